@@ -1,0 +1,7 @@
+# One benchmark program, made of the x_bench.cc beside the code.
+find_package(benchmark REQUIRED)
+file(GLOB_RECURSE benches CONFIGURE_DEPENDS ${PROJECT_SOURCE_DIR}/src/mjsense/*_bench.cc)
+if(benches)
+  add_executable(mjsense_bench ${benches})
+  target_link_libraries(mjsense_bench PRIVATE mjsense ${MJSENSE_PRIVATE_LIBS} benchmark::benchmark benchmark::benchmark_main)
+endif()

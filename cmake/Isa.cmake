@@ -1,0 +1,11 @@
+# Instruction sets. The library runs on any x86-64. Files named *_avx2.cc and *_avx512.cc are compiled for these and chosen at
+# run time (core/cpu.h), so that a machine without them never meets an illegal instruction.
+if(CMAKE_SYSTEM_PROCESSOR MATCHES "x86_64|AMD64")
+  foreach(file IN LISTS MJSENSE_SOURCES)
+    if(file MATCHES "_avx2\\.cc$")
+      set_source_files_properties(${file} PROPERTIES COMPILE_OPTIONS "-march=x86-64-v3;-O3")
+    elseif(file MATCHES "_avx512\\.cc$")
+      set_source_files_properties(${file} PROPERTIES COMPILE_OPTIONS "-march=x86-64-v4;-mprefer-vector-width=512;-O3")
+    endif()
+  endforeach()
+endif()

@@ -1,0 +1,50 @@
+#pragma once
+// Errors that name the place, the value, the expectation and the nearest valid names.
+
+#include <span>
+#include <stdexcept>
+#include <string>
+#include <string_view>
+#include <vector>
+
+namespace mjsense {
+
+// What Python sees: ValueError, KeyError, RuntimeError.
+enum class ErrorKind { kValue, kKey, kRuntime };
+
+class Error : public std::runtime_error {
+ public:
+  Error(ErrorKind kind, const std::string& message) : std::runtime_error(message), kind_(kind) {}
+  ErrorKind kind() const { return kind_; }
+
+ private:
+  ErrorKind kind_;
+};
+
+// A wrong argument or configuration.
+struct ValueError : Error {
+  explicit ValueError(const std::string& message) : Error(ErrorKind::kValue, message) {}
+};
+
+// A name that does not exist.
+struct KeyError : Error {
+  explicit KeyError(const std::string& message) : Error(ErrorKind::kKey, message) {}
+};
+
+// Something outside our control failed: a file, a program, the physics.
+struct RuntimeError : Error {
+  explicit RuntimeError(const std::string& message) : Error(ErrorKind::kRuntime, message) {}
+};
+
+// The (at most `most`) candidates nearest to `name` by edit distance, best first; none that share too little.
+std::vector<std::string> nearest_names(std::string_view name, std::span<const std::string> candidates,
+                                       std::size_t most = 3);
+
+// "; did you mean 'a' or 'b'?" or, when nothing is near, "; available: a, b, c" (the first 12). "" if there are none.
+std::string suggest(std::string_view name, std::span<const std::string> candidates);
+
+// KeyError "sensor 'feet': no geom named 'FR_fot'; did you mean 'FR_foot'?"
+[[noreturn]] void throw_unknown(std::string_view place, std::string_view kind, std::string_view name,
+                                std::span<const std::string> candidates);
+
+}  // namespace mjsense

@@ -1,0 +1,83 @@
+#include "mjsense/core/parallel.h"
+
+#include <sched.h>
+
+#include <algorithm>
+
+namespace mjsense {
+
+int available_cpus() {
+  cpu_set_t set;
+  if (sched_getaffinity(0, sizeof set, &set) == 0) return std::max(1, CPU_COUNT(&set));
+  return std::max(1, static_cast<int>(std::thread::hardware_concurrency()));
+}
+
+ThreadPool::ThreadPool(int threads) {
+  const int count = threads > 0 ? threads : available_cpus();
+  for (int t = 1; t < count; ++t) workers_.emplace_back([this, t] { worker(t); });
+}
+
+ThreadPool::~ThreadPool() {
+  {
+    const std::lock_guard lock(mutex_);
+    stop_ = true;
+  }
+  wake_.notify_all();
+  for (std::thread& w : workers_) w.join();
+}
+
+void ThreadPool::run_raw(int n, Fn fn, void* ctx) {
+  if (n <= 0) return;
+  fn_ = fn;
+  ctx_ = ctx;
+  n_ = n;
+  failed_item_ = -1;
+  failure_ = nullptr;
+  next_.store(0, std::memory_order_relaxed);
+  const bool alone = workers_.empty() || n == 1;
+  if (!alone) {
+    {
+      const std::lock_guard lock(mutex_);
+      active_ = static_cast<int>(workers_.size());
+      ++epoch_;
+    }
+    wake_.notify_all();
+  }
+  work(0);
+  if (!alone) {
+    std::unique_lock lock(mutex_);
+    done_.wait(lock, [this] { return active_ == 0; });
+  }
+  if (failure_) std::rethrow_exception(std::exchange(failure_, nullptr));
+}
+
+void ThreadPool::work(int thread) {
+  for (int i = next_.fetch_add(1, std::memory_order_relaxed); i < n_; i = next_.fetch_add(1, std::memory_order_relaxed)) {
+    try {
+      fn_(ctx_, i, thread);
+    } catch (...) {
+      const std::lock_guard lock(mutex_);
+      if (failed_item_ < 0 || i < failed_item_) {
+        failed_item_ = i;
+        failure_ = std::current_exception();
+      }
+    }
+  }
+}
+
+void ThreadPool::worker(int thread) {
+  std::uint64_t seen = 0;
+  while (true) {
+    {
+      std::unique_lock lock(mutex_);
+      wake_.wait(lock, [&] { return stop_ || epoch_ != seen; });
+      if (stop_) return;
+      seen = epoch_;
+    }
+    work(thread);
+    const std::lock_guard lock(mutex_);
+    if (--active_ == 0) done_.notify_one();
+  }
+}
+
+}  // namespace mjsense

@@ -1,0 +1,58 @@
+#pragma once
+// A pool for casting rays and shading tiles. Physics runs on MuJoCo's own pool; the two never run at the same time, so
+// together they never use more threads than asked for.
+
+#include <atomic>
+#include <condition_variable>
+#include <cstdint>
+#include <exception>
+#include <mutex>
+#include <thread>
+#include <type_traits>
+#include <utility>
+#include <vector>
+
+namespace mjsense {
+
+class ThreadPool {
+ public:
+  // `threads` includes the caller's; <= 0: one per CPU that this process may use.
+  explicit ThreadPool(int threads);
+  ~ThreadPool();
+  ThreadPool(const ThreadPool&) = delete;
+  ThreadPool& operator=(const ThreadPool&) = delete;
+
+  int size() const { return static_cast<int>(workers_.size()) + 1; }
+
+  // Runs body(item, thread) for item in [0, n), thread in [0, size()); returns when all are done. Items are handed out in
+  // order. The exception of the lowest failing item is rethrown here; the other items still run. Allocates nothing.
+  template <class Body>
+  void run(int n, Body&& body) {
+    run_raw(n, [](void* ctx, int item, int thread) { (*static_cast<std::remove_reference_t<Body>*>(ctx))(item, thread); },
+            const_cast<void*>(static_cast<const void*>(&body)));
+  }
+
+ private:
+  using Fn = void (*)(void* ctx, int item, int thread);
+  void run_raw(int n, Fn fn, void* ctx);
+  void work(int thread);
+  void worker(int thread);
+
+  std::vector<std::thread> workers_;
+  std::mutex mutex_;
+  std::condition_variable wake_, done_;
+  std::uint64_t epoch_ = 0;
+  int active_ = 0;
+  bool stop_ = false;
+  Fn fn_ = nullptr;
+  void* ctx_ = nullptr;
+  int n_ = 0;
+  std::atomic<int> next_{0};
+  int failed_item_ = -1;
+  std::exception_ptr failure_;
+};
+
+// CPUs that this process may run on (its affinity mask, not the machine's count).
+int available_cpus();
+
+}  // namespace mjsense

@@ -1,0 +1,37 @@
+#include "mjsense/core/sensor.h"
+
+#include <fmt/format.h>
+
+#include <vector>
+
+#include "mjsense/core/error.h"
+
+namespace mjsense {
+
+void Sensor::edit_spec(mjSpec* /*spec*/) {}
+void Sensor::substep(const World& /*world*/) {}
+void Sensor::cast(const CastContext& /*context*/) {}
+void Sensor::reset(const World& /*world*/) {}
+
+const Field& Sensor::field(std::string_view name) const {
+  std::vector<std::string> names;
+  for (const Field& f : fields_) {
+    if (f.name == name) return f;
+    names.push_back(f.name);
+  }
+  throw_unknown(fmt::format("sensor '{}'", name_), "field", name, names);
+}
+
+std::size_t Sensor::bytes_per_world() const {
+  std::size_t n = 0;
+  for (const Field& f : fields_) n += f.data.row_bytes();
+  return n;
+}
+
+Field& Sensor::add_field(std::string_view name, SensorSpec spec, int num_worlds) {
+  spec.name = name.empty() ? name_ : fmt::format("{}/{}", name_, name);
+  Array data(spec.dtype, spec.shape.with_front(num_worlds));
+  return fields_.emplace_back(Field{std::string(name), std::move(spec), std::move(data)});
+}
+
+}  // namespace mjsense
