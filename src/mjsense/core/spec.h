@@ -8,6 +8,13 @@
 
 namespace mjsense {
 
+// How a recording keeps a stream.
+enum class Storage {
+  kArray,       // a dataset with one row a step
+  kRgbVideo,    // uint8 [H, W, 3], row 0 the top: one MP4 a camera
+  kDepthVideo,  // float32 [H, W] metres: one lossless video a camera
+};
+
 struct SensorSpec {
   std::string name;                 // full name of the stream: "robot/imu_acc", "feet/force", "wrist_camera_depth"
   DType dtype = DType::kFloat32;
@@ -18,6 +25,7 @@ struct SensorSpec {
   double high = std::numeric_limits<double>::infinity();
   bool is_dict = false;             // the row is JSON text, uint8[str_max_len], padded with 0
   int str_max_len = 0;              // bytes of an is_dict row
+  Storage storage = Storage::kArray;
   std::string description;          // one sentence: what is measured, with its sign
 };
 
