@@ -31,10 +31,12 @@ DType dtype_from_name(std::string_view name) {
   throw ValueError(fmt::format("unknown dtype '{}'", name));
 }
 
-Shape::Shape(std::initializer_list<std::int64_t> dims) : Shape(std::span(dims.begin(), dims.size())) {}
+Shape::Shape(std::initializer_list<std::int64_t> dims)
+    : Shape(std::span(dims.begin(), dims.size())) {}
 
 Shape::Shape(std::span<const std::int64_t> dims) {
-  if (dims.size() > kMaxRank) throw ValueError(fmt::format("array of rank {}: at most {}", dims.size(), kMaxRank));
+  if (dims.size() > kMaxRank)
+    throw ValueError(fmt::format("array of rank {}: at most {}", dims.size(), kMaxRank));
   for (std::int64_t d : dims) {
     if (d < 0) throw ValueError(fmt::format("negative dimension {}", d));
     dims_[rank_++] = d;

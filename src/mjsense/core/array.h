@@ -1,5 +1,6 @@
 #pragma once
-// Typed n-dimensional arrays: what a sensor owns, a suite observes, a recording stores and Python sees without a copy.
+// Typed n-dimensional arrays: what a sensor owns, a suite observes, a recording stores and Python
+// sees without a copy.
 
 #include <array>
 #include <cstddef>
@@ -15,17 +16,39 @@ namespace mjsense {
 enum class DType : std::uint8_t { kFloat32, kFloat64, kUint8, kUint16, kInt32, kInt64, kBool };
 
 std::size_t dtype_size(DType dtype);
-std::string_view dtype_name(DType dtype);  // NumPy's name: "float32", "uint8", "bool" ...
+std::string_view dtype_name(DType dtype);      // NumPy's name: "float32", "uint8", "bool" ...
 DType dtype_from_name(std::string_view name);  // throws ValueError
 
-template <class T> constexpr DType dtype_of();
-template <> constexpr DType dtype_of<float>() { return DType::kFloat32; }
-template <> constexpr DType dtype_of<double>() { return DType::kFloat64; }
-template <> constexpr DType dtype_of<std::uint8_t>() { return DType::kUint8; }
-template <> constexpr DType dtype_of<std::uint16_t>() { return DType::kUint16; }
-template <> constexpr DType dtype_of<std::int32_t>() { return DType::kInt32; }
-template <> constexpr DType dtype_of<std::int64_t>() { return DType::kInt64; }
-template <> constexpr DType dtype_of<bool>() { return DType::kBool; }
+template <class T>
+constexpr DType dtype_of();
+template <>
+constexpr DType dtype_of<float>() {
+  return DType::kFloat32;
+}
+template <>
+constexpr DType dtype_of<double>() {
+  return DType::kFloat64;
+}
+template <>
+constexpr DType dtype_of<std::uint8_t>() {
+  return DType::kUint8;
+}
+template <>
+constexpr DType dtype_of<std::uint16_t>() {
+  return DType::kUint16;
+}
+template <>
+constexpr DType dtype_of<std::int32_t>() {
+  return DType::kInt32;
+}
+template <>
+constexpr DType dtype_of<std::int64_t>() {
+  return DType::kInt64;
+}
+template <>
+constexpr DType dtype_of<bool>() {
+  return DType::kBool;
+}
 
 // Up to 6 dimensions, without allocation.
 class Shape {
@@ -38,7 +61,9 @@ class Shape {
   int rank() const { return rank_; }
   std::int64_t operator[](int i) const { return dims_[i]; }
   std::int64_t size() const;  // number of elements; 1 for a scalar
-  std::span<const std::int64_t> dims() const { return {dims_.data(), static_cast<std::size_t>(rank_)}; }
+  std::span<const std::int64_t> dims() const {
+    return {dims_.data(), static_cast<std::size_t>(rank_)};
+  }
   Shape with_front(std::int64_t dim) const;  // (dim, *this)
   Shape without_front() const;
   bool operator==(const Shape& other) const;
@@ -49,7 +74,8 @@ class Shape {
   int rank_ = 0;
 };
 
-// An array somebody else owns. Strides are in bytes; row-major and dense unless the owner says otherwise.
+// An array somebody else owns. Strides are in bytes; row-major and dense unless the owner says
+// otherwise.
 struct ArrayView {
   std::byte* data = nullptr;
   DType dtype = DType::kFloat32;
@@ -77,14 +103,20 @@ class Array {
   const std::byte* row_data(int w) const { return data_.get() + w * row_bytes(); }
 
   // Row w as a flat span. T must be the array's element type.
-  template <class T> std::span<T> row(int w) {
+  template <class T>
+  std::span<T> row(int w) {
     return {reinterpret_cast<T*>(row_data(w)), row_elements_};
   }
-  template <class T> std::span<const T> row(int w) const {
+  template <class T>
+  std::span<const T> row(int w) const {
     return {reinterpret_cast<const T*>(row_data(w)), row_elements_};
   }
-  template <class T> std::span<T> all() { return {reinterpret_cast<T*>(data()), static_cast<std::size_t>(shape_.size())}; }
-  template <class T> std::span<const T> all() const {
+  template <class T>
+  std::span<T> all() {
+    return {reinterpret_cast<T*>(data()), static_cast<std::size_t>(shape_.size())};
+  }
+  template <class T>
+  std::span<const T> all() const {
     return {reinterpret_cast<const T*>(data()), static_cast<std::size_t>(shape_.size())};
   }
 

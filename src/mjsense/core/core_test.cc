@@ -31,7 +31,8 @@ TEST(Array, RowsAreDenseAlignedAndZero) {
 }
 
 TEST(Errors, NameTheNearest) {
-  const std::vector<std::string> names = {"robot/FR_foot", "robot/FL_foot", "terrain", "robot/trunk"};
+  const std::vector<std::string> names = {"robot/FR_foot", "robot/FL_foot", "terrain",
+                                          "robot/trunk"};
   EXPECT_THAT(nearest_names("robot/FR_fot", names), ElementsAre("robot/FR_foot", "robot/FL_foot"));
   EXPECT_THAT(nearest_names("trunk", names), ElementsAre("robot/trunk"));
   EXPECT_THAT(nearest_names("zzz", names), ElementsAre());
@@ -45,7 +46,8 @@ TEST(Errors, NameTheNearest) {
 }
 
 TEST(Rng, SameNumbersInAnyOrderAndUniform) {
-  Rng a(7, 3, stream_of("imu"), 11), b(7, 3, stream_of("imu"), 11), other(7, 4, stream_of("imu"), 11);
+  Rng a(7, 3, stream_of("imu"), 11), b(7, 3, stream_of("imu"), 11),
+      other(7, 4, stream_of("imu"), 11);
   int same = 0;
   for (int i = 0; i < 100; ++i) {
     const auto x = a.next();
@@ -97,9 +99,15 @@ TEST(Json, FloatsAsPythonWritesThem) {
 TEST(Json, WritesPaddedSortedAsciiRows) {
   std::vector<std::uint8_t> row(64, 255);
   JsonWriter json(row);
-  json.begin_object().key("arm").values(std::vector<double>{0.5, -1}).key("b\xC3\xA9\xF0\x9F\x98\x80").value(true).end_object();
+  json.begin_object()
+      .key("arm")
+      .values(std::vector<double>{0.5, -1})
+      .key("b\xC3\xA9\xF0\x9F\x98\x80")
+      .value(true)
+      .end_object();
   ASSERT_TRUE(json.finish());
-  EXPECT_EQ(std::string(reinterpret_cast<char*>(row.data())), R"({"arm":[0.5,-1.0],"b\u00e9\ud83d\ude00":true})");
+  EXPECT_EQ(std::string(reinterpret_cast<char*>(row.data())),
+            R"({"arm":[0.5,-1.0],"b\u00e9\ud83d\ude00":true})");
   EXPECT_EQ(row.back(), 0);
 }
 
@@ -122,9 +130,15 @@ TEST(ThreadPool, RunsEveryItemOnceAndReportsTheFirstFailure) {
       pool.run(37, [&](int i, int) { ++hits[i]; });
       for (auto& h : hits) EXPECT_EQ(h, 1);
     }
-    EXPECT_THROW(pool.run(9, [](int i, int) { if (i % 4 == 3) throw RuntimeError(std::to_string(i)); }), RuntimeError);
+    EXPECT_THROW(pool.run(9,
+                          [](int i, int) {
+                            if (i % 4 == 3) throw RuntimeError(std::to_string(i));
+                          }),
+                 RuntimeError);
     try {
-      pool.run(9, [](int i, int) { if (i % 4 == 3) throw RuntimeError(std::to_string(i)); });
+      pool.run(9, [](int i, int) {
+        if (i % 4 == 3) throw RuntimeError(std::to_string(i));
+      });
     } catch (const RuntimeError& e) {
       EXPECT_STREQ(e.what(), "3");
     }

@@ -16,7 +16,10 @@ int distance(std::string_view a, std::string_view b) {
     for (std::size_t j = 1; j <= b.size(); ++j) {
       const bool same = a[i - 1] == b[j - 1];
       const bool same_letter = std::tolower(a[i - 1]) == std::tolower(b[j - 1]);
-      d[i][j] = std::min({d[i - 1][j] + 2, d[i][j - 1] + 2, d[i - 1][j - 1] + (same ? 0 : same_letter ? 1 : 2)});
+      d[i][j] = std::min({d[i - 1][j] + 2, d[i][j - 1] + 2,
+                          d[i - 1][j - 1] + (same          ? 0
+                                             : same_letter ? 1
+                                                           : 2)});
       if (i > 1 && j > 1 && a[i - 1] == b[j - 2] && a[i - 2] == b[j - 1]) {
         d[i][j] = std::min(d[i][j], d[i - 2][j - 2] + 2);
       }
@@ -27,8 +30,8 @@ int distance(std::string_view a, std::string_view b) {
 
 }  // namespace
 
-std::vector<std::string> nearest_names(std::string_view name, std::span<const std::string> candidates,
-                                       std::size_t most) {
+std::vector<std::string> nearest_names(std::string_view name,
+                                       std::span<const std::string> candidates, std::size_t most) {
   std::vector<std::pair<int, std::string>> scored;
   for (const std::string& c : candidates) {
     int d = distance(name, c);
@@ -39,7 +42,8 @@ std::vector<std::string> nearest_names(std::string_view name, std::span<const st
       scored.emplace_back(d, c);
     }
   }
-  std::stable_sort(scored.begin(), scored.end(), [](auto& a, auto& b) { return a.first < b.first; });
+  std::stable_sort(scored.begin(), scored.end(),
+                   [](auto& a, auto& b) { return a.first < b.first; });
   std::vector<std::string> names;
   for (auto& [d, c] : scored) {
     if (names.size() == most) break;
@@ -60,12 +64,14 @@ std::string suggest(std::string_view name, std::span<const std::string> candidat
   if (candidates.empty()) return "";
   constexpr std::size_t kMost = 12;
   const auto shown = candidates.first(std::min(candidates.size(), kMost));
-  return fmt::format("; available: {}{}", fmt::join(shown, ", "), candidates.size() > kMost ? ", ..." : "");
+  return fmt::format("; available: {}{}", fmt::join(shown, ", "),
+                     candidates.size() > kMost ? ", ..." : "");
 }
 
 void throw_unknown(std::string_view place, std::string_view kind, std::string_view name,
                    std::span<const std::string> candidates) {
-  throw KeyError(fmt::format("{}: no {} named '{}'{}", place, kind, name, suggest(name, candidates)));
+  throw KeyError(
+      fmt::format("{}: no {} named '{}'{}", place, kind, name, suggest(name, candidates)));
 }
 
 }  // namespace mjsense

@@ -14,7 +14,8 @@ void JsonWriter::put(char c) {
 }
 
 void JsonWriter::put(std::string_view text) {
-  if (size_ + text.size() <= row_.size()) std::memcpy(row_.data() + size_, text.data(), text.size());
+  if (size_ + text.size() <= row_.size())
+    std::memcpy(row_.data() + size_, text.data(), text.size());
   size_ += text.size();
 }
 
@@ -115,12 +116,14 @@ JsonWriter& JsonWriter::values(std::span<const float> xs) {
   return end_array();
 }
 
-// Python's ensure_ascii: UTF-8 is decoded and written as \uXXXX, as a surrogate pair beyond the basic plane; a byte that is
-// not UTF-8 becomes U+FFFD.
+// Python's ensure_ascii: UTF-8 is decoded and written as \uXXXX, as a surrogate pair beyond the
+// basic plane; a byte that is not UTF-8 becomes U+FFFD.
 void JsonWriter::string(std::string_view text) {
   auto escape = [this](unsigned code) {
     constexpr char kHex[] = "0123456789abcdef";
-    const char u[6] = {'\\', 'u', kHex[code >> 12 & 15], kHex[code >> 8 & 15], kHex[code >> 4 & 15], kHex[code & 15]};
+    const char u[6] = {
+        '\\',           'u', kHex[code >> 12 & 15], kHex[code >> 8 & 15], kHex[code >> 4 & 15],
+        kHex[code & 15]};
     put(std::string_view(u, 6));
   };
   put('"');
@@ -129,15 +132,32 @@ void JsonWriter::string(std::string_view text) {
     if (c < 0x80) {
       ++i;
       switch (c) {
-        case '"': put("\\\""); break;
-        case '\\': put("\\\\"); break;
-        case '\n': put("\\n"); break;
-        case '\r': put("\\r"); break;
-        case '\t': put("\\t"); break;
-        case '\b': put("\\b"); break;
-        case '\f': put("\\f"); break;
+        case '"':
+          put("\\\"");
+          break;
+        case '\\':
+          put("\\\\");
+          break;
+        case '\n':
+          put("\\n");
+          break;
+        case '\r':
+          put("\\r");
+          break;
+        case '\t':
+          put("\\t");
+          break;
+        case '\b':
+          put("\\b");
+          break;
+        case '\f':
+          put("\\f");
+          break;
         default:
-          if (c < 0x20) escape(c); else put(static_cast<char>(c));
+          if (c < 0x20)
+            escape(c);
+          else
+            put(static_cast<char>(c));
       }
       continue;
     }
@@ -179,7 +199,8 @@ int format_python_float(double x, char* out) {
   if (std::isnan(x)) return copy("NaN");
   if (std::isinf(x)) return copy(x > 0 ? "Infinity" : "-Infinity");
   if (x == 0.0) return copy(std::signbit(x) ? "-0.0" : "0.0");
-  // Shortest digits in scientific form, then laid out as repr() does: an exponent below -4 or from 16 on is written as one.
+  // Shortest digits in scientific form, then laid out as repr() does: an exponent below -4 or from
+  // 16 on is written as one.
   char sci[32];
   const char* end = std::to_chars(sci, sci + sizeof sci, x, std::chars_format::scientific).ptr;
   const char* p = sci;

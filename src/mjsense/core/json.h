@@ -1,7 +1,8 @@
 #pragma once
 // JSON text of dict sensors, byte for byte what Python's
-// json.dumps(x, sort_keys=True, separators=(",", ":")) gives (spec: floats as their shortest round trip, NaN and Infinity
-// as Python writes them, ASCII only), written straight into a fixed row. Nothing allocates.
+// json.dumps(x, sort_keys=True, separators=(",", ":")) gives (spec: floats as their shortest round
+// trip, NaN and Infinity as Python writes them, ASCII only), written straight into a fixed row.
+// Nothing allocates.
 
 #include <cstdint>
 #include <span>
@@ -14,7 +15,8 @@ class JsonWriter {
   // Writes into `row`; what is not used is filled with 0 by finish().
   explicit JsonWriter(std::span<std::uint8_t> row) : row_(row) {}
 
-  // Members of an object must be written in sorted order of their keys; a key that is not raises std::logic_error.
+  // Members of an object must be written in sorted order of their keys; a key that is not raises
+  // std::logic_error.
   JsonWriter& begin_object();
   JsonWriter& end_object();
   JsonWriter& begin_array();
@@ -37,7 +39,8 @@ class JsonWriter {
   std::size_t size() const { return size_; }
   bool fits() const { return size_ <= row_.size(); }
 
-  // Pads with 0. Returns fits(): a text that does not fit is the caller's error to report, never cut silently.
+  // Pads with 0. Returns fits(): a text that does not fit is the caller's error to report, never
+  // cut silently.
   bool finish();
 
  private:
@@ -58,8 +61,8 @@ class JsonWriter {
   } levels_[kMaxDepth];
 };
 
-// Python's repr(float): the shortest text that reads back as x ("1.0", "1e-05", "-0.0", "NaN", "Infinity").
-// Writes at most 32 bytes; returns their number.
+// Python's repr(float): the shortest text that reads back as x ("1.0", "1e-05", "-0.0", "NaN",
+// "Infinity"). Writes at most 32 bytes; returns their number.
 int format_python_float(double x, char* out);
 
 }  // namespace mjsense

@@ -52,7 +52,8 @@ void ThreadPool::run_raw(int n, Fn fn, void* ctx) {
 }
 
 void ThreadPool::work(int thread) {
-  for (int i = next_.fetch_add(1, std::memory_order_relaxed); i < n_; i = next_.fetch_add(1, std::memory_order_relaxed)) {
+  for (int i = next_.fetch_add(1, std::memory_order_relaxed); i < n_;
+       i = next_.fetch_add(1, std::memory_order_relaxed)) {
     try {
       fn_(ctx_, i, thread);
     } catch (...) {

@@ -1,6 +1,6 @@
 #pragma once
-// A pool for casting rays and shading tiles. Physics runs on MuJoCo's own pool; the two never run at the same time, so
-// together they never use more threads than asked for.
+// A pool for casting rays and shading tiles. Physics runs on MuJoCo's own pool; the two never run
+// at the same time, so together they never use more threads than asked for.
 
 #include <atomic>
 #include <condition_variable>
@@ -24,12 +24,17 @@ class ThreadPool {
 
   int size() const { return static_cast<int>(workers_.size()) + 1; }
 
-  // Runs body(item, thread) for item in [0, n), thread in [0, size()); returns when all are done. Items are handed out in
-  // order. The exception of the lowest failing item is rethrown here; the other items still run. Allocates nothing.
+  // Runs body(item, thread) for item in [0, n), thread in [0, size()); returns when all are done.
+  // Items are handed out in order. The exception of the lowest failing item is rethrown here; the
+  // other items still run. Allocates nothing.
   template <class Body>
   void run(int n, Body&& body) {
-    run_raw(n, [](void* ctx, int item, int thread) { (*static_cast<std::remove_reference_t<Body>*>(ctx))(item, thread); },
-            const_cast<void*>(static_cast<const void*>(&body)));
+    run_raw(
+        n,
+        [](void* ctx, int item, int thread) {
+          (*static_cast<std::remove_reference_t<Body>*>(ctx))(item, thread);
+        },
+        const_cast<void*>(static_cast<const void*>(&body)));
   }
 
  private:

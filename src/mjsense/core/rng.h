@@ -1,6 +1,7 @@
 #pragma once
-// Random numbers that are a pure function of (seed, world, stream, step, draw): the same at any thread count and any order.
-// Philox4x32-10: Salmon et al., "Parallel random numbers: as easy as 1, 2, 3", SC 2011.
+// Random numbers that are a pure function of (seed, world, stream, step, draw): the same at any
+// thread count and any order. Philox4x32-10: Salmon et al., "Parallel random numbers: as easy as 1,
+// 2, 3", SC 2011.
 
 #include <array>
 #include <cmath>
@@ -19,10 +20,13 @@ constexpr std::uint32_t stream_of(std::string_view name) {
 
 class Rng {
  public:
-  // `step` identifies the moment (a world's step counter, or its episode number for draws made at reset).
+  // `step` identifies the moment (a world's step counter, or its episode number for draws made at
+  // reset).
   Rng(std::uint64_t seed, std::uint32_t world, std::uint32_t stream, std::uint64_t step)
-      : key_{static_cast<std::uint32_t>(seed) ^ (stream * 0x9E3779B9u), static_cast<std::uint32_t>(seed >> 32) ^ stream},
-        counter_{0, world, static_cast<std::uint32_t>(step), static_cast<std::uint32_t>(step >> 32)} {}
+      : key_{static_cast<std::uint32_t>(seed) ^ (stream * 0x9E3779B9u),
+             static_cast<std::uint32_t>(seed >> 32) ^ stream},
+        counter_{0, world, static_cast<std::uint32_t>(step),
+                 static_cast<std::uint32_t>(step >> 32)} {}
 
   std::uint32_t next() {
     if (used_ == 4) refill();
@@ -39,7 +43,8 @@ class Rng {
     std::uint64_t product = static_cast<std::uint64_t>(next()) * n;
     if (static_cast<std::uint32_t>(product) < n) {
       const std::uint32_t threshold = (0u - n) % n;
-      while (static_cast<std::uint32_t>(product) < threshold) product = static_cast<std::uint64_t>(next()) * n;
+      while (static_cast<std::uint32_t>(product) < threshold)
+        product = static_cast<std::uint64_t>(next()) * n;
     }
     return static_cast<std::uint32_t>(product >> 32);
   }

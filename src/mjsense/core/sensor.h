@@ -1,13 +1,15 @@
 #pragma once
-// The one idea of mjsense: a named, typed, batched measurement. Given B worlds a sensor owns preallocated rows [B, ...] and
-// fills row w from world w. Scene sensors, observation sensors and users' own are this class and have this life:
+// The one idea of mjsense: a named, typed, batched measurement. Given B worlds a sensor owns
+// preallocated rows [B, ...] and fills row w from world w. Scene sensors, observation sensors and
+// users' own are this class and have this life:
 //
 //   edit_spec(spec)       before compilation: add the MuJoCo elements it needs
-//   initialize(init)      after compilation: resolve names to ids, declare fields; from here on no allocation
-//   substep(world)        after each physics step, if wants_substep(): air time, history
-//   compute(world)        fill row w; a pure function of (model, data, the sensor's own state, its RNG key)
-//   cast(rays)            stage kCast only: trace what compute() prepared, for many worlds at once
-//   reset(world)          forget the episode of this world; compute() follows before anybody reads
+//   initialize(init)      after compilation: resolve names to ids, declare fields; from here on no
+//   allocation substep(world)        after each physics step, if wants_substep(): air time, history
+//   compute(world)        fill row w; a pure function of (model, data, the sensor's own state, its
+//   RNG key) cast(context)         stages kCast and kBatch: the work that is done for many worlds
+//   at once reset(world)          forget the episode of this world; compute() follows before
+//   anybody reads
 
 #include <mujoco/mujoco.h>
 
@@ -28,28 +30,33 @@ class RayScene;
 class Scene;
 class ThreadPool;
 
-// One world as a sensor sees it. In compute() and substep() every derived field of `data` belongs to its present state:
-// positions, velocities, accelerations, contacts and their forces. `model` holds the world's own values of randomised
-// fields and is valid during the call only. MuJoCo errors leave a call by longjmp: hold no object with a destructor across
-// a MuJoCo function that can fail.
+// One world as a sensor sees it. In compute() and substep() every derived field of `data` belongs
+// to its present state: positions, velocities, accelerations, contacts and their forces. `model`
+// holds the world's own values of randomised fields and is valid during the call only. MuJoCo
+// errors leave a call by longjmp: hold no object with a destructor across a MuJoCo function that
+// can fail.
 struct World {
-  int id = 0;                  // row, 0 .. B-1
+  int id = 0;  // row, 0 .. B-1
   const mjModel* model = nullptr;
   mjData* data = nullptr;
-  std::int64_t substep = 0;    // physics steps since this world's last reset; time = substep * model->opt.timestep
-  std::int64_t tick = 0;       // physics steps since the last seeding; never goes back at a reset: the RNG's step
-  std::int64_t episode = 0;    // resets of this world since the last seeding
+  std::int64_t substep =
+      0;  // physics steps since this world's last reset; time = substep * model->opt.timestep
+  std::int64_t tick =
+      0;  // physics steps since the last seeding; never goes back at a reset: the RNG's step
+  std::int64_t episode = 0;  // resets of this world since the last seeding
   std::uint64_t seed = 0;
-  bool first = false;          // first compute() since the reset
+  bool first = false;  // no step was taken since the reset
 
   double dt() const { return model->opt.timestep; }
   double time() const { return static_cast<double>(substep) * model->opt.timestep; }
   // Numbers for this moment: the same at any thread count and any B.
-  Rng rng(std::uint32_t stream) const { return {seed, static_cast<std::uint32_t>(id), stream, static_cast<std::uint64_t>(tick)}; }
+  Rng rng(std::uint32_t stream) const {
+    return {seed, static_cast<std::uint32_t>(id), stream, static_cast<std::uint64_t>(tick)};
+  }
 };
 
-// One typed buffer of a sensor and what it means. A sensor with one field names it ""; its stream is the sensor's own name.
-// Another field's stream is "sensor/field".
+// One typed buffer of a sensor and what it means. A sensor with one field names it ""; its stream
+// is the sensor's own name. Another field's stream is "sensor/field".
 struct Field {
   std::string name;
   SensorSpec spec;
@@ -60,7 +67,7 @@ struct SensorInit {
   const mjModel* model = nullptr;
   const Scene* scene = nullptr;  // null where a sensor is used without a scene
   int num_worlds = 1;
-  int decimation = 1;            // substeps per control step
+  int decimation = 1;  // substeps per control step
   int threads = 1;
 };
 
@@ -75,6 +82,7 @@ enum class Stage {
   kRow,       // compute() alone fills the row
   kCast,      // compute() prepares poses, cast() traces
   kPostCast,  // compute() reads rows of kCast sensors: runs after them
+  kBatch,     // cast() alone, on the caller's thread, after all others: sensors written in Python
 };
 
 class Sensor {
@@ -85,7 +93,7 @@ class Sensor {
   Sensor& operator=(const Sensor&) = delete;
 
   const std::string& name() const { return name_; }  // key in its scene or suite
-  virtual std::string_view kind() const = 0;          // "builtin", "contact", "camera", ...
+  virtual std::string_view kind() const = 0;         // "builtin", "contact", "camera", ...
 
   virtual void edit_spec(mjSpec* spec);
   virtual void initialize(const SensorInit& init) = 0;
@@ -104,7 +112,8 @@ class Sensor {
   // Fields, valid after initialize(). Their addresses do not change.
   std::deque<Field>& fields() { return fields_; }
   const std::deque<Field>& fields() const { return fields_; }
-  const Field& field(std::string_view name = "") const;  // throws KeyError naming the fields there are
+  const Field& field(
+      std::string_view name = "") const;  // throws KeyError naming the fields there are
   std::size_t bytes_per_world() const;
 
  protected:
@@ -122,7 +131,8 @@ struct SensorCfg {
   std::string name;
   virtual ~SensorCfg() = default;
   virtual std::unique_ptr<Sensor> build() const = 0;
-  // Key in the scene's registry: "robot/imu" for a built-in sensor on an entity, else the plain name.
+  // Key in the scene's registry: "robot/imu" for a built-in sensor on an entity, else the plain
+  // name.
   virtual std::string key() const { return name; }
 
  protected:

@@ -1,14 +1,17 @@
 #pragma once
-// B parallel worlds: a thin owner of MuJoCo's mjBatch (persistent, one mjData a world). Steps, resets, clocks, and the promise
-// that after step(), reset() and forward() every derived field of a world belongs to its present state.
+// B parallel worlds: a thin owner of MuJoCo's mjBatch (persistent, one mjData a world). Steps,
+// resets, clocks, and the promise that after step(), reset() and forward() every derived field of a
+// world belongs to its present state.
 
 #include <mujoco/mjbatch.h>
 #include <mujoco/mujoco.h>
 
 #include <cstdint>
+#include <exception>
 #include <memory>
 #include <span>
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include "mjsense/core/array.h"
@@ -16,13 +19,16 @@
 
 namespace mjsense {
 
-// What happens inside the parallel pass over worlds, on MuJoCo's threads. Exceptions are caught, and rethrown by the call.
+// What happens inside the parallel pass over worlds, on MuJoCo's threads. Exceptions are caught,
+// and rethrown by the call.
 class WorldHooks {
  public:
   virtual ~WorldHooks() = default;
   virtual bool wants_substep() const { return false; }
   virtual void substep(const World& world) = 0;  // after every physics step, world fresh
-  virtual void refreshed(const World& world) = 0;  // once, at the end of step/reset/forward, world fresh
+  virtual void reset(const World& world) = 0;    // this world begins a new episode, world fresh
+  virtual void refreshed(
+      const World& world) = 0;  // once, at the end of step/reset/forward/visit, world fresh
 };
 
 // A world whose physics went wrong in the last call. It was reset alone; the others went on.
@@ -52,16 +58,21 @@ class Worlds {
   void forward(std::span<const int> ids, WorldHooks& hooks);
   // key: keyframe, -1 the model's defaults.
   void reset(std::span<const int> ids, int key, WorldHooks& hooks);
-  // The same without making anything current: plain mj_step, as MuJoCo's users know it.
+  // Plain mj_step: derived fields stay one substep behind the state, as MuJoCo's users know it.
   void step_raw(int substeps);
-  // Runs body on the worlds' fresh data; nothing of the state changes.
+  // refreshed() on worlds as they are. State rows written since the last call are made current
+  // first.
   void visit(std::span<const int> ids, WorldHooks& hooks);
+  // Model fields of the batch (mjb_expand) were written: the next step must not reuse what was
+  // computed from the old ones.
+  void model_changed() { model_version_++; }
 
   // Worlds that failed in the last call, by index. Their state is the reset state.
   const std::vector<Failure>& failures() const { return failures_; }
 
   // Live views of the state rows, [B, n] float64, strided. Call forward() after writing.
-  // Names: time qpos qvel act ctrl qfrc_applied xfrc_applied mocap_pos mocap_quat qacc_warmstart eq_active userdata.
+  // Names: time qpos qvel act ctrl qfrc_applied xfrc_applied mocap_pos mocap_quat qacc_warmstart
+  // eq_active userdata.
   ArrayView state_component(std::string_view name);
   ArrayView state();  // [B, nstate], mjSTATE_INTEGRATION
 
@@ -72,17 +83,40 @@ class Worlds {
  private:
   struct Clock {
     std::int64_t substep = 0, tick = 0, episode = 0;
-    bool first = true;
   };
-  struct Call;
+  enum class Op { kStep, kForward, kReset, kStepRaw, kVisit };
+  struct Call {
+    Worlds* self;
+    Op op;
+    int substeps;
+    int key;
+    WorldHooks* hooks;
+  };
   static void run(const mjModel* m, mjData* d, int w, void* arg);
-  void apply(std::span<const int> ids, Call& call);
+  void run_world(const mjModel* m, mjData* d, int w, const Call& call);
+  bool step_world(const mjModel* m, mjData* d, int w, const Call& call);
+  void apply(std::span<const int> ids, Call call, bool save);
+  World view(const mjModel* m, mjData* d, int w) const;
+  bool derived_current(int w) const;
+  void remember(int w);
 
   mjBatch* batch_ = nullptr;
   int num_worlds_;
+  std::size_t num_state_ = 0;
   std::uint64_t seed_ = 0;
+  std::int64_t model_version_ = 0;
   std::vector<Clock> clocks_;
+  std::vector<int> reset_key_;      // keyframe of each world's last reset
+  std::vector<mjtNum> remembered_;  // state rows to which the derived fields belong
+  std::vector<std::int64_t>
+      derived_version_;  // model version of the derived fields; -1: one substep behind
+  std::vector<std::exception_ptr> exceptions_;  // of hooks, by world
+  std::vector<std::uint8_t> diverged_;          // by world: mjtWarning + 1 in this call
   std::vector<Failure> failures_;
+  std::vector<int> ids_;  // scratch: the sorted selection
+  std::size_t ctrl_begin_ = 0,
+              ctrl_end_ =
+                  0;  // part of a state row that the position and velocity stages do not read
 };
 
 }  // namespace mjsense
