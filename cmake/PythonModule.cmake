@@ -1,0 +1,34 @@
+# The Python package. The extension is mjsense/_core.abi3.so: nanobind in split mode (its run-time part is the package
+# nanobind-backend), so that one wheel serves every CPython from 3.10 on. The *_py.cc beside the code they bind and
+# python/bindings make it up.
+find_package(Python 3.10 REQUIRED COMPONENTS Interpreter Development.Module)
+execute_process(COMMAND ${Python_EXECUTABLE} -m nanobind --cmake_dir OUTPUT_VARIABLE nanobind_ROOT
+                OUTPUT_STRIP_TRAILING_WHITESPACE ERROR_QUIET)
+find_package(nanobind CONFIG REQUIRED)
+
+file(GLOB_RECURSE MJSENSE_PY_SOURCES CONFIGURE_DEPENDS ${PROJECT_SOURCE_DIR}/src/mjsense/*_py.cc
+     ${PROJECT_SOURCE_DIR}/python/bindings/*.cc)
+nanobind_add_module(mjsense_python BACKEND_MODULE nanobind_backend NOMINSIZE NB_SUPPRESS_WARNINGS ${MJSENSE_PY_SOURCES})
+target_include_directories(mjsense_python PRIVATE ${PROJECT_SOURCE_DIR})
+target_compile_definitions(mjsense_python PRIVATE MJSENSE_VERSION="${PROJECT_VERSION}")
+target_compile_options(mjsense_python PRIVATE -Wall -Wextra -Wno-missing-field-initializers)
+target_link_libraries(mjsense_python PRIVATE mjsense ${MJSENSE_PRIVATE_LIBS})
+
+# build/<preset>/python is a ready package: the extension, and links to the Python files. PYTHONPATH=build/dev/python.
+set(MJSENSE_PY_DIR ${PROJECT_BINARY_DIR}/python/mjsense)
+set_target_properties(mjsense_python PROPERTIES OUTPUT_NAME _core LIBRARY_OUTPUT_DIRECTORY ${MJSENSE_PY_DIR}
+                                                INSTALL_RPATH "$ORIGIN/../mujoco")
+file(GLOB_RECURSE MJSENSE_PY_FILES CONFIGURE_DEPENDS RELATIVE ${PROJECT_SOURCE_DIR}/python/mjsense
+     ${PROJECT_SOURCE_DIR}/python/mjsense/*.py ${PROJECT_SOURCE_DIR}/python/mjsense/py.typed)
+foreach(file IN LISTS MJSENSE_PY_FILES)
+  get_filename_component(folder ${MJSENSE_PY_DIR}/${file} DIRECTORY)
+  file(MAKE_DIRECTORY ${folder})
+  file(CREATE_LINK ${PROJECT_SOURCE_DIR}/python/mjsense/${file} ${MJSENSE_PY_DIR}/${file} SYMBOLIC)
+endforeach()
+
+nanobind_add_stub(mjsense_stub MODULE mjsense._core OUTPUT ${MJSENSE_PY_DIR}/_core.pyi DEPENDS mjsense_python
+                  PYTHON_PATH ${PROJECT_BINARY_DIR}/python)
+
+# scikit-build-core takes python/mjsense itself (pyproject.toml); CMake adds what is built.
+install(TARGETS mjsense_python LIBRARY DESTINATION mjsense COMPONENT python)
+install(FILES ${MJSENSE_PY_DIR}/_core.pyi DESTINATION mjsense COMPONENT python)

@@ -1,0 +1,10 @@
+#pragma once
+// The rooms of the extension: each function stands in the x_py.cc beside the code it binds.
+
+#include <nanobind/nanobind.h>
+
+namespace mjsense::python {
+
+void bind_core(nanobind::module_& m);
+
+}  // namespace mjsense::python

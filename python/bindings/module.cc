@@ -1,0 +1,12 @@
+// The extension mjsense._core. Users see it through the package mjsense.
+
+#include <nanobind/nanobind.h>
+
+#include "python/bindings/bindings.h"
+
+NB_MODULE(_core, m) {
+  m.doc() = "The C++ side of mjsense.";
+  // Interpreters tear modules down in no order we control; a leak report there tells users nothing.
+  nanobind::set_leak_warnings(false);
+  mjsense::python::bind_core(m);
+}

@@ -1,0 +1,24 @@
+#pragma once
+// Arrays cross the language border without a copy.
+
+#include <nanobind/nanobind.h>
+#include <nanobind/ndarray.h>
+
+#include "mjsense/core/array.h"
+
+namespace mjsense::python {
+
+namespace nb = nanobind;
+
+// A NumPy array on the view's memory, which `owner` keeps alive.
+nb::object to_numpy(const ArrayView& view, nb::handle owner);
+
+// A Python object that holds `pointer` until it is collected: the owner of arrays on memory inside
+// *pointer.
+template <class T>
+nb::object owner_of(std::shared_ptr<T> pointer) {
+  return nb::capsule(new std::shared_ptr<T>(std::move(pointer)),
+                     [](void* p) noexcept { delete static_cast<std::shared_ptr<T>*>(p); });
+}
+
+}  // namespace mjsense::python

@@ -1,0 +1,9 @@
+"""Errors of mjsense: ValueError, RuntimeError, and a KeyError that prints as a sentence."""
+
+
+class UnknownNameError(KeyError):
+    """A name that does not exist; the message gives the nearest ones."""
+
+    def __str__(self) -> str:
+        # KeyError shows the repr of its argument: quotes around a sentence, escapes within.
+        return str(self.args[0]) if self.args else ""
