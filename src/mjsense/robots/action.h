@@ -1,0 +1,40 @@
+#pragma once
+// What a policy commands for one control step of one world: plain memory, no allocation.
+
+#include <array>
+#include <optional>
+#include <span>
+
+namespace mjsense {
+
+// Values of one move group: joint positions, or the commands of its actuators.
+struct GroupValues {
+  static constexpr int kMaxSize = 8;
+  std::array<double, kMaxSize> values{};
+  int size = 0;
+  bool given = false;  // false: the policy says nothing about this group, its controller holds
+
+  std::span<const double> view() const { return {values.data(), static_cast<std::size_t>(size)}; }
+  void set(std::span<const double> xs) {
+    size = static_cast<int>(xs.size());
+    for (int i = 0; i < size; ++i) values[i] = xs[i];
+    given = true;
+  }
+};
+
+// One GroupValues a move group, in the robot's order.
+struct RobotValues {
+  static constexpr int kMaxGroups = 8;
+  std::array<GroupValues, kMaxGroups> groups{};
+  GroupValues& operator[](int g) { return groups[g]; }
+  const GroupValues& operator[](int g) const { return groups[g]; }
+};
+
+struct Action {
+  RobotValues commands;  // of actuators; "base": [] is given with size 0
+  bool done =
+      false;  // the policy has finished: this step is still simulated, then the episode ends
+  std::optional<bool> success;  // the policy's own verdict; {done, success: false} gives up
+};
+
+}  // namespace mjsense

@@ -1,0 +1,53 @@
+#pragma once
+// Forward and inverse kinematics of a chain of a compiled model, from its fixed transforms alone:
+// no mjData, so that any thread may plan for any world.
+
+#include <mujoco/mujoco.h>
+
+#include <span>
+#include <vector>
+
+#include "mjsense/core/pose.h"
+
+namespace mjsense {
+
+// Hinges and slides from body `base` (excluded) to site `leaf`; J = joints().size() of them move.
+class Chain {
+ public:
+  static constexpr int kMaxJoints = 16;
+
+  // Joints that `moving` does not list stay at the model's qpos0.
+  Chain(const mjModel* model, int base_body, int leaf_site, std::span<const int> moving);
+
+  std::span<const int> joints() const { return joints_; }  // ids, base to leaf
+  std::span<const double> low() const { return low_; }     // joint ranges; infinite where unlimited
+  std::span<const double> high() const { return high_; }
+
+  // Pose of the leaf in the base frame.
+  Pose fk(std::span<const double> q) const;
+  // Also the Jacobian [6, J], row-major: rows v (m per unit of q), then w (rad per unit of q), base
+  // axes, at the leaf.
+  Pose jacobian(std::span<const double> q, std::span<double> jacobian) const;
+
+  // Moves q (in: the start, out: the solution) until the leaf is at `target` (base frame): dq = J^T
+  // (J J^T + 1e-12 I)^-1 e with e = log6(T^-1 T*) in base axes, clipped to the joint ranges in
+  // every iteration. True if |e| < tolerance within max_iterations; q is otherwise the last
+  // iterate.
+  bool ik(const Pose& target, std::span<double> q, int max_iterations = 1000,
+          double tolerance = 1e-4) const;
+
+ private:
+  struct Link {
+    Pose fixed;  // from the previous link's moved frame
+    Vec3 axis;   // of the joint, in that frame after `fixed`
+    Vec3 anchor;
+    bool slide = false;
+    double zero = 0;  // qpos0
+  };
+  std::vector<Link> links_;
+  Pose tail_;  // from the last link to the leaf
+  std::vector<int> joints_;
+  std::vector<double> low_, high_;
+};
+
+}  // namespace mjsense

@@ -1,0 +1,107 @@
+#pragma once
+// A robot of a compiled model: move groups, controllers, kinematics. State is per world, in arrays
+// indexed by world; every function that takes a World (or a world index) touches that world's alone
+// and may run in parallel with the others.
+
+#include <mujoco/mujoco.h>
+
+#include <memory>
+#include <span>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "mjsense/core/pose.h"
+#include "mjsense/core/rng.h"
+#include "mjsense/core/sensor.h"
+#include "mjsense/robots/action.h"
+#include "mjsense/robots/kinematics.h"
+#include "mjsense/robots/robot_cfg.h"
+#include "mjsense/robots/state_row.h"
+
+namespace mjsense {
+
+// A named set of joints with a controller.
+struct MoveGroup {
+  std::string name;
+  GroupKind kind = GroupKind::kArm;
+  std::vector<int> joints, qpos, dofs;  // ids, addresses in qpos and qvel
+  std::vector<int> actuators;           // empty: nothing to command (a mocap base)
+  std::vector<double> ctrl_low, ctrl_high;
+  int leaf_site = -1;  // -1: the leaf is the base frame itself
+  int root_body = -1;
+  // Grippers only.
+  double open_command = 0, closed_command = 0, max_opening = 0;
+  int pad_sites[2] = {-1, -1};
+
+  bool controlled() const { return !actuators.empty(); }
+};
+
+class Robot {
+ public:
+  static constexpr std::string_view kPrefix = "robot_0/";
+
+  // Resolves every name of cfg; throws KeyError naming the first that `model` does not have.
+  Robot(RobotCfg cfg, const mjModel* model, int num_worlds, std::string_view prefix = kPrefix);
+
+  const RobotCfg& cfg() const { return cfg_; }
+  const std::string& name() const { return cfg_.name; }
+  const std::string& prefix() const { return prefix_; }
+  std::span<const MoveGroup> groups() const { return groups_; }
+  int group_index(std::string_view name) const;  // throws KeyError
+  const MoveGroup& group(std::string_view name) const { return groups_[group_index(name)]; }
+  int arm() const { return arm_; }          // index of the first arm
+  int gripper() const { return gripper_; }  // index of the first gripper
+  int base_body() const { return base_body_; }
+
+  // --- what a fresh world shows
+  Pose base_pose(const World& world) const;                    // X_WB: on the floor
+  Pose leaf_pose(const World& world, int group) const;         // X_WL
+  Pose tcp_pose(const World& world, int group) const;          // X_BL = inv(base) leaf
+  double opening(const World& world, int gripper) const;       // m, between the pads
+  bool is_open(const World& world, int gripper) const;         // above half of max_opening
+  void read_qpos(const World& world, RobotValues& out) const;  // every group
+  void read_qvel(const World& world, RobotValues& out) const;
+
+  // --- kinematics, in the base frame
+  // Leaf of `group` where each joint stands at its group's value; a group with fewer values than
+  // joints (a gripper's one command for two drivers) gives all of them its first. A base gives the
+  // identity.
+  Pose fk(int group, const RobotValues& values) const;
+  const Chain& chain(int group) const {
+    return *chains_[group];
+  }  // arms: through the arm's joints only
+
+  // --- controllers
+  // Start configuration with noise drawn from rng, robot standing at X_WB; controls hold it.
+  void write_start(const StateRow& state, const Pose& base, Rng& rng) const;
+  // A new episode: the targets are what the controllers hold now (arm: its qpos; gripper: open or
+  // closed as it is).
+  void reset(const World& world);
+  // New targets: the action clipped to the control ranges; groups that it leaves out hold. Throws
+  // ValueError when a group has the wrong number of values.
+  void command(const World& world, const Action& action);
+  // Writes the targets to ctrl, with the arm's action noise if rng is not null.
+  void write_ctrl(const World& world, const StateRow& state, Rng* noise) const;
+  // Un-noised targets of the controlled groups: what actions/joint_pos records.
+  const RobotValues& targets(int world) const { return targets_[world]; }
+
+  // Sensors that every task with this robot records (tcp_pose). They refer to this robot.
+  std::vector<std::shared_ptr<Sensor>> create_robot_sensors() const;
+
+ private:
+  void hold(const World& world, int group, GroupValues& out) const;
+  void add_arm_noise(const World& world, int group, Rng& rng, std::span<double> q) const;
+
+  RobotCfg cfg_;
+  const mjModel* model_;
+  std::string prefix_;
+  std::vector<MoveGroup> groups_;
+  std::vector<std::unique_ptr<Chain>> chains_;  // per group, null without a leaf
+  std::vector<std::vector<std::pair<int, int>>>
+      source_;  // per group, per chain joint: (group, index)
+  int arm_ = -1, gripper_ = -1, base_body_ = -1, base_mocap_ = -1;
+  std::vector<RobotValues> targets_, held_;  // [B]
+};
+
+}  // namespace mjsense

@@ -1,0 +1,62 @@
+#pragma once
+// What a robot is, as data: its MJCF, move groups, start configuration, cameras. One function a
+// robot fills one in.
+
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "mjsense/scene/entity.h"
+
+namespace mjsense {
+
+enum class GroupKind { kBase, kArm, kGripper };
+
+// Names are local to the robot's MJCF, without the "robot_0/" prefix.
+struct MoveGroupCfg {
+  std::string name;  // "arm"
+  GroupKind kind = GroupKind::kArm;
+  std::vector<std::string> joints, actuators;
+  std::string leaf_site;       // the group's tool frame; "" for a base
+  std::string root_body;       // its subtree is the group: the gripper's geoms of grasp_state_*
+  std::vector<double> init;    // start joint positions, rad or m
+  std::vector<double> spread;  // half widths of their uniform start noise; empty: none
+  // Grippers only.
+  double open_command = 0, closed_command = 0;  // of the actuator
+  double max_opening = 0;                       // m, between the pads
+  std::vector<std::string> pad_sites;           // two, on the pads' faces
+};
+
+// A camera of the robot's MJCF that an episode records.
+struct CameraMount {
+  std::string name;         // of the sensor: "wrist_camera"
+  std::string mjcf_camera;  // "gripper/wrist_camera"
+  bool record_depth = false;
+};
+
+// Noise that the arm's controllers see and recordings do not (spec section 5).
+struct ActionNoiseCfg {
+  bool enabled = true;
+  double scale = 0.1;           // standard deviation per metre that the command would move the tool
+  double rotation_ratio = 0.1;  // rotation deviation (rad) per position deviation (m)
+  double max_position = 0.02;   // m, truncation
+  double max_rotation = 0.1;    // rad
+};
+
+struct RobotCfg {
+  std::string name;  // "franka"
+  ModelSource model;
+  std::string base_body;             // mocap body on the floor: the robot base frame
+  std::vector<MoveGroupCfg> groups;  // in this order everywhere
+  std::vector<CameraMount> cameras;
+  int image_width = 640, image_height = 368;  // one resolution for all cameras
+  ActionNoiseCfg noise;
+  int env_state_size = 31;  // env_states: numbers of the articulation row
+  std::string env_state_name = "panda";
+};
+
+// The robots there are, and one of them; throws KeyError with the nearest names.
+std::vector<std::string> robot_names();
+RobotCfg robot_cfg(std::string_view name);
+
+}  // namespace mjsense

@@ -1,0 +1,22 @@
+#pragma once
+// The state of one world that an episode writes: MuJoCo's own rows, wherever they live. Call
+// forward() after writing.
+
+#include <mujoco/mujoco.h>
+
+namespace mjsense {
+
+class Worlds;
+
+struct StateRow {
+  double* qpos = nullptr;        // [nq]
+  double* qvel = nullptr;        // [nv]
+  double* ctrl = nullptr;        // [nu]
+  double* mocap_pos = nullptr;   // [nmocap, 3]; null without mocap bodies
+  double* mocap_quat = nullptr;  // [nmocap, 4]
+};
+
+StateRow state_row(mjData* data);
+StateRow state_row(Worlds& worlds, int world);
+
+}  // namespace mjsense
