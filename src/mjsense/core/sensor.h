@@ -73,7 +73,7 @@ struct SensorInit {
 
 // What cast() traces: the ray scene as compute() of the worlds `ids` left it.
 struct CastContext {
-  RayScene& rays;
+  RayScene* rays;            // null for stage kBatch in a scene that casts nothing
   std::span<const int> ids;  // sorted
   ThreadPool& pool;
 };

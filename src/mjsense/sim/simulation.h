@@ -1,14 +1,12 @@
 #pragma once
 // Scene + worlds + sensors: steps physics and keeps every measurement fresh.
 //
-// A sensor is computed when it is read and stale, and from then on in the same parallel pass as the physics, for as long as it
-// is read every step. Stale means: the world was stepped, reset, forwarded or written since.
+// A sensor is computed when it is read and stale, and from then on in the same parallel pass as the physics, for as long as
+// it is read every step. Stale means: the world was stepped, reset or forwarded since.
 
 #include <cstdint>
 #include <memory>
 #include <span>
-#include <string>
-#include <string_view>
 #include <vector>
 
 #include "mjsense/core/parallel.h"
@@ -27,46 +25,77 @@ struct SimulationCfg {
 
 class Simulation {
  public:
+  // Every world starts reset, at the model's defaults.
   Simulation(std::shared_ptr<Scene> scene, const SimulationCfg& cfg);
   ~Simulation();
+  Simulation(const Simulation&) = delete;
+  Simulation& operator=(const Simulation&) = delete;
 
   Scene& scene() { return *scene_; }
+  const std::shared_ptr<Scene>& scene_ptr() const { return scene_; }
   Worlds& worlds() { return *worlds_; }
   ThreadPool& pool() { return *pool_; }
   const mjModel* model() const { return scene_->model(); }
   int num_worlds() const { return cfg_.num_worlds; }
   int decimation() const { return cfg_.decimation; }
-  double step_dt() const;  // s, one control step
+  double step_dt() const { return cfg_.decimation * model()->opt.timestep; }  // s, one control step
 
   void step(int control_steps = 1);
+  // Empty ids: all worlds. key: keyframe, -1 the model's defaults.
   void reset(std::span<const int> ids = {}, int key = -1);
-  void seed(std::uint64_t seed);
+  // Random numbers start again from this seed; reset() usually follows.
+  void seed(std::uint64_t seed) { worlds_->seed(seed); }
+  // Makes derived fields and sensors current after state rows were written.
   void forward(std::span<const int> ids = {});
 
-  // Peer-compatible low level (mjlab's order of calls): raw mj_step, and sensors' per-substep state advanced by hand.
+  // mjlab's order of calls, by hand: plain mj_step, then one update of the sensors' per-substep state.
   void step_raw(int substeps);
-  void update_sensors(double dt);
+  void update_sensors();
+  // Forgets the episode in the sensors of these worlds, physics untouched.
+  void reset_sensors(std::span<const int> ids = {});
 
-  // Adds a sensor that is not part of the scene (observation sensors, users' own); initializes it at once.
+  // Adds a sensor that is not part of the scene (observation sensors, users' own) and initializes it.
   void add(std::shared_ptr<Sensor> sensor);
-  // Makes the sensor's rows current in every world, then they may be read until the next change.
-  void refresh(Sensor& sensor);
+  // Makes the sensor's rows current in every world. They stay so until the next step, reset or forward.
+  void refresh(Sensor& sensor) { Sensor* one[] = {&sensor}; refresh(one); }
   void refresh(std::span<Sensor* const> sensors);
+  // State was changed in a way that only the caller knows.
   void invalidate(std::span<const int> ids = {});
 
+  // Worlds that failed in the last step, reset or forward; they were reset alone.
   const std::vector<Failure>& failures() const { return worlds_->failures(); }
-  RayScene& rays();
+  RayScene& rays();  // made when first needed
 
  private:
-  struct Hooks;
   struct Slot;
+  class Hooks;
+  enum class Change { kStep, kForward, kReset, kNone };
+
+  void initialize(Sensor& sensor);
+  Slot& slot_of(const Sensor& sensor);
+  // Makes `change` happen and `slots` (each after its inputs) current in the worlds `ids` (empty: all).
+  void compute(std::span<Slot* const> slots, std::span<const int> ids, Change change, int key = -1);
+  void cast(std::span<Slot* const> slots, std::span<const int> ids, int phase);
+  template <class Wanted>
+  void collect(std::vector<Slot*>& slots, Wanted&& wanted);
+  void mark_stale(std::span<const int> ids);
+
+  // Buffers that keep their capacity, so that a step allocates nothing; one for each level of nested calls (a sensor in Python
+  // may read other sensors while it is computed).
+  struct Scratch;
+  class Borrowed;
+  std::vector<std::unique_ptr<Scratch>> scratch_;
+
   SimulationCfg cfg_;
   std::shared_ptr<Scene> scene_;
   std::unique_ptr<Worlds> worlds_;
   std::unique_ptr<ThreadPool> pool_;
   std::unique_ptr<RayScene> rays_;
   std::vector<std::shared_ptr<Sensor>> added_;
-  std::vector<std::unique_ptr<Slot>> slots_;
+  std::vector<std::unique_ptr<Slot>> slots_;   // scene sensors, then added ones
+  std::vector<std::int64_t> version_;          // of each world's state
+  std::vector<std::int64_t> rays_version_;     // of the poses in the ray scene
+  bool any_substep_ = false;
 };
 
 }  // namespace mjsense
