@@ -1,0 +1,33 @@
+#pragma once
+// `sensor_param_<camera>`: where a camera is and how it projects, in OpenCV's conventions.
+
+#include <string>
+
+#include "mjsense/core/sensor.h"
+
+namespace mjsense {
+
+// A point p_W (m) lands on pixel (u, v) = (k0 / k2, k1 / k2) with k = intrinsic_cv * extrinsic_cv *
+// [p_W, 1]; u to the right, v down, (0, 0) the outer corner of the top left pixel. Streams, all
+// float64:
+//   <name>/cam2world_gl [4, 4]   X_WC, columns right, down, forward, position. Despite its
+//   published name its axes are
+//                                OpenCV's (x right, y down, z forward), not OpenGL's.
+//   <name>/extrinsic_cv [3, 4]   top rows of its inverse: world to camera
+//   <name>/intrinsic_cv [3, 3]   [[f, 0, W/2], [0, f, H/2], [0, 0, 1]], f = (H/2) / tan(fovy/2)
+//   pixels, rounded to float32
+class CameraParameterSensor final : public Sensor {
+ public:
+  // `camera`: full MuJoCo name. width, height: pixels, of the recorded picture.
+  CameraParameterSensor(std::string name, std::string camera, int width, int height);
+  std::string_view kind() const override { return "camera_parameters"; }
+  void initialize(const SensorInit& init) override;
+  void compute(const World& world) override;
+
+ private:
+  std::string camera_;
+  int width_, height_;
+  int id_ = -1;
+};
+
+}  // namespace mjsense

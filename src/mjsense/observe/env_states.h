@@ -1,0 +1,44 @@
+#pragma once
+// `env_states`: what it takes to put the scene back as it was - every free body, and the robot's
+// joints.
+
+#include <string>
+#include <vector>
+
+#include "mjsense/core/sensor.h"
+#include "mjsense/observe/joint_state.h"
+
+namespace mjsense {
+
+// Streams
+//   env_states/actors/<name>          float32 [13]  position 3 (m), quaternion 4 (wxyz), velocity
+//   6: linear (m/s, world axes),
+//                                     angular (rad/s, body axes) - MuJoCo's qpos and qvel of the
+//                                     free joint, so that writing them back restores the body. One
+//                                     for each free body outside `robot`.
+//   env_states/articulations/<robot>  float32 [N]   qpos of all groups in order, then qvel of all
+//   groups; padded with 0
+// The name of an actor is that of its body, with '/' as '_' (a file's '/' would make a folder of
+// it).
+class EnvStatesSensor final : public Sensor {
+ public:
+  // `length`: N, at least what the groups need (31 is the published width of the Franka: 9 + 9 and
+  // zeros). `robot_body`: free bodies at or below it are no actors; "" none.
+  EnvStatesSensor(std::string name, std::string articulation, std::vector<JointGroup> groups,
+                  int length, std::string robot_body);
+  std::string_view kind() const override { return "env_states"; }
+  void initialize(const SensorInit& init) override;
+  void compute(const World& world) override;
+
+ private:
+  struct Actor {
+    int qpos, dof;
+  };
+  std::string articulation_;
+  std::vector<JointGroup> groups_;
+  int length_;
+  std::string robot_body_;
+  std::vector<Actor> actors_;  // field i belongs to actor i; the articulation is the last field
+};
+
+}  // namespace mjsense

@@ -1,0 +1,73 @@
+#include "mjsense/observe/frame.h"
+
+#include <fmt/format.h>
+
+#include "mjsense/core/error.h"
+
+namespace mjsense {
+
+Frame Frame::find(const mjModel* model, std::string_view place, std::string_view type,
+                  std::string_view name) {
+  if (type != "body" && type != "site") {
+    throw ValueError(fmt::format("{}: a frame is of type body or site, not '{}'", place, type));
+  }
+  const mjtObj object = type == "body" ? mjOBJ_BODY : mjOBJ_SITE;
+  return {object, object_id(model, object, place, name)};
+}
+
+Pose Frame::pose(const mjData* data) const {
+  if (type == mjOBJ_BODY) return {vec3(data->xpos + 3 * id), quat(data->xquat + 4 * id)};
+  return pose_from_mat(data->site_xpos + 3 * id, data->site_xmat + 9 * id);
+}
+
+namespace {
+struct Kind {
+  int count;
+  const char* name;
+};
+
+Kind kind_of(const mjModel* model, mjtObj type) {
+  switch (type) {
+    case mjOBJ_BODY:
+      return {static_cast<int>(model->nbody), "body"};
+    case mjOBJ_SITE:
+      return {static_cast<int>(model->nsite), "site"};
+    case mjOBJ_GEOM:
+      return {static_cast<int>(model->ngeom), "geom"};
+    case mjOBJ_CAMERA:
+      return {static_cast<int>(model->ncam), "camera"};
+    case mjOBJ_JOINT:
+      return {static_cast<int>(model->njnt), "joint"};
+    case mjOBJ_ACTUATOR:
+      return {static_cast<int>(model->nu), "actuator"};
+    default:
+      throw ValueError(
+          fmt::format("no names of MuJoCo objects of type {}", static_cast<int>(type)));
+  }
+}
+}  // namespace
+
+std::vector<std::string> object_names(const mjModel* model, mjtObj type) {
+  std::vector<std::string> names(kind_of(model, type).count);
+  for (std::size_t i = 0; i < names.size(); ++i) {
+    const char* name = mj_id2name(model, type, static_cast<int>(i));
+    if (name) names[i] = name;
+  }
+  return names;
+}
+
+int object_id(const mjModel* model, mjtObj type, std::string_view place, std::string_view name) {
+  const int id = mj_name2id(model, type, std::string(name).c_str());
+  if (id < 0) throw_unknown(place, kind_of(model, type).name, name, object_names(model, type));
+  return id;
+}
+
+std::vector<char> subtree(const mjModel* model, int root) {
+  std::vector<char> inside(model->nbody, 0);
+  for (int body = 0; body < model->nbody; ++body) {
+    inside[body] = body == root || (body > 0 && inside[model->body_parentid[body]]);
+  }
+  return inside;
+}
+
+}  // namespace mjsense

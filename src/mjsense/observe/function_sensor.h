@@ -1,0 +1,50 @@
+#pragma once
+// A sensor that is one function of a world: what a task, a robot or a policy knows and nobody else
+// computes.
+
+#include <functional>
+#include <span>
+#include <string>
+#include <utility>
+
+#include "mjsense/core/sensor.h"
+#include "mjsense/observe/json_sensor.h"
+
+namespace mjsense {
+
+// Row of T's. spec.dtype is set from T; the function fills the whole row.
+template <class T>
+class FunctionSensor final : public Sensor {
+ public:
+  using Fn = std::function<void(const World&, std::span<T>)>;
+  FunctionSensor(std::string name, SensorSpec spec, Fn fn)
+      : Sensor(std::move(name)), spec_(std::move(spec)), fn_(std::move(fn)) {
+    spec_.dtype = dtype_of<T>();
+  }
+  std::string_view kind() const override { return "function"; }
+  void initialize(const SensorInit& init) override {
+    clear_fields();
+    add_field("", spec_, init.num_worlds);
+  }
+  void compute(const World& world) override { fn_(world, fields()[0].data.row<T>(world.id)); }
+
+ private:
+  SensorSpec spec_;
+  Fn fn_;
+};
+
+// Row of JSON text.
+class JsonFunctionSensor final : public JsonSensor {
+ public:
+  using Fn = std::function<void(const World&, JsonWriter&)>;
+  JsonFunctionSensor(std::string name, int str_max_len, std::string description, Fn fn)
+      : JsonSensor(std::move(name), str_max_len, std::move(description)), fn_(std::move(fn)) {}
+
+ protected:
+  void write(const World& world, JsonWriter& json) override { fn_(world, json); }
+
+ private:
+  Fn fn_;
+};
+
+}  // namespace mjsense

@@ -1,0 +1,162 @@
+#include "mjsense/observe/image_points.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <limits>
+
+#include "mjsense/core/error.h"
+#include "mjsense/observe/frame.h"
+
+namespace mjsense {
+
+ImagePointsSensor::ImagePointsSensor(std::string name, std::vector<Object> objects,
+                                     std::vector<Camera> cameras)
+    : Sensor(std::move(name)), objects_(std::move(objects)), cameras_(std::move(cameras)) {
+  if (objects_.size() > kMaxObjects) {
+    throw ValueError(fmt::format("sensor '{}': {} objects, at most {}", this->name(),
+                                 objects_.size(), kMaxObjects));
+  }
+  for (const Camera& camera : cameras_) {
+    if (std::ranges::find(inputs_, camera.sensor) == inputs_.end()) {
+      inputs_.push_back(camera.sensor);
+    }
+  }
+}
+
+void ImagePointsSensor::initialize(const SensorInit& init) {
+  const mjModel* m = init.model;
+  geom_objects_.assign(m->ngeom, 0);
+  for (std::size_t o = 0; o < objects_.size(); ++o) {
+    const int root = object_id(m, mjOBJ_BODY, fmt::format("sensor '{}'", name()), objects_[o].body);
+    const std::vector<char> bodies = subtree(m, root);
+    for (int g = 0; g < m->ngeom; ++g) {
+      if (bodies[m->geom_bodyid[g]] && m->geom_group[g] < 3) geom_objects_[g] |= Mask(1u << o);
+    }
+  }
+  pictures_.clear();
+  std::int64_t most = 0;
+  for (const Camera& camera : cameras_) {
+    const Field& field = camera.sensor->field(camera.field);
+    const Shape& shape = field.spec.shape;
+    if (field.spec.dtype != DType::kInt32 || shape.rank() != 3 || shape[2] != 2) {
+      throw ValueError(fmt::format("sensor '{}': '{}' must be int32 (H, W, 2), is {} {}", name(),
+                                   field.spec.name, dtype_name(field.spec.dtype), shape.str()));
+    }
+    pictures_.push_back({&field, static_cast<int>(shape[1]), static_cast<int>(shape[0])});
+    most = std::max(most, shape[0] * shape[1]);
+  }
+  scratch_.assign(init.num_worlds, std::vector<Mask>(3 * most));
+  clear_fields();
+  for (const Object& object : objects_) {
+    for (const Camera& camera : cameras_) {
+      SensorSpec spec;
+      spec.shape = {kPoints, 2};
+      spec.frame = "picture of " + camera.name;
+      spec.low = 0;
+      spec.high = 1;
+      spec.description =
+          "Pixels that show the object, (column / W, row / H); NaN where there is none.";
+      add_field(fmt::format("{}/{}/points", object.key, camera.name), spec, init.num_worlds);
+      SensorSpec count;
+      count.dtype = DType::kInt32;
+      count.shape = {1};
+      count.low = 0;
+      count.high = kPoints;
+      count.description = "Number of points.";
+      add_field(fmt::format("{}/{}/num_points", object.key, camera.name), count, init.num_worlds);
+    }
+  }
+}
+
+void ImagePointsSensor::compute(const World& world) {
+  for (std::size_t c = 0; c < cameras_.size(); ++c) {
+    const auto [field, width, height] = pictures_[c];
+    const int pixels = width * height;
+    Mask* mask = scratch_[world.id].data();
+    Mask* once = mask + pixels;
+    Mask* twice = once + pixels;
+    const auto segments = field->data.row<std::int32_t>(world.id);
+    Mask any = 0;
+    for (int i = 0; i < pixels; ++i) {
+      const std::int32_t id = segments[2 * i];
+      mask[i] = segments[2 * i + 1] == mjOBJ_GEOM && id >= 0 ? geom_objects_[id] : Mask(0);
+      any |= mask[i];
+    }
+    if (any) {
+      erode_cross(mask, width, height, once);
+      erode_cross(once, width, height, twice);
+    }
+    for (std::size_t o = 0; o < objects_.size(); ++o) {
+      points_of(world, static_cast<int>(o), static_cast<int>(c), mask, any ? twice : mask);
+    }
+  }
+}
+
+void ImagePointsSensor::points_of(const World& world, int object, int camera, const Mask* mask,
+                                  const Mask* eroded) {
+  const auto [field, width, height] = pictures_[camera];
+  const std::size_t index = 2 * (object * cameras_.size() + camera);
+  const auto points = fields()[index].data.row<float>(world.id);
+  const auto num_points = fields()[index + 1].data.row<std::int32_t>(world.id);
+  std::ranges::fill(points, std::numeric_limits<float>::quiet_NaN());
+
+  const Mask bit = Mask(1u << object);
+  const int pixels = width * height;
+  const auto count_of = [&](const Mask* m) {
+    int n = 0;
+    for (int i = 0; i < pixels; ++i) n += m[i] >> object & 1;
+    return n;
+  };
+  const bool erode =
+      !cameras_[camera].skip_erosion && objects_[object].key.find("handle") == std::string::npos;
+  const Mask* chosen = erode ? eroded : mask;
+  int count = count_of(chosen);
+  if (count == 0 && erode) count = count_of(chosen = mask);
+  const int n = std::min(count, kPoints);
+  num_points[0] = n;
+  if (n == 0) return;
+
+  // Which of the object's pixels, counted row by row, goes to which place.
+  std::array<int, kPoints> ranks;
+  for (int i = 0; i < n; ++i) ranks[i] = i;
+  if (count > kPoints) {
+    Rng rng = world.rng(stream_of(fields()[index].spec.name));
+    for (int i = 0; i < n; ++i) {
+      do {
+        ranks[i] = static_cast<int>(rng.below(count));
+      } while (std::find(ranks.begin(), ranks.begin() + i, ranks[i]) != ranks.begin() + i);
+    }
+  }
+  std::array<int, kPoints> order;
+  for (int i = 0; i < n; ++i) order[i] = i;
+  std::sort(order.begin(), order.begin() + n, [&](int a, int b) { return ranks[a] < ranks[b]; });
+
+  const auto round4 = [](float x) { return std::nearbyint(x * 10000.0f) / 10000.0f; };
+  int rank = 0, next = 0;
+  for (int i = 0; next < n; ++i) {
+    if (!(chosen[i] & bit)) continue;
+    if (rank++ != ranks[order[next]]) continue;
+    points[2 * order[next]] = round4(static_cast<float>(i % width) / static_cast<float>(width));
+    points[2 * order[next] + 1] =
+        round4(static_cast<float>(i / width) / static_cast<float>(height));
+    ++next;
+  }
+}
+
+void erode_cross(const std::uint16_t* in, int width, int height, std::uint16_t* out) {
+  std::fill(out, out + width, std::uint16_t(0));
+  std::fill(out + (height - 1) * width, out + height * width, std::uint16_t(0));
+  for (int y = 1; y + 1 < height; ++y) {
+    const std::uint16_t* row = in + y * width;
+    std::uint16_t* to = out + y * width;
+    to[0] = to[width - 1] = 0;
+    for (int x = 1; x + 1 < width; ++x) {
+      to[x] = row[x] & row[x - 1] & row[x + 1] & row[x - width] & row[x + width];
+    }
+  }
+}
+
+}  // namespace mjsense
