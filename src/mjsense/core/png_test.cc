@@ -1,0 +1,44 @@
+#include "mjsense/core/png.h"
+
+#include <gtest/gtest.h>
+#include <zlib.h>
+
+#include "mjsense/core/error.h"
+
+namespace mjsense {
+namespace {
+
+std::uint32_t u32(const std::uint8_t* p) { return p[0] << 24 | p[1] << 16 | p[2] << 8 | p[3]; }
+
+TEST(Png, ReadsBackPixelByPixel) {
+  const int width = 5, height = 3;
+  std::vector<std::uint8_t> pixels(width * height * 3);
+  for (std::size_t i = 0; i < pixels.size(); ++i) pixels[i] = static_cast<std::uint8_t>(i * 37);
+  const auto png = encode_png(pixels, width, height, 3);
+  EXPECT_EQ(u32(&png[16]), 5u);
+  EXPECT_EQ(u32(&png[20]), 3u);
+  const std::size_t idat = 8 + 12 + 13;
+  ASSERT_EQ(std::string(png.begin() + idat + 4, png.begin() + idat + 8), "IDAT");
+  std::vector<std::uint8_t> rows((width * 3 + 1) * height);
+  uLongf size = rows.size();
+  ASSERT_EQ(uncompress(rows.data(), &size, &png[idat + 8], u32(&png[idat])), Z_OK);
+  ASSERT_EQ(size, rows.size());
+  for (int y = 0; y < height; ++y) {
+    for (int i = 0; i < width * 3; ++i) {
+      std::uint8_t got = rows[y * (width * 3 + 1) + 1 + i];
+      if (y > 0) got += pixels[(y - 1) * width * 3 + i];
+      EXPECT_EQ(got, pixels[y * width * 3 + i]);
+    }
+  }
+}
+
+TEST(Png, RefusesWrongSizesAndPlaces) {
+  const std::vector<std::uint8_t> pixels(12);
+  EXPECT_THROW(encode_png(pixels, 2, 2, 4), ValueError);
+  EXPECT_THROW(encode_png(pixels, 0, 2, 3), ValueError);
+  EXPECT_THROW(encode_png(pixels, 3, 2, 2), ValueError);
+  EXPECT_THROW(write_png("/nonexistent_directory/x.png", pixels, 2, 2, 3), RuntimeError);
+}
+
+}  // namespace
+}  // namespace mjsense
