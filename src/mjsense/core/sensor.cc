@@ -9,6 +9,7 @@
 namespace mjsense {
 
 void Sensor::edit_spec(mjSpec* /*spec*/) {}
+std::vector<std::unique_ptr<Sensor>> Sensor::parts() { return {}; }
 void Sensor::substep(const World& /*world*/) {}
 void Sensor::cast(const CastContext& /*context*/) {}
 void Sensor::reset(const World& /*world*/) {}

@@ -19,6 +19,7 @@
 #include <span>
 #include <string>
 #include <string_view>
+#include <vector>
 
 #include "mjsense/core/array.h"
 #include "mjsense/core/rng.h"
@@ -46,8 +47,12 @@ struct World {
   std::int64_t episode = 0;  // resets of this world since the last seeding
   std::uint64_t seed = 0;
   bool first = false;  // no step was taken since the reset
+  // Changes whenever the derived fields of `data` may have: a physics step, forward, reset. What was
+  // taken from them at an equal moment of the same world may be reused. 0: not known.
+  std::uint64_t moment = 0;
+  double elapsed = 0.0;  // s that one substep() stands for; 0: the model's timestep
 
-  double dt() const { return model->opt.timestep; }
+  double dt() const { return elapsed > 0.0 ? elapsed : model->opt.timestep; }
   double time() const { return static_cast<double>(substep) * model->opt.timestep; }
   // Numbers for this moment: the same at any thread count and any B.
   Rng rng(std::uint32_t stream) const {
@@ -96,6 +101,9 @@ class Sensor {
   virtual std::string_view kind() const = 0;         // "builtin", "contact", "camera", ...
 
   virtual void edit_spec(mjSpec* spec);
+  // Further sensors that it brings into its scene's registry, after the discovered ones; asked once,
+  // after edit_spec().
+  virtual std::vector<std::unique_ptr<Sensor>> parts();
   virtual void initialize(const SensorInit& init) = 0;
   virtual bool wants_substep() const { return false; }
   virtual void substep(const World& world);

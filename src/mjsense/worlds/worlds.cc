@@ -183,7 +183,7 @@ void Worlds::visit(std::span<const int> ids, WorldHooks& hooks) {
 
 World Worlds::view(const mjModel* m, mjData* d, int w) const {
   const Clock& c = clocks_[w];
-  return {w, m, d, c.substep, c.tick, c.episode, seed_, c.substep == 0};
+  return {w, m, d, c.substep, c.tick, c.episode, seed_, c.substep == 0, c.moment};
 }
 
 // True if the position and velocity stages in mjData belong to the state row as it is now.
@@ -232,6 +232,7 @@ bool Worlds::step_world(const mjModel* m, mjData* d, int w, const Call& call) {
     }
     ++clocks_[w].substep;
     ++clocks_[w].tick;
+    ++clocks_[w].moment;
     if (every) call.hooks->substep(view(m, d, w));
   }
   return true;
@@ -244,6 +245,7 @@ void Worlds::run_world(const mjModel* m, mjData* d, int w, const Call& call) {
       break;
     case Op::kForward:
       mj_forward(m, d);
+      ++clocks_[w].moment;
       break;
     case Op::kReset:
       if (call.key >= 0) {
@@ -255,16 +257,21 @@ void Worlds::run_world(const mjModel* m, mjData* d, int w, const Call& call) {
       reset_key_[w] = call.key;
       clocks_[w].substep = 0;
       ++clocks_[w].episode;
+      ++clocks_[w].moment;
       break;
     case Op::kStepRaw:
       for (int k = 0; k < call.substeps; ++k) mj_step(m, d);
       clocks_[w].substep += call.substeps;
       clocks_[w].tick += call.substeps;
+      ++clocks_[w].moment;
       mj_getState(m, d, remembered_.data() + w * num_state_, mjSTATE_INTEGRATION);
       derived_version_[w] = -1;
       return;
     case Op::kVisit:
-      if (derived_version_[w] >= 0 && !derived_current(w)) mj_forward(m, d);
+      if (derived_version_[w] >= 0 && !derived_current(w)) {
+        mj_forward(m, d);
+        ++clocks_[w].moment;
+      }
       break;
   }
   if (call.op != Op::kVisit || derived_version_[w] >= 0) {

@@ -83,6 +83,7 @@ class Worlds {
  private:
   struct Clock {
     std::int64_t substep = 0, tick = 0, episode = 0;
+    std::uint64_t moment = 0;
   };
   enum class Op { kStep, kForward, kReset, kStepRaw, kVisit };
   struct Call {
