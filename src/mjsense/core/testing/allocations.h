@@ -1,0 +1,38 @@
+#pragma once
+// Counts heap allocations of this process (all threads) made through operator new. For tests only: including this header, in
+// one file of a test program, replaces the global operator new.
+
+#include <atomic>
+#include <cstdlib>
+#include <new>
+
+namespace mjsense {
+
+inline std::atomic<long> allocations_so_far{0};
+
+class AllocationCount {
+ public:
+  AllocationCount() : start_(allocations_so_far) {}
+  long since() const { return allocations_so_far - start_; }
+
+ private:
+  long start_;
+};
+
+}  // namespace mjsense
+
+void* operator new(std::size_t size) {
+  ++mjsense::allocations_so_far;
+  if (void* p = std::malloc(size ? size : 1)) return p;
+  throw std::bad_alloc();
+}
+void* operator new(std::size_t size, std::align_val_t align) {
+  ++mjsense::allocations_so_far;
+  const auto a = static_cast<std::size_t>(align);
+  if (void* p = std::aligned_alloc(a, (size + a - 1) / a * a)) return p;
+  throw std::bad_alloc();
+}
+void operator delete(void* p) noexcept { std::free(p); }
+void operator delete(void* p, std::size_t) noexcept { std::free(p); }
+void operator delete(void* p, std::align_val_t) noexcept { std::free(p); }
+void operator delete(void* p, std::size_t, std::align_val_t) noexcept { std::free(p); }
