@@ -4,6 +4,7 @@
 #include <array>
 #include <map>
 #include <string>
+#include <utility>
 #include <vector>
 
 namespace mjsense {
@@ -17,13 +18,23 @@ struct ModelSource {
 
 struct EntityCfg {
   ModelSource model;
-  std::array<double, 3> pos{0, 0, 0};      // m, of the entity's root in the world
+  // Pose of the entity's root in the world: of its free body, else of the mocap body that a fixed
+  // base hangs under. The identity keeps what the XML says.
+  std::array<double, 3> pos{0, 0, 0};      // m
   std::array<double, 4> quat{1, 0, 0, 0};  // wxyz
+  // Values of hinges and slides in the keyframe init_state, used when the XML has no keyframe of
+  // its own: (regular expression that matches the whole local name, rad or m), the first match
+  // counts, 0 without one.
+  std::vector<std::pair<std::string, double>> joint_pos;
+  // An entity without a free joint is hung under the mocap body "<name>/mocap_base", so that each
+  // world can place it. False attaches it to the world as it is (static scenery).
+  bool mocap_base = true;
 };
 
 // One MuJoCo element. Full name = "entity/name" if entity is non-empty, else "name".
 struct ObjRef {
-  std::string type;    // body xbody joint geom site actuator tendon camera ...
+  std::string
+      type;  // body (inertial frame) xbody (body frame) joint geom site actuator tendon camera ...
   std::string name;
   std::string entity;
   bool empty() const { return type.empty() && name.empty(); }

@@ -1,9 +1,11 @@
 #pragma once
-// A scene: what all worlds share. Entities and terrain attached into one spec, sensors registered, the model compiled.
+// A scene: what all worlds share. Entities and terrain attached into one spec, sensors registered,
+// the model compiled.
 
 #include <mujoco/mujoco.h>
 
 #include <functional>
+#include <map>
 #include <memory>
 #include <optional>
 #include <string>
@@ -19,47 +21,68 @@
 namespace mjsense {
 
 struct SceneCfg {
-  std::vector<std::pair<std::string, EntityCfg>> entities;  // attached in this order, names prefixed "name/"
-  std::optional<TerrainCfg> terrain;
+  std::vector<std::pair<std::string, EntityCfg>>
+      entities;                       // attached in this order, names prefixed "name/"
+  std::optional<TerrainCfg> terrain;  // attached first, without a prefix
   std::vector<std::shared_ptr<const SensorCfg>> sensors;
-  double env_spacing = 2.0;             // m, grid of world origins on a plane
-  std::optional<double> extent;         // overrides stat.extent
+  double env_spacing = 2.0;      // m, grid of world origins on a plane
+  std::optional<double> extent;  // m, overrides stat.extent
   OptionsCfg options;
-  std::function<void(mjSpec*)> spec_fn;  // called last, before compilation
+  std::function<void(mjSpec*)>
+      spec_fn;  // called last, before compilation; sensors that it adds are not discovered
 };
 
-// Names of an entity's elements, local (without the prefix), in spec order.
+// Names of an entity's elements, local (without the prefix), in model order. An element that its
+// MJCF leaves unnamed is given a name: its type and its number among the entity's elements of that
+// type, "geom_3"; a free joint "floating_base_joint".
 struct Entity {
   std::string name;
-  bool fixed_base = false;
-  std::vector<std::string> body_names, geom_names, site_names, joint_names, actuator_names, tendon_names, camera_names;
+  bool fixed_base = false;  // no free joint
+  std::vector<std::string> body_names, geom_names, site_names, joint_names, actuator_names,
+      tendon_names, camera_names;
 };
 
 class Scene {
  public:
+  // Throws ValueError or KeyError that names the entity or sensor at fault.
   explicit Scene(SceneCfg cfg);
   ~Scene();
   Scene(const Scene&) = delete;
   Scene& operator=(const Scene&) = delete;
 
+  // One keyframe, "init_state": the first keyframes of the entities joined. A world starts at
+  // qpos0, not there.
   const mjModel* model() const;
-  std::string to_xml() const;  // compiles to the same model again
+  // With assets() as files beside it compiles to the same model again. Files on disk are named by
+  // absolute path.
+  std::string to_xml() const;
+  const std::map<std::string, std::string>& assets() const;
   const SceneCfg& cfg() const;
 
-  // Configured sensors in order, then those discovered in the entities' XML. Not initialized: Simulation does that.
+  // Configured sensors in order, then those discovered in the entities' XML. Not initialized:
+  // Simulation does that.
   const std::vector<std::unique_ptr<Sensor>>& sensors() const;
   Sensor* find_sensor(std::string_view key) const;  // null if there is none
   Sensor& sensor(std::string_view key) const;       // throws KeyError with the nearest names
 
-  const std::vector<Entity>& entities() const;  // the terrain, if any, first
-  const Entity& entity(std::string_view name) const;
+  const std::vector<Entity>& entities() const;        // the terrain, if any, first
+  const Entity& entity(std::string_view name) const;  // throws KeyError with the nearest names
 
-  // World origins [B, 3]: zeros without terrain, a grid on a plane, (level, type) tiles on generated terrain.
+  // World origins [B, 3], m: zeros without terrain, a grid on a plane, (level, type) tiles on
+  // generated terrain.
   std::vector<double> env_origins(int num_worlds) const;
+
+  // What was found odd but not wrong: options of entities that are not carried over, further
+  // keyframes, MuJoCo's own.
+  const std::vector<std::string>& warnings() const;
 
  private:
   struct Impl;
   std::unique_ptr<Impl> impl_;
 };
+
+// The sensor that reads a MuJoCo sensor found in the model under `name`. Defined in
+// sensors/builtin: declared here, because a scene discovers sensors but knows no kind of them.
+std::unique_ptr<Sensor> make_discovered_sensor(const std::string& name);
 
 }  // namespace mjsense

@@ -1,0 +1,252 @@
+#include "mjsense/scene/attach.h"
+
+#include <fmt/format.h>
+#include <fmt/ranges.h>
+
+#include <algorithm>
+#include <cmath>
+#include <set>
+#include <utility>
+
+#include "mjsense/core/error.h"
+#include "mjsense/core/match.h"
+#include "mjsense/scene/options.h"
+#include "mjsense/scene/resolve.h"
+
+namespace mjsense {
+namespace {
+
+constexpr const char* kFreeJoint = "floating_base_joint";
+
+std::string place_of(const std::string& name) { return fmt::format("entity '{}'", name); }
+
+// Unnamed elements get their type and number as a name: "geom_3". A name that is taken gets a
+// trailing "_".
+void name_unnamed(mjSpec* spec) {
+  for (mjtObj type : {mjOBJ_BODY, mjOBJ_JOINT, mjOBJ_GEOM, mjOBJ_SITE, mjOBJ_CAMERA, mjOBJ_LIGHT,
+                      mjOBJ_TENDON, mjOBJ_ACTUATOR, mjOBJ_SENSOR}) {
+    const std::vector<mjsElement*> elements = spec_elements(spec, type);
+    const std::vector<std::string> names = spec_names(spec, type);
+    std::set<std::string> taken(names.begin(), names.end());
+    for (std::size_t i = 0; i < elements.size(); ++i) {
+      if (!names[i].empty()) continue;
+      std::string name = fmt::format("{}_{}", obj_type_name(type), i);
+      if (type == mjOBJ_JOINT && mjs_asJoint(elements[i])->type == mjJNT_FREE) name = kFreeJoint;
+      while (!taken.insert(name).second) name += "_";
+      mjs_setName(elements[i], name.c_str());
+    }
+  }
+}
+
+std::vector<double> values_of(const mjDoubleVec* values) {
+  int size = 0;
+  const double* data = mjs_getDouble(values, &size);
+  return {data, data + size};
+}
+
+// The first keyframe is kept aside, all are removed: MuJoCo would make each a keyframe of the whole
+// scene.
+InitialState take_keyframes(mjSpec* spec, const std::string& place,
+                            std::vector<std::string>& warnings) {
+  InitialState init;
+  const std::vector<mjsElement*> keys = spec_elements(spec, mjOBJ_KEY);
+  if (keys.size() > 1) {
+    warnings.push_back(fmt::format("{}: {} keyframes; only the first, '{}', goes into init_state",
+                                   place, keys.size(), element_name(keys[0])));
+  }
+  if (!keys.empty()) {
+    const mjsKey* key = mjs_asKey(keys[0]);
+    init = {true,
+            values_of(key->qpos),
+            values_of(key->qvel),
+            values_of(key->act),
+            values_of(key->ctrl),
+            values_of(key->mpos),
+            values_of(key->mquat)};
+  }
+  for (mjsElement* key : keys) mjs_delete(spec, key);
+  return init;
+}
+
+void drop_options(mjSpec* spec, const std::string& place, std::vector<std::string>& warnings) {
+  const std::vector<std::string> changed = changed_options(spec->option);
+  if (!changed.empty()) {
+    warnings.push_back(
+        fmt::format("{}: its <option> is not carried over ({}); set the scene's options", place,
+                    fmt::join(changed, ", ")));
+  }
+  mj_defaultOption(&spec->option);
+  spec->authored.option = 0;
+  spec->authored.disableflags = spec->authored.enableflags = spec->authored.disableactuator = 0;
+}
+
+// Each group of <visual> settings is the first entity's that writes it.
+void move_visual(mjSpec* from, mjSpec* to) {
+  const auto move = [](std::uint64_t& mine, std::uint64_t& theirs, const auto& value,
+                       auto& target) {
+    if (theirs == 0 && mine != 0) {
+      target = value;
+      theirs = mine;
+    }
+    mine = 0;
+  };
+  mjsAuthored& a = from->authored;
+  mjsAuthored& b = to->authored;
+  move(a.visual_global, b.visual_global, from->visual.global, to->visual.global);
+  move(a.visual_quality, b.visual_quality, from->visual.quality, to->visual.quality);
+  move(a.visual_headlight, b.visual_headlight, from->visual.headlight, to->visual.headlight);
+  move(a.visual_map, b.visual_map, from->visual.map, to->visual.map);
+  move(a.visual_scale, b.visual_scale, from->visual.scale, to->visual.scale);
+  move(a.visual_rgba, b.visual_rgba, from->visual.rgba, to->visual.rgba);
+  from->visual = to->visual;
+}
+
+bool is_identity(const EntityCfg& cfg) {
+  return cfg.pos == std::array<double, 3>{0, 0, 0} && cfg.quat == std::array<double, 4>{1, 0, 0, 0};
+}
+
+void set_pose(mjsBody* body, const EntityCfg& cfg, const std::string& place) {
+  double norm = 0;
+  for (double q : cfg.quat) norm += q * q;
+  if (!(norm > 1e-12) || !std::isfinite(norm)) {
+    throw ValueError(fmt::format("{}: quat ({}) is no rotation; expected w, x, y, z", place,
+                                 fmt::join(cfg.quat, ", ")));
+  }
+  if (is_identity(cfg)) return;
+  if (mjs_getFrame(body->element)) {
+    throw ValueError(
+        fmt::format("{}: its root '{}' stands in a <frame>, so pos and quat must be given there",
+                    place, element_name(body->element)));
+  }
+  std::copy(cfg.pos.begin(), cfg.pos.end(), body->pos);
+  for (int i = 0; i < 4; ++i) body->quat[i] = cfg.quat[i] / std::sqrt(norm);
+  mjs_defaultOrientation(&body->alt);
+}
+
+}  // namespace
+
+Attached attach_entity(mjSpec* scene, const std::string& name, const EntityCfg& cfg, Vfs& vfs,
+                       std::vector<std::string>& warnings) {
+  const std::string place = place_of(name);
+  SpecPtr child = parse_model(cfg.model, vfs, place);
+  name_unnamed(child.get());
+
+  Attached attached{name, cfg};
+  std::vector<mjsElement*> free_joints;
+  for (mjsElement* joint : spec_elements(child.get(), mjOBJ_JOINT)) {
+    if (mjs_asJoint(joint)->type == mjJNT_FREE) free_joints.push_back(joint);
+  }
+  if (free_joints.size() > 1) {
+    throw ValueError(fmt::format(
+        "{}: its model has {} freejoints ('{}', '{}', ...); an entity has at most one, make each "
+        "floating part an entity",
+        place, free_joints.size(), element_name(free_joints[0]), element_name(free_joints[1])));
+  }
+  attached.fixed_base = free_joints.empty();
+  attached.init = take_keyframes(child.get(), place, warnings);
+  drop_options(child.get(), place, warnings);
+  move_visual(child.get(), scene);
+
+  mjsBody* world = mjs_findBody(scene, "world");
+  mjsElement* root = mjs_firstChild(mjs_findBody(child.get(), "world"), mjOBJ_BODY, 0);
+  const bool is_mocap = root && mjs_asBody(root)->mocap;
+  attached.wrapped = attached.fixed_base && !is_mocap && cfg.mocap_base;
+  mjsBody* parent = world;
+  if (attached.wrapped) {
+    parent = mjs_addBody(world, nullptr);
+    mjs_setName(parent->element, (name + "/mocap_base").c_str());
+    parent->mocap = 1;
+    set_pose(parent, cfg, place);
+  } else if (!attached.fixed_base) {
+    set_pose(mjs_getParent(free_joints[0]), cfg, place);
+  } else if (is_mocap) {
+    set_pose(mjs_asBody(root), cfg, place);
+  }
+  mjsFrame* frame = mjs_addFrame(parent, nullptr);
+  if (attached.fixed_base && !attached.wrapped && !is_mocap) {
+    std::copy(cfg.pos.begin(), cfg.pos.end(), frame->pos);
+    std::copy(cfg.quat.begin(), cfg.quat.end(), frame->quat);
+  }
+  // The scene keeps the child alive: it is attached by reference.
+  if (!mjs_attach(frame->element, child->element, (name + "/").c_str(), "")) {
+    throw ValueError(fmt::format("{}: {}", place, mjs_getError(scene)));
+  }
+  return attached;
+}
+
+void merge_initial_states(const std::vector<Attached>& entities, mjModel* m, mjsKey* key) {
+  const auto put = [](const std::vector<double>& values, mjtNum* target, int size,
+                      const char* field, const Attached& e) {
+    if (static_cast<int>(values.size()) > size) {
+      throw ValueError(fmt::format("{}: its keyframe has {} values of {}, the entity {}",
+                                   place_of(e.name), values.size(), field, size));
+    }
+    std::copy(values.begin(), values.end(), target);
+  };
+  for (const Attached& e : entities) {
+    const std::string prefix = e.name + "/";
+    int qpos = -1, nq = 0, dof = -1, nv = 0;
+    for (int j = 0; j < m->njnt; ++j) {
+      const std::string name = name_of(m, mjOBJ_JOINT, j);
+      if (!name.starts_with(prefix)) continue;
+      if (qpos < 0) qpos = m->jnt_qposadr[j], dof = m->jnt_dofadr[j];
+      const int type = m->jnt_type[j];
+      nq += type == mjJNT_FREE ? 7 : type == mjJNT_BALL ? 4 : 1;
+      nv += type == mjJNT_FREE ? 6 : type == mjJNT_BALL ? 3 : 1;
+      if (e.init.from_xml) continue;
+      mjtNum* q = m->key_qpos + m->jnt_qposadr[j];
+      if (type == mjJNT_FREE) {
+        std::copy(e.cfg.pos.begin(), e.cfg.pos.end(), q);
+        std::copy(e.cfg.quat.begin(), e.cfg.quat.end(), q + 3);
+        mju_normalize4(q + 3);
+      } else if (type == mjJNT_HINGE || type == mjJNT_SLIDE) {
+        q[0] = 0;
+        for (const auto& [pattern, value] : e.cfg.joint_pos) {
+          if (!Regex(pattern, place_of(e.name) + ": joint_pos")
+                   .fullmatch(name.substr(prefix.size())))
+            continue;
+          q[0] = value;
+          break;
+        }
+      }
+    }
+    if (!e.init.from_xml) continue;
+    if (qpos >= 0) {
+      put(e.init.qpos, m->key_qpos + qpos, nq, "qpos", e);
+      put(e.init.qvel, m->key_qvel + dof, nv, "qvel", e);
+    }
+    int ctrl = -1, nu = 0, act = -1, na = 0;
+    for (int a = 0; a < m->nactuator; ++a) {
+      if (!name_of(m, mjOBJ_ACTUATOR, a).starts_with(prefix)) continue;
+      if (ctrl < 0) ctrl = m->actuator_ctrladr[a];
+      nu += m->actuator_ctrlnum[a];
+      if (m->actuator_actadr[a] >= 0) {
+        if (act < 0) act = m->actuator_actadr[a];
+        na += m->actuator_actnum[a];
+      }
+    }
+    if (ctrl >= 0) put(e.init.ctrl, m->key_ctrl + ctrl, nu, "ctrl", e);
+    if (act >= 0) put(e.init.act, m->key_act + act, na, "act", e);
+    int mocap = -1, nmocap = 0;
+    for (int b = 0; b < m->nbody; ++b) {
+      const std::string name = name_of(m, mjOBJ_BODY, b);
+      if (m->body_mocapid[b] < 0 || !name.starts_with(prefix) ||
+          (e.wrapped && name == prefix + "mocap_base"))
+        continue;
+      if (mocap < 0) mocap = m->body_mocapid[b];
+      ++nmocap;
+    }
+    if (mocap >= 0) {
+      put(e.init.mpos, m->key_mpos + 3 * mocap, 3 * nmocap, "mpos", e);
+      put(e.init.mquat, m->key_mquat + 4 * mocap, 4 * nmocap, "mquat", e);
+    }
+  }
+  mjs_setDouble(key->qpos, m->key_qpos, static_cast<int>(m->nq));
+  mjs_setDouble(key->qvel, m->key_qvel, static_cast<int>(m->nv));
+  mjs_setDouble(key->act, m->key_act, static_cast<int>(m->na));
+  mjs_setDouble(key->ctrl, m->key_ctrl, static_cast<int>(m->nu));
+  mjs_setDouble(key->mpos, m->key_mpos, static_cast<int>(3 * m->nmocap));
+  mjs_setDouble(key->mquat, m->key_mquat, static_cast<int>(4 * m->nmocap));
+}
+
+}  // namespace mjsense

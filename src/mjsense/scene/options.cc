@@ -1,0 +1,143 @@
+#include "mjsense/scene/options.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cctype>
+#include <cmath>
+#include <span>
+#include <utility>
+
+#include "mjsense/core/error.h"
+
+namespace mjsense {
+namespace {
+
+std::string lower(std::string_view text) {
+  std::string out(text);
+  std::transform(out.begin(), out.end(), out.begin(),
+                 [](unsigned char c) { return std::tolower(c); });
+  return out;
+}
+
+int word(std::string_view field, std::string_view value,
+         std::span<const std::pair<const char*, int>> known) {
+  std::vector<std::string> names;
+  for (const auto& [name, number] : known) {
+    if (lower(value) == lower(name)) return number;
+    names.emplace_back(name);
+  }
+  throw ValueError(fmt::format("options: {} = '{}' is not known; expected one of {}", field, value,
+                               fmt::join(names, ", ")));
+}
+
+// MuJoCo's XML names of the flags, lower case without spaces: "Frictionloss" -> "frictionloss",
+// "Clampctrl" -> "clampctrl".
+int flags(std::string_view field, const std::vector<std::string>& wanted,
+          std::span<const char* const> known) {
+  std::vector<std::string> names;
+  for (const char* name : known) {
+    std::string flag = lower(name);
+    std::erase(flag, ' ');
+    names.push_back(std::move(flag));
+  }
+  int bits = 0;
+  for (const std::string& flag : wanted) {
+    const auto it = std::find(names.begin(), names.end(), flag);
+    if (it == names.end()) {
+      throw ValueError(
+          fmt::format("options: {} has no flag '{}'{}", field, flag, suggest(flag, names)));
+    }
+    bits |= 1 << (it - names.begin());
+  }
+  return bits;
+}
+
+void require(bool good, std::string_view field, double value, std::string_view expected) {
+  if (!good) throw ValueError(fmt::format("options: {} = {} must be {}", field, value, expected));
+}
+
+constexpr std::pair<const char*, int> kIntegrators[] = {{"Euler", mjINT_EULER},
+                                                        {"RK4", mjINT_RK4},
+                                                        {"implicit", mjINT_IMPLICIT},
+                                                        {"implicitfast", mjINT_IMPLICITFAST},
+                                                        {"discrete", mjINT_DISCRETE}};
+constexpr std::pair<const char*, int> kCones[] = {{"pyramidal", mjCONE_PYRAMIDAL},
+                                                  {"elliptic", mjCONE_ELLIPTIC}};
+constexpr std::pair<const char*, int> kSolvers[] = {
+    {"PGS", mjSOL_PGS}, {"CG", mjSOL_CG}, {"Newton", mjSOL_NEWTON}};
+constexpr std::pair<const char*, int> kJacobians[] = {
+    {"dense", mjJAC_DENSE}, {"sparse", mjJAC_SPARSE}, {"auto", mjJAC_AUTO}};
+
+}  // namespace
+
+void apply_options(const OptionsCfg& cfg, mjOption& option) {
+  require(std::isfinite(cfg.timestep) && cfg.timestep > 0, "timestep", cfg.timestep,
+          "a positive number of seconds");
+  require(cfg.impratio > 0, "impratio", cfg.impratio, "positive");
+  require(cfg.iterations > 0, "iterations", cfg.iterations, "positive");
+  require(cfg.ls_iterations > 0, "ls_iterations", cfg.ls_iterations, "positive");
+  require(cfg.ccd_iterations > 0, "ccd_iterations", cfg.ccd_iterations, "positive");
+  require(cfg.tolerance >= 0, "tolerance", cfg.tolerance, "0 or positive");
+  require(cfg.ls_tolerance >= 0, "ls_tolerance", cfg.ls_tolerance, "0 or positive");
+  require(cfg.density >= 0, "density", cfg.density, "0 or positive");
+  require(cfg.viscosity >= 0, "viscosity", cfg.viscosity, "0 or positive");
+  option.timestep = cfg.timestep;
+  option.integrator = word("integrator", cfg.integrator, kIntegrators);
+  option.cone = word("cone", cfg.cone, kCones);
+  option.solver = word("solver", cfg.solver, kSolvers);
+  option.jacobian = word("jacobian", cfg.jacobian, kJacobians);
+  option.impratio = cfg.impratio;
+  option.iterations = cfg.iterations;
+  option.tolerance = cfg.tolerance;
+  option.ls_iterations = cfg.ls_iterations;
+  option.ls_tolerance = cfg.ls_tolerance;
+  option.ccd_iterations = cfg.ccd_iterations;
+  std::copy(cfg.gravity.begin(), cfg.gravity.end(), option.gravity);
+  std::copy(cfg.magnetic.begin(), cfg.magnetic.end(), option.magnetic);
+  std::copy(cfg.wind.begin(), cfg.wind.end(), option.wind);
+  option.density = cfg.density;
+  option.viscosity = cfg.viscosity;
+  option.disableflags = flags("disableflags", cfg.disableflags, {mjDISABLESTRING, mjNDISABLE});
+  option.enableflags = flags("enableflags", cfg.enableflags, {mjENABLESTRING, mjNENABLE});
+}
+
+std::vector<std::string> changed_options(const mjOption& option) {
+  mjOption standard;
+  mj_defaultOption(&standard);
+  std::vector<std::string> names;
+  const auto note = [&](const char* name, auto& mine, auto& theirs) {
+    if (!std::equal(std::begin(mine), std::end(mine), std::begin(theirs))) names.emplace_back(name);
+  };
+  const auto note_number = [&](const char* name, auto mine, auto theirs) {
+    if (mine != theirs) names.emplace_back(name);
+  };
+  note_number("timestep", option.timestep, standard.timestep);
+  note_number("integrator", option.integrator, standard.integrator);
+  note_number("cone", option.cone, standard.cone);
+  note_number("solver", option.solver, standard.solver);
+  note_number("jacobian", option.jacobian, standard.jacobian);
+  note_number("impratio", option.impratio, standard.impratio);
+  note_number("iterations", option.iterations, standard.iterations);
+  note_number("tolerance", option.tolerance, standard.tolerance);
+  note_number("ls_iterations", option.ls_iterations, standard.ls_iterations);
+  note_number("ls_tolerance", option.ls_tolerance, standard.ls_tolerance);
+  note_number("noslip_iterations", option.noslip_iterations, standard.noslip_iterations);
+  note_number("noslip_tolerance", option.noslip_tolerance, standard.noslip_tolerance);
+  note_number("ccd_iterations", option.ccd_iterations, standard.ccd_iterations);
+  note_number("ccd_tolerance", option.ccd_tolerance, standard.ccd_tolerance);
+  note_number("density", option.density, standard.density);
+  note_number("viscosity", option.viscosity, standard.viscosity);
+  note_number("disableflags", option.disableflags, standard.disableflags);
+  note_number("enableflags", option.enableflags, standard.enableflags);
+  note("gravity", option.gravity, standard.gravity);
+  note("wind", option.wind, standard.wind);
+  note("magnetic", option.magnetic, standard.magnetic);
+  note_number("o_margin", option.o_margin, standard.o_margin);
+  note("o_solref", option.o_solref, standard.o_solref);
+  note("o_solimp", option.o_solimp, standard.o_solimp);
+  note("o_friction", option.o_friction, standard.o_friction);
+  return names;
+}
+
+}  // namespace mjsense

@@ -1,0 +1,143 @@
+#include "mjsense/scene/resolve.h"
+
+#include <fmt/format.h>
+
+#include <utility>
+
+#include "mjsense/core/error.h"
+#include "mjsense/scene/scene.h"
+
+namespace mjsense {
+namespace {
+
+void check_entity(const Scene* scene, std::string_view entity, std::string_view place) {
+  if (!scene || entity.empty()) return;
+  std::vector<std::string> names;
+  for (const Entity& e : scene->entities()) {
+    if (e.name == entity) return;
+    names.push_back(e.name);
+  }
+  throw_unknown(place, "entity", entity, names);
+}
+
+}  // namespace
+
+mjtObj obj_type(std::string_view name, std::string_view place) {
+  if (const int type = mju_str2Type(std::string(name).c_str()); type > 0)
+    return static_cast<mjtObj>(type);
+  throw ValueError(fmt::format(
+      "{}: unknown object type '{}'; known: body, xbody, joint, geom, site, camera, light, tendon, "
+      "actuator, sensor, mesh, hfield, ...",
+      place, name));
+}
+
+std::string obj_type_name(mjtObj type) {
+  const char* name = mju_type2Str(type);
+  return name ? name : "object";
+}
+
+std::string name_of(const mjModel* model, mjtObj type, int id) {
+  const char* name = mj_id2name(model, type, id);
+  return name ? name : "";
+}
+
+std::vector<std::string> model_names(const mjModel* model, mjtObj type) {
+  if (type == mjOBJ_XBODY) type = mjOBJ_BODY;
+  std::vector<std::string> names;
+  const int count = count_of(model, type);
+  for (int i = 0; i < count; ++i) names.push_back(name_of(model, type, i));
+  return names;
+}
+
+int count_of(const mjModel* m, mjtObj type) {
+  switch (type) {
+    case mjOBJ_BODY:
+    case mjOBJ_XBODY:
+      return static_cast<int>(m->nbody);
+    case mjOBJ_JOINT:
+      return static_cast<int>(m->njnt);
+    case mjOBJ_GEOM:
+      return static_cast<int>(m->ngeom);
+    case mjOBJ_SITE:
+      return static_cast<int>(m->nsite);
+    case mjOBJ_CAMERA:
+      return static_cast<int>(m->ncam);
+    case mjOBJ_LIGHT:
+      return static_cast<int>(m->nlight);
+    case mjOBJ_FLEX:
+      return static_cast<int>(m->nflex);
+    case mjOBJ_MESH:
+      return static_cast<int>(m->nmesh);
+    case mjOBJ_SKIN:
+      return static_cast<int>(m->nskin);
+    case mjOBJ_HFIELD:
+      return static_cast<int>(m->nhfield);
+    case mjOBJ_TEXTURE:
+      return static_cast<int>(m->ntex);
+    case mjOBJ_MATERIAL:
+      return static_cast<int>(m->nmat);
+    case mjOBJ_PAIR:
+      return static_cast<int>(m->npair);
+    case mjOBJ_EXCLUDE:
+      return static_cast<int>(m->nexclude);
+    case mjOBJ_EQUALITY:
+      return static_cast<int>(m->neq);
+    case mjOBJ_TENDON:
+      return static_cast<int>(m->ntendon);
+    case mjOBJ_ACTUATOR:
+      return static_cast<int>(m->nactuator);
+    case mjOBJ_SENSOR:
+      return static_cast<int>(m->nsensor);
+    case mjOBJ_NUMERIC:
+      return static_cast<int>(m->nnumeric);
+    case mjOBJ_TEXT:
+      return static_cast<int>(m->ntext);
+    case mjOBJ_TUPLE:
+      return static_cast<int>(m->ntuple);
+    case mjOBJ_KEY:
+      return static_cast<int>(m->nkey);
+    case mjOBJ_PLUGIN:
+      return static_cast<int>(m->nplugin);
+    default:
+      return 0;
+  }
+}
+
+int resolve(const mjModel* model, mjtObj type, std::string_view full_name, std::string_view place) {
+  const std::string name(full_name);
+  const int id =
+      name.empty() ? -1 : mj_name2id(model, type == mjOBJ_XBODY ? mjOBJ_BODY : type, name.c_str());
+  if (id < 0) throw_unknown(place, obj_type_name(type), name, model_names(model, type));
+  return id;
+}
+
+ResolvedObj resolve(const mjModel* model, const Scene* scene, const ObjRef& ref,
+                    std::string_view place) {
+  check_entity(scene, ref.entity, place);
+  const mjtObj type = obj_type(ref.type, place);
+  return {type, resolve(model, type, ref.full_name(), place)};
+}
+
+Elements entity_elements(const mjModel* model, const Scene* scene, std::string_view entity,
+                         mjtObj type, std::string_view place) {
+  check_entity(scene, entity, place);
+  // The terrain is attached without a prefix: its elements are named "terrain..." without a slash.
+  const std::string prefix = entity.empty() ? "" : fmt::format("{}/", entity);
+  Elements found;
+  const std::vector<std::string> names = model_names(model, type);
+  const bool bodies = type == mjOBJ_BODY || type == mjOBJ_XBODY;
+  for (int i = bodies && !entity.empty() ? 1 : 0; i < static_cast<int>(names.size()); ++i) {
+    const std::string& name = names[i];
+    if (name.starts_with(prefix)) {
+      found.names.push_back(name.substr(prefix.size()));
+      found.ids.push_back(i);
+    } else if (entity == "terrain" && name.starts_with("terrain") &&
+               name.find('/') == std::string::npos) {
+      found.names.push_back(name);
+      found.ids.push_back(i);
+    }
+  }
+  return found;
+}
+
+}  // namespace mjsense

@@ -1,0 +1,47 @@
+#pragma once
+// From names to ids, for sensors. `place` starts every message: "sensor 'imu'".
+
+#include <mujoco/mujoco.h>
+
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "mjsense/scene/entity.h"
+
+namespace mjsense {
+
+class Scene;
+
+// "body" -> mjOBJ_BODY ...; throws ValueError with the known types.
+mjtObj obj_type(std::string_view name, std::string_view place);
+std::string obj_type_name(mjtObj type);
+
+// Names of all elements of a type in model order, "" where there is none. XBODY counts as BODY.
+std::vector<std::string> model_names(const mjModel* model, mjtObj type);
+std::string name_of(const mjModel* model, mjtObj type, int id);  // full name, "" if unnamed
+int count_of(const mjModel* model, mjtObj type);
+
+// Id of the element with this full name; throws KeyError naming the place and the nearest names.
+int resolve(const mjModel* model, mjtObj type, std::string_view full_name, std::string_view place);
+
+struct ResolvedObj {
+  mjtObj type = mjOBJ_UNKNOWN;
+  int id = -1;
+};
+
+// An unknown entity is an error that names the entities there are (scene may be null: then it is
+// not checked by itself).
+ResolvedObj resolve(const mjModel* model, const Scene* scene, const ObjRef& ref,
+                    std::string_view place);
+
+// Local names and ids of an entity's elements, in model order; "" as the entity: every element
+// under its full name. The world body is no entity's. Throws KeyError for an unknown entity.
+struct Elements {
+  std::vector<std::string> names;
+  std::vector<int> ids;
+};
+Elements entity_elements(const mjModel* model, const Scene* scene, std::string_view entity,
+                         mjtObj type, std::string_view place);
+
+}  // namespace mjsense

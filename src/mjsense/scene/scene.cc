@@ -1,0 +1,196 @@
+#include "mjsense/scene/scene.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <utility>
+
+#include "mjsense/core/error.h"
+#include "mjsense/scene/attach.h"
+#include "mjsense/scene/resolve.h"
+#include "mjsense/scene/spec.h"
+
+namespace mjsense {
+namespace {
+
+constexpr const char* kInitState = "init_state";
+
+void check_name(const std::string& name, bool has_terrain, const std::vector<Attached>& before) {
+  if (name.empty()) throw ValueError("scene: an entity needs a name");
+  if (name.find('/') != std::string::npos)
+    throw ValueError(fmt::format("entity '{}': '/' is not allowed in a name", name));
+  if (has_terrain && name == "terrain")
+    throw ValueError("entity 'terrain': the name is taken by the scene's terrain");
+  for (const Attached& other : before) {
+    if (other.name == name)
+      throw ValueError(fmt::format("entity '{}': there are two of this name", name));
+  }
+}
+
+Entity describe(const mjModel* model, const std::string& name, bool fixed_base) {
+  const auto names = [&](mjtObj type) {
+    return entity_elements(model, nullptr, name, type, "").names;
+  };
+  return {name,
+          fixed_base,
+          names(mjOBJ_BODY),
+          names(mjOBJ_GEOM),
+          names(mjOBJ_SITE),
+          names(mjOBJ_JOINT),
+          names(mjOBJ_ACTUATOR),
+          names(mjOBJ_TENDON),
+          names(mjOBJ_CAMERA)};
+}
+
+}  // namespace
+
+struct Scene::Impl {
+  SceneCfg cfg;
+  Vfs vfs;
+  SpecPtr spec;
+  ModelPtr model;
+  std::vector<Attached> attached;
+  std::vector<Entity> entities;
+  std::vector<std::unique_ptr<Sensor>> sensors;
+  std::vector<std::string> warnings;
+
+  void build();
+  void add_sensors();
+  void discover_sensors();
+  void compile(mjsKey* key);
+};
+
+void Scene::Impl::build() {
+  spec.reset(mj_makeSpec());
+  mj_defaultOption(&spec->option);
+  apply_options(cfg.options, spec->option);
+  spec->stat.meansize = 0.03;
+  if (cfg.extent) {
+    if (!(*cfg.extent > 0))
+      throw ValueError(fmt::format("scene: extent = {} must be positive (m)", *cfg.extent));
+    spec->stat.extent = *cfg.extent;
+  }
+  spec->compiler.conflict = mjCONFLICT_MERGE;  // sizes: the larger wins
+
+  if (cfg.terrain) add_terrain(*cfg.terrain, spec.get());
+  {
+    // What MuJoCo says about sizes while merging is of no use to anybody.
+    std::vector<std::string> chatter;
+    WarningCapture capture(chatter);
+    for (const auto& [name, entity] : cfg.entities) {
+      check_name(name, cfg.terrain.has_value(), attached);
+      attached.push_back(attach_entity(spec.get(), name, entity, vfs, warnings));
+    }
+  }
+  add_sensors();
+  discover_sensors();
+  mjsKey* key = mjs_addKey(spec.get());
+  mjs_setName(key->element, kInitState);
+  if (cfg.spec_fn) cfg.spec_fn(spec.get());
+  compile(key);
+
+  if (cfg.terrain) entities.push_back(describe(model.get(), "terrain", true));
+  for (const Attached& entity : attached)
+    entities.push_back(describe(model.get(), entity.name, entity.fixed_base));
+}
+
+void Scene::Impl::add_sensors() {
+  for (const auto& sensor_cfg : cfg.sensors) {
+    const std::string key = sensor_cfg->key();
+    if (key.empty()) throw ValueError("scene: a sensor needs a name");
+    for (const auto& other : sensors) {
+      if (other->name() == key) {
+        throw ValueError(
+            fmt::format("sensor '{}': already exists in the scene; two sensors of one name", key));
+      }
+    }
+    for (const Attached& entity : attached) {
+      if (entity.name == key)
+        warnings.push_back(fmt::format("sensor '{}' hides the entity of the same name", key));
+    }
+    sensors.push_back(sensor_cfg->build());
+    sensors.back()->edit_spec(spec.get());
+  }
+}
+
+// Every MuJoCo sensor that no configured sensor stands for: those of the entities' XML, then those
+// that sensors added.
+void Scene::Impl::discover_sensors() {
+  for (const std::string& name : spec_names(spec.get(), mjOBJ_SENSOR)) {
+    const auto taken = [&](const auto& sensor) { return sensor->name() == name; };
+    if (std::none_of(sensors.begin(), sensors.end(), taken))
+      sensors.push_back(make_discovered_sensor(name));
+  }
+}
+
+void Scene::Impl::compile(mjsKey* key) {
+  {
+    WarningCapture capture(warnings);
+    model.reset(mj_compile(spec.get(), vfs.get()));
+  }
+  if (!model) throw ValueError(fmt::format("scene: {}", mjs_getError(spec.get())));
+  merge_initial_states(attached, model.get(), key);
+}
+
+Scene::Scene(SceneCfg cfg) : impl_(std::make_unique<Impl>()) {
+  impl_->cfg = std::move(cfg);
+  impl_->build();
+}
+
+Scene::~Scene() = default;
+
+const mjModel* Scene::model() const { return impl_->model.get(); }
+const SceneCfg& Scene::cfg() const { return impl_->cfg; }
+const std::map<std::string, std::string>& Scene::assets() const { return impl_->vfs.files(); }
+const std::vector<std::unique_ptr<Sensor>>& Scene::sensors() const { return impl_->sensors; }
+const std::vector<Entity>& Scene::entities() const { return impl_->entities; }
+const std::vector<std::string>& Scene::warnings() const { return impl_->warnings; }
+
+std::string Scene::to_xml() const {
+  char error[1024] = "";
+  std::string xml(1 << 16, '\0');
+  int needed = mj_saveXMLString(impl_->spec.get(), xml.data(), static_cast<int>(xml.size()), error,
+                                sizeof error);
+  if (needed > 0) {
+    xml.resize(needed + 1);
+    needed = mj_saveXMLString(impl_->spec.get(), xml.data(), static_cast<int>(xml.size()), error,
+                              sizeof error);
+  }
+  if (needed != 0) throw RuntimeError(fmt::format("scene: not saved as XML: {}", error));
+  xml.resize(xml.find('\0'));
+  return xml;
+}
+
+Sensor* Scene::find_sensor(std::string_view key) const {
+  for (const auto& sensor : impl_->sensors) {
+    if (sensor->name() == key) return sensor.get();
+  }
+  return nullptr;
+}
+
+Sensor& Scene::sensor(std::string_view key) const {
+  if (Sensor* sensor = find_sensor(key)) return *sensor;
+  std::vector<std::string> names;
+  for (const auto& sensor : impl_->sensors) names.push_back(sensor->name());
+  throw KeyError(fmt::format("scene: sensor '{}' not found{}", key, suggest(key, names)));
+}
+
+const Entity& Scene::entity(std::string_view name) const {
+  std::vector<std::string> names;
+  for (const Entity& entity : impl_->entities) {
+    if (entity.name == name) return entity;
+    names.push_back(entity.name);
+  }
+  throw KeyError(fmt::format("scene: entity '{}' not found{}", name, suggest(name, names)));
+}
+
+std::vector<double> Scene::env_origins(int num_worlds) const {
+  if (num_worlds < 1)
+    throw ValueError(
+        fmt::format("scene: env_origins of {} worlds; expected at least 1", num_worlds));
+  if (!impl_->cfg.terrain) return std::vector<double>(3 * num_worlds);
+  return terrain_origins(*impl_->cfg.terrain, num_worlds, impl_->cfg.env_spacing);
+}
+
+}  // namespace mjsense

@@ -1,0 +1,118 @@
+#include "mjsense/scene/spec.h"
+
+#include <fmt/format.h>
+
+#include <filesystem>
+#include <mutex>
+
+#include "mjsense/core/embedded.h"
+#include "mjsense/core/error.h"
+#include "mjsense/scene/resolve.h"
+
+namespace mjsense {
+namespace {
+
+constexpr std::string_view kEmbedded = "embedded:";
+
+std::mutex capture_mutex;
+mjfLogHandler chained = nullptr;
+thread_local std::vector<std::string>* captured = nullptr;
+
+void on_message(const mjLogMessage* message) {
+  if (captured && message->level == mjLOG_WARNING) {
+    std::string text = message->subject;
+    if (message->body) text += fmt::format(": {}", message->body);
+    captured->push_back(std::move(text));
+  } else if (chained) {
+    chained(message);
+  }
+}
+
+SpecPtr checked(mjSpec* spec, const char* error, std::string_view place) {
+  if (!spec) throw ValueError(fmt::format("{}: {}", place, error));
+  return SpecPtr(spec);
+}
+
+}  // namespace
+
+void Vfs::add(const std::string& name, std::string_view bytes, std::string_view place) {
+  if (auto it = files_.find(name); it != files_.end()) {
+    if (it->second == bytes) return;
+    throw ValueError(
+        fmt::format("{}: asset '{}' differs from another entity's asset of that name; rename one",
+                    place, name));
+  }
+  const auto it = files_.emplace(name, std::string(bytes)).first;
+  const int failed =
+      mj_addBufferVFS(&vfs_, name.c_str(), it->second.data(), static_cast<int>(it->second.size()));
+  if (failed)
+    throw ValueError(fmt::format("{}: MuJoCo did not take the asset '{}' ({} bytes)", place, name,
+                                 bytes.size()));
+}
+
+WarningCapture::WarningCapture(std::vector<std::string>& messages) {
+  capture_mutex.lock();
+  captured = &messages;
+  previous_ = mju_setLogHandler(on_message);
+  chained = previous_;
+}
+
+WarningCapture::~WarningCapture() {
+  mju_setLogHandler(previous_);
+  captured = nullptr;
+  capture_mutex.unlock();
+}
+
+SpecPtr parse_model(const ModelSource& source, Vfs& vfs, std::string_view place) {
+  char error[1024] = "";
+  for (const auto& [name, bytes] : source.assets) vfs.add(name, bytes, place);
+  if (!source.xml.empty()) {
+    if (!source.path.empty())
+      throw ValueError(fmt::format("{}: give a path or an XML text, not both", place));
+    return checked(mj_parseXMLString(source.xml.c_str(), vfs.get(), error, sizeof error), error,
+                   place);
+  }
+  if (source.path.empty())
+    throw ValueError(fmt::format("{}: no model; give a path or an XML text", place));
+  if (source.path.starts_with(kEmbedded)) {
+    const std::string name = source.path.substr(kEmbedded.size());
+    embedded_file(name);  // throws with the nearest names
+    for (const EmbeddedFile& file : embedded_files())
+      vfs.add(std::string(file.name), file.text, place);
+    return checked(mj_parseXML(name.c_str(), vfs.get(), error, sizeof error), error, place);
+  }
+  if (!std::filesystem::is_regular_file(source.path)) {
+    throw ValueError(fmt::format("{}: no file '{}'", place, source.path));
+  }
+  // Absolute, so that its assets are found from anywhere.
+  const std::string path = std::filesystem::absolute(source.path).lexically_normal().string();
+  return checked(mj_parse(path.c_str(), nullptr, vfs.get(), error, sizeof error), error, place);
+}
+
+std::string element_name(const mjsElement* element) {
+  return mjs_getString(mjs_getName(const_cast<mjsElement*>(element)));
+}
+
+std::vector<mjsElement*> spec_elements(const mjSpec* spec, mjtObj type) {
+  std::vector<mjsElement*> elements;
+  for (mjsElement* e = mjs_firstElement(spec, type); e; e = mjs_nextElement(spec, e))
+    elements.push_back(e);
+  return elements;
+}
+
+std::vector<std::string> spec_names(const mjSpec* spec, mjtObj type) {
+  std::vector<std::string> names;
+  for (const mjsElement* e : spec_elements(spec, type)) names.push_back(element_name(e));
+  return names;
+}
+
+mjsElement* find_in_spec(const mjSpec* spec, mjtObj type, const std::string& name,
+                         std::string_view place) {
+  if (type == mjOBJ_XBODY) type = mjOBJ_BODY;
+  if (type == mjOBJ_BODY && name == "world") return mjs_findBody(spec, "world")->element;
+  mjsElement* element = name.empty() ? nullptr : mjs_findElement(spec, type, name.c_str());
+  if (!element) throw_unknown(place, obj_type_name(type), name, spec_names(spec, type));
+  return element;
+}
+
+}  // namespace mjsense

@@ -1,0 +1,72 @@
+#pragma once
+// MuJoCo's mjSpec in C++: owners, names, and its messages as exceptions and strings. libmujoco of
+// the wheel is built with another C++ library than ours: touch mjString, mjDoubleVec ... only
+// through the mjs_get* and mjs_set* functions.
+
+#include <mujoco/mujoco.h>
+
+#include <map>
+#include <memory>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "mjsense/scene/entity.h"
+
+namespace mjsense {
+
+struct SpecDelete {
+  void operator()(mjSpec* spec) const { mj_deleteSpec(spec); }
+};
+struct ModelDelete {
+  void operator()(mjModel* model) const { mj_deleteModel(model); }
+};
+using SpecPtr = std::unique_ptr<mjSpec, SpecDelete>;
+using ModelPtr = std::unique_ptr<mjModel, ModelDelete>;
+
+// Files in memory for parsing and compiling.
+class Vfs {
+ public:
+  Vfs() { mj_defaultVFS(&vfs_); }
+  ~Vfs() { mj_deleteVFS(&vfs_); }
+  Vfs(const Vfs&) = delete;
+  Vfs& operator=(const Vfs&) = delete;
+
+  // A second file of one name must be the same file, else ValueError: `place` says who wanted it.
+  void add(const std::string& name, std::string_view bytes, std::string_view place);
+  const mjVFS* get() const { return &vfs_; }
+  const std::map<std::string, std::string>& files() const { return files_; }
+
+ private:
+  mjVFS vfs_;
+  std::map<std::string, std::string> files_;
+};
+
+// While it lives, MuJoCo's warnings on this thread are kept here instead of printed and written to
+// MUJOCO_LOG.TXT. One at a time in the process; other threads' messages go where they went before.
+class WarningCapture {
+ public:
+  explicit WarningCapture(std::vector<std::string>& messages);
+  ~WarningCapture();
+  WarningCapture(const WarningCapture&) = delete;
+  WarningCapture& operator=(const WarningCapture&) = delete;
+
+ private:
+  mjfLogHandler previous_;
+};
+
+// Parses a model; its files in memory go into `vfs`. Throws ValueError with MuJoCo's text; `place`
+// names the entity.
+SpecPtr parse_model(const ModelSource& source, Vfs& vfs, std::string_view place);
+
+std::string element_name(const mjsElement* element);
+// The elements of one type, in the order of the spec.
+std::vector<mjsElement*> spec_elements(const mjSpec* spec, mjtObj type);
+std::vector<std::string> spec_names(const mjSpec* spec, mjtObj type);
+
+// Element of the spec by its full name; throws KeyError with the nearest names. XBODY is looked up
+// as BODY.
+mjsElement* find_in_spec(const mjSpec* spec, mjtObj type, const std::string& name,
+                         std::string_view place);
+
+}  // namespace mjsense
