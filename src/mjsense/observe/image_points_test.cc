@@ -1,0 +1,160 @@
+#include "mjsense/observe/image_points.h"
+
+#include <gmock/gmock.h>
+
+#include <cmath>
+#include <set>
+
+#include "mjsense/core/error.h"
+#include "mjsense/observe/test_world.h"
+
+namespace mjsense {
+namespace {
+
+// Bodies a (geoms 0, 1) and b (geom 2, invisible).
+constexpr char kScene[] = R"(
+<mujoco><worldbody>
+  <body name="a"><geom size="1"/><body name="a2"><geom size="1"/></body></body>
+  <body name="b"><geom size="1" group="3"/></body>
+</worldbody></mujoco>)";
+
+// A segmentation that a test paints.
+class Painted : public Sensor {
+ public:
+  Painted(int width, int height) : Sensor("camera"), width_(width), height_(height) {}
+  std::string_view kind() const override { return "painted"; }
+  void initialize(const SensorInit& init) override {
+    SensorSpec spec;
+    spec.dtype = DType::kInt32;
+    spec.shape = {height_, width_, 2};
+    auto all = add_field("segmentation", spec, init.num_worlds).data.all<std::int32_t>();
+    std::ranges::fill(all, -1);
+  }
+  void compute(const World&) override {}
+  void paint(int geom, int left, int top, int width, int height, int world = 0) {
+    auto row = fields()[0].data.row<std::int32_t>(world);
+    for (int y = top; y < top + height; ++y) {
+      for (int x = left; x < left + width; ++x) {
+        row[2 * (y * width_ + x)] = geom;
+        row[2 * (y * width_ + x) + 1] = mjOBJ_GEOM;
+      }
+    }
+  }
+
+ private:
+  int width_, height_;
+};
+
+struct Fixture {
+  explicit Fixture(const std::string& key = "pickup_obj", const std::string& body = "a")
+      : world(kScene),
+        camera(100, 50),
+        points("object_image_points", {{key, body}}, {{"camera", &camera}}) {
+    camera.initialize(world.init(2));
+    points.initialize(world.init(2));
+    prefix = key + "/camera/";
+  }
+  int count(int w = 0) { return values<std::int32_t>(points, prefix + "num_points", w)[0]; }
+  std::vector<float> xy(int w = 0) { return values<float>(points, prefix + "points", w); }
+
+  TestWorld world;
+  Painted camera;
+  ImagePointsSensor points;
+  std::string prefix;
+};
+
+TEST(ImagePoints, NothingSeenIsNaN) {
+  Fixture f;
+  f.points.compute(f.world.world());
+  EXPECT_EQ(f.count(), 0);
+  for (float x : f.xy()) EXPECT_TRUE(std::isnan(x));
+}
+
+// Published example: a 6 x 7 mask leaves 2 x 3 = 6 points after two erosions, row by row.
+TEST(ImagePoints, ErodesTwiceAndListsRowByRow) {
+  Fixture f;
+  f.camera.paint(1, 10, 20, 6, 7);  // a2 belongs to a
+  f.points.compute(f.world.world());
+  EXPECT_EQ(f.count(), 6);
+  const auto xy = f.xy();
+  const float expected[] = {.12f, .44f, .13f, .44f, .12f, .46f, .13f, .46f, .12f, .48f, .13f, .48f};
+  for (int i = 0; i < 12; ++i) EXPECT_FLOAT_EQ(xy[i], expected[i]) << i;
+  for (int i = 12; i < 20; ++i) EXPECT_TRUE(std::isnan(xy[i]));
+}
+
+TEST(ImagePoints, WhatErosionRemovesKeepsAllItsPixels) {
+  Fixture f;
+  f.camera.paint(0, 10, 20, 5, 2);
+  f.points.compute(f.world.world());
+  EXPECT_EQ(f.count(), 10);
+  EXPECT_FLOAT_EQ(f.xy()[0], .10f);
+  EXPECT_FLOAT_EQ(f.xy()[1], .40f);
+  EXPECT_FLOAT_EQ(f.xy()[18], .14f);
+}
+
+TEST(ImagePoints, AHandleIsNotEroded) {
+  Fixture f("door_handle");
+  f.camera.paint(0, 10, 20, 3, 3);
+  f.points.compute(f.world.world());
+  EXPECT_EQ(f.count(), 9);
+}
+
+TEST(ImagePoints, InvisibleGroupsDoNotCount) {
+  Fixture f("pickup_obj", "b");
+  f.camera.paint(2, 10, 20, 20, 20);
+  f.points.compute(f.world.world());
+  EXPECT_EQ(f.count(), 0);
+}
+
+TEST(ImagePoints, DrawsTenDifferentOnesThatTheKeyDecides) {
+  Fixture f;
+  f.camera.paint(0, 10, 10, 40, 30);
+  f.points.compute(f.world.world());
+  const auto first = f.xy();
+  std::set<std::pair<float, float>> different;
+  for (int i = 0; i < 10; ++i) {
+    different.insert({first[2 * i], first[2 * i + 1]});
+    EXPECT_GE(first[2 * i], .12f - 1e-6f);
+    EXPECT_LE(first[2 * i], .47f + 1e-6f);
+    EXPECT_GE(first[2 * i + 1], .24f - 1e-6f);
+    EXPECT_LE(first[2 * i + 1], .74f + 1e-6f);
+  }
+  EXPECT_EQ(different.size(), 10u);
+  f.points.compute(f.world.world());
+  EXPECT_EQ(f.xy(), first);
+  World later = f.world.world();
+  later.tick = 33;
+  f.points.compute(later);
+  EXPECT_NE(f.xy(), first);
+}
+
+TEST(ImagePoints, PicturesEndIsBackground) {
+  Fixture f;
+  f.camera.paint(0, 0, 0, 100, 50);
+  f.points.compute(f.world.world());
+  for (int i = 0; i < 10; ++i) {
+    EXPECT_GE(f.xy()[2 * i], .02f - 1e-6f);
+    EXPECT_LE(f.xy()[2 * i], .97f + 1e-6f);
+  }
+}
+
+TEST(ImagePoints, RefusesASegmentationItCannotRead) {
+  TestWorld w(kScene);
+  class Wrong : public Sensor {
+   public:
+    Wrong() : Sensor("camera") {}
+    std::string_view kind() const override { return "wrong"; }
+    void initialize(const SensorInit& init) override {
+      SensorSpec spec;
+      spec.shape = {4, 4};
+      add_field("segmentation", spec, init.num_worlds);
+    }
+    void compute(const World&) override {}
+  } wrong;
+  wrong.initialize(w.init());
+  ImagePointsSensor points("object_image_points", {{"a", "a"}}, {{"camera", &wrong}});
+  EXPECT_THROW(points.initialize(w.init()), ValueError);
+}
+
+}  // namespace
+}  // namespace mjsense

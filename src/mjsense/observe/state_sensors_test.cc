@@ -1,0 +1,182 @@
+#include <gmock/gmock.h>
+
+#include <cmath>
+#include <numbers>
+
+#include "mjsense/core/error.h"
+#include "mjsense/observe/camera_parameters.h"
+#include "mjsense/observe/env_states.h"
+#include "mjsense/observe/function_sensor.h"
+#include "mjsense/observe/grasp_state.h"
+#include "mjsense/observe/joint_state.h"
+#include "mjsense/observe/pose_sensor.h"
+#include "mjsense/observe/test_world.h"
+
+namespace mjsense {
+namespace {
+
+using testing::ElementsAre;
+using testing::FloatNear;
+using testing::HasSubstr;
+using testing::Pointwise;
+
+// A base 0.58 m above the floor with one hinge and a tool site; a cube; a camera that looks down
+// +x.
+constexpr char kScene[] = R"(
+<mujoco>
+  <worldbody>
+    <geom name="floor" type="plane" size="2 2 .1"/>
+    <body name="robot/base" mocap="true" pos="1 0 0" quat="0 0 0 1">
+      <body name="robot/link" pos="0 0 .58">
+        <joint name="robot/joint" axis="0 0 1"/>
+        <geom name="robot/pad" size=".05"/>
+        <site name="robot/tool" pos=".3 0 0"/>
+      </body>
+    </body>
+    <body name="thing/cube" pos="3 0 .05"><freejoint/><geom name="cube" type="box" size=".05 .05 .05" mass=".1"/></body>
+    <camera name="camera" pos="0 0 1" xyaxes="0 -1 0 0 0 1" fovy="60"/>
+  </worldbody>
+</mujoco>)";
+
+std::vector<JointGroup> groups() { return {{"base", {}, {}}, {"arm", {0}, {0}}}; }
+
+TEST(JointState, IsSortedJsonOfFloat32Values) {
+  TestWorld w(kScene);
+  w.data->qpos[0] = 0.05;
+  w.data->qvel[0] = -1e-5;
+  JointStateSensor qpos("qpos", JointStateSensor::What::kPosition, groups());
+  JointStateSensor qvel("qvel", JointStateSensor::What::kVelocity, groups());
+  w.compute(qpos);
+  w.compute(qvel);
+  EXPECT_EQ(text(qpos), R"({"arm":[0.05000000074505806],"base":[]})");
+  EXPECT_EQ(text(qvel), R"({"arm":[-9.999999747378752e-06],"base":[]})");
+  EXPECT_EQ(qpos.fields()[0].spec.shape, Shape({2000}));
+  EXPECT_TRUE(qpos.fields()[0].spec.is_dict);
+}
+
+TEST(JointState, RefusesARowThatCannotHoldTheLongestText) {
+  TestWorld w(kScene);
+  JointStateSensor qpos("qpos", JointStateSensor::What::kPosition, groups(), 40);
+  try {
+    qpos.initialize(w.init());
+    FAIL();
+  } catch (const ValueError& e) {
+    EXPECT_STREQ(e.what(), "sensor 'qpos': its text can need 46 bytes, str_max_len is 40");
+  }
+}
+
+TEST(JsonFunction, RefusesTextThatIsTooLongAtTheMomentItIs) {
+  TestWorld w(kScene);
+  std::string word = "short";
+  JsonFunctionSensor info("task_info", 16, "", [&](const World&, JsonWriter& json) {
+    json.begin_object().key("w").value(word).end_object();
+  });
+  w.compute(info);
+  EXPECT_EQ(text(info), R"({"w":"short"})");
+  word = "very much longer";
+  try {
+    info.compute(w.world());
+    FAIL();
+  } catch (const RowTooLong& e) {
+    EXPECT_EQ(e.world, 0);
+    EXPECT_STREQ(e.what(),
+                 "sensor 'task_info', world 0: its text needs 24 bytes, str_max_len is 16");
+  }
+}
+
+TEST(Pose, OfASiteInTheBaseFrame) {
+  TestWorld w(kScene);
+  PoseSensor base("robot_base_pose", {"body", "robot/base"});
+  PoseSensor tcp("tcp_pose", {"site", "robot/tool"}, {"body", "robot/base"});
+  w.compute(base);
+  w.compute(tcp);
+  EXPECT_THAT(values<float>(base), ElementsAre(1, 0, 0, 0, 0, 0, 1));
+  // The base is turned by half a turn about z: in its own frame the tool is still in front of it.
+  EXPECT_THAT(values<float>(tcp),
+              Pointwise(FloatNear(1e-6f), {.3f, 0.f, .58f, 1.f, 0.f, 0.f, 0.f}));
+  EXPECT_EQ(tcp.fields()[0].spec.frame, "body robot/base");
+}
+
+TEST(Pose, NamesTheNearestWhenThereIsNone) {
+  TestWorld w(kScene);
+  PoseSensor tcp("tcp_pose", {"site", "robot/tol"});
+  try {
+    tcp.initialize(w.init());
+    FAIL();
+  } catch (const KeyError& e) {
+    EXPECT_THAT(
+        e.what(),
+        HasSubstr("sensor 'tcp_pose': no site named 'robot/tol'; did you mean 'robot/tool'?"));
+  }
+}
+
+TEST(EnvStates, HoldsEveryFreeBodyAndTheRobot) {
+  TestWorld w(kScene);
+  w.data->qpos[0] = 0.25;
+  w.data->qvel[0] = -2;
+  for (int i = 0; i < 6; ++i) w.data->qvel[1 + i] = i;
+  EnvStatesSensor states("env_states", "panda", groups(), 6, "robot/base");
+  w.compute(states);
+  ASSERT_EQ(states.fields().size(), 2u);
+  EXPECT_EQ(states.fields()[0].spec.name, "env_states/actors/thing_cube");
+  EXPECT_EQ(states.fields()[1].spec.name, "env_states/articulations/panda");
+  EXPECT_THAT(values<float>(states, "actors/thing_cube"),
+              ElementsAre(3, 0, .05f, 1, 0, 0, 0, 0, 1, 2, 3, 4, 5));
+  EXPECT_THAT(values<float>(states, "articulations/panda"), ElementsAre(.25f, -2, 0, 0, 0, 0));
+  EXPECT_THROW(EnvStatesSensor("env_states", "panda", groups(), 1, "robot/base"), ValueError);
+}
+
+TEST(CameraParameters, ProjectKnownPoints) {
+  TestWorld w(kScene);
+  CameraParameterSensor camera("sensor_param_camera", "camera", 640, 368);
+  w.compute(camera);
+  const auto X = values<double>(camera, "cam2world_gl");
+  const auto E = values<double>(camera, "extrinsic_cv");
+  const auto K = values<double>(camera, "intrinsic_cv");
+  // It looks along +x from (0, 0, 1): right is -y, down is -z.
+  EXPECT_THAT(
+      X, Pointwise(testing::DoubleNear(1e-12), {0, 0, 1, 0, -1, 0, 0, 0, 0, -1, 0, 1, 0, 0, 0, 1}));
+  const double f = static_cast<float>(184 / std::tan(std::numbers::pi / 6));
+  EXPECT_THAT(K, ElementsAre(f, 0, 320, 0, f, 184, 0, 0, 1));
+
+  const auto project = [&](double x, double y, double z) {
+    double c[3], k[3];
+    for (int i = 0; i < 3; ++i)
+      c[i] = E[4 * i] * x + E[4 * i + 1] * y + E[4 * i + 2] * z + E[4 * i + 3];
+    for (int i = 0; i < 3; ++i) k[i] = K[3 * i] * c[0] + K[3 * i + 1] * c[1] + K[3 * i + 2] * c[2];
+    return std::pair{k[0] / k[2], k[1] / k[2]};
+  };
+  const auto [u0, v0] = project(2, 0, 1);
+  EXPECT_NEAR(u0, 320, 1e-9);
+  EXPECT_NEAR(v0, 184, 1e-9);
+  const auto [u1, v1] =
+      project(2, -.5, 1 + 2 * std::tan(std::numbers::pi / 6));  // right, upper edge
+  EXPECT_NEAR(u1, 320 + f / 4, 1e-4);
+  EXPECT_NEAR(v1, 0, 1e-4);
+}
+
+TEST(GraspState, TouchingIsNotHolding) {
+  TestWorld w(kScene);
+  GraspStateSensor grasp("grasp_state_pickup_obj", "thing/cube", {{"gripper", "robot/base"}});
+  w.compute(grasp);  // the cube rests on the floor, alone
+  EXPECT_EQ(text(grasp), R"({"gripper":{"held":false,"touching":false}})");
+
+  const auto place = [&](double z) {  // the pad is a sphere at (1, 0, .58)
+    w.data->qpos[1] = 1;
+    w.data->qpos[3] = z;
+    mj_forward(w.model, w.data);
+    grasp.compute(w.world());
+  };
+  place(.58 + .09);
+  EXPECT_EQ(text(grasp), R"({"gripper":{"held":true,"touching":true}})");
+  // Now the cube touches the floor, too: lift the floor to it.
+  w.data->mocap_pos[2] = -.58 + .05 + .05 + .04;
+  w.data->qpos[1] = 1;
+  w.data->qpos[3] = .0499;
+  mj_forward(w.model, w.data);
+  grasp.compute(w.world());
+  EXPECT_EQ(text(grasp), R"({"gripper":{"held":false,"touching":true}})");
+}
+
+}  // namespace
+}  // namespace mjsense
