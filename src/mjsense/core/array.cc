@@ -82,8 +82,23 @@ Array::Array(DType dtype, const Shape& shape) : dtype_(dtype), shape_(shape) {
   fill_zero();
 }
 
+Array Array::shared(Array& owner, DType dtype, const Shape& shape) {
+  Array out;
+  out.dtype_ = dtype;
+  out.shape_ = shape;
+  out.row_elements_ = static_cast<std::size_t>(shape.without_front().size());
+  if (out.bytes() != owner.bytes() || out.row_bytes() != owner.row_bytes()) {
+    throw ValueError(fmt::format("{} {} cannot share the memory of {} {}", dtype_name(dtype),
+                                 shape.str(), dtype_name(owner.dtype()), owner.shape().str()));
+  }
+  out.data_ = std::unique_ptr<std::byte[], Free>(owner.data(), Free(false));
+  return out;
+}
+
 void Array::fill_zero() { std::memset(data_.get(), 0, bytes()); }
 
-void Array::Free::operator()(std::byte* p) const { ::operator delete[](p, kAlign); }
+void Array::Free::operator()(std::byte* p) const {
+  if (owned) ::operator delete[](p, kAlign);
+}
 
 }  // namespace mjsense

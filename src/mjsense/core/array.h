@@ -91,6 +91,8 @@ class Array {
  public:
   Array() = default;
   Array(DType dtype, const Shape& shape);
+  // The memory of another array, which must live longer, under a shape of as many bytes a row.
+  static Array shared(Array& owner, DType dtype, const Shape& shape);
 
   bool empty() const { return data_ == nullptr; }
   DType dtype() const { return dtype_; }
@@ -125,6 +127,9 @@ class Array {
 
  private:
   struct Free {
+    Free() : owned(true) {}
+    explicit Free(bool owned) : owned(owned) {}
+    bool owned;
     void operator()(std::byte* p) const;
   };
   std::unique_ptr<std::byte[], Free> data_;

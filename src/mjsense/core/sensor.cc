@@ -35,4 +35,11 @@ Field& Sensor::add_field(std::string_view name, SensorSpec spec, int num_worlds)
   return fields_.emplace_back(Field{std::string(name), std::move(spec), std::move(data)});
 }
 
+Field& Sensor::share_field(std::string_view name, SensorSpec spec, Field& source) {
+  spec.name = name.empty() ? name_ : fmt::format("{}/{}", name_, name);
+  Array data =
+      Array::shared(source.data, spec.dtype, spec.shape.with_front(source.data.shape()[0]));
+  return fields_.emplace_back(Field{std::string(name), std::move(spec), std::move(data)});
+}
+
 }  // namespace mjsense

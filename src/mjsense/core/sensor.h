@@ -47,8 +47,8 @@ struct World {
   std::int64_t episode = 0;  // resets of this world since the last seeding
   std::uint64_t seed = 0;
   bool first = false;  // no step was taken since the reset
-  // Changes whenever the derived fields of `data` may have: a physics step, forward, reset. What was
-  // taken from them at an equal moment of the same world may be reused. 0: not known.
+  // Changes whenever the derived fields of `data` may have: a physics step, forward, reset. What
+  // was taken from them at an equal moment of the same world may be reused. 0: not known.
   std::uint64_t moment = 0;
   double elapsed = 0.0;  // s that one substep() stands for; 0: the model's timestep
 
@@ -101,8 +101,8 @@ class Sensor {
   virtual std::string_view kind() const = 0;         // "builtin", "contact", "camera", ...
 
   virtual void edit_spec(mjSpec* spec);
-  // Further sensors that it brings into its scene's registry, after the discovered ones; asked once,
-  // after edit_spec().
+  // Further sensors that it brings into its scene's registry, after the discovered ones; asked
+  // once, after edit_spec().
   virtual std::vector<std::unique_ptr<Sensor>> parts();
   virtual void initialize(const SensorInit& init) = 0;
   virtual bool wants_substep() const { return false; }
@@ -127,6 +127,8 @@ class Sensor {
  protected:
   // Declares a field: allocates [B, *shape]. `spec.name` is filled in. Call from initialize() only.
   Field& add_field(std::string_view name, SensorSpec spec, int num_worlds);
+  // A field whose rows are those of another sensor's field, which must live longer.
+  Field& share_field(std::string_view name, SensorSpec spec, Field& source);
   void clear_fields() { fields_.clear(); }
 
  private:

@@ -2,62 +2,42 @@
 
 #include <fmt/format.h>
 
-#include <algorithm>
-
 #include "mjsense/core/error.h"
 #include "mjsense/sim/simulation.h"
 
 namespace mjsense {
 
 void SensorSuite::add(std::shared_ptr<Sensor> sensor, std::string_view owner) {
-  Sensor* raw = sensor.get();
-  insert({.name = raw->name(),
-          .sensor = raw,
-          .owned = std::move(sensor),
-          .owner = std::string(owner)});
+  const std::string from = owner.empty() ? "the suite" : std::string(owner);
+  if (sensor->name().empty()) throw ValueError(fmt::format("a sensor from {} has no name", from));
+  if (const int other = index(sensor->name()); other >= 0) {
+    throw ValueError(fmt::format("'{}' is duplicated sensor uuid: from {} and from {}",
+                                 sensor->name(), owners_[other], from));
+  }
+  sensors_.push_back(std::move(sensor));
+  owners_.push_back(from);
 }
 
 void SensorSuite::extend(std::span<const std::shared_ptr<Sensor>> sensors, std::string_view owner) {
   for (const auto& sensor : sensors) add(sensor, owner);
 }
 
-void SensorSuite::add_field(std::string name, Sensor& scene_sensor, std::string_view field,
-                            std::string_view owner, std::optional<SensorSpec> spec) {
-  insert({.name = std::move(name),
-          .sensor = &scene_sensor,
-          .field = std::string(field),
-          .spec = std::move(spec),
-          .owner = std::string(owner)});
-}
-
-void SensorSuite::insert(Entry added) {
-  if (added.name.empty()) {
-    throw ValueError(
-        fmt::format("a sensor of {} has no name", added.owner.empty() ? "the suite" : added.owner));
+int SensorSuite::index(std::string_view name) const {
+  for (std::size_t i = 0; i < sensors_.size(); ++i) {
+    if (sensors_[i]->name() == name) return static_cast<int>(i);
   }
-  if (const Entry* other = entry(added.name)) {
-    auto from = [](const Entry& e) { return e.owner.empty() ? std::string("the suite") : e.owner; };
-    throw ValueError(fmt::format("'{}' is duplicated sensor uuid: from {} and from {}", added.name,
-                                 from(*other), from(added)));
-  }
-  entries_.push_back(std::move(added));
-  streams_.clear();
-}
-
-const SensorSuite::Entry* SensorSuite::entry(std::string_view name) const {
-  const auto it = std::ranges::find(entries_, name, &Entry::name);
-  return it == entries_.end() ? nullptr : &*it;
+  return -1;
 }
 
 std::vector<std::string> SensorSuite::names() const {
   std::vector<std::string> names;
-  for (const Entry& e : entries_) names.push_back(e.name);
+  for (const auto& sensor : sensors_) names.push_back(sensor->name());
   return names;
 }
 
 Sensor* SensorSuite::find(std::string_view name) const {
-  const Entry* e = entry(name);
-  return e ? e->sensor : nullptr;
+  const int i = index(name);
+  return i < 0 ? nullptr : sensors_[i].get();
 }
 
 Sensor& SensorSuite::get(std::string_view name) const {
@@ -66,7 +46,7 @@ Sensor& SensorSuite::get(std::string_view name) const {
 }
 
 const std::string& SensorSuite::owner(std::string_view name) const {
-  if (const Entry* e = entry(name)) return e->owner;
+  if (const int i = index(name); i >= 0) return owners_[i];
   throw_unknown("suite", "sensor", name, names());
 }
 
@@ -75,54 +55,39 @@ void SensorSuite::bind(Simulation& simulation) {
     throw ValueError("a suite belongs to one simulation; this one is bound to another");
   }
   simulation_ = &simulation;
-  streams_.clear();
-  sensors_.clear();
-  for (Entry& e : entries_) {
-    if (!e.bound && e.owned) simulation.add(e.owned);
-    e.bound = true;
-    if (e.field) e.sensor->field(*e.field);  // throws if there is none
-    if (std::ranges::find(sensors_, e.sensor) == sensors_.end()) sensors_.push_back(e.sensor);
-    for (Field& field : e.sensor->fields()) {
-      if (e.field && field.name != *e.field) continue;
-      Stream stream{e.spec.value_or(field.spec), {}, e.sensor};
-      if (e.field) stream.spec.name = e.name;
-      if (stream.row_bytes() != field.data.row_bytes()) {
-        throw ValueError(fmt::format("suite: '{}' declares {} {}, but '{}' has {} {}", e.name,
-                                     dtype_name(stream.spec.dtype), stream.spec.shape.str(),
-                                     field.spec.name, dtype_name(field.spec.dtype),
-                                     field.spec.shape.str()));
-      }
-      stream.data = ArrayView::dense(field.data.data(), stream.spec.dtype,
-                                     stream.spec.shape.with_front(field.data.shape()[0]));
-      streams_.push_back(std::move(stream));
-    }
+  while (bound_.size() < sensors_.size()) {
+    simulation.add(sensors_[bound_.size()]);
+    bound_.push_back(sensors_[bound_.size()].get());
   }
 }
 
 void SensorSuite::refresh() {
-  if (!simulation_) throw ValueError("the suite is not bound to a simulation: call bind() first");
-  simulation_->refresh(sensors_);
-}
-
-std::span<const Stream> SensorSuite::streams() const {
-  if (streams_.empty() && !entries_.empty()) {
-    throw ValueError("the suite has sensors that are not bound to a simulation: call bind() first");
+  if (!simulation_ || bound_.size() < sensors_.size()) {
+    throw ValueError("the suite has sensors that are not bound to a simulation: call bind()");
   }
-  return streams_;
+  simulation_->refresh(bound_);
 }
 
-const Stream& SensorSuite::stream(std::string_view name) const {
+std::vector<const Field*> SensorSuite::streams() const {
+  std::vector<const Field*> streams;
+  for (const auto& sensor : sensors_) {
+    for (const Field& field : sensor->fields()) streams.push_back(&field);
+  }
+  return streams;
+}
+
+const Field& SensorSuite::stream(std::string_view name) const {
   std::vector<std::string> names;
-  for (const Stream& s : streams()) {
-    if (s.spec.name == name) return s;
-    names.push_back(s.spec.name);
+  for (const Field* field : streams()) {
+    if (field->spec.name == name) return *field;
+    names.push_back(field->spec.name);
   }
   throw_unknown("suite", "stream", name, names);
 }
 
 std::size_t SensorSuite::bytes_per_world() const {
   std::size_t bytes = 0;
-  for (const Stream& s : streams()) bytes += s.row_bytes();
+  for (const Field* field : streams()) bytes += field->data.row_bytes();
   return bytes;
 }
 

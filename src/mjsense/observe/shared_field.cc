@@ -1,0 +1,33 @@
+#include "mjsense/observe/shared_field.h"
+
+#include "mjsense/core/error.h"
+
+namespace mjsense {
+
+SharedField::SharedField(std::string name, Sensor& source, std::string field,
+                         std::function<void(SensorSpec&)> adapt)
+    : Sensor(std::move(name)),
+      source_(&source),
+      field_(std::move(field)),
+      adapt_(std::move(adapt)) {}
+
+Stage SharedField::stage() const {
+  return source_->stage() == Stage::kRow ? Stage::kRow : Stage::kPostCast;
+}
+
+void SharedField::initialize(const SensorInit& /*init*/) {
+  clear_fields();
+  std::vector<std::string> names;
+  for (Field& field : source_->fields()) {
+    names.push_back(field.name);
+    if (field.name != field_) continue;
+    SensorSpec spec = field.spec;
+    if (adapt_) adapt_(spec);
+    share_field("", std::move(spec), field);
+    return;
+  }
+  throw_unknown("sensor '" + name() + "', which shows '" + source_->name() + "'", "field", field_,
+                names);
+}
+
+}  // namespace mjsense

@@ -1,0 +1,29 @@
+#pragma once
+// One field of another sensor as a sensor of its own: the rows are shared, nothing is copied. So a
+// camera of the scene is `wrist_camera` and `wrist_camera_depth` in a suite.
+
+#include <functional>
+#include <string>
+
+#include "mjsense/core/sensor.h"
+
+namespace mjsense {
+
+class SharedField final : public Sensor {
+ public:
+  // `adapt` may change the field's spec: its storage, or its shape to one of as many bytes.
+  SharedField(std::string name, Sensor& source, std::string field,
+              std::function<void(SensorSpec&)> adapt = {});
+  std::string_view kind() const override { return "shared"; }
+  Stage stage() const override;
+  std::span<Sensor* const> inputs() const override { return {&source_, 1}; }
+  void initialize(const SensorInit& init) override;
+  void compute(const World& /*world*/) override {}
+
+ private:
+  Sensor* source_;
+  std::string field_;
+  std::function<void(SensorSpec&)> adapt_;
+};
+
+}  // namespace mjsense
