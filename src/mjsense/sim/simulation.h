@@ -1,8 +1,9 @@
 #pragma once
 // Scene + worlds + sensors: steps physics and keeps every measurement fresh.
 //
-// A sensor is computed when it is read and stale, and from then on in the same parallel pass as the physics, for as long as
-// it is read every step. Stale means: the world was stepped, reset or forwarded since.
+// A sensor is computed when it is read and stale, and from then on in the same parallel pass as the
+// physics, for as long as it is read every step. Stale means: the world was stepped, reset or
+// forwarded since.
 
 #include <cstdint>
 #include <memory>
@@ -48,16 +49,22 @@ class Simulation {
   // Makes derived fields and sensors current after state rows were written.
   void forward(std::span<const int> ids = {});
 
-  // mjlab's order of calls, by hand: plain mj_step, then one update of the sensors' per-substep state.
+  // mjlab's order of calls, by hand: plain mj_step, then one update of the sensors' per-substep
+  // state.
   void step_raw(int substeps);
-  void update_sensors();
+  void update_sensors(double dt = 0.0);  // dt: s that this update stands for; 0: the timestep
   // Forgets the episode in the sensors of these worlds, physics untouched.
   void reset_sensors(std::span<const int> ids = {});
 
-  // Adds a sensor that is not part of the scene (observation sensors, users' own) and initializes it.
+  // Adds a sensor that is not part of the scene (observation sensors, users' own) and initializes
+  // it.
   void add(std::shared_ptr<Sensor> sensor);
-  // Makes the sensor's rows current in every world. They stay so until the next step, reset or forward.
-  void refresh(Sensor& sensor) { Sensor* one[] = {&sensor}; refresh(one); }
+  // Makes the sensor's rows current in every world. They stay so until the next step, reset or
+  // forward.
+  void refresh(Sensor& sensor) {
+    Sensor* one[] = {&sensor};
+    refresh(one);
+  }
   void refresh(std::span<Sensor* const> sensors);
   // State was changed in a way that only the caller knows.
   void invalidate(std::span<const int> ids = {});
@@ -73,15 +80,16 @@ class Simulation {
 
   void initialize(Sensor& sensor);
   Slot& slot_of(const Sensor& sensor);
-  // Makes `change` happen and `slots` (each after its inputs) current in the worlds `ids` (empty: all).
+  // Makes `change` happen and `slots` (each after its inputs) current in the worlds `ids` (empty:
+  // all).
   void compute(std::span<Slot* const> slots, std::span<const int> ids, Change change, int key = -1);
   void cast(std::span<Slot* const> slots, std::span<const int> ids, int phase);
   template <class Wanted>
   void collect(std::vector<Slot*>& slots, Wanted&& wanted);
   void mark_stale(std::span<const int> ids);
 
-  // Buffers that keep their capacity, so that a step allocates nothing; one for each level of nested calls (a sensor in Python
-  // may read other sensors while it is computed).
+  // Buffers that keep their capacity, so that a step allocates nothing; one for each level of
+  // nested calls (a sensor in Python may read other sensors while it is computed).
   struct Scratch;
   class Borrowed;
   std::vector<std::unique_ptr<Scratch>> scratch_;
@@ -92,9 +100,9 @@ class Simulation {
   std::unique_ptr<ThreadPool> pool_;
   std::unique_ptr<RayScene> rays_;
   std::vector<std::shared_ptr<Sensor>> added_;
-  std::vector<std::unique_ptr<Slot>> slots_;   // scene sensors, then added ones
-  std::vector<std::int64_t> version_;          // of each world's state
-  std::vector<std::int64_t> rays_version_;     // of the poses in the ray scene
+  std::vector<std::unique_ptr<Slot>> slots_;  // scene sensors, then added ones
+  std::vector<std::int64_t> version_;         // of each world's state
+  std::vector<std::int64_t> rays_version_;    // of the poses in the ray scene
   bool any_substep_ = false;
 };
 

@@ -21,6 +21,8 @@ class AllocationCount {
 
 }  // namespace mjsense
 
+#pragma GCC diagnostic push
+#pragma GCC diagnostic ignored "-Wmismatched-new-delete"  // malloc and free are the pair here
 void* operator new(std::size_t size) {
   ++mjsense::allocations_so_far;
   if (void* p = std::malloc(size ? size : 1)) return p;
@@ -36,3 +38,4 @@ void operator delete(void* p) noexcept { std::free(p); }
 void operator delete(void* p, std::size_t) noexcept { std::free(p); }
 void operator delete(void* p, std::align_val_t) noexcept { std::free(p); }
 void operator delete(void* p, std::size_t, std::align_val_t) noexcept { std::free(p); }
+#pragma GCC diagnostic pop

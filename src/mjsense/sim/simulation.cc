@@ -1,0 +1,328 @@
+#include "mjsense/sim/simulation.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+
+#include "mjsense/core/error.h"
+#if __has_include("mjsense/rays/ray_scene.h")
+#include "mjsense/rays/ray_scene.h"
+#else
+namespace mjsense {
+class RayScene {
+ public:
+  RayScene(const mjModel*, int) {}
+  void update(const World&) {}
+};
+}  // namespace mjsense
+#endif
+
+namespace mjsense {
+namespace {
+
+// Runs `body` for a sensor; an error that does not say which sensor failed gets its name.
+template <class Body>
+void guarded(const Sensor& sensor, Body&& body) {
+  try {
+    body();
+  } catch (const Error& e) {
+    if (std::string_view(e.what()).find(sensor.name()) != std::string_view::npos) throw;
+    const std::string message = fmt::format("sensor '{}': {}", sensor.name(), e.what());
+    switch (e.kind()) {
+      case ErrorKind::kValue:
+        throw ValueError(message);
+      case ErrorKind::kKey:
+        throw KeyError(message);
+      case ErrorKind::kRuntime:
+        throw RuntimeError(message);
+    }
+  }
+}
+
+}  // namespace
+
+// A sensor and where its rows stand.
+struct Simulation::Slot {
+  Sensor* sensor;
+  std::vector<Slot*> inputs;
+  std::vector<std::int64_t> computed;  // by world: version_ to which the row belongs
+  int phase = 0;        // passes that must come before: 1 + that of an input which casts
+  bool casts = false;   // stage kCast or kBatch: finished by cast()
+  bool read = false;    // since the last step
+  bool wanted = false;  // scratch of collect()
+};
+
+struct Simulation::Scratch {
+  std::vector<Slot*> slots;
+  std::vector<int> ids;
+};
+
+class Simulation::Borrowed {
+ public:
+  explicit Borrowed(Simulation& sim) : sim_(sim) {
+    if (sim.scratch_.empty()) {
+      scratch_ = std::make_unique<Scratch>();
+    } else {
+      scratch_ = std::move(sim.scratch_.back());
+      sim.scratch_.pop_back();
+    }
+    scratch_->slots.clear();
+    scratch_->ids.clear();
+  }
+  ~Borrowed() { sim_.scratch_.push_back(std::move(scratch_)); }
+  Borrowed(const Borrowed&) = delete;
+  Borrowed& operator=(const Borrowed&) = delete;
+  Scratch* operator->() { return scratch_.get(); }
+
+ private:
+  Simulation& sim_;
+  std::unique_ptr<Scratch> scratch_;
+};
+
+// What happens to the sensors while MuJoCo's threads run over the worlds.
+class Simulation::Hooks final : public WorldHooks {
+ public:
+  enum class Only { kNothing, kSubstep, kReset };
+  Hooks(Simulation& sim, std::span<Slot* const> slots, int phase)
+      : sim_(sim), slots_(slots), phase_(phase) {
+    for (const Slot* s : slots) rays_ |= s->phase == phase && s->sensor->stage() == Stage::kCast;
+  }
+
+  // Nothing but substep() or reset() of every sensor.
+  Hooks(Simulation& sim, Only only, double elapsed = 0.0)
+      : sim_(sim), only_(only), elapsed_(elapsed) {}
+
+  bool wants_substep() const override { return sim_.any_substep_; }
+
+  void substep(const World& world) override {
+    for (auto& slot : sim_.slots_) {
+      if (slot->sensor->wants_substep())
+        guarded(*slot->sensor, [&] { slot->sensor->substep(world); });
+    }
+  }
+
+  void reset(const World& world) override {
+    for (auto& slot : sim_.slots_) guarded(*slot->sensor, [&] { slot->sensor->reset(world); });
+  }
+
+  void refreshed(const World& world) override {
+    if (only_ == Only::kSubstep) {
+      World by_hand = world;
+      by_hand.elapsed = elapsed_;
+      return substep(by_hand);
+    }
+    if (only_ == Only::kReset) return reset(world);
+    const std::int64_t version = sim_.version_[world.id];
+    if (rays_ && sim_.rays_version_[world.id] != version) {
+      sim_.rays_->update(world);
+      sim_.rays_version_[world.id] = version;
+    }
+    for (Slot* slot : slots_) {
+      if (slot->phase != phase_ || slot->computed[world.id] == version) continue;
+      guarded(*slot->sensor, [&] { slot->sensor->compute(world); });
+      if (!slot->casts) slot->computed[world.id] = version;
+    }
+  }
+
+ private:
+  Simulation& sim_;
+  std::span<Slot* const> slots_;
+  int phase_ = 0;
+  Only only_ = Only::kNothing;
+  double elapsed_ = 0.0;
+  bool rays_ = false;
+};
+
+Simulation::Simulation(std::shared_ptr<Scene> scene, const SimulationCfg& cfg)
+    : cfg_(cfg), scene_(std::move(scene)) {
+  if (cfg.decimation < 1)
+    throw ValueError(fmt::format("decimation is {}: must be at least 1", cfg.decimation));
+  worlds_ = std::make_unique<Worlds>(scene_->model(), cfg.num_worlds, cfg.threads);
+  worlds_->seed(cfg.seed);
+  // Not worlds_->threads(): MuJoCo's pool is never larger than the number of worlds, but one image
+  // has many tiles.
+  pool_ = std::make_unique<ThreadPool>(cfg.threads);
+  version_.assign(cfg.num_worlds, 1);
+  rays_version_.assign(cfg.num_worlds, 0);
+  for (auto& sensor : scene_->sensors()) initialize(*sensor);
+  reset();
+}
+
+Simulation::~Simulation() = default;
+
+RayScene& Simulation::rays() {
+  if (!rays_) rays_ = std::make_unique<RayScene>(scene_->model(), cfg_.num_worlds);
+  return *rays_;
+}
+
+void Simulation::initialize(Sensor& sensor) {
+  const SensorInit init{scene_->model(), scene_.get(), cfg_.num_worlds, cfg_.decimation,
+                        pool_->size()};
+  guarded(sensor, [&] { sensor.initialize(init); });
+  auto slot = std::make_unique<Slot>();
+  slot->sensor = &sensor;
+  slot->computed.assign(cfg_.num_worlds, 0);
+  slot->casts = sensor.stage() == Stage::kCast || sensor.stage() == Stage::kBatch;
+  if (sensor.stage() == Stage::kPostCast) slot->phase = 1;
+  for (const Sensor* input : sensor.inputs()) {
+    Slot& in = slot_of(*input);
+    slot->inputs.push_back(&in);
+    slot->phase = std::max(slot->phase, in.phase + (in.casts ? 1 : 0));
+  }
+  if (sensor.stage() == Stage::kCast) rays();
+  any_substep_ |= sensor.wants_substep();
+  slots_.push_back(std::move(slot));
+}
+
+void Simulation::add(std::shared_ptr<Sensor> sensor) {
+  initialize(*sensor);
+  added_.push_back(std::move(sensor));
+}
+
+Simulation::Slot& Simulation::slot_of(const Sensor& sensor) {
+  for (auto& slot : slots_) {
+    if (slot->sensor == &sensor) return *slot;
+  }
+  throw ValueError(fmt::format("sensor '{}' does not belong to this simulation: call add() first",
+                               sensor.name()));
+}
+
+// The slots for which `wanted` holds and their inputs, in order: an input was initialized before
+// the sensor that reads it.
+template <class Wanted>
+void Simulation::collect(std::vector<Slot*>& slots, Wanted&& wanted) {
+  for (auto slot = slots_.rbegin(); slot != slots_.rend(); ++slot) {
+    (*slot)->wanted |= wanted(**slot);
+    if ((*slot)->wanted) {
+      for (Slot* input : (*slot)->inputs) input->wanted = true;
+    }
+  }
+  for (auto& slot : slots_) {
+    if (slot->wanted) slots.push_back(slot.get());
+    slot->wanted = false;
+  }
+}
+
+void Simulation::mark_stale(std::span<const int> ids) {
+  if (ids.empty()) {
+    for (std::int64_t& v : version_) ++v;
+  } else {
+    for (int w : ids) ++version_[w];
+  }
+}
+
+void Simulation::compute(std::span<Slot* const> slots, std::span<const int> ids, Change change,
+                         int key) {
+  int last_phase = 0;
+  for (const Slot* slot : slots) last_phase = std::max(last_phase, slot->phase);
+  for (int phase = 0; phase <= last_phase; ++phase) {
+    Hooks hooks(*this, slots, phase);
+    if (phase > 0) {
+      worlds_->visit(ids, hooks);
+    } else {
+      switch (change) {
+        case Change::kStep:
+          worlds_->step(cfg_.decimation, hooks);
+          break;
+        case Change::kForward:
+          worlds_->forward(ids, hooks);
+          break;
+        case Change::kReset:
+          worlds_->reset(ids, key, hooks);
+          break;
+        case Change::kNone:
+          worlds_->visit(ids, hooks);
+          break;
+      }
+    }
+    cast(slots, ids, phase);
+  }
+}
+
+void Simulation::cast(std::span<Slot* const> slots, std::span<const int> ids, int phase) {
+  for (const Stage stage : {Stage::kCast, Stage::kBatch}) {
+    for (Slot* slot : slots) {
+      if (slot->sensor->stage() != stage || slot->phase != phase) continue;
+      Borrowed due(*this);
+      const int n = ids.empty() ? cfg_.num_worlds : static_cast<int>(ids.size());
+      for (int k = 0; k < n; ++k) {
+        const int w = ids.empty() ? k : ids[k];
+        if (slot->computed[w] != version_[w]) due->ids.push_back(w);
+      }
+      if (due->ids.empty()) continue;
+      guarded(*slot->sensor, [&] { slot->sensor->cast({rays_.get(), due->ids, *pool_}); });
+      for (int w : due->ids) slot->computed[w] = version_[w];
+    }
+  }
+}
+
+void Simulation::step(int control_steps) {
+  if (control_steps < 1) throw ValueError(fmt::format("step({}): at least 1", control_steps));
+  for (int k = 0; k < control_steps; ++k) {
+    const bool last = k + 1 == control_steps;
+    Borrowed due(*this);
+    collect(due->slots, [last](Slot& s) {
+      const bool wanted = s.sensor->eager() || (last && s.read);
+      if (last) s.read = false;
+      return wanted;
+    });
+    mark_stale({});
+    compute(due->slots, {}, Change::kStep);
+  }
+}
+
+void Simulation::reset(std::span<const int> ids, int key) {
+  const std::vector<int> sorted = worlds_->checked_ids(ids);
+  Borrowed due(*this);
+  collect(due->slots, [](Slot& s) { return s.sensor->eager() || s.read; });
+  mark_stale(sorted);
+  compute(due->slots, sorted, Change::kReset, key);
+}
+
+void Simulation::forward(std::span<const int> ids) {
+  const std::vector<int> sorted = worlds_->checked_ids(ids);
+  Borrowed due(*this);
+  collect(due->slots, [](Slot& s) { return s.sensor->eager() || s.read; });
+  mark_stale(sorted);
+  compute(due->slots, sorted, Change::kForward);
+}
+
+void Simulation::step_raw(int substeps) {
+  mark_stale({});
+  worlds_->step_raw(substeps);
+}
+
+void Simulation::update_sensors(double dt) {
+  Hooks hooks(*this, Hooks::Only::kSubstep, dt);
+  mark_stale({});
+  worlds_->visit({}, hooks);
+}
+
+void Simulation::reset_sensors(std::span<const int> ids) {
+  const std::vector<int> sorted = worlds_->checked_ids(ids);
+  Hooks hooks(*this, Hooks::Only::kReset);
+  mark_stale(sorted);
+  worlds_->visit(sorted, hooks);
+}
+
+void Simulation::invalidate(std::span<const int> ids) { mark_stale(worlds_->checked_ids(ids)); }
+
+void Simulation::refresh(std::span<Sensor* const> sensors) {
+  Borrowed due(*this);
+  for (const Sensor* sensor : sensors) {
+    slot_of(*sensor).wanted = true;
+  }
+  collect(due->slots, [](const Slot&) { return false; });
+  for (int w = 0; w < cfg_.num_worlds; ++w) {
+    for (const Slot* slot : due->slots) {
+      if (slot->computed[w] != version_[w]) {
+        due->ids.push_back(w);
+        break;
+      }
+    }
+  }
+  if (!due->ids.empty()) compute(due->slots, due->ids, Change::kNone);
+  for (const Sensor* sensor : sensors) slot_of(*sensor).read = true;  // only if it can be computed
+}
+
+}  // namespace mjsense

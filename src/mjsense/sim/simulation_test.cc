@@ -1,0 +1,207 @@
+#include "mjsense/sim/simulation.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <memory>
+#include <vector>
+
+#include "mjsense/core/error.h"
+#include "mjsense/core/testing/allocations.h"
+
+namespace mjsense {
+namespace {
+
+using ::testing::Each;
+using ::testing::ElementsAre;
+using ::testing::HasSubstr;
+
+constexpr char kXml[] = R"(
+<mujoco>
+  <worldbody>
+    <body name="ball" pos="0 0 1"><freejoint/><geom name="ball" type="sphere" size=".1"/></body>
+  </worldbody>
+</mujoco>)";
+
+std::shared_ptr<Scene> scene() {
+  SceneCfg cfg;
+  cfg.entities.emplace_back("robot", EntityCfg{.model = {.xml = kXml}});
+  cfg.terrain = TerrainCfg{};
+  return std::make_shared<Scene>(cfg);
+}
+
+// Height of the ball, counting how often it is asked.
+struct Height : Sensor {
+  explicit Height(std::string name, Stage stage = Stage::kRow)
+      : Sensor(std::move(name)), stage_(stage) {}
+  std::string_view kind() const override { return "height"; }
+  void initialize(const SensorInit& init) override {
+    add_field("", {.shape = {1}, .unit = "m"}, init.num_worlds);
+    computes.assign(init.num_worlds, 0);
+    substeps.assign(init.num_worlds, 0);
+    resets.assign(init.num_worlds, 0);
+  }
+  void compute(const World& w) override {
+    if (w.id == fail_in) throw ValueError("no value");
+    ++computes[w.id];
+    row(w.id) = static_cast<float>(w.data->xpos[3 * (w.model->nbody - 1) + 2]);
+  }
+  void substep(const World& w) override { ++substeps[w.id]; }
+  void reset(const World& w) override { ++resets[w.id]; }
+  void cast(const CastContext& context) override {
+    ++casts;
+    cast_ids.assign(context.ids.begin(), context.ids.end());
+    if (on_cast) on_cast();
+  }
+  bool wants_substep() const override { return with_substeps; }
+  bool eager() const override { return is_eager; }
+  Stage stage() const override { return stage_; }
+  std::span<Sensor* const> inputs() const override { return input_list; }
+  float& row(int w) { return fields()[0].data.row<float>(w)[0]; }
+
+  Stage stage_;
+  bool with_substeps = false, is_eager = false;
+  int fail_in = -1, casts = 0;
+  std::vector<int> computes, substeps, resets, cast_ids;
+  std::vector<Sensor*> input_list;
+  std::function<void()> on_cast;
+};
+
+template <class... Args>
+std::shared_ptr<Height> add(Simulation& sim, Args... args) {
+  auto sensor = std::make_shared<Height>(args...);
+  sim.add(sensor);
+  return sensor;
+}
+
+TEST(Simulation, ComputesOnceUntilTheStateChanges) {
+  Simulation sim(scene(), {.num_worlds = 3, .decimation = 2, .threads = 2});
+  auto h = add(sim, "h");
+  EXPECT_THAT(h->computes, Each(0));
+  sim.refresh(*h);
+  sim.refresh(*h);
+  EXPECT_THAT(h->computes, Each(1));
+  EXPECT_FLOAT_EQ(h->row(1), 1.0f);
+  sim.step();  // read since: computed in the same pass
+  EXPECT_THAT(h->computes, Each(2));
+  sim.refresh(*h);
+  EXPECT_THAT(h->computes, Each(2));
+  EXPECT_LT(h->row(1), 1.0f);
+  sim.step(3);  // read once since, so only the last of these
+  EXPECT_THAT(h->computes, Each(3));
+  sim.step();  // not read since: lazy again
+  EXPECT_THAT(h->computes, Each(3));
+}
+
+TEST(Simulation, DescribesThePresentState) {
+  Simulation sim(scene(), {.decimation = 5});
+  auto h = add(sim, "h");
+  sim.step(4);
+  sim.refresh(*h);
+  const auto* qpos = reinterpret_cast<const double*>(sim.worlds().state_component("qpos").data);
+  EXPECT_FLOAT_EQ(h->row(0), static_cast<float>(qpos[2]));
+}
+
+TEST(Simulation, PartialResetRefreshesExactlyThoseWorlds) {
+  Simulation sim(scene(), {.num_worlds = 4});
+  auto h = add(sim, "h");
+  sim.step(50);
+  sim.refresh(*h);
+  const float before = h->row(1);
+  const int ids[] = {2, 0};
+  sim.reset(ids);
+  EXPECT_THAT(h->resets, ElementsAre(1, 0, 1, 0));
+  sim.refresh(*h);
+  EXPECT_THAT(h->computes, ElementsAre(2, 1, 2, 1));
+  EXPECT_FLOAT_EQ(h->row(2), 1.0f);
+  EXPECT_EQ(h->row(1), before);
+}
+
+TEST(Simulation, EagerSensorsAndTheirInputsRunEveryControlStep) {
+  Simulation sim(scene(), {.num_worlds = 2, .decimation = 3});
+  auto in = add(sim, "in");
+  auto filter = std::make_shared<Height>("filter");
+  filter->is_eager = filter->with_substeps = true;
+  filter->input_list = {in.get()};
+  sim.add(filter);
+  sim.step(5);
+  EXPECT_THAT(filter->computes, Each(5));
+  EXPECT_THAT(in->computes, Each(5));
+  EXPECT_THAT(filter->substeps, Each(15));
+}
+
+TEST(Simulation, CastsAfterComputingAndFiltersAfterCasts) {
+  Simulation sim(scene(), {.num_worlds = 3});
+  auto camera = add(sim, "camera", Stage::kCast);
+  auto points = std::make_shared<Height>("points", Stage::kPostCast);
+  points->input_list = {camera.get()};
+  sim.add(points);
+  std::vector<int> seen;
+  camera->on_cast = [&] { seen = points->computes; };
+  sim.refresh(*points);
+  EXPECT_THAT(seen, Each(0));
+  EXPECT_THAT(points->computes, Each(1));
+  EXPECT_EQ(camera->casts, 1);
+  const int ids[] = {1};
+  sim.reset(ids);
+  EXPECT_THAT(camera->cast_ids, ElementsAre(1));
+}
+
+// A sensor written in Python reads others while it is computed.
+TEST(Simulation, BatchSensorsMayReadOthers) {
+  Simulation sim(scene(), {.num_worlds = 2});
+  auto h = add(sim, "h");
+  auto user = add(sim, "user", Stage::kBatch);
+  user->on_cast = [&] { sim.refresh(*h); };
+  sim.refresh(*user);
+  sim.step();
+  EXPECT_EQ(user->casts, 2);
+  EXPECT_THAT(h->computes, Each(2));
+}
+
+TEST(Simulation, AFailingSensorIsNamedAndTheOthersGoOn) {
+  Simulation sim(scene(), {.num_worlds = 3});
+  auto bad = add(sim, "bad");
+  auto good = add(sim, "good");
+  bad->fail_in = 1;
+  try {
+    sim.refresh(*bad);
+    FAIL();
+  } catch (const ValueError& e) {
+    EXPECT_STREQ(e.what(), "sensor 'bad': no value");
+  }
+  sim.step();
+  sim.refresh(*good);
+  bad->fail_in = -1;
+  sim.refresh(*bad);
+  EXPECT_THAT(good->computes, Each(1));
+}
+
+TEST(Simulation, AStepAllocatesNothing) {
+  Simulation sim(scene(), {.num_worlds = 4, .decimation = 2, .threads = 2});
+  auto camera = add(sim, "camera", Stage::kCast);
+  auto h = add(sim, "h");
+  for (int k = 0; k < 3; ++k) {
+    sim.step();
+    sim.refresh(*camera);
+    sim.refresh(*h);
+  }
+  const AllocationCount count;
+  for (int k = 0; k < 10; ++k) {
+    sim.step();
+    sim.refresh(*camera);
+    sim.refresh(*h);
+  }
+  EXPECT_EQ(count.since(), 0);
+}
+
+TEST(Simulation, ReadsOfForeignSensorsAreErrors) {
+  Simulation sim(scene(), {});
+  Height foreign("foreign");
+  EXPECT_THROW(sim.refresh(foreign), ValueError);
+  EXPECT_THROW(sim.step(0), ValueError);
+  EXPECT_THROW(Simulation(scene(), {.decimation = 0}), ValueError);
+}
+
+}  // namespace
+}  // namespace mjsense
