@@ -1,0 +1,26 @@
+"""Run all benchmarks (or those named) one after the other: `./dev bench [name ...]`."""
+
+import pathlib
+import subprocess
+import sys
+
+HERE = pathlib.Path(__file__).parent
+SHARED = {"run", "harness"}
+
+
+def main() -> int:
+    names = [a for a in sys.argv[1:] if not a.startswith("-")]
+    flags = [a for a in sys.argv[1:] if a.startswith("-")]
+    known = sorted(p.stem for p in HERE.glob("*.py") if p.stem not in SHARED)
+    unknown = [n for n in names if n not in known]
+    if unknown:
+        print(f"no benchmark named {', '.join(unknown)}; there are: {', '.join(known)}", file=sys.stderr)
+        return 2
+    failed = [n for n in names or known if subprocess.run([sys.executable, HERE / f"{n}.py", *flags]).returncode]
+    if failed:
+        print("failed: " + ", ".join(failed), file=sys.stderr)
+    return 1 if failed else 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())
