@@ -26,15 +26,15 @@ EnvStatesSensor::EnvStatesSensor(std::string name, std::string articulation,
 
 void EnvStatesSensor::initialize(const SensorInit& init) {
   const mjModel* m = init.model;
-  std::vector<char> robot(m->nbody, 0);
-  if (!robot_body_.empty()) {
-    robot = subtree(m, object_id(m, mjOBJ_BODY, fmt::format("sensor '{}'", name()), robot_body_));
-  }
+  const int robot = robot_body_.empty()
+                        ? -1
+                        : object_id(m, mjOBJ_BODY, fmt::format("sensor '{}'", name()), robot_body_);
   clear_fields();
   actors_.clear();
   for (int j = 0; j < m->njnt; ++j) {
     const int body = m->jnt_bodyid[j];
-    if (m->jnt_type[j] != mjJNT_FREE || robot[body]) continue;
+    if (m->jnt_type[j] != mjJNT_FREE) continue;
+    if (robot >= 0 && is_below(m, body, robot)) continue;
     const char* body_name = mj_id2name(m, mjOBJ_BODY, body);
     std::string actor = body_name ? body_name : fmt::format("body_{}", body);
     std::ranges::replace(actor, '/', '_');

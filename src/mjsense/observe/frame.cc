@@ -15,6 +15,10 @@ Frame Frame::find(const mjModel* model, std::string_view place, std::string_view
   return {object, object_id(model, object, place, name)};
 }
 
+void BodyRef::resolve(const mjModel* model, std::string_view place) {
+  if (!name.empty()) id_ = object_id(model, mjOBJ_BODY, place, name);
+}
+
 Pose Frame::pose(const mjData* data) const {
   if (type == mjOBJ_BODY) return {vec3(data->xpos + 3 * id), quat(data->xquat + 4 * id)};
   return pose_from_mat(data->site_xpos + 3 * id, data->site_xmat + 9 * id);
@@ -60,14 +64,6 @@ int object_id(const mjModel* model, mjtObj type, std::string_view place, std::st
   const int id = mj_name2id(model, type, std::string(name).c_str());
   if (id < 0) throw_unknown(place, kind_of(model, type).name, name, object_names(model, type));
   return id;
-}
-
-std::vector<char> subtree(const mjModel* model, int root) {
-  std::vector<char> inside(model->nbody, 0);
-  for (int body = 0; body < model->nbody; ++body) {
-    inside[body] = body == root || (body > 0 && inside[model->body_parentid[body]]);
-  }
-  return inside;
 }
 
 }  // namespace mjsense

@@ -3,6 +3,7 @@
 
 #include <mujoco/mujoco.h>
 
+#include <functional>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -22,11 +23,30 @@ struct Frame {
   Pose pose(const mjData* data) const;
 };
 
+// A body by its full name, or one that may be another in every world and episode.
+struct BodyRef {
+  std::string name;
+  std::function<int(int world)> of;  // id, -1: there is none now; used where `name` is empty
+
+  BodyRef(std::string name) : name(std::move(name)) {}
+  BodyRef(const char* name) : name(name) {}
+  BodyRef(std::function<int(int)> of) : of(std::move(of)) {}
+  // Turns a name into an id for all worlds; throws KeyError naming `place`.
+  void resolve(const mjModel* model, std::string_view place);
+  int operator()(int world) const { return id_ >= 0 ? id_ : of ? of(world) : -1; }
+
+ private:
+  int id_ = -1;
+};
+
+// True if `body` is `root` or below it.
+inline bool is_below(const mjModel* model, int body, int root) {
+  while (body > root) body = model->body_parentid[body];  // parents come first
+  return body == root;
+}
+
 // Names of all objects of a type, "" where one has none.
 std::vector<std::string> object_names(const mjModel* model, mjtObj type);
 // Id of the named object; throws KeyError naming `place` and the nearest names.
 int object_id(const mjModel* model, mjtObj type, std::string_view place, std::string_view name);
-// 1 for each body that is `root` or below it, else 0; [nbody].
-std::vector<char> subtree(const mjModel* model, int root);
-
 }  // namespace mjsense

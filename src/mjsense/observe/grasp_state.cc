@@ -9,11 +9,11 @@
 
 namespace mjsense {
 
-GraspStateSensor::GraspStateSensor(std::string name, std::string object_body,
-                                   std::vector<Gripper> grippers, int str_max_len)
+GraspStateSensor::GraspStateSensor(std::string name, BodyRef object, std::vector<Gripper> grippers,
+                                   int str_max_len)
     : JsonSensor(std::move(name), str_max_len,
                  "Whether each gripper touches and holds the object."),
-      object_body_(std::move(object_body)),
+      object_(std::move(object)),
       grippers_(std::move(grippers)) {
   if (grippers_.size() > kMaxGrippers) {
     throw ValueError(fmt::format("sensor '{}': {} grippers, at most {}", this->name(),
@@ -25,29 +25,28 @@ GraspStateSensor::GraspStateSensor(std::string name, std::string object_body,
 void GraspStateSensor::prepare(const SensorInit& init) {
   const mjModel* m = init.model;
   const std::string place = fmt::format("sensor '{}'", name());
-  const auto geoms_below = [&](const std::string& body) {
-    const std::vector<char> bodies = subtree(m, object_id(m, mjOBJ_BODY, place, body));
-    std::vector<char> geoms(m->ngeom);
-    for (int g = 0; g < m->ngeom; ++g) geoms[g] = bodies[m->geom_bodyid[g]];
-    return geoms;
-  };
-  object_ = geoms_below(object_body_);
+  object_.resolve(m, place);
   gripper_bits_.assign(m->ngeom, 0);
   for (std::size_t i = 0; i < grippers_.size(); ++i) {
-    const std::vector<char> geoms = geoms_below(grippers_[i].body);
-    for (int g = 0; g < m->ngeom; ++g) gripper_bits_[g] |= geoms[g] ? 1u << i : 0u;
+    const int root = object_id(m, mjOBJ_BODY, place, grippers_[i].body);
+    for (int g = 0; g < m->ngeom; ++g) {
+      if (is_below(m, m->geom_bodyid[g], root)) gripper_bits_[g] |= 1u << i;
+    }
   }
 }
 
 void GraspStateSensor::write(const World& world, JsonWriter& json) {
   std::uint32_t touching = 0;
   bool foreign = false;
+  const mjModel* m = world.model;
   const mjData* d = world.data;
-  for (int c = 0; c < d->ncon; ++c) {
+  const int root = object_(world.id);
+  const auto in_object = [&](int geom) { return is_below(m, m->geom_bodyid[geom], root); };
+  for (int c = 0; root >= 0 && c < d->ncon; ++c) {
     const mjContact& contact = d->contact[c];
     const int a = contact.geom[0], b = contact.geom[1];
-    if (contact.exclude != 0 || a < 0 || b < 0 || object_[a] == object_[b]) continue;
-    const std::uint32_t bits = gripper_bits_[object_[a] ? b : a];
+    if (contact.exclude != 0 || a < 0 || b < 0 || in_object(a) == in_object(b)) continue;
+    const std::uint32_t bits = gripper_bits_[in_object(a) ? b : a];
     touching |= bits;
     foreign |= bits == 0;
   }

@@ -4,6 +4,7 @@
 #include <string>
 #include <vector>
 
+#include "mjsense/observe/frame.h"
 #include "mjsense/observe/json_sensor.h"
 
 namespace mjsense {
@@ -18,7 +19,7 @@ class GraspStateSensor final : public JsonSensor {
     std::string name;  // move group: "gripper"
     std::string body;  // root body; its geoms and those of the bodies below it
   };
-  GraspStateSensor(std::string name, std::string object_body, std::vector<Gripper> grippers,
+  GraspStateSensor(std::string name, BodyRef object, std::vector<Gripper> grippers,
                    int str_max_len = kDefaultLength);
 
  protected:
@@ -28,9 +29,8 @@ class GraspStateSensor final : public JsonSensor {
 
  private:
   static constexpr int kMaxGrippers = 30;
-  std::string object_body_;
+  BodyRef object_;
   std::vector<Gripper> grippers_;            // sorted by name
-  std::vector<char> object_;                 // [ngeom] 1 in the object
   std::vector<std::uint32_t> gripper_bits_;  // [ngeom] bit g set: in gripper g
 };
 

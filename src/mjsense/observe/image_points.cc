@@ -28,14 +28,7 @@ ImagePointsSensor::ImagePointsSensor(std::string name, std::vector<Object> objec
 
 void ImagePointsSensor::initialize(const SensorInit& init) {
   const mjModel* m = init.model;
-  geom_objects_.assign(m->ngeom, 0);
-  for (std::size_t o = 0; o < objects_.size(); ++o) {
-    const int root = object_id(m, mjOBJ_BODY, fmt::format("sensor '{}'", name()), objects_[o].body);
-    const std::vector<char> bodies = subtree(m, root);
-    for (int g = 0; g < m->ngeom; ++g) {
-      if (bodies[m->geom_bodyid[g]] && m->geom_group[g] < 3) geom_objects_[g] |= Mask(1u << o);
-    }
-  }
+  for (Object& object : objects_) object.body.resolve(m, fmt::format("sensor '{}'", name()));
   pictures_.clear();
   std::int64_t most = 0;
   for (const Camera& camera : cameras_) {
@@ -48,7 +41,7 @@ void ImagePointsSensor::initialize(const SensorInit& init) {
     pictures_.push_back({&field, static_cast<int>(shape[1]), static_cast<int>(shape[0])});
     most = std::max(most, shape[0] * shape[1]);
   }
-  scratch_.assign(init.num_worlds, std::vector<Mask>(3 * most));
+  scratch_.assign(init.num_worlds, {std::vector<Mask>(m->ngeom), std::vector<Mask>(3 * most)});
   clear_fields();
   for (const Object& object : objects_) {
     for (const Camera& camera : cameras_) {
@@ -72,17 +65,28 @@ void ImagePointsSensor::initialize(const SensorInit& init) {
 }
 
 void ImagePointsSensor::compute(const World& world) {
+  const mjModel* m = world.model;
+  std::vector<Mask>& geom_objects = scratch_[world.id].geom_objects;
+  std::ranges::fill(geom_objects, Mask(0));
+  for (std::size_t o = 0; o < objects_.size(); ++o) {
+    const int root = objects_[o].body(world.id);
+    for (int g = 0; root >= 0 && g < m->ngeom; ++g) {
+      if (m->geom_group[g] < 3 && is_below(m, m->geom_bodyid[g], root)) {
+        geom_objects[g] |= Mask(1u << o);
+      }
+    }
+  }
   for (std::size_t c = 0; c < cameras_.size(); ++c) {
     const auto [field, width, height] = pictures_[c];
     const int pixels = width * height;
-    Mask* mask = scratch_[world.id].data();
+    Mask* mask = scratch_[world.id].pictures.data();
     Mask* once = mask + pixels;
     Mask* twice = once + pixels;
     const auto segments = field->data.row<std::int32_t>(world.id);
     Mask any = 0;
     for (int i = 0; i < pixels; ++i) {
       const std::int32_t id = segments[2 * i];
-      mask[i] = segments[2 * i + 1] == mjOBJ_GEOM && id >= 0 ? geom_objects_[id] : Mask(0);
+      mask[i] = segments[2 * i + 1] == mjOBJ_GEOM && id >= 0 ? geom_objects[id] : Mask(0);
       any |= mask[i];
     }
     if (any) {

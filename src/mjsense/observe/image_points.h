@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "mjsense/core/sensor.h"
+#include "mjsense/observe/frame.h"
 
 namespace mjsense {
 
@@ -23,8 +24,8 @@ class ImagePointsSensor final : public Sensor {
   static constexpr int kPoints = 10;
   static constexpr int kMaxObjects = 16;
   struct Object {
-    std::string key;   // "pickup_obj", "gripper"; a key with "handle" in it is not eroded
-    std::string body;  // full MuJoCo name of its root body
+    std::string key;  // "pickup_obj", "gripper"; a key with "handle" in it is not eroded
+    BodyRef body;     // its root
   };
   struct Camera {
     std::string name;
@@ -50,9 +51,12 @@ class ImagePointsSensor final : public Sensor {
   std::vector<Object> objects_;
   std::vector<Camera> cameras_;
   std::vector<Sensor*> inputs_;
-  std::vector<Mask> geom_objects_;  // [ngeom]
   std::vector<Picture> pictures_;
-  std::vector<std::vector<Mask>> scratch_;  // [B] three pictures each
+  struct Scratch {
+    std::vector<Mask> geom_objects;  // [ngeom]
+    std::vector<Mask> pictures;      // [3, H, W]
+  };
+  std::vector<Scratch> scratch_;  // [B]
 };
 
 // The 3 x 3 cross erosion of up to 16 masks at once, bit by bit; outside counts as 0. `out` must

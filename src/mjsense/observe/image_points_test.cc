@@ -49,7 +49,7 @@ struct Fixture {
   explicit Fixture(const std::string& key = "pickup_obj", const std::string& body = "a")
       : world(kScene),
         camera(100, 50),
-        points("object_image_points", {{key, body}}, {{"camera", &camera}}) {
+        points("object_image_points", {{key, BodyRef(body)}}, {{"camera", &camera}}) {
     camera.initialize(world.init(2));
     points.initialize(world.init(2));
     prefix = key + "/camera/";
