@@ -1,0 +1,41 @@
+#include "mjsense/sensors/contact/contact_field_sensor.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <utility>
+
+namespace mjsense {
+
+ContactFieldSensor::ContactFieldSensor(ContactSensor* owner, int primary, std::string field)
+    : Sensor(fmt::format("{}_{}_{}", owner->name(), owner->primary_names()[primary], field)),
+      owner_(owner),
+      owner_as_sensor_(owner),
+      primary_(primary),
+      field_(std::move(field)) {}
+
+void ContactFieldSensor::initialize(const SensorInit& init) {
+  clear_fields();
+  SensorSpec spec = contact_field_spec(field_, /*world_axes=*/owner_->cfg().reduce == "netforce");
+  const std::int64_t dim = spec.shape.size();
+  spec.shape = {owner_->cfg().num_slots * dim};
+  add_field("", std::move(spec), init.num_worlds);
+}
+
+void ContactFieldSensor::compute(const World& world) {
+  const std::span<float> row = fields().front().data.row<float>(world.id);
+  const std::size_t dim = row.size() / owner_->cfg().num_slots;
+  std::ranges::fill(row, 0.0f);
+  ContactReading reading;
+  for (int k = 0; k < owner_->cfg().num_slots; ++k) {
+    const int found = owner_->read_slot(world, primary_, k, reading);
+    if (!found) break;
+    for (std::size_t i = 0; i < dim; ++i) {
+      row[k * dim + i] =
+          field_ == "found" ? static_cast<float>(found)
+                            : static_cast<float>(contact_field_values(field_, reading)[i]);
+    }
+  }
+}
+
+}  // namespace mjsense

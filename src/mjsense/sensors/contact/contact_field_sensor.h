@@ -1,0 +1,28 @@
+#pragma once
+// One field of one primary as a sensor of its own: what mjlab's registry calls
+// "<sensor>_<primary>_<field>". Contact frame, whatever the owner's global_frame says.
+
+#include <string>
+
+#include "mjsense/sensors/contact/contact_sensor.h"
+
+namespace mjsense {
+
+class ContactFieldSensor : public Sensor {
+ public:
+  // owner must outlive it.
+  ContactFieldSensor(ContactSensor* owner, int primary, std::string field);
+
+  std::string_view kind() const override { return "contact_field"; }
+  void initialize(const SensorInit& init) override;  // after its owner
+  void compute(const World& world) override;
+  std::span<Sensor* const> inputs() const override { return {&owner_as_sensor_, 1}; }
+
+ private:
+  ContactSensor* owner_;
+  Sensor* owner_as_sensor_;
+  int primary_;
+  std::string field_;
+};
+
+}  // namespace mjsense

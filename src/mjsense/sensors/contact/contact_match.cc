@@ -1,0 +1,182 @@
+#include "mjsense/sensors/contact/contact_match.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <unordered_map>
+
+#include "mjsense/core/error.h"
+#include "mjsense/core/match.h"
+
+namespace mjsense {
+namespace {
+
+std::vector<std::string> labels_of(const std::vector<ContactObject>& objects) {
+  std::vector<std::string> labels;
+  for (const ContactObject& o : objects) labels.push_back(o.label);
+  return labels;
+}
+
+std::string_view kind_of(const ContactMatch& match) {
+  return match.mode == "geom" ? "geom" : "body";
+}
+
+void check_mode(std::string_view place, const ContactMatch& match) {
+  if (match.mode == "geom" || match.mode == "body" || match.mode == "subtree") return;
+  throw ValueError(
+      fmt::format("{}: mode '{}': must be geom, body or subtree", place, match.mode));
+}
+
+}  // namespace
+
+ContactNames::ContactNames(const mjModel* m) {
+  for (int b = 0; b < m->nbody; ++b) {
+    bodies_.push_back({m->names + m->name_bodyadr[b], b, m->body_parentid[b]});
+    if (bodies_.back().name == "terrain") terrain_ = b;
+  }
+  for (int g = 0; g < m->ngeom; ++g) {
+    geoms_.push_back({m->names + m->name_geomadr[g], m->geom_bodyid[g], -1});
+  }
+}
+
+ContactNames::ContactNames(mjSpec* spec) {
+  std::unordered_map<const mjsElement*, int> index;
+  for (mjsElement* e = mjs_firstElement(spec, mjOBJ_BODY); e; e = mjs_nextElement(spec, e)) {
+    const int b = static_cast<int>(bodies_.size());
+    index[e] = b;
+    const mjsBody* parent = b > 0 ? mjs_getParent(e) : nullptr;
+    const auto p = parent ? index.find(parent->element) : index.end();
+    bodies_.push_back({mjs_getString(mjs_getName(e)), b, p == index.end() ? 0 : p->second});
+    if (bodies_.back().name == "terrain") terrain_ = b;
+  }
+  for (mjsElement* e = mjs_firstElement(spec, mjOBJ_GEOM); e; e = mjs_nextElement(spec, e)) {
+    const mjsBody* parent = mjs_getParent(e);
+    const auto p = parent ? index.find(parent->element) : index.end();
+    geoms_.push_back({mjs_getString(mjs_getName(e)), p == index.end() ? 0 : p->second, -1});
+  }
+}
+
+const std::vector<ContactNames::Element>& ContactNames::elements(const ContactMatch& match) const {
+  return match.mode == "geom" ? geoms_ : bodies_;
+}
+
+bool ContactNames::in_terrain(int body) const {
+  while (body > 0 && body != terrain_) body = bodies_[body].parent;
+  return body > 0;
+}
+
+// Every named element of the entity, in model order.
+std::vector<ContactObject> ContactNames::of_entity(std::string_view place,
+                                                   const ContactMatch& match) const {
+  const std::string prefix = match.entity + "/";
+  const bool terrain = match.entity == "terrain" && terrain_ > 0;
+  std::vector<ContactObject> result;
+  const std::vector<Element>& all = elements(match);
+  for (int id = 0; id < static_cast<int>(all.size()); ++id) {
+    const std::string& name = all[id].name;
+    if (name.empty()) continue;
+    if (name.starts_with(prefix)) {
+      result.push_back({id, name, name.substr(prefix.size())});
+    } else if (terrain && in_terrain(all[id].body)) {
+      result.push_back({id, name, name});
+    }
+  }
+  if (!result.empty()) return result;
+
+  std::vector<std::string> entities;
+  for (const Element& b : bodies_) {
+    const std::size_t slash = b.name.find('/');
+    const std::string entity = b.name == "terrain" ? b.name : b.name.substr(0, slash);
+    if (slash == std::string::npos && b.name != "terrain") continue;
+    if (std::find(entities.begin(), entities.end(), entity) == entities.end()) {
+      entities.push_back(entity);
+    }
+  }
+  if (std::find(entities.begin(), entities.end(), match.entity) == entities.end()) {
+    throw ValueError(fmt::format("{}: entity '{}' not found{}", place, match.entity,
+                                 suggest(match.entity, entities)));
+  }
+  throw ValueError(
+      fmt::format("{}: entity '{}' has no named {}", place, match.entity, kind_of(match)));
+}
+
+std::vector<ContactObject> ContactNames::literal(std::string_view place,
+                                                 const ContactMatch& match) const {
+  const std::vector<Element>& all = elements(match);
+  std::vector<ContactObject> result;
+  for (const std::string& name : match.pattern) {
+    const auto found = std::find_if(all.begin(), all.end(),
+                                    [&](const Element& e) { return e.name == name && !name.empty(); });
+    if (found == all.end()) {
+      std::vector<std::string> names;
+      for (const Element& e : all) {
+        if (!e.name.empty()) names.push_back(e.name);
+      }
+      throw_unknown(place, kind_of(match), name, names);
+    }
+    const int id = static_cast<int>(found - all.begin());
+    for (const ContactObject& other : result) {
+      if (other.id == id) throw ValueError(fmt::format("{}: '{}' is given twice", place, name));
+    }
+    result.push_back({id, name, name});
+  }
+  return result;
+}
+
+std::vector<ContactObject> ContactNames::by_regex(std::string_view place,
+                                                  const ContactMatch& match) const {
+  const std::vector<ContactObject> all = of_entity(place, match);
+  std::vector<ContactObject> result;
+  for (int i : match_names(match.pattern, labels_of(all), place)) result.push_back(all[i]);
+  return result;
+}
+
+std::vector<ContactObject> ContactNames::primaries(std::string_view sensor,
+                                                   const ContactMatch& match) const {
+  const std::string place = fmt::format("sensor '{}': primary", sensor);
+  check_mode(place, match);
+  if (match.pattern.empty()) throw ValueError(fmt::format("{}: no pattern is given", place));
+  if (match.entity.empty()) return literal(place, match);
+  std::vector<ContactObject> result = by_regex(place, match);
+  const std::vector<std::string> before = labels_of(result);
+  const Exclude exclude(match.exclude, place);
+  std::erase_if(result, [&](const ContactObject& o) { return exclude.drops(o.label); });
+  if (result.empty()) {
+    throw ValueError(fmt::format("{}: nothing is left after excludes of: {}", place,
+                                 fmt::join(before, ", ")));
+  }
+  return result;
+}
+
+std::vector<ContactObject> ContactNames::secondaries(std::string_view sensor,
+                                                     const ContactMatch& match,
+                                                     std::string_view policy) const {
+  const std::string place = fmt::format("sensor '{}': secondary", sensor);
+  check_mode(place, match);
+  if (policy == "each") {
+    if (match.pattern.empty()) throw ValueError(fmt::format("{}: no pattern is given", place));
+    return match.entity.empty() ? literal(place, match) : by_regex(place, match);
+  }
+  if (match.pattern.size() != 1) {
+    throw ValueError(
+        fmt::format("{}: {} patterns: must be a single name (policy 'each' takes several)", place,
+                    match.pattern.size()));
+  }
+  if (match.entity.empty()) return literal(place, match);
+  if (match.mode == "subtree") {  // a literal name in the peer, and so here
+    const std::vector<ContactObject> all = of_entity(place, match);
+    for (const ContactObject& o : all) {
+      if (o.label == match.pattern[0]) return {o};
+    }
+    throw_unknown(place, "body", match.pattern[0], labels_of(all));
+  }
+  std::vector<ContactObject> result = by_regex(place, match);
+  if (result.size() > 1 && policy == "error") {
+    throw ValueError(fmt::format("{}: '{}' matches {} names: {}", place, match.pattern[0],
+                                 result.size(), fmt::join(labels_of(result), ", ")));
+  }
+  result.resize(1);
+  return result;
+}
+
+}  // namespace mjsense

@@ -1,0 +1,127 @@
+#pragma once
+// What one contact sensor keeps of the contacts of a pass: per primary a count, the K best contacts
+// or their net wrench. Nothing is limited but K; nothing allocates after the constructor.
+
+#include <mujoco/mujoco.h>
+
+#include <cstdint>
+#include <span>
+#include <string_view>
+#include <vector>
+
+#include "mjsense/core/sensor.h"
+#include "mjsense/sensors/contact/contact_match.h"
+
+namespace mjsense {
+
+enum class ContactReduce { kNone, kMinDist, kMaxForce, kNetForce };
+ContactReduce contact_reduce_from_name(std::string_view name, std::string_view place);  // KeyError
+
+// One contact while a pass looks at it. Its wrench is computed when first asked for, once for all
+// sensors.
+class PassContact {
+ public:
+  PassContact(const World& world, int id)
+      : contact(world.data->contact[id]), id(id), world_(world) {}
+
+  const mjContact& contact;
+  const int id;
+
+  const mjtNum* wrench() {  // contact frame, N and N m
+    if (!has_wrench_) {
+      mj_contactForce(world_.model, world_.data, id, wrench_);
+      has_wrench_ = true;
+    }
+    return wrench_;
+  }
+  mjtNum force_norm() { return mju_norm3(wrench()); }
+
+ private:
+  const World& world_;
+  mjtNum wrench_[6];
+  bool has_wrench_ = false;
+};
+
+// A contact as seen from a primary: sign +1 if the primary is geom 1, -1 if it is geom 2.
+struct ContactRef {
+  double key = 0.0;  // what it was selected by: smaller is better
+  int contact = -1;  // index in mjData.contact
+  int sign = 1;
+};
+
+// Sums over the contacts of a primary, world axes. Positions and moments are about `origin`, the first
+// contact, so that nothing cancels far from the world's origin.
+struct ContactSum {
+  double origin[3], weight, weighted_pos[3], force[3], normal_force[3], moment[3];
+  ContactRef strongest;
+};
+
+class ContactReducer {
+ public:
+  struct Config {
+    std::vector<ContactObject> primaries, secondaries;  // no secondaries: contacts with anything
+    std::string_view primary_mode, secondary_mode;
+    ContactReduce reduce = ContactReduce::kMaxForce;
+    int num_slots = 1;
+    bool keep_peak = false;   // also the strongest of all contacts, whatever `reduce` selects
+    bool keep_pairs = false;  // also counts and net forces by secondary
+  };
+  ContactReducer() = default;
+  ContactReducer(const mjModel* model, int num_worlds, const Config& config);
+
+  // Primaries that a geom belongs to.
+  std::span<const int> primaries_of(int geom) const { return list(primary_of_geom_, geom); }
+  bool accepts_other(int geom) const { return any_other_ || (geom >= 0 && other_[geom]); }
+
+  void begin(int world);
+  void add(int world, int primary, PassContact& contact, int sign);
+
+  int num_primaries() const { return num_primaries_; }
+  int num_slots() const { return num_slots_; }
+  int num_secondaries() const { return num_secondaries_; }
+  bool is_net() const { return reduce_ == ContactReduce::kNetForce; }
+
+  // Results of the last pass over this world. touched: primaries with a contact, in the order found.
+  std::span<const int> touched(int world) const {
+    return {touched_.data() + world * num_primaries_, static_cast<std::size_t>(num_touched_[world])};
+  }
+  int count(int world, int primary) const { return count_[world * num_primaries_ + primary]; }
+  const ContactRef& slot(int world, int primary, int k) const {
+    return slots_[(world * num_primaries_ + primary) * num_slots_ + k];
+  }
+  const ContactSum& sum(int world, int primary) const { return sums_[world * num_primaries_ + primary]; }
+  const ContactRef& peak(int world, int primary) const;  // needs keep_peak, not netforce
+  std::span<const std::int32_t> pair_count(int world) const;
+  std::span<const double> pair_force(int world) const;  // [P, S, 3]
+
+  std::size_t bytes_per_world() const;
+
+ private:
+  // Values by geom, packed: those of geom g are values[begin[g] .. begin[g + 1]).
+  struct Lists {
+    std::vector<int> begin, values;
+  };
+  static std::span<const int> list(const Lists& lists, int geom) {
+    if (geom < 0) return {};
+    return {lists.values.data() + lists.begin[geom], lists.values.data() + lists.begin[geom + 1]};
+  }
+  static Lists lists_of(const mjModel* model, const std::vector<ContactObject>& objects,
+                        std::string_view mode);
+  void insert(ContactRef* slots, int filled, const ContactRef& ref) const;
+  void add_to_sum(ContactSum& sum, bool is_first, PassContact& contact, int sign) const;
+  void add_to_pairs(int world, int primary, PassContact& contact, int sign);
+
+  ContactReduce reduce_ = ContactReduce::kNone;
+  int num_primaries_ = 0, num_slots_ = 1, num_secondaries_ = 0;
+  bool any_other_ = true, keep_pairs_ = false;
+  Lists primary_of_geom_, secondary_of_geom_;
+  std::vector<std::uint8_t> other_;  // by geom: belongs to a secondary
+  std::vector<int> touched_, num_touched_;
+  std::vector<std::int32_t> count_;
+  std::vector<ContactRef> slots_, peaks_;
+  std::vector<ContactSum> sums_;
+  std::vector<std::int32_t> pair_count_;
+  std::vector<double> pair_force_;
+};
+
+}  // namespace mjsense

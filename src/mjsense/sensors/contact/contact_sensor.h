@@ -1,0 +1,136 @@
+#pragma once
+// Contacts of chosen geoms, bodies or subtrees (primaries), with everything or with chosen others
+// (secondaries).
+//
+// Sign and frame. The normal points from the primary to the other side. The force is what the
+// PRIMARY EXERTS ON THE OTHER: a box on the floor reads (0, 0, -m g) in the world frame; make the
+// floor the primary to read the ground reaction. Components are in the contact frame
+// (x = normal, y = tangent, z = normal x tangent), hence force[0] >= 0 without adhesion; with
+// global_frame, and always with reduce = netforce, they are in the world frame.
+//
+// All contact sensors of a scene share one pass over mjData.contact (contact_pass.h).
+
+#include <memory>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "mjsense/core/sensor.h"
+#include "mjsense/sensors/contact/contact_match.h"
+#include "mjsense/sensors/contact/contact_memory.h"
+#include "mjsense/sensors/contact/contact_reducer.h"
+
+namespace mjsense {
+
+class ContactPass;
+
+struct ContactSensorCfg : SensorCfg {
+  ContactMatch primary;
+  std::optional<ContactMatch> secondary;  // none: contacts with anything
+  // first: of several matches the first in model order. error: several matches are an error. any: no
+  // filter, `secondary` is not looked at. each: every match, and who touches whom is reported.
+  std::string secondary_policy = "first";
+
+  // Of found force torque dist pos normal tangent; each becomes a field.
+  std::vector<std::string> fields = {"found", "force"};
+  // none: contact-list order. mindist: deepest first. maxforce: strongest first. netforce: one
+  // synthetic contact at the force-weighted centroid, with the net wrench in the world frame.
+  std::string reduce = "maxforce";
+  int num_slots = 1;           // K contacts a primary
+  bool global_frame = false;   // force and torque in world axes; needs normal and tangent among fields
+  bool track_air_time = false; // needs "found" among fields, without it the timers stay 0 (as in mjlab)
+  int history_length = 0;      // H substeps of every requested field, newest first; <= 0: none
+
+  // Beyond mjlab. All are exact: they look at every substep, and at every contact, not at the slots.
+  bool track_events = false;    // fields touchdown, liftoff
+  bool latch = false;           // fields found_any, force_peak, dist_at_peak, pos_at_peak, first_touch_time
+  bool friction_split = false;  // fields normal_force, friction_force
+  bool other_ids = false;       // fields other_geom, other_body
+
+  bool debug = false;  // prints what was matched
+
+  std::unique_ptr<Sensor> build() const override;  // throws ValueError or KeyError
+};
+
+// The seven basic fields: what the values of a slot mean, and where they are in a reading.
+SensorSpec contact_field_spec(std::string_view field, bool world_axes);  // KeyError if unknown
+const double* contact_field_values(std::string_view field, const ContactReading& reading);
+
+// Fields (float32 unless said; B worlds, P primaries, K slots, N = P K with index p K + k, S
+// secondaries, H history). A slot without a contact is all zero.
+//   found      [B, N]     number of matching contacts, the same in every filled slot of a primary;
+//                         contacts in the gap count, with zero force
+//   force      [B, N, 3]  N, see above          torque  [B, N, 3]  N m, same axes
+//   dist       [B, N]     m, negative in penetration; 0 with netforce
+//   pos        [B, N, 3]  m, world              normal, tangent  [B, N, 3]  unit, world
+//   X_history  [B, N, H(, 3)]  of every field X above, newest first, one entry a substep
+//   current_air_time, last_air_time, current_contact_time, last_contact_time  [B, P]  s
+//   touchdown, liftoff  bool [B, P]  a contact began (ended) in this control step
+//   found_any  bool [B, P]  any contact in this control step
+//   force_peak [B, P, 3], dist_at_peak [B, P], pos_at_peak [B, P, 3]  the strongest of the step
+//   first_touch_time [B, P]  s from the start of the control step to its first substep with contact;
+//                         -1 if none
+//   normal_force, friction_force  [B, N, 3]  N, axes of force, which is their sum
+//   other_geom, other_body  int32 [B, N]  MuJoCo ids of the other side; -1: empty slot or a flex;
+//                         with netforce those of the strongest contact
+//   pair_found [B, P, S], pair_force [B, P, S, 3]  N, world, primary on secondary (policy each)
+class ContactSensor : public Sensor {
+ public:
+  explicit ContactSensor(ContactSensorCfg cfg);
+  ~ContactSensor() override;
+
+  std::string_view kind() const override { return "contact"; }
+  void edit_spec(mjSpec* spec) override;
+  std::vector<std::unique_ptr<Sensor>> parts() override;
+  void initialize(const SensorInit& init) override;
+  bool wants_substep() const override;
+  void substep(const World& world) override;
+  void compute(const World& world) override;
+  void reset(const World& world) override;
+
+  const ContactSensorCfg& cfg() const { return cfg_; }
+  // Local names of the primaries (secondaries), in the order of P (S). Known after edit_spec() or
+  // initialize().
+  const std::vector<std::string>& primary_names() const { return primary_names_; }
+  const std::vector<std::string>& secondary_names() const { return secondary_names_; }
+
+  // bool [B, P]: the present contact (air) phase began less than dt + abs_tol ago. A touch that began
+  // and ended inside a control step is invisible to these; `touchdown` sees it. RuntimeError without
+  // track_air_time.
+  Array compute_first_contact(double dt, double abs_tol = 1e-6) const;
+  Array compute_first_air(double dt, double abs_tol = 1e-6) const;
+
+  // The next substep starts a control step: latches and events are cleared then. Only for callers that
+  // drive substep() by themselves; Simulation counts `decimation` substeps from the reset.
+  void begin_control_step(int world);
+
+  // One slot as MuJoCo's own sensor has it: in the contact frame whatever cfg says. Valid after
+  // compute(). Returns the number of matching contacts, 0 if the slot is empty.
+  int read_slot(const World& world, int primary, int slot, ContactReading& reading) const;
+
+ private:
+  struct Output;
+  Array first(double dt, double abs_tol, std::string_view field) const;
+  void add_outputs(const SensorInit& init);
+  void write_rows(const World& world);
+  void clear_rows(int world);
+  void write_slot(int world, int slot, int found, const ContactReading& reading);
+  void remember(const World& world);
+  void write_history(int world);
+
+  ContactSensorCfg cfg_;
+  std::vector<std::string> primary_names_, secondary_names_;
+  std::shared_ptr<ContactPass> pass_;
+  ContactReducer reducer_;
+  ContactMemory memory_;
+  std::vector<Output> outputs_;
+  Field *other_geom_ = nullptr, *other_body_ = nullptr, *pair_found_ = nullptr,
+        *pair_force_ = nullptr;
+  bool needs_wrench_ = false;
+  std::vector<std::uint64_t> written_moment_;  // of the rows, by world
+  std::vector<int> written_;                   // [B, P] primaries whose rows are not zero ...
+  std::vector<int> num_written_;               // ... and how many
+  std::vector<std::uint16_t> history_left_;    // [B, N] substeps until a slot's history is all zero
+};
+
+}  // namespace mjsense
