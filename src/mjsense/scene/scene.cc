@@ -115,12 +115,24 @@ void Scene::Impl::add_sensors() {
 }
 
 // Every MuJoCo sensor that no configured sensor stands for: those of the entities' XML, then those
-// that sensors added.
+// that sensors added; then the parts of sensors.
 void Scene::Impl::discover_sensors() {
   for (const std::string& name : spec_names(spec.get(), mjOBJ_SENSOR)) {
     const auto taken = [&](const auto& sensor) { return sensor->name() == name; };
     if (std::none_of(sensors.begin(), sensors.end(), taken))
       sensors.push_back(make_discovered_sensor(name));
+  }
+  const std::size_t num_whole = sensors.size();
+  for (std::size_t i = 0; i < num_whole; ++i) {
+    for (std::unique_ptr<Sensor>& part : sensors[i]->parts()) {
+      for (const auto& other : sensors) {
+        if (other->name() == part->name()) {
+          throw ValueError(fmt::format("sensor '{}': its part '{}' has the name of another sensor",
+                                       sensors[i]->name(), part->name()));
+        }
+      }
+      sensors.push_back(std::move(part));
+    }
   }
 }
 

@@ -31,9 +31,9 @@ void ContactFieldSensor::compute(const World& world) {
     const int found = owner_->read_slot(world, primary_, k, reading);
     if (!found) break;
     for (std::size_t i = 0; i < dim; ++i) {
-      row[k * dim + i] =
-          field_ == "found" ? static_cast<float>(found)
-                            : static_cast<float>(contact_field_values(field_, reading)[i]);
+      row[k * dim + i] = field_ == "found"
+                             ? static_cast<float>(found)
+                             : static_cast<float>(contact_field_values(field_, reading)[i]);
     }
   }
 }

@@ -23,8 +23,7 @@ std::string_view kind_of(const ContactMatch& match) {
 
 void check_mode(std::string_view place, const ContactMatch& match) {
   if (match.mode == "geom" || match.mode == "body" || match.mode == "subtree") return;
-  throw ValueError(
-      fmt::format("{}: mode '{}': must be geom, body or subtree", place, match.mode));
+  throw ValueError(fmt::format("{}: mode '{}': must be geom, body or subtree", place, match.mode));
 }
 
 }  // namespace
@@ -105,8 +104,8 @@ std::vector<ContactObject> ContactNames::literal(std::string_view place,
   const std::vector<Element>& all = elements(match);
   std::vector<ContactObject> result;
   for (const std::string& name : match.pattern) {
-    const auto found = std::find_if(all.begin(), all.end(),
-                                    [&](const Element& e) { return e.name == name && !name.empty(); });
+    const auto found = std::find_if(
+        all.begin(), all.end(), [&](const Element& e) { return e.name == name && !name.empty(); });
     if (found == all.end()) {
       std::vector<std::string> names;
       for (const Element& e : all) {
@@ -142,8 +141,8 @@ std::vector<ContactObject> ContactNames::primaries(std::string_view sensor,
   const Exclude exclude(match.exclude, place);
   std::erase_if(result, [&](const ContactObject& o) { return exclude.drops(o.label); });
   if (result.empty()) {
-    throw ValueError(fmt::format("{}: nothing is left after excludes of: {}", place,
-                                 fmt::join(before, ", ")));
+    throw ValueError(
+        fmt::format("{}: nothing is left after excludes of: {}", place, fmt::join(before, ", ")));
   }
   return result;
 }

@@ -12,7 +12,8 @@ T* row(Array* array, int world) {
 
 }  // namespace
 
-ContactMemory::ContactMemory(int num_worlds, int num_primaries, int decimation, const Fields& fields)
+ContactMemory::ContactMemory(int num_worlds, int num_primaries, int decimation,
+                             const Fields& fields)
     : fields_(fields), num_primaries_(num_primaries), decimation_(decimation) {
   const std::size_t n = static_cast<std::size_t>(num_worlds) * num_primaries;
   substep_.resize(num_worlds);
@@ -86,16 +87,20 @@ void ContactMemory::strike(const World& world, int primary, double force_norm,
 
 void ContactMemory::clear_step(int world) {
   step_time_[world] = 0.0;
-  const auto zero = [&](Array* a) { std::fill_n(a->row_data(world), a->row_bytes(), std::byte{0}); };
+  const auto zero = [&](Array* a) {
+    std::fill_n(a->row_data(world), a->row_bytes(), std::byte{0});
+  };
   if (fields_.touchdown) {
     zero(fields_.touchdown);
     zero(fields_.liftoff);
   }
   if (fields_.found_any) {
-    for (Array* a : {fields_.found_any, fields_.force_peak, fields_.dist_at_peak, fields_.pos_at_peak})
+    for (Array* a :
+         {fields_.found_any, fields_.force_peak, fields_.dist_at_peak, fields_.pos_at_peak})
       zero(a);
     std::ranges::fill(fields_.first_touch_time->row<float>(world), -1.0f);
-    std::fill_n(peak_.begin() + static_cast<std::size_t>(world) * num_primaries_, num_primaries_, -1.0);
+    std::fill_n(peak_.begin() + static_cast<std::size_t>(world) * num_primaries_, num_primaries_,
+                -1.0);
   }
 }
 
@@ -105,8 +110,8 @@ void ContactMemory::reset(int world, const ContactReducer& contacts) {
   clear_step(world);
   if (fields_.current_air) {
     std::fill_n(since_.begin() + begin, num_primaries_, 0.0);
-    for (Array* a : {fields_.current_air, fields_.last_air, fields_.current_contact,
-                     fields_.last_contact})
+    for (Array* a :
+         {fields_.current_air, fields_.last_air, fields_.current_contact, fields_.last_contact})
       std::ranges::fill(a->row<float>(world), 0.0f);
   }
   // A primary that starts in contact has not touched down.

@@ -39,11 +39,11 @@ class ContactMemory {
 
   Fields fields_;
   int num_primaries_ = 0, decimation_ = 1;
-  std::vector<int> substep_;        // of the control step, by world
-  std::vector<double> since_;       // [B, P] s in contact if > 0, in the air if < 0
-  std::vector<double> step_time_;   // [B] s since the control step began
-  std::vector<double> peak_;        // [B, P] greatest force norm of the step, -1 without contact
-  std::vector<std::uint8_t> touch_; // [B, P] contact at the last substep
+  std::vector<int> substep_;         // of the control step, by world
+  std::vector<double> since_;        // [B, P] s in contact if > 0, in the air if < 0
+  std::vector<double> step_time_;    // [B] s since the control step began
+  std::vector<double> peak_;         // [B, P] greatest force norm of the step, -1 without contact
+  std::vector<std::uint8_t> touch_;  // [B, P] contact at the last substep
 };
 
 }  // namespace mjsense

@@ -38,10 +38,10 @@ void ContactPass::run(const World& world) {
       ContactReducer& r = *reducers_[e.reducer];
       if (!r.accepts_other(g1)) continue;
       // A primary on both sides (a subtree that touches itself) has this contact once, as geom 1.
-      const bool counted = r.accepts_other(g2) &&
-                           std::any_of(first.begin(), first.end(), [&](const Entry& other) {
-                             return other.reducer == e.reducer && other.primary == e.primary;
-                           });
+      const bool counted =
+          r.accepts_other(g2) && std::any_of(first.begin(), first.end(), [&](const Entry& other) {
+            return other.reducer == e.reducer && other.primary == e.primary;
+          });
       if (!counted) r.add(world.id, e.primary, contact, -1);
     }
   }

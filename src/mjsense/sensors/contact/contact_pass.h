@@ -1,7 +1,7 @@
 #pragma once
-// One walk over mjData.contact per world and moment, for all contact sensors that want it at the same
-// time: a table from each geom to the primaries it belongs to makes the cost grow with the contacts,
-// not with primaries or fields.
+// One walk over mjData.contact per world and moment, for all contact sensors that want it at the
+// same time: a table from each geom to the primaries it belongs to makes the cost grow with the
+// contacts, not with primaries or fields.
 
 #include <cstdint>
 #include <span>

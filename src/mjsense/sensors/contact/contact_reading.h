@@ -1,5 +1,6 @@
 #pragma once
-// One slot of a contact sensor in double precision: what is read from mjData for a selected contact.
+// One slot of a contact sensor in double precision: what is read from mjData for a selected
+// contact.
 
 #include "mjsense/core/sensor.h"
 #include "mjsense/sensors/contact/contact_reducer.h"
@@ -7,7 +8,7 @@
 namespace mjsense {
 
 struct ContactReading {
-  double force[3]{}, torque[3]{};  // N, N m; primary on the other
+  double force[3]{}, torque[3]{};                 // N, N m; primary on the other
   double normal_force[3]{}, friction_force[3]{};  // their sum is force
   double dist = 0.0;                              // m, negative in penetration
   double pos[3]{};                                // m, world
@@ -15,7 +16,8 @@ struct ContactReading {
   int other_geom = -1, other_body = -1;
 };
 
-// Components in the contact frame, or in world axes if `global`. Without `wrench` the forces stay 0.
+// Components in the contact frame, or in world axes if `global`. Without `wrench` the forces stay
+// 0.
 ContactReading read_contact(const World& world, const ContactRef& ref, bool wrench, bool global);
 
 // The synthetic contact of netforce: world axes, at the force-weighted centroid.

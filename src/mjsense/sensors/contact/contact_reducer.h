@@ -49,8 +49,8 @@ struct ContactRef {
   int sign = 1;
 };
 
-// Sums over the contacts of a primary, world axes. Positions and moments are about `origin`, the first
-// contact, so that nothing cancels far from the world's origin.
+// Sums over the contacts of a primary, world axes. Positions and moments are about `origin`, the
+// first contact, so that nothing cancels far from the world's origin.
 struct ContactSum {
   double origin[3], weight, weighted_pos[3], force[3], normal_force[3], moment[3];
   ContactRef strongest;
@@ -81,15 +81,19 @@ class ContactReducer {
   int num_secondaries() const { return num_secondaries_; }
   bool is_net() const { return reduce_ == ContactReduce::kNetForce; }
 
-  // Results of the last pass over this world. touched: primaries with a contact, in the order found.
+  // Results of the last pass over this world. touched: primaries with a contact, in the order
+  // found.
   std::span<const int> touched(int world) const {
-    return {touched_.data() + world * num_primaries_, static_cast<std::size_t>(num_touched_[world])};
+    return {touched_.data() + world * num_primaries_,
+            static_cast<std::size_t>(num_touched_[world])};
   }
   int count(int world, int primary) const { return count_[world * num_primaries_ + primary]; }
   const ContactRef& slot(int world, int primary, int k) const {
     return slots_[(world * num_primaries_ + primary) * num_slots_ + k];
   }
-  const ContactSum& sum(int world, int primary) const { return sums_[world * num_primaries_ + primary]; }
+  const ContactSum& sum(int world, int primary) const {
+    return sums_[world * num_primaries_ + primary];
+  }
   const ContactRef& peak(int world, int primary) const;  // needs keep_peak, not netforce
   std::span<const std::int32_t> pair_count(int world) const;
   std::span<const double> pair_force(int world) const;  // [P, S, 3]

@@ -106,8 +106,7 @@ std::unique_ptr<Sensor> ContactSensorCfg::build() const {
     throw ValueError(fmt::format("{}: num_slots is {}: must be at least 1", place, num_slots));
   }
   if (history_length > 65535) {
-    throw ValueError(
-        fmt::format("{}: history_length is {}: at most 65535", place, history_length));
+    throw ValueError(fmt::format("{}: history_length is {}: at most 65535", place, history_length));
   }
   const std::vector<std::string> policies = {"first", "any", "error", "each"};
   if (!contains(policies, secondary_policy)) {
@@ -137,8 +136,7 @@ void ContactSensor::edit_spec(mjSpec* spec) {
   primary_names_ = labels_of(names.primaries(name(), cfg_.primary));
   secondary_names_.clear();
   if (cfg_.secondary && cfg_.secondary_policy != "any") {
-    secondary_names_ =
-        labels_of(names.secondaries(name(), *cfg_.secondary, cfg_.secondary_policy));
+    secondary_names_ = labels_of(names.secondaries(name(), *cfg_.secondary, cfg_.secondary_policy));
   }
 }
 
@@ -213,7 +211,8 @@ void ContactSensor::add_outputs(const SensorInit& init) {
     SensorSpec spec = contact_field_spec(field, world_axes);
     const bool vector = spec.shape.rank() == 1;
     spec.shape = vector ? Shape{N, 3} : Shape{N};
-    outputs_.push_back({values_of(field), vector ? 3 : 1, &add(field.c_str(), spec)->data, nullptr});
+    outputs_.push_back(
+        {values_of(field), vector ? 3 : 1, &add(field.c_str(), spec)->data, nullptr});
     needs_wrench_ |= field == "force" || field == "torque";
   }
   if (cfg_.friction_split) {
@@ -397,7 +396,8 @@ void ContactSensor::write_slot(int w, int slot, int found, const ContactReading&
   }
 }
 
-// Shifts every slot by one substep. A slot that has been empty for H substeps is all zero and skipped.
+// Shifts every slot by one substep. A slot that has been empty for H substeps is all zero and
+// skipped.
 void ContactSensor::write_history(int w) {
   const int K = cfg_.num_slots, N = reducer_.num_primaries() * K;
   const std::size_t H = cfg_.history_length;

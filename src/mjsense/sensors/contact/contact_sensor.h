@@ -27,8 +27,8 @@ class ContactPass;
 struct ContactSensorCfg : SensorCfg {
   ContactMatch primary;
   std::optional<ContactMatch> secondary;  // none: contacts with anything
-  // first: of several matches the first in model order. error: several matches are an error. any: no
-  // filter, `secondary` is not looked at. each: every match, and who touches whom is reported.
+  // first: of several matches the first in model order. error: several matches are an error. any:
+  // no filter, `secondary` is not looked at. each: every match, and who touches whom is reported.
   std::string secondary_policy = "first";
 
   // Of found force torque dist pos normal tangent; each becomes a field.
@@ -36,14 +36,17 @@ struct ContactSensorCfg : SensorCfg {
   // none: contact-list order. mindist: deepest first. maxforce: strongest first. netforce: one
   // synthetic contact at the force-weighted centroid, with the net wrench in the world frame.
   std::string reduce = "maxforce";
-  int num_slots = 1;           // K contacts a primary
-  bool global_frame = false;   // force and torque in world axes; needs normal and tangent among fields
-  bool track_air_time = false; // needs "found" among fields, without it the timers stay 0 (as in mjlab)
-  int history_length = 0;      // H substeps of every requested field, newest first; <= 0: none
+  int num_slots = 1;  // K contacts a primary
+  bool global_frame =
+      false;  // force and torque in world axes; needs normal and tangent among fields
+  bool track_air_time =
+      false;               // needs "found" among fields, without it the timers stay 0 (as in mjlab)
+  int history_length = 0;  // H substeps of every requested field, newest first; <= 0: none
 
-  // Beyond mjlab. All are exact: they look at every substep, and at every contact, not at the slots.
-  bool track_events = false;    // fields touchdown, liftoff
-  bool latch = false;           // fields found_any, force_peak, dist_at_peak, pos_at_peak, first_touch_time
+  // Beyond mjlab. All are exact: they look at every substep, and at every contact, not at the
+  // slots.
+  bool track_events = false;  // fields touchdown, liftoff
+  bool latch = false;  // fields found_any, force_peak, dist_at_peak, pos_at_peak, first_touch_time
   bool friction_split = false;  // fields normal_force, friction_force
   bool other_ids = false;       // fields other_geom, other_body
 
@@ -68,7 +71,8 @@ const double* contact_field_values(std::string_view field, const ContactReading&
 //   touchdown, liftoff  bool [B, P]  a contact began (ended) in this control step
 //   found_any  bool [B, P]  any contact in this control step
 //   force_peak [B, P, 3], dist_at_peak [B, P], pos_at_peak [B, P, 3]  the strongest of the step
-//   first_touch_time [B, P]  s from the start of the control step to its first substep with contact;
+//   first_touch_time [B, P]  s from the start of the control step to its first substep with
+//   contact;
 //                         -1 if none
 //   normal_force, friction_force  [B, N, 3]  N, axes of force, which is their sum
 //   other_geom, other_body  int32 [B, N]  MuJoCo ids of the other side; -1: empty slot or a flex;
@@ -94,14 +98,14 @@ class ContactSensor : public Sensor {
   const std::vector<std::string>& primary_names() const { return primary_names_; }
   const std::vector<std::string>& secondary_names() const { return secondary_names_; }
 
-  // bool [B, P]: the present contact (air) phase began less than dt + abs_tol ago. A touch that began
-  // and ended inside a control step is invisible to these; `touchdown` sees it. RuntimeError without
-  // track_air_time.
+  // bool [B, P]: the present contact (air) phase began less than dt + abs_tol ago. A touch that
+  // began and ended inside a control step is invisible to these; `touchdown` sees it. RuntimeError
+  // without track_air_time.
   Array compute_first_contact(double dt, double abs_tol = 1e-6) const;
   Array compute_first_air(double dt, double abs_tol = 1e-6) const;
 
-  // The next substep starts a control step: latches and events are cleared then. Only for callers that
-  // drive substep() by themselves; Simulation counts `decimation` substeps from the reset.
+  // The next substep starts a control step: latches and events are cleared then. Only for callers
+  // that drive substep() by themselves; Simulation counts `decimation` substeps from the reset.
   void begin_control_step(int world);
 
   // One slot as MuJoCo's own sensor has it: in the contact frame whatever cfg says. Valid after

@@ -1,0 +1,119 @@
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <memory>
+
+#include "mjsense/core/error.h"
+#include "mjsense/scene/scene.h"
+#include "mjsense/sensors/contact/contact_sensor.h"
+#include "mjsense/sim/simulation.h"
+
+namespace mjsense {
+namespace {
+
+using ::testing::ElementsAre;
+using ::testing::HasSubstr;
+
+constexpr char kBox[] = R"(
+<mujoco><worldbody>
+  <body name="ground"><geom name="ground_geom" type="plane" size="5 5 .1"/></body>
+  <body name="box" pos="0 0 .5"><freejoint name="bj"/>
+    <geom name="box_geom" type="box" size=".1 .1 .1" mass="1"/></body>
+</worldbody></mujoco>)";
+
+ContactSensorCfg box_cfg(std::string pattern = "box_geom") {
+  ContactSensorCfg cfg;
+  cfg.name = "c";
+  cfg.primary = {"geom", {std::move(pattern)}, "box", {}};
+  return cfg;
+}
+
+// A scene of one entity with these contact sensors.
+struct Lab {
+  std::shared_ptr<Scene> scene;
+  std::unique_ptr<Simulation> sim;
+
+  Lab(std::string entity, std::string xml, std::vector<ContactSensorCfg> sensors,
+      SimulationCfg cfg = {}) {
+    SceneCfg s;
+    EntityCfg e;
+    e.model.xml = std::move(xml);
+    s.entities.emplace_back(std::move(entity), e);
+    for (ContactSensorCfg& c : sensors) s.sensors.push_back(std::make_shared<ContactSensorCfg>(c));
+    scene = std::make_shared<Scene>(std::move(s));
+    sim = std::make_unique<Simulation>(scene, cfg);
+  }
+  ContactSensor& sensor(std::string_view name = "c") {
+    return dynamic_cast<ContactSensor&>(scene->sensor(name));
+  }
+  std::vector<float> read(std::string_view field, std::string_view name = "c") {
+    sim->refresh(scene->sensor(name));
+    const auto all = scene->sensor(name).field(field).data.all<float>();
+    return {all.begin(), all.end()};
+  }
+  void pose(std::initializer_list<double> qpos, int world = 0) {
+    const ArrayView v = sim->worlds().state_component("qpos");
+    std::copy(qpos.begin(), qpos.end(),
+              reinterpret_cast<double*>(v.data + world * v.strides[0]));
+  }
+};
+
+TEST(Contact, BoxOnTheFloorPushesDownWithItsWeight) {
+  ContactSensorCfg net = box_cfg(), slots = box_cfg();
+  net.reduce = "netforce";
+  net.fields = {"found", "force", "pos"};
+  slots.name = "s";
+  slots.fields = {"force", "normal", "tangent"};
+  slots.global_frame = true;
+  slots.num_slots = 4;
+  Lab lab("box", kBox, {net, slots});
+  lab.pose({0, 0, 0.1, 1, 0, 0, 0});
+  lab.sim->forward();
+  for (int i = 0; i < 1000; ++i) lab.sim->step();
+  EXPECT_EQ(lab.read("found")[0], 4.0f);
+  const std::vector<float> f = lab.read("force");
+  EXPECT_NEAR(f[0], 0, 1e-4);
+  EXPECT_NEAR(f[1], 0, 1e-4);
+  EXPECT_NEAR(f[2], -9.81, 1e-3);
+  const std::vector<float> g = lab.read("force", "s");
+  EXPECT_NEAR(g[2] + g[5] + g[8] + g[11], -9.81, 1e-3);
+  EXPECT_THAT(lab.sensor().primary_names(), ElementsAre("box_geom"));
+}
+
+TEST(Contact, PartsAreMuJoCosPerFieldSensors) {
+  Lab lab("box", kBox, {box_cfg()});
+  EXPECT_TRUE(lab.scene->find_sensor("c_box_geom_found"));
+  lab.pose({0, 0, 0.0995, 1, 0, 0, 0});
+  lab.sim->forward();
+  EXPECT_THAT(lab.read("", "c_box_geom_found"), ElementsAre(4.0f));
+}
+
+TEST(Contact, ErrorsNameSensorAndNearest) {
+  const auto message = [](ContactSensorCfg cfg) -> std::string {
+    try {
+      Lab lab("box", kBox, {std::move(cfg)});
+    } catch (const Error& e) {
+      return e.what();
+    }
+    return "";
+  };
+  EXPECT_THAT(message(box_cfg("BOX_GEOM")), HasSubstr("Not all regular expressions are matched"));
+  ContactSensorCfg c = box_cfg();
+  c.primary.exclude = {"box_.*"};
+  EXPECT_THAT(message(c), HasSubstr("after excludes"));
+  c = box_cfg();
+  c.primary.entity = "bax";
+  EXPECT_THAT(message(c), HasSubstr("entity 'bax' not found; did you mean 'box'?"));
+  c = box_cfg();
+  c.reduce = "sum";
+  EXPECT_THAT(message(c), HasSubstr("no reduce named 'sum'"));
+  c = box_cfg();
+  c.fields = {"found", "froce"};
+  EXPECT_THAT(message(c), HasSubstr("did you mean 'force'?"));
+  c = box_cfg();
+  c.secondary = ContactMatch{"geom", {"ground_geom", "box_geom"}, "box", {}};
+  EXPECT_THAT(message(c), HasSubstr("single name"));
+}
+
+}  // namespace
+}  // namespace mjsense
