@@ -1,0 +1,46 @@
+#include "mjsense/core/cpu.h"
+
+#include <fmt/format.h>
+
+#include <array>
+#include <cstdlib>
+
+#include "mjsense/core/error.h"
+
+namespace mjsense {
+namespace {
+
+constexpr std::array<std::string_view, 3> kNames = {"portable", "avx2", "avx512"};
+
+Isa detect() {
+#if defined(__x86_64__)
+  __builtin_cpu_init();
+  if (__builtin_cpu_supports("x86-64-v4")) return Isa::kAvx512;
+  if (__builtin_cpu_supports("x86-64-v3")) return Isa::kAvx2;
+#endif
+  return Isa::kPortable;
+}
+
+Isa choose() {
+  const Isa best = detect();
+  const char* wanted = std::getenv("MJSENSE_ISA");
+  if (wanted == nullptr || *wanted == '\0') return best;
+  for (std::size_t i = 0; i < kNames.size(); ++i) {
+    if (kNames[i] != wanted) continue;
+    if (static_cast<Isa>(i) > best)
+      throw RuntimeError(fmt::format("MJSENSE_ISA={}: this CPU has {}", wanted, isa_name(best)));
+    return static_cast<Isa>(i);
+  }
+  throw ValueError(fmt::format("MJSENSE_ISA={}: expected portable, avx2 or avx512", wanted));
+}
+
+}  // namespace
+
+Isa cpu_isa() {
+  static const Isa isa = choose();
+  return isa;
+}
+
+std::string_view isa_name(Isa isa) { return kNames[static_cast<std::size_t>(isa)]; }
+
+}  // namespace mjsense

@@ -1,0 +1,80 @@
+#pragma once
+// Embree 4 or 3 behind one face: a device, and packets of 16 rays against a scene of triangles.
+// Unnamed namespace: each instruction set keeps its own copy.
+
+#if __has_include(<embree4/rtcore.h>)
+#include <embree4/rtcore.h>
+#else
+#include <embree3/rtcore.h>
+#endif
+
+namespace mjsense {
+namespace {
+
+// Rejects hits on the back of triangles, for queries that cull them.
+inline void reject_backfaces(const RTCFilterFunctionNArguments* args) {
+  for (unsigned i = 0; i < args->N; ++i) {
+    if (args->valid[i] == 0) continue;
+    const float dot = RTCRayN_dir_x(args->ray, args->N, i) * RTCHitN_Ng_x(args->hit, args->N, i) +
+                      RTCRayN_dir_y(args->ray, args->N, i) * RTCHitN_Ng_y(args->hit, args->N, i) +
+                      RTCRayN_dir_z(args->ray, args->N, i) * RTCHitN_Ng_z(args->hit, args->N, i);
+    if (dot > 0.0f) args->valid[i] = 0;
+  }
+}
+
+#if RTC_VERSION_MAJOR >= 4
+
+constexpr auto kSceneFlags =
+    static_cast<RTCSceneFlags>(static_cast<int>(RTC_SCENE_FLAG_ROBUST) |
+                               static_cast<int>(RTC_SCENE_FLAG_FILTER_FUNCTION_IN_ARGUMENTS));
+
+inline void embree_intersect16(const int* valid, RTCScene scene, RTCRayHit16* rays, bool cull,
+                               bool coherent) {
+  RTCIntersectArguments args;
+  rtcInitIntersectArguments(&args);
+  if (coherent) args.flags = RTC_RAY_QUERY_FLAG_COHERENT;
+  if (cull) {
+    args.flags =
+        static_cast<RTCRayQueryFlags>(args.flags | RTC_RAY_QUERY_FLAG_INVOKE_ARGUMENT_FILTER);
+    args.filter = reject_backfaces;
+  }
+  rtcIntersect16(valid, scene, rays, &args);
+}
+
+inline void embree_occluded16(const int* valid, RTCScene scene, RTCRay16* rays, bool cull) {
+  RTCOccludedArguments args;
+  rtcInitOccludedArguments(&args);
+  if (cull) {
+    args.flags = RTC_RAY_QUERY_FLAG_INVOKE_ARGUMENT_FILTER;
+    args.filter = reject_backfaces;
+  }
+  rtcOccluded16(valid, scene, rays, &args);
+}
+
+#else
+
+constexpr auto kSceneFlags =
+    static_cast<RTCSceneFlags>(static_cast<int>(RTC_SCENE_FLAG_ROBUST) |
+                               static_cast<int>(RTC_SCENE_FLAG_CONTEXT_FILTER_FUNCTION));
+
+inline void embree_intersect16(const int* valid, RTCScene scene, RTCRayHit16* rays, bool cull,
+                               bool coherent) {
+  RTCIntersectContext context;
+  rtcInitIntersectContext(&context);
+  if (coherent) context.flags = RTC_INTERSECT_CONTEXT_FLAG_COHERENT;
+  if (cull) context.filter = reject_backfaces;
+  rtcIntersect16(valid, scene, &context, rays);
+}
+
+// Never coherent: rtcOccluded16 of Debian's 3.13.5 does not return with that flag.
+inline void embree_occluded16(const int* valid, RTCScene scene, RTCRay16* rays, bool cull) {
+  RTCIntersectContext context;
+  rtcInitIntersectContext(&context);
+  if (cull) context.filter = reject_backfaces;
+  rtcOccluded16(valid, scene, &context, rays);
+}
+
+#endif
+
+}  // namespace
+}  // namespace mjsense

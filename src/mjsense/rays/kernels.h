@@ -1,0 +1,56 @@
+#pragma once
+// The functions that exist once per instruction set (kernels_portable.cc, kernels_avx2.cc,
+// kernels_avx512.cc, all made of kernels_impl.h). Structures only: nothing here may be compiled
+// into an inline function that another CPU would meet.
+
+#include <cstdint>
+
+namespace mjsense {
+
+struct RayPacket;
+struct HitPacket;
+struct RayGeom;
+struct RayCandidate;
+
+struct HeightField {
+  const float* data;  // [rows, cols] 0..1
+  int rows, cols;
+  float size[4];  // m: half x, half y, height of 1, thickness of the base
+  void* scene;    // RTCScene of its surface: face 2 * cell + triangle
+};
+
+struct KernelScene {
+  void* const* mesh_scenes;          // RTCScene by mesh id
+  const HeightField* height_fields;  // by height-field id
+};
+
+struct KernelWorld {
+  const RayGeom* geoms;
+  const float* low[3];  // [padded]
+  const float* high[3];
+  const std::uint32_t* flags;      // [padded]
+  const int* bodies;               // [padded]
+  const void* const* flex_scenes;  // RTCScene by flex id
+  int count;                       // geoms and flexes
+};
+
+struct KernelFilter {
+  std::uint32_t groups;
+  int exclude_body;
+  bool transparent, cull_mesh, cull_solid;
+  const std::uint8_t* hidden;  // null: none
+};
+
+struct RayKernels {
+  int (*gather)(const KernelWorld&, const KernelFilter&, const RayPacket&, RayCandidate* out);
+  void (*trace)(const KernelScene&, const KernelWorld&, const KernelFilter&, const RayPacket&,
+                HitPacket&, const RayCandidate*, int count);
+  std::uint32_t (*occluded)(const KernelScene&, const KernelWorld&, const KernelFilter&,
+                            const RayPacket&, const RayCandidate*, int count);
+};
+
+const RayKernels& portable_kernels();
+const RayKernels& avx2_kernels();
+const RayKernels& avx512_kernels();
+
+}  // namespace mjsense

@@ -1,0 +1,7 @@
+#include "mjsense/rays/kernels_impl.h"
+
+namespace mjsense {
+
+const RayKernels& avx2_kernels() { return kKernels; }
+
+}  // namespace mjsense

@@ -1,0 +1,311 @@
+#pragma once
+// The kernels: a packet of 16 rays against candidate geoms, kWidth lanes at a time. Included by one
+// .cc file per instruction set.
+//
+// Precision in float32: a packet's origin is brought into a geom's frame in double; solids are
+// solved from the point of the ray nearest to their centre, meshes from where the ray enters their
+// box. So numbers are small where digits count.
+
+#include <mujoco/mujoco.h>
+
+#include "mjsense/rays/beam.h"
+#include "mjsense/rays/embree.h"
+#include "mjsense/rays/height_field.h"
+#include "mjsense/rays/kernels.h"
+#include "mjsense/rays/packet.h"
+#include "mjsense/rays/ray_geom.h"
+#include "mjsense/rays/simd.h"
+#include "mjsense/rays/solids.h"
+
+namespace mjsense {
+namespace {
+
+// A geom's frame for one packet: p_G = base + R^T o, d_G = R^T d.
+struct Frame {
+  float base[3];
+  const float* r;
+
+  Frame(const RayGeom& g, const double* origin) : r(g.rot) {
+    const double x = origin[0] - g.pos[0], y = origin[1] - g.pos[1], z = origin[2] - g.pos[2];
+    for (int i = 0; i < 3; ++i)
+      base[i] = static_cast<float>(g.mat[i] * x + g.mat[3 + i] * y + g.mat[6 + i] * z);
+  }
+  Vec3 direction(const float (*d)[kPacket], int k) const {
+    const Float x = load(d[0] + k), y = load(d[1] + k), z = load(d[2] + k);
+    return {fma(r[0], x, fma(r[3], y, Float(r[6]) * z)),
+            fma(r[1], x, fma(r[4], y, Float(r[7]) * z)),
+            fma(r[2], x, fma(r[5], y, Float(r[8]) * z))};
+  }
+  Vec3 point(const float (*o)[kPacket], int k) const {
+    const Vec3 p = direction(o, k);
+    return {p.x + base[0], p.y + base[1], p.z + base[2]};
+  }
+  Vec3 to_world(Vec3 n) const {
+    return {fma(r[0], n.x, fma(r[1], n.y, Float(r[2]) * n.z)),
+            fma(r[3], n.x, fma(r[4], n.y, Float(r[5]) * n.z)),
+            fma(r[6], n.x, fma(r[7], n.y, Float(r[8]) * n.z))};
+  }
+};
+
+Vec3 unit(Vec3 n) {
+  const Float s = Float(1.0f) / sqrt(max(dot(n, n), 1e-30f));
+  return {n.x * s, n.y * s, n.z * s};
+}
+
+// Lanes whose hit at t is nearer than what is known, or equally near (to rounding) with a lower
+// geom id.
+Mask nearer(const HitPacket& hits, const RayPacket& rays, int k, Float t, int geom) {
+  const Float best = load(hits.t + k);
+  const Float tolerance = fma(t, 4e-7f, 1e-7f);
+  const Mask before = t < best - tolerance;
+  const Mask tie = (t <= best + tolerance) & less(int_of(geom), load(hits.geom + k));
+  return (before | tie) & (t <= load(rays.tmax + k)) & (t < Float(kNoHit));
+}
+
+void put(HitPacket& hits, int k, Mask m, Float t, int geom, Int prim, Vec3 n) {
+  store(hits.t + k, select(m, t, load(hits.t + k)));
+  store(hits.geom + k, select(m, int_of(geom), load(hits.geom + k)));
+  store(hits.prim + k, select(m, prim, load(hits.prim + k)));
+  store(hits.n[0] + k, select(m, n.x, load(hits.n[0] + k)));
+  store(hits.n[1] + k, select(m, n.y, load(hits.n[1] + k)));
+  store(hits.n[2] + k, select(m, n.z, load(hits.n[2] + k)));
+  store(hits.u + k, select(m, Float(0.0f), load(hits.u + k)));
+  store(hits.v + k, select(m, Float(0.0f), load(hits.v + k)));
+}
+
+template <class Shape>
+void trace_solid(const RayGeom& g, int id, bool cull, const RayPacket& rays, HitPacket& hits) {
+  const Frame frame(g, rays.origin);
+  for (int k = 0; k < kPacket; k += kWidth) {
+    const Vec3 o = frame.point(rays.o, k), d = frame.direction(rays.d, k);
+    const Float t = Shape::intersect(g.size, o, d, cull);
+    const Mask m = nearer(hits, rays, k, t, id);
+    if (any(m))
+      put(hits, k, m, t, id, int_of(0), frame.to_world(Shape::normal(g.size, along(o, t, d))));
+  }
+}
+
+template <class Shape>
+std::uint32_t occluded_solid(const RayGeom& g, bool cull, const RayPacket& rays) {
+  const Frame frame(g, rays.origin);
+  std::uint32_t hit = 0;
+  for (int k = 0; k < kPacket; k += kWidth) {
+    const Float t =
+        Shape::intersect(g.size, frame.point(rays.o, k), frame.direction(rays.d, k), cull);
+    hit |= bits(t <= load(rays.tmax + k) & t < Float(kNoHit)) << k;
+  }
+  return hit;
+}
+
+// Rays in a mesh's frame, each started shortly before it enters the mesh's box; `start` is where
+// that is.
+struct MeshRays {
+  alignas(64) RTCRayHit16 rh;
+  alignas(64) int valid[kPacket];
+  alignas(64) float start[kPacket];
+
+  // Returns whether any ray meets the box before `limit` [16].
+  bool prepare(const RayGeom& g, const Frame& frame, const RayPacket& rays, const float* limit) {
+    bool some = false;
+    const float pad = 1e-5f + 1e-4f * (g.half[0] + g.half[1] + g.half[2]);
+    for (int k = 0; k < kPacket; k += kWidth) {
+      const Vec3 o = frame.point(rays.o, k), d = frame.direction(rays.d, k);
+      const float size[3] = {g.half[0] + pad, g.half[1] + pad, g.half[2] + pad};
+      const Vec3 c = {o.x - g.center[0], o.y - g.center[1], o.z - g.center[2]};
+      const Interval in = Box::interval(size, c, d);
+      const Float t = max(in.enter, 0.0f), cut = load(limit + k);
+      const Mask m = (in.enter <= in.leave) & (in.leave >= Float(0.0f)) & (t <= cut);
+      some |= any(m);
+      const Vec3 p = along(o, t, d);
+      store(valid + k, select(m, int_of(-1), int_of(0)));
+      store(start + k, t);
+      store(rh.ray.org_x + k, p.x);
+      store(rh.ray.org_y + k, p.y);
+      store(rh.ray.org_z + k, p.z);
+      store(rh.ray.dir_x + k, d.x);
+      store(rh.ray.dir_y + k, d.y);
+      store(rh.ray.dir_z + k, d.z);
+      store(rh.ray.tnear + k, Float(0.0f));
+      store(rh.ray.tfar + k, fma(cut, 1.000001f, 1e-6f) - t);
+      store(rh.ray.time + k, Float(0.0f));
+      store(reinterpret_cast<int*>(rh.ray.mask) + k, int_of(-1));
+      store(reinterpret_cast<int*>(rh.ray.id) + k, int_of(0));
+      store(reinterpret_cast<int*>(rh.ray.flags) + k, int_of(0));
+      store(reinterpret_cast<int*>(rh.hit.geomID) + k, int_of(-1));
+      store(reinterpret_cast<int*>(rh.hit.instID[0]) + k, int_of(-1));
+    }
+    return some;
+  }
+};
+
+void limits(const RayPacket& rays, const HitPacket& hits, float* limit) {
+  for (int k = 0; k < kPacket; k += kWidth)
+    store(limit + k, min(load(hits.t + k), load(rays.tmax + k)));
+}
+
+void trace_triangles(RTCScene scene, const RayGeom& g, int id, bool cull, const RayPacket& rays,
+                     HitPacket& hits) {
+  const Frame frame(g, rays.origin);
+  alignas(64) float limit[kPacket];
+  limits(rays, hits, limit);
+  MeshRays mesh;
+  if (!mesh.prepare(g, frame, rays, limit)) return;
+  embree_intersect16(mesh.valid, scene, &mesh.rh, cull, false);
+  for (int k = 0; k < kPacket; k += kWidth) {
+    const Mask found = less(load(mesh.valid + k), int_of(0)) &
+                       ~less(load(reinterpret_cast<int*>(mesh.rh.hit.geomID) + k), int_of(0));
+    if (!any(found)) continue;
+    const Float t = select(found, load(mesh.start + k) + load(mesh.rh.ray.tfar + k), Float(kNoHit));
+    const Mask m = nearer(hits, rays, k, t, id);
+    if (!any(m)) continue;
+    const Vec3 n =
+        unit({load(mesh.rh.hit.Ng_x + k), load(mesh.rh.hit.Ng_y + k), load(mesh.rh.hit.Ng_z + k)});
+    put(hits, k, m, t, id, load(reinterpret_cast<int*>(mesh.rh.hit.primID) + k), frame.to_world(n));
+    store(hits.u + k, select(m, load(mesh.rh.hit.u + k), load(hits.u + k)));
+    store(hits.v + k, select(m, load(mesh.rh.hit.v + k), load(hits.v + k)));
+  }
+}
+
+std::uint32_t occluded_triangles(RTCScene scene, const RayGeom& g, bool cull,
+                                 const RayPacket& rays) {
+  const Frame frame(g, rays.origin);
+  MeshRays mesh;
+  if (!mesh.prepare(g, frame, rays, rays.tmax)) return 0;
+  embree_occluded16(mesh.valid, scene, &mesh.rh.ray, cull);
+  std::uint32_t hit = 0;
+  for (int k = 0; k < kPacket; k += kWidth)
+    hit |= bits(less(load(mesh.valid + k), int_of(0)) & (load(mesh.rh.ray.tfar + k) < Float(0.0f)))
+           << k;
+  return hit;
+}
+
+void trace_height_field(const HeightField& field, const RayGeom& g, int id, bool cull,
+                        const RayPacket& rays, HitPacket& hits) {
+  const Frame frame(g, rays.origin);
+  for (int k = 0; k < kPacket; k += kWidth) {
+    const Vec3 o = frame.point(rays.o, k), d = frame.direction(rays.d, k);
+    const Float limit = min(load(hits.t + k), load(rays.tmax + k));
+    const FieldHit hit = intersect_height_field(field, o, d, limit, cull);
+    const Mask m = nearer(hits, rays, k, hit.t, id);
+    if (any(m)) put(hits, k, m, hit.t, id, hit.prim, frame.to_world(hit.normal));
+  }
+}
+
+std::uint32_t occluded_height_field(const HeightField& field, const RayGeom& g, bool cull,
+                                    const RayPacket& rays) {
+  const Frame frame(g, rays.origin);
+  std::uint32_t hit = 0;
+  for (int k = 0; k < kPacket; k += kWidth) {
+    const Float limit = load(rays.tmax + k);
+    const FieldHit h = intersect_height_field(field, frame.point(rays.o, k),
+                                              frame.direction(rays.d, k), limit, cull);
+    hit |= bits((h.t <= limit) & (h.t < Float(kNoHit))) << k;
+  }
+  return hit;
+}
+
+void trace(const KernelScene& scene, const KernelWorld& world, const KernelFilter& filter,
+           const RayPacket& rays, HitPacket& hits, const RayCandidate* candidates, int count) {
+  for (int k = 0; k < kPacket; k += kWidth) {
+    store(hits.t + k, Float(kNoHit));
+    store(hits.geom + k, int_of(-1));
+    store(hits.prim + k, int_of(0));
+    for (float* p : {hits.n[0], hits.n[1], hits.n[2], hits.u, hits.v}) store(p + k, Float(0.0f));
+  }
+  const bool cull = filter.cull_solid, cull_mesh = filter.cull_mesh;
+  for (int c = 0; c < count; ++c) {
+    bool reachable = false;  // candidates come nearest first
+    for (int k = 0; k < kPacket; k += kWidth)
+      reachable |= any(Float(candidates[c].t) <= min(load(hits.t + k), load(rays.tmax + k)));
+    if (!reachable) break;
+    const int id = candidates[c].geom;
+    const RayGeom& g = world.geoms[id];
+    switch (g.type) {
+      case mjGEOM_PLANE:
+        trace_solid<Plane>(g, id, cull, rays, hits);
+        break;
+      case mjGEOM_SPHERE:
+        trace_solid<Sphere>(g, id, cull, rays, hits);
+        break;
+      case mjGEOM_CAPSULE:
+        trace_solid<Capsule>(g, id, cull, rays, hits);
+        break;
+      case mjGEOM_ELLIPSOID:
+        trace_solid<Ellipsoid>(g, id, cull, rays, hits);
+        break;
+      case mjGEOM_CYLINDER:
+        trace_solid<Cylinder>(g, id, cull, rays, hits);
+        break;
+      case mjGEOM_BOX:
+        trace_solid<Box>(g, id, cull, rays, hits);
+        break;
+      case mjGEOM_HFIELD:
+        trace_height_field(scene.height_fields[g.data], g, id, cull, rays, hits);
+        break;
+      case mjGEOM_MESH:
+      case mjGEOM_SDF:
+        trace_triangles(static_cast<RTCScene>(scene.mesh_scenes[g.data]), g, id, cull_mesh, rays,
+                        hits);
+        break;
+      case kFlexType:
+        trace_triangles(static_cast<RTCScene>(const_cast<void*>(world.flex_scenes[g.data])), g, id,
+                        cull_mesh, rays, hits);
+        break;
+      default:
+        break;
+    }
+  }
+}
+
+std::uint32_t occluded(const KernelScene& scene, const KernelWorld& world,
+                       const KernelFilter& filter, const RayPacket& rays,
+                       const RayCandidate* candidates, int count) {
+  std::uint32_t active = 0;
+  for (int k = 0; k < kPacket; k += kWidth) active |= bits(load(rays.tmax + k) >= Float(0.0f)) << k;
+  std::uint32_t hit = 0;
+  const bool cull = filter.cull_solid, cull_mesh = filter.cull_mesh;
+  for (int c = 0; c < count && (hit & active) != active; ++c) {
+    const RayGeom& g = world.geoms[candidates[c].geom];
+    switch (g.type) {
+      case mjGEOM_PLANE:
+        hit |= occluded_solid<Plane>(g, cull, rays);
+        break;
+      case mjGEOM_SPHERE:
+        hit |= occluded_solid<Sphere>(g, cull, rays);
+        break;
+      case mjGEOM_CAPSULE:
+        hit |= occluded_solid<Capsule>(g, cull, rays);
+        break;
+      case mjGEOM_ELLIPSOID:
+        hit |= occluded_solid<Ellipsoid>(g, cull, rays);
+        break;
+      case mjGEOM_CYLINDER:
+        hit |= occluded_solid<Cylinder>(g, cull, rays);
+        break;
+      case mjGEOM_BOX:
+        hit |= occluded_solid<Box>(g, cull, rays);
+        break;
+      case mjGEOM_HFIELD:
+        hit |= occluded_height_field(scene.height_fields[g.data], g, cull, rays);
+        break;
+      case mjGEOM_MESH:
+      case mjGEOM_SDF:
+        hit |= occluded_triangles(static_cast<RTCScene>(scene.mesh_scenes[g.data]), g, cull_mesh,
+                                  rays);
+        break;
+      case kFlexType:
+        hit |=
+            occluded_triangles(static_cast<RTCScene>(const_cast<void*>(world.flex_scenes[g.data])),
+                               g, cull_mesh, rays);
+        break;
+      default:
+        break;
+    }
+  }
+  return hit & active;
+}
+
+constexpr RayKernels kKernels = {&gather_candidates, &trace, &occluded};
+
+}  // namespace
+}  // namespace mjsense

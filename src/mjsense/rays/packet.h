@@ -1,0 +1,67 @@
+#pragma once
+// Rays and hits in groups of 16, as the kernels take them: arrays by component, no allocation.
+
+#include <array>
+#include <cstdint>
+#include <limits>
+#include <span>
+
+namespace mjsense {
+
+inline constexpr int kPacket = 16;
+inline constexpr float kNoHit = std::numeric_limits<float>::infinity();
+
+// 16 rays p(t) = origin + o + t d, t in [0, tmax]. Give `origin` in double and near the rays'
+// origins (a sensor's frame): what is close to it is precise, wherever in the world it is.
+// Directions must have length 1. A lane with tmax < 0 is no ray.
+struct alignas(64) RayPacket {
+  float o[3][kPacket];  // m, relative to `origin`, world axes
+  float d[3][kPacket];
+  float tmax[kPacket];  // m
+  double origin[3];     // m, world
+};
+
+// What the rays hit first. A ray without a hit has t = kNoHit, geom = -1, and everything else 0.
+struct alignas(64) HitPacket {
+  float t[kPacket];     // m
+  int geom[kPacket];    // geom id; num_geoms + flex id for a flex
+  int prim[kPacket];    // mesh: face of the mesh; height field: 2 * cell + triangle, -1 base and
+                        // sides; flex: element
+  float n[3][kPacket];  // unit normal in the world: outward, or by the triangle's winding
+  float u[kPacket],
+      v[kPacket];  // mesh, flex: barycentric weights of the triangle's second and third vertex
+};
+
+// A geom that a packet may meet, not before t.
+struct RayCandidate {
+  float t;  // m
+  int geom;
+};
+
+struct Hit {
+  double t = kNoHit;  // m
+  int geom = -1;
+  int prim = 0;
+  std::array<float, 3> normal{};
+  float u = 0, v = 0;
+  bool operator!() const { return geom < 0; }
+};
+
+// Which geoms a query sees. It belongs to the query: no sensor's choice changes what another one
+// sees.
+struct RayFilter {
+  enum class Backfaces {
+    kHit,       // as mj_ray: meshes from both sides, solids also from inside
+    kCullMesh,  // triangles only from the side they are wound towards
+    kCull,      // as MuJoCo's renderer: and solids only from outside
+  };
+  std::uint32_t groups =
+      0x3f;                  // bit g: geoms of group g; groups are clamped to 0..5 as MuJoCo does
+  int exclude_body = -1;     // geoms of this body are not seen; its children's are
+  bool transparent = false;  // see geoms of alpha 0 too
+  Backfaces backfaces = Backfaces::kHit;
+  std::span<const std::uint8_t>
+      hidden;  // [num_geoms + num_flexes]: nonzero is not seen; empty: all are seen
+};
+
+}  // namespace mjsense

@@ -1,0 +1,97 @@
+#include "mjsense/rays/ray_scene.h"
+
+#include <cmath>
+
+#include "mjsense/core/cpu.h"
+#include "mjsense/rays/kernels.h"
+#include "mjsense/rays/shared_geometry.h"
+
+namespace mjsense {
+namespace {
+
+const RayKernels& kernels_for(Isa isa) {
+#if defined(__x86_64__)
+  if (isa == Isa::kAvx512) return avx512_kernels();
+  if (isa == Isa::kAvx2) return avx2_kernels();
+#endif
+  return portable_kernels();
+}
+
+KernelFilter kernel_filter(const RayFilter& f) {
+  using Backfaces = RayFilter::Backfaces;
+  return {f.groups,
+          f.exclude_body,
+          f.transparent,
+          f.backfaces != Backfaces::kHit,
+          f.backfaces == Backfaces::kCull,
+          f.hidden.empty() ? nullptr : f.hidden.data()};
+}
+
+KernelWorld kernel_world(const RayWorld& w) {
+  const auto low = w.low(), high = w.high();
+  return {w.geoms().data(), {low[0], low[1], low[2]}, {high[0], high[1], high[2]},
+          w.flags().data(), w.bodies().data(),        nullptr,
+          w.num_objects()};
+}
+
+}  // namespace
+
+RayScratch::RayScratch(const RayScene& scene) : candidates_(scene.num_objects()) {}
+
+RayScene::RayScene(const mjModel* model, int num_worlds)
+    : model_(model),
+      shared_(std::make_unique<SharedGeometry>(model)),
+      kernels_(&kernels_for(cpu_isa())) {
+  worlds_.reserve(num_worlds);
+  for (int w = 0; w < num_worlds; ++w) worlds_.emplace_back(model, shared_->bounds);
+}
+
+RayScene::~RayScene() = default;
+
+void RayScene::update(const World& world) { worlds_[world.id].update(world.model, world.data); }
+
+void RayScene::gather(int world, const RayFilter& filter, const RayPacket& rays,
+                      RayScratch& scratch) const {
+  scratch.count =
+      kernels_->gather(kernel_world(worlds_[world]), kernel_filter(filter), rays, scratch.data());
+}
+
+void RayScene::trace_candidates(int world, const RayFilter& filter, const RayPacket& rays,
+                                HitPacket& hits, std::span<const RayCandidate> candidates) const {
+  const KernelScene scene{shared_->mesh_scenes.data(), shared_->height_fields.data()};
+  kernels_->trace(scene, kernel_world(worlds_[world]), kernel_filter(filter), rays, hits,
+                  candidates.data(), static_cast<int>(candidates.size()));
+}
+
+void RayScene::trace(int world, const RayFilter& filter, const RayPacket& rays, HitPacket& hits,
+                     RayScratch& scratch) const {
+  gather(world, filter, rays, scratch);
+  trace_candidates(world, filter, rays, hits, scratch.candidates());
+}
+
+std::uint32_t RayScene::occluded(int world, const RayFilter& filter, const RayPacket& rays,
+                                 RayScratch& scratch) const {
+  gather(world, filter, rays, scratch);
+  const KernelScene scene{shared_->mesh_scenes.data(), shared_->height_fields.data()};
+  return kernels_->occluded(scene, kernel_world(worlds_[world]), kernel_filter(filter), rays,
+                            scratch.data(), static_cast<int>(scratch.count));
+}
+
+Hit RayScene::trace(int world, const RayFilter& filter, const double origin[3],
+                    const double direction[3]) const {
+  RayScratch scratch(*this);
+  RayPacket rays{};
+  HitPacket hits;
+  const double length = std::sqrt(direction[0] * direction[0] + direction[1] * direction[1] +
+                                  direction[2] * direction[2]);
+  for (int k = 0; k < 3; ++k) {
+    rays.origin[k] = origin[k];
+    for (int i = 0; i < kPacket; ++i) rays.d[k][i] = static_cast<float>(direction[k] / length);
+  }
+  for (int i = 0; i < kPacket; ++i) rays.tmax[i] = i == 0 ? kNoHit : -1.0f;
+  trace(world, filter, rays, hits, scratch);
+  return {hits.t[0], hits.geom[0], hits.prim[0], {hits.n[0][0], hits.n[1][0], hits.n[2][0]},
+          hits.u[0], hits.v[0]};
+}
+
+}  // namespace mjsense

@@ -1,0 +1,81 @@
+#pragma once
+// What rays see of one world: poses and visual properties of its geoms, copied out of MuJoCo in the
+// parallel pass over worlds, so that casting needs no mjData.
+
+#include <mujoco/mujoco.h>
+
+#include <array>
+#include <cstdint>
+#include <span>
+#include <vector>
+
+#include "mjsense/core/array.h"
+#include "mjsense/rays/ray_geom.h"
+
+namespace mjsense {
+
+// Lights and cameras for rendering (mjData's light_xpos ... cam_xmat).
+struct RayLight {
+  double pos[3], dir[3];
+};
+struct RayCamera {
+  double pos[3], mat[9];
+};
+
+// Local boxes (center, half) of the shared shapes, by mesh and height-field id.
+struct ShapeBounds {
+  std::vector<std::array<float, 6>> meshes, height_fields;
+};
+
+class RayWorld {
+ public:
+  RayWorld() = default;
+  RayWorld(const mjModel* model, const ShapeBounds& bounds);
+
+  // Copies the world's present values. No allocation. Called by one thread a world.
+  void update(const mjModel* model, const mjData* data);
+
+  int num_geoms() const { return num_geoms_; }  // of the model, without flexes
+  int num_objects() const { return static_cast<int>(geoms_.size()); }  // geoms, then flexes
+  std::uint64_t version() const { return version_; }  // grows with every update; 0: never updated
+
+  const RayGeom& geom(int id) const { return geoms_[id]; }
+  std::span<const RayGeom> geoms() const { return geoms_; }
+  std::array<const float*, 3> low() const {
+    return {row(0), row(1), row(2)};
+  }  // world boxes [num_objects padded to 16]
+  std::array<const float*, 3> high() const {
+    return {row(3), row(4), row(5)};
+  }  // planes: +-infinity
+  // Bit g of group g; kTransparent if its alpha is 0; 0 for padding.
+  static constexpr std::uint32_t kTransparent = 0x100;
+  std::span<const std::uint32_t> flags() const { return flags_; }
+  std::span<const int> bodies() const { return bodies_; }  // body id, -1 for flexes and padding
+  std::span<const int> materials() const { return materials_; }  // material id or -1
+  std::span<const float> rgba() const {
+    return rgba_;
+  }  // [num_objects, 4], resolved: the material's if it has one
+  std::span<const float> flex_vertices() const {
+    return flex_vertices_;
+  }  // [nflexvert, 3] m, world
+  std::span<const RayLight> lights() const { return lights_; }
+  std::span<const RayCamera> cameras() const { return cameras_; }
+
+ private:
+  const float* row(int i) const { return bounds_.row<float>(i).data(); }
+  void update_bounds();
+
+  int num_geoms_ = 0;
+  std::uint64_t version_ = 0;
+  std::vector<RayGeom> geoms_;
+  const ShapeBounds* shapes_ = nullptr;
+  Array bounds_;  // [6, padded]
+  std::vector<std::uint32_t> flags_;
+  std::vector<int> bodies_, materials_;
+  std::vector<float> rgba_;
+  std::vector<float> flex_vertices_;
+  std::vector<RayLight> lights_;
+  std::vector<RayCamera> cameras_;
+};
+
+}  // namespace mjsense

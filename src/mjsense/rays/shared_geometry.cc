@@ -1,0 +1,84 @@
+#include "mjsense/rays/shared_geometry.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <array>
+#include <limits>
+
+#include "mjsense/core/error.h"
+
+namespace mjsense {
+namespace {
+
+std::array<float, 6> box_around(const float* vertices, int count) {
+  std::array<float, 6> box{};
+  for (int k = 0; k < 3; ++k) {
+    float low = std::numeric_limits<float>::infinity(), high = -low;
+    for (int i = 0; i < count; ++i) {
+      low = std::min(low, vertices[3 * i + k]);
+      high = std::max(high, vertices[3 * i + k]);
+    }
+    box[k] = 0.5f * (low + high);
+    box[3 + k] = 0.5f * (high - low);
+  }
+  return box;
+}
+
+}  // namespace
+
+SceneHandle build_triangles(RTCDevice device, const float* vertices, int num_vertices,
+                            const int* faces, int num_faces) {
+  SceneHandle scene(rtcNewScene(device));
+  rtcSetSceneFlags(scene.get(), kSceneFlags);
+  rtcSetSceneBuildQuality(scene.get(), RTC_BUILD_QUALITY_HIGH);
+  RTCGeometry geometry = rtcNewGeometry(device, RTC_GEOMETRY_TYPE_TRIANGLE);
+  void* v = rtcSetNewGeometryBuffer(geometry, RTC_BUFFER_TYPE_VERTEX, 0, RTC_FORMAT_FLOAT3,
+                                    3 * sizeof(float), num_vertices);
+  void* f = rtcSetNewGeometryBuffer(geometry, RTC_BUFFER_TYPE_INDEX, 0, RTC_FORMAT_UINT3,
+                                    3 * sizeof(int), num_faces);
+  if (v == nullptr || f == nullptr)
+    throw RuntimeError(
+        fmt::format("ray scene: Embree could not allocate a mesh of {} vertices and {} faces",
+                    num_vertices, num_faces));
+  std::copy_n(vertices, 3 * num_vertices, static_cast<float*>(v));
+  std::copy_n(faces, 3 * num_faces, static_cast<int*>(f));
+  rtcCommitGeometry(geometry);
+  rtcAttachGeometry(scene.get(), geometry);
+  rtcReleaseGeometry(geometry);
+  rtcCommitScene(scene.get());
+  return scene;
+}
+
+SharedGeometry::SharedGeometry(const mjModel* m) {
+  // One thread: the BVH, and with it every answer, is the same on every machine.
+  device.reset(rtcNewDevice("threads=1"));
+  if (!device)
+    throw RuntimeError(fmt::format("ray scene: Embree gave no device (error {})",
+                                   static_cast<int>(rtcGetDeviceError(nullptr))));
+
+  std::vector<bool> shown(m->nmesh, false);
+  for (int i = 0; i < m->ngeom; ++i)
+    if ((m->geom_type[i] == mjGEOM_MESH || m->geom_type[i] == mjGEOM_SDF) && m->geom_dataid[i] >= 0)
+      shown[m->geom_dataid[i]] = true;
+  meshes.resize(m->nmesh);
+  mesh_scenes.assign(m->nmesh, nullptr);
+  for (int i = 0; i < m->nmesh; ++i) {
+    const float* vertices = m->mesh_vert + 3 * m->mesh_vertadr[i];
+    bounds.meshes.push_back(box_around(vertices, m->mesh_vertnum[i]));
+    if (!shown[i]) continue;
+    meshes[i] = build_triangles(device.get(), vertices, m->mesh_vertnum[i],
+                                m->mesh_face + 3 * m->mesh_faceadr[i], m->mesh_facenum[i]);
+    mesh_scenes[i] = meshes[i].get();
+  }
+  for (int i = 0; i < m->nhfield; ++i) {
+    HeightField field{
+        m->hfield_data + m->hfield_adr[i], m->hfield_nrow[i], m->hfield_ncol[i], {}, nullptr};
+    std::copy_n(m->hfield_size + 4 * i, 4, field.size);
+    height_fields.push_back(field);
+    const float* s = field.size;
+    bounds.height_fields.push_back({0, 0, 0.5f * (s[2] - s[3]), s[0], s[1], 0.5f * (s[2] + s[3])});
+  }
+}
+
+}  // namespace mjsense

@@ -1,0 +1,38 @@
+#pragma once
+// The shapes that all worlds share: one BVH a mesh, one a height field.
+
+#include <mujoco/mujoco.h>
+
+#include <memory>
+#include <vector>
+
+#include "mjsense/rays/embree.h"
+#include "mjsense/rays/kernels.h"
+#include "mjsense/rays/ray_world.h"
+
+namespace mjsense {
+
+struct DeviceRelease {
+  void operator()(RTCDevice device) const { rtcReleaseDevice(device); }
+};
+struct SceneRelease {
+  void operator()(RTCScene scene) const { rtcReleaseScene(scene); }
+};
+using DeviceHandle = std::unique_ptr<RTCDeviceTy, DeviceRelease>;
+using SceneHandle = std::unique_ptr<RTCSceneTy, SceneRelease>;
+
+struct SharedGeometry {
+  explicit SharedGeometry(const mjModel* model);
+
+  DeviceHandle device;
+  std::vector<SceneHandle> meshes;         // null for a mesh that no geom shows
+  std::vector<void*> mesh_scenes;          // the same, for the kernels
+  std::vector<HeightField> height_fields;  // data: the model's
+  ShapeBounds bounds;
+};
+
+// A scene of one triangle mesh; positions and indices are copied.
+SceneHandle build_triangles(RTCDevice device, const float* vertices, int num_vertices,
+                            const int* faces, int num_faces);
+
+}  // namespace mjsense

@@ -1,0 +1,222 @@
+#pragma once
+// Vectors of kWidth floats for the kernels: AVX-512 (16), AVX2 (8), or plain arrays of 4 that any
+// compiler vectorises. Everything lies in an unnamed namespace, because each instruction set must
+// keep its own copy.
+
+#if defined(__AVX512F__) || defined(__AVX2__)
+#include <immintrin.h>
+#endif
+
+#include <cmath>
+#include <cstdint>
+#include <cstring>
+
+namespace mjsense {
+namespace {
+
+#if defined(__AVX512F__)
+
+constexpr int kWidth = 16;
+
+struct Mask {
+  __mmask16 m;
+};
+struct Int {
+  __m512i v;
+};
+struct Float {
+  __m512 v;
+  Float() = default;
+  Float(__m512 x) : v(x) {}
+  Float(float x) : v(_mm512_set1_ps(x)) {}
+};
+
+inline Float load(const float* p) { return _mm512_load_ps(p); }
+inline Float loadu(const float* p) { return _mm512_loadu_ps(p); }
+inline void store(float* p, Float x) { _mm512_store_ps(p, x.v); }
+inline void store(int* p, Int x) { _mm512_store_si512(p, x.v); }
+inline Int load(const int* p) { return {_mm512_load_si512(p)}; }
+inline Int int_of(int x) { return {_mm512_set1_epi32(x)}; }
+inline Float operator+(Float a, Float b) { return _mm512_add_ps(a.v, b.v); }
+inline Float operator-(Float a, Float b) { return _mm512_sub_ps(a.v, b.v); }
+inline Float operator*(Float a, Float b) { return _mm512_mul_ps(a.v, b.v); }
+inline Float operator/(Float a, Float b) { return _mm512_div_ps(a.v, b.v); }
+inline Float operator-(Float a) {
+  return _mm512_castsi512_ps(
+      _mm512_xor_si512(_mm512_castps_si512(a.v), _mm512_set1_epi32(int(0x80000000u))));
+}
+inline Float fma(Float a, Float b, Float c) { return _mm512_fmadd_ps(a.v, b.v, c.v); }
+inline Float min(Float a, Float b) { return _mm512_min_ps(a.v, b.v); }
+inline Float max(Float a, Float b) { return _mm512_max_ps(a.v, b.v); }
+inline Float sqrt(Float a) { return _mm512_sqrt_ps(a.v); }
+inline Float abs(Float a) { return _mm512_abs_ps(a.v); }
+inline Mask operator<(Float a, Float b) { return {_mm512_cmp_ps_mask(a.v, b.v, _CMP_LT_OQ)}; }
+inline Mask operator<=(Float a, Float b) { return {_mm512_cmp_ps_mask(a.v, b.v, _CMP_LE_OQ)}; }
+inline Mask operator&(Mask a, Mask b) { return {static_cast<__mmask16>(a.m & b.m)}; }
+inline Mask operator|(Mask a, Mask b) { return {static_cast<__mmask16>(a.m | b.m)}; }
+inline Mask operator~(Mask a) { return {static_cast<__mmask16>(~a.m)}; }
+inline std::uint32_t bits(Mask a) { return a.m; }
+inline Mask mask_of(std::uint32_t b) { return {static_cast<__mmask16>(b)}; }
+inline Float select(Mask m, Float a, Float b) { return _mm512_mask_blend_ps(m.m, b.v, a.v); }
+inline Int select(Mask m, Int a, Int b) { return {_mm512_mask_blend_epi32(m.m, b.v, a.v)}; }
+inline Mask less(Int a, Int b) { return {_mm512_cmplt_epi32_mask(a.v, b.v)}; }
+inline Int operator+(Int a, Int b) { return {_mm512_add_epi32(a.v, b.v)}; }
+inline Int operator*(Int a, Int b) { return {_mm512_mullo_epi32(a.v, b.v)}; }
+inline Int truncate(Float a) { return {_mm512_cvttps_epi32(a.v)}; }
+inline Float to_float(Int a) { return _mm512_cvtepi32_ps(a.v); }
+inline Float floor(Float a) {
+  return _mm512_roundscale_ps(a.v, _MM_FROUND_TO_NEG_INF | _MM_FROUND_NO_EXC);
+}
+inline Float gather(const float* p, Int i) { return _mm512_i32gather_ps(i.v, p, 4); }
+
+#elif defined(__AVX2__)
+
+constexpr int kWidth = 8;
+
+struct Mask {
+  __m256 m;
+};
+struct Int {
+  __m256i v;
+};
+struct Float {
+  __m256 v;
+  Float() = default;
+  Float(__m256 x) : v(x) {}
+  Float(float x) : v(_mm256_set1_ps(x)) {}
+};
+
+inline Float load(const float* p) { return _mm256_load_ps(p); }
+inline Float loadu(const float* p) { return _mm256_loadu_ps(p); }
+inline void store(float* p, Float x) { _mm256_store_ps(p, x.v); }
+inline void store(int* p, Int x) { _mm256_store_si256(reinterpret_cast<__m256i*>(p), x.v); }
+inline Int load(const int* p) { return {_mm256_load_si256(reinterpret_cast<const __m256i*>(p))}; }
+inline Int int_of(int x) { return {_mm256_set1_epi32(x)}; }
+inline Float operator+(Float a, Float b) { return _mm256_add_ps(a.v, b.v); }
+inline Float operator-(Float a, Float b) { return _mm256_sub_ps(a.v, b.v); }
+inline Float operator*(Float a, Float b) { return _mm256_mul_ps(a.v, b.v); }
+inline Float operator/(Float a, Float b) { return _mm256_div_ps(a.v, b.v); }
+inline Float operator-(Float a) { return _mm256_xor_ps(a.v, _mm256_set1_ps(-0.0f)); }
+inline Float fma(Float a, Float b, Float c) { return _mm256_fmadd_ps(a.v, b.v, c.v); }
+inline Float min(Float a, Float b) { return _mm256_min_ps(a.v, b.v); }
+inline Float max(Float a, Float b) { return _mm256_max_ps(a.v, b.v); }
+inline Float sqrt(Float a) { return _mm256_sqrt_ps(a.v); }
+inline Float abs(Float a) { return _mm256_andnot_ps(_mm256_set1_ps(-0.0f), a.v); }
+inline Mask operator<(Float a, Float b) { return {_mm256_cmp_ps(a.v, b.v, _CMP_LT_OQ)}; }
+inline Mask operator<=(Float a, Float b) { return {_mm256_cmp_ps(a.v, b.v, _CMP_LE_OQ)}; }
+inline Mask operator&(Mask a, Mask b) { return {_mm256_and_ps(a.m, b.m)}; }
+inline Mask operator|(Mask a, Mask b) { return {_mm256_or_ps(a.m, b.m)}; }
+inline Mask operator~(Mask a) {
+  return {_mm256_xor_ps(a.m, _mm256_castsi256_ps(_mm256_set1_epi32(-1)))};
+}
+inline std::uint32_t bits(Mask a) { return static_cast<std::uint32_t>(_mm256_movemask_ps(a.m)); }
+inline Mask mask_of(std::uint32_t b) {
+  const __m256i lanes = _mm256_setr_epi32(1, 2, 4, 8, 16, 32, 64, 128);
+  const __m256i set = _mm256_and_si256(_mm256_set1_epi32(static_cast<int>(b)), lanes);
+  return {_mm256_castsi256_ps(_mm256_cmpeq_epi32(set, lanes))};
+}
+inline Float select(Mask m, Float a, Float b) { return _mm256_blendv_ps(b.v, a.v, m.m); }
+inline Int select(Mask m, Int a, Int b) {
+  return {_mm256_castps_si256(
+      _mm256_blendv_ps(_mm256_castsi256_ps(b.v), _mm256_castsi256_ps(a.v), m.m))};
+}
+inline Mask less(Int a, Int b) { return {_mm256_castsi256_ps(_mm256_cmpgt_epi32(b.v, a.v))}; }
+inline Int operator+(Int a, Int b) { return {_mm256_add_epi32(a.v, b.v)}; }
+inline Int operator*(Int a, Int b) { return {_mm256_mullo_epi32(a.v, b.v)}; }
+inline Int truncate(Float a) { return {_mm256_cvttps_epi32(a.v)}; }
+inline Float to_float(Int a) { return _mm256_cvtepi32_ps(a.v); }
+inline Float floor(Float a) { return _mm256_floor_ps(a.v); }
+inline Float gather(const float* p, Int i) { return _mm256_i32gather_ps(p, i.v, 4); }
+
+#else
+
+constexpr int kWidth = 4;
+typedef float Float4 __attribute__((vector_size(16)));
+typedef int Int4 __attribute__((vector_size(16)));
+
+struct Mask {
+  Int4 m;  // -1 or 0
+};
+struct Int {
+  Int4 v;
+};
+struct Float {
+  Float4 v;
+  Float() = default;
+  Float(Float4 x) : v(x) {}
+  Float(float x) : v(Float4{x, x, x, x}) {}
+};
+
+inline Float loadu(const float* p) {
+  Float4 x;
+  std::memcpy(&x, p, sizeof x);
+  return x;
+}
+inline Float load(const float* p) { return loadu(p); }
+inline void store(float* p, Float x) { std::memcpy(p, &x.v, sizeof x.v); }
+inline void store(int* p, Int x) { std::memcpy(p, &x.v, sizeof x.v); }
+inline Int load(const int* p) {
+  Int4 x;
+  std::memcpy(&x, p, sizeof x);
+  return {x};
+}
+inline Int int_of(int x) { return {Int4{x, x, x, x}}; }
+inline Float operator+(Float a, Float b) { return a.v + b.v; }
+inline Float operator-(Float a, Float b) { return a.v - b.v; }
+inline Float operator*(Float a, Float b) { return a.v * b.v; }
+inline Float operator/(Float a, Float b) { return a.v / b.v; }
+inline Float operator-(Float a) { return -a.v; }
+inline Float fma(Float a, Float b, Float c) { return a.v * b.v + c.v; }
+inline Float min(Float a, Float b) { return a.v < b.v ? a.v : b.v; }
+inline Float max(Float a, Float b) { return a.v > b.v ? a.v : b.v; }
+inline Float sqrt(Float a) {
+  return Float4{std::sqrt(a.v[0]), std::sqrt(a.v[1]), std::sqrt(a.v[2]), std::sqrt(a.v[3])};
+}
+inline Float abs(Float a) {
+  return reinterpret_cast<Float4>(reinterpret_cast<Int4>(a.v) & 0x7fffffff);
+}
+inline Mask operator<(Float a, Float b) { return {a.v < b.v}; }
+inline Mask operator<=(Float a, Float b) { return {a.v <= b.v}; }
+inline Mask operator&(Mask a, Mask b) { return {a.m & b.m}; }
+inline Mask operator|(Mask a, Mask b) { return {a.m | b.m}; }
+inline Mask operator~(Mask a) { return {~a.m}; }
+inline std::uint32_t bits(Mask a) {
+  return static_cast<std::uint32_t>((a.m[0] & 1) | (a.m[1] & 2) | (a.m[2] & 4) | (a.m[3] & 8));
+}
+inline Mask mask_of(std::uint32_t b) {
+  const int x = static_cast<int>(b);
+  return {Int4{-(x & 1), -(x >> 1 & 1), -(x >> 2 & 1), -(x >> 3 & 1)}};
+}
+inline Float select(Mask m, Float a, Float b) { return m.m ? a.v : b.v; }
+inline Int select(Mask m, Int a, Int b) { return {m.m ? a.v : b.v}; }
+inline Mask less(Int a, Int b) { return {a.v < b.v}; }
+inline Int operator+(Int a, Int b) { return {a.v + b.v}; }
+inline Int operator*(Int a, Int b) { return {a.v * b.v}; }
+inline Int truncate(Float a) { return {__builtin_convertvector(a.v, Int4)}; }
+inline Float to_float(Int a) { return __builtin_convertvector(a.v, Float4); }
+inline Float floor(Float a) {
+  return Float4{std::floor(a.v[0]), std::floor(a.v[1]), std::floor(a.v[2]), std::floor(a.v[3])};
+}
+inline Float gather(const float* p, Int i) {
+  return Float4{p[i.v[0]], p[i.v[1]], p[i.v[2]], p[i.v[3]]};
+}
+
+#endif
+
+inline bool any(Mask m) { return bits(m) != 0; }
+inline Mask operator>(Float a, Float b) { return b < a; }
+inline Mask operator>=(Float a, Float b) { return b <= a; }
+constexpr std::uint32_t kAllLanes = (1u << kWidth) - 1;
+
+struct Vec3 {
+  Float x, y, z;
+};
+inline Vec3 operator+(Vec3 a, Vec3 b) { return {a.x + b.x, a.y + b.y, a.z + b.z}; }
+inline Vec3 operator-(Vec3 a, Vec3 b) { return {a.x - b.x, a.y - b.y, a.z - b.z}; }
+inline Float dot(Vec3 a, Vec3 b) { return fma(a.x, b.x, fma(a.y, b.y, a.z * b.z)); }
+inline Vec3 along(Vec3 o, Float t, Vec3 d) {
+  return {fma(t, d.x, o.x), fma(t, d.y, o.y), fma(t, d.z, o.z)};
+}
+
+}  // namespace
+}  // namespace mjsense
