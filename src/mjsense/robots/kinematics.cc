@@ -1,0 +1,142 @@
+#include "mjsense/robots/kinematics.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <array>
+#include <limits>
+
+#include "mjsense/core/error.h"
+
+namespace mjsense {
+namespace {
+
+// Solves (J J^T + eps I) y = e for a [6, n] Jacobian, by Cholesky factorisation, and returns J^T y.
+void damped_step(std::span<const double> jacobian, int n, double eps, const double (&e)[6], std::span<double> dq) {
+  double a[6][6];
+  for (int i = 0; i < 6; ++i) {
+    for (int j = 0; j <= i; ++j) {
+      double s = i == j ? eps : 0.0;
+      for (int k = 0; k < n; ++k) s += jacobian[i * n + k] * jacobian[j * n + k];
+      a[i][j] = s;
+    }
+  }
+  double y[6];
+  for (int i = 0; i < 6; ++i) {
+    for (int j = 0; j <= i; ++j) {
+      double s = a[i][j];
+      for (int k = 0; k < j; ++k) s -= a[i][k] * a[j][k];
+      // At a singular configuration rounding may leave a pivot at or below zero.
+      a[i][j] = i == j ? std::sqrt(std::max(s, eps)) : s / a[j][j];
+    }
+    double s = e[i];
+    for (int k = 0; k < i; ++k) s -= a[i][k] * y[k];
+    y[i] = s / a[i][i];
+  }
+  for (int i = 5; i >= 0; --i) {
+    for (int k = i + 1; k < 6; ++k) y[i] -= a[k][i] * y[k];
+    y[i] /= a[i][i];
+  }
+  for (int k = 0; k < n; ++k) {
+    dq[k] = 0;
+    for (int i = 0; i < 6; ++i) dq[k] += jacobian[i * n + k] * y[i];
+  }
+}
+
+}  // namespace
+
+Chain::Chain(const mjModel* model, int base_body, int leaf_site, std::span<const int> moving) {
+  std::vector<int> path;
+  for (int b = model->site_bodyid[leaf_site]; b != base_body; b = model->body_parentid[b]) {
+    if (b == 0) {
+      throw ValueError(fmt::format("site '{}' is not on a body below '{}'", mj_id2name(model, mjOBJ_SITE, leaf_site),
+                                   mj_id2name(model, mjOBJ_BODY, base_body)));
+    }
+    path.push_back(b);
+  }
+  std::reverse(path.begin(), path.end());
+  Pose fixed;
+  for (int b : path) {
+    fixed = fixed * Pose{vec3(model->body_pos + 3 * b), quat(model->body_quat + 4 * b)};
+    for (int j = model->body_jntadr[b]; j < model->body_jntadr[b] + model->body_jntnum[b]; ++j) {
+      if (std::find(moving.begin(), moving.end(), j) == moving.end()) continue;
+      const int type = model->jnt_type[j];
+      if (type != mjJNT_HINGE && type != mjJNT_SLIDE) {
+        throw ValueError(fmt::format("joint '{}' of a kinematic chain must be a hinge or a slide",
+                                     mj_id2name(model, mjOBJ_JOINT, j)));
+      }
+      if (joints_.size() == kMaxJoints) throw ValueError(fmt::format("a kinematic chain has at most {} joints", kMaxJoints));
+      links_.push_back({fixed, vec3(model->jnt_axis + 3 * j), vec3(model->jnt_pos + 3 * j), type == mjJNT_SLIDE,
+                        model->qpos0[model->jnt_qposadr[j]]});
+      joints_.push_back(j);
+      const bool limited = model->jnt_limited[j];
+      low_.push_back(limited ? model->jnt_range[2 * j] : -std::numeric_limits<double>::infinity());
+      high_.push_back(limited ? model->jnt_range[2 * j + 1] : std::numeric_limits<double>::infinity());
+      fixed = Pose{};
+    }
+  }
+  tail_ = fixed * Pose{vec3(model->site_pos + 3 * leaf_site), quat(model->site_quat + 4 * leaf_site)};
+}
+
+Pose Chain::fk(std::span<const double> q) const {
+  Pose pose;
+  for (std::size_t i = 0; i < links_.size(); ++i) {
+    const Link& link = links_[i];
+    const double dq = q[i] - link.zero;
+    pose = pose * link.fixed;
+    if (link.slide) {
+      pose.p = pose * (dq * link.axis);
+    } else {
+      const Quat turn = axis_angle(link.axis, dq);
+      pose = pose * Pose{link.anchor - rotate(turn, link.anchor), turn};
+    }
+  }
+  return pose * tail_;
+}
+
+Pose Chain::jacobian(std::span<const double> q, std::span<double> jacobian) const {
+  const std::size_t n = links_.size();
+  std::array<Vec3, kMaxJoints> axes, anchors;
+  Pose pose;
+  for (std::size_t i = 0; i < n; ++i) {
+    const Link& link = links_[i];
+    const double dq = q[i] - link.zero;
+    pose = pose * link.fixed;
+    axes[i] = rotate(pose.q, link.axis);
+    anchors[i] = pose * link.anchor;
+    if (link.slide) {
+      pose.p = pose * (dq * link.axis);
+    } else {
+      const Quat turn = axis_angle(link.axis, dq);
+      pose = pose * Pose{link.anchor - rotate(turn, link.anchor), turn};
+    }
+  }
+  const Pose leaf = pose * tail_;
+  for (std::size_t i = 0; i < n; ++i) {
+    const Vec3 v = links_[i].slide ? axes[i] : cross(axes[i], leaf.p - anchors[i]);
+    const Vec3 w = links_[i].slide ? Vec3{} : axes[i];
+    for (int k = 0; k < 3; ++k) {
+      jacobian[k * n + i] = v[k];
+      jacobian[(3 + k) * n + i] = w[k];
+    }
+  }
+  return leaf;
+}
+
+bool Chain::ik(const Pose& target, std::span<double> q, int max_iterations, double tolerance) const {
+  const int n = static_cast<int>(links_.size());
+  std::array<double, 6 * kMaxJoints> jac;
+  std::array<double, kMaxJoints> dq;
+  for (int iteration = 0; iteration < max_iterations; ++iteration) {
+    const Pose leaf = jacobian(q, {jac.data(), static_cast<std::size_t>(6 * n)});
+    const Twist body = log6(inverse(leaf) * target);
+    if (norm(body) < tolerance) return true;
+    const Vec3 v = rotate(leaf.q, body.v), w = rotate(leaf.q, body.w);
+    const double e[6] = {v.x, v.y, v.z, w.x, w.y, w.z};
+    damped_step({jac.data(), static_cast<std::size_t>(6 * n)}, n, 1e-12, e, {dq.data(), static_cast<std::size_t>(n)});
+    for (int k = 0; k < n; ++k) q[k] = std::clamp(q[k] + dq[k], low_[k], high_[k]);
+  }
+  return false;
+}
+
+}  // namespace mjsense

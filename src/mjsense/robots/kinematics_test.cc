@@ -1,0 +1,99 @@
+#include "mjsense/robots/kinematics.h"
+
+#include <gtest/gtest.h>
+
+#include <memory>
+#include <string>
+
+#include "mjsense/core/embedded.h"
+#include "mjsense/core/rng.h"
+
+namespace mjsense {
+namespace {
+
+struct Fr3 : testing::Test {
+  void SetUp() override {
+    const std::string xml(embedded_file("franka/fr3.xml"));
+    char error[500] = "";
+    mjSpec* spec = mj_parseXMLString(xml.c_str(), nullptr, error, sizeof(error));
+    ASSERT_TRUE(spec) << error;
+    model = mj_compile(spec, nullptr);
+    ASSERT_TRUE(model) << mjs_getError(spec);
+    mj_deleteSpec(spec);
+    data = mj_makeData(model);
+    for (int i = 1; i <= 7; ++i) {
+      joints.push_back(mj_name2id(model, mjOBJ_JOINT, ("fr3_joint" + std::to_string(i)).c_str()));
+    }
+    base = mj_name2id(model, mjOBJ_BODY, "base");
+    site = mj_name2id(model, mjOBJ_SITE, "gripper/grasp_site");
+    chain = std::make_unique<Chain>(model, base, site, joints);
+  }
+  void TearDown() override {
+    mj_deleteData(data);
+    mj_deleteModel(model);
+  }
+  std::array<double, 7> random_configuration(Rng& rng) const {
+    std::array<double, 7> q;
+    for (int i = 0; i < 7; ++i) q[i] = rng.uniform(chain->low()[i], chain->high()[i]);
+    return q;
+  }
+
+  mjModel* model = nullptr;
+  mjData* data = nullptr;
+  std::vector<int> joints;
+  int base = -1, site = -1;
+  std::unique_ptr<Chain> chain;
+};
+
+TEST_F(Fr3, ForwardKinematicsAndJacobianAreMuJoCos) {
+  Rng rng(1, 0, 0, 0);
+  std::array<double, 6 * 7> jac;
+  std::vector<double> jacp(3 * model->nv), jacr(3 * model->nv);
+  for (int trial = 0; trial < 200; ++trial) {
+    const auto q = random_configuration(rng);
+    for (int i = 0; i < 7; ++i) data->qpos[model->jnt_qposadr[joints[i]]] = q[i];
+    mj_kinematics(model, data);
+    mj_comPos(model, data);
+    const Pose expected = pose_from_mat(data->site_xpos + 3 * site, data->site_xmat + 9 * site);
+    const Pose leaf = chain->jacobian(q, jac);
+    EXPECT_LT(norm(leaf.p - expected.p), 1e-12);
+    EXPECT_LT(angle_between(leaf.q, expected.q), 1e-7);
+    EXPECT_LT(norm(chain->fk(q).p - leaf.p), 1e-14);
+    mj_jacSite(model, data, jacp.data(), jacr.data(), site);
+    for (int i = 0; i < 7; ++i) {
+      const int dof = model->jnt_dofadr[joints[i]];
+      for (int k = 0; k < 3; ++k) {
+        EXPECT_NEAR(jac[k * 7 + i], jacp[k * model->nv + dof], 1e-10);
+        EXPECT_NEAR(jac[(3 + k) * 7 + i], jacr[k * model->nv + dof], 1e-10);
+      }
+    }
+  }
+}
+
+TEST_F(Fr3, InverseKinematicsConvergesOnReachablePoses) {
+  Rng rng(2, 0, 0, 0);
+  int solved = 0;
+  const int trials = 1000;
+  for (int trial = 0; trial < trials; ++trial) {
+    const Pose target = chain->fk(random_configuration(rng));
+    std::array<double, 7> q{0, -0.7853, 0, -2.35619, 0, 1.57079, 0};
+    if (!chain->ik(target, q)) continue;
+    const Twist error = log6(inverse(chain->fk(q)) * target);
+    EXPECT_LT(norm(error), 1e-4);
+    for (int i = 0; i < 7; ++i) {
+      EXPECT_GE(q[i], chain->low()[i]);
+      EXPECT_LE(q[i], chain->high()[i]);
+    }
+    ++solved;
+  }
+  RecordProperty("solved", solved);
+  EXPECT_GE(solved, 990) << "of " << trials;
+}
+
+TEST_F(Fr3, InverseKinematicsGivesUpOutOfReach) {
+  std::array<double, 7> q{0, -0.7853, 0, -2.35619, 0, 1.57079, 0};
+  EXPECT_FALSE(chain->ik({{2.0, 0, 0.5}, {}}, q));
+}
+
+}  // namespace
+}  // namespace mjsense
