@@ -5,14 +5,20 @@
 #include <algorithm>
 #include <array>
 #include <limits>
+#include <numbers>
 
 #include "mjsense/core/error.h"
 
 namespace mjsense {
 namespace {
 
+// Iterations from the caller's configuration, then from each new one. A solution is usually found
+// within 10.
+constexpr int kFirstAttempt = 100, kAttempt = 30;
+
 // Solves (J J^T + eps I) y = e for a [6, n] Jacobian, by Cholesky factorisation, and returns J^T y.
-void damped_step(std::span<const double> jacobian, int n, double eps, const double (&e)[6], std::span<double> dq) {
+void damped_step(std::span<const double> jacobian, int n, double eps, const double (&e)[6],
+                 std::span<double> dq) {
   double a[6][6];
   for (int i = 0; i < 6; ++i) {
     for (int j = 0; j <= i; ++j) {
@@ -49,7 +55,8 @@ Chain::Chain(const mjModel* model, int base_body, int leaf_site, std::span<const
   std::vector<int> path;
   for (int b = model->site_bodyid[leaf_site]; b != base_body; b = model->body_parentid[b]) {
     if (b == 0) {
-      throw ValueError(fmt::format("site '{}' is not on a body below '{}'", mj_id2name(model, mjOBJ_SITE, leaf_site),
+      throw ValueError(fmt::format("site '{}' is not on a body below '{}'",
+                                   mj_id2name(model, mjOBJ_SITE, leaf_site),
                                    mj_id2name(model, mjOBJ_BODY, base_body)));
     }
     path.push_back(b);
@@ -65,17 +72,20 @@ Chain::Chain(const mjModel* model, int base_body, int leaf_site, std::span<const
         throw ValueError(fmt::format("joint '{}' of a kinematic chain must be a hinge or a slide",
                                      mj_id2name(model, mjOBJ_JOINT, j)));
       }
-      if (joints_.size() == kMaxJoints) throw ValueError(fmt::format("a kinematic chain has at most {} joints", kMaxJoints));
-      links_.push_back({fixed, vec3(model->jnt_axis + 3 * j), vec3(model->jnt_pos + 3 * j), type == mjJNT_SLIDE,
-                        model->qpos0[model->jnt_qposadr[j]]});
+      if (joints_.size() == kMaxJoints)
+        throw ValueError(fmt::format("a kinematic chain has at most {} joints", kMaxJoints));
+      links_.push_back({fixed, vec3(model->jnt_axis + 3 * j), vec3(model->jnt_pos + 3 * j),
+                        type == mjJNT_SLIDE, model->qpos0[model->jnt_qposadr[j]]});
       joints_.push_back(j);
       const bool limited = model->jnt_limited[j];
       low_.push_back(limited ? model->jnt_range[2 * j] : -std::numeric_limits<double>::infinity());
-      high_.push_back(limited ? model->jnt_range[2 * j + 1] : std::numeric_limits<double>::infinity());
+      high_.push_back(limited ? model->jnt_range[2 * j + 1]
+                              : std::numeric_limits<double>::infinity());
       fixed = Pose{};
     }
   }
-  tail_ = fixed * Pose{vec3(model->site_pos + 3 * leaf_site), quat(model->site_quat + 4 * leaf_site)};
+  tail_ =
+      fixed * Pose{vec3(model->site_pos + 3 * leaf_site), quat(model->site_quat + 4 * leaf_site)};
 }
 
 Pose Chain::fk(std::span<const double> q) const {
@@ -123,17 +133,38 @@ Pose Chain::jacobian(std::span<const double> q, std::span<double> jacobian) cons
   return leaf;
 }
 
-bool Chain::ik(const Pose& target, std::span<double> q, int max_iterations, double tolerance) const {
+// Additive recurrence: the fractional parts of k * alpha_i, alpha_i powers of the generalised
+// golden ratio, fill the box of joint ranges evenly whatever their number.
+void Chain::restart(int k, std::span<double> q) const {
+  const int n = static_cast<int>(links_.size());
+  double phi = 1.5;  // the root of x^(n+1) = x + 1
+  for (int i = 0; i < 30; ++i) phi = std::pow(1.0 + phi, 1.0 / (n + 1));
+  double alpha = 1.0;
+  for (int i = 0; i < n; ++i) {
+    alpha /= phi;
+    const double u = std::fmod(0.5 + k * alpha, 1.0);
+    const double low = std::max(low_[i], -std::numbers::pi),
+                 high = std::min(high_[i], std::numbers::pi);
+    q[i] = low < high ? low + u * (high - low) : low_[i];
+  }
+}
+
+bool Chain::ik(const Pose& target, std::span<double> q, int max_iterations,
+               double tolerance) const {
   const int n = static_cast<int>(links_.size());
   std::array<double, 6 * kMaxJoints> jac;
   std::array<double, kMaxJoints> dq;
+  int restarts = 0;
   for (int iteration = 0; iteration < max_iterations; ++iteration) {
+    if (iteration >= kFirstAttempt && (iteration - kFirstAttempt) % kAttempt == 0)
+      restart(++restarts, q);
     const Pose leaf = jacobian(q, {jac.data(), static_cast<std::size_t>(6 * n)});
     const Twist body = log6(inverse(leaf) * target);
     if (norm(body) < tolerance) return true;
     const Vec3 v = rotate(leaf.q, body.v), w = rotate(leaf.q, body.w);
     const double e[6] = {v.x, v.y, v.z, w.x, w.y, w.z};
-    damped_step({jac.data(), static_cast<std::size_t>(6 * n)}, n, 1e-12, e, {dq.data(), static_cast<std::size_t>(n)});
+    damped_step({jac.data(), static_cast<std::size_t>(6 * n)}, n, 1e-12, e,
+                {dq.data(), static_cast<std::size_t>(n)});
     for (int k = 0; k < n; ++k) q[k] = std::clamp(q[k] + dq[k], low_[k], high_[k]);
   }
   return false;

@@ -32,15 +32,18 @@ class Chain {
   // Moves q (in: the start, out: the solution) until the leaf is at `target` (base frame): dq = J^T
   // (J J^T + 1e-12 I)^-1 e with e = log6(T^-1 T*) in base axes, clipped to the joint ranges in
   // every iteration. True if |e| < tolerance within max_iterations; q is otherwise the last
-  // iterate.
+  // iterate. The first 100 iterations start at q, so that a solution near q is found where there is
+  // one; if they end in a corner of the ranges, the others start at configurations spread over
+  // them.
   bool ik(const Pose& target, std::span<double> q, int max_iterations = 1000,
           double tolerance = 1e-4) const;
 
  private:
+  void restart(int k, std::span<double> q) const;
+
   struct Link {
-    Pose fixed;  // from the previous link's moved frame
-    Vec3 axis;   // of the joint, in that frame after `fixed`
-    Vec3 anchor;
+    Pose fixed;         // from the previous link's moved frame
+    Vec3 axis, anchor;  // of the joint, in the frame after `fixed`
     bool slide = false;
     double zero = 0;  // qpos0
   };
