@@ -14,6 +14,11 @@ struct Vec3 {
 };
 
 inline Vec3 vec3(const double* p) { return {p[0], p[1], p[2]}; }
+inline void write_vec(Vec3 v, double* out) {
+  out[0] = v.x;
+  out[1] = v.y;
+  out[2] = v.z;
+}
 inline Vec3 operator+(Vec3 a, Vec3 b) { return {a.x + b.x, a.y + b.y, a.z + b.z}; }
 inline Vec3 operator-(Vec3 a, Vec3 b) { return {a.x - b.x, a.y - b.y, a.z - b.z}; }
 inline Vec3 operator-(Vec3 a) { return {-a.x, -a.y, -a.z}; }
@@ -30,6 +35,12 @@ struct Quat {
 };
 
 inline Quat quat(const double* q) { return {q[0], q[1], q[2], q[3]}; }
+inline void write_quat(Quat q, double* out) {
+  out[0] = q.w;
+  out[1] = q.x;
+  out[2] = q.y;
+  out[3] = q.z;
+}
 inline Quat operator*(Quat a, Quat b) {
   return {
       a.w * b.w - a.x * b.x - a.y * b.y - a.z * b.z, a.w * b.x + a.x * b.w + a.y * b.z - a.z * b.y,

@@ -7,7 +7,9 @@
 namespace mjsense {
 namespace {
 
-Vec3 random_vector(Rng& rng, double scale) { return {scale * rng.normal(), scale * rng.normal(), scale * rng.normal()}; }
+Vec3 random_vector(Rng& rng, double scale) {
+  return {scale * rng.normal(), scale * rng.normal(), scale * rng.normal()};
+}
 
 TEST(Pose, LogIsTheInverseOfExp) {
   Rng rng(3, 0, 0, 0);
@@ -18,7 +20,8 @@ TEST(Pose, LogIsTheInverseOfExp) {
     if (i % 10 == 0) w = 1e-7 * w;
     const Twist twist{random_vector(rng, 0.5), w};
     const Twist back = log6(exp6(twist));
-    // Below 1e-6 rad the linear part is the translation itself, off by at most half the angle times its length.
+    // Below 1e-6 rad the linear part is the translation itself, off by at most half the angle times
+    // its length.
     EXPECT_LT(norm(back.v - twist.v), 1e-6) << i;
     EXPECT_LT(norm(back.w - twist.w), 1e-9) << i;
   }
@@ -36,8 +39,10 @@ TEST(Pose, ScrewAboutAnOffsetAxis) {
 TEST(Pose, MatrixToQuaternion) {
   Rng rng(4, 0, 0, 0);
   for (int i = 0; i < 1000; ++i) {
-    const Quat q = normalized(Quat{rng.normal(), rng.normal(), rng.normal(), i % 3 == 0 ? 0.0 : rng.normal()});
-    const Quat back = quat_from_columns(rotate(q, {1, 0, 0}), rotate(q, {0, 1, 0}), rotate(q, {0, 0, 1}));
+    const Quat q =
+        normalized(Quat{rng.normal(), rng.normal(), rng.normal(), i % 3 == 0 ? 0.0 : rng.normal()});
+    const Quat back =
+        quat_from_columns(rotate(q, {1, 0, 0}), rotate(q, {0, 1, 0}), rotate(q, {0, 0, 1}));
     EXPECT_LT(angle_between(q, back), 1e-7);
   }
 }
@@ -45,7 +50,8 @@ TEST(Pose, MatrixToQuaternion) {
 TEST(Pose, GroupLaws) {
   Rng rng(5, 0, 0, 0);
   for (int i = 0; i < 100; ++i) {
-    const Pose a{random_vector(rng, 1), exp3(random_vector(rng, 1))}, b{random_vector(rng, 1), exp3(random_vector(rng, 1))};
+    const Pose a{random_vector(rng, 1), exp3(random_vector(rng, 1))},
+        b{random_vector(rng, 1), exp3(random_vector(rng, 1))};
     const Vec3 p = random_vector(rng, 1);
     EXPECT_LT(norm((a * b) * p - a * (b * p)), 1e-12);
     EXPECT_LT(norm((inverse(a) * a) * p - p), 1e-12);

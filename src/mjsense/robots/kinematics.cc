@@ -14,6 +14,7 @@ namespace {
 
 // Iterations from the caller's configuration, then from each new one. A solution is usually found
 // within 10.
+constexpr double kDamping = 1e-12;
 constexpr int kFirstAttempt = 100, kAttempt = 30;
 
 // Solves (J J^T + eps I) y = e for a [6, n] Jacobian, by Cholesky factorisation, and returns J^T y.
@@ -133,6 +134,15 @@ Pose Chain::jacobian(std::span<const double> q, std::span<double> jacobian) cons
   return leaf;
 }
 
+void Chain::joint_motion(std::span<const double> q, const Twist& twist,
+                         std::span<double> dq) const {
+  std::array<double, 6 * kMaxJoints> storage;
+  const std::span<double> jac(storage.data(), 6 * links_.size());
+  jacobian(q, jac);
+  const double e[6] = {twist.v.x, twist.v.y, twist.v.z, twist.w.x, twist.w.y, twist.w.z};
+  damped_step(jac, static_cast<int>(links_.size()), kDamping, e, dq);
+}
+
 // Additive recurrence: the fractional parts of k * alpha_i, alpha_i powers of the generalised
 // golden ratio, fill the box of joint ranges evenly whatever their number.
 void Chain::restart(int k, std::span<double> q) const {
@@ -163,7 +173,7 @@ bool Chain::ik(const Pose& target, std::span<double> q, int max_iterations,
     if (norm(body) < tolerance) return true;
     const Vec3 v = rotate(leaf.q, body.v), w = rotate(leaf.q, body.w);
     const double e[6] = {v.x, v.y, v.z, w.x, w.y, w.z};
-    damped_step({jac.data(), static_cast<std::size_t>(6 * n)}, n, 1e-12, e,
+    damped_step({jac.data(), static_cast<std::size_t>(6 * n)}, n, kDamping, e,
                 {dq.data(), static_cast<std::size_t>(n)});
     for (int k = 0; k < n; ++k) q[k] = std::clamp(q[k] + dq[k], low_[k], high_[k]);
   }

@@ -29,6 +29,10 @@ class Chain {
   // axes, at the leaf.
   Pose jacobian(std::span<const double> q, std::span<double> jacobian) const;
 
+  // The smallest joint motion dq that moves the leaf by `twist` (base axes, at the leaf): J^+
+  // twist.
+  void joint_motion(std::span<const double> q, const Twist& twist, std::span<double> dq) const;
+
   // Moves q (in: the start, out: the solution) until the leaf is at `target` (base frame): dq = J^T
   // (J J^T + 1e-12 I)^-1 e with e = log6(T^-1 T*) in base axes, clipped to the joint ranges in
   // every iteration. True if |e| < tolerance within max_iterations; q is otherwise the last

@@ -101,7 +101,7 @@ class Robot {
   std::vector<std::vector<std::pair<int, int>>>
       source_;  // per group, per chain joint: (group, index)
   int arm_ = -1, gripper_ = -1, base_body_ = -1, base_mocap_ = -1;
-  std::vector<RobotValues> targets_, held_;  // [B]
+  std::vector<RobotValues> targets_;  // [B]; `given` false: the group holds
 };
 
 }  // namespace mjsense
