@@ -46,7 +46,8 @@ struct World {
       0;  // physics steps since the last seeding; never goes back at a reset: the RNG's step
   std::int64_t episode = 0;  // resets of this world since the last seeding
   std::uint64_t seed = 0;
-  bool first = false;  // no step was taken since the reset
+  bool first = false;     // no step was taken since the reset
+  std::uint32_t key = 0;  // whose random numbers these are: the world's id, or its episode's number
   // Changes whenever the derived fields of `data` may have: a physics step, forward, reset. What
   // was taken from them at an equal moment of the same world may be reused. 0: not known.
   std::uint64_t moment = 0;
@@ -56,7 +57,7 @@ struct World {
   double time() const { return static_cast<double>(substep) * model->opt.timestep; }
   // Numbers for this moment: the same at any thread count and any B.
   Rng rng(std::uint32_t stream) const {
-    return {seed, static_cast<std::uint32_t>(id), stream, static_cast<std::uint64_t>(tick)};
+    return {seed, key, stream, static_cast<std::uint64_t>(tick)};
   }
 };
 

@@ -3,6 +3,8 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <chrono>
+#include <numeric>
 
 #include "mjsense/core/error.h"
 #if __has_include("mjsense/rays/ray_scene.h")
@@ -19,6 +21,11 @@ class RayScene {
 
 namespace mjsense {
 namespace {
+
+// Seconds since `start`.
+double since(std::chrono::steady_clock::time_point start) {
+  return std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+}
 
 // Runs `body` for a sensor; an error that does not say which sensor failed gets its name.
 template <class Body>
@@ -46,6 +53,8 @@ struct Simulation::Slot {
   Sensor* sensor;
   std::vector<Slot*> inputs;
   std::vector<std::int64_t> computed;  // by world: version_ to which the row belongs
+  std::vector<double> compute_s;       // by world
+  double cast_s = 0;
   int phase = 0;        // passes that must come before: 1 + that of an input which casts
   bool casts = false;   // stage kCast or kBatch: finished by cast()
   bool read = false;    // since the last step
@@ -119,7 +128,9 @@ class Simulation::Hooks final : public WorldHooks {
     }
     for (Slot* slot : slots_) {
       if (slot->phase != phase_ || slot->computed[world.id] == version) continue;
+      const auto start = std::chrono::steady_clock::now();
       guarded(*slot->sensor, [&] { slot->sensor->compute(world); });
+      slot->compute_s[world.id] += since(start);
       if (!slot->casts) slot->computed[world.id] = version;
     }
   }
@@ -162,6 +173,7 @@ void Simulation::initialize(Sensor& sensor) {
   auto slot = std::make_unique<Slot>();
   slot->sensor = &sensor;
   slot->computed.assign(cfg_.num_worlds, 0);
+  slot->compute_s.assign(cfg_.num_worlds, 0.0);
   slot->casts = sensor.stage() == Stage::kCast || sensor.stage() == Stage::kBatch;
   if (sensor.stage() == Stage::kPostCast) slot->phase = 1;
   for (const Sensor* input : sensor.inputs()) {
@@ -179,7 +191,7 @@ void Simulation::add(std::shared_ptr<Sensor> sensor) {
   added_.push_back(std::move(sensor));
 }
 
-Simulation::Slot& Simulation::slot_of(const Sensor& sensor) {
+Simulation::Slot& Simulation::slot_of(const Sensor& sensor) const {
   for (auto& slot : slots_) {
     if (slot->sensor == &sensor) return *slot;
   }
@@ -222,7 +234,7 @@ void Simulation::compute(std::span<Slot* const> slots, std::span<const int> ids,
     } else {
       switch (change) {
         case Change::kStep:
-          worlds_->step(cfg_.decimation, hooks);
+          worlds_->step(cfg_.decimation, hooks, ids);
           break;
         case Change::kForward:
           worlds_->forward(ids, hooks);
@@ -250,13 +262,15 @@ void Simulation::cast(std::span<Slot* const> slots, std::span<const int> ids, in
         if (slot->computed[w] != version_[w]) due->ids.push_back(w);
       }
       if (due->ids.empty()) continue;
+      const auto start = std::chrono::steady_clock::now();
       guarded(*slot->sensor, [&] { slot->sensor->cast({rays_.get(), due->ids, *pool_}); });
+      slot->cast_s += since(start);
       for (int w : due->ids) slot->computed[w] = version_[w];
     }
   }
 }
 
-void Simulation::step(int control_steps) {
+void Simulation::step(int control_steps, std::span<const int> ids) {
   if (control_steps < 1) throw ValueError(fmt::format("step({}): at least 1", control_steps));
   for (int k = 0; k < control_steps; ++k) {
     const bool last = k + 1 == control_steps;
@@ -266,15 +280,15 @@ void Simulation::step(int control_steps) {
       if (last) s.read = false;
       return wanted;
     });
-    mark_stale({});
-    compute(due->slots, {}, Change::kStep);
+    mark_stale(ids);
+    compute(due->slots, ids, Change::kStep);
   }
 }
 
 void Simulation::reset(std::span<const int> ids, int key) {
   const std::vector<int> sorted = worlds_->checked_ids(ids);
   Borrowed due(*this);
-  collect(due->slots, [](Slot& s) { return s.sensor->eager() || s.read; });
+  collect(due->slots, [](Slot& s) { return s.sensor->eager(); });
   mark_stale(sorted);
   compute(due->slots, sorted, Change::kReset, key);
 }
@@ -282,7 +296,7 @@ void Simulation::reset(std::span<const int> ids, int key) {
 void Simulation::forward(std::span<const int> ids) {
   const std::vector<int> sorted = worlds_->checked_ids(ids);
   Borrowed due(*this);
-  collect(due->slots, [](Slot& s) { return s.sensor->eager() || s.read; });
+  collect(due->slots, [](Slot& s) { return s.sensor->eager(); });
   mark_stale(sorted);
   compute(due->slots, sorted, Change::kForward);
 }
@@ -303,6 +317,11 @@ void Simulation::reset_sensors(std::span<const int> ids) {
   Hooks hooks(*this, Hooks::Only::kReset);
   mark_stale(sorted);
   worlds_->visit(sorted, hooks);
+}
+
+Simulation::Cost Simulation::cost(const Sensor& sensor) const {
+  const Slot& slot = slot_of(sensor);
+  return {std::accumulate(slot.compute_s.begin(), slot.compute_s.end(), 0.0), slot.cast_s};
 }
 
 void Simulation::invalidate(std::span<const int> ids) { mark_stale(worlds_->checked_ids(ids)); }

@@ -41,7 +41,8 @@ class Simulation {
   int decimation() const { return cfg_.decimation; }
   double step_dt() const { return cfg_.decimation * model()->opt.timestep; }  // s, one control step
 
-  void step(int control_steps = 1);
+  // Empty ids: all worlds; the others stand still.
+  void step(int control_steps = 1, std::span<const int> ids = {});
   // Empty ids: all worlds. key: keyframe, -1 the model's defaults.
   void reset(std::span<const int> ids = {}, int key = -1);
   // Random numbers start again from this seed; reset() usually follows.
@@ -69,6 +70,13 @@ class Simulation {
   // State was changed in a way that only the caller knows.
   void invalidate(std::span<const int> ids = {});
 
+  // Time that a sensor has taken so far.
+  struct Cost {
+    double compute = 0;  // s of processor time, all worlds together
+    double cast = 0;     // s of wall time
+  };
+  Cost cost(const Sensor& sensor) const;
+
   // Worlds that failed in the last step, reset or forward; they were reset alone.
   const std::vector<Failure>& failures() const { return worlds_->failures(); }
   RayScene& rays();  // made when first needed
@@ -79,7 +87,7 @@ class Simulation {
   enum class Change { kStep, kForward, kReset, kNone };
 
   void initialize(Sensor& sensor);
-  Slot& slot_of(const Sensor& sensor);
+  Slot& slot_of(const Sensor& sensor) const;
   // Makes `change` happen and `slots` (each after its inputs) current in the worlds `ids` (empty:
   // all).
   void compute(std::span<Slot* const> slots, std::span<const int> ids, Change change, int key = -1);

@@ -117,6 +117,34 @@ TEST(Simulation, PartialResetRefreshesExactlyThoseWorlds) {
   EXPECT_EQ(h->row(1), before);
 }
 
+// Episodes start with a reset, state that is written, a forward: only then is there something to
+// measure.
+TEST(Simulation, ResetAndForwardComputeWhenReadNotBefore) {
+  Simulation sim(scene(), {.num_worlds = 2});
+  auto h = add(sim, "h");
+  sim.refresh(*h);
+  sim.reset();
+  sim.forward();
+  EXPECT_THAT(h->computes, Each(1));
+  sim.refresh(*h);
+  EXPECT_THAT(h->computes, Each(2));
+}
+
+TEST(Simulation, StepsSomeWorldsAlone) {
+  Simulation sim(scene(), {.num_worlds = 3});
+  auto h = add(sim, "h");
+  sim.refresh(*h);
+  const int ids[] = {0, 2};
+  sim.step(20, ids);
+  sim.refresh(*h);
+  EXPECT_THAT(h->computes, ElementsAre(2, 1, 2));
+  EXPECT_LT(h->row(0), 1.0f);
+  EXPECT_FLOAT_EQ(h->row(1), 1.0f);
+  EXPECT_EQ(h->row(0), h->row(2));
+  EXPECT_EQ(sim.worlds().substeps(1), 0);
+  EXPECT_GT(sim.cost(*h).compute, 0.0);
+}
+
 TEST(Simulation, EagerSensorsAndTheirInputsRunEveryControlStep) {
   Simulation sim(scene(), {.num_worlds = 2, .decimation = 3});
   auto in = add(sim, "in");
@@ -144,6 +172,7 @@ TEST(Simulation, CastsAfterComputingAndFiltersAfterCasts) {
   EXPECT_EQ(camera->casts, 1);
   const int ids[] = {1};
   sim.reset(ids);
+  sim.refresh(*points);
   EXPECT_THAT(camera->cast_ids, ElementsAre(1));
 }
 

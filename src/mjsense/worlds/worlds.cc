@@ -15,7 +15,8 @@
 namespace mjsense {
 namespace {
 
-// MuJoCo's pool is not instrumented: these tell the thread sanitiser what its atomics order. Nothing in other builds.
+// MuJoCo's pool is not instrumented: these tell the thread sanitiser what its atomics order.
+// Nothing in other builds.
 void orders_before([[maybe_unused]] void* event) {
 #ifdef __SANITIZE_THREAD__
   __tsan_release(event);
@@ -93,6 +94,7 @@ Worlds::Worlds(const mjModel* model, int num_worlds, int threads) : num_worlds_(
   if (!batch_) throw RuntimeError(fmt::format("cannot make {} worlds: {}", num_worlds, error));
   num_state_ = static_cast<std::size_t>(mjb_nstate(batch_));
   clocks_.resize(num_worlds);
+  seed(0);
   reset_key_.assign(num_worlds, -1);
   remembered_.resize(num_worlds * num_state_);
   derived_version_.assign(num_worlds, -1);
@@ -114,7 +116,13 @@ const mjModel* Worlds::model() const { return mjb_model(batch_); }
 
 void Worlds::seed(std::uint64_t seed) {
   seed_ = seed;
-  for (Clock& c : clocks_) c.tick = c.episode = 0;
+  for (int w = 0; w < num_worlds_; ++w) rekey(w, static_cast<std::uint32_t>(w));
+}
+
+void Worlds::rekey(int world, std::uint32_t key) {
+  Clock& clock = clocks_[world];
+  clock.tick = clock.episode = 0;
+  clock.key = key;
 }
 
 double Worlds::time(int world) const {
@@ -155,9 +163,9 @@ ArrayView Worlds::state_component(std::string_view name) {
   throw_unknown("simulation", "state component", name, names);
 }
 
-void Worlds::step(int substeps, WorldHooks& hooks) {
+void Worlds::step(int substeps, WorldHooks& hooks, std::span<const int> ids) {
   if (substeps < 1) throw ValueError(fmt::format("substeps is {}: must be at least 1", substeps));
-  apply({}, {this, Op::kStep, substeps, -1, &hooks}, true);
+  apply(ids, {this, Op::kStep, substeps, -1, &hooks}, true);
 }
 
 void Worlds::forward(std::span<const int> ids, WorldHooks& hooks) {
@@ -183,7 +191,7 @@ void Worlds::visit(std::span<const int> ids, WorldHooks& hooks) {
 
 World Worlds::view(const mjModel* m, mjData* d, int w) const {
   const Clock& c = clocks_[w];
-  return {w, m, d, c.substep, c.tick, c.episode, seed_, c.substep == 0, c.moment};
+  return {w, m, d, c.substep, c.tick, c.episode, seed_, c.substep == 0, c.key, c.moment};
 }
 
 // True if the position and velocity stages in mjData belong to the state row as it is now.

@@ -52,9 +52,12 @@ class Worlds {
   // A new seed starts ticks and episodes again at 0 (of all worlds).
   void seed(std::uint64_t seed);
   std::uint64_t seed() const { return seed_; }
+  // From here on this world draws as world `key` would, ticks and episodes from 0: an episode that
+  // always takes the same key draws the same numbers in whatever world it runs.
+  void rekey(int world, std::uint32_t key);
 
   // Empty ids: every world. Ids are checked (range, duplicates) and may come in any order.
-  void step(int substeps, WorldHooks& hooks);
+  void step(int substeps, WorldHooks& hooks, std::span<const int> ids = {});
   void forward(std::span<const int> ids, WorldHooks& hooks);
   // key: keyframe, -1 the model's defaults.
   void reset(std::span<const int> ids, int key, WorldHooks& hooks);
@@ -83,6 +86,7 @@ class Worlds {
  private:
   struct Clock {
     std::int64_t substep = 0, tick = 0, episode = 0;
+    std::uint32_t key = 0;
     std::uint64_t moment = 0;
   };
   enum class Op { kStep, kForward, kReset, kStepRaw, kVisit };
