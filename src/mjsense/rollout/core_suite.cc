@@ -1,0 +1,112 @@
+#include "mjsense/rollout/core_suite.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+
+#include "mjsense/observe/camera_parameters.h"
+#include "mjsense/observe/env_states.h"
+#include "mjsense/observe/function_sensor.h"
+#include "mjsense/observe/image_points.h"
+#include "mjsense/observe/joint_state.h"
+#include "mjsense/observe/pose_sensor.h"
+#include "mjsense/observe/shared_field.h"
+#include "mjsense/policies/policy.h"
+#include "mjsense/rollout/action_sensors.h"
+
+namespace mjsense {
+namespace {
+
+constexpr int kTaskInfoLength = 4000;
+
+std::vector<JointGroup> joint_groups(const Robot& robot) {
+  std::vector<JointGroup> groups;
+  for (const MoveGroup& g : robot.groups()) groups.push_back({g.name, g.qpos, g.dofs});
+  return groups;
+}
+
+void add_camera(SensorSuite& suite, const RecordedCamera& camera, const std::string& owner) {
+  suite.add(std::make_shared<CameraParameterSensor>("sensor_param_" + camera.name,
+                                                    camera.mjcf_camera, camera.width, camera.height),
+            owner);
+  suite.add(std::make_shared<SharedField>(camera.name, *camera.sensor, "rgb",
+                                          [](SensorSpec& spec) { spec.storage = Storage::kRgbVideo; }),
+            owner);
+  if (!camera.depth) return;
+  suite.add(std::make_shared<SharedField>(camera.name + "_depth", *camera.sensor, "depth",
+                                          [&camera](SensorSpec& spec) {
+                                            spec.storage = Storage::kDepthVideo;
+                                            spec.shape = {camera.height, camera.width};
+                                          }),
+            owner);
+}
+
+// Grippers by the names of their groups, then what plays a role in the task.
+std::shared_ptr<Sensor> image_points(const Task& task, const std::vector<RecordedCamera>& cameras) {
+  const Robot& robot = task.robot();
+  std::vector<ImagePointsSensor::Object> objects;
+  for (const MoveGroup& g : robot.groups()) {
+    if (g.kind == GroupKind::kGripper) {
+      objects.push_back({g.name, BodyRef([body = g.root_body](int) { return body; })});
+    }
+  }
+  for (std::size_t i = 0; i < task.objects(0).size(); ++i) {
+    objects.push_back({task.objects(0)[i].role,
+                       BodyRef([&task, i](int world) { return task.objects(world)[i].body; })});
+  }
+  std::vector<ImagePointsSensor::Camera> views;
+  for (const RecordedCamera& camera : cameras) {
+    std::string lower = camera.name;
+    std::ranges::transform(lower, lower.begin(), [](unsigned char c) { return std::tolower(c); });
+    if (lower.find("follower") == std::string::npos) {
+      views.push_back({.name = camera.name, .sensor = camera.sensor});
+    }
+  }
+  return std::make_shared<ImagePointsSensor>("object_image_points", std::move(objects),
+                                             std::move(views));
+}
+
+}  // namespace
+
+SensorSuite core_suite(const Task& task, const ActionLog& log,
+                       const std::vector<RecordedCamera>& cameras) {
+  const Robot& robot = task.robot();
+  const RobotCfg& cfg = robot.cfg();
+  const std::string of_task = fmt::format("task '{}'", task.name());
+  SensorSuite suite;
+  for (const RecordedCamera& camera : cameras) add_camera(suite, camera, of_task);
+
+  using What = JointStateSensor::What;
+  suite.add(std::make_shared<JointStateSensor>("qpos", What::kPosition, joint_groups(robot)),
+            of_task);
+  suite.add(std::make_shared<JointStateSensor>("qvel", What::kVelocity, joint_groups(robot)),
+            of_task);
+  suite.add(std::make_shared<FunctionSensor<float>>(
+                "robot_base_pose", pose_spec("world", "Pose of the robot's base, on the floor."),
+                [&robot](const World& world, std::span<float> row) {
+                  write_pose(robot.base_pose(world), row.data());
+                }),
+            of_task);
+  const char* base = mj_id2name(task.model(), mjOBJ_BODY, robot.base_body());
+  suite.add(std::make_shared<EnvStatesSensor>("env_states", cfg.env_state_name, joint_groups(robot),
+                                              cfg.env_state_size, base ? base : ""),
+            of_task);
+  suite.add(std::make_shared<JsonFunctionSensor>("task_info", kTaskInfoLength,
+                                                 "What the task says about the state.",
+                                                 [&task](const World& world, JsonWriter& json) {
+                                                   json.begin_object();
+                                                   task.write_info(world, json);
+                                                   json.end_object();
+                                                 }),
+            of_task);
+  suite.extend(action_sensors(task, log), of_task);
+  if (!cameras.empty()) suite.add(image_points(task, cameras), of_task);
+  suite.extend(task.create_task_sensors(), of_task);
+  suite.extend(robot.create_robot_sensors(), fmt::format("robot '{}'", robot.name()));
+  if (const Policy* policy = task.policy()) {
+    suite.extend(policy->create_policy_sensors(), fmt::format("policy '{}'", policy->name()));
+  }
+  return suite;
+}
+
+}  // namespace mjsense

@@ -1,0 +1,28 @@
+#pragma once
+// The suite of an episode: what a policy observes and a recording holds, in its published order.
+
+#include <string>
+#include <vector>
+
+#include "mjsense/observe/suite.h"
+#include "mjsense/rollout/action_log.h"
+#include "mjsense/tasks/task.h"
+
+namespace mjsense {
+
+// A camera that an episode records.
+struct RecordedCamera {
+  std::string name;         // of its stream: "wrist_camera"
+  std::string mjcf_camera;  // full MuJoCo name
+  int width = 640, height = 368;
+  bool depth = false;
+  Sensor* sensor = nullptr;  // of the scene: fields rgb, segmentation, and depth if it is recorded
+};
+
+// Per camera [sensor_param_<c>, <c>, <c>_depth], qpos, qvel, robot_base_pose, env_states, task_info, actions/*,
+// object_image_points, then the task's, the robot's and the policy's own sensors. Names are unique; a clash names both owners.
+// The sensors refer to task, log and cameras, which live longer.
+SensorSuite core_suite(const Task& task, const ActionLog& log,
+                       const std::vector<RecordedCamera>& cameras);
+
+}  // namespace mjsense
