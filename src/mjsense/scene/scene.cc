@@ -56,8 +56,8 @@ struct Scene::Impl {
   std::vector<std::string> warnings;
 
   void build();
+  void add(std::unique_ptr<Sensor> sensor);
   void add_sensors();
-  void discover_sensors();
   void compile(mjsKey* key);
 };
 
@@ -84,7 +84,6 @@ void Scene::Impl::build() {
     }
   }
   add_sensors();
-  discover_sensors();
   mjsKey* key = mjs_addKey(spec.get());
   mjs_setName(key->element, kInitState);
   if (cfg.spec_fn) cfg.spec_fn(spec.get());
@@ -95,44 +94,38 @@ void Scene::Impl::build() {
     entities.push_back(describe(model.get(), entity.name, entity.fixed_base));
 }
 
-void Scene::Impl::add_sensors() {
-  for (const auto& sensor_cfg : cfg.sensors) {
-    const std::string key = sensor_cfg->key();
-    if (key.empty()) throw ValueError("scene: a sensor needs a name");
-    for (const auto& other : sensors) {
-      if (other->name() == key) {
-        throw ValueError(
-            fmt::format("sensor '{}': already exists in the scene; two sensors of one name", key));
-      }
+// Keys are unique: two sensors of one name are an error, always.
+void Scene::Impl::add(std::unique_ptr<Sensor> sensor) {
+  const std::string& key = sensor->name();
+  if (key.empty()) throw ValueError("scene: a sensor needs a name");
+  for (const auto& other : sensors) {
+    if (other->name() == key) {
+      throw ValueError(
+          fmt::format("sensor '{}': already exists in the scene; two sensors of one name", key));
     }
-    for (const Attached& entity : attached) {
-      if (entity.name == key)
-        warnings.push_back(fmt::format("sensor '{}' hides the entity of the same name", key));
-    }
-    sensors.push_back(sensor_cfg->build());
-    sensors.back()->edit_spec(spec.get());
   }
+  for (const Attached& entity : attached) {
+    if (entity.name == key) {
+      warnings.push_back(fmt::format("sensor '{}' hides the entity of the same name", key));
+    }
+  }
+  sensors.push_back(std::move(sensor));
 }
 
-// Every MuJoCo sensor that no configured sensor stands for: those of the entities' XML, then those
-// that sensors added; then the parts of sensors.
-void Scene::Impl::discover_sensors() {
+void Scene::Impl::add_sensors() {
+  for (const auto& sensor_cfg : cfg.sensors) {
+    add(sensor_cfg->build());
+    sensors.back()->edit_spec(spec.get());
+  }
+  const std::size_t configured = sensors.size();
+  // Every MuJoCo sensor that no configured sensor stands for: those of the entities' XML, then
+  // those that sensors added.
   for (const std::string& name : spec_names(spec.get(), mjOBJ_SENSOR)) {
     const auto taken = [&](const auto& sensor) { return sensor->name() == name; };
-    if (std::none_of(sensors.begin(), sensors.end(), taken))
-      sensors.push_back(make_discovered_sensor(name));
+    if (std::none_of(sensors.begin(), sensors.end(), taken)) add(make_discovered_sensor(name));
   }
-  const std::size_t num_whole = sensors.size();
-  for (std::size_t i = 0; i < num_whole; ++i) {
-    for (std::unique_ptr<Sensor>& part : sensors[i]->parts()) {
-      for (const auto& other : sensors) {
-        if (other->name() == part->name()) {
-          throw ValueError(fmt::format("sensor '{}': its part '{}' has the name of another sensor",
-                                       sensors[i]->name(), part->name()));
-        }
-      }
-      sensors.push_back(std::move(part));
-    }
+  for (std::size_t i = 0; i < configured; ++i) {
+    for (auto& part : sensors[i]->parts()) add(std::move(part));
   }
 }
 

@@ -1,0 +1,12 @@
+#pragma once
+// Unit, frame, bounds and meaning of a MuJoCo sensor, read off the compiled model.
+
+#include <mujoco/mujoco.h>
+
+#include "mjsense/core/spec.h"
+
+namespace mjsense {
+
+SensorSpec describe_builtin(const mjModel* model, int sensor_id);
+
+}  // namespace mjsense
