@@ -6,5 +6,9 @@
 namespace mjsense::python {
 
 void bind_core(nanobind::module_& m);
+void bind_scene(nanobind::module_& m);
+void bind_simulation(nanobind::module_& m);
+void bind_contact(nanobind::module_& m);
+void bind_raycast(nanobind::module_& m);
 
 }  // namespace mjsense::python

@@ -2,11 +2,35 @@
 
 import mujoco as _mujoco  # first: it loads the libmujoco that the extension shares
 
-if _mujoco.mj_versionString() != "4.0.1":
+_MUJOCO = "4.0.1"
+if _mujoco.mj_versionString() != _MUJOCO:
     raise ImportError(
-        f"mjsense needs MuJoCo 4.0.1, found {_mujoco.mj_versionString()}: pip install 'mujoco-core==4.0.1'"
+        f"mjsense is built for MuJoCo {_MUJOCO}, found {_mujoco.mj_versionString()}: pip install 'mujoco-core=={_MUJOCO}'"
     )
 
-from mjsense import _core
-from mjsense._core import SensorSpec, __version__
+from mjsense._core import SensorSpec, __version__, embedded_models
+from mjsense.configs import (
+    BuiltinSensorCfg,
+    CameraSensorCfg,
+    ContactMatch,
+    ContactSensorCfg,
+    EntityCfg,
+    GridPatternCfg,
+    MujocoCfg,
+    ObjRef,
+    PinholeCameraPatternCfg,
+    RayCastSensorCfg,
+    RingPatternCfg,
+    SceneCfg,
+    SensorCfg,
+    TerrainCfg,
+    TerrainHeightSensorCfg,
+    replace,
+)
+from mjsense.contact import ContactSensor
+from mjsense.data import CameraData, ContactData, RayCastData, SensorData
 from mjsense.errors import UnknownNameError
+from mjsense.raycast import CameraSensor, RayCastSensor, TerrainHeightSensor
+from mjsense.scene import Entity, Scene
+from mjsense.sensor import BuiltinSensor, NativeSensor, Sensor, SensorError
+from mjsense.simulation import Simulation

@@ -1,6 +1,8 @@
 #pragma once
 // What a scene is made of: attached MJCF models, and references to their elements.
 
+#include <mujoco/mujoco.h>
+
 #include <array>
 #include <map>
 #include <string>
@@ -13,7 +15,8 @@ namespace mjsense {
 struct ModelSource {
   std::string path;                           // read from disk, relative assets beside it
   std::string xml;                            // or this text
-  std::map<std::string, std::string> assets;  // name -> bytes, for xml
+  const mjSpec* spec = nullptr;               // or this spec, which is copied
+  std::map<std::string, std::string> assets;  // name -> bytes, for xml and spec
 };
 
 struct EntityCfg {

@@ -62,7 +62,7 @@ struct Scene::Impl {
 };
 
 void Scene::Impl::build() {
-  spec.reset(mj_makeSpec());
+  spec = cfg.spec ? SpecPtr(cfg.spec, SpecDelete{false}) : SpecPtr(mj_makeSpec());
   mj_defaultOption(&spec->option);
   apply_options(cfg.options, spec->option);
   spec->stat.meansize = 0.03;

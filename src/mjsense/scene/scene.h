@@ -28,6 +28,9 @@ struct SceneCfg {
   double env_spacing = 2.0;      // m, grid of world origins on a plane
   std::optional<double> extent;  // m, overrides stat.extent
   OptionsCfg options;
+  // Empty spec that the scene is built in and that must live as long as the scene; null: one of the
+  // scene's own. The Python package passes its MjSpec's, so that spec_fn sees the real thing.
+  mjSpec* spec = nullptr;
   std::function<void(mjSpec*)>
       spec_fn;  // called last, before compilation; sensors that it adds are not discovered
 };

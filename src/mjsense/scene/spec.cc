@@ -66,6 +66,11 @@ WarningCapture::~WarningCapture() {
 SpecPtr parse_model(const ModelSource& source, Vfs& vfs, std::string_view place) {
   char error[1024] = "";
   for (const auto& [name, bytes] : source.assets) vfs.add(name, bytes, place);
+  if (source.spec) {
+    if (!source.path.empty() || !source.xml.empty())
+      throw ValueError(fmt::format("{}: give a spec, a path or an XML text, only one", place));
+    return checked(mj_copySpec(source.spec), "MuJoCo cannot copy its spec", place);
+  }
   if (!source.xml.empty()) {
     if (!source.path.empty())
       throw ValueError(fmt::format("{}: give a path or an XML text, not both", place));

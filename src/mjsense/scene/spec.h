@@ -16,7 +16,10 @@
 namespace mjsense {
 
 struct SpecDelete {
-  void operator()(mjSpec* spec) const { mj_deleteSpec(spec); }
+  bool owned = true;
+  void operator()(mjSpec* spec) const {
+    if (owned) mj_deleteSpec(spec);
+  }
 };
 struct ModelDelete {
   void operator()(mjModel* model) const { mj_deleteModel(model); }

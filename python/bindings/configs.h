@@ -1,0 +1,58 @@
+#pragma once
+// The list of sensor configurations that Python knows. Each is read in the x_py.cc beside its
+// sensor.
+
+#include <nanobind/nanobind.h>
+
+#include <memory>
+#include <span>
+
+#include "mjsense/core/sensor.h"
+#include "mjsense/scene/entity.h"
+#include "python/bindings/reader.h"
+
+namespace mjsense::python {
+
+struct CfgKind {
+  const char* name;  // the class attribute `kind` of the Python dataclass
+  std::shared_ptr<SensorCfg> (*read)(nb::handle config);
+  nb::dict (*defaults)();
+};
+
+template <class Cfg>
+CfgKind cfg_kind(const char* name) {
+  return {name,
+          [](nb::handle config) -> std::shared_ptr<SensorCfg> {
+            auto cfg = std::make_shared<Cfg>();
+            FromPython reader(config);
+            fields(reader, *cfg);
+            return cfg;
+          },
+          [] {
+            Cfg cfg;
+            ToPython writer;
+            fields(writer, cfg);
+            return writer.values;
+          }};
+}
+
+// One line for each sensor, here and in configs.cc.
+CfgKind builtin_kind();
+CfgKind camera_kind();
+CfgKind contact_kind();
+CfgKind raycast_kind();
+CfgKind terrain_height_kind();
+
+std::span<const CfgKind> cfg_kinds();
+
+// Throws TypeError for an object that is no sensor configuration.
+std::shared_ptr<SensorCfg> read_sensor_cfg(nb::handle config);
+
+template <class Fields>
+void fields(Fields& f, ObjRef& ref) {
+  f("type", ref.type);
+  f("name", ref.name);
+  f("entity", ref.entity);
+}
+
+}  // namespace mjsense::python

@@ -1,0 +1,82 @@
+#include "python/bindings/derived_field.h"
+
+#include <mujoco/mjxmacro.h>
+
+#include <cstring>
+#include <type_traits>
+
+#include "mjsense/core/error.h"
+
+namespace mjsense::python {
+namespace {
+
+// One line of MuJoCo's table of mjData fields.
+struct DataField {
+  std::string name;
+  DType dtype;
+  int rows, columns;
+  const void* (*pointer)(const mjData*);
+};
+
+template <class T>
+void add(std::vector<DataField>& fields, const char* name, int rows, int columns,
+         const void* (*pointer)(const mjData*)) {
+  if constexpr (std::is_same_v<T, mjtNum>)
+    fields.push_back({name, DType::kFloat64, rows, columns, pointer});
+  if constexpr (std::is_same_v<T, int>)
+    fields.push_back({name, DType::kInt32, rows, columns, pointer});
+  if constexpr (std::is_same_v<T, mjtBool>)
+    fields.push_back({name, DType::kBool, rows, columns, pointer});
+}
+
+std::vector<DataField> data_fields(const mjModel* m) {
+  std::vector<DataField> fields;
+#define X(type, field, nr, nc)                                             \
+  add<type>(fields, #field, static_cast<int>(m->nr), static_cast<int>(nc), \
+            [](const mjData* d) -> const void* { return d->field; });
+#undef MJ_M
+#define MJ_M(n) m->n
+  MJDATA_POINTERS
+#undef MJ_M
+#define MJ_M(n) n
+#undef X
+  return fields;
+}
+
+class DerivedField final : public Sensor {
+ public:
+  explicit DerivedField(DataField field)
+      : Sensor("mjData." + field.name), field_(std::move(field)) {}
+  std::string_view kind() const override { return "mjdata"; }
+
+  void initialize(const SensorInit& init) override {
+    clear_fields();
+    SensorSpec spec;
+    spec.dtype = field_.dtype;
+    spec.shape = field_.columns == 1 ? Shape{field_.rows} : Shape{field_.rows, field_.columns};
+    spec.description = "mjData." + field_.name;
+    add_field("", spec, init.num_worlds);
+  }
+
+  void compute(const World& world) override {
+    Array& rows = fields()[0].data;
+    if (rows.row_bytes() > 0)
+      std::memcpy(rows.row_data(world.id), field_.pointer(world.data), rows.row_bytes());
+  }
+
+ private:
+  DataField field_;
+};
+
+}  // namespace
+
+std::shared_ptr<Sensor> make_derived_field(std::string_view name, const mjModel* model) {
+  std::vector<std::string> names;
+  for (DataField& field : data_fields(model)) {
+    if (field.name == name) return std::make_shared<DerivedField>(std::move(field));
+    names.push_back(field.name);
+  }
+  throw_unknown("simulation", "mjData field", name, names);
+}
+
+}  // namespace mjsense::python

@@ -1,0 +1,67 @@
+#include "python/bindings/python_sensor.h"
+
+#include <nanobind/stl/string.h>
+#include <nanobind/stl/vector.h>
+
+namespace mjsense::python {
+
+PythonSensor::PythonSensor(std::string name, nb::object self, std::optional<SensorSpec> spec)
+    : Sensor(std::move(name)), self_(self.release().ptr()), spec_(std::move(spec)) {}
+
+PythonSensor::~PythonSensor() {
+  // A sensor that outlives the interpreter has nobody left to give its object back to.
+  if (!nb::is_alive()) return;
+  nb::gil_scoped_acquire lock;
+  nb::handle(self_).dec_ref();
+}
+
+void PythonSensor::edit_spec(mjSpec*) {
+  nb::gil_scoped_acquire lock;
+  self().attr("_edit_spec")();
+}
+
+void PythonSensor::initialize(const SensorInit& init) {
+  clear_fields();
+  if (spec_) add_field("", *spec_, init.num_worlds);
+  reset_.assign(init.num_worlds, 0);
+}
+
+void PythonSensor::cast(const CastContext&) {
+  nb::gil_scoped_acquire lock;
+  flush_resets();
+  self().attr("_compute_rows")();
+}
+
+void PythonSensor::reset(const World& world) {
+  reset_[world.id] = 1;
+  any_reset_ = true;
+}
+
+void PythonSensor::flush_resets() {
+  if (!any_reset_.exchange(false)) return;
+  nb::list ids;
+  for (std::size_t w = 0; w < reset_.size(); ++w) {
+    if (reset_[w]) ids.append(w);
+    reset_[w] = 0;
+  }
+  self().attr("_reset")(ids);
+}
+
+std::optional<SensorSpec> read_python_spec(nb::handle sensor) {
+  nb::object declared = sensor.attr("_row_spec")();
+  if (declared.is_none()) return {};
+  SensorSpec spec;
+  spec.dtype = dtype_from_name(nb::cast<std::string>(declared["dtype"]));
+  spec.shape =
+      Shape(std::span<const std::int64_t>(nb::cast<std::vector<std::int64_t>>(declared["shape"])));
+  spec.unit = nb::cast<std::string>(declared["unit"]);
+  spec.frame = nb::cast<std::string>(declared["frame"]);
+  spec.low = nb::cast<double>(declared["low"]);
+  spec.high = nb::cast<double>(declared["high"]);
+  spec.is_dict = nb::cast<bool>(declared["is_dict"]);
+  if (spec.is_dict) spec.str_max_len = static_cast<int>(spec.shape[0]);
+  spec.description = nb::cast<std::string>(declared["description"]);
+  return spec;
+}
+
+}  // namespace mjsense::python

@@ -1,0 +1,52 @@
+#pragma once
+// A sensor written in Python, as the simulation sees it: computed for all worlds at once, on the
+// caller's thread.
+
+#include <nanobind/nanobind.h>
+
+#include <atomic>
+#include <cstdint>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "mjsense/core/sensor.h"
+
+namespace mjsense::python {
+
+namespace nb = nanobind;
+
+// Calls _edit_spec(), _compute_rows() and _reset(ids) of a mjsense.Sensor
+// (python/mjsense/sensor.py); its initialize(sim) is called by the Python simulation, once that
+// exists. Any thread may call and destroy this: it takes the interpreter's lock where it needs it.
+class PythonSensor final : public Sensor {
+ public:
+  // `spec`: of its one field; without one it has none, and its value is a Python object only.
+  PythonSensor(std::string name, nb::object self, std::optional<SensorSpec> spec);
+  ~PythonSensor() override;
+
+  std::string_view kind() const override { return "python"; }
+  Stage stage() const override { return Stage::kBatch; }
+  void edit_spec(mjSpec* spec) override;
+  void initialize(const SensorInit& init) override;
+  void compute(const World&) override {}
+  void cast(const CastContext& context) override;
+  void reset(const World& world) override;
+
+  // Tells Python which worlds were reset since the last call. Needs the interpreter's lock, as does
+  // self().
+  void flush_resets();
+  nb::object self() const { return nb::borrow(self_); }
+
+ private:
+  PyObject* self_;
+  std::optional<SensorSpec> spec_;
+  std::vector<std::uint8_t> reset_;  // [B] worlds reset since the last call into Python
+  std::atomic<bool> any_reset_{false};
+};
+
+// Spec of a mjsense.Sensor's rows from its observation_space, unit and frame; none if it declares
+// no space.
+std::optional<SensorSpec> read_python_spec(nb::handle sensor);
+
+}  // namespace mjsense::python

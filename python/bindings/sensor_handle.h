@@ -1,0 +1,23 @@
+#pragma once
+// A C++ sensor as Python holds it.
+
+#include <memory>
+
+#include "mjsense/core/error.h"
+#include "mjsense/core/sensor.h"
+
+namespace mjsense::python {
+
+struct SensorHandle {
+  std::shared_ptr<Sensor> sensor;  // keeps alive whoever owns it, too
+
+  // The sensor as one of a kind, for the methods of that kind.
+  template <class T>
+  T& as() const {
+    if (auto* typed = dynamic_cast<T*>(sensor.get())) return *typed;
+    throw ValueError("sensor '" + sensor->name() + "' is a " + std::string(sensor->kind()) +
+                     " sensor: it has no such method");
+  }
+};
+
+}  // namespace mjsense::python

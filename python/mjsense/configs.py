@@ -1,0 +1,329 @@
+"""Configurations of scenes and sensors: plain dataclasses, all checked by C++ when they are made.
+
+Units: metres, radians, seconds, newtons; other units are in the name. Quaternions are (w, x, y, z). Shapes: ``B`` worlds, ``P``
+primaries, ``S`` slots (``N = P*S``), ``F`` frames, ``R`` rays (``F`` times the rays of the pattern), ``H`` history length.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any, ClassVar
+
+import mujoco
+
+from mjsense import _core
+
+
+@dataclass(frozen=True)
+class ObjRef:
+    """One MuJoCo element. Its full name is ``entity/name``, or ``name`` without an entity."""
+
+    type: str = ""
+    """body (inertial frame), xbody (body frame), joint, geom, site, actuator, tendon, camera ..."""
+    name: str = ""
+    entity: str | None = None
+
+    @property
+    def full_name(self) -> str:
+        return f"{self.entity}/{self.name}" if self.entity else self.name
+
+
+# ---------------------------------------------------------------------------------------------------------------- scene
+
+
+@dataclass
+class EntityCfg:
+    """A model that is attached to the scene; all its names get the prefix ``<entity>/``."""
+
+    model: str | Path | mujoco.MjSpec | Callable[[], mujoco.MjSpec]
+    """Path of an MJCF file, XML text, ``embedded:<file>`` (see :func:`mjsense.embedded_models`), an MjSpec, or a function that
+    makes one."""
+    assets: Mapping[str, bytes] = field(default_factory=dict)
+    """Files that XML text refers to, by name."""
+    pos: Sequence[float] = (0.0, 0.0, 0.0)
+    """m, of the entity's root in the world."""
+    quat: Sequence[float] = (1.0, 0.0, 0.0, 0.0)
+    mocap_base: bool = True
+    """Hang a model without a free joint under the mocap body ``<entity>/mocap_base``, so that each world can place it."""
+
+    def _source(self) -> tuple[str, Any, dict[str, bytes]]:
+        """(kind, value, assets): kind path, xml or spec."""
+        model, assets = self.model, dict(self.assets)
+        if callable(model):
+            model = model()
+        if isinstance(model, mujoco.MjSpec):
+            return "spec", model, {**model.assets, **assets}
+        if isinstance(model, str) and model.lstrip().startswith("<"):
+            return "xml", model, assets
+        if isinstance(model, (str, Path)):
+            return "path", str(model), assets
+        raise TypeError(f"EntityCfg.model must be a path, XML text or a mujoco.MjSpec, not {model!r}")
+
+
+@dataclass
+class TerrainCfg:
+    """The ground, registered as entity ``terrain``."""
+
+    terrain_type: str = "plane"
+
+
+@dataclass
+class MujocoCfg:
+    """Physics options of a scene. Entities' own ``<option>`` values are not carried over: one scene, one physics."""
+
+    timestep: float = 0.002
+    """s, of one substep."""
+    integrator: str = "implicitfast"
+    """euler, rk4, implicit or implicitfast."""
+    cone: str = "pyramidal"
+    """pyramidal or elliptic."""
+    solver: str = "newton"
+    """newton, cg or pgs."""
+    jacobian: str = "auto"
+    """auto, dense or sparse."""
+    impratio: float = 1.0
+    iterations: int = 100
+    tolerance: float = 1e-8
+    ls_iterations: int = 50
+    ls_tolerance: float = 0.01
+    ccd_iterations: int = 50
+    gravity: Sequence[float] = (0.0, 0.0, -9.81)
+    """m/s^2."""
+    magnetic: Sequence[float] = (0.0, -0.5, 0.0)
+    """What magnetometers read in the world frame."""
+    wind: Sequence[float] = (0.0, 0.0, 0.0)
+    """m/s."""
+    density: float = 0.0
+    """kg/m^3, of the medium."""
+    viscosity: float = 0.0
+    """Pa s."""
+    disableflags: Sequence[str] = ()
+    """Lower-case names of MJCF flags: ``("contact", "gravity")``."""
+    enableflags: Sequence[str] = ()
+
+
+@dataclass
+class SceneCfg:
+    """What all worlds share."""
+
+    num_envs: int = 1
+    """B, unless ``Simulation(num_worlds=...)`` says otherwise."""
+    env_spacing: float = 2.0
+    """m, between the origins of neighbouring worlds on a plane."""
+    terrain: TerrainCfg | None = None
+    entities: Mapping[str, EntityCfg] = field(default_factory=dict)
+    """Attached in this order."""
+    sensors: Sequence[Any] = ()
+    """Sensor configurations, configurations of your own with ``build()``, or :class:`mjsense.Sensor` objects."""
+    extent: float | None = None
+    """m, overrides ``stat.extent`` of the model."""
+    spec_fn: Callable[[mujoco.MjSpec], None] | None = None
+    """Edits the spec last, before compilation."""
+    options: MujocoCfg = field(default_factory=MujocoCfg)
+
+
+# -------------------------------------------------------------------------------------------------------------- sensors
+
+
+@dataclass
+class SensorCfg:
+    """Base of the built-in sensor configurations."""
+
+    kind: ClassVar[str] = ""
+    name: str
+    """Key in the scene: ``scene[name]``."""
+
+    def __post_init__(self) -> None:
+        _core.check_cfg(self)
+
+    @property
+    def prefixed_name(self) -> str:
+        """Key in the scene's registry."""
+        return _core.cfg_key(self)
+
+
+@dataclass
+class BuiltinSensorCfg(SensorCfg):
+    """One of MuJoCo's own sensors; ``data`` is float32 ``[B, dim]``. Registered as ``entity/name``."""
+
+    kind: ClassVar[str] = "builtin"
+    sensor_type: str = ""
+    """accelerometer, gyro, framepos, jointpos, rangefinder ...: the MJCF name."""
+    obj: ObjRef | None = None
+    """What is measured."""
+    ref: ObjRef | None = None
+    """Frame in which a frame sensor's value is expressed; the world without one."""
+    cutoff: float = 0.0
+    """Positive: every component is limited to [-cutoff, cutoff] (a rangefinder's -1 too)."""
+
+
+@dataclass(frozen=True)
+class ContactMatch:
+    """Which geoms or bodies take part in a contact."""
+
+    mode: str
+    """geom, body, or subtree (a body and all its descendants)."""
+    pattern: str | Sequence[str]
+    """With an entity: regular expressions that must match a whole local name. Without: full MuJoCo names, literally."""
+    entity: str | None = None
+    exclude: Sequence[str] = ()
+    """Names to leave out; one with any of ``.*+?[]{}()\\|^$`` is a regular expression that is searched."""
+
+
+@dataclass
+class ContactSensorCfg(SensorCfg):
+    """Contacts of primaries, optionally with one secondary only. ``data`` is a :class:`mjsense.ContactData`.
+
+    The normal points from the primary to the secondary; forces are what the **primary exerts on the secondary**: a box on the
+    floor reads (0, 0, -m g) in the world frame.
+    """
+
+    kind: ClassVar[str] = "contact"
+    primary: ContactMatch = None  # type: ignore[assignment]
+    secondary: ContactMatch | None = None
+    fields: Sequence[str] = ("found", "force")
+    """Any of found, force, torque, dist, pos, normal, tangent."""
+    reduce: str = "maxforce"
+    """none, mindist, maxforce, netforce: which contacts come first (netforce: their sum)."""
+    num_slots: int = 1
+    """S, contacts kept for each primary."""
+    secondary_policy: str = "first"
+    """When several elements match the secondary: first, any (no filter), error."""
+    track_air_time: bool = False
+    global_frame: bool = False
+    """Forces and torques in the world frame instead of the contact frame (x = normal)."""
+    history_length: int = 0
+    """H, substeps kept of force, torque and dist."""
+    debug: bool = False
+
+
+@dataclass(frozen=True)
+class GridPatternCfg:
+    """Parallel rays from the points of a grid, x fastest."""
+
+    kind: ClassVar[str] = "grid"
+    size: Sequence[float] = (1.0, 1.0)
+    """m, in x and y."""
+    resolution: float = 0.1
+    """m between rays."""
+    direction: Sequence[float] = (0.0, 0.0, -1.0)
+
+    def generate_rays(self) -> tuple[Any, Any]:
+        """Offsets (m) and unit directions, float32 ``[n, 3]`` each, in the local frame."""
+        return _core.pattern_rays(self)
+
+
+@dataclass(frozen=True)
+class PinholeCameraPatternCfg:
+    """Rays of a pinhole camera that looks along -Z: edge-inclusive, bottom row first."""
+
+    kind: ClassVar[str] = "pinhole"
+    width: int = 16
+    height: int = 12
+    fovy: float = 45.0
+    """Vertical, degrees."""
+    camera_name: str | None = None
+    """Take resolution and angles from this camera of the model instead."""
+
+    @classmethod
+    def from_intrinsic_matrix(cls, intrinsic_matrix: Sequence[float], width: int, height: int) -> PinholeCameraPatternCfg:
+        """From a 3x3 matrix, as 9 numbers or rows; only its fy is used."""
+        flat = [x for row in intrinsic_matrix for x in (row if hasattr(row, "__iter__") else (row,))]
+        if len(flat) != 9 or not flat[4] > 0:
+            raise ValueError(f"intrinsic_matrix must be 3x3 with a positive fy, not {intrinsic_matrix!r}")
+        return cls(width=width, height=height, fovy=math.degrees(2 * math.atan(height / (2 * float(flat[4])))))
+
+    @classmethod
+    def from_mujoco_camera(cls, camera_name: str) -> PinholeCameraPatternCfg:
+        """Resolution and angles of a camera of the model."""
+        return cls(camera_name=camera_name)
+
+    def generate_rays(self) -> tuple[Any, Any]:
+        """Offsets (m) and unit directions, float32 ``[n, 3]`` each, in the local frame."""
+        return _core.pattern_rays(self)
+
+
+@dataclass(frozen=True)
+class RingPatternCfg:
+    """Parallel rays from the points of circles in the XY plane, after the centre."""
+
+    @dataclass(frozen=True)
+    class Ring:
+        radius: float = 0.1
+        """m."""
+        num_samples: int = 8
+
+    kind: ClassVar[str] = "ring"
+    rings: Sequence[RingPatternCfg.Ring] = ()
+    include_center: bool = True
+    direction: Sequence[float] = (0.0, 0.0, -1.0)
+
+    @classmethod
+    def single_ring(cls, radius: float = 0.1, num_samples: int = 8, **kwargs: Any) -> RingPatternCfg:
+        return cls(rings=(cls.Ring(radius, num_samples),), **kwargs)
+
+    def generate_rays(self) -> tuple[Any, Any]:
+        """Offsets (m) and unit directions, float32 ``[n, 3]`` each, in the local frame."""
+        return _core.pattern_rays(self)
+
+
+@dataclass
+class RayCastSensorCfg(SensorCfg):
+    """Rays from frames against everything visible. ``data`` is a :class:`mjsense.RayCastData`."""
+
+    kind: ClassVar[str] = "raycast"
+    frame: ObjRef | Sequence[ObjRef] = ()
+    """Bodies (body frame), sites or geoms that the rays start from."""
+    pattern: GridPatternCfg | PinholeCameraPatternCfg | RingPatternCfg = field(default_factory=GridPatternCfg)
+    ray_alignment: str = "base"
+    """base: offsets and directions turn with the frame; yaw: only with its heading; world: not at all."""
+    max_distance: float = 10.0
+    """m; hits farther away are misses."""
+    exclude_parent_body: bool = True
+    """Rays pass through the body they start from (not through its children)."""
+    include_geom_groups: Sequence[int] | None = (0, 1, 2)
+    """None: all."""
+    debug_vis: bool = False
+
+
+@dataclass
+class TerrainHeightSensorCfg(RayCastSensorCfg):
+    """Height of frames above what lies below them. ``data.heights`` is float32 ``[B, F]``, ``[B, F, n]`` without reduction."""
+
+    kind: ClassVar[str] = "terrain_height"
+    reduction: str = "mean"
+    """min, max, mean, none."""
+
+
+@dataclass
+class CameraSensorCfg(SensorCfg):
+    """A camera of the model (``camera_name``), or a new one. ``data`` is a :class:`mjsense.CameraData`."""
+
+    kind: ClassVar[str] = "camera"
+    camera_name: str | None = None
+    """Full name of an existing camera, ``robot/wrist``."""
+    parent_body: str | None = None
+    """Full name of the body that carries a new camera; the world without one."""
+    pos: Sequence[float] = (0.0, 0.0, 1.0)
+    """m, in the parent body."""
+    quat: Sequence[float] = (1.0, 0.0, 0.0, 0.0)
+    fovy: float | None = None
+    """Vertical, degrees. None: the camera's own, 45 for a new one."""
+    width: int = 160
+    height: int = 120
+    data_types: Sequence[str] = ("rgb",)
+    """Any of rgb, depth, segmentation."""
+    use_textures: bool = True
+    use_shadows: bool = False
+    enabled_geom_groups: Sequence[int] = (0, 1, 2)
+    orthographic: bool = False
+    clone_data: bool = False
+
+
+def replace(cfg: Any, **changes: Any) -> Any:
+    """A copy of a configuration with some fields changed."""
+    return dataclasses.replace(cfg, **changes)

@@ -1,0 +1,34 @@
+"""Contact sensors."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from mjsense import _core
+from mjsense.data import ContactData
+from mjsense.sensor import NativeSensor
+
+
+class ContactSensor(NativeSensor):
+    """Contacts of its primaries; ``data`` is a :class:`mjsense.ContactData`."""
+
+    _data_type = ContactData
+
+    @property
+    def primary_names(self) -> tuple[str, ...]:
+        """Local names of the primaries, in the order of the columns."""
+        return _core.contact_primary_names(self._handle)
+
+    def compute_first_contact(self, dt: float, abs_tol: float = 1e-6) -> np.ndarray:
+        """Which primaries came into contact within the last `dt` seconds: bool ``[B, P]``. Needs track_air_time."""
+        return self._within("current_contact_time", dt, abs_tol)
+
+    def compute_first_air(self, dt: float, abs_tol: float = 1e-6) -> np.ndarray:
+        """Which primaries took off within the last `dt` seconds: bool ``[B, P]``. Needs track_air_time."""
+        return self._within("current_air_time", dt, abs_tol)
+
+    def _within(self, timer: str, dt: float, abs_tol: float) -> np.ndarray:
+        time = getattr(self.data, timer)
+        if time is None:
+            raise RuntimeError(f"sensor '{self.name}' does not track air time: set track_air_time=True")
+        return (time > 0.0) & (time < dt + abs_tol)

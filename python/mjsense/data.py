@@ -1,0 +1,103 @@
+"""What sensors with several fields return. All arrays are float32 unless said otherwise, [B, ...], and share memory with the
+sensor: they hold the values of the moment of the last read of ``.data``. Fields that were not asked for are None."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, fields
+from typing import Any
+
+import numpy as np
+
+
+@dataclass(slots=True)
+class SensorData:
+    """Base: the fields of a sensor that is none of the kinds below."""
+
+    def __repr__(self) -> str:
+        shown = ", ".join(
+            f"{f.name}={getattr(self, f.name).dtype}{list(getattr(self, f.name).shape)}"
+            for f in fields(self)
+            if getattr(self, f.name) is not None
+        )
+        return f"{type(self).__name__}({shown})"
+
+
+@dataclass(slots=True, repr=False)
+class ContactData(SensorData):
+    """Contacts of ``P`` primaries with ``S`` slots each; column ``p * S + s``, ``N = P * S``. A slot without contact is zero.
+
+    Force is what the primary exerts on the secondary; normals point from the primary to the secondary.
+    """
+
+    found: np.ndarray | None = None
+    """[B, N] number of contacts that matched, the same in every filled slot; 0: none."""
+    force: np.ndarray | None = None
+    """[B, N, 3] N. Contact frame (x = normal, force[0] >= 0); world frame with global_frame or netforce."""
+    torque: np.ndarray | None = None
+    """[B, N, 3] N m, in the frame of force."""
+    dist: np.ndarray | None = None
+    """[B, N] m, negative in penetration."""
+    pos: np.ndarray | None = None
+    """[B, N, 3] m, world."""
+    normal: np.ndarray | None = None
+    """[B, N, 3] unit, world."""
+    tangent: np.ndarray | None = None
+    """[B, N, 3] unit, world."""
+    current_air_time: np.ndarray | None = None
+    """[B, P] s since the last contact; 0 in contact."""
+    last_air_time: np.ndarray | None = None
+    """[B, P] s, of the last flight, the landing substep included."""
+    current_contact_time: np.ndarray | None = None
+    """[B, P] s since the contact began; 0 in the air."""
+    last_contact_time: np.ndarray | None = None
+    """[B, P] s, of the last contact, the take-off substep included."""
+    force_history: np.ndarray | None = None
+    """[B, N, H, 3] N, newest first, one entry a substep."""
+    torque_history: np.ndarray | None = None
+    """[B, N, H, 3] N m."""
+    dist_history: np.ndarray | None = None
+    """[B, N, H] m."""
+
+
+@dataclass(slots=True, repr=False)
+class RayCastData(SensorData):
+    """Hits of ``R = F * n`` rays, frame by frame."""
+
+    distances: np.ndarray | None = None
+    """[B, R] m along the ray; -1: nothing within max_distance."""
+    hit_pos_w: np.ndarray | None = None
+    """[B, R, 3] m, world; the ray's origin on a miss."""
+    normals_w: np.ndarray | None = None
+    """[B, R, 3] unit, world, outward; 0 on a miss."""
+    frame_pos_w: np.ndarray | None = None
+    """[B, F, 3] m, world."""
+    frame_quat_w: np.ndarray | None = None
+    """[B, F, 4] of the physical frame, not the aligned one."""
+    pos_w: np.ndarray | None = None
+    """[B, 3] m, of frame 0."""
+    quat_w: np.ndarray | None = None
+    """[B, 4] of frame 0."""
+    heights: np.ndarray | None = None
+    """Terrain height sensors: [B, F] m, [B, F, n] without reduction."""
+
+
+@dataclass(slots=True, repr=False)
+class CameraData(SensorData):
+    """Images; row 0 is the top."""
+
+    rgb: np.ndarray | None = None
+    """[B, H, W, 3] uint8."""
+    depth: np.ndarray | None = None
+    """[B, H, W, 1] m, distance to the camera plane; 0: background."""
+    segmentation: np.ndarray | None = None
+    """[B, H, W, 2] int32: (geom id, 5); (-1, -1): background."""
+
+
+def make_data(base: type, arrays: dict[str, np.ndarray]) -> Any:
+    """An instance of `base` with these fields; fields that it does not name are added in a class of their own."""
+    known = {f.name for f in fields(base)}
+    extra = [name for name in arrays if name not in known]
+    if extra:
+        namespace = {"__annotations__": {name: "np.ndarray | None" for name in extra}, **dict.fromkeys(extra)}
+        base = dataclass(repr=False)(type(base.__name__, (base,), namespace))
+    return base(**arrays)

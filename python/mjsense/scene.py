@@ -1,0 +1,132 @@
+"""Scenes: what all worlds share."""
+
+from __future__ import annotations
+
+import difflib
+import warnings
+import weakref
+from collections.abc import Mapping
+from functools import cached_property
+from types import MappingProxyType
+from typing import Any
+
+import mujoco
+import numpy as np
+
+from mjsense import _core
+from mjsense.configs import SceneCfg, SensorCfg
+from mjsense.contact import ContactSensor
+from mjsense.errors import UnknownNameError
+from mjsense.raycast import CameraSensor, RayCastSensor, TerrainHeightSensor
+from mjsense.sensor import BuiltinSensor, NativeSensor, Sensor
+
+_CLASSES = {
+    "builtin": BuiltinSensor,
+    "contact": ContactSensor,
+    "raycast": RayCastSensor,
+    "terrain_height": TerrainHeightSensor,
+    "camera": CameraSensor,
+}
+
+
+class Entity:
+    """An attached model: the names of its elements, local (without the prefix), in model order."""
+
+    def __init__(self, name: str, description: dict[str, Any]) -> None:
+        self.name = name
+        self.fixed_base: bool = description["fixed_base"]
+        """No free joint."""
+        self.body_names: tuple[str, ...] = description["body_names"]
+        self.geom_names: tuple[str, ...] = description["geom_names"]
+        self.site_names: tuple[str, ...] = description["site_names"]
+        self.joint_names: tuple[str, ...] = description["joint_names"]
+        self.actuator_names: tuple[str, ...] = description["actuator_names"]
+        self.tendon_names: tuple[str, ...] = description["tendon_names"]
+        self.camera_names: tuple[str, ...] = description["camera_names"]
+
+    def __repr__(self) -> str:
+        return f"<entity '{self.name}': {len(self.body_names)} bodies, {len(self.joint_names)} joints>"
+
+
+class Scene:
+    """Entities, terrain and sensors, compiled into one model. ``scene[key]`` is a sensor or, failing that, an entity."""
+
+    def __init__(self, cfg: SceneCfg) -> None:
+        self.cfg = cfg
+        self.spec = mujoco.MjSpec()
+        """The spec the scene is built in."""
+        self._simulation: Any = None
+        items = [self._item(sensor) for sensor in cfg.sensors]
+        for item in items:
+            if isinstance(item, Sensor):
+                item._scene_ref = weakref.ref(self)
+
+        def edit() -> None:
+            if cfg.spec_fn is not None:
+                cfg.spec_fn(self.spec)
+
+        self._core = _core.Scene.make(cfg, self.spec, items, edit)
+        for text in self._core.warnings():
+            warnings.warn(text, stacklevel=2)
+        self._sensors: dict[str, Any] = {}
+        for handle in self._core.sensors():
+            own = handle.python_object()
+            self._sensors[handle.name] = own if own is not None else _CLASSES.get(handle.kind, NativeSensor)(handle)
+            if own is not None:
+                own._handle = handle
+
+    @staticmethod
+    def _item(sensor: Any) -> Any:
+        """What C++ takes: a configuration it knows, or a Sensor."""
+        if isinstance(sensor, (SensorCfg, Sensor)):
+            return sensor
+        if hasattr(sensor, "build"):
+            built = sensor.build()
+            if not isinstance(built, Sensor):
+                raise TypeError(f"{type(sensor).__name__}.build() must return a mjsense.Sensor, not {built!r}")
+            built.uuid = getattr(sensor, "prefixed_name", "") or built.uuid or sensor.name
+            return built
+        raise TypeError(f"sensors: neither a sensor configuration nor a mjsense.Sensor: {sensor!r}")
+
+    def __repr__(self) -> str:
+        return f"<scene: entities {list(self.entities)}, {len(self._sensors)} sensors>"
+
+    def __getitem__(self, key: str) -> Any:
+        if key in self._sensors:
+            return self._sensors[key]
+        if key in self.entities:
+            return self.entities[key]
+        names = [*self.entities, *self._sensors]
+        near = difflib.get_close_matches(str(key), names, 3)
+        hint = f"Did you mean {' or '.join(map(repr, near))}?" if near else f"Available: {', '.join(names)}"
+        raise UnknownNameError(f"Scene element '{key}' not found. {hint}")
+
+    def __contains__(self, key: object) -> bool:
+        return key in self._sensors or key in self.entities
+
+    @property
+    def sensors(self) -> Mapping[str, Any]:
+        """Configured sensors in their order, then those found in the entities' XML."""
+        return MappingProxyType(self._sensors)
+
+    @cached_property
+    def entities(self) -> Mapping[str, Entity]:
+        """The terrain, if there is one, first."""
+        return MappingProxyType({name: Entity(name, names) for name, names in self._core.entities().items()})
+
+    @cached_property
+    def model(self) -> mujoco.MjModel:
+        """A copy of the compiled model, for looking things up. Changing it changes no simulation."""
+        return mujoco.MjModel._from_model_ptr(self._core.copy_model())
+
+    def to_xml(self) -> str:
+        """MJCF that compiles to the same model; with ``assets()`` as files beside it if there are any."""
+        return self._core.to_xml()
+
+    def assets(self) -> dict[str, bytes]:
+        """Files that the scene got as bytes, by name."""
+        return self._core.assets()
+
+    def env_origins(self, num_worlds: int | None = None) -> np.ndarray:
+        """Origins of the worlds, float32 ``[B, 3]`` m: zeros without terrain, a grid on a plane."""
+        return self._core.env_origins(self.cfg.num_envs if num_worlds is None else num_worlds)

@@ -1,0 +1,292 @@
+"""Simulations: B worlds of one scene, stepped together, with every sensor fresh."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+import mujoco
+import numpy as np
+
+from mjsense import _core
+from mjsense.scene import Scene
+from mjsense.sensor import NativeSensor, Sensor
+
+_STATE = ("qpos", "qvel", "act", "ctrl", "qfrc_applied", "xfrc_applied", "mocap_pos", "mocap_quat", "eq_active", "userdata")
+
+
+def _state_property(name: str, text: str) -> property:
+    def get(self: Simulation) -> np.ndarray:
+        return self._component(name)
+
+    def put(self: Simulation, value: Any) -> None:
+        self._component(name)[...] = value
+
+    return property(get, put, doc=text + " Live, float64; call forward() after writing.")
+
+
+class Simulation:
+    """B worlds of a scene.
+
+    After ``step()``, ``reset()`` and ``forward()`` every derived quantity and every sensor belongs to the present state. Worlds
+    are independent, results are the same bit for bit at any number of threads.
+    """
+
+    def __init__(self, scene: Scene, num_worlds: int | None = None, decimation: int = 1, threads: int = 0, seed: int = 0) -> None:
+        """
+        Args:
+            scene: its sensors belong to this simulation from now on; a second one needs a scene of its own.
+            num_worlds: B; the scene's num_envs if not given.
+            decimation: physics steps (substeps) per control step.
+            threads: 0 takes every CPU that this process may use.
+            seed: of random numbers (noise, delays).
+        """
+        if not isinstance(scene, Scene):
+            raise TypeError(f"scene must be a mjsense.Scene, not {scene!r}")
+        if scene._simulation is not None:
+            raise RuntimeError("this scene belongs to a simulation already: make another with Scene(scene.cfg)")
+        num_worlds = scene.cfg.num_envs if num_worlds is None else num_worlds
+        self._core = _core.Simulation(scene._core, num_worlds, decimation, threads, seed)
+        scene._simulation = self._core
+        self.scene = scene
+        self.num_worlds = num_worlds
+        """B."""
+        self.decimation = decimation
+        """Substeps per control step."""
+        self.physics_dt: float = self._core.physics_dt
+        """s, one substep."""
+        self.step_dt: float = self._core.step_dt
+        """s, one control step."""
+        self._views: dict[str, np.ndarray] = {}
+        self._python: list[Sensor] = []
+        self.data = DerivedFields(self)
+        """Fields of mjData, ``[B, ...]``: ``sim.data.xpos``."""
+        for sensor in scene.sensors.values():
+            if isinstance(sensor, Sensor):
+                self._core.own_sensor(sensor._handle)
+                self._own(sensor, sensor._handle)
+            else:
+                sensor._bind(self._core)
+
+    def __repr__(self) -> str:
+        if self._core.closed:
+            return "<simulation, closed>"
+        return f"<simulation: {self.num_worlds} worlds, {self.step_dt:g} s a step>"
+
+    def __enter__(self) -> Simulation:
+        return self
+
+    def __exit__(self, *exception: Any) -> None:
+        self.close()
+
+    def close(self) -> None:
+        """Frees the worlds once the arrays taken from them are gone. Every later call raises."""
+        self._views.clear()
+        self._core.close()
+
+    # --------------------------------------------------------------------------------------------------------- physics
+
+    def step(self, control_steps: int = 1) -> None:
+        """Advances every world by control steps of ``decimation`` substeps each."""
+        updated = [sensor for sensor in self._python if type(sensor).update is not Sensor.update]
+        if not updated:
+            self._core.step(control_steps)
+            return
+        for _ in range(control_steps):
+            for sensor in updated:
+                sensor._pending_dt += self.step_dt
+            self._core.step(1)
+            for sensor in updated:
+                sensor._update_pending()
+
+    def reset(self, world_ids: Sequence[int] | None = None, *, seed: int | None = None, key: int | str | None = None) -> None:
+        """Begins a new episode.
+
+        Args:
+            world_ids: which worlds; all if not given.
+            seed: random numbers start again from this seed, in all worlds.
+            key: keyframe (name or index) to start from, the model's own pose if not given. ``"init_state"`` joins the entities'
+                first keyframes.
+        """
+        if isinstance(key, str):
+            found = mujoco.mj_name2id(self.scene.model, mujoco.mjtObj.mjOBJ_KEY, key)
+            if found < 0:
+                names = [self.scene.model.key(i).name for i in range(self.scene.model.nkey)]
+                raise ValueError(f"no keyframe '{key}'; there are {names}")
+            key = found
+        self._core.reset(_ids(world_ids), -1 if key is None else key, seed)
+
+    def forward(self, world_ids: Sequence[int] | None = None) -> None:
+        """Makes derived quantities and sensors current after state was written."""
+        self._core.forward(_ids(world_ids))
+
+    def set_state(self, world_ids: Sequence[int] | None = None, *, forward: bool = True, **components: Any) -> None:
+        """Writes parts of the state, ``set_state(qpos=..., qvel=...)``, then calls forward().
+
+        Values are ``[n]`` (the same for every world) or ``[worlds, n]``.
+        """
+        rows = slice(None) if world_ids is None else np.asarray(_ids(world_ids), dtype=int)
+        checked = []
+        for name, value in components.items():
+            view = self._component(name)
+            value = np.asarray(value, dtype=np.float64)
+            target = view[rows]
+            if value.shape not in (target.shape, target.shape[1:], (1, *target.shape[1:])):
+                raise ValueError(f"{name}: shape {value.shape} is neither {target.shape} nor {target.shape[1:]}")
+            checked.append((view, value))
+        for view, value in checked:
+            view[rows] = value
+        if forward:
+            self.forward(world_ids)
+        else:
+            self._core.invalidate(_ids(world_ids))
+
+    @property
+    def state(self) -> np.ndarray:
+        """The whole integration state, one row a world (mjSTATE_INTEGRATION). Live, float64; copy it to keep it."""
+        if "state" not in self._views or self._core.closed:
+            self._views["state"] = self._core.state()
+        return self._views["state"]
+
+    qpos = _state_property("qpos", "Joint positions [B, nq] (m, rad).")
+    qvel = _state_property("qvel", "Joint velocities [B, nv] (m/s, rad/s).")
+    act = _state_property("act", "Actuator activations [B, na].")
+    ctrl = _state_property("ctrl", "Controls [B, nu].")
+    qfrc_applied = _state_property("qfrc_applied", "Applied generalized forces [B, nv].")
+    xfrc_applied = _state_property("xfrc_applied", "Applied forces (N) and torques (N m) [B, nbody, 6], world frame.")
+    mocap_pos = _state_property("mocap_pos", "Mocap positions [B, nmocap, 3] (m).")
+    mocap_quat = _state_property("mocap_quat", "Mocap orientations [B, nmocap, 4].")
+    eq_active = _state_property("eq_active", "Which equality constraints are active [B, neq].")
+    userdata = _state_property("userdata", "User data [B, nuserdata].")
+
+    @property
+    def time(self) -> np.ndarray:
+        """Simulation time of each world since its reset, s ``[B]``; counted in whole substeps."""
+        return np.array(self._core.times())
+
+    @property
+    def failures(self) -> list[tuple[int, str]]:
+        """Worlds that failed in the last call, with MuJoCo's words; each was reset alone."""
+        return self._core.failures()
+
+    @property
+    def model(self) -> mujoco.MjModel:
+        """A copy of the model, for looking things up."""
+        return self.scene.model
+
+    @property
+    def threads(self) -> int:
+        return self._core.threads
+
+    @property
+    def seed(self) -> int:
+        return self._core.seed
+
+    def randomize(self, field: str, values: Any, world_ids: Sequence[int] | None = None) -> None:
+        """Gives worlds their own values of a field of the model: ``randomize("geom_friction", values)``.
+
+        Values are ``[worlds, ...]`` or broadcast to it. Quantities that MuJoCo derives from the field follow.
+        """
+        view = self.model_field(field)
+        rows = slice(None) if world_ids is None else np.asarray(_ids(world_ids), dtype=int)
+        view[rows] = values
+        self._core.model_changed(_ids(world_ids), field in mujoco.MjModel._setconst_inputs)
+        self.forward(world_ids)
+
+    def model_field(self, name: str) -> np.ndarray:
+        """A field of the model with a value per world, ``[B, ...]``, live: see :meth:`randomize`."""
+        key = f"model.{name}"
+        if key not in self._views or self._core.closed:
+            like = getattr(self.model, name, None)
+            if not isinstance(like, np.ndarray):
+                raise AttributeError(f"mjModel has no array '{name}'")
+            self._views[key] = self._core.model_field(name).view(like.dtype).reshape(self.num_worlds, *like.shape)
+        return self._views[key]
+
+    def _component(self, name: str) -> np.ndarray:
+        view = self._views.get(name)
+        if view is None or self._core.closed:
+            view = self._views[name] = self._core.component(name)
+        return view
+
+    # --------------------------------------------------------------------------------------------------------- sensors
+
+    def add(self, sensor: Sensor) -> Sensor:
+        """Adds a sensor that is not part of the scene, for suites; returns it."""
+        if not isinstance(sensor, Sensor):
+            raise TypeError(f"not a mjsense.Sensor: {sensor!r}")
+        if sensor._core is not None:
+            raise RuntimeError(f"sensor '{sensor.uuid}' belongs to a simulation already")
+        self._own(sensor, self._core.add_sensor(sensor))
+        return sensor
+
+    def _own(self, sensor: Sensor, handle: Any) -> None:
+        self._python.append(sensor)
+        sensor._bind(self, handle)
+
+    def refresh(self, sensors: Sequence[Any]) -> None:
+        """Computes several sensors in one pass over the worlds; reading each ``.data`` then costs nothing."""
+        for sensor in sensors:
+            if not isinstance(sensor, (NativeSensor, Sensor)):
+                raise TypeError(f"not a sensor: {sensor!r}")
+        self._core.refresh_all([sensor._handle for sensor in sensors])
+
+    def invalidate(self, world_ids: Sequence[int] | None = None) -> None:
+        """Says that state was changed behind the simulation's back: sensors are computed anew at their next read."""
+        self._core.invalidate(_ids(world_ids))
+
+    # ------------------------------------------------------------------------------------------- mjlab's order of calls
+
+    def step_raw(self, substeps: int = 1) -> None:
+        """Plain mj_step: derived quantities stay one substep behind the state, as in MuJoCo and mjlab."""
+        self._core.step_raw(substeps)
+
+    def update_sensors(self, dt: float = 0.0) -> None:
+        """One update of the sensors' per-substep state (air time, history), after step_raw(1). dt 0: the timestep."""
+        for sensor in self._python:
+            if type(sensor).update is not Sensor.update:
+                sensor._pending_dt += dt or self.physics_dt
+                sensor._update_pending()
+        self._core.update_sensors(dt)
+
+    def reset_sensors(self, world_ids: Sequence[int] | None = None) -> None:
+        """Sensors forget the episode of these worlds; the physics goes on."""
+        self._core.reset_sensors(_ids(world_ids))
+
+
+class DerivedFields:
+    """Fields of mjData of every world, as they are now: ``sim.data.xpos`` is float64 ``[B, nbody, 3]``.
+
+    Like a sensor's, the arrays are overwritten by the next read after a change, and cost a copy only when they are read.
+    """
+
+    def __init__(self, sim: Simulation) -> None:
+        self._sim = sim
+        self._fields: dict[str, tuple[Any, np.ndarray]] = {}
+
+    def __getattr__(self, name: str) -> np.ndarray:
+        if name.startswith("_"):
+            raise AttributeError(name)
+        sim = self._sim
+        if name in _STATE:
+            return sim._component(name)
+        if name not in self._fields:
+            try:
+                handle = sim._core.derived_field(name)
+            except KeyError as error:
+                raise AttributeError(str(error)) from None
+            self._fields[name] = handle, handle.arrays()[""]
+        handle, array = self._fields[name]
+        sim._core.refresh(handle)
+        return array
+
+
+def _ids(world_ids: Any) -> list[int] | None:
+    if world_ids is None:
+        return None
+    array = np.asarray(world_ids)
+    if array.dtype == bool:
+        array = np.flatnonzero(array)
+    if array.size and not np.issubdtype(array.dtype, np.integer):
+        raise TypeError(f"world_ids must be integers or a mask, not {world_ids!r}")
+    return [int(w) for w in array.reshape(-1)]
