@@ -70,11 +70,12 @@ class Simulation {
   // State was changed in a way that only the caller knows.
   void invalidate(std::span<const int> ids = {});
 
-  // Time that a sensor has taken so far.
+  // Time that a sensor has taken since measure_cost(true).
   struct Cost {
     double compute = 0;  // s of processor time, all worlds together
     double cast = 0;     // s of wall time
   };
+  void measure_cost(bool on) { measure_cost_ = on; }
   Cost cost(const Sensor& sensor) const;
 
   // Worlds that failed in the last step, reset or forward; they were reset alone.
@@ -112,6 +113,7 @@ class Simulation {
   std::vector<std::int64_t> version_;         // of each world's state
   std::vector<std::int64_t> rays_version_;    // of the poses in the ray scene
   bool any_substep_ = false;
+  bool measure_cost_ = false;
 };
 
 }  // namespace mjsense
