@@ -124,7 +124,9 @@ class Simulation::Hooks final : public WorldHooks {
     if (only_ == Only::kReset) return reset(world);
     const std::int64_t version = sim_.version_[world.id];
     if (rays_ && sim_.rays_version_[world.id] != version) {
+      const auto start = std::chrono::steady_clock::now();
       sim_.rays_->update(world);
+      sim_.rays_s_[world.id] += since(start);
       sim_.rays_version_[world.id] = version;
     }
     for (Slot* slot : slots_) {
@@ -156,6 +158,7 @@ Simulation::Simulation(std::shared_ptr<Scene> scene, const SimulationCfg& cfg)
   pool_ = std::make_unique<ThreadPool>(cfg.threads);
   version_.assign(cfg.num_worlds, 1);
   rays_version_.assign(cfg.num_worlds, 0);
+  rays_s_.assign(cfg.num_worlds, 0.0);
   for (auto& sensor : scene_->sensors()) initialize(*sensor);
   reset();
 }
@@ -323,6 +326,10 @@ void Simulation::reset_sensors(std::span<const int> ids) {
 Simulation::Cost Simulation::cost(const Sensor& sensor) const {
   const Slot& slot = slot_of(sensor);
   return {std::accumulate(slot.compute_s.begin(), slot.compute_s.end(), 0.0), slot.cast_s};
+}
+
+double Simulation::ray_scene_cost() const {
+  return std::accumulate(rays_s_.begin(), rays_s_.end(), 0.0);
 }
 
 void Simulation::invalidate(std::span<const int> ids) { mark_stale(worlds_->checked_ids(ids)); }
