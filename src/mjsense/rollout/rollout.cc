@@ -96,6 +96,7 @@ Rollout::Rollout(const RolloutCfg& cfg) : cfg_(cfg) {
                                                                   .decimation = task_->decimation(),
                                                                   .threads = cfg.threads,
                                                                   .seed = cfg.seed});
+  simulation_->measure_cost(true);
   for (RecordedCamera& camera : cameras_) camera.sensor = &scene->sensor(camera.name);
   task_->initialize(scene->model(), cfg.num_worlds);
   if (policy_) task_->register_policy(*policy_);

@@ -124,9 +124,9 @@ class Simulation::Hooks final : public WorldHooks {
     if (only_ == Only::kReset) return reset(world);
     const std::int64_t version = sim_.version_[world.id];
     if (rays_ && sim_.rays_version_[world.id] != version) {
-      const auto start = std::chrono::steady_clock::now();
+      const Timer timer(sim_.measure_cost_);
       sim_.rays_->update(world);
-      sim_.rays_s_[world.id] += since(start);
+      sim_.rays_s_[world.id] += timer.seconds();
       sim_.rays_version_[world.id] = version;
     }
     for (Slot* slot : slots_) {
