@@ -97,19 +97,31 @@ void check(herr_t status, std::string_view what) {
   if (status < 0) throw RuntimeError(fmt::format("{}: {}", what, library_error()));
 }
 
+namespace {
+
+Id file_access() {
+  Id access = plist(H5P_FILE_ACCESS);
+  // A file is closed whole, whatever an error left open in it.
+  H5Pset_fclose_degree(access, H5F_CLOSE_STRONG);
+  // The library would lock the file, and a program started meanwhile could hold the lock after us.
+  // Houses have their own.
+  H5Pset_file_locking(access, false, true);
+  return access;
+}
+
+}  // namespace
+
 Id create_file(const std::filesystem::path& path) {
   const Id creation = plist(H5P_FILE_CREATE);
   H5Pset_obj_track_times(creation, false);
-  const Id access = plist(H5P_FILE_ACCESS);
-  H5Pset_fclose_degree(
-      access, H5F_CLOSE_STRONG);  // a file is closed whole, whatever an error left open in it
+  H5Pset_istore_k(creation, 8);  // small chunk indices: an episode has many datasets of few chunks
+  const Id access = file_access();
   return {H5Fcreate(path.c_str(), H5F_ACC_TRUNC, creation, access), H5Fclose,
           fmt::format("cannot create '{}'", path.string())};
 }
 
 Id open_file(const std::filesystem::path& path, bool writable) {
-  const Id access = plist(H5P_FILE_ACCESS);
-  H5Pset_fclose_degree(access, H5F_CLOSE_STRONG);
+  const Id access = file_access();
   return {H5Fopen(path.c_str(), writable ? H5F_ACC_RDWR : H5F_ACC_RDONLY, access), H5Fclose,
           fmt::format("cannot open '{}'", path.string())};
 }
