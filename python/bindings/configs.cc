@@ -7,10 +7,7 @@
 namespace mjsense::python {
 
 std::span<const CfgKind> cfg_kinds() {
-  static const std::vector<CfgKind> kinds = {
-      builtin_kind(),
-      contact_kind(),
-  };
+  static const std::vector<CfgKind> kinds = {};
   return kinds;
 }
 

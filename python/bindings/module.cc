@@ -11,5 +11,4 @@ NB_MODULE(_core, m) {
   mjsense::python::bind_core(m);
   mjsense::python::bind_scene(m);
   mjsense::python::bind_simulation(m);
-  mjsense::python::bind_contact(m);
 }

@@ -18,10 +18,10 @@ namespace {
 struct FieldHit {
   Float t;
   Int prim;
-  Vec3 normal;
+  Vec3f normal;
 };
 
-inline void take(FieldHit& hit, Mask m, Float t, Int prim, Vec3 n) {
+inline void take(FieldHit& hit, Mask m, Float t, Int prim, Vec3f n) {
   m = m & (t < hit.t);
   hit.t = select(m, t, hit.t);
   hit.prim = select(m, prim, hit.prim);
@@ -52,11 +52,11 @@ struct Cell {
 };
 
 // The surface between `start` and `stop` on each active lane.
-inline void march(const HeightField& field, Vec3 o, Vec3 d, Float start, Float stop, Mask active,
+inline void march(const HeightField& field, Vec3f o, Vec3f d, Float start, Float stop, Mask active,
                   bool cull, FieldHit& hit) {
   const float per_x = (field.cols - 1) / (2 * field.size[0]),
               per_y = (field.rows - 1) / (2 * field.size[1]);
-  const Vec3 p = along(o, start, d);
+  const Vec3f p = along(o, start, d);
   const Float gx = (p.x + field.size[0]) * per_x, gy = (p.y + field.size[1]) * per_y;
   const Float sx = d.x * per_x, sy = d.y * per_y;
   const Float length = stop - start;
@@ -96,7 +96,7 @@ inline void march(const HeightField& field, Vec3 o, Vec3 d, Float start, Float s
         const Float t = t0 + (t1 - t0) * select(abs(drop) > Float(1e-30f), fa / drop, 0.0f);
         const Float middle = (t0 + t1) * 0.5f;
         const Mask first = fma(middle, sy, gy) - cy <= fma(middle, sx, gx) - cx;
-        const Vec3 n = Sphere::normal(
+        const Vec3f n = Sphere::normal(
             nullptr, {-cell.slope_x(first) * per_x, -cell.slope_y(first) * per_y, 1.0f});
         const Int prim =
             (iy * int_of(field.cols - 1) + ix) * int_of(2) + select(first, int_of(0), int_of(1));
@@ -118,17 +118,17 @@ inline void march(const HeightField& field, Vec3 o, Vec3 d, Float start, Float s
   }
 }
 
-inline FieldHit intersect_height_field(const HeightField& field, Vec3 o, Vec3 d, Float limit,
+inline FieldHit intersect_height_field(const HeightField& field, Vec3f o, Vec3f d, Float limit,
                                        bool cull) {
   FieldHit hit = {kNoHit, int_of(-1), {0.0f, 0.0f, 0.0f}};
   const float base[3] = {field.size[0], field.size[1], 0.5f * field.size[3]};
-  const Vec3 ob = {o.x, o.y, o.z + base[2]};
+  const Vec3f ob = {o.x, o.y, o.z + base[2]};
   const Float t_base = Box::intersect(base, ob, d, cull);
   if (any(t_base < Float(kNoHit)))
     take(hit, t_base < Float(kNoHit), t_base, int_of(-1), Box::normal(base, along(ob, t_base, d)));
 
   const float top[3] = {field.size[0], field.size[1], 0.5f * field.size[2]};
-  const Vec3 ot = {o.x, o.y, o.z - top[2]};
+  const Vec3f ot = {o.x, o.y, o.z - top[2]};
   const Interval in = Box::interval(top, ot, d);
   const Float start = max(in.enter, 0.0f), stop = min(in.leave, limit);
   const Mask active = (in.enter <= in.leave) & (in.leave >= Float(0.0f)) & (start <= stop);
@@ -145,8 +145,8 @@ inline FieldHit intersect_height_field(const HeightField& field, Vec3 o, Vec3 d,
     const Float t = end == 0 ? in.enter : in.leave;
     const Mask m = end == 0 ? entering : leaving;
     if (!any(m)) continue;
-    const Vec3 p = along(ot, t, d);
-    const Vec3 n = Box::normal(top, p);
+    const Vec3f p = along(ot, t, d);
+    const Vec3f n = Box::normal(top, p);
     const Mask wall = m & (abs(n.z) < Float(0.5f));
     if (!any(wall)) continue;
     const Float gx = min(max((p.x + field.size[0]) * per_x, 0.0f), last_x);

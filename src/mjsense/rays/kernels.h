@@ -7,6 +7,7 @@
 
 namespace mjsense {
 
+struct LocalPacket;
 struct RayPacket;
 struct HitPacket;
 struct RayGeom;
@@ -42,6 +43,7 @@ struct KernelFilter {
 };
 
 struct RayKernels {
+  void (*place)(const LocalPacket&, const float* rotation, float tmax, RayPacket&);
   int (*gather)(const KernelWorld&, const KernelFilter&, const RayPacket&, RayCandidate* out);
   void (*trace)(const KernelScene&, const KernelWorld&, const KernelFilter&, const RayPacket&,
                 HitPacket&, const RayCandidate*, int count);

@@ -30,24 +30,24 @@ struct Frame {
     for (int i = 0; i < 3; ++i)
       base[i] = static_cast<float>(g.mat[i] * x + g.mat[3 + i] * y + g.mat[6 + i] * z);
   }
-  Vec3 direction(const float (*d)[kPacket], int k) const {
+  Vec3f direction(const float (*d)[kPacket], int k) const {
     const Float x = load(d[0] + k), y = load(d[1] + k), z = load(d[2] + k);
     return {fma(r[0], x, fma(r[3], y, Float(r[6]) * z)),
             fma(r[1], x, fma(r[4], y, Float(r[7]) * z)),
             fma(r[2], x, fma(r[5], y, Float(r[8]) * z))};
   }
-  Vec3 point(const float (*o)[kPacket], int k) const {
-    const Vec3 p = direction(o, k);
+  Vec3f point(const float (*o)[kPacket], int k) const {
+    const Vec3f p = direction(o, k);
     return {p.x + base[0], p.y + base[1], p.z + base[2]};
   }
-  Vec3 to_world(Vec3 n) const {
+  Vec3f to_world(Vec3f n) const {
     return {fma(r[0], n.x, fma(r[1], n.y, Float(r[2]) * n.z)),
             fma(r[3], n.x, fma(r[4], n.y, Float(r[5]) * n.z)),
             fma(r[6], n.x, fma(r[7], n.y, Float(r[8]) * n.z))};
   }
 };
 
-Vec3 unit(Vec3 n) {
+Vec3f unit(Vec3f n) {
   const Float s = Float(1.0f) / sqrt(max(dot(n, n), 1e-30f));
   return {n.x * s, n.y * s, n.z * s};
 }
@@ -62,7 +62,7 @@ Mask nearer(const HitPacket& hits, const RayPacket& rays, int k, Float t, int ge
   return (before | tie) & (t <= load(rays.tmax + k)) & (t < Float(kNoHit));
 }
 
-void put(HitPacket& hits, int k, Mask m, Float t, int geom, Int prim, Vec3 n) {
+void put(HitPacket& hits, int k, Mask m, Float t, int geom, Int prim, Vec3f n) {
   store(hits.t + k, select(m, t, load(hits.t + k)));
   store(hits.geom + k, select(m, int_of(geom), load(hits.geom + k)));
   store(hits.prim + k, select(m, prim, load(hits.prim + k)));
@@ -77,7 +77,7 @@ template <class Shape>
 void trace_solid(const RayGeom& g, int id, bool cull, const RayPacket& rays, HitPacket& hits) {
   const Frame frame(g, rays.origin);
   for (int k = 0; k < kPacket; k += kWidth) {
-    const Vec3 o = frame.point(rays.o, k), d = frame.direction(rays.d, k);
+    const Vec3f o = frame.point(rays.o, k), d = frame.direction(rays.d, k);
     const Float t = Shape::intersect(g.size, o, d, cull);
     const Mask m = nearer(hits, rays, k, t, id);
     if (any(m))
@@ -109,14 +109,14 @@ struct MeshRays {
     bool some = false;
     const float pad = 1e-5f + 1e-4f * (g.half[0] + g.half[1] + g.half[2]);
     for (int k = 0; k < kPacket; k += kWidth) {
-      const Vec3 o = frame.point(rays.o, k), d = frame.direction(rays.d, k);
+      const Vec3f o = frame.point(rays.o, k), d = frame.direction(rays.d, k);
       const float size[3] = {g.half[0] + pad, g.half[1] + pad, g.half[2] + pad};
-      const Vec3 c = {o.x - g.center[0], o.y - g.center[1], o.z - g.center[2]};
+      const Vec3f c = {o.x - g.center[0], o.y - g.center[1], o.z - g.center[2]};
       const Interval in = Box::interval(size, c, d);
       const Float t = max(in.enter, 0.0f), cut = load(limit + k);
       const Mask m = (in.enter <= in.leave) & (in.leave >= Float(0.0f)) & (t <= cut);
       some |= any(m);
-      const Vec3 p = along(o, t, d);
+      const Vec3f p = along(o, t, d);
       store(valid + k, select(m, int_of(-1), int_of(0)));
       store(start + k, t);
       store(rh.ray.org_x + k, p.x);
@@ -158,7 +158,7 @@ void trace_triangles(RTCScene scene, const RayGeom& g, int id, bool cull, const 
     const Float t = select(found, load(mesh.start + k) + load(mesh.rh.ray.tfar + k), Float(kNoHit));
     const Mask m = nearer(hits, rays, k, t, id);
     if (!any(m)) continue;
-    const Vec3 n =
+    const Vec3f n =
         unit({load(mesh.rh.hit.Ng_x + k), load(mesh.rh.hit.Ng_y + k), load(mesh.rh.hit.Ng_z + k)});
     put(hits, k, m, t, id, load(reinterpret_cast<int*>(mesh.rh.hit.primID) + k), frame.to_world(n));
     store(hits.u + k, select(m, load(mesh.rh.hit.u + k), load(hits.u + k)));
@@ -183,7 +183,7 @@ void trace_height_field(const HeightField& field, const RayGeom& g, int id, bool
                         const RayPacket& rays, HitPacket& hits) {
   const Frame frame(g, rays.origin);
   for (int k = 0; k < kPacket; k += kWidth) {
-    const Vec3 o = frame.point(rays.o, k), d = frame.direction(rays.d, k);
+    const Vec3f o = frame.point(rays.o, k), d = frame.direction(rays.d, k);
     const Float limit = min(load(hits.t + k), load(rays.tmax + k));
     const FieldHit hit = intersect_height_field(field, o, d, limit, cull);
     const Mask m = nearer(hits, rays, k, hit.t, id);
@@ -305,7 +305,20 @@ std::uint32_t occluded(const KernelScene& scene, const KernelWorld& world,
   return hit & active;
 }
 
-constexpr RayKernels kKernels = {&gather_candidates, &trace, &occluded};
+void place(const LocalPacket& local, const float* r, float tmax, RayPacket& out) {
+  for (int k = 0; k < kPacket; k += kWidth) {
+    const Vec3f o = {load(local.o[0] + k), load(local.o[1] + k), load(local.o[2] + k)};
+    const Vec3f d = {load(local.d[0] + k), load(local.d[1] + k), load(local.d[2] + k)};
+    for (int i = 0; i < 3; ++i) {
+      const Vec3f row = {r[3 * i], r[3 * i + 1], r[3 * i + 2]};
+      store(out.o[i] + k, dot(row, o));
+      store(out.d[i] + k, dot(row, d));
+    }
+    store(out.tmax + k, load(local.active + k) * tmax);
+  }
+}
+
+constexpr RayKernels kKernels = {&place, &gather_candidates, &trace, &occluded};
 
 }  // namespace
 }  // namespace mjsense

@@ -21,6 +21,13 @@ struct alignas(64) RayPacket {
   double origin[3];     // m, world
 };
 
+// The same rays in a sensor's frame, before the sensor's pose is known; active < 0: no ray.
+struct alignas(64) LocalPacket {
+  float o[3][kPacket];
+  float d[3][kPacket];
+  float active[kPacket];
+};
+
 // What the rays hit first. A ray without a hit has t = kNoHit, geom = -1, and everything else 0.
 struct alignas(64) HitPacket {
   float t[kPacket];     // m

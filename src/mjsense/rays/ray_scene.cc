@@ -36,7 +36,7 @@ KernelWorld kernel_world(const RayWorld& w) {
 
 }  // namespace
 
-RayScratch::RayScratch(const RayScene& scene) : candidates_(scene.num_objects()) {}
+RayScratch::RayScratch(int num_objects) : candidates_(num_objects) {}
 
 RayScene::RayScene(const mjModel* model, int num_worlds)
     : model_(model),
@@ -49,6 +49,11 @@ RayScene::RayScene(const mjModel* model, int num_worlds)
 RayScene::~RayScene() = default;
 
 void RayScene::update(const World& world) { worlds_[world.id].update(world.model, world.data); }
+
+void RayScene::place(const LocalPacket& local, const float rotation[9], float tmax,
+                     RayPacket& rays) const {
+  kernels_->place(local, rotation, tmax, rays);
+}
 
 void RayScene::gather(int world, const RayFilter& filter, const RayPacket& rays,
                       RayScratch& scratch) const {
@@ -79,7 +84,7 @@ std::uint32_t RayScene::occluded(int world, const RayFilter& filter, const RayPa
 
 Hit RayScene::trace(int world, const RayFilter& filter, const double origin[3],
                     const double direction[3]) const {
-  RayScratch scratch(*this);
+  RayScratch scratch(num_objects());
   RayPacket rays{};
   HitPacket hits;
   const double length = std::sqrt(direction[0] * direction[0] + direction[1] * direction[1] +

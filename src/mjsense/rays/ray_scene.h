@@ -33,7 +33,7 @@ struct SharedGeometry;
 // query.
 class RayScratch {
  public:
-  explicit RayScratch(const RayScene& scene);
+  explicit RayScratch(int num_objects);  // RayScene::num_objects()
   std::span<RayCandidate> candidates() { return {candidates_.data(), count}; }
   RayCandidate* data() { return candidates_.data(); }
   std::size_t count = 0;
@@ -56,6 +56,9 @@ class RayScene {
   // Copies poses and per-world properties of world.id from world.data and world.model.
   void update(const World& world);
   const RayWorld& world(int id) const { return worlds_[id]; }
+
+  // Rays of a sensor whose rotation is `rotation` (row-major R_WS); origin is the caller's to set.
+  void place(const LocalPacket& local, const float rotation[9], float tmax, RayPacket& rays) const;
 
   // Nearest hits of 16 rays.
   void trace(int world, const RayFilter& filter, const RayPacket& rays, HitPacket& hits,

@@ -208,13 +208,13 @@ inline Mask operator>(Float a, Float b) { return b < a; }
 inline Mask operator>=(Float a, Float b) { return b <= a; }
 constexpr std::uint32_t kAllLanes = (1u << kWidth) - 1;
 
-struct Vec3 {
+struct Vec3f {
   Float x, y, z;
 };
-inline Vec3 operator+(Vec3 a, Vec3 b) { return {a.x + b.x, a.y + b.y, a.z + b.z}; }
-inline Vec3 operator-(Vec3 a, Vec3 b) { return {a.x - b.x, a.y - b.y, a.z - b.z}; }
-inline Float dot(Vec3 a, Vec3 b) { return fma(a.x, b.x, fma(a.y, b.y, a.z * b.z)); }
-inline Vec3 along(Vec3 o, Float t, Vec3 d) {
+inline Vec3f operator+(Vec3f a, Vec3f b) { return {a.x + b.x, a.y + b.y, a.z + b.z}; }
+inline Vec3f operator-(Vec3f a, Vec3f b) { return {a.x - b.x, a.y - b.y, a.z - b.z}; }
+inline Float dot(Vec3f a, Vec3f b) { return fma(a.x, b.x, fma(a.y, b.y, a.z * b.z)); }
+inline Vec3f along(Vec3f o, Float t, Vec3f d) {
   return {fma(t, d.x, o.x), fma(t, d.y, o.y), fma(t, d.z, o.z)};
 }
 

@@ -30,27 +30,27 @@ inline Interval slab(Float s, Float o, Float d) {
 }
 
 struct Plane {
-  static Float intersect(const float* size, Vec3 o, Vec3 d, bool) {
+  static Float intersect(const float* size, Vec3f o, Vec3f d, bool) {
     const Float t = -o.z / d.z;
     Mask hit = (d.z < Float(-1e-15f)) & (t >= Float(0.0f));
     if (size[0] > 0) hit = hit & (abs(fma(t, d.x, o.x)) <= Float(size[0]));
     if (size[1] > 0) hit = hit & (abs(fma(t, d.y, o.y)) <= Float(size[1]));
     return select(hit, t, Float(kNoHit));
   }
-  static Vec3 normal(const float*, Vec3) { return {0.0f, 0.0f, 1.0f}; }
+  static Vec3f normal(const float*, Vec3f) { return {0.0f, 0.0f, 1.0f}; }
 };
 
 struct Box {
-  static Interval interval(const float* size, Vec3 o, Vec3 d) {
+  static Interval interval(const float* size, Vec3f o, Vec3f d) {
     const Interval x = slab(size[0], o.x, d.x), y = slab(size[1], o.y, d.y),
                    z = slab(size[2], o.z, d.z);
     return {max(x.enter, max(y.enter, z.enter)), min(x.leave, min(y.leave, z.leave))};
   }
-  static Float intersect(const float* size, Vec3 o, Vec3 d, bool cull) {
+  static Float intersect(const float* size, Vec3f o, Vec3f d, bool cull) {
     const Interval in = interval(size, o, d);
     return first_ahead(in, in.enter <= in.leave, cull);
   }
-  static Vec3 normal(const float* size, Vec3 p) {
+  static Vec3f normal(const float* size, Vec3f p) {
     const Float x = abs(abs(p.x) - size[0]), y = abs(abs(p.y) - size[1]),
                 z = abs(abs(p.z) - size[2]);
     const Mask is_x = (x <= y) & (x <= z), is_y = ~is_x & (y <= z), is_z = ~is_x & ~is_y;
@@ -61,30 +61,31 @@ struct Box {
 };
 
 struct Sphere {
-  static Float intersect(const float* size, Vec3 o, Vec3 d, bool cull) {
+  static Float intersect(const float* size, Vec3f o, Vec3f d, bool cull) {
     const Float middle = -dot(o, d);
-    const Vec3 p = along(o, middle, d);
+    const Vec3f p = along(o, middle, d);
     const Float det = Float(size[0] * size[0]) - dot(p, p);
     const Float half = sqrt(max(det, 0.0f));
     return first_ahead({middle - half, middle + half}, det > Float(0.0f), cull);
   }
-  static Vec3 normal(const float*, Vec3 p) {
+  static Vec3f normal(const float*, Vec3f p) {
     const Float s = Float(1.0f) / sqrt(max(dot(p, p), 1e-30f));
     return {p.x * s, p.y * s, p.z * s};
   }
 };
 
 struct Ellipsoid {
-  static Float intersect(const float* size, Vec3 o, Vec3 d, bool cull) {
+  static Float intersect(const float* size, Vec3f o, Vec3f d, bool cull) {
     const float s[3] = {1 / size[0], 1 / size[1], 1 / size[2]};
-    const Vec3 so = {o.x * s[0], o.y * s[1], o.z * s[2]}, sd = {d.x * s[0], d.y * s[1], d.z * s[2]};
+    const Vec3f so = {o.x * s[0], o.y * s[1], o.z * s[2]},
+                sd = {d.x * s[0], d.y * s[1], d.z * s[2]};
     const Float a = dot(sd, sd), middle = -dot(so, sd) / a;
-    const Vec3 p = along(so, middle, sd);
+    const Vec3f p = along(so, middle, sd);
     const Float det = Float(1.0f) - dot(p, p);
     const Float half = sqrt(max(det, 0.0f) / a);
     return first_ahead({middle - half, middle + half}, det > Float(0.0f), cull);
   }
-  static Vec3 normal(const float* size, Vec3 p) {
+  static Vec3f normal(const float* size, Vec3f p) {
     const float s[3] = {1 / (size[0] * size[0]), 1 / (size[1] * size[1]), 1 / (size[2] * size[2])};
     return Sphere::normal(size, {p.x * s[0], p.y * s[1], p.z * s[2]});
   }
@@ -95,7 +96,7 @@ struct Ellipsoid {
 struct Tube {
   Interval in;
   Mask hit;
-  Tube(float r, Vec3 o, Vec3 d) {
+  Tube(float r, Vec3f o, Vec3f d) {
     const Float a = max(fma(d.x, d.x, d.y * d.y), 1e-20f);
     const Float middle = -fma(o.x, d.x, o.y * d.y) / a;
     const Float x = fma(middle, d.x, o.x), y = fma(middle, d.y, o.y);
@@ -107,15 +108,15 @@ struct Tube {
 };
 
 struct Cylinder {
-  static Float intersect(const float* size, Vec3 o, Vec3 d, bool cull) {
+  static Float intersect(const float* size, Vec3f o, Vec3f d, bool cull) {
     const Float middle = -dot(o, d);
-    const Vec3 p = along(o, middle, d);
+    const Vec3f p = along(o, middle, d);
     const Tube tube(size[0], p, d);
     const Interval caps = slab(size[1], p.z, d.z);
     const Float enter = max(tube.in.enter, caps.enter), leave = min(tube.in.leave, caps.leave);
     return first_ahead({middle + enter, middle + leave}, tube.hit & (enter <= leave), cull);
   }
-  static Vec3 normal(const float* size, Vec3 p) {
+  static Vec3f normal(const float* size, Vec3f p) {
     const Float rho = sqrt(fma(p.x, p.x, p.y * p.y));
     const Mask cap = abs(abs(p.z) - size[1]) < abs(rho - size[0]);
     const Float s = Float(1.0f) / max(rho, 1e-20f);
@@ -127,26 +128,26 @@ struct Cylinder {
 struct Capsule {
   // The end of the tube's interval at t, moved to the ball at that end if it lies beyond the
   // straight part. `side`: -1 entry, 1 exit.
-  static Float end(Float t, float side, float r, float h, Vec3 p, Vec3 d, Mask& hit) {
+  static Float end(Float t, float side, float r, float h, Vec3f p, Vec3f d, Mask& hit) {
     const Float z = fma(t, d.z, p.z);
     const Mask beyond = abs(z) > Float(h);
-    const Vec3 c = {p.x, p.y, p.z - select(z < Float(0.0f), Float(-h), Float(h))};
+    const Vec3f c = {p.x, p.y, p.z - select(z < Float(0.0f), Float(-h), Float(h))};
     const Float middle = -dot(c, d);
-    const Vec3 q = along(c, middle, d);
+    const Vec3f q = along(c, middle, d);
     const Float det = Float(r * r) - dot(q, q);
     hit = hit & (~beyond | (det > Float(0.0f)));
     return select(beyond, fma(sqrt(max(det, 0.0f)), side, middle), t);
   }
-  static Float intersect(const float* size, Vec3 o, Vec3 d, bool cull) {
+  static Float intersect(const float* size, Vec3f o, Vec3f d, bool cull) {
     const Float middle = -dot(o, d);
-    const Vec3 p = along(o, middle, d);
+    const Vec3f p = along(o, middle, d);
     const Tube tube(size[0], p, d);
     Mask hit = tube.hit;
     const Float enter = end(tube.in.enter, -1.0f, size[0], size[1], p, d, hit);
     const Float leave = end(tube.in.leave, 1.0f, size[0], size[1], p, d, hit);
     return first_ahead({middle + enter, middle + leave}, hit, cull);
   }
-  static Vec3 normal(const float* size, Vec3 p) {
+  static Vec3f normal(const float* size, Vec3f p) {
     const Float h = size[1];
     return Sphere::normal(size, {p.x, p.y, p.z - min(max(p.z, -h), h)});
   }

@@ -1,0 +1,87 @@
+#include "mjsense/sensors/height/terrain_height.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <array>
+#include <string_view>
+
+#include "mjsense/core/error.h"
+
+namespace mjsense {
+
+std::unique_ptr<Sensor> TerrainHeightSensorCfg::build() const {
+  return std::make_unique<TerrainHeightSensor>(*this);
+}
+
+TerrainHeightSensor::TerrainHeightSensor(const TerrainHeightSensorCfg& cfg) : RayCastSensor(cfg) {
+  constexpr std::array<std::string_view, 4> kNames = {"min", "max", "mean", "none"};
+  const auto found = std::find(kNames.begin(), kNames.end(), cfg.reduction);
+  if (found == kNames.end())
+    throw ValueError(fmt::format("{}: reduction is '{}': must be 'min', 'max', 'mean' or 'none'",
+                                 place(), cfg.reduction));
+  reduction_ = static_cast<Reduction>(found - kNames.begin());
+}
+
+void TerrainHeightSensor::initialize(const SensorInit& init) {
+  RayCastSensor::initialize(init);
+  SensorSpec spec;
+  spec.shape = reduction_ == Reduction::kNone ? Shape{num_frames(), num_rays_per_frame()}
+                                              : Shape{num_frames()};
+  spec.unit = "m";
+  spec.frame = "world";
+  spec.description = "height of each frame above the surface below it";
+  heights_ = &add_field("heights", std::move(spec), init.num_worlds);
+}
+
+void TerrainHeightSensor::finish(const RayScene& rays, int world, RayScratch& scratch) {
+  const int n = num_rays_per_frame();
+  const float none = static_cast<float>(cfg_.max_distance);
+  const float* distance = distances_->data.row<float>(world).data();
+  const float* hit = hit_pos_->data.row<float>(world).data();
+  const float* normal = normals_->data.row<float>(world).data();
+  float* out = heights_->data.row<float>(world).data();
+  for (int f = 0; f < num_frames(); ++f) {
+    const double z = frame_pose(world, f).pos[2];
+    const int first = f * n;
+    const bool any =
+        std::any_of(distance + first, distance + first + n, [](float t) { return t >= 0; });
+    const float missing = any ? none : height_without_hits(rays, world, f, scratch);
+    float least = 0, most = 0;
+    double sum = 0;
+    for (int i = 0; i < n; ++i) {
+      const int r = first + i;
+      float h = missing;
+      if (distance[r] >= 0)
+        h = normal[3 * r + 2] < 0 ? 0.0f : static_cast<float>(z - hit[3 * r + 2]);
+      if (reduction_ == Reduction::kNone) out[r] = h;
+      least = i == 0 ? h : std::min(least, h);
+      most = i == 0 ? h : std::max(most, h);
+      sum += h;
+    }
+    if (reduction_ == Reduction::kMin) out[f] = least;
+    if (reduction_ == Reduction::kMax) out[f] = most;
+    if (reduction_ == Reduction::kMean) out[f] = static_cast<float>(sum / n);
+  }
+}
+
+// Straight down from the frame, however far; then from max_distance above it.
+float TerrainHeightSensor::height_without_hits(const RayScene& rays, int world, int frame,
+                                               RayScratch& scratch) const {
+  const FramePose& pose = frame_pose(world, frame);
+  double ground = 0;
+  RayPacket down{};
+  HitPacket hits;
+  for (int i = 0; i < kPacket; ++i) {
+    down.d[2][i] = -1.0f;
+    down.tmax[i] = i < 2 ? kNoHit : -1.0f;
+  }
+  down.o[2][1] = static_cast<float>(cfg_.max_distance);
+  std::copy_n(pose.pos, 3, down.origin);
+  rays.trace(world, filter(frame), down, hits, scratch);
+  for (int i = 1; i >= 0; --i)
+    if (hits.geom[i] >= 0) ground = pose.pos[2] + (down.o[2][i] - hits.t[i]);
+  return static_cast<float>(std::clamp(pose.pos[2] - ground, 0.0, cfg_.max_distance));
+}
+
+}  // namespace mjsense

@@ -1,0 +1,43 @@
+#pragma once
+// TerrainHeightSensor: how high frames (feet, a base) are above what lies below them. A
+// RayCastSensor with one more field:
+//   heights  float32 [B, F] m (reduction min, max, mean) or [B, F, n] m (none)
+//
+// A ray that hits gives frame z - hit z; on a surface's underside (the frame is inside something)
+// 0; a ray that misses gives max_distance. Where all rays of a frame miss, the ground straight
+// below decides, however far, else the one above (the frame lies under it: 0): the difference of
+// heights, within [0, max_distance]. Only where there is no ground at all, the world's z = 0 stands
+// for it.
+
+#include <memory>
+#include <string>
+
+#include "mjsense/sensors/raycast/raycast.h"
+
+namespace mjsense {
+
+struct TerrainHeightSensorCfg : RayCastSensorCfg {
+  std::string reduction = "min";  // min max mean none, over a frame's rays
+
+  std::unique_ptr<Sensor> build() const override;
+};
+
+class TerrainHeightSensor : public RayCastSensor {
+ public:
+  explicit TerrainHeightSensor(const TerrainHeightSensorCfg& cfg);
+  std::string_view kind() const override { return "terrain_height"; }
+  void initialize(const SensorInit& init) override;
+
+ protected:
+  bool wants_finish() const override { return true; }
+  void finish(const RayScene& rays, int world, RayScratch& scratch) override;
+
+ private:
+  enum class Reduction { kMin, kMax, kMean, kNone };
+  float height_without_hits(const RayScene& rays, int world, int frame, RayScratch& scratch) const;
+
+  Reduction reduction_;
+  Field* heights_ = nullptr;
+};
+
+}  // namespace mjsense

@@ -1,0 +1,162 @@
+#include "mjsense/sensors/raycast/pattern.h"
+
+#include <fmt/format.h>
+
+#include <cmath>
+#include <numbers>
+
+#include "mjsense/core/error.h"
+#include "mjsense/scene/resolve.h"
+
+namespace mjsense {
+namespace {
+
+constexpr std::size_t kMaxRays = 1 << 24;
+
+using Direction = std::array<double, 3>;
+
+Direction unit(const Direction& d, std::string_view place) {
+  const double length = std::sqrt(d[0] * d[0] + d[1] * d[1] + d[2] * d[2]);
+  if (!std::isfinite(length) || length < 1e-12)
+    throw ValueError(fmt::format("{}: ray direction ({}, {}, {}) has no finite length above 0",
+                                 place, d[0], d[1], d[2]));
+  return {d[0] / length, d[1] / length, d[2] / length};
+}
+
+void check_count(double rays, std::string_view place) {
+  if (rays > static_cast<double>(kMaxRays))
+    throw ValueError(fmt::format("{}: {:.0f} rays; at most {}", place, rays, kMaxRays));
+}
+
+std::vector<double> grid_axis(double size, double resolution) {
+  const int count = static_cast<int>(std::ceil((size + 0.5 * resolution) / resolution));
+  std::vector<double> values(count);
+  for (int k = 0; k < count; ++k) values[k] = -0.5 * size + k * resolution;
+  return values;
+}
+
+RayPattern make(const GridPattern& g, const mjModel*, std::string_view place) {
+  if (!(g.resolution > 0) || !std::isfinite(g.resolution))
+    throw ValueError(
+        fmt::format("{}: grid resolution is {}: must be above 0", place, g.resolution));
+  for (double s : g.size)
+    if (!(s >= 0) || !std::isfinite(s))
+      throw ValueError(
+          fmt::format("{}: grid size is ({}, {}): must be 0 or more", place, g.size[0], g.size[1]));
+  check_count((g.size[0] / g.resolution + 1) * (g.size[1] / g.resolution + 1), place);
+  const Direction d = unit(g.direction, place);
+  RayPattern pattern;
+  for (double y : grid_axis(g.size[1], g.resolution))
+    for (double x : grid_axis(g.size[0], g.resolution)) pattern.offsets.push_back({x, y, 0});
+  pattern.directions.assign(pattern.offsets.size(), d);
+  return pattern;
+}
+
+double linspace(int i, int count) { return count > 1 ? -1.0 + 2.0 * i / (count - 1) : -1.0; }
+
+RayPattern make(const PinholePattern& p, const mjModel* model, std::string_view place) {
+  int width = p.width, height = p.height;
+  double tan_v = std::tan(0.5 * p.fovy * std::numbers::pi / 180), tan_h = 0;
+  double fovy = p.fovy;
+  if (!p.camera.empty()) {
+    if (model == nullptr)
+      throw ValueError(fmt::format("{}: camera '{}' needs a model", place, p.camera));
+    const int c = resolve(model, mjOBJ_CAMERA, p.camera, place);
+    width = model->cam_resolution[2 * c];
+    height = model->cam_resolution[2 * c + 1];
+    fovy = model->cam_fovy[c];
+    tan_v = std::tan(0.5 * fovy * std::numbers::pi / 180);
+    const float* sensor = model->cam_sensorsize + 2 * c;
+    const float* focal = model->cam_intrinsic + 4 * c;
+    if (sensor[0] > 0 && sensor[1] > 0 && focal[0] > 0 && focal[1] > 0) {
+      tan_h = sensor[0] / (2.0 * focal[0]);
+      tan_v = sensor[1] / (2.0 * focal[1]);
+      fovy = 2 * std::atan(tan_v) * 180 / std::numbers::pi;
+    }
+  }
+  if (width < 1 || height < 1)
+    throw ValueError(fmt::format("{}: pinhole pattern of {} x {} rays: both must be at least 1",
+                                 place, width, height));
+  if (!(fovy > 0 && fovy < 180))
+    throw ValueError(
+        fmt::format("{}: pinhole fovy is {} degrees: must lie between 0 and 180", place, fovy));
+  check_count(static_cast<double>(width) * height, place);
+  if (tan_h == 0) tan_h = tan_v * width / height;
+  RayPattern pattern;
+  for (int v = 0; v < height; ++v)
+    for (int u = 0; u < width; ++u)
+      pattern.directions.push_back(
+          unit({linspace(u, width) * tan_h, linspace(v, height) * tan_v, -1.0}, place));
+  pattern.offsets.assign(pattern.directions.size(), {0, 0, 0});
+  return pattern;
+}
+
+RayPattern make(const RingPattern& r, const mjModel*, std::string_view place) {
+  const Direction d = unit(r.direction, place);
+  RayPattern pattern;
+  if (r.include_center) pattern.offsets.push_back({0, 0, 0});
+  for (const RingPattern::Ring& ring : r.rings) {
+    if (ring.num_samples < 1 || !(ring.radius >= 0) || !std::isfinite(ring.radius))
+      throw ValueError(
+          fmt::format("{}: ring of radius {} with {} samples: the radius must be 0 or more, the "
+                      "samples at least 1",
+                      place, ring.radius, ring.num_samples));
+    check_count(static_cast<double>(pattern.offsets.size()) + ring.num_samples, place);
+    for (int i = 0; i < ring.num_samples; ++i) {
+      const double angle = 2 * std::numbers::pi * i / ring.num_samples;
+      pattern.offsets.push_back({ring.radius * std::cos(angle), ring.radius * std::sin(angle), 0});
+    }
+  }
+  pattern.directions.assign(pattern.offsets.size(), d);
+  return pattern;
+}
+
+RayPattern make(const UserPattern& u, const mjModel*, std::string_view place) {
+  const std::size_t n = std::max(u.offsets.size(), u.directions.size());
+  for (std::size_t count : {u.offsets.size(), u.directions.size()})
+    if (count != n && count != 1)
+      throw ValueError(
+          fmt::format("{}: pattern of {} offsets and {} directions: give as many, or one", place,
+                      u.offsets.size(), u.directions.size()));
+  RayPattern pattern;
+  for (std::size_t i = 0; i < n; ++i) {
+    const std::array<double, 3>& o = u.offsets[u.offsets.size() == 1 ? 0 : i];
+    for (double x : o)
+      if (!std::isfinite(x))
+        throw ValueError(fmt::format("{}: offset {} of the pattern is ({}, {}, {})", place, i, o[0],
+                                     o[1], o[2]));
+    pattern.offsets.push_back(o);
+    pattern.directions.push_back(unit(u.directions[u.directions.size() == 1 ? 0 : i], place));
+  }
+  return pattern;
+}
+
+}  // namespace
+
+PinholePattern PinholePattern::from_intrinsic_matrix(const std::array<double, 9>& k, int width,
+                                                     int height) {
+  if (!(k[4] > 0))
+    throw ValueError(
+        fmt::format("pinhole pattern: fy is {} in the intrinsic matrix: must be above 0", k[4]));
+  return {width, height, 2 * std::atan(height / (2 * k[4])) * 180 / std::numbers::pi, ""};
+}
+
+PinholePattern PinholePattern::from_mujoco_camera(std::string camera_name) {
+  PinholePattern p;
+  p.camera = std::move(camera_name);
+  return p;
+}
+
+RingPattern RingPattern::single_ring(double radius, int num_samples) {
+  RingPattern p;
+  p.rings = {{radius, num_samples}};
+  return p;
+}
+
+RayPattern make_pattern(const PatternCfg& cfg, const mjModel* model, std::string_view place) {
+  RayPattern pattern = std::visit([&](const auto& p) { return make(p, model, place); }, cfg);
+  if (pattern.size() == 0) throw ValueError(fmt::format("{}: the pattern has no rays", place));
+  return pattern;
+}
+
+}  // namespace mjsense

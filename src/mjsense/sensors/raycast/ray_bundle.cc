@@ -1,0 +1,68 @@
+#include "mjsense/sensors/raycast/ray_bundle.h"
+
+#include <algorithm>
+#include <array>
+#include <numeric>
+#include <span>
+
+namespace mjsense {
+namespace {
+
+// Start and a point at `depth` of each ray: what is close in these six numbers travels together.
+using Key = std::array<double, 6>;
+
+void split(std::span<int> rays, std::span<const Key> keys) {
+  if (static_cast<int>(rays.size()) <= kPacket) {
+    std::sort(rays.begin(), rays.end());
+    return;
+  }
+  int widest = 0;
+  double most = -1;
+  for (int k = 0; k < 6; ++k) {
+    const auto [low, high] = std::minmax_element(
+        rays.begin(), rays.end(), [&](int a, int b) { return keys[a][k] < keys[b][k]; });
+    const double width = keys[*high][k] - keys[*low][k];
+    if (width > most * (1 + 1e-9)) {
+      most = width;
+      widest = k;
+    }
+  }
+  const std::size_t packets = (rays.size() + kPacket - 1) / kPacket, left = packets / 2 * kPacket;
+  std::nth_element(rays.begin(), rays.begin() + left, rays.end(), [&](int a, int b) {
+    return keys[a][widest] != keys[b][widest] ? keys[a][widest] < keys[b][widest] : a < b;
+  });
+  split(rays.first(left), keys);
+  split(rays.subspan(left), keys);
+}
+
+}  // namespace
+
+RayBundle::RayBundle(const RayPattern& pattern, double depth)
+    : num_rays_(static_cast<int>(pattern.size())) {
+  std::vector<Key> keys(num_rays_);
+  for (int i = 0; i < num_rays_; ++i)
+    for (int k = 0; k < 3; ++k) {
+      keys[i][k] = pattern.offsets[i][k];
+      keys[i][3 + k] = pattern.offsets[i][k] + depth * pattern.directions[i][k];
+    }
+  std::vector<int> rays(num_rays_);
+  std::iota(rays.begin(), rays.end(), 0);
+  split(rays, keys);
+
+  const int count = (num_rays_ + kPacket - 1) / kPacket;
+  packets_.resize(count);
+  order_.assign(count * kPacket, -1);
+  std::copy(rays.begin(), rays.end(), order_.begin());
+  for (int p = 0; p < count; ++p)
+    for (int i = 0; i < kPacket; ++i) {
+      const int ray = order_[p * kPacket + i];
+      const int source = ray >= 0 ? ray : order_[p * kPacket];  // idle lanes repeat a neighbour
+      packets_[p].active[i] = ray >= 0 ? 1.0f : -1.0f;
+      for (int k = 0; k < 3; ++k) {
+        packets_[p].o[k][i] = static_cast<float>(pattern.offsets[source][k]);
+        packets_[p].d[k][i] = static_cast<float>(pattern.directions[source][k]);
+      }
+    }
+}
+
+}  // namespace mjsense

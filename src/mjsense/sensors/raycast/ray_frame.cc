@@ -1,0 +1,90 @@
+#include "mjsense/sensors/raycast/ray_frame.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+
+#include "mjsense/core/error.h"
+#include "mjsense/scene/resolve.h"
+
+namespace mjsense {
+
+RayAlignment ray_alignment(std::string_view name, std::string_view place) {
+  if (name == "base") return RayAlignment::kBase;
+  if (name == "yaw") return RayAlignment::kYaw;
+  if (name == "world") return RayAlignment::kWorld;
+  throw ValueError(
+      fmt::format("{}: ray_alignment is '{}': must be 'base', 'yaw' or 'world'", place, name));
+}
+
+RayFrame::RayFrame(const mjModel* m, const Scene* scene, const ObjRef& ref,
+                   std::string_view place) {
+  const ResolvedObj obj = resolve(m, scene, ref, place);
+  type_ = obj.type;
+  id_ = obj.id;
+  switch (type_) {
+    case mjOBJ_BODY:
+    case mjOBJ_XBODY:
+      body_ = id_;
+      break;
+    case mjOBJ_SITE:
+      body_ = m->site_bodyid[id_];
+      break;
+    case mjOBJ_GEOM:
+      body_ = m->geom_bodyid[id_];
+      break;
+    case mjOBJ_CAMERA:
+      body_ = m->cam_bodyid[id_];
+      break;
+    default:
+      throw ValueError(
+          fmt::format("{}: frame '{}' is a {}: must be 'body', 'site', or 'geom' ('xbody' and "
+                      "'camera' will do too)",
+                      place, ref.full_name(), ref.type));
+  }
+}
+
+FramePose RayFrame::pose(const mjData* d, RayAlignment alignment) const {
+  const mjtNum* pos = d->xpos;
+  const mjtNum* mat = d->xmat;
+  if (type_ == mjOBJ_SITE) {
+    pos = d->site_xpos;
+    mat = d->site_xmat;
+  } else if (type_ == mjOBJ_GEOM) {
+    pos = d->geom_xpos;
+    mat = d->geom_xmat;
+  } else if (type_ == mjOBJ_CAMERA) {
+    pos = d->cam_xpos;
+    mat = d->cam_xmat;
+  }
+  FramePose pose;
+  std::copy_n(pos + 3 * id_, 3, pose.pos);
+  std::copy_n(mat + 9 * id_, 9, pose.mat);
+  align_rays(alignment, pose.mat, pose.align);
+  return pose;
+}
+
+void align_rays(RayAlignment alignment, const double mat[9], float out[9]) {
+  if (alignment == RayAlignment::kBase) {
+    std::copy_n(mat, 9, out);
+    return;
+  }
+  double x = 1, y = 0;
+  if (alignment == RayAlignment::kYaw) {
+    x = mat[0];
+    y = mat[3];
+    if (std::hypot(x, y) < 0.1) {
+      const double length = std::max(std::hypot(mat[1], mat[4]), 1e-6);
+      x = mat[4] / length;
+      y = -mat[1] / length;
+    }
+    const double length = std::max(std::hypot(x, y), 1e-6);
+    x /= length;
+    y /= length;
+  }
+  const double a[9] = {x, -y, 0, y, x, 0, 0, 0, 1};
+  std::copy_n(a, 9, out);
+}
+
+}  // namespace mjsense

@@ -1,0 +1,192 @@
+#include "mjsense/sensors/raycast/raycast.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+#include "mjsense/core/error.h"
+#include "mjsense/core/parallel.h"
+
+namespace mjsense {
+namespace {
+
+// Packets that one thread takes at a time.
+constexpr int kChunk = 24;
+constexpr double kInf = std::numeric_limits<double>::infinity();
+
+std::uint32_t group_mask(const std::optional<std::vector<int>>& groups, const std::string& place) {
+  if (!groups) return 0x3f;
+  std::uint32_t mask = 0;
+  for (int g : *groups) {
+    if (g < 0 || g > 5)
+      throw ValueError(fmt::format("{}: include_geom_groups has {}: groups are 0 to 5", place, g));
+    mask |= 1u << g;
+  }
+  return mask;
+}
+
+}  // namespace
+
+std::unique_ptr<Sensor> RayCastSensorCfg::build() const {
+  return std::make_unique<RayCastSensor>(*this);
+}
+
+RayCastSensor::RayCastSensor(const RayCastSensorCfg& cfg) : Sensor(cfg.key()), cfg_(cfg) {
+  if (cfg.frame.empty()) throw ValueError(place() + ": no frame given");
+  alignment_ = ray_alignment(cfg.ray_alignment, place());
+  filter_.groups = group_mask(cfg.include_geom_groups, place());
+  if (!(cfg.max_distance > 0))
+    throw ValueError(
+        fmt::format("{}: max_distance is {} m: must be above 0", place(), cfg.max_distance));
+  if (!(cfg.min_distance >= 0 && cfg.min_distance < cfg.max_distance))
+    throw ValueError(fmt::format("{}: min_distance is {} m: must lie in [0, max_distance = {})",
+                                 place(), cfg.min_distance, cfg.max_distance));
+}
+
+RayCastSensor::~RayCastSensor() = default;
+
+std::string RayCastSensor::place() const { return fmt::format("sensor '{}'", name()); }
+
+Field& RayCastSensor::add(std::string_view name, DType dtype, Shape shape, std::string unit,
+                          std::string frame, double low, double high, std::string description,
+                          int num_worlds) {
+  SensorSpec spec;
+  spec.dtype = dtype;
+  spec.shape = shape;
+  spec.unit = std::move(unit);
+  spec.frame = std::move(frame);
+  spec.low = low;
+  spec.high = high;
+  spec.description = std::move(description);
+  return add_field(name, std::move(spec), num_worlds);
+}
+
+void RayCastSensor::initialize(const SensorInit& init) {
+  const mjModel* m = init.model;
+  frames_.clear();
+  for (const ObjRef& ref : cfg_.frame) frames_.emplace_back(m, init.scene, ref, place());
+  pattern_ = make_pattern(cfg_.pattern, m, place());
+  bundle_ = RayBundle(pattern_, std::min(3.0, cfg_.max_distance));
+  poses_.assign(static_cast<std::size_t>(init.num_worlds) * frames_.size(), FramePose{});
+  const int objects = static_cast<int>(m->ngeom + m->nflex);
+  scratch_.assign(init.threads, RayScratch(objects));
+
+  clear_fields();
+  const int b = init.num_worlds, n = num_rays(), f = num_frames();
+  const double far = cfg_.max_distance;
+  const DType f32 = DType::kFloat32, i32 = DType::kInt32;
+  distances_ = &add("distances", f32, {n}, "m", "", -1, far,
+                    "distance along each ray to the nearest surface; -1: none", b);
+  hit_pos_ = &add("hit_pos_w", f32, {n, 3}, "m", "world", -kInf, kInf,
+                  "where each ray hits; its origin if nowhere", b);
+  normals_ = &add("normals_w", f32, {n, 3}, "", "world", -1, 1,
+                  "unit normal of the surface hit; 0 if none", b);
+  frame_pos_ =
+      &add("frame_pos_w", f32, {f, 3}, "m", "world", -kInf, kInf, "position of each frame", b);
+  frame_quat_ =
+      &add("frame_quat_w", f32, {f, 4}, "", "world", -1, 1, "orientation (wxyz) of each frame", b);
+  pos_ = &add("pos_w", f32, {3}, "m", "world", -kInf, kInf, "position of frame 0", b);
+  quat_ = &add("quat_w", f32, {4}, "", "world", -1, 1, "orientation (wxyz) of frame 0", b);
+  if (cfg_.hit_ids) {
+    geom_id_ = &add("geom_id", i32, {n}, "", "", -1, objects - 1,
+                    "geom that each ray hits, -1 none; geoms + flex id for a flex", b);
+    body_id_ = &add("body_id", i32, {n}, "", "", -1, m->nbody - 1,
+                    "body of the geom that each ray hits; -1 none", b);
+    material_id_ = &add("material_id", i32, {n}, "", "", -1, m->nmat - 1,
+                        "material of the geom that each ray hits; -1 none", b);
+  }
+}
+
+void RayCastSensor::compute(const World& world) {
+  for (int f = 0; f < num_frames(); ++f) {
+    FramePose& pose = poses_[world.id * num_frames() + f];
+    pose = frames_[f].pose(world.data, alignment_);
+    double q[4];
+    mju_mat2Quat(q, pose.mat);
+    std::copy_n(pose.pos, 3, frame_pos_->data.row<float>(world.id).data() + 3 * f);
+    std::copy_n(q, 4, frame_quat_->data.row<float>(world.id).data() + 4 * f);
+  }
+  std::copy_n(frame_pos_->data.row<float>(world.id).data(), 3,
+              pos_->data.row<float>(world.id).data());
+  std::copy_n(frame_quat_->data.row<float>(world.id).data(), 4,
+              quat_->data.row<float>(world.id).data());
+}
+
+void RayCastSensor::cast(const CastContext& context) {
+  const int packets = bundle_.num_packets(), chunks = (packets + kChunk - 1) / kChunk;
+  const int per_world = chunks * num_frames();
+  const int worlds = static_cast<int>(context.ids.size());
+  context.pool.run(worlds * per_world, [&](int item, int thread) {
+    const int world = context.ids[item / per_world], part = item % per_world;
+    const int begin = part % chunks * kChunk;
+    trace_packets(*context.rays, world, part / chunks, begin, std::min(begin + kChunk, packets),
+                  scratch_[thread]);
+  });
+  if (wants_finish())
+    context.pool.run(worlds, [&](int item, int thread) {
+      finish(*context.rays, context.ids[item], scratch_[thread]);
+    });
+}
+
+void RayCastSensor::finish(const RayScene& /*rays*/, int /*world*/, RayScratch& /*scratch*/) {}
+
+RayFilter RayCastSensor::filter(int frame) const {
+  RayFilter filter = filter_;
+  if (cfg_.exclude_parent_body) filter.exclude_body = frames_[frame].body();
+  return filter;
+}
+
+// The rows of one world and frame.
+struct RayCastSensor::Rows {
+  float *distances, *hit_pos, *normals;
+  int *geom_id, *body_id, *material_id;
+};
+
+void RayCastSensor::trace_packets(const RayScene& rays, int world, int frame, int begin, int end,
+                                  RayScratch& scratch) {
+  const FramePose& pose = frame_pose(world, frame);
+  const RayWorld& seen = rays.world(world);
+  const int first = frame * num_rays_per_frame();
+  const auto ids = [&](Field* field) {
+    return field ? field->data.row<int>(world).data() + first : nullptr;
+  };
+  const Rows rows{distances_->data.row<float>(world).data() + first,
+                  hit_pos_->data.row<float>(world).data() + 3 * first,
+                  normals_->data.row<float>(world).data() + 3 * first,
+                  ids(geom_id_),
+                  ids(body_id_),
+                  ids(material_id_)};
+  const RayFilter seen_by = filter(frame);
+  const float nearest = static_cast<float>(cfg_.min_distance),
+              farthest = static_cast<float>(cfg_.max_distance);
+  const float reach = farthest * (1 + 4e-7f);  // rounding makes no miss of a hit at max_distance
+  RayPacket packet;
+  HitPacket hits;
+  std::copy_n(pose.pos, 3, packet.origin);
+  for (int p = begin; p < end; ++p) {
+    rays.place(bundle_.packet(p), pose.align, reach, packet);
+    rays.trace(world, seen_by, packet, hits, scratch);
+    const int* order = bundle_.rays(p);
+    for (int i = 0; i < kPacket; ++i) {
+      const int r = order[i];
+      if (r < 0) continue;
+      const bool hit = hits.geom[i] >= 0 && hits.t[i] >= nearest;
+      const float t = hit ? std::min(hits.t[i], farthest) : 0.0f;
+      rows.distances[r] = hit ? t : -1.0f;
+      for (int k = 0; k < 3; ++k) {
+        rows.hit_pos[3 * r + k] =
+            static_cast<float>(packet.origin[k] + (packet.o[k][i] + t * packet.d[k][i]));
+        rows.normals[3 * r + k] = hit ? hits.n[k][i] : 0.0f;
+      }
+      if (rows.geom_id == nullptr) continue;
+      const int geom = hit ? hits.geom[i] : -1;
+      rows.geom_id[r] = geom;
+      rows.body_id[r] = hit ? seen.bodies()[geom] : -1;
+      rows.material_id[r] = hit ? seen.materials()[geom] : -1;
+    }
+  }
+}
+
+}  // namespace mjsense

@@ -1,0 +1,114 @@
+#pragma once
+// RayCastSensor: distances, hit points and normals of rays that travel with one or more frames.
+//
+// B worlds, F frames, n rays a frame, N = F * n rays (frame-major: ray f * n + i). Fields:
+//   distances     float32 [B, N]     m along the ray; -1: nothing between min_distance and
+//   max_distance hit_pos_w     float32 [B, N, 3]  m, world; the ray's origin where it hits nothing
+//   normals_w     float32 [B, N, 3]  unit, world: outward, or by the triangle's winding; 0 where it
+//   hits nothing frame_pos_w   float32 [B, F, 3]  m, world frame_quat_w  float32 [B, F, 4]  wxyz,
+//   of the frame itself (not of the alignment); largest component positive pos_w, quat_w those of
+//   frame 0, [B, 3] and [B, 4]
+// and with hit_ids
+//   geom_id       int32   [B, N]     -1: none; num_geoms + flex id for a flex
+//   body_id       int32   [B, N]     body of that geom; -1: none, or a flex
+//   material_id   int32   [B, N]     material of that geom; -1: none
+
+#include <array>
+#include <memory>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "mjsense/core/sensor.h"
+#include "mjsense/rays/packet.h"
+#include "mjsense/rays/ray_scene.h"
+#include "mjsense/scene/entity.h"
+#include "mjsense/sensors/raycast/pattern.h"
+#include "mjsense/sensors/raycast/ray_bundle.h"
+#include "mjsense/sensors/raycast/ray_frame.h"
+
+namespace mjsense {
+
+// What a viewer draws of a ray sensor (debug_draw.h). Colours are rgba; sizes in units of the
+// model's stat.meansize.
+struct RayCastVizCfg {
+  bool show_rays = false;  // arrows from origin to hit
+  bool show_normals = false;
+  std::array<float, 4> hit_color{0, 1, 1, 1};
+  std::array<float, 4> ray_color{0, 1, 0, 0.8f};
+  std::array<float, 4> miss_color{1, 0, 0, 0.4f};
+  std::array<float, 4> normal_color{1, 1, 0, 1};
+  double hit_radius = 0.5, ray_width = 0.1, normal_length = 5.0;
+};
+
+struct RayCastSensorCfg : SensorCfg {
+  std::vector<ObjRef>
+      frame;  // body (its own frame, not the inertial one), site, geom; also xbody and camera
+  PatternCfg pattern = GridPattern{};
+  std::string ray_alignment =
+      "base";                  // base yaw world: what of the frame's rotation the rays follow
+  double max_distance = 10.0;  // m; a hit beyond it is none
+  bool exclude_parent_body =
+      true;  // geoms of the frame's own body are not seen; those of its children are
+  std::optional<std::vector<int>> include_geom_groups{{0, 1, 2}};  // nullopt: all
+  bool debug_vis = false;
+  RayCastVizCfg viz;
+
+  // Beyond mjlab's.
+  double min_distance = 0.0;  // m; a hit nearer than this is none (and hides what is behind it)
+  bool hit_ids = true;        // fields geom_id, body_id, material_id
+
+  std::unique_ptr<Sensor> build() const override;
+};
+
+class RayCastSensor : public Sensor {
+ public:
+  explicit RayCastSensor(const RayCastSensorCfg& cfg);
+  ~RayCastSensor() override;
+
+  std::string_view kind() const override { return "raycast"; }
+  Stage stage() const override { return Stage::kCast; }
+  void initialize(const SensorInit& init) override;
+  void compute(const World& world) override;
+  void cast(const CastContext& context) override;
+
+  const RayCastSensorCfg& cfg() const { return cfg_; }
+  int num_frames() const { return static_cast<int>(frames_.size()); }
+  int num_rays_per_frame() const { return bundle_.num_rays(); }
+  int num_rays() const { return num_frames() * num_rays_per_frame(); }
+  // Local rays of one frame, [n].
+  const RayPattern& pattern() const { return pattern_; }
+  // As the last compute() left it: the frame's pose and the alignment of its rays.
+  const FramePose& frame_pose(int world, int frame) const {
+    return poses_[world * num_frames() + frame];
+  }
+
+ protected:
+  // After all rays of a world are traced; worlds in parallel, each on one thread.
+  virtual void finish(const RayScene& rays, int world, RayScratch& scratch);
+  virtual bool wants_finish() const { return false; }
+  std::string place() const;
+  // What rays of this frame see.
+  RayFilter filter(int frame) const;
+  RayCastSensorCfg cfg_;
+  Field *distances_ = nullptr, *hit_pos_ = nullptr, *normals_ = nullptr, *frame_pos_ = nullptr,
+        *frame_quat_ = nullptr, *pos_ = nullptr, *quat_ = nullptr, *geom_id_ = nullptr,
+        *body_id_ = nullptr, *material_id_ = nullptr;
+
+ private:
+  struct Rows;
+  void trace_packets(const RayScene& rays, int world, int frame, int begin, int end,
+                     RayScratch& scratch);
+  Field& add(std::string_view name, DType dtype, Shape shape, std::string unit, std::string frame,
+             double low, double high, std::string description, int num_worlds);
+
+  RayAlignment alignment_ = RayAlignment::kBase;
+  RayFilter filter_;
+  RayPattern pattern_;
+  RayBundle bundle_;
+  std::vector<RayFrame> frames_;
+  std::vector<FramePose> poses_;     // [B, F]
+  std::vector<RayScratch> scratch_;  // one a thread
+};
+
+}  // namespace mjsense

@@ -1,0 +1,310 @@
+#include "mjsense/sensors/raycast/raycast.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+#include <memory>
+
+#include "mjsense/core/error.h"
+#include "mjsense/scene/scene.h"
+#include "mjsense/sensors/height/terrain_height.h"
+#include "mjsense/sim/simulation.h"
+
+namespace mjsense {
+namespace {
+
+using ::testing::Each;
+using ::testing::ElementsAre;
+using ::testing::FloatNear;
+using ::testing::HasSubstr;
+using ::testing::Pointwise;
+
+// A floor, a step 0.5 m high for x > 0.5, and a floating base with a child body under it and geoms
+// in other groups.
+constexpr char kRobot[] = R"(
+<mujoco>
+  <asset><material name="rock" rgba=".5 .5 .5 1"/><material name="glass" rgba="1 1 1 0"/></asset>
+  <worldbody>
+    <geom name="floor" type="plane" size="0 0 .1" material="rock"/>
+    <geom name="step" type="box" size="1 2 .225" pos="1.5 0 .275"/>
+    <geom name="window" type="box" size=".1 .1 .1" pos="-3 0 1" material="glass"/>
+    <geom name="hidden" type="box" size=".1 .1 .1" pos="-4 0 1" group="3"/>
+    <camera name="eye" pos="0 0 2" resolution="4 3" fovy="60"/>
+    <body name="base" pos="0 0 2">
+      <freejoint name="root"/>
+      <geom name="shell" type="box" size=".2 .2 .1" mass="1"/>
+      <site name="scan" pos="0 0 -.05" euler="0 0 90"/>
+      <body name="belly" pos="0 0 -.5"><geom name="ball" type="sphere" size=".05" mass=".1"/></body>
+    </body>
+  </worldbody>
+</mujoco>)";
+
+constexpr double kOnItsSide = 0.70710678118654752;  // w and x of a quarter turn about x
+
+template <class Cfg>
+std::shared_ptr<Cfg> sensor_cfg(std::string name = "ray") {
+  auto cfg = std::make_shared<Cfg>();
+  cfg->name = std::move(name);
+  cfg->frame = {{"body", "base", "r"}};
+  cfg->pattern = GridPattern{.size = {0, 0}};
+  return cfg;
+}
+
+struct Lab {
+  std::shared_ptr<Scene> scene;
+  std::unique_ptr<Simulation> sim;
+
+  explicit Lab(std::vector<std::shared_ptr<const SensorCfg>> sensors, SimulationCfg cfg = {}) {
+    SceneCfg s;
+    s.entities.emplace_back("r", EntityCfg{.model = {.xml = kRobot}});
+    s.sensors = std::move(sensors);
+    scene = std::make_shared<Scene>(std::move(s));
+    sim = std::make_unique<Simulation>(scene, cfg);
+  }
+  template <class T = float>
+  std::vector<T> read(std::string_view field, std::string_view name = "ray") {
+    Sensor& sensor = scene->sensor(name);
+    sim->refresh(sensor);
+    const auto all = sensor.field(field).data.all<T>();
+    return {all.begin(), all.end()};
+  }
+  // Position and wxyz of the base.
+  void pose(std::initializer_list<double> qpos, int world = 0) {
+    const ArrayView v = sim->worlds().state_component("qpos");
+    std::copy(qpos.begin(), qpos.end(), reinterpret_cast<double*>(v.data + world * v.strides[0]));
+    const int ids[] = {world};
+    sim->forward(ids);
+  }
+};
+
+std::string error_of(const std::shared_ptr<RayCastSensorCfg>& cfg) {
+  try {
+    Lab lab({cfg});
+  } catch (const Error& e) {
+    return e.what();
+  }
+  return "";
+}
+
+TEST(RayCast, SeesItsChildButNotItself) {
+  Lab lab({sensor_cfg<RayCastSensorCfg>()});
+  EXPECT_THAT(lab.read("distances"), ElementsAre(FloatNear(0.45f, 1e-6f)));
+  EXPECT_THAT(lab.read("normals_w"), Pointwise(FloatNear(1e-6f), {0.0f, 0.0f, 1.0f}));
+  EXPECT_THAT(lab.read("hit_pos_w"), Pointwise(FloatNear(1e-6f), {0.0f, 0.0f, 1.55f}));
+  const mjModel* m = lab.sim->model();
+  EXPECT_EQ(lab.read<int>("geom_id")[0], mj_name2id(m, mjOBJ_GEOM, "r/ball"));
+  EXPECT_EQ(lab.read<int>("body_id")[0], mj_name2id(m, mjOBJ_BODY, "r/belly"));
+  EXPECT_EQ(lab.read<int>("material_id")[0], -1);
+}
+
+TEST(RayCast, SeesItselfFromInsideIfAsked) {
+  auto cfg = sensor_cfg<RayCastSensorCfg>();
+  cfg->exclude_parent_body = false;
+  Lab lab({cfg});
+  EXPECT_THAT(lab.read("distances"), ElementsAre(FloatNear(0.1f, 1e-6f)));
+  EXPECT_THAT(lab.read("normals_w"), Pointwise(FloatNear(1e-6f), {0.0f, 0.0f, -1.0f}));
+}
+
+TEST(RayCast, AMissKeepsTheOrigin) {
+  auto cfg = sensor_cfg<RayCastSensorCfg>();
+  cfg->pattern = GridPattern{.size = {0, 0}, .direction = {0, 0, 1}};
+  Lab lab({cfg});
+  lab.pose({-1, 2, 3, 1, 0, 0, 0});
+  EXPECT_THAT(lab.read("distances"), ElementsAre(-1.0f));
+  EXPECT_THAT(lab.read("normals_w"), Each(0.0f));
+  EXPECT_THAT(lab.read("hit_pos_w"), ElementsAre(-1.0f, 2.0f, 3.0f));
+  EXPECT_THAT(lab.read<int>("geom_id"), ElementsAre(-1));
+}
+
+TEST(RayCast, DistancesAtBothLimitsCount) {
+  auto cfg = sensor_cfg<RayCastSensorCfg>();
+  cfg->ray_alignment = "world";
+  cfg->max_distance = 2.1;
+  cfg->min_distance = 1.9;
+  Lab lab({cfg});
+  const auto distance = [&](double z) {
+    lab.pose({-10, 0, z, kOnItsSide, kOnItsSide, 0, 0});  // the child is out of the way
+    return lab.read("distances")[0];
+  };
+  EXPECT_FLOAT_EQ(distance(2.1), 2.1f);
+  EXPECT_FLOAT_EQ(distance(1.9), 1.9f);
+  EXPECT_FLOAT_EQ(distance(2.10001), -1.0f);
+  EXPECT_FLOAT_EQ(distance(1.89999), -1.0f);
+}
+
+TEST(RayCast, AlignmentTurnsRaysButNotTheFrame) {
+  std::vector<std::shared_ptr<const SensorCfg>> cfgs;
+  for (const char* alignment : {"base", "yaw", "world"}) {
+    auto cfg = sensor_cfg<RayCastSensorCfg>(alignment);
+    cfg->frame = {{"site", "scan", "r"}};  // turned by 90 degrees about z
+    cfg->pattern = UserPattern{{{0.3, 0, 0}}, {{0, 0, -2}}};
+    cfg->ray_alignment = alignment;
+    cfgs.push_back(cfg);
+  }
+  Lab lab(cfgs);
+  const double c = std::cos(0.1), s = std::sin(0.1);
+  lab.pose({-2, 0, 2, c, 0, s, 0});  // pitched by 0.2 rad
+  const std::vector<float> base = lab.read("hit_pos_w", "base"), yaw = lab.read("hit_pos_w", "yaw"),
+                           world = lab.read("hit_pos_w", "world");
+  const double x = -2 - 0.05 * std::sin(0.2), z = 2 - 0.05 * std::cos(0.2);
+  EXPECT_THAT(base, Pointwise(FloatNear(1e-5f), {float(x - z * std::tan(0.2)), 0.3f, 0.0f}));
+  EXPECT_THAT(yaw, Pointwise(FloatNear(1e-5f), {float(x), 0.3f, 0.0f}));
+  EXPECT_THAT(world, Pointwise(FloatNear(1e-5f), {float(x + 0.3), 0.0f, 0.0f}));
+  EXPECT_EQ(lab.read("quat_w", "world"), lab.read("quat_w", "base"));
+}
+
+TEST(RayCast, GroupsAndTransparencyBelongToTheQuery) {
+  auto seen = sensor_cfg<RayCastSensorCfg>("default"),
+       third = sensor_cfg<RayCastSensorCfg>("third");
+  third->include_geom_groups = {{3}};
+  seen->ray_alignment = third->ray_alignment = "world";
+  Lab lab({seen, third});
+  lab.pose({-4, 0, 2, kOnItsSide, kOnItsSide, 0, 0});
+  EXPECT_FLOAT_EQ(lab.read("distances", "default")[0], 2.0f);
+  EXPECT_FLOAT_EQ(lab.read("distances", "third")[0], 0.9f);
+  lab.pose({-3, 0, 2, kOnItsSide, kOnItsSide, 0, 0});
+  EXPECT_FLOAT_EQ(lab.read("distances", "default")[0], 2.0f) << "glass of alpha 0";
+  EXPECT_FLOAT_EQ(lab.read("distances", "third")[0], -1.0f);
+}
+
+TEST(RayCast, FramesMayBeCamerasAndSeveral) {
+  auto cfg = sensor_cfg<RayCastSensorCfg>();
+  cfg->frame = {{"camera", "eye", "r"}, {"xbody", "belly", "r"}};
+  cfg->pattern = PinholePattern::from_mujoco_camera("r/eye");
+  cfg->exclude_parent_body = false;  // the camera belongs to the world body, and so does the floor
+  Lab lab({cfg});
+  lab.pose({-10, 0, 5, 1, 0, 0, 0});
+  const std::vector<float> d = lab.read("distances");
+  ASSERT_EQ(d.size(), 24u);
+  // Corner ray of the camera: (-tan_h, -tan_v, -1) from 2 m above the floor.
+  const double tan_v = std::tan(30 * mjPI / 180), tan_h = tan_v * 4 / 3;
+  EXPECT_NEAR(d[0], 2 * std::sqrt(1 + tan_v * tan_v + tan_h * tan_h), 1e-5);
+  EXPECT_NEAR(d[12], 0.05, 1e-6);  // from inside its own ball
+  EXPECT_THAT(lab.read("frame_pos_w"),
+              Pointwise(FloatNear(1e-6f), {0.0f, 0.0f, 2.0f, -10.0f, 0.0f, 4.5f}));
+}
+
+TEST(RayCast, ATeleportIsInTheNextReadingAndOnlyThatWorldChanges) {
+  Lab lab({sensor_cfg<RayCastSensorCfg>()}, {.num_worlds = 3});
+  const std::vector<float> before = lab.read("hit_pos_w");
+  lab.pose({-7, 1, 9, 1, 0, 0, 0}, 1);
+  const std::vector<float> after = lab.read("hit_pos_w");
+  for (int i = 0; i < 9; ++i) {
+    if (i / 3 == 1) continue;
+    EXPECT_EQ(after[i], before[i]);
+  }
+  EXPECT_NEAR(after[3], -7, 1e-5);
+  EXPECT_NEAR(after[5], 8.55, 1e-5);
+  const int ids[] = {1};
+  lab.sim->reset(ids);
+  EXPECT_EQ(lab.read("hit_pos_w"), before);
+}
+
+TEST(RayCast, BitEqualAtAnyNumberOfThreadsAndWorlds) {
+  const auto run = [](int threads, int worlds) {
+    auto cfg = sensor_cfg<RayCastSensorCfg>();
+    cfg->pattern = GridPattern{.size = {4, 3}, .resolution = 0.07, .direction = {0.2, 0.1, -1}};
+    Lab lab({cfg}, {.num_worlds = worlds, .threads = threads});
+    for (int w = 0; w < worlds; ++w) lab.pose({0.3, 0.1 * w, 2, 0.9, 0.1, 0.2 + 0.01 * w, 0.3}, w);
+    lab.sim->step(3);
+    return lab.read("distances");
+  };
+  const std::vector<float> one = run(1, 5), two = run(2, 5), five = run(5, 5), alone = run(1, 1);
+  EXPECT_EQ(one, two);
+  EXPECT_EQ(one, five);
+  EXPECT_TRUE(std::equal(alone.begin(), alone.end(), one.begin()));
+}
+
+TEST(RayCast, ErrorsNameSensorFoundAndExpected) {
+  const auto with = [](auto change) {
+    auto cfg = sensor_cfg<RayCastSensorCfg>();
+    change(*cfg);
+    return error_of(cfg);
+  };
+  using Cfg = RayCastSensorCfg;
+  EXPECT_THAT(with([](Cfg& c) { c.ray_alignment = "foo"; }),
+              HasSubstr("sensor 'ray': ray_alignment is 'foo'"));
+  EXPECT_THAT(with([](Cfg& c) { c.frame = {}; }), HasSubstr("no frame"));
+  EXPECT_THAT(with([](Cfg& c) {
+                c.frame = {{"joint", "root", "r"}};
+              }),
+              HasSubstr("must be 'body', 'site', or 'geom'"));
+  EXPECT_THAT(with([](Cfg& c) { c.frame = {{"site", "scam", "r"}}; }), HasSubstr("scan"));
+  EXPECT_THAT(with([](Cfg& c) {
+                c.include_geom_groups = {{0, 6}};
+              }),
+              HasSubstr("groups are 0 to 5"));
+  EXPECT_THAT(with([](Cfg& c) { c.max_distance = 0; }), HasSubstr("max_distance"));
+  EXPECT_THAT(with([](Cfg& c) { c.min_distance = 10; }), HasSubstr("min_distance"));
+  EXPECT_THAT(with([](Cfg& c) { c.pattern = GridPattern{.resolution = 0}; }),
+              HasSubstr("resolution is 0"));
+  EXPECT_THAT(with([](Cfg& c) {
+                c.pattern = GridPattern{.direction = {0, 0, 0}};
+              }),
+              HasSubstr("no finite length"));
+  EXPECT_THAT(with([](Cfg& c) { c.pattern = RingPattern{.include_center = false}; }),
+              HasSubstr("no rays"));
+  EXPECT_THAT(with([](Cfg& c) { c.pattern = PinholePattern{.width = 0}; }),
+              HasSubstr("at least 1"));
+  EXPECT_THAT(with([](Cfg& c) { c.pattern = PinholePattern::from_mujoco_camera("r/eyes"); }),
+              HasSubstr("r/eye"));
+}
+
+TEST(Pattern, GridStopsShortWhereTheResolutionDoesNotDivide) {
+  const RayPattern p =
+      make_pattern(GridPattern{.size = {0.5, 0}, .resolution = 0.2}, nullptr, "test");
+  ASSERT_EQ(p.size(), 3u);
+  EXPECT_DOUBLE_EQ(p.offsets[0][0], -0.25);
+  EXPECT_NEAR(p.offsets[2][0], 0.15, 1e-12);
+}
+
+TEST(Pattern, EveryRayIsInExactlyOnePacket) {
+  for (int n : {1, 15, 16, 17, 187, 1000}) {
+    Rng rng(1, 0, 0, n);
+    UserPattern user;
+    user.offsets.assign(n, {});
+    for (auto& o : user.offsets)
+      for (double& x : o) x = rng.uniform(-1, 1);
+    const RayBundle bundle(make_pattern(user, nullptr, "test"));
+    std::vector<int> seen(n, 0);
+    for (int p = 0; p < bundle.num_packets(); ++p)
+      for (int i = 0; i < kPacket; ++i)
+        if (bundle.rays(p)[i] >= 0) ++seen[bundle.rays(p)[i]];
+    EXPECT_THAT(seen, Each(1));
+    EXPECT_EQ(bundle.num_packets(), (n + 15) / 16);
+  }
+}
+
+TEST(TerrainHeight, LeastOverEachFootsRing) {
+  auto cfg = sensor_cfg<TerrainHeightSensorCfg>();
+  cfg->ray_alignment = "yaw";
+  cfg->max_distance = 1.0;
+  cfg->pattern = RingPattern::single_ring(0.04, 4);
+  cfg->frame = {{"body", "belly", "r"}, {"camera", "eye", "r"}};
+  Lab lab({cfg});
+  lab.pose({0.49, 0, 1.2, 1, 0, 0, 0});
+  EXPECT_THAT(
+      lab.read("heights"),
+      Pointwise(FloatNear(1e-6f), {0.2f, 1.0f}));  // over the step's edge; 2 m up: max_distance
+}
+
+TEST(TerrainHeight, BelowTheGroundIsZeroAndFarAboveIsTheLimit) {
+  auto cfg = sensor_cfg<TerrainHeightSensorCfg>();
+  cfg->max_distance = 1.0;
+  cfg->include_geom_groups = {{0}};
+  cfg->ray_alignment = "world";
+  Lab lab({cfg});
+  const auto at = [&](double x, double z) {
+    lab.pose({x, 0, z, kOnItsSide, kOnItsSide, 0, 0});
+    return lab.read("heights")[0];
+  };
+  EXPECT_FLOAT_EQ(at(-2, 0.25), 0.25f);
+  EXPECT_FLOAT_EQ(at(-2, 50), 1.0f);
+  EXPECT_FLOAT_EQ(at(-2, -0.3), 0.0f);
+  EXPECT_FLOAT_EQ(at(1.5, 0.4), 0.0f) << "inside the step";
+}
+
+}  // namespace
+}  // namespace mjsense
