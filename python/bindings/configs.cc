@@ -7,7 +7,10 @@
 namespace mjsense::python {
 
 std::span<const CfgKind> cfg_kinds() {
-  static const std::vector<CfgKind> kinds = {};
+  static const std::vector<CfgKind> kinds = {
+      builtin_kind(),
+      contact_kind(),
+  };
   return kinds;
 }
 

@@ -11,4 +11,5 @@ NB_MODULE(_core, m) {
   mjsense::python::bind_core(m);
   mjsense::python::bind_scene(m);
   mjsense::python::bind_simulation(m);
+  mjsense::python::bind_contact(m);
 }

@@ -54,6 +54,10 @@ class FromPython {
   template <class T>
   void read(const char* name, nb::handle value, T& out) {
     if constexpr (requires { fields(*this, out); }) {
+      if (value.is_none()) {
+        out = T{};
+        return;
+      }
       FromPython nested(value);
       fields(nested, out);
     } else if constexpr (IsOptional<T>::value) {
@@ -68,6 +72,8 @@ class FromPython {
         return;
       }
       for (nb::handle item : value) read(name, item, out.emplace_back());
+    } else if (std::is_same_v<T, std::string> && value.is_none()) {
+      out = T{};
     } else {
       if (std::is_arithmetic_v<T> && (nb::isinstance<nb::bool_>(value) != std::is_same_v<T, bool>))
         throw_field_type(config_, name, value, wanted_of(typeid(T)));

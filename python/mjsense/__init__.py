@@ -30,6 +30,7 @@ from mjsense.configs import (
 from mjsense.contact import ContactSensor
 from mjsense.data import CameraData, ContactData, RayCastData, SensorData
 from mjsense.errors import UnknownNameError
+from mjsense.pipeline import ObservationPipeline
 from mjsense.raycast import CameraSensor, RayCastSensor, TerrainHeightSensor
 from mjsense.scene import Entity, Scene
 from mjsense.sensor import BuiltinSensor, NativeSensor, Sensor, SensorError

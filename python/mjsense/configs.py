@@ -159,6 +159,32 @@ class BuiltinSensorCfg(SensorCfg):
     """Frame in which a frame sensor's value is expressed; the world without one."""
     cutoff: float = 0.0
     """Positive: every component is limited to [-cutoff, cutoff] (a rangefinder's -1 too)."""
+    delay: float = 0.0
+    """s between a reading and its showing. Needs nsample."""
+    interval: float = 0.0
+    """s between readings; 0: every physics step. Needs nsample."""
+    phase: float = 0.0
+    """s in (-interval, 0]."""
+    nsample: int = 0
+    """Readings kept, newest first, in the field ``history``."""
+    interp: str = "zoh"
+    """Between readings: zoh, linear, cubic."""
+    noise: float = 0.0
+    """Standard deviation; stored in the model, never applied by MuJoCo."""
+    data: Sequence[str] = ("dist",)
+    """Rangefinder: any of dist, dir, origin, point, normal, depth, in this order."""
+    enclosed: bool = False
+    """insidesite: by how much the whole object juts out, m."""
+    dim: int = 0
+    """User sensors."""
+    datatype: str = "real"
+    """User sensors: real, positive, axis, quaternion."""
+    needstage: str = "acc"
+    """User sensors: pos, vel, acc."""
+    plugin: str = ""
+    """Plugin sensors: identifier."""
+    instance: str = ""
+    """Plugin sensors: full name of an instance in an entity's XML."""
 
 
 @dataclass(frozen=True)
@@ -192,13 +218,23 @@ class ContactSensorCfg(SensorCfg):
     num_slots: int = 1
     """S, contacts kept for each primary."""
     secondary_policy: str = "first"
-    """When several elements match the secondary: first, any (no filter), error."""
+    """When several elements match the secondary: first, error, any (no filter), each (report who touches whom)."""
     track_air_time: bool = False
+    """Timers of flight and contact; needs found."""
     global_frame: bool = False
-    """Forces and torques in the world frame instead of the contact frame (x = normal)."""
+    """Forces and torques in the world frame instead of the contact frame (x = normal); needs normal and tangent."""
     history_length: int = 0
-    """H, substeps kept of force, torque and dist."""
+    """H, substeps kept of every field."""
+    track_events: bool = False
+    """touchdown and liftoff: exact, also when both happened within one control step."""
+    latch: bool = False
+    """What happened at any time in the control step: found_any, force_peak, dist_at_peak, pos_at_peak, first_touch_time."""
+    friction_split: bool = False
+    """normal_force and friction_force."""
+    other_ids: bool = False
+    """other_geom and other_body."""
     debug: bool = False
+    """Print what was matched."""
 
 
 @dataclass(frozen=True)

@@ -19,6 +19,11 @@ class ContactSensor(NativeSensor):
         """Local names of the primaries, in the order of the columns."""
         return _core.contact_primary_names(self._handle)
 
+    @property
+    def secondary_names(self) -> tuple[str, ...]:
+        """Local names of the secondaries."""
+        return _core.contact_secondary_names(self._handle)
+
     def compute_first_contact(self, dt: float, abs_tol: float = 1e-6) -> np.ndarray:
         """Which primaries came into contact within the last `dt` seconds: bool ``[B, P]``. Needs track_air_time."""
         return self._within("current_contact_time", dt, abs_tol)

@@ -57,6 +57,40 @@ class ContactData(SensorData):
     """[B, N, H, 3] N m."""
     dist_history: np.ndarray | None = None
     """[B, N, H] m."""
+    found_history: np.ndarray | None = None
+    """[B, N, H]."""
+    pos_history: np.ndarray | None = None
+    """[B, N, H, 3] m."""
+    normal_history: np.ndarray | None = None
+    """[B, N, H, 3]."""
+    tangent_history: np.ndarray | None = None
+    """[B, N, H, 3]."""
+    touchdown: np.ndarray | None = None
+    """[B, P] bool, a contact began in this control step."""
+    liftoff: np.ndarray | None = None
+    """[B, P] bool, a contact ended in this control step."""
+    found_any: np.ndarray | None = None
+    """[B, P] bool, any contact in this control step."""
+    force_peak: np.ndarray | None = None
+    """[B, P, 3] N, the strongest of the control step."""
+    dist_at_peak: np.ndarray | None = None
+    """[B, P] m."""
+    pos_at_peak: np.ndarray | None = None
+    """[B, P, 3] m."""
+    first_touch_time: np.ndarray | None = None
+    """[B, P] s from the start of the control step to its first substep with contact; -1: none."""
+    normal_force: np.ndarray | None = None
+    """[B, N, 3] N, part of force along the normal."""
+    friction_force: np.ndarray | None = None
+    """[B, N, 3] N, the rest of force."""
+    other_geom: np.ndarray | None = None
+    """[B, N] int32, MuJoCo id of the other side; -1: none."""
+    other_body: np.ndarray | None = None
+    """[B, N] int32."""
+    pair_found: np.ndarray | None = None
+    """[B, P, S] with secondary_policy "each": contacts of each primary with each secondary."""
+    pair_force: np.ndarray | None = None
+    """[B, P, S, 3] N, world, primary on secondary."""
 
 
 @dataclass(slots=True, repr=False)

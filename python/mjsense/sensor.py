@@ -5,7 +5,8 @@ from __future__ import annotations
 import inspect
 import json
 import weakref
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
+from types import MappingProxyType
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -38,6 +39,7 @@ class NativeSensor:
         self._handle = handle
         self._core: _core.Simulation | None = None
         self._data: Any = None
+        self._fields: Mapping[str, np.ndarray] = {}
         self.name: str = handle.name
         """Key in the scene."""
         self.kind: str = handle.kind
@@ -49,7 +51,8 @@ class NativeSensor:
     def _bind(self, core: _core.Simulation) -> None:
         self._core = core
         arrays = self._handle.arrays()
-        self._data = arrays[""] if list(arrays) == [""] else data.make_data(self._data_type, arrays)
+        self._fields = MappingProxyType(arrays)
+        self._data = arrays[""] if "" in arrays else data.make_data(self._data_type, arrays)
 
     @property
     def data(self) -> Any:
@@ -64,15 +67,21 @@ class NativeSensor:
         return self._data
 
     @property
+    def fields(self) -> Mapping[str, np.ndarray]:
+        """Every field as it is now, by name; the only or main one is ''."""
+        self.data  # makes them current
+        return self._fields
+
+    @property
     def specs(self) -> dict[str, _core.SensorSpec]:
         """What each field is: dtype, shape, unit, frame. A sensor with one field calls it ''."""
         return self._handle.specs()
 
     @property
     def spec(self) -> _core.SensorSpec:
-        """The spec of a sensor with one field."""
+        """The spec of a sensor with one field, or of its main one."""
         specs = self.specs
-        if list(specs) != [""]:
+        if "" not in specs:
             raise ValueError(f"sensor '{self.name}' has the fields {sorted(specs)}: use specs")
         return specs[""]
 

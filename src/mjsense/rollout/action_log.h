@@ -1,5 +1,6 @@
 #pragma once
-// What each world looked like when its last action was chosen: relative actions are measured from there.
+// What each world looked like when its last action was chosen: relative actions are measured from
+// there.
 
 #include <array>
 #include <vector>
@@ -15,8 +16,8 @@ class ActionLog {
   explicit ActionLog(int num_worlds) : entries_(num_worlds) {}
 
   struct Entry {
-    bool given = false;  // false: the episode has had no action yet
-    RobotValues qpos;    // of every group
+    bool given = false;                              // false: the episode has had no action yet
+    RobotValues qpos;                                // of every group
     std::array<Pose, RobotValues::kMaxGroups> leaf;  // X_BL of every group
   };
 

@@ -9,7 +9,8 @@
 namespace mjsense {
 namespace {
 
-// True at an observation after which the episode is over by the policy's word or by success; a time-out is not.
+// True at an observation after which the episode is over by the policy's word or by success; a
+// time-out is not.
 bool terminal(const Task& task, const World& world) {
   return task.done_received(world.id) ||
          (task.cfg().terminate_upon_success && task.evaluate(world).success);
@@ -131,8 +132,9 @@ class JointPosRel final : public ActionSensor {
 class EePose final : public ActionSensor {
  public:
   EePose(const Task& task, const ActionLog& log)
-      : ActionSensor("actions/ee_pose", "Where the targets put each group's leaf: robot base frame.",
-                     "m, wxyz", task, log) {}
+      : ActionSensor("actions/ee_pose",
+                     "Where the targets put each group's leaf: robot base frame.", "m, wxyz", task,
+                     log) {}
 
  protected:
   void write(const World& world, JsonWriter& json) override {

@@ -1,6 +1,6 @@
 #pragma once
-// The five `actions/*` of an observation: what led to it. Row t belongs to the action between observations t-1 and t; at a
-// terminal observation all but commanded_action are {}.
+// The five `actions/*` of an observation: what led to it. Row t belongs to the action between
+// observations t-1 and t; at a terminal observation all but commanded_action are {}.
 
 #include <memory>
 #include <vector>
@@ -10,14 +10,18 @@
 
 namespace mjsense {
 
-// Units: rad or m (joints), the actuators' own (grippers), m and wxyz (poses). All is_dict, keys are move groups.
+// Units: rad or m (joints), the actuators' own (grippers), m and wxyz (poses). All is_dict, keys
+// are move groups.
 //
-//   actions/commanded_action  as the policy gave it, rounded to float32; {} first; keeps its last value at the terminal
+//   actions/commanded_action  as the policy gave it, rounded to float32; {} first; keeps its last
+//   value at the terminal
 //                             observation. A policy's own verdict is "success":[0.0] or [1.0]
 //   actions/joint_pos         the controllers' targets, without action noise; first: what they hold
-//   actions/joint_pos_rel     these minus qpos of the observation before; groups that have not as many targets as joints are
+//   actions/joint_pos_rel     these minus qpos of the observation before; groups that have not as
+//   many targets as joints are
 //                             left out; first: zeros for every group
-//   actions/ee_twist          log6(inv(X_BL of the observation before) * fk(targets)) = [linear 3 (m), angular 3 (rad)], in the
+//   actions/ee_twist          log6(inv(X_BL of the observation before) * fk(targets)) = [linear 3
+//   (m), angular 3 (rad)], in the
 //                             axes of that leaf, per control step; first: zeros
 //   actions/ee_pose           fk(targets), X_BL of every group; a base gives the identity
 //

@@ -26,12 +26,13 @@ std::vector<JointGroup> joint_groups(const Robot& robot) {
 }
 
 void add_camera(SensorSuite& suite, const RecordedCamera& camera, const std::string& owner) {
-  suite.add(std::make_shared<CameraParameterSensor>("sensor_param_" + camera.name,
-                                                    camera.mjcf_camera, camera.width, camera.height),
+  suite.add(std::make_shared<CameraParameterSensor>(
+                "sensor_param_" + camera.name, camera.mjcf_camera, camera.width, camera.height),
             owner);
-  suite.add(std::make_shared<SharedField>(camera.name, *camera.sensor, "rgb",
-                                          [](SensorSpec& spec) { spec.storage = Storage::kRgbVideo; }),
-            owner);
+  suite.add(
+      std::make_shared<SharedField>(camera.name, *camera.sensor, "rgb",
+                                    [](SensorSpec& spec) { spec.storage = Storage::kRgbVideo; }),
+      owner);
   if (!camera.depth) return;
   suite.add(std::make_shared<SharedField>(camera.name + "_depth", *camera.sensor, "depth",
                                           [&camera](SensorSpec& spec) {

@@ -19,9 +19,10 @@ struct RecordedCamera {
   Sensor* sensor = nullptr;  // of the scene: fields rgb, segmentation, and depth if it is recorded
 };
 
-// Per camera [sensor_param_<c>, <c>, <c>_depth], qpos, qvel, robot_base_pose, env_states, task_info, actions/*,
-// object_image_points, then the task's, the robot's and the policy's own sensors. Names are unique; a clash names both owners.
-// The sensors refer to task, log and cameras, which live longer.
+// Per camera [sensor_param_<c>, <c>, <c>_depth], qpos, qvel, robot_base_pose, env_states,
+// task_info, actions/*, object_image_points, then the task's, the robot's and the policy's own
+// sensors. Names are unique; a clash names both owners. The sensors refer to task, log and cameras,
+// which live longer.
 SensorSuite core_suite(const Task& task, const ActionLog& log,
                        const std::vector<RecordedCamera>& cameras);
 

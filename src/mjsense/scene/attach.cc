@@ -10,6 +10,7 @@
 
 #include "mjsense/core/error.h"
 #include "mjsense/core/match.h"
+#include "mjsense/scene/assets.h"
 #include "mjsense/scene/options.h"
 #include "mjsense/scene/resolve.h"
 
@@ -128,7 +129,8 @@ void set_pose(mjsBody* body, const EntityCfg& cfg, const std::string& place) {
 Attached attach_entity(mjSpec* scene, const std::string& name, const EntityCfg& cfg, Vfs& vfs,
                        std::vector<std::string>& warnings) {
   const std::string place = place_of(name);
-  SpecPtr child = parse_model(cfg.model, vfs, place);
+  SpecPtr child = parse_model(cfg.model, place);
+  adopt_assets(child.get(), cfg.model, name, vfs);
   name_unnamed(child.get());
 
   Attached attached{name, cfg};
@@ -174,7 +176,7 @@ Attached attach_entity(mjSpec* scene, const std::string& name, const EntityCfg& 
   return attached;
 }
 
-void merge_initial_states(const std::vector<Attached>& entities, mjModel* m, mjsKey* key) {
+void merge_initial_states(const std::vector<Attached>& entities, mjModel* m) {
   const auto put = [](const std::vector<double>& values, mjtNum* target, int size,
                       const char* field, const Attached& e) {
     if (static_cast<int>(values.size()) > size) {
@@ -241,12 +243,6 @@ void merge_initial_states(const std::vector<Attached>& entities, mjModel* m, mjs
       put(e.init.mquat, m->key_mquat + 4 * mocap, 4 * nmocap, "mquat", e);
     }
   }
-  mjs_setDouble(key->qpos, m->key_qpos, static_cast<int>(m->nq));
-  mjs_setDouble(key->qvel, m->key_qvel, static_cast<int>(m->nv));
-  mjs_setDouble(key->act, m->key_act, static_cast<int>(m->na));
-  mjs_setDouble(key->ctrl, m->key_ctrl, static_cast<int>(m->nu));
-  mjs_setDouble(key->mpos, m->key_mpos, static_cast<int>(3 * m->nmocap));
-  mjs_setDouble(key->mquat, m->key_mquat, static_cast<int>(4 * m->nmocap));
 }
 
 }  // namespace mjsense

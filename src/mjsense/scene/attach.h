@@ -32,7 +32,7 @@ Attached attach_entity(mjSpec* scene, const std::string& name, const EntityCfg& 
                        std::vector<std::string>& warnings);
 
 // Fills the model's keyframe 0 ("init_state", at the model's defaults so far) with the entities'
-// initial states, and the spec's key with the same.
-void merge_initial_states(const std::vector<Attached>& entities, mjModel* model, mjsKey* key);
+// initial states.
+void merge_initial_states(const std::vector<Attached>& entities, mjModel* model);
 
 }  // namespace mjsense

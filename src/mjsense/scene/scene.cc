@@ -58,7 +58,7 @@ struct Scene::Impl {
   void build();
   void add(std::unique_ptr<Sensor> sensor);
   void add_sensors();
-  void compile(mjsKey* key);
+  void compile();
 };
 
 void Scene::Impl::build() {
@@ -71,6 +71,7 @@ void Scene::Impl::build() {
       throw ValueError(fmt::format("scene: extent = {} must be positive (m)", *cfg.extent));
     spec->stat.extent = *cfg.extent;
   }
+  spec->compiler.savecompiled = 0;             // numbers are saved exactly
   spec->compiler.conflict = mjCONFLICT_MERGE;  // sizes: the larger wins
 
   if (cfg.terrain) add_terrain(*cfg.terrain, spec.get());
@@ -84,10 +85,9 @@ void Scene::Impl::build() {
     }
   }
   add_sensors();
-  mjsKey* key = mjs_addKey(spec.get());
-  mjs_setName(key->element, kInitState);
+  mjs_setName(mjs_addKey(spec.get())->element, kInitState);
   if (cfg.spec_fn) cfg.spec_fn(spec.get());
-  compile(key);
+  compile();
 
   if (cfg.terrain) entities.push_back(describe(model.get(), "terrain", true));
   for (const Attached& entity : attached)
@@ -129,13 +129,14 @@ void Scene::Impl::add_sensors() {
   }
 }
 
-void Scene::Impl::compile(mjsKey* key) {
+void Scene::Impl::compile() {
   {
     WarningCapture capture(warnings);
     model.reset(mj_compile(spec.get(), vfs.get()));
   }
   if (!model) throw ValueError(fmt::format("scene: {}", mjs_getError(spec.get())));
-  merge_initial_states(attached, model.get(), key);
+  merge_initial_states(attached, model.get());
+  mj_copyBack(spec.get(), model.get());  // the keyframe, for to_xml()
 }
 
 Scene::Scene(SceneCfg cfg) : impl_(std::make_unique<Impl>()) {
@@ -152,20 +153,7 @@ const std::vector<std::unique_ptr<Sensor>>& Scene::sensors() const { return impl
 const std::vector<Entity>& Scene::entities() const { return impl_->entities; }
 const std::vector<std::string>& Scene::warnings() const { return impl_->warnings; }
 
-std::string Scene::to_xml() const {
-  char error[1024] = "";
-  std::string xml(1 << 16, '\0');
-  int needed = mj_saveXMLString(impl_->spec.get(), xml.data(), static_cast<int>(xml.size()), error,
-                                sizeof error);
-  if (needed > 0) {
-    xml.resize(needed + 1);
-    needed = mj_saveXMLString(impl_->spec.get(), xml.data(), static_cast<int>(xml.size()), error,
-                              sizeof error);
-  }
-  if (needed != 0) throw RuntimeError(fmt::format("scene: not saved as XML: {}", error));
-  xml.resize(xml.find('\0'));
-  return xml;
-}
+std::string Scene::to_xml() const { return save_xml(impl_->spec.get()); }
 
 Sensor* Scene::find_sensor(std::string_view key) const {
   for (const auto& sensor : impl_->sensors) {

@@ -4,10 +4,16 @@
 
 #include <filesystem>
 #include <mutex>
+#include <optional>
+#include <utility>
 
 #include "mjsense/core/embedded.h"
 #include "mjsense/core/error.h"
 #include "mjsense/scene/resolve.h"
+
+// Exported for MuJoCo's own Python bindings: significant digits of numbers in saved XML.
+extern "C" int _mjPRIVATE__get_xml_precision(void);
+extern "C" void _mjPRIVATE__set_xml_precision(int precision);
 
 namespace mjsense {
 namespace {
@@ -31,6 +37,21 @@ void on_message(const mjLogMessage* message) {
 SpecPtr checked(mjSpec* spec, const char* error, std::string_view place) {
   if (!spec) throw ValueError(fmt::format("{}: {}", place, error));
   return SpecPtr(spec);
+}
+
+std::optional<std::string> try_save(const mjSpec* spec, std::string& why) {
+  char error[1024] = "";
+  std::string xml(1 << 16, '\0');
+  int needed =
+      mj_saveXMLString(spec, xml.data(), static_cast<int>(xml.size()), error, sizeof error);
+  if (needed > 0) {
+    xml.resize(needed + 1);
+    needed = mj_saveXMLString(spec, xml.data(), static_cast<int>(xml.size()), error, sizeof error);
+  }
+  why = error;
+  if (needed != 0) return std::nullopt;
+  xml.resize(xml.find('\0'));
+  return xml;
 }
 
 }  // namespace
@@ -63,7 +84,8 @@ WarningCapture::~WarningCapture() {
   capture_mutex.unlock();
 }
 
-SpecPtr parse_model(const ModelSource& source, Vfs& vfs, std::string_view place) {
+SpecPtr parse_model(const ModelSource& source, std::string_view place) {
+  Vfs vfs;
   char error[1024] = "";
   for (const auto& [name, bytes] : source.assets) vfs.add(name, bytes, place);
   if (source.spec) {
@@ -92,6 +114,20 @@ SpecPtr parse_model(const ModelSource& source, Vfs& vfs, std::string_view place)
   // Absolute, so that its assets are found from anywhere.
   const std::string path = std::filesystem::absolute(source.path).lexically_normal().string();
   return checked(mj_parse(path.c_str(), nullptr, vfs.get(), error, sizeof error), error, place);
+}
+
+std::string save_xml(mjSpec* spec) {
+  std::string error;
+  spec->compiler.savecompiled = 0;
+  if (auto xml = try_save(spec, error)) return *std::move(xml);
+  spec->compiler.savecompiled = 1;
+  const int digits = _mjPRIVATE__get_xml_precision();
+  _mjPRIVATE__set_xml_precision(17);
+  auto xml = try_save(spec, error);
+  _mjPRIVATE__set_xml_precision(digits);
+  spec->compiler.savecompiled = 0;
+  if (!xml) throw RuntimeError(fmt::format("scene: not saved as XML: {}", error));
+  return *std::move(xml);
 }
 
 std::string element_name(const mjsElement* element) {

@@ -58,9 +58,12 @@ class WarningCapture {
   mjfLogHandler previous_;
 };
 
-// Parses a model; its files in memory go into `vfs`. Throws ValueError with MuJoCo's text; `place`
-// names the entity.
-SpecPtr parse_model(const ModelSource& source, Vfs& vfs, std::string_view place);
+// Parses a model. Throws ValueError with MuJoCo's text; `place` names the entity.
+SpecPtr parse_model(const ModelSource& source, std::string_view place);
+
+// The compiled spec as MJCF: as it is written where one file can say it, exactly; else, where
+// entities were compiled with settings of their own, the values that compilation made.
+std::string save_xml(mjSpec* spec);
 
 std::string element_name(const mjsElement* element);
 // The elements of one type, in the order of the spec.

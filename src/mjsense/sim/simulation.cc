@@ -7,25 +7,26 @@
 #include <numeric>
 
 #include "mjsense/core/error.h"
-#if __has_include("mjsense/rays/ray_scene.h")
 #include "mjsense/rays/ray_scene.h"
-#else
-namespace mjsense {
-class RayScene {
- public:
-  RayScene(const mjModel*, int) {}
-  void update(const World&) {}
-};
-}  // namespace mjsense
-#endif
 
 namespace mjsense {
 namespace {
 
-// Seconds since `start`.
-double since(std::chrono::steady_clock::time_point start) {
-  return std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
-}
+// Seconds since it was made; 0 and no look at the clock (25 ns, as much as a small sensor) when off.
+class Timer {
+ public:
+  explicit Timer(bool on) : on_(on) {
+    if (on_) start_ = std::chrono::steady_clock::now();
+  }
+  double seconds() const {
+    if (!on_) return 0.0;
+    return std::chrono::duration<double>(std::chrono::steady_clock::now() - start_).count();
+  }
+
+ private:
+  bool on_;
+  std::chrono::steady_clock::time_point start_;
+};
 
 // Runs `body` for a sensor; an error that does not say which sensor failed gets its name.
 template <class Body>
@@ -123,14 +124,16 @@ class Simulation::Hooks final : public WorldHooks {
     if (only_ == Only::kReset) return reset(world);
     const std::int64_t version = sim_.version_[world.id];
     if (rays_ && sim_.rays_version_[world.id] != version) {
+      const Timer timer(sim_.measure_cost_);
       sim_.rays_->update(world);
+      sim_.rays_s_[world.id] += timer.seconds();
       sim_.rays_version_[world.id] = version;
     }
     for (Slot* slot : slots_) {
       if (slot->phase != phase_ || slot->computed[world.id] == version) continue;
-      const auto start = std::chrono::steady_clock::now();
+      const Timer timer(sim_.measure_cost_);
       guarded(*slot->sensor, [&] { slot->sensor->compute(world); });
-      slot->compute_s[world.id] += since(start);
+      slot->compute_s[world.id] += timer.seconds();
       if (!slot->casts) slot->computed[world.id] = version;
     }
   }
@@ -155,6 +158,7 @@ Simulation::Simulation(std::shared_ptr<Scene> scene, const SimulationCfg& cfg)
   pool_ = std::make_unique<ThreadPool>(cfg.threads);
   version_.assign(cfg.num_worlds, 1);
   rays_version_.assign(cfg.num_worlds, 0);
+  rays_s_.assign(cfg.num_worlds, 0.0);
   for (auto& sensor : scene_->sensors()) initialize(*sensor);
   reset();
 }
@@ -262,9 +266,9 @@ void Simulation::cast(std::span<Slot* const> slots, std::span<const int> ids, in
         if (slot->computed[w] != version_[w]) due->ids.push_back(w);
       }
       if (due->ids.empty()) continue;
-      const auto start = std::chrono::steady_clock::now();
+      const Timer timer(measure_cost_);
       guarded(*slot->sensor, [&] { slot->sensor->cast({rays_.get(), due->ids, *pool_}); });
-      slot->cast_s += since(start);
+      slot->cast_s += timer.seconds();
       for (int w : due->ids) slot->computed[w] = version_[w];
     }
   }
@@ -322,6 +326,10 @@ void Simulation::reset_sensors(std::span<const int> ids) {
 Simulation::Cost Simulation::cost(const Sensor& sensor) const {
   const Slot& slot = slot_of(sensor);
   return {std::accumulate(slot.compute_s.begin(), slot.compute_s.end(), 0.0), slot.cast_s};
+}
+
+double Simulation::ray_scene_cost() const {
+  return std::accumulate(rays_s_.begin(), rays_s_.end(), 0.0);
 }
 
 void Simulation::invalidate(std::span<const int> ids) { mark_stale(worlds_->checked_ids(ids)); }

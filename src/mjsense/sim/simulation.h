@@ -70,12 +70,15 @@ class Simulation {
   // State was changed in a way that only the caller knows.
   void invalidate(std::span<const int> ids = {});
 
-  // Time that a sensor has taken so far.
+  // Time that a sensor has taken since measure_cost(true).
   struct Cost {
     double compute = 0;  // s of processor time, all worlds together
     double cast = 0;     // s of wall time
   };
+  void measure_cost(bool on) { measure_cost_ = on; }
   Cost cost(const Sensor& sensor) const;
+  // s of processor time spent so far on moving the ray scene to the worlds' poses.
+  double ray_scene_cost() const;
 
   // Worlds that failed in the last step, reset or forward; they were reset alone.
   const std::vector<Failure>& failures() const { return worlds_->failures(); }
@@ -111,7 +114,9 @@ class Simulation {
   std::vector<std::unique_ptr<Slot>> slots_;  // scene sensors, then added ones
   std::vector<std::int64_t> version_;         // of each world's state
   std::vector<std::int64_t> rays_version_;    // of the poses in the ray scene
+  std::vector<double> rays_s_;                // time spent on them, by world
   bool any_substep_ = false;
+  bool measure_cost_ = false;
 };
 
 }  // namespace mjsense

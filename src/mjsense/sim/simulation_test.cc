@@ -133,6 +133,7 @@ TEST(Simulation, ResetAndForwardComputeWhenReadNotBefore) {
 TEST(Simulation, StepsSomeWorldsAlone) {
   Simulation sim(scene(), {.num_worlds = 3});
   auto h = add(sim, "h");
+  sim.measure_cost(true);
   sim.refresh(*h);
   const int ids[] = {0, 2};
   sim.step(20, ids);

@@ -53,9 +53,11 @@ ContactReading read_contact(const World& world, const ContactRef& ref, bool wren
 ContactReading read_net_contact(const World& world, const ContactSum& sum) {
   ContactReading r;
   double arm[3], moment[3];
+  const bool loaded =
+      sum.weight > 0;  // contacts in the gap have no centroid: the origin, as MuJoCo
   for (int i = 0; i < 3; ++i) {
-    arm[i] = sum.weight > 0 ? sum.weighted_pos[i] / sum.weight : 0.0;
-    r.pos[i] = sum.origin[i] + arm[i];
+    arm[i] = loaded ? sum.weighted_pos[i] / sum.weight : 0.0;
+    r.pos[i] = loaded ? sum.origin[i] + arm[i] : 0.0;
     r.force[i] = sum.force[i];
     r.normal_force[i] = sum.normal_force[i];
     r.friction_force[i] = sum.force[i] - sum.normal_force[i];

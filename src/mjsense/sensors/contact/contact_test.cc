@@ -53,8 +53,7 @@ struct Lab {
   }
   void pose(std::initializer_list<double> qpos, int world = 0) {
     const ArrayView v = sim->worlds().state_component("qpos");
-    std::copy(qpos.begin(), qpos.end(),
-              reinterpret_cast<double*>(v.data + world * v.strides[0]));
+    std::copy(qpos.begin(), qpos.end(), reinterpret_cast<double*>(v.data + world * v.strides[0]));
   }
 };
 

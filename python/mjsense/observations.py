@@ -1,0 +1,53 @@
+"""Observation functions on sensors, with mjlab's names: ``height_scan(sim, sensor_name="scan")``.
+
+`env` is anything with a ``scene``: a :class:`mjsense.Simulation`, or an environment that has one. They return new arrays.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+
+def builtin_sensor(env: Any, sensor_name: str) -> np.ndarray:
+    """The sensor's value, ``[B, dim]``."""
+    return np.array(env.scene[sensor_name].data)
+
+
+def projected_gravity_from_sensor(env: Any, sensor_name: str) -> np.ndarray:
+    """Direction of gravity in a body's frame ``[B, 3]``, from a sensor of the world's up vector there: its negation."""
+    return -env.scene[sensor_name].data
+
+
+def height_scan(env: Any, sensor_name: str, offset: float = 0.0, miss_value: float | None = None) -> np.ndarray:
+    """Height of each ray's frame above its hit, less `offset`: ``[B, R]`` m; misses are `miss_value` (max_distance)."""
+    sensor = env.scene[sensor_name]
+    data = sensor.data
+    if miss_value is None:
+        miss_value = sensor.cfg.max_distance
+    frames = data.frame_pos_w.shape[1]
+    hit_z = data.hit_pos_w[:, :, 2].reshape(len(data.hit_pos_w), frames, -1)
+    heights = (data.frame_pos_w[:, :, None, 2] - hit_z - np.float32(offset)).reshape(data.distances.shape)
+    return np.where(data.distances < 0, np.float32(miss_value), heights)
+
+
+def foot_height(env: Any, sensor_name: str) -> np.ndarray:
+    """Heights of a terrain height sensor, ``[B, F]`` m."""
+    return np.array(env.scene[sensor_name].data.heights)
+
+
+def foot_contact(env: Any, sensor_name: str) -> np.ndarray:
+    """1 where a contact was found, ``[B, N]`` float32."""
+    return (env.scene[sensor_name].data.found > 0).astype(np.float32)
+
+
+def foot_contact_forces(env: Any, sensor_name: str) -> np.ndarray:
+    """Forces compressed to sign(F) log(1 + |F|), component by component: ``[B, 3 N]``."""
+    force = env.scene[sensor_name].data.force
+    return (np.sign(force) * np.log1p(np.abs(force))).reshape(len(force), -1)
+
+
+def foot_air_time(env: Any, sensor_name: str) -> np.ndarray:
+    """Present time in the air, ``[B, P]`` s."""
+    return np.array(env.scene[sensor_name].data.current_air_time)

@@ -1,0 +1,412 @@
+#include "mjsense/record/encoder.h"
+
+#include <fcntl.h>
+#include <fmt/format.h>
+#include <poll.h>
+#include <signal.h>
+#include <sys/eventfd.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <cerrno>
+#include <chrono>
+#include <condition_variable>
+#include <cstring>
+#include <deque>
+#include <mutex>
+#include <thread>
+
+#include "mjsense/core/error.h"
+#include "mjsense/record/process.h"
+
+namespace mjsense {
+
+namespace {
+
+constexpr int kDefaultEncoders = 32;
+constexpr int kReapPeriodMs = 4;  // how often ending encoders are looked after
+
+using Clock = std::chrono::steady_clock;
+
+double seconds_since(Clock::time_point start) {
+  return std::chrono::duration<double>(Clock::now() - start).count();
+}
+
+}  // namespace
+
+std::vector<std::string> encoder_command(const VideoCfg& cfg, const Fps& fps,
+                                         const VideoStream& video,
+                                         const std::filesystem::path& input,
+                                         const std::filesystem::path& output) {
+  const bool grey = video.kind == VideoKind::kDepth16;
+  std::vector<std::string> a = {ffmpeg_program(cfg.ffmpeg),
+                                "-nostdin",
+                                "-hide_banner",
+                                "-loglevel",
+                                "error",
+                                "-y",
+                                "-f",
+                                "rawvideo",
+                                "-pixel_format",
+                                grey ? "gray16le" : "rgb24",
+                                "-video_size",
+                                fmt::format("{}x{}", video.width, video.height),
+                                "-framerate",
+                                fmt::format("{}/{}", fps.num, fps.den),
+                                "-i",
+                                input == "-" ? "pipe:0" : input.string(),
+                                "-an",
+                                "-threads",
+                                fmt::format("{}", cfg.threads)};
+  const auto add = [&a](std::initializer_list<std::string> more) { a.insert(a.end(), more); };
+  switch (video.kind) {
+    case VideoKind::kRgb:
+      // 4:2:0 needs even sizes. One grey column or row on the right or below moves no pixel, so
+      // intrinsics stay true.
+      if (video.width % 2 || video.height % 2)
+        add({"-vf", "pad=ceil(iw/2)*2:ceil(ih/2)*2:0:0:gray"});
+      add({"-c:v", "libx264", "-pix_fmt", "yuv420p", "-preset", cfg.preset, "-crf",
+           fmt::format("{}", cfg.crf), "-g", fmt::format("{}", cfg.keyint)});
+      break;
+    case VideoKind::kDepth16:
+      add({"-c:v", "ffv1", "-level", "3", "-g", "1", "-slicecrc", "1", "-pix_fmt", "gray16le"});
+      break;
+    case VideoKind::kDepthRedGreen:
+      add({"-c:v", "libx264rgb", "-pix_fmt", "rgb24", "-crf", "23"});
+      break;
+  }
+  add({"-fflags", "+bitexact", "-flags:v", "+bitexact", "-map_metadata", "-1", "-f",
+       video.extension == ".mkv" ? "matroska" : "mp4", output.string()});
+  return a;
+}
+
+void check_ffmpeg(const VideoCfg& cfg, std::span<const VideoStream> videos) {
+  if (videos.empty()) return;
+  const std::string program = ffmpeg_program(cfg.ffmpeg);
+  std::string listing;
+  try {
+    listing = run_process({program, "-hide_banner", "-loglevel", "error", "-encoders"});
+  } catch (const Error& error) {
+    throw RuntimeError(
+        fmt::format("recording {} video streams needs ffmpeg: {}; install it (apt-get install "
+                    "ffmpeg) or name it "
+                    "in $MJSENSE_FFMPEG",
+                    videos.size(), error.what()));
+  }
+  constexpr const char* kEncoders[] = {"libx264", "ffv1", "libx264rgb"};
+  for (const VideoStream& video : videos) {
+    const char* encoder = kEncoders[static_cast<int>(video.kind)];
+    if (listing.find(fmt::format(" {} ", encoder)) == std::string::npos) {
+      throw RuntimeError(
+          fmt::format("the ffmpeg program '{}' has no encoder '{}', which video '{}' needs",
+                      program, encoder, video.key));
+    }
+  }
+}
+
+class EncoderPool::Stream {
+ public:
+  const VideoStream* video = nullptr;
+  std::filesystem::path output, spool;
+  OnDone on_done;
+  Child child;
+  Fd spool_file;
+  bool direct = true;   // has its own ffmpeg from the start
+  bool closed = false;  // the producer is done
+  bool aborted = false;
+  std::string failure;
+
+  // Ring of frames: [taken, filled) wait for the pool's thread, which has written `offset` bytes of
+  // the first.
+  std::vector<std::vector<std::uint8_t>> ring;
+  std::uint64_t filled = 0, taken = 0;
+  std::size_t offset = 0;
+
+  int sink() const { return direct ? child.in.get() : spool_file.get(); }
+  bool has_frames() const { return taken < filled; }
+  bool failed() const { return !failure.empty() || aborted; }
+};
+
+struct EncoderPool::Impl {
+  VideoCfg cfg;
+  Fps fps;
+  int max_encoders;
+  int max_direct;   // encoders that streams may hold while they grow; the others drain spool files
+  int max_waiting;  // spool files that wait for an encoder
+
+  mutable std::mutex mutex;
+  std::condition_variable changed;
+  std::vector<std::unique_ptr<Stream>> streams;
+  int running = 0;  // ffmpeg processes
+  bool stop = false;
+  double waited = 0, cpu = 0;
+  Fd wake_fd;
+  std::thread thread;
+
+  Impl(const VideoCfg& cfg_, const Fps& fps_, int streams_at_once) : cfg(cfg_), fps(fps_) {
+    max_encoders = cfg.max_encoders > 0 ? cfg.max_encoders : kDefaultEncoders;
+    const bool enough = streams_at_once <= max_encoders;
+    max_direct = enough ? max_encoders : max_encoders - std::max(1, max_encoders / 4);
+    max_waiting = std::max(1, streams_at_once);
+    wake_fd = Fd(eventfd(0, EFD_CLOEXEC | EFD_NONBLOCK));
+    if (!wake_fd)
+      throw RuntimeError(
+          fmt::format("cannot create an event descriptor: {}", std::strerror(errno)));
+    thread = std::thread([this] { run(); });
+  }
+
+  ~Impl() {
+    {
+      const std::lock_guard lock(mutex);
+      stop = true;
+    }
+    wake();
+    thread.join();
+    for (auto& stream : streams) kill_process(stream->child);
+  }
+
+  void wake() const {
+    const std::uint64_t one = 1;
+    [[maybe_unused]] const ssize_t n = write(wake_fd.get(), &one, sizeof one);
+  }
+
+  int count(auto&& matches) const {
+    return static_cast<int>(
+        std::count_if(streams.begin(), streams.end(), [&](const auto& s) { return matches(*s); }));
+  }
+  int waiting() const {
+    return count([](const Stream& s) { return !s.direct && s.closed && s.child.pid < 0; });
+  }
+
+  void wait_until(std::unique_lock<std::mutex>& lock, auto&& ready) {
+    if (ready()) return;
+    const auto start = Clock::now();
+    changed.wait(lock, ready);
+    waited += seconds_since(start);
+  }
+
+  // The pool's thread: writes what producers queued, starts encoders on complete spool files,
+  // collects what has ended.
+  void run() {
+    sigset_t pipe;
+    sigemptyset(&pipe);
+    sigaddset(&pipe, SIGPIPE);
+    pthread_sigmask(
+        SIG_BLOCK, &pipe,
+        nullptr);  // an encoder that died is an EPIPE for us, not the end of the program
+    std::vector<pollfd> polled;
+    std::vector<Stream*> ready;
+    while (true) {
+      polled.assign(1, {wake_fd.get(), POLLIN, 0});
+      ready.assign(1, nullptr);
+      bool ending = false;
+      {
+        const std::lock_guard lock(mutex);
+        if (stop) return;
+        for (const auto& stream : streams) {
+          ending |= stream->child.pid >= 0 && !stream->child.in;
+          if (stream->failed() || !stream->has_frames()) continue;
+          polled.push_back({stream->sink(), POLLOUT, 0});
+          ready.push_back(stream.get());
+        }
+      }
+      poll(polled.data(), polled.size(), ending ? kReapPeriodMs : -1);
+      std::uint64_t drained;
+      while (read(wake_fd.get(), &drained, sizeof drained) > 0) {
+      }
+      for (std::size_t i = 1; i < polled.size(); ++i) {
+        if (polled[i].revents != 0) feed(*ready[i]);
+      }
+      look_after();
+    }
+  }
+
+  // Writes as much as the sink takes now.
+  void feed(Stream& stream) {
+    const std::size_t size = stream.video->frame_bytes();
+    while (true) {
+      const std::uint8_t* frame;
+      {
+        const std::lock_guard lock(mutex);
+        if (stream.failed() || !stream.has_frames()) return;
+        frame = stream.ring[stream.taken % stream.ring.size()].data();
+      }
+      const ssize_t n = write(stream.sink(), frame + stream.offset, size - stream.offset);
+      if (n < 0 && errno == EINTR) continue;
+      if (n < 0 && errno == EAGAIN) return;
+      const std::lock_guard lock(mutex);
+      if (n < 0) {
+        stream.failure = stream.direct ? "ffmpeg stopped reading"
+                                       : fmt::format("cannot write '{}': {}", stream.spool.string(),
+                                                     std::strerror(errno));
+      } else {
+        stream.offset += static_cast<std::size_t>(n);
+        if (stream.offset < size) continue;
+        stream.offset = 0;
+        ++stream.taken;
+      }
+      changed.notify_all();
+    }
+  }
+
+  void look_after() {
+    std::vector<std::pair<OnDone, Result>> done;
+    {
+      const std::lock_guard lock(mutex);
+      for (auto& stream : streams) advance(*stream);
+      for (auto& stream : streams) {
+        Result result;
+        if (!ended(*stream, result)) continue;
+        done.emplace_back(std::move(stream->on_done), std::move(result));
+        stream.reset();
+      }
+      std::erase(streams, nullptr);
+      if (!done.empty()) changed.notify_all();
+    }
+    for (auto& [on_done, result] : done) on_done(result);
+  }
+
+  // Takes the next step of a stream that is complete or has failed.
+  void advance(Stream& stream) {
+    if (stream.failed()) {
+      if (stream.child.pid >= 0) finish(stream, true);
+      return;
+    }
+    if (!stream.closed || stream.has_frames()) return;
+    if (stream.direct) {
+      stream.child.in.reset();  // the end of its input
+    } else if (stream.child.pid < 0 && running < max_encoders) {
+      stream.spool_file.reset();
+      try {
+        stream.child = start_process(
+            encoder_command(cfg, fps, *stream.video, stream.spool, stream.output), false, false);
+        ++running;
+      } catch (const Error& error) {
+        stream.failure = error.what();
+      }
+    }
+  }
+
+  // Collects an ffmpeg that ends by itself; with `now`, makes it end. False if it still runs.
+  bool finish(Stream& stream, bool now) {
+    Exit exit;
+    bool ended = wait_process(stream.child, false, exit);
+    if (!ended && now && !stream.failure.empty()) {
+      usleep(50000);  // it stopped reading, so it is about to end, and its own words are worth a
+                      // moment
+      ended = wait_process(stream.child, false, exit);
+    }
+    if (ended && !exit.ok) stream.failure = "ffmpeg: " + exit.why;
+    if (!ended && now) {
+      kill(stream.child.pid, SIGKILL);
+      ended = wait_process(stream.child, true, exit);
+    }
+    if (!ended) return false;
+    --running;
+    cpu += exit.cpu_s;
+    stream.child.in.reset();
+    return true;
+  }
+
+  bool ended(Stream& stream, Result& result) {
+    if (!stream.failed()) {
+      const bool started = stream.child.pid >= 0;
+      if (!started || stream.child.in) return false;  // still fed, or waits for an encoder
+      if (!finish(stream, false)) return false;
+    } else if (!stream.closed && !stream.aborted) {
+      return false;  // the producer still holds it; reserve() tells it
+    }
+    if (!stream.spool.empty()) unlink(stream.spool.c_str());
+    result = {!stream.failed(), stream.aborted,
+              stream.failure.empty()
+                  ? ""
+                  : fmt::format("video '{}': {}", stream.video->key, stream.failure)};
+    return true;
+  }
+};
+
+EncoderPool::EncoderPool(const VideoCfg& cfg, const Fps& fps, int streams_at_once)
+    : impl_(std::make_unique<Impl>(cfg, fps, streams_at_once)) {}
+EncoderPool::~EncoderPool() = default;
+
+EncoderPool::Stream* EncoderPool::open(const VideoStream& video,
+                                       const std::filesystem::path& output, OnDone on_done) {
+  auto stream = std::make_unique<Stream>();
+  stream->video = &video;
+  stream->output = output;
+  stream->on_done = std::move(on_done);
+  stream->ring.assign(std::max(1, impl_->cfg.queue_frames),
+                      std::vector<std::uint8_t>(video.frame_bytes()));
+
+  std::unique_lock lock(impl_->mutex);
+  const bool may_spool = impl_->max_direct < impl_->max_encoders;
+  const auto slot_free = [&] {
+    const int direct = impl_->count([](const Stream& s) { return s.direct; });
+    return direct < impl_->max_direct && impl_->running < impl_->max_encoders;
+  };
+  if (may_spool) {
+    impl_->wait_until(lock, [&] { return impl_->waiting() < impl_->max_waiting; });
+  } else {
+    impl_->wait_until(lock, slot_free);
+  }
+  stream->direct = slot_free();
+  if (stream->direct) {
+    stream->child =
+        start_process(encoder_command(impl_->cfg, impl_->fps, video, "-", output), true, false);
+    ++impl_->running;
+  } else {
+    stream->spool = output.string() + ".raw";
+    stream->spool_file =
+        Fd(::open(stream->spool.c_str(), O_WRONLY | O_CREAT | O_TRUNC | O_CLOEXEC, 0644));
+    if (!stream->spool_file) {
+      throw RuntimeError(
+          fmt::format("cannot write '{}': {}", stream->spool.string(), std::strerror(errno)));
+    }
+  }
+  return impl_->streams.emplace_back(std::move(stream)).get();
+}
+
+std::span<std::uint8_t> EncoderPool::reserve(Stream* stream) {
+  std::unique_lock lock(impl_->mutex);
+  impl_->wait_until(lock, [&] {
+    return stream->failed() || stream->filled - stream->taken < stream->ring.size();
+  });
+  if (stream->failed()) return {};
+  return stream->ring[stream->filled % stream->ring.size()];
+}
+
+void EncoderPool::commit(Stream* stream) {
+  {
+    const std::lock_guard lock(impl_->mutex);
+    ++stream->filled;
+  }
+  impl_->wake();
+}
+
+void EncoderPool::close(Stream* stream) {
+  {
+    const std::lock_guard lock(impl_->mutex);
+    stream->closed = true;
+  }
+  impl_->wake();
+}
+
+void EncoderPool::abort(Stream* stream) {
+  {
+    const std::lock_guard lock(impl_->mutex);
+    stream->aborted = true;
+  }
+  impl_->wake();
+}
+
+double EncoderPool::waited_s() const {
+  const std::lock_guard lock(impl_->mutex);
+  return impl_->waited;
+}
+
+double EncoderPool::cpu_s() const {
+  const std::lock_guard lock(impl_->mutex);
+  return impl_->cpu;
+}
+
+}  // namespace mjsense

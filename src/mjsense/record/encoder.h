@@ -1,0 +1,66 @@
+#pragma once
+// Frames to video files through ffmpeg programs: one thread feeds them all.
+//
+// A stream is one video of one episode. Usually it has its own ffmpeg from the first frame on. When
+// the worlds have more streams than max_encoders, the surplus streams write raw frames to a file
+// beside their video, and encoders take these files up as they come free; the video is the same,
+// byte for byte. Either way the producer waits while `queue_frames` of its frames are not taken
+// yet, so memory is bounded and no frame is lost.
+
+#include <cstddef>
+#include <cstdint>
+#include <filesystem>
+#include <functional>
+#include <memory>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "mjsense/record/layout.h"
+#include "mjsense/record/recording.h"
+
+namespace mjsense {
+
+// What ffmpeg is told: raw frames from `input` ("-": its stdin) to `output`.
+std::vector<std::string> encoder_command(const VideoCfg& cfg, const Fps& fps,
+                                         const VideoStream& video,
+                                         const std::filesystem::path& input,
+                                         const std::filesystem::path& output);
+
+// Throws RuntimeError unless the ffmpeg program runs and has the encoders that the videos need.
+void check_ffmpeg(const VideoCfg& cfg, std::span<const VideoStream> videos);
+
+class EncoderPool {
+ public:
+  class Stream;
+  struct Result {
+    bool ok = false;
+    bool aborted = false;
+    std::string why;  // if not ok
+  };
+  // Called once per stream by the pool's thread, after its ffmpeg has ended.
+  using OnDone = std::function<void(const Result&)>;
+
+  // `streams_at_once`: the most streams that grow at the same time.
+  EncoderPool(const VideoCfg& cfg, const Fps& fps, int streams_at_once);
+  ~EncoderPool();  // kills what still runs
+
+  // Waits for a free encoder, or for disk space to be drained. `video` outlives the stream. Throws
+  // RuntimeError when ffmpeg cannot be started.
+  Stream* open(const VideoStream& video, const std::filesystem::path& output, OnDone on_done);
+  // The place of the next frame; waits while the queue is full. Empty when the stream has failed:
+  // on_done tells why.
+  std::span<std::uint8_t> reserve(Stream* stream);
+  void commit(Stream* stream);
+  void close(Stream* stream);  // no more frames; the stream must not be used any more
+  void abort(Stream* stream);  // no more frames, and the video is not wanted
+
+  double waited_s() const;  // time that open() and reserve() waited
+  double cpu_s() const;     // processor time of the programs that have ended
+
+ private:
+  struct Impl;
+  std::unique_ptr<Impl> impl_;
+};
+
+}  // namespace mjsense

@@ -1,0 +1,158 @@
+#include "mjsense/record/episode_file.h"
+
+#include <fmt/format.h>
+#include <zlib.h>
+
+#include <algorithm>
+#include <cstring>
+
+#include "mjsense/core/error.h"
+#include "mjsense/record/depth.h"
+
+namespace mjsense {
+namespace {
+
+void describe(hid_t object, const Sensor& sensor, const SensorSpec& spec) {
+  h5::set_attribute(object, "unit", spec.unit);
+  h5::set_attribute(object, "frame", spec.frame);
+  h5::set_attribute(object, "description", spec.description);
+  h5::set_attribute(object, "spec", spec_json(sensor, spec));
+}
+
+void describe_video(hid_t dataset, const RecordingCfg& cfg, const VideoStream& video) {
+  describe(dataset, *video.sensor, video.field->spec);
+  h5::set_attribute(dataset, "width", std::int64_t{video.width});
+  h5::set_attribute(dataset, "height", std::int64_t{video.height});
+  h5::set_attribute(dataset, "fps", cfg.fps.str());
+  switch (video.kind) {
+    case VideoKind::kRgb:
+      h5::set_attribute(dataset, "encoding", "rgb");
+      h5::set_attribute(dataset, "codec", "h264");
+      break;
+    case VideoKind::kDepth16:
+      h5::set_attribute(dataset, "encoding", "depth16");
+      h5::set_attribute(dataset, "codec", "ffv1");
+      h5::set_attribute(dataset, "metres_per_unit", cfg.video.depth_unit);
+      h5::set_attribute(dataset, "invalid_value", std::int64_t{kDepthInvalid});
+      h5::set_attribute(dataset, "far_value", std::int64_t{kDepthFar});
+      break;
+    case VideoKind::kDepthRedGreen:
+      h5::set_attribute(dataset, "encoding", "molmospaces_red_green");
+      h5::set_attribute(dataset, "codec", "h264");
+      break;
+  }
+}
+
+void add_file_name(hid_t trajectory, const RecordingCfg& cfg, const VideoStream& video) {
+  const hsize_t size = kFileNameBytes;
+  const h5::Id space(H5Screate_simple(1, &size, nullptr), H5Sclose, "HDF5 space");
+  const std::string place = "obs/sensor_data/" + video.key;
+  const h5::Id dataset(H5Dcreate2(trajectory, place.c_str(), H5T_STD_U8LE, space,
+                                  h5::link_properties(), h5::dataset_properties(), H5P_DEFAULT),
+                       H5Dclose, place);
+  char name[kFileNameBytes] = {};
+  const std::string file = video.stem + video.extension;
+  std::memcpy(name, file.data(), std::min(file.size(), kFileNameBytes));
+  h5::check(H5Dwrite(dataset, H5T_NATIVE_UINT8, H5S_ALL, H5S_ALL, H5P_DEFAULT, name), place);
+  describe_video(dataset, cfg, video);
+}
+
+}  // namespace
+
+std::string_view own_place(int stream) {
+  constexpr std::string_view kPlaces[kOwnStreams] = {"rewards", "success", "fail", "terminated",
+                                                     "truncated"};
+  return kPlaces[stream];
+}
+
+DType own_dtype(int stream) { return stream == kRewards ? DType::kFloat32 : DType::kBool; }
+
+EpisodeFile::EpisodeFile(const std::filesystem::path& path, const RecordingCfg& cfg,
+                         const RecordingPlan& plan, const EpisodeMeta& meta)
+    : path_(path), gzip_(cfg.gzip) {
+  const h5::H5Lock lock;
+  file_ = h5::create_file(path);
+  h5::set_attribute(file_, "format", "mjsense 1");
+  h5::set_attribute(file_, "recording", plan.fingerprint);
+  trajectory_ = h5::create_group(file_, "traj_0");
+  h5::set_attribute(trajectory_, "episode", meta.episode);
+  h5::set_attribute(trajectory_, "seed", meta.seed);
+  for (const char* group : standard_groups()) h5::create_group(trajectory_, group);
+  datasets_.reserve(plan.arrays.size() + kOwnStreams);
+  for (const ArrayStream& stream : plan.arrays) {
+    add_dataset(stream.place, stream.field->spec.dtype, stream.field->data.shape().without_front(),
+                stream.chunk_rows);
+    describe(datasets_.back().id, *stream.sensor, stream.field->spec);
+    if (stream.field->spec.is_dict) h5::set_attribute(datasets_.back().id, "encoding", "json");
+  }
+  for (int i = 0; i < kOwnStreams; ++i)
+    add_dataset(own_place(i), own_dtype(i), Shape{}, chunk_rows(dtype_size(own_dtype(i))));
+  for (const VideoStream& video : plan.videos) add_file_name(trajectory_, cfg, video);
+}
+
+EpisodeFile::~EpisodeFile() {
+  const h5::H5Lock lock;
+  datasets_.clear();
+  trajectory_.reset();
+  file_.reset();
+}
+
+void EpisodeFile::add_dataset(std::string_view place, DType dtype, const Shape& row,
+                              std::int64_t chunk_rows) {
+  Dataset dataset;
+  hsize_t chunk[Shape::kMaxRank + 1] = {static_cast<hsize_t>(chunk_rows)};
+  hsize_t most[Shape::kMaxRank + 1] = {H5S_UNLIMITED};
+  dataset.rank = row.rank() + 1;
+  for (int i = 0; i < row.rank(); ++i) {
+    // A row of no elements is stored as such; HDF5 wants its chunks to have a size all the same.
+    const auto size = static_cast<hsize_t>(row[i]);
+    dataset.dims[i + 1] = size;
+    chunk[i + 1] = std::max<hsize_t>(1, size);
+    most[i + 1] = size == 0 ? H5S_UNLIMITED : size;
+  }
+
+  const std::string name(place);
+  const h5::Id space(H5Screate_simple(dataset.rank, dataset.dims, most), H5Sclose, name);
+  const h5::Id properties = h5::dataset_properties();
+  h5::check(H5Pset_chunk(properties, dataset.rank, chunk), name);
+  if (gzip_ > 0) h5::check(H5Pset_deflate(properties, static_cast<unsigned>(gzip_)), name);
+
+  const auto slash = name.rfind('/');
+  if (slash != std::string::npos) h5::create_group(trajectory_, name.substr(0, slash));
+  dataset.id = h5::Id(H5Dcreate2(trajectory_, name.c_str(), h5::memory_type(dtype), space,
+                                 h5::link_properties(), properties, H5P_DEFAULT),
+                      H5Dclose, name);
+  datasets_.push_back(std::move(dataset));
+}
+
+void EpisodeFile::write_chunk(int stream, std::int64_t rows, std::span<const std::uint8_t> chunk) {
+  std::span<const std::uint8_t> bytes = chunk;
+  if (gzip_ > 0 && !chunk.empty()) {  // outside the library's lock: here the time goes
+    packed_.resize(compressBound(chunk.size()));
+    uLongf size = packed_.size();
+    if (compress2(packed_.data(), &size, chunk.data(), chunk.size(), gzip_) != Z_OK) {
+      throw RuntimeError(
+          fmt::format("zlib failed to compress {} bytes for '{}'", chunk.size(), path_.string()));
+    }
+    bytes = {packed_.data(), size};
+  }
+  const h5::H5Lock lock;
+  Dataset& dataset = datasets_[stream];
+  hsize_t offset[Shape::kMaxRank + 1] = {dataset.dims[0]};
+  dataset.dims[0] += static_cast<hsize_t>(rows);
+  const std::string what = fmt::format("cannot write '{}'", path_.string());
+  h5::check(H5Dset_extent(dataset.id, dataset.dims), what);
+  if (chunk.empty()) return;
+  h5::check(H5Dwrite_chunk(dataset.id, H5P_DEFAULT, 0, offset, bytes.size(), bytes.data()), what);
+}
+
+void EpisodeFile::finish(std::string_view obs_scene, std::string_view outcome) {
+  const h5::H5Lock lock;
+  h5::write_text(trajectory_, "obs_scene", obs_scene);
+  h5::set_attribute(trajectory_, "outcome", outcome);
+  datasets_.clear();
+  trajectory_.reset();
+  file_.close(fmt::format("cannot write '{}'", path_.string()));
+}
+
+}  // namespace mjsense

@@ -1,0 +1,51 @@
+#pragma once
+// The HDF5 file of one episode while it is recorded: `traj_0` of a file of its own. Used by one
+// thread.
+
+#include <cstdint>
+#include <filesystem>
+#include <span>
+#include <string_view>
+#include <vector>
+
+#include "mjsense/record/h5.h"
+#include "mjsense/record/layout.h"
+
+namespace mjsense {
+
+// What the recorder adds to every step; the places of these datasets stand beside the suite's.
+enum OwnStream { kRewards, kSuccess, kFail, kTerminated, kTruncated, kOwnStreams };
+std::string_view own_place(int stream);
+DType own_dtype(int stream);
+
+class EpisodeFile {
+ public:
+  EpisodeFile(const std::filesystem::path& path, const RecordingCfg& cfg, const RecordingPlan& plan,
+              const EpisodeMeta& meta);
+  ~EpisodeFile();
+  EpisodeFile(const EpisodeFile&) = delete;
+  EpisodeFile& operator=(const EpisodeFile&) = delete;
+
+  // Appends `rows` rows of a stream: streams [0, arrays) are the plan's, then OwnStream. `chunk`
+  // has the bytes of a whole chunk, zero beyond the rows. Chunks of a stream come in order, all but
+  // the last full.
+  void write_chunk(int stream, std::int64_t rows, std::span<const std::uint8_t> chunk);
+  void finish(std::string_view obs_scene,
+              std::string_view outcome);  // closes; throws when the disk refuses
+
+ private:
+  struct Dataset {
+    h5::Id id;
+    int rank = 0;
+    hsize_t dims[Shape::kMaxRank + 1] = {};
+  };
+  void add_dataset(std::string_view place, DType dtype, const Shape& row, std::int64_t chunk_rows);
+
+  std::filesystem::path path_;
+  int gzip_;
+  h5::Id file_, trajectory_;
+  std::vector<Dataset> datasets_;
+  std::vector<std::uint8_t> packed_;
+};
+
+}  // namespace mjsense

@@ -1,0 +1,40 @@
+#pragma once
+// A suite without physics, in the shape of a Franka pick: every value is a function of (episode,
+// step), so that tests and benchmarks know what must be on disk.
+
+#include <cstdint>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "mjsense/core/sensor.h"
+
+namespace mjsense {
+
+struct FakeSuiteCfg {
+  int num_worlds = 1;
+  int width = 64, height = 48;
+  bool rgb = true, depth = true;
+  int cameras = 1;  // wrist_camera, exo_camera_1, ...
+};
+
+class FakeSuite {
+ public:
+  explicit FakeSuite(const FakeSuiteCfg& cfg);
+  ~FakeSuite();
+  std::vector<const Sensor*> sensors() const;
+  Sensor& sensor(const std::string& name);
+  // Writes step `t` of `episode`, which has `length` steps, into row `world` of every sensor.
+  void fill(int world, std::int64_t episode, int t, int length);
+
+  static float joint(std::int64_t episode, int t, int j);  // rad
+  static float depth(int x, int y, int t);  // m; 0 in the left upper corner, infinite in the right
+  static std::string obs_scene(std::int64_t episode);
+
+ private:
+  struct Cfg;
+  FakeSuiteCfg cfg_;
+  std::vector<std::unique_ptr<Sensor>> sensors_;
+};
+
+}  // namespace mjsense

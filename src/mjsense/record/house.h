@@ -1,0 +1,86 @@
+#pragma once
+// The directory of one house, as a small store that survives kill -9 at any moment:
+//
+//   house_0/trajectories_batch_1_of_2.h5, episode_*.mp4     published: whole, under their final
+//   names house_0/.recording/recording.json                       what the recording is
+//   house_0/.recording/lock                                 held by the process that records
+//   house_0/.recording/episode_00000007/                    finished, waits until its batch is
+//   whole house_0/.recording/episode_00000008.discarded           attempted, not kept
+//   house_0/.recording/episode_00000009.part.1234/          running in process 1234, worthless
+//   after it
+//
+// Every change of state is one rename. A batch is published by moving videos first and the HDF5
+// file last; when that is interrupted, doing it again ends in the same state, because the order of
+// episodes is that of their numbers.
+
+#include <cstdint>
+#include <filesystem>
+#include <map>
+#include <string>
+#include <vector>
+
+#include "mjsense/record/process.h"
+
+namespace mjsense {
+
+// Which attempts were decided, and how.
+struct Decisions {
+  std::map<std::int64_t, bool> kept_by_episode;
+
+  bool contains(std::int64_t episode) const { return kept_by_episode.contains(episode); }
+  int kept() const;
+  int discarded() const { return static_cast<int>(kept_by_episode.size()) - kept(); }
+  // The first `most` kept episodes, in order. `settled`: only those whose place no undecided
+  // attempt can take any more.
+  std::vector<std::int64_t> first(int most, bool settled) const;
+};
+
+class House {
+ public:
+  // Opens or begins a recording. Throws ValueError when there is one and `resume` is false, or it
+  // is a different one, or another process records into it; RuntimeError when the directory cannot
+  // be written.
+  House(const std::filesystem::path& dir, const std::string& fingerprint, bool resume);
+
+  const std::filesystem::path& dir() const { return dir_; }
+  std::filesystem::path part_dir(std::int64_t episode) const;
+  void begin(std::int64_t episode);  // makes an empty part_dir
+  void keep(std::int64_t episode);   // syncs part_dir and makes it a finished episode
+  void discard(std::int64_t episode, const std::string& why);
+  void abandon(std::int64_t episode);
+
+  const Decisions& decisions() const { return decisions_; }
+  bool ended() const { return ended_; }  // published; nothing more to record
+
+  void publish_ready();  // the batches whose episodes are all decided
+  void publish_all();    // also batches that lack episodes; ends the recording
+  std::int64_t published_bytes() const { return published_bytes_; }
+
+ private:
+  bool load_published(const std::string& fingerprint);
+  void load_staged();
+  void publish(int batch, const std::vector<std::int64_t>& episodes);
+  std::vector<std::int64_t> batch_of(int batch, const std::vector<std::int64_t>& kept) const;
+  void end();
+
+  std::filesystem::path dir_, staging_;
+  std::string fingerprint_;
+  int episodes_ = 0;
+  std::vector<int> batch_sizes_;
+  std::vector<bool> published_;
+  Decisions decisions_;
+  std::int64_t published_bytes_ = 0;
+  bool ended_ = false;
+  Fd lock_;
+};
+
+// The names under which a house keeps what is not published.
+inline constexpr const char* kStagingDir = ".recording";
+inline constexpr const char* kEpisodeFile = "traj.h5";
+
+// recording.json of a house: "" when it holds no unfinished recording.
+std::string unfinished_recording(const std::filesystem::path& house);
+// Directories of finished, unpublished episodes, in order.
+std::vector<std::filesystem::path> finished_episodes(const std::filesystem::path& house);
+
+}  // namespace mjsense

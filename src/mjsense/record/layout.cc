@@ -1,0 +1,269 @@
+#include "mjsense/record/layout.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <map>
+#include <nlohmann/json.hpp>
+#include <numeric>
+
+#include "mjsense/core/error.h"
+
+namespace mjsense {
+namespace {
+
+// About 128 KiB: large enough for gzip and the file system, small enough that many worlds' buffers
+// fit the cache.
+constexpr std::size_t kChunkBytes = 1 << 17;
+constexpr std::int64_t kMostChunkRows = 512;
+
+// What the recorder itself writes into every episode.
+constexpr const char* kOwnPlaces[] = {"rewards",    "success",   "fail",
+                                      "terminated", "truncated", "obs_scene"};
+
+void check_path(const std::string& sensor, const std::string& stream) {
+  std::size_t start = 0;
+  while (true) {
+    const std::size_t end = std::min(stream.find('/', start), stream.size());
+    const std::string part = stream.substr(start, end - start);
+    if (part.empty() || part == "." || part == ".." || part.find('\0') != std::string::npos) {
+      throw ValueError(fmt::format(
+          "sensor '{}': its stream '{}' cannot be stored: a name between slashes is empty or a dot",
+          sensor, stream));
+    }
+    if (end == stream.size()) return;
+    start = end + 1;
+  }
+}
+
+std::string flat(std::string name) {
+  std::replace(name.begin(), name.end(), '/', '_');
+  return name;
+}
+
+void add_videos(const RecordingCfg& cfg, const Sensor& sensor, const Field& field,
+                std::vector<VideoStream>& videos) {
+  const SensorSpec& spec = field.spec;
+  const bool rgb = spec.storage == Storage::kRgbVideo;
+  const bool right =
+      rgb ? spec.dtype == DType::kUint8 && spec.shape.rank() == 3 && spec.shape[2] == 3
+          : spec.dtype == DType::kFloat32 && spec.shape.rank() == 2;
+  if (!right || spec.shape.size() == 0) {
+    throw ValueError(fmt::format("sensor '{}': stream '{}' is {}{}, but {} is {}", sensor.name(),
+                                 spec.name, dtype_name(spec.dtype), spec.shape.str(),
+                                 rgb ? "an RGB video" : "a depth video",
+                                 rgb ? "uint8 (height, width, 3)" : "float32 (height, width)"));
+  }
+  VideoStream video{&sensor,
+                    &field,
+                    rgb ? VideoKind::kRgb : VideoKind::kDepth16,
+                    flat(spec.name),
+                    flat(spec.name),
+                    rgb ? ".mp4" : ".mkv",
+                    static_cast<int>(spec.shape[1]),
+                    static_cast<int>(spec.shape[0])};
+  if (!rgb && cfg.video.molmospaces_depth) {
+    // MolmoSpaces' loaders find their form under the camera's depth name; ours stands beside it.
+    VideoStream lossy = video;
+    lossy.kind = VideoKind::kDepthRedGreen;
+    lossy.extension = ".mp4";
+    videos.push_back(lossy);
+    video.key += "_16bit";
+  }
+  videos.push_back(video);
+}
+
+// Two datasets cannot have one name, and a dataset cannot be a group.
+void check_places(const std::map<std::string, std::string>& owners) {
+  for (const auto& [place, owner] : owners) {
+    for (std::size_t slash = place.find('/'); slash != std::string::npos;
+         slash = place.find('/', slash + 1)) {
+      if (const auto above = owners.find(place.substr(0, slash)); above != owners.end()) {
+        throw ValueError(fmt::format("{} is stored as '{}', inside '{}' of {}; rename one of them",
+                                     owner, place, above->first, above->second));
+      }
+    }
+  }
+}
+
+std::string fingerprint(const RecordingCfg& cfg, const RecordingPlan& plan) {
+  nlohmann::json settings;
+  try {
+    settings = nlohmann::json::parse(cfg.settings);
+  } catch (const nlohmann::json::exception&) {
+    throw ValueError(fmt::format("recording: settings is no JSON text: {:.80}", cfg.settings));
+  }
+  nlohmann::json streams = nlohmann::json::array();
+  for (const Sensor* sensor : cfg.sensors) {
+    for (const Field& field : sensor->fields()) {
+      streams.push_back(fmt::format("{} {}{}", field.spec.name, dtype_name(field.spec.dtype),
+                                    field.spec.shape.str()));
+    }
+  }
+  nlohmann::json j{{"format", 1},
+                   {"house", cfg.house},
+                   {"episodes", cfg.episodes},
+                   {"batches", batch_sizes(cfg.episodes, cfg.batches).size()},
+                   {"fps", cfg.fps.str()},
+                   {"gzip", cfg.gzip},
+                   {"streams", streams},
+                   {"settings", settings}};
+  if (!plan.videos.empty()) {
+    const VideoCfg& v = cfg.video;
+    j["video"] = {{"crf", v.crf},
+                  {"preset", v.preset},
+                  {"keyint", v.keyint},
+                  {"threads", v.threads},
+                  {"depth_unit", v.depth_unit},
+                  {"molmospaces_depth", v.molmospaces_depth}};
+  }
+  return j.dump();
+}
+
+}  // namespace
+
+Fps Fps::from_period_ms(std::int64_t policy_dt_ms) {
+  if (policy_dt_ms <= 0)
+    throw ValueError(fmt::format("policy_dt_ms is {}, expected a positive number", policy_dt_ms));
+  const std::int64_t common = std::gcd<std::int64_t>(1000, policy_dt_ms);
+  return {1000 / common, policy_dt_ms / common};
+}
+
+std::string Fps::str() const {
+  return den == 1 ? fmt::format("{}", num) : fmt::format("{}/{}", num, den);
+}
+
+std::size_t VideoStream::frame_bytes() const {
+  return static_cast<std::size_t>(width) * height * (kind == VideoKind::kDepth16 ? 2 : 3);
+}
+
+std::int64_t chunk_rows(std::size_t row_bytes) {
+  return std::clamp<std::int64_t>(
+      static_cast<std::int64_t>(kChunkBytes / std::max<std::size_t>(1, row_bytes)), 1,
+      kMostChunkRows);
+}
+
+std::string place_of(std::string_view stream) {
+  constexpr std::string_view kParam = "sensor_param_";
+  if (stream == "qpos" || stream == "qvel") return fmt::format("obs/agent/{}", stream);
+  if (stream.starts_with("actions/") || stream.starts_with("env_states/"))
+    return std::string(stream);
+  if (stream.starts_with(kParam))
+    return fmt::format("obs/sensor_param/{}", stream.substr(kParam.size()));
+  return fmt::format("obs/extra/{}", stream);
+}
+
+RecordingPlan plan_recording(const RecordingCfg& cfg) {
+  RecordingPlan plan;
+  std::map<std::string, std::string> owners;  // place -> "sensor 'x'"
+  const auto claim = [&](const std::string& place, const std::string& owner) {
+    const auto [at, fresh] = owners.emplace(place, owner);
+    if (!fresh)
+      throw ValueError(fmt::format("{} and {} would both be stored as '{}'; rename one of them",
+                                   at->second, owner, place));
+  };
+  for (const char* own : kOwnPlaces) claim(own, "the recorder");
+  for (const char* group : standard_groups()) claim(group, "the layout");
+  for (const Sensor* sensor : cfg.sensors) {
+    if (sensor == nullptr) throw ValueError("recording: a sensor of the suite is null");
+    if (sensor->fields().empty()) {
+      throw ValueError(
+          fmt::format("sensor '{}' has no fields: initialize it before recording", sensor->name()));
+    }
+    for (const Field& field : sensor->fields()) {
+      const SensorSpec& spec = field.spec;
+      check_path(sensor->name(), spec.name);
+      if (field.data.shape().rank() == 0 || field.data.shape()[0] < cfg.num_worlds) {
+        throw ValueError(
+            fmt::format("sensor '{}': stream '{}' has shape {}, expected rows of {} worlds",
+                        sensor->name(), spec.name, field.data.shape().str(), cfg.num_worlds));
+      }
+      const std::string owner = fmt::format("sensor '{}'", sensor->name());
+      if (spec.storage == Storage::kArray) {
+        plan.arrays.push_back(
+            {sensor, &field, place_of(spec.name), chunk_rows(field.data.row_bytes())});
+        claim(plan.arrays.back().place, owner);
+      } else {
+        const std::size_t first = plan.videos.size();
+        add_videos(cfg, *sensor, field, plan.videos);
+        for (std::size_t i = first; i < plan.videos.size(); ++i)
+          claim("obs/sensor_data/" + plan.videos[i].key, owner);
+      }
+    }
+  }
+  for (const char* group : standard_groups()) owners.erase(group);
+  check_places(owners);
+  plan.fingerprint = fingerprint(cfg, plan);
+  return plan;
+}
+
+std::vector<int> batch_sizes(int episodes, int batches) {
+  if (episodes <= 0)
+    throw ValueError(fmt::format("recording: episodes is {}, expected at least 1", episodes));
+  if (batches < 0 || batches > episodes) {
+    throw ValueError(fmt::format(
+        "recording: {} batches for {} episodes, expected 1 to {} (0: about 4 episodes each)",
+        batches, episodes, episodes));
+  }
+  if (batches == 0)
+    batches = std::max(
+        1, static_cast<int>(std::nearbyint(episodes / 4.0)));  // Python's round(): half to even
+  std::vector<int> sizes(batches, episodes / batches);
+  for (int b = 0; b < episodes % batches; ++b) ++sizes[b];
+  return sizes;
+}
+
+std::string batch_file(int batch, int batches) {
+  return fmt::format("trajectories_batch_{}_of_{}.h5", batch + 1, batches);
+}
+
+std::string video_file(std::string_view stem, std::string_view extension, int index, int batch,
+                       int batches) {
+  return fmt::format("episode_{:08d}_{}_batch_{}_of_{}{}", index, stem, batch + 1, batches,
+                     extension);
+}
+
+std::string video_file(const VideoStream& video, int index, int batch, int batches) {
+  return video_file(video.stem, video.extension, index, batch, batches);
+}
+
+std::span<const char* const> standard_groups() {
+  static constexpr const char* kGroups[] = {
+      "actions",   "env_states/actors", "env_states/articulations", "obs/agent",
+      "obs/extra", "obs/sensor_data",   "obs/sensor_param"};
+  return kGroups;
+}
+
+std::string spec_json(const Sensor& sensor, const SensorSpec& spec) {
+  constexpr const char* kStorage[] = {"array", "rgb_video", "depth_video"};
+  nlohmann::json j{
+      {"name", spec.name},
+      {"sensor", sensor.name()},
+      {"kind", sensor.kind()},
+      {"dtype", dtype_name(spec.dtype)},
+      {"shape", std::vector<std::int64_t>(spec.shape.dims().begin(), spec.shape.dims().end())},
+      {"is_dict", spec.is_dict},
+      {"storage", kStorage[static_cast<int>(spec.storage)]}};
+  if (std::isfinite(spec.low)) j["low"] = spec.low;
+  if (std::isfinite(spec.high)) j["high"] = spec.high;
+  if (spec.is_dict) j["str_max_len"] = spec.str_max_len;
+  return j.dump();
+}
+
+std::string fingerprint_difference(const std::string& was, const std::string& now) {
+  if (was == now) return "";
+  const auto a = nlohmann::json::parse(was, nullptr, false),
+             b = nlohmann::json::parse(now, nullptr, false);
+  if (!a.is_object() || !b.is_object()) return "its description cannot be read";
+  const nlohmann::json difference = nlohmann::json::diff(a, b);
+  if (difference.empty()) return "";
+  const nlohmann::json::json_pointer at(difference[0]["path"].get<std::string>());
+  const auto text = [&](const nlohmann::json& j) {
+    return j.contains(at) ? j[at].dump() : std::string("absent");
+  };
+  return fmt::format("'{}' was {:.100} and is now {:.100}", at.to_string().substr(1), text(a),
+                     text(b));
+}
+
+}  // namespace mjsense

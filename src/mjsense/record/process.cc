@@ -1,0 +1,181 @@
+#include "mjsense/record/process.h"
+
+#include <fcntl.h>
+#include <fmt/format.h>
+#include <signal.h>
+#include <spawn.h>
+#include <sys/mman.h>
+#include <sys/resource.h>
+#include <sys/wait.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <cerrno>
+#include <cstdlib>
+#include <cstring>
+#include <utility>
+
+#include "mjsense/core/error.h"
+
+extern char** environ;
+
+namespace mjsense {
+namespace {
+
+std::string last_words(int log) {
+  constexpr off_t kMost = 600;
+  const off_t size = lseek(log, 0, SEEK_END);
+  if (size <= 0) return "";
+  std::string text(std::min(size, kMost), '\0');
+  const ssize_t n = pread(log, text.data(), text.size(), std::max<off_t>(0, size - kMost));
+  text.resize(std::max<ssize_t>(0, n));
+  while (!text.empty() && std::isspace(static_cast<unsigned char>(text.back()))) text.pop_back();
+  for (char& c : text) {
+    if (c == '\n' || c == '\r') c = ' ';
+  }
+  return text;
+}
+
+[[noreturn]] void throw_system(const char* what) {
+  throw RuntimeError(fmt::format("{}: {}", what, std::strerror(errno)));
+}
+
+// Both ends are closed on exec: a program started at the same time by another thread must not hold
+// our write end, or the reader would never see the end of its input.
+std::pair<Fd, Fd> make_pipe() {
+  int ends[2];
+  if (pipe2(ends, O_CLOEXEC) != 0) throw_system("cannot create a pipe");
+  return {Fd(ends[0]), Fd(ends[1])};
+}
+
+}  // namespace
+
+Fd& Fd::operator=(Fd&& other) noexcept {
+  if (this != &other) {
+    reset();
+    fd_ = other.release();
+  }
+  return *this;
+}
+
+int Fd::release() { return std::exchange(fd_, -1); }
+
+void Fd::reset() {
+  if (fd_ >= 0) close(release());
+}
+
+Child start_process(const std::vector<std::string>& argv, bool pipe_in, bool pipe_out) {
+  Child child;
+  child.log = Fd(memfd_create("stderr", MFD_CLOEXEC));
+  if (!child.log) throw_system("cannot create an anonymous file");
+  Fd child_in, child_out;
+  if (pipe_in) {
+    std::tie(child_in, child.in) = make_pipe();
+    fcntl(child.in.get(), F_SETFL, O_NONBLOCK);
+    fcntl(child.in.get(), F_SETPIPE_SZ,
+          1 << 20);  // fewer wake-ups a frame; refused quietly beyond the user's limit
+  } else {
+    child_in = Fd(open("/dev/null", O_RDONLY | O_CLOEXEC));
+  }
+  if (pipe_out) {
+    std::tie(child.out, child_out) = make_pipe();
+  } else {
+    child_out = Fd(open("/dev/null", O_WRONLY | O_CLOEXEC));
+  }
+
+  posix_spawn_file_actions_t actions;
+  posix_spawn_file_actions_init(&actions);
+  posix_spawn_file_actions_adddup2(&actions, child_in.get(), 0);
+  posix_spawn_file_actions_adddup2(&actions, child_out.get(), 1);
+  posix_spawn_file_actions_adddup2(&actions, child.log.get(), 2);
+  posix_spawn_file_actions_addclosefrom_np(&actions, 3);  // files that libraries opened without O_CLOEXEC
+
+  posix_spawnattr_t attributes;
+  posix_spawnattr_init(&attributes);
+  sigset_t none, all;
+  sigemptyset(&none);
+  sigfillset(&all);
+  posix_spawnattr_setsigmask(&attributes, &none);
+  posix_spawnattr_setsigdefault(&attributes, &all);
+  posix_spawnattr_setpgroup(&attributes, 0);
+  posix_spawnattr_setflags(&attributes,
+                           POSIX_SPAWN_SETSIGMASK | POSIX_SPAWN_SETSIGDEF | POSIX_SPAWN_SETPGROUP);
+
+  std::vector<char*> args;
+  for (const std::string& a : argv) args.push_back(const_cast<char*>(a.c_str()));
+  args.push_back(nullptr);
+  const int error = posix_spawnp(&child.pid, args[0], &actions, &attributes, args.data(), environ);
+  posix_spawn_file_actions_destroy(&actions);
+  posix_spawnattr_destroy(&attributes);
+  if (error != 0)
+    throw RuntimeError(
+        fmt::format("cannot start the program '{}': {}", argv[0], std::strerror(error)));
+  return child;
+}
+
+bool wait_process(Child& child, bool block, Exit& result) {
+  int status = 0;
+  rusage usage{};
+  pid_t got;
+  do {
+    got = wait4(child.pid, &status, block ? 0 : WNOHANG, &usage);
+  } while (got < 0 && errno == EINTR);
+  if (got == 0) return false;
+  child.pid = -1;
+  const auto seconds = [](const timeval& t) {
+    return static_cast<double>(t.tv_sec) + 1e-6 * static_cast<double>(t.tv_usec);
+  };
+  result.cpu_s = seconds(usage.ru_utime) + seconds(usage.ru_stime);
+  const std::string words = last_words(child.log.get());
+  if (got < 0) {
+    result.why = fmt::format("its exit status was lost ({})", std::strerror(errno));
+  } else if (WIFSIGNALED(status)) {
+    result.why =
+        fmt::format("killed by signal {} ({})", WTERMSIG(status), strsignal(WTERMSIG(status)));
+  } else if (WEXITSTATUS(status) != 0) {
+    result.why = fmt::format("exit code {}", WEXITSTATUS(status));
+  } else {
+    result.ok = true;
+  }
+  if (!result.ok && !words.empty()) result.why += ": " + words;
+  return true;
+}
+
+void kill_process(Child& child) {
+  if (child.pid < 0) return;
+  kill(child.pid, SIGKILL);
+  Exit ignored;
+  wait_process(child, true, ignored);
+}
+
+std::string run_process(const std::vector<std::string>& argv) {
+  Child child = start_process(argv, false, true);
+  std::string output;
+  std::uint8_t buffer[1 << 14];
+  while (const std::size_t n = read_fully(child.out.get(), buffer))
+    output.append(reinterpret_cast<char*>(buffer), n);
+  Exit result;
+  wait_process(child, true, result);
+  if (!result.ok)
+    throw RuntimeError(fmt::format("the program '{}' failed: {}", argv[0], result.why));
+  return output;
+}
+
+std::size_t read_fully(int fd, std::span<std::uint8_t> bytes) {
+  std::size_t done = 0;
+  while (done < bytes.size()) {
+    const ssize_t n = read(fd, bytes.data() + done, bytes.size() - done);
+    if (n < 0 && errno == EINTR) continue;
+    if (n <= 0) break;
+    done += static_cast<std::size_t>(n);
+  }
+  return done;
+}
+
+std::string ffmpeg_program(const std::string& wanted) {
+  if (!wanted.empty()) return wanted;
+  const char* from_environment = std::getenv("MJSENSE_FFMPEG");
+  return from_environment && *from_environment ? from_environment : "ffmpeg";
+}
+
+}  // namespace mjsense

@@ -1,0 +1,225 @@
+#include "mjsense/rollout/record_job.h"
+
+#include <fmt/format.h>
+
+#include <chrono>
+#include <cmath>
+#include <limits>
+
+#include "mjsense/core/error.h"
+
+namespace mjsense {
+namespace {
+
+using Clock = std::chrono::steady_clock;
+
+double since(Clock::time_point start) {
+  return std::chrono::duration<double>(Clock::now() - start).count();
+}
+
+// What the data depend on: not the number of worlds or threads. A recording resumes only with equal
+// settings.
+std::string settings_of(const RecordJobCfg& job, Rollout& rollout) {
+  const RolloutCfg& cfg = rollout.cfg();
+  std::vector<std::uint8_t> text(1 << 16);
+  JsonWriter json(text);
+  json.begin_object();
+  json.key("action_noise").value(cfg.action_noise);
+  json.key("cameras").begin_array();
+  for (const RecordedCamera& camera : rollout.cameras()) {
+    json.begin_object();
+    json.key("depth").value(camera.depth);
+    json.key("height").value(camera.height);
+    json.key("name").value(camera.name);
+    json.key("width").value(camera.width);
+    json.end_object();
+  }
+  json.end_array();
+  json.key("horizon").value(rollout.task().cfg().horizon);
+  json.key("keep_failures").value(job.keep_failures);
+  json.key("policy").value(cfg.policy);
+  json.key("policy_dt_ms").value(rollout.task().cfg().policy_dt_ms);
+  json.key("robot").value(cfg.robot);
+  json.key("samples").value(cfg.samples);
+  json.key("seed").value(static_cast<std::int64_t>(cfg.seed));
+  json.key("shadows").value(cfg.shadows);
+  json.key("task").value(cfg.task);
+  json.end_object();
+  return {text.begin(), text.begin() + static_cast<std::ptrdiff_t>(json.size())};
+}
+
+RecordingCfg recording_cfg(const RecordJobCfg& job, Rollout& rollout) {
+  RecordingCfg cfg;
+  cfg.out_dir = job.out;
+  cfg.house = job.house;
+  cfg.episodes = job.episodes;
+  cfg.batches = job.batches;
+  cfg.num_worlds = rollout.num_worlds();
+  cfg.fps = Fps::from_period_ms(rollout.task().cfg().policy_dt_ms);
+  for (const auto& sensor : rollout.suite().sensors()) cfg.sensors.push_back(sensor.get());
+  cfg.settings = settings_of(job, rollout);
+  cfg.resume = job.resume;
+  cfg.gzip = job.gzip;
+  cfg.video = job.video;
+  return cfg;
+}
+
+class RecordJob {
+ public:
+  explicit RecordJob(const RecordJobCfg& cfg)
+      : cfg_(checked(cfg)),
+        rollout_(cfg.rollout),
+        recorder_(recording_cfg(cfg, rollout_)),
+        lengths_(rollout_.num_worlds(), 0),
+        max_attempts_(cfg.max_attempts > 0 ? cfg.max_attempts : 6 * cfg.episodes) {
+    for (const RecordedCamera& camera : rollout_.cameras()) pictures_ += camera.depth ? 2 : 1;
+  }
+
+  RecordSummary run(const std::function<void(const RecordProgress&)>& report,
+                    const StopFlag* stop) {
+    const auto begun = Clock::now();
+    double reported = -1;
+    while (true) {
+      const int level = stop ? stop->load() : 0;
+      if (level >= 2) abandon();
+      if (level == 0) start_episodes();
+      if (running_ == 0) break;
+      rollout_.act();
+      rollout_.step();
+      for (int w = 0; w < rollout_.num_worlds(); ++w) {
+        if (rollout_.active(w)) observe(w);
+      }
+      progress_.seconds = since(begun);
+      update_progress();
+      if (report && progress_.seconds - reported > 0.1) {
+        report(progress_);
+        reported = progress_.seconds;
+      }
+    }
+    summary_.interrupted = stop && stop->load() > 0 && !recorder_.enough();
+    timed([&] { summary_.interrupted ? recorder_.flush() : recorder_.complete(); });
+    progress_.seconds = since(begun);
+    update_progress();
+    if (report) report(progress_);
+    summary_.enough = recorder_.kept() >= cfg_.episodes;
+    summary_.progress = progress_;
+    summary_.times = rollout_.times();
+    summary_.record = recorder_.stats();
+    summary_.house_dir = recorder_.house_dir();
+    return summary_;
+  }
+
+ private:
+  static const RecordJobCfg& checked(const RecordJobCfg& cfg) {
+    if (cfg.episodes < 1) {
+      throw ValueError(fmt::format("episodes is {}: must be at least 1", cfg.episodes));
+    }
+    return cfg;
+  }
+
+  template <class Body>
+  void timed(Body&& body) {
+    const auto begun = Clock::now();
+    body();
+    summary_.recording_s += since(begun);
+  }
+
+  // Free worlds take the next attempts, as many as are still needed if all that run succeed.
+  void start_episodes() {
+    worlds_.clear();
+    episodes_.clear();
+    for (int w = 0; w < rollout_.num_worlds(); ++w) {
+      if (rollout_.active(w)) continue;
+      while (next_ < max_attempts_ && recorder_.decided(next_)) ++next_;
+      if (next_ >= max_attempts_ || recorder_.kept() + running_ >= cfg_.episodes) break;
+      worlds_.push_back(w);
+      episodes_.push_back(next_++);
+      ++running_;
+    }
+    if (worlds_.empty()) return;
+    rollout_.start(worlds_, episodes_);
+    for (std::size_t k = 0; k < worlds_.size(); ++k) {
+      timed([&] {
+        recorder_.begin_episode(worlds_[k], {.episode = episodes_[k], .seed = cfg_.rollout.seed});
+      });
+      lengths_[worlds_[k]] = 0;
+      observe(worlds_[k]);
+    }
+  }
+
+  // Records the observation that world w shows, and ends its episode where it ends.
+  void observe(int w) {
+    if (!rollout_.fault(w).empty()) return end(w, false, rollout_.fault(w));
+    const Evaluation& now = rollout_.evaluation(w);
+    timed([&] {
+      recorder_.append(w, {.reward = static_cast<float>(now.reward),
+                           .terminated = now.terminal,
+                           .truncated = now.truncated,
+                           .success = now.success});
+    });
+    progress_.frames += pictures_;
+    if (++lengths_[w] > 1) ++progress_.steps;
+    if (!now.terminal && !now.truncated) return;
+    end(w, now.success, now.success ? "success" : now.terminal ? "no success" : "horizon reached");
+  }
+
+  void end(int w, bool success, const std::string& outcome) {
+    timed([&] {
+      if (success || (cfg_.keep_failures && lengths_[w] > 1)) {
+        recorder_.finish_episode(w, rollout_.task().obs_scene(w), outcome);
+      } else {
+        recorder_.discard_episode(w, outcome);
+      }
+    });
+    ++(success ? progress_.succeeded : progress_.failed);
+    if (!success) ++summary_.failures[outcome];
+    summary_.lengths.push_back(lengths_[w]);
+    rollout_.stop(w);
+    --running_;
+  }
+
+  void abandon() {
+    for (int w = 0; w < rollout_.num_worlds(); ++w) {
+      if (!rollout_.active(w)) continue;
+      recorder_.abandon_episode(w);
+      rollout_.stop(w);
+      --running_;
+    }
+  }
+
+  void update_progress() {
+    progress_.kept = recorder_.kept();
+    progress_.wanted = cfg_.episodes;
+    progress_.running = running_;
+    progress_.physics_steps = progress_.steps * rollout_.task().decimation();
+  }
+
+  RecordJobCfg cfg_;
+  Rollout rollout_;
+  Recorder recorder_;
+  RecordProgress progress_;
+  RecordSummary summary_;
+  std::vector<int> lengths_;  // observations of each world's episode so far
+  std::vector<int> worlds_;
+  std::vector<std::int64_t> episodes_;
+  std::int64_t next_ = 0;
+  std::int64_t max_attempts_;
+  int running_ = 0;
+  int pictures_ = 0;  // of one observation
+};
+
+}  // namespace
+
+double RecordProgress::seconds_left() const {
+  const int ended = succeeded + failed;
+  if (ended == 0 || kept == 0) return std::numeric_limits<double>::quiet_NaN();
+  return seconds / kept * std::max(0, wanted - kept);
+}
+
+RecordSummary record_episodes(const RecordJobCfg& cfg,
+                              const std::function<void(const RecordProgress&)>& progress,
+                              const StopFlag* stop) {
+  return RecordJob(cfg).run(progress, stop);
+}
+
+}  // namespace mjsense

@@ -1,0 +1,123 @@
+#pragma once
+// B worlds that play episodes of a task, in lock step: the loop under recording, gym environments
+// and benchmarks.
+//
+//   Rollout rollout(cfg);
+//   rollout.start(worlds, episodes);        observation 0 of these episodes is fresh
+//   while (...) {
+//     rollout.act();                        the policy's actions; or write rollout.action(w)
+//     yourself rollout.step();                       apply -> controllers -> physics -> sensors
+//     rollout.suite(), rollout.evaluation(w), rollout.fault(w)
+//   }
+//
+// An episode is a function of (seed, number): it does not depend on B, on its world, on threads, or
+// on what ran beside it.
+
+#include <cstdint>
+#include <functional>
+#include <memory>
+#include <optional>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "mjsense/observe/suite.h"
+#include "mjsense/policies/policy.h"
+#include "mjsense/rollout/action_log.h"
+#include "mjsense/rollout/core_suite.h"
+#include "mjsense/sim/simulation.h"
+#include "mjsense/tasks/task.h"
+
+namespace mjsense {
+
+struct RolloutCfg {
+  std::string task = "pick";
+  std::string robot = "franka";
+  std::string policy = "planner";  // "": actions come from the caller
+  int num_worlds = 1;
+  int threads = 0;  // 0: the CPUs this process may use
+  std::uint64_t seed = 0;
+  std::optional<std::vector<std::string>>
+      cameras;                       // of the robot's, in this order; unset: all, empty: none
+  std::optional<int> width, height;  // pixels; unset: the robot's
+  bool depth = false;                // of every camera; else as the robot's mounts say
+  int samples = 1;                   // rays per pixel of rgb
+  bool shadows = true;
+  std::optional<int> horizon;  // control steps
+  bool action_noise = true;
+};
+
+// Where the time of steps went, wall seconds.
+struct RolloutTimes {
+  double policy = 0;     // act(): planning, inverse kinematics, controllers
+  double physics = 0;    // MuJoCo
+  double sensing = 0;    // rows
+  double rendering = 0;  // cameras and rays
+  double reset = 0;      // start(): sampling, first plans, first observations
+};
+
+class Rollout {
+ public:
+  // Throws KeyError for an unknown task, robot, policy or camera, ValueError for bad sizes.
+  explicit Rollout(const RolloutCfg& cfg);
+  ~Rollout();
+  Rollout(const Rollout&) = delete;
+  Rollout& operator=(const Rollout&) = delete;
+
+  const RolloutCfg& cfg() const { return cfg_; }
+  int num_worlds() const { return cfg_.num_worlds; }
+  Task& task() { return *task_; }
+  Policy* policy() { return policy_.get(); }
+  Simulation& simulation() { return *simulation_; }
+  SensorSuite& suite() { return suite_; }
+  const std::vector<RecordedCamera>& cameras() const { return cameras_; }
+
+  // World worlds[k] plays episode episodes[k] from its start. Its faults are forgotten.
+  void start(std::span<const int> worlds, std::span<const std::int64_t> episodes);
+  // This world plays nothing until it is started again; it stands still.
+  void stop(int world) { active_[world] = false; }
+  bool active(int world) const { return active_[world]; }
+  std::int64_t episode(int world) const { return task_->episode(world); }
+
+  // The policy fills the actions of the active worlds.
+  void act();
+  Action& action(int world) { return actions_[world]; }
+  // One control step; then suite and evaluations of the active worlds are current.
+  void step();
+
+  const Evaluation& evaluation(int world) const { return evaluations_[world]; }
+  // Why this world's episode cannot go on: physics that diverged (MuJoCo's text), a row that does
+  // not fit. "" if it can. The world was reset; its rows mean nothing until it is started again.
+  const std::string& fault(int world) const { return faults_[world]; }
+
+  const RolloutTimes& times() const { return times_; }
+
+ private:
+  class EachActive;
+  std::span<const int> active_worlds();
+  void for_each(std::span<const int> worlds, std::function<void(const World&)> body);
+  bool guard_rows(const std::function<void()>& body);
+  void observe();
+  void take_failures();
+  void set_fault(int world, std::string text);
+  double row_cost() const;
+  double cast_cost() const;
+  int threads() const;
+
+  RolloutCfg cfg_;
+  std::unique_ptr<Task> task_;
+  std::unique_ptr<Policy> policy_;
+  std::vector<RecordedCamera> cameras_;
+  std::unique_ptr<ActionLog> log_;
+  SensorSuite suite_;
+  std::unique_ptr<Simulation> simulation_;  // refers to the suite's sensors
+  std::vector<Action> actions_;
+  std::vector<Evaluation> evaluations_;
+  std::vector<std::string> faults_;
+  std::vector<char> active_;
+  std::vector<StateRow> rows_;  // [B]
+  std::vector<int> ids_;        // scratch of active_worlds()
+  RolloutTimes times_;
+};
+
+}  // namespace mjsense

@@ -1,0 +1,75 @@
+#include "mjsense/scene/assets.h"
+
+#include <fmt/format.h>
+
+#include <filesystem>
+
+namespace mjsense {
+namespace {
+
+namespace fs = std::filesystem;
+
+class Adopter {
+ public:
+  Adopter(const ModelSource& source, const std::string& entity, Vfs& vfs)
+      : source_(source), entity_(entity), vfs_(vfs) {}
+
+  // The new name of `file`, which the element names relative to `dir`.
+  std::string operator()(const mjsElement* element, const char* dir, std::string file) const {
+    const mjSpec* origin = mjs_getOriginSpec(element);
+    if (origin->strippath) file = fs::path(file).filename().string();
+    const std::string joined = (fs::path(dir) / file).lexically_normal().generic_string();
+    for (const std::string& name : {joined, file, fs::path(file).filename().string()}) {
+      if (auto it = source_.assets.find(name); it != source_.assets.end())
+        return in_memory(it->first, it->second);
+    }
+    const fs::path base = mjs_getString(origin->modelfiledir);
+    return base.is_absolute() ? (base / joined).lexically_normal().generic_string() : joined;
+  }
+
+ private:
+  std::string in_memory(const std::string& name, const std::string& bytes) const {
+    const auto taken = vfs_.files().find(name);
+    const bool clash = taken != vfs_.files().end() && taken->second != bytes;
+    const std::string unique = clash ? entity_ + "/" + name : name;
+    vfs_.add(unique, bytes, fmt::format("entity '{}'", entity_));
+    return unique;
+  }
+
+  const ModelSource& source_;
+  const std::string& entity_;
+  Vfs& vfs_;
+};
+
+}  // namespace
+
+void adopt_assets(mjSpec* child, const ModelSource& source, const std::string& entity, Vfs& vfs) {
+  const Adopter adopt(source, entity, vfs);
+  const auto rename = [&](mjsElement* element, mjString* file, bool texture) {
+    const std::string old = mjs_getString(file);
+    if (old.empty()) return;
+    const mjsCompiler* compiler = mjs_getCompiler(element);
+    mjs_setString(
+        file, adopt(element, mjs_getString(texture ? compiler->texturedir : compiler->meshdir), old)
+                  .c_str());
+  };
+  for (mjsElement* e : spec_elements(child, mjOBJ_MESH)) rename(e, mjs_asMesh(e)->file, false);
+  for (mjsElement* e : spec_elements(child, mjOBJ_HFIELD)) rename(e, mjs_asHField(e)->file, false);
+  for (mjsElement* e : spec_elements(child, mjOBJ_SKIN)) rename(e, mjs_asSkin(e)->file, false);
+  for (mjsElement* e : spec_elements(child, mjOBJ_TEXTURE)) {
+    mjsTexture* texture = mjs_asTexture(e);
+    rename(e, texture->file, true);
+    const char* dir = mjs_getString(mjs_getCompiler(e)->texturedir);
+    for (int i = 0; i < 6; ++i) {
+      const char* file = mjs_getInStringVec(texture->cubefiles, i);
+      if (!file || !*file) continue;
+      mjs_setInStringVec(texture->cubefiles, i, adopt(e, dir, file).c_str());
+    }
+  }
+  // Directories are part of the names now.
+  mjs_setString(child->compiler.meshdir, "");
+  mjs_setString(child->compiler.texturedir, "");
+  child->strippath = 0;
+}
+
+}  // namespace mjsense

@@ -1,0 +1,140 @@
+// Row w among B worlds is row w alone, bit for bit, at any number of threads; and a step allocates
+// nothing.
+
+#include <gtest/gtest.h>
+
+#include <cstring>
+#include <memory>
+#include <random>
+#include <vector>
+
+#include "mjsense/core/testing/allocations.h"
+#include "mjsense/scene/scene.h"
+#include "mjsense/sensors/contact/contact_sensor.h"
+#include "mjsense/sim/simulation.h"
+
+namespace mjsense {
+namespace {
+
+constexpr char kHeap[] = R"(
+<mujoco><worldbody>
+  <body name="a" pos="0 0 .2"><freejoint/><geom name="a" type="box" size=".1 .1 .05"/></body>
+  <body name="b" pos=".05 0 .4">
+    <joint type="slide" axis="1 0 0"/><joint type="slide" axis="0 1 0"/>
+    <joint type="slide" axis="0 0 1"/><joint type="ball"/>
+    <geom name="b" type="box" size=".1 .1 .05"/></body>
+  <body name="c" pos="0 .05 .6">
+    <joint type="slide" axis="1 0 0"/><joint type="slide" axis="0 1 0"/>
+    <joint type="slide" axis="0 0 1"/><joint type="ball"/>
+    <geom name="c" type="capsule" size=".05 .1"/></body>
+</worldbody></mujoco>)";
+
+std::shared_ptr<Scene> make_scene() {
+  SceneCfg cfg;
+  EntityCfg entity;
+  entity.model.xml = kHeap;
+  cfg.entities.emplace_back("heap", entity);
+  cfg.terrain = TerrainCfg{};
+  for (const char* reduce : {"none", "mindist", "maxforce", "netforce"}) {
+    for (bool memory : {false, true}) {
+      ContactSensorCfg c;
+      c.name = std::string(reduce) + (memory ? "_memory" : "");
+      c.primary = {"body", {".*"}, "heap", {}};
+      c.fields = {"found", "force", "torque", "dist", "pos", "normal", "tangent"};
+      c.reduce = reduce;
+      c.num_slots = 3;
+      c.friction_split = c.other_ids = true;
+      if (memory) {
+        c.track_air_time = c.track_events = c.latch = true;
+        c.history_length = 5;
+        c.secondary = ContactMatch{"geom", {".*"}, "heap", {}};
+        c.secondary_policy = "each";
+      }
+      cfg.sensors.push_back(std::make_shared<ContactSensorCfg>(c));
+    }
+  }
+  return std::make_shared<Scene>(std::move(cfg));
+}
+
+// Every world thrown differently; world w depends on w alone.
+void throw_world(Simulation& sim, int row, int w) {
+  std::mt19937 random(100 + w);
+  std::uniform_real_distribution<double> u(-1, 1);
+  const ArrayView qvel = sim.worlds().state_component("qvel");
+  auto* v = reinterpret_cast<double*>(qvel.data + row * qvel.strides[0]);
+  for (int i = 0; i < sim.model()->nv; ++i) v[i] = u(random);
+}
+
+std::vector<Sensor*> contact_sensors(Simulation& sim) {
+  std::vector<Sensor*> list;
+  for (const auto& s : sim.scene().sensors()) {
+    if (s->kind() == "contact") list.push_back(s.get());
+  }
+  return list;
+}
+
+TEST(ContactLockstep, AnyBatchAndThreadCountIsBitEqual) {
+  constexpr int kWorlds = 16, kSteps = 40;
+  struct Run {
+    std::shared_ptr<Scene> scene;
+    std::unique_ptr<Simulation> sim;
+  };
+  std::vector<Run> runs;
+  for (int threads : {1, 2, 5}) {
+    SimulationCfg cfg;
+    cfg.num_worlds = kWorlds;
+    cfg.decimation = 4;
+    cfg.threads = threads;
+    auto scene = make_scene();
+    runs.push_back({scene, std::make_unique<Simulation>(scene, cfg)});
+    for (int w = 0; w < kWorlds; ++w) throw_world(*runs.back().sim, w, w);
+  }
+  SimulationCfg one;
+  one.decimation = 4;
+  one.threads = 1;
+  constexpr int kAlone = 11;
+  auto scene = make_scene();
+  Simulation alone(scene, one);
+  throw_world(alone, 0, kAlone);
+  for (int step = 0; step < kSteps; ++step) {
+    for (Run& run : runs) {
+      run.sim->step();
+      run.sim->refresh(contact_sensors(*run.sim));
+    }
+    alone.step();
+    alone.refresh(contact_sensors(alone));
+    for (std::size_t i = 0; i < contact_sensors(alone).size(); ++i) {
+      for (const Field& f : contact_sensors(*runs[0].sim)[i]->fields()) {
+        for (std::size_t r = 1; r < runs.size(); ++r) {
+          const Array& other = contact_sensors(*runs[r].sim)[i]->field(f.name).data;
+          ASSERT_EQ(std::memcmp(f.data.data(), other.data(), f.data.bytes()), 0) << f.spec.name;
+        }
+        const Array& single = contact_sensors(alone)[i]->field(f.name).data;
+        ASSERT_EQ(std::memcmp(f.data.row_data(kAlone), single.data(), single.bytes()), 0)
+            << f.spec.name << " step " << step;
+      }
+    }
+  }
+}
+
+TEST(ContactLockstep, StepAllocatesNothing) {
+  SimulationCfg cfg;
+  cfg.num_worlds = 4;
+  cfg.decimation = 3;
+  cfg.threads = 2;
+  Simulation sim(make_scene(), cfg);
+  const std::vector<Sensor*> sensors = contact_sensors(sim);
+  for (int i = 0; i < 3; ++i) {
+    sim.step();
+    sim.refresh(sensors);
+  }
+  const AllocationCount count;
+  for (int i = 0; i < 200; ++i) {
+    sim.step();
+    sim.refresh(sensors);
+  }
+  EXPECT_EQ(count.since(), 0);
+}
+
+}  // namespace
+}  // namespace mjsense

@@ -1,0 +1,305 @@
+// Random heaps of bodies: every field, mode and reduction against MuJoCo's own contact sensors, and
+// what MuJoCo does not have against a brute-force search of mjData.contact.
+
+#include <fmt/format.h>
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <memory>
+#include <random>
+#include <string>
+#include <vector>
+
+#include "mjsense/sensors/contact/contact_sensor.h"
+
+namespace mjsense {
+namespace {
+
+using Random = std::mt19937;
+double uniform(Random& r, double a, double b) {
+  return std::uniform_real_distribution<double>(a, b)(r);
+}
+int below(Random& r, int n) { return std::uniform_int_distribution<int>(0, n - 1)(r); }
+
+const std::vector<std::string> kAll = {"found", "force",  "torque", "dist",
+                                       "pos",   "normal", "tangent"};
+const char* const kModes[] = {"geom", "body", "subtree"};
+const char* const kReduces[] = {"none", "mindist", "maxforce", "netforce"};
+
+struct Heap {
+  std::string xml;
+  std::vector<std::string> geoms, bodies;
+};
+
+std::string random_geom(Random& r, Heap& heap) {
+  const char* types[] = {"sphere", "box", "capsule", "ellipsoid"};
+  const std::string name = fmt::format("g{}", heap.geoms.size());
+  heap.geoms.push_back(name);
+  const int condims[] = {1, 3, 4, 6};
+  return fmt::format(
+      R"(<geom name="{}" type="{}" size="{:.3f} {:.3f} {:.3f}" pos="{:.3f} {:.3f} {:.3f}" condim="{}" margin="{:.3f}" gap="{:.3f}" friction="{:.2f} .02 .01"/>)",
+      name, types[below(r, 4)], uniform(r, .03, .08), uniform(r, .03, .08), uniform(r, .03, .08),
+      uniform(r, -.05, .05), uniform(r, -.05, .05), uniform(r, -.05, .05), condims[below(r, 4)],
+      below(r, 2) * .01, below(r, 2) * .02, uniform(r, .2, 1.2));
+}
+
+void add_body(Random& r, Heap& heap, int depth) {
+  const std::string name = fmt::format("b{}", heap.bodies.size());
+  heap.bodies.push_back(name);
+  const double reach = depth ? .15 : .25;
+  heap.xml +=
+      fmt::format(R"(<body name="{}" pos="{:.3f} {:.3f} {:.3f}">)", name, uniform(r, -reach, reach),
+                  uniform(r, -reach, reach), depth ? 0.0 : uniform(r, .02, .3));
+  heap.xml += depth ? R"(<joint type="hinge" axis="0 1 0"/>)" : "<freejoint/>";
+  for (int k = 1 + below(r, 3); k > 0; --k) heap.xml += random_geom(r, heap);
+  if (depth < 3) {
+    for (int k = below(r, 3 - depth); k > 0; --k) add_body(r, heap, depth + 1);
+  }
+  heap.xml += "</body>";
+}
+
+Heap random_heap(Random& r) {
+  Heap heap;
+  heap.xml = fmt::format(
+      R"(<mujoco><option cone="{}"/><size memory="20M"/><worldbody><geom name="floor" type="plane" size="3 3 .1"/>)",
+      below(r, 2) ? "elliptic" : "pyramidal");
+  heap.geoms.push_back("floor");
+  heap.bodies.push_back("world");
+  for (int k = 2 + below(r, 5); k > 0; --k) add_body(r, heap, 0);
+  heap.xml += "</worldbody><sensor>";
+  return heap;
+}
+
+ContactMatch random_match(Random& r, const Heap& heap, int count) {
+  ContactMatch match;
+  match.mode = kModes[below(r, 3)];
+  std::vector<std::string> names = match.mode == "geom" ? heap.geoms : heap.bodies;
+  std::shuffle(names.begin(), names.end(), r);
+  names.resize(std::min<std::size_t>(names.size(), count));
+  match.pattern = names;
+  return match;
+}
+
+ContactSensorCfg random_cfg(Random& r, const Heap& heap, int index) {
+  ContactSensorCfg cfg;
+  cfg.name = fmt::format("c{}", index);
+  cfg.primary = random_match(r, heap, 1 + below(r, 4));
+  if (below(r, 2)) cfg.secondary = random_match(r, heap, 1);
+  cfg.fields = kAll;
+  cfg.reduce = kReduces[below(r, 4)];
+  cfg.num_slots = 1 + below(r, 4);
+  return cfg;
+}
+
+// MuJoCo's sensors for the same content: one a primary.
+std::string mujoco_sensors(const ContactSensorCfg& cfg) {
+  std::string xml;
+  for (std::size_t p = 0; p < cfg.primary.pattern.size(); ++p) {
+    xml += fmt::format(R"(<contact name="{}_{}" {}1="{}" )", cfg.name, p, cfg.primary.mode,
+                       cfg.primary.pattern[p]);
+    if (cfg.secondary)
+      xml += fmt::format(R"({}2="{}" )", cfg.secondary->mode, cfg.secondary->pattern[0]);
+    xml +=
+        fmt::format(R"(num="{}" reduce="{}" data="found force torque dist pos normal tangent"/>)",
+                    cfg.num_slots, cfg.reduce);
+  }
+  return xml;
+}
+
+struct Model {
+  mjModel* m = nullptr;
+  mjData* d = nullptr;
+  explicit Model(const std::string& xml) {
+    char error[1000] = "";
+    mjSpec* spec = mj_parseXMLString(xml.c_str(), nullptr, error, sizeof error);
+    EXPECT_TRUE(spec) << error;
+    m = mj_compile(spec, nullptr);
+    EXPECT_TRUE(m) << mjs_getError(spec);
+    mj_deleteSpec(spec);
+    d = mj_makeData(m);
+  }
+  ~Model() {
+    mj_deleteData(d);
+    mj_deleteModel(m);
+  }
+};
+
+std::unique_ptr<ContactSensor> make_sensor(const ContactSensorCfg& cfg, const mjModel* m,
+                                           int decimation = 1) {
+  std::unique_ptr<Sensor> s = cfg.build();
+  SensorInit init;
+  init.model = m;
+  init.decimation = decimation;
+  s->initialize(init);
+  return std::unique_ptr<ContactSensor>(static_cast<ContactSensor*>(s.release()));
+}
+
+void expect_equal_to_mujoco(ContactSensor& sensor, const Model& model) {
+  const int P = static_cast<int>(sensor.primary_names().size()), K = sensor.cfg().num_slots;
+  for (int p = 0; p < P; ++p) {
+    const std::string name = fmt::format("{}_{}", sensor.name(), p);
+    const int id = mj_name2id(model.m, mjOBJ_SENSOR, name.c_str());
+    const mjtNum* native = model.d->sensordata + model.m->sensor_adr[id];
+    for (int k = 0; k < K; ++k) {
+      for (const std::string& field : kAll) {
+        const auto row = sensor.field(field).data.row<float>(0);
+        const int dim = static_cast<int>(row.size()) / (P * K);
+        for (int i = 0; i < dim; ++i, ++native) {
+          ASSERT_NEAR(row[(p * K + k) * dim + i], *native, 1e-6 * std::max(1.0, std::abs(*native)))
+              << name << " " << sensor.cfg().reduce << " " << sensor.cfg().primary.mode << " slot "
+              << k << " " << field << "[" << i << "] of " << model.d->ncon << " contacts";
+        }
+      }
+    }
+  }
+}
+
+TEST(ContactRandom, EveryFieldModeAndReductionIsMuJoCos) {
+  int contacts = 0;
+  for (int seed = 0; seed < 150; ++seed) {
+    Random r(seed);
+    Heap heap = random_heap(r);
+    std::vector<ContactSensorCfg> cfgs;
+    for (int i = 0; i < 8; ++i) {
+      cfgs.push_back(random_cfg(r, heap, i));
+      heap.xml += mujoco_sensors(cfgs.back());
+    }
+    Model model(heap.xml + "</sensor></mujoco>");
+    std::vector<std::unique_ptr<ContactSensor>> sensors;
+    for (const ContactSensorCfg& cfg : cfgs) sensors.push_back(make_sensor(cfg, model.m));
+    for (int step = 0; step < 12; ++step) {
+      mj_forward(model.m, model.d);
+      contacts += model.d->ncon;
+      World world{0, model.m, model.d};
+      world.moment = step + 1;
+      for (auto& sensor : sensors) {
+        sensor->compute(world);
+        expect_equal_to_mujoco(*sensor, model);
+        if (HasFatalFailure()) return;
+      }
+      mj_step(model.m, model.d);
+      mj_step(model.m, model.d);
+    }
+  }
+  EXPECT_GT(contacts, 5000);  // the heaps are not empty
+}
+
+// ---- what MuJoCo does not have
+
+bool belongs(const mjModel* m, int geom, const std::string& mode, const std::string& name) {
+  if (geom < 0) return false;
+  if (mode == "geom") return geom == mj_name2id(m, mjOBJ_GEOM, name.c_str());
+  const int object = mj_name2id(m, mjOBJ_BODY, name.c_str());
+  for (int body = m->geom_bodyid[geom];; body = m->body_parentid[body]) {
+    if (body == object) return true;
+    if (mode == "body" || body == 0) return false;
+  }
+}
+
+TEST(ContactRandom, PairsOthersAndFrictionSplitMatchBruteForce) {
+  int pairs = 0;
+  for (int seed = 1000; seed < 1100; ++seed) {
+    Random r(seed);
+    Heap heap = random_heap(r);
+    Model model(heap.xml + "</sensor></mujoco>");
+    ContactSensorCfg cfg = random_cfg(r, heap, 0);
+    cfg.secondary = random_match(r, heap, 1 + below(r, 4));
+    cfg.secondary_policy = "each";
+    cfg.friction_split = cfg.other_ids = true;
+    cfg.global_frame = true;
+    auto sensor = make_sensor(cfg, model.m);
+    const int P = static_cast<int>(cfg.primary.pattern.size());
+    const int S = static_cast<int>(cfg.secondary->pattern.size());
+    for (int step = 0; step < 10; ++step) {
+      mj_forward(model.m, model.d);
+      sensor->compute({0, model.m, model.d});
+      const auto found = sensor->field("pair_found").data.row<float>(0);
+      const auto force = sensor->field("pair_force").data.row<float>(0);
+      for (int p = 0; p < P; ++p) {
+        std::vector<int> others;
+        for (int s = 0; s < S; ++s) {
+          int count = 0;
+          double sum[3] = {0, 0, 0}, size = 1;
+          for (int i = 0; i < model.d->ncon; ++i) {
+            const mjContact& c = model.d->contact[i];
+            const auto prim = [&](int side) {
+              return belongs(model.m, c.geom[side], cfg.primary.mode, cfg.primary.pattern[p]);
+            };
+            const auto sec = [&](int side, int which) {
+              return belongs(model.m, c.geom[side], cfg.secondary->mode,
+                             cfg.secondary->pattern[which]);
+            };
+            bool regular = false, reverse = false;
+            for (int any = 0; any < S; ++any) {
+              regular |= prim(0) && sec(1, any);
+              reverse |= prim(1) && sec(0, any);
+            }
+            if (!regular && !reverse) continue;
+            const int sign = regular ? 1 : -1;
+            others.push_back(c.geom[regular ? 1 : 0]);
+            if (!sec(regular ? 1 : 0, s)) continue;
+            mjtNum f[6], w[3];
+            mj_contactForce(model.m, model.d, i, f);
+            mju_mulMatTVec3(w, c.frame, f);
+            for (int k = 0; k < 3; ++k) sum[k] += sign * w[k];
+            size += mju_norm3(f);
+            ++count;
+          }
+          ASSERT_EQ(found[p * S + s], count);
+          pairs += count > 0;
+          for (int k = 0; k < 3; ++k) ASSERT_NEAR(force[(p * S + s) * 3 + k], sum[k], 1e-6 * size);
+        }
+        for (int k = 0; k < cfg.num_slots; ++k) {
+          const int n = p * cfg.num_slots + k;
+          const int other = sensor->field("other_geom").data.row<std::int32_t>(0)[n];
+          if (sensor->field("found").data.row<float>(0)[n] == 0) {
+            ASSERT_EQ(other, -1);
+          } else {
+            ASSERT_NE(std::find(others.begin(), others.end(), other), others.end());
+            ASSERT_EQ(sensor->field("other_body").data.row<std::int32_t>(0)[n],
+                      model.m->geom_bodyid[other]);
+          }
+          const float* whole = &sensor->field("force").data.row<float>(0)[n * 3];
+          const float* normal = &sensor->field("normal_force").data.row<float>(0)[n * 3];
+          const float* friction = &sensor->field("friction_force").data.row<float>(0)[n * 3];
+          const float* axis = &sensor->field("normal").data.row<float>(0)[n * 3];
+          const double tol =
+              1e-6 * (1 + std::abs(whole[0]) + std::abs(whole[1]) + std::abs(whole[2]));
+          double along = 0;
+          for (int i = 0; i < 3; ++i) {
+            ASSERT_NEAR(normal[i] + friction[i], whole[i], tol);
+            along += friction[i] * axis[i];
+          }
+          if (cfg.reduce == "netforce") continue;  // has no single normal
+          ASSERT_NEAR(along, 0, tol);
+        }
+      }
+      for (int k = 0; k < 3; ++k) mj_step(model.m, model.d);
+    }
+  }
+  EXPECT_GT(pairs, 300);
+}
+
+// A plate of 80 balls: more matches than any fixed buffer, every one counted and summed.
+TEST(ContactRandom, EightyContactsOfOneBody) {
+  std::string xml = R"(<mujoco><worldbody><geom type="plane" size="5 5 .1"/>
+      <body name="b" pos="0 0 .0195"><freejoint/>)";
+  for (int i = 0; i < 80; ++i) {
+    xml += fmt::format(R"(<geom size=".02" pos="{:.2f} {:.2f} 0" mass=".01"/>)", i % 10 * .05,
+                       i / 10 * .05);
+  }
+  ContactSensorCfg cfg;
+  cfg.name = "c0";
+  cfg.primary = {"body", {"b"}, "", {}};
+  cfg.fields = kAll;
+  cfg.reduce = "netforce";
+  Model model(xml + "</body></worldbody><sensor>" + mujoco_sensors(cfg) + "</sensor></mujoco>");
+  mj_forward(model.m, model.d);
+  auto sensor = make_sensor(cfg, model.m);
+  sensor->compute({0, model.m, model.d});
+  EXPECT_EQ(sensor->field("found").data.row<float>(0)[0], 80);
+  expect_equal_to_mujoco(*sensor, model);
+}
+
+}  // namespace
+}  // namespace mjsense

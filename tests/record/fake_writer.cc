@@ -1,0 +1,132 @@
+// Records a suite without physics: what the Python tests of the files read, kill and resume.
+//   record_fake OUT [--episodes N] [--worlds B] [--steps T] [--batches n] [--resume] [--discard K]
+//   [--width W] [--height H]
+//               [--cameras C] [--encoders E] [--red-green] [--no-video] [--gzip G] [--step-ms MS]
+//               [--stop-after N]
+// Every K-th attempt is discarded (0: none). Prints "finished E" after each episode that is safe on
+// disk.
+
+#include <fmt/format.h>
+
+#include <chrono>
+#include <cstdlib>
+#include <cstring>
+#include <map>
+#include <thread>
+
+#include "mjsense/core/error.h"
+#include "mjsense/record/fake_suite.h"
+#include "mjsense/record/recorder.h"
+
+using namespace mjsense;
+
+namespace {
+
+struct Options {
+  std::map<std::string, std::string> values;
+  int number(const std::string& key, int otherwise) const {
+    const auto at = values.find(key);
+    return at == values.end() ? otherwise : std::atoi(at->second.c_str());
+  }
+  bool flag(const std::string& key) const { return values.contains(key); }
+};
+
+Options parse(int argc, char** argv) {
+  Options options;
+  for (int i = 2; i < argc; ++i) {
+    const std::string key = argv[i];
+    const bool has_value = i + 1 < argc && std::strncmp(argv[i + 1], "--", 2) != 0;
+    options.values[key] = has_value ? argv[++i] : "";
+  }
+  return options;
+}
+
+struct Running {
+  std::int64_t episode = -1;
+  int t = 0;
+};
+
+int record(const std::string& out, const Options& o) {
+  const int worlds = o.number("--worlds", 2), steps = o.number("--steps", 20),
+            discard = o.number("--discard", 0);
+  FakeSuite suite({worlds, o.number("--width", 64), o.number("--height", 48), !o.flag("--no-video"),
+                   !o.flag("--no-video"), o.number("--cameras", 1)});
+  RecordingCfg cfg;
+  cfg.out_dir = out;
+  cfg.episodes = o.number("--episodes", 4);
+  cfg.batches = o.number("--batches", 0);
+  cfg.num_worlds = worlds;
+  cfg.fps = Fps::from_period_ms(66);
+  cfg.sensors = suite.sensors();
+  cfg.settings = R"({"task": "fake", "seed": 0})";
+  cfg.resume = o.flag("--resume");
+  cfg.gzip = o.number("--gzip", 4);
+  cfg.video.max_encoders = o.number("--encoders", 0);
+  cfg.video.molmospaces_depth = o.flag("--red-green");
+  Recorder recorder(cfg);
+
+  const auto rejected = [&](std::int64_t e) { return discard > 0 && e % discard == discard - 1; };
+  const auto length = [&](std::int64_t e) {
+    return steps + static_cast<int>(e % 3);
+  };  // worlds finish at different times
+  std::vector<Running> running(worlds);
+  std::int64_t next = 0;
+  int finished = 0;
+  while (true) {
+    bool any = false;
+    for (int w = 0; w < worlds; ++w) {
+      Running& r = running[w];
+      if (recorder.enough()) {
+        if (recorder.recording(w)) recorder.abandon_episode(w);
+        continue;
+      }
+      if (r.episode < 0) {
+        while (recorder.decided(next)) ++next;
+        r = {next++, 0};
+        recorder.begin_episode(w, {r.episode, 1000u + static_cast<std::uint64_t>(r.episode)});
+      }
+      any = true;
+      const int T = length(r.episode);
+      suite.fill(w, r.episode, r.t, T);
+      const bool last = r.t + 1 == T;
+      recorder.append(w, {0.25f * static_cast<float>(r.t), last, false, last});
+      if (o.flag("--step-ms"))
+        std::this_thread::sleep_for(std::chrono::milliseconds(o.number("--step-ms", 0)));
+      ++r.t;
+      if (!last) continue;
+      if (rejected(r.episode)) {
+        recorder.discard_episode(w, "every so many");
+      } else {
+        recorder.finish_episode(w, FakeSuite::obs_scene(r.episode), "success");
+        if (o.flag("--print")) {
+          recorder.flush();
+          fmt::print("finished {}\n", r.episode);
+          std::fflush(stdout);
+        }
+      }
+      r.episode = -1;
+      if (++finished == o.number("--stop-after", -1)) return 0;
+    }
+    if (!any) break;
+  }
+  recorder.complete();
+  const RecordStats s = recorder.stats();
+  fmt::print(
+      "rows {} frames {} copy {:.4f} wait {:.4f} write {:.4f} commit {:.4f} encode_cpu {:.4f} "
+      "bytes_per_world {}\n",
+      s.rows, s.frames, s.copy_s, s.wait_s, s.write_s, s.commit_s, s.encode_cpu_s,
+      recorder.bytes_per_world());
+  return 0;
+}
+
+}  // namespace
+
+int main(int argc, char** argv) {
+  if (argc < 2) return 2;
+  try {
+    return record(argv[1], parse(argc, argv));
+  } catch (const Error& error) {
+    fmt::print(stderr, "error: {}\n", error.what());
+    return 2;
+  }
+}
