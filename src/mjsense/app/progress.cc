@@ -1,0 +1,64 @@
+#include "mjsense/app/progress.h"
+
+#include <fmt/format.h>
+#include <unistd.h>
+
+#include <cmath>
+#include <cstdio>
+
+namespace mjsense {
+
+std::string clock_text(double seconds) {
+  const auto s = static_cast<long>(std::lround(seconds));
+  if (s >= 3600) return fmt::format("{}:{:02}:{:02}", s / 3600, s / 60 % 60, s % 60);
+  return fmt::format("{}:{:02}", s / 60, s % 60);
+}
+
+std::string bytes_text(double bytes) {
+  const char* units[] = {"B", "kB", "MB", "GB", "TB"};
+  int unit = 0;
+  while (bytes >= 999.5 && unit < 4) bytes /= 1000, ++unit;
+  return unit == 0 || bytes >= 99.95 ? fmt::format("{:.0f} {}", bytes, units[unit])
+                                     : fmt::format("{:.1f} {}", bytes, units[unit]);
+}
+
+std::string progress_text(const RecordProgress& p) {
+  const int ended = p.succeeded + p.failed;
+  std::string text = fmt::format("{}/{} episodes", p.kept, p.wanted);
+  text += ended ? fmt::format("  {:.0f} % success", 100.0 * p.succeeded / ended) : "";
+  const double seconds = std::max(p.seconds, 1e-9);
+  text += fmt::format("  {:.0f} steps/s", static_cast<double>(p.steps) / seconds);
+  if (p.frames) text += fmt::format("  {:.0f} frames/s", static_cast<double>(p.frames) / seconds);
+  const double left = p.seconds_left();
+  if (!std::isnan(left) && p.kept < p.wanted) text += fmt::format("  {} left", clock_text(left));
+  return text;
+}
+
+ProgressLine::ProgressLine(bool quiet) : quiet_(quiet), terminal_(isatty(STDERR_FILENO) != 0) {}
+
+void ProgressLine::show(const RecordProgress& progress, int stop_level) {
+  if (quiet_) return;
+  std::string text = progress_text(progress);
+  if (stop_level > 0) {
+    text += fmt::format("  stopping: {} running (Ctrl-C again discards them)", progress.running);
+  }
+  if (terminal_) {
+    fmt::print(stderr, "\r\033[K{}", text);
+    std::fflush(stderr);
+    open_ = true;
+    return;
+  }
+  const int ended = progress.succeeded + progress.failed;
+  const bool quiet_spell = progress.seconds - shown_at_ > 10;
+  if ((ended == shown_ended_ || progress.seconds - shown_at_ < 1) && !quiet_spell) return;
+  shown_ended_ = ended;
+  shown_at_ = progress.seconds;
+  fmt::print(stderr, "{}\n", text);
+}
+
+void ProgressLine::finish() {
+  if (open_) fmt::print(stderr, "\n");
+  open_ = false;
+}
+
+}  // namespace mjsense

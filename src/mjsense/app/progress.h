@@ -1,0 +1,31 @@
+#pragma once
+// The line that tells a person how a recording goes: on a terminal one line that changes, else a
+// line whenever an episode ends.
+
+#include <string>
+
+#include "mjsense/rollout/record_job.h"
+
+namespace mjsense {
+
+class ProgressLine {
+ public:
+  explicit ProgressLine(bool quiet);
+  void show(const RecordProgress& progress, int stop_level);
+  void finish();  // leaves the line as it stands
+
+ private:
+  bool quiet_, terminal_;
+  bool open_ = false;
+  int shown_ended_ = -1;
+  double shown_at_ = -1e9;
+};
+
+// "3/8 episodes  100 % success  412 steps/s  824 frames/s  0:42 left"
+std::string progress_text(const RecordProgress& progress);
+// "1:05:09", "0:42"
+std::string clock_text(double seconds);
+// "412 B", "3.4 kB", "1.2 MB"
+std::string bytes_text(double bytes);
+
+}  // namespace mjsense

@@ -1,0 +1,190 @@
+#include "mjsense/app/record_command.h"
+
+#include <fmt/format.h>
+
+#include <charconv>
+#include <csignal>
+#include <cstdio>
+#include <nlohmann/json.hpp>
+#include <numeric>
+
+#include "mjsense/app/progress.h"
+#include "mjsense/app/table.h"
+#include "mjsense/core/error.h"
+#include "mjsense/record/check.h"
+
+namespace mjsense {
+namespace {
+
+StopFlag stop_flag{0};
+
+// Ctrl-C and SIGTERM while it lives: first finish what runs, then discard it, then leave at once.
+class StopOnSignal {
+ public:
+  StopOnSignal() {
+    struct sigaction action = {};
+    action.sa_handler = [](int signal) {
+      if (++stop_flag > 2) _exit(128 + signal);
+    };
+    stop_flag = 0;
+    sigaction(SIGINT, &action, &old_int_);
+    sigaction(SIGTERM, &action, &old_term_);
+  }
+  ~StopOnSignal() {
+    sigaction(SIGINT, &old_int_, nullptr);
+    sigaction(SIGTERM, &old_term_, nullptr);
+  }
+  StopOnSignal(const StopOnSignal&) = delete;
+  StopOnSignal& operator=(const StopOnSignal&) = delete;
+
+ private:
+  struct sigaction old_int_ = {}, old_term_ = {};
+};
+
+std::uint64_t bytes_below(const std::filesystem::path& folder) {
+  std::uint64_t bytes = 0;
+  for (const auto& entry : std::filesystem::recursive_directory_iterator(folder)) {
+    if (entry.is_regular_file()) bytes += entry.file_size();
+  }
+  return bytes;
+}
+
+// Wall seconds by room, the largest share last being what is left.
+std::vector<std::pair<std::string, double>> time_split(const RecordSummary& s) {
+  std::vector<std::pair<std::string, double>> split = {{"policy", s.times.policy + s.times.reset},
+                                                       {"physics", s.times.physics},
+                                                       {"sensing", s.times.sensing},
+                                                       {"rendering", s.times.rendering},
+                                                       {"recording", s.recording_s}};
+  double known = 0;
+  for (const auto& [name, seconds] : split) known += seconds;
+  split.emplace_back("rest", std::max(0.0, s.progress.seconds - known));
+  return split;
+}
+
+std::string summary_text(const RecordSummary& s, const std::string& sheet) {
+  const RecordProgress& p = s.progress;
+  const int ended = p.succeeded + p.failed;
+  std::string out;
+  if (ended > 0) {
+    out += fmt::format("{} of {} attempts succeeded ({:.0f} %); {} of {} episodes are on disk\n",
+                       p.succeeded, ended, 100.0 * p.succeeded / ended, p.kept, p.wanted);
+  } else {
+    out += fmt::format("{} of {} episodes are on disk\n", p.kept, p.wanted);
+  }
+  for (const auto& [why, count] : s.failures) out += fmt::format("  {} x {}\n", count, why);
+  if (p.steps > 0) {
+    const double rate = 1 / std::max(p.seconds, 1e-9);
+    out += fmt::format(
+        "{} steps in {:.1f} s: {:.1f} steps/s, {:.0f} physics steps/s, {:.1f} frames/s\n", p.steps,
+        p.seconds, static_cast<double>(p.steps) * rate, static_cast<double>(p.physics_steps) * rate,
+        static_cast<double>(p.frames) * rate);
+    out += "time:";
+    for (const auto& [name, seconds] : time_split(s)) {
+      out += fmt::format("  {} {:.0f} %", name, 100 * seconds * rate);
+    }
+    out += fmt::format("  (beside it: encoders {:.1f} s, files {:.1f} s)\n", s.record.encode_cpu_s,
+                       s.record.write_s + s.record.commit_s);
+  }
+  if (std::filesystem::exists(s.house_dir)) {
+    out += fmt::format("\n{}{} in all\n", tree_text(s.house_dir.string()),
+                       bytes_text(static_cast<double>(bytes_below(s.house_dir))));
+  }
+  if (!sheet.empty()) out += "\npictures of every camera over time: " + sheet + "\n";
+  return out;
+}
+
+std::string summary_json(const RecordSummary& s, const std::string& sheet) {
+  nlohmann::json out;
+  const RecordProgress& p = s.progress;
+  out["kept"] = p.kept;
+  out["wanted"] = p.wanted;
+  out["attempts"] = p.succeeded + p.failed;
+  out["succeeded"] = p.succeeded;
+  out["failed"] = p.failed;
+  out["failures"] = s.failures;
+  out["interrupted"] = s.interrupted;
+  out["observations"] = s.lengths;
+  out["steps"] = p.steps;
+  out["physics_steps"] = p.physics_steps;
+  out["frames"] = p.frames;
+  out["seconds"] = p.seconds;
+  for (const auto& [name, seconds] : time_split(s)) out["time"][name] = seconds;
+  out["encode_cpu_s"] = s.record.encode_cpu_s;
+  out["write_s"] = s.record.write_s + s.record.commit_s;
+  out["raw_bytes"] = s.record.raw_bytes;
+  out["path"] = s.house_dir.string();
+  out["contact_sheet"] = sheet.empty() ? nlohmann::json() : nlohmann::json(sheet);
+  return out.dump(2) + "\n";
+}
+
+}  // namespace
+
+void parse_size(const std::string& text, RolloutCfg& rollout) {
+  int width = 0, height = 0;
+  const char* end = text.data() + text.size();
+  const auto [x, e1] = std::from_chars(text.data(), end, width);
+  if (e1 == std::errc() && x != end && *x == 'x') {
+    const auto [rest, e2] = std::from_chars(x + 1, end, height);
+    if (e2 == std::errc() && rest == end && width > 0 && height > 0) {
+      rollout.width = width;
+      rollout.height = height;
+      return;
+    }
+  }
+  throw ValueError(fmt::format("size '{}': expected WIDTHxHEIGHT, as 640x368", text));
+}
+
+void parse_cameras(const std::string& text, RolloutCfg& rollout) {
+  std::vector<std::string> names;
+  if (text != "none") {
+    for (std::size_t begin = 0; begin <= text.size();) {
+      const std::size_t end = std::min(text.find(',', begin), text.size());
+      if (end == begin) throw ValueError(fmt::format("cameras '{}': an empty name", text));
+      names.push_back(text.substr(begin, end - begin));
+      begin = end + 1;
+    }
+  }
+  rollout.cameras = std::move(names);
+}
+
+int run_record(const RecordOptions& options) {
+  const RecordJobCfg& job = options.job;
+  if (job.out.empty()) throw ValueError("record: where to? give --out DIR");
+  RecordSummary summary;
+  {
+    const StopOnSignal signals;
+    ProgressLine line(options.quiet);
+    try {
+      summary = record_episodes(
+          job, [&](const RecordProgress& p) { line.show(p, stop_flag.load()); }, &stop_flag);
+    } catch (...) {
+      line.finish();
+      throw;
+    }
+    line.finish();
+  }
+  std::string sheet;
+  if (options.sheet && summary.progress.kept > 0 && summary.progress.frames > 0 &&
+      !summary.interrupted) {
+    sheet = (job.out / "contact_sheet.png").string();
+    contact_sheet(summary.house_dir, sheet, 4, 8, job.video.ffmpeg);
+  }
+  if (options.json) {
+    fmt::print("{}", summary_json(summary, sheet));
+  } else {
+    fmt::print("{}", summary_text(summary, sheet));
+  }
+  if (summary.interrupted) {
+    fmt::print(stderr,
+               "interrupted: the finished episodes are safe; go on with --resume, or end it with "
+               "`mjsense repair {}`\n",
+               summary.house_dir.string());
+  } else if (!summary.enough) {
+    fmt::print(stderr, "gave up after {} attempts; --max-attempts allows more\n",
+               summary.progress.succeeded + summary.progress.failed);
+  }
+  return summary.enough ? 0 : 1;
+}
+
+}  // namespace mjsense

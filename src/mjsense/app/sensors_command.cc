@@ -1,0 +1,118 @@
+#include "mjsense/app/sensors_command.h"
+
+#include <fmt/format.h>
+
+#include <filesystem>
+#include <nlohmann/json.hpp>
+
+#include "mjsense/app/table.h"
+#include "mjsense/core/error.h"
+
+namespace mjsense {
+namespace {
+
+struct Line {
+  const SensorSpec* spec;
+  double microseconds;  // a step and world; negative: counted with the sensor's first stream
+};
+
+// Streams of some sensors, the cost of each at its first stream.
+std::vector<Line> lines_of(Simulation& simulation, std::span<Sensor* const> sensors, int steps) {
+  std::vector<Line> lines;
+  for (Sensor* sensor : sensors) {
+    const Simulation::Cost cost = simulation.cost(*sensor);
+    double each =
+        steps > 0 ? 1e6 * (cost.compute + cost.cast) / steps / simulation.num_worlds() : -1;
+    for (const Field& field : sensor->fields()) {
+      lines.push_back({&field.spec, each});
+      each = -1;
+    }
+  }
+  return lines;
+}
+
+void print(const std::vector<Line>& lines, bool json) {
+  if (json) {
+    nlohmann::json out = nlohmann::json::array();
+    for (const auto& [spec, cost] : lines) {
+      const auto dims = spec->shape.dims();
+      nlohmann::json line = {{"name", spec->name},
+                             {"dtype", dtype_name(spec->dtype)},
+                             {"shape", std::vector<std::int64_t>(dims.begin(), dims.end())},
+                             {"unit", spec->unit},
+                             {"frame", spec->frame},
+                             {"is_dict", spec->is_dict},
+                             {"bytes", spec->shape.size() * dtype_size(spec->dtype)},
+                             {"description", spec->description}};
+      line["microseconds"] = cost < 0 ? nlohmann::json() : nlohmann::json(cost);
+      out.push_back(std::move(line));
+    }
+    fmt::print("{}\n", out.dump(2));
+    return;
+  }
+  Table table{{"name", "shape", "dtype", "unit", "frame", "bytes", "us/step"}, "lllllrr", {}};
+  std::size_t total_bytes = 0;
+  double total_cost = 0;
+  for (const auto& [spec, cost] : lines) {
+    const std::size_t bytes = spec->shape.size() * dtype_size(spec->dtype);
+    total_bytes += bytes;
+    total_cost += std::max(cost, 0.0);
+    table.rows.push_back({spec->name, spec->shape.str(),
+                          spec->is_dict ? "json" : std::string(dtype_name(spec->dtype)), spec->unit,
+                          spec->frame, fmt::format("{}", bytes),
+                          cost < 0 ? "" : fmt::format("{:.1f}", cost)});
+  }
+  table.rows.push_back({fmt::format("{} streams", lines.size()), "", "", "", "",
+                        fmt::format("{}", total_bytes),
+                        total_cost > 0 ? fmt::format("{:.1f}", total_cost) : ""});
+  fmt::print("{}", table.text());
+}
+
+std::vector<Line> task_lines(Rollout& rollout, int steps) {
+  const int worlds[] = {0};
+  const std::int64_t episodes[] = {0};
+  rollout.start(worlds, episodes);
+  std::vector<Sensor*> sensors;
+  for (const RecordedCamera& camera : rollout.cameras()) sensors.push_back(camera.sensor);
+  for (const auto& sensor : rollout.suite().sensors()) sensors.push_back(sensor.get());
+  int taken = 0;
+  for (; taken < steps && rollout.fault(0).empty() && !rollout.evaluation(0).terminal; ++taken) {
+    rollout.act();
+    rollout.step();
+  }
+  return lines_of(rollout.simulation(), sensors, taken + (steps > 0 ? 1 : 0));
+}
+
+std::vector<Line> scene_lines(Simulation& simulation, int steps) {
+  std::vector<Sensor*> sensors;
+  for (const auto& sensor : simulation.scene().sensors()) sensors.push_back(sensor.get());
+  simulation.measure_cost(true);
+  for (int k = 0; k < steps; ++k) {
+    simulation.step();
+    simulation.refresh(sensors);
+  }
+  return lines_of(simulation, sensors, steps);
+}
+
+}  // namespace
+
+int run_sensors(const SensorsOptions& options) {
+  const std::filesystem::path path = options.what;
+  if (path.has_extension() || std::filesystem::exists(path)) {
+    if (!std::filesystem::is_regular_file(path)) {
+      throw ValueError(fmt::format("{}: no such file", options.what));
+    }
+    SceneCfg cfg;
+    cfg.entities.emplace_back(path.stem().string(), EntityCfg{.model = {.path = options.what}});
+    Simulation simulation(std::make_shared<Scene>(std::move(cfg)), {});
+    print(scene_lines(simulation, options.steps), options.json);
+    return 0;
+  }
+  RolloutCfg rollout_cfg = options.rollout;
+  rollout_cfg.task = options.what;
+  Rollout rollout(rollout_cfg);
+  print(task_lines(rollout, options.steps), options.json);
+  return 0;
+}
+
+}  // namespace mjsense

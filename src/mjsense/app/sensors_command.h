@@ -1,0 +1,19 @@
+#pragma once
+// `mjsense sensors SCENE.xml|TASK`: every stream, what it means, and what it costs.
+
+#include <string>
+
+#include "mjsense/rollout/rollout.h"
+
+namespace mjsense {
+
+struct SensorsOptions {
+  std::string what;    // an MJCF file, or the name of a task
+  RolloutCfg rollout;  // of a task
+  int steps = 20;      // control steps over which the cost is taken; 0: do not measure
+  bool json = false;
+};
+
+int run_sensors(const SensorsOptions& options);
+
+}  // namespace mjsense

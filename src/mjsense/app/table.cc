@@ -1,0 +1,71 @@
+#include "mjsense/app/table.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <filesystem>
+
+#include "mjsense/app/progress.h"
+
+namespace mjsense {
+namespace {
+
+// Characters that a reader sees: UTF-8 continuation bytes are none.
+std::size_t width(const std::string& text) {
+  return static_cast<std::size_t>(std::ranges::count_if(
+      text, [](char c) { return (static_cast<unsigned char>(c) & 0xC0) != 0x80; }));
+}
+
+void add_tree(const std::filesystem::path& folder, const std::string& indent, std::size_t most,
+              std::string& out) {
+  std::vector<std::filesystem::directory_entry> entries;
+  for (const auto& entry : std::filesystem::directory_iterator(folder)) entries.push_back(entry);
+  std::ranges::sort(entries);
+  const std::size_t shown = entries.size() > most ? most - 1 : entries.size();
+  for (std::size_t i = 0; i < shown; ++i) {
+    const bool last = i + 1 == entries.size();
+    const std::string name = entries[i].path().filename().string();
+    out += indent + (last ? "└── " : "├── ") + name;
+    if (entries[i].is_directory()) {
+      out += "/\n";
+      add_tree(entries[i].path(), indent + (last ? "    " : "│   "), most, out);
+    } else {
+      out += "  " + bytes_text(static_cast<double>(entries[i].file_size())) + "\n";
+    }
+  }
+  if (shown < entries.size())
+    out += fmt::format("{}└── ... {} more\n", indent, entries.size() - shown);
+}
+
+}  // namespace
+
+std::string Table::text() const {
+  std::vector<std::size_t> widths;
+  for (const std::string& cell : header) widths.push_back(width(cell));
+  for (const auto& row : rows) {
+    for (std::size_t i = 0; i < row.size(); ++i) widths[i] = std::max(widths[i], width(row[i]));
+  }
+  std::string out;
+  const auto add = [&](const std::vector<std::string>& row) {
+    std::string line;
+    for (std::size_t i = 0; i < row.size(); ++i) {
+      const std::string padding(widths[i] - width(row[i]), ' ');
+      const bool to_right = i < right.size() && right[i] == 'r';
+      line += to_right ? padding + row[i] : row[i] + padding;
+      if (i + 1 < row.size()) line += "  ";
+    }
+    line.erase(line.find_last_not_of(' ') + 1);
+    out += line + "\n";
+  };
+  add(header);
+  for (const auto& row : rows) add(row);
+  return out;
+}
+
+std::string tree_text(const std::string& folder, std::size_t most) {
+  std::string out = folder + "\n";
+  add_tree(folder, "", most, out);
+  return out;
+}
+
+}  // namespace mjsense
