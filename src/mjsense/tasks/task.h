@@ -119,7 +119,7 @@ class Task {
   // Throws KeyError.
   virtual Pose start_pose(int world, std::string_view role) const = 0;
   virtual std::optional<Pose> goal_pose(int world, std::string_view role) const = 0;
-  // Members of task_info, keys sorted; json stands inside no object yet.
+  // task_info: one JSON object, its keys sorted.
   virtual void write_info(const World& world, JsonWriter& json) const = 0;
   // obs_scene: JSON text with task_type, task_description, policy_dt_ms, referral_expressions,
   // policy_phases, the task's own keys.
@@ -133,12 +133,13 @@ class Task {
   virtual void initialize_task() = 0;  // model() and robot() are there
   // Writes everything except the robot's joints; returns where the robot's base stands.
   virtual Pose sample_scene(int world, Rng& rng, const StateRow& state) = 0;
-  // Further members of obs_scene: (key, JSON value).
+  // Further members of obs_scene with text values, in this order.
   virtual std::vector<std::pair<std::string, std::string>> scene_info(int world) const {
     (void)world;
     return {};
   }
-  Evaluation end_conditions(int world, bool success) const;
+  // terminal and truncated of an observation with this success.
+  Evaluation judge(int world, double reward, bool success) const;
 
  private:
   struct Episode {

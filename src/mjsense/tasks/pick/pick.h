@@ -1,0 +1,70 @@
+#pragma once
+// Pick up one of the objects on a table: success is the object 1 cm up and touched by nothing but
+// the robot.
+
+#include <array>
+#include <string>
+#include <vector>
+
+#include "mjsense/tasks/object_shape.h"
+#include "mjsense/tasks/task.h"
+
+namespace mjsense {
+
+class PickTask final : public Task {
+ public:
+  static constexpr std::string_view kRole = "pickup_obj";
+
+  explicit PickTask(TaskCfg cfg) : Task(std::move(cfg)) {}
+  std::string_view name() const override { return "pick"; }
+  std::string_view type() const override { return "pick"; }
+  SceneCfg scene_cfg() const override;
+
+  void begin(const World& world) override;
+  // Reward: height above the start (m), where nothing but the robot bears the object.
+  Evaluation evaluate(const World& world) const override;
+
+  std::span<const TaskObject> objects(int world) const override {
+    return {&targets_[world].object, 1};
+  }
+  std::string description(int world) const override;
+  std::vector<std::pair<std::string, std::vector<Referral>>> referrals(int world) const override;
+  Pose start_pose(int world, std::string_view role) const override;
+  std::optional<Pose> goal_pose(int world,
+                                std::string_view role) const override;  // 5 cm above the start
+  // episode_step, position_error (m, to the goal), rotation_error (rad), success.
+  void write_info(const World& world, JsonWriter& json) const override;
+  std::vector<std::shared_ptr<Sensor>> create_task_sensors() const override;
+
+  // --- for planners
+  struct Object {
+    int body = -1;
+    std::string kind;  // "mug": the body's name in models/tasks/pick.xml
+    ObjectShape shape;
+  };
+  std::span<const Object> all_objects() const { return objects_; }  // target and distractors
+  int target(int world) const { return targets_[world].index; }     // index in all_objects()
+  double table_height() const { return table_height_; }             // m
+
+ protected:
+  void initialize_task() override;
+  Pose sample_scene(int world, Rng& rng, const StateRow& state) override;
+  std::vector<std::pair<std::string, std::string>> scene_info(int world) const override;
+
+ private:
+  struct Target {
+    int index = 0;
+    TaskObject object;
+    Pose start;
+  };
+  void place(int object, double x, double y, double yaw, const StateRow& state) const;
+  bool borne_by_others(const World& world, int body) const;
+  bool lifted(const World& world) const;
+
+  std::vector<Object> objects_;
+  std::vector<Target> targets_;  // [B]
+  int robot_root_ = -1;
+  double table_height_ = 0;
+};
+
+}  // namespace mjsense
