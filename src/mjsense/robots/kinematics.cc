@@ -15,7 +15,7 @@ namespace {
 // Iterations from the caller's configuration, then from each new one. A solution is usually found
 // within 10.
 constexpr double kDamping = 1e-12;
-constexpr int kFirstAttempt = 100, kAttempt = 30;
+constexpr int kAttempt = 30;
 
 // Solves (J J^T + eps I) y = e for a [6, n] Jacobian, by Cholesky factorisation, and returns J^T y.
 void damped_step(std::span<const double> jacobian, int n, double eps, const double (&e)[6],
@@ -166,8 +166,7 @@ bool Chain::ik(const Pose& target, std::span<double> q, int max_iterations,
   std::array<double, kMaxJoints> dq;
   int restarts = 0;
   for (int iteration = 0; iteration < max_iterations; ++iteration) {
-    if (iteration >= kFirstAttempt && (iteration - kFirstAttempt) % kAttempt == 0)
-      restart(++restarts, q);
+    if (iteration >= kTracking && (iteration - kTracking) % kAttempt == 0) restart(++restarts, q);
     const Pose leaf = jacobian(q, {jac.data(), static_cast<std::size_t>(6 * n)});
     const Twist body = log6(inverse(leaf) * target);
     if (norm(body) < tolerance) return true;

@@ -15,6 +15,7 @@ namespace mjsense {
 class Chain {
  public:
   static constexpr int kMaxJoints = 16;
+  static constexpr int kTracking = 100;  // iterations of ik() that stay with its start
 
   // Joints that `moving` does not list stay at the model's qpos0.
   Chain(const mjModel* model, int base_body, int leaf_site, std::span<const int> moving);
@@ -36,9 +37,9 @@ class Chain {
   // Moves q (in: the start, out: the solution) until the leaf is at `target` (base frame): dq = J^T
   // (J J^T + 1e-12 I)^-1 e with e = log6(T^-1 T*) in base axes, clipped to the joint ranges in
   // every iteration. True if |e| < tolerance within max_iterations; q is otherwise the last
-  // iterate. The first 100 iterations start at q, so that a solution near q is found where there is
-  // one; if they end in a corner of the ranges, the others start at configurations spread over
-  // them.
+  // iterate. The first kTracking iterations start at q, so that a solution near q is found where
+  // there is one; if they end in a corner of the ranges, the others start at configurations spread
+  // over them.
   bool ik(const Pose& target, std::span<double> q, int max_iterations = 1000,
           double tolerance = 1e-4) const;
 

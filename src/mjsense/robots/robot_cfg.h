@@ -22,9 +22,10 @@ struct MoveGroupCfg {
   std::vector<double> init;    // start joint positions, rad or m
   std::vector<double> spread;  // half widths of their uniform start noise; empty: none
   // Grippers only.
-  double open_command = 0, closed_command = 0;  // of the actuator
-  double max_opening = 0;                       // m, between the pads
-  std::vector<std::string> pad_sites;           // two, on the pads' faces
+  double open_command = 0, closed_command = 0;     // of the actuator
+  double max_opening = 0;                          // m, between the pads
+  std::vector<std::string> pad_sites;              // two, on the pads' faces
+  double pad_half_width = 0, pad_half_length = 0;  // m, across and along the approach
 };
 
 // A camera of the robot's MJCF that an episode records.

@@ -110,16 +110,15 @@ class Task {
   }
 
   // --- what observations and recordings say about it
-  virtual std::span<const TaskObject> objects(
-      int world) const = 0;                              // roles first of which is the main one
-  virtual std::string description(int world) const = 0;  // "Pick up the mug"
+  virtual std::span<const TaskObject> objects(int world) const = 0;  // the main one first
+  virtual std::string description(int world) const = 0;              // "Pick up the mug"
   virtual std::vector<std::pair<std::string, std::vector<Referral>>> referrals(
       int world) const = 0;  // per role
   // Pose of the object with this role: at the first observation, and where the task wants it.
   // Throws KeyError.
   virtual Pose start_pose(int world, std::string_view role) const = 0;
   virtual std::optional<Pose> goal_pose(int world, std::string_view role) const = 0;
-  // task_info: one JSON object, its keys sorted.
+  // Members of task_info, keys sorted; the caller opens and closes the object.
   virtual void write_info(const World& world, JsonWriter& json) const = 0;
   // obs_scene: JSON text with task_type, task_description, policy_dt_ms, referral_expressions,
   // policy_phases, the task's own keys.

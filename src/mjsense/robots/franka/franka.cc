@@ -34,6 +34,8 @@ RobotCfg franka_cfg() {
   gripper.open_command = 0;
   gripper.closed_command = 255;
   gripper.max_opening = 0.087;
+  gripper.pad_half_width = 0.011;
+  gripper.pad_half_length = 0.019;
   gripper.pad_sites = {"gripper/left_pad", "gripper/right_pad"};
 
   cfg.groups = {base, arm, gripper};

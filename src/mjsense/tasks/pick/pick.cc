@@ -14,9 +14,9 @@ namespace {
 
 using std::numbers::pi;
 
-// What stands on the table of models/tasks/pick.xml, and how people refer to it.
+// What lies on the table, and how people refer to it.
 struct Kind {
-  const char* body;
+  const char* name;  // of its model, entity and body
   const char* text;
   std::array<const char*, 2> others;
 };
@@ -44,8 +44,6 @@ constexpr double kDrop = 0.0003;  // m above the table at the start
 constexpr double kLift = 0.01;    // m of success
 constexpr double kGoal = 0.05;    // m, goal above the start
 
-constexpr const char* kScene = "scene/";
-
 void add_look(mjSpec* spec) {
   auto& light = spec->visual.headlight;
   for (int i = 0; i < 3; ++i) {
@@ -54,7 +52,7 @@ void add_look(mjSpec* spec) {
     light.specular[i] = 0.05f;
   }
   spec->visual.quality.shadowsize = 4096;
-  mjsTexture* sky = mjs_addTexture(spec);
+  mjsTexture* sky = mjs_addTexture(spec, nullptr);
   sky->type = mjTEXTURE_SKYBOX;
   sky->builtin = mjBUILTIN_GRADIENT;
   const double top[3] = {0.55, 0.67, 0.80}, bottom[3] = {0.86, 0.89, 0.92};
@@ -71,7 +69,12 @@ SceneCfg PickTask::scene_cfg() const {
   EntityCfg room, robot;
   room.model.path = "embedded:tasks/pick.xml";
   robot.model = cfg().robot.model;
-  scene.entities = {{"scene", room}, {"robot_0", robot}};
+  scene.entities = {{"room", room}, {"robot_0", robot}};
+  for (const Kind& kind : kKinds) {
+    EntityCfg object;
+    object.model.path = fmt::format("embedded:objects/{}.xml", kind.name);
+    scene.entities.emplace_back(kind.name, object);
+  }
   scene.extent = 2.0;
   scene.options.timestep = 0.001 * cfg().sim_dt_ms;
   // An elliptic cone with impratio above 1 keeps a held object from creeping out of the pads.
@@ -84,12 +87,12 @@ SceneCfg PickTask::scene_cfg() const {
 void PickTask::initialize_task() {
   objects_.clear();
   for (const Kind& kind : kKinds) {
-    const int body = resolve(model(), mjOBJ_BODY, std::string(kScene) + kind.body, "task 'pick'");
-    objects_.push_back({body, kind.body, object_shape(model(), body)});
+    const int body = resolve(model(), mjOBJ_BODY, fmt::format("{0}/{0}", kind.name), "task 'pick'");
+    objects_.push_back({body, kind.name, object_shape(model(), body)});
   }
   targets_.assign(num_worlds(), {});
   robot_root_ = model()->body_rootid[robot().base_body()];
-  const int top = resolve(model(), mjOBJ_GEOM, std::string(kScene) + "table_top", "task 'pick'");
+  const int top = resolve(model(), mjOBJ_GEOM, "room/table_top", "task 'pick'");
   table_height_ = model()->body_pos[3 * model()->geom_bodyid[top] + 2] +
                   model()->geom_pos[3 * top + 2] + model()->geom_size[3 * top + 2];
 }
@@ -222,8 +225,10 @@ std::vector<std::pair<std::string, std::vector<Referral>>> PickTask::referrals(i
 }
 
 Pose PickTask::start_pose(int world, std::string_view role) const {
-  const std::vector<std::string> roles{std::string(kRole)};
-  if (role != kRole) throw_unknown("task 'pick'", "role", role, roles);
+  if (role != kRole) {
+    const std::vector<std::string> roles{std::string(kRole)};
+    throw_unknown("task 'pick'", "role", role, roles);
+  }
   return targets_[world].start;
 }
 
@@ -237,13 +242,11 @@ void PickTask::write_info(const World& world, JsonWriter& json) const {
   const Target& target = targets_[world.id];
   const int body = target.object.body;
   const Vec3 goal = target.start.p + Vec3{0, 0, kGoal};
-  json.begin_object();
   json.key("episode_step").value(episode_step(world.id));
   json.key("position_error").value(norm(vec3(world.data->xpos + 3 * body) - goal));
   json.key("rotation_error")
       .value(angle_between(target.start.q, quat(world.data->xquat + 4 * body)));
   json.key("success").value(lifted(world));
-  json.end_object();
 }
 
 std::vector<std::pair<std::string, std::string>> PickTask::scene_info(int world) const {

@@ -39,7 +39,7 @@ class PickTask final : public Task {
   // --- for planners
   struct Object {
     int body = -1;
-    std::string kind;  // "mug": the body's name in models/tasks/pick.xml
+    std::string kind;  // "mug": of models/objects
     ObjectShape shape;
   };
   std::span<const Object> all_objects() const { return objects_; }  // target and distractors

@@ -1,0 +1,180 @@
+#include "mjsense/policies/planner/grasp.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <limits>
+#include <memory>
+#include <numbers>
+
+namespace mjsense {
+namespace {
+
+using std::numbers::pi;
+
+constexpr int kYaws = 24;              // closing directions over half a turn
+constexpr double kSupportGap = 0.004;  // m, finger tips above the support
+constexpr double kSideGap = 0.006;     // m, free on each side of the object before closing
+constexpr double kFaceDepth = 0.002;   // m, what counts as one face
+constexpr double kFaceWidth = 0.010;   // m, of the face that both pads touch
+constexpr double kTopGap =
+    0.012;  // m, that the object must reach above the tool's origin or below it
+// Slides of the grasp along the object, across the closing direction.
+constexpr std::array<double, 5> kSlides{0.0, 0.012, -0.012, 0.024, -0.024};
+
+struct DataDelete {
+  void operator()(mjData* data) const { mj_deleteData(data); }
+};
+
+// Extent of the surface between the pads, and of the faces that they would touch.
+struct Squeeze {
+  double low = std::numeric_limits<double>::infinity(), high = -low;
+  double face = 0;  // m, overlap of the two faces across the closing direction
+};
+
+Squeeze squeeze(std::span<const Vec3> points, Vec3 center, Vec3 close, Vec3 across,
+                double half_width, double half_length) {
+  const auto inside = [&](Vec3 r) {
+    return std::abs(dot(r, across)) <= half_width && std::abs(r.z) <= half_length;
+  };
+  Squeeze s;
+  for (Vec3 p : points) {
+    const Vec3 r = p - center;
+    if (!inside(r)) continue;
+    const double c = dot(r, close);
+    s.low = std::min(s.low, c);
+    s.high = std::max(s.high, c);
+  }
+  if (!(s.low < s.high)) return s;
+  double low0 = 1, low1 = -1, high0 = 1, high1 = -1;
+  for (Vec3 p : points) {
+    const Vec3 r = p - center;
+    if (!inside(r)) continue;
+    const double c = dot(r, close), u = dot(r, across);
+    if (c < s.low + kFaceDepth) {
+      low0 = std::min(low0, u);
+      low1 = std::max(low1, u);
+    }
+    if (c > s.high - kFaceDepth) {
+      high0 = std::min(high0, u);
+      high1 = std::max(high1, u);
+    }
+  }
+  s.face = std::min(low1, high1) - std::max(low0, high0);
+  return s;
+}
+
+}  // namespace
+
+GripperShape::GripperShape(const mjModel* model, const Robot& robot, int gripper) {
+  const MoveGroup& group = robot.groups()[gripper];
+  const MoveGroupCfg& cfg = robot.cfg().groups[gripper];
+  const std::unique_ptr<mjData, DataDelete> data(mj_makeData(model));
+  for (std::size_t i = 0; i < cfg.init.size(); ++i) data->qpos[group.qpos[i]] = cfg.init[i];
+  mj_kinematics(model, data.get());
+  const int site = group.leaf_site;
+  const Pose world_tool = pose_from_mat(data->site_xpos + 3 * site, data->site_xmat + 9 * site);
+  max_opening = group.max_opening;
+  Vec3 low{1, 1, 1}, high{-1, -1, -1};
+  for (int g = 0; g < model->ngeom; ++g) {
+    if (!model->geom_contype[g] && !model->geom_conaffinity[g]) continue;
+    int body = model->geom_bodyid[g];
+    while (body > group.root_body) body = model->body_parentid[body];
+    if (body != group.root_body) continue;
+    const double* aabb = model->geom_aabb + 6 * g;
+    const Pose pose = inverse(world_tool) *
+                      pose_from_mat(data->geom_xpos + 3 * g, data->geom_xmat + 9 * g) *
+                      Pose{vec3(aabb), {}};
+    const Box box{pose, vec3(aabb + 3)};
+    boxes.push_back(box);
+    for (int corner = 0; corner < 8; ++corner) {
+      const Vec3 p =
+          pose * Vec3{corner & 1 ? box.half.x : -box.half.x, corner & 2 ? box.half.y : -box.half.y,
+                      corner & 4 ? box.half.z : -box.half.z};
+      low = {std::min(low.x, p.x), std::min(low.y, p.y), std::min(low.z, p.z)};
+      high = {std::max(high.x, p.x), std::max(high.y, p.y), std::max(high.z, p.z)};
+    }
+  }
+  center = 0.5 * (low + high);
+  radius = 0.5 * norm(high - low);
+  // The fingers swing on arcs: half closed they reach a little further than open.
+  constexpr double kSwing = 0.005;
+  tip = high.z + kSwing;
+  pad_half_width = cfg.pad_half_width;
+  pad_half_length = cfg.pad_half_length;
+}
+
+bool GripperShape::hits(const Pose& tool, const Pose& object, const ObjectShape& shape,
+                        double margin) const {
+  const Pose tool_object = inverse(tool) * object;
+  if (norm(tool_object.p - center) > radius + shape.reach + margin) return false;
+  for (const Box& box : boxes) {
+    const Pose box_object = inverse(box.pose) * tool_object;
+    const double reach = shape.reach + margin;
+    if (std::abs(box_object.p.x) > box.half.x + reach ||
+        std::abs(box_object.p.y) > box.half.y + reach ||
+        std::abs(box_object.p.z) > box.half.z + reach) {
+      continue;
+    }
+    for (Vec3 point : shape.points) {
+      const Vec3 p = box_object * point;
+      if (std::abs(p.x) < box.half.x + margin && std::abs(p.y) < box.half.y + margin &&
+          std::abs(p.z) < box.half.z + margin) {
+        return true;
+      }
+    }
+  }
+  return false;
+}
+
+std::vector<Grasp> propose_grasps(const GripperShape& gripper, const ObjectShape& shape,
+                                  const Pose& object, double support_height, const Pose& tool) {
+  std::vector<Vec3> points;
+  points.reserve(shape.points.size());
+  double top = -std::numeric_limits<double>::infinity();
+  for (Vec3 p : shape.points) {
+    points.push_back(object * p);
+    top = std::max(top, points.back().z);
+  }
+  const Vec3 forward = rotate(object.q, {1, 0, 0});
+  const double yaw0 = std::atan2(forward.y, forward.x);
+  const double lowest = support_height + gripper.tip + kSupportGap;
+  const double highest = std::max(lowest, top - kTopGap);
+  const double half_length = 0.9 * gripper.pad_half_length,
+               half_width = 0.9 * gripper.pad_half_width;
+
+  std::vector<Grasp> grasps;
+  const int levels = highest - lowest < 0.01 ? 1 : 4;
+  for (int level = 0; level < levels; ++level) {
+    const double z = levels == 1 ? lowest : lowest + (highest - lowest) * level / (levels - 1);
+    for (int k = 0; k < kYaws; ++k) {
+      const double yaw = yaw0 + pi * k / kYaws;
+      const Vec3 close{std::cos(yaw), std::sin(yaw), 0}, across{-close.y, close.x, 0};
+      for (double slide : kSlides) {
+        const Vec3 center = Vec3{object.p.x, object.p.y, z} + slide * across;
+        const Squeeze s = squeeze(points, center, close, across, half_width, half_length);
+        const double width = s.high - s.low;
+        if (!(width > 0.004 && width < gripper.max_opening - 2 * kSideGap) || s.face < kFaceWidth)
+          continue;
+        const Vec3 position = center + (0.5 * (s.low + s.high)) * close;
+        // The tool's y axis may point either way along the closing direction.
+        for (int flip = 0; flip < 2; ++flip) {
+          const Vec3 y = flip ? -close : close, approach{0, 0, -1};
+          Grasp grasp;
+          grasp.pose = {position, quat_from_columns(cross(y, approach), y, approach)};
+          grasp.width = width;
+          if (gripper.hits(grasp.pose, object, shape, 0.0)) continue;
+          grasp.cost = norm(position - tool.p) +
+                       0.01 * angle_between(tool.q, grasp.pose.q) * 180.0 / pi + 2.0 * approach.z +
+                       8.0 * norm(position - object.p);
+          grasps.push_back(grasp);
+        }
+      }
+    }
+  }
+  std::stable_sort(grasps.begin(), grasps.end(),
+                   [](const Grasp& a, const Grasp& b) { return a.cost < b.cost; });
+  return grasps;
+}
+
+}  // namespace mjsense

@@ -1,0 +1,46 @@
+#pragma once
+// Where a parallel gripper can take an object that lies on a support, from above.
+//
+// Tool frame: z the approach, y the closing direction, the origin between the finger tips.
+
+#include <span>
+#include <vector>
+
+#include "mjsense/core/pose.h"
+#include "mjsense/robots/robot.h"
+#include "mjsense/tasks/object_shape.h"
+
+namespace mjsense {
+
+// The open gripper: boxes in the tool frame.
+struct GripperShape {
+  struct Box {
+    Pose pose;  // X_TB
+    Vec3 half;  // m
+  };
+  std::vector<Box> boxes;
+  Vec3 center;  // of a sphere around all boxes
+  double radius = 0;
+  double tip = 0;  // m, how far the fingers reach below the origin, at any opening
+  double pad_half_width = 0, pad_half_length = 0;  // m, of a pad, across and along the approach
+  double max_opening = 0;                          // m
+
+  // From the gripper group's geoms that touch, at its start configuration.
+  GripperShape(const mjModel* model, const Robot& robot, int gripper);
+  // True if one of the points lies within `margin` of a box.
+  bool hits(const Pose& tool, const Pose& object, const ObjectShape& shape, double margin) const;
+};
+
+struct Grasp {
+  Pose pose;         // X_WT
+  double width = 0;  // m, between the pads
+  double cost = 0;
+};
+
+// Candidates by rising cost = distance to the tool (m) + 0.01 * turn (deg) + 2 * approach_z + 8 *
+// distance to the object's origin (m). Each closes on two faces that stand opposite and are wide
+// enough to hold against turning.
+std::vector<Grasp> propose_grasps(const GripperShape& gripper, const ObjectShape& shape,
+                                  const Pose& object, double support_height, const Pose& tool);
+
+}  // namespace mjsense

@@ -1,0 +1,49 @@
+#pragma once
+// For tests and benchmarks: one episode of a task with plain MuJoCo, without sensors.
+
+#include <mujoco/mujoco.h>
+
+#include <cstdint>
+
+#include "mjsense/policies/policy.h"
+#include "mjsense/tasks/task.h"
+
+namespace mjsense {
+
+struct EpisodeResult {
+  int steps = 0;  // control steps
+  bool success = false;
+  bool gave_up = false;
+  bool truncated = false;
+  double reward = 0;  // of the last observation
+};
+
+inline EpisodeResult run_episode(Task& task, Policy& policy, mjData* data, int world_id, std::int64_t episode) {
+  const mjModel* model = task.model();
+  mj_resetData(model, data);
+  task.sample(world_id, episode, state_row(data));
+  mj_forward(model, data);
+  World world{.id = world_id, .model = model, .data = data};
+  world.first = true;
+  task.begin(world);
+  policy.reset(world);
+  EpisodeResult result;
+  Action action;
+  for (;;) {
+    policy.act(world, action);
+    task.apply(world, action, state_row(data));
+    for (int i = 0; i < task.decimation(); ++i) mj_step(model, data);
+    mj_forward(model, data);
+    world.substep += task.decimation();
+    world.first = false;
+    ++result.steps;
+    const Evaluation e = task.evaluate(world);
+    result.success = e.success;
+    result.reward = e.reward;
+    result.truncated = e.truncated;
+    result.gave_up = action.success.has_value() && !*action.success;
+    if (e.terminal || e.truncated) return result;
+  }
+}
+
+}  // namespace mjsense

@@ -1,0 +1,26 @@
+#include "mjsense/observe/pose_sensor.h"
+#include "mjsense/robots/robot.h"
+#include "mjsense/scene/resolve.h"
+
+namespace mjsense {
+
+// One tool pose a gripper: `tcp_pose` of the only one, `tcp_pose_left` of "left_gripper".
+std::vector<std::shared_ptr<Sensor>> Robot::create_robot_sensors() const {
+  std::vector<const MoveGroup*> grippers;
+  for (const MoveGroup& group : groups_) {
+    if (group.kind == GroupKind::kGripper) grippers.push_back(&group);
+  }
+  std::vector<std::shared_ptr<Sensor>> sensors;
+  for (const MoveGroup* gripper : grippers) {
+    std::string name = "tcp_pose";
+    if (grippers.size() > 1) name += "_" + gripper->name.substr(0, gripper->name.find('_'));
+    sensors.push_back(std::make_shared<PoseSensor>(
+        name, PoseSensor::Ref{"site", name_of(model_, mjOBJ_SITE, gripper->leaf_site)},
+        PoseSensor::Ref{"body", name_of(model_, mjOBJ_BODY, base_body_)},
+        "Pose of the point between the finger tips in the robot's base frame, which stands on the "
+        "floor."));
+  }
+  return sensors;
+}
+
+}  // namespace mjsense
