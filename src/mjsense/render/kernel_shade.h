@@ -1,0 +1,330 @@
+#pragma once
+// From hits to colours: MuJoCo's classic light model (OpenGL's fixed function, evaluated at every pixel). Part of the tile
+// kernels.
+//
+//   base  = clamp(emission + sum of lights without shadow)        lights: attenuation * spot * (ambient + diffuse + specular)
+//   colour = texture * (base + sum over shadow-casting lights that are not barred of clamp(light))
+
+#include "mjsense/render/kernel_texture.h"
+#include "mjsense/render/kernel_trace.h"
+
+namespace mjsense {
+namespace {
+
+// A packet's surface points, camera frame.
+struct alignas(64) Surfaces {
+  float p[3][kLanes], n[3][kLanes];
+  float rgb[3][kLanes], alpha[kLanes];
+  float texture[3][kLanes];  // 0..1
+  float specular[kLanes], exponent[kLanes], emission[kLanes];
+};
+
+struct alignas(64) Colors {
+  float rgb[3][kLanes];
+};
+
+// x^n for x in [0, 1]; error below 0.002 where it matters (what 8 bits show).
+inline Float power(Float x, Float n) {
+  const Float floor_x = max(x, splat(0.3f));
+  const Float s = (floor_x - splat(1.0f)) / (floor_x + splat(1.0f)), s2 = s * s;
+  const Float log = splat(2.0f) * s * fma(s2, fma(s2, fma(s2, splat(1.0f / 7), splat(0.2f)), splat(1.0f / 3)), splat(1.0f));
+  Float y = max(fma(n * log, splat(1.0f / 256), splat(1.0f)), splat(0.0f));  // (1 + n log x / 256)^256
+  for (int i = 0; i < 8; ++i) y = y * y;
+  return select(splat(0.3f) <= x, y, select(n < splat(4.0f), x * y * splat(1.0f / 0.3f), splat(0.0f)));
+}
+
+inline float inverse_length(const float* v) {
+  const float l2 = v[0] * v[0] + v[1] * v[1] + v[2] * v[2];
+  return l2 > 0 ? 1.0f / __builtin_sqrtf(l2) : 0.0f;
+}
+
+// Unit normal in the geom's frame of a primitive at p.
+inline Vec3 primitive_normal(const ViewGeom& g, Vec3 p) {
+  const Float zero = splat(0.0f), one = splat(1.0f);
+  switch (g.type) {
+    case mjGEOM_SPHERE: return {p.x, p.y, p.z};
+    case mjGEOM_ELLIPSOID:
+      return {p.x * splat(1 / (g.size[0] * g.size[0])), p.y * splat(1 / (g.size[1] * g.size[1])),
+              p.z * splat(1 / (g.size[2] * g.size[2]))};
+    case mjGEOM_CAPSULE: {
+      const Float h = splat(g.size[1]);
+      return {p.x, p.y, p.z - min(max(p.z, -h), h)};
+    }
+    case mjGEOM_CYLINDER: {
+      const Float ring = sqrt(fma(p.x, p.x, p.y * p.y)) * splat(1 / g.size[0]);
+      const Mask end = abs(p.z) * splat(1 / g.size[1]) > ring;
+      return {select(end, zero, p.x), select(end, zero, p.y), select(end, select(p.z < zero, -one, one), zero)};
+    }
+    case mjGEOM_BOX: {
+      const Float x = p.x * splat(1 / g.size[0]), y = p.y * splat(1 / g.size[1]), z = p.z * splat(1 / g.size[2]);
+      const Float ax = abs(x), ay = abs(y), az = abs(z);
+      const Mask is_x = (ax >= ay) & (ax >= az);
+      const Mask is_y = (!is_x) & (ay >= az);
+      return {select(is_x, x, zero), select(is_y, y, zero), select(is_x | is_y, zero, z)};
+    }
+    default: return {zero, zero, one};
+  }
+}
+
+// Texture of lane i, by the pixel's footprint on the tangent plane.
+inline Color lane_texture(const View& view, const ViewGeom& g, const Pixels& pixels, const Hits& hits, int i, const float* p,
+                          const float* n_local, const float* n) {
+  const Surface& s = g.surface;
+  const Texture& texture = *s.texture;
+  const bool ortho = view.grid.orthographic;
+  const float d[3] = {ortho ? 0 : pixels.x[i], ortho ? 0 : pixels.y[i], -1};
+  const float nd = n[0] * d[0] + n[1] * d[1] + n[2] * d[2];
+  const float across = ortho ? 1.0f : hits.t[i];
+  float step[2][3];  // dP/dx, dP/dy in the geom's frame
+  for (int a = 0; a < 2; ++a) {
+    const float size = across * (a == 0 ? view.grid.dx : view.grid.dy);
+    const float slope = nd < -1e-4f ? n[a] / nd : -n[a] * 1e4f;
+    float w[3];
+    for (int k = 0; k < 3; ++k) w[k] = size * ((k == a ? 1.0f : 0.0f) - d[k] * slope);
+    for (int k = 0; k < 3; ++k) step[a][k] = g.rot[k] * w[0] + g.rot[3 + k] * w[1] + g.rot[6 + k] * w[2];
+  }
+  const auto norm = [](const float* v) { return __builtin_sqrtf(v[0] * v[0] + v[1] * v[1] + v[2] * v[2]); };
+  const float width = static_cast<float>(texture.level[0].width), height = static_cast<float>(texture.level[0].height);
+  const float length = norm(step[0]) > norm(step[1]) ? norm(step[0]) : norm(step[1]);
+  if (texture.cube) {
+    const float x = p[0] * s.stretch[0], y = p[1] * s.stretch[1], z = p[2] * s.stretch[2];
+    const float ax = x < 0 ? -x : x, ay = y < 0 ? -y : y, az = z < 0 ? -z : z;
+    const float most = ax > ay ? (ax > az ? ax : az) : (ay > az ? ay : az);
+    const float stretch = s.stretch[0] > s.stretch[1] ? s.stretch[0] : s.stretch[1];
+    return sample_cube(texture, x, y, z, most > 0 ? 0.5f * width * length * stretch / most : 1.0f);
+  }
+  if (s.mapped && hits.prim[i] >= 0) {
+    const float* uv = g.mesh->uvs + 6 * hits.prim[i];
+    const float b1 = hits.u[i], b2 = hits.v[i], b0 = 1 - b1 - b2;
+    const float u = b0 * uv[0] + b1 * uv[2] + b2 * uv[4], v = b0 * uv[1] + b1 * uv[3] + b2 * uv[5];
+    const float most = width > height ? width : height;
+    return sample(texture, 0, u * s.repeat[0], v * s.repeat[1], length * most * g.mesh->density[hits.prim[i]]);
+  }
+  float u, v, ku, kv;
+  primitive_uv(g, p, n_local, u, v, ku, kv);
+  ku *= s.repeat[0] * width;
+  kv *= s.repeat[1] * height;
+  float footprint = length * (ku > kv ? ku : kv);
+  if (g.type == mjGEOM_PLANE) {
+    float most = 0;
+    for (const auto& w : step) {
+      const float r2 = ku * ku * w[0] * w[0] + kv * kv * w[1] * w[1];
+      most = r2 > most ? r2 : most;
+    }
+    footprint = __builtin_sqrtf(most);
+  }
+  return sample(texture, 0, u * s.repeat[0], v * s.repeat[1], footprint);
+}
+
+// Normals of triangles: interpolated where the mesh has them, else the face's own.
+inline void triangle_normals(const ViewGeom& g, const Hits& hits, std::uint32_t lanes, float (*n)[kLanes]) {
+  for (int i = 0; i < kLanes; ++i) {
+    if (!(lanes >> i & 1u)) continue;
+    float local[3] = {hits.n[0][i], hits.n[1][i], hits.n[2][i]};
+    if (g.mesh && hits.prim[i] >= 0) {
+      const float* c = g.mesh->normals + 9 * hits.prim[i];
+      const float b1 = hits.u[i], b2 = hits.v[i], b0 = 1 - b1 - b2;
+      for (int k = 0; k < 3; ++k) local[k] = b0 * c[k] + b1 * c[3 + k] + b2 * c[6 + k];
+    }
+    for (int k = 0; k < 3; ++k) n[k][i] = local[k];
+  }
+}
+
+// Points, normals (unit, camera frame) and materials of `lanes`. `color`: also what only rgb needs.
+inline void gather_surfaces(const View& view, const Pixels& pixels, const Hits& hits, std::uint32_t lanes, bool color,
+                            Surfaces& out) {
+  const bool ortho = view.grid.orthographic;
+  for (int k = 0; k < kLanes; k += kWidth) {
+    const Float t = load(hits.t + k), x = load(pixels.x + k), y = load(pixels.y + k);
+    store(out.p[0] + k, ortho ? x : t * x);
+    store(out.p[1] + k, ortho ? y : t * y);
+    store(out.p[2] + k, -t);
+  }
+  std::uint32_t todo = lanes;
+  while (todo) {
+    const int geom = hits.geom[__builtin_ctz(todo)];
+    const ViewGeom& g = view.geoms[geom];
+    std::uint32_t mine = 0;
+    for (int i = 0; i < kLanes; ++i) mine |= static_cast<std::uint32_t>(hits.geom[i] == geom) << i;
+    mine &= todo;
+    todo &= ~mine;
+    alignas(64) float local[3][kLanes], normal[3][kLanes];
+    if (g.bvh) triangle_normals(g, hits, mine, normal);
+    for (int k = 0; k < kLanes; k += kWidth) {
+      const Mask m = mask_of(mine >> k & kAllLanes);
+      if (!any(m)) continue;
+      const Vec3 p{load(out.p[0] + k), load(out.p[1] + k), load(out.p[2] + k)};
+      const Vec3 q = to_geom(g.rot, p - splat(g.pos));
+      Vec3 n = g.bvh ? Vec3{load(normal[0] + k), load(normal[1] + k), load(normal[2] + k)} : primitive_normal(g, q);
+      const Float inverse = splat(1.0f) / sqrt(max(dot(n, n), splat(1e-30f)));
+      n = {n.x * inverse, n.y * inverse, n.z * inverse};
+      store(local[0] + k, q.x);
+      store(local[1] + k, q.y);
+      store(local[2] + k, q.z);
+      store(normal[0] + k, n.x);
+      store(normal[1] + k, n.y);
+      store(normal[2] + k, n.z);
+      const Vec3 c = from_geom(g.rot, n);
+      store(out.n[0] + k, select(m, c.x, load(out.n[0] + k)));
+      store(out.n[1] + k, select(m, c.y, load(out.n[1] + k)));
+      store(out.n[2] + k, select(m, c.z, load(out.n[2] + k)));
+      if (!color) continue;
+      const Surface& s = g.surface;
+      for (int c3 = 0; c3 < 3; ++c3) {
+        store(out.rgb[c3] + k, select(m, splat(s.rgba[c3]), load(out.rgb[c3] + k)));
+        store(out.texture[c3] + k, select(m, splat(1.0f), load(out.texture[c3] + k)));
+      }
+      store(out.alpha + k, select(m, splat(s.rgba[3]), load(out.alpha + k)));
+      store(out.specular + k, select(m, splat(s.specular), load(out.specular + k)));
+      store(out.exponent + k, select(m, splat(s.exponent), load(out.exponent + k)));
+      store(out.emission + k, select(m, splat(s.emission), load(out.emission + k)));
+    }
+    if (!color || !g.surface.texture) continue;
+    for (int i = 0; i < kLanes; ++i) {
+      if (!(mine >> i & 1u)) continue;
+      const float p[3] = {local[0][i], local[1][i], local[2][i]};
+      const float nl[3] = {normal[0][i], normal[1][i], normal[2][i]};
+      const float n[3] = {out.n[0][i], out.n[1][i], out.n[2][i]};
+      const Color c = lane_texture(view, g, pixels, hits, i, p, nl, n);
+      out.texture[0][i] = c.r * (1.0f / 255);
+      out.texture[1][i] = c.g * (1.0f / 255);
+      out.texture[2][i] = c.b * (1.0f / 255);
+    }
+  }
+}
+
+// Geoms that may stand between the light at hand and the points at hand.
+struct Casters {
+  const int* list;
+  int count;
+};
+
+struct LightTerm {
+  Float scale;       // attenuation * spot
+  Float diffuse;     // N L
+  Float specular;    // (N H)^exponent
+  Vec3 to_light;     // not normalised
+};
+
+inline LightTerm light_term(const ViewLight& light, bool ortho, Vec3 p, Vec3 n, Float exponent, bool shiny) {
+  const Float zero = splat(0.0f), one = splat(1.0f);
+  LightTerm out;
+  Vec3 l;
+  out.scale = one;
+  if (light.kind == LightKind::kDirectional) {
+    l = {splat(-light.dir[0]), splat(-light.dir[1]), splat(-light.dir[2])};
+    out.to_light = l;
+  } else {
+    out.to_light = splat(light.pos) - p;
+    const Float distance = sqrt(max(dot(out.to_light, out.to_light), splat(1e-20f)));
+    const Float inverse = one / distance;
+    l = {out.to_light.x * inverse, out.to_light.y * inverse, out.to_light.z * inverse};
+    const float* a = light.attenuation;
+    out.scale = one / max(fma(fma(splat(a[2]), distance, splat(a[1])), distance, splat(a[0])), splat(1e-6f));
+    if (light.kind == LightKind::kSpot) {
+      const Float cosine = -dot(l, splat(light.dir));
+      Float spot = one;
+      if (light.exponent > 0) spot = power(max(cosine, zero), splat(light.exponent));
+      out.scale = out.scale * select(cosine < splat(light.cos_cutoff), zero, spot);
+    }
+  }
+  const Float cosine = dot(n, l);
+  out.diffuse = max(cosine, zero);
+  out.specular = zero;
+  if (shiny) {
+    Vec3 v{zero, zero, one};  // to the viewer
+    if (!ortho) {
+      const Float inverse = -one / sqrt(dot(p, p));
+      v = {p.x * inverse, p.y * inverse, p.z * inverse};
+    }
+    const Vec3 h = l + v;
+    const Float nh = dot(n, h) / sqrt(max(dot(h, h), splat(1e-20f)));
+    out.specular = select(zero < cosine, power(min(max(nh, zero), one), exponent), zero);
+  }
+  return out;
+}
+
+// Adds one light's contribution to `sum`, for lanes that are not in `dark`; clamped to 1 by itself if `separate`.
+inline void add_light(const View& view, const ViewLight& light, const Surfaces& s, std::uint32_t dark, bool separate,
+                      Colors& sum) {
+  const bool shiny = light.specular[0] + light.specular[1] + light.specular[2] > 0;
+  for (int k = 0; k < kLanes; k += kWidth) {
+    const Vec3 p{load(s.p[0] + k), load(s.p[1] + k), load(s.p[2] + k)};
+    const Vec3 n{load(s.n[0] + k), load(s.n[1] + k), load(s.n[2] + k)};
+    const LightTerm term = light_term(light, view.grid.orthographic, p, n, load(s.exponent + k), shiny);
+    const Float gloss = term.specular * load(s.specular + k);
+    const Float scale = select(mask_of(dark >> k & kAllLanes), splat(0.0f), term.scale);
+    for (int c = 0; c < 3; ++c) {
+      const Float matte = fma(splat(light.diffuse[c]), term.diffuse, splat(light.ambient[c]));
+      Float add = scale * fma(matte, load(s.rgb[c] + k), splat(light.specular[c]) * gloss);
+      if (separate) add = min(add, splat(1.0f));
+      store(sum.rgb[c] + k, load(sum.rgb[c] + k) + add);
+    }
+  }
+}
+
+// Lanes that do not get the light: barred by a geom, or turned away.
+inline std::uint32_t dark_lanes(const View& view, const ViewLight& light, const Surfaces& s, const Hits& hits,
+                                std::uint32_t lanes, Casters casters) {
+  LightRays rays;
+  std::uint32_t facing = 0;
+  for (int k = 0; k < kLanes; k += kWidth) {
+    const Vec3 p{load(s.p[0] + k), load(s.p[1] + k), load(s.p[2] + k)};
+    const Vec3 n{load(s.n[0] + k), load(s.n[1] + k), load(s.n[2] + k)};
+    const LightTerm term = light_term(light, true, p, n, splat(0.0f), false);
+    facing |= bits((splat(0.0f) < term.diffuse) & (splat(0.0f) < term.scale)) << k;
+    store(rays.d[0] + k, term.to_light.x);
+    store(rays.d[1] + k, term.to_light.y);
+    store(rays.d[2] + k, term.to_light.z);
+  }
+  const std::uint32_t active = facing & lanes;
+  if (!active) return ~0u;
+  __builtin_memcpy(rays.p, s.p, sizeof rays.p);
+  __builtin_memcpy(rays.n, s.n, sizeof rays.n);
+  __builtin_memcpy(rays.geom, hits.geom, sizeof rays.geom);
+  float low[3] = {kInfinity, kInfinity, kInfinity}, high[3] = {-kInfinity, -kInfinity, -kInfinity};
+  for (int i = 0; i < kLanes; ++i) {
+    if (!(active >> i & 1u)) continue;
+    for (int c = 0; c < 3; ++c) {
+      low[c] = s.p[c][i] < low[c] ? s.p[c][i] : low[c];
+      high[c] = s.p[c][i] > high[c] ? s.p[c][i] : high[c];
+    }
+  }
+  float axis[3], r2 = 0;
+  for (int c = 0; c < 3; ++c) {
+    rays.center[c] = 0.5f * (low[c] + high[c]);
+    r2 += 0.25f * (high[c] - low[c]) * (high[c] - low[c]);
+    axis[c] = light.kind == LightKind::kDirectional ? -light.dir[c] : light.pos[c] - rays.center[c];
+  }
+  rays.radius = __builtin_sqrtf(r2);
+  rays.end = light.kind == LightKind::kDirectional ? kInfinity : 1.0f;
+  return ~active | in_shadow(view, casters.list, casters.count, rays, axis, active);
+}
+
+// Colours 0..1 of `lanes`. `casters` by light; null: no light casts shadows here.
+inline void shade(const View& view, const Surfaces& s, const Hits& hits, std::uint32_t lanes, const Casters* casters,
+                  Colors& out) {
+  Colors separate = {};
+  for (int c = 0; c < 3; ++c)
+    for (int k = 0; k < kLanes; k += kWidth) {
+      const Float glow = load(s.emission + k) + splat(view.global_ambient);
+      store(out.rgb[c] + k, glow * load(s.rgb[c] + k));
+    }
+  for (int i = 0; i < view.num_lights; ++i) {
+    const ViewLight& light = view.lights[i];
+    if (casters && light.shadows) {
+      const std::uint32_t dark = dark_lanes(view, light, s, hits, lanes, casters[i]);
+      if ((lanes & ~dark) != 0) add_light(view, light, s, dark, true, separate);
+    } else {
+      add_light(view, light, s, 0, false, out);
+    }
+  }
+  for (int c = 0; c < 3; ++c)
+    for (int k = 0; k < kLanes; k += kWidth) {
+      const Float sum = min(load(out.rgb[c] + k), splat(1.0f)) + load(separate.rgb[c] + k);
+      store(out.rgb[c] + k, min(sum * load(s.texture[c] + k), splat(1.0f)));
+    }
+}
+
+}  // namespace
+}  // namespace mjsense

@@ -1,0 +1,287 @@
+#pragma once
+// A tile of 16 x 16 pixels: which geoms it can see, what each pixel sees, what colour that is. Part of the tile kernels.
+
+#include "mjsense/render/kernel_shade.h"
+
+namespace mjsense {
+namespace {
+
+constexpr int kPackets = kTileSize / 4;     // along a side
+constexpr int kMaxLayers = 8;               // of transparent geoms over one packet
+
+struct TileHits {
+  Pixels pixels[kPackets * kPackets];
+  Hits opaque[kPackets * kPackets];
+};
+
+inline void fill_pixels(const PixelGrid& grid, int x0, int y0, float shift_x, float shift_y, Pixels& out) {
+  float* w = out.window;
+  w[0] = w[2] = kInfinity;
+  w[1] = w[3] = -kInfinity;
+  for (int i = 0; i < kLanes; ++i) {
+    // Lanes outside the image repeat its border: they cost nothing extra and disturb nobody.
+    const int x = x0 + i % 4 < grid.width ? x0 + i % 4 : grid.width - 1;
+    const int y = y0 + i / 4 < grid.height ? y0 + i / 4 : grid.height - 1;
+    float px, py;
+    if (grid.bent) {
+      px = grid.bent[2 * (y * grid.width + x)] + shift_x * grid.dx;
+      py = grid.bent[2 * (y * grid.width + x) + 1] + shift_y * grid.dy;
+    } else {
+      px = grid.left + grid.dx * (static_cast<float>(x) + (0.5f + shift_x));
+      py = grid.top + grid.dy * (static_cast<float>(y) + (0.5f + shift_y));
+    }
+    out.x[i] = px;
+    out.y[i] = py;
+    w[0] = px < w[0] ? px : w[0];
+    w[1] = px > w[1] ? px : w[1];
+    w[2] = py < w[2] ? py : w[2];
+    w[3] = py > w[3] ? py : w[3];
+  }
+}
+
+// Casters for every shadow-casting light, for the points that the tile sees.
+inline void find_casters(const View& view, const TileHits& tile, int packets, TileScratch& scratch, Casters* out) {
+  LightRays around;
+  float low[3] = {kInfinity, kInfinity, kInfinity}, high[3] = {-kInfinity, -kInfinity, -kInfinity};
+  for (int q = 0; q < packets; ++q) {
+    const Hits& hits = tile.opaque[q];
+    for (int i = 0; i < kLanes; ++i) {
+      if (hits.geom[i] < 0) continue;
+      const float t = hits.t[i], s = view.grid.orthographic ? 1.0f : t;
+      const float p[3] = {s * tile.pixels[q].x[i], s * tile.pixels[q].y[i], -t};
+      for (int c = 0; c < 3; ++c) {
+        low[c] = p[c] < low[c] ? p[c] : low[c];
+        high[c] = p[c] > high[c] ? p[c] : high[c];
+      }
+    }
+  }
+  const bool empty = low[0] > high[0];
+  float r2 = 0;
+  for (int c = 0; c < 3 && !empty; ++c) {
+    around.center[c] = 0.5f * (low[c] + high[c]);
+    r2 += 0.25f * (high[c] - low[c]) * (high[c] - low[c]);
+  }
+  around.radius = __builtin_sqrtf(r2);
+  int* next = scratch.casters;
+  for (int i = 0; i < view.num_lights; ++i) {
+    const ViewLight& light = view.lights[i];
+    out[i] = {next, 0};
+    if (!light.shadows || empty) continue;
+    const bool directional = light.kind == LightKind::kDirectional;
+    around.end = directional ? kInfinity : 1.0f;
+    float axis[3];
+    for (int c = 0; c < 3; ++c) axis[c] = directional ? -light.dir[c] : light.pos[c] - around.center[c];
+    for (int g = 0; g < view.num_geoms; ++g)
+      if (in_shaft(around, axis, view.geoms[g])) next[out[i].count++] = g;
+    next += out[i].count;
+  }
+}
+
+inline void shade_background(const View& view, const Pixels& pixels, std::uint32_t lanes, Colors& out) {
+  for (int i = 0; i < kLanes; ++i) {
+    if (!(lanes >> i & 1u)) continue;
+    Color color = {0, 0, 0};
+    if (view.skybox) {
+      const bool ortho = view.grid.orthographic;
+      const float d[3] = {ortho ? 0 : pixels.x[i], ortho ? 0 : pixels.y[i], -1};
+      float w[3];
+      for (int r = 0; r < 3; ++r) w[r] = view.r_wc[3 * r] * d[0] + view.r_wc[3 * r + 1] * d[1] + view.r_wc[3 * r + 2] * d[2];
+      const float step = view.grid.dx < 0 ? -view.grid.dx : view.grid.dx;
+      color = sample_cube(*view.skybox, w[0], w[2], -w[1], 0.5f * step * view.skybox->level[0].width);
+    }
+    out.rgb[0][i] = color.r * (1.0f / 255);
+    out.rgb[1][i] = color.g * (1.0f / 255);
+    out.rgb[2][i] = color.b * (1.0f / 255);
+  }
+}
+
+inline std::uint32_t hit_lanes(const Hits& hits) {
+  std::uint32_t lanes = 0;
+  for (int i = 0; i < kLanes; ++i) lanes |= static_cast<std::uint32_t>(hits.geom[i] >= 0) << i;
+  return lanes;
+}
+
+struct Layer {
+  Colors color;
+  alignas(64) float alpha[kLanes];  // 0: does not cover the lane
+};
+
+inline void blend(const Layer& layer, Colors& out) {
+  for (int k = 0; k < kLanes; k += kWidth) {
+    const Float a = load(layer.alpha + k);
+    for (int c = 0; c < 3; ++c) {
+      const Float under = load(out.rgb[c] + k);
+      store(out.rgb[c] + k, fma(a, load(layer.color.rgb[c] + k) - under, under));
+    }
+  }
+}
+
+// MuJoCo draws transparent geoms twice, near to far and back, each time over what is there.
+inline void shade_transparent(const View& view, const int* list, int count, const Pixels& pixels, const Hits& opaque,
+                              Colors& out) {
+  Layer layers[kMaxLayers];
+  int used = 0;
+  for (int i = 0; i < count && used < kMaxLayers; ++i) {
+    if (!overlap(view.geoms[list[i]].window, pixels.window)) continue;
+    Hits hits = opaque;
+    for (int& g : hits.geom) g = -1;
+    trace_geom(view, list[i], pixels, hits);
+    const std::uint32_t lanes = hit_lanes(hits);
+    if (!lanes) continue;
+    Surfaces surfaces = {};
+    gather_surfaces(view, pixels, hits, lanes, true, surfaces);
+    Layer& layer = layers[used++];
+    shade(view, surfaces, hits, lanes, nullptr, layer.color);
+    for (int k = 0; k < kLanes; ++k) layer.alpha[k] = lanes >> k & 1u ? surfaces.alpha[k] : 0;
+    blend(layer, out);
+  }
+  for (int i = used - 1; i >= 0; --i) blend(layers[i], out);
+}
+
+inline std::uint8_t byte(float x) { return static_cast<std::uint8_t>(x * 255.0f + 0.5f); }
+
+// Nearest of opaque and transparent geoms: what depth and segmentation see. A plane seen from behind is not there.
+inline void first_hits(const View& view, const int* list, int count, const Pixels& pixels, Hits& hits) {
+  for (int i = 0; i < count; ++i) {
+    const ViewGeom& g = view.geoms[list[i]];
+    if (g.type == mjGEOM_PLANE && g.behind) continue;
+    if (overlap(g.window, pixels.window)) trace_geom(view, list[i], pixels, hits);
+  }
+}
+
+inline void write_geometry(const View& view, const ImageTargets& targets, int x0, int y0, const Pixels& pixels,
+                           const Hits& hits) {
+  Surfaces surfaces;
+  if (targets.normals) {
+    __builtin_memset(surfaces.n, 0, sizeof surfaces.n);
+    gather_surfaces(view, pixels, hits, hit_lanes(hits), false, surfaces);
+  }
+  const PixelGrid& grid = view.grid;
+  for (int i = 0; i < kLanes; ++i) {
+    const int x = x0 + i % 4, y = y0 + i / 4;
+    if (x >= grid.width || y >= grid.height) continue;
+    const std::size_t at = static_cast<std::size_t>(y) * grid.width + x;
+    const bool hit = hits.geom[i] >= 0;
+    const float px = pixels.x[i], py = pixels.y[i], t = hits.t[i];
+    if (targets.depth) {
+      const float length = grid.orthographic || !targets.ray_depth ? 1.0f : __builtin_sqrtf(px * px + py * py + 1);
+      targets.depth[at] = hit ? t * length : 0;
+    }
+    if (targets.segmentation) {
+      const ViewGeom* g = hit ? &view.geoms[hits.geom[i]] : nullptr;
+      targets.segmentation[2 * at] = g ? g->id : -1;
+      targets.segmentation[2 * at + 1] = g ? g->object : -1;
+    }
+    if (targets.normals)
+      for (int c = 0; c < 3; ++c) targets.normals[3 * at + c] = hit ? surfaces.n[c][i] : 0;
+    if (targets.points) {
+      const float s = grid.orthographic ? 1.0f : t;
+      const float nan = __builtin_nanf("");
+      targets.points[3 * at] = hit ? s * px : nan;
+      targets.points[3 * at + 1] = hit ? s * py : nan;
+      targets.points[3 * at + 2] = hit ? -t : nan;
+    }
+  }
+}
+
+struct TileLists {
+  int opaque = 0, transparent = 0;
+};
+
+inline TileLists find_geoms(const View& view, const float* window, TileScratch& scratch) {
+  TileLists lists;
+  for (int i = 0; i < view.num_opaque; ++i)
+    if (overlap(view.geoms[i].window, window)) scratch.opaque[lists.opaque++] = i;
+  for (int i = view.num_opaque; i < view.num_opaque + view.num_transparent; ++i)
+    if (overlap(view.geoms[i].window, window)) scratch.transparent[lists.transparent++] = i;
+  return lists;
+}
+
+// Offsets in a pixel, far from each other in both directions: Hammersley points.
+inline void sample_shift(int index, int samples, float& x, float& y) {
+  if (samples == 1) {
+    x = y = 0;
+    return;
+  }
+  std::uint32_t b = static_cast<std::uint32_t>(index);
+  float radical = 0, half = 0.5f;
+  for (; b; b >>= 1, half *= 0.5f) radical += (b & 1u) * half;
+  x = (static_cast<float>(index) + 0.5f) / samples - 0.5f;
+  y = radical + 0.5f / samples - 0.5f;
+}
+
+inline void render_tile(const View& view, const ImageTargets& targets, int tx, int ty, TileScratch& scratch) {
+  TileHits& tile = *static_cast<TileHits*>(scratch.hits);
+  const PixelGrid& grid = view.grid;
+  const int x0 = tx * kTileSize, y0 = ty * kTileSize;
+  const int across = (grid.width - x0 + 3) / 4 < kPackets ? (grid.width - x0 + 3) / 4 : kPackets;
+  const int down = (grid.height - y0 + 3) / 4 < kPackets ? (grid.height - y0 + 3) / 4 : kPackets;
+  const int packets = across * down;
+  const bool geometry = targets.depth || targets.segmentation || targets.normals || targets.points;
+  const float far = view.far > 0 ? view.far : kInfinity;
+  const int samples = targets.rgb ? targets.samples : 1;
+  float sum[kPackets * kPackets][3][kLanes];
+  for (int sample = 0; sample < samples || (sample == samples && samples > 1 && geometry); ++sample) {
+    // The last round, if there is one, is for depth and segmentation: through pixel centres.
+    const bool centered = sample == samples || samples == 1;
+    float shift_x = 0, shift_y = 0;
+    if (!centered) sample_shift(sample, samples, shift_x, shift_y);
+    float window[4] = {kInfinity, -kInfinity, kInfinity, -kInfinity};
+    for (int q = 0; q < packets; ++q) {
+      fill_pixels(grid, x0 + 4 * (q % across), y0 + 4 * (q / across), shift_x, shift_y, tile.pixels[q]);
+      const float* w = tile.pixels[q].window;
+      for (int c = 0; c < 4; c += 2) {
+        window[c] = w[c] < window[c] ? w[c] : window[c];
+        window[c + 1] = w[c + 1] > window[c + 1] ? w[c + 1] : window[c + 1];
+      }
+    }
+    const TileLists lists = find_geoms(view, window, scratch);
+    for (int q = 0; q < packets; ++q) {
+      clear(tile.opaque[q], far);
+      trace_packet(view, scratch.opaque, lists.opaque, tile.pixels[q], tile.opaque[q]);
+    }
+    if (targets.rgb && sample < samples) {
+      Casters casters[View::kMaxLights];
+      const bool shadows = view.shadows;
+      if (shadows) find_casters(view, tile, packets, scratch, casters);
+      for (int q = 0; q < packets; ++q) {
+        const Hits& hits = tile.opaque[q];
+        const std::uint32_t lanes = hit_lanes(hits);
+        Colors colors = {};
+        if (lanes) {
+          Surfaces surfaces = {};
+          gather_surfaces(view, tile.pixels[q], hits, lanes, true, surfaces);
+          shade(view, surfaces, hits, lanes, shadows ? casters : nullptr, colors);
+        }
+        if (lanes != 0xffffu) shade_background(view, tile.pixels[q], ~lanes & 0xffffu, colors);
+        if (lists.transparent) shade_transparent(view, scratch.transparent, lists.transparent, tile.pixels[q], hits, colors);
+        for (int c = 0; c < 3; ++c)
+          for (int i = 0; i < kLanes; ++i) sum[q][c][i] = sample == 0 ? colors.rgb[c][i] : sum[q][c][i] + colors.rgb[c][i];
+      }
+    }
+    if (geometry && centered) {
+      for (int q = 0; q < packets; ++q) {
+        if (lists.transparent) first_hits(view, scratch.transparent, lists.transparent, tile.pixels[q], tile.opaque[q]);
+        write_geometry(view, targets, x0 + 4 * (q % across), y0 + 4 * (q / across), tile.pixels[q], tile.opaque[q]);
+      }
+    }
+  }
+  if (!targets.rgb) return;
+  const float scale = 1.0f / samples;
+  for (int q = 0; q < packets; ++q)
+    for (int i = 0; i < kLanes; ++i) {
+      const int x = x0 + 4 * (q % across) + i % 4, y = y0 + 4 * (q / across) + i / 4;
+      if (x >= grid.width || y >= grid.height) continue;
+      std::uint8_t* out = targets.rgb + 3 * (static_cast<std::size_t>(y) * grid.width + x);
+      for (int c = 0; c < 3; ++c) out[c] = byte(sum[q][c][i] * scale);
+    }
+}
+
+inline void render_tiles(const View& view, const ImageTargets& targets, int first, int last, TileScratch& scratch) {
+  const int across = (view.grid.width + kTileSize - 1) / kTileSize;
+  for (int ty = first; ty < last; ++ty)
+    for (int tx = 0; tx < across; ++tx) render_tile(view, targets, tx, ty, scratch);
+}
+
+}  // namespace
+}  // namespace mjsense

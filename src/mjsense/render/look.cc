@@ -1,0 +1,154 @@
+#include "mjsense/render/look.h"
+
+#include <algorithm>
+#include <cmath>
+
+namespace mjsense {
+namespace {
+
+// Vertex normals that turn away from their face by more than this cosine belong to a crease: MuJoCo shades it flat.
+constexpr float kCrease = 0.8f;
+
+std::uint8_t linear_from_srgb(std::uint8_t value) {
+  const double v = value / 255.0;
+  const double linear = v <= 0.04045 ? v / 12.92 : std::pow((v + 0.055) / 1.055, 2.4);
+  return static_cast<std::uint8_t>(std::lround(255.0 * linear));
+}
+
+std::uint32_t pack(const std::uint32_t (&sum)[4], std::uint32_t n) {
+  std::uint32_t texel = 0;
+  for (int c = 0; c < 4; ++c) texel |= ((sum[c] + n / 2) / n) << (8 * c);
+  return texel;
+}
+
+// (b - a) x (c - a), and its length.
+float cross(const float* a, const float* b, const float* c, float* out) {
+  const float e1[3] = {b[0] - a[0], b[1] - a[1], b[2] - a[2]};
+  const float e2[3] = {c[0] - a[0], c[1] - a[1], c[2] - a[2]};
+  for (int i = 0; i < 3; ++i) out[i] = e1[(i + 1) % 3] * e2[(i + 2) % 3] - e1[(i + 2) % 3] * e2[(i + 1) % 3];
+  return std::sqrt(out[0] * out[0] + out[1] * out[1] + out[2] * out[2]);
+}
+
+// The next level of one image by a box filter; odd edges repeat the last texel.
+void halve(const std::uint32_t* src, int width, int height, std::uint32_t* dst, int w2, int h2) {
+  for (int y = 0; y < h2; ++y) {
+    for (int x = 0; x < w2; ++x) {
+      const int xs[2] = {std::min(2 * x, width - 1), std::min(2 * x + 1, width - 1)};
+      const int ys[2] = {std::min(2 * y, height - 1), std::min(2 * y + 1, height - 1)};
+      std::uint32_t sum[4] = {};
+      for (int yy : ys)
+        for (int xx : xs)
+          for (int c = 0; c < 4; ++c) sum[c] += (src[yy * width + xx] >> (8 * c)) & 255u;
+      dst[y * w2 + x] = pack(sum, 4);
+    }
+  }
+}
+
+}  // namespace
+
+Look::Look(const mjModel* model, unsigned group_mask) {
+  textures_.resize(model->ntex);
+  meshes_.resize(model->nmesh);
+  for (int i = 0; i < model->ntex; ++i) add_texture(model, i);
+  for (int i = 0; i < model->ntex && !skybox_; ++i)
+    if (model->tex_type[i] == mjTEXTURE_SKYBOX && textures_[i].levels > 0) skybox_ = &textures_[i];
+  for (int g = 0; g < model->ngeom; ++g) {
+    const bool mesh = model->geom_type[g] == mjGEOM_MESH || model->geom_type[g] == mjGEOM_SDF;
+    const int group = std::clamp(model->geom_group[g], 0, mjNGROUP - 1);
+    const int id = model->geom_dataid[g];
+    if (mesh && id >= 0 && (group_mask >> group & 1u) && !meshes_[id].normals) add_mesh(model, id);
+  }
+}
+
+void Look::add_texture(const mjModel* model, int id) {
+  Texture& texture = textures_[id];
+  const int channels = model->tex_nchannel[id];
+  if (channels != 3 && channels != 4) return;  // encoded for another renderer: drawn without a texture
+  texture.cube = model->tex_type[id] != mjTEXTURE_2D;
+  const int width = model->tex_width[id];
+  // A square "cube" has one image for all faces.
+  const bool repeated = texture.cube && model->tex_width[id] == model->tex_height[id];
+  const int height = texture.cube ? width : model->tex_height[id];
+  const int faces = texture.cube ? 6 : 1;
+  const bool srgb = model->tex_colorspace[id] == mjCOLORSPACE_SRGB && !texture.cube;
+  const mjtByte* data = model->tex_data + model->tex_adr[id];
+
+  std::size_t total = 0;
+  for (int w = width, h = height, n = 0; n < Texture::kMaxLevels; ++n) {
+    total += static_cast<std::size_t>(faces) * w * h;
+    ++texture.levels;
+    if (w == 1 && h == 1) break;
+    w = std::max(1, w / 2);
+    h = std::max(1, h / 2);
+  }
+  std::vector<std::uint32_t>& texels = texels_.emplace_back(total);
+  for (int f = 0; f < faces; ++f) {
+    const mjtByte* image = data + (repeated ? 0 : static_cast<std::size_t>(f) * width * height * channels);
+    std::uint32_t* out = texels.data() + static_cast<std::size_t>(f) * width * height;
+    for (int i = 0; i < width * height; ++i) {
+      std::uint32_t texel = 255u << 24;
+      for (int c = 0; c < 3; ++c) {
+        const mjtByte v = image[i * channels + c];
+        texel |= static_cast<std::uint32_t>(srgb ? linear_from_srgb(v) : v) << (8 * c);
+      }
+      if (channels == 4) texel = (texel & 0xFFFFFFu) | static_cast<std::uint32_t>(image[i * 4 + 3]) << 24;
+      out[i] = texel;
+    }
+  }
+  std::uint32_t* at = texels.data();
+  for (int n = 0, w = width, h = height; n < texture.levels; ++n) {
+    texture.level[n] = {at, w, h};
+    const std::size_t size = static_cast<std::size_t>(w) * h;
+    std::uint32_t* next = at + faces * size;
+    const int w2 = std::max(1, w / 2), h2 = std::max(1, h / 2);
+    if (n + 1 < texture.levels)
+      for (int f = 0; f < faces; ++f) halve(at + f * size, w, h, next + static_cast<std::size_t>(f) * w2 * h2, w2, h2);
+    at = next;
+    w = w2;
+    h = h2;
+  }
+}
+
+void Look::add_mesh(const mjModel* model, int id) {
+  const int faces = model->mesh_facenum[id];
+  const int first = model->mesh_faceadr[id];
+  const float* vert = model->mesh_vert + 3 * model->mesh_vertadr[id];
+  const float* normal = model->mesh_normal + 3 * model->mesh_normaladr[id];
+  const bool has_uv = model->mesh_texcoordadr[id] >= 0;
+  std::vector<float>& normals = tables_.emplace_back(static_cast<std::size_t>(faces) * 9);
+  for (int f = 0; f < faces; ++f) {
+    const int* v = model->mesh_face + 3 * (first + f);
+    const int* n = model->mesh_facenormal + 3 * (first + f);
+    float flat[3];
+    const float length = cross(vert + 3 * v[0], vert + 3 * v[1], vert + 3 * v[2], flat);
+    for (float& x : flat) x = length > 0 ? x / length : 0;
+    for (int k = 0; k < 3; ++k) {
+      const float* smooth = normal + 3 * n[k];
+      const float cosine = smooth[0] * flat[0] + smooth[1] * flat[1] + smooth[2] * flat[2];
+      const float* use = !has_uv && cosine < kCrease ? flat : smooth;
+      std::copy(use, use + 3, normals.begin() + 9 * f + 3 * k);
+    }
+  }
+  meshes_[id].normals = normals.data();
+  if (!has_uv) return;
+  const float* texcoord = model->mesh_texcoord + 2 * model->mesh_texcoordadr[id];
+  std::vector<float>& uvs = tables_.emplace_back(static_cast<std::size_t>(faces) * 6);
+  std::vector<float>& density = tables_.emplace_back(faces);
+  for (int f = 0; f < faces; ++f) {
+    float* uv = uvs.data() + 6 * f;
+    for (int k = 0; k < 3; ++k) {
+      const int t = model->mesh_facetexcoord[3 * (first + f) + k];
+      uv[2 * k] = texcoord[2 * t];
+      uv[2 * k + 1] = texcoord[2 * t + 1];
+    }
+    const int* v = model->mesh_face + 3 * (first + f);
+    float normal[3];
+    const float area = cross(vert + 3 * v[0], vert + 3 * v[1], vert + 3 * v[2], normal);
+    const float uv_area = std::abs((uv[2] - uv[0]) * (uv[5] - uv[1]) - (uv[4] - uv[0]) * (uv[3] - uv[1]));
+    density[f] = area > 0 ? std::sqrt(uv_area / area) : 0;
+  }
+  meshes_[id].uvs = uvs.data();
+  meshes_[id].density = density.data();
+}
+
+}  // namespace mjsense

@@ -1,0 +1,55 @@
+#pragma once
+// What surfaces look like, taken from the model once and shared by all cameras and worlds: textures with their mipmaps, and
+// the normals and texture coordinates of mesh faces as MuJoCo's classic renderer uses them.
+
+#include <mujoco/mujoco.h>
+
+#include <cstdint>
+#include <span>
+#include <vector>
+
+namespace mjsense {
+
+// One image of a pyramid: RGBA8 texels, row 0 first; a cube map has its six faces (+x -x +y -y +z -z) one after another.
+struct MipLevel {
+  const std::uint32_t* texels = nullptr;
+  int width = 0, height = 0;
+};
+
+struct Texture {
+  static constexpr int kMaxLevels = 15;
+  bool cube = false;
+  int levels = 0;
+  MipLevel level[kMaxLevels];
+};
+
+// Per face of a mesh, by face index. Null where the model has none.
+struct MeshLook {
+  const float* normals = nullptr;  // [F, 3 corners, 3]
+  const float* uvs = nullptr;      // [F, 3 corners, 2]
+  const float* density = nullptr;  // [F] texture units per metre
+};
+
+class Look {
+ public:
+  // Only meshes of geoms whose group is in `group_mask` (bit g) are prepared.
+  Look(const mjModel* model, unsigned group_mask);
+  Look(const Look&) = delete;
+  Look& operator=(const Look&) = delete;
+
+  const Texture* texture(int id) const { return id < 0 ? nullptr : &textures_[id]; }
+  const MeshLook* mesh(int id) const { return &meshes_[id]; }
+  const Texture* skybox() const { return skybox_; }  // null if the model has none
+
+ private:
+  void add_texture(const mjModel* model, int id);
+  void add_mesh(const mjModel* model, int id);
+
+  std::vector<Texture> textures_;
+  std::vector<MeshLook> meshes_;
+  std::vector<std::vector<std::uint32_t>> texels_;
+  std::vector<std::vector<float>> tables_;
+  const Texture* skybox_ = nullptr;
+};
+
+}  // namespace mjsense

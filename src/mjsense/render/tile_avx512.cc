@@ -1,0 +1,9 @@
+#include "mjsense/render/kernel_tile.h"
+
+namespace mjsense {
+
+void render_tiles_avx512(const View& view, const ImageTargets& targets, int first, int last, TileScratch& scratch) {
+  render_tiles(view, targets, first, last, scratch);
+}
+
+}  // namespace mjsense
