@@ -31,24 +31,24 @@ struct alignas(64) Hits {
 
 inline Float splat(float x) { return Float(x); }
 
-inline Vec3 splat(const float* p) { return {splat(p[0]), splat(p[1]), splat(p[2])}; }
+inline Vec3f splat(const float* p) { return {splat(p[0]), splat(p[1]), splat(p[2])}; }
 
 // R^T v.
-inline Vec3 to_geom(const float* r, Vec3 v) {
+inline Vec3f to_geom(const float* r, Vec3f v) {
   return {fma(splat(r[0]), v.x, fma(splat(r[3]), v.y, splat(r[6]) * v.z)),
           fma(splat(r[1]), v.x, fma(splat(r[4]), v.y, splat(r[7]) * v.z)),
           fma(splat(r[2]), v.x, fma(splat(r[5]), v.y, splat(r[8]) * v.z))};
 }
 
 // R v.
-inline Vec3 from_geom(const float* r, Vec3 v) {
+inline Vec3f from_geom(const float* r, Vec3f v) {
   return {fma(splat(r[0]), v.x, fma(splat(r[1]), v.y, splat(r[2]) * v.z)),
           fma(splat(r[3]), v.x, fma(splat(r[4]), v.y, splat(r[5]) * v.z)),
           fma(splat(r[6]), v.x, fma(splat(r[7]), v.y, splat(r[8]) * v.z))};
 }
 
 struct LocalRay {
-  Vec3 o, d;
+  Vec3f o, d;
 };
 
 inline LocalRay pixel_ray(const ViewGeom& g, const PixelGrid& grid, Float x, Float y) {
@@ -66,17 +66,17 @@ inline Interval where(Mask m, Interval a) { return {select(m, a.enter, splat(kIn
 
 // The distance of the line from the centre decides, not a difference of large squares: silhouettes of small far spheres stay
 // round in single precision.
-inline Interval sphere(Vec3 o, Vec3 d, float radius) {
+inline Interval sphere(Vec3f o, Vec3f d, float radius) {
   const Float a = dot(d, d);
   const Float middle = -dot(o, d) / a;
-  const Vec3 q = along(o, middle, d);
+  const Vec3f q = along(o, middle, d);
   const Float rest = splat(radius * radius) - dot(q, q);
   const Float half = sqrt(max(rest, splat(0.0f)) / a);
   return where(rest >= splat(0.0f), {middle - half, middle + half});
 }
 
-inline Interval ellipsoid(Vec3 o, Vec3 d, const float* size) {
-  const Vec3 s{splat(1.0f / size[0]), splat(1.0f / size[1]), splat(1.0f / size[2])};
+inline Interval ellipsoid(Vec3f o, Vec3f d, const float* size) {
+  const Vec3f s{splat(1.0f / size[0]), splat(1.0f / size[1]), splat(1.0f / size[2])};
   return sphere({o.x * s.x, o.y * s.y, o.z * s.z}, {d.x * s.x, d.y * s.y, d.z * s.z}, 1.0f);
 }
 
@@ -89,7 +89,7 @@ inline Interval slab(Float o, Float inverse, Float low, Float high) {
   return {min(a, b), max(a, b)};
 }
 
-inline Interval box(Vec3 o, Vec3 d, const float* center, const float* half) {
+inline Interval box(Vec3f o, Vec3f d, const float* center, const float* half) {
   const Interval x = slab(o.x, safe_inverse(d.x), splat(center[0] - half[0]), splat(center[0] + half[0]));
   const Interval y = slab(o.y, safe_inverse(d.y), splat(center[1] - half[1]), splat(center[1] + half[1]));
   const Interval z = slab(o.z, safe_inverse(d.z), splat(center[2] - half[2]), splat(center[2] + half[2]));
@@ -98,7 +98,7 @@ inline Interval box(Vec3 o, Vec3 d, const float* center, const float* half) {
 }
 
 // The endless cylinder around z.
-inline Interval tube(Vec3 o, Vec3 d, float radius) {
+inline Interval tube(Vec3f o, Vec3f d, float radius) {
   const Float a = max(fma(d.x, d.x, d.y * d.y), splat(kTiny));
   const Float middle = -fma(o.x, d.x, o.y * d.y) / a;
   const Float qx = fma(middle, d.x, o.x), qy = fma(middle, d.y, o.y);
@@ -107,21 +107,21 @@ inline Interval tube(Vec3 o, Vec3 d, float radius) {
   return where(rest >= splat(0.0f), {middle - half, middle + half});
 }
 
-inline Interval cylinder(Vec3 o, Vec3 d, float radius, float half) {
+inline Interval cylinder(Vec3f o, Vec3f d, float radius, float half) {
   const Interval side = tube(o, d, radius);
   const Interval ends = slab(o.z, safe_inverse(d.z), splat(-half), splat(half));
   const Interval all{max(side.enter, ends.enter), min(side.exit, ends.exit)};
   return where(all.enter <= all.exit, all);
 }
 
-inline Interval capsule(Vec3 o, Vec3 d, float radius, float half) {
+inline Interval capsule(Vec3f o, Vec3f d, float radius, float half) {
   const Interval middle = cylinder(o, d, radius, half);
   const Interval top = sphere({o.x, o.y, o.z - splat(half)}, d, radius);
   const Interval bottom = sphere({o.x, o.y, o.z + splat(half)}, d, radius);
   return {min(middle.enter, min(top.enter, bottom.enter)), max(middle.exit, max(top.exit, bottom.exit))};
 }
 
-inline Interval solid(const ViewGeom& g, Vec3 o, Vec3 d) {
+inline Interval solid(const ViewGeom& g, Vec3f o, Vec3f d) {
   static constexpr float kOrigin[3] = {0, 0, 0};
   switch (g.type) {
     case mjGEOM_SPHERE: return sphere(o, d, g.size[0]);
@@ -134,9 +134,9 @@ inline Interval solid(const ViewGeom& g, Vec3 o, Vec3 d) {
 }
 
 // Crossing of a plane inside its size, from the front or from both sides.
-inline Float plane(const ViewGeom& g, Vec3 o, Vec3 d, bool both_sides) {
+inline Float plane(const ViewGeom& g, Vec3f o, Vec3f d, bool both_sides) {
   const Float t = -o.z * safe_inverse(d.z);
-  const Vec3 p = along(o, t, d);
+  const Vec3f p = along(o, t, d);
   Mask hit = splat(0.0f) < t;
   if (!both_sides) hit = hit & (d.z < splat(0.0f));
   if (g.size[0] > 0) hit = hit & (abs(p.x) <= splat(g.size[0]));

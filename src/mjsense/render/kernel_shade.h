@@ -39,7 +39,7 @@ inline float inverse_length(const float* v) {
 }
 
 // Unit normal in the geom's frame of a primitive at p.
-inline Vec3 primitive_normal(const ViewGeom& g, Vec3 p) {
+inline Vec3f primitive_normal(const ViewGeom& g, Vec3f p) {
   const Float zero = splat(0.0f), one = splat(1.0f);
   switch (g.type) {
     case mjGEOM_SPHERE: return {p.x, p.y, p.z};
@@ -58,9 +58,8 @@ inline Vec3 primitive_normal(const ViewGeom& g, Vec3 p) {
     case mjGEOM_BOX: {
       const Float x = p.x * splat(1 / g.size[0]), y = p.y * splat(1 / g.size[1]), z = p.z * splat(1 / g.size[2]);
       const Float ax = abs(x), ay = abs(y), az = abs(z);
-      const Mask is_x = (ax >= ay) & (ax >= az);
-      const Mask is_y = (!is_x) & (ay >= az);
-      return {select(is_x, x, zero), select(is_y, y, zero), select(is_x | is_y, zero, z)};
+      const Mask is_x = (ax >= ay) & (ax >= az), not_z = is_x | (ay >= az);
+      return {select(is_x, x, zero), select(is_x, zero, select(not_z, y, zero)), select(not_z, zero, z)};
     }
     default: return {zero, zero, one};
   }
@@ -153,9 +152,9 @@ inline void gather_surfaces(const View& view, const Pixels& pixels, const Hits& 
     for (int k = 0; k < kLanes; k += kWidth) {
       const Mask m = mask_of(mine >> k & kAllLanes);
       if (!any(m)) continue;
-      const Vec3 p{load(out.p[0] + k), load(out.p[1] + k), load(out.p[2] + k)};
-      const Vec3 q = to_geom(g.rot, p - splat(g.pos));
-      Vec3 n = g.bvh ? Vec3{load(normal[0] + k), load(normal[1] + k), load(normal[2] + k)} : primitive_normal(g, q);
+      const Vec3f p{load(out.p[0] + k), load(out.p[1] + k), load(out.p[2] + k)};
+      const Vec3f q = to_geom(g.rot, p - splat(g.pos));
+      Vec3f n = g.bvh ? Vec3f{load(normal[0] + k), load(normal[1] + k), load(normal[2] + k)} : primitive_normal(g, q);
       const Float inverse = splat(1.0f) / sqrt(max(dot(n, n), splat(1e-30f)));
       n = {n.x * inverse, n.y * inverse, n.z * inverse};
       store(local[0] + k, q.x);
@@ -164,7 +163,7 @@ inline void gather_surfaces(const View& view, const Pixels& pixels, const Hits& 
       store(normal[0] + k, n.x);
       store(normal[1] + k, n.y);
       store(normal[2] + k, n.z);
-      const Vec3 c = from_geom(g.rot, n);
+      const Vec3f c = from_geom(g.rot, n);
       store(out.n[0] + k, select(m, c.x, load(out.n[0] + k)));
       store(out.n[1] + k, select(m, c.y, load(out.n[1] + k)));
       store(out.n[2] + k, select(m, c.z, load(out.n[2] + k)));
@@ -203,13 +202,13 @@ struct LightTerm {
   Float scale;       // attenuation * spot
   Float diffuse;     // N L
   Float specular;    // (N H)^exponent
-  Vec3 to_light;     // not normalised
+  Vec3f to_light;     // not normalised
 };
 
-inline LightTerm light_term(const ViewLight& light, bool ortho, Vec3 p, Vec3 n, Float exponent, bool shiny) {
+inline LightTerm light_term(const ViewLight& light, bool ortho, Vec3f p, Vec3f n, Float exponent, bool shiny) {
   const Float zero = splat(0.0f), one = splat(1.0f);
   LightTerm out;
-  Vec3 l;
+  Vec3f l;
   out.scale = one;
   if (light.kind == LightKind::kDirectional) {
     l = {splat(-light.dir[0]), splat(-light.dir[1]), splat(-light.dir[2])};
@@ -232,12 +231,12 @@ inline LightTerm light_term(const ViewLight& light, bool ortho, Vec3 p, Vec3 n, 
   out.diffuse = max(cosine, zero);
   out.specular = zero;
   if (shiny) {
-    Vec3 v{zero, zero, one};  // to the viewer
+    Vec3f v{zero, zero, one};  // to the viewer
     if (!ortho) {
       const Float inverse = -one / sqrt(dot(p, p));
       v = {p.x * inverse, p.y * inverse, p.z * inverse};
     }
-    const Vec3 h = l + v;
+    const Vec3f h = l + v;
     const Float nh = dot(n, h) / sqrt(max(dot(h, h), splat(1e-20f)));
     out.specular = select(zero < cosine, power(min(max(nh, zero), one), exponent), zero);
   }
@@ -249,8 +248,8 @@ inline void add_light(const View& view, const ViewLight& light, const Surfaces& 
                       Colors& sum) {
   const bool shiny = light.specular[0] + light.specular[1] + light.specular[2] > 0;
   for (int k = 0; k < kLanes; k += kWidth) {
-    const Vec3 p{load(s.p[0] + k), load(s.p[1] + k), load(s.p[2] + k)};
-    const Vec3 n{load(s.n[0] + k), load(s.n[1] + k), load(s.n[2] + k)};
+    const Vec3f p{load(s.p[0] + k), load(s.p[1] + k), load(s.p[2] + k)};
+    const Vec3f n{load(s.n[0] + k), load(s.n[1] + k), load(s.n[2] + k)};
     const LightTerm term = light_term(light, view.grid.orthographic, p, n, load(s.exponent + k), shiny);
     const Float gloss = term.specular * load(s.specular + k);
     const Float scale = select(mask_of(dark >> k & kAllLanes), splat(0.0f), term.scale);
@@ -269,8 +268,8 @@ inline std::uint32_t dark_lanes(const View& view, const ViewLight& light, const 
   LightRays rays;
   std::uint32_t facing = 0;
   for (int k = 0; k < kLanes; k += kWidth) {
-    const Vec3 p{load(s.p[0] + k), load(s.p[1] + k), load(s.p[2] + k)};
-    const Vec3 n{load(s.n[0] + k), load(s.n[1] + k), load(s.n[2] + k)};
+    const Vec3f p{load(s.p[0] + k), load(s.p[1] + k), load(s.p[2] + k)};
+    const Vec3f n{load(s.n[0] + k), load(s.n[1] + k), load(s.n[2] + k)};
     const LightTerm term = light_term(light, true, p, n, splat(0.0f), false);
     facing |= bits((splat(0.0f) < term.diffuse) & (splat(0.0f) < term.scale)) << k;
     store(rays.d[0] + k, term.to_light.x);

@@ -82,7 +82,7 @@ inline void trace_walls(const ViewGeom& g, int index, const PixelGrid& grid, con
     const std::uint32_t lanes = bits(hit);
     if (!lanes) continue;
     alignas(64) float t[kWidth], p[3][kWidth];
-    const Vec3 at = along(ray.o, inside.enter, ray.d);
+    const Vec3f at = along(ray.o, inside.enter, ray.d);
     store(t, inside.enter);
     store(p[0], at.x);
     store(p[1], at.y);
@@ -171,14 +171,14 @@ inline std::uint32_t shadow_of_triangles(const ViewGeom& g, int index, const Lig
   alignas(64) int valid[kLanes];
   std::uint32_t some = 0;
   for (int k = 0; k < kLanes; k += kWidth) {
-    const Vec3 p{load(rays.p[0] + k), load(rays.p[1] + k), load(rays.p[2] + k)};
-    const Vec3 d = to_geom(g.rot, {load(rays.d[0] + k), load(rays.d[1] + k), load(rays.d[2] + k)});
-    Vec3 o = to_geom(g.rot, p - splat(g.pos));
+    const Vec3f p{load(rays.p[0] + k), load(rays.p[1] + k), load(rays.p[2] + k)};
+    const Vec3f d = to_geom(g.rot, {load(rays.d[0] + k), load(rays.d[1] + k), load(rays.d[2] + k)});
+    Vec3f o = to_geom(g.rot, p - splat(g.pos));
     // A surface must not lie in its own shadow by rounding: start a little above it.
     const Int same = load(rays.geom + k);
-    const Mask own = !(less(same, int_of(index)) | less(int_of(index), same));
-    const Vec3 n = to_geom(g.rot, {load(rays.n[0] + k), load(rays.n[1] + k), load(rays.n[2] + k)});
-    const Float lift = select(own, splat(1e-4f) * max(splat(g.radius), abs(p.z)), splat(0.0f));
+    const Mask other = less(same, int_of(index)) | less(int_of(index), same);
+    const Vec3f n = to_geom(g.rot, {load(rays.n[0] + k), load(rays.n[1] + k), load(rays.n[2] + k)});
+    const Float lift = select(other, splat(0.0f), splat(1e-4f) * max(splat(g.radius), abs(p.z)));
     o = along(o, lift, n);
     const Interval inside = box(o, d, g.box, g.box + 3);
     const Mask hit = mask_of(active >> k & kAllLanes) & (inside.enter < splat(rays.end)) & (inside.exit > splat(0.0f));
@@ -218,9 +218,9 @@ inline std::uint32_t in_shadow(const View& view, const int* casters, int count, 
       for (int k = 0; k < kLanes; k += kWidth) {
         const std::uint32_t lanes = active >> k & kAllLanes;
         if (!lanes) continue;
-        const Vec3 p{load(rays.p[0] + k), load(rays.p[1] + k), load(rays.p[2] + k)};
-        const Vec3 o = to_geom(g.rot, p - splat(g.pos));
-        const Vec3 d = to_geom(g.rot, {load(rays.d[0] + k), load(rays.d[1] + k), load(rays.d[2] + k)});
+        const Vec3f p{load(rays.p[0] + k), load(rays.p[1] + k), load(rays.p[2] + k)};
+        const Vec3f o = to_geom(g.rot, p - splat(g.pos));
+        const Vec3f d = to_geom(g.rot, {load(rays.d[0] + k), load(rays.d[1] + k), load(rays.d[2] + k)});
         const Int at = load(rays.geom + k), self = int_of(casters[i]);
         const Mask other = less(at, self) | less(self, at);
         Mask barred;

@@ -1,0 +1,252 @@
+#include "mjsense/render/view_builder.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <numbers>
+
+#include "mjsense/rays/ray_world.h"
+#include "mjsense/rays/shared_geometry.h"
+
+namespace mjsense {
+namespace {
+
+constexpr float kEndless = std::numeric_limits<float>::infinity();
+constexpr float kOpaque = 0.995f;      // MuJoCo blends what has less
+constexpr float kFromBehind = 0.3f;    // MuJoCo's factor for the alpha of planes seen from below
+constexpr float kNearest = 1e-4f;      // m; a box that comes nearer may cover anything
+
+// out = R^T v.
+void rotate_back(const double r[9], const double v[3], double out[3]) {
+  for (int i = 0; i < 3; ++i) out[i] = r[i] * v[0] + r[3 + i] * v[1] + r[6 + i] * v[2];
+}
+
+// The visualiser's rule: a geom's own colour, unless it is the default grey and there is a material.
+void resolve_rgba(const mjModel* m, int material, const float* own, float* out) {
+  const bool is_default = own[0] == 0.5f && own[1] == 0.5f && own[2] == 0.5f && own[3] == 1.0f;
+  std::copy_n(material >= 0 && is_default ? m->mat_rgba + 4 * material : own, 4, out);
+}
+
+}  // namespace
+
+Appearance::Appearance(const mjModel* m)
+    : rgba_(4 * ViewBuilder::max_geoms(m)), lights_(View::kMaxLights), light_ids_(View::kMaxLights) {
+  copy(m);
+}
+
+void Appearance::copy(const mjModel* m) {
+  for (int i = 0; i < m->ngeom; ++i) resolve_rgba(m, m->geom_matid[i], m->geom_rgba + 4 * i, &rgba_[4 * i]);
+  for (int i = 0; i < m->nflex; ++i) resolve_rgba(m, m->flex_matid[i], m->flex_rgba + 4 * i, &rgba_[4 * (m->ngeom + i)]);
+  num_lights_ = 0;
+  const auto add = [&](int id, const float* ambient, const float* diffuse, const float* specular) -> ViewLight& {
+    light_ids_[num_lights_] = id;
+    ViewLight& light = lights_[num_lights_++];
+    light = {};
+    std::copy_n(ambient, 3, light.ambient);
+    std::copy_n(diffuse, 3, light.diffuse);
+    std::copy_n(specular, 3, light.specular);
+    light.attenuation[0] = 1;
+    return light;
+  };
+  const auto& head = m->vis.headlight;
+  if (head.active) add(-1, head.ambient, head.diffuse, head.specular);
+  for (int i = 0; i < m->nlight && num_lights_ < View::kMaxLights; ++i) {
+    if (!m->light_active[i] || m->light_type[i] == mjLIGHT_IMAGE) continue;
+    ViewLight& light = add(i, m->light_ambient + 3 * i, m->light_diffuse + 3 * i, m->light_specular + 3 * i);
+    light.shadows = m->light_castshadow[i];
+    light.kind = m->light_type[i] == mjLIGHT_DIRECTIONAL ? LightKind::kDirectional
+                 : m->light_type[i] == mjLIGHT_SPOT      ? LightKind::kSpot
+                                                         : LightKind::kPoint;
+    if (light.kind == LightKind::kDirectional) continue;
+    std::copy_n(m->light_attenuation + 3 * i, 3, light.attenuation);
+    light.exponent = m->light_exponent[i];
+    const double cutoff = m->light_cutoff[i];
+    light.cos_cutoff = static_cast<float>(std::cos(cutoff * std::numbers::pi / 180));
+    if (cutoff >= 180) light.kind = LightKind::kPoint;
+  }
+}
+
+ViewBuilder::ViewBuilder(const mjModel* model, const Look& look, const SharedGeometry& shapes, const ViewOptions& options)
+    : model_(model), look_(&look), shapes_(&shapes), options_(options), unsorted_(max_geoms(model)), sorted_(max_geoms(model)) {
+  order_.reserve(max_geoms(model));
+  view_.near = options.near;
+  view_.far = options.far;
+  view_.shadows = options.shadows;
+  view_.skybox = options.textures ? look.skybox() : nullptr;
+}
+
+const View& ViewBuilder::build(const RayWorld& world, const Appearance& appearance, const double position[3],
+                               const double rotation[9], const PixelGrid& grid) {
+  view_.grid = grid;
+  order_.clear();
+  for (int id = 0; id < world.num_geoms(); ++id) {
+    const float* rgba = appearance.rgba().data() + 4 * id;
+    if (rgba[3] == 0 || !(world.flags()[id] & options_.groups)) continue;
+    const int index = static_cast<int>(order_.size());
+    ViewGeom& g = unsorted_[index];
+    place(world, id, position, rotation, g);
+    const bool sight = in_sight(g);
+    if (!sight && !options_.shadows) continue;
+    set_surface(world, rgba, id, g);
+    Order order{sight ? g.transparent : 2, g.nearest, index};
+    if (order.rank == 1) {
+      const float* p = g.pos;
+      order.key = g.type == mjGEOM_PLANE ? 1e10f : std::sqrt(p[0] * p[0] + p[1] * p[1] + p[2] * p[2]) - g.radius;
+    }
+    order_.push_back(order);
+  }
+  std::sort(order_.begin(), order_.end(), [](const Order& a, const Order& b) {
+    if (a.rank != b.rank) return a.rank < b.rank;
+    if (a.key != b.key) return a.key < b.key;
+    return a.index < b.index;
+  });
+  view_.num_opaque = view_.num_transparent = 0;
+  for (std::size_t i = 0; i < order_.size(); ++i) {
+    sorted_[i] = unsorted_[order_[i].index];
+    view_.num_opaque += order_[i].rank == 0;
+    view_.num_transparent += order_[i].rank == 1;
+  }
+  view_.geoms = sorted_.data();
+  view_.num_geoms = static_cast<int>(order_.size());
+  for (int i = 0; i < 9; ++i) view_.r_wc[i] = static_cast<float>(rotation[i]);
+  set_lights(world, appearance, position, rotation);
+  return view_;
+}
+
+void ViewBuilder::place(const RayWorld& world, int id, const double position[3], const double rotation[9], ViewGeom& g) const {
+  const RayGeom& source = world.geom(id);
+  const double offset[3] = {source.pos[0] - position[0], source.pos[1] - position[1], source.pos[2] - position[2]};
+  double p[3], eye[3];
+  rotate_back(rotation, offset, p);
+  rotate_back(source.mat, offset, eye);
+  for (int i = 0; i < 3; ++i) {
+    g.pos[i] = static_cast<float>(p[i]);
+    g.eye[i] = static_cast<float>(-eye[i]);
+    g.size[i] = source.size[i];
+    g.box[i] = source.center[i];
+    g.box[3 + i] = source.half[i];
+    for (int j = 0; j < 3; ++j)
+      g.rot[3 * i + j] = static_cast<float>(rotation[i] * source.mat[j] + rotation[3 + i] * source.mat[3 + j] +
+                                            rotation[6 + i] * source.mat[6 + j]);
+  }
+  g.type = source.type;
+  g.id = id;
+  g.object = mjOBJ_GEOM;
+  g.bvh = nullptr;
+  g.mesh = nullptr;
+  g.height_field = nullptr;
+  if (g.type == mjGEOM_MESH || g.type == mjGEOM_SDF) {
+    g.bvh = shapes_->mesh_scenes[source.data];
+    g.mesh = look_->mesh(source.data);
+  } else if (g.type == mjGEOM_HFIELD) {
+    g.height_field = &shapes_->height_fields[source.data];
+    g.bvh = g.height_field->scene;
+  }
+  g.behind = g.type == mjGEOM_PLANE && g.eye[2] < 0;
+}
+
+// Bounding sphere, window and nearest depth of g; whether any of it can be in the image.
+bool ViewBuilder::in_sight(ViewGeom& g) const {
+  const PixelGrid& grid = view_.grid;
+  for (int i = 0; i < 3; ++i)
+    g.center[i] = g.pos[i] + g.rot[3 * i] * g.box[0] + g.rot[3 * i + 1] * g.box[1] + g.rot[3 * i + 2] * g.box[2];
+  const float* h = g.box + 3;
+  g.radius = g.type == mjGEOM_SPHERE ? g.size[0] : std::sqrt(h[0] * h[0] + h[1] * h[1] + h[2] * h[2]);
+  g.window[0] = g.window[2] = -kEndless;
+  g.window[1] = g.window[3] = kEndless;
+  g.nearest = 0;
+  if (g.type == mjGEOM_PLANE) {
+    g.radius = kEndless;
+    return true;
+  }
+  float low[3] = {kEndless, kEndless, kEndless}, high[3] = {-kEndless, -kEndless, -kEndless};
+  float window[4] = {kEndless, -kEndless, kEndless, -kEndless};
+  for (int corner = 0; corner < 8; ++corner) {
+    float c[3];
+    for (int i = 0; i < 3; ++i) {
+      c[i] = g.center[i];
+      for (int k = 0; k < 3; ++k) c[i] += (corner >> k & 1 ? h[k] : -h[k]) * g.rot[3 * i + k];
+      low[i] = std::min(low[i], c[i]);
+      high[i] = std::max(high[i], c[i]);
+    }
+    const float depth = grid.orthographic ? 1.0f : std::max(-c[2], kNearest);
+    window[0] = std::min(window[0], c[0] / depth);
+    window[1] = std::max(window[1], c[0] / depth);
+    window[2] = std::min(window[2], c[1] / depth);
+    window[3] = std::max(window[3], c[1] / depth);
+  }
+  const float nearest = -high[2], farthest = -low[2];
+  if (farthest <= view_.near || (view_.far > 0 && nearest >= view_.far)) return false;
+  g.nearest = std::max(nearest - 1e-5f * (1 + std::abs(nearest)), 0.0f);
+  if (!grid.orthographic && nearest <= kNearest) return true;
+  for (int i = 0; i < 4; ++i) {
+    const float slack = 1e-5f * (1 + std::abs(window[i]));
+    g.window[i] = window[i] + (i % 2 ? slack : -slack);
+  }
+  if (grid.bent) return true;  // the corners of the image do not bound it
+  const float right = grid.left + grid.dx * grid.width, bottom = grid.top + grid.dy * grid.height;
+  return g.window[0] <= right && g.window[1] >= grid.left && g.window[2] <= grid.top && g.window[3] >= bottom;
+}
+
+void ViewBuilder::set_surface(const RayWorld& world, const float* rgba, int id, ViewGeom& g) const {
+  Surface& s = g.surface;
+  s = {};
+  std::copy_n(rgba, 4, s.rgba);
+  if (g.behind) s.rgba[3] *= kFromBehind;
+  g.transparent = s.rgba[3] < kOpaque || g.behind;
+  s.specular = 0.5f;
+  s.exponent = 64.0f;
+  const int material = world.materials()[id];
+  if (material < 0) return;
+  s.specular = model_->mat_specular[material];
+  s.exponent = 128.0f * model_->mat_shininess[material];
+  s.emission = model_->mat_emission[material];
+  if (!options_.textures) return;
+  s.texture = look_->texture(model_->mat_texid[mjNTEXROLE * material + mjTEXROLE_RGB]);
+  if (s.texture && s.texture->levels == 0) s.texture = nullptr;
+  if (!s.texture) return;
+  const bool uniform = model_->mat_texuniform[material];
+  s.mapped = g.mesh && g.mesh->uvs && !s.texture->cube;
+  for (int i = 0; i < 2; ++i) {
+    const float size = g.size[i] > 0 ? g.size[i] : 1.0f;
+    s.repeat[i] = model_->mat_texrepeat[2 * material + i] * (uniform && !s.mapped ? size : 1.0f);
+  }
+  // Cube maps: MuJoCo takes directions in the unit shape that it scales (meshes and planes: in metres).
+  const bool in_meters = g.mesh || g.height_field || g.type == mjGEOM_PLANE;
+  for (int i = 0; i < 3; ++i) {
+    float size = g.size[i];
+    if (g.type == mjGEOM_SPHERE || ((g.type == mjGEOM_CAPSULE || g.type == mjGEOM_CYLINDER) && i < 2)) size = g.size[0];
+    if ((g.type == mjGEOM_CAPSULE || g.type == mjGEOM_CYLINDER) && i == 2) size = g.size[1];
+    if (in_meters) {
+      s.stretch[i] = uniform ? size : 1.0f;
+    } else {
+      s.stretch[i] = uniform || size <= 0 ? 1.0f : 1.0f / size;
+    }
+  }
+}
+
+void ViewBuilder::set_lights(const RayWorld& world, const Appearance& appearance, const double position[3],
+                             const double rotation[9]) {
+  view_.num_lights = static_cast<int>(appearance.lights().size());
+  view_.global_ambient = view_.num_lights == 0 ? 0.3f : 0.0f;  // MuJoCo's, so that something shows
+  for (int i = 0; i < view_.num_lights; ++i) {
+    ViewLight& light = view_.lights[i];
+    light = appearance.lights()[i];
+    const int id = appearance.light_ids()[i];
+    if (id < 0) {  // the headlight shines where the camera looks
+      light.dir[2] = -1;
+      continue;
+    }
+    const RayLight& source = world.lights()[id];
+    const double offset[3] = {source.pos[0] - position[0], source.pos[1] - position[1], source.pos[2] - position[2]};
+    double p[3], d[3];
+    rotate_back(rotation, offset, p);
+    rotate_back(rotation, source.dir, d);
+    for (int k = 0; k < 3; ++k) {
+      light.pos[k] = static_cast<float>(p[k]);
+      light.dir[k] = static_cast<float>(d[k]);
+    }
+  }
+}
+
+}  // namespace mjsense

@@ -1,0 +1,73 @@
+#pragma once
+// Brings a world into a camera's frame: what is in sight, nearest first, with its materials and lights.
+
+#include <mujoco/mujoco.h>
+
+#include <memory>
+#include <span>
+#include <vector>
+
+#include "mjsense/render/look.h"
+#include "mjsense/render/view.h"
+
+namespace mjsense {
+
+class RayWorld;
+struct SharedGeometry;
+
+// What an image depends on besides poses; a world's own values where they are randomised.
+class Appearance {
+ public:
+  explicit Appearance(const mjModel* model);
+  void copy(const mjModel* model);  // no allocation
+
+  std::span<const float> rgba() const { return rgba_; }           // [ngeom + nflex, 4] as MuJoCo's visualiser resolves it
+  std::span<const ViewLight> lights() const { return {lights_.data(), num_lights_}; }  // active ones; no poses yet
+  std::span<const int> light_ids() const { return light_ids_; }
+
+ private:
+  std::vector<float> rgba_;
+  std::vector<ViewLight> lights_;
+  std::vector<int> light_ids_;
+  std::size_t num_lights_ = 0;
+};
+
+struct ViewOptions {
+  unsigned groups = 0x7;  // bit g: geoms of group g
+  bool textures = true;
+  bool shadows = false;
+  float near = 0, far = 0;
+};
+
+// Owns the geoms of one view; build() fills it anew and allocates nothing.
+class ViewBuilder {
+ public:
+  ViewBuilder(const mjModel* model, const Look& look, const SharedGeometry& shapes, const ViewOptions& options);
+
+  // position, rotation: X_WC, row-major.
+  const View& build(const RayWorld& world, const Appearance& appearance, const double position[3], const double rotation[9],
+                    const PixelGrid& grid);
+  const View& view() const { return view_; }
+  static std::size_t max_geoms(const mjModel* model) { return static_cast<std::size_t>(model->ngeom + model->nflex); }
+
+ private:
+  struct Order {
+    int rank;   // 0 opaque, 1 transparent, 2 only casts shadows
+    float key;
+    int index;
+  };
+  void place(const RayWorld& world, int id, const double position[3], const double rotation[9], ViewGeom& g) const;
+  bool in_sight(ViewGeom& g) const;
+  void set_surface(const RayWorld& world, const float* rgba, int id, ViewGeom& g) const;
+  void set_lights(const RayWorld& world, const Appearance& appearance, const double position[3], const double rotation[9]);
+
+  const mjModel* model_;
+  const Look* look_;
+  const SharedGeometry* shapes_;
+  ViewOptions options_;
+  View view_;
+  std::vector<ViewGeom> unsorted_, sorted_;
+  std::vector<Order> order_;
+};
+
+}  // namespace mjsense
