@@ -6,4 +6,6 @@ void render_tiles_portable(const View& view, const ImageTargets& targets, int fi
   render_tiles(view, targets, first, last, scratch);
 }
 
+std::size_t tile_hits_bytes() { return sizeof(TileHits); }
+
 }  // namespace mjsense

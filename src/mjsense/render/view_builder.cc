@@ -66,8 +66,8 @@ void Appearance::copy(const mjModel* m) {
   }
 }
 
-ViewBuilder::ViewBuilder(const mjModel* model, const Look& look, const SharedGeometry& shapes, const ViewOptions& options)
-    : model_(model), look_(&look), shapes_(&shapes), options_(options), unsorted_(max_geoms(model)), sorted_(max_geoms(model)) {
+ViewBuilder::ViewBuilder(const mjModel* model, const Look& look, const ViewOptions& options)
+    : model_(model), look_(&look), options_(options), unsorted_(max_geoms(model)), sorted_(max_geoms(model)) {
   order_.reserve(max_geoms(model));
   view_.near = options.near;
   view_.far = options.far;
@@ -75,8 +75,8 @@ ViewBuilder::ViewBuilder(const mjModel* model, const Look& look, const SharedGeo
   view_.skybox = options.textures ? look.skybox() : nullptr;
 }
 
-const View& ViewBuilder::build(const RayWorld& world, const Appearance& appearance, const double position[3],
-                               const double rotation[9], const PixelGrid& grid) {
+const View& ViewBuilder::build(const RayWorld& world, const SharedGeometry& shapes, const Appearance& appearance,
+                               const double position[3], const double rotation[9], const PixelGrid& grid) {
   view_.grid = grid;
   order_.clear();
   for (int id = 0; id < world.num_geoms(); ++id) {
@@ -84,7 +84,7 @@ const View& ViewBuilder::build(const RayWorld& world, const Appearance& appearan
     if (rgba[3] == 0 || !(world.flags()[id] & options_.groups)) continue;
     const int index = static_cast<int>(order_.size());
     ViewGeom& g = unsorted_[index];
-    place(world, id, position, rotation, g);
+    place(world, shapes, id, position, rotation, g);
     const bool sight = in_sight(g);
     if (!sight && !options_.shadows) continue;
     set_surface(world, rgba, id, g);
@@ -113,7 +113,8 @@ const View& ViewBuilder::build(const RayWorld& world, const Appearance& appearan
   return view_;
 }
 
-void ViewBuilder::place(const RayWorld& world, int id, const double position[3], const double rotation[9], ViewGeom& g) const {
+void ViewBuilder::place(const RayWorld& world, const SharedGeometry& shapes, int id, const double position[3],
+                        const double rotation[9], ViewGeom& g) const {
   const RayGeom& source = world.geom(id);
   const double offset[3] = {source.pos[0] - position[0], source.pos[1] - position[1], source.pos[2] - position[2]};
   double p[3], eye[3];
@@ -136,10 +137,10 @@ void ViewBuilder::place(const RayWorld& world, int id, const double position[3],
   g.mesh = nullptr;
   g.height_field = nullptr;
   if (g.type == mjGEOM_MESH || g.type == mjGEOM_SDF) {
-    g.bvh = shapes_->mesh_scenes[source.data];
+    g.bvh = shapes.mesh_scenes[source.data];
     g.mesh = look_->mesh(source.data);
   } else if (g.type == mjGEOM_HFIELD) {
-    g.height_field = &shapes_->height_fields[source.data];
+    g.height_field = &shapes.height_fields[source.data];
     g.bvh = g.height_field->scene;
   }
   g.behind = g.type == mjGEOM_PLANE && g.eye[2] < 0;

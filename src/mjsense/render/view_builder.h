@@ -42,11 +42,11 @@ struct ViewOptions {
 // Owns the geoms of one view; build() fills it anew and allocates nothing.
 class ViewBuilder {
  public:
-  ViewBuilder(const mjModel* model, const Look& look, const SharedGeometry& shapes, const ViewOptions& options);
+  ViewBuilder(const mjModel* model, const Look& look, const ViewOptions& options);
 
   // position, rotation: X_WC, row-major.
-  const View& build(const RayWorld& world, const Appearance& appearance, const double position[3], const double rotation[9],
-                    const PixelGrid& grid);
+  const View& build(const RayWorld& world, const SharedGeometry& shapes, const Appearance& appearance,
+                    const double position[3], const double rotation[9], const PixelGrid& grid);
   const View& view() const { return view_; }
   static std::size_t max_geoms(const mjModel* model) { return static_cast<std::size_t>(model->ngeom + model->nflex); }
 
@@ -56,14 +56,14 @@ class ViewBuilder {
     float key;
     int index;
   };
-  void place(const RayWorld& world, int id, const double position[3], const double rotation[9], ViewGeom& g) const;
+  void place(const RayWorld& world, const SharedGeometry& shapes, int id, const double position[3], const double rotation[9],
+             ViewGeom& g) const;
   bool in_sight(ViewGeom& g) const;
   void set_surface(const RayWorld& world, const float* rgba, int id, ViewGeom& g) const;
   void set_lights(const RayWorld& world, const Appearance& appearance, const double position[3], const double rotation[9]);
 
   const mjModel* model_;
   const Look* look_;
-  const SharedGeometry* shapes_;
   ViewOptions options_;
   View view_;
   std::vector<ViewGeom> unsorted_, sorted_;

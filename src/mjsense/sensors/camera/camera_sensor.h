@@ -1,0 +1,61 @@
+#pragma once
+// The sensor that CameraSensorCfg builds.
+
+#include <memory>
+#include <vector>
+
+#include "mjsense/render/camera_model.h"
+#include "mjsense/render/look.h"
+#include "mjsense/render/view_builder.h"
+#include "mjsense/sensors/camera/camera.h"
+
+namespace mjsense {
+
+// Throws ValueError for anything that can be wrong before there is a model.
+void validate(const CameraSensorCfg& cfg);
+
+class CameraSensor final : public Sensor {
+ public:
+  explicit CameraSensor(const CameraSensorCfg& cfg);
+  ~CameraSensor() override;
+
+  std::string_view kind() const override { return "camera"; }
+  Stage stage() const override { return Stage::kCast; }
+  // A camera with its own rate must see every control step: what it shows between two images is the older one.
+  bool eager() const override { return cfg_.update_period > 0; }
+  void edit_spec(mjSpec* spec) override;
+  void initialize(const SensorInit& init) override;
+  void compute(const World& world) override;
+  void cast(const CastContext& context) override;
+
+  const CameraSensorCfg& cfg() const { return cfg_; }
+  int camera_id() const { return camera_; }
+
+ private:
+  struct Workspace;
+  struct PerWorld {
+    PixelGrid grid;
+    Appearance appearance;
+    std::int64_t image = -1;  // number of the image shown, with an update period
+    bool due = false;
+  };
+  bool wants(std::string_view type) const;
+  void declare_fields(int num_worlds);
+  bool is_due(const World& world, std::int64_t& image) const;
+  ImageTargets targets(int world);
+  const View& build_view(const RayScene& rays, int world, ViewBuilder& builder) const;
+
+  CameraSensorCfg cfg_;
+  const mjModel* model_ = nullptr;
+  int camera_ = -1;
+  unsigned groups_ = 0;
+  std::vector<PerWorld> worlds_;
+  std::vector<float> bent_;
+  std::vector<int> due_;
+  std::unique_ptr<Look> look_;
+  std::unique_ptr<Workspace> workspace_;
+  Field *rgb_ = nullptr, *depth_ = nullptr, *segmentation_ = nullptr, *normals_ = nullptr, *points_ = nullptr;
+  Field *intrinsics_ = nullptr, *pose_ = nullptr;
+};
+
+}  // namespace mjsense
