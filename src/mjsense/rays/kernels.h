@@ -17,7 +17,7 @@ struct HeightField {
   const float* data;  // [rows, cols] 0..1
   int rows, cols;
   float size[4];  // m: half x, half y, height of 1, thickness of the base
-  void* scene;    // RTCScene of its surface: face 2 * cell + triangle
+  void* scene;    // RTCScene of its surface (z up): face 2 * cell + triangle; null without cameras
 };
 
 struct KernelScene {

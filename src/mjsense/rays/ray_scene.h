@@ -56,6 +56,7 @@ class RayScene {
   // Copies poses and per-world properties of world.id from world.data and world.model.
   void update(const World& world);
   const RayWorld& world(int id) const { return worlds_[id]; }
+  const SharedGeometry& shared() const { return *shared_; }  // for the kernels of cameras
 
   // Rays of a sensor whose rotation is `rotation` (row-major R_WS); origin is the caller's to set.
   void place(const LocalPacket& local, const float rotation[9], float tmax, RayPacket& rays) const;

@@ -25,6 +25,26 @@ std::array<float, 6> box_around(const float* vertices, int count) {
   return box;
 }
 
+// The surface of a height field, cells split along (row, col) - (row + 1, col + 1).
+SceneHandle build_surface(RTCDevice device, const HeightField& field) {
+  std::vector<float> vertices;
+  std::vector<int> faces;
+  for (int r = 0; r < field.rows; ++r)
+    for (int c = 0; c < field.cols; ++c) {
+      vertices.push_back(field.size[0] * (2.0f * c / (field.cols - 1) - 1.0f));
+      vertices.push_back(field.size[1] * (2.0f * r / (field.rows - 1) - 1.0f));
+      vertices.push_back(field.size[2] * field.data[r * field.cols + c]);
+    }
+  for (int r = 0; r + 1 < field.rows; ++r)
+    for (int c = 0; c + 1 < field.cols; ++c) {
+      const int v = r * field.cols + c;
+      for (int i : {v, v + 1, v + field.cols + 1, v, v + field.cols + 1, v + field.cols})
+        faces.push_back(i);
+    }
+  return build_triangles(device, vertices.data(), field.rows * field.cols, faces.data(),
+                         static_cast<int>(faces.size() / 3));
+}
+
 }  // namespace
 
 SceneHandle build_triangles(RTCDevice device, const float* vertices, int num_vertices,
@@ -75,6 +95,10 @@ SharedGeometry::SharedGeometry(const mjModel* m) {
     HeightField field{
         m->hfield_data + m->hfield_adr[i], m->hfield_nrow[i], m->hfield_ncol[i], {}, nullptr};
     std::copy_n(m->hfield_size + 4 * i, 4, field.size);
+    if (m->ncam > 0) {
+      surfaces.push_back(build_surface(device.get(), field));
+      field.scene = surfaces.back().get();
+    }
     height_fields.push_back(field);
     const float* s = field.size;
     bounds.height_fields.push_back({0, 0, 0.5f * (s[2] - s[3]), s[0], s[1], 0.5f * (s[2] + s[3])});

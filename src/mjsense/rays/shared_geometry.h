@@ -28,6 +28,7 @@ struct SharedGeometry {
   std::vector<SceneHandle> meshes;         // null for a mesh that no geom shows
   std::vector<void*> mesh_scenes;          // the same, for the kernels
   std::vector<HeightField> height_fields;  // data: the model's
+  std::vector<SceneHandle> surfaces;       // of height fields, if the model has cameras: rays march
   ShapeBounds bounds;
 };
 

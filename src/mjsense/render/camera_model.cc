@@ -10,7 +10,8 @@
 namespace mjsense {
 namespace {
 
-PixelGrid grid_from_window(int width, int height, double left, double right, double top, double bottom) {
+PixelGrid grid_from_window(int width, int height, double left, double right, double top,
+                           double bottom) {
   PixelGrid grid;
   grid.width = width;
   grid.height = height;
@@ -44,7 +45,8 @@ bool undo_brown_conrady(Point target, std::span<const double> k, Point& out) {
     }
     constexpr double h = 1e-6;
     const Point fx = brown_conrady({p.x + h, p.y}, k), fy = brown_conrady({p.x, p.y + h}, k);
-    const double a = (fx.x - f.x) / h, b = (fy.x - f.x) / h, c = (fx.y - f.y) / h, d = (fy.y - f.y) / h;
+    const double a = (fx.x - f.x) / h, b = (fy.x - f.x) / h, c = (fx.y - f.y) / h,
+                 d = (fy.y - f.y) / h;
     const double det = a * d - b * c;
     if (!(det > 1e-9)) return false;  // folded over: beyond the lens's own image
     p.x += (d * ex - b * ey) / det;
@@ -81,7 +83,8 @@ PixelGrid grid_from_fovy(int width, int height, double fovy_deg, bool orthograph
   return grid;
 }
 
-PixelGrid grid_from_sensor(int width, int height, const float focal_principal[4], const float sensor_size[2]) {
+PixelGrid grid_from_sensor(int width, int height, const float focal_principal[4],
+                           const float sensor_size[2]) {
   double sw = sensor_size[0], sh = sensor_size[1];
   const double aspect = static_cast<double>(width) / height;
   if (aspect > sw / sh) {
@@ -89,8 +92,10 @@ PixelGrid grid_from_sensor(int width, int height, const float focal_principal[4]
   } else {
     sw = sh * aspect;
   }
-  const double fx = focal_principal[0], fy = focal_principal[1], cx = focal_principal[2], cy = focal_principal[3];
-  return grid_from_window(width, height, -(sw / 2 - cx) / fx, (sw / 2 + cx) / fx, (sh / 2 - cy) / fy, -(sh / 2 + cy) / fy);
+  const double fx = focal_principal[0], fy = focal_principal[1], cx = focal_principal[2],
+               cy = focal_principal[3];
+  return grid_from_window(width, height, -(sw / 2 - cx) / fx, (sw / 2 + cx) / fx,
+                          (sh / 2 - cy) / fy, -(sh / 2 + cy) / fy);
 }
 
 PixelGrid grid_from_intrinsics(int width, int height, double fx, double fy, double cx, double cy) {
@@ -100,7 +105,8 @@ PixelGrid grid_from_intrinsics(int width, int height, double fx, double fy, doub
 PixelGrid grid_of_camera(const mjModel* model, int camera, int width, int height) {
   const float* size = model->cam_sensorsize + 2 * camera;
   const bool orthographic = model->cam_projection[camera] == mjPROJ_ORTHOGRAPHIC;
-  if (!orthographic && size[1] != 0) return grid_from_sensor(width, height, model->cam_intrinsic + 4 * camera, size);
+  if (!orthographic && size[1] != 0)
+    return grid_from_sensor(width, height, model->cam_intrinsic + 4 * camera, size);
   return grid_from_fovy(width, height, model->cam_fovy[camera], orthographic);
 }
 
@@ -108,7 +114,8 @@ std::array<float, 9> intrinsic_matrix(const PixelGrid& grid) {
   return {1 / grid.dx, 0, -grid.left / grid.dx, 0, -1 / grid.dy, -grid.top / grid.dy, 0, 0, 1};
 }
 
-std::vector<float> bent_rays(const PixelGrid& grid, Lens lens, std::span<const double> coefficients, const char* place) {
+std::vector<float> bent_rays(const PixelGrid& grid, Lens lens, std::span<const double> coefficients,
+                             const char* place) {
   std::vector<float> rays(static_cast<std::size_t>(grid.width) * grid.height * 2);
   for (int y = 0; y < grid.height; ++y) {
     for (int x = 0; x < grid.width; ++x) {
@@ -125,8 +132,9 @@ std::vector<float> bent_rays(const PixelGrid& grid, Lens lens, std::span<const d
         straight = {seen.x * scale, seen.y * scale};
       }
       if (!found)
-        throw ValueError(fmt::format("{}: the distortion has no inverse at pixel ({}, {}): the lens does not reach so far", place,
-                                     x, y));
+        throw ValueError(fmt::format(
+            "{}: the distortion has no inverse at pixel ({}, {}): the lens does not reach so far",
+            place, x, y));
       float* out = rays.data() + 2 * (static_cast<std::size_t>(y) * grid.width + x);
       out[0] = static_cast<float>(straight.x);
       out[1] = static_cast<float>(-straight.y);

@@ -14,11 +14,14 @@ namespace mjsense {
 // fovy of the image's height, square pixels. fovy_deg: degrees; orthographic: metres.
 PixelGrid grid_from_fovy(int width, int height, double fovy_deg, bool orthographic);
 
-// MuJoCo's physical camera: focal lengths, principal point and sensor size in one unit of length. If the image has another
-// aspect than the sensor, the sensor is shortened or narrowed around its centre.
-PixelGrid grid_from_sensor(int width, int height, const float focal_principal[4], const float sensor_size[2]);
+// MuJoCo's physical camera: focal lengths, principal point and sensor size in one unit of length.
+// If the image has another aspect than the sensor, the sensor is shortened or narrowed around its
+// centre.
+PixelGrid grid_from_sensor(int width, int height, const float focal_principal[4],
+                           const float sensor_size[2]);
 
-// Pixels: image point (u, v), v down, u = 0 the left border, sees along ((u - cx) / fx, (v - cy) / fy, 1), z forward.
+// Pixels: image point (u, v), v down, u = 0 the left border, sees along ((u - cx) / fx, (v - cy) /
+// fy, 1), z forward.
 PixelGrid grid_from_intrinsics(int width, int height, double fx, double fy, double cx, double cy);
 
 // The model's camera as MuJoCo renders it at width x height.
@@ -29,8 +32,10 @@ std::array<float, 9> intrinsic_matrix(const PixelGrid& grid);
 
 enum class Lens { kBrownConrady, kFisheye };
 
-// [H, W, 2] for PixelGrid::bent: where each pixel looks through a lens with these coefficients (CameraSensorCfg says how they are
-// meant). Throws ValueError, beginning with `place`, if the lens cannot be inverted over the image or sees 180 degrees.
-std::vector<float> bent_rays(const PixelGrid& grid, Lens lens, std::span<const double> coefficients, const char* place);
+// [H, W, 2] for PixelGrid::bent: where each pixel looks through a lens with these coefficients
+// (CameraSensorCfg says how they are meant). Throws ValueError, beginning with `place`, if the lens
+// cannot be inverted over the image or sees 180 degrees.
+std::vector<float> bent_rays(const PixelGrid& grid, Lens lens, std::span<const double> coefficients,
+                             const char* place);
 
 }  // namespace mjsense

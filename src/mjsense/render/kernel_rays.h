@@ -1,5 +1,6 @@
 #pragma once
-// Packets of 16 pixels against one geom. Part of the tile kernels: compiled once per instruction set.
+// Packets of 16 pixels against one geom. Part of the tile kernels: compiled once per instruction
+// set.
 
 #include <mujoco/mujoco.h>
 
@@ -22,9 +23,9 @@ struct alignas(64) Pixels {
 };
 
 struct alignas(64) Hits {
-  float t[kLanes];    // planar depth; infinity: nothing
-  int geom[kLanes];   // index into View::geoms; -1: nothing
-  int prim[kLanes];   // face of a mesh; side of a height field: -1
+  float t[kLanes];   // planar depth; infinity: nothing
+  int geom[kLanes];  // index into View::geoms; -1: nothing
+  int prim[kLanes];  // face of a mesh; side of a height field: -1
   float u[kLanes], v[kLanes];
   float n[3][kLanes];  // geom frame, any length: triangles only
 };
@@ -53,7 +54,8 @@ struct LocalRay {
 
 inline LocalRay pixel_ray(const ViewGeom& g, const PixelGrid& grid, Float x, Float y) {
   if (!grid.orthographic) return {splat(g.eye), to_geom(g.rot, {x, y, splat(-1.0f)})};
-  return {splat(g.eye) + to_geom(g.rot, {x, y, splat(0.0f)}), to_geom(g.rot, {splat(0.0f), splat(0.0f), splat(-1.0f)})};
+  return {splat(g.eye) + to_geom(g.rot, {x, y, splat(0.0f)}),
+          to_geom(g.rot, {splat(0.0f), splat(0.0f), splat(-1.0f)})};
 }
 
 // Where a line is inside a convex solid: enter <= exit, or infinity and minus infinity.
@@ -62,10 +64,12 @@ struct Interval {
 };
 
 inline Interval nothing() { return {splat(kInfinity), splat(-kInfinity)}; }
-inline Interval where(Mask m, Interval a) { return {select(m, a.enter, splat(kInfinity)), select(m, a.exit, splat(-kInfinity))}; }
+inline Interval where(Mask m, Interval a) {
+  return {select(m, a.enter, splat(kInfinity)), select(m, a.exit, splat(-kInfinity))};
+}
 
-// The distance of the line from the centre decides, not a difference of large squares: silhouettes of small far spheres stay
-// round in single precision.
+// The distance of the line from the centre decides, not a difference of large squares: silhouettes
+// of small far spheres stay round in single precision.
 inline Interval sphere(Vec3f o, Vec3f d, float radius) {
   const Float a = dot(d, d);
   const Float middle = -dot(o, d) / a;
@@ -90,9 +94,12 @@ inline Interval slab(Float o, Float inverse, Float low, Float high) {
 }
 
 inline Interval box(Vec3f o, Vec3f d, const float* center, const float* half) {
-  const Interval x = slab(o.x, safe_inverse(d.x), splat(center[0] - half[0]), splat(center[0] + half[0]));
-  const Interval y = slab(o.y, safe_inverse(d.y), splat(center[1] - half[1]), splat(center[1] + half[1]));
-  const Interval z = slab(o.z, safe_inverse(d.z), splat(center[2] - half[2]), splat(center[2] + half[2]));
+  const Interval x =
+      slab(o.x, safe_inverse(d.x), splat(center[0] - half[0]), splat(center[0] + half[0]));
+  const Interval y =
+      slab(o.y, safe_inverse(d.y), splat(center[1] - half[1]), splat(center[1] + half[1]));
+  const Interval z =
+      slab(o.z, safe_inverse(d.z), splat(center[2] - half[2]), splat(center[2] + half[2]));
   const Interval all{max(max(x.enter, y.enter), z.enter), min(min(x.exit, y.exit), z.exit)};
   return where(all.enter <= all.exit, all);
 }
@@ -118,18 +125,25 @@ inline Interval capsule(Vec3f o, Vec3f d, float radius, float half) {
   const Interval middle = cylinder(o, d, radius, half);
   const Interval top = sphere({o.x, o.y, o.z - splat(half)}, d, radius);
   const Interval bottom = sphere({o.x, o.y, o.z + splat(half)}, d, radius);
-  return {min(middle.enter, min(top.enter, bottom.enter)), max(middle.exit, max(top.exit, bottom.exit))};
+  return {min(middle.enter, min(top.enter, bottom.enter)),
+          max(middle.exit, max(top.exit, bottom.exit))};
 }
 
 inline Interval solid(const ViewGeom& g, Vec3f o, Vec3f d) {
   static constexpr float kOrigin[3] = {0, 0, 0};
   switch (g.type) {
-    case mjGEOM_SPHERE: return sphere(o, d, g.size[0]);
-    case mjGEOM_CAPSULE: return capsule(o, d, g.size[0], g.size[1]);
-    case mjGEOM_ELLIPSOID: return ellipsoid(o, d, g.size);
-    case mjGEOM_CYLINDER: return cylinder(o, d, g.size[0], g.size[1]);
-    case mjGEOM_BOX: return box(o, d, kOrigin, g.size);
-    default: return nothing();
+    case mjGEOM_SPHERE:
+      return sphere(o, d, g.size[0]);
+    case mjGEOM_CAPSULE:
+      return capsule(o, d, g.size[0], g.size[1]);
+    case mjGEOM_ELLIPSOID:
+      return ellipsoid(o, d, g.size);
+    case mjGEOM_CYLINDER:
+      return cylinder(o, d, g.size[0], g.size[1]);
+    case mjGEOM_BOX:
+      return box(o, d, kOrigin, g.size);
+    default:
+      return nothing();
   }
 }
 

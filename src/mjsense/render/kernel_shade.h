@@ -1,9 +1,10 @@
 #pragma once
-// From hits to colours: MuJoCo's classic light model (OpenGL's fixed function, evaluated at every pixel). Part of the tile
-// kernels.
+// From hits to colours: MuJoCo's classic light model (OpenGL's fixed function, evaluated at every
+// pixel). Part of the tile kernels.
 //
-//   base  = clamp(emission + sum of lights without shadow)        lights: attenuation * spot * (ambient + diffuse + specular)
-//   colour = texture * (base + sum over shadow-casting lights that are not barred of clamp(light))
+//   base  = clamp(emission + sum of lights without shadow)        lights: attenuation * spot *
+//   (ambient + diffuse + specular) colour = texture * (base + sum over shadow-casting lights that
+//   are not barred of clamp(light))
 
 #include "mjsense/render/kernel_texture.h"
 #include "mjsense/render/kernel_trace.h"
@@ -27,10 +28,14 @@ struct alignas(64) Colors {
 inline Float power(Float x, Float n) {
   const Float floor_x = max(x, splat(0.3f));
   const Float s = (floor_x - splat(1.0f)) / (floor_x + splat(1.0f)), s2 = s * s;
-  const Float log = splat(2.0f) * s * fma(s2, fma(s2, fma(s2, splat(1.0f / 7), splat(0.2f)), splat(1.0f / 3)), splat(1.0f));
-  Float y = max(fma(n * log, splat(1.0f / 256), splat(1.0f)), splat(0.0f));  // (1 + n log x / 256)^256
+  const Float log =
+      splat(2.0f) * s *
+      fma(s2, fma(s2, fma(s2, splat(1.0f / 7), splat(0.2f)), splat(1.0f / 3)), splat(1.0f));
+  Float y =
+      max(fma(n * log, splat(1.0f / 256), splat(1.0f)), splat(0.0f));  // (1 + n log x / 256)^256
   for (int i = 0; i < 8; ++i) y = y * y;
-  return select(splat(0.3f) <= x, y, select(n < splat(4.0f), x * y * splat(1.0f / 0.3f), splat(0.0f)));
+  return select(splat(0.3f) <= x, y,
+                select(n < splat(4.0f), x * y * splat(1.0f / 0.3f), splat(0.0f)));
 }
 
 inline float inverse_length(const float* v) {
@@ -42,7 +47,8 @@ inline float inverse_length(const float* v) {
 inline Vec3f primitive_normal(const ViewGeom& g, Vec3f p) {
   const Float zero = splat(0.0f), one = splat(1.0f);
   switch (g.type) {
-    case mjGEOM_SPHERE: return {p.x, p.y, p.z};
+    case mjGEOM_SPHERE:
+      return {p.x, p.y, p.z};
     case mjGEOM_ELLIPSOID:
       return {p.x * splat(1 / (g.size[0] * g.size[0])), p.y * splat(1 / (g.size[1] * g.size[1])),
               p.z * splat(1 / (g.size[2] * g.size[2]))};
@@ -53,21 +59,26 @@ inline Vec3f primitive_normal(const ViewGeom& g, Vec3f p) {
     case mjGEOM_CYLINDER: {
       const Float ring = sqrt(fma(p.x, p.x, p.y * p.y)) * splat(1 / g.size[0]);
       const Mask end = abs(p.z) * splat(1 / g.size[1]) > ring;
-      return {select(end, zero, p.x), select(end, zero, p.y), select(end, select(p.z < zero, -one, one), zero)};
+      return {select(end, zero, p.x), select(end, zero, p.y),
+              select(end, select(p.z < zero, -one, one), zero)};
     }
     case mjGEOM_BOX: {
-      const Float x = p.x * splat(1 / g.size[0]), y = p.y * splat(1 / g.size[1]), z = p.z * splat(1 / g.size[2]);
+      const Float x = p.x * splat(1 / g.size[0]), y = p.y * splat(1 / g.size[1]),
+                  z = p.z * splat(1 / g.size[2]);
       const Float ax = abs(x), ay = abs(y), az = abs(z);
       const Mask is_x = (ax >= ay) & (ax >= az), not_z = is_x | (ay >= az);
-      return {select(is_x, x, zero), select(is_x, zero, select(not_z, y, zero)), select(not_z, zero, z)};
+      return {select(is_x, x, zero), select(is_x, zero, select(not_z, y, zero)),
+              select(not_z, zero, z)};
     }
-    default: return {zero, zero, one};
+    default:
+      return {zero, zero, one};
   }
 }
 
 // Texture of lane i, by the pixel's footprint on the tangent plane.
-inline Color lane_texture(const View& view, const ViewGeom& g, const Pixels& pixels, const Hits& hits, int i, const float* p,
-                          const float* n_local, const float* n) {
+inline Color lane_texture(const View& view, const ViewGeom& g, const Pixels& pixels,
+                          const Hits& hits, int i, const float* p, const float* n_local,
+                          const float* n) {
   const Surface& s = g.surface;
   const Texture& texture = *s.texture;
   const bool ortho = view.grid.orthographic;
@@ -80,10 +91,14 @@ inline Color lane_texture(const View& view, const ViewGeom& g, const Pixels& pix
     const float slope = nd < -1e-4f ? n[a] / nd : -n[a] * 1e4f;
     float w[3];
     for (int k = 0; k < 3; ++k) w[k] = size * ((k == a ? 1.0f : 0.0f) - d[k] * slope);
-    for (int k = 0; k < 3; ++k) step[a][k] = g.rot[k] * w[0] + g.rot[3 + k] * w[1] + g.rot[6 + k] * w[2];
+    for (int k = 0; k < 3; ++k)
+      step[a][k] = g.rot[k] * w[0] + g.rot[3 + k] * w[1] + g.rot[6 + k] * w[2];
   }
-  const auto norm = [](const float* v) { return __builtin_sqrtf(v[0] * v[0] + v[1] * v[1] + v[2] * v[2]); };
-  const float width = static_cast<float>(texture.level[0].width), height = static_cast<float>(texture.level[0].height);
+  const auto norm = [](const float* v) {
+    return __builtin_sqrtf(v[0] * v[0] + v[1] * v[1] + v[2] * v[2]);
+  };
+  const float width = static_cast<float>(texture.level[0].width),
+              height = static_cast<float>(texture.level[0].height);
   const float length = norm(step[0]) > norm(step[1]) ? norm(step[0]) : norm(step[1]);
   if (texture.cube) {
     const float x = p[0] * s.stretch[0], y = p[1] * s.stretch[1], z = p[2] * s.stretch[2];
@@ -97,7 +112,8 @@ inline Color lane_texture(const View& view, const ViewGeom& g, const Pixels& pix
     const float b1 = hits.u[i], b2 = hits.v[i], b0 = 1 - b1 - b2;
     const float u = b0 * uv[0] + b1 * uv[2] + b2 * uv[4], v = b0 * uv[1] + b1 * uv[3] + b2 * uv[5];
     const float most = width > height ? width : height;
-    return sample(texture, 0, u * s.repeat[0], v * s.repeat[1], length * most * g.mesh->density[hits.prim[i]]);
+    return sample(texture, 0, u * s.repeat[0] + s.shift[0], v * s.repeat[1] + s.shift[1],
+                  length * most * g.mesh->density[hits.prim[i]]);
   }
   float u, v, ku, kv;
   primitive_uv(g, p, n_local, u, v, ku, kv);
@@ -112,11 +128,12 @@ inline Color lane_texture(const View& view, const ViewGeom& g, const Pixels& pix
     }
     footprint = __builtin_sqrtf(most);
   }
-  return sample(texture, 0, u * s.repeat[0], v * s.repeat[1], footprint);
+  return sample(texture, 0, u * s.repeat[0] + s.shift[0], v * s.repeat[1] + s.shift[1], footprint);
 }
 
 // Normals of triangles: interpolated where the mesh has them, else the face's own.
-inline void triangle_normals(const ViewGeom& g, const Hits& hits, std::uint32_t lanes, float (*n)[kLanes]) {
+inline void triangle_normals(const ViewGeom& g, const Hits& hits, std::uint32_t lanes,
+                             float (*n)[kLanes]) {
   for (int i = 0; i < kLanes; ++i) {
     if (!(lanes >> i & 1u)) continue;
     float local[3] = {hits.n[0][i], hits.n[1][i], hits.n[2][i]};
@@ -130,8 +147,8 @@ inline void triangle_normals(const ViewGeom& g, const Hits& hits, std::uint32_t 
 }
 
 // Points, normals (unit, camera frame) and materials of `lanes`. `color`: also what only rgb needs.
-inline void gather_surfaces(const View& view, const Pixels& pixels, const Hits& hits, std::uint32_t lanes, bool color,
-                            Surfaces& out) {
+inline void gather_surfaces(const View& view, const Pixels& pixels, const Hits& hits,
+                            std::uint32_t lanes, bool color, Surfaces& out) {
   const bool ortho = view.grid.orthographic;
   for (int k = 0; k < kLanes; k += kWidth) {
     const Float t = load(hits.t + k), x = load(pixels.x + k), y = load(pixels.y + k);
@@ -154,7 +171,8 @@ inline void gather_surfaces(const View& view, const Pixels& pixels, const Hits& 
       if (!any(m)) continue;
       const Vec3f p{load(out.p[0] + k), load(out.p[1] + k), load(out.p[2] + k)};
       const Vec3f q = to_geom(g.rot, p - splat(g.pos));
-      Vec3f n = g.bvh ? Vec3f{load(normal[0] + k), load(normal[1] + k), load(normal[2] + k)} : primitive_normal(g, q);
+      Vec3f n = g.bvh ? Vec3f{load(normal[0] + k), load(normal[1] + k), load(normal[2] + k)}
+                      : primitive_normal(g, q);
       const Float inverse = splat(1.0f) / sqrt(max(dot(n, n), splat(1e-30f)));
       n = {n.x * inverse, n.y * inverse, n.z * inverse};
       store(local[0] + k, q.x);
@@ -199,13 +217,14 @@ struct Casters {
 };
 
 struct LightTerm {
-  Float scale;       // attenuation * spot
-  Float diffuse;     // N L
-  Float specular;    // (N H)^exponent
-  Vec3f to_light;     // not normalised
+  Float scale;     // attenuation * spot
+  Float diffuse;   // N L
+  Float specular;  // (N H)^exponent
+  Vec3f to_light;  // not normalised
 };
 
-inline LightTerm light_term(const ViewLight& light, bool ortho, Vec3f p, Vec3f n, Float exponent, bool shiny) {
+inline LightTerm light_term(const ViewLight& light, bool ortho, Vec3f p, Vec3f n, Float exponent,
+                            bool shiny) {
   const Float zero = splat(0.0f), one = splat(1.0f);
   LightTerm out;
   Vec3f l;
@@ -219,7 +238,8 @@ inline LightTerm light_term(const ViewLight& light, bool ortho, Vec3f p, Vec3f n
     const Float inverse = one / distance;
     l = {out.to_light.x * inverse, out.to_light.y * inverse, out.to_light.z * inverse};
     const float* a = light.attenuation;
-    out.scale = one / max(fma(fma(splat(a[2]), distance, splat(a[1])), distance, splat(a[0])), splat(1e-6f));
+    out.scale = one / max(fma(fma(splat(a[2]), distance, splat(a[1])), distance, splat(a[0])),
+                          splat(1e-6f));
     if (light.kind == LightKind::kSpot) {
       const Float cosine = -dot(l, splat(light.dir));
       Float spot = one;
@@ -243,14 +263,16 @@ inline LightTerm light_term(const ViewLight& light, bool ortho, Vec3f p, Vec3f n
   return out;
 }
 
-// Adds one light's contribution to `sum`, for lanes that are not in `dark`; clamped to 1 by itself if `separate`.
-inline void add_light(const View& view, const ViewLight& light, const Surfaces& s, std::uint32_t dark, bool separate,
-                      Colors& sum) {
+// Adds one light's contribution to `sum`, for lanes that are not in `dark`; clamped to 1 by itself
+// if `separate`.
+inline void add_light(const View& view, const ViewLight& light, const Surfaces& s,
+                      std::uint32_t dark, bool separate, Colors& sum) {
   const bool shiny = light.specular[0] + light.specular[1] + light.specular[2] > 0;
   for (int k = 0; k < kLanes; k += kWidth) {
     const Vec3f p{load(s.p[0] + k), load(s.p[1] + k), load(s.p[2] + k)};
     const Vec3f n{load(s.n[0] + k), load(s.n[1] + k), load(s.n[2] + k)};
-    const LightTerm term = light_term(light, view.grid.orthographic, p, n, load(s.exponent + k), shiny);
+    const LightTerm term =
+        light_term(light, view.grid.orthographic, p, n, load(s.exponent + k), shiny);
     const Float gloss = term.specular * load(s.specular + k);
     const Float scale = select(mask_of(dark >> k & kAllLanes), splat(0.0f), term.scale);
     for (int c = 0; c < 3; ++c) {
@@ -263,8 +285,8 @@ inline void add_light(const View& view, const ViewLight& light, const Surfaces& 
 }
 
 // Lanes that do not get the light: barred by a geom, or turned away.
-inline std::uint32_t dark_lanes(const View& view, const ViewLight& light, const Surfaces& s, const Hits& hits,
-                                std::uint32_t lanes, Casters casters) {
+inline std::uint32_t dark_lanes(const View& view, const ViewLight& light, const Surfaces& s,
+                                const Hits& hits, std::uint32_t lanes, Casters casters) {
   LightRays rays;
   std::uint32_t facing = 0;
   for (int k = 0; k < kLanes; k += kWidth) {
@@ -301,8 +323,8 @@ inline std::uint32_t dark_lanes(const View& view, const ViewLight& light, const 
 }
 
 // Colours 0..1 of `lanes`. `casters` by light; null: no light casts shadows here.
-inline void shade(const View& view, const Surfaces& s, const Hits& hits, std::uint32_t lanes, const Casters* casters,
-                  Colors& out) {
+inline void shade(const View& view, const Surfaces& s, const Hits& hits, std::uint32_t lanes,
+                  const Casters* casters, Colors& out) {
   Colors separate = {};
   for (int c = 0; c < 3; ++c)
     for (int k = 0; k < kLanes; k += kWidth) {

@@ -1,5 +1,6 @@
 #pragma once
-// Texture coordinates and filtering as OpenGL does them: bilinear, between two levels of the pyramid. Part of the tile kernels.
+// Texture coordinates and filtering as OpenGL does them: bilinear, between two levels of the
+// pyramid. Part of the tile kernels.
 
 #include "mjsense/render/kernel_rays.h"
 
@@ -12,7 +13,8 @@ struct Color {
 
 inline Color texel(const MipLevel& level, int offset, int x, int y) {
   const std::uint32_t t = level.texels[offset + y * level.width + x];
-  return {static_cast<float>(t & 255u), static_cast<float>(t >> 8 & 255u), static_cast<float>(t >> 16 & 255u)};
+  return {static_cast<float>(t & 255u), static_cast<float>(t >> 8 & 255u),
+          static_cast<float>(t >> 16 & 255u)};
 }
 
 inline Color mix(Color a, Color b, float f) {
@@ -68,7 +70,8 @@ inline Color sample(const Texture& texture, int face, float s, float t, float fo
   const float f = lod - a;
   const auto at = [&](int n) {
     const MipLevel& level = texture.level[n];
-    return bilinear(level, face * level.width * level.height, s * level.width - 0.5f, t * level.height - 0.5f, !texture.cube);
+    return bilinear(level, face * level.width * level.height, s * level.width - 0.5f,
+                    t * level.height - 0.5f, !texture.cube);
   };
   const Color near = at(a);
   return f > 0.01f && a < last ? mix(near, at(a + 1), f) : near;
@@ -101,14 +104,16 @@ inline Color sample_cube(const Texture& texture, float x, float y, float z, floa
 
 constexpr float kPi = 3.14159265358979f;
 
-// Coordinates of MuJoCo's primitives: p on the surface, geom frame. `per_meter`: how fast they change, at most.
-inline void primitive_uv(const ViewGeom& g, const float* p, const float* n, float& u, float& v, float& per_meter_u,
-                         float& per_meter_v) {
+// Coordinates of MuJoCo's primitives: p on the surface, geom frame. `per_meter`: how fast they
+// change, at most.
+inline void primitive_uv(const ViewGeom& g, const float* p, const float* n, float& u, float& v,
+                         float& per_meter_u, float& per_meter_v) {
   const float* s = g.size;
   switch (g.type) {
     case mjGEOM_PLANE:
     case mjGEOM_HFIELD: {
-      const float sx = g.height_field ? g.height_field->size[0] : s[0], sy = g.height_field ? g.height_field->size[1] : s[1];
+      const float sx = g.height_field ? g.height_field->size[0] : s[0],
+                  sy = g.height_field ? g.height_field->size[1] : s[1];
       u = sx > 0 ? 0.5f * (p[0] / sx + 1) : 0.5f * p[0];
       v = sy > 0 ? 0.5f * (1 - p[1] / sy) : -0.5f * p[1];
       per_meter_u = sx > 0 ? 0.5f / sx : 0.5f;
@@ -124,7 +129,8 @@ inline void primitive_uv(const ViewGeom& g, const float* p, const float* n, floa
       per_meter_v = 0.5f / s[b];
       return;
     }
-    default: break;
+    default:
+      break;
   }
   const bool ball = g.type == mjGEOM_SPHERE || g.type == mjGEOM_ELLIPSOID;
   const float sx = s[0], sy = g.type == mjGEOM_ELLIPSOID ? s[1] : s[0];

@@ -1,20 +1,22 @@
 #pragma once
-// A tile of 16 x 16 pixels: which geoms it can see, what each pixel sees, what colour that is. Part of the tile kernels.
+// A tile of 16 x 16 pixels: which geoms it can see, what each pixel sees, what colour that is. Part
+// of the tile kernels.
 
 #include "mjsense/render/kernel_shade.h"
 
 namespace mjsense {
 namespace {
 
-constexpr int kPackets = kTileSize / 4;     // along a side
-constexpr int kMaxLayers = 8;               // of transparent geoms over one packet
+constexpr int kPackets = kTileSize / 4;  // along a side
+constexpr int kMaxLayers = 8;            // of transparent geoms over one packet
 
 struct TileHits {
   Pixels pixels[kPackets * kPackets];
   Hits opaque[kPackets * kPackets];
 };
 
-inline void fill_pixels(const PixelGrid& grid, int x0, int y0, float shift_x, float shift_y, Pixels& out) {
+inline void fill_pixels(const PixelGrid& grid, int x0, int y0, float shift_x, float shift_y,
+                        Pixels& out) {
   float* w = out.window;
   w[0] = w[2] = kInfinity;
   w[1] = w[3] = -kInfinity;
@@ -40,7 +42,8 @@ inline void fill_pixels(const PixelGrid& grid, int x0, int y0, float shift_x, fl
 }
 
 // Casters for every shadow-casting light, for the points that the tile sees.
-inline void find_casters(const View& view, const TileHits& tile, int packets, TileScratch& scratch, Casters* out) {
+inline void find_casters(const View& view, const TileHits& tile, int packets, TileScratch& scratch,
+                         Casters* out) {
   LightRays around;
   float low[3] = {kInfinity, kInfinity, kInfinity}, high[3] = {-kInfinity, -kInfinity, -kInfinity};
   for (int q = 0; q < packets; ++q) {
@@ -70,14 +73,16 @@ inline void find_casters(const View& view, const TileHits& tile, int packets, Ti
     const bool directional = light.kind == LightKind::kDirectional;
     around.end = directional ? kInfinity : 1.0f;
     float axis[3];
-    for (int c = 0; c < 3; ++c) axis[c] = directional ? -light.dir[c] : light.pos[c] - around.center[c];
+    for (int c = 0; c < 3; ++c)
+      axis[c] = directional ? -light.dir[c] : light.pos[c] - around.center[c];
     for (int g = 0; g < view.num_geoms; ++g)
       if (in_shaft(around, axis, view.geoms[g])) next[out[i].count++] = g;
     next += out[i].count;
   }
 }
 
-inline void shade_background(const View& view, const Pixels& pixels, std::uint32_t lanes, Colors& out) {
+inline void shade_background(const View& view, const Pixels& pixels, std::uint32_t lanes,
+                             Colors& out) {
   for (int i = 0; i < kLanes; ++i) {
     if (!(lanes >> i & 1u)) continue;
     Color color = {0, 0, 0};
@@ -85,9 +90,11 @@ inline void shade_background(const View& view, const Pixels& pixels, std::uint32
       const bool ortho = view.grid.orthographic;
       const float d[3] = {ortho ? 0 : pixels.x[i], ortho ? 0 : pixels.y[i], -1};
       float w[3];
-      for (int r = 0; r < 3; ++r) w[r] = view.r_wc[3 * r] * d[0] + view.r_wc[3 * r + 1] * d[1] + view.r_wc[3 * r + 2] * d[2];
+      for (int r = 0; r < 3; ++r)
+        w[r] = view.r_wc[3 * r] * d[0] + view.r_wc[3 * r + 1] * d[1] + view.r_wc[3 * r + 2] * d[2];
       const float step = view.grid.dx < 0 ? -view.grid.dx : view.grid.dx;
-      color = sample_cube(*view.skybox, w[0], w[2], -w[1], 0.5f * step * view.skybox->level[0].width);
+      color =
+          sample_cube(*view.skybox, w[0], w[2], -w[1], 0.5f * step * view.skybox->level[0].width);
     }
     out.rgb[0][i] = color.r * (1.0f / 255);
     out.rgb[1][i] = color.g * (1.0f / 255);
@@ -117,8 +124,8 @@ inline void blend(const Layer& layer, Colors& out) {
 }
 
 // MuJoCo draws transparent geoms twice, near to far and back, each time over what is there.
-inline void shade_transparent(const View& view, const int* list, int count, const Pixels& pixels, const Hits& opaque,
-                              Colors& out) {
+inline void shade_transparent(const View& view, const int* list, int count, const Pixels& pixels,
+                              const Hits& opaque, Colors& out) {
   Layer layers[kMaxLayers];
   int used = 0;
   for (int i = 0; i < count && used < kMaxLayers; ++i) {
@@ -140,8 +147,10 @@ inline void shade_transparent(const View& view, const int* list, int count, cons
 
 inline std::uint8_t byte(float x) { return static_cast<std::uint8_t>(x * 255.0f + 0.5f); }
 
-// Nearest of opaque and transparent geoms: what depth and segmentation see. A plane seen from behind is not there.
-inline void first_hits(const View& view, const int* list, int count, const Pixels& pixels, Hits& hits) {
+// Nearest of opaque and transparent geoms: what depth and segmentation see. A plane seen from
+// behind is not there.
+inline void first_hits(const View& view, const int* list, int count, const Pixels& pixels,
+                       Hits& hits) {
   for (int i = 0; i < count; ++i) {
     const ViewGeom& g = view.geoms[list[i]];
     if (g.type == mjGEOM_PLANE && g.behind) continue;
@@ -149,8 +158,8 @@ inline void first_hits(const View& view, const int* list, int count, const Pixel
   }
 }
 
-inline void write_geometry(const View& view, const ImageTargets& targets, int x0, int y0, const Pixels& pixels,
-                           const Hits& hits) {
+inline void write_geometry(const View& view, const ImageTargets& targets, int x0, int y0,
+                           const Pixels& pixels, const Hits& hits) {
   Surfaces surfaces;
   if (targets.normals) {
     __builtin_memset(surfaces.n, 0, sizeof surfaces.n);
@@ -164,7 +173,8 @@ inline void write_geometry(const View& view, const ImageTargets& targets, int x0
     const bool hit = hits.geom[i] >= 0;
     const float px = pixels.x[i], py = pixels.y[i], t = hits.t[i];
     if (targets.depth) {
-      const float length = grid.orthographic || !targets.ray_depth ? 1.0f : __builtin_sqrtf(px * px + py * py + 1);
+      const float length =
+          grid.orthographic || !targets.ray_depth ? 1.0f : __builtin_sqrtf(px * px + py * py + 1);
       targets.depth[at] = hit ? t * length : 0;
     }
     if (targets.segmentation) {
@@ -210,7 +220,8 @@ inline void sample_shift(int index, int samples, float& x, float& y) {
   y = radical + 0.5f / samples - 0.5f;
 }
 
-inline void render_tile(const View& view, const ImageTargets& targets, int tx, int ty, TileScratch& scratch) {
+inline void render_tile(const View& view, const ImageTargets& targets, int tx, int ty,
+                        TileScratch& scratch) {
   TileHits& tile = *static_cast<TileHits*>(scratch.hits);
   const PixelGrid& grid = view.grid;
   const int x0 = tx * kTileSize, y0 = ty * kTileSize;
@@ -221,14 +232,16 @@ inline void render_tile(const View& view, const ImageTargets& targets, int tx, i
   const float far = view.far > 0 ? view.far : kInfinity;
   const int samples = targets.rgb ? targets.samples : 1;
   float sum[kPackets * kPackets][3][kLanes];
-  for (int sample = 0; sample < samples || (sample == samples && samples > 1 && geometry); ++sample) {
+  for (int sample = 0; sample < samples || (sample == samples && samples > 1 && geometry);
+       ++sample) {
     // The last round, if there is one, is for depth and segmentation: through pixel centres.
     const bool centered = sample == samples || samples == 1;
     float shift_x = 0, shift_y = 0;
     if (!centered) sample_shift(sample, samples, shift_x, shift_y);
     float window[4] = {kInfinity, -kInfinity, kInfinity, -kInfinity};
     for (int q = 0; q < packets; ++q) {
-      fill_pixels(grid, x0 + 4 * (q % across), y0 + 4 * (q / across), shift_x, shift_y, tile.pixels[q]);
+      fill_pixels(grid, x0 + 4 * (q % across), y0 + 4 * (q / across), shift_x, shift_y,
+                  tile.pixels[q]);
       const float* w = tile.pixels[q].window;
       for (int c = 0; c < 4; c += 2) {
         window[c] = w[c] < window[c] ? w[c] : window[c];
@@ -254,15 +267,20 @@ inline void render_tile(const View& view, const ImageTargets& targets, int tx, i
           shade(view, surfaces, hits, lanes, shadows ? casters : nullptr, colors);
         }
         if (lanes != 0xffffu) shade_background(view, tile.pixels[q], ~lanes & 0xffffu, colors);
-        if (lists.transparent) shade_transparent(view, scratch.transparent, lists.transparent, tile.pixels[q], hits, colors);
+        if (lists.transparent)
+          shade_transparent(view, scratch.transparent, lists.transparent, tile.pixels[q], hits,
+                            colors);
         for (int c = 0; c < 3; ++c)
-          for (int i = 0; i < kLanes; ++i) sum[q][c][i] = sample == 0 ? colors.rgb[c][i] : sum[q][c][i] + colors.rgb[c][i];
+          for (int i = 0; i < kLanes; ++i)
+            sum[q][c][i] = sample == 0 ? colors.rgb[c][i] : sum[q][c][i] + colors.rgb[c][i];
       }
     }
     if (geometry && centered) {
       for (int q = 0; q < packets; ++q) {
-        if (lists.transparent) first_hits(view, scratch.transparent, lists.transparent, tile.pixels[q], tile.opaque[q]);
-        write_geometry(view, targets, x0 + 4 * (q % across), y0 + 4 * (q / across), tile.pixels[q], tile.opaque[q]);
+        if (lists.transparent)
+          first_hits(view, scratch.transparent, lists.transparent, tile.pixels[q], tile.opaque[q]);
+        write_geometry(view, targets, x0 + 4 * (q % across), y0 + 4 * (q / across), tile.pixels[q],
+                       tile.opaque[q]);
       }
     }
   }
@@ -277,7 +295,8 @@ inline void render_tile(const View& view, const ImageTargets& targets, int tx, i
     }
 }
 
-inline void render_tiles(const View& view, const ImageTargets& targets, int first, int last, TileScratch& scratch) {
+inline void render_tiles(const View& view, const ImageTargets& targets, int first, int last,
+                         TileScratch& scratch) {
   const int across = (view.grid.width + kTileSize - 1) / kTileSize;
   for (int ty = first; ty < last; ++ty)
     for (int tx = 0; tx < across; ++tx) render_tile(view, targets, tx, ty, scratch);

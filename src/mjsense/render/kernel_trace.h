@@ -1,5 +1,6 @@
 #pragma once
-// Which geom each pixel of a packet sees first, and what lies between a point and a light. Part of the tile kernels.
+// Which geom each pixel of a packet sees first, and what lies between a point and a light. Part of
+// the tile kernels.
 
 #include "mjsense/render/kernel_rays.h"
 
@@ -20,9 +21,10 @@ inline float highest(const float* values) {
   return best;
 }
 
-// Lanes whose ray meets the geom's bounding box before t, as Embree takes them; false if there are none.
-inline bool fill_rays(const ViewGeom& g, const PixelGrid& grid, const Pixels& pixels, float near, const float* t,
-                      RTCRayHit16& rays, int* valid) {
+// Lanes whose ray meets the geom's bounding box before t, as Embree takes them; false if there are
+// none.
+inline bool fill_rays(const ViewGeom& g, const PixelGrid& grid, const Pixels& pixels, float near,
+                      const float* t, RTCRayHit16& rays, int* valid) {
   std::uint32_t some = 0;
   for (int k = 0; k < kLanes; k += kWidth) {
     const LocalRay ray = pixel_ray(g, grid, load(pixels.x + k), load(pixels.y + k));
@@ -48,8 +50,8 @@ inline bool fill_rays(const ViewGeom& g, const PixelGrid& grid, const Pixels& pi
   return some != 0;
 }
 
-inline void trace_triangles(const ViewGeom& g, int index, const PixelGrid& grid, const Pixels& pixels, float near,
-                            Hits& hits) {
+inline void trace_triangles(const ViewGeom& g, int index, const PixelGrid& grid,
+                            const Pixels& pixels, float near, Hits& hits) {
   RTCRayHit16 rays;
   alignas(64) int valid[kLanes];
   if (!fill_rays(g, grid, pixels, near, hits.t, rays, valid)) return;
@@ -61,7 +63,8 @@ inline void trace_triangles(const ViewGeom& g, int index, const PixelGrid& grid,
     if (!any(hit)) continue;
     store(hits.t + k, select(hit, t, before));
     store(hits.geom + k, select(hit, int_of(index), load(hits.geom + k)));
-    store(hits.prim + k, select(hit, load(reinterpret_cast<int*>(rays.hit.primID) + k), load(hits.prim + k)));
+    store(hits.prim + k,
+          select(hit, load(reinterpret_cast<int*>(rays.hit.primID) + k), load(hits.prim + k)));
     store(hits.u + k, select(hit, load(rays.hit.u + k), load(hits.u + k)));
     store(hits.v + k, select(hit, load(rays.hit.v + k), load(hits.v + k)));
     store(hits.n[0] + k, select(hit, load(rays.hit.Ng_x + k), load(hits.n[0] + k)));
@@ -71,14 +74,16 @@ inline void trace_triangles(const ViewGeom& g, int index, const PixelGrid& grid,
 }
 
 // Side walls and base of a height field, from outside. Few rays meet them: one lane at a time.
-inline void trace_walls(const ViewGeom& g, int index, const PixelGrid& grid, const Pixels& pixels, float near, Hits& hits) {
+inline void trace_walls(const ViewGeom& g, int index, const PixelGrid& grid, const Pixels& pixels,
+                        float near, Hits& hits) {
   const HeightField& f = *g.height_field;
   const float center[3] = {0, 0, 0.5f * (f.size[2] - f.size[3])};
   const float half[3] = {f.size[0], f.size[1], 0.5f * (f.size[2] + f.size[3])};
   for (int k = 0; k < kLanes; k += kWidth) {
     const LocalRay ray = pixel_ray(g, grid, load(pixels.x + k), load(pixels.y + k));
     const Interval inside = box(ray.o, ray.d, center, half);
-    const Mask hit = (inside.enter < load(hits.t + k)) & (splat(near) < inside.enter) & (inside.enter <= inside.exit);
+    const Mask hit = (inside.enter < load(hits.t + k)) & (splat(near) < inside.enter) &
+                     (inside.enter <= inside.exit);
     const std::uint32_t lanes = bits(hit);
     if (!lanes) continue;
     alignas(64) float t[kWidth], p[3][kWidth];
@@ -116,7 +121,8 @@ inline void trace_geom(const View& view, int index, const Pixels& pixels, Hits& 
   }
   for (int k = 0; k < kLanes; k += kWidth) {
     const LocalRay ray = pixel_ray(g, view.grid, load(pixels.x + k), load(pixels.y + k));
-    const Float t = g.type == mjGEOM_PLANE ? plane(g, ray.o, ray.d, g.behind) : solid(g, ray.o, ray.d).enter;
+    const Float t =
+        g.type == mjGEOM_PLANE ? plane(g, ray.o, ray.d, g.behind) : solid(g, ray.o, ray.d).enter;
     const Float before = load(hits.t + k);
     const Mask hit = (t < before) & (splat(view.near) < t);
     if (!any(hit)) continue;
@@ -135,7 +141,8 @@ inline void clear(Hits& hits, float far) {
 }
 
 // The nearest opaque geoms among `list`, which is sorted by ViewGeom::nearest.
-inline void trace_packet(const View& view, const int* list, int count, const Pixels& pixels, Hits& hits) {
+inline void trace_packet(const View& view, const int* list, int count, const Pixels& pixels,
+                         Hits& hits) {
   float farthest = highest(hits.t);
   for (int i = 0; i < count; ++i) {
     const ViewGeom& g = view.geoms[list[i]];
@@ -157,7 +164,8 @@ struct alignas(64) LightRays {
 // Can anything within `radius` around `center` lie between the packet's points and the light?
 inline bool in_shaft(const LightRays& rays, const float* axis, const ViewGeom& g) {
   if (g.type == mjGEOM_PLANE) return true;
-  const float v[3] = {g.center[0] - rays.center[0], g.center[1] - rays.center[1], g.center[2] - rays.center[2]};
+  const float v[3] = {g.center[0] - rays.center[0], g.center[1] - rays.center[1],
+                      g.center[2] - rays.center[2]};
   const float length2 = axis[0] * axis[0] + axis[1] * axis[1] + axis[2] * axis[2];
   float s = (v[0] * axis[0] + v[1] * axis[1] + v[2] * axis[2]) / length2;
   s = s < 0 ? 0 : s > rays.end ? rays.end : s;
@@ -166,7 +174,8 @@ inline bool in_shaft(const LightRays& rays, const float* axis, const ViewGeom& g
   return w[0] * w[0] + w[1] * w[1] + w[2] * w[2] <= reach * reach;
 }
 
-inline std::uint32_t shadow_of_triangles(const ViewGeom& g, int index, const LightRays& rays, std::uint32_t active) {
+inline std::uint32_t shadow_of_triangles(const ViewGeom& g, int index, const LightRays& rays,
+                                         std::uint32_t active) {
   RTCRay16 ray;
   alignas(64) int valid[kLanes];
   std::uint32_t some = 0;
@@ -181,7 +190,8 @@ inline std::uint32_t shadow_of_triangles(const ViewGeom& g, int index, const Lig
     const Float lift = select(other, splat(0.0f), splat(1e-4f) * max(splat(g.radius), abs(p.z)));
     o = along(o, lift, n);
     const Interval inside = box(o, d, g.box, g.box + 3);
-    const Mask hit = mask_of(active >> k & kAllLanes) & (inside.enter < splat(rays.end)) & (inside.exit > splat(0.0f));
+    const Mask hit = mask_of(active >> k & kAllLanes) & (inside.enter < splat(rays.end)) &
+                     (inside.exit > splat(0.0f));
     some |= bits(hit);
     store(valid + k, select(hit, int_of(-1), int_of(0)));
     store(ray.org_x + k, o.x);
@@ -205,8 +215,8 @@ inline std::uint32_t shadow_of_triangles(const ViewGeom& g, int index, const Lig
 }
 
 // Lanes of `active` whose way to the light is barred by one of `casters`.
-inline std::uint32_t in_shadow(const View& view, const int* casters, int count, const LightRays& rays, const float* axis,
-                               std::uint32_t active) {
+inline std::uint32_t in_shadow(const View& view, const int* casters, int count,
+                               const LightRays& rays, const float* axis, std::uint32_t active) {
   std::uint32_t dark = 0;
   for (int i = 0; i < count && active; ++i) {
     const ViewGeom& g = view.geoms[casters[i]];
@@ -220,7 +230,8 @@ inline std::uint32_t in_shadow(const View& view, const int* casters, int count, 
         if (!lanes) continue;
         const Vec3f p{load(rays.p[0] + k), load(rays.p[1] + k), load(rays.p[2] + k)};
         const Vec3f o = to_geom(g.rot, p - splat(g.pos));
-        const Vec3f d = to_geom(g.rot, {load(rays.d[0] + k), load(rays.d[1] + k), load(rays.d[2] + k)});
+        const Vec3f d =
+            to_geom(g.rot, {load(rays.d[0] + k), load(rays.d[1] + k), load(rays.d[2] + k)});
         const Int at = load(rays.geom + k), self = int_of(casters[i]);
         const Mask other = less(at, self) | less(self, at);
         Mask barred;

@@ -6,7 +6,8 @@
 namespace mjsense {
 namespace {
 
-// Vertex normals that turn away from their face by more than this cosine belong to a crease: MuJoCo shades it flat.
+// Vertex normals that turn away from their face by more than this cosine belong to a crease: MuJoCo
+// shades it flat.
 constexpr float kCrease = 0.8f;
 
 std::uint8_t linear_from_srgb(std::uint8_t value) {
@@ -25,7 +26,8 @@ std::uint32_t pack(const std::uint32_t (&sum)[4], std::uint32_t n) {
 float cross(const float* a, const float* b, const float* c, float* out) {
   const float e1[3] = {b[0] - a[0], b[1] - a[1], b[2] - a[2]};
   const float e2[3] = {c[0] - a[0], c[1] - a[1], c[2] - a[2]};
-  for (int i = 0; i < 3; ++i) out[i] = e1[(i + 1) % 3] * e2[(i + 2) % 3] - e1[(i + 2) % 3] * e2[(i + 1) % 3];
+  for (int i = 0; i < 3; ++i)
+    out[i] = e1[(i + 1) % 3] * e2[(i + 2) % 3] - e1[(i + 2) % 3] * e2[(i + 1) % 3];
   return std::sqrt(out[0] * out[0] + out[1] * out[1] + out[2] * out[2]);
 }
 
@@ -63,7 +65,8 @@ Look::Look(const mjModel* model, unsigned group_mask) {
 void Look::add_texture(const mjModel* model, int id) {
   Texture& texture = textures_[id];
   const int channels = model->tex_nchannel[id];
-  if (channels != 3 && channels != 4) return;  // encoded for another renderer: drawn without a texture
+  if (channels != 3 && channels != 4)
+    return;  // encoded for another renderer: drawn without a texture
   texture.cube = model->tex_type[id] != mjTEXTURE_2D;
   const int width = model->tex_width[id];
   // A square "cube" has one image for all faces.
@@ -83,7 +86,8 @@ void Look::add_texture(const mjModel* model, int id) {
   }
   std::vector<std::uint32_t>& texels = texels_.emplace_back(total);
   for (int f = 0; f < faces; ++f) {
-    const mjtByte* image = data + (repeated ? 0 : static_cast<std::size_t>(f) * width * height * channels);
+    const mjtByte* image =
+        data + (repeated ? 0 : static_cast<std::size_t>(f) * width * height * channels);
     std::uint32_t* out = texels.data() + static_cast<std::size_t>(f) * width * height;
     for (int i = 0; i < width * height; ++i) {
       std::uint32_t texel = 255u << 24;
@@ -91,7 +95,8 @@ void Look::add_texture(const mjModel* model, int id) {
         const mjtByte v = image[i * channels + c];
         texel |= static_cast<std::uint32_t>(srgb ? linear_from_srgb(v) : v) << (8 * c);
       }
-      if (channels == 4) texel = (texel & 0xFFFFFFu) | static_cast<std::uint32_t>(image[i * 4 + 3]) << 24;
+      if (channels == 4)
+        texel = (texel & 0xFFFFFFu) | static_cast<std::uint32_t>(image[i * 4 + 3]) << 24;
       out[i] = texel;
     }
   }
@@ -102,7 +107,8 @@ void Look::add_texture(const mjModel* model, int id) {
     std::uint32_t* next = at + faces * size;
     const int w2 = std::max(1, w / 2), h2 = std::max(1, h / 2);
     if (n + 1 < texture.levels)
-      for (int f = 0; f < faces; ++f) halve(at + f * size, w, h, next + static_cast<std::size_t>(f) * w2 * h2, w2, h2);
+      for (int f = 0; f < faces; ++f)
+        halve(at + f * size, w, h, next + static_cast<std::size_t>(f) * w2 * h2, w2, h2);
     at = next;
     w = w2;
     h = h2;
@@ -144,7 +150,8 @@ void Look::add_mesh(const mjModel* model, int id) {
     const int* v = model->mesh_face + 3 * (first + f);
     float normal[3];
     const float area = cross(vert + 3 * v[0], vert + 3 * v[1], vert + 3 * v[2], normal);
-    const float uv_area = std::abs((uv[2] - uv[0]) * (uv[5] - uv[1]) - (uv[4] - uv[0]) * (uv[3] - uv[1]));
+    const float uv_area =
+        std::abs((uv[2] - uv[0]) * (uv[5] - uv[1]) - (uv[4] - uv[0]) * (uv[3] - uv[1]));
     density[f] = area > 0 ? std::sqrt(uv_area / area) : 0;
   }
   meshes_[id].uvs = uvs.data();

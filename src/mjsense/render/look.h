@@ -1,6 +1,7 @@
 #pragma once
-// What surfaces look like, taken from the model once and shared by all cameras and worlds: textures with their mipmaps, and
-// the normals and texture coordinates of mesh faces as MuJoCo's classic renderer uses them.
+// What surfaces look like, taken from the model once and shared by all cameras and worlds: textures
+// with their mipmaps, and the normals and texture coordinates of mesh faces as MuJoCo's classic
+// renderer uses them.
 
 #include <mujoco/mujoco.h>
 
@@ -10,7 +11,8 @@
 
 namespace mjsense {
 
-// One image of a pyramid: RGBA8 texels, row 0 first; a cube map has its six faces (+x -x +y -y +z -z) one after another.
+// One image of a pyramid: RGBA8 texels, row 0 first; a cube map has its six faces (+x -x +y -y +z
+// -z) one after another.
 struct MipLevel {
   const std::uint32_t* texels = nullptr;
   int width = 0, height = 0;

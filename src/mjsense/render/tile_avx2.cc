@@ -2,7 +2,8 @@
 
 namespace mjsense {
 
-void render_tiles_avx2(const View& view, const ImageTargets& targets, int first, int last, TileScratch& scratch) {
+void render_tiles_avx2(const View& view, const ImageTargets& targets, int first, int last,
+                       TileScratch& scratch) {
   render_tiles(view, targets, first, last, scratch);
 }
 

@@ -1,6 +1,7 @@
 #pragma once
-// One image about to be rendered: everything it can show, in the camera's frame (x right, y up, looking along -z), where rays
-// start at the origin and single precision is enough. Plain structures, because kernels of every instruction set read them.
+// One image about to be rendered: everything it can show, in the camera's frame (x right, y up,
+// looking along -z), where rays start at the origin and single precision is enough. Plain
+// structures, because kernels of every instruction set read them.
 
 #include <cstddef>
 #include <cstdint>
@@ -11,13 +12,15 @@ namespace mjsense {
 
 struct HeightField;
 
-// Rays of pixels. Pixel (x, y), row 0 at the top, sees along (X, Y, -1) from the origin, with X = left + dx (x + 0.5) and
-// Y = top + dy (y + 0.5); an orthographic one along (0, 0, -1) from (X, Y, 0). A parameter t of such a ray is planar depth.
+// Rays of pixels. Pixel (x, y), row 0 at the top, sees along (X, Y, -1) from the origin, with X =
+// left + dx (x + 0.5) and Y = top + dy (y + 0.5); an orthographic one along (0, 0, -1) from (X, Y,
+// 0). A parameter t of such a ray is planar depth.
 struct PixelGrid {
   int width = 0, height = 0;
   float left = 0, top = 0, dx = 0, dy = 0;
   bool orthographic = false;
-  const float* bent = nullptr;  // [H, W, 2] X and Y of a lens with distortion; null: the formula above
+  const float* bent =
+      nullptr;  // [H, W, 2] X and Y of a lens with distortion; null: the formula above
 };
 
 // How a geom answers light. MuJoCo's classic material.
@@ -25,26 +28,27 @@ struct Surface {
   float rgba[4];
   float specular, exponent, emission;  // exponent: 128 * shininess
   const Texture* texture;              // null: none
-  float repeat[2];                     // 2D: times the texture coordinates; cube: unused
+  float repeat[2], shift[2];           // 2D: texture coordinates times repeat plus shift
   float stretch[3];                    // cube: times the direction
   bool mapped;                         // 2D texture by the mesh's own coordinates
 };
 
 struct alignas(64) ViewGeom {
-  float rot[9];       // R_CG row-major
-  float pos[3];       // p_CG, m
-  float eye[3];       // the camera in the geom's frame: -R_CG^T p_CG, m
-  float size[3];      // as mjModel's geom_size, m
-  float box[6];       // local bounding box: centre, half sizes; m
-  float center[3];    // bounding sphere in C, m; planes: endless
+  float rot[9];     // R_CG row-major
+  float pos[3];     // p_CG, m
+  float eye[3];     // the camera in the geom's frame: -R_CG^T p_CG, m
+  float size[3];    // as mjModel's geom_size, m
+  float box[6];     // local bounding box: centre, half sizes; m
+  float center[3];  // bounding sphere in C, m; planes: endless
   float radius;
-  float window[4];    // X min, X max, Y min, Y max of what it may cover
-  float nearest;      // no point of it has less planar depth
-  int type;           // mjtGeom
-  int id, object;     // for segmentation: id and mjtObj
-  bool transparent;   // blended over what is behind it, casts shadows, receives none
-  bool behind;        // a plane that the camera sees from below: a faint veil, and nothing to depth and segmentation
-  void* bvh;          // RTCScene of a mesh, a height field's surface, a flex; else null
+  float window[4];   // X min, X max, Y min, Y max of what it may cover
+  float nearest;     // no point of it has less planar depth
+  int type;          // mjtGeom
+  int id, object;    // for segmentation: id and mjtObj
+  bool transparent;  // blended over what is behind it, casts shadows, receives none
+  bool behind;  // a plane that the camera sees from below: a faint veil, and nothing to depth and
+                // segmentation
+  void* bvh;    // RTCScene of a mesh, a height field's surface, a flex; else null
   const MeshLook* mesh;
   const HeightField* height_field;
   Surface surface;
@@ -64,45 +68,46 @@ struct ViewLight {
 struct View {
   static constexpr int kMaxLights = 32;
   PixelGrid grid;
-  float near = 0, far = 0;        // planar m
+  float near = 0, far = 0;  // planar m
   const ViewGeom* geoms = nullptr;
-  int num_geoms = 0;              // the first num_opaque are opaque and in sight, nearest first;
-  int num_opaque = 0;             // then num_transparent in sight, by MuJoCo's order of blending;
-  int num_transparent = 0;        // the rest only casts shadows
+  int num_geoms = 0;        // the first num_opaque are opaque and in sight, nearest first;
+  int num_opaque = 0;       // then num_transparent in sight, by MuJoCo's order of blending;
+  int num_transparent = 0;  // the rest only casts shadows
   ViewLight lights[kMaxLights];
   int num_lights = 0;
   bool shadows = false;
   float global_ambient = 0;
   const Texture* skybox = nullptr;
-  float r_wc[9] = {};             // for the skybox
+  float r_wc[9] = {};  // for the skybox
 };
 
 // Where the image goes; null: not wanted. Whole images, rows from the top.
 struct ImageTargets {
-  std::uint8_t* rgb = nullptr;     // [H, W, 3]
-  float* depth = nullptr;          // [H, W]
+  std::uint8_t* rgb = nullptr;           // [H, W, 3]
+  float* depth = nullptr;                // [H, W]
   std::int32_t* segmentation = nullptr;  // [H, W, 2]
-  float* normals = nullptr;        // [H, W, 3]
-  float* points = nullptr;         // [H, W, 3]
-  bool ray_depth = false;          // depth along the ray instead of planar
-  int samples = 1;                 // of rgb
+  float* normals = nullptr;              // [H, W, 3]
+  float* points = nullptr;               // [H, W, 3]
+  bool ray_depth = false;                // depth along the ray instead of planar
+  int samples = 1;                       // of rgb
 };
 
 inline constexpr int kTileSize = 16;  // pixels; a tile is 4 x 4 packets of 4 x 4 pixels
 
 // Work space of one thread: lists as long as the view has geoms.
 struct TileScratch {
-  int* opaque = nullptr;       // geoms in sight of the tile
+  int* opaque = nullptr;  // geoms in sight of the tile
   int* transparent = nullptr;
-  int* casters = nullptr;      // of all lights: kMaxLights times as long
-  void* hits = nullptr;        // 16 packets of hits
+  int* casters = nullptr;  // of all lights: kMaxLights times as long
+  void* hits = nullptr;    // 16 packets of hits
 };
 
 // Bytes of TileScratch::hits, 64-byte aligned.
 std::size_t tile_hits_bytes();
 
 // Renders rows of tiles [first, last) of the image. Every pixel is a function of the view alone.
-using RenderTiles = void (*)(const View& view, const ImageTargets& targets, int first, int last, TileScratch& scratch);
+using RenderTiles = void (*)(const View& view, const ImageTargets& targets, int first, int last,
+                             TileScratch& scratch);
 void render_tiles_portable(const View&, const ImageTargets&, int first, int last, TileScratch&);
 void render_tiles_avx2(const View&, const ImageTargets&, int first, int last, TileScratch&);
 void render_tiles_avx512(const View&, const ImageTargets&, int first, int last, TileScratch&);

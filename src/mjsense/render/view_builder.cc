@@ -12,16 +12,17 @@ namespace mjsense {
 namespace {
 
 constexpr float kEndless = std::numeric_limits<float>::infinity();
-constexpr float kOpaque = 0.995f;      // MuJoCo blends what has less
-constexpr float kFromBehind = 0.3f;    // MuJoCo's factor for the alpha of planes seen from below
-constexpr float kNearest = 1e-4f;      // m; a box that comes nearer may cover anything
+constexpr float kOpaque = 0.995f;    // MuJoCo blends what has less
+constexpr float kFromBehind = 0.3f;  // MuJoCo's factor for the alpha of planes seen from below
+constexpr float kNearest = 1e-4f;    // m; a box that comes nearer may cover anything
 
 // out = R^T v.
 void rotate_back(const double r[9], const double v[3], double out[3]) {
   for (int i = 0; i < 3; ++i) out[i] = r[i] * v[0] + r[3 + i] * v[1] + r[6 + i] * v[2];
 }
 
-// The visualiser's rule: a geom's own colour, unless it is the default grey and there is a material.
+// The visualiser's rule: a geom's own colour, unless it is the default grey and there is a
+// material.
 void resolve_rgba(const mjModel* m, int material, const float* own, float* out) {
   const bool is_default = own[0] == 0.5f && own[1] == 0.5f && own[2] == 0.5f && own[3] == 1.0f;
   std::copy_n(material >= 0 && is_default ? m->mat_rgba + 4 * material : own, 4, out);
@@ -30,15 +31,20 @@ void resolve_rgba(const mjModel* m, int material, const float* own, float* out) 
 }  // namespace
 
 Appearance::Appearance(const mjModel* m)
-    : rgba_(4 * ViewBuilder::max_geoms(m)), lights_(View::kMaxLights), light_ids_(View::kMaxLights) {
+    : rgba_(4 * ViewBuilder::max_geoms(m)),
+      lights_(View::kMaxLights),
+      light_ids_(View::kMaxLights) {
   copy(m);
 }
 
 void Appearance::copy(const mjModel* m) {
-  for (int i = 0; i < m->ngeom; ++i) resolve_rgba(m, m->geom_matid[i], m->geom_rgba + 4 * i, &rgba_[4 * i]);
-  for (int i = 0; i < m->nflex; ++i) resolve_rgba(m, m->flex_matid[i], m->flex_rgba + 4 * i, &rgba_[4 * (m->ngeom + i)]);
+  for (int i = 0; i < m->ngeom; ++i)
+    resolve_rgba(m, m->geom_matid[i], m->geom_rgba + 4 * i, &rgba_[4 * i]);
+  for (int i = 0; i < m->nflex; ++i)
+    resolve_rgba(m, m->flex_matid[i], m->flex_rgba + 4 * i, &rgba_[4 * (m->ngeom + i)]);
   num_lights_ = 0;
-  const auto add = [&](int id, const float* ambient, const float* diffuse, const float* specular) -> ViewLight& {
+  const auto add = [&](int id, const float* ambient, const float* diffuse,
+                       const float* specular) -> ViewLight& {
     light_ids_[num_lights_] = id;
     ViewLight& light = lights_[num_lights_++];
     light = {};
@@ -52,7 +58,8 @@ void Appearance::copy(const mjModel* m) {
   if (head.active) add(-1, head.ambient, head.diffuse, head.specular);
   for (int i = 0; i < m->nlight && num_lights_ < View::kMaxLights; ++i) {
     if (!m->light_active[i] || m->light_type[i] == mjLIGHT_IMAGE) continue;
-    ViewLight& light = add(i, m->light_ambient + 3 * i, m->light_diffuse + 3 * i, m->light_specular + 3 * i);
+    ViewLight& light =
+        add(i, m->light_ambient + 3 * i, m->light_diffuse + 3 * i, m->light_specular + 3 * i);
     light.shadows = m->light_castshadow[i];
     light.kind = m->light_type[i] == mjLIGHT_DIRECTIONAL ? LightKind::kDirectional
                  : m->light_type[i] == mjLIGHT_SPOT      ? LightKind::kSpot
@@ -67,7 +74,11 @@ void Appearance::copy(const mjModel* m) {
 }
 
 ViewBuilder::ViewBuilder(const mjModel* model, const Look& look, const ViewOptions& options)
-    : model_(model), look_(&look), options_(options), unsorted_(max_geoms(model)), sorted_(max_geoms(model)) {
+    : model_(model),
+      look_(&look),
+      options_(options),
+      unsorted_(max_geoms(model)),
+      sorted_(max_geoms(model)) {
   order_.reserve(max_geoms(model));
   view_.near = options.near;
   view_.far = options.far;
@@ -75,8 +86,9 @@ ViewBuilder::ViewBuilder(const mjModel* model, const Look& look, const ViewOptio
   view_.skybox = options.textures ? look.skybox() : nullptr;
 }
 
-const View& ViewBuilder::build(const RayWorld& world, const SharedGeometry& shapes, const Appearance& appearance,
-                               const double position[3], const double rotation[9], const PixelGrid& grid) {
+const View& ViewBuilder::build(const RayWorld& world, const SharedGeometry& shapes,
+                               const Appearance& appearance, const double position[3],
+                               const double rotation[9], const PixelGrid& grid) {
   view_.grid = grid;
   order_.clear();
   for (int id = 0; id < world.num_geoms(); ++id) {
@@ -91,7 +103,9 @@ const View& ViewBuilder::build(const RayWorld& world, const SharedGeometry& shap
     Order order{sight ? g.transparent : 2, g.nearest, index};
     if (order.rank == 1) {
       const float* p = g.pos;
-      order.key = g.type == mjGEOM_PLANE ? 1e10f : std::sqrt(p[0] * p[0] + p[1] * p[1] + p[2] * p[2]) - g.radius;
+      order.key = g.type == mjGEOM_PLANE
+                      ? 1e10f
+                      : std::sqrt(p[0] * p[0] + p[1] * p[1] + p[2] * p[2]) - g.radius;
     }
     order_.push_back(order);
   }
@@ -113,10 +127,11 @@ const View& ViewBuilder::build(const RayWorld& world, const SharedGeometry& shap
   return view_;
 }
 
-void ViewBuilder::place(const RayWorld& world, const SharedGeometry& shapes, int id, const double position[3],
-                        const double rotation[9], ViewGeom& g) const {
+void ViewBuilder::place(const RayWorld& world, const SharedGeometry& shapes, int id,
+                        const double position[3], const double rotation[9], ViewGeom& g) const {
   const RayGeom& source = world.geom(id);
-  const double offset[3] = {source.pos[0] - position[0], source.pos[1] - position[1], source.pos[2] - position[2]};
+  const double offset[3] = {source.pos[0] - position[0], source.pos[1] - position[1],
+                            source.pos[2] - position[2]};
   double p[3], eye[3];
   rotate_back(rotation, offset, p);
   rotate_back(source.mat, offset, eye);
@@ -127,8 +142,9 @@ void ViewBuilder::place(const RayWorld& world, const SharedGeometry& shapes, int
     g.box[i] = source.center[i];
     g.box[3 + i] = source.half[i];
     for (int j = 0; j < 3; ++j)
-      g.rot[3 * i + j] = static_cast<float>(rotation[i] * source.mat[j] + rotation[3 + i] * source.mat[3 + j] +
-                                            rotation[6 + i] * source.mat[6 + j]);
+      g.rot[3 * i + j] =
+          static_cast<float>(rotation[i] * source.mat[j] + rotation[3 + i] * source.mat[3 + j] +
+                             rotation[6 + i] * source.mat[6 + j]);
   }
   g.type = source.type;
   g.id = id;
@@ -150,9 +166,11 @@ void ViewBuilder::place(const RayWorld& world, const SharedGeometry& shapes, int
 bool ViewBuilder::in_sight(ViewGeom& g) const {
   const PixelGrid& grid = view_.grid;
   for (int i = 0; i < 3; ++i)
-    g.center[i] = g.pos[i] + g.rot[3 * i] * g.box[0] + g.rot[3 * i + 1] * g.box[1] + g.rot[3 * i + 2] * g.box[2];
+    g.center[i] = g.pos[i] + g.rot[3 * i] * g.box[0] + g.rot[3 * i + 1] * g.box[1] +
+                  g.rot[3 * i + 2] * g.box[2];
   const float* h = g.box + 3;
-  g.radius = g.type == mjGEOM_SPHERE ? g.size[0] : std::sqrt(h[0] * h[0] + h[1] * h[1] + h[2] * h[2]);
+  g.radius =
+      g.type == mjGEOM_SPHERE ? g.size[0] : std::sqrt(h[0] * h[0] + h[1] * h[1] + h[2] * h[2]);
   g.window[0] = g.window[2] = -kEndless;
   g.window[1] = g.window[3] = kEndless;
   g.nearest = 0;
@@ -186,7 +204,8 @@ bool ViewBuilder::in_sight(ViewGeom& g) const {
   }
   if (grid.bent) return true;  // the corners of the image do not bound it
   const float right = grid.left + grid.dx * grid.width, bottom = grid.top + grid.dy * grid.height;
-  return g.window[0] <= right && g.window[1] >= grid.left && g.window[2] <= grid.top && g.window[3] >= bottom;
+  return g.window[0] <= right && g.window[1] >= grid.left && g.window[2] <= grid.top &&
+         g.window[3] >= bottom;
 }
 
 void ViewBuilder::set_surface(const RayWorld& world, const float* rgba, int id, ViewGeom& g) const {
@@ -211,12 +230,16 @@ void ViewBuilder::set_surface(const RayWorld& world, const float* rgba, int id, 
   for (int i = 0; i < 2; ++i) {
     const float size = g.size[i] > 0 ? g.size[i] : 1.0f;
     s.repeat[i] = model_->mat_texrepeat[2 * material + i] * (uniform && !s.mapped ? size : 1.0f);
+    if (g.type == mjGEOM_PLANE && g.size[i] <= 0) s.shift[i] = -0.5f;
   }
-  // Cube maps: MuJoCo takes directions in the unit shape that it scales (meshes and planes: in metres).
+  // Cube maps: MuJoCo takes directions in the unit shape that it scales (meshes and planes: in
+  // metres).
   const bool in_meters = g.mesh || g.height_field || g.type == mjGEOM_PLANE;
   for (int i = 0; i < 3; ++i) {
     float size = g.size[i];
-    if (g.type == mjGEOM_SPHERE || ((g.type == mjGEOM_CAPSULE || g.type == mjGEOM_CYLINDER) && i < 2)) size = g.size[0];
+    if (g.type == mjGEOM_SPHERE ||
+        ((g.type == mjGEOM_CAPSULE || g.type == mjGEOM_CYLINDER) && i < 2))
+      size = g.size[0];
     if ((g.type == mjGEOM_CAPSULE || g.type == mjGEOM_CYLINDER) && i == 2) size = g.size[1];
     if (in_meters) {
       s.stretch[i] = uniform ? size : 1.0f;
@@ -226,8 +249,8 @@ void ViewBuilder::set_surface(const RayWorld& world, const float* rgba, int id, 
   }
 }
 
-void ViewBuilder::set_lights(const RayWorld& world, const Appearance& appearance, const double position[3],
-                             const double rotation[9]) {
+void ViewBuilder::set_lights(const RayWorld& world, const Appearance& appearance,
+                             const double position[3], const double rotation[9]) {
   view_.num_lights = static_cast<int>(appearance.lights().size());
   view_.global_ambient = view_.num_lights == 0 ? 0.3f : 0.0f;  // MuJoCo's, so that something shows
   for (int i = 0; i < view_.num_lights; ++i) {
@@ -239,7 +262,8 @@ void ViewBuilder::set_lights(const RayWorld& world, const Appearance& appearance
       continue;
     }
     const RayLight& source = world.lights()[id];
-    const double offset[3] = {source.pos[0] - position[0], source.pos[1] - position[1], source.pos[2] - position[2]};
+    const double offset[3] = {source.pos[0] - position[0], source.pos[1] - position[1],
+                              source.pos[2] - position[2]};
     double p[3], d[3];
     rotate_back(rotation, offset, p);
     rotate_back(rotation, source.dir, d);

@@ -1,5 +1,6 @@
 #pragma once
-// Brings a world into a camera's frame: what is in sight, nearest first, with its materials and lights.
+// Brings a world into a camera's frame: what is in sight, nearest first, with its materials and
+// lights.
 
 #include <mujoco/mujoco.h>
 
@@ -21,8 +22,12 @@ class Appearance {
   explicit Appearance(const mjModel* model);
   void copy(const mjModel* model);  // no allocation
 
-  std::span<const float> rgba() const { return rgba_; }           // [ngeom + nflex, 4] as MuJoCo's visualiser resolves it
-  std::span<const ViewLight> lights() const { return {lights_.data(), num_lights_}; }  // active ones; no poses yet
+  std::span<const float> rgba() const {
+    return rgba_;
+  }  // [ngeom + nflex, 4] as MuJoCo's visualiser resolves it
+  std::span<const ViewLight> lights() const {
+    return {lights_.data(), num_lights_};
+  }  // active ones; no poses yet
   std::span<const int> light_ids() const { return light_ids_; }
 
  private:
@@ -45,22 +50,26 @@ class ViewBuilder {
   ViewBuilder(const mjModel* model, const Look& look, const ViewOptions& options);
 
   // position, rotation: X_WC, row-major.
-  const View& build(const RayWorld& world, const SharedGeometry& shapes, const Appearance& appearance,
-                    const double position[3], const double rotation[9], const PixelGrid& grid);
+  const View& build(const RayWorld& world, const SharedGeometry& shapes,
+                    const Appearance& appearance, const double position[3],
+                    const double rotation[9], const PixelGrid& grid);
   const View& view() const { return view_; }
-  static std::size_t max_geoms(const mjModel* model) { return static_cast<std::size_t>(model->ngeom + model->nflex); }
+  static std::size_t max_geoms(const mjModel* model) {
+    return static_cast<std::size_t>(model->ngeom + model->nflex);
+  }
 
  private:
   struct Order {
-    int rank;   // 0 opaque, 1 transparent, 2 only casts shadows
+    int rank;  // 0 opaque, 1 transparent, 2 only casts shadows
     float key;
     int index;
   };
-  void place(const RayWorld& world, const SharedGeometry& shapes, int id, const double position[3], const double rotation[9],
-             ViewGeom& g) const;
+  void place(const RayWorld& world, const SharedGeometry& shapes, int id, const double position[3],
+             const double rotation[9], ViewGeom& g) const;
   bool in_sight(ViewGeom& g) const;
   void set_surface(const RayWorld& world, const float* rgba, int id, ViewGeom& g) const;
-  void set_lights(const RayWorld& world, const Appearance& appearance, const double position[3], const double rotation[9]);
+  void set_lights(const RayWorld& world, const Appearance& appearance, const double position[3],
+                  const double rotation[9]);
 
   const mjModel* model_;
   const Look* look_;

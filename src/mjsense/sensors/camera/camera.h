@@ -1,15 +1,17 @@
 #pragma once
-// CameraSensor: images of every world from one camera, by ray casting on the CPU. No OpenGL, no display, no GPU.
+// CameraSensor: images of every world from one camera, by ray casting on the CPU. No OpenGL, no
+// display, no GPU.
 //
 // Fields (only those asked for in data_types; row 0 is the top of the image):
-//   rgb           uint8   [B, H, W, 3]  MuJoCo's classic look: headlight, lights, materials, textures, skybox, shadows
-//   depth         float32 [B, H, W, 1]  m; planar: distance to the camera plane; ray: along the pixel's ray; 0 background
-//   segmentation  int32   [B, H, W, 2]  (id, type): (geom id, mjOBJ_GEOM); (-1, -1) background
-//   normals       float32 [B, H, W, 3]  unit, outward, camera frame; 0 background
-//   point_cloud   float32 [B, H, W, 3]  m, camera frame; NaN background
+//   rgb           uint8   [B, H, W, 3]  MuJoCo's classic look: headlight, lights, materials,
+//   textures, skybox, shadows depth         float32 [B, H, W, 1]  m; planar: distance to the camera
+//   plane; ray: along the pixel's ray; 0 background segmentation  int32   [B, H, W, 2]  (id, type):
+//   (geom id, mjOBJ_GEOM); (-1, -1) background normals       float32 [B, H, W, 3]  unit, outward,
+//   camera frame; 0 background point_cloud   float32 [B, H, W, 3]  m, camera frame; NaN background
 // and always
-//   intrinsics    float32 [B, 3, 3]     K in pixels, OpenCV convention: x right, y down, z forward; pixel centres at +0.5
-//   pose          float32 [B, 4, 4]     X_WC of the image; C is MuJoCo's camera frame: x right, y up, looking along -z
+//   intrinsics    float32 [B, 3, 3]     K in pixels, OpenCV convention: x right, y down, z forward;
+//   pixel centres at +0.5 pose          float32 [B, 4, 4]     X_WC of the image; C is MuJoCo's
+//   camera frame: x right, y up, looking along -z
 
 #include <array>
 #include <cstdint>
@@ -27,37 +29,42 @@ struct CameraIntrinsics {
   double fx = 0, fy = 0, cx = 0, cy = 0;
 };
 
-// Where a lens puts the image of a direction. x = X/Z, y = Y/Z (OpenCV camera frame), r = |(x, y)|, theta = atan r.
-//   brown_conrady: x' = x (1 + k1 r^2 + k2 r^4 + k3 r^6) + 2 p1 x y + p2 (r^2 + 2 x^2), y' alike; coefficients k1 k2 p1 p2 k3
-//   fisheye:       r' = theta (1 + k1 theta^2 + k2 theta^4 + k3 theta^6 + k4 theta^8);         coefficients k1 k2 k3 k4
+// Where a lens puts the image of a direction. x = X/Z, y = Y/Z (OpenCV camera frame), r = |(x, y)|,
+// theta = atan r.
+//   brown_conrady: x' = x (1 + k1 r^2 + k2 r^4 + k3 r^6) + 2 p1 x y + p2 (r^2 + 2 x^2), y' alike;
+//   coefficients k1 k2 p1 p2 k3 fisheye:       r' = theta (1 + k1 theta^2 + k2 theta^4 + k3 theta^6
+//   + k4 theta^8);         coefficients k1 k2 k3 k4
 struct LensDistortion {
   std::string model = "none";  // none brown_conrady fisheye
   std::vector<double> coefficients;
 };
 
 struct CameraSensorCfg : SensorCfg {
-  std::string camera_name;               // an existing camera (full name); empty: a new camera called `name`
-  std::string parent_body;               // of a new camera, full name; empty: the world
-  std::array<double, 3> pos{0, 0, 1};    // m, in the parent body
+  std::string camera_name;  // an existing camera (full name); empty: a new camera called `name`
+  std::string parent_body;  // of a new camera, full name; empty: the world
+  std::array<double, 3> pos{0, 0, 1};  // m, in the parent body
   std::array<double, 4> quat{1, 0, 0, 0};
-  std::optional<double> fovy;            // degrees (orthographic: image height in m); new cameras: 45
-  int width = 160, height = 120;         // pixels; the model's own resolution is not used
+  std::optional<double> fovy;     // degrees (orthographic: image height in m); new cameras: 45
+  int width = 160, height = 120;  // pixels; the model's own resolution is not used
   std::vector<std::string> data_types{"rgb"};  // rgb depth segmentation normals point_cloud
   bool use_textures = true;
   bool use_shadows = false;
   std::vector<int> enabled_geom_groups{0, 1, 2};
-  bool orthographic = false;             // true: also overrides a wrapped camera
-  bool clone_data = false;               // accepted for mjlab's sake; rows are overwritten by the next image either way
+  bool orthographic = false;  // true: also overrides a wrapped camera
+  bool clone_data =
+      false;  // accepted for mjlab's sake; rows are overwritten by the next image either way
 
   // Beyond mjlab's.
-  double near = 0, far = 0;              // m, planar; what is nearer or farther is not seen; far 0: no limit
-  double update_period = 0, phase = 0;   // s; an image is taken at the first control step at or after phase + k * period
-  int samples = 1;                       // per pixel of rgb, for anti-aliased edges: 1 4 8 16
-  std::string depth_kind = "planar";     // planar ray
+  double near = 0, far = 0;  // m, planar; what is nearer or farther is not seen; far 0: no limit
+  double update_period = 0,
+         phase =
+             0;     // s; an image is taken at the first control step at or after phase + k * period
+  int samples = 1;  // per pixel of rgb, for anti-aliased edges: 1 4 8 16
+  std::string depth_kind = "planar";  // planar ray
   std::optional<CameraIntrinsics> intrinsics;
   LensDistortion distortion;
-  std::string depth_noise = "none";      // none d405 d435
-  std::string renderer = "rays";         // rays opengl (MuJoCo's own renderer, where it was built in)
+  std::string depth_noise = "none";  // none d405 d435
+  std::string renderer = "rays";     // rays opengl (MuJoCo's own renderer, where it was built in)
 
   std::unique_ptr<Sensor> build() const override;
 };

@@ -16,48 +16,65 @@ namespace {
 void check_choice(const std::string& place, std::string_view field, const std::string& value,
                   std::span<const std::string> choices) {
   if (std::find(choices.begin(), choices.end(), value) != choices.end()) return;
-  throw ValueError(fmt::format("{}: invalid {} '{}'; expected one of: {}", place, field, value, fmt::join(choices, ", ")));
+  throw ValueError(fmt::format("{}: invalid {} '{}'; expected one of: {}", place, field, value,
+                               fmt::join(choices, ", ")));
 }
 
 }  // namespace
 
 void validate(const CameraSensorCfg& cfg) {
   const std::string place = fmt::format("camera '{}'", cfg.name);
-  const auto fail = [&](const std::string& what) { throw ValueError(fmt::format("{}: {}", place, what)); };
+  const auto fail = [&](const std::string& what) {
+    throw ValueError(fmt::format("{}: {}", place, what));
+  };
   if (cfg.name.empty()) throw ValueError("a camera needs a name");
   const std::array<std::string, 5> types{"rgb", "depth", "segmentation", "normals", "point_cloud"};
-  if (cfg.data_types.empty()) fail(fmt::format("data_types is empty; choose from: {}", fmt::join(types, ", ")));
+  if (cfg.data_types.empty())
+    fail(fmt::format("data_types is empty; choose from: {}", fmt::join(types, ", ")));
   for (const std::string& type : cfg.data_types) {
     if (std::find(types.begin(), types.end(), type) == types.end())
       fail(fmt::format("Invalid camera data types: '{}'{}", type, suggest(type, types)));
-    if (std::count(cfg.data_types.begin(), cfg.data_types.end(), type) > 1) fail(fmt::format("data type '{}' twice", type));
+    if (std::count(cfg.data_types.begin(), cfg.data_types.end(), type) > 1)
+      fail(fmt::format("data type '{}' twice", type));
   }
   if (cfg.width < 1 || cfg.height < 1 || cfg.width > 16384 || cfg.height > 16384)
     fail(fmt::format("width x height is {} x {}: each must be 1..16384", cfg.width, cfg.height));
   for (int g : cfg.enabled_geom_groups)
-    if (g < 0 || g >= mjNGROUP) fail(fmt::format("geom group {}: groups are 0..{}", g, mjNGROUP - 1));
+    if (g < 0 || g >= mjNGROUP)
+      fail(fmt::format("geom group {}: groups are 0..{}", g, mjNGROUP - 1));
   if (cfg.fovy) {
     if (!(*cfg.fovy > 0)) fail(fmt::format("fovy is {}: must be positive", *cfg.fovy));
     if (!cfg.orthographic && cfg.camera_name.empty() && *cfg.fovy >= 180)
       fail(fmt::format("fovy is {} degrees: a perspective camera sees less than 180", *cfg.fovy));
   }
   if (!(cfg.near >= 0) || !(cfg.far >= 0) || (cfg.far > 0 && cfg.far <= cfg.near))
-    fail(fmt::format("near {} and far {}: need 0 <= near < far, or far 0 for no limit", cfg.near, cfg.far));
-  if (!(cfg.update_period >= 0) || !(cfg.phase >= 0)) fail("update_period and phase must not be negative");
-  if (cfg.samples < 1 || cfg.samples > 64) fail(fmt::format("samples is {}: must be 1..64", cfg.samples));
+    fail(fmt::format("near {} and far {}: need 0 <= near < far, or far 0 for no limit", cfg.near,
+                     cfg.far));
+  if (!(cfg.update_period >= 0) || !(cfg.phase >= 0))
+    fail("update_period and phase must not be negative");
+  if (cfg.samples < 1 || cfg.samples > 64)
+    fail(fmt::format("samples is {}: must be 1..64", cfg.samples));
   check_choice(place, "depth_kind", cfg.depth_kind, std::array<std::string, 2>{"planar", "ray"});
   check_choice(place, "renderer", cfg.renderer, std::array<std::string, 2>{"rays", "opengl"});
-  check_choice(place, "depth_noise", cfg.depth_noise, std::array<std::string, 3>{"none", "d405", "d435"});
-  check_choice(place, "distortion model", cfg.distortion.model, std::array<std::string, 3>{"none", "brown_conrady", "fisheye"});
-  const std::size_t needed = cfg.distortion.model == "none" ? 0 : cfg.distortion.model == "fisheye" ? 4 : 5;
+  check_choice(place, "depth_noise", cfg.depth_noise,
+               std::array<std::string, 3>{"none", "d405", "d435"});
+  check_choice(place, "distortion model", cfg.distortion.model,
+               std::array<std::string, 3>{"none", "brown_conrady", "fisheye"});
+  const std::size_t needed = cfg.distortion.model == "none"      ? 0
+                             : cfg.distortion.model == "fisheye" ? 4
+                                                                 : 5;
   if (cfg.distortion.coefficients.size() != needed)
     fail(fmt::format("distortion '{}' takes {} coefficients, got {}", cfg.distortion.model, needed,
                      cfg.distortion.coefficients.size()));
-  if (cfg.intrinsics && (!(cfg.intrinsics->fx > 0) || !(cfg.intrinsics->fy > 0))) fail("intrinsics: fx and fy must be positive");
-  if (cfg.orthographic && (cfg.intrinsics || needed > 0)) fail("an orthographic camera has no intrinsics and no lens distortion");
+  if (cfg.intrinsics && (!(cfg.intrinsics->fx > 0) || !(cfg.intrinsics->fy > 0)))
+    fail("intrinsics: fx and fy must be positive");
+  if (cfg.orthographic && (cfg.intrinsics || needed > 0))
+    fail("an orthographic camera has no intrinsics and no lens distortion");
   if (!cfg.camera_name.empty() && !cfg.parent_body.empty())
-    fail(fmt::format("camera_name '{}' wraps an existing camera, which stays on its body: leave parent_body empty",
-                     cfg.camera_name));
+    fail(
+        fmt::format("camera_name '{}' wraps an existing camera, which stays on its body: leave "
+                    "parent_body empty",
+                    cfg.camera_name));
 }
 
 namespace {
@@ -71,7 +88,9 @@ std::vector<std::string> names_of(const mjSpec* spec, mjtObj type) {
 
 }  // namespace
 
-std::unique_ptr<Sensor> CameraSensorCfg::build() const { return std::make_unique<CameraSensor>(*this); }
+std::unique_ptr<Sensor> CameraSensorCfg::build() const {
+  return std::make_unique<CameraSensor>(*this);
+}
 
 void CameraSensor::edit_spec(mjSpec* spec) {
   const std::string place = fmt::format("camera '{}'", name());
@@ -86,7 +105,9 @@ void CameraSensor::edit_spec(mjSpec* spec) {
   mjsBody* body = mjs_findBody(spec, cfg_.parent_body.empty() ? "world" : cfg_.parent_body.c_str());
   if (!body) throw_unknown(place, "body", cfg_.parent_body, names_of(spec, mjOBJ_BODY));
   if (mjs_findElement(spec, mjOBJ_CAMERA, name().c_str()))
-    throw ValueError(fmt::format("{}: repeated name: the model has a camera of this name; set camera_name to use it", place));
+    throw ValueError(fmt::format(
+        "{}: repeated name: the model has a camera of this name; set camera_name to use it",
+        place));
   mjsCamera* camera = mjs_addCamera(body, nullptr);
   mjs_setName(camera->element, name().c_str());
   std::copy(cfg_.pos.begin(), cfg_.pos.end(), camera->pos);

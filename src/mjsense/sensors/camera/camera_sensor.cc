@@ -12,16 +12,18 @@
 namespace mjsense {
 namespace {
 
-constexpr int kItemsPerThread = 4;  // parts of work for each thread, so that all finish at about the same time
+constexpr int kItemsPerThread =
+    4;  // parts of work for each thread, so that all finish at about the same time
 
 ViewOptions view_options(const CameraSensorCfg& cfg, unsigned groups) {
-  return {groups, cfg.use_textures, cfg.use_shadows, static_cast<float>(cfg.near), static_cast<float>(cfg.far)};
+  return {groups, cfg.use_textures, cfg.use_shadows, static_cast<float>(cfg.near),
+          static_cast<float>(cfg.far)};
 }
 
 }  // namespace
 
-// Made at the first cast(), which knows the shared shapes. Few large images: a view each, and their tiles are divided among
-// the threads. Many small ones: a view a thread.
+// Made at the first cast(), which knows the shared shapes. Few large images: a view each, and their
+// tiles are divided among the threads. Many small ones: a view a thread.
 struct CameraSensor::Workspace {
   std::vector<ViewBuilder> builders;
   std::vector<TileScratch> scratch;  // by thread
@@ -30,7 +32,9 @@ struct CameraSensor::Workspace {
   RenderTiles render = best_render_tiles();
 };
 
-CameraSensor::CameraSensor(const CameraSensorCfg& cfg) : Sensor(cfg.name), cfg_(cfg) { validate(cfg); }
+CameraSensor::CameraSensor(const CameraSensorCfg& cfg) : Sensor(cfg.name), cfg_(cfg) {
+  validate(cfg);
+}
 
 CameraSensor::~CameraSensor() = default;
 
@@ -45,12 +49,13 @@ void CameraSensor::initialize(const SensorInit& init) {
   camera_ = mj_name2id(model_, mjOBJ_CAMERA, camera.c_str());
   if (camera_ < 0) {
     std::vector<std::string> names;
-    for (int i = 0; i < model_->ncam; ++i) names.emplace_back(model_->names + model_->name_camadr[i]);
+    for (int i = 0; i < model_->ncam; ++i)
+      names.emplace_back(model_->names + model_->name_camadr[i]);
     throw_unknown(place, "camera", camera, names);
   }
   if (model_->nlight >= View::kMaxLights)
-    throw ValueError(fmt::format("{}: the model has {} lights; at most {} are drawn", place, model_->nlight,
-                                 View::kMaxLights - 1));
+    throw ValueError(fmt::format("{}: the model has {} lights; at most {} are drawn", place,
+                                 model_->nlight, View::kMaxLights - 1));
   groups_ = 0;
   for (int g : cfg_.enabled_geom_groups) groups_ |= 1u << g;
   look_ = std::make_unique<Look>(model_, groups_);
@@ -66,7 +71,8 @@ void CameraSensor::initialize(const SensorInit& init) {
     grid = grid_from_intrinsics(cfg_.width, cfg_.height, k.fx, k.fy, k.cx, k.cy);
   }
   if (cfg_.distortion.model != "none") {
-    if (grid.orthographic) throw ValueError(fmt::format("{}: an orthographic camera has no lens distortion", place));
+    if (grid.orthographic)
+      throw ValueError(fmt::format("{}: an orthographic camera has no lens distortion", place));
     const Lens lens = cfg_.distortion.model == "fisheye" ? Lens::kFisheye : Lens::kBrownConrady;
     bent_ = bent_rays(grid, lens, cfg_.distortion.coefficients, place.c_str());
     grid.bent = bent_.data();
@@ -74,24 +80,28 @@ void CameraSensor::initialize(const SensorInit& init) {
   for (PerWorld& w : worlds_) w.grid = grid;
 
   // Everything that cast() needs, but for the ray scene's shapes.
-  const int slots = std::max(init.threads, std::min(init.num_worlds, kItemsPerThread * init.threads));
+  const int slots =
+      std::max(init.threads, std::min(init.num_worlds, kItemsPerThread * init.threads));
   workspace_ = std::make_unique<Workspace>();
   workspace_->builders.reserve(slots);
-  for (int i = 0; i < slots; ++i) workspace_->builders.emplace_back(model_, *look_, view_options(cfg_, groups_));
+  for (int i = 0; i < slots; ++i)
+    workspace_->builders.emplace_back(model_, *look_, view_options(cfg_, groups_));
   const std::size_t geoms = ViewBuilder::max_geoms(model_);
   for (int i = 0; i < init.threads; ++i) {
-    workspace_->hits.emplace_back(DType::kUint8, Shape{static_cast<std::int64_t>(tile_hits_bytes())});
+    workspace_->hits.emplace_back(DType::kUint8,
+                                  Shape{static_cast<std::int64_t>(tile_hits_bytes())});
     std::vector<int>& list = workspace_->lists.emplace_back((2 + View::kMaxLights) * geoms);
-    workspace_->scratch.push_back(
-        {list.data(), list.data() + geoms, list.data() + 2 * geoms, workspace_->hits.back().data()});
+    workspace_->scratch.push_back({list.data(), list.data() + geoms, list.data() + 2 * geoms,
+                                   workspace_->hits.back().data()});
   }
 }
 
 void CameraSensor::declare_fields(int num_worlds) {
   const std::int64_t h = cfg_.height, w = cfg_.width;
-  const std::string frame = fmt::format("camera {}", cfg_.camera_name.empty() ? name() : cfg_.camera_name);
-  const auto add = [&](const char* field, DType dtype, Shape shape, const char* unit, double low, double high, Storage storage,
-                       const char* text) {
+  const std::string frame =
+      fmt::format("camera {}", cfg_.camera_name.empty() ? name() : cfg_.camera_name);
+  const auto add = [&](const char* field, DType dtype, Shape shape, const char* unit, double low,
+                       double high, Storage storage, const char* text) {
     SensorSpec spec;
     spec.dtype = dtype;
     spec.shape = shape;
@@ -105,11 +115,14 @@ void CameraSensor::declare_fields(int num_worlds) {
   };
   constexpr double inf = std::numeric_limits<double>::infinity();
   rgb_ = depth_ = segmentation_ = normals_ = points_ = nullptr;
-  if (wants("rgb")) rgb_ = add("rgb", DType::kUint8, {h, w, 3}, "", 0, 255, Storage::kRgbVideo, "Colour image, row 0 at the top.");
+  if (wants("rgb"))
+    rgb_ = add("rgb", DType::kUint8, {h, w, 3}, "", 0, 255, Storage::kRgbVideo,
+               "Colour image, row 0 at the top.");
   if (wants("depth"))
-    depth_ = add("depth", DType::kFloat32, {h, w, 1}, "m", 0, inf, Storage::kDepthVideo,
-                 cfg_.depth_kind == "ray" ? "Distance along each pixel's ray; 0 where nothing is seen."
-                                          : "Distance to the camera plane; 0 where nothing is seen.");
+    depth_ =
+        add("depth", DType::kFloat32, {h, w, 1}, "m", 0, inf, Storage::kDepthVideo,
+            cfg_.depth_kind == "ray" ? "Distance along each pixel's ray; 0 where nothing is seen."
+                                     : "Distance to the camera plane; 0 where nothing is seen.");
   if (wants("segmentation"))
     segmentation_ = add("segmentation", DType::kInt32, {h, w, 2}, "", -1, inf, Storage::kArray,
                         "(geom id, object type) of each pixel; (-1, -1) where nothing is seen.");
@@ -117,10 +130,12 @@ void CameraSensor::declare_fields(int num_worlds) {
     normals_ = add("normals", DType::kFloat32, {h, w, 3}, "", -1, 1, Storage::kArray,
                    "Unit surface normal in the camera frame; 0 where nothing is seen.");
   if (wants("point_cloud"))
-    points_ = add("point_cloud", DType::kFloat32, {h, w, 3}, "m", -inf, inf, Storage::kArray,
-                  "Point in the camera frame (x right, y up, looking along -z); NaN where nothing is seen.");
-  intrinsics_ = add("intrinsics", DType::kFloat32, {3, 3}, "pixels", -inf, inf, Storage::kArray,
-                    "K: image point (u right, v down) of a direction (x right, y down, z forward).");
+    points_ = add(
+        "point_cloud", DType::kFloat32, {h, w, 3}, "m", -inf, inf, Storage::kArray,
+        "Point in the camera frame (x right, y up, looking along -z); NaN where nothing is seen.");
+  intrinsics_ =
+      add("intrinsics", DType::kFloat32, {3, 3}, "pixels", -inf, inf, Storage::kArray,
+          "K: image point (u right, v down) of a direction (x right, y down, z forward).");
   pose_ = add("pose", DType::kFloat32, {4, 4}, "m", -inf, inf, Storage::kArray,
               "X_WC of the image; the camera looks along its -z axis, y is up in the image.");
   pose_->spec.frame = "world";
@@ -129,7 +144,8 @@ void CameraSensor::declare_fields(int num_worlds) {
 // Image n is due from phase + n * period on; before that, and at a reset, the first one.
 bool CameraSensor::is_due(const World& world, std::int64_t& image) const {
   if (cfg_.update_period <= 0) return true;
-  const std::int64_t period = std::max<std::int64_t>(1, std::llround(cfg_.update_period / world.dt()));
+  const std::int64_t period =
+      std::max<std::int64_t>(1, std::llround(cfg_.update_period / world.dt()));
   const std::int64_t phase = std::llround(cfg_.phase / world.dt()) % period;
   const std::int64_t now = world.substep - phase;
   const std::int64_t n = now >= 0 ? now / period : -1;
@@ -143,7 +159,8 @@ void CameraSensor::compute(const World& world) {
   w.due = is_due(world, w.image);
   if (!w.due) return;
   const mjModel* m = world.model;
-  if (!cfg_.intrinsics && !w.grid.bent) w.grid = grid_of_camera(m, camera_, cfg_.width, cfg_.height);
+  if (!cfg_.intrinsics && !w.grid.bent)
+    w.grid = grid_of_camera(m, camera_, cfg_.width, cfg_.height);
   w.appearance.copy(m);
   std::ranges::copy(intrinsic_matrix(w.grid), intrinsics_->data.row<float>(world.id).begin());
   const double* p = world.data->cam_xpos + 3 * camera_;
@@ -172,7 +189,8 @@ ImageTargets CameraSensor::targets(int world) {
 const View& CameraSensor::build_view(const RayScene& rays, int world, ViewBuilder& builder) const {
   const RayWorld& state = rays.world(world);
   const RayCamera& camera = state.cameras()[camera_];
-  return builder.build(state, rays.shared(), worlds_[world].appearance, camera.pos, camera.mat, worlds_[world].grid);
+  return builder.build(state, rays.shared(), worlds_[world].appearance, camera.pos, camera.mat,
+                       worlds_[world].grid);
 }
 
 void CameraSensor::cast(const CastContext& context) {
@@ -182,7 +200,8 @@ void CameraSensor::cast(const CastContext& context) {
   const int count = static_cast<int>(due_.size());
   const int tile_rows = (cfg_.height + kTileSize - 1) / kTileSize;
   const int threads = context.pool.size();
-  const int bands = std::clamp((kItemsPerThread * threads + count - 1) / std::max(count, 1), 1, tile_rows);
+  const int bands =
+      std::clamp((kItemsPerThread * threads + count - 1) / std::max(count, 1), 1, tile_rows);
   const RayScene& rays = *context.rays;
   Workspace& work = *workspace_;
   if (threads == 1 || bands == 1) {
@@ -191,7 +210,8 @@ void CameraSensor::cast(const CastContext& context) {
       work.render(view, targets(due_[item]), 0, tile_rows, work.scratch[thread]);
     });
   } else {
-    context.pool.run(count, [&](int item, int) { build_view(rays, due_[item], work.builders[item]); });
+    context.pool.run(count,
+                     [&](int item, int) { build_view(rays, due_[item], work.builders[item]); });
     context.pool.run(count * bands, [&](int item, int thread) {
       const int image = item / bands, band = item % bands;
       work.render(work.builders[image].view(), targets(due_[image]), band * tile_rows / bands,

@@ -21,7 +21,8 @@ class CameraSensor final : public Sensor {
 
   std::string_view kind() const override { return "camera"; }
   Stage stage() const override { return Stage::kCast; }
-  // A camera with its own rate must see every control step: what it shows between two images is the older one.
+  // A camera with its own rate must see every control step: what it shows between two images is the
+  // older one.
   bool eager() const override { return cfg_.update_period > 0; }
   void edit_spec(mjSpec* spec) override;
   void initialize(const SensorInit& init) override;
@@ -54,7 +55,8 @@ class CameraSensor final : public Sensor {
   std::vector<int> due_;
   std::unique_ptr<Look> look_;
   std::unique_ptr<Workspace> workspace_;
-  Field *rgb_ = nullptr, *depth_ = nullptr, *segmentation_ = nullptr, *normals_ = nullptr, *points_ = nullptr;
+  Field *rgb_ = nullptr, *depth_ = nullptr, *segmentation_ = nullptr, *normals_ = nullptr,
+        *points_ = nullptr;
   Field *intrinsics_ = nullptr, *pose_ = nullptr;
 };
 
