@@ -162,5 +162,14 @@ TEST(RoundTrip, ClashingFiles) {
   expect_round_trip(scene);
 }
 
+TEST(RoundTrip, GeneratedTerrain) {
+  SceneCfg cfg;
+  cfg.terrain = TerrainCfg{.terrain_type = "generator", .levels = 2};
+  cfg.entities = {
+      {"a",
+       xml("<mujoco><worldbody><body><freejoint/><geom size='.1'/></body></worldbody></mujoco>")}};
+  expect_round_trip(Scene(std::move(cfg)));
+}
+
 }  // namespace
 }  // namespace mjsense

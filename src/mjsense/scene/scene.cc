@@ -50,6 +50,7 @@ struct Scene::Impl {
   Vfs vfs;
   SpecPtr spec;
   ModelPtr model;
+  std::optional<Terrain> terrain;
   std::vector<Attached> attached;
   std::vector<Entity> entities;
   std::vector<std::unique_ptr<Sensor>> sensors;
@@ -74,7 +75,7 @@ void Scene::Impl::build() {
   spec->compiler.savecompiled = 0;             // numbers are saved exactly
   spec->compiler.conflict = mjCONFLICT_MERGE;  // sizes: the larger wins
 
-  if (cfg.terrain) add_terrain(*cfg.terrain, spec.get());
+  if (cfg.terrain) terrain.emplace(*cfg.terrain).add_to(spec.get());
   {
     // What MuJoCo says about sizes while merging is of no use to anybody.
     std::vector<std::string> chatter;
@@ -182,8 +183,10 @@ std::vector<double> Scene::env_origins(int num_worlds) const {
   if (num_worlds < 1)
     throw ValueError(
         fmt::format("scene: env_origins of {} worlds; expected at least 1", num_worlds));
-  if (!impl_->cfg.terrain) return std::vector<double>(3 * num_worlds);
-  return terrain_origins(*impl_->cfg.terrain, num_worlds, impl_->cfg.env_spacing);
+  if (!impl_->terrain) return std::vector<double>(3 * num_worlds);
+  return impl_->terrain->env_origins(num_worlds, impl_->cfg.env_spacing);
 }
+
+const Terrain* Scene::terrain() const { return impl_->terrain ? &*impl_->terrain : nullptr; }
 
 }  // namespace mjsense

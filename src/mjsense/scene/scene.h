@@ -71,9 +71,10 @@ class Scene {
   const std::vector<Entity>& entities() const;        // the terrain, if any, first
   const Entity& entity(std::string_view name) const;  // throws KeyError with the nearest names
 
-  // World origins [B, 3], m: zeros without terrain, a grid on a plane, (level, type) tiles on
-  // generated terrain.
+  // World origins [B, 3], m: zeros without terrain, a grid on a plane, spawn points of (level,
+  // type) tiles on generated terrain.
   std::vector<double> env_origins(int num_worlds) const;
+  const Terrain* terrain() const;  // null if there is none
 
   // What was found odd but not wrong: options of entities that are not carried over, further
   // keyframes, MuJoCo's own.

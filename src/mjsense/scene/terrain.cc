@@ -2,31 +2,158 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <cmath>
 
 #include "mjsense/core/error.h"
+#include "mjsense/core/rng.h"
+#include "mjsense/scene/terrain_tile.h"
 
 namespace mjsense {
+namespace {
 
-void add_terrain(const TerrainCfg& cfg, mjSpec* spec) {
-  if (cfg.terrain_type != "plane") {
-    throw ValueError(
-        fmt::format("terrain: unknown terrain_type '{}'; expected plane", cfg.terrain_type));
-  }
-  mjsBody* body = mjs_addBody(mjs_findBody(spec, "world"), nullptr);
-  mjs_setName(body->element, "terrain");
-  mjsGeom* geom = mjs_addGeom(body, nullptr);
-  mjs_setName(geom->element, "terrain");
-  geom->type = mjGEOM_PLANE;
-  geom->size[2] = 0.01;
+void require(bool good, const std::string& what) {
+  if (!good) throw ValueError("terrain: " + what);
 }
 
-std::vector<double> terrain_origins(const TerrainCfg& /*cfg*/, int num_worlds, double env_spacing) {
-  // A grid centred on the world's origin, row i div cols along -x, column i mod cols along +y.
-  const int rows = (num_worlds + static_cast<int>(std::sqrt(num_worlds)) - 1) /
-                   static_cast<int>(std::sqrt(num_worlds));
-  const int cols = (num_worlds + rows - 1) / rows;
+void check(const std::string& name, const SubTerrainCfg& s, const TerrainCfg& cfg) {
+  const auto sub = [&](std::string_view text) {
+    return fmt::format("sub-terrain '{}': {}", name, text);
+  };
+  const double side = std::min(cfg.tile_size[0], cfg.tile_size[1]);
+  require(s.proportion >= 0 && std::isfinite(s.proportion),
+          sub(fmt::format("proportion = {} must be >= 0", s.proportion)));
+  require(s.platform_width > 0 && s.platform_width < side,
+          sub(fmt::format("platform_width = {} m must be between 0 and the tile's {} m",
+                          s.platform_width, side)));
+  require(s.spacing > 0, sub("spacing must be positive (m)"));
+  require(s.step_width > 0, sub("step_width must be positive (m)"));
+  require(s.pit_depth > 0, sub("pit_depth must be positive (m)"));
+  require(s.waves > 0, sub("waves must be positive"));
+  for (int i = 0; i < 2; ++i) {
+    require(s.stone_width[i] > 0.02, sub("stone_width must be more than 0.02 m"));
+    require(s.gap[i] >= 0, sub("gap must be >= 0 (m)"));
+    require(s.step_height[i] > 0, sub("step_height must be positive (m)"));
+    require(s.amplitude[i] >= 0, sub("amplitude must be >= 0 (m)"));
+    require(s.slope[i] >= 0, sub("slope must be >= 0; use inverted for a pit"));
+    require(std::abs(s.stone_height[i]) < s.pit_depth,
+            sub("stone_height must be less than pit_depth"));
+  }
+}
+
+// How many columns each sub-terrain gets: by proportion, in order, ends of the columns rounded
+// down.
+std::vector<int> share_columns(const TerrainCfg& cfg, int types) {
+  double total = 0;
+  for (const auto& [name, sub] : cfg.sub_terrains) total += sub.proportion;
+  require(total > 0, "the proportions of the sub-terrains add up to 0");
+  std::vector<int> column(types);
+  for (int j = 0; j < types; ++j) {
+    const double x = (j + 0.5) / types * total;
+    double sum = 0;
+    std::size_t k = 0;
+    while (k + 1 < cfg.sub_terrains.size() && (sum += cfg.sub_terrains[k].second.proportion) <= x)
+      ++k;
+    column[j] = static_cast<int>(k);
+  }
+  return column;
+}
+
+}  // namespace
+
+Terrain::Terrain(TerrainCfg cfg) : cfg_(std::move(cfg)) {
+  if (cfg_.terrain_type == "plane") return;
+  require(cfg_.terrain_type == "generator",
+          fmt::format("unknown terrain_type '{}'; expected plane or generator", cfg_.terrain_type));
+  if (cfg_.sub_terrains.empty()) {
+    for (const char* kind : {"flat", "rough", "waves", "slope", "stairs", "stepping_stones"}) {
+      cfg_.sub_terrains.emplace_back(kind, SubTerrainCfg{.kind = kind});
+    }
+  }
+  require(cfg_.levels > 0, fmt::format("levels = {} must be positive", cfg_.levels));
+  require(cfg_.types >= 0, fmt::format("types = {} must be >= 0", cfg_.types));
+  require(cfg_.tile_size[0] > 0 && cfg_.tile_size[1] > 0, "tile_size must be positive (m)");
+  require(
+      cfg_.resolution > 0 && cfg_.resolution <= std::min(cfg_.tile_size[0], cfg_.tile_size[1]) / 2,
+      fmt::format("resolution = {} m must be positive and at most half a tile", cfg_.resolution));
+  require(cfg_.border >= 0, fmt::format("border = {} m must be >= 0", cfg_.border));
+  require(cfg_.max_init_level < cfg_.levels,
+          fmt::format("max_init_level = {}, but there are {} levels", cfg_.max_init_level,
+                      cfg_.levels));
+  for (const auto& [name, sub] : cfg_.sub_terrains) check(name, sub, cfg_);
+  levels_ = cfg_.levels;
+  types_ = cfg_.types > 0 ? cfg_.types : static_cast<int>(cfg_.sub_terrains.size());
+  column_ = share_columns(cfg_, types_);
+}
+
+const std::string& Terrain::type_name(int type) const {
+  return cfg_.sub_terrains[column_[type]].first;
+}
+
+void Terrain::add_to(mjSpec* spec) {
+  mjsBody* body = mjs_addBody(mjs_findBody(spec, "world"), nullptr);
+  mjs_setName(body->element, "terrain");
+  if (levels_ == 0) {
+    mjsGeom* geom = mjs_addGeom(body, nullptr);
+    mjs_setName(geom->element, "terrain");
+    geom->type = mjGEOM_PLANE;
+    geom->size[2] = 0.01;
+    return;
+  }
+  const auto [sx, sy] = cfg_.tile_size;
+  origins_.clear();
+  for (int level = 0; level < levels_; ++level) {
+    const double x = levels_ == 1 ? 0.5 : level / (levels_ - 1.0);
+    for (int type = 0; type < types_; ++type) {
+      Tile tile{.spec = spec,
+                .body = body,
+                .name = fmt::format("terrain_{}_{}", level, type),
+                .centre = {(level - (levels_ - 1) / 2.0) * sx, (type - (types_ - 1) / 2.0) * sy},
+                .size = cfg_.tile_size,
+                .difficulty = cfg_.difficulty[0] + (cfg_.difficulty[1] - cfg_.difficulty[0]) * x,
+                .resolution = cfg_.resolution,
+                .rng = Rng(cfg_.seed, static_cast<std::uint32_t>(level * types_ + type),
+                           stream_of("terrain"), 0)};
+      const double z = build_tile(cfg_.sub_terrains[column_[type]].second, tile);
+      origins_.insert(origins_.end(), {tile.centre[0], tile.centre[1], z});
+    }
+  }
+  if (const double b = cfg_.border; b > 0) {
+    const double wx = levels_ * sx, wy = types_ * sy;
+    const std::array<float, 4> grey{0.5f, 0.5f, 0.5f, 1.0f};
+    add_box(body, "terrain_border", {0, -(wy + b) / 2}, {wx + 2 * b, b}, -1, 0, grey);
+    add_box(body, "terrain_border_1", {0, (wy + b) / 2}, {wx + 2 * b, b}, -1, 0, grey);
+    add_box(body, "terrain_border_2", {-(wx + b) / 2, 0}, {b, wy}, -1, 0, grey);
+    add_box(body, "terrain_border_3", {(wx + b) / 2, 0}, {b, wy}, -1, 0, grey);
+  }
+}
+
+std::vector<int> Terrain::env_tiles(int num_worlds) const {
+  std::vector<int> tiles(2 * num_worlds);
+  if (levels_ == 0) return tiles;
+  const int top = cfg_.max_init_level < 0 ? levels_ - 1 : cfg_.max_init_level;
+  for (int i = 0; i < num_worlds; ++i) {
+    Rng rng(cfg_.seed, static_cast<std::uint32_t>(i), stream_of("terrain level"), 0);
+    tiles[2 * i] = static_cast<int>(rng.below(top + 1));
+    tiles[2 * i + 1] = static_cast<int>(static_cast<std::int64_t>(i) * types_ / num_worlds);
+  }
+  return tiles;
+}
+
+std::vector<double> Terrain::env_origins(int num_worlds, double env_spacing) const {
   std::vector<double> origins(3 * num_worlds);
+  if (levels_ > 0) {
+    const std::vector<int> tiles = env_tiles(num_worlds);
+    for (int i = 0; i < num_worlds; ++i) {
+      std::copy_n(origins_.begin() + 3 * (tiles[2 * i] * types_ + tiles[2 * i + 1]), 3,
+                  origins.begin() + 3 * i);
+    }
+    return origins;
+  }
+  // A grid centred on the world's origin: row i div cols goes along -x, column i mod cols along +y.
+  const int root = static_cast<int>(std::sqrt(num_worlds));
+  const int rows = (num_worlds + root - 1) / root;
+  const int cols = (num_worlds + rows - 1) / rows;
   for (int i = 0; i < num_worlds; ++i) {
     origins[3 * i] = -(i / cols - (rows - 1) / 2.0) * env_spacing;
     origins[3 * i + 1] = (i % cols - (cols - 1) / 2.0) * env_spacing;

@@ -1,0 +1,172 @@
+#include "mjsense/scene/terrain.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <memory>
+
+#include "mjsense/core/error.h"
+#include "mjsense/scene/scene.h"
+
+namespace mjsense {
+namespace {
+
+using ::testing::ElementsAre;
+using ::testing::HasSubstr;
+
+struct DataDelete {
+  void operator()(mjData* data) const { mj_deleteData(data); }
+};
+
+TEST(Terrain, PlaneOriginsAreAGrid) {
+  Terrain plane({});
+  EXPECT_THAT(plane.env_origins(1, 3), ElementsAre(0, 0, 0));
+  EXPECT_THAT(plane.env_origins(2, 3), ElementsAre(1.5, 0, 0, -1.5, 0, 0));
+  EXPECT_THAT(plane.env_origins(5, 2),
+              ElementsAre(2, -1, 0, 2, 1, 0, 0, -1, 0, 0, 1, 0, -2, -1, 0));
+  EXPECT_THAT(plane.env_origins(9, 3), ElementsAre(3, -3, 0, 3, 0, 0, 3, 3, 0, 0, -3, 0, 0, 0, 0, 0,
+                                                   3, 0, -3, -3, 0, -3, 0, 0, -3, 3, 0));
+}
+
+class Generated {
+ public:
+  explicit Generated(TerrainCfg cfg) {
+    cfg.terrain_type = "generator";
+    SceneCfg scene;
+    scene.terrain = std::move(cfg);
+    scene_ = std::make_unique<Scene>(std::move(scene));
+    data_.reset(mj_makeData(scene_->model()));
+    mj_forward(scene_->model(), data_.get());
+  }
+  const Terrain& terrain() const { return *scene_->terrain(); }
+  const Scene& scene() const { return *scene_; }
+  // Height of the ground below (x, y), NaN where there is none.
+  double height(double x, double y) const {
+    const mjtNum from[] = {x, y, 50}, down[] = {0, 0, -1};
+    int geom = -1;
+    const double t =
+        mj_ray(scene_->model(), data_.get(), from, down, nullptr, 1, -1, &geom, nullptr);
+    return t < 0 ? std::nan("") : 50 - t;
+  }
+
+ private:
+  std::unique_ptr<Scene> scene_;
+  std::unique_ptr<mjData, DataDelete> data_;
+};
+
+TEST(Terrain, SpawnPointsLieOnTheGround) {
+  Generated g({.levels = 3});
+  ASSERT_EQ(g.terrain().levels(), 3);
+  ASSERT_EQ(g.terrain().types(), 6);
+  const auto& origins = g.terrain().tile_origins();
+  ASSERT_EQ(origins.size(), 3u * 6 * 3);
+  for (std::size_t i = 0; i < origins.size(); i += 3) {
+    EXPECT_NEAR(g.height(origins[i] + 1e-4, origins[i + 1] + 1e-4), origins[i + 2], 1e-3) << i / 3;
+  }
+  EXPECT_THAT(g.scene().entity("terrain").body_names, ElementsAre("terrain"));
+  EXPECT_DOUBLE_EQ(origins[0], -8);
+  EXPECT_DOUBLE_EQ(origins[1], -20);
+}
+
+// Heights by hand at asymmetric points: they fail for a transposed or mirrored height field.
+TEST(Terrain, ShapesByHand) {
+  TerrainCfg cfg;
+  cfg.levels = 1;
+  cfg.tile_size = {8, 6};
+  cfg.sub_terrains = {
+      {"slope", {.kind = "slope", .slope = {.2, .4}}},
+      {"pit", {.kind = "slope", .inverted = true, .slope = {.3, .3}}},
+      {"stairs", {.kind = "stairs", .step_height = {.1, .1}, .step_width = .5}},
+      {"hole", {.kind = "stairs", .inverted = true, .step_height = {.1, .1}, .step_width = .5}},
+      {"waves", {.kind = "waves", .amplitude = {.1, .1}, .waves = 1}}};
+  Generated g(cfg);
+  const auto at = [&](int type, double x, double y) {
+    const double* o = g.terrain().tile_origins().data() + 3 * type;
+    return g.height(o[0] + x, o[1] + y);
+  };
+  EXPECT_NEAR(at(0, 0, 0), .3 * 2, 1e-6);
+  EXPECT_NEAR(at(0, 3.5, .3), .3 * .5, 1e-6);
+  EXPECT_NEAR(at(0, -.35, 2.5), .3 * .5, 1e-6);
+  EXPECT_NEAR(at(1, 3.5, .3), -.3 * .5, 1e-6);
+  EXPECT_NEAR(at(2, 3.25, 0), .1, 1e-9);
+  EXPECT_NEAR(at(2, 0, -2.75), 0, 1e-9);
+  EXPECT_NEAR(at(2, .2, .3), .4, 1e-9);
+  EXPECT_NEAR(at(3, 3.25, 0), -.1, 1e-9);
+  EXPECT_NEAR(at(3, 0, -1.9), -.2, 1e-9);
+  EXPECT_NEAR(at(3, .2, .3), -.4, 1e-9);
+  EXPECT_NEAR(at(4, -2, -1.5), .1, 1e-4);
+  EXPECT_NEAR(at(4, 2, -1.5), -.1, 1e-4);
+  EXPECT_NEAR(at(4, -1, -.75), .1 * .5, 2e-3);
+  EXPECT_NEAR(g.height(4 + 2, 0), 0, 1e-9);  // the border
+}
+
+TEST(Terrain, SteppingStonesHaveGaps) {
+  TerrainCfg cfg;
+  cfg.levels = 2;
+  cfg.border = 0;
+  cfg.sub_terrains = {{"stones",
+                       {.kind = "stepping_stones",
+                        .stone_width = {.5, .3},
+                        .gap = {.1, .3},
+                        .stone_height = {0, .1}}}};
+  Generated g(cfg);
+  int low = 0, high = 0;
+  for (double x = -3.9; x < 3.9; x += .09) {
+    const double z = g.height(-4 + x, 3.1);
+    EXPECT_TRUE(std::abs(z) < 1e-9 || std::abs(z + 1) < 1e-9) << x << " " << z;
+    z < -.5 ? ++low : ++high;
+  }
+  EXPECT_NEAR(low / double(low + high), 1.0 / 6, .06);  // the gaps
+  EXPECT_NEAR(g.height(-4, 0), 0, 1e-9);
+  EXPECT_TRUE(std::isnan(g.height(20, 20)));
+}
+
+TEST(Terrain, IsDeterministicAndSharesOutColumns) {
+  TerrainCfg cfg;
+  cfg.terrain_type = "generator";
+  cfg.seed = 5;
+  cfg.types = 8;
+  cfg.max_init_level = 2;
+  cfg.sub_terrains = {{"a", {.kind = "rough", .proportion = 3}},
+                      {"b", {.kind = "flat", .proportion = 1}}};
+  Generated one(cfg), two(cfg);
+  cfg.seed = 6;
+  Generated other(cfg);
+  EXPECT_EQ(one.height(-7.3, -13.1), two.height(-7.3, -13.1));
+  EXPECT_NE(one.height(-7.3, -13.1), other.height(-7.3, -13.1));
+  int b = 0;
+  for (int j = 0; j < 8; ++j) b += one.terrain().type_name(j) == "b";
+  EXPECT_EQ(b, 2);
+  const std::vector<int> tiles = one.terrain().env_tiles(160);
+  std::vector<int> levels(5), types(8);
+  for (int i = 0; i < 160; ++i) ++levels[tiles[2 * i]], ++types[tiles[2 * i + 1]];
+  EXPECT_THAT(types, ::testing::Each(20));
+  EXPECT_EQ(levels[3] + levels[4], 0);
+  EXPECT_GT(std::min({levels[0], levels[1], levels[2]}), 30);
+  EXPECT_EQ(one.scene().env_origins(160), two.scene().env_origins(160));
+}
+
+TEST(Terrain, SaysWhatIsWrong) {
+  const auto fault = [](TerrainCfg cfg) -> std::string {
+    try {
+      SceneCfg scene;
+      scene.terrain = std::move(cfg);
+      Scene{std::move(scene)};
+    } catch (const ValueError& error) {
+      return error.what();
+    }
+    return "";
+  };
+  EXPECT_THAT(fault({.terrain_type = "hills"}), HasSubstr("expected plane or generator"));
+  EXPECT_THAT(fault({.terrain_type = "generator", .levels = 0}), HasSubstr("levels = 0"));
+  EXPECT_THAT(fault({.terrain_type = "generator", .sub_terrains = {{"x", {.kind = "stair"}}}}),
+              HasSubstr("did you mean 'stairs'"));
+  EXPECT_THAT(fault({.terrain_type = "generator", .sub_terrains = {{"x", {.platform_width = 9}}}}),
+              HasSubstr("sub-terrain 'x': platform_width = 9 m"));
+  EXPECT_THAT(fault({.terrain_type = "generator", .max_init_level = 5}),
+              HasSubstr("max_init_level = 5"));
+}
+
+}  // namespace
+}  // namespace mjsense

@@ -1,0 +1,198 @@
+#include "mjsense/scene/terrain_tile.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <functional>
+#include <numbers>
+#include <vector>
+
+#include "mjsense/core/error.h"
+
+namespace mjsense {
+namespace {
+
+constexpr double kThickness = 1.0;  // m, of the ground below its lowest point
+
+double at(const std::array<double, 2>& range, double difficulty) {
+  return range[0] + (range[1] - range[0]) * difficulty;
+}
+
+std::array<float, 4> colour(double difficulty) {
+  const float x = static_cast<float>(difficulty);
+  return {0.45f + 0.25f * x, 0.55f - 0.1f * x, 0.45f - 0.1f * x, 1.0f};
+}
+
+// Boxes of one tile, numbered.
+class Boxes {
+ public:
+  explicit Boxes(Tile& tile) : tile_(tile) {}
+  void add(double x, double y, double wx, double wy, double bottom, double top) {
+    add_box(tile_.body, count_ == 0 ? tile_.name : fmt::format("{}_{}", tile_.name, count_),
+            {tile_.centre[0] + x, tile_.centre[1] + y}, {wx, wy}, bottom, top,
+            colour(tile_.difficulty));
+    ++count_;
+  }
+
+ private:
+  Tile& tile_;
+  int count_ = 0;
+};
+
+// A height field from z = height(x, y), x and y from the tile's centre (m).
+void add_height_field(Tile& tile, const std::function<double(double, double)>& height) {
+  const int nx = static_cast<int>(std::lround(tile.size[0] / tile.resolution)) + 1;
+  const int ny = static_cast<int>(std::lround(tile.size[1] / tile.resolution)) + 1;
+  std::vector<float> z(static_cast<std::size_t>(nx) * ny);
+  for (int j = 0; j < ny; ++j) {
+    for (int i = 0; i < nx; ++i) {
+      z[j * nx + i] = static_cast<float>(
+          height(tile.size[0] * (i / (nx - 1.0) - 0.5), tile.size[1] * (j / (ny - 1.0) - 0.5)));
+    }
+  }
+  const auto [low, high] = std::minmax_element(z.begin(), z.end());
+  const double bottom = *low, range = std::max(1e-4, static_cast<double>(*high) - *low);
+
+  mjsHField* field = mjs_addHField(tile.spec);
+  mjs_setName(field->element, tile.name.c_str());
+  field->nrow = ny;
+  field->ncol = nx;
+  field->size[0] = tile.size[0] / 2;
+  field->size[1] = tile.size[1] / 2;
+  field->size[2] = range;
+  field->size[3] = kThickness;
+  mjs_setFloat(field->userdata, z.data(), static_cast<int>(z.size()));
+
+  mjsGeom* geom = mjs_addGeom(tile.body, nullptr);
+  mjs_setName(geom->element, tile.name.c_str());
+  geom->type = mjGEOM_HFIELD;
+  mjs_setString(geom->hfieldname, tile.name.c_str());
+  geom->pos[0] = tile.centre[0];
+  geom->pos[1] = tile.centre[1];
+  geom->pos[2] = bottom;
+  const auto rgba = colour(tile.difficulty);
+  std::copy(rgba.begin(), rgba.end(), geom->rgba);
+}
+
+double flat(const SubTerrainCfg&, Tile& tile) {
+  Boxes(tile).add(0, 0, tile.size[0], tile.size[1], -kThickness, 0);
+  return 0;
+}
+
+double rough(const SubTerrainCfg& cfg, Tile& tile) {
+  const double amplitude = at(cfg.amplitude, tile.difficulty);
+  const int nx = static_cast<int>(std::ceil(tile.size[0] / cfg.spacing)) + 2;
+  const int ny = static_cast<int>(std::ceil(tile.size[1] / cfg.spacing)) + 2;
+  std::vector<double> knots(static_cast<std::size_t>(nx) * ny);
+  for (double& z : knots) z = tile.rng.uniform(-amplitude, amplitude);
+  const auto height = [&](double x, double y) {  // bilinear between the knots
+    const double u = (x + tile.size[0] / 2) / cfg.spacing, v = (y + tile.size[1] / 2) / cfg.spacing;
+    const int i = std::clamp(static_cast<int>(u), 0, nx - 2),
+              j = std::clamp(static_cast<int>(v), 0, ny - 2);
+    const double a = u - i, b = v - j;
+    const double* z = knots.data() + j * nx + i;
+    return (1 - b) * ((1 - a) * z[0] + a * z[1]) + b * ((1 - a) * z[nx] + a * z[nx + 1]);
+  };
+  add_height_field(tile, height);
+  return height(0, 0);
+}
+
+double waves(const SubTerrainCfg& cfg, Tile& tile) {
+  const double amplitude = at(cfg.amplitude, tile.difficulty);
+  const auto height = [&](double x, double y) {
+    const double k = 2 * std::numbers::pi * cfg.waves;
+    return amplitude * std::sin(k * (x / tile.size[0] + 0.5)) *
+           std::sin(k * (y / tile.size[1] + 0.5));
+  };
+  add_height_field(tile, height);
+  return height(0, 0);
+}
+
+double slope(const SubTerrainCfg& cfg, Tile& tile) {
+  const double rise = at(cfg.slope, tile.difficulty) * (cfg.inverted ? -1 : 1);
+  const double reach = std::min(tile.size[0], tile.size[1]) / 2 - cfg.platform_width / 2;
+  const auto height = [&](double x, double y) {
+    const double inside = std::min(tile.size[0] / 2 - std::abs(x), tile.size[1] / 2 - std::abs(y));
+    return rise * std::clamp(inside, 0.0, reach);
+  };
+  add_height_field(tile, height);
+  return height(0, 0);
+}
+
+double stairs(const SubTerrainCfg& cfg, Tile& tile) {
+  const double step = at(cfg.step_height, tile.difficulty);
+  const double room = (std::min(tile.size[0], tile.size[1]) - cfg.platform_width) / 2;
+  const int steps = static_cast<int>(room / cfg.step_width);
+  Boxes boxes(tile);
+  if (!cfg.inverted) {  // each step is a box that stands on the one before
+    for (int k = 0; k <= steps; ++k) {
+      const double in = 2 * k * cfg.step_width;
+      boxes.add(0, 0, tile.size[0] - in, tile.size[1] - in, k == 0 ? -kThickness : (k - 1) * step,
+                k * step);
+    }
+    return steps * step;
+  }
+  for (int k = 0; k < steps; ++k) {  // each step is a ring of four boxes
+    const double wx = tile.size[0] - 2 * k * cfg.step_width,
+                 wy = tile.size[1] - 2 * k * cfg.step_width;
+    const double bottom = -steps * step - kThickness, top = -k * step, w = cfg.step_width;
+    boxes.add(-(wx - w) / 2, 0, w, wy, bottom, top);
+    boxes.add((wx - w) / 2, 0, w, wy, bottom, top);
+    boxes.add(0, -(wy - w) / 2, wx - 2 * w, w, bottom, top);
+    boxes.add(0, (wy - w) / 2, wx - 2 * w, w, bottom, top);
+  }
+  const double in = 2 * steps * cfg.step_width;
+  boxes.add(0, 0, tile.size[0] - in, tile.size[1] - in, -steps * step - kThickness, -steps * step);
+  return -steps * step;
+}
+
+double stepping_stones(const SubTerrainCfg& cfg, Tile& tile) {
+  const double stone = at(cfg.stone_width, tile.difficulty), gap = at(cfg.gap, tile.difficulty);
+  const double uneven = at(cfg.stone_height, tile.difficulty), pitch = stone + gap;
+  const double bottom = -cfg.pit_depth;
+  Boxes boxes(tile);
+  boxes.add(0, 0, tile.size[0], tile.size[1], bottom - kThickness, bottom);
+  boxes.add(0, 0, cfg.platform_width, cfg.platform_width, bottom, 0);
+  const int nx = static_cast<int>((tile.size[0] + gap) / pitch),
+            ny = static_cast<int>((tile.size[1] + gap) / pitch);
+  const double clear = cfg.platform_width / 2 + gap / 2 + stone / 2;
+  for (int j = 0; j < ny; ++j) {
+    for (int i = 0; i < nx; ++i) {
+      const double x = (i - (nx - 1) / 2.0) * pitch, y = (j - (ny - 1) / 2.0) * pitch;
+      const double top = tile.rng.uniform(-uneven, uneven);
+      if (std::abs(x) < clear && std::abs(y) < clear) continue;
+      boxes.add(x, y, stone, stone, bottom, top);
+    }
+  }
+  return 0;
+}
+
+}  // namespace
+
+void add_box(mjsBody* body, const std::string& name, std::array<double, 2> centre,
+             std::array<double, 2> size, double bottom, double top,
+             const std::array<float, 4>& rgba) {
+  mjsGeom* geom = mjs_addGeom(body, nullptr);
+  mjs_setName(geom->element, name.c_str());
+  geom->type = mjGEOM_BOX;
+  const double pos[] = {centre[0], centre[1], (bottom + top) / 2};
+  const double half[] = {size[0] / 2, size[1] / 2, (top - bottom) / 2};
+  std::copy(pos, pos + 3, geom->pos);
+  std::copy(half, half + 3, geom->size);
+  std::copy(rgba.begin(), rgba.end(), geom->rgba);
+}
+
+double build_tile(const SubTerrainCfg& cfg, Tile& tile) {
+  if (cfg.kind == "flat") return flat(cfg, tile);
+  if (cfg.kind == "rough") return rough(cfg, tile);
+  if (cfg.kind == "waves") return waves(cfg, tile);
+  if (cfg.kind == "slope") return slope(cfg, tile);
+  if (cfg.kind == "stairs") return stairs(cfg, tile);
+  if (cfg.kind == "stepping_stones") return stepping_stones(cfg, tile);
+  const std::vector<std::string> kinds = {"flat",  "rough",  "waves",
+                                          "slope", "stairs", "stepping_stones"};
+  throw ValueError(fmt::format("terrain: unknown kind '{}'{}", cfg.kind, suggest(cfg.kind, kinds)));
+}
+
+}  // namespace mjsense

@@ -1,0 +1,34 @@
+#pragma once
+// One tile of a generated terrain.
+
+#include <mujoco/mujoco.h>
+
+#include <array>
+#include <string>
+
+#include "mjsense/core/rng.h"
+#include "mjsense/scene/terrain.h"
+
+namespace mjsense {
+
+struct Tile {
+  mjSpec* spec;
+  mjsBody* body;
+  std::string name;              // of its geoms, and of its height field
+  std::array<double, 2> centre;  // m
+  std::array<double, 2> size;    // m
+  double difficulty;             // 0 .. 1
+  double resolution;             // m
+  Rng rng;
+};
+
+// Adds the tile's geoms; returns the height (m) of its surface at the centre. Throws ValueError for
+// an unknown kind.
+double build_tile(const SubTerrainCfg& cfg, Tile& tile);
+
+// A box with its top at `top` and its bottom at `bottom`, sizes in m.
+void add_box(mjsBody* body, const std::string& name, std::array<double, 2> centre,
+             std::array<double, 2> size, double bottom, double top,
+             const std::array<float, 4>& rgba);
+
+}  // namespace mjsense
