@@ -35,3 +35,4 @@ from mjsense.raycast import CameraSensor, RayCastSensor, TerrainHeightSensor
 from mjsense.scene import Entity, Scene
 from mjsense.sensor import BuiltinSensor, NativeSensor, Sensor, SensorError
 from mjsense.simulation import Simulation
+from mjsense.suite import SensorSuite

@@ -114,6 +114,21 @@ class Scene:
         """The terrain, if there is one, first."""
         return MappingProxyType({name: Entity(name, names) for name, names in self._core.entities().items()})
 
+    def _entities_of_spec(self) -> dict[str, Entity]:
+        """The entities before compilation, as far as names go."""
+        kinds = {"body": "bodies", "geom": "geoms", "site": "sites", "joint": "joints", "actuator": "actuators",
+                 "tendon": "tendons", "camera": "cameras"}  # fmt: skip
+        entities = {}
+        for name in self.cfg.entities:
+            prefix = name + "/"
+            described: dict[str, Any] = {
+                f"{kind}_names": tuple(e.name[len(prefix) :] for e in getattr(self.spec, many) if e.name.startswith(prefix))
+                for kind, many in kinds.items()
+            }
+            described["fixed_base"] = "mocap_base" in described["body_names"]
+            entities[name] = Entity(name, described)
+        return entities
+
     @cached_property
     def model(self) -> mujoco.MjModel:
         """A copy of the compiled model, for looking things up. Changing it changes no simulation."""

@@ -9,6 +9,7 @@ from collections.abc import Mapping, Sequence
 from types import MappingProxyType
 from typing import TYPE_CHECKING, Any
 
+import gymnasium
 import numpy as np
 
 from mjsense import _core, data
@@ -86,8 +87,31 @@ class NativeSensor:
         return specs[""]
 
     @property
+    def uuid(self) -> str:
+        """Its name, as suites call it."""
+        return self.name
+
+    @property
+    def observation_space(self) -> gymnasium.Space:
+        """gymnasium space of one world's value: a Box, or a Dict of one Box a field."""
+        spaces = {name: _box(spec) for name, spec in self.specs.items()}
+        return spaces[""] if "" in spaces else gymnasium.spaces.Dict(spaces)
+
+    @property
     def bytes_per_world(self) -> int:
+        """Memory of one world's row."""
         return self._handle.bytes_per_world
+
+
+def _box(spec: _core.SensorSpec) -> gymnasium.spaces.Box:
+    dtype = np.dtype(spec.dtype)
+    low, high = spec.low, spec.high
+    if dtype.kind in "iu":
+        info = np.iinfo(dtype)
+        low, high = max(low, info.min), min(high, info.max)
+    elif dtype.kind == "b":
+        low, high = 0, 1
+    return gymnasium.spaces.Box(low, high, spec.shape, dtype)
 
 
 class Sensor:
@@ -210,7 +234,7 @@ class Sensor:
         wanted = len([p for p in inspect.signature(function).parameters.values() if p.default is p.empty and p.kind < 2])
         with _named(self, method):
             if method == "edit_spec" and wanted == 2:
-                function(first, owner.entities)
+                function(first, owner._entities_of_spec())
             elif method == "initialize" and wanted == 4:
                 function(owner.model, owner.model, owner.data, "cpu")
             else:

@@ -59,9 +59,11 @@ mjSpec* spec_of(nb::handle mjspec) {
 
 // What an EntityCfg's `model` stands for, as EntityCfg._source() tells: ("path" | "xml" | "spec",
 // value).
-ModelSource read_source(nb::handle config) {
+// What it refers to is added to `alive`.
+ModelSource read_source(nb::handle config, nb::list& alive) {
   ModelSource source;
   const auto from = nb::cast<nb::tuple>(config.attr("_source")());
+  alive.append(from);
   const auto kind = nb::cast<std::string>(from[0]);
   if (kind == "path") source.path = nb::cast<std::string>(from[1]);
   if (kind == "xml") source.xml = nb::cast<std::string>(from[1]);
@@ -121,12 +123,13 @@ std::shared_ptr<Scene> make_scene(nb::handle config, nb::handle spec, nb::list s
   }
   FromPython options(config.attr("options"));
   fields(options, cfg.options);
+  nb::list alive;
   for (auto [name, entity] : nb::dict(config.attr("entities"))) {
     auto& [key, entity_cfg] = cfg.entities.emplace_back();
     key = nb::cast<std::string>(name);
     FromPython fields_of(entity);
     fields(fields_of, entity_cfg);
-    entity_cfg.model = read_source(entity);
+    entity_cfg.model = read_source(entity, alive);
   }
   for (nb::handle sensor : sensors) cfg.sensors.push_back(read_sensor(sensor));
   cfg.spec = spec_of(spec);

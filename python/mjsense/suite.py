@@ -1,0 +1,100 @@
+"""Suites: what a policy observes and what a recording stores."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator, Sequence
+from typing import Any
+
+import gymnasium
+import numpy as np
+
+from mjsense.errors import UnknownNameError
+from mjsense.sensor import NativeSensor, Sensor
+
+
+class SensorSuite:
+    """An ordered set of sensors with unique names.
+
+    ``suite.get_observations(sim)`` gives the arrays of all worlds ``[B, ...]``, without a copy;
+    ``suite.get_observations(env, task, batch_index)`` one world's, copied, as MolmoSpaces does.
+    """
+
+    def __init__(self, sensors: Iterable[Any] = ()) -> None:
+        self.sensors: dict[str, Any] = {}
+        self.extend(sensors)
+
+    def add(self, sensor: Any) -> None:
+        """Adds a sensor of the scene or one of your own."""
+        if not isinstance(sensor, (Sensor, NativeSensor)):
+            raise TypeError(f"not a sensor: {sensor!r}")
+        uuid = sensor.uuid
+        if not uuid:
+            raise ValueError(f"{type(sensor).__name__} has no uuid")
+        if uuid in self.sensors:
+            raise AssertionError(f"'{uuid}' is duplicated sensor uuid")
+        self.sensors[uuid] = sensor
+
+    def extend(self, sensors: Iterable[Any]) -> None:
+        """Adds them in order; those before a clash stay added."""
+        for sensor in sensors:
+            self.add(sensor)
+
+    def get(self, uuid: str) -> Any:
+        """The sensor of this name."""
+        if uuid not in self.sensors:
+            raise UnknownNameError(f"no sensor '{uuid}' in the suite; there are {', '.join(self.sensors) or 'none'}")
+        return self.sensors[uuid]
+
+    __getitem__ = get
+
+    def __contains__(self, uuid: object) -> bool:
+        return uuid in self.sensors
+
+    def __iter__(self) -> Iterator[Any]:
+        return iter(self.sensors.values())
+
+    def __len__(self) -> int:
+        return len(self.sensors)
+
+    @property
+    def observation_spaces(self) -> gymnasium.spaces.Dict:
+        """Space of one world's observation."""
+        return gymnasium.spaces.Dict({uuid: s.observation_space for uuid, s in self.sensors.items()})
+
+    def reset(self, world_ids: Sequence[int] | None = None) -> None:
+        """Calls reset() of the sensors that are written in Python."""
+        for sensor in self.sensors.values():
+            if isinstance(sensor, Sensor):
+                sensor._reset(list(range(sensor.sim.num_worlds)) if world_ids is None else list(world_ids))
+
+    def get_observations(self, env: Any, task: Any = None, batch_index: int | None = None) -> dict[str, Any]:
+        """A new dict in the suite's order.
+
+        Args:
+            env: a Simulation, or anything that has one as ``sim``.
+            task: handed to get_observation() of your sensors.
+            batch_index: one world; all of them if not given.
+        """
+        sim = getattr(env, "sim", env)
+        for sensor in self.sensors.values():
+            if isinstance(sensor, Sensor) and sensor._core is None:
+                sim.add(sensor)
+        if batch_index is None:
+            sim.refresh(list(self.sensors.values()))
+            return {uuid: sensor.data for uuid, sensor in self.sensors.items()}
+        if not 0 <= batch_index < sim.num_worlds:
+            raise ValueError(f"batch_index {batch_index}: must be in [0, {sim.num_worlds})")
+        out = {}
+        for uuid, sensor in self.sensors.items():
+            if isinstance(sensor, Sensor) and type(sensor).get_observation is not Sensor.get_observation:
+                out[uuid] = sensor.get_observation(env, task, batch_index)
+            elif isinstance(sensor, Sensor):
+                out[uuid] = _copied(sensor.data[batch_index])
+            else:
+                rows = {name: array[batch_index].copy() for name, array in sensor.fields.items()}
+                out[uuid] = rows[""] if "" in rows else rows
+        return out
+
+
+def _copied(row: Any) -> Any:
+    return row.copy() if isinstance(row, np.ndarray) else row

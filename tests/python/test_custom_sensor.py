@@ -1,0 +1,250 @@
+import json
+
+import gymnasium
+import numpy as np
+import pytest
+from scenes import ball_scene, feet_cfg
+
+import mjsense as mjs
+
+BOX = gymnasium.spaces.Box(-np.inf, np.inf, (1,), np.float32)
+
+
+class Height(mjs.Sensor):
+    """Height of the ball."""
+
+    uuid = "height"
+    observation_space = BOX
+    unit = "m"
+    calls = 0
+
+    def compute(self, sim):
+        self.calls += 1
+        return sim.qpos[:, 2:3]
+
+
+class HeightOfMjlab(mjs.Sensor):
+    def __init__(self):
+        super().__init__()
+        self.uuid = "height"
+
+    def edit_spec(self, spec, entities):
+        self.entities = {name: entity.geom_names for name, entity in entities.items()}
+
+    def initialize(self, mj_model, model, data, device):
+        self._mj_data = data
+        self.nq = mj_model.nq
+
+    def _compute_data(self):
+        return self._mj_data.qpos[:, 2:3]
+
+
+class HeightOfMolmo(mjs.Sensor):
+    def __init__(self):
+        super().__init__(uuid="height", observation_space=BOX)
+
+    def get_observation(self, env, task, batch_index=0):
+        return env.qpos[batch_index, 2:3].astype(np.float32)
+
+
+@pytest.mark.parametrize("sensor_type", [Height, HeightOfMjlab, HeightOfMolmo])
+@pytest.mark.parametrize("in_scene", [True, False])
+def test_three_styles(sensor_type, in_scene):
+    sensor = sensor_type()
+    scene = ball_scene(sensor) if in_scene else ball_scene()
+    sim = mjs.Simulation(scene, num_worlds=3)
+    if in_scene:
+        assert scene["height"] is sensor
+    else:
+        sim.add(sensor)
+    sim.qpos[:, 2] = [1, 2, 3]
+    sim.forward()
+    np.testing.assert_array_equal(np.asarray(sensor.data)[:, 0], [1, 2, 3])
+
+
+def test_registry_order_and_config_of_ones_own():
+    class Cfg:
+        name = "mine"
+        prefixed_name = "ball/mine"
+
+        def build(self):
+            return HeightOfMjlab()
+
+    scene = ball_scene(feet_cfg(fields=("found",)), Cfg())
+    assert list(scene.sensors)[:2] == ["touch", "ball/mine"]
+    assert scene["ball/mine"].entities["ball"] == ("ball",)
+    with pytest.raises(ValueError, match="two sensors of one name"):
+        ball_scene(Height(), Height())
+
+
+def test_lazy_cached_and_invalidated():
+    sensor = Height()
+    sim = mjs.Simulation(ball_scene(sensor), num_worlds=2)
+    assert sensor.calls == 0
+    sensor.data, sensor.data
+    assert sensor.calls == 1
+    for change in (sim.step, sim.forward, sim.reset, sim.invalidate, lambda: sim.reset([1]), sim.update_sensors):
+        calls = sensor.calls
+        change()
+        sensor.data, sensor.data
+        assert sensor.calls == calls + 1
+    sim.set_state(qpos=[0, 0, 4, 1, 0, 0, 0])
+    assert sensor.data[0, 0] == 4
+
+
+def test_reading_other_sensors():
+    class Twice(mjs.Sensor):
+        uuid = "twice"
+        observation_space = BOX
+
+        def compute(self, sim):
+            return 2 * sim.scene["height"].data
+
+    sim = mjs.Simulation(ball_scene(Twice(), Height()), num_worlds=2)
+    for _ in range(3):
+        sim.step()
+        np.testing.assert_allclose(sim.scene["twice"].data, 2 * sim.qpos[:, 2:3].astype(np.float32))
+
+
+def test_life_cycle():
+    class Log(mjs.Sensor):
+        uuid = "log"
+
+        def __init__(self):
+            self.calls = []
+
+        def edit_spec(self, spec):
+            spec.worldbody.add_site(name="from_sensor")
+            self.calls.append("edit_spec")
+
+        def initialize(self, sim):
+            self.calls.append(f"initialize {sim.model.site('from_sensor').id >= 0}")
+
+        def update(self, dt):
+            self.calls.append(f"update {dt:g}")
+
+        def reset(self, world_ids=None):
+            self.calls.append(f"reset {world_ids}")
+
+        def compute(self, sim):
+            self.calls.append("compute")
+            return np.zeros(sim.num_worlds)
+
+    log = Log()
+    sim = mjs.Simulation(ball_scene(log), num_worlds=3, decimation=2)
+    assert log.calls == ["edit_spec", "initialize True"]
+    log.calls.clear()
+    sim.reset()
+    sim.reset([2])
+    sim.step(2)
+    log.data
+    assert log.calls == ["reset None", "reset [2]", "update 0.004", "update 0.004", "compute"]
+    log.calls.clear()
+    sim.qvel[1, 0] = 1e20
+    sim.step()
+    assert log.calls == ["reset [1]", "update 0.004", "compute"]
+
+
+class Broken(mjs.Sensor):
+    uuid = "broken"
+    fail = True
+
+    def compute(self, sim):
+        if self.fail:
+            raise ZeroDivisionError("by zero")
+        return np.ones(sim.num_worlds)
+
+
+def test_errors_name_the_sensor_and_leave_the_simulation_usable():
+    sensor = Broken()
+    sim = mjs.Simulation(ball_scene(sensor), num_worlds=2)
+    for _ in range(2):
+        with pytest.raises(mjs.SensorError, match=r"sensor 'broken': compute\(\): ZeroDivisionError: by zero") as error:
+            sensor.data
+        assert isinstance(error.value.__cause__, ZeroDivisionError)
+        sim.step()
+        sim.scene["ball/acc"].data
+    sensor.fail = False
+    assert sensor.data.tolist() == [1, 1]
+    sensor.fail = True  # it is read every step now, so step() computes it
+    with pytest.raises(mjs.SensorError):
+        sim.step()
+        sensor.data
+    sensor.fail = False
+    sim.step()
+    assert sensor.data.tolist() == [1, 1]
+
+
+@pytest.mark.parametrize(
+    "value, text",
+    [
+        (np.zeros((3, 1)), r"shape \(3, 1\) is not \(2, 1\)"),
+        (np.zeros(2), "shape"),
+        (np.array([["a"], ["b"]]), "do not fit"),
+        (None, "shape"),
+    ],
+)
+def test_wrong_values(value, text):
+    class Wrong(Height):
+        def compute(self, sim):
+            return value
+
+    sim = mjs.Simulation(ball_scene(), num_worlds=2)
+    with pytest.raises(mjs.SensorError, match=text):
+        sim.add(Wrong()).data
+
+
+def test_changing_state_inside_compute_is_refused():
+    class Greedy(mjs.Sensor):
+        uuid = "greedy"
+
+        def compute(self, sim):
+            sim.step()
+
+    sim = mjs.Simulation(ball_scene(Greedy()))
+    with pytest.raises(mjs.SensorError, match=r"step\(\) is called while the simulation is at work"):
+        sim.scene["greedy"].data
+    sim.step()
+
+
+def test_dict_sensor_is_json_on_disk():
+    class Info(mjs.Sensor):
+        uuid = "info"
+        is_dict = True
+        str_max_len = 64
+
+        def get_observation(self, env, task, batch_index=0):
+            return {"z": np.float32(0.5), "a": [1, float("nan")], "world": batch_index}
+
+    sensor = Info()
+    sim = mjs.Simulation(ball_scene(sensor), num_worlds=2)
+    assert sensor.data[1]["world"] == 1
+    row = sensor.rows[1]
+    assert row.dtype == np.uint8 and row.shape == (64,)
+    text = bytes(row).rstrip(b"\0")
+    assert text == b'{"a":[1,NaN],"world":1,"z":0.5}'
+    assert json.loads(text)["z"] == 0.5
+    sensor.str_max_len = 3
+    sim.invalidate()
+    with pytest.raises(mjs.SensorError, match="JSON text of 31 bytes, str_max_len is 3"):
+        sensor.data
+
+
+def test_suite():
+    suite = mjs.SensorSuite([Height()])
+    with pytest.raises(AssertionError, match="'height' is duplicated sensor uuid"):
+        suite.add(Height())
+    scene = ball_scene(feet_cfg(fields=("found",)))
+    suite.extend([scene["touch"], scene["ball/acc"]])
+    sim = mjs.Simulation(scene, num_worlds=2)
+    batch = suite.get_observations(sim)
+    assert list(batch) == ["height", "touch", "ball/acc"]
+    assert batch["height"].shape == (2, 1) and batch["ball/acc"] is scene["ball/acc"].data
+    one = suite.get_observations(sim, None, 1)
+    assert one["height"].shape == (1,) and one["touch"]["found"].shape == (1,)
+    assert suite.observation_spaces.contains(one)
+    with pytest.raises(KeyError, match="no sensor 'heigth'"):
+        suite.get("heigth")
+    with pytest.raises(ValueError, match="batch_index 2"):
+        suite.get_observations(sim, None, 2)
+    assert len(suite) == 3 and "touch" in suite

@@ -1,0 +1,37 @@
+import numpy as np
+import pytest
+
+import mjsense as mjs
+
+
+def frames(n, worlds=2):
+    return [np.array([[t + 10 * w] for w in range(worlds)], np.float32) for t in range(n)]
+
+
+def test_order_of_the_pipeline():
+    pipeline = mjs.ObservationPipeline(1, bias=1.0, clip=(0, 2), scale=10.0)
+    assert pipeline([[0.5]]).tolist() == [[15.0]]
+    assert pipeline([[7.0]]).tolist() == [[20.0]]
+
+
+def test_delay_and_partial_reset():
+    pipeline = mjs.ObservationPipeline(2, delay_min_lag=2, delay_max_lag=2)
+    out = [pipeline(f)[:, 0].tolist() for f in frames(3)]
+    assert out == [[0, 10], [0, 10], [0, 10]]
+    pipeline.reset([1])
+    assert pipeline(frames(4)[3])[:, 0].tolist() == [1, 13]
+
+
+def test_history_is_oldest_first_and_backfilled():
+    pipeline = mjs.ObservationPipeline(2, history_length=3)
+    out = [pipeline(f).tolist() for f in frames(3)]
+    assert out == [[[0, 0, 0], [10, 10, 10]], [[0, 0, 1], [10, 10, 11]], [[0, 1, 2], [10, 11, 12]]]
+    pipeline.reset([0])
+    assert pipeline(frames(4)[3]).tolist() == [[3, 3, 3], [11, 12, 13]]
+
+
+def test_noise_is_seeded():
+    a, b = (mjs.ObservationPipeline(2, noise=("gaussian", 0, 1), seed=3) for _ in range(2))
+    assert np.array_equal(a(frames(1)[0]), b(frames(1)[0]))
+    with pytest.raises(ValueError, match="operation"):
+        mjs.ObservationPipeline(1, operation="mul")

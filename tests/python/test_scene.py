@@ -1,0 +1,90 @@
+import mujoco
+import numpy as np
+import pytest
+from scenes import ARM, BALL, ball_scene
+
+import mjsense as mjs
+
+
+def test_entities_and_names():
+    scene = mjs.Scene(mjs.SceneCfg(entities={"arm": mjs.EntityCfg(model=ARM), "ball": mjs.EntityCfg(model=BALL)}))
+    assert list(scene.entities) == ["arm", "ball"]
+    assert scene["arm"].joint_names == ("shoulder", "elbow")
+    assert scene["arm"].fixed_base and not scene["ball"].fixed_base
+    assert list(scene.sensors) == ["ball/acc"]
+    assert scene.model.nq == 2 + 7
+    assert mujoco.MjModel.from_xml_string(scene.to_xml()).nq == scene.model.nq
+
+
+def test_model_from_path_text_spec_and_function(tmp_path):
+    path = tmp_path / "ball.xml"
+    path.write_text(BALL)
+    for model in (path, str(path), BALL, mujoco.MjSpec.from_string(BALL), lambda: mujoco.MjSpec.from_string(BALL)):
+        scene = mjs.Scene(mjs.SceneCfg(entities={"b": mjs.EntityCfg(model=model)}))
+        assert scene["b"].geom_names == ("ball",)
+
+
+def test_spec_with_assets():
+    cube = b"v -1 -1 -1\nv 1 -1 -1\nv 0 1 -1\nv 0 0 1\nf 1 3 2\nf 1 2 4\nf 2 3 4\nf 3 1 4\n"
+    xml = '<mujoco><asset><mesh name="m" file="m.obj"/></asset><worldbody><geom type="mesh" mesh="m"/></worldbody></mujoco>'
+    from_text = mjs.EntityCfg(model=xml, assets={"m.obj": cube})
+    from_spec = mjs.EntityCfg(model=mujoco.MjSpec.from_string(xml, assets={"m.obj": cube}))
+    for cfg in (from_text, from_spec):
+        scene = mjs.Scene(mjs.SceneCfg(entities={"e": cfg}))
+        assert scene.model.nmesh == 1
+        again = mujoco.MjModel.from_xml_string(scene.to_xml(), scene.assets())
+        assert again.nmeshvert == scene.model.nmeshvert
+
+
+def test_spec_fn_edits_the_scene_itself():
+    def add_marker(spec):
+        spec.worldbody.add_site(name="marker", pos=[1, 2, 3])
+
+    scene = ball_scene(spec_fn=add_marker)
+    assert scene.model.site("marker").pos.tolist() == [1, 2, 3]
+
+
+def test_errors_of_spec_fn_come_through():
+    def broken(spec):
+        raise LookupError("no such thing")
+
+    with pytest.raises(LookupError, match="no such thing"):
+        ball_scene(spec_fn=broken)
+
+
+def test_lookup_error_names_the_nearest():
+    scene = ball_scene()
+    with pytest.raises(KeyError) as error:
+        scene["ball/ac"]
+    assert str(error.value) == "Scene element 'ball/ac' not found. Did you mean 'ball/acc' or 'ball'?"
+    assert "ball/acc" in scene and "ball" in scene and "nothing" not in scene
+
+
+@pytest.mark.parametrize(
+    "cfg, text",
+    [
+        (dict(entities={"a": mjs.EntityCfg(model="/nowhere.xml")}), "nowhere.xml"),
+        (dict(entities={"a": mjs.EntityCfg(model="<mujoco><worldbdy/></mujoco>")}), "worldbdy"),
+        (dict(entities={"a": mjs.EntityCfg(model=17)}), "EntityCfg.model"),
+        (dict(entities={"a": mjs.EntityCfg(model=BALL, pos=(1, 2))}), "pos must be 3 numbers"),
+        (dict(sensors=(17,)), "17"),
+        (dict(extent="big"), "extent must be a number"),
+        (dict(options=mjs.MujocoCfg(timestep=-1)), "timestep"),
+        (dict(options=mjs.MujocoCfg(iterations=1.5)), "iterations must be an int"),
+    ],
+)
+def test_bad_scenes(cfg, text):
+    with pytest.raises((ValueError, TypeError), match=text):
+        mjs.Scene(mjs.SceneCfg(**cfg))
+
+
+def test_env_origins():
+    np.testing.assert_array_equal(
+        ball_scene(env_spacing=3.0).env_origins(2), np.array([[1.5, 0, 0], [-1.5, 0, 0]], np.float32)
+    )
+
+
+def test_model_copy_is_independent():
+    scene = ball_scene()
+    scene.model.opt.timestep = 1.0
+    assert mjs.Simulation(scene).physics_dt == 0.002

@@ -1,0 +1,215 @@
+import gc
+import threading
+
+import mujoco
+import numpy as np
+import pytest
+from scenes import ARM, BALL, ball_scene, feet_cfg
+
+import mjsense as mjs
+
+
+@pytest.fixture
+def sim():
+    return mjs.Simulation(ball_scene(), num_worlds=4, decimation=5)
+
+
+def test_live_views(sim):
+    assert sim.qpos.shape == (4, 7) and sim.qpos.dtype == np.float64
+    sim.qpos[:, 2] = [1, 2, 3, 4]
+    sim.forward()
+    assert sim.data.xpos[:, -1, 2].tolist() == [1, 2, 3, 4]
+    before = sim.qpos
+    sim.step()
+    assert before is sim.qpos and before[0, 2] < 1
+
+
+def test_step_is_mujocos(sim):
+    model = sim.scene.model
+    data = mujoco.MjData(model)
+    sim.step(3)
+    for _ in range(15):
+        mujoco.mj_step(model, data)
+    np.testing.assert_array_equal(sim.qpos[2], data.qpos)
+    np.testing.assert_allclose(sim.time, 15 * 0.002)
+
+
+@pytest.mark.parametrize("threads", [1, 2, 5])
+def test_bits_do_not_depend_on_threads(threads):
+    sim = mjs.Simulation(ball_scene(), num_worlds=7, threads=threads)
+    sim.qvel[:] = np.random.default_rng(0).normal(size=sim.qvel.shape)
+    sim.forward()
+    sim.step(50)
+    alone = mjs.Simulation(ball_scene(), num_worlds=7, threads=1)
+    alone.qvel[:] = np.random.default_rng(0).normal(size=sim.qvel.shape)
+    alone.forward()
+    alone.step(50)
+    assert sim.state.tobytes() == alone.state.tobytes()
+    assert sim.scene["ball/acc"].data.tobytes() == alone.scene["ball/acc"].data.tobytes()
+
+
+def test_zero_copy_and_freshness(sim):
+    sensor = sim.scene["ball/acc"]
+    first = sensor.data
+    assert first.dtype == np.float32 and first.shape == (4, 3)
+    np.testing.assert_allclose(first, 0, atol=1e-6)  # free fall
+    sim.qpos[:, 2] = 0.0995
+    sim.forward()
+    assert sensor.data is first and np.all(first[:, 2] > 1)
+
+
+def test_dlpack(sim):
+    array = sim.scene["ball/acc"].data
+    other = np.from_dlpack(array)
+    assert np.shares_memory(array, other)
+
+
+def test_partial_reset(sim):
+    sim.step(10)
+    sim.reset([1, 3])
+    assert sim.time.tolist() == [0.1, 0, 0.1, 0]
+    assert sim.qpos[1, 2] == 1 and sim.qpos[0, 2] < 1
+    sim.reset(np.array([True, False, False, False]))
+    assert sim.time[0] == 0
+    sim.reset([])
+    assert sim.time[2] == 0.1
+    sim.reset()
+    assert not sim.time.any()
+
+
+def test_reset_to_keyframe():
+    xml = ARM.replace("</actuator>", '</actuator><keyframe><key qpos=".5 -.5"/></keyframe>')
+    scene = mjs.Scene(mjs.SceneCfg(entities={"arm": mjs.EntityCfg(model=xml)}))
+    sim = mjs.Simulation(scene, num_worlds=2)
+    sim.reset(key="init_state")
+    np.testing.assert_allclose(sim.qpos, [[0.5, -0.5]] * 2)
+    with pytest.raises(ValueError, match="no keyframe 'home'"):
+        sim.reset(key="home")
+
+
+def test_set_state(sim):
+    sim.set_state(qpos=[0, 0, 5, 1, 0, 0, 0])
+    assert sim.data.xpos[:, -1, 2].tolist() == [5] * 4
+    sim.set_state([0, 2], qpos=[[0, 0, 6, 1, 0, 0, 0], [0, 0, 7, 1, 0, 0, 0]])
+    assert sim.data.xpos[:, -1, 2].tolist() == [6, 5, 7, 5]
+    with pytest.raises(ValueError, match="qpos: shape"):
+        sim.set_state(qpos=[1, 2])
+    with pytest.raises(KeyError, match="did you mean 'qpos'"):
+        sim.set_state(qpo=[1])
+
+
+def test_randomize(sim):
+    sim.randomize("body_mass", [[0, 0, m] for m in (1, 2, 3, 4)] if sim.model.nbody == 3 else 1)
+    sim.qpos[:, 2] = 0.0995
+    sim.forward()
+    assert sim.model_field("body_mass")[:, 2].tolist() == [1, 2, 3, 4]
+    force = sim.data.qfrc_constraint[:, 2]
+    assert np.all(np.diff(force) > 0)
+    with pytest.raises(AttributeError, match="no array 'bodymass'"):
+        sim.randomize("bodymass", 1)
+
+
+def test_failed_world_is_reset_alone(sim):
+    sim.step(2)
+    sim.qvel[2, 0] = 1e20
+    sim.step()
+    assert [w for w, _ in sim.failures] == [2]
+    assert sim.time.tolist() == [0.03, 0.03, 0, 0.03]
+
+
+def test_bad_arguments(sim):
+    for call, error in [
+        (lambda: sim.step(0), ValueError),
+        (lambda: sim.step("2"), TypeError),
+        (lambda: sim.reset([4]), ValueError),
+        (lambda: sim.reset([1, 1]), ValueError),
+        (lambda: sim.reset([0.5]), TypeError),
+        (lambda: sim.step_raw(-1), ValueError),
+        (lambda: sim.refresh([17]), TypeError),
+        (lambda: sim.data.xposs, AttributeError),
+        (lambda: mjs.Simulation(sim.scene), RuntimeError),
+        (lambda: mjs.Simulation(ball_scene(), num_worlds=0), ValueError),
+        (lambda: mjs.Simulation(ball_scene(), num_worlds=2.5), TypeError),
+        (lambda: mjs.Simulation(ball_scene(), decimation=0), ValueError),
+        (lambda: mjs.Simulation(ball_scene(), threads=-2), ValueError),
+        (lambda: mjs.Simulation("scene"), TypeError),
+        (lambda: setattr(sim, "qpos", np.zeros((3, 3))), ValueError),
+    ]:
+        with pytest.raises(error):
+            call()
+    sim.step()
+
+
+def test_use_after_close():
+    sim = mjs.Simulation(ball_scene(), num_worlds=2)
+    sensor, qpos = sim.scene["ball/acc"], sim.qpos
+    acc = sensor.data
+    sim.close()
+    sim.close()
+    for call in (sim.step, sim.forward, sim.reset, lambda: sim.qpos, lambda: sim.state, lambda: sensor.data, lambda: sim.data.xpos):
+        with pytest.raises(RuntimeError, match="closed"):
+            call()
+    assert qpos[0, 2] == 1 and acc.shape == (2, 3)  # arrays outlive it
+
+
+def test_arrays_keep_their_memory():
+    def rows():
+        sim = mjs.Simulation(ball_scene(), num_worlds=3)
+        sim.qpos[:, 2] = 7
+        return sim.qpos, sim.scene["ball/acc"].data
+
+    qpos, acc = rows()
+    gc.collect()
+    other = [mjs.Simulation(ball_scene(), num_worlds=3) for _ in range(3)]  # would take the memory if it were free
+    assert qpos[:, 2].tolist() == [7] * 3 and acc.shape == (3, 3) and len(other) == 3
+
+
+def test_threads_take_turns(sim):
+    errors = []
+
+    def work():
+        try:
+            for _ in range(50):
+                sim.step()
+                sim.scene["ball/acc"].data
+        except Exception as error:  # pragma: no cover
+            errors.append(error)
+
+    threads = [threading.Thread(target=work) for _ in range(4)]
+    for thread in threads:
+        thread.start()
+    for thread in threads:
+        thread.join()
+    assert not errors
+    np.testing.assert_allclose(sim.time, 4 * 50 * 0.01)
+
+
+def test_data_before_simulation():
+    with pytest.raises(RuntimeError, match="'ball/acc' has no data yet"):
+        ball_scene()["ball/acc"].data
+
+
+def test_raw_step_lags_and_forward_catches_up():
+    scene = ball_scene(mjs.BuiltinSensorCfg(name="pos", sensor_type="framepos", obj=mjs.ObjRef("site", "imu", "ball")))
+    sim = mjs.Simulation(scene)
+    sim.qvel[0, 2] = 5
+    sim.step_raw()
+    assert scene["ball/pos"].data[0, 2] == 1
+    sim.forward()
+    assert scene["ball/pos"].data[0, 2] > 1
+
+
+def test_contact_data_and_air_time():
+    scene = ball_scene(feet_cfg(fields=("found", "force", "normal", "tangent"), global_frame=True, track_air_time=True))
+    sim = mjs.Simulation(scene, num_worlds=2, decimation=5)
+    sim.qpos[0, 2], sim.qpos[1, 2] = 0.0995, 200
+    sim.forward()
+    sim.step(400)
+    data = scene["touch"].data
+    assert data.found[:, 0].tolist() == [1, 0]
+    np.testing.assert_allclose(data.force[0, 0], [0, 0, -9.81], atol=0.05)
+    assert data.dist is None and data.force_history is None
+    assert data.current_air_time[1, 0] == pytest.approx(4, abs=0.01)
+    assert scene["touch"].primary_names == ("ball",)
+    assert scene["touch"].compute_first_contact(sim.step_dt).tolist() == [[False], [False]]
+    assert "found=float32[2, 1]" in repr(data)
