@@ -10,6 +10,8 @@ std::span<const CfgKind> cfg_kinds() {
   static const std::vector<CfgKind> kinds = {
       builtin_kind(),
       contact_kind(),
+      raycast_kind(),
+      terrain_height_kind(),
   };
   return kinds;
 }

@@ -12,4 +12,5 @@ NB_MODULE(_core, m) {
   mjsense::python::bind_scene(m);
   mjsense::python::bind_simulation(m);
   mjsense::python::bind_contact(m);
+  mjsense::python::bind_raycast(m);
 }

@@ -37,7 +37,8 @@ std::string config_place(nb::handle config);
                                    const char* wanted);
 const char* wanted_of(const std::type_info& type);
 
-// Structs with fields of their own (ObjRef, ContactMatch ...): found by fields(...).
+// Values with fields of their own (ObjRef, ContactMatch ...) are read by their fields(...); what
+// needs more than that, by a read_custom(FromPython&, nb::handle, T&), both declared in this namespace.
 class FromPython {
  public:
   explicit FromPython(nb::handle config) : config_(config) {}
@@ -60,6 +61,8 @@ class FromPython {
       }
       FromPython nested(value);
       fields(nested, out);
+    } else if constexpr (requires { read_custom(*this, value, out); }) {
+      read_custom(*this, value, out);
     } else if constexpr (IsOptional<T>::value) {
       if (value.is_none()) return out.reset();
       read(name, value, out.emplace());
@@ -101,6 +104,8 @@ class ToPython {
       ToPython nested;
       fields(nested, value);
       return nested.values;
+    } else if constexpr (requires(FromPython& f, nb::handle h) { read_custom(f, h, value); }) {
+      return nb::none();
     } else if constexpr (IsOptional<T>::value) {
       if (!value) return nb::none();
       return write(*value);

@@ -20,11 +20,13 @@ from mjsense.configs import (
     ObjRef,
     PinholeCameraPatternCfg,
     RayCastSensorCfg,
+    RayCastVizCfg,
     RingPatternCfg,
     SceneCfg,
     SensorCfg,
     TerrainCfg,
     TerrainHeightSensorCfg,
+    UserPatternCfg,
     replace,
 )
 from mjsense.contact import ContactSensor

@@ -307,6 +307,36 @@ class RingPatternCfg:
         return _core.pattern_rays(self)
 
 
+@dataclass(frozen=True)
+class UserPatternCfg:
+    """Your own rays. One direction for all offsets, or one offset for all directions, will do."""
+
+    kind: ClassVar[str] = "user"
+    offsets: Sequence[Sequence[float]] = ((0.0, 0.0, 0.0),)
+    """m, [n, 3]."""
+    directions: Sequence[Sequence[float]] = ((0.0, 0.0, -1.0),)
+    """[n, 3], of any length but 0."""
+
+    def generate_rays(self) -> tuple[Any, Any]:
+        """Offsets (m) and unit directions, float32 ``[n, 3]`` each, in the local frame."""
+        return _core.pattern_rays(self)
+
+
+@dataclass
+class RayCastVizCfg:
+    """What a viewer draws of a ray sensor. Colours are rgba, sizes in units of the model's ``stat.meansize``."""
+
+    show_rays: bool = False
+    show_normals: bool = False
+    hit_color: Sequence[float] = (0.0, 1.0, 1.0, 1.0)
+    ray_color: Sequence[float] = (0.0, 1.0, 0.0, 0.8)
+    miss_color: Sequence[float] = (1.0, 0.0, 0.0, 0.4)
+    normal_color: Sequence[float] = (1.0, 1.0, 0.0, 1.0)
+    hit_radius: float = 0.5
+    ray_width: float = 0.1
+    normal_length: float = 5.0
+
+
 @dataclass
 class RayCastSensorCfg(SensorCfg):
     """Rays from frames against everything visible. ``data`` is a :class:`mjsense.RayCastData`."""
@@ -314,7 +344,7 @@ class RayCastSensorCfg(SensorCfg):
     kind: ClassVar[str] = "raycast"
     frame: ObjRef | Sequence[ObjRef] = ()
     """Bodies (body frame), sites or geoms that the rays start from."""
-    pattern: GridPatternCfg | PinholeCameraPatternCfg | RingPatternCfg = field(default_factory=GridPatternCfg)
+    pattern: GridPatternCfg | PinholeCameraPatternCfg | RingPatternCfg | UserPatternCfg = field(default_factory=GridPatternCfg)
     ray_alignment: str = "base"
     """base: offsets and directions turn with the frame; yaw: only with its heading; world: not at all."""
     max_distance: float = 10.0
@@ -324,6 +354,22 @@ class RayCastSensorCfg(SensorCfg):
     include_geom_groups: Sequence[int] | None = (0, 1, 2)
     """None: all."""
     debug_vis: bool = False
+    viz: RayCastVizCfg = field(default_factory=RayCastVizCfg)
+    min_distance: float = 0.0
+    """m; nearer hits are misses, and hide what is behind them."""
+    hit_ids: bool = True
+    """geom_id, body_id and material_id of what was hit."""
+    any_frame: bool = False
+    """Take xbody and camera frames too, which mjlab refuses."""
+
+    def __post_init__(self) -> None:
+        for ref in (self.frame,) if isinstance(self.frame, ObjRef) else self.frame:
+            if not self.any_frame and ref.type in ("xbody", "camera"):
+                raise ValueError(
+                    f"sensor '{self.name}': frame '{ref.full_name}' is a {ref.type}: must be 'body', 'site', or 'geom' "
+                    "(any_frame=True takes xbody and camera)"
+                )
+        super().__post_init__()
 
 
 @dataclass
@@ -331,8 +377,8 @@ class TerrainHeightSensorCfg(RayCastSensorCfg):
     """Height of frames above what lies below them. ``data.heights`` is float32 ``[B, F]``, ``[B, F, n]`` without reduction."""
 
     kind: ClassVar[str] = "terrain_height"
-    reduction: str = "mean"
-    """min, max, mean, none."""
+    reduction: str = "min"
+    """min, max, mean, none; over a frame's rays."""
 
 
 @dataclass

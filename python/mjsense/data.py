@@ -111,6 +111,12 @@ class RayCastData(SensorData):
     """[B, 3] m, of frame 0."""
     quat_w: np.ndarray | None = None
     """[B, 4] of frame 0."""
+    geom_id: np.ndarray | None = None
+    """[B, R] int32, geom that was hit; -1: none; beyond the geoms: flexes."""
+    body_id: np.ndarray | None = None
+    """[B, R] int32; -1: none."""
+    material_id: np.ndarray | None = None
+    """[B, R] int32; -1: none."""
     heights: np.ndarray | None = None
     """Terrain height sensors: [B, F] m, [B, F, n] without reduction."""
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from mjsense import _core
 from mjsense.data import CameraData, RayCastData
 from mjsense.sensor import NativeSensor
 
@@ -14,16 +15,17 @@ class RayCastSensor(NativeSensor):
     @property
     def num_frames(self) -> int:
         """F."""
-        return self.specs["frame_pos_w"].shape[0]
-
-    @property
-    def num_rays(self) -> int:
-        """R, of all frames together."""
-        return self.specs["distances"].shape[0]
+        return _core.ray_counts(self._handle)[0]
 
     @property
     def num_rays_per_frame(self) -> int:
-        return self.num_rays // self.num_frames
+        """n, known once the simulation exists."""
+        return _core.ray_counts(self._handle)[1]
+
+    @property
+    def num_rays(self) -> int:
+        """R = F * n."""
+        return self.num_frames * self.num_rays_per_frame
 
 
 class TerrainHeightSensor(RayCastSensor):

@@ -34,7 +34,7 @@ def plain(value):
 def test_defaults_are_those_of_cpp(kind):
     ours = {f.name: f for f in dataclasses.fields(CLASSES[kind])}
     theirs = _core.cfg_defaults()[kind]
-    assert set(ours) - set(theirs) <= {"pattern", "clone_data", "debug_vis"}
+    assert set(ours) - set(theirs) <= {"pattern", "any_frame"}
     for name, value in theirs.items():
         field = ours[name]
         if field.default is not dataclasses.MISSING:
