@@ -2,6 +2,9 @@
 // What a robot is, as data: its MJCF, move groups, start configuration, cameras. One function a
 // robot fills one in.
 
+#include <mujoco/mujoco.h>
+
+#include <functional>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -47,6 +50,9 @@ struct ActionNoiseCfg {
 struct RobotCfg {
   std::string name;  // "franka"
   ModelSource model;
+  // Called on the scene's spec before compilation with the prefix of the robot's names; may be
+  // empty.
+  std::function<void(mjSpec* spec, const std::string& prefix)> edit_spec;
   std::string base_body;             // mocap body on the floor: the robot base frame
   std::vector<MoveGroupCfg> groups;  // in this order everywhere
   std::vector<CameraMount> cameras;

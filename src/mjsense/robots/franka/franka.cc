@@ -1,6 +1,33 @@
 #include "mjsense/robots/franka/franka.h"
 
+#include <fmt/format.h>
+
+#include <cstdlib>
+#include <filesystem>
+
+#include "mjsense/core/error.h"
+#include "mjsense/scene/spec.h"
+
 namespace mjsense {
+namespace {
+
+constexpr int kLinks = 8;
+
+std::string mesh_file(const std::string& folder, int link) {
+  return fmt::format("{}/link{}.stl", folder, link);
+}
+
+void check_meshes(const std::string& folder) {
+  for (int i = 0; i < kLinks; ++i) {
+    if (!std::filesystem::is_regular_file(mesh_file(folder, i))) {
+      throw ValueError(fmt::format(
+          "MJSENSE_FRANKA_MESHES: '{}' is no file; the folder must hold link0.stl ... link7.stl",
+          mesh_file(folder, i)));
+    }
+  }
+}
+
+}  // namespace
 
 RobotCfg franka_cfg() {
   RobotCfg cfg;
@@ -40,7 +67,39 @@ RobotCfg franka_cfg() {
 
   cfg.groups = {base, arm, gripper};
   cfg.cameras = {{"wrist_camera", "gripper/wrist_camera"}, {"exo_camera_1", "exo_camera_1"}};
+
+  const char* meshes = std::getenv("MJSENSE_FRANKA_MESHES");
+  if (meshes && *meshes) {
+    const std::string folder = meshes;
+    check_meshes(folder);
+    cfg.edit_spec = [folder](mjSpec* spec, const std::string& prefix) {
+      use_franka_meshes(spec, prefix, folder);
+    };
+  }
   return cfg;
+}
+
+void use_franka_meshes(mjSpec* spec, const std::string& prefix, const std::string& folder) {
+  std::vector<mjsElement*> shapes;
+  for (mjsElement* geom : spec_elements(spec, mjOBJ_GEOM)) {
+    if (element_name(geom).starts_with(prefix + "shape_")) shapes.push_back(geom);
+  }
+  for (mjsElement* shape : shapes) mjs_delete(spec, shape);
+  for (int i = 0; i < kLinks; ++i) {
+    const std::string name = fmt::format("{}fr3_link{}", prefix, i);
+    mjsMesh* mesh = mjs_addMesh(spec, nullptr);
+    mjs_setName(mesh->element, name.c_str());
+    mjs_setString(mesh->file, mesh_file(folder, i).c_str());
+    mjsBody* body = mjs_asBody(find_in_spec(spec, mjOBJ_BODY, name, "robot 'franka'"));
+    mjsGeom* geom = mjs_addGeom(body, nullptr);
+    mjs_setName(geom->element, (name + "_mesh").c_str());
+    geom->type = mjGEOM_MESH;
+    geom->group = 2;
+    geom->contype = geom->conaffinity = 0;
+    geom->mass = 0;
+    mjs_setString(geom->meshname, name.c_str());
+    mjs_setString(geom->material, (prefix + "fr3_white").c_str());
+  }
 }
 
 }  // namespace mjsense

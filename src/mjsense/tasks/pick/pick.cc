@@ -80,7 +80,10 @@ SceneCfg PickTask::scene_cfg() const {
   // An elliptic cone with impratio above 1 keeps a held object from creeping out of the pads.
   scene.options.cone = "elliptic";
   scene.options.impratio = 10;
-  scene.spec_fn = add_look;
+  scene.spec_fn = [edit = cfg().robot.edit_spec](mjSpec* spec) {
+    add_look(spec);
+    if (edit) edit(spec, std::string(Robot::kPrefix));
+  };
   return scene;
 }
 
