@@ -3,6 +3,7 @@
 //   [--width W] [--height H]
 //               [--cameras C] [--encoders E] [--red-green] [--no-video] [--gzip G] [--step-ms MS]
 //               [--stop-after N]
+//   record_fake verify|repair|inspect PATH,  record_fake sheet PATH PNG
 // Every K-th attempt is discarded (0: none). Prints "finished E" after each episode that is safe on
 // disk.
 
@@ -15,6 +16,7 @@
 #include <thread>
 
 #include "mjsense/core/error.h"
+#include "mjsense/record/check.h"
 #include "mjsense/record/fake_suite.h"
 #include "mjsense/record/recorder.h"
 
@@ -119,11 +121,24 @@ int record(const std::string& out, const Options& o) {
   return 0;
 }
 
+int look(const std::string& command, const std::string& path, const std::string& png) {
+  if (command == "verify") {
+    const VerifyResult result = verify(path, {.decode = true});
+    fmt::print("{}", result.text());
+    return result.ok() ? 0 : 1;
+  }
+  if (command == "repair") fmt::print("{}", repair(path).text());
+  if (command == "inspect") fmt::print("{}", inspect(path).text());
+  if (command == "sheet") contact_sheet(path, png);
+  return 0;
+}
+
 }  // namespace
 
 int main(int argc, char** argv) {
   if (argc < 2) return 2;
   try {
+    if (argc > 2 && argv[2][0] != '-') return look(argv[1], argv[2], argc > 3 ? argv[3] : "");
     return record(argv[1], parse(argc, argv));
   } catch (const Error& error) {
     fmt::print(stderr, "error: {}\n", error.what());

@@ -48,7 +48,7 @@ RepairResult repair(const std::filesystem::path& path);
 struct StreamStats {
   std::string name;  // "obs/agent/qpos/arm": dict rows are split by key
   std::string dtype, shape, unit, frame, description;
-  std::int64_t count = 0, nan = 0;
+  std::int64_t count = 0, nan = 0, infinite = 0;  // the others are counted apart
   double mean = 0, std = 0, min = 0, max = 0;
 };
 

@@ -5,6 +5,7 @@
 #include <algorithm>
 
 #include "mjsense/core/error.h"
+#include "mjsense/record/lzf.h"
 
 namespace mjsense::h5 {
 namespace {
@@ -66,6 +67,7 @@ H5Lock::H5Lock() : lock_(library()) {
     // try, at exit, to write once more what could not be written.
     H5dont_atexit();
     H5open();
+    register_lzf();
     H5Eset_auto2(H5E_DEFAULT, nullptr, nullptr);
     return true;
   }();
