@@ -1,6 +1,6 @@
 #pragma once
-// Counts heap allocations of this process (all threads) made through operator new. For tests only: including this header, in
-// one file of a test program, replaces the global operator new.
+// Counts heap allocations of this process (all threads) made through operator new. For tests only: including this header
+// replaces the global operator new (weakly, so that several files of a test program may).
 
 #include <atomic>
 #include <cstdlib>
@@ -23,19 +23,19 @@ class AllocationCount {
 
 #pragma GCC diagnostic push
 #pragma GCC diagnostic ignored "-Wmismatched-new-delete"  // malloc and free are the pair here
-void* operator new(std::size_t size) {
+[[gnu::weak]] void* operator new(std::size_t size) {
   ++mjsense::allocations_so_far;
   if (void* p = std::malloc(size ? size : 1)) return p;
   throw std::bad_alloc();
 }
-void* operator new(std::size_t size, std::align_val_t align) {
+[[gnu::weak]] void* operator new(std::size_t size, std::align_val_t align) {
   ++mjsense::allocations_so_far;
   const auto a = static_cast<std::size_t>(align);
   if (void* p = std::aligned_alloc(a, (size + a - 1) / a * a)) return p;
   throw std::bad_alloc();
 }
-void operator delete(void* p) noexcept { std::free(p); }
-void operator delete(void* p, std::size_t) noexcept { std::free(p); }
-void operator delete(void* p, std::align_val_t) noexcept { std::free(p); }
-void operator delete(void* p, std::size_t, std::align_val_t) noexcept { std::free(p); }
+[[gnu::weak]] void operator delete(void* p) noexcept { std::free(p); }
+[[gnu::weak]] void operator delete(void* p, std::size_t) noexcept { std::free(p); }
+[[gnu::weak]] void operator delete(void* p, std::align_val_t) noexcept { std::free(p); }
+[[gnu::weak]] void operator delete(void* p, std::size_t, std::align_val_t) noexcept { std::free(p); }
 #pragma GCC diagnostic pop
