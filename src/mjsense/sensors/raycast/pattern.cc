@@ -128,6 +128,14 @@ RayPattern make(const UserPattern& u, const mjModel*, std::string_view place) {
     pattern.offsets.push_back(o);
     pattern.directions.push_back(unit(u.directions[u.directions.size() == 1 ? 0 : i], place));
   }
+  if (!u.times.empty() && u.times.size() != n)
+    throw ValueError(fmt::format("{}: pattern of {} rays and {} times", place, n, u.times.size()));
+  for (std::size_t i = 0; i < u.times.size(); ++i) {
+    if (!(u.times[i] <= 0) || !std::isfinite(u.times[i]))
+      throw ValueError(fmt::format("{}: time {} of the pattern is {} s: must be 0 or before", place,
+                                   i, u.times[i]));
+  }
+  pattern.times = u.times;
   return pattern;
 }
 

@@ -15,6 +15,7 @@ namespace mjsense {
 struct RayPattern {
   std::vector<std::array<double, 3>> offsets;     // [N]
   std::vector<std::array<double, 3>> directions;  // [N]
+  std::vector<double> times;  // [N] s, when the ray is cast: 0 now, < 0 before; empty: all now
   std::size_t size() const { return directions.size(); }
 };
 
@@ -59,6 +60,7 @@ struct RingPattern {
 struct UserPattern {
   std::vector<std::array<double, 3>> offsets{{0, 0, 0}};      // m
   std::vector<std::array<double, 3>> directions{{0, 0, -1}};  // any length but 0
+  std::vector<double> times;  // s <= 0, one a ray or none: the frame is where it was then
 };
 
 using PatternCfg = std::variant<GridPattern, PinholePattern, RingPattern, UserPattern>;

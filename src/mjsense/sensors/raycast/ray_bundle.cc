@@ -37,30 +37,30 @@ void split(std::span<int> rays, std::span<const Key> keys) {
 
 }  // namespace
 
-RayBundle::RayBundle(const RayPattern& pattern, double depth)
-    : num_rays_(static_cast<int>(pattern.size())) {
+RayBundle::RayBundle(const RayPattern& pattern, int first, int count, double depth)
+    : num_rays_(count) {
   std::vector<Key> keys(num_rays_);
   for (int i = 0; i < num_rays_; ++i)
     for (int k = 0; k < 3; ++k) {
-      keys[i][k] = pattern.offsets[i][k];
-      keys[i][3 + k] = pattern.offsets[i][k] + depth * pattern.directions[i][k];
+      keys[i][k] = pattern.offsets[first + i][k];
+      keys[i][3 + k] = pattern.offsets[first + i][k] + depth * pattern.directions[first + i][k];
     }
   std::vector<int> rays(num_rays_);
   std::iota(rays.begin(), rays.end(), 0);
   split(rays, keys);
 
-  const int count = (num_rays_ + kPacket - 1) / kPacket;
-  packets_.resize(count);
-  order_.assign(count * kPacket, -1);
+  const int num_packets = (num_rays_ + kPacket - 1) / kPacket;
+  packets_.resize(num_packets);
+  order_.assign(num_packets * kPacket, -1);
   std::copy(rays.begin(), rays.end(), order_.begin());
-  for (int p = 0; p < count; ++p)
+  for (int p = 0; p < num_packets; ++p)
     for (int i = 0; i < kPacket; ++i) {
       const int ray = order_[p * kPacket + i];
       const int source = ray >= 0 ? ray : order_[p * kPacket];  // idle lanes repeat a neighbour
       packets_[p].active[i] = ray >= 0 ? 1.0f : -1.0f;
       for (int k = 0; k < 3; ++k) {
-        packets_[p].o[k][i] = static_cast<float>(pattern.offsets[source][k]);
-        packets_[p].d[k][i] = static_cast<float>(pattern.directions[source][k]);
+        packets_[p].o[k][i] = static_cast<float>(pattern.offsets[first + source][k]);
+        packets_[p].d[k][i] = static_cast<float>(pattern.directions[first + source][k]);
       }
     }
 }

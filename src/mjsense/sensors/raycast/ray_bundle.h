@@ -12,8 +12,9 @@ namespace mjsense {
 class RayBundle {
  public:
   RayBundle() = default;
-  // Rays are neighbours if they are close at `depth` metres.
-  explicit RayBundle(const RayPattern& pattern, double depth = 3.0);
+  // Rays [first, first + count) of the pattern, numbered from 0 here. They are neighbours if they
+  // are close at `depth` metres.
+  RayBundle(const RayPattern& pattern, int first, int count, double depth = 3.0);
 
   int num_rays() const { return num_rays_; }
   int num_packets() const { return static_cast<int>(packets_.size()); }

@@ -67,8 +67,19 @@ void RayCastSensor::initialize(const SensorInit& init) {
   const mjModel* m = init.model;
   frames_.clear();
   for (const ObjRef& ref : cfg_.frame) frames_.emplace_back(m, init.scene, ref, place());
-  pattern_ = make_pattern(cfg_.pattern, m, place());
-  bundle_ = RayBundle(pattern_, std::min(3.0, cfg_.max_distance));
+  pattern_ = build_pattern(m);
+  const int count = static_cast<int>(pattern_.size()) / num_parts();
+  bundles_.clear();
+  for (int k = 0; k < num_parts(); ++k)
+    bundles_.emplace_back(pattern_, k * count, count, std::min(3.0, cfg_.max_distance));
+  parts_.assign(init.num_worlds, 0);
+  moments_.assign(init.num_worlds, 0.0);
+  history_ = {};
+  if (!pattern_.times.empty()) {
+    const double oldest = *std::min_element(pattern_.times.begin(), pattern_.times.end());
+    history_ = PoseHistory(init.num_worlds * num_frames(),
+                           static_cast<int>(-oldest / m->opt.timestep) + 3);
+  }
   poses_.assign(static_cast<std::size_t>(init.num_worlds) * frames_.size(), FramePose{});
   const int objects = static_cast<int>(m->ngeom + m->nflex);
   scratch_.assign(init.threads, RayScratch(objects));
@@ -99,7 +110,27 @@ void RayCastSensor::initialize(const SensorInit& init) {
   }
 }
 
+RayPattern RayCastSensor::build_pattern(const mjModel* model) const {
+  return make_pattern(cfg_.pattern, model, place());
+}
+
+void RayCastSensor::remember(const World& world) {
+  for (int f = 0; f < num_frames(); ++f)
+    history_.push(world.id * num_frames() + f, world.time(),
+                  frames_[f].pose(world.data, RayAlignment::kBase));
+}
+
+void RayCastSensor::substep(const World& world) { remember(world); }
+
+void RayCastSensor::reset(const World& world) {
+  if (history_.empty()) return;
+  for (int f = 0; f < num_frames(); ++f) history_.clear(world.id * num_frames() + f);
+}
+
 void RayCastSensor::compute(const World& world) {
+  parts_[world.id] = part(world);
+  moments_[world.id] = world.time();
+  if (!history_.empty()) remember(world);
   for (int f = 0; f < num_frames(); ++f) {
     FramePose& pose = poses_[world.id * num_frames() + f];
     pose = frames_[f].pose(world.data, alignment_);
@@ -115,7 +146,7 @@ void RayCastSensor::compute(const World& world) {
 }
 
 void RayCastSensor::cast(const CastContext& context) {
-  const int packets = bundle_.num_packets(), chunks = (packets + kChunk - 1) / kChunk;
+  const int packets = bundles_.front().num_packets(), chunks = (packets + kChunk - 1) / kChunk;
   const int per_world = chunks * num_frames();
   const int worlds = static_cast<int>(context.ids.size());
   context.pool.run(worlds * per_world, [&](int item, int thread) {
@@ -132,10 +163,46 @@ void RayCastSensor::cast(const CastContext& context) {
 
 void RayCastSensor::finish(const RayScene& /*rays*/, int /*world*/, RayScratch& /*scratch*/) {}
 
+void RayCastSensor::forget(int world, int r) {
+  distances_->data.row<float>(world)[r] = -1.0f;
+  for (int k = 0; k < 3; ++k) normals_->data.row<float>(world)[3 * r + k] = 0.0f;
+  for (Field* ids : {geom_id_, body_id_, material_id_})
+    if (ids != nullptr) ids->data.row<int>(world)[r] = -1;
+}
+
 RayFilter RayCastSensor::filter(int frame) const {
   RayFilter filter = filter_;
   if (cfg_.exclude_parent_body) filter.exclude_body = frames_[frame].body();
   return filter;
+}
+
+void RayCastSensor::place_timed(int world, int frame, int packet, float reach,
+                                RayPacket& out) const {
+  const RayBundle& bundle = bundles_[parts_[world]];
+  const LocalPacket& local = bundle.packet(packet);
+  const double* times = pattern_.times.data() + parts_[world] * num_rays_per_frame();
+  double last = 1.0;  // no ray's time
+  float shift[3] = {}, align[9] = {};
+  for (int i = 0; i < kPacket; ++i) {
+    const int r = bundle.rays(packet)[i];
+    if (r >= 0 && times[r] != last) {
+      last = times[r];
+      const Pose pose = history_.at(world * num_frames() + frame, moments_[world] + last);
+      const double p[3] = {pose.p.x, pose.p.y, pose.p.z},
+                   q[4] = {pose.q.w, pose.q.x, pose.q.y, pose.q.z};
+      double mat[9];
+      mju_quat2Mat(mat, q);
+      align_rays(alignment_, mat, align);
+      for (int k = 0; k < 3; ++k) shift[k] = static_cast<float>(p[k] - out.origin[k]);
+    }
+    for (int k = 0; k < 3; ++k) {
+      const float* row = align + 3 * k;
+      out.o[k][i] =
+          shift[k] + row[0] * local.o[0][i] + row[1] * local.o[1][i] + row[2] * local.o[2][i];
+      out.d[k][i] = row[0] * local.d[0][i] + row[1] * local.d[1][i] + row[2] * local.d[2][i];
+    }
+    out.tmax[i] = local.active[i] * reach;
+  }
 }
 
 // The rows of one world and frame.
@@ -147,6 +214,7 @@ struct RayCastSensor::Rows {
 void RayCastSensor::trace_packets(const RayScene& rays, int world, int frame, int begin, int end,
                                   RayScratch& scratch) {
   const FramePose& pose = frame_pose(world, frame);
+  const RayBundle& bundle = bundles_[parts_[world]];
   const RayWorld& seen = rays.world(world);
   const int first = frame * num_rays_per_frame();
   const auto ids = [&](Field* field) {
@@ -166,9 +234,12 @@ void RayCastSensor::trace_packets(const RayScene& rays, int world, int frame, in
   HitPacket hits;
   std::copy_n(pose.pos, 3, packet.origin);
   for (int p = begin; p < end; ++p) {
-    rays.place(bundle_.packet(p), pose.align, reach, packet);
+    if (history_.empty())
+      rays.place(bundle.packet(p), pose.align, reach, packet);
+    else
+      place_timed(world, frame, p, reach, packet);
     rays.trace(world, seen_by, packet, hits, scratch);
-    const int* order = bundle_.rays(p);
+    const int* order = bundle.rays(p);
     for (int i = 0; i < kPacket; ++i) {
       const int r = order[i];
       if (r < 0) continue;

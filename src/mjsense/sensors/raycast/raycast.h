@@ -24,6 +24,7 @@
 #include "mjsense/rays/ray_scene.h"
 #include "mjsense/scene/entity.h"
 #include "mjsense/sensors/raycast/pattern.h"
+#include "mjsense/sensors/raycast/pose_history.h"
 #include "mjsense/sensors/raycast/ray_bundle.h"
 #include "mjsense/sensors/raycast/ray_frame.h"
 
@@ -69,14 +70,18 @@ class RayCastSensor : public Sensor {
   std::string_view kind() const override { return "raycast"; }
   Stage stage() const override { return Stage::kCast; }
   void initialize(const SensorInit& init) override;
+  bool wants_substep() const override { return !history_.empty(); }
+  void substep(const World& world) override;
   void compute(const World& world) override;
   void cast(const CastContext& context) override;
+  void reset(const World& world) override;
 
   const RayCastSensorCfg& cfg() const { return cfg_; }
   int num_frames() const { return static_cast<int>(frames_.size()); }
-  int num_rays_per_frame() const { return bundle_.num_rays(); }
+  int num_rays_per_frame() const { return bundles_.front().num_rays(); }
   int num_rays() const { return num_frames() * num_rays_per_frame(); }
-  // Local rays of one frame, [n].
+  // Local rays of one frame, [n]; of a sensor that casts a different part of its pattern each time,
+  // all of them.
   const RayPattern& pattern() const { return pattern_; }
   // As the last compute() left it: the frame's pose and the alignment of its rays.
   const FramePose& frame_pose(int world, int frame) const {
@@ -84,12 +89,24 @@ class RayCastSensor : public Sensor {
   }
 
  protected:
+  // Rays of a pattern that is cast in `count` parts of equal size, one after the other; which is
+  // the turn's in this world.
+  virtual int num_parts() const { return 1; }
+  virtual int part(const World& /*world*/) const { return 0; }
+  int part_of(int world) const { return parts_[world]; }
+  // The rays of one frame, for the pattern given.
+  virtual RayPattern build_pattern(const mjModel* model) const;
   // After all rays of a world are traced; worlds in parallel, each on one thread.
   virtual void finish(const RayScene& rays, int world, RayScratch& scratch);
   virtual bool wants_finish() const { return false; }
   std::string place() const;
+  Field& add(std::string_view name, DType dtype, Shape shape, std::string unit, std::string frame,
+             double low, double high, std::string description, int num_worlds);
+  // Makes ray r of this world one that hits nothing. hit_pos_w is the caller's.
+  void forget(int world, int r);
   // What rays of this frame see.
   RayFilter filter(int frame) const;
+
   RayCastSensorCfg cfg_;
   Field *distances_ = nullptr, *hit_pos_ = nullptr, *normals_ = nullptr, *frame_pos_ = nullptr,
         *frame_quat_ = nullptr, *pos_ = nullptr, *quat_ = nullptr, *geom_id_ = nullptr,
@@ -97,15 +114,18 @@ class RayCastSensor : public Sensor {
 
  private:
   struct Rows;
+  void remember(const World& world);
+  // As RayScene::place(), each ray with the frame's pose at its own time.
+  void place_timed(int world, int frame, int packet, float reach, RayPacket& out) const;
   void trace_packets(const RayScene& rays, int world, int frame, int begin, int end,
                      RayScratch& scratch);
-  Field& add(std::string_view name, DType dtype, Shape shape, std::string unit, std::string frame,
-             double low, double high, std::string description, int num_worlds);
-
   RayAlignment alignment_ = RayAlignment::kBase;
   RayFilter filter_;
   RayPattern pattern_;
-  RayBundle bundle_;
+  std::vector<RayBundle> bundles_;  // one a part
+  std::vector<int> parts_;          // [B] the part to cast now
+  std::vector<double> moments_;     // [B] s, time of the world at the last compute()
+  PoseHistory history_;             // of frames [B, F]; empty unless rays have times of their own
   std::vector<RayFrame> frames_;
   std::vector<FramePose> poses_;     // [B, F]
   std::vector<RayScratch> scratch_;  // one a thread

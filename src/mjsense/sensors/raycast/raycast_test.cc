@@ -267,7 +267,7 @@ TEST(Pattern, EveryRayIsInExactlyOnePacket) {
     user.offsets.assign(n, {});
     for (auto& o : user.offsets)
       for (double& x : o) x = rng.uniform(-1, 1);
-    const RayBundle bundle(make_pattern(user, nullptr, "test"));
+    const RayBundle bundle(make_pattern(user, nullptr, "test"), 0, n);
     std::vector<int> seen(n, 0);
     for (int p = 0; p < bundle.num_packets(); ++p)
       for (int i = 0; i < kPacket; ++i)

@@ -1,0 +1,186 @@
+#include "mjsense/sensors/lidar/lidar.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+
+#include "mjsense/core/error.h"
+#include "mjsense/sensors/lidar/npy.h"
+
+namespace mjsense {
+namespace {
+
+constexpr double kRadians = std::numbers::pi / 180;
+
+std::array<double, 3> direction(double azimuth, double elevation) {
+  return {std::cos(elevation) * std::cos(azimuth), std::cos(elevation) * std::sin(azimuth),
+          std::sin(elevation)};
+}
+
+void check(bool good, const std::string& place, const char* name, double value,
+           const char* expected) {
+  if (!good)
+    throw ValueError(fmt::format("{}: {} is {}: must be {}", place, name, value, expected));
+}
+
+}  // namespace
+
+std::unique_ptr<Sensor> LidarSensorCfg::build() const {
+  return std::make_unique<LidarSensor>(*this);
+}
+
+LidarSensor::LidarSensor(const LidarSensorCfg& cfg) : RayCastSensor(cfg), lidar_(cfg) {
+  cfg_.hit_ids = true;  // intensity needs them
+  check(cfg.range_noise_std >= 0, place(), "range_noise_std", cfg.range_noise_std, "0 or more");
+  check(cfg.range_noise_relative >= 0, place(), "range_noise_relative", cfg.range_noise_relative,
+        "0 or more");
+  check(cfg.range_resolution >= 0, place(), "range_resolution", cfg.range_resolution, "0 or more");
+  check(cfg.dropout >= 0 && cfg.dropout <= 1, place(), "dropout", cfg.dropout, "between 0 and 1");
+  if (const auto* s = std::get_if<SpinningScan>(&cfg.scan)) {
+    rate_hz_ = s->rate_hz;
+    check(s->channels >= 1, place(), "channels", s->channels, "at least 1");
+    check(s->samples >= 1, place(), "samples", s->samples, "at least 1");
+    check(s->azimuth_span_deg > 0 && s->azimuth_span_deg <= 360, place(), "azimuth_span_deg",
+          s->azimuth_span_deg, "above 0 and at most 360");
+    if (!s->elevations_deg.empty() && static_cast<int>(s->elevations_deg.size()) != s->channels)
+      throw ValueError(fmt::format("{}: {} channels and {} elevations", place(), s->channels,
+                                   s->elevations_deg.size()));
+  } else {
+    const TableScan& t = std::get<TableScan>(cfg.scan);
+    rate_hz_ = t.rate_hz;
+    angles_ = t.file.empty() ? t.angles : read_npy_pairs(t.file);
+    if (angles_.empty()) throw ValueError(place() + ": the scan's table has no rows");
+    const int rows = static_cast<int>(angles_.size());
+    check(t.rays_per_scan >= 0 && t.rays_per_scan <= rows, place(), "rays_per_scan",
+          t.rays_per_scan, "between 0 and the table's rows");
+    if (t.rays_per_scan > 0) num_parts_ = rows / t.rays_per_scan;
+    angles_.resize(t.rays_per_scan > 0 ? num_parts_ * t.rays_per_scan : rows);
+  }
+  check(rate_hz_ > 0, place(), "rate_hz", rate_hz_, "above 0");
+}
+
+RayPattern LidarSensor::build_pattern(const mjModel* /*model*/) const {
+  RayPattern pattern = std::holds_alternative<SpinningScan>(lidar_.scan)
+                           ? spinning(std::get<SpinningScan>(lidar_.scan))
+                           : table(std::get<TableScan>(lidar_.scan));
+  pattern.offsets.assign(pattern.directions.size(), {0, 0, 0});
+  if (!lidar_.motion_distortion) pattern.times.clear();
+  return pattern;
+}
+
+RayPattern LidarSensor::spinning(const SpinningScan& s) const {
+  RayPattern pattern;
+  for (int c = 0; c < s.channels; ++c) {
+    const double even = s.channels > 1
+                            ? s.elevation_min_deg +
+                                  (s.elevation_max_deg - s.elevation_min_deg) * c / (s.channels - 1)
+                            : 0.5 * (s.elevation_min_deg + s.elevation_max_deg);
+    const double elevation = s.elevations_deg.empty() ? even : s.elevations_deg[c];
+    for (int i = 0; i < s.samples; ++i) {
+      const double azimuth = s.azimuth_start_deg + s.azimuth_span_deg * i / s.samples;
+      pattern.directions.push_back(direction(azimuth * kRadians, elevation * kRadians));
+      // A full turn takes 1 / rate; a part of it is passed in that part of the time.
+      pattern.times.push_back((i - (s.samples - 1)) * s.azimuth_span_deg /
+                              (360 * s.samples * s.rate_hz));
+    }
+  }
+  return pattern;
+}
+
+RayPattern LidarSensor::table(const TableScan& t) const {
+  RayPattern pattern;
+  const int count = static_cast<int>(angles_.size()) / num_parts_;
+  for (std::size_t i = 0; i < angles_.size(); ++i) {
+    pattern.directions.push_back(direction(angles_[i][0], angles_[i][1]));
+    pattern.times.push_back((static_cast<int>(i) % count - (count - 1)) / (count * t.rate_hz));
+  }
+  return pattern;
+}
+
+// The scan that was finished last: it is cast as a whole.
+int LidarSensor::part(const World& world) const {
+  const auto scan = static_cast<std::int64_t>(std::floor(world.time() * rate_hz_ + 1e-6));
+  return static_cast<int>(scan % num_parts_);
+}
+
+void LidarSensor::initialize(const SensorInit& init) {
+  RayCastSensor::initialize(init);
+  noise_.assign(init.num_worlds, Rng(0, 0, 0, 0));
+  const double far = cfg_.max_distance;
+  points_ = &add("points", DType::kFloat32, {num_rays(), 3}, "m", "sensor", -far, far,
+                 "point of each return; 0 if none", init.num_worlds);
+  intensity_ = &add("intensity", DType::kFloat32, {num_rays()}, "", "", 0, 1,
+                    "albedo times cosine of incidence of each return; 0 if none", init.num_worlds);
+}
+
+void LidarSensor::compute(const World& world) {
+  RayCastSensor::compute(world);
+  noise_[world.id] = world.rng(stream_of(name()));
+}
+
+void LidarSensor::finish(const RayScene& rays, int world, RayScratch& /*scratch*/) {
+  const int n = num_rays_per_frame(), first_ray = part_of(world) * n;
+  if (lidar_.range_noise_std > 0 || lidar_.range_noise_relative > 0 ||
+      lidar_.range_resolution > 0 || lidar_.dropout > 0)
+    disturb(world);
+  const float* distance = distances_->data.row<float>(world).data();
+  const float* hit = hit_pos_->data.row<float>(world).data();
+  const float* normal = normals_->data.row<float>(world).data();
+  const int* geom = geom_id_->data.row<int>(world).data();
+  float* point = points_->data.row<float>(world).data();
+  float* intensity = intensity_->data.row<float>(world).data();
+  const std::span<const float> rgba = rays.world(world).rgba();
+  for (int r = 0; r < num_rays(); ++r) {
+    const bool seen = distance[r] >= 0;
+    const std::array<double, 3>& d = pattern().directions[first_ray + r % n];
+    for (int k = 0; k < 3; ++k)
+      point[3 * r + k] = seen ? distance[r] * static_cast<float>(d[k]) : 0.0f;
+    intensity[r] = 0;
+    if (!seen) continue;
+    const double* from = frame_pose(world, r / n).pos;
+    float cosine = 0, length = 0;
+    for (int k = 0; k < 3; ++k) {
+      const float back = static_cast<float>(from[k] - hit[3 * r + k]);
+      cosine += back * normal[3 * r + k];
+      length += back * back;
+    }
+    const float* c = &rgba[4 * geom[r]];
+    const float albedo = (c[0] + c[1] + c[2]) / 3;
+    intensity[r] =
+        std::clamp(albedo * std::abs(cosine) / std::sqrt(std::max(length, 1e-20f)), 0.0f, 1.0f);
+  }
+}
+
+// Lost and inexact returns.
+void LidarSensor::disturb(int world) {
+  Rng& rng = noise_[world];
+  float* distance = distances_->data.row<float>(world).data();
+  float* hit = hit_pos_->data.row<float>(world).data();
+  for (int r = 0; r < num_rays(); ++r) {
+    // Every ray draws its numbers, hit or not: what one ray meets does not change another's noise.
+    const bool lost = lidar_.dropout > 0 && rng.uniform() < lidar_.dropout;
+    const bool noisy = lidar_.range_noise_std > 0 || lidar_.range_noise_relative > 0;
+    const double draw = noisy ? rng.normal() : 0.0;
+    if (distance[r] < 0) continue;
+    const double t = distance[r];
+    double measured =
+        t + draw * std::hypot(lidar_.range_noise_std, lidar_.range_noise_relative * t);
+    if (lidar_.range_resolution > 0)
+      measured = std::round(measured / lidar_.range_resolution) * lidar_.range_resolution;
+    const double* from = frame_pose(world, r / num_rays_per_frame()).pos;
+    float* at = hit + 3 * r;
+    if (lost || measured < cfg_.min_distance || measured > cfg_.max_distance) {
+      forget(world, r);
+      for (int k = 0; k < 3; ++k) at[k] = static_cast<float>(from[k]);
+      continue;
+    }
+    distance[r] = static_cast<float>(measured);
+    double along[3] = {at[0] - from[0], at[1] - from[1], at[2] - from[2]};
+    mju_normalize3(along);
+    for (int k = 0; k < 3; ++k) at[k] += static_cast<float>((measured - t) * along[k]);
+  }
+}
+
+}  // namespace mjsense

@@ -1,0 +1,87 @@
+#pragma once
+// LidarSensor: a RayCastSensor whose rays are a lidar's, with its noise, its returns' intensity and
+// its point cloud.
+//
+// All fields of RayCastSensor (geom_id and its kin always), and
+//   points      float32 [B, N, 3]  m, sensor frame, as the device reports them; 0 without a return
+//   intensity   float32 [B, N]     0..1: albedo of the surface times the cosine of incidence; 0
+//   without a return
+// Noise is in distances, points and hit_pos_w alike. Ray order: a spinning lidar's is [channels,
+// samples], row-major, the first channel first; a table's is its own.
+
+#include <array>
+#include <memory>
+#include <string>
+#include <variant>
+#include <vector>
+
+#include "mjsense/sensors/raycast/raycast.h"
+
+namespace mjsense {
+
+// `channels` lasers over each other turn about the frame's z axis, counter-clockwise, from
+// azimuth_start; one reading is one sweep, the last firing now.
+struct SpinningScan {
+  int channels = 16;
+  double elevation_min_deg = -15.0, elevation_max_deg = 15.0;  // evenly spaced, the lowest first
+  std::vector<double> elevations_deg;  // or one elevation a channel, in this order
+  int samples = 360;                   // firings of each channel in a sweep
+  double azimuth_start_deg = 0.0, azimuth_span_deg = 360.0;  // 0: along +x
+  double rate_hz = 10.0;                                     // sweeps a second
+};
+
+// Rays from a table of (azimuth, elevation) in radians: solid-state lidars, or a pattern that does
+// not repeat within a reading.
+struct TableScan {
+  std::string
+      file;  // .npy of shape (M, 2), float32 or float64, such as mujoco-lidar's Livox tables
+  std::vector<std::array<double, 2>> angles;  // or the table itself
+  int rays_per_scan =
+      0;  // each scan takes the next so many rows, and starts again at the end; 0: all rows
+  double rate_hz = 10.0;  // scans a second
+};
+
+struct LidarSensorCfg : RayCastSensorCfg {
+  LidarSensorCfg() {
+    max_distance = 100.0;
+    min_distance = 0.1;
+  }
+  std::variant<SpinningScan, TableScan> scan;
+  bool motion_distortion =
+      false;  // each ray leaves from where the frame was at its own moment of the sweep
+  double range_noise_std = 0.0;       // m
+  double range_noise_relative = 0.0;  // standard deviation in parts of the range, added in squares
+  double range_resolution = 0.0;      // m, distances are rounded to multiples; 0: not at all
+  double dropout = 0.0;               // probability that a return is lost
+
+  std::unique_ptr<Sensor> build() const override;
+};
+
+class LidarSensor : public RayCastSensor {
+ public:
+  explicit LidarSensor(const LidarSensorCfg& cfg);
+  std::string_view kind() const override { return "lidar"; }
+  void initialize(const SensorInit& init) override;
+  void compute(const World& world) override;
+
+ protected:
+  RayPattern build_pattern(const mjModel* model) const override;
+  int num_parts() const override { return num_parts_; }
+  int part(const World& world) const override;
+  bool wants_finish() const override { return true; }
+  void finish(const RayScene& rays, int world, RayScratch& scratch) override;
+
+ private:
+  RayPattern spinning(const SpinningScan& scan) const;
+  RayPattern table(const TableScan& scan) const;
+  void disturb(int world);
+
+  LidarSensorCfg lidar_;
+  std::vector<std::array<double, 2>> angles_;  // of a table
+  int num_parts_ = 1;
+  double rate_hz_;
+  std::vector<Rng> noise_;  // [B]
+  Field *points_ = nullptr, *intensity_ = nullptr;
+};
+
+}  // namespace mjsense

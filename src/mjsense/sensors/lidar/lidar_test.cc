@@ -1,0 +1,217 @@
+#include "mjsense/sensors/lidar/lidar.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <cstdio>
+#include <cstring>
+#include <filesystem>
+#include <fstream>
+#include <memory>
+
+#include "mjsense/core/error.h"
+#include "mjsense/scene/scene.h"
+#include "mjsense/sensors/lidar/npy.h"
+#include "mjsense/sensors/lidar/point_cloud.h"
+#include "mjsense/sim/simulation.h"
+
+namespace mjsense {
+namespace {
+
+using ::testing::Each;
+using ::testing::FloatNear;
+using ::testing::HasSubstr;
+
+// Inside a ball of radius 5 m and grey 0.5, a puck that slides along x without friction.
+constexpr char kRoom[] = R"(
+<mujoco><option gravity="0 0 0"/><worldbody>
+  <geom name="room" type="sphere" size="5" rgba=".5 .5 .5 1" contype="0" conaffinity="0"/>
+  <geom name="wall" type="box" size=".5 20 20" pos="4.5 0 0" group="1" contype="0" conaffinity="0"/>
+  <body name="puck"><joint name="x" type="slide" axis="1 0 0"/><joint name="turn" type="hinge" axis="0 0 1"/>
+    <geom size=".05" mass="1"/><site name="lidar"/></body>
+</worldbody></mujoco>)";
+
+struct Lab {
+  std::shared_ptr<LidarSensorCfg> cfg = std::make_shared<LidarSensorCfg>();
+  std::shared_ptr<Scene> scene;
+  std::unique_ptr<Simulation> sim;
+
+  Lab() {
+    cfg->name = "lidar";
+    cfg->frame = {{"site", "lidar", "r"}};
+    cfg->include_geom_groups = {{0}};
+    cfg->scan = SpinningScan{.channels = 4, .samples = 90};
+  }
+  void start(SimulationCfg sim_cfg = {}) {
+    SceneCfg s;
+    s.entities.emplace_back("r", EntityCfg{.model = {.xml = kRoom}});
+    s.options.gravity = {0, 0, 0};
+    s.sensors = {cfg};
+    scene = std::make_shared<Scene>(std::move(s));
+    sim = std::make_unique<Simulation>(scene, sim_cfg);
+  }
+  std::vector<float> read(std::string_view field) {
+    Sensor& sensor = scene->sensor("lidar");
+    sim->refresh(sensor);
+    const auto all = sensor.field(field).data.all<float>();
+    return {all.begin(), all.end()};
+  }
+  void set(const char* component, int i, double value) {
+    const ArrayView v = sim->worlds().state_component(component);
+    reinterpret_cast<double*>(v.data)[i] = value;
+  }
+};
+
+TEST(Lidar, RoundRoomIsAsFarEverywhere) {
+  Lab lab;
+  lab.start();
+  EXPECT_THAT(lab.read("distances"), Each(FloatNear(5, 1e-5f)));
+  EXPECT_THAT(lab.read("intensity"), Each(FloatNear(0.5f, 1e-5f)));
+  const std::vector<float> p = lab.read("points");
+  // Channel 3 (15 degrees up), firing 0 along +x; channel 0, firing 45 along -x.
+  EXPECT_NEAR(p[3 * 270], 5 * std::cos(15 * mjPI / 180), 1e-5);
+  EXPECT_NEAR(p[3 * 270 + 2], 5 * std::sin(15 * mjPI / 180), 1e-5);
+  EXPECT_NEAR(p[3 * 45], -5 * std::cos(15 * mjPI / 180), 1e-5);
+  EXPECT_NEAR(p[3 * 45 + 2], -5 * std::sin(15 * mjPI / 180), 1e-5);
+}
+
+TEST(Lidar, NoiseHasItsDeviationAndDependsOnTheSeedOnly) {
+  const auto run = [](int threads, int worlds, std::uint64_t seed) {
+    Lab lab;
+    lab.cfg->range_noise_std = 0.03;
+    lab.cfg->range_noise_relative = 0.008;  // 0.04 m at 5 m: 0.05 m together
+    lab.cfg->dropout = 0.1;
+    lab.start({.num_worlds = worlds, .threads = threads, .seed = seed});
+    lab.sim->step(2);
+    return lab.read("distances");
+  };
+  const std::vector<float> d = run(1, 8, 1);
+  double sum = 0, squares = 0;
+  int n = 0;
+  for (float x : d) {
+    if (x < 0) continue;
+    ++n;
+    sum += x - 5;
+    squares += (x - 5) * (x - 5);
+  }
+  EXPECT_NEAR(n, 0.9 * d.size(), 4 * std::sqrt(0.09 * d.size()));
+  EXPECT_NEAR(sum / n, 0, 4 * 0.05 / std::sqrt(n));
+  EXPECT_NEAR(std::sqrt(squares / n), 0.05, 0.003);
+  EXPECT_EQ(run(5, 8, 1), d);
+  const std::vector<float> alone = run(1, 1, 1);
+  EXPECT_TRUE(std::equal(alone.begin(), alone.end(), d.begin()));
+  EXPECT_NE(run(1, 8, 2), d);
+}
+
+TEST(Lidar, MotionDistortsTheSweep) {
+  Lab lab;
+  lab.cfg->include_geom_groups = {{1}};  // the wall at x = 4
+  lab.cfg->motion_distortion = true;
+  // One laser that looks along +x all the time: azimuth span of nearly nothing would pass in no
+  // time, so a table it is.
+  lab.cfg->scan =
+      TableScan{.angles = std::vector<std::array<double, 2>>(101, {0.0, 0.0}), .rate_hz = 10};
+  lab.start();
+  lab.set("qvel", 0, 2.0);
+  for (int i = 0; i < 250; ++i) lab.sim->step();  // 0.5 s: at x = 1
+  const std::vector<float> d = lab.read("distances");
+  for (int i = 0; i <= 100; ++i) {
+    const double before = (i - 100) / 1010.0;  // s
+    EXPECT_NEAR(d[i], 4 - (1 + 2 * before), 1e-4) << i;
+  }
+  const std::vector<float> hit = lab.read("hit_pos_w");
+  EXPECT_NEAR(hit[0], 4, 1e-5);
+}
+
+TEST(Lidar, BeforeTheFirstMomentTheFrameStoodStill) {
+  Lab lab;
+  lab.cfg->include_geom_groups = {{1}};
+  lab.cfg->motion_distortion = true;
+  lab.start();
+  lab.set("qpos", 0, 1.0);
+  lab.sim->forward();
+  const std::vector<float> d = lab.read("distances");
+  EXPECT_NEAR(d[2 * 90], 3 / std::cos(5 * mjPI / 180), 1e-5);
+  EXPECT_NEAR(d[2 * 90 + 45], -1, 0);
+}
+
+TEST(Lidar, TableAdvancesWithEveryScan) {
+  Lab lab;
+  std::vector<std::array<double, 2>> angles;
+  for (int i = 0; i < 30; ++i) angles.push_back({0.01 * i, 0.0});
+  lab.cfg->scan = TableScan{.angles = angles, .rays_per_scan = 10, .rate_hz = 100};
+  lab.start({.decimation = 5});  // 0.01 s a step: a scan a step
+  for (int step = 0; step < 5; ++step) {
+    const std::vector<float> p = lab.read("points");
+    EXPECT_NEAR(std::atan2(p[1], p[0]), 0.1 * (step % 3), 1e-5) << step;
+    lab.sim->step();
+  }
+}
+
+TEST(Lidar, ErrorsSayWhatIsWrong) {
+  const auto with = [](auto change) -> std::string {
+    Lab lab;
+    change(*lab.cfg);
+    try {
+      lab.start();
+    } catch (const Error& e) {
+      return e.what();
+    }
+    return "";
+  };
+  using Cfg = LidarSensorCfg;
+  EXPECT_THAT(with([](Cfg& c) { c.dropout = 2; }), HasSubstr("sensor 'lidar': dropout is 2"));
+  EXPECT_THAT(with([](Cfg& c) { c.scan = SpinningScan{.channels = 2, .elevations_deg = {1}}; }),
+              HasSubstr("2 channels and 1 elevations"));
+  EXPECT_THAT(with([](Cfg& c) { c.scan = TableScan{}; }), HasSubstr("no rows"));
+  EXPECT_THAT(with([](Cfg& c) { c.scan = TableScan{.file = "nowhere.npy"}; }),
+              HasSubstr("nowhere.npy"));
+  EXPECT_THAT(with([](Cfg& c) { c.range_noise_std = -1; }), HasSubstr("range_noise_std"));
+}
+
+std::string temporary(const char* name) {
+  return (std::filesystem::temp_directory_path() / name).string();
+}
+
+TEST(Npy, ReadsFloatPairsAndRefusesOthers) {
+  const std::string path = temporary("mjsense_npy_test.npy");
+  const auto write = [&](std::string dict, std::vector<float> values) {
+    dict.resize(118, ' ');
+    std::ofstream out(path, std::ios::binary);
+    out.write("\x93NUMPY\x01\x00\x76\x00", 10);
+    out << dict;
+    out.write(reinterpret_cast<const char*>(values.data()),
+              static_cast<std::streamsize>(values.size() * 4));
+  };
+  write("{'descr': '<f4', 'fortran_order': False, 'shape': (2, 2), }", {1, 2, 3, 4});
+  EXPECT_EQ(read_npy_pairs(path), (std::vector<std::array<double, 2>>{{1, 2}, {3, 4}}));
+  write("{'descr': '<f4', 'fortran_order': False, 'shape': (3, 2), }", {1, 2, 3, 4});
+  EXPECT_THROW(read_npy_pairs(path), RuntimeError);
+  write("{'descr': '<i4', 'fortran_order': False, 'shape': (2, 2), }", {1, 2, 3, 4});
+  EXPECT_THROW(read_npy_pairs(path), RuntimeError);
+  write("{'descr': '<f4', 'fortran_order': False, 'shape': (2, 3), }", {1, 2, 3, 4, 5, 6});
+  EXPECT_THROW(read_npy_pairs(path), RuntimeError);
+  std::remove(path.c_str());
+}
+
+TEST(PointCloud, LeavesOutWhatDidNotReturn) {
+  const std::string path = temporary("mjsense_cloud_test.ply");
+  const float points[] = {1, 2, 3, 0, 0, 0, 4, 5, 6}, intensity[] = {0.5f, 0, 1},
+              distances[] = {3, -1, 8};
+  write_point_cloud(path, points, intensity, distances);
+  std::ifstream in(path, std::ios::binary);
+  const std::string text((std::istreambuf_iterator<char>(in)), {});
+  EXPECT_THAT(text, HasSubstr("element vertex 2\n"));
+  const std::size_t body = text.find("end_header\n") + 11;
+  ASSERT_EQ(text.size() - body, 32u);
+  float last[4];
+  std::memcpy(last, text.data() + body + 16, 16);
+  EXPECT_EQ(last[2], 6);
+  EXPECT_EQ(last[3], 1);
+  std::remove(path.c_str());
+  EXPECT_THROW(write_point_cloud("cloud.xyz", points), ValueError);
+}
+
+}  // namespace
+}  // namespace mjsense
