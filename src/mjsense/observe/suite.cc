@@ -61,11 +61,11 @@ void SensorSuite::bind(Simulation& simulation) {
   }
 }
 
-void SensorSuite::refresh() {
+void SensorSuite::refresh(std::span<const int> ids) {
   if (!simulation_ || bound_.size() < sensors_.size()) {
     throw ValueError("the suite has sensors that are not bound to a simulation: call bind()");
   }
-  simulation_->refresh(bound_);
+  simulation_->refresh(bound_, ids);
 }
 
 std::vector<const Field*> SensorSuite::streams() const {

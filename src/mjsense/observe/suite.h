@@ -34,8 +34,8 @@ class SensorSuite {
   // Adds the sensors to the simulation, each once; those added later need another call. The
   // simulation lives longer.
   void bind(Simulation& simulation);
-  // Makes every row current, in every world.
-  void refresh();
+  // Makes every row current, in the worlds `ids` (empty: all).
+  void refresh(std::span<const int> ids = {});
   // Fields of all sensors in order: a sensor with several has several streams. Valid after bind().
   std::vector<const Field*> streams() const;
   const Field& stream(std::string_view name) const;  // throws KeyError with the nearest names

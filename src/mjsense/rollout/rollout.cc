@@ -205,7 +205,6 @@ bool Rollout::guard_rows(const std::function<void()>& body) {
   } catch (const RowTooLong& e) {
     if (!active_[e.world] || !faults_[e.world].empty()) throw;
     set_fault(e.world, e.what());
-    simulation_->reset(std::span<const int>(&e.world, 1));
     return false;
   }
 }
@@ -213,10 +212,9 @@ bool Rollout::guard_rows(const std::function<void()>& body) {
 void Rollout::observe() {
   const auto begun = Clock::now();
   const double cast = cast_cost();
-  while (!guard_rows([this] { suite_.refresh(); })) {
+  while (!active_worlds().empty() && !guard_rows([this] { suite_.refresh(ids_); })) {
   }
-  for_each(active_worlds(),
-           [this](const World& world) { evaluations_[world.id] = task_->evaluate(world); });
+  for_each(ids_, [this](const World& world) { evaluations_[world.id] = task_->evaluate(world); });
   const double spent_cast = cast_cost() - cast;
   times_.rendering += spent_cast;
   times_.sensing += since(begun) - spent_cast;

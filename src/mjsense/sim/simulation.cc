@@ -334,13 +334,15 @@ double Simulation::ray_scene_cost() const {
 
 void Simulation::invalidate(std::span<const int> ids) { mark_stale(worlds_->checked_ids(ids)); }
 
-void Simulation::refresh(std::span<Sensor* const> sensors) {
+void Simulation::refresh(std::span<Sensor* const> sensors, std::span<const int> ids) {
   Borrowed due(*this);
   for (const Sensor* sensor : sensors) {
     slot_of(*sensor).wanted = true;
   }
   collect(due->slots, [](const Slot&) { return false; });
-  for (int w = 0; w < cfg_.num_worlds; ++w) {
+  const int n = ids.empty() ? cfg_.num_worlds : static_cast<int>(ids.size());
+  for (int k = 0; k < n; ++k) {
+    const int w = ids.empty() ? k : ids[k];
     for (const Slot* slot : due->slots) {
       if (slot->computed[w] != version_[w]) {
         due->ids.push_back(w);

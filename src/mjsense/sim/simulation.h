@@ -60,13 +60,13 @@ class Simulation {
   // Adds a sensor that is not part of the scene (observation sensors, users' own) and initializes
   // it.
   void add(std::shared_ptr<Sensor> sensor);
-  // Makes the sensor's rows current in every world. They stay so until the next step, reset or
-  // forward.
+  // Makes the sensor's rows current, in the worlds `ids` (empty: all). They stay so until the next
+  // step, reset or forward.
   void refresh(Sensor& sensor) {
     Sensor* one[] = {&sensor};
     refresh(one);
   }
-  void refresh(std::span<Sensor* const> sensors);
+  void refresh(std::span<Sensor* const> sensors, std::span<const int> ids = {});
   // State was changed in a way that only the caller knows.
   void invalidate(std::span<const int> ids = {});
 

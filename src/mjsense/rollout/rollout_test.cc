@@ -1,0 +1,238 @@
+#include "mjsense/rollout/rollout.h"
+
+#include <gmock/gmock.h>
+
+#include <cmath>
+#include <limits>
+#include <map>
+#include <nlohmann/json.hpp>
+
+#include "mjsense/core/error.h"
+#include "mjsense/observe/function_sensor.h"
+
+namespace mjsense {
+namespace {
+
+using nlohmann::json;
+using testing::ElementsAre;
+using testing::HasSubstr;
+
+RolloutCfg blind(int num_worlds = 1, int threads = 1) {
+  RolloutCfg cfg;
+  cfg.cameras.emplace();
+  cfg.num_worlds = num_worlds;
+  cfg.threads = threads;
+  cfg.seed = 3;
+  return cfg;
+}
+
+json row(Rollout& rollout, const std::string& name, int world = 0) {
+  const auto bytes = rollout.suite().stream(name).data.row<std::uint8_t>(world);
+  const std::string text(bytes.begin(), bytes.end());
+  return json::parse(text.substr(0, text.find('\0')));
+}
+
+std::vector<double> numbers(const json& list) { return list.get<std::vector<double>>(); }
+
+void start(Rollout& rollout, std::vector<int> worlds, std::vector<std::int64_t> episodes) {
+  rollout.start(worlds, episodes);
+}
+
+TEST(Rollout, TheSuiteStandsInItsPublishedOrder) {
+  Rollout rollout(blind());
+  EXPECT_THAT(
+      rollout.suite().names(),
+      ElementsAre("qpos", "qvel", "robot_base_pose", "env_states", "task_info",
+                  "actions/commanded_action", "actions/joint_pos", "actions/joint_pos_rel",
+                  "actions/ee_twist", "actions/ee_pose", "obj_start", "grasp_state_pickup_obj",
+                  "obj_end", "tcp_pose", "policy_phase", "policy_num_retries", "grasp_pose"));
+  EXPECT_EQ(rollout.suite().owner("tcp_pose"), "robot 'franka'");
+  EXPECT_EQ(rollout.suite().owner("grasp_pose"), "policy 'planner'");
+}
+
+// Row t belongs to the action between the observations t-1 and t.
+TEST(Rollout, ActionsAreMeasuredFromTheObservationBefore) {
+  Rollout rollout(blind());
+  start(rollout, {0}, {7});
+  EXPECT_EQ(row(rollout, "actions/commanded_action"), json::object());
+  EXPECT_EQ(row(rollout, "actions/joint_pos_rel"),
+            json::parse(R"({"arm":[0.0,0.0,0.0,0.0,0.0,0.0,0.0],"base":[],"gripper":[0.0,0.0]})"));
+  EXPECT_EQ(row(rollout, "actions/ee_twist")["arm"], json::parse("[0.0,0.0,0.0,0.0,0.0,0.0]"));
+  EXPECT_EQ(row(rollout, "actions/ee_pose")["base"], json::parse("[0.0,0.0,0.0,1.0,0.0,0.0,0.0]"));
+
+  const Robot& robot = rollout.task().robot();
+  for (int t = 1; t <= 20; ++t) {
+    const auto before = numbers(row(rollout, "qpos")["arm"]);
+    const auto leaf_row = rollout.suite().stream("tcp_pose").data.row<float>(0);
+    const Pose leaf{{leaf_row[0], leaf_row[1], leaf_row[2]},
+                    {leaf_row[3], leaf_row[4], leaf_row[5], leaf_row[6]}};
+    rollout.act();
+    rollout.step();
+    const auto target = numbers(row(rollout, "actions/joint_pos")["arm"]);
+    const auto relative = numbers(row(rollout, "actions/joint_pos_rel")["arm"]);
+    EXPECT_FALSE(
+        row(rollout, "actions/joint_pos_rel").contains("gripper"));  // one command, two joints
+    for (int i = 0; i < 7; ++i) EXPECT_NEAR(relative[i], target[i] - before[i], 1e-6);
+    // The target pose, reached from the leaf by the twist.
+    const auto twist = numbers(row(rollout, "actions/ee_twist")["arm"]);
+    const Pose reached =
+        leaf * exp6({{twist[0], twist[1], twist[2]}, {twist[3], twist[4], twist[5]}});
+    RobotValues values;
+    values[robot.arm()].set(target);
+    const Pose expected = robot.fk(robot.arm(), values);
+    EXPECT_NEAR(norm(reached.p - expected.p), 0, 1e-5);
+    EXPECT_NEAR(angle_between(reached.q, expected.q), 0, 1e-5);
+    const auto pose = numbers(row(rollout, "actions/ee_pose")["arm"]);
+    EXPECT_NEAR(pose[0], expected.p.x, 1e-12);
+    EXPECT_NEAR(pose[3], expected.q.w, 1e-12);
+  }
+}
+
+TEST(Rollout, AtTheEndOnlyTheCommandIsLeft) {
+  Rollout rollout(blind());
+  start(rollout, {0}, {7});
+  json before;
+  int actions = 0;
+  while (!rollout.evaluation(0).terminal && !rollout.evaluation(0).truncated) {
+    before = row(rollout, "actions/commanded_action");
+    rollout.act();
+    rollout.step();
+    ++actions;
+  }
+  EXPECT_TRUE(rollout.evaluation(0).terminal);
+  EXPECT_TRUE(rollout.evaluation(0).success);
+  EXPECT_GT(actions, 20);
+  for (const char* name : {"joint_pos", "joint_pos_rel", "ee_twist", "ee_pose"}) {
+    EXPECT_EQ(row(rollout, std::string("actions/") + name), json::object()) << name;
+  }
+  EXPECT_NE(row(rollout, "actions/commanded_action"), json::object());
+  EXPECT_EQ(row(rollout, "task_info")["episode_step"], actions);
+}
+
+// FNV-1a of every row that a world shows.
+std::uint64_t hash(Rollout& rollout, int world) {
+  std::uint64_t h = 1469598103934665603ull;
+  for (const Field* field : rollout.suite().streams()) {
+    for (std::size_t i = 0; i < field->data.row_bytes(); ++i) {
+      h = (h ^ static_cast<std::uint8_t>(field->data.row_data(world)[i])) * 1099511628211ull;
+    }
+  }
+  return h;
+}
+
+// Hashes of the first observations of episodes 0 .. 4, played as worlds become free.
+std::map<std::int64_t, std::vector<std::uint64_t>> play(const RolloutCfg& cfg) {
+  Rollout rollout(cfg);
+  std::map<std::int64_t, std::vector<std::uint64_t>> seen;
+  std::int64_t next = 0;
+  const auto length = [](std::int64_t episode) {
+    return 6 + 3 * static_cast<std::size_t>(episode);
+  };
+  while (true) {
+    bool any = false;
+    for (int w = 0; w < rollout.num_worlds(); ++w) {
+      if (rollout.active(w) && seen[rollout.episode(w)].size() == length(rollout.episode(w))) {
+        rollout.stop(w);
+      }
+      if (!rollout.active(w) && next < 5) {
+        start(rollout, {w}, {next});
+        seen[next++].push_back(hash(rollout, w));
+      }
+      any |= rollout.active(w);
+    }
+    if (!any) return seen;
+    rollout.act();
+    rollout.step();
+    for (int w = 0; w < rollout.num_worlds(); ++w) {
+      if (rollout.active(w)) seen[rollout.episode(w)].push_back(hash(rollout, w));
+    }
+  }
+}
+
+TEST(Rollout, AnEpisodeIsTheSameInAnyWorldAtAnyThreadCount) {
+  const auto alone = play(blind(1, 1));
+  EXPECT_EQ(alone.size(), 5u);
+  EXPECT_NE(alone.at(0)[3], alone.at(1)[3]);
+  EXPECT_EQ(play(blind(3, 1)), alone);
+  EXPECT_EQ(play(blind(4, 2)), alone);
+  EXPECT_EQ(play(blind(5, 5)), alone);
+}
+
+TEST(Rollout, AWorldThatDivergesIsAloneInIt) {
+  const auto run = [](bool poison) {
+    Rollout rollout(blind(2, 2));
+    start(rollout, {0, 1}, {0, 1});
+    for (int t = 0; t < 8; ++t) {
+      if (poison && t == 4) {
+        const StateRow state = state_row(rollout.simulation().worlds(), 1);
+        state.qvel[0] = std::numeric_limits<double>::quiet_NaN();
+      }
+      rollout.act();
+      rollout.step();
+    }
+    if (poison) {
+      EXPECT_THAT(rollout.fault(1), HasSubstr("MuJoCo"));
+      start(rollout, {1}, {1});  // and it can begin again
+      EXPECT_EQ(rollout.fault(1), "");
+      rollout.act();
+      rollout.step();
+      EXPECT_EQ(row(rollout, "task_info", 1)["episode_step"], 1);
+    } else {
+      rollout.act();
+      rollout.step();
+    }
+    EXPECT_EQ(rollout.fault(0), "");
+    return hash(rollout, 0);
+  };
+  EXPECT_EQ(run(true), run(false));
+}
+
+TEST(Rollout, ARowThatDoesNotFitEndsItsEpisodeAlone) {
+  Rollout rollout(blind(2));
+  rollout.suite().add(std::make_shared<JsonFunctionSensor>(
+      "notes", 16, "", [&](const World& world, JsonWriter& json) {
+        const int step = rollout.task().episode_step(world.id);
+        json.begin_object();
+        json.key("n").value(world.id == 1 && step == 3 ? "much longer than that" : "short");
+        json.end_object();
+      }));
+  rollout.suite().bind(rollout.simulation());
+  start(rollout, {0, 1}, {0, 1});
+  for (int t = 0; t < 5; ++t) {
+    rollout.act();
+    rollout.step();
+    EXPECT_EQ(rollout.fault(1).empty(), t < 2) << t;
+  }
+  EXPECT_EQ(rollout.fault(1),
+            "sensor 'notes', world 1: its text needs 29 bytes, str_max_len is 16");
+  EXPECT_EQ(rollout.fault(0), "");
+  EXPECT_EQ(row(rollout, "task_info", 0)["episode_step"], 5);
+}
+
+TEST(Rollout, WrongNamesAndNumbersAreOneClearLine) {
+  const auto error = [](auto change) -> std::string {
+    RolloutCfg cfg = blind();
+    change(cfg);
+    try {
+      Rollout rollout(cfg);
+    } catch (const Error& e) {
+      return e.what();
+    }
+    return "";
+  };
+  EXPECT_EQ(error([](RolloutCfg& c) { c.num_worlds = -2; }), "worlds is -2: must be at least 1");
+  EXPECT_EQ(error([](RolloutCfg& c) { c.cameras = {{"wrist_camra"}}; }),
+            "robot 'franka': no camera named 'wrist_camra'; did you mean 'wrist_camera'?");
+  EXPECT_THAT(error([](RolloutCfg& c) {
+                c.cameras = {{"wrist_camera", "wrist_camera"}};
+              }),
+              HasSubstr("given twice"));
+  EXPECT_THAT(error([](RolloutCfg& c) { c.robot = "frank"; }), HasSubstr("did you mean 'franka'?"));
+  EXPECT_THAT(error([](RolloutCfg& c) { c.task = "pik"; }), HasSubstr("did you mean 'pick'?"));
+  EXPECT_THAT(error([](RolloutCfg& c) { c.policy = "planer"; }),
+              HasSubstr("did you mean 'planner'?"));
+  EXPECT_THAT(error([](RolloutCfg& c) { c.horizon = 0; }), HasSubstr("horizon"));
+}
+
+}  // namespace
+}  // namespace mjsense
