@@ -110,7 +110,9 @@ class Task {
   }
 
   // --- what observations and recordings say about it
-  virtual std::span<const TaskObject> objects(int world) const = 0;  // the main one first
+  // The main one first. Roles are the same in every episode, and known after initialize(); bodies
+  // may change.
+  virtual std::span<const TaskObject> objects(int world) const = 0;
   virtual std::string description(int world) const = 0;              // "Pick up the mug"
   virtual std::vector<std::pair<std::string, std::vector<Referral>>> referrals(
       int world) const = 0;  // per role

@@ -94,6 +94,9 @@ void PickTask::initialize_task() {
     objects_.push_back({body, kind.name, object_shape(model(), body)});
   }
   targets_.assign(num_worlds(), {});
+  for (Target& target : targets_) {
+    target.object = {std::string(kRole), objects_[0].body, kKinds[0].text};
+  }
   robot_root_ = model()->body_rootid[robot().base_body()];
   const int top = resolve(model(), mjOBJ_GEOM, "room/table_top", "task 'pick'");
   table_height_ = model()->body_pos[3 * model()->geom_bodyid[top] + 2] +
