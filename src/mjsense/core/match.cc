@@ -8,6 +8,7 @@
 #include <algorithm>
 
 #include "mjsense/core/error.h"
+#include "mjsense/core/python_regex.h"
 
 namespace mjsense {
 
@@ -31,16 +32,29 @@ struct Regex::Code {
 
 Regex::Regex(std::string_view pattern, std::string_view place)
     : pattern_(pattern), code_(std::make_unique<Code>()) {
+  const auto fault = [&](std::string_view what) {
+    return ValueError(
+        fmt::format("{}: '{}' is not a regular expression: {}", place, pattern, what));
+  };
+  PcrePattern translated;
+  try {
+    translated = translate_python_regex(pattern);
+  } catch (const ValueError& error) {
+    throw fault(error.what());
+  }
   int error = 0;
   PCRE2_SIZE offset = 0;
+  std::unique_ptr<pcre2_compile_context, void (*)(pcre2_compile_context*)> context(
+      pcre2_compile_context_create(nullptr), pcre2_compile_context_free);
+  pcre2_set_newline(context.get(), PCRE2_NEWLINE_LF);
   code_->code =
-      pcre2_compile(reinterpret_cast<PCRE2_SPTR>(pattern.data()), pattern.size(),
-                    PCRE2_UTF | PCRE2_UCP | PCRE2_MATCH_INVALID_UTF, &error, &offset, nullptr);
+      pcre2_compile(reinterpret_cast<PCRE2_SPTR>(translated.text.data()), translated.text.size(),
+                    PCRE2_UTF | PCRE2_MATCH_INVALID_UTF | (translated.ascii ? 0 : PCRE2_UCP),
+                    &error, &offset, context.get());
   if (!code_->code) {
     PCRE2_UCHAR message[256];
     pcre2_get_error_message(error, message, sizeof message);
-    throw ValueError(fmt::format("{}: '{}' is not a regular expression: {} at position {}", place,
-                                 pattern, reinterpret_cast<char*>(message), offset));
+    throw fault(reinterpret_cast<char*>(message));
   }
 }
 

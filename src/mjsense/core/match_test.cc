@@ -1,0 +1,236 @@
+#include "mjsense/core/match.h"
+
+#include <fmt/format.h>
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <cstdio>
+#include <cstdlib>
+#include <filesystem>
+#include <fstream>
+#include <iostream>
+#include <sstream>
+
+#include "mjsense/core/error.h"
+
+namespace mjsense {
+namespace {
+
+using ::testing::ElementsAre;
+using ::testing::HasSubstr;
+
+const std::vector<std::string> kNames = {"FR_foot", "FL_foot", "RR_foot", "trunk", "FR_calf"};
+
+TEST(Match, WholeNamesInModelOrder) {
+  const std::vector<std::string> patterns = {".*_calf", "F._foot"};
+  EXPECT_THAT(match_names(patterns, kNames, "sensor 'feet'"), ElementsAre(0, 1, 4));
+  EXPECT_THAT(match_names(std::vector<std::string>{"(?!R).*_foot"}, kNames, "x"),
+              ElementsAre(0, 1));
+}
+
+std::string fault(const std::vector<std::string>& patterns) {
+  try {
+    match_names(patterns, kNames, "sensor 'feet'");
+  } catch (const ValueError& error) {
+    return error.what();
+  }
+  return "";
+}
+
+TEST(Match, SaysWhatIsWrong) {
+  EXPECT_EQ(fault({"foot"}),
+            "sensor 'feet': Not all regular expressions are matched: 'foot' matches no name; did "
+            "you mean 'FR_foot', 'FL_foot' or "
+            "'RR_foot'?");
+  EXPECT_EQ(fault({"FR.*", ".*_foot"}),
+            "sensor 'feet': Multiple matches for 'FR_foot': the patterns 'FR.*' and '.*_foot'");
+  EXPECT_EQ(fault({"FR_(foot"}),
+            "sensor 'feet': 'FR_(foot' is not a regular expression: missing ), unterminated "
+            "subpattern at position 3");
+  EXPECT_THAT(fault({"*"}), HasSubstr("nothing to repeat at position 0"));
+  EXPECT_THAT(fault({"a**"}), HasSubstr("multiple repeat"));
+  EXPECT_THAT(fault({"\\h"}), HasSubstr("bad escape \\h"));
+}
+
+TEST(Match, ExcludeSearchesOrCompares) {
+  const Exclude exclude(std::vector<std::string>{"trunk", "_cal.$"}, "x");
+  EXPECT_TRUE(exclude.drops("trunk"));
+  EXPECT_FALSE(exclude.drops("trunk_2"));
+  EXPECT_TRUE(exclude.drops("FR_calf"));
+  EXPECT_FALSE(exclude.drops("FR_calf_2"));
+}
+
+// Syntax on which PCRE2 by itself would differ from Python.
+TEST(Match, PythonsDialect) {
+  const auto full = [](const char* pattern, std::string_view text) {
+    return Regex(pattern).fullmatch(text);
+  };
+  EXPECT_TRUE(full("[[:a]", ":"));
+  EXPECT_TRUE(full("a{,2}b", "aab"));
+  EXPECT_TRUE(full("a{,}b", "aaab"));
+  EXPECT_TRUE(full("a{}", "a{}"));
+  EXPECT_TRUE(full("\\u00e9+", "éé"));
+  EXPECT_TRUE(full("\\w+", "bras_été_3"));
+  EXPECT_FALSE(full("(?a)\\w+", "été"));
+  EXPECT_FALSE(full("a\\Z", "a\n"));
+  EXPECT_TRUE(full("a$\\n", "a\n"));
+  EXPECT_TRUE(full("(?x) a b # comment (", "ab"));
+  EXPECT_TRUE(full("(a)(?P<n>b)\\1(?P=n)", "abab"));
+  EXPECT_TRUE(full("\\v", "\v"));
+  EXPECT_FALSE(full("\\v", "\n"));
+  EXPECT_TRUE(full("a|ab", "ab"));  // fullmatch goes on after the first alternative
+  EXPECT_TRUE(full("(?i)foot", "FOOT"));
+  EXPECT_FALSE(full("foot", "Foot"));
+  EXPECT_TRUE(full("\\s", "\x1c"));
+}
+
+// 10,000 random pattern lists against Python's re: which names are matched, which lists are errors.
+constexpr const char* kOracle = R"py(
+import random, re, sys, warnings
+warnings.simplefilter("ignore")
+rng = random.Random(int(sys.argv[1]))
+words = ["FR", "FL", "RR", "RL", "foot", "calf", "hip", "_", "_", "0", "1", "12", "link", "é", "ß", "左", "/", "-", ".", " ", "A", "a"]
+atoms = ["F", "R", "L", "foot", "calf", "hip", "_", "0", "1", ".", ".", ".*", r"\d", r"\w", r"\s", r"\D", r"\W", r"\S", r"\.", r"\-", r"\_",
+         "é", "左", r"\u00e9", r"\xe9", r"\x41", "[FR]", "[^L]", "[a-f]", r"[\w-]", "[]a]", "[^]a]", "[[:alpha:]]", r"[\d_]", "[F-R0-9]", "[a-]",
+         "{", "{}", "}", "]", "{a", r"\t", r"\\", "/", "-", r"\101", r"\0", "[.*+]", "[|&]", r"[\b]", r"[\101]", "#", " "]
+anchors = ["^", "$", r"\A", r"\Z", r"\b"]
+quants = ["*", "+", "?", "{2}", "{1,2}", "{,2}", "{1,}", "*?", "+?", "??", "{0,2}?", "{,}"]
+if sys.version_info >= (3, 11): quants += ["*+", "++", "?+"]
+
+def piece(depth, state):
+    x = rng.random()
+    if depth > 0 and x < .3:
+        body = alternation(depth - 1, state)
+        kind = rng.choice(["(", "(", "(?:", "(?=", "(?!", "(?P<", "(?i:", "(?s-i:", "(?<=", "(?<!", "(?#", "(?>"])
+        if kind == "(?#": return "(?#comment)"
+        if kind == "(?>" and sys.version_info < (3, 11): kind = "(?:"
+        if kind in ("(?<=", "(?<!"): return kind + rng.choice(["F", "_", "[FR]", "foot", r"\w", "a|b"]) + ")"
+        if kind == "(": state[0] += 1
+        if kind == "(?P<":
+            state[0] += 1; state[1] += 1
+            kind = "(?P<n%d>" % state[1]
+        return kind + body + ")"
+    if x < .36: return rng.choice(anchors)
+    if x < .40 and state[0]: return "\\%d" % rng.randint(1, state[0])
+    if x < .42 and state[1]: return "(?P=n%d)" % rng.randint(1, state[1])
+    if x < .43 and state[0]: return "(?(%d)%s|%s)" % (rng.randint(1, state[0]), rng.choice(atoms), rng.choice(atoms))
+    return rng.choice(atoms)
+
+def sequence(depth, state):
+    out = ""
+    for _ in range(rng.randint(0 if depth < 2 else 1, 4)):
+        out += piece(depth, state)
+        if rng.random() < .25: out += rng.choice(quants)
+    return out
+
+def alternation(depth, state):
+    return "|".join(sequence(depth, state) for _ in range(rng.choice([1, 1, 1, 2, 3])))
+
+def name(): return "".join(rng.choice(words) for _ in range(rng.randint(1, 5)))
+
+def pattern(names):
+    x = rng.random()
+    if x < .25:  # derived from a name, so that it matches
+        n = rng.choice(names)
+        k = rng.randint(0, len(n))
+        return re.escape(n[:k]) + rng.choice([".*", r"\w*", "[^/]*", "(?:.|)+", ".*?"]) + rng.choice(["", "$", r"\Z"])
+    if x < .35: return "(.*_)?" + rng.choice(["foot", "calf", "hip|link", "(?!foot).*", r"\d+"]) + rng.choice(["", ".*"])
+    if x < .40: return "".join(rng.choice("()[]{}?*+|\\^$.aF_0-:!=<P>#") for _ in range(rng.randint(1, 7)))  # mostly errors
+    return rng.choice(["", "", "", "(?i)", "(?s)", "(?x)", "(?a)"]) + alternation(2, [0, 0])
+
+def expected(patterns, names, excludes):
+    found, used = [], set()
+    for i, n in enumerate(names):
+        hits = [k for k, p in enumerate(patterns) if re.fullmatch(p, n)]
+        if len(hits) > 1: return "error"
+        used.update(hits)
+        if hits: found.append(i)
+    if len(used) < len(patterns): return "error"
+    special = set(".*+?[]{}()\\|^$")
+    for e in excludes:
+        test = (lambda n: re.search(e, n)) if special & set(e) else (lambda n: n == e)
+        found = [i for i in found if not test(names[i])]
+    return " ".join(map(str, found))
+
+def code(strings): return ",".join("x" + s.encode().hex() for s in strings)
+for _ in range(int(sys.argv[2])):
+    names = [name() for _ in range(rng.randint(1, 8))]
+    patterns = [pattern(names) for _ in range(rng.choice([1, 1, 1, 2]))]
+    excludes = [rng.choice([pattern(names), rng.choice(names)]) for _ in range(rng.choice([0, 0, 1]))]
+    try:
+        for e in patterns + excludes: re.compile(e)
+        result = expected(patterns, names, excludes)
+    except (re.error, OverflowError) as error:
+        result = "syntax"
+    print(code(patterns), code(names), code(excludes) or "-", result, sep="\t")
+)py";
+
+std::vector<std::string> decode(const std::string& text) {
+  std::vector<std::string> strings;
+  if (text == "-") return strings;
+  std::stringstream in(text);
+  for (std::string part; std::getline(in, part, ',');) {
+    std::string bytes;
+    for (std::size_t i = 1; i < part.size(); i += 2)
+      bytes += static_cast<char>(std::stoi(part.substr(i, 2), nullptr, 16));
+    strings.push_back(bytes);
+  }
+  return strings;
+}
+
+std::string ours(const std::vector<std::string>& patterns, const std::vector<std::string>& names,
+                 const std::vector<std::string>& excludes) {
+  try {
+    for (const auto& p : patterns) Regex{p};
+    const Exclude exclude(excludes, "test");
+    std::string out;
+    for (int i : match_names(patterns, names, "test")) {
+      if (!exclude.drops(names[i])) out += fmt::format("{}{}", out.empty() ? "" : " ", i);
+    }
+    return out;
+  } catch (const ValueError& error) {
+    return std::string(error.what()).find("is not a regular expression") != std::string::npos
+               ? "syntax"
+               : "error";
+  }
+}
+
+TEST(Match, TenThousandListsAgainstPython) {
+  const std::string script =
+      (std::filesystem::path(::testing::TempDir()) / "mjsense_match_oracle.py").string();
+  std::ofstream(script) << kOracle;
+  const char* given = std::getenv("MJSENSE_MATCH_SEED");
+  const std::string seed = given ? given : "1";
+  FILE* python = popen(("python3 '" + script + "' " + seed + " 10000").c_str(), "r");
+  ASSERT_NE(python, nullptr);
+  std::string text;
+  char buffer[1 << 16];
+  while (const std::size_t n = std::fread(buffer, 1, sizeof buffer, python)) text.append(buffer, n);
+  if (pclose(python) != 0) GTEST_SKIP() << "no python3";
+  std::stringstream lines(text);
+  int total = 0, matched = 0, syntax = 0, faults = 0;
+  for (std::string line; std::getline(lines, line); ++total) {
+    std::stringstream columns(line);
+    std::string patterns, names, excludes, expected;
+    std::getline(columns, patterns, '\t');
+    std::getline(columns, names, '\t');
+    std::getline(columns, excludes, '\t');
+    std::getline(columns, expected);
+    const std::string got = ours(decode(patterns), decode(names), decode(excludes));
+    if (expected == "syntax") ++syntax;
+    if (expected != "syntax" && expected != "error" && !expected.empty()) ++matched;
+    if (got != expected && ++faults <= 20) {
+      ADD_FAILURE() << fmt::format("python '{}' ours '{}'", expected, got) << " patterns "
+                    << ::testing::PrintToString(decode(patterns)) << " names "
+                    << ::testing::PrintToString(decode(names)) << " exclude "
+                    << ::testing::PrintToString(decode(excludes));
+    }
+  }
+  EXPECT_EQ(total, 10000);
+  EXPECT_EQ(faults, 0);
+  EXPECT_GT(matched, 1500);
+  EXPECT_GT(syntax, 300);
+}
+
+}  // namespace
+}  // namespace mjsense
