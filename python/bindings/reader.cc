@@ -13,6 +13,7 @@ std::string config_place(nb::handle config) {
 
 const char* wanted_of(const std::type_info& type) {
   if (type == typeid(bool)) return "a bool";
+  if (type == typeid(std::uint64_t)) return "an int from 0 on";
   if (type == typeid(int) || type == typeid(std::int64_t)) return "an int";
   if (type == typeid(double) || type == typeid(float)) return "a number";
   if (type == typeid(std::string)) return "a str";

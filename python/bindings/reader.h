@@ -38,7 +38,8 @@ std::string config_place(nb::handle config);
 const char* wanted_of(const std::type_info& type);
 
 // Values with fields of their own (ObjRef, ContactMatch ...) are read by their fields(...); what
-// needs more than that, by a read_custom(FromPython&, nb::handle, T&), both declared in this namespace.
+// needs more than that, by a read_custom(FromPython&, nb::handle, T&), both declared in this
+// namespace.
 class FromPython {
  public:
   explicit FromPython(nb::handle config) : config_(config) {}
@@ -51,7 +52,6 @@ class FromPython {
 
   nb::handle config() const { return config_; }
 
- private:
   template <class T>
   void read(const char* name, nb::handle value, T& out) {
     if constexpr (requires { fields(*this, out); }) {
@@ -85,6 +85,7 @@ class FromPython {
     }
   }
 
+ private:
   nb::handle config_;
 };
 
@@ -104,7 +105,7 @@ class ToPython {
       ToPython nested;
       fields(nested, value);
       return nested.values;
-    } else if constexpr (requires(FromPython& f, nb::handle h) { read_custom(f, h, value); }) {
+    } else if constexpr (requires(FromPython & f, nb::handle h) { read_custom(f, h, value); }) {
       return nb::none();
     } else if constexpr (IsOptional<T>::value) {
       if (!value) return nb::none();

@@ -8,14 +8,17 @@ if _mujoco.mj_versionString() != _MUJOCO:
         f"mjsense is built for MuJoCo {_MUJOCO}, found {_mujoco.mj_versionString()}: pip install 'mujoco-core=={_MUJOCO}'"
     )
 
+from mjsense import observations
 from mjsense._core import SensorSpec, __version__, embedded_models
 from mjsense.configs import (
     BuiltinSensorCfg,
+    CameraIntrinsics,
     CameraSensorCfg,
     ContactMatch,
     ContactSensorCfg,
     EntityCfg,
     GridPatternCfg,
+    LensDistortion,
     MujocoCfg,
     ObjRef,
     PinholeCameraPatternCfg,
@@ -24,6 +27,7 @@ from mjsense.configs import (
     RingPatternCfg,
     SceneCfg,
     SensorCfg,
+    SubTerrainCfg,
     TerrainCfg,
     TerrainHeightSensorCfg,
     UserPatternCfg,

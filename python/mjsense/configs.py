@@ -47,6 +47,8 @@ class EntityCfg:
     pos: Sequence[float] = (0.0, 0.0, 0.0)
     """m, of the entity's root in the world."""
     quat: Sequence[float] = (1.0, 0.0, 0.0, 0.0)
+    joint_pos: Mapping[str, float] = field(default_factory=dict)
+    """Joint positions (rad, m) of the keyframe ``init_state`` by regular expression, unless the model has a keyframe."""
     mocap_base: bool = True
     """Hang a model without a free joint under the mocap body ``<entity>/mocap_base``, so that each world can place it."""
 
@@ -65,10 +67,60 @@ class EntityCfg:
 
 
 @dataclass
+class SubTerrainCfg:
+    """One kind of tile. Pairs are (value at difficulty 0, value at difficulty 1)."""
+
+    kind: str = "flat"
+    """flat, rough, waves, slope, stairs, stepping_stones."""
+    proportion: float = 1.0
+    """Share of the columns."""
+    inverted: bool = False
+    """slope, stairs: down into a pit."""
+    platform_width: float = 2.0
+    """m, the flat square at the centre."""
+    amplitude: Sequence[float] = (0.01, 0.08)
+    """m, rough and waves."""
+    spacing: float = 0.2
+    """m between the knots of rough."""
+    waves: int = 2
+    slope: Sequence[float] = (0.0, 0.6)
+    """Rise over run."""
+    step_height: Sequence[float] = (0.03, 0.2)
+    """m."""
+    step_width: float = 0.3
+    """m."""
+    stone_width: Sequence[float] = (1.0, 0.35)
+    """m."""
+    gap: Sequence[float] = (0.05, 0.35)
+    """m."""
+    stone_height: Sequence[float] = (0.0, 0.05)
+    """m by which stones stand higher or lower."""
+    pit_depth: float = 1.0
+    """m, stepping_stones."""
+
+
+@dataclass
 class TerrainCfg:
-    """The ground, registered as entity ``terrain``."""
+    """The ground, registered as entity ``terrain``: a plane, or tiles of rising difficulty (levels along x, types along y)."""
 
     terrain_type: str = "plane"
+    """plane or generator."""
+    sub_terrains: Mapping[str, SubTerrainCfg] = field(default_factory=dict)
+    """Empty: one of every kind."""
+    levels: int = 5
+    types: int = 0
+    """Columns; 0: one for each sub-terrain."""
+    tile_size: Sequence[float] = (8.0, 8.0)
+    """m."""
+    difficulty: Sequence[float] = (0.0, 1.0)
+    """Of the first and the last level."""
+    resolution: float = 0.1
+    """m, of height fields."""
+    border: float = 5.0
+    """m, flat, around all tiles."""
+    max_init_level: int = -1
+    """Highest level that a world starts on; -1: any."""
+    seed: int = 0
 
 
 @dataclass
@@ -381,6 +433,24 @@ class TerrainHeightSensorCfg(RayCastSensorCfg):
     """min, max, mean, none; over a frame's rays."""
 
 
+@dataclass(frozen=True)
+class CameraIntrinsics:
+    """Focal lengths and principal point in pixels of the image; replaces fovy."""
+
+    fx: float
+    fy: float
+    cx: float
+    cy: float
+
+
+@dataclass(frozen=True)
+class LensDistortion:
+    """none, brown_conrady (k1 k2 p1 p2 k3) or fisheye (k1 k2 k3 k4)."""
+
+    model: str = "none"
+    coefficients: Sequence[float] = ()
+
+
 @dataclass
 class CameraSensorCfg(SensorCfg):
     """A camera of the model (``camera_name``), or a new one. ``data`` is a :class:`mjsense.CameraData`."""
@@ -394,16 +464,35 @@ class CameraSensorCfg(SensorCfg):
     """m, in the parent body."""
     quat: Sequence[float] = (1.0, 0.0, 0.0, 0.0)
     fovy: float | None = None
-    """Vertical, degrees. None: the camera's own, 45 for a new one."""
+    """Vertical, degrees; orthographic: height of the image, m. None: the camera's own, 45 for a new one."""
     width: int = 160
     height: int = 120
     data_types: Sequence[str] = ("rgb",)
-    """Any of rgb, depth, segmentation."""
+    """Any of rgb, depth, segmentation, normals, point_cloud."""
     use_textures: bool = True
     use_shadows: bool = False
     enabled_geom_groups: Sequence[int] = (0, 1, 2)
     orthographic: bool = False
     clone_data: bool = False
+    """``data`` is a copy at every read."""
+    near: float = 0.0
+    """m from the camera plane; what is nearer is not seen."""
+    far: float = 0.0
+    """m; 0: no limit."""
+    update_period: float = 0.0
+    """s between images; 0: at every read."""
+    phase: float = 0.0
+    """s; images are taken at the first control step at or after phase + k * update_period."""
+    samples: int = 1
+    """Per pixel of rgb, 1 to 64, for smooth edges."""
+    depth_kind: str = "planar"
+    """planar: distance to the camera plane; ray: along the pixel's ray."""
+    intrinsics: CameraIntrinsics | None = None
+    distortion: LensDistortion = field(default_factory=LensDistortion)
+    depth_noise: str = "none"
+    """none, d405, d435."""
+    renderer: str = "rays"
+    """rays, or opengl: MuJoCo's own renderer, where it was built in."""
 
 
 def replace(cfg: Any, **changes: Any) -> Any:

@@ -128,9 +128,17 @@ class CameraData(SensorData):
     rgb: np.ndarray | None = None
     """[B, H, W, 3] uint8."""
     depth: np.ndarray | None = None
-    """[B, H, W, 1] m, distance to the camera plane; 0: background."""
+    """[B, H, W, 1] m, distance to the camera plane (depth_kind "ray": along the ray); 0: background."""
     segmentation: np.ndarray | None = None
     """[B, H, W, 2] int32: (geom id, 5); (-1, -1): background."""
+    normals: np.ndarray | None = None
+    """[B, H, W, 3] unit, outward, camera frame; 0: background."""
+    point_cloud: np.ndarray | None = None
+    """[B, H, W, 3] m, camera frame; NaN: background."""
+    intrinsics: np.ndarray | None = None
+    """[B, 3, 3] pixels, OpenCV: x right, y down, z forward; pixel centres at +0.5."""
+    pose: np.ndarray | None = None
+    """[B, 4, 4] of MuJoCo's camera frame (x right, y up, looks along -z) in the world, when the image was taken."""
 
 
 def make_data(base: type, arrays: dict[str, np.ndarray]) -> Any:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 from mjsense import _core
 from mjsense.data import CameraData, RayCastData
 from mjsense.sensor import NativeSensor
@@ -36,3 +38,11 @@ class CameraSensor(NativeSensor):
     """Images; ``data`` is a :class:`mjsense.CameraData`."""
 
     _data_type = CameraData
+
+    @property
+    def data(self) -> CameraData:
+        """The present images."""
+        data = super().data
+        if self.cfg is None or not self.cfg.clone_data:
+            return data
+        return replace(data, **{name: array.copy() for name, array in self._fields.items()})

@@ -74,6 +74,9 @@ class Scene:
             self._sensors[handle.name] = own if own is not None else _CLASSES.get(handle.kind, NativeSensor)(handle)
             if own is not None:
                 own._handle = handle
+        for sensor_cfg in cfg.sensors:
+            if isinstance(sensor_cfg, SensorCfg):
+                self._sensors[sensor_cfg.prefixed_name].cfg = sensor_cfg
 
     @staticmethod
     def _item(sensor: Any) -> Any:

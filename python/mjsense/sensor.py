@@ -45,6 +45,8 @@ class NativeSensor:
         """Key in the scene."""
         self.kind: str = handle.kind
         """builtin, contact, raycast, camera ..."""
+        self.cfg: Any = None
+        """Its configuration; None for a sensor that was found in the model."""
 
     def __repr__(self) -> str:
         return f"<{self.kind} sensor '{self.name}'>"

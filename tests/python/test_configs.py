@@ -14,6 +14,8 @@ CLASSES = {
     "terrain_height": mjs.TerrainHeightSensorCfg,
     "camera": mjs.CameraSensorCfg,
     "options": mjs.MujocoCfg,
+    "terrain": mjs.TerrainCfg,
+    "sub_terrain": mjs.SubTerrainCfg,
 }
 
 

@@ -17,7 +17,6 @@
 #include "python/bindings/sensor_handle.h"
 
 namespace mjsense::python {
-namespace {
 
 template <class Fields>
 void fields(Fields& f, OptionsCfg& c) {
@@ -42,16 +41,59 @@ void fields(Fields& f, OptionsCfg& c) {
 }
 
 template <class Fields>
+void fields(Fields& f, SubTerrainCfg& c) {
+  f("kind", c.kind);
+  f("proportion", c.proportion);
+  f("inverted", c.inverted);
+  f("platform_width", c.platform_width);
+  f("amplitude", c.amplitude);
+  f("spacing", c.spacing);
+  f("waves", c.waves);
+  f("slope", c.slope);
+  f("step_height", c.step_height);
+  f("step_width", c.step_width);
+  f("stone_width", c.stone_width);
+  f("gap", c.gap);
+  f("stone_height", c.stone_height);
+  f("pit_depth", c.pit_depth);
+}
+
+// Mappings keep their order: names of tiles, regular expressions of joints.
+template <class Value>
+void read_custom(FromPython& f, nb::handle mapping,
+                 std::vector<std::pair<std::string, Value>>& out) {
+  out.clear();
+  for (auto [key, value] :
+       nb::cast<nb::dict>(nb::module_::import_("builtins").attr("dict")(mapping))) {
+    auto& [name, read] = out.emplace_back();
+    f.read("key", key, name);
+    f.read(name.c_str(), value, read);
+  }
+}
+
+template <class Fields>
 void fields(Fields& f, TerrainCfg& c) {
   f("terrain_type", c.terrain_type);
+  f("sub_terrains", c.sub_terrains);
+  f("levels", c.levels);
+  f("types", c.types);
+  f("tile_size", c.tile_size);
+  f("difficulty", c.difficulty);
+  f("resolution", c.resolution);
+  f("border", c.border);
+  f("max_init_level", c.max_init_level);
+  f("seed", c.seed);
 }
 
 template <class Fields>
 void fields(Fields& f, EntityCfg& c) {
   f("pos", c.pos);
   f("quat", c.quat);
+  f("joint_pos", c.joint_pos);
   f("mocap_base", c.mocap_base);
 }
+
+namespace {
 
 mjSpec* spec_of(nb::handle mjspec) {
   return reinterpret_cast<mjSpec*>(nb::cast<std::uintptr_t>(mjspec.attr("_address")));
@@ -184,10 +226,14 @@ void bind_scene(nb::module_& m) {
       [] {
         nb::dict all;
         for (const CfgKind& kind : cfg_kinds()) all[kind.name] = kind.defaults();
-        OptionsCfg options;
-        ToPython writer;
-        fields(writer, options);
-        all["options"] = writer.values;
+        const auto add = [&all](const char* name, auto cfg) {
+          ToPython writer;
+          fields(writer, cfg);
+          all[name] = writer.values;
+        };
+        add("options", OptionsCfg{});
+        add("terrain", TerrainCfg{});
+        add("sub_terrain", SubTerrainCfg{});
         return all;
       },
       "Defaults of the C++ configurations, by kind.");

@@ -1,0 +1,82 @@
+import numpy as np
+import pytest
+
+import mjsense as mjs
+
+TABLE = """
+<mujoco>
+  <worldbody>
+    <geom name="floor" type="plane" size="5 5 .1"/>
+    <geom name="box" type="box" size=".5 .5 .25" pos="1 0 .25" rgba="1 0 0 1"/>
+    <body name="head" pos="0 0 4"><camera name="eye" fovy="60"/></body>
+    <light pos="0 0 4" dir="0 0 -1"/>
+  </worldbody>
+</mujoco>
+"""
+
+
+def scene(*sensors):
+    return mjs.Scene(mjs.SceneCfg(entities={"room": mjs.EntityCfg(model=TABLE)}, sensors=sensors))
+
+
+def test_fields_and_shapes():
+    camera = mjs.CameraSensorCfg(name="eye", camera_name="room/eye", width=32, height=24, data_types=("rgb", "depth", "segmentation"))
+    s = scene(camera)
+    mjs.Simulation(s, num_worlds=2)
+    data = s["eye"].data
+    assert data.rgb.shape == (2, 24, 32, 3) and data.rgb.dtype == np.uint8
+    assert data.depth.shape == (2, 24, 32, 1) and data.depth.dtype == np.float32
+    assert data.segmentation.shape == (2, 24, 32, 2) and data.segmentation.dtype == np.int32
+    assert data.normals is None
+    assert data.depth[0, 12, 8, 0] == pytest.approx(4, abs=1e-4)
+    red = data.rgb[0, 12, 24].astype(int)
+    assert red[0] > 2 * red[1]  # +x is to the right
+
+
+def test_orthographic_rays_are_parallel():
+    camera = mjs.CameraSensorCfg(name="map", pos=(0, 0, 3), fovy=4.0, orthographic=True, width=4, height=4, data_types=("depth",))
+    s = scene(camera)
+    mjs.Simulation(s)
+    # Pixel centres at x = -1.5, -0.5, 0.5, 1.5 m; the box covers x in [0.5, 1.5], y in [-0.5, 0.5].
+    depth = s["map"].data.depth[0, :, :, 0]
+    assert set(np.round(depth, 4).ravel()) <= {3.0, 2.5}
+    np.testing.assert_allclose(depth[:, :2], 3.0, atol=1e-4)
+
+
+def test_clone_data():
+    copied = mjs.CameraSensorCfg(name="a", camera_name="room/eye", width=4, height=4, clone_data=True)
+    shared = mjs.CameraSensorCfg(name="b", pos=(0, 0, 3), width=4, height=4)
+    s = scene(copied, shared)
+    mjs.Simulation(s)
+    assert s["a"].data.rgb is not s["a"].data.rgb
+    assert s["b"].data is s["b"].data
+
+
+def test_rays():
+    s = scene(
+        mjs.RayCastSensorCfg(name="scan", frame=mjs.ObjRef("body", "head", "room"), pattern=mjs.GridPatternCfg(size=(2, 0), resolution=1)),
+        mjs.TerrainHeightSensorCfg(name="height", frame=mjs.ObjRef("body", "head", "room"), reduction="none",
+                                   pattern=mjs.UserPatternCfg(offsets=((0, 0, 0), (1, 0, 0)))),
+    )  # fmt: skip
+    mjs.Simulation(s, num_worlds=2)
+    np.testing.assert_allclose(s["scan"].data.distances[0], [4, 4, 3.5], atol=1e-5)
+    assert (s["scan"].num_rays, s["scan"].num_frames, s["scan"].num_rays_per_frame) == (3, 1, 3)
+    np.testing.assert_allclose(s["height"].data.heights[1, 0], [4, 3.5], atol=1e-5)
+    assert s["scan"].cfg.max_distance == 10
+    np.testing.assert_allclose(mjs.observations.height_scan(_env(s), "scan")[0], [4, 4, 3.5], atol=1e-5)
+
+
+def _env(s):
+    return type("Env", (), {"scene": s})
+
+
+def test_camera_errors():
+    for kwargs, text in [
+        (dict(data_types=("rgbd",)), "rgb"),
+        (dict(width=0), "width"),
+        (dict(data_types="depths"), "depth"),
+    ]:
+        with pytest.raises((ValueError, KeyError), match=text):
+            mjs.CameraSensorCfg(name="c", **kwargs)
+    with pytest.raises((ValueError, KeyError), match="room/eye"):
+        scene(mjs.CameraSensorCfg(name="c", camera_name="room/ey"))
