@@ -24,6 +24,7 @@ struct alignas(64) Pixels {
 
 struct alignas(64) Hits {
   float t[kLanes];   // planar depth; infinity: nothing
+  int id[kLanes];    // geom id; -1: nothing
   int geom[kLanes];  // index into View::geoms; -1: nothing
   int prim[kLanes];  // face of a mesh; side of a height field: -1
   float u[kLanes], v[kLanes];

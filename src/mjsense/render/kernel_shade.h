@@ -75,60 +75,98 @@ inline Vec3f primitive_normal(const ViewGeom& g, Vec3f p) {
   }
 }
 
-// Texture of lane i, by the pixel's footprint on the tangent plane.
-inline Color lane_texture(const View& view, const ViewGeom& g, const Pixels& pixels,
-                          const Hits& hits, int i, const float* p, const float* n_local,
-                          const float* n) {
+// How far the hit point moves from one pixel to the next, across and down, on its tangent plane:
+// geom frame, m.
+struct Steps {
+  Vec3f x, y;
+};
+
+inline Steps pixel_steps(const View& view, const ViewGeom& g, const Pixels& pixels,
+                         const Hits& hits, int k, Vec3f n) {
+  const bool ortho = view.grid.orthographic;
+  const Float zero = splat(0.0f), one = splat(1.0f);
+  const Vec3f d{ortho ? zero : load(pixels.x + k), ortho ? zero : load(pixels.y + k), splat(-1.0f)};
+  const Float inverse = one / min(dot(n, d), splat(-1e-4f));
+  const Float scale = ortho ? one : load(hits.t + k);
+  const auto step = [&](Float along_n, Float ex, Float ey, float size) {
+    const Float slope = along_n * inverse, s = scale * splat(size);
+    return to_geom(g.rot, {s * (ex - d.x * slope), s * (ey - d.y * slope), -(s * d.z * slope)});
+  };
+  return {step(n.x, one, zero, view.grid.dx), step(n.y, zero, one, view.grid.dy)};
+}
+
+// Texture coordinates that only scalar code knows: a mesh's own, and those of curved primitives.
+struct alignas(64) Mapped {
+  float u[kLanes], v[kLanes];
+  float rate_u[kLanes], rate_v[kLanes];  // per metre
+};
+
+inline void map_lanes(const ViewGeom& g, const Hits& hits, std::uint32_t lanes,
+                      const float (*local)[kLanes], const float (*normal)[kLanes], Mapped& out) {
+  for (int i = 0; i < kLanes; ++i) {
+    out.u[i] = out.v[i] = out.rate_u[i] = out.rate_v[i] = 0;
+    if (!(lanes >> i & 1u)) continue;
+    if (g.surface.mapped && hits.prim[i] >= 0) {
+      const float* uv = g.mesh->uvs + 6 * hits.prim[i];
+      const float b1 = hits.u[i], b2 = hits.v[i], b0 = 1 - b1 - b2;
+      out.u[i] = b0 * uv[0] + b1 * uv[2] + b2 * uv[4];
+      out.v[i] = b0 * uv[1] + b1 * uv[3] + b2 * uv[5];
+      out.rate_u[i] = out.rate_v[i] = g.mesh->density[hits.prim[i]];
+    } else {
+      const float p[3] = {local[0][i], local[1][i], local[2][i]};
+      const float n[3] = {normal[0][i], normal[1][i], normal[2][i]};
+      primitive_uv(g, p, n, out.u[i], out.v[i], out.rate_u[i], out.rate_v[i]);
+    }
+  }
+}
+
+// Texture colours of `lanes`, all of geom g.
+inline void texture_lanes(const View& view, const ViewGeom& g, const Pixels& pixels,
+                          const Hits& hits, std::uint32_t lanes, const float (*local)[kLanes],
+                          const float (*normal)[kLanes], Surfaces& out) {
   const Surface& s = g.surface;
   const Texture& texture = *s.texture;
-  const bool ortho = view.grid.orthographic;
-  const float d[3] = {ortho ? 0 : pixels.x[i], ortho ? 0 : pixels.y[i], -1};
-  const float nd = n[0] * d[0] + n[1] * d[1] + n[2] * d[2];
-  const float across = ortho ? 1.0f : hits.t[i];
-  float step[2][3];  // dP/dx, dP/dy in the geom's frame
-  for (int a = 0; a < 2; ++a) {
-    const float size = across * (a == 0 ? view.grid.dx : view.grid.dy);
-    const float slope = nd < -1e-4f ? n[a] / nd : -n[a] * 1e4f;
-    float w[3];
-    for (int k = 0; k < 3; ++k) w[k] = size * ((k == a ? 1.0f : 0.0f) - d[k] * slope);
-    for (int k = 0; k < 3; ++k)
-      step[a][k] = g.rot[k] * w[0] + g.rot[3 + k] * w[1] + g.rot[6 + k] * w[2];
-  }
-  const auto norm = [](const float* v) {
-    return __builtin_sqrtf(v[0] * v[0] + v[1] * v[1] + v[2] * v[2]);
-  };
-  const float width = static_cast<float>(texture.level[0].width),
-              height = static_cast<float>(texture.level[0].height);
-  const float length = norm(step[0]) > norm(step[1]) ? norm(step[0]) : norm(step[1]);
-  if (texture.cube) {
-    const float x = p[0] * s.stretch[0], y = p[1] * s.stretch[1], z = p[2] * s.stretch[2];
-    const float ax = x < 0 ? -x : x, ay = y < 0 ? -y : y, az = z < 0 ? -z : z;
-    const float most = ax > ay ? (ax > az ? ax : az) : (ay > az ? ay : az);
-    const float stretch = s.stretch[0] > s.stretch[1] ? s.stretch[0] : s.stretch[1];
-    return sample_cube(texture, x, y, z, most > 0 ? 0.5f * width * length * stretch / most : 1.0f);
-  }
-  if (s.mapped && hits.prim[i] >= 0) {
-    const float* uv = g.mesh->uvs + 6 * hits.prim[i];
-    const float b1 = hits.u[i], b2 = hits.v[i], b0 = 1 - b1 - b2;
-    const float u = b0 * uv[0] + b1 * uv[2] + b2 * uv[4], v = b0 * uv[1] + b1 * uv[3] + b2 * uv[5];
-    const float most = width > height ? width : height;
-    return sample(texture, 0, u * s.repeat[0] + s.shift[0], v * s.repeat[1] + s.shift[1],
-                  length * most * g.mesh->density[hits.prim[i]]);
-  }
-  float u, v, ku, kv;
-  primitive_uv(g, p, n_local, u, v, ku, kv);
-  ku *= s.repeat[0] * width;
-  kv *= s.repeat[1] * height;
-  float footprint = length * (ku > kv ? ku : kv);
-  if (g.type == mjGEOM_PLANE) {
-    float most = 0;
-    for (const auto& w : step) {
-      const float r2 = ku * ku * w[0] * w[0] + kv * kv * w[1] * w[1];
-      most = r2 > most ? r2 : most;
+  const float width = texture.width[0], height = texture.height[0];
+  const bool flat = g.type == mjGEOM_PLANE;
+  Mapped mapped;
+  if (!texture.cube && !flat) map_lanes(g, hits, lanes, local, normal, mapped);
+  for (int k = 0; k < kLanes; k += kWidth) {
+    const Mask m = mask_of(lanes >> k & kAllLanes);
+    if (!any(m)) continue;
+    const Vec3f q{load(local[0] + k), load(local[1] + k), load(local[2] + k)};
+    const Vec3f n{load(out.n[0] + k), load(out.n[1] + k), load(out.n[2] + k)};
+    const Steps steps = pixel_steps(view, g, pixels, hits, k, n);
+    const Float length = sqrt(max(dot(steps.x, steps.x), dot(steps.y, steps.y)));
+    Rgb color;
+    if (texture.cube) {
+      const Vec3f d{q.x * s.stretch[0], q.y * s.stretch[1], q.z * s.stretch[2]};
+      const Float most = max(max(abs(d.x), max(abs(d.y), abs(d.z))), splat(kTiny));
+      const float stretch = s.stretch[0] > s.stretch[1] ? s.stretch[0] : s.stretch[1];
+      color = sample_cube(texture, d, length * splat(0.5f * width * stretch) / most);
+    } else {
+      Float u, v, footprint;
+      if (flat) {
+        const float sx = g.size[0] > 0 ? 0.5f / g.size[0] : 0.5f;
+        const float sy = g.size[1] > 0 ? 0.5f / g.size[1] : 0.5f;
+        u = fma(q.x, splat(sx), splat(g.size[0] > 0 ? 0.5f : 0.0f));
+        v = fma(q.y, splat(-sy), splat(g.size[1] > 0 ? 0.5f : 0.0f));
+        const Float ku = splat(sx * s.repeat[0] * width), kv = splat(sy * s.repeat[1] * height);
+        const auto texels = [&](Vec3f w) { return fma(ku * w.x, ku * w.x, kv * w.y * (kv * w.y)); };
+        footprint = sqrt(max(texels(steps.x), texels(steps.y)));
+      } else {
+        u = load(mapped.u + k);
+        v = load(mapped.v + k);
+        footprint = length * max(load(mapped.rate_u + k) * splat(s.repeat[0] * width),
+                                 load(mapped.rate_v + k) * splat(s.repeat[1] * height));
+      }
+      color = sample(texture, int_of(0), fma(u, splat(s.repeat[0]), splat(s.shift[0])),
+                     fma(v, splat(s.repeat[1]), splat(s.shift[1])), footprint);
     }
-    footprint = __builtin_sqrtf(most);
+    const Float scale = splat(1.0f / 255);
+    store(out.texture[0] + k, select(m, color.r * scale, load(out.texture[0] + k)));
+    store(out.texture[1] + k, select(m, color.g * scale, load(out.texture[1] + k)));
+    store(out.texture[2] + k, select(m, color.b * scale, load(out.texture[2] + k)));
   }
-  return sample(texture, 0, u * s.repeat[0] + s.shift[0], v * s.repeat[1] + s.shift[1], footprint);
 }
 
 // Normals of triangles: interpolated where the mesh has them, else the face's own.
@@ -196,17 +234,7 @@ inline void gather_surfaces(const View& view, const Pixels& pixels, const Hits& 
       store(out.exponent + k, select(m, splat(s.exponent), load(out.exponent + k)));
       store(out.emission + k, select(m, splat(s.emission), load(out.emission + k)));
     }
-    if (!color || !g.surface.texture) continue;
-    for (int i = 0; i < kLanes; ++i) {
-      if (!(mine >> i & 1u)) continue;
-      const float p[3] = {local[0][i], local[1][i], local[2][i]};
-      const float nl[3] = {normal[0][i], normal[1][i], normal[2][i]};
-      const float n[3] = {out.n[0][i], out.n[1][i], out.n[2][i]};
-      const Color c = lane_texture(view, g, pixels, hits, i, p, nl, n);
-      out.texture[0][i] = c.r * (1.0f / 255);
-      out.texture[1][i] = c.g * (1.0f / 255);
-      out.texture[2][i] = c.b * (1.0f / 255);
-    }
+    if (color && g.surface.texture) texture_lanes(view, g, pixels, hits, mine, local, normal, out);
   }
 }
 
@@ -288,7 +316,9 @@ inline void add_light(const View& view, const ViewLight& light, const Surfaces& 
 inline std::uint32_t dark_lanes(const View& view, const ViewLight& light, const Surfaces& s,
                                 const Hits& hits, std::uint32_t lanes, Casters casters) {
   LightRays rays;
-  std::uint32_t facing = 0;
+  const bool directional = light.kind == LightKind::kDirectional;
+  std::uint32_t facing = 0, reachable = 0;
+  rays.longest = 1;
   for (int k = 0; k < kLanes; k += kWidth) {
     const Vec3f p{load(s.p[0] + k), load(s.p[1] + k), load(s.p[2] + k)};
     const Vec3f n{load(s.n[0] + k), load(s.n[1] + k), load(s.n[2] + k)};
@@ -297,15 +327,20 @@ inline std::uint32_t dark_lanes(const View& view, const ViewLight& light, const 
     store(rays.d[0] + k, term.to_light.x);
     store(rays.d[1] + k, term.to_light.y);
     store(rays.d[2] + k, term.to_light.z);
+    // MuJoCo's directional lights have a place after all: nothing behind it casts a shadow.
+    const Float end = directional ? dot(p - splat(light.pos), splat(light.dir)) : splat(1.0f);
+    reachable |= bits(splat(0.0f) < end) << k;
+    store(rays.end + k, end);
   }
-  const std::uint32_t active = facing & lanes;
-  if (!active) return ~0u;
+  const std::uint32_t active = facing & reachable & lanes;
+  if (!active) return ~facing;
   __builtin_memcpy(rays.p, s.p, sizeof rays.p);
   __builtin_memcpy(rays.n, s.n, sizeof rays.n);
   __builtin_memcpy(rays.geom, hits.geom, sizeof rays.geom);
   float low[3] = {kInfinity, kInfinity, kInfinity}, high[3] = {-kInfinity, -kInfinity, -kInfinity};
   for (int i = 0; i < kLanes; ++i) {
     if (!(active >> i & 1u)) continue;
+    rays.longest = rays.end[i] > rays.longest ? rays.end[i] : rays.longest;
     for (int c = 0; c < 3; ++c) {
       low[c] = s.p[c][i] < low[c] ? s.p[c][i] : low[c];
       high[c] = s.p[c][i] > high[c] ? s.p[c][i] : high[c];
@@ -315,11 +350,10 @@ inline std::uint32_t dark_lanes(const View& view, const ViewLight& light, const 
   for (int c = 0; c < 3; ++c) {
     rays.center[c] = 0.5f * (low[c] + high[c]);
     r2 += 0.25f * (high[c] - low[c]) * (high[c] - low[c]);
-    axis[c] = light.kind == LightKind::kDirectional ? -light.dir[c] : light.pos[c] - rays.center[c];
+    axis[c] = directional ? -light.dir[c] : light.pos[c] - rays.center[c];
   }
   rays.radius = __builtin_sqrtf(r2);
-  rays.end = light.kind == LightKind::kDirectional ? kInfinity : 1.0f;
-  return ~active | in_shadow(view, casters.list, casters.count, rays, axis, active);
+  return ~facing | in_shadow(view, casters.list, casters.count, rays, axis, active);
 }
 
 // Colours 0..1 of `lanes`. `casters` by light; null: no light casts shadows here.

@@ -7,99 +7,96 @@
 namespace mjsense {
 namespace {
 
-struct Color {
-  float r, g, b;
+using Ints = int __attribute__((vector_size(4 * kWidth)));
+
+inline Int bits_and(Int a, int mask) { return {(decltype(a.v))((Ints)a.v & mask)}; }
+inline Int shift_right(Int a, int n) { return {(decltype(a.v))((Ints)a.v >> n)}; }
+inline Int bits_of(Float a) { return {(decltype(Int::v))a.v}; }
+inline Int gather_int(const void* p, Int i) {
+  return bits_of(gather(static_cast<const float*>(p), i));
+}
+
+struct Rgb {
+  Float r, g, b;  // 0..255
 };
 
-inline Color texel(const MipLevel& level, int offset, int x, int y) {
-  const std::uint32_t t = level.texels[offset + y * level.width + x];
-  return {static_cast<float>(t & 255u), static_cast<float>(t >> 8 & 255u),
-          static_cast<float>(t >> 16 & 255u)};
+inline Rgb unpack(Int t) {
+  return {to_float(bits_and(t, 255)), to_float(bits_and(shift_right(t, 8), 255)),
+          to_float(bits_and(shift_right(t, 16), 255))};
 }
 
-inline Color mix(Color a, Color b, float f) {
-  return {a.r + (b.r - a.r) * f, a.g + (b.g - a.g) * f, a.b + (b.b - a.b) * f};
+inline Rgb mix(Rgb a, Rgb b, Float f) {
+  return {fma(f, b.r - a.r, a.r), fma(f, b.g - a.g, a.g), fma(f, b.b - a.b, a.b)};
 }
 
-inline int floor_int(float x) {
-  const int i = static_cast<int>(x);
-  return i - (static_cast<float>(i) > x);
+// log2 of x >= 1 to about 1%: enough to choose between levels.
+inline Float rough_log2(Float x) {
+  const Int b = bits_of(x);
+  const Float m = to_float(bits_and(b, 0x7fffff)) * splat(1.0f / 0x800000);
+  return to_float(shift_right(b, 23)) + fma(splat(0.34f) * m, splat(1.0f) - m, m - splat(127.0f));
 }
 
-inline int wrap(int i, int n) {
-  const int m = i % n;
-  return m < 0 ? m + n : m;
-}
-
-inline int clamp_index(int i, int n) { return i < 0 ? 0 : i >= n ? n - 1 : i; }
-
-// u, v in texels of this level; `offset`: first texel of the face.
-inline Color bilinear(const MipLevel& level, int offset, float u, float v, bool repeat) {
-  const int x0 = floor_int(u), y0 = floor_int(v);
-  const float fx = u - x0, fy = v - y0;
-  const int xa = repeat ? wrap(x0, level.width) : clamp_index(x0, level.width);
-  const int xb = repeat ? wrap(x0 + 1, level.width) : clamp_index(x0 + 1, level.width);
-  const int ya = repeat ? wrap(y0, level.height) : clamp_index(y0, level.height);
-  const int yb = repeat ? wrap(y0 + 1, level.height) : clamp_index(y0 + 1, level.height);
-  return mix(mix(texel(level, offset, xa, ya), texel(level, offset, xb, ya), fx),
-             mix(texel(level, offset, xa, yb), texel(level, offset, xb, yb), fx), fy);
-}
-
-// log2 to about 1%: enough to choose between levels.
-inline float rough_log2(float x) {
-  std::uint32_t bits;
-  __builtin_memcpy(&bits, &x, sizeof bits);
-  const float mantissa_bits = static_cast<float>(bits & 0x7fffffu) * (1.0f / 0x800000);
-  const float exponent = static_cast<float>(static_cast<int>(bits >> 23) - 127);
-  return exponent + mantissa_bits + 0.34f * mantissa_bits * (1 - mantissa_bits);
-}
-
-// 0..255. s, t of one face, [0, 1) once around; `footprint`: pixel size in texels of level 0.
-inline Color sample(const Texture& texture, int face, float s, float t, float footprint) {
-  // Endless planes seen at the horizon: keep integers in range.
-  if (!(s > -1e6f && s < 1e6f)) s = 0;
-  if (!(t > -1e6f && t < 1e6f)) t = 0;
-  if (!texture.cube) {
-    s -= floor_int(s);
-    t -= floor_int(t);
+// One level of the pyramid at (s, t) in [0, 1].
+inline Rgb bilinear(const Texture& texture, Int level, Int face, Float s, Float t) {
+  const Float zero = splat(0.0f), one = splat(1.0f), half = splat(0.5f);
+  const Float w = gather(texture.width, level), h = gather(texture.height, level);
+  const Float u = fma(s, w, -half), v = fma(t, h, -half);
+  Float x0 = floor(u), y0 = floor(v);
+  const Float fx = u - x0, fy = v - y0;
+  Float x1 = x0 + one, y1 = y0 + one;
+  if (texture.cube) {
+    x0 = max(x0, zero);
+    y0 = max(y0, zero);
+    x1 = min(x1, w - one);
+    y1 = min(y1, h - one);
+  } else {
+    x0 = select(x0 < zero, x0 + w, x0);
+    y0 = select(y0 < zero, y0 + h, y0);
+    x1 = select(x1 < w, x1, x1 - w);
+    y1 = select(y1 < h, y1, y1 - h);
   }
-  const int last = texture.levels - 1;
-  float lod = footprint > 1.0f ? rough_log2(footprint) : 0.0f;
-  if (!(lod < static_cast<float>(last))) lod = static_cast<float>(last);
-  const int a = static_cast<int>(lod);
-  const float f = lod - a;
-  const auto at = [&](int n) {
-    const MipLevel& level = texture.level[n];
-    return bilinear(level, face * level.width * level.height, s * level.width - 0.5f,
-                    t * level.height - 0.5f, !texture.cube);
-  };
-  const Color near = at(a);
-  return f > 0.01f && a < last ? mix(near, at(a + 1), f) : near;
+  const Int width = truncate(w);
+  const Int base = gather_int(texture.offset, level) + face * (width * truncate(h));
+  const Int row0 = base + truncate(y0) * width, row1 = base + truncate(y1) * width;
+  const Int c0 = truncate(x0), c1 = truncate(x1);
+  const auto texel = [&](Int at) { return unpack(gather_int(texture.texels, at)); };
+  return mix(mix(texel(row0 + c0), texel(row0 + c1), fx),
+             mix(texel(row1 + c0), texel(row1 + c1), fx), fy);
+}
+
+// 0..255. (s, t): once around in [0, 1); `footprint`: size of a pixel in texels of level 0.
+inline Rgb sample(const Texture& texture, Int face, Float s, Float t, Float footprint) {
+  const Float zero = splat(0.0f);
+  // What is no number, or endlessly far, must still be an index.
+  s = select(abs(s) < splat(1e6f), s, zero);
+  t = select(abs(t) < splat(1e6f), t, zero);
+  if (!texture.cube) {
+    s = s - floor(s);
+    t = t - floor(t);
+  }
+  const float last = static_cast<float>(texture.levels - 1);
+  const Float size = min(max(footprint, splat(1.0f)), splat(65536.0f));
+  const Float lod = min(max(rough_log2(size), zero), splat(last));
+  const Float level = floor(lod), between = lod - level;
+  const Rgb near = bilinear(texture, truncate(level), face, s, t);
+  if (!any(between > splat(0.01f))) return near;
+  const Int coarser = truncate(min(level + splat(1.0f), splat(last)));
+  return mix(near, bilinear(texture, coarser, face, s, t), between);
 }
 
 // OpenGL's cube map: which face a direction meets, and where on it.
-inline Color sample_cube(const Texture& texture, float x, float y, float z, float footprint) {
-  const float ax = x < 0 ? -x : x, ay = y < 0 ? -y : y, az = z < 0 ? -z : z;
-  int face;
-  float s, t, m;
-  if (ax >= ay && ax >= az) {
-    face = x >= 0 ? 0 : 1;
-    m = ax;
-    s = x >= 0 ? -z : z;
-    t = -y;
-  } else if (ay >= az) {
-    face = y >= 0 ? 2 : 3;
-    m = ay;
-    s = x;
-    t = y >= 0 ? z : -z;
-  } else {
-    face = z >= 0 ? 4 : 5;
-    m = az;
-    s = z >= 0 ? x : -x;
-    t = -y;
-  }
-  m = m > 0 ? m : 1;
-  return sample(texture, face, 0.5f * (s / m + 1), 0.5f * (t / m + 1), footprint);
+inline Rgb sample_cube(const Texture& texture, Vec3f d, Float footprint) {
+  const Float zero = splat(0.0f), half = splat(0.5f);
+  const Float ax = abs(d.x), ay = abs(d.y), az = abs(d.z);
+  const Mask is_x = (ax >= ay) & (ax >= az), not_z = is_x | (ay >= az);
+  const Mask nx = d.x < zero, ny = d.y < zero, nz = d.z < zero;
+  const Float m = max(max(ax, max(ay, az)), splat(kTiny));
+  const Float s = select(is_x, select(nx, d.z, -d.z), select(not_z, d.x, select(nz, -d.x, d.x)));
+  const Float t = select(is_x, -d.y, select(not_z, select(ny, -d.z, d.z), -d.y));
+  const Int face =
+      select(is_x, select(nx, int_of(1), int_of(0)),
+             select(not_z, select(ny, int_of(3), int_of(2)), select(nz, int_of(5), int_of(4))));
+  return sample(texture, face, fma(half, s / m, half), fma(half, t / m, half), footprint);
 }
 
 constexpr float kPi = 3.14159265358979f;

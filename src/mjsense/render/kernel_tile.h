@@ -71,7 +71,7 @@ inline void find_casters(const View& view, const TileHits& tile, int packets, Ti
     out[i] = {next, 0};
     if (!light.shadows || empty) continue;
     const bool directional = light.kind == LightKind::kDirectional;
-    around.end = directional ? kInfinity : 1.0f;
+    around.longest = directional ? kInfinity : 1.0f;
     float axis[3];
     for (int c = 0; c < 3; ++c)
       axis[c] = directional ? -light.dir[c] : light.pos[c] - around.center[c];
@@ -83,22 +83,25 @@ inline void find_casters(const View& view, const TileHits& tile, int packets, Ti
 
 inline void shade_background(const View& view, const Pixels& pixels, std::uint32_t lanes,
                              Colors& out) {
-  for (int i = 0; i < kLanes; ++i) {
-    if (!(lanes >> i & 1u)) continue;
-    Color color = {0, 0, 0};
-    if (view.skybox) {
-      const bool ortho = view.grid.orthographic;
-      const float d[3] = {ortho ? 0 : pixels.x[i], ortho ? 0 : pixels.y[i], -1};
-      float w[3];
-      for (int r = 0; r < 3; ++r)
-        w[r] = view.r_wc[3 * r] * d[0] + view.r_wc[3 * r + 1] * d[1] + view.r_wc[3 * r + 2] * d[2];
-      const float step = view.grid.dx < 0 ? -view.grid.dx : view.grid.dx;
+  const bool ortho = view.grid.orthographic;
+  const float* r = view.r_wc;
+  const float step = view.grid.dx < 0 ? -view.grid.dx : view.grid.dx;
+  for (int k = 0; k < kLanes; k += kWidth) {
+    const Mask m = mask_of(lanes >> k & kAllLanes);
+    if (!any(m)) continue;
+    const Float zero = splat(0.0f);
+    const Vec3f d{ortho ? zero : load(pixels.x + k), ortho ? zero : load(pixels.y + k),
+                  splat(-1.0f)};
+    const Vec3f w = from_geom(r, d);
+    // MuJoCo turns the sky a quarter around x.
+    Rgb color{zero, zero, zero};
+    if (view.skybox)
       color =
-          sample_cube(*view.skybox, w[0], w[2], -w[1], 0.5f * step * view.skybox->level[0].width);
-    }
-    out.rgb[0][i] = color.r * (1.0f / 255);
-    out.rgb[1][i] = color.g * (1.0f / 255);
-    out.rgb[2][i] = color.b * (1.0f / 255);
+          sample_cube(*view.skybox, {w.x, w.z, -w.y}, splat(0.5f * step * view.skybox->width[0]));
+    const Float scale = splat(1.0f / 255);
+    store(out.rgb[0] + k, select(m, color.r * scale, load(out.rgb[0] + k)));
+    store(out.rgb[1] + k, select(m, color.g * scale, load(out.rgb[1] + k)));
+    store(out.rgb[2] + k, select(m, color.b * scale, load(out.rgb[2] + k)));
   }
 }
 
@@ -131,7 +134,7 @@ inline void shade_transparent(const View& view, const int* list, int count, cons
   for (int i = 0; i < count && used < kMaxLayers; ++i) {
     if (!overlap(view.geoms[list[i]].window, pixels.window)) continue;
     Hits hits = opaque;
-    for (int& g : hits.geom) g = -1;
+    for (int i = 0; i < kLanes; ++i) hits.geom[i] = hits.id[i] = -1;
     trace_geom(view, list[i], pixels, hits);
     const std::uint32_t lanes = hit_lanes(hits);
     if (!lanes) continue;
@@ -260,7 +263,7 @@ inline void render_tile(const View& view, const ImageTargets& targets, int tx, i
       for (int q = 0; q < packets; ++q) {
         const Hits& hits = tile.opaque[q];
         const std::uint32_t lanes = hit_lanes(hits);
-        Colors colors = {};
+        Colors colors;
         if (lanes) {
           Surfaces surfaces = {};
           gather_surfaces(view, tile.pixels[q], hits, lanes, true, surfaces);

@@ -21,6 +21,17 @@ inline float highest(const float* values) {
   return best;
 }
 
+// Surfaces nearer to each other than this (times t) coincide: the geom with the higher id shows, as
+// MuJoCo draws it later. (Rays, like mj_ray, take the lower one.)
+constexpr float kSame = 3e-7f;
+
+// Lanes where a hit at t on geom `id` replaces what was there before.
+inline Mask shows(Float t, Int id, Float before, Int id_before) {
+  const Float slack = t * splat(kSame);
+  return (t < splat(kInfinity)) &
+         ((t < before - slack) | ((t <= before + slack) & less(id_before, id)));
+}
+
 // Lanes whose ray meets the geom's bounding box before t, as Embree takes them; false if there are
 // none.
 inline bool fill_rays(const ViewGeom& g, const PixelGrid& grid, const Pixels& pixels, float near,
@@ -29,7 +40,7 @@ inline bool fill_rays(const ViewGeom& g, const PixelGrid& grid, const Pixels& pi
   for (int k = 0; k < kLanes; k += kWidth) {
     const LocalRay ray = pixel_ray(g, grid, load(pixels.x + k), load(pixels.y + k));
     const Interval inside = box(ray.o, ray.d, g.box, g.box + 3);
-    const Float limit = load(t + k);
+    const Float limit = load(t + k) * splat(1.0f + kSame);
     const Mask hit = (inside.enter < limit) & (inside.exit > splat(near));
     some |= bits(hit);
     store(valid + k, select(hit, int_of(-1), int_of(0)));
@@ -59,8 +70,10 @@ inline void trace_triangles(const ViewGeom& g, int index, const PixelGrid& grid,
   for (int k = 0; k < kLanes; k += kWidth) {
     const Float t = load(rays.ray.tfar + k);
     const Float before = load(hits.t + k);
-    const Mask hit = t < before;
+    const Int found = load(reinterpret_cast<int*>(rays.hit.geomID) + k);
+    const Mask hit = less(int_of(-1), found) & shows(t, int_of(g.id), before, load(hits.id + k));
     if (!any(hit)) continue;
+    store(hits.id + k, select(hit, int_of(g.id), load(hits.id + k)));
     store(hits.t + k, select(hit, t, before));
     store(hits.geom + k, select(hit, int_of(index), load(hits.geom + k)));
     store(hits.prim + k,
@@ -102,6 +115,7 @@ inline void trace_walls(const ViewGeom& g, int index, const PixelGrid& grid, con
       const float column = 0.5f * (x + 1) * (f.cols - 1), row = 0.5f * (y + 1) * (f.rows - 1);
       if (!vertical && p[2][i] > border_height(f, column, row)) continue;
       hits.t[k + i] = t[i];
+      hits.id[k + i] = g.id;
       hits.geom[k + i] = index;
       hits.prim[k + i] = -1;
       hits.n[0][k + i] = vertical ? 0.0f : ax >= ay ? x : 0.0f;
@@ -124,8 +138,9 @@ inline void trace_geom(const View& view, int index, const Pixels& pixels, Hits& 
     const Float t =
         g.type == mjGEOM_PLANE ? plane(g, ray.o, ray.d, g.behind) : solid(g, ray.o, ray.d).enter;
     const Float before = load(hits.t + k);
-    const Mask hit = (t < before) & (splat(view.near) < t);
+    const Mask hit = shows(t, int_of(g.id), before, load(hits.id + k)) & (splat(view.near) < t);
     if (!any(hit)) continue;
+    store(hits.id + k, select(hit, int_of(g.id), load(hits.id + k)));
     store(hits.t + k, select(hit, t, before));
     store(hits.geom + k, select(hit, int_of(index), load(hits.geom + k)));
   }
@@ -134,6 +149,7 @@ inline void trace_geom(const View& view, int index, const Pixels& pixels, Hits& 
 inline void clear(Hits& hits, float far) {
   for (int i = 0; i < kLanes; ++i) {
     hits.t[i] = far;
+    hits.id[i] = -1;
     hits.geom[i] = -1;
     hits.prim[i] = -1;
     hits.u[i] = hits.v[i] = hits.n[0][i] = hits.n[1][i] = hits.n[2][i] = 0;
@@ -158,7 +174,8 @@ struct alignas(64) LightRays {
   float p[3][kLanes], d[3][kLanes], n[3][kLanes];
   int geom[kLanes];
   float center[3], radius;  // sphere around the active points
-  float end;                // 1 for a light at a place, infinity for a direction
+  float end[kLanes];        // 1 for a light at a place; how far it is for a direction
+  float longest;            // the largest of them
 };
 
 // Can anything within `radius` around `center` lie between the packet's points and the light?
@@ -168,7 +185,7 @@ inline bool in_shaft(const LightRays& rays, const float* axis, const ViewGeom& g
                       g.center[2] - rays.center[2]};
   const float length2 = axis[0] * axis[0] + axis[1] * axis[1] + axis[2] * axis[2];
   float s = (v[0] * axis[0] + v[1] * axis[1] + v[2] * axis[2]) / length2;
-  s = s < 0 ? 0 : s > rays.end ? rays.end : s;
+  s = s < 0 ? 0 : s > rays.longest ? rays.longest : s;
   const float w[3] = {v[0] - s * axis[0], v[1] - s * axis[1], v[2] - s * axis[2]};
   const float reach = g.radius + rays.radius;
   return w[0] * w[0] + w[1] * w[1] + w[2] * w[2] <= reach * reach;
@@ -190,7 +207,7 @@ inline std::uint32_t shadow_of_triangles(const ViewGeom& g, int index, const Lig
     const Float lift = select(other, splat(0.0f), splat(1e-4f) * max(splat(g.radius), abs(p.z)));
     o = along(o, lift, n);
     const Interval inside = box(o, d, g.box, g.box + 3);
-    const Mask hit = mask_of(active >> k & kAllLanes) & (inside.enter < splat(rays.end)) &
+    const Mask hit = mask_of(active >> k & kAllLanes) & (inside.enter < load(rays.end + k)) &
                      (inside.exit > splat(0.0f));
     some |= bits(hit);
     store(valid + k, select(hit, int_of(-1), int_of(0)));
@@ -201,7 +218,7 @@ inline std::uint32_t shadow_of_triangles(const ViewGeom& g, int index, const Lig
     store(ray.dir_y + k, d.y);
     store(ray.dir_z + k, d.z);
     store(ray.tnear + k, splat(0.0f));
-    store(ray.tfar + k, splat(rays.end));
+    store(ray.tfar + k, load(rays.end + k));
     store(ray.time + k, splat(0.0f));
     store(reinterpret_cast<int*>(ray.mask) + k, int_of(-1));
     store(reinterpret_cast<int*>(ray.flags) + k, int_of(0));
@@ -236,10 +253,10 @@ inline std::uint32_t in_shadow(const View& view, const int* casters, int count,
         const Mask other = less(at, self) | less(self, at);
         Mask barred;
         if (g.type == mjGEOM_PLANE) {
-          barred = plane(g, o, d, true) < splat(rays.end);
+          barred = plane(g, o, d, true) < load(rays.end + k);
         } else {
           const Interval inside = solid(g, o, d);
-          barred = (inside.enter < splat(rays.end)) & (inside.exit > splat(1e-5f));
+          barred = (inside.enter < load(rays.end + k)) & (inside.exit > splat(1e-5f));
         }
         hit |= (bits(barred & other) & lanes) << k;
       }

@@ -100,16 +100,16 @@ void Look::add_texture(const mjModel* model, int id) {
       out[i] = texel;
     }
   }
-  std::uint32_t* at = texels.data();
-  for (int n = 0, w = width, h = height; n < texture.levels; ++n) {
-    texture.level[n] = {at, w, h};
-    const std::size_t size = static_cast<std::size_t>(w) * h;
-    std::uint32_t* next = at + faces * size;
-    const int w2 = std::max(1, w / 2), h2 = std::max(1, h / 2);
-    if (n + 1 < texture.levels)
-      for (int f = 0; f < faces; ++f)
-        halve(at + f * size, w, h, next + static_cast<std::size_t>(f) * w2 * h2, w2, h2);
-    at = next;
+  texture.texels = texels.data();
+  for (int n = 0, w = width, h = height, at = 0; n < texture.levels; ++n) {
+    texture.width[n] = static_cast<float>(w);
+    texture.height[n] = static_cast<float>(h);
+    texture.offset[n] = at;
+    const int size = w * h, w2 = std::max(1, w / 2), h2 = std::max(1, h / 2);
+    std::uint32_t* image = texels.data() + at;
+    at += faces * size;
+    for (int f = 0; f < faces && n + 1 < texture.levels; ++f)
+      halve(image + f * size, w, h, texels.data() + at + f * w2 * h2, w2, h2);
     w = w2;
     h = h2;
   }

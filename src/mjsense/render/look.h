@@ -11,18 +11,16 @@
 
 namespace mjsense {
 
-// One image of a pyramid: RGBA8 texels, row 0 first; a cube map has its six faces (+x -x +y -y +z
-// -z) one after another.
-struct MipLevel {
-  const std::uint32_t* texels = nullptr;
-  int width = 0, height = 0;
-};
-
+// A pyramid of images, RGBA8, in one array: level 0 first, row 0 first; a cube map has its six
+// faces
+// (+x -x +y -y +z -z) one after another in each level. Tables by level, for gathering.
 struct Texture {
   static constexpr int kMaxLevels = 15;
   bool cube = false;
-  int levels = 0;
-  MipLevel level[kMaxLevels];
+  int levels = 0;  // 0: cannot be drawn
+  const std::uint32_t* texels = nullptr;
+  float width[kMaxLevels] = {}, height[kMaxLevels] = {};
+  int offset[kMaxLevels] = {};  // of the level's first texel
 };
 
 // Per face of a mesh, by face index. Null where the model has none.
