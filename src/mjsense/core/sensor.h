@@ -115,6 +115,8 @@ class Sensor {
   virtual Stage stage() const { return Stage::kRow; }
   // True if compute() must run exactly once a control step, read or not (delays, rates, filters).
   virtual bool eager() const { return false; }
+  // Keys of the sensors of its scene that initialize() looks at: they are initialized first.
+  virtual std::vector<std::string> reads() const { return {}; }
   // Sensors whose rows compute() reads: they are computed first.
   virtual std::span<Sensor* const> inputs() const { return {}; }
 

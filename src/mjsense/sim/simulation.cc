@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <functional>
 #include <chrono>
 #include <numeric>
 
@@ -159,11 +160,33 @@ Simulation::Simulation(std::shared_ptr<Scene> scene, const SimulationCfg& cfg)
   version_.assign(cfg.num_worlds, 1);
   rays_version_.assign(cfg.num_worlds, 0);
   rays_s_.assign(cfg.num_worlds, 0.0);
-  for (auto& sensor : scene_->sensors()) initialize(*sensor);
+  initialize_scene();
   reset();
 }
 
 Simulation::~Simulation() = default;
+
+// In the order of the registry, but a sensor after those that it reads.
+void Simulation::initialize_scene() {
+  std::vector<Sensor*> done, open;
+  const auto contains = [](const std::vector<Sensor*>& list, const Sensor* s) {
+    return std::find(list.begin(), list.end(), s) != list.end();
+  };
+  const std::function<void(Sensor&)> visit = [&](Sensor& sensor) {
+    if (contains(done, &sensor)) return;
+    if (contains(open, &sensor)) {
+      throw ValueError(fmt::format("sensor '{}': reads itself", sensor.name()));
+    }
+    open.push_back(&sensor);
+    for (const std::string& key : sensor.reads()) {
+      guarded(sensor, [&] { visit(scene_->sensor(key)); });
+    }
+    open.pop_back();
+    initialize(sensor);
+    done.push_back(&sensor);
+  };
+  for (auto& sensor : scene_->sensors()) visit(*sensor);
+}
 
 RayScene& Simulation::rays() {
   if (!rays_) rays_ = std::make_unique<RayScene>(scene_->model(), cfg_.num_worlds);

@@ -89,6 +89,7 @@ class Simulation {
   class Hooks;
   enum class Change { kStep, kForward, kReset, kNone };
 
+  void initialize_scene();
   void initialize(Sensor& sensor);
   Slot& slot_of(const Sensor& sensor) const;
   // Makes `change` happen and `slots` (each after its inputs) current in the worlds `ids` (empty:

@@ -1,0 +1,124 @@
+#pragma once
+// One imperfection of a sensor: noise, bias, delay, dropout ... An effect changes a row in place,
+// in the row's own unit; times are seconds. Random numbers depend on (seed, world, stream, tick)
+// alone, so results are the same at any number of threads and worlds.
+
+#include <cstdint>
+#include <memory>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "mjsense/core/array.h"
+#include "mjsense/core/rng.h"
+#include "mjsense/core/spec.h"
+
+namespace mjsense {
+
+// When a row was measured.
+struct EffectMoment {
+  int world = 0;          // row
+  std::uint32_t key = 0;  // whose random numbers these are: usually the world
+  std::uint64_t seed = 0;
+  std::int64_t tick = 0;
+  std::int64_t episode = 0;  // 1 is the first since the seeding
+  double time = 0.0;         // s, tick as a time
+  double elapsed = 0.0;  // s since the last new row of this world; 0 for the first of an episode
+  bool first = false;    // first row of an episode
+  // False when this tick's row is measured again (after a state write): state must not advance, but
+  // the newest value must follow.
+  bool advance = true;
+
+  Rng rng(std::uint32_t stream) const {
+    return {seed, key, stream, static_cast<std::uint64_t>(tick)};
+  }
+  Rng episode_rng(std::uint32_t stream) const {
+    return {seed, key, stream, static_cast<std::uint64_t>(episode)};
+  }
+};
+
+// A row of any element type. Numeric effects need float32 or float64.
+struct EffectRow {
+  std::byte* data;
+  DType dtype;
+  int size;
+
+  std::size_t bytes() const { return size * dtype_size(dtype); }
+  double at(int i) const {  // numeric rows
+    return dtype == DType::kFloat32 ? reinterpret_cast<const float*>(data)[i]
+                                    : reinterpret_cast<const double*>(data)[i];
+  }
+  // x_i <- f(x_i, i), numeric rows
+  template <class F>
+  void transform(F&& f) const {
+    if (dtype == DType::kFloat32) {
+      auto* x = reinterpret_cast<float*>(data);
+      for (int i = 0; i < size; ++i) x[i] = static_cast<float>(f(static_cast<double>(x[i]), i));
+    } else {
+      auto* x = reinterpret_cast<double*>(data);
+      for (int i = 0; i < size; ++i) x[i] = f(x[i], i);
+    }
+  }
+};
+
+// What an effect is set up for.
+struct EffectInit {
+  std::string place;  // starts every message: "sensor 'imu', effect 0 (noise)"
+  int num_worlds = 1;
+  DType dtype = DType::kFloat32;
+  int size = 1;              // elements of a row
+  double period = 0.0;       // s between rows
+  std::uint32_t stream = 0;  // its own random numbers
+};
+
+// Configuration (public members) and, in a copy made by clone(), the state of B worlds.
+class Effect {
+ public:
+  virtual ~Effect() = default;
+  virtual std::unique_ptr<Effect> clone() const = 0;
+  virtual std::string kind() const = 0;
+
+  // Checks the configuration, throws ValueError; allocates. Nothing allocates afterwards.
+  virtual void initialize(const EffectInit& init) = 0;
+  virtual void apply(const EffectMoment& moment, const EffectRow& row) = 0;
+  // A new episode of this world; apply() with first follows.
+  virtual void reset(const EffectMoment& /*moment*/) {}
+  // True if it must see every row, read or not.
+  virtual bool eager() const { return false; }
+
+  // Fields of the sensor it applies to; empty: all.
+  std::vector<std::string> fields;
+};
+
+// One value for all components or one for each.
+using PerComponent = std::vector<double>;
+inline double component(const PerComponent& values, int i) {
+  return values.size() == 1 ? values[0] : values[i];
+}
+void check_components(const PerComponent& values, const char* name, const EffectInit& init);
+void check_numeric(const EffectInit& init);  // float32 or float64, else ValueError
+
+// A random number: gaussian(mean, std), uniform [low, high) or the constant `value`.
+struct Draw {
+  enum class Kind { kGaussian, kUniform, kConstant };
+  Kind kind = Kind::kGaussian;
+  PerComponent mean = {0.0}, std = {0.0};  // gaussian
+  PerComponent low = {0.0}, high = {0.0};  // uniform
+  PerComponent value = {0.0};              // constant
+
+  static Draw gaussian(PerComponent std, PerComponent mean = {0.0});
+  static Draw uniform(PerComponent low, PerComponent high);
+  static Draw constant(PerComponent value);
+
+  void check(const EffectInit& init) const;
+  double sample(Rng& rng, int i) const;
+};
+
+// How a random number e meets a value x: x + e, x e, or e alone.
+enum class Operation { kAdd, kScale, kAbs };
+Operation operation_from_name(std::string_view name);  // add scale abs; throws ValueError
+inline double operate(Operation operation, double x, double e) {
+  return operation == Operation::kAdd ? x + e : operation == Operation::kScale ? x * e : e;
+}
+
+}  // namespace mjsense

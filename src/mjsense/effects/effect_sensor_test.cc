@@ -1,0 +1,136 @@
+#include "mjsense/effects/effect_sensor.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <cstring>
+#include <memory>
+
+#include "mjsense/core/error.h"
+#include "mjsense/effects/calibration.h"
+#include "mjsense/effects/noise.h"
+#include "mjsense/effects/timing.h"
+#include "mjsense/scene/scene.h"
+#include "mjsense/sim/simulation.h"
+
+namespace mjsense {
+namespace {
+
+using ::testing::HasSubstr;
+
+constexpr char kPendulum[] = R"(
+<mujoco><worldbody><body name="arm" pos="0 0 1"><joint name="hinge" axis="0 1 0"/>
+  <geom type="capsule" fromto="0 0 0 .4 0 0" size=".04" mass="1"/><site name="imu" pos=".2 0 0"/></body>
+</worldbody>
+<sensor><gyro name="gyro" site="imu"/><accelerometer name="acc" site="imu"/></sensor></mujoco>)";
+
+std::shared_ptr<Scene> make_scene(EffectSensorCfg cfg) {
+  SceneCfg scene;
+  EntityCfg arm;
+  arm.model.xml = kPendulum;
+  scene.entities.emplace_back("robot", arm);
+  scene.sensors.push_back(std::make_shared<EffectSensorCfg>(std::move(cfg)));
+  return std::make_shared<Scene>(std::move(scene));
+}
+
+// Reads a sensor that the scene discovers in the XML, hence after it.
+EffectSensorCfg noisy() {
+  EffectSensorCfg cfg;
+  cfg.name = "noisy";
+  cfg.sensor = "robot/gyro";
+  BiasDrift drift;
+  drift.std = {0.1};
+  drift.time_constant_s = 1.0;
+  Delay delay(0.02);
+  delay.jitter_s = 0.01;
+  cfg.effects = {std::make_shared<Noise>(Draw::gaussian({0.2})), std::make_shared<BiasDrift>(drift),
+                 std::make_shared<EpisodeBias>(Draw::uniform({-1}, {1})),
+                 std::make_shared<Delay>(delay), std::make_shared<Dropout>(0.2)};
+  cfg.history_length = 2;
+  return cfg;
+}
+
+TEST(EffectSensor, CleanValueStaysReadableAndDelayIsInSeconds) {
+  EffectSensorCfg cfg;
+  cfg.name = "late";
+  cfg.sensor = "robot/gyro";
+  cfg.effects = {std::make_shared<Delay>(0.016)};
+  auto scene = make_scene(cfg);
+  SimulationCfg sim_cfg;
+  sim_cfg.decimation = 4;  // 8 ms a step
+  Simulation sim(scene, sim_cfg);
+  std::vector<float> clean;
+  for (int k = 0; k < 20; ++k) {
+    sim.step();
+    if (k == 7) sim.forward();  // measures the same moment again
+    Sensor* both[] = {&scene->sensor("late"), &scene->sensor("robot/gyro")};
+    sim.refresh(both);
+    clean.push_back(both[1]->field().data.row<float>(0)[1]);
+    const float late = both[0]->field().data.row<float>(0)[1];
+    EXPECT_EQ(late, k >= 2 ? clean[k - 2] : 0.0f) << k;
+  }
+  EXPECT_NE(clean[19], clean[17]);
+  EXPECT_EQ(scene->sensor("late").field().spec.unit, scene->sensor("robot/gyro").field().spec.unit);
+}
+
+TEST(EffectSensor, BitEqualAtAnyBatchAndThreadCount) {
+  constexpr int kWorlds = 16, kAlone = 5;
+  std::vector<std::shared_ptr<Scene>> scenes;
+  std::vector<std::unique_ptr<Simulation>> sims;
+  for (int threads : {1, 2, 5}) {
+    scenes.push_back(make_scene(noisy()));
+    SimulationCfg cfg;
+    cfg.num_worlds = kWorlds;
+    cfg.decimation = 3;
+    cfg.threads = threads;
+    cfg.seed = 9;
+    sims.push_back(std::make_unique<Simulation>(scenes.back(), cfg));
+  }
+  SimulationCfg one;
+  one.decimation = 3;
+  one.seed = 9;
+  auto alone_scene = make_scene(noisy());
+  Simulation alone(alone_scene, one);
+  alone.worlds().rekey(0, kAlone);
+  alone.reset();
+  for (int k = 0; k < 60; ++k) {
+    for (auto& sim : sims) {
+      if (k % 20 == 10) sim->reset({{kAlone}});
+      sim->step();
+      sim->refresh(sim->scene().sensor("noisy"));
+    }
+    if (k % 20 == 10) alone.reset();
+    alone.step();
+    alone.refresh(alone_scene->sensor("noisy"));
+    const Array& a = scenes[0]->sensor("noisy").field().data;
+    for (std::size_t i = 1; i < sims.size(); ++i) {
+      const Array& b = scenes[i]->sensor("noisy").field().data;
+      ASSERT_EQ(std::memcmp(a.data(), b.data(), a.bytes()), 0) << k;
+    }
+    const Array& s = alone_scene->sensor("noisy").field().data;
+    ASSERT_EQ(std::memcmp(a.row_data(kAlone), s.data(), s.bytes()), 0) << k;
+  }
+}
+
+TEST(EffectSensor, ErrorsNameWhatThereIs) {
+  const auto message = [](EffectSensorCfg cfg) -> std::string {
+    try {
+      Simulation sim(make_scene(std::move(cfg)), {});
+    } catch (const Error& e) {
+      return e.what();
+    }
+    return "";
+  };
+  EffectSensorCfg cfg;
+  cfg.name = "x";
+  cfg.sensor = "robot/gyo";
+  EXPECT_THAT(message(cfg), HasSubstr("robot/gyro"));
+  cfg.sensor = "x";
+  EXPECT_THAT(message(cfg), HasSubstr("reads itself"));
+  cfg.sensor = "robot/gyro";
+  cfg.fields = {"force"};
+  EXPECT_THAT(message(cfg), HasSubstr("no field of 'robot/gyro' named 'force'"));
+}
+
+}  // namespace
+}  // namespace mjsense

@@ -1,0 +1,109 @@
+#include "mjsense/effects/noise.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <utility>
+
+#include "mjsense/core/error.h"
+
+namespace mjsense {
+
+Noise::Noise(Draw d, Operation op) : draw(std::move(d)), operation(op) {}
+
+Noise Noise::with_density(PerComponent density) {
+  Noise n;
+  n.density = std::move(density);
+  return n;
+}
+
+void Noise::initialize(const EffectInit& init) {
+  check_numeric(init);
+  draw.check(init);
+  check_components(density, "density", init);
+  for (double d : density) {
+    if (d < 0) throw ValueError(fmt::format("{}: density is {}: negative", init.place, d));
+    has_density_ |= d > 0;
+  }
+  if (has_density_ && !(init.period > 0)) {
+    throw ValueError(fmt::format("{}: a density needs a period > 0", init.place));
+  }
+  density_factor_ = has_density_ ? 1.0 / std::sqrt(init.period) : 0.0;
+  stream_ = init.stream;
+}
+
+void Noise::apply(const EffectMoment& moment, const EffectRow& row) {
+  Rng rng = moment.rng(stream_);
+  row.transform([&](double x, int i) {
+    x = operate(operation, x, draw.sample(rng, i));
+    if (has_density_) x += component(density, i) * density_factor_ * rng.normal();
+    return x;
+  });
+}
+
+EpisodeBias::EpisodeBias(Draw d, Operation op) : draw(std::move(d)), operation(op) {}
+
+void EpisodeBias::initialize(const EffectInit& init) {
+  check_numeric(init);
+  draw.check(init);
+  stream_ = init.stream;
+  size_ = init.size;
+  bias_.assign(static_cast<std::size_t>(init.num_worlds) * init.size, 0.0);
+  drawn_.assign(init.num_worlds, 0);
+}
+
+void EpisodeBias::reset(const EffectMoment& moment) {
+  Rng rng = moment.episode_rng(stream_);
+  double* bias = bias_.data() + static_cast<std::size_t>(moment.world) * size_;
+  double e = 0.0;
+  for (int i = 0; i < size_; ++i) {
+    if (per_component || i == 0) e = draw.sample(rng, i);
+    bias[i] = operate(operation, moment.episode > 1 ? bias[i] : 0.0, e);
+  }
+  drawn_[moment.world] = 1;
+}
+
+void EpisodeBias::apply(const EffectMoment& moment, const EffectRow& row) {
+  if (!drawn_[moment.world]) reset(moment);
+  const double* bias = bias_.data() + static_cast<std::size_t>(moment.world) * size_;
+  row.transform([&](double x, int i) { return x + bias[i]; });
+}
+
+void BiasDrift::initialize(const EffectInit& init) {
+  check_numeric(init);
+  check_components(std, "std", init);
+  check_components(density, "density", init);
+  if (!(time_constant_s > 0)) {
+    throw ValueError(
+        fmt::format("{}: time_constant_s is {}: must be positive", init.place, time_constant_s));
+  }
+  if (std::isinf(time_constant_s) && std::ranges::any_of(std, [](double s) { return s > 0; })) {
+    throw ValueError(fmt::format(
+        "{}: std needs a finite time_constant_s; a random walk has density", init.place));
+  }
+  stream_ = init.stream;
+  size_ = init.size;
+  bias_.assign(static_cast<std::size_t>(init.num_worlds) * init.size, 0.0);
+}
+
+void BiasDrift::apply(const EffectMoment& moment, const EffectRow& row) {
+  double* bias = bias_.data() + static_cast<std::size_t>(moment.world) * size_;
+  if (moment.first && moment.advance) {
+    Rng rng = moment.episode_rng(stream_ ^ 0x5bd1e995u);  // not the numbers of a tick
+    for (int i = 0; i < size_; ++i) {
+      bias[i] = start_at_zero ? 0.0 : component(std, i) * rng.normal();
+    }
+  } else if (moment.advance) {
+    Rng rng = moment.rng(stream_);
+    const double keep = std::exp(-moment.elapsed / time_constant_s);
+    const double fresh = std::sqrt(1.0 - keep * keep), walk = std::sqrt(moment.elapsed);
+    for (int i = 0; i < size_; ++i) {
+      bias[i] = keep * bias[i] +
+                (component(std, i) * fresh + component(density, i) * walk) * rng.normal();
+    }
+  }
+  row.transform([&](double x, int i) { return x + bias[i]; });
+}
+
+}  // namespace mjsense

@@ -1,0 +1,81 @@
+#pragma once
+// Random errors: white noise, a bias per episode, a bias that drifts.
+
+#include <limits>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "mjsense/effects/effect.h"
+
+namespace mjsense {
+
+// x <- x + e (or x e, or e), e fresh for every row and component.
+struct Noise : Effect {
+  Draw draw;
+  Operation operation = Operation::kAdd;
+  // unit / sqrt(Hz); adds a Gaussian of std = density / sqrt(period), whose Allan deviation is
+  // density / sqrt(tau): the "noise density" of a data sheet. Comes on top of `draw`.
+  PerComponent density = {0.0};
+
+  Noise() = default;
+  explicit Noise(Draw draw, Operation operation = Operation::kAdd);
+  static Noise with_density(PerComponent density);
+
+  std::unique_ptr<Effect> clone() const override { return std::make_unique<Noise>(*this); }
+  std::string kind() const override { return "noise"; }
+  void initialize(const EffectInit& init) override;
+  void apply(const EffectMoment& moment, const EffectRow& row) override;
+
+ private:
+  std::uint32_t stream_ = 0;
+  double density_factor_ = 0.0;  // 1 / sqrt(period)
+  bool has_density_ = false;
+};
+
+// x <- x + b, b constant over an episode (turn-on bias). At every reset b <- operation(b, e), from
+// 0: kAbs draws it anew, kAdd walks from episode to episode (mjlab's additive-bias model with
+// "add").
+struct EpisodeBias : Effect {
+  Draw draw;
+  Operation operation = Operation::kAbs;
+  bool per_component = true;  // false: one number for the whole row
+
+  EpisodeBias() = default;
+  explicit EpisodeBias(Draw draw, Operation operation = Operation::kAbs);
+
+  std::unique_ptr<Effect> clone() const override { return std::make_unique<EpisodeBias>(*this); }
+  std::string kind() const override { return "episode_bias"; }
+  void initialize(const EffectInit& init) override;
+  void reset(const EffectMoment& moment) override;
+  void apply(const EffectMoment& moment, const EffectRow& row) override;
+
+ private:
+  std::uint32_t stream_ = 0;
+  int size_ = 0;
+  std::vector<double> bias_;         // [B, size]
+  std::vector<std::uint8_t> drawn_;  // by world
+};
+
+// x <- x + b with db = -b / tau dt + sigma sqrt(2 / tau) dW: a first-order Gauss-Markov process
+// with standard deviation sigma and autocorrelation exp(-|t| / tau). It starts from its stationary
+// distribution at every reset. With tau infinite: a random walk db = density dW from 0.
+struct BiasDrift : Effect {
+  PerComponent std = {0.0};  // unit
+  double time_constant_s = std::numeric_limits<double>::infinity();
+  PerComponent density = {0.0};  // unit / sqrt(s), of the random walk
+  bool start_at_zero = false;
+
+  std::unique_ptr<Effect> clone() const override { return std::make_unique<BiasDrift>(*this); }
+  std::string kind() const override { return "bias_drift"; }
+  void initialize(const EffectInit& init) override;
+  void apply(const EffectMoment& moment, const EffectRow& row) override;
+  bool eager() const override { return true; }
+
+ private:
+  std::uint32_t stream_ = 0;
+  int size_ = 0;
+  std::vector<double> bias_;  // [B, size]
+};
+
+}  // namespace mjsense

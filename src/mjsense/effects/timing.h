@@ -1,0 +1,131 @@
+#pragma once
+// When a value arrives: delay, jitter, lower rate, lost frames. All take rows of any element type
+// unless said.
+
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "mjsense/effects/effect.h"
+
+namespace mjsense {
+
+// The last rows of every world, with their times.
+class FrameRing {
+ public:
+  void initialize(int num_worlds, std::size_t row_bytes, int capacity);
+  void clear(int world) { count_[world] = 0; }
+  void push(int world, const std::byte* row, double time);
+  void replace_newest(int world, const std::byte* row);
+  int count(int world) const { return count_[world]; }
+  // age 0: the newest. Ages beyond the oldest give the oldest.
+  const std::byte* frame(int world, int age) const;
+  double time(int world, int age) const;
+
+ private:
+  std::size_t index(int world, int age) const;
+
+  int capacity_ = 0;
+  std::size_t row_bytes_ = 0;
+  std::vector<std::byte> frames_;  // [B, capacity, row]
+  std::vector<double> times_;      // [B, capacity]
+  std::vector<int> newest_, count_;
+};
+
+// Output at time t: the row measured at t - lag, lag = delay + jitter.
+//   delay   drawn for each world and episode from [delay_s, delay_max_s] (delay_max_s < delay_s:
+//   fixed) jitter  uniform in [-jitter_s, jitter_s], fresh for every row; the output never goes
+//   back in time
+// Without interpolation: the newest row not younger than that. Before there is one: the first row
+// of the episode.
+struct Delay : Effect {
+  double delay_s = 0.0, delay_max_s = 0.0, jitter_s = 0.0;
+  bool interpolate = false;  // linear between rows; float rows only
+
+  Delay() = default;
+  explicit Delay(double delay_s) : delay_s(delay_s) {}
+  std::unique_ptr<Effect> clone() const override { return std::make_unique<Delay>(*this); }
+  std::string kind() const override { return "delay"; }
+  void initialize(const EffectInit& init) override;
+  void apply(const EffectMoment& moment, const EffectRow& row) override;
+  bool eager() const override { return true; }
+
+ private:
+  std::uint32_t stream_ = 0;
+  FrameRing ring_;
+  std::vector<double> lag_, output_time_;  // s, by world
+};
+
+// mjlab's delay, in rows: output = the row `lag` rows ago, at most as many as there are since the
+// reset. lag is uniform in [min_lag, max_lag], drawn every update_period rows (0: every row) but
+// kept with hold_probability.
+struct StepDelay : Effect {
+  int min_lag = 0, max_lag = 0;
+  bool per_world = true;  // false: all worlds have the same lag
+  double hold_probability = 0.0;
+  int update_period = 0;
+  bool per_world_phase = true;  // when worlds draw, if update_period > 0
+
+  StepDelay() = default;
+  StepDelay(int min_lag, int max_lag) : min_lag(min_lag), max_lag(max_lag) {}
+  std::unique_ptr<Effect> clone() const override { return std::make_unique<StepDelay>(*this); }
+  std::string kind() const override { return "step_delay"; }
+  void initialize(const EffectInit& init) override;
+  void apply(const EffectMoment& moment, const EffectRow& row) override;
+  bool eager() const override { return true; }
+
+ private:
+  void draw_lag(const EffectMoment& moment);
+
+  std::uint32_t stream_ = 0;
+  FrameRing ring_;
+  std::vector<int> lag_, rows_, phase_;  // by world
+};
+
+// A device slower than the control loop: a new row at phase + k / rate_hz, held in between.
+struct Rate : Effect {
+  double rate_hz = 0.0;
+  double phase_s = 0.0;
+  bool random_phase = false;  // uniform over a period, for each world and episode
+
+  Rate() = default;
+  explicit Rate(double rate_hz, double phase_s = 0.0) : rate_hz(rate_hz), phase_s(phase_s) {}
+  std::unique_ptr<Effect> clone() const override { return std::make_unique<Rate>(*this); }
+  std::string kind() const override { return "rate"; }
+  void initialize(const EffectInit& init) override;
+  void apply(const EffectMoment& moment, const EffectRow& row) override;
+  bool eager() const override { return true; }
+
+ private:
+  std::uint32_t stream_ = 0;
+  std::size_t row_bytes_ = 0;
+  std::vector<std::byte> held_;       // [B, row]
+  std::vector<double> phase_;         // s, by world
+  std::vector<std::int64_t> number_;  // of the row held
+  std::vector<std::uint8_t> is_new_;  // the row of the present tick was taken
+};
+
+// A row is lost with this probability: the last one that arrived is held, or NaN or 0 is given. The
+// first of an episode always arrives.
+struct Dropout : Effect {
+  enum class Mode { kHold, kNan, kZero };
+  double probability = 0.0;
+  Mode mode = Mode::kHold;
+
+  Dropout() = default;
+  explicit Dropout(double probability, Mode mode = Mode::kHold)
+      : probability(probability), mode(mode) {}
+  static Mode mode_from_name(std::string_view name);  // hold nan zero; throws ValueError
+  std::unique_ptr<Effect> clone() const override { return std::make_unique<Dropout>(*this); }
+  std::string kind() const override { return "dropout"; }
+  void initialize(const EffectInit& init) override;
+  void apply(const EffectMoment& moment, const EffectRow& row) override;
+  bool eager() const override { return mode == Mode::kHold; }
+
+ private:
+  std::uint32_t stream_ = 0;
+  std::size_t row_bytes_ = 0;
+  std::vector<std::byte> held_;  // [B, row]
+};
+
+}  // namespace mjsense
