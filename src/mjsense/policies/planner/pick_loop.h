@@ -18,7 +18,8 @@ struct EpisodeResult {
   double reward = 0;  // of the last observation
 };
 
-inline EpisodeResult run_episode(Task& task, Policy& policy, mjData* data, int world_id, std::int64_t episode) {
+inline EpisodeResult run_episode(Task& task, Policy& policy, mjData* data, int world_id,
+                                 std::int64_t episode) {
   const mjModel* model = task.model();
   mj_resetData(model, data);
   task.sample(world_id, episode, state_row(data));

@@ -2,7 +2,9 @@
 
 #include <gtest/gtest.h>
 
+#include <cmath>
 #include <cstdlib>
+#include <cstring>
 #include <vector>
 
 #include "mjsense/core/parallel.h"
@@ -52,12 +54,115 @@ TEST(PickPlanner, PicksUpMostObjects) {
     const EpisodeResult& r = results[e];
     successes += r.success;
     if (wanted)
-      printf("%3d %-32s steps %3d success %d gave_up %d truncated %d reward %.4f\n", e, text[e].c_str(), r.steps,
-             r.success, r.gave_up, r.truncated, r.reward);
+      printf("%3d %-32s steps %3d success %d gave_up %d truncated %d reward %.4f\n", e,
+             text[e].c_str(), r.steps, r.success, r.gave_up, r.truncated, r.reward);
   }
   RecordProperty("successes", successes);
   if (wanted) printf("%d of %d\n", successes, episodes);
   EXPECT_GE(successes, 0.9 * episodes);
+}
+
+TEST(PickPlanner, AnEpisodeIsTheSameInEveryWorld) {
+  Stage stage(3, /*noise=*/true);
+  run_episode(*stage.task, *stage.policy, stage.data[0].get(), 0, 4);
+  run_episode(*stage.task, *stage.policy, stage.data[2].get(), 2, 8);  // leaves nothing behind
+  run_episode(*stage.task, *stage.policy, stage.data[2].get(), 2, 4);
+  const int nq = stage.scene->model()->nq;
+  EXPECT_EQ(0, std::memcmp(stage.data[0]->qpos, stage.data[2]->qpos, nq * sizeof(double)));
+}
+
+// A world whose target has been put somewhere else after sampling.
+struct Moved {
+  Moved(Stage& stage, double x, double y)
+      : world{.id = 0, .model = stage.scene->model(), .data = stage.data[0].get()} {
+    stage.task->sample(0, 0, state_row(world.data));
+    mj_forward(world.model, world.data);
+    qpos = world.data->qpos +
+           world.model->jnt_qposadr[world.model->body_jntadr[stage.task->objects(0)[0].body]];
+    move(x, y);
+    stage.task->begin(world);
+    stage.policy->reset(world);
+  }
+  void move(double x, double y) {
+    qpos[0] += x;
+    qpos[1] += y;
+    mj_forward(world.model, world.data);
+  }
+  World world;
+  double* qpos;
+};
+
+TEST(PickPlanner, GivesUpWhatItCannotReach) {
+  Stage stage(1);
+  Moved moved(stage, 2.0, 0.0);
+  Action action;
+  stage.policy->act(moved.world, action);
+  EXPECT_TRUE(action.done);
+  ASSERT_TRUE(action.success.has_value());
+  EXPECT_FALSE(*action.success);
+  for (const GroupValues& group : action.commands.groups) EXPECT_FALSE(group.given);
+}
+
+TEST(PickPlanner, RetriesAfterClosingOnNothingThenGivesUp) {
+  Stage stage(1);
+  Moved moved(stage, 0.0, 0.0);
+  auto& planner = static_cast<PlannerPolicy&>(*stage.policy);
+  World& world = moved.world;
+  std::vector<int> phases;
+  int most_retries = 0;
+  double side = 1;
+  for (int step = 0; step < 400; ++step) {
+    Action action;
+    planner.act(world, action);
+    if (phases.empty() || phases.back() != planner.phase(0)) phases.push_back(planner.phase(0));
+    if (planner.num_retries(0) > most_retries) {
+      most_retries = planner.num_retries(0);
+      for (int g = 0; g < 3; ++g)
+        EXPECT_FALSE(action.commands[g].given) << "a retry holds for one step";
+    }
+    if (action.done) {
+      EXPECT_EQ(action.success, std::optional<bool>(false));
+      EXPECT_EQ(most_retries, 3);
+      const std::vector<int> one{2, 3, 4, 5};
+      EXPECT_EQ(std::vector<int>(phases.begin(), phases.begin() + 4), one);
+      return;
+    }
+    stage.task->apply(world, action, state_row(world.data));
+    // Whenever the fingers are about to close, the object slips away.
+    if (planner.phase(0) == 4 &&
+        stage.task->robot().opening(world, stage.task->robot().gripper()) > 0.08) {
+      moved.move(0, 0.15 * side);
+      side = -side;
+    }
+    for (int i = 0; i < stage.task->decimation(); ++i) mj_step(world.model, world.data);
+    mj_forward(world.model, world.data);
+    world.substep += stage.task->decimation();
+  }
+  FAIL() << "never gave up; retries " << most_retries;
+}
+
+TEST(Grasp, ClosesOnOppositeFacesOfABox) {
+  Stage stage(1);
+  const Robot& robot = stage.task->robot();
+  const GripperShape gripper(stage.scene->model(), robot, robot.gripper());
+  EXPECT_NEAR(gripper.tip, 0.019 + 0.005, 1e-3);
+  const auto& objects = static_cast<PickTask&>(*stage.task).all_objects();
+  const auto& block = objects[0];
+  ASSERT_EQ(block.kind, "red_block");
+  const double yaw = 0.4;
+  const Pose object{{0.5, 0.1, 0.625}, axis_angle({0, 0, 1}, yaw)};
+  const Pose tool{{0.5, 0.1, 0.9}, {0, 1, 0, 0}};
+  const auto grasps = propose_grasps(gripper, block.shape, object, 0.6, tool);
+  ASSERT_FALSE(grasps.empty());
+  for (std::size_t i = 0; i < grasps.size(); ++i) {
+    EXPECT_GE(grasps[i].cost, grasps[i > 0 ? i - 1 : 0].cost);
+    EXPECT_FALSE(gripper.hits(grasps[i].pose, object, block.shape, 0.0));
+    EXPECT_LT(rotate(grasps[i].pose.q, {0, 0, 1}).z, -0.999) << "from above";
+    EXPECT_GT(grasps[i].pose.p.z, 0.6 + gripper.tip) << "finger tips above the table";
+    // Along one of the sides (0.044 or 0.070 m), not over a corner.
+    const Vec3 closing = rotate(conjugate(object.q), rotate(grasps[i].pose.q, {0, 1, 0}));
+    EXPECT_GT(std::max(std::abs(closing.x), std::abs(closing.y)), std::cos(0.2));
+  }
 }
 
 }  // namespace

@@ -1,0 +1,68 @@
+// The pick without sensors: what planning and physics cost, and how often it succeeds.
+//   mjsense_bench --benchmark_filter=Pick
+
+#include <benchmark/benchmark.h>
+
+#include <memory>
+
+#include "mjsense/policies/planner/pick_loop.h"
+
+namespace mjsense {
+namespace {
+
+struct Stage {
+  explicit Stage(bool noise) {
+    TaskCfg cfg;
+    cfg.robot = robot_cfg("franka");
+    cfg.action_noise = noise;
+    task = make_task("pick", cfg);
+    scene = std::make_unique<Scene>(task->scene_cfg());
+    task->initialize(scene->model(), 1);
+    policy = make_policy("planner");
+    task->register_policy(*policy);
+    data.reset(mj_makeData(scene->model()));
+  }
+  std::unique_ptr<Task> task;
+  std::unique_ptr<Scene> scene;
+  std::unique_ptr<Policy> policy;
+  std::unique_ptr<mjData, decltype(&mj_deleteData)> data{nullptr, mj_deleteData};
+};
+
+// One episode an iteration: episodes 0, 1, 2 ... of seed 0.
+void pick_episode(benchmark::State& state) {
+  Stage stage(state.range(0) != 0);
+  std::int64_t episode = 0, steps = 0, successes = 0;
+  for (auto _ : state) {
+    const EpisodeResult result =
+        run_episode(*stage.task, *stage.policy, stage.data.get(), 0, episode++);
+    steps += result.steps;
+    successes += result.success;
+  }
+  state.counters["success"] = static_cast<double>(successes) / static_cast<double>(episode);
+  state.counters["steps/s"] =
+      benchmark::Counter(static_cast<double>(steps), benchmark::Counter::kIsRate);
+}
+BENCHMARK(pick_episode)
+    ->Name("PickEpisode/noise")
+    ->Arg(0)
+    ->Arg(1)
+    ->Iterations(100)
+    ->Unit(benchmark::kMillisecond);
+
+// Sampling an episode and planning it: what a reset costs.
+void pick_plan(benchmark::State& state) {
+  Stage stage(false);
+  mjData* data = stage.data.get();
+  World world{.id = 0, .model = stage.scene->model(), .data = data};
+  std::int64_t episode = 0;
+  for (auto _ : state) {
+    stage.task->sample(0, episode++, state_row(data));
+    mj_forward(world.model, data);
+    stage.task->begin(world);
+    stage.policy->reset(world);
+  }
+}
+BENCHMARK(pick_plan)->Name("PickPlan")->Iterations(100)->Unit(benchmark::kMillisecond);
+
+}  // namespace
+}  // namespace mjsense

@@ -1,0 +1,220 @@
+#include "mjsense/robots/robot.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include "mjsense/core/error.h"
+#include "mjsense/scene/scene.h"
+
+namespace mjsense {
+namespace {
+
+using testing::HasSubstr;
+
+struct DataDelete {
+  void operator()(mjData* data) const { mj_deleteData(data); }
+};
+
+// A Franka alone in two worlds.
+struct Franka : testing::Test {
+  static SceneCfg scene_cfg() {
+    SceneCfg cfg;
+    EntityCfg entity;
+    entity.model = robot_cfg("franka").model;
+    cfg.entities = {{"robot_0", entity}};
+    return cfg;
+  }
+  void SetUp() override {
+    for (int w = 0; w < 2; ++w) {
+      data[w].reset(mj_makeData(model));
+      worlds[w] = {.id = w, .model = model, .data = data[w].get()};
+      Rng rng(7, 0, 0, w);
+      robot.write_start(state_row(data[w].get()), {}, rng);
+      mj_forward(model, data[w].get());
+      robot.reset(worlds[w]);
+    }
+  }
+  void step(int w, int substeps) {
+    robot.write_ctrl(worlds[w], state_row(data[w].get()), nullptr);
+    for (int i = 0; i < substeps; ++i) mj_step(model, data[w].get());
+    mj_forward(model, data[w].get());
+  }
+  std::vector<double> arm_qpos(int w) const {
+    RobotValues q;
+    robot.read_qpos(worlds[w], q);
+    const auto arm = q[robot.arm()].view();
+    return {arm.begin(), arm.end()};
+  }
+
+  Scene scene{scene_cfg()};
+  const mjModel* model = scene.model();
+  Robot robot{robot_cfg("franka"), model, 2};
+  std::unique_ptr<mjData, DataDelete> data[2];
+  World worlds[2];
+};
+
+TEST_F(Franka, GroupsAreThoseOfTheStation) {
+  ASSERT_EQ(robot.groups().size(), 3u);
+  EXPECT_EQ(robot.groups()[0].name, "base");
+  EXPECT_FALSE(robot.groups()[0].controlled());
+  EXPECT_EQ(robot.group("arm").joints.size(), 7u);
+  EXPECT_EQ(robot.group("gripper").joints.size(), 2u);
+  EXPECT_EQ(robot.group("gripper").actuators.size(), 1u);
+  EXPECT_EQ(robot.group("gripper").ctrl_high[0], 255);
+  EXPECT_NEAR(robot.group("arm").ctrl_low[3], -3.0770, 1e-12);
+}
+
+TEST_F(Franka, StartsNearItsStartConfigurationAndStaysThere) {
+  const double init[] = {0, -0.7853, 0, -2.35619, 0, 1.57079, 0};
+  const double spread[] = {0.025, 0.05, 0.075, 0.1, 0.125, 0.15, 0.175};
+  const auto before = arm_qpos(0);
+  for (int i = 0; i < 7; ++i) EXPECT_LE(std::abs(before[i] - init[i]), spread[i]);
+  EXPECT_NE(before, arm_qpos(1));  // drawn from different numbers
+  step(0, 1000);
+  const auto after = arm_qpos(0);
+  for (int i = 0; i < 7; ++i) EXPECT_NEAR(after[i], before[i], 1e-6);
+}
+
+TEST_F(Franka, ToolPoseIsForwardKinematicsInTheBaseFrame) {
+  RobotValues q;
+  robot.read_qpos(worlds[0], q);
+  const Pose measured = robot.tcp_pose(worlds[0], robot.gripper());
+  for (int group : {robot.arm(), robot.gripper()}) {
+    const Pose computed = robot.fk(group, q);
+    EXPECT_LT(norm(measured.p - computed.p), 1e-12);
+    EXPECT_LT(angle_between(measured.q, computed.q), 1e-7);
+  }
+  EXPECT_GT(measured.p.z, 0.58);  // the base frame is on the floor
+  EXPECT_EQ(norm(robot.fk(0, q).p), 0);
+
+  // Where the base stands changes nothing.
+  data[0]->mocap_pos[0] = 1.5;
+  write_quat(axis_angle({0, 0, 1}, 0.7), data[0]->mocap_quat);
+  mj_forward(model, data[0].get());
+  EXPECT_NEAR(robot.base_pose(worlds[0]).p.x, 1.5, 1e-12);
+  EXPECT_LT(norm(robot.tcp_pose(worlds[0], robot.arm()).p - measured.p), 1e-12);
+}
+
+TEST_F(Franka, GripperOpensAndClosesOnCommand) {
+  const int g = robot.gripper();
+  EXPECT_NEAR(robot.opening(worlds[0], g), 0.087, 0.001);
+  EXPECT_TRUE(robot.is_open(worlds[0], g));
+  Action action;
+  const double closed = 255;
+  action.commands[g].set({&closed, 1});
+  robot.command(worlds[0], action);
+  step(0, 500);
+  EXPECT_NEAR(robot.opening(worlds[0], g), 0.0, 0.001);
+  EXPECT_FALSE(robot.is_open(worlds[0], g));
+  EXPECT_NEAR(data[0]->qpos[robot.groups()[g].qpos[0]], 0.8, 0.005);
+  // Left out, it holds what it is: closed.
+  robot.command(worlds[0], {});
+  EXPECT_EQ(robot.targets(0)[g].values[0], 255);
+  const double open = 0;
+  action.commands[g].set({&open, 1});
+  robot.command(worlds[0], action);
+  step(0, 500);
+  EXPECT_NEAR(robot.opening(worlds[0], g), 0.087, 0.001);
+}
+
+TEST_F(Franka, LeftOutGroupsHoldWhereTheyWere) {
+  Action action;
+  auto target = arm_qpos(0);
+  target[0] += 0.3;
+  action.commands[robot.arm()].set(target);
+  robot.command(worlds[0], action);
+  step(0, 33);
+  robot.command(worlds[0], {});
+  const auto held = arm_qpos(0);
+  const auto first = robot.targets(0)[robot.arm()].view();
+  EXPECT_EQ(std::vector<double>(first.begin(), first.end()), held);
+  // Set once: the arm still moves, the target does not follow it.
+  step(0, 33);
+  robot.command(worlds[0], {});
+  const auto second = robot.targets(0)[robot.arm()].view();
+  EXPECT_EQ(std::vector<double>(second.begin(), second.end()), held);
+  EXPECT_NE(arm_qpos(0), held);
+  // The other world was not touched.
+  EXPECT_FALSE(robot.targets(1)[robot.arm()].given);
+}
+
+TEST_F(Franka, CommandsAreClippedAndChecked) {
+  Action action;
+  std::vector<double> target(7, 10.0);
+  action.commands[robot.arm()].set(target);
+  robot.command(worlds[0], action);
+  const auto clipped = robot.targets(0)[robot.arm()].view();
+  for (int i = 0; i < 7; ++i) EXPECT_EQ(clipped[i], robot.group("arm").ctrl_high[i]);
+
+  target.pop_back();
+  action.commands[robot.arm()].set(target);
+  try {
+    robot.command(worlds[0], action);
+    FAIL();
+  } catch (const ValueError& e) {
+    EXPECT_THAT(e.what(), HasSubstr("move group 'arm' takes 7 commands, the action has 6"));
+  }
+  target.assign(7, NAN);
+  action.commands[robot.arm()].set(target);
+  EXPECT_THROW(robot.command(worlds[0], action), ValueError);
+}
+
+TEST_F(Franka, ActionNoiseGrowsWithTheMotionAndIsNotRecorded) {
+  const StateRow state = state_row(data[0].get());
+  const auto start = arm_qpos(0);
+  const int arm = robot.arm();
+  Rng rng(1, 0, 0, 0);
+  robot.write_ctrl(worlds[0], state, &rng);
+  for (int i = 0; i < 7; ++i) EXPECT_NEAR(state.ctrl[i], start[i], 1e-12) << "no motion, no noise";
+
+  Action action;
+  auto target = start;
+  target[0] += 0.1;
+  action.commands[arm].set(target);
+  robot.command(worlds[0], action);
+  RobotValues values;
+  robot.read_qpos(worlds[0], values);
+  const Pose here = robot.fk(arm, values);
+  // The tool would move by 0.1 rad about the first joint's axis.
+  const double move = 0.1 * std::hypot(here.p.x, here.p.y);
+  const Pose wanted = robot.fk(arm, robot.targets(0));
+  double square = 0;
+  const int draws = 2000;
+  for (int k = 0; k < draws; ++k) {
+    robot.write_ctrl(worlds[0], state, &rng);
+    values[arm].set({state.ctrl, 7});
+    const Vec3 off = robot.fk(arm, values).p - wanted.p;
+    for (int i = 0; i < 3; ++i)
+      EXPECT_LT(std::abs(off[i]), 0.023);  // 0.02 and what the linear map leaves
+    square += dot(off, off);
+  }
+  EXPECT_NEAR(std::sqrt(square / (3 * draws)), 0.1 * move, 0.01 * move);
+  EXPECT_EQ(robot.targets(0)[arm].values[0], target[0]);
+}
+
+TEST_F(Franka, UnknownNamesAreErrorsWithTheNearest) {
+  try {
+    robot_cfg("frnka");
+    FAIL();
+  } catch (const KeyError& e) {
+    EXPECT_THAT(e.what(), HasSubstr("did you mean 'franka'?"));
+  }
+  try {
+    robot.group_index("griper");
+    FAIL();
+  } catch (const KeyError& e) {
+    EXPECT_THAT(e.what(), HasSubstr("'gripper'"));
+  }
+  RobotCfg wrong = robot_cfg("franka");
+  wrong.groups[1].joints[2] = "fr3_jont3";
+  try {
+    Robot broken(wrong, model, 1);
+    FAIL();
+  } catch (const KeyError& e) {
+    EXPECT_THAT(e.what(), HasSubstr("robot 'franka'"));
+    EXPECT_THAT(e.what(), HasSubstr("robot_0/fr3_joint3"));
+  }
+}
+
+}  // namespace
+}  // namespace mjsense

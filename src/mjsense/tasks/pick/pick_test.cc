@@ -1,0 +1,195 @@
+#include "mjsense/tasks/pick/pick.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <nlohmann/json.hpp>
+#include <set>
+
+#include "mjsense/core/error.h"
+
+namespace mjsense {
+namespace {
+
+using testing::HasSubstr;
+
+struct DataDelete {
+  void operator()(mjData* data) const { mj_deleteData(data); }
+};
+
+TaskCfg franka() {
+  TaskCfg cfg;
+  cfg.robot = robot_cfg("franka");
+  return cfg;
+}
+
+struct Pick : testing::Test {
+  void start(int world, std::int64_t episode) {
+    mj_resetData(model, data.get());
+    task.sample(world, episode, state_row(data.get()));
+    mj_forward(model, data.get());
+    w = {.id = world, .model = model, .data = data.get()};
+    task.begin(w);
+  }
+  int body() const { return task.objects(w.id)[0].body; }
+  double* object_qpos() { return data->qpos + model->jnt_qposadr[model->body_jntadr[body()]]; }
+
+  PickTask task{franka()};
+  Scene scene{task.scene_cfg()};
+  const mjModel* model = scene.model();
+  std::unique_ptr<mjData, DataDelete> data{mj_makeData(model)};
+  World w;
+  void SetUp() override { task.initialize(model, 3); }
+};
+
+TEST_F(Pick, AnEpisodeDependsOnItsNumberAlone) {
+  start(0, 5);
+  const std::vector<double> qpos(data->qpos, data->qpos + model->nq);
+  const std::string what = task.description(0);
+  start(2, 6);
+  EXPECT_NE(qpos, std::vector<double>(data->qpos, data->qpos + model->nq));
+  start(2, 5);
+  EXPECT_EQ(qpos, std::vector<double>(data->qpos, data->qpos + model->nq));
+  EXPECT_EQ(what, task.description(2));
+}
+
+TEST_F(Pick, ObjectsStandFreeOnTheTable) {
+  std::set<std::string> targets;
+  for (int episode = 0; episode < 100; ++episode) {
+    start(0, episode);
+    targets.insert(task.description(0));
+    for (int i = 0; i < data->ncon; ++i) EXPECT_GT(data->contact[i].dist, -1e-4) << episode;
+    const auto objects = task.all_objects();
+    for (const auto& a : objects) {
+      const double* p = data->xpos + 3 * a.body;
+      EXPECT_NEAR(p[2] + a.shape.low, task.table_height(), 1e-3);
+      for (const auto& b : objects) {
+        if (a.body >= b.body) continue;
+        const double distance =
+            std::hypot(p[0] - data->xpos[3 * b.body], p[1] - data->xpos[3 * b.body + 1]);
+        EXPECT_GT(distance, a.shape.radius + b.shape.radius)
+            << a.kind << " " << b.kind << " " << episode;
+      }
+    }
+  }
+  EXPECT_EQ(targets.size(), task.all_objects().size()) << "every kind is a target in 100 episodes";
+}
+
+TEST_F(Pick, ObjectsRestWhereTheyStart) {
+  for (int episode = 0; episode < 3; ++episode) {
+    start(0, episode);
+    const std::vector<double> before(data->xpos, data->xpos + 3 * model->nbody);
+    for (int i = 0; i < 500; ++i) mj_step(model, data.get());
+    for (const auto& object : task.all_objects()) {
+      for (int k = 0; k < 3; ++k)
+        EXPECT_NEAR(data->xpos[3 * object.body + k], before[3 * object.body + k], 2e-3)
+            << object.kind;
+    }
+  }
+}
+
+TEST_F(Pick, LiftedByNothingIsNoSuccess) {
+  start(0, 1);
+  Evaluation e = task.evaluate(w);
+  EXPECT_EQ(e.reward, 0);
+  EXPECT_FALSE(e.success || e.terminal || e.truncated);
+  object_qpos()[2] += 0.05;
+  mj_forward(model, data.get());
+  e = task.evaluate(w);
+  EXPECT_NEAR(e.reward, 0.05, 1e-9);  // nothing else bears it
+  EXPECT_FALSE(e.success);            // but the robot does not touch it
+}
+
+TEST_F(Pick, TouchingTheTableIsNoSuccess) {
+  start(0, 1);
+  // On another object: high enough, but not the robot's doing.
+  int other = -1;
+  for (const auto& object : task.all_objects()) {
+    if (object.kind == "red_block" && object.body != body()) other = object.body;
+  }
+  if (other < 0) GTEST_SKIP() << "the block itself is the target";
+  const auto& shape = task.all_objects()[task.target(0)].shape;
+  write_vec(
+      {data->xpos[3 * other], data->xpos[3 * other + 1], task.table_height() + 0.0495 - shape.low},
+      object_qpos());
+  mj_forward(model, data.get());
+  const Evaluation e = task.evaluate(w);
+  EXPECT_FALSE(e.success);
+  EXPECT_EQ(e.reward, 0) << "the block bears it";
+}
+
+TEST_F(Pick, EndsWithTheHorizonOrADoneAction) {
+  start(0, 0);
+  Action action;
+  for (int i = 0; i < task.cfg().horizon - 1; ++i) task.apply(w, action, state_row(data.get()));
+  EXPECT_FALSE(task.evaluate(w).truncated);
+  task.apply(w, action, state_row(data.get()));
+  EXPECT_TRUE(task.evaluate(w).truncated);
+  EXPECT_FALSE(task.evaluate(w).terminal);
+  action.done = true;
+  task.apply(w, action, state_row(data.get()));
+  EXPECT_TRUE(task.evaluate(w).terminal);
+  start(0, 1);
+  EXPECT_FALSE(task.evaluate(w).terminal) << "a new episode";
+  EXPECT_EQ(task.last_action(0), nullptr);
+}
+
+TEST_F(Pick, TellsWhatItIs) {
+  start(1, 3);
+  const auto obs = nlohmann::json::parse(task.obs_scene(1));
+  EXPECT_EQ(obs["task_type"], "pick");
+  EXPECT_EQ(obs["policy_dt_ms"], 66);
+  EXPECT_EQ(obs["task_description"], task.description(1));
+  EXPECT_EQ("Pick up the " + obs["object_name"].get<std::string>(), task.description(1));
+  double probability = 0;
+  for (const auto& pair : obs["referral_expressions"]["pickup_obj"])
+    probability += pair[1].get<double>();
+  EXPECT_NEAR(probability, 1, 1e-12);
+
+  std::vector<std::uint8_t> row(400);
+  JsonWriter json(row);
+  json.begin_object();
+  task.write_info(w, json);
+  json.end_object();
+  ASSERT_TRUE(json.finish());
+  const auto info = nlohmann::json::parse(reinterpret_cast<const char*>(row.data()));
+  EXPECT_NEAR(info["position_error"].get<double>(), 0.05, 1e-9);
+  EXPECT_NEAR(info["rotation_error"].get<double>(), 0, 1e-6);
+  EXPECT_EQ(info["success"], false);
+  EXPECT_EQ(info["episode_step"], 0);
+}
+
+TEST_F(Pick, GoalIsFiveCentimetresUp) {
+  start(0, 2);
+  const Pose start_pose = task.start_pose(0, "pickup_obj");
+  EXPECT_NEAR(start_pose.p.z, data->xpos[3 * body() + 2], 1e-12);
+  EXPECT_NEAR(task.goal_pose(0, "pickup_obj")->p.z - start_pose.p.z, 0.05, 1e-12);
+  EXPECT_THROW(task.start_pose(0, "place_receptacle"), KeyError);
+}
+
+TEST_F(Pick, SensorsInTheirOrder) {
+  std::vector<std::string> names;
+  for (const auto& sensor : task.create_task_sensors()) names.push_back(sensor->name());
+  EXPECT_THAT(names, testing::ElementsAre("obj_start", "grasp_state_pickup_obj", "obj_end"));
+  const auto robot_sensors = task.robot().create_robot_sensors();
+  ASSERT_EQ(robot_sensors.size(), 1u);
+  EXPECT_EQ(robot_sensors[0]->name(), "tcp_pose");
+}
+
+TEST(Task, BadConfigurationsAreErrors) {
+  TaskCfg cfg = franka();
+  cfg.policy_dt_ms = 65;
+  EXPECT_THROW(PickTask{cfg}, ValueError);
+  cfg = franka();
+  cfg.horizon = 0;
+  EXPECT_THROW(PickTask{cfg}, ValueError);
+  try {
+    make_task("pik", franka());
+    FAIL();
+  } catch (const KeyError& e) {
+    EXPECT_THAT(e.what(), HasSubstr("did you mean 'pick'?"));
+  }
+}
+
+}  // namespace
+}  // namespace mjsense
