@@ -1,0 +1,317 @@
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <memory>
+
+#include "mjsense/core/error.h"
+#include "mjsense/core/testing/allocations.h"
+#include "mjsense/rays/ray_scene.h"
+#include "mjsense/scene/scene.h"
+#include "mjsense/sensors/camera/camera_sensor.h"
+#include "mjsense/sim/simulation.h"
+
+namespace mjsense {
+namespace {
+
+using ::testing::HasSubstr;
+
+// A scene of one entity "w" and cameras in it.
+struct Lab {
+  std::shared_ptr<Scene> scene;
+  std::unique_ptr<Simulation> sim;
+
+  Lab(const std::string& worldbody, std::vector<CameraSensorCfg> cameras, SimulationCfg cfg = {}) {
+    SceneCfg s;
+    EntityCfg e;
+    e.model.xml = "<mujoco>" + worldbody + "</mujoco>";
+    s.entities.emplace_back("w", e);
+    for (CameraSensorCfg& c : cameras) s.sensors.push_back(std::make_shared<CameraSensorCfg>(c));
+    scene = std::make_shared<Scene>(std::move(s));
+    sim = std::make_unique<Simulation>(scene, cfg);
+  }
+  template <class T>
+  std::vector<T> read(std::string_view field, std::string_view name = "cam", int world = -1) {
+    Sensor& sensor = scene->sensor(name);
+    sim->refresh(sensor);
+    const Array& data = sensor.field(field).data;
+    const auto all = world < 0 ? data.all<T>() : data.row<T>(world);
+    return {all.begin(), all.end()};
+  }
+  void pose(int world, std::initializer_list<double> qpos) {
+    const ArrayView v = sim->worlds().state_component("qpos");
+    std::copy(qpos.begin(), qpos.end(), reinterpret_cast<double*>(v.data + world * v.strides[0]));
+    sim->forward(std::vector<int>{world});
+  }
+};
+
+CameraSensorCfg camera(int width, int height, std::vector<std::string> types,
+                       std::string wrapped = "") {
+  CameraSensorCfg cfg;
+  cfg.name = "cam";
+  cfg.camera_name = std::move(wrapped);
+  cfg.width = width;
+  cfg.height = height;
+  cfg.data_types = std::move(types);
+  return cfg;
+}
+
+// The scene of the published cases: an overhead camera at 4 m over a floor, a box and a ball.
+constexpr char kCases[] = R"(<worldbody><light pos="0 0 3" dir="0 0 -1"/>
+  <geom name="floor" type="plane" size="10 10 .1" rgba=".5 .5 .5 1"/>
+  <geom name="box" type="box" size=".5 .5 .5" pos="0 0 .5" rgba="1 0 0 1"/>
+  <geom name="ball" size=".3" pos="1.2 .6 .9" rgba="0 1 0 1" group="1"/>
+  <geom name="vis3" type="box" size=".2 .2 .2" pos="-1.2 -.6 1.5" group="3"/>
+  <camera name="top" pos="0.03 0.02 4" fovy="50" resolution="8 6"/>
+  <camera name="phys" pos="0.02 0.03 4" resolution="8 6" sensorsize=".008 .006"
+          focal=".006 .006" principal=".0005 -.0003"/></worldbody>)";
+
+TEST(Camera, DepthIsPlanarAndIdsAreGeoms) {
+  Lab lab(kCases, {camera(8, 6, {"depth", "segmentation"}, "w/top")});
+  const auto depth = lab.read<float>("depth");
+  const auto ids = lab.read<std::int32_t>("segmentation");
+  ASSERT_EQ(depth.size(), 48u);
+  // Row 1, column 6 is the ball, columns 3 and 4 of rows 2 and 3 the box; the rest is floor.
+  for (int y = 0; y < 6; ++y)
+    for (int x = 0; x < 8; ++x) {
+      const int i = 8 * y + x;
+      const bool ball = y == 1 && x == 6, box = (y == 2 || y == 3) && (x == 3 || x == 4);
+      EXPECT_NEAR(depth[i], ball ? 2.8198407 : box ? 3.0 : 4.0, 1e-5) << x << ", " << y;
+      EXPECT_EQ(ids[2 * i], ball ? 2 : box ? 1 : 0) << x << ", " << y;
+      EXPECT_EQ(ids[2 * i + 1], mjOBJ_GEOM);
+    }
+}
+
+TEST(Camera, OneCameraServesSensorsWithDifferentGroups) {
+  CameraSensorCfg without_ball = camera(8, 6, {"segmentation"}, "w/top");
+  CameraSensorCfg with_hidden = without_ball;
+  without_ball.enabled_geom_groups = {0};
+  with_hidden.name = "all";
+  with_hidden.enabled_geom_groups = {0, 1, 2, 3};
+  Lab lab(kCases, {without_ball, with_hidden});
+  const auto few = lab.read<std::int32_t>("segmentation");
+  const auto all = lab.read<std::int32_t>("segmentation", "all");
+  EXPECT_EQ(few[2 * (8 * 1 + 6)], 0);
+  EXPECT_EQ(all[2 * (8 * 1 + 6)], 2);
+  EXPECT_EQ(few[2 * (8 * 4 + 0)], 0);
+  EXPECT_EQ(all[2 * (8 * 4 + 0)], 3);
+}
+
+TEST(Camera, SphereAtTwoMetresReadsTwoMetres) {
+  CameraSensorCfg cfg = camera(31, 31, {"depth", "normals", "point_cloud"});
+  cfg.pos = {0, 0, 2.5};
+  Lab lab(R"(<worldbody><geom size=".5"/></worldbody>)", {cfg});
+  const int center = 15 * 31 + 15;
+  EXPECT_NEAR(lab.read<float>("depth")[center], 2.0, 1e-6);
+  const auto n = lab.read<float>("normals");
+  EXPECT_NEAR(n[3 * center + 2], 1.0, 1e-6);
+  const auto p = lab.read<float>("point_cloud");
+  EXPECT_NEAR(p[3 * center + 2], -2.0, 1e-6);
+  // Every point of the cloud lies on the sphere, every normal points away from its centre.
+  int hits = 0;
+  for (std::size_t i = 0; i < p.size() / 3; ++i) {
+    if (std::isnan(p[3 * i])) continue;
+    ++hits;
+    const double r[3] = {p[3 * i], p[3 * i + 1], p[3 * i + 2] + 2.5};
+    EXPECT_NEAR(std::hypot(r[0], r[1], r[2]), 0.5, 1e-5);
+    for (int k = 0; k < 3; ++k) EXPECT_NEAR(n[3 * i + k], r[k] / 0.5, 1e-4);
+  }
+  EXPECT_GT(hits, 100);
+}
+
+TEST(Camera, KnownPointsProjectToTheRightPixels) {
+  Lab lab(kCases, {camera(64, 48, {"segmentation"}, "w/phys")});
+  const auto ids = lab.read<std::int32_t>("segmentation");
+  const auto k = lab.read<float>("intrinsics");
+  const auto pose = lab.read<float>("pose");
+  const double ball[3] = {1.2, 0.6, 0.9};
+  double c[3] = {};
+  for (int i = 0; i < 3; ++i)
+    for (int j = 0; j < 3; ++j) c[i] += pose[4 * j + i] * (ball[j] - pose[4 * j + 3]);
+  const double u = k[0] * c[0] / -c[2] + k[2], v = k[4] * -c[1] / -c[2] + k[5];
+  // The outline of a small sphere is centred on its centre's image to a fraction of a pixel.
+  double x = 0, y = 0, n = 0;
+  for (int i = 0; i < 64 * 48; ++i) {
+    if (ids[2 * i] != 2) continue;
+    x += i % 64 + 0.5;
+    y += i / 64 + 0.5;
+    ++n;
+  }
+  ASSERT_GT(n, 10);
+  EXPECT_NEAR(x / n, u, 0.7);
+  EXPECT_NEAR(y / n, v, 0.7);
+}
+
+TEST(Camera, RayDepthIsThePointsDistance) {
+  CameraSensorCfg cfg = camera(16, 12, {"depth", "point_cloud"}, "w/top");
+  cfg.depth_kind = "ray";
+  Lab lab(kCases, {cfg});
+  const auto d = lab.read<float>("depth"), p = lab.read<float>("point_cloud");
+  for (std::size_t i = 0; i < d.size(); ++i)
+    EXPECT_NEAR(d[i], std::hypot(p[3 * i], p[3 * i + 1], p[3 * i + 2]), 1e-5);
+}
+
+TEST(Camera, OrthographicRaysAreParallel) {
+  CameraSensorCfg cfg = camera(4, 4, {"depth", "point_cloud"});
+  cfg.pos = {0.03, 0.02, 4.0};
+  cfg.fovy = 3.0;  // metres
+  cfg.orthographic = true;
+  Lab lab(kCases, {cfg});
+  const auto d = lab.read<float>("depth");
+  const auto p = lab.read<float>("point_cloud");
+  for (int y = 0; y < 4; ++y)
+    for (int x = 0; x < 4; ++x) {
+      const double px = (x + 0.5) * 0.75 - 1.5, py = 1.5 - (y + 0.5) * 0.75;
+      EXPECT_NEAR(p[3 * (4 * y + x)], px, 1e-6);
+      EXPECT_NEAR(p[3 * (4 * y + x) + 1], py, 1e-6);
+      const bool box = std::abs(px + 0.03) < 0.5 && std::abs(py + 0.02) < 0.5;
+      EXPECT_NEAR(d[4 * y + x], box ? 3.0 : d[4 * y + x] < 3.9 ? d[4 * y + x] : 4.0, 1e-6);
+    }
+}
+
+TEST(Camera, SeesWhatMuJoCoDraws) {
+  // A ghost of alpha 0 is not there; a shell is seen through from inside; a plane has one side.
+  CameraSensorCfg cfg = camera(3, 3, {"depth", "segmentation"}, "w/c");
+  Lab lab(R"(<worldbody><geom name="floor" type="plane" size="10 10 .1"/>
+    <geom name="ghost" size=".3" pos="0 0 1" rgba="1 1 1 0"/><geom name="shell" size=".5" pos="0 0 3"/>
+    <camera name="c" pos=".02 .01 3" fovy="30"/><camera name="below" pos="0 0 -1" quat="0 1 0 0"/>
+    </worldbody>)",
+          {cfg});
+  for (float d : lab.read<float>("depth")) EXPECT_NEAR(d, 3.0, 1e-5);
+  for (std::size_t i = 0; i < 9; ++i) EXPECT_EQ(lab.read<std::int32_t>("segmentation")[2 * i], 0);
+}
+
+TEST(Camera, NothingSeenIsZeroAndMinusOne) {
+  CameraSensorCfg cfg = camera(5, 5, {"rgb", "depth", "segmentation", "normals"});
+  cfg.quat = {0, 1, 0, 0};  // up
+  Lab lab(R"(<worldbody><geom size=".1"/></worldbody>)", {cfg});
+  for (auto v : lab.read<std::uint8_t>("rgb")) EXPECT_EQ(v, 0);
+  for (auto v : lab.read<float>("depth")) EXPECT_EQ(v, 0);
+  for (auto v : lab.read<std::int32_t>("segmentation")) EXPECT_EQ(v, -1);
+  for (auto v : lab.read<float>("normals")) EXPECT_EQ(v, 0);
+}
+
+TEST(Camera, ClipRangeHidesWhatIsNearerOrFarther) {
+  CameraSensorCfg cfg = camera(8, 6, {"segmentation"}, "w/top");
+  cfg.near = 2.9;
+  cfg.far = 3.5;
+  Lab lab(kCases, {cfg});
+  const auto ids = lab.read<std::int32_t>("segmentation");
+  EXPECT_EQ(ids[2 * (8 * 2 + 3)], 1);
+  EXPECT_EQ(ids[0], -1);               // the floor is too far
+  EXPECT_NE(ids[2 * (8 * 1 + 6)], 2);  // the ball's top is too near
+}
+
+// Falling spheres and a turning box, everything that pictures are made of.
+constexpr char kShow[] = R"(
+  <asset><texture name="sky" type="skybox" builtin="gradient" rgb1=".4 .6 .8" rgb2="0 0 0" width="32" height="32"/>
+    <texture name="t" type="2d" builtin="checker" rgb1="1 0 0" rgb2="0 0 1" width="64" height="64"/>
+    <texture name="q" type="cube" builtin="gradient" rgb1="1 1 0" rgb2="0 1 1" width="16" height="16"/>
+    <material name="m" texture="t" texrepeat="3 3"/><material name="n" texture="q"/>
+    <mesh name="tet" vertex="0 0 0 1 0 0 0 1 0 0 0 1"/></asset>
+  <worldbody><light pos="1 1 4" dir="-.2 -.2 -1" castshadow="true"/><geom type="plane" size="0 0 .1" material="m"/>
+    <body name="b" pos="0 0 1"><freejoint/><geom type="box" size=".3 .2 .1" material="n"/>
+      <geom type="capsule" size=".05 .3" pos="0 0 .3" rgba=".2 .9 .2 1"/></body>
+    <geom type="mesh" mesh="tet" pos=".5 .2 0"/><geom type="ellipsoid" size=".3 .2 .1" pos="-.6 .3 .2" rgba=".9 .5 .1 .5"/>
+    <geom type="cylinder" size=".1 .3" pos="-.3 -.6 .3" material="m"/>
+    <camera name="c" pos="0 -2.5 1.5" xyaxes="1 0 0 0 .5 1"/></worldbody>)";
+
+std::vector<std::byte> rows(int worlds, int threads, int world, int width, int height) {
+  CameraSensorCfg cfg =
+      camera(width, height, {"rgb", "depth", "segmentation", "normals", "point_cloud"}, "w/c");
+  cfg.use_shadows = true;
+  SimulationCfg sim;
+  sim.num_worlds = worlds;
+  sim.threads = threads;
+  Lab lab(kShow, {cfg}, sim);
+  lab.pose(world, {0.1, 0.05, 0.8, 0.9, 0.3, 0.2, 0.1});
+  lab.sim->refresh(lab.scene->sensor("cam"));
+  std::vector<std::byte> all;
+  for (const Field& f : lab.scene->sensor("cam").fields()) {
+    const std::byte* row = f.data.row_data(world);
+    all.insert(all.end(), row, row + f.data.row_bytes());
+  }
+  return all;
+}
+
+TEST(Camera, ImagesAreBitEqualAtAnyThreadCountAndAmongAnyNumberOfWorlds) {
+  const auto one = rows(1, 1, 0, 50, 37);
+  EXPECT_EQ(one, rows(1, 2, 0, 50, 37));
+  EXPECT_EQ(one, rows(1, 5, 0, 50, 37));
+  EXPECT_EQ(one, rows(16, 1, 7, 50, 37));
+  EXPECT_EQ(one, rows(16, 5, 15, 50, 37));
+}
+
+TEST(Camera, TeleportedObjectIsInTheNextImage) {
+  SimulationCfg sim;
+  sim.num_worlds = 3;
+  Lab lab(
+      R"(<worldbody><body><joint type="slide" axis="1 0 0"/><geom size=".2"/></body></worldbody>)",
+      {camera(21, 21, {"segmentation"})}, sim);
+  EXPECT_EQ(lab.read<std::int32_t>("segmentation", "cam", 1)[2 * (10 * 21 + 10)], 0);
+  lab.pose(1, {5.0});
+  EXPECT_EQ(lab.read<std::int32_t>("segmentation", "cam", 1)[2 * (10 * 21 + 10)], -1);
+  EXPECT_EQ(lab.read<std::int32_t>("segmentation", "cam", 2)[2 * (10 * 21 + 10)], 0);
+  lab.sim->reset(std::vector<int>{1});
+  EXPECT_EQ(lab.read<std::int32_t>("segmentation", "cam", 1)[2 * (10 * 21 + 10)], 0);
+}
+
+TEST(Camera, OwnRateHoldsTheImageBetweenTicks) {
+  CameraSensorCfg cfg = camera(9, 9, {"depth"});
+  cfg.pos = {0, 0, 10};
+  cfg.update_period = 0.01;  // 5 steps of 2 ms
+  Lab lab(R"(<worldbody><body><freejoint/><geom size=".2"/></body></worldbody>)", {cfg});
+  std::vector<float> seen;
+  for (int i = 0; i < 11; ++i) {
+    seen.push_back(lab.read<float>("depth")[40]);
+    lab.sim->step();
+  }
+  for (int i = 0; i < 5; ++i) EXPECT_EQ(seen[i], seen[0]);
+  EXPECT_GT(seen[5], seen[4]);
+  for (int i = 5; i < 10; ++i) EXPECT_EQ(seen[i], seen[5]);
+  EXPECT_GT(seen[10], seen[9]);
+}
+
+TEST(Camera, NoAllocationPerFrame) {
+  CameraSensorCfg cfg = camera(40, 30, {"rgb", "depth", "segmentation", "normals"}, "w/c");
+  cfg.use_shadows = true;
+  Lab lab(kShow, {cfg});
+  Sensor& sensor = lab.scene->sensor("cam");
+  lab.sim->step();
+  lab.sim->refresh(sensor);
+  lab.sim->step();
+  lab.sim->refresh(sensor);
+  const AllocationCount before;
+  lab.sim->step();
+  lab.sim->refresh(sensor);
+  EXPECT_EQ(before.since(), 0);
+}
+
+TEST(Camera, FaultsAreNamed) {
+  const auto message = [](auto&& make) -> std::string {
+    try {
+      make();
+    } catch (const Error& e) {
+      return e.what();
+    }
+    return "no error";
+  };
+  CameraSensorCfg cfg = camera(4, 3, {"rgbd"});
+  EXPECT_THAT(message([&] { cfg.build(); }), HasSubstr("Invalid camera data types: 'rgbd'"));
+  cfg.data_types = {};
+  EXPECT_THAT(message([&] { cfg.build(); }), HasSubstr("data_types is empty"));
+  cfg = camera(4, 3, {"rgb"}, "w/tpo");
+  EXPECT_THAT(message([&] { Lab(kCases, {cfg}); }),
+              HasSubstr("no camera named 'w/tpo'; did you mean 'w/top'?"));
+  cfg = camera(4, 3, {"rgb"});
+  cfg.name = "w/top";
+  EXPECT_THAT(message([&] { Lab(kCases, {cfg}); }), HasSubstr("repeated name"));
+  cfg.name = "cam";
+  cfg.parent_body = "w/none";
+  EXPECT_THAT(message([&] { Lab(kCases, {cfg}); }), HasSubstr("no body named 'w/none'"));
+  cfg = camera(0, 3, {"rgb"});
+  EXPECT_THAT(message([&] { cfg.build(); }), HasSubstr("0 x 3"));
+}
+
+}  // namespace
+}  // namespace mjsense
