@@ -48,7 +48,7 @@ void run_external(const std::string& word, char** arguments, std::span<const std
   }
   std::vector<std::string> names(known.begin(), known.end());
   for (std::string& name : words_in_path()) names.push_back(std::move(name));
-  throw_unknown("mjsense", "command", word, names);
+  throw KeyError(fmt::format("no command '{}'{}", word, suggest(word, names)));
 }
 
 }  // namespace mjsense

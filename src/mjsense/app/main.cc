@@ -1,1 +1,210 @@
-int main() { return 0; }
+// The `mjsense` program. Exit codes: 0 done; 1 some episodes or checks failed; 2 wrong usage or
+// input.
+
+#include <fmt/format.h>
+#include <mujoco/mujoco.h>
+
+#include <CLI/CLI.hpp>
+#include <cstdio>
+#include <exception>
+#include <filesystem>
+#include <mutex>
+#include <set>
+#include <string>
+#include <vector>
+
+#include "mjsense/app/external.h"
+#include "mjsense/app/record_command.h"
+#include "mjsense/app/sensors_command.h"
+#include "mjsense/core/error.h"
+#include "mjsense/record/check.h"
+
+namespace mjsense {
+namespace {
+
+constexpr int kFailed = 1;
+constexpr int kWrongInput = 2;
+
+// Options that record and sensors share.
+void add_rollout_options(CLI::App& app, RolloutCfg& cfg) {
+  app.add_option("--robot", cfg.robot, "which robot")->capture_default_str();
+  app.add_option("--policy", cfg.policy, "what drives it")->capture_default_str();
+  app.add_option("--threads", cfg.threads, "0: every CPU this process may use")
+      ->capture_default_str();
+  app.add_option("--seed", cfg.seed, "same seed, same episodes")->capture_default_str();
+  app.add_option_function<std::string>(
+         "--cameras", [&cfg](const std::string& text) { parse_cameras(text, cfg); },
+         "names with commas between, or none; default: all of the robot's")
+      ->type_name("NAMES");
+  app.add_option_function<std::string>(
+         "--size", [&cfg](const std::string& text) { parse_size(text, cfg); },
+         "of the pictures; default: the robot's")
+      ->type_name("WxH");
+  app.add_flag("--depth", cfg.depth, "record depth of every camera");
+  app.add_option("--samples", cfg.samples, "rays a pixel of rgb")->capture_default_str();
+  app.add_flag("!--no-shadows", cfg.shadows, "render without shadows");
+  app.add_option("--horizon", cfg.horizon, "control steps after which an episode is cut");
+  app.add_flag("!--no-noise", cfg.action_noise, "commands reach the arm without noise");
+}
+
+CLI::App& add_record(CLI::App& program, RecordOptions& options) {
+  RecordJobCfg& job = options.job;
+  CLI::App& app = *program.add_subcommand("record", "play episodes of a task and keep them");
+  app.add_option("task", job.rollout.task, "which task")->capture_default_str();
+  add_rollout_options(app, job.rollout);
+  app.add_option("--episodes", job.episodes, "how many to keep")->capture_default_str();
+  app.add_option("--worlds", job.rollout.num_worlds, "how many run at one time")
+      ->capture_default_str();
+  app.add_option("--out", job.out, "folder for the files")->type_name("DIR");
+  app.add_flag("--resume", job.resume, "go on with an interrupted recording");
+  app.add_option("--config", "TOML file with these options; the command line wins")
+      ->type_name("FILE");
+  app.add_flag("--keep-failures", job.keep_failures, "keep episodes that fail, too");
+  app.add_option("--max-attempts", job.max_attempts, "0: six times the episodes")
+      ->capture_default_str();
+  app.add_option("--house", job.house, "number of the house_N folder")->capture_default_str();
+  app.add_option("--batches", job.batches, "HDF5 files; 0: one for four episodes")
+      ->capture_default_str();
+  app.add_option("--gzip", job.gzip, "compression of arrays, 0 to 9")->capture_default_str();
+  app.add_option("--crf", job.video.crf, "quality of videos, 0 lossless to 51")
+      ->capture_default_str();
+  app.add_option("--preset", job.video.preset, "effort of the video encoder")
+      ->capture_default_str();
+  app.add_option("--ffmpeg", job.video.ffmpeg, "the program; default: of PATH")->type_name("PATH");
+  app.add_flag("--molmospaces-depth", job.video.molmospaces_depth,
+               "also depth as MolmoSpaces' loaders read it (lossy)");
+  app.add_flag("!--no-sheet", options.sheet, "write no contact sheet");
+  app.add_flag("--json", options.json, "summary as JSON");
+  app.add_flag("-q,--quiet", options.quiet, "no progress");
+  return app;
+}
+
+CLI::App& add_sensors(CLI::App& program, SensorsOptions& options) {
+  CLI::App& app = *program.add_subcommand("sensors", "what is measured, and what it costs");
+  app.add_option("what", options.what, "an MJCF file or the name of a task")
+      ->required()
+      ->type_name("SCENE.xml|TASK");
+  add_rollout_options(app, options.rollout);
+  app.add_option("--steps", options.steps, "to measure the cost over; 0: do not measure")
+      ->capture_default_str()
+      ->check(CLI::NonNegativeNumber);
+  app.add_flag("--json", options.json, "as JSON");
+  return app;
+}
+
+struct PathOptions {
+  std::string path, sheet, ffmpeg;
+  bool json = false, decode = false;
+};
+
+CLI::App& add_path_command(CLI::App& program, const char* name, const char* help,
+                           PathOptions& options) {
+  CLI::App& app = *program.add_subcommand(name, help);
+  app.add_option("path", options.path, "a recording, a house_N folder or an .h5 file")->required();
+  app.add_flag("--json", options.json, "as JSON");
+  return app;
+}
+
+// MuJoCo's warnings, each once, on stderr and in no file. A world that diverges is reported with its episode.
+void show_warnings() {
+  mju_user_warning = [](const char* text) {
+    static std::mutex mutex;
+    static std::set<std::string> shown;
+    const std::string warning = text;
+    if (warning.find("simulation is unstable") != std::string::npos) return;
+    const std::lock_guard lock(mutex);
+    if (shown.insert(warning).second) fmt::print(stderr, "mjsense: MuJoCo: {}\n", warning);
+  };
+}
+
+const std::string& existing(const std::string& path) {
+  if (!std::filesystem::exists(path)) throw ValueError(path + ": no such file or directory");
+  return path;
+}
+
+void print(const std::string& text) { fmt::print("{}{}", text, text.ends_with('\n') ? "" : "\n"); }
+
+// --config must be read before the command line is: what is given there wins.
+void read_config_argument(int argc, char** argv, RecordOptions& options) {
+  for (int i = 2; i < argc; ++i) {
+    const std::string word = argv[i];
+    if (word == "--config" && i + 1 < argc) read_config(argv[i + 1], options);
+    if (word.starts_with("--config=")) read_config(word.substr(9), options);
+  }
+}
+
+int run(int argc, char** argv) {
+  show_warnings();
+  CLI::App program("Senses of MuJoCo worlds: measured, rendered, recorded.", "mjsense");
+  program.set_version_flag("--version", "mjsense " MJSENSE_VERSION);
+  program.require_subcommand(1);
+  program.footer("Any other word runs mjsense-<word> from PATH.");
+
+  RecordOptions record_options;
+  SensorsOptions sensors_options;
+  PathOptions inspect_options, verify_options, repair_options;
+  CLI::App& record = add_record(program, record_options);
+  CLI::App& sensors = add_sensors(program, sensors_options);
+  CLI::App& inspect_app =
+      add_path_command(program, "inspect", "trees, statistics, pictures", inspect_options);
+  inspect_app.add_option("--sheet", inspect_options.sheet, "write a contact sheet")
+      ->type_name("FILE.png");
+  inspect_app.add_option("--ffmpeg", inspect_options.ffmpeg, "the program")->type_name("PATH");
+  CLI::App& verify_app =
+      add_path_command(program, "verify", "is a recording whole and readable", verify_options);
+  verify_app.add_flag("--decode", verify_options.decode, "decode every frame");
+  verify_app.add_option("--ffmpeg", verify_options.ffmpeg, "the program")->type_name("PATH");
+  add_path_command(program, "repair", "publish what an interrupted recording has finished",
+                   repair_options);
+
+  std::vector<std::string> known;
+  for (const CLI::App* app : program.get_subcommands({})) known.push_back(app->get_name());
+  if (argc < 2) {
+    fmt::print(stderr, "{}", program.help());
+    return kWrongInput;
+  }
+  const std::string word = argv[1];
+  if (!word.empty() && word[0] != '-' && std::ranges::find(known, word) == known.end()) {
+    run_external(word, argv + 1, known);
+  }
+  if (word == "record") read_config_argument(argc, argv, record_options);
+  try {
+    program.parse(argc, argv);
+  } catch (const CLI::ParseError& e) {
+    if (e.get_exit_code() == 0) return program.exit(e);  // --help, --version
+    throw ValueError(
+        fmt::format("{} (mjsense{} --help shows how)", e.what(), word[0] == '-' ? "" : " " + word));
+  }
+
+  if (record.parsed()) return run_record(record_options);
+  if (sensors.parsed()) return run_sensors(sensors_options);
+  if (inspect_app.parsed()) {
+    const InspectResult result = inspect(existing(inspect_options.path));
+    print(inspect_options.json ? result.json() : result.text());
+    if (!inspect_options.sheet.empty()) {
+      contact_sheet(inspect_options.path, inspect_options.sheet, 4, 8, inspect_options.ffmpeg);
+    }
+    return 0;
+  }
+  if (verify_app.parsed()) {
+    const VerifyResult result =
+        verify(existing(verify_options.path), {verify_options.decode, verify_options.ffmpeg});
+    print(verify_options.json ? result.json() : result.text());
+    return result.ok() ? 0 : kFailed;
+  }
+  const RepairResult result = repair(existing(repair_options.path));
+  print(repair_options.json ? result.json() : result.text());
+  return 0;
+}
+
+}  // namespace
+}  // namespace mjsense
+
+int main(int argc, char** argv) {
+  try {
+    return mjsense::run(argc, argv);
+  } catch (const std::exception& e) {
+    fmt::print(stderr, "mjsense: {}\n", e.what());
+    return mjsense::kWrongInput;
+  }
+}

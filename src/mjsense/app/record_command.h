@@ -9,6 +9,7 @@
 namespace mjsense {
 
 struct RecordOptions {
+  RecordOptions() { job.rollout.num_worlds = 4; }
   RecordJobCfg job;
   bool json = false;
   bool quiet = false;

@@ -2,6 +2,7 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <chrono>
 #include <cmath>
 #include <limits>
@@ -68,8 +69,8 @@ class RecordJob {
  public:
   explicit RecordJob(const RecordJobCfg& cfg)
       : cfg_(checked(cfg)),
-        rollout_(cfg.rollout),
-        recorder_(recording_cfg(cfg, rollout_)),
+        rollout_(cfg_.rollout),
+        recorder_(recording_cfg(cfg_, rollout_)),
         lengths_(rollout_.num_worlds(), 0),
         max_attempts_(cfg.max_attempts > 0 ? cfg.max_attempts : 6 * cfg.episodes) {
     for (const RecordedCamera& camera : rollout_.cameras()) pictures_ += camera.depth ? 2 : 1;
@@ -110,10 +111,12 @@ class RecordJob {
   }
 
  private:
-  static const RecordJobCfg& checked(const RecordJobCfg& cfg) {
+  // No more worlds than episodes.
+  static RecordJobCfg checked(RecordJobCfg cfg) {
     if (cfg.episodes < 1) {
       throw ValueError(fmt::format("episodes is {}: must be at least 1", cfg.episodes));
     }
+    cfg.rollout.num_worlds = std::min(cfg.rollout.num_worlds, cfg.episodes);
     return cfg;
   }
 
