@@ -47,8 +47,8 @@ constexpr double kGoal = 0.05;    // m, goal above the start
 void add_look(mjSpec* spec) {
   auto& light = spec->visual.headlight;
   for (int i = 0; i < 3; ++i) {
-    light.ambient[i] = 0.28f;
-    light.diffuse[i] = 0.22f;
+    light.ambient[i] = 0.30f;
+    light.diffuse[i] = 0.18f;
     light.specular[i] = 0.05f;
   }
   spec->visual.quality.shadowsize = 4096;
