@@ -10,5 +10,6 @@ void bind_scene(nanobind::module_& m);
 void bind_simulation(nanobind::module_& m);
 void bind_contact(nanobind::module_& m);
 void bind_raycast(nanobind::module_& m);
+void bind_rollout(nanobind::module_& m);
 
 }  // namespace mjsense::python

@@ -13,4 +13,5 @@ NB_MODULE(_core, m) {
   mjsense::python::bind_simulation(m);
   mjsense::python::bind_contact(m);
   mjsense::python::bind_raycast(m);
+  mjsense::python::bind_rollout(m);
 }
