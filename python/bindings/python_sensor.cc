@@ -24,6 +24,10 @@ void PythonSensor::initialize(const SensorInit& init) {
   clear_fields();
   if (spec_) add_field("", *spec_, init.num_worlds);
   reset_.assign(init.num_worlds, 0);
+  if (on_initialized) {
+    nb::gil_scoped_acquire lock;
+    on_initialized();
+  }
 }
 
 void PythonSensor::cast(const CastContext&) {

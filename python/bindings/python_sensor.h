@@ -6,6 +6,7 @@
 
 #include <atomic>
 #include <cstdint>
+#include <functional>
 #include <optional>
 #include <string>
 #include <vector>
@@ -33,6 +34,8 @@ class PythonSensor final : public Sensor {
   void cast(const CastContext& context) override;
   void reset(const World& world) override;
 
+  // Called with the interpreter's lock when the rows exist.
+  std::function<void()> on_initialized;
   // Tells Python which worlds were reset since the last call. Needs the interpreter's lock, as does
   // self().
   void flush_resets();

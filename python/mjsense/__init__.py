@@ -9,7 +9,7 @@ if _mujoco.mj_versionString() != _MUJOCO:
     )
 
 from mjsense import observations
-from mjsense._core import SensorSpec, __version__, embedded_models
+from mjsense._core import SensorSpec, __version__, embedded_models, policy_names, robot_names, task_names
 from mjsense.configs import (
     BuiltinSensorCfg,
     CameraIntrinsics,
@@ -38,6 +38,7 @@ from mjsense.data import CameraData, ContactData, RayCastData, SensorData
 from mjsense.errors import UnknownNameError
 from mjsense.pipeline import ObservationPipeline
 from mjsense.raycast import CameraSensor, RayCastSensor, TerrainHeightSensor
+from mjsense.record import RecordProgress, RecordSummary, record
 from mjsense.scene import Entity, Scene
 from mjsense.sensor import BuiltinSensor, NativeSensor, Sensor, SensorError
 from mjsense.simulation import Simulation

@@ -68,13 +68,24 @@ class Scene:
         self._core = _core.Scene.make(cfg, self.spec, items, edit)
         for text in self._core.warnings():
             warnings.warn(text, stacklevel=2)
+        self._register()
+
+    @classmethod
+    def _of(cls, core: Any) -> Scene:
+        """Of a C++ scene that something else made."""
+        self = cls.__new__(cls)
+        self.cfg, self.spec, self._core, self._simulation = SceneCfg(), None, core, None
+        self._register()
+        return self
+
+    def _register(self) -> None:
         self._sensors: dict[str, Any] = {}
         for handle in self._core.sensors():
             own = handle.python_object()
             self._sensors[handle.name] = own if own is not None else _CLASSES.get(handle.kind, NativeSensor)(handle)
             if own is not None:
                 own._handle = handle
-        for sensor_cfg in cfg.sensors:
+        for sensor_cfg in self.cfg.sensors:
             if isinstance(sensor_cfg, SensorCfg):
                 self._sensors[sensor_cfg.prefixed_name].cfg = sensor_cfg
 

@@ -48,10 +48,21 @@ class Simulation:
         num_worlds = scene.cfg.num_envs if num_worlds is None else num_worlds
         self._core = _core.Simulation(scene._core, num_worlds, decimation, threads, seed)
         scene._simulation = self._core
+        self._adopt(scene)
+
+    @classmethod
+    def _of(cls, core: Any) -> Simulation:
+        """Of a C++ simulation that something else steps."""
+        self = cls.__new__(cls)
+        self._core = core
+        self._adopt(Scene._of(core.scene()))
+        return self
+
+    def _adopt(self, scene: Scene) -> None:
         self.scene = scene
-        self.num_worlds = num_worlds
+        self.num_worlds: int = self._core.num_worlds
         """B."""
-        self.decimation = decimation
+        self.decimation: int = self._core.decimation
         """Substeps per control step."""
         self.physics_dt: float = self._core.physics_dt
         """s, one substep."""

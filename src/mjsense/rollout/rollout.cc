@@ -92,7 +92,7 @@ Rollout::Rollout(const RolloutCfg& cfg) : cfg_(cfg) {
     scene_cfg.sensors.push_back(std::make_shared<CameraSensorCfg>(camera_cfg(camera, cfg)));
   }
   auto scene = std::make_shared<Scene>(std::move(scene_cfg));
-  simulation_ = std::make_unique<Simulation>(scene, SimulationCfg{.num_worlds = cfg.num_worlds,
+  simulation_ = std::make_shared<Simulation>(scene, SimulationCfg{.num_worlds = cfg.num_worlds,
                                                                   .decimation = task_->decimation(),
                                                                   .threads = cfg.threads,
                                                                   .seed = cfg.seed});
@@ -102,6 +102,7 @@ Rollout::Rollout(const RolloutCfg& cfg) : cfg_(cfg) {
   if (policy_) task_->register_policy(*policy_);
   log_ = std::make_unique<ActionLog>(cfg.num_worlds);
   suite_ = core_suite(*task_, *log_, cameras_);
+  if (cfg.more_sensors) suite_.extend(cfg.more_sensors(simulation_), "the caller");
   suite_.bind(*simulation_);
 
   actions_.resize(cfg.num_worlds);

@@ -45,6 +45,9 @@ struct RolloutCfg {
   bool shadows = true;
   std::optional<int> horizon;  // control steps
   bool action_noise = true;
+  // Makes further sensors for the suite, recorded like the others.
+  std::function<std::vector<std::shared_ptr<Sensor>>(const std::shared_ptr<Simulation>&)>
+      more_sensors;
 };
 
 // Where the time of steps went, wall seconds.
@@ -69,6 +72,7 @@ class Rollout {
   Task& task() { return *task_; }
   Policy* policy() { return policy_.get(); }
   Simulation& simulation() { return *simulation_; }
+  const std::shared_ptr<Simulation>& simulation_ptr() const { return simulation_; }
   SensorSuite& suite() { return suite_; }
   const std::vector<RecordedCamera>& cameras() const { return cameras_; }
 
@@ -110,7 +114,7 @@ class Rollout {
   std::vector<RecordedCamera> cameras_;
   std::unique_ptr<ActionLog> log_;
   SensorSuite suite_;
-  std::unique_ptr<Simulation> simulation_;  // refers to the suite's sensors
+  std::shared_ptr<Simulation> simulation_;  // refers to the suite's sensors
   std::vector<Action> actions_;
   std::vector<Evaluation> evaluations_;
   std::vector<std::string> faults_;

@@ -48,31 +48,36 @@ void fields(Fields& f, RecordJobCfg& c) {
 
 namespace {
 
-// Python's sensors as members of a rollout's suite. `bind(core)` gives them their Python simulation.
-std::function<std::vector<std::shared_ptr<Sensor>>(Simulation&)> suite_sensors(
-    nb::list sensors, nb::object make_simulation, std::shared_ptr<nb::object> simulation) {
-  if (sensors.size() == 0) return {};
-  return [=](Simulation& sim) {
-    nb::gil_scoped_acquire lock;
-    // Not owned: the rollout closes it before it goes.
-    auto core =
-        std::make_unique<PySimulation>(std::shared_ptr<Simulation>(&sim, [](Simulation*) {}));
-    PySimulation* shared = core.get();
-    *simulation = make_simulation(nb::cast(std::move(core)));
-    std::vector<std::shared_ptr<Sensor>> made;
-    for (nb::handle item : sensors) {
-      nb::object object = nb::borrow(item);
-      auto sensor = std::make_shared<PythonSensor>(nb::cast<std::string>(object.attr("uuid")),
-                                                   object, read_python_spec(object));
-      std::weak_ptr<PythonSensor> weak = sensor;
-      sensor->on_initialized = [weak, object, simulation] {
-        object.attr("_bind")(*simulation, SensorHandle{weak.lock()});
-      };
-      shared->add_python(sensor);
-      made.push_back(sensor);
-    }
-    return made;
-  };
+// Python's sensors as members of a rollout's suite, and the Python simulation that they see. C++ copies and destroys its
+// configuration without the interpreter's lock, so it holds this by a pointer.
+struct PythonMembers {
+  nb::list sensors;
+  nb::object make_simulation;
+  nb::object simulation;
+
+  // Nothing of Python's may hold on to a rollout that has ended.
+  void close() {
+    if (simulation) simulation.attr("close")();
+  }
+};
+
+std::vector<std::shared_ptr<Sensor>> make_members(PythonMembers& members,
+                                                  const std::shared_ptr<Simulation>& sim) {
+  nb::gil_scoped_acquire lock;
+  auto* shared = new PySimulation(sim);
+  members.simulation = members.make_simulation(nb::cast(shared, nb::rv_policy::take_ownership));
+  std::vector<std::shared_ptr<Sensor>> made;
+  for (nb::handle object : members.sensors) {
+    auto sensor = std::make_shared<PythonSensor>(nb::cast<std::string>(object.attr("uuid")),
+                                                 nb::borrow(object), read_python_spec(object));
+    sensor->on_initialized = [weak = std::weak_ptr<PythonSensor>(sensor), &members] {
+      auto self = weak.lock();
+      self->self().attr("_bind")(members.simulation, SensorHandle{self});
+    };
+    shared->add_python(sensor);
+    made.push_back(sensor);
+  }
+  return made;
 }
 
 nb::dict progress_dict(const RecordProgress& p) {
@@ -96,8 +101,10 @@ nb::dict record(nb::handle config, const std::string& out, nb::object progress, 
   FromPython reader(config);
   fields(reader, cfg);
   cfg.out = out;
-  auto simulation = std::make_shared<nb::object>();
-  cfg.rollout.more_sensors = suite_sensors(sensors, make_simulation, simulation);
+  PythonMembers members{sensors, make_simulation, {}};
+  if (sensors.size() > 0) {
+    cfg.rollout.more_sensors = [&members](const auto& sim) { return make_members(members, sim); };
+  }
   StopFlag stop{0};
   nb::object error;  // of `progress`, or KeyboardInterrupt
   const auto report = [&](const RecordProgress& p) {
@@ -112,10 +119,14 @@ nb::dict record(nb::handle config, const std::string& out, nb::object progress, 
     }
   };
   RecordSummary s;
-  {
+  try {
     nb::gil_scoped_release unlock;
     s = record_episodes(cfg, report, &stop);
+  } catch (...) {
+    members.close();
+    throw;
   }
+  members.close();
   if (error) {
     PyErr_SetObject(reinterpret_cast<PyObject*>(Py_TYPE(error.ptr())), error.ptr());
     throw nb::python_error();
@@ -270,11 +281,7 @@ void bind_rollout(nb::module_& m) {
           nb::arg("world"))
       .def_prop_ro("fps", [](PyRollout& s) { return s.rollout().task().fps(); })
       .def(
-          "simulation",
-          [](PyRollout& s) {
-            return new PySimulation(
-                std::shared_ptr<Simulation>(s.share(), &s.rollout().simulation()));
-          },
+          "simulation", [](PyRollout& s) { return new PySimulation(s.rollout().simulation_ptr()); },
           nb::rv_policy::take_ownership);
 }
 

@@ -1,109 +1,21 @@
 // Simulations in Python. python/mjsense/simulation.py makes the public class of it.
-//
-// Memory: arrays handed out hold a share of the simulation, so close() frees it when the last of
-// them is gone. Threads: every call runs without the interpreter's lock and takes the simulation's
-// own mutex, so that Python threads take turns. The mutex is recursive because a sensor written in
-// Python reads other sensors while it is computed.
+
+#include "mjsense/sim/simulation.h"
 
 #include <nanobind/nanobind.h>
 #include <nanobind/stl/optional.h>
-#include <nanobind/stl/pair.h>
 #include <nanobind/stl/shared_ptr.h>
 #include <nanobind/stl/string.h>
 #include <nanobind/stl/vector.h>
 
-#include <mutex>
-
-#include "mjsense/core/error.h"
-#include "mjsense/sim/simulation.h"
 #include "python/bindings/bindings.h"
 #include "python/bindings/derived_field.h"
 #include "python/bindings/numpy.h"
-#include "python/bindings/python_sensor.h"
+#include "python/bindings/py_simulation.h"
 #include "python/bindings/sensor_handle.h"
 
 namespace mjsense::python {
 namespace {
-
-class PySimulation {
- public:
-  PySimulation(std::shared_ptr<Scene> scene, int num_worlds, int decimation, int threads,
-               std::uint64_t seed) {
-    const SimulationCfg cfg{num_worlds, decimation, threads, seed};
-    nb::gil_scoped_release unlock;
-    shared_ = std::make_shared<Shared>(std::move(scene), cfg);
-  }
-
-  void close() {
-    std::shared_ptr<Shared> last;
-    {
-      nb::gil_scoped_release unlock;
-      std::lock_guard lock(mutex_);
-      if (depth_ > 0) throw RuntimeError("close() is called while the simulation is at work");
-      last = std::move(shared_);
-    }
-  }
-  bool closed() const { return shared_ == nullptr; }
-
-  // `what` names the call in the message when a sensor's own code makes it.
-  template <class Body>
-  void change(const char* what, Body&& body) {
-    nb::gil_scoped_release unlock;
-    std::lock_guard lock(mutex_);
-    Simulation& sim = open();
-    if (depth_ > 0) {
-      throw RuntimeError(
-          std::string(what) +
-          "() is called while the simulation is at work: a sensor's code may read other "
-          "sensors and the state, but not change them");
-    }
-    const Depth in(depth_);
-    body(sim);
-  }
-  template <class Body>
-  void read(Body&& body) {
-    nb::gil_scoped_release unlock;
-    std::lock_guard lock(mutex_);
-    Simulation& sim = open();
-    const Depth in(depth_);
-    body(sim);
-  }
-
-  Simulation& open() const {
-    if (!shared_) throw RuntimeError("the simulation is closed");
-    return shared_->sim;
-  }
-  nb::object owner() const {
-    open();
-    return owner_of(shared_);
-  }
-  std::shared_ptr<Simulation> share() const {
-    open();
-    return {shared_, &shared_->sim};
-  }
-
-  // Python sensors learn of the resets of their worlds (also of worlds that failed), computed or
-  // not.
-  void flush_resets() {
-    for (auto& sensor : python_) sensor->flush_resets();
-  }
-  void add_python(std::shared_ptr<PythonSensor> sensor) { python_.push_back(std::move(sensor)); }
-
- private:
-  struct Shared {
-    Shared(std::shared_ptr<Scene> scene, const SimulationCfg& cfg) : sim(std::move(scene), cfg) {}
-    Simulation sim;
-  };
-  struct Depth {
-    explicit Depth(int& depth) : depth(depth) { ++depth; }
-    ~Depth() { --depth; }
-    int& depth;
-  };
-  std::shared_ptr<Shared> shared_;
-  std::recursive_mutex mutex_;
-  int depth_ = 0;
-  std::vector<std::shared_ptr<PythonSensor>> python_;
-};
 
 using Ids = std::optional<std::vector<int>>;
 
@@ -156,6 +68,7 @@ void bind_simulation(nb::module_& m) {
   nb::class_<PySimulation>(m, "Simulation", "The C++ simulation.")
       .def(nb::init<std::shared_ptr<Scene>, int, int, int, std::uint64_t>(), nb::arg("scene"),
            nb::arg("num_worlds"), nb::arg("decimation"), nb::arg("threads"), nb::arg("seed"))
+      .def("scene", [](const PySimulation& s) { return s.open().scene_ptr(); })
       .def("close", &PySimulation::close)
       .def_prop_ro("closed", &PySimulation::closed)
       .def_prop_ro("num_worlds", [](const PySimulation& s) { return s.open().num_worlds(); })

@@ -1,0 +1,97 @@
+#pragma once
+// A simulation as Python holds it.
+//
+// Memory: arrays handed out hold a share of the simulation, so close() frees it when the last of
+// them is gone.
+// Threads: every call runs without the interpreter's lock and takes the simulation's own mutex, so
+// that Python threads take turns. The mutex is recursive because a sensor written in Python reads
+// other sensors while it is computed.
+
+#include <nanobind/nanobind.h>
+
+#include <memory>
+#include <mutex>
+#include <string>
+#include <vector>
+
+#include "mjsense/core/error.h"
+#include "mjsense/sim/simulation.h"
+#include "python/bindings/numpy.h"
+#include "python/bindings/python_sensor.h"
+
+namespace mjsense::python {
+
+class PySimulation {
+ public:
+  PySimulation(std::shared_ptr<Scene> scene, int num_worlds, int decimation, int threads,
+               std::uint64_t seed) {
+    const SimulationCfg cfg{num_worlds, decimation, threads, seed};
+    nb::gil_scoped_release unlock;
+    sim_ = std::make_shared<Simulation>(std::move(scene), cfg);
+  }
+  // One that somebody else made.
+  explicit PySimulation(std::shared_ptr<Simulation> sim) : sim_(std::move(sim)) {}
+
+  void close() {
+    std::shared_ptr<Simulation> last;
+    {
+      nb::gil_scoped_release unlock;
+      std::lock_guard lock(mutex_);
+      if (depth_ > 0) throw RuntimeError("close() is called while the simulation is at work");
+      last = std::move(sim_);
+    }
+  }
+  bool closed() const { return sim_ == nullptr; }
+
+  // `what` names the call in the message when a sensor's own code makes it.
+  template <class Body>
+  void change(const char* what, Body&& body) {
+    nb::gil_scoped_release unlock;
+    std::lock_guard lock(mutex_);
+    Simulation& sim = open();
+    if (depth_ > 0) {
+      throw RuntimeError(
+          std::string(what) +
+          "() is called while the simulation is at work: a sensor's code may read other "
+          "sensors and the state, but not change them");
+    }
+    const Depth in(depth_);
+    body(sim);
+  }
+  template <class Body>
+  void read(Body&& body) {
+    nb::gil_scoped_release unlock;
+    std::lock_guard lock(mutex_);
+    Simulation& sim = open();
+    const Depth in(depth_);
+    body(sim);
+  }
+
+  Simulation& open() const {
+    if (!sim_) throw RuntimeError("the simulation is closed");
+    return *sim_;
+  }
+  nb::object owner() const {
+    open();
+    return owner_of(sim_);
+  }
+  // Python sensors learn of the resets of their worlds (also of worlds that failed), computed or
+  // not.
+  void flush_resets() {
+    for (auto& sensor : python_) sensor->flush_resets();
+  }
+  void add_python(std::shared_ptr<PythonSensor> sensor) { python_.push_back(std::move(sensor)); }
+
+ private:
+  struct Depth {
+    explicit Depth(int& depth) : depth(depth) { ++depth; }
+    ~Depth() { --depth; }
+    int& depth;
+  };
+  std::shared_ptr<Simulation> sim_;
+  std::recursive_mutex mutex_;
+  int depth_ = 0;
+  std::vector<std::shared_ptr<PythonSensor>> python_;
+};
+
+}  // namespace mjsense::python

@@ -1,0 +1,83 @@
+import gymnasium
+import h5py
+import numpy as np
+import pytest
+
+import mjsense as mjs
+
+SMALL = dict(worlds=2, width=48, height=32, shadows=False, seed=1)
+
+
+class Hand(mjs.Sensor):
+    """Height of every body."""
+
+    uuid = "heights"
+    observation_space = gymnasium.spaces.Box(-10, 10, (3,), np.float32)
+    unit = "m"
+
+    def compute(self, sim):
+        return sim.data.xpos[:, :3, 2]
+
+
+@pytest.fixture(scope="module")
+def recording(tmp_path_factory):
+    seen = []
+    summary = mjs.record(
+        out=tmp_path_factory.mktemp("data"), episodes=1, sensors=[Hand()], progress=seen.append, **SMALL
+    )
+    return summary, seen
+
+
+def test_summary_and_progress(recording):
+    summary, seen = recording
+    assert summary.kept == 1 and summary.enough and not summary.interrupted
+    assert isinstance(seen[-1], mjs.RecordProgress) and seen[-1].kept == 1
+    assert summary.steps == sum(n - 1 for n in summary.lengths)
+
+
+def test_own_sensor_is_on_disk(recording):
+    files = list(recording[0].path.rglob("*.h5"))
+    assert len(files) == 1
+    with h5py.File(files[0]) as file:
+        rows = file["traj_0/obs/extra/heights"]
+        assert rows.shape[1:] == (3,) and rows.dtype == np.float32
+        assert rows.attrs["unit"] in ("m", b"m")
+        assert len(rows) == len(file["traj_0/obs/extra/heights"])
+
+
+def test_bad_arguments(tmp_path):
+    for kwargs, error, text in [
+        (dict(task="pik"), KeyError, "did you mean 'pick'"),
+        (dict(robot="frank"), KeyError, "franka"),
+        (dict(policy="x"), KeyError, "planner"),
+        (dict(cameras=["wrist"]), KeyError, "wrist"),
+        (dict(episodes=0), ValueError, "episodes is 0"),
+        (dict(worlds=0), ValueError, "worlds is 0"),
+        (dict(episodes="2"), TypeError, "episodes must be an int"),
+        (dict(sensors=[3]), TypeError, "not a mjsense.Sensor"),
+    ]:
+        with pytest.raises(error, match=text):
+            mjs.record(**{"out": tmp_path, **SMALL, **kwargs})
+
+
+def test_errors_of_a_sensor_end_the_recording(tmp_path):
+    class Broken(Hand):
+        def compute(self, sim):
+            raise ArithmeticError("no")
+
+    with pytest.raises(mjs.SensorError, match="sensor 'heights': compute"):
+        mjs.record(out=tmp_path, episodes=1, sensors=[Broken()], **SMALL)
+    with pytest.raises(ValueError, match="cannot be recorded"):
+        Broken.observation_space = None
+        mjs.record(out=tmp_path, episodes=1, sensors=[Broken()], **SMALL)
+
+
+def test_interrupt(tmp_path):
+    def stop(progress):
+        raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt):
+        mjs.record(out=tmp_path, episodes=2, progress=stop, **SMALL)
+    # What was finished stays, and the recording can go on.
+    summary = mjs.record(out=tmp_path, episodes=2, resume=True, **SMALL)
+    assert summary.kept == 2 and summary.enough
