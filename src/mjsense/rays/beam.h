@@ -11,27 +11,19 @@
 namespace mjsense {
 namespace {
 
-inline float lane_min(Float x) {
-  alignas(64) float v[kWidth];
-  store(v, x);
-  float m = v[0];
-  for (int i = 1; i < kWidth; ++i) m = v[i] < m ? v[i] : m;
-  return m;
-}
-
 struct Range {
   float low, high;
 };
 
-inline Range range_of(const float* x, const float* tmax) {
-  Float low = kNoHit, high = kNoHit;  // `high` negated
-  for (int k = 0; k < kPacket; k += kWidth) {
-    const Mask active = load(tmax + k) >= Float(0.0f);
-    low = min(low, select(active, load(x + k), Float(kNoHit)));
-    high = min(high, select(active, -load(x + k), Float(kNoHit)));
+// Grows over lanes and packets.
+struct Bound {
+  Float low = kNoHit, negated_high = kNoHit;
+  void add(Mask active, Float x) {
+    low = min(low, select(active, x, Float(kNoHit)));
+    negated_high = min(negated_high, select(active, -x, Float(kNoHit)));
   }
-  return {lane_min(low), -lane_min(high)};
-}
+  Range range() const { return {lane_min(low), -lane_min(negated_high)}; }
+};
 
 struct Beam {
   bool empty = false;       // no active lane
@@ -42,47 +34,58 @@ struct Beam {
   Range slope[3];   // d[i] / |d[axis]|
   float tmax = 0.0f;
 
-  explicit Beam(const RayPacket& rays) {
-    tmax = -range_of_max(rays.tmax);
-    if (!(tmax >= 0.0f)) {
-      empty = true;
-      return;
+  // Of packets with one origin.
+  Beam(const RayPacket* packets, int count) {
+    Bound o[3], d[3];
+    Float farthest = -1.0f;
+    for (int p = 0; p < count; ++p) {
+      for (int k = 0; k < kPacket; k += kWidth) {
+        const Float t = load(packets[p].tmax + k);
+        const Mask active = t >= Float(0.0f);
+        farthest = max(farthest, t);
+        for (int i = 0; i < 3; ++i) {
+          o[i].add(active, load(packets[p].o[i] + k));
+          d[i].add(active, load(packets[p].d[i] + k));
+        }
+      }
     }
+    tmax = lane_max(farthest);
+    empty = tmax < 0.0f;
+    if (empty) return;
     float best = 0.0f;
     for (int i = 0; i < 3; ++i) {
-      const Range d = range_of(rays.d[i], rays.tmax);
-      const float smallest = d.low > 0 ? d.low : (d.high < 0 ? -d.high : 0.0f);
+      const Range r = d[i].range(), from = o[i].range();
+      const float smallest = r.low > 0 ? r.low : (r.high < 0 ? -r.high : 0.0f);
       if (smallest > best) {
         best = smallest;
         axis = i;
-        sign = d.low > 0 ? 1.0f : -1.0f;
+        sign = r.low > 0 ? 1.0f : -1.0f;
       }
-      const Range o = range_of(rays.o[i], rays.tmax);
-      const float center = static_cast<float>(rays.origin[i]);
+      const float center = static_cast<float>(packets->origin[i]);
       const float error = 2e-7f * ((center < 0 ? -center : center) + 1.0f);
-      origin[i] = {center + o.low - error, center + o.high + error};
+      origin[i] = {center + from.low - error, center + from.high + error};
     }
     everywhere = best < 1e-3f;
     if (everywhere) return;
-    for (int i = 0; i < 3; ++i) {
-      alignas(64) float s[kPacket];
-      for (int k = 0; k < kPacket; k += kWidth)
-        store(s + k, load(rays.d[i] + k) / abs(load(rays.d[axis] + k)));
-      slope[i] = range_of(s, rays.tmax);
+    const int b = (axis + 1) % 3, c = (axis + 2) % 3;
+    Bound slope_b, slope_c;
+    for (int p = 0; p < count; ++p) {
+      for (int k = 0; k < kPacket; k += kWidth) {
+        const Mask active = load(packets[p].tmax + k) >= Float(0.0f);
+        const Float inverse = Float(1.0f) / abs(load(packets[p].d[axis] + k));
+        slope_b.add(active, load(packets[p].d[b] + k) * inverse);
+        slope_c.add(active, load(packets[p].d[c] + k) * inverse);
+      }
     }
+    slope[b] = slope_b.range();
+    slope[c] = slope_c.range();
   }
 
-  static float range_of_max(const float* x) {
-    Float m = kNoHit;
-    for (int k = 0; k < kPacket; k += kWidth) m = min(m, -load(x + k));
-    return lane_min(m);
-  }
-
-  // Lanes of geoms i .. i + kWidth - 1 whose box the beam touches, and a distance before which it
+  // Lanes of boxes i .. i + kWidth - 1 that the beam touches, and a distance before which it
   // does not.
-  Mask touches(const KernelWorld& world, int i, Float& nearest) const {
+  Mask touches(const KernelBoxes& boxes, int i, Float& nearest) const {
     const int a = axis, b = (axis + 1) % 3, c = (axis + 2) % 3;
-    const Float lo = loadu(world.low[a] + i), hi = loadu(world.high[a] + i);
+    const Float lo = loadu(boxes.low[a] + i), hi = loadu(boxes.high[a] + i);
     const bool up = sign > 0;
     // How far along the axis the box begins and ends, seen from the nearest and the farthest
     // origin.
@@ -93,45 +96,83 @@ struct Beam {
     for (int j : {b, c}) {
       const Float least = Float(origin[j].low) + min(begin * slope[j].low, end * slope[j].low);
       const Float most = Float(origin[j].high) + max(begin * slope[j].high, end * slope[j].high);
-      m = m & (least <= loadu(world.high[j] + i)) & (most >= loadu(world.low[j] + i));
+      m = m & (least <= loadu(boxes.high[j] + i)) & (most >= loadu(boxes.low[j] + i));
     }
     return m & (begin <= Float(tmax));
   }
 };
 
-inline int gather_candidates(const KernelWorld& world, const KernelFilter& filter,
-                             const RayPacket& rays, RayCandidate* out) {
-  const Beam beam(rays);
-  if (beam.empty) return 0;
-  int count = 0;
-  const std::uint32_t refused = filter.transparent ? 0u : 0x100u;
-  for (int i = 0; i < world.count; i += kWidth) {
-    std::uint32_t in = kAllLanes;
-    alignas(64) float nearest[kWidth] = {};
+// Calls take(box, nearest) for each box that the beam touches.
+template <class Take>
+void for_each_box(const Beam& beam, const KernelBoxes& boxes, Take&& take) {
+  if (beam.empty) return;
+  alignas(64) float nearest[kWidth] = {};
+  for (int i = 0; i < boxes.count; i += kWidth) {
+    std::uint32_t in = i + kWidth <= boxes.count ? kAllLanes : (1u << (boxes.count - i)) - 1;
     if (!beam.everywhere) {
       Float t;
-      in = bits(beam.touches(world, i, t));
+      in &= bits(beam.touches(boxes, i, t));
       if (in == 0) continue;
       store(nearest, t);
     }
     for (; in != 0; in &= in - 1) {
-      const int j = __builtin_ctz(in), id = i + j;
-      const std::uint32_t flags = world.flags[id];
-      if ((flags & filter.groups) == 0 || (flags & refused) != 0) continue;
-      if (filter.exclude_body >= 0 && world.bodies[id] == filter.exclude_body) continue;
-      if (filter.hidden != nullptr && filter.hidden[id] != 0) continue;
-      out[count++] = {nearest[j], id};
+      const int j = __builtin_ctz(in);
+      take(i + j, nearest[j]);
     }
   }
-  // Nearest first; Shell's sort: counts are small.
-  for (int gap = count > 8 ? (count > 64 ? 31 : 5) : 1; gap > 0; gap = gap > 5 ? 5 : gap / 5) {
+}
+
+inline bool passes(const KernelWorld& world, const KernelFilter& filter, int geom) {
+  constexpr std::uint32_t kTransparent = 0x100;  // RayWorld::kTransparent
+  const std::uint32_t flags = world.flags[geom];
+  if ((flags & filter.groups) == 0 || (!filter.transparent && (flags & kTransparent) != 0))
+    return false;
+  if (filter.exclude_body >= 0 && world.bodies[geom] == filter.exclude_body) return false;
+  return filter.hidden == nullptr || filter.hidden[geom] == 0;
+}
+
+// Nearest first. Shell's sort: counts are small.
+inline void sort_candidates(RayCandidate* c, int count) {
+  for (int gap = count > 64 ? 31 : count > 12 ? 5 : 1; gap > 0; gap = gap > 5 ? 5 : gap / 5) {
     for (int i = gap; i < count; ++i) {
-      const RayCandidate x = out[i];
+      const RayCandidate x = c[i];
       int j = i;
-      for (; j >= gap && out[j - gap].t > x.t; j -= gap) out[j] = out[j - gap];
-      out[j] = x;
+      for (; j >= gap && c[j - gap].t > x.t; j -= gap) c[j] = c[j - gap];
+      c[j] = x;
     }
   }
+}
+
+inline int gather(const KernelWorld& world, const KernelFilter& filter, const RayPacket& rays,
+                  RayCandidate* out) {
+  int count = 0;
+  for_each_box(Beam(&rays, 1), world.boxes, [&](int i, float nearest) {
+    if (passes(world, filter, i)) out[count++] = {nearest, i};
+  });
+  sort_candidates(out, count);
+  return count;
+}
+
+inline int gather_from(const KernelBoxes& boxes, const RayPacket& rays, RayCandidate* out) {
+  int count = 0;
+  for_each_box(Beam(&rays, 1), boxes, [&](int i, float nearest) {
+    out[count++] = {nearest, boxes.ids[i]};
+  });
+  sort_candidates(out, count);
+  return count;
+}
+
+inline int focus(const KernelWorld& world, const KernelFilter& filter, const RayPacket* packets,
+                 int num_packets, float* const* low, float* const* high, int* ids) {
+  int count = 0;
+  for_each_box(Beam(packets, num_packets), world.boxes, [&](int i, float) {
+    if (!passes(world, filter, i)) return;
+    for (int k = 0; k < 3; ++k) {
+      low[k][count] = world.boxes.low[k][i];
+      high[k][count] = world.boxes.high[k][i];
+    }
+    ids[count++] = i;
+  });
   return count;
 }
 

@@ -25,14 +25,20 @@ struct KernelScene {
   const HeightField* height_fields;  // by height-field id
 };
 
+// Boxes in the world, by coordinate; padded to a multiple of 16 with boxes that nothing meets.
+struct KernelBoxes {
+  const float* low[3];
+  const float* high[3];
+  const int* ids;  // of the geoms; null: box i is geom i
+  int count;
+};
+
 struct KernelWorld {
   const RayGeom* geoms;
-  const float* low[3];  // [padded]
-  const float* high[3];
+  KernelBoxes boxes;               // of all geoms and flexes
   const std::uint32_t* flags;      // [padded]
   const int* bodies;               // [padded]
   const void* const* flex_scenes;  // RTCScene by flex id
-  int count;                       // geoms and flexes
 };
 
 struct KernelFilter {
@@ -44,7 +50,12 @@ struct KernelFilter {
 
 struct RayKernels {
   void (*place)(const LocalPacket&, const float* rotation, float tmax, RayPacket&);
+  // Writes the boxes that any of `count` packets of one origin can meet into `low`, `high`, `ids`; returns their number.
+  int (*focus)(const KernelWorld&, const KernelFilter&, const RayPacket*, int count,
+               float* const* low, float* const* high, int* ids);
+  // Writes what one packet can meet, nearest first: of all geoms that pass the filter, or of `boxes`.
   int (*gather)(const KernelWorld&, const KernelFilter&, const RayPacket&, RayCandidate* out);
+  int (*gather_from)(const KernelBoxes&, const RayPacket&, RayCandidate* out);
   void (*trace)(const KernelScene&, const KernelWorld&, const KernelFilter&, const RayPacket&,
                 HitPacket&, const RayCandidate*, int count);
   std::uint32_t (*occluded)(const KernelScene&, const KernelWorld&, const KernelFilter&,

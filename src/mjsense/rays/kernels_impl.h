@@ -248,6 +248,7 @@ void trace(const KernelScene& scene, const KernelWorld& world, const KernelFilte
                         hits);
         break;
       case kFlexType:
+        if (world.flex_scenes[g.data] == nullptr) break;
         trace_triangles(static_cast<RTCScene>(const_cast<void*>(world.flex_scenes[g.data])), g, id,
                         cull_mesh, rays, hits);
         break;
@@ -294,6 +295,7 @@ std::uint32_t occluded(const KernelScene& scene, const KernelWorld& world,
                                   rays);
         break;
       case kFlexType:
+        if (world.flex_scenes[g.data] == nullptr) break;
         hit |=
             occluded_triangles(static_cast<RTCScene>(const_cast<void*>(world.flex_scenes[g.data])),
                                g, cull_mesh, rays);
@@ -318,7 +320,7 @@ void place(const LocalPacket& local, const float* r, float tmax, RayPacket& out)
   }
 }
 
-constexpr RayKernels kKernels = {&place, &gather_candidates, &trace, &occluded};
+constexpr RayKernels kKernels = {&place, &focus, &gather, &gather_from, &trace, &occluded};
 
 }  // namespace
 }  // namespace mjsense

@@ -20,6 +20,7 @@
 #include <span>
 #include <vector>
 
+#include "mjsense/core/cpu.h"
 #include "mjsense/core/sensor.h"
 #include "mjsense/rays/packet.h"
 #include "mjsense/rays/ray_world.h"
@@ -27,6 +28,7 @@
 namespace mjsense {
 
 struct RayKernels;
+class FlexShapes;
 struct SharedGeometry;
 
 // Geoms that a packet of rays may meet, nearest first. One a thread, made once, reused by every
@@ -39,12 +41,17 @@ class RayScratch {
   std::size_t count = 0;
 
  private:
+  friend class RayScene;
+  int stride_, num_boxes_ = 0;
   std::vector<RayCandidate> candidates_;
+  std::vector<float> boxes_;  // [6, stride]: what focus() found
+  std::vector<int> ids_;
 };
 
 class RayScene {
  public:
-  RayScene(const mjModel* model, int num_worlds);
+  // `isa`: which kernels; not more than cpu_isa() finds.
+  RayScene(const mjModel* model, int num_worlds, Isa isa = cpu_isa());
   ~RayScene();
   RayScene(const RayScene&) = delete;
   RayScene& operator=(const RayScene&) = delete;
@@ -70,6 +77,11 @@ class RayScene {
   void gather(int world, const RayFilter& filter, const RayPacket& rays, RayScratch& scratch) const;
   void trace_candidates(int world, const RayFilter& filter, const RayPacket& rays, HitPacket& hits,
                         std::span<const RayCandidate> candidates) const;
+  // For many packets of one origin: focus() narrows the world to what any of them can meet, trace_focused() then traces each.
+  void focus(int world, const RayFilter& filter, std::span<const RayPacket> packets,
+             RayScratch& scratch) const;
+  void trace_focused(int world, const RayFilter& filter, const RayPacket& rays, HitPacket& hits,
+                     RayScratch& scratch) const;
   // Bit i: something lies on ray i before its tmax.
   std::uint32_t occluded(int world, const RayFilter& filter, const RayPacket& rays,
                          RayScratch& scratch) const;
@@ -84,6 +96,7 @@ class RayScene {
   std::unique_ptr<SharedGeometry> shared_;
   const RayKernels* kernels_;
   std::vector<RayWorld> worlds_;
+  std::vector<FlexShapes> flexes_;  // [B]
 };
 
 }  // namespace mjsense

@@ -4,8 +4,11 @@
 
 #include <cmath>
 #include <cstdlib>
+#include <cstring>
 #include <string>
+#include <vector>
 
+#include "mjsense/core/testing/allocations.h"
 #include "mjsense/rays/test_scene.h"
 
 namespace mjsense {
@@ -60,7 +63,7 @@ class RandomRays : public ::testing::TestWithParam<const char*> {};
 TEST_P(RandomRays, AgreeWithMjRay) {
   Rng rng(7, 0, stream_of(GetParam()), 0);
   const long total = ray_count(20000);
-  const int scenes = 5;
+  const int scenes = 6;
   long wrong = 0, wrong_geom = 0, wrong_normal = 0, hits = 0;
   for (int s = 0; s < scenes; ++s) {
     const std::string type = GetParam();
@@ -71,7 +74,8 @@ TEST_P(RandomRays, AgreeWithMjRay) {
                                                         40, 4)
                                 : testing::random_scene(rng, {GetParam()}, 6, 1.5);
     const TestModel m(xml);
-    RayScene scene(m.model, 1);
+    // Each of the CPU's instruction sets in turn.
+    RayScene scene(m.model, 1, static_cast<Isa>(s % (static_cast<int>(cpu_isa()) + 1)));
     scene.update(m.world());
     for (long i = 0; i < total / scenes; ++i) {
       double o[3], d[3];
@@ -109,6 +113,246 @@ INSTANTIATE_TEST_SUITE_P(Shapes, RandomRays,
                          ::testing::Values("plane", "sphere", "capsule", "ellipsoid", "cylinder",
                                            "box", "mesh", "hfield", "all"),
                          [](const auto& info) { return std::string(info.param); });
+
+// Tests of every kernel.
+class Kernels : public ::testing::TestWithParam<int> {
+ protected:
+  void SetUp() override {
+    if (GetParam() > static_cast<int>(cpu_isa())) GTEST_SKIP() << "not on this CPU";
+  }
+  Isa isa() const { return static_cast<Isa>(GetParam()); }
+};
+
+INSTANTIATE_TEST_SUITE_P(Isas, Kernels, ::testing::Values(0, 1, 2), [](const auto& info) {
+  return std::string(isa_name(static_cast<Isa>(info.param)));
+});
+
+// A packet of rays from one origin into a cone around a random direction.
+RayPacket random_packet(Rng& rng, double origin, double spread) {
+  RayPacket rays;
+  double axis[3];
+  testing::random_direction(rng, axis);
+  for (double& x : rays.origin) x = rng.uniform(-origin, origin);
+  for (int i = 0; i < kPacket; ++i) {
+    double d[3];
+    testing::random_direction(rng, d);
+    for (int k = 0; k < 3; ++k) d[k] = axis[k] + spread * d[k];
+    mju_normalize3(d);
+    for (int k = 0; k < 3; ++k) {
+      rays.o[k][i] = static_cast<float>(rng.uniform(-0.1, 0.1));
+      rays.d[k][i] = static_cast<float>(d[k]);
+    }
+    rays.tmax[i] = rng.below(8) == 0 ? -1.0f : static_cast<float>(rng.uniform(0, 12));
+  }
+  return rays;
+}
+
+TEST_P(Kernels, FocusedAndPlainTracesAreTheSameBits) {
+  Rng rng(3, 0, 0, 0);
+  const TestModel m(
+      testing::random_scene(rng, {"plane", "sphere", "capsule", "box", "mesh", "hfield"}, 60, 4));
+  RayScene scene(m.model, 1, isa());
+  scene.update(m.world());
+  RayScratch a(scene.num_objects()), b(scene.num_objects());
+  for (int trial = 0; trial < 300; ++trial) {
+    RayPacket packets[3] = {random_packet(rng, 5, trial % 3 * 0.3), random_packet(rng, 5, 0.1),
+                            random_packet(rng, 5, 2)};
+    for (RayPacket& p : packets) std::copy_n(packets[0].origin, 3, p.origin);
+    scene.focus(0, {}, packets, a);
+    for (const RayPacket& p : packets) {
+      HitPacket x, y;
+      scene.trace_focused(0, {}, p, x, a);
+      scene.trace(0, {}, p, y, b);
+      EXPECT_EQ(std::memcmp(x.t, y.t, sizeof x.t), 0);
+      EXPECT_EQ(std::memcmp(x.geom, y.geom, sizeof x.geom), 0);
+      EXPECT_EQ(std::memcmp(x.n, y.n, sizeof x.n), 0);
+    }
+  }
+}
+
+TEST_P(Kernels, OccludedWhereSomethingIsHit) {
+  Rng rng(4, 0, 0, 0);
+  const TestModel m(testing::random_scene(
+      rng, {"plane", "sphere", "capsule", "ellipsoid", "cylinder", "box", "mesh", "hfield"}, 40,
+      4));
+  RayScene scene(m.model, 1, isa());
+  scene.update(m.world());
+  RayScratch scratch(scene.num_objects());
+  int hit_lanes = 0, wrong = 0;
+  for (int trial = 0; trial < 500; ++trial) {
+    const RayPacket rays = random_packet(rng, 5, 0.2 * (trial % 5));
+    HitPacket hits;
+    scene.trace(0, {}, rays, hits, scratch);
+    const std::uint32_t hidden = scene.occluded(0, {}, rays, scratch);
+    for (int i = 0; i < kPacket; ++i) {
+      hit_lanes += hits.geom[i] >= 0;
+      wrong += (hits.geom[i] >= 0) != ((hidden >> i & 1) != 0);
+    }
+  }
+  EXPECT_GT(hit_lanes, 500);
+  EXPECT_LE(wrong, 2);  // a surface at tmax itself
+}
+
+TEST_P(Kernels, PreciseFarFromTheWorldsOrigin) {
+  // Everything 1000 m away from the origin, seen from 10 m.
+  Rng rng(5, 0, 0, 0);
+  for (const char* type :
+       {"plane", "sphere", "capsule", "ellipsoid", "cylinder", "box", "mesh", "hfield"}) {
+    const TestModel m(testing::random_scene(rng, {type}, 1, 0));
+    for (int k = 0; k < 3; ++k) m.data->geom_xpos[k] += 1000 - 300 * k;
+    RayScene scene(m.model, 1, isa());
+    scene.update(m.world());
+    double worst = 0;
+    int hits = 0;
+    for (int i = 0; i < 2000; ++i) {
+      double o[3], d[3];
+      testing::random_direction(rng, o);
+      for (int k = 0; k < 3; ++k) o[k] *= 10;
+      testing::aim(rng, 0.2, o, d);
+      for (int k = 0; k < 3; ++k) o[k] += m.data->geom_xpos[k];
+      const Truth truth = mujoco_ray(m, o, d);
+      const Hit hit = scene.trace(0, {}, o, d);
+      if (truth.t < 0 || !hit) continue;
+      const double cosine = std::abs(mju_dot3(truth.normal, d));
+      if (cosine < 0.2) continue;  // grazing: a hair's breadth to the side is far along the ray
+      ++hits;
+      worst = std::max(worst, std::abs(hit.t - truth.t));
+    }
+    EXPECT_GT(hits, 100) << type;
+    EXPECT_LT(worst, 1e-5) << type;
+  }
+}
+
+constexpr char kLayers[] = R"(
+<mujoco><asset><mesh name="cube" vertex="-1 -1 -1 1 -1 -1 1 1 -1 -1 1 -1 -1 -1 1 1 -1 1 1 1 1 -1 1 1"/>
+  <material name="clear" rgba="1 1 1 0"/></asset><worldbody>
+  <geom name="floor" type="plane" size="0 0 1" pos="0 0 -5"/>
+  <geom name="first" type="box" size="1 1 1"/>
+  <geom name="again" type="box" size="1 1 1"/>
+  <geom name="cube" type="mesh" mesh="cube"/>
+  <geom name="drum" type="cylinder" size="1 1"/>
+  <body name="lid" pos="0 0 2"><geom name="lid" type="box" size="1 1 .1" group="2"/></body>
+  <geom name="glass" type="box" size="1 1 .1" pos="0 0 3" material="clear"/>
+  <geom name="ghost" type="box" size="1 1 .1" pos="0 0 4" group="5"/>
+</worldbody></mujoco>)";
+
+struct Layers {
+  TestModel m{kLayers};
+  RayScene scene;
+  explicit Layers(Isa isa) : scene(m.model, 1, isa) { scene.update(m.world()); }
+  int id(const char* name) const { return mj_name2id(m.model, mjOBJ_GEOM, name); }
+  Hit down(const RayFilter& filter, double z = 9, double x = 0.3) const {
+    const double o[3] = {x, 0.2, z}, d[3] = {0, 0, -1};
+    return scene.trace(0, filter, o, d);
+  }
+};
+
+TEST_P(Kernels, FiltersSeeWhatTheyName) {
+  const Layers s(isa());
+  EXPECT_EQ(s.down({}).geom, s.id("ghost"));
+  EXPECT_EQ(s.down({.groups = 0x1f}).geom, s.id("lid"));
+  EXPECT_EQ(s.down({.groups = 0x1f, .transparent = true}).geom, s.id("glass"));
+  EXPECT_EQ(s.down({.groups = 0x1f, .exclude_body = 1}).geom, s.id("first"));
+  EXPECT_EQ(s.down({.groups = 0x20}).geom, s.id("ghost"));
+  EXPECT_EQ(s.down({.groups = 0x04}).geom, s.id("lid"));
+  EXPECT_EQ(s.down({.groups = 0x08}).geom, -1);
+  std::vector<std::uint8_t> hidden(s.scene.num_objects(), 0);
+  hidden[s.id("ghost")] = hidden[s.id("lid")] = 1;
+  EXPECT_EQ(s.down({.hidden = hidden}).geom, s.id("first"));
+  EXPECT_EQ(s.down({}).geom, s.id("ghost")) << "the filter of one query is not another's";
+}
+
+TEST_P(Kernels, TiesGoToTheLowerGeom) {
+  const Layers s(isa());
+  const RayFilter low{.groups = 1};
+  for (double x : {0.0, 0.1, 0.3, 0.7}) EXPECT_EQ(s.down(low, 9, x).geom, s.id("first"));
+  std::vector<std::uint8_t> hidden(s.scene.num_objects(), 0);
+  hidden[s.id("first")] = hidden[s.id("again")] = 1;
+  EXPECT_EQ(s.down({.groups = 1, .hidden = hidden}).geom, s.id("cube"));  // not the drum
+}
+
+TEST_P(Kernels, BackFacesAreCulledIfAsked) {
+  const Layers s(isa());
+  const auto inside = [&](const char* only, RayFilter::Backfaces backfaces) {
+    std::vector<std::uint8_t> hidden(s.scene.num_objects(), 1);
+    hidden[s.id(only)] = hidden[s.id("floor")] = 0;
+    return s.down({.backfaces = backfaces, .hidden = hidden}, 0).geom;
+  };
+  using B = RayFilter::Backfaces;
+  EXPECT_EQ(inside("cube", B::kHit), s.id("cube"));
+  EXPECT_EQ(inside("first", B::kHit), s.id("first"));
+  EXPECT_EQ(inside("cube", B::kCullMesh), s.id("floor"));
+  EXPECT_EQ(inside("first", B::kCullMesh), s.id("first"));
+  EXPECT_EQ(inside("cube", B::kCull), s.id("floor"));
+  EXPECT_EQ(inside("first", B::kCull), s.id("floor"));
+  EXPECT_EQ(inside("drum", B::kCull), s.id("floor"));
+}
+
+TEST_P(Kernels, EndlessPlanesAreEndless) {
+  const Layers s(isa());
+  for (double x : {1e3, 1e5, -1e7}) {
+    const double o[3] = {x, 2 * x, 20}, d[3] = {0, 0, -1};
+    const Hit hit = s.scene.trace(0, {}, o, d);
+    EXPECT_EQ(hit.geom, s.id("floor"));
+    EXPECT_NEAR(hit.t, 25, 1e-5);
+  }
+}
+
+TEST(RayScene, PerWorldSizesAndVisibility) {
+  TestModel m(kLayers);
+  RayScene scene(m.model, 2);
+  mjModel* own = mj_copyModel(nullptr, m.model);
+  const int ghost = mj_name2id(own, mjOBJ_GEOM, "ghost"), lid = mj_name2id(own, mjOBJ_GEOM, "lid");
+  own->geom_rgba[4 * ghost + 3] = 0;
+  own->geom_size[3 * lid + 2] = 0.4;
+  World second = m.world(1);
+  second.model = own;
+  scene.update(m.world(0));
+  scene.update(second);
+  const double o[3] = {0, 0, 9}, d[3] = {0, 0, -1};
+  EXPECT_EQ(scene.trace(0, {}, o, d).geom, ghost);
+  EXPECT_EQ(scene.trace(1, {}, o, d).geom, lid);
+  EXPECT_NEAR(scene.trace(1, {}, o, d).t, 9 - 2.4, 1e-6);
+  own->geom_size[3 * lid + 2] = 0.2;  // changed again, nothing moved
+  scene.update(second);
+  EXPECT_NEAR(scene.trace(1, {}, o, d).t, 9 - 2.2, 1e-6);
+  mj_deleteModel(own);
+}
+
+TEST(RayScene, ClothIsHitWhereItsTrianglesAre) {
+  const TestModel m(R"(<mujoco><worldbody>
+    <flexcomp name="cloth" type="grid" dim="2" count="5 5 1" spacing=".2 .2 .2" radius=".01" pos="0 0 1"><edge equality="true"/></flexcomp>
+    <geom type="plane" size="0 0 1"/></worldbody></mujoco>)");
+  RayScene scene(m.model, 1);
+  scene.update(m.world());
+  const double o[3] = {0.05, 0.07, 2}, d[3] = {0, 0, -1};
+  Hit hit = scene.trace(0, {}, o, d);
+  EXPECT_EQ(hit.geom, m.model->ngeom);  // flex 0
+  EXPECT_NEAR(hit.t, 1, 1e-6);
+  for (int i = 0; i < m.model->nflexvert; ++i) m.data->flexvert_xpos[3 * i + 2] += 0.25;
+  scene.update(m.world());
+  EXPECT_NEAR(scene.trace(0, {}, o, d).t, 0.75, 1e-6);
+  const double aside[3] = {0.5, 0.5, 2};
+  EXPECT_EQ(scene.trace(0, {}, aside, d).geom, 0);
+}
+
+TEST(RayScene, AllocatesNothingAfterTheFirstRay) {
+  Rng rng(6, 0, 0, 0);
+  const TestModel m(
+      testing::random_scene(rng, {"plane", "sphere", "capsule", "box", "mesh", "hfield"}, 60, 4));
+  RayScene scene(m.model, 1);
+  RayScratch scratch(scene.num_objects());
+  scene.update(m.world());
+  const AllocationCount count;
+  HitPacket hits;
+  for (int i = 0; i < 100; ++i) {
+    scene.update(m.world());
+    const RayPacket rays = random_packet(rng, 5, 0.3);
+    scene.trace(0, {}, rays, hits, scratch);
+    scene.occluded(0, {}, rays, scratch);
+  }
+  EXPECT_EQ(count.since(), 0);
+}
 
 }  // namespace
 }  // namespace mjsense

@@ -32,7 +32,7 @@ class RayWorld {
   RayWorld() = default;
   RayWorld(const mjModel* model, const ShapeBounds& bounds);
 
-  // Copies the world's present values. No allocation. Called by one thread a world.
+  // Copies the world's present values; what did not move costs a comparison. No allocation. Called by one thread a world.
   void update(const mjModel* model, const mjData* data);
 
   int num_geoms() const { return num_geoms_; }  // of the model, without flexes
@@ -41,12 +41,9 @@ class RayWorld {
 
   const RayGeom& geom(int id) const { return geoms_[id]; }
   std::span<const RayGeom> geoms() const { return geoms_; }
-  std::array<const float*, 3> low() const {
-    return {row(0), row(1), row(2)};
-  }  // world boxes [num_objects padded to 16]
-  std::array<const float*, 3> high() const {
-    return {row(3), row(4), row(5)};
-  }  // planes: +-infinity
+  // Boxes in the world, by coordinate [num_objects, padded to 16]; planes reach to +-1e30.
+  const std::array<const float*, 3>& low() const { return low_; }
+  const std::array<const float*, 3>& high() const { return high_; }
   // Bit g of group g; kTransparent if its alpha is 0; 0 for padding.
   static constexpr std::uint32_t kTransparent = 0x100;
   std::span<const std::uint32_t> flags() const { return flags_; }
@@ -56,20 +53,23 @@ class RayWorld {
     return rgba_;
   }  // [num_objects, 4], resolved: the material's if it has one
   std::span<const float> flex_vertices() const {
-    return flex_vertices_;
+    return {flex_vertices_.data(), flex_vertices_.size() - 1};
   }  // [nflexvert, 3] m, world
   std::span<const RayLight> lights() const { return lights_; }
   std::span<const RayCamera> cameras() const { return cameras_; }
 
  private:
-  const float* row(int i) const { return bounds_.row<float>(i).data(); }
-  void update_bounds();
+  void describe(const mjModel* model, int object, int material, int group, const float* own_rgba);
+  void update_flexes(const mjModel* model, const mjData* data);
+  void set_local_box(RayGeom& geom) const;
+  void set_world_box(int object);
 
   int num_geoms_ = 0;
   std::uint64_t version_ = 0;
   std::vector<RayGeom> geoms_;
   const ShapeBounds* shapes_ = nullptr;
-  Array bounds_;  // [6, padded]
+  Array bounds_;                                // [6, padded]
+  std::array<const float*, 3> low_{}, high_{};  // its rows
   std::vector<std::uint32_t> flags_;
   std::vector<int> bodies_, materials_;
   std::vector<float> rgba_;

@@ -68,6 +68,7 @@ inline Float floor(Float a) {
   return _mm512_roundscale_ps(a.v, _MM_FROUND_TO_NEG_INF | _MM_FROUND_NO_EXC);
 }
 inline Float gather(const float* p, Int i) { return _mm512_i32gather_ps(i.v, p, 4); }
+inline float lane_min(Float a) { return _mm512_reduce_min_ps(a.v); }
 
 #elif defined(__AVX2__)
 
@@ -127,6 +128,11 @@ inline Int truncate(Float a) { return {_mm256_cvttps_epi32(a.v)}; }
 inline Float to_float(Int a) { return _mm256_cvtepi32_ps(a.v); }
 inline Float floor(Float a) { return _mm256_floor_ps(a.v); }
 inline Float gather(const float* p, Int i) { return _mm256_i32gather_ps(p, i.v, 4); }
+inline float lane_min(Float a) {
+  __m128 m = _mm_min_ps(_mm256_castps256_ps128(a.v), _mm256_extractf128_ps(a.v, 1));
+  m = _mm_min_ps(m, _mm_movehl_ps(m, m));
+  return _mm_cvtss_f32(_mm_min_ss(m, _mm_movehdup_ps(m)));
+}
 
 #else
 
@@ -200,12 +206,17 @@ inline Float floor(Float a) {
 inline Float gather(const float* p, Int i) {
   return Float4{p[i.v[0]], p[i.v[1]], p[i.v[2]], p[i.v[3]]};
 }
+inline float lane_min(Float a) {
+  const float x = a.v[0] < a.v[1] ? a.v[0] : a.v[1], y = a.v[2] < a.v[3] ? a.v[2] : a.v[3];
+  return x < y ? x : y;
+}
 
 #endif
 
 inline bool any(Mask m) { return bits(m) != 0; }
 inline Mask operator>(Float a, Float b) { return b < a; }
 inline Mask operator>=(Float a, Float b) { return b <= a; }
+inline float lane_max(Float m) { return -lane_min(-m); }
 constexpr std::uint32_t kAllLanes = (1u << kWidth) - 1;
 
 struct Vec3f {

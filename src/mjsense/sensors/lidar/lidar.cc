@@ -58,6 +58,8 @@ LidarSensor::LidarSensor(const LidarSensorCfg& cfg) : RayCastSensor(cfg), lidar_
     if (t.rays_per_scan > 0) num_parts_ = rows / t.rays_per_scan;
     angles_.resize(t.rays_per_scan > 0 ? num_parts_ * t.rays_per_scan : rows);
   }
+  disturbed_ = cfg.range_noise_std > 0 || cfg.range_noise_relative > 0 ||
+               cfg.range_resolution > 0 || cfg.dropout > 0;
   check(rate_hz_ > 0, place(), "rate_hz", rate_hz_, "above 0");
 }
 
@@ -120,44 +122,37 @@ void LidarSensor::compute(const World& world) {
   noise_[world.id] = world.rng(stream_of(name()));
 }
 
-void LidarSensor::finish(const RayScene& rays, int world, RayScratch& /*scratch*/) {
-  const int n = num_rays_per_frame(), first_ray = part_of(world) * n;
-  if (lidar_.range_noise_std > 0 || lidar_.range_noise_relative > 0 ||
-      lidar_.range_resolution > 0 || lidar_.dropout > 0)
-    disturb(world);
-  const float* distance = distances_->data.row<float>(world).data();
-  const float* hit = hit_pos_->data.row<float>(world).data();
-  const float* normal = normals_->data.row<float>(world).data();
-  const int* geom = geom_id_->data.row<int>(world).data();
-  float* point = points_->data.row<float>(world).data();
-  float* intensity = intensity_->data.row<float>(world).data();
+void LidarSensor::traced(const RayScene& rays, int world, int frame, const RayBundle& bundle, int p,
+                         const RayPacket& packet, const HitPacket& hits) {
+  const int first = frame * num_rays_per_frame();
+  const LocalPacket& local = bundle.packet(p);
+  float* points = points_->data.row<float>(world).data() + 3 * first;
+  float* intensity = intensity_->data.row<float>(world).data() + first;
   const std::span<const float> rgba = rays.world(world).rgba();
-  for (int r = 0; r < num_rays(); ++r) {
-    const bool seen = distance[r] >= 0;
-    const std::array<double, 3>& d = pattern().directions[first_ray + r % n];
-    for (int k = 0; k < 3; ++k)
-      point[3 * r + k] = seen ? distance[r] * static_cast<float>(d[k]) : 0.0f;
+  float at[3][kPacket], cosine[kPacket];
+  for (int i = 0; i < kPacket; ++i) {
+    const float t = hits.geom[i] >= 0 ? hits.t[i] : 0.0f;
+    for (int k = 0; k < 3; ++k) at[k][i] = t * local.d[k][i];
+    cosine[i] = std::abs(packet.d[0][i] * hits.n[0][i] + packet.d[1][i] * hits.n[1][i] +
+                         packet.d[2][i] * hits.n[2][i]);
+  }
+  for (int i = 0; i < kPacket; ++i) {
+    const int r = bundle.rays(p)[i];
+    if (r < 0) continue;
+    for (int k = 0; k < 3; ++k) points[3 * r + k] = at[k][i];
     intensity[r] = 0;
-    if (!seen) continue;
-    const double* from = frame_pose(world, r / n).pos;
-    float cosine = 0, length = 0;
-    for (int k = 0; k < 3; ++k) {
-      const float back = static_cast<float>(from[k] - hit[3 * r + k]);
-      cosine += back * normal[3 * r + k];
-      length += back * back;
-    }
-    const float* c = &rgba[4 * geom[r]];
-    const float albedo = (c[0] + c[1] + c[2]) / 3;
-    intensity[r] =
-        std::clamp(albedo * std::abs(cosine) / std::sqrt(std::max(length, 1e-20f)), 0.0f, 1.0f);
+    if (hits.geom[i] < 0) continue;
+    const float* c = &rgba[4 * hits.geom[i]];
+    intensity[r] = std::clamp((c[0] + c[1] + c[2]) / 3 * cosine[i], 0.0f, 1.0f);
   }
 }
 
 // Lost and inexact returns.
-void LidarSensor::disturb(int world) {
+void LidarSensor::finish(const RayScene& /*rays*/, int world, RayScratch& /*scratch*/) {
   Rng& rng = noise_[world];
   float* distance = distances_->data.row<float>(world).data();
   float* hit = hit_pos_->data.row<float>(world).data();
+  float* point = points_->data.row<float>(world).data();
   for (int r = 0; r < num_rays(); ++r) {
     // Every ray draws its numbers, hit or not: what one ray meets does not change another's noise.
     const bool lost = lidar_.dropout > 0 && rng.uniform() < lidar_.dropout;
@@ -173,13 +168,20 @@ void LidarSensor::disturb(int world) {
     float* at = hit + 3 * r;
     if (lost || measured < cfg_.min_distance || measured > cfg_.max_distance) {
       forget(world, r);
-      for (int k = 0; k < 3; ++k) at[k] = static_cast<float>(from[k]);
+      for (int k = 0; k < 3; ++k) {
+        at[k] = static_cast<float>(from[k]);
+        point[3 * r + k] = 0;
+      }
+      intensity_->data.row<float>(world)[r] = 0;
       continue;
     }
     distance[r] = static_cast<float>(measured);
     double along[3] = {at[0] - from[0], at[1] - from[1], at[2] - from[2]};
     mju_normalize3(along);
-    for (int k = 0; k < 3; ++k) at[k] += static_cast<float>((measured - t) * along[k]);
+    for (int k = 0; k < 3; ++k) {
+      at[k] += static_cast<float>((measured - t) * along[k]);
+      point[3 * r + k] *= t > 0 ? static_cast<float>(measured / t) : 1.0f;
+    }
   }
 }
 

@@ -68,17 +68,19 @@ class LidarSensor : public RayCastSensor {
   RayPattern build_pattern(const mjModel* model) const override;
   int num_parts() const override { return num_parts_; }
   int part(const World& world) const override;
-  bool wants_finish() const override { return true; }
+  void traced(const RayScene& rays, int world, int frame, const RayBundle& bundle, int p,
+              const RayPacket& packet, const HitPacket& hits) override;
+  bool wants_finish() const override { return disturbed_; }
   void finish(const RayScene& rays, int world, RayScratch& scratch) override;
 
  private:
   RayPattern spinning(const SpinningScan& scan) const;
   RayPattern table(const TableScan& scan) const;
-  void disturb(int world);
 
   LidarSensorCfg lidar_;
   std::vector<std::array<double, 2>> angles_;  // of a table
   int num_parts_ = 1;
+  bool disturbed_;  // by noise, rounding or loss
   double rate_hz_;
   std::vector<Rng> noise_;  // [B]
   Field *points_ = nullptr, *intensity_ = nullptr;

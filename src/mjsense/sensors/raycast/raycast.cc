@@ -205,58 +205,77 @@ void RayCastSensor::place_timed(int world, int frame, int packet, float reach,
   }
 }
 
-// The rows of one world and frame.
-struct RayCastSensor::Rows {
-  float *distances, *hit_pos, *normals;
-  int *geom_id, *body_id, *material_id;
-};
+void RayCastSensor::place(const RayScene& rays, int world, int frame, int p, RayPacket& out) const {
+  const FramePose& pose = frame_pose(world, frame);
+  std::copy_n(pose.pos, 3, out.origin);
+  // Rounding makes no miss of a hit at max_distance.
+  const float reach = static_cast<float>(cfg_.max_distance) * (1 + 4e-7f);
+  if (history_.empty())
+    rays.place(bundles_[parts_[world]].packet(p), pose.align, reach, out);
+  else
+    place_timed(world, frame, p, reach, out);
+}
 
 void RayCastSensor::trace_packets(const RayScene& rays, int world, int frame, int begin, int end,
                                   RayScratch& scratch) {
-  const FramePose& pose = frame_pose(world, frame);
   const RayBundle& bundle = bundles_[parts_[world]];
-  const RayWorld& seen = rays.world(world);
-  const int first = frame * num_rays_per_frame();
-  const auto ids = [&](Field* field) {
-    return field ? field->data.row<int>(world).data() + first : nullptr;
-  };
-  const Rows rows{distances_->data.row<float>(world).data() + first,
-                  hit_pos_->data.row<float>(world).data() + 3 * first,
-                  normals_->data.row<float>(world).data() + 3 * first,
-                  ids(geom_id_),
-                  ids(body_id_),
-                  ids(material_id_)};
   const RayFilter seen_by = filter(frame);
   const float nearest = static_cast<float>(cfg_.min_distance),
               farthest = static_cast<float>(cfg_.max_distance);
-  const float reach = farthest * (1 + 4e-7f);  // rounding makes no miss of a hit at max_distance
-  RayPacket packet;
+  RayPacket packets[kChunk];
+  for (int p = begin; p < end; ++p) place(rays, world, frame, p, packets[p - begin]);
+  rays.focus(world, seen_by, {packets, static_cast<std::size_t>(end - begin)}, scratch);
   HitPacket hits;
-  std::copy_n(pose.pos, 3, packet.origin);
   for (int p = begin; p < end; ++p) {
-    if (history_.empty())
-      rays.place(bundle.packet(p), pose.align, reach, packet);
-    else
-      place_timed(world, frame, p, reach, packet);
-    rays.trace(world, seen_by, packet, hits, scratch);
-    const int* order = bundle.rays(p);
+    const RayPacket& packet = packets[p - begin];
+    rays.trace_focused(world, seen_by, packet, hits, scratch);
     for (int i = 0; i < kPacket; ++i) {
-      const int r = order[i];
-      if (r < 0) continue;
-      const bool hit = hits.geom[i] >= 0 && hits.t[i] >= nearest;
-      const float t = hit ? std::min(hits.t[i], farthest) : 0.0f;
-      rows.distances[r] = hit ? t : -1.0f;
-      for (int k = 0; k < 3; ++k) {
-        rows.hit_pos[3 * r + k] =
-            static_cast<float>(packet.origin[k] + (packet.o[k][i] + t * packet.d[k][i]));
-        rows.normals[3 * r + k] = hit ? hits.n[k][i] : 0.0f;
-      }
-      if (rows.geom_id == nullptr) continue;
-      const int geom = hit ? hits.geom[i] : -1;
-      rows.geom_id[r] = geom;
-      rows.body_id[r] = hit ? seen.bodies()[geom] : -1;
-      rows.material_id[r] = hit ? seen.materials()[geom] : -1;
+      hits.geom[i] = hits.t[i] >= nearest ? hits.geom[i] : -1;
+      hits.t[i] = hits.t[i] < farthest ? hits.t[i] : farthest;
     }
+    write(rays.world(world), world, frame, bundle.rays(p), packet, hits);
+    traced(rays, world, frame, bundle, p, packet, hits);
+  }
+}
+
+void RayCastSensor::traced(const RayScene& /*rays*/, int /*world*/, int /*frame*/,
+                           const RayBundle& /*bundle*/, int /*p*/, const RayPacket& /*packet*/,
+                           const HitPacket& /*hits*/) {}
+
+void RayCastSensor::write(const RayWorld& seen, int world, int frame, const int* order,
+                          const RayPacket& packet, const HitPacket& hits) {
+  const int first = frame * num_rays_per_frame();
+  float* distances = distances_->data.row<float>(world).data() + first;
+  float* hit_pos = hit_pos_->data.row<float>(world).data() + 3 * first;
+  float* normals = normals_->data.row<float>(world).data() + 3 * first;
+  // By component first: these loops become vector code.
+  float t[kPacket], at[3][kPacket], n[3][kPacket];
+  for (int i = 0; i < kPacket; ++i) t[i] = hits.geom[i] >= 0 ? hits.t[i] : 0.0f;
+  for (int k = 0; k < 3; ++k) {
+    for (int i = 0; i < kPacket; ++i) {
+      at[k][i] = static_cast<float>(packet.origin[k] + (packet.o[k][i] + t[i] * packet.d[k][i]));
+      n[k][i] = hits.geom[i] >= 0 ? hits.n[k][i] : 0.0f;
+    }
+  }
+  for (int i = 0; i < kPacket; ++i) {
+    const int r = order[i];
+    if (r < 0) continue;
+    distances[r] = hits.geom[i] >= 0 ? hits.t[i] : -1.0f;
+    for (int k = 0; k < 3; ++k) {
+      hit_pos[3 * r + k] = at[k][i];
+      normals[3 * r + k] = n[k][i];
+    }
+  }
+  if (geom_id_ == nullptr) return;
+  int* geoms = geom_id_->data.row<int>(world).data() + first;
+  int* bodies = body_id_->data.row<int>(world).data() + first;
+  int* materials = material_id_->data.row<int>(world).data() + first;
+  for (int i = 0; i < kPacket; ++i) {
+    const int r = order[i], geom = hits.geom[i];
+    if (r < 0) continue;
+    geoms[r] = geom;
+    bodies[r] = geom >= 0 ? seen.bodies()[geom] : -1;
+    materials[r] = geom >= 0 ? seen.materials()[geom] : -1;
   }
 }
 

@@ -96,6 +96,10 @@ class RayCastSensor : public Sensor {
   int part_of(int world) const { return parts_[world]; }
   // The rays of one frame, for the pattern given.
   virtual RayPattern build_pattern(const mjModel* model) const;
+  // One packet of this world and frame is traced: lane i is ray bundle.rays(p)[i] of the frame, or none if that is < 0. Lanes whose hit
+  // does not count have geom -1. Runs on any thread.
+  virtual void traced(const RayScene& rays, int world, int frame, const RayBundle& bundle, int p,
+                      const RayPacket& packet, const HitPacket& hits);
   // After all rays of a world are traced; worlds in parallel, each on one thread.
   virtual void finish(const RayScene& rays, int world, RayScratch& scratch);
   virtual bool wants_finish() const { return false; }
@@ -113,10 +117,12 @@ class RayCastSensor : public Sensor {
         *body_id_ = nullptr, *material_id_ = nullptr;
 
  private:
-  struct Rows;
+  void write(const RayWorld& seen, int world, int frame, const int* order, const RayPacket& packet,
+             const HitPacket& hits);
   void remember(const World& world);
   // As RayScene::place(), each ray with the frame's pose at its own time.
-  void place_timed(int world, int frame, int packet, float reach, RayPacket& out) const;
+  void place(const RayScene& rays, int world, int frame, int p, RayPacket& out) const;
+  void place_timed(int world, int frame, int p, float reach, RayPacket& out) const;
   void trace_packets(const RayScene& rays, int world, int frame, int begin, int end,
                      RayScratch& scratch);
   RayAlignment alignment_ = RayAlignment::kBase;
