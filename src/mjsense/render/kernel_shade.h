@@ -238,12 +238,6 @@ inline void gather_surfaces(const View& view, const Pixels& pixels, const Hits& 
   }
 }
 
-// Geoms that may stand between the light at hand and the points at hand.
-struct Casters {
-  const int* list;
-  int count;
-};
-
 struct LightTerm {
   Float scale;     // attenuation * spot
   Float diffuse;   // N L
@@ -314,7 +308,7 @@ inline void add_light(const View& view, const ViewLight& light, const Surfaces& 
 
 // Lanes that do not get the light: barred by a geom, or turned away.
 inline std::uint32_t dark_lanes(const View& view, const ViewLight& light, const Surfaces& s,
-                                const Hits& hits, std::uint32_t lanes, Casters casters) {
+                                const Hits& hits, std::uint32_t lanes, Casters& casters) {
   LightRays rays;
   const bool directional = light.kind == LightKind::kDirectional;
   std::uint32_t facing = 0, reachable = 0;
@@ -353,12 +347,12 @@ inline std::uint32_t dark_lanes(const View& view, const ViewLight& light, const 
     axis[c] = directional ? -light.dir[c] : light.pos[c] - rays.center[c];
   }
   rays.radius = __builtin_sqrtf(r2);
-  return ~facing | in_shadow(view, casters.list, casters.count, rays, axis, active);
+  return ~facing | in_shadow(view, casters, rays, axis, active);
 }
 
 // Colours 0..1 of `lanes`. `casters` by light; null: no light casts shadows here.
 inline void shade(const View& view, const Surfaces& s, const Hits& hits, std::uint32_t lanes,
-                  const Casters* casters, Colors& out) {
+                  Casters* casters, Colors& out) {
   Colors separate = {};
   for (int c = 0; c < 3; ++c)
     for (int k = 0; k < kLanes; k += kWidth) {

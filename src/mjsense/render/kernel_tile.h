@@ -17,23 +17,31 @@ struct TileHits {
 
 inline void fill_pixels(const PixelGrid& grid, int x0, int y0, float shift_x, float shift_y,
                         Pixels& out) {
+  // Lanes outside the image repeat its border: they cost nothing extra and disturb nobody.
+  float xs[4], ys[4];
+  int columns[4], rows[4];
+  for (int i = 0; i < 4; ++i) {
+    columns[i] = x0 + i < grid.width ? x0 + i : grid.width - 1;
+    rows[i] = y0 + i < grid.height ? y0 + i : grid.height - 1;
+    xs[i] = grid.left + grid.dx * (static_cast<float>(columns[i]) + (0.5f + shift_x));
+    ys[i] = grid.top + grid.dy * (static_cast<float>(rows[i]) + (0.5f + shift_y));
+  }
   float* w = out.window;
+  if (!grid.bent) {
+    for (int i = 0; i < kLanes; ++i) out.x[i] = xs[i % 4];
+    for (int i = 0; i < kLanes; ++i) out.y[i] = ys[i / 4];
+    w[0] = xs[0];
+    w[1] = xs[3];
+    w[2] = ys[3];
+    w[3] = ys[0];
+    return;
+  }
   w[0] = w[2] = kInfinity;
   w[1] = w[3] = -kInfinity;
   for (int i = 0; i < kLanes; ++i) {
-    // Lanes outside the image repeat its border: they cost nothing extra and disturb nobody.
-    const int x = x0 + i % 4 < grid.width ? x0 + i % 4 : grid.width - 1;
-    const int y = y0 + i / 4 < grid.height ? y0 + i / 4 : grid.height - 1;
-    float px, py;
-    if (grid.bent) {
-      px = grid.bent[2 * (y * grid.width + x)] + shift_x * grid.dx;
-      py = grid.bent[2 * (y * grid.width + x) + 1] + shift_y * grid.dy;
-    } else {
-      px = grid.left + grid.dx * (static_cast<float>(x) + (0.5f + shift_x));
-      py = grid.top + grid.dy * (static_cast<float>(y) + (0.5f + shift_y));
-    }
-    out.x[i] = px;
-    out.y[i] = py;
+    const float* ray = grid.bent + 2 * (rows[i / 4] * grid.width + columns[i % 4]);
+    const float px = out.x[i] = ray[0] + shift_x * grid.dx;
+    const float py = out.y[i] = ray[1] + shift_y * grid.dy;
     w[0] = px < w[0] ? px : w[0];
     w[1] = px > w[1] ? px : w[1];
     w[2] = py < w[2] ? py : w[2];
@@ -68,7 +76,7 @@ inline void find_casters(const View& view, const TileHits& tile, int packets, Ti
   int* next = scratch.casters;
   for (int i = 0; i < view.num_lights; ++i) {
     const ViewLight& light = view.lights[i];
-    out[i] = {next, 0};
+    out[i] = {next, 0, 0};
     if (!light.shadows || empty) continue;
     const bool directional = light.kind == LightKind::kDirectional;
     around.longest = directional ? kInfinity : 1.0f;
@@ -161,6 +169,30 @@ inline void first_hits(const View& view, const int* list, int count, const Pixel
   }
 }
 
+inline void write_depth(const View& view, const ImageTargets& targets, int x0, int y0,
+                        const Pixels& pixels, const Hits& hits) {
+  const PixelGrid& grid = view.grid;
+  alignas(64) float depth[kLanes];
+  for (int k = 0; k < kLanes; k += kWidth) {
+    Float t = load(hits.t + k);
+    if (targets.ray_depth && !grid.orthographic) {
+      const Float px = load(pixels.x + k), py = load(pixels.y + k);
+      t = t * sqrt(fma(px, px, fma(py, py, splat(1.0f))));
+    }
+    store(depth + k, select(less(int_of(-1), load(hits.geom + k)), t, splat(0.0f)));
+  }
+  const int columns = grid.width - x0 < 4 ? grid.width - x0 : 4;
+  const int rows = grid.height - y0 < 4 ? grid.height - y0 : 4;
+  for (int r = 0; r < rows; ++r) {
+    float* out = targets.depth + static_cast<std::size_t>(y0 + r) * grid.width + x0;
+    if (columns == 4) {
+      __builtin_memcpy(out, depth + 4 * r, 4 * sizeof(float));
+    } else {
+      for (int c = 0; c < columns; ++c) out[c] = depth[4 * r + c];
+    }
+  }
+}
+
 inline void write_geometry(const View& view, const ImageTargets& targets, int x0, int y0,
                            const Pixels& pixels, const Hits& hits) {
   Surfaces surfaces;
@@ -169,17 +201,14 @@ inline void write_geometry(const View& view, const ImageTargets& targets, int x0
     gather_surfaces(view, pixels, hits, hit_lanes(hits), false, surfaces);
   }
   const PixelGrid& grid = view.grid;
+  if (targets.depth) write_depth(view, targets, x0, y0, pixels, hits);
+  if (!targets.segmentation && !targets.normals && !targets.points) return;
   for (int i = 0; i < kLanes; ++i) {
     const int x = x0 + i % 4, y = y0 + i / 4;
     if (x >= grid.width || y >= grid.height) continue;
     const std::size_t at = static_cast<std::size_t>(y) * grid.width + x;
     const bool hit = hits.geom[i] >= 0;
     const float px = pixels.x[i], py = pixels.y[i], t = hits.t[i];
-    if (targets.depth) {
-      const float length =
-          grid.orthographic || !targets.ray_depth ? 1.0f : __builtin_sqrtf(px * px + py * py + 1);
-      targets.depth[at] = hit ? t * length : 0;
-    }
     if (targets.segmentation) {
       const ViewGeom* g = hit ? &view.geoms[hits.geom[i]] : nullptr;
       targets.segmentation[2 * at] = g ? g->id : -1;
@@ -201,12 +230,29 @@ struct TileLists {
   int opaque = 0, transparent = 0;
 };
 
+// What a row of tiles may show. A lens with distortion bends rows: there it is everything in sight.
+inline void find_row(const View& view, int ty, TileScratch& scratch) {
+  const PixelGrid& grid = view.grid;
+  const float high = grid.top + grid.dy * static_cast<float>(ty * kTileSize);
+  const float low = high + grid.dy * kTileSize;
+  scratch.row_count = 0;
+  for (int i = 0; i < view.num_opaque + view.num_transparent; ++i) {
+    const float* w = view.geoms[i].window;
+    if (grid.bent || (w[2] <= high && w[3] >= low)) scratch.row[scratch.row_count++] = i;
+  }
+}
+
 inline TileLists find_geoms(const View& view, const float* window, TileScratch& scratch) {
   TileLists lists;
-  for (int i = 0; i < view.num_opaque; ++i)
-    if (overlap(view.geoms[i].window, window)) scratch.opaque[lists.opaque++] = i;
-  for (int i = view.num_opaque; i < view.num_opaque + view.num_transparent; ++i)
-    if (overlap(view.geoms[i].window, window)) scratch.transparent[lists.transparent++] = i;
+  for (int i = 0; i < scratch.row_count; ++i) {
+    const int g = scratch.row[i];
+    if (!overlap(view.geoms[g].window, window)) continue;
+    if (g < view.num_opaque) {
+      scratch.opaque[lists.opaque++] = g;
+    } else {
+      scratch.transparent[lists.transparent++] = g;
+    }
+  }
   return lists;
 }
 
@@ -301,8 +347,10 @@ inline void render_tile(const View& view, const ImageTargets& targets, int tx, i
 inline void render_tiles(const View& view, const ImageTargets& targets, int first, int last,
                          TileScratch& scratch) {
   const int across = (view.grid.width + kTileSize - 1) / kTileSize;
-  for (int ty = first; ty < last; ++ty)
+  for (int ty = first; ty < last; ++ty) {
+    find_row(view, ty, scratch);
     for (int tx = 0; tx < across; ++tx) render_tile(view, targets, tx, ty, scratch);
+  }
 }
 
 }  // namespace

@@ -66,7 +66,22 @@ inline void trace_triangles(const ViewGeom& g, int index, const PixelGrid& grid,
   RTCRayHit16 rays;
   alignas(64) int valid[kLanes];
   if (!fill_rays(g, grid, pixels, near, hits.t, rays, valid)) return;
-  embree_intersect16(valid, static_cast<RTCScene>(g.bvh), &rays, true, true);
+  embree_intersect16(valid, static_cast<RTCScene>(g.bvh), &rays, false, true);
+  // A closed surface shows its front first. Only where a back came first is it worth to ask Embree
+  // about every triangle's side.
+  std::uint32_t backs = 0;
+  for (int k = 0; k < kLanes; k += kWidth) {
+    const Vec3f n{load(rays.hit.Ng_x + k), load(rays.hit.Ng_y + k), load(rays.hit.Ng_z + k)};
+    const Vec3f d{load(rays.ray.dir_x + k), load(rays.ray.dir_y + k), load(rays.ray.dir_z + k)};
+    int* ids = reinterpret_cast<int*>(rays.hit.geomID) + k;
+    const Mask back = less(int_of(-1), load(ids)) & (dot(n, d) > splat(0.0f));
+    backs |= bits(back) << k;
+    store(valid + k, select(back, int_of(-1), int_of(0)));
+    store(ids, select(back, int_of(-1), load(ids)));
+    const Float limit = load(hits.t + k) * splat(1.0f + kSame);
+    store(rays.ray.tfar + k, select(back, limit, load(rays.ray.tfar + k)));
+  }
+  if (backs) embree_intersect16(valid, static_cast<RTCScene>(g.bvh), &rays, true, true);
   for (int k = 0; k < kLanes; k += kWidth) {
     const Float t = load(rays.ray.tfar + k);
     const Float before = load(hits.t + k);
@@ -147,12 +162,15 @@ inline void trace_geom(const View& view, int index, const Pixels& pixels, Hits& 
 }
 
 inline void clear(Hits& hits, float far) {
-  for (int i = 0; i < kLanes; ++i) {
-    hits.t[i] = far;
-    hits.id[i] = -1;
-    hits.geom[i] = -1;
-    hits.prim[i] = -1;
-    hits.u[i] = hits.v[i] = hits.n[0][i] = hits.n[1][i] = hits.n[2][i] = 0;
+  const Float zero = splat(0.0f);
+  for (int k = 0; k < kLanes; k += kWidth) {
+    store(hits.t + k, splat(far));
+    store(hits.id + k, int_of(-1));
+    store(hits.geom + k, int_of(-1));
+    store(hits.prim + k, int_of(-1));
+    store(hits.u + k, zero);
+    store(hits.v + k, zero);
+    for (auto& n : hits.n) store(n + k, zero);
   }
 }
 
@@ -231,40 +249,55 @@ inline std::uint32_t shadow_of_triangles(const ViewGeom& g, int index, const Lig
   return dark;
 }
 
-// Lanes of `active` whose way to the light is barred by one of `casters`.
-inline std::uint32_t in_shadow(const View& view, const int* casters, int count,
-                               const LightRays& rays, const float* axis, std::uint32_t active) {
+inline std::uint32_t shadow_of_geom(const View& view, int caster, const LightRays& rays,
+                                    std::uint32_t active) {
+  const ViewGeom& g = view.geoms[caster];
+  if (g.bvh) return shadow_of_triangles(g, caster, rays, active);
   std::uint32_t dark = 0;
-  for (int i = 0; i < count && active; ++i) {
-    const ViewGeom& g = view.geoms[casters[i]];
-    if (!in_shaft(rays, axis, g)) continue;
-    std::uint32_t hit = 0;
-    if (g.bvh) {
-      hit = shadow_of_triangles(g, casters[i], rays, active);
+  for (int k = 0; k < kLanes; k += kWidth) {
+    const std::uint32_t lanes = active >> k & kAllLanes;
+    if (!lanes) continue;
+    const Vec3f p{load(rays.p[0] + k), load(rays.p[1] + k), load(rays.p[2] + k)};
+    const Vec3f o = to_geom(g.rot, p - splat(g.pos));
+    const Vec3f d = to_geom(g.rot, {load(rays.d[0] + k), load(rays.d[1] + k), load(rays.d[2] + k)});
+    const Int at = load(rays.geom + k), self = int_of(caster);
+    const Mask other = less(at, self) | less(self, at);
+    const Float end = load(rays.end + k);
+    Mask barred;
+    if (g.type == mjGEOM_PLANE) {
+      barred = plane(g, o, d, true) < end;
     } else {
-      for (int k = 0; k < kLanes; k += kWidth) {
-        const std::uint32_t lanes = active >> k & kAllLanes;
-        if (!lanes) continue;
-        const Vec3f p{load(rays.p[0] + k), load(rays.p[1] + k), load(rays.p[2] + k)};
-        const Vec3f o = to_geom(g.rot, p - splat(g.pos));
-        const Vec3f d =
-            to_geom(g.rot, {load(rays.d[0] + k), load(rays.d[1] + k), load(rays.d[2] + k)});
-        const Int at = load(rays.geom + k), self = int_of(casters[i]);
-        const Mask other = less(at, self) | less(self, at);
-        Mask barred;
-        if (g.type == mjGEOM_PLANE) {
-          barred = plane(g, o, d, true) < load(rays.end + k);
-        } else {
-          const Interval inside = solid(g, o, d);
-          barred = (inside.enter < load(rays.end + k)) & (inside.exit > splat(1e-5f));
-        }
-        hit |= (bits(barred & other) & lanes) << k;
-      }
+      const Interval inside = solid(g, o, d);
+      barred = (inside.enter < end) & (inside.exit > splat(1e-5f));
     }
-    dark |= hit;
-    active &= ~hit;
+    dark |= (bits(barred & other) & lanes) << k;
   }
   return dark;
+}
+
+// Geoms that may stand between a light and the points at hand. `hint`: the one that did for the
+// packet before; it is asked first, which changes nothing but the time.
+struct Casters {
+  const int* list;
+  int count;
+  int hint;
+};
+
+// Lanes of `active` whose way to the light is barred by one of `casters`.
+inline std::uint32_t in_shadow(const View& view, Casters& casters, const LightRays& rays,
+                               const float* axis, std::uint32_t active) {
+  if (casters.count == 0) return 0;
+  std::uint32_t left = active;
+  if (in_shaft(rays, axis, view.geoms[casters.list[casters.hint]]))
+    left &= ~shadow_of_geom(view, casters.list[casters.hint], rays, left);
+  for (int i = 0; i < casters.count && left; ++i) {
+    if (i == casters.hint || !in_shaft(rays, axis, view.geoms[casters.list[i]])) continue;
+    const std::uint32_t dark = shadow_of_geom(view, casters.list[i], rays, left);
+    if (!dark) continue;
+    left &= ~dark;
+    if (!left) casters.hint = i;
+  }
+  return active & ~left;
 }
 
 }  // namespace

@@ -48,10 +48,10 @@ void halve(const std::uint32_t* src, int width, int height, std::uint32_t* dst, 
 
 }  // namespace
 
-Look::Look(const mjModel* model, unsigned group_mask) {
+Look::Look(const mjModel* model, unsigned group_mask, bool textures) {
   textures_.resize(model->ntex);
   meshes_.resize(model->nmesh);
-  for (int i = 0; i < model->ntex; ++i) add_texture(model, i);
+  for (int i = 0; i < model->ntex && textures; ++i) add_texture(model, i);
   for (int i = 0; i < model->ntex && !skybox_; ++i)
     if (model->tex_type[i] == mjTEXTURE_SKYBOX && textures_[i].levels > 0) skybox_ = &textures_[i];
   for (int g = 0; g < model->ngeom; ++g) {

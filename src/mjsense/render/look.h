@@ -33,7 +33,7 @@ struct MeshLook {
 class Look {
  public:
   // Only meshes of geoms whose group is in `group_mask` (bit g) are prepared.
-  Look(const mjModel* model, unsigned group_mask);
+  Look(const mjModel* model, unsigned group_mask, bool textures);
   Look(const Look&) = delete;
   Look& operator=(const Look&) = delete;
 

@@ -96,6 +96,8 @@ inline constexpr int kTileSize = 16;  // pixels; a tile is 4 x 4 packets of 4 x 
 
 // Work space of one thread: lists as long as the view has geoms.
 struct TileScratch {
+  int* row = nullptr;  // geoms in sight of the row of tiles
+  int row_count = 0;
   int* opaque = nullptr;  // geoms in sight of the tile
   int* transparent = nullptr;
   int* casters = nullptr;  // of all lights: kMaxLights times as long

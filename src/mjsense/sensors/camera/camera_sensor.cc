@@ -58,7 +58,8 @@ void CameraSensor::initialize(const SensorInit& init) {
                                  model_->nlight, View::kMaxLights - 1));
   groups_ = 0;
   for (int g : cfg_.enabled_geom_groups) groups_ |= 1u << g;
-  look_ = std::make_unique<Look>(model_, groups_);
+  look_ = std::make_unique<Look>(model_, wants("rgb") || wants("normals") ? groups_ : 0u,
+                                 wants("rgb") && cfg_.use_textures);
   workspace_.reset();
   clear_fields();
   declare_fields(init.num_worlds);
@@ -90,9 +91,13 @@ void CameraSensor::initialize(const SensorInit& init) {
   for (int i = 0; i < init.threads; ++i) {
     workspace_->hits.emplace_back(DType::kUint8,
                                   Shape{static_cast<std::int64_t>(tile_hits_bytes())});
-    std::vector<int>& list = workspace_->lists.emplace_back((2 + View::kMaxLights) * geoms);
-    workspace_->scratch.push_back({list.data(), list.data() + geoms, list.data() + 2 * geoms,
-                                   workspace_->hits.back().data()});
+    std::vector<int>& list = workspace_->lists.emplace_back((3 + View::kMaxLights) * geoms);
+    TileScratch& scratch = workspace_->scratch.emplace_back();
+    scratch.row = list.data();
+    scratch.opaque = scratch.row + geoms;
+    scratch.transparent = scratch.opaque + geoms;
+    scratch.casters = scratch.transparent + geoms;
+    scratch.hits = workspace_->hits.back().data();
   }
 }
 
