@@ -103,7 +103,7 @@ int run_sensors(const SensorsOptions& options) {
       throw ValueError(fmt::format("{}: no such file", options.what));
     }
     SceneCfg cfg;
-    cfg.entities.emplace_back(path.stem().string(), EntityCfg{.model = {.path = options.what}});
+    cfg.base.path = options.what;
     Simulation simulation(std::make_shared<Scene>(std::move(cfg)), {});
     print(scene_lines(simulation, options.steps), options.json);
     return 0;

@@ -9,7 +9,6 @@
 #include <utility>
 
 #include "mjsense/core/error.h"
-#include "mjsense/core/match.h"
 #include "mjsense/scene/assets.h"
 #include "mjsense/scene/options.h"
 #include "mjsense/scene/resolve.h"
@@ -37,36 +36,6 @@ void name_unnamed(mjSpec* spec) {
       mjs_setName(elements[i], name.c_str());
     }
   }
-}
-
-std::vector<double> values_of(const mjDoubleVec* values) {
-  int size = 0;
-  const double* data = mjs_getDouble(values, &size);
-  return {data, data + size};
-}
-
-// The first keyframe is kept aside, all are removed: MuJoCo would make each a keyframe of the whole
-// scene.
-InitialState take_keyframes(mjSpec* spec, const std::string& place,
-                            std::vector<std::string>& warnings) {
-  InitialState init;
-  const std::vector<mjsElement*> keys = spec_elements(spec, mjOBJ_KEY);
-  if (keys.size() > 1) {
-    warnings.push_back(fmt::format("{}: {} keyframes; only the first, '{}', goes into init_state",
-                                   place, keys.size(), element_name(keys[0])));
-  }
-  if (!keys.empty()) {
-    const mjsKey* key = mjs_asKey(keys[0]);
-    init = {true,
-            values_of(key->qpos),
-            values_of(key->qvel),
-            values_of(key->act),
-            values_of(key->ctrl),
-            values_of(key->mpos),
-            values_of(key->mquat)};
-  }
-  for (mjsElement* key : keys) mjs_delete(spec, key);
-  return init;
 }
 
 void drop_options(mjSpec* spec, const std::string& place, std::vector<std::string>& warnings) {
@@ -100,6 +69,12 @@ void move_visual(mjSpec* from, mjSpec* to) {
   move(a.visual_scale, b.visual_scale, from->visual.scale, to->visual.scale);
   move(a.visual_rgba, b.visual_rgba, from->visual.rgba, to->visual.rgba);
   from->visual = to->visual;
+}
+
+bool any_mocap(const mjSpec* spec) {
+  const std::vector<mjsElement*> bodies = spec_elements(spec, mjOBJ_BODY);
+  return std::any_of(bodies.begin(), bodies.end(),
+                     [](mjsElement* body) { return mjs_asBody(body)->mocap; });
 }
 
 bool is_identity(const EntityCfg& cfg) {
@@ -140,8 +115,8 @@ Attached attach_entity(mjSpec* scene, const std::string& name, const EntityCfg& 
   }
   if (free_joints.size() > 1) {
     throw ValueError(fmt::format(
-        "{}: its model has {} freejoints ('{}', '{}', ...); an entity has at most one, make each "
-        "floating part an entity",
+        "{}: its model has {} freejoints ('{}', '{}', ...); an entity has at most one; make each "
+        "floating part an entity, or the whole model the scene's base",
         place, free_joints.size(), element_name(free_joints[0]), element_name(free_joints[1])));
   }
   attached.fixed_base = free_joints.empty();
@@ -152,7 +127,12 @@ Attached attach_entity(mjSpec* scene, const std::string& name, const EntityCfg& 
   mjsBody* world = mjs_findBody(scene, "world");
   mjsElement* root = mjs_firstChild(mjs_findBody(child.get(), "world"), mjOBJ_BODY, 0);
   const bool is_mocap = root && mjs_asBody(root)->mocap;
-  attached.wrapped = attached.fixed_base && !is_mocap && cfg.mocap_base;
+  const bool has_mocap = any_mocap(child.get());
+  attached.wrapped = attached.fixed_base && !has_mocap && cfg.mocap_base;
+  if (attached.fixed_base && has_mocap && !is_mocap && cfg.mocap_base) {
+    warnings.push_back(fmt::format(
+        "{}: stays on the world body, because MuJoCo does not nest its mocap bodies", place));
+  }
   mjsBody* parent = world;
   if (attached.wrapped) {
     parent = mjs_addBody(world, nullptr);
@@ -176,73 +156,14 @@ Attached attach_entity(mjSpec* scene, const std::string& name, const EntityCfg& 
   return attached;
 }
 
-void merge_initial_states(const std::vector<Attached>& entities, mjModel* m) {
-  const auto put = [](const std::vector<double>& values, mjtNum* target, int size,
-                      const char* field, const Attached& e) {
-    if (static_cast<int>(values.size()) > size) {
-      throw ValueError(fmt::format("{}: its keyframe has {} values of {}, the entity {}",
-                                   place_of(e.name), values.size(), field, size));
-    }
-    std::copy(values.begin(), values.end(), target);
-  };
-  for (const Attached& e : entities) {
-    const std::string prefix = e.name + "/";
-    int qpos = -1, nq = 0, dof = -1, nv = 0;
-    for (int j = 0; j < m->njnt; ++j) {
-      const std::string name = name_of(m, mjOBJ_JOINT, j);
-      if (!name.starts_with(prefix)) continue;
-      if (qpos < 0) qpos = m->jnt_qposadr[j], dof = m->jnt_dofadr[j];
-      const int type = m->jnt_type[j];
-      nq += type == mjJNT_FREE ? 7 : type == mjJNT_BALL ? 4 : 1;
-      nv += type == mjJNT_FREE ? 6 : type == mjJNT_BALL ? 3 : 1;
-      if (e.init.from_xml) continue;
-      mjtNum* q = m->key_qpos + m->jnt_qposadr[j];
-      if (type == mjJNT_FREE) {
-        std::copy(e.cfg.pos.begin(), e.cfg.pos.end(), q);
-        std::copy(e.cfg.quat.begin(), e.cfg.quat.end(), q + 3);
-        mju_normalize4(q + 3);
-      } else if (type == mjJNT_HINGE || type == mjJNT_SLIDE) {
-        q[0] = 0;
-        for (const auto& [pattern, value] : e.cfg.joint_pos) {
-          if (!Regex(pattern, place_of(e.name) + ": joint_pos")
-                   .fullmatch(name.substr(prefix.size())))
-            continue;
-          q[0] = value;
-          break;
-        }
-      }
-    }
-    if (!e.init.from_xml) continue;
-    if (qpos >= 0) {
-      put(e.init.qpos, m->key_qpos + qpos, nq, "qpos", e);
-      put(e.init.qvel, m->key_qvel + dof, nv, "qvel", e);
-    }
-    int ctrl = -1, nu = 0, act = -1, na = 0;
-    for (int a = 0; a < m->nactuator; ++a) {
-      if (!name_of(m, mjOBJ_ACTUATOR, a).starts_with(prefix)) continue;
-      if (ctrl < 0) ctrl = m->actuator_ctrladr[a];
-      nu += m->actuator_ctrlnum[a];
-      if (m->actuator_actadr[a] >= 0) {
-        if (act < 0) act = m->actuator_actadr[a];
-        na += m->actuator_actnum[a];
-      }
-    }
-    if (ctrl >= 0) put(e.init.ctrl, m->key_ctrl + ctrl, nu, "ctrl", e);
-    if (act >= 0) put(e.init.act, m->key_act + act, na, "act", e);
-    int mocap = -1, nmocap = 0;
-    for (int b = 0; b < m->nbody; ++b) {
-      const std::string name = name_of(m, mjOBJ_BODY, b);
-      if (m->body_mocapid[b] < 0 || !name.starts_with(prefix) ||
-          (e.wrapped && name == prefix + "mocap_base"))
-        continue;
-      if (mocap < 0) mocap = m->body_mocapid[b];
-      ++nmocap;
-    }
-    if (mocap >= 0) {
-      put(e.init.mpos, m->key_mpos + 3 * mocap, 3 * nmocap, "mpos", e);
-      put(e.init.mquat, m->key_mquat + 4 * mocap, 4 * nmocap, "mquat", e);
-    }
-  }
+Attached adopt_base(mjSpec* base, const ModelSource& source, Vfs& vfs,
+                    std::vector<std::string>& warnings) {
+  adopt_assets(base, source, "", vfs);
+  name_unnamed(base);
+  Attached attached;
+  attached.init = take_keyframes(base, "scene base", warnings);
+  drop_options(base, "scene base", warnings);
+  return attached;
 }
 
 }  // namespace mjsense

@@ -17,6 +17,8 @@ struct ModelSource {
   std::string xml;                            // or this text
   const mjSpec* spec = nullptr;               // or this spec, which is copied
   std::map<std::string, std::string> assets;  // name -> bytes, for xml and spec
+
+  bool empty() const { return path.empty() && xml.empty() && spec == nullptr; }
 };
 
 struct EntityCfg {

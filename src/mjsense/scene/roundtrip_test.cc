@@ -6,8 +6,11 @@
 #include <mujoco/mjxmacro.h>
 
 #include <cmath>
+#include <cstdio>
+#include <cstdlib>
 #include <filesystem>
 #include <fstream>
+#include <sstream>
 
 #include "mjsense/core/error.h"
 #include "mjsense/scene/scene.h"
@@ -40,11 +43,25 @@ std::vector<std::string> differences(const mjModel* a, const mjModel* b) {
 #undef X
   if (!out.empty()) return out;
   MJMODEL_POINTERS_PREAMBLE(a)
-#define X(type, name, nr, nc) compare(#name, a->name, b->name, static_cast<long>(a->nr) * (nc));
+  // Sizes that a type does not use are not saved.
+  const auto compare_sizes = [&](const char* name, const int* type, const mjtNum* x,
+                                 const mjtNum* y, long n) {
+    for (long i = 0; i < n; ++i) {
+      const int used = type[i] == mjGEOM_SPHERE                                  ? 1
+                       : type[i] == mjGEOM_CAPSULE || type[i] == mjGEOM_CYLINDER ? 2
+                                                                                 : 3;
+      compare(name, x + 3 * i, y + 3 * i, used);
+    }
+  };
+#define X(type, name, nr, nc)                                                           \
+  if (std::string_view(#name) != "geom_size" && std::string_view(#name) != "site_size") \
+    compare(#name, a->name, b->name, static_cast<long>(a->nr) * (nc));
 #define XNV X
   MJMODEL_POINTERS
 #undef XNV
 #undef X
+  compare_sizes("geom_size", a->geom_type, a->geom_size, b->geom_size, a->ngeom);
+  compare_sizes("site_size", a->site_type, a->site_size, b->site_size, a->nsite);
   compare("opt.timestep", &a->opt.timestep, &b->opt.timestep, 1);
   compare("opt.gravity", a->opt.gravity, b->opt.gravity, 3);
   compare("opt.disableflags", &a->opt.disableflags, &b->opt.disableflags, 1);
@@ -169,6 +186,36 @@ TEST(RoundTrip, GeneratedTerrain) {
       {"a",
        xml("<mujoco><worldbody><body><freejoint/><geom size='.1'/></body></worldbody></mujoco>")}};
   expect_round_trip(Scene(std::move(cfg)));
+}
+
+// Every model below the folders MJSENSE_TEST_MODELS (separated by ':') that MuJoCo itself loads, twice in one scene.
+TEST(RoundTrip, ModelsOfFolders) {
+  const char* folders = std::getenv("MJSENSE_TEST_MODELS");
+  if (!folders) GTEST_SKIP() << "MJSENSE_TEST_MODELS is not set";
+  std::stringstream list(folders);
+  int tested = 0;
+  for (std::string folder; std::getline(list, folder, ':');) {
+    for (const auto& entry : std::filesystem::recursive_directory_iterator(folder)) {
+      if (entry.path().extension() != ".xml") continue;
+      const std::string path = entry.path().string();
+      char error[1000];
+      ModelPtr plain(mj_loadXML(path.c_str(), nullptr, error, sizeof error));
+      if (!plain) continue;
+      SCOPED_TRACE(path);
+      try {
+        SceneCfg base;
+        base.base.path = path;
+        expect_round_trip(Scene(std::move(base)));
+        SceneCfg cfg;
+        cfg.entities = {{"a", {.model = {.path = path}}}, {"b", {.model = {.path = path}}}};
+        expect_round_trip(Scene(std::move(cfg)));
+        ++tested;
+      } catch (const std::exception& e) {
+        std::printf("%s: %s\n", path.c_str(), e.what());
+      }
+    }
+  }
+  std::printf("%d models\n", tested);
 }
 
 }  // namespace

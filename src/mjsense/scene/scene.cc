@@ -63,10 +63,13 @@ struct Scene::Impl {
 };
 
 void Scene::Impl::build() {
-  spec = cfg.spec ? SpecPtr(cfg.spec, SpecDelete{false}) : SpecPtr(mj_makeSpec());
+  spec = cfg.spec           ? SpecPtr(cfg.spec, SpecDelete{false})
+         : cfg.base.empty() ? SpecPtr(mj_makeSpec())
+                            : parse_model(cfg.base, "scene base");
+  attached.push_back(adopt_base(spec.get(), cfg.base, vfs, warnings));
   mj_defaultOption(&spec->option);
   apply_options(cfg.options, spec->option);
-  spec->stat.meansize = 0.03;
+  if (std::isnan(spec->stat.meansize)) spec->stat.meansize = 0.03;
   if (cfg.extent) {
     if (!(*cfg.extent > 0))
       throw ValueError(fmt::format("scene: extent = {} must be positive (m)", *cfg.extent));
@@ -76,14 +79,16 @@ void Scene::Impl::build() {
   spec->compiler.conflict = mjCONFLICT_MERGE;  // sizes: the larger wins
 
   if (cfg.terrain) terrain.emplace(*cfg.terrain).add_to(spec.get());
+  std::vector<std::string> said;
   {
-    // What MuJoCo says about sizes while merging is of no use to anybody.
-    std::vector<std::string> chatter;
-    WarningCapture capture(chatter);
+    WarningCapture capture(said);
     for (const auto& [name, entity] : cfg.entities) {
       check_name(name, cfg.terrain.has_value(), attached);
       attached.push_back(attach_entity(spec.get(), name, entity, vfs, warnings));
     }
+  }
+  for (std::string& text : said) {  // which size wins is of no use to anybody
+    if (!text.starts_with("Attach conflict")) warnings.push_back(std::move(text));
   }
   add_sensors();
   mjs_setName(mjs_addKey(spec.get())->element, kInitState);
@@ -91,8 +96,10 @@ void Scene::Impl::build() {
   compile();
 
   if (cfg.terrain) entities.push_back(describe(model.get(), "terrain", true));
-  for (const Attached& entity : attached)
+  for (const Attached& entity : attached) {
+    if (entity.name.empty()) continue;
     entities.push_back(describe(model.get(), entity.name, entity.fixed_base));
+  }
 }
 
 // Keys are unique: two sensors of one name are an error, always.

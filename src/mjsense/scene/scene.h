@@ -21,6 +21,9 @@
 namespace mjsense {
 
 struct SceneCfg {
+  // A whole model to start from, as it is: names without a prefix, any number of free joints. Its
+  // sensors are discovered; it is no entity. Empty: an empty world.
+  ModelSource base;
   std::vector<std::pair<std::string, EntityCfg>>
       entities;                       // attached in this order, names prefixed "name/"
   std::optional<TerrainCfg> terrain;  // attached first, without a prefix
@@ -28,7 +31,7 @@ struct SceneCfg {
   double env_spacing = 2.0;      // m, grid of world origins on a plane
   std::optional<double> extent;  // m, overrides stat.extent
   OptionsCfg options;
-  // Empty spec that the scene is built in and that must live as long as the scene; null: one of the
+  // Spec that the scene is built in (its contents are the base) and that must live as long as the scene; null: one of the
   // scene's own. The Python package passes its MjSpec's, so that spec_fn sees the real thing.
   mjSpec* spec = nullptr;
   std::function<void(mjSpec*)>

@@ -3,9 +3,12 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
+#include <functional>
 
 #include "mjsense/core/error.h"
+#include "mjsense/scene/resolve.h"
 
 namespace mjsense {
 namespace {
@@ -49,6 +52,240 @@ TEST(Scene, AttachesWithPrefixesInOrder) {
   EXPECT_EQ(scene.sensors()[0]->name(), "robot/g");
   EXPECT_EQ(scene.sensors()[1]->name(), "robot/sensor_1");
   EXPECT_THAT(scene.to_xml(), HasSubstr("init_state"));
+}
+
+std::string fault(SceneCfg cfg) {
+  try {
+    Scene{std::move(cfg)};
+  } catch (const Error& error) {
+    return error.what();
+  }
+  return "no error";
+}
+
+std::string fault(const std::string& name, EntityCfg entity) {
+  SceneCfg cfg;
+  cfg.entities = {{name, std::move(entity)}};
+  return fault(std::move(cfg));
+}
+
+constexpr const char* kBall =
+    "<mujoco><worldbody><body name='b'><freejoint/><geom size='.1'/></body></worldbody></mujoco>";
+
+TEST(Scene, SaysWhatIsWrongWithAnEntity) {
+  EXPECT_EQ(fault("a", {.model = {.path = "/nowhere/a.xml"}}),
+            "entity 'a': no file '/nowhere/a.xml'");
+  EXPECT_THAT(fault("a", {.model = {.path = "embedded:franka/fr4.xml"}}), HasSubstr("franka/fr"));
+  EXPECT_EQ(fault("a", {}), "entity 'a': no model; give a path or an XML text");
+  EXPECT_THAT(fault("a", {.model = {.path = "x.xml", .xml = kBall}}), HasSubstr("not both"));
+  EXPECT_THAT(fault("a", xml("<mujoco><worldbody><geom sise='1'/></worldbody></mujoco>")),
+              HasSubstr("entity 'a': XML Error: Schema violation: unrecognized attribute: 'sise'"));
+  EXPECT_THAT(fault("a", xml("<mujoco><worldbody>")), HasSubstr("entity 'a': XML"));
+  EXPECT_THAT(
+      fault("a", xml("<mujoco><worldbody><body name='x'><joint/></body></worldbody></mujoco>")),
+      HasSubstr("a/x"));
+  EXPECT_THAT(
+      fault("a", xml("<mujoco><asset><mesh file='none.obj'/></asset><worldbody/></mujoco>")),
+      HasSubstr("none.obj"));
+  EXPECT_EQ(fault("", xml(kBall)), "scene: an entity needs a name");
+  EXPECT_EQ(fault("a/b", xml(kBall)), "entity 'a/b': '/' is not allowed in a name");
+  EXPECT_THAT(fault("a", {.model = {.xml = kBall}, .quat = {0, 0, 0, 0}}),
+              HasSubstr("no rotation"));
+  EXPECT_THAT(
+      fault("x", xml("<mujoco><worldbody><body name='a'><freejoint/><geom size='.1'/></body><body "
+                     "name='b'><freejoint/><geom size='.1'/></body></worldbody></mujoco>")),
+      HasSubstr(
+          "entity 'x': its model has 2 freejoints ('floating_base_joint', 'floating_base_joint_'"));
+  EXPECT_EQ(fault("a", {.model = {.xml = kRobot}, .joint_pos = {{"sholder", 1}}}),
+            "entity 'a': joint_pos: 'sholder' matches no hinge or slide; did you mean 'shoulder'?");
+  SceneCfg twice;
+  twice.entities = {{"a", xml(kBall)}, {"a", xml(kBall)}};
+  EXPECT_EQ(fault(std::move(twice)), "entity 'a': there are two of this name");
+  SceneCfg terrain;
+  terrain.terrain.emplace();
+  terrain.entities = {{"terrain", xml(kBall)}};
+  EXPECT_EQ(fault(std::move(terrain)),
+            "entity 'terrain': the name is taken by the scene's terrain");
+}
+
+TEST(Scene, SaysWhatIsWrongWithAnOption) {
+  const auto option_fault = [](const std::function<void(OptionsCfg&)>& edit) {
+    SceneCfg cfg;
+    edit(cfg.options);
+    return fault(std::move(cfg));
+  };
+  EXPECT_THAT(option_fault([](auto& o) { o.integrator = "rk5"; }),
+              HasSubstr("integrator = 'rk5' is not known; expected one of Euler, RK4"));
+  EXPECT_EQ(option_fault([](auto& o) { o.integrator = "euler"; }), "no error");
+  EXPECT_THAT(option_fault([](auto& o) { o.timestep = 0; }), HasSubstr("timestep = 0 must be"));
+  EXPECT_EQ(option_fault([](auto& o) { o.disableflags = {"contacts"}; }),
+            "options: disableflags has no flag 'contacts'; did you mean 'contact'?");
+  EXPECT_THAT(option_fault([](auto& o) { o.enableflags = {"contact"}; }),
+              HasSubstr("no flag 'contact'"));
+  for (int i = 0; i < mjNDISABLE; ++i) {  // every name that MJCF knows is known here
+    SceneCfg cfg;
+    std::string name = mjDISABLESTRING[i];
+    std::transform(name.begin(), name.end(), name.begin(), ::tolower);
+    cfg.options.disableflags = {name};
+    const Scene scene(std::move(cfg));
+    EXPECT_EQ(scene.model()->opt.disableflags, 1 << i) << name;
+    EXPECT_THAT(scene.to_xml(), HasSubstr(name + "=\"disable\""));
+  }
+}
+
+TEST(Scene, LooksUpWithNearestNames) {
+  SceneCfg cfg;
+  cfg.entities = {{"robot", xml(kRobot)}};
+  Scene scene(std::move(cfg));
+  EXPECT_EQ(scene.sensor("robot/g").name(), "robot/g");
+  EXPECT_EQ(scene.find_sensor("g"), nullptr);
+  try {
+    scene.sensor("g");
+    FAIL();
+  } catch (const KeyError& error) {
+    EXPECT_STREQ(error.what(), "scene: sensor 'g' not found; did you mean 'robot/g'?");
+  }
+  EXPECT_THROW(scene.entity("robt"), KeyError);
+  const ResolvedObj site =
+      resolve(scene.model(), &scene, {.type = "site", .name = "imu", .entity = "robot"}, "test");
+  EXPECT_EQ(name_of(scene.model(), site.type, site.id), "robot/imu");
+  const auto fault_of = [&](ObjRef ref) -> std::string {
+    try {
+      resolve(scene.model(), &scene, ref, "sensor 's'");
+    } catch (const Error& error) {
+      return error.what();
+    }
+    return "";
+  };
+  EXPECT_EQ(fault_of({"site", "imu", "robo"}),
+            "sensor 's': no entity named 'robo'; did you mean 'robot'?");
+  EXPECT_EQ(fault_of({"site", "imi", "robot"}),
+            "sensor 's': no site named 'robot/imi'; did you mean 'robot/imu'?");
+  EXPECT_THAT(fault_of({"sight", "imu", "robot"}), HasSubstr("unknown object type 'sight'"));
+}
+
+TEST(Scene, PlacesEntities) {
+  SceneCfg cfg;
+  const std::array<double, 3> pos{1, 2, 3};
+  const std::array<double, 4> quat{2, 2, 0, 0};
+  cfg.entities = {
+      {"ball", {.model = {.xml = kBall}, .pos = pos, .quat = quat}},
+      {"table", {.model = {.xml = kTable}, .pos = pos, .quat = quat}},
+      {"post",
+       {.model = {.xml = "<mujoco><worldbody><geom name='g' size='.1'/></worldbody></mujoco>"},
+        .pos = pos,
+        .mocap_base = false}},
+      {"robot", {.model = {.xml = kRobot}, .joint_pos = {{"should.*", .5}, {".*", .7}}}}};
+  cfg.entities[3].second.joint_pos.pop_back();
+  Scene scene(std::move(cfg));
+  const mjModel* m = scene.model();
+  EXPECT_THAT(std::vector<double>(m->qpos0, m->qpos0 + 3), ElementsAre(1, 2, 3));
+  EXPECT_THAT(std::vector<double>(m->key_qpos, m->key_qpos + 3), ElementsAre(1, 2, 3));
+  EXPECT_NEAR(m->key_qpos[4], std::sqrt(.5), 1e-12);
+  const int base = mj_name2id(m, mjOBJ_BODY, "table/mocap_base");
+  EXPECT_THAT(std::vector<double>(m->body_pos + 3 * base, m->body_pos + 3 * base + 3),
+              ElementsAre(1, 2, 3));
+  EXPECT_NEAR(m->body_quat[4 * base + 1], std::sqrt(.5), 1e-12);
+  EXPECT_EQ(m->body_mocapid[base], 0);
+  const int post = mj_name2id(m, mjOBJ_GEOM, "post/g");
+  EXPECT_EQ(m->geom_bodyid[post], 0);
+  EXPECT_THAT(std::vector<double>(m->geom_pos + 3 * post, m->geom_pos + 3 * post + 3),
+              ElementsAre(1, 2, 3));
+  EXPECT_EQ(m->key_qpos[m->nq - 1], .5);
+}
+
+TEST(Scene, JoinsKeyframes) {
+  const char* legged =
+      "<mujoco><worldbody><body><freejoint/><geom size='.1'/><body><joint name='j' range='-9 "
+      "9'/><geom size='.1'/>"
+      "</body></body></worldbody><actuator><general joint='j' dyntype='integrator' "
+      "name='a'/><motor joint='j'/></actuator>"
+      "<keyframe><key name='home' qpos='1 2 3 0 1 0 0 .4' qvel='1 2 3 4 5 6 7' act='.5' ctrl='.6 "
+      ".7'/><key "
+      "name='other'/></keyframe></mujoco>";
+  SceneCfg cfg;
+  cfg.entities = {
+      {"table", xml(kTable)}, {"one", xml(legged)}, {"robot", xml(kRobot)}, {"two", xml(legged)}};
+  Scene scene(std::move(cfg));
+  const mjModel* m = scene.model();
+  ASSERT_EQ(m->nkey, 1);
+  EXPECT_STREQ(mj_id2name(m, mjOBJ_KEY, 0), "init_state");
+  EXPECT_THAT(
+      std::vector<double>(m->key_qpos, m->key_qpos + m->nq),
+      ElementsAre(.25, 1, 2, 3, 0, 1, 0, 0, .4, 0, 0, 0, 1, 0, 0, 0, 0, 1, 2, 3, 0, 1, 0, 0, .4));
+  EXPECT_THAT(std::vector<double>(m->key_ctrl, m->key_ctrl + m->nu),
+              ElementsAre(.6, .7, 0, .6, .7));
+  EXPECT_THAT(std::vector<double>(m->key_act, m->key_act + m->na), ElementsAre(.5, .5));
+  EXPECT_THAT(std::vector<double>(m->key_qvel, m->key_qvel + 8),
+              ElementsAre(0, 1, 2, 3, 4, 5, 6, 7));
+  EXPECT_THAT(scene.warnings(), ::testing::Contains(HasSubstr("entity 'one': 2 keyframes")));
+}
+
+TEST(Scene, SpecFnComesLast) {
+  SceneCfg cfg;
+  cfg.entities = {{"robot", xml(kRobot)}};
+  cfg.extent = 4;
+  cfg.spec_fn = [](mjSpec* spec) {
+    mjsSite* site = mjs_addSite(mjs_findBody(spec, "robot/arm"), nullptr);
+    mjs_setName(site->element, "extra");
+    mjsSensor* sensor = mjs_addSensor(spec);
+    mjs_setName(sensor->element, "late");
+    sensor->type = mjSENS_CLOCK;
+    spec->option.timestep = .004;
+  };
+  Scene scene(std::move(cfg));
+  EXPECT_GE(mj_name2id(scene.model(), mjOBJ_SITE, "extra"), 0);
+  EXPECT_EQ(scene.model()->opt.timestep, .004);
+  EXPECT_EQ(scene.model()->stat.extent, 4);
+  EXPECT_FLOAT_EQ(scene.model()->stat.meansize, .03);
+  EXPECT_EQ(scene.find_sensor("late"), nullptr);
+}
+
+// A whole model as it is, with two free bodies and its keyframe, and an entity on top.
+TEST(Scene, Base) {
+  SceneCfg cfg;
+  cfg.base.xml =
+      "<mujoco><worldbody><geom type='plane' size='1 1 1'/><body name='a'><freejoint/><geom "
+      "size='.1'/></body><body "
+      "name='b'><freejoint/><geom size='.1'/><site name='s'/></body></worldbody><sensor><gyro "
+      "site='s'/></sensor>"
+      "<keyframe><key qpos='1 2 3 1 0 0 0 4 5 6 1 0 0 0'/></keyframe></mujoco>";
+  cfg.entities = {{"table", xml(kTable)}};
+  Scene scene(std::move(cfg));
+  const mjModel* m = scene.model();
+  EXPECT_GE(mj_name2id(m, mjOBJ_BODY, "a"), 0);
+  EXPECT_EQ(m->njnt, 3);
+  EXPECT_THAT(std::vector<double>(m->key_qpos, m->key_qpos + m->nq),
+              ElementsAre(1, 2, 3, 1, 0, 0, 0, 4, 5, 6, 1, 0, 0, 0, .25));
+  EXPECT_EQ(scene.sensors().at(0)->name(), "sensor_0");
+  EXPECT_EQ(scene.entities().size(), 1u);
+}
+
+TEST(Scene, LeavesMocapBodiesInTheWorld) {
+  SceneCfg cfg;
+  cfg.entities = {
+      {"lab", xml("<mujoco><worldbody><body name='post'><geom size='.1'/></body><body name='hand' "
+                  "mocap='true'/>"
+                  "</worldbody></mujoco>")},
+      {"tracker", xml("<mujoco><worldbody><body name='t' mocap='true'/></worldbody></mujoco>")}};
+  Scene scene(std::move(cfg));
+  EXPECT_THAT(scene.entity("lab").body_names, ElementsAre("post", "hand"));
+  EXPECT_THAT(scene.entity("tracker").body_names, ElementsAre("t"));
+  EXPECT_TRUE(scene.entity("lab").fixed_base);
+  EXPECT_THAT(scene.warnings(), ElementsAre(HasSubstr("entity 'lab': stays on the world body")));
+}
+
+TEST(Scene, KeepsTheLooksOfTheFirstThatSays) {
+  SceneCfg cfg;
+  cfg.entities = {
+      {"a", xml("<mujoco><visual><map znear='.5'/></visual><size nuserdata='3'/></mujoco>")},
+      {"b", xml("<mujoco><visual><map znear='.25'/><headlight ambient='.5 .5 .5'/></visual>"
+                "<size nuserdata='7'/></mujoco>")}};
+  Scene scene(std::move(cfg));
+  EXPECT_FLOAT_EQ(scene.model()->vis.map.znear, .5f);
+  EXPECT_FLOAT_EQ(scene.model()->vis.headlight.ambient[0], .5f);
+  EXPECT_EQ(scene.model()->nuserdata, 7);
+  EXPECT_THAT(scene.warnings(), ::testing::IsEmpty());
 }
 
 }  // namespace
