@@ -43,3 +43,4 @@ from mjsense.scene import Entity, Scene
 from mjsense.sensor import BuiltinSensor, NativeSensor, Sensor, SensorError
 from mjsense.simulation import Simulation
 from mjsense.suite import SensorSuite
+from mjsense.vector import TaskVectorEnv, make_vec

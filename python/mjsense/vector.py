@@ -1,0 +1,195 @@
+"""Tasks as gymnasium vector environments."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from types import SimpleNamespace
+from typing import Any
+
+import gymnasium
+import numpy as np
+from gymnasium.vector import AutoresetMode, VectorEnv
+from gymnasium.vector.utils import batch_space
+
+from mjsense import _core
+from mjsense.sensor import _box
+from mjsense.simulation import Simulation
+
+
+class TaskVectorEnv(VectorEnv):
+    """``num_envs`` worlds that play episodes of a task; made by :func:`make_vec`.
+
+    Observations are copies (gymnasium's rule); ``env.rows`` are the sensors' own arrays. A world whose episode has ended begins the
+    next one in the next step, whose action it ignores (autoreset mode NEXT_STEP).
+    """
+
+    metadata = {"render_modes": ["rgb_array"], "autoreset_mode": AutoresetMode.NEXT_STEP}
+
+    def __init__(self, config: SimpleNamespace, observations: Sequence[str] | None, render_mode: str | None) -> None:
+        if render_mode not in (None, "rgb_array"):
+            raise ValueError(f"render_mode must be None or 'rgb_array', not {render_mode!r}")
+        self._config, self._wanted, self.render_mode = config, observations, render_mode
+        self.num_envs = config.num_worlds
+        self._closed = False
+        self._build(config.seed)
+        layout = self._rollout.action_layout()
+        self.action_groups: dict[str, slice] = {}
+        """Columns of the action by move group."""
+        start = 0
+        for name, low, _ in layout:
+            self.action_groups[name] = slice(start, start + len(low))
+            start += len(low)
+        low, high = (np.concatenate([row[k] for row in layout]).astype(np.float32) for k in (1, 2))
+        self.single_action_space = gymnasium.spaces.Box(low, high, dtype=np.float32)
+        self.action_space = batch_space(self.single_action_space, self.num_envs)
+        self.single_observation_space = gymnasium.spaces.Dict({name: _box(self.specs[name]) for name in self.rows})
+        self.observation_space = batch_space(self.single_observation_space, self.num_envs)
+
+    def _build(self, seed: int) -> None:
+        self._config.seed = seed
+        self._rollout = _core.Rollout(self._config)
+        streams = {spec.name: (spec, array) for spec, array in self._rollout.streams()}
+        names = self._wanted
+        if names is None:
+            plain = (name for name, (spec, _) in streams.items() if not spec.is_dict)
+            names = [name for name in plain if not name.startswith(("sensor_param_", "object_image_points"))]
+        unknown = [name for name in names if name not in streams]
+        if unknown:
+            raise ValueError(f"no stream '{unknown[0]}'; there are {', '.join(streams)}")
+        self.rows: dict[str, np.ndarray] = {name: streams[name][1] for name in names}
+        """The streams' own arrays [B, ...], as they are now."""
+        self.specs: dict[str, _core.SensorSpec] = {name: streams[name][0] for name in names}
+        """Unit, frame and shape of each stream."""
+        self.sim = Simulation._of(self._rollout.simulation())
+        """The worlds. Read them as you like; the task writes them."""
+        self._next_episode = 0
+        self._ended = np.zeros(self.num_envs, bool)
+        self._started = False
+
+    def reset(self, *, seed: int | None = None, options: dict[str, Any] | None = None) -> tuple[dict[str, np.ndarray], dict]:
+        """Begins a new episode in every world; with a seed, the first ones of that seed."""
+        self._check_open()
+        mask = np.ones(self.num_envs, bool)
+        if options and "reset_mask" in options:
+            mask = np.asarray(options["reset_mask"], bool)
+            if mask.shape != (self.num_envs,) or not (self._started or mask.all()):
+                raise ValueError(f"reset_mask: shape {mask.shape}, expected ({self.num_envs},), after a first reset of all")
+        if seed is not None:
+            if not isinstance(seed, (int, np.integer)) or seed < 0:
+                raise ValueError(f"seed must be an int from 0 on, not {seed!r}")
+            if seed != self._config.seed:
+                self._build(int(seed))
+                mask[:] = True
+            self._next_episode = 0
+        self._begin(np.flatnonzero(mask))
+        return self._observe(), {}
+
+    def _begin(self, worlds: np.ndarray) -> None:
+        episodes = list(range(self._next_episode, self._next_episode + len(worlds)))
+        self._next_episode += len(worlds)
+        self._rollout.start(worlds.tolist(), episodes)
+        self._ended[worlds] = False
+        self._started = True
+
+    def step(self, actions: Any) -> tuple[dict[str, np.ndarray], np.ndarray, np.ndarray, np.ndarray, dict[str, Any]]:
+        """One control step. Actions ``[num_envs, n]``: actuator commands of the move groups, see ``action_groups``."""
+        self._check_open()
+        if not self._started:
+            raise RuntimeError("call reset() before step()")
+        actions = np.ascontiguousarray(actions, dtype=np.float64)
+        if actions.shape != self.action_space.shape:
+            raise ValueError(f"actions: shape {actions.shape}, expected {self.action_space.shape}")
+        if not np.isfinite(actions).all():
+            raise ValueError(f"actions of worlds {np.flatnonzero(~np.isfinite(actions).all(1)).tolist()} are not finite")
+        fresh = self._ended.copy()
+        if fresh.any():
+            for world in np.flatnonzero(fresh):
+                self._rollout.stop(int(world))
+        if not fresh.all():
+            self._rollout.set_actions(actions)
+            self._rollout.step()
+        if fresh.any():
+            self._begin(np.flatnonzero(fresh))
+        reward = np.zeros(self.num_envs)
+        terminated, truncated, success = (np.zeros(self.num_envs, bool) for _ in range(3))
+        faults = np.full(self.num_envs, "", object)
+        for world in np.flatnonzero(~fresh):
+            reward[world], success[world], terminated[world], truncated[world], faults[world] = self._rollout.outcome(int(world))
+        broken = faults != ""
+        truncated |= broken
+        self._ended = terminated | truncated
+        infos: dict[str, Any] = {"success": success, "_success": ~fresh}
+        if broken.any():
+            infos |= {"fault": faults, "_fault": broken}
+        return self._observe(), reward, terminated, truncated, infos
+
+    def expert_action(self) -> np.ndarray:
+        """What the task's own policy would do now, ``[num_envs, n]``. Needs ``make_vec(..., policy="planner")``."""
+        self._check_open()
+        self._rollout.act()
+        return np.array(self._rollout.actions(), dtype=np.float32)
+
+    def _observe(self) -> dict[str, np.ndarray]:
+        return {name: rows.copy() for name, rows in self.rows.items()}
+
+    def render(self) -> tuple[np.ndarray, ...] | None:
+        """The first camera's picture of every world."""
+        if self.render_mode is None:
+            return None
+        pictures = [rows for name, rows in self.rows.items() if rows.ndim == 4 and rows.dtype == np.uint8]
+        if not pictures:
+            raise RuntimeError("this environment observes no camera")
+        return tuple(pictures[0].copy())
+
+    def _check_open(self) -> None:
+        if self._closed:
+            raise RuntimeError("the environment is closed")
+
+    def close_extras(self, **kwargs: Any) -> None:
+        """Frees the worlds."""
+        self._closed = True
+        self.sim.close()
+        self._rollout = None  # type: ignore[assignment]
+
+
+def make_vec(
+    task: str = "pick",
+    robot: str = "franka",
+    *,
+    num_envs: int = 1,
+    policy: str | None = None,
+    observations: Sequence[str] | None = None,
+    cameras: Sequence[str] | None = None,
+    width: int | None = None,
+    height: int | None = None,
+    depth: bool = False,
+    samples: int = 1,
+    shadows: bool = True,
+    horizon: int | None = None,
+    action_noise: bool = False,
+    threads: int = 0,
+    seed: int = 0,
+    render_mode: str | None = None,
+) -> TaskVectorEnv:
+    """A task as a gymnasium vector environment.
+
+    Args:
+        task, robot: their registered names.
+        num_envs: worlds.
+        policy: name of a policy that :meth:`TaskVectorEnv.expert_action` asks; none if not given.
+        observations: names of the streams to observe; if not given, all that are numbers.
+        cameras: names of the robot's cameras; all if not given, ``[]`` for none (much faster).
+        width, height: pixels of every camera.
+        depth: observe depth too.
+        samples: rays per pixel of rgb.
+        horizon: control steps until truncation.
+        action_noise: disturb the arm's commands as recordings do.
+        threads: 0 takes every CPU that this process may use.
+        seed: of the episodes, until reset(seed=...).
+    """
+    config = SimpleNamespace(
+        task=task, robot=robot, policy=policy or "", num_worlds=num_envs, threads=threads, seed=seed,
+        cameras=None if cameras is None else list(cameras), width=width, height=height, depth=depth, samples=samples,
+        shadows=shadows, horizon=horizon, action_noise=action_noise,
+    )  # fmt: skip
+    return TaskVectorEnv(config, observations, render_mode)

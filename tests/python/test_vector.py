@@ -1,0 +1,103 @@
+import gymnasium
+import numpy as np
+import pytest
+from gymnasium.vector import AutoresetMode
+
+import mjsense as mjs
+
+
+def make(**kwargs):
+    return mjs.make_vec(**{"num_envs": 3, "cameras": [], "threads": 2, **kwargs})
+
+
+@pytest.fixture(scope="module")
+def env():
+    env = make()
+    yield env
+    env.close()
+
+
+def hold(env):
+    return np.tile(np.float32([0, -0.7, 0, -2.3, 0, 1.6, 0, 0]), (env.num_envs, 1))
+
+
+def test_spaces(env):
+    assert isinstance(env, gymnasium.vector.VectorEnv)
+    assert env.metadata["autoreset_mode"] == AutoresetMode.NEXT_STEP
+    assert env.action_space.shape == (3, 8) and list(env.action_groups) == ["arm", "gripper"]
+    observation, info = env.reset(seed=0)
+    assert env.observation_space.contains(observation) and info == {}
+    assert observation["tcp_pose"].shape == (3, 7)
+    assert env.specs["tcp_pose"].unit.startswith("m")
+
+
+def test_step_and_copies(env):
+    first, _ = env.reset(seed=0)
+    second, reward, terminated, truncated, info = env.step(hold(env))
+    assert env.observation_space.contains(second)
+    assert reward.shape == terminated.shape == truncated.shape == (3,)
+    assert not np.shares_memory(first["tcp_pose"], second["tcp_pose"])
+    assert not np.shares_memory(second["tcp_pose"], env.rows["tcp_pose"])
+    assert info["success"].dtype == bool
+
+
+def test_same_seed_same_episode(env):
+    runs = []
+    for _ in range(2):
+        env.reset(seed=3)
+        runs.append([env.step(hold(env))[0]["tcp_pose"] for _ in range(5)])
+    np.testing.assert_array_equal(runs[0], runs[1])
+    assert not np.array_equal(env.reset(seed=4)[0]["tcp_pose"], env.reset(seed=3)[0]["tcp_pose"])
+
+
+def test_truncation_and_autoreset():
+    env = make(horizon=4, num_envs=2)
+    env.reset()
+    flags = [env.step(hold(env))[3].tolist() for _ in range(7)]
+    assert flags == [[False] * 2] * 3 + [[True] * 2] + [[False] * 2] * 3
+    env.close()
+
+
+def test_expert_solves_the_task():
+    env = make(policy="planner", num_envs=2)
+    env.reset(seed=1)
+    won = np.zeros(2, bool)
+    for _ in range(120):
+        *_, info = env.step(env.expert_action())
+        won |= info["success"]
+        if won.all():
+            break
+    assert won.all()
+    env.close()
+
+
+def test_cameras_and_render():
+    env = make(num_envs=2, cameras=["wrist_camera"], width=32, height=24, observations=["wrist_camera"], render_mode="rgb_array")
+    observation, _ = env.reset()
+    assert list(observation) == ["wrist_camera"] and observation["wrist_camera"].shape == (2, 24, 32, 3)
+    assert observation["wrist_camera"].std() > 1
+    assert env.render()[1].shape == (24, 32, 3)
+    env.close()
+
+
+def test_bad_use(env):
+    env.reset()
+    for call, error in [
+        (lambda: env.step(np.zeros((2, 8))), ValueError),
+        (lambda: env.step(np.full((3, 8), np.nan)), ValueError),
+        (lambda: env.reset(seed=-1), ValueError),
+        (lambda: env.expert_action(), ValueError),
+        (lambda: make(observations=["tcp"]), ValueError),
+        (lambda: make(task="pik"), KeyError),
+        (lambda: make(num_envs=0), ValueError),
+        (lambda: make(render_mode="human"), ValueError),
+    ]:
+        with pytest.raises(error):
+            call()
+    other = make(num_envs=1)
+    with pytest.raises(RuntimeError, match="reset"):
+        other.step(np.zeros((1, 8)))
+    other.close()
+    for call in (lambda: other.step(np.zeros((1, 8))), other.reset, other.expert_action):
+        with pytest.raises(RuntimeError, match="closed"):
+            call()
