@@ -1,19 +1,20 @@
-"""Collects the page of every sensor (src/mjsense/sensors/*/page.md) into the documentation: one page a sensor, kept in its room."""
+"""Collects the pages that stand in the rooms (src/mjsense/sensors/*/page.md and so on) into the documentation."""
 
 import pathlib
 
 from mkdocs.structure.files import File
 
-ROOM = pathlib.Path(__file__).parent.parent / "src" / "mjsense" / "sensors"
+SOURCE = pathlib.Path(__file__).parent.parent / "src" / "mjsense"
+ROOMS = ("sensors", "robots", "tasks", "policies")
 
 
 def on_files(files, config):
-    pages = sorted(ROOM.glob("*/page.md"))
-    for page in pages:
-        name = page.parent.name
-        files.append(File.generated(config, f"sensors/{name}.md", content=page.read_text()))
-        for picture in sorted(page.parent.glob("*.svg")) + sorted(page.parent.glob("*.png")):
-            files.append(File.generated(config, f"sensors/{picture.name}", content=picture.read_bytes()))
-    index = "# Sensors\n\n" + "".join(f"- [{p.parent.name}]({p.parent.name}.md)\n" for p in pages)
-    files.append(File.generated(config, "sensors/index.md", content=index))
+    for room in ROOMS:
+        pages = sorted((SOURCE / room).glob("*/page.md"))
+        for page in pages:
+            files.append(File.generated(config, f"{room}/{page.parent.name}.md", content=page.read_text()))
+            for picture in sorted(page.parent.glob("*.svg")) + sorted(page.parent.glob("*.png")):
+                files.append(File.generated(config, f"{room}/{picture.name}", content=picture.read_bytes()))
+        index = f"# {room.capitalize()}\n\n" + "".join(f"- [{p.parent.name}]({p.parent.name}.md)\n" for p in pages)
+        files.append(File.generated(config, f"{room}/index.md", content=index))
     return files

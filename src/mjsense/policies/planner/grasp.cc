@@ -136,8 +136,10 @@ std::vector<Grasp> propose_grasps(const GripperShape& gripper, const ObjectShape
     points.push_back(object * p);
     top = std::max(top, points.back().z);
   }
-  const Vec3 forward = rotate(object.q, {1, 0, 0});
-  const double yaw0 = std::atan2(forward.y, forward.x);
+  // Directions are counted from an axis of the body that lies flat: faces are often square to it.
+  Vec3 flat = rotate(object.q, {1, 0, 0});
+  if (std::abs(flat.z) > 0.7) flat = rotate(object.q, {0, 1, 0});
+  const double yaw0 = std::atan2(flat.y, flat.x);
   const double lowest = support_height + gripper.tip + kSupportGap;
   const double highest = std::max(lowest, top - kTopGap);
   const double half_length = 0.9 * gripper.pad_half_length,

@@ -19,17 +19,42 @@ struct Kind {
   const char* name;  // of its model, entity and body
   const char* text;
   std::array<const char*, 2> others;
+  bool lies = false;    // may also lie on its side
+  bool on_end = false;  // may also stand on an end
 };
 constexpr Kind kKinds[] = {
-    {"red_block", "red block", {"wooden block", "brick"}},
+    {"red_block", "red block", {"wooden block", "brick"}, true, true},
     {"blue_cube", "blue cube", {"cube", "blue block"}},
-    {"soup_can", "soup can", {"can", "tin can"}},
+    {"soup_can", "soup can", {"can", "tin can"}, true},
     {"yellow_puck", "yellow puck", {"puck", "yellow disc"}},
     {"marker", "green marker", {"marker", "pen"}},
     {"mug", "mug", {"teal mug", "cup"}},
     {"pear", "pear", {"green pear", "fruit"}},
     {"toy_bone", "toy bone", {"dog toy", "orange bone"}},
 };
+
+// One of the ways in which an object rests.
+Quat draw_rest(const Kind& kind, Rng& rng) {
+  const std::uint32_t choice = rng.below(1u + kind.lies + kind.on_end);
+  if (choice == 0) return {};
+  return choice == 1 ? axis_angle({0, 1, 0}, 0.5 * pi) : axis_angle({1, 0, 0}, 0.5 * pi);
+}
+
+// What an object takes up in a resting orientation.
+struct Footprint {
+  double radius = 0;  // m, about the vertical through the body's origin
+  double low = 0;     // m, its lowest point
+};
+
+Footprint footprint(const ObjectShape& shape, Quat rest) {
+  Footprint print;
+  for (Vec3 point : shape.points) {
+    const Vec3 p = rotate(rest, point);
+    print.radius = std::max(print.radius, std::hypot(p.x, p.y));
+    print.low = std::min(print.low, p.z);
+  }
+  return print;
+}
 
 // Where objects may stand: the target where the arm reaches it from above, the others anywhere on
 // the table.
@@ -103,13 +128,12 @@ void PickTask::initialize_task() {
                   model()->geom_pos[3 * top + 2] + model()->geom_size[3 * top + 2];
 }
 
-void PickTask::place(int object, double x, double y, double yaw, const StateRow& state) const {
-  const Object& o = objects_[object];
-  const int joint = model()->body_jntadr[o.body];
+void PickTask::place(int object, const Pose& pose, const StateRow& state) const {
+  const int joint = model()->body_jntadr[objects_[object].body];
   double* qpos = state.qpos + model()->jnt_qposadr[joint];
   double* qvel = state.qvel + model()->jnt_dofadr[joint];
-  write_vec({x, y, table_height_ - o.shape.low + kDrop}, qpos);
-  write_quat(axis_angle({0, 0, 1}, yaw), qpos + 3);
+  write_vec(pose.p, qpos);
+  write_quat(pose.q, qpos + 3);
   std::fill(qvel, qvel + 6, 0.0);
 }
 
@@ -123,6 +147,7 @@ Pose PickTask::sample_scene(int world, Rng& rng, const StateRow& state) {
     double x, y;
   };
   std::vector<Spot> spots(n);
+  std::vector<Footprint> prints(n);
   std::vector<int> placed;
   // Metres to spare at a spot: negative where objects would stand too close.
   const auto clearance = [&](int object, Spot s) {
@@ -130,8 +155,7 @@ Pose PickTask::sample_scene(int world, Rng& rng, const StateRow& state) {
     for (int other : placed) {
       const double gap = object == target || other == target ? kTargetGap : kGap;
       const double distance = std::hypot(s.x - spots[other].x, s.y - spots[other].y);
-      least = std::min(
-          least, distance - objects_[object].shape.radius - objects_[other].shape.radius - gap);
+      least = std::min(least, distance - prints[object].radius - prints[other].radius - gap);
     }
     return least;
   };
@@ -143,6 +167,8 @@ Pose PickTask::sample_scene(int world, Rng& rng, const StateRow& state) {
     // The target first, then the others in order.
     const int object = k == 0 ? target : k <= target ? k - 1 : k;
     const Area& area = object == target ? kTargetArea : kTableArea;
+    const Quat rest = draw_rest(kKinds[object], rng);
+    prints[object] = footprint(objects_[object].shape, rest);
     Spot best = draw(area);
     double room = clearance(object, best);
     for (int attempt = 0; attempt < 200 && room < 0; ++attempt) {
@@ -155,7 +181,8 @@ Pose PickTask::sample_scene(int world, Rng& rng, const StateRow& state) {
     }
     spots[object] = best;
     placed.push_back(object);
-    place(object, best.x, best.y, rng.uniform(-pi, pi), state);
+    const Vec3 position{best.x, best.y, table_height_ - prints[object].low + kDrop};
+    place(object, {position, axis_angle({0, 0, 1}, rng.uniform(-pi, pi)) * rest}, state);
   }
   return {};
 }

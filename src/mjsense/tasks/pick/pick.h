@@ -57,7 +57,7 @@ class PickTask final : public Task {
     TaskObject object;
     Pose start;
   };
-  void place(int object, double x, double y, double yaw, const StateRow& state) const;
+  void place(int object, const Pose& pose, const StateRow& state) const;
   bool borne_by_others(const World& world, int body) const;
   bool lifted(const World& world) const;
 
