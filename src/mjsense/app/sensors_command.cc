@@ -4,6 +4,7 @@
 
 #include <filesystem>
 #include <nlohmann/json.hpp>
+#include <set>
 
 #include "mjsense/app/table.h"
 #include "mjsense/core/error.h"
@@ -16,13 +17,20 @@ struct Line {
   double microseconds;  // a step and world; negative: counted with the sensor's first stream
 };
 
-// Streams of some sensors, the cost of each at its first stream.
+// Streams of some sensors, the cost of each at its first stream. What sensors share (a camera of the scene shown as colour and
+// as depth) is counted with the first that reads it.
 std::vector<Line> lines_of(Simulation& simulation, std::span<Sensor* const> sensors, int steps) {
   std::vector<Line> lines;
-  for (Sensor* sensor : sensors) {
+  std::set<const Sensor*> counted;
+  const auto seconds = [&](const Sensor* sensor) {
+    if (!counted.insert(sensor).second) return 0.0;
     const Simulation::Cost cost = simulation.cost(*sensor);
-    double each =
-        steps > 0 ? 1e6 * (cost.compute + cost.cast) / steps / simulation.num_worlds() : -1;
+    return cost.compute + cost.cast;
+  };
+  for (Sensor* sensor : sensors) {
+    double total = seconds(sensor);
+    for (const Sensor* input : sensor->inputs()) total += seconds(input);
+    double each = steps > 0 ? 1e6 * total / steps / simulation.num_worlds() : -1;
     for (const Field& field : sensor->fields()) {
       lines.push_back({&field.spec, each});
       each = -1;
@@ -73,7 +81,6 @@ std::vector<Line> task_lines(Rollout& rollout, int steps) {
   const std::int64_t episodes[] = {0};
   rollout.start(worlds, episodes);
   std::vector<Sensor*> sensors;
-  for (const RecordedCamera& camera : rollout.cameras()) sensors.push_back(camera.sensor);
   for (const auto& sensor : rollout.suite().sensors()) sensors.push_back(sensor.get());
   int taken = 0;
   for (; taken < steps && rollout.fault(0).empty() && !rollout.evaluation(0).terminal; ++taken) {

@@ -31,12 +31,18 @@ void EnvStatesSensor::initialize(const SensorInit& init) {
                         : object_id(m, mjOBJ_BODY, fmt::format("sensor '{}'", name()), robot_body_);
   clear_fields();
   actors_.clear();
+  std::vector<std::string> full, last;
   for (int j = 0; j < m->njnt; ++j) {
     const int body = m->jnt_bodyid[j];
     if (m->jnt_type[j] != mjJNT_FREE) continue;
     if (robot >= 0 && is_below(m, body, robot)) continue;
-    const char* body_name = mj_id2name(m, mjOBJ_BODY, body);
-    std::string actor = body_name ? body_name : fmt::format("body_{}", body);
+    const char* name = mj_id2name(m, mjOBJ_BODY, body);
+    full.push_back(name ? name : fmt::format("body_{}", body));
+    last.push_back(full.back().substr(full.back().rfind('/') + 1));
+    actors_.push_back({m->jnt_qposadr[j], m->jnt_dofadr[j]});
+  }
+  for (std::size_t i = 0; i < full.size(); ++i) {
+    std::string actor = std::ranges::count(last, last[i]) == 1 ? last[i] : full[i];
     std::ranges::replace(actor, '/', '_');
     SensorSpec spec;
     spec.shape = {13};
@@ -44,7 +50,6 @@ void EnvStatesSensor::initialize(const SensorInit& init) {
     spec.frame = "world (angular velocity: body)";
     spec.description = "Free joint of the body: position, quaternion, linear and angular velocity.";
     add_field(fmt::format("actors/{}", actor), spec, init.num_worlds);
-    actors_.push_back({m->jnt_qposadr[j], m->jnt_dofadr[j]});
   }
   SensorSpec spec;
   spec.shape = {length_};

@@ -18,8 +18,8 @@ namespace mjsense {
 //                                     for each free body outside `robot`.
 //   env_states/articulations/<robot>  float32 [N]   qpos of all groups in order, then qvel of all
 //   groups; padded with 0
-// The name of an actor is that of its body, with '/' as '_' (a file's '/' would make a folder of
-// it).
+// An actor is called as its body, without the entity's prefix ("mug" for "mug/mug") where that is unique, else with '_' for
+// '/' (a file's '/' would make a folder of it).
 class EnvStatesSensor final : public Sensor {
  public:
   // `length`: N, at least what the groups need (31 is the published width of the Franka: 9 + 9 and

@@ -78,47 +78,53 @@ void ImagePointsSensor::compute(const World& world) {
   }
   for (std::size_t c = 0; c < cameras_.size(); ++c) {
     const auto [field, width, height] = pictures_[c];
-    const int pixels = width * height;
     Mask* mask = scratch_[world.id].pictures.data();
-    Mask* once = mask + pixels;
-    Mask* twice = once + pixels;
+    Mask* once = mask + width * height;
+    Mask* twice = once + width * height;
     const auto segments = field->data.row<std::int32_t>(world.id);
-    Mask any = 0;
-    for (int i = 0; i < pixels; ++i) {
-      const std::int32_t id = segments[2 * i];
-      mask[i] = segments[2 * i + 1] == mjOBJ_GEOM && id >= 0 ? geom_objects[id] : Mask(0);
-      any |= mask[i];
+    // All work after this is done on the rows that show an object.
+    int top = height, bottom = 0;
+    for (int y = 0; y < height; ++y) {
+      Mask any = 0;
+      for (int i = y * width; i < (y + 1) * width; ++i) {
+        const std::int32_t id = segments[2 * i];
+        mask[i] = segments[2 * i + 1] == mjOBJ_GEOM && id >= 0 ? geom_objects[id] : Mask(0);
+        any |= mask[i];
+      }
+      if (!any) continue;
+      top = std::min(top, y);
+      bottom = y + 1;
     }
-    if (any) {
-      erode_cross(mask, width, height, once);
-      erode_cross(once, width, height, twice);
+    if (top < bottom) {
+      // Rows outside are background, as what lies outside the picture is.
+      const int rows = bottom - top;
+      erode_cross(mask + top * width, width, rows, once + top * width);
+      erode_cross(once + top * width, width, rows, twice + top * width);
     }
     for (std::size_t o = 0; o < objects_.size(); ++o) {
-      points_of(world, static_cast<int>(o), static_cast<int>(c), mask, any ? twice : mask);
+      points_of(world, static_cast<int>(o), static_cast<int>(c), {mask, twice, top, bottom});
     }
   }
 }
 
-void ImagePointsSensor::points_of(const World& world, int object, int camera, const Mask* mask,
-                                  const Mask* eroded) {
+void ImagePointsSensor::points_of(const World& world, int object, int camera, const Masks& masks) {
   const auto [field, width, height] = pictures_[camera];
   const std::size_t index = 2 * (object * cameras_.size() + camera);
   const auto points = fields()[index].data.row<float>(world.id);
   const auto num_points = fields()[index + 1].data.row<std::int32_t>(world.id);
   std::ranges::fill(points, std::numeric_limits<float>::quiet_NaN());
 
-  const Mask bit = Mask(1u << object);
-  const int pixels = width * height;
+  const int begin = masks.top * width, end = masks.bottom * width;
   const auto count_of = [&](const Mask* m) {
     int n = 0;
-    for (int i = 0; i < pixels; ++i) n += m[i] >> object & 1;
+    for (int i = begin; i < end; ++i) n += m[i] >> object & 1;
     return n;
   };
   const bool erode =
       !cameras_[camera].skip_erosion && objects_[object].key.find("handle") == std::string::npos;
-  const Mask* chosen = erode ? eroded : mask;
+  const Mask* chosen = erode ? masks.eroded : masks.all;
   int count = count_of(chosen);
-  if (count == 0 && erode) count = count_of(chosen = mask);
+  if (count == 0 && erode) count = count_of(chosen = masks.all);
   const int n = std::min(count, kPoints);
   num_points[0] = n;
   if (n == 0) return;
@@ -140,8 +146,8 @@ void ImagePointsSensor::points_of(const World& world, int object, int camera, co
 
   const auto round4 = [](float x) { return std::nearbyint(x * 10000.0f) / 10000.0f; };
   int rank = 0, next = 0;
-  for (int i = 0; next < n; ++i) {
-    if (!(chosen[i] & bit)) continue;
+  for (int i = begin; next < n; ++i) {
+    if (!(chosen[i] >> object & 1)) continue;
     if (rank++ != ranks[order[next]]) continue;
     points[2 * order[next]] = round4(static_cast<float>(i % width) / static_cast<float>(width));
     points[2 * order[next] + 1] =

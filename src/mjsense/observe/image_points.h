@@ -46,7 +46,11 @@ class ImagePointsSensor final : public Sensor {
     const Field* segmentation;
     int width, height;
   };
-  void points_of(const World& world, int object, int camera, const Mask* mask, const Mask* eroded);
+  struct Masks {
+    const Mask *all, *eroded;  // [H, W], valid from row top to row bottom
+    int top, bottom;
+  };
+  void points_of(const World& world, int object, int camera, const Masks& masks);
 
   std::vector<Object> objects_;
   std::vector<Camera> cameras_;

@@ -2,6 +2,7 @@
 
 #include <gmock/gmock.h>
 
+#include <algorithm>
 #include <cmath>
 #include <set>
 
@@ -135,6 +136,49 @@ TEST(ImagePoints, PicturesEndIsBackground) {
   for (int i = 0; i < 10; ++i) {
     EXPECT_GE(f.xy()[2 * i], .02f - 1e-6f);
     EXPECT_LE(f.xy()[2 * i], .97f + 1e-6f);
+  }
+}
+
+// Random pictures: every point lies in the mask that the definition gives, computed pixel by pixel.
+TEST(ImagePoints, PointsLieInTheMaskOfTheDefinition) {
+  constexpr int kWidth = 100, kHeight = 50;
+  Rng rng(1, 0, 0, 0);
+  for (int picture = 0; picture < 200; ++picture) {
+    Fixture f;
+    const int blobs = 1 + static_cast<int>(rng.below(6));
+    for (int k = 0; k < blobs; ++k) {
+      const int x = static_cast<int>(rng.below(kWidth)), y = static_cast<int>(rng.below(kHeight));
+      const int w = static_cast<int>(rng.below(kWidth - x)),
+                h = static_cast<int>(rng.below(kHeight - y));
+      f.camera.paint(k % 3, x, y, std::min(w, 25), std::min(h, 12));
+    }
+    using Mask = std::vector<char>;
+    const auto segments = f.camera.fields()[0].data.row<std::int32_t>(0);
+    Mask all(kWidth * kHeight);
+    for (int i = 0; i < kWidth * kHeight; ++i)
+      all[i] = segments[2 * i] == 0 || segments[2 * i] == 1;
+    const auto erode = [&](const Mask& in) {
+      Mask out(in.size());
+      const auto at = [&](int x, int y) {
+        return x >= 0 && y >= 0 && x < kWidth && y < kHeight && in[y * kWidth + x];
+      };
+      for (int y = 0; y < kHeight; ++y) {
+        for (int x = 0; x < kWidth; ++x) {
+          out[y * kWidth + x] =
+              at(x, y) && at(x - 1, y) && at(x + 1, y) && at(x, y - 1) && at(x, y + 1);
+        }
+      }
+      return out;
+    };
+    Mask expected = erode(erode(all));
+    if (std::ranges::count(expected, 1) == 0) expected = all;
+    f.points.compute(f.world.world());
+    ASSERT_EQ(f.count(), std::min<std::ptrdiff_t>(10, std::ranges::count(expected, 1)));
+    for (int i = 0; i < f.count(); ++i) {
+      const int x = static_cast<int>(std::lround(f.xy()[2 * i] * kWidth));
+      const int y = static_cast<int>(std::lround(f.xy()[2 * i + 1] * kHeight));
+      EXPECT_TRUE(expected[y * kWidth + x]) << "picture " << picture << " pixel " << x << " " << y;
+    }
   }
 }
 

@@ -118,9 +118,9 @@ TEST(EnvStates, HoldsEveryFreeBodyAndTheRobot) {
   EnvStatesSensor states("env_states", "panda", groups(), 6, "robot/base");
   w.compute(states);
   ASSERT_EQ(states.fields().size(), 2u);
-  EXPECT_EQ(states.fields()[0].spec.name, "env_states/actors/thing_cube");
+  EXPECT_EQ(states.fields()[0].spec.name, "env_states/actors/cube");
   EXPECT_EQ(states.fields()[1].spec.name, "env_states/articulations/panda");
-  EXPECT_THAT(values<float>(states, "actors/thing_cube"),
+  EXPECT_THAT(values<float>(states, "actors/cube"),
               ElementsAre(3, 0, .05f, 1, 0, 0, 0, 0, 1, 2, 3, 4, 5));
   EXPECT_THAT(values<float>(states, "articulations/panda"), ElementsAre(.25f, -2, 0, 0, 0, 0));
   EXPECT_THROW(EnvStatesSensor("env_states", "panda", groups(), 1, "robot/base"), ValueError);

@@ -81,8 +81,10 @@ class CommandedAction final : public ActionSensor {
 class JointPos final : public ActionSensor {
  public:
   JointPos(const Task& task, const ActionLog& log)
-      : ActionSensor("actions/joint_pos", "Targets of the position controllers, without noise.",
-                     "rad or m; grippers: actuator command", task, log) {}
+      : ActionSensor("actions/joint_pos",
+                     "Targets of the position controllers, without noise; grippers: the actuator's "
+                     "command.",
+                     "rad or m", task, log) {}
 
  protected:
   void write(const World& world, JsonWriter& json) override {

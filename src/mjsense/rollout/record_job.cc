@@ -174,7 +174,12 @@ class RecordJob {
         recorder_.discard_episode(w, outcome);
       }
     });
+    // Attempts that fail make what is kept dearer.
+    ended_steps_ += lengths_[w] - 1;
     ++(success ? progress_.succeeded : progress_.failed);
+    progress_.mean_length = static_cast<double>(ended_steps_) /
+                            std::max(1, cfg_.keep_failures ? progress_.succeeded + progress_.failed
+                                                           : progress_.succeeded);
     if (!success) ++summary_.failures[outcome];
     summary_.lengths.push_back(lengths_[w]);
     rollout_.stop(w);
@@ -194,6 +199,10 @@ class RecordJob {
     progress_.kept = recorder_.kept();
     progress_.wanted = cfg_.episodes;
     progress_.running = running_;
+    progress_.running_steps = 0;
+    for (int w = 0; w < rollout_.num_worlds(); ++w) {
+      if (rollout_.active(w)) progress_.running_steps += lengths_[w] - 1;
+    }
     progress_.physics_steps = progress_.steps * rollout_.task().decimation();
   }
 
@@ -206,6 +215,7 @@ class RecordJob {
   std::vector<int> worlds_;
   std::vector<std::int64_t> episodes_;
   std::int64_t next_ = 0;
+  std::int64_t ended_steps_ = 0;
   std::int64_t max_attempts_;
   int running_ = 0;
   int pictures_ = 0;  // of one observation
@@ -214,9 +224,9 @@ class RecordJob {
 }  // namespace
 
 double RecordProgress::seconds_left() const {
-  const int ended = succeeded + failed;
-  if (ended == 0 || kept == 0) return std::numeric_limits<double>::quiet_NaN();
-  return seconds / kept * std::max(0, wanted - kept);
+  if (mean_length == 0 || steps == 0) return std::numeric_limits<double>::quiet_NaN();
+  const double steps_left = (wanted - kept) * mean_length - static_cast<double>(running_steps);
+  return std::max(0.0, steps_left) * seconds / static_cast<double>(steps);
 }
 
 RecordSummary record_episodes(const RecordJobCfg& cfg,

@@ -34,9 +34,11 @@ struct RecordProgress {
   int succeeded = 0, failed = 0;  // attempts of this run
   std::int64_t steps = 0;         // control steps of this run, all worlds
   std::int64_t physics_steps = 0;
-  std::int64_t frames = 0;      // pictures recorded, all cameras
-  double seconds = 0;           // wall
-  double seconds_left() const;  // NaN until an episode has ended
+  std::int64_t frames = 0;         // pictures recorded, all cameras
+  double seconds = 0;              // wall
+  double mean_length = 0;          // steps of a kept episode of this run
+  std::int64_t running_steps = 0;  // that the running attempts have taken
+  double seconds_left() const;     // NaN until an episode was kept
 };
 
 struct RecordSummary {

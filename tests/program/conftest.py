@@ -1,0 +1,26 @@
+"""Drives the mjsense program as a user does: build/dev/mjsense, or $MJSENSE_PROGRAM."""
+
+import os
+import pathlib
+import subprocess
+
+import pytest
+
+ROOT = pathlib.Path(__file__).resolve().parents[2]
+PROGRAM = os.environ.get("MJSENSE_PROGRAM", str(ROOT / "build/dev/mjsense"))
+
+
+@pytest.fixture
+def mjsense(tmp_path):
+    """mjsense("record", "pick", ..., rc=0) runs in an empty folder and returns the finished process."""
+
+    def run(*args, rc=0, env=None, **kwargs):
+        done = subprocess.run(
+            [PROGRAM, *map(str, args)],
+            cwd=tmp_path, env={**os.environ, **(env or {})}, capture_output=True, text=True, timeout=300, **kwargs)
+        assert done.returncode == rc, f"exit code {done.returncode}\n{done.stdout}\n{done.stderr}"
+        return done
+
+    run.program = PROGRAM
+    run.folder = tmp_path
+    return run

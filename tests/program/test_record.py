@@ -1,0 +1,163 @@
+"""mjsense record: what is on disk, that it depends on nothing but the seed, and that it stops cleanly."""
+
+import json
+import pathlib
+import signal
+import subprocess
+import time
+
+import h5py
+import numpy as np
+import pytest
+
+# Small pictures, a few steps: enough for everything but success.
+QUICK = ["record", "pick", "--size", "64x48", "--horizon", "6", "--keep-failures", "-q"]
+
+
+def rows(dataset):
+    return [json.loads(bytes(row).rstrip(b"\0")) for row in dataset[()]]
+
+
+def contents(folder):
+    """{path below folder: bytes} of what a recording is made of."""
+    folder = pathlib.Path(folder)
+    return {str(p.relative_to(folder)): p.read_bytes() for p in sorted(folder.rglob("*")) if p.is_file()}
+
+
+def video_of(mp4):
+    out = subprocess.run(
+        ["ffprobe", "-v", "error", "-count_packets", "-select_streams", "v", "-show_entries",
+         "stream=nb_read_packets,width,height,r_frame_rate", "-of", "json", mp4],
+        capture_output=True, text=True, check=True)
+    return json.loads(out.stdout)["streams"][0]
+
+
+def check_cameras(traj, house, start, T):
+    for camera in ("wrist_camera", "exo_camera_1"):
+        param = traj[f"obs/sensor_param/{camera}"]
+        E, K, X = (param[k][0] for k in ("extrinsic_cv", "intrinsic_cv", "cam2world_gl"))
+        np.testing.assert_allclose(E, np.linalg.inv(X)[:3], atol=1e-12)
+        name = bytes(traj[f"obs/sensor_data/{camera}"][()]).rstrip(b"\0").decode()
+        video = video_of(house / name)
+        assert int(video["nb_read_packets"]) == T
+        assert (video["width"], video["height"], video["r_frame_rate"]) == (160, 96, "500/33")
+        points = traj[f"obs/extra/object_image_points/pickup_obj/{camera}/points"]
+        assert points.shape == (T, 10, 2) and points.dtype == np.float32
+        if camera == "exo_camera_1":  # the object is seen where its pose is projected
+            p = E @ [*start[:3], 1.0]
+            assert np.abs(np.nanmean(points[0], axis=0) - (K @ p)[:2] / p[2] / (160, 96)).max() < 0.05
+
+
+def check_actions(traj, T):
+    """Row t is the action that led to observation t; the last is the done sentinel."""
+    actions = {k: rows(v) for k, v in traj["actions"].items()}
+    assert all(len(v) == T for v in actions.values())
+    assert actions["commanded_action"][0] == {} and actions["commanded_action"][-1] != {}
+    for key in ("joint_pos", "joint_pos_rel", "ee_twist", "ee_pose"):
+        assert actions[key][-1] == {} and actions[key][1] != {}, key
+    qpos = rows(traj["obs/agent/qpos"])
+    for t in range(1, T - 1):
+        rel = np.array(actions["joint_pos"][t]["arm"]) - np.array(qpos[t - 1]["arm"])
+        np.testing.assert_allclose(actions["joint_pos_rel"][t]["arm"], rel, atol=1e-6)
+    panda = traj["env_states/articulations/panda"]
+    assert panda.shape == (T, 31) and panda.dtype == np.float32
+    np.testing.assert_allclose(panda[5, :7], qpos[5]["arm"], atol=1e-6)
+
+
+def test_a_pick_as_molmospaces_readers_know_it(mjsense):
+    done = mjsense("record", "pick", "--robot", "franka", "--episodes", 2, "--worlds", 2, "--size", "160x96",
+                   "--out", "data", "--json", "-q")
+    summary = json.loads(done.stdout)
+    assert summary["kept"] == 2 and summary["succeeded"] == 2
+    house = mjsense.folder / "data/house_0"
+    with h5py.File(house / "trajectories_batch_1_of_1.h5") as file:
+        assert sorted(k for k in file if k.startswith("traj_")) == ["traj_0", "traj_1"]
+        for i in range(2):
+            traj = file[f"traj_{i}"]
+            T = len(traj["success"])
+            assert T in summary["observations"]
+            assert traj["success"][-1] and not traj["success"][0]
+            assert (traj["fail"][()] == ~traj["success"][()]).all()
+            assert list(np.flatnonzero(traj["terminated"])) == [T - 1]
+            scene = json.loads(traj["obs_scene"][()])
+            assert scene["task_type"] == "pick" and scene["policy_dt_ms"] == 66
+            assert {"task_description", "referral_expressions", "policy_phases", "text", "object_name"} <= set(scene)
+            check_actions(traj, T)
+            actors = traj["env_states/actors"]
+            assert len(actors) >= 5 and all(a.shape == (T, 13) for a in actors.values())
+            start = traj["obs/extra/obj_start"][0]
+            assert any(np.allclose(a[0, :7], start, atol=1e-3) and a[-1, 2] > start[2] + 0.01 for a in actors.values())
+            assert traj["obs/extra/policy_phase"].dtype == np.int64
+            check_cameras(traj, house, start, T)
+    assert pathlib.Path(mjsense.folder, summary["contact_sheet"]).read_bytes().startswith(b"\x89PNG")
+    mjsense("verify", "data")
+
+
+def test_the_same_bytes_with_other_worlds_and_threads(mjsense):
+    common = [*QUICK, "--episodes", 3, "--no-sheet"]
+    mjsense(*common, "--seed", 5, "--worlds", 1, "--threads", 1, "--out", "a")
+    mjsense(*common, "--seed", 5, "--worlds", 3, "--threads", 2, "--out", "b")
+    mjsense(*common, "--seed", 6, "--out", "c")
+    a, b, c = (contents(mjsense.folder / folder) for folder in "abc")
+    assert a == b
+    assert a["house_0/trajectories_batch_1_of_1.h5"] != c["house_0/trajectories_batch_1_of_1.h5"]
+
+
+def test_depth_is_kept(mjsense):
+    mjsense(*QUICK, "--depth", "--cameras", "wrist_camera", "--out", "data")
+    names = [p.name for p in (mjsense.folder / "data/house_0").iterdir()]
+    assert [n for n in names if n.startswith("episode_00000000_wrist_camera_depth_")]
+    mjsense("verify", "data", "--decode")
+
+
+def test_without_cameras(mjsense):
+    mjsense(*QUICK, "--cameras", "none", "--out", "data")
+    assert [p.name for p in (mjsense.folder / "data/house_0").iterdir()] == ["trajectories_batch_1_of_1.h5"]
+
+
+def test_failures_are_dropped_unless_asked_for(mjsense):
+    done = mjsense("record", "pick", "--cameras", "none", "--horizon", 4, "--max-attempts", 3, "--out", "data", "-q",
+                   "--json", rc=1)
+    summary = json.loads(done.stdout)
+    assert summary["kept"] == 0 and summary["failures"] == {"horizon reached": 3}
+    assert "gave up after 3 attempts" in done.stderr
+
+
+def test_config_file_and_command_line(mjsense):
+    (mjsense.folder / "job.toml").write_text(
+        'task = "pick"\nepisodes = 2\nsize = "64x48"\ncameras = ["exo_camera_1"]\nhorizon = 6\nkeep_failures = true\n'
+        'seed = 5\nout = "data"\n')
+    done = mjsense("record", "--config", "job.toml", "--episodes", 1, "--json", "-q")
+    assert json.loads(done.stdout)["wanted"] == 1
+    assert len(list((mjsense.folder / "data/house_0").glob("*.mp4"))) == 1
+
+
+def interrupt(mjsense, args, signals):
+    """Starts the program and sends it `signals` as soon as episodes run."""
+    process = subprocess.Popen([mjsense.program, *map(str, args)], cwd=mjsense.folder, stdout=subprocess.PIPE,
+                               stderr=subprocess.PIPE, text=True)
+    running = mjsense.folder / "data/house_0/.recording"
+    deadline = time.time() + 60
+    while not list(running.glob("episode_*")) and time.time() < deadline:
+        time.sleep(0.01)
+    for _ in range(signals):
+        process.send_signal(signal.SIGINT)
+        time.sleep(0.05)
+    err = process.communicate(timeout=120)[1]
+    return process.returncode, err
+
+
+@pytest.mark.parametrize("signals", [1, 2])
+def test_interrupted_then_resumed_is_as_if_nothing_had_happened(mjsense, signals):
+    args = ["record", "pick", "--size", "64x48", "--horizon", 30, "--keep-failures", "--no-sheet", "--episodes", 4]
+    code, err = interrupt(mjsense, [*args, "--worlds", 2, "--out", "data"], signals)
+    assert code == 1 and "go on with --resume" in err
+    mjsense(*args, "--worlds", 1, "--out", "data", "--resume", "-q")
+    mjsense(*args, "--worlds", 4, "--out", "whole", "-q")
+    assert contents(mjsense.folder / "data") == contents(mjsense.folder / "whole")
+
+
+def test_progress_is_plain_lines_where_nobody_watches(mjsense):
+    done = mjsense("record", "pick", "--cameras", "none", "--horizon", 4, "--keep-failures", "--out", "data")
+    assert "1/1 episodes" in done.stderr and "\r" not in done.stderr and "\033" not in done.stderr
+    assert "trajectories_batch_1_of_1.h5" in done.stdout

@@ -1,0 +1,118 @@
+"""The other words of mjsense, and wrong input: one clear line, exit code 2, nothing half-written."""
+
+import json
+import os
+
+import pytest
+
+SCENE = """<mujoco><worldbody><body name="ball"><freejoint/><geom size=".1"/><site name="s"/></body></worldbody>
+<sensor><gyro name="turn" site="s"/></sensor></mujoco>"""
+
+
+@pytest.mark.parametrize("args, line", [
+    ("record pik --out x", "no task named 'pik'; did you mean 'pick'?"),
+    ("record pick --out x --robot frnka", "no robot named 'frnka'; did you mean 'franka'?"),
+    ("record pick --out x --policy planer", "no policy named 'planer'; did you mean 'planner'?"),
+    ("record pick --out x --cameras exo_camera_2", "no camera named 'exo_camera_2'; did you mean 'exo_camera_1'"),
+    ("record pick", "give --out DIR"),
+    ("record pick --out x --episodes 0", "episodes is 0: must be at least 1"),
+    ("record pick --out x --episodes many", "--episodes"),
+    ("record pick --out x --worlds -1", "worlds is -1: must be at least 1"),
+    ("record pick --out x --threads -1", "threads is -1"),
+    ("record pick --out x --size 640", "size '640': expected WIDTHxHEIGHT"),
+    ("record pick --out x --size 0x10", "size '0x10'"),
+    ("record pick --out x --samples 0", "samples"),
+    ("record pick --out x --bogus", "--bogus"),
+    ("record pick --out /proc/x", "/proc/x"),
+    ("record pick --out x --ffmpeg /no/ffmpeg", "/no/ffmpeg"),
+    ("record pick --config missing.toml --out x", "missing.toml: no such file"),
+    ("record pick --config typo.toml --out x", "typo.toml:2: no key named 'episods'; did you mean 'episodes'?"),
+    ("record pick --config type.toml --out x", "type.toml:1: the value of 'episodes' is of a wrong type"),
+    ("record pick --config broken.toml --out x", "broken.toml:1"),
+    ("recrd", "no command named 'recrd'; did you mean 'record'?"),
+    ("sensors missing.xml", "missing.xml: no such file"),
+    ("sensors broken.xml", "broken.xml"),
+    ("sensors pik", "did you mean 'pick'?"),
+    ("inspect missing", "missing: no such file or directory"),
+    ("verify missing", "missing: no such file or directory"),
+    ("repair missing", "missing: no such file or directory"),
+])
+def test_wrong_input_is_one_clear_line(mjsense, args, line):
+    (mjsense.folder / "typo.toml").write_text('task = "pick"\nepisods = 3\n')
+    (mjsense.folder / "type.toml").write_text('episodes = "three"\n')
+    (mjsense.folder / "broken.toml").write_text("episodes = = 3\n")
+    (mjsense.folder / "broken.xml").write_text("<mujoco><worldbody>\n")
+    before = sorted(mjsense.folder.iterdir())
+    done = mjsense(*args.split(), rc=2)
+    assert line in done.stderr
+    assert done.stderr.startswith("mjsense: ") and done.stderr.count("\n") == 1, done.stderr
+    assert done.stdout == ""
+    assert sorted(mjsense.folder.iterdir()) == before
+
+
+def test_no_word_at_all_shows_the_words(mjsense):
+    done = mjsense(rc=2)
+    assert "record" in done.stderr and "verify" in done.stderr
+
+
+def test_a_folder_that_cannot_be_written(mjsense):
+    (mjsense.folder / "file").write_text("")
+    done = mjsense("record", "pick", "--cameras", "none", "--out", "file", rc=2)
+    assert "file" in done.stderr and done.stderr.count("\n") == 1
+
+
+def test_another_recording_is_not_written_over(mjsense):
+    quick = ["record", "pick", "--cameras", "none", "--horizon", 3, "--keep-failures", "-q", "--out", "data"]
+    mjsense(*quick)
+    before = (mjsense.folder / "data/house_0/trajectories_batch_1_of_1.h5").read_bytes()
+    mjsense(*quick, rc=2)
+    mjsense(*quick, "--seed", 1, rc=2)
+    assert (mjsense.folder / "data/house_0/trajectories_batch_1_of_1.h5").read_bytes() == before
+    mjsense(*quick, "--house", 1)
+
+
+def test_help_and_version(mjsense):
+    assert mjsense("--version").stdout.startswith("mjsense ")
+    for word in ("record", "sensors", "inspect", "verify", "repair"):
+        assert "Usage" in mjsense(word, "--help").stdout
+
+
+def test_other_words_run_programs_of_the_path(mjsense):
+    tool = mjsense.folder / "bin/mjsense-hello"
+    tool.parent.mkdir()
+    tool.write_text('#!/bin/sh\necho "hello $*"\nexit 7\n')
+    tool.chmod(0o755)
+    path = {"PATH": f"{tool.parent}:{os.environ['PATH']}"}
+    assert mjsense("hello", "you", "--there", rc=7, env=path).stdout == "hello you --there\n"
+    assert "did you mean 'hello'?" in mjsense("helo", rc=2, env=path).stderr
+
+
+def test_sensors_of_a_scene(mjsense):
+    (mjsense.folder / "scene.xml").write_text(SCENE)
+    out = mjsense("sensors", "scene.xml").stdout
+    assert "scene/turn" in out and "rad/s" in out
+    table = json.loads(mjsense("sensors", "scene.xml", "--json").stdout)
+    turn = next(s for s in table if s["name"] == "scene/turn")
+    assert turn["shape"] == [3] and turn["bytes"] == 12 and turn["microseconds"] > 0
+
+
+def test_sensors_of_a_task(mjsense):
+    table = json.loads(mjsense("sensors", "pick", "--json", "--size", "64x48", "--steps", 2).stdout)
+    names = [s["name"] if s["name"].startswith("actions/") else s["name"].split("/")[0] for s in table]
+    assert list(dict.fromkeys(names)) == [
+        "sensor_param_wrist_camera", "wrist_camera", "sensor_param_exo_camera_1", "exo_camera_1", "qpos", "qvel",
+        "robot_base_pose", "env_states", "task_info", "actions/commanded_action", "actions/joint_pos",
+        "actions/joint_pos_rel", "actions/ee_twist", "actions/ee_pose", "object_image_points", "obj_start",
+        "grasp_state_pickup_obj", "obj_end", "tcp_pose", "policy_phase", "policy_num_retries", "grasp_pose"]
+
+
+def test_verify_inspect_repair(mjsense):
+    mjsense("record", "pick", "--size", "64x48", "--horizon", 4, "--keep-failures", "-q", "--out", "data")
+    assert json.loads(mjsense("verify", "data", "--json").stdout)
+    assert json.loads(mjsense("inspect", "data", "--json", "--sheet", "sheet.png").stdout)
+    assert (mjsense.folder / "sheet.png").read_bytes().startswith(b"\x89PNG")
+    mjsense("repair", "data")
+    video = next((mjsense.folder / "data/house_0").glob("*.mp4"))
+    video.unlink()
+    done = mjsense("verify", "data", rc=1)
+    assert video.name in done.stdout
