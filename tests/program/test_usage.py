@@ -29,7 +29,7 @@ SCENE = """<mujoco><worldbody><body name="ball"><freejoint/><geom size=".1"/><si
     ("record pick --config typo.toml --out x", "typo.toml:2: no key named 'episods'; did you mean 'episodes'?"),
     ("record pick --config type.toml --out x", "type.toml:1: the value of 'episodes' is of a wrong type"),
     ("record pick --config broken.toml --out x", "broken.toml:1"),
-    ("recrd", "no command named 'recrd'; did you mean 'record'?"),
+    ("recrd", "no command 'recrd'; did you mean 'record'?"),
     ("sensors missing.xml", "missing.xml: no such file"),
     ("sensors broken.xml", "broken.xml"),
     ("sensors pik", "did you mean 'pick'?"),

@@ -105,6 +105,13 @@ CLI::App& add_path_command(CLI::App& program, const char* name, const char* help
   return app;
 }
 
+// MuJoCo's messages may have several lines.
+std::string one_line(std::string text) {
+  text.erase(text.find_last_not_of(" \n") + 1);
+  for (std::size_t at; (at = text.find('\n')) != std::string::npos;) text.replace(at, 1, "; ");
+  return text;
+}
+
 // MuJoCo's warnings, each once, on stderr and in no file. A world that diverges is reported with its episode.
 void show_warnings() {
   mju_user_warning = [](const char* text) {
@@ -113,7 +120,8 @@ void show_warnings() {
     const std::string warning = text;
     if (warning.find("simulation is unstable") != std::string::npos) return;
     const std::lock_guard lock(mutex);
-    if (shown.insert(warning).second) fmt::print(stderr, "mjsense: MuJoCo: {}\n", warning);
+    if (shown.insert(warning).second)
+      fmt::print(stderr, "mjsense: MuJoCo: {}\n", one_line(warning));
   };
 }
 
@@ -204,7 +212,7 @@ int main(int argc, char** argv) {
   try {
     return mjsense::run(argc, argv);
   } catch (const std::exception& e) {
-    fmt::print(stderr, "mjsense: {}\n", e.what());
+    fmt::print(stderr, "mjsense: {}\n", mjsense::one_line(e.what()));
     return mjsense::kWrongInput;
   }
 }

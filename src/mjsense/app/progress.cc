@@ -38,26 +38,32 @@ ProgressLine::ProgressLine(bool quiet) : quiet_(quiet), terminal_(isatty(STDERR_
 
 void ProgressLine::show(const RecordProgress& progress, int stop_level) {
   if (quiet_) return;
-  std::string text = progress_text(progress);
-  if (stop_level > 0) {
-    text += fmt::format("  stopping: {} running (Ctrl-C again discards them)", progress.running);
+  text_ = progress_text(progress);
+  if (stop_level > 0 && progress.running > 0) {
+    text_ += fmt::format("  stopping: {} running (Ctrl-C again discards them)", progress.running);
   }
   if (terminal_) {
-    fmt::print(stderr, "\r\033[K{}", text);
+    fmt::print(stderr, "\r\033[K{}", text_);
     std::fflush(stderr);
     open_ = true;
     return;
   }
   const int ended = progress.succeeded + progress.failed;
-  const bool quiet_spell = progress.seconds - shown_at_ > 10;
-  if ((ended == shown_ended_ || progress.seconds - shown_at_ < 1) && !quiet_spell) return;
+  const double quiet_for = progress.seconds - shown_at_;
+  if (quiet_for < 1 || (ended == shown_ended_ && quiet_for < 10)) return;
   shown_ended_ = ended;
   shown_at_ = progress.seconds;
-  fmt::print(stderr, "{}\n", text);
+  print();
+}
+
+void ProgressLine::print() {
+  fmt::print(stderr, "{}\n", text_);
+  printed_ = text_;
 }
 
 void ProgressLine::finish() {
   if (open_) fmt::print(stderr, "\n");
+  if (!terminal_ && text_ != printed_) print();
   open_ = false;
 }
 

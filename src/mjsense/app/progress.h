@@ -12,11 +12,14 @@ class ProgressLine {
  public:
   explicit ProgressLine(bool quiet);
   void show(const RecordProgress& progress, int stop_level);
-  void finish();  // leaves the line as it stands
+  void finish();  // leaves the last line as it stands
 
  private:
+  void print();
+
   bool quiet_, terminal_;
   bool open_ = false;
+  std::string text_, printed_;
   int shown_ended_ = -1;
   double shown_at_ = -1e9;
 };

@@ -113,7 +113,8 @@ SpecPtr parse_model(const ModelSource& source, std::string_view place) {
   }
   // Absolute, so that its assets are found from anywhere.
   const std::string path = std::filesystem::absolute(source.path).lexically_normal().string();
-  return checked(mj_parse(path.c_str(), nullptr, vfs.get(), error, sizeof error), error, place);
+  return checked(mj_parse(path.c_str(), nullptr, vfs.get(), error, sizeof error), error,
+                 fmt::format("{} ({})", place, source.path));
 }
 
 std::string save_xml(mjSpec* spec) {

@@ -1,0 +1,59 @@
+"""The main job end to end: a planner drives a Franka to pick, two cameras watch, episodes land on disk.
+
+Steps and frames a second over the whole job, and where the time goes. `encoders` and `files` are processor seconds spent
+beside the loop, in other processes and threads, and compete with it for the CPUs.
+"""
+
+import json
+import os
+import pathlib
+import statistics
+import subprocess
+import sys
+import tempfile
+
+from harness import Row, report
+
+ROOT = pathlib.Path(__file__).resolve().parents[1]
+RUNS = 3
+CASES = {
+    "state alone, 16 episodes in 4 worlds": ["--episodes", "16", "--cameras", "none"],
+    "2 cameras 640x368, 4 episodes in 4 worlds": ["--episodes", "4"],
+    "2 cameras 640x368 with depth, 4 episodes in 4 worlds": ["--episodes", "4", "--depth"],
+    "2 cameras 320x192, 8 episodes in 4 worlds": ["--episodes", "8", "--size", "320x192"],
+}
+
+
+def program() -> str:
+    built = [ROOT / "build" / preset / "mjsense" for preset in ("release", "dev")]
+    found = os.environ.get("MJSENSE_PROGRAM") or next((str(p) for p in built if p.exists()), None)
+    if not found:
+        sys.exit("bench/main_job: build the program first (./dev build) or name it in $MJSENSE_PROGRAM")
+    return found
+
+
+def run(options: list[str]) -> dict:
+    with tempfile.TemporaryDirectory() as folder:
+        command = [program(), "record", "pick", "--robot", "franka", "--worlds", "4", "--out", folder, "--json", "-q",
+                   "--no-sheet", *options]
+        return json.loads(subprocess.run(command, check=True, capture_output=True, text=True).stdout)
+
+
+def main() -> None:
+    rows = []
+    for case, options in CASES.items():
+        results = [run(options) for _ in range(RUNS)]
+        median = statistics.median
+        rows.append(Row(case, median(r["steps"] / r["seconds"] for r in results), "steps/s"))
+        if results[0]["frames"]:
+            rows.append(Row(case, median(r["frames"] / r["seconds"] for r in results), "frames/s"))
+        for room in results[0]["time"]:
+            share = median(100 * r["time"][room] / r["seconds"] for r in results)
+            rows.append(Row(f"- {room}", share, "% of the time"))
+        rows.append(Row("- beside it: encoders", median(r["encode_cpu_s"] for r in results), "CPU s"))
+        rows.append(Row("- beside it: files", median(r["write_s"] for r in results), "s"))
+    report("Main job", rows)
+
+
+if __name__ == "__main__":
+    main()
