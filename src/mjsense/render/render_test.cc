@@ -1,0 +1,292 @@
+#include <gtest/gtest.h>
+
+#include <array>
+#include <cmath>
+#include <memory>
+
+#include "mjsense/core/cpu.h"
+#include "mjsense/core/error.h"
+#include "mjsense/rays/ray_scene.h"
+#include "mjsense/render/camera_model.h"
+#include "mjsense/render/view_builder.h"
+
+namespace mjsense {
+namespace {
+
+using Pixel = std::array<int, 3>;
+
+// A model, its ray scene, and images of it from any place.
+struct Studio {
+  std::unique_ptr<mjModel, void (*)(mjModel*)> model{nullptr, mj_deleteModel};
+  std::unique_ptr<mjData, void (*)(mjData*)> data{nullptr, mj_deleteData};
+  std::unique_ptr<RayScene> rays;
+  std::unique_ptr<Look> look;
+  ViewOptions options;
+  RenderTiles render = best_render_tiles();
+
+  explicit Studio(const std::string& xml) {
+    char error[500] = "";
+    mjSpec* spec =
+        mj_parseXMLString(("<mujoco>" + xml + "</mujoco>").c_str(), nullptr, error, sizeof error);
+    if (!spec) throw RuntimeError(error);
+    model.reset(mj_compile(spec, nullptr));
+    if (!model) throw RuntimeError(mjs_getError(spec));
+    mj_deleteSpec(spec);
+    data.reset(mj_makeData(model.get()));
+    mj_forward(model.get(), data.get());
+  }
+  // Overwrites texture `id`: texel i of the image in memory.
+  void paint(int id, auto&& color) {
+    const int n = model->tex_width[id] * model->tex_height[id];
+    for (int i = 0; i < n; ++i) {
+      const Pixel c = color(i);
+      for (int k = 0; k < 3; ++k)
+        model->tex_data[model->tex_adr[id] + 3 * i + k] = static_cast<mjtByte>(c[k]);
+    }
+  }
+  // size x size pixels from `at`, camera axes given by x and y (unit, world).
+  std::vector<std::uint8_t> shoot(std::array<double, 3> at, std::array<double, 3> x,
+                                  std::array<double, 3> y, int size, double fovy = 45,
+                                  int samples = 1) {
+    if (!rays) {
+      rays = std::make_unique<RayScene>(model.get(), 1);
+      look = std::make_unique<Look>(model.get(), 0x3fu, true);
+      World world;
+      world.model = model.get();
+      world.data = data.get();
+      rays->update(world);
+    }
+    const double z[3] = {x[1] * y[2] - x[2] * y[1], x[2] * y[0] - x[0] * y[2],
+                         x[0] * y[1] - x[1] * y[0]};
+    double r[9];
+    for (int i = 0; i < 3; ++i) {
+      r[3 * i] = x[i];
+      r[3 * i + 1] = y[i];
+      r[3 * i + 2] = z[i];
+    }
+    ViewBuilder builder(model.get(), *look, options);
+    const View& view = builder.build(rays->world(0), rays->shared(), Appearance(model.get()),
+                                     at.data(), r, grid_from_fovy(size, size, fovy, false));
+    std::vector<std::uint8_t> image(3 * size * size);
+    std::vector<int> lists((3 + View::kMaxLights) * (model->ngeom + 1));
+    Array hits(DType::kUint8, {static_cast<std::int64_t>(tile_hits_bytes())});
+    TileScratch scratch;
+    scratch.row = lists.data();
+    scratch.opaque = scratch.row + model->ngeom;
+    scratch.transparent = scratch.opaque + model->ngeom;
+    scratch.casters = scratch.transparent + model->ngeom;
+    scratch.hits = hits.data();
+    ImageTargets targets;
+    targets.rgb = image.data();
+    targets.samples = samples;
+    render(view, targets, 0, (size + kTileSize - 1) / kTileSize, scratch);
+    return image;
+  }
+  Pixel center(std::array<double, 3> at, std::array<double, 3> x, std::array<double, 3> y,
+               double fovy = 45) {
+    const auto image = shoot(at, x, y, 9, fovy);
+    const std::uint8_t* p = image.data() + 3 * (4 * 9 + 4);
+    return {p[0], p[1], p[2]};
+  }
+  Pixel from_above(double x, double y, double height = 2) {
+    return center({x, y, height}, {1, 0, 0}, {0, 1, 0}, 1);
+  }
+};
+
+void expect_pixel(Pixel got, Pixel want, int tolerance = 1) {
+  for (int c = 0; c < 3; ++c)
+    EXPECT_NEAR(got[c], want[c], tolerance) << got[0] << " " << got[1] << " " << got[2] << " for "
+                                            << want[0] << " " << want[1] << " " << want[2];
+}
+
+// Ambient light alone: what is seen is colour times texture.
+constexpr char kFlat[] =
+    R"(<visual><headlight ambient="1 1 1" diffuse="0 0 0" specular="0 0 0"/></visual>)";
+constexpr char kDark[] = R"(<visual><headlight active="0"/></visual>)";
+constexpr char kMatte[] =
+    R"(<asset><material name="matte" specular="0" rgba="1 .5 .2 1"/></asset>)";
+
+TEST(Shading, HeadlightIsAmbientPlusDiffuseTimesCosine) {
+  Studio s(std::string(kMatte) +
+           R"(<worldbody><geom type="plane" size="5 5 1" material="matte"/></worldbody>)");
+  // Default headlight: ambient 0.1, diffuse 0.4.
+  expect_pixel(s.from_above(0, 0), {128, 64, 26});
+  // From 45 degrees the headlight meets the floor at 45 degrees.
+  const double h = std::sqrt(0.5), v = 255 * (0.1 + 0.4 * h);
+  expect_pixel(s.center({0, -2, 2}, {1, 0, 0}, {0, h, h}, 1),
+               {int(v + .5), int(v / 2 + .5), int(v / 5 + .5)});
+}
+
+TEST(Shading, SpotHasAConeAnExponentAndAttenuation) {
+  Studio s(std::string(kDark) + kMatte + R"(<worldbody>
+    <light pos="0 0 2" dir="0 0 -1" cutoff="30" exponent="2" attenuation="0 .5 .25" diffuse="1 1 1" specular="0 0 0"
+           castshadow="false"/>
+    <geom type="plane" size="5 5 1" material="matte"/></worldbody>)");
+  expect_pixel(s.from_above(0, 0, 5), {128, 64, 26});  // attenuation 1 / (.5 * 2 + .25 * 4)
+  const double d = std::sqrt(5.0), cosine = 2 / d;     // one metre aside
+  const double value = cosine * cosine * cosine / (0.5 * d + 0.25 * d * d);
+  expect_pixel(s.from_above(1, 0, 5),
+               {int(255 * value + .5), int(127.5 * value + .5), int(51 * value + .5)});
+  expect_pixel(s.from_above(1.3, 0, 5), {0, 0, 0});  // 33 degrees: outside
+}
+
+TEST(Shading, SpecularHighlightIsWhereHalfwayMeetsTheNormal) {
+  Studio s(
+      std::string(kDark) +
+      R"(<asset><material name="m" rgba="0 0 0 1" specular=".5" shininess=".25"/></asset><worldbody>
+    <light pos="1 0 2" dir="0 0 -1" type="directional" diffuse="1 1 1" specular="1 1 1" castshadow="false"/>
+    <geom type="plane" size="5 5 1" material="m"/></worldbody>)");
+  expect_pixel(s.from_above(0, 0), {128, 128, 128});
+  // Seen from 60 degrees, halfway is 30 degrees off the normal: cos^32.
+  const double v = 0.5 * std::pow(std::cos(M_PI / 6), 32) * 255;
+  const double c = 0.5, sn = std::sqrt(0.75);
+  expect_pixel(s.center({0, -2 * sn, 2 * c}, {1, 0, 0}, {0, c, sn}, 1),
+               {int(v + .5), int(v + .5), int(v + .5)});
+}
+
+TEST(Shading, ShadowsHaveSharpKnownEdges) {
+  // A box of half size 0.2 at height 1, light at height 3: its shadow reaches to 0.2 * 3 / 1.8 = 1/3.
+  Studio s(std::string(kDark) + kMatte + R"(<worldbody>
+    <light pos="0 0 3" dir="0 0 -1" diffuse="1 1 1" specular="0 0 0" castshadow="true" cutoff="80" exponent="0"/>
+    <geom type="plane" size="5 5 1" material="matte"/><geom type="box" size=".2 .2 .2" pos="0 0 1" material="matte"/>
+    </worldbody>)");
+  const std::array<double, 3> x{1, 0, 0}, y{0, 1, 0};
+  s.options.shadows = true;
+  EXPECT_EQ(s.center({0.32, 0, 0.5}, x, y, 1)[0], 0);
+  EXPECT_GT(s.center({0.35, 0, 0.5}, x, y, 1)[0], 200);
+  EXPECT_GT(s.center({0, 0, 2}, x, y, 1)[0], 200);  // the box itself
+  s.options.shadows = false;
+  EXPECT_GT(s.center({0.32, 0, 0.5}, x, y, 1)[0], 200);
+}
+
+TEST(Texture, PlaneStartsAtTheCornerAndRepeats) {
+  Studio s(std::string(kFlat) +
+           R"(<asset><texture name="t" type="2d" builtin="flat" width="2" height="2"/>
+    <material name="m" texture="t" texrepeat="2 1"/></asset><worldbody>
+    <geom type="plane" size="1 1 1" material="m"/></worldbody>)");
+  const std::array<Pixel, 4> texels{{{255, 0, 0}, {0, 255, 0}, {0, 0, 255}, {255, 255, 255}}};
+  s.paint(0, [&](int i) { return texels[i]; });
+  // Across: two repeats of two texels, centres at x = -.75 -.25 .25 .75. Row 0 of the image is at +y.
+  expect_pixel(s.from_above(-0.75, 0.5), texels[0]);
+  expect_pixel(s.from_above(-0.25, 0.5), texels[1]);
+  expect_pixel(s.from_above(0.25, 0.5), texels[0]);
+  expect_pixel(s.from_above(-0.75, -0.5), texels[2]);
+  expect_pixel(s.from_above(0.75, -0.5), texels[3]);
+  expect_pixel(s.from_above(-0.5, 0.5), {128, 128, 0});  // halfway between two texels
+}
+
+TEST(Texture, CubeFacesAndSkyFollowOpenGL) {
+  const std::array<Pixel, 6> faces{
+      {{255, 0, 0}, {0, 255, 0}, {0, 0, 255}, {255, 255, 0}, {0, 255, 255}, {255, 0, 255}}};
+  Studio s(std::string(kFlat) +
+           R"(<asset><texture name="t" type="cube" builtin="flat" width="8" height="48"/>
+    <texture name="sky" type="skybox" builtin="flat" width="8" height="48"/><material name="m" texture="t"/></asset>
+    <worldbody><geom type="box" size=".5 .4 .3" material="m"/></worldbody>)");
+  for (int t = 0; t < 2; ++t) s.paint(t, [&](int i) { return faces[i / 64]; });
+  expect_pixel(s.center({2, 0, 0}, {0, 1, 0}, {0, 0, 1}), faces[0]);
+  expect_pixel(s.center({-2, 0, 0}, {0, -1, 0}, {0, 0, 1}), faces[1]);
+  expect_pixel(s.center({0, 2, 0}, {-1, 0, 0}, {0, 0, 1}), faces[2]);
+  expect_pixel(s.center({0, -2, 0}, {1, 0, 0}, {0, 0, 1}), faces[3]);
+  expect_pixel(s.center({0, 0, 2}, {1, 0, 0}, {0, 1, 0}), faces[4]);
+  expect_pixel(s.center({0, 0, -2}, {1, 0, 0}, {0, -1, 0}), faces[5]);
+  // The sky is turned a quarter around x: its +y face is overhead.
+  expect_pixel(s.center({9, 0, 9}, {1, 0, 0}, {0, -1, 0}), faces[2]);
+  expect_pixel(s.center({9, 0, 9}, {0, -1, 0}, {0, 0, 1}), faces[0]);
+}
+
+TEST(Shading, TransparentGeomsAreDrawnTwice) {
+  Studio s(std::string(kFlat) + R"(<worldbody><geom type="plane" size="5 5 1" rgba="1 1 1 1"/>
+    <geom type="box" size=".5 .5 .1" pos="0 0 .5" rgba="0 0 0 .5"/></worldbody>)");
+  expect_pixel(s.from_above(0, 0), {64, 64, 64});  // 1 * (1 - .5)^2
+}
+
+TEST(Kernels, EveryInstructionSetPaintsTheSamePicture) {
+  Studio s(
+      R"(<asset><texture name="t" type="2d" builtin="checker" rgb1="1 0 0" rgb2="0 0 1" width="64" height="64"/>
+    <texture name="q" type="cube" builtin="gradient" rgb1="1 1 0" rgb2="0 1 1" width="16" height="16"/>
+    <material name="m" texture="t" texrepeat="3 3"/><material name="n" texture="q"/>
+    <mesh name="tet" vertex="0 0 0 1 0 0 0 1 0 0 0 1"/></asset>
+    <worldbody><light pos="1 1 4" dir="-.2 -.2 -1" castshadow="true"/><geom type="plane" size="0 0 .1" material="m"/>
+    <geom type="box" size=".3 .2 .1" pos="0 0 1" euler="20 10 5" material="n"/><geom type="mesh" mesh="tet" pos=".5 .2 0"/>
+    <geom type="ellipsoid" size=".3 .2 .1" pos="-.6 .3 .2" rgba=".9 .5 .1 .5"/>
+    <geom type="capsule" size=".05 .3" pos="0 0 .3" rgba=".2 .9 .2 1"/>
+    <geom type="cylinder" size=".1 .3" pos="-.3 -.6 .3" material="m"/></worldbody>)");
+  s.options.shadows = true;
+  const auto shoot = [&](RenderTiles render) {
+    s.render = render;
+    return s.shoot({0, -2.5, 1.5}, {1, 0, 0}, {0, 0.4, std::sqrt(1 - 0.16)}, 45);
+  };
+  const auto portable = shoot(render_tiles_portable);
+  std::vector<RenderTiles> others;
+#if defined(__x86_64__)
+  if (cpu_isa() >= Isa::kAvx2) others.push_back(render_tiles_avx2);
+  if (cpu_isa() >= Isa::kAvx512) others.push_back(render_tiles_avx512);
+#endif
+  for (RenderTiles render : others) {
+    const auto image = shoot(render);
+    int different = 0;
+    for (std::size_t i = 0; i < image.size(); ++i)
+      different += std::abs(image[i] - portable[i]) > 1;
+    EXPECT_LT(different, 30);  // of 6075 values: edges that rounding moves
+  }
+}
+
+TEST(Shading, SamplesSoftenEdges) {
+  Studio s(
+      std::string(kFlat) +
+      R"(<worldbody><geom type="box" size=".5 .5 .5" rgba="1 1 1 1" euler="0 0 20"/></worldbody>)");
+  const auto partly = [](const std::vector<std::uint8_t>& image) {
+    int n = 0;
+    for (auto v : image) n += v != 0 && v != 255;
+    return n;
+  };
+  EXPECT_EQ(partly(s.shoot({0, 0, 3}, {1, 0, 0}, {0, 1, 0}, 40)), 0);
+  EXPECT_GT(partly(s.shoot({0, 0, 3}, {1, 0, 0}, {0, 1, 0}, 40, 45, 4)), 100);
+}
+
+TEST(CameraModel, GridsAreThosePublished) {
+  const PixelGrid g = grid_from_fovy(8, 6, 90, false);
+  EXPECT_FLOAT_EQ(g.left, -8.0f / 6);
+  EXPECT_FLOAT_EQ(g.top, 1);
+  EXPECT_FLOAT_EQ(g.dx, 2.0f / 6);
+  EXPECT_FLOAT_EQ(g.dy, -2.0f / 6);
+  const float focal[4] = {.006f, .006f, .0005f, -.0003f}, size[2] = {.008f, .006f};
+  const PixelGrid p = grid_from_sensor(8, 6, focal, size);
+  EXPECT_NEAR(p.left, -(.004 - .0005) / .006, 1e-6);
+  EXPECT_NEAR(p.left + 8 * p.dx, (.004 + .0005) / .006, 1e-6);
+  EXPECT_NEAR(p.top, (.003 + .0003) / .006, 1e-6);
+  const PixelGrid k = grid_from_intrinsics(640, 480, 600, 610, 321, 238);
+  const auto matrix = intrinsic_matrix(k);
+  EXPECT_NEAR(matrix[0], 600, 1e-3);
+  EXPECT_NEAR(matrix[4], 610, 1e-3);
+  EXPECT_NEAR(matrix[2], 321, 1e-3);
+  EXPECT_NEAR(matrix[5], 238, 1e-3);
+}
+
+TEST(CameraModel, DistortionIsUndone) {
+  const PixelGrid grid = grid_from_intrinsics(64, 48, 60, 60, 32, 24);
+  const double k[5] = {-0.2, 0.05, 0.001, -0.002, 0.01};
+  const auto rays = bent_rays(grid, Lens::kBrownConrady, k, "camera 'c'");
+  for (int y = 0; y < 48; y += 7)
+    for (int x = 0; x < 64; x += 7) {
+      const double a = rays[2 * (64 * y + x)], b = -rays[2 * (64 * y + x) + 1], r2 = a * a + b * b;
+      const double radial = 1 + r2 * (k[0] + r2 * (k[1] + r2 * k[4]));
+      const double u = a * radial + 2 * k[2] * a * b + k[3] * (r2 + 2 * a * a);
+      const double v = b * radial + k[2] * (r2 + 2 * b * b) + 2 * k[3] * a * b;
+      EXPECT_NEAR(60 * u + 32, x + 0.5, 1e-4);
+      EXPECT_NEAR(60 * v + 24, y + 0.5, 1e-4);
+    }
+  // An equidistant fisheye of 139 degrees across: the border pixel sees 69.5 degrees aside.
+  const double none[4] = {};
+  const double f = 32 / (69.5 * M_PI / 180);
+  const auto wide =
+      bent_rays(grid_from_intrinsics(64, 48, f, f, 32, 24), Lens::kFisheye, none, "camera 'c'");
+  EXPECT_NEAR(std::atan(std::hypot(wide[2 * 64 * 24], wide[2 * 64 * 24 + 1])) * 180 / M_PI,
+              69.5 * 31.504 / 32, 0.1);
+  EXPECT_THROW(
+      bent_rays(grid_from_intrinsics(64, 48, 10, 10, 32, 24), Lens::kFisheye, none, "camera 'c'"),
+      ValueError);
+}
+
+}  // namespace
+}  // namespace mjsense
