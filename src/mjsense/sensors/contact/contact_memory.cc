@@ -3,15 +3,6 @@
 #include <algorithm>
 
 namespace mjsense {
-namespace {
-
-template <class T>
-T* row(Array* array, int world) {
-  return array->row<T>(world).data();
-}
-
-}  // namespace
-
 ContactMemory::ContactMemory(int num_worlds, int num_primaries, int decimation,
                              const Fields& fields)
     : fields_(fields), num_primaries_(num_primaries), decimation_(decimation) {
@@ -37,10 +28,10 @@ void ContactMemory::update_time(const World& world, const ContactReducer& contac
   const int w = world.id;
   const double dt = world.dt();
   double* since = since_.data() + static_cast<std::size_t>(w) * num_primaries_;
-  float* air = row<float>(fields_.current_air, w);
-  float* last_air = row<float>(fields_.last_air, w);
-  float* contact = row<float>(fields_.current_contact, w);
-  float* last_contact = row<float>(fields_.last_contact, w);
+  float* air = fields_.current_air(w);
+  float* last_air = fields_.last_air(w);
+  float* contact = fields_.current_contact(w);
+  float* last_contact = fields_.last_contact(w);
   for (int p = 0; p < num_primaries_; ++p) {
     double t = since[p];
     if (contacts.count(w, p) > 0) {
@@ -59,8 +50,8 @@ void ContactMemory::update_time(const World& world, const ContactReducer& contac
 void ContactMemory::update_events(const World& world, const ContactReducer& contacts) {
   const int w = world.id;
   std::uint8_t* touch = touch_.data() + static_cast<std::size_t>(w) * num_primaries_;
-  bool* touchdown = row<bool>(fields_.touchdown, w);
-  bool* liftoff = row<bool>(fields_.liftoff, w);
+  bool* touchdown = fields_.touchdown(w);
+  bool* liftoff = fields_.liftoff(w);
   for (int p = 0; p < num_primaries_; ++p) {
     const bool now = contacts.count(w, p) > 0;
     touchdown[p] |= now && !touch[p];
@@ -69,38 +60,36 @@ void ContactMemory::update_events(const World& world, const ContactReducer& cont
   }
 }
 
-void ContactMemory::strike(const World& world, int primary, double force_norm,
-                           const ContactReading& reading) {
-  const int w = world.id, p = primary;
-  row<bool>(fields_.found_any, w)[p] = true;
-  float& first = row<float>(fields_.first_touch_time, w)[p];
+bool ContactMemory::strike(int w, int p, double force_norm) {
+  fields_.found_any(w)[p] = true;
+  float& first = fields_.first_touch_time(w)[p];
   if (first < 0) first = static_cast<float>(step_time_[w]);
   double& peak = peak_[static_cast<std::size_t>(w) * num_primaries_ + p];
-  if (force_norm <= peak) return;
+  if (force_norm <= peak) return false;
   peak = force_norm;
-  row<float>(fields_.dist_at_peak, w)[p] = static_cast<float>(reading.dist);
+  return true;
+}
+
+void ContactMemory::set_peak(int w, int p, const ContactReading& reading) {
+  fields_.dist_at_peak(w)[p] = static_cast<float>(reading.dist);
   for (int i = 0; i < 3; ++i) {
-    row<float>(fields_.force_peak, w)[3 * p + i] = static_cast<float>(reading.force[i]);
-    row<float>(fields_.pos_at_peak, w)[3 * p + i] = static_cast<float>(reading.pos[i]);
+    fields_.force_peak(w)[3 * p + i] = static_cast<float>(reading.force[i]);
+    fields_.pos_at_peak(w)[3 * p + i] = static_cast<float>(reading.pos[i]);
   }
 }
 
-void ContactMemory::clear_step(int world) {
-  step_time_[world] = 0.0;
-  const auto zero = [&](Array* a) {
-    std::fill_n(a->row_data(world), a->row_bytes(), std::byte{0});
-  };
+void ContactMemory::clear_step(int w) {
+  step_time_[w] = 0.0;
   if (fields_.touchdown) {
-    zero(fields_.touchdown);
-    zero(fields_.liftoff);
+    fields_.touchdown.fill(w, false);
+    fields_.liftoff.fill(w, false);
   }
   if (fields_.found_any) {
-    for (Array* a :
-         {fields_.found_any, fields_.force_peak, fields_.dist_at_peak, fields_.pos_at_peak})
-      zero(a);
-    std::ranges::fill(fields_.first_touch_time->row<float>(world), -1.0f);
-    std::fill_n(peak_.begin() + static_cast<std::size_t>(world) * num_primaries_, num_primaries_,
-                -1.0);
+    fields_.found_any.fill(w, false);
+    for (const auto& rows : {fields_.force_peak, fields_.dist_at_peak, fields_.pos_at_peak})
+      rows.fill(w, 0.0f);
+    fields_.first_touch_time.fill(w, -1.0f);
+    std::fill_n(peak_.begin() + static_cast<std::size_t>(w) * num_primaries_, num_primaries_, -1.0);
   }
 }
 
@@ -110,9 +99,9 @@ void ContactMemory::reset(int world, const ContactReducer& contacts) {
   clear_step(world);
   if (fields_.current_air) {
     std::fill_n(since_.begin() + begin, num_primaries_, 0.0);
-    for (Array* a :
+    for (const auto& rows :
          {fields_.current_air, fields_.last_air, fields_.current_contact, fields_.last_contact})
-      std::ranges::fill(a->row<float>(world), 0.0f);
+      rows.fill(world, 0.0f);
   }
   // A primary that starts in contact has not touched down.
   for (int p = 0; fields_.touchdown && p < num_primaries_; ++p) {

@@ -2,6 +2,7 @@
 // What a contact sensor remembers from substep to substep: air and contact times, touchdown and
 // lift-off, and the latch over a control step.
 
+#include <algorithm>
 #include <cstdint>
 #include <span>
 #include <vector>
@@ -11,23 +12,40 @@
 
 namespace mjsense {
 
+// The rows of a field, without the arithmetic of Array.
+template <class T>
+class Rows {
+ public:
+  Rows() = default;
+  explicit Rows(Array& array)
+      : base_(reinterpret_cast<T*>(array.data())), size_(array.row<T>(0).size()) {}
+  explicit operator bool() const { return base_ != nullptr; }
+  T* operator()(int world) const { return base_ + world * size_; }
+  void fill(int world, T value) const { std::fill_n((*this)(world), size_, value); }
+
+ private:
+  T* base_ = nullptr;
+  std::size_t size_ = 0;
+};
+
 class ContactMemory {
  public:
-  // Where it writes; null: not asked for.
+  // Where it writes; empty: not asked for.
   struct Fields {
-    Array *current_air = nullptr, *last_air = nullptr, *current_contact = nullptr,
-          *last_contact = nullptr;
-    Array *touchdown = nullptr, *liftoff = nullptr;
-    Array *found_any = nullptr, *force_peak = nullptr, *dist_at_peak = nullptr,
-          *pos_at_peak = nullptr, *first_touch_time = nullptr;
+    Rows<float> current_air, last_air, current_contact, last_contact;
+    Rows<bool> touchdown, liftoff;
+    Rows<bool> found_any;
+    Rows<float> force_peak, dist_at_peak, pos_at_peak, first_touch_time;
   };
   ContactMemory() = default;
   ContactMemory(int num_worlds, int num_primaries, int decimation, const Fields& fields);
 
   // One substep. First next_substep(), then strike() for every primary in contact.
   void next_substep(const World& world, const ContactReducer& contacts);
-  bool wants_strikes() const { return fields_.found_any != nullptr; }
-  void strike(const World& world, int primary, double force_norm, const ContactReading& reading);
+  bool wants_strikes() const { return static_cast<bool>(fields_.found_any); }
+  // True if it is the strongest of the control step so far: set_peak() must follow.
+  bool strike(int world, int primary, double force_norm);
+  void set_peak(int world, int primary, const ContactReading& reading);
 
   void begin_control_step(int world) { substep_[world] = 0; }
   void reset(int world, const ContactReducer& contacts);

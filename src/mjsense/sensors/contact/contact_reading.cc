@@ -32,7 +32,7 @@ ContactReading read_contact(const World& world, const ContactRef& ref, bool wren
   set_other(world, c, s, r);
   if (!wrench) return r;
   mjtNum f[6];
-  mj_contactForce(world.model, world.data, ref.contact, f);
+  contact_wrench(world.model, world.data, ref.contact, f);
   if (global) {
     to_world(r.force, c, s, f[0], f[1], f[2]);
     to_world(r.torque, c, s, f[3], f[4], f[5]);

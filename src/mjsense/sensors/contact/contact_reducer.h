@@ -4,6 +4,7 @@
 
 #include <mujoco/mujoco.h>
 
+#include <cmath>
 #include <cstdint>
 #include <span>
 #include <string_view>
@@ -17,6 +18,19 @@ namespace mjsense {
 enum class ContactReduce { kNone, kMinDist, kMaxForce, kNetForce };
 ContactReduce contact_reduce_from_name(std::string_view name, std::string_view place);  // KeyError
 
+// mj_contactForce, without the call for the usual kind of contact: force and torque in the contact frame.
+inline void contact_wrench(const mjModel* m, const mjData* d, int id, mjtNum wrench[6]) {
+  const mjContact& c = d->contact[id];
+  const bool usual = c.exclude == 0 && c.efc_address >= 0 && c.adhesion == 0 && c.dim == 3 &&
+                     m->opt.cone == mjCONE_PYRAMIDAL && !(m->opt.enableflags & mjENBL_IPC);
+  if (!usual) return mj_contactForce(m, d, id, wrench);
+  const mjtNum* edge = d->efc_force + c.efc_address;
+  wrench[0] = edge[0] + edge[1] + edge[2] + edge[3];
+  wrench[1] = (edge[0] - edge[1]) * c.friction[0];
+  wrench[2] = (edge[2] - edge[3]) * c.friction[1];
+  wrench[3] = wrench[4] = wrench[5] = 0;
+}
+
 // One contact while a pass looks at it. Its wrench is computed when first asked for, once for all
 // sensors.
 class PassContact {
@@ -29,12 +43,15 @@ class PassContact {
 
   const mjtNum* wrench() {  // contact frame, N and N m
     if (!has_wrench_) {
-      mj_contactForce(world_.model, world_.data, id, wrench_);
+      contact_wrench(world_.model, world_.data, id, wrench_);
       has_wrench_ = true;
     }
     return wrench_;
   }
-  mjtNum force_norm() { return mju_norm3(wrench()); }
+  mjtNum force_norm() {
+    const mjtNum* f = wrench();
+    return std::sqrt(f[0] * f[0] + f[1] * f[1] + f[2] * f[2]);
+  }
 
  private:
   const World& world_;

@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <cstddef>
 #include <cstdio>
 #include <cstring>
 #include <utility>
@@ -41,11 +42,15 @@ SensorSpec make_spec(Shape shape, DType dtype, std::string unit, std::string fra
 
 }  // namespace
 
+// Where a field's values are in a reading; found is not in it.
 struct ContactSensor::Output {
-  const double* (*values)(const ContactReading&);  // null: found
+  int offset;  // in doubles; -1: found
   int dim;
-  Array* rows;
-  Array* history;  // null: none
+  Rows<float> rows, history;  // empty history: none
+
+  const double* values(const ContactReading& reading) const {
+    return reinterpret_cast<const double*>(&reading) + offset;
+  }
 };
 
 SensorSpec contact_field_spec(std::string_view field, bool world_axes) {
@@ -74,22 +79,26 @@ SensorSpec contact_field_spec(std::string_view field, bool world_axes) {
 
 namespace {
 
-using Values = const double* (*)(const ContactReading&);
+constexpr int index_of(std::size_t byte_offset) {
+  return static_cast<int>(byte_offset / sizeof(double));
+}
 
-Values values_of(std::string_view field) {
-  if (field == "force") return [](const ContactReading& r) { return +r.force; };
-  if (field == "torque") return [](const ContactReading& r) { return +r.torque; };
-  if (field == "dist") return [](const ContactReading& r) { return &r.dist; };
-  if (field == "pos") return [](const ContactReading& r) { return +r.pos; };
-  if (field == "normal") return [](const ContactReading& r) { return +r.normal; };
-  if (field == "tangent") return [](const ContactReading& r) { return +r.tangent; };
-  return nullptr;
+int offset_of(std::string_view field) {
+  if (field == "force") return index_of(offsetof(ContactReading, force));
+  if (field == "torque") return index_of(offsetof(ContactReading, torque));
+  if (field == "dist") return index_of(offsetof(ContactReading, dist));
+  if (field == "pos") return index_of(offsetof(ContactReading, pos));
+  if (field == "normal") return index_of(offsetof(ContactReading, normal));
+  if (field == "tangent") return index_of(offsetof(ContactReading, tangent));
+  if (field == "normal_force") return index_of(offsetof(ContactReading, normal_force));
+  if (field == "friction_force") return index_of(offsetof(ContactReading, friction_force));
+  return -1;
 }
 
 }  // namespace
 
 const double* contact_field_values(std::string_view field, const ContactReading& reading) {
-  return values_of(field)(reading);
+  return reinterpret_cast<const double*>(&reading) + offset_of(field);
 }
 
 std::unique_ptr<Sensor> ContactSensorCfg::build() const {
@@ -198,6 +207,8 @@ void ContactSensor::initialize(const SensorInit& init) {
 void ContactSensor::add_outputs(const SensorInit& init) {
   clear_fields();
   outputs_.clear();
+  other_geom_ = other_body_ = {};
+  pair_found_ = pair_force_ = {};
   const std::int64_t P = reducer_.num_primaries(), S = reducer_.num_secondaries();
   const std::int64_t N = P * cfg_.num_slots, H = cfg_.history_length;
   const bool world_axes = cfg_.global_frame || reducer_.is_net();
@@ -205,62 +216,65 @@ void ContactSensor::add_outputs(const SensorInit& init) {
   const auto add = [&](const char* field, SensorSpec spec) {
     return &add_field(field, std::move(spec), B);
   };
+  const auto rows = [&](const char* field, SensorSpec spec) {
+    return Rows<float>(add(field, std::move(spec))->data);
+  };
 
   needs_wrench_ = cfg_.friction_split;
   for (const std::string& field : cfg_.fields) {
     SensorSpec spec = contact_field_spec(field, world_axes);
     const bool vector = spec.shape.rank() == 1;
     spec.shape = vector ? Shape{N, 3} : Shape{N};
-    outputs_.push_back(
-        {values_of(field), vector ? 3 : 1, &add(field.c_str(), spec)->data, nullptr});
+    outputs_.push_back({offset_of(field), vector ? 3 : 1, rows(field.c_str(), spec), {}});
     needs_wrench_ |= field == "force" || field == "torque";
   }
   if (cfg_.friction_split) {
     const std::string axes = world_axes ? "world" : "contact";
     const auto part = [&](const char* field, const char* text) {
-      return &add(field, make_spec({N, 3}, DType::kFloat32, "N", axes, text))->data;
+      outputs_.push_back({offset_of(field),
+                          3,
+                          rows(field, make_spec({N, 3}, DType::kFloat32, "N", axes, text)),
+                          {}});
     };
-    outputs_.push_back({[](const ContactReading& r) { return +r.normal_force; }, 3,
-                        part("normal_force", "Normal part of force."), nullptr});
-    outputs_.push_back({[](const ContactReading& r) { return +r.friction_force; }, 3,
-                        part("friction_force", "Tangential part of force."), nullptr});
+    part("normal_force", "Normal part of force.");
+    part("friction_force", "Tangential part of force.");
   }
   for (std::size_t i = 0; H > 0 && i < cfg_.fields.size(); ++i) {
     SensorSpec spec = contact_field_spec(cfg_.fields[i], world_axes);
     spec.shape = outputs_[i].dim == 3 ? Shape{N, H, 3} : Shape{N, H};
     spec.description += " The last substeps, newest first.";
-    outputs_[i].history = &add((cfg_.fields[i] + "_history").c_str(), spec)->data;
+    outputs_[i].history = rows((cfg_.fields[i] + "_history").c_str(), spec);
   }
 
   if (cfg_.other_ids) {
     const auto id = [&](const char* field, const char* text) {
-      Field* f = add(field, make_spec({N}, DType::kInt32, "", "", text));
-      std::ranges::fill(f->data.all<std::int32_t>(), -1);
-      return f;
+      Array& data = add(field, make_spec({N}, DType::kInt32, "", "", text))->data;
+      std::ranges::fill(data.all<std::int32_t>(), -1);
+      return Rows<std::int32_t>(data);
     };
     other_geom_ = id("other_geom", "MuJoCo geom id of the other side, -1 if none.");
     other_body_ = id("other_body", "MuJoCo body id of the other side, -1 if none.");
   }
   if (cfg_.secondary_policy == "each") {
-    pair_found_ = add("pair_found", make_spec({P, S}, DType::kFloat32, "", "",
-                                              "Number of contacts of primary and secondary."));
-    pair_force_ = add("pair_force", make_spec({P, S, 3}, DType::kFloat32, "N", "world",
-                                              "Net force of the primary on the secondary."));
+    pair_found_ = rows("pair_found", make_spec({P, S}, DType::kFloat32, "", "",
+                                               "Number of contacts of primary and secondary."));
+    pair_force_ = rows("pair_force", make_spec({P, S, 3}, DType::kFloat32, "N", "world",
+                                               "Net force of the primary on the secondary."));
   }
 
   ContactMemory::Fields m;
   const auto seconds = [&](const char* field, const char* text) {
-    return &add(field, make_spec({P}, DType::kFloat32, "s", "", text))->data;
+    return rows(field, make_spec({P}, DType::kFloat32, "s", "", text));
   };
   const auto flag = [&](const char* field, const char* text) {
-    return &add(field, make_spec({P}, DType::kBool, "", "", text))->data;
+    return Rows<bool>(add(field, make_spec({P}, DType::kBool, "", "", text))->data);
   };
   if (cfg_.track_air_time) {
     m.current_air = seconds("current_air_time", "Time since the contact was lost.");
     m.last_air = seconds("last_air_time", "Length of the last phase in the air.");
     m.current_contact = seconds("current_contact_time", "Time since the contact began.");
     m.last_contact = seconds("last_contact_time", "Length of the last contact.");
-    if (!contains(cfg_.fields, "found")) m.current_air = nullptr;
+    if (!contains(cfg_.fields, "found")) m.current_air = {};
   }
   if (cfg_.track_events) {
     m.touchdown = flag("touchdown", "A contact began in this control step.");
@@ -269,15 +283,12 @@ void ContactSensor::add_outputs(const SensorInit& init) {
   if (cfg_.latch) {
     const std::string axes = world_axes ? "world" : "contact";
     m.found_any = flag("found_any", "There was a contact in this control step.");
-    m.force_peak = &add("force_peak", make_spec({P, 3}, DType::kFloat32, "N", axes,
-                                                "Strongest force of this control step."))
-                        ->data;
-    m.dist_at_peak = &add("dist_at_peak", make_spec({P}, DType::kFloat32, "m", "",
-                                                    "Signed distance at the strongest force."))
-                          ->data;
-    m.pos_at_peak = &add("pos_at_peak", make_spec({P, 3}, DType::kFloat32, "m", "world",
-                                                  "Contact point of the strongest force."))
-                         ->data;
+    m.force_peak = rows("force_peak", make_spec({P, 3}, DType::kFloat32, "N", axes,
+                                                "Strongest force of this control step."));
+    m.dist_at_peak = rows("dist_at_peak", make_spec({P}, DType::kFloat32, "m", "",
+                                                    "Signed distance at the strongest force."));
+    m.pos_at_peak = rows("pos_at_peak", make_spec({P, 3}, DType::kFloat32, "m", "world",
+                                                  "Contact point of the strongest force."));
     m.first_touch_time = seconds("first_touch_time",
                                  "From the start of the control step to its first contact, or -1.");
   }
@@ -297,12 +308,17 @@ void ContactSensor::substep(const World& world) {
 }
 
 void ContactSensor::remember(const World& world) {
-  const bool world_axes = cfg_.global_frame;
-  for (int p : reducer_.touched(world.id)) {
-    const ContactReading r =
-        reducer_.is_net() ? read_net_contact(world, reducer_.sum(world.id, p))
-                          : read_contact(world, reducer_.peak(world.id, p), true, world_axes);
-    memory_.strike(world, p, mju_norm3(r.force), r);
+  const int w = world.id;
+  for (int p : reducer_.touched(w)) {
+    if (reducer_.is_net()) {
+      const ContactSum& sum = reducer_.sum(w, p);
+      if (!memory_.strike(w, p, mju_norm3(sum.force))) continue;
+      memory_.set_peak(w, p, read_net_contact(world, sum));
+    } else {
+      const ContactRef& peak = reducer_.peak(w, p);
+      if (!memory_.strike(w, p, -peak.key)) continue;
+      memory_.set_peak(w, p, read_contact(world, peak, true, cfg_.global_frame));
+    }
   }
 }
 
@@ -311,7 +327,7 @@ void ContactSensor::reset(const World& world) {
   if (cfg_.track_events) pass_->run(world);
   memory_.reset(w, reducer_);
   for (const Output& o : outputs_) {
-    if (o.history) std::fill_n(o.history->row_data(w), o.history->row_bytes(), std::byte{0});
+    if (o.history) o.history.fill(w, 0.0f);
   }
   if (cfg_.history_length > 0) {
     const std::size_t n = static_cast<std::size_t>(reducer_.num_primaries()) * cfg_.num_slots;
@@ -333,90 +349,103 @@ int ContactSensor::read_slot(const World& world, int primary, int slot,
 
 void ContactSensor::write_rows(const World& world) {
   const int w = world.id, K = cfg_.num_slots;
-  clear_rows(w);
+  const std::size_t P = reducer_.num_primaries();
   int& num_written = num_written_[w];
-  int* written = written_.data() + static_cast<std::size_t>(w) * reducer_.num_primaries();
+  int* written = written_.data() + w * P;
+  for (int i = 0; i < num_written; ++i) {
+    if (reducer_.count(w, written[i]) == 0) clear_rows(w, written[i], 0);
+  }
+  num_written = 0;
   for (int p : reducer_.touched(w)) {
     written[num_written++] = p;
     const int count = reducer_.count(w, p);
+    const int filled = reducer_.is_net() ? 1 : std::min(count, K);
     if (reducer_.is_net()) {
       write_slot(w, p * K, count, read_net_contact(world, reducer_.sum(w, p)));
-      continue;
+    } else {
+      for (int k = 0; k < filled; ++k) {
+        write_slot(w, p * K + k, count,
+                   read_contact(world, reducer_.slot(w, p, k), needs_wrench_, cfg_.global_frame));
+      }
     }
-    for (int k = 0; k < std::min(count, K); ++k) {
-      write_slot(w, p * K + k, count,
-                 read_contact(world, reducer_.slot(w, p, k), needs_wrench_, cfg_.global_frame));
-    }
-  }
-  if (pair_found_) {
-    const std::size_t S = reducer_.num_secondaries();
-    float* found = pair_found_->data.row<float>(w).data();
-    float* force = pair_force_->data.row<float>(w).data();
-    for (int p : reducer_.touched(w)) {
-      std::copy_n(reducer_.pair_count(w).data() + p * S, S, found + p * S);
-      std::copy_n(reducer_.pair_force(w).data() + p * S * 3, S * 3, force + p * S * 3);
+    if (filled < K) clear_rows(w, p, filled);
+    if (pair_found_) {
+      const std::size_t S = reducer_.num_secondaries();
+      std::copy_n(reducer_.pair_count(w).data() + p * S, S, pair_found_(w) + p * S);
+      std::copy_n(reducer_.pair_force(w).data() + p * S * 3, S * 3, pair_force_(w) + p * S * 3);
     }
   }
   written_moment_[w] = world.moment;
 }
 
-void ContactSensor::clear_rows(int w) {
-  const int* written = written_.data() + static_cast<std::size_t>(w) * reducer_.num_primaries();
-  const std::size_t K = cfg_.num_slots, S = reducer_.num_secondaries();
-  for (int i = 0; i < num_written_[w]; ++i) {
-    const std::size_t p = written[i];
-    for (const Output& o : outputs_) {
-      std::fill_n(o.rows->row<float>(w).data() + p * K * o.dim, K * o.dim, 0.0f);
-    }
-    if (other_geom_) {
-      std::fill_n(other_geom_->data.row<std::int32_t>(w).data() + p * K, K, -1);
-      std::fill_n(other_body_->data.row<std::int32_t>(w).data() + p * K, K, -1);
-    }
-    if (pair_found_) {
-      std::fill_n(pair_found_->data.row<float>(w).data() + p * S, S, 0.0f);
-      std::fill_n(pair_force_->data.row<float>(w).data() + p * S * 3, S * 3, 0.0f);
-    }
+// Empties the slots of a primary from `first_slot` on, and its pairs if that is all of them.
+void ContactSensor::clear_rows(int w, int primary, int first_slot) {
+  const std::size_t slot = static_cast<std::size_t>(primary) * cfg_.num_slots + first_slot;
+  const std::size_t n = cfg_.num_slots - first_slot, S = reducer_.num_secondaries();
+  for (const Output& o : outputs_) std::fill_n(o.rows(w) + slot * o.dim, n * o.dim, 0.0f);
+  if (other_geom_) {
+    std::fill_n(other_geom_(w) + slot, n, -1);
+    std::fill_n(other_body_(w) + slot, n, -1);
   }
-  num_written_[w] = 0;
+  if (pair_found_ && first_slot == 0) {
+    std::fill_n(pair_found_(w) + primary * S, S, 0.0f);
+    std::fill_n(pair_force_(w) + primary * S * 3, S * 3, 0.0f);
+  }
 }
 
 void ContactSensor::write_slot(int w, int slot, int found, const ContactReading& reading) {
   for (const Output& o : outputs_) {
-    float* row = o.rows->row<float>(w).data() + static_cast<std::size_t>(slot) * o.dim;
-    if (!o.values) {
+    float* row = o.rows(w) + static_cast<std::size_t>(slot) * o.dim;
+    if (o.offset < 0) {
       *row = static_cast<float>(found);
       continue;
     }
     const double* values = o.values(reading);
-    for (int i = 0; i < o.dim; ++i) row[i] = static_cast<float>(values[i]);
+    row[0] = static_cast<float>(values[0]);
+    if (o.dim == 1) continue;
+    row[1] = static_cast<float>(values[1]);
+    row[2] = static_cast<float>(values[2]);
   }
   if (other_geom_) {
-    other_geom_->data.row<std::int32_t>(w)[slot] = reading.other_geom;
-    other_body_->data.row<std::int32_t>(w)[slot] = reading.other_body;
+    other_geom_(w)[slot] = reading.other_geom;
+    other_body_(w)[slot] = reading.other_body;
   }
 }
 
-// Shifts every slot by one substep. A slot that has been empty for H substeps is all zero and
-// skipped.
+// Moves every slot's history on by one substep. A slot that has been empty for H substeps is all zero
+// and left alone; neighbours that are not move together.
 void ContactSensor::write_history(int w) {
   const int K = cfg_.num_slots, N = reducer_.num_primaries() * K;
-  const std::size_t H = cfg_.history_length;
-  for (int n = 0; n < N; ++n) {
-    std::uint16_t& left = history_left_[static_cast<std::size_t>(w) * N + n];
+  std::uint16_t* left = history_left_.data() + static_cast<std::size_t>(w) * N;
+  const auto is_live = [&](int n) {
     const int count = reducer_.count(w, n / K);
-    const bool filled = n % K < (reducer_.is_net() ? std::min(count, 1) : count);
-    if (filled) {
-      left = static_cast<std::uint16_t>(H);
-    } else if (left > 0) {
-      --left;
-    } else {
-      continue;
+    if (n % K < (reducer_.is_net() ? std::min(count, 1) : count)) {
+      left[n] = static_cast<std::uint16_t>(cfg_.history_length);
+      return true;
     }
-    for (const Output& o : outputs_) {
-      if (!o.history) continue;
-      float* h = o.history->row<float>(w).data() + n * H * o.dim;
-      std::memmove(h + o.dim, h, (H - 1) * o.dim * sizeof(float));
-      std::copy_n(o.rows->row<float>(w).data() + static_cast<std::size_t>(n) * o.dim, o.dim, h);
+    return left[n] > 0 && (--left[n], true);
+  };
+  for (int begin = 0; begin < N; ++begin) {
+    if (!is_live(begin)) continue;
+    int end = begin + 1;
+    while (end < N && is_live(end)) ++end;
+    shift_history(w, begin, end);
+    begin = end;  // which is not live
+  }
+}
+
+// One move for all slots [begin, end): what it carries over a slot's border is then overwritten.
+void ContactSensor::shift_history(int w, int begin, int end) {
+  const std::size_t H = cfg_.history_length;
+  for (const Output& o : outputs_) {
+    if (!o.history) continue;
+    const std::size_t dim = o.dim;
+    float* history = o.history(w) + begin * H * dim;
+    const float* row = o.rows(w) + begin * dim;
+    const std::size_t n = end - begin;
+    std::memmove(history + dim, history, (n * H - 1) * dim * sizeof(float));
+    for (std::size_t k = 0; k < n; ++k) {
+      for (std::size_t i = 0; i < dim; ++i) history[k * H * dim + i] = row[k * dim + i];
     }
   }
 }

@@ -117,10 +117,11 @@ class ContactSensor : public Sensor {
   Array first(double dt, double abs_tol, std::string_view field) const;
   void add_outputs(const SensorInit& init);
   void write_rows(const World& world);
-  void clear_rows(int world);
+  void clear_rows(int world, int primary, int first_slot);
   void write_slot(int world, int slot, int found, const ContactReading& reading);
   void remember(const World& world);
   void write_history(int world);
+  void shift_history(int world, int begin, int end);
 
   ContactSensorCfg cfg_;
   std::vector<std::string> primary_names_, secondary_names_;
@@ -128,8 +129,8 @@ class ContactSensor : public Sensor {
   ContactReducer reducer_;
   ContactMemory memory_;
   std::vector<Output> outputs_;
-  Field *other_geom_ = nullptr, *other_body_ = nullptr, *pair_found_ = nullptr,
-        *pair_force_ = nullptr;
+  Rows<std::int32_t> other_geom_, other_body_;
+  Rows<float> pair_found_, pair_force_;
   bool needs_wrench_ = false;
   std::vector<std::uint64_t> written_moment_;  // of the rows, by world
   std::vector<int> written_;                   // [B, P] primaries whose rows are not zero ...

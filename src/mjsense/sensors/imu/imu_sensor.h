@@ -1,0 +1,86 @@
+#pragma once
+// An inertial measurement unit at a site: accelerometer and gyroscope of one device, with its errors.
+
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "mjsense/core/sensor.h"
+#include "mjsense/effects/chain.h"
+#include "mjsense/scene/entity.h"
+
+namespace mjsense {
+
+// What a data sheet says of a device, in SI units. Tolerances are taken as three standard deviations of
+// devices, drawn anew for each episode; what a sheet does not give is 0.
+struct ImuModel {
+  struct Axis {
+    double noise_density = 0.0;            // unit / sqrt(Hz)
+    double bias_tolerance[3] = {0, 0, 0};  // unit, x y z
+    double scale_tolerance = 0.0;          // 1
+    double cross_axis_tolerance = 0.0;     // 1
+    double range = 0.0;                    // unit, +-; 0: unlimited
+    double resolution = 0.0;               // unit, of one count; 0: continuous
+    double bias_drift = 0.0;               // unit, standard deviation of a Gauss-Markov bias
+    double bias_drift_time_s = 0.0;
+  };
+  Axis accelerometer, gyroscope;  // m/s^2, rad/s
+};
+
+// Presets:
+//   ideal       no errors
+//   mpu6050     InvenSense PS-MPU-6000A-00 rev. 3.4, tables 6.1 and 6.2, at +-2000 deg/s and +-16 g:
+//               gyroscope 0.005 deg/s/sqrt(Hz), zero rate +-20 deg/s, scale +-3 %, cross-axis +-2 %,
+//               16.4 LSB/(deg/s); accelerometer 400 ug/sqrt(Hz), zero g +-50 mg (x, y), +-80 mg (z),
+//               scale +-3 %, cross-axis +-2 %, 2048 LSB/g
+//   icm42688p   TDK DS-000347 rev. 1.7, page 1, at +-2000 deg/s and +-16 g, 16 bit:
+//               gyroscope 2.8 mdeg/s/sqrt(Hz), accelerometer 70 ug/sqrt(Hz); offsets are not in the preset
+// Throws KeyError with the names there are.
+ImuModel imu_preset(const std::string& name);
+
+// The effects of one half of a device, in the order of its signal path: axes, bias, noise, range, counts.
+Effects imu_effects(const ImuModel::Axis& axis);
+
+struct ImuSensorCfg : SensorCfg {
+  ObjRef site;  // type "site" (or empty)
+  std::string preset = "ideal";
+  ImuModel model;            // used if preset is ""
+  bool orientation = false;  // also field "quat", without errors
+  Effects effects;  // after those of the device, on acc and gyro alike: delay, rate, dropout
+
+  std::unique_ptr<Sensor> build() const override;
+};
+
+// Fields, in the axes of the site:
+//   acc   [B, 3]  m/s^2, specific force R^T (a - g): +9.81 along up at rest, 0 in free fall
+//   gyro  [B, 3]  rad/s, R^T omega
+//   quat  [B, 4]  wxyz, of the site in the world
+// The clean values are MuJoCo's sensors "<name>_acc", "<name>_gyro" (and "<name>_quat"), which the scene
+// registers too.
+class ImuSensor : public Sensor {
+ public:
+  explicit ImuSensor(ImuSensorCfg cfg);
+
+  std::string_view kind() const override { return "imu"; }
+  void edit_spec(mjSpec* spec) override;
+  void initialize(const SensorInit& init) override;
+  void compute(const World& world) override;
+  void reset(const World& world) override;
+  bool eager() const override { return eager_; }
+
+ private:
+  struct Part {
+    Field* field;
+    int address;  // in sensordata
+    EffectChain chain;
+    std::vector<float> clean;  // [B, size]
+  };
+  std::string mujoco_name(std::string_view part) const { return name() + "_" + std::string(part); }
+
+  ImuSensorCfg cfg_;
+  ImuModel model_;
+  std::vector<Part> parts_;
+  bool eager_ = false;
+};
+
+}  // namespace mjsense
