@@ -8,7 +8,8 @@ namespace mjsense::python {
 
 std::span<const CfgKind> cfg_kinds() {
   static const std::vector<CfgKind> kinds = {
-      builtin_kind(), camera_kind(), contact_kind(), raycast_kind(), terrain_height_kind(),
+      builtin_kind(), camera_kind(),  contact_kind(),
+      lidar_kind(),   raycast_kind(), terrain_height_kind(),
   };
   return kinds;
 }

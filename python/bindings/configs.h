@@ -40,6 +40,7 @@ CfgKind cfg_kind(const char* name) {
 CfgKind builtin_kind();
 CfgKind camera_kind();
 CfgKind contact_kind();
+CfgKind lidar_kind();
 CfgKind raycast_kind();
 CfgKind terrain_height_kind();
 

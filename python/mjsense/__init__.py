@@ -19,6 +19,7 @@ from mjsense.configs import (
     EntityCfg,
     GridPatternCfg,
     LensDistortion,
+    LidarSensorCfg,
     MujocoCfg,
     ObjRef,
     PinholeCameraPatternCfg,
@@ -27,7 +28,9 @@ from mjsense.configs import (
     RingPatternCfg,
     SceneCfg,
     SensorCfg,
+    SpinningScanCfg,
     SubTerrainCfg,
+    TableScanCfg,
     TerrainCfg,
     TerrainHeightSensorCfg,
     UserPatternCfg,
@@ -37,7 +40,7 @@ from mjsense.contact import ContactSensor
 from mjsense.data import CameraData, ContactData, RayCastData, SensorData
 from mjsense.errors import UnknownNameError
 from mjsense.pipeline import ObservationPipeline
-from mjsense.raycast import CameraSensor, RayCastSensor, TerrainHeightSensor
+from mjsense.raycast import CameraSensor, LidarSensor, RayCastSensor, TerrainHeightSensor
 from mjsense.record import RecordProgress, RecordSummary, record
 from mjsense.scene import Entity, Scene
 from mjsense.sensor import BuiltinSensor, NativeSensor, Sensor, SensorError

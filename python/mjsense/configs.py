@@ -368,6 +368,8 @@ class UserPatternCfg:
     """m, [n, 3]."""
     directions: Sequence[Sequence[float]] = ((0.0, 0.0, -1.0),)
     """[n, 3], of any length but 0."""
+    times: Sequence[float] = ()
+    """s <= 0, [n] or none: each ray leaves from where the frame was then."""
 
     def generate_rays(self) -> tuple[Any, Any]:
         """Offsets (m) and unit directions, float32 ``[n, 3]`` each, in the local frame."""
@@ -431,6 +433,59 @@ class TerrainHeightSensorCfg(RayCastSensorCfg):
     kind: ClassVar[str] = "terrain_height"
     reduction: str = "min"
     """min, max, mean, none; over a frame's rays."""
+
+
+@dataclass(frozen=True)
+class SpinningScanCfg:
+    """Lasers over each other that turn about the frame's z axis; rays are ``[channels, samples]``."""
+
+    kind: ClassVar[str] = "spinning"
+    channels: int = 16
+    elevation_min_deg: float = -15.0
+    elevation_max_deg: float = 15.0
+    elevations_deg: Sequence[float] = ()
+    """One a channel instead of evenly spaced ones."""
+    samples: int = 360
+    """Firings of each channel in a sweep."""
+    azimuth_start_deg: float = 0.0
+    """0: along +x; counter-clockwise."""
+    azimuth_span_deg: float = 360.0
+    rate_hz: float = 10.0
+
+
+@dataclass(frozen=True)
+class TableScanCfg:
+    """Rays from a table of (azimuth, elevation), rad: solid-state and non-repeating lidars."""
+
+    kind: ClassVar[str] = "table"
+    file: str = ""
+    """.npy of shape (M, 2)."""
+    angles: Sequence[Sequence[float]] = ()
+    """The table itself, [M, 2]."""
+    rays_per_scan: int = 0
+    """Rows that a scan takes, the next ones at the next scan; 0: all."""
+    rate_hz: float = 10.0
+
+
+@dataclass
+class LidarSensorCfg(RayCastSensorCfg):
+    """A spinning or table lidar. ``data`` is a :class:`mjsense.RayCastData` with points and intensity."""
+
+    kind: ClassVar[str] = "lidar"
+    max_distance: float = 100.0
+    min_distance: float = 0.1
+    any_frame: bool = True
+    scan: SpinningScanCfg | TableScanCfg = field(default_factory=SpinningScanCfg)
+    motion_distortion: bool = False
+    """Each ray leaves from where the frame was at its own moment of the sweep."""
+    range_noise_std: float = 0.0
+    """m."""
+    range_noise_relative: float = 0.0
+    """Standard deviation in parts of the range."""
+    range_resolution: float = 0.0
+    """m; 0: exact."""
+    dropout: float = 0.0
+    """Probability that a return is lost."""
 
 
 @dataclass(frozen=True)

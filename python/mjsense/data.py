@@ -119,6 +119,10 @@ class RayCastData(SensorData):
     """[B, R] int32; -1: none."""
     heights: np.ndarray | None = None
     """Terrain height sensors: [B, F] m, [B, F, n] without reduction."""
+    points: np.ndarray | None = None
+    """Lidars: [B, R, 3] m, sensor frame; 0 without a return."""
+    intensity: np.ndarray | None = None
+    """Lidars: [B, R] 0..1."""
 
 
 @dataclass(slots=True, repr=False)

@@ -34,6 +34,15 @@ class TerrainHeightSensor(RayCastSensor):
     """Height above the ground below its frames, ``data.heights``."""
 
 
+class LidarSensor(RayCastSensor):
+    """A lidar: ``data.points``, ``data.intensity`` and all of a RayCastSensor's."""
+
+    def write_point_cloud(self, path: str, world: int = 0) -> None:
+        """The returns of one world, in the sensor's frame, as .ply or .pcd."""
+        data = self.data
+        _core.write_point_cloud(str(path), data.points[world], data.intensity[world], data.distances[world])
+
+
 class CameraSensor(NativeSensor):
     """Images; ``data`` is a :class:`mjsense.CameraData`."""
 

@@ -17,12 +17,13 @@ from mjsense import _core
 from mjsense.configs import SceneCfg, SensorCfg
 from mjsense.contact import ContactSensor
 from mjsense.errors import UnknownNameError
-from mjsense.raycast import CameraSensor, RayCastSensor, TerrainHeightSensor
+from mjsense.raycast import CameraSensor, LidarSensor, RayCastSensor, TerrainHeightSensor
 from mjsense.sensor import BuiltinSensor, NativeSensor, Sensor
 
 _CLASSES = {
     "builtin": BuiltinSensor,
     "contact": ContactSensor,
+    "lidar": LidarSensor,
     "raycast": RayCastSensor,
     "terrain_height": TerrainHeightSensor,
     "camera": CameraSensor,

@@ -10,6 +10,7 @@ from mjsense import _core
 CLASSES = {
     "builtin": mjs.BuiltinSensorCfg,
     "contact": mjs.ContactSensorCfg,
+    "lidar": mjs.LidarSensorCfg,
     "raycast": mjs.RayCastSensorCfg,
     "terrain_height": mjs.TerrainHeightSensorCfg,
     "camera": mjs.CameraSensorCfg,

@@ -1,9 +1,13 @@
 // Ray sensors and their patterns in Python.
 
 #include <nanobind/nanobind.h>
+#include <nanobind/ndarray.h>
+#include <nanobind/stl/optional.h>
 #include <nanobind/stl/string.h>
 
 #include "mjsense/sensors/height/terrain_height.h"
+#include "mjsense/sensors/lidar/lidar.h"
+#include "mjsense/sensors/lidar/point_cloud.h"
 #include "mjsense/sensors/raycast/raycast.h"
 #include "python/bindings/bindings.h"
 #include "python/bindings/configs.h"
@@ -44,6 +48,7 @@ template <class Fields>
 void fields(Fields& f, UserPattern& c) {
   f("offsets", c.offsets);
   f("directions", c.directions);
+  f("times", c.times);
 }
 
 // A pattern's class says which it is: its attribute `kind`.
@@ -97,6 +102,53 @@ void fields(Fields& f, TerrainHeightSensorCfg& c) {
   f("reduction", c.reduction);
 }
 
+template <class Fields>
+void fields(Fields& f, SpinningScan& c) {
+  f("channels", c.channels);
+  f("elevation_min_deg", c.elevation_min_deg);
+  f("elevation_max_deg", c.elevation_max_deg);
+  f("elevations_deg", c.elevations_deg);
+  f("samples", c.samples);
+  f("azimuth_start_deg", c.azimuth_start_deg);
+  f("azimuth_span_deg", c.azimuth_span_deg);
+  f("rate_hz", c.rate_hz);
+}
+
+template <class Fields>
+void fields(Fields& f, TableScan& c) {
+  f("file", c.file);
+  f("angles", c.angles);
+  f("rays_per_scan", c.rays_per_scan);
+  f("rate_hz", c.rate_hz);
+}
+
+// As for patterns.
+void read_custom(FromPython&, nb::handle value, std::variant<SpinningScan, TableScan>& out) {
+  nb::object kind = nb::getattr(value, "kind", nb::none());
+  const std::string name = nb::isinstance<nb::str>(kind) ? nb::cast<std::string>(kind) : "";
+  const auto read = [&](auto scan) {
+    FromPython reader(value);
+    fields(reader, scan);
+    out = std::move(scan);
+  };
+  if (name == "spinning") return read(SpinningScan{});
+  if (name == "table") return read(TableScan{});
+  const std::string text = "not a lidar's scan: " + nb::cast<std::string>(nb::repr(value));
+  throw nb::type_error(text.c_str());
+}
+
+template <class Fields>
+void fields(Fields& f, LidarSensorCfg& c) {
+  fields(f, static_cast<RayCastSensorCfg&>(c));
+  f("scan", c.scan);
+  f("motion_distortion", c.motion_distortion);
+  f("range_noise_std", c.range_noise_std);
+  f("range_noise_relative", c.range_noise_relative);
+  f("range_resolution", c.range_resolution);
+  f("dropout", c.dropout);
+}
+
+CfgKind lidar_kind() { return cfg_kind<LidarSensorCfg>("lidar"); }
 CfgKind raycast_kind() { return cfg_kind<RayCastSensorCfg>("raycast"); }
 CfgKind terrain_height_kind() { return cfg_kind<TerrainHeightSensorCfg>("terrain_height"); }
 
@@ -125,6 +177,19 @@ void bind_raycast(nb::module_& m) {
         return nb::make_tuple(rows_of(rays.offsets), rows_of(rays.directions));
       },
       "Offsets and directions, float32 [n, 3], of a pattern.");
+  m.def(
+      "write_point_cloud",
+      [](const std::string& path, nb::ndarray<const float, nb::c_contig, nb::device::cpu> points,
+         std::optional<nb::ndarray<const float, nb::c_contig, nb::device::cpu>> intensity,
+         std::optional<nb::ndarray<const float, nb::c_contig, nb::device::cpu>> distances) {
+        const auto span = [](const auto& a) { return std::span<const float>(a.data(), a.size()); };
+        write_point_cloud(path, span(points),
+                          intensity ? span(*intensity) : std::span<const float>{},
+                          distances ? span(*distances) : std::span<const float>{});
+      },
+      nb::arg("path"), nb::arg("points"), nb::arg("intensity") = nb::none(),
+      nb::arg("distances") = nb::none(),
+      "Writes points [..., 3] as .ply or .pcd; those with distance < 0 are left out.");
   m.def("ray_counts", [](const SensorHandle& h) {
     const auto& sensor = h.as<RayCastSensor>();
     return nb::make_tuple(sensor.num_frames(), sensor.num_rays_per_frame());

@@ -12,6 +12,7 @@
 #include "mjsense/sensors/camera/camera.h"
 #include "mjsense/sensors/contact/contact_sensor.h"
 #include "mjsense/sensors/height/terrain_height.h"
+#include "mjsense/sensors/lidar/lidar.h"
 #include "mjsense/sensors/raycast/raycast.h"
 
 namespace mjsense {
@@ -87,6 +88,14 @@ inline std::vector<std::shared_ptr<const SensorCfg>> every_sensor() {
                                    [](auto& c) {
                                      c.frame = {{"site", "imu", "robot"}};
                                    }),
+      make<LidarSensorCfg>("lidar",
+                           [](auto& c) {
+                             c.frame = {{"site", "imu", "robot"}};
+                             c.scan = SpinningScan{.channels = 4, .samples = 60};
+                             c.motion_distortion = true;
+                             c.range_noise_std = 0.01;
+                             c.dropout = 0.1;
+                           }),
       make<CameraSensorCfg>("eye",
                             [](auto& c) {
                               c.camera_name = "robot/eye";
