@@ -176,6 +176,16 @@ class SceneCfg:
     spec_fn: Callable[[mujoco.MjSpec], None] | None = None
     """Edits the spec last, before compilation."""
     options: MujocoCfg = field(default_factory=MujocoCfg)
+    base: str | Path | None = None
+    """A whole model to start from, as it is (path or XML text): names without a prefix, any number of free joints. Its sensors
+    are found; it is no entity."""
+
+    def _base_spec(self) -> mujoco.MjSpec:
+        """The spec that the scene is built in."""
+        if self.base is None:
+            return mujoco.MjSpec()
+        text = str(self.base)
+        return mujoco.MjSpec.from_string(text) if text.lstrip().startswith("<") else mujoco.MjSpec.from_file(text)
 
 
 # -------------------------------------------------------------------------------------------------------------- sensors

@@ -54,7 +54,7 @@ class Scene:
 
     def __init__(self, cfg: SceneCfg) -> None:
         self.cfg = cfg
-        self.spec = mujoco.MjSpec()
+        self.spec = cfg._base_spec()
         """The spec the scene is built in."""
         self._simulation: Any = None
         items = [self._item(sensor) for sensor in cfg.sensors]
@@ -160,3 +160,11 @@ class Scene:
     def env_origins(self, num_worlds: int | None = None) -> np.ndarray:
         """Origins of the worlds, float32 ``[B, 3]`` m: zeros without terrain, a grid on a plane."""
         return self._core.env_origins(self.cfg.num_envs if num_worlds is None else num_worlds)
+
+    def env_tiles(self, num_worlds: int | None = None) -> np.ndarray | None:
+        """(level, type) of the worlds' tiles, int32 ``[B, 2]``; None without generated terrain."""
+        return self._core.env_tiles(self.cfg.num_envs if num_worlds is None else num_worlds)
+
+    def tile_origins(self) -> np.ndarray | None:
+        """Spawn points of the tiles, float32 ``[levels, types, 3]`` m; None without generated terrain."""
+        return self._core.tile_origins()

@@ -204,12 +204,33 @@ nb::dict entity_names(const Entity& e) {
   return names;
 }
 
+template <class T, class From>
+nb::object array_of(const std::vector<From>& values, const Shape& shape) {
+  auto array = std::make_shared<Array>(dtype_of<T>(), shape);
+  auto out = array->template all<T>();
+  for (std::size_t i = 0; i < values.size(); ++i) out[i] = static_cast<T>(values[i]);
+  return to_numpy(array->view(), owner_of(array));
+}
+
 nb::object env_origins(const Scene& scene, int num_worlds) {
-  auto origins = std::make_shared<Array>(DType::kFloat32, Shape{num_worlds, 3});
-  const std::vector<double> values = scene.env_origins(num_worlds);
-  auto out = origins->all<float>();
-  for (std::size_t i = 0; i < values.size(); ++i) out[i] = static_cast<float>(values[i]);
-  return to_numpy(origins->view(), owner_of(origins));
+  return array_of<float>(scene.env_origins(num_worlds), {num_worlds, 3});
+}
+
+// Of generated terrain; None without.
+const Terrain* tiles_of(const Scene& scene) {
+  return scene.terrain() && scene.terrain()->levels() > 0 ? scene.terrain() : nullptr;
+}
+
+nb::object env_tiles(const Scene& scene, int num_worlds) {
+  const Terrain* tiles = tiles_of(scene);
+  if (!tiles) return nb::none();
+  return array_of<std::int32_t>(tiles->env_tiles(num_worlds), {num_worlds, 2});
+}
+
+nb::object tile_origins(const Scene& scene) {
+  const Terrain* tiles = tiles_of(scene);
+  if (!tiles) return nb::none();
+  return array_of<float>(tiles->tile_origins(), {tiles->levels(), tiles->types(), 3});
 }
 
 }  // namespace
@@ -307,6 +328,8 @@ void bind_scene(nb::module_& m) {
                all[entity.name.c_str()] = entity_names(entity);
              return all;
            })
+      .def("env_tiles", &env_tiles, nb::arg("num_worlds"))
+      .def("tile_origins", &tile_origins)
       .def("env_origins", &env_origins, nb::arg("num_worlds"));
 }
 
