@@ -56,6 +56,16 @@ void validate(const CameraSensorCfg& cfg) {
     fail(fmt::format("samples is {}: must be 1..64", cfg.samples));
   check_choice(place, "depth_kind", cfg.depth_kind, std::array<std::string, 2>{"planar", "ray"});
   check_choice(place, "renderer", cfg.renderer, std::array<std::string, 2>{"rays", "opengl"});
+  if (cfg.renderer == "opengl") {
+    for (const std::string& type : cfg.data_types)
+      if (type == "normals" || type == "point_cloud")
+        fail(fmt::format("renderer 'opengl' has no {}", type));
+    if (cfg.near > 0 || cfg.far > 0 || cfg.intrinsics || cfg.distortion.model != "none" ||
+        cfg.depth_kind != "planar")
+      fail(
+          "renderer 'opengl' takes clip range and intrinsics from the model, has no lens "
+          "distortion, and measures planar depth");
+  }
   check_choice(place, "depth_noise", cfg.depth_noise,
                std::array<std::string, 3>{"none", "d405", "d435"});
   check_choice(place, "distortion model", cfg.distortion.model,

@@ -80,6 +80,14 @@ void CameraSensor::initialize(const SensorInit& init) {
   }
   for (PerWorld& w : worlds_) w.grid = grid;
 
+  gl_.reset();
+  if (cfg_.renderer == "opengl") {
+    gl_ = make_gl_renderer(model_,
+                           {camera_, cfg_.width, cfg_.height, groups_, cfg_.use_textures,
+                            cfg_.use_shadows, cfg_.samples},
+                           place);
+    return;
+  }
   // Everything that cast() needs, but for the ray scene's shapes.
   const int slots =
       std::max(init.threads, std::min(init.num_worlds, kItemsPerThread * init.threads));
@@ -202,12 +210,16 @@ void CameraSensor::cast(const CastContext& context) {
   due_.clear();
   for (int id : context.ids)
     if (worlds_[id].due) due_.push_back(id);
+  const RayScene& rays = *context.rays;
+  if (gl_) {
+    for (int id : due_) gl_->render(rays.world(id), targets(id));
+    return;
+  }
   const int count = static_cast<int>(due_.size());
   const int tile_rows = (cfg_.height + kTileSize - 1) / kTileSize;
   const int threads = context.pool.size();
   const int bands =
       std::clamp((kItemsPerThread * threads + count - 1) / std::max(count, 1), 1, tile_rows);
-  const RayScene& rays = *context.rays;
   Workspace& work = *workspace_;
   if (threads == 1 || bands == 1) {
     context.pool.run(count, [&](int item, int thread) {

@@ -5,6 +5,7 @@
 #include <vector>
 
 #include "mjsense/render/camera_model.h"
+#include "mjsense/render/gl_renderer.h"
 #include "mjsense/render/look.h"
 #include "mjsense/render/view_builder.h"
 #include "mjsense/sensors/camera/camera.h"
@@ -54,6 +55,7 @@ class CameraSensor final : public Sensor {
   std::vector<float> bent_;
   std::vector<int> due_;
   std::unique_ptr<Look> look_;
+  std::unique_ptr<GlRenderer> gl_;  // renderer "opengl"
   std::unique_ptr<Workspace> workspace_;
   Field *rgb_ = nullptr, *depth_ = nullptr, *segmentation_ = nullptr, *normals_ = nullptr,
         *points_ = nullptr;

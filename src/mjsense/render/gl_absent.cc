@@ -1,0 +1,15 @@
+// Stands in for render/opengl/ in builds without it.
+#include <fmt/format.h>
+
+#include "mjsense/core/error.h"
+#include "mjsense/render/gl_renderer.h"
+
+namespace mjsense {
+
+std::unique_ptr<GlRenderer> make_gl_renderer(const mjModel*, const GlRendererCfg&,
+                                             const std::string& place) {
+  throw RuntimeError(fmt::format(
+      "{}: renderer 'opengl' is not in this build (configure with -DMJSENSE_OPENGL=ON)", place));
+}
+
+}  // namespace mjsense

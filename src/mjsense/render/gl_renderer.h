@@ -1,0 +1,35 @@
+#pragma once
+// MuJoCo's own OpenGL renderer, offscreen, as a reference: for comparing pictures, and for those who want exactly its look.
+// Present when the library was built with MJSENSE_OPENGL; needs libEGL and a driver (Mesa's llvmpipe does) at run time.
+
+#include <mujoco/mujoco.h>
+
+#include <memory>
+#include <string>
+
+#include "mjsense/render/view.h"
+
+namespace mjsense {
+
+class RayWorld;
+
+struct GlRendererCfg {
+  int camera = 0;
+  int width = 0, height = 0;
+  unsigned groups = 0x7;  // bit g: geoms of group g
+  bool textures = true, shadows = true;
+  int samples = 1;
+};
+
+class GlRenderer {
+ public:
+  virtual ~GlRenderer() = default;
+  // Fills rgb, depth (planar) and segmentation of `targets`. Colours and sizes are the model's own, not a world's.
+  virtual void render(const RayWorld& world, const ImageTargets& targets) = 0;
+};
+
+// Throws RuntimeError, beginning with `place`, if there is no OpenGL to be had.
+std::unique_ptr<GlRenderer> make_gl_renderer(const mjModel* model, const GlRendererCfg& cfg,
+                                             const std::string& place);
+
+}  // namespace mjsense

@@ -1,0 +1,202 @@
+#include "mjsense/render/gl_renderer.h"
+
+#include <EGL/egl.h>
+#include <EGL/eglext.h>
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <vector>
+
+#include "mjsense/core/error.h"
+#include "mjsense/rays/ray_world.h"
+
+namespace mjsense {
+namespace {
+
+// A context without a window, on Mesa's surfaceless platform or whatever display there is.
+class EglContext {
+ public:
+  explicit EglContext(const std::string& place) {
+    const auto fail = [&](const char* what) {
+      throw RuntimeError(
+          fmt::format("{}: OpenGL: {} (EGL error {:#x}); is libgl1-mesa-dri installed?", place,
+                      what, static_cast<unsigned>(eglGetError())));
+    };
+    display_ = eglGetPlatformDisplay(EGL_PLATFORM_SURFACELESS_MESA, EGL_DEFAULT_DISPLAY, nullptr);
+    if (display_ == EGL_NO_DISPLAY || !eglInitialize(display_, nullptr, nullptr)) {
+      display_ = eglGetDisplay(EGL_DEFAULT_DISPLAY);
+      if (display_ == EGL_NO_DISPLAY || !eglInitialize(display_, nullptr, nullptr))
+        fail("no EGL display");
+    }
+    eglBindAPI(EGL_OPENGL_API);
+    const EGLint wanted[] = {EGL_SURFACE_TYPE, EGL_PBUFFER_BIT, EGL_RENDERABLE_TYPE, EGL_OPENGL_BIT,
+                             EGL_NONE};
+    EGLConfig config = nullptr;
+    EGLint count = 0;
+    if (!eglChooseConfig(display_, wanted, &config, 1, &count) || count < 1)
+      fail("no suitable EGL configuration");
+    context_ = eglCreateContext(display_, config, EGL_NO_CONTEXT, nullptr);
+    if (context_ == EGL_NO_CONTEXT) fail("no context");
+  }
+  ~EglContext() {
+    release();
+    eglDestroyContext(display_, context_);
+  }
+  EglContext(const EglContext&) = delete;
+  EglContext& operator=(const EglContext&) = delete;
+
+  // A context belongs to one thread at a time: take it for a picture, then give it back.
+  bool take() {
+    return eglBindAPI(EGL_OPENGL_API) &&
+           eglMakeCurrent(display_, EGL_NO_SURFACE, EGL_NO_SURFACE, context_);
+  }
+  void release() { eglMakeCurrent(display_, EGL_NO_SURFACE, EGL_NO_SURFACE, EGL_NO_CONTEXT); }
+
+ private:
+  EGLDisplay display_ = EGL_NO_DISPLAY;
+  EGLContext context_ = EGL_NO_CONTEXT;
+};
+
+void flip_rows(auto* pixels, int width, int height) {
+  for (int y = 0; y < height / 2; ++y)
+    std::swap_ranges(pixels + y * width, pixels + (y + 1) * width,
+                     pixels + (height - 1 - y) * width);
+}
+
+class MujocoGl final : public GlRenderer {
+ public:
+  MujocoGl(const mjModel* model, const GlRendererCfg& cfg, const std::string& place)
+      : cfg_(cfg),
+        place_(place),
+        egl_(place),
+        model_(mj_copyModel(nullptr, model)),
+        data_(mj_makeData(model_)) {
+    model_->vis.global.offwidth = cfg.width;
+    model_->vis.global.offheight = cfg.height;
+    model_->vis.quality.offsamples = cfg.samples > 1 ? cfg.samples : 0;
+    colors_.resize(3 * static_cast<std::size_t>(cfg.width) * cfg.height);
+    take();
+    mjv_defaultScene(&scene_);
+    mjv_makeScene(model_, &scene_, static_cast<int>(model_->ngeom) + 100);
+    mjr_defaultContext(&context_);
+    mjr_makeContext(model_, &context_, mjFONTSCALE_100);
+    mjr_setBuffer(mjFB_OFFSCREEN, &context_);
+    context_.readDepthMap = mjDEPTH_ZERONEAR;
+    egl_.release();
+    mjv_defaultOption(&options_);
+    std::fill_n(options_.sitegroup, mjNGROUP, 0);
+    for (int g = 0; g < mjNGROUP; ++g) options_.geomgroup[g] = cfg.groups >> g & 1u;
+    options_.flags[mjVIS_TEXTURE] = cfg.textures;
+    options_.flags[mjVIS_TENDON] = 0;
+    mjv_defaultCamera(&camera_);
+    camera_.type = mjCAMERA_FIXED;
+    camera_.fixedcamid = cfg.camera;
+  }
+  ~MujocoGl() override {
+    if (egl_.take()) mjr_freeContext(&context_);
+    mjv_freeScene(&scene_);
+    mj_deleteData(data_);
+    mj_deleteModel(model_);
+  }
+
+  void render(const RayWorld& world, const ImageTargets& targets) override {
+    pose(world);
+    mjv_updateScene(model_, data_, &options_, nullptr, &camera_, mjCAT_STATIC | mjCAT_DYNAMIC,
+                    &scene_);
+    const mjrRect all{0, 0, cfg_.width, cfg_.height};
+    take();
+    mjr_setBuffer(mjFB_OFFSCREEN, &context_);
+    if (targets.rgb) {
+      scene_.flags[mjRND_SHADOW] = cfg_.shadows;
+      scene_.flags[mjRND_SKYBOX] = cfg_.textures;
+      mjr_render(all, &scene_, &context_);
+      mjr_readPixels(targets.rgb, nullptr, all, &context_);
+    }
+    if (targets.depth) {  // apart, because the sky would be part of it
+      scene_.flags[mjRND_SHADOW] = scene_.flags[mjRND_SKYBOX] = 0;
+      mjr_render(all, &scene_, &context_);
+      mjr_readPixels(nullptr, targets.depth, all, &context_);
+    }
+    if (targets.segmentation) {
+      scene_.flags[mjRND_SEGMENT] = scene_.flags[mjRND_IDCOLOR] = 1;
+      mjr_render(all, &scene_, &context_);
+      mjr_readPixels(colors_.data(), nullptr, all, &context_);
+      scene_.flags[mjRND_SEGMENT] = scene_.flags[mjRND_IDCOLOR] = 0;
+    }
+    egl_.release();
+    if (targets.rgb) flip_rows(targets.rgb, 3 * cfg_.width, cfg_.height);
+    if (targets.depth) convert_depth(targets.depth);
+    if (targets.segmentation) convert_ids(targets.segmentation);
+  }
+
+ private:
+  void take() {
+    if (!egl_.take())
+      throw RuntimeError(fmt::format("{}: OpenGL: another thread holds the context", place_));
+  }
+
+  void pose(const RayWorld& world) {
+    for (int i = 0; i < world.num_geoms(); ++i) {
+      std::copy_n(world.geom(i).pos, 3, data_->geom_xpos + 3 * i);
+      std::copy_n(world.geom(i).mat, 9, data_->geom_xmat + 9 * i);
+    }
+    for (std::size_t i = 0; i < world.lights().size(); ++i) {
+      std::copy_n(world.lights()[i].pos, 3, data_->light_xpos + 3 * i);
+      std::copy_n(world.lights()[i].dir, 3, data_->light_xdir + 3 * i);
+    }
+    for (std::size_t i = 0; i < world.cameras().size(); ++i) {
+      std::copy_n(world.cameras()[i].pos, 3, data_->cam_xpos + 3 * i);
+      std::copy_n(world.cameras()[i].mat, 9, data_->cam_xmat + 9 * i);
+    }
+  }
+
+  // From the depth buffer (0 near, 1 far) to planar metres, 0 for the far plane.
+  void convert_depth(float* depth) const {
+    const double near = model_->vis.map.znear * model_->stat.extent,
+                 far = model_->vis.map.zfar * model_->stat.extent;
+    const bool orthographic = model_->cam_projection[cfg_.camera] == mjPROJ_ORTHOGRAPHIC;
+    for (int i = 0; i < cfg_.width * cfg_.height; ++i) {
+      const double d = depth[i];
+      const double z = orthographic ? near + d * (far - near) : near / (1 - d * (1 - near / far));
+      depth[i] = d >= 1 ? 0.0f : static_cast<float>(z);
+    }
+    flip_rows(depth, cfg_.width, cfg_.height);
+  }
+
+  void convert_ids(std::int32_t* out) const {
+    std::fill_n(out, 2 * cfg_.width * cfg_.height, -1);
+    std::vector<const mjvGeom*> by_segment(scene_.ngeom + 1, nullptr);
+    for (int i = 0; i < scene_.ngeom; ++i) {
+      const int segment = scene_.geoms[i].segid;
+      if (segment >= 0 && segment <= scene_.ngeom) by_segment[segment] = &scene_.geoms[i];
+    }
+    for (int y = 0; y < cfg_.height; ++y)
+      for (int x = 0; x < cfg_.width; ++x) {
+        const unsigned char* c = &colors_[3 * ((cfg_.height - 1 - y) * cfg_.width + x)];
+        const int segment = (c[0] | c[1] << 8 | c[2] << 16) - 1;
+        if (segment < 0 || segment > scene_.ngeom || !by_segment[segment]) continue;
+        out[2 * (y * cfg_.width + x)] = by_segment[segment]->objid;
+        out[2 * (y * cfg_.width + x) + 1] = by_segment[segment]->objtype;
+      }
+  }
+
+  GlRendererCfg cfg_;
+  std::string place_;
+  EglContext egl_;
+  mjModel* model_;  // a copy: the size of the offscreen buffer belongs to the model
+  mjData* data_;    // poses only
+  mjvScene scene_;
+  mjvOption options_;
+  mjvCamera camera_;
+  mjrContext context_;
+  std::vector<unsigned char> colors_;
+};
+
+}  // namespace
+
+std::unique_ptr<GlRenderer> make_gl_renderer(const mjModel* model, const GlRendererCfg& cfg,
+                                             const std::string& place) {
+  return std::make_unique<MujocoGl>(model, cfg, place);
+}
+
+}  // namespace mjsense

@@ -1,0 +1,85 @@
+// The same scene by rays and by MuJoCo's own renderer.
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+
+#include "mjsense/core/error.h"
+#include "mjsense/scene/scene.h"
+#include "mjsense/sensors/camera/camera_sensor.h"
+#include "mjsense/sim/simulation.h"
+
+namespace mjsense {
+namespace {
+
+constexpr char kScene[] = R"(<mujoco>
+  <asset><texture name="sky" type="skybox" builtin="gradient" rgb1=".4 .6 .8" rgb2="0 0 0" width="64" height="64"/>
+    <texture name="t" type="2d" builtin="checker" rgb1=".8 .2 .2" rgb2=".2 .2 .8" width="64" height="64"/>
+    <texture name="q" type="cube" builtin="gradient" rgb1="1 1 0" rgb2="0 1 1" width="16" height="16"/>
+    <material name="m" texture="t" texrepeat="3 3"/><material name="n" texture="q"/>
+    <mesh name="tet" vertex="0 0 0 1 0 0 0 1 0 0 0 1"/>
+    <hfield name="h" nrow="3" ncol="4" size=".4 .3 .2 .1" elevation="0 1 .2 .5  .3 0 1 .1  .9 .2 .4 .6"/></asset>
+  <worldbody><light pos="1 -1 4" dir="-.2 .2 -1" castshadow="true" cutoff="60"/>
+    <geom type="plane" size="5 5 .1" material="m"/>
+    <geom type="box" size=".3 .2 .1" pos="0 0 1" euler="20 10 5" material="n"/>
+    <geom type="capsule" size=".05 .3" pos="0 -.4 .4" euler="30 0 0" rgba=".2 .9 .2 1"/>
+    <geom type="mesh" mesh="tet" pos=".5 .2 0"/><geom type="hfield" hfield="h" pos="-1 -.5 .1"/>
+    <geom type="ellipsoid" size=".3 .2 .1" pos="-.6 .3 .2" rgba=".9 .5 .1 1"/>
+    <geom type="sphere" size=".2" pos=".9 -.6 .2" rgba=".1 .5 .9 1"/>
+    <geom type="cylinder" size=".1 .3" pos="-.3 -.6 .3" material="m"/>
+    <camera name="c" pos="0 -2.5 1.5" xyaxes="1 0 0 0 .5 1"/></worldbody></mujoco>)";
+
+TEST(CameraAgainstOpenGL, DepthIdsAndColoursAgree) {
+  constexpr int kWidth = 160, kHeight = 120, kCount = kWidth * kHeight;
+  SceneCfg cfg;
+  EntityCfg entity;
+  entity.model.xml = kScene;
+  cfg.entities.emplace_back("w", entity);
+  for (const char* renderer : {"rays", "opengl"}) {
+    auto camera = std::make_shared<CameraSensorCfg>();
+    camera->name = renderer;
+    camera->renderer = renderer;
+    camera->camera_name = "w/c";
+    camera->width = kWidth;
+    camera->height = kHeight;
+    camera->data_types = {"rgb", "depth", "segmentation"};
+    camera->use_shadows = true;
+    cfg.sensors.push_back(camera);
+  }
+  auto scene = std::make_shared<Scene>(std::move(cfg));
+  std::unique_ptr<Simulation> sim;
+  try {
+    sim = std::make_unique<Simulation>(scene, SimulationCfg{});
+  } catch (const RuntimeError& e) {
+    GTEST_SKIP() << e.what();
+  }
+  Sensor &rays = scene->sensor("rays"), &gl = scene->sensor("opengl");
+  sim->refresh(rays);
+  sim->refresh(gl);
+  const auto depth = rays.field("depth").data.row<float>(0),
+             gl_depth = gl.field("depth").data.row<float>(0);
+  const auto ids = rays.field("segmentation").data.row<std::int32_t>(0);
+  const auto gl_ids = gl.field("segmentation").data.row<std::int32_t>(0);
+  const auto rgb = rays.field("rgb").data.row<std::uint8_t>(0),
+             gl_rgb = gl.field("rgb").data.row<std::uint8_t>(0);
+  std::vector<float> errors;
+  int other_id = 0, far_off = 0;
+  double square = 0;
+  for (int i = 0; i < kCount; ++i) {
+    errors.push_back(std::abs(depth[i] - gl_depth[i]));
+    far_off += errors.back() > 0.01;
+    other_id += ids[2 * i] != gl_ids[2 * i] || ids[2 * i + 1] != gl_ids[2 * i + 1];
+    for (int c = 0; c < 3; ++c) square += std::pow(rgb[3 * i + c] - gl_rgb[3 * i + c], 2);
+  }
+  std::nth_element(errors.begin(), errors.begin() + kCount / 2, errors.end());
+  EXPECT_LT(errors[kCount / 2], 1e-4);  // m, median
+  EXPECT_LT(far_off, kCount / 200);     // silhouettes, and MuJoCo's facets
+  EXPECT_LT(other_id, kCount / 200);
+  const double psnr = 10 * std::log10(255.0 * 255.0 * 3 * kCount / square);
+  EXPECT_GT(psnr, 28);
+  RecordProperty("psnr", std::to_string(psnr));
+}
+
+}  // namespace
+}  // namespace mjsense
