@@ -263,6 +263,7 @@ struct EncoderPool::Impl {
       std::erase(streams, nullptr);
       if (!done.empty()) changed.notify_all();
     }
+    if (!done.empty()) wake();  // an encoder is free: look again at what waits for one
     for (auto& [on_done, result] : done) on_done(result);
   }
 

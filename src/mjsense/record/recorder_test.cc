@@ -1,0 +1,403 @@
+#include "mjsense/record/recorder.h"
+
+#include <fmt/format.h>
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+#include <sys/resource.h>
+#include <sys/wait.h>
+
+#include <csignal>
+#include <functional>
+#include <thread>
+
+#include "mjsense/core/error.h"
+#include "mjsense/record/check.h"
+#include "mjsense/record/house.h"
+#include "mjsense/record/test_tools.h"
+#include "mjsense/record/trajectory.h"
+
+namespace mjsense {
+namespace {
+
+using namespace testing;
+using ::testing::AllOf;
+using ::testing::HasSubstr;
+using ::testing::IsEmpty;
+using ::testing::SizeIs;
+
+FakeSuiteCfg without_video(int worlds) { return {worlds, 16, 12, false, false}; }
+
+// Records and returns the bytes of all HDF5 files, in order.
+std::string record(const fs::path& out, int episodes, const Attempts& attempts, bool video = false,
+                   const std::function<void(RecordingCfg&)>& change = {}) {
+  FakeSuite suite({attempts.worlds, 16, 12, video, video});
+  RecordingCfg cfg = fake_recording(out, suite, attempts.worlds, episodes);
+  if (change) change(cfg);
+  {
+    Recorder recorder(cfg);
+    record_all(recorder, suite, attempts);
+  }
+  std::string bytes;
+  for (const std::string& name : tree(out)) bytes += read_file(out / name);
+  return bytes;
+}
+
+TEST(Recorder, EpisodesReadBackAsWritten) {
+  TempDir dir;
+  record(dir.path, 3, {.worlds = 2, .steps = 70});  // more rows than a chunk of dict rows holds
+  EXPECT_THAT(tree(dir.path), ::testing::ElementsAre("house_0/trajectories_batch_1_of_1.h5"));
+  const h5::H5Lock lock;
+  const h5::Id file = h5::open_file(dir.path / "house_0/trajectories_batch_1_of_1.h5");
+  ASSERT_THAT(trajectory_names(file), SizeIs(3));
+  for (int e = 0; e < 3; ++e) {
+    const h5::Id traj(H5Gopen2(file, fmt::format("traj_{}", e).c_str(), H5P_DEFAULT), H5Gclose,
+                      "traj");
+    const int T = length_of(e, 70);
+    EXPECT_EQ(h5::int_attribute(traj, "episode", -1), e);
+    EXPECT_EQ(h5::text_attribute(traj, "outcome"), "success");
+    EXPECT_EQ(h5::read_text(traj, "obs_scene"), FakeSuite::obs_scene(e));
+    const RowDataset qpos(traj, "obs/agent/qpos"), tcp(traj, "obs/extra/tcp_pose"),
+        fail(traj, "fail");
+    EXPECT_EQ(qpos.rows(), T);
+    EXPECT_TRUE(qpos.is_json());
+    EXPECT_EQ(qpos.shape(), "(T, 2000)");
+    qpos.each_text([&](std::int64_t t, std::string_view text) {
+      EXPECT_THAT(std::string(text),
+                  HasSubstr(fmt::format("{{\"arm\":[{}", static_cast<double>(FakeSuite::joint(
+                                                             e, static_cast<int>(t), 0)))));
+    });
+    std::vector<double> values;
+    tcp.each_number([&](auto piece) { values.insert(values.end(), piece.begin(), piece.end()); });
+    ASSERT_EQ(values.size(), T * 7u);
+    for (int t = 0; t < T; ++t) EXPECT_EQ(values[t * 7 + 3], e * 1000 + t + 0.375);
+    values.clear();
+    fail.each_number([&](auto piece) { values.insert(values.end(), piece.begin(), piece.end()); });
+    EXPECT_EQ(fail.dtype(), "bool");
+    EXPECT_EQ(std::count(values.begin(), values.end(), 1.0), T - 1);
+  }
+}
+
+TEST(Recorder, BytesDoNotDependOnWorldsOrOrder) {
+  TempDir one, three, discards;
+  const std::string bytes = record(one.path, 5, {.worlds = 1});
+  EXPECT_EQ(bytes, record(three.path, 5, {.worlds = 3}));
+  EXPECT_NE(bytes, record(discards.path, 5, {.worlds = 3, .discard_every = 2}));
+}
+
+TEST(Recorder, WorldsMayAppendFromDifferentThreads) {
+  TempDir one, four;
+  const std::string bytes = record(one.path, 4, {.worlds = 1, .steps = 40});
+  {
+    FakeSuite suite(without_video(4));
+    Recorder recorder(fake_recording(four.path, suite, 4, 4));
+    std::vector<std::thread> threads;
+    for (int w = 0; w < 4; ++w) {
+      threads.emplace_back([&, w] {
+        recorder.begin_episode(w, {w, 7});
+        for (int t = 0, T = length_of(w, 40); t < T; ++t) {
+          suite.fill(w, w, t, T);
+          recorder.append(w, {0.5f * static_cast<float>(t + 1), t + 1 == T, false, t + 1 == T});
+        }
+        recorder.finish_episode(w, FakeSuite::obs_scene(w), "success");
+      });
+    }
+    for (std::thread& t : threads) t.join();
+    recorder.complete();
+  }
+  std::string again;
+  for (const std::string& name : tree(four.path)) again += read_file(four.path / name);
+  EXPECT_EQ(bytes, again);
+}
+
+TEST(Recorder, ResumingGivesTheFilesOfAnUninterruptedRun) {
+  TempDir whole, broken;
+  const std::string bytes = record(whole.path, 6, {.worlds = 2, .discard_every = 3}, true);
+  for (const int count : {1, 3}) {  // so many more each time, then the recorder is dropped
+    record(broken.path, 6, {.worlds = 2, .discard_every = 3, .stop_after = count}, true,
+           [&](RecordingCfg& c) { c.resume = true; });
+    EXPECT_TRUE(fs::exists(broken.path / "house_0/.recording"));
+  }
+  EXPECT_EQ(bytes, record(broken.path, 6, {.worlds = 3, .discard_every = 3}, true,
+                          [&](RecordingCfg& c) { c.resume = true; }));
+  EXPECT_EQ(tree(whole.path), tree(broken.path));
+  // Resuming what is complete changes nothing and records nothing.
+  EXPECT_EQ(bytes,
+            record(broken.path, 6, {.worlds = 2}, true, [&](RecordingCfg& c) { c.resume = true; }));
+}
+
+TEST(Recorder, DiscardedAttemptsLeaveNoTrace) {
+  TempDir dir;
+  record(dir.path, 4, {.worlds = 3, .discard_every = 2}, true);
+  const InspectResult result = inspect(dir.path);
+  ASSERT_THAT(result.files, SizeIs(1));
+  EXPECT_EQ(result.files[0].episodes, 4);
+  EXPECT_THAT(tree(dir.path), SizeIs(1 + 4 * 2));
+  EXPECT_TRUE(verify(dir.path).ok()) << verify(dir.path).text();
+}
+
+TEST(Recorder, AnUnfinishedRecordingIsReadableAndRepairable) {
+  TempDir dir;
+  record(dir.path, 8, {.worlds = 2, .stop_after = 3}, true);
+  const VerifyResult before = verify(dir.path);
+  EXPECT_EQ(before.unpublished, 3);
+  EXPECT_EQ(before.episodes, 3);
+  EXPECT_EQ(before.videos, 6);
+  ASSERT_THAT(before.findings, SizeIs(1)) << before.text();
+  EXPECT_THAT(before.findings[0].text, HasSubstr("3 finished episodes wait"));
+  EXPECT_THAT(repair(dir.path).text(), HasSubstr("published 3 finished episodes"));
+  const VerifyResult after = verify(dir.path);
+  EXPECT_TRUE(after.ok()) << after.text();
+  EXPECT_EQ(after.episodes, 3);
+  EXPECT_FALSE(fs::exists(dir.path / "house_0/.recording"));
+}
+
+TEST(Recorder, FewEncodersGiveTheSameVideos) {
+  TempDir many, few;
+  const Attempts attempts{.worlds = 4, .steps = 12};
+  const std::string bytes = record(many.path, 5, attempts, true);
+  for (const int encoders : {1, 3}) {
+    EXPECT_EQ(bytes,
+              record(few.path / std::to_string(encoders), 5, attempts, true, [&](RecordingCfg& c) {
+                c.video.max_encoders = encoders;
+                c.video.queue_frames = 1;
+              }));
+  }
+}
+
+TEST(Recorder, OddPicturesArePadded) {
+  TempDir dir;
+  FakeSuite suite({1, 17, 13});
+  RecordingCfg cfg = fake_recording(dir.path, suite, 1, 1);
+  cfg.video.molmospaces_depth = true;
+  {
+    Recorder recorder(cfg);
+    record_all(recorder, suite, {.worlds = 1});
+  }
+  const VerifyResult result = verify(dir.path, {.decode = true});
+  EXPECT_TRUE(result.ok()) << result.text();
+  EXPECT_EQ(result.videos, 3);
+}
+
+TEST(Recorder, ASlowEncoderHoldsTheProducerAndLosesNothing) {
+  TempDir dir, tools;
+  FakeSuite suite({1, 16, 12, true, false});
+  RecordingCfg cfg = fake_recording(dir.path, suite, 1, 1);
+  // Takes one frame in 10 ms, and writes a line for each.
+  cfg.video.ffmpeg = fake_ffmpeg(
+      tools.path,
+      "while n=$(head -c 576 | wc -c); [ $n -gt 0 ]; do echo $n >> $out; sleep 0.01; done");
+  cfg.video.queue_frames = 2;
+  constexpr int kSteps = 60;
+  Recorder recorder(cfg);
+  recorder.begin_episode(0, {});
+  for (int t = 0; t < kSteps; ++t) {
+    suite.fill(0, 0, t, kSteps);
+    recorder.append(0, {});
+  }
+  recorder.finish_episode(0, "{}");
+  recorder.complete();
+  std::string lines;
+  for (int t = 0; t < kSteps; ++t) lines += "576\n";
+  EXPECT_EQ(read_file(dir.path / "house_0/episode_00000000_wrist_camera_batch_1_of_1.mp4"), lines);
+  EXPECT_GT(recorder.stats().frames, 0);
+}
+
+TEST(Recorder, AProducerWaitsForAnEncoderThatTakesNothing) {
+  TempDir dir, tools;
+  FakeSuite suite({1, 320, 240, true, false});
+  RecordingCfg cfg = fake_recording(dir.path, suite, 1, 1);
+  cfg.video.ffmpeg = fake_ffmpeg(tools.path, "sleep 0.5; cat > $out");
+  cfg.video.queue_frames = 2;
+  Recorder recorder(cfg);
+  recorder.begin_episode(0, {});
+  constexpr int kFrames = 20;  // 4.6 MB: the pipe holds 1 MiB, the queue 2 frames
+  for (int t = 0; t < kFrames; ++t) {
+    suite.fill(0, 0, t, kFrames);
+    recorder.append(0, {});
+  }
+  EXPECT_GT(recorder.stats().wait_s, 0.2);
+  recorder.finish_episode(0, "{}");
+  recorder.complete();
+  EXPECT_EQ(fs::file_size(dir.path / "house_0/episode_00000000_wrist_camera_batch_1_of_1.mp4"),
+            320u * 240 * 3 * kFrames);
+}
+
+// ---- faults: one clear error, nothing under a final name
+
+void expect_nothing_published(const fs::path& out) {
+  if (!fs::exists(out)) return;
+  for (const std::string& name : tree(out)) EXPECT_THAT(name, HasSubstr("/.recording/"));
+}
+
+TEST(RecorderFaults, FfmpegIsAbsent) {
+  TempDir dir;
+  const std::string error = error_of([&] {
+    record(dir.path, 1, {}, true, [](RecordingCfg& c) { c.video.ffmpeg = "/nonexistent/ffmpeg"; });
+  });
+  EXPECT_THAT(error, AllOf(HasSubstr("needs ffmpeg"), HasSubstr("/nonexistent/ffmpeg"),
+                           HasSubstr("apt-get install ffmpeg")));
+  EXPECT_THAT(tree(dir.path), IsEmpty());
+  record(dir.path, 1, {}, false, [](RecordingCfg& c) {
+    c.video.ffmpeg = "/nonexistent/ffmpeg";
+  });  // without video it is not needed
+}
+
+TEST(RecorderFaults, FfmpegDies) {
+  for (const char* body : {"head -c 2000 > $out; echo 'the encoder exploded' >&2; exit 3",
+                           "head -c 2000 > /dev/null; kill -9 $$"}) {
+    TempDir dir, tools;
+    const std::string error = error_of([&] {
+      record(dir.path, 2, {.worlds = 2, .steps = 4000}, true,
+             [&](RecordingCfg& c) { c.video.ffmpeg = fake_ffmpeg(tools.path, body); });
+    });
+    EXPECT_THAT(error,
+                AllOf(HasSubstr("cannot be recorded: video 'wrist_camera"), HasSubstr("ffmpeg: ")));
+    const bool has_words = std::string(body).find("exploded") != std::string::npos;
+    EXPECT_THAT(error, HasSubstr(has_words ? "exit code 3: the encoder exploded" : "signal 9"));
+    expect_nothing_published(dir.path);
+    EXPECT_THAT(finished_episodes(dir.path / "house_0"), IsEmpty());
+  }
+}
+
+TEST(RecorderFaults, FfmpegFailsAtTheEnd) {
+  TempDir dir, tools;
+  const std::string error = error_of([&] {
+    record(dir.path, 1, {.worlds = 1}, true, [&](RecordingCfg& c) {
+      c.video.ffmpeg = fake_ffmpeg(tools.path, "cat > $out; echo 'no trailer' >&2; exit 1");
+    });
+  });
+  EXPECT_THAT(error, HasSubstr("exit code 1: no trailer"));
+  expect_nothing_published(dir.path);
+}
+
+TEST(RecorderFaults, ExistingOutput) {
+  TempDir dir;
+  record(dir.path, 1, {});
+  EXPECT_THAT(error_of([&] { record(dir.path, 1, {}); }),
+              AllOf(HasSubstr("already holds recorded trajectories"), HasSubstr("house_0")));
+  EXPECT_THAT(
+      error_of([&] { record(dir.path, 2, {}, false, [](RecordingCfg& c) { c.resume = true; }); }),
+      HasSubstr("different recording: 'episodes' was 1 and is now 2"));
+  TempDir other;
+  record(other.path, 8, {.stop_after = 1});
+  EXPECT_THAT(error_of([&] { record(other.path, 8, {}); }),
+              HasSubstr("already holds an unfinished recording"));
+}
+
+TEST(RecorderFaults, TwoProcessesDoNotShareAHouse) {
+  TempDir dir;
+  FakeSuite suite(without_video(1));
+  RecordingCfg cfg = fake_recording(dir.path, suite, 1, 2);
+  Recorder first(cfg);
+  cfg.resume = true;
+  EXPECT_THAT(error_of([&] { Recorder second(cfg); }), HasSubstr("another process records into"));
+}
+
+TEST(RecorderFaults, UnwritableDirectory) {
+  TempDir dir;
+  std::ofstream(dir.path / "file") << "x";
+  const std::string error = error_of([&] { record(dir.path / "file", 1, {}); });
+  EXPECT_THAT(error, AllOf(HasSubstr("cannot create the directory"), HasSubstr("Not a directory")));
+}
+
+// A full disk, as a limit on the size of files in a process of its own.
+TEST(RecorderFaults, DiskFull) {
+  for (const bool video : {false, true}) {
+    TempDir dir;
+    const fs::path report = dir.path / "report";
+    const pid_t pid = fork();
+    if (pid == 0) {
+      signal(SIGXFSZ, SIG_IGN);
+      std::ofstream out(report);
+      const std::string error = error_of([&] {
+        FakeSuite suite({1, 320, 240, video, video});
+        Recorder recorder(fake_recording(dir.path / "out", suite, 1, 1));
+        const rlimit limit{20000, 20000};
+        setrlimit(RLIMIT_FSIZE, &limit);
+        record_all(recorder, suite, {.worlds = 1, .steps = 400});
+      });
+      out << error << std::flush;
+      _exit(error.empty() ? 1 : 0);
+    }
+    int status = 0;
+    waitpid(pid, &status, 0);
+    EXPECT_TRUE(WIFEXITED(status) && WEXITSTATUS(status) == 0) << status;
+    EXPECT_THAT(read_file(report),
+                ::testing::AnyOf(HasSubstr("File too large"), HasSubstr("killed by signal")))
+        << video;
+    expect_nothing_published(dir.path / "out");
+    EXPECT_THAT(finished_episodes(dir.path / "out/house_0"), IsEmpty());
+  }
+}
+
+TEST(RecorderFaults, ATextThatDoesNotFitIsRefused) {
+  TempDir dir;
+  FakeSuite suite(without_video(1));
+  Recorder recorder(fake_recording(dir.path, suite, 1, 1));
+  recorder.begin_episode(0, {});
+  suite.fill(0, 0, 0, 2);
+  recorder.append(0, {});
+  auto row = suite.sensor("task_info").fields()[0].data.row<std::uint8_t>(0);
+  std::fill(row.begin(), row.end(), 'x');  // cut in the middle
+  EXPECT_THAT(
+      error_of([&] { recorder.append(0, {}); }),
+      AllOf(HasSubstr("sensor 'task_info': step 1 of episode 0"), HasSubstr("str_max_len = 4000")));
+  EXPECT_THAT(error_of([&] { recorder.finish_episode(0, "{}"); }), HasSubstr("was refused"));
+  recorder.discard_episode(0, "text cut");
+  EXPECT_EQ(recorder.discarded(), 1);
+  recorder.begin_episode(0, {1, 0});  // the next one is recorded
+  suite.fill(0, 1, 0, 1);
+  recorder.append(0, {});
+  recorder.finish_episode(0, "{}");
+  recorder.complete();
+  EXPECT_TRUE(verify(dir.path).ok());
+}
+
+TEST(RecorderFaults, WrongCallsAreNamed) {
+  TempDir dir;
+  FakeSuite suite(without_video(2));
+  Recorder recorder(fake_recording(dir.path, suite, 2, 2));
+  EXPECT_THAT(error_of([&] { recorder.append(0, {}); }),
+              HasSubstr("no episode was begun in world 0"));
+  EXPECT_THAT(error_of([&] { recorder.begin_episode(2, {}); }),
+              HasSubstr("no world 2, expected 0 to 1"));
+  EXPECT_THAT(error_of([&] {
+                recorder.begin_episode(0, {-1, 0});
+              }),
+              HasSubstr("episode -1 is negative"));
+  recorder.begin_episode(0, {0, 0});
+  EXPECT_THAT(error_of([&] {
+                recorder.begin_episode(0, {1, 0});
+              }),
+              HasSubstr("still records episode 0"));
+  EXPECT_THAT(error_of([&] {
+                recorder.begin_episode(1, {0, 0});
+              }),
+              HasSubstr("already runs in another world"));
+  EXPECT_THAT(error_of([&] { recorder.finish_episode(0, "{}"); }), HasSubstr("has no steps"));
+  suite.fill(0, 0, 0, 1);
+  recorder.append(0, {});
+  EXPECT_THAT(error_of([&] { recorder.finish_episode(0, "{oops"); }), HasSubstr("no JSON text"));
+  EXPECT_THAT(error_of([&] { recorder.complete(); }), HasSubstr("world 0 still records episode 0"));
+  recorder.finish_episode(0, "{}");
+  EXPECT_THAT(error_of([&] { recorder.begin_episode(0, {0, 0}); }), HasSubstr("already recorded"));
+  recorder.complete();
+  EXPECT_THAT(error_of([&] { recorder.begin_episode(0, {1, 0}); }), HasSubstr("is complete"));
+}
+
+TEST(RecorderFaults, WrongConfigurationsAreNamed) {
+  TempDir dir;
+  const auto error = [&](const std::function<void(RecordingCfg&)>& change) {
+    return error_of([&] { record(dir.path, 1, {}, false, change); });
+  };
+  EXPECT_THAT(error([](RecordingCfg& c) { c.out_dir.clear(); }), HasSubstr("no output directory"));
+  EXPECT_THAT(error([](RecordingCfg& c) { c.episodes = 0; }), HasSubstr("episodes is 0"));
+  EXPECT_THAT(error([](RecordingCfg& c) { c.num_worlds = -1; }), HasSubstr("num_worlds is -1"));
+  EXPECT_THAT(error([](RecordingCfg& c) { c.fps = {0, 1}; }), HasSubstr("fps is 0/1"));
+  EXPECT_THAT(error([](RecordingCfg& c) { c.gzip = 10; }), HasSubstr("gzip is 10"));
+  EXPECT_THAT(error([](RecordingCfg& c) { c.settings = "{"; }), HasSubstr("settings is no JSON"));
+  EXPECT_THAT(tree(dir.path), IsEmpty());
+}
+
+}  // namespace
+}  // namespace mjsense

@@ -1,0 +1,136 @@
+#pragma once
+// For the tests of this room only.
+
+#include <unistd.h>
+
+#include <algorithm>
+#include <filesystem>
+#include <fstream>
+#include <sstream>
+#include <string>
+#include <vector>
+
+#include "mjsense/record/fake_suite.h"
+#include "mjsense/record/recorder.h"
+
+namespace mjsense::testing {
+
+namespace fs = std::filesystem;
+
+struct TempDir {
+  fs::path path;
+  TempDir() {
+    std::string name = (fs::temp_directory_path() / "mjsense_record_XXXXXX").string();
+    path = mkdtemp(name.data());
+  }
+  ~TempDir() {
+    std::error_code ignored;
+    fs::permissions(path, fs::perms::owner_all, ignored);
+    fs::remove_all(path, ignored);
+  }
+};
+
+inline std::string read_file(const fs::path& path) {
+  std::ifstream in(path, std::ios::binary);
+  std::stringstream text;
+  text << in.rdbuf();
+  return text.str();
+}
+
+// Every file below `dir`, by its relative path.
+inline std::vector<std::string> tree(const fs::path& dir) {
+  std::vector<std::string> names;
+  for (const auto& e : fs::recursive_directory_iterator(dir)) {
+    if (e.is_regular_file()) names.push_back(e.path().lexically_relative(dir).string());
+  }
+  std::sort(names.begin(), names.end());
+  return names;
+}
+
+// An executable script in the place of ffmpeg. `body` sees the output file as $out; the question
+// for encoders is answered.
+inline std::string fake_ffmpeg(const fs::path& dir, const std::string& body) {
+  const fs::path path = dir / "ffmpeg";
+  std::ofstream(path) << "#!/bin/sh\n"
+                         "case \"$*\" in *-encoders*) echo ' V libx264 x'; echo ' V ffv1 x'; echo "
+                         "' V libx264rgb x'; exit 0;; esac\n"
+                         "for out; do :; done\n"
+                      << body << "\n";
+  fs::permissions(path, fs::perms::owner_all);
+  return path.string();
+}
+
+struct Attempts {
+  int worlds = 2;
+  int steps = 6;
+  int discard_every = 0;  // the last of so many attempts; 0: none
+  int stop_after = -1;    // decided attempts after which the recorder is dropped without complete()
+};
+
+inline int length_of(std::int64_t episode, int steps) {
+  return steps + static_cast<int>(episode % 3);
+}
+
+// Runs attempts 0, 1, 2 ... as a rollout does, until the recording has enough.
+inline void record_all(Recorder& recorder, FakeSuite& suite, const Attempts& a) {
+  struct Running {
+    std::int64_t episode = -1;
+    int t = 0;
+  };
+  std::vector<Running> running(a.worlds);
+  std::int64_t next = 0;
+  for (int decided = 0; !recorder.enough();) {
+    for (int w = 0; w < a.worlds && !recorder.enough(); ++w) {
+      Running& r = running[w];
+      if (r.episode < 0) {
+        while (recorder.decided(next)) ++next;
+        r = {next++, 0};
+        recorder.begin_episode(w, {r.episode, 7});
+      }
+      const int T = length_of(r.episode, a.steps);
+      suite.fill(w, r.episode, r.t, T);
+      const bool last = ++r.t == T;
+      recorder.append(w, {0.5f * static_cast<float>(r.t), last, false, last});
+      if (!last) continue;
+      if (a.discard_every > 0 && r.episode % a.discard_every == a.discard_every - 1) {
+        recorder.discard_episode(w, "for the test");
+      } else {
+        recorder.finish_episode(w, FakeSuite::obs_scene(r.episode), "success");
+      }
+      r.episode = -1;
+      if (++decided == a.stop_after) {
+        recorder.flush();
+        return;
+      }
+    }
+  }
+  for (int w = 0; w < a.worlds; ++w) {
+    if (recorder.recording(w)) recorder.abandon_episode(w);
+  }
+  recorder.complete();
+}
+
+inline RecordingCfg fake_recording(const fs::path& out, const FakeSuite& suite, int worlds,
+                                   int episodes) {
+  RecordingCfg cfg;
+  cfg.out_dir = out;
+  cfg.episodes = episodes;
+  cfg.num_worlds = worlds;
+  cfg.fps = Fps::from_period_ms(66);
+  cfg.sensors = suite.sensors();
+  cfg.settings = R"({"seed":7})";
+  return cfg;
+}
+
+// What() of the error that `run` throws; "" if it throws none.
+template <class Run>
+std::string error_of(Run&& run) {
+  try {
+    run();
+  } catch (const std::exception& error) {
+    return error.what();
+  }
+  return "";
+}
+
+}  // namespace mjsense::testing
