@@ -1,0 +1,27 @@
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+sys.path.insert(0, str(Path(__file__).parent))
+ROOT = Path(__file__).parents[2]
+
+
+@pytest.fixture(scope="session")
+def record_fake():
+    """The program that records a suite without physics: record_fake(out, "--episodes", 4) -> CompletedProcess."""
+    found = [Path(p) for p in (os.environ.get("MJSENSE_RECORD_FAKE"),) if p] or sorted(ROOT.glob("build/*/record_fake"))
+    if not found:
+        pytest.skip("record_fake is not built (./dev build)")
+    program = max(found, key=lambda p: p.stat().st_mtime)
+
+    def run(*arguments, check=True):
+        done = subprocess.run([program, *map(str, arguments)], capture_output=True, text=True, timeout=120)
+        if check:
+            assert done.returncode == 0, done.stderr
+        return done
+
+    run.program = program
+    return run

@@ -1,0 +1,63 @@
+"""kill -9 at random moments: every finished episode stays readable, resuming goes on, nothing twice."""
+
+import random
+import signal
+import subprocess
+import time
+
+import h5py
+import pytest
+
+OPTIONS = ["--episodes", "7", "--batches", "3", "--worlds", "3", "--steps", "8", "--discard", "4", "--print"]
+
+
+def contents(out):
+    return {str(p.relative_to(out)): p.read_bytes() for p in out.rglob("*") if p.is_file()}
+
+
+@pytest.fixture(scope="module")
+def whole(record_fake, tmp_path_factory):
+    out = tmp_path_factory.mktemp("whole")
+    record_fake(out, *OPTIONS)
+    return contents(out)
+
+
+@pytest.mark.parametrize("seed", range(2))
+def test_kill_and_resume(record_fake, whole, tmp_path, seed):
+    rng = random.Random(seed)
+    finished = []  # episodes that the program said are safe
+    for _ in range(12):
+        process = subprocess.Popen(
+            [record_fake.program, tmp_path, *OPTIONS, "--resume", "--step-ms", "4"], stdout=subprocess.PIPE, text=True
+        )
+        time.sleep(rng.uniform(0.02, 0.8))
+        process.send_signal(signal.SIGKILL)
+        finished += [line.split()[1] for line in process.communicate()[0].splitlines() if line.startswith("finished")]
+        if (tmp_path / "house_0").exists() and not (tmp_path / "house_0/.recording").exists():
+            break  # it was faster
+        check_readable(record_fake, tmp_path, finished)
+    record_fake(tmp_path, *OPTIONS, "--resume")
+    assert len(set(finished)) == len(finished), "an episode was recorded twice"
+    assert contents(tmp_path) == whole
+
+
+def check_readable(record_fake, out, finished):
+    house = out / "house_0"
+    found = set()
+    for path in [*house.glob("*.h5"), *house.glob(".recording/episode_????????/traj.h5")]:
+        with h5py.File(path) as f:
+            found |= {str(traj.attrs["episode"]) for traj in f.values() if len(traj["obs/agent/qpos"]) == len(traj["success"])}
+    assert set(finished) <= found
+    for path in house.glob("*.h5"):  # under a final name: whole, with its videos
+        assert "\nwhole" in "\n" + record_fake("verify", path).stdout
+
+
+def test_repair_ends_what_was_killed(record_fake, tmp_path):
+    record_fake(tmp_path, *OPTIONS, "--stop-after", 2)
+    house = tmp_path / "house_0"
+    (house / ".recording/episode_00000099.part.1").mkdir()
+    assert "published 2 finished episodes" in record_fake("repair", tmp_path).stdout
+    assert not (house / ".recording").exists()
+    assert "whole: 1 files, 2 episodes" in record_fake("verify", tmp_path).stdout
+    done = record_fake(tmp_path, *OPTIONS, check=False)
+    assert done.returncode == 2 and "already holds recorded trajectories" in done.stderr
