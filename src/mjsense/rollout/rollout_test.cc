@@ -8,6 +8,7 @@
 #include <nlohmann/json.hpp>
 
 #include "mjsense/core/error.h"
+#include "mjsense/core/testing/allocations.h"
 #include "mjsense/observe/function_sensor.h"
 
 namespace mjsense {
@@ -156,6 +157,21 @@ TEST(Rollout, AnEpisodeIsTheSameInAnyWorldAtAnyThreadCount) {
   EXPECT_EQ(play(blind(3, 1)), alone);
   EXPECT_EQ(play(blind(4, 2)), alone);
   EXPECT_EQ(play(blind(5, 5)), alone);
+}
+
+TEST(Rollout, AStepAllocatesNothing) {
+  Rollout rollout(blind(3, 2));
+  start(rollout, {0, 1, 2}, {0, 1, 2});
+  const auto run = [&](int steps) {
+    for (int t = 0; t < steps; ++t) {
+      rollout.act();
+      rollout.step();
+    }
+  };
+  run(5);
+  const AllocationCount count;
+  run(30);
+  EXPECT_EQ(count.since(), 0);
 }
 
 TEST(Rollout, AWorldThatDivergesIsAloneInIt) {
