@@ -4,6 +4,9 @@
 #include <array>
 #include <optional>
 #include <span>
+#include <string>
+
+#include "mjsense/core/error.h"
 
 namespace mjsense {
 
@@ -15,7 +18,12 @@ struct GroupValues {
   bool given = false;  // false: the policy says nothing about this group, its controller holds
 
   std::span<const double> view() const { return {values.data(), static_cast<std::size_t>(size)}; }
+  // Throws ValueError for more than kMaxSize values.
   void set(std::span<const double> xs) {
+    if (xs.size() > kMaxSize) {
+      throw ValueError("a move group takes at most " + std::to_string(kMaxSize) + " values, not " +
+                       std::to_string(xs.size()));
+    }
     size = static_cast<int>(xs.size());
     for (int i = 0; i < size; ++i) values[i] = xs[i];
     given = true;
@@ -31,9 +39,8 @@ struct RobotValues {
 };
 
 struct Action {
-  RobotValues commands;  // of actuators; "base": [] is given with size 0
-  bool done =
-      false;  // the policy has finished: this step is still simulated, then the episode ends
+  RobotValues commands;         // of actuators; "base": [] is given with size 0
+  bool done = false;            // the policy has finished: after this step the episode ends
   std::optional<bool> success;  // the policy's own verdict; {done, success: false} gives up
 };
 

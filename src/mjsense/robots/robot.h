@@ -68,9 +68,9 @@ class Robot {
   // joints (a gripper's one command for two drivers) gives all of them its first. A base gives the
   // identity.
   Pose fk(int group, const RobotValues& values) const;
-  const Chain& chain(int group) const {
-    return *chains_[group];
-  }  // arms: through the arm's joints only
+  // From the base to the group's leaf, through every joint of a move group on the way. Not for a
+  // base, which has none.
+  const Chain& chain(int group) const { return *chains_[group]; }
 
   // --- controllers
   // Start configuration with noise drawn from rng, robot standing at X_WB; controls hold it.
@@ -98,8 +98,8 @@ class Robot {
   std::string prefix_;
   std::vector<MoveGroup> groups_;
   std::vector<std::unique_ptr<Chain>> chains_;  // per group, null without a leaf
-  std::vector<std::vector<std::pair<int, int>>>
-      source_;  // per group, per chain joint: (group, index)
+  // Per group, per joint of its chain: (group, index) of its value.
+  std::vector<std::vector<std::pair<int, int>>> source_;
   int arm_ = -1, gripper_ = -1, base_body_ = -1, base_mocap_ = -1;
   std::vector<RobotValues> targets_;  // [B]; `given` false: the group holds
 };

@@ -38,9 +38,8 @@ struct CameraMount {
   bool record_depth = false;
 };
 
-// Noise that the arm's controllers see and recordings do not (spec section 5).
+// Displacement of the tool that the arm's controllers see and recordings do not; normal, truncated.
 struct ActionNoiseCfg {
-  bool enabled = true;
   double scale = 0.1;           // standard deviation per metre that the command would move the tool
   double rotation_ratio = 0.1;  // rotation deviation (rad) per position deviation (m)
   double max_position = 0.02;   // m, truncation

@@ -7,6 +7,7 @@
 #include <numbers>
 
 #include "mjsense/core/error.h"
+#include "mjsense/observe/frame.h"
 #include "mjsense/scene/resolve.h"
 
 namespace mjsense {
@@ -107,11 +108,6 @@ Pose body_in(const mjModel* model, int body, int root) {
   for (; body != root; body = model->body_parentid[body])
     pose = Pose{vec3(model->body_pos + 3 * body), quat(model->body_quat + 4 * body)} * pose;
   return pose;
-}
-
-bool is_below(const mjModel* model, int body, int root) {
-  while (body > root) body = model->body_parentid[body];
-  return body == root;
 }
 
 }  // namespace

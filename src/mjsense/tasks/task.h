@@ -1,12 +1,13 @@
 #pragma once
 // A task: its scene, its episodes, and what counts as done. Life:
 //
-//   scene_cfg()                 before compilation: robot, furniture, objects, lights
-//   initialize(model, B)        after compilation: resolves names; the robot exists from here on
-//   register_policy(policy)     once
-//   per episode of a world:     sample(w, episode, state) -> forward -> begin(world) ->
-//   policy.reset(world) -> observe per control step:           policy.act(world, action) ->
-//   apply(world, action, state) -> step -> observe, evaluate(world)
+//   scene_cfg()              before compilation: robot, furniture, objects, lights
+//   initialize(model, B)     after compilation: resolves names; the robot exists from here on
+//   register_policy(policy)  once
+//   an episode of a world:   sample(w, episode, state), forward, begin(world), policy.reset(world),
+//                            observe
+//   a control step:          policy.act(world, action), apply(world, action, state), step, observe,
+//                            evaluate(world)
 //
 // State is per world; functions that take a world touch that world's alone and may run in parallel
 // with the others.
@@ -72,9 +73,8 @@ class Task {
   const TaskCfg& cfg() const { return cfg_; }
   virtual std::string_view name() const = 0;  // registry name
   virtual std::string_view type() const = 0;  // task_type of obs_scene: "pick"
-  int decimation() const {
-    return cfg_.policy_dt_ms / cfg_.sim_dt_ms;
-  }  // physics steps per control step
+  // Physics steps per control step.
+  int decimation() const { return cfg_.policy_dt_ms / cfg_.sim_dt_ms; }
   double fps() const { return 1000.0 / cfg_.policy_dt_ms; }
 
   virtual SceneCfg scene_cfg() const = 0;  // the caller appends sensors
@@ -113,9 +113,9 @@ class Task {
   // The main one first. Roles are the same in every episode, and known after initialize(); bodies
   // may change.
   virtual std::span<const TaskObject> objects(int world) const = 0;
-  virtual std::string description(int world) const = 0;              // "Pick up the mug"
-  virtual std::vector<std::pair<std::string, std::vector<Referral>>> referrals(
-      int world) const = 0;  // per role
+  virtual std::string description(int world) const = 0;  // "Pick up the mug"
+  using Referrals = std::vector<std::pair<std::string, std::vector<Referral>>>;  // by role
+  virtual Referrals referrals(int world) const = 0;
   // Pose of the object with this role: at the first observation, and where the task wants it.
   // Throws KeyError.
   virtual Pose start_pose(int world, std::string_view role) const = 0;

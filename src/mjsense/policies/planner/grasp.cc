@@ -7,6 +7,8 @@
 #include <memory>
 #include <numbers>
 
+#include "mjsense/observe/frame.h"
+
 namespace mjsense {
 namespace {
 
@@ -17,8 +19,7 @@ constexpr double kSupportGap = 0.004;  // m, finger tips above the support
 constexpr double kSideGap = 0.006;     // m, free on each side of the object before closing
 constexpr double kFaceDepth = 0.002;   // m, what counts as one face
 constexpr double kFaceWidth = 0.010;   // m, of the face that both pads touch
-constexpr double kTopGap =
-    0.012;  // m, that the object must reach above the tool's origin or below it
+constexpr double kTopGap = 0.012;      // m, of the tool's origin below the top of a high object
 // Slides of the grasp along the object, across the closing direction.
 constexpr std::array<double, 5> kSlides{0.0, 0.012, -0.012, 0.024, -0.024};
 
@@ -78,9 +79,7 @@ GripperShape::GripperShape(const mjModel* model, const Robot& robot, int gripper
   Vec3 low{1, 1, 1}, high{-1, -1, -1};
   for (int g = 0; g < model->ngeom; ++g) {
     if (!model->geom_contype[g] && !model->geom_conaffinity[g]) continue;
-    int body = model->geom_bodyid[g];
-    while (body > group.root_body) body = model->body_parentid[body];
-    if (body != group.root_body) continue;
+    if (!is_below(model, model->geom_bodyid[g], group.root_body)) continue;
     const double* aabb = model->geom_aabb + 6 * g;
     const Pose pose = inverse(world_tool) *
                       pose_from_mat(data->geom_xpos + 3 * g, data->geom_xmat + 9 * g) *

@@ -40,6 +40,12 @@ void PickPlanner::initialize(Task& task) {
   if (robot.arm() < 0 || robot.gripper() < 0)
     throw ValueError(fmt::format(
         "policy 'planner' needs an arm and a gripper; robot '{}' lacks one", robot.name()));
+  const auto driven = robot.chain(robot.arm()).joints();
+  if (!std::ranges::equal(driven, robot.groups()[robot.arm()].joints))
+    throw ValueError(
+        fmt::format("policy 'planner' moves the tool by the arm alone; that of robot '{}' moves "
+                    "with others too",
+                    robot.name()));
   gripper_shape_ = std::make_unique<GripperShape>(task_->model(), robot, robot.gripper());
   plans_.assign(task_->num_worlds(), {});
 }

@@ -252,7 +252,7 @@ std::string PickTask::description(int world) const {
   return "Pick up the " + targets_[world].object.name;
 }
 
-std::vector<std::pair<std::string, std::vector<Referral>>> PickTask::referrals(int world) const {
+Task::Referrals PickTask::referrals(int world) const {
   const Kind& kind = kKinds[targets_[world].index];
   return {{std::string(kRole), {{kind.text, 0.5}, {kind.others[0], 0.3}, {kind.others[1], 0.2}}}};
 }

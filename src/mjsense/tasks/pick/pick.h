@@ -28,7 +28,7 @@ class PickTask final : public Task {
     return {&targets_[world].object, 1};
   }
   std::string description(int world) const override;
-  std::vector<std::pair<std::string, std::vector<Referral>>> referrals(int world) const override;
+  Referrals referrals(int world) const override;
   Pose start_pose(int world, std::string_view role) const override;
   std::optional<Pose> goal_pose(int world,
                                 std::string_view role) const override;  // 5 cm above the start
