@@ -8,8 +8,15 @@ namespace mjsense::python {
 
 std::span<const CfgKind> cfg_kinds() {
   static const std::vector<CfgKind> kinds = {
-      builtin_kind(), camera_kind(),  contact_kind(),
-      lidar_kind(),   raycast_kind(), terrain_height_kind(),
+      // clang-format off: one line a sensor
+      builtin_kind(),
+      camera_kind(),
+      contact_kind(),
+      effect_kind(),
+      lidar_kind(),
+      raycast_kind(),
+      terrain_height_kind(),
+      // clang-format on
   };
   return kinds;
 }

@@ -41,6 +41,7 @@ CfgKind builtin_kind();
 CfgKind camera_kind();
 CfgKind contact_kind();
 CfgKind lidar_kind();
+CfgKind effect_kind();
 CfgKind raycast_kind();
 CfgKind terrain_height_kind();
 

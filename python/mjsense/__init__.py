@@ -8,7 +8,7 @@ if _mujoco.mj_versionString() != _MUJOCO:
         f"mjsense is built for MuJoCo {_MUJOCO}, found {_mujoco.mj_versionString()}: pip install 'mujoco-core=={_MUJOCO}'"
     )
 
-from mjsense import observations
+from mjsense import effects, observations
 from mjsense._core import SensorSpec, __version__, embedded_models, policy_names, robot_names, task_names
 from mjsense.configs import (
     BuiltinSensorCfg,
@@ -38,6 +38,7 @@ from mjsense.configs import (
 )
 from mjsense.contact import ContactSensor
 from mjsense.data import CameraData, ContactData, RayCastData, SensorData
+from mjsense.effects import EffectSensorCfg
 from mjsense.errors import UnknownNameError
 from mjsense.pipeline import ObservationPipeline
 from mjsense.raycast import CameraSensor, LidarSensor, RayCastSensor, TerrainHeightSensor

@@ -14,6 +14,7 @@ CLASSES = {
     "raycast": mjs.RayCastSensorCfg,
     "terrain_height": mjs.TerrainHeightSensorCfg,
     "camera": mjs.CameraSensorCfg,
+    "effect": mjs.EffectSensorCfg,
     "options": mjs.MujocoCfg,
     "terrain": mjs.TerrainCfg,
     "sub_terrain": mjs.SubTerrainCfg,

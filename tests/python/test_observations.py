@@ -31,7 +31,15 @@ def test_history_is_oldest_first_and_backfilled():
 
 
 def test_noise_is_seeded():
-    a, b = (mjs.ObservationPipeline(2, noise=("gaussian", 0, 1), seed=3) for _ in range(2))
+    a, b = (mjs.ObservationPipeline(2, noise=mjs.effects.Gaussian(1.0), seed=3) for _ in range(2))
     assert np.array_equal(a(frames(1)[0]), b(frames(1)[0]))
     with pytest.raises(ValueError, match="operation"):
         mjs.ObservationPipeline(1, operation="mul")
+
+
+def test_pipeline_errors():
+    with pytest.raises(ValueError, match=r"shape \(3, 1\): expected \(2, D\)"):
+        mjs.ObservationPipeline(2)(np.zeros((3, 1)))
+    with pytest.raises(RuntimeError):
+        mjs.ObservationPipeline(1, nan_policy="error")([[float("nan")]])
+    assert mjs.ObservationPipeline(1, nan_policy="sanitize")([[float("nan")]]).tolist() == [[0.0]]
