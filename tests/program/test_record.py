@@ -133,25 +133,29 @@ def test_config_file_and_command_line(mjsense):
 
 
 def interrupt(mjsense, args, signals):
-    """Starts the program and sends it `signals` as soon as episodes run."""
+    """Starts the program and sends it the signals as soon as episodes run."""
     process = subprocess.Popen([mjsense.program, *map(str, args)], cwd=mjsense.folder, stdout=subprocess.PIPE,
                                stderr=subprocess.PIPE, text=True)
     running = mjsense.folder / "data/house_0/.recording"
     deadline = time.time() + 60
     while not list(running.glob("episode_*")) and time.time() < deadline:
         time.sleep(0.01)
-    for _ in range(signals):
-        process.send_signal(signal.SIGINT)
+    for each in signals:
+        process.send_signal(each)
         time.sleep(0.05)
     err = process.communicate(timeout=120)[1]
     return process.returncode, err
 
 
-@pytest.mark.parametrize("signals", [1, 2])
+@pytest.mark.parametrize("signals", [[signal.SIGINT], [signal.SIGINT, signal.SIGINT], [signal.SIGKILL]],
+                         ids=["once", "twice", "killed"])
 def test_interrupted_then_resumed_is_as_if_nothing_had_happened(mjsense, signals):
     args = ["record", "pick", "--size", "64x48", "--horizon", 30, "--keep-failures", "--no-sheet", "--episodes", 4]
     code, err = interrupt(mjsense, [*args, "--worlds", 2, "--out", "data"], signals)
-    assert code == 1 and "go on with --resume" in err
+    if signals == [signal.SIGKILL]:
+        assert code == -signal.SIGKILL
+    else:
+        assert code == 1 and "go on with --resume" in err
     mjsense(*args, "--worlds", 1, "--out", "data", "--resume", "-q")
     mjsense(*args, "--worlds", 4, "--out", "whole", "-q")
     assert contents(mjsense.folder / "data") == contents(mjsense.folder / "whole")

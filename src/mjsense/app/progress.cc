@@ -1,12 +1,23 @@
 #include "mjsense/app/progress.h"
 
 #include <fmt/format.h>
+#include <sys/ioctl.h>
 #include <unistd.h>
 
 #include <cmath>
 #include <cstdio>
 
 namespace mjsense {
+
+namespace {
+
+// A longer line would wrap, and the next could not take its place.
+std::size_t terminal_width() {
+  winsize size{};
+  return ioctl(STDERR_FILENO, TIOCGWINSZ, &size) == 0 && size.ws_col > 1 ? size.ws_col : 80;
+}
+
+}  // namespace
 
 std::string clock_text(double seconds) {
   const auto s = static_cast<long>(std::lround(seconds));
@@ -40,10 +51,10 @@ void ProgressLine::show(const RecordProgress& progress, int stop_level) {
   if (quiet_) return;
   text_ = progress_text(progress);
   if (stop_level > 0 && progress.running > 0) {
-    text_ += fmt::format("  stopping: {} running (Ctrl-C again discards them)", progress.running);
+    text_ += fmt::format("  stopping: {} running; Ctrl-C discards them", progress.running);
   }
   if (terminal_) {
-    fmt::print(stderr, "\r\033[K{}", text_);
+    fmt::print(stderr, "\r\033[K{}", text_.substr(0, terminal_width() - 1));
     std::fflush(stderr);
     open_ = true;
     return;

@@ -163,7 +163,14 @@ class RecordJob {
     progress_.frames += pictures_;
     if (++lengths_[w] > 1) ++progress_.steps;
     if (!now.terminal && !now.truncated) return;
-    end(w, now.success, now.success ? "success" : now.terminal ? "no success" : "horizon reached");
+    end(w, now.success, outcome(w, now));
+  }
+
+  const char* outcome(int w, const Evaluation& now) {
+    if (now.success) return "success";
+    if (!now.terminal) return "horizon reached";
+    const Action* last = rollout_.task().last_action(w);
+    return last && last->success == false ? "the policy gave up" : "no success";
   }
 
   void end(int w, bool success, const std::string& outcome) {

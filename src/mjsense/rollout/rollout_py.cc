@@ -269,7 +269,8 @@ void bind_rollout(nb::module_& m) {
   nb::class_<PyRollout>(m, "Rollout", "The C++ rollout.")
       .def(nb::init<nb::handle>(), nb::arg("config"))
       .def("start", &PyRollout::start, nb::arg("worlds"), nb::arg("episodes"))
-      .def("stop", [](PyRollout& s, int w) { s.rollout().stop(w); }, nb::arg("world"))
+      .def(
+          "stop", [](PyRollout& s, int w) { s.rollout().stop(w); }, nb::arg("world"))
       .def("act", &PyRollout::act)
       .def("step", &PyRollout::step)
       .def("set_actions", &PyRollout::set_actions, nb::arg("values"))
