@@ -2,6 +2,7 @@
 
 #include <EGL/egl.h>
 #include <EGL/eglext.h>
+#include <dlfcn.h>
 #include <fmt/format.h>
 
 #include <algorithm>
@@ -13,46 +14,80 @@
 namespace mjsense {
 namespace {
 
+// libEGL, loaded when first asked for: without it everything else still runs.
+struct Egl {
+  decltype(&eglGetError) get_error;
+  decltype(&eglGetDisplay) get_display;
+  decltype(&eglGetPlatformDisplay) get_platform_display;
+  decltype(&eglInitialize) initialize;
+  decltype(&eglBindAPI) bind_api;
+  decltype(&eglChooseConfig) choose_config;
+  decltype(&eglCreateContext) create_context;
+  decltype(&eglDestroyContext) destroy_context;
+  decltype(&eglMakeCurrent) make_current;
+
+  explicit Egl(const std::string& place) {
+    void* library = dlopen("libEGL.so.1", RTLD_NOW | RTLD_LOCAL);
+    if (!library)
+      throw RuntimeError(fmt::format("{}: OpenGL: {}; is libegl1 installed?", place, dlerror()));
+    const auto find = [&](auto& function, const char* name) {
+      function = reinterpret_cast<std::decay_t<decltype(function)>>(dlsym(library, name));
+      if (!function) throw RuntimeError(fmt::format("{}: OpenGL: libEGL has no {}", place, name));
+    };
+    find(get_error, "eglGetError");
+    find(get_display, "eglGetDisplay");
+    find(get_platform_display, "eglGetPlatformDisplay");
+    find(initialize, "eglInitialize");
+    find(bind_api, "eglBindAPI");
+    find(choose_config, "eglChooseConfig");
+    find(create_context, "eglCreateContext");
+    find(destroy_context, "eglDestroyContext");
+    find(make_current, "eglMakeCurrent");
+  }
+};
+
 // A context without a window, on Mesa's surfaceless platform or whatever display there is.
 class EglContext {
  public:
-  explicit EglContext(const std::string& place) {
+  explicit EglContext(const std::string& place) : egl_(place) {
     const auto fail = [&](const char* what) {
       throw RuntimeError(
           fmt::format("{}: OpenGL: {} (EGL error {:#x}); is libgl1-mesa-dri installed?", place,
-                      what, static_cast<unsigned>(eglGetError())));
+                      what, static_cast<unsigned>(egl_.get_error())));
     };
-    display_ = eglGetPlatformDisplay(EGL_PLATFORM_SURFACELESS_MESA, EGL_DEFAULT_DISPLAY, nullptr);
-    if (display_ == EGL_NO_DISPLAY || !eglInitialize(display_, nullptr, nullptr)) {
-      display_ = eglGetDisplay(EGL_DEFAULT_DISPLAY);
-      if (display_ == EGL_NO_DISPLAY || !eglInitialize(display_, nullptr, nullptr))
+    display_ =
+        egl_.get_platform_display(EGL_PLATFORM_SURFACELESS_MESA, EGL_DEFAULT_DISPLAY, nullptr);
+    if (display_ == EGL_NO_DISPLAY || !egl_.initialize(display_, nullptr, nullptr)) {
+      display_ = egl_.get_display(EGL_DEFAULT_DISPLAY);
+      if (display_ == EGL_NO_DISPLAY || !egl_.initialize(display_, nullptr, nullptr))
         fail("no EGL display");
     }
-    eglBindAPI(EGL_OPENGL_API);
+    egl_.bind_api(EGL_OPENGL_API);
     const EGLint wanted[] = {EGL_SURFACE_TYPE, EGL_PBUFFER_BIT, EGL_RENDERABLE_TYPE, EGL_OPENGL_BIT,
                              EGL_NONE};
     EGLConfig config = nullptr;
     EGLint count = 0;
-    if (!eglChooseConfig(display_, wanted, &config, 1, &count) || count < 1)
+    if (!egl_.choose_config(display_, wanted, &config, 1, &count) || count < 1)
       fail("no suitable EGL configuration");
-    context_ = eglCreateContext(display_, config, EGL_NO_CONTEXT, nullptr);
+    context_ = egl_.create_context(display_, config, EGL_NO_CONTEXT, nullptr);
     if (context_ == EGL_NO_CONTEXT) fail("no context");
   }
   ~EglContext() {
     release();
-    eglDestroyContext(display_, context_);
+    egl_.destroy_context(display_, context_);
   }
   EglContext(const EglContext&) = delete;
   EglContext& operator=(const EglContext&) = delete;
 
   // A context belongs to one thread at a time: take it for a picture, then give it back.
   bool take() {
-    return eglBindAPI(EGL_OPENGL_API) &&
-           eglMakeCurrent(display_, EGL_NO_SURFACE, EGL_NO_SURFACE, context_);
+    return egl_.bind_api(EGL_OPENGL_API) &&
+           egl_.make_current(display_, EGL_NO_SURFACE, EGL_NO_SURFACE, context_);
   }
-  void release() { eglMakeCurrent(display_, EGL_NO_SURFACE, EGL_NO_SURFACE, EGL_NO_CONTEXT); }
+  void release() { egl_.make_current(display_, EGL_NO_SURFACE, EGL_NO_SURFACE, EGL_NO_CONTEXT); }
 
  private:
+  Egl egl_;
   EGLDisplay display_ = EGL_NO_DISPLAY;
   EGLContext context_ = EGL_NO_CONTEXT;
 };

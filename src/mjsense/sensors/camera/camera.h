@@ -63,8 +63,9 @@ struct CameraSensorCfg : SensorCfg {
   std::string depth_kind = "planar";  // planar ray
   std::optional<CameraIntrinsics> intrinsics;
   LensDistortion distortion;
-  std::string depth_noise = "none";  // none d405 d435
-  std::string renderer = "rays";     // rays opengl (MuJoCo's own renderer, where it was built in)
+  std::string depth_noise =
+      "none";  // none d405 d435: of a stereo camera, on the field depth only (depth_noise.h)
+  std::string renderer = "rays";  // rays opengl (MuJoCo's own renderer, where it was built in)
 
   std::unique_ptr<Sensor> build() const override;
 };

@@ -68,6 +68,9 @@ void validate(const CameraSensorCfg& cfg) {
   }
   check_choice(place, "depth_noise", cfg.depth_noise,
                std::array<std::string, 3>{"none", "d405", "d435"});
+  const auto has_depth = std::count(cfg.data_types.begin(), cfg.data_types.end(), "depth") > 0;
+  if (cfg.depth_noise != "none" && (!has_depth || cfg.depth_kind != "planar" || cfg.orthographic))
+    fail("depth_noise is for planar depth of a perspective camera");
   check_choice(place, "distortion model", cfg.distortion.model,
                std::array<std::string, 3>{"none", "brown_conrady", "fisheye"});
   const std::size_t needed = cfg.distortion.model == "none"      ? 0

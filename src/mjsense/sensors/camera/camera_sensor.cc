@@ -8,6 +8,7 @@
 #include "mjsense/core/error.h"
 #include "mjsense/core/parallel.h"
 #include "mjsense/rays/ray_scene.h"
+#include "mjsense/sensors/camera/depth_noise.h"
 
 namespace mjsense {
 namespace {
@@ -63,7 +64,7 @@ void CameraSensor::initialize(const SensorInit& init) {
   workspace_.reset();
   clear_fields();
   declare_fields(init.num_worlds);
-  worlds_.assign(init.num_worlds, PerWorld{{}, Appearance(model_), -1, false});
+  worlds_.assign(init.num_worlds, PerWorld{{}, Appearance(model_)});
   due_.reserve(init.num_worlds);
 
   PixelGrid grid = grid_of_camera(model_, camera_, cfg_.width, cfg_.height);
@@ -80,6 +81,10 @@ void CameraSensor::initialize(const SensorInit& init) {
   }
   for (PerWorld& w : worlds_) w.grid = grid;
 
+  clean_.clear();
+  if (cfg_.depth_noise != "none")
+    clean_.assign(init.threads,
+                  std::vector<float>(static_cast<std::size_t>(cfg_.width) * cfg_.height));
   gl_.reset();
   if (cfg_.renderer == "opengl") {
     gl_ = make_gl_renderer(model_,
@@ -175,6 +180,7 @@ void CameraSensor::compute(const World& world) {
   if (!cfg_.intrinsics && !w.grid.bent)
     w.grid = grid_of_camera(m, camera_, cfg_.width, cfg_.height);
   w.appearance.copy(m);
+  w.rng = world.rng(stream_of(name()));
   std::ranges::copy(intrinsic_matrix(w.grid), intrinsics_->data.row<float>(world.id).begin());
   const double* p = world.data->cam_xpos + 3 * camera_;
   const double* r = world.data->cam_xmat + 9 * camera_;
@@ -210,6 +216,21 @@ void CameraSensor::cast(const CastContext& context) {
   due_.clear();
   for (int id : context.ids)
     if (worlds_[id].due) due_.push_back(id);
+  render_due(context);
+  if (!clean_.empty()) add_noise(context);
+  for (int id : due_) worlds_[id].due = false;
+}
+
+void CameraSensor::add_noise(const CastContext& context) {
+  const StereoCamera camera = stereo_preset(cfg_.depth_noise);
+  context.pool.run(static_cast<int>(due_.size()), [&](int item, int thread) {
+    const int id = due_[item];
+    add_stereo_noise(camera, depth_->data.row<float>(id), cfg_.width, 1.0 / worlds_[id].grid.dx,
+                     worlds_[id].rng, clean_[thread]);
+  });
+}
+
+void CameraSensor::render_due(const CastContext& context) {
   const RayScene& rays = *context.rays;
   if (gl_) {
     for (int id : due_) gl_->render(rays.world(id), targets(id));
@@ -235,7 +256,6 @@ void CameraSensor::cast(const CastContext& context) {
                   (band + 1) * tile_rows / bands, work.scratch[thread]);
     });
   }
-  for (int id : due_) worlds_[id].due = false;
 }
 
 }  // namespace mjsense

@@ -4,6 +4,7 @@
 #include <memory>
 #include <vector>
 
+#include "mjsense/core/rng.h"
 #include "mjsense/render/camera_model.h"
 #include "mjsense/render/gl_renderer.h"
 #include "mjsense/render/look.h"
@@ -40,9 +41,12 @@ class CameraSensor final : public Sensor {
     Appearance appearance;
     std::int64_t image = -1;  // number of the image shown, with an update period
     bool due = false;
+    Rng rng{0, 0, 0, 0};  // of the moment of the image
   };
   bool wants(std::string_view type) const;
   void declare_fields(int num_worlds);
+  void render_due(const CastContext& context);
+  void add_noise(const CastContext& context);
   bool is_due(const World& world, std::int64_t& image) const;
   ImageTargets targets(int world);
   const View& build_view(const RayScene& rays, int world, ViewBuilder& builder) const;
@@ -54,6 +58,7 @@ class CameraSensor final : public Sensor {
   std::vector<PerWorld> worlds_;
   std::vector<float> bent_;
   std::vector<int> due_;
+  std::vector<std::vector<float>> clean_;  // true depth of one image, by thread; with noise only
   std::unique_ptr<Look> look_;
   std::unique_ptr<GlRenderer> gl_;  // renderer "opengl"
   std::unique_ptr<Workspace> workspace_;

@@ -287,6 +287,36 @@ TEST(Camera, NoAllocationPerFrame) {
   EXPECT_EQ(before.since(), 0);
 }
 
+TEST(Camera, StereoNoiseGrowsWithTheSquareOfDepth) {
+  double spread[2];
+  for (int i = 0; i < 2; ++i) {
+    const double z = i == 0 ? 1.0 : 2.0;
+    CameraSensorCfg cfg = camera(64, 64, {"depth"});
+    cfg.pos = {0, 0, z};
+    cfg.fovy = 60;
+    cfg.depth_noise = "d435";
+    Lab lab(R"(<worldbody><geom type="plane" size="9 9 1"/></worldbody>)", {cfg});
+    const auto depth = lab.read<float>("depth");
+    double sum = 0, square = 0;
+    for (float d : depth) {
+      sum += d - z;
+      square += (d - z) * (d - z);
+    }
+    EXPECT_NEAR(sum / 4096, 0, 0.002 * z * z);
+    spread[i] = std::sqrt(square / 4096);
+    // f = 848 / (2 tan 30), b = 0.05, 0.08 pixels and rounding to 1/32 of one.
+    const double f = 848 / (2 * std::tan(M_PI / 6)),
+                 sigma = std::hypot(0.08, 1 / 32.0 / std::sqrt(12.0));
+    EXPECT_NEAR(spread[i], z * z * sigma / (f * 0.05), 0.05 * spread[i]);
+    // The same moment gives the same noise, another moment other noise.
+    lab.sim->invalidate();
+    EXPECT_EQ(depth, lab.read<float>("depth"));
+    lab.sim->step();
+    EXPECT_NE(depth, lab.read<float>("depth"));
+  }
+  EXPECT_NEAR(spread[1] / spread[0], 4, 0.2);
+}
+
 TEST(Camera, FaultsAreNamed) {
   const auto message = [](auto&& make) -> std::string {
     try {

@@ -1,0 +1,32 @@
+#pragma once
+// What a stereo depth camera makes of true depth. With focal length f (native pixels) and baseline b:
+//   disparity  d = f b / z + noise, rounded to 1/32 pixel;  measured z = f b / d, so its spread grows with z^2
+//   lost       nearer than the camera can match, farther than it is sold for, at jumps in depth, on surfaces seen edge-on
+// A lost pixel reads 0.
+
+#include <span>
+#include <string_view>
+
+#include "mjsense/core/rng.h"
+
+namespace mjsense {
+
+struct StereoCamera {
+  double baseline;           // m
+  double native_width;       // pixels that disparities are measured in
+  double sigma;              // of a disparity, native pixels
+  double nearest, farthest;  // m
+  double edge_loss;          // probability, next to a jump in depth
+  double
+      grazing_loss;  // probability, where depth changes by more than its pixel's width times `grazing_slope`
+  double grazing_slope;
+};
+
+// "d405" or "d435".
+StereoCamera stereo_preset(std::string_view name);
+
+// depth [height, width] planar m, in place; fx in image pixels; scratch as long as depth.
+void add_stereo_noise(const StereoCamera& camera, std::span<float> depth, int width, double fx,
+                      Rng rng, std::span<float> scratch);
+
+}  // namespace mjsense
