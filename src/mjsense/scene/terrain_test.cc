@@ -119,6 +119,11 @@ TEST(Terrain, SteppingStonesHaveGaps) {
   }
   EXPECT_NEAR(low / double(low + high), 1.0 / 6, .06);  // the gaps
   EXPECT_NEAR(g.height(-4, 0), 0, 1e-9);
+  // No gap is wider than it should be, around the platform neither.
+  for (double widest = 0, x = -3.8; x < 3.8; x += .01) {
+    widest = g.height(-4 + x, .21) < -.5 ? widest + .01 : 0;
+    EXPECT_LT(widest, .12) << x;
+  }
   EXPECT_TRUE(std::isnan(g.height(20, 20)));
 }
 

@@ -149,20 +149,31 @@ double stairs(const SubTerrainCfg& cfg, Tile& tile) {
 
 double stepping_stones(const SubTerrainCfg& cfg, Tile& tile) {
   const double stone = at(cfg.stone_width, tile.difficulty), gap = at(cfg.gap, tile.difficulty);
-  const double uneven = at(cfg.stone_height, tile.difficulty), pitch = stone + gap;
-  const double bottom = -cfg.pit_depth;
+  const double uneven = at(cfg.stone_height, tile.difficulty), bottom = -cfg.pit_depth;
+  // Along each axis n stones, at least as wide as asked for, share out the tile; the platform takes
+  // the place of m of them. So every gap is the same, around the platform and at the edges (half)
+  // too.
+  struct Row {
+    int n, m;
+    double pitch;
+    double at(int i) const { return (i - (n - 1) / 2.0) * pitch; }
+    bool in_platform(int i) const { return std::abs(2 * i - (n - 1)) < m; }
+  };
+  const auto share = [&](double size) {
+    const int n = std::max(1, static_cast<int>(size / (stone + gap)));
+    const double pitch = size / n;
+    const int m = static_cast<int>(std::ceil((cfg.platform_width + gap) / pitch));
+    return Row{n, std::min(n, m + ((n - m) & 1)), pitch};
+  };
+  const Row x = share(tile.size[0]), y = share(tile.size[1]);
   Boxes boxes(tile);
   boxes.add(0, 0, tile.size[0], tile.size[1], bottom - kThickness, bottom);
-  boxes.add(0, 0, cfg.platform_width, cfg.platform_width, bottom, 0);
-  const int nx = static_cast<int>((tile.size[0] + gap) / pitch),
-            ny = static_cast<int>((tile.size[1] + gap) / pitch);
-  const double clear = cfg.platform_width / 2 + gap / 2 + stone / 2;
-  for (int j = 0; j < ny; ++j) {
-    for (int i = 0; i < nx; ++i) {
-      const double x = (i - (nx - 1) / 2.0) * pitch, y = (j - (ny - 1) / 2.0) * pitch;
+  boxes.add(0, 0, x.m * x.pitch - gap, y.m * y.pitch - gap, bottom, 0);
+  for (int j = 0; j < y.n; ++j) {
+    for (int i = 0; i < x.n; ++i) {
       const double top = tile.rng.uniform(-uneven, uneven);
-      if (std::abs(x) < clear && std::abs(y) < clear) continue;
-      boxes.add(x, y, stone, stone, bottom, top);
+      if (x.in_platform(i) && y.in_platform(j)) continue;
+      boxes.add(x.at(i), y.at(j), x.pitch - gap, y.pitch - gap, bottom, top);
     }
   }
   return 0;
