@@ -9,6 +9,7 @@ from types import SimpleNamespace
 from typing import Any
 
 from mjsense import _core
+from mjsense.assets import use_installed_meshes
 from mjsense.sensor import Sensor
 from mjsense.simulation import Simulation
 
@@ -119,6 +120,7 @@ def record(
         if sensor._row_spec() is None:
             raise ValueError(f"sensor '{sensor.uuid}' cannot be recorded: give it an observation_space, or is_dict = True")
     report = None if progress is None else lambda p: progress(RecordProgress(**p))
+    use_installed_meshes()
     made = _core.record(config, str(out), report, own, Simulation._of)
     made["path"] = Path(made["path"])
     return RecordSummary(**made)

@@ -12,6 +12,7 @@ from gymnasium.vector import AutoresetMode, VectorEnv
 from gymnasium.vector.utils import batch_space
 
 from mjsense import _core
+from mjsense.assets import use_installed_meshes
 from mjsense.sensor import _box
 from mjsense.simulation import Simulation
 
@@ -47,6 +48,7 @@ class TaskVectorEnv(VectorEnv):
 
     def _build(self, seed: int) -> None:
         self._config.seed = seed
+        use_installed_meshes()
         self._rollout = _core.Rollout(self._config)
         streams = {spec.name: (spec, array) for spec, array in self._rollout.streams()}
         names = self._wanted

@@ -1,0 +1,32 @@
+import importlib
+import os
+
+import pytest
+
+from mjsense import assets
+
+
+@pytest.fixture
+def package(tmp_path, monkeypatch):
+    """A gymnasium_robotics that holds a mesh and must not be imported."""
+    folder = tmp_path / "gymnasium_robotics/envs/assets/kitchen_franka/franka_assets/meshes/visual"
+    folder.mkdir(parents=True)
+    (folder / "link0.stl").touch()
+    (tmp_path / "gymnasium_robotics/__init__.py").write_text("raise ImportError")
+    monkeypatch.syspath_prepend(tmp_path)
+    importlib.invalidate_caches()
+    return folder
+
+
+def test_meshes_are_found_without_import(package):
+    assert assets.franka_meshes() == package
+
+
+def test_the_users_choice_has_priority(package, monkeypatch):
+    monkeypatch.setenv("MJSENSE_FRANKA_MESHES", "")
+    assets.use_installed_meshes()
+    assert os.environ["MJSENSE_FRANKA_MESHES"] == ""
+    monkeypatch.delenv("MJSENSE_FRANKA_MESHES")
+    assets.use_installed_meshes()
+    assert os.environ["MJSENSE_FRANKA_MESHES"] == str(package)
+    monkeypatch.delenv("MJSENSE_FRANKA_MESHES")
