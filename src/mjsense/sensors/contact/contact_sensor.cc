@@ -415,23 +415,27 @@ void ContactSensor::write_slot(int w, int slot, int found, const ContactReading&
 // Moves every slot's history on by one substep. A slot that has been empty for H substeps is all zero
 // and left alone; neighbours that are not move together.
 void ContactSensor::write_history(int w) {
-  const int K = cfg_.num_slots, N = reducer_.num_primaries() * K;
-  std::uint16_t* left = history_left_.data() + static_cast<std::size_t>(w) * N;
-  const auto is_live = [&](int n) {
-    const int count = reducer_.count(w, n / K);
-    if (n % K < (reducer_.is_net() ? std::min(count, 1) : count)) {
-      left[n] = static_cast<std::uint16_t>(cfg_.history_length);
-      return true;
+  const int K = cfg_.num_slots, P = reducer_.num_primaries();
+  std::uint16_t* left = history_left_.data() + static_cast<std::size_t>(w) * P * K;
+  int begin = -1;  // of the run of slots to move, -1: none
+  for (int p = 0, n = 0; p < P; ++p) {
+    const int count = reducer_.count(w, p);
+    const int filled = reducer_.is_net() ? std::min(count, 1) : count;
+    for (int k = 0; k < K; ++k, ++n) {
+      const bool live = k < filled || left[n] > 0;
+      if (k < filled) {
+        left[n] = static_cast<std::uint16_t>(cfg_.history_length);
+      } else if (live) {
+        --left[n];
+      }
+      if (live && begin < 0) begin = n;
+      if (!live && begin >= 0) {
+        shift_history(w, begin, n);
+        begin = -1;
+      }
     }
-    return left[n] > 0 && (--left[n], true);
-  };
-  for (int begin = 0; begin < N; ++begin) {
-    if (!is_live(begin)) continue;
-    int end = begin + 1;
-    while (end < N && is_live(end)) ++end;
-    shift_history(w, begin, end);
-    begin = end;  // which is not live
   }
+  if (begin >= 0) shift_history(w, begin, P * K);
 }
 
 // One move for all slots [begin, end): what it carries over a slot's border is then overwritten.
