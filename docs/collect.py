@@ -6,6 +6,7 @@ from mkdocs.structure.files import File
 
 SOURCE = pathlib.Path(__file__).parent.parent / "src" / "mjsense"
 ROOMS = ("sensors", "robots", "tasks", "policies")
+ALONE = ("effects",)  # rooms with one page
 
 
 def on_files(files, config):
@@ -17,4 +18,6 @@ def on_files(files, config):
                 files.append(File.generated(config, f"{room}/{picture.name}", content=picture.read_bytes()))
         index = f"# {room.capitalize()}\n\n" + "".join(f"- [{p.parent.name}]({p.parent.name}.md)\n" for p in pages)
         files.append(File.generated(config, f"{room}/index.md", content=index))
+    for room in ALONE:
+        files.append(File.generated(config, f"{room}.md", content=(SOURCE / room / "page.md").read_text()))
     return files
