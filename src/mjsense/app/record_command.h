@@ -17,7 +17,7 @@ struct RecordOptions {
 };
 
 // The names of options in a configuration file: those of the command line, with '-' as '_'.
-// Reads TOML into `options`; throws ValueError "x.toml:3: unknown key 'episods'; did you mean
+// Reads TOML into `options`; throws ValueError "x.toml:3: no key named 'episods'; did you mean
 // 'episodes'?".
 void read_config(const std::string& path, RecordOptions& options);
 

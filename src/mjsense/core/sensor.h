@@ -3,13 +3,12 @@
 // preallocated rows [B, ...] and fills row w from world w. Scene sensors, observation sensors and
 // users' own are this class and have this life:
 //
-//   edit_spec(spec)       before compilation: add the MuJoCo elements it needs
-//   initialize(init)      after compilation: resolve names to ids, declare fields; from here on no
-//   allocation substep(world)        after each physics step, if wants_substep(): air time, history
-//   compute(world)        fill row w; a pure function of (model, data, the sensor's own state, its
-//   RNG key) cast(context)         stages kCast and kBatch: the work that is done for many worlds
-//   at once reset(world)          forget the episode of this world; compute() follows before
-//   anybody reads
+//   edit_spec(spec)   before compilation: add the MuJoCo elements it needs
+//   initialize(init)  after compilation: resolve names to ids, declare fields; no allocation later
+//   substep(world)    after each physics step, if wants_substep(): air time, history
+//   compute(world)    fill row w; a pure function of (model, data, its own state, its RNG key)
+//   cast(context)     stages kCast and kBatch: the work that is done for many worlds at once
+//   reset(world)      forget the episode of this world; compute() follows before anybody reads
 
 #include <mujoco/mujoco.h>
 

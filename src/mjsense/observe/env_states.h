@@ -11,15 +11,14 @@
 namespace mjsense {
 
 // Streams
-//   env_states/actors/<name>          float32 [13]  position 3 (m), quaternion 4 (wxyz), velocity
-//   6: linear (m/s, world axes),
-//                                     angular (rad/s, body axes) - MuJoCo's qpos and qvel of the
-//                                     free joint, so that writing them back restores the body. One
-//                                     for each free body outside `robot`.
-//   env_states/articulations/<robot>  float32 [N]   qpos of all groups in order, then qvel of all
-//   groups; padded with 0
-// An actor is called as its body, without the entity's prefix ("mug" for "mug/mug") where that is unique, else with '_' for
-// '/' (a file's '/' would make a folder of it).
+//   env_states/actors/<name>          float32 [13]: position 3 (m), quaternion 4 (wxyz), velocity 6
+//                                     (m/s in world axes, rad/s in body axes): MuJoCo's qpos and
+//                                     qvel of the free joint, which written back restore the body.
+//                                     One for each free body outside the robot.
+//   env_states/articulations/<robot>  float32 [N]: qpos of all groups in order, then their qvel,
+//                                     then zeros
+// An actor is called as its body, without the entity's prefix ("mug" for "mug/mug") where that is
+// unique, else with '_' for '/', which would make a folder of it in a file.
 class EnvStatesSensor final : public Sensor {
  public:
   // `length`: N, at least what the groups need (31 is the published width of the Franka: 9 + 9 and

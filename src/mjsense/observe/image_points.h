@@ -11,8 +11,9 @@
 namespace mjsense {
 
 // Streams, for each object and camera
-//   <name>/<object>/<camera>/points      float32 [10, 2]  (column / W, row / H), rounded to 4
-//   decimals; NaN where there is none <name>/<object>/<camera>/num_points  int32 [1]
+//   <name>/<object>/<camera>/points      float32 [10, 2]: (column / W, row / H), rounded to 4
+//                                        decimals; NaN where there is none
+//   <name>/<object>/<camera>/num_points  int32 [1]
 // The pixels of an object are those whose segment is a geom of its body or below, of a visible
 // group (< 3). They are eroded twice with the 3 x 3 cross (outside the picture counts as
 // background) so that points lie well inside; an object that vanishes under it keeps all its

@@ -10,19 +10,17 @@
 
 namespace mjsense {
 
-// Units: rad or m (joints), the actuators' own (grippers), m and wxyz (poses). All is_dict, keys
-// are move groups.
+// Units: rad or m (joints), the actuators' own (grippers), m and wxyz (poses). All are JSON, their
+// keys move groups. "Before" is the observation that the action answers.
 //
-//   actions/commanded_action  as the policy gave it, rounded to float32; {} first; keeps its last
-//   value at the terminal
-//                             observation. A policy's own verdict is "success":[0.0] or [1.0]
-//   actions/joint_pos         the controllers' targets, without action noise; first: what they hold
-//   actions/joint_pos_rel     these minus qpos of the observation before; groups that have not as
-//   many targets as joints are
-//                             left out; first: zeros for every group
-//   actions/ee_twist          log6(inv(X_BL of the observation before) * fk(targets)) = [linear 3
-//   (m), angular 3 (rad)], in the
-//                             axes of that leaf, per control step; first: zeros
+//   actions/commanded_action  as the policy gave it, rounded to float32; {} first; keeps its value
+//                             at the terminal observation. The policy's own verdict is
+//                             "success":[0.0] or [1.0]
+//   actions/joint_pos         the controllers' targets, without noise; first: what they hold
+//   actions/joint_pos_rel     these minus qpos before; groups that have not as many targets as
+//                             joints are left out; first: zeros for every group
+//   actions/ee_twist          log6(inv(X_BL before) * fk(targets)) = [linear 3 (m), angular 3
+//                             (rad)], in the axes of that leaf, per control step; first: zeros
 //   actions/ee_pose           fk(targets), X_BL of every group; a base gives the identity
 //
 // They refer to the task and the log, which live longer.

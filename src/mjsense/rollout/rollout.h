@@ -3,10 +3,10 @@
 // and benchmarks.
 //
 //   Rollout rollout(cfg);
-//   rollout.start(worlds, episodes);        observation 0 of these episodes is fresh
+//   rollout.start(worlds, episodes);   observation 0 of these episodes is fresh
 //   while (...) {
-//     rollout.act();                        the policy's actions; or write rollout.action(w)
-//     yourself rollout.step();                       apply -> controllers -> physics -> sensors
+//     rollout.act();                   the policy's actions; or write rollout.action(w) yourself
+//     rollout.step();                  apply -> controllers -> physics -> sensors -> judgement
 //     rollout.suite(), rollout.evaluation(w), rollout.fault(w)
 //   }
 //
@@ -37,8 +37,8 @@ struct RolloutCfg {
   int num_worlds = 1;
   int threads = 0;  // 0: the CPUs this process may use
   std::uint64_t seed = 0;
-  std::optional<std::vector<std::string>>
-      cameras;                       // of the robot's, in this order; unset: all, empty: none
+  // Of the robot's, in this order; unset: all, empty: none.
+  std::optional<std::vector<std::string>> cameras;
   std::optional<int> width, height;  // pixels; unset: the robot's
   bool depth = false;                // of every camera; else as the robot's mounts say
   int samples = 1;                   // rays per pixel of rgb
@@ -91,7 +91,7 @@ class Rollout {
 
   const Evaluation& evaluation(int world) const { return evaluations_[world]; }
   // Why this world's episode cannot go on: physics that diverged (MuJoCo's text), a row that does
-  // not fit. "" if it can. The world was reset; its rows mean nothing until it is started again.
+  // not fit. "" if it can. Its rows mean nothing until it is started again.
   const std::string& fault(int world) const { return faults_[world]; }
 
   const RolloutTimes& times() const { return times_; }
