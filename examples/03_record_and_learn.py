@@ -1,0 +1,29 @@
+"""Record picks of a planner, then meet the same task as a gymnasium environment."""
+
+import sys
+import tempfile
+
+import h5py
+
+import mjsense as mjs
+
+out = sys.argv[1] if len(sys.argv) > 1 else tempfile.mkdtemp()
+summary = mjs.record("pick", "franka", out=out, episodes=2, worlds=2, width=160, height=92)
+print(f"{summary.kept} episodes, {summary.frames} frames in {summary.seconds:.1f} s: {summary.path}")
+
+with h5py.File(next(summary.path.glob("*.h5"))) as file:
+    episode = file["traj_0"]
+    print("observed:", ", ".join(episode["obs/extra"]))
+    print("success at step", int(episode["success"][:].argmax()))
+
+env = mjs.make_vec("pick", num_envs=2, policy="planner", cameras=[], seed=7)
+observation, _ = env.reset()
+print("observation:", {name: rows.shape for name, rows in observation.items() if "/" not in name})
+picked = [False, False]
+for step in range(150):
+    observation, reward, terminated, truncated, info = env.step(env.expert_action())
+    picked = [a or bool(b) for a, b in zip(picked, info["success"])]
+    if all(picked):
+        break
+print("the planner picked", sum(picked), "of 2 objects in", step + 1, "steps")
+env.close()
