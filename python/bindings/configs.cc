@@ -13,6 +13,7 @@ std::span<const CfgKind> cfg_kinds() {
       camera_kind(),
       contact_kind(),
       effect_kind(),
+      imu_kind(),
       lidar_kind(),
       raycast_kind(),
       terrain_height_kind(),

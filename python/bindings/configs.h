@@ -40,6 +40,7 @@ CfgKind cfg_kind(const char* name) {
 CfgKind builtin_kind();
 CfgKind camera_kind();
 CfgKind contact_kind();
+CfgKind imu_kind();
 CfgKind lidar_kind();
 CfgKind effect_kind();
 CfgKind raycast_kind();

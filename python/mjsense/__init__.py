@@ -40,6 +40,7 @@ from mjsense.contact import ContactSensor
 from mjsense.data import CameraData, ContactData, RayCastData, SensorData
 from mjsense.effects import EffectSensorCfg
 from mjsense.errors import UnknownNameError
+from mjsense.imu import ImuAxis, ImuData, ImuModel, ImuSensor, ImuSensorCfg
 from mjsense.pipeline import ObservationPipeline
 from mjsense.raycast import CameraSensor, LidarSensor, RayCastSensor, TerrainHeightSensor
 from mjsense.record import RecordProgress, RecordSummary, record

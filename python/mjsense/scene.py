@@ -17,12 +17,14 @@ from mjsense import _core
 from mjsense.configs import SceneCfg, SensorCfg
 from mjsense.contact import ContactSensor
 from mjsense.errors import UnknownNameError
+from mjsense.imu import ImuSensor
 from mjsense.raycast import CameraSensor, LidarSensor, RayCastSensor, TerrainHeightSensor
 from mjsense.sensor import BuiltinSensor, NativeSensor, Sensor
 
 _CLASSES = {
     "builtin": BuiltinSensor,
     "contact": ContactSensor,
+    "imu": ImuSensor,
     "lidar": LidarSensor,
     "raycast": RayCastSensor,
     "terrain_height": TerrainHeightSensor,

@@ -15,6 +15,7 @@ CLASSES = {
     "terrain_height": mjs.TerrainHeightSensorCfg,
     "camera": mjs.CameraSensorCfg,
     "effect": mjs.EffectSensorCfg,
+    "imu": mjs.ImuSensorCfg,
     "options": mjs.MujocoCfg,
     "terrain": mjs.TerrainCfg,
     "sub_terrain": mjs.SubTerrainCfg,

@@ -53,8 +53,8 @@ Effects imu_effects(const ImuModel::Axis& axis) {
     m.angle_std = axis.cross_axis_tolerance / 3;
     effects.push_back(std::make_shared<Misalignment>(m));
   }
-  const double* tolerance = axis.bias_tolerance;
-  if (std::any_of(tolerance, tolerance + 3, [](double b) { return b > 0; })) {
+  const std::array<double, 3>& tolerance = axis.bias_tolerance;
+  if (std::ranges::any_of(tolerance, [](double b) { return b > 0; })) {
     effects.push_back(std::make_shared<EpisodeBias>(
         Draw::gaussian({tolerance[0] / 3, tolerance[1] / 3, tolerance[2] / 3})));
   }

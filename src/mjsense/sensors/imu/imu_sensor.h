@@ -1,6 +1,7 @@
 #pragma once
 // An inertial measurement unit at a site: accelerometer and gyroscope of one device, with its errors.
 
+#include <array>
 #include <memory>
 #include <string>
 #include <vector>
@@ -15,13 +16,13 @@ namespace mjsense {
 // devices, drawn anew for each episode; what a sheet does not give is 0.
 struct ImuModel {
   struct Axis {
-    double noise_density = 0.0;            // unit / sqrt(Hz)
-    double bias_tolerance[3] = {0, 0, 0};  // unit, x y z
-    double scale_tolerance = 0.0;          // 1
-    double cross_axis_tolerance = 0.0;     // 1
-    double range = 0.0;                    // unit, +-; 0: unlimited
-    double resolution = 0.0;               // unit, of one count; 0: continuous
-    double bias_drift = 0.0;               // unit, standard deviation of a Gauss-Markov bias
+    double noise_density = 0.0;              // unit / sqrt(Hz)
+    std::array<double, 3> bias_tolerance{};  // unit, x y z
+    double scale_tolerance = 0.0;            // 1
+    double cross_axis_tolerance = 0.0;       // 1
+    double range = 0.0;                      // unit, +-; 0: unlimited
+    double resolution = 0.0;                 // unit, of one count; 0: continuous
+    double bias_drift = 0.0;                 // unit, standard deviation of a Gauss-Markov bias
     double bias_drift_time_s = 0.0;
   };
   Axis accelerometer, gyroscope;  // m/s^2, rad/s
