@@ -1,3 +1,5 @@
+from pathlib import Path
+
 import mujoco
 import numpy as np
 import pytest
@@ -88,3 +90,63 @@ def test_model_copy_is_independent():
     scene = ball_scene()
     scene.model.opt.timestep = 1.0
     assert mjs.Simulation(scene).physics_dt == 0.002
+
+
+TWO_BALLS = """
+<mujoco>
+  <worldbody>
+    <body name="a"><freejoint/><geom size=".1"/></body>
+    <body name="b"><freejoint/><geom size=".1"/><site name="s"/></body>
+  </worldbody>
+  <sensor><gyro site="s"/></sensor>
+</mujoco>
+"""
+
+
+def test_base_is_a_whole_model_as_it_is(tmp_path):
+    path = tmp_path / "two.xml"
+    path.write_text(TWO_BALLS)
+    for base in (TWO_BALLS, path):
+        scene = mjs.Scene(mjs.SceneCfg(base=base, entities={"arm": mjs.EntityCfg(model=ARM)}))
+        assert list(scene.sensors) == ["sensor_0"]
+        assert list(scene.entities) == ["arm"]
+        assert scene.model.body("b").id == 2
+    with pytest.raises(ValueError, match="the whole model the scene's base"):
+        mjs.Scene(mjs.SceneCfg(entities={"two": mjs.EntityCfg(model=TWO_BALLS)}))
+
+
+def test_generated_terrain():
+    kinds = ("rough", "stairs")
+    terrain = mjs.TerrainCfg(
+        terrain_type="generator", levels=3, sub_terrains={kind: mjs.SubTerrainCfg(kind=kind) for kind in kinds}
+    )
+    scene = mjs.Scene(mjs.SceneCfg(terrain=terrain))
+    tiles, origins = scene.env_tiles(6), scene.tile_origins()
+    assert origins.shape == (3, 2, 3)
+    np.testing.assert_array_equal(tiles[:, 1], [0, 0, 0, 1, 1, 1])
+    np.testing.assert_array_equal(scene.env_origins(6), origins[tiles[:, 0], tiles[:, 1]])
+    assert mjs.Scene(mjs.SceneCfg()).env_tiles(2) is None
+
+
+TOUCH_GRID = """
+<mujoco>
+  <extension><plugin plugin="mujoco.sensor.touch_grid"><instance name="grid">
+    <config key="nchannel" value="1"/><config key="size" value="3 2"/><config key="fov" value="30 20"/>
+    <config key="gamma" value="0"/></instance></plugin></extension>
+  <worldbody><body name="b"><freejoint/><geom size=".1"/><site name="s"/></body></worldbody>
+  <sensor><plugin name="xml" instance="grid" objtype="site" objname="s"/></sensor>
+</mujoco>
+"""
+
+
+def test_plugin_sensor():
+    library = Path(mujoco.__file__).parent / "plugin" / "libsensor.so"
+    if not library.exists():
+        pytest.skip("this MuJoCo comes without its sensor plugins")
+    mujoco.mj_loadPluginLibrary(str(library))
+    sensor = mjs.BuiltinSensorCfg(
+        name="touch", sensor_type="plugin", obj=mjs.ObjRef("site", "s", "pad"), instance="pad/grid"
+    )
+    scene = mjs.Scene(mjs.SceneCfg(entities={"pad": mjs.EntityCfg(model=TOUCH_GRID)}, sensors=[sensor]))
+    mjs.Simulation(scene, num_worlds=2)
+    assert scene["pad/xml"].data.shape == scene["pad/touch"].data.shape == (2, 6)

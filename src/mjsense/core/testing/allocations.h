@@ -28,6 +28,10 @@ class AllocationCount {
   if (void* p = std::malloc(size ? size : 1)) return p;
   throw std::bad_alloc();
 }
+[[gnu::weak]] void* operator new(std::size_t size, const std::nothrow_t&) noexcept {
+  ++mjsense::allocations_so_far;
+  return std::malloc(size ? size : 1);
+}
 [[gnu::weak]] void* operator new(std::size_t size, std::align_val_t align) {
   ++mjsense::allocations_so_far;
   const auto a = static_cast<std::size_t>(align);

@@ -204,7 +204,11 @@ void BuiltinSensor::edit_spec(mjSpec* spec) {
         if (mjs_activatePlugin(spec, cfg_->plugin.c_str()) != 0) {
           throw ValueError(fmt::format("{}: MuJoCo has no plugin '{}'", place, cfg_->plugin));
         }
+        mjsPlugin* plugin = mjs_addPlugin(spec);
+        mjs_setString(plugin->plugin_name, cfg_->plugin.c_str());
+        mjs_setName(plugin->element, name().c_str());
         mjs_setString(sensor->plugin.plugin_name, cfg_->plugin.c_str());
+        mjs_setString(sensor->plugin.name, name().c_str());
       } else {
         find_in_spec(spec, mjOBJ_PLUGIN, cfg_->instance, place);
         mjs_setString(sensor->plugin.name, cfg_->instance.c_str());
