@@ -5,7 +5,7 @@ import subprocess
 import sys
 
 HERE = pathlib.Path(__file__).parent
-SHARED = {"run", "harness"}
+SHARED = {"run", "harness", "camera_scenes", "pictures"}  # not benchmarks
 
 
 def main() -> int:

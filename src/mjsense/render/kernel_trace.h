@@ -11,14 +11,11 @@ inline bool overlap(const float* a, const float* b) {
   return a[0] <= b[1] && b[0] <= a[1] && a[2] <= b[3] && b[2] <= a[3];
 }
 
-inline float highest(const float* values) {
-  Float m = load(values);
-  for (int k = kWidth; k < kLanes; k += kWidth) m = max(m, load(values + k));
-  alignas(64) float lane[kWidth];
-  store(lane, m);
-  float best = lane[0];
-  for (int i = 1; i < kWidth; ++i) best = lane[i] > best ? lane[i] : best;
-  return best;
+// Is any of the packet's hits beyond `depth`?
+inline bool any_beyond(const float* t, float depth) {
+  for (int k = 0; k < kLanes; k += kWidth)
+    if (any(splat(depth) < load(t + k))) return true;
+  return false;
 }
 
 // Surfaces nearer to each other than this (times t) coincide: the geom with the higher id shows, as
@@ -177,13 +174,10 @@ inline void clear(Hits& hits, float far) {
 // The nearest opaque geoms among `list`, which is sorted by ViewGeom::nearest.
 inline void trace_packet(const View& view, const int* list, int count, const Pixels& pixels,
                          Hits& hits) {
-  float farthest = highest(hits.t);
   for (int i = 0; i < count; ++i) {
     const ViewGeom& g = view.geoms[list[i]];
-    if (g.nearest >= farthest) break;
-    if (!overlap(g.window, pixels.window)) continue;
-    trace_geom(view, list[i], pixels, hits);
-    farthest = highest(hits.t);
+    if (!any_beyond(hits.t, g.nearest)) break;
+    if (overlap(g.window, pixels.window)) trace_geom(view, list[i], pixels, hits);
   }
 }
 
