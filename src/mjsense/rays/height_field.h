@@ -1,7 +1,7 @@
 #pragma once
 // A packet against a height field in its own frame, for kernels_impl.h. The surface z = h(x, y) is
 // two triangles a cell, split along (row, col) - (row + 1, col + 1); below it stands a base box of
-// its own. Each lane walks the cells under its ray and looks for a change of sign of z - h:
+// its own. Each lane walks the cells under its ray, leaps over blocks that it passes above, and looks for a change of sign of z - h:
 // neighbouring cells share their borders' values, so no ray slips through a seam.
 
 #include <mujoco/mujoco.h>
@@ -51,70 +51,146 @@ struct Cell {
   }
 };
 
+// A ray over the grid, in grid coordinates (columns, rows) and local heights; t counts from `start`.
+struct GridRay {
+  Float x, y, z;     // at t = 0
+  Float dx, dy, dz;  // per metre
+  Float length;      // m
+  Mask right, up, still_x, still_y;
+  Float inv_x, inv_y;
+
+  GridRay(const HeightField& field, Vec3f o, Vec3f d, Float start, Float stop) {
+    const float per_x = (field.cols - 1) / (2 * field.size[0]);
+    const float per_y = (field.rows - 1) / (2 * field.size[1]);
+    const Vec3f p = along(o, start, d);
+    x = (p.x + field.size[0]) * per_x;
+    y = (p.y + field.size[1]) * per_y;
+    z = p.z;
+    dx = d.x * per_x;
+    dy = d.y * per_y;
+    dz = d.z;
+    length = stop - start;
+    right = dx > Float(0.0f);
+    up = dy > Float(0.0f);
+    still_x = abs(dx) < Float(1e-20f);
+    still_y = abs(dy) < Float(1e-20f);
+    inv_x = Float(1.0f) / dx;
+    inv_y = Float(1.0f) / dy;
+  }
+  Float x_at(Float t) const { return fma(t, dx, x); }
+  Float y_at(Float t) const { return fma(t, dy, y); }
+  Float z_at(Float t) const { return fma(t, dz, z); }
+  // When it crosses the line at this column or row.
+  Float reaches_x(Float column) const { return select(still_x, kNoHit, (column - x) * inv_x); }
+  Float reaches_y(Float row) const { return select(still_y, kNoHit, (row - y) * inv_y); }
+};
+
+// Where each lane is: its cell, and when it came there.
+struct Walk {
+  Float cx, cy, t;
+  Mask active;
+  Mask fresh;  // came by a leap: the height above the surface at t is not known
+
+  void stay_inside(const HeightField& field) {
+    const Float last_x = static_cast<float>(field.cols - 2),
+                last_y = static_cast<float>(field.rows - 2);
+    active = active & (cx >= Float(0.0f)) & (cy >= Float(0.0f)) & (cx <= last_x) & (cy <= last_y);
+    cx = min(max(cx, 0.0f), last_x);  // lanes that are done must not read outside
+    cy = min(max(cy, 0.0f), last_y);
+  }
+
+  // Lanes that pass above all of their block leap to its border. Returns them.
+  Mask leap(const HeightField& field, const GridRay& ray) {
+    constexpr float kBlock = HeightField::kBlock;
+    const Float bx = floor(cx * (1 / kBlock)), by = floor(cy * (1 / kBlock));
+    const Float top =
+        gather(field.block_tops, truncate(by) * int_of(field.block_cols) + truncate(bx));
+    const Float low_x = bx * kBlock, low_y = by * kBlock;
+    const Float edge_x = low_x + select(ray.right, kBlock, 0.0f);
+    const Float edge_y = low_y + select(ray.up, kBlock, 0.0f);
+    const Float out_x = ray.reaches_x(edge_x), out_y = ray.reaches_y(edge_y);
+    const Float out = max(t, min(ray.length, min(out_x, out_y)));
+    const Mask above = active & (min(ray.z_at(t), ray.z_at(out)) > top);
+    if (!any(above)) return above;
+    const Mask sideways = out_x <= out_y;
+    const Float within_x = min(max(floor(ray.x_at(out)), low_x), low_x + (kBlock - 1));
+    const Float within_y = min(max(floor(ray.y_at(out)), low_y), low_y + (kBlock - 1));
+    const Float next_x = select(sideways, select(ray.right, edge_x, edge_x - 1.0f), within_x);
+    const Float next_y = select(sideways, within_y, select(ray.up, edge_y, edge_y - 1.0f));
+    cx = select(above, next_x, cx);
+    cy = select(above, next_y, cy);
+    t = select(above, out, t);
+    fresh = fresh | above;
+    active = active & ~(above & (out >= ray.length));
+    stay_inside(field);
+    return above;
+  }
+};
+
 // The surface between `start` and `stop` on each active lane.
 inline void march(const HeightField& field, Vec3f o, Vec3f d, Float start, Float stop, Mask active,
                   bool cull, FieldHit& hit) {
-  const float per_x = (field.cols - 1) / (2 * field.size[0]),
-              per_y = (field.rows - 1) / (2 * field.size[1]);
-  const Vec3f p = along(o, start, d);
-  const Float gx = (p.x + field.size[0]) * per_x, gy = (p.y + field.size[1]) * per_y;
-  const Float sx = d.x * per_x, sy = d.y * per_y;
-  const Float length = stop - start;
-  const Mask right = sx > Float(0.0f), up = sy > Float(0.0f);
-  const Float step_x = select(right, 1.0f, -1.0f), step_y = select(up, 1.0f, -1.0f);
-  const Float last_x = static_cast<float>(field.cols - 2),
-              last_y = static_cast<float>(field.rows - 2);
-  const Mask still_x = abs(sx) < Float(1e-20f), still_y = abs(sy) < Float(1e-20f),
-             still_d = abs(sy - sx) < Float(1e-20f);
-  const Float inv_x = Float(1.0f) / sx, inv_y = Float(1.0f) / sy, inv_d = Float(1.0f) / (sy - sx);
-
-  Float cx = min(max(floor(gx), 0.0f), last_x), cy = min(max(floor(gy), 0.0f), last_y);
-  Float ta = 0.0f;
-  Float fa = 0.0f, side = 0.0f;  // z - h at ta; the sign it had at the start
-  bool fresh = true;
-  while (any(active)) {
-    const Int ix = truncate(cx), iy = truncate(cy);
+  const GridRay ray(field, o, d, start, stop);
+  const float per_x = (field.cols - 1) / (2 * field.size[0]);
+  const float per_y = (field.rows - 1) / (2 * field.size[1]);
+  const Float diagonal = ray.dy - ray.dx, inv_diagonal = Float(1.0f) / diagonal;
+  const Mask still_diagonal = abs(diagonal) < Float(1e-20f);
+  Walk walk{floor(ray.x), floor(ray.y), 0.0f, active, mask_of(kAllLanes)};
+  walk.cx = min(max(walk.cx, 0.0f), static_cast<float>(field.cols - 2));
+  walk.cy = min(max(walk.cy, 0.0f), static_cast<float>(field.rows - 2));
+  // Leaps pay where rays cross many cells.
+  const bool far =
+      any(active & (ray.length * (abs(ray.dx) + abs(ray.dy)) > Float(HeightField::kBlock)));
+  Float fa = 0.0f, side = 0.0f;  // height above the surface at walk.t; its sign so far
+  while (any(walk.active)) {
+    const Mask leapt = far ? walk.leap(field, ray) : mask_of(0);
+    const Mask here = walk.active & ~leapt;
+    if (!any(here)) continue;
+    const Int ix = truncate(walk.cx), iy = truncate(walk.cy);
     const Cell cell(field, ix, iy);
-    if (fresh) {
-      fa = p.z - cell.height(gx, gy);
-      side = select(fa < Float(0.0f), -1.0f, 1.0f);
-      fresh = false;
+    const Float ta = walk.t;
+    const Mask fresh = walk.fresh & here;
+    if (any(fresh)) {
+      const Float f = ray.z_at(ta) - cell.height(ray.x_at(ta), ray.y_at(ta));
+      fa = select(fresh, f, fa);
+      side = select(fresh, select(f < Float(0.0f), -1.0f, 1.0f), side);
+      walk.fresh = walk.fresh & ~fresh;
     }
-    const Float next_x = select(still_x, kNoHit, (cx + select(right, 1.0f, 0.0f) - gx) * inv_x);
-    const Float next_y = select(still_y, kNoHit, (cy + select(up, 1.0f, 0.0f) - gy) * inv_y);
-    const Float tb = max(ta, min(length, min(next_x, next_y)));
+    const Float next_x = ray.reaches_x(walk.cx + select(ray.right, 1.0f, 0.0f));
+    const Float next_y = ray.reaches_y(walk.cy + select(ray.up, 1.0f, 0.0f));
+    const Float tb = max(ta, min(ray.length, min(next_x, next_y)));
     // The ray may change triangles inside the cell, where x - x0 = y - y0.
-    const Float td = ((gx - cx) - (gy - cy)) * inv_d;
-    const Float tm = select(still_d | ~(td > ta) | ~(td < tb), tb, td);
+    const Float td = ((ray.x - walk.cx) - (ray.y - walk.cy)) * inv_diagonal;
+    const Float tm = select(still_diagonal | ~(td > ta) | ~(td < tb), tb, td);
+    Mask open = here;
     for (int part = 0; part < 2; ++part) {
       const Float t0 = part == 0 ? ta : tm, t1 = part == 0 ? tm : tb;
-      const Float fb = fma(t1, d.z, p.z) - cell.height(fma(t1, sx, gx), fma(t1, sy, gy));
+      const Float fb = ray.z_at(t1) - cell.height(ray.x_at(t1), ray.y_at(t1));
       const Mask crossing =
-          active & (fb * side <= Float(0.0f)) & (part == 0 ? mask_of(kAllLanes) : tm < tb);
+          open & (fb * side <= Float(0.0f)) & (part == 0 ? mask_of(kAllLanes) : tm < tb);
       if (any(crossing)) {
         const Float drop = fa - fb;
         const Float t = t0 + (t1 - t0) * select(abs(drop) > Float(1e-30f), fa / drop, 0.0f);
         const Float middle = (t0 + t1) * 0.5f;
-        const Mask first = fma(middle, sy, gy) - cy <= fma(middle, sx, gx) - cx;
+        const Mask first = ray.y_at(middle) - walk.cy <= ray.x_at(middle) - walk.cx;
         const Vec3f n = Sphere::normal(
             nullptr, {-cell.slope_x(first) * per_x, -cell.slope_y(first) * per_y, 1.0f});
         const Int prim =
             (iy * int_of(field.cols - 1) + ix) * int_of(2) + select(first, int_of(0), int_of(1));
         const Mask seen = cull ? crossing & (side > Float(0.0f)) : crossing;
         take(hit, seen, start + t, prim, n);
-        active = active & ~seen;
+        open = open & ~seen;
+        walk.active = walk.active & ~seen;
         side = select(crossing, -side, side);
       }
-      fa = fb;
+      fa = select(here, fb, fa);
     }
-    const Mask step_in_x = next_x <= next_y;
-    cx = select(step_in_x, cx + step_x, cx);
-    cy = select(step_in_x, cy, cy + step_y);
-    active = active & (tb < length) & (cx >= Float(0.0f)) & (cy >= Float(0.0f)) & (cx <= last_x) &
-             (cy <= last_y);
-    cx = min(max(cx, 0.0f), last_x);  // lanes that are done must not read outside
-    cy = min(max(cy, 0.0f), last_y);
-    ta = tb;
+    const Mask sideways = next_x <= next_y;
+    walk.cx = select(here & sideways, walk.cx + select(ray.right, 1.0f, -1.0f), walk.cx);
+    walk.cy = select(here & ~sideways, walk.cy + select(ray.up, 1.0f, -1.0f), walk.cy);
+    walk.active = walk.active & (leapt | (tb < ray.length));
+    walk.stay_inside(field);
+    walk.t = select(here, tb, walk.t);
   }
 }
 

@@ -14,10 +14,14 @@ struct RayGeom;
 struct RayCandidate;
 
 struct HeightField {
-  const float* data;  // [rows, cols] 0..1
+  static constexpr int kBlock = 8;  // cells along a block's side
+  const float* data;                // [rows, cols] 0..1
   int rows, cols;
   float size[4];  // m: half x, half y, height of 1, thickness of the base
   void* scene;    // RTCScene of its surface (z up): face 2 * cell + triangle; null without cameras
+  const float*
+      block_tops;  // [ceil((rows - 1) / kBlock), block_cols] m, highest point of each block
+  int block_cols;
 };
 
 struct KernelScene {

@@ -223,6 +223,34 @@ TEST_P(Kernels, PreciseFarFromTheWorldsOrigin) {
   }
 }
 
+TEST_P(Kernels, GrazingRaysOverWideTerrain) {
+  Rng rng(8, 0, 0, 0);
+  std::string hills;
+  for (int r = 0; r < 45; ++r) {
+    for (int c = 0; c < 70; ++c)
+      hills += testing::vec(
+          {0.3 + 0.2 * std::sin(0.3 * r) * std::cos(0.2 * c) + (rng.below(40) == 0 ? 0.4 : 0.0)});
+  }
+  const TestModel m(
+      "<mujoco><asset><hfield name='hills' nrow='45' ncol='70' size='14 9 2 .1' elevation='" +
+      hills +
+      "'/></asset><worldbody><geom type='hfield' hfield='hills' euler='3 -4 "
+      "30'/></worldbody></mujoco>");
+  RayScene scene(m.model, 1, isa());
+  scene.update(m.world());
+  int wrong = 0, hits = 0;
+  for (int i = 0; i < 1500; ++i) {
+    double o[3] = {rng.uniform(-16, 16), rng.uniform(-12, 12), rng.uniform(0, 2.5)};
+    double d[3] = {rng.normal(), rng.normal(), rng.uniform(-0.3, 0.15)};
+    mju_normalize3(d);
+    const Hit hit = scene.trace(0, {}, o, d);
+    hits += hit.geom >= 0;
+    wrong += !agree(m, o, d, hit);
+  }
+  EXPECT_EQ(wrong, 0);
+  EXPECT_GT(hits, 500);
+}
+
 constexpr char kLayers[] = R"(
 <mujoco><asset><mesh name="cube" vertex="-1 -1 -1 1 -1 -1 1 1 -1 -1 1 -1 -1 -1 1 1 -1 1 1 1 1 -1 1 1"/>
   <material name="clear" rgba="1 1 1 0"/></asset><worldbody>

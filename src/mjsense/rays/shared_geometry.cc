@@ -45,6 +45,27 @@ SceneHandle build_surface(RTCDevice device, const HeightField& field) {
                          static_cast<int>(faces.size() / 3));
 }
 
+int blocks(int points) { return (points - 2) / HeightField::kBlock + 1; }
+
+std::vector<float> highest_points(const HeightField& field) {
+  std::vector<float> tops;
+  for (int by = 0; by < blocks(field.rows); ++by) {
+    for (int bx = 0; bx < blocks(field.cols); ++bx) {
+      // A block's cells have points on its far border too.
+      float top = 0.0f;
+      for (int r = by * HeightField::kBlock;
+           r <= std::min((by + 1) * HeightField::kBlock, field.rows - 1); ++r) {
+        const float* row = field.data + r * field.cols;
+        for (int c = bx * HeightField::kBlock;
+             c <= std::min((bx + 1) * HeightField::kBlock, field.cols - 1); ++c)
+          top = std::max(top, row[c]);
+      }
+      tops.push_back(top * field.size[2]);
+    }
+  }
+  return tops;
+}
+
 }  // namespace
 
 SceneHandle build_triangles(RTCDevice device, const float* vertices, int num_vertices,
@@ -99,6 +120,9 @@ SharedGeometry::SharedGeometry(const mjModel* m) {
       surfaces.push_back(build_surface(device.get(), field));
       field.scene = surfaces.back().get();
     }
+    block_tops.push_back(highest_points(field));
+    field.block_tops = block_tops.back().data();
+    field.block_cols = blocks(field.cols);
     height_fields.push_back(field);
     const float* s = field.size;
     bounds.height_fields.push_back({0, 0, 0.5f * (s[2] - s[3]), s[0], s[1], 0.5f * (s[2] + s[3])});

@@ -25,10 +25,11 @@ struct SharedGeometry {
   explicit SharedGeometry(const mjModel* model);
 
   DeviceHandle device;
-  std::vector<SceneHandle> meshes;         // null for a mesh that no geom shows
-  std::vector<void*> mesh_scenes;          // the same, for the kernels
-  std::vector<HeightField> height_fields;  // data: the model's
-  std::vector<SceneHandle> surfaces;       // of height fields, if the model has cameras: rays march
+  std::vector<SceneHandle> meshes;             // null for a mesh that no geom shows
+  std::vector<void*> mesh_scenes;              // the same, for the kernels
+  std::vector<HeightField> height_fields;      // data: the model's
+  std::vector<std::vector<float>> block_tops;  // of each height field
+  std::vector<SceneHandle> surfaces;  // of height fields, if the model has cameras: rays march
   ShapeBounds bounds;
 };
 
