@@ -97,6 +97,8 @@ struct Fixture {
   std::unique_ptr<RayScene> rays;
 
   explicit Fixture(int threads = 1) {
+    // For peers in Python (bench/peers): the same scene.
+    if (const char* path = std::getenv("MJSENSE_BENCH_SAVE")) mj_saveModel(m, path, nullptr, 0);
     mj_forward(m, d);
     LidarSensorCfg cfg;
     cfg.name = "lidar";

@@ -13,7 +13,7 @@ namespace mjsense {
 namespace {
 
 // Packets that one thread takes at a time.
-constexpr int kChunk = 24;
+constexpr int kChunk = 12;
 constexpr double kInf = std::numeric_limits<double>::infinity();
 
 std::uint32_t group_mask(const std::optional<std::vector<int>>& groups, const std::string& place) {
