@@ -205,6 +205,19 @@ void RayCastSensor::place_timed(int world, int frame, int packet, float reach,
   }
 }
 
+RayCastSensor::WorldRay RayCastSensor::world_ray(int world, int r) const {
+  const int n = num_rays_per_frame(), i = parts_[world] * n + r % n;
+  const FramePose& pose = frame_pose(world, r / n);
+  WorldRay ray{{pose.pos[0], pose.pos[1], pose.pos[2]}, {}};
+  for (int k = 0; k < 3; ++k) {
+    for (int j = 0; j < 3; ++j) {
+      ray.origin[k] += pose.align[3 * k + j] * pattern_.offsets[i][j];
+      ray.direction[k] += pose.align[3 * k + j] * pattern_.directions[i][j];
+    }
+  }
+  return ray;
+}
+
 void RayCastSensor::place(const RayScene& rays, int world, int frame, int p, RayPacket& out) const {
   const FramePose& pose = frame_pose(world, frame);
   std::copy_n(pose.pos, 3, out.origin);

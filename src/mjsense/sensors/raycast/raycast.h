@@ -83,6 +83,11 @@ class RayCastSensor : public Sensor {
   // Local rays of one frame, [n]; of a sensor that casts a different part of its pattern each time,
   // all of them.
   const RayPattern& pattern() const { return pattern_; }
+  // Ray r of a world as it is now, for drawing (rays with times of their own: as if cast now).
+  struct WorldRay {
+    std::array<double, 3> origin, direction;  // m, world; unit
+  };
+  WorldRay world_ray(int world, int r) const;
   // As the last compute() left it: the frame's pose and the alignment of its rays.
   const FramePose& frame_pose(int world, int frame) const {
     return poses_[world * num_frames() + frame];

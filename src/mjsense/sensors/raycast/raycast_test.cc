@@ -10,6 +10,7 @@
 #include "mjsense/core/error.h"
 #include "mjsense/scene/scene.h"
 #include "mjsense/sensors/height/terrain_height.h"
+#include "mjsense/sensors/raycast/debug_draw.h"
 #include "mjsense/sim/simulation.h"
 
 namespace mjsense {
@@ -250,6 +251,26 @@ TEST(RayCast, ErrorsNameSensorFoundAndExpected) {
               HasSubstr("at least 1"));
   EXPECT_THAT(with([](Cfg& c) { c.pattern = PinholePattern::from_mujoco_camera("r/eyes"); }),
               HasSubstr("r/eye"));
+}
+
+TEST(RayCast, DrawsHitsRaysAndNormals) {
+  auto cfg = sensor_cfg<RayCastSensorCfg>();
+  cfg->pattern = UserPattern{{{0, 0, 0}}, {{0, 0, -1}, {0, 0, 1}}};
+  cfg->viz.show_rays = cfg->viz.show_normals = true;
+  Lab lab({cfg});
+  lab.read("distances");
+  mjvScene scene;
+  mjv_defaultScene(&scene);
+  mjv_makeScene(lab.sim->model(), &scene, 3);
+  auto& sensor = dynamic_cast<RayCastSensor&>(lab.scene->sensor("ray"));
+  EXPECT_EQ(draw_rays(sensor, 0, lab.sim->model(), &scene), 1);  // room for 3 of 4
+  ASSERT_EQ(scene.ngeom, 3);
+  EXPECT_STREQ(scene.geoms[0].label, "ray_hit_0");
+  EXPECT_NEAR(scene.geoms[0].pos[2], 1.55, 1e-5);
+  EXPECT_STREQ(scene.geoms[1].label, "ray_ray_0");
+  EXPECT_NEAR(scene.geoms[1].pos[2], 2, 1e-5);
+  EXPECT_STREQ(scene.geoms[2].label, "ray_normal_0");
+  mjv_freeScene(&scene);
 }
 
 TEST(Pattern, GridStopsShortWhereTheResolutionDoesNotDivide) {
