@@ -38,6 +38,14 @@ std::string settings_of(const RecordJobCfg& job, Rollout& rollout) {
   json.end_array();
   json.key("horizon").value(rollout.task().cfg().horizon);
   json.key("keep_failures").value(job.keep_failures);
+  // Sizes that change with the scene and with what robots are drawn with.
+  const mjModel* m = rollout.task().model();
+  json.key("model").begin_object();
+  json.key("nbody").value(static_cast<std::int64_t>(m->nbody));
+  json.key("ngeom").value(static_cast<std::int64_t>(m->ngeom));
+  json.key("nmeshvert").value(static_cast<std::int64_t>(m->nmeshvert));
+  json.key("ntexdata").value(static_cast<std::int64_t>(m->ntexdata));
+  json.end_object();
   json.key("policy").value(cfg.policy);
   json.key("policy_dt_ms").value(rollout.task().cfg().policy_dt_ms);
   json.key("robot").value(cfg.robot);
