@@ -57,37 +57,19 @@ struct Scene::Impl {
   std::vector<std::string> warnings;
 
   void build();
+  void attach();
   void add(std::unique_ptr<Sensor> sensor);
   void add_sensors();
   void compile();
 };
 
 void Scene::Impl::build() {
-  spec = cfg.spec           ? SpecPtr(cfg.spec, SpecDelete{false})
-         : cfg.base.empty() ? SpecPtr(mj_makeSpec())
-                            : parse_model(cfg.base, "scene base");
-  attached.push_back(adopt_base(spec.get(), cfg.base, vfs, warnings));
-  mj_defaultOption(&spec->option);
-  apply_options(cfg.options, spec->option);
-  if (std::isnan(spec->stat.meansize)) spec->stat.meansize = 0.03;
-  if (cfg.extent) {
-    if (!(*cfg.extent > 0))
-      throw ValueError(fmt::format("scene: extent = {} must be positive (m)", *cfg.extent));
-    spec->stat.extent = *cfg.extent;
-  }
-  spec->compiler.savecompiled = 0;             // numbers are saved exactly
-  spec->compiler.conflict = mjCONFLICT_MERGE;  // sizes: the larger wins
-
-  if (cfg.terrain) terrain.emplace(*cfg.terrain).add_to(spec.get());
   std::vector<std::string> said;
   {
     WarningCapture capture(said);
-    for (const auto& [name, entity] : cfg.entities) {
-      check_name(name, cfg.terrain.has_value(), attached);
-      attached.push_back(attach_entity(spec.get(), name, entity, vfs, warnings));
-    }
+    attach();
   }
-  for (std::string& text : said) {  // which size wins is of no use to anybody
+  for (std::string& text : said) {  // which entity's <size> wins is of no use to anybody
     if (!text.starts_with("Attach conflict")) warnings.push_back(std::move(text));
   }
   add_sensors();
@@ -99,6 +81,29 @@ void Scene::Impl::build() {
   for (const Attached& entity : attached) {
     if (entity.name.empty()) continue;
     entities.push_back(describe(model.get(), entity.name, entity.fixed_base));
+  }
+}
+
+// Base, options, terrain, entities.
+void Scene::Impl::attach() {
+  spec = cfg.spec           ? SpecPtr(cfg.spec, SpecDelete{false})
+         : cfg.base.empty() ? SpecPtr(mj_makeSpec())
+                            : parse_model(cfg.base, "scene base");
+  attached.push_back(adopt_base(spec.get(), cfg.base, vfs, warnings));
+  apply_options(cfg.options, spec->option);
+  if (std::isnan(spec->stat.meansize)) spec->stat.meansize = 0.03;
+  if (cfg.extent) {
+    if (!(*cfg.extent > 0)) {
+      throw ValueError(fmt::format("scene: extent = {} must be positive (m)", *cfg.extent));
+    }
+    spec->stat.extent = *cfg.extent;
+  }
+  spec->compiler.savecompiled = 0;             // numbers are saved exactly
+  spec->compiler.conflict = mjCONFLICT_MERGE;  // sizes: the larger wins
+  if (cfg.terrain) terrain.emplace(*cfg.terrain).add_to(spec.get());
+  for (const auto& [name, entity] : cfg.entities) {
+    check_name(name, cfg.terrain.has_value(), attached);
+    attached.push_back(attach_entity(spec.get(), name, entity, vfs, warnings));
   }
 }
 
@@ -144,7 +149,9 @@ void Scene::Impl::compile() {
   }
   if (!model) throw ValueError(fmt::format("scene: {}", mjs_getError(spec.get())));
   merge_initial_states(attached, model.get());
-  mj_copyBack(spec.get(), model.get());  // the keyframe, for to_xml()
+  if (!mj_copyBack(spec.get(), model.get())) {  // the keyframe, for to_xml()
+    throw RuntimeError(fmt::format("scene: {}", mjs_getError(spec.get())));
+  }
 }
 
 Scene::Scene(SceneCfg cfg) : impl_(std::make_unique<Impl>()) {
