@@ -27,7 +27,7 @@ SCENES = {
     "go1": ("view", "head"),
     "panda": ("view",),
 }
-WIDTH, HEIGHT = 400, 300
+WIDTH, HEIGHT = 340, 255
 SHOWN_GROUPS = (0, 1, 2)
 
 

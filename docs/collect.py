@@ -13,7 +13,7 @@ def on_files(files, config):
     for room in ROOMS:
         pages = sorted((SOURCE / room).glob("*/page.md"))
         for page in pages:
-            files.append(File.generated(config, f"{room}/{page.parent.name}.md", content=page.read_text()))
+            files.append(File.generated(config, f"{room}/{page.parent.name}.md", content=page.read_text().replace("../../../../docs/", "../")))
             for picture in sorted(page.parent.glob("*.svg")) + sorted(page.parent.glob("*.png")):
                 files.append(File.generated(config, f"{room}/{picture.name}", content=picture.read_bytes()))
         index = f"# {room.capitalize()}\n\n" + "".join(f"- [{p.parent.name}]({p.parent.name}.md)\n" for p in pages)

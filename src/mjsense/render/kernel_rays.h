@@ -19,7 +19,8 @@ constexpr float kTiny = 1e-20f;
 // Rays of 4 x 4 pixels: X and Y of PixelGrid, lane = 4 * row + column.
 struct alignas(64) Pixels {
   float x[kLanes], y[kLanes];
-  float window[4];  // X min, X max, Y min, Y max
+  float near[kLanes];  // planar depth from which on something is seen
+  float window[4];     // X min, X max, Y min, Y max
 };
 
 struct alignas(64) Hits {

@@ -8,6 +8,7 @@ namespace mjsense {
 namespace {
 
 constexpr int kPackets = kTileSize / 4;  // along a side
+constexpr int kMaxMirrored = 32;         // transparent geoms in a reflection
 constexpr int kMaxLayers = 8;            // of transparent geoms over one packet
 
 struct TileHits {
@@ -15,8 +16,10 @@ struct TileHits {
   Hits opaque[kPackets * kPackets];
 };
 
-inline void fill_pixels(const PixelGrid& grid, int x0, int y0, float shift_x, float shift_y,
+inline void fill_pixels(const View& view, int x0, int y0, float shift_x, float shift_y,
                         Pixels& out) {
+  const PixelGrid& grid = view.grid;
+  for (int k = 0; k < kLanes; k += kWidth) store(out.near + k, splat(view.near));
   // Lanes outside the image repeat its border: they cost nothing extra and disturb nobody.
   float xs[4], ys[4];
   int columns[4], rows[4];
@@ -156,6 +159,55 @@ inline void shade_transparent(const View& view, const int* list, int count, cons
   for (int i = used - 1; i >= 0; --i) blend(layers[i], out);
 }
 
+// What the mirror among `lanes` reflects, added to its colour. Of a box only the top is one.
+inline void add_reflection(const View& view, const Pixels& pixels, const Hits& hits, Colors& out) {
+  const View& beyond = *view.reflection;
+  Pixels through = pixels;
+  std::uint32_t lanes = 0;
+  for (int i = 0; i < kLanes; ++i) {
+    bool mirror = hits.id[i] == view.mirror;
+    if (mirror && view.geoms[hits.geom[i]].type == mjGEOM_BOX) {
+      const ViewGeom& g = view.geoms[hits.geom[i]];
+      const bool ortho = view.grid.orthographic;
+      const float s = ortho ? 1.0f : hits.t[i];
+      const float q[3] = {s * pixels.x[i] - g.pos[0], s * pixels.y[i] - g.pos[1],
+                          -hits.t[i] - g.pos[2]};
+      const float height = g.rot[2] * q[0] + g.rot[5] * q[1] + g.rot[8] * q[2];
+      mirror = height > g.size[2] * 0.999f;
+    }
+    through.near[i] = mirror ? hits.t[i] * 1.00001f : kInfinity;
+    lanes |= static_cast<std::uint32_t>(mirror) << i;
+  }
+  if (!lanes) return;
+  Hits found;
+  clear(found, kInfinity);
+  trace_packet(beyond, nullptr, beyond.num_opaque, through, found);
+  const std::uint32_t seen = hit_lanes(found);
+  Colors color = {};
+  if (seen) {
+    Surfaces surfaces = {};
+    gather_surfaces(beyond, through, found, seen, true, surfaces);
+    shade(beyond, surfaces, found, seen, nullptr, color);
+  }
+  for (int k = 0; k < kLanes; k += kWidth)  // what lanes without a hit hold is no colour
+    for (auto& c : color.rgb)
+      store(c + k, select(mask_of(seen >> k & kAllLanes), load(c + k), splat(0.0f)));
+  int list[kMaxMirrored];
+  int count = 0;
+  while (count < beyond.num_transparent && count < kMaxMirrored) {
+    list[count] = beyond.num_opaque + count;
+    ++count;
+  }
+  if (count) shade_transparent(beyond, list, count, through, found, color);
+  for (int k = 0; k < kLanes; k += kWidth) {
+    const Mask m = mask_of(lanes >> k & kAllLanes);
+    for (int c = 0; c < 3; ++c) {
+      const Float own = load(out.rgb[c] + k);
+      store(out.rgb[c] + k, select(m, min(own + load(color.rgb[c] + k), splat(1.0f)), own));
+    }
+  }
+}
+
 inline std::uint8_t byte(float x) { return static_cast<std::uint8_t>(x * 255.0f + 0.5f); }
 
 // Nearest of opaque and transparent geoms: what depth and segmentation see. A plane seen from
@@ -289,7 +341,7 @@ inline void render_tile(const View& view, const ImageTargets& targets, int tx, i
     if (!centered) sample_shift(sample, samples, shift_x, shift_y);
     float window[4] = {kInfinity, -kInfinity, kInfinity, -kInfinity};
     for (int q = 0; q < packets; ++q) {
-      fill_pixels(grid, x0 + 4 * (q % across), y0 + 4 * (q / across), shift_x, shift_y,
+      fill_pixels(view, x0 + 4 * (q % across), y0 + 4 * (q / across), shift_x, shift_y,
                   tile.pixels[q]);
       const float* w = tile.pixels[q].window;
       for (int c = 0; c < 4; c += 2) {
@@ -316,6 +368,7 @@ inline void render_tile(const View& view, const ImageTargets& targets, int tx, i
           shade(view, surfaces, hits, lanes, shadows ? casters : nullptr, colors);
         }
         if (lanes != 0xffffu) shade_background(view, tile.pixels[q], ~lanes & 0xffffu, colors);
+        if (view.reflection) add_reflection(view, tile.pixels[q], hits, colors);
         if (lists.transparent)
           shade_transparent(view, scratch.transparent, lists.transparent, tile.pixels[q], hits,
                             colors);

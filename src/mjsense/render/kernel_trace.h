@@ -31,14 +31,14 @@ inline Mask shows(Float t, Int id, Float before, Int id_before) {
 
 // Lanes whose ray meets the geom's bounding box before t, as Embree takes them; false if there are
 // none.
-inline bool fill_rays(const ViewGeom& g, const PixelGrid& grid, const Pixels& pixels, float near,
+inline bool fill_rays(const ViewGeom& g, const PixelGrid& grid, const Pixels& pixels,
                       const float* t, RTCRayHit16& rays, int* valid) {
   std::uint32_t some = 0;
   for (int k = 0; k < kLanes; k += kWidth) {
     const LocalRay ray = pixel_ray(g, grid, load(pixels.x + k), load(pixels.y + k));
     const Interval inside = box(ray.o, ray.d, g.box, g.box + 3);
     const Float limit = load(t + k) * splat(1.0f + kSame);
-    const Mask hit = (inside.enter < limit) & (inside.exit > splat(near));
+    const Mask hit = (inside.enter < limit) & (inside.exit > load(pixels.near + k));
     some |= bits(hit);
     store(valid + k, select(hit, int_of(-1), int_of(0)));
     store(rays.ray.org_x + k, ray.o.x);
@@ -47,7 +47,7 @@ inline bool fill_rays(const ViewGeom& g, const PixelGrid& grid, const Pixels& pi
     store(rays.ray.dir_x + k, ray.d.x);
     store(rays.ray.dir_y + k, ray.d.y);
     store(rays.ray.dir_z + k, ray.d.z);
-    store(rays.ray.tnear + k, splat(near));
+    store(rays.ray.tnear + k, load(pixels.near + k));
     store(rays.ray.tfar + k, limit);
     store(rays.ray.time + k, splat(0.0f));
     store(reinterpret_cast<int*>(rays.ray.mask) + k, int_of(-1));
@@ -59,10 +59,10 @@ inline bool fill_rays(const ViewGeom& g, const PixelGrid& grid, const Pixels& pi
 }
 
 inline void trace_triangles(const ViewGeom& g, int index, const PixelGrid& grid,
-                            const Pixels& pixels, float near, Hits& hits) {
+                            const Pixels& pixels, Hits& hits) {
   RTCRayHit16 rays;
   alignas(64) int valid[kLanes];
-  if (!fill_rays(g, grid, pixels, near, hits.t, rays, valid)) return;
+  if (!fill_rays(g, grid, pixels, hits.t, rays, valid)) return;
   embree_intersect16(valid, static_cast<RTCScene>(g.bvh), &rays, false, true);
   // A closed surface shows its front first. Only where a back came first is it worth to ask Embree
   // about every triangle's side.
@@ -100,14 +100,14 @@ inline void trace_triangles(const ViewGeom& g, int index, const PixelGrid& grid,
 
 // Side walls and base of a height field, from outside. Few rays meet them: one lane at a time.
 inline void trace_walls(const ViewGeom& g, int index, const PixelGrid& grid, const Pixels& pixels,
-                        float near, Hits& hits) {
+                        Hits& hits) {
   const HeightField& f = *g.height_field;
   const float center[3] = {0, 0, 0.5f * (f.size[2] - f.size[3])};
   const float half[3] = {f.size[0], f.size[1], 0.5f * (f.size[2] + f.size[3])};
   for (int k = 0; k < kLanes; k += kWidth) {
     const LocalRay ray = pixel_ray(g, grid, load(pixels.x + k), load(pixels.y + k));
     const Interval inside = box(ray.o, ray.d, center, half);
-    const Mask hit = (inside.enter < load(hits.t + k)) & (splat(near) < inside.enter) &
+    const Mask hit = (inside.enter < load(hits.t + k)) & (load(pixels.near + k) < inside.enter) &
                      (inside.enter <= inside.exit);
     const std::uint32_t lanes = bits(hit);
     if (!lanes) continue;
@@ -141,8 +141,8 @@ inline void trace_walls(const ViewGeom& g, int index, const PixelGrid& grid, con
 inline void trace_geom(const View& view, int index, const Pixels& pixels, Hits& hits) {
   const ViewGeom& g = view.geoms[index];
   if (g.bvh) {
-    trace_triangles(g, index, view.grid, pixels, view.near, hits);
-    if (g.height_field) trace_walls(g, index, view.grid, pixels, view.near, hits);
+    trace_triangles(g, index, view.grid, pixels, hits);
+    if (g.height_field) trace_walls(g, index, view.grid, pixels, hits);
     return;
   }
   for (int k = 0; k < kLanes; k += kWidth) {
@@ -150,7 +150,8 @@ inline void trace_geom(const View& view, int index, const Pixels& pixels, Hits& 
     const Float t =
         g.type == mjGEOM_PLANE ? plane(g, ray.o, ray.d, g.behind) : solid(g, ray.o, ray.d).enter;
     const Float before = load(hits.t + k);
-    const Mask hit = shows(t, int_of(g.id), before, load(hits.id + k)) & (splat(view.near) < t);
+    const Mask hit =
+        shows(t, int_of(g.id), before, load(hits.id + k)) & (load(pixels.near + k) < t);
     if (!any(hit)) continue;
     store(hits.id + k, select(hit, int_of(g.id), load(hits.id + k)));
     store(hits.t + k, select(hit, t, before));
@@ -172,12 +173,14 @@ inline void clear(Hits& hits, float far) {
 }
 
 // The nearest opaque geoms among `list`, which is sorted by ViewGeom::nearest.
+// No list: all that are in sight.
 inline void trace_packet(const View& view, const int* list, int count, const Pixels& pixels,
                          Hits& hits) {
   for (int i = 0; i < count; ++i) {
-    const ViewGeom& g = view.geoms[list[i]];
+    const int index = list ? list[i] : i;
+    const ViewGeom& g = view.geoms[index];
     if (!any_beyond(hits.t, g.nearest)) break;
-    if (overlap(g.window, pixels.window)) trace_geom(view, list[i], pixels, hits);
+    if (overlap(g.window, pixels.window)) trace_geom(view, index, pixels, hits);
   }
 }
 

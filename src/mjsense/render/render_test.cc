@@ -200,6 +200,20 @@ TEST(Shading, TransparentGeomsAreDrawnTwice) {
   expect_pixel(s.from_above(0, 0), {64, 64, 64});  // 1 * (1 - .5)^2
 }
 
+TEST(Shading, FloorMirrorsWithItsReflectance) {
+  Studio s(std::string(kFlat) +
+           R"(<asset><material name="mirror" rgba="0 0 .2 1" reflectance=".5"/></asset><worldbody>
+    <geom type="plane" size="5 5 1" material="mirror"/><geom type="box" size=".5 .1 .5" pos="0 1 1" rgba="1 0 0 1"/>
+    </worldbody>)");
+  s.options.reflections = true;
+  // From (0, -1, 1) down at 45 degrees: the floor at the origin, in it the box's front at height 0.9.
+  const double h = std::sqrt(0.5);
+  expect_pixel(s.center({0, -1, 1}, {1, 0, 0}, {0, h, h}, 1), {128, 0, 51});
+  expect_pixel(s.center({3, -1, 1}, {1, 0, 0}, {0, h, h}, 1), {0, 0, 51});
+  s.options.reflections = false;
+  expect_pixel(s.center({0, -1, 1}, {1, 0, 0}, {0, h, h}, 1), {0, 0, 51});
+}
+
 TEST(Kernels, EveryInstructionSetPaintsTheSamePicture) {
   Studio s(
       R"(<asset><texture name="t" type="2d" builtin="checker" rgb1="1 0 0" rgb2="0 0 1" width="64" height="64"/>

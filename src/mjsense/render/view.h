@@ -79,6 +79,10 @@ struct View {
   float global_ambient = 0;
   const Texture* skybox = nullptr;
   float r_wc[9] = {};  // for the skybox
+  // The first geom that reflects, in sight or not: -1 if there is none. What it shows is the scene as a
+  // camera behind it sees it through it, added to its own colour.
+  int mirror = -1;  // geom id
+  const View* reflection = nullptr;
 };
 
 // Where the image goes; null: not wanted. Whole images, rows from the top.

@@ -84,6 +84,13 @@ ViewBuilder::ViewBuilder(const mjModel* model, const Look& look, const ViewOptio
   view_.far = options.far;
   view_.shadows = options.shadows;
   view_.skybox = options.textures ? look.skybox() : nullptr;
+  const float* reflectance = model->mat_reflectance;
+  if (options.reflections &&
+      std::any_of(reflectance, reflectance + model->nmat, [](float r) { return r > 0; })) {
+    ViewOptions flat = options;
+    flat.reflections = flat.shadows = false;
+    mirrored_ = std::make_unique<ViewBuilder>(model, look, flat);
+  }
 }
 
 const View& ViewBuilder::build(const RayWorld& world, const SharedGeometry& shapes,
@@ -93,7 +100,7 @@ const View& ViewBuilder::build(const RayWorld& world, const SharedGeometry& shap
   order_.clear();
   for (int id = 0; id < world.num_geoms(); ++id) {
     const float* rgba = appearance.rgba().data() + 4 * id;
-    if (rgba[3] == 0 || !(world.flags()[id] & options_.groups)) continue;
+    if (rgba[3] == 0 || !(world.flags()[id] & options_.groups) || id == left_out_) continue;
     const int index = static_cast<int>(order_.size());
     ViewGeom& g = unsorted_[index];
     place(world, shapes, id, position, rotation, g);
@@ -124,7 +131,45 @@ const View& ViewBuilder::build(const RayWorld& world, const SharedGeometry& shap
   view_.num_geoms = static_cast<int>(order_.size());
   for (int i = 0; i < 9; ++i) view_.r_wc[i] = static_cast<float>(rotation[i]);
   set_lights(world, appearance, position, rotation);
+  if (mirrored_) set_mirror(world, shapes, appearance, position, rotation);
   return view_;
+}
+
+// The camera is mirrored in the plane: the same pixel rays then meet the mirror in the same points
+// and go on to what is reflected. Its rotation is a reflection too, which disturbs nobody.
+void ViewBuilder::set_mirror(const RayWorld& world, const SharedGeometry& shapes,
+                             const Appearance& appearance, const double position[3],
+                             const double rotation[9]) {
+  view_.mirror = -1;
+  view_.reflection = nullptr;
+  for (int id = 0; id < world.num_geoms(); ++id) {
+    const RayGeom& g = world.geom(id);
+    const int material = world.materials()[id];
+    if ((g.type != mjGEOM_PLANE && g.type != mjGEOM_BOX) || material < 0) continue;
+    const float reflectance = model_->mat_reflectance[material];
+    if (reflectance <= 0 || appearance.rgba()[4 * id + 3] < kOpaque) continue;
+    if (!(world.flags()[id] & options_.groups)) continue;
+    const double normal[3] = {g.mat[2], g.mat[5], g.mat[8]};
+    const double top = g.type == mjGEOM_BOX ? g.size[2] : 0;
+    double above = -top;
+    for (int k = 0; k < 3; ++k) above += (position[k] - g.pos[k]) * normal[k];
+    if (above < 0) {
+      if (g.type == mjGEOM_PLANE) continue;  // seen from below it is a veil, not a mirror
+      return;
+    }
+    double p[3], r[9];
+    for (int k = 0; k < 3; ++k) p[k] = position[k] - 2 * above * normal[k];
+    for (int j = 0; j < 3; ++j) {
+      double along = 0;
+      for (int k = 0; k < 3; ++k) along += normal[k] * rotation[3 * k + j];
+      for (int k = 0; k < 3; ++k) r[3 * k + j] = rotation[3 * k + j] - 2 * along * normal[k];
+    }
+    mirrored_->left_out_ = id;
+    mirrored_->tint_ = reflectance;
+    view_.reflection = &mirrored_->build(world, shapes, appearance, p, r, view_.grid);
+    view_.mirror = id;
+    return;  // one, as in MuJoCo
+  }
 }
 
 void ViewBuilder::place(const RayWorld& world, const SharedGeometry& shapes, int id,
@@ -212,6 +257,7 @@ void ViewBuilder::set_surface(const RayWorld& world, const float* rgba, int id, 
   Surface& s = g.surface;
   s = {};
   std::copy_n(rgba, 4, s.rgba);
+  for (int i = 0; i < 3; ++i) s.rgba[i] *= tint_;
   if (g.behind) s.rgba[3] *= kFromBehind;
   g.transparent = s.rgba[3] < kOpaque || g.behind;
   s.specular = 0.5f;

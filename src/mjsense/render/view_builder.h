@@ -41,6 +41,7 @@ struct ViewOptions {
   unsigned groups = 0x7;  // bit g: geoms of group g
   bool textures = true;
   bool shadows = false;
+  bool reflections = false;
   float near = 0, far = 0;
 };
 
@@ -68,6 +69,8 @@ class ViewBuilder {
              const double rotation[9], ViewGeom& g) const;
   bool in_sight(ViewGeom& g) const;
   void set_surface(const RayWorld& world, const float* rgba, int id, ViewGeom& g) const;
+  void set_mirror(const RayWorld& world, const SharedGeometry& shapes, const Appearance& appearance,
+                  const double position[3], const double rotation[9]);
   void set_lights(const RayWorld& world, const Appearance& appearance, const double position[3],
                   const double rotation[9]);
 
@@ -77,6 +80,9 @@ class ViewBuilder {
   View view_;
   std::vector<ViewGeom> unsorted_, sorted_;
   std::vector<Order> order_;
+  std::unique_ptr<ViewBuilder> mirrored_;  // null: nothing in the model reflects
+  int left_out_ = -1;                      // geom that this view does not show: the mirror itself
+  float tint_ = 1;                         // of every colour: the mirror's reflectance
 };
 
 }  // namespace mjsense

@@ -17,8 +17,14 @@ constexpr int kItemsPerThread =
     4;  // parts of work for each thread, so that all finish at about the same time
 
 ViewOptions view_options(const CameraSensorCfg& cfg, unsigned groups) {
-  return {groups, cfg.use_textures, cfg.use_shadows, static_cast<float>(cfg.near),
-          static_cast<float>(cfg.far)};
+  ViewOptions options;
+  options.groups = groups;
+  options.textures = cfg.use_textures;
+  options.shadows = cfg.use_shadows;
+  options.reflections = std::count(cfg.data_types.begin(), cfg.data_types.end(), "rgb") > 0;
+  options.near = static_cast<float>(cfg.near);
+  options.far = static_cast<float>(cfg.far);
+  return options;
 }
 
 }  // namespace
