@@ -43,9 +43,13 @@ const char* wanted_of(const std::type_info& type);
 class FromPython {
  public:
   explicit FromPython(nb::handle config) : config_(config) {}
+  // Of a value inside another config, which error messages name.
+  FromPython(nb::handle config, nb::handle parent, const char* field)
+      : config_(config), parent_(parent), field_(field) {}
 
   template <class T>
   void operator()(const char* name, T& out) {
+    if (!nb::hasattr(config_, name)) throw_no_field(name);
     nb::object value = nb::getattr(config_, name);
     read(name, value, out);
   }
@@ -59,7 +63,7 @@ class FromPython {
         out = T{};
         return;
       }
-      FromPython nested(value);
+      FromPython nested(value, config_, name);
       fields(nested, out);
     } else if constexpr (requires { read_custom(*this, value, out); }) {
       read_custom(*this, value, out);
@@ -86,7 +90,14 @@ class FromPython {
   }
 
  private:
-  nb::handle config_;
+  [[noreturn]] void throw_no_field(const char* name) const {
+    const std::string wanted = std::string("a configuration with '") + name + "'";
+    if (parent_) throw_field_type(parent_, field_, config_, wanted.c_str());
+    throw_field_type(config_, "it", config_, wanted.c_str());
+  }
+
+  nb::handle config_, parent_;
+  const char* field_ = "";
 };
 
 // The other direction: a dict of the fields' values.

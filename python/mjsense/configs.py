@@ -428,7 +428,7 @@ class RayCastSensorCfg(SensorCfg):
 
     def __post_init__(self) -> None:
         for ref in (self.frame,) if isinstance(self.frame, ObjRef) else self.frame:
-            if not self.any_frame and ref.type in ("xbody", "camera"):
+            if not self.any_frame and getattr(ref, "type", "") in ("xbody", "camera"):
                 raise ValueError(
                     f"sensor '{self.name}': frame '{ref.full_name}' is a {ref.type}: must be 'body', 'site', or 'geom' "
                     "(any_frame=True takes xbody and camera)"

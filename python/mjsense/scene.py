@@ -55,6 +55,10 @@ class Scene:
     """Entities, terrain and sensors, compiled into one model. ``scene[key]`` is a sensor or, failing that, an entity."""
 
     def __init__(self, cfg: SceneCfg) -> None:
+        if not isinstance(cfg, SceneCfg):
+            raise TypeError(f"a scene is made of a SceneCfg, not {cfg!r}")
+        if isinstance(cfg.sensors, (SensorCfg, Sensor)) or not hasattr(cfg.sensors, "__iter__"):
+            raise TypeError(f"SceneCfg.sensors must be a sequence, not {cfg.sensors!r}")
         self.cfg = cfg
         self.spec = cfg._base_spec()
         """The spec the scene is built in."""
@@ -62,6 +66,8 @@ class Scene:
         items = [self._item(sensor) for sensor in cfg.sensors]
         for item in items:
             if isinstance(item, Sensor):
+                if item._scene_ref is not None and item._scene_ref() is not None:
+                    raise RuntimeError(f"sensor '{item.uuid}' belongs to another scene: make one for each")
                 item._scene_ref = weakref.ref(self)
 
         def edit() -> None:

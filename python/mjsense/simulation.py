@@ -136,7 +136,7 @@ class Simulation:
 
         Values are ``[n]`` (the same for every world) or ``[worlds, n]``.
         """
-        rows = slice(None) if world_ids is None else np.asarray(_ids(world_ids), dtype=int)
+        rows = self._rows(world_ids)
         checked = []
         for name, value in components.items():
             view = self._component(name)
@@ -198,9 +198,7 @@ class Simulation:
 
         Values are ``[worlds, ...]`` or broadcast to it. Quantities that MuJoCo derives from the field follow.
         """
-        view = self.model_field(field)
-        rows = slice(None) if world_ids is None else np.asarray(_ids(world_ids), dtype=int)
-        view[rows] = values
+        self.model_field(field)[self._rows(world_ids)] = values
         self._core.model_changed(_ids(world_ids), field in mujoco.MjModel._setconst_inputs)
         self.forward(world_ids)
 
@@ -213,6 +211,16 @@ class Simulation:
                 raise AttributeError(f"mjModel has no array '{name}'")
             self._views[key] = self._core.model_field(name).view(like.dtype).reshape(self.num_worlds, *like.shape)
         return self._views[key]
+
+    def _rows(self, world_ids: Any) -> Any:
+        """Index of these worlds; ValueError for ids out of range."""
+        ids = _ids(world_ids)
+        if ids is None:
+            return slice(None)
+        for world in ids:
+            if not 0 <= world < self.num_worlds:
+                raise ValueError(f"world id {world}: must be in [0, {self.num_worlds})")
+        return np.array(ids, dtype=int)
 
     def _component(self, name: str) -> np.ndarray:
         view = self._views.get(name)

@@ -207,6 +207,16 @@ def test_changing_state_inside_compute_is_refused():
     sim.step()
 
 
+def test_a_sensor_belongs_to_one_scene():
+    sensor = Height()
+    scene = ball_scene(sensor)
+    with pytest.raises(RuntimeError, match="'height' belongs to another scene"):
+        ball_scene(sensor)
+    sim = mjs.Simulation(scene)
+    with pytest.raises(RuntimeError, match="'height' belongs to a simulation"):
+        sim.add(sensor)
+
+
 def test_dict_sensor_is_json_on_disk():
     class Info(mjs.Sensor):
         uuid = "info"

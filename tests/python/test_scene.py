@@ -1,4 +1,5 @@
 from pathlib import Path
+from types import MappingProxyType
 
 import mujoco
 import numpy as np
@@ -69,7 +70,11 @@ def test_lookup_error_names_the_nearest():
         (dict(entities={"a": mjs.EntityCfg(model="<mujoco><worldbdy/></mujoco>")}), "worldbdy"),
         (dict(entities={"a": mjs.EntityCfg(model=17)}), "EntityCfg.model"),
         (dict(entities={"a": mjs.EntityCfg(model=BALL, pos=(1, 2))}), "pos must be 3 numbers"),
+        (dict(entities={"a": BALL}), "entities must be a configuration"),
+        (dict(entities=None), "NoneType"),
+        (dict(terrain="plane"), "terrain must be a configuration"),
         (dict(sensors=(17,)), "17"),
+        (dict(sensors=None), "must be a sequence"),
         (dict(extent="big"), "extent must be a number"),
         (dict(options=mjs.MujocoCfg(timestep=-1)), "timestep"),
         (dict(options=mjs.MujocoCfg(iterations=1.5)), "iterations must be an int"),
@@ -78,6 +83,12 @@ def test_lookup_error_names_the_nearest():
 def test_bad_scenes(cfg, text):
     with pytest.raises((ValueError, TypeError), match=text):
         mjs.Scene(mjs.SceneCfg(**cfg))
+
+
+def test_entities_are_any_mapping():
+    entities = {"b": mjs.EntityCfg(model=BALL)}
+    for given in (entities, MappingProxyType(entities), list(entities.items())):
+        assert list(mjs.Scene(mjs.SceneCfg(entities=given)).entities) == ["b"]
 
 
 def test_env_origins():

@@ -125,6 +125,8 @@ def test_bad_arguments(sim):
         (lambda: sim.reset([1, 1]), ValueError),
         (lambda: sim.reset([0.5]), TypeError),
         (lambda: sim.step_raw(-1), ValueError),
+        (lambda: sim.set_state([-1], qpos=np.zeros(7)), ValueError),
+        (lambda: sim.randomize("body_mass", 1, [5]), ValueError),
         (lambda: sim.refresh([17]), TypeError),
         (lambda: sim.data.xposs, AttributeError),
         (lambda: mjs.Simulation(sim.scene), RuntimeError),
@@ -138,6 +140,7 @@ def test_bad_arguments(sim):
         with pytest.raises(error):
             call()
     sim.step()
+    assert np.all(sim.qpos[:, 2] > 0.9)  # nothing was written on the way
 
 
 def test_use_after_close():

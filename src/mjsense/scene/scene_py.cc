@@ -58,13 +58,17 @@ void fields(Fields& f, SubTerrainCfg& c) {
   f("pit_depth", c.pit_depth);
 }
 
+// Any mapping, or pairs; TypeError for what is neither.
+nb::dict dict_of(nb::handle mapping) {
+  return nb::cast<nb::dict>(nb::module_::import_("builtins").attr("dict")(mapping));
+}
+
 // Mappings keep their order: names of tiles, regular expressions of joints.
 template <class Value>
 void read_custom(FromPython& f, nb::handle mapping,
                  std::vector<std::pair<std::string, Value>>& out) {
   out.clear();
-  for (auto [key, value] :
-       nb::cast<nb::dict>(nb::module_::import_("builtins").attr("dict")(mapping))) {
+  for (auto [key, value] : dict_of(mapping)) {
     auto& [name, read] = out.emplace_back();
     f.read("key", key, name);
     f.read(name.c_str(), value, read);
@@ -158,19 +162,14 @@ std::shared_ptr<Scene> make_scene(nb::handle config, nb::handle spec, nb::list s
   FromPython reader(config);
   reader("env_spacing", cfg.env_spacing);
   reader("extent", cfg.extent);
-  nb::object terrain = config.attr("terrain");
-  if (!terrain.is_none()) {
-    FromPython fields_of(terrain);
-    fields(fields_of, cfg.terrain.emplace());
-  }
-  FromPython options(config.attr("options"));
-  fields(options, cfg.options);
+  nb::object terrain = config.attr("terrain"), options = config.attr("options");
+  if (!terrain.is_none()) reader.read("terrain", terrain, cfg.terrain.emplace());
+  reader.read("options", options, cfg.options);
   nb::list alive;
-  for (auto [name, entity] : nb::dict(config.attr("entities"))) {
+  for (auto [name, entity] : dict_of(config.attr("entities"))) {
     auto& [key, entity_cfg] = cfg.entities.emplace_back();
-    key = nb::cast<std::string>(name);
-    FromPython fields_of(entity);
-    fields(fields_of, entity_cfg);
+    reader.read("entities", name, key);
+    reader.read("entities", entity, entity_cfg);
     entity_cfg.model = read_source(entity, alive);
   }
   for (nb::handle sensor : sensors) cfg.sensors.push_back(read_sensor(sensor));
