@@ -1,11 +1,12 @@
 // Records a suite without physics: what the Python tests of the files read, kill and resume.
-//   record_fake OUT [--episodes N] [--worlds B] [--steps T] [--batches n] [--resume] [--discard K]
-//   [--width W] [--height H]
-//               [--cameras C] [--encoders E] [--red-green] [--no-video] [--gzip G] [--step-ms MS]
-//               [--stop-after N]
-//   record_fake verify|repair|inspect PATH,  record_fake sheet PATH PNG
-// Every K-th attempt is discarded (0: none). Prints "finished E" after each episode that is safe on
-// disk.
+//   record_fake OUT [--episodes N] [--worlds B] [--steps T] [--batches n] [--discard K]
+//               [--width W] [--height H] [--cameras C] [--no-video] [--no-depth] [--red-green]
+//               [--encoders E] [--threads n] [--gzip G] [--resume]
+//               [--step-ms MS] [--stop-after N] [--print] [--measure]
+//   record_fake verify|repair|inspect PATH
+//   record_fake sheet PATH PNG
+// Every K-th attempt is discarded (0: none). --print says "finished E" after each episode that is
+// safe on disk; --measure says how long recording took.
 
 #include <fmt/format.h>
 

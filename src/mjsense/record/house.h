@@ -1,13 +1,12 @@
 #pragma once
 // The directory of one house, as a small store that survives kill -9 at any moment:
 //
-//   house_0/trajectories_batch_1_of_2.h5, episode_*.mp4     published: whole, under their final
-//   names house_0/.recording/recording.json                       what the recording is
-//   house_0/.recording/lock                                 held by the process that records
-//   house_0/.recording/episode_00000007/                    finished, waits until its batch is
-//   whole house_0/.recording/episode_00000008.discarded           attempted, not kept
-//   house_0/.recording/episode_00000009.part.1234/          running in process 1234, worthless
-//   after it
+//   trajectories_batch_1_of_2.h5, episode_*.mp4   published: whole, under their final names
+//   .recording/recording.json                     what the recording is
+//   .recording/lock                               held by the process that records
+//   .recording/episode_00000007/                  finished, waits until its batch is whole
+//   .recording/episode_00000008.discarded         attempted, not kept
+//   .recording/episode_00000009.part.1234/        running in process 1234, worthless after it
 //
 // Every change of state is one rename. A batch is published by moving videos first and the HDF5
 // file last; when that is interrupted, doing it again ends in the same state, because the order of

@@ -1,12 +1,12 @@
 #pragma once
 // Episodes -> HDF5 + video, streamed while they run.
 //
-//   Recorder recorder(cfg);                        opens or resumes {out}/house_{id}/
+//   Recorder recorder(cfg);                     opens or resumes {out}/house_{id}/
 //   recorder.begin_episode(w, {episode, seed});
-//   recorder.append(w, {reward, ...});             once per observation: copies row w of every
-//   sensor recorder.finish_episode(w, obs_scene);         kept;   or discard_episode(w, why):
-//   attempted, not kept recorder.complete();                           publishes everything, ends
-//   the recording
+//   recorder.append(w, {reward, ...});          once per observation: row w of every sensor
+//   recorder.finish_episode(w, obs_scene);      kept
+//   recorder.discard_episode(w, why);           or: attempted, not kept
+//   recorder.complete();                        publishes everything, ends the recording
 //
 // append() copies and returns; one thread feeds the encoders, one writes HDF5. Memory does not grow
 // with the length of an episode: when an encoder or the disk is slower than the simulation,
@@ -59,18 +59,18 @@ class Recorder {
   void append(int world, const StepRow& row);
   // `obs_scene`: JSON text. `outcome`: one word or sentence, kept as an attribute.
   void finish_episode(int world, std::string_view obs_scene, std::string_view outcome = "");
-  void discard_episode(
-      int world,
-      std::string_view why = "");   // decided: a resumed recording does not attempt it again
-  void abandon_episode(int world);  // undecided: it does
+  // Decided, not kept: a resumed recording does not attempt it again.
+  void discard_episode(int world, std::string_view why = "");
+  // Undecided: a resumed recording attempts it again.
+  void abandon_episode(int world);
 
   bool recording(int world) const;
   // True if this attempt was finished or discarded, now or before the recording was resumed.
   bool decided(std::int64_t episode) const;
   int kept() const;  // episodes finished so far, published or not
   int discarded() const;
-  bool enough()
-      const;  // cfg.episodes are kept and no earlier attempt is undecided: nothing more to attempt
+  // cfg.episodes are kept and no earlier attempt is undecided: nothing more to attempt.
+  bool enough() const;
 
   // Waits until every finished episode is safe on disk.
   void flush();

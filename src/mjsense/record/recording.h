@@ -24,18 +24,16 @@ struct Fps {
 
 struct VideoCfg {
   std::string ffmpeg;  // the program; "": $MJSENSE_FFMPEG, else "ffmpeg" of PATH
-  int max_encoders =
-      0;  // ffmpeg processes at one time; 0: 32. Streams beyond wait in raw files on disk.
-  int queue_frames =
-      3;  // frames of a stream that wait in memory; when they are full, append() waits
-  int threads =
-      1;  // per encoder. The bytes of a video depend on it, so it is never taken from the machine.
-  int crf = 25;  // x264 quality: 0 lossless .. 51
-  std::string preset = "medium";
-  int keyint =
-      250;  // most frames between key frames: smaller means faster seeking and larger files
-  double depth_unit =
-      0.0002;  // metres per unit of the 16-bit depth video: 0.2 mm reaches to 13.1 m
+  // ffmpeg processes at one time; 0: 32. Streams beyond them wait in raw files on disk.
+  int max_encoders = 0;
+  // Frames of a stream that wait in memory; when they are full, append() waits.
+  int queue_frames = 3;
+  // Per encoder. The bytes of a video depend on it, so it is never taken from the machine.
+  int threads = 1;
+  int crf = 24;                     // x264 quality: 0 lossless .. 51
+  std::string preset = "veryfast";  // x264 effort; docs/formats.md has the figures
+  int keyint = 250;                // most frames between key frames: fewer seek faster, more shrink
+  double depth_unit = 0.0002;      // metres per unit of the 16-bit depth video; reaches to 13.1 m
   bool molmospaces_depth = false;  // also MolmoSpaces' lossy red-green depth MP4, for its loaders
 };
 
@@ -43,15 +41,14 @@ struct RecordingCfg {
   std::filesystem::path out_dir;
   int house = 0;     // {out_dir}/house_{house}/
   int episodes = 1;  // episodes to keep
-  int batches =
-      0;  // files they are spread over; 0: max(1, round(episodes / 4)), as MolmoSpaces does
+  // Files they are spread over; 0: max(1, round(episodes / 4)), as MolmoSpaces does.
+  int batches = 0;
   int num_worlds = 1;
   Fps fps;
-  // The suite, in its order. Initialized; they outlive the recorder. Not one of their fields is
-  // missing on disk.
+  // The suite, in its order. Initialized; they outlive the recorder. Every field is on disk.
   std::vector<const Sensor*> sensors;
-  // JSON text of what made the data (task, robot, seed ...): kept in every file; a resumed
-  // recording must have the same.
+  // JSON text of what made the data (task, robot, seed ...): kept in every file; a recording can
+  // only be resumed with the same.
   std::string settings = "{}";
   bool resume = false;  // go on with what is there; else existing output is an error
   int gzip = 4;         // 0: no compression .. 9
