@@ -6,7 +6,7 @@ namespace mjsense {
 
 FlexShapes::FlexShapes(RTCDevice device, const mjModel* m, std::span<const float> vertices) {
   for (int f = 0; f < m->nflex; ++f) {
-    // Cloth shows its elements, a solid its shell; both list vertices of this flex, three a triangle.
+    // Cloth shows its elements, a solid its shell: three vertices of this flex a triangle.
     const bool cloth = m->flex_dim[f] == 2;
     const int* faces =
         cloth ? m->flex_elem + m->flex_elemdataadr[f] : m->flex_shell + m->flex_shelldataadr[f];

@@ -13,7 +13,7 @@ namespace mjsense {
 class FlexShapes {
  public:
   FlexShapes() = default;
-  // `vertices` [nflexvert, 3] stay where they are, with room for a fourth coordinate of the last one.
+  // `vertices` [nflexvert, 3] stay where they are, with room for a fourth coordinate of the last.
   FlexShapes(RTCDevice device, const mjModel* model, std::span<const float> vertices);
 
   // The vertices have moved. Embree may allocate.

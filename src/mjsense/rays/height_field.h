@@ -1,8 +1,9 @@
 #pragma once
 // A packet against a height field in its own frame, for kernels_impl.h. The surface z = h(x, y) is
-// two triangles a cell, split along (row, col) - (row + 1, col + 1); below it stands a base box of
-// its own. Each lane walks the cells under its ray, leaps over blocks that it passes above, and looks for a change of sign of z - h:
-// neighbouring cells share their borders' values, so no ray slips through a seam.
+// two triangles a cell, split along (row, col) - (row + 1, col + 1); below it stands a base box.
+// Each lane walks the cells under its ray, leaps over blocks that it passes above, and looks for a
+// change of sign of z - h: neighbouring cells share their borders' values, so no ray slips through
+// a seam.
 
 #include <mujoco/mujoco.h>
 
@@ -51,7 +52,8 @@ struct Cell {
   }
 };
 
-// A ray over the grid, in grid coordinates (columns, rows) and local heights; t counts from `start`.
+// A ray over the grid, in grid coordinates (columns, rows) and local heights; t counts from
+// `start`.
 struct GridRay {
   Float x, y, z;     // at t = 0
   Float dx, dy, dz;  // per metre

@@ -54,10 +54,12 @@ struct KernelFilter {
 
 struct RayKernels {
   void (*place)(const LocalPacket&, const float* rotation, float tmax, RayPacket&);
-  // Writes the boxes that any of `count` packets of one origin can meet into `low`, `high`, `ids`; returns their number.
+  // Writes the boxes that any of `count` packets of one origin can meet into `low`, `high`, `ids`;
+  // returns their number.
   int (*focus)(const KernelWorld&, const KernelFilter&, const RayPacket*, int count,
                float* const* low, float* const* high, int* ids);
-  // Writes what one packet can meet, nearest first: of all geoms that pass the filter, or of `boxes`.
+  // Writes what one packet can meet, nearest first: of all geoms that pass the filter, or of
+  // `boxes`; returns how many.
   int (*gather)(const KernelWorld&, const KernelFilter&, const RayPacket&, RayCandidate* out);
   int (*gather_from)(const KernelBoxes&, const RayPacket&, RayCandidate* out);
   void (*trace)(const KernelScene&, const KernelWorld&, const KernelFilter&, const RayPacket&,

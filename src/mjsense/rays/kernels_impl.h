@@ -92,7 +92,7 @@ std::uint32_t occluded_solid(const RayGeom& g, bool cull, const RayPacket& rays)
   for (int k = 0; k < kPacket; k += kWidth) {
     const Float t =
         Shape::intersect(g.size, frame.point(rays.o, k), frame.direction(rays.d, k), cull);
-    hit |= bits(t <= load(rays.tmax + k) & t < Float(kNoHit)) << k;
+    hit |= bits((t <= load(rays.tmax + k)) & (t < Float(kNoHit))) << k;
   }
   return hit;
 }
@@ -204,6 +204,13 @@ std::uint32_t occluded_height_field(const HeightField& field, const RayGeom& g, 
   return hit;
 }
 
+// The BVH of a mesh, SDF or flex; null where it has no triangles.
+RTCScene triangles_of(const KernelScene& scene, const KernelWorld& world, const RayGeom& g) {
+  if (g.type == kFlexType)
+    return static_cast<RTCScene>(const_cast<void*>(world.flex_scenes[g.data]));
+  return static_cast<RTCScene>(scene.mesh_scenes[g.data]);
+}
+
 void trace(const KernelScene& scene, const KernelWorld& world, const KernelFilter& filter,
            const RayPacket& rays, HitPacket& hits, const RayCandidate* candidates, int count) {
   for (int k = 0; k < kPacket; k += kWidth) {
@@ -244,13 +251,9 @@ void trace(const KernelScene& scene, const KernelWorld& world, const KernelFilte
         break;
       case mjGEOM_MESH:
       case mjGEOM_SDF:
-        trace_triangles(static_cast<RTCScene>(scene.mesh_scenes[g.data]), g, id, cull_mesh, rays,
-                        hits);
-        break;
       case kFlexType:
-        if (world.flex_scenes[g.data] == nullptr) break;
-        trace_triangles(static_cast<RTCScene>(const_cast<void*>(world.flex_scenes[g.data])), g, id,
-                        cull_mesh, rays, hits);
+        if (const RTCScene triangles = triangles_of(scene, world, g))
+          trace_triangles(triangles, g, id, cull_mesh, rays, hits);
         break;
       default:
         break;
@@ -291,14 +294,9 @@ std::uint32_t occluded(const KernelScene& scene, const KernelWorld& world,
         break;
       case mjGEOM_MESH:
       case mjGEOM_SDF:
-        hit |= occluded_triangles(static_cast<RTCScene>(scene.mesh_scenes[g.data]), g, cull_mesh,
-                                  rays);
-        break;
       case kFlexType:
-        if (world.flex_scenes[g.data] == nullptr) break;
-        hit |=
-            occluded_triangles(static_cast<RTCScene>(const_cast<void*>(world.flex_scenes[g.data])),
-                               g, cull_mesh, rays);
+        if (const RTCScene triangles = triangles_of(scene, world, g))
+          hit |= occluded_triangles(triangles, g, cull_mesh, rays);
         break;
       default:
         break;

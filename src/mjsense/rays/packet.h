@@ -30,13 +30,13 @@ struct alignas(64) LocalPacket {
 
 // What the rays hit first. A ray without a hit has t = kNoHit, geom = -1, and everything else 0.
 struct alignas(64) HitPacket {
-  float t[kPacket];     // m
-  int geom[kPacket];    // geom id; num_geoms + flex id for a flex
-  int prim[kPacket];    // mesh: face of the mesh; height field: 2 * cell + triangle, -1 base and
-                        // sides; flex: element
+  float t[kPacket];   // m
+  int geom[kPacket];  // geom id; num_geoms + flex id for a flex
+  // Mesh: its face. Height field: 2 * cell + triangle, -1 for base and sides. Flex: its triangle.
+  int prim[kPacket];
   float n[3][kPacket];  // unit normal in the world: outward, or by the triangle's winding
-  float u[kPacket],
-      v[kPacket];  // mesh, flex: barycentric weights of the triangle's second and third vertex
+  // Mesh and flex: barycentric weights of the triangle's second and third vertex.
+  float u[kPacket], v[kPacket];
 };
 
 // A geom that a packet may meet, not before t.
@@ -62,13 +62,12 @@ struct RayFilter {
     kCullMesh,  // triangles only from the side they are wound towards
     kCull,      // as MuJoCo's renderer: and solids only from outside
   };
-  std::uint32_t groups =
-      0x3f;                  // bit g: geoms of group g; groups are clamped to 0..5 as MuJoCo does
-  int exclude_body = -1;     // geoms of this body are not seen; its children's are
-  bool transparent = false;  // see geoms of alpha 0 too
+  std::uint32_t groups = 0x3f;  // bit g: geoms of group g, clamped to 0..5 as MuJoCo does
+  int exclude_body = -1;        // geoms of this body are not seen; its children's are
+  bool transparent = false;     // see geoms of alpha 0 too
   Backfaces backfaces = Backfaces::kHit;
-  std::span<const std::uint8_t>
-      hidden;  // [num_geoms + num_flexes]: nonzero is not seen; empty: all are seen
+  // Per geom and flex, nonzero: not seen. Empty: all are.
+  std::span<const std::uint8_t> hidden;
 };
 
 }  // namespace mjsense

@@ -1,13 +1,12 @@
 #pragma once
-// Everything that rays and cameras of B worlds can hit. Geometry (a BVH per mesh and per height
-// field) exists once; a world adds its geoms' poses. Answers are those of mj_ray, to 1e-5 m at 10
-// m:
-//   plane      from the front only; endless where size is 0, at any distance
-//   sphere, capsule, ellipsoid, cylinder, box      from outside and from inside, normal outward
-//   mesh       both sides, normal by winding
-//   hfield     both sides of the surface, side walls, base box
-//   sdf        its mesh, as MuJoCo draws it (mj_ray marches the field itself: they differ by the
-//   mesh's resolution) flex       its triangles without the radius (mj_ray does not see flexes)
+// Everything that rays and cameras of B worlds can hit. Geometry (a BVH per mesh) exists once; a
+// world adds its geoms' poses. Answers are those of mj_ray, to 1e-5 m at 10 m:
+//   plane   from the front only; endless where size is 0, at any distance
+//   sphere, capsule, ellipsoid, cylinder, box   from outside and inside, normal outward
+//   mesh    both sides, normal by winding
+//   hfield  both sides of the surface, side walls, base box
+//   sdf     its mesh, as MuJoCo draws it: mj_ray marches the field, they differ by its resolution
+//   flex    its triangles without the radius (mj_ray does not see flexes); none for lines
 // Hits nearer to each other than rounding are a tie: the lower geom id wins.
 //
 // update() runs in the parallel pass over worlds; tracing reads only and may run on any number of
@@ -31,8 +30,7 @@ struct RayKernels;
 class FlexShapes;
 struct SharedGeometry;
 
-// Geoms that a packet of rays may meet, nearest first. One a thread, made once, reused by every
-// query.
+// Geoms that a packet of rays may meet. One a thread, made once, reused by every query.
 class RayScratch {
  public:
   explicit RayScratch(int num_objects);  // RayScene::num_objects()
@@ -77,7 +75,8 @@ class RayScene {
   void gather(int world, const RayFilter& filter, const RayPacket& rays, RayScratch& scratch) const;
   void trace_candidates(int world, const RayFilter& filter, const RayPacket& rays, HitPacket& hits,
                         std::span<const RayCandidate> candidates) const;
-  // For many packets of one origin: focus() narrows the world to what any of them can meet, trace_focused() then traces each.
+  // For many packets of one origin: focus() narrows the world to what any of them can meet,
+  // trace_focused() then traces each.
   void focus(int world, const RayFilter& filter, std::span<const RayPacket> packets,
              RayScratch& scratch) const;
   void trace_focused(int world, const RayFilter& filter, const RayPacket& rays, HitPacket& hits,

@@ -32,7 +32,8 @@ class RayWorld {
   RayWorld() = default;
   RayWorld(const mjModel* model, const ShapeBounds& bounds);
 
-  // Copies the world's present values; what did not move costs a comparison. No allocation. Called by one thread a world.
+  // Copies the world's present values; what did not move costs a comparison. No allocation. Called
+  // by one thread a world.
   void update(const mjModel* model, const mjData* data);
 
   int num_geoms() const { return num_geoms_; }  // of the model, without flexes
@@ -49,12 +50,12 @@ class RayWorld {
   std::span<const std::uint32_t> flags() const { return flags_; }
   std::span<const int> bodies() const { return bodies_; }  // body id, -1 for flexes and padding
   std::span<const int> materials() const { return materials_; }  // material id or -1
-  std::span<const float> rgba() const {
-    return rgba_;
-  }  // [num_objects, 4], resolved: the material's if it has one
+  // [num_objects, 4], resolved: the material's if it has one
+  std::span<const float> rgba() const { return rgba_; }
+  // [nflexvert, 3] m, world
   std::span<const float> flex_vertices() const {
     return {flex_vertices_.data(), flex_vertices_.size() - 1};
-  }  // [nflexvert, 3] m, world
+  }
   std::span<const RayLight> lights() const { return lights_; }
   std::span<const RayCamera> cameras() const { return cameras_; }
 

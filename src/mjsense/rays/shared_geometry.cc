@@ -98,16 +98,13 @@ SharedGeometry::SharedGeometry(const mjModel* m) {
     throw RuntimeError(fmt::format("ray scene: Embree gave no device (error {})",
                                    static_cast<int>(rtcGetDeviceError(nullptr))));
 
-  std::vector<bool> shown(m->nmesh, false);
-  for (int i = 0; i < m->ngeom; ++i)
-    if ((m->geom_type[i] == mjGEOM_MESH || m->geom_type[i] == mjGEOM_SDF) && m->geom_dataid[i] >= 0)
-      shown[m->geom_dataid[i]] = true;
+  // All meshes, shown or not: a world may give a geom another one.
   meshes.resize(m->nmesh);
   mesh_scenes.assign(m->nmesh, nullptr);
   for (int i = 0; i < m->nmesh; ++i) {
     const float* vertices = m->mesh_vert + 3 * m->mesh_vertadr[i];
     bounds.meshes.push_back(box_around(vertices, m->mesh_vertnum[i]));
-    if (!shown[i]) continue;
+    if (m->mesh_facenum[i] == 0) continue;
     meshes[i] = build_triangles(device.get(), vertices, m->mesh_vertnum[i],
                                 m->mesh_face + 3 * m->mesh_faceadr[i], m->mesh_facenum[i]);
     mesh_scenes[i] = meshes[i].get();

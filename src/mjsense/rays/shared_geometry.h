@@ -1,5 +1,5 @@
 #pragma once
-// The shapes that all worlds share: one BVH a mesh, one a height field.
+// The shapes that all worlds share: a BVH for each mesh; height fields, which rays march over.
 
 #include <mujoco/mujoco.h>
 
@@ -25,7 +25,7 @@ struct SharedGeometry {
   explicit SharedGeometry(const mjModel* model);
 
   DeviceHandle device;
-  std::vector<SceneHandle> meshes;             // null for a mesh that no geom shows
+  std::vector<SceneHandle> meshes;             // null for a mesh without faces
   std::vector<void*> mesh_scenes;              // the same, for the kernels
   std::vector<HeightField> height_fields;      // data: the model's
   std::vector<std::vector<float>> block_tops;  // of each height field

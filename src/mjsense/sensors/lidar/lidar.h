@@ -3,11 +3,10 @@
 // its point cloud.
 //
 // All fields of RayCastSensor (geom_id and its kin always), and
-//   points      float32 [B, N, 3]  m, sensor frame, as the device reports them; 0 without a return
-//   intensity   float32 [B, N]     0..1: albedo of the surface times the cosine of incidence; 0
-//   without a return
-// Noise is in distances, points and hit_pos_w alike. Ray order: a spinning lidar's is [channels,
-// samples], row-major, the first channel first; a table's is its own.
+//   points      float32 [B, N, 3]  m, sensor frame, as the device reports them; 0: no return
+//   intensity   float32 [B, N]     0..1: the surface's albedo times the cosine of incidence
+// Noise is in distances, points and hit_pos_w alike. Ray order: a spinning lidar's is
+// [channels, samples], row-major, the first channel first; a table's is its own.
 
 #include <array>
 #include <memory>
@@ -33,11 +32,9 @@ struct SpinningScan {
 // Rays from a table of (azimuth, elevation) in radians: solid-state lidars, or a pattern that does
 // not repeat within a reading.
 struct TableScan {
-  std::string
-      file;  // .npy of shape (M, 2), float32 or float64, such as mujoco-lidar's Livox tables
+  std::string file;  // .npy of shape (M, 2), such as mujoco-lidar's Livox tables
   std::vector<std::array<double, 2>> angles;  // or the table itself
-  int rays_per_scan =
-      0;  // each scan takes the next so many rows, and starts again at the end; 0: all rows
+  int rays_per_scan = 0;  // rows that a scan takes, the next ones at the next scan; 0: all
   double rate_hz = 10.0;  // scans a second
 };
 
@@ -47,8 +44,8 @@ struct LidarSensorCfg : RayCastSensorCfg {
     min_distance = 0.1;
   }
   std::variant<SpinningScan, TableScan> scan;
-  bool motion_distortion =
-      false;  // each ray leaves from where the frame was at its own moment of the sweep
+  // Each ray leaves from where the frame was at its own moment of the sweep.
+  bool motion_distortion = false;
   double range_noise_std = 0.0;       // m
   double range_noise_relative = 0.0;  // standard deviation in parts of the range, added in squares
   double range_resolution = 0.0;      // m, distances are rounded to multiples; 0: not at all

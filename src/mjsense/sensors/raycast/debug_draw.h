@@ -1,6 +1,6 @@
 #pragma once
-// What a ray sensor saw, as geoms for MuJoCo's viewers: a ball at each hit and, as cfg().viz asks, an arrow along each ray and
-// the surface's normal.
+// What a ray sensor saw, as geoms for MuJoCo's viewers: a ball at each hit and, as cfg().viz asks,
+// an arrow along each ray and the surface's normal.
 
 #include <mujoco/mujoco.h>
 
@@ -8,7 +8,7 @@
 
 namespace mjsense {
 
-// Appends to `scene` the last reading of this world; stops where the scene is full. Returns how many geoms were left out.
+// Appends to `scene` the last reading of this world. Returns how many geoms found no room.
 // Labels: "<sensor>_hit_3", "<sensor>_ray_3", "<sensor>_normal_3".
 int draw_rays(const RayCastSensor& sensor, int world, const mjModel* model, mjvScene* scene);
 

@@ -28,13 +28,12 @@ struct GridPattern {
   std::array<double, 3> direction{0, 0, -1};
 };
 
-// Rays from one point through the edges (not the centres) of an image's pixels, looking along -z. u
-// = linspace(-1, 1, width) varies fastest; the first row is the bottom of MuJoCo's image.
+// Rays from one point through the edges (not the centres) of an image's pixels, looking along -z.
+// u = linspace(-1, 1, width) varies fastest; the first row is the bottom of MuJoCo's image.
 struct PinholePattern {
   int width = 16, height = 12;
   double fovy = 45.0;  // degrees; horizontally tan(fovx / 2) = tan(fovy / 2) * width / height
-  std::string camera;  // resolution and field of view of this camera of the model instead; its pose
-                       // plays no part
+  std::string camera;  // resolution and field of view of this camera instead; not its pose
 
   // K row-major, 3x3: fovy = 2 atan(height / (2 fy)); fx, cx and cy play no part.
   static PinholePattern from_intrinsic_matrix(const std::array<double, 9>& k, int width,

@@ -2,12 +2,13 @@
 // RayCastSensor: distances, hit points and normals of rays that travel with one or more frames.
 //
 // B worlds, F frames, n rays a frame, N = F * n rays (frame-major: ray f * n + i). Fields:
-//   distances     float32 [B, N]     m along the ray; -1: nothing between min_distance and
-//   max_distance hit_pos_w     float32 [B, N, 3]  m, world; the ray's origin where it hits nothing
-//   normals_w     float32 [B, N, 3]  unit, world: outward, or by the triangle's winding; 0 where it
-//   hits nothing frame_pos_w   float32 [B, F, 3]  m, world frame_quat_w  float32 [B, F, 4]  wxyz,
-//   of the frame itself (not of the alignment); largest component positive pos_w, quat_w those of
-//   frame 0, [B, 3] and [B, 4]
+//   distances     float32 [B, N]     m along the ray; -1: nothing in [min_distance, max_distance]
+//   hit_pos_w     float32 [B, N, 3]  m, world; the ray's origin where it hits nothing
+//   normals_w     float32 [B, N, 3]  unit, world: outward, or by the triangle's winding; 0: no hit
+//   frame_pos_w   float32 [B, F, 3]  m, world
+//   frame_quat_w  float32 [B, F, 4]  wxyz, the frame's own (not of the alignment), largest one > 0
+//   pos_w         float32 [B, 3]     m, world, of frame 0
+//   quat_w        float32 [B, 4]     wxyz, of frame 0
 // and with hit_ids
 //   geom_id       int32   [B, N]     -1: none; num_geoms + flex id for a flex
 //   body_id       int32   [B, N]     body of that geom; -1: none, or a flex
@@ -43,14 +44,11 @@ struct RayCastVizCfg {
 };
 
 struct RayCastSensorCfg : SensorCfg {
-  std::vector<ObjRef>
-      frame;  // body (its own frame, not the inertial one), site, geom; also xbody and camera
+  std::vector<ObjRef> frame;  // body (its own frame, not the inertial one), site, geom, camera
   PatternCfg pattern = GridPattern{};
-  std::string ray_alignment =
-      "base";                  // base yaw world: what of the frame's rotation the rays follow
-  double max_distance = 10.0;  // m; a hit beyond it is none
-  bool exclude_parent_body =
-      true;  // geoms of the frame's own body are not seen; those of its children are
+  std::string ray_alignment = "base";  // base yaw world: what of the frame's turn the rays follow
+  double max_distance = 10.0;          // m; a hit beyond it is none
+  bool exclude_parent_body = true;     // the frame's body is not seen; its children are
   std::optional<std::vector<int>> include_geom_groups{{0, 1, 2}};  // nullopt: all
   bool debug_vis = false;
   RayCastVizCfg viz;
@@ -94,15 +92,13 @@ class RayCastSensor : public Sensor {
   }
 
  protected:
-  // Rays of a pattern that is cast in `count` parts of equal size, one after the other; which is
-  // the turn's in this world.
+  // A pattern may be cast in parts of equal size, one after the other; part() says whose turn it is.
   virtual int num_parts() const { return 1; }
   virtual int part(const World& /*world*/) const { return 0; }
-  int part_of(int world) const { return parts_[world]; }
   // The rays of one frame, for the pattern given.
   virtual RayPattern build_pattern(const mjModel* model) const;
-  // One packet of this world and frame is traced: lane i is ray bundle.rays(p)[i] of the frame, or none if that is < 0. Lanes whose hit
-  // does not count have geom -1. Runs on any thread.
+  // One packet of this world and frame is traced: lane i is ray bundle.rays(p)[i] of the frame, or
+  // none if that is < 0. Lanes whose hit does not count have geom -1. Runs on any thread.
   virtual void traced(const RayScene& rays, int world, int frame, const RayBundle& bundle, int p,
                       const RayPacket& packet, const HitPacket& hits);
   // After all rays of a world are traced; worlds in parallel, each on one thread.
