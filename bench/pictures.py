@@ -27,7 +27,7 @@ SCENES = {
     "go1": ("view", "head"),
     "panda": ("view",),
 }
-WIDTH, HEIGHT = 340, 255
+WIDTH, HEIGHT = 300, 225
 SHOWN_GROUPS = (0, 1, 2)
 
 

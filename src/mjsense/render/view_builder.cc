@@ -165,6 +165,8 @@ void ViewBuilder::set_mirror(const RayWorld& world, const SharedGeometry& shapes
       for (int k = 0; k < 3; ++k) r[3 * k + j] = rotation[3 * k + j] - 2 * along * normal[k];
     }
     mirrored_->left_out_ = id;
+    mirrored_->own_headlight_ = false;
+    for (int k = 0; k < 3; ++k) mirrored_->headlight_[k] = -rotation[3 * k + 2];
     mirrored_->tint_ = reflectance;
     view_.reflection = &mirrored_->build(world, shapes, appearance, p, r, view_.grid);
     view_.mirror = id;
@@ -304,7 +306,9 @@ void ViewBuilder::set_lights(const RayWorld& world, const Appearance& appearance
     light = appearance.lights()[i];
     const int id = appearance.light_ids()[i];
     if (id < 0) {  // the headlight shines where the camera looks
-      light.dir[2] = -1;
+      double d[3] = {0, 0, -1};
+      if (!own_headlight_) rotate_back(rotation, headlight_, d);
+      for (int k = 0; k < 3; ++k) light.dir[k] = static_cast<float>(d[k]);
       continue;
     }
     const RayLight& source = world.lights()[id];

@@ -82,7 +82,9 @@ class ViewBuilder {
   std::vector<Order> order_;
   std::unique_ptr<ViewBuilder> mirrored_;  // null: nothing in the model reflects
   int left_out_ = -1;                      // geom that this view does not show: the mirror itself
-  float tint_ = 1;                         // of every colour: the mirror's reflectance
+  bool own_headlight_ = true;              // else headlight_: where the mirrored camera looks
+  double headlight_[3] = {};
+  float tint_ = 1;  // of every colour: the mirror's reflectance
 };
 
 }  // namespace mjsense
