@@ -18,17 +18,24 @@ namespace mjsense {
 enum class ContactReduce { kNone, kMinDist, kMaxForce, kNetForce };
 ContactReduce contact_reduce_from_name(std::string_view name, std::string_view place);  // KeyError
 
-// mj_contactForce, without the call for the usual kind of contact: force and torque in the contact frame.
+// mj_contactForce, without the call for contacts that are plain constraints: force and torque in the
+// contact frame. A pyramid's edges come in pairs, one pair for each friction direction.
 inline void contact_wrench(const mjModel* m, const mjData* d, int id, mjtNum wrench[6]) {
   const mjContact& c = d->contact[id];
-  const bool usual = c.exclude == 0 && c.efc_address >= 0 && c.adhesion == 0 && c.dim == 3 &&
-                     m->opt.cone == mjCONE_PYRAMIDAL && !(m->opt.enableflags & mjENBL_IPC);
-  if (!usual) return mj_contactForce(m, d, id, wrench);
-  const mjtNum* edge = d->efc_force + c.efc_address;
-  wrench[0] = edge[0] + edge[1] + edge[2] + edge[3];
-  wrench[1] = (edge[0] - edge[1]) * c.friction[0];
-  wrench[2] = (edge[2] - edge[3]) * c.friction[1];
-  wrench[3] = wrench[4] = wrench[5] = 0;
+  const bool plain = c.exclude == 0 && c.efc_address >= 0 && c.adhesion == 0 &&
+                     !(m->opt.enableflags & mjENBL_IPC);
+  if (!plain) return mj_contactForce(m, d, id, wrench);
+  const mjtNum* force = d->efc_force + c.efc_address;
+  for (int i = 0; i < 6; ++i) wrench[i] = 0;
+  if (c.dim == 1 || m->opt.cone == mjCONE_ELLIPTIC) {
+    for (int i = 0; i < c.dim; ++i) wrench[i] = force[i];
+    return;
+  }
+  for (int i = 1; i < c.dim; ++i, force += 2) {
+    wrench[0] += force[0];  // one by one, as MuJoCo: equal forces stay equal
+    wrench[0] += force[1];
+    wrench[i] = (force[0] - force[1]) * c.friction[i - 1];
+  }
 }
 
 // One contact while a pass looks at it. Its wrench is computed when first asked for, once for all

@@ -1,0 +1,118 @@
+"""Contact sensing on Unitree Go1 robots on rough terrain: what it adds to a step, next to MuJoCo's own contact sensors.
+
+The robot is mjlab's, taken from its wheel on PyPI into a temporary folder. All cases run the same physics; CPU time of one thread, so
+that other programs on the machine matter little. MuJoCo's sensors give the seven fields of the four feet at the end of a step;
+ours give these and air time, touchdown and lift-off, the peak of the step, and a history of four substeps of every field.
+"""
+
+import glob
+import pathlib
+import subprocess
+import sys
+import tempfile
+import time
+import zipfile
+
+import mujoco
+from harness import Row, report
+
+import mjsense as mjs
+
+FIELDS = ("found", "force", "torque", "dist", "pos", "normal", "tangent")
+FEET = [f"{leg}_foot_collision" for leg in ("FR", "FL", "RR", "RL")]
+DECIMATION = 4
+
+
+def fetch_go1(folder: str) -> pathlib.Path:
+    command = [sys.executable, "-m", "pip", "-q", "download", "mjlab==1.6.0", "--no-deps", "-d", folder]
+    if subprocess.run(command).returncode:
+        sys.exit("bench/contact: cannot fetch mjlab's wheel from PyPI")
+    with zipfile.ZipFile(glob.glob(f"{folder}/*.whl")[0]) as wheel:
+        wheel.extractall(folder, [n for n in wheel.namelist() if "unitree_go1/xmls" in n])
+    return next(pathlib.Path(folder).rglob("go1.xml"))
+
+
+def robot(xml: pathlib.Path, native: bool) -> mujoco.MjSpec:
+    """Go1 that stands on springs; with MuJoCo's contact sensors, one a foot, if `native`."""
+    spec = mujoco.MjSpec.from_file(str(xml))
+    pose = {"thigh": 0.9, "calf": -1.8, "R_hip": 0.1, "L_hip": -0.1}
+    for joint in spec.joints:
+        for part, angle in pose.items():
+            if part in joint.name:
+                joint.stiffness, joint.damping, joint.springref = 40.0, 1.0, angle
+    for foot in FEET if native else ():
+        sensor = spec.add_sensor(name=f"{foot}_contact", type=mujoco.mjtSensor.mjSENS_CONTACT)
+        sensor.objtype, sensor.objname = mujoco.mjtObj.mjOBJ_GEOM, foot
+        sensor.intprm[0] = sum(1 << i for i in range(7))  # the seven fields
+        sensor.intprm[1] = 2  # maxforce
+        sensor.intprm[2] = 1
+    return spec
+
+
+def feet(**kwargs) -> mjs.ContactSensorCfg:
+    primary = mjs.ContactMatch(mode="geom", pattern=".*_foot_collision", entity="robot")
+    return mjs.ContactSensorCfg(name="feet", primary=primary, fields=FIELDS, **kwargs)
+
+
+class Case:
+    def __init__(self, xml: pathlib.Path, worlds: int, sensors=(), read=(), native: bool = False, rough: bool = True) -> None:
+        entity = mjs.EntityCfg(model=robot(xml, native), pos=(0.0, 0.0, 0.35))
+        terrain = mjs.TerrainCfg(terrain_type="generator", levels=2, types=4) if rough else mjs.TerrainCfg()
+        self.scene = mjs.Scene(mjs.SceneCfg(entities={"robot": entity}, terrain=terrain, sensors=sensors))
+        self.sim = mjs.Simulation(self.scene, num_worlds=worlds, decimation=DECIMATION, threads=1)
+        self.read = [self.scene[key] for key in read]
+        self.seconds: list[float] = []
+        self.run(25)
+
+    def run(self, steps: int) -> None:
+        for _ in range(steps):
+            self.sim.step()
+            for sensor in self.read:
+                sensor.data
+
+    def measure(self, steps: int) -> None:
+        start = time.process_time()
+        self.run(steps)
+        self.seconds.append((time.process_time() - start) / steps)
+
+    def us_per_world_step(self) -> float:
+        """Of one substep of one world: the least of all rounds, which other programs disturbed least."""
+        return 1e6 * min(self.seconds) / self.sim.num_worlds / DECIMATION
+
+
+def main() -> None:
+    quick = "--quick" in sys.argv
+    rounds, steps = (3, 4) if quick else (9, 10)
+    rows = []
+    with tempfile.TemporaryDirectory() as folder:
+        xml = fetch_go1(folder)
+        imu = [f"robot/imu_{s}" for s in ("ang_vel", "lin_vel", "lin_acc")]
+        memory = {"track_air_time": True, "track_events": True, "latch": True, "history_length": DECIMATION}
+        cases = {
+            "physics": Case(xml, 64),
+            "fields": Case(xml, 64, (feet(),), ["feet", *imu]),
+            "memory": Case(xml, 64, (feet(**memory),), ["feet", *imu]),
+            "mujoco": Case(xml, 64, read=[*imu, *(f"robot/{f}_contact" for f in FEET)], native=True),
+        }
+        for _ in range(rounds):
+            for case in cases.values():
+                case.measure(steps)
+        us = {name: case.us_per_world_step() for name, case in cases.items()}
+        rows.append(Row("64 Go1 on rough terrain: physics", us["physics"], "us a world-substep"))
+        for name, text in (("fields", "IMU and feet, 7 fields"), ("memory", "the same with air time, events, peak, history")):
+            share = 100 * (us[name] - us["physics"]) / us["physics"]
+            peer = 100 * (us["mujoco"] - us["physics"]) / us["physics"]
+            rows.append(Row(text, share, "% of physics", peer, "MuJoCo's sensors, 7 fields", higher_is_better=False))
+        for worlds in (16, 256) if quick else (16, 256, 2048):
+            case = Case(xml, worlds, (feet(**memory),), ["feet"], rough=False)
+            for _ in range(3):
+                case.measure(max(1, 2 * steps * 16 // worlds))
+            kilobytes = sum(a.nbytes for a in case.scene["feet"].fields.values()) / worlds / 1024
+            rows.append(Row(f"{worlds} Go1 on a plane: physics and feet", case.us_per_world_step(), "us a world-substep"))
+            rows.append(Row("- rows of the sensor", kilobytes, "KiB a world"))
+            del case
+    report("Contact sensors", rows)
+
+
+if __name__ == "__main__":
+    main()
