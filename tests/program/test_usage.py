@@ -90,9 +90,9 @@ def test_other_words_run_programs_of_the_path(mjsense):
 def test_sensors_of_a_scene(mjsense):
     (mjsense.folder / "scene.xml").write_text(SCENE)
     out = mjsense("sensors", "scene.xml").stdout
-    assert "scene/turn" in out and "rad/s" in out
+    assert "turn" in out and "rad/s" in out
     table = json.loads(mjsense("sensors", "scene.xml", "--json").stdout)
-    turn = next(s for s in table if s["name"] == "scene/turn")
+    turn = next(s for s in table if s["name"] == "turn")
     assert turn["shape"] == [3] and turn["bytes"] == 12 and turn["microseconds"] > 0
 
 

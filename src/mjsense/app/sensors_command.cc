@@ -39,6 +39,10 @@ std::vector<Line> lines_of(Simulation& simulation, std::span<Sensor* const> sens
   return lines;
 }
 
+std::string cost_text(double microseconds) {
+  return fmt::format("{:.{}f}", microseconds, microseconds < 10 ? 2 : microseconds < 1000 ? 1 : 0);
+}
+
 void print(const std::vector<Line>& lines, bool json) {
   if (json) {
     nlohmann::json out = nlohmann::json::array();
@@ -67,12 +71,11 @@ void print(const std::vector<Line>& lines, bool json) {
     total_cost += std::max(cost, 0.0);
     table.rows.push_back({spec->name, spec->shape.str(),
                           spec->is_dict ? "json" : std::string(dtype_name(spec->dtype)), spec->unit,
-                          spec->frame, fmt::format("{}", bytes),
-                          cost < 0 ? "" : fmt::format("{:.1f}", cost)});
+                          spec->frame, fmt::format("{}", bytes), cost < 0 ? "" : cost_text(cost)});
   }
   table.rows.push_back({fmt::format("{} streams", lines.size()), "", "", "", "",
                         fmt::format("{}", total_bytes),
-                        total_cost > 0 ? fmt::format("{:.1f}", total_cost) : ""});
+                        total_cost > 0 ? cost_text(total_cost) : ""});
   fmt::print("{}", table.text());
 }
 

@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <cctype>
 
 #include "mjsense/observe/camera_parameters.h"
 #include "mjsense/observe/env_states.h"

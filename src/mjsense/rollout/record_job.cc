@@ -124,6 +124,9 @@ class RecordJob {
     if (cfg.episodes < 1) {
       throw ValueError(fmt::format("episodes is {}: must be at least 1", cfg.episodes));
     }
+    if (cfg.rollout.policy.empty()) {
+      throw ValueError(fmt::format("record needs a policy{}", suggest("", policy_names())));
+    }
     cfg.rollout.num_worlds = std::min(cfg.rollout.num_worlds, cfg.episodes);
     return cfg;
   }
@@ -183,14 +186,14 @@ class RecordJob {
 
   void end(int w, bool success, const std::string& outcome) {
     timed([&] {
-      if (success || (cfg_.keep_failures && lengths_[w] > 1)) {
+      if (success || (cfg_.keep_failures && lengths_[w] > 1 && !rollout_.refused(w))) {
         recorder_.finish_episode(w, rollout_.task().obs_scene(w), outcome);
       } else {
         recorder_.discard_episode(w, outcome);
       }
     });
     // Attempts that fail make what is kept dearer.
-    ended_steps_ += lengths_[w] - 1;
+    ended_steps_ += std::max(0, lengths_[w] - 1);
     ++(success ? progress_.succeeded : progress_.failed);
     progress_.mean_length = static_cast<double>(ended_steps_) /
                             std::max(1, cfg_.keep_failures ? progress_.succeeded + progress_.failed

@@ -109,6 +109,7 @@ Rollout::Rollout(const RolloutCfg& cfg) : cfg_(cfg) {
   evaluations_.resize(cfg.num_worlds);
   faults_.resize(cfg.num_worlds);
   active_.assign(cfg.num_worlds, 0);
+  refused_.assign(cfg.num_worlds, 0);
   for (int w = 0; w < cfg.num_worlds; ++w) rows_.push_back(state_row(simulation_->worlds(), w));
   ids_.reserve(cfg.num_worlds);
 }
@@ -149,6 +150,7 @@ void Rollout::start(std::span<const int> worlds, std::span<const std::int64_t> e
     const int w = worlds[k];
     active_[w] = true;
     faults_[w].clear();
+    refused_[w] = false;
     actions_[w] = Action{};
     simulation_->worlds().rekey(w, static_cast<std::uint32_t>(episodes[k]));
   }
@@ -206,6 +208,7 @@ bool Rollout::guard_rows(const std::function<void()>& body) {
   } catch (const RowTooLong& e) {
     if (!active_[e.world] || !faults_[e.world].empty()) throw;
     set_fault(e.world, e.what());
+    refused_[e.world] = true;
     return false;
   }
 }

@@ -93,6 +93,8 @@ class Rollout {
   // Why this world's episode cannot go on: physics that diverged (MuJoCo's text), a row that does
   // not fit. "" if it can. Its rows mean nothing until it is started again.
   const std::string& fault(int world) const { return faults_[world]; }
+  // The fault is a row that does not fit: nothing of this episode may be kept.
+  bool refused(int world) const { return refused_[world]; }
 
   const RolloutTimes& times() const { return times_; }
 
@@ -118,7 +120,7 @@ class Rollout {
   std::vector<Action> actions_;
   std::vector<Evaluation> evaluations_;
   std::vector<std::string> faults_;
-  std::vector<char> active_;
+  std::vector<char> active_, refused_;
   std::vector<StateRow> rows_;  // [B]
   std::vector<int> ids_;        // scratch of active_worlds()
   RolloutTimes times_;

@@ -221,7 +221,9 @@ TEST(Rollout, ARowThatDoesNotFitEndsItsEpisodeAlone) {
   }
   EXPECT_EQ(rollout.fault(1),
             "sensor 'notes', world 1: its text needs 29 bytes, str_max_len is 16");
+  EXPECT_TRUE(rollout.refused(1));
   EXPECT_EQ(rollout.fault(0), "");
+  EXPECT_FALSE(rollout.refused(0));
   EXPECT_EQ(row(rollout, "task_info", 0)["episode_step"], 5);
 }
 
