@@ -3,6 +3,10 @@
 #include <fmt/format.h>
 
 #include <filesystem>
+#include <vector>
+
+#include "mjsense/core/error.h"
+#include "mjsense/scene/resolve.h"
 
 namespace mjsense {
 namespace {
@@ -24,10 +28,22 @@ class Adopter {
         return in_memory(it->first, it->second);
     }
     const fs::path base = mjs_getString(origin->modelfiledir);
-    return base.is_absolute() ? (base / joined).lexically_normal().generic_string() : joined;
+    std::string path = (base / joined).lexically_normal().generic_string();
+    if (!base.empty()) path = fs::absolute(path).generic_string();
+    // "provider:name" is for MuJoCo's resource providers.
+    if (path.find(':') == std::string::npos && !fs::exists(path)) missing(element, path);
+    return path;
   }
 
  private:
+  [[noreturn]] void missing(const mjsElement* element, const std::string& path) const {
+    std::vector<std::string> names;
+    for (const auto& [name, bytes] : source_.assets) names.push_back(name);
+    throw ValueError(fmt::format(
+        "{}: {} '{}': no file '{}'{}", entity_.empty() ? "scene base" : "entity '" + entity_ + "'",
+        obj_type_name(element->elemtype), element_name(element), path, suggest(path, names)));
+  }
+
   std::string in_memory(const std::string& name, const std::string& bytes) const {
     const auto taken = vfs_.files().find(name);
     const bool clash = taken != vfs_.files().end() && taken->second != bytes;

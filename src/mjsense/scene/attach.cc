@@ -81,6 +81,38 @@ bool is_identity(const EntityCfg& cfg) {
   return cfg.pos == std::array<double, 3>{0, 0, 0} && cfg.quat == std::array<double, 4>{1, 0, 0, 0};
 }
 
+// Elements that refer to others. MuJoCo leaves out, without a word, those whose target is unknown.
+struct Census {
+  mjtObj type;
+  std::vector<std::string> names;
+};
+
+std::vector<Census> census(const mjSpec* spec) {
+  std::vector<Census> counts;
+  for (mjtObj type :
+       {mjOBJ_ACTUATOR, mjOBJ_SENSOR, mjOBJ_TENDON, mjOBJ_EQUALITY, mjOBJ_PAIR, mjOBJ_EXCLUDE}) {
+    counts.push_back({type, spec_names(spec, type)});
+  }
+  return counts;
+}
+
+void check_nothing_lost(const std::vector<Census>& child, const std::vector<Census>& before,
+                        const std::vector<Census>& after, const ModelSource& source,
+                        const std::string& place) {
+  for (std::size_t i = 0; i < child.size(); ++i) {
+    const std::vector<std::string>& now = after[i].names;
+    if (now.size() - before[i].names.size() == child[i].names.size()) continue;
+    std::string why = explain_fault(source, place);  // MuJoCo's own words for the model alone
+    if (!why.empty()) throw ValueError(fmt::format("{}: {}", place, why));
+    const auto lost = std::find_if(child[i].names.begin(), child[i].names.end(), [&](auto& name) {
+      return std::none_of(now.begin(), now.end(), [&](auto& n) { return n.ends_with("/" + name); });
+    });
+    throw ValueError(fmt::format(
+        "{}: its {} '{}' cannot be attached: what it refers to is not in its model", place,
+        obj_type_name(child[i].type), lost == child[i].names.end() ? "" : *lost));
+  }
+}
+
 void set_pose(mjsBody* body, const EntityCfg& cfg, const std::string& place) {
   double norm = 0;
   for (double q : cfg.quat) norm += q * q;
@@ -149,10 +181,12 @@ Attached attach_entity(mjSpec* scene, const std::string& name, const EntityCfg& 
     std::copy(cfg.pos.begin(), cfg.pos.end(), frame->pos);
     std::copy(cfg.quat.begin(), cfg.quat.end(), frame->quat);
   }
+  const std::vector<Census> before = census(child.get()), scene_before = census(scene);
   // The scene keeps the child alive: it is attached by reference.
   if (!mjs_attach(frame->element, child->element, (name + "/").c_str(), "")) {
-    throw ValueError(fmt::format("{}: {}", place, mjs_getError(scene)));
+    throw ValueError(fmt::format("{}: {}", place, one_line(mjs_getError(scene))));
   }
+  check_nothing_lost(before, scene_before, census(scene), cfg.model, place);
   return attached;
 }
 

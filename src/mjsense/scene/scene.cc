@@ -147,7 +147,7 @@ void Scene::Impl::compile() {
     WarningCapture capture(warnings);
     model.reset(mj_compile(spec.get(), vfs.get()));
   }
-  if (!model) throw ValueError(fmt::format("scene: {}", mjs_getError(spec.get())));
+  if (!model) throw ValueError(fmt::format("scene: {}", one_line(mjs_getError(spec.get()))));
   merge_initial_states(attached, model.get());
   if (!mj_copyBack(spec.get(), model.get())) {  // the keyframe, for to_xml()
     throw RuntimeError(fmt::format("scene: {}", mjs_getError(spec.get())));

@@ -79,7 +79,7 @@ TEST(Scene, SaysWhatIsWrongWithAnEntity) {
   EXPECT_EQ(fault("a", {}), "entity 'a': no model; give a path or an XML text");
   EXPECT_THAT(fault("a", {.model = {.path = "x.xml", .xml = kBall}}), HasSubstr("not both"));
   EXPECT_THAT(fault("a", xml("<mujoco><worldbody><geom sise='1'/></worldbody></mujoco>")),
-              HasSubstr("entity 'a': XML Error: Schema violation: unrecognized attribute: 'sise'"));
+              HasSubstr("entity 'a': Schema violation: unrecognized attribute: 'sise'"));
   EXPECT_THAT(fault("a", xml("<mujoco><worldbody>")), HasSubstr("entity 'a': XML"));
   EXPECT_THAT(
       fault("a", xml("<mujoco><worldbody><body name='x'><joint/></body></worldbody></mujoco>")),

@@ -35,7 +35,7 @@ void on_message(const mjLogMessage* message) {
 }
 
 SpecPtr checked(mjSpec* spec, const char* error, std::string_view place) {
-  if (!spec) throw ValueError(fmt::format("{}: {}", place, error));
+  if (!spec) throw ValueError(fmt::format("{}: {}", place, one_line(error)));
   return SpecPtr(spec);
 }
 
@@ -115,6 +115,30 @@ SpecPtr parse_model(const ModelSource& source, std::string_view place) {
   const std::string path = std::filesystem::absolute(source.path).lexically_normal().string();
   return checked(mj_parse(path.c_str(), nullptr, vfs.get(), error, sizeof error), error,
                  fmt::format("{} ({})", place, source.path));
+}
+
+std::string explain_fault(const ModelSource& source, std::string_view place) {
+  Vfs vfs;
+  for (const auto& [name, bytes] : source.assets) vfs.add(name, bytes, place);
+  const SpecPtr spec = parse_model(source, place);
+  const ModelPtr model(mj_compile(spec.get(), vfs.get()));
+  return model ? "" : one_line(mjs_getError(spec.get()));
+}
+
+std::string one_line(std::string_view message) {
+  std::string out;
+  for (std::string_view prefix : {"XML Error: ", "Error: ", "Error: "}) {
+    if (message.starts_with(prefix)) message.remove_prefix(prefix.size());
+  }
+  for (char c : message) {
+    if (c == '\n') {
+      if (!out.empty() && !out.ends_with("; ")) out += "; ";
+    } else {
+      out += c;
+    }
+  }
+  while (out.ends_with("; ")) out.resize(out.size() - 2);
+  return out;
 }
 
 std::string save_xml(mjSpec* spec) {

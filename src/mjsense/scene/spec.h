@@ -61,6 +61,12 @@ class WarningCapture {
 // Parses a model. Throws ValueError with MuJoCo's text; `place` names the entity.
 SpecPtr parse_model(const ModelSource& source, std::string_view place);
 
+// What MuJoCo says when it compiles the model by itself; "" if it does compile.
+std::string explain_fault(const ModelSource& source, std::string_view place);
+
+// MuJoCo's message without its line breaks and its "Error:".
+std::string one_line(std::string_view message);
+
 // The compiled spec as MJCF: as it is written where one file can say it, exactly; else, where
 // entities were compiled with settings of their own, the values that compilation made.
 std::string save_xml(mjSpec* spec);
