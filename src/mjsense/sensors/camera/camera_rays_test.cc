@@ -1,0 +1,80 @@
+// Images against single rays of the ray scene: every pixel of random scenes of every geom type.
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+
+#include "mjsense/core/parallel.h"
+#include "mjsense/rays/ray_scene.h"
+#include "mjsense/rays/test_scene.h"
+#include "mjsense/sensors/camera/camera_sensor.h"
+
+namespace mjsense {
+namespace {
+
+TEST(CameraAgainstRays, EveryPixelSeesWhatItsRayMeets) {
+  constexpr int kWidth = 61, kHeight = 47, kScenes = 12;
+  long pixels = 0, other_geom = 0, hits = 0, off = 0;
+  for (int scene = 0; scene < kScenes; ++scene) {
+    Rng rng(7, 0, 1, scene);
+    std::string xml = testing::random_scene(
+        rng, {"plane", "sphere", "capsule", "ellipsoid", "cylinder", "box", "mesh", "hfield"}, 40,
+        2.5);
+    const std::string end = "</worldbody>";
+    const std::string eye =
+        testing::vec({rng.uniform(-4, 4), rng.uniform(-4, 4), rng.uniform(1, 4)});
+    const std::string turn =
+        testing::vec({rng.uniform(20, 70), rng.uniform(-30, 30), rng.uniform(-180, 180)});
+    xml.insert(xml.find(end),
+               "<camera name='c' pos='" + eye + "' euler='" + turn + "' fovy='70'/>");
+    testing::TestModel m(xml);
+    RayScene rays(m.model, 1);
+    rays.update(m.world());
+    CameraSensorCfg cfg;
+    cfg.name = "cam";
+    cfg.camera_name = "c";
+    cfg.width = kWidth;
+    cfg.height = kHeight;
+    cfg.data_types = {"depth", "segmentation"};
+    const auto camera = cfg.build();
+    SensorInit init;
+    init.model = m.model;
+    camera->initialize(init);
+    camera->compute(m.world());
+    ThreadPool pool(1);
+    const int id = 0;
+    camera->cast({&rays, {&id, 1}, pool});
+    const auto depth = camera->field("depth").data.row<float>(0);
+    const auto ids = camera->field("segmentation").data.row<std::int32_t>(0);
+
+    RayFilter filter;
+    filter.groups = 0x7;
+    filter.backfaces = RayFilter::Backfaces::kCull;
+    const double top = std::tan(35 * M_PI / 180), right = top * kWidth / kHeight;
+    const double *origin = m.data->cam_xpos, *r = m.data->cam_xmat;
+    for (int y = 0; y < kHeight; ++y)
+      for (int x = 0; x < kWidth; ++x) {
+        const double c[3] = {right * (2 * (x + 0.5) / kWidth - 1),
+                             top * (1 - 2 * (y + 0.5) / kHeight), -1};
+        double d[3];
+        for (int k = 0; k < 3; ++k)
+          d[k] = r[3 * k] * c[0] + r[3 * k + 1] * c[1] + r[3 * k + 2] * c[2];
+        const Hit hit = rays.trace(0, filter, origin, d);
+        const double planar = hit.t / std::hypot(c[0], c[1], c[2]);
+        const int i = y * kWidth + x;
+        ++pixels;
+        hits += hit.geom >= 0;
+        if (ids[2 * i] != hit.geom) {
+          ++other_geom;
+        } else if (hit.geom >= 0) {
+          off += std::abs(depth[i] - planar) > 1e-5 * (1 + planar);
+        }
+      }
+  }
+  EXPECT_GT(hits, pixels / 4);
+  EXPECT_LT(other_geom, pixels / 5000);  // edges, by rounding
+  EXPECT_LT(off, pixels / 5000);
+}
+
+}  // namespace
+}  // namespace mjsense
