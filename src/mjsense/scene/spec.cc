@@ -2,6 +2,7 @@
 
 #include <fmt/format.h>
 
+#include <atomic>
 #include <filesystem>
 #include <mutex>
 #include <optional>
@@ -21,7 +22,7 @@ namespace {
 constexpr std::string_view kEmbedded = "embedded:";
 
 std::mutex capture_mutex;
-mjfLogHandler chained = nullptr;
+std::atomic<mjfLogHandler> chained = nullptr;
 thread_local std::vector<std::string>* captured = nullptr;
 
 void on_message(const mjLogMessage* message) {
@@ -29,8 +30,8 @@ void on_message(const mjLogMessage* message) {
     std::string text = message->subject;
     if (message->body) text += fmt::format(": {}", message->body);
     captured->push_back(std::move(text));
-  } else if (chained) {
-    chained(message);
+  } else if (const mjfLogHandler next = chained) {
+    next(message);
   }
 }
 

@@ -59,58 +59,88 @@ void randomize(const mjModel* m, mjData* d, Rng& rng) {
   for (int i = 0; i < m->nu; ++i) d->ctrl[i] = rng.uniform(-1, 1);
 }
 
-// Configured sensors, discovered ones, and MuJoCo alone on the same XML: the same numbers.
+// Another robot of the same names: every pose, axis, size and mass moved at random.
+void disturb(mjSpec* spec, int seed) {
+  Rng rng(seed, 7, 0, 0);
+  const auto move = [&](double* pos, double* quat) {
+    for (int i = 0; i < 3; ++i) pos[i] += rng.uniform(-.05, .05);
+    for (int i = 0; i < 4; ++i) quat[i] += rng.uniform(-.2, .2);
+  };
+  for (mjsElement* e : spec_elements(spec, mjOBJ_BODY)) {
+    mjsBody* body = mjs_asBody(e);
+    if (element_name(e) != "world") move(body->pos, body->quat);
+  }
+  for (mjsElement* e : spec_elements(spec, mjOBJ_SITE))
+    move(mjs_asSite(e)->pos, mjs_asSite(e)->quat);
+  for (mjsElement* e : spec_elements(spec, mjOBJ_CAMERA)) {
+    move(mjs_asCamera(e)->pos, mjs_asCamera(e)->quat);
+  }
+  for (mjsElement* e : spec_elements(spec, mjOBJ_JOINT)) {
+    for (double& x : mjs_asJoint(e)->axis) x += rng.uniform(-.5, .5);
+    mjs_asJoint(e)->damping[0] = rng.uniform(0, 1);
+  }
+  for (mjsElement* e : spec_elements(spec, mjOBJ_GEOM)) {
+    if (mjs_asGeom(e)->type == mjGEOM_PLANE || mjs_asGeom(e)->type == mjGEOM_MESH) continue;
+    mjs_asGeom(e)->mass = rng.uniform(.1, 3);
+    mjs_asGeom(e)->size[0] *= rng.uniform(.7, 1.4);
+  }
+}
+
+// Configured sensors, discovered ones, and MuJoCo alone on the same XML: the same numbers, on random
+// robots in random states.
 TEST(BuiltinSensor, EveryTypeAgreesWithMujoco) {
   const std::vector<Case> cases = all_cases();
   std::string sensors;
-  SceneCfg cfg;
-  for (const Case& c : cases) {
-    sensors += c.xml;
-    cfg.sensors.push_back(std::make_shared<BuiltinSensorCfg>(c.cfg));
-  }
-  cfg.entities = {{"robot", {.model = {.xml = robot(sensors)}}}};
-  Bench bench(std::move(cfg));
-
-  // The same physics, without mjsense: prefixes are the only difference.
-  char error[1000] = "";
-  SpecPtr spec(mj_parseXMLString(robot(sensors).c_str(), nullptr, error, sizeof error));
-  ASSERT_TRUE(spec) << error;
-  spec->option = bench.model()->opt;
-  ModelPtr plain(mj_compile(spec.get(), nullptr));
-  ASSERT_TRUE(plain);
-  DataPtr data(mj_makeData(plain.get()));
-
+  for (const Case& c : cases) sensors += c.xml;
   std::set<std::string> types, moved;
-  for (int trial = 0; trial < 20; ++trial) {
-    Rng a(trial, 0, 0, 0), b(trial, 0, 0, 0);
-    mj_resetData(bench.model(), bench.data());
-    mj_resetData(plain.get(), data.get());
-    randomize(bench.model(), bench.data(), a);
-    randomize(plain.get(), data.get(), b);
-    for (int k = 0; k < 5; ++k) {
-      mj_step(bench.model(), bench.data());
-      mj_step(plain.get(), data.get());
-    }
-    mj_forward(bench.model(), bench.data());
-    mj_forward(plain.get(), data.get());
-    for (const Case& c : cases) {
-      const std::string local = c.cfg.name.substr(4);
-      const auto configured = bench.read(c.cfg.key());
-      const auto found = bench.read("robot/xml_" + local);
-      const int id = mj_name2id(plain.get(), mjOBJ_SENSOR, ("xml_" + local).c_str());
-      ASSERT_GE(id, 0) << local;
-      ASSERT_EQ(configured.size(), static_cast<std::size_t>(plain->sensor_dim[id])) << local;
-      ASSERT_EQ(found.size(), configured.size()) << local;
-      const auto& spec = bench.scene().sensor(c.cfg.key()).field().spec;
-      for (std::size_t i = 0; i < configured.size(); ++i) {
-        const float expected = static_cast<float>(data->sensordata[plain->sensor_adr[id] + i]);
-        EXPECT_EQ(configured[i], expected) << local << " " << i;
-        EXPECT_EQ(found[i], expected) << local << " " << i;
-        EXPECT_GE(configured[i], spec.low - 1e-5) << local;
-        EXPECT_LE(configured[i], spec.high + 1e-5) << local;
-        if (expected != 0) moved.insert(c.cfg.sensor_type);
+  for (int model = 0; model < 10; ++model) {
+    SceneCfg cfg;
+    for (const Case& c : cases) cfg.sensors.push_back(std::make_shared<BuiltinSensorCfg>(c.cfg));
+    cfg.entities = {{"robot", {.model = {.xml = robot(sensors)}}}};
+    if (model > 0) cfg.spec_fn = [&](mjSpec* spec) { disturb(spec, model); };
+    Bench bench(std::move(cfg));
+
+    // The same physics, without mjsense: prefixes are the only difference.
+    char error[1000] = "";
+    SpecPtr spec(mj_parseXMLString(robot(sensors).c_str(), nullptr, error, sizeof error));
+    ASSERT_TRUE(spec) << error;
+    spec->option = bench.model()->opt;
+    if (model > 0) disturb(spec.get(), model);
+    ModelPtr plain(mj_compile(spec.get(), nullptr));
+    ASSERT_TRUE(plain) << mjs_getError(spec.get());
+    DataPtr data(mj_makeData(plain.get()));
+
+    for (int trial = 0; trial < 5; ++trial) {
+      Rng a(trial, model, 0, 0), b(trial, model, 0, 0);
+      mj_resetData(bench.model(), bench.data());
+      mj_resetData(plain.get(), data.get());
+      randomize(bench.model(), bench.data(), a);
+      randomize(plain.get(), data.get(), b);
+      for (int k = 0; k < 5; ++k) {
+        mj_step(bench.model(), bench.data());
+        mj_step(plain.get(), data.get());
       }
-      types.insert(c.cfg.sensor_type);
+      mj_forward(bench.model(), bench.data());
+      mj_forward(plain.get(), data.get());
+      for (const Case& c : cases) {
+        const std::string local = c.cfg.name.substr(4);
+        const auto configured = bench.read(c.cfg.key());
+        const auto found = bench.read("robot/xml_" + local);
+        const int id = mj_name2id(plain.get(), mjOBJ_SENSOR, ("xml_" + local).c_str());
+        ASSERT_GE(id, 0) << local;
+        ASSERT_EQ(configured.size(), static_cast<std::size_t>(plain->sensor_dim[id])) << local;
+        ASSERT_EQ(found.size(), configured.size()) << local;
+        const auto& about = bench.scene().sensor(c.cfg.key()).field().spec;
+        for (std::size_t i = 0; i < configured.size(); ++i) {
+          const float expected = static_cast<float>(data->sensordata[plain->sensor_adr[id] + i]);
+          EXPECT_EQ(configured[i], expected) << local << " " << i << " of model " << model;
+          EXPECT_EQ(found[i], expected) << local << " " << i << " of model " << model;
+          EXPECT_GE(configured[i], about.low - 1e-5) << local;
+          EXPECT_LE(configured[i], about.high + 1e-5) << local;
+          if (expected != 0) moved.insert(c.cfg.sensor_type);
+        }
+        types.insert(c.cfg.sensor_type);
+      }
     }
   }
   for (const BuiltinType& type : builtin_types()) {
