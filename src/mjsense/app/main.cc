@@ -15,6 +15,7 @@
 
 #include "mjsense/app/external.h"
 #include "mjsense/app/record_command.h"
+#include "mjsense/app/scan_command.h"
 #include "mjsense/app/sensors_command.h"
 #include "mjsense/core/error.h"
 #include "mjsense/record/check.h"
@@ -92,6 +93,33 @@ CLI::App& add_sensors(CLI::App& program, SensorsOptions& options) {
   return app;
 }
 
+CLI::App& add_scan(CLI::App& program, ScanOptions& options) {
+  CLI::App& app = *program.add_subcommand("scan", "what a lidar sees, as a point cloud");
+  app.add_option("scene", options.scene, "an MJCF file")
+      ->required()
+      ->check(CLI::ExistingFile)
+      ->type_name("SCENE.xml");
+  app.add_option("--frame", options.frame, "what carries the lidar: site:NAME, body:NAME, ...")
+      ->required()
+      ->type_name("TYPE:NAME");
+  app.add_option("--out", options.out, "the file, .ply or .pcd")->required()->type_name("FILE");
+  app.add_option("--channels", options.spinning.channels, "lasers")->capture_default_str();
+  app.add_option("--samples", options.spinning.samples, "firings a turn")->capture_default_str();
+  app.add_option("--low", options.spinning.elevation_min_deg, "degrees, the lowest laser")
+      ->capture_default_str();
+  app.add_option("--high", options.spinning.elevation_max_deg, "degrees, the highest laser")
+      ->capture_default_str();
+  app.add_option("--table", options.table.file, "azimuths and elevations in rad instead")
+      ->check(CLI::ExistingFile)
+      ->type_name("FILE.npy");
+  app.add_option("--max-distance", options.max_distance, "m")->capture_default_str();
+  app.add_option("--steps", options.steps, "physics steps before the scan")
+      ->capture_default_str()
+      ->check(CLI::NonNegativeNumber);
+  app.add_flag("--world", options.world, "points in the world, not in the lidar's frame");
+  return app;
+}
+
 struct PathOptions {
   std::string path, sheet, ffmpeg;
   bool json = false, decode = false;
@@ -150,9 +178,11 @@ int run(int argc, char** argv) {
 
   RecordOptions record_options;
   SensorsOptions sensors_options;
+  ScanOptions scan_options;
   PathOptions inspect_options, verify_options, repair_options;
   CLI::App& record = add_record(program, record_options);
   CLI::App& sensors = add_sensors(program, sensors_options);
+  CLI::App& scan = add_scan(program, scan_options);
   CLI::App& inspect_app =
       add_path_command(program, "inspect", "trees, statistics, pictures", inspect_options);
   inspect_app.add_option("--sheet", inspect_options.sheet, "write a contact sheet")
@@ -186,6 +216,7 @@ int run(int argc, char** argv) {
 
   if (record.parsed()) return run_record(record_options);
   if (sensors.parsed()) return run_sensors(sensors_options);
+  if (scan.parsed()) return run_scan(scan_options);
   if (inspect_app.parsed()) {
     const InspectResult result = inspect(existing(inspect_options.path));
     print(inspect_options.json ? result.json() : result.text());

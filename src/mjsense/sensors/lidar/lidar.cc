@@ -33,6 +33,7 @@ std::unique_ptr<Sensor> LidarSensorCfg::build() const {
 
 LidarSensor::LidarSensor(const LidarSensorCfg& cfg) : RayCastSensor(cfg), lidar_(cfg) {
   cfg_.hit_ids = true;  // intensity needs them
+  exclude_world_ = false;
   check(cfg.range_noise_std >= 0, place(), "range_noise_std", cfg.range_noise_std, "0 or more");
   check(cfg.range_noise_relative >= 0, place(), "range_noise_relative", cfg.range_noise_relative,
         "0 or more");

@@ -29,7 +29,7 @@ constexpr char kRoom[] = R"(
   <geom name="room" type="sphere" size="5" rgba=".5 .5 .5 1" contype="0" conaffinity="0"/>
   <geom name="wall" type="box" size=".5 20 20" pos="4.5 0 0" group="1" contype="0" conaffinity="0"/>
   <body name="puck"><joint name="x" type="slide" axis="1 0 0"/><joint name="turn" type="hinge" axis="0 0 1"/>
-    <geom size=".05" mass="1"/><site name="lidar"/></body>
+    <geom size=".05" mass="1" group="2"/><site name="lidar"/></body>
 </worldbody></mujoco>)";
 
 struct Lab {
@@ -74,6 +74,13 @@ TEST(Lidar, RoundRoomIsAsFarEverywhere) {
   EXPECT_NEAR(p[3 * 270 + 2], 5 * std::sin(15 * mjPI / 180), 1e-5);
   EXPECT_NEAR(p[3 * 45], -5 * std::cos(15 * mjPI / 180), 1e-5);
   EXPECT_NEAR(p[3 * 45 + 2], -5 * std::sin(15 * mjPI / 180), 1e-5);
+}
+
+TEST(Lidar, StandingInTheWorldItSeesTheWorld) {
+  Lab lab;
+  lab.cfg->frame = {{"body", "world", ""}};
+  lab.start();
+  EXPECT_THAT(lab.read("distances"), Each(FloatNear(5, 1e-5f)));
 }
 
 TEST(Lidar, NoiseHasItsDeviationAndDependsOnTheSeedOnly) {

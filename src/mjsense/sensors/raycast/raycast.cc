@@ -172,7 +172,8 @@ void RayCastSensor::forget(int world, int r) {
 
 RayFilter RayCastSensor::filter(int frame) const {
   RayFilter filter = filter_;
-  if (cfg_.exclude_parent_body) filter.exclude_body = frames_[frame].body();
+  const int body = frames_[frame].body();
+  if (cfg_.exclude_parent_body && (body > 0 || exclude_world_)) filter.exclude_body = body;
   return filter;
 }
 

@@ -113,6 +113,7 @@ class RayCastSensor : public Sensor {
   RayFilter filter(int frame) const;
 
   RayCastSensorCfg cfg_;
+  bool exclude_world_ = true;  // exclude_parent_body also where the frame's body is the world
   Field *distances_ = nullptr, *hit_pos_ = nullptr, *normals_ = nullptr, *frame_pos_ = nullptr,
         *frame_quat_ = nullptr, *pos_ = nullptr, *quat_ = nullptr, *geom_id_ = nullptr,
         *body_id_ = nullptr, *material_id_ = nullptr;
