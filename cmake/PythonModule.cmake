@@ -1,7 +1,7 @@
 # The Python package. The extension is mjsense/_core.abi3.so: nanobind in split mode (its run-time part is the package
-# nanobind-backend), so that one wheel serves every CPython from 3.10 on. The *_py.cc beside the code they bind and
+# nanobind-backend), so that one wheel serves every CPython from 3.11 on. The *_py.cc beside the code they bind and
 # python/bindings make it up.
-find_package(Python 3.10 REQUIRED COMPONENTS Interpreter Development.Module)
+find_package(Python 3.11 REQUIRED COMPONENTS Interpreter Development.Module)
 execute_process(COMMAND ${Python_EXECUTABLE} -m nanobind --cmake_dir OUTPUT_VARIABLE nanobind_ROOT
                 OUTPUT_STRIP_TRAILING_WHITESPACE ERROR_QUIET)
 find_package(nanobind CONFIG REQUIRED)

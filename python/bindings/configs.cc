@@ -9,14 +9,8 @@ namespace mjsense::python {
 std::span<const CfgKind> cfg_kinds() {
   static const std::vector<CfgKind> kinds = {
       // clang-format off: one line a sensor
-      builtin_kind(),
-      camera_kind(),
-      contact_kind(),
-      effect_kind(),
-      imu_kind(),
-      lidar_kind(),
-      raycast_kind(),
-      terrain_height_kind(),
+      builtin_kind(), camera_kind(), contact_kind(), effect_kind(),
+      imu_kind(),     lidar_kind(),  raycast_kind(), terrain_height_kind(),
       // clang-format on
   };
   return kinds;

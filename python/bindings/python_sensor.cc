@@ -3,16 +3,23 @@
 #include <nanobind/stl/string.h>
 #include <nanobind/stl/vector.h>
 
+#include "mjsense/core/error.h"
+
 namespace mjsense::python {
 
-PythonSensor::PythonSensor(std::string name, nb::object self, std::optional<SensorSpec> spec)
-    : Sensor(std::move(name)), self_(self.release().ptr()), spec_(std::move(spec)) {}
+WeakObject::WeakObject(nb::handle object)
+    : reference_(new nb::weakref(object), [](nb::weakref* reference) {
+        // What outlives the interpreter has nobody left to give it back to.
+        if (!nb::is_alive()) return;
+        nb::gil_scoped_acquire lock;
+        delete reference;
+      }) {}
 
-PythonSensor::~PythonSensor() {
-  // A sensor that outlives the interpreter has nobody left to give its object back to.
-  if (!nb::is_alive()) return;
-  nb::gil_scoped_acquire lock;
-  nb::handle(self_).dec_ref();
+nb::object WeakObject::get() const {
+  nb::object object = (*reference_)();
+  if (object.is_none())
+    throw RuntimeError("a sensor written in Python was deleted while its simulation uses it");
+  return object;
 }
 
 void PythonSensor::edit_spec(mjSpec*) {

@@ -7,6 +7,7 @@
 #include <atomic>
 #include <cstdint>
 #include <functional>
+#include <memory>
 #include <optional>
 #include <string>
 #include <vector>
@@ -17,14 +18,27 @@ namespace mjsense::python {
 
 namespace nb = nanobind;
 
+// A Python object that C++ refers to without keeping it alive, for references in a circle would never be freed. May be copied
+// and destroyed by any thread.
+class WeakObject {
+ public:
+  explicit WeakObject(nb::handle object);
+  // Needs the interpreter's lock. RuntimeError if the object is gone.
+  nb::object get() const;
+
+ private:
+  std::shared_ptr<nb::weakref> reference_;
+};
+
 // Calls _edit_spec(), _compute_rows() and _reset(ids) of a mjsense.Sensor
 // (python/mjsense/sensor.py); its initialize(sim) is called by the Python simulation, once that
 // exists. Any thread may call and destroy this: it takes the interpreter's lock where it needs it.
 class PythonSensor final : public Sensor {
  public:
   // `spec`: of its one field; without one it has none, and its value is a Python object only.
-  PythonSensor(std::string name, nb::object self, std::optional<SensorSpec> spec);
-  ~PythonSensor() override;
+  // `self` is kept alive by the Python scene or simulation that it belongs to.
+  PythonSensor(std::string name, WeakObject self, std::optional<SensorSpec> spec)
+      : Sensor(std::move(name)), self_(std::move(self)), spec_(std::move(spec)) {}
 
   std::string_view kind() const override { return "python"; }
   Stage stage() const override { return Stage::kBatch; }
@@ -39,10 +53,10 @@ class PythonSensor final : public Sensor {
   // Tells Python which worlds were reset since the last call. Needs the interpreter's lock, as does
   // self().
   void flush_resets();
-  nb::object self() const { return nb::borrow(self_); }
+  nb::object self() const { return self_.get(); }
 
  private:
-  PyObject* self_;
+  WeakObject self_;
   std::optional<SensorSpec> spec_;
   std::vector<std::uint8_t> reset_;  // [B] worlds reset since the last call into Python
   std::atomic<bool> any_reset_{false};

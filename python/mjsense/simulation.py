@@ -70,8 +70,7 @@ class Simulation:
         """s, one control step."""
         self._views: dict[str, np.ndarray] = {}
         self._python: list[Sensor] = []
-        self.data = DerivedFields(self)
-        """Fields of mjData, ``[B, ...]``: ``sim.data.xpos``."""
+        self._derived: dict[str, tuple[Any, np.ndarray]] = {}
         for sensor in scene.sensors.values():
             if isinstance(sensor, Sensor):
                 self._core.own_sensor(sensor._handle)
@@ -169,6 +168,11 @@ class Simulation:
     mocap_quat = _state_property("mocap_quat", "Mocap orientations [B, nmocap, 4].")
     eq_active = _state_property("eq_active", "Which equality constraints are active [B, neq].")
     userdata = _state_property("userdata", "User data [B, nuserdata].")
+
+    @property
+    def data(self) -> DerivedFields:
+        """Fields of mjData as they are now, ``[B, ...]``: ``sim.data.xpos``."""
+        return DerivedFields(self)
 
     @property
     def time(self) -> np.ndarray:
@@ -281,7 +285,6 @@ class DerivedFields:
 
     def __init__(self, sim: Simulation) -> None:
         self._sim = sim
-        self._fields: dict[str, tuple[Any, np.ndarray]] = {}
 
     def __getattr__(self, name: str) -> np.ndarray:
         if name.startswith("_"):
@@ -289,13 +292,13 @@ class DerivedFields:
         sim = self._sim
         if name in _STATE:
             return sim._component(name)
-        if name not in self._fields:
+        if name not in sim._derived:
             try:
                 handle = sim._core.derived_field(name)
             except KeyError as error:
                 raise AttributeError(str(error)) from None
-            self._fields[name] = handle, handle.arrays()[""]
-        handle, array = self._fields[name]
+            sim._derived[name] = handle, handle.arrays()[""]
+        handle, array = sim._derived[name]
         sim._core.refresh(handle)
         return array
 

@@ -1,4 +1,6 @@
+import gc
 import json
+import weakref
 
 import gymnasium
 import numpy as np
@@ -258,3 +260,23 @@ def test_suite():
     with pytest.raises(ValueError, match="batch_index 2"):
         suite.get_observations(sim, None, 2)
     assert len(suite) == 3 and "touch" in suite
+
+
+def test_nothing_is_leaked():
+    def make():
+        sensor = Height()
+        sim = mjs.Simulation(ball_scene(sensor), num_worlds=2)
+        sim.add(Hidden())
+        sim.step()
+        sensor.data, sim.data.xpos
+        return weakref.ref(sensor), weakref.ref(sim), sensor.rows
+
+    class Hidden(HeightOfMjlab):
+        def __init__(self):
+            super().__init__()
+            self.uuid = "hidden"
+
+    sensor, sim, rows = make()
+    gc.collect()
+    assert sensor() is None and sim() is None
+    assert rows.shape == (2, 1)

@@ -69,7 +69,7 @@ std::vector<std::shared_ptr<Sensor>> make_members(PythonMembers& members,
   std::vector<std::shared_ptr<Sensor>> made;
   for (nb::handle object : members.sensors) {
     auto sensor = std::make_shared<PythonSensor>(nb::cast<std::string>(object.attr("uuid")),
-                                                 nb::borrow(object), read_python_spec(object));
+                                                 WeakObject(object), read_python_spec(object));
     sensor->on_initialized = [weak = std::weak_ptr<PythonSensor>(sensor), &members] {
       auto self = weak.lock();
       self->self().attr("_bind")(members.simulation, SensorHandle{self});

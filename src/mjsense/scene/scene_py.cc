@@ -124,34 +124,23 @@ ModelSource read_source(nb::handle config, nb::list& alive) {
 // A sensor written in Python among a scene's configured ones.
 class PythonSensorCfg final : public SensorCfg {
  public:
-  PythonSensorCfg(std::string key, nb::object sensor, std::optional<SensorSpec> spec)
-      : sensor_(std::move(sensor)), spec_(std::move(spec)) {
+  PythonSensorCfg(std::string key, nb::handle sensor, std::optional<SensorSpec> spec)
+      : sensor_(sensor), spec_(std::move(spec)) {
     name = std::move(key);
   }
-  ~PythonSensorCfg() override {
-    if (!nb::is_alive()) {
-      sensor_.release();
-      return;
-    }
-    nb::gil_scoped_acquire lock;
-    sensor_.reset();
-  }
-  PythonSensorCfg(const PythonSensorCfg&) = delete;
-  PythonSensorCfg& operator=(const PythonSensorCfg&) = delete;
   std::unique_ptr<Sensor> build() const override {
-    nb::gil_scoped_acquire lock;
     return std::make_unique<PythonSensor>(name, sensor_, spec_);
   }
 
  private:
-  nb::object sensor_;
+  WeakObject sensor_;
   std::optional<SensorSpec> spec_;
 };
 
 std::shared_ptr<const SensorCfg> read_sensor(nb::handle item) {
   if (!nb::hasattr(item, "_compute_rows")) return read_sensor_cfg(item);
-  return std::make_shared<PythonSensorCfg>(nb::cast<std::string>(item.attr("uuid")),
-                                           nb::borrow(item), read_python_spec(item));
+  return std::make_shared<PythonSensorCfg>(nb::cast<std::string>(item.attr("uuid")), item,
+                                           read_python_spec(item));
 }
 
 // `spec` is the empty MjSpec that the scene is built in, so that Python's spec_fn sees the real

@@ -1,13 +1,12 @@
 // Simulations in Python. python/mjsense/simulation.py makes the public class of it.
 
-#include "mjsense/sim/simulation.h"
-
 #include <nanobind/nanobind.h>
 #include <nanobind/stl/optional.h>
 #include <nanobind/stl/shared_ptr.h>
 #include <nanobind/stl/string.h>
 #include <nanobind/stl/vector.h>
 
+#include "mjsense/sim/simulation.h"
 #include "python/bindings/bindings.h"
 #include "python/bindings/derived_field.h"
 #include "python/bindings/numpy.h"
@@ -120,8 +119,9 @@ void bind_simulation(nb::module_& m) {
       .def(
           "add_sensor",
           [](PySimulation& s, nb::object object) {
-            auto sensor = std::make_shared<PythonSensor>(nb::cast<std::string>(object.attr("uuid")),
-                                                         object, read_python_spec(object));
+            auto sensor =
+                std::make_shared<PythonSensor>(nb::cast<std::string>(object.attr("uuid")),
+                                               WeakObject(object), read_python_spec(object));
             s.change("add", [&](Simulation& sim) { sim.add(sensor); });
             s.add_python(sensor);
             return SensorHandle{sensor};
