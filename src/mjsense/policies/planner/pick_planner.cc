@@ -15,9 +15,11 @@ constexpr Phase kPhases[] = {
     {"lift", 5},    {"preplace", 6},     {"place", 7},    {"retreat", 8}, {"go_home", 9}};
 enum PhaseNumber { kUnknown = 0, kOpen = 1, kPregrasp = 2, kGrasp = 3, kClose = 4, kLift = 5 };
 
-constexpr double kPathMargin = 0.008;   // m, gripper to other objects on the way
+// m, gripper to all objects on the way to the pregrasp. The target too: at the end of the fast leg
+// the tool is 2 cm behind its command, and fingers already beside a high object would push it over.
+constexpr double kPathMargin = 0.008;
 constexpr double kGraspMargin = 0.003;  // m, at the grasp
-constexpr double kPathStep = 0.03;      // m
+constexpr double kPathStep = 0.01;      // m
 
 Pose raised(Pose pose, double height) {
   pose.p.z += height;
@@ -147,11 +149,8 @@ bool PickPlanner::path_is_free(const World& world, const Pose& tool, const Pose&
   for (int i = 1; i <= steps; ++i) {
     const Pose at = tool * exp6((static_cast<double>(i) / steps) * screw);
     for (const auto& object : objects) {
-      if (gripper_shape_->hits(
-              at, object_pose(world, object.body), object.shape,
-              object.body == objects[task_->target(world.id)].body ? 0.0 : kPathMargin)) {
+      if (gripper_shape_->hits(at, object_pose(world, object.body), object.shape, kPathMargin))
         return false;
-      }
     }
   }
   return true;
