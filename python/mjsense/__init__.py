@@ -49,3 +49,17 @@ from mjsense.sensor import BuiltinSensor, NativeSensor, Sensor, SensorError
 from mjsense.simulation import Simulation
 from mjsense.suite import SensorSuite
 from mjsense.vector import TaskVectorEnv, make_vec
+
+# fmt: off
+__all__ = [
+    "BuiltinSensor", "BuiltinSensorCfg", "CameraData", "CameraIntrinsics", "CameraSensor", "CameraSensorCfg",
+    "ContactData", "ContactMatch", "ContactSensor", "ContactSensorCfg", "EffectSensorCfg", "Entity", "EntityCfg",
+    "GridPatternCfg", "ImuAxis", "ImuData", "ImuModel", "ImuSensor", "ImuSensorCfg", "LensDistortion", "LidarSensor",
+    "LidarSensorCfg", "MujocoCfg", "NativeSensor", "ObjRef", "ObservationPipeline", "PinholeCameraPatternCfg",
+    "RayCastData", "RayCastSensor", "RayCastSensorCfg", "RayCastVizCfg", "RecordProgress", "RecordSummary",
+    "RingPatternCfg", "Scene", "SceneCfg", "Sensor", "SensorCfg", "SensorData", "SensorError", "SensorSpec",
+    "SensorSuite", "Simulation", "SpinningScanCfg", "SubTerrainCfg", "TableScanCfg", "TaskVectorEnv", "TerrainCfg",
+    "TerrainHeightSensor", "TerrainHeightSensorCfg", "UnknownNameError", "UserPatternCfg", "effects",
+    "embedded_models", "make_vec", "observations", "policy_names", "record", "replace", "robot_names", "task_names",
+    "__version__",
+]

@@ -1,0 +1,34 @@
+import types
+
+import mujoco
+
+import mjsense as mjs
+
+
+def test_everything_public_is_exported():
+    public = {
+        name
+        for name, value in vars(mjs).items()
+        if not name.startswith("_") and not isinstance(value, types.ModuleType)
+    }
+    assert public | {"effects", "observations", "__version__"} == set(mjs.__all__)
+
+
+def test_every_public_class_and_function_says_what_it_is():
+    for name in mjs.__all__:
+        value = getattr(mjs, name)
+        if isinstance(value, (type, types.FunctionType)):
+            assert value.__doc__, name
+
+
+def test_one_mujoco():
+    assert mjs._core.mujoco_version() == mujoco.mj_versionString()
+    with open("/proc/self/maps") as maps:
+        assert len({line.split()[-1] for line in maps if "libmujoco.so" in line}) == 1
+
+
+def test_registries():
+    assert "pick" in mjs.task_names() and "franka" in mjs.robot_names() and "planner" in mjs.policy_names()
+    assert any(name.endswith(".xml") for name in mjs.embedded_models())
+    scene = mjs.Scene(mjs.SceneCfg(entities={"robot": mjs.EntityCfg(model="embedded:franka/fr3.xml")}))
+    assert scene["robot"].joint_names
