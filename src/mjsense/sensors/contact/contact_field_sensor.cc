@@ -5,6 +5,8 @@
 #include <algorithm>
 #include <utility>
 
+#include "mjsense/sensors/contact/contact_fields.h"
+
 namespace mjsense {
 
 ContactFieldSensor::ContactFieldSensor(ContactSensor* owner, int primary, std::string field)
@@ -26,14 +28,14 @@ void ContactFieldSensor::compute(const World& world) {
   const std::span<float> row = fields().front().data.row<float>(world.id);
   const std::size_t dim = row.size() / owner_->cfg().num_slots;
   std::ranges::fill(row, 0.0f);
+  const int offset = contact_field_offset(field_);
   ContactReading reading;
   for (int k = 0; k < owner_->cfg().num_slots; ++k) {
     const int found = owner_->read_slot(world, primary_, k, reading);
     if (!found) break;
     for (std::size_t i = 0; i < dim; ++i) {
-      row[k * dim + i] = field_ == "found"
-                             ? static_cast<float>(found)
-                             : static_cast<float>(contact_field_values(field_, reading)[i]);
+      row[k * dim + i] =
+          static_cast<float>(offset < 0 ? found : contact_values(reading, offset)[i]);
     }
   }
 }

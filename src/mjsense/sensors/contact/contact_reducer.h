@@ -22,8 +22,8 @@ ContactReduce contact_reduce_from_name(std::string_view name, std::string_view p
 // contact frame. A pyramid's edges come in pairs, one pair for each friction direction.
 inline void contact_wrench(const mjModel* m, const mjData* d, int id, mjtNum wrench[6]) {
   const mjContact& c = d->contact[id];
-  const bool plain = c.exclude == 0 && c.efc_address >= 0 && c.adhesion == 0 &&
-                     !(m->opt.enableflags & mjENBL_IPC);
+  const bool plain =
+      c.exclude == 0 && c.efc_address >= 0 && c.adhesion == 0 && !(m->opt.enableflags & mjENBL_IPC);
   if (!plain) return mj_contactForce(m, d, id, wrench);
   const mjtNum* force = d->efc_force + c.efc_address;
   for (int i = 0; i < 6; ++i) wrench[i] = 0;

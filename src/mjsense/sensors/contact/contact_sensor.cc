@@ -11,13 +11,11 @@
 #include "mjsense/core/error.h"
 #include "mjsense/scene/scene.h"
 #include "mjsense/sensors/contact/contact_field_sensor.h"
+#include "mjsense/sensors/contact/contact_fields.h"
 #include "mjsense/sensors/contact/contact_pass.h"
 
 namespace mjsense {
 namespace {
-
-const std::vector<std::string> kFields = {"found", "force",  "torque", "dist",
-                                          "pos",   "normal", "tangent"};
 
 bool contains(const std::vector<std::string>& list, std::string_view x) {
   return std::find(list.begin(), list.end(), x) != list.end();
@@ -29,109 +27,13 @@ std::vector<std::string> labels_of(const std::vector<ContactObject>& objects) {
   return labels;
 }
 
-SensorSpec make_spec(Shape shape, DType dtype, std::string unit, std::string frame,
-                     std::string description) {
-  SensorSpec spec;
-  spec.dtype = dtype;
-  spec.shape = shape;
-  spec.unit = std::move(unit);
-  spec.frame = std::move(frame);
-  spec.description = std::move(description);
-  return spec;
-}
-
 }  // namespace
 
-// Where a field's values are in a reading; found is not in it.
 struct ContactSensor::Output {
-  int offset;  // in doubles; -1: found
+  int offset;  // of its values in a reading; -1: found
   int dim;
   Rows<float> rows, history;  // empty history: none
-
-  const double* values(const ContactReading& reading) const {
-    return reinterpret_cast<const double*>(&reading) + offset;
-  }
 };
-
-SensorSpec contact_field_spec(std::string_view field, bool world_axes) {
-  const std::string axes = world_axes ? "world" : "contact";
-  SensorSpec s;
-  if (field == "found") {
-    s = make_spec({}, DType::kFloat32, "", "", "Number of matching contacts, 0 in an empty slot.");
-    s.low = 0.0;
-  } else if (field == "force") {
-    s = make_spec({3}, DType::kFloat32, "N", axes, "Force of the primary on the other side.");
-  } else if (field == "torque") {
-    s = make_spec({3}, DType::kFloat32, "N m", axes, "Torque of the primary on the other side.");
-  } else if (field == "dist") {
-    s = make_spec({}, DType::kFloat32, "m", "", "Signed distance, negative in penetration.");
-  } else if (field == "pos") {
-    s = make_spec({3}, DType::kFloat32, "m", "world", "Contact point.");
-  } else if (field == "normal") {
-    s = make_spec({3}, DType::kFloat32, "", "world", "Unit normal, from the primary outwards.");
-  } else if (field == "tangent") {
-    s = make_spec({3}, DType::kFloat32, "", "world", "Unit vector of the contact frame's y axis.");
-  } else {
-    throw_unknown("contact sensor", "field", field, kFields);
-  }
-  return s;
-}
-
-namespace {
-
-constexpr int index_of(std::size_t byte_offset) {
-  return static_cast<int>(byte_offset / sizeof(double));
-}
-
-int offset_of(std::string_view field) {
-  if (field == "force") return index_of(offsetof(ContactReading, force));
-  if (field == "torque") return index_of(offsetof(ContactReading, torque));
-  if (field == "dist") return index_of(offsetof(ContactReading, dist));
-  if (field == "pos") return index_of(offsetof(ContactReading, pos));
-  if (field == "normal") return index_of(offsetof(ContactReading, normal));
-  if (field == "tangent") return index_of(offsetof(ContactReading, tangent));
-  if (field == "normal_force") return index_of(offsetof(ContactReading, normal_force));
-  if (field == "friction_force") return index_of(offsetof(ContactReading, friction_force));
-  return -1;
-}
-
-}  // namespace
-
-const double* contact_field_values(std::string_view field, const ContactReading& reading) {
-  return reinterpret_cast<const double*>(&reading) + offset_of(field);
-}
-
-std::unique_ptr<Sensor> ContactSensorCfg::build() const {
-  const std::string place = fmt::format("sensor '{}'", name);
-  if (fields.empty()) throw ValueError(fmt::format("{}: no fields are asked for", place));
-  for (std::size_t i = 0; i < fields.size(); ++i) {
-    if (!contains(kFields, fields[i])) throw_unknown(place, "field", fields[i], kFields);
-    if (std::count(fields.begin(), fields.end(), fields[i]) > 1) {
-      throw ValueError(fmt::format("{}: field '{}' is asked for twice", place, fields[i]));
-    }
-  }
-  const ContactReduce how = contact_reduce_from_name(reduce, place);
-  if (num_slots < 1) {
-    throw ValueError(fmt::format("{}: num_slots is {}: must be at least 1", place, num_slots));
-  }
-  if (history_length > 65535) {
-    throw ValueError(fmt::format("{}: history_length is {}: at most 65535", place, history_length));
-  }
-  const std::vector<std::string> policies = {"first", "any", "error", "each"};
-  if (!contains(policies, secondary_policy)) {
-    throw ValueError(fmt::format("{}: secondary_policy '{}'{}", place, secondary_policy,
-                                 suggest(secondary_policy, policies)));
-  }
-  if (secondary_policy == "each" && !secondary) {
-    throw ValueError(fmt::format("{}: secondary_policy 'each' needs a secondary", place));
-  }
-  if (global_frame && how != ContactReduce::kNetForce &&
-      !(contains(fields, "normal") && contains(fields, "tangent"))) {
-    throw ValueError(
-        fmt::format("{}: global_frame needs 'normal' and 'tangent' among fields", place));
-  }
-  return std::make_unique<ContactSensor>(*this);
-}
 
 ContactSensor::ContactSensor(ContactSensorCfg cfg) : Sensor(cfg.name), cfg_(std::move(cfg)) {}
 ContactSensor::~ContactSensor() = default;
@@ -225,15 +127,16 @@ void ContactSensor::add_outputs(const SensorInit& init) {
     SensorSpec spec = contact_field_spec(field, world_axes);
     const bool vector = spec.shape.rank() == 1;
     spec.shape = vector ? Shape{N, 3} : Shape{N};
-    outputs_.push_back({offset_of(field), vector ? 3 : 1, rows(field.c_str(), spec), {}});
+    outputs_.push_back(
+        {contact_field_offset(field), vector ? 3 : 1, rows(field.c_str(), spec), {}});
     needs_wrench_ |= field == "force" || field == "torque";
   }
   if (cfg_.friction_split) {
     const std::string axes = world_axes ? "world" : "contact";
     const auto part = [&](const char* field, const char* text) {
-      outputs_.push_back({offset_of(field),
+      outputs_.push_back({contact_field_offset(field),
                           3,
-                          rows(field, make_spec({N, 3}, DType::kFloat32, "N", axes, text)),
+                          rows(field, contact_spec({N, 3}, DType::kFloat32, "N", axes, text)),
                           {}});
     };
     part("normal_force", "Normal part of force.");
@@ -248,7 +151,7 @@ void ContactSensor::add_outputs(const SensorInit& init) {
 
   if (cfg_.other_ids) {
     const auto id = [&](const char* field, const char* text) {
-      Array& data = add(field, make_spec({N}, DType::kInt32, "", "", text))->data;
+      Array& data = add(field, contact_spec({N}, DType::kInt32, "", "", text))->data;
       std::ranges::fill(data.all<std::int32_t>(), -1);
       return Rows<std::int32_t>(data);
     };
@@ -256,25 +159,25 @@ void ContactSensor::add_outputs(const SensorInit& init) {
     other_body_ = id("other_body", "MuJoCo body id of the other side, -1 if none.");
   }
   if (cfg_.secondary_policy == "each") {
-    pair_found_ = rows("pair_found", make_spec({P, S}, DType::kFloat32, "", "",
-                                               "Number of contacts of primary and secondary."));
-    pair_force_ = rows("pair_force", make_spec({P, S, 3}, DType::kFloat32, "N", "world",
-                                               "Net force of the primary on the secondary."));
+    pair_found_ = rows("pair_found", contact_spec({P, S}, DType::kFloat32, "", "",
+                                                  "Number of contacts of primary and secondary."));
+    pair_force_ = rows("pair_force", contact_spec({P, S, 3}, DType::kFloat32, "N", "world",
+                                                  "Net force of the primary on the secondary."));
   }
 
   ContactMemory::Fields m;
   const auto seconds = [&](const char* field, const char* text) {
-    return rows(field, make_spec({P}, DType::kFloat32, "s", "", text));
+    return rows(field, contact_spec({P}, DType::kFloat32, "s", "", text));
   };
   const auto flag = [&](const char* field, const char* text) {
-    return Rows<bool>(add(field, make_spec({P}, DType::kBool, "", "", text))->data);
+    return Rows<bool>(add(field, contact_spec({P}, DType::kBool, "", "", text))->data);
   };
   if (cfg_.track_air_time) {
     m.current_air = seconds("current_air_time", "Time since the contact was lost.");
     m.last_air = seconds("last_air_time", "Length of the last phase in the air.");
     m.current_contact = seconds("current_contact_time", "Time since the contact began.");
     m.last_contact = seconds("last_contact_time", "Length of the last contact.");
-    if (!contains(cfg_.fields, "found")) m.current_air = {};
+    if (!contains(cfg_.fields, "found")) m.current_air = {};  // the timers stay 0, as in mjlab
   }
   if (cfg_.track_events) {
     m.touchdown = flag("touchdown", "A contact began in this control step.");
@@ -283,12 +186,12 @@ void ContactSensor::add_outputs(const SensorInit& init) {
   if (cfg_.latch) {
     const std::string axes = world_axes ? "world" : "contact";
     m.found_any = flag("found_any", "There was a contact in this control step.");
-    m.force_peak = rows("force_peak", make_spec({P, 3}, DType::kFloat32, "N", axes,
-                                                "Strongest force of this control step."));
-    m.dist_at_peak = rows("dist_at_peak", make_spec({P}, DType::kFloat32, "m", "",
-                                                    "Signed distance at the strongest force."));
-    m.pos_at_peak = rows("pos_at_peak", make_spec({P, 3}, DType::kFloat32, "m", "world",
-                                                  "Contact point of the strongest force."));
+    m.force_peak = rows("force_peak", contact_spec({P, 3}, DType::kFloat32, "N", axes,
+                                                   "Strongest force of this control step."));
+    m.dist_at_peak = rows("dist_at_peak", contact_spec({P}, DType::kFloat32, "m", "",
+                                                       "Signed distance at the strongest force."));
+    m.pos_at_peak = rows("pos_at_peak", contact_spec({P, 3}, DType::kFloat32, "m", "world",
+                                                     "Contact point of the strongest force."));
     m.first_touch_time = seconds("first_touch_time",
                                  "From the start of the control step to its first contact, or -1.");
   }
@@ -400,7 +303,7 @@ void ContactSensor::write_slot(int w, int slot, int found, const ContactReading&
       *row = static_cast<float>(found);
       continue;
     }
-    const double* values = o.values(reading);
+    const double* values = contact_values(reading, o.offset);
     row[0] = static_cast<float>(values[0]);
     if (o.dim == 1) continue;
     row[1] = static_cast<float>(values[1]);

@@ -55,10 +55,6 @@ struct ContactSensorCfg : SensorCfg {
   std::unique_ptr<Sensor> build() const override;  // throws ValueError or KeyError
 };
 
-// The seven basic fields: what the values of a slot mean, and where they are in a reading.
-SensorSpec contact_field_spec(std::string_view field, bool world_axes);  // KeyError if unknown
-const double* contact_field_values(std::string_view field, const ContactReading& reading);
-
 // Fields (float32 unless said; B worlds, P primaries, K slots, N = P K with index p K + k, S
 // secondaries, H history). A slot without a contact is all zero.
 //   found      [B, N]     number of matching contacts, the same in every filled slot of a primary;

@@ -79,6 +79,58 @@ TEST(Contact, BoxOnTheFloorPushesDownWithItsWeight) {
   EXPECT_THAT(lab.sensor().primary_names(), ElementsAre("box_geom"));
 }
 
+//  [top]     g
+//  [middle]  the primary: pushed down by the top, held by the bottom
+//  [bottom]
+//  -------
+TEST(Contact, MiddleOfAStackPushesBothWays) {
+  std::vector<std::pair<std::string, double>> boxes = {
+      {"bottom", 0.1}, {"middle", 0.3}, {"top", 0.5}};
+  for (const char* reduce : {"mindist", "maxforce", "none"}) {
+    SceneCfg cfg;
+    cfg.terrain = TerrainCfg{};
+    for (const auto& [name, z] : boxes) {
+      EntityCfg box;
+      box.model.xml = "<mujoco><worldbody><body name='b' pos='0 0 " + std::to_string(z) +
+                      "'><freejoint/><geom name='g' type='box' size='.1 .1 .1' mass='1'/></body>"
+                      "</worldbody></mujoco>";
+      cfg.entities.emplace_back(name, box);
+    }
+    auto on = [&](const std::string& other) {
+      auto c = std::make_shared<ContactSensorCfg>();
+      c->name = "on_" + other;
+      c->primary = {"geom", {"g"}, "middle", {}};
+      c->secondary = ContactMatch{"geom", {"g"}, other, {}};
+      c->fields = {"force", "normal", "tangent"};
+      c->reduce = reduce;
+      c->num_slots = 4;
+      c->global_frame = true;
+      return c;
+    };
+    cfg.sensors = {on("top"), on("bottom")};
+    auto all = on("bottom");
+    all->name = "all";
+    all->secondary.reset();
+    all->num_slots = 8;
+    cfg.sensors.push_back(all);
+    auto scene = std::make_shared<Scene>(std::move(cfg));
+    Simulation sim(scene, {});
+    sim.step(1500);
+    const auto sum_z = [&](const char* name) {
+      sim.refresh(scene->sensor(name));
+      double sum = 0;
+      const auto f = scene->sensor(name).field("force").data.row<float>(0);
+      for (std::size_t i = 2; i < f.size(); i += 3) sum += f[i];
+      return sum;
+    };
+    EXPECT_NEAR(sum_z("on_top"), 9.81, 0.01) << reduce;
+    EXPECT_NEAR(sum_z("on_bottom"), -2 * 9.81, 0.02) << reduce;
+    EXPECT_NEAR(sum_z("all"), -9.81, 0.02) << reduce;
+    const auto n = scene->sensor("on_top").field("normal").data.row<float>(0);
+    EXPECT_NEAR(n[2], 1, 1e-6) << reduce;
+  }
+}
+
 TEST(Contact, PartsAreMuJoCosPerFieldSensors) {
   Lab lab("box", kBox, {box_cfg()});
   EXPECT_TRUE(lab.scene->find_sensor("c_box_geom_found"));

@@ -1,0 +1,30 @@
+#pragma once
+// The fields of a slot: what their values mean, and where they are in a reading.
+
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "mjsense/core/sensor.h"
+#include "mjsense/sensors/contact/contact_reading.h"
+
+namespace mjsense {
+
+// The seven that may be asked for: found force torque dist pos normal tangent.
+const std::vector<std::string>& contact_fields();
+
+// Of one slot, [] or [3]; world_axes: of force and torque. KeyError if unknown.
+SensorSpec contact_field_spec(std::string_view field, bool world_axes);
+
+// Index of the first value of a field (also normal_force, friction_force) in a ContactReading seen as
+// doubles; -1 for found, which is not in it.
+int contact_field_offset(std::string_view field);
+
+inline const double* contact_values(const ContactReading& reading, int offset) {
+  return reinterpret_cast<const double*>(&reading) + offset;
+}
+
+SensorSpec contact_spec(Shape shape, DType dtype, std::string unit, std::string frame,
+                        std::string description);
+
+}  // namespace mjsense
