@@ -1,5 +1,5 @@
 #pragma once
-// `mjsense scan SCENE.xml --frame site:head --out cloud.ply`: what a lidar sees in a scene, as a point cloud.
+// `mjsense scan SCENE.xml --frame site:head --out cloud.ply`: what a lidar sees, as a point cloud.
 
 #include <string>
 
