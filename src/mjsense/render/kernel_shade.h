@@ -151,8 +151,9 @@ inline void texture_lanes(const View& view, const ViewGeom& g, const Pixels& pix
         u = fma(q.x, splat(sx), splat(g.size[0] > 0 ? 0.5f : 0.0f));
         v = fma(q.y, splat(-sy), splat(g.size[1] > 0 ? 0.5f : 0.0f));
         const Float ku = splat(sx * s.repeat[0] * width), kv = splat(sy * s.repeat[1] * height);
-        const auto texels = [&](Vec3f w) { return fma(ku * w.x, ku * w.x, kv * w.y * (kv * w.y)); };
-        footprint = sqrt(max(texels(steps.x), texels(steps.y)));
+        // The largest component, as Mesa takes it: sharper than the length of the vector.
+        const auto texels = [&](Vec3f w) { return max(abs(ku * w.x), abs(kv * w.y)); };
+        footprint = max(texels(steps.x), texels(steps.y));
       } else {
         u = load(mapped.u + k);
         v = load(mapped.v + k);

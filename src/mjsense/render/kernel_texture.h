@@ -77,8 +77,10 @@ inline Rgb sample(const Texture& texture, Int face, Float s, Float t, Float foot
   const float last = static_cast<float>(texture.levels - 1);
   const Float size = min(max(footprint, splat(1.0f)), splat(65536.0f));
   const Float lod = min(max(rough_log2(size), zero), splat(last));
-  const Float level = floor(lod), between = lod - level;
-  const Rgb near = bilinear(texture, truncate(level), face, s, t);
+  // Two levels are mixed only around the middle between them, as Mesa and GPUs do.
+  const Float moved = lod + splat(0.25f), level = floor(moved);
+  const Float between = max(fma(splat(2.0f), moved - level, splat(-1.0f)), zero);
+  const Rgb near = bilinear(texture, truncate(min(level, splat(last))), face, s, t);
   if (!any(between > splat(0.01f))) return near;
   const Int coarser = truncate(min(level + splat(1.0f), splat(last)));
   return mix(near, bilinear(texture, coarser, face, s, t), between);
