@@ -109,14 +109,14 @@ inline void primitive_uv(const ViewGeom& g, const float* p, const float* n, floa
                          float& per_meter_u, float& per_meter_v) {
   const float* s = g.size;
   switch (g.type) {
-    case mjGEOM_PLANE:
-    case mjGEOM_HFIELD: {
-      const float sx = g.height_field ? g.height_field->size[0] : s[0],
-                  sy = g.height_field ? g.height_field->size[1] : s[1];
-      u = sx > 0 ? 0.5f * (p[0] / sx + 1) : 0.5f * p[0];
-      v = sy > 0 ? 0.5f * (1 - p[1] / sy) : -0.5f * p[1];
-      per_meter_u = sx > 0 ? 0.5f / sx : 0.5f;
-      per_meter_v = sy > 0 ? 0.5f / sy : 0.5f;
+    case mjGEOM_HFIELD:
+    case mjGEOM_SDF:
+    case mjGEOM_MESH: {  // without coordinates of its own: from above
+      const float sx = s[0] > 0 ? s[0] : 1, sy = s[1] > 0 ? s[1] : 1;
+      u = 0.5f * p[0] / sx;
+      v = -0.5f * p[1] / sy;
+      per_meter_u = 0.5f / sx;
+      per_meter_v = 0.5f / sy;
       return;
     }
     case mjGEOM_BOX: {

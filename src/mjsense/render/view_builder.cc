@@ -278,7 +278,8 @@ void ViewBuilder::set_surface(const RayWorld& world, const float* rgba, int id, 
   for (int i = 0; i < 2; ++i) {
     const float size = g.size[i] > 0 ? g.size[i] : 1.0f;
     s.repeat[i] = model_->mat_texrepeat[2 * material + i] * (uniform && !s.mapped ? size : 1.0f);
-    if (g.type == mjGEOM_PLANE && g.size[i] <= 0) s.shift[i] = -0.5f;
+    const bool from_above = (g.mesh && !s.mapped) || g.height_field;
+    if (from_above || (g.type == mjGEOM_PLANE && g.size[i] <= 0)) s.shift[i] = -0.5f;
   }
   // Cube maps: MuJoCo takes directions in the unit shape that it scales (meshes and planes: in
   // metres).
