@@ -177,8 +177,8 @@ class SceneCfg:
     """Edits the spec last, before compilation."""
     options: MujocoCfg = field(default_factory=MujocoCfg)
     base: str | Path | None = None
-    """A whole model to start from, as it is (path or XML text): names without a prefix, any number of free joints. Its sensors
-    are found; it is no entity."""
+    """A whole model to start from, as it is (path or XML text): names without a prefix, any number of free joints, its own
+    ``<option>`` unless ``options`` are set. Its sensors are found; it is no entity."""
 
     def _base_spec(self) -> mujoco.MjSpec:
         """The spec that the scene is built in."""

@@ -39,13 +39,15 @@ void name_unnamed(mjSpec* spec) {
 }
 
 void drop_options(mjSpec* spec, const std::string& place, std::vector<std::string>& warnings) {
-  const std::vector<std::string> changed = changed_options(spec->option);
+  mjOption standard;
+  mj_defaultOption(&standard);
+  const std::vector<std::string> changed = differing_options(spec->option, standard);
   if (!changed.empty()) {
     warnings.push_back(
         fmt::format("{}: its <option> is not carried over ({}); set the scene's options", place,
                     fmt::join(changed, ", ")));
   }
-  mj_defaultOption(&spec->option);
+  spec->option = standard;
   spec->authored.option = 0;
   spec->authored.disableflags = spec->authored.enableflags = spec->authored.disableactuator = 0;
 }
@@ -196,7 +198,6 @@ Attached adopt_base(mjSpec* base, const ModelSource& source, Vfs& vfs,
   name_unnamed(base);
   Attached attached;
   attached.init = take_keyframes(base, "scene base", warnings);
-  drop_options(base, "scene base", warnings);
   return attached;
 }
 

@@ -18,7 +18,7 @@ Attached attach_entity(mjSpec* scene, const std::string& name, const EntityCfg& 
                        std::vector<std::string>& warnings);
 
 // Makes a whole model the ground that entities are attached to, in place: names what is unnamed,
-// takes its keyframes and options out.
+// takes its keyframes out.
 Attached adopt_base(mjSpec* base, const ModelSource& source, Vfs& vfs,
                     std::vector<std::string>& warnings);
 

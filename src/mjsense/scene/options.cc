@@ -102,9 +102,7 @@ void apply_options(const OptionsCfg& cfg, mjOption& option) {
   option.enableflags = flags("enableflags", cfg.enableflags, {mjENABLESTRING, mjNENABLE});
 }
 
-std::vector<std::string> changed_options(const mjOption& option) {
-  mjOption standard;
-  mj_defaultOption(&standard);
+std::vector<std::string> differing_options(const mjOption& a, const mjOption& b) {
   std::vector<std::string> names;
   const auto note = [&](const char* name, auto& mine, auto& theirs) {
     if (!std::equal(std::begin(mine), std::end(mine), std::begin(theirs))) names.emplace_back(name);
@@ -112,31 +110,31 @@ std::vector<std::string> changed_options(const mjOption& option) {
   const auto note_number = [&](const char* name, auto mine, auto theirs) {
     if (mine != theirs) names.emplace_back(name);
   };
-  note_number("timestep", option.timestep, standard.timestep);
-  note_number("integrator", option.integrator, standard.integrator);
-  note_number("cone", option.cone, standard.cone);
-  note_number("solver", option.solver, standard.solver);
-  note_number("jacobian", option.jacobian, standard.jacobian);
-  note_number("impratio", option.impratio, standard.impratio);
-  note_number("iterations", option.iterations, standard.iterations);
-  note_number("tolerance", option.tolerance, standard.tolerance);
-  note_number("ls_iterations", option.ls_iterations, standard.ls_iterations);
-  note_number("ls_tolerance", option.ls_tolerance, standard.ls_tolerance);
-  note_number("noslip_iterations", option.noslip_iterations, standard.noslip_iterations);
-  note_number("noslip_tolerance", option.noslip_tolerance, standard.noslip_tolerance);
-  note_number("ccd_iterations", option.ccd_iterations, standard.ccd_iterations);
-  note_number("ccd_tolerance", option.ccd_tolerance, standard.ccd_tolerance);
-  note_number("density", option.density, standard.density);
-  note_number("viscosity", option.viscosity, standard.viscosity);
-  note_number("disableflags", option.disableflags, standard.disableflags);
-  note_number("enableflags", option.enableflags, standard.enableflags);
-  note("gravity", option.gravity, standard.gravity);
-  note("wind", option.wind, standard.wind);
-  note("magnetic", option.magnetic, standard.magnetic);
-  note_number("o_margin", option.o_margin, standard.o_margin);
-  note("o_solref", option.o_solref, standard.o_solref);
-  note("o_solimp", option.o_solimp, standard.o_solimp);
-  note("o_friction", option.o_friction, standard.o_friction);
+  note_number("timestep", a.timestep, b.timestep);
+  note_number("integrator", a.integrator, b.integrator);
+  note_number("cone", a.cone, b.cone);
+  note_number("solver", a.solver, b.solver);
+  note_number("jacobian", a.jacobian, b.jacobian);
+  note_number("impratio", a.impratio, b.impratio);
+  note_number("iterations", a.iterations, b.iterations);
+  note_number("tolerance", a.tolerance, b.tolerance);
+  note_number("ls_iterations", a.ls_iterations, b.ls_iterations);
+  note_number("ls_tolerance", a.ls_tolerance, b.ls_tolerance);
+  note_number("noslip_iterations", a.noslip_iterations, b.noslip_iterations);
+  note_number("noslip_tolerance", a.noslip_tolerance, b.noslip_tolerance);
+  note_number("ccd_iterations", a.ccd_iterations, b.ccd_iterations);
+  note_number("ccd_tolerance", a.ccd_tolerance, b.ccd_tolerance);
+  note_number("density", a.density, b.density);
+  note_number("viscosity", a.viscosity, b.viscosity);
+  note_number("disableflags", a.disableflags, b.disableflags);
+  note_number("enableflags", a.enableflags, b.enableflags);
+  note("gravity", a.gravity, b.gravity);
+  note("wind", a.wind, b.wind);
+  note("magnetic", a.magnetic, b.magnetic);
+  note_number("o_margin", a.o_margin, b.o_margin);
+  note("o_solref", a.o_solref, b.o_solref);
+  note("o_solimp", a.o_solimp, b.o_solimp);
+  note("o_friction", a.o_friction, b.o_friction);
   return names;
 }
 

@@ -34,7 +34,7 @@ struct OptionsCfg {
 // Throws ValueError for a value out of range or an unknown word, with the known ones.
 void apply_options(const OptionsCfg& cfg, mjOption& option);
 
-// Names of the fields in which an entity's own options differ from MuJoCo's defaults.
-std::vector<std::string> changed_options(const mjOption& option);
+// Names of the fields in which two sets of options differ.
+std::vector<std::string> differing_options(const mjOption& a, const mjOption& b);
 
 }  // namespace mjsense

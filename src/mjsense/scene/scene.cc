@@ -58,6 +58,7 @@ struct Scene::Impl {
 
   void build();
   void attach();
+  void set_options();
   void add(std::unique_ptr<Sensor> sensor);
   void add_sensors();
   void compile();
@@ -84,13 +85,25 @@ void Scene::Impl::build() {
   }
 }
 
+// The options as configured; a base keeps its own where nothing is configured.
+void Scene::Impl::set_options() {
+  mjOption standard, configured;
+  mj_defaultOption(&standard);
+  configured = standard;
+  apply_options(OptionsCfg{}, standard);
+  apply_options(cfg.options, configured);
+  const bool has_base = spec_elements(spec.get(), mjOBJ_BODY).size() > 1 ||
+                        mjs_firstElement(spec.get(), mjOBJ_GEOM) != nullptr;
+  if (!has_base || !differing_options(standard, configured).empty()) spec->option = configured;
+}
+
 // Base, options, terrain, entities.
 void Scene::Impl::attach() {
   spec = cfg.spec           ? SpecPtr(cfg.spec, SpecDelete{false})
          : cfg.base.empty() ? SpecPtr(mj_makeSpec())
                             : parse_model(cfg.base, "scene base");
   attached.push_back(adopt_base(spec.get(), cfg.base, vfs, warnings));
-  apply_options(cfg.options, spec->option);
+  set_options();
   if (std::isnan(spec->stat.meansize)) spec->stat.meansize = 0.03;
   if (cfg.extent) {
     if (!(*cfg.extent > 0)) {

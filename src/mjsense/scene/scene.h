@@ -21,21 +21,24 @@
 namespace mjsense {
 
 struct SceneCfg {
-  // A whole model to start from, as it is: names without a prefix, any number of free joints. Its
-  // sensors are discovered; it is no entity. Empty: an empty world.
+  // A whole model to start from, as it is: names without a prefix, any number of free joints, its own
+  // options unless `options` are set. Its sensors are discovered; it is no entity. Empty: an empty
+  // world.
   ModelSource base;
-  std::vector<std::pair<std::string, EntityCfg>>
-      entities;                       // attached in this order, names prefixed "name/"
-  std::optional<TerrainCfg> terrain;  // attached first, without a prefix
+  // Attached next, without a prefix.
+  std::optional<TerrainCfg> terrain;
+  // Attached in this order, names prefixed "name/".
+  std::vector<std::pair<std::string, EntityCfg>> entities;
   std::vector<std::shared_ptr<const SensorCfg>> sensors;
   double env_spacing = 2.0;      // m, grid of world origins on a plane
   std::optional<double> extent;  // m, overrides stat.extent
   OptionsCfg options;
-  // Spec that the scene is built in (its contents are the base) and that must live as long as the scene; null: one of the
-  // scene's own. The Python package passes its MjSpec's, so that spec_fn sees the real thing.
+  // Called last, before compilation; sensors that it adds are not discovered.
+  std::function<void(mjSpec*)> spec_fn;
+  // Spec that the scene is built in (its contents are the base) and that must live as long as the
+  // scene; null: one of the scene's own. The Python package passes its MjSpec's, so that spec_fn sees
+  // the real thing.
   mjSpec* spec = nullptr;
-  std::function<void(mjSpec*)>
-      spec_fn;  // called last, before compilation; sensors that it adds are not discovered
 };
 
 // Names of an entity's elements, local (without the prefix), in model order. An element that its

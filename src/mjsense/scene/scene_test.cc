@@ -245,7 +245,8 @@ TEST(Scene, SpecFnComesLast) {
 TEST(Scene, Base) {
   SceneCfg cfg;
   cfg.base.xml =
-      "<mujoco><worldbody><geom type='plane' size='1 1 1'/><body name='a'><freejoint/><geom "
+      "<mujoco><option timestep='.005' integrator='RK4'/><worldbody><geom type='plane' size='1 1 "
+      "1'/><body name='a'><freejoint/><geom "
       "size='.1'/></body><body "
       "name='b'><freejoint/><geom size='.1'/><site name='s'/></body></worldbody><sensor><gyro "
       "site='s'/></sensor>"
@@ -259,6 +260,13 @@ TEST(Scene, Base) {
               ElementsAre(1, 2, 3, 1, 0, 0, 0, 4, 5, 6, 1, 0, 0, 0, .25));
   EXPECT_EQ(scene.sensors().at(0)->name(), "sensor_0");
   EXPECT_EQ(scene.entities().size(), 1u);
+  EXPECT_EQ(m->opt.timestep, .005);
+  EXPECT_EQ(m->opt.integrator, mjINT_RK4);
+  SceneCfg other = scene.cfg();
+  other.options.gravity = {0, 0, -1};
+  const Scene moon(std::move(other));
+  EXPECT_EQ(moon.model()->opt.gravity[2], -1);
+  EXPECT_EQ(moon.model()->opt.timestep, .002);
 }
 
 TEST(Scene, LeavesMocapBodiesInTheWorld) {
