@@ -140,6 +140,37 @@ std::string size_text(std::int64_t bytes) {
   return fmt::format("{:.1f} MiB", static_cast<double>(bytes) / (1 << 20));
 }
 
+std::vector<std::string> split_path(const std::string& path) {
+  std::vector<std::string> parts;
+  for (std::size_t start = 0; start <= path.size();) {
+    const std::size_t end = std::min(path.find('/', start), path.size());
+    parts.push_back(path.substr(start, end - start));
+    start = end + 1;
+  }
+  return parts;
+}
+
+// "    tcp_pose      float32  (T, 7)     0.3268 +- 0.3826   [-0.24, 1.041]   m, wxyz  in world"
+std::string line_of(const StreamStats& s, const std::string& name, int indent) {
+  constexpr int kNameColumns = 34;
+  std::string line = fmt::format("{:{}}{:<{}} {:<8} {:<14}", "", indent, name,
+                                 std::max(1, kNameColumns - indent), s.dtype, s.shape);
+  if (s.count > 0) {
+    const std::string range = fmt::format("[{:.4g}, {:.4g}]", s.min, s.max);
+    line += fmt::format(" {:>10.4g} +- {:<10.4g} {:<22}", s.mean, s.std, range);
+  }
+  if (!s.unit.empty()) line += "  " + s.unit;
+  if (!s.frame.empty()) line += "  in " + s.frame;
+  const auto share = [&](std::int64_t n, const char* what) {
+    const auto all = static_cast<double>(s.count + s.nan + s.infinite);
+    if (n > 0) line += fmt::format("  {} {:.0f} %", what, 100.0 * static_cast<double>(n) / all);
+  };
+  share(s.nan, "NaN");
+  share(s.infinite, "infinite");
+  while (!line.empty() && line.back() == ' ') line.pop_back();
+  return line;
+}
+
 }  // namespace
 
 InspectResult inspect(const fs::path& path) { return Inspector().run(path); }
@@ -155,33 +186,13 @@ std::string InspectResult::text() const {
   // A tree: what a line shares with the one above is left blank.
   std::vector<std::string> last;
   for (const StreamStats& s : streams) {
-    std::vector<std::string> parts;
-    for (std::size_t start = 0; start <= s.name.size();) {
-      const std::size_t end = std::min(s.name.find('/', start), s.name.size());
-      parts.push_back(s.name.substr(start, end - start));
-      start = end + 1;
+    std::vector<std::string> parts = split_path(s.name);
+    std::size_t depth = 0;
+    while (depth + 1 < parts.size() && depth < last.size() && parts[depth] == last[depth]) ++depth;
+    for (; depth + 1 < parts.size(); ++depth) {
+      out += fmt::format("{:{}}{}/\n", "", 2 * depth, parts[depth]);
     }
-    std::size_t shared = 0;
-    while (shared + 1 < parts.size() && shared < last.size() && parts[shared] == last[shared])
-      ++shared;
-    for (; shared + 1 < parts.size(); ++shared)
-      out += fmt::format("{:{}}{}/\n", "", 2 * shared, parts[shared]);
-    std::string line =
-        fmt::format("{:{}}{:<{}} {:<8} {:<14} {:<6}", "", 2 * shared, parts.back(),
-                    std::max<int>(1, 34 - 2 * static_cast<int>(shared)), s.dtype, s.shape, s.unit);
-    if (s.count > 0)
-      line += fmt::format(" {:>10.4g} +- {:<10.4g} [{:.4g}, {:.4g}]", s.mean, s.std, s.min, s.max);
-    const auto share = [&](std::int64_t n, const char* what) {
-      if (n > 0)
-        line += fmt::format(
-            "  {} {:.0f} %", what,
-            100.0 * static_cast<double>(n) / static_cast<double>(s.count + s.nan + s.infinite));
-    };
-    share(s.nan, "NaN");
-    share(s.infinite, "infinite");
-    if (!s.frame.empty()) line += fmt::format("  in {}", s.frame);
-    while (!line.empty() && line.back() == ' ') line.pop_back();
-    out += line + "\n";
+    out += line_of(s, parts.back(), 2 * static_cast<int>(depth)) + "\n";
     last = std::move(parts);
   }
   return out;
