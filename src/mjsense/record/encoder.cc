@@ -34,76 +34,6 @@ double seconds_since(Clock::time_point start) {
 
 }  // namespace
 
-std::vector<std::string> encoder_command(const VideoCfg& cfg, const Fps& fps,
-                                         const VideoStream& video,
-                                         const std::filesystem::path& input,
-                                         const std::filesystem::path& output) {
-  const bool grey = video.kind == VideoKind::kDepth16;
-  std::vector<std::string> a = {ffmpeg_program(cfg.ffmpeg),
-                                "-nostdin",
-                                "-hide_banner",
-                                "-loglevel",
-                                "error",
-                                "-y",
-                                "-f",
-                                "rawvideo",
-                                "-pixel_format",
-                                grey ? "gray16le" : "rgb24",
-                                "-video_size",
-                                fmt::format("{}x{}", video.width, video.height),
-                                "-framerate",
-                                fmt::format("{}/{}", fps.num, fps.den),
-                                "-i",
-                                input == "-" ? "pipe:0" : input.string(),
-                                "-an",
-                                "-threads",
-                                fmt::format("{}", cfg.threads)};
-  const auto add = [&a](std::initializer_list<std::string> more) { a.insert(a.end(), more); };
-  switch (video.kind) {
-    case VideoKind::kRgb:
-      // 4:2:0 needs even sizes. One grey column or row on the right or below moves no pixel, so
-      // intrinsics stay true.
-      if (video.width % 2 || video.height % 2)
-        add({"-vf", "pad=ceil(iw/2)*2:ceil(ih/2)*2:0:0:gray"});
-      add({"-c:v", "libx264", "-pix_fmt", "yuv420p", "-preset", cfg.preset, "-crf",
-           fmt::format("{}", cfg.crf), "-g", fmt::format("{}", cfg.keyint)});
-      break;
-    case VideoKind::kDepth16:
-      add({"-c:v", "ffv1", "-level", "3", "-g", "1", "-slicecrc", "1", "-pix_fmt", "gray16le"});
-      break;
-    case VideoKind::kDepthRedGreen:
-      add({"-c:v", "libx264rgb", "-pix_fmt", "rgb24", "-crf", "23"});
-      break;
-  }
-  add({"-fflags", "+bitexact", "-flags:v", "+bitexact", "-map_metadata", "-1", "-f",
-       video.extension == ".mkv" ? "matroska" : "mp4", output.string()});
-  return a;
-}
-
-void check_ffmpeg(const VideoCfg& cfg, std::span<const VideoStream> videos) {
-  if (videos.empty()) return;
-  const std::string program = ffmpeg_program(cfg.ffmpeg);
-  std::string listing;
-  try {
-    listing = run_process({program, "-hide_banner", "-loglevel", "error", "-encoders"});
-  } catch (const Error& error) {
-    throw RuntimeError(
-        fmt::format("recording {} video streams needs ffmpeg: {}; install it (apt-get install "
-                    "ffmpeg) or name it "
-                    "in $MJSENSE_FFMPEG",
-                    videos.size(), error.what()));
-  }
-  constexpr const char* kEncoders[] = {"libx264", "ffv1", "libx264rgb"};
-  for (const VideoStream& video : videos) {
-    const char* encoder = kEncoders[static_cast<int>(video.kind)];
-    if (listing.find(fmt::format(" {} ", encoder)) == std::string::npos) {
-      throw RuntimeError(
-          fmt::format("the ffmpeg program '{}' has no encoder '{}', which video '{}' needs",
-                      program, encoder, video.key));
-    }
-  }
-}
-
 class EncoderPool::Stream {
  public:
   const VideoStream* video = nullptr;
@@ -149,9 +79,9 @@ struct EncoderPool::Impl {
     max_direct = enough ? max_encoders : max_encoders - std::max(1, max_encoders / 4);
     max_waiting = std::max(1, streams_at_once);
     wake_fd = Fd(eventfd(0, EFD_CLOEXEC | EFD_NONBLOCK));
-    if (!wake_fd)
-      throw RuntimeError(
-          fmt::format("cannot create an event descriptor: {}", std::strerror(errno)));
+    if (!wake_fd) {
+      throw RuntimeError(fmt::format("cannot create an event fd: {}", std::strerror(errno)));
+    }
     thread = std::thread([this] { run(); });
   }
 
@@ -191,9 +121,8 @@ struct EncoderPool::Impl {
     sigset_t pipe;
     sigemptyset(&pipe);
     sigaddset(&pipe, SIGPIPE);
-    pthread_sigmask(
-        SIG_BLOCK, &pipe,
-        nullptr);  // an encoder that died is an EPIPE for us, not the end of the program
+    // An encoder that died is an EPIPE for us, not the end of the program.
+    pthread_sigmask(SIG_BLOCK, &pipe, nullptr);
     std::vector<pollfd> polled;
     std::vector<Stream*> ready;
     while (true) {
@@ -274,6 +203,7 @@ struct EncoderPool::Impl {
       return;
     }
     if (!stream.closed || stream.has_frames()) return;
+    stream.ring.clear();
     if (stream.direct) {
       stream.child.in.reset();  // the end of its input
     } else if (stream.child.pid < 0 && running < max_encoders) {
@@ -293,8 +223,7 @@ struct EncoderPool::Impl {
     Exit exit;
     bool ended = wait_process(stream.child, false, exit);
     if (!ended && now && !stream.failure.empty()) {
-      usleep(50000);  // it stopped reading, so it is about to end, and its own words are worth a
-                      // moment
+      usleep(50000);  // it stopped reading, so it is about to end: wait for its own words
       ended = wait_process(stream.child, false, exit);
     }
     if (ended && !exit.ok) stream.failure = "ffmpeg: " + exit.why;

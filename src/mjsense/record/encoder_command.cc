@@ -1,0 +1,67 @@
+#include <fmt/format.h>
+
+#include "mjsense/core/error.h"
+#include "mjsense/record/encoder.h"
+#include "mjsense/record/process.h"
+
+namespace mjsense {
+
+std::vector<std::string> encoder_command(const VideoCfg& cfg, const Fps& fps,
+                                         const VideoStream& video,
+                                         const std::filesystem::path& input,
+                                         const std::filesystem::path& output) {
+  const bool grey = video.kind == VideoKind::kDepth16;
+  std::vector<std::string> a = {ffmpeg_program(cfg.ffmpeg)};
+  const auto add = [&a](std::initializer_list<std::string> more) { a.insert(a.end(), more); };
+  add({"-nostdin", "-hide_banner", "-loglevel", "error", "-y"});
+  add({"-f", "rawvideo", "-pixel_format", grey ? "gray16le" : "rgb24"});
+  add({"-video_size", fmt::format("{}x{}", video.width, video.height)});
+  add({"-framerate", fmt::format("{}/{}", fps.num, fps.den)});
+  add({"-i", input == "-" ? "pipe:0" : input.string()});
+  add({"-an", "-threads", fmt::format("{}", cfg.threads)});
+  switch (video.kind) {
+    case VideoKind::kRgb:
+      // 4:2:0 needs even sizes. One grey column or row on the right or below moves no pixel, so
+      // intrinsics stay true.
+      if (video.width % 2 || video.height % 2)
+        add({"-vf", "pad=ceil(iw/2)*2:ceil(ih/2)*2:0:0:gray"});
+      add({"-c:v", "libx264", "-pix_fmt", "yuv420p", "-preset", cfg.preset, "-crf",
+           fmt::format("{}", cfg.crf), "-g", fmt::format("{}", cfg.keyint)});
+      break;
+    case VideoKind::kDepth16:
+      add({"-c:v", "ffv1", "-level", "3", "-g", "1", "-slicecrc", "1", "-pix_fmt", "gray16le"});
+      break;
+    case VideoKind::kDepthRedGreen:
+      add({"-c:v", "libx264rgb", "-pix_fmt", "rgb24", "-crf", "23"});
+      break;
+  }
+  add({"-fflags", "+bitexact", "-flags:v", "+bitexact", "-map_metadata", "-1", "-f",
+       video.extension == ".mkv" ? "matroska" : "mp4", output.string()});
+  return a;
+}
+
+void check_ffmpeg(const VideoCfg& cfg, std::span<const VideoStream> videos) {
+  if (videos.empty()) return;
+  const std::string program = ffmpeg_program(cfg.ffmpeg);
+  std::string listing;
+  try {
+    listing = run_process({program, "-hide_banner", "-loglevel", "error", "-encoders"});
+  } catch (const Error& error) {
+    throw RuntimeError(
+        fmt::format("recording {} video streams needs ffmpeg: {}; install it (apt-get install "
+                    "ffmpeg) or name it "
+                    "in $MJSENSE_FFMPEG",
+                    videos.size(), error.what()));
+  }
+  constexpr const char* kEncoders[] = {"libx264", "ffv1", "libx264rgb"};
+  for (const VideoStream& video : videos) {
+    const char* encoder = kEncoders[static_cast<int>(video.kind)];
+    if (listing.find(fmt::format(" {} ", encoder)) == std::string::npos) {
+      throw RuntimeError(
+          fmt::format("the ffmpeg program '{}' has no encoder '{}', which video '{}' needs",
+                      program, encoder, video.key));
+    }
+  }
+}
+
+}  // namespace mjsense

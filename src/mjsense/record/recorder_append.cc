@@ -1,0 +1,121 @@
+#include <fmt/format.h>
+
+#include <cstring>
+
+#include "mjsense/core/error.h"
+#include "mjsense/record/depth.h"
+#include "mjsense/record/recorder_impl.h"
+
+namespace mjsense {
+
+void Recorder::Impl::append(int world, const StepRow& row) {
+  Episode& episode = running(world, "append a step");
+  rethrow();
+  check_texts(world, episode);
+  for (std::size_t v = 0; v < plan.videos.size(); ++v) {
+    const Clock::time_point asked = Clock::now();
+    const std::span<std::uint8_t> frame = pool->reserve(episode.videos[v]);
+    wait_s += seconds_since(asked);
+    if (frame.empty()) {
+      abort_videos(episode);  // so that the encoder's own words are collected
+      wait_for_failure();
+    }
+    const Clock::time_point start = Clock::now();
+    copy_frame(plan.videos[v], world, frame);
+    copy_s += seconds_since(start);
+    pool->commit(episode.videos[v]);
+  }
+  const Clock::time_point start = Clock::now();
+  const double waited = episode.waited_s;
+  for (std::size_t s = 0; s < plan.arrays.size(); ++s) {
+    const Field& field = *plan.arrays[s].field;
+    const std::byte* from = field.data.row_data(world);
+    // Of a dict row only the text is copied: what follows is zero here as there.
+    const std::size_t bytes = field.spec.is_dict
+                                  ? strnlen(reinterpret_cast<const char*>(from), row_bytes[s])
+                                  : row_bytes[s];
+    put_row(episode, world, static_cast<int>(s), from, bytes);
+  }
+  const bool fail = !row.success;
+  const void* own[kOwnStreams] = {&row.reward, &row.success, &fail, &row.terminated,
+                                  &row.truncated};
+  for (int i = 0; i < kOwnStreams; ++i) {
+    const int s = static_cast<int>(plan.arrays.size()) + i;
+    put_row(episode, world, s, own[i], row_bytes[s]);
+  }
+  ++episode.rows;
+  rows += 1;
+  frames += static_cast<std::int64_t>(plan.videos.size());
+  copy_s += seconds_since(start) - (episode.waited_s - waited);
+}
+
+void Recorder::Impl::check_texts(int world, Episode& episode) const {
+  for (const ArrayStream& stream : plan.arrays) {
+    if (!stream.field->spec.is_dict) continue;
+    const char* text = reinterpret_cast<const char*>(stream.field->data.row_data(world));
+    const std::size_t most = stream.field->data.row_bytes();
+    const std::size_t size = strnlen(text, most);
+    if (size < most || (size > 0 && (text[size - 1] == '}' || text[size - 1] == ']'))) continue;
+    episode.refused = true;
+    throw ValueError(
+        fmt::format("sensor '{}': step {} of episode {}: its text does not fit str_max_len = {}; "
+                    "the episode cannot be kept",
+                    stream.sensor->name(), episode.rows, episode.meta.episode, most));
+  }
+}
+
+void Recorder::Impl::copy_frame(const VideoStream& video, int world,
+                                std::span<std::uint8_t> frame) const {
+  const std::byte* from = video.field->data.row_data(world);
+  const std::size_t pixels = static_cast<std::size_t>(video.width) * video.height;
+  const std::span<const float> metres(reinterpret_cast<const float*>(from), pixels);
+  switch (video.kind) {
+    case VideoKind::kRgb:
+      std::memcpy(frame.data(), from, frame.size());
+      break;
+    case VideoKind::kDepth16:
+      encode_depth16(metres, cfg.video.depth_unit,
+                     {reinterpret_cast<std::uint16_t*>(frame.data()), pixels});
+      break;
+    case VideoKind::kDepthRedGreen:
+      encode_depth_red_green(metres, frame);
+      break;
+  }
+}
+
+void Recorder::Impl::put_row(Episode& episode, int world, int s, const void* from,
+                             std::size_t bytes) {
+  Buffer& chunk = episode.chunks[s];
+  if (episode.chunk_fill[s] == 0 && chunk.empty() && row_bytes[s] > 0)
+    chunk = take_buffer(episode, s);
+  if (bytes > 0)
+    std::memcpy(chunk.data() + static_cast<std::size_t>(episode.chunk_fill[s]) * row_bytes[s], from,
+                bytes);
+  if (++episode.chunk_fill[s] == chunk_rows_of[s]) hand_over(worlds[world], s);
+}
+
+Recorder::Impl::Buffer Recorder::Impl::take_buffer(Episode& episode, int s) {
+  Buffer buffer;
+  {
+    std::unique_lock lock(mutex);
+    if (free_chunks[s].empty()) {
+      const Clock::time_point start = Clock::now();
+      progress.wait(lock, [&] { return !free_chunks[s].empty(); });
+      episode.waited_s += seconds_since(start);
+      wait_s += seconds_since(start);
+    }
+    buffer = std::move(free_chunks[s].back());
+    free_chunks[s].pop_back();
+  }
+  buffer.assign(static_cast<std::size_t>(chunk_rows_of[s]) * row_bytes[s], 0);
+  return buffer;
+}
+
+void Recorder::Impl::hand_over(const EpisodePtr& episode, int s) {
+  Job job{Job::kChunk, episode, s, episode->chunk_fill[s], std::move(episode->chunks[s])};
+  episode->chunks[s] = {};
+  episode->chunk_fill[s] = 0;
+  post(std::move(job));
+}
+
+}  // namespace mjsense
