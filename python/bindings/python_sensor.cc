@@ -24,7 +24,7 @@ nb::object WeakObject::get() const {
 
 void PythonSensor::edit_spec(mjSpec*) {
   nb::gil_scoped_acquire lock;
-  self().attr("_edit_spec")();
+  self().attr("_mjs_edit_spec")();
 }
 
 void PythonSensor::initialize(const SensorInit& init) {
@@ -40,7 +40,7 @@ void PythonSensor::initialize(const SensorInit& init) {
 void PythonSensor::cast(const CastContext&) {
   nb::gil_scoped_acquire lock;
   flush_resets();
-  self().attr("_compute_rows")();
+  self().attr("_mjs_compute_rows")();
 }
 
 void PythonSensor::reset(const World& world) {
@@ -55,11 +55,11 @@ void PythonSensor::flush_resets() {
     if (reset_[w]) ids.append(w);
     reset_[w] = 0;
   }
-  self().attr("_reset")(ids);
+  self().attr("_mjs_reset")(ids);
 }
 
 std::optional<SensorSpec> read_python_spec(nb::handle sensor) {
-  nb::object declared = sensor.attr("_row_spec")();
+  nb::object declared = sensor.attr("_mjs_row_spec")();
   if (declared.is_none()) return {};
   SensorSpec spec;
   spec.dtype = dtype_from_name(nb::cast<std::string>(declared["dtype"]));

@@ -30,7 +30,7 @@ class WeakObject {
   std::shared_ptr<nb::weakref> reference_;
 };
 
-// Calls _edit_spec(), _compute_rows() and _reset(ids) of a mjsense.Sensor
+// Calls _mjs_edit_spec(), _mjs_compute_rows() and _mjs_reset(ids) of a mjsense.Sensor
 // (python/mjsense/sensor.py); its initialize(sim) is called by the Python simulation, once that
 // exists. Any thread may call and destroy this: it takes the interpreter's lock where it needs it.
 class PythonSensor final : public Sensor {

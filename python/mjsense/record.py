@@ -117,7 +117,7 @@ def record(
     for sensor in own:
         if not isinstance(sensor, Sensor):
             raise TypeError(f"not a mjsense.Sensor: {sensor!r}")
-        if sensor._row_spec() is None:
+        if sensor._mjs_row_spec() is None:
             raise ValueError(f"sensor '{sensor.uuid}' cannot be recorded: give it an observation_space, or is_dict = True")
     report = None if progress is None else lambda p: progress(RecordProgress(**p))
     use_installed_meshes()

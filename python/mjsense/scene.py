@@ -66,9 +66,9 @@ class Scene:
         items = [self._item(sensor) for sensor in cfg.sensors]
         for item in items:
             if isinstance(item, Sensor):
-                if item._scene_ref is not None and item._scene_ref() is not None:
+                if item._mjs_scene_ref is not None and item._mjs_scene_ref() is not None:
                     raise RuntimeError(f"sensor '{item.uuid}' belongs to another scene: make one for each")
-                item._scene_ref = weakref.ref(self)
+                item._mjs_scene_ref = weakref.ref(self)
 
         def edit() -> None:
             if cfg.spec_fn is not None:
@@ -93,7 +93,7 @@ class Scene:
             own = handle.python_object()
             self._sensors[handle.name] = own if own is not None else _CLASSES.get(handle.kind, NativeSensor)(handle)
             if own is not None:
-                own._handle = handle
+                own._mjs_handle = handle
         for sensor_cfg in self.cfg.sensors:
             if isinstance(sensor_cfg, SensorCfg):
                 self._sensors[sensor_cfg.prefixed_name].cfg = sensor_cfg

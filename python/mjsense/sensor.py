@@ -137,13 +137,14 @@ class Sensor:
     unit: str = ""
     frame: str = ""
 
-    _handle: Any = None
-    _core: Any = None
-    _sim_ref: Any = None
-    _scene_ref: Any = None
-    _value: Any = None
-    _rows: np.ndarray | None = None
-    _pending_dt: float = 0.0
+    # Names of ours begin so, that yours are free.
+    _mjs_handle: Any = None
+    _mjs_core: Any = None
+    _mjs_sim_ref: Any = None
+    _mjs_scene_ref: Any = None
+    _mjs_value: Any = None
+    _mjs_rows: np.ndarray | None = None
+    _mjs_pending_dt: float = 0.0
 
     def __init__(self, uuid: str | None = None, observation_space: Any = None) -> None:
         if uuid is not None:
@@ -190,12 +191,17 @@ class Sensor:
 
     @property
     def name(self) -> str:
+        """The same as uuid, as mjlab calls it."""
         return self.uuid
 
+    @name.setter
+    def name(self, name: str) -> None:
+        self.uuid = name
+
     @property
-    def sim(self) -> Simulation:
+    def simulation(self) -> Simulation:
         """The simulation it belongs to."""
-        sim = self._sim_ref() if self._sim_ref else None
+        sim = self._mjs_sim_ref() if self._mjs_sim_ref else None
         if sim is None:
             raise RuntimeError(f"sensor '{self.uuid}' belongs to no simulation yet")
         return sim
@@ -203,34 +209,34 @@ class Sensor:
     @property
     def data(self) -> Any:
         """The present value, of all worlds."""
-        if self._core is None:
+        if self._mjs_core is None:
             raise RuntimeError(f"sensor '{self.uuid}' has no data yet: it belongs to no simulation")
-        self._core.refresh(self._handle)
-        return self._value
+        self._mjs_core.refresh(self._mjs_handle)
+        return self._mjs_value
 
     @property
     def rows(self) -> np.ndarray:
         """What a recording stores: ``[B, ...]``, for is_dict sensors JSON text in uint8 ``[B, str_max_len]``."""
-        if self._rows is None:
+        if self._mjs_rows is None:
             raise RuntimeError(f"sensor '{self.uuid}' has no rows: give it an observation_space, or is_dict = True")
-        self._core.refresh(self._handle)
-        return self._rows
+        self._mjs_core.refresh(self._mjs_handle)
+        return self._mjs_rows
 
     # ------------------------------------------------------------------------------- called by mjsense (the C++ adapter)
 
-    def _edit_spec(self) -> None:
-        scene = self._scene_ref() if self._scene_ref else None
+    def _mjs_edit_spec(self) -> None:
+        scene = self._mjs_scene_ref() if self._mjs_scene_ref else None
         if scene is not None:
-            self._call("edit_spec", scene.spec, scene)
+            self._mjs_call("edit_spec", scene.spec, scene)
 
-    def _bind(self, sim: Simulation, handle: _core.SensorHandle) -> None:
-        self._sim_ref, self._handle, self._core = weakref.ref(sim), handle, sim._core
-        self._rows = handle.arrays().get("")
+    def _mjs_bind(self, sim: Simulation, handle: _core.SensorHandle) -> None:
+        self._mjs_sim_ref, self._mjs_handle, self._mjs_core = weakref.ref(sim), handle, sim._core
+        self._mjs_rows = handle.arrays().get("")
         if not self.is_dict:
-            self._value = self._rows
-        self._call("initialize", sim, sim)
+            self._mjs_value = self._mjs_rows
+        self._mjs_call("initialize", sim, sim)
 
-    def _call(self, method: str, first: Any, owner: Any) -> None:
+    def _mjs_call(self, method: str, first: Any, owner: Any) -> None:
         """Calls edit_spec or initialize with our arguments or, where it takes more, with mjlab's."""
         function = getattr(self, method)
         wanted = len([p for p in inspect.signature(function).parameters.values() if p.default is p.empty and p.kind < 2])
@@ -242,36 +248,36 @@ class Sensor:
             else:
                 function(first)
 
-    def _reset(self, world_ids: list[int]) -> None:
+    def _mjs_reset(self, world_ids: list[int]) -> None:
         with _named(self, "reset"):
             if not inspect.signature(self.reset).parameters:
                 self.reset()
             else:
-                self.reset(None if len(world_ids) == self.sim.num_worlds else world_ids)
+                self.reset(None if len(world_ids) == self.simulation.num_worlds else world_ids)
 
-    def _update_pending(self) -> None:
-        if self._pending_dt:
-            dt, self._pending_dt = self._pending_dt, 0.0
+    def _mjs_update_pending(self) -> None:
+        if self._mjs_pending_dt:
+            dt, self._mjs_pending_dt = self._mjs_pending_dt, 0.0
             with _named(self, "update"):
                 self.update(dt)
 
-    def _compute_rows(self) -> None:
-        if self._sim_ref is None:
+    def _mjs_compute_rows(self) -> None:
+        if self._mjs_sim_ref is None:
             return  # the simulation is being made; initialize() has not been called
-        self._update_pending()
-        sim = self.sim
+        self._mjs_update_pending()
+        sim = self.simulation
         with _named(self, "compute"):
             value = self.compute(sim)
-            if self._rows is None:
-                self._value = value
+            if self._mjs_rows is None:
+                self._mjs_value = value
             elif self.is_dict:
-                self._value = list(value)
-                self._write_json(self._value, sim.num_worlds)
+                self._mjs_value = list(value)
+                self._mjs_write_json(self._mjs_value, sim.num_worlds)
             else:
-                self._write_rows(value)
+                self._mjs_write_rows(value)
 
-    def _write_rows(self, value: Any) -> None:
-        rows = self._rows
+    def _mjs_write_rows(self, value: Any) -> None:
+        rows = self._mjs_rows
         array = np.asarray(value)
         if array.shape != rows.shape:
             raise ValueError(f"shape {array.shape} is not {rows.shape}: B worlds, then the observation_space")
@@ -279,17 +285,17 @@ class Sensor:
             raise ValueError(f"{array.dtype} values do not fit the observation_space's {rows.dtype}")
         rows[...] = array
 
-    def _write_json(self, values: list[Any], num_worlds: int) -> None:
+    def _mjs_write_json(self, values: list[Any], num_worlds: int) -> None:
         if len(values) != num_worlds:
             raise ValueError(f"{len(values)} values for {num_worlds} worlds")
         for world, value in enumerate(values):
             text = encode_json(value)
             if len(text) > self.str_max_len:
                 raise ValueError(f"world {world}: JSON text of {len(text)} bytes, str_max_len is {self.str_max_len}")
-            self._rows[world] = 0
-            self._rows[world, : len(text)] = np.frombuffer(text, np.uint8)
+            self._mjs_rows[world] = 0
+            self._mjs_rows[world, : len(text)] = np.frombuffer(text, np.uint8)
 
-    def _row_spec(self) -> dict[str, Any] | None:
+    def _mjs_row_spec(self) -> dict[str, Any] | None:
         if not self.uuid:
             raise ValueError(f"{type(self).__name__} has no uuid")
         common = {"unit": self.unit, "frame": self.frame, "description": (type(self).__doc__ or "").strip().split("\n")[0]}

@@ -73,8 +73,8 @@ class Simulation:
         self._derived: dict[str, tuple[Any, np.ndarray]] = {}
         for sensor in scene.sensors.values():
             if isinstance(sensor, Sensor):
-                self._core.own_sensor(sensor._handle)
-                self._own(sensor, sensor._handle)
+                self._core.own_sensor(sensor._mjs_handle)
+                self._own(sensor, sensor._mjs_handle)
             else:
                 sensor._bind(self._core)
 
@@ -104,10 +104,10 @@ class Simulation:
             return
         for _ in range(control_steps):
             for sensor in updated:
-                sensor._pending_dt += self.step_dt
+                sensor._mjs_pending_dt += self.step_dt
             self._core.step(1)
             for sensor in updated:
-                sensor._update_pending()
+                sensor._mjs_update_pending()
 
     def reset(self, world_ids: Sequence[int] | None = None, *, seed: int | None = None, key: int | str | None = None) -> None:
         """Begins a new episode.
@@ -238,21 +238,21 @@ class Simulation:
         """Adds a sensor that is not part of the scene, for suites; returns it."""
         if not isinstance(sensor, Sensor):
             raise TypeError(f"not a mjsense.Sensor: {sensor!r}")
-        if sensor._core is not None:
+        if sensor._mjs_core is not None:
             raise RuntimeError(f"sensor '{sensor.uuid}' belongs to a simulation already")
         self._own(sensor, self._core.add_sensor(sensor))
         return sensor
 
     def _own(self, sensor: Sensor, handle: Any) -> None:
         self._python.append(sensor)
-        sensor._bind(self, handle)
+        sensor._mjs_bind(self, handle)
 
     def refresh(self, sensors: Sequence[Any]) -> None:
         """Computes several sensors in one pass over the worlds; reading each ``.data`` then costs nothing."""
         for sensor in sensors:
             if not isinstance(sensor, (NativeSensor, Sensor)):
                 raise TypeError(f"not a sensor: {sensor!r}")
-        self._core.refresh_all([sensor._handle for sensor in sensors])
+        self._core.refresh_all([s._mjs_handle if isinstance(s, Sensor) else s._handle for s in sensors])
 
     def invalidate(self, world_ids: Sequence[int] | None = None) -> None:
         """Says that state was changed behind the simulation's back: sensors are computed anew at their next read."""
@@ -268,8 +268,8 @@ class Simulation:
         """One update of the sensors' per-substep state (air time, history), after step_raw(1). dt 0: the timestep."""
         for sensor in self._python:
             if type(sensor).update is not Sensor.update:
-                sensor._pending_dt += dt or self.physics_dt
-                sensor._update_pending()
+                sensor._mjs_pending_dt += dt or self.physics_dt
+                sensor._mjs_update_pending()
         self._core.update_sensors(dt)
 
     def reset_sensors(self, world_ids: Sequence[int] | None = None) -> None:

@@ -65,7 +65,7 @@ class SensorSuite:
         """Calls reset() of the sensors that are written in Python."""
         for sensor in self.sensors.values():
             if isinstance(sensor, Sensor):
-                sensor._reset(list(range(sensor.sim.num_worlds)) if world_ids is None else list(world_ids))
+                sensor._mjs_reset(list(range(sensor.simulation.num_worlds)) if world_ids is None else list(world_ids))
 
     def get_observations(self, env: Any, task: Any = None, batch_index: int | None = None) -> dict[str, Any]:
         """A new dict in the suite's order.
@@ -77,7 +77,7 @@ class SensorSuite:
         """
         sim = getattr(env, "sim", env)
         for sensor in self.sensors.values():
-            if isinstance(sensor, Sensor) and sensor._core is None:
+            if isinstance(sensor, Sensor) and sensor._mjs_core is None:
                 sim.add(sensor)
         if batch_index is None:
             sim.refresh(list(self.sensors.values()))

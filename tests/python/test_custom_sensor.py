@@ -280,3 +280,23 @@ def test_nothing_is_leaked():
     gc.collect()
     assert sensor() is None and sim() is None
     assert rows.shape == (2, 1)
+
+
+def test_names_of_users_are_free():
+    class Mine(mjs.Sensor):
+        def __init__(self):
+            self.name = "mine"
+
+        def initialize(self, sim):
+            self.sim, self._value, self._rows, self._handle, self._core, self._data = sim, 1, 2, 3, 4, 5
+
+        def _reset(self):
+            raise AssertionError
+
+        def compute(self, sim):
+            return np.full(self.sim.num_worlds, self._value + self._rows + self._handle + self._core + self._data)
+
+    sim = mjs.Simulation(ball_scene(Mine()), num_worlds=2)
+    sim.reset()
+    sim.step()
+    assert sim.scene["mine"].data.tolist() == [15, 15]

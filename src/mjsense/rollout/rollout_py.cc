@@ -72,7 +72,7 @@ std::vector<std::shared_ptr<Sensor>> make_members(PythonMembers& members,
                                                  WeakObject(object), read_python_spec(object));
     sensor->on_initialized = [weak = std::weak_ptr<PythonSensor>(sensor), &members] {
       auto self = weak.lock();
-      self->self().attr("_bind")(members.simulation, SensorHandle{self});
+      self->self().attr("_mjs_bind")(members.simulation, SensorHandle{self});
     };
     shared->add_python(sensor);
     made.push_back(sensor);

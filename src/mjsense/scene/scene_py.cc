@@ -138,7 +138,7 @@ class PythonSensorCfg final : public SensorCfg {
 };
 
 std::shared_ptr<const SensorCfg> read_sensor(nb::handle item) {
-  if (!nb::hasattr(item, "_compute_rows")) return read_sensor_cfg(item);
+  if (!nb::hasattr(item, "_mjs_compute_rows")) return read_sensor_cfg(item);
   return std::make_shared<PythonSensorCfg>(nb::cast<std::string>(item.attr("uuid")), item,
                                            read_python_spec(item));
 }
