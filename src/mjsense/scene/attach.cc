@@ -115,13 +115,23 @@ void check_nothing_lost(const std::vector<Census>& child, const std::vector<Cens
   }
 }
 
-void set_pose(mjsBody* body, const EntityCfg& cfg, const std::string& place) {
+std::array<double, 4> unit_quat(const EntityCfg& cfg, const std::string& place) {
   double norm = 0;
   for (double q : cfg.quat) norm += q * q;
   if (!(norm > 1e-12) || !std::isfinite(norm)) {
     throw ValueError(fmt::format("{}: quat ({}) is no rotation; expected w, x, y, z", place,
                                  fmt::join(cfg.quat, ", ")));
   }
+  for (double x : cfg.pos) {
+    if (!std::isfinite(x)) throw ValueError(fmt::format("{}: pos is not finite", place));
+  }
+  std::array<double, 4> unit;
+  for (int i = 0; i < 4; ++i) unit[i] = cfg.quat[i] / std::sqrt(norm);
+  return unit;
+}
+
+void set_pose(mjsBody* body, const EntityCfg& cfg, const std::string& place) {
+  const std::array<double, 4> quat = unit_quat(cfg, place);
   if (is_identity(cfg)) return;
   if (mjs_getFrame(body->element)) {
     throw ValueError(
@@ -129,7 +139,7 @@ void set_pose(mjsBody* body, const EntityCfg& cfg, const std::string& place) {
                     place, element_name(body->element)));
   }
   std::copy(cfg.pos.begin(), cfg.pos.end(), body->pos);
-  for (int i = 0; i < 4; ++i) body->quat[i] = cfg.quat[i] / std::sqrt(norm);
+  std::copy(quat.begin(), quat.end(), body->quat);
   mjs_defaultOrientation(&body->alt);
 }
 
@@ -180,8 +190,9 @@ Attached attach_entity(mjSpec* scene, const std::string& name, const EntityCfg& 
   }
   mjsFrame* frame = mjs_addFrame(parent, nullptr);
   if (attached.fixed_base && !attached.wrapped && !is_mocap) {
+    const std::array<double, 4> quat = unit_quat(cfg, place);
     std::copy(cfg.pos.begin(), cfg.pos.end(), frame->pos);
-    std::copy(cfg.quat.begin(), cfg.quat.end(), frame->quat);
+    std::copy(quat.begin(), quat.end(), frame->quat);
   }
   const std::vector<Census> before = census(child.get()), scene_before = census(scene);
   // The scene keeps the child alive: it is attached by reference.

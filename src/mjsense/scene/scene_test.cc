@@ -92,6 +92,11 @@ TEST(Scene, SaysWhatIsWrongWithAnEntity) {
   EXPECT_THAT(fault("a", {.model = {.xml = kBall}, .quat = {0, 0, 0, 0}}),
               HasSubstr("no rotation"));
   EXPECT_THAT(
+      fault("a", {.model = {.xml = "<mujoco><worldbody><geom size='.1'/></worldbody></mujoco>"},
+                  .quat = {0, 0, 0, 0},
+                  .mocap_base = false}),
+      HasSubstr("no rotation"));
+  EXPECT_THAT(
       fault("x", xml("<mujoco><worldbody><body name='a'><freejoint/><geom size='.1'/></body><body "
                      "name='b'><freejoint/><geom size='.1'/></body></worldbody></mujoco>")),
       HasSubstr(
