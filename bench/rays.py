@@ -2,8 +2,8 @@
 height_scan_bench.cc, run as one program.
 
 $MJSENSE_BENCH_QUADRUPED and $MJSENSE_BENCH_HUMANOID name MJCFs (a Go1's and a G1's, as mjlab's wheel has them) to stand in for the
-built-in robots. With $MJSENSE_PEERS, the Python of an environment with mujoco-lidar (peers/mujoco_lidar.py), that one is measured in
-the same scene. Rates count processor time of one core, so that a busy machine counts for both sides alike.
+built-in robots. With $MJSENSE_PEERS, the Python of an environment with mujoco-lidar and mujoco_warp, the engine under mjlab's ray
+sensors (peers/), those are measured in the same scenes. Rates count processor time of one core, so that a busy machine counts for both sides alike.
 """
 
 import json
@@ -51,16 +51,17 @@ def rate(m: dict) -> float:
     return m["rays"] / m["cpu"] * 1e3
 
 
-def mujoco_lidar() -> float | None:
+def peer(script: str, benchmark: str, *args: str) -> float | None:
+    """M rays per CPU second of a peer in the scene of this benchmark; None without $MJSENSE_PEERS."""
     python = os.environ.get("MJSENSE_PEERS")
     if not python:
         return None
     with tempfile.TemporaryDirectory() as folder:
         scene = os.path.join(folder, "scene.mjb")
-        subprocess.run([program(), "--benchmark_filter=lidar_mj_multiRay", "--benchmark_min_time=0.01"], check=True,
+        subprocess.run([program(), f"--benchmark_filter={benchmark}", "--benchmark_min_time=0.01"], check=True,
                        env={**os.environ, "MJSENSE_BENCH_SAVE": scene}, capture_output=True)
-        script = ROOT / "bench" / "peers" / "mujoco_lidar.py"
-        lines = subprocess.run([python, str(script), scene], check=True, capture_output=True, text=True).stdout.splitlines()
+        path = ROOT / "bench" / "peers" / f"{script}.py"
+        lines = subprocess.run([python, str(path), scene, *args], check=True, capture_output=True, text=True).stdout.splitlines()
         return float(lines[-1].split()[0]) * 1e-6
 
 
@@ -68,17 +69,18 @@ def main() -> None:
     m = measure()
     unit = "M rays per CPU second"
     rows = []
-    for case, ours, peer in (
-        ("187 rays, 64 worlds, height field 128 x 128", "height_scan/height_field/1", "height_scan_mj_ray/height_field"),
-        ("187 rays, 64 worlds, 94 boxes", "height_scan/boxes/1", "height_scan_mj_ray/boxes"),
+    for case, scene, scripts in (
+        ("187 rays, 64 worlds, height field 128 x 128", "height_field", {"mujoco_warp": "height"}),
+        ("187 rays, 64 worlds, 94 boxes", "boxes", {"mujoco_warp": "height"}),
+        ("lidar 16 x 360 in a room, humanoid of meshes", "", {"mujoco_warp": "lidar", "mujoco_lidar": "lidar"}),
     ):
-        rows.append(Row(case, rate(m[ours]), unit, rate(m[peer]), "mj_ray", goal=5))
-    case = "lidar 16 x 360 in a room, humanoid of meshes"
-    rows.append(Row(case, rate(m["lidar/1"]), unit, rate(m["lidar_mj_multiRay"]), "mj_multiRay", goal=5))
-    rows.append(Row(case, rate(m["lidar/1"]), unit, rate(m["lidar_mj_ray"]), "mj_ray"))
-    other = mujoco_lidar()
-    if other is not None:
-        rows.append(Row(case, rate(m["lidar/1"]), unit, other, "mujoco-lidar, Warp on the CPU", goal=5))
+        ours = rate(m[f"height_scan/{scene}/1" if scene else "lidar/1"])
+        mujoco = f"height_scan_mj_ray/{scene}" if scene else "lidar_mj_multiRay"
+        rows.append(Row(case, ours, unit, rate(m[mujoco]), "mj_ray" if scene else "mj_multiRay", goal=5))
+        for script, kind in scripts.items():
+            other = peer(script, mujoco, kind)
+            if other is not None:
+                rows.append(Row(case, ours, unit, other, f"{script} on the CPU", goal=5))
     for name, case in (("height_scan/boxes", "height scan, boxes"), ("lidar", "lidar")):
         rows.append(Row(f"{case}, two threads and one", m[f"{name}/2"]["real"] * 1e-3, "us", m[f"{name}/1"]["real"] * 1e-3,
                         "one thread", higher_is_better=False, goal=1.9))

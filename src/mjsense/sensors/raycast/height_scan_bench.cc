@@ -74,6 +74,8 @@ mjModel* load(bool field) {
   }
   mjModel* m = mj_compile(spec, nullptr);
   if (m == nullptr) std::fprintf(stderr, "%s\n", mjs_getError(spec));
+  // For peers in Python (bench/peers): the same scene.
+  if (const char* path = std::getenv("MJSENSE_BENCH_SAVE")) mj_saveModel(m, path, nullptr, 0);
   return m;
 }
 
