@@ -159,7 +159,8 @@ House::House(const fs::path& dir, const std::string& fingerprint, bool resume)
   const fs::path lock = staging_ / "lock";
   lock_ = Fd(open(lock.c_str(), O_RDWR | O_CREAT | O_CLOEXEC, 0644));
   if (!lock_) throw_file("write", lock, errno);
-  if (flock(lock_.get(), LOCK_EX | LOCK_NB) != 0) {
+  // The second question: whether it came to its end between our reading and our lock.
+  if (flock(lock_.get(), LOCK_EX | LOCK_NB) != 0 || unfinished != unfinished_recording(dir)) {
     throw ValueError(fmt::format("another process records into '{}'", dir.string()));
   }
   load_staged();
@@ -314,9 +315,10 @@ void House::publish(int batch, const std::vector<std::int64_t>& episodes) {
 void House::end() {
   ended_ = true;
   for (const fs::path& path : entries(staging_)) {
-    if (path.filename() != "recording.json" && path.filename() != "lock") remove_tree(path);
+    const fs::path name = path.filename();
+    if (name != "recording.json" && name != "lock" && name != kEndingFile) remove_tree(path);
   }
-  remove_tree(staging_ / "recording.json");
+  remove_tree(staging_ / "recording.json");  // before the mark that says it has ended
   lock_.reset();
   remove_tree(staging_);
 }
