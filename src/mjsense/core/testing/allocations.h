@@ -41,5 +41,7 @@ class AllocationCount {
 [[gnu::weak]] void operator delete(void* p) noexcept { std::free(p); }
 [[gnu::weak]] void operator delete(void* p, std::size_t) noexcept { std::free(p); }
 [[gnu::weak]] void operator delete(void* p, std::align_val_t) noexcept { std::free(p); }
-[[gnu::weak]] void operator delete(void* p, std::size_t, std::align_val_t) noexcept { std::free(p); }
+[[gnu::weak]] void operator delete(void* p, std::size_t, std::align_val_t) noexcept {
+  std::free(p);
+}
 #pragma GCC diagnostic pop
