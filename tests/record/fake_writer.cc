@@ -19,7 +19,7 @@
 
 #include "mjsense/core/error.h"
 #include "mjsense/record/check.h"
-#include "mjsense/record/fake_suite.h"
+#include "mjsense/record/testing/fake_suite.h"
 #include "mjsense/record/recorder.h"
 
 using namespace mjsense;

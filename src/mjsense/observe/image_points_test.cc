@@ -7,7 +7,7 @@
 #include <set>
 
 #include "mjsense/core/error.h"
-#include "mjsense/observe/test_world.h"
+#include "mjsense/observe/testing/world.h"
 
 namespace mjsense {
 namespace {

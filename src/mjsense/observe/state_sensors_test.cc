@@ -10,7 +10,7 @@
 #include "mjsense/observe/grasp_state.h"
 #include "mjsense/observe/joint_state.h"
 #include "mjsense/observe/pose_sensor.h"
-#include "mjsense/observe/test_world.h"
+#include "mjsense/observe/testing/world.h"
 
 namespace mjsense {
 namespace {

@@ -4,7 +4,7 @@
 
 #include "mjsense/core/error.h"
 #include "mjsense/observe/shared_field.h"
-#include "mjsense/observe/test_world.h"
+#include "mjsense/observe/testing/world.h"
 
 namespace mjsense {
 namespace {

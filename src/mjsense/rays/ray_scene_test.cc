@@ -9,7 +9,7 @@
 #include <vector>
 
 #include "mjsense/core/testing/allocations.h"
-#include "mjsense/rays/test_scene.h"
+#include "mjsense/rays/testing/scene.h"
 
 namespace mjsense {
 namespace {

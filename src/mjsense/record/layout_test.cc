@@ -8,7 +8,7 @@
 
 #include "mjsense/core/error.h"
 #include "mjsense/record/depth.h"
-#include "mjsense/record/test_tools.h"
+#include "mjsense/record/testing/tools.h"
 
 namespace mjsense {
 namespace {

@@ -13,7 +13,7 @@
 #include "mjsense/core/error.h"
 #include "mjsense/record/check.h"
 #include "mjsense/record/house.h"
-#include "mjsense/record/test_tools.h"
+#include "mjsense/record/testing/tools.h"
 #include "mjsense/record/trajectory.h"
 
 namespace mjsense {

@@ -6,7 +6,7 @@
 
 #include "mjsense/core/parallel.h"
 #include "mjsense/rays/ray_scene.h"
-#include "mjsense/rays/test_scene.h"
+#include "mjsense/rays/testing/scene.h"
 #include "mjsense/sensors/camera/camera_sensor.h"
 
 namespace mjsense {

@@ -1,4 +1,4 @@
-#include "mjsense/record/fake_suite.h"
+#include "mjsense/record/testing/fake_suite.h"
 
 #include <fmt/format.h>
 

@@ -10,7 +10,7 @@
 #include <string>
 #include <vector>
 
-#include "mjsense/record/fake_suite.h"
+#include "mjsense/record/testing/fake_suite.h"
 #include "mjsense/record/recorder.h"
 
 namespace mjsense::testing {
