@@ -187,10 +187,11 @@ inline void trace_packet(const View& view, const int* list, int count, const Pix
 // Points to be lit, camera frame, and the way to the light: q = p + s d, s in (0, end).
 struct alignas(64) LightRays {
   float p[3][kLanes], d[3][kLanes], n[3][kLanes];
+  float end[kLanes];  // 1 for a light at a place; how far it is for a direction
   int geom[kLanes];
+  // Scalars come last: what is above is loaded as aligned vectors.
+  float longest;            // the largest end
   float center[3], radius;  // sphere around the active points
-  float end[kLanes];        // 1 for a light at a place; how far it is for a direction
-  float longest;            // the largest of them
 };
 
 // Can anything within `radius` around `center` lie between the packet's points and the light?
