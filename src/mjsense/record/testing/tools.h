@@ -10,8 +10,8 @@
 #include <string>
 #include <vector>
 
-#include "mjsense/record/testing/fake_suite.h"
 #include "mjsense/record/recorder.h"
+#include "mjsense/record/testing/fake_suite.h"
 
 namespace mjsense::testing {
 
