@@ -2,10 +2,13 @@
 
 The robot is mjlab's, taken from its wheel on PyPI into a temporary folder. All cases run the same physics; CPU time of one thread, so
 that other programs on the machine matter little. MuJoCo's sensors give the seven fields of the four feet at the end of a step;
-ours give these and air time, touchdown and lift-off, the peak of the step, and a history of four substeps of every field.
+ours give these and air time, touchdown and lift-off, the peak of the step, and a history of four substeps of every field. With
+$MJSENSE_MJLAB, the Python of an environment with mjlab (peers/mjlab_contact.py), its sensors are measured on the CPU too.
 """
 
 import glob
+import json
+import os
 import pathlib
 import statistics
 import subprocess
@@ -86,6 +89,20 @@ def share(case: Case, physics: Case) -> float:
     return statistics.median(100 * (a / b - 1) for a, b in zip(case.seconds, physics.seconds))
 
 
+def added_us(case: Case, physics: Case) -> float:
+    """The same in microseconds of a substep of one world."""
+    return 1e6 * statistics.median(a - b for a, b in zip(case.seconds, physics.seconds)) / case.sim.num_worlds / DECIMATION
+
+
+def mjlab() -> dict[str, float] | None:
+    """What peers/mjlab_contact.py measures; None without $MJSENSE_MJLAB."""
+    python = os.environ.get("MJSENSE_MJLAB")
+    if not python:
+        return None
+    script = pathlib.Path(__file__).parent / "peers" / "mjlab_contact.py"
+    return json.loads(subprocess.run([python, str(script)], check=True, stdout=subprocess.PIPE, text=True).stdout.splitlines()[-1])
+
+
 def main() -> None:
     quick = "--quick" in sys.argv
     rounds, steps = (10, 2) if quick else (60, 2)
@@ -108,7 +125,16 @@ def main() -> None:
         peer = share(cases["mujoco"], physics)
         rows.append(Row("IMU and feet, 7 fields", share(cases["fields"], physics), "% of physics", peer, "MuJoCo's sensors",
                         higher_is_better=False))
-        rows.append(Row("the same with air time, events, peak, history", share(cases["memory"], physics), "% of physics"))
+        remembered = Row("the same with air time, events, peak, history", share(cases["memory"], physics), "% of physics",
+                         higher_is_better=False)
+        rows.append(remembered)
+        if other := mjlab():
+            sensing = other["sensors"] + other["torch"]
+            remembered.peer, remembered.peer_name = 100 * sensing / other["physics"], f"mjlab on the CPU, of its {other['physics']:.0f} us"
+            touching = (cases["memory"].scene["feet"].data.found > 0).mean(), other["feet_in_contact"]
+            rows.append(Row("- in time ({:.0%} of the feet touch, {:.0%} of mjlab's)".format(*touching),
+                            added_us(cases["memory"], physics), "us a world-substep", sensing,
+                            f"mjlab on the CPU, {other['torch']:.1f} of it in torch", higher_is_better=False))
         for worlds in (16, 256) if quick else (16, 256, 2048):
             case = Case(xml, worlds, (feet(**memory),), ["feet"], rough=False)
             for _ in range(3):
