@@ -64,6 +64,9 @@ class Case:
         terrain = mjs.TerrainCfg(terrain_type="generator", levels=2, types=4) if rough else mjs.TerrainCfg()
         self.scene = mjs.Scene(mjs.SceneCfg(entities={"robot": entity}, terrain=terrain, sensors=sensors))
         self.sim = mjs.Simulation(self.scene, num_worlds=worlds, decimation=DECIMATION, threads=1)
+        if rough:  # each robot on its tile
+            self.sim.qpos[:, :3] += self.scene.env_origins(worlds)
+            self.sim.forward()
         self.read = [self.scene[key] for key in read]
         self.seconds: list[float] = []
         self.run(25)
