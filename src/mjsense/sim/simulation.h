@@ -92,8 +92,8 @@ class Simulation {
   void initialize_scene();
   void initialize(Sensor& sensor);
   Slot& slot_of(const Sensor& sensor) const;
-  // Makes `change` happen and `slots` (each after its inputs) current in the worlds `ids` (empty:
-  // all).
+  // Makes `change` happen and `slots` (each after its inputs) current in the worlds `ids`
+  // (empty: all).
   void compute(std::span<Slot* const> slots, std::span<const int> ids, Change change, int key = -1);
   void cast(std::span<Slot* const> slots, std::span<const int> ids, int phase);
   template <class Wanted>
