@@ -14,6 +14,7 @@ namespace mjsense {
 class RayWorld;
 
 struct GlRendererCfg {
+  int num_worlds = 1;
   int camera = 0;
   int width = 0, height = 0;
   unsigned groups = 0x7;  // bit g: geoms of group g
@@ -24,8 +25,11 @@ struct GlRendererCfg {
 class GlRenderer {
  public:
   virtual ~GlRenderer() = default;
-  // Fills rgb, depth (planar) and segmentation of `targets`. Colours and sizes are the model's own, not a world's.
-  virtual void render(const RayWorld& world, const ImageTargets& targets) = 0;
+  // Takes the world's own colours, materials, sizes, lights and field of view. Worlds in parallel.
+  virtual void remember(int world, const mjModel* model) = 0;
+  // Fills rgb, depth (planar) and segmentation of `targets`; poses as `state` has them, the rest as
+  // remembered.
+  virtual void render(int world, const RayWorld& state, const ImageTargets& targets) = 0;
 };
 
 // Throws RuntimeError, beginning with `place`, if there is no OpenGL to be had.

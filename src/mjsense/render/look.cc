@@ -48,18 +48,13 @@ void halve(const std::uint32_t* src, int width, int height, std::uint32_t* dst, 
 
 }  // namespace
 
-Look::Look(const mjModel* model, unsigned group_mask, bool textures) {
+Look::Look(const mjModel* model, bool meshes, bool textures) {
   textures_.resize(model->ntex);
   meshes_.resize(model->nmesh);
   for (int i = 0; i < model->ntex && textures; ++i) add_texture(model, i);
   for (int i = 0; i < model->ntex && !skybox_; ++i)
     if (model->tex_type[i] == mjTEXTURE_SKYBOX && textures_[i].levels > 0) skybox_ = &textures_[i];
-  for (int g = 0; g < model->ngeom; ++g) {
-    const bool mesh = model->geom_type[g] == mjGEOM_MESH || model->geom_type[g] == mjGEOM_SDF;
-    const int group = std::clamp(model->geom_group[g], 0, mjNGROUP - 1);
-    const int id = model->geom_dataid[g];
-    if (mesh && id >= 0 && (group_mask >> group & 1u) && !meshes_[id].normals) add_mesh(model, id);
-  }
+  for (int i = 0; i < model->nmesh && meshes; ++i) add_mesh(model, i);
 }
 
 void Look::add_texture(const mjModel* model, int id) {

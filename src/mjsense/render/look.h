@@ -32,8 +32,9 @@ struct MeshLook {
 
 class Look {
  public:
-  // Only meshes of geoms whose group is in `group_mask` (bit g) are prepared.
-  Look(const mjModel* model, unsigned group_mask, bool textures);
+  // `meshes`: prepare all of them, shown or not, as a world may give a geom another one or another
+  // group; false for views that need no normals.
+  Look(const mjModel* model, bool meshes, bool textures);
   Look(const Look&) = delete;
   Look& operator=(const Look&) = delete;
 

@@ -50,7 +50,7 @@ struct Studio {
                                   int samples = 1) {
     if (!rays) {
       rays = std::make_unique<RayScene>(model.get(), 1);
-      look = std::make_unique<Look>(model.get(), 0x3fu, true);
+      look = std::make_unique<Look>(model.get(), true, true);
       World world;
       world.model = model.get();
       world.data = data.get();

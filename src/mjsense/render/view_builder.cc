@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
-#include <numbers>
 
 #include "mjsense/rays/ray_world.h"
 #include "mjsense/rays/shared_geometry.h"
@@ -21,72 +20,16 @@ void rotate_back(const double r[9], const double v[3], double out[3]) {
   for (int i = 0; i < 3; ++i) out[i] = r[i] * v[0] + r[3 + i] * v[1] + r[6 + i] * v[2];
 }
 
-// The visualiser's rule: a geom's own colour, unless it is the default grey and there is a
-// material.
-void resolve_rgba(const mjModel* m, int material, const float* own, float* out) {
-  const bool is_default = own[0] == 0.5f && own[1] == 0.5f && own[2] == 0.5f && own[3] == 1.0f;
-  std::copy_n(material >= 0 && is_default ? m->mat_rgba + 4 * material : own, 4, out);
-}
-
 }  // namespace
 
-Appearance::Appearance(const mjModel* m)
-    : rgba_(4 * ViewBuilder::max_geoms(m)),
-      lights_(View::kMaxLights),
-      light_ids_(View::kMaxLights) {
-  copy(m);
-}
-
-void Appearance::copy(const mjModel* m) {
-  for (int i = 0; i < m->ngeom; ++i)
-    resolve_rgba(m, m->geom_matid[i], m->geom_rgba + 4 * i, &rgba_[4 * i]);
-  for (int i = 0; i < m->nflex; ++i)
-    resolve_rgba(m, m->flex_matid[i], m->flex_rgba + 4 * i, &rgba_[4 * (m->ngeom + i)]);
-  num_lights_ = 0;
-  const auto add = [&](int id, const float* ambient, const float* diffuse,
-                       const float* specular) -> ViewLight& {
-    light_ids_[num_lights_] = id;
-    ViewLight& light = lights_[num_lights_++];
-    light = {};
-    std::copy_n(ambient, 3, light.ambient);
-    std::copy_n(diffuse, 3, light.diffuse);
-    std::copy_n(specular, 3, light.specular);
-    light.attenuation[0] = 1;
-    return light;
-  };
-  const auto& head = m->vis.headlight;
-  if (head.active) add(-1, head.ambient, head.diffuse, head.specular);
-  for (int i = 0; i < m->nlight && num_lights_ < View::kMaxLights; ++i) {
-    if (!m->light_active[i] || m->light_type[i] == mjLIGHT_IMAGE) continue;
-    ViewLight& light =
-        add(i, m->light_ambient + 3 * i, m->light_diffuse + 3 * i, m->light_specular + 3 * i);
-    light.shadows = m->light_castshadow[i];
-    light.kind = m->light_type[i] == mjLIGHT_DIRECTIONAL ? LightKind::kDirectional
-                 : m->light_type[i] == mjLIGHT_SPOT      ? LightKind::kSpot
-                                                         : LightKind::kPoint;
-    if (light.kind == LightKind::kDirectional) continue;
-    std::copy_n(m->light_attenuation + 3 * i, 3, light.attenuation);
-    light.exponent = m->light_exponent[i];
-    const double cutoff = m->light_cutoff[i];
-    light.cos_cutoff = static_cast<float>(std::cos(cutoff * std::numbers::pi / 180));
-    if (cutoff >= 180) light.kind = LightKind::kPoint;
-  }
-}
-
 ViewBuilder::ViewBuilder(const mjModel* model, const Look& look, const ViewOptions& options)
-    : model_(model),
-      look_(&look),
-      options_(options),
-      unsorted_(max_geoms(model)),
-      sorted_(max_geoms(model)) {
+    : look_(&look), options_(options), unsorted_(max_geoms(model)), sorted_(max_geoms(model)) {
   order_.reserve(max_geoms(model));
   view_.near = options.near;
   view_.far = options.far;
   view_.shadows = options.shadows;
   view_.skybox = options.textures ? look.skybox() : nullptr;
-  const float* reflectance = model->mat_reflectance;
-  if (options.reflections &&
-      std::any_of(reflectance, reflectance + model->nmat, [](float r) { return r > 0; })) {
+  if (options.reflections && model->nmat > 0) {  // any world may make a material reflect
     ViewOptions flat = options;
     flat.reflections = flat.shadows = false;
     mirrored_ = std::make_unique<ViewBuilder>(model, look, flat);
@@ -106,7 +49,7 @@ const View& ViewBuilder::build(const RayWorld& world, const SharedGeometry& shap
     place(world, shapes, id, position, rotation, g);
     const bool sight = in_sight(g);
     if (!sight && !options_.shadows) continue;
-    set_surface(world, rgba, id, g);
+    set_surface(world, appearance, id, g);
     Order order{sight ? g.transparent : 2, g.nearest, index};
     if (order.rank == 1) {
       const float* p = g.pos;
@@ -146,7 +89,7 @@ void ViewBuilder::set_mirror(const RayWorld& world, const SharedGeometry& shapes
     const RayGeom& g = world.geom(id);
     const int material = world.materials()[id];
     if ((g.type != mjGEOM_PLANE && g.type != mjGEOM_BOX) || material < 0) continue;
-    const float reflectance = model_->mat_reflectance[material];
+    const float reflectance = appearance.materials()[material].reflectance;
     if (reflectance <= 0 || appearance.rgba()[4 * id + 3] < kOpaque) continue;
     if (!(world.flags()[id] & options_.groups)) continue;
     const double normal[3] = {g.mat[2], g.mat[5], g.mat[8]};
@@ -255,29 +198,30 @@ bool ViewBuilder::in_sight(ViewGeom& g) const {
          g.window[3] >= bottom;
 }
 
-void ViewBuilder::set_surface(const RayWorld& world, const float* rgba, int id, ViewGeom& g) const {
+void ViewBuilder::set_surface(const RayWorld& world, const Appearance& appearance, int id,
+                              ViewGeom& g) const {
   Surface& s = g.surface;
   s = {};
-  std::copy_n(rgba, 4, s.rgba);
+  std::copy_n(appearance.rgba().data() + 4 * id, 4, s.rgba);
   for (int i = 0; i < 3; ++i) s.rgba[i] *= tint_;
   if (g.behind) s.rgba[3] *= kFromBehind;
   g.transparent = s.rgba[3] < kOpaque || g.behind;
   s.specular = 0.5f;
   s.exponent = 64.0f;
-  const int material = world.materials()[id];
-  if (material < 0) return;
-  s.specular = model_->mat_specular[material];
-  s.exponent = 128.0f * model_->mat_shininess[material];
-  s.emission = model_->mat_emission[material];
+  if (world.materials()[id] < 0) return;
+  const Material& material = appearance.materials()[world.materials()[id]];
+  s.specular = material.specular;
+  s.exponent = 128.0f * material.shininess;
+  s.emission = material.emission;
   if (!options_.textures) return;
-  s.texture = look_->texture(model_->mat_texid[mjNTEXROLE * material + mjTEXROLE_RGB]);
+  s.texture = look_->texture(material.texture);
   if (s.texture && s.texture->levels == 0) s.texture = nullptr;
   if (!s.texture) return;
-  const bool uniform = model_->mat_texuniform[material];
+  const bool uniform = material.uniform;
   s.mapped = g.mesh && g.mesh->uvs && !s.texture->cube;
   for (int i = 0; i < 2; ++i) {
     const float size = g.size[i] > 0 ? g.size[i] : 1.0f;
-    s.repeat[i] = model_->mat_texrepeat[2 * material + i] * (uniform && !s.mapped ? size : 1.0f);
+    s.repeat[i] = material.repeat[i] * (uniform && !s.mapped ? size : 1.0f);
     const bool from_above = (g.mesh && !s.mapped) || g.height_field;
     if (from_above || (g.type == mjGEOM_PLANE && g.size[i] <= 0)) s.shift[i] = -0.5f;
   }

@@ -8,6 +8,7 @@
 #include <span>
 #include <vector>
 
+#include "mjsense/render/appearance.h"
 #include "mjsense/render/look.h"
 #include "mjsense/render/view.h"
 
@@ -15,27 +16,6 @@ namespace mjsense {
 
 class RayWorld;
 struct SharedGeometry;
-
-// What an image depends on besides poses; a world's own values where they are randomised.
-class Appearance {
- public:
-  explicit Appearance(const mjModel* model);
-  void copy(const mjModel* model);  // no allocation
-
-  std::span<const float> rgba() const {
-    return rgba_;
-  }  // [ngeom + nflex, 4] as MuJoCo's visualiser resolves it
-  std::span<const ViewLight> lights() const {
-    return {lights_.data(), num_lights_};
-  }  // active ones; no poses yet
-  std::span<const int> light_ids() const { return light_ids_; }
-
- private:
-  std::vector<float> rgba_;
-  std::vector<ViewLight> lights_;
-  std::vector<int> light_ids_;
-  std::size_t num_lights_ = 0;
-};
 
 struct ViewOptions {
   unsigned groups = 0x7;  // bit g: geoms of group g
@@ -68,19 +48,18 @@ class ViewBuilder {
   void place(const RayWorld& world, const SharedGeometry& shapes, int id, const double position[3],
              const double rotation[9], ViewGeom& g) const;
   bool in_sight(ViewGeom& g) const;
-  void set_surface(const RayWorld& world, const float* rgba, int id, ViewGeom& g) const;
+  void set_surface(const RayWorld& world, const Appearance& appearance, int id, ViewGeom& g) const;
   void set_mirror(const RayWorld& world, const SharedGeometry& shapes, const Appearance& appearance,
                   const double position[3], const double rotation[9]);
   void set_lights(const RayWorld& world, const Appearance& appearance, const double position[3],
                   const double rotation[9]);
 
-  const mjModel* model_;
   const Look* look_;
   ViewOptions options_;
   View view_;
   std::vector<ViewGeom> unsorted_, sorted_;
   std::vector<Order> order_;
-  std::unique_ptr<ViewBuilder> mirrored_;  // null: nothing in the model reflects
+  std::unique_ptr<ViewBuilder> mirrored_;  // null: nothing can reflect
   int left_out_ = -1;                      // geom that this view does not show: the mirror itself
   bool own_headlight_ = true;              // else headlight_: where the mirrored camera looks
   double headlight_[3] = {};

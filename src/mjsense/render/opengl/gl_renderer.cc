@@ -10,6 +10,7 @@
 
 #include "mjsense/core/error.h"
 #include "mjsense/rays/ray_world.h"
+#include "mjsense/render/opengl/visual_fields.h"
 
 namespace mjsense {
 namespace {
@@ -105,7 +106,8 @@ class MujocoGl final : public GlRenderer {
         place_(place),
         egl_(place),
         model_(mj_copyModel(nullptr, model)),
-        data_(mj_makeData(model_)) {
+        data_(mj_makeData(model_)),
+        worlds_(cfg.num_worlds, VisualFields(model)) {
     model_->vis.global.offwidth = cfg.width;
     model_->vis.global.offheight = cfg.height;
     model_->vis.quality.offsamples = cfg.samples > 1 ? cfg.samples : 0;
@@ -134,8 +136,11 @@ class MujocoGl final : public GlRenderer {
     mj_deleteModel(model_);
   }
 
-  void render(const RayWorld& world, const ImageTargets& targets) override {
-    pose(world);
+  void remember(int world, const mjModel* model) override { worlds_[world].copy_from(model); }
+
+  void render(int world, const RayWorld& state, const ImageTargets& targets) override {
+    show(worlds_[world]);
+    pose(state);
     mjv_updateScene(model_, data_, &options_, nullptr, &camera_, mjCAT_STATIC | mjCAT_DYNAMIC,
                     &scene_);
     const mjrRect all{0, 0, cfg_.width, cfg_.height};
@@ -168,6 +173,15 @@ class MujocoGl final : public GlRenderer {
   void take() {
     if (!egl_.take())
       throw RuntimeError(fmt::format("{}: OpenGL: another thread holds the context", place_));
+  }
+
+  // The context has tables of its own for materials.
+  void show(const VisualFields& world) {
+    world.copy_to(model_);
+    const int count = std::min(static_cast<int>(model_->nmat), mjMAXMATERIAL);
+    std::copy_n(model_->mat_texid, mjNTEXROLE * count, context_.mat_texid);
+    std::copy_n(model_->mat_texuniform, count, context_.mat_texuniform);
+    std::copy_n(model_->mat_texrepeat, 2 * count, context_.mat_texrepeat);
   }
 
   void pose(const RayWorld& world) {
@@ -218,8 +232,9 @@ class MujocoGl final : public GlRenderer {
   GlRendererCfg cfg_;
   std::string place_;
   EglContext egl_;
-  mjModel* model_;  // a copy: the size of the offscreen buffer belongs to the model
+  mjModel* model_;  // a copy: it has the offscreen buffer's size, and shows one world after another
   mjData* data_;    // poses only
+  std::vector<VisualFields> worlds_;
   mjvScene scene_;
   mjvOption options_;
   mjvCamera camera_;

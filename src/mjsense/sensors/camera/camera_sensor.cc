@@ -65,7 +65,7 @@ void CameraSensor::initialize(const SensorInit& init) {
                                  model_->nlight, View::kMaxLights - 1));
   groups_ = 0;
   for (int g : cfg_.enabled_geom_groups) groups_ |= 1u << g;
-  look_ = std::make_unique<Look>(model_, wants("rgb") || wants("normals") ? groups_ : 0u,
+  look_ = std::make_unique<Look>(model_, wants("rgb") || wants("normals"),
                                  wants("rgb") && cfg_.use_textures);
   workspace_.reset();
   clear_fields();
@@ -94,8 +94,8 @@ void CameraSensor::initialize(const SensorInit& init) {
   gl_.reset();
   if (cfg_.renderer == "opengl") {
     gl_ = make_gl_renderer(model_,
-                           {camera_, cfg_.width, cfg_.height, groups_, cfg_.use_textures,
-                            cfg_.use_shadows, cfg_.samples},
+                           {init.num_worlds, camera_, cfg_.width, cfg_.height, groups_,
+                            cfg_.use_textures, cfg_.use_shadows, cfg_.samples},
                            place);
     return;
   }
@@ -185,7 +185,11 @@ void CameraSensor::compute(const World& world) {
   const mjModel* m = world.model;
   if (!cfg_.intrinsics && !w.grid.bent)
     w.grid = grid_of_camera(m, camera_, cfg_.width, cfg_.height);
-  w.appearance.copy(m);
+  if (gl_) {
+    gl_->remember(world.id, m);
+  } else {
+    w.appearance.copy(m);
+  }
   w.rng = world.rng(stream_of(name()));
   std::ranges::copy(intrinsic_matrix(w.grid), intrinsics_->data.row<float>(world.id).begin());
   const double* p = world.data->cam_xpos + 3 * camera_;
@@ -239,7 +243,7 @@ void CameraSensor::add_noise(const CastContext& context) {
 void CameraSensor::render_due(const CastContext& context) {
   const RayScene& rays = *context.rays;
   if (gl_) {
-    for (int id : due_) gl_->render(rays.world(id), targets(id));
+    for (int id : due_) gl_->render(id, rays.world(id), targets(id));
     return;
   }
   const int count = static_cast<int>(due_.size());
