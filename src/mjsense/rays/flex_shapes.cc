@@ -3,46 +3,145 @@
 #include <algorithm>
 
 namespace mjsense {
+namespace {
 
-FlexShapes::FlexShapes(RTCDevice device, const mjModel* m, std::span<const float> vertices) {
-  for (int f = 0; f < m->nflex; ++f) {
-    // Cloth shows its elements, a solid its shell: three vertices of this flex a triangle.
-    const bool cloth = m->flex_dim[f] == 2;
-    const int* faces =
-        cloth ? m->flex_elem + m->flex_elemdataadr[f] : m->flex_shell + m->flex_shelldataadr[f];
-    const int count = cloth ? m->flex_elemnum[f] : m->flex_dim[f] == 3 ? m->flex_shellnum[f] : 0;
-    if (count == 0) {
-      scenes_.emplace_back();
-      pointers_.push_back(nullptr);
-      continue;
+// Unit normal of the triangle a b c.
+void face_normal(const double* a, const double* b, const double* c, double n[3]) {
+  double ab[3], ac[3];
+  mju_sub3(ab, b, a);
+  mju_sub3(ac, c, a);
+  mju_cross(n, ab, ac);
+  mju_normalize3(n);
+}
+
+SceneHandle capsule_scene(RTCDevice device, const std::vector<float>& ends) {
+  const std::size_t count = ends.size() / 8;
+  RTCGeometry geometry = rtcNewGeometry(device, RTC_GEOMETRY_TYPE_ROUND_LINEAR_CURVE);
+  rtcSetSharedGeometryBuffer(geometry, RTC_BUFFER_TYPE_VERTEX, 0, RTC_FORMAT_FLOAT4, ends.data(), 0,
+                             4 * sizeof(float), 2 * count);
+  auto* first = static_cast<unsigned*>(rtcSetNewGeometryBuffer(
+      geometry, RTC_BUFFER_TYPE_INDEX, 0, RTC_FORMAT_UINT, sizeof(unsigned), count));
+  for (std::size_t e = 0; e < count; ++e) first[e] = static_cast<unsigned>(2 * e);
+  return moving_scene(device, geometry);
+}
+
+}  // namespace
+
+FlexShapes::FlexShapes(RTCDevice device, std::span<const FlexSurface> surfaces,
+                       const mjModel* model) {
+  const bool shaded = model->ncam > 0;
+  flexes_.reserve(surfaces.size());
+  for (const FlexSurface& s : surfaces) {
+    Flex& flex = flexes_.emplace_back();
+    flex.surface = &s;
+    flex.radius = model->flex_radius[flexes_.size() - 1];
+    flex.vertices.assign(s.rest.begin(), s.rest.end());
+    if (s.dim == 1) {
+      flex.ends.resize(4 * s.edges.size());
+      move_capsules(flex);
+      if (!s.edges.empty() && flex.radius > 0) flex.capsules = capsule_scene(device, flex.ends);
+      scenes_.push_back(flex.capsules.get());
+    } else {
+      std::vector<float> rest = s.rest;
+      if (s.dim == 2) rest.insert(rest.end(), s.rest.begin(), s.rest.end());
+      flex.smooth.resize(s.rest.size());
+      if (shaded && !s.flat) flex.normals.resize(3 * s.faces.size());
+      flex.mesh = SoftMesh(device, s.faces, rest);
+      move_sheets(flex);
+      scenes_.push_back(flex.mesh.scene());
     }
-    SceneHandle scene(rtcNewScene(device));
-    rtcSetSceneFlags(scene.get(), static_cast<RTCSceneFlags>(kSceneFlags | RTC_SCENE_FLAG_DYNAMIC));
-    rtcSetSceneBuildQuality(scene.get(), RTC_BUILD_QUALITY_REFIT);
-    RTCGeometry geometry = rtcNewGeometry(device, RTC_GEOMETRY_TYPE_TRIANGLE);
-    rtcSetGeometryBuildQuality(geometry, RTC_BUILD_QUALITY_REFIT);
-    rtcSetSharedGeometryBuffer(geometry, RTC_BUFFER_TYPE_VERTEX, 0, RTC_FORMAT_FLOAT3,
-                               vertices.data(), 3 * sizeof(float) * m->flex_vertadr[f],
-                               3 * sizeof(float), m->flex_vertnum[f]);
-    void* indices = rtcSetNewGeometryBuffer(geometry, RTC_BUFFER_TYPE_INDEX, 0, RTC_FORMAT_UINT3,
-                                            3 * sizeof(int), count);
-    std::copy_n(faces, 3 * count, static_cast<int*>(indices));
-    rtcCommitGeometry(geometry);
-    rtcAttachGeometryByID(scene.get(), geometry, 0);
-    rtcReleaseGeometry(geometry);
-    rtcCommitScene(scene.get());
-    pointers_.push_back(scene.get());
-    scenes_.push_back(std::move(scene));
   }
 }
 
-void FlexShapes::update() {
-  for (const SceneHandle& scene : scenes_) {
-    if (!scene) continue;
-    RTCGeometry geometry = rtcGetGeometry(scene.get(), 0);
-    rtcUpdateGeometryBuffer(geometry, RTC_BUFFER_TYPE_VERTEX, 0);
-    rtcCommitGeometry(geometry);
-    rtcCommitScene(scene.get());
+void FlexShapes::update(const mjModel* m, const mjData* d) {
+  for (std::size_t f = 0; f < flexes_.size(); ++f) {
+    Flex& flex = flexes_[f];
+    const double* moved = d->flexvert_xpos + 3 * m->flex_vertadr[f];
+    if (flex.radius == m->flex_radius[f] &&
+        std::equal(flex.vertices.begin(), flex.vertices.end(), moved))
+      continue;
+    flex.radius = m->flex_radius[f];
+    std::copy_n(moved, flex.vertices.size(), flex.vertices.begin());
+    if (flex.surface->dim == 1) {
+      move_capsules(flex);
+      if (flex.capsules) refit_scene(flex.capsules.get());
+    } else {
+      move_sheets(flex);
+      flex.mesh.refit();
+    }
+  }
+}
+
+const float* FlexShapes::normals(int flex) const {
+  const std::vector<float>& normals = flexes_[flex].normals;
+  return normals.empty() ? nullptr : normals.data();
+}
+
+void FlexShapes::move_capsules(Flex& flex) {
+  const FlexSurface& s = *flex.surface;
+  const double* origin = flex.vertices.data();
+  const auto radius = static_cast<float>(flex.radius);
+  float low[3] = {}, high[3] = {};
+  for (std::size_t i = 0; i < s.edges.size(); ++i) {
+    float* end = &flex.ends[4 * i];
+    for (int k = 0; k < 3; ++k) {
+      end[k] = static_cast<float>(origin[3 * s.edges[i] + k] - origin[k]);
+      low[k] = std::min(low[k], end[k]);
+      high[k] = std::max(high[k], end[k]);
+    }
+    end[3] = radius;
+  }
+  for (int k = 0; k < 3; ++k) {
+    flex.box[k] = 0.5f * (low[k] + high[k]);
+    flex.box[3 + k] = 0.5f * (high[k] - low[k]) + radius;
+  }
+}
+
+void FlexShapes::move_sheets(Flex& flex) {
+  const FlexSurface& s = *flex.surface;
+  const double* x = flex.vertices.data();
+  const int step = s.dim == 2 ? 2 : 1;  // of two sheets the first
+  std::fill(flex.smooth.begin(), flex.smooth.end(), 0.0);
+  for (int f = 0; f < s.num_sheet_faces; f += step) {
+    const int* v = &s.faces[3 * f];
+    double n[3];
+    face_normal(x + 3 * v[0], x + 3 * v[1], x + 3 * v[2], n);
+    for (int c = 0; c < 3; ++c) mju_addTo3(&flex.smooth[3 * v[c]], n);
+  }
+  const std::span<float> surface = flex.mesh.vertices();
+  for (int i = 0; i < s.num_vertices; ++i) {
+    double* n = &flex.smooth[3 * i];
+    mju_normalize3(n);
+    for (int k = 0; k < 3; ++k) {
+      const double p = x[3 * i + k] - x[k];
+      surface[3 * i + k] = static_cast<float>(p + flex.radius * n[k]);
+      if (s.dim == 2)
+        surface[3 * (s.num_vertices + i) + k] = static_cast<float>(p - flex.radius * n[k]);
+    }
+  }
+  box_around(surface, flex.box);
+  if (!flex.normals.empty()) shade(flex);
+}
+
+// The second sheet looks the other way; the border is flat.
+void FlexShapes::shade(Flex& flex) {
+  const FlexSurface& s = *flex.surface;
+  float* out = flex.normals.data();
+  for (int f = 0; f < s.num_faces(); ++f) {
+    const int* v = &s.faces[3 * f];
+    for (int c = 0; c < 3; ++c, out += 3) {
+      if (f < s.num_sheet_faces) {
+        const bool second = v[c] >= s.num_vertices;
+        const double* n = &flex.smooth[3 * (second ? v[c] - s.num_vertices : v[c])];
+        for (int k = 0; k < 3; ++k) out[k] = static_cast<float>(second ? -n[k] : n[k]);
+      } else if (c == 0) {
+        double p[3][3], n[3];
+        for (int i = 0; i < 3; ++i)
+          for (int k = 0; k < 3; ++k) p[i][k] = flex.mesh.vertices()[3 * v[i] + k];
+        face_normal(p[0], p[1], p[2], n);
+        for (int i = 0; i < 9; ++i) out[i] = static_cast<float>(n[i % 3]);
+      }
+    }
   }
 }
 

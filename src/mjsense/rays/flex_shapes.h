@@ -1,30 +1,52 @@
 #pragma once
-// Flexes of one world: triangles whose vertices move, a BVH each, refitted by every update.
+// The flexes of one world: their surfaces (flex_surface.h) where the world's vertices are now, in
+// the frame of the flex's first vertex (world axes), so that single precision is enough anywhere.
 
 #include <mujoco/mujoco.h>
 
 #include <span>
 #include <vector>
 
-#include "mjsense/rays/shared_geometry.h"
+#include "mjsense/rays/flex_surface.h"
+#include "mjsense/rays/soft_mesh.h"
 
 namespace mjsense {
 
 class FlexShapes {
  public:
-  FlexShapes() = default;
-  // `vertices` [nflexvert, 3] stay where they are, with room for a fourth coordinate of the last.
-  FlexShapes(RTCDevice device, const mjModel* model, std::span<const float> vertices);
+  // `surfaces` by flex id; they must outlive this.
+  FlexShapes(RTCDevice device, std::span<const FlexSurface> surfaces, const mjModel* model);
 
-  // The vertices have moved. Embree may allocate.
-  void update();
-  const void* const* scenes() const {
-    return pointers_.data();
-  }  // RTCScene by flex id; null for lines
+  // Takes the world's vertices and radii. A flex that did not move costs a comparison.
+  void update(const mjModel* model, const mjData* data);
+
+  std::span<const double> vertices(int flex) const { return flexes_[flex].vertices; }  // m, world
+  const double* position(int flex) const { return flexes_[flex].vertices.data(); }     // m, world
+  // [6] centre and half sizes of its box, m.
+  const float* box(int flex) const { return flexes_[flex].box; }
+  // [F, 3 corners, 3] unit normals; null: the faces' own.
+  const float* normals(int flex) const;
+  // RTCScene by flex id; null where there is nothing to meet.
+  void* const* scenes() const { return scenes_.data(); }
 
  private:
-  std::vector<SceneHandle> scenes_;
-  std::vector<const void*> pointers_;
+  struct Flex {
+    const FlexSurface* surface;
+    double radius;                 // m
+    std::vector<double> vertices;  // [V, 3] m, world
+    std::vector<double> smooth;    // [V, 3] unit normals of the vertices
+    std::vector<float> normals;    // [F, 3, 3]
+    SoftMesh mesh;                 // dimensions 2 and 3
+    std::vector<float> ends;       // [E, 2, 4] m, positions and radii: dimension 1
+    SceneHandle capsules;
+    float box[6];
+  };
+  static void move_capsules(Flex& flex);
+  static void move_sheets(Flex& flex);
+  static void shade(Flex& flex);
+
+  std::vector<Flex> flexes_;
+  std::vector<void*> scenes_;
 };
 
 }  // namespace mjsense

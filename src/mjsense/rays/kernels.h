@@ -39,10 +39,10 @@ struct KernelBoxes {
 
 struct KernelWorld {
   const RayGeom* geoms;
-  KernelBoxes boxes;               // of all geoms and flexes
-  const std::uint32_t* flags;      // [padded]
-  const int* bodies;               // [padded]
-  const void* const* flex_scenes;  // RTCScene by flex id
+  KernelBoxes boxes;           // of all geoms and flexes
+  const std::uint32_t* flags;  // [padded]
+  const int* bodies;           // [padded]
+  void* const* flex_scenes;    // RTCScene by flex id
 };
 
 struct KernelFilter {

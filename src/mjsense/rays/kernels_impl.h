@@ -206,8 +206,7 @@ std::uint32_t occluded_height_field(const HeightField& field, const RayGeom& g, 
 
 // The BVH of a mesh, SDF or flex; null where it has no triangles.
 RTCScene triangles_of(const KernelScene& scene, const KernelWorld& world, const RayGeom& g) {
-  if (g.type == kFlexType)
-    return static_cast<RTCScene>(const_cast<void*>(world.flex_scenes[g.data]));
+  if (g.type == kFlexType) return static_cast<RTCScene>(world.flex_scenes[g.data]);
   return static_cast<RTCScene>(scene.mesh_scenes[g.data]);
 }
 

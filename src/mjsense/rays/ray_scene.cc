@@ -27,13 +27,13 @@ KernelFilter kernel_filter(const RayFilter& f) {
           f.hidden.empty() ? nullptr : f.hidden.data()};
 }
 
-KernelWorld kernel_world(const RayWorld& w, const FlexShapes& flexes) {
+KernelWorld kernel_world(const RayWorld& w) {
   const auto &low = w.low(), &high = w.high();
   return {w.geoms().data(),
           {{low[0], low[1], low[2]}, {high[0], high[1], high[2]}, nullptr, w.num_objects()},
           w.flags().data(),
           w.bodies().data(),
-          flexes.scenes()};
+          w.flexes() ? w.flexes()->scenes() : nullptr};
 }
 
 }  // namespace
@@ -47,18 +47,12 @@ RayScratch::RayScratch(int num_objects)
 RayScene::RayScene(const mjModel* model, int num_worlds, Isa isa)
     : model_(model), shared_(std::make_unique<SharedGeometry>(model)), kernels_(&kernels_for(isa)) {
   worlds_.reserve(num_worlds);
-  for (int w = 0; w < num_worlds; ++w) {
-    worlds_.emplace_back(model, shared_->bounds);
-    flexes_.emplace_back(shared_->device.get(), model, worlds_[w].flex_vertices());
-  }
+  for (int w = 0; w < num_worlds; ++w) worlds_.emplace_back(model, *shared_);
 }
 
 RayScene::~RayScene() = default;
 
-void RayScene::update(const World& world) {
-  worlds_[world.id].update(world.model, world.data);
-  flexes_[world.id].update();
-}
+void RayScene::update(const World& world) { worlds_[world.id].update(world.model, world.data); }
 
 void RayScene::place(const LocalPacket& local, const float rotation[9], float tmax,
                      RayPacket& rays) const {
@@ -67,24 +61,24 @@ void RayScene::place(const LocalPacket& local, const float rotation[9], float tm
 
 void RayScene::gather(int world, const RayFilter& filter, const RayPacket& rays,
                       RayScratch& scratch) const {
-  scratch.count = kernels_->gather(kernel_world(worlds_[world], flexes_[world]),
-                                   kernel_filter(filter), rays, scratch.data());
+  scratch.count =
+      kernels_->gather(kernel_world(worlds_[world]), kernel_filter(filter), rays, scratch.data());
 }
 
 void RayScene::trace_candidates(int world, const RayFilter& filter, const RayPacket& rays,
                                 HitPacket& hits, std::span<const RayCandidate> candidates) const {
   const KernelScene scene{shared_->mesh_scenes.data(), shared_->height_fields.data()};
-  kernels_->trace(scene, kernel_world(worlds_[world], flexes_[world]), kernel_filter(filter), rays,
-                  hits, candidates.data(), static_cast<int>(candidates.size()));
+  kernels_->trace(scene, kernel_world(worlds_[world]), kernel_filter(filter), rays, hits,
+                  candidates.data(), static_cast<int>(candidates.size()));
 }
 
 void RayScene::focus(int world, const RayFilter& filter, std::span<const RayPacket> packets,
                      RayScratch& scratch) const {
   float* rows[6];
   for (int k = 0; k < 6; ++k) rows[k] = scratch.boxes_.data() + k * scratch.stride_;
-  scratch.num_boxes_ = kernels_->focus(
-      kernel_world(worlds_[world], flexes_[world]), kernel_filter(filter), packets.data(),
-      static_cast<int>(packets.size()), rows, rows + 3, scratch.ids_.data());
+  scratch.num_boxes_ =
+      kernels_->focus(kernel_world(worlds_[world]), kernel_filter(filter), packets.data(),
+                      static_cast<int>(packets.size()), rows, rows + 3, scratch.ids_.data());
 }
 
 void RayScene::trace_focused(int world, const RayFilter& filter, const RayPacket& rays,
@@ -109,9 +103,8 @@ std::uint32_t RayScene::occluded(int world, const RayFilter& filter, const RayPa
                                  RayScratch& scratch) const {
   gather(world, filter, rays, scratch);
   const KernelScene scene{shared_->mesh_scenes.data(), shared_->height_fields.data()};
-  return kernels_->occluded(scene, kernel_world(worlds_[world], flexes_[world]),
-                            kernel_filter(filter), rays, scratch.data(),
-                            static_cast<int>(scratch.count));
+  return kernels_->occluded(scene, kernel_world(worlds_[world]), kernel_filter(filter), rays,
+                            scratch.data(), static_cast<int>(scratch.count));
 }
 
 Hit RayScene::trace(int world, const RayFilter& filter, const double origin[3],

@@ -6,7 +6,8 @@
 //   mesh    both sides, normal by winding
 //   hfield  both sides of the surface, side walls, base box
 //   sdf     its mesh, as MuJoCo draws it: mj_ray marches the field, they differ by its resolution
-//   flex    its triangles without the radius (mj_ray does not see flexes); none for lines
+//   flex    the surface that MuJoCo draws, `radius` around its elements (mj_ray does not see flexes):
+//           both sides, normal by winding; flex_surface.h says which triangles
 // Hits nearer to each other than rounding are a tie: the lower geom id wins.
 //
 // update() runs in the parallel pass over worlds; tracing reads only and may run on any number of
@@ -27,7 +28,6 @@
 namespace mjsense {
 
 struct RayKernels;
-class FlexShapes;
 struct SharedGeometry;
 
 // Geoms that a packet of rays may meet. One a thread, made once, reused by every query.
@@ -95,7 +95,6 @@ class RayScene {
   std::unique_ptr<SharedGeometry> shared_;
   const RayKernels* kernels_;
   std::vector<RayWorld> worlds_;
-  std::vector<FlexShapes> flexes_;  // [B]
 };
 
 }  // namespace mjsense

@@ -3,6 +3,9 @@
 #include <algorithm>
 #include <cmath>
 
+#include "mjsense/rays/flex_shapes.h"
+#include "mjsense/rays/shared_geometry.h"
+
 namespace mjsense {
 namespace {
 
@@ -11,8 +14,11 @@ constexpr float kEndless = 1e30f;
 
 }  // namespace
 
-RayWorld::RayWorld(const mjModel* m, const ShapeBounds& bounds)
-    : num_geoms_(static_cast<int>(m->ngeom)), shapes_(&bounds) {
+RayWorld::RayWorld(RayWorld&&) noexcept = default;
+RayWorld::~RayWorld() = default;
+
+RayWorld::RayWorld(const mjModel* m, const SharedGeometry& shapes)
+    : num_geoms_(static_cast<int>(m->ngeom)), shapes_(&shapes) {
   const int count = static_cast<int>(m->ngeom + m->nflex);
   const int padded = (count + kPad - 1) / kPad * kPad;
   geoms_.resize(count);
@@ -25,7 +31,7 @@ RayWorld::RayWorld(const mjModel* m, const ShapeBounds& bounds)
   bodies_.assign(padded, -1);
   materials_.assign(count, -1);
   rgba_.assign(4 * count, 0.0f);
-  flex_vertices_.assign(3 * m->nflexvert + 1, 0.0f);
+  if (m->nflex > 0) flexes_ = std::make_unique<FlexShapes>(shapes.device.get(), shapes.flexes, m);
   lights_.resize(m->nlight);
   cameras_.resize(m->ncam);
 }
@@ -52,7 +58,7 @@ void RayWorld::update(const mjModel* m, const mjData* d) {
     set_local_box(g);
     set_world_box(i);
   }
-  if (m->nflex > 0) update_flexes(m, d);
+  if (flexes_) update_flexes(m, d);
   for (int i = 0; i < m->nlight; ++i) {
     std::copy_n(d->light_xpos + 3 * i, 3, lights_[i].pos);
     std::copy_n(d->light_xdir + 3 * i, 3, lights_[i].dir);
@@ -72,25 +78,18 @@ void RayWorld::describe(const mjModel* m, int i, int material, int group, const 
 }
 
 void RayWorld::update_flexes(const mjModel* m, const mjData* d) {
-  std::copy_n(d->flexvert_xpos, 3 * m->nflexvert, flex_vertices_.begin());
+  flexes_->update(m, d);
   for (int f = 0; f < m->nflex; ++f) {
     const int i = num_geoms_ + f;
-    describe(m, i, m->flex_matid[f], m->flex_group[f], m->flex_rgba + 4 * f);
+    describe(m, i, flex_material(m, f), m->flex_group[f], m->flex_rgba + 4 * f);
     RayGeom& g = geoms_[i];
     g = {.mat = {1, 0, 0, 0, 1, 0, 0, 0, 1},
          .rot = {1, 0, 0, 0, 1, 0, 0, 0, 1},
          .type = kFlexType,
          .data = f};
-    const float* v = &flex_vertices_[3 * m->flex_vertadr[f]];
-    for (int k = 0; k < 3; ++k) {
-      float low = kEndless, high = -kEndless;
-      for (int j = 0; j < m->flex_vertnum[f]; ++j) {
-        low = std::min(low, v[3 * j + k]);
-        high = std::max(high, v[3 * j + k]);
-      }
-      g.center[k] = 0.5f * (low + high);
-      g.half[k] = 0.5f * (high - low);
-    }
+    std::copy_n(flexes_->position(f), 3, g.pos);
+    std::copy_n(flexes_->box(f), 3, g.center);
+    std::copy_n(flexes_->box(f) + 3, 3, g.half);
     set_world_box(i);
   }
 }
@@ -129,10 +128,10 @@ void RayWorld::set_local_box(RayGeom& g) const {
       break;
     case mjGEOM_MESH:
     case mjGEOM_SDF:
-      shape(shapes_->meshes[g.data]);
+      shape(shapes_->bounds.meshes[g.data]);
       break;
     case mjGEOM_HFIELD:
-      shape(shapes_->height_fields[g.data]);
+      shape(shapes_->bounds.height_fields[g.data]);
       break;
     default:
       break;  // flexes have theirs already

@@ -6,6 +6,7 @@
 
 #include <array>
 #include <cstdint>
+#include <memory>
 #include <span>
 #include <vector>
 
@@ -22,18 +23,17 @@ struct RayCamera {
   double pos[3], mat[9];
 };
 
-// Local boxes (center, half) of the shared shapes, by mesh and height-field id.
-struct ShapeBounds {
-  std::vector<std::array<float, 6>> meshes, height_fields;
-};
+class FlexShapes;
+struct SharedGeometry;
 
 class RayWorld {
  public:
-  RayWorld() = default;
-  RayWorld(const mjModel* model, const ShapeBounds& bounds);
+  RayWorld(const mjModel* model, const SharedGeometry& shapes);
+  RayWorld(RayWorld&&) noexcept;
+  ~RayWorld();
 
-  // Copies the world's present values; what did not move costs a comparison. No allocation. Called
-  // by one thread a world.
+  // Copies the world's present values; what did not move costs a comparison. No allocation but
+  // Embree's own for a flex that moved. Called by one thread a world.
   void update(const mjModel* model, const mjData* data);
 
   int num_geoms() const { return num_geoms_; }  // of the model, without flexes
@@ -52,10 +52,7 @@ class RayWorld {
   std::span<const int> materials() const { return materials_; }  // material id or -1
   // [num_objects, 4], resolved: the material's if it has one
   std::span<const float> rgba() const { return rgba_; }
-  // [nflexvert, 3] m, world
-  std::span<const float> flex_vertices() const {
-    return {flex_vertices_.data(), flex_vertices_.size() - 1};
-  }
+  const FlexShapes* flexes() const { return flexes_.get(); }  // null: the model has none
   std::span<const RayLight> lights() const { return lights_; }
   std::span<const RayCamera> cameras() const { return cameras_; }
 
@@ -68,13 +65,13 @@ class RayWorld {
   int num_geoms_ = 0;
   std::uint64_t version_ = 0;
   std::vector<RayGeom> geoms_;
-  const ShapeBounds* shapes_ = nullptr;
+  const SharedGeometry* shapes_;
+  std::unique_ptr<FlexShapes> flexes_;
   Array bounds_;                                // [6, padded]
   std::array<const float*, 3> low_{}, high_{};  // its rows
   std::vector<std::uint32_t> flags_;
   std::vector<int> bodies_, materials_;
   std::vector<float> rgba_;
-  std::vector<float> flex_vertices_;
   std::vector<RayLight> lights_;
   std::vector<RayCamera> cameras_;
 };

@@ -109,6 +109,7 @@ SharedGeometry::SharedGeometry(const mjModel* m) {
                                 m->mesh_face + 3 * m->mesh_faceadr[i], m->mesh_facenum[i]);
     mesh_scenes[i] = meshes[i].get();
   }
+  for (int i = 0; i < m->nflex; ++i) flexes.push_back(flex_surface(m, i));
   for (int i = 0; i < m->nhfield; ++i) {
     HeightField field{
         m->hfield_data + m->hfield_adr[i], m->hfield_nrow[i], m->hfield_ncol[i], {}, nullptr};

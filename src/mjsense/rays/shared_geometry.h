@@ -1,14 +1,16 @@
 #pragma once
-// The shapes that all worlds share: a BVH for each mesh; height fields, which rays march over.
+// The shapes that all worlds share: a BVH for each mesh; height fields, which rays march over; the
+// triangles of flexes.
 
 #include <mujoco/mujoco.h>
 
+#include <array>
 #include <memory>
 #include <vector>
 
 #include "mjsense/rays/embree.h"
+#include "mjsense/rays/flex_surface.h"
 #include "mjsense/rays/kernels.h"
-#include "mjsense/rays/ray_world.h"
 
 namespace mjsense {
 
@@ -21,6 +23,11 @@ struct SceneRelease {
 using DeviceHandle = std::unique_ptr<RTCDeviceTy, DeviceRelease>;
 using SceneHandle = std::unique_ptr<RTCSceneTy, SceneRelease>;
 
+// Local boxes (center, half) of the shared shapes, by mesh and height-field id.
+struct ShapeBounds {
+  std::vector<std::array<float, 6>> meshes, height_fields;
+};
+
 struct SharedGeometry {
   explicit SharedGeometry(const mjModel* model);
 
@@ -31,6 +38,7 @@ struct SharedGeometry {
   std::vector<std::vector<float>> block_tops;  // of each height field
   std::vector<SceneHandle> surfaces;  // of height fields, if the model has cameras: rays march
   ShapeBounds bounds;
+  std::vector<FlexSurface> flexes;  // what does not move of them
 };
 
 // A scene of one triangle mesh; positions and indices are copied.

@@ -4,6 +4,8 @@
 #include <cmath>
 #include <numbers>
 
+#include "mjsense/rays/flex_surface.h"
+
 namespace mjsense {
 namespace {
 
@@ -28,7 +30,7 @@ void Appearance::copy(const mjModel* m) {
   for (int i = 0; i < m->ngeom; ++i)
     resolve_rgba(m, m->geom_matid[i], m->geom_rgba + 4 * i, &rgba_[4 * i]);
   for (int i = 0; i < m->nflex; ++i)
-    resolve_rgba(m, m->flex_matid[i], m->flex_rgba + 4 * i, &rgba_[4 * (m->ngeom + i)]);
+    resolve_rgba(m, flex_material(m, i), m->flex_rgba + 4 * i, &rgba_[4 * (m->ngeom + i)]);
   for (int i = 0; i < m->nmat; ++i)
     materials_[i] = {.specular = m->mat_specular[i],
                      .shininess = m->mat_shininess[i],

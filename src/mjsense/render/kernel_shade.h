@@ -176,7 +176,7 @@ inline void triangle_normals(const ViewGeom& g, const Hits& hits, std::uint32_t 
   for (int i = 0; i < kLanes; ++i) {
     if (!(lanes >> i & 1u)) continue;
     float local[3] = {hits.n[0][i], hits.n[1][i], hits.n[2][i]};
-    if (g.mesh && hits.prim[i] >= 0) {
+    if (g.mesh && g.mesh->normals && hits.prim[i] >= 0) {
       const float* c = g.mesh->normals + 9 * hits.prim[i];
       const float b1 = hits.u[i], b2 = hits.v[i], b0 = 1 - b1 - b2;
       for (int k = 0; k < 3; ++k) local[k] = b0 * c[k] + b1 * c[3 + k] + b2 * c[6 + k];

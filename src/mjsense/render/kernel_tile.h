@@ -145,7 +145,7 @@ inline void write_geometry(const View& view, const ImageTargets& targets, int x0
     const float px = pixels.x[i], py = pixels.y[i], t = hits.t[i];
     if (targets.segmentation) {
       const ViewGeom* g = hit ? &view.geoms[hits.geom[i]] : nullptr;
-      targets.segmentation[2 * at] = g ? g->id : -1;
+      targets.segmentation[2 * at] = g ? g->object_id : -1;
       targets.segmentation[2 * at + 1] = g ? g->object : -1;
     }
     if (targets.normals)

@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "mjsense/rays/flex_surface.h"
+
 namespace mjsense {
 namespace {
 
@@ -51,6 +53,8 @@ void halve(const std::uint32_t* src, int width, int height, std::uint32_t* dst, 
 Look::Look(const mjModel* model, bool meshes, bool textures) {
   textures_.resize(model->ntex);
   meshes_.resize(model->nmesh);
+  flexes_.resize(model->nflex);
+  for (int i = 0; i < model->nflex && textures; ++i) add_flex(model, i);
   for (int i = 0; i < model->ntex && textures; ++i) add_texture(model, i);
   for (int i = 0; i < model->ntex && !skybox_; ++i)
     if (model->tex_type[i] == mjTEXTURE_SKYBOX && textures_[i].levels > 0) skybox_ = &textures_[i];
@@ -133,24 +137,37 @@ void Look::add_mesh(const mjModel* model, int id) {
   meshes_[id].normals = normals.data();
   if (!has_uv) return;
   const float* texcoord = model->mesh_texcoord + 2 * model->mesh_texcoordadr[id];
-  std::vector<float>& uvs = tables_.emplace_back(static_cast<std::size_t>(faces) * 6);
-  std::vector<float>& density = tables_.emplace_back(faces);
+  add_coordinates(
+      meshes_[id], faces,
+      [&](int f, int k) { return vert + 3 * model->mesh_face[3 * (first + f) + k]; },
+      [&](int f, int k) { return texcoord + 2 * model->mesh_facetexcoord[3 * (first + f) + k]; });
+}
+
+void Look::add_flex(const mjModel* model, int id) {
+  const FlexSurface s = flex_surface(model, id);
+  if (s.texcoords.empty()) return;
+  const float* texcoord = model->flex_texcoord + 2 * model->flex_texcoordadr[id];
+  add_coordinates(
+      flexes_[id], s.num_faces(),
+      [&](int f, int k) { return &s.rest[3 * (s.faces[3 * f + k] % s.num_vertices)]; },
+      [&](int f, int k) { return texcoord + 2 * s.texcoords[3 * f + k]; });
+}
+
+template <class Position, class Texcoord>
+void Look::add_coordinates(MeshLook& look, int faces, Position position, Texcoord texcoord) {
+  float* uvs = tables_.emplace_back(static_cast<std::size_t>(faces) * 6).data();
+  float* density = tables_.emplace_back(faces).data();
   for (int f = 0; f < faces; ++f) {
-    float* uv = uvs.data() + 6 * f;
-    for (int k = 0; k < 3; ++k) {
-      const int t = model->mesh_facetexcoord[3 * (first + f) + k];
-      uv[2 * k] = texcoord[2 * t];
-      uv[2 * k + 1] = texcoord[2 * t + 1];
-    }
-    const int* v = model->mesh_face + 3 * (first + f);
+    float* uv = uvs + 6 * f;
+    for (int k = 0; k < 3; ++k) std::copy_n(texcoord(f, k), 2, uv + 2 * k);
     float normal[3];
-    const float area = cross(vert + 3 * v[0], vert + 3 * v[1], vert + 3 * v[2], normal);
+    const float area = cross(position(f, 0), position(f, 1), position(f, 2), normal);
     const float uv_area =
         std::abs((uv[2] - uv[0]) * (uv[5] - uv[1]) - (uv[4] - uv[0]) * (uv[3] - uv[1]));
     density[f] = area > 0 ? std::sqrt(uv_area / area) : 0;
   }
-  meshes_[id].uvs = uvs.data();
-  meshes_[id].density = density.data();
+  look.uvs = uvs;
+  look.density = density;
 }
 
 }  // namespace mjsense

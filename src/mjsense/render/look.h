@@ -23,7 +23,7 @@ struct Texture {
   int offset[kMaxLevels] = {};  // of the level's first texel
 };
 
-// Per face of a mesh, by face index. Null where the model has none.
+// Per face of a mesh, flex or skin, by face index. Null where there is none.
 struct MeshLook {
   const float* normals = nullptr;  // [F, 3 corners, 3]
   const float* uvs = nullptr;      // [F, 3 corners, 2]
@@ -40,14 +40,19 @@ class Look {
 
   const Texture* texture(int id) const { return id < 0 ? nullptr : &textures_[id]; }
   const MeshLook* mesh(int id) const { return &meshes_[id]; }
-  const Texture* skybox() const { return skybox_; }  // null if the model has none
+  const MeshLook* flex(int id) const { return &flexes_[id]; }  // without normals: they move
+  const Texture* skybox() const { return skybox_; }            // null if the model has none
 
  private:
   void add_texture(const mjModel* model, int id);
   void add_mesh(const mjModel* model, int id);
+  void add_flex(const mjModel* model, int id);
+  // Corner k of face f: where it is, m, and its texture coordinates.
+  template <class Position, class Texcoord>
+  void add_coordinates(MeshLook& look, int faces, Position position, Texcoord texcoord);
 
   std::vector<Texture> textures_;
-  std::vector<MeshLook> meshes_;
+  std::vector<MeshLook> meshes_, flexes_;
   std::vector<std::vector<std::uint32_t>> texels_;
   std::vector<std::vector<float>> tables_;
   const Texture* skybox_ = nullptr;

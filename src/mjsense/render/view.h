@@ -41,14 +41,15 @@ struct alignas(64) ViewGeom {
   float box[6];     // local bounding box: centre, half sizes; m
   float center[3];  // bounding sphere in C, m; planes: endless
   float radius;
-  float window[4];   // X min, X max, Y min, Y max of what it may cover
-  float nearest;     // no point of it has less planar depth
-  int type;          // mjtGeom
-  int id, object;    // for segmentation: id and mjtObj
-  bool transparent;  // blended over what is behind it, casts shadows, receives none
+  float window[4];        // X min, X max, Y min, Y max of what it may cover
+  float nearest;          // no point of it has less planar depth
+  int type;               // mjtGeom; mjGEOM_MESH for a flex or skin
+  int id;                 // of geoms, then flexes, then skins: unique in the model
+  int object_id, object;  // for segmentation: id and mjtObj
+  bool transparent;       // blended over what is behind it, casts shadows, receives none
   bool behind;  // a plane that the camera sees from below: a faint veil, and nothing to depth and
                 // segmentation
-  void* bvh;    // RTCScene of a mesh, a height field's surface, a flex; else null
+  void* bvh;    // RTCScene of a mesh, a height field's surface, a flex, a skin; else null
   const MeshLook* mesh;
   const HeightField* height_field;
   Surface surface;

@@ -4,6 +4,7 @@
 #include <cmath>
 #include <limits>
 
+#include "mjsense/rays/flex_shapes.h"
 #include "mjsense/rays/ray_world.h"
 #include "mjsense/rays/shared_geometry.h"
 
@@ -23,7 +24,11 @@ void rotate_back(const double r[9], const double v[3], double out[3]) {
 }  // namespace
 
 ViewBuilder::ViewBuilder(const mjModel* model, const Look& look, const ViewOptions& options)
-    : look_(&look), options_(options), unsorted_(max_geoms(model)), sorted_(max_geoms(model)) {
+    : look_(&look),
+      options_(options),
+      unsorted_(max_geoms(model)),
+      sorted_(max_geoms(model)),
+      flexes_(model->nflex) {
   order_.reserve(max_geoms(model));
   view_.near = options.near;
   view_.far = options.far;
@@ -41,7 +46,7 @@ const View& ViewBuilder::build(const RayWorld& world, const SharedGeometry& shap
                                const double rotation[9], const PixelGrid& grid) {
   view_.grid = grid;
   order_.clear();
-  for (int id = 0; id < world.num_geoms(); ++id) {
+  for (int id = 0; id < world.num_objects(); ++id) {
     const float* rgba = appearance.rgba().data() + 4 * id;
     if (rgba[3] == 0 || !(world.flags()[id] & options_.groups) || id == left_out_) continue;
     const int index = static_cast<int>(order_.size());
@@ -53,9 +58,10 @@ const View& ViewBuilder::build(const RayWorld& world, const SharedGeometry& shap
     Order order{sight ? g.transparent : 2, g.nearest, index};
     if (order.rank == 1) {
       const float* p = g.pos;
+      const float reach = g.object == mjOBJ_GEOM ? g.radius : 0;  // MuJoCo's of what is soft
       order.key = g.type == mjGEOM_PLANE
                       ? 1e10f
-                      : std::sqrt(p[0] * p[0] + p[1] * p[1] + p[2] * p[2]) - g.radius;
+                      : std::sqrt(p[0] * p[0] + p[1] * p[1] + p[2] * p[2]) - reach;
     }
     order_.push_back(order);
   }
@@ -118,7 +124,7 @@ void ViewBuilder::set_mirror(const RayWorld& world, const SharedGeometry& shapes
 }
 
 void ViewBuilder::place(const RayWorld& world, const SharedGeometry& shapes, int id,
-                        const double position[3], const double rotation[9], ViewGeom& g) const {
+                        const double position[3], const double rotation[9], ViewGeom& g) {
   const RayGeom& source = world.geom(id);
   const double offset[3] = {source.pos[0] - position[0], source.pos[1] - position[1],
                             source.pos[2] - position[2]};
@@ -136,8 +142,14 @@ void ViewBuilder::place(const RayWorld& world, const SharedGeometry& shapes, int
           static_cast<float>(rotation[i] * source.mat[j] + rotation[3 + i] * source.mat[3 + j] +
                              rotation[6 + i] * source.mat[6 + j]);
   }
+  g.id = g.object_id = id;
+  set_shape(world, shapes, source, g);
+  g.behind = g.type == mjGEOM_PLANE && g.eye[2] < 0;
+}
+
+void ViewBuilder::set_shape(const RayWorld& world, const SharedGeometry& shapes,
+                            const RayGeom& source, ViewGeom& g) {
   g.type = source.type;
-  g.id = id;
   g.object = mjOBJ_GEOM;
   g.bvh = nullptr;
   g.mesh = nullptr;
@@ -148,8 +160,16 @@ void ViewBuilder::place(const RayWorld& world, const SharedGeometry& shapes, int
   } else if (g.type == mjGEOM_HFIELD) {
     g.height_field = &shapes.height_fields[source.data];
     g.bvh = g.height_field->scene;
+  } else if (g.type == kFlexType) {
+    const int flex = source.data;
+    g.type = mjGEOM_MESH;
+    g.object = mjOBJ_FLEX;
+    g.object_id = flex;
+    g.bvh = world.flexes()->scenes()[flex];
+    flexes_[flex] = *look_->flex(flex);
+    flexes_[flex].normals = world.flexes()->normals(flex);
+    g.mesh = &flexes_[flex];
   }
-  g.behind = g.type == mjGEOM_PLANE && g.eye[2] < 0;
 }
 
 // Bounding sphere, window and nearest depth of g; whether any of it can be in the image.
@@ -219,6 +239,10 @@ void ViewBuilder::set_surface(const RayWorld& world, const Appearance& appearanc
   if (!s.texture) return;
   const bool uniform = material.uniform;
   s.mapped = g.mesh && g.mesh->uvs && !s.texture->cube;
+  if (g.object == mjOBJ_FLEX && !s.mapped) {
+    s.texture = nullptr;  // MuJoCo: textures only by a flex's own coordinates
+    return;
+  }
   for (int i = 0; i < 2; ++i) {
     const float size = g.size[i] > 0 ? g.size[i] : 1.0f;
     s.repeat[i] = material.repeat[i] * (uniform && !s.mapped ? size : 1.0f);

@@ -15,6 +15,7 @@
 namespace mjsense {
 
 class RayWorld;
+struct RayGeom;
 struct SharedGeometry;
 
 struct ViewOptions {
@@ -46,7 +47,9 @@ class ViewBuilder {
     int index;
   };
   void place(const RayWorld& world, const SharedGeometry& shapes, int id, const double position[3],
-             const double rotation[9], ViewGeom& g) const;
+             const double rotation[9], ViewGeom& g);
+  void set_shape(const RayWorld& world, const SharedGeometry& shapes, const RayGeom& source,
+                 ViewGeom& g);
   bool in_sight(ViewGeom& g) const;
   void set_surface(const RayWorld& world, const Appearance& appearance, int id, ViewGeom& g) const;
   void set_mirror(const RayWorld& world, const SharedGeometry& shapes, const Appearance& appearance,
@@ -59,6 +62,7 @@ class ViewBuilder {
   View view_;
   std::vector<ViewGeom> unsorted_, sorted_;
   std::vector<Order> order_;
+  std::vector<MeshLook> flexes_;           // with the world's normals
   std::unique_ptr<ViewBuilder> mirrored_;  // null: nothing can reflect
   int left_out_ = -1;                      // geom that this view does not show: the mirror itself
   bool own_headlight_ = true;              // else headlight_: where the mirrored camera looks

@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "mjsense/core/error.h"
+#include "mjsense/rays/flex_shapes.h"
 #include "mjsense/rays/ray_world.h"
 #include "mjsense/render/opengl/visual_fields.h"
 
@@ -114,7 +115,8 @@ class MujocoGl final : public GlRenderer {
     colors_.resize(3 * static_cast<std::size_t>(cfg.width) * cfg.height);
     take();
     mjv_defaultScene(&scene_);
-    mjv_makeScene(model_, &scene_, static_cast<int>(model_->ngeom) + 100);
+    mjv_makeScene(model_, &scene_,
+                  static_cast<int>(model_->ngeom + model_->nflex + model_->nskin) + 100);
     mjr_defaultContext(&context_);
     mjr_makeContext(model_, &context_, mjFONTSCALE_100);
     mjr_setBuffer(mjFB_OFFSCREEN, &context_);
@@ -122,7 +124,8 @@ class MujocoGl final : public GlRenderer {
     egl_.release();
     mjv_defaultOption(&options_);
     std::fill_n(options_.sitegroup, mjNGROUP, 0);
-    for (int g = 0; g < mjNGROUP; ++g) options_.geomgroup[g] = cfg.groups >> g & 1u;
+    for (int g = 0; g < mjNGROUP; ++g)
+      options_.geomgroup[g] = options_.flexgroup[g] = options_.skingroup[g] = cfg.groups >> g & 1u;
     options_.flags[mjVIS_TEXTURE] = cfg.textures;
     options_.flags[mjVIS_TENDON] = 0;
     mjv_defaultCamera(&camera_);
@@ -189,6 +192,9 @@ class MujocoGl final : public GlRenderer {
       std::copy_n(world.geom(i).pos, 3, data_->geom_xpos + 3 * i);
       std::copy_n(world.geom(i).mat, 9, data_->geom_xmat + 9 * i);
     }
+    for (int f = 0; f < model_->nflex; ++f)
+      std::ranges::copy(world.flexes()->vertices(f),
+                        data_->flexvert_xpos + 3 * model_->flex_vertadr[f]);
     for (std::size_t i = 0; i < world.lights().size(); ++i) {
       std::copy_n(world.lights()[i].pos, 3, data_->light_xpos + 3 * i);
       std::copy_n(world.lights()[i].dir, 3, data_->light_xdir + 3 * i);

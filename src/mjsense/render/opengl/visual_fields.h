@@ -45,6 +45,11 @@ class VisualFields {
     fields(3 * m->ngeom, m->geom_size);
     fields(4 * m->ngeom, m->geom_rgba);
     fields(m->ngeom, m->geom_rbound);
+    fields(m->nflex, m->flex_group, m->flex_radius, m->flex_flatskin);
+    fields(m->nflexelem, m->flex_matid);
+    fields(4 * m->nflex, m->flex_rgba);
+    fields(m->nskin, m->skin_matid, m->skin_group, m->skin_inflate);
+    fields(4 * m->nskin, m->skin_rgba);
     fields(m->nmat, m->mat_texuniform, m->mat_emission, m->mat_specular, m->mat_shininess,
            m->mat_reflectance);
     fields(mjNTEXROLE * m->nmat, m->mat_texid);

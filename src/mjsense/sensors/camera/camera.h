@@ -2,16 +2,22 @@
 // CameraSensor: images of every world from one camera, by ray casting on the CPU. No OpenGL, no
 // display, no GPU.
 //
-// Fields (only those asked for in data_types; row 0 is the top of the image):
-//   rgb           uint8   [B, H, W, 3]  MuJoCo's classic look: headlight, lights, materials,
-//   textures, skybox, shadows depth         float32 [B, H, W, 1]  m; planar: distance to the camera
-//   plane; ray: along the pixel's ray; 0 background segmentation  int32   [B, H, W, 2]  (id, type):
-//   (geom id, mjOBJ_GEOM); (-1, -1) background normals       float32 [B, H, W, 3]  unit, outward,
-//   camera frame; 0 background point_cloud   float32 [B, H, W, 3]  m, camera frame; NaN background
+// Fields, only those asked for in data_types; row 0 is the top of the image:
+//
+//   rgb           uint8   [B, H, W, 3]  MuJoCo's classic look
+//   depth         float32 [B, H, W, 1]  m; planar: distance to the camera plane; ray: along the
+//                                       pixel's ray; 0 where nothing is
+//   segmentation  int32   [B, H, W, 2]  (id, type): mjOBJ_GEOM, mjOBJ_FLEX or mjOBJ_SKIN; (-1, -1)
+//                                       where nothing is
+//   normals       float32 [B, H, W, 3]  unit, outward, camera frame; 0 where nothing is
+//   point_cloud   float32 [B, H, W, 3]  m, camera frame; NaN where nothing is
+//
 // and always
-//   intrinsics    float32 [B, 3, 3]     K in pixels, OpenCV convention: x right, y down, z forward;
-//   pixel centres at +0.5 pose          float32 [B, 4, 4]     X_WC of the image; C is MuJoCo's
-//   camera frame: x right, y up, looking along -z
+//
+//   intrinsics    float32 [B, 3, 3]     K in pixels, OpenCV's: x right, y down, z forward; pixel
+//                                       centres at +0.5
+//   pose          float32 [B, 4, 4]     X_WC of the image; C is MuJoCo's camera frame: x right, y up,
+//                                       looking along -z
 
 #include <array>
 #include <cstdint>

@@ -149,7 +149,7 @@ void CameraSensor::declare_fields(int num_worlds) {
                                      : "Distance to the camera plane; 0 where nothing is seen.");
   if (wants("segmentation"))
     segmentation_ = add("segmentation", DType::kInt32, {h, w, 2}, "", -1, inf, Storage::kArray,
-                        "(geom id, object type) of each pixel; (-1, -1) where nothing is seen.");
+                        "(id, mjtObj) of each pixel: geom, flex or skin; (-1, -1) where nothing is seen.");
   if (wants("normals"))
     normals_ = add("normals", DType::kFloat32, {h, w, 3}, "", -1, 1, Storage::kArray,
                    "Unit surface normal in the camera frame; 0 where nothing is seen.");

@@ -1,0 +1,173 @@
+// What bends: flexes and skins in images.
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <cstring>
+#include <memory>
+
+#include "mjsense/core/error.h"
+#include "mjsense/core/parallel.h"
+#include "mjsense/rays/ray_scene.h"
+#include "mjsense/rays/testing/scene.h"
+#include "mjsense/scene/scene.h"
+#include "mjsense/sensors/camera/camera_sensor.h"
+#include "mjsense/sim/simulation.h"
+
+namespace mjsense {
+namespace {
+
+using testing::TestModel;
+
+CameraSensorCfg camera(int width, int height) {
+  CameraSensorCfg cfg;
+  cfg.name = "cam";
+  cfg.camera_name = "eye";
+  cfg.width = width;
+  cfg.height = height;
+  cfg.data_types = {"rgb", "depth", "segmentation", "normals"};
+  return cfg;
+}
+
+// One camera over the worlds of one model; the test moves what it likes in `m.data` and shoots.
+struct Studio {
+  RayScene rays;
+  std::unique_ptr<Sensor> sensor;
+  ThreadPool pool{1};
+
+  Studio(const TestModel& m, const CameraSensorCfg& cfg, int worlds = 1)
+      : rays(m.model, worlds), sensor(cfg.build()) {
+    SensorInit init;
+    init.model = m.model;
+    init.num_worlds = worlds;
+    sensor->initialize(init);
+  }
+  void shoot(const World& world) {
+    rays.update(world);
+    sensor->compute(world);
+    sensor->cast({&rays, {&world.id, 1}, pool});
+  }
+  template <class T>
+  std::span<const T> image(const char* field, int world = 0) const {
+    return sensor->field(field).data.row<T>(world);
+  }
+};
+
+int pixel(int x, int y, int width) { return y * width + x; }
+
+// A camera looks down on 1 x 1 m of cloth, rope or jelly from 3 m above the world's origin.
+std::string scene(const std::string& flex, const std::string& more = "") {
+  return "<mujoco><worldbody>" + more + flex +
+         "<camera name='eye' pos='0 0 3' fovy='40'/></worldbody></mujoco>";
+}
+
+constexpr char kCloth[] =
+    "<flexcomp name='cloth' type='grid' dim='2' count='11 11 1' spacing='.1 .1 .1' pos='0 0 1' "
+    "radius='.01' rgba='.9 .2 .1 1'><edge equality='true'/></flexcomp>";
+
+TEST(CameraFlex, FlatClothAtTwoMetresReadsTwoMetresLessItsRadius) {
+  const TestModel m(scene(kCloth));
+  Studio studio(m, camera(64, 64));
+  studio.shoot(m.world());
+  const auto depth = studio.image<float>("depth");
+  const auto ids = studio.image<std::int32_t>("segmentation");
+  const auto normals = studio.image<float>("normals");
+  const auto rgb = studio.image<std::uint8_t>("rgb");
+  // 0.5 m at 1.99 m are 22.1 of the 32 pixels from the middle to the border.
+  for (int y = 0; y < 64; ++y)
+    for (int x = 0; x < 64; ++x) {
+      const int i = pixel(x, y, 64);
+      const bool on = std::abs(x - 31.5) < 22 && std::abs(y - 31.5) < 22;
+      if (!on && std::abs(x - 31.5) < 23 && std::abs(y - 31.5) < 23) continue;  // the border
+      EXPECT_NEAR(depth[i], on ? 1.99 : 0, 1e-6) << x << ' ' << y;
+      EXPECT_EQ(ids[2 * i], on ? 0 : -1);
+      EXPECT_EQ(ids[2 * i + 1], on ? static_cast<int>(mjOBJ_FLEX) : -1);
+      if (!on) continue;
+      EXPECT_NEAR(normals[3 * i + 2], 1, 1e-6);
+      EXPECT_GT(rgb[3 * i], rgb[3 * i + 1] + 60);
+    }
+}
+
+TEST(CameraFlex, MovedClothIsInTheNextImageOfItsWorldOnly) {
+  const TestModel m(scene(kCloth));
+  Studio studio(m, camera(16, 16), 2);
+  const int middle = pixel(8, 8, 16);
+  studio.shoot(m.world(0));
+  studio.shoot(m.world(1));
+  for (int i = 0; i < m.model->nflexvert; ++i) m.data->flexvert_xpos[3 * i + 2] += 0.25;
+  studio.shoot(m.world(1));
+  EXPECT_NEAR(studio.image<float>("depth", 0)[middle], 1.99, 1e-6);
+  EXPECT_NEAR(studio.image<float>("depth", 1)[middle], 1.74, 1e-6);
+}
+
+TEST(CameraFlex, BothSidesOfClothAreDrawn) {
+  TestModel m(scene(kCloth));
+  mju_copy(m.model->cam_pos, std::array{0.0, 0.0, -1.0}.data(), 3);
+  mju_copy(m.model->cam_quat, std::array{0.0, 1.0, 0.0, 0.0}.data(), 4);  // looks up
+  mj_forward(m.model, m.data);
+  Studio studio(m, camera(16, 16));
+  studio.shoot(m.world());
+  EXPECT_NEAR(studio.image<float>("depth")[pixel(8, 8, 16)], 1.99, 1e-6);
+  EXPECT_NEAR(studio.image<float>("normals")[3 * pixel(8, 8, 16) + 2], 1, 1e-6);
+}
+
+TEST(CameraFlex, RopeIsRound) {
+  const TestModel m(scene(
+      "<flexcomp name='rope' type='grid' dim='1' count='11 1 1' spacing='.1 .1 .1' pos='0 0 1' "
+      "radius='.04'><edge equality='true'/></flexcomp>"));
+  CameraSensorCfg cfg = camera(65, 65);
+  Studio studio(m, cfg);
+  studio.shoot(m.world());
+  const auto depth = studio.image<float>("depth");
+  const auto normals = studio.image<float>("normals");
+  const double slope = 2 * std::tan(20 * M_PI / 180) / 65;
+  for (int y = 31; y <= 33; ++y) {
+    // A ray at height s z meets the cylinder y^2 + (z - 2)^2 = 0.04^2 of the camera's frame.
+    const double s = slope * (32 - y), a = 1 + s * s, b = -2, c = 4 - 0.0016;
+    const double t = (-b - std::sqrt(b * b - a * c)) / a;
+    const int i = pixel(32, y, 65);
+    EXPECT_NEAR(depth[i], t, 3e-6) << y;
+    EXPECT_NEAR(normals[3 * i + 1], s * t / 0.04, 1e-3);
+    EXPECT_NEAR(normals[3 * i + 2], (2 - t) / 0.04, 1e-3);
+  }
+}
+
+TEST(CameraFlex, GroupsAndAlphaHideIt) {
+  TestModel m(scene(kCloth));
+  Studio studio(m, camera(8, 8));
+  m.model->flex_group[0] = 4;
+  studio.shoot(m.world());
+  EXPECT_EQ(studio.image<std::int32_t>("segmentation")[2 * pixel(4, 4, 8)], -1);
+  m.model->flex_group[0] = 1;
+  m.model->flex_rgba[3] = 0;
+  studio.shoot(m.world());
+  EXPECT_EQ(studio.image<std::int32_t>("segmentation")[2 * pixel(4, 4, 8)], -1);
+  m.model->flex_rgba[3] = 0.4F;
+  studio.shoot(m.world());
+  EXPECT_EQ(studio.image<std::int32_t>("segmentation")[2 * pixel(4, 4, 8)], 0);
+}
+
+// Light comes from the upper left: the cloth's shadow lies on the floor to its right, a ball's on the
+// cloth.
+TEST(CameraFlex, ClothCastsAndReceivesShadows) {
+  const TestModel m(scene(
+      kCloth,
+      "<light pos='-3 0 5' dir='1 0 -1' type='directional' castshadow='true' ambient='.1 .1 .1'/>"
+      "<geom name='floor' type='plane' size='5 5 .1'/>"
+      "<geom name='ball' size='.1' pos='-.3 0 1.5'/>"));
+  CameraSensorCfg cfg = camera(128, 128);
+  cfg.use_shadows = true;
+  Studio studio(m, cfg);
+  studio.shoot(m.world());
+  const auto red = [&](double x, double y, double depth) {
+    const double scale = 64 / (depth * std::tan(20 * M_PI / 180));
+    const int i = pixel(static_cast<int>(64 + scale * x), static_cast<int>(64 - scale * y), 128);
+    return static_cast<int>(studio.image<std::uint8_t>("rgb")[3 * i]);
+  };
+  EXPECT_LT(red(0.9, 0, 3), 0.7 * red(-0.9, 0, 3));
+  EXPECT_LT(red(0.19, 0, 1.99), 0.7 * red(0.19, 0.3, 1.99));
+  EXPECT_NEAR(red(0.19, 0.3, 1.99), red(0.19, -0.3, 1.99), 3);  // no shadow of its own
+}
+
+}  // namespace
+}  // namespace mjsense
