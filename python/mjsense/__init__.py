@@ -14,8 +14,10 @@ from mjsense.configs import (
     BuiltinSensorCfg,
     CameraIntrinsics,
     CameraSensorCfg,
+    CameraVizCfg,
     ContactMatch,
     ContactSensorCfg,
+    ContactVizCfg,
     EntityCfg,
     GridPatternCfg,
     LensDistortion,
@@ -38,6 +40,7 @@ from mjsense.configs import (
 )
 from mjsense.contact import ContactSensor
 from mjsense.data import CameraData, ContactData, RayCastData, SensorData
+from mjsense.drawing import DebugShapes
 from mjsense.effects import EffectSensorCfg
 from mjsense.errors import UnknownNameError
 from mjsense.imu import ImuAxis, ImuData, ImuModel, ImuSensor, ImuSensorCfg
@@ -53,7 +56,8 @@ from mjsense.vector import TaskVectorEnv, make_vec
 # fmt: off
 __all__ = [
     "BuiltinSensor", "BuiltinSensorCfg", "CameraData", "CameraIntrinsics", "CameraSensor", "CameraSensorCfg",
-    "ContactData", "ContactMatch", "ContactSensor", "ContactSensorCfg", "EffectSensorCfg", "Entity", "EntityCfg",
+    "CameraVizCfg", "ContactData", "ContactMatch", "ContactSensor", "ContactSensorCfg", "ContactVizCfg", "DebugShapes",
+    "EffectSensorCfg", "Entity", "EntityCfg",
     "GridPatternCfg", "ImuAxis", "ImuData", "ImuModel", "ImuSensor", "ImuSensorCfg", "LensDistortion", "LidarSensor",
     "LidarSensorCfg", "MujocoCfg", "NativeSensor", "ObjRef", "ObservationPipeline", "PinholeCameraPatternCfg",
     "RayCastData", "RayCastSensor", "RayCastSensorCfg", "RayCastVizCfg", "RecordProgress", "RecordSummary",

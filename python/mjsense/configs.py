@@ -263,6 +263,24 @@ class ContactMatch:
 
 
 @dataclass
+class ContactVizCfg:
+    """What a viewer draws of every contact in a slot. Colours are rgba, sizes in units of the model's ``stat.meansize``."""
+
+    show_points: bool = True
+    show_frames: bool = True
+    """Axes of the contact: x (red) is the normal, from the primary to the secondary."""
+    show_forces: bool = True
+    """The force that the primary exerts on the secondary, as an arrow that ends at the contact point."""
+    force_scale: float = 0.0
+    """m per N; 0: the model's ``vis.map.force``, as MuJoCo's own arrows."""
+    point_color: Sequence[float] = (1.0, 0.5, 0.0, 1.0)
+    force_color: Sequence[float] = (0.9, 0.1, 0.9, 1.0)
+    point_radius: float = 0.3
+    axis_length: float = 2.0
+    force_width: float = 0.3
+
+
+@dataclass
 class ContactSensorCfg(SensorCfg):
     """Contacts of primaries, optionally with one secondary only. ``data`` is a :class:`mjsense.ContactData`.
 
@@ -297,6 +315,9 @@ class ContactSensorCfg(SensorCfg):
     """other_geom and other_body."""
     debug: bool = False
     """Print what was matched."""
+    debug_vis: bool = False
+    """Drawn by ``Simulation.draw(scene)`` unasked."""
+    viz: ContactVizCfg = field(default_factory=ContactVizCfg)
 
 
 @dataclass(frozen=True)
@@ -418,6 +439,7 @@ class RayCastSensorCfg(SensorCfg):
     include_geom_groups: Sequence[int] | None = (0, 1, 2)
     """None: all."""
     debug_vis: bool = False
+    """Drawn by ``Simulation.draw(scene)`` unasked."""
     viz: RayCastVizCfg = field(default_factory=RayCastVizCfg)
     min_distance: float = 0.0
     """m; nearer hits are misses, and hide what is behind them."""
@@ -517,6 +539,21 @@ class LensDistortion:
 
 
 @dataclass
+class CameraVizCfg:
+    """What a viewer draws of a camera: the pyramid of what it sees, and its axes (it looks along -z, the blue one)."""
+
+    show_frustum: bool = True
+    show_frame: bool = True
+    frustum_depth: float = 0.0
+    """m from the camera plane (through a lens: along the rays); 0: ``far``, or without one 10 ``stat.meansize``."""
+    frustum_color: Sequence[float] = (1.0, 0.6, 0.0, 1.0)
+    line_width: float = 2.0
+    """Pixels."""
+    axis_length: float = 5.0
+    """In units of ``stat.meansize``."""
+
+
+@dataclass
 class CameraSensorCfg(SensorCfg):
     """A camera of the model (``camera_name``), or a new one. ``data`` is a :class:`mjsense.CameraData`."""
 
@@ -558,6 +595,9 @@ class CameraSensorCfg(SensorCfg):
     """none, d405, d435."""
     renderer: str = "rays"
     """rays, or opengl: MuJoCo's own renderer, where it was built in."""
+    debug_vis: bool = False
+    """Drawn by ``Simulation.draw(scene)`` unasked."""
+    viz: CameraVizCfg = field(default_factory=CameraVizCfg)
 
 
 def replace(cfg: Any, **changes: Any) -> Any:

@@ -13,6 +13,7 @@ import gymnasium
 import numpy as np
 
 from mjsense import _core, data
+from mjsense.drawing import DebugShapes
 
 if TYPE_CHECKING:
     import mujoco
@@ -98,6 +99,14 @@ class NativeSensor:
         """gymnasium space of one world's value: a Box, or a Dict of one Box a field."""
         spaces = {name: _box(spec) for name, spec in self.specs.items()}
         return spaces[""] if "" in spaces else gymnasium.spaces.Dict(spaces)
+
+    def debug_shapes(self, world: int = 0) -> DebugShapes:
+        """What it measures in this world, as shapes to look at: see :meth:`mjsense.Simulation.draw`."""
+        if self._core is None:
+            raise RuntimeError(f"sensor '{self.name}' has no data yet: make a Simulation of its scene first")
+        shapes = DebugShapes(world, self._core.meansize)
+        shapes._extend(*self._core.draw(world, [self._handle]))
+        return shapes
 
     @property
     def bytes_per_world(self) -> int:
@@ -187,6 +196,9 @@ class Sensor:
     def reset(self, world_ids: Sequence[int] | None = None) -> None:
         """These worlds (None: all) begin a new episode."""
 
+    def debug_vis(self, visualizer: DebugShapes) -> None:
+        """Shows world ``visualizer.env_idx`` to a human: ``visualizer.add_arrow(start, end, color)`` and so on."""
+
     # --------------------------------------------------------------------------------------------------------- reading
 
     @property
@@ -222,6 +234,10 @@ class Sensor:
         self._mjs_core.refresh(self._mjs_handle)
         return self._mjs_rows
 
+    def debug_shapes(self, world: int = 0) -> DebugShapes:
+        """What ``debug_vis`` shows of this world."""
+        return self.simulation.debug_shapes(world, self)
+
     # ------------------------------------------------------------------------------- called by mjsense (the C++ adapter)
 
     def _mjs_edit_spec(self) -> None:
@@ -254,6 +270,12 @@ class Sensor:
                 self.reset()
             else:
                 self.reset(None if len(world_ids) == self.simulation.num_worlds else world_ids)
+
+    def _mjs_draw(self, shapes: DebugShapes) -> None:
+        if not _overrides(self, "debug_vis"):
+            raise ValueError(f"sensor '{self.uuid}' has nothing to draw: write debug_vis(visualizer)")
+        with _named(self, "debug_vis"):
+            self.debug_vis(shapes)
 
     def _mjs_update_pending(self) -> None:
         if self._mjs_pending_dt:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import difflib
 from collections.abc import Sequence
 from typing import Any
 
@@ -9,6 +10,8 @@ import mujoco
 import numpy as np
 
 from mjsense import _core
+from mjsense.drawing import DebugShapes
+from mjsense.errors import UnknownNameError
 from mjsense.scene import Scene
 from mjsense.sensor import NativeSensor, Sensor
 
@@ -257,6 +260,54 @@ class Simulation:
     def invalidate(self, world_ids: Sequence[int] | None = None) -> None:
         """Says that state was changed behind the simulation's back: sensors are computed anew at their next read."""
         self._core.invalidate(_ids(world_ids))
+
+    # --------------------------------------------------------------------------------------------------------- drawing
+
+    def draw(self, scene: mujoco.MjvScene, world: int = 0, sensors: Any = None, *, labels: bool = False) -> int:
+        """Adds what sensors measure to a scene of MuJoCo's (``renderer.scene``, ``viewer.user_scn``).
+
+        Args:
+            world: whose measurements.
+            sensors: a sensor, its name, or a sequence of these; None: those whose configuration has ``debug_vis=True`` (and
+                sensors of your own that have a ``debug_vis`` method).
+            labels: also write what each shape is.
+
+        Returns:
+            How many shapes found no room in the scene; 0: all are drawn.
+        """
+        return self.debug_shapes(world, sensors).draw(scene, labels)
+
+    def debug_shapes(self, world: int = 0, sensors: Any = None) -> DebugShapes:
+        """The shapes that :meth:`draw` adds, as NumPy arrays for other viewers."""
+        self._rows([world])
+        shapes = DebugShapes(world, self._core.meansize)
+        if sensors is None:
+            shapes._extend(*self._core.draw(world, []))
+            own = [sensor for sensor in self._python if type(sensor).debug_vis is not Sensor.debug_vis]
+        else:
+            if isinstance(sensors, (str, NativeSensor, Sensor)):
+                sensors = [sensors]
+            chosen = [self._sensor(sensor) for sensor in sensors]
+            native = [sensor._handle for sensor in chosen if isinstance(sensor, NativeSensor)]
+            if native:
+                shapes._extend(*self._core.draw(world, native))
+            own = [sensor for sensor in chosen if isinstance(sensor, Sensor)]
+        for sensor in own:
+            sensor._mjs_draw(shapes)
+        return shapes
+
+    def _sensor(self, sensor: Any) -> Any:
+        """A sensor of this simulation, from itself or its name."""
+        if isinstance(sensor, (NativeSensor, Sensor)):
+            return sensor
+        if not isinstance(sensor, str):
+            raise TypeError(f"neither a sensor nor the name of one: {sensor!r}")
+        known = {**self.scene.sensors, **{own.uuid: own for own in self._python}}
+        if sensor not in known:
+            near = difflib.get_close_matches(sensor, known, 3)
+            hint = f"did you mean {' or '.join(map(repr, near))}?" if near else f"there are {', '.join(known)}"
+            raise UnknownNameError(f"no sensor named '{sensor}'; {hint}")
+        return known[sensor]
 
     # ------------------------------------------------------------------------------------------- mjlab's order of calls
 

@@ -10,7 +10,8 @@ import pytest
 import mjsense
 
 EXAMPLES = Path(__file__).parents[2] / "examples"
-SAYS = {"01": "landed: [9.81 9.81 9.81 9.81]", "02": "picture: (3, 48, 64, 3) uint8", "03": "the planner picked 2 of 2"}
+SAYS = {"01": "landed: [9.81 9.81 9.81 9.81]", "02": "picture: (3, 48, 64, 3) uint8", "03": "the planner picked 2 of 2",
+        "04": "the feet press on the floor with 88"}
 
 
 @pytest.mark.parametrize("name", sorted(p.name for p in EXAMPLES.glob("*.py")))

@@ -13,6 +13,10 @@ std::vector<std::unique_ptr<Sensor>> Sensor::parts() { return {}; }
 void Sensor::substep(const World& /*world*/) {}
 void Sensor::cast(const CastContext& /*context*/) {}
 void Sensor::reset(const World& /*world*/) {}
+void Sensor::draw(const World& /*world*/, DebugShapes& /*shapes*/) {
+  throw ValueError(
+      fmt::format("sensor '{}': a sensor of kind '{}' has nothing to draw", name_, kind()));
+}
 
 const Field& Sensor::field(std::string_view name) const {
   std::vector<std::string> names;

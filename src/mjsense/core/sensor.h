@@ -26,6 +26,7 @@
 
 namespace mjsense {
 
+class DebugShapes;
 class RayScene;
 class Scene;
 class ThreadPool;
@@ -110,6 +111,11 @@ class Sensor {
   virtual void compute(const World& world) = 0;
   virtual void cast(const CastContext& context);
   virtual void reset(const World& world);
+
+  // Debug drawing. draw() adds what a human should see of the row of this world, which is current;
+  // ValueError if that is never anything. debug_vis(): wherever the scene is drawn, unasked.
+  virtual bool debug_vis() const { return false; }
+  virtual void draw(const World& world, DebugShapes& shapes);
 
   virtual Stage stage() const { return Stage::kRow; }
   // True if compute() must run exactly once a control step, read or not (delays, rates, filters).

@@ -358,6 +358,11 @@ double Simulation::ray_scene_cost() const {
 void Simulation::invalidate(std::span<const int> ids) { mark_stale(worlds_->checked_ids(ids)); }
 
 void Simulation::refresh(std::span<Sensor* const> sensors, std::span<const int> ids) {
+  make_current(sensors, ids);
+  for (const Sensor* sensor : sensors) slot_of(*sensor).read = true;  // only if it can be computed
+}
+
+void Simulation::make_current(std::span<Sensor* const> sensors, std::span<const int> ids) {
   Borrowed due(*this);
   for (const Sensor* sensor : sensors) {
     slot_of(*sensor).wanted = true;
@@ -374,7 +379,37 @@ void Simulation::refresh(std::span<Sensor* const> sensors, std::span<const int> 
     }
   }
   if (!due->ids.empty()) compute(due->slots, due->ids, Change::kNone);
-  for (const Sensor* sensor : sensors) slot_of(*sensor).read = true;  // only if it can be computed
+}
+
+class Simulation::DrawHooks final : public WorldHooks {
+ public:
+  DrawHooks(std::span<Sensor* const> sensors, DebugShapes& shapes)
+      : sensors_(sensors), shapes_(shapes) {}
+  void substep(const World& /*world*/) override {}
+  void reset(const World& /*world*/) override {}
+  void refreshed(const World& world) override {
+    for (Sensor* sensor : sensors_) guarded(*sensor, [&] { sensor->draw(world, shapes_); });
+  }
+
+ private:
+  std::span<Sensor* const> sensors_;
+  DebugShapes& shapes_;
+};
+
+DebugShapes Simulation::draw(int world, std::span<Sensor* const> sensors) {
+  std::vector<Sensor*> chosen(sensors.begin(), sensors.end());
+  if (sensors.empty()) {
+    for (auto& slot : slots_) {
+      if (slot->sensor->debug_vis()) chosen.push_back(slot->sensor);
+    }
+  }
+  const std::vector<int> ids = worlds_->checked_ids({&world, 1});
+  DebugShapes shapes(model()->stat.meansize);
+  if (chosen.empty()) return shapes;
+  make_current(chosen, ids);
+  DrawHooks hooks(chosen, shapes);
+  worlds_->visit(ids, hooks);
+  return shapes;
 }
 
 }  // namespace mjsense

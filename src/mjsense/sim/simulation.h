@@ -10,6 +10,7 @@
 #include <span>
 #include <vector>
 
+#include "mjsense/core/debug_shapes.h"
 #include "mjsense/core/parallel.h"
 #include "mjsense/core/sensor.h"
 #include "mjsense/scene/scene.h"
@@ -67,6 +68,9 @@ class Simulation {
     refresh(one);
   }
   void refresh(std::span<Sensor* const> sensors, std::span<const int> ids = {});
+  // What these sensors show of one world as it is now, to be seen by a human; empty: those with
+  // debug_vis. Drawing does not count as reading.
+  DebugShapes draw(int world, std::span<Sensor* const> sensors = {});
   // State was changed in a way that only the caller knows.
   void invalidate(std::span<const int> ids = {});
 
@@ -87,6 +91,7 @@ class Simulation {
  private:
   struct Slot;
   class Hooks;
+  class DrawHooks;
   enum class Change { kStep, kForward, kReset, kNone };
 
   void initialize_scene();
@@ -96,6 +101,7 @@ class Simulation {
   // (empty: all).
   void compute(std::span<Slot* const> slots, std::span<const int> ids, Change change, int key = -1);
   void cast(std::span<Slot* const> slots, std::span<const int> ids, int phase);
+  void make_current(std::span<Sensor* const> sensors, std::span<const int> ids);
   template <class Wanted>
   void collect(std::vector<Slot*>& slots, Wanted&& wanted);
   void mark_stale(std::span<const int> ids);

@@ -4,7 +4,10 @@
 #include <nanobind/stl/optional.h>
 #include <nanobind/stl/shared_ptr.h>
 #include <nanobind/stl/string.h>
+#include <nanobind/stl/string_view.h>
 #include <nanobind/stl/vector.h>
+
+#include <algorithm>
 
 #include "mjsense/sim/simulation.h"
 #include "python/bindings/bindings.h"
@@ -61,6 +64,37 @@ nb::object model_field(PySimulation& self, const std::string& name) {
   return to_numpy(ArrayView::dense(data, DType::kUint8, {sim.num_worlds(), bytes}), self.owner());
 }
 
+std::string_view kind_name(mjtGeom kind) {
+  return kind == mjGEOM_SPHERE ? "sphere" : kind == mjGEOM_LINE ? "line" : "arrow";
+}
+
+// (kinds, positions [n, 3], vectors [n, 3], widths [n], rgba [n, 4], labels), float64 but for rgba.
+nb::tuple draw(PySimulation& self, int world, nb::list handles) {
+  std::vector<Sensor*> sensors;
+  for (nb::handle h : handles) sensors.push_back(nb::cast<SensorHandle&>(h).sensor.get());
+  DebugShapes shapes(0);
+  self.read([&](Simulation& sim) { shapes = sim.draw(world, sensors); });
+  const auto n = static_cast<std::int64_t>(shapes.list().size());
+  const auto array = [](DType dtype, Shape shape) { return std::make_shared<Array>(dtype, shape); };
+  const auto positions = array(DType::kFloat64, {n, 3}), vectors = array(DType::kFloat64, {n, 3}),
+             widths = array(DType::kFloat64, {n}), rgba = array(DType::kFloat32, {n, 4});
+  nb::list kinds, labels;
+  for (std::int64_t i = 0; i < n; ++i) {
+    const DebugShape& shape = shapes.list()[i];
+    kinds.append(kind_name(shape.kind));
+    labels.append(shape.label);
+    write_vec(shape.pos, positions->all<double>().data() + 3 * i);
+    write_vec(shape.vector, vectors->all<double>().data() + 3 * i);
+    widths->all<double>()[i] = shape.width;
+    std::ranges::copy(shape.rgba, rgba->all<float>().data() + 4 * i);
+  }
+  const auto numpy = [](const std::shared_ptr<Array>& a) {
+    return to_numpy(a->view(), owner_of(a));
+  };
+  return nb::make_tuple(kinds, numpy(positions), numpy(vectors), numpy(widths), numpy(rgba),
+                        labels);
+}
+
 }  // namespace
 
 void bind_simulation(nb::module_& m) {
@@ -76,6 +110,8 @@ void bind_simulation(nb::module_& m) {
       .def_prop_ro("step_dt", [](const PySimulation& s) { return s.open().step_dt(); })
       .def_prop_ro("physics_dt",
                    [](const PySimulation& s) { return s.open().model()->opt.timestep; })
+      .def_prop_ro("meansize",
+                   [](const PySimulation& s) { return s.open().model()->stat.meansize; })
       .def_prop_ro("seed", [](const PySimulation& s) { return s.open().worlds().seed(); })
       .def("step", &step, nb::arg("control_steps") = 1)
       .def("reset", &reset, nb::arg("world_ids") = nb::none(), nb::arg("key") = -1,
@@ -108,6 +144,7 @@ void bind_simulation(nb::module_& m) {
             s.read([&](Simulation& sim) { sim.refresh(sensors); });
           },
           nb::arg("sensors"))
+      .def("draw", &draw, nb::arg("world"), nb::arg("sensors"))
       .def(
           "invalidate",
           [](PySimulation& s, const Ids& ids) {

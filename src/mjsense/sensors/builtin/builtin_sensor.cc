@@ -10,6 +10,7 @@
 #include "mjsense/scene/resolve.h"
 #include "mjsense/scene/scene.h"
 #include "mjsense/scene/spec.h"
+#include "mjsense/sensors/builtin/builtin_draw.h"
 #include "mjsense/sensors/builtin/builtin_spec.h"
 #include "mjsense/sensors/builtin/builtin_types.h"
 
@@ -221,12 +222,12 @@ void BuiltinSensor::edit_spec(mjSpec* spec) {
 
 void BuiltinSensor::initialize(const SensorInit& init) {
   const mjModel* m = init.model;
-  const int id = resolve(m, mjOBJ_SENSOR, name(), fmt::format("sensor '{}'", name()));
-  adr_ = m->sensor_adr[id];
-  dim_ = m->sensor_dim[id];
-  history_adr_ = m->sensor_historyadr[id];
-  nsample_ = history_adr_ < 0 ? 0 : m->sensor_history[2 * id];
-  SensorSpec spec = describe_builtin(m, id);
+  id_ = resolve(m, mjOBJ_SENSOR, name(), fmt::format("sensor '{}'", name()));
+  adr_ = m->sensor_adr[id_];
+  dim_ = m->sensor_dim[id_];
+  history_adr_ = m->sensor_historyadr[id_];
+  nsample_ = history_adr_ < 0 ? 0 : m->sensor_history[2 * id_];
+  SensorSpec spec = describe_builtin(m, id_);
   clear_fields();
   field_ = &add_field("", spec, init.num_worlds);
   if (nsample_ > 0) {
@@ -251,6 +252,10 @@ void BuiltinSensor::compute(const World& world) {
     const mjtNum* sample = samples + ((newest - k + nsample_) % nsample_) * dim_;
     for (int i = 0; i < dim_; ++i) past[k * dim_ + i] = static_cast<float>(sample[i]);
   }
+}
+
+void BuiltinSensor::draw(const World& world, DebugShapes& shapes) {
+  draw_sensor_frame(world, id_, name(), shapes);
 }
 
 }  // namespace mjsense

@@ -60,9 +60,11 @@ class BuiltinSensor : public Sensor {
   void edit_spec(mjSpec* spec) override;
   void initialize(const SensorInit& init) override;
   void compute(const World& world) override;
+  void draw(const World& world, DebugShapes& shapes) override;  // the frame it is attached to
 
  private:
   std::unique_ptr<const BuiltinSensorCfg> cfg_;  // null if found in the model
+  int id_ = -1;
   int adr_ = 0, dim_ = 0;
   int history_adr_ = -1, nsample_ = 0;
   Field* field_ = nullptr;

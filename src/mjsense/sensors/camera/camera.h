@@ -45,6 +45,17 @@ struct LensDistortion {
   std::vector<double> coefficients;
 };
 
+// What a viewer draws of a camera: the pyramid of what it sees, from `near` (or its own place) on,
+// and its axes.
+struct CameraVizCfg {
+  bool show_frustum = true, show_frame = true;
+  double frustum_depth = 0;  // m, planar (through a lens: along the rays); 0: `far`, or without one
+                             // ten times the model's stat.meansize
+  std::array<float, 4> frustum_color{1, 0.6f, 0, 1};
+  double line_width = 2;     // pixels
+  double axis_length = 5.0;  // of the frame, in units of stat.meansize
+};
+
 struct CameraSensorCfg : SensorCfg {
   std::string camera_name;  // an existing camera (full name); empty: a new camera called `name`
   std::string parent_body;  // of a new camera, full name; empty: the world
@@ -72,6 +83,8 @@ struct CameraSensorCfg : SensorCfg {
   std::string depth_noise =
       "none";  // none d405 d435: of a stereo camera, on the field depth only (depth_noise.h)
   std::string renderer = "rays";  // rays opengl (MuJoCo's own renderer, where it was built in)
+  bool debug_vis = false;
+  CameraVizCfg viz;
 
   std::unique_ptr<Sensor> build() const override;
 };

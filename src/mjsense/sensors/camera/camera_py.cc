@@ -20,6 +20,16 @@ void fields(Fields& f, LensDistortion& c) {
 }
 
 template <class Fields>
+void fields(Fields& f, CameraVizCfg& c) {
+  f("show_frustum", c.show_frustum);
+  f("show_frame", c.show_frame);
+  f("frustum_depth", c.frustum_depth);
+  f("frustum_color", c.frustum_color);
+  f("line_width", c.line_width);
+  f("axis_length", c.axis_length);
+}
+
+template <class Fields>
 void fields(Fields& f, CameraSensorCfg& c) {
   f("name", c.name);
   f("camera_name", c.camera_name);
@@ -45,6 +55,8 @@ void fields(Fields& f, CameraSensorCfg& c) {
   f("distortion", c.distortion);
   f("depth_noise", c.depth_noise);
   f("renderer", c.renderer);
+  f("debug_vis", c.debug_vis);
+  f("viz", c.viz);
 }
 
 CfgKind camera_kind() { return cfg_kind<CameraSensorCfg>("camera"); }

@@ -30,6 +30,8 @@ class CameraSensor final : public Sensor {
   void initialize(const SensorInit& init) override;
   void compute(const World& world) override;
   void cast(const CastContext& context) override;
+  bool debug_vis() const override { return cfg_.debug_vis; }
+  void draw(const World& world, DebugShapes& shapes) override;
 
   const CameraSensorCfg& cfg() const { return cfg_; }
   int camera_id() const { return camera_; }

@@ -19,6 +19,19 @@ void fields(Fields& f, ContactMatch& c) {
 }
 
 template <class Fields>
+void fields(Fields& f, ContactVizCfg& c) {
+  f("show_points", c.show_points);
+  f("show_frames", c.show_frames);
+  f("show_forces", c.show_forces);
+  f("force_scale", c.force_scale);
+  f("point_color", c.point_color);
+  f("force_color", c.force_color);
+  f("point_radius", c.point_radius);
+  f("axis_length", c.axis_length);
+  f("force_width", c.force_width);
+}
+
+template <class Fields>
 void fields(Fields& f, ContactSensorCfg& c) {
   f("name", c.name);
   f("primary", c.primary);
@@ -35,6 +48,8 @@ void fields(Fields& f, ContactSensorCfg& c) {
   f("friction_split", c.friction_split);
   f("other_ids", c.other_ids);
   f("debug", c.debug);
+  f("debug_vis", c.debug_vis);
+  f("viz", c.viz);
 }
 
 CfgKind contact_kind() { return cfg_kind<ContactSensorCfg>("contact"); }

@@ -10,6 +10,7 @@
 //
 // All contact sensors of a scene share one pass over mjData.contact (contact_pass.h).
 
+#include <array>
 #include <memory>
 #include <optional>
 #include <string>
@@ -23,6 +24,17 @@
 namespace mjsense {
 
 class ContactPass;
+
+// What a viewer draws of every contact in a slot. Sizes in units of the model's stat.meansize.
+struct ContactVizCfg {
+  bool show_points = true, show_frames = true;
+  bool show_forces =
+      true;  // the force of the primary on the other: an arrow that ends at the point
+  double force_scale = 0.0;  // m per N; 0: the model's vis.map.force, as MuJoCo's own arrows
+  std::array<float, 4> point_color{1, 0.5f, 0, 1};
+  std::array<float, 4> force_color{0.9f, 0.1f, 0.9f, 1};
+  double point_radius = 0.3, axis_length = 2.0, force_width = 0.3;
+};
 
 struct ContactSensorCfg : SensorCfg {
   ContactMatch primary;
@@ -51,6 +63,8 @@ struct ContactSensorCfg : SensorCfg {
   bool other_ids = false;       // fields other_geom, other_body
 
   bool debug = false;  // prints what was matched
+  bool debug_vis = false;
+  ContactVizCfg viz;
 
   std::unique_ptr<Sensor> build() const override;  // throws ValueError or KeyError
 };
@@ -87,6 +101,8 @@ class ContactSensor : public Sensor {
   void substep(const World& world) override;
   void compute(const World& world) override;
   void reset(const World& world) override;
+  bool debug_vis() const override { return cfg_.debug_vis; }
+  void draw(const World& world, DebugShapes& shapes) override;
 
   const ContactSensorCfg& cfg() const { return cfg_; }
   // Local names of the primaries (secondaries), in the order of P (S). Known after edit_spec() or

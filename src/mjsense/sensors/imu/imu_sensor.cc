@@ -5,6 +5,7 @@
 #include <utility>
 
 #include "mjsense/core/error.h"
+#include "mjsense/sensors/builtin/builtin_draw.h"
 
 namespace mjsense {
 namespace {
@@ -69,6 +70,7 @@ void ImuSensor::initialize(const SensorInit& init) {
       throw ValueError(
           fmt::format("sensor '{}': the model has no sensor '{}'", name(), mujoco_name(part)));
     }
+    if (parts_.empty()) accelerometer_ = id;
     SensorSpec spec;
     spec.shape = {size};
     spec.unit = unit;
@@ -113,6 +115,10 @@ void ImuSensor::compute(const World& world) {
 void ImuSensor::reset(const World& world) {
   const ChainTick tick{world.id, world.key, world.seed, world.tick, world.episode};
   for (Part& part : parts_) part.chain.reset(tick);
+}
+
+void ImuSensor::draw(const World& world, DebugShapes& shapes) {
+  draw_sensor_frame(world, accelerometer_, name(), shapes);
 }
 
 }  // namespace mjsense

@@ -67,6 +67,7 @@ class ImuSensor : public Sensor {
   void initialize(const SensorInit& init) override;
   void compute(const World& world) override;
   void reset(const World& world) override;
+  void draw(const World& world, DebugShapes& shapes) override;  // the axes of its site
   bool eager() const override { return eager_; }
 
  private:
@@ -81,6 +82,7 @@ class ImuSensor : public Sensor {
   ImuSensorCfg cfg_;
   ImuModel model_;
   std::vector<Part> parts_;
+  int accelerometer_ = -1;  // MuJoCo's sensor
   bool eager_ = false;
 };
 

@@ -20,6 +20,7 @@
 #include <string>
 #include <vector>
 
+#include "mjsense/core/debug_shapes.h"
 #include "mjsense/core/sensor.h"
 #include "mjsense/rays/packet.h"
 #include "mjsense/rays/ray_scene.h"
@@ -31,8 +32,8 @@
 
 namespace mjsense {
 
-// What a viewer draws of a ray sensor (debug_draw.h). Colours are rgba; sizes in units of the
-// model's stat.meansize.
+// What a viewer draws of a ray sensor. Colours are rgba; sizes in units of the model's
+// stat.meansize.
 struct RayCastVizCfg {
   bool show_rays = false;  // arrows from origin to hit
   bool show_normals = false;
@@ -73,6 +74,8 @@ class RayCastSensor : public Sensor {
   void compute(const World& world) override;
   void cast(const CastContext& context) override;
   void reset(const World& world) override;
+  bool debug_vis() const override { return cfg_.debug_vis; }
+  void draw(const World& world, DebugShapes& shapes) override;
 
   const RayCastSensorCfg& cfg() const { return cfg_; }
   int num_frames() const { return static_cast<int>(frames_.size()); }

@@ -10,7 +10,6 @@
 #include "mjsense/core/error.h"
 #include "mjsense/scene/scene.h"
 #include "mjsense/sensors/height/terrain_height.h"
-#include "mjsense/sensors/raycast/debug_draw.h"
 #include "mjsense/sim/simulation.h"
 
 namespace mjsense {
@@ -258,19 +257,26 @@ TEST(RayCast, DrawsHitsRaysAndNormals) {
   cfg->pattern = UserPattern{{{0, 0, 0}}, {{0, 0, -1}, {0, 0, 1}}};
   cfg->viz.show_rays = cfg->viz.show_normals = true;
   Lab lab({cfg});
-  lab.read("distances");
-  mjvScene scene;
-  mjv_defaultScene(&scene);
-  mjv_makeScene(lab.sim->model(), &scene, 3);
-  auto& sensor = dynamic_cast<RayCastSensor&>(lab.scene->sensor("ray"));
-  EXPECT_EQ(draw_rays(sensor, 0, lab.sim->model(), &scene), 1);  // room for 3 of 4
-  ASSERT_EQ(scene.ngeom, 3);
-  EXPECT_STREQ(scene.geoms[0].label, "ray_hit_0");
-  EXPECT_NEAR(scene.geoms[0].pos[2], 1.55, 1e-5);
-  EXPECT_STREQ(scene.geoms[1].label, "ray_ray_0");
-  EXPECT_NEAR(scene.geoms[1].pos[2], 2, 1e-5);
-  EXPECT_STREQ(scene.geoms[2].label, "ray_normal_0");
-  mjv_freeScene(&scene);
+  EXPECT_TRUE(lab.sim->draw(0).list().empty());  // no debug_vis
+  Sensor* sensor[] = {&lab.scene->sensor("ray")};
+  const DebugShapes shapes = lab.sim->draw(0, sensor);
+  const double unit = lab.sim->model()->stat.meansize;
+  const auto expect = [&](int i, mjtGeom kind, const char* label, double z, double dz,
+                          double width) {
+    const DebugShape& s = shapes.list().at(i);
+    EXPECT_EQ(s.kind, kind);
+    EXPECT_EQ(s.label, label);
+    EXPECT_NEAR(s.pos.z, z, 1e-5);
+    EXPECT_NEAR(s.vector.z, dz, 1e-5);
+    EXPECT_NEAR(norm(s.vector), std::abs(dz), 1e-5);
+    EXPECT_DOUBLE_EQ(s.width, width * unit);
+  };
+  ASSERT_EQ(shapes.list().size(), 4u);  // from the base at 2 m, a ball at 1.5 m under it
+  expect(0, mjGEOM_SPHERE, "ray_hit_0", 1.55, 0, 0.5);
+  expect(1, mjGEOM_ARROW, "ray_ray_0", 2, -0.45, 0.1);
+  expect(2, mjGEOM_ARROW, "ray_normal_0", 1.55, 5 * unit, 0.1);
+  expect(3, mjGEOM_ARROW, "ray_ray_1", 2, 0.5, 0.1);
+  EXPECT_EQ(shapes.list()[3].rgba, cfg->viz.miss_color);
 }
 
 TEST(Pattern, GridStopsShortWhereTheResolutionDoesNotDivide) {
