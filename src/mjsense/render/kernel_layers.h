@@ -3,6 +3,7 @@
 // reflections. Part of the tile kernels.
 
 #include "mjsense/render/kernel_shade.h"
+#include "mjsense/render/kernel_trace.h"
 
 namespace mjsense {
 namespace {
@@ -64,7 +65,7 @@ inline void shade_transparent(const View& view, const int* list, int count, cons
     if (!overlap(view.geoms[list[i]].window, pixels.window)) continue;
     Hits hits = opaque;
     for (int i = 0; i < kLanes; ++i) hits.geom[i] = hits.id[i] = -1;
-    trace_geom(view, list[i], pixels, hits);
+    trace_geom(view, list[i], &pixels, &hits, 1u);
     const std::uint32_t lanes = hit_lanes(hits);
     if (!lanes) continue;
     Surfaces surfaces = {};
@@ -75,6 +76,17 @@ inline void shade_transparent(const View& view, const int* list, int count, cons
     blend(layer, out);
   }
   for (int i = used - 1; i >= 0; --i) blend(layers[i], out);
+}
+
+// The nearest of all opaque geoms in sight, for one packet.
+inline void trace_opaque(const View& view, const Pixels& pixels, Hits& hits) {
+  for (int i = 0; i < view.num_opaque; ++i) {
+    const ViewGeom& g = view.geoms[i];
+    bool beyond = false;
+    for (int k = 0; k < kLanes; k += kWidth) beyond |= any(splat(g.nearest) < load(hits.t + k));
+    if (!beyond) return;
+    if (overlap(g.window, pixels.window)) trace_geom(view, i, &pixels, &hits, 1u);
+  }
 }
 
 // What the mirror among `lanes` reflects, added to its colour. Of a box only the top is one.
@@ -99,7 +111,7 @@ inline void add_reflection(const View& view, const Pixels& pixels, const Hits& h
   if (!lanes) return;
   Hits found;
   clear(found, kInfinity);
-  trace_packet(beyond, nullptr, beyond.num_opaque, through, found);
+  trace_opaque(beyond, through, found);
   const std::uint32_t seen = hit_lanes(found);
   Colors color = {};
   if (seen) {

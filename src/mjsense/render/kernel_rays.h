@@ -27,9 +27,10 @@ struct alignas(64) Hits {
   float t[kLanes];   // planar depth; infinity: nothing
   int id[kLanes];    // geom id; -1: nothing
   int geom[kLanes];  // index into View::geoms; -1: nothing
+  // What follows is there for triangles only.
   int prim[kLanes];  // face of a mesh; side of a height field: -1
   float u[kLanes], v[kLanes];
-  float n[3][kLanes];  // geom frame, any length: triangles only
+  float n[3][kLanes];  // geom frame, any length
 };
 
 inline Float splat(float x) { return Float(x); }
@@ -53,12 +54,6 @@ inline Vec3f from_geom(const float* r, Vec3f v) {
 struct LocalRay {
   Vec3f o, d;
 };
-
-inline LocalRay pixel_ray(const ViewGeom& g, const PixelGrid& grid, Float x, Float y) {
-  if (!grid.orthographic) return {splat(g.eye), to_geom(g.rot, {x, y, splat(-1.0f)})};
-  return {splat(g.eye) + to_geom(g.rot, {x, y, splat(0.0f)}),
-          to_geom(g.rot, {splat(0.0f), splat(0.0f), splat(-1.0f)})};
-}
 
 // Where a line is inside a convex solid: enter <= exit, or infinity and minus infinity.
 struct Interval {

@@ -6,8 +6,8 @@
 //   (ambient + diffuse + specular) colour = texture * (base + sum over shadow-casting lights that
 //   are not barred of clamp(light))
 
+#include "mjsense/render/kernel_shadow.h"
 #include "mjsense/render/kernel_texture.h"
-#include "mjsense/render/kernel_trace.h"
 
 namespace mjsense {
 namespace {

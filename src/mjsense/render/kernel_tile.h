@@ -9,9 +9,15 @@ namespace {
 
 constexpr int kPackets = kTileSize / 4;  // along a side
 
-struct TileHits {
-  Pixels pixels[kPackets * kPackets];
-  Hits opaque[kPackets * kPackets];
+constexpr int kTilePackets = kPackets * kPackets;
+static_assert(kTilePackets == kLanes, "a vector has a lane for each packet");
+
+struct alignas(64) TileHits {
+  Pixels pixels[kTilePackets];
+  Hits opaque[kTilePackets];
+  // By packet: Pixels::window, and the largest t of its hits (minus infinity: no packet).
+  float window[4][kTilePackets];
+  float farthest[kTilePackets];
 };
 
 inline void fill_pixels(const View& view, int x0, int y0, float shift_x, float shift_y,
@@ -92,14 +98,46 @@ inline void find_casters(const View& view, const TileHits& tile, int packets, Ti
 
 inline std::uint8_t byte(float x) { return static_cast<std::uint8_t>(x * 255.0f + 0.5f); }
 
-// Nearest of opaque and transparent geoms: what depth and segmentation see. A plane seen from
-// behind is not there.
-inline void first_hits(const View& view, const int* list, int count, const Pixels& pixels,
-                       Hits& hits) {
+// The packets that may see something of g nearer than what they have.
+inline PacketMask packets_in_reach(const ViewGeom& g, const TileHits& tile) {
+  PacketMask packets = 0;
+  for (int k = 0; k < kTilePackets; k += kWidth) {
+    const Mask m = (load(tile.window[0] + k) <= splat(g.window[1])) &
+                   (splat(g.window[0]) <= load(tile.window[1] + k)) &
+                   (load(tile.window[2] + k) <= splat(g.window[3])) &
+                   (splat(g.window[2]) <= load(tile.window[3] + k)) &
+                   (splat(g.nearest) < load(tile.farthest + k));
+    packets |= bits(m) << k;
+  }
+  return packets;
+}
+
+inline void update_farthest(TileHits& tile, PacketMask packets) {
+  for (; packets; packets &= packets - 1) {
+    const int q = __builtin_ctz(packets);
+    Float far = load(tile.opaque[q].t);
+    for (int k = kWidth; k < kLanes; k += kWidth) far = max(far, load(tile.opaque[q].t + k));
+    tile.farthest[q] = lane_max(far);
+  }
+}
+
+// The nearest hits of all packets among the geoms of `list`, which is sorted by ViewGeom::nearest.
+inline void trace_tile(const View& view, const int* list, int count, TileHits& tile) {
+  for (int i = 0; i < count; ++i) {
+    const PacketMask packets = packets_in_reach(view.geoms[list[i]], tile);
+    if (packets)
+      update_farthest(tile, trace_geom(view, list[i], tile.pixels, tile.opaque, packets));
+  }
+}
+
+// Adds transparent geoms to the hits: depth and segmentation see them too. A plane seen from behind
+// is not there.
+inline void trace_transparent(const View& view, const int* list, int count, TileHits& tile) {
   for (int i = 0; i < count; ++i) {
     const ViewGeom& g = view.geoms[list[i]];
     if (g.type == mjGEOM_PLANE && g.behind) continue;
-    if (overlap(g.window, pixels.window)) trace_geom(view, list[i], pixels, hits);
+    const PacketMask packets = packets_in_reach(g, tile);
+    if (packets) trace_geom(view, list[i], tile.pixels, tile.opaque, packets);
   }
 }
 
@@ -214,7 +252,7 @@ inline void render_tile(const View& view, const ImageTargets& targets, int tx, i
   const bool geometry = targets.depth || targets.segmentation || targets.normals || targets.points;
   const float far = view.far > 0 ? view.far : kInfinity;
   const int samples = targets.rgb ? targets.samples : 1;
-  float sum[kPackets * kPackets][3][kLanes];
+  float sum[kTilePackets][3][kLanes];
   for (int sample = 0; sample < samples || (sample == samples && samples > 1 && geometry);
        ++sample) {
     // The last round, if there is one, is for depth and segmentation: through pixel centres.
@@ -230,12 +268,13 @@ inline void render_tile(const View& view, const ImageTargets& targets, int tx, i
         window[c] = w[c] < window[c] ? w[c] : window[c];
         window[c + 1] = w[c + 1] > window[c + 1] ? w[c + 1] : window[c + 1];
       }
-    }
-    const TileLists lists = find_geoms(view, window, scratch);
-    for (int q = 0; q < packets; ++q) {
+      for (int c = 0; c < 4; ++c) tile.window[c][q] = w[c];
+      tile.farthest[q] = far;
       clear(tile.opaque[q], far);
-      trace_packet(view, scratch.opaque, lists.opaque, tile.pixels[q], tile.opaque[q]);
     }
+    for (int q = packets; q < kTilePackets; ++q) tile.farthest[q] = -kInfinity;
+    const TileLists lists = find_geoms(view, window, scratch);
+    trace_tile(view, scratch.opaque, lists.opaque, tile);
     if (targets.rgb && sample < samples) {
       Casters casters[View::kMaxLights];
       const bool shadows = view.shadows;
@@ -260,9 +299,8 @@ inline void render_tile(const View& view, const ImageTargets& targets, int tx, i
       }
     }
     if (geometry && centered) {
+      trace_transparent(view, scratch.transparent, lists.transparent, tile);
       for (int q = 0; q < packets; ++q) {
-        if (lists.transparent)
-          first_hits(view, scratch.transparent, lists.transparent, tile.pixels[q], tile.opaque[q]);
         write_geometry(view, targets, x0 + 4 * (q % across), y0 + 4 * (q / across), tile.pixels[q],
                        tile.opaque[q]);
       }

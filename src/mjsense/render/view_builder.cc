@@ -14,7 +14,7 @@ namespace {
 constexpr float kEndless = std::numeric_limits<float>::infinity();
 constexpr float kOpaque = 0.995f;    // MuJoCo blends what has less
 constexpr float kFromBehind = 0.3f;  // MuJoCo's factor for the alpha of planes seen from below
-constexpr float kNearest = 1e-4f;    // m; a box that comes nearer may cover anything
+constexpr float kNearest = 1e-4f;    // m; what is nearer than this counts as behind the camera
 
 // out = R^T v.
 void rotate_back(const double r[9], const double v[3], double out[3]) {
@@ -188,26 +188,40 @@ bool ViewBuilder::in_sight(ViewGeom& g) const {
     g.radius = kEndless;
     return true;
   }
-  float low[3] = {kEndless, kEndless, kEndless}, high[3] = {-kEndless, -kEndless, -kEndless};
-  float window[4] = {kEndless, -kEndless, kEndless, -kEndless};
+  float corners[8][3], nearest = kEndless, farthest = -kEndless;
   for (int corner = 0; corner < 8; ++corner) {
-    float c[3];
+    float* c = corners[corner];
     for (int i = 0; i < 3; ++i) {
       c[i] = g.center[i];
       for (int k = 0; k < 3; ++k) c[i] += (corner >> k & 1 ? h[k] : -h[k]) * g.rot[3 * i + k];
-      low[i] = std::min(low[i], c[i]);
-      high[i] = std::max(high[i], c[i]);
     }
-    const float depth = grid.orthographic ? 1.0f : std::max(-c[2], kNearest);
-    window[0] = std::min(window[0], c[0] / depth);
-    window[1] = std::max(window[1], c[0] / depth);
-    window[2] = std::min(window[2], c[1] / depth);
-    window[3] = std::max(window[3], c[1] / depth);
+    nearest = std::min(nearest, -c[2]);
+    farthest = std::max(farthest, -c[2]);
   }
-  const float nearest = -high[2], farthest = -low[2];
   if (farthest <= view_.near || (view_.far > 0 && nearest >= view_.far)) return false;
   g.nearest = std::max(nearest - 1e-5f * (1 + std::abs(nearest)), 0.0f);
-  if (!grid.orthographic && nearest <= kNearest) return true;
+  float window[4] = {kEndless, -kEndless, kEndless, -kEndless};
+  const auto show = [&](float x, float y, float depth, float error) {
+    window[0] = std::min(window[0], (x - error) / depth);
+    window[1] = std::max(window[1], (x + error) / depth);
+    window[2] = std::min(window[2], (y - error) / depth);
+    window[3] = std::max(window[3], (y + error) / depth);
+  };
+  for (int corner = 0; corner < 8; ++corner) {
+    const float *c = corners[corner], depth = -c[2];
+    if (grid.orthographic || depth >= kNearest) {
+      show(c[0], c[1], grid.orthographic ? 1.0f : depth, 0.0f);
+      continue;
+    }
+    // Beside or behind the camera: what is in front of it ends where edges cross the plane of depth
+    // kNearest.
+    for (int k = 0; k < 3; ++k) {
+      const float *d = corners[corner ^ (1 << k)], beyond = -d[2];
+      if (beyond <= kNearest) continue;
+      const float s = (kNearest - depth) / (beyond - depth);
+      show(c[0] + s * (d[0] - c[0]), c[1] + s * (d[1] - c[1]), kNearest, 1e-6f * g.radius);
+    }
+  }
   for (int i = 0; i < 4; ++i) {
     const float slack = 1e-5f * (1 + std::abs(window[i]));
     g.window[i] = window[i] + (i % 2 ? slack : -slack);

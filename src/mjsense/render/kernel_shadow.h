@@ -1,0 +1,124 @@
+#pragma once
+// What lies between a point and a light. Part of the tile kernels.
+
+#include "mjsense/render/kernel_rays.h"
+
+namespace mjsense {
+namespace {
+
+// Points to be lit, camera frame, and the way to the light: q = p + s d, s in (0, end).
+struct alignas(64) LightRays {
+  float p[3][kLanes], d[3][kLanes], n[3][kLanes];
+  float end[kLanes];  // 1 for a light at a place; how far it is for a direction
+  int geom[kLanes];
+  // Scalars come last: what is above is loaded as aligned vectors.
+  float longest;            // the largest end
+  float center[3], radius;  // sphere around the active points
+};
+
+// Can anything within `radius` around `center` lie between the packet's points and the light?
+inline bool in_shaft(const LightRays& rays, const float* axis, const ViewGeom& g) {
+  if (g.type == mjGEOM_PLANE) return true;
+  const float v[3] = {g.center[0] - rays.center[0], g.center[1] - rays.center[1],
+                      g.center[2] - rays.center[2]};
+  const float length2 = axis[0] * axis[0] + axis[1] * axis[1] + axis[2] * axis[2];
+  float s = (v[0] * axis[0] + v[1] * axis[1] + v[2] * axis[2]) / length2;
+  s = s < 0 ? 0 : s > rays.longest ? rays.longest : s;
+  const float w[3] = {v[0] - s * axis[0], v[1] - s * axis[1], v[2] - s * axis[2]};
+  const float reach = g.radius + rays.radius;
+  return w[0] * w[0] + w[1] * w[1] + w[2] * w[2] <= reach * reach;
+}
+
+inline std::uint32_t shadow_of_triangles(const ViewGeom& g, int index, const LightRays& rays,
+                                         std::uint32_t active) {
+  RTCRay16 ray;
+  alignas(64) int valid[kLanes];
+  std::uint32_t some = 0;
+  for (int k = 0; k < kLanes; k += kWidth) {
+    const Vec3f p{load(rays.p[0] + k), load(rays.p[1] + k), load(rays.p[2] + k)};
+    const Vec3f d = to_geom(g.rot, {load(rays.d[0] + k), load(rays.d[1] + k), load(rays.d[2] + k)});
+    Vec3f o = to_geom(g.rot, p - splat(g.pos));
+    // A surface must not lie in its own shadow by rounding: start a little above it.
+    const Int same = load(rays.geom + k);
+    const Mask other = less(same, int_of(index)) | less(int_of(index), same);
+    const Vec3f n = to_geom(g.rot, {load(rays.n[0] + k), load(rays.n[1] + k), load(rays.n[2] + k)});
+    const Float lift = select(other, splat(0.0f), splat(1e-4f) * max(splat(g.radius), abs(p.z)));
+    o = along(o, lift, n);
+    const Interval inside = box(o, d, g.box, g.box + 3);
+    const Mask hit = mask_of(active >> k & kAllLanes) & (inside.enter < load(rays.end + k)) &
+                     (inside.exit > splat(0.0f));
+    some |= bits(hit);
+    store(valid + k, select(hit, int_of(-1), int_of(0)));
+    store(ray.org_x + k, o.x);
+    store(ray.org_y + k, o.y);
+    store(ray.org_z + k, o.z);
+    store(ray.dir_x + k, d.x);
+    store(ray.dir_y + k, d.y);
+    store(ray.dir_z + k, d.z);
+    store(ray.tnear + k, splat(0.0f));
+    store(ray.tfar + k, load(rays.end + k));
+    store(ray.time + k, splat(0.0f));
+    store(reinterpret_cast<int*>(ray.mask) + k, int_of(-1));
+    store(reinterpret_cast<int*>(ray.flags) + k, int_of(0));
+  }
+  if (!some) return 0;
+  embree_occluded16(valid, static_cast<RTCScene>(g.bvh), &ray, false);
+  std::uint32_t dark = 0;
+  for (int i = 0; i < kLanes; ++i)
+    if (valid[i] && ray.tfar[i] < 0) dark |= 1u << i;
+  return dark;
+}
+
+inline std::uint32_t shadow_of_geom(const View& view, int caster, const LightRays& rays,
+                                    std::uint32_t active) {
+  const ViewGeom& g = view.geoms[caster];
+  if (g.bvh) return shadow_of_triangles(g, caster, rays, active);
+  std::uint32_t dark = 0;
+  for (int k = 0; k < kLanes; k += kWidth) {
+    const std::uint32_t lanes = active >> k & kAllLanes;
+    if (!lanes) continue;
+    const Vec3f p{load(rays.p[0] + k), load(rays.p[1] + k), load(rays.p[2] + k)};
+    const Vec3f o = to_geom(g.rot, p - splat(g.pos));
+    const Vec3f d = to_geom(g.rot, {load(rays.d[0] + k), load(rays.d[1] + k), load(rays.d[2] + k)});
+    const Int at = load(rays.geom + k), self = int_of(caster);
+    const Mask other = less(at, self) | less(self, at);
+    const Float end = load(rays.end + k);
+    Mask barred;
+    if (g.type == mjGEOM_PLANE) {
+      barred = plane(g, o, d, true) < end;
+    } else {
+      const Interval inside = solid(g, o, d);
+      barred = (inside.enter < end) & (inside.exit > splat(1e-5f));
+    }
+    dark |= (bits(barred & other) & lanes) << k;
+  }
+  return dark;
+}
+
+// Geoms that may stand between a light and the points at hand. `hint`: the one that did for the
+// packet before; it is asked first, which changes nothing but the time.
+struct Casters {
+  const int* list;
+  int count;
+  int hint;
+};
+
+// Lanes of `active` whose way to the light is barred by one of `casters`.
+inline std::uint32_t in_shadow(const View& view, Casters& casters, const LightRays& rays,
+                               const float* axis, std::uint32_t active) {
+  if (casters.count == 0) return 0;
+  std::uint32_t left = active;
+  if (in_shaft(rays, axis, view.geoms[casters.list[casters.hint]]))
+    left &= ~shadow_of_geom(view, casters.list[casters.hint], rays, left);
+  for (int i = 0; i < casters.count && left; ++i) {
+    if (i == casters.hint || !in_shaft(rays, axis, view.geoms[casters.list[i]])) continue;
+    const std::uint32_t dark = shadow_of_geom(view, casters.list[i], rays, left);
+    if (!dark) continue;
+    left &= ~dark;
+    if (!left) casters.hint = i;
+  }
+  return active & ~left;
+}
+
+}  // namespace
+}  // namespace mjsense
