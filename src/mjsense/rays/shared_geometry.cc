@@ -25,24 +25,27 @@ std::array<float, 6> box_around(const float* vertices, int count) {
   return box;
 }
 
+struct Triangles {
+  std::vector<float> vertices;  // [n, 3] m
+  std::vector<int> faces;       // [m, 3]
+};
+
 // The surface of a height field, cells split along (row, col) - (row + 1, col + 1).
-SceneHandle build_surface(RTCDevice device, const HeightField& field) {
-  std::vector<float> vertices;
-  std::vector<int> faces;
+Triangles surface_of(const HeightField& field) {
+  Triangles out;
   for (int r = 0; r < field.rows; ++r)
     for (int c = 0; c < field.cols; ++c) {
-      vertices.push_back(field.size[0] * (2.0f * c / (field.cols - 1) - 1.0f));
-      vertices.push_back(field.size[1] * (2.0f * r / (field.rows - 1) - 1.0f));
-      vertices.push_back(field.size[2] * field.data[r * field.cols + c]);
+      out.vertices.push_back(field.size[0] * (2.0f * c / (field.cols - 1) - 1.0f));
+      out.vertices.push_back(field.size[1] * (2.0f * r / (field.rows - 1) - 1.0f));
+      out.vertices.push_back(field.size[2] * field.data[r * field.cols + c]);
     }
   for (int r = 0; r + 1 < field.rows; ++r)
     for (int c = 0; c + 1 < field.cols; ++c) {
       const int v = r * field.cols + c;
       for (int i : {v, v + 1, v + field.cols + 1, v, v + field.cols + 1, v + field.cols})
-        faces.push_back(i);
+        out.faces.push_back(i);
     }
-  return build_triangles(device, vertices.data(), field.rows * field.cols, faces.data(),
-                         static_cast<int>(faces.size() / 3));
+  return out;
 }
 
 int blocks(int points) { return (points - 2) / HeightField::kBlock + 1; }
@@ -101,6 +104,7 @@ SharedGeometry::SharedGeometry(const mjModel* m) {
   // All meshes, shown or not: a world may give a geom another one.
   meshes.resize(m->nmesh);
   mesh_scenes.assign(m->nmesh, nullptr);
+  mesh_clusters.resize(m->nmesh);
   for (int i = 0; i < m->nmesh; ++i) {
     const float* vertices = m->mesh_vert + 3 * m->mesh_vertadr[i];
     bounds.meshes.push_back(box_around(vertices, m->mesh_vertnum[i]));
@@ -108,6 +112,9 @@ SharedGeometry::SharedGeometry(const mjModel* m) {
     meshes[i] = build_triangles(device.get(), vertices, m->mesh_vertnum[i],
                                 m->mesh_face + 3 * m->mesh_faceadr[i], m->mesh_facenum[i]);
     mesh_scenes[i] = meshes[i].get();
+    if (m->ncam > 0)
+      mesh_clusters[i] =
+          build_clusters(vertices, m->mesh_face + 3 * m->mesh_faceadr[i], m->mesh_facenum[i]);
   }
   for (int i = 0; i < m->nflex; ++i) flexes.push_back(flex_surface(m, i));
   for (int i = 0; i < m->nhfield; ++i) {
@@ -115,8 +122,13 @@ SharedGeometry::SharedGeometry(const mjModel* m) {
         m->hfield_data + m->hfield_adr[i], m->hfield_nrow[i], m->hfield_ncol[i], {}, nullptr};
     std::copy_n(m->hfield_size + 4 * i, 4, field.size);
     if (m->ncam > 0) {
-      surfaces.push_back(build_surface(device.get(), field));
+      const Triangles surface = surface_of(field);
+      const int count = static_cast<int>(surface.faces.size() / 3);
+      surfaces.push_back(build_triangles(device.get(), surface.vertices.data(),
+                                         field.rows * field.cols, surface.faces.data(), count));
       field.scene = surfaces.back().get();
+      surface_clusters.push_back(
+          build_clusters(surface.vertices.data(), surface.faces.data(), count));
     }
     block_tops.push_back(highest_points(field));
     field.block_tops = block_tops.back().data();

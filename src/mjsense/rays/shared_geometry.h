@@ -1,6 +1,6 @@
 #pragma once
-// The shapes that all worlds share: a BVH for each mesh; height fields, which rays march over; the
-// triangles of flexes.
+// The shapes that all worlds share: a BVH for each mesh; height fields, which rays march over; for
+// cameras the triangles of both in blocks; the triangles of flexes.
 
 #include <mujoco/mujoco.h>
 
@@ -8,6 +8,7 @@
 #include <memory>
 #include <vector>
 
+#include "mjsense/rays/clusters.h"
 #include "mjsense/rays/embree.h"
 #include "mjsense/rays/flex_surface.h"
 #include "mjsense/rays/kernels.h"
@@ -37,8 +38,18 @@ struct SharedGeometry {
   std::vector<HeightField> height_fields;      // data: the model's
   std::vector<std::vector<float>> block_tops;  // of each height field
   std::vector<SceneHandle> surfaces;  // of height fields, if the model has cameras: rays march
+  // For images; none if the model has no camera.
+  std::vector<Clusters> mesh_clusters, surface_clusters;
   ShapeBounds bounds;
   std::vector<FlexSurface> flexes;  // what does not move of them
+
+  const Clusters* clusters_of_mesh(int id) const { return clusters(mesh_clusters, id); }
+  const Clusters* clusters_of_height_field(int id) const { return clusters(surface_clusters, id); }
+
+ private:
+  static const Clusters* clusters(const std::vector<Clusters>& all, std::size_t id) {
+    return id < all.size() && !all[id].nodes.empty() ? &all[id] : nullptr;
+  }
 };
 
 // A scene of one triangle mesh; positions and indices are copied.

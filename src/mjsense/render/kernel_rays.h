@@ -4,6 +4,7 @@
 
 #include <mujoco/mujoco.h>
 
+#include "mjsense/rays/clusters.h"
 #include "mjsense/rays/embree.h"
 #include "mjsense/rays/kernels.h"
 #include "mjsense/rays/simd.h"

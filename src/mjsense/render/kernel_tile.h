@@ -3,22 +3,10 @@
 // of the tile kernels.
 
 #include "mjsense/render/kernel_layers.h"
+#include "mjsense/render/kernel_raster.h"
 
 namespace mjsense {
 namespace {
-
-constexpr int kPackets = kTileSize / 4;  // along a side
-
-constexpr int kTilePackets = kPackets * kPackets;
-static_assert(kTilePackets == kLanes, "a vector has a lane for each packet");
-
-struct alignas(64) TileHits {
-  Pixels pixels[kTilePackets];
-  Hits opaque[kTilePackets];
-  // By packet: Pixels::window, and the largest t of its hits (minus infinity: no packet).
-  float window[4][kTilePackets];
-  float farthest[kTilePackets];
-};
 
 inline void fill_pixels(const View& view, int x0, int y0, float shift_x, float shift_y,
                         Pixels& out) {
@@ -57,12 +45,12 @@ inline void fill_pixels(const View& view, int x0, int y0, float shift_x, float s
 }
 
 // Casters for every shadow-casting light, for the points that the tile sees.
-inline void find_casters(const View& view, const TileHits& tile, int packets, TileScratch& scratch,
+inline void find_casters(const View& view, const Tile& tile, int packets, TileScratch& scratch,
                          Casters* out) {
   LightRays around;
   float low[3] = {kInfinity, kInfinity, kInfinity}, high[3] = {-kInfinity, -kInfinity, -kInfinity};
   for (int q = 0; q < packets; ++q) {
-    const Hits& hits = tile.opaque[q];
+    const Hits& hits = tile.hits[q];
     for (int i = 0; i < kLanes; ++i) {
       if (hits.geom[i] < 0) continue;
       const float t = hits.t[i], s = view.grid.orthographic ? 1.0f : t;
@@ -98,46 +86,49 @@ inline void find_casters(const View& view, const TileHits& tile, int packets, Ti
 
 inline std::uint8_t byte(float x) { return static_cast<std::uint8_t>(x * 255.0f + 0.5f); }
 
-// The packets that may see something of g nearer than what they have.
-inline PacketMask packets_in_reach(const ViewGeom& g, const TileHits& tile) {
-  PacketMask packets = 0;
-  for (int k = 0; k < kTilePackets; k += kWidth) {
-    const Mask m = (load(tile.window[0] + k) <= splat(g.window[1])) &
-                   (splat(g.window[0]) <= load(tile.window[1] + k)) &
-                   (load(tile.window[2] + k) <= splat(g.window[3])) &
-                   (splat(g.window[2]) <= load(tile.window[3] + k)) &
-                   (splat(g.nearest) < load(tile.farthest + k));
-    packets |= bits(m) << k;
-  }
-  return packets;
-}
-
-inline void update_farthest(TileHits& tile, PacketMask packets) {
+inline void update_farthest(Tile& tile, PacketMask packets) {
   for (; packets; packets &= packets - 1) {
     const int q = __builtin_ctz(packets);
-    Float far = load(tile.opaque[q].t);
-    for (int k = kWidth; k < kLanes; k += kWidth) far = max(far, load(tile.opaque[q].t + k));
+    Float far = load(tile.hits[q].t);
+    for (int k = kWidth; k < kLanes; k += kWidth) far = max(far, load(tile.hits[q].t + k));
     tile.farthest[q] = lane_max(far);
   }
+  Float depth = load(tile.farthest);
+  for (int k = kWidth; k < kTilePackets; k += kWidth) depth = max(depth, load(tile.farthest + k));
+  tile.depth = lane_max(depth);
+}
+
+// Nearer hits of `packets` on geom `index` replace those of the tile: which did.
+inline PacketMask draw_or_trace(const View& view, int index, PacketMask packets, Tile& tile) {
+  const ViewGeom& g = view.geoms[index];
+  PacketMask changed = 0;
+  if (g.clusters && !view.grid.orthographic && rasterize(view, index, packets, tile, changed)) {
+    if (g.height_field)
+      changed |= trace_walls(Tracing(view, index), tile.pixels, tile.hits, packets);
+    return changed;
+  }
+  return trace_geom(view, index, tile.pixels, tile.hits, packets);
 }
 
 // The nearest hits of all packets among the geoms of `list`, which is sorted by ViewGeom::nearest.
-inline void trace_tile(const View& view, const int* list, int count, TileHits& tile) {
+inline void trace_tile(const View& view, const int* list, int count, Tile& tile) {
   for (int i = 0; i < count; ++i) {
-    const PacketMask packets = packets_in_reach(view.geoms[list[i]], tile);
-    if (packets)
-      update_farthest(tile, trace_geom(view, list[i], tile.pixels, tile.opaque, packets));
+    const ViewGeom& g = view.geoms[list[i]];
+    const PacketMask packets = packets_in_reach(g.window, g.nearest, tile);
+    if (!packets) continue;
+    const PacketMask changed = draw_or_trace(view, list[i], packets, tile);
+    if (changed) update_farthest(tile, changed);
   }
 }
 
 // Adds transparent geoms to the hits: depth and segmentation see them too. A plane seen from behind
 // is not there.
-inline void trace_transparent(const View& view, const int* list, int count, TileHits& tile) {
+inline void trace_transparent(const View& view, const int* list, int count, Tile& tile) {
   for (int i = 0; i < count; ++i) {
     const ViewGeom& g = view.geoms[list[i]];
     if (g.type == mjGEOM_PLANE && g.behind) continue;
-    const PacketMask packets = packets_in_reach(g, tile);
-    if (packets) trace_geom(view, list[i], tile.pixels, tile.opaque, packets);
+    const PacketMask packets = packets_in_reach(g.window, g.nearest, tile);
+    if (packets) draw_or_trace(view, list[i], packets, tile);
   }
 }
 
@@ -243,7 +234,7 @@ inline void sample_shift(int index, int samples, float& x, float& y) {
 
 inline void render_tile(const View& view, const ImageTargets& targets, int tx, int ty,
                         TileScratch& scratch) {
-  TileHits& tile = *static_cast<TileHits*>(scratch.hits);
+  Tile& tile = *static_cast<Tile*>(scratch.hits);
   const PixelGrid& grid = view.grid;
   const int x0 = tx * kTileSize, y0 = ty * kTileSize;
   const int across = (grid.width - x0 + 3) / 4 < kPackets ? (grid.width - x0 + 3) / 4 : kPackets;
@@ -251,6 +242,7 @@ inline void render_tile(const View& view, const ImageTargets& targets, int tx, i
   const int packets = across * down;
   const bool geometry = targets.depth || targets.segmentation || targets.normals || targets.points;
   const float far = view.far > 0 ? view.far : kInfinity;
+  tile.shaded = targets.rgb || targets.normals;
   const int samples = targets.rgb ? targets.samples : 1;
   float sum[kTilePackets][3][kLanes];
   for (int sample = 0; sample < samples || (sample == samples && samples > 1 && geometry);
@@ -259,7 +251,9 @@ inline void render_tile(const View& view, const ImageTargets& targets, int tx, i
     const bool centered = sample == samples || samples == 1;
     float shift_x = 0, shift_y = 0;
     if (!centered) sample_shift(sample, samples, shift_x, shift_y);
-    float window[4] = {kInfinity, -kInfinity, kInfinity, -kInfinity};
+    float* window = tile.around;
+    window[0] = window[2] = kInfinity;
+    window[1] = window[3] = -kInfinity;
     for (int q = 0; q < packets; ++q) {
       fill_pixels(view, x0 + 4 * (q % across), y0 + 4 * (q / across), shift_x, shift_y,
                   tile.pixels[q]);
@@ -270,9 +264,10 @@ inline void render_tile(const View& view, const ImageTargets& targets, int tx, i
       }
       for (int c = 0; c < 4; ++c) tile.window[c][q] = w[c];
       tile.farthest[q] = far;
-      clear(tile.opaque[q], far);
+      clear(tile.hits[q], far);
     }
     for (int q = packets; q < kTilePackets; ++q) tile.farthest[q] = -kInfinity;
+    tile.depth = far;
     const TileLists lists = find_geoms(view, window, scratch);
     trace_tile(view, scratch.opaque, lists.opaque, tile);
     if (targets.rgb && sample < samples) {
@@ -280,7 +275,7 @@ inline void render_tile(const View& view, const ImageTargets& targets, int tx, i
       const bool shadows = view.shadows;
       if (shadows) find_casters(view, tile, packets, scratch, casters);
       for (int q = 0; q < packets; ++q) {
-        const Hits& hits = tile.opaque[q];
+        const Hits& hits = tile.hits[q];
         const std::uint32_t lanes = hit_lanes(hits);
         Colors colors;
         if (lanes) {
@@ -302,7 +297,7 @@ inline void render_tile(const View& view, const ImageTargets& targets, int tx, i
       trace_transparent(view, scratch.transparent, lists.transparent, tile);
       for (int q = 0; q < packets; ++q) {
         write_geometry(view, targets, x0 + 4 * (q % across), y0 + 4 * (q / across), tile.pixels[q],
-                       tile.opaque[q]);
+                       tile.hits[q]);
       }
     }
   }

@@ -21,8 +21,37 @@ inline Mask shows(Float t, Int id, Float before, Int id_before) {
          ((t < before - slack) | ((t <= before + slack) & less(id_before, id)));
 }
 
-// Bit q: the hits of packet q.
+// Bit q: packet q of a tile.
 using PacketMask = std::uint32_t;
+
+constexpr int kPackets = kTileSize / 4;  // along a side
+constexpr int kTilePackets = kPackets * kPackets;
+static_assert(kTilePackets == kLanes, "a vector has a lane for each packet");
+
+struct alignas(64) Tile {
+  Pixels pixels[kTilePackets];
+  Hits hits[kTilePackets];
+  // By packet: Pixels::window, and the largest t of its hits (minus infinity: no packet).
+  float window[4][kTilePackets];
+  float farthest[kTilePackets];
+  float around[4];  // all windows together
+  float depth;      // the largest of `farthest`
+  bool shaded;      // more than depth and ids is wanted
+};
+
+// The packets that may see something in `window`, at `nearest` or beyond, before what they have.
+inline PacketMask packets_in_reach(const float* window, float nearest, const Tile& tile) {
+  PacketMask packets = 0;
+  for (int k = 0; k < kTilePackets; k += kWidth) {
+    const Mask m = (load(tile.window[0] + k) <= splat(window[1])) &
+                   (splat(window[0]) <= load(tile.window[1] + k)) &
+                   (load(tile.window[2] + k) <= splat(window[3])) &
+                   (splat(window[2]) <= load(tile.window[3] + k)) &
+                   (splat(nearest) < load(tile.farthest + k));
+    packets |= bits(m) << k;
+  }
+  return packets;
+}
 
 // What stays the same from packet to packet while one geom is traced. Packets are independent of each
 // other, so that the CPU works on several at once.
@@ -135,7 +164,7 @@ inline PacketMask trace_triangles(const Tracing& at, const Pixels* pixels, Hits*
 }
 
 // Side walls and base of a height field, from outside. Few rays meet them: one lane at a time.
-inline bool trace_walls(const Tracing& at, const Pixels& pixels, Hits& hits) {
+inline bool trace_walls_of_packet(const Tracing& at, const Pixels& pixels, Hits& hits) {
   const ViewGeom& g = at.geom;
   const HeightField& f = *g.height_field;
   const float center[3] = {0, 0, 0.5f * (f.size[2] - f.size[3])};
@@ -172,6 +201,21 @@ inline bool trace_walls(const Tracing& at, const Pixels& pixels, Hits& hits) {
       hits.n[1][k + i] = vertical || ax >= ay ? 0.0f : y;
       hits.n[2][k + i] = vertical ? -1.0f : 0.0f;
     }
+  }
+  return changed;
+}
+
+inline PacketMask trace_walls(const Tracing& at, const Pixels* pixels, Hits* hits,
+                              PacketMask packets) {
+  const ViewGeom& g = at.geom;
+  const float *size = g.height_field->size, *eye = g.eye;
+  const bool above = -size[0] < eye[0] && eye[0] < size[0] && -size[1] < eye[1] &&
+                     eye[1] < size[1] && -size[3] < eye[2];
+  if (above && !at.orthographic) return 0;  // all walls turn their backs
+  PacketMask changed = 0;
+  for (; packets; packets &= packets - 1) {
+    const int q = __builtin_ctz(packets);
+    changed |= static_cast<PacketMask>(trace_walls_of_packet(at, pixels[q], hits[q])) << q;
   }
   return changed;
 }
@@ -223,12 +267,7 @@ inline PacketMask trace_geom(const View& view, int index, const Pixels* pixels, 
       break;
   }
   PacketMask changed = g.bvh ? trace_triangles(at, pixels, hits, packets) : 0;
-  if (g.height_field) {
-    for (; packets; packets &= packets - 1) {
-      const int q = __builtin_ctz(packets);
-      changed |= static_cast<PacketMask>(trace_walls(at, pixels[q], hits[q])) << q;
-    }
-  }
+  if (g.height_field) changed |= trace_walls(at, pixels, hits, packets);
   return changed;
 }
 

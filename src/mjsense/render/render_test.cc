@@ -69,7 +69,7 @@ struct Studio {
                                      at.data(), r, grid_from_fovy(size, size, fovy, false));
     std::vector<std::uint8_t> image(3 * size * size);
     std::vector<int> lists((3 + View::kMaxLights) * (model->ngeom + 1));
-    Array hits(DType::kUint8, {static_cast<std::int64_t>(tile_hits_bytes())});
+    Array hits(DType::kUint8, {static_cast<std::int64_t>(tile_bytes())});
     TileScratch scratch;
     scratch.row = lists.data();
     scratch.opaque = scratch.row + model->ngeom;

@@ -10,6 +10,7 @@
 
 namespace mjsense {
 
+struct Clusters;
 struct HeightField;
 
 // Rays of pixels. Pixel (x, y), row 0 at the top, sees along (X, Y, -1) from the origin, with X =
@@ -50,6 +51,7 @@ struct alignas(64) ViewGeom {
   bool behind;  // a plane that the camera sees from below: a faint veil, and nothing to depth and
                 // segmentation
   void* bvh;    // RTCScene of a mesh, a height field's surface, a flex, a skin; else null
+  const Clusters* clusters;  // the same triangles to be drawn; null: rays only
   const MeshLook* mesh;
   const HeightField* height_field;
   Surface surface;
@@ -106,11 +108,11 @@ struct TileScratch {
   int* opaque = nullptr;  // geoms in sight of the tile
   int* transparent = nullptr;
   int* casters = nullptr;  // of all lights: kMaxLights times as long
-  void* hits = nullptr;    // 16 packets of hits
+  void* hits = nullptr;    // a Tile
 };
 
-// Bytes of TileScratch::hits, 64-byte aligned.
-std::size_t tile_hits_bytes();
+// Bytes of a Tile, 64-byte aligned.
+std::size_t tile_bytes();
 
 // Renders rows of tiles [first, last) of the image. Every pixel is a function of the view alone.
 using RenderTiles = void (*)(const View& view, const ImageTargets& targets, int first, int last,

@@ -152,14 +152,17 @@ void ViewBuilder::set_shape(const RayWorld& world, const SharedGeometry& shapes,
   g.type = source.type;
   g.object = mjOBJ_GEOM;
   g.bvh = nullptr;
+  g.clusters = nullptr;
   g.mesh = nullptr;
   g.height_field = nullptr;
   if (g.type == mjGEOM_MESH || g.type == mjGEOM_SDF) {
     g.bvh = shapes.mesh_scenes[source.data];
     g.mesh = look_->mesh(source.data);
+    g.clusters = shapes.clusters_of_mesh(source.data);
   } else if (g.type == mjGEOM_HFIELD) {
     g.height_field = &shapes.height_fields[source.data];
     g.bvh = g.height_field->scene;
+    g.clusters = shapes.clusters_of_height_field(source.data);
   } else if (g.type == kFlexType) {
     const int flex = source.data;
     g.type = mjGEOM_MESH;

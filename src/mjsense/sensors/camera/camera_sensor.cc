@@ -109,7 +109,7 @@ void CameraSensor::initialize(const SensorInit& init) {
   const std::size_t geoms = ViewBuilder::max_geoms(model_);
   for (int i = 0; i < init.threads; ++i) {
     workspace_->hits.emplace_back(DType::kUint8,
-                                  Shape{static_cast<std::int64_t>(tile_hits_bytes())});
+                                  Shape{static_cast<std::int64_t>(tile_bytes())});
     std::vector<int>& list = workspace_->lists.emplace_back((3 + View::kMaxLights) * geoms);
     TileScratch& scratch = workspace_->scratch.emplace_back();
     scratch.row = list.data();
