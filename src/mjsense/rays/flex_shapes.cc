@@ -45,7 +45,7 @@ FlexShapes::FlexShapes(RTCDevice device, std::span<const FlexSurface> surfaces,
       std::vector<float> rest = s.rest;
       if (s.dim == 2) rest.insert(rest.end(), s.rest.begin(), s.rest.end());
       flex.smooth.resize(s.rest.size());
-      if (shaded && !s.flat) flex.normals.resize(3 * s.faces.size());
+      if (shaded) flex.normals.resize(3 * s.faces.size());
       flex.mesh = SoftMesh(device, s.faces, rest);
       move_sheets(flex);
       scenes_.push_back(flex.mesh.scene());
@@ -123,25 +123,29 @@ void FlexShapes::move_sheets(Flex& flex) {
   if (!flex.normals.empty()) shade(flex);
 }
 
-// The second sheet looks the other way; the border is flat.
+// Smooth faces have their vertices' normals, the second sheet the opposite ones. Flat ones have the
+// normal of the face before it was displaced, the border that of its own.
 void FlexShapes::shade(Flex& flex) {
   const FlexSurface& s = *flex.surface;
-  float* out = flex.normals.data();
+  const std::span<const float> surface = flex.mesh.vertices();
   for (int f = 0; f < s.num_faces(); ++f) {
     const int* v = &s.faces[3 * f];
-    for (int c = 0; c < 3; ++c, out += 3) {
-      if (f < s.num_sheet_faces) {
-        const bool second = v[c] >= s.num_vertices;
-        const double* n = &flex.smooth[3 * (second ? v[c] - s.num_vertices : v[c])];
-        for (int k = 0; k < 3; ++k) out[k] = static_cast<float>(second ? -n[k] : n[k]);
-      } else if (c == 0) {
-        double p[3][3], n[3];
-        for (int i = 0; i < 3; ++i)
-          for (int k = 0; k < 3; ++k) p[i][k] = flex.mesh.vertices()[3 * v[i] + k];
-        face_normal(p[0], p[1], p[2], n);
-        for (int i = 0; i < 9; ++i) out[i] = static_cast<float>(n[i % 3]);
-      }
+    float* out = &flex.normals[9 * f];
+    const bool border = f >= s.num_sheet_faces;
+    if (!s.flat && !border) {
+      const double sign = v[0] < s.num_vertices ? 1 : -1;
+      for (int i = 0; i < 9; ++i)
+        out[i] = static_cast<float>(sign * flex.smooth[3 * (v[i / 3] % s.num_vertices) + i % 3]);
+      continue;
     }
+    double corners[9], n[3];
+    for (int i = 0; i < 9; ++i) {
+      const int vertex = v[i / 3], k = i % 3;
+      corners[i] =
+          border ? surface[3 * vertex + k] : flex.vertices[3 * (vertex % s.num_vertices) + k];
+    }
+    face_normal(corners, corners + 3, corners + 6, n);
+    for (int i = 0; i < 9; ++i) out[i] = static_cast<float>(n[i % 3]);
   }
 }
 

@@ -24,7 +24,7 @@ class FlexShapes {
   const double* position(int flex) const { return flexes_[flex].vertices.data(); }     // m, world
   // [6] centre and half sizes of its box, m.
   const float* box(int flex) const { return flexes_[flex].box; }
-  // [F, 3 corners, 3] unit normals; null: the faces' own.
+  // [F, 3 corners, 3] unit normals; null for lines, and without cameras.
   const float* normals(int flex) const;
   // RTCScene by flex id; null where there is nothing to meet.
   void* const* scenes() const { return scenes_.data(); }

@@ -12,9 +12,10 @@ struct alignas(64) RayGeom {
   float size[3];    // m, as mjModel's geom_size
   float center[3];  // m, local bounding box
   float half[3];
-  int type;  // mjtGeom; kFlexType for a flex
-  int data;  // mesh or height-field id, flex id, or -1
+  int type;  // mjtGeom; kFlexType for a flex, kSkinType for a skin
+  int data;  // id of the mesh, height field, flex or skin; or -1
 };
 inline constexpr int kFlexType = 1000;
+inline constexpr int kSkinType = 1001;  // for cameras only
 
 }  // namespace mjsense

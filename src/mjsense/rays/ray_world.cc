@@ -5,6 +5,7 @@
 
 #include "mjsense/rays/flex_shapes.h"
 #include "mjsense/rays/shared_geometry.h"
+#include "mjsense/rays/skin_shapes.h"
 
 namespace mjsense {
 namespace {
@@ -32,6 +33,7 @@ RayWorld::RayWorld(const mjModel* m, const SharedGeometry& shapes)
   materials_.assign(count, -1);
   rgba_.assign(4 * count, 0.0f);
   if (m->nflex > 0) flexes_ = std::make_unique<FlexShapes>(shapes.device.get(), shapes.flexes, m);
+  if (m->nskin > 0 && m->ncam > 0) skins_ = std::make_unique<SkinShapes>(shapes.device.get(), m);
   lights_.resize(m->nlight);
   cameras_.resize(m->ncam);
 }
@@ -59,6 +61,7 @@ void RayWorld::update(const mjModel* m, const mjData* d) {
     set_world_box(i);
   }
   if (flexes_) update_flexes(m, d);
+  if (skins_) skins_->update(m, d);
   for (int i = 0; i < m->nlight; ++i) {
     std::copy_n(d->light_xpos + 3 * i, 3, lights_[i].pos);
     std::copy_n(d->light_xdir + 3 * i, 3, lights_[i].dir);

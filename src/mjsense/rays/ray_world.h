@@ -24,6 +24,7 @@ struct RayCamera {
 };
 
 class FlexShapes;
+class SkinShapes;
 struct SharedGeometry;
 
 class RayWorld {
@@ -53,6 +54,8 @@ class RayWorld {
   // [num_objects, 4], resolved: the material's if it has one
   std::span<const float> rgba() const { return rgba_; }
   const FlexShapes* flexes() const { return flexes_.get(); }  // null: the model has none
+  // What cameras may bend when they need it; null: there are no skins, or no cameras.
+  SkinShapes* skins() const { return skins_.get(); }
   std::span<const RayLight> lights() const { return lights_; }
   std::span<const RayCamera> cameras() const { return cameras_; }
 
@@ -67,6 +70,7 @@ class RayWorld {
   std::vector<RayGeom> geoms_;
   const SharedGeometry* shapes_;
   std::unique_ptr<FlexShapes> flexes_;
+  std::unique_ptr<SkinShapes> skins_;
   Array bounds_;                                // [6, padded]
   std::array<const float*, 3> low_{}, high_{};  // its rows
   std::vector<std::uint32_t> flags_;

@@ -19,7 +19,7 @@ void resolve_rgba(const mjModel* m, int material, const float* own, float* out) 
 }  // namespace
 
 Appearance::Appearance(const mjModel* m)
-    : rgba_(4 * (m->ngeom + m->nflex)),
+    : rgba_(4 * (m->ngeom + m->nflex + m->nskin)),
       materials_(m->nmat),
       lights_(View::kMaxLights),
       light_ids_(View::kMaxLights) {
@@ -31,6 +31,8 @@ void Appearance::copy(const mjModel* m) {
     resolve_rgba(m, m->geom_matid[i], m->geom_rgba + 4 * i, &rgba_[4 * i]);
   for (int i = 0; i < m->nflex; ++i)
     resolve_rgba(m, flex_material(m, i), m->flex_rgba + 4 * i, &rgba_[4 * (m->ngeom + i)]);
+  for (int i = 0; i < m->nskin; ++i)
+    resolve_rgba(m, m->skin_matid[i], m->skin_rgba + 4 * i, &rgba_[4 * (m->ngeom + m->nflex + i)]);
   for (int i = 0; i < m->nmat; ++i)
     materials_[i] = {.specular = m->mat_specular[i],
                      .shininess = m->mat_shininess[i],

@@ -22,7 +22,7 @@ class Appearance {
   explicit Appearance(const mjModel* model);
   void copy(const mjModel* model);  // no allocation
 
-  // [ngeom + nflex, 4] as MuJoCo's visualiser resolves it
+  // [geoms, then flexes, then skins; 4] as MuJoCo's visualiser resolves it
   std::span<const float> rgba() const { return rgba_; }
   std::span<const Material> materials() const { return materials_; }  // [nmat]
   // Active ones; no poses yet.

@@ -54,7 +54,9 @@ Look::Look(const mjModel* model, bool meshes, bool textures) {
   textures_.resize(model->ntex);
   meshes_.resize(model->nmesh);
   flexes_.resize(model->nflex);
+  skins_.resize(model->nskin);
   for (int i = 0; i < model->nflex && textures; ++i) add_flex(model, i);
+  for (int i = 0; i < model->nskin && textures; ++i) add_skin(model, i);
   for (int i = 0; i < model->ntex && textures; ++i) add_texture(model, i);
   for (int i = 0; i < model->ntex && !skybox_; ++i)
     if (model->tex_type[i] == mjTEXTURE_SKYBOX && textures_[i].levels > 0) skybox_ = &textures_[i];
@@ -151,6 +153,16 @@ void Look::add_flex(const mjModel* model, int id) {
       flexes_[id], s.num_faces(),
       [&](int f, int k) { return &s.rest[3 * (s.faces[3 * f + k] % s.num_vertices)]; },
       [&](int f, int k) { return texcoord + 2 * s.texcoords[3 * f + k]; });
+}
+
+void Look::add_skin(const mjModel* model, int id) {
+  if (model->skin_texcoordadr[id] < 0) return;
+  const float* vert = model->skin_vert + 3 * model->skin_vertadr[id];
+  const float* texcoord = model->skin_texcoord + 2 * model->skin_texcoordadr[id];
+  const int* face = model->skin_face + 3 * model->skin_faceadr[id];
+  add_coordinates(
+      skins_[id], model->skin_facenum[id], [&](int f, int k) { return vert + 3 * face[3 * f + k]; },
+      [&](int f, int k) { return texcoord + 2 * face[3 * f + k]; });
 }
 
 template <class Position, class Texcoord>

@@ -7,6 +7,7 @@
 #include "mjsense/rays/flex_shapes.h"
 #include "mjsense/rays/ray_world.h"
 #include "mjsense/rays/shared_geometry.h"
+#include "mjsense/rays/skin_shapes.h"
 
 namespace mjsense {
 namespace {
@@ -28,7 +29,7 @@ ViewBuilder::ViewBuilder(const mjModel* model, const Look& look, const ViewOptio
       options_(options),
       unsorted_(max_geoms(model)),
       sorted_(max_geoms(model)),
-      flexes_(model->nflex) {
+      soft_looks_(model->nflex + model->nskin) {
   order_.reserve(max_geoms(model));
   view_.near = options.near;
   view_.far = options.far;
@@ -46,15 +47,17 @@ const View& ViewBuilder::build(const RayWorld& world, const SharedGeometry& shap
                                const double rotation[9], const PixelGrid& grid) {
   view_.grid = grid;
   order_.clear();
-  for (int id = 0; id < world.num_objects(); ++id) {
+  const auto add = [&](const RayGeom& source, int id, std::uint32_t flags, int material) {
     const float* rgba = appearance.rgba().data() + 4 * id;
-    if (rgba[3] == 0 || !(world.flags()[id] & options_.groups) || id == left_out_) continue;
+    if (rgba[3] == 0 || !(flags & options_.groups) || id == left_out_) return;
     const int index = static_cast<int>(order_.size());
     ViewGeom& g = unsorted_[index];
-    place(world, shapes, id, position, rotation, g);
+    g.id = id;
+    place(source, position, rotation, g);
+    set_shape(world, shapes, source, g);
     const bool sight = in_sight(g);
-    if (!sight && !options_.shadows) continue;
-    set_surface(world, appearance, id, g);
+    if (!sight && !options_.shadows) return;
+    set_surface(source, rgba, material < 0 ? nullptr : &appearance.materials()[material], g);
     Order order{sight ? g.transparent : 2, g.nearest, index};
     if (order.rank == 1) {
       const float* p = g.pos;
@@ -64,6 +67,13 @@ const View& ViewBuilder::build(const RayWorld& world, const SharedGeometry& shap
                       : std::sqrt(p[0] * p[0] + p[1] * p[1] + p[2] * p[2]) - reach;
     }
     order_.push_back(order);
+  };
+  for (int id = 0; id < world.num_objects(); ++id)
+    add(world.geom(id), id, world.flags()[id], world.materials()[id]);
+  if (SkinShapes* skins = world.skins()) {
+    skins->bend(options_.groups);
+    for (int i = 0; i < skins->size(); ++i)
+      add(skins->geom(i), world.num_objects() + i, skins->group(i), skins->material(i));
   }
   std::sort(order_.begin(), order_.end(), [](const Order& a, const Order& b) {
     if (a.rank != b.rank) return a.rank < b.rank;
@@ -123,9 +133,8 @@ void ViewBuilder::set_mirror(const RayWorld& world, const SharedGeometry& shapes
   }
 }
 
-void ViewBuilder::place(const RayWorld& world, const SharedGeometry& shapes, int id,
-                        const double position[3], const double rotation[9], ViewGeom& g) {
-  const RayGeom& source = world.geom(id);
+void ViewBuilder::place(const RayGeom& source, const double position[3], const double rotation[9],
+                        ViewGeom& g) const {
   const double offset[3] = {source.pos[0] - position[0], source.pos[1] - position[1],
                             source.pos[2] - position[2]};
   double p[3], eye[3];
@@ -142,15 +151,14 @@ void ViewBuilder::place(const RayWorld& world, const SharedGeometry& shapes, int
           static_cast<float>(rotation[i] * source.mat[j] + rotation[3 + i] * source.mat[3 + j] +
                              rotation[6 + i] * source.mat[6 + j]);
   }
-  g.id = g.object_id = id;
-  set_shape(world, shapes, source, g);
-  g.behind = g.type == mjGEOM_PLANE && g.eye[2] < 0;
 }
 
 void ViewBuilder::set_shape(const RayWorld& world, const SharedGeometry& shapes,
                             const RayGeom& source, ViewGeom& g) {
   g.type = source.type;
+  g.behind = g.type == mjGEOM_PLANE && g.eye[2] < 0;
   g.object = mjOBJ_GEOM;
+  g.object_id = g.id;
   g.bvh = nullptr;
   g.clusters = nullptr;
   g.mesh = nullptr;
@@ -164,15 +172,28 @@ void ViewBuilder::set_shape(const RayWorld& world, const SharedGeometry& shapes,
     g.bvh = g.height_field->scene;
     g.clusters = shapes.clusters_of_height_field(source.data);
   } else if (g.type == kFlexType) {
-    const int flex = source.data;
-    g.type = mjGEOM_MESH;
+    const int id = source.data;
     g.object = mjOBJ_FLEX;
-    g.object_id = flex;
-    g.bvh = world.flexes()->scenes()[flex];
-    flexes_[flex] = *look_->flex(flex);
-    flexes_[flex].normals = world.flexes()->normals(flex);
-    g.mesh = &flexes_[flex];
+    g.bvh = world.flexes()->scenes()[id];
+    g.mesh = soft_look(id, *look_->flex(id), world.flexes()->normals(id));
+  } else if (g.type == kSkinType) {
+    const int id = source.data;
+    g.object = mjOBJ_SKIN;
+    g.bvh = world.skins()->scene(id);
+    g.mesh = soft_look(look_->num_flexes() + id, *look_->skin(id), world.skins()->normals(id));
   }
+  if (g.object != mjOBJ_GEOM) {
+    g.object_id = source.data;
+    g.type = mjGEOM_MESH;
+  }
+}
+
+// The world's normals with the texture coordinates that all share.
+const MeshLook* ViewBuilder::soft_look(int index, const MeshLook& shared, const float* normals) {
+  MeshLook& look = soft_looks_[index];
+  look = shared;
+  look.normals = normals;
+  return &look;
 }
 
 // Bounding sphere, window and nearest depth of g; whether any of it can be in the image.
@@ -235,36 +256,37 @@ bool ViewBuilder::in_sight(ViewGeom& g) const {
          g.window[3] >= bottom;
 }
 
-void ViewBuilder::set_surface(const RayWorld& world, const Appearance& appearance, int id,
+void ViewBuilder::set_surface(const RayGeom& source, const float* rgba, const Material* material,
                               ViewGeom& g) const {
   Surface& s = g.surface;
   s = {};
-  std::copy_n(appearance.rgba().data() + 4 * id, 4, s.rgba);
+  std::copy_n(rgba, 4, s.rgba);
   for (int i = 0; i < 3; ++i) s.rgba[i] *= tint_;
   if (g.behind) s.rgba[3] *= kFromBehind;
   g.transparent = s.rgba[3] < kOpaque || g.behind;
   s.specular = 0.5f;
   s.exponent = 64.0f;
-  if (world.materials()[id] < 0) return;
-  const Material& material = appearance.materials()[world.materials()[id]];
-  s.specular = material.specular;
-  s.exponent = 128.0f * material.shininess;
-  s.emission = material.emission;
+  if (!material) return;
+  s.specular = material->specular;
+  s.exponent = 128.0f * material->shininess;
+  s.emission = material->emission;
   if (!options_.textures) return;
-  s.texture = look_->texture(material.texture);
+  s.texture = look_->texture(material->texture);
   if (s.texture && s.texture->levels == 0) s.texture = nullptr;
   if (!s.texture) return;
-  const bool uniform = material.uniform;
+  const bool uniform = material->uniform;
   s.mapped = g.mesh && g.mesh->uvs && !s.texture->cube;
-  if (g.object == mjOBJ_FLEX && !s.mapped) {
-    s.texture = nullptr;  // MuJoCo: textures only by a flex's own coordinates
+  if (g.object == mjOBJ_FLEX && !s.mapped) {  // MuJoCo: by its own coordinates only
+    s.texture = nullptr;
     return;
   }
   for (int i = 0; i < 2; ++i) {
     const float size = g.size[i] > 0 ? g.size[i] : 1.0f;
-    s.repeat[i] = material.repeat[i] * (uniform && !s.mapped ? size : 1.0f);
+    s.repeat[i] = material->repeat[i] * (uniform && !s.mapped ? size : 1.0f);
     const bool from_above = (g.mesh && !s.mapped) || g.height_field;
     if (from_above || (g.type == mjGEOM_PLANE && g.size[i] <= 0)) s.shift[i] = -0.5f;
+    if (from_above && g.object == mjOBJ_SKIN)  // the texture stays where it is in the world
+      s.shift[i] += (i ? -0.5f : 0.5f) * s.repeat[i] * static_cast<float>(source.pos[i]);
   }
   // Cube maps: MuJoCo takes directions in the unit shape that it scales (meshes and planes: in
   // metres).

@@ -37,7 +37,7 @@ class ViewBuilder {
                     const double rotation[9], const PixelGrid& grid);
   const View& view() const { return view_; }
   static std::size_t max_geoms(const mjModel* model) {
-    return static_cast<std::size_t>(model->ngeom + model->nflex);
+    return static_cast<std::size_t>(model->ngeom + model->nflex + model->nskin);
   }
 
  private:
@@ -46,12 +46,14 @@ class ViewBuilder {
     float key;
     int index;
   };
-  void place(const RayWorld& world, const SharedGeometry& shapes, int id, const double position[3],
-             const double rotation[9], ViewGeom& g);
+  void place(const RayGeom& source, const double position[3], const double rotation[9],
+             ViewGeom& g) const;
   void set_shape(const RayWorld& world, const SharedGeometry& shapes, const RayGeom& source,
                  ViewGeom& g);
+  const MeshLook* soft_look(int index, const MeshLook& shared, const float* normals);
   bool in_sight(ViewGeom& g) const;
-  void set_surface(const RayWorld& world, const Appearance& appearance, int id, ViewGeom& g) const;
+  void set_surface(const RayGeom& source, const float* rgba, const Material* material,
+                   ViewGeom& g) const;
   void set_mirror(const RayWorld& world, const SharedGeometry& shapes, const Appearance& appearance,
                   const double position[3], const double rotation[9]);
   void set_lights(const RayWorld& world, const Appearance& appearance, const double position[3],
@@ -62,7 +64,7 @@ class ViewBuilder {
   View view_;
   std::vector<ViewGeom> unsorted_, sorted_;
   std::vector<Order> order_;
-  std::vector<MeshLook> flexes_;           // with the world's normals
+  std::vector<MeshLook> soft_looks_;       // of flexes, then skins, with the world's normals
   std::unique_ptr<ViewBuilder> mirrored_;  // null: nothing can reflect
   int left_out_ = -1;                      // geom that this view does not show: the mirror itself
   bool own_headlight_ = true;              // else headlight_: where the mirrored camera looks

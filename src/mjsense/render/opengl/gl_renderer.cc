@@ -11,6 +11,7 @@
 #include "mjsense/core/error.h"
 #include "mjsense/rays/flex_shapes.h"
 #include "mjsense/rays/ray_world.h"
+#include "mjsense/rays/skin_shapes.h"
 #include "mjsense/render/opengl/visual_fields.h"
 
 namespace mjsense {
@@ -195,6 +196,7 @@ class MujocoGl final : public GlRenderer {
     for (int f = 0; f < model_->nflex; ++f)
       std::ranges::copy(world.flexes()->vertices(f),
                         data_->flexvert_xpos + 3 * model_->flex_vertadr[f]);
+    for (int i = 0; i < model_->nskin; ++i) pose_bones(i, world.skins()->bones(i));
     for (std::size_t i = 0; i < world.lights().size(); ++i) {
       std::copy_n(world.lights()[i].pos, 3, data_->light_xpos + 3 * i);
       std::copy_n(world.lights()[i].dir, 3, data_->light_xdir + 3 * i);
@@ -202,6 +204,14 @@ class MujocoGl final : public GlRenderer {
     for (std::size_t i = 0; i < world.cameras().size(); ++i) {
       std::copy_n(world.cameras()[i].pos, 3, data_->cam_xpos + 3 * i);
       std::copy_n(world.cameras()[i].mat, 9, data_->cam_xmat + 9 * i);
+    }
+  }
+
+  void pose_bones(int skin, std::span<const double> bones) {
+    for (int b = 0; b < model_->skin_bonenum[skin]; ++b) {
+      const int body = model_->skin_bonebodyid[model_->skin_boneadr[skin] + b];
+      std::copy_n(&bones[7 * b], 3, data_->xpos + 3 * body);
+      std::copy_n(&bones[7 * b + 3], 4, data_->xquat + 4 * body);
     }
   }
 

@@ -169,5 +169,98 @@ TEST(CameraFlex, ClothCastsAndReceivesShadows) {
   EXPECT_NEAR(red(0.19, 0.3, 1.99), red(0.19, -0.3, 1.99), 3);  // no shadow of its own
 }
 
+// A square metre of skin that one body carries.
+constexpr char kSkin[] = R"(<mujoco><worldbody>
+  <camera name="eye" pos="0 0 3" fovy="40"/>
+  <body name="bone" pos="0 0 1"><joint type="slide" axis="0 0 1"/><geom size=".01" group="4"/></body></worldbody>
+  <deformable><skin name="patch" rgba=".2 .9 .1 1" group="%" inflate=".01" vertex="-.5 -.5 0 .5 -.5 0 .5 .5 0 -.5 .5 0" face="0 1 2 0 2 3">
+    <bone body="bone" bindpos="0 0 0" bindquat="1 0 0 0" vertid="0 1 2 3" vertweight="1 1 1 1"/></skin></deformable></mujoco>)";
+
+std::string skin_in_group(char group) {
+  std::string xml = kSkin;
+  xml[xml.find('%')] = group;
+  return xml;
+}
+
+TEST(CameraSkin, FollowsItsBonesInEachWorld) {
+  const TestModel m(skin_in_group('0'));
+  Studio studio(m, camera(16, 16), 2);
+  const int middle = pixel(8, 8, 16);
+  studio.shoot(m.world(0));
+  m.data->qpos[0] = 0.5;
+  mj_forward(m.model, m.data);
+  studio.shoot(m.world(1));
+  for (int w : {0, 1}) {
+    EXPECT_NEAR(studio.image<float>("depth", w)[middle], w ? 1.49 : 1.99, 1e-6);
+    EXPECT_EQ(studio.image<std::int32_t>("segmentation", w)[2 * middle], 0);
+    EXPECT_EQ(studio.image<std::int32_t>("segmentation", w)[2 * middle + 1], mjOBJ_SKIN);
+    EXPECT_NEAR(studio.image<float>("normals", w)[3 * middle + 2], 1, 1e-6);
+    EXPECT_GT(studio.image<std::uint8_t>("rgb", w)[3 * middle + 1],
+              studio.image<std::uint8_t>("rgb", w)[3 * middle] + 60);
+  }
+}
+
+TEST(CameraSkin, IsOneSidedAndObeysItsGroup) {
+  {
+    const TestModel m(skin_in_group('4'));
+    Studio studio(m, camera(8, 8));
+    studio.shoot(m.world());
+    EXPECT_EQ(studio.image<std::int32_t>("segmentation")[2 * pixel(4, 4, 8)], -1);
+  }
+  const TestModel m(skin_in_group('0'));
+  m.data->qpos[0] = 4;  // over the camera
+  mj_forward(m.model, m.data);
+  Studio studio(m, camera(8, 8));
+  studio.shoot(m.world());
+  EXPECT_EQ(studio.image<std::int32_t>("segmentation")[2 * pixel(4, 4, 8)], -1);
+}
+
+// The scene of the pictures: images depend on nothing but their world.
+constexpr char kSoft[] = R"(<mujoco><worldbody>
+  <light pos="1 -1 3" dir="-.3 .3 -1" castshadow="true" cutoff="60"/><geom type="plane" size="5 5 .1"/>
+  <camera name="eye" pos="0 -2 1.5" xyaxes="1 0 0 0 .6 .8"/>
+  <flexcomp name="cloth" type="grid" dim="2" count="7 7 1" spacing=".1 .1 .1" pos="-.4 0 .5" radius=".01" mass=".1"><edge equality="true"/></flexcomp>
+  <flexcomp name="rope" type="grid" dim="1" count="7 1 1" spacing=".1 .1 .1" pos=".4 0 .5" radius=".02" mass=".1"><edge equality="true"/><pin id="0"/></flexcomp>
+  <body name="bone" pos="0 -.6 .4"><joint type="ball"/><geom size=".05" pos=".1 0 0" group="4"/></body></worldbody>
+  <deformable><skin name="patch" rgba=".2 .9 .1 1" vertex="-.2 -.2 0 .2 -.2 0 .2 .2 .1 -.2 .2 0" face="0 1 2 0 2 3">
+    <bone body="bone" bindpos="0 0 0" bindquat="1 0 0 0" vertid="0 1 2 3" vertweight="1 1 1 1"/></skin></deformable></mujoco>)";
+
+// Bytes of every image of every step, by world; world `first + w` starts with its own velocities.
+std::vector<std::string> play(int first, int worlds, int threads) {
+  SceneCfg cfg;
+  EntityCfg entity;
+  entity.model.xml = kSoft;
+  cfg.entities.emplace_back("w", entity);
+  auto eye = std::make_shared<CameraSensorCfg>(camera(48, 36));
+  eye->camera_name = "w/eye";
+  eye->use_shadows = true;
+  cfg.sensors.push_back(eye);
+  auto scene = std::make_shared<Scene>(std::move(cfg));
+  Simulation sim(scene, {.num_worlds = worlds, .decimation = 5, .threads = threads});
+  const ArrayView qvel = sim.worlds().state_component("qvel");
+  for (int row = 0; row < worlds; ++row) {
+    auto* v = reinterpret_cast<double*>(qvel.data + row * qvel.strides[0]);
+    for (int i = 0; i < sim.model()->nv; ++i) v[i] = 0.5 * std::sin(1.7 * i + first + row);
+  }
+  sim.forward();
+  std::vector<std::string> bytes(worlds);
+  Sensor& sensor = scene->sensor("cam");
+  for (int k = 0; k < 4; ++k) {
+    sim.step();
+    sim.refresh(sensor);
+    for (const Field& f : sensor.fields())
+      for (int row = 0; row < worlds; ++row)
+        bytes[row].append(reinterpret_cast<const char*>(f.data.row_data(row)), f.data.row_bytes());
+  }
+  return bytes;
+}
+
+TEST(CameraSoft, ImagesAreBitEqualAtAnyThreadCountAndAmongAnyNumberOfWorlds) {
+  const std::vector<std::string> reference = play(0, 5, 1);
+  EXPECT_NE(reference[0], reference[1]);
+  EXPECT_EQ(play(0, 5, 3), reference);
+  EXPECT_EQ(play(3, 1, 2)[0], reference[3]);
+}
+
 }  // namespace
 }  // namespace mjsense

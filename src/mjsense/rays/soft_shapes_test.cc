@@ -1,0 +1,140 @@
+// Flexes and skins against MuJoCo's own visualiser, for vertices and bones anywhere.
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+
+#include "mjsense/core/testing/allocations.h"
+#include "mjsense/rays/flex_shapes.h"
+#include "mjsense/rays/shared_geometry.h"
+#include "mjsense/rays/skin_shapes.h"
+#include "mjsense/rays/testing/scene.h"
+
+namespace mjsense {
+namespace {
+
+using testing::TestModel;
+
+// What MuJoCo would draw.
+struct Drawn {
+  mjvScene scene;
+  mjvOption option;
+
+  explicit Drawn(const TestModel& m) {
+    mjv_defaultScene(&scene);
+    mjv_defaultOption(&option);
+    mjv_makeScene(m.model, &scene, 100);
+    mjvCamera camera;
+    mjv_defaultCamera(&camera);
+    mjv_updateScene(m.model, m.data, &option, nullptr, &camera, mjCAT_ALL, &scene);
+  }
+  ~Drawn() { mjv_freeScene(&scene); }
+  Drawn(const Drawn&) = delete;
+  Drawn& operator=(const Drawn&) = delete;
+};
+
+// Box [6] around points [count, 3], relative to `origin`.
+void expect_box(const float* box, const float* points, int count, const double* origin) {
+  for (int k = 0; k < 3; ++k) {
+    double low = 1e30, high = -1e30;
+    for (int i = 0; i < count; ++i) {
+      low = std::min<double>(low, points[3 * i + k] - origin[k]);
+      high = std::max<double>(high, points[3 * i + k] - origin[k]);
+    }
+    EXPECT_NEAR(box[k] - box[3 + k], low, 1e-6);
+    EXPECT_NEAR(box[k] + box[3 + k], high, 1e-6);
+  }
+}
+
+constexpr char kFlexes[] = R"(<mujoco><worldbody>
+  <flexcomp name="cloth" type="grid" dim="2" count="6 5 1" spacing=".1 .1 .1" radius=".02"/>
+  <flexcomp name="flat" type="grid" dim="2" count="3 3 1" spacing=".1 .1 .1" radius=".01" flatskin="true"/>
+  <flexcomp name="jelly" type="grid" dim="3" count="4 3 3" spacing=".1 .1 .1" radius=".01"/>
+  <camera/></worldbody></mujoco>)";
+
+TEST(FlexShapes, FacesAndNormalsAreMuJoCos) {
+  const TestModel m(kFlexes);
+  const SharedGeometry shared(m.model);
+  FlexShapes shapes(shared.device.get(), shared.flexes, m.model);
+  Rng rng(3, 0, 0, 0);
+  for (int round = 0; round < 3; ++round) {
+    for (int i = 0; i < 3 * m.model->nflexvert; ++i)
+      m.data->flexvert_xpos[i] += rng.uniform(-0.02, 0.02);
+    shapes.update(m.model, m.data);
+    const Drawn drawn(m);
+    for (int f = 0; f < m.model->nflex; ++f) {
+      const int faces = drawn.scene.flexfaceused[f];
+      const int first = 9 * drawn.scene.flexfaceadr[f];
+      ASSERT_EQ(shared.flexes[f].num_faces(), faces);
+      expect_box(shapes.box(f), drawn.scene.flexface + first, 3 * faces, shapes.position(f));
+      const float* normals = shapes.normals(f);
+      const int sheets = 9 * shared.flexes[f].num_sheet_faces;  // MuJoCo's border is a bit skewed
+      for (int i = 0; i < sheets; ++i)
+        ASSERT_NEAR(normals[i], drawn.scene.flexnormal[first + i], 1e-6) << f << ' ' << i;
+      for (int i = sheets; i < 9 * faces; i += 3) {
+        double cosine = 0;
+        for (int k = 0; k < 3; ++k)
+          cosine += normals[i + k] * drawn.scene.flexnormal[first + i + k];
+        EXPECT_GT(cosine, 0.8);
+      }
+    }
+  }
+}
+
+// A strip of 12 vertices along x that two bones share, the second bound at an angle.
+constexpr char kSkin[] = R"(<mujoco><worldbody>
+  <body name="a" pos=".1 .2 .3" euler="10 20 30"><joint type="ball"/><geom size=".01"/>
+    <body name="b" pos=".3 0 0" euler="0 0 20"><joint type="ball"/><geom size=".01"/></body></body>
+  <camera/></worldbody>
+  <deformable><skin name="strip" inflate=".015" group="1"
+    vertex="0 -.1 0 0 .1 0  .1 -.1 .02 .1 .1 0  .2 -.1 0 .2 .1 .03  .3 -.1 0 .3 .1 0  .4 -.1 .1 .4 .1 0  .5 -.1 0 .5 .1 0"
+    face="0 2 1 1 2 3  2 4 3 3 4 5  4 6 5 5 6 7  6 8 7 7 8 9  8 10 9 9 10 11">
+    <bone body="a" bindpos="0 0 0" bindquat="1 0 0 0" vertid="0 1 2 3 4 5 6 7" vertweight="1 1 1 1 .7 .7 .3 .3"/>
+    <bone body="b" bindpos=".3 0 0" bindquat=".9 .1 .3 .2" vertid="4 5 6 7 8 9 10 11" vertweight=".3 .3 .7 .7 1 1 1 1"/>
+  </skin></deformable></mujoco>)";
+
+TEST(SkinShapes, VerticesAndNormalsAreMuJoCos) {
+  const TestModel m(kSkin);
+  const SharedGeometry shared(m.model);
+  SkinShapes shapes(shared.device.get(), m.model);
+  Rng rng(4, 0, 0, 0);
+  for (int round = 0; round < 3; ++round) {
+    for (int i = 0; i < m.model->nq; ++i) m.data->qpos[i] = rng.normal();
+    mj_forward(m.model, m.data);
+    shapes.update(m.model, m.data);
+    shapes.bend(~0u);
+    const Drawn drawn(m);
+    const RayGeom& g = shapes.geom(0);
+    const float box[6] = {g.center[0], g.center[1], g.center[2], g.half[0], g.half[1], g.half[2]};
+    expect_box(box, drawn.scene.skinvert, m.model->nskinvert, g.pos);
+    for (int i = 0; i < 3 * m.model->nskinface; ++i)
+      for (int k = 0; k < 3; ++k)
+        ASSERT_NEAR(shapes.normals(0)[3 * i + k],
+                    drawn.scene.skinnormal[3 * m.model->skin_face[i] + k], 2e-6);
+  }
+}
+
+TEST(SkinShapes, BendsOnlyWhatIsAskedForAndMoved) {
+  const TestModel m(kSkin);
+  const SharedGeometry shared(m.model);
+  SkinShapes shapes(shared.device.get(), m.model);
+  shapes.update(m.model, m.data);
+  shapes.bend(1u << 1);
+  const float before = shapes.normals(0)[0];
+  m.data->qpos[1] = 0.5;
+  mj_forward(m.model, m.data);
+  shapes.update(m.model, m.data);
+  shapes.bend(1u << 0);  // another group
+  EXPECT_EQ(shapes.normals(0)[0], before);
+  const AllocationCount count;
+  shapes.bend(1u << 1);
+  EXPECT_NE(shapes.normals(0)[0], before);
+  EXPECT_LE(count.since(), 1);  // Embree's
+  const AllocationCount at_rest;
+  shapes.update(m.model, m.data);
+  shapes.bend(~0u);
+  EXPECT_EQ(at_rest.since(), 0);
+}
+
+}  // namespace
+}  // namespace mjsense
