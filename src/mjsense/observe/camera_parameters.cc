@@ -2,11 +2,13 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <cmath>
 #include <numbers>
 
 #include "mjsense/core/error.h"
 #include "mjsense/observe/frame.h"
+#include "mjsense/render/camera_model.h"
 
 namespace mjsense {
 
@@ -21,6 +23,9 @@ CameraParameterSensor::CameraParameterSensor(std::string name, std::string camer
 
 void CameraParameterSensor::initialize(const SensorInit& init) {
   id_ = object_id(init.model, mjOBJ_CAMERA, fmt::format("sensor '{}'", name()), camera_);
+  if (init.model->cam_projection[id_] == mjPROJ_ORTHOGRAPHIC)
+    throw ValueError(fmt::format(
+        "sensor '{}': camera '{}' is orthographic: it has no pinhole matrix", name(), camera_));
   clear_fields();
   SensorSpec spec;
   spec.dtype = DType::kFloat64;
@@ -36,7 +41,7 @@ void CameraParameterSensor::initialize(const SensorInit& init) {
   spec.shape = {3, 3};
   spec.unit = "px";
   spec.frame = "pixels";
-  spec.description = "Pinhole matrix [[f, 0, W/2], [0, f, H/2], [0, 0, 1]].";
+  spec.description = "Pinhole matrix of the picture.";
   add_field("intrinsic_cv", spec, init.num_worlds);
 }
 
@@ -56,10 +61,15 @@ void CameraParameterSensor::compute(const World& world) {
     const double* axis = &extrinsic[4 * i];
     extrinsic[4 * i + 3] = -(axis[0] * p[0] + axis[1] * p[1] + axis[2] * p[2]);
   }
+  if (world.model->cam_sensorsize[2 * id_ + 1] > 0) {
+    const PixelGrid grid = grid_of_camera(world.model, id_, width_, height_);
+    std::ranges::copy(intrinsic_matrix(grid), intrinsic.begin());
+    return;
+  }
   const double fovy = world.model->cam_fovy[id_] * std::numbers::pi / 180.0;
   const double f = static_cast<float>(0.5 * height_ / std::tan(0.5 * fovy));
   const double k[9] = {f, 0, 0.5 * width_, 0, f, 0.5 * height_, 0, 0, 1};
-  std::copy(k, k + 9, intrinsic.begin());
+  std::ranges::copy(k, intrinsic.begin());
 }
 
 }  // namespace mjsense

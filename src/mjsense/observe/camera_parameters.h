@@ -14,7 +14,8 @@ namespace mjsense {
 //                               name its axes are OpenCV's (x right, y down, z forward).
 //   <name>/extrinsic_cv [3, 4]  top rows of its inverse: world to camera
 //   <name>/intrinsic_cv [3, 3]  [[f, 0, W/2], [0, f, H/2], [0, 0, 1]], pixels;
-//                               f = (H/2) / tan(fovy/2), rounded to float32
+//                               f = (H/2) / tan(fovy/2), rounded to float32. Of a camera with
+//                               sensorsize, focal and principal in its MJCF: fx, fy, cx, cy of these
 class CameraParameterSensor final : public Sensor {
  public:
   // `camera`: full MuJoCo name. width, height: pixels, of the recorded picture.

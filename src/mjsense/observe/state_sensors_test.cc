@@ -35,6 +35,9 @@ constexpr char kScene[] = R"(
     </body>
     <body name="thing/cube" pos="3 0 .05"><freejoint/><geom name="cube" type="box" size=".05 .05 .05" mass=".1"/></body>
     <camera name="camera" pos="0 0 1" xyaxes="0 -1 0 0 0 1" fovy="60"/>
+    <camera name="chip" pos="0 0 1" xyaxes="0 -1 0 0 0 1" resolution="640 480" sensorsize=".004 .003"
+            focal=".003 .0025" principal=".0002 -.0001"/>
+    <camera name="map" pos="0 0 1" projection="orthographic" fovy="2"/>
   </worldbody>
 </mujoco>)";
 
@@ -153,6 +156,20 @@ TEST(CameraParameters, ProjectKnownPoints) {
       project(2, -.5, 1 + 2 * std::tan(std::numbers::pi / 6));  // right, upper edge
   EXPECT_NEAR(u1, 320 + f / 4, 1e-4);
   EXPECT_NEAR(v1, 0, 1e-4);
+}
+
+TEST(CameraParameters, MatrixOfACameraWithASensor) {
+  TestWorld w(kScene);
+  CameraParameterSensor camera("sensor_param_chip", "chip", 640, 480);
+  w.compute(camera);
+  // 640 pixels on 4 mm; MuJoCo's principal point is that of the sensor in the lens's frame.
+  const auto K = values<double>(camera, "intrinsic_cv");
+  const double pixel = 640 / .004;
+  const std::vector<double> expected = {
+      .003 * pixel, 0, 320 - .0002 * pixel, 0, .0025 * pixel, 240 + .0001 * pixel, 0, 0, 1};
+  EXPECT_THAT(K, Pointwise(testing::DoubleNear(1e-3), expected));
+  CameraParameterSensor map("sensor_param_map", "map", 640, 480);
+  EXPECT_THROW(w.compute(map), ValueError);
 }
 
 TEST(GraspState, TouchingIsNotHolding) {

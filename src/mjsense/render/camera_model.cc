@@ -2,6 +2,7 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <cmath>
 #include <numbers>
 
@@ -57,6 +58,8 @@ bool undo_brown_conrady(Point target, std::span<const double> k, Point& out) {
   return std::hypot(target.x - f.x, target.y - f.y) < 1e-9;
 }
 
+constexpr double kWidest = 89.0 * std::numbers::pi / 180;  // of a fisheye, off its axis
+
 double fisheye(double theta, std::span<const double> k) {
   const double t2 = theta * theta;
   return theta * (1 + t2 * (k[0] + t2 * (k[1] + t2 * (k[2] + t2 * k[3]))));
@@ -64,13 +67,37 @@ double fisheye(double theta, std::span<const double> k) {
 
 // The angle that the lens puts at `r`; negative if there is none below 89 degrees.
 double undo_fisheye(double r, std::span<const double> k) {
-  double low = 0, high = 89.0 * std::numbers::pi / 180;
+  double low = 0, high = kWidest;
   if (fisheye(high, k) < r) return -1;
   for (int i = 0; i < 60; ++i) {
     const double middle = 0.5 * (low + high);
     (fisheye(middle, k) < r ? low : high) = middle;
   }
   return 0.5 * (low + high);
+}
+
+// Pixel (x, y) shows nothing that the lens could bring there.
+[[noreturn]] void throw_out_of_reach(const PixelGrid& grid, Lens lens, std::span<const double> k,
+                                     const char* place, int x, int y) {
+  if (lens == Lens::kBrownConrady)
+    throw ValueError(fmt::format(
+        "{}: the distortion has no inverse at pixel ({}, {}): with these coefficients the image "
+        "folds over before it; a longer focal length (fx {:.4g} now) or smaller coefficients",
+        place, x, y, 1 / grid.dx));
+  const double corner =
+      std::max(std::hypot(grid.left, grid.top),
+               std::hypot(grid.left + grid.dx * grid.width, grid.top + grid.dy * grid.height));
+  const double reach = fisheye(kWidest, k);
+  if (!(reach > 0))
+    throw ValueError(fmt::format(
+        "{}: the distortion has no inverse at pixel ({}, {}): these coefficients put 89 degrees at "
+        "radius {:.4g}",
+        place, x, y, reach));
+  throw ValueError(
+      fmt::format("{}: the distortion has no inverse at pixel ({}, {}): the lens would see more "
+                  "than 89 degrees "
+                  "off its axis there; a longer focal length (fx {:.4g} now, {:.4g} or more)",
+                  place, x, y, 1 / grid.dx, std::ceil(corner / (grid.dx * reach))));
 }
 
 }  // namespace
@@ -131,10 +158,7 @@ std::vector<float> bent_rays(const PixelGrid& grid, Lens lens, std::span<const d
         const double scale = r > 1e-12 ? std::tan(theta) / r : 1;
         straight = {seen.x * scale, seen.y * scale};
       }
-      if (!found)
-        throw ValueError(fmt::format(
-            "{}: the distortion has no inverse at pixel ({}, {}): the lens does not reach so far",
-            place, x, y));
+      if (!found) throw_out_of_reach(grid, lens, coefficients, place, x, y);
       float* out = rays.data() + 2 * (static_cast<std::size_t>(y) * grid.width + x);
       out[0] = static_cast<float>(straight.x);
       out[1] = static_cast<float>(-straight.y);

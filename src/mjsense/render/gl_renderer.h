@@ -5,6 +5,7 @@
 #include <mujoco/mujoco.h>
 
 #include <memory>
+#include <optional>
 #include <string>
 
 #include "mjsense/render/view.h"
@@ -20,6 +21,9 @@ struct GlRendererCfg {
   unsigned groups = 0x7;  // bit g: geoms of group g
   bool textures = true, shadows = true;
   int samples = 1;
+  // Instead of what the model says of the camera.
+  std::optional<double> fovy;  // degrees; orthographic: m
+  bool orthographic = false;
 };
 
 class GlRenderer {

@@ -182,6 +182,11 @@ class MujocoGl final : public GlRenderer {
   // The context has tables of its own for materials.
   void show(const VisualFields& world) {
     world.copy_to(model_);
+    if (cfg_.orthographic) model_->cam_projection[cfg_.camera] = mjPROJ_ORTHOGRAPHIC;
+    if (cfg_.fovy) {
+      model_->cam_fovy[cfg_.camera] = *cfg_.fovy;
+      std::fill_n(model_->cam_sensorsize + 2 * cfg_.camera, 2, 0.0f);
+    }
     const int count = std::min(static_cast<int>(model_->nmat), mjMAXMATERIAL);
     std::copy_n(model_->mat_texid, mjNTEXROLE * count, context_.mat_texid);
     std::copy_n(model_->mat_texuniform, count, context_.mat_texuniform);

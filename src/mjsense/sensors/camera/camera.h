@@ -37,9 +37,11 @@ struct CameraIntrinsics {
 
 // Where a lens puts the image of a direction. x = X/Z, y = Y/Z (OpenCV camera frame), r = |(x, y)|,
 // theta = atan r.
-//   brown_conrady: x' = x (1 + k1 r^2 + k2 r^4 + k3 r^6) + 2 p1 x y + p2 (r^2 + 2 x^2), y' alike;
-//   coefficients k1 k2 p1 p2 k3 fisheye:       r' = theta (1 + k1 theta^2 + k2 theta^4 + k3 theta^6
-//   + k4 theta^8);         coefficients k1 k2 k3 k4
+//   brown_conrady, coefficients k1 k2 p1 p2 k3:
+//     x' = x (1 + k1 r^2 + k2 r^4 + k3 r^6) + 2 p1 x y + p2 (r^2 + 2 x^2)
+//     y' = y (1 + k1 r^2 + k2 r^4 + k3 r^6) + p1 (r^2 + 2 y^2) + 2 p2 x y
+//   fisheye, coefficients k1 k2 k3 k4:
+//     r' = theta (1 + k1 theta^2 + k2 theta^4 + k3 theta^6 + k4 theta^8)
 struct LensDistortion {
   std::string model = "none";  // none brown_conrady fisheye
   std::vector<double> coefficients;
@@ -61,28 +63,28 @@ struct CameraSensorCfg : SensorCfg {
   std::string parent_body;  // of a new camera, full name; empty: the world
   std::array<double, 3> pos{0, 0, 1};  // m, in the parent body
   std::array<double, 4> quat{1, 0, 0, 0};
-  std::optional<double> fovy;     // degrees (orthographic: image height in m); new cameras: 45
-  int width = 160, height = 120;  // pixels; the model's own resolution is not used
+  // Degrees (orthographic: height of the image, m). Not given: the camera's own, 45 for a new one.
+  // Of a wrapped camera it is this sensor's alone, as is `orthographic`: others that look through
+  // it, and the model, keep theirs.
+  std::optional<double> fovy;
+  int width = 160, height = 120;               // pixels; the model's own resolution is not used
   std::vector<std::string> data_types{"rgb"};  // rgb depth segmentation normals point_cloud
   bool use_textures = true;
   bool use_shadows = false;
   std::vector<int> enabled_geom_groups{0, 1, 2};
-  bool orthographic = false;  // true: also overrides a wrapped camera
-  bool clone_data =
-      false;  // accepted for mjlab's sake; rows are overwritten by the next image either way
+  bool orthographic = false;
+  bool clone_data = false;  // Python only: a copy at every read
 
   // Beyond mjlab's.
   double near = 0, far = 0;  // m, planar; what is nearer or farther is not seen; far 0: no limit
-  double update_period = 0,
-         phase =
-             0;     // s; an image is taken at the first control step at or after phase + k * period
-  int samples = 1;  // per pixel of rgb, for anti-aliased edges: 1 4 8 16
+  // s. An image is taken at the first control step at or after phase + k * update_period.
+  double update_period = 0, phase = 0;
+  int samples = 1;                    // per pixel of rgb, for anti-aliased edges, 1 to 64
   std::string depth_kind = "planar";  // planar ray
   std::optional<CameraIntrinsics> intrinsics;
   LensDistortion distortion;
-  std::string depth_noise =
-      "none";  // none d405 d435: of a stereo camera, on the field depth only (depth_noise.h)
-  std::string renderer = "rays";  // rays opengl (MuJoCo's own renderer, where it was built in)
+  std::string depth_noise = "none";  // none d405 d435: on the field depth only (depth_noise.h)
+  std::string renderer = "rays";     // rays opengl (MuJoCo's own renderer, where it was built in)
   bool debug_vis = false;
   CameraVizCfg viz;
 

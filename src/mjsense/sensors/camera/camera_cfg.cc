@@ -20,7 +20,31 @@ void check_choice(const std::string& place, std::string_view field, const std::s
                                fmt::join(choices, ", ")));
 }
 
+// s; more would be a mistake, and physics steps are counted in whole numbers.
+constexpr double kLongest = 1e6;
+
+template <class Fail>
+void check_pose(const CameraSensorCfg& cfg, Fail&& fail) {
+  const CameraSensorCfg made;
+  if (!cfg.camera_name.empty() && (cfg.pos != made.pos || cfg.quat != made.quat))
+    fail(
+        fmt::format("camera_name '{}' wraps an existing camera, which stays where it is: leave pos "
+                    "and quat alone",
+                    cfg.camera_name));
+  double length = 0;
+  for (double x : cfg.quat) length += x * x;
+  if (!std::isfinite(cfg.pos[0] + cfg.pos[1] + cfg.pos[2]) || !std::isfinite(length) ||
+      length < 1e-12)
+    fail(fmt::format("pos {} and quat {}: must be finite, quat not 0", cfg.pos, cfg.quat));
+}
+
 }  // namespace
+
+void check_fovy(double degrees, std::string_view place) {
+  if (degrees < 180) return;
+  throw ValueError(fmt::format("{}: fovy is {} degrees: a perspective camera sees less than 180",
+                               place, degrees));
+}
 
 void validate(const CameraSensorCfg& cfg) {
   const std::string place = fmt::format("camera '{}'", cfg.name);
@@ -39,19 +63,30 @@ void validate(const CameraSensorCfg& cfg) {
   }
   if (cfg.width < 1 || cfg.height < 1 || cfg.width > 16384 || cfg.height > 16384)
     fail(fmt::format("width x height is {} x {}: each must be 1..16384", cfg.width, cfg.height));
+  if (cfg.enabled_geom_groups.empty())
+    fail("enabled_geom_groups is empty: nothing would be seen; choose from 0..5");
   for (int g : cfg.enabled_geom_groups)
     if (g < 0 || g >= mjNGROUP)
       fail(fmt::format("geom group {}: groups are 0..{}", g, mjNGROUP - 1));
+  check_pose(cfg, fail);
   if (cfg.fovy) {
-    if (!(*cfg.fovy > 0)) fail(fmt::format("fovy is {}: must be positive", *cfg.fovy));
-    if (!cfg.orthographic && cfg.camera_name.empty() && *cfg.fovy >= 180)
-      fail(fmt::format("fovy is {} degrees: a perspective camera sees less than 180", *cfg.fovy));
+    if (!(*cfg.fovy > 0) || !std::isfinite(*cfg.fovy))
+      fail(fmt::format("fovy is {}: must be positive", *cfg.fovy));
+    if (!cfg.orthographic && cfg.camera_name.empty()) check_fovy(*cfg.fovy, place);
+    if (cfg.intrinsics)
+      fail("both fovy and intrinsics are given: intrinsics say all that fovy does");
   }
-  if (!(cfg.near >= 0) || !(cfg.far >= 0) || (cfg.far > 0 && cfg.far <= cfg.near))
+  if (!(cfg.near >= 0) || !std::isfinite(cfg.near) || !(cfg.far >= 0) ||
+      (cfg.far > 0 && cfg.far <= cfg.near))
     fail(fmt::format("near {} and far {}: need 0 <= near < far, or far 0 for no limit", cfg.near,
                      cfg.far));
-  if (!(cfg.update_period >= 0) || !(cfg.phase >= 0))
-    fail("update_period and phase must not be negative");
+  if (!(cfg.update_period >= 0) || !(cfg.phase >= 0) || cfg.update_period > kLongest ||
+      cfg.phase > kLongest)
+    fail(fmt::format("update_period {} s and phase {} s: each must be 0 to {:g} s",
+                     cfg.update_period, cfg.phase, kLongest));
+  if (cfg.phase > 0 && cfg.update_period == 0)
+    fail(fmt::format("phase {} s without an update_period: every reading is a new image",
+                     cfg.phase));
   if (cfg.samples < 1 || cfg.samples > 64)
     fail(fmt::format("samples is {}: must be 1..64", cfg.samples));
   check_choice(place, "depth_kind", cfg.depth_kind, std::array<std::string, 2>{"planar", "ray"});
@@ -79,8 +114,18 @@ void validate(const CameraSensorCfg& cfg) {
   if (cfg.distortion.coefficients.size() != needed)
     fail(fmt::format("distortion '{}' takes {} coefficients, got {}", cfg.distortion.model, needed,
                      cfg.distortion.coefficients.size()));
-  if (cfg.intrinsics && (!(cfg.intrinsics->fx > 0) || !(cfg.intrinsics->fy > 0)))
-    fail("intrinsics: fx and fy must be positive");
+  for (double k : cfg.distortion.coefficients)
+    if (!std::isfinite(k))
+      fail(fmt::format("distortion has the coefficient {}: must be finite", k));
+  if (cfg.intrinsics) {
+    const CameraIntrinsics& k = *cfg.intrinsics;
+    const bool finite = std::isfinite(k.fx + k.fy + k.cx + k.cy);
+    if (!finite || k.fx <= 0 || k.fy <= 0)
+      fail(
+          fmt::format("intrinsics fx {} fy {} cx {} cy {} (pixels): all must be finite, fx and fy "
+                      "positive",
+                      k.fx, k.fy, k.cx, k.cy));
+  }
   if (cfg.orthographic && (cfg.intrinsics || needed > 0))
     fail("an orthographic camera has no intrinsics and no lens distortion");
   if (!cfg.camera_name.empty() && !cfg.parent_body.empty())
@@ -110,10 +155,7 @@ void CameraSensor::edit_spec(mjSpec* spec) {
   if (!cfg_.camera_name.empty()) {
     mjsElement* element = mjs_findElement(spec, mjOBJ_CAMERA, cfg_.camera_name.c_str());
     if (!element) throw_unknown(place, "camera", cfg_.camera_name, names_of(spec, mjOBJ_CAMERA));
-    mjsCamera* camera = mjs_asCamera(element);
-    if (cfg_.fovy) camera->fovy = *cfg_.fovy;
-    if (cfg_.orthographic) camera->proj = mjPROJ_ORTHOGRAPHIC;
-    return;
+    return;  // what this sensor changes about it, others do not see
   }
   mjsBody* body = mjs_findBody(spec, cfg_.parent_body.empty() ? "world" : cfg_.parent_body.c_str());
   if (!body) throw_unknown(place, "body", cfg_.parent_body, names_of(spec, mjOBJ_BODY));

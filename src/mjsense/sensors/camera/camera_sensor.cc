@@ -73,14 +73,9 @@ void CameraSensor::initialize(const SensorInit& init) {
   worlds_.assign(init.num_worlds, PerWorld{{}, Appearance(model_)});
   due_.reserve(init.num_worlds);
 
-  PixelGrid grid = grid_of_camera(model_, camera_, cfg_.width, cfg_.height);
-  if (cfg_.intrinsics) {
-    const CameraIntrinsics& k = *cfg_.intrinsics;
-    grid = grid_from_intrinsics(cfg_.width, cfg_.height, k.fx, k.fy, k.cx, k.cy);
-  }
+  PixelGrid grid = grid_in(model_);
+  check_grid(grid);
   if (cfg_.distortion.model != "none") {
-    if (grid.orthographic)
-      throw ValueError(fmt::format("{}: an orthographic camera has no lens distortion", place));
     const Lens lens = cfg_.distortion.model == "fisheye" ? Lens::kFisheye : Lens::kBrownConrady;
     bent_ = bent_rays(grid, lens, cfg_.distortion.coefficients, place.c_str());
     grid.bent = bent_.data();
@@ -93,10 +88,13 @@ void CameraSensor::initialize(const SensorInit& init) {
                   std::vector<float>(static_cast<std::size_t>(cfg_.width) * cfg_.height));
   gl_.reset();
   if (cfg_.renderer == "opengl") {
-    gl_ = make_gl_renderer(model_,
-                           {init.num_worlds, camera_, cfg_.width, cfg_.height, groups_,
-                            cfg_.use_textures, cfg_.use_shadows, cfg_.samples},
-                           place);
+    GlRendererCfg gl{init.num_worlds, camera_,           cfg_.width,       cfg_.height,
+                     groups_,         cfg_.use_textures, cfg_.use_shadows, cfg_.samples};
+    if (!cfg_.camera_name.empty()) {
+      gl.fovy = cfg_.fovy;
+      gl.orthographic = cfg_.orthographic;
+    }
+    gl_ = make_gl_renderer(model_, gl, place);
     return;
   }
   // Everything that cast() needs, but for the ray scene's shapes.
@@ -118,6 +116,32 @@ void CameraSensor::initialize(const SensorInit& init) {
     scratch.casters = scratch.transparent + geoms;
     scratch.hits = workspace_->hits.back().data();
   }
+}
+
+// As the world of `model` has the camera, but for what the configuration says about one that others
+// may look through too.
+PixelGrid CameraSensor::grid_in(const mjModel* model) const {
+  const int w = cfg_.width, h = cfg_.height;
+  if (cfg_.intrinsics) {
+    const CameraIntrinsics& k = *cfg_.intrinsics;
+    return grid_from_intrinsics(w, h, k.fx, k.fy, k.cx, k.cy);
+  }
+  const bool wrapped = !cfg_.camera_name.empty();
+  if (!wrapped || (!cfg_.fovy && !cfg_.orthographic)) return grid_of_camera(model, camera_, w, h);
+  const bool orthographic =
+      cfg_.orthographic || model->cam_projection[camera_] == mjPROJ_ORTHOGRAPHIC;
+  return grid_from_fovy(w, h, cfg_.fovy.value_or(model->cam_fovy[camera_]), orthographic);
+}
+
+// What validate() cannot know of a camera of the model.
+void CameraSensor::check_grid(const PixelGrid& grid) const {
+  const std::string place = fmt::format("camera '{}'", name());
+  const bool orthographic = model_->cam_projection[camera_] == mjPROJ_ORTHOGRAPHIC;
+  if (cfg_.fovy && !grid.orthographic) check_fovy(*cfg_.fovy, place);
+  if (orthographic && (cfg_.intrinsics || cfg_.distortion.model != "none"))
+    throw ValueError(place + ": an orthographic camera has no intrinsics and no lens distortion");
+  if (orthographic && cfg_.depth_noise != "none")
+    throw ValueError(place + ": depth_noise is for planar depth of a perspective camera");
 }
 
 void CameraSensor::declare_fields(int num_worlds) {
@@ -168,11 +192,9 @@ void CameraSensor::declare_fields(int num_worlds) {
 // Image n is due from phase + n * period on; before that, and at a reset, the first one.
 bool CameraSensor::is_due(const World& world, std::int64_t& image) const {
   if (cfg_.update_period <= 0) return true;
-  const std::int64_t period =
-      std::max<std::int64_t>(1, std::llround(cfg_.update_period / world.dt()));
-  const std::int64_t phase = std::llround(cfg_.phase / world.dt()) % period;
-  const std::int64_t now = world.substep - phase;
-  const std::int64_t n = now >= 0 ? now / period : -1;
+  // Rounding makes no image late that is due exactly now.
+  const double passed = (world.time() - cfg_.phase) / cfg_.update_period + 1e-6;
+  const auto n = std::max<std::int64_t>(-1, static_cast<std::int64_t>(std::floor(passed)));
   const bool due = world.first || n != image;
   image = n;
   return due;
@@ -183,8 +205,7 @@ void CameraSensor::compute(const World& world) {
   w.due = is_due(world, w.image);
   if (!w.due) return;
   const mjModel* m = world.model;
-  if (!cfg_.intrinsics && !w.grid.bent)
-    w.grid = grid_of_camera(m, camera_, cfg_.width, cfg_.height);
+  if (!w.grid.bent) w.grid = grid_in(m);
   if (gl_) {
     gl_->remember(world.id, m);
   } else {

@@ -15,6 +15,8 @@ namespace mjsense {
 
 // Throws ValueError for anything that can be wrong before there is a model.
 void validate(const CameraSensorCfg& cfg);
+// Throws ValueError from 180 degrees on.
+void check_fovy(double degrees, std::string_view place);
 
 class CameraSensor final : public Sensor {
  public:
@@ -49,6 +51,8 @@ class CameraSensor final : public Sensor {
   void declare_fields(int num_worlds);
   void render_due(const CastContext& context);
   void add_noise(const CastContext& context);
+  PixelGrid grid_in(const mjModel* model) const;
+  void check_grid(const PixelGrid& grid) const;
   bool is_due(const World& world, std::int64_t& image) const;
   ImageTargets targets(int world);
   const View& build_view(const RayScene& rays, int world, ViewBuilder& builder) const;

@@ -2,6 +2,7 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <limits>
 #include <memory>
 
 #include "mjsense/core/error.h"
@@ -317,6 +318,104 @@ TEST(Camera, StereoNoiseGrowsWithTheSquareOfDepth) {
   EXPECT_NEAR(spread[1] / spread[0], 4, 0.2);
 }
 
+// The depth image of a floor whose normal is `tilt_deg` off the axis of a camera 1 m away.
+std::vector<float> depth_of_tilted_floor(double tilt_deg, int size, const std::string& noise) {
+  CameraSensorCfg cfg = camera(size, size, {"depth"});
+  const double half = tilt_deg * M_PI / 360;
+  cfg.pos = {0, -std::sin(2 * half), std::cos(2 * half)};
+  cfg.quat = {std::cos(half), std::sin(half), 0, 0};
+  cfg.fovy = 2;
+  cfg.depth_noise = noise;
+  Lab lab(R"(<worldbody><geom type="plane" size="90 90 1"/></worldbody>)", {cfg});
+  return lab.read<float>("depth");
+}
+
+TEST(Camera, StereoLosesSurfacesSeenEdgeOnAtAnyResolution) {
+  for (int size : {20, 100}) {
+    const auto lost = [&](double tilt) {
+      const auto depth = depth_of_tilted_floor(tilt, size, "d435");
+      return static_cast<double>(std::count(depth.begin(), depth.end(), 0.0f)) / depth.size();
+    };
+    EXPECT_EQ(lost(0), 0);
+    EXPECT_EQ(lost(70), 0);
+    EXPECT_NEAR(lost(83), 0.7, 0.1);
+  }
+}
+
+TEST(Camera, StereoMeasuresNothingOutOfItsRange) {
+  CameraSensorCfg cfg = camera(32, 32, {"depth"});
+  cfg.fovy = 60;
+  cfg.depth_noise = "d405";  // 0.07 to 2 m
+  const auto depth_at = [&](double z) {
+    cfg.pos = {0, 0, z};
+    Lab lab(R"(<worldbody><geom type="plane" size="9 9 1"/></worldbody>)", {cfg});
+    return lab.read<float>("depth");
+  };
+  EXPECT_THAT(depth_at(0.06), testing::Each(0.0f));
+  EXPECT_THAT(depth_at(2.3), testing::Each(0.0f));
+  EXPECT_THAT(depth_at(1.0), testing::Each(testing::Gt(0.0f)));
+  // Near the end of the range noise decides.
+  const auto border = depth_at(2.0);
+  EXPECT_THAT(border, testing::Each(testing::Le(2.0f)));
+  EXPECT_NEAR(std::count(border.begin(), border.end(), 0.0f), 512, 120);
+}
+
+TEST(Camera, StereoLosesHalfOfThePixelsAtEdges) {
+  CameraSensorCfg cfg = camera(200, 200, {"depth", "segmentation"});
+  cfg.pos = {0, 0, 3};
+  cfg.depth_noise = "d435";
+  Lab lab(R"(<worldbody><geom type="plane" size="9 9 1"/>
+             <geom type="box" size=".5 .5 .5" pos="0 0 .5"/></worldbody>)",
+          {cfg});
+  const auto depth = lab.read<float>("depth");
+  const auto ids = lab.read<std::int32_t>("segmentation");
+  int edges = 0, lost = 0, lost_elsewhere = 0;
+  for (int y = 1; y < 199; ++y)
+    for (int x = 1; x < 199; ++x) {
+      const int i = 200 * y + x;
+      bool edge = false;
+      for (int j : {i - 1, i + 1, i - 200, i + 200}) edge |= ids[2 * j] != ids[2 * i];
+      edges += edge;
+      (edge ? lost : lost_elsewhere) += depth[i] == 0;
+    }
+  EXPECT_GT(edges, 400);
+  EXPECT_NEAR(lost, 0.5 * edges, 2 * std::sqrt(edges));
+  EXPECT_EQ(lost_elsewhere, 0);
+}
+
+TEST(Camera, OwnRateNeedNotDivideIntoSteps) {
+  CameraSensorCfg cfg = camera(9, 9, {"depth"});
+  cfg.pos = {0, 0, 10};
+  cfg.update_period = 1.0 / 30;  // 16.67 steps of 2 ms
+  cfg.phase = 0.01;
+  Lab lab(R"(<worldbody><body><freejoint/><geom size=".2"/></body></worldbody>)", {cfg});
+  std::vector<int> taken;
+  float last = lab.read<float>("depth")[40];
+  for (int step = 1; step <= 500; ++step) {  // 1 s
+    lab.sim->step();
+    const float now = lab.read<float>("depth")[40];
+    if (now != last) taken.push_back(step);
+    last = now;
+  }
+  ASSERT_EQ(taken.size(), 30u);
+  for (int k = 0; k < 30; ++k)
+    EXPECT_EQ(taken[k], std::ceil((0.01 + k / 30.0) / 0.002 - 1e-6)) << k;
+}
+
+TEST(Camera, OwnFieldOfViewIsNoOtherSensors) {
+  CameraSensorCfg plain = camera(8, 6, {"depth"}, "w/phys"), wide = plain, map = plain;
+  wide.name = "wide";
+  wide.fovy = 90;
+  map.name = "map";
+  map.fovy = 3;
+  map.orthographic = true;
+  Lab lab(kCases, {wide, plain, map});
+  // Pixels per unit of X/Z: from the sensor 6 / .006 * .006, from 90 degrees 3, 6 pixels on 3 m.
+  EXPECT_NEAR(lab.read<float>("intrinsics", "cam")[4], 6, 1e-4);
+  EXPECT_NEAR(lab.read<float>("intrinsics", "wide")[4], 3, 1e-4);
+  EXPECT_NEAR(lab.read<float>("intrinsics", "map")[4], 2, 1e-4);
+}
+
 TEST(Camera, FaultsAreNamed) {
   const auto message = [](auto&& make) -> std::string {
     try {
@@ -341,6 +440,35 @@ TEST(Camera, FaultsAreNamed) {
   EXPECT_THAT(message([&] { Lab(kCases, {cfg}); }), HasSubstr("no body named 'w/none'"));
   cfg = camera(0, 3, {"rgb"});
   EXPECT_THAT(message([&] { cfg.build(); }), HasSubstr("0 x 3"));
+  const auto with = [&](auto change, std::string wrapped = "") {
+    CameraSensorCfg c = camera(4, 3, {"rgb", "depth"}, std::move(wrapped));
+    change(c);
+    return message([&] { Lab(kCases, {c}); });
+  };
+  using Cfg = CameraSensorCfg;
+  constexpr double kNan = std::numeric_limits<double>::quiet_NaN();
+  constexpr double kInf = std::numeric_limits<double>::infinity();
+  EXPECT_THAT(with([](Cfg& c) { c.near = kInf; }), HasSubstr("near inf"));
+  EXPECT_THAT(with([](Cfg& c) { c.update_period = kInf; }), HasSubstr("update_period inf"));
+  EXPECT_THAT(with([](Cfg& c) { c.phase = 1; }), HasSubstr("without an update_period"));
+  EXPECT_THAT(with([](Cfg& c) { c.pos[0] = kNan; }), HasSubstr("must be finite"));
+  EXPECT_THAT(with([](Cfg& c) { c.quat = {0, 0, 0, 0}; }), HasSubstr("quat not 0"));
+  EXPECT_THAT(with([](Cfg& c) { c.enabled_geom_groups.clear(); }), HasSubstr("is empty"));
+  EXPECT_THAT(with([](Cfg& c) { c.intrinsics = {1, 1, kNan, 1}; }), HasSubstr("cx nan"));
+  EXPECT_THAT(with([](Cfg& c) {
+                c.intrinsics = {1, 1, 1, 1};
+                c.fovy = 60;
+              }),
+              HasSubstr("both fovy and intrinsics"));
+  EXPECT_THAT(with([](Cfg& c) { c.distortion = {"fisheye", {kNan, 0, 0, 0}}; }), HasSubstr("nan"));
+  EXPECT_THAT(with([](Cfg& c) { c.pos = {1, 2, 3}; }, "w/top"), HasSubstr("stays where it is"));
+  EXPECT_THAT(with([](Cfg& c) { c.fovy = 200; }, "w/top"), HasSubstr("less than 180"));
+  // What an ideal fisheye of this focal length would put in the corners lies behind the camera.
+  EXPECT_THAT(with([](Cfg& c) {
+                c.intrinsics = {1, 1, 2, 1.5};
+                c.distortion = {"fisheye", {0, 0, 0, 0}};
+              }),
+              HasSubstr("fx 1 now, 2 or more"));
 }
 
 }  // namespace

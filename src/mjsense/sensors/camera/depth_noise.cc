@@ -7,7 +7,26 @@ namespace mjsense {
 namespace {
 
 constexpr double kSubpixels = 32;  // Intel's matcher: 5 fractional bits
-constexpr double kJump = 0.04;     // relative change of depth from pixel to pixel that is an edge
+constexpr double kJump = 0.04;     // relative change of depth that no plane explains
+
+// How depth runs along one axis: `before` and `after` are the neighbours' true depths, negative
+// beyond the image, 0 where nothing is.
+struct Run {
+  bool jump;
+  double change;  // of depth from pixel to pixel, on this side of a jump
+};
+
+// 1 / z is linear along a plane, however steep: what is not is an edge.
+Run run_of(double before, double z, double after) {
+  const auto far = [](double depth) { return depth > 0 ? 1 / depth : 0; };
+  if (before < 0 && after < 0) return {false, 0};
+  if (before < 0 || after < 0) {
+    const double other = std::max(before, after);
+    return {other == 0, std::abs(other - z)};
+  }
+  return {std::abs(far(before) + far(after) - 2 / z) > kJump / z,
+          std::min(std::abs(before - z), std::abs(after - z))};
+}
 
 }  // namespace
 
@@ -29,28 +48,24 @@ void add_stereo_noise(const StereoCamera& camera, std::span<float> depth, int wi
       const double z = scratch[i];
       // The same draws whatever is seen: a pixel's noise does not depend on its neighbours' fate.
       const double noise = rng.normal(), luck = rng.uniform();
-      if (z < camera.nearest || z > camera.farthest) {
+      if (!(z > 0)) {
         depth[i] = 0;
         continue;
       }
-      double change = 0;
-      const auto compare = [&](bool inside, std::size_t j) {
-        if (inside) change = std::max(change, std::abs(scratch[j] - z));
+      const auto at = [&](bool inside, std::size_t j) -> double {
+        return inside ? scratch[j] : -1;
       };
-      compare(x > 0, i - 1);
-      compare(x + 1 < width, i + 1);
-      compare(y > 0, i - width);
-      compare(y + 1 < height, i + width);
-      const double loss = change > kJump * z                       ? camera.edge_loss
-                          : change > camera.grazing_slope * z / fx ? camera.grazing_loss
-                                                                   : 0;
-      if (luck < loss) {
-        depth[i] = 0;
-        continue;
-      }
+      const Run across = run_of(at(x > 0, i - 1), z, at(x + 1 < width, i + 1));
+      const Run down = run_of(at(y > 0, i - width), z, at(y + 1 < height, i + width));
+      const double slope = std::hypot(across.change, down.change) * fx / z;
+      const double loss = across.jump || down.jump       ? camera.edge_loss
+                          : slope > camera.grazing_slope ? camera.grazing_loss
+                                                         : 0;
       double disparity = focal * camera.baseline / z + camera.sigma * noise;
       disparity = std::max(std::round(disparity * kSubpixels), 1.0) / kSubpixels;
-      depth[i] = static_cast<float>(focal * camera.baseline / disparity);
+      const double measured = focal * camera.baseline / disparity;
+      const bool lost = luck < loss || measured < camera.nearest || measured > camera.farthest;
+      depth[i] = lost ? 0.0f : static_cast<float>(measured);
     }
   }
 }

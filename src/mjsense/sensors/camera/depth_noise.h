@@ -1,7 +1,9 @@
 #pragma once
 // What a stereo depth camera makes of true depth. With focal length f (native pixels) and baseline b:
-//   disparity  d = f b / z + noise, rounded to 1/32 pixel;  measured z = f b / d, so its spread grows with z^2
-//   lost       nearer than the camera can match, farther than it is sold for, at jumps in depth, on surfaces seen edge-on
+//   measured  disparity = f b / z + noise, rounded to 1/32 pixel; z = f b / disparity. So its spread
+//             grows with z^2.
+//   lost      what is measured nearer than the camera can match or farther than it is sold for; some
+//             of the pixels at jumps in depth, and on surfaces seen edge-on
 // A lost pixel reads 0.
 
 #include <span>
@@ -17,15 +19,15 @@ struct StereoCamera {
   double sigma;              // of a disparity, native pixels
   double nearest, farthest;  // m
   double edge_loss;          // probability, next to a jump in depth
-  double
-      grazing_loss;  // probability, where depth changes by more than its pixel's width times `grazing_slope`
-  double grazing_slope;
+  double grazing_loss;       // probability, on a surface steeper than `grazing_slope`
+  double grazing_slope;      // tangent of the angle between its normal and the pixel's ray
 };
 
 // "d405" or "d435".
 StereoCamera stereo_preset(std::string_view name);
 
-// depth [height, width] planar m, in place; fx in image pixels; scratch as long as depth.
+// depth [height, width] planar m, in place, 0 where nothing is; fx in image pixels; scratch as long
+// as depth.
 void add_stereo_noise(const StereoCamera& camera, std::span<float> depth, int width, double fx,
                       Rng rng, std::span<float> scratch);
 

@@ -34,34 +34,64 @@ std::unique_ptr<Sensor> LidarSensorCfg::build() const {
 LidarSensor::LidarSensor(const LidarSensorCfg& cfg) : RayCastSensor(cfg), lidar_(cfg) {
   cfg_.hit_ids = true;  // intensity needs them
   exclude_world_ = false;
-  check(cfg.range_noise_std >= 0, place(), "range_noise_std", cfg.range_noise_std, "0 or more");
-  check(cfg.range_noise_relative >= 0, place(), "range_noise_relative", cfg.range_noise_relative,
-        "0 or more");
-  check(cfg.range_resolution >= 0, place(), "range_resolution", cfg.range_resolution, "0 or more");
+  if (cfg.pattern != PatternCfg(GridPattern{}))
+    throw ValueError(place() + ": a pattern is set, but a lidar's rays are those of its scan");
+  const auto check_noise = [&](const char* name, double value) {
+    check(value >= 0 && std::isfinite(value), place(), name, value, "0 or more, and finite");
+  };
+  check_noise("range_noise_std", cfg.range_noise_std);
+  check_noise("range_noise_relative", cfg.range_noise_relative);
+  check_noise("range_resolution", cfg.range_resolution);
   check(cfg.dropout >= 0 && cfg.dropout <= 1, place(), "dropout", cfg.dropout, "between 0 and 1");
   if (const auto* s = std::get_if<SpinningScan>(&cfg.scan)) {
+    check_spinning(*s);
     rate_hz_ = s->rate_hz;
-    check(s->channels >= 1, place(), "channels", s->channels, "at least 1");
-    check(s->samples >= 1, place(), "samples", s->samples, "at least 1");
-    check(s->azimuth_span_deg > 0 && s->azimuth_span_deg <= 360, place(), "azimuth_span_deg",
-          s->azimuth_span_deg, "above 0 and at most 360");
-    if (!s->elevations_deg.empty() && static_cast<int>(s->elevations_deg.size()) != s->channels)
-      throw ValueError(fmt::format("{}: {} channels and {} elevations", place(), s->channels,
-                                   s->elevations_deg.size()));
   } else {
     const TableScan& t = std::get<TableScan>(cfg.scan);
     rate_hz_ = t.rate_hz;
-    angles_ = t.file.empty() ? t.angles : read_npy_pairs(t.file);
-    if (angles_.empty()) throw ValueError(place() + ": the scan's table has no rows");
-    const int rows = static_cast<int>(angles_.size());
-    check(t.rays_per_scan >= 0 && t.rays_per_scan <= rows, place(), "rays_per_scan",
-          t.rays_per_scan, "between 0 and the table's rows");
-    if (t.rays_per_scan > 0) num_parts_ = rows / t.rays_per_scan;
-    angles_.resize(t.rays_per_scan > 0 ? num_parts_ * t.rays_per_scan : rows);
+    read_table(t);
   }
   disturbed_ = cfg.range_noise_std > 0 || cfg.range_noise_relative > 0 ||
                cfg.range_resolution > 0 || cfg.dropout > 0;
-  check(rate_hz_ > 0, place(), "rate_hz", rate_hz_, "above 0");
+  check(rate_hz_ > 0 && std::isfinite(rate_hz_), place(), "rate_hz", rate_hz_,
+        "above 0, and finite");
+}
+
+void LidarSensor::check_spinning(const SpinningScan& s) const {
+  check(s.channels >= 1, place(), "channels", s.channels, "at least 1");
+  check(s.samples >= 1, place(), "samples", s.samples, "at least 1");
+  check_ray_count(static_cast<double>(s.channels) * s.samples, place());
+  check(s.azimuth_span_deg > 0 && s.azimuth_span_deg <= 360, place(), "azimuth_span_deg",
+        s.azimuth_span_deg, "above 0 and at most 360");
+  check(std::isfinite(s.azimuth_start_deg), place(), "azimuth_start_deg", s.azimuth_start_deg,
+        "finite");
+  if (!s.elevations_deg.empty() && static_cast<int>(s.elevations_deg.size()) != s.channels)
+    throw ValueError(fmt::format("{}: elevations_deg has {} values, channels is {}: one a channel",
+                                 place(), s.elevations_deg.size(), s.channels));
+  const auto check_elevation = [&](const char* name, double degrees) {
+    check(std::abs(degrees) <= 90, place(), name, degrees, "between -90 and 90");
+  };
+  check_elevation("elevation_min_deg", s.elevation_min_deg);
+  check_elevation("elevation_max_deg", s.elevation_max_deg);
+  for (double degrees : s.elevations_deg) check_elevation("elevations_deg", degrees);
+}
+
+void LidarSensor::read_table(const TableScan& t) {
+  if (!t.file.empty() && !t.angles.empty())
+    throw ValueError(place() + ": the scan has a file and angles: give one of them");
+  angles_ = t.file.empty() ? t.angles : read_npy_pairs(t.file, place());
+  if (angles_.empty()) throw ValueError(place() + ": the scan's table has no rows");
+  for (std::size_t i = 0; i < angles_.size(); ++i)
+    if (!std::isfinite(angles_[i][0] + angles_[i][1]))
+      throw ValueError(fmt::format("{}: row {} of the scan's table is ({}, {}): must be finite",
+                                   place(), i, angles_[i][0], angles_[i][1]));
+  const int rows = static_cast<int>(angles_.size());
+  if (t.rays_per_scan < 0 || t.rays_per_scan > rows)
+    throw ValueError(
+        fmt::format("{}: rays_per_scan is {}: must be between 0 and the table's {} rows", place(),
+                    t.rays_per_scan, rows));
+  if (t.rays_per_scan > 0) num_parts_ = rows / t.rays_per_scan;
+  angles_.resize(t.rays_per_scan > 0 ? num_parts_ * t.rays_per_scan : rows);
 }
 
 RayPattern LidarSensor::build_pattern(const mjModel* /*model*/) const {
@@ -111,6 +141,9 @@ int LidarSensor::part(const World& world) const {
 void LidarSensor::initialize(const SensorInit& init) {
   RayCastSensor::initialize(init);
   noise_.assign(init.num_worlds, Rng(0, 0, 0, 0));
+  origins_ = {};
+  if (disturbed_ && lidar_.motion_distortion)
+    origins_ = Array(DType::kFloat32, {init.num_worlds, num_rays(), 3});
   const double far = cfg_.max_distance;
   points_ = &add("points", DType::kFloat32, {num_rays(), 3}, "m", "sensor", -far, far,
                  "point of each return; 0 if none", init.num_worlds);
@@ -141,6 +174,10 @@ void LidarSensor::traced(const RayScene& rays, int world, int frame, const RayBu
     const int r = bundle.rays(p)[i];
     if (r < 0) continue;
     for (int k = 0; k < 3; ++k) points[3 * r + k] = at[k][i];
+    if (!origins_.empty()) {
+      float* origin = origins_.row<float>(world).data() + 3 * (first + r);
+      for (int k = 0; k < 3; ++k) origin[k] = static_cast<float>(packet.origin[k] + packet.o[k][i]);
+    }
     intensity[r] = 0;
     if (hits.geom[i] < 0) continue;
     const float* c = &rgba[4 * hits.geom[i]];
@@ -165,25 +202,32 @@ void LidarSensor::finish(const RayScene& /*rays*/, int world, RayScratch& /*scra
         t + draw * std::hypot(lidar_.range_noise_std, lidar_.range_noise_relative * t);
     if (lidar_.range_resolution > 0)
       measured = std::round(measured / lidar_.range_resolution) * lidar_.range_resolution;
-    const double* from = frame_pose(world, r / num_rays_per_frame()).pos;
     float* at = hit + 3 * r;
+    float from[3];
+    origin(world, r, from);
     if (lost || measured < cfg_.min_distance || measured > cfg_.max_distance) {
       forget(world, r);
-      for (int k = 0; k < 3; ++k) {
-        at[k] = static_cast<float>(from[k]);
-        point[3 * r + k] = 0;
-      }
+      std::copy_n(from, 3, at);
+      std::fill_n(point + 3 * r, 3, 0.0f);
       intensity_->data.row<float>(world)[r] = 0;
       continue;
     }
     distance[r] = static_cast<float>(measured);
-    double along[3] = {at[0] - from[0], at[1] - from[1], at[2] - from[2]};
-    mju_normalize3(along);
+    const float scale = t > 0 ? static_cast<float>(measured / t) : 1.0f;
     for (int k = 0; k < 3; ++k) {
-      at[k] += static_cast<float>((measured - t) * along[k]);
-      point[3 * r + k] *= t > 0 ? static_cast<float>(measured / t) : 1.0f;
+      at[k] = from[k] + (at[k] - from[k]) * scale;
+      point[3 * r + k] *= scale;
     }
   }
+}
+
+void LidarSensor::origin(int world, int r, float out[3]) const {
+  if (!origins_.empty()) {
+    std::copy_n(origins_.row<float>(world).data() + 3 * r, 3, out);
+    return;
+  }
+  const double* frame = frame_pose(world, r / num_rays_per_frame()).pos;
+  for (int k = 0; k < 3; ++k) out[k] = static_cast<float>(frame[k]);
 }
 
 }  // namespace mjsense

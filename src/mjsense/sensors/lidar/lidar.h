@@ -34,10 +34,13 @@ struct SpinningScan {
 struct TableScan {
   std::string file;  // .npy of shape (M, 2), such as mujoco-lidar's Livox tables
   std::vector<std::array<double, 2>> angles;  // or the table itself
-  int rays_per_scan = 0;  // rows that a scan takes, the next ones at the next scan; 0: all
+  // Rows that a scan takes, the next ones at the next scan; 0: all. Rows left over at the end are
+  // not used.
+  int rays_per_scan = 0;
   double rate_hz = 10.0;  // scans a second
 };
 
+// `pattern` is not for lidars, and hit ids are always there.
 struct LidarSensorCfg : RayCastSensorCfg {
   LidarSensorCfg() {
     max_distance = 100.0;
@@ -71,8 +74,11 @@ class LidarSensor : public RayCastSensor {
   void finish(const RayScene& rays, int world, RayScratch& scratch) override;
 
  private:
+  void check_spinning(const SpinningScan& scan) const;
+  void read_table(const TableScan& scan);
   RayPattern spinning(const SpinningScan& scan) const;
   RayPattern table(const TableScan& scan) const;
+  void origin(int world, int r, float out[3]) const;  // of ray r, m, world
 
   LidarSensorCfg lidar_;
   std::vector<std::array<double, 2>> angles_;  // of a table
@@ -80,6 +86,7 @@ class LidarSensor : public RayCastSensor {
   bool disturbed_;  // by noise, rounding or loss
   double rate_hz_;
   std::vector<Rng> noise_;  // [B]
+  Array origins_;  // [B, N, 3] m, world: of rays that noise moves and that left at different times
   Field *points_ = nullptr, *intensity_ = nullptr;
 };
 

@@ -8,6 +8,7 @@
 #include <cstring>
 #include <filesystem>
 #include <fstream>
+#include <limits>
 #include <memory>
 
 #include "mjsense/core/error.h"
@@ -131,6 +132,29 @@ TEST(Lidar, MotionDistortsTheSweep) {
   EXPECT_NEAR(hit[0], 4, 1e-5);
 }
 
+TEST(Lidar, NoiseMovesDistortedReturnsAlongTheirOwnRays) {
+  const auto run = [](auto change) {
+    Lab lab;
+    lab.cfg->motion_distortion = true;
+    change(*lab.cfg);
+    lab.start();
+    lab.set("qvel", 0, 4.0);
+    lab.set("qvel", 1, 2.0);
+    for (int i = 0; i < 200; ++i) lab.sim->step();
+    return std::pair{lab.read("hit_pos_w"), lab.read("distances")};
+  };
+  const auto [clean, far] = run([](LidarSensorCfg&) {});
+  const auto [noisy, measured] = run([](LidarSensorCfg& c) { c.range_noise_std = 0.5; });
+  const auto [origins, lost] = run([](LidarSensorCfg& c) { c.dropout = 1; });
+  EXPECT_THAT(lost, Each(-1.0f));
+  EXPECT_GT(std::abs(origins[0] - origins[3 * 89]), 0.3);  // 0.1 s at 4 m/s
+  for (std::size_t r = 0; r < far.size(); ++r)
+    for (int k = 0; k < 3; ++k) {
+      const float o = origins[3 * r + k], ray = (clean[3 * r + k] - o) / far[r];
+      ASSERT_NEAR(noisy[3 * r + k], o + measured[r] * ray, 1e-4) << r;
+    }
+}
+
 TEST(Lidar, BeforeTheFirstMomentTheFrameStoodStill) {
   Lab lab;
   lab.cfg->include_geom_groups = {{1}};
@@ -170,10 +194,31 @@ TEST(Lidar, ErrorsSayWhatIsWrong) {
   using Cfg = LidarSensorCfg;
   EXPECT_THAT(with([](Cfg& c) { c.dropout = 2; }), HasSubstr("sensor 'lidar': dropout is 2"));
   EXPECT_THAT(with([](Cfg& c) { c.scan = SpinningScan{.channels = 2, .elevations_deg = {1}}; }),
-              HasSubstr("2 channels and 1 elevations"));
+              HasSubstr("elevations_deg has 1 values, channels is 2"));
   EXPECT_THAT(with([](Cfg& c) { c.scan = TableScan{}; }), HasSubstr("no rows"));
   EXPECT_THAT(with([](Cfg& c) { c.scan = TableScan{.file = "nowhere.npy"}; }),
-              HasSubstr("nowhere.npy"));
+              HasSubstr("sensor 'lidar': scan table 'nowhere.npy': cannot be opened"));
+  EXPECT_THAT(with([](Cfg& c) {
+                c.scan = TableScan{.file = "nowhere.npy", .angles = {{0, 0}}};
+              }),
+              HasSubstr("give one of them"));
+  constexpr double kNan = std::numeric_limits<double>::quiet_NaN();
+  EXPECT_THAT(with([](Cfg& c) {
+                c.scan = TableScan{.angles = {{0, 0}, {0, kNan}}};
+              }),
+              HasSubstr("row 1"));
+  EXPECT_THAT(with([](Cfg& c) { c.scan = SpinningScan{.elevation_max_deg = 120}; }),
+              HasSubstr("elevation_max_deg is 120"));
+  EXPECT_THAT(with([](Cfg& c) { c.scan = SpinningScan{.azimuth_start_deg = kNan}; }),
+              HasSubstr("azimuth_start_deg is nan"));
+  EXPECT_THAT(with([](Cfg& c) { c.scan = SpinningScan{.channels = 100000, .samples = 100000}; }),
+              HasSubstr("10000000000 rays; at most"));
+  EXPECT_THAT(with([](Cfg& c) {
+                c.scan = SpinningScan{.rate_hz = 1e-9};
+                c.motion_distortion = true;
+              }),
+              HasSubstr("poses to remember"));
+  EXPECT_THAT(with([](Cfg& c) { c.pattern = RingPattern{}; }), HasSubstr("those of its scan"));
   EXPECT_THAT(with([](Cfg& c) { c.range_noise_std = -1; }), HasSubstr("range_noise_std"));
 }
 
@@ -192,13 +237,13 @@ TEST(Npy, ReadsFloatPairsAndRefusesOthers) {
               static_cast<std::streamsize>(values.size() * 4));
   };
   write("{'descr': '<f4', 'fortran_order': False, 'shape': (2, 2), }", {1, 2, 3, 4});
-  EXPECT_EQ(read_npy_pairs(path), (std::vector<std::array<double, 2>>{{1, 2}, {3, 4}}));
+  EXPECT_EQ(read_npy_pairs(path, "here"), (std::vector<std::array<double, 2>>{{1, 2}, {3, 4}}));
   write("{'descr': '<f4', 'fortran_order': False, 'shape': (3, 2), }", {1, 2, 3, 4});
-  EXPECT_THROW(read_npy_pairs(path), RuntimeError);
+  EXPECT_THROW(read_npy_pairs(path, "here"), RuntimeError);
   write("{'descr': '<i4', 'fortran_order': False, 'shape': (2, 2), }", {1, 2, 3, 4});
-  EXPECT_THROW(read_npy_pairs(path), RuntimeError);
+  EXPECT_THROW(read_npy_pairs(path, "here"), RuntimeError);
   write("{'descr': '<f4', 'fortran_order': False, 'shape': (2, 3), }", {1, 2, 3, 4, 5, 6});
-  EXPECT_THROW(read_npy_pairs(path), RuntimeError);
+  EXPECT_THROW(read_npy_pairs(path, "here"), RuntimeError);
   std::remove(path.c_str());
 }
 

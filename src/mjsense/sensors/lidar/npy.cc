@@ -12,14 +12,20 @@
 namespace mjsense {
 namespace {
 
-[[noreturn]] void fail(const std::string& path, std::string_view what) {
-  throw RuntimeError(fmt::format("scan table '{}': {}", path, what));
+// What is read, and for whom.
+struct Source {
+  const std::string& path;
+  std::string_view place;
+};
+
+[[noreturn]] void fail(const Source& source, std::string_view what) {
+  throw RuntimeError(fmt::format("{}: scan table '{}': {}", source.place, source.path, what));
 }
 
 // The text after 'key': in the header's Python dict, up to the next comma at this level.
-std::string_view entry(std::string_view header, std::string_view key, const std::string& path) {
+std::string_view entry(std::string_view header, std::string_view key, const Source& source) {
   const std::size_t at = header.find(fmt::format("'{}':", key));
-  if (at == std::string_view::npos) fail(path, fmt::format("its header has no '{}'", key));
+  if (at == std::string_view::npos) fail(source, fmt::format("its header has no '{}'", key));
   std::string_view rest = header.substr(at + key.size() + 3);
   const std::size_t begin = rest.find_first_not_of(' ');
   rest = rest.substr(begin);
@@ -28,34 +34,35 @@ std::string_view entry(std::string_view header, std::string_view key, const std:
 
 }  // namespace
 
-std::vector<std::array<double, 2>> read_npy_pairs(const std::string& path) {
+std::vector<std::array<double, 2>> read_npy_pairs(const std::string& path, std::string_view place) {
+  const Source source{path, place};
   std::ifstream in(path, std::ios::binary);
-  if (!in) fail(path, "cannot be opened");
+  if (!in) fail(source, "cannot be opened");
   char magic[8];
   if (!in.read(magic, 8) || std::memcmp(magic, "\x93NUMPY", 6) != 0)
-    fail(path, "is not a .npy file");
+    fail(source, "is not a .npy file");
   std::uint8_t size[4] = {};
   const int size_bytes = magic[6] == 1 ? 2 : 4;
-  if (!in.read(reinterpret_cast<char*>(size), size_bytes)) fail(path, "ends in its header");
+  if (!in.read(reinterpret_cast<char*>(size), size_bytes)) fail(source, "ends in its header");
   const std::uint32_t header_size =
       size[0] | size[1] << 8 | size[2] << 16 | static_cast<std::uint32_t>(size[3]) << 24;
-  if (header_size > (1u << 20)) fail(path, "has a header of more than 1 MiB");
+  if (header_size > (1u << 20)) fail(source, "has a header of more than 1 MiB");
   std::string header(header_size, '\0');
-  if (!in.read(header.data(), header_size)) fail(path, "ends in its header");
+  if (!in.read(header.data(), header_size)) fail(source, "ends in its header");
 
-  const std::string_view type = entry(header, "descr", path),
-                         order = entry(header, "fortran_order", path),
-                         shape = entry(header, "shape", path);
+  const std::string_view type = entry(header, "descr", source),
+                         order = entry(header, "fortran_order", source),
+                         shape = entry(header, "shape", source);
   const bool single = type == "'<f4'";
   long rows = -1, columns = -1;
   if (std::sscanf(std::string(shape).c_str(), "(%ld, %ld)", &rows, &columns) != 2 || columns != 2 ||
       rows < 1 || (!single && type != "'<f8'") || order != "False")
-    fail(path, fmt::format("holds {} of shape {}, fortran_order {}: expected '<f4' or '<f8' of "
-                           "shape (M, 2) in C order",
-                           type, shape, order));
+    fail(source, fmt::format("holds {} of shape {}, fortran_order {}: expected '<f4' or '<f8' of "
+                             "shape (M, 2) in C order",
+                             type, shape, order));
   std::vector<char> raw(static_cast<std::size_t>(rows) * 2 * (single ? 4 : 8));
   if (!in.read(raw.data(), static_cast<std::streamsize>(raw.size())))
-    fail(path, fmt::format("ends before its {} rows", rows));
+    fail(source, fmt::format("ends before its {} rows", rows));
   std::vector<std::array<double, 2>> pairs(rows);
   for (long i = 0; i < 2 * rows; ++i) {
     float f;

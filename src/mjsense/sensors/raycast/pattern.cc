@@ -11,7 +11,7 @@
 namespace mjsense {
 namespace {
 
-constexpr std::size_t kMaxRays = 1 << 24;
+constexpr double kMaxRays = 1 << 24;
 
 using Direction = std::array<double, 3>;
 
@@ -21,11 +21,6 @@ Direction unit(const Direction& d, std::string_view place) {
     throw ValueError(fmt::format("{}: ray direction ({}, {}, {}) has no finite length above 0",
                                  place, d[0], d[1], d[2]));
   return {d[0] / length, d[1] / length, d[2] / length};
-}
-
-void check_count(double rays, std::string_view place) {
-  if (rays > static_cast<double>(kMaxRays))
-    throw ValueError(fmt::format("{}: {:.0f} rays; at most {}", place, rays, kMaxRays));
 }
 
 std::vector<double> grid_axis(double size, double resolution) {
@@ -43,7 +38,7 @@ RayPattern make(const GridPattern& g, const mjModel*, std::string_view place) {
     if (!(s >= 0) || !std::isfinite(s))
       throw ValueError(
           fmt::format("{}: grid size is ({}, {}): must be 0 or more", place, g.size[0], g.size[1]));
-  check_count((g.size[0] / g.resolution + 1) * (g.size[1] / g.resolution + 1), place);
+  check_ray_count((g.size[0] / g.resolution + 1) * (g.size[1] / g.resolution + 1), place);
   const Direction d = unit(g.direction, place);
   RayPattern pattern;
   for (double y : grid_axis(g.size[1], g.resolution))
@@ -62,6 +57,10 @@ RayPattern make(const PinholePattern& p, const mjModel* model, std::string_view 
     if (model == nullptr)
       throw ValueError(fmt::format("{}: camera '{}' needs a model", place, p.camera));
     const int c = resolve(model, mjOBJ_CAMERA, p.camera, place);
+    if (model->cam_projection[c] == mjPROJ_ORTHOGRAPHIC)
+      throw ValueError(fmt::format(
+          "{}: camera '{}' is orthographic: its rays are parallel, as a grid pattern's are", place,
+          p.camera));
     width = model->cam_resolution[2 * c];
     height = model->cam_resolution[2 * c + 1];
     fovy = model->cam_fovy[c];
@@ -80,7 +79,7 @@ RayPattern make(const PinholePattern& p, const mjModel* model, std::string_view 
   if (!(fovy > 0 && fovy < 180))
     throw ValueError(
         fmt::format("{}: pinhole fovy is {} degrees: must lie between 0 and 180", place, fovy));
-  check_count(static_cast<double>(width) * height, place);
+  check_ray_count(static_cast<double>(width) * height, place);
   if (tan_h == 0) tan_h = tan_v * width / height;
   RayPattern pattern;
   for (int v = 0; v < height; ++v)
@@ -101,7 +100,7 @@ RayPattern make(const RingPattern& r, const mjModel*, std::string_view place) {
           fmt::format("{}: ring of radius {} with {} samples: the radius must be 0 or more, the "
                       "samples at least 1",
                       place, ring.radius, ring.num_samples));
-    check_count(static_cast<double>(pattern.offsets.size()) + ring.num_samples, place);
+    check_ray_count(static_cast<double>(pattern.offsets.size()) + ring.num_samples, place);
     for (int i = 0; i < ring.num_samples; ++i) {
       const double angle = 2 * std::numbers::pi * i / ring.num_samples;
       pattern.offsets.push_back({ring.radius * std::cos(angle), ring.radius * std::sin(angle), 0});
@@ -123,8 +122,8 @@ RayPattern make(const UserPattern& u, const mjModel*, std::string_view place) {
     const std::array<double, 3>& o = u.offsets[u.offsets.size() == 1 ? 0 : i];
     for (double x : o)
       if (!std::isfinite(x))
-        throw ValueError(fmt::format("{}: offset {} of the pattern is ({}, {}, {})", place, i, o[0],
-                                     o[1], o[2]));
+        throw ValueError(fmt::format("{}: offset {} of the pattern is ({}, {}, {}): must be finite",
+                                     place, i, o[0], o[1], o[2]));
     pattern.offsets.push_back(o);
     pattern.directions.push_back(unit(u.directions[u.directions.size() == 1 ? 0 : i], place));
   }
@@ -140,6 +139,11 @@ RayPattern make(const UserPattern& u, const mjModel*, std::string_view place) {
 }
 
 }  // namespace
+
+void check_ray_count(double rays, std::string_view place) {
+  if (rays > kMaxRays)
+    throw ValueError(fmt::format("{}: {:.0f} rays; at most {:.0f}", place, rays, kMaxRays));
+}
 
 PinholePattern PinholePattern::from_intrinsic_matrix(const std::array<double, 9>& k, int width,
                                                      int height) {

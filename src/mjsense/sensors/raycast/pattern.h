@@ -23,6 +23,7 @@ struct RayPattern {
 // both ends where resolution divides size, else it stops short. x varies fastest. Size 0 is one
 // ray.
 struct GridPattern {
+  bool operator==(const GridPattern&) const = default;
   std::array<double, 2> size{1.0, 1.0};  // m
   double resolution = 0.1;               // m
   std::array<double, 3> direction{0, 0, -1};
@@ -31,6 +32,7 @@ struct GridPattern {
 // Rays from one point through the edges (not the centres) of an image's pixels, looking along -z.
 // u = linspace(-1, 1, width) varies fastest; the first row is the bottom of MuJoCo's image.
 struct PinholePattern {
+  bool operator==(const PinholePattern&) const = default;
   int width = 16, height = 12;
   double fovy = 45.0;  // degrees; horizontally tan(fovx / 2) = tan(fovy / 2) * width / height
   std::string camera;  // resolution and field of view of this camera instead; not its pose
@@ -44,7 +46,9 @@ struct PinholePattern {
 // Parallel rays from rings around the frame's z axis: the centre first, then ring after ring,
 // counter-clockwise from +x.
 struct RingPattern {
+  bool operator==(const RingPattern&) const = default;
   struct Ring {
+    bool operator==(const Ring&) const = default;
     double radius = 0.1;  // m
     int num_samples = 8;
   };
@@ -57,12 +61,16 @@ struct RingPattern {
 
 // The caller's own rays. One direction for all offsets, or one offset for all directions, will do.
 struct UserPattern {
+  bool operator==(const UserPattern&) const = default;
   std::vector<std::array<double, 3>> offsets{{0, 0, 0}};      // m
   std::vector<std::array<double, 3>> directions{{0, 0, -1}};  // any length but 0
   std::vector<double> times;  // s <= 0, one a ray or none: the frame is where it was then
 };
 
 using PatternCfg = std::variant<GridPattern, PinholePattern, RingPattern, UserPattern>;
+
+// Throws ValueError for more rays than a sensor may have.
+void check_ray_count(double rays, std::string_view place);
 
 // Throws ValueError for anything that gives no rays, endless ones or NaN; KeyError for an unknown
 // camera. `model` may be null unless a pattern names a camera. `place` starts every message:

@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 
 #include "mjsense/core/error.h"
@@ -20,6 +21,12 @@ RayAlignment ray_alignment(std::string_view name, std::string_view place) {
 
 RayFrame::RayFrame(const mjModel* m, const Scene* scene, const ObjRef& ref,
                    std::string_view place) {
+  const std::array<std::string_view, 5> types = {"body", "xbody", "site", "geom", "camera"};
+  if (std::find(types.begin(), types.end(), ref.type) == types.end())
+    throw ValueError(
+        fmt::format("{}: frame '{}' is a '{}': must be 'body', 'site', or 'geom' "
+                    "('xbody' and 'camera' will do too)",
+                    place, ref.full_name(), ref.type));
   const ResolvedObj obj = resolve(m, scene, ref, place);
   type_ = obj.type;
   id_ = obj.id;
@@ -34,14 +41,8 @@ RayFrame::RayFrame(const mjModel* m, const Scene* scene, const ObjRef& ref,
     case mjOBJ_GEOM:
       body_ = m->geom_bodyid[id_];
       break;
-    case mjOBJ_CAMERA:
-      body_ = m->cam_bodyid[id_];
-      break;
     default:
-      throw ValueError(
-          fmt::format("{}: frame '{}' is a {}: must be 'body', 'site', or 'geom' ('xbody' and "
-                      "'camera' will do too)",
-                      place, ref.full_name(), ref.type));
+      body_ = m->cam_bodyid[id_];
   }
 }
 

@@ -14,6 +14,7 @@ namespace {
 
 // Packets that one thread takes at a time.
 constexpr int kChunk = 12;
+constexpr int kMostMoments = 100'000;  // of a frame's past
 constexpr double kInf = std::numeric_limits<double>::infinity();
 
 std::uint32_t group_mask(const std::optional<std::vector<int>>& groups, const std::string& place) {
@@ -24,6 +25,7 @@ std::uint32_t group_mask(const std::optional<std::vector<int>>& groups, const st
       throw ValueError(fmt::format("{}: include_geom_groups has {}: groups are 0 to 5", place, g));
     mask |= 1u << g;
   }
+  if (mask == 0) throw ValueError(place + ": include_geom_groups is empty: rays would see nothing");
   return mask;
 }
 
@@ -77,8 +79,13 @@ void RayCastSensor::initialize(const SensorInit& init) {
   history_ = {};
   if (!pattern_.times.empty()) {
     const double oldest = *std::min_element(pattern_.times.begin(), pattern_.times.end());
-    history_ = PoseHistory(init.num_worlds * num_frames(),
-                           static_cast<int>(-oldest / m->opt.timestep) + 3);
+    const double steps = -oldest / m->opt.timestep + 3;
+    if (steps > kMostMoments)
+      throw ValueError(
+          fmt::format("{}: its rays' times reach {} s back: {:.0f} poses to remember; at "
+                      "most {}",
+                      place(), -oldest, steps, kMostMoments));
+    history_ = PoseHistory(init.num_worlds * num_frames(), static_cast<int>(steps));
   }
   poses_.assign(static_cast<std::size_t>(init.num_worlds) * frames_.size(), FramePose{});
   const int objects = static_cast<int>(m->ngeom + m->nflex);

@@ -32,6 +32,7 @@ constexpr char kRobot[] = R"(
     <geom name="window" type="box" size=".1 .1 .1" pos="-3 0 1" material="glass"/>
     <geom name="hidden" type="box" size=".1 .1 .1" pos="-4 0 1" group="3"/>
     <camera name="eye" pos="0 0 2" resolution="4 3" fovy="60"/>
+    <camera name="map" pos="0 0 2" resolution="4 3" fovy="2" projection="orthographic"/>
     <body name="base" pos="0 0 2">
       <freejoint name="root"/>
       <geom name="shell" type="box" size=".2 .2 .1" mass="1"/>
@@ -232,6 +233,15 @@ TEST(RayCast, ErrorsNameSensorFoundAndExpected) {
               }),
               HasSubstr("must be 'body', 'site', or 'geom'"));
   EXPECT_THAT(with([](Cfg& c) { c.frame = {{"site", "scam", "r"}}; }), HasSubstr("scan"));
+  EXPECT_THAT(with([](Cfg& c) {
+                c.frame = {{"sight", "scan", "r"}};
+              }),
+              HasSubstr("is a 'sight': must be 'body', 'site', or 'geom'"));
+  EXPECT_THAT(with([](Cfg& c) { c.include_geom_groups.emplace(); }), HasSubstr("is empty"));
+  EXPECT_THAT(with([](Cfg& c) { c.pattern = PinholePattern::from_mujoco_camera("r/map"); }),
+              HasSubstr("camera 'r/map' is orthographic"));
+  EXPECT_THAT(with([](Cfg& c) { c.pattern = UserPattern{.times = {-1e9}}; }),
+              HasSubstr("poses to remember"));
   EXPECT_THAT(with([](Cfg& c) {
                 c.include_geom_groups = {{0, 6}};
               }),
