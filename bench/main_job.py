@@ -7,15 +7,12 @@ the whole job, encoders included, a step: unlike the rates it hardly depends on 
 
 import json
 import os
-import pathlib
 import statistics
 import subprocess
-import sys
 import tempfile
 
-from harness import Row, report
+from harness import Row, program, report
 
-ROOT = pathlib.Path(__file__).resolve().parents[1]
 RUNS = 3
 CASES = {
     "state alone, 16 episodes in 4 worlds": ["--episodes", "16", "--cameras", "none"],
@@ -25,17 +22,9 @@ CASES = {
 }
 
 
-def program() -> str:
-    built = [ROOT / "build" / preset / "mjsense" for preset in ("release", "dev")]
-    found = os.environ.get("MJSENSE_PROGRAM") or next((str(p) for p in built if p.exists()), None)
-    if not found:
-        sys.exit("bench/main_job: build the program first (./dev build) or name it in $MJSENSE_PROGRAM")
-    return found
-
-
 def run(options: list[str]) -> dict:
     with tempfile.TemporaryDirectory() as folder:
-        command = [program(), "record", "pick", "--robot", "franka", "--worlds", "4", "--out", folder, "--json", "-q",
+        command = [program("mjsense"), "record", "pick", "--robot", "franka", "--worlds", "4", "--out", folder, "--json", "-q",
                    "--no-sheet", *options]
         before = os.times()
         summary = json.loads(subprocess.run(command, check=True, capture_output=True, text=True).stdout)

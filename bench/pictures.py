@@ -7,18 +7,19 @@ Depth and ids are compared where both see something; depth only where it is opaq
 
 from __future__ import annotations
 
-import os
-
-os.environ.setdefault("MUJOCO_GL", "egl")
-
 import pathlib
-import struct
 import sys
-import zlib
+
+import opengl  # noqa: F401  before mujoco
 
 import camera_scenes
+import harness  # noqa: F401  finds mjsense
 import mujoco
 import numpy as np
+from fetch import Unavailable
+from images import ssim, write_png
+
+import mjsense as mjs
 
 SCENES = {
     "gallery": ("front", "top", "low"),
@@ -28,40 +29,6 @@ SCENES = {
     "panda": ("view",),
 }
 WIDTH, HEIGHT = 300, 225
-SHOWN_GROUPS = (0, 1, 2)
-
-
-def write_png(path: pathlib.Path, image: np.ndarray) -> None:
-    height, width, _ = image.shape
-    raw = b"".join(b"\0" + row.tobytes() for row in image)
-
-    def chunk(kind: bytes, body: bytes) -> bytes:
-        return struct.pack(">I", len(body)) + kind + body + struct.pack(">I", zlib.crc32(kind + body))
-
-    head = struct.pack(">IIBBBBB", width, height, 8, 2, 0, 0, 0)
-    path.write_bytes(
-        b"\x89PNG\r\n\x1a\n" + chunk(b"IHDR", head) + chunk(b"IDAT", zlib.compress(raw, 9)) + chunk(b"IEND", b"")
-    )
-
-
-def ssim(a: np.ndarray, b: np.ndarray) -> float:
-    """Structural similarity of luminance: Wang et al. 2004, Gaussian window of 11 pixels, sigma 1.5."""
-    kernel = np.exp(-0.5 * ((np.arange(11) - 5) / 1.5) ** 2)
-    kernel /= kernel.sum()
-
-    def blur(x: np.ndarray) -> np.ndarray:
-        for axis in (0, 1):
-            x = np.apply_along_axis(lambda row: np.convolve(row, kernel, "valid"), axis, x)
-        return x
-
-    a, b = (x.astype(float) @ (0.299, 0.587, 0.114) for x in (a, b))
-    mean_a, mean_b = blur(a), blur(b)
-    var_a, var_b = blur(a * a) - mean_a**2, blur(b * b) - mean_b**2
-    cov = blur(a * b) - mean_a * mean_b
-    c1, c2 = (0.01 * 255) ** 2, (0.03 * 255) ** 2
-    return float(
-        (((2 * mean_a * mean_b + c1) * (2 * cov + c2)) / ((mean_a**2 + mean_b**2 + c1) * (var_a + var_b + c2))).mean()
-    )
 
 
 def classic(model: mujoco.MjModel, data: mujoco.MjData, camera: str) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
@@ -84,11 +51,9 @@ def classic(model: mujoco.MjModel, data: mujoco.MjData, camera: str) -> tuple[np
 
 
 def compare(name: str, camera: str, folder: pathlib.Path) -> None:
-    import mjsense as mjs
-
     cfg = mjs.CameraSensorCfg(
         name="cam", camera_name=f"w/{camera}", width=WIDTH, height=HEIGHT, use_shadows=True,
-        data_types=("rgb", "depth", "segmentation"), enabled_geom_groups=SHOWN_GROUPS,
+        data_types=("rgb", "depth", "segmentation"), enabled_geom_groups=camera_scenes.SHOWN_GROUPS,
     )
     scene = mjs.Scene(
         mjs.SceneCfg(entities={"w": mjs.EntityCfg(model=getattr(camera_scenes, name)())}, sensors=(cfg,))
@@ -120,9 +85,7 @@ def main() -> int:
     if len(sys.argv) < 2:
         print(__doc__, file=sys.stderr)
         return 2
-    camera_scenes.need_opengl()
     folder = pathlib.Path(sys.argv[1])
-    folder.mkdir(parents=True, exist_ok=True)
     print("| scene | depth, median | off by > 1 cm | same geom | SSIM | PSNR |\n| --- | ---: | ---: | ---: | ---: | ---: |")
     for name, cameras in SCENES.items():
         if len(sys.argv) == 2 or name in sys.argv[2:]:
@@ -132,4 +95,7 @@ def main() -> int:
 
 
 if __name__ == "__main__":
-    sys.exit(main())
+    try:
+        sys.exit(main())
+    except Unavailable as error:
+        sys.exit(f"pictures: {error}")

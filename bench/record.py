@@ -18,9 +18,8 @@ import tempfile
 import h5py
 import numpy as np
 
-from harness import Row, median_seconds, report
+from harness import Row, median_seconds, program, report
 
-ROOT = pathlib.Path(__file__).parents[1]
 WIDTH, HEIGHT = 640, 368
 JSON_STREAMS = {f"actions/{k}": 2000 for k in ("commanded_action", "ee_pose", "ee_twist", "joint_pos", "joint_pos_rel")} | {
     "obs/agent/qpos": 2000, "obs/agent/qvel": 2000, "obs/extra/task_info": 4000, "obs/extra/grasp_state_pickup_obj": 2000,
@@ -82,13 +81,6 @@ def processor_seconds() -> float:
     return sum(u.ru_utime + u.ru_stime for u in used)
 
 
-def record_fake() -> pathlib.Path:
-    found = sorted(ROOT.glob("build/*/record_fake"), key=lambda p: p.stat().st_mtime)
-    if not found:
-        sys.exit("record_fake is not built: ./dev build")
-    return found[-1]
-
-
 def main() -> None:
     table = []
     split = None
@@ -96,7 +88,7 @@ def main() -> None:
         rgb, metres = [pictures(steps)] * 2, [depth(steps)] * (2 if with_depth else 0)
         rows = [{"arm": list(np.sin(0.1 * t + np.arange(7))), "base": [], "gripper": [0.00296]} for t in range(steps)]
         scratch = pathlib.Path(tempfile.mkdtemp())
-        command = [record_fake(), scratch / "ours", "--measure", "--cameras", 2, "--steps", steps, "--episodes", episodes,
+        command = [program("record_fake"), scratch / "ours", "--measure", "--cameras", 2, "--steps", steps, "--episodes", episodes,
                    "--worlds", episodes, "--width", WIDTH, "--height", HEIGHT, *([] if with_depth else ["--no-depth"])]  # fmt: skip
         walls, peer_cpu = [], []
 

@@ -1,9 +1,4 @@
-"""What mjlab's sensors cost on the CPU: 64 Go1 on rough terrain, IMU and feet as in bench/contact.py. Runs in an environment of its own:
-
-    python3.12 -m venv mjlab && mjlab/bin/pip install --no-deps mjlab==1.6.0
-    mjlab/bin/pip install torch "mujoco~=3.11.0" "mujoco-warp~=3.11.0" scipy tyro tqdm trimesh prettytable mediapy \\
-        imageio-ffmpeg pyyaml packaging
-    mjlab/bin/python bench/peers/mjlab_contact.py
+"""What mjlab's sensors cost on the CPU: 64 Go1 on rough terrain, IMU and feet as in bench/contact.py.
 
 The scene is mjlab's own: Scene and Simulation on the device "cpu", its Go1 held by its actuators, four of its rough terrains, its physics
 (mujoco_warp, whose kernels are compiled in the first run, about a minute). The last line is a JSON object; microseconds of CPU time of one
@@ -19,19 +14,16 @@ mjlab's history holds force, torque and dist.
 
 import json
 import statistics
-import sys
 import time
 
-sys.path.pop(0)  # this folder has a file with mujoco_warp's name
-
-import torch  # noqa: E402
-import warp as wp  # noqa: E402
-from mjlab.asset_zoo.robots.unitree_go1.go1_constants import get_go1_robot_cfg  # noqa: E402
-from mjlab.scene import Scene, SceneCfg  # noqa: E402
-from mjlab.sensor import ContactMatch, ContactSensorCfg  # noqa: E402
-from mjlab.sim import Simulation, SimulationCfg  # noqa: E402
-from mjlab.terrains import TerrainEntityCfg, TerrainGeneratorCfg  # noqa: E402
-from mjlab.terrains.config import ROUGH_TERRAINS_CFG  # noqa: E402
+import torch
+import warp as wp
+from mjlab.asset_zoo.robots.unitree_go1.go1_constants import get_go1_robot_cfg
+from mjlab.scene import Scene, SceneCfg
+from mjlab.sensor import ContactMatch, ContactSensorCfg
+from mjlab.sim import Simulation, SimulationCfg
+from mjlab.terrains import TerrainEntityCfg, TerrainGeneratorCfg
+from mjlab.terrains.config import ROUGH_TERRAINS_CFG
 
 WORLDS, DECIMATION, WARMUP, ROUNDS = 64, 4, 25, 20
 FIELDS = ("found", "force", "torque", "dist", "pos", "normal", "tangent")

@@ -1,20 +1,16 @@
-"""Rays a second of mujoco_warp on the CPU, the engine under mjlab's ray sensors, in a scene that mjsense's benchmarks saved. Runs in an
-environment of its own:
-
-    python -m venv peers && peers/bin/pip install warp-lang mujoco-core==4.0.1 && peers/bin/pip install --no-deps mujoco-warp etils absl-py
-    peers/bin/python bench/peers/mujoco_warp.py scene.mjb lidar|height
+"""Rays a second of mujoco_warp on the CPU, the engine under mjlab's ray sensors, in a scene that our benchmarks saved:
+warp_rays scene.mjb lidar|height.
 """
 
+import json
 import statistics
 import sys
 import time
 
-sys.path.pop(0)  # this file has the package's name
-
-import mujoco  # noqa: E402
-import mujoco_warp as mjw  # noqa: E402
-import numpy as np  # noqa: E402
-import warp as wp  # noqa: E402
+import mujoco
+import mujoco_warp as mjw
+import numpy as np
+import warp as wp
 
 
 def lidar(model, data):
@@ -68,7 +64,7 @@ def main() -> None:
             if i >= 10:
                 seconds.append(time.process_time() - start)
     hits = int((out[0].numpy() >= 0).sum())
-    print(f"{worlds * n / statistics.median(seconds):.0f} rays per CPU second, {hits} hits")
+    print(json.dumps({"rays_per_second": worlds * n / statistics.median(seconds), "hits": hits}))
 
 
 main()

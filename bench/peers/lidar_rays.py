@@ -1,19 +1,14 @@
-"""Rays a second of mujoco-lidar (Warp on the CPU) in the scene that lidar_bench.cc saved. Runs in an environment of its own:
+"""Rays a second of mujoco-lidar (Warp on the CPU) in the scene that lidar_bench.cc saved: lidar_rays scene.mjb."""
 
-    python -m venv peers && peers/bin/pip install warp-lang scipy mujoco-core==4.0.1 && peers/bin/pip install --no-deps mujoco-lidar
-    peers/bin/python bench/peers/mujoco_lidar.py scene.mjb
-"""
-
+import json
 import statistics
 import sys
 import time
 
-sys.path.pop(0)  # this file has the package's name
-
-import mujoco  # noqa: E402
-import numpy as np  # noqa: E402
-import warp as wp  # noqa: E402
-from mujoco_lidar import MjLidarWrapper  # noqa: E402
+import mujoco
+import numpy as np
+import warp as wp
+from mujoco_lidar import MjLidarWrapper
 
 wp.config.quiet = True
 model = mujoco.MjModel.from_binary_path(sys.argv[1])
@@ -29,4 +24,5 @@ for i in range(30):
     distances = lidar.trace_rays(data, azimuth, elevation)
     if i >= 10:
         seconds.append(time.process_time() - start)
-print(f"{azimuth.size / statistics.median(seconds):.0f} rays per CPU second, {int((np.asarray(distances) < 30).sum())} hits")
+hits = int((np.asarray(distances) < 30).sum())
+print(json.dumps({"rays_per_second": azimuth.size / statistics.median(seconds), "hits": hits}))

