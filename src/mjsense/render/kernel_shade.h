@@ -286,16 +286,27 @@ inline LightTerm light_term(const ViewLight& light, bool ortho, Vec3f p, Vec3f n
   return out;
 }
 
-// Adds one light's contribution to `sum`, for lanes that are not in `dark`; clamped to 1 by itself
+// One light on all lanes of a packet.
+struct Lit {
+  LightTerm terms[kLanes / kWidth];
+
+  Lit(const View& view, const ViewLight& light, const Surfaces& s) {
+    const bool shiny = light.specular[0] + light.specular[1] + light.specular[2] > 0;
+    for (int k = 0; k < kLanes; k += kWidth) {
+      const Vec3f p{load(s.p[0] + k), load(s.p[1] + k), load(s.p[2] + k)};
+      const Vec3f n{load(s.n[0] + k), load(s.n[1] + k), load(s.n[2] + k)};
+      terms[k / kWidth] =
+          light_term(light, view.grid.orthographic, p, n, load(s.exponent + k), shiny);
+    }
+  }
+};
+
+// Adds the light's contribution to `sum`, for lanes that are not in `dark`; clamped to 1 by itself
 // if `separate`.
-inline void add_light(const View& view, const ViewLight& light, const Surfaces& s,
-                      std::uint32_t dark, bool separate, Colors& sum) {
-  const bool shiny = light.specular[0] + light.specular[1] + light.specular[2] > 0;
+inline void add_light(const ViewLight& light, const Lit& lit, const Surfaces& s, std::uint32_t dark,
+                      bool separate, Colors& sum) {
   for (int k = 0; k < kLanes; k += kWidth) {
-    const Vec3f p{load(s.p[0] + k), load(s.p[1] + k), load(s.p[2] + k)};
-    const Vec3f n{load(s.n[0] + k), load(s.n[1] + k), load(s.n[2] + k)};
-    const LightTerm term =
-        light_term(light, view.grid.orthographic, p, n, load(s.exponent + k), shiny);
+    const LightTerm& term = lit.terms[k / kWidth];
     const Float gloss = term.specular * load(s.specular + k);
     const Float scale = select(mask_of(dark >> k & kAllLanes), splat(0.0f), term.scale);
     for (int c = 0; c < 3; ++c) {
@@ -308,16 +319,16 @@ inline void add_light(const View& view, const ViewLight& light, const Surfaces& 
 }
 
 // Lanes that do not get the light: barred by a geom, or turned away.
-inline std::uint32_t dark_lanes(const View& view, const ViewLight& light, const Surfaces& s,
-                                const Hits& hits, std::uint32_t lanes, Casters& casters) {
+inline std::uint32_t dark_lanes(const View& view, const ViewLight& light, const Lit& lit,
+                                const Surfaces& s, const Hits& hits, std::uint32_t lanes,
+                                Casters& casters) {
   LightRays rays;
   const bool directional = light.kind == LightKind::kDirectional;
   std::uint32_t facing = 0, reachable = 0;
   rays.longest = 1;
   for (int k = 0; k < kLanes; k += kWidth) {
     const Vec3f p{load(s.p[0] + k), load(s.p[1] + k), load(s.p[2] + k)};
-    const Vec3f n{load(s.n[0] + k), load(s.n[1] + k), load(s.n[2] + k)};
-    const LightTerm term = light_term(light, true, p, n, splat(0.0f), false);
+    const LightTerm& term = lit.terms[k / kWidth];
     facing |= bits((splat(0.0f) < term.diffuse) & (splat(0.0f) < term.scale)) << k;
     store(rays.d[0] + k, term.to_light.x);
     store(rays.d[1] + k, term.to_light.y);
@@ -362,11 +373,12 @@ inline void shade(const View& view, const Surfaces& s, const Hits& hits, std::ui
     }
   for (int i = 0; i < view.num_lights; ++i) {
     const ViewLight& light = view.lights[i];
+    const Lit lit(view, light, s);
     if (casters && light.shadows) {
-      const std::uint32_t dark = dark_lanes(view, light, s, hits, lanes, casters[i]);
-      if ((lanes & ~dark) != 0) add_light(view, light, s, dark, true, separate);
+      const std::uint32_t dark = dark_lanes(view, light, lit, s, hits, lanes, casters[i]);
+      if ((lanes & ~dark) != 0) add_light(light, lit, s, dark, true, separate);
     } else {
-      add_light(view, light, s, 0, false, out);
+      add_light(light, lit, s, 0, false, out);
     }
   }
   for (int c = 0; c < 3; ++c)

@@ -84,8 +84,6 @@ inline void find_casters(const View& view, const Tile& tile, int packets, TileSc
   }
 }
 
-inline std::uint8_t byte(float x) { return static_cast<std::uint8_t>(x * 255.0f + 0.5f); }
-
 inline void update_farthest(Tile& tile, PacketMask packets) {
   for (; packets; packets &= packets - 1) {
     const int q = __builtin_ctz(packets);
@@ -189,6 +187,33 @@ inline void write_geometry(const View& view, const ImageTargets& targets, int x0
   }
 }
 
+// Colours 0..1 of a packet.
+inline void write_rgb(const ImageTargets& targets, const PixelGrid& grid, int x0, int y0,
+                      const float (*rgb)[kLanes], float scale) {
+  alignas(64) std::uint32_t packed[kLanes];  // 0xbbggrr
+  const Float full = splat(255.0f * scale), half = splat(0.5f);
+  for (int k = 0; k < kLanes; k += kWidth) {
+    Int bytes[3];
+    for (int c = 0; c < 3; ++c) bytes[c] = truncate(fma(load(rgb[c] + k), full, half));
+    store(reinterpret_cast<int*>(packed) + k,
+          bytes[0] + int_of(256) * (bytes[1] + int_of(256) * bytes[2]));
+  }
+  const int columns = grid.width - x0 < 4 ? grid.width - x0 : 4;
+  const int rows = grid.height - y0 < 4 ? grid.height - y0 : 4;
+  for (int r = 0; r < rows; ++r) {
+    std::uint8_t* out = targets.rgb + 3 * (static_cast<std::size_t>(y0 + r) * grid.width + x0);
+    const std::uint32_t* p = packed + 4 * r;
+    if (columns == 4) {  // four pixels are three words, the lowest byte first
+      const std::uint32_t words[3] = {p[0] | p[1] << 24, p[1] >> 8 | p[2] << 16,
+                                      p[2] >> 16 | p[3] << 8};
+      __builtin_memcpy(out, words, sizeof words);
+      continue;
+    }
+    for (int i = 0; i < columns; ++i)
+      for (int c = 0; c < 3; ++c) out[3 * i + c] = static_cast<std::uint8_t>(p[i] >> 8 * c);
+  }
+}
+
 struct TileLists {
   int opaque = 0, transparent = 0;
 };
@@ -244,7 +269,7 @@ inline void render_tile(const View& view, const ImageTargets& targets, int tx, i
   const float far = view.far > 0 ? view.far : kInfinity;
   tile.shaded = targets.rgb || targets.normals;
   const int samples = targets.rgb ? targets.samples : 1;
-  float sum[kTilePackets][3][kLanes];
+  alignas(64) float sum[kTilePackets][3][kLanes];
   for (int sample = 0; sample < samples || (sample == samples && samples > 1 && geometry);
        ++sample) {
     // The last round, if there is one, is for depth and segmentation: through pixel centres.
@@ -289,8 +314,10 @@ inline void render_tile(const View& view, const ImageTargets& targets, int tx, i
           shade_transparent(view, scratch.transparent, lists.transparent, tile.pixels[q], hits,
                             colors);
         for (int c = 0; c < 3; ++c)
-          for (int i = 0; i < kLanes; ++i)
-            sum[q][c][i] = sample == 0 ? colors.rgb[c][i] : sum[q][c][i] + colors.rgb[c][i];
+          for (int k = 0; k < kLanes; k += kWidth) {
+            const Float color = load(colors.rgb[c] + k);
+            store(sum[q][c] + k, sample == 0 ? color : color + load(sum[q][c] + k));
+          }
       }
     }
     if (geometry && centered) {
@@ -302,14 +329,8 @@ inline void render_tile(const View& view, const ImageTargets& targets, int tx, i
     }
   }
   if (!targets.rgb) return;
-  const float scale = 1.0f / samples;
   for (int q = 0; q < packets; ++q)
-    for (int i = 0; i < kLanes; ++i) {
-      const int x = x0 + 4 * (q % across) + i % 4, y = y0 + 4 * (q / across) + i / 4;
-      if (x >= grid.width || y >= grid.height) continue;
-      std::uint8_t* out = targets.rgb + 3 * (static_cast<std::size_t>(y) * grid.width + x);
-      for (int c = 0; c < 3; ++c) out[c] = byte(sum[q][c][i] * scale);
-    }
+    write_rgb(targets, grid, x0 + 4 * (q % across), y0 + 4 * (q / across), sum[q], 1.0f / samples);
 }
 
 inline void render_tiles(const View& view, const ImageTargets& targets, int first, int last,
