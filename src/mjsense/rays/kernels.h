@@ -22,6 +22,8 @@ struct HeightField {
   const float*
       block_tops;  // [ceil((rows - 1) / kBlock), block_cols] m, highest point of each block
   int block_cols;
+  float top;       // m, the highest point
+  float steepest;  // the largest slope
 };
 
 struct KernelScene {

@@ -48,6 +48,18 @@ Triangles surface_of(const HeightField& field) {
   return out;
 }
 
+float steepest_slope(const HeightField& field) {
+  const float dx = 2 * field.size[0] / (field.cols - 1), dy = 2 * field.size[1] / (field.rows - 1);
+  float most = 0;
+  for (int r = 0; r + 1 < field.rows; ++r)
+    for (int c = 0; c + 1 < field.cols; ++c) {
+      const float *p = field.data + r * field.cols + c, *q = p + field.cols;
+      most = std::max({most, std::hypot((p[1] - p[0]) / dx, (q[1] - p[1]) / dy),
+                       std::hypot((q[1] - q[0]) / dx, (q[0] - p[0]) / dy)});
+    }
+  return most * field.size[2];
+}
+
 int blocks(int points) { return (points - 2) / HeightField::kBlock + 1; }
 
 std::vector<float> highest_points(const HeightField& field) {
@@ -118,8 +130,10 @@ SharedGeometry::SharedGeometry(const mjModel* m) {
   }
   for (int i = 0; i < m->nflex; ++i) flexes.push_back(flex_surface(m, i));
   for (int i = 0; i < m->nhfield; ++i) {
-    HeightField field{
-        m->hfield_data + m->hfield_adr[i], m->hfield_nrow[i], m->hfield_ncol[i], {}, nullptr};
+    HeightField field{};
+    field.data = m->hfield_data + m->hfield_adr[i];
+    field.rows = m->hfield_nrow[i];
+    field.cols = m->hfield_ncol[i];
     std::copy_n(m->hfield_size + 4 * i, 4, field.size);
     if (m->ncam > 0) {
       const Triangles surface = surface_of(field);
@@ -133,6 +147,8 @@ SharedGeometry::SharedGeometry(const mjModel* m) {
     block_tops.push_back(highest_points(field));
     field.block_tops = block_tops.back().data();
     field.block_cols = blocks(field.cols);
+    field.top = *std::max_element(block_tops.back().begin(), block_tops.back().end());
+    field.steepest = steepest_slope(field);
     height_fields.push_back(field);
     const float* s = field.size;
     bounds.height_fields.push_back({0, 0, 0.5f * (s[2] - s[3]), s[0], s[1], 0.5f * (s[2] + s[3])});

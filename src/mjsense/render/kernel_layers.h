@@ -37,7 +37,8 @@ inline void shade_background(const View& view, const Pixels& pixels, std::uint32
 
 inline std::uint32_t hit_lanes(const Hits& hits) {
   std::uint32_t lanes = 0;
-  for (int i = 0; i < kLanes; ++i) lanes |= static_cast<std::uint32_t>(hits.geom[i] >= 0) << i;
+  for (int k = 0; k < kLanes; k += kWidth)
+    lanes |= bits(less(int_of(-1), load(hits.geom + k))) << k;
   return lanes;
 }
 

@@ -38,6 +38,21 @@ inline Float splat(float x) { return Float(x); }
 
 inline Vec3f splat(const float* p) { return {splat(p[0]), splat(p[1]), splat(p[2])}; }
 
+// Box around the points of `lanes`; low > high if there are none.
+inline void bounds(const float (*p)[kLanes], std::uint32_t lanes, float* low, float* high) {
+  for (int c = 0; c < 3; ++c) {
+    Float least = splat(kInfinity), most = splat(-kInfinity);
+    for (int k = 0; k < kLanes; k += kWidth) {
+      const Mask m = mask_of(lanes >> k & kAllLanes);
+      const Float x = load(p[c] + k);
+      least = min(least, select(m, x, splat(kInfinity)));
+      most = max(most, select(m, x, splat(-kInfinity)));
+    }
+    low[c] = lane_min(least);
+    high[c] = lane_max(most);
+  }
+}
+
 // R^T v.
 inline Vec3f to_geom(const float* r, Vec3f v) {
   return {fma(splat(r[0]), v.x, fma(splat(r[3]), v.y, splat(r[6]) * v.z)),

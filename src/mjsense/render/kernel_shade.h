@@ -325,7 +325,6 @@ inline std::uint32_t dark_lanes(const View& view, const ViewLight& light, const 
   LightRays rays;
   const bool directional = light.kind == LightKind::kDirectional;
   std::uint32_t facing = 0, reachable = 0;
-  rays.longest = 1;
   for (int k = 0; k < kLanes; k += kWidth) {
     const Vec3f p{load(s.p[0] + k), load(s.p[1] + k), load(s.p[2] + k)};
     const LightTerm& term = lit.terms[k / kWidth];
@@ -343,23 +342,15 @@ inline std::uint32_t dark_lanes(const View& view, const ViewLight& light, const 
   __builtin_memcpy(rays.p, s.p, sizeof rays.p);
   __builtin_memcpy(rays.n, s.n, sizeof rays.n);
   __builtin_memcpy(rays.geom, hits.geom, sizeof rays.geom);
-  float low[3] = {kInfinity, kInfinity, kInfinity}, high[3] = {-kInfinity, -kInfinity, -kInfinity};
-  for (int i = 0; i < kLanes; ++i) {
-    if (!(active >> i & 1u)) continue;
-    rays.longest = rays.end[i] > rays.longest ? rays.end[i] : rays.longest;
-    for (int c = 0; c < 3; ++c) {
-      low[c] = s.p[c][i] < low[c] ? s.p[c][i] : low[c];
-      high[c] = s.p[c][i] > high[c] ? s.p[c][i] : high[c];
-    }
+  float low[3], high[3];
+  bounds(s.p, active, low, high);
+  Float longest = splat(0.0f);
+  for (int k = 0; k < kLanes; k += kWidth) {
+    const Mask m = mask_of(active >> k & kAllLanes);
+    longest = max(longest, select(m, load(rays.end + k), splat(0.0f)));
   }
-  float axis[3], r2 = 0;
-  for (int c = 0; c < 3; ++c) {
-    rays.center[c] = 0.5f * (low[c] + high[c]);
-    r2 += 0.25f * (high[c] - low[c]) * (high[c] - low[c]);
-    axis[c] = directional ? -light.dir[c] : light.pos[c] - rays.center[c];
-  }
-  rays.radius = __builtin_sqrtf(r2);
-  return ~facing | in_shadow(view, casters, rays, axis, active);
+  const Shaft shaft = shaft_to(light, low, high, lane_max(longest));
+  return ~facing | in_shadow(view, casters, rays, shaft, active);
 }
 
 // Colours 0..1 of `lanes`. `casters` by light; null: no light casts shadows here.

@@ -44,43 +44,38 @@ inline void fill_pixels(const View& view, int x0, int y0, float shift_x, float s
   }
 }
 
-// Casters for every shadow-casting light, for the points that the tile sees.
+// Casters of every shadow-casting light for the points that the tile sees.
 inline void find_casters(const View& view, const Tile& tile, int packets, TileScratch& scratch,
                          Casters* out) {
-  LightRays around;
-  float low[3] = {kInfinity, kInfinity, kInfinity}, high[3] = {-kInfinity, -kInfinity, -kInfinity};
-  for (int q = 0; q < packets; ++q) {
-    const Hits& hits = tile.hits[q];
-    for (int i = 0; i < kLanes; ++i) {
-      if (hits.geom[i] < 0) continue;
-      const float t = hits.t[i], s = view.grid.orthographic ? 1.0f : t;
-      const float p[3] = {s * tile.pixels[q].x[i], s * tile.pixels[q].y[i], -t};
+  Float low[3], high[3];
+  for (int c = 0; c < 3; ++c) {
+    low[c] = splat(kInfinity);
+    high[c] = splat(-kInfinity);
+  }
+  for (int q = 0; q < packets; ++q)
+    for (int k = 0; k < kLanes; k += kWidth) {
+      const Mask hit = less(int_of(-1), load(tile.hits[q].geom + k));
+      const Float t = load(tile.hits[q].t + k), s = view.grid.orthographic ? splat(1.0f) : t;
+      const Float p[3] = {s * load(tile.pixels[q].x + k), s * load(tile.pixels[q].y + k), -t};
       for (int c = 0; c < 3; ++c) {
-        low[c] = p[c] < low[c] ? p[c] : low[c];
-        high[c] = p[c] > high[c] ? p[c] : high[c];
+        low[c] = min(low[c], select(hit, p[c], splat(kInfinity)));
+        high[c] = max(high[c], select(hit, p[c], splat(-kInfinity)));
       }
     }
+  float least[3], most[3];
+  for (int c = 0; c < 3; ++c) {
+    least[c] = lane_min(low[c]);
+    most[c] = lane_max(high[c]);
   }
-  const bool empty = low[0] > high[0];
-  float r2 = 0;
-  for (int c = 0; c < 3 && !empty; ++c) {
-    around.center[c] = 0.5f * (low[c] + high[c]);
-    r2 += 0.25f * (high[c] - low[c]) * (high[c] - low[c]);
-  }
-  around.radius = __builtin_sqrtf(r2);
-  int* next = scratch.casters;
+  int used = 0;
   for (int i = 0; i < view.num_lights; ++i) {
-    const ViewLight& light = view.lights[i];
-    out[i] = {next, 0, 0};
-    if (!light.shadows || empty) continue;
-    const bool directional = light.kind == LightKind::kDirectional;
-    around.longest = directional ? kInfinity : 1.0f;
-    float axis[3];
-    for (int c = 0; c < 3; ++c)
-      axis[c] = directional ? -light.dir[c] : light.pos[c] - around.center[c];
-    for (int g = 0; g < view.num_geoms; ++g)
-      if (in_shaft(around, axis, view.geoms[g])) next[out[i].count++] = g;
-    next += out[i].count;
+    out[i] = {scratch.casters + used, scratch.spheres, 0, 0};
+    for (float** p :
+         {&out[i].spheres.x, &out[i].spheres.y, &out[i].spheres.z, &out[i].spheres.radius})
+      *p += used;
+    if (!view.lights[i].shadows || least[0] > most[0]) continue;
+    find_casters(view, view.lights[i], least, most, out[i]);
+    used += out[i].count;
   }
 }
 
@@ -259,7 +254,7 @@ inline void sample_shift(int index, int samples, float& x, float& y) {
 
 inline void render_tile(const View& view, const ImageTargets& targets, int tx, int ty,
                         TileScratch& scratch) {
-  Tile& tile = *static_cast<Tile*>(scratch.hits);
+  Tile& tile = *static_cast<Tile*>(scratch.tile);
   const PixelGrid& grid = view.grid;
   const int x0 = tx * kTileSize, y0 = ty * kTileSize;
   const int across = (grid.width - x0 + 3) / 4 < kPackets ? (grid.width - x0 + 3) / 4 : kPackets;

@@ -8,6 +8,7 @@
 #include "mjsense/core/error.h"
 #include "mjsense/rays/ray_scene.h"
 #include "mjsense/render/camera_model.h"
+#include "mjsense/render/tile_memory.h"
 #include "mjsense/render/view_builder.h"
 
 namespace mjsense {
@@ -68,18 +69,11 @@ struct Studio {
     const View& view = builder.build(rays->world(0), rays->shared(), Appearance(model.get()),
                                      at.data(), r, grid_from_fovy(size, size, fovy, false));
     std::vector<std::uint8_t> image(3 * size * size);
-    std::vector<int> lists((3 + View::kMaxLights) * (model->ngeom + 1));
-    Array hits(DType::kUint8, {static_cast<std::int64_t>(tile_bytes())});
-    TileScratch scratch;
-    scratch.row = lists.data();
-    scratch.opaque = scratch.row + model->ngeom;
-    scratch.transparent = scratch.opaque + model->ngeom;
-    scratch.casters = scratch.transparent + model->ngeom;
-    scratch.hits = hits.data();
+    TileMemory memory(ViewBuilder::max_geoms(model.get()));
     ImageTargets targets;
     targets.rgb = image.data();
     targets.samples = samples;
-    render(view, targets, 0, (size + kTileSize - 1) / kTileSize, scratch);
+    render(view, targets, 0, (size + kTileSize - 1) / kTileSize, memory.scratch());
     return image;
   }
   Pixel center(std::array<double, 3> at, std::array<double, 3> x, std::array<double, 3> y,

@@ -68,6 +68,12 @@ struct ViewLight {
   float cos_cutoff, exponent;  // spot
 };
 
+// Bounding spheres in C, m. May be read kSpherePadding elements beyond the last.
+struct Spheres {
+  float *x, *y, *z, *radius;
+};
+inline constexpr int kSpherePadding = 16;
+
 struct View {
   static constexpr int kMaxLights = 32;
   PixelGrid grid;
@@ -76,6 +82,7 @@ struct View {
   int num_geoms = 0;        // the first num_opaque are opaque and in sight, nearest first;
   int num_opaque = 0;       // then num_transparent in sight, by MuJoCo's order of blending;
   int num_transparent = 0;  // the rest only casts shadows
+  Spheres spheres{};        // of geoms
   ViewLight lights[kMaxLights];
   int num_lights = 0;
   bool shadows = false;
@@ -108,7 +115,8 @@ struct TileScratch {
   int* opaque = nullptr;  // geoms in sight of the tile
   int* transparent = nullptr;
   int* casters = nullptr;  // of all lights: kMaxLights times as long
-  void* hits = nullptr;    // a Tile
+  Spheres spheres{};       // of casters
+  void* tile = nullptr;    // a Tile of the kernels
 };
 
 // Bytes of a Tile, 64-byte aligned.

@@ -29,6 +29,7 @@ ViewBuilder::ViewBuilder(const mjModel* model, const Look& look, const ViewOptio
       options_(options),
       unsorted_(max_geoms(model)),
       sorted_(max_geoms(model)),
+      spheres_(4 * (max_geoms(model) + kSpherePadding)),
       soft_looks_(model->nflex + model->nskin) {
   order_.reserve(max_geoms(model));
   view_.near = options.near;
@@ -81,8 +82,15 @@ const View& ViewBuilder::build(const RayWorld& world, const SharedGeometry& shap
     return a.index < b.index;
   });
   view_.num_opaque = view_.num_transparent = 0;
+  float* spheres = spheres_.data();  // here, because builders move
+  const std::size_t stride = spheres_.size() / 4;
+  view_.spheres = {spheres, spheres + stride, spheres + 2 * stride, spheres + 3 * stride};
   for (std::size_t i = 0; i < order_.size(); ++i) {
-    sorted_[i] = unsorted_[order_[i].index];
+    const ViewGeom& g = sorted_[i] = unsorted_[order_[i].index];
+    view_.spheres.x[i] = g.center[0];
+    view_.spheres.y[i] = g.center[1];
+    view_.spheres.z[i] = g.center[2];
+    view_.spheres.radius[i] = g.radius;
     view_.num_opaque += order_[i].rank == 0;
     view_.num_transparent += order_[i].rank == 1;
   }

@@ -63,6 +63,7 @@ class ViewBuilder {
   ViewOptions options_;
   View view_;
   std::vector<ViewGeom> unsorted_, sorted_;
+  std::vector<float> spheres_;  // View::spheres
   std::vector<Order> order_;
   std::vector<MeshLook> soft_looks_;       // of flexes, then skins, with the world's normals
   std::unique_ptr<ViewBuilder> mirrored_;  // null: nothing can reflect

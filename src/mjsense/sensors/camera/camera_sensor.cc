@@ -8,6 +8,7 @@
 #include "mjsense/core/error.h"
 #include "mjsense/core/parallel.h"
 #include "mjsense/rays/ray_scene.h"
+#include "mjsense/render/tile_memory.h"
 #include "mjsense/sensors/camera/depth_noise.h"
 
 namespace mjsense {
@@ -33,9 +34,7 @@ ViewOptions view_options(const CameraSensorCfg& cfg, unsigned groups) {
 // tiles are divided among the threads. Many small ones: a view a thread.
 struct CameraSensor::Workspace {
   std::vector<ViewBuilder> builders;
-  std::vector<TileScratch> scratch;  // by thread
-  std::vector<std::vector<int>> lists;
-  std::vector<Array> hits;
+  std::vector<TileMemory> memory;  // by thread
   RenderTiles render = best_render_tiles();
 };
 
@@ -104,18 +103,8 @@ void CameraSensor::initialize(const SensorInit& init) {
   workspace_->builders.reserve(slots);
   for (int i = 0; i < slots; ++i)
     workspace_->builders.emplace_back(model_, *look_, view_options(cfg_, groups_));
-  const std::size_t geoms = ViewBuilder::max_geoms(model_);
-  for (int i = 0; i < init.threads; ++i) {
-    workspace_->hits.emplace_back(DType::kUint8,
-                                  Shape{static_cast<std::int64_t>(tile_bytes())});
-    std::vector<int>& list = workspace_->lists.emplace_back((3 + View::kMaxLights) * geoms);
-    TileScratch& scratch = workspace_->scratch.emplace_back();
-    scratch.row = list.data();
-    scratch.opaque = scratch.row + geoms;
-    scratch.transparent = scratch.opaque + geoms;
-    scratch.casters = scratch.transparent + geoms;
-    scratch.hits = workspace_->hits.back().data();
-  }
+  const int geoms = ViewBuilder::max_geoms(model_);
+  for (int i = 0; i < init.threads; ++i) workspace_->memory.emplace_back(geoms);
 }
 
 // As the world of `model` has the camera, but for what the configuration says about one that others
@@ -172,8 +161,9 @@ void CameraSensor::declare_fields(int num_worlds) {
             cfg_.depth_kind == "ray" ? "Distance along each pixel's ray; 0 where nothing is seen."
                                      : "Distance to the camera plane; 0 where nothing is seen.");
   if (wants("segmentation"))
-    segmentation_ = add("segmentation", DType::kInt32, {h, w, 2}, "", -1, inf, Storage::kArray,
-                        "(id, mjtObj) of each pixel: geom, flex or skin; (-1, -1) where nothing is seen.");
+    segmentation_ =
+        add("segmentation", DType::kInt32, {h, w, 2}, "", -1, inf, Storage::kArray,
+            "(id, mjtObj) of each pixel: geom, flex or skin; (-1, -1) where nothing is seen.");
   if (wants("normals"))
     normals_ = add("normals", DType::kFloat32, {h, w, 3}, "", -1, 1, Storage::kArray,
                    "Unit surface normal in the camera frame; 0 where nothing is seen.");
@@ -276,7 +266,7 @@ void CameraSensor::render_due(const CastContext& context) {
   if (threads == 1 || bands == 1) {
     context.pool.run(count, [&](int item, int thread) {
       const View& view = build_view(rays, due_[item], work.builders[thread]);
-      work.render(view, targets(due_[item]), 0, tile_rows, work.scratch[thread]);
+      work.render(view, targets(due_[item]), 0, tile_rows, work.memory[thread].scratch());
     });
   } else {
     context.pool.run(count,
@@ -284,7 +274,7 @@ void CameraSensor::render_due(const CastContext& context) {
     context.pool.run(count * bands, [&](int item, int thread) {
       const int image = item / bands, band = item % bands;
       work.render(work.builders[image].view(), targets(due_[image]), band * tile_rows / bands,
-                  (band + 1) * tile_rows / bands, work.scratch[thread]);
+                  (band + 1) * tile_rows / bands, work.memory[thread].scratch());
     });
   }
 }
