@@ -17,6 +17,13 @@ struct Material {
   bool uniform;     // repeat is per metre, not per geom
 };
 
+// mjModel's vis.map and vis.rgba, as far as the sky is concerned.
+struct Sky {
+  float distance;  // m, of the cylinder that MuJoCo paints it on
+  float haze_width;
+  float haze_rgb[3];
+};
+
 class Appearance {
  public:
   explicit Appearance(const mjModel* model);
@@ -25,6 +32,7 @@ class Appearance {
   // [geoms, then flexes, then skins; 4] as MuJoCo's visualiser resolves it
   std::span<const float> rgba() const { return rgba_; }
   std::span<const Material> materials() const { return materials_; }  // [nmat]
+  const Sky& sky() const { return sky_; }
   // Active ones; no poses yet.
   std::span<const ViewLight> lights() const { return {lights_.data(), num_lights_}; }
   std::span<const int> light_ids() const { return light_ids_; }  // -1: the headlight
@@ -34,6 +42,7 @@ class Appearance {
 
   std::vector<float> rgba_;
   std::vector<Material> materials_;
+  Sky sky_;
   std::vector<ViewLight> lights_;
   std::vector<int> light_ids_;
   std::size_t num_lights_ = 0;

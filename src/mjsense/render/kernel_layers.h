@@ -1,6 +1,6 @@
 #pragma once
-// What lies behind, before and inside the opaque surfaces of a packet: the sky, transparent geoms,
-// reflections. Part of the tile kernels.
+// What lies before and inside the opaque surfaces of a packet: transparent geoms, reflections. Part of
+// the tile kernels.
 
 #include "mjsense/render/kernel_shade.h"
 #include "mjsense/render/kernel_trace.h"
@@ -10,30 +10,6 @@ namespace {
 
 constexpr int kMaxMirrored = 32;  // transparent geoms in a reflection
 constexpr int kMaxLayers = 8;     // of transparent geoms over one packet
-
-inline void shade_background(const View& view, const Pixels& pixels, std::uint32_t lanes,
-                             Colors& out) {
-  const bool ortho = view.grid.orthographic;
-  const float* r = view.r_wc;
-  const float step = view.grid.dx < 0 ? -view.grid.dx : view.grid.dx;
-  for (int k = 0; k < kLanes; k += kWidth) {
-    const Mask m = mask_of(lanes >> k & kAllLanes);
-    if (!any(m)) continue;
-    const Float zero = splat(0.0f);
-    const Vec3f d{ortho ? zero : load(pixels.x + k), ortho ? zero : load(pixels.y + k),
-                  splat(-1.0f)};
-    const Vec3f w = from_geom(r, d);
-    // MuJoCo turns the sky a quarter around x.
-    Rgb color{zero, zero, zero};
-    if (view.skybox)
-      color =
-          sample_cube(*view.skybox, {w.x, w.z, -w.y}, splat(0.5f * step * view.skybox->width[0]));
-    const Float scale = splat(1.0f / 255);
-    store(out.rgb[0] + k, select(m, color.r * scale, load(out.rgb[0] + k)));
-    store(out.rgb[1] + k, select(m, color.g * scale, load(out.rgb[1] + k)));
-    store(out.rgb[2] + k, select(m, color.b * scale, load(out.rgb[2] + k)));
-  }
-}
 
 inline std::uint32_t hit_lanes(const Hits& hits) {
   std::uint32_t lanes = 0;

@@ -3,6 +3,7 @@
 // of the tile kernels.
 
 #include "mjsense/render/kernel_layers.h"
+#include "mjsense/render/kernel_sky.h"
 #include "mjsense/render/kernel_raster.h"
 
 namespace mjsense {
@@ -305,6 +306,7 @@ inline void render_tile(const View& view, const ImageTargets& targets, int tx, i
         }
         if (lanes != 0xffffu) shade_background(view, tile.pixels[q], ~lanes & 0xffffu, colors);
         if (view.reflection) add_reflection(view, tile.pixels[q], hits, colors);
+        if (view.sky_distance > 0) add_haze(view, tile.pixels[q], hits, colors);
         if (lists.transparent)
           shade_transparent(view, scratch.transparent, lists.transparent, tile.pixels[q], hits,
                             colors);

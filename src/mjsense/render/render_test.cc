@@ -188,6 +188,32 @@ TEST(Texture, CubeFacesAndSkyFollowOpenGL) {
   expect_pixel(s.center({9, 0, 9}, {0, -1, 0}, {0, 0, 1}), faces[0]);
 }
 
+// The sky is a cylinder of radius 0.7 * 50 * 1 m; the camera is 7 m over the floor, so that a ray that
+// falls by 0.2 s a metre meets the floor at 1 / s of that radius.
+TEST(Shading, HazeLiesWhereTheFloorMeetsTheSky) {
+  Studio s(
+      std::string(R"(<statistic extent="1"/><visual><map haze=".3"/><rgba haze="0 0 1 1"/>
+    <headlight ambient="1 1 1" diffuse="0 0 0" specular="0 0 0"/></visual>)") +
+      R"(<asset><texture name="sky" type="skybox" builtin="flat" rgb1="0 1 0" rgb2="0 1 0" width="8" height="48"/></asset>
+    <worldbody><geom type="plane" size="0 0 1" rgba="1 0 0 1"/>
+    <geom size="2" pos="0 23 2.4" rgba="1 1 1 1"/><geom type="box" size="1 1 9" pos="40 0 9"/></worldbody>)");
+  s.paint(0, [](int) { return Pixel{0, 255, 0}; });
+  const auto falling = [&](double slope, double x, double y) {
+    const double fall = 0.2 * slope, l = std::hypot(1, fall);
+    return s.center({0, 0, 7}, {y, -x, 0}, {x * fall / l, y * fall / l, 1 / l}, 1);
+  };
+  const double inside = 255 * (1 - 1.2 / 1.36) * 1.3 / 0.3;
+  expect_pixel(falling(2, 0, -1), {255, 0, 0});
+  expect_pixel(falling(1.45, 0, -1), {255, 0, 0});
+  expect_pixel(falling(1.2, 0, -1), {int(255.5 - inside), 0, int(inside + .5)});
+  expect_pixel(falling(1.0001, 0, -1), {0, 0, 255});
+  const double outside = 255 * (0.5 / 1.15) / (1 - 0.3 / 1.3);
+  expect_pixel(falling(0.5, 0, -1), {0, int(255.5 - outside), int(outside + .5)});
+  expect_pixel(falling(-0.1, 0, -1), {0, 255, 0});
+  expect_pixel(falling(1, 0, 1), {255, 255, 255});  // a ball before the haze
+  expect_pixel(falling(-0.1, 1, 0), {0, 255, 0});   // a box behind the sky
+}
+
 TEST(Shading, TransparentGeomsAreDrawnTwice) {
   Studio s(std::string(kFlat) + R"(<worldbody><geom type="plane" size="5 5 1" rgba="1 1 1 1"/>
     <geom type="box" size=".5 .5 .1" pos="0 0 .5" rgba="0 0 0 .5"/></worldbody>)");

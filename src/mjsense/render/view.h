@@ -88,7 +88,15 @@ struct View {
   bool shadows = false;
   float global_ambient = 0;
   const Texture* skybox = nullptr;
-  float r_wc[9] = {};  // for the skybox
+  float r_wc[9] = {};      // for the skybox
+  float sky_distance = 0;  // m; it hides what is farther away. 0: hides nothing
+  struct Haze {            // over an endless plane
+    float up[3];           // the plane's normal, in C
+    float height = 0;      // of the camera over the plane, m; not positive: no haze
+    float width;           // of sky_distance
+    float rgb[3];
+  } haze;
+  float sky_from = 0;  // planar m: what is nearer is neither hidden nor hazy
   // The first geom that reflects, in sight or not: -1 if there is none. What it shows is the scene as a
   // camera behind it sees it through it, added to its own colour.
   int mirror = -1;  // geom id

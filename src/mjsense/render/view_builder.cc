@@ -48,9 +48,12 @@ const View& ViewBuilder::build(const RayWorld& world, const SharedGeometry& shap
                                const double rotation[9], const PixelGrid& grid) {
   view_.grid = grid;
   order_.clear();
+  const RayGeom* endless = nullptr;  // the first endless plane
   const auto add = [&](const RayGeom& source, int id, std::uint32_t flags, int material) {
     const float* rgba = appearance.rgba().data() + 4 * id;
     if (rgba[3] == 0 || !(flags & options_.groups) || id == left_out_) return;
+    if (!endless && source.type == mjGEOM_PLANE && source.size[0] == 0 && source.size[1] == 0)
+      endless = &source;
     const int index = static_cast<int>(order_.size());
     ViewGeom& g = unsorted_[index];
     g.id = id;
@@ -98,6 +101,7 @@ const View& ViewBuilder::build(const RayWorld& world, const SharedGeometry& shap
   view_.num_geoms = static_cast<int>(order_.size());
   for (int i = 0; i < 9; ++i) view_.r_wc[i] = static_cast<float>(rotation[i]);
   set_lights(world, appearance, position, rotation);
+  if (view_.skybox) set_sky(endless, appearance.sky(), position, rotation);
   if (mirrored_) set_mirror(world, shapes, appearance, position, rotation);
   return view_;
 }
@@ -311,6 +315,36 @@ void ViewBuilder::set_surface(const RayGeom& source, const float* rgba, const Ma
       s.stretch[i] = uniform || size <= 0 ? 1.0f : 1.0f / size;
     }
   }
+}
+
+// The sky's cylinder and the haze are nowhere nearer to the camera than 1 - width of the cylinder's
+// radius; the longest rays go to the corners.
+float ViewBuilder::sky_from(const Sky& sky) const {
+  const PixelGrid& grid = view_.grid;
+  if (grid.bent) return 0;
+  const float x = std::max(std::abs(grid.left), std::abs(grid.left + grid.dx * grid.width));
+  const float y = std::max(std::abs(grid.top), std::abs(grid.top + grid.dy * grid.height));
+  return std::max(1 - sky.haze_width, 0.0f) * sky.distance / std::sqrt(1 + x * x + y * y);
+}
+
+// Seen by parallel rays the sky has no place: it hides nothing, and there is no haze.
+void ViewBuilder::set_sky(const RayGeom* plane, const Sky& sky, const double position[3],
+                          const double rotation[9]) {
+  view_.sky_distance = view_.grid.orthographic ? 0 : sky.distance;
+  view_.sky_from = sky_from(sky);
+  View::Haze& haze = view_.haze;
+  haze.height = 0;
+  if (!plane) return;
+  const double normal[3] = {plane->mat[2], plane->mat[5], plane->mat[8]};
+  double up[3], height = 0;
+  rotate_back(rotation, normal, up);
+  for (int k = 0; k < 3; ++k) {
+    height += (position[k] - plane->pos[k]) * normal[k];
+    haze.up[k] = static_cast<float>(up[k]);
+    haze.rgb[k] = sky.haze_rgb[k];
+  }
+  haze.height = static_cast<float>(height);
+  haze.width = sky.haze_width;
 }
 
 void ViewBuilder::set_lights(const RayWorld& world, const Appearance& appearance,

@@ -56,6 +56,9 @@ class ViewBuilder {
                    ViewGeom& g) const;
   void set_mirror(const RayWorld& world, const SharedGeometry& shapes, const Appearance& appearance,
                   const double position[3], const double rotation[9]);
+  float sky_from(const Sky& sky) const;
+  void set_sky(const RayGeom* plane, const Sky& sky, const double position[3],
+               const double rotation[9]);
   void set_lights(const RayWorld& world, const Appearance& appearance, const double position[3],
                   const double rotation[9]);
 
