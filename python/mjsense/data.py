@@ -139,6 +139,8 @@ class CameraData(SensorData):
     """[B, H, W, 3] unit, outward, camera frame; 0: background."""
     point_cloud: np.ndarray | None = None
     """[B, H, W, 3] m, camera frame; NaN: background."""
+    flow: np.ndarray | None = None
+    """[B, H, W, 2] pixels: where what a pixel sees was in the previous image, minus where it is (u right, v down); NaN: background."""
     intrinsics: np.ndarray | None = None
     """[B, 3, 3] pixels, OpenCV: x right, y down, z forward; pixel centres at +0.5."""
     pose: np.ndarray | None = None

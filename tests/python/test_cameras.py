@@ -33,6 +33,22 @@ def test_fields_and_shapes():
     assert red[0] > 2 * red[1]  # +x is to the right
 
 
+def test_flow_of_a_zoom_in_one_world():
+    camera = mjs.CameraSensorCfg(name="eye", camera_name="room/eye", width=32, height=24, data_types=("flow",))
+    s = scene(camera)
+    sim = mjs.Simulation(s, num_worlds=2)
+    assert (s["eye"].data.flow == 0).all()
+    sim.step()
+    sim.randomize("cam_fovy", 40.0, world_ids=[1])
+    assert s["eye"].specs["flow"].shape == (24, 32, 2) and s["eye"].specs["flow"].unit == "pixels"
+    flow = s["eye"].data.flow
+    assert flow.shape == (2, 24, 32, 2) and flow.dtype == np.float32
+    assert (flow[0] == 0).all()
+    v, u = np.mgrid[:24, :32] + 0.5
+    shrunk = np.tan(np.radians(20)) / np.tan(np.radians(30)) - 1  # in the wider image before, all was nearer to the middle
+    np.testing.assert_allclose(flow[1], np.stack([(u - 16) * shrunk, (v - 12) * shrunk], -1), atol=1e-4)
+
+
 def test_orthographic_rays_are_parallel():
     camera = mjs.CameraSensorCfg(name="map", pos=(0, 0, 3), fovy=4.0, orthographic=True, width=4, height=4, data_types=("depth",))
     s = scene(camera)

@@ -141,6 +141,17 @@ std::array<float, 9> intrinsic_matrix(const PixelGrid& grid) {
   return {1 / grid.dx, 0, -grid.left / grid.dx, 0, -1 / grid.dy, -grid.top / grid.dy, 0, 0, 1};
 }
 
+std::array<double, 2> through_lens(Lens lens, std::span<const double> coefficients, double x,
+                                   double y) {
+  if (lens == Lens::kBrownConrady) {
+    const Point bent = brown_conrady({x, y}, coefficients);
+    return {bent.x, bent.y};
+  }
+  const double r = std::hypot(x, y);
+  const double scale = r > 1e-12 ? fisheye(std::atan(r), coefficients) / r : 1;
+  return {scale * x, scale * y};
+}
+
 std::vector<float> bent_rays(const PixelGrid& grid, Lens lens, std::span<const double> coefficients,
                              const char* place) {
   std::vector<float> rays(static_cast<std::size_t>(grid.width) * grid.height * 2);

@@ -32,6 +32,11 @@ std::array<float, 9> intrinsic_matrix(const PixelGrid& grid);
 
 enum class Lens { kBrownConrady, kFisheye };
 
+// Where such a lens puts the image of the direction (x, y, 1), x right, y down, z forward: (x', y')
+// of CameraSensorCfg's formulas.
+std::array<double, 2> through_lens(Lens lens, std::span<const double> coefficients, double x,
+                                   double y);
+
 // [H, W, 2] for PixelGrid::bent: where each pixel looks through a lens with these coefficients
 // (CameraSensorCfg says how they are meant). Throws ValueError, beginning with `place`, if the lens
 // cannot be inverted over the image or sees 180 degrees.

@@ -11,6 +11,9 @@
 //                                       where nothing is
 //   normals       float32 [B, H, W, 3]  unit, outward, camera frame; 0 where nothing is
 //   point_cloud   float32 [B, H, W, 3]  m, camera frame; NaN where nothing is
+//   flow          float32 [B, H, W, 2]  pixels, u right, v down: where the point that a pixel sees was
+//                                       in the previous image, minus where it is (optical_flow.h); NaN
+//                                       where nothing is
 //
 // and always
 //
@@ -67,8 +70,9 @@ struct CameraSensorCfg : SensorCfg {
   // Of a wrapped camera it is this sensor's alone, as is `orthographic`: others that look through
   // it, and the model, keep theirs.
   std::optional<double> fovy;
-  int width = 160, height = 120;               // pixels; the model's own resolution is not used
-  std::vector<std::string> data_types{"rgb"};  // rgb depth segmentation normals point_cloud
+  int width = 160, height = 120;  // pixels; the model's own resolution is not used
+  // Of rgb depth segmentation normals point_cloud flow.
+  std::vector<std::string> data_types{"rgb"};
   bool use_textures = true;
   bool use_shadows = false;
   std::vector<int> enabled_geom_groups{0, 1, 2};

@@ -74,12 +74,18 @@ void CameraSensor::initialize(const SensorInit& init) {
 
   PixelGrid grid = grid_in(model_);
   check_grid(grid);
+  std::optional<LensModel> lens;
   if (cfg_.distortion.model != "none") {
-    const Lens lens = cfg_.distortion.model == "fisheye" ? Lens::kFisheye : Lens::kBrownConrady;
-    bent_ = bent_rays(grid, lens, cfg_.distortion.coefficients, place.c_str());
+    lens = {cfg_.distortion.model == "fisheye" ? Lens::kFisheye : Lens::kBrownConrady,
+            cfg_.distortion.coefficients};
+    bent_ = bent_rays(grid, lens->lens, lens->coefficients, place.c_str());
     grid.bent = bent_.data();
   }
   for (PerWorld& w : worlds_) w.grid = grid;
+  optical_flow_.reset();
+  if (wants("flow"))
+    optical_flow_ = std::make_unique<OpticalFlow>(model_, camera_, lens, cfg_.update_period > 0,
+                                                  grid, init.num_worlds, init.threads);
 
   clean_.clear();
   if (cfg_.depth_noise != "none")
@@ -151,7 +157,7 @@ void CameraSensor::declare_fields(int num_worlds) {
     return &add_field(field, spec, num_worlds);
   };
   constexpr double inf = std::numeric_limits<double>::infinity();
-  rgb_ = depth_ = segmentation_ = normals_ = points_ = nullptr;
+  rgb_ = depth_ = segmentation_ = normals_ = points_ = flow_ = nullptr;
   if (wants("rgb"))
     rgb_ = add("rgb", DType::kUint8, {h, w, 3}, "", 0, 255, Storage::kRgbVideo,
                "Colour image, row 0 at the top.");
@@ -171,6 +177,10 @@ void CameraSensor::declare_fields(int num_worlds) {
     points_ = add(
         "point_cloud", DType::kFloat32, {h, w, 3}, "m", -inf, inf, Storage::kArray,
         "Point in the camera frame (x right, y up, looking along -z); NaN where nothing is seen.");
+  if (wants("flow"))
+    flow_ = add("flow", DType::kFloat32, {h, w, 2}, "pixels", -inf, inf, Storage::kArray,
+                "Where what a pixel sees was in the previous image, minus where it is (u right, v "
+                "down); NaN where nothing rigid is seen.");
   intrinsics_ =
       add("intrinsics", DType::kFloat32, {3, 3}, "pixels", -inf, inf, Storage::kArray,
           "K: image point (u right, v down) of a direction (x right, y down, z forward).");
@@ -190,6 +200,10 @@ bool CameraSensor::is_due(const World& world, std::int64_t& image) const {
   return due;
 }
 
+void CameraSensor::reset(const World& world) {
+  if (optical_flow_) optical_flow_->reset(world.id);
+}
+
 void CameraSensor::compute(const World& world) {
   PerWorld& w = worlds_[world.id];
   w.due = is_due(world, w.image);
@@ -201,6 +215,7 @@ void CameraSensor::compute(const World& world) {
   } else {
     w.appearance.copy(m);
   }
+  if (optical_flow_) optical_flow_->take(world, w.grid);
   w.rng = world.rng(stream_of(name()));
   std::ranges::copy(intrinsic_matrix(w.grid), intrinsics_->data.row<float>(world.id).begin());
   const double* p = world.data->cam_xpos + 3 * camera_;
@@ -251,10 +266,25 @@ void CameraSensor::add_noise(const CastContext& context) {
   });
 }
 
+void CameraSensor::render_rows(const View& view, int world, int first, int last, int thread) {
+  ImageTargets image = targets(world);
+  if (optical_flow_) optical_flow_->complete(image, thread);
+  workspace_->render(view, image, first, last, workspace_->memory[thread].scratch());
+  if (optical_flow_)
+    optical_flow_->write(world, image, first * kTileSize, std::min(last * kTileSize, cfg_.height),
+                         flow_->data.row<float>(world).data());
+}
+
 void CameraSensor::render_due(const CastContext& context) {
   const RayScene& rays = *context.rays;
   if (gl_) {
-    for (int id : due_) gl_->render(id, rays.world(id), targets(id));
+    for (int id : due_) {
+      ImageTargets image = targets(id);
+      if (optical_flow_) optical_flow_->complete(image, 0);
+      gl_->render(id, rays.world(id), image);
+      if (optical_flow_)
+        optical_flow_->write(id, image, 0, cfg_.height, flow_->data.row<float>(id).data());
+    }
     return;
   }
   const int count = static_cast<int>(due_.size());
@@ -266,15 +296,15 @@ void CameraSensor::render_due(const CastContext& context) {
   if (threads == 1 || bands == 1) {
     context.pool.run(count, [&](int item, int thread) {
       const View& view = build_view(rays, due_[item], work.builders[thread]);
-      work.render(view, targets(due_[item]), 0, tile_rows, work.memory[thread].scratch());
+      render_rows(view, due_[item], 0, tile_rows, thread);
     });
   } else {
     context.pool.run(count,
                      [&](int item, int) { build_view(rays, due_[item], work.builders[item]); });
     context.pool.run(count * bands, [&](int item, int thread) {
       const int image = item / bands, band = item % bands;
-      work.render(work.builders[image].view(), targets(due_[image]), band * tile_rows / bands,
-                  (band + 1) * tile_rows / bands, work.memory[thread].scratch());
+      render_rows(work.builders[image].view(), due_[image], band * tile_rows / bands,
+                  (band + 1) * tile_rows / bands, thread);
     });
   }
 }

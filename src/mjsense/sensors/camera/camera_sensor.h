@@ -10,6 +10,7 @@
 #include "mjsense/render/look.h"
 #include "mjsense/render/view_builder.h"
 #include "mjsense/sensors/camera/camera.h"
+#include "mjsense/sensors/camera/optical_flow.h"
 
 namespace mjsense {
 
@@ -32,6 +33,7 @@ class CameraSensor final : public Sensor {
   void initialize(const SensorInit& init) override;
   void compute(const World& world) override;
   void cast(const CastContext& context) override;
+  void reset(const World& world) override;
   bool debug_vis() const override { return cfg_.debug_vis; }
   void draw(const World& world, DebugShapes& shapes) override;
 
@@ -55,6 +57,8 @@ class CameraSensor final : public Sensor {
   void check_grid(const PixelGrid& grid) const;
   bool is_due(const World& world, std::int64_t& image) const;
   ImageTargets targets(int world);
+  // Rows of tiles [first, last) of an image and what is computed from them.
+  void render_rows(const View& view, int world, int first, int last, int thread);
   const View& build_view(const RayScene& rays, int world, ViewBuilder& builder) const;
 
   CameraSensorCfg cfg_;
@@ -68,8 +72,9 @@ class CameraSensor final : public Sensor {
   std::unique_ptr<Look> look_;
   std::unique_ptr<GlRenderer> gl_;  // renderer "opengl"
   std::unique_ptr<Workspace> workspace_;
+  std::unique_ptr<OpticalFlow> optical_flow_;  // null: not wanted
   Field *rgb_ = nullptr, *depth_ = nullptr, *segmentation_ = nullptr, *normals_ = nullptr,
-        *points_ = nullptr;
+        *points_ = nullptr, *flow_ = nullptr;
   Field *intrinsics_ = nullptr, *pose_ = nullptr;
 };
 

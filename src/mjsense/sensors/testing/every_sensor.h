@@ -101,8 +101,18 @@ inline std::vector<std::shared_ptr<const SensorCfg>> every_sensor() {
                               c.camera_name = "robot/eye";
                               c.width = 48;
                               c.height = 32;
-                              c.data_types = {"rgb", "depth", "segmentation"};
+                              c.data_types = {"rgb", "depth", "segmentation", "flow"};
                               c.use_shadows = true;
+                            }),
+      make<CameraSensorCfg>("flow",
+                            [](auto& c) {
+                              c.camera_name = "robot/eye";
+                              c.width = 40;
+                              c.height = 40;
+                              c.data_types = {"flow"};
+                              c.intrinsics = CameraIntrinsics{20, 20, 20, 20};
+                              c.distortion = {"fisheye", {0.01, 0, 0, 0}};
+                              c.update_period = 0.01;
                             }),
   };
 }
