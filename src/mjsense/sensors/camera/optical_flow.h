@@ -39,8 +39,8 @@ class OpticalFlow {
   // Buffers of this thread for what write() needs and `targets` lacks.
   void complete(ImageTargets& targets, int thread);
   // Pixel rows [first, last) of flow [H, W, 2]: (u, v) of the point in the previous image minus
-  // (u, v) of the pixel, in pixels, u right, v down. NaN where nothing or a flex is seen, and where
-  // the point was behind the camera or farther out than the lens has an image.
+  // (u, v) of the pixel, in pixels, u right, v down. NaN where nothing rigid is seen, and where the
+  // point was behind the camera or farther out than the lens has an image.
   void write(int world, const ImageTargets& image, int first, int last, float* flow) const;
 
  private:
