@@ -37,6 +37,15 @@ def test_table_of_angles(mjsense, room):
     np.save(mjsense.folder / "ahead.npy", np.array([[0.0, 0.0], [np.pi, 0.0]], np.float32))
     done = mjsense("scan", room, "--frame", "site:head", "--table", "ahead.npy", "--out", "cloud.ply")
     assert "1 of 2 rays returned" in done.stdout
+    done = mjsense("scan", room, "--frame", "site:head", "--table", "ahead.npy", "--rays", "1", "--out", "cloud.ply")
+    assert "1 of 1 rays returned" in done.stdout
+    done = mjsense("scan", room, "--frame", "site:head", "--table", "ahead.npy", "--channels", "4", "--out", "cloud.ply", rc=2)
+    assert "--table excludes --channels" in done.stderr
+
+
+def test_negative_steps(mjsense, room):
+    done = mjsense("scan", room, "--frame", "site:head", "--out", "cloud.ply", "--steps", "-5", rc=2)
+    assert "Value -5 not in range" in done.stderr and len(done.stderr) < 200
 
 
 @pytest.mark.parametrize("frame, out, message", [

@@ -80,6 +80,8 @@ CLI::App& add_record(CLI::App& program, RecordOptions& options) {
   return app;
 }
 
+constexpr int kMostSteps = 1'000'000'000;
+
 CLI::App& add_sensors(CLI::App& program, SensorsOptions& options) {
   CLI::App& app = *program.add_subcommand("sensors", "what is measured, and what it costs");
   app.add_option("what", options.what, "an MJCF file or the name of a task")
@@ -88,7 +90,7 @@ CLI::App& add_sensors(CLI::App& program, SensorsOptions& options) {
   add_rollout_options(app, options.rollout);
   app.add_option("--steps", options.steps, "to measure the cost over; 0: do not measure")
       ->capture_default_str()
-      ->check(CLI::NonNegativeNumber);
+      ->check(CLI::Range(0, kMostSteps));
   app.add_flag("--json", options.json, "as JSON");
   return app;
 }
@@ -103,19 +105,24 @@ CLI::App& add_scan(CLI::App& program, ScanOptions& options) {
       ->required()
       ->type_name("TYPE:NAME");
   app.add_option("--out", options.out, "the file, .ply or .pcd")->required()->type_name("FILE");
-  app.add_option("--channels", options.spinning.channels, "lasers")->capture_default_str();
-  app.add_option("--samples", options.spinning.samples, "firings a turn")->capture_default_str();
-  app.add_option("--low", options.spinning.elevation_min_deg, "degrees, the lowest laser")
-      ->capture_default_str();
-  app.add_option("--high", options.spinning.elevation_max_deg, "degrees, the highest laser")
-      ->capture_default_str();
-  app.add_option("--table", options.table.file, "azimuths and elevations in rad instead")
-      ->check(CLI::ExistingFile)
-      ->type_name("FILE.npy");
+  CLI::Option* table = app.add_option("--table", options.table.file,
+                                      "azimuths and elevations in rad instead of a spinning scan")
+                           ->check(CLI::ExistingFile)
+                           ->type_name("FILE.npy");
+  app.add_option("--rays", options.table.rays_per_scan, "rows of the table to cast; 0: all")
+      ->capture_default_str()
+      ->needs(table);
+  const auto add_spinning = [&](const char* name, auto& value, const char* help) {
+    app.add_option(name, value, help)->capture_default_str()->excludes(table);
+  };
+  add_spinning("--channels", options.spinning.channels, "lasers");
+  add_spinning("--samples", options.spinning.samples, "firings a turn");
+  add_spinning("--low", options.spinning.elevation_min_deg, "degrees, the lowest laser");
+  add_spinning("--high", options.spinning.elevation_max_deg, "degrees, the highest laser");
   app.add_option("--max-distance", options.max_distance, "m")->capture_default_str();
   app.add_option("--steps", options.steps, "physics steps before the scan")
       ->capture_default_str()
-      ->check(CLI::NonNegativeNumber);
+      ->check(CLI::Range(0, kMostSteps));
   app.add_flag("--world", options.world, "points in the world, not in the lidar's frame");
   return app;
 }

@@ -9,7 +9,9 @@ namespace mjsense {
 std::unique_ptr<GlRenderer> make_gl_renderer(const mjModel*, const GlRendererCfg&,
                                              const std::string& place) {
   throw RuntimeError(fmt::format(
-      "{}: renderer 'opengl' is not in this build (configure with -DMJSENSE_OPENGL=ON)", place));
+      "{}: renderer 'opengl' is not in this build: install libegl-dev and configure with "
+      "-DMJSENSE_OPENGL=ON, or use renderer 'rays'",
+      place));
 }
 
 }  // namespace mjsense
