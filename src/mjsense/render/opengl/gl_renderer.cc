@@ -156,15 +156,14 @@ class MujocoGl final : public GlRenderer {
       mjr_render(all, &scene_, &context_);
       mjr_readPixels(targets.rgb, nullptr, all, &context_);
     }
-    if (targets.depth) {  // apart, because the sky would be part of it
+    // Apart, because the sky would be part of depth; and by ids, which MuJoCo draws without
+    // averaging samples: both are those of pixel centres.
+    if (targets.depth || targets.segmentation) {
       scene_.flags[mjRND_SHADOW] = scene_.flags[mjRND_SKYBOX] = 0;
-      mjr_render(all, &scene_, &context_);
-      mjr_readPixels(nullptr, targets.depth, all, &context_);
-    }
-    if (targets.segmentation) {
       scene_.flags[mjRND_SEGMENT] = scene_.flags[mjRND_IDCOLOR] = 1;
       mjr_render(all, &scene_, &context_);
-      mjr_readPixels(colors_.data(), nullptr, all, &context_);
+      mjr_readPixels(targets.segmentation ? colors_.data() : nullptr, targets.depth, all,
+                     &context_);
       scene_.flags[mjRND_SEGMENT] = scene_.flags[mjRND_IDCOLOR] = 0;
     }
     egl_.release();

@@ -36,10 +36,11 @@ TEST(CameraAgainstOpenGL, DepthIdsAndColoursAgree) {
   EntityCfg entity;
   entity.model.xml = kScene;
   cfg.entities.emplace_back("w", entity);
-  for (const char* renderer : {"rays", "opengl"}) {
+  for (const char* name : {"rays", "opengl", "opengl smooth"}) {
     auto camera = std::make_shared<CameraSensorCfg>();
-    camera->name = renderer;
-    camera->renderer = renderer;
+    camera->name = name;
+    camera->renderer = std::string(name) == "rays" ? "rays" : "opengl";
+    camera->samples = std::string(name) == "opengl smooth" ? 4 : 1;
     camera->camera_name = "w/c";
     camera->width = kWidth;
     camera->height = kHeight;
@@ -79,6 +80,12 @@ TEST(CameraAgainstOpenGL, DepthIdsAndColoursAgree) {
   const double psnr = 10 * std::log10(255.0 * 255.0 * 3 * kCount / square);
   EXPECT_GT(psnr, 28);
   RecordProperty("psnr", std::to_string(psnr));
+  // Several samples smooth colours, and leave depth and ids those of pixel centres.
+  Sensor& smooth = scene->sensor("opengl smooth");
+  sim->refresh(smooth);
+  EXPECT_FALSE(std::ranges::equal(gl_rgb, smooth.field("rgb").data.row<std::uint8_t>(0)));
+  EXPECT_TRUE(std::ranges::equal(gl_depth, smooth.field("depth").data.row<float>(0)));
+  EXPECT_TRUE(std::ranges::equal(gl_ids, smooth.field("segmentation").data.row<std::int32_t>(0)));
 }
 
 }  // namespace
