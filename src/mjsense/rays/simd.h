@@ -68,6 +68,14 @@ inline Float floor(Float a) {
   return _mm512_roundscale_ps(a.v, _MM_FROUND_TO_NEG_INF | _MM_FROUND_NO_EXC);
 }
 inline Float gather(const float* p, Int i) { return _mm512_i32gather_ps(i.v, p, 4); }
+// p[i] and p[i + 1].
+inline void gather_pairs(const std::uint32_t* p, Int i, Int& first, Int& second) {
+  const __m512i low = _mm512_i32gather_epi64(_mm512_castsi512_si256(i.v), p, 4);
+  const __m512i high = _mm512_i32gather_epi64(_mm512_extracti64x4_epi64(i.v, 1), p, 4);
+  const __m512i even = _mm512_setr_epi32(0, 2, 4, 6, 8, 10, 12, 14, 16, 18, 20, 22, 24, 26, 28, 30);
+  first = {_mm512_permutex2var_epi32(low, even, high)};
+  second = {_mm512_permutex2var_epi32(low, _mm512_add_epi32(even, _mm512_set1_epi32(1)), high)};
+}
 inline float lane_min(Float a) { return _mm512_reduce_min_ps(a.v); }
 
 #elif defined(__AVX2__)
@@ -128,6 +136,18 @@ inline Int truncate(Float a) { return {_mm256_cvttps_epi32(a.v)}; }
 inline Float to_float(Int a) { return _mm256_cvtepi32_ps(a.v); }
 inline Float floor(Float a) { return _mm256_floor_ps(a.v); }
 inline Float gather(const float* p, Int i) { return _mm256_i32gather_ps(p, i.v, 4); }
+inline void gather_pairs(const std::uint32_t* p, Int i, Int& first, Int& second) {
+  const auto* pairs = reinterpret_cast<const long long*>(p);
+  const __m256 low =
+      _mm256_castsi256_ps(_mm256_i32gather_epi64(pairs, _mm256_castsi256_si128(i.v), 4));
+  const __m256 high =
+      _mm256_castsi256_ps(_mm256_i32gather_epi64(pairs, _mm256_extracti128_si256(i.v, 1), 4));
+  const auto in_order = [](__m256 x) {  // lanes 0 1 4 5 2 3 6 7
+    return _mm256_permute4x64_epi64(_mm256_castps_si256(x), _MM_SHUFFLE(3, 1, 2, 0));
+  };
+  first = {in_order(_mm256_shuffle_ps(low, high, _MM_SHUFFLE(2, 0, 2, 0)))};
+  second = {in_order(_mm256_shuffle_ps(low, high, _MM_SHUFFLE(3, 1, 3, 1)))};
+}
 inline float lane_min(Float a) {
   __m128 m = _mm_min_ps(_mm256_castps256_ps128(a.v), _mm256_extractf128_ps(a.v, 1));
   m = _mm_min_ps(m, _mm_movehl_ps(m, m));
@@ -205,6 +225,12 @@ inline Float floor(Float a) {
 }
 inline Float gather(const float* p, Int i) {
   return Float4{p[i.v[0]], p[i.v[1]], p[i.v[2]], p[i.v[3]]};
+}
+inline void gather_pairs(const std::uint32_t* p, Int i, Int& first, Int& second) {
+  for (int k = 0; k < kWidth; ++k) {
+    first.v[k] = static_cast<int>(p[i.v[k]]);
+    second.v[k] = static_cast<int>(p[i.v[k] + 1]);
+  }
 }
 inline float lane_min(Float a) {
   const float x = a.v[0] < a.v[1] ? a.v[0] : a.v[1], y = a.v[2] < a.v[3] ? a.v[2] : a.v[3];

@@ -106,7 +106,7 @@ inline void map_lanes(const ViewGeom& g, const Hits& hits, std::uint32_t lanes,
   for (int i = 0; i < kLanes; ++i) {
     out.u[i] = out.v[i] = out.rate_u[i] = out.rate_v[i] = 0;
     if (!(lanes >> i & 1u)) continue;
-    if (g.surface.mapped && hits.prim[i] >= 0) {
+    if (g.surface.mapped) {
       const float* uv = g.mesh->uvs + 6 * hits.prim[i];
       const float b1 = hits.u[i], b2 = hits.v[i], b0 = 1 - b1 - b2;
       out.u[i] = b0 * uv[0] + b1 * uv[2] + b2 * uv[4];
@@ -115,7 +115,7 @@ inline void map_lanes(const ViewGeom& g, const Hits& hits, std::uint32_t lanes,
     } else {
       const float p[3] = {local[0][i], local[1][i], local[2][i]};
       const float n[3] = {normal[0][i], normal[1][i], normal[2][i]};
-      primitive_uv(g, p, n, out.u[i], out.v[i], out.rate_u[i], out.rate_v[i]);
+      curved_uv(g, p, n, out.u[i], out.v[i], out.rate_u[i], out.rate_v[i]);
     }
   }
 }
@@ -127,9 +127,11 @@ inline void texture_lanes(const View& view, const ViewGeom& g, const Pixels& pix
   const Surface& s = g.surface;
   const Texture& texture = *s.texture;
   const float width = texture.width[0], height = texture.height[0];
-  const bool flat = g.type == mjGEOM_PLANE;
+  const bool plane = g.type == mjGEOM_PLANE;
+  const bool curved = g.type == mjGEOM_SPHERE || g.type == mjGEOM_ELLIPSOID ||
+                      g.type == mjGEOM_CAPSULE || g.type == mjGEOM_CYLINDER;
   Mapped mapped;
-  if (!texture.cube && !flat) map_lanes(g, hits, lanes, local, normal, mapped);
+  if (!texture.cube && (curved || s.mapped)) map_lanes(g, hits, lanes, local, normal, mapped);
   for (int k = 0; k < kLanes; k += kWidth) {
     const Mask m = mask_of(lanes >> k & kAllLanes);
     if (!any(m)) continue;
@@ -142,10 +144,10 @@ inline void texture_lanes(const View& view, const ViewGeom& g, const Pixels& pix
       const Vec3f d{q.x * s.stretch[0], q.y * s.stretch[1], q.z * s.stretch[2]};
       const Float most = max(max(abs(d.x), max(abs(d.y), abs(d.z))), splat(kTiny));
       const float stretch = s.stretch[0] > s.stretch[1] ? s.stretch[0] : s.stretch[1];
-      color = sample_cube(texture, d, length * splat(0.5f * width * stretch) / most);
+      color = sample_cube(texture, m, d, length * splat(0.5f * width * stretch) / most);
     } else {
       Float u, v, footprint;
-      if (flat) {
+      if (plane) {
         const float sx = g.size[0] > 0 ? 0.5f / g.size[0] : 0.5f;
         const float sy = g.size[1] > 0 ? 0.5f / g.size[1] : 0.5f;
         u = fma(q.x, splat(sx), splat(g.size[0] > 0 ? 0.5f : 0.0f));
@@ -155,12 +157,17 @@ inline void texture_lanes(const View& view, const ViewGeom& g, const Pixels& pix
         const auto texels = [&](Vec3f w) { return max(abs(ku * w.x), abs(kv * w.y)); };
         footprint = max(texels(steps.x), texels(steps.y));
       } else {
-        u = load(mapped.u + k);
-        v = load(mapped.v + k);
-        footprint = length * max(load(mapped.rate_u + k) * splat(s.repeat[0] * width),
-                                 load(mapped.rate_v + k) * splat(s.repeat[1] * height));
+        const Coordinates at =
+            curved || s.mapped
+                ? Coordinates{load(mapped.u + k), load(mapped.v + k), load(mapped.rate_u + k),
+                              load(mapped.rate_v + k)}
+                : flat_uv(g, q, {load(normal[0] + k), load(normal[1] + k), load(normal[2] + k)});
+        u = at.u;
+        v = at.v;
+        footprint = length * max(at.rate_u * splat(s.repeat[0] * width),
+                                 at.rate_v * splat(s.repeat[1] * height));
       }
-      color = sample(texture, int_of(0), fma(u, splat(s.repeat[0]), splat(s.shift[0])),
+      color = sample(texture, m, int_of(0), fma(u, splat(s.repeat[0]), splat(s.shift[0])),
                      fma(v, splat(s.repeat[1]), splat(s.shift[1])), footprint);
     }
     const Float scale = splat(1.0f / 255);

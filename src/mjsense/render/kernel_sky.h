@@ -22,8 +22,8 @@ inline void shade_background(const View& view, const Pixels& pixels, std::uint32
     // MuJoCo turns the sky a quarter around x.
     Rgb color{zero, zero, zero};
     if (view.skybox)
-      color =
-          sample_cube(*view.skybox, {w.x, w.z, -w.y}, splat(0.5f * step * view.skybox->width[0]));
+      color = sample_cube(*view.skybox, m, {w.x, w.z, -w.y},
+                          splat(0.5f * step * view.skybox->width[0]));
     const Float scale = splat(1.0f / 255);
     store(out.rgb[0] + k, select(m, color.r * scale, load(out.rgb[0] + k)));
     store(out.rgb[1] + k, select(m, color.g * scale, load(out.rgb[1] + k)));

@@ -36,36 +36,60 @@ inline Float rough_log2(Float x) {
   return to_float(shift_right(b, 23)) + fma(splat(0.34f) * m, splat(1.0f) - m, m - splat(127.0f));
 }
 
+// The size of a level and where it begins, lane by lane.
+struct Level {
+  Float width, height;
+  Int offset;
+
+  Level(const Texture& texture, Float level) {
+    const float first = lane_min(level);
+    if (first == lane_max(level)) {  // most packets need one only
+      const int i = static_cast<int>(first);
+      width = splat(texture.width[i]);
+      height = splat(texture.height[i]);
+      offset = int_of(texture.offset[i]);
+      return;
+    }
+    const Int i = truncate(level);
+    width = gather(texture.width, i);
+    height = gather(texture.height, i);
+    offset = gather_int(texture.offset, i);
+  }
+};
+
 // One level of the pyramid at (s, t) in [0, 1].
-inline Rgb bilinear(const Texture& texture, Int level, Int face, Float s, Float t) {
+inline Rgb bilinear(const Texture& texture, const Level& level, Int face, Float s, Float t) {
   const Float zero = splat(0.0f), one = splat(1.0f), half = splat(0.5f);
-  const Float w = gather(texture.width, level), h = gather(texture.height, level);
+  const Float w = level.width, h = level.height;
   const Float u = fma(s, w, -half), v = fma(t, h, -half);
   Float x0 = floor(u), y0 = floor(v);
-  const Float fx = u - x0, fy = v - y0;
-  Float x1 = x0 + one, y1 = y0 + one;
+  Float fx = u - x0;
+  const Float fy = v - y0;
+  Float y1 = y0 + one;
   if (texture.cube) {
+    fx = select(x0 < zero, zero, fx);
     x0 = max(x0, zero);
     y0 = max(y0, zero);
-    x1 = min(x1, w - one);
     y1 = min(y1, h - one);
   } else {
     x0 = select(x0 < zero, x0 + w, x0);
     y0 = select(y0 < zero, y0 + h, y0);
-    x1 = select(x1 < w, x1, x1 - w);
     y1 = select(y1 < h, y1, y1 - h);
   }
-  const Int width = truncate(w);
-  const Int base = gather_int(texture.offset, level) + face * (width * truncate(h));
-  const Int row0 = base + truncate(y0) * width, row1 = base + truncate(y1) * width;
-  const Int c0 = truncate(x0), c1 = truncate(x1);
-  const auto texel = [&](Int at) { return unpack(gather_int(texture.texels, at)); };
-  return mix(mix(texel(row0 + c0), texel(row0 + c1), fx),
-             mix(texel(row1 + c0), texel(row1 + c1), fx), fy);
+  const Int stride = truncate(w) + int_of(1);
+  const Int base = level.offset + face * (stride * truncate(h)) + truncate(x0);
+  const auto row = [&](Float y) {
+    Int left, right;
+    gather_pairs(texture.texels, base + truncate(y) * stride, left, right);
+    return mix(unpack(left), unpack(right), fx);
+  };
+  return mix(row(y0), row(y1), fy);
 }
 
-// 0..255. (s, t): once around in [0, 1); `footprint`: size of a pixel in texels of level 0.
-inline Rgb sample(const Texture& texture, Int face, Float s, Float t, Float footprint) {
+// 0..255 of the lanes in `wanted`. (s, t): once around in [0, 1); `footprint`: size of a pixel in
+// texels of level 0.
+inline Rgb sample(const Texture& texture, Mask wanted, Int face, Float s, Float t,
+                  Float footprint) {
   const Float zero = splat(0.0f);
   // What is no number, or endlessly far, must still be an index.
   s = select(abs(s) < splat(1e6f), s, zero);
@@ -74,20 +98,21 @@ inline Rgb sample(const Texture& texture, Int face, Float s, Float t, Float foot
     s = s - floor(s);
     t = t - floor(t);
   }
-  const float last = static_cast<float>(texture.levels - 1);
+  const Float last = splat(static_cast<float>(texture.levels - 1));
   const Float size = min(max(footprint, splat(1.0f)), splat(65536.0f));
-  const Float lod = min(max(rough_log2(size), zero), splat(last));
+  Float lod = min(max(rough_log2(size), zero), last);
+  lod = select(wanted, lod, splat(lane_min(select(wanted, lod, last))));
   // Two levels are mixed only around the middle between them, as Mesa and GPUs do.
   const Float moved = lod + splat(0.25f), level = floor(moved);
   const Float between = max(fma(splat(2.0f), moved - level, splat(-1.0f)), zero);
-  const Rgb near = bilinear(texture, truncate(min(level, splat(last))), face, s, t);
+  const Rgb near = bilinear(texture, Level(texture, min(level, last)), face, s, t);
   if (!any(between > splat(0.01f))) return near;
-  const Int coarser = truncate(min(level + splat(1.0f), splat(last)));
+  const Level coarser(texture, min(level + splat(1.0f), last));
   return mix(near, bilinear(texture, coarser, face, s, t), between);
 }
 
 // OpenGL's cube map: which face a direction meets, and where on it.
-inline Rgb sample_cube(const Texture& texture, Vec3f d, Float footprint) {
+inline Rgb sample_cube(const Texture& texture, Mask wanted, Vec3f d, Float footprint) {
   const Float zero = splat(0.0f), half = splat(0.5f);
   const Float ax = abs(d.x), ay = abs(d.y), az = abs(d.z);
   const Mask is_x = (ax >= ay) & (ax >= az), not_z = is_x | (ay >= az);
@@ -98,39 +123,38 @@ inline Rgb sample_cube(const Texture& texture, Vec3f d, Float footprint) {
   const Int face =
       select(is_x, select(nx, int_of(1), int_of(0)),
              select(not_z, select(ny, int_of(3), int_of(2)), select(nz, int_of(5), int_of(4))));
-  return sample(texture, face, fma(half, s / m, half), fma(half, t / m, half), footprint);
+  return sample(texture, wanted, face, fma(half, s / m, half), fma(half, t / m, half), footprint);
 }
 
 constexpr float kPi = 3.14159265358979f;
 
-// Coordinates of MuJoCo's primitives: p on the surface, geom frame. `per_meter`: how fast they
-// change, at most.
-inline void primitive_uv(const ViewGeom& g, const float* p, const float* n, float& u, float& v,
-                         float& per_meter_u, float& per_meter_v) {
+// Texture coordinates of a packet. `rate_u`, `rate_v`: how fast they change at most, per metre.
+struct Coordinates {
+  Float u, v, rate_u, rate_v;
+};
+
+// Of shapes on which they are linear: boxes, and seen from above meshes without coordinates of their
+// own and height fields. p on the surface, n its normal; geom frame.
+inline Coordinates flat_uv(const ViewGeom& g, Vec3f p, Vec3f n) {
   const float* s = g.size;
-  switch (g.type) {
-    case mjGEOM_HFIELD:
-    case mjGEOM_SDF:
-    case mjGEOM_MESH: {  // without coordinates of its own: from above
-      const float sx = s[0] > 0 ? s[0] : 1, sy = s[1] > 0 ? s[1] : 1;
-      u = 0.5f * p[0] / sx;
-      v = -0.5f * p[1] / sy;
-      per_meter_u = 0.5f / sx;
-      per_meter_v = 0.5f / sy;
-      return;
-    }
-    case mjGEOM_BOX: {
-      const float nx = n[0] < 0 ? -n[0] : n[0], nz = n[2] < 0 ? -n[2] : n[2];
-      const int a = nx > 0.5f ? 1 : 0, b = nz > 0.5f ? 1 : 2;
-      u = 0.5f * (p[a] / s[a] + 1);
-      v = 0.5f * (1 - p[b] / s[b]);
-      per_meter_u = 0.5f / s[a];
-      per_meter_v = 0.5f / s[b];
-      return;
-    }
-    default:
-      break;
+  const Float half = splat(0.5f);
+  if (g.type != mjGEOM_BOX) {
+    const float kx = 0.5f / (s[0] > 0 ? s[0] : 1), ky = 0.5f / (s[1] > 0 ? s[1] : 1);
+    return {p.x * splat(kx), p.y * splat(-ky), splat(kx), splat(ky)};
   }
+  const Mask x_face = half < abs(n.x), z_face = half < abs(n.z);
+  const float k[3] = {0.5f / s[0], 0.5f / s[1], 0.5f / s[2]};
+  const Float kx = select(x_face, splat(k[1]), splat(k[0]));
+  const Float ky = select(z_face, splat(k[1]), splat(k[2]));
+  return {fma(select(x_face, p.y, p.x), kx, half), fma(select(z_face, p.y, p.z), -ky, half), kx,
+          ky};
+}
+
+// Coordinates of MuJoCo's curved primitives: p on the surface, geom frame. `per_meter`: how fast they
+// change, at most.
+inline void curved_uv(const ViewGeom& g, const float* p, const float* n, float& u, float& v,
+                      float& per_meter_u, float& per_meter_v) {
+  const float* s = g.size;
   const bool ball = g.type == mjGEOM_SPHERE || g.type == mjGEOM_ELLIPSOID;
   const float sx = s[0], sy = g.type == mjGEOM_ELLIPSOID ? s[1] : s[0];
   const float x = p[0] / sx, y = p[1] / sy;

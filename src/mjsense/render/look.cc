@@ -1,6 +1,7 @@
 #include "mjsense/render/look.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 
 #include "mjsense/rays/flex_surface.h"
@@ -12,10 +13,15 @@ namespace {
 // shades it flat.
 constexpr float kCrease = 0.8f;
 
-std::uint8_t linear_from_srgb(std::uint8_t value) {
-  const double v = value / 255.0;
-  const double linear = v <= 0.04045 ? v / 12.92 : std::pow((v + 0.055) / 1.055, 2.4);
-  return static_cast<std::uint8_t>(std::lround(255.0 * linear));
+// By sRGB value.
+std::array<std::uint8_t, 256> linear_values() {
+  std::array<std::uint8_t, 256> table;
+  for (int i = 0; i < 256; ++i) {
+    const double v = i / 255.0;
+    const double linear = v <= 0.04045 ? v / 12.92 : std::pow((v + 0.055) / 1.055, 2.4);
+    table[i] = static_cast<std::uint8_t>(std::lround(255.0 * linear));
+  }
+  return table;
 }
 
 std::uint32_t pack(const std::uint32_t (&sum)[4], std::uint32_t n) {
@@ -76,16 +82,18 @@ void Look::add_texture(const mjModel* model, int id) {
   const int faces = texture.cube ? 6 : 1;
   const bool srgb = model->tex_colorspace[id] == mjCOLORSPACE_SRGB && !texture.cube;
   const mjtByte* data = model->tex_data + model->tex_adr[id];
+  const std::array<std::uint8_t, 256> linear = linear_values();
 
-  std::size_t total = 0;
+  std::size_t total = 0, padded = 0;
   for (int w = width, h = height, n = 0; n < Texture::kMaxLevels; ++n) {
     total += static_cast<std::size_t>(faces) * w * h;
+    padded += static_cast<std::size_t>(faces) * (w + 1) * h;
     ++texture.levels;
     if (w == 1 && h == 1) break;
     w = std::max(1, w / 2);
     h = std::max(1, h / 2);
   }
-  std::vector<std::uint32_t>& texels = texels_.emplace_back(total);
+  std::vector<std::uint32_t> texels(total);
   for (int f = 0; f < faces; ++f) {
     const mjtByte* image =
         data + (repeated ? 0 : static_cast<std::size_t>(f) * width * height * channels);
@@ -94,20 +102,26 @@ void Look::add_texture(const mjModel* model, int id) {
       std::uint32_t texel = 255u << 24;
       for (int c = 0; c < 3; ++c) {
         const mjtByte v = image[i * channels + c];
-        texel |= static_cast<std::uint32_t>(srgb ? linear_from_srgb(v) : v) << (8 * c);
+        texel |= static_cast<std::uint32_t>(srgb ? linear[v] : v) << (8 * c);
       }
       if (channels == 4)
         texel = (texel & 0xFFFFFFu) | static_cast<std::uint32_t>(image[i * 4 + 3]) << 24;
       out[i] = texel;
     }
   }
-  texture.texels = texels.data();
+  std::vector<std::uint32_t>& rows = texels_.emplace_back(padded);
+  texture.texels = rows.data();
+  std::uint32_t* row = rows.data();
   for (int n = 0, w = width, h = height, at = 0; n < texture.levels; ++n) {
     texture.width[n] = static_cast<float>(w);
     texture.height[n] = static_cast<float>(h);
-    texture.offset[n] = at;
+    texture.offset[n] = static_cast<int>(row - rows.data());
     const int size = w * h, w2 = std::max(1, w / 2), h2 = std::max(1, h / 2);
     std::uint32_t* image = texels.data() + at;
+    for (int y = 0; y < faces * h; ++y, row += w + 1) {
+      std::copy_n(image + y * w, w, row);
+      row[w] = row[texture.cube ? w - 1 : 0];
+    }
     at += faces * size;
     for (int f = 0; f < faces && n + 1 < texture.levels; ++f)
       halve(image + f * size, w, h, texels.data() + at + f * w2 * h2, w2, h2);
