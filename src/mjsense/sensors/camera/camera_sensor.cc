@@ -14,8 +14,9 @@
 namespace mjsense {
 namespace {
 
-constexpr int kItemsPerThread =
-    4;  // parts of work for each thread, so that all finish at about the same time
+// Fewer images than this for each thread are divided into bands, so many that all threads finish at
+// about the same time.
+constexpr int kImagesPerThread = 4, kBandsPerThread = 16;
 
 ViewOptions view_options(const CameraSensorCfg& cfg, unsigned groups) {
   ViewOptions options;
@@ -104,7 +105,7 @@ void CameraSensor::initialize(const SensorInit& init) {
   }
   // Everything that cast() needs, but for the ray scene's shapes.
   const int slots =
-      std::max(init.threads, std::min(init.num_worlds, kItemsPerThread * init.threads));
+      std::max(init.threads, std::min(init.num_worlds, kImagesPerThread * init.threads));
   workspace_ = std::make_unique<Workspace>();
   workspace_->builders.reserve(slots);
   for (int i = 0; i < slots; ++i)
@@ -290,15 +291,14 @@ void CameraSensor::render_due(const CastContext& context) {
   const int count = static_cast<int>(due_.size());
   const int tile_rows = (cfg_.height + kTileSize - 1) / kTileSize;
   const int threads = context.pool.size();
-  const int bands =
-      std::clamp((kItemsPerThread * threads + count - 1) / std::max(count, 1), 1, tile_rows);
   Workspace& work = *workspace_;
-  if (threads == 1 || bands == 1) {
+  if (threads == 1 || count >= kImagesPerThread * threads) {
     context.pool.run(count, [&](int item, int thread) {
       const View& view = build_view(rays, due_[item], work.builders[thread]);
       render_rows(view, due_[item], 0, tile_rows, thread);
     });
   } else {
+    const int bands = std::clamp(kBandsPerThread * threads / std::max(count, 1), 1, tile_rows);
     context.pool.run(count,
                      [&](int item, int) { build_view(rays, due_[item], work.builders[item]); });
     context.pool.run(count * bands, [&](int item, int thread) {
