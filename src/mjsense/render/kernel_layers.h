@@ -45,7 +45,7 @@ inline void shade_transparent(const View& view, const int* list, int count, cons
     trace_geom(view, list[i], &pixels, &hits, 1u);
     const std::uint32_t lanes = hit_lanes(hits);
     if (!lanes) continue;
-    Surfaces surfaces = {};
+    Surfaces surfaces;
     gather_surfaces(view, pixels, hits, lanes, true, surfaces);
     Layer& layer = layers[used++];
     shade(view, surfaces, hits, lanes, nullptr, layer.color);
@@ -92,7 +92,7 @@ inline void add_reflection(const View& view, const Pixels& pixels, const Hits& h
   const std::uint32_t seen = hit_lanes(found);
   Colors color = {};
   if (seen) {
-    Surfaces surfaces = {};
+    Surfaces surfaces;
     gather_surfaces(beyond, through, found, seen, true, surfaces);
     shade(beyond, surfaces, found, seen, nullptr, color);
   }

@@ -195,6 +195,7 @@ inline void triangle_normals(const ViewGeom& g, const Hits& hits, std::uint32_t 
 // Points, normals (unit, camera frame) and materials of `lanes`. `color`: also what only rgb needs.
 inline void gather_surfaces(const View& view, const Pixels& pixels, const Hits& hits,
                             std::uint32_t lanes, bool color, Surfaces& out) {
+  if (lanes != 0xffffu) __builtin_memset(&out, 0, sizeof out);  // other lanes hold numbers too
   const bool ortho = view.grid.orthographic;
   for (int k = 0; k < kLanes; k += kWidth) {
     const Float t = load(hits.t + k), x = load(pixels.x + k), y = load(pixels.y + k);

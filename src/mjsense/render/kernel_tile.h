@@ -3,8 +3,9 @@
 // of the tile kernels.
 
 #include "mjsense/render/kernel_layers.h"
-#include "mjsense/render/kernel_sky.h"
+#include "mjsense/render/kernel_output.h"
 #include "mjsense/render/kernel_raster.h"
+#include "mjsense/render/kernel_sky.h"
 
 namespace mjsense {
 namespace {
@@ -126,90 +127,6 @@ inline void trace_transparent(const View& view, const int* list, int count, Tile
   }
 }
 
-inline void write_depth(const View& view, const ImageTargets& targets, int x0, int y0,
-                        const Pixels& pixels, const Hits& hits) {
-  const PixelGrid& grid = view.grid;
-  alignas(64) float depth[kLanes];
-  for (int k = 0; k < kLanes; k += kWidth) {
-    Float t = load(hits.t + k);
-    if (targets.ray_depth && !grid.orthographic) {
-      const Float px = load(pixels.x + k), py = load(pixels.y + k);
-      t = t * sqrt(fma(px, px, fma(py, py, splat(1.0f))));
-    }
-    store(depth + k, select(less(int_of(-1), load(hits.geom + k)), t, splat(0.0f)));
-  }
-  const int columns = grid.width - x0 < 4 ? grid.width - x0 : 4;
-  const int rows = grid.height - y0 < 4 ? grid.height - y0 : 4;
-  for (int r = 0; r < rows; ++r) {
-    float* out = targets.depth + static_cast<std::size_t>(y0 + r) * grid.width + x0;
-    if (columns == 4) {
-      __builtin_memcpy(out, depth + 4 * r, 4 * sizeof(float));
-    } else {
-      for (int c = 0; c < columns; ++c) out[c] = depth[4 * r + c];
-    }
-  }
-}
-
-inline void write_geometry(const View& view, const ImageTargets& targets, int x0, int y0,
-                           const Pixels& pixels, const Hits& hits) {
-  Surfaces surfaces;
-  if (targets.normals) {
-    __builtin_memset(surfaces.n, 0, sizeof surfaces.n);
-    gather_surfaces(view, pixels, hits, hit_lanes(hits), false, surfaces);
-  }
-  const PixelGrid& grid = view.grid;
-  if (targets.depth) write_depth(view, targets, x0, y0, pixels, hits);
-  if (!targets.segmentation && !targets.normals && !targets.points) return;
-  for (int i = 0; i < kLanes; ++i) {
-    const int x = x0 + i % 4, y = y0 + i / 4;
-    if (x >= grid.width || y >= grid.height) continue;
-    const std::size_t at = static_cast<std::size_t>(y) * grid.width + x;
-    const bool hit = hits.geom[i] >= 0;
-    const float px = pixels.x[i], py = pixels.y[i], t = hits.t[i];
-    if (targets.segmentation) {
-      const ViewGeom* g = hit ? &view.geoms[hits.geom[i]] : nullptr;
-      targets.segmentation[2 * at] = g ? g->object_id : -1;
-      targets.segmentation[2 * at + 1] = g ? g->object : -1;
-    }
-    if (targets.normals)
-      for (int c = 0; c < 3; ++c) targets.normals[3 * at + c] = hit ? surfaces.n[c][i] : 0;
-    if (targets.points) {
-      const float s = grid.orthographic ? 1.0f : t;
-      const float nan = __builtin_nanf("");
-      targets.points[3 * at] = hit ? s * px : nan;
-      targets.points[3 * at + 1] = hit ? s * py : nan;
-      targets.points[3 * at + 2] = hit ? -t : nan;
-    }
-  }
-}
-
-// Colours 0..1 of a packet.
-inline void write_rgb(const ImageTargets& targets, const PixelGrid& grid, int x0, int y0,
-                      const float (*rgb)[kLanes], float scale) {
-  alignas(64) std::uint32_t packed[kLanes];  // 0xbbggrr
-  const Float full = splat(255.0f * scale), half = splat(0.5f);
-  for (int k = 0; k < kLanes; k += kWidth) {
-    Int bytes[3];
-    for (int c = 0; c < 3; ++c) bytes[c] = truncate(fma(load(rgb[c] + k), full, half));
-    store(reinterpret_cast<int*>(packed) + k,
-          bytes[0] + int_of(256) * (bytes[1] + int_of(256) * bytes[2]));
-  }
-  const int columns = grid.width - x0 < 4 ? grid.width - x0 : 4;
-  const int rows = grid.height - y0 < 4 ? grid.height - y0 : 4;
-  for (int r = 0; r < rows; ++r) {
-    std::uint8_t* out = targets.rgb + 3 * (static_cast<std::size_t>(y0 + r) * grid.width + x0);
-    const std::uint32_t* p = packed + 4 * r;
-    if (columns == 4) {  // four pixels are three words, the lowest byte first
-      const std::uint32_t words[3] = {p[0] | p[1] << 24, p[1] >> 8 | p[2] << 16,
-                                      p[2] >> 16 | p[3] << 8};
-      __builtin_memcpy(out, words, sizeof words);
-      continue;
-    }
-    for (int i = 0; i < columns; ++i)
-      for (int c = 0; c < 3; ++c) out[3 * i + c] = static_cast<std::uint8_t>(p[i] >> 8 * c);
-  }
-}
-
 struct TileLists {
   int opaque = 0, transparent = 0;
 };
@@ -300,7 +217,7 @@ inline void render_tile(const View& view, const ImageTargets& targets, int tx, i
         const std::uint32_t lanes = hit_lanes(hits);
         Colors colors;
         if (lanes) {
-          Surfaces surfaces = {};
+          Surfaces surfaces;
           gather_surfaces(view, tile.pixels[q], hits, lanes, true, surfaces);
           shade(view, surfaces, hits, lanes, shadows ? casters : nullptr, colors);
         }
