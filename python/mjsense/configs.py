@@ -570,7 +570,7 @@ class CameraSensorCfg(SensorCfg):
     width: int = 160
     height: int = 120
     data_types: Sequence[str] = ("rgb",)
-    """Any of rgb, depth, segmentation, normals, point_cloud, flow."""
+    """Any of rgb, depth, segmentation, body_segmentation, entity_segmentation, normals, point_cloud, flow."""
     use_textures: bool = True
     use_shadows: bool = False
     enabled_geom_groups: Sequence[int] = (0, 1, 2)

@@ -135,6 +135,10 @@ class CameraData(SensorData):
     """[B, H, W, 1] m, distance to the camera plane (depth_kind "ray": along the ray); 0: background."""
     segmentation: np.ndarray | None = None
     """[B, H, W, 2] int32: (geom id, 5); (-1, -1): background."""
+    body_segmentation: np.ndarray | None = None
+    """[B, H, W, 1] int32 body id; -1: background, flexes, skins."""
+    entity_segmentation: np.ndarray | None = None
+    """[B, H, W, 1] int32 place in ``list(scene.entities)``; -1: background, or no entity's."""
     normals: np.ndarray | None = None
     """[B, H, W, 3] unit, outward, camera frame; 0: background."""
     point_cloud: np.ndarray | None = None

@@ -9,6 +9,8 @@
 //                                       pixel's ray; 0 where nothing is
 //   segmentation  int32   [B, H, W, 2]  (id, type): mjOBJ_GEOM, mjOBJ_FLEX or mjOBJ_SKIN; (-1, -1)
 //                                       where nothing is
+//   body_segmentation, entity_segmentation
+//                 int32   [B, H, W, 1]  body id; index in Scene::entities(); -1 where there is none
 //   normals       float32 [B, H, W, 3]  unit, outward, camera frame; 0 where nothing is
 //   point_cloud   float32 [B, H, W, 3]  m, camera frame; NaN where nothing is
 //   flow          float32 [B, H, W, 2]  pixels, u right, v down: where the point that a pixel sees was
@@ -71,7 +73,7 @@ struct CameraSensorCfg : SensorCfg {
   // it, and the model, keep theirs.
   std::optional<double> fovy;
   int width = 160, height = 120;  // pixels; the model's own resolution is not used
-  // Of rgb depth segmentation normals point_cloud flow.
+  // Of rgb depth segmentation body_segmentation entity_segmentation normals point_cloud flow.
   std::vector<std::string> data_types{"rgb"};
   bool use_textures = true;
   bool use_shadows = false;

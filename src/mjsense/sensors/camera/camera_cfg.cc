@@ -52,8 +52,9 @@ void validate(const CameraSensorCfg& cfg) {
     throw ValueError(fmt::format("{}: {}", place, what));
   };
   if (cfg.name.empty()) throw ValueError("a camera needs a name");
-  const std::array<std::string, 6> types{"rgb",     "depth",       "segmentation",
-                                         "normals", "point_cloud", "flow"};
+  const std::array<std::string, 8> types{
+      "rgb",     "depth",       "segmentation", "body_segmentation", "entity_segmentation",
+      "normals", "point_cloud", "flow"};
   if (cfg.data_types.empty())
     fail(fmt::format("data_types is empty; choose from: {}", fmt::join(types, ", ")));
   for (const std::string& type : cfg.data_types) {

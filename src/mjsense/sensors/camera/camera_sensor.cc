@@ -87,6 +87,8 @@ void CameraSensor::initialize(const SensorInit& init) {
   if (wants("flow"))
     optical_flow_ = std::make_unique<OpticalFlow>(model_, camera_, lens, cfg_.update_period > 0,
                                                   grid, init.num_worlds, init.threads);
+  owners_.reset();
+  if (bodies_ || entities_) owners_ = std::make_unique<PixelOwners>(init, cfg_.width, cfg_.height);
 
   clean_.clear();
   if (cfg_.depth_noise != "none")
@@ -158,7 +160,7 @@ void CameraSensor::declare_fields(int num_worlds) {
     return &add_field(field, spec, num_worlds);
   };
   constexpr double inf = std::numeric_limits<double>::infinity();
-  rgb_ = depth_ = segmentation_ = normals_ = points_ = flow_ = nullptr;
+  rgb_ = depth_ = segmentation_ = bodies_ = entities_ = normals_ = points_ = flow_ = nullptr;
   if (wants("rgb"))
     rgb_ = add("rgb", DType::kUint8, {h, w, 3}, "", 0, 255, Storage::kRgbVideo,
                "Colour image, row 0 at the top.");
@@ -171,6 +173,12 @@ void CameraSensor::declare_fields(int num_worlds) {
     segmentation_ =
         add("segmentation", DType::kInt32, {h, w, 2}, "", -1, inf, Storage::kArray,
             "(id, mjtObj) of each pixel: geom, flex or skin; (-1, -1) where nothing is seen.");
+  if (wants("body_segmentation"))
+    bodies_ = add("body_segmentation", DType::kInt32, {h, w, 1}, "", -1, model_->nbody - 1,
+                  Storage::kArray, "Body id of each pixel's geom; -1 where there is none.");
+  if (wants("entity_segmentation"))
+    entities_ = add("entity_segmentation", DType::kInt32, {h, w, 1}, "", -1, inf, Storage::kArray,
+                    "Entity of each pixel, by its place in the scene; -1 where there is none.");
   if (wants("normals"))
     normals_ = add("normals", DType::kFloat32, {h, w, 3}, "", -1, 1, Storage::kArray,
                    "Unit surface normal in the camera frame; 0 where nothing is seen.");
@@ -230,7 +238,8 @@ void CameraSensor::compute(const World& world) {
   pose[15] = 1;
 }
 
-ImageTargets CameraSensor::targets(int world) {
+// The fields of this world, and this thread's buffers for what only derive() needs.
+ImageTargets CameraSensor::targets(int world, int thread) {
   ImageTargets t;
   if (rgb_) t.rgb = rgb_->data.row<std::uint8_t>(world).data();
   if (depth_) t.depth = depth_->data.row<float>(world).data();
@@ -239,6 +248,8 @@ ImageTargets CameraSensor::targets(int world) {
   if (points_) t.points = points_->data.row<float>(world).data();
   t.ray_depth = cfg_.depth_kind == "ray";
   t.samples = cfg_.samples;
+  if (optical_flow_) optical_flow_->complete(t, thread);
+  if (owners_) owners_->complete(t, thread);
   return t;
 }
 
@@ -268,23 +279,30 @@ void CameraSensor::add_noise(const CastContext& context) {
 }
 
 void CameraSensor::render_rows(const View& view, int world, int first, int last, int thread) {
-  ImageTargets image = targets(world);
-  if (optical_flow_) optical_flow_->complete(image, thread);
+  const ImageTargets image = targets(world, thread);
   workspace_->render(view, image, first, last, workspace_->memory[thread].scratch());
+  derive(world, image, first * kTileSize, std::min(last * kTileSize, cfg_.height));
+}
+
+// What follows from depth and ids of the pixel rows [first, last).
+void CameraSensor::derive(int world, const ImageTargets& image, int first, int last) {
   if (optical_flow_)
-    optical_flow_->write(world, image, first * kTileSize, std::min(last * kTileSize, cfg_.height),
-                         flow_->data.row<float>(world).data());
+    optical_flow_->write(world, image, first, last, flow_->data.row<float>(world).data());
+  if (owners_) {
+    const auto row = [&](Field* field) {
+      return field ? field->data.row<std::int32_t>(world).data() : nullptr;
+    };
+    owners_->write(image, first * cfg_.width, last * cfg_.width, row(bodies_), row(entities_));
+  }
 }
 
 void CameraSensor::render_due(const CastContext& context) {
   const RayScene& rays = *context.rays;
   if (gl_) {
     for (int id : due_) {
-      ImageTargets image = targets(id);
-      if (optical_flow_) optical_flow_->complete(image, 0);
+      const ImageTargets image = targets(id, 0);
       gl_->render(id, rays.world(id), image);
-      if (optical_flow_)
-        optical_flow_->write(id, image, 0, cfg_.height, flow_->data.row<float>(id).data());
+      derive(id, image, 0, cfg_.height);
     }
     return;
   }

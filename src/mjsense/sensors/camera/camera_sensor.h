@@ -11,6 +11,7 @@
 #include "mjsense/render/view_builder.h"
 #include "mjsense/sensors/camera/camera.h"
 #include "mjsense/sensors/camera/optical_flow.h"
+#include "mjsense/sensors/camera/pixel_owners.h"
 
 namespace mjsense {
 
@@ -56,7 +57,8 @@ class CameraSensor final : public Sensor {
   PixelGrid grid_in(const mjModel* model) const;
   void check_grid(const PixelGrid& grid) const;
   bool is_due(const World& world, std::int64_t& image) const;
-  ImageTargets targets(int world);
+  ImageTargets targets(int world, int thread);
+  void derive(int world, const ImageTargets& image, int first, int last);
   // Rows of tiles [first, last) of an image and what is computed from them.
   void render_rows(const View& view, int world, int first, int last, int thread);
   const View& build_view(const RayScene& rays, int world, ViewBuilder& builder) const;
@@ -73,8 +75,9 @@ class CameraSensor final : public Sensor {
   std::unique_ptr<GlRenderer> gl_;  // renderer "opengl"
   std::unique_ptr<Workspace> workspace_;
   std::unique_ptr<OpticalFlow> optical_flow_;  // null: not wanted
-  Field *rgb_ = nullptr, *depth_ = nullptr, *segmentation_ = nullptr, *normals_ = nullptr,
-        *points_ = nullptr, *flow_ = nullptr;
+  std::unique_ptr<PixelOwners> owners_;        // the same
+  Field *rgb_ = nullptr, *depth_ = nullptr, *segmentation_ = nullptr, *bodies_ = nullptr,
+        *entities_ = nullptr, *normals_ = nullptr, *points_ = nullptr, *flow_ = nullptr;
   Field *intrinsics_ = nullptr, *pose_ = nullptr;
 };
 

@@ -31,6 +31,9 @@ struct Lab {
     scene = std::make_shared<Scene>(std::move(s));
     sim = std::make_unique<Simulation>(scene, cfg);
   }
+  Lab(SceneCfg s, SimulationCfg cfg)
+      : scene(std::make_shared<Scene>(std::move(s))),
+        sim(std::make_unique<Simulation>(scene, cfg)) {}
   template <class T>
   std::vector<T> read(std::string_view field, std::string_view name = "cam", int world = -1) {
     Sensor& sensor = scene->sensor(name);
@@ -81,6 +84,45 @@ TEST(Camera, DepthIsPlanarAndIdsAreGeoms) {
       EXPECT_EQ(ids[2 * i], ball ? 2 : box ? 1 : 0) << x << ", " << y;
       EXPECT_EQ(ids[2 * i + 1], mjOBJ_GEOM);
     }
+}
+
+TEST(Camera, PixelsKnowTheirBodiesAndEntities) {
+  SceneCfg cfg;
+  cfg.terrain.emplace();
+  for (const char* name : {"a", "b"}) {
+    EntityCfg e;
+    e.model.xml = R"(<mujoco><worldbody><body name="ball"><freejoint/><geom size=".3"/></body>
+                     </worldbody></mujoco>)";
+    cfg.entities.emplace_back(name, e);
+  }
+  CameraSensorCfg all =
+      camera(32, 16, {"segmentation", "body_segmentation", "entity_segmentation"});
+  all.pos = {0, 0, 5};
+  CameraSensorCfg entities = camera(32, 16, {"entity_segmentation"});
+  entities.camera_name = "cam";
+  entities.name = "entities";
+  for (const CameraSensorCfg& c : {all, entities})
+    cfg.sensors.push_back(std::make_shared<CameraSensorCfg>(c));
+  Lab lab(std::move(cfg), {.num_worlds = 2, .threads = 2});
+  for (int world : {0, 1})
+    lab.pose(world, {-1, 0, 1, 1, 0, 0, 0, 1 + 20.0 * world, 0, 1, 1, 0, 0, 0});
+  const mjModel* m = lab.scene->model();
+  int seen[3] = {};
+  for (int world : {0, 1}) {
+    const auto ids = lab.read<std::int32_t>("segmentation", "cam", world);
+    const auto bodies = lab.read<std::int32_t>("body_segmentation", "cam", world);
+    const auto owners = lab.read<std::int32_t>("entity_segmentation", "cam", world);
+    EXPECT_EQ(owners, lab.read<std::int32_t>("entity_segmentation", "entities", world));
+    for (std::size_t i = 0; i < bodies.size(); ++i) {
+      ASSERT_EQ(bodies[i], m->geom_bodyid[ids[2 * i]]);
+      const int body = bodies[i];  // terrain, a/ball, b/ball, each with one geom
+      ASSERT_EQ(owners[i], ids[2 * i]) << body;
+      ++seen[owners[i]];
+    }
+    EXPECT_EQ(std::count(owners.begin(), owners.end(), 2) > 0, world == 0);  // b rolled away
+  }
+  EXPECT_GT(seen[0], seen[1]);
+  EXPECT_GT(seen[1], seen[2]);
 }
 
 TEST(Camera, OneCameraServesSensorsWithDifferentGroups) {

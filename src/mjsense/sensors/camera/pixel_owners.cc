@@ -1,0 +1,48 @@
+#include "mjsense/sensors/camera/pixel_owners.h"
+
+#include "mjsense/scene/resolve.h"
+#include "mjsense/scene/scene.h"
+
+namespace mjsense {
+namespace {
+
+std::vector<std::int32_t> entity_of_each(const SensorInit& init, mjtObj type) {
+  std::vector<std::int32_t> owners(count_of(init.model, type), -1);
+  if (init.scene == nullptr) return owners;
+  std::int32_t entity = 0;
+  for (const Entity& e : init.scene->entities()) {
+    for (int id : entity_elements(init.model, init.scene, e.name, type, "camera").ids)
+      owners[id] = entity;
+    ++entity;
+  }
+  return owners;
+}
+
+}  // namespace
+
+PixelOwners::PixelOwners(const SensorInit& init, int width, int height)
+    : model_(init.model),
+      geom_entity_(entity_of_each(init, mjOBJ_GEOM)),
+      flex_entity_(entity_of_each(init, mjOBJ_FLEX)),
+      skin_entity_(entity_of_each(init, mjOBJ_SKIN)),
+      scratch_(init.threads,
+               std::vector<std::int32_t>(2 * static_cast<std::size_t>(width) * height)) {}
+
+void PixelOwners::complete(ImageTargets& targets, int thread) {
+  if (targets.segmentation == nullptr) targets.segmentation = scratch_[thread].data();
+}
+
+void PixelOwners::write(const ImageTargets& image, int begin, int end, std::int32_t* bodies,
+                        std::int32_t* entities) const {
+  for (int i = begin; i < end; ++i) {
+    const int id = image.segmentation[2 * i], type = image.segmentation[2 * i + 1];
+    if (bodies != nullptr) bodies[i] = type == mjOBJ_GEOM ? model_->geom_bodyid[id] : -1;
+    if (entities != nullptr)
+      entities[i] = type == mjOBJ_GEOM   ? geom_entity_[id]
+                    : type == mjOBJ_FLEX ? flex_entity_[id]
+                    : type == mjOBJ_SKIN ? skin_entity_[id]
+                                         : -1;
+  }
+}
+
+}  // namespace mjsense
