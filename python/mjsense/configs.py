@@ -16,6 +16,7 @@ from typing import Any, ClassVar
 import mujoco
 
 from mjsense import _core
+from mjsense._field_docs import show_field_docs
 
 
 @dataclass(frozen=True)
@@ -430,6 +431,7 @@ class RayCastSensorCfg(SensorCfg):
     frame: ObjRef | Sequence[ObjRef] = ()
     """Bodies (body frame), sites or geoms that the rays start from."""
     pattern: GridPatternCfg | PinholeCameraPatternCfg | RingPatternCfg | UserPatternCfg = field(default_factory=GridPatternCfg)
+    """The rays of one frame."""
     ray_alignment: str = "base"
     """base: offsets and directions turn with the frame; yaw: only with its heading; world: not at all."""
     max_distance: float = 10.0
@@ -473,8 +475,11 @@ class SpinningScanCfg:
 
     kind: ClassVar[str] = "spinning"
     channels: int = 16
+    """Lasers."""
     elevation_min_deg: float = -15.0
+    """Of channel 0, above the xy plane."""
     elevation_max_deg: float = 15.0
+    """Of the last channel; the others lie evenly between."""
     elevations_deg: Sequence[float] = ()
     """One a channel instead of evenly spaced ones."""
     samples: int = 360
@@ -482,7 +487,9 @@ class SpinningScanCfg:
     azimuth_start_deg: float = 0.0
     """0: along +x; counter-clockwise."""
     azimuth_span_deg: float = 360.0
+    """Up to 360."""
     rate_hz: float = 10.0
+    """Turns a second; matters with motion distortion only."""
 
 
 @dataclass(frozen=True)
@@ -495,13 +502,14 @@ class TableScanCfg:
     angles: Sequence[Sequence[float]] = ()
     """The table itself, [M, 2]."""
     rays_per_scan: int = 0
-    """Rows that a scan takes, the next ones at the next scan; 0: all."""
+    """Rows that a scan takes, the next ones at the next scan; 0: all. Rows left over at the end are not used."""
     rate_hz: float = 10.0
+    """Scans a second."""
 
 
 @dataclass
 class LidarSensorCfg(RayCastSensorCfg):
-    """A spinning or table lidar. ``data`` is a :class:`mjsense.RayCastData` with points and intensity."""
+    """A spinning or table lidar. ``data`` is a :class:`mjsense.RayCastData` with points and intensity; ``pattern`` is not for lidars."""
 
     kind: ClassVar[str] = "lidar"
     max_distance: float = 100.0
@@ -532,10 +540,16 @@ class CameraIntrinsics:
 
 @dataclass(frozen=True)
 class LensDistortion:
-    """none, brown_conrady (k1 k2 p1 p2 k3) or fisheye (k1 k2 k3 k4)."""
+    """Where a lens puts the image of a direction (X, Y, Z), z forward, y down: OpenCV's models.
+
+    brown_conrady: x = X/Z, y = Y/Z, ``x' = x (1 + k1 r^2 + k2 r^4 + k3 r^6) + 2 p1 x y + p2 (r^2 + 2 x^2)``, y' alike.
+    fisheye: ``r' = theta (1 + k1 theta^2 + k2 theta^4 + k3 theta^6 + k4 theta^8)``, theta the angle to the axis, up to 89 degrees.
+    """
 
     model: str = "none"
+    """none, brown_conrady, fisheye."""
     coefficients: Sequence[float] = ()
+    """brown_conrady: k1 k2 p1 p2 k3; fisheye: k1 k2 k3 k4."""
 
 
 @dataclass
@@ -563,18 +577,26 @@ class CameraSensorCfg(SensorCfg):
     parent_body: str | None = None
     """Full name of the body that carries a new camera; the world without one."""
     pos: Sequence[float] = (0.0, 0.0, 1.0)
-    """m, in the parent body."""
+    """m, of a new camera in the parent body."""
     quat: Sequence[float] = (1.0, 0.0, 0.0, 0.0)
+    """wxyz, of a new camera in the parent body: x right, y up, looking along -z."""
     fovy: float | None = None
-    """Vertical, degrees; orthographic: height of the image, m. None: the camera's own, 45 for a new one."""
+    """Vertical, degrees; orthographic: height of the image, m. None: the camera's own, 45 for a new one. Beside ``camera_name`` it is
+    this sensor's alone."""
     width: int = 160
+    """Pixels; the resolution in the MJCF plays no part."""
     height: int = 120
+    """Pixels."""
     data_types: Sequence[str] = ("rgb",)
     """Any of rgb, depth, segmentation, body_segmentation, entity_segmentation, normals, point_cloud, flow."""
     use_textures: bool = True
+    """Textures of materials, and the skybox."""
     use_shadows: bool = False
+    """Of lights that cast them."""
     enabled_geom_groups: Sequence[int] = (0, 1, 2)
+    """Groups (0 to 5) that are seen."""
     orthographic: bool = False
+    """Parallel rays. Beside ``camera_name`` it is this sensor's alone."""
     clone_data: bool = False
     """``data`` is a copy at every read."""
     near: float = 0.0
@@ -584,15 +606,17 @@ class CameraSensorCfg(SensorCfg):
     update_period: float = 0.0
     """s between images; 0: at every read."""
     phase: float = 0.0
-    """s; images are taken at the first control step at or after phase + k * update_period."""
+    """s; images are taken at the first control step at or after phase + k * update_period, and at a reset."""
     samples: int = 1
     """Per pixel of rgb, 1 to 64, for smooth edges."""
     depth_kind: str = "planar"
     """planar: distance to the camera plane; ray: along the pixel's ray."""
     intrinsics: CameraIntrinsics | None = None
+    """Instead of fovy and of what the MJCF says."""
     distortion: LensDistortion = field(default_factory=LensDistortion)
+    """Of the lens; the image is as distorted as the lens leaves it."""
     depth_noise: str = "none"
-    """none, d405, d435."""
+    """none, d405, d435: what these stereo cameras make of ``depth``; the other fields stay exact."""
     renderer: str = "rays"
     """rays, or opengl: MuJoCo's own renderer, where it was built in."""
     debug_vis: bool = False
@@ -603,3 +627,6 @@ class CameraSensorCfg(SensorCfg):
 def replace(cfg: Any, **changes: Any) -> Any:
     """A copy of a configuration with some fields changed."""
     return dataclasses.replace(cfg, **changes)
+
+
+show_field_docs(__name__)

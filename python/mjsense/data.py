@@ -8,6 +8,8 @@ from typing import Any
 
 import numpy as np
 
+from mjsense._field_docs import show_field_docs
+
 
 @dataclass(slots=True)
 class SensorData:
@@ -159,3 +161,6 @@ def make_data(base: type, arrays: dict[str, np.ndarray]) -> Any:
         namespace = {"__annotations__": {name: "np.ndarray | None" for name in extra}, **dict.fromkeys(extra)}
         base = dataclass(repr=False)(type(base.__name__, (base,), namespace))
     return base(**arrays)
+
+
+show_field_docs(__name__)

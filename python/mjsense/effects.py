@@ -14,6 +14,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any, ClassVar
 
+from mjsense._field_docs import show_field_docs
 from mjsense.configs import SensorCfg
 
 PerComponent = float | Sequence[float]
@@ -209,3 +210,6 @@ class EffectSensorCfg(SensorCfg):
     history_length: int = 0
     """Rows of every field, oldest first; the first of an episode fills all. 0: no history."""
     flatten_history: bool = True
+
+
+show_field_docs(__name__)

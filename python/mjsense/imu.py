@@ -8,6 +8,7 @@ from typing import Any, ClassVar
 
 import numpy as np
 
+from mjsense._field_docs import show_field_docs
 from mjsense.configs import ObjRef, SensorCfg
 from mjsense.data import SensorData
 from mjsense.sensor import NativeSensor
@@ -75,3 +76,6 @@ class ImuSensor(NativeSensor):
     """An IMU; ``data`` is an :class:`mjsense.ImuData`."""
 
     _data_type = ImuData
+
+
+show_field_docs(__name__)

@@ -1,3 +1,4 @@
+import pydoc
 import types
 from pathlib import Path
 
@@ -64,3 +65,10 @@ def test_readme(tmp_path, monkeypatch):
     assert scene["robot/imu_acc"].data.shape == (64, 3)
     assert scene["feet"].data.force.shape == (64, 4, 3)
     assert scene["front"].data.rgb.shape == (64, 120, 160, 3)
+
+
+def test_help_shows_every_field():
+    text = pydoc.plain(pydoc.render_doc(mjs.LidarSensorCfg))
+    assert "Each ray leaves from where the frame was at its own moment of the sweep." in text  # its own
+    assert "m; hits farther away are misses." in text  # inherited
+    assert "[B, H, W, 3] uint8." in pydoc.plain(pydoc.render_doc(mjs.CameraData))
