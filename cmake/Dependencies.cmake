@@ -14,7 +14,8 @@ execute_process(
   OUTPUT_VARIABLE MUJOCO_DIR OUTPUT_STRIP_TRAILING_WHITESPACE)
 file(GLOB MUJOCO_LIBRARY "${MUJOCO_DIR}/libmujoco.so.4.0.*")
 if(NOT MUJOCO_DIR OR NOT MUJOCO_LIBRARY)
-  message(FATAL_ERROR "MuJoCo 4.0 not found in ${Python_EXECUTABLE}: run ./dev setup, or pip install 'mujoco-core==4.0.*'")
+  message(FATAL_ERROR "MuJoCo 4.0 not found in ${Python_EXECUTABLE}: run ./dev setup, or pip install 'mujoco-core==4.0.*' "
+                      "there, or name another Python by -DPython_EXECUTABLE=...")
 endif()
 add_library(mujoco::mujoco SHARED IMPORTED GLOBAL)
 set_target_properties(mujoco::mujoco PROPERTIES IMPORTED_LOCATION ${MUJOCO_LIBRARY}

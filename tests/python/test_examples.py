@@ -10,8 +10,9 @@ import pytest
 import mjsense
 
 EXAMPLES = Path(__file__).parents[2] / "examples"
+BUILD = Path(mjsense.__file__).absolute().parents[2]
 SAYS = {"01": "landed: [9.81 9.81 9.81 9.81]", "02": "picture: (3, 48, 64, 3) uint8", "03": "the planner picked 2 of 2",
-        "04": "the feet press on the floor with 88"}
+        "04": "the feet press on the floor with 88", "05": "pixels of the box: [1916 1234  826]"}
 
 
 @pytest.mark.parametrize("name", sorted(p.name for p in EXAMPLES.glob("*.py")))
@@ -22,3 +23,20 @@ def test_example(name, tmp_path):
     )
     assert done.returncode == 0, done.stderr
     assert SAYS.get(name[:2], "") in done.stdout
+
+
+@pytest.mark.skipif(not (BUILD / "CMakeCache.txt").exists(), reason="not imported from a build folder")
+def test_cpp_project(tmp_path):
+    """examples/cpp finds the installed library, builds, and takes a picture."""
+
+    def run(*command):
+        done = subprocess.run([str(c) for c in command], cwd=tmp_path, capture_output=True, text=True, timeout=300)
+        assert done.returncode == 0, done.stdout + done.stderr
+
+    run("cmake", "--install", BUILD, "--prefix", "installed")
+    run("cmake", "-S", EXAMPLES / "cpp", "-B", "build", "-G", "Ninja",
+        f"-DCMAKE_PREFIX_PATH={tmp_path / 'installed'}", f"-DPython_EXECUTABLE={sys.executable}")  # fmt: skip
+    run("cmake", "--build", "build")
+    run("build/sees", EXAMPLES.parent / "bench" / "gallery.xml", "front")
+    header, pixels = (tmp_path / "front.ppm").read_bytes().split(b"255\n", 1)
+    assert header == b"P6 320 240 " and len(pixels) == 3 * 320 * 240 and len(set(pixels)) > 100
