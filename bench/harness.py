@@ -18,16 +18,14 @@ from collections.abc import Callable
 
 ROOT = pathlib.Path(__file__).resolve().parents[1]
 RELEASE = ROOT / "build" / "release"  # what ./dev bench builds
-if (RELEASE / "python").exists():
-    sys.path.insert(0, str(RELEASE / "python"))  # so that `import mjsense` after this module finds what is measured
+if not (RELEASE / "python").exists():
+    sys.exit(f"{RELEASE} is missing: ./dev bench builds it")
+sys.path.insert(0, str(RELEASE / "python"))  # so that `import mjsense` after this module finds what is measured
 
 
 def program(name: str) -> str:
-    """The path of `mjsense` or `mjsense_bench`."""
-    path = RELEASE / name
-    if not path.exists():
-        sys.exit(f"{path} is missing: ./dev bench builds it")
-    return str(path)
+    """The path of a built program."""
+    return str(RELEASE / name)
 
 
 @dataclasses.dataclass

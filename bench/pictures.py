@@ -1,8 +1,8 @@
 """Side-by-side sheets: ours, MuJoCo's classic renderer, and their difference (times 3); and how far apart they are.
 
-    python bench/pictures.py FOLDER [scene ...]        scenes: gallery pick kitchen go1 panda
+    .venv/bin/python bench/pictures.py FOLDER [scene ...]        scenes: gallery pick kitchen go1 panda
 
-Depth and ids are compared where both see something; depth only where it is opaque, for MuJoCo's depth looks through glass.
+It needs what ./dev bench builds. Depth and ids are compared where both see something; depth only where it is opaque, for MuJoCo's depth looks through glass.
 """
 
 from __future__ import annotations
