@@ -47,6 +47,11 @@ def gallery() -> mujoco.MjSpec:
     return mujoco.MjSpec.from_file(str(HERE / "gallery.xml"))
 
 
+def soft() -> mujoco.MjSpec:
+    """Cloth on a ball, a rope on a post, a soft block, a skinned beam."""
+    return mujoco.MjSpec.from_file(str(HERE / "soft.xml"))
+
+
 def pick() -> mujoco.MjSpec:
     """Our pick scene: the FR3 with its primitive visuals at the table."""
     models = HERE.parent / "models"
