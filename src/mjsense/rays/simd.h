@@ -55,7 +55,12 @@ inline Mask operator<=(Float a, Float b) { return {_mm512_cmp_ps_mask(a.v, b.v, 
 inline Mask operator&(Mask a, Mask b) { return {static_cast<__mmask16>(a.m & b.m)}; }
 inline Mask operator|(Mask a, Mask b) { return {static_cast<__mmask16>(a.m | b.m)}; }
 inline Mask operator~(Mask a) { return {static_cast<__mmask16>(~a.m)}; }
-inline std::uint32_t bits(Mask a) { return a.m; }
+inline std::uint32_t bits(Mask a) {
+  // Not `return a.m`: GCC 12 may spill the 16 bits and read 32 back.
+  std::uint32_t b;
+  __asm__("kmovw %1, %0" : "=r"(b) : "k"(a.m));
+  return b;
+}
 inline Mask mask_of(std::uint32_t b) { return {static_cast<__mmask16>(b)}; }
 inline Float select(Mask m, Float a, Float b) { return _mm512_mask_blend_ps(m.m, b.v, a.v); }
 inline Int select(Mask m, Int a, Int b) { return {_mm512_mask_blend_epi32(m.m, b.v, a.v)}; }
