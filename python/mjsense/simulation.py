@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import difflib
+import difflib
 from collections.abc import Sequence
 from typing import Any
 
@@ -15,6 +16,8 @@ from mjsense.errors import UnknownNameError
 from mjsense.scene import Scene
 from mjsense.sensor import NativeSensor, Sensor
 
+_IDS = {"geom_matid": "nmat", "flex_matid": "nmat", "mat_texid": "ntex"}
+"""Fields of ids that sensors follow, and how many there are."""
 _STATE = ("qpos", "qvel", "act", "ctrl", "qfrc_applied", "xfrc_applied", "mocap_pos", "mocap_quat", "eq_active", "userdata")
 
 
@@ -203,9 +206,20 @@ class Simulation:
     def randomize(self, field: str, values: Any, world_ids: Sequence[int] | None = None) -> None:
         """Gives worlds their own values of a field of the model: ``randomize("geom_friction", values)``.
 
-        Values are ``[worlds, ...]`` or broadcast to it. Quantities that MuJoCo derives from the field follow.
+        Values are ``[worlds, ...]`` or broadcast to it. Quantities that MuJoCo derives from the field follow, and so do rays and
+        images. Meshes, height fields and the pixels of textures cannot differ between worlds: ValueError.
         """
-        self.model_field(field)[self._rows(world_ids)] = values
+        target = self.model_field(field)
+        rows = self._rows(world_ids)
+        try:
+            values = np.broadcast_to(np.asarray(values, target.dtype), target[rows].shape)
+        except (TypeError, ValueError) as error:
+            raise ValueError(f"{field}: values must be of shape {target[rows].shape} or broadcast to it: {error}") from None
+        if field in _IDS:
+            count = getattr(self.model, _IDS[field])
+            if (values < -1).any() or (values >= count).any():
+                raise ValueError(f"{field}: ids from {values.min()} to {values.max()}; the model's are 0 to {count - 1}, -1 is none")
+        target[rows] = values
         self._core.model_changed(_ids(world_ids), field in mujoco.MjModel._setconst_inputs)
         self.forward(world_ids)
 
@@ -215,7 +229,9 @@ class Simulation:
         if key not in self._views or self._core.closed:
             like = getattr(self.model, name, None)
             if not isinstance(like, np.ndarray):
-                raise AttributeError(f"mjModel has no array '{name}'")
+                near = difflib.get_close_matches(name, dir(self.model), 3)
+                hint = f"; did you mean {' or '.join(map(repr, near))}?" if near else ""
+                raise AttributeError(f"mjModel has no array '{name}'{hint}")
             self._views[key] = self._core.model_field(name).view(like.dtype).reshape(self.num_worlds, *like.shape)
         return self._views[key]
 

@@ -98,6 +98,18 @@ def test_set_state(sim):
         sim.set_state(qpo=[1])
 
 
+def test_randomize_says_what_is_wrong(sim):
+    for call, error, text in [
+        (lambda: sim.randomize("bodymass", 1), AttributeError, "did you mean 'body_mass'"),
+        (lambda: sim.randomize("body_mass", np.ones((4, 99))), ValueError, r"body_mass: values must be of shape \(4, "),
+        (lambda: sim.randomize("body_mass", "heavy"), ValueError, "body_mass: values must be"),
+        (lambda: sim.randomize("geom_matid", sim.model.nmat), ValueError, "geom_matid: ids from"),
+        (lambda: sim.randomize("mesh_vert", 1), ValueError, "cannot have a value per world"),
+    ]:
+        with pytest.raises(error, match=text):
+            call()
+
+
 def test_randomize(sim):
     sim.randomize("body_mass", [[0, 0, m] for m in (1, 2, 3, 4)] if sim.model.nbody == 3 else 1)
     sim.qpos[:, 2] = 0.0995
