@@ -30,11 +30,35 @@ constexpr char kScene[] = R"(<mujoco>
     <geom type="cylinder" size=".1 .3" pos="-.3 -.6 .3" material="m"/>
     <camera name="c" pos="0 -2.5 1.5" xyaxes="1 0 0 0 .5 1"/></worldbody></mujoco>)";
 
-TEST(CameraAgainstOpenGL, DepthIdsAndColoursAgree) {
+// Cloth, a rope, a soft solid and a skin, all bent.
+constexpr char kSoftScene[] = R"(<mujoco>
+  <asset><texture name="sky" type="skybox" builtin="gradient" rgb1=".4 .6 .8" rgb2="0 0 0" width="64" height="64"/>
+    <texture name="t" type="2d" builtin="checker" rgb1=".8 .2 .2" rgb2=".9 .8 .7" width="64" height="64"/>
+    <material name="m" texture="t" texrepeat="3 3"/></asset>
+  <worldbody><light pos="1 -1 4" dir="-.2 .2 -1" castshadow="true" cutoff="60"/>
+    <geom type="plane" size="0 0 .1" rgba=".4 .5 .6 1"/>
+    <flexcomp name="cloth" type="grid" dim="2" count="9 7 1" spacing=".1 .1 .1" pos="-.8 -.3 .6" euler="30 20 10" radius=".01" material="m"/>
+    <flexcomp name="rope" type="grid" dim="1" count="9 1 1" spacing=".1 .1 .1" pos=".4 .5 .9" euler="0 20 70" radius=".03" rgba=".9 .8 .2 1"/>
+    <flexcomp name="jelly" type="grid" dim="3" count="4 4 4" spacing=".1 .1 .1" pos=".2 -.5 .3" euler="0 0 30" radius=".02" rgba=".2 .8 .3 1"/>
+    <body name="a" pos=".6 -.9 .5" euler="0 30 0"><geom size=".01" group="4"/>
+      <body name="b" pos=".3 0 0" euler="40 50 0"><geom size=".01" group="4"/></body></body>
+    <camera name="c" pos="0 -2.5 1.5" xyaxes="1 0 0 0 .5 1"/></worldbody>
+  <deformable><skin name="s" material="m" inflate=".01"
+    vertex="0 -.2 0 0 .2 0  .15 -.2 0 .15 .2 0  .3 -.2 0 .3 .2 0  .45 -.2 0 .45 .2 0  .6 -.2 0 .6 .2 0"
+    texcoord="0 0 0 1 .25 0 .25 1 .5 0 .5 1 .75 0 .75 1 1 0 1 1" face="0 2 1 1 2 3 2 4 3 3 4 5 4 6 5 5 6 7 6 8 7 7 8 9">
+    <bone body="a" bindpos="0 0 0" bindquat="1 0 0 0" vertid="0 1 2 3 4 5" vertweight="1 1 1 1 .5 .5"/>
+    <bone body="b" bindpos=".3 0 0" bindquat="1 0 0 0" vertid="4 5 6 7 8 9" vertweight=".5 .5 1 1 1 1"/></skin></deformable></mujoco>)";
+
+class CameraAgainstOpenGL : public ::testing::TestWithParam<const char*> {};
+
+INSTANTIATE_TEST_SUITE_P(Scenes, CameraAgainstOpenGL, ::testing::Values(kScene, kSoftScene),
+                         [](const auto& scene) { return scene.index == 0 ? "rigid" : "soft"; });
+
+TEST_P(CameraAgainstOpenGL, DepthIdsAndColoursAgree) {
   constexpr int kWidth = 160, kHeight = 120, kCount = kWidth * kHeight;
   SceneCfg cfg;
   EntityCfg entity;
-  entity.model.xml = kScene;
+  entity.model.xml = GetParam();
   cfg.entities.emplace_back("w", entity);
   for (const char* name : {"rays", "opengl", "opengl smooth"}) {
     auto camera = std::make_shared<CameraSensorCfg>();
