@@ -24,12 +24,6 @@ std::array<std::uint8_t, 256> linear_values() {
   return table;
 }
 
-std::uint32_t pack(const std::uint32_t (&sum)[4], std::uint32_t n) {
-  std::uint32_t texel = 0;
-  for (int c = 0; c < 4; ++c) texel |= ((sum[c] + n / 2) / n) << (8 * c);
-  return texel;
-}
-
 // (b - a) x (c - a), and its length.
 float cross(const float* a, const float* b, const float* c, float* out) {
   const float e1[3] = {b[0] - a[0], b[1] - a[1], b[2] - a[2]};
@@ -39,17 +33,36 @@ float cross(const float* a, const float* b, const float* c, float* out) {
   return std::sqrt(out[0] * out[0] + out[1] * out[1] + out[2] * out[2]);
 }
 
-// The next level of one image by a box filter; odd edges repeat the last texel.
+// Which two texels of a row of `size` the texel i of the next level's row of `half` lies between.
+struct Between {
+  int first, second;
+  float weight;  // of the second
+};
+Between between(int i, int size, int half) {
+  const float x =
+      (static_cast<float>(i) + 0.5f) * static_cast<float>(size) / static_cast<float>(half) - 0.5f;
+  const int first = static_cast<int>(x);
+  return {first, std::min(first + 1, size - 1), x - static_cast<float>(first)};
+}
+
+// The next level of one image, interpolated at its texels' centres as OpenGL drivers do: the mean of
+// 2 x 2 where sizes are even; where they are odd nothing drifts and no border is lost.
 void halve(const std::uint32_t* src, int width, int height, std::uint32_t* dst, int w2, int h2) {
   for (int y = 0; y < h2; ++y) {
+    const Between v = between(y, height, h2);
+    const std::uint32_t *above = src + v.first * width, *below = src + v.second * width;
     for (int x = 0; x < w2; ++x) {
-      const int xs[2] = {std::min(2 * x, width - 1), std::min(2 * x + 1, width - 1)};
-      const int ys[2] = {std::min(2 * y, height - 1), std::min(2 * y + 1, height - 1)};
-      std::uint32_t sum[4] = {};
-      for (int yy : ys)
-        for (int xx : xs)
-          for (int c = 0; c < 4; ++c) sum[c] += (src[yy * width + xx] >> (8 * c)) & 255u;
-      dst[y * w2 + x] = pack(sum, 4);
+      const Between u = between(x, width, w2);
+      std::uint32_t texel = 0;
+      for (int shift = 0; shift < 32; shift += 8) {
+        const auto mix = [&](const std::uint32_t* row) {
+          const auto channel = [&](int i) { return static_cast<float>(row[i] >> shift & 255u); };
+          return channel(u.first) + u.weight * (channel(u.second) - channel(u.first));
+        };
+        const float value = mix(above) + v.weight * (mix(below) - mix(above));
+        texel |= static_cast<std::uint32_t>(value + 0.5f) << shift;
+      }
+      dst[y * w2 + x] = texel;
     }
   }
 }

@@ -4,6 +4,7 @@
 #include <cmath>
 #include <limits>
 #include <memory>
+#include <numeric>
 
 #include "mjsense/core/error.h"
 #include "mjsense/core/testing/allocations.h"
@@ -232,6 +233,22 @@ TEST(Camera, NothingSeenIsZeroAndMinusOne) {
   for (auto v : lab.read<float>("depth")) EXPECT_EQ(v, 0);
   for (auto v : lab.read<std::int32_t>("segmentation")) EXPECT_EQ(v, -1);
   for (auto v : lab.read<float>("normals")) EXPECT_EQ(v, 0);
+}
+
+// Far away a tile is as bright as the mean of its texture, also where the texture's size is odd.
+TEST(Camera, DistantTexturesKeepTheirBorders) {
+  CameraSensorCfg cfg = camera(40, 40, {"rgb"});
+  cfg.pos = {0, 0, 4};
+  // 15 x 15 texels, the outermost white, and two on a pixel.
+  Lab lab(R"(<asset><texture name="t" type="2d" builtin="flat" mark="edge" rgb1="0 0 0"
+                     markrgb="1 1 1" width="15" height="15"/>
+               <material name="m" texture="t" texrepeat="6.4 6.4" emission="1" specular="0"/></asset>
+             <worldbody><light active="false"/><geom type="plane" size="2 2 .1" material="m"/>
+             </worldbody>)",
+          {cfg});
+  const auto rgb = lab.read<std::uint8_t>("rgb");
+  const double mean = std::accumulate(rgb.begin(), rgb.end(), 0.0) / rgb.size();
+  EXPECT_NEAR(mean, 255 * (15 * 15 - 13 * 13) / (15.0 * 15), 8);
 }
 
 TEST(Camera, ClipRangeHidesWhatIsNearerOrFarther) {
