@@ -2,6 +2,7 @@
 // What lies before and inside the opaque surfaces of a packet: transparent geoms, reflections. Part of
 // the tile kernels.
 
+#include "mjsense/render/kernel_fixed.h"
 #include "mjsense/render/kernel_shade.h"
 #include "mjsense/render/kernel_trace.h"
 
@@ -10,13 +11,6 @@ namespace {
 
 constexpr int kMaxMirrored = 32;  // transparent geoms in a reflection
 constexpr int kMaxLayers = 8;     // of transparent geoms over one packet
-
-inline std::uint32_t hit_lanes(const Hits& hits) {
-  std::uint32_t lanes = 0;
-  for (int k = 0; k < kLanes; k += kWidth)
-    lanes |= bits(less(int_of(-1), load(hits.geom + k))) << k;
-  return lanes;
-}
 
 struct Layer {
   Colors color;

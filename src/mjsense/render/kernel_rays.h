@@ -34,6 +34,13 @@ struct alignas(64) Hits {
   float n[3][kLanes];  // geom frame, any length
 };
 
+// Which of a layered view's geoms.
+enum class Part { kAll, kFixed, kMoving };
+
+inline bool belongs(const ViewGeom& g, Part part) {
+  return part == Part::kAll || g.fixed == (part == Part::kFixed);
+}
+
 inline Float splat(float x) { return Float(x); }
 
 inline Vec3f splat(const float* p) { return {splat(p[0]), splat(p[1]), splat(p[2])}; }

@@ -298,13 +298,12 @@ inline LightTerm light_term(const ViewLight& light, bool ortho, Vec3f p, Vec3f n
 struct Lit {
   LightTerm terms[kLanes / kWidth];
 
-  Lit(const View& view, const ViewLight& light, const Surfaces& s) {
-    const bool shiny = light.specular[0] + light.specular[1] + light.specular[2] > 0;
+  Lit(const View& view, const ViewLight& light, const Surfaces& s, bool shiny) {
     for (int k = 0; k < kLanes; k += kWidth) {
       const Vec3f p{load(s.p[0] + k), load(s.p[1] + k), load(s.p[2] + k)};
       const Vec3f n{load(s.n[0] + k), load(s.n[1] + k), load(s.n[2] + k)};
-      terms[k / kWidth] =
-          light_term(light, view.grid.orthographic, p, n, load(s.exponent + k), shiny);
+      terms[k / kWidth] = light_term(light, view.grid.orthographic, p, n,
+                                     shiny ? load(s.exponent + k) : splat(0.0f), shiny);
     }
   }
 };
@@ -326,10 +325,19 @@ inline void add_light(const ViewLight& light, const Lit& lit, const Surfaces& s,
   }
 }
 
-// Lanes that do not get the light: barred by a geom, or turned away.
-inline std::uint32_t dark_lanes(const View& view, const ViewLight& light, const Lit& lit,
-                                const Surfaces& s, const Hits& hits, std::uint32_t lanes,
-                                Casters& casters) {
+// What casts shadows on a tile, by light. In a layered view fixed lanes of a packet know already where
+// fixed geoms leave them in the dark.
+struct Shadows {
+  Casters fixed[View::kMaxLights], moving[View::kMaxLights];  // not layered: all are moving
+  const FixedTile* known = nullptr;
+  std::uint32_t fixed_lanes = 0;  // of the packet at hand
+  int packet = 0;
+};
+
+// Lanes that do not get light `index`: barred by a geom, or turned away.
+inline std::uint32_t dark_lanes(const View& view, int index, const Lit& lit, const Surfaces& s,
+                                const Hits& hits, std::uint32_t lanes, Shadows& shadows) {
+  const ViewLight& light = view.lights[index];
   LightRays rays;
   const bool directional = light.kind == LightKind::kDirectional;
   std::uint32_t facing = 0, reachable = 0;
@@ -345,8 +353,10 @@ inline std::uint32_t dark_lanes(const View& view, const ViewLight& light, const 
     reachable |= bits(splat(0.0f) < end) << k;
     store(rays.end + k, end);
   }
-  const std::uint32_t active = facing & reachable & lanes;
-  if (!active) return ~facing;
+  std::uint32_t dark = ~facing;
+  if (shadows.known) dark |= shadows.known->dark[index][shadows.packet] & shadows.fixed_lanes;
+  const std::uint32_t active = reachable & lanes & ~dark;
+  if (!active) return dark;
   __builtin_memcpy(rays.p, s.p, sizeof rays.p);
   __builtin_memcpy(rays.n, s.n, sizeof rays.n);
   __builtin_memcpy(rays.geom, hits.geom, sizeof rays.geom);
@@ -358,12 +368,13 @@ inline std::uint32_t dark_lanes(const View& view, const ViewLight& light, const 
     longest = max(longest, select(m, load(rays.end + k), splat(0.0f)));
   }
   const Shaft shaft = shaft_to(light, low, high, lane_max(longest));
-  return ~facing | in_shadow(view, casters, rays, shaft, active);
+  dark |= in_shadow(view, shadows.fixed[index], rays, shaft, active & ~shadows.fixed_lanes);
+  return dark | in_shadow(view, shadows.moving[index], rays, shaft, active & ~dark);
 }
 
-// Colours 0..1 of `lanes`. `casters` by light; null: no light casts shadows here.
+// Colours 0..1 of `lanes`. No shadows: no light casts any here.
 inline void shade(const View& view, const Surfaces& s, const Hits& hits, std::uint32_t lanes,
-                  Casters* casters, Colors& out) {
+                  Shadows* shadows, Colors& out) {
   Colors separate = {};
   for (int c = 0; c < 3; ++c)
     for (int k = 0; k < kLanes; k += kWidth) {
@@ -372,9 +383,10 @@ inline void shade(const View& view, const Surfaces& s, const Hits& hits, std::ui
     }
   for (int i = 0; i < view.num_lights; ++i) {
     const ViewLight& light = view.lights[i];
-    const Lit lit(view, light, s);
-    if (casters && light.shadows) {
-      const std::uint32_t dark = dark_lanes(view, light, lit, s, hits, lanes, casters[i]);
+    const bool shiny = light.specular[0] + light.specular[1] + light.specular[2] > 0;
+    const Lit lit(view, light, s, shiny);
+    if (shadows && light.shadows) {
+      const std::uint32_t dark = dark_lanes(view, i, lit, s, hits, lanes, *shadows);
       if ((lanes & ~dark) != 0) add_light(light, lit, s, dark, true, separate);
     } else {
       add_light(light, lit, s, 0, false, out);

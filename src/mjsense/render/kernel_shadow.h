@@ -160,8 +160,8 @@ struct Casters {
   }
 };
 
-// All casters of one light for points in a box.
-inline void find_casters(const View& view, const ViewLight& light, const float* low,
+// All casters of one light among `part` for points in a box.
+inline void find_casters(const View& view, const ViewLight& light, Part part, const float* low,
                          const float* high, Casters& out) {
   const bool directional = light.kind == LightKind::kDirectional;
   const Shaft shaft = shaft_to(light, low, high, directional ? kInfinity : 1.0f);
@@ -170,7 +170,9 @@ inline void find_casters(const View& view, const ViewLight& light, const float* 
     for (; near; near &= near - 1) {
       const int g = i + __builtin_ctz(near);
       if (g >= view.num_geoms) break;
-      if (view.geoms[g].type == mjGEOM_PLANE || meets_box(shaft, view.geoms[g])) out.add(view, g);
+      const ViewGeom& geom = view.geoms[g];
+      if (!belongs(geom, part)) continue;
+      if (geom.type == mjGEOM_PLANE || meets_box(shaft, geom)) out.add(view, g);
     }
   }
 }
@@ -178,7 +180,7 @@ inline void find_casters(const View& view, const ViewLight& light, const float* 
 // Lanes of `active` whose way to the light is barred by one of `casters`.
 inline std::uint32_t in_shadow(const View& view, Casters& casters, const LightRays& rays,
                                const Shaft& shaft, std::uint32_t active) {
-  if (casters.count == 0) return 0;
+  if (casters.count == 0 || !active) return 0;
   std::uint32_t left = active & ~shadow_of_geom(view, casters.list[casters.hint], rays, active);
   for (int i = 0; i < casters.count && left; i += kWidth) {
     std::uint32_t near = spheres_in_shaft(shaft, casters.spheres, i);

@@ -2,6 +2,7 @@
 // A tile of 16 x 16 pixels: which geoms it can see, what each pixel sees, what colour that is. Part
 // of the tile kernels.
 
+#include "mjsense/render/kernel_fixed.h"
 #include "mjsense/render/kernel_layers.h"
 #include "mjsense/render/kernel_output.h"
 #include "mjsense/render/kernel_raster.h"
@@ -43,76 +44,6 @@ inline void fill_pixels(const View& view, int x0, int y0, float shift_x, float s
     w[1] = px > w[1] ? px : w[1];
     w[2] = py < w[2] ? py : w[2];
     w[3] = py > w[3] ? py : w[3];
-  }
-}
-
-// Casters of every shadow-casting light for the points that the tile sees.
-inline void find_casters(const View& view, const Tile& tile, int packets, TileScratch& scratch,
-                         Casters* out) {
-  Float low[3], high[3];
-  for (int c = 0; c < 3; ++c) {
-    low[c] = splat(kInfinity);
-    high[c] = splat(-kInfinity);
-  }
-  for (int q = 0; q < packets; ++q)
-    for (int k = 0; k < kLanes; k += kWidth) {
-      const Mask hit = less(int_of(-1), load(tile.hits[q].geom + k));
-      const Float t = load(tile.hits[q].t + k), s = view.grid.orthographic ? splat(1.0f) : t;
-      const Float p[3] = {s * load(tile.pixels[q].x + k), s * load(tile.pixels[q].y + k), -t};
-      for (int c = 0; c < 3; ++c) {
-        low[c] = min(low[c], select(hit, p[c], splat(kInfinity)));
-        high[c] = max(high[c], select(hit, p[c], splat(-kInfinity)));
-      }
-    }
-  float least[3], most[3];
-  for (int c = 0; c < 3; ++c) {
-    least[c] = lane_min(low[c]);
-    most[c] = lane_max(high[c]);
-  }
-  int used = 0;
-  for (int i = 0; i < view.num_lights; ++i) {
-    out[i] = {scratch.casters + used, scratch.spheres, 0, 0};
-    for (float** p :
-         {&out[i].spheres.x, &out[i].spheres.y, &out[i].spheres.z, &out[i].spheres.radius})
-      *p += used;
-    if (!view.lights[i].shadows || least[0] > most[0]) continue;
-    find_casters(view, view.lights[i], least, most, out[i]);
-    used += out[i].count;
-  }
-}
-
-inline void update_farthest(Tile& tile, PacketMask packets) {
-  for (; packets; packets &= packets - 1) {
-    const int q = __builtin_ctz(packets);
-    Float far = load(tile.hits[q].t);
-    for (int k = kWidth; k < kLanes; k += kWidth) far = max(far, load(tile.hits[q].t + k));
-    tile.farthest[q] = lane_max(far);
-  }
-  Float depth = load(tile.farthest);
-  for (int k = kWidth; k < kTilePackets; k += kWidth) depth = max(depth, load(tile.farthest + k));
-  tile.depth = lane_max(depth);
-}
-
-// Nearer hits of `packets` on geom `index` replace those of the tile: which did.
-inline PacketMask draw_or_trace(const View& view, int index, PacketMask packets, Tile& tile) {
-  const ViewGeom& g = view.geoms[index];
-  PacketMask changed = 0;
-  if (g.clusters && !view.grid.orthographic && rasterize(view, index, packets, tile, changed)) {
-    if (g.height_field)
-      changed |= trace_walls(Tracing(view, index), tile.pixels, tile.hits, packets);
-    return changed;
-  }
-  return trace_geom(view, index, tile.pixels, tile.hits, packets);
-}
-
-// The nearest hits of all packets among the geoms of `list`, which is sorted by ViewGeom::nearest.
-inline void trace_tile(const View& view, const int* list, int count, Tile& tile) {
-  for (int i = 0; i < count; ++i) {
-    const ViewGeom& g = view.geoms[list[i]];
-    const PacketMask packets = packets_in_reach(g.window, g.nearest, tile);
-    if (!packets) continue;
-    const PacketMask changed = draw_or_trace(view, list[i], packets, tile);
-    if (changed) update_farthest(tile, changed);
   }
 }
 
@@ -180,7 +111,7 @@ inline void render_tile(const View& view, const ImageTargets& targets, int tx, i
   const int packets = across * down;
   const bool geometry = targets.depth || targets.segmentation || targets.normals || targets.points;
   const float far = view.far > 0 ? view.far : kInfinity;
-  tile.shaded = targets.rgb || targets.normals;
+  tile.shaded = targets.rgb || targets.normals || targets.fixed;
   const int samples = targets.rgb ? targets.samples : 1;
   alignas(64) float sum[kTilePackets][3][kLanes];
   for (int sample = 0; sample < samples || (sample == samples && samples > 1 && geometry);
@@ -207,11 +138,22 @@ inline void render_tile(const View& view, const ImageTargets& targets, int tx, i
     for (int q = packets; q < kTilePackets; ++q) tile.farthest[q] = -kInfinity;
     tile.depth = far;
     const TileLists lists = find_geoms(view, window, scratch);
-    trace_tile(view, scratch.opaque, lists.opaque, tile);
+    const FixedTile* fixed = nullptr;
+    if (view.layered && samples == 1) {
+      const int at = ty * ((grid.width + kTileSize - 1) / kTileSize) + tx;
+      FixedTile* made = targets.fixed ? targets.fixed + at : scratch.fixed;
+      if (view.fixed) {
+        load_fixed(view, view.fixed[at], packets, tile);
+      } else {
+        make_fixed(view, lists.opaque, packets, tile, scratch, *made);
+      }
+      if (targets.fixed) return;
+      fixed = view.fixed ? view.fixed + at : made;
+    }
+    trace_tile(view, fixed ? Part::kMoving : Part::kAll, scratch.opaque, lists.opaque, tile);
     if (targets.rgb && sample < samples) {
-      Casters casters[View::kMaxLights];
-      const bool shadows = view.shadows;
-      if (shadows) find_casters(view, tile, packets, scratch, casters);
+      Shadows shadows;
+      if (view.shadows) find_all_casters(view, fixed, tile, packets, scratch, shadows);
       for (int q = 0; q < packets; ++q) {
         const Hits& hits = tile.hits[q];
         const std::uint32_t lanes = hit_lanes(hits);
@@ -219,7 +161,9 @@ inline void render_tile(const View& view, const ImageTargets& targets, int tx, i
         if (lanes) {
           Surfaces surfaces;
           gather_surfaces(view, tile.pixels[q], hits, lanes, true, surfaces);
-          shade(view, surfaces, hits, lanes, shadows ? casters : nullptr, colors);
+          if (fixed) shadows.fixed_lanes = lanes & fixed_lanes(view, hits);
+          shadows.packet = q;
+          shade(view, surfaces, hits, lanes, view.shadows ? &shadows : nullptr, colors);
         }
         if (lanes != 0xffffu) shade_background(view, tile.pixels[q], ~lanes & 0xffffu, colors);
         if (view.reflection) add_reflection(view, tile.pixels[q], hits, colors);

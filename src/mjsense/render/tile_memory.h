@@ -17,6 +17,7 @@ class TileMemory {
   std::vector<int> lists_;
   std::vector<float> spheres_;
   Array tile_;
+  std::vector<FixedTile> fixed_;
   TileScratch scratch_;
 };
 

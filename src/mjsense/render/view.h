@@ -47,6 +47,7 @@ struct alignas(64) ViewGeom {
   int type;               // mjtGeom; mjGEOM_MESH for a flex or skin
   int id;                 // of geoms, then flexes, then skins: unique in the model
   int object_id, object;  // for segmentation: id and mjtObj
+  bool fixed;             // belongs to View::fixed
   bool transparent;       // blended over what is behind it, casts shadows, receives none
   bool behind;  // a plane that the camera sees from below: a faint veil, and nothing to depth and
                 // segmentation
@@ -74,6 +75,8 @@ struct Spheres {
 };
 inline constexpr int kSpherePadding = 16;
 
+struct FixedTile;
+
 struct View {
   static constexpr int kMaxLights = 32;
   PixelGrid grid;
@@ -86,6 +89,11 @@ struct View {
   ViewLight lights[kMaxLights];
   int num_lights = 0;
   bool shadows = false;
+  // Fixed geoms are drawn first, for themselves. `fixed`: the image's tiles of them, row by row, if they
+  // are known.
+  bool layered = false;
+  const FixedTile* fixed = nullptr;
+  const int* index_of_id = nullptr;  // of geoms in sight, in `geoms`
   float global_ambient = 0;
   const Texture* skybox = nullptr;
   float r_wc[9] = {};      // for the skybox
@@ -112,9 +120,19 @@ struct ImageTargets {
   float* points = nullptr;               // [H, W, 3]
   bool ray_depth = false;                // depth along the ray instead of planar
   int samples = 1;                       // of rgb
+  FixedTile* fixed = nullptr;            // these are made, and no image
 };
 
 inline constexpr int kTileSize = 16;  // pixels; a tile is 4 x 4 packets of 4 x 4 pixels
+
+// What a tile shows of the fixed geoms: Hits by packet, and the lanes of each packet that a light does
+// not reach, because a fixed geom stands in its way or the surface is turned away.
+struct alignas(64) FixedTile {
+  static constexpr int kPixels = kTileSize * kTileSize;
+  float t[kPixels], u[kPixels], v[kPixels], n[3][kPixels];
+  int id[kPixels], prim[kPixels];
+  std::uint16_t dark[View::kMaxLights][kPixels / 16];
+};
 
 // Work space of one thread: lists as long as the view has geoms.
 struct TileScratch {
@@ -125,6 +143,7 @@ struct TileScratch {
   int* casters = nullptr;  // of all lights: kMaxLights times as long
   Spheres spheres{};       // of casters
   void* tile = nullptr;    // a Tile of the kernels
+  FixedTile* fixed = nullptr;
 };
 
 // Bytes of a Tile, 64-byte aligned.

@@ -8,6 +8,7 @@
 #include "mjsense/rays/ray_world.h"
 #include "mjsense/rays/shared_geometry.h"
 #include "mjsense/rays/skin_shapes.h"
+#include "mjsense/render/fixed_layer.h"
 
 namespace mjsense {
 namespace {
@@ -32,13 +33,19 @@ ViewBuilder::ViewBuilder(const mjModel* model, const Look& look, const ViewOptio
       spheres_(4 * (max_geoms(model) + kSpherePadding)),
       soft_looks_(model->nflex + model->nskin) {
   order_.reserve(max_geoms(model));
+  if (options.layered) {
+    view_.layered = true;
+    index_of_id_.resize(max_geoms(model));
+    for (int i = 0; i < model->ngeom; ++i)
+      fixed_.push_back(is_fixed_body(model, model->geom_bodyid[i]));
+  }
   view_.near = options.near;
   view_.far = options.far;
   view_.shadows = options.shadows;
   view_.skybox = options.textures ? look.skybox() : nullptr;
   if (options.reflections && model->nmat > 0) {  // any world may make a material reflect
     ViewOptions flat = options;
-    flat.reflections = flat.shadows = false;
+    flat.reflections = flat.shadows = flat.layered = false;
     mirrored_ = std::make_unique<ViewBuilder>(model, look, flat);
   }
 }
@@ -57,6 +64,7 @@ const View& ViewBuilder::build(const RayWorld& world, const SharedGeometry& shap
     const int index = static_cast<int>(order_.size());
     ViewGeom& g = unsorted_[index];
     g.id = id;
+    g.fixed = static_cast<std::size_t>(id) < fixed_.size() && fixed_[id];
     place(source, position, rotation, g);
     set_shape(world, shapes, source, g);
     const bool sight = in_sight(g);
@@ -90,6 +98,7 @@ const View& ViewBuilder::build(const RayWorld& world, const SharedGeometry& shap
   view_.spheres = {spheres, spheres + stride, spheres + 2 * stride, spheres + 3 * stride};
   for (std::size_t i = 0; i < order_.size(); ++i) {
     const ViewGeom& g = sorted_[i] = unsorted_[order_[i].index];
+    if (view_.layered) index_of_id_[g.id] = static_cast<int>(i);
     view_.spheres.x[i] = g.center[0];
     view_.spheres.y[i] = g.center[1];
     view_.spheres.z[i] = g.center[2];
@@ -98,6 +107,8 @@ const View& ViewBuilder::build(const RayWorld& world, const SharedGeometry& shap
     view_.num_transparent += order_[i].rank == 1;
   }
   view_.geoms = sorted_.data();
+  view_.index_of_id = index_of_id_.data();
+  view_.fixed = nullptr;
   view_.num_geoms = static_cast<int>(order_.size());
   for (int i = 0; i < 9; ++i) view_.r_wc[i] = static_cast<float>(rotation[i]);
   set_lights(world, appearance, position, rotation);

@@ -23,6 +23,7 @@ struct ViewOptions {
   bool textures = true;
   bool shadows = false;
   bool reflections = false;
+  bool layered = false;  // View::layered
   float near = 0, far = 0;
 };
 
@@ -36,6 +37,7 @@ class ViewBuilder {
                     const Appearance& appearance, const double position[3],
                     const double rotation[9], const PixelGrid& grid);
   const View& view() const { return view_; }
+  void use_fixed(const FixedTile* tiles) { view_.fixed = tiles; }  // of the view just built
   static std::size_t max_geoms(const mjModel* model) {
     return static_cast<std::size_t>(model->ngeom + model->nflex + model->nskin);
   }
@@ -68,6 +70,8 @@ class ViewBuilder {
   std::vector<ViewGeom> unsorted_, sorted_;
   std::vector<float> spheres_;  // View::spheres
   std::vector<Order> order_;
+  std::vector<std::uint8_t> fixed_;  // of geoms; none if not layered
+  std::vector<int> index_of_id_;
   std::vector<MeshLook> soft_looks_;       // of flexes, then skins, with the world's normals
   std::unique_ptr<ViewBuilder> mirrored_;  // null: nothing can reflect
   int left_out_ = -1;                      // geom that this view does not show: the mirror itself

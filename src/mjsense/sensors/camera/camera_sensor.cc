@@ -110,8 +110,12 @@ void CameraSensor::initialize(const SensorInit& init) {
       std::max(init.threads, std::min(init.num_worlds, kImagesPerThread * init.threads));
   workspace_ = std::make_unique<Workspace>();
   workspace_->builders.reserve(slots);
-  for (int i = 0; i < slots; ++i)
-    workspace_->builders.emplace_back(model_, *look_, view_options(cfg_, groups_));
+  fixed_layer_.reset();
+  if (rgb_ && cfg_.use_shadows && cfg_.samples == 1 && FixedLayer::possible(model_, camera_))
+    fixed_layer_ = std::make_unique<FixedLayer>(model_, cfg_.width, cfg_.height);
+  ViewOptions options = view_options(cfg_, groups_);
+  options.layered = fixed_layer_ != nullptr;
+  for (int i = 0; i < slots; ++i) workspace_->builders.emplace_back(model_, *look_, options);
   const int geoms = ViewBuilder::max_geoms(model_);
   for (int i = 0; i < init.threads; ++i) workspace_->memory.emplace_back(geoms);
 }
@@ -256,8 +260,21 @@ ImageTargets CameraSensor::targets(int world, int thread) {
 const View& CameraSensor::build_view(const RayScene& rays, int world, ViewBuilder& builder) const {
   const RayWorld& state = rays.world(world);
   const RayCamera& camera = state.cameras()[camera_];
-  return builder.build(state, rays.shared(), worlds_[world].appearance, camera.pos, camera.mat,
-                       worlds_[world].grid);
+  const View& view = builder.build(state, rays.shared(), worlds_[world].appearance, camera.pos,
+                                   camera.mat, worlds_[world].grid);
+  if (fixed_layer_ && fixed_layer_->shows(view)) builder.use_fixed(fixed_layer_->tiles());
+  return view;
+}
+
+// One world is asked for all: those that look different are drawn without the layer.
+void CameraSensor::update_fixed_layer(const CastContext& context, int tile_rows) {
+  const View& view = build_view(*context.rays, due_[0], workspace_->builders[0]);
+  if (!fixed_layer_->settles(view)) return;
+  ImageTargets tiles;
+  tiles.fixed = fixed_layer_->tiles();
+  context.pool.run(tile_rows, [&](int row, int thread) {
+    workspace_->render(view, tiles, row, row + 1, workspace_->memory[thread].scratch());
+  });
 }
 
 void CameraSensor::cast(const CastContext& context) {
@@ -310,6 +327,7 @@ void CameraSensor::render_due(const CastContext& context) {
   const int tile_rows = (cfg_.height + kTileSize - 1) / kTileSize;
   const int threads = context.pool.size();
   Workspace& work = *workspace_;
+  if (fixed_layer_ && count > 0) update_fixed_layer(context, tile_rows);
   if (threads == 1 || count >= kImagesPerThread * threads) {
     context.pool.run(count, [&](int item, int thread) {
       const View& view = build_view(rays, due_[item], work.builders[thread]);

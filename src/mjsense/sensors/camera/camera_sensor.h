@@ -6,6 +6,7 @@
 
 #include "mjsense/core/rng.h"
 #include "mjsense/render/camera_model.h"
+#include "mjsense/render/fixed_layer.h"
 #include "mjsense/render/gl_renderer.h"
 #include "mjsense/render/look.h"
 #include "mjsense/render/view_builder.h"
@@ -61,6 +62,7 @@ class CameraSensor final : public Sensor {
   void derive(int world, const ImageTargets& image, int first, int last);
   // Rows of tiles [first, last) of an image and what is computed from them.
   void render_rows(const View& view, int world, int first, int last, int thread);
+  void update_fixed_layer(const CastContext& context, int tile_rows);
   const View& build_view(const RayScene& rays, int world, ViewBuilder& builder) const;
 
   CameraSensorCfg cfg_;
@@ -74,6 +76,7 @@ class CameraSensor final : public Sensor {
   std::unique_ptr<Look> look_;
   std::unique_ptr<GlRenderer> gl_;  // renderer "opengl"
   std::unique_ptr<Workspace> workspace_;
+  std::unique_ptr<FixedLayer> fixed_layer_;    // null: it would not pay, or the camera moves
   std::unique_ptr<OpticalFlow> optical_flow_;  // null: not wanted
   std::unique_ptr<PixelOwners> owners_;        // the same
   Field *rgb_ = nullptr, *depth_ = nullptr, *segmentation_ = nullptr, *bodies_ = nullptr,

@@ -1,0 +1,147 @@
+#pragma once
+// The layer of fixed geoms of a tile, and who casts shadows on what the tile shows. Part of the tile
+// kernels.
+
+#include "mjsense/render/kernel_raster.h"
+#include "mjsense/render/kernel_shade.h"
+
+namespace mjsense {
+namespace {
+
+inline std::uint32_t hit_lanes(const Hits& hits) {
+  std::uint32_t lanes = 0;
+  for (int k = 0; k < kLanes; k += kWidth)
+    lanes |= bits(less(int_of(-1), load(hits.geom + k))) << k;
+  return lanes;
+}
+
+// Lanes that show a fixed geom.
+inline std::uint32_t fixed_lanes(const View& view, const Hits& hits) {
+  std::uint32_t lanes = 0;
+  for (int i = 0; i < kLanes; ++i)
+    lanes |= static_cast<std::uint32_t>(hits.geom[i] >= 0 && view.geoms[hits.geom[i]].fixed) << i;
+  return lanes;
+}
+
+// Box around what the tile shows, or only what moves of it; low > high: nothing.
+inline void tile_bounds(const View& view, Part part, const Tile& tile, int packets, float* low,
+                        float* high) {
+  Float least[3], most[3];
+  for (int c = 0; c < 3; ++c) {
+    least[c] = splat(kInfinity);
+    most[c] = splat(-kInfinity);
+  }
+  for (int q = 0; q < packets; ++q) {
+    const Hits& hits = tile.hits[q];
+    std::uint32_t lanes = hit_lanes(hits);
+    if (part == Part::kMoving) lanes &= ~fixed_lanes(view, hits);
+    for (int k = 0; k < kLanes; k += kWidth) {
+      const Mask m = mask_of(lanes >> k & kAllLanes);
+      const Float t = load(hits.t + k), s = view.grid.orthographic ? splat(1.0f) : t;
+      const Float p[3] = {s * load(tile.pixels[q].x + k), s * load(tile.pixels[q].y + k), -t};
+      for (int c = 0; c < 3; ++c) {
+        least[c] = min(least[c], select(m, p[c], splat(kInfinity)));
+        most[c] = max(most[c], select(m, p[c], splat(-kInfinity)));
+      }
+    }
+  }
+  for (int c = 0; c < 3; ++c) {
+    low[c] = lane_min(least[c]);
+    high[c] = lane_max(most[c]);
+  }
+}
+
+// Casters among `part` of every light for points in the box; the lists begin at `used` in the scratch.
+inline void find_casters(const View& view, Part part, const float* low, const float* high,
+                         TileScratch& scratch, int& used, Casters* out) {
+  for (int i = 0; i < view.num_lights; ++i) {
+    const Spheres& s = scratch.spheres;
+    out[i] = {scratch.casters + used, {s.x + used, s.y + used, s.z + used, s.radius + used}, 0, 0};
+    if (!view.lights[i].shadows || low[0] > high[0]) continue;
+    find_casters(view, view.lights[i], part, low, high, out[i]);
+    used += out[i].count;
+  }
+}
+
+// `fixed`: the tile's layer, which knows what fixed geoms shade of each other; null: not layered.
+inline void find_all_casters(const View& view, const FixedTile* fixed, const Tile& tile,
+                             int packets, TileScratch& scratch, Shadows& out) {
+  float low[3], high[3];
+  int used = 0;
+  out.known = fixed;
+  for (int i = 0; i < view.num_lights; ++i) out.fixed[i].count = 0;
+  if (fixed) {
+    tile_bounds(view, Part::kMoving, tile, packets, low, high);
+    find_casters(view, Part::kFixed, low, high, scratch, used, out.fixed);
+  }
+  tile_bounds(view, Part::kAll, tile, packets, low, high);
+  find_casters(view, fixed ? Part::kMoving : Part::kAll, low, high, scratch, used, out.moving);
+}
+
+inline void keep_hits(const Hits& hits, int packet, FixedTile& out) {
+  for (int k = 0; k < kLanes; k += kWidth) {
+    const int at = packet * kLanes + k;
+    store(out.t + at, load(hits.t + k));
+    store(out.id + at, load(hits.id + k));
+    store(out.prim + at, load(hits.prim + k));
+    store(out.u + at, load(hits.u + k));
+    store(out.v + at, load(hits.v + k));
+    for (int c = 0; c < 3; ++c) store(out.n[c] + at, load(hits.n[c] + k));
+  }
+}
+
+// Draws the fixed geoms among `count` in scratch.opaque into the tile, and keeps what is known then.
+inline void make_fixed(const View& view, int count, int packets, Tile& tile, TileScratch& scratch,
+                       FixedTile& out) {
+  trace_tile(view, Part::kFixed, scratch.opaque, count, tile);
+  float low[3], high[3];
+  tile_bounds(view, Part::kAll, tile, packets, low, high);
+  Shadows shadows;
+  int used = 0;
+  find_casters(view, Part::kFixed, low, high, scratch, used, shadows.fixed);
+  for (int i = 0; i < view.num_lights; ++i) shadows.moving[i].count = 0;
+  for (int q = 0; q < packets; ++q) {
+    const Hits& hits = tile.hits[q];
+    keep_hits(hits, q, out);
+    const std::uint32_t lanes = hit_lanes(hits);
+    if (!lanes) continue;
+    Surfaces surfaces;
+    gather_surfaces(view, tile.pixels[q], hits, lanes, false, surfaces);
+    for (int i = 0; i < view.num_lights; ++i) {
+      if (!view.lights[i].shadows) continue;
+      const Lit lit(view, view.lights[i], surfaces, false);
+      const std::uint32_t dark = dark_lanes(view, i, lit, surfaces, hits, lanes, shadows);
+      out.dark[i][q] = static_cast<std::uint16_t>(dark & lanes);
+    }
+  }
+}
+
+// The tile as make_fixed() leaves it, from what is kept.
+inline void load_fixed(const View& view, const FixedTile& from, int packets, Tile& tile) {
+  PacketMask shown = 0;
+  for (int q = 0; q < packets; ++q) {
+    Hits& hits = tile.hits[q];
+    for (int k = 0; k < kLanes; k += kWidth) {
+      const int at = q * kLanes + k;
+      store(hits.t + k, load(from.t + at));
+      store(hits.id + k, load(from.id + at));
+      store(hits.prim + k, load(from.prim + at));
+      store(hits.u + k, load(from.u + at));
+      store(hits.v + k, load(from.v + at));
+      for (int c = 0; c < 3; ++c) store(hits.n[c] + k, load(from.n[c] + at));
+    }
+    int last = -1, index = -1;
+    for (int i = 0; i < kLanes; ++i) {
+      if (hits.id[i] != last) {  // most packets see few
+        last = hits.id[i];
+        index = last < 0 ? -1 : view.index_of_id[last];
+      }
+      hits.geom[i] = index;
+      shown |= static_cast<PacketMask>(index >= 0) << q;
+    }
+  }
+  if (shown) update_farthest(tile, shown);
+}
+
+}  // namespace
+}  // namespace mjsense

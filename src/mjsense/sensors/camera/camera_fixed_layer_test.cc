@@ -1,0 +1,119 @@
+// A camera that has kept what stands still makes the same image as one that has not, bit for bit.
+
+#include <gtest/gtest.h>
+
+#include <functional>
+#include <string>
+#include <vector>
+
+#include "mjsense/core/parallel.h"
+#include "mjsense/rays/ray_scene.h"
+#include "mjsense/rays/testing/scene.h"
+#include "mjsense/sensors/camera/camera_sensor.h"
+
+namespace mjsense {
+namespace {
+
+std::string room(Rng& rng) {
+  std::string heights;
+  for (int i = 0; i < 30 * 30; ++i) heights += testing::vec({rng.uniform()});
+  std::string things;
+  for (int i = 0; i < 12; ++i) {
+    const std::string pos =
+        testing::vec({rng.uniform(-1, 1), rng.uniform(-1, 1), rng.uniform(0.2, 1)});
+    const std::string body =
+        i % 3 == 0 ? "<body pos='" + pos + "'>" : "<body pos='" + pos + "'><freejoint/>";
+    things += body + "<geom type='mesh' mesh='rock'/><geom type='box' size='.1 .2 .05'/>" +
+              (i % 4 == 0 ? "<geom type='sphere' size='.15' pos='.2 0 0' rgba='1 0 0 .5'/>" : "") +
+              "</body>";
+  }
+  std::string rock;
+  for (int i = 0; i < 60; ++i)
+    rock += testing::vec({rng.uniform(-0.3, 0.3), rng.uniform(-0.2, 0.2), rng.uniform(-0.2, 0.2)});
+  return "<mujoco><asset><mesh name='rock' vertex='" + rock +
+         "'/><hfield name='ground' nrow='30' ncol='30' size='2 2 .3 .1' elevation='" + heights +
+         "'/></asset><worldbody><light name='sun' pos='0 0 4' dir='.3 .2 -1' type='directional'/>"
+         "<light name='lamp' pos='1 -1 3' dir='-.3 .3 -1' cutoff='60'/>"
+         "<geom name='floor' type='plane' size='0 0 1'/><geom type='hfield' hfield='ground'/>" +
+         things +
+         "<body name='marker' mocap='true' pos='0 0 1'><geom type='box' size='.2 .2 .02'/></body>"
+         "<camera name='c' pos='0 -2.5 3' euler='40 0 0' fovy='50'/></worldbody></mujoco>";
+}
+
+struct Camera {
+  std::unique_ptr<Sensor> sensor;
+  explicit Camera(const mjModel* model, int num_worlds = 1, int threads = 1) {
+    CameraSensorCfg cfg;
+    cfg.name = "cam";
+    cfg.camera_name = "c";
+    cfg.width = 75;
+    cfg.height = 50;
+    cfg.data_types = {"rgb", "depth", "segmentation"};
+    cfg.use_shadows = true;
+    sensor = cfg.build();
+    SensorInit init;
+    init.model = model;
+    init.num_worlds = num_worlds;
+    init.threads = threads;
+    sensor->initialize(init);
+  }
+};
+
+// All bytes of the image of world 0.
+std::vector<std::uint8_t> image(Camera& camera, const testing::TestModel& m, RayScene& rays,
+                                ThreadPool& pool) {
+  mj_forward(m.model, m.data);
+  rays.update(m.world());
+  camera.sensor->compute(m.world());
+  const int id = 0;
+  camera.sensor->cast({&rays, {&id, 1}, pool});
+  std::vector<std::uint8_t> bytes;
+  for (const char* field : {"rgb", "depth", "segmentation"}) {
+    const Array& data = camera.sensor->field(field).data;
+    const auto* p = reinterpret_cast<const std::uint8_t*>(data.row_data(0));
+    bytes.insert(bytes.end(), p, p + data.row_bytes());
+  }
+  return bytes;
+}
+
+TEST(FixedLayer, ChangesNoBitOfAnyImage) {
+  for (int scene = 0; scene < 4; ++scene) {
+    Rng rng(5, 0, 1, scene);
+    testing::TestModel m(room(rng));
+    RayScene rays(m.model, 1);
+    ThreadPool pool(1 + scene % 3);
+    Camera keeps(m.model, 1, 1 + scene % 3);
+    const int box = m.model->ngeom - 3, light = 1;
+    const std::vector<std::function<void()>> changes = {
+        [] {},
+        [] {},
+        [] {},
+        [&] { m.data->qpos[0] += 0.3; },
+        [&] { m.data->mocap_pos[0] += 0.1; },
+        [&] { m.model->geom_pos[3 * 2] += 0.2; },  // of a fixed geom: what is kept is worth nothing
+        [] {},
+        [] {},
+        [] {},
+        [&] { m.model->light_pos[3 * light] += 0.5; },
+        [] {},
+        [] {},
+        [&] { m.model->cam_fovy[0] += 5; },
+        [] {},
+        [] {},
+        [&] { m.model->geom_rgba[4 * box + 3] = 0; },
+        [&] { m.model->geom_rgba[4] = 0.2f; },
+        [] {},
+        [] {},
+        [&] { m.data->qpos[7] -= 0.2; },
+    };
+    for (std::size_t i = 0; i < changes.size(); ++i) {
+      changes[i]();
+      Camera fresh(m.model, 1, 1 + scene % 3);
+      EXPECT_EQ(image(keeps, m, rays, pool), image(fresh, m, rays, pool))
+          << "scene " << scene << " image " << i;
+    }
+  }
+}
+
+}  // namespace
+}  // namespace mjsense
