@@ -1,7 +1,7 @@
-"""Images a second of CPU time beside Filament, MuJoCo 4's physically based renderer, through Vulkan (Mesa's lavapipe where there is no GPU).
+"""Images a second of CPU time beside Filament, MuJoCo 4's physically based renderer, through Vulkan: Mesa's lavapipe, without a GPU.
 
 rgb with shadows on both sides, without Filament's reflections and multisampling; then depth. Poses change before every image; physics and
-mj_forward are not timed. CPU time is counted, so with a GPU these figures mean nothing. Filament's colours are another look (photometric
+mj_forward are not timed. CPU time is counted, so on a GPU these figures mean nothing. Filament gives a scene another look (its own
 lights, tone mapping): --pictures=FOLDER writes both. A row says on how many pixels the depths are the same.
 """
 

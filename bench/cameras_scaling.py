@@ -18,46 +18,49 @@ from harness import Row, report
 SMALL, MIDDLE, LARGE = (84, 84), (224, 224), (640, 480)
 
 
-def cpu_and_wall(*cases: Ours, runs: int = RUNS) -> list[tuple[float, float]]:
-    """Median seconds of each; they take turns, so that a machine that drifts drifts for all."""
-    for case in cases:
-        case.frame()
-    times = [[case.frame() for case in cases] for _ in range(runs)]
-    return [tuple(map(statistics.median, zip(*case))) for case in zip(*times)]
-
-
 def by_worlds(name: str) -> list[Row]:
-    rows = []
+    rows: list[Row] = []
     for worlds in (1, 16, 256):
-        # As many images in each measurement, for one image alone is too short to time.
-        frames = 256 // worlds
         case = Ours(name, SMALL, ("rgb",), worlds, threads=1)
         case.frame()
-        seconds = [sum(case.frame()[0] for _ in range(frames)) for _ in range(RUNS)]
-        cost = 1e6 * statistics.median(seconds) / 256
-        alone = rows[0].ours if rows else None
-        rows.append(Row(f"{name}: an image of 84x84, {worlds} world{'s' * (worlds > 1)}", cost, "us", alone, "1 world" if rows else "", higher_is_better=False,
-                        goal=1 if rows else None))
+        # 256 images in each measurement, for one alone is short.
+        seconds = [sum(case.frame()[0] for _ in range(256 // worlds)) for _ in range(RUNS)]
+        rows.append(lower(f"{name}: an image of 84x84, worlds: {worlds}", 1e6 * statistics.median(seconds) / 256, "us", rows, "1 world"))
     return rows
 
 
 def by_pixels(name: str) -> list[Row]:
-    rows = []
+    rows: list[Row] = []
     for width, height in (SMALL, MIDDLE, LARGE):
-        [(cpu, _)] = cpu_and_wall(Ours(name, (width, height), ("rgb",), 16, threads=1))
-        cost = 1e9 * cpu / 16 / (width * height)
-        small = rows[0].ours if rows else None
-        rows.append(Row(f"{name}: a pixel of {width}x{height}", cost, "ns", small, "84x84" if rows else "", higher_is_better=False))
+        case = Ours(name, (width, height), ("rgb",), 16, threads=1)
+        case.frame()
+        seconds = [case.frame()[0] for _ in range(RUNS)]
+        cost = 1e9 * statistics.median(seconds) / 16 / (width * height)
+        rows.append(lower(f"{name}: a pixel of {width}x{height}", cost, "ns", rows, "84x84"))
     return rows
+
+
+def lower(case: str, cost: float, unit: str, before: list[Row], first: str) -> Row:
+    """Beside the first of the rows before it; called `first`."""
+    return Row(case, cost, unit, before[0].ours if before else None, first if before else "", higher_is_better=False)
 
 
 def by_threads(name: str) -> list[Row]:
     rows = []
     for size, worlds in ((SMALL, 64), (MIDDLE, 8), (LARGE, 1)):
-        (_, one), (_, two) = cpu_and_wall(*(Ours(name, size, ("rgb",), worlds, threads) for threads in (1, 2)), runs=2 * RUNS + 1)
-        text = f"{name}: {worlds} {'image' if worlds == 1 else 'images'} of {size[0]}x{size[1]}, two threads"
+        cases = [Ours(name, size, ("rgb",), worlds, threads) for threads in (1, 2)]
+        one, two = median_seconds(*cases, runs=2 * RUNS + 1)
+        text = f"{name}: {worlds} of {size[0]}x{size[1]}, two threads"
         rows.append(Row(text, 1000 * two, "ms", 1000 * one, "one thread", higher_is_better=False, goal=1.9))
     return rows
+
+
+def median_seconds(*cases: Ours, runs: int) -> list[float]:
+    """Median wall seconds of a frame of each; they take turns, so that a machine that drifts drifts for all."""
+    for case in cases:
+        case.frame()
+    times = [[case.frame()[1] for case in cases] for _ in range(runs)]
+    return [statistics.median(seconds) for seconds in zip(*times)]
 
 
 def main() -> None:

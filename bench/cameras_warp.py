@@ -1,8 +1,8 @@
-"""Images a second of CPU time beside mujoco_warp's cameras on the CPU, the renderer of mjlab's CameraSensor: 64 worlds, 84 x 84, rgb and depth.
+"""Images a second of CPU time beside mujoco_warp's cameras on the CPU, the renderer of mjlab's CameraSensor.
 
-Ours has shadows; the peer once without, its default, and once with. Poses change before every image; physics and kinematics are not
-timed. A row says on how many pixels the depths are the same, so that both are known to draw the same scene; --pictures=FOLDER
-writes what both drew. The first run compiles the peer's kernels, about a minute.
+64 worlds, 84 x 84, rgb and depth together. Ours has shadows; the peer once without, its default, and once with. Poses change before
+every image; physics and kinematics are not timed. A row says on how many pixels the depths are the same, so that both are known
+to draw the same scene; --pictures=FOLDER writes what both drew. The first run compiles the peer's kernels, about a minute.
 """
 
 from __future__ import annotations

@@ -2,7 +2,8 @@
 
     .venv/bin/python bench/pictures.py FOLDER [scene ...]        scenes: gallery soft pick kitchen go1 panda
 
-It needs what ./dev bench builds. Depth and ids are compared where both see something; depth only where it is opaque, for MuJoCo's depth looks through glass.
+It needs what ./dev bench builds. Depth and ids are compared where both see something; depth only where it is opaque, for MuJoCo's depth
+looks through glass.
 """
 
 from __future__ import annotations

@@ -2,9 +2,9 @@
 
     filament_cameras SCENE WIDTH HEIGHT rgb|depth image.npz
 
-One image at a time and no multisampling; rgb with shadows but without reflections, which cost it the most. Timed are the update of its scene,
-the image and reading it back. mujoco.rendering.filament.Renderer needs Python 3.12, so mjrf is used as that does. image.npz gets
-frame 0.
+One image at a time and no multisampling; rgb with shadows but without reflections, which cost it the most. Timed are the update of its
+scene, the image and reading it back. mujoco.rendering.filament.Renderer needs Python 3.12, so mjrf is used as that does. image.npz
+gets frame 0.
 """
 
 import json
