@@ -29,7 +29,6 @@ SceneHandle capsule_scene(RTCDevice device, const std::vector<float>& ends) {
 
 FlexShapes::FlexShapes(RTCDevice device, std::span<const FlexSurface> surfaces,
                        const mjModel* model) {
-  const bool shaded = model->ncam > 0;
   flexes_.reserve(surfaces.size());
   for (const FlexSurface& s : surfaces) {
     Flex& flex = flexes_.emplace_back();
@@ -37,23 +36,43 @@ FlexShapes::FlexShapes(RTCDevice device, std::span<const FlexSurface> surfaces,
     flex.radius = model->flex_radius[flexes_.size() - 1];
     flex.vertices.assign(s.rest.begin(), s.rest.end());
     if (s.dim == 1) {
-      flex.ends.resize(4 * s.edges.size());
-      move_capsules(flex);
-      if (!s.edges.empty() && flex.radius > 0) flex.capsules = capsule_scene(device, flex.ends);
-      scenes_.push_back(flex.capsules.get());
-    } else {
-      std::vector<float> rest = s.rest;
-      if (s.dim == 2) rest.insert(rest.end(), s.rest.begin(), s.rest.end());
-      flex.smooth.resize(s.rest.size());
-      if (shaded) flex.normals.resize(3 * s.faces.size());
-      flex.mesh = SoftMesh(device, s.faces, rest);
-      move_sheets(flex);
-      scenes_.push_back(flex.mesh.scene());
+      add_capsules(device, flex);
+      continue;
     }
+    if (model->ncam > 0) flex.normals.resize(3 * s.faces.size());
+    add_sheets(device, flex);
   }
 }
 
+void FlexShapes::add_sheets(RTCDevice device, Flex& flex) {
+  const FlexSurface& s = *flex.surface;
+  std::vector<float> rest = s.rest;
+  if (s.dim == 2) rest.insert(rest.end(), s.rest.begin(), s.rest.end());
+  flex.smooth.resize(s.rest.size());
+  flex.mesh = SoftMesh(device, s.faces, rest);
+  move_sheets(flex);
+  scenes_.push_back(flex.mesh.scene());
+  for (const FlexSurface::Part& p : s.parts) {
+    const std::span<const int> faces(s.faces.data() + 3 * p.first, 3 * p.count);
+    void* scene = s.parts.size() == 1 ? scenes_.back() : flex.mesh.add_part(device, faces);
+    const float* normals = flex.normals.empty() ? nullptr : flex.normals.data() + 9 * p.first;
+    parts_.push_back({static_cast<int>(flexes_.size()) - 1, p.element, -1, scene, normals});
+  }
+}
+
+void FlexShapes::add_capsules(RTCDevice device, Flex& flex) {
+  const FlexSurface& s = *flex.surface;
+  flex.ends.resize(4 * s.edges.size());
+  move_capsules(flex);
+  if (!s.edges.empty() && flex.radius > 0) flex.capsules = capsule_scene(device, flex.ends);
+  scenes_.push_back(flex.capsules.get());
+  for (const FlexSurface::Part& p : s.parts)
+    parts_.push_back(
+        {static_cast<int>(flexes_.size()) - 1, p.element, -1, scenes_.back(), nullptr});
+}
+
 void FlexShapes::update(const mjModel* m, const mjData* d) {
+  for (Part& part : parts_) part.material = m->flex_matid[part.element];
   for (std::size_t f = 0; f < flexes_.size(); ++f) {
     Flex& flex = flexes_[f];
     const double* moved = d->flexvert_xpos + 3 * m->flex_vertadr[f];
@@ -70,11 +89,6 @@ void FlexShapes::update(const mjModel* m, const mjData* d) {
       flex.mesh.refit();
     }
   }
-}
-
-const float* FlexShapes::normals(int flex) const {
-  const std::vector<float>& normals = flexes_[flex].normals;
-  return normals.empty() ? nullptr : normals.data();
 }
 
 void FlexShapes::move_capsules(Flex& flex) {
@@ -100,10 +114,10 @@ void FlexShapes::move_capsules(Flex& flex) {
 void FlexShapes::move_sheets(Flex& flex) {
   const FlexSurface& s = *flex.surface;
   const double* x = flex.vertices.data();
-  const int step = s.dim == 2 ? 2 : 1;  // of two sheets the first
   std::fill(flex.smooth.begin(), flex.smooth.end(), 0.0);
-  for (int f = 0; f < s.num_sheet_faces; f += step) {
+  for (int f = 0; f < s.num_faces(); ++f) {
     const int* v = &s.faces[3 * f];
+    if (s.side(v) != FlexSurface::Side::kFirst) continue;
     double n[3];
     face_normal(x + 3 * v[0], x + 3 * v[1], x + 3 * v[2], n);
     for (int c = 0; c < 3; ++c) mju_addTo3(&flex.smooth[3 * v[c]], n);
@@ -131,9 +145,10 @@ void FlexShapes::shade(Flex& flex) {
   for (int f = 0; f < s.num_faces(); ++f) {
     const int* v = &s.faces[3 * f];
     float* out = &flex.normals[9 * f];
-    const bool border = f >= s.num_sheet_faces;
+    const FlexSurface::Side side = s.side(v);
+    const bool border = side == FlexSurface::Side::kBorder;
     if (!s.flat && !border) {
-      const double sign = v[0] < s.num_vertices ? 1 : -1;
+      const double sign = side == FlexSurface::Side::kFirst ? 1 : -1;
       for (int i = 0; i < 9; ++i)
         out[i] = static_cast<float>(sign * flex.smooth[3 * (v[i / 3] % s.num_vertices) + i % 3]);
       continue;

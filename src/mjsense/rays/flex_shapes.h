@@ -24,10 +24,17 @@ class FlexShapes {
   const double* position(int flex) const { return flexes_[flex].vertices.data(); }     // m, world
   // [6] centre and half sizes of its box, m.
   const float* box(int flex) const { return flexes_[flex].box; }
-  // [F, 3 corners, 3] unit normals; null for lines, and without cameras.
-  const float* normals(int flex) const;
-  // RTCScene by flex id; null where there is nothing to meet.
+  // RTCScene by flex id, for rays; null where there is nothing to meet.
   void* const* scenes() const { return scenes_.data(); }
+
+  // What cameras draw, in the order of flex_parts().
+  struct Part {
+    int flex, element;     // `element`: whose material it has
+    int material;          // id or -1
+    void* scene;           // RTCScene; null: nothing
+    const float* normals;  // [faces, 3 corners, 3] unit; null for lines, and without cameras
+  };
+  std::span<const Part> parts() const { return parts_; }
 
  private:
   struct Flex {
@@ -41,12 +48,15 @@ class FlexShapes {
     SceneHandle capsules;
     float box[6];
   };
+  void add_sheets(RTCDevice device, Flex& flex);
+  void add_capsules(RTCDevice device, Flex& flex);
   static void move_capsules(Flex& flex);
   static void move_sheets(Flex& flex);
   static void shade(Flex& flex);
 
   std::vector<Flex> flexes_;
   std::vector<void*> scenes_;
+  std::vector<Part> parts_;
 };
 
 }  // namespace mjsense

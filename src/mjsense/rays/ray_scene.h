@@ -8,6 +8,7 @@
 //   sdf     its mesh, as MuJoCo draws it: mj_ray marches the field, they differ by its resolution
 //   flex    the surface that MuJoCo draws, `radius` around its elements (mj_ray does not see flexes):
 //           both sides, normal by winding; flex_surface.h says which triangles
+//   skin    not seen, as by mj_ray; cameras see them (skin_shapes.h)
 // Hits nearer to each other than rounding are a tie: the lower geom id wins.
 //
 // update() runs in the parallel pass over worlds; tracing reads only and may run on any number of

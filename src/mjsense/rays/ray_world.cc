@@ -84,7 +84,9 @@ void RayWorld::update_flexes(const mjModel* m, const mjData* d) {
   flexes_->update(m, d);
   for (int f = 0; f < m->nflex; ++f) {
     const int i = num_geoms_ + f;
-    describe(m, i, flex_material(m, f), m->flex_group[f], m->flex_rgba + 4 * f);
+    const int element = m->flex_elemadr[f];  // rays know one material a flex: the first element's
+    describe(m, i, m->flex_elemnum[f] > 0 ? m->flex_matid[element] : -1, m->flex_group[f],
+             m->flex_rgba + 4 * f);
     RayGeom& g = geoms_[i];
     g = {.mat = {1, 0, 0, 0, 1, 0, 0, 0, 1},
          .rot = {1, 0, 0, 0, 1, 0, 0, 0, 1},

@@ -48,19 +48,29 @@ void box_around(std::span<const float> points, float box[6]) {
 SoftMesh::SoftMesh(RTCDevice device, std::span<const int> faces, std::span<const float> rest)
     : vertices_(rest.begin(), rest.end()) {
   vertices_.push_back(0);
-  if (faces.empty()) return;
+  scene_ = build(device, faces);
+}
+
+SceneHandle SoftMesh::build(RTCDevice device, std::span<const int> faces) {
+  if (faces.empty()) return nullptr;
   RTCGeometry geometry = rtcNewGeometry(device, RTC_GEOMETRY_TYPE_TRIANGLE);
   rtcSetGeometryBuildQuality(geometry, RTC_BUILD_QUALITY_REFIT);
   rtcSetSharedGeometryBuffer(geometry, RTC_BUFFER_TYPE_VERTEX, 0, RTC_FORMAT_FLOAT3,
-                             vertices_.data(), 0, 3 * sizeof(float), rest.size() / 3);
+                             vertices_.data(), 0, 3 * sizeof(float), vertices_.size() / 3);
   void* indices = rtcSetNewGeometryBuffer(geometry, RTC_BUFFER_TYPE_INDEX, 0, RTC_FORMAT_UINT3,
                                           3 * sizeof(int), faces.size() / 3);
   std::copy(faces.begin(), faces.end(), static_cast<int*>(indices));
-  scene_ = moving_scene(device, geometry);
+  return moving_scene(device, geometry);
+}
+
+void* SoftMesh::add_part(RTCDevice device, std::span<const int> faces) {
+  return parts_.emplace_back(build(device, faces)).get();
 }
 
 void SoftMesh::refit() {
   if (scene_) refit_scene(scene_.get());
+  for (const SceneHandle& part : parts_)
+    if (part) refit_scene(part.get());
 }
 
 }  // namespace mjsense

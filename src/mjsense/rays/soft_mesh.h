@@ -14,6 +14,9 @@ class SoftMesh {
   // `faces` [F, 3]; `rest` [V, 3]: a shape that suits the BVH, which is built for it once.
   SoftMesh(RTCDevice device, std::span<const int> faces, std::span<const float> rest);
 
+  // A scene of its own for some of the faces.
+  void* add_part(RTCDevice device, std::span<const int> faces);
+
   std::span<float> vertices() { return {vertices_.data(), vertices_.size() - 1}; }  // [V, 3]
   // The vertices have been written. Refits are linear in the number of faces (0.02 ms for 3400) and
   // make one small allocation inside Embree.
@@ -21,8 +24,11 @@ class SoftMesh {
   void* scene() const { return scene_.get(); }  // RTCScene; null without faces
 
  private:
+  SceneHandle build(RTCDevice device, std::span<const int> faces);
+
   std::vector<float> vertices_;  // and one more: Embree loads four coordinates of the last
   SceneHandle scene_;
+  std::vector<SceneHandle> parts_;
 };
 
 // Embree's scene for one geometry that moves; `geometry` is taken over.

@@ -67,8 +67,8 @@ TEST(FlexShapes, FacesAndNormalsAreMuJoCos) {
       const int first = 9 * drawn.scene.flexfaceadr[f];
       ASSERT_EQ(shared.flexes[f].num_faces(), faces);
       expect_box(shapes.box(f), drawn.scene.flexface + first, 3 * faces, shapes.position(f));
-      const float* normals = shapes.normals(f);
-      const int sheets = 9 * shared.flexes[f].num_sheet_faces;  // MuJoCo's border is a bit skewed
+      const float* normals = shapes.parts()[f].normals;
+      const int sheets = 9 * (faces - 2 * (f < 2 ? m.model->flex_shellnum[f] : 0));
       for (int i = 0; i < sheets; ++i)
         ASSERT_NEAR(normals[i], drawn.scene.flexnormal[first + i], 1e-6) << f << ' ' << i;
       for (int i = sheets; i < 9 * faces; i += 3) {
@@ -78,6 +78,30 @@ TEST(FlexShapes, FacesAndNormalsAreMuJoCos) {
         EXPECT_GT(cosine, 0.8);
       }
     }
+  }
+}
+
+// Three materials: a part for each, with what MuJoCo draws in that material.
+TEST(FlexShapes, EveryMaterialHasItsPart) {
+  const TestModel m(
+      R"(<mujoco><asset><material name="a" rgba="1 0 0 1"/><material name="b" rgba="0 1 0 1"/>
+    <material name="c" rgba="0 0 1 1"/></asset><worldbody><camera/></worldbody>
+    <deformable><flex name="f" dim="2" body="world" radius=".01" material="b a c b"
+      vertex="0 0 1 1 0 1 0 1 1 1 1 1 2 0 1 2 1 1" element="0 1 2 1 3 2 1 4 3 4 5 3"/></deformable></mujoco>)");
+  const SharedGeometry shared(m.model);
+  FlexShapes shapes(shared.device.get(), shared.flexes, m.model);
+  shapes.update(m.model, m.data);
+  const Drawn drawn(m);
+  ASSERT_EQ(drawn.scene.ngeom, 3);
+  ASSERT_EQ(shapes.parts().size(), 3u);
+  for (int i = 0; i < 3; ++i) {
+    const mjvGeom& g = drawn.scene.geoms[i];  // size: radius, first face, faces
+    const FlexSurface::Part& part = shared.flexes[0].parts[i];
+    EXPECT_EQ(part.first, g.size[1]);
+    EXPECT_EQ(part.count, g.size[2]);
+    for (int k = 0; k < 4; ++k)
+      EXPECT_EQ(m.model->mat_rgba[4 * shapes.parts()[i].material + k], g.rgba[k]);
+    EXPECT_NE(shapes.parts()[i].scene, shapes.scenes()[0]);
   }
 }
 

@@ -4,8 +4,6 @@
 #include <cmath>
 #include <numbers>
 
-#include "mjsense/rays/flex_surface.h"
-
 namespace mjsense {
 namespace {
 
@@ -19,7 +17,8 @@ void resolve_rgba(const mjModel* m, int material, const float* own, float* out) 
 }  // namespace
 
 Appearance::Appearance(const mjModel* m)
-    : rgba_(4 * (m->ngeom + m->nflex + m->nskin)),
+    : flex_parts_(flex_parts(m)),
+      rgba_(4 * (m->ngeom + flex_parts_.size() + m->nskin)),
       materials_(m->nmat),
       lights_(View::kMaxLights),
       light_ids_(View::kMaxLights) {
@@ -29,10 +28,13 @@ Appearance::Appearance(const mjModel* m)
 void Appearance::copy(const mjModel* m) {
   for (int i = 0; i < m->ngeom; ++i)
     resolve_rgba(m, m->geom_matid[i], m->geom_rgba + 4 * i, &rgba_[4 * i]);
-  for (int i = 0; i < m->nflex; ++i)
-    resolve_rgba(m, flex_material(m, i), m->flex_rgba + 4 * i, &rgba_[4 * (m->ngeom + i)]);
-  for (int i = 0; i < m->nskin; ++i)
-    resolve_rgba(m, m->skin_matid[i], m->skin_rgba + 4 * i, &rgba_[4 * (m->ngeom + m->nflex + i)]);
+  float* next = rgba_.data() + 4 * m->ngeom;
+  for (const FlexPart& part : flex_parts_) {
+    resolve_rgba(m, m->flex_matid[part.element], m->flex_rgba + 4 * part.flex, next);
+    next += 4;
+  }
+  for (int i = 0; i < m->nskin; ++i, next += 4)
+    resolve_rgba(m, m->skin_matid[i], m->skin_rgba + 4 * i, next);
   for (int i = 0; i < m->nmat; ++i)
     materials_[i] = {.specular = m->mat_specular[i],
                      .shininess = m->mat_shininess[i],

@@ -6,6 +6,7 @@
 #include <span>
 #include <vector>
 
+#include "mjsense/rays/flex_surface.h"
 #include "mjsense/render/view.h"
 
 namespace mjsense {
@@ -29,7 +30,7 @@ class Appearance {
   explicit Appearance(const mjModel* model);
   void copy(const mjModel* model);  // no allocation
 
-  // [geoms, then flexes, then skins; 4] as MuJoCo's visualiser resolves it
+  // [geoms, then parts of flexes, then skins; 4] as MuJoCo's visualiser resolves it
   std::span<const float> rgba() const { return rgba_; }
   std::span<const Material> materials() const { return materials_; }  // [nmat]
   const Sky& sky() const { return sky_; }
@@ -40,6 +41,7 @@ class Appearance {
  private:
   void copy_lights(const mjModel* model);
 
+  std::vector<FlexPart> flex_parts_;
   std::vector<float> rgba_;
   std::vector<Material> materials_;
   Sky sky_;

@@ -72,9 +72,8 @@ void halve(const std::uint32_t* src, int width, int height, std::uint32_t* dst, 
 Look::Look(const mjModel* model, bool meshes, bool textures) {
   textures_.resize(model->ntex);
   meshes_.resize(model->nmesh);
-  flexes_.resize(model->nflex);
   skins_.resize(model->nskin);
-  for (int i = 0; i < model->nflex && textures; ++i) add_flex(model, i);
+  for (int i = 0; i < model->nflex; ++i) add_flex(model, i, textures);
   for (int i = 0; i < model->nskin && textures; ++i) add_skin(model, i);
   for (int i = 0; i < model->ntex && textures; ++i) add_texture(model, i);
   for (int i = 0; i < model->ntex && !skybox_; ++i)
@@ -172,14 +171,18 @@ void Look::add_mesh(const mjModel* model, int id) {
       [&](int f, int k) { return texcoord + 2 * model->mesh_facetexcoord[3 * (first + f) + k]; });
 }
 
-void Look::add_flex(const mjModel* model, int id) {
+void Look::add_flex(const mjModel* model, int id, bool textures) {
   const FlexSurface s = flex_surface(model, id);
-  if (s.texcoords.empty()) return;
-  const float* texcoord = model->flex_texcoord + 2 * model->flex_texcoordadr[id];
-  add_coordinates(
-      flexes_[id], s.num_faces(),
-      [&](int f, int k) { return &s.rest[3 * (s.faces[3 * f + k] % s.num_vertices)]; },
-      [&](int f, int k) { return texcoord + 2 * s.texcoords[3 * f + k]; });
+  for (const FlexSurface::Part& part : s.parts) {
+    MeshLook& look = flex_parts_.emplace_back();
+    if (s.texcoords.empty() || !textures) continue;
+    const float* texcoord = model->flex_texcoord + 2 * model->flex_texcoordadr[id];
+    const auto corner = [&](int f, int k) { return 3 * (part.first + f) + k; };
+    add_coordinates(
+        look, part.count,
+        [&](int f, int k) { return &s.rest[3 * (s.faces[corner(f, k)] % s.num_vertices)]; },
+        [&](int f, int k) { return texcoord + 2 * s.texcoords[corner(f, k)]; });
+  }
 }
 
 void Look::add_skin(const mjModel* model, int id) {

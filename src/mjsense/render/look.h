@@ -42,22 +42,22 @@ class Look {
   const Texture* texture(int id) const { return id < 0 ? nullptr : &textures_[id]; }
   const MeshLook* mesh(int id) const { return &meshes_[id]; }
   // Without normals, which move.
-  const MeshLook* flex(int id) const { return &flexes_[id]; }
-  int num_flexes() const { return static_cast<int>(flexes_.size()); }
+  const MeshLook* flex_part(int index) const { return &flex_parts_[index]; }  // of flex_parts()
+  int num_flex_parts() const { return static_cast<int>(flex_parts_.size()); }
   const MeshLook* skin(int id) const { return &skins_[id]; }
   const Texture* skybox() const { return skybox_; }  // null if the model has none
 
  private:
   void add_texture(const mjModel* model, int id);
   void add_mesh(const mjModel* model, int id);
-  void add_flex(const mjModel* model, int id);
+  void add_flex(const mjModel* model, int id, bool textures);
   void add_skin(const mjModel* model, int id);
   // Corner k of face f: where it is, m, and its texture coordinates.
   template <class Position, class Texcoord>
   void add_coordinates(MeshLook& look, int faces, Position position, Texcoord texcoord);
 
   std::vector<Texture> textures_;
-  std::vector<MeshLook> meshes_, flexes_, skins_;
+  std::vector<MeshLook> meshes_, flex_parts_, skins_;
   std::vector<std::vector<std::uint32_t>> texels_;
   std::vector<std::vector<float>> tables_;
   const Texture* skybox_ = nullptr;

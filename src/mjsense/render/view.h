@@ -45,7 +45,7 @@ struct alignas(64) ViewGeom {
   float window[4];        // X min, X max, Y min, Y max of what it may cover
   float nearest;          // no point of it has less planar depth
   int type;               // mjtGeom; mjGEOM_MESH for a flex or skin
-  int id;                 // of geoms, then flexes, then skins: unique in the model
+  int id;                 // of geoms, parts of flexes, skins: unique in the model
   int object_id, object;  // for segmentation: id and mjtObj
   bool fixed;             // belongs to View::fixed
   bool transparent;       // blended over what is behind it, casts shadows, receives none

@@ -31,7 +31,7 @@ ViewBuilder::ViewBuilder(const mjModel* model, const Look& look, const ViewOptio
       unsorted_(max_geoms(model)),
       sorted_(max_geoms(model)),
       spheres_(4 * (max_geoms(model) + kSpherePadding)),
-      soft_looks_(model->nflex + model->nskin) {
+      soft_looks_(look.num_flex_parts() + model->nskin) {
   order_.reserve(max_geoms(model));
   if (options.layered) {
     view_.layered = true;
@@ -80,12 +80,19 @@ const View& ViewBuilder::build(const RayWorld& world, const SharedGeometry& shap
     }
     order_.push_back(order);
   };
-  for (int id = 0; id < world.num_objects(); ++id)
+  int id = 0;
+  for (; id < world.num_geoms(); ++id)
     add(world.geom(id), id, world.flags()[id], world.materials()[id]);
+  if (const FlexShapes* flexes = world.flexes()) {
+    for (const FlexShapes::Part& part : flexes->parts()) {
+      const int object = world.num_geoms() + part.flex;
+      add(world.geom(object), id++, world.flags()[object], part.material);
+    }
+  }
   if (SkinShapes* skins = world.skins()) {
     skins->bend(options_.groups);
     for (int i = 0; i < skins->size(); ++i)
-      add(skins->geom(i), world.num_objects() + i, skins->group(i), skins->material(i));
+      add(skins->geom(i), id++, skins->group(i), skins->material(i));
   }
   std::sort(order_.begin(), order_.end(), [](const Order& a, const Order& b) {
     if (a.rank != b.rank) return a.rank < b.rank;
@@ -195,15 +202,16 @@ void ViewBuilder::set_shape(const RayWorld& world, const SharedGeometry& shapes,
     g.bvh = g.height_field->scene;
     g.clusters = shapes.clusters_of_height_field(source.data);
   } else if (g.type == kFlexType) {
-    const int id = source.data;
+    const int part = g.id - world.num_geoms();
+    const FlexShapes::Part& shape = world.flexes()->parts()[part];
     g.object = mjOBJ_FLEX;
-    g.bvh = world.flexes()->scenes()[id];
-    g.mesh = soft_look(id, *look_->flex(id), world.flexes()->normals(id));
+    g.bvh = shape.scene;
+    g.mesh = soft_look(part, *look_->flex_part(part), shape.normals);
   } else if (g.type == kSkinType) {
     const int id = source.data;
     g.object = mjOBJ_SKIN;
     g.bvh = world.skins()->scene(id);
-    g.mesh = soft_look(look_->num_flexes() + id, *look_->skin(id), world.skins()->normals(id));
+    g.mesh = soft_look(look_->num_flex_parts() + id, *look_->skin(id), world.skins()->normals(id));
   }
   if (g.object != mjOBJ_GEOM) {
     g.object_id = source.data;

@@ -39,7 +39,7 @@ class ViewBuilder {
   const View& view() const { return view_; }
   void use_fixed(const FixedTile* tiles) { view_.fixed = tiles; }  // of the view just built
   static std::size_t max_geoms(const mjModel* model) {
-    return static_cast<std::size_t>(model->ngeom + model->nflex + model->nskin);
+    return static_cast<std::size_t>(model->ngeom + model->nskin) + flex_parts(model).size();
   }
 
  private:
@@ -72,7 +72,7 @@ class ViewBuilder {
   std::vector<Order> order_;
   std::vector<std::uint8_t> fixed_;  // of geoms; none if not layered
   std::vector<int> index_of_id_;
-  std::vector<MeshLook> soft_looks_;       // of flexes, then skins, with the world's normals
+  std::vector<MeshLook> soft_looks_;  // of parts of flexes, then skins, with the world's normals
   std::unique_ptr<ViewBuilder> mirrored_;  // null: nothing can reflect
   int left_out_ = -1;                      // geom that this view does not show: the mirror itself
   bool own_headlight_ = true;              // else headlight_: where the mirrored camera looks

@@ -117,7 +117,7 @@ class MujocoGl final : public GlRenderer {
     take();
     mjv_defaultScene(&scene_);
     mjv_makeScene(model_, &scene_,
-                  static_cast<int>(model_->ngeom + model_->nflex + model_->nskin) + 100);
+                  static_cast<int>(model_->ngeom + model_->nflexelem + model_->nskin) + 100);
     mjr_defaultContext(&context_);
     mjr_makeContext(model_, &context_, mjFONTSCALE_100);
     mjr_setBuffer(mjFB_OFFSCREEN, &context_);
