@@ -104,17 +104,17 @@ inline std::vector<std::shared_ptr<const SensorCfg>> every_sensor() {
                               c.data_types = {"rgb", "depth", "segmentation", "flow"};
                               c.use_shadows = true;
                             }),
-      make<CameraSensorCfg>("flow",
-                            [](auto& c) {
-                              c.camera_name = "robot/eye";
-                              c.width = 40;
-                              c.height = 40;
-                              c.data_types = {"flow", "normals", "body_segmentation",
-                                              "entity_segmentation"};
-                              c.intrinsics = CameraIntrinsics{20, 20, 20, 20};
-                              c.distortion = {"fisheye", {0.01, 0, 0, 0}};
-                              c.update_period = 0.01;
-                            }),
+      make<CameraSensorCfg>(
+          "flow",
+          [](auto& c) {
+            c.camera_name = "robot/eye";
+            c.width = 40;
+            c.height = 40;
+            c.data_types = {"flow", "normals", "body_segmentation", "entity_segmentation"};
+            c.intrinsics = CameraIntrinsics{20, 20, 20, 20};
+            c.distortion = {"fisheye", {0.01, 0, 0, 0}};
+            c.update_period = 0.01;
+          }),
   };
 }
 
