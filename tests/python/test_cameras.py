@@ -96,3 +96,14 @@ def test_camera_errors():
             mjs.CameraSensorCfg(name="c", **kwargs)
     with pytest.raises((ValueError, KeyError), match="room/eye"):
         scene(mjs.CameraSensorCfg(name="c", camera_name="room/ey"))
+
+
+def test_orthographic_highlights_are_those_of_opengl():
+    kwargs = dict(camera_name="room/eye", width=60, height=40, orthographic=True, fovy=4.0)
+    s = scene(mjs.CameraSensorCfg("rays", **kwargs), mjs.CameraSensorCfg("opengl", renderer="opengl", **kwargs))
+    try:
+        mjs.Simulation(s)
+    except RuntimeError as error:
+        pytest.skip(str(error))
+    difference = s["rays"].data.rgb.astype(float) - s["opengl"].data.rgb
+    assert np.abs(difference).mean() < 1

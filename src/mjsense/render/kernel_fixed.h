@@ -109,7 +109,7 @@ inline void make_fixed(const View& view, int count, int packets, Tile& tile, Til
     gather_surfaces(view, tile.pixels[q], hits, lanes, false, surfaces);
     for (int i = 0; i < view.num_lights; ++i) {
       if (!view.lights[i].shadows) continue;
-      const Lit lit(view, view.lights[i], surfaces, false);
+      const Lit lit(view.lights[i], surfaces, false);
       const std::uint32_t dark = dark_lanes(view, i, lit, surfaces, hits, lanes, shadows);
       out.dark[i][q] = static_cast<std::uint16_t>(dark & lanes);
     }

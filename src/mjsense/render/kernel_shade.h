@@ -254,8 +254,7 @@ struct LightTerm {
   Vec3f to_light;  // not normalised
 };
 
-inline LightTerm light_term(const ViewLight& light, bool ortho, Vec3f p, Vec3f n, Float exponent,
-                            bool shiny) {
+inline LightTerm light_term(const ViewLight& light, Vec3f p, Vec3f n, Float exponent, bool shiny) {
   const Float zero = splat(0.0f), one = splat(1.0f);
   LightTerm out;
   Vec3f l;
@@ -282,12 +281,9 @@ inline LightTerm light_term(const ViewLight& light, bool ortho, Vec3f p, Vec3f n
   out.diffuse = max(cosine, zero);
   out.specular = zero;
   if (shiny) {
-    Vec3f v{zero, zero, one};  // to the viewer
-    if (!ortho) {
-      const Float inverse = -one / sqrt(dot(p, p));
-      v = {p.x * inverse, p.y * inverse, p.z * inverse};
-    }
-    const Vec3f h = l + v;
+    // The viewer is the camera's origin, of orthographic cameras too: so it is in OpenGL.
+    const Float inverse = -one / sqrt(max(dot(p, p), splat(1e-20f)));
+    const Vec3f h = l + Vec3f{p.x * inverse, p.y * inverse, p.z * inverse};
     const Float nh = dot(n, h) / sqrt(max(dot(h, h), splat(1e-20f)));
     out.specular = select(zero < cosine, power(min(max(nh, zero), one), exponent), zero);
   }
@@ -298,12 +294,12 @@ inline LightTerm light_term(const ViewLight& light, bool ortho, Vec3f p, Vec3f n
 struct Lit {
   LightTerm terms[kLanes / kWidth];
 
-  Lit(const View& view, const ViewLight& light, const Surfaces& s, bool shiny) {
+  Lit(const ViewLight& light, const Surfaces& s, bool shiny) {
     for (int k = 0; k < kLanes; k += kWidth) {
       const Vec3f p{load(s.p[0] + k), load(s.p[1] + k), load(s.p[2] + k)};
       const Vec3f n{load(s.n[0] + k), load(s.n[1] + k), load(s.n[2] + k)};
-      terms[k / kWidth] = light_term(light, view.grid.orthographic, p, n,
-                                     shiny ? load(s.exponent + k) : splat(0.0f), shiny);
+      terms[k / kWidth] =
+          light_term(light, p, n, shiny ? load(s.exponent + k) : splat(0.0f), shiny);
     }
   }
 };
@@ -384,7 +380,7 @@ inline void shade(const View& view, const Surfaces& s, const Hits& hits, std::ui
   for (int i = 0; i < view.num_lights; ++i) {
     const ViewLight& light = view.lights[i];
     const bool shiny = light.specular[0] + light.specular[1] + light.specular[2] > 0;
-    const Lit lit(view, light, s, shiny);
+    const Lit lit(light, s, shiny);
     if (shadows && light.shadows) {
       const std::uint32_t dark = dark_lanes(view, i, lit, s, hits, lanes, *shadows);
       if ((lanes & ~dark) != 0) add_light(light, lit, s, dark, true, separate);
