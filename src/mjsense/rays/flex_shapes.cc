@@ -146,21 +146,24 @@ void FlexShapes::shade(Flex& flex) {
     const int* v = &s.faces[3 * f];
     float* out = &flex.normals[9 * f];
     const FlexSurface::Side side = s.side(v);
-    const bool border = side == FlexSurface::Side::kBorder;
-    if (!s.flat && !border) {
-      const double sign = side == FlexSurface::Side::kFirst ? 1 : -1;
-      for (int i = 0; i < 9; ++i)
-        out[i] = static_cast<float>(sign * flex.smooth[3 * (v[i / 3] % s.num_vertices) + i % 3]);
+    const int sheet = side == FlexSurface::Side::kSecond ? s.num_vertices : 0;
+    if (!s.flat && side != FlexSurface::Side::kBorder) {
+      const double sign = sheet ? -1 : 1;
+      for (int c = 0; c < 3; ++c) {
+        const double* n = &flex.smooth[3 * (v[c] - sheet)];
+        for (int k = 0; k < 3; ++k) out[3 * c + k] = static_cast<float>(sign * n[k]);
+      }
       continue;
     }
     double corners[9], n[3];
-    for (int i = 0; i < 9; ++i) {
-      const int vertex = v[i / 3], k = i % 3;
-      corners[i] =
-          border ? surface[3 * vertex + k] : flex.vertices[3 * (vertex % s.num_vertices) + k];
-    }
+    for (int c = 0; c < 3; ++c)
+      for (int k = 0; k < 3; ++k)
+        corners[3 * c + k] = side == FlexSurface::Side::kBorder
+                                 ? surface[3 * v[c] + k]
+                                 : flex.vertices[3 * (v[c] - sheet) + k];
     face_normal(corners, corners + 3, corners + 6, n);
-    for (int i = 0; i < 9; ++i) out[i] = static_cast<float>(n[i % 3]);
+    for (int c = 0; c < 3; ++c)
+      for (int k = 0; k < 3; ++k) out[3 * c + k] = static_cast<float>(n[k]);
   }
 }
 
