@@ -15,17 +15,19 @@ inline std::uint32_t hit_lanes(const Hits& hits) {
   return lanes;
 }
 
-// Lanes that show a fixed geom.
-inline std::uint32_t fixed_lanes(const View& view, const Hits& hits) {
+// Lanes of a packet that still show what the layer does.
+inline std::uint32_t fixed_lanes(const FixedTile& fixed, int packet, const Hits& hits) {
   std::uint32_t lanes = 0;
-  for (int i = 0; i < kLanes; ++i)
-    lanes |= static_cast<std::uint32_t>(hits.geom[i] >= 0 && view.geoms[hits.geom[i]].fixed) << i;
+  for (int k = 0; k < kLanes; k += kWidth) {
+    const Int id = load(hits.id + k), kept = load(fixed.id + packet * kLanes + k);
+    lanes |= bits(~(less(id, kept) | less(kept, id)) & less(int_of(-1), id)) << k;
+  }
   return lanes;
 }
 
-// Box around what the tile shows, or only what moves of it; low > high: nothing.
-inline void tile_bounds(const View& view, Part part, const Tile& tile, int packets, float* low,
-                        float* high) {
+// Box around what the tile shows, but for what its layer does if there is one; low > high: nothing.
+inline void tile_bounds(const View& view, const FixedTile* fixed, const Tile& tile, int packets,
+                        float* low, float* high) {
   Float least[3], most[3];
   for (int c = 0; c < 3; ++c) {
     least[c] = splat(kInfinity);
@@ -34,7 +36,8 @@ inline void tile_bounds(const View& view, Part part, const Tile& tile, int packe
   for (int q = 0; q < packets; ++q) {
     const Hits& hits = tile.hits[q];
     std::uint32_t lanes = hit_lanes(hits);
-    if (part == Part::kMoving) lanes &= ~fixed_lanes(view, hits);
+    if (fixed) lanes &= ~fixed_lanes(*fixed, q, hits);
+    if (!lanes) continue;
     for (int k = 0; k < kLanes; k += kWidth) {
       const Mask m = mask_of(lanes >> k & kAllLanes);
       const Float t = load(hits.t + k), s = view.grid.orthographic ? splat(1.0f) : t;
@@ -71,10 +74,10 @@ inline void find_all_casters(const View& view, const FixedTile* fixed, const Til
   out.known = fixed;
   for (int i = 0; i < view.num_lights; ++i) out.fixed[i].count = 0;
   if (fixed) {
-    tile_bounds(view, Part::kMoving, tile, packets, low, high);
+    tile_bounds(view, fixed, tile, packets, low, high);
     find_casters(view, Part::kFixed, low, high, scratch, used, out.fixed);
   }
-  tile_bounds(view, Part::kAll, tile, packets, low, high);
+  tile_bounds(view, nullptr, tile, packets, low, high);
   find_casters(view, fixed ? Part::kMoving : Part::kAll, low, high, scratch, used, out.moving);
 }
 
@@ -95,7 +98,7 @@ inline void make_fixed(const View& view, int count, int packets, Tile& tile, Til
                        FixedTile& out) {
   trace_tile(view, Part::kFixed, scratch.opaque, count, tile);
   float low[3], high[3];
-  tile_bounds(view, Part::kAll, tile, packets, low, high);
+  tile_bounds(view, nullptr, tile, packets, low, high);
   Shadows shadows;
   int used = 0;
   find_casters(view, Part::kFixed, low, high, scratch, used, shadows.fixed);
@@ -137,8 +140,8 @@ inline void load_fixed(const View& view, const FixedTile& from, int packets, Til
         index = last < 0 ? -1 : view.index_of_id[last];
       }
       hits.geom[i] = index;
-      shown |= static_cast<PacketMask>(index >= 0) << q;
     }
+    if (hit_lanes(hits)) shown |= 1u << q;
   }
   if (shown) update_farthest(tile, shown);
 }

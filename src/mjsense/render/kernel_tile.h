@@ -161,7 +161,7 @@ inline void render_tile(const View& view, const ImageTargets& targets, int tx, i
         if (lanes) {
           Surfaces surfaces;
           gather_surfaces(view, tile.pixels[q], hits, lanes, true, surfaces);
-          if (fixed) shadows.fixed_lanes = lanes & fixed_lanes(view, hits);
+          if (fixed) shadows.fixed_lanes = fixed_lanes(*fixed, q, hits);
           shadows.packet = q;
           shade(view, surfaces, hits, lanes, view.shadows ? &shadows : nullptr, colors);
         }
