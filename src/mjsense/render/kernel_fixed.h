@@ -59,7 +59,7 @@ inline void find_casters(const View& view, Part part, const float* low, const fl
                          TileScratch& scratch, int& used, Casters* out) {
   for (int i = 0; i < view.num_lights; ++i) {
     const Spheres& s = scratch.spheres;
-    out[i] = {scratch.casters + used, {s.x + used, s.y + used, s.z + used, s.radius + used}, 0, 0};
+    out[i] = {scratch.casters + used, {s.x + used, s.y + used, s.z + used, s.radius + used}, 0, -1};
     if (!view.lights[i].shadows || low[0] > high[0]) continue;
     find_casters(view, view.lights[i], part, low, high, out[i]);
     used += out[i].count;

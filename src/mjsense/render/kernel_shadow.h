@@ -144,7 +144,8 @@ inline std::uint32_t shadow_of_geom(const View& view, int caster, const LightRay
 }
 
 // Geoms that may stand between a light and the points at hand, with their bounding spheres. `hint`:
-// the one that did for the packet before; it is asked first, which changes nothing but the time.
+// the one that did for the packet before, or -1; it is asked first, which changes nothing but the
+// time.
 struct Casters {
   int* list;
   Spheres spheres;
@@ -181,7 +182,12 @@ inline void find_casters(const View& view, const ViewLight& light, Part part, co
 inline std::uint32_t in_shadow(const View& view, Casters& casters, const LightRays& rays,
                                const Shaft& shaft, std::uint32_t active) {
   if (casters.count == 0 || !active) return 0;
-  std::uint32_t left = active & ~shadow_of_geom(view, casters.list[casters.hint], rays, active);
+  std::uint32_t left = active;
+  if (casters.hint >= 0) {
+    const std::uint32_t dark = shadow_of_geom(view, casters.list[casters.hint], rays, active);
+    left &= ~dark;
+    if (!dark) casters.hint = -1;
+  }
   for (int i = 0; i < casters.count && left; i += kWidth) {
     std::uint32_t near = spheres_in_shaft(shaft, casters.spheres, i);
     for (; near && left; near &= near - 1) {
