@@ -2,8 +2,8 @@
 // The layer of fixed geoms of a tile, and who casts shadows on what the tile shows. Part of the tile
 // kernels.
 
-#include "mjsense/render/kernel_raster.h"
 #include "mjsense/render/kernel_shade.h"
+#include "mjsense/render/kernel_visible.h"
 
 namespace mjsense {
 namespace {

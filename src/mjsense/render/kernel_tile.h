@@ -5,7 +5,6 @@
 #include "mjsense/render/kernel_fixed.h"
 #include "mjsense/render/kernel_layers.h"
 #include "mjsense/render/kernel_output.h"
-#include "mjsense/render/kernel_raster.h"
 #include "mjsense/render/kernel_sky.h"
 
 namespace mjsense {
@@ -44,17 +43,6 @@ inline void fill_pixels(const View& view, int x0, int y0, float shift_x, float s
     w[1] = px > w[1] ? px : w[1];
     w[2] = py < w[2] ? py : w[2];
     w[3] = py > w[3] ? py : w[3];
-  }
-}
-
-// Adds transparent geoms to the hits: depth and segmentation see them too. A plane seen from behind
-// is not there.
-inline void trace_transparent(const View& view, const int* list, int count, Tile& tile) {
-  for (int i = 0; i < count; ++i) {
-    const ViewGeom& g = view.geoms[list[i]];
-    if (g.type == mjGEOM_PLANE && g.behind) continue;
-    const PacketMask packets = packets_in_reach(g.window, g.nearest, tile);
-    if (packets) draw_or_trace(view, list[i], packets, tile);
   }
 }
 
