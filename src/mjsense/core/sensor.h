@@ -29,6 +29,7 @@ namespace mjsense {
 class DebugShapes;
 class RayScene;
 class Scene;
+class Shared;
 class ThreadPool;
 
 // One world as a sensor sees it. In compute() and substep() every derived field of `data` belongs
@@ -75,6 +76,7 @@ struct SensorInit {
   int num_worlds = 1;
   int decimation = 1;  // substeps per control step
   int threads = 1;
+  Shared* shared = nullptr;  // null where a sensor is used alone
 };
 
 // What cast() traces: the ray scene as compute() of the worlds `ids` left it.

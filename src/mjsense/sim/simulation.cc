@@ -194,8 +194,8 @@ RayScene& Simulation::rays() {
 }
 
 void Simulation::initialize(Sensor& sensor) {
-  const SensorInit init{scene_->model(), scene_.get(), cfg_.num_worlds, cfg_.decimation,
-                        pool_->size()};
+  const SensorInit init{scene_->model(), scene_.get(),  cfg_.num_worlds,
+                        cfg_.decimation, pool_->size(), &shared_};
   guarded(sensor, [&] { sensor.initialize(init); });
   auto slot = std::make_unique<Slot>();
   slot->sensor = &sensor;

@@ -13,6 +13,7 @@
 #include "mjsense/core/debug_shapes.h"
 #include "mjsense/core/parallel.h"
 #include "mjsense/core/sensor.h"
+#include "mjsense/core/shared.h"
 #include "mjsense/scene/scene.h"
 #include "mjsense/worlds/worlds.h"
 
@@ -113,6 +114,7 @@ class Simulation {
   std::vector<std::unique_ptr<Scratch>> scratch_;
 
   SimulationCfg cfg_;
+  Shared shared_;
   std::shared_ptr<Scene> scene_;
   std::unique_ptr<Worlds> worlds_;
   std::unique_ptr<ThreadPool> pool_;

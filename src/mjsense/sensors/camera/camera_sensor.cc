@@ -7,6 +7,7 @@
 
 #include "mjsense/core/error.h"
 #include "mjsense/core/parallel.h"
+#include "mjsense/core/shared.h"
 #include "mjsense/rays/ray_scene.h"
 #include "mjsense/render/tile_memory.h"
 #include "mjsense/sensors/camera/depth_noise.h"
@@ -27,6 +28,13 @@ ViewOptions view_options(const CameraSensorCfg& cfg, unsigned groups) {
   options.near = static_cast<float>(cfg.near);
   options.far = static_cast<float>(cfg.far);
   return options;
+}
+
+// Cameras of one simulation share what they do not change.
+std::shared_ptr<const Look> look_of(const SensorInit& init, bool meshes, bool textures) {
+  const auto make = [&] { return std::make_shared<const Look>(init.model, meshes, textures); };
+  if (init.shared == nullptr) return make();
+  return init.shared->get<Look>(fmt::format("look {} {}", meshes, textures), make);
 }
 
 }  // namespace
@@ -65,8 +73,7 @@ void CameraSensor::initialize(const SensorInit& init) {
                                  model_->nlight, View::kMaxLights - 1));
   groups_ = 0;
   for (int g : cfg_.enabled_geom_groups) groups_ |= 1u << g;
-  look_ = std::make_unique<Look>(model_, wants("rgb") || wants("normals"),
-                                 wants("rgb") && cfg_.use_textures);
+  look_ = look_of(init, wants("rgb") || wants("normals"), wants("rgb") && cfg_.use_textures);
   workspace_.reset();
   clear_fields();
   declare_fields(init.num_worlds);

@@ -73,7 +73,7 @@ class CameraSensor final : public Sensor {
   std::vector<float> bent_;
   std::vector<int> due_;
   std::vector<std::vector<float>> clean_;  // true depth of one image, by thread; with noise only
-  std::unique_ptr<Look> look_;
+  std::shared_ptr<const Look> look_;
   std::unique_ptr<GlRenderer> gl_;  // renderer "opengl"
   std::unique_ptr<Workspace> workspace_;
   std::unique_ptr<FixedLayer> fixed_layer_;    // null: it would not pay, or the camera moves
