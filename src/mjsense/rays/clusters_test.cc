@@ -42,7 +42,7 @@ void each_triangle(const Clusters& clusters, const ClusterNode& node, int i, Use
 }
 
 TEST(Clusters, HoldEveryFaceOnceInsideItsBoxesAndCones) {
-  for (int n : {1, 2, 3, 7, 20, 61}) {
+  for (int n : {1, 2, 3, 5, 7, 11, 13, 17, 20, 23, 31, 47, 61}) {
     Rng rng(3, 0, 1, n);
     const Sheet sheet(n, rng);
     const Clusters clusters =
