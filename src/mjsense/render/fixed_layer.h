@@ -1,7 +1,8 @@
 #pragma once
-// What a camera that stands still sees of geoms that stand still, and which of it lies in their
-// shadow: found once, kept, and used for every image and world in which none of it has changed. Images
-// are the same with and without it, bit for bit: kernels always draw the fixed part first.
+// What a camera that stands still sees of geoms that stand still, which of it lies in their shadow, and
+// its colours where nothing that moves casts one: found once, kept, and used for every image and world in
+// which none of it has changed. Images are the same with and without it, bit for bit: kernels always draw
+// the fixed part first.
 
 #include <mujoco/mujoco.h>
 
@@ -19,7 +20,7 @@ class FixedLayer {
   // Whether the camera and all lights that cast shadows stand still, and there is such a light.
   static bool possible(const mjModel* model, int camera);
 
-  // 36 bytes a pixel.
+  // 48 bytes a pixel.
   FixedLayer(const mjModel* model, int width, int height);
 
   // To be asked with one view of every cast: true if its fixed part has become the same as the time

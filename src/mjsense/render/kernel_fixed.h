@@ -93,9 +93,10 @@ inline void keep_hits(const Hits& hits, int packet, FixedTile& out) {
   }
 }
 
-// Draws the fixed geoms among `count` in scratch.opaque into the tile, and keeps what is known then.
-inline void make_fixed(const View& view, int count, int packets, Tile& tile, TileScratch& scratch,
-                       FixedTile& out) {
+// Draws the fixed geoms among `count` in scratch.opaque into the tile, and keeps what is known then;
+// colours only if they are wanted.
+inline void make_fixed(const View& view, int count, int packets, bool colors, Tile& tile,
+                       TileScratch& scratch, FixedTile& out) {
   trace_tile(view, Part::kFixed, scratch.opaque, count, tile);
   float low[3], high[3];
   tile_bounds(view, nullptr, tile, packets, low, high);
@@ -109,14 +110,68 @@ inline void make_fixed(const View& view, int count, int packets, Tile& tile, Til
     const std::uint32_t lanes = hit_lanes(hits);
     if (!lanes) continue;
     Surfaces surfaces;
-    gather_surfaces(view, tile.pixels[q], hits, lanes, false, surfaces);
+    gather_surfaces(view, tile.pixels[q], hits, lanes, colors, surfaces);
     for (int i = 0; i < view.num_lights; ++i) {
       if (!view.lights[i].shadows) continue;
       const Lit lit(view.lights[i], surfaces, false);
       const std::uint32_t dark = dark_lanes(view, i, lit, surfaces, hits, lanes, shadows);
       out.dark[i][q] = static_cast<std::uint16_t>(dark & lanes);
     }
+    if (!colors) continue;
+    Shadows known = shadows;
+    known.known = &out;
+    known.fixed_lanes = lanes;
+    known.packet = q;
+    Colors shaded;
+    shade(view, surfaces, hits, lanes, &known, shaded);
+    for (int c = 0; c < 3; ++c)
+      for (int k = 0; k < kLanes; k += kWidth)
+        store(out.rgb[c] + q * kLanes + k, load(shaded.rgb[c] + k));
   }
+}
+
+// Settles what is dark of a packet that shows nothing but fixed geoms. True: anything that moves casts a
+// shadow on it.
+inline bool settle(const View& view, const Pixels& pixels, const Hits& hits, std::uint32_t lanes,
+                   Shadows& shadows) {
+  Surfaces s;
+  for (int k = 0; k < kLanes; k += kWidth) {
+    const Float t = load(hits.t + k), scale = view.grid.orthographic ? splat(1.0f) : t;
+    store(s.p[0] + k, scale * load(pixels.x + k));
+    store(s.p[1] + k, scale * load(pixels.y + k));
+    store(s.p[2] + k, -t);
+    for (auto& n : s.n) store(n + k, splat(0.0f));  // for shadows of a geom on itself
+  }
+  bool darker = false;
+  for (int i = 0; i < view.num_lights; ++i) {
+    const ViewLight& light = view.lights[i];
+    const std::uint32_t known = shadows.known->dark[i][shadows.packet];
+    shadows.settled_dark[i] = known;
+    if (!light.shadows || shadows.moving[i].count == 0) continue;
+    Lit lit;
+    for (int k = 0; k < kLanes; k += kWidth) {
+      LightTerm& term = lit.terms[k / kWidth];
+      term.scale = term.diffuse = splat(1.0f);  // lanes turned away are known to be dark
+      term.to_light =
+          light.kind == LightKind::kDirectional
+              ? Vec3f{splat(-light.dir[0]), splat(-light.dir[1]), splat(-light.dir[2])}
+              : splat(light.pos) - Vec3f{load(s.p[0] + k), load(s.p[1] + k), load(s.p[2] + k)};
+    }
+    shadows.settled_dark[i] = dark_lanes(view, i, lit, s, hits, lanes, shadows) & lanes;
+    darker |= shadows.settled_dark[i] != known;
+  }
+  shadows.settled = true;
+  return darker;
+}
+
+// The colours of packet `packet`, if they are what is kept; false: they are not.
+inline bool load_colors(const View& view, const FixedTile& kept, const Pixels& pixels,
+                        const Hits& hits, std::uint32_t lanes, Shadows& shadows, Colors& out) {
+  if (lanes != shadows.fixed_lanes || settle(view, pixels, hits, lanes, shadows)) return false;
+  for (int c = 0; c < 3; ++c)
+    for (int k = 0; k < kLanes; k += kWidth)
+      store(out.rgb[c] + k, load(kept.rgb[c] + shadows.packet * kLanes + k));
+  return true;
 }
 
 // The tile as make_fixed() leaves it, from what is kept.

@@ -77,6 +77,7 @@ inline LightTerm light_term(const ViewLight& light, Vec3f p, Vec3f n, Float expo
 struct Lit {
   LightTerm terms[kLanes / kWidth];
 
+  Lit() = default;
   Lit(const ViewLight& light, const Surfaces& s, bool shiny) {
     for (int k = 0; k < kLanes; k += kWidth) {
       const Vec3f p{load(s.p[0] + k), load(s.p[1] + k), load(s.p[2] + k)};
@@ -109,13 +110,17 @@ inline void add_light(const ViewLight& light, const Lit& lit, const Surfaces& s,
 struct Shadows {
   Casters fixed[View::kMaxLights], moving[View::kMaxLights];  // not layered: all are moving
   const FixedTile* known = nullptr;
-  std::uint32_t fixed_lanes = 0;  // of the packet at hand
+  // Of the packet at hand:
   int packet = 0;
+  std::uint32_t fixed_lanes = 0;
+  bool settled = false;                          // all lanes are fixed, and it is known
+  std::uint32_t settled_dark[View::kMaxLights];  // by light, which of them are dark
 };
 
 // Lanes that do not get light `index`: barred by a geom, or turned away.
 inline std::uint32_t dark_lanes(const View& view, int index, const Lit& lit, const Surfaces& s,
                                 const Hits& hits, std::uint32_t lanes, Shadows& shadows) {
+  if (shadows.settled) return shadows.settled_dark[index];
   const ViewLight& light = view.lights[index];
   LightRays rays;
   const bool directional = light.kind == LightKind::kDirectional;

@@ -133,7 +133,7 @@ inline void render_tile(const View& view, const ImageTargets& targets, int tx, i
       if (view.fixed) {
         load_fixed(view, view.fixed[at], packets, tile);
       } else {
-        make_fixed(view, lists.opaque, packets, tile, scratch, *made);
+        make_fixed(view, lists.opaque, packets, targets.fixed, tile, scratch, *made);
       }
       if (targets.fixed) return;
       fixed = view.fixed ? view.fixed + at : made;
@@ -146,11 +146,14 @@ inline void render_tile(const View& view, const ImageTargets& targets, int tx, i
         const Hits& hits = tile.hits[q];
         const std::uint32_t lanes = hit_lanes(hits);
         Colors colors;
-        if (lanes) {
+        shadows.packet = q;
+        shadows.settled = false;
+        if (fixed) shadows.fixed_lanes = fixed_lanes(*fixed, q, hits);
+        const bool kept = lanes && view.fixed &&
+                          load_colors(view, *fixed, tile.pixels[q], hits, lanes, shadows, colors);
+        if (lanes && !kept) {
           Surfaces surfaces;
           gather_surfaces(view, tile.pixels[q], hits, lanes, true, surfaces);
-          if (fixed) shadows.fixed_lanes = fixed_lanes(*fixed, q, hits);
-          shadows.packet = q;
           shade(view, surfaces, hits, lanes, view.shadows ? &shadows : nullptr, colors);
         }
         if (lanes != 0xffffu) shade_background(view, tile.pixels[q], ~lanes & 0xffffu, colors);

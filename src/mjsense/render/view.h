@@ -125,12 +125,14 @@ struct ImageTargets {
 
 inline constexpr int kTileSize = 16;  // pixels; a tile is 4 x 4 packets of 4 x 4 pixels
 
-// What a tile shows of the fixed geoms: Hits by packet, and the lanes of each packet that a light does
-// not reach, because a fixed geom stands in its way or the surface is turned away.
+// What a tile shows of the fixed geoms: Hits by packet, the lanes of each packet that a light does not
+// reach, because a fixed geom stands in its way or the surface is turned away, and the colours where
+// nothing else casts a shadow.
 struct alignas(64) FixedTile {
   static constexpr int kPixels = kTileSize * kTileSize;
   float t[kPixels], u[kPixels], v[kPixels], n[3][kPixels];
   int id[kPixels], prim[kPixels];
+  float rgb[3][kPixels];  // kept tiles only
   std::uint16_t dark[View::kMaxLights][kPixels / 16];
 };
 
