@@ -2,21 +2,19 @@
 
 #include <algorithm>
 #include <cmath>
-#include <limits>
 
 #include "mjsense/rays/flex_shapes.h"
 #include "mjsense/rays/ray_world.h"
 #include "mjsense/rays/shared_geometry.h"
 #include "mjsense/rays/skin_shapes.h"
 #include "mjsense/render/fixed_layer.h"
+#include "mjsense/render/view_window.h"
 
 namespace mjsense {
 namespace {
 
-constexpr float kEndless = std::numeric_limits<float>::infinity();
 constexpr float kOpaque = 0.995f;    // MuJoCo blends what has less
 constexpr float kFromBehind = 0.3f;  // MuJoCo's factor for the alpha of planes seen from below
-constexpr float kNearest = 1e-4f;    // m; what is nearer than this counts as behind the camera
 
 // out = R^T v.
 void rotate_back(const double r[9], const double v[3], double out[3]) {
@@ -67,7 +65,7 @@ const View& ViewBuilder::build(const RayWorld& world, const SharedGeometry& shap
     g.fixed = static_cast<std::size_t>(id) < fixed_.size() && fixed_[id];
     place(source, position, rotation, g);
     set_shape(world, shapes, source, g);
-    const bool sight = in_sight(g);
+    const bool sight = find_window(view_, g);
     if (!sight && !options_.shadows) return;
     set_surface(source, rgba, material < 0 ? nullptr : &appearance.materials()[material], g);
     Order order{sight ? g.transparent : 2, g.nearest, index};
@@ -225,66 +223,6 @@ const MeshLook* ViewBuilder::soft_look(int index, const MeshLook& shared, const 
   look = shared;
   look.normals = normals;
   return &look;
-}
-
-// Bounding sphere, window and nearest depth of g; whether any of it can be in the image.
-bool ViewBuilder::in_sight(ViewGeom& g) const {
-  const PixelGrid& grid = view_.grid;
-  for (int i = 0; i < 3; ++i)
-    g.center[i] = g.pos[i] + g.rot[3 * i] * g.box[0] + g.rot[3 * i + 1] * g.box[1] +
-                  g.rot[3 * i + 2] * g.box[2];
-  const float* h = g.box + 3;
-  g.radius =
-      g.type == mjGEOM_SPHERE ? g.size[0] : std::sqrt(h[0] * h[0] + h[1] * h[1] + h[2] * h[2]);
-  g.window[0] = g.window[2] = -kEndless;
-  g.window[1] = g.window[3] = kEndless;
-  g.nearest = 0;
-  if (g.type == mjGEOM_PLANE) {
-    g.radius = kEndless;
-    return true;
-  }
-  float corners[8][3], nearest = kEndless, farthest = -kEndless;
-  for (int corner = 0; corner < 8; ++corner) {
-    float* c = corners[corner];
-    for (int i = 0; i < 3; ++i) {
-      c[i] = g.center[i];
-      for (int k = 0; k < 3; ++k) c[i] += (corner >> k & 1 ? h[k] : -h[k]) * g.rot[3 * i + k];
-    }
-    nearest = std::min(nearest, -c[2]);
-    farthest = std::max(farthest, -c[2]);
-  }
-  if (farthest <= view_.near || (view_.far > 0 && nearest >= view_.far)) return false;
-  g.nearest = std::max(nearest - 1e-5f * (1 + std::abs(nearest)), 0.0f);
-  float window[4] = {kEndless, -kEndless, kEndless, -kEndless};
-  const auto show = [&](float x, float y, float depth, float error) {
-    window[0] = std::min(window[0], (x - error) / depth);
-    window[1] = std::max(window[1], (x + error) / depth);
-    window[2] = std::min(window[2], (y - error) / depth);
-    window[3] = std::max(window[3], (y + error) / depth);
-  };
-  for (int corner = 0; corner < 8; ++corner) {
-    const float *c = corners[corner], depth = -c[2];
-    if (grid.orthographic || depth >= kNearest) {
-      show(c[0], c[1], grid.orthographic ? 1.0f : depth, 0.0f);
-      continue;
-    }
-    // Beside or behind the camera: what is in front of it ends where edges cross the plane of depth
-    // kNearest.
-    for (int k = 0; k < 3; ++k) {
-      const float *d = corners[corner ^ (1 << k)], beyond = -d[2];
-      if (beyond <= kNearest) continue;
-      const float s = (kNearest - depth) / (beyond - depth);
-      show(c[0] + s * (d[0] - c[0]), c[1] + s * (d[1] - c[1]), kNearest, 1e-6f * g.radius);
-    }
-  }
-  for (int i = 0; i < 4; ++i) {
-    const float slack = 1e-5f * (1 + std::abs(window[i]));
-    g.window[i] = window[i] + (i % 2 ? slack : -slack);
-  }
-  if (grid.bent) return true;  // the corners of the image do not bound it
-  const float right = grid.left + grid.dx * grid.width, bottom = grid.top + grid.dy * grid.height;
-  return g.window[0] <= right && g.window[1] >= grid.left && g.window[2] <= grid.top &&
-         g.window[3] >= bottom;
 }
 
 void ViewBuilder::set_surface(const RayGeom& source, const float* rgba, const Material* material,

@@ -53,7 +53,6 @@ class ViewBuilder {
   void set_shape(const RayWorld& world, const SharedGeometry& shapes, const RayGeom& source,
                  ViewGeom& g);
   const MeshLook* soft_look(int index, const MeshLook& shared, const float* normals);
-  bool in_sight(ViewGeom& g) const;
   void set_surface(const RayGeom& source, const float* rgba, const Material* material,
                    ViewGeom& g) const;
   void set_mirror(const RayWorld& world, const SharedGeometry& shapes, const Appearance& appearance,
