@@ -22,8 +22,11 @@ bool equal_bytes(const T& a, const T& b) {
 }  // namespace
 
 bool is_fixed_body(const mjModel* m, int body) {
-  for (; body > 0; body = m->body_parentid[body])
-    if (m->body_jntnum[body] > 0 || m->body_mocapid[body] >= 0) return false;
+  for (; body > 0; body = m->body_parentid[body]) {
+    if (m->body_jntnum[body] > 0) return false;
+    const bool parent = body + 1 < m->nbody && m->body_parentid[body + 1] == body;
+    if (m->body_mocapid[body] >= 0 && !parent) return false;
+  }
   return true;
 }
 

@@ -12,7 +12,8 @@
 
 namespace mjsense {
 
-// Bodies that nothing but the user can move: no joint and no mocap up to the world.
+// Bodies that stand still between resets: without a joint up to the world. A mocap body with children is
+// the base of something and counts as such; one without is a target or marker, and moves.
 bool is_fixed_body(const mjModel* model, int body);
 
 class FixedLayer {

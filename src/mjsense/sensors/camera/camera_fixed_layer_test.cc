@@ -37,6 +37,8 @@ std::string room(Rng& rng) {
          "<geom name='floor' type='plane' size='0 0 1'/><geom type='hfield' hfield='ground'/>" +
          things +
          "<body name='marker' mocap='true' pos='0 0 1'><geom type='box' size='.2 .2 .02'/></body>"
+         "<body name='base' mocap='true' pos='-1 0 .5'><geom type='cylinder' size='.1 .5'/>"
+         "<body pos='0 0 .6'><geom type='mesh' mesh='rock'/></body></body>"
          "<camera name='c' pos='0 -2.5 3' euler='40 0 0' fovy='50'/></worldbody></mujoco>";
 }
 
@@ -90,6 +92,9 @@ TEST(FixedLayer, ChangesNoBitOfAnyImage) {
         [] {},
         [&] { m.data->qpos[0] += 0.3; },
         [&] { m.data->mocap_pos[0] += 0.1; },
+        [&] { m.data->mocap_pos[3] += 0.1; },
+        [] {},
+        [] {},
         [&] { m.model->geom_pos[3 * 2] += 0.2; },  // of a fixed geom: what is kept is worth nothing
         [] {},
         [] {},
