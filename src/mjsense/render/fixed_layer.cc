@@ -50,7 +50,7 @@ FixedLayer::FixedLayer(const mjModel* m, int width, int height)
 }
 
 bool FixedLayer::settles(const View& view) {
-  if (same(view)) return std::exchange(made_, true) == false;
+  if (same(view)) return !std::exchange(made_, true);
   made_ = false;
   grid_ = view.grid;
   geoms_.clear();

@@ -40,8 +40,8 @@ inline void tile_bounds(const View& view, const FixedTile* fixed, const Tile& ti
     if (!lanes) continue;
     for (int k = 0; k < kLanes; k += kWidth) {
       const Mask m = mask_of(lanes >> k & kAllLanes);
-      const Float t = load(hits.t + k), s = view.grid.orthographic ? splat(1.0f) : t;
-      const Float p[3] = {s * load(tile.pixels[q].x + k), s * load(tile.pixels[q].y + k), -t};
+      const Vec3f at = hit_point(view, tile.pixels[q], hits, k);
+      const Float p[3] = {at.x, at.y, at.z};
       for (int c = 0; c < 3; ++c) {
         least[c] = min(least[c], select(m, p[c], splat(kInfinity)));
         most[c] = max(most[c], select(m, p[c], splat(-kInfinity)));
@@ -136,10 +136,10 @@ inline bool settle(const View& view, const Pixels& pixels, const Hits& hits, std
                    Shadows& shadows) {
   Surfaces s;
   for (int k = 0; k < kLanes; k += kWidth) {
-    const Float t = load(hits.t + k), scale = view.grid.orthographic ? splat(1.0f) : t;
-    store(s.p[0] + k, scale * load(pixels.x + k));
-    store(s.p[1] + k, scale * load(pixels.y + k));
-    store(s.p[2] + k, -t);
+    const Vec3f p = hit_point(view, pixels, hits, k);
+    store(s.p[0] + k, p.x);
+    store(s.p[1] + k, p.y);
+    store(s.p[2] + k, p.z);
     for (auto& n : s.n) store(n + k, splat(0.0f));  // for shadows of a geom on itself
   }
   bool darker = false;

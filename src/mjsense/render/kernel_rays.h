@@ -45,6 +45,13 @@ inline Float splat(float x) { return Float(x); }
 
 inline Vec3f splat(const float* p) { return {splat(p[0]), splat(p[1]), splat(p[2])}; }
 
+// Where the pixels of a packet hit, camera frame; of lanes without a hit any number.
+inline Vec3f hit_point(const View& view, const Pixels& pixels, const Hits& hits, int k) {
+  const Float t = load(hits.t + k), x = load(pixels.x + k), y = load(pixels.y + k);
+  if (view.grid.orthographic) return {x, y, -t};
+  return {t * x, t * y, -t};
+}
+
 // Box around the points of `lanes`; low > high if there are none.
 inline void bounds(const float (*p)[kLanes], std::uint32_t lanes, float* low, float* high) {
   for (int c = 0; c < 3; ++c) {

@@ -168,12 +168,11 @@ inline void triangle_normals(const ViewGeom& g, const Hits& hits, std::uint32_t 
 inline void gather_surfaces(const View& view, const Pixels& pixels, const Hits& hits,
                             std::uint32_t lanes, bool color, Surfaces& out) {
   if (lanes != 0xffffu) __builtin_memset(&out, 0, sizeof out);  // other lanes hold numbers too
-  const bool ortho = view.grid.orthographic;
   for (int k = 0; k < kLanes; k += kWidth) {
-    const Float t = load(hits.t + k), x = load(pixels.x + k), y = load(pixels.y + k);
-    store(out.p[0] + k, ortho ? x : t * x);
-    store(out.p[1] + k, ortho ? y : t * y);
-    store(out.p[2] + k, -t);
+    const Vec3f p = hit_point(view, pixels, hits, k);
+    store(out.p[0] + k, p.x);
+    store(out.p[1] + k, p.y);
+    store(out.p[2] + k, p.z);
   }
   std::uint32_t todo = lanes;
   while (todo) {

@@ -89,6 +89,25 @@ inline void sample_shift(int index, int samples, float& x, float& y) {
   y = radical + 0.5f / samples - 0.5f;
 }
 
+// The colours of packet `q` before transparent geoms: what it sees, the sky, reflections, haze.
+inline void shade_packet(const View& view, const FixedTile* fixed, int q, const Pixels& pixels,
+                         const Hits& hits, Shadows& shadows, Colors& colors) {
+  const std::uint32_t lanes = hit_lanes(hits);
+  shadows.packet = q;
+  shadows.settled = false;
+  if (fixed) shadows.fixed_lanes = fixed_lanes(*fixed, q, hits);
+  const bool kept =
+      lanes && view.fixed && load_colors(view, *fixed, pixels, hits, lanes, shadows, colors);
+  if (lanes && !kept) {
+    Surfaces surfaces;
+    gather_surfaces(view, pixels, hits, lanes, true, surfaces);
+    shade(view, surfaces, hits, lanes, view.shadows ? &shadows : nullptr, colors);
+  }
+  if (lanes != 0xffffu) shade_background(view, pixels, ~lanes & 0xffffu, colors);
+  if (view.reflection) add_reflection(view, pixels, hits, colors);
+  if (view.sky_distance > 0) add_haze(view, pixels, hits, colors);
+}
+
 inline void render_tile(const View& view, const ImageTargets& targets, int tx, int ty,
                         TileScratch& scratch) {
   Tile& tile = *static_cast<Tile*>(scratch.tile);
@@ -133,7 +152,7 @@ inline void render_tile(const View& view, const ImageTargets& targets, int tx, i
       if (view.fixed) {
         load_fixed(view, view.fixed[at], packets, tile);
       } else {
-        make_fixed(view, lists.opaque, packets, targets.fixed, tile, scratch, *made);
+        make_fixed(view, lists.opaque, packets, targets.fixed != nullptr, tile, scratch, *made);
       }
       if (targets.fixed) return;
       fixed = view.fixed ? view.fixed + at : made;
@@ -143,25 +162,11 @@ inline void render_tile(const View& view, const ImageTargets& targets, int tx, i
       Shadows shadows;
       if (view.shadows) find_all_casters(view, fixed, tile, packets, scratch, shadows);
       for (int q = 0; q < packets; ++q) {
-        const Hits& hits = tile.hits[q];
-        const std::uint32_t lanes = hit_lanes(hits);
         Colors colors;
-        shadows.packet = q;
-        shadows.settled = false;
-        if (fixed) shadows.fixed_lanes = fixed_lanes(*fixed, q, hits);
-        const bool kept = lanes && view.fixed &&
-                          load_colors(view, *fixed, tile.pixels[q], hits, lanes, shadows, colors);
-        if (lanes && !kept) {
-          Surfaces surfaces;
-          gather_surfaces(view, tile.pixels[q], hits, lanes, true, surfaces);
-          shade(view, surfaces, hits, lanes, view.shadows ? &shadows : nullptr, colors);
-        }
-        if (lanes != 0xffffu) shade_background(view, tile.pixels[q], ~lanes & 0xffffu, colors);
-        if (view.reflection) add_reflection(view, tile.pixels[q], hits, colors);
-        if (view.sky_distance > 0) add_haze(view, tile.pixels[q], hits, colors);
+        shade_packet(view, fixed, q, tile.pixels[q], tile.hits[q], shadows, colors);
         if (lists.transparent)
-          shade_transparent(view, scratch.transparent, lists.transparent, tile.pixels[q], hits,
-                            colors);
+          shade_transparent(view, scratch.transparent, lists.transparent, tile.pixels[q],
+                            tile.hits[q], colors);
         for (int c = 0; c < 3; ++c)
           for (int k = 0; k < kLanes; k += kWidth) {
             const Float color = load(colors.rgb[c] + k);
