@@ -4,10 +4,9 @@
 
 #include <cmath>
 
-#include "mjsense/core/parallel.h"
 #include "mjsense/rays/ray_scene.h"
 #include "mjsense/rays/testing/scene.h"
-#include "mjsense/sensors/camera/camera_sensor.h"
+#include "mjsense/sensors/camera/testing/shoot.h"
 
 namespace mjsense {
 namespace {
@@ -38,14 +37,7 @@ TEST(CameraAgainstRays, EveryPixelSeesWhatItsRayMeets) {
     cfg.width = kWidth;
     cfg.height = kHeight;
     cfg.data_types = {"depth", "segmentation"};
-    const auto camera = cfg.build();
-    SensorInit init;
-    init.model = m.model;
-    camera->initialize(init);
-    camera->compute(m.world());
-    ThreadPool pool(1);
-    const int id = 0;
-    camera->cast({&rays, {&id, 1}, pool});
+    const auto camera = testing::shoot(cfg, m, rays);
     const auto depth = camera->field("depth").data.row<float>(0);
     const auto ids = camera->field("segmentation").data.row<std::int32_t>(0);
 

@@ -4,10 +4,9 @@
 
 #include <cmath>
 
-#include "mjsense/core/parallel.h"
 #include "mjsense/rays/ray_scene.h"
 #include "mjsense/rays/testing/scene.h"
-#include "mjsense/sensors/camera/camera_sensor.h"
+#include "mjsense/sensors/camera/testing/shoot.h"
 
 namespace mjsense {
 namespace {
@@ -55,14 +54,7 @@ TEST(CameraShadows, FallWhereTheWayToTheLightIsBarred) {
     cfg.width = cfg.height = kSize;
     cfg.data_types = {"rgb", "normals", "point_cloud"};
     cfg.use_shadows = true;
-    const auto camera = cfg.build();
-    SensorInit init;
-    init.model = m.model;
-    camera->initialize(init);
-    camera->compute(m.world());
-    ThreadPool pool(1);
-    const int id = 0;
-    camera->cast({&rays, {&id, 1}, pool});
+    const auto camera = testing::shoot(cfg, m, rays);
     const auto rgb = camera->field("rgb").data.row<std::uint8_t>(0);
     const auto normals = camera->field("normals").data.row<float>(0);
     const auto points = camera->field("point_cloud").data.row<float>(0);
