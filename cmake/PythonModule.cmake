@@ -1,13 +1,12 @@
 # The Python package. The extension is mjsense/_core.abi3.so: nanobind in split mode (its run-time part is the package
-# nanobind-backend), so that one wheel serves every CPython from 3.11 on. The *_py.cc beside the code they bind and
-# python/bindings make it up.
+# nanobind-backend), so that one wheel serves every CPython from 3.11 on. It is made of
+# python/bindings, which stands above every room of C++.
 find_package(Python 3.11 REQUIRED COMPONENTS Interpreter Development.Module)
 execute_process(COMMAND ${Python_EXECUTABLE} -m nanobind --cmake_dir OUTPUT_VARIABLE nanobind_ROOT
                 OUTPUT_STRIP_TRAILING_WHITESPACE ERROR_QUIET)
 find_package(nanobind CONFIG REQUIRED)
 
-file(GLOB_RECURSE MJSENSE_PY_SOURCES CONFIGURE_DEPENDS ${PROJECT_SOURCE_DIR}/src/mjsense/*_py.cc
-     ${PROJECT_SOURCE_DIR}/python/bindings/*.cc)
+file(GLOB_RECURSE MJSENSE_PY_SOURCES CONFIGURE_DEPENDS ${PROJECT_SOURCE_DIR}/python/bindings/*.cc)
 nanobind_add_module(mjsense_python BACKEND_MODULE nanobind_backend NOMINSIZE NB_SUPPRESS_WARNINGS ${MJSENSE_PY_SOURCES})
 target_include_directories(mjsense_python PRIVATE ${PROJECT_SOURCE_DIR})
 target_compile_definitions(mjsense_python PRIVATE MJSENSE_VERSION="${PROJECT_VERSION}")

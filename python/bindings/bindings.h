@@ -1,5 +1,5 @@
 #pragma once
-// The rooms of the extension: each function stands in the x_py.cc beside the code it binds.
+// The rooms of the extension: each function stands in the file of its name.
 
 #include <nanobind/nanobind.h>
 

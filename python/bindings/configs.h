@@ -1,6 +1,6 @@
 #pragma once
-// The list of sensor configurations that Python knows. Each is read in the x_py.cc beside its
-// sensor.
+// The list of sensor configurations that Python knows. Each is read in
+// sensors/x.cc.
 
 #include <nanobind/nanobind.h>
 

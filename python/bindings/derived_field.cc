@@ -19,14 +19,10 @@ struct DataField {
 };
 
 template <class T>
-void add(std::vector<DataField>& fields, const char* name, int rows, int columns,
-         const void* (*pointer)(const mjData*)) {
-  if constexpr (std::is_same_v<T, mjtNum>)
-    fields.push_back({name, DType::kFloat64, rows, columns, pointer});
-  if constexpr (std::is_same_v<T, int>)
-    fields.push_back({name, DType::kInt32, rows, columns, pointer});
-  if constexpr (std::is_same_v<T, mjtBool>)
-    fields.push_back({name, DType::kBool, rows, columns, pointer});
+void add(std::vector<DataField>& fields, const char* name, int rows, int columns, const void* (*pointer)(const mjData*)) {
+  if constexpr (std::is_same_v<T, mjtNum>) fields.push_back({name, DType::kFloat64, rows, columns, pointer});
+  if constexpr (std::is_same_v<T, int>) fields.push_back({name, DType::kInt32, rows, columns, pointer});
+  if constexpr (std::is_same_v<T, mjtBool>) fields.push_back({name, DType::kBool, rows, columns, pointer});
 }
 
 std::vector<DataField> data_fields(const mjModel* m) {

@@ -18,7 +18,7 @@
 #include <thread>
 
 #include "mjsense/core/error.h"
-#include "mjsense/record/check.h"
+#include "mjsense/replay/check.h"
 #include "mjsense/record/testing/fake_suite.h"
 #include "mjsense/record/recorder.h"
 

@@ -18,7 +18,7 @@
 #include "mjsense/app/scan_command.h"
 #include "mjsense/app/sensors_command.h"
 #include "mjsense/core/error.h"
-#include "mjsense/record/check.h"
+#include "mjsense/replay/check.h"
 
 namespace mjsense {
 namespace {

@@ -11,7 +11,7 @@
 #include "mjsense/app/progress.h"
 #include "mjsense/app/table.h"
 #include "mjsense/core/error.h"
-#include "mjsense/record/check.h"
+#include "mjsense/replay/check.h"
 
 namespace mjsense {
 namespace {

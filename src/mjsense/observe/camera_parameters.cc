@@ -8,7 +8,7 @@
 
 #include "mjsense/core/error.h"
 #include "mjsense/observe/frame.h"
-#include "mjsense/render/camera_model.h"
+#include "mjsense/render/view/camera_model.h"
 
 namespace mjsense {
 

@@ -8,7 +8,7 @@
 #include <string_view>
 #include <vector>
 
-#include "mjsense/record/h5.h"
+#include "mjsense/hdf5/h5.h"
 #include "mjsense/record/layout.h"
 
 namespace mjsense {

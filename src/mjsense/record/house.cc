@@ -15,7 +15,7 @@
 #include <sstream>
 
 #include "mjsense/core/error.h"
-#include "mjsense/record/h5.h"
+#include "mjsense/hdf5/h5.h"
 #include "mjsense/record/layout.h"
 
 namespace fs = std::filesystem;

@@ -11,10 +11,10 @@
 #include <thread>
 
 #include "mjsense/core/error.h"
-#include "mjsense/record/check.h"
 #include "mjsense/record/house.h"
 #include "mjsense/record/testing/tools.h"
-#include "mjsense/record/trajectory.h"
+#include "mjsense/replay/check.h"
+#include "mjsense/replay/trajectory.h"
 
 namespace mjsense {
 namespace {

@@ -7,9 +7,9 @@
 #include "mjsense/core/cpu.h"
 #include "mjsense/core/error.h"
 #include "mjsense/rays/ray_scene.h"
-#include "mjsense/render/camera_model.h"
-#include "mjsense/render/tile_memory.h"
-#include "mjsense/render/view_builder.h"
+#include "mjsense/render/kernels/tile_memory.h"
+#include "mjsense/render/view/camera_model.h"
+#include "mjsense/render/view/view_builder.h"
 
 namespace mjsense {
 namespace {

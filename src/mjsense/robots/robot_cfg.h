@@ -61,8 +61,4 @@ struct RobotCfg {
   std::string env_state_name = "panda";
 };
 
-// The robots there are, and one of them; throws KeyError with the nearest names.
-std::vector<std::string> robot_names();
-RobotCfg robot_cfg(std::string_view name);
-
 }  // namespace mjsense

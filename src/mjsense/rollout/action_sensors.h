@@ -5,8 +5,8 @@
 #include <memory>
 #include <vector>
 
+#include "mjsense/episode/task.h"
 #include "mjsense/rollout/action_log.h"
-#include "mjsense/tasks/task.h"
 
 namespace mjsense {
 

@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cctype>
 
+#include "mjsense/episode/policy.h"
 #include "mjsense/observe/camera_parameters.h"
 #include "mjsense/observe/env_states.h"
 #include "mjsense/observe/function_sensor.h"
@@ -12,7 +13,6 @@
 #include "mjsense/observe/joint_state.h"
 #include "mjsense/observe/pose_sensor.h"
 #include "mjsense/observe/shared_field.h"
-#include "mjsense/policies/policy.h"
 #include "mjsense/rollout/action_sensors.h"
 
 namespace mjsense {

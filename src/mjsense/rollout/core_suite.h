@@ -4,9 +4,9 @@
 #include <string>
 #include <vector>
 
+#include "mjsense/episode/task.h"
 #include "mjsense/observe/suite.h"
 #include "mjsense/rollout/action_log.h"
-#include "mjsense/tasks/task.h"
 
 namespace mjsense {
 

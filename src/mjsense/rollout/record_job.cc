@@ -8,6 +8,7 @@
 #include <limits>
 
 #include "mjsense/core/error.h"
+#include "mjsense/rollout/registry.h"
 
 namespace mjsense {
 namespace {

@@ -8,6 +8,7 @@
 
 #include "mjsense/core/error.h"
 #include "mjsense/observe/json_sensor.h"
+#include "mjsense/rollout/registry.h"
 #include "mjsense/sensors/camera/camera.h"
 
 namespace mjsense {

@@ -21,12 +21,12 @@
 #include <string>
 #include <vector>
 
+#include "mjsense/episode/policy.h"
+#include "mjsense/episode/task.h"
 #include "mjsense/observe/suite.h"
-#include "mjsense/policies/policy.h"
 #include "mjsense/rollout/action_log.h"
 #include "mjsense/rollout/core_suite.h"
 #include "mjsense/sim/simulation.h"
-#include "mjsense/tasks/task.h"
 
 namespace mjsense {
 

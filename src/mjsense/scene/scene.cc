@@ -8,6 +8,7 @@
 
 #include "mjsense/core/error.h"
 #include "mjsense/scene/attach.h"
+#include "mjsense/scene/model_sensors/model_sensor.h"
 #include "mjsense/scene/resolve.h"
 #include "mjsense/scene/spec.h"
 
@@ -148,7 +149,8 @@ void Scene::Impl::add_sensors() {
   // those that sensors added.
   for (const std::string& name : spec_names(spec.get(), mjOBJ_SENSOR)) {
     const auto taken = [&](const auto& sensor) { return sensor->name() == name; };
-    if (std::none_of(sensors.begin(), sensors.end(), taken)) add(make_discovered_sensor(name));
+    if (std::none_of(sensors.begin(), sensors.end(), taken))
+      add(std::make_unique<ModelSensor>(name));
   }
   for (std::size_t i = 0; i < configured; ++i) {
     for (auto& part : sensors[i]->parts()) add(std::move(part));

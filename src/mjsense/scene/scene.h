@@ -91,8 +91,4 @@ class Scene {
   std::unique_ptr<Impl> impl_;
 };
 
-// The sensor that reads a MuJoCo sensor found in the model under `name`. Defined in
-// sensors/builtin: declared here, because a scene discovers sensors but knows no kind of them.
-std::unique_ptr<Sensor> make_discovered_sensor(const std::string& name);
-
 }  // namespace mjsense

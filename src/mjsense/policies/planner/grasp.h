@@ -7,8 +7,8 @@
 #include <vector>
 
 #include "mjsense/core/pose.h"
+#include "mjsense/episode/object_shape.h"
 #include "mjsense/robots/robot.h"
-#include "mjsense/tasks/object_shape.h"
 
 namespace mjsense {
 

@@ -6,6 +6,9 @@
 #include <memory>
 
 #include "mjsense/policies/planner/pick_loop.h"
+#include "mjsense/policies/planner/pick_planner.h"
+#include "mjsense/robots/franka/franka.h"
+#include "mjsense/tasks/pick/pick.h"
 
 namespace mjsense {
 namespace {
@@ -13,12 +16,12 @@ namespace {
 struct Stage {
   explicit Stage(bool noise) {
     TaskCfg cfg;
-    cfg.robot = robot_cfg("franka");
+    cfg.robot = franka_cfg();
     cfg.action_noise = noise;
-    task = make_task("pick", cfg);
+    task = std::make_unique<PickTask>(cfg);
     scene = std::make_unique<Scene>(task->scene_cfg());
     task->initialize(scene->model(), 1);
-    policy = make_policy("planner");
+    policy = std::make_unique<PickPlanner>();
     task->register_policy(*policy);
     data.reset(mj_makeData(scene->model()));
   }

@@ -5,8 +5,8 @@
 
 #include <cstdint>
 
-#include "mjsense/policies/policy.h"
-#include "mjsense/tasks/task.h"
+#include "mjsense/episode/policy.h"
+#include "mjsense/episode/task.h"
 
 namespace mjsense {
 

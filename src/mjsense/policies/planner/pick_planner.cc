@@ -35,8 +35,9 @@ Pose object_pose(const World& world, int body) {
 std::span<const Phase> PickPlanner::phases() const { return kPhases; }
 
 void PickPlanner::initialize(Task& task) {
-  task_ = dynamic_cast<PickTask*>(&task);
-  if (!task_)
+  task_ = &task;
+  scene_ = task.grasp_scene();
+  if (!scene_)
     throw ValueError(fmt::format("policy 'planner' picks; it cannot do task '{}'", task.name()));
   const Robot& robot = task_->robot();
   if (robot.arm() < 0 || robot.gripper() < 0)
@@ -99,11 +100,11 @@ void PickPlanner::plan(const World& world, Plan& plan) const {
 
 bool PickPlanner::choose_grasp(const World& world, Grasp& chosen) const {
   const Robot& robot = task_->robot();
-  const auto objects = task_->all_objects();
-  const auto& target = objects[task_->target(world.id)];
+  const auto objects = scene_->all_objects();
+  const auto& target = objects[scene_->target(world.id)];
   const Pose tool = robot.leaf_pose(world, robot.arm()), base = robot.base_pose(world);
   const std::vector<Grasp> grasps = propose_grasps(
-      *gripper_shape_, target.shape, object_pose(world, target.body), task_->table_height(), tool);
+      *gripper_shape_, target.shape, object_pose(world, target.body), scene_->table_height(), tool);
   std::array<double, Chain::kMaxJoints> q;
   read_arm(world, q);
   int tried = 0;
@@ -145,7 +146,7 @@ bool PickPlanner::reachable(const Pose& base, const Pose& grasp, std::span<const
 bool PickPlanner::path_is_free(const World& world, const Pose& tool, const Pose& pregrasp) const {
   const Twist screw = log6(inverse(tool) * pregrasp);
   const int steps = std::max(1, static_cast<int>(norm(screw.v) / kPathStep));
-  const auto objects = task_->all_objects();
+  const auto objects = scene_->all_objects();
   for (int i = 1; i <= steps; ++i) {
     const Pose at = tool * exp6((static_cast<double>(i) / steps) * screw);
     for (const auto& object : objects) {

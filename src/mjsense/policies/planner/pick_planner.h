@@ -1,13 +1,14 @@
 #pragma once
-// Picks up the target of a PickTask: open, pregrasp, grasp, settle, close, lift. Waypoints are
+// Picks up the target of a task that has a GraspScene: open, pregrasp, grasp, settle, close, lift. Waypoints are
 // timed by simulation time; the tool moves on screws between them; inverse kinematics follows from
 // the last command.
 
 #include <vector>
 
+#include "mjsense/episode/grasp_scene.h"
+#include "mjsense/episode/policy.h"
+#include "mjsense/episode/task.h"
 #include "mjsense/policies/planner/grasp.h"
-#include "mjsense/policies/policy.h"
-#include "mjsense/tasks/pick/pick.h"
 
 namespace mjsense {
 
@@ -28,7 +29,7 @@ class PickPlanner final : public PlannerPolicy {
  public:
   explicit PickPlanner(PickPlannerCfg cfg = {}) : cfg_(cfg) {}
   std::string_view name() const override { return "planner"; }
-  void initialize(Task& task) override;  // throws ValueError for another task than PickTask
+  void initialize(Task& task) override;  // throws ValueError for a task without one
   void reset(const World& world) override;
   void act(const World& world, Action& action) override;
 
@@ -70,7 +71,8 @@ class PickPlanner final : public PlannerPolicy {
   void read_arm(const World& world, std::span<double> q) const;
 
   PickPlannerCfg cfg_;
-  PickTask* task_ = nullptr;
+  const Task* task_ = nullptr;
+  const GraspScene* scene_ = nullptr;
   std::unique_ptr<GripperShape> gripper_shape_;
   std::vector<Plan> plans_;  // [B]
 };

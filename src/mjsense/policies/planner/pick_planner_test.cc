@@ -9,6 +9,8 @@
 
 #include "mjsense/core/parallel.h"
 #include "mjsense/policies/planner/pick_loop.h"
+#include "mjsense/robots/franka/franka.h"
+#include "mjsense/tasks/pick/pick.h"
 
 namespace mjsense {
 namespace {
@@ -21,12 +23,12 @@ using DataPtr = std::unique_ptr<mjData, DataDelete>;
 struct Stage {
   explicit Stage(int num_worlds, bool noise = false) {
     TaskCfg cfg;
-    cfg.robot = robot_cfg("franka");
+    cfg.robot = franka_cfg();
     cfg.action_noise = noise;
-    task = make_task("pick", cfg);
+    task = std::make_unique<PickTask>(cfg);
     scene = std::make_unique<Scene>(task->scene_cfg());
     task->initialize(scene->model(), num_worlds);
-    policy = make_policy("planner");
+    policy = std::make_unique<PickPlanner>();
     task->register_policy(*policy);
     for (int w = 0; w < num_worlds; ++w) data.emplace_back(mj_makeData(scene->model()));
   }

@@ -1,4 +1,4 @@
-#include "mjsense/render/gl_renderer.h"
+#include "mjsense/render/opengl/gl_renderer.h"
 
 #include <EGL/egl.h>
 #include <EGL/eglext.h>

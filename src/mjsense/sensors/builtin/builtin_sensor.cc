@@ -7,12 +7,10 @@
 #include <cmath>
 
 #include "mjsense/core/error.h"
+#include "mjsense/scene/model_sensors/builtin_types.h"
 #include "mjsense/scene/resolve.h"
 #include "mjsense/scene/scene.h"
 #include "mjsense/scene/spec.h"
-#include "mjsense/sensors/builtin/builtin_draw.h"
-#include "mjsense/sensors/builtin/builtin_spec.h"
-#include "mjsense/sensors/builtin/builtin_types.h"
 
 namespace mjsense {
 namespace {
@@ -75,10 +73,6 @@ bool is_unit(mjtSensor type) {
 }
 
 }  // namespace
-
-std::unique_ptr<Sensor> make_discovered_sensor(const std::string& name) {
-  return std::make_unique<BuiltinSensor>(name);
-}
 
 std::string BuiltinSensorCfg::key() const {
   return obj.entity.empty() ? name : obj.entity + "/" + name;
@@ -152,10 +146,9 @@ std::unique_ptr<Sensor> BuiltinSensorCfg::build() const {
 }
 
 BuiltinSensor::BuiltinSensor(const BuiltinSensorCfg& cfg)
-    : Sensor(cfg.key()), cfg_(std::make_unique<BuiltinSensorCfg>(cfg)) {}
+    : ModelSensor(cfg.key()), cfg_(std::make_unique<BuiltinSensorCfg>(cfg)) {}
 
 void BuiltinSensor::edit_spec(mjSpec* spec) {
-  if (!cfg_) return;
   const std::string place = fmt::format("sensor '{}'", name());
   if (mjs_findElement(spec, mjOBJ_SENSOR, name().c_str())) {
     throw ValueError(cfg_->obj.entity.empty()
@@ -218,44 +211,6 @@ void BuiltinSensor::edit_spec(mjSpec* spec) {
     default:
       break;
   }
-}
-
-void BuiltinSensor::initialize(const SensorInit& init) {
-  const mjModel* m = init.model;
-  id_ = resolve(m, mjOBJ_SENSOR, name(), fmt::format("sensor '{}'", name()));
-  adr_ = m->sensor_adr[id_];
-  dim_ = m->sensor_dim[id_];
-  history_adr_ = m->sensor_historyadr[id_];
-  nsample_ = history_adr_ < 0 ? 0 : m->sensor_history[2 * id_];
-  SensorSpec spec = describe_builtin(m, id_);
-  clear_fields();
-  field_ = &add_field("", spec, init.num_worlds);
-  if (nsample_ > 0) {
-    spec.shape = {nsample_, dim_};
-    spec.description = fmt::format("samples of '{}' before its delay, newest first", name());
-    history_ = &add_field("history", spec, init.num_worlds);
-  }
-}
-
-void BuiltinSensor::compute(const World& world) {
-  const mjtNum* values = world.data->sensordata + adr_;
-  std::span<float> row = field_->data.row<float>(world.id);
-  for (int i = 0; i < dim_; ++i) row[i] = static_cast<float>(values[i]);
-  if (nsample_ == 0) return;
-
-  // MuJoCo's ring: [user, index of the newest sample, nsample times, nsample x dim values].
-  const mjtNum* ring = world.data->history + history_adr_;
-  const int newest = static_cast<int>(ring[1]);
-  const mjtNum* samples = ring + 2 + nsample_;
-  std::span<float> past = history_->data.row<float>(world.id);
-  for (int k = 0; k < nsample_; ++k) {
-    const mjtNum* sample = samples + ((newest - k + nsample_) % nsample_) * dim_;
-    for (int i = 0; i < dim_; ++i) past[k * dim_ + i] = static_cast<float>(sample[i]);
-  }
-}
-
-void BuiltinSensor::draw(const World& world, DebugShapes& shapes) {
-  draw_sensor_frame(world, id_, name(), shapes);
 }
 
 }  // namespace mjsense

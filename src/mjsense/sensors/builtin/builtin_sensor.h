@@ -9,6 +9,7 @@
 
 #include "mjsense/core/sensor.h"
 #include "mjsense/scene/entity.h"
+#include "mjsense/scene/model_sensors/model_sensor.h"
 
 namespace mjsense {
 
@@ -50,25 +51,14 @@ struct BuiltinSensorCfg : SensorCfg {
 
 // Fields: "" float32 [dim]; with a history (nsample > 0) also "history" float32 [nsample, dim], the
 // samples taken so far, undelayed, newest first (0 before the first).
-class BuiltinSensor : public Sensor {
+// Writes one of MuJoCo's own sensors into the spec; its rows are a ModelSensor's.
+class BuiltinSensor : public ModelSensor {
  public:
-  // Found in the model under its name.
-  explicit BuiltinSensor(std::string name) : Sensor(std::move(name)) {}
   explicit BuiltinSensor(const BuiltinSensorCfg& cfg);
-
-  std::string_view kind() const override { return "builtin"; }
   void edit_spec(mjSpec* spec) override;
-  void initialize(const SensorInit& init) override;
-  void compute(const World& world) override;
-  void draw(const World& world, DebugShapes& shapes) override;  // the frame it is attached to
 
  private:
-  std::unique_ptr<const BuiltinSensorCfg> cfg_;  // null if found in the model
-  int id_ = -1;
-  int adr_ = 0, dim_ = 0;
-  int history_adr_ = -1, nsample_ = 0;
-  Field* field_ = nullptr;
-  Field* history_ = nullptr;
+  std::unique_ptr<const BuiltinSensorCfg> cfg_;
 };
 
 }  // namespace mjsense

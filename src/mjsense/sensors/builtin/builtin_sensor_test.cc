@@ -13,10 +13,10 @@
 
 #include "mjsense/core/error.h"
 #include "mjsense/core/rng.h"
+#include "mjsense/scene/model_sensors/builtin_types.h"
 #include "mjsense/scene/scene.h"
 #include "mjsense/scene/spec.h"
 #include "mjsense/sensors/builtin/builtin_cases.h"
-#include "mjsense/sensors/builtin/builtin_types.h"
 #include "mjsense/sim/simulation.h"
 
 namespace mjsense {

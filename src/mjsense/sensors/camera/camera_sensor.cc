@@ -9,7 +9,7 @@
 #include "mjsense/core/parallel.h"
 #include "mjsense/core/shared.h"
 #include "mjsense/rays/ray_scene.h"
-#include "mjsense/render/tile_memory.h"
+#include "mjsense/render/kernels/tile_memory.h"
 #include "mjsense/sensors/camera/depth_noise.h"
 
 namespace mjsense {

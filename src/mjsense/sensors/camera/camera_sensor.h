@@ -5,11 +5,11 @@
 #include <vector>
 
 #include "mjsense/core/rng.h"
-#include "mjsense/render/camera_model.h"
-#include "mjsense/render/fixed_layer.h"
-#include "mjsense/render/gl_renderer.h"
-#include "mjsense/render/look.h"
-#include "mjsense/render/view_builder.h"
+#include "mjsense/render/opengl/gl_renderer.h"
+#include "mjsense/render/view/camera_model.h"
+#include "mjsense/render/view/fixed_layer.h"
+#include "mjsense/render/view/look.h"
+#include "mjsense/render/view/view_builder.h"
 #include "mjsense/sensors/camera/camera.h"
 #include "mjsense/sensors/camera/optical_flow.h"
 #include "mjsense/sensors/camera/pixel_owners.h"

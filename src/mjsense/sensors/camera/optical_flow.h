@@ -11,8 +11,8 @@
 
 #include "mjsense/core/pose.h"
 #include "mjsense/core/sensor.h"
-#include "mjsense/render/camera_model.h"
-#include "mjsense/render/view.h"
+#include "mjsense/render/view/camera_model.h"
+#include "mjsense/render/view/view.h"
 
 namespace mjsense {
 

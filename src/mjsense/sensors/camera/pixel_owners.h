@@ -7,7 +7,7 @@
 #include <vector>
 
 #include "mjsense/core/sensor.h"
-#include "mjsense/render/view.h"
+#include "mjsense/render/view/view.h"
 
 namespace mjsense {
 

@@ -5,7 +5,7 @@
 #include <utility>
 
 #include "mjsense/core/error.h"
-#include "mjsense/sensors/builtin/builtin_draw.h"
+#include "mjsense/scene/model_sensors/builtin_draw.h"
 
 namespace mjsense {
 namespace {

@@ -6,12 +6,12 @@
 #include <string>
 #include <vector>
 
-#include "mjsense/tasks/object_shape.h"
-#include "mjsense/tasks/task.h"
+#include "mjsense/episode/grasp_scene.h"
+#include "mjsense/episode/task.h"
 
 namespace mjsense {
 
-class PickTask final : public Task {
+class PickTask final : public Task, public GraspScene {
  public:
   static constexpr std::string_view kRole = "pickup_obj";
 
@@ -36,15 +36,10 @@ class PickTask final : public Task {
   void write_info(const World& world, JsonWriter& json) const override;
   std::vector<std::shared_ptr<Sensor>> create_task_sensors() const override;
 
-  // --- for planners
-  struct Object {
-    int body = -1;
-    std::string kind;  // "mug": of models/objects
-    ObjectShape shape;
-  };
-  std::span<const Object> all_objects() const { return objects_; }  // target and distractors
-  int target(int world) const { return targets_[world].index; }     // index in all_objects()
-  double table_height() const { return table_height_; }             // m
+  const GraspScene* grasp_scene() const override { return this; }
+  std::span<const GraspObject> all_objects() const override { return objects_; }
+  int target(int world) const override { return targets_[world].index; }
+  double table_height() const override { return table_height_; }
 
  protected:
   void initialize_task() override;
@@ -61,7 +56,7 @@ class PickTask final : public Task {
   bool borne_by_others(const World& world, int body) const;
   bool lifted(const World& world) const;
 
-  std::vector<Object> objects_;
+  std::vector<GraspObject> objects_;
   std::vector<Target> targets_;  // [B]
   int robot_root_ = -1;
   double table_height_ = 0;

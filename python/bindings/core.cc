@@ -1,0 +1,89 @@
+// Errors, specs and versions in Python.
+
+#include <mujoco/mujoco.h>
+#include <nanobind/nanobind.h>
+#include <nanobind/stl/string.h>
+
+#include "mjsense/core/error.h"
+#include "mjsense/core/spec.h"
+#include "python/bindings/bindings.h"
+#include "python/bindings/numpy.h"
+
+namespace mjsense::python {
+namespace {
+
+// mjsense.errors.UnknownNameError is a KeyError whose text is not quoted.
+void translate(const std::exception_ptr& error, void*) {
+  try {
+    std::rethrow_exception(error);
+  } catch (const Error& e) {
+    switch (e.kind()) {
+      case ErrorKind::kValue:
+        PyErr_SetString(PyExc_ValueError, e.what());
+        break;
+      case ErrorKind::kRuntime:
+        PyErr_SetString(PyExc_RuntimeError, e.what());
+        break;
+      case ErrorKind::kKey:
+        PyErr_SetString(nb::module_::import_("mjsense.errors").attr("UnknownNameError").ptr(), e.what());
+        break;
+    }
+  }
+}
+
+nb::tuple shape_tuple(const Shape& shape) {
+  nb::list dims;
+  for (auto dim : shape.dims()) dims.append(dim);
+  return nb::tuple(dims);
+}
+
+std::string spec_repr(const SensorSpec& s) {
+  std::string text =
+      "SensorSpec('" + s.name + "', " + std::string(dtype_name(s.dtype)) + s.shape.str();
+  if (!s.unit.empty()) text += ", " + s.unit;
+  if (!s.frame.empty()) text += ", in " + s.frame;
+  return text + ")";
+}
+
+}  // namespace
+
+void bind_core(nb::module_& m) {
+  nb::register_exception_translator(translate);
+  m.attr("__version__") = MJSENSE_VERSION;
+  m.def(
+      "mujoco_version", [] { return std::string(mj_versionString()); },
+      "Version of the libmujoco that is loaded.");
+
+  nb::class_<SensorSpec>(m, "SensorSpec", "What a measurement is, apart from its value.")
+      .def_prop_ro(
+          "name", [](const SensorSpec& s) { return s.name; },
+          "Full name of the stream: \"feet/force\".")
+      .def_prop_ro(
+          "dtype", [](const SensorSpec& s) { return std::string(dtype_name(s.dtype)); },
+          "NumPy's name of the type.")
+      .def_prop_ro(
+          "shape", [](const SensorSpec& s) { return shape_tuple(s.shape); },
+          "Shape of one world's row.")
+      .def_prop_ro(
+          "unit", [](const SensorSpec& s) { return s.unit; },
+          "\"m\", \"rad\", \"N\" ...; empty: none.")
+      .def_prop_ro(
+          "frame", [](const SensorSpec& s) { return s.frame; },
+          "Frame in which the row is expressed.")
+      .def_prop_ro(
+          "low", [](const SensorSpec& s) { return s.low; }, "Smallest value that can occur.")
+      .def_prop_ro(
+          "high", [](const SensorSpec& s) { return s.high; }, "Largest value that can occur.")
+      .def_prop_ro(
+          "is_dict", [](const SensorSpec& s) { return s.is_dict; },
+          "The row is JSON text in uint8.")
+      .def_prop_ro(
+          "str_max_len", [](const SensorSpec& s) { return s.str_max_len; },
+          "Bytes of an is_dict row.")
+      .def_prop_ro(
+          "description", [](const SensorSpec& s) { return s.description; },
+          "One sentence, with the sign.")
+      .def("__repr__", &spec_repr);
+}
+
+}  // namespace mjsense::python

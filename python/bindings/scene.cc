@@ -1,0 +1,325 @@
+// Scenes in Python. python/mjsense/scene.py makes the public class of it.
+
+#include "mjsense/scene/scene.h"
+
+#include <nanobind/nanobind.h>
+#include <nanobind/stl/optional.h>
+#include <nanobind/stl/pair.h>
+#include <nanobind/stl/shared_ptr.h>
+#include <nanobind/stl/string.h>
+#include <nanobind/stl/vector.h>
+
+#include "mjsense/core/embedded.h"
+#include "mjsense/core/error.h"
+#include "python/bindings/bindings.h"
+#include "python/bindings/configs.h"
+#include "python/bindings/numpy.h"
+#include "python/bindings/python_sensor.h"
+#include "python/bindings/sensor_handle.h"
+
+namespace mjsense::python {
+
+template <class Fields>
+void fields(Fields& f, OptionsCfg& c) {
+  f("timestep", c.timestep);
+  f("integrator", c.integrator);
+  f("cone", c.cone);
+  f("solver", c.solver);
+  f("jacobian", c.jacobian);
+  f("impratio", c.impratio);
+  f("iterations", c.iterations);
+  f("tolerance", c.tolerance);
+  f("ls_iterations", c.ls_iterations);
+  f("ls_tolerance", c.ls_tolerance);
+  f("ccd_iterations", c.ccd_iterations);
+  f("gravity", c.gravity);
+  f("magnetic", c.magnetic);
+  f("wind", c.wind);
+  f("density", c.density);
+  f("viscosity", c.viscosity);
+  f("disableflags", c.disableflags);
+  f("enableflags", c.enableflags);
+}
+
+template <class Fields>
+void fields(Fields& f, SubTerrainCfg& c) {
+  f("kind", c.kind);
+  f("proportion", c.proportion);
+  f("inverted", c.inverted);
+  f("platform_width", c.platform_width);
+  f("amplitude", c.amplitude);
+  f("spacing", c.spacing);
+  f("waves", c.waves);
+  f("slope", c.slope);
+  f("step_height", c.step_height);
+  f("step_width", c.step_width);
+  f("stone_width", c.stone_width);
+  f("gap", c.gap);
+  f("stone_height", c.stone_height);
+  f("pit_depth", c.pit_depth);
+}
+
+// Any mapping, or pairs; TypeError for what is neither.
+nb::dict dict_of(nb::handle mapping) {
+  return nb::cast<nb::dict>(nb::module_::import_("builtins").attr("dict")(mapping));
+}
+
+// Mappings keep their order: names of tiles, regular expressions of joints.
+template <class Value>
+void read_custom(FromPython& f, nb::handle mapping,
+                 std::vector<std::pair<std::string, Value>>& out) {
+  out.clear();
+  for (auto [key, value] : dict_of(mapping)) {
+    auto& [name, read] = out.emplace_back();
+    f.read("key", key, name);
+    f.read(name.c_str(), value, read);
+  }
+}
+
+template <class Fields>
+void fields(Fields& f, TerrainCfg& c) {
+  f("terrain_type", c.terrain_type);
+  f("sub_terrains", c.sub_terrains);
+  f("levels", c.levels);
+  f("types", c.types);
+  f("tile_size", c.tile_size);
+  f("difficulty", c.difficulty);
+  f("resolution", c.resolution);
+  f("border", c.border);
+  f("max_init_level", c.max_init_level);
+  f("seed", c.seed);
+}
+
+template <class Fields>
+void fields(Fields& f, EntityCfg& c) {
+  f("pos", c.pos);
+  f("quat", c.quat);
+  f("joint_pos", c.joint_pos);
+  f("mocap_base", c.mocap_base);
+}
+
+namespace {
+
+mjSpec* spec_of(nb::handle mjspec) {
+  return reinterpret_cast<mjSpec*>(nb::cast<std::uintptr_t>(mjspec.attr("_address")));
+}
+
+// What an EntityCfg's `model` stands for, as EntityCfg._source() tells: ("path" | "xml" | "spec",
+// value).
+// What it refers to is added to `alive`.
+ModelSource read_source(nb::handle config, nb::list& alive) {
+  ModelSource source;
+  const auto from = nb::cast<nb::tuple>(config.attr("_source")());
+  alive.append(from);
+  const auto kind = nb::cast<std::string>(from[0]);
+  if (kind == "path") source.path = nb::cast<std::string>(from[1]);
+  if (kind == "xml") source.xml = nb::cast<std::string>(from[1]);
+  if (kind == "spec") source.spec = spec_of(from[1]);
+  for (auto [name, bytes] : nb::cast<nb::dict>(from[2])) {
+    const auto data = nb::cast<nb::bytes>(bytes);
+    source.assets[nb::cast<std::string>(name)] = std::string(data.c_str(), data.size());
+  }
+  return source;
+}
+
+// A sensor written in Python among a scene's configured ones.
+class PythonSensorCfg final : public SensorCfg {
+ public:
+  PythonSensorCfg(std::string key, nb::handle sensor, std::optional<SensorSpec> spec)
+      : sensor_(sensor), spec_(std::move(spec)) {
+    name = std::move(key);
+  }
+  std::unique_ptr<Sensor> build() const override {
+    return std::make_unique<PythonSensor>(name, sensor_, spec_);
+  }
+
+ private:
+  WeakObject sensor_;
+  std::optional<SensorSpec> spec_;
+};
+
+std::shared_ptr<const SensorCfg> read_sensor(nb::handle item) {
+  if (!nb::hasattr(item, "_mjs_compute_rows")) return read_sensor_cfg(item);
+  return std::make_shared<PythonSensorCfg>(nb::cast<std::string>(item.attr("uuid")), item,
+                                           read_python_spec(item));
+}
+
+// `spec` is the empty MjSpec that the scene is built in, so that Python's spec_fn sees the real
+// thing; `edit` is called with no argument when everything is attached.
+std::shared_ptr<Scene> make_scene(nb::handle config, nb::handle spec, nb::list sensors,
+                                  nb::object edit) {
+  SceneCfg cfg;
+  FromPython reader(config);
+  reader("env_spacing", cfg.env_spacing);
+  reader("extent", cfg.extent);
+  nb::object terrain = config.attr("terrain"), options = config.attr("options");
+  if (!terrain.is_none()) reader.read("terrain", terrain, cfg.terrain.emplace());
+  reader.read("options", options, cfg.options);
+  nb::list alive;
+  for (auto [name, entity] : dict_of(config.attr("entities"))) {
+    auto& [key, entity_cfg] = cfg.entities.emplace_back();
+    reader.read("entities", name, key);
+    reader.read("entities", entity, entity_cfg);
+    entity_cfg.model = read_source(entity, alive);
+  }
+  for (nb::handle sensor : sensors) cfg.sensors.push_back(read_sensor(sensor));
+  cfg.spec = spec_of(spec);
+  // Called below only: `edit` need not outlive this function, and the stored config may be
+  // destroyed without the lock.
+  nb::handle call = edit;
+  cfg.spec_fn = [call](mjSpec*) {
+    nb::gil_scoped_acquire lock;
+    call();
+  };
+  nb::gil_scoped_release unlock;
+  return std::make_shared<Scene>(std::move(cfg));
+}
+
+nb::dict entity_names(const Entity& e) {
+  nb::dict names;
+  const auto add = [&](const char* key, const std::vector<std::string>& list) {
+    nb::list items;
+    for (const auto& item : list) items.append(item);
+    names[key] = nb::tuple(items);
+  };
+  add("body_names", e.body_names);
+  add("geom_names", e.geom_names);
+  add("site_names", e.site_names);
+  add("joint_names", e.joint_names);
+  add("actuator_names", e.actuator_names);
+  add("tendon_names", e.tendon_names);
+  add("camera_names", e.camera_names);
+  names["fixed_base"] = e.fixed_base;
+  return names;
+}
+
+template <class T, class From>
+nb::object array_of(const std::vector<From>& values, const Shape& shape) {
+  auto array = std::make_shared<Array>(dtype_of<T>(), shape);
+  auto out = array->template all<T>();
+  for (std::size_t i = 0; i < values.size(); ++i) out[i] = static_cast<T>(values[i]);
+  return to_numpy(array->view(), owner_of(array));
+}
+
+nb::object env_origins(const Scene& scene, int num_worlds) {
+  return array_of<float>(scene.env_origins(num_worlds), {num_worlds, 3});
+}
+
+// Of generated terrain; None without.
+const Terrain* tiles_of(const Scene& scene) {
+  return scene.terrain() && scene.terrain()->levels() > 0 ? scene.terrain() : nullptr;
+}
+
+nb::object env_tiles(const Scene& scene, int num_worlds) {
+  const Terrain* tiles = tiles_of(scene);
+  if (!tiles) return nb::none();
+  return array_of<std::int32_t>(tiles->env_tiles(num_worlds), {num_worlds, 2});
+}
+
+nb::object tile_origins(const Scene& scene) {
+  const Terrain* tiles = tiles_of(scene);
+  if (!tiles) return nb::none();
+  return array_of<float>(tiles->tile_origins(), {tiles->levels(), tiles->types(), 3});
+}
+
+}  // namespace
+
+void bind_scene(nb::module_& m) {
+  m.def(
+      "check_cfg", [](nb::handle config) { read_sensor_cfg(config)->build(); },
+      "Raises if a sensor configuration is wrong.");
+  m.def(
+      "cfg_key", [](nb::handle config) { return read_sensor_cfg(config)->key(); },
+      "Key in a scene's registry.");
+  m.def(
+      "cfg_defaults",
+      [] {
+        nb::dict all;
+        for (const CfgKind& kind : cfg_kinds()) all[kind.name] = kind.defaults();
+        const auto add = [&all](const char* name, auto cfg) {
+          ToPython writer;
+          fields(writer, cfg);
+          all[name] = writer.values;
+        };
+        add("options", OptionsCfg{});
+        add("terrain", TerrainCfg{});
+        add("sub_terrain", SubTerrainCfg{});
+        return all;
+      },
+      "Defaults of the C++ configurations, by kind.");
+  m.def(
+      "embedded_models",
+      [] {
+        nb::list names;
+        for (const EmbeddedFile& file : embedded_files()) names.append(std::string(file.name));
+        return names;
+      },
+      "Names of the models that are part of mjsense: EntityCfg(model=\"embedded:<name>\").");
+
+  nb::class_<SensorHandle>(m, "SensorHandle", "A C++ sensor.")
+      .def_prop_ro("name", [](const SensorHandle& h) { return h.sensor->name(); })
+      .def_prop_ro("kind", [](const SensorHandle& h) { return std::string(h.sensor->kind()); })
+      .def_prop_ro("bytes_per_world",
+                   [](const SensorHandle& h) { return h.sensor->bytes_per_world(); })
+      .def(
+          "specs",
+          [](const SensorHandle& h) {
+            nb::dict specs;
+            for (const Field& field : h.sensor->fields())
+              specs[field.name.c_str()] = nb::cast(field.spec, nb::rv_policy::copy);
+            return specs;
+          },
+          "SensorSpec of each field; empty before the simulation exists.")
+      .def(
+          "arrays",
+          [](const SensorHandle& h) {
+            nb::dict arrays;
+            nb::object owner = owner_of(h.sensor);
+            for (Field& field : h.sensor->fields())
+              arrays[field.name.c_str()] = to_numpy(field.data.view(), owner);
+            return arrays;
+          },
+          "The rows [B, ...] of each field, without a copy.")
+      .def("python_object", [](const SensorHandle& h) -> nb::object {
+        auto* sensor = dynamic_cast<PythonSensor*>(h.sensor.get());
+        return sensor ? sensor->self() : nb::none();
+      });
+
+  nb::class_<Scene>(m, "Scene", "The C++ scene.")
+      .def_static("make", &make_scene, nb::arg("config"), nb::arg("spec"), nb::arg("sensors"),
+                  nb::arg("edit"))
+      .def("to_xml", &Scene::to_xml)
+      .def("assets",
+           [](const Scene& s) {
+             nb::dict assets;
+             for (const auto& [name, bytes] : s.assets())
+               assets[name.c_str()] = nb::bytes(bytes.data(), bytes.size());
+             return assets;
+           })
+      .def("warnings", &Scene::warnings)
+      .def(
+          "copy_model",
+          [](const Scene& s) {
+            return reinterpret_cast<std::uintptr_t>(mj_copyModel(nullptr, s.model()));
+          },
+          "Address of a copy of the mjModel, which the caller owns.")
+      .def("sensors",
+           [](std::shared_ptr<Scene> s) {
+             nb::list handles;
+             for (const auto& sensor : s->sensors())
+               handles.append(SensorHandle{std::shared_ptr<Sensor>(s, sensor.get())});
+             return handles;
+           })
+      .def("entities",
+           [](const Scene& s) {
+             nb::dict all;
+             for (const Entity& entity : s.entities())
+               all[entity.name.c_str()] = entity_names(entity);
+             return all;
+           })
+      .def("env_tiles", &env_tiles, nb::arg("num_worlds"))
+      .def("tile_origins", &tile_origins)
+      .def("env_origins", &env_origins, nb::arg("num_worlds"));
+}
+
+}  // namespace mjsense::python

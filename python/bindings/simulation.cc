@@ -1,0 +1,219 @@
+// Simulations in Python. python/mjsense/simulation.py makes the public class of it.
+
+#include "mjsense/sim/simulation.h"
+
+#include <nanobind/nanobind.h>
+#include <nanobind/stl/optional.h>
+#include <nanobind/stl/shared_ptr.h>
+#include <nanobind/stl/string.h>
+#include <nanobind/stl/string_view.h>
+#include <nanobind/stl/vector.h>
+
+#include <algorithm>
+
+#include "python/bindings/bindings.h"
+#include "python/bindings/derived_field.h"
+#include "python/bindings/numpy.h"
+#include "python/bindings/py_simulation.h"
+#include "python/bindings/sensor_handle.h"
+
+namespace mjsense::python {
+namespace {
+
+using Ids = std::optional<std::vector<int>>;
+
+// None is every world; an empty list is no world, which the C++ side would take for every.
+bool nothing(const Ids& ids) { return ids && ids->empty(); }
+std::vector<int> list_of(const Ids& ids) { return ids ? *ids : std::vector<int>{}; }
+
+void step(PySimulation& self, int control_steps) {
+  self.change("step", [&](Simulation& sim) { sim.step(control_steps); });
+  self.flush_resets();
+}
+
+void reset(PySimulation& self, const Ids& ids, int key, std::optional<std::uint64_t> seed) {
+  self.change("reset", [&](Simulation& sim) {
+    const std::vector<int> checked = sim.worlds().checked_ids(list_of(ids));
+    if (seed) sim.seed(*seed);
+    if (!nothing(ids)) sim.reset(checked, key);
+  });
+  self.flush_resets();
+}
+
+void reset_sensors(PySimulation& self, const Ids& ids) {
+  self.change("reset_sensors", [&](Simulation& sim) {
+    if (!nothing(ids)) sim.reset_sensors(sim.worlds().checked_ids(list_of(ids)));
+  });
+  self.flush_resets();
+}
+
+void forward(PySimulation& self, const Ids& ids) {
+  self.change("forward", [&](Simulation& sim) {
+    if (!nothing(ids)) sim.forward(sim.worlds().checked_ids(list_of(ids)));
+  });
+  self.flush_resets();
+}
+
+// Rows [B, bytes] of a field of the model: Python knows its type and shape from MuJoCo's own
+// bindings.
+nb::object model_field(PySimulation& self, const std::string& name) {
+  Simulation& sim = self.open();
+  int size = 0, element = 0;
+  void* data = mjb_expand(sim.worlds().batch(), name.c_str(), &size, &element);
+  if (!data) throw ValueError("mjModel field '" + name + "' cannot have a value per world");
+  const std::int64_t bytes = static_cast<std::int64_t>(size) * element;
+  return to_numpy(ArrayView::dense(data, DType::kUint8, {sim.num_worlds(), bytes}), self.owner());
+}
+
+std::string_view kind_name(mjtGeom kind) {
+  return kind == mjGEOM_SPHERE ? "sphere" : kind == mjGEOM_LINE ? "line" : "arrow";
+}
+
+// (kinds, positions [n, 3], vectors [n, 3], widths [n], rgba [n, 4], labels), float64 but for rgba.
+nb::tuple draw(PySimulation& self, int world, nb::list handles) {
+  std::vector<Sensor*> sensors;
+  for (nb::handle h : handles) sensors.push_back(nb::cast<SensorHandle&>(h).sensor.get());
+  DebugShapes shapes(0);
+  self.read([&](Simulation& sim) { shapes = sim.draw(world, sensors); });
+  const auto n = static_cast<std::int64_t>(shapes.list().size());
+  const auto array = [](DType dtype, Shape shape) { return std::make_shared<Array>(dtype, shape); };
+  const auto positions = array(DType::kFloat64, {n, 3}), vectors = array(DType::kFloat64, {n, 3}),
+             widths = array(DType::kFloat64, {n}), rgba = array(DType::kFloat32, {n, 4});
+  nb::list kinds, labels;
+  for (std::int64_t i = 0; i < n; ++i) {
+    const DebugShape& shape = shapes.list()[i];
+    kinds.append(kind_name(shape.kind));
+    labels.append(shape.label);
+    write_vec(shape.pos, positions->all<double>().data() + 3 * i);
+    write_vec(shape.vector, vectors->all<double>().data() + 3 * i);
+    widths->all<double>()[i] = shape.width;
+    std::ranges::copy(shape.rgba, rgba->all<float>().data() + 4 * i);
+  }
+  const auto numpy = [](const std::shared_ptr<Array>& a) {
+    return to_numpy(a->view(), owner_of(a));
+  };
+  return nb::make_tuple(kinds, numpy(positions), numpy(vectors), numpy(widths), numpy(rgba),
+                        labels);
+}
+
+}  // namespace
+
+void bind_simulation(nb::module_& m) {
+  nb::class_<PySimulation>(m, "Simulation", "The C++ simulation.")
+      .def(nb::init<std::shared_ptr<Scene>, int, int, int, std::uint64_t>(), nb::arg("scene"),
+           nb::arg("num_worlds"), nb::arg("decimation"), nb::arg("threads"), nb::arg("seed"))
+      .def("scene", [](const PySimulation& s) { return s.open().scene_ptr(); })
+      .def("close", &PySimulation::close)
+      .def_prop_ro("closed", &PySimulation::closed)
+      .def_prop_ro("num_worlds", [](const PySimulation& s) { return s.open().num_worlds(); })
+      .def_prop_ro("decimation", [](const PySimulation& s) { return s.open().decimation(); })
+      .def_prop_ro("threads", [](const PySimulation& s) { return s.open().worlds().threads(); })
+      .def_prop_ro("step_dt", [](const PySimulation& s) { return s.open().step_dt(); })
+      .def_prop_ro("physics_dt",
+                   [](const PySimulation& s) { return s.open().model()->opt.timestep; })
+      .def_prop_ro("meansize",
+                   [](const PySimulation& s) { return s.open().model()->stat.meansize; })
+      .def_prop_ro("seed", [](const PySimulation& s) { return s.open().worlds().seed(); })
+      .def("step", &step, nb::arg("control_steps") = 1)
+      .def("reset", &reset, nb::arg("world_ids") = nb::none(), nb::arg("key") = -1,
+           nb::arg("seed") = nb::none())
+      .def("reset_sensors", &reset_sensors, nb::arg("world_ids") = nb::none())
+      .def("forward", &forward, nb::arg("world_ids") = nb::none())
+      .def(
+          "step_raw",
+          [](PySimulation& s, int n) {
+            s.change("step_raw", [&](Simulation& sim) { sim.step_raw(n); });
+          },
+          nb::arg("substeps"))
+      .def(
+          "update_sensors",
+          [](PySimulation& s, double dt) {
+            s.change("update", [dt](Simulation& sim) { sim.update_sensors(dt); });
+          },
+          nb::arg("dt") = 0.0)
+      .def(
+          "refresh",
+          [](PySimulation& s, const SensorHandle& h) {
+            s.read([&](Simulation& sim) { sim.refresh(*h.sensor); });
+          },
+          nb::arg("sensor"))
+      .def(
+          "refresh_all",
+          [](PySimulation& s, nb::list handles) {
+            std::vector<Sensor*> sensors;
+            for (nb::handle h : handles) sensors.push_back(nb::cast<SensorHandle&>(h).sensor.get());
+            s.read([&](Simulation& sim) { sim.refresh(sensors); });
+          },
+          nb::arg("sensors"))
+      .def("draw", &draw, nb::arg("world"), nb::arg("sensors"))
+      .def(
+          "invalidate",
+          [](PySimulation& s, const Ids& ids) {
+            s.change("invalidate", [&](Simulation& sim) {
+              if (!nothing(ids)) sim.invalidate(sim.worlds().checked_ids(list_of(ids)));
+            });
+          },
+          nb::arg("world_ids") = nb::none())
+      .def(
+          "add_sensor",
+          [](PySimulation& s, nb::object object) {
+            auto sensor =
+                std::make_shared<PythonSensor>(nb::cast<std::string>(object.attr("uuid")),
+                                               WeakObject(object), read_python_spec(object));
+            s.change("add", [&](Simulation& sim) { sim.add(sensor); });
+            s.add_python(sensor);
+            return SensorHandle{sensor};
+          },
+          nb::arg("sensor"), "Adds a mjsense.Sensor that is not part of the scene.")
+      .def(
+          "own_sensor",
+          [](PySimulation& s, const SensorHandle& h) {
+            if (auto sensor = std::dynamic_pointer_cast<PythonSensor>(h.sensor))
+              s.add_python(sensor);
+          },
+          nb::arg("sensor"), "Tells a Python sensor of the scene about resets from now on.")
+      .def(
+          "component",
+          [](PySimulation& s, const std::string& name) {
+            return to_numpy(s.open().worlds().state_component(name), s.owner());
+          },
+          nb::arg("name"))
+      .def("state", [](PySimulation& s) { return to_numpy(s.open().worlds().state(), s.owner()); })
+      .def("model_field", &model_field, nb::arg("name"))
+      .def(
+          "derived_field",
+          [](PySimulation& s, const std::string& name) {
+            auto sensor = make_derived_field(name, s.open().model());
+            s.change("add", [&](Simulation& sim) { sim.add(sensor); });
+            return SensorHandle{sensor};
+          },
+          nb::arg("name"), "A field of mjData as a sensor.")
+      .def(
+          "model_changed",
+          [](PySimulation& s, const Ids& ids, bool set_const) {
+            s.change("randomize", [&](Simulation& sim) {
+              if (nothing(ids)) return;
+              const std::vector<int> checked = sim.worlds().checked_ids(list_of(ids));
+              if (set_const)
+                mjb_setConst(sim.worlds().batch(), checked.empty() ? nullptr : checked.data(),
+                             static_cast<int>(checked.size()));
+              sim.worlds().model_changed();
+            });
+          },
+          nb::arg("world_ids"), nb::arg("set_const"))
+      .def("times",
+           [](PySimulation& s) {
+             nb::list times;
+             for (int w = 0; w < s.open().num_worlds(); ++w)
+               times.append(s.open().worlds().time(w));
+             return times;
+           })
+      .def("failures", [](PySimulation& s) {
+        nb::list failures;
+        for (const Failure& f : s.open().failures())
+          failures.append(nb::make_tuple(f.world, f.message));
+        return failures;
+      });
+}
+
+}  // namespace mjsense::python

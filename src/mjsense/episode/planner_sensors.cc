@@ -1,0 +1,31 @@
+#include "mjsense/episode/policy.h"
+#include "mjsense/observe/function_sensor.h"
+#include "mjsense/observe/pose_sensor.h"
+
+namespace mjsense {
+
+std::vector<std::shared_ptr<Sensor>> PlannerPolicy::create_policy_sensors() const {
+  SensorSpec phase, retries;
+  phase.low = 0;
+  phase.description =
+      "Number of the planner's phase before it chooses the next action; obs_scene names them.";
+  retries.low = 0;
+  retries.description = "How often the planner has begun again in this episode.";
+  std::vector<std::shared_ptr<Sensor>> sensors;
+  sensors.push_back(std::make_shared<FunctionSensor<std::int64_t>>(
+      "policy_phase", phase,
+      [this](const World& world, std::span<std::int64_t> row) { row[0] = this->phase(world.id); }));
+  sensors.push_back(std::make_shared<FunctionSensor<std::int64_t>>(
+      "policy_num_retries", retries,
+      [this](const World& world, std::span<std::int64_t> row) { row[0] = num_retries(world.id); }));
+  if (has_grasp_pose()) {
+    sensors.push_back(std::make_shared<FunctionSensor<float>>(
+        "grasp_pose", pose_spec("world", "Pose at which the planner means to close the gripper."),
+        [this](const World& world, std::span<float> row) {
+          write_pose(grasp_pose(world.id), row.data());
+        }));
+  }
+  return sensors;
+}
+
+}  // namespace mjsense

@@ -1,0 +1,55 @@
+#pragma once
+// A policy: what to command next, world by world.
+
+#include <memory>
+#include <span>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "mjsense/core/pose.h"
+#include "mjsense/core/sensor.h"
+#include "mjsense/robots/action.h"
+
+namespace mjsense {
+
+class Task;
+
+struct Phase {
+  std::string_view name;
+  int number;
+};
+
+class Policy {
+ public:
+  virtual ~Policy() = default;
+  virtual std::string_view name() const = 0;
+
+  // Called once by Task::register_policy: allocates for the task's worlds.
+  virtual void initialize(Task& task) = 0;
+  // A new episode of a fresh world. Throws nothing for a task that it cannot solve: the first
+  // action gives up.
+  virtual void reset(const World& world) = 0;
+  // The action for the next control step. Touches this world's state alone: worlds act in parallel.
+  virtual void act(const World& world, Action& action) = 0;
+
+  // Every phase there is: obs_scene's policy_phases. Empty: it knows none.
+  virtual std::span<const Phase> phases() const { return {}; }
+  // Sensors that this policy adds to the suite. They refer to this policy.
+  virtual std::vector<std::shared_ptr<Sensor>> create_policy_sensors() const { return {}; }
+};
+
+// A policy that follows phases: its state is what policy_phase, policy_num_retries and grasp_pose
+// record.
+class PlannerPolicy : public Policy {
+ public:
+  virtual int phase(int world) const = 0;  // number of the present one
+  virtual int num_retries(int world) const = 0;
+  virtual Pose grasp_pose(
+      int world) const = 0;  // world frame, target of the tool; zeros before the first plan
+  virtual bool has_grasp_pose() const { return true; }
+
+  std::vector<std::shared_ptr<Sensor>> create_policy_sensors() const override;
+};
+
+}  // namespace mjsense

@@ -1,0 +1,164 @@
+#pragma once
+// A task: its scene, its episodes, and what counts as done. Life:
+//
+//   scene_cfg()              before compilation: robot, furniture, objects, lights
+//   initialize(model, B)     after compilation: resolves names; the robot exists from here on
+//   register_policy(policy)  once
+//   an episode of a world:   sample(w, episode, state), forward, begin(world), policy.reset(world),
+//                            observe
+//   a control step:          policy.act(world, action), apply(world, action, state), step, observe,
+//                            evaluate(world)
+//
+// State is per world; functions that take a world touch that world's alone and may run in parallel
+// with the others.
+
+#include <mujoco/mujoco.h>
+
+#include <cstdint>
+#include <memory>
+#include <optional>
+#include <span>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "mjsense/core/json.h"
+#include "mjsense/core/pose.h"
+#include "mjsense/core/sensor.h"
+#include "mjsense/robots/robot.h"
+#include "mjsense/scene/scene.h"
+
+namespace mjsense {
+
+class GraspScene;
+class Policy;
+
+struct TaskCfg {
+  RobotCfg robot;
+  std::uint64_t seed = 0;
+  int horizon = 500;      // control steps after which an episode is truncated
+  int policy_dt_ms = 66;  // one control step
+  int sim_dt_ms = 2;      // one physics step
+  bool action_noise = true;
+  bool terminate_upon_success = false;
+};
+
+// An object that plays a role in an episode: "pickup_obj" -> a body.
+struct TaskObject {
+  std::string role;
+  int body = -1;
+  std::string name;  // of the body, for people: "mug"
+};
+
+// One observation's judgement.
+struct Evaluation {
+  double reward = 0;
+  bool success = false;    // momentary, not latched
+  bool terminal = false;   // done action received, or success with terminate_upon_success
+  bool truncated = false;  // the horizon is reached
+};
+
+// Text with a weight, as obs_scene's referral_expressions have it.
+struct Referral {
+  std::string text;
+  double probability = 1;
+};
+
+class Task {
+ public:
+  explicit Task(TaskCfg cfg);  // throws ValueError for bad timing
+  virtual ~Task() = default;
+  Task(const Task&) = delete;
+  Task& operator=(const Task&) = delete;
+
+  const TaskCfg& cfg() const { return cfg_; }
+  virtual std::string_view name() const = 0;  // registry name
+  virtual std::string_view type() const = 0;  // task_type of obs_scene: "pick"
+  // Physics steps per control step.
+  int decimation() const { return cfg_.policy_dt_ms / cfg_.sim_dt_ms; }
+  double fps() const { return 1000.0 / cfg_.policy_dt_ms; }
+
+  virtual SceneCfg scene_cfg() const = 0;  // the caller appends sensors
+  void initialize(const mjModel* model, int num_worlds);
+  const mjModel* model() const { return model_; }
+  int num_worlds() const { return num_worlds_; }
+  Robot& robot() { return *robot_; }
+  const Robot& robot() const { return *robot_; }
+
+  // Throws ValueError "Policy already registered" on a second call. The policy must outlive the
+  // task.
+  void register_policy(Policy& policy);
+  Policy* policy() const { return policy_; }
+
+  // --- one episode of one world
+  // Writes the start state of episode number `episode`: a function of (cfg.seed, episode) alone,
+  // whatever the world.
+  void sample(int world, std::int64_t episode, const StateRow& state);
+  // After forward(): what the episode is measured against (start poses), the controllers' targets.
+  // Resets the step count.
+  virtual void begin(const World& world);
+  // Counts the step, remembers the action, sets targets and writes ctrl (noise keyed by seed,
+  // episode, step).
+  void apply(const World& world, const Action& action, const StateRow& state);
+  virtual Evaluation evaluate(const World& world) const = 0;
+
+  std::int64_t episode(int world) const { return episodes_[world].number; }
+  int episode_step(int world) const { return episodes_[world].step; }
+  bool done_received(int world) const { return episodes_[world].done; }
+  // As the policy gave it, before clipping and noise; null before the first.
+  const Action* last_action(int world) const {
+    return episodes_[world].step > 0 ? &episodes_[world].action : nullptr;
+  }
+
+  // --- what observations and recordings say about it
+  // The main one first. Roles are the same in every episode, and known after initialize(); bodies
+  // may change.
+  virtual std::span<const TaskObject> objects(int world) const = 0;
+  virtual std::string description(int world) const = 0;  // "Pick up the mug"
+  using Referrals = std::vector<std::pair<std::string, std::vector<Referral>>>;  // by role
+  virtual Referrals referrals(int world) const = 0;
+  // Pose of the object with this role: at the first observation, and where the task wants it.
+  // Throws KeyError.
+  virtual Pose start_pose(int world, std::string_view role) const = 0;
+  virtual std::optional<Pose> goal_pose(int world, std::string_view role) const = 0;
+  // Members of task_info, keys sorted; the caller opens and closes the object.
+  virtual void write_info(const World& world, JsonWriter& json) const = 0;
+  // obs_scene: JSON text with task_type, task_description, policy_dt_ms, referral_expressions,
+  // policy_phases, the task's own keys.
+  std::string obs_scene(int world) const;
+
+  // For planners of grasps; null where nothing is to be grasped.
+  virtual const GraspScene* grasp_scene() const { return nullptr; }
+
+  // Sensors beyond the core that this task records (obj_start, grasp_state_*, obj_end). They refer
+  // to this task.
+  virtual std::vector<std::shared_ptr<Sensor>> create_task_sensors() const = 0;
+
+ protected:
+  virtual void initialize_task() = 0;  // model() and robot() are there
+  // Writes everything except the robot's joints; returns where the robot's base stands.
+  virtual Pose sample_scene(int world, Rng& rng, const StateRow& state) = 0;
+  // Further members of obs_scene with text values, in this order.
+  virtual std::vector<std::pair<std::string, std::string>> scene_info(int world) const {
+    (void)world;
+    return {};
+  }
+  // terminal and truncated of an observation with this success.
+  Evaluation judge(int world, double reward, bool success) const;
+
+ private:
+  struct Episode {
+    std::int64_t number = 0;
+    int step = 0;
+    bool done = false;
+    Action action;
+  };
+  TaskCfg cfg_;
+  const mjModel* model_ = nullptr;
+  int num_worlds_ = 0;
+  std::unique_ptr<Robot> robot_;
+  Policy* policy_ = nullptr;
+  std::vector<Episode> episodes_;
+};
+
+}  // namespace mjsense

@@ -1,0 +1,19 @@
+#include "mjsense/core/cpu.h"
+#include "mjsense/render/view/view.h"
+
+namespace mjsense {
+
+RenderTiles best_render_tiles() {
+  switch (cpu_isa()) {
+#if defined(__x86_64__)
+    case Isa::kAvx512:
+      return render_tiles_avx512;
+    case Isa::kAvx2:
+      return render_tiles_avx2;
+#endif
+    default:
+      return render_tiles_portable;
+  }
+}
+
+}  // namespace mjsense

@@ -1,0 +1,205 @@
+#pragma once
+// The layer of fixed geoms of a tile, and who casts shadows on what the tile shows. Part of the tile
+// kernels.
+
+#include "mjsense/render/kernels/shade.h"
+#include "mjsense/render/kernels/visible.h"
+
+namespace mjsense {
+namespace {
+
+inline std::uint32_t hit_lanes(const Hits& hits) {
+  std::uint32_t lanes = 0;
+  for (int k = 0; k < kLanes; k += kWidth)
+    lanes |= bits(less(int_of(-1), load(hits.geom + k))) << k;
+  return lanes;
+}
+
+// Lanes of a packet that still show what the layer does.
+inline std::uint32_t fixed_lanes(const FixedTile& fixed, int packet, const Hits& hits) {
+  std::uint32_t lanes = 0;
+  for (int k = 0; k < kLanes; k += kWidth) {
+    const Int id = load(hits.id + k), kept = load(fixed.id + packet * kLanes + k);
+    lanes |= bits(~(less(id, kept) | less(kept, id)) & less(int_of(-1), id)) << k;
+  }
+  return lanes;
+}
+
+// Box around what the tile shows, but for what its layer does if there is one; low > high: nothing.
+inline void tile_bounds(const View& view, const FixedTile* fixed, const Tile& tile, int packets,
+                        float* low, float* high) {
+  Float least[3], most[3];
+  for (int c = 0; c < 3; ++c) {
+    least[c] = splat(kInfinity);
+    most[c] = splat(-kInfinity);
+  }
+  for (int q = 0; q < packets; ++q) {
+    const Hits& hits = tile.hits[q];
+    std::uint32_t lanes = hit_lanes(hits);
+    if (fixed) lanes &= ~fixed_lanes(*fixed, q, hits);
+    if (!lanes) continue;
+    for (int k = 0; k < kLanes; k += kWidth) {
+      const Mask m = mask_of(lanes >> k & kAllLanes);
+      const Vec3f at = hit_point(view, tile.pixels[q], hits, k);
+      const Float p[3] = {at.x, at.y, at.z};
+      for (int c = 0; c < 3; ++c) {
+        least[c] = min(least[c], select(m, p[c], splat(kInfinity)));
+        most[c] = max(most[c], select(m, p[c], splat(-kInfinity)));
+      }
+    }
+  }
+  for (int c = 0; c < 3; ++c) {
+    low[c] = lane_min(least[c]);
+    high[c] = lane_max(most[c]);
+  }
+}
+
+// Casters among `part` of every light for points in the box; the lists begin at `used` in the scratch.
+inline void find_casters(const View& view, Part part, const float* low, const float* high,
+                         TileScratch& scratch, int& used, Casters* out) {
+  for (int i = 0; i < view.num_lights; ++i) {
+    const Spheres& s = scratch.spheres;
+    out[i] = {scratch.casters + used, {s.x + used, s.y + used, s.z + used, s.radius + used}, 0, -1};
+    if (!view.lights[i].shadows || low[0] > high[0]) continue;
+    find_casters(view, view.lights[i], part, low, high, out[i]);
+    used += out[i].count;
+  }
+}
+
+// `fixed`: the tile's layer, which knows what fixed geoms shade of each other; null: not layered.
+inline void find_all_casters(const View& view, const FixedTile* fixed, const Tile& tile,
+                             int packets, TileScratch& scratch, Shadows& out) {
+  float low[3], high[3];
+  int used = 0;
+  out.known = fixed;
+  for (int i = 0; i < view.num_lights; ++i) out.fixed[i].count = 0;
+  if (fixed) {
+    tile_bounds(view, fixed, tile, packets, low, high);
+    find_casters(view, Part::kFixed, low, high, scratch, used, out.fixed);
+  }
+  tile_bounds(view, nullptr, tile, packets, low, high);
+  find_casters(view, fixed ? Part::kMoving : Part::kAll, low, high, scratch, used, out.moving);
+}
+
+inline void keep_hits(const Hits& hits, int packet, FixedTile& out) {
+  for (int k = 0; k < kLanes; k += kWidth) {
+    const int at = packet * kLanes + k;
+    store(out.t + at, load(hits.t + k));
+    store(out.id + at, load(hits.id + k));
+    store(out.prim + at, load(hits.prim + k));
+    store(out.u + at, load(hits.u + k));
+    store(out.v + at, load(hits.v + k));
+    for (int c = 0; c < 3; ++c) store(out.n[c] + at, load(hits.n[c] + k));
+  }
+}
+
+// Draws the fixed geoms among `count` in scratch.opaque into the tile, and keeps what is known then;
+// colours only if they are wanted.
+inline void make_fixed(const View& view, int count, int packets, bool colors, Tile& tile,
+                       TileScratch& scratch, FixedTile& out) {
+  trace_tile(view, Part::kFixed, scratch.opaque, count, tile);
+  float low[3], high[3];
+  tile_bounds(view, nullptr, tile, packets, low, high);
+  Shadows shadows;
+  int used = 0;
+  find_casters(view, Part::kFixed, low, high, scratch, used, shadows.fixed);
+  for (int i = 0; i < view.num_lights; ++i) shadows.moving[i].count = 0;
+  for (int q = 0; q < packets; ++q) {
+    const Hits& hits = tile.hits[q];
+    keep_hits(hits, q, out);
+    const std::uint32_t lanes = hit_lanes(hits);
+    if (!lanes) continue;
+    Surfaces surfaces;
+    gather_surfaces(view, tile.pixels[q], hits, lanes, colors, surfaces);
+    for (int i = 0; i < view.num_lights; ++i) {
+      if (!view.lights[i].shadows) continue;
+      const Lit lit(view.lights[i], surfaces, false);
+      const std::uint32_t dark = dark_lanes(view, i, lit, surfaces, hits, lanes, shadows);
+      out.dark[i][q] = static_cast<std::uint16_t>(dark & lanes);
+    }
+    if (!colors) continue;
+    Shadows known = shadows;
+    known.known = &out;
+    known.fixed_lanes = lanes;
+    known.packet = q;
+    Colors shaded;
+    shade(view, surfaces, hits, lanes, &known, shaded);
+    for (int c = 0; c < 3; ++c)
+      for (int k = 0; k < kLanes; k += kWidth)
+        store(out.rgb[c] + q * kLanes + k, load(shaded.rgb[c] + k));
+  }
+}
+
+// Settles what is dark of a packet that shows nothing but fixed geoms. True: anything that moves casts a
+// shadow on it.
+inline bool settle(const View& view, const Pixels& pixels, const Hits& hits, std::uint32_t lanes,
+                   Shadows& shadows) {
+  Surfaces s;
+  for (int k = 0; k < kLanes; k += kWidth) {
+    const Vec3f p = hit_point(view, pixels, hits, k);
+    store(s.p[0] + k, p.x);
+    store(s.p[1] + k, p.y);
+    store(s.p[2] + k, p.z);
+    for (auto& n : s.n) store(n + k, splat(0.0f));  // for shadows of a geom on itself
+  }
+  bool darker = false;
+  for (int i = 0; i < view.num_lights; ++i) {
+    const ViewLight& light = view.lights[i];
+    const std::uint32_t known = shadows.known->dark[i][shadows.packet];
+    shadows.settled_dark[i] = known;
+    if (!light.shadows || shadows.moving[i].count == 0) continue;
+    Lit lit;
+    for (int k = 0; k < kLanes; k += kWidth) {
+      LightTerm& term = lit.terms[k / kWidth];
+      term.scale = term.diffuse = splat(1.0f);  // lanes turned away are known to be dark
+      term.to_light =
+          light.kind == LightKind::kDirectional
+              ? Vec3f{splat(-light.dir[0]), splat(-light.dir[1]), splat(-light.dir[2])}
+              : splat(light.pos) - Vec3f{load(s.p[0] + k), load(s.p[1] + k), load(s.p[2] + k)};
+    }
+    shadows.settled_dark[i] = dark_lanes(view, i, lit, s, hits, lanes, shadows) & lanes;
+    darker |= shadows.settled_dark[i] != known;
+  }
+  shadows.settled = true;
+  return darker;
+}
+
+// The colours of packet `packet`, if they are what is kept; false: they are not.
+inline bool load_colors(const View& view, const FixedTile& kept, const Pixels& pixels,
+                        const Hits& hits, std::uint32_t lanes, Shadows& shadows, Colors& out) {
+  if (lanes != shadows.fixed_lanes || settle(view, pixels, hits, lanes, shadows)) return false;
+  for (int c = 0; c < 3; ++c)
+    for (int k = 0; k < kLanes; k += kWidth)
+      store(out.rgb[c] + k, load(kept.rgb[c] + shadows.packet * kLanes + k));
+  return true;
+}
+
+// The tile as make_fixed() leaves it, from what is kept.
+inline void load_fixed(const View& view, const FixedTile& from, int packets, Tile& tile) {
+  PacketMask shown = 0;
+  for (int q = 0; q < packets; ++q) {
+    Hits& hits = tile.hits[q];
+    for (int k = 0; k < kLanes; k += kWidth) {
+      const int at = q * kLanes + k;
+      store(hits.t + k, load(from.t + at));
+      store(hits.id + k, load(from.id + at));
+      store(hits.prim + k, load(from.prim + at));
+      store(hits.u + k, load(from.u + at));
+      store(hits.v + k, load(from.v + at));
+      for (int c = 0; c < 3; ++c) store(hits.n[c] + k, load(from.n[c] + at));
+    }
+    int last = -1, index = -1;
+    for (int i = 0; i < kLanes; ++i) {
+      if (hits.id[i] != last) {  // most packets see few
+        last = hits.id[i];
+        index = last < 0 ? -1 : view.index_of_id[last];
+      }
+      hits.geom[i] = index;
+    }
+    if (hit_lanes(hits)) shown |= 1u << q;
+  }
+  if (shown) update_farthest(tile, shown);
+}
+
+}  // namespace
+}  // namespace mjsense

@@ -1,0 +1,241 @@
+#pragma once
+// Triangles drawn into a tile, where it has more pixels than the shape has triangles: each is set up
+// once for the tile instead of being met by every packet of rays. Part of the tile kernels.
+//
+// With corners c0 c1 c2 in the camera's frame, the ray d = (x, y, -1) of a pixel passes inside the edge
+// from c1 to c2 where d . (c2 - c1) x (c2 + c1) >= 0 (Pluecker's test): a linear function of x and y,
+// exactly opposite for the neighbour across the edge, so that nothing shows between them. 1 / t is
+// linear too: d . N / (c0 . N) with N = (c1 - c0) x (c2 - c0).
+
+#include "mjsense/render/kernels/trace.h"
+
+namespace mjsense {
+namespace {
+
+// A block of triangles as functions of x and y: f(x, y) = f[0] x + f[1] y - f[2].
+struct alignas(64) Drawn {
+  float edges[3][3][kClusterSize];
+  float inverse_t[3][kClusterSize];
+  float window[4][kClusterSize];
+  float nearest[kClusterSize], farthest[kClusterSize];  // planar depth of the corners
+};
+
+inline Vec3f cross(Vec3f a, Vec3f b) {
+  return {fma(a.y, b.z, -(a.z * b.y)), fma(a.z, b.x, -(a.x * b.z)), fma(a.x, b.y, -(a.y * b.x))};
+}
+
+inline void store(float (*p)[kClusterSize], int k, Vec3f v) {
+  store(p[0] + k, v.x);
+  store(p[1] + k, v.y);
+  store(p[2] + k, v.z);
+}
+
+// Lanes where the interval [low, high] contains a pixel's centre first + i * step.
+inline Mask holds_center(Float low, Float high, float first, float step) {
+  constexpr float kSlack = 1e-3f;  // pixels
+  const Float inverse = splat(1.0f / step);
+  const Float a = (low - splat(first)) * inverse, b = (high - splat(first)) * inverse;
+  return -floor(-(min(a, b) - splat(kSlack))) <= floor(max(a, b) + splat(kSlack));
+}
+
+// The triangles that may show in the tile: they face the camera and lie over a pixel's centre.
+inline std::uint32_t set_up(const View& view, const ViewGeom& g, const TriangleBlock& block,
+                            const Tile& tile, Drawn& out) {
+  const PixelGrid& grid = view.grid;
+  std::uint32_t drawn = 0;
+  for (int k = 0; k < kClusterSize; k += kWidth) {
+    Vec3f c[3];
+    for (int i = 0; i < 3; ++i) {
+      const Vec3f v{load(block.corners[i][0] + k), load(block.corners[i][1] + k),
+                    load(block.corners[i][2] + k)};
+      c[i] = splat(g.pos) + from_geom(g.rot, v);
+    }
+    const Vec3f n = cross(c[1] - c[0], c[2] - c[0]);
+    const Float volume = dot(n, c[0]);
+    Mask shown = volume < splat(-1e-30f);
+    if (!any(shown)) continue;
+    const Float nearest = -max(c[0].z, max(c[1].z, c[2].z));
+    const Float farthest = -min(c[0].z, min(c[1].z, c[2].z));
+    const Mask ahead = splat(kTiny) < nearest;
+    Float low[2], high[2];
+    for (int axis = 0; axis < 2; ++axis) {
+      Float x[3];
+      for (int i = 0; i < 3; ++i) x[i] = (axis == 0 ? c[i].x : c[i].y) / -c[i].z;
+      const Float a = min(x[0], min(x[1], x[2])), b = max(x[0], max(x[1], x[2]));
+      const Float slack = splat(1e-6f) * (splat(1.0f) + max(abs(a), abs(b)));
+      low[axis] = select(ahead, a - slack, splat(-kInfinity));
+      high[axis] = select(ahead, b + slack, splat(kInfinity));
+    }
+    shown = shown & (low[0] <= splat(tile.around[1])) & (splat(tile.around[0]) <= high[0]) &
+            (low[1] <= splat(tile.around[3])) & (splat(tile.around[2]) <= high[1]) &
+            (splat(0.0f) < farthest);
+    if (!grid.bent) {
+      const Mask over = holds_center(low[0], high[0], tile.around[0], grid.dx) &
+                        holds_center(low[1], high[1], tile.around[3], grid.dy);
+      shown = shown & (over | ~ahead);
+    }
+    const std::uint32_t lanes = bits(shown);
+    if (!lanes) continue;
+    drawn |= lanes << k;
+    for (int i = 0; i < 3; ++i) {
+      const Vec3f a = c[(i + 1) % 3], b = c[(i + 2) % 3];
+      store(out.edges[i], k, cross(b - a, b + a));
+    }
+    const Float inverse = splat(1.0f) / volume;
+    store(out.inverse_t, k, {n.x * inverse, n.y * inverse, n.z * inverse});
+    for (int axis = 0; axis < 2; ++axis) {
+      store(out.window[2 * axis] + k, low[axis]);
+      store(out.window[2 * axis + 1] + k, high[axis]);
+    }
+    store(out.nearest + k, nearest);
+    store(out.farthest + k, farthest);
+  }
+  return drawn;
+}
+
+inline Float linear(const float (*f)[kClusterSize], int lane, Float x, Float y) {
+  return fma(splat(f[0][lane]), x, fma(splat(f[1][lane]), y, splat(-f[2][lane])));
+}
+
+// Lanes of a packet that see triangle `lane` of the block as the nearest so far, written to its hits.
+inline bool draw(const ViewGeom& g, int index, const Drawn& drawn, int lane, int face, bool shaded,
+                 const Pixels& pixels, Hits& h) {
+  bool changed = false;
+  for (int k = 0; k < kLanes; k += kWidth) {
+    const Float x = load(pixels.x + k), y = load(pixels.y + k), zero = splat(0.0f);
+    const Float e0 = linear(drawn.edges[0], lane, x, y), e1 = linear(drawn.edges[1], lane, x, y),
+                e2 = linear(drawn.edges[2], lane, x, y);
+    const Mask inside = (zero <= e0) & (zero <= e1) & (zero <= e2);
+    if (!any(inside)) continue;
+    // Seen almost edge-on, t may leave the triangle by rounding.
+    const Float t =
+        min(max(splat(1.0f) / linear(drawn.inverse_t, lane, x, y), splat(drawn.nearest[lane])),
+            splat(drawn.farthest[lane]));
+    const Int id_before = load(h.id + k);
+    const Float before = load(h.t + k);
+    const Mask hit =
+        inside & shows(t, int_of(g.id), before, id_before) & (load(pixels.near + k) < t);
+    if (!any(hit)) continue;
+    changed = true;
+    store(h.id + k, select(hit, int_of(g.id), id_before));
+    store(h.t + k, select(hit, t, before));
+    store(h.geom + k, select(hit, int_of(index), load(h.geom + k)));
+    if (!shaded) continue;
+    const Float inverse = splat(1.0f) / max(e0 + e1 + e2, splat(1e-30f));
+    store(h.prim + k, select(hit, int_of(face), load(h.prim + k)));
+    store(h.u + k, select(hit, e1 * inverse, load(h.u + k)));
+    store(h.v + k, select(hit, e2 * inverse, load(h.v + k)));
+    if (g.mesh) continue;  // it has normals of its own
+    const Vec3f n =
+        to_geom(g.rot, {splat(-drawn.inverse_t[0][lane]), splat(-drawn.inverse_t[1][lane]),
+                        splat(-drawn.inverse_t[2][lane])});
+    store(h.n[0] + k, select(hit, n.x, load(h.n[0] + k)));
+    store(h.n[1] + k, select(hit, n.y, load(h.n[1] + k)));
+    store(h.n[2] + k, select(hit, n.z, load(h.n[2] + k)));
+  }
+  return changed;
+}
+
+// Half-spaces in the geom's frame, a . q + b >= 0, whose intersection holds all that the tile sees.
+struct TileFrustum {
+  static constexpr int kPlanes = 5;
+  float a[kPlanes][3], size[kPlanes][3], b[kPlanes];
+  const float* eye;
+
+  TileFrustum(const ViewGeom& g, const Tile& tile) : eye(g.eye) {
+    const float* w = tile.around;
+    const float normals[kPlanes][3] = {
+        {1, 0, w[0]}, {-1, 0, -w[1]}, {0, 1, w[2]}, {0, -1, -w[3]}, {0, 0, 1}};
+    for (int p = 0; p < kPlanes; ++p) {
+      const float* n = normals[p];
+      b[p] = n[0] * g.pos[0] + n[1] * g.pos[1] + n[2] * g.pos[2];
+      for (int i = 0; i < 3; ++i) {
+        a[p][i] = n[0] * g.rot[i] + n[1] * g.rot[3 + i] + n[2] * g.rot[6 + i];
+        size[p][i] = a[p][i] < 0 ? -a[p][i] : a[p][i];
+      }
+      const float reach = g.pos[0] * g.pos[0] + g.pos[1] * g.pos[1] + g.pos[2] * g.pos[2];
+      b[p] += 1e-6f * (g.radius + __builtin_sqrtf(reach));  // rounding
+    }
+    b[4] += tile.depth;  // nothing behind what is seen already
+  }
+
+  std::uint32_t children(const ClusterNode& node) const {
+    std::uint32_t seen = 0;
+    for (int k = 0; k < kClusterSize; k += kWidth) {
+      const Vec3f c{load(node.center[0] + k), load(node.center[1] + k), load(node.center[2] + k)};
+      const Vec3f h{load(node.half[0] + k), load(node.half[1] + k), load(node.half[2] + k)};
+      Float least = splat(kInfinity);
+      for (int p = 0; p < kPlanes; ++p)
+        least = min(least, dot(splat(a[p]), c) + fma(splat(size[p][0]), h.x, splat(b[p])) +
+                               fma(splat(size[p][1]), h.y, splat(size[p][2]) * h.z));
+      const Vec3f d = c - splat(eye);
+      const Vec3f axis{load(node.axis[0] + k), load(node.axis[1] + k), load(node.axis[2] + k)};
+      const Float away = fma(load(node.spread + k), sqrt(dot(d, d)), sqrt(dot(h, h)));
+      seen |= bits((splat(0.0f) <= least) & (dot(axis, d) <= away)) << k;
+    }
+    return seen & ((1u << node.count) - 1);
+  }
+};
+
+constexpr int kMaxBlocks = 640;  // more in one tile are never worth drawing
+
+// The blocks of triangles that the tile may see; -1: more than `most`.
+inline int find_blocks(const Clusters& clusters, const TileFrustum& frustum, int most,
+                       int* blocks) {
+  int waiting[Clusters::kMaxWaiting];
+  int left = 1, found = 0;
+  waiting[0] = 0;
+  while (left) {
+    const ClusterNode& node = clusters.nodes[waiting[--left]];
+    for (std::uint32_t seen = frustum.children(node); seen; seen &= seen - 1) {
+      const int child = node.child[__builtin_ctz(seen)];
+      if (child >= 0) {
+        waiting[left++] = child;
+      } else if (found < most) {
+        blocks[found++] = ~child;
+      } else {
+        return -1;
+      }
+    }
+  }
+  return found;
+}
+
+inline void prefetch(const TriangleBlock& block) {
+  const char* p = reinterpret_cast<const char*>(&block);
+  for (std::size_t line = 0; line < sizeof block; line += 64) __builtin_prefetch(p + line);
+}
+
+// Draws geom `index` into `packets` of the tile, if that is cheaper than rays; false: it is not.
+inline bool rasterize(const View& view, int index, PacketMask packets, Tile& tile,
+                      PacketMask& changed) {
+  const ViewGeom& g = view.geoms[index];
+  const Clusters& clusters = *g.clusters;
+  // A packet of rays costs about as much as kBlocksPerPacket blocks.
+  constexpr int kBlocksPerPacket = 40;
+  const int most = kBlocksPerPacket * __builtin_popcount(packets);
+  int blocks[kMaxBlocks];
+  const int count = find_blocks(clusters, TileFrustum(g, tile), most, blocks);
+  if (count < 0) return false;
+  Drawn drawn;
+  for (int i = 0; i < count; ++i) {
+    const TriangleBlock& block = clusters.blocks[blocks[i]];
+    if (i + 1 < count) prefetch(clusters.blocks[blocks[i + 1]]);
+    for (std::uint32_t lanes = set_up(view, g, block, tile, drawn); lanes; lanes &= lanes - 1) {
+      const int lane = __builtin_ctz(lanes);
+      const float window[4] = {drawn.window[0][lane], drawn.window[1][lane], drawn.window[2][lane],
+                               drawn.window[3][lane]};
+      PacketMask over = packets & packets_in_reach(window, drawn.nearest[lane], tile);
+      for (; over; over &= over - 1) {
+        const int q = __builtin_ctz(over);
+        if (draw(g, index, drawn, lane, block.face[lane], tile.shaded, tile.pixels[q],
+                 tile.hits[q]))
+          changed |= 1u << q;
+      }
+    }
+  }
+  return true;
+}
+
+}  // namespace
+}  // namespace mjsense

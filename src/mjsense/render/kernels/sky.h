@@ -1,0 +1,72 @@
+#pragma once
+// What lies behind the opaque surfaces of a packet: the sky, and the haze before it. Part of the tile
+// kernels.
+
+#include "mjsense/render/kernels/shade.h"
+
+namespace mjsense {
+namespace {
+
+inline void shade_background(const View& view, const Pixels& pixels, std::uint32_t lanes,
+                             Colors& out) {
+  const bool ortho = view.grid.orthographic;
+  const float* r = view.r_wc;
+  const float step = view.grid.dx < 0 ? -view.grid.dx : view.grid.dx;
+  for (int k = 0; k < kLanes; k += kWidth) {
+    const Mask m = mask_of(lanes >> k & kAllLanes);
+    if (!any(m)) continue;
+    const Float zero = splat(0.0f);
+    const Vec3f d{ortho ? zero : load(pixels.x + k), ortho ? zero : load(pixels.y + k),
+                  splat(-1.0f)};
+    const Vec3f w = from_geom(r, d);
+    // MuJoCo turns the sky a quarter around x.
+    Rgb color{zero, zero, zero};
+    if (view.skybox)
+      color = sample_cube(*view.skybox, m, {w.x, w.z, -w.y},
+                          splat(0.5f * step * view.skybox->width[0]));
+    const Float scale = splat(1.0f / 255);
+    store(out.rgb[0] + k, select(m, color.r * scale, load(out.rgb[0] + k)));
+    store(out.rgb[1] + k, select(m, color.g * scale, load(out.rgb[1] + k)));
+    store(out.rgb[2] + k, select(m, color.b * scale, load(out.rgb[2] + k)));
+  }
+}
+
+// MuJoCo's sky hangs on a cylinder around the camera, and on what it hides haze lies: the inside of a
+// cone that rises from the plane at 1 - width of the cylinder's radius to its rim at the height of
+// the camera. Densest where the plane meets the cylinder, it fades towards both borders.
+inline void add_haze(const View& view, const Pixels& pixels, const Hits& hits, Colors& out) {
+  const View::Haze& haze = view.haze;
+  const Float zero = splat(0.0f), one = splat(1.0f), distance = splat(view.sky_distance);
+  for (int k = 0; k < kLanes; k += kWidth) {
+    Float t = load(hits.t + k);
+    if (!any(splat(view.sky_from) < t)) continue;
+    const Vec3f d{load(pixels.x + k), load(pixels.y + k), splat(-1.0f)};
+    const Vec3f w = from_geom(view.r_wc, d);
+    const Float reach = max(sqrt(fma(w.x, w.x, w.y * w.y)), abs(w.z));
+    const Mask hidden = less(int_of(-1), load(hits.geom + k)) & (distance < t * reach);
+    if (any(hidden)) {
+      shade_background(view, pixels, bits(hidden) << k, out);
+      t = select(hidden, splat(kInfinity), t);
+    }
+    if (haze.height <= 0) continue;
+    const Float rise = dot(d, splat(haze.up));
+    const Float level = sqrt(max(dot(d, d) - rise * rise, splat(kTiny)));
+    const Float slope = splat(-view.sky_distance / haze.height) * rise / level;
+    const Float radius = one / fma(splat(haze.width), slope, one);
+    const Float height = one - slope * radius;
+    const Mask inside = (zero < slope) & (zero < height) & (radius * distance < t * level);
+    if (!any(inside)) continue;
+    const float densest = haze.width / (1 + haze.width);
+    const Float alpha = select(
+        inside,
+        min(height * splat(1 / (densest + 1e-6f)), (one - height) * splat(1 / (1 - densest))),
+        zero);
+    for (int c = 0; c < 3; ++c) {
+      const Float under = load(out.rgb[c] + k);
+      store(out.rgb[c] + k, fma(alpha, splat(haze.rgb[c]) - under, under));
+    }
+  }
+}
+
+}  // namespace
+}  // namespace mjsense

@@ -1,0 +1,222 @@
+#pragma once
+// The surfaces that the pixels of a packet show: points, normals, materials, textures. Part of the tile
+// kernels.
+
+#include "mjsense/render/kernels/texture.h"
+
+namespace mjsense {
+namespace {
+
+// A packet's surface points, camera frame.
+struct alignas(64) Surfaces {
+  float p[3][kLanes], n[3][kLanes];
+  float rgb[3][kLanes], alpha[kLanes];
+  float texture[3][kLanes];  // 0..1
+  float specular[kLanes], exponent[kLanes], emission[kLanes];
+};
+
+// Unit normal in the geom's frame of a primitive at p.
+inline Vec3f primitive_normal(const ViewGeom& g, Vec3f p) {
+  const Float zero = splat(0.0f), one = splat(1.0f);
+  switch (g.type) {
+    case mjGEOM_SPHERE:
+      return {p.x, p.y, p.z};
+    case mjGEOM_ELLIPSOID:
+      return {p.x * splat(1 / (g.size[0] * g.size[0])), p.y * splat(1 / (g.size[1] * g.size[1])),
+              p.z * splat(1 / (g.size[2] * g.size[2]))};
+    case mjGEOM_CAPSULE: {
+      const Float h = splat(g.size[1]);
+      return {p.x, p.y, p.z - min(max(p.z, -h), h)};
+    }
+    case mjGEOM_CYLINDER: {
+      const Float ring = sqrt(fma(p.x, p.x, p.y * p.y)) * splat(1 / g.size[0]);
+      const Mask end = abs(p.z) * splat(1 / g.size[1]) > ring;
+      return {select(end, zero, p.x), select(end, zero, p.y),
+              select(end, select(p.z < zero, -one, one), zero)};
+    }
+    case mjGEOM_BOX: {
+      const Float x = p.x * splat(1 / g.size[0]), y = p.y * splat(1 / g.size[1]),
+                  z = p.z * splat(1 / g.size[2]);
+      const Float ax = abs(x), ay = abs(y), az = abs(z);
+      const Mask is_x = (ax >= ay) & (ax >= az), not_z = is_x | (ay >= az);
+      return {select(is_x, x, zero), select(is_x, zero, select(not_z, y, zero)),
+              select(not_z, zero, z)};
+    }
+    default:
+      return {zero, zero, one};
+  }
+}
+
+// How far the hit point moves from one pixel to the next, across and down, on its tangent plane:
+// geom frame, m.
+struct Steps {
+  Vec3f x, y;
+};
+
+inline Steps pixel_steps(const View& view, const ViewGeom& g, const Pixels& pixels,
+                         const Hits& hits, int k, Vec3f n) {
+  const bool ortho = view.grid.orthographic;
+  const Float zero = splat(0.0f), one = splat(1.0f);
+  const Vec3f d{ortho ? zero : load(pixels.x + k), ortho ? zero : load(pixels.y + k), splat(-1.0f)};
+  const Float inverse = one / min(dot(n, d), splat(-1e-4f));
+  const Float scale = ortho ? one : load(hits.t + k);
+  const auto step = [&](Float along_n, Float ex, Float ey, float size) {
+    const Float slope = along_n * inverse, s = scale * splat(size);
+    return to_geom(g.rot, {s * (ex - d.x * slope), s * (ey - d.y * slope), -(s * d.z * slope)});
+  };
+  return {step(n.x, one, zero, view.grid.dx), step(n.y, zero, one, view.grid.dy)};
+}
+
+// Texture coordinates that only scalar code knows: a mesh's own, and those of curved primitives.
+struct alignas(64) Mapped {
+  float u[kLanes], v[kLanes];
+  float rate_u[kLanes], rate_v[kLanes];  // per metre
+};
+
+inline void map_lanes(const ViewGeom& g, const Hits& hits, std::uint32_t lanes,
+                      const float (*local)[kLanes], const float (*normal)[kLanes], Mapped& out) {
+  for (int i = 0; i < kLanes; ++i) {
+    out.u[i] = out.v[i] = out.rate_u[i] = out.rate_v[i] = 0;
+    if (!(lanes >> i & 1u)) continue;
+    if (g.surface.mapped) {
+      const float* uv = g.mesh->uvs + 6 * hits.prim[i];
+      const float b1 = hits.u[i], b2 = hits.v[i], b0 = 1 - b1 - b2;
+      out.u[i] = b0 * uv[0] + b1 * uv[2] + b2 * uv[4];
+      out.v[i] = b0 * uv[1] + b1 * uv[3] + b2 * uv[5];
+      out.rate_u[i] = out.rate_v[i] = g.mesh->density[hits.prim[i]];
+    } else {
+      const float p[3] = {local[0][i], local[1][i], local[2][i]};
+      const float n[3] = {normal[0][i], normal[1][i], normal[2][i]};
+      curved_uv(g, p, n, out.u[i], out.v[i], out.rate_u[i], out.rate_v[i]);
+    }
+  }
+}
+
+// Texture colours of `lanes`, all of geom g.
+inline void texture_lanes(const View& view, const ViewGeom& g, const Pixels& pixels,
+                          const Hits& hits, std::uint32_t lanes, const float (*local)[kLanes],
+                          const float (*normal)[kLanes], Surfaces& out) {
+  const Surface& s = g.surface;
+  const Texture& texture = *s.texture;
+  const float width = texture.width[0], height = texture.height[0];
+  const bool plane = g.type == mjGEOM_PLANE;
+  const bool curved = g.type == mjGEOM_SPHERE || g.type == mjGEOM_ELLIPSOID ||
+                      g.type == mjGEOM_CAPSULE || g.type == mjGEOM_CYLINDER;
+  Mapped mapped;
+  if (!texture.cube && (curved || s.mapped)) map_lanes(g, hits, lanes, local, normal, mapped);
+  for (int k = 0; k < kLanes; k += kWidth) {
+    const Mask m = mask_of(lanes >> k & kAllLanes);
+    if (!any(m)) continue;
+    const Vec3f q{load(local[0] + k), load(local[1] + k), load(local[2] + k)};
+    const Vec3f n{load(out.n[0] + k), load(out.n[1] + k), load(out.n[2] + k)};
+    const Steps steps = pixel_steps(view, g, pixels, hits, k, n);
+    const Float length = sqrt(max(dot(steps.x, steps.x), dot(steps.y, steps.y)));
+    Rgb color;
+    if (texture.cube) {
+      const Vec3f d{q.x * s.stretch[0], q.y * s.stretch[1], q.z * s.stretch[2]};
+      const Float most = max(max(abs(d.x), max(abs(d.y), abs(d.z))), splat(kTiny));
+      const float stretch = s.stretch[0] > s.stretch[1] ? s.stretch[0] : s.stretch[1];
+      color = sample_cube(texture, m, d, length * splat(0.5f * width * stretch) / most);
+    } else {
+      Float u, v, footprint;
+      if (plane) {
+        const float sx = g.size[0] > 0 ? 0.5f / g.size[0] : 0.5f;
+        const float sy = g.size[1] > 0 ? 0.5f / g.size[1] : 0.5f;
+        u = fma(q.x, splat(sx), splat(g.size[0] > 0 ? 0.5f : 0.0f));
+        v = fma(q.y, splat(-sy), splat(g.size[1] > 0 ? 0.5f : 0.0f));
+        const Float ku = splat(sx * s.repeat[0] * width), kv = splat(sy * s.repeat[1] * height);
+        // The largest component, as Mesa takes it: sharper than the length of the vector.
+        const auto texels = [&](Vec3f w) { return max(abs(ku * w.x), abs(kv * w.y)); };
+        footprint = max(texels(steps.x), texels(steps.y));
+      } else {
+        const Coordinates at =
+            curved || s.mapped
+                ? Coordinates{load(mapped.u + k), load(mapped.v + k), load(mapped.rate_u + k),
+                              load(mapped.rate_v + k)}
+                : flat_uv(g, q, {load(normal[0] + k), load(normal[1] + k), load(normal[2] + k)});
+        u = at.u;
+        v = at.v;
+        footprint = length * max(at.rate_u * splat(s.repeat[0] * width),
+                                 at.rate_v * splat(s.repeat[1] * height));
+      }
+      color = sample(texture, m, int_of(0), fma(u, splat(s.repeat[0]), splat(s.shift[0])),
+                     fma(v, splat(s.repeat[1]), splat(s.shift[1])), footprint);
+    }
+    const Float scale = splat(1.0f / 255);
+    store(out.texture[0] + k, select(m, color.r * scale, load(out.texture[0] + k)));
+    store(out.texture[1] + k, select(m, color.g * scale, load(out.texture[1] + k)));
+    store(out.texture[2] + k, select(m, color.b * scale, load(out.texture[2] + k)));
+  }
+}
+
+// Normals of triangles: interpolated where the mesh has them, else the face's own.
+inline void triangle_normals(const ViewGeom& g, const Hits& hits, std::uint32_t lanes,
+                             float (*n)[kLanes]) {
+  for (int i = 0; i < kLanes; ++i) {
+    if (!(lanes >> i & 1u)) continue;
+    float local[3] = {hits.n[0][i], hits.n[1][i], hits.n[2][i]};
+    if (g.mesh && g.mesh->normals && hits.prim[i] >= 0) {
+      const float* c = g.mesh->normals + 9 * hits.prim[i];
+      const float b1 = hits.u[i], b2 = hits.v[i], b0 = 1 - b1 - b2;
+      for (int k = 0; k < 3; ++k) local[k] = b0 * c[k] + b1 * c[3 + k] + b2 * c[6 + k];
+    }
+    for (int k = 0; k < 3; ++k) n[k][i] = local[k];
+  }
+}
+
+// Points, normals (unit, camera frame) and materials of `lanes`. `color`: also what only rgb needs.
+inline void gather_surfaces(const View& view, const Pixels& pixels, const Hits& hits,
+                            std::uint32_t lanes, bool color, Surfaces& out) {
+  if (lanes != 0xffffu) __builtin_memset(&out, 0, sizeof out);  // other lanes hold numbers too
+  for (int k = 0; k < kLanes; k += kWidth) {
+    const Vec3f p = hit_point(view, pixels, hits, k);
+    store(out.p[0] + k, p.x);
+    store(out.p[1] + k, p.y);
+    store(out.p[2] + k, p.z);
+  }
+  std::uint32_t todo = lanes;
+  while (todo) {
+    const int geom = hits.geom[__builtin_ctz(todo)];
+    const ViewGeom& g = view.geoms[geom];
+    std::uint32_t mine = 0;
+    for (int i = 0; i < kLanes; ++i) mine |= static_cast<std::uint32_t>(hits.geom[i] == geom) << i;
+    mine &= todo;
+    todo &= ~mine;
+    alignas(64) float local[3][kLanes], normal[3][kLanes];
+    if (g.bvh) triangle_normals(g, hits, mine, normal);
+    for (int k = 0; k < kLanes; k += kWidth) {
+      const Mask m = mask_of(mine >> k & kAllLanes);
+      if (!any(m)) continue;
+      const Vec3f p{load(out.p[0] + k), load(out.p[1] + k), load(out.p[2] + k)};
+      const Vec3f q = to_geom(g.rot, p - splat(g.pos));
+      Vec3f n = g.bvh ? Vec3f{load(normal[0] + k), load(normal[1] + k), load(normal[2] + k)}
+                      : primitive_normal(g, q);
+      const Float inverse = splat(1.0f) / sqrt(max(dot(n, n), splat(1e-30f)));
+      n = {n.x * inverse, n.y * inverse, n.z * inverse};
+      store(local[0] + k, q.x);
+      store(local[1] + k, q.y);
+      store(local[2] + k, q.z);
+      store(normal[0] + k, n.x);
+      store(normal[1] + k, n.y);
+      store(normal[2] + k, n.z);
+      const Vec3f c = from_geom(g.rot, n);
+      store(out.n[0] + k, select(m, c.x, load(out.n[0] + k)));
+      store(out.n[1] + k, select(m, c.y, load(out.n[1] + k)));
+      store(out.n[2] + k, select(m, c.z, load(out.n[2] + k)));
+      if (!color) continue;
+      const Surface& s = g.surface;
+      for (int c3 = 0; c3 < 3; ++c3) {
+        store(out.rgb[c3] + k, select(m, splat(s.rgba[c3]), load(out.rgb[c3] + k)));
+        store(out.texture[c3] + k, select(m, splat(1.0f), load(out.texture[c3] + k)));
+      }
+      store(out.alpha + k, select(m, splat(s.rgba[3]), load(out.alpha + k)));
+      store(out.specular + k, select(m, splat(s.specular), load(out.specular + k)));
+      store(out.exponent + k, select(m, splat(s.exponent), load(out.exponent + k)));
+      store(out.emission + k, select(m, splat(s.emission), load(out.emission + k)));
+    }
+    if (color && g.surface.texture) texture_lanes(view, g, pixels, hits, mine, local, normal, out);
+  }
+}
+
+}  // namespace
+}  // namespace mjsense

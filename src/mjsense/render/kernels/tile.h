@@ -1,0 +1,200 @@
+#pragma once
+// A tile of 16 x 16 pixels: which geoms it can see, what each pixel sees, what colour that is. Part
+// of the tile kernels.
+
+#include "mjsense/render/kernels/fixed.h"
+#include "mjsense/render/kernels/layers.h"
+#include "mjsense/render/kernels/output.h"
+#include "mjsense/render/kernels/sky.h"
+
+namespace mjsense {
+namespace {
+
+inline void fill_pixels(const View& view, int x0, int y0, float shift_x, float shift_y,
+                        Pixels& out) {
+  const PixelGrid& grid = view.grid;
+  for (int k = 0; k < kLanes; k += kWidth) store(out.near + k, splat(view.near));
+  // Lanes outside the image repeat its border: they cost nothing extra and disturb nobody.
+  float xs[4], ys[4];
+  int columns[4], rows[4];
+  for (int i = 0; i < 4; ++i) {
+    columns[i] = x0 + i < grid.width ? x0 + i : grid.width - 1;
+    rows[i] = y0 + i < grid.height ? y0 + i : grid.height - 1;
+    xs[i] = grid.left + grid.dx * (static_cast<float>(columns[i]) + (0.5f + shift_x));
+    ys[i] = grid.top + grid.dy * (static_cast<float>(rows[i]) + (0.5f + shift_y));
+  }
+  float* w = out.window;
+  if (!grid.bent) {
+    for (int i = 0; i < kLanes; ++i) out.x[i] = xs[i % 4];
+    for (int i = 0; i < kLanes; ++i) out.y[i] = ys[i / 4];
+    w[0] = xs[0];
+    w[1] = xs[3];
+    w[2] = ys[3];
+    w[3] = ys[0];
+    return;
+  }
+  w[0] = w[2] = kInfinity;
+  w[1] = w[3] = -kInfinity;
+  for (int i = 0; i < kLanes; ++i) {
+    const float* ray = grid.bent + 2 * (rows[i / 4] * grid.width + columns[i % 4]);
+    const float px = out.x[i] = ray[0] + shift_x * grid.dx;
+    const float py = out.y[i] = ray[1] + shift_y * grid.dy;
+    w[0] = px < w[0] ? px : w[0];
+    w[1] = px > w[1] ? px : w[1];
+    w[2] = py < w[2] ? py : w[2];
+    w[3] = py > w[3] ? py : w[3];
+  }
+}
+
+struct TileLists {
+  int opaque = 0, transparent = 0;
+};
+
+// What a row of tiles may show. A lens with distortion bends rows: there it is everything in sight.
+inline void find_row(const View& view, int ty, TileScratch& scratch) {
+  const PixelGrid& grid = view.grid;
+  const float high = grid.top + grid.dy * static_cast<float>(ty * kTileSize);
+  const float low = high + grid.dy * kTileSize;
+  scratch.row_count = 0;
+  for (int i = 0; i < view.num_opaque + view.num_transparent; ++i) {
+    const float* w = view.geoms[i].window;
+    if (grid.bent || (w[2] <= high && w[3] >= low)) scratch.row[scratch.row_count++] = i;
+  }
+}
+
+inline TileLists find_geoms(const View& view, const float* window, TileScratch& scratch) {
+  TileLists lists;
+  for (int i = 0; i < scratch.row_count; ++i) {
+    const int g = scratch.row[i];
+    if (!overlap(view.geoms[g].window, window)) continue;
+    if (g < view.num_opaque) {
+      scratch.opaque[lists.opaque++] = g;
+    } else {
+      scratch.transparent[lists.transparent++] = g;
+    }
+  }
+  return lists;
+}
+
+// Offsets in a pixel, far from each other in both directions: Hammersley points.
+inline void sample_shift(int index, int samples, float& x, float& y) {
+  if (samples == 1) {
+    x = y = 0;
+    return;
+  }
+  std::uint32_t b = static_cast<std::uint32_t>(index);
+  float radical = 0, half = 0.5f;
+  for (; b; b >>= 1, half *= 0.5f) radical += (b & 1u) * half;
+  x = (static_cast<float>(index) + 0.5f) / samples - 0.5f;
+  y = radical + 0.5f / samples - 0.5f;
+}
+
+// The colours of packet `q` before transparent geoms: what it sees, the sky, reflections, haze.
+inline void shade_packet(const View& view, const FixedTile* fixed, int q, const Pixels& pixels,
+                         const Hits& hits, Shadows& shadows, Colors& colors) {
+  const std::uint32_t lanes = hit_lanes(hits);
+  shadows.packet = q;
+  shadows.settled = false;
+  if (fixed) shadows.fixed_lanes = fixed_lanes(*fixed, q, hits);
+  const bool kept =
+      lanes && view.fixed && load_colors(view, *fixed, pixels, hits, lanes, shadows, colors);
+  if (lanes && !kept) {
+    Surfaces surfaces;
+    gather_surfaces(view, pixels, hits, lanes, true, surfaces);
+    shade(view, surfaces, hits, lanes, view.shadows ? &shadows : nullptr, colors);
+  }
+  if (lanes != 0xffffu) shade_background(view, pixels, ~lanes & 0xffffu, colors);
+  if (view.reflection) add_reflection(view, pixels, hits, colors);
+  if (view.sky_distance > 0) add_haze(view, pixels, hits, colors);
+}
+
+inline void render_tile(const View& view, const ImageTargets& targets, int tx, int ty,
+                        TileScratch& scratch) {
+  Tile& tile = *static_cast<Tile*>(scratch.tile);
+  const PixelGrid& grid = view.grid;
+  const int x0 = tx * kTileSize, y0 = ty * kTileSize;
+  const int across = (grid.width - x0 + 3) / 4 < kPackets ? (grid.width - x0 + 3) / 4 : kPackets;
+  const int down = (grid.height - y0 + 3) / 4 < kPackets ? (grid.height - y0 + 3) / 4 : kPackets;
+  const int packets = across * down;
+  const bool geometry = targets.depth || targets.segmentation || targets.normals || targets.points;
+  const float far = view.far > 0 ? view.far : kInfinity;
+  tile.shaded = targets.rgb || targets.normals || targets.fixed;
+  const int samples = targets.rgb ? targets.samples : 1;
+  alignas(64) float sum[kTilePackets][3][kLanes];
+  for (int sample = 0; sample < samples || (sample == samples && samples > 1 && geometry);
+       ++sample) {
+    // The last round, if there is one, is for depth and segmentation: through pixel centres.
+    const bool centered = sample == samples || samples == 1;
+    float shift_x = 0, shift_y = 0;
+    if (!centered) sample_shift(sample, samples, shift_x, shift_y);
+    float* window = tile.around;
+    window[0] = window[2] = kInfinity;
+    window[1] = window[3] = -kInfinity;
+    for (int q = 0; q < packets; ++q) {
+      fill_pixels(view, x0 + 4 * (q % across), y0 + 4 * (q / across), shift_x, shift_y,
+                  tile.pixels[q]);
+      const float* w = tile.pixels[q].window;
+      for (int c = 0; c < 4; c += 2) {
+        window[c] = w[c] < window[c] ? w[c] : window[c];
+        window[c + 1] = w[c + 1] > window[c + 1] ? w[c + 1] : window[c + 1];
+      }
+      for (int c = 0; c < 4; ++c) tile.window[c][q] = w[c];
+      tile.farthest[q] = far;
+      clear(tile.hits[q], far);
+    }
+    for (int q = packets; q < kTilePackets; ++q) tile.farthest[q] = -kInfinity;
+    tile.depth = far;
+    const TileLists lists = find_geoms(view, window, scratch);
+    const FixedTile* fixed = nullptr;
+    if (view.layered && samples == 1) {
+      const int at = ty * ((grid.width + kTileSize - 1) / kTileSize) + tx;
+      FixedTile* made = targets.fixed ? targets.fixed + at : scratch.fixed;
+      if (view.fixed) {
+        load_fixed(view, view.fixed[at], packets, tile);
+      } else {
+        make_fixed(view, lists.opaque, packets, targets.fixed != nullptr, tile, scratch, *made);
+      }
+      if (targets.fixed) return;
+      fixed = view.fixed ? view.fixed + at : made;
+    }
+    trace_tile(view, fixed ? Part::kMoving : Part::kAll, scratch.opaque, lists.opaque, tile);
+    if (targets.rgb && sample < samples) {
+      Shadows shadows;
+      if (view.shadows) find_all_casters(view, fixed, tile, packets, scratch, shadows);
+      for (int q = 0; q < packets; ++q) {
+        Colors colors;
+        shade_packet(view, fixed, q, tile.pixels[q], tile.hits[q], shadows, colors);
+        if (lists.transparent)
+          shade_transparent(view, scratch.transparent, lists.transparent, tile.pixels[q],
+                            tile.hits[q], colors);
+        for (int c = 0; c < 3; ++c)
+          for (int k = 0; k < kLanes; k += kWidth) {
+            const Float color = load(colors.rgb[c] + k);
+            store(sum[q][c] + k, sample == 0 ? color : color + load(sum[q][c] + k));
+          }
+      }
+    }
+    if (geometry && centered) {
+      trace_transparent(view, scratch.transparent, lists.transparent, tile);
+      for (int q = 0; q < packets; ++q) {
+        write_geometry(view, targets, x0 + 4 * (q % across), y0 + 4 * (q / across), tile.pixels[q],
+                       tile.hits[q]);
+      }
+    }
+  }
+  if (!targets.rgb) return;
+  for (int q = 0; q < packets; ++q)
+    write_rgb(targets, grid, x0 + 4 * (q % across), y0 + 4 * (q / across), sum[q], 1.0f / samples);
+}
+
+inline void render_tiles(const View& view, const ImageTargets& targets, int first, int last,
+                         TileScratch& scratch) {
+  const int across = (view.grid.width + kTileSize - 1) / kTileSize;
+  for (int ty = first; ty < last; ++ty) {
+    find_row(view, ty, scratch);
+    for (int tx = 0; tx < across; ++tx) render_tile(view, targets, tx, ty, scratch);
+  }
+}
+
+}  // namespace
+}  // namespace mjsense

@@ -1,0 +1,10 @@
+#include "mjsense/render/kernels/tile.h"
+
+namespace mjsense {
+
+void render_tiles_avx2(const View& view, const ImageTargets& targets, int first, int last,
+                       TileScratch& scratch) {
+  render_tiles(view, targets, first, last, scratch);
+}
+
+}  // namespace mjsense

@@ -1,0 +1,12 @@
+#include "mjsense/render/kernels/tile.h"
+
+namespace mjsense {
+
+void render_tiles_portable(const View& view, const ImageTargets& targets, int first, int last,
+                           TileScratch& scratch) {
+  render_tiles(view, targets, first, last, scratch);
+}
+
+std::size_t tile_bytes() { return sizeof(Tile); }
+
+}  // namespace mjsense

@@ -1,0 +1,283 @@
+#pragma once
+// Which geom the pixels of packets see first. Part of the tile kernels.
+
+#include "mjsense/render/kernels/rays.h"
+
+namespace mjsense {
+namespace {
+
+inline bool overlap(const float* a, const float* b) {
+  return a[0] <= b[1] && b[0] <= a[1] && a[2] <= b[3] && b[2] <= a[3];
+}
+
+// Surfaces nearer to each other than this (times t) coincide: the geom with the higher id shows, as
+// MuJoCo draws it later. (Rays, like mj_ray, take the lower one.)
+constexpr float kSame = 3e-7f;
+
+// Lanes where a hit at t on geom `id` replaces what was there before.
+inline Mask shows(Float t, Int id, Float before, Int id_before) {
+  const Float slack = t * splat(kSame);
+  return (t < splat(kInfinity)) &
+         ((t < before - slack) | ((t <= before + slack) & less(id_before, id)));
+}
+
+// Bit q: packet q of a tile.
+using PacketMask = std::uint32_t;
+
+constexpr int kPackets = kTileSize / 4;  // along a side
+constexpr int kTilePackets = kPackets * kPackets;
+static_assert(kTilePackets == kLanes, "a vector has a lane for each packet");
+
+struct alignas(64) Tile {
+  Pixels pixels[kTilePackets];
+  Hits hits[kTilePackets];
+  // By packet: Pixels::window, and the largest t of its hits (minus infinity: no packet).
+  float window[4][kTilePackets];
+  float farthest[kTilePackets];
+  float around[4];  // all windows together
+  float depth;      // the largest of `farthest`
+  bool shaded;      // more than depth and ids is wanted
+};
+
+// The packets that may see something in `window`, at `nearest` or beyond, before what they have.
+inline PacketMask packets_in_reach(const float* window, float nearest, const Tile& tile) {
+  PacketMask packets = 0;
+  for (int k = 0; k < kTilePackets; k += kWidth) {
+    const Mask m = (load(tile.window[0] + k) <= splat(window[1])) &
+                   (splat(window[0]) <= load(tile.window[1] + k)) &
+                   (load(tile.window[2] + k) <= splat(window[3])) &
+                   (splat(window[2]) <= load(tile.window[3] + k)) &
+                   (splat(nearest) < load(tile.farthest + k));
+    packets |= bits(m) << k;
+  }
+  return packets;
+}
+
+// What stays the same from packet to packet while one geom is traced. Packets are independent of each
+// other, so that the CPU works on several at once.
+struct Tracing {
+  const ViewGeom& geom;
+  int index;  // of the geom in the view
+  bool orthographic;
+  Vec3f eye, right, up, ahead;  // of the camera, in the geom's frame
+
+  Tracing(const View& view, int i)
+      : geom(view.geoms[i]), index(i), orthographic(view.grid.orthographic), eye(splat(geom.eye)) {
+    const float* r = geom.rot;
+    right = {splat(r[0]), splat(r[1]), splat(r[2])};
+    up = {splat(r[3]), splat(r[4]), splat(r[5])};
+    ahead = {splat(-r[6]), splat(-r[7]), splat(-r[8])};
+  }
+  LocalRay ray(const Pixels& pixels, int k) const {
+    const Float x = load(pixels.x + k), y = load(pixels.y + k);
+    if (orthographic) return {along(along(eye, x, right), y, up), ahead};
+    return {eye, along(along(ahead, x, right), y, up)};
+  }
+};
+
+// Lanes whose ray meets the geom's bounding box before t, as Embree takes them; false if there are
+// none.
+inline bool fill_rays(const Tracing& at, const Pixels& pixels, const float* t, RTCRayHit16& rays,
+                      int* valid) {
+  const ViewGeom& g = at.geom;
+  std::uint32_t some = 0;
+  for (int k = 0; k < kLanes; k += kWidth) {
+    const LocalRay ray = at.ray(pixels, k);
+    const Interval inside = box(ray.o, ray.d, g.box, g.box + 3);
+    const Float near = load(pixels.near + k), limit = load(t + k) * splat(1.0f + kSame);
+    const Mask hit = (inside.enter < limit) & (inside.exit > near);
+    some |= bits(hit);
+    store(valid + k, select(hit, int_of(-1), int_of(0)));
+    store(rays.ray.org_x + k, ray.o.x);
+    store(rays.ray.org_y + k, ray.o.y);
+    store(rays.ray.org_z + k, ray.o.z);
+    store(rays.ray.dir_x + k, ray.d.x);
+    store(rays.ray.dir_y + k, ray.d.y);
+    store(rays.ray.dir_z + k, ray.d.z);
+    store(rays.ray.tnear + k, near);
+    store(rays.ray.tfar + k, limit);
+    store(reinterpret_cast<int*>(rays.hit.geomID) + k, int_of(-1));
+  }
+  return some != 0;
+}
+
+// A closed surface shows its front first. Only where a back came first is it worth to ask Embree
+// about every triangle's side.
+inline void look_behind_backs(const ViewGeom& g, const float* t, RTCRayHit16& rays, int* valid) {
+  std::uint32_t backs = 0;
+  for (int k = 0; k < kLanes; k += kWidth) {
+    const Vec3f n{load(rays.hit.Ng_x + k), load(rays.hit.Ng_y + k), load(rays.hit.Ng_z + k)};
+    const Vec3f d{load(rays.ray.dir_x + k), load(rays.ray.dir_y + k), load(rays.ray.dir_z + k)};
+    int* ids = reinterpret_cast<int*>(rays.hit.geomID) + k;
+    const Mask back = less(int_of(-1), load(ids)) & (dot(n, d) > splat(0.0f));
+    if (!any(back)) {
+      store(valid + k, int_of(0));
+      continue;
+    }
+    backs |= bits(back) << k;
+    store(valid + k, select(back, int_of(-1), int_of(0)));
+    store(ids, select(back, int_of(-1), load(ids)));
+    const Float limit = load(t + k) * splat(1.0f + kSame);
+    store(rays.ray.tfar + k, select(back, limit, load(rays.ray.tfar + k)));
+  }
+  if (backs) embree_intersect16(valid, static_cast<RTCScene>(g.bvh), &rays, true, true);
+}
+
+inline PacketMask trace_triangles(const Tracing& at, const Pixels* pixels, Hits* hits,
+                                  PacketMask packets) {
+  const ViewGeom& g = at.geom;
+  RTCRayHit16 rays;
+  alignas(64) int valid[kLanes];
+  for (int k = 0; k < kLanes; k += kWidth) {  // what Embree leaves as it is
+    store(rays.ray.time + k, splat(0.0f));
+    store(reinterpret_cast<int*>(rays.ray.mask) + k, int_of(-1));
+    store(reinterpret_cast<int*>(rays.ray.flags) + k, int_of(0));
+    store(reinterpret_cast<int*>(rays.hit.instID[0]) + k, int_of(-1));
+  }
+  PacketMask changed = 0;
+  for (; packets; packets &= packets - 1) {
+    const int q = __builtin_ctz(packets);
+    Hits& h = hits[q];
+    if (!fill_rays(at, pixels[q], h.t, rays, valid)) continue;
+    embree_intersect16(valid, static_cast<RTCScene>(g.bvh), &rays, false, true);
+    look_behind_backs(g, h.t, rays, valid);
+    for (int k = 0; k < kLanes; k += kWidth) {
+      const Float t = load(rays.ray.tfar + k);
+      const Float before = load(h.t + k);
+      const Int found = load(reinterpret_cast<int*>(rays.hit.geomID) + k);
+      const Mask hit = less(int_of(-1), found) & shows(t, int_of(g.id), before, load(h.id + k));
+      if (!any(hit)) continue;
+      changed |= 1u << q;
+      store(h.id + k, select(hit, int_of(g.id), load(h.id + k)));
+      store(h.t + k, select(hit, t, before));
+      store(h.geom + k, select(hit, int_of(at.index), load(h.geom + k)));
+      store(h.prim + k,
+            select(hit, load(reinterpret_cast<int*>(rays.hit.primID) + k), load(h.prim + k)));
+      store(h.u + k, select(hit, load(rays.hit.u + k), load(h.u + k)));
+      store(h.v + k, select(hit, load(rays.hit.v + k), load(h.v + k)));
+      store(h.n[0] + k, select(hit, load(rays.hit.Ng_x + k), load(h.n[0] + k)));
+      store(h.n[1] + k, select(hit, load(rays.hit.Ng_y + k), load(h.n[1] + k)));
+      store(h.n[2] + k, select(hit, load(rays.hit.Ng_z + k), load(h.n[2] + k)));
+    }
+  }
+  return changed;
+}
+
+// Side walls and base of a height field, from outside. Few rays meet them: one lane at a time.
+inline bool trace_walls_of_packet(const Tracing& at, const Pixels& pixels, Hits& hits) {
+  const ViewGeom& g = at.geom;
+  const HeightField& f = *g.height_field;
+  const float center[3] = {0, 0, 0.5f * (f.size[2] - f.size[3])};
+  const float half[3] = {f.size[0], f.size[1], 0.5f * (f.size[2] + f.size[3])};
+  bool changed = false;
+  for (int k = 0; k < kLanes; k += kWidth) {
+    const LocalRay ray = at.ray(pixels, k);
+    const Interval inside = box(ray.o, ray.d, center, half);
+    const Mask hit = (inside.enter < load(hits.t + k)) & (load(pixels.near + k) < inside.enter) &
+                     (inside.enter <= inside.exit);
+    const std::uint32_t lanes = bits(hit);
+    if (!lanes) continue;
+    alignas(64) float t[kWidth], p[3][kWidth];
+    const Vec3f point = along(ray.o, inside.enter, ray.d);
+    store(t, inside.enter);
+    store(p[0], point.x);
+    store(p[1], point.y);
+    store(p[2], point.z);
+    for (int i = 0; i < kWidth; ++i) {
+      if (!(lanes >> i & 1u)) continue;
+      const float x = p[0][i] / f.size[0], y = p[1][i] / f.size[1];
+      const float z = (p[2][i] - center[2]) / half[2];
+      const float ax = x < 0 ? -x : x, ay = y < 0 ? -y : y, az = z < 0 ? -z : z;
+      const bool vertical = az > ax && az > ay;
+      if (vertical && z > 0) continue;  // entered through the open top
+      const float column = 0.5f * (x + 1) * (f.cols - 1), row = 0.5f * (y + 1) * (f.rows - 1);
+      if (!vertical && p[2][i] > border_height(f, column, row)) continue;
+      changed = true;
+      hits.t[k + i] = t[i];
+      hits.id[k + i] = g.id;
+      hits.geom[k + i] = at.index;
+      hits.prim[k + i] = -1;
+      hits.n[0][k + i] = vertical ? 0.0f : ax >= ay ? x : 0.0f;
+      hits.n[1][k + i] = vertical || ax >= ay ? 0.0f : y;
+      hits.n[2][k + i] = vertical ? -1.0f : 0.0f;
+    }
+  }
+  return changed;
+}
+
+inline PacketMask trace_walls(const Tracing& at, const Pixels* pixels, Hits* hits,
+                              PacketMask packets) {
+  const ViewGeom& g = at.geom;
+  const float *size = g.height_field->size, *eye = g.eye;
+  const bool above = -size[0] < eye[0] && eye[0] < size[0] && -size[1] < eye[1] &&
+                     eye[1] < size[1] && -size[3] < eye[2];
+  if (above && !at.orthographic) return 0;  // all walls turn their backs
+  PacketMask changed = 0;
+  for (; packets; packets &= packets - 1) {
+    const int q = __builtin_ctz(packets);
+    changed |= static_cast<PacketMask>(trace_walls_of_packet(at, pixels[q], hits[q])) << q;
+  }
+  return changed;
+}
+
+// Where pixels enter a solid or meet a plane.
+template <typename Enter>
+PacketMask trace_surface(const Tracing& at, const Pixels* pixels, Hits* hits, PacketMask packets,
+                         Enter enter) {
+  const Int id = int_of(at.geom.id), index = int_of(at.index);
+  PacketMask changed = 0;
+  for (; packets; packets &= packets - 1) {
+    const int q = __builtin_ctz(packets);
+    Hits& h = hits[q];
+    for (int k = 0; k < kLanes; k += kWidth) {
+      const LocalRay ray = at.ray(pixels[q], k);
+      const Float t = enter(ray.o, ray.d), before = load(h.t + k);
+      const Int id_before = load(h.id + k);
+      const Mask hit = shows(t, id, before, id_before) & (load(pixels[q].near + k) < t);
+      changed |= static_cast<PacketMask>(any(hit)) << q;
+      store(h.id + k, select(hit, id, id_before));
+      store(h.t + k, select(hit, t, before));
+      store(h.geom + k, select(hit, index, load(h.geom + k)));
+    }
+  }
+  return changed;
+}
+
+// Nearer hits of `packets` on geom `index` replace those in `hits`: which did. Front faces only.
+inline PacketMask trace_geom(const View& view, int index, const Pixels* pixels, Hits* hits,
+                             PacketMask packets) {
+  static constexpr float kOrigin[3] = {0, 0, 0};
+  const Tracing at(view, index);
+  const ViewGeom& g = at.geom;
+  const auto surface = [&](auto enter) { return trace_surface(at, pixels, hits, packets, enter); };
+  switch (g.type) {
+    case mjGEOM_PLANE:
+      return surface([&](Vec3f o, Vec3f d) { return plane(g, o, d, g.behind); });
+    case mjGEOM_SPHERE:
+      return surface([&](Vec3f o, Vec3f d) { return sphere(o, d, g.size[0]).enter; });
+    case mjGEOM_CAPSULE:
+      return surface([&](Vec3f o, Vec3f d) { return capsule(o, d, g.size[0], g.size[1]).enter; });
+    case mjGEOM_ELLIPSOID:
+      return surface([&](Vec3f o, Vec3f d) { return ellipsoid(o, d, g.size).enter; });
+    case mjGEOM_CYLINDER:
+      return surface([&](Vec3f o, Vec3f d) { return cylinder(o, d, g.size[0], g.size[1]).enter; });
+    case mjGEOM_BOX:
+      return surface([&](Vec3f o, Vec3f d) { return box(o, d, kOrigin, g.size).enter; });
+    default:
+      break;
+  }
+  PacketMask changed = g.bvh ? trace_triangles(at, pixels, hits, packets) : 0;
+  if (g.height_field) changed |= trace_walls(at, pixels, hits, packets);
+  return changed;
+}
+
+inline void clear(Hits& hits, float far) {
+  for (int k = 0; k < kLanes; k += kWidth) {
+    store(hits.t + k, splat(far));
+    store(hits.id + k, int_of(-1));
+    store(hits.geom + k, int_of(-1));
+  }
+}
+
+}  // namespace
+}  // namespace mjsense

@@ -1,0 +1,60 @@
+#pragma once
+// What the pixels of a tile see first: by rays, or drawn where that is cheaper. Part of the tile
+// kernels.
+
+#include "mjsense/render/kernels/raster.h"
+#include "mjsense/render/kernels/trace.h"
+
+namespace mjsense {
+namespace {
+
+inline void update_farthest(Tile& tile, PacketMask packets) {
+  for (; packets; packets &= packets - 1) {
+    const int q = __builtin_ctz(packets);
+    Float far = load(tile.hits[q].t);
+    for (int k = kWidth; k < kLanes; k += kWidth) far = max(far, load(tile.hits[q].t + k));
+    tile.farthest[q] = lane_max(far);
+  }
+  Float depth = load(tile.farthest);
+  for (int k = kWidth; k < kTilePackets; k += kWidth) depth = max(depth, load(tile.farthest + k));
+  tile.depth = lane_max(depth);
+}
+
+// Nearer hits of `packets` on geom `index` replace those of the tile: which did.
+inline PacketMask draw_or_trace(const View& view, int index, PacketMask packets, Tile& tile) {
+  const ViewGeom& g = view.geoms[index];
+  PacketMask changed = 0;
+  if (g.clusters && !view.grid.orthographic && rasterize(view, index, packets, tile, changed)) {
+    if (g.height_field)
+      changed |= trace_walls(Tracing(view, index), tile.pixels, tile.hits, packets);
+    return changed;
+  }
+  return trace_geom(view, index, tile.pixels, tile.hits, packets);
+}
+
+// The nearest hits of all packets among those geoms of `list` that are `part`; it is sorted by
+// ViewGeom::nearest.
+inline void trace_tile(const View& view, Part part, const int* list, int count, Tile& tile) {
+  for (int i = 0; i < count; ++i) {
+    const ViewGeom& g = view.geoms[list[i]];
+    if (!belongs(g, part)) continue;
+    const PacketMask packets = packets_in_reach(g.window, g.nearest, tile);
+    if (!packets) continue;
+    const PacketMask changed = draw_or_trace(view, list[i], packets, tile);
+    if (changed) update_farthest(tile, changed);
+  }
+}
+
+// Adds transparent geoms to the hits: depth and segmentation see them too. A plane seen from behind
+// is not there.
+inline void trace_transparent(const View& view, const int* list, int count, Tile& tile) {
+  for (int i = 0; i < count; ++i) {
+    const ViewGeom& g = view.geoms[list[i]];
+    if (g.type == mjGEOM_PLANE && g.behind) continue;
+    const PacketMask packets = packets_in_reach(g.window, g.nearest, tile);
+    if (packets) draw_or_trace(view, list[i], packets, tile);
+  }
+}
+
+}  // namespace
+}  // namespace mjsense

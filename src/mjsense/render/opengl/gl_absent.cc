@@ -1,0 +1,17 @@
+// Stands in for render/opengl/ in builds without it.
+#include <fmt/format.h>
+
+#include "mjsense/core/error.h"
+#include "mjsense/render/opengl/gl_renderer.h"
+
+namespace mjsense {
+
+std::unique_ptr<GlRenderer> make_gl_renderer(const mjModel*, const GlRendererCfg&,
+                                             const std::string& place) {
+  throw RuntimeError(fmt::format(
+      "{}: renderer 'opengl' is not in this build: install libegl-dev and configure with "
+      "-DMJSENSE_OPENGL=ON, or use renderer 'rays'",
+      place));
+}
+
+}  // namespace mjsense

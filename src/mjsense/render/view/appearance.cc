@@ -1,0 +1,84 @@
+#include "mjsense/render/view/appearance.h"
+
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+
+namespace mjsense {
+namespace {
+
+// The visualiser's rule: a geom's own colour, unless it is the default grey and there is a
+// material.
+void resolve_rgba(const mjModel* m, int material, const float* own, float* out) {
+  const bool is_default = own[0] == 0.5f && own[1] == 0.5f && own[2] == 0.5f && own[3] == 1.0f;
+  std::copy_n(material >= 0 && is_default ? m->mat_rgba + 4 * material : own, 4, out);
+}
+
+}  // namespace
+
+Appearance::Appearance(const mjModel* m)
+    : flex_parts_(flex_parts(m)),
+      rgba_(4 * (m->ngeom + flex_parts_.size() + m->nskin)),
+      materials_(m->nmat),
+      lights_(View::kMaxLights),
+      light_ids_(View::kMaxLights) {
+  copy(m);
+}
+
+void Appearance::copy(const mjModel* m) {
+  for (int i = 0; i < m->ngeom; ++i)
+    resolve_rgba(m, m->geom_matid[i], m->geom_rgba + 4 * i, &rgba_[4 * i]);
+  float* next = rgba_.data() + 4 * m->ngeom;
+  for (const FlexPart& part : flex_parts_) {
+    resolve_rgba(m, m->flex_matid[part.element], m->flex_rgba + 4 * part.flex, next);
+    next += 4;
+  }
+  for (int i = 0; i < m->nskin; ++i, next += 4)
+    resolve_rgba(m, m->skin_matid[i], m->skin_rgba + 4 * i, next);
+  for (int i = 0; i < m->nmat; ++i)
+    materials_[i] = {.specular = m->mat_specular[i],
+                     .shininess = m->mat_shininess[i],
+                     .emission = m->mat_emission[i],
+                     .reflectance = m->mat_reflectance[i],
+                     .texture = m->mat_texid[mjNTEXROLE * i + mjTEXROLE_RGB],
+                     .repeat = {m->mat_texrepeat[2 * i], m->mat_texrepeat[2 * i + 1]},
+                     .uniform = m->mat_texuniform[i] != 0};
+  sky_.distance = static_cast<float>(0.7 * m->vis.map.zfar * m->stat.extent);
+  sky_.haze_width = m->vis.map.haze;
+  std::copy_n(m->vis.rgba.haze, 3, sky_.haze_rgb);
+  copy_lights(m);
+}
+
+void Appearance::copy_lights(const mjModel* m) {
+  num_lights_ = 0;
+  const auto add = [&](int id, const float* ambient, const float* diffuse,
+                       const float* specular) -> ViewLight& {
+    light_ids_[num_lights_] = id;
+    ViewLight& light = lights_[num_lights_++];
+    light = {};
+    std::copy_n(ambient, 3, light.ambient);
+    std::copy_n(diffuse, 3, light.diffuse);
+    std::copy_n(specular, 3, light.specular);
+    light.attenuation[0] = 1;
+    return light;
+  };
+  const auto& head = m->vis.headlight;
+  if (head.active) add(-1, head.ambient, head.diffuse, head.specular);
+  for (int i = 0; i < m->nlight && num_lights_ < View::kMaxLights; ++i) {
+    if (!m->light_active[i] || m->light_type[i] == mjLIGHT_IMAGE) continue;
+    ViewLight& light =
+        add(i, m->light_ambient + 3 * i, m->light_diffuse + 3 * i, m->light_specular + 3 * i);
+    light.shadows = m->light_castshadow[i];
+    light.kind = m->light_type[i] == mjLIGHT_DIRECTIONAL ? LightKind::kDirectional
+                 : m->light_type[i] == mjLIGHT_SPOT      ? LightKind::kSpot
+                                                         : LightKind::kPoint;
+    if (light.kind == LightKind::kDirectional) continue;
+    std::copy_n(m->light_attenuation + 3 * i, 3, light.attenuation);
+    light.exponent = m->light_exponent[i];
+    const double cutoff = m->light_cutoff[i];
+    light.cos_cutoff = static_cast<float>(std::cos(cutoff * std::numbers::pi / 180));
+    if (cutoff >= 180) light.kind = LightKind::kPoint;
+  }
+}
+
+}  // namespace mjsense

@@ -1,0 +1,77 @@
+#include "mjsense/render/view/fixed_layer.h"
+
+#include <cstring>
+#include <utility>
+
+#include "mjsense/render/view/view_builder.h"
+
+namespace mjsense {
+namespace {
+
+bool equal(const PixelGrid& a, const PixelGrid& b) {
+  return a.width == b.width && a.height == b.height && a.left == b.left && a.top == b.top &&
+         a.dx == b.dx && a.dy == b.dy && a.orthographic == b.orthographic && a.bent == b.bent;
+}
+
+// Byte by byte: what differs in padding alone is drawn anew, which is right too.
+template <typename T>
+bool equal_bytes(const T& a, const T& b) {
+  return std::memcmp(&a, &b, sizeof(T)) == 0;
+}
+
+}  // namespace
+
+bool is_fixed_body(const mjModel* m, int body) {
+  for (; body > 0; body = m->body_parentid[body]) {
+    if (m->body_jntnum[body] > 0) return false;
+    const bool parent = body + 1 < m->nbody && m->body_parentid[body + 1] == body;
+    if (m->body_mocapid[body] >= 0 && !parent) return false;
+  }
+  return true;
+}
+
+bool FixedLayer::possible(const mjModel* m, int camera) {
+  if (m->cam_mode[camera] != mjCAMLIGHT_FIXED || !is_fixed_body(m, m->cam_bodyid[camera]))
+    return false;
+  int lights = 0;
+  for (int i = 0; i < m->nlight; ++i) {
+    if (!m->light_castshadow[i]) continue;
+    ++lights;
+    if (m->light_mode[i] != mjCAMLIGHT_FIXED || !is_fixed_body(m, m->light_bodyid[i])) return false;
+  }
+  return lights > 0;
+}
+
+FixedLayer::FixedLayer(const mjModel* m, int width, int height)
+    : tiles_(static_cast<std::size_t>((width + kTileSize - 1) / kTileSize) *
+             ((height + kTileSize - 1) / kTileSize)) {
+  geoms_.reserve(ViewBuilder::max_geoms(m));
+  lights_.reserve(View::kMaxLights);
+}
+
+bool FixedLayer::settles(const View& view) {
+  if (same(view)) return !std::exchange(made_, true);
+  made_ = false;
+  grid_ = view.grid;
+  geoms_.clear();
+  for (int i = 0; i < view.num_geoms; ++i)
+    if (view.geoms[i].fixed) geoms_.push_back(view.geoms[i]);
+  lights_.assign(view.lights, view.lights + view.num_lights);
+  return false;
+}
+
+bool FixedLayer::same(const View& view) const {
+  if (!equal(grid_, view.grid) || static_cast<int>(lights_.size()) != view.num_lights) return false;
+  for (int i = 0; i < view.num_lights; ++i)
+    if (!equal_bytes(lights_[i], view.lights[i])) return false;
+  std::size_t next = 0;
+  for (int i = 0; i < view.num_geoms; ++i) {
+    const ViewGeom& g = view.geoms[i];
+    if (!g.fixed) continue;
+    if (next == geoms_.size() || !equal_bytes(geoms_[next], g)) return false;
+    ++next;
+  }
+  return next == geoms_.size();
+}
+
+}  // namespace mjsense

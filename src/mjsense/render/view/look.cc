@@ -1,0 +1,215 @@
+#include "mjsense/render/view/look.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+
+#include "mjsense/rays/flex_surface.h"
+
+namespace mjsense {
+namespace {
+
+// Vertex normals that turn away from their face by more than this cosine belong to a crease: MuJoCo
+// shades it flat.
+constexpr float kCrease = 0.8f;
+
+// By sRGB value.
+std::array<std::uint8_t, 256> linear_values() {
+  std::array<std::uint8_t, 256> table;
+  for (int i = 0; i < 256; ++i) {
+    const double v = i / 255.0;
+    const double linear = v <= 0.04045 ? v / 12.92 : std::pow((v + 0.055) / 1.055, 2.4);
+    table[i] = static_cast<std::uint8_t>(std::lround(255.0 * linear));
+  }
+  return table;
+}
+
+// (b - a) x (c - a), and its length.
+float cross(const float* a, const float* b, const float* c, float* out) {
+  const float e1[3] = {b[0] - a[0], b[1] - a[1], b[2] - a[2]};
+  const float e2[3] = {c[0] - a[0], c[1] - a[1], c[2] - a[2]};
+  for (int i = 0; i < 3; ++i)
+    out[i] = e1[(i + 1) % 3] * e2[(i + 2) % 3] - e1[(i + 2) % 3] * e2[(i + 1) % 3];
+  return std::sqrt(out[0] * out[0] + out[1] * out[1] + out[2] * out[2]);
+}
+
+// Which two texels of a row of `size` the texel i of the next level's row of `half` lies between.
+struct Between {
+  int first, second;
+  float weight;  // of the second
+};
+Between between(int i, int size, int half) {
+  const float x =
+      (static_cast<float>(i) + 0.5f) * static_cast<float>(size) / static_cast<float>(half) - 0.5f;
+  const int first = static_cast<int>(x);
+  return {first, std::min(first + 1, size - 1), x - static_cast<float>(first)};
+}
+
+// The next level of one image, interpolated at its texels' centres as OpenGL drivers do: the mean of
+// 2 x 2 where sizes are even; where they are odd nothing drifts and no border is lost.
+void halve(const std::uint32_t* src, int width, int height, std::uint32_t* dst, int w2, int h2) {
+  for (int y = 0; y < h2; ++y) {
+    const Between v = between(y, height, h2);
+    const std::uint32_t *above = src + v.first * width, *below = src + v.second * width;
+    for (int x = 0; x < w2; ++x) {
+      const Between u = between(x, width, w2);
+      std::uint32_t texel = 0;
+      for (int shift = 0; shift < 32; shift += 8) {
+        const auto mix = [&](const std::uint32_t* row) {
+          const auto channel = [&](int i) { return static_cast<float>(row[i] >> shift & 255u); };
+          return channel(u.first) + u.weight * (channel(u.second) - channel(u.first));
+        };
+        const float value = mix(above) + v.weight * (mix(below) - mix(above));
+        texel |= static_cast<std::uint32_t>(value + 0.5f) << shift;
+      }
+      dst[y * w2 + x] = texel;
+    }
+  }
+}
+
+}  // namespace
+
+Look::Look(const mjModel* model, bool meshes, bool textures) {
+  textures_.resize(model->ntex);
+  meshes_.resize(model->nmesh);
+  skins_.resize(model->nskin);
+  for (int i = 0; i < model->nflex; ++i) add_flex(model, i, textures);
+  for (int i = 0; i < model->nskin && textures; ++i) add_skin(model, i);
+  for (int i = 0; i < model->ntex && textures; ++i) add_texture(model, i);
+  for (int i = 0; i < model->ntex && !skybox_; ++i)
+    if (model->tex_type[i] == mjTEXTURE_SKYBOX && textures_[i].levels > 0) skybox_ = &textures_[i];
+  for (int i = 0; i < model->nmesh && meshes; ++i) add_mesh(model, i);
+}
+
+void Look::add_texture(const mjModel* model, int id) {
+  Texture& texture = textures_[id];
+  const int channels = model->tex_nchannel[id];
+  if (channels != 3 && channels != 4)
+    return;  // encoded for another renderer: drawn without a texture
+  texture.cube = model->tex_type[id] != mjTEXTURE_2D;
+  const int width = model->tex_width[id];
+  // A square "cube" has one image for all faces.
+  const bool repeated = texture.cube && model->tex_width[id] == model->tex_height[id];
+  const int height = texture.cube ? width : model->tex_height[id];
+  const int faces = texture.cube ? 6 : 1;
+  const bool srgb = model->tex_colorspace[id] == mjCOLORSPACE_SRGB && !texture.cube;
+  const mjtByte* data = model->tex_data + model->tex_adr[id];
+  const std::array<std::uint8_t, 256> linear = linear_values();
+
+  std::size_t total = 0, padded = 0;
+  for (int w = width, h = height, n = 0; n < Texture::kMaxLevels; ++n) {
+    total += static_cast<std::size_t>(faces) * w * h;
+    padded += static_cast<std::size_t>(faces) * (w + 1) * h;
+    ++texture.levels;
+    if (w == 1 && h == 1) break;
+    w = std::max(1, w / 2);
+    h = std::max(1, h / 2);
+  }
+  std::vector<std::uint32_t> texels(total);
+  for (int f = 0; f < faces; ++f) {
+    const mjtByte* image =
+        data + (repeated ? 0 : static_cast<std::size_t>(f) * width * height * channels);
+    std::uint32_t* out = texels.data() + static_cast<std::size_t>(f) * width * height;
+    for (int i = 0; i < width * height; ++i) {
+      std::uint32_t texel = 255u << 24;
+      for (int c = 0; c < 3; ++c) {
+        const mjtByte v = image[i * channels + c];
+        texel |= static_cast<std::uint32_t>(srgb ? linear[v] : v) << (8 * c);
+      }
+      if (channels == 4)
+        texel = (texel & 0xFFFFFFu) | static_cast<std::uint32_t>(image[i * 4 + 3]) << 24;
+      out[i] = texel;
+    }
+  }
+  std::vector<std::uint32_t>& rows = texels_.emplace_back(padded);
+  texture.texels = rows.data();
+  std::uint32_t* row = rows.data();
+  for (int n = 0, w = width, h = height, at = 0; n < texture.levels; ++n) {
+    texture.width[n] = static_cast<float>(w);
+    texture.height[n] = static_cast<float>(h);
+    texture.offset[n] = static_cast<int>(row - rows.data());
+    const int size = w * h, w2 = std::max(1, w / 2), h2 = std::max(1, h / 2);
+    std::uint32_t* image = texels.data() + at;
+    for (int y = 0; y < faces * h; ++y, row += w + 1) {
+      std::copy_n(image + y * w, w, row);
+      row[w] = row[texture.cube ? w - 1 : 0];
+    }
+    at += faces * size;
+    for (int f = 0; f < faces && n + 1 < texture.levels; ++f)
+      halve(image + f * size, w, h, texels.data() + at + f * w2 * h2, w2, h2);
+    w = w2;
+    h = h2;
+  }
+}
+
+void Look::add_mesh(const mjModel* model, int id) {
+  const int faces = model->mesh_facenum[id];
+  const int first = model->mesh_faceadr[id];
+  const float* vert = model->mesh_vert + 3 * model->mesh_vertadr[id];
+  const float* normal = model->mesh_normal + 3 * model->mesh_normaladr[id];
+  const bool has_uv = model->mesh_texcoordadr[id] >= 0;
+  std::vector<float>& normals = tables_.emplace_back(static_cast<std::size_t>(faces) * 9);
+  for (int f = 0; f < faces; ++f) {
+    const int* v = model->mesh_face + 3 * (first + f);
+    const int* n = model->mesh_facenormal + 3 * (first + f);
+    float flat[3];
+    const float length = cross(vert + 3 * v[0], vert + 3 * v[1], vert + 3 * v[2], flat);
+    for (float& x : flat) x = length > 0 ? x / length : 0;
+    for (int k = 0; k < 3; ++k) {
+      const float* smooth = normal + 3 * n[k];
+      const float cosine = smooth[0] * flat[0] + smooth[1] * flat[1] + smooth[2] * flat[2];
+      const float* use = !has_uv && cosine < kCrease ? flat : smooth;
+      std::copy(use, use + 3, normals.begin() + 9 * f + 3 * k);
+    }
+  }
+  meshes_[id].normals = normals.data();
+  if (!has_uv) return;
+  const float* texcoord = model->mesh_texcoord + 2 * model->mesh_texcoordadr[id];
+  add_coordinates(
+      meshes_[id], faces,
+      [&](int f, int k) { return vert + 3 * model->mesh_face[3 * (first + f) + k]; },
+      [&](int f, int k) { return texcoord + 2 * model->mesh_facetexcoord[3 * (first + f) + k]; });
+}
+
+void Look::add_flex(const mjModel* model, int id, bool textures) {
+  const FlexSurface s = flex_surface(model, id);
+  for (const FlexSurface::Part& part : s.parts) {
+    MeshLook& look = flex_parts_.emplace_back();
+    if (s.texcoords.empty() || !textures) continue;
+    const float* texcoord = model->flex_texcoord + 2 * model->flex_texcoordadr[id];
+    const auto corner = [&](int f, int k) { return 3 * (part.first + f) + k; };
+    add_coordinates(
+        look, part.count,
+        [&](int f, int k) { return &s.rest[3 * (s.faces[corner(f, k)] % s.num_vertices)]; },
+        [&](int f, int k) { return texcoord + 2 * s.texcoords[corner(f, k)]; });
+  }
+}
+
+void Look::add_skin(const mjModel* model, int id) {
+  if (model->skin_texcoordadr[id] < 0) return;
+  const float* vert = model->skin_vert + 3 * model->skin_vertadr[id];
+  const float* texcoord = model->skin_texcoord + 2 * model->skin_texcoordadr[id];
+  const int* face = model->skin_face + 3 * model->skin_faceadr[id];
+  add_coordinates(
+      skins_[id], model->skin_facenum[id], [&](int f, int k) { return vert + 3 * face[3 * f + k]; },
+      [&](int f, int k) { return texcoord + 2 * face[3 * f + k]; });
+}
+
+template <class Position, class Texcoord>
+void Look::add_coordinates(MeshLook& look, int faces, Position position, Texcoord texcoord) {
+  float* uvs = tables_.emplace_back(static_cast<std::size_t>(faces) * 6).data();
+  float* density = tables_.emplace_back(faces).data();
+  for (int f = 0; f < faces; ++f) {
+    float* uv = uvs + 6 * f;
+    for (int k = 0; k < 3; ++k) std::copy_n(texcoord(f, k), 2, uv + 2 * k);
+    float normal[3];
+    const float area = cross(position(f, 0), position(f, 1), position(f, 2), normal);
+    const float uv_area =
+        std::abs((uv[2] - uv[0]) * (uv[5] - uv[1]) - (uv[4] - uv[0]) * (uv[3] - uv[1]));
+    density[f] = area > 0 ? std::sqrt(uv_area / area) : 0;
+  }
+  look.uvs = uvs;
+  look.density = density;
+}
+
+}  // namespace mjsense

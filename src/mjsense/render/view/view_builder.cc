@@ -1,0 +1,334 @@
+#include "mjsense/render/view/view_builder.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "mjsense/rays/flex_shapes.h"
+#include "mjsense/rays/ray_world.h"
+#include "mjsense/rays/shared_geometry.h"
+#include "mjsense/rays/skin_shapes.h"
+#include "mjsense/render/view/fixed_layer.h"
+#include "mjsense/render/view/view_window.h"
+
+namespace mjsense {
+namespace {
+
+constexpr float kOpaque = 0.995f;    // MuJoCo blends what has less
+constexpr float kFromBehind = 0.3f;  // MuJoCo's factor for the alpha of planes seen from below
+
+// out = R^T v.
+void rotate_back(const double r[9], const double v[3], double out[3]) {
+  for (int i = 0; i < 3; ++i) out[i] = r[i] * v[0] + r[3 + i] * v[1] + r[6 + i] * v[2];
+}
+
+}  // namespace
+
+ViewBuilder::ViewBuilder(const mjModel* model, const Look& look, const ViewOptions& options)
+    : look_(&look),
+      options_(options),
+      unsorted_(max_geoms(model)),
+      sorted_(max_geoms(model)),
+      spheres_(4 * (max_geoms(model) + kSpherePadding)),
+      soft_looks_(look.num_flex_parts() + model->nskin) {
+  order_.reserve(max_geoms(model));
+  if (options.layered) {
+    view_.layered = true;
+    index_of_id_.resize(max_geoms(model));
+    for (int i = 0; i < model->ngeom; ++i)
+      fixed_.push_back(is_fixed_body(model, model->geom_bodyid[i]));
+  }
+  view_.near = options.near;
+  view_.far = options.far;
+  view_.shadows = options.shadows;
+  view_.skybox = options.textures ? look.skybox() : nullptr;
+  if (options.reflections && model->nmat > 0) {  // any world may make a material reflect
+    ViewOptions flat = options;
+    flat.reflections = flat.shadows = flat.layered = false;
+    mirrored_ = std::make_unique<ViewBuilder>(model, look, flat);
+  }
+}
+
+const View& ViewBuilder::build(const RayWorld& world, const SharedGeometry& shapes,
+                               const Appearance& appearance, const double position[3],
+                               const double rotation[9], const PixelGrid& grid) {
+  view_.grid = grid;
+  order_.clear();
+  const RayGeom* endless = nullptr;  // the first endless plane
+  const auto add = [&](const RayGeom& source, int id, std::uint32_t flags, int material) {
+    const float* rgba = appearance.rgba().data() + 4 * id;
+    if (rgba[3] == 0 || !(flags & options_.groups) || id == left_out_) return;
+    if (!endless && source.type == mjGEOM_PLANE && source.size[0] == 0 && source.size[1] == 0)
+      endless = &source;
+    const int index = static_cast<int>(order_.size());
+    ViewGeom& g = unsorted_[index];
+    g.id = id;
+    g.fixed = static_cast<std::size_t>(id) < fixed_.size() && fixed_[id];
+    place(source, position, rotation, g);
+    set_shape(world, shapes, source, g);
+    const bool sight = find_window(view_, g);
+    if (!sight && !options_.shadows) return;
+    set_surface(source, rgba, material < 0 ? nullptr : &appearance.materials()[material], g);
+    Order order{sight ? g.transparent : 2, g.nearest, index};
+    if (order.rank == 1) {
+      const float* p = g.pos;
+      const float reach = g.object == mjOBJ_GEOM ? g.radius : 0;  // MuJoCo's of what is soft
+      order.key = g.type == mjGEOM_PLANE
+                      ? 1e10f
+                      : std::sqrt(p[0] * p[0] + p[1] * p[1] + p[2] * p[2]) - reach;
+    }
+    order_.push_back(order);
+  };
+  int id = 0;
+  for (; id < world.num_geoms(); ++id)
+    add(world.geom(id), id, world.flags()[id], world.materials()[id]);
+  if (const FlexShapes* flexes = world.flexes()) {
+    for (const FlexShapes::Part& part : flexes->parts()) {
+      const int object = world.num_geoms() + part.flex;
+      add(world.geom(object), id++, world.flags()[object], part.material);
+    }
+  }
+  if (SkinShapes* skins = world.skins()) {
+    skins->bend(options_.groups);
+    for (int i = 0; i < skins->size(); ++i)
+      add(skins->geom(i), id++, skins->group(i), skins->material(i));
+  }
+  std::sort(order_.begin(), order_.end(), [](const Order& a, const Order& b) {
+    if (a.rank != b.rank) return a.rank < b.rank;
+    if (a.key != b.key) return a.key < b.key;
+    return a.index < b.index;
+  });
+  view_.num_opaque = view_.num_transparent = 0;
+  float* spheres = spheres_.data();  // here, because builders move
+  const std::size_t stride = spheres_.size() / 4;
+  view_.spheres = {spheres, spheres + stride, spheres + 2 * stride, spheres + 3 * stride};
+  for (std::size_t i = 0; i < order_.size(); ++i) {
+    const ViewGeom& g = sorted_[i] = unsorted_[order_[i].index];
+    if (view_.layered) index_of_id_[g.id] = static_cast<int>(i);
+    view_.spheres.x[i] = g.center[0];
+    view_.spheres.y[i] = g.center[1];
+    view_.spheres.z[i] = g.center[2];
+    view_.spheres.radius[i] = g.radius;
+    view_.num_opaque += order_[i].rank == 0;
+    view_.num_transparent += order_[i].rank == 1;
+  }
+  view_.geoms = sorted_.data();
+  view_.index_of_id = index_of_id_.data();
+  view_.fixed = nullptr;
+  view_.num_geoms = static_cast<int>(order_.size());
+  for (int i = 0; i < 9; ++i) view_.r_wc[i] = static_cast<float>(rotation[i]);
+  set_lights(world, appearance, position, rotation);
+  if (view_.skybox) set_sky(endless, appearance.sky(), position, rotation);
+  if (mirrored_) set_mirror(world, shapes, appearance, position, rotation);
+  return view_;
+}
+
+// The camera is mirrored in the plane: the same pixel rays then meet the mirror in the same points
+// and go on to what is reflected. Its rotation is a reflection too, which disturbs nobody.
+void ViewBuilder::set_mirror(const RayWorld& world, const SharedGeometry& shapes,
+                             const Appearance& appearance, const double position[3],
+                             const double rotation[9]) {
+  view_.mirror = -1;
+  view_.reflection = nullptr;
+  for (int id = 0; id < world.num_geoms(); ++id) {
+    const RayGeom& g = world.geom(id);
+    const int material = world.materials()[id];
+    if ((g.type != mjGEOM_PLANE && g.type != mjGEOM_BOX) || material < 0) continue;
+    const float reflectance = appearance.materials()[material].reflectance;
+    if (reflectance <= 0 || appearance.rgba()[4 * id + 3] < kOpaque) continue;
+    if (!(world.flags()[id] & options_.groups)) continue;
+    const double normal[3] = {g.mat[2], g.mat[5], g.mat[8]};
+    const double top = g.type == mjGEOM_BOX ? g.size[2] : 0;
+    double above = -top;
+    for (int k = 0; k < 3; ++k) above += (position[k] - g.pos[k]) * normal[k];
+    if (above < 0) {
+      if (g.type == mjGEOM_PLANE) continue;  // seen from below it is a veil, not a mirror
+      return;
+    }
+    double p[3], r[9];
+    for (int k = 0; k < 3; ++k) p[k] = position[k] - 2 * above * normal[k];
+    for (int j = 0; j < 3; ++j) {
+      double along = 0;
+      for (int k = 0; k < 3; ++k) along += normal[k] * rotation[3 * k + j];
+      for (int k = 0; k < 3; ++k) r[3 * k + j] = rotation[3 * k + j] - 2 * along * normal[k];
+    }
+    mirrored_->left_out_ = id;
+    mirrored_->own_headlight_ = false;
+    for (int k = 0; k < 3; ++k) mirrored_->headlight_[k] = -rotation[3 * k + 2];
+    mirrored_->tint_ = reflectance;
+    view_.reflection = &mirrored_->build(world, shapes, appearance, p, r, view_.grid);
+    view_.mirror = id;
+    return;  // one, as in MuJoCo
+  }
+}
+
+void ViewBuilder::place(const RayGeom& source, const double position[3], const double rotation[9],
+                        ViewGeom& g) const {
+  const double offset[3] = {source.pos[0] - position[0], source.pos[1] - position[1],
+                            source.pos[2] - position[2]};
+  double p[3], eye[3];
+  rotate_back(rotation, offset, p);
+  rotate_back(source.mat, offset, eye);
+  for (int i = 0; i < 3; ++i) {
+    g.pos[i] = static_cast<float>(p[i]);
+    g.eye[i] = static_cast<float>(-eye[i]);
+    g.size[i] = source.size[i];
+    g.box[i] = source.center[i];
+    g.box[3 + i] = source.half[i];
+    for (int j = 0; j < 3; ++j)
+      g.rot[3 * i + j] =
+          static_cast<float>(rotation[i] * source.mat[j] + rotation[3 + i] * source.mat[3 + j] +
+                             rotation[6 + i] * source.mat[6 + j]);
+  }
+}
+
+void ViewBuilder::set_shape(const RayWorld& world, const SharedGeometry& shapes,
+                            const RayGeom& source, ViewGeom& g) {
+  g.type = source.type;
+  g.behind = g.type == mjGEOM_PLANE && g.eye[2] < 0;
+  g.object = mjOBJ_GEOM;
+  g.object_id = g.id;
+  g.bvh = nullptr;
+  g.clusters = nullptr;
+  g.mesh = nullptr;
+  g.height_field = nullptr;
+  if (g.type == mjGEOM_MESH || g.type == mjGEOM_SDF) {
+    g.bvh = shapes.mesh_scenes[source.data];
+    g.mesh = look_->mesh(source.data);
+    g.clusters = shapes.clusters_of_mesh(source.data);
+  } else if (g.type == mjGEOM_HFIELD) {
+    g.height_field = &shapes.height_fields[source.data];
+    g.bvh = g.height_field->scene;
+    g.clusters = shapes.clusters_of_height_field(source.data);
+  } else if (g.type == kFlexType) {
+    const int part = g.id - world.num_geoms();
+    const FlexShapes::Part& shape = world.flexes()->parts()[part];
+    g.object = mjOBJ_FLEX;
+    g.bvh = shape.scene;
+    g.mesh = soft_look(part, *look_->flex_part(part), shape.normals);
+  } else if (g.type == kSkinType) {
+    const int id = source.data;
+    g.object = mjOBJ_SKIN;
+    g.bvh = world.skins()->scene(id);
+    g.mesh = soft_look(look_->num_flex_parts() + id, *look_->skin(id), world.skins()->normals(id));
+  }
+  if (g.object != mjOBJ_GEOM) {
+    g.object_id = source.data;
+    g.type = mjGEOM_MESH;
+  }
+}
+
+// The world's normals with the texture coordinates that all share.
+const MeshLook* ViewBuilder::soft_look(int index, const MeshLook& shared, const float* normals) {
+  MeshLook& look = soft_looks_[index];
+  look = shared;
+  look.normals = normals;
+  return &look;
+}
+
+void ViewBuilder::set_surface(const RayGeom& source, const float* rgba, const Material* material,
+                              ViewGeom& g) const {
+  Surface& s = g.surface;
+  s = {};
+  std::copy_n(rgba, 4, s.rgba);
+  for (int i = 0; i < 3; ++i) s.rgba[i] *= tint_;
+  if (g.behind) s.rgba[3] *= kFromBehind;
+  g.transparent = s.rgba[3] < kOpaque || g.behind;
+  s.specular = 0.5f;
+  s.exponent = 64.0f;
+  if (!material) return;
+  s.specular = material->specular;
+  s.exponent = 128.0f * material->shininess;
+  s.emission = material->emission;
+  if (!options_.textures) return;
+  s.texture = look_->texture(material->texture);
+  if (s.texture && s.texture->levels == 0) s.texture = nullptr;
+  if (!s.texture) return;
+  const bool uniform = material->uniform;
+  s.mapped = g.mesh && g.mesh->uvs && !s.texture->cube;
+  if (g.object == mjOBJ_FLEX && !s.mapped) {  // MuJoCo: by its own coordinates only
+    s.texture = nullptr;
+    return;
+  }
+  for (int i = 0; i < 2; ++i) {
+    const float size = g.size[i] > 0 ? g.size[i] : 1.0f;
+    s.repeat[i] = material->repeat[i] * (uniform && !s.mapped ? size : 1.0f);
+    const bool from_above = (g.mesh && !s.mapped) || g.height_field;
+    if (from_above || (g.type == mjGEOM_PLANE && g.size[i] <= 0)) s.shift[i] = -0.5f;
+    if (from_above && g.object == mjOBJ_SKIN)  // the texture stays where it is in the world
+      s.shift[i] += (i ? -0.5f : 0.5f) * s.repeat[i] * static_cast<float>(source.pos[i]);
+  }
+  // Cube maps: MuJoCo takes directions in the unit shape that it scales (meshes and planes: in
+  // metres).
+  const bool in_meters = g.mesh || g.height_field || g.type == mjGEOM_PLANE;
+  for (int i = 0; i < 3; ++i) {
+    float size = g.size[i];
+    if (g.type == mjGEOM_SPHERE ||
+        ((g.type == mjGEOM_CAPSULE || g.type == mjGEOM_CYLINDER) && i < 2))
+      size = g.size[0];
+    if ((g.type == mjGEOM_CAPSULE || g.type == mjGEOM_CYLINDER) && i == 2) size = g.size[1];
+    if (in_meters) {
+      s.stretch[i] = uniform ? size : 1.0f;
+    } else {
+      s.stretch[i] = uniform || size <= 0 ? 1.0f : 1.0f / size;
+    }
+  }
+}
+
+// The sky's cylinder and the haze are nowhere nearer to the camera than 1 - width of the cylinder's
+// radius; the longest rays go to the corners.
+float ViewBuilder::sky_from(const Sky& sky) const {
+  const PixelGrid& grid = view_.grid;
+  if (grid.bent) return 0;
+  const float x = std::max(std::abs(grid.left), std::abs(grid.left + grid.dx * grid.width));
+  const float y = std::max(std::abs(grid.top), std::abs(grid.top + grid.dy * grid.height));
+  return std::max(1 - sky.haze_width, 0.0f) * sky.distance / std::sqrt(1 + x * x + y * y);
+}
+
+// Seen by parallel rays the sky has no place: it hides nothing, and there is no haze.
+void ViewBuilder::set_sky(const RayGeom* plane, const Sky& sky, const double position[3],
+                          const double rotation[9]) {
+  view_.sky_distance = view_.grid.orthographic ? 0 : sky.distance;
+  view_.sky_from = sky_from(sky);
+  View::Haze& haze = view_.haze;
+  haze.height = 0;
+  if (!plane) return;
+  const double normal[3] = {plane->mat[2], plane->mat[5], plane->mat[8]};
+  double up[3], height = 0;
+  rotate_back(rotation, normal, up);
+  for (int k = 0; k < 3; ++k) {
+    height += (position[k] - plane->pos[k]) * normal[k];
+    haze.up[k] = static_cast<float>(up[k]);
+    haze.rgb[k] = sky.haze_rgb[k];
+  }
+  haze.height = static_cast<float>(height);
+  haze.width = sky.haze_width;
+}
+
+void ViewBuilder::set_lights(const RayWorld& world, const Appearance& appearance,
+                             const double position[3], const double rotation[9]) {
+  view_.num_lights = static_cast<int>(appearance.lights().size());
+  view_.global_ambient = view_.num_lights == 0 ? 0.3f : 0.0f;  // MuJoCo's, so that something shows
+  for (int i = 0; i < view_.num_lights; ++i) {
+    ViewLight& light = view_.lights[i];
+    light = appearance.lights()[i];
+    const int id = appearance.light_ids()[i];
+    if (id < 0) {  // the headlight shines where the camera looks
+      double d[3] = {0, 0, -1};
+      if (!own_headlight_) rotate_back(rotation, headlight_, d);
+      for (int k = 0; k < 3; ++k) light.dir[k] = static_cast<float>(d[k]);
+      continue;
+    }
+    const RayLight& source = world.lights()[id];
+    const double offset[3] = {source.pos[0] - position[0], source.pos[1] - position[1],
+                              source.pos[2] - position[2]};
+    double p[3], d[3];
+    rotate_back(rotation, offset, p);
+    rotate_back(rotation, source.dir, d);
+    for (int k = 0; k < 3; ++k) {
+      light.pos[k] = static_cast<float>(p[k]);
+      light.dir[k] = static_cast<float>(d[k]);
+    }
+  }
+}
+
+}  // namespace mjsense

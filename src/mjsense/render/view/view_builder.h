@@ -1,0 +1,82 @@
+#pragma once
+// Brings a world into a camera's frame: what is in sight, nearest first, with its materials and
+// lights.
+
+#include <mujoco/mujoco.h>
+
+#include <memory>
+#include <span>
+#include <vector>
+
+#include "mjsense/render/view/appearance.h"
+#include "mjsense/render/view/look.h"
+#include "mjsense/render/view/view.h"
+
+namespace mjsense {
+
+class RayWorld;
+struct RayGeom;
+struct SharedGeometry;
+
+struct ViewOptions {
+  unsigned groups = 0x7;  // bit g: geoms of group g
+  bool textures = true;
+  bool shadows = false;
+  bool reflections = false;
+  bool layered = false;  // View::layered
+  float near = 0, far = 0;
+};
+
+// Owns the geoms of one view; build() fills it anew and allocates nothing.
+class ViewBuilder {
+ public:
+  ViewBuilder(const mjModel* model, const Look& look, const ViewOptions& options);
+
+  // position, rotation: X_WC, row-major.
+  const View& build(const RayWorld& world, const SharedGeometry& shapes,
+                    const Appearance& appearance, const double position[3],
+                    const double rotation[9], const PixelGrid& grid);
+  const View& view() const { return view_; }
+  void use_fixed(const FixedTile* tiles) { view_.fixed = tiles; }  // of the view just built
+  static std::size_t max_geoms(const mjModel* model) {
+    return static_cast<std::size_t>(model->ngeom + model->nskin) + flex_parts(model).size();
+  }
+
+ private:
+  struct Order {
+    int rank;  // 0 opaque, 1 transparent, 2 only casts shadows
+    float key;
+    int index;
+  };
+  void place(const RayGeom& source, const double position[3], const double rotation[9],
+             ViewGeom& g) const;
+  void set_shape(const RayWorld& world, const SharedGeometry& shapes, const RayGeom& source,
+                 ViewGeom& g);
+  const MeshLook* soft_look(int index, const MeshLook& shared, const float* normals);
+  void set_surface(const RayGeom& source, const float* rgba, const Material* material,
+                   ViewGeom& g) const;
+  void set_mirror(const RayWorld& world, const SharedGeometry& shapes, const Appearance& appearance,
+                  const double position[3], const double rotation[9]);
+  float sky_from(const Sky& sky) const;
+  void set_sky(const RayGeom* plane, const Sky& sky, const double position[3],
+               const double rotation[9]);
+  void set_lights(const RayWorld& world, const Appearance& appearance, const double position[3],
+                  const double rotation[9]);
+
+  const Look* look_;
+  ViewOptions options_;
+  View view_;
+  std::vector<ViewGeom> unsorted_, sorted_;
+  std::vector<float> spheres_;  // View::spheres
+  std::vector<Order> order_;
+  std::vector<std::uint8_t> fixed_;  // of geoms; none if not layered
+  std::vector<int> index_of_id_;
+  std::vector<MeshLook> soft_looks_;  // of parts of flexes, then skins, with the world's normals
+  std::unique_ptr<ViewBuilder> mirrored_;  // null: nothing can reflect
+  int left_out_ = -1;                      // geom that this view does not show: the mirror itself
+  bool own_headlight_ = true;              // else headlight_: where the mirrored camera looks
+  double headlight_[3] = {};
+  float tint_ = 1;  // of every colour: the mirror's reflectance
+};
+
+}  // namespace mjsense

@@ -1,0 +1,222 @@
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <map>
+#include <nlohmann/json.hpp>
+
+#include "mjsense/core/error.h"
+#include "mjsense/replay/check.h"
+#include "mjsense/replay/json_text.h"
+#include "mjsense/replay/trajectory.h"
+
+namespace fs = std::filesystem;
+
+namespace mjsense {
+namespace {
+
+// Mean and spread in one pass that stays exact for values far from zero (Welford).
+struct Accumulator {
+  std::int64_t count = 0, nan = 0, infinite = 0;
+  double mean = 0, squares = 0;
+  double min = std::numeric_limits<double>::infinity(),
+         max = -std::numeric_limits<double>::infinity();
+
+  void add(double x) {
+    if (!std::isfinite(x)) {
+      ++(std::isnan(x) ? nan : infinite);
+      return;
+    }
+    ++count;
+    min = std::min(min, x);
+    max = std::max(max, x);
+    const double before = x - mean;
+    mean += before / static_cast<double>(count);
+    squares += before * (x - mean);
+  }
+
+  void store(StreamStats& stats) const {
+    stats.count = count;
+    stats.nan = nan;
+    stats.infinite = infinite;
+    if (count == 0) return;
+    stats.mean = mean;
+    stats.std = std::sqrt(squares / static_cast<double>(count));
+    stats.min = min;
+    stats.max = max;
+  }
+};
+
+struct Stream {
+  StreamStats stats;
+  Accumulator values;
+};
+
+class Inspector {
+ public:
+  InspectResult run(const fs::path& path) {
+    for (const RecordedFile& file : recorded_files(path)) add_file(file);
+    for (auto& [name, stream] : streams_) {
+      stream.values.store(stream.stats);
+      result_.streams.push_back(std::move(stream.stats));
+    }
+    return std::move(result_);
+  }
+
+ private:
+  void add_file(const RecordedFile& recorded) {
+    InspectResult::File entry{recorded.name,
+                              static_cast<std::int64_t>(fs::file_size(recorded.path))};
+    const h5::H5Lock lock;
+    const h5::Id file = h5::open_file(recorded.path);
+    if (result_.settings.empty()) result_.settings = h5::text_attribute(file, "recording");
+    for (const std::string& name : trajectory_names(file)) {
+      const h5::Id trajectory(H5Gopen2(file, name.c_str(), H5P_DEFAULT), H5Gclose, name);
+      ++entry.episodes;
+      add_trajectory(trajectory, entry);
+      if (!h5::exists(trajectory, "obs/sensor_data")) continue;
+      const h5::Id videos(H5Gopen2(trajectory, "obs/sensor_data", H5P_DEFAULT), H5Gclose, name);
+      for (const std::string& key : h5::children(videos))
+        result_.videos.push_back(read_file_name(videos, key));
+    }
+    result_.files.push_back(std::move(entry));
+  }
+
+  void add_trajectory(hid_t trajectory, InspectResult::File& entry) {
+    visit_datasets(trajectory, [&](const std::string& name) {
+      if (name.starts_with("obs/sensor_data/")) return;
+      const RowDataset dataset(trajectory, name);
+      Stream& stream = stream_of(dataset, name);
+      if (dataset.is_json()) {
+        dataset.each_text([&](std::int64_t, std::string_view text) {
+          parse_json(text, [&](const std::string& path, double x) {
+            value_of(name, path, stream).add(x);
+          });
+        });
+      } else if (dataset.is_number() && !dataset.scalar()) {
+        double last = 0;
+        dataset.each_number([&](std::span<const double> values) {
+          for (const double x : values) stream.values.add(x);
+          if (!values.empty()) last = values.back();
+        });
+        if (name != "success") return;
+        entry.steps += static_cast<int>(dataset.rows());
+        entry.successes += last != 0;
+      }
+    });
+  }
+
+  Stream& stream_of(const RowDataset& dataset, const std::string& name) {
+    Stream& stream = streams_[name];
+    if (stream.stats.name.empty()) {
+      stream.stats.name = name;
+      stream.stats.dtype = dataset.dtype();
+      stream.stats.shape = dataset.shape();
+      stream.stats.unit = h5::text_attribute(dataset.id(), "unit");
+      stream.stats.frame = h5::text_attribute(dataset.id(), "frame");
+      stream.stats.description = h5::text_attribute(dataset.id(), "description");
+    }
+    return stream;
+  }
+
+  Accumulator& value_of(const std::string& name, const std::string& key, const Stream& whole) {
+    Stream& stream = streams_[name + "/" + key];
+    if (stream.stats.name.empty()) {
+      stream.stats.name = name + "/" + key;
+      stream.stats.dtype = "number";
+      stream.stats.unit = whole.stats.unit;
+    }
+    return stream.values;
+  }
+
+  InspectResult result_;
+  std::map<std::string, Stream> streams_;
+};
+
+std::string size_text(std::int64_t bytes) {
+  if (bytes < 1 << 10) return fmt::format("{} B", bytes);
+  if (bytes < 1 << 20) return fmt::format("{:.1f} KiB", static_cast<double>(bytes) / (1 << 10));
+  return fmt::format("{:.1f} MiB", static_cast<double>(bytes) / (1 << 20));
+}
+
+std::vector<std::string> split_path(const std::string& path) {
+  std::vector<std::string> parts;
+  for (std::size_t start = 0; start <= path.size();) {
+    const std::size_t end = std::min(path.find('/', start), path.size());
+    parts.push_back(path.substr(start, end - start));
+    start = end + 1;
+  }
+  return parts;
+}
+
+// "    tcp_pose      float32  (T, 7)     0.3268 +- 0.3826   [-0.24, 1.041]   m, wxyz  in world"
+std::string line_of(const StreamStats& s, const std::string& name, int indent) {
+  constexpr int kNameColumns = 34;
+  std::string line = fmt::format("{:{}}{:<{}} {:<8} {:<14}", "", indent, name,
+                                 std::max(1, kNameColumns - indent), s.dtype, s.shape);
+  if (s.count > 0) {
+    const std::string range = fmt::format("[{:.4g}, {:.4g}]", s.min, s.max);
+    line += fmt::format(" {:>10.4g} +- {:<10.4g} {:<22}", s.mean, s.std, range);
+  }
+  if (!s.unit.empty()) line += "  " + s.unit;
+  if (!s.frame.empty()) line += "  in " + s.frame;
+  const auto share = [&](std::int64_t n, const char* what) {
+    const auto all = static_cast<double>(s.count + s.nan + s.infinite);
+    if (n > 0) line += fmt::format("  {} {:.0f} %", what, 100.0 * static_cast<double>(n) / all);
+  };
+  share(s.nan, "NaN");
+  share(s.infinite, "infinite");
+  while (!line.empty() && line.back() == ' ') line.pop_back();
+  return line;
+}
+
+}  // namespace
+
+InspectResult inspect(const fs::path& path) { return Inspector().run(path); }
+
+std::string InspectResult::text() const {
+  std::string out;
+  for (const File& f : files) {
+    out += fmt::format("{}  {}, {} episodes, {} successes, {} steps\n", f.path, size_text(f.bytes),
+                       f.episodes, f.successes, f.steps);
+  }
+  out += fmt::format("{} videos\n\n", videos.size());
+
+  // A tree: what a line shares with the one above is left blank.
+  std::vector<std::string> last;
+  for (const StreamStats& s : streams) {
+    std::vector<std::string> parts = split_path(s.name);
+    std::size_t depth = 0;
+    while (depth + 1 < parts.size() && depth < last.size() && parts[depth] == last[depth]) ++depth;
+    for (; depth + 1 < parts.size(); ++depth) {
+      out += fmt::format("{:{}}{}/\n", "", 2 * depth, parts[depth]);
+    }
+    out += line_of(s, parts.back(), 2 * static_cast<int>(depth)) + "\n";
+    last = std::move(parts);
+  }
+  return out;
+}
+
+std::string InspectResult::json() const {
+  nlohmann::json j{{"videos", videos},
+                   {"recording", nlohmann::json::parse(settings, nullptr, false)}};
+  if (j["recording"].is_discarded()) j["recording"] = nullptr;
+  for (const File& f : files) {
+    j["files"].push_back({{"path", f.path},
+                          {"bytes", f.bytes},
+                          {"episodes", f.episodes},
+                          {"successes", f.successes},
+                          {"steps", f.steps}});
+  }
+  for (const StreamStats& s : streams) {
+    nlohmann::json one{{"name", s.name},   {"dtype", s.dtype}, {"shape", s.shape},
+                       {"unit", s.unit},   {"frame", s.frame}, {"description", s.description},
+                       {"count", s.count}, {"nan", s.nan},     {"infinite", s.infinite}};
+    if (s.count > 0) one.update({{"mean", s.mean}, {"std", s.std}, {"min", s.min}, {"max", s.max}});
+    j["streams"].push_back(std::move(one));
+  }
+  return j.dump(2);
+}
+
+}  // namespace mjsense

@@ -1,0 +1,172 @@
+#include "mjsense/replay/json_text.h"
+
+#include <fmt/format.h>
+
+#include <charconv>
+#include <cmath>
+#include <limits>
+
+namespace mjsense {
+namespace {
+
+constexpr int kMaxDepth = 64;
+
+struct SyntaxError {
+  std::size_t at;
+  const char* expected;
+};
+
+class Parser {
+ public:
+  Parser(std::string_view text, const OnNumber& on_number) : text_(text), on_number_(on_number) {}
+
+  void document() {
+    value(0);
+    blank();
+    if (at_ != text_.size()) throw SyntaxError{at_, "the end"};
+  }
+
+ private:
+  char peek() const { return at_ < text_.size() ? text_[at_] : '\0'; }
+
+  void blank() {
+    while (peek() == ' ' || peek() == '\n' || peek() == '\t' || peek() == '\r') ++at_;
+  }
+
+  void expect(char c, const char* expected) {
+    if (peek() != c) throw SyntaxError{at_, expected};
+    ++at_;
+  }
+
+  bool word(std::string_view w) {
+    if (text_.substr(at_, w.size()) != w) return false;
+    at_ += w.size();
+    return true;
+  }
+
+  void number_is(double x) const {
+    if (on_number_) on_number_(path_, x);
+  }
+
+  void value(int depth) {
+    if (depth > kMaxDepth) throw SyntaxError{at_, "less nesting"};
+    blank();
+    switch (peek()) {
+      case '{':
+        return object(depth);
+      case '[':
+        return array(depth);
+      case '"':
+        string(nullptr);
+        return;
+      default:
+        break;
+    }
+    constexpr double kInfinity = std::numeric_limits<double>::infinity();
+    if (word("null")) return;
+    if (word("true")) return number_is(1);
+    if (word("false")) return number_is(0);
+    if (word("NaN")) return number_is(std::numeric_limits<double>::quiet_NaN());
+    if (word("Infinity")) return number_is(kInfinity);
+    if (word("-Infinity")) return number_is(-kInfinity);
+    number();
+  }
+
+  void object(int depth) {
+    ++at_;
+    blank();
+    if (peek() == '}') {
+      ++at_;
+      return;
+    }
+    while (true) {
+      blank();
+      const std::size_t parent = path_.size();
+      std::string key;
+      string(&key);
+      blank();
+      expect(':', "':'");
+      if (!path_.empty()) path_ += '/';
+      path_ += key;
+      value(depth + 1);
+      path_.resize(parent);
+      blank();
+      if (peek() == '}') break;
+      expect(',', "',' or '}'");
+    }
+    ++at_;
+  }
+
+  void array(int depth) {
+    ++at_;
+    blank();
+    if (peek() == ']') {
+      ++at_;
+      return;
+    }
+    while (true) {
+      value(depth + 1);
+      blank();
+      if (peek() == ']') break;
+      expect(',', "',' or ']'");
+    }
+    ++at_;
+  }
+
+  // Escapes are checked, and kept as they are: keys are only names here.
+  void string(std::string* out) {
+    expect('"', "a string");
+    const std::size_t start = at_;
+    while (peek() != '"') {
+      if (at_ >= text_.size() || static_cast<unsigned char>(text_[at_]) < 0x20)
+        throw SyntaxError{at_, "'\"'"};
+      if (text_[at_++] != '\\') continue;
+      if (at_ >= text_.size() ||
+          std::string_view("\"\\/bfnrtu").find(text_[at_]) == std::string_view::npos) {
+        throw SyntaxError{at_, "an escape"};
+      }
+      if (text_[at_++] != 'u') continue;
+      for (int i = 0; i < 4; ++i, ++at_) {
+        if (at_ >= text_.size() || !std::isxdigit(static_cast<unsigned char>(text_[at_])))
+          throw SyntaxError{at_, "4 hex digits"};
+      }
+    }
+    if (out) *out = text_.substr(start, at_ - start);
+    ++at_;
+  }
+
+  void number() {
+    double x = 0;
+    const char* first = text_.data() + at_;
+    const auto [end, error] = std::from_chars(first, text_.data() + text_.size(), x);
+    const bool letter =
+        end != first && std::isalpha(static_cast<unsigned char>(*first == '-' ? first[1] : *first));
+    if (end == first || letter || error == std::errc::invalid_argument)
+      throw SyntaxError{at_, "a value"};
+    at_ += static_cast<std::size_t>(end - first);
+    number_is(x);
+  }
+
+  std::string_view text_;
+  const OnNumber& on_number_;
+  std::size_t at_ = 0;
+  std::string path_;
+};
+
+}  // namespace
+
+std::string parse_json(std::string_view text, const OnNumber& on_number) {
+  try {
+    Parser(text, on_number).document();
+    return "";
+  } catch (const SyntaxError& error) {
+    return fmt::format("byte {}: expected {}", error.at, error.expected);
+  }
+}
+
+std::string_view trim_row(std::string_view row) {
+  const std::size_t end = row.find_last_not_of('\0');
+  return end == std::string_view::npos ? std::string_view{} : row.substr(0, end + 1);
+}
+
+}  // namespace mjsense

@@ -1,0 +1,73 @@
+#include "mjsense/replay/json_text.h"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <map>
+#include <vector>
+
+#include "mjsense/hdf5/lzf.h"
+
+namespace mjsense {
+namespace {
+
+TEST(JsonText, AcceptsWhatPythonWrites) {
+  for (const char* text : {"{}", "[]", "{\"a\":[1,-0.0,1e-05,1.0],\"b\":{\"c\":null}}",
+                           "{\"x\":NaN,\"y\":Infinity,\"z\":-Infinity}", " {\"a\" : true} ",
+                           "\"\\u00e9\\n\"", "1e400"}) {
+    EXPECT_EQ(parse_json(text), "") << text;
+  }
+}
+
+TEST(JsonText, NamesThePlaceOfAFault) {
+  EXPECT_EQ(parse_json(""), "byte 0: expected a value");
+  EXPECT_EQ(parse_json("{\"a\":[1,2"), "byte 9: expected ',' or ']'");
+  EXPECT_EQ(parse_json("{\"a\" 1}"), "byte 5: expected ':'");
+  EXPECT_EQ(parse_json("{\"a\":1} x"), "byte 8: expected the end");
+  for (const char* text : {"{\"a\":}", "{a:1}", "[1,]", "{\"a\":1,}", "nan", "inf", "+1", "\"\\x\"",
+                           "\"\\u12\"", "[", "tru"}) {
+    EXPECT_NE(parse_json(text), "") << text;
+  }
+  EXPECT_NE(parse_json(std::string(1000, '[')), "");
+}
+
+TEST(JsonText, EveryPrefixOfARowIsRefused) {
+  const std::string row =
+      "{\"arm\":[0.1,-2.5e-3,Infinity],\"gripper\":{\"held\":true,\"name\":\"a\\u00e9\"}}";
+  ASSERT_EQ(parse_json(row), "");
+  for (std::size_t n = 0; n < row.size(); ++n) EXPECT_NE(parse_json(row.substr(0, n)), "") << n;
+}
+
+TEST(JsonText, VisitsNumbersWithTheirPaths) {
+  std::map<std::string, std::vector<double>> seen;
+  ASSERT_EQ(parse_json("{\"arm\":[1,2.5],\"g\":{\"held\":true},\"n\":NaN}",
+                       [&](const std::string& path, double x) { seen[path].push_back(x); }),
+            "");
+  EXPECT_EQ(seen["arm"], (std::vector<double>{1, 2.5}));
+  EXPECT_EQ(seen["g/held"], (std::vector<double>{1}));
+  EXPECT_TRUE(std::isnan(seen["n"].at(0)));
+}
+
+TEST(Lzf, UnpacksRunsAndReferences) {
+  // "abc", then 7 bytes from 3 back (overlapping), then "!".
+  const std::vector<std::uint8_t> packed = {2, 'a', 'b', 'c', 5 << 5, 2, 0, '!'};
+  std::vector<std::uint8_t> out(32);
+  ASSERT_EQ(lzf_unpack(packed, out), 11u);
+  EXPECT_EQ(std::string(out.begin(), out.begin() + 11), "abcabcabca!");
+  // A long reference: 7 + 20 + 2 bytes.
+  const std::vector<std::uint8_t> lengthy = {0, 'z', 7 << 5, 20, 0};
+  EXPECT_EQ(lzf_unpack(lengthy, out), 30u);
+}
+
+TEST(Lzf, RefusesDamage) {
+  std::vector<std::uint8_t> out(8);
+  EXPECT_EQ(lzf_unpack(std::vector<std::uint8_t>{5, 'a'}, out), 0u);  // run beyond the end
+  EXPECT_EQ(lzf_unpack(std::vector<std::uint8_t>{0, 'a', 1 << 5, 9}, out),
+            0u);  // before the beginning
+  EXPECT_EQ(
+      lzf_unpack(std::vector<std::uint8_t>{0, 'a', 6 << 5, 0, 0, 'b'}, std::span(out).first(4)),
+      0u);  // no room
+}
+
+}  // namespace
+}  // namespace mjsense

@@ -1,0 +1,42 @@
+#include "mjsense/rollout/registry.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include "mjsense/core/error.h"
+
+namespace mjsense {
+namespace {
+
+using testing::HasSubstr;
+
+template <class Make>
+void expect_unknown(Make&& make, const char* nearest) {
+  try {
+    make();
+    FAIL();
+  } catch (const KeyError& e) {
+    EXPECT_THAT(e.what(), HasSubstr(nearest));
+  }
+}
+
+TEST(Registry, MakesWhatItNames) {
+  for (const std::string& robot : robot_names()) {
+    for (const std::string& task : task_names()) {
+      TaskCfg cfg;
+      cfg.robot = robot_cfg(robot);
+      EXPECT_EQ(cfg.robot.name, robot);
+      EXPECT_EQ(make_task(task, cfg)->name(), task);
+    }
+  }
+  for (const std::string& policy : policy_names()) EXPECT_EQ(make_policy(policy)->name(), policy);
+}
+
+TEST(Registry, UnknownNamesAreErrorsWithTheNearest) {
+  expect_unknown([] { robot_cfg("frnka"); }, "did you mean 'franka'?");
+  expect_unknown([] { make_task("pik", {}); }, "did you mean 'pick'?");
+  expect_unknown([] { make_policy("plannr"); }, "did you mean 'planner'?");
+}
+
+}  // namespace
+}  // namespace mjsense

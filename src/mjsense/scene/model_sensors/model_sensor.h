@@ -1,0 +1,28 @@
+#pragma once
+// A sensor that stands in the model, found under its name: its row is the sensor's numbers in
+// mjData.sensordata, as float32 [B, dim], and with a history `history` [B, nsample, dim].
+
+#include <string>
+
+#include "mjsense/core/sensor.h"
+
+namespace mjsense {
+
+class ModelSensor : public Sensor {
+ public:
+  explicit ModelSensor(std::string name) : Sensor(std::move(name)) {}  // full name in the model
+
+  std::string_view kind() const override { return "builtin"; }
+  void initialize(const SensorInit& init) override;
+  void compute(const World& world) override;
+  void draw(const World& world, DebugShapes& shapes) override;  // the frame it is attached to
+
+ private:
+  int id_ = -1;
+  int adr_ = 0, dim_ = 0;
+  int history_adr_ = -1, nsample_ = 0;
+  Field* field_ = nullptr;
+  Field* history_ = nullptr;
+};
+
+}  // namespace mjsense

@@ -1,0 +1,58 @@
+#!/usr/bin/env python3
+"""Fails where an include runs against the order of the rooms, which the table in docs/architecture.md gives.
+
+A file may include its own room and the rooms above it in that table. Tests, benchmarks and folders testing/ may include
+anything: they judge from outside. Nothing in src/ may include python/.
+"""
+
+from __future__ import annotations
+
+import re
+import sys
+from pathlib import Path
+
+ROOT = Path(__file__).resolve().parent.parent
+SOURCES = ROOT / "src" / "mjsense"
+INCLUDE = re.compile(r'^\s*#\s*include\s+"([^"]+)"', re.MULTILINE)
+JUDGES = re.compile(r"_(test|bench)\.cc$|/testing/")
+
+
+def rooms_of(page: str) -> list[str]:
+    """First column of the table under "## Rooms", in order."""
+    table = page.split("## Rooms", 1)[1].split("\n## ", 1)[0]
+    return re.findall(r"^\| `([a-z0-9]+)/", table, re.MULTILINE)
+
+
+def wrong_includes(path: Path, text: str, order: dict[str, int]) -> list[str]:
+    room = path.parts[0]
+    found = []
+    for include in INCLUDE.findall(text):
+        target = include.removeprefix("mjsense/").split("/")[0]
+        if include.startswith("python/"):
+            found.append(f"{path}: includes {include}: bindings stand above every room")
+        elif not include.startswith("mjsense/") or "/" not in include.removeprefix("mjsense/"):
+            continue
+        elif target not in order:
+            found.append(f"{path}: includes {include}: room '{target}' is not in docs/architecture.md")
+        elif order[target] > order[room]:
+            found.append(f"{path}: includes {include}: {room}/ stands below {target}/")
+    return found
+
+
+def main() -> int:
+    rooms = rooms_of((ROOT / "docs" / "architecture.md").read_text())
+    order = {room: i for i, room in enumerate(rooms)}
+    folders = {p.name for p in SOURCES.iterdir() if p.is_dir()}
+    found = [f"docs/architecture.md: room '{room}' has no folder" for room in rooms if room not in folders]
+    found += [f"src/mjsense/{room}: not in the table of docs/architecture.md" for room in sorted(folders - set(rooms))]
+    if not found:
+        for path in sorted(SOURCES.rglob("*")):
+            name = path.relative_to(SOURCES)
+            if path.suffix in (".h", ".cc") and len(name.parts) > 1 and not JUDGES.search(path.as_posix()):
+                found += wrong_includes(name, path.read_text(), order)
+    print("\n".join(found), file=sys.stderr)
+    return 1 if found else 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())
