@@ -1,6 +1,7 @@
 #include "mjsense/scene/compiler_settings.h"
 
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 
 #include <algorithm>
 #include <utility>
@@ -65,16 +66,17 @@ std::vector<std::string> whole_model_settings(const mjSpec* spec) {
 }
 
 SpecPtr apply_whole_model_settings(SpecPtr spec, const Vfs& vfs, std::string_view place) {
+  const std::string apart = fmt::format("{}: compiled by itself, because its <compiler> sets {}",
+                                        place, fmt::join(whole_model_settings(spec.get()), ", "));
   const auto fail = [&](std::string_view why) {
-    throw ValueError(fmt::format("{}: compiled by itself for its <compiler> settings: {}", place,
-                                 one_line(why)));
+    throw ValueError(fmt::format("{}: {}", apart, one_line(why)));
   };
   const ModelPtr model = compile(spec.get(), vfs);
   if (!model) fail(mjs_getError(spec.get()));
   check_muscles_have_ranges(spec.get(), model.get(), place);
   if (!mj_copyBack(spec.get(), model.get())) fail(mjs_getError(spec.get()));
 
-  const std::string xml = save_compiled_xml(spec.get());
+  const std::string xml = save_compiled_xml(spec.get(), apart);
   char error[1024] = "";
   SpecPtr made(mj_parseXMLString(xml.c_str(), vfs.get(), error, sizeof error));
   if (!made) fail(error);

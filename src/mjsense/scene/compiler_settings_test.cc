@@ -9,8 +9,12 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstdio>
+#include <cstdlib>
+#include <filesystem>
 #include <map>
 #include <ostream>
+#include <sstream>
 #include <string>
 #include <vector>
 
@@ -83,7 +87,8 @@ struct Compare {
                   : type == mjOBJ_ACTUATOR ? alone->nactuator
                                            : alone->njnt;
     for (int i = type == mjOBJ_BODY ? 1 : 0; i < n; ++i) {
-      const std::string name = mj_id2name(alone, type, i);
+      const char* name = mj_id2name(alone, type, i);
+      if (!name || !*name) continue;
       const int other = mj_name2id(scene, type, (prefix + name).c_str());
       ASSERT_GE(other, 0) << name << " is not in the scene";
       double distance = 0, opposite = 0, size = 0;
@@ -135,7 +140,8 @@ struct Compare {
     numbers("actuator_acc0", mjOBJ_ACTUATOR, 1, alone->actuator_acc0, scene->actuator_acc0, solved);
 #undef FIELD
     for (int j = 0; j < alone->njnt; ++j) {
-      const std::string name = mj_id2name(alone, mjOBJ_JOINT, j);
+      const char* name = mj_id2name(alone, mjOBJ_JOINT, j);
+      if (!name || !*name) continue;
       const int other = mj_name2id(scene, mjOBJ_JOINT, (prefix + name).c_str());
       EXPECT_EQ(alone->jnt_limited[j], scene->jnt_limited[other]) << name;
       EXPECT_NEAR(alone->dof_damping[alone->jnt_dofadr[j]],
@@ -144,7 +150,8 @@ struct Compare {
           << name;
     }
     for (int g = 0; g < alone->ngeom; ++g) {
-      const std::string name = mj_id2name(alone, mjOBJ_GEOM, g);
+      const char* name = mj_id2name(alone, mjOBJ_GEOM, g);
+      if (!name || !*name) continue;
       const int other = mj_name2id(scene, mjOBJ_GEOM, (prefix + name).c_str());
       ASSERT_GE(other, 0);
       EXPECT_EQ(alone->geom_type[g], scene->geom_type[other]) << name;
@@ -236,6 +243,60 @@ TEST(CompilerSettings, LengthRangesAreThoseOfTheModelAlone) {
                                                   "muscle 'u' without a range")));
 }
 
+// A URDF fuses and discards unless it says otherwise.
+TEST(CompilerSettings, Urdf) {
+  const std::string inertial =
+      "<inertial><origin xyz='0 0 .1'/><mass value='2'/><inertia ixx='.02' iyy='.03' izz='.04' "
+      "ixy='0' "
+      "ixz='0' iyz='0'/></inertial><collision><geometry><box size='.1 .2 "
+      ".3'/></geometry></collision>";
+  const std::string urdf = fmt::format(
+      "<robot name='r'><link name='base'>{0}</link><link name='arm'>{0}</link><link "
+      "name='hand'>{0}</link>"
+      "<joint name='j' type='revolute'><parent link='base'/><child link='arm'/><origin xyz='0 0 "
+      ".3'/><axis "
+      "xyz='0 1 0'/><limit lower='-1' upper='2' effort='5' velocity='3'/></joint>"
+      "<joint name='fixed' type='fixed'><parent link='arm'/><child link='hand'/><origin xyz='0 .1 "
+      ".3' rpy='.1 "
+      ".2 .3'/></joint></robot>",
+      inertial);
+  const ModelPtr alone = compile_text(urdf, {});
+  ASSERT_TRUE(alone);
+  ASSERT_EQ(alone->nbody, 2);
+  SceneCfg cfg;
+  cfg.entities = {{"e", {.model = {.xml = urdf}}},
+                  {"f", {.model = {.xml = urdf}, .mocap_base = false}}};
+  const Scene scene(std::move(cfg));
+  for (const char* prefix : {"e/", "f/"}) {
+    SCOPED_TRACE(prefix);
+    Compare{alone.get(), scene.model(), prefix, 1e-9}.run();
+    Compare{alone.get(), compile_text(scene.to_xml(), scene.assets()).get(), prefix, 1e-9}.run();
+  }
+}
+
+TEST(CompilerSettings, WhatCannotBeAppliedIsRefused) {
+  const auto make = [](const mjSpec* spec) {
+    SceneCfg cfg;
+    cfg.entities = {{"e", {.model = {.spec = spec}}}};
+    return Scene(std::move(cfg)).model()->ntex;
+  };
+  const SpecPtr spec(mj_makeSpec());
+  mjsTexture* texture = mjs_addTexture(spec.get(), nullptr);
+  mjs_setName(texture->element, "t");
+  texture->type = mjTEXTURE_2D;
+  texture->width = texture->height = 2;
+  texture->nchannel = 3;
+  const unsigned char pixels[12] = {};
+  mjs_setBuffer(texture->data, pixels, 12);
+  EXPECT_EQ(make(spec.get()), 1);
+  spec->compiler.settotalmass = 7;
+  EXPECT_THAT(
+      [&] { make(spec.get()); },
+      ThrowsMessage<Error>(::testing::AllOf(
+          HasSubstr("entity 'e': compiled by itself, because its <compiler> sets settotalmass"),
+          HasSubstr("no support for buffer textures"))));
+}
+
 TEST(CompilerSettings, ABaseKeepsThemForItselfOnly) {
   const auto scene = [](const std::string& compiler, bool alone) {
     SceneCfg cfg;
@@ -256,6 +317,37 @@ TEST(CompilerSettings, ABaseKeepsThemForItselfOnly) {
                bounded = compile_text(robot("boundmass='.5'"), kAssets)->body_subtreemass[0];
   EXPECT_GT(bounded, plain + .5);
   EXPECT_NEAR(scene("boundmass='.5'", false), plain + bounded, 1e-9);
+}
+
+// Every model below the folders MJSENSE_TEST_MODELS (separated by ':') that MuJoCo itself loads.
+TEST(CompilerSettings, ModelsOfFolders) {
+  const char* folders = std::getenv("MJSENSE_TEST_MODELS");
+  if (!folders) GTEST_SKIP() << "MJSENSE_TEST_MODELS is not set";
+  std::stringstream list(folders);
+  int tested = 0;
+  for (std::string folder; std::getline(list, folder, ':');) {
+    for (const auto& entry : std::filesystem::recursive_directory_iterator(folder)) {
+      const std::string path = entry.path().string();
+      if (entry.path().extension() != ".xml") continue;
+      char error[1000];
+      const ModelPtr alone(mj_loadXML(path.c_str(), nullptr, error, sizeof error));
+      if (!alone) continue;
+      SCOPED_TRACE(path);
+      try {
+        SceneCfg cfg;
+        cfg.entities = {{"plain", {.model = {.xml = robot(""), .assets = kAssets}}},
+                        {"e", {.model = {.path = path}, .mocap_base = false}}};
+        const Scene scene(std::move(cfg));
+        Compare{alone.get(), scene.model(), "e/", 1e-9}.run();
+        const double mass = alone->body_subtreemass[0] - alone->body_mass[0];
+        std::printf("%s: %.6g kg\n", path.c_str(), mass);
+        ++tested;
+      } catch (const std::exception& e) {
+        std::printf("%s: %s\n", path.c_str(), e.what());
+      }
+    }
+  }
+  std::printf("%d models\n", tested);
 }
 
 TEST(CompilerSettings, OnlyWhatMakesADifferenceIsApplied) {

@@ -177,10 +177,10 @@ std::string save_xml(mjSpec* spec) {
   std::string error;
   spec->compiler.savecompiled = 0;
   if (auto xml = try_save(spec, error)) return *std::move(xml);
-  return save_compiled_xml(spec);
+  return save_compiled_xml(spec, "scene");
 }
 
-std::string save_compiled_xml(mjSpec* spec) {
+std::string save_compiled_xml(mjSpec* spec, std::string_view place) {
   std::string error;
   spec->compiler.savecompiled = 1;
   const int digits = _mjPRIVATE__get_xml_precision();
@@ -188,7 +188,7 @@ std::string save_compiled_xml(mjSpec* spec) {
   auto xml = try_save(spec, error);
   _mjPRIVATE__set_xml_precision(digits);
   spec->compiler.savecompiled = 0;
-  if (!xml) throw RuntimeError(fmt::format("scene: not saved as XML: {}", error));
+  if (!xml) throw RuntimeError(fmt::format("{}: not saved as XML: {}", place, one_line(error)));
   return *std::move(xml);
 }
 

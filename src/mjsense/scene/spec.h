@@ -75,8 +75,8 @@ ModelPtr compile(mjSpec* spec, const Vfs& vfs);
 std::string save_xml(mjSpec* spec);
 
 // The values that compile() made, with all their digits: what settings of <compiler> have done to
-// them too.
-std::string save_compiled_xml(mjSpec* spec);
+// them too. Throws RuntimeError that starts with `place`.
+std::string save_compiled_xml(mjSpec* spec, std::string_view place);
 
 std::string element_name(const mjsElement* element);
 // The elements of one type, in the order of the spec.
