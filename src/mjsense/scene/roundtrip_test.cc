@@ -53,8 +53,9 @@ std::vector<std::string> differences(const mjModel* a, const mjModel* b) {
       compare(name, x + 3 * i, y + 3 * i, used);
     }
   };
-#define X(type, name, nr, nc)                                                           \
-  if (std::string_view(#name) != "geom_size" && std::string_view(#name) != "site_size") \
+#define X(type, name, nr, nc)                                                             \
+  if (std::string_view(#name) != "geom_size" && std::string_view(#name) != "site_size" && \
+      std::string_view(#name) != "tendon_width")                                          \
     compare(#name, a->name, b->name, static_cast<long>(a->nr) * (nc));
 #define XNV X
   MJMODEL_POINTERS
@@ -62,6 +63,10 @@ std::vector<std::string> differences(const mjModel* a, const mjModel* b) {
 #undef X
   compare_sizes("geom_size", a->geom_type, a->geom_size, b->geom_size, a->ngeom);
   compare_sizes("site_size", a->site_type, a->site_size, b->site_size, a->nsite);
+  for (int t = 0; t < a->ntendon; ++t) {  // a fixed tendon is not drawn
+    if (a->wrap_type[a->tendon_adr[t]] == mjWRAP_JOINT) continue;
+    compare("tendon_width", a->tendon_width + t, b->tendon_width + t, 1);
+  }
   compare("opt.timestep", &a->opt.timestep, &b->opt.timestep, 1);
   compare("opt.gravity", a->opt.gravity, b->opt.gravity, 3);
   compare("opt.disableflags", &a->opt.disableflags, &b->opt.disableflags, 1);
