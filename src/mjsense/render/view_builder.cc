@@ -1,6 +1,7 @@
 #include "mjsense/render/view_builder.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 
 #include "mjsense/rays/flex_shapes.h"
@@ -19,6 +20,20 @@ constexpr float kFromBehind = 0.3f;  // MuJoCo's factor for the alpha of planes 
 // out = R^T v.
 void rotate_back(const double r[9], const double v[3], double out[3]) {
   for (int i = 0; i < 3; ++i) out[i] = r[i] * v[0] + r[3 + i] * v[1] + r[6 + i] * v[2];
+}
+
+// The size by which MuJoCo's visualiser scales a shape along its axes, and with texuniform its texture.
+std::array<float, 3> drawn_extent(const ViewGeom& g) {
+  const float* s = g.size;
+  switch (g.type) {
+    case mjGEOM_SPHERE:
+      return {s[0], s[0], s[0]};
+    case mjGEOM_CAPSULE:
+    case mjGEOM_CYLINDER:
+      return {s[0], s[0], s[1]};
+    default:
+      return {s[0], s[1], s[2]};
+  }
 }
 
 }  // namespace
@@ -249,27 +264,25 @@ void ViewBuilder::set_surface(const RayGeom& source, const float* rgba, const Ma
     s.texture = nullptr;
     return;
   }
+  const std::array<float, 3> extent = drawn_extent(g);
+  s.from_above = (g.mesh && !s.mapped) || g.height_field;
+  const bool endless = g.type == mjGEOM_PLANE && (g.size[0] <= 0 || g.size[1] <= 0);
   for (int i = 0; i < 2; ++i) {
-    const float size = g.size[i] > 0 ? g.size[i] : 1.0f;
-    s.repeat[i] = material->repeat[i] * (uniform && !s.mapped ? size : 1.0f);
-    const bool from_above = (g.mesh && !s.mapped) || g.height_field;
-    if (from_above || (g.type == mjGEOM_PLANE && g.size[i] <= 0)) s.shift[i] = -0.5f;
-    if (from_above && g.object == mjOBJ_SKIN)  // the texture stays where it is in the world
+    s.repeat[i] = material->repeat[i];
+    if (s.repeat[i] <= 0 && !s.from_above) s.repeat[i] = 1;
+    if (uniform && extent[i] > 0) s.repeat[i] *= extent[i];
+    if (s.from_above || endless) s.shift[i] = -0.5f;
+    if (s.from_above && g.object == mjOBJ_SKIN)  // the texture stays where it is in the world
       s.shift[i] += (i ? -0.5f : 0.5f) * s.repeat[i] * static_cast<float>(source.pos[i]);
   }
   // Cube maps: MuJoCo takes directions in the unit shape that it scales (meshes and planes: in
   // metres).
   const bool in_meters = g.mesh || g.height_field || g.type == mjGEOM_PLANE;
   for (int i = 0; i < 3; ++i) {
-    float size = g.size[i];
-    if (g.type == mjGEOM_SPHERE ||
-        ((g.type == mjGEOM_CAPSULE || g.type == mjGEOM_CYLINDER) && i < 2))
-      size = g.size[0];
-    if ((g.type == mjGEOM_CAPSULE || g.type == mjGEOM_CYLINDER) && i == 2) size = g.size[1];
     if (in_meters) {
-      s.stretch[i] = uniform ? size : 1.0f;
+      s.stretch[i] = uniform ? extent[i] : 1.0f;
     } else {
-      s.stretch[i] = uniform || size <= 0 ? 1.0f : 1.0f / size;
+      s.stretch[i] = uniform || extent[i] <= 0 ? 1.0f : 1.0f / extent[i];
     }
   }
 }
