@@ -19,20 +19,25 @@
 namespace mjsense::python {
 
 // Words for enumerations, read by their own functions.
-void read_custom(FromPython& f, nb::handle value, Operation& out) {
+template <class Word>
+void read_word(FromPython& f, nb::handle value, const char* field,
+               Word (*from_name)(std::string_view), Word& out) {
   std::string name;
-  f.read("operation", value, name);
-  out = operation_from_name(name);
+  f.read(field, value, name);
+  try {
+    out = from_name(name);
+  } catch (const ValueError& e) {
+    throw ValueError(config_place(f.config()) + ": " + e.what());
+  }
+}
+void read_custom(FromPython& f, nb::handle value, Operation& out) {
+  read_word(f, value, "operation", &operation_from_name, out);
 }
 void read_custom(FromPython& f, nb::handle value, NanPolicy::Action& out) {
-  std::string name;
-  f.read("action", value, name);
-  out = NanPolicy::action_from_name(name);
+  read_word(f, value, "action", &NanPolicy::action_from_name, out);
 }
 void read_custom(FromPython& f, nb::handle value, Dropout::Mode& out) {
-  std::string name;
-  f.read("mode", value, name);
-  out = Dropout::mode_from_name(name);
+  read_word(f, value, "mode", &Dropout::mode_from_name, out);
 }
 void read_custom(FromPython& f, nb::handle value, Draw& out) {
   nb::object kind = nb::getattr(value, "kind", nb::none());
@@ -232,6 +237,21 @@ class PyChain {
 }  // namespace
 
 void bind_effects(nb::module_& m) {
+  const auto class_name = [](nb::handle object) {
+    return nb::cast<std::string>(object.type().attr("__name__"));
+  };
+  add_cfg_check("Effect", [class_name](nb::handle config) {
+    FromPython reader(config);
+    std::shared_ptr<const Effect> effect;
+    read_custom(reader, config, effect);
+    effect->validate(class_name(config));
+  });
+  add_cfg_check("Draw", [class_name](nb::handle config) {
+    FromPython reader(config);
+    Draw draw;
+    read_custom(reader, config, draw);
+    draw.validate(class_name(config));
+  });
   nb::class_<PyChain>(m, "EffectChain", "Effects on rows that come from anywhere.")
       .def(nb::init<nb::handle, int, int, double, std::uint64_t>(), nb::arg("config"),
            nb::arg("size"), nb::arg("num_worlds"), nb::arg("period"), nb::arg("seed"))

@@ -1,5 +1,8 @@
 #include "mjsense/rollout/action_sensors.h"
 
+#include <fmt/format.h>
+#include <fmt/ranges.h>
+
 #include <algorithm>
 #include <cmath>
 
@@ -14,6 +17,20 @@ namespace {
 bool terminal(const Task& task, const World& world) {
   return task.done_received(world.id) ||
          (task.cfg().terminate_upon_success && task.evaluate(world).success);
+}
+
+// "arm: rad; gripper: 0 open .. 255 closed"
+template <class Wanted>
+std::string command_units(const Task& task, Wanted&& wanted) {
+  std::vector<std::string> units;
+  for (const MoveGroup& group : task.robot().groups()) {
+    if (group.controlled() && wanted(group))
+      units.push_back(group.name + ": " + group.command_unit);
+  }
+  return fmt::format("{}", fmt::join(units, "; "));
+}
+std::string command_units(const Task& task) {
+  return command_units(task, [](const MoveGroup&) { return true; });
 }
 
 class ActionSensor : public JsonSensor {
@@ -50,8 +67,8 @@ class ActionSensor : public JsonSensor {
 class CommandedAction final : public ActionSensor {
  public:
   CommandedAction(const Task& task, const ActionLog& log)
-      : ActionSensor("actions/commanded_action", "The policy's action, as it gave it.", "", task,
-                     log) {}
+      : ActionSensor("actions/commanded_action", "The policy's action, as it gave it.",
+                     command_units(task), task, log) {}
 
  protected:
   void write(const World& world, JsonWriter& json) override {
@@ -81,10 +98,8 @@ class CommandedAction final : public ActionSensor {
 class JointPos final : public ActionSensor {
  public:
   JointPos(const Task& task, const ActionLog& log)
-      : ActionSensor("actions/joint_pos",
-                     "Targets of the position controllers, without noise; grippers: the actuator's "
-                     "command.",
-                     "rad or m", task, log) {}
+      : ActionSensor("actions/joint_pos", "Targets of the controllers, without noise.",
+                     command_units(task), task, log) {}
 
  protected:
   void write(const World& world, JsonWriter& json) override {
@@ -99,12 +114,16 @@ class JointPos final : public ActionSensor {
   std::size_t max_bytes() const override { return bytes(); }
 };
 
+bool has_target_for_each_joint(const MoveGroup& group) {
+  return group.controlled() && group.actuators.size() == group.joints.size();
+}
+
 class JointPosRel final : public ActionSensor {
  public:
   JointPosRel(const Task& task, const ActionLog& log)
       : ActionSensor("actions/joint_pos_rel",
                      "Targets of the controllers minus the joint positions observed before.",
-                     "rad or m", task, log) {}
+                     command_units(task, has_target_for_each_joint), task, log) {}
 
  protected:
   void write(const World& world, JsonWriter& json) override {
@@ -120,7 +139,7 @@ class JointPosRel final : public ActionSensor {
       for (int g : sorted_) {
         const GroupValues& target = targets(world)[g];
         const GroupValues& qpos = before.qpos[g];
-        if (!group(g).controlled() || target.size != qpos.size) continue;
+        if (!has_target_for_each_joint(group(g))) continue;
         json.key(group(g).name).begin_array();
         for (int i = 0; i < target.size; ++i) json.value(target.values[i] - qpos.values[i]);
         json.end_array();

@@ -10,7 +10,8 @@
 
 namespace mjsense {
 
-// Units: rad or m (joints), the actuators' own (grippers), m and wxyz (poses). All are JSON, their
+// Units: what each group's actuators take (MoveGroup::command_unit: rad of an arm's servos, 0 open .. 255
+// closed of a gripper), m and wxyz (poses). All are JSON, their
 // keys move groups. "Before" is the observation that the action answers.
 //
 //   actions/commanded_action  as the policy gave it, rounded to float32; {} first; keeps its value

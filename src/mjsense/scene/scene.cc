@@ -7,9 +7,11 @@
 #include <cmath>
 #include <utility>
 
+#include "mjsense/core/checks.h"
 #include "mjsense/core/error.h"
 #include "mjsense/scene/attach.h"
 #include "mjsense/scene/compiler_settings.h"
+#include "mjsense/scene/model_check.h"
 #include "mjsense/scene/model_sensors/model_sensor.h"
 #include "mjsense/scene/resolve.h"
 #include "mjsense/scene/spec.h"
@@ -47,6 +49,12 @@ Entity describe(const mjModel* model, const std::string& name, bool fixed_base) 
 }
 
 }  // namespace
+
+void validate(const SceneCfg& cfg, std::string_view place) {
+  require_not_negative(cfg.env_spacing, place, "env_spacing");
+  if (cfg.extent) require_positive(*cfg.extent, place, "extent");
+  validate(cfg.options, place == "scene" ? "options" : place);
+}
 
 struct Scene::Impl {
   SceneCfg cfg;
@@ -114,18 +122,14 @@ void Scene::Impl::check_base_alone() {
 
 // Base, options, terrain, entities.
 void Scene::Impl::attach() {
+  validate(cfg, "scene");
   spec = cfg.spec           ? SpecPtr(cfg.spec, SpecDelete{false})
          : cfg.base.empty() ? SpecPtr(mj_makeSpec())
                             : parse_model(cfg.base, "scene base");
   attached.push_back(adopt_base(spec.get(), cfg.base, vfs, warnings));
   set_options();
   if (std::isnan(spec->stat.meansize)) spec->stat.meansize = 0.03;
-  if (cfg.extent) {
-    if (!(*cfg.extent > 0)) {
-      throw ValueError(fmt::format("scene: extent = {} must be positive (m)", *cfg.extent));
-    }
-    spec->stat.extent = *cfg.extent;
-  }
+  if (cfg.extent) spec->stat.extent = *cfg.extent;
   spec->compiler.savecompiled = 0;             // numbers are saved exactly
   spec->compiler.conflict = mjCONFLICT_MERGE;  // sizes: the larger wins
   check_base_alone();
@@ -178,6 +182,7 @@ void Scene::Impl::compile() {
     model = mjsense::compile(spec.get(), vfs);
   }
   if (!model) throw ValueError(fmt::format("scene: {}", one_line(mjs_getError(spec.get()))));
+  check_model(model.get(), warnings);
   merge_initial_states(attached, model.get());
   if (!mj_copyBack(spec.get(), model.get())) {  // the keyframe, for to_xml()
     throw RuntimeError(fmt::format("scene: {}", mjs_getError(spec.get())));

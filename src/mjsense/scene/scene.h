@@ -41,6 +41,9 @@ struct SceneCfg {
   mjSpec* spec = nullptr;
 };
 
+// Throws ValueError for numbers and options that no scene can have.
+void validate(const SceneCfg& cfg, std::string_view place);
+
 // Names of an entity's elements, local (without the prefix), in model order. An element that its
 // MJCF leaves unnamed is given a name: its type and its number among the entity's elements of that
 // type, "geom_3"; a free joint "floating_base_joint".

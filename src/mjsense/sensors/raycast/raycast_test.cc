@@ -89,6 +89,31 @@ std::string error_of(const std::shared_ptr<RayCastSensorCfg>& cfg) {
   return "";
 }
 
+// What is wrong in any model is refused before there is one.
+TEST(RayCast, RefusesAWrongConfigurationWhenItIsBuilt) {
+  const auto message = [](auto change) -> std::string {
+    const auto cfg = sensor_cfg<RayCastSensorCfg>();
+    change(*cfg);
+    try {
+      cfg->build();
+    } catch (const Error& e) {
+      return e.what();
+    }
+    return "";
+  };
+  using Cfg = RayCastSensorCfg;
+  EXPECT_EQ(message([](Cfg&) {}), "");
+  EXPECT_THAT(message([](Cfg& c) { c.pattern = GridPattern{.resolution = 0}; }),
+              HasSubstr("grid resolution is 0: must be above 0"));
+  EXPECT_THAT(message([](Cfg& c) { c.pattern = PinholePattern{.fovy = 180}; }), HasSubstr("fovy"));
+  EXPECT_THAT(message([](Cfg& c) { c.pattern = RingPattern{.include_center = false}; }),
+              HasSubstr("no rays"));
+  EXPECT_THAT(message([](Cfg& c) { c.pattern = UserPattern{.times = {1}}; }), HasSubstr("time 0"));
+  EXPECT_EQ(message([](Cfg& c) { c.pattern = PinholePattern::from_mujoco_camera("eye"); }), "");
+  EXPECT_THAT(message([](Cfg& c) { c.frame[0].type = "goem"; }), HasSubstr("is a 'goem'"));
+  EXPECT_THAT(message([](Cfg& c) { c.viz.ray_width = -1; }), HasSubstr("ray_width is -1"));
+}
+
 TEST(RayCast, SeesItsChildButNotItself) {
   Lab lab({sensor_cfg<RayCastSensorCfg>()});
   EXPECT_THAT(lab.read("distances"), ElementsAre(FloatNear(0.45f, 1e-6f)));
