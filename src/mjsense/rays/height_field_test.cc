@@ -136,8 +136,8 @@ Ray random_ray(Rng& rng, const Field& field) {
   if (kind == 4) d[2] *= 0.01;         // grazing
   if (kind == 3) d[rng.below(2)] = 0;  // along the grid
   mju_normalize3(d);
-  // Before the target, at it, or behind it: above, on, inside.
-  const double away = rng.below(8) == 0   ? 0
+  // Far before the target, close before it, or behind it: above, inside.
+  const double away = rng.below(8) == 0   ? 1e-4
                       : rng.below(8) == 0 ? rng.uniform(-1, 0)
                                           : rng.uniform(0, 10);
   double o[3];
