@@ -30,6 +30,20 @@ inline void nudge(int i, double length, const double from[3], double to[3]) {
   for (int k = 0; k < 3; ++k, i /= 3) to[k] = from[k] + length * (i % 3 - 1);
 }
 
+// Whether the point that a ray hit lies on a surface, to 2 micrometres along its normal.
+inline bool on_surface(const TestModel& m, const double o[3], const double d[3], const Hit& hit) {
+  constexpr double kClear = 1e-4;
+  double above[3], from[3], down[3];
+  for (int k = 0; k < 3; ++k) down[k] = -static_cast<double>(hit.normal[k]);
+  mju_normalize3(down);
+  for (int k = 0; k < 3; ++k) above[k] = o[k] + hit.t * d[k] - kClear * down[k];
+  for (int i = 0; i < 27; ++i) {  // a point of the very border
+    nudge(i, 1e-7, above, from);
+    if (std::abs(mujoco_ray(m, from, down).t - kClear) < 2e-6) return true;
+  }
+  return false;
+}
+
 // Same surface at the same place; where they differ, the ray must graze, start on a surface, or
 // slide along a wall: moved by some micrometres, sideways or back along itself, or turned by a
 // microradian, mj_ray itself changes its mind.
@@ -39,7 +53,10 @@ inline bool agree(const TestModel& m, const double o[3], const double d[3], cons
     // A plane met at a grazing angle a kilometre away is where directions in float32 show.
     return std::abs(hit.t - r.t) <= (r.t > 100 ? 1e-3 * r.t : 1e-5 * std::max(1.0, 0.1 * r.t));
   };
-  if (same(mujoco_ray(m, o, d))) return true;
+  const Truth straight = mujoco_ray(m, o, d);
+  if (same(straight)) return true;
+  const bool nearer = !!hit && (straight.t < 0 || hit.t < straight.t);
+  if (nearer && on_surface(m, o, d, hit)) return true;
   double lowest = 1e300, highest = -1e300;
   const auto same_from = [&](const double from[3], const double along[3], double back) {
     double moved[3];
