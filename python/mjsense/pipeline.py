@@ -77,8 +77,8 @@ class ObservationPipeline(KnownAttributes):
 
     def reset(self, world_ids: Sequence[int] | None = None) -> None:
         """These worlds (None: all) forget what they have seen."""
-        if self._chain is not None and (world_ids is None or len(world_ids)):
-            self._chain.reset([] if world_ids is None else [int(w) for w in world_ids])
+        if self._chain is not None:
+            self._chain.reset(None if world_ids is None else [int(w) for w in world_ids])
 
     def __call__(self, values: Any) -> np.ndarray:
         rows = np.ascontiguousarray(values, dtype=np.float32)

@@ -17,7 +17,7 @@ SAYS = {"01": "landed: [9.81 9.81 9.81 9.81]", "02": "picture: (3, 48, 64, 3) ui
 
 @pytest.mark.parametrize("name", sorted(p.name for p in EXAMPLES.glob("*.py")))
 def test_example(name, tmp_path):
-    env = {**os.environ, "PYTHONPATH": str(Path(mjsense.__file__).absolute().parents[1])}
+    env = {**os.environ, "PYTHONPATH": str(Path(mjsense.__file__).absolute().parents[1]), "TMPDIR": str(tmp_path)}
     done = subprocess.run(
         [sys.executable, EXAMPLES / name], cwd=tmp_path, env=env, capture_output=True, text=True, timeout=300
     )

@@ -66,6 +66,7 @@ struct Scene::Impl {
   std::vector<Entity> entities;
   std::vector<std::unique_ptr<Sensor>> sensors;
   std::vector<std::string> warnings;
+  std::weak_ptr<void> claim;
 
   void build();
   void attach();
@@ -202,6 +203,18 @@ const std::map<std::string, std::string>& Scene::assets() const { return impl_->
 const std::vector<std::unique_ptr<Sensor>>& Scene::sensors() const { return impl_->sensors; }
 const std::vector<Entity>& Scene::entities() const { return impl_->entities; }
 const std::vector<std::string>& Scene::warnings() const { return impl_->warnings; }
+
+std::shared_ptr<void> Scene::claim() {
+  if (!impl_->claim.expired()) {
+    throw RuntimeError(
+        "this scene belongs to a simulation already, whose rows its sensors hold: make another "
+        "Scene "
+        "of the same configuration");
+  }
+  std::shared_ptr<void> claim = std::make_shared<char>();
+  impl_->claim = claim;
+  return claim;
+}
 
 std::string Scene::to_xml() const { return save_xml(impl_->spec.get()); }
 

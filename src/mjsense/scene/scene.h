@@ -77,6 +77,10 @@ class Scene {
   Sensor* find_sensor(std::string_view key) const;  // null if there is none
   Sensor& sensor(std::string_view key) const;       // throws KeyError with the nearest names
 
+  // The sensors hold the rows of one simulation at a time: this scene is taken until the result is
+  // destroyed. Throws RuntimeError if it is taken.
+  std::shared_ptr<void> claim();
+
   const std::vector<Entity>& entities() const;        // the terrain, if any, first
   const Entity& entity(std::string_view name) const;  // throws KeyError with the nearest names
 
