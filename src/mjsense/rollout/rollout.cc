@@ -45,7 +45,8 @@ std::vector<RecordedCamera> chosen_cameras(const RobotCfg& robot, const RolloutC
                        .mjcf_camera = std::string(Robot::kPrefix) + mount->mjcf_camera,
                        .width = cfg.width.value_or(robot.image_width),
                        .height = cfg.height.value_or(robot.image_height),
-                       .depth = cfg.depth || mount->record_depth});
+                       .depth = cfg.depth || mount->record_depth,
+                       .image_points = mount->image_points});
   }
   return cameras;
 }
