@@ -599,10 +599,18 @@ class CameraSensorCfg(SensorCfg):
     """Parallel rays. Beside ``camera_name`` it is this sensor's alone."""
     clone_data: bool = False
     """``data`` is a copy at every read."""
+    enabled_site_groups: Sequence[int] = ()
+    """Groups (0 to 5) of sites that are drawn, as MuJoCo draws them."""
+    enabled_tendon_groups: Sequence[int] = ()
+    """Groups (0 to 5) of tendons that are drawn, as MuJoCo draws them."""
+    max_lights: int = 8
+    """Of the lights that are on, the headlight first, so many shine, 0 to 32. MuJoCo's OpenGL has 8."""
     near: float = 0.0
     """m from the camera plane; what is nearer is not seen."""
     far: float = 0.0
     """m; 0: no limit."""
+    clip_near: str = "none"
+    """none, or model: ``near`` is where MuJoCo's renderers clip, ``visual/map/znear`` times the model's extent."""
     update_period: float = 0.0
     """s between images; 0: at every read."""
     phase: float = 0.0

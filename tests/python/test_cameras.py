@@ -1,3 +1,4 @@
+import mujoco
 import numpy as np
 import pytest
 
@@ -107,3 +108,91 @@ def test_orthographic_highlights_are_those_of_opengl():
         pytest.skip(str(error))
     difference = s["rays"].data.rgb.astype(float) - s["opengl"].data.rgb
     assert np.abs(difference).mean() < 1
+
+
+MARKED = """
+<mujoco>
+  <worldbody>
+    <light pos="0 0 3"/>
+    <geom type="plane" size="3 3 .1"/>
+    <site name="anchor" pos="-.5 0 1" size=".02"/>
+    <body name="ball" pos=".4 0 .6"><joint type="slide" axis="0 1 0"/><geom size=".1" mass="1"/>
+      <site name="goal" pos="0 0 .2" size=".12" rgba="0 1 0 1"/></body>
+    <camera name="eye" pos="0 -2.5 1.2" xyaxes="1 0 0 0 .3 1"/>
+  </worldbody>
+  <tendon><spatial name="rope" width=".01"><site site="anchor"/><site site="goal"/></spatial></tendon>
+</mujoco>
+"""
+
+
+def marked(renderer="rays", groups=(0,), num_worlds=1):
+    types = ("rgb", "depth", "segmentation", "body_segmentation", "entity_segmentation", "flow")
+    camera = mjs.CameraSensorCfg("eye", camera_name="room/eye", width=80, height=60, data_types=types, renderer=renderer, use_shadows=True,
+                                 enabled_site_groups=groups, enabled_tendon_groups=groups)  # fmt: skip
+    s = mjs.Scene(mjs.SceneCfg(entities={"room": mjs.EntityCfg(model=MARKED)}, sensors=(camera,)))
+    try:
+        return s, mjs.Simulation(s, num_worlds=num_worlds)
+    except RuntimeError as error:
+        if renderer == "opengl":
+            pytest.skip(str(error))
+        raise
+
+
+SITE, TENDON = int(mujoco.mjtObj.mjOBJ_SITE), int(mujoco.mjtObj.mjOBJ_TENDON)
+
+
+@pytest.mark.parametrize("renderer", ["rays", "opengl"])
+def test_sites_and_tendons_move_with_their_world(renderer):
+    s, sim = marked(renderer, num_worlds=3)
+    for _ in range(3):  # so that what stands still is kept
+        s["eye"].data.rgb  # noqa: B018
+        sim.forward()
+    for world in range(3):
+        sim.qpos[world, 0] = 0.3 * world
+    sim.forward()
+    many = {name: array.copy() for name, array in s["eye"].fields.items()}
+    kinds = many["segmentation"][..., 1]
+    assert (kinds == SITE).sum((1, 2)).min() > 20 and (kinds == TENDON).sum((1, 2)).min() > 10
+    assert len({many["segmentation"][world].tobytes() for world in range(3)}) == 3
+    for world in range(3):  # a world looks as it does alone
+        one, alone = marked(renderer)
+        alone.qpos[0, 0] = 0.3 * world
+        alone.forward()
+        for name, array in one["eye"].fields.items():
+            if name != "flow":
+                np.testing.assert_array_equal(array[0], many[name][world], err_msg=name)
+
+
+def test_sites_and_tendons_belong_to_the_entity_that_brought_them():
+    s, _ = marked()
+    data = s["eye"].data
+    kinds = data.segmentation[0, ..., 1]
+    assert (data.entity_segmentation[0, ..., 0][kinds == TENDON] == 0).all()
+    assert (data.body_segmentation[0, ..., 0][kinds == TENDON] == -1).all()
+    goal = (kinds == SITE) & (data.segmentation[0, ..., 0] == 1)
+    assert goal.sum() > 20 and (data.body_segmentation[0, ..., 0][goal] == s.model.site_bodyid[1]).all()
+
+
+def test_the_flow_of_a_site_is_that_of_its_body():
+    s, sim = marked()
+    s["eye"].data.flow  # noqa: B018, the image before
+    sim.qpos[0, 0] = 0.1
+    sim.forward()
+    data = s["eye"].data
+    kinds, flow = data.segmentation[0, ..., 1], data.flow[0]
+    goal = (kinds == SITE) & (data.segmentation[0, ..., 0] == 1)
+    assert np.isfinite(flow[goal]).all() and (np.abs(flow[goal]) > 0).any()
+    assert np.isnan(flow[kinds == TENDON]).all()
+
+
+def test_a_site_may_look_different_in_each_world():
+    s, sim = marked(num_worlds=2)
+    colors, groups = np.array([s.model.site_rgba] * 2), np.array([s.model.site_group] * 2)
+    colors[1, 1], groups[0, 0] = (1, 0, 0, 1), 4
+    sim.randomize("site_rgba", colors)
+    sim.randomize("site_group", groups)
+    rgb, seen = s["eye"].data.rgb, s["eye"].data.segmentation
+    goal = (seen[..., 1] == SITE) & (seen[..., 0] == 1)
+    assert rgb[0][goal[0]].mean(0).argmax() == 1 and rgb[1][goal[1]].mean(0).argmax() == 0
+    anchors = ((seen[..., 1] == SITE) & (seen[..., 0] == 0)).sum((1, 2))
+    assert anchors[0] == 0 < anchors[1]

@@ -46,8 +46,12 @@ void fields(Fields& f, CameraSensorCfg& c) {
   f("enabled_geom_groups", c.enabled_geom_groups);
   f("orthographic", c.orthographic);
   f("clone_data", c.clone_data);
+  f("enabled_site_groups", c.enabled_site_groups);
+  f("enabled_tendon_groups", c.enabled_tendon_groups);
+  f("max_lights", c.max_lights);
   f("near", c.near);
   f("far", c.far);
+  f("clip_near", c.clip_near);
   f("update_period", c.update_period);
   f("phase", c.phase);
   f("samples", c.samples);

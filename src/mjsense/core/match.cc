@@ -8,7 +8,7 @@
 #include <algorithm>
 
 #include "mjsense/core/error.h"
-#include "mjsense/core/python_regex.h"
+#include "mjsense/core/pattern_subset.h"
 
 namespace mjsense {
 
@@ -36,9 +36,8 @@ Regex::Regex(std::string_view pattern, std::string_view place)
     return ValueError(
         fmt::format("{}: '{}' is not a regular expression: {}", place, pattern, what));
   };
-  PcrePattern translated;
   try {
-    translated = translate_python_regex(pattern);
+    check_pattern_subset(pattern);
   } catch (const ValueError& error) {
     throw fault(error.what());
   }
@@ -47,14 +46,13 @@ Regex::Regex(std::string_view pattern, std::string_view place)
   std::unique_ptr<pcre2_compile_context, void (*)(pcre2_compile_context*)> context(
       pcre2_compile_context_create(nullptr), pcre2_compile_context_free);
   pcre2_set_newline(context.get(), PCRE2_NEWLINE_LF);
-  code_->code =
-      pcre2_compile(reinterpret_cast<PCRE2_SPTR>(translated.text.data()), translated.text.size(),
-                    PCRE2_UTF | PCRE2_MATCH_INVALID_UTF | (translated.ascii ? 0 : PCRE2_UCP),
-                    &error, &offset, context.get());
+  code_->code = pcre2_compile(reinterpret_cast<PCRE2_SPTR>(pattern.data()), pattern.size(),
+                              PCRE2_UTF | PCRE2_MATCH_INVALID_UTF | PCRE2_UCP, &error, &offset,
+                              context.get());
   if (!code_->code) {
     PCRE2_UCHAR message[256];
     pcre2_get_error_message(error, message, sizeof message);
-    throw fault(reinterpret_cast<char*>(message));
+    throw fault(fmt::format("{} at position {}", reinterpret_cast<char*>(message), offset));
   }
 }
 

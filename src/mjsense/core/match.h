@@ -1,6 +1,7 @@
 #pragma once
 // Regular expressions with the meaning of Python's `re`: case-sensitive, Unicode. Names of elements
-// are matched by them.
+// are matched by them. PCRE2 does the work; pattern_subset.h says which patterns are taken: all 52
+// of mjlab 1.6 are. (A translator of all of Python's syntax stood here: three times the code.)
 
 #include <memory>
 #include <span>

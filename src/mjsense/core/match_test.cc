@@ -45,11 +45,11 @@ TEST(Match, SaysWhatIsWrong) {
   EXPECT_EQ(fault({"FR.*", ".*_foot"}),
             "sensor 'feet': Multiple matches for 'FR_foot': the patterns 'FR.*' and '.*_foot'");
   EXPECT_EQ(fault({"FR_(foot"}),
-            "sensor 'feet': 'FR_(foot' is not a regular expression: missing ), unterminated "
-            "subpattern at position 3");
-  EXPECT_THAT(fault({"*"}), HasSubstr("nothing to repeat at position 0"));
-  EXPECT_THAT(fault({"a**"}), HasSubstr("multiple repeat"));
-  EXPECT_THAT(fault({"\\h"}), HasSubstr("bad escape \\h"));
+            "sensor 'feet': 'FR_(foot' is not a regular expression: missing closing parenthesis at "
+            "position 8");
+  EXPECT_THAT(fault({"*"}), HasSubstr("nothing that this could repeat at position 0"));
+  EXPECT_THAT(fault({"a**"}), HasSubstr("nothing that this could repeat at position 2"));
+  EXPECT_THAT(fault({"\\h"}), HasSubstr("not supported: \\h at position 0"));
 }
 
 TEST(Match, ExcludeSearchesOrCompares) {
@@ -60,28 +60,40 @@ TEST(Match, ExcludeSearchesOrCompares) {
   EXPECT_FALSE(exclude.drops("FR_calf_2"));
 }
 
-// Syntax on which PCRE2 by itself would differ from Python.
-TEST(Match, PythonsDialect) {
+std::string refusal(const std::string& pattern) {
+  try {
+    Regex regex(pattern, "x");
+  } catch (const ValueError& error) {
+    return error.what();
+  }
+  return "";
+}
+
+// Where PCRE2 by itself would differ from Python: refused, not read otherwise.
+TEST(Match, RefusesWhatTheTwoReadDifferently) {
+  for (const char* pattern :
+       {"[[:a]",  "a{,2}b",         "a{}",     "\\u00e9", "\\N{DIGIT ONE}", "a\\Z",    "(?x) a b",
+        "(a)\\1", "(?P<n>a)(?P=n)", "\\v",     "(?a)\\w", "(?(1)a|b)",      "\\101",   "\\0",
+        "a(?i)b", "(?-i:a)",        "\\Qa\\E", "(?|a|b)", "(*UTF)a",        "[\\w-a]", "\\h",
+        "\\x4"}) {
+    EXPECT_THAT(refusal(pattern), HasSubstr("not supported")) << pattern;
+  }
+  EXPECT_EQ(refusal("FR_\\Z"),
+            "x: 'FR_\\Z' is not a regular expression: not supported: \\Z at position 3");
+}
+
+TEST(Match, PythonsMeaning) {
   const auto full = [](const char* pattern, std::string_view text) {
     return Regex(pattern).fullmatch(text);
   };
-  EXPECT_TRUE(full("[[:a]", ":"));
-  EXPECT_TRUE(full("a{,2}b", "aab"));
-  EXPECT_TRUE(full("a{,}b", "aaab"));
-  EXPECT_TRUE(full("a{}", "a{}"));
-  EXPECT_TRUE(full("\\u00e9+", "éé"));
+  EXPECT_TRUE(full("é+", "éé"));
   EXPECT_TRUE(full("\\w+", "bras_été_3"));
-  EXPECT_FALSE(full("(?a)\\w+", "été"));
-  EXPECT_FALSE(full("a\\Z", "a\n"));
   EXPECT_TRUE(full("a$\\n", "a\n"));
-  EXPECT_TRUE(full("(?x) a b # comment (", "ab"));
-  EXPECT_TRUE(full("(a)(?P<n>b)\\1(?P=n)", "abab"));
-  EXPECT_TRUE(full("\\v", "\v"));
-  EXPECT_FALSE(full("\\v", "\n"));
   EXPECT_TRUE(full("a|ab", "ab"));  // fullmatch goes on after the first alternative
   EXPECT_TRUE(full("(?i)foot", "FOOT"));
+  EXPECT_TRUE(full("(?i:f)oot", "Foot"));
   EXPECT_FALSE(full("foot", "Foot"));
-  EXPECT_TRUE(full("\\s", "\x1c"));
+  EXPECT_TRUE(full("[]a\\[-]+", "]a[-"));
 }
 
 // 10,000 random pattern lists against Python's re: which names are matched, which lists are errors.
@@ -97,12 +109,20 @@ anchors = ["^", "$", r"\A", r"\Z", r"\b"]
 quants = ["*", "+", "?", "{2}", "{1,2}", "{,2}", "{1,}", "*?", "+?", "??", "{0,2}?", "{,}"]
 if sys.version_info >= (3, 11): quants += ["*+", "++", "?+"]
 
+# Half of the lists keep to what is supported; the others may be refused.
+beyond = {r"\u00e9", "[[:alpha:]]", "{", "{}", "{a", r"\101", r"\0", r"[\101]", r"\Z", "{,2}", "{,}"}
+inside = False
+
+def choose(choices):
+    return rng.choice([c for c in choices if not (inside and c in beyond)])
+
 def piece(depth, state):
     x = rng.random()
     if depth > 0 and x < .3:
         body = alternation(depth - 1, state)
         kind = rng.choice(["(", "(", "(?:", "(?=", "(?!", "(?P<", "(?i:", "(?s-i:", "(?<=", "(?<!", "(?#", "(?>"])
-        if kind == "(?#": return "(?#comment)"
+        if kind == "(?s-i:" and inside: kind = "(?s:"
+        if kind == "(?#": return "" if inside else "(?#comment)"
         if kind == "(?>" and sys.version_info < (3, 11): kind = "(?:"
         if kind in ("(?<=", "(?<!"): return kind + rng.choice(["F", "_", "[FR]", "foot", r"\w", "a|b"]) + ")"
         if kind == "(": state[0] += 1
@@ -110,17 +130,17 @@ def piece(depth, state):
             state[0] += 1; state[1] += 1
             kind = "(?P<n%d>" % state[1]
         return kind + body + ")"
-    if x < .36: return rng.choice(anchors)
-    if x < .40 and state[0]: return "\\%d" % rng.randint(1, state[0])
-    if x < .42 and state[1]: return "(?P=n%d)" % rng.randint(1, state[1])
-    if x < .43 and state[0]: return "(?(%d)%s|%s)" % (rng.randint(1, state[0]), rng.choice(atoms), rng.choice(atoms))
-    return rng.choice(atoms)
+    if x < .36: return choose(anchors)
+    if x < .40 and state[0] and not inside: return "\\%d" % rng.randint(1, state[0])
+    if x < .42 and state[1] and not inside: return "(?P=n%d)" % rng.randint(1, state[1])
+    if x < .43 and state[0] and not inside: return "(?(%d)%s|%s)" % (rng.randint(1, state[0]), rng.choice(atoms), rng.choice(atoms))
+    return choose(atoms)
 
 def sequence(depth, state):
     out = ""
     for _ in range(rng.randint(0 if depth < 2 else 1, 4)):
         out += piece(depth, state)
-        if rng.random() < .25: out += rng.choice(quants)
+        if rng.random() < .25: out += choose(quants)
     return out
 
 def alternation(depth, state):
@@ -133,10 +153,10 @@ def pattern(names):
     if x < .25:  # derived from a name, so that it matches
         n = rng.choice(names)
         k = rng.randint(0, len(n))
-        return re.escape(n[:k]) + rng.choice([".*", r"\w*", "[^/]*", "(?:.|)+", ".*?"]) + rng.choice(["", "$", r"\Z"])
+        return re.escape(n[:k]) + rng.choice([".*", r"\w*", "[^/]*", "(?:.|)+", ".*?"]) + choose(["", "$", r"\Z"])
     if x < .35: return "(.*_)?" + rng.choice(["foot", "calf", "hip|link", "(?!foot).*", r"\d+"]) + rng.choice(["", ".*"])
-    if x < .40: return "".join(rng.choice("()[]{}?*+|\\^$.aF_0-:!=<P>#") for _ in range(rng.randint(1, 7)))  # mostly errors
-    return rng.choice(["", "", "", "(?i)", "(?s)", "(?x)", "(?a)"]) + alternation(2, [0, 0])
+    if x < .40 and not inside: return "".join(rng.choice("()[]{}?*+|\\^$.aF_0-:!=<P>#") for _ in range(rng.randint(1, 7)))  # mostly errors
+    return rng.choice(["", "", "", "(?i)", "(?s)"] + ([] if inside else ["(?x)", "(?a)"])) + alternation(2, [0, 0])
 
 def expected(patterns, names, excludes):
     found, used = [], set()
@@ -159,6 +179,7 @@ def beyond_this_python(strings):
 
 def code(strings): return ",".join("x" + s.encode().hex() for s in strings)
 for _ in range(int(sys.argv[2])):
+    inside = not inside
     while True:
         names = [name() for _ in range(rng.randint(1, 8))]
         patterns = [pattern(names) for _ in range(rng.choice([1, 1, 1, 2]))]
@@ -169,7 +190,7 @@ for _ in range(int(sys.argv[2])):
         result = expected(patterns, names, excludes)
     except (re.error, OverflowError) as error:
         result = "syntax"
-    print(code(patterns), code(names), code(excludes) or "-", result, sep="\t")
+    print(code(patterns), code(names), code(excludes) or "-", result, "inside" if inside else "any", sep="\t")
 )py";
 
 std::vector<std::string> decode(const std::string& text) {
@@ -196,9 +217,10 @@ std::string ours(const std::vector<std::string>& patterns, const std::vector<std
     }
     return out;
   } catch (const ValueError& error) {
-    return std::string(error.what()).find("is not a regular expression") != std::string::npos
-               ? "syntax"
-               : "error";
+    const std::string_view what = error.what();
+    if (what.find("not supported: nothing that this could repeat") != what.npos) return "syntax";
+    if (what.find("not supported") != what.npos) return "unsupported";
+    return what.find("is not a regular expression") != what.npos ? "syntax" : "error";
   }
 }
 
@@ -215,17 +237,22 @@ TEST(Match, TenThousandListsAgainstPython) {
   while (const std::size_t n = std::fread(buffer, 1, sizeof buffer, python)) text.append(buffer, n);
   if (pclose(python) != 0) GTEST_SKIP() << "no python3";
   std::stringstream lines(text);
-  int total = 0, matched = 0, syntax = 0, faults = 0;
+  int total = 0, matched = 0, syntax = 0, unsupported = 0, faults = 0;
   for (std::string line; std::getline(lines, line); ++total) {
     std::stringstream columns(line);
-    std::string patterns, names, excludes, expected;
+    std::string patterns, names, excludes, expected, subset;
     std::getline(columns, patterns, '\t');
     std::getline(columns, names, '\t');
     std::getline(columns, excludes, '\t');
-    std::getline(columns, expected);
+    std::getline(columns, expected, '\t');
+    std::getline(columns, subset);
     const std::string got = ours(decode(patterns), decode(names), decode(excludes));
     if (expected == "syntax") ++syntax;
     if (expected != "syntax" && expected != "error" && !expected.empty()) ++matched;
+    if (got == "unsupported" && (subset == "any" || expected == "syntax")) {
+      ++unsupported;
+      continue;
+    }
     if (got != expected && ++faults <= 20) {
       ADD_FAILURE() << fmt::format("python '{}' ours '{}'", expected, got) << " patterns "
                     << ::testing::PrintToString(decode(patterns)) << " names "
@@ -237,6 +264,7 @@ TEST(Match, TenThousandListsAgainstPython) {
   EXPECT_EQ(faults, 0);
   EXPECT_GT(matched, 1500);
   EXPECT_GT(syntax, 300);
+  EXPECT_LT(unsupported, 5000);
 }
 
 }  // namespace

@@ -66,7 +66,7 @@ struct Studio {
       r[3 * i + 2] = z[i];
     }
     ViewBuilder builder(model.get(), *look, options);
-    const View& view = builder.build(rays->world(0), rays->shared(), Appearance(model.get()),
+    const View& view = builder.build(rays->world(0), rays->shared(), Appearance(model.get()), {},
                                      at.data(), r, grid_from_fovy(size, size, fovy, false));
     std::vector<std::uint8_t> image(3 * size * size);
     TileMemory memory(ViewBuilder::max_geoms(model.get()));

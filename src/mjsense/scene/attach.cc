@@ -10,6 +10,7 @@
 
 #include "mjsense/core/error.h"
 #include "mjsense/scene/assets.h"
+#include "mjsense/scene/compiler_settings.h"
 #include "mjsense/scene/options.h"
 #include "mjsense/scene/resolve.h"
 
@@ -153,6 +154,10 @@ Attached attach_entity(mjSpec* scene, const std::string& name, const EntityCfg& 
   name_unnamed(child.get());
 
   Attached attached{name, cfg};
+  attached.init = take_keyframes(child.get(), place, warnings);
+  if (!whole_model_settings(child.get()).empty()) {
+    child = apply_whole_model_settings(std::move(child), vfs, place);
+  }
   std::vector<mjsElement*> free_joints;
   for (mjsElement* joint : spec_elements(child.get(), mjOBJ_JOINT)) {
     if (mjs_asJoint(joint)->type == mjJNT_FREE) free_joints.push_back(joint);
@@ -164,7 +169,6 @@ Attached attach_entity(mjSpec* scene, const std::string& name, const EntityCfg& 
         place, free_joints.size(), element_name(free_joints[0]), element_name(free_joints[1])));
   }
   attached.fixed_base = free_joints.empty();
-  attached.init = take_keyframes(child.get(), place, warnings);
   drop_options(child.get(), place, warnings);
   move_visual(child.get(), scene);
 

@@ -53,8 +53,9 @@ std::vector<std::string> differences(const mjModel* a, const mjModel* b) {
       compare(name, x + 3 * i, y + 3 * i, used);
     }
   };
-#define X(type, name, nr, nc)                                                           \
-  if (std::string_view(#name) != "geom_size" && std::string_view(#name) != "site_size") \
+#define X(type, name, nr, nc)                                                             \
+  if (std::string_view(#name) != "geom_size" && std::string_view(#name) != "site_size" && \
+      std::string_view(#name) != "tendon_width")                                          \
     compare(#name, a->name, b->name, static_cast<long>(a->nr) * (nc));
 #define XNV X
   MJMODEL_POINTERS
@@ -62,6 +63,10 @@ std::vector<std::string> differences(const mjModel* a, const mjModel* b) {
 #undef X
   compare_sizes("geom_size", a->geom_type, a->geom_size, b->geom_size, a->ngeom);
   compare_sizes("site_size", a->site_type, a->site_size, b->site_size, a->nsite);
+  for (int t = 0; t < a->ntendon; ++t) {  // a fixed tendon is not drawn
+    if (a->wrap_type[a->tendon_adr[t]] == mjWRAP_JOINT) continue;
+    compare("tendon_width", a->tendon_width + t, b->tendon_width + t, 1);
+  }
   compare("opt.timestep", &a->opt.timestep, &b->opt.timestep, 1);
   compare("opt.gravity", a->opt.gravity, b->opt.gravity, 3);
   compare("opt.disableflags", &a->opt.disableflags, &b->opt.disableflags, 1);
@@ -160,8 +165,37 @@ TEST(RoundTrip, DifferentCompilers) {
       {"a", body("inertiafromgeom='true'")},
       {"b", body("balanceinertia='true' angle='radian'")},
       {"c", body("inertiagrouprange='0 3' inertiafromgeom='auto' balanceinertia='true'")},
-      {"d", body("settotalmass='7' alignfree='true'")}};
+      {"d", body("settotalmass='7' alignfree='true'")},
+      {"e", body("boundmass='.5' boundinertia='.3'")},
+      {"f", body("boundmass='.6' fusestatic='true'")}};
   expect_round_trip(Scene(std::move(cfg)));
+}
+
+// A model that attaches another without a prefix, both with a default class of one name.
+TEST(RoundTrip, RepeatedDefaultClasses) {
+  const std::string part =
+      "<mujoco model='part'><default><default class='robot'><default class='look'><geom rgba='0 1 "
+      "0 1' "
+      "group='2'/></default></default></default><worldbody><body name='p' pos='0 0 1'><joint "
+      "name='j'/>"
+      "<geom class='look' size='.1'/><geom class='look' group='3' "
+      "size='.1'/></body></worldbody></mujoco>";
+  const std::string whole =
+      "<mujoco><default><default class='look'><geom rgba='1 0 0 1' size='.3' contype='0'/>"
+      "<default class='look_'><geom size='.4'/></default></default></default>"
+      "<asset><model name='part' file='part.xml'/></asset><worldbody><body name='own'><freejoint/>"
+      "<geom class='look'/><geom class='look_'/><body childclass='look' pos='1 0 0'><geom/><attach "
+      "model='part' prefix=''/>"
+      "</body></body></worldbody></mujoco>";
+  SceneCfg base;
+  base.base = {.xml = whole, .assets = {{"part.xml", part}}};
+  expect_round_trip(Scene(std::move(base)));
+  SceneCfg cfg;
+  cfg.entities = {{"a", {.model = {.xml = whole, .assets = {{"part.xml", part}}}}},
+                  {"b", {.model = {.xml = whole, .assets = {{"part.xml", part}}}}}};
+  const Scene scene(std::move(cfg));
+  ASSERT_EQ(scene.model()->ngeom, 10);
+  expect_round_trip(scene);
 }
 
 // Two entities bring different files of one name.

@@ -1,6 +1,7 @@
 #include "mjsense/scene/scene.h"
 
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 
 #include <algorithm>
 #include <cmath>
@@ -8,6 +9,7 @@
 
 #include "mjsense/core/error.h"
 #include "mjsense/scene/attach.h"
+#include "mjsense/scene/compiler_settings.h"
 #include "mjsense/scene/model_sensors/model_sensor.h"
 #include "mjsense/scene/resolve.h"
 #include "mjsense/scene/spec.h"
@@ -60,6 +62,7 @@ struct Scene::Impl {
   void build();
   void attach();
   void set_options();
+  void check_base_alone();
   void add(std::unique_ptr<Sensor> sensor);
   void add_sensors();
   void compile();
@@ -98,6 +101,17 @@ void Scene::Impl::set_options() {
   if (!has_base || !differing_options(standard, configured).empty()) spec->option = configured;
 }
 
+// What the base's <compiler> does to a whole model would be done to everything in the scene.
+void Scene::Impl::check_base_alone() {
+  const std::vector<std::string> settings = whole_model_settings(spec.get());
+  if (settings.empty() || (!cfg.terrain && cfg.entities.empty())) return;
+  throw ValueError(
+      fmt::format("scene base: its <compiler> sets {}, which would act on what is attached to it "
+                  "too; make it an "
+                  "entity, or remove the setting",
+                  fmt::join(settings, ", ")));
+}
+
 // Base, options, terrain, entities.
 void Scene::Impl::attach() {
   spec = cfg.spec           ? SpecPtr(cfg.spec, SpecDelete{false})
@@ -114,6 +128,7 @@ void Scene::Impl::attach() {
   }
   spec->compiler.savecompiled = 0;             // numbers are saved exactly
   spec->compiler.conflict = mjCONFLICT_MERGE;  // sizes: the larger wins
+  check_base_alone();
   if (cfg.terrain) terrain.emplace(*cfg.terrain).add_to(spec.get());
   for (const auto& [name, entity] : cfg.entities) {
     check_name(name, cfg.terrain.has_value(), attached);
@@ -160,7 +175,7 @@ void Scene::Impl::add_sensors() {
 void Scene::Impl::compile() {
   {
     WarningCapture capture(warnings);
-    model.reset(mj_compile(spec.get(), vfs.get()));
+    model = mjsense::compile(spec.get(), vfs);
   }
   if (!model) throw ValueError(fmt::format("scene: {}", one_line(mjs_getError(spec.get()))));
   merge_initial_states(attached, model.get());

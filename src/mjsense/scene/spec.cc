@@ -6,6 +6,7 @@
 #include <filesystem>
 #include <mutex>
 #include <optional>
+#include <set>
 #include <utility>
 
 #include "mjsense/core/embedded.h"
@@ -40,6 +41,27 @@ SpecPtr checked(mjSpec* spec, const char* error, std::string_view place) {
   return SpecPtr(spec);
 }
 
+// A model that attaches another without a prefix may have two default classes of one name, which
+// MuJoCo writes but does not read. Elements are written as they differ from the last of them; the
+// others are given names that nothing uses.
+void make_defaults_unique(std::string& xml) {
+  constexpr std::string_view kTag = "<default class=\"";
+  std::set<std::string> taken;
+  std::vector<std::pair<std::size_t, std::string>> classes;  // where the name begins, last first
+  for (std::size_t at = xml.find(kTag); at != std::string::npos; at = xml.find(kTag, at)) {
+    at += kTag.size();
+    classes.insert(classes.begin(), {at, xml.substr(at, xml.find('"', at) - at)});
+    taken.insert(classes.front().second);
+  }
+  std::set<std::string> seen;
+  for (const auto& [at, name] : classes) {
+    if (seen.insert(name).second) continue;
+    std::string other = name + "_";
+    while (!taken.insert(other).second) other += "_";
+    xml.replace(at, name.size(), other);
+  }
+}
+
 std::optional<std::string> try_save(const mjSpec* spec, std::string& why) {
   char error[1024] = "";
   std::string xml(1 << 16, '\0');
@@ -52,6 +74,7 @@ std::optional<std::string> try_save(const mjSpec* spec, std::string& why) {
   why = error;
   if (needed != 0) return std::nullopt;
   xml.resize(xml.find('\0'));
+  make_defaults_unique(xml);
   return xml;
 }
 
@@ -142,17 +165,30 @@ std::string one_line(std::string_view message) {
   return out;
 }
 
+ModelPtr compile(mjSpec* spec, const Vfs& vfs) {
+  const mjtBool save = spec->compiler.saveinertial;
+  spec->compiler.saveinertial = 1;  // as it was at compilation counts for save_compiled_xml()
+  ModelPtr model(mj_compile(spec, vfs.get()));
+  spec->compiler.saveinertial = save;
+  return model;
+}
+
 std::string save_xml(mjSpec* spec) {
   std::string error;
   spec->compiler.savecompiled = 0;
   if (auto xml = try_save(spec, error)) return *std::move(xml);
+  return save_compiled_xml(spec, "scene");
+}
+
+std::string save_compiled_xml(mjSpec* spec, std::string_view place) {
+  std::string error;
   spec->compiler.savecompiled = 1;
   const int digits = _mjPRIVATE__get_xml_precision();
   _mjPRIVATE__set_xml_precision(17);
   auto xml = try_save(spec, error);
   _mjPRIVATE__set_xml_precision(digits);
   spec->compiler.savecompiled = 0;
-  if (!xml) throw RuntimeError(fmt::format("scene: not saved as XML: {}", error));
+  if (!xml) throw RuntimeError(fmt::format("{}: not saved as XML: {}", place, one_line(error)));
   return *std::move(xml);
 }
 

@@ -67,9 +67,16 @@ std::string explain_fault(const ModelSource& source, std::string_view place);
 // MuJoCo's message without its line breaks and its "Error:".
 std::string one_line(std::string_view message);
 
+// Null if it fails: mjs_getError() says why.
+ModelPtr compile(mjSpec* spec, const Vfs& vfs);
+
 // The compiled spec as MJCF: as it is written where one file can say it, exactly; else, where
 // entities were compiled with settings of their own, the values that compilation made.
 std::string save_xml(mjSpec* spec);
+
+// The values that compile() made, with all their digits: what settings of <compiler> have done to
+// them too. Throws RuntimeError that starts with `place`.
+std::string save_compiled_xml(mjSpec* spec, std::string_view place);
 
 std::string element_name(const mjsElement* element);
 // The elements of one type, in the order of the spec.

@@ -119,11 +119,11 @@ inline void texture_lanes(const View& view, const ViewGeom& g, const Pixels& pix
       color = sample_cube(texture, m, d, length * splat(0.5f * width * stretch) / most);
     } else {
       Float u, v, footprint;
-      if (plane) {
+      if (plane || s.from_above) {
         const float sx = g.size[0] > 0 ? 0.5f / g.size[0] : 0.5f;
         const float sy = g.size[1] > 0 ? 0.5f / g.size[1] : 0.5f;
-        u = fma(q.x, splat(sx), splat(g.size[0] > 0 ? 0.5f : 0.0f));
-        v = fma(q.y, splat(-sy), splat(g.size[1] > 0 ? 0.5f : 0.0f));
+        u = fma(q.x, splat(sx), splat(plane && g.size[0] > 0 ? 0.5f : 0.0f));
+        v = fma(q.y, splat(-sy), splat(plane && g.size[1] > 0 ? 0.5f : 0.0f));
         const Float ku = splat(sx * s.repeat[0] * width), kv = splat(sy * s.repeat[1] * height);
         // The largest component, as Mesa takes it: sharper than the length of the vector.
         const auto texels = [&](Vec3f w) { return max(abs(ku * w.x), abs(kv * w.y)); };
@@ -133,7 +133,7 @@ inline void texture_lanes(const View& view, const ViewGeom& g, const Pixels& pix
             curved || s.mapped
                 ? Coordinates{load(mapped.u + k), load(mapped.v + k), load(mapped.rate_u + k),
                               load(mapped.rate_v + k)}
-                : flat_uv(g, q, {load(normal[0] + k), load(normal[1] + k), load(normal[2] + k)});
+                : box_uv(g, q, {load(normal[0] + k), load(normal[1] + k), load(normal[2] + k)});
         u = at.u;
         v = at.v;
         footprint = length * max(at.rate_u * splat(s.repeat[0] * width),

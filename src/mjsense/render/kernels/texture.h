@@ -133,15 +133,10 @@ struct Coordinates {
   Float u, v, rate_u, rate_v;
 };
 
-// Of shapes on which they are linear: boxes, and seen from above meshes without coordinates of their
-// own and height fields. p on the surface, n its normal; geom frame.
-inline Coordinates flat_uv(const ViewGeom& g, Vec3f p, Vec3f n) {
+// Of a box: p on the surface, n its normal; geom frame.
+inline Coordinates box_uv(const ViewGeom& g, Vec3f p, Vec3f n) {
   const float* s = g.size;
   const Float half = splat(0.5f);
-  if (g.type != mjGEOM_BOX) {
-    const float kx = 0.5f / (s[0] > 0 ? s[0] : 1), ky = 0.5f / (s[1] > 0 ? s[1] : 1);
-    return {p.x * splat(kx), p.y * splat(-ky), splat(kx), splat(ky)};
-  }
   const Mask x_face = half < abs(n.x), z_face = half < abs(n.z);
   const float k[3] = {0.5f / s[0], 0.5f / s[1], 0.5f / s[2]};
   const Float kx = select(x_face, splat(k[1]), splat(k[0]));

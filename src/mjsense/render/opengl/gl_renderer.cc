@@ -116,8 +116,9 @@ class MujocoGl final : public GlRenderer {
     colors_.resize(3 * static_cast<std::size_t>(cfg.width) * cfg.height);
     take();
     mjv_defaultScene(&scene_);
-    mjv_makeScene(model_, &scene_,
-                  static_cast<int>(model_->ngeom + model_->nflexelem + model_->nskin) + 100);
+    mjv_makeScene(
+        model_, &scene_,
+        static_cast<int>(model_->ngeom + model_->nflexelem + model_->nskin + cfg.markers) + 100);
     mjr_defaultContext(&context_);
     mjr_makeContext(model_, &context_, mjFONTSCALE_100);
     mjr_setBuffer(mjFB_OFFSCREEN, &context_);
@@ -142,11 +143,18 @@ class MujocoGl final : public GlRenderer {
 
   void remember(int world, const mjModel* model) override { worlds_[world].copy_from(model); }
 
-  void render(int world, const RayWorld& state, const ImageTargets& targets) override {
+  void render(int world, const RayWorld& state, std::span<const mjvGeom> markers,
+              const ImageTargets& targets) override {
     show(worlds_[world]);
     pose(state);
     mjv_updateScene(model_, data_, &options_, nullptr, &camera_, mjCAT_STATIC | mjCAT_DYNAMIC,
                     &scene_);
+    for (const mjvGeom& marker : markers) {
+      scene_.geoms[scene_.ngeom] = marker;
+      scene_.geoms[scene_.ngeom].segid = scene_.ngeom;
+      ++scene_.ngeom;
+    }
+    scene_.nlight = std::min(scene_.nlight, cfg_.max_lights);
     const mjrRect all{0, 0, cfg_.width, cfg_.height};
     take();
     mjr_setBuffer(mjFB_OFFSCREEN, &context_);

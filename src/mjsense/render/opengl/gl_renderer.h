@@ -4,8 +4,10 @@
 
 #include <mujoco/mujoco.h>
 
+#include <cstddef>
 #include <memory>
 #include <optional>
+#include <span>
 #include <string>
 
 #include "mjsense/render/view/view.h"
@@ -21,6 +23,8 @@ struct GlRendererCfg {
   unsigned groups = 0x7;  // bit g: geoms of group g
   bool textures = true, shadows = true;
   int samples = 1;
+  int max_lights = 8;
+  std::size_t markers = 0;  // at most so many
   // Instead of what the model says of the camera.
   std::optional<double> fovy;  // degrees; orthographic: m
   bool orthographic = false;
@@ -31,9 +35,10 @@ class GlRenderer {
   virtual ~GlRenderer() = default;
   // Takes the world's own colours, materials, sizes, lights and field of view. Worlds in parallel.
   virtual void remember(int world, const mjModel* model) = 0;
-  // Fills rgb, depth (planar) and segmentation of `targets`; poses as `state` has them, the rest as
-  // remembered.
-  virtual void render(int world, const RayWorld& state, const ImageTargets& targets) = 0;
+  // Fills rgb, depth (planar) and segmentation of `targets`; poses as `state` has them, markers as given,
+  // the rest as remembered.
+  virtual void render(int world, const RayWorld& state, std::span<const mjvGeom> markers,
+                      const ImageTargets& targets) = 0;
 };
 
 // Throws RuntimeError, beginning with `place`, if there is no OpenGL to be had.

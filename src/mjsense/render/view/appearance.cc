@@ -16,12 +16,13 @@ void resolve_rgba(const mjModel* m, int material, const float* own, float* out) 
 
 }  // namespace
 
-Appearance::Appearance(const mjModel* m)
-    : flex_parts_(flex_parts(m)),
+Appearance::Appearance(const mjModel* m, int max_lights)
+    : max_lights_(max_lights),
+      flex_parts_(flex_parts(m)),
       rgba_(4 * (m->ngeom + flex_parts_.size() + m->nskin)),
       materials_(m->nmat),
-      lights_(View::kMaxLights),
-      light_ids_(View::kMaxLights) {
+      lights_(max_lights),
+      light_ids_(max_lights) {
   copy(m);
 }
 
@@ -49,8 +50,11 @@ void Appearance::copy(const mjModel* m) {
   copy_lights(m);
 }
 
+// MuJoCo gives each light that is on a place, the headlight the first, and OpenGL has so many; image lights
+// take one and show nothing.
 void Appearance::copy_lights(const mjModel* m) {
   num_lights_ = 0;
+  int places = 0;
   const auto add = [&](int id, const float* ambient, const float* diffuse,
                        const float* specular) -> ViewLight& {
     light_ids_[num_lights_] = id;
@@ -63,9 +67,10 @@ void Appearance::copy_lights(const mjModel* m) {
     return light;
   };
   const auto& head = m->vis.headlight;
-  if (head.active) add(-1, head.ambient, head.diffuse, head.specular);
-  for (int i = 0; i < m->nlight && num_lights_ < View::kMaxLights; ++i) {
-    if (!m->light_active[i] || m->light_type[i] == mjLIGHT_IMAGE) continue;
+  if (head.active && ++places <= max_lights_) add(-1, head.ambient, head.diffuse, head.specular);
+  for (int i = 0; i < m->nlight; ++i) {
+    if (!m->light_active[i] || ++places > max_lights_ || m->light_type[i] == mjLIGHT_IMAGE)
+      continue;
     ViewLight& light =
         add(i, m->light_ambient + 3 * i, m->light_diffuse + 3 * i, m->light_specular + 3 * i);
     light.shadows = m->light_castshadow[i];

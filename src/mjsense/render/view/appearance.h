@@ -25,9 +25,12 @@ struct Sky {
   float haze_rgb[3];
 };
 
+inline constexpr int kClassicLights = 8;  // OpenGL's, and so those of MuJoCo's classic renderer
+
 class Appearance {
  public:
-  explicit Appearance(const mjModel* model);
+  // max_lights: of those that are on, the headlight first, so many shine; up to View::kMaxLights.
+  explicit Appearance(const mjModel* model, int max_lights = kClassicLights);
   void copy(const mjModel* model);  // no allocation
 
   // [geoms, then parts of flexes, then skins; 4] as MuJoCo's visualiser resolves it
@@ -41,6 +44,7 @@ class Appearance {
  private:
   void copy_lights(const mjModel* model);
 
+  int max_lights_;
   std::vector<FlexPart> flex_parts_;
   std::vector<float> rgba_;
   std::vector<Material> materials_;

@@ -32,6 +32,7 @@ struct Surface {
   float repeat[2], shift[2];           // 2D: texture coordinates times repeat plus shift
   float stretch[3];                    // cube: times the direction
   bool mapped;                         // 2D texture by the mesh's own coordinates
+  bool from_above;                     // 2D texture laid along z on a mesh or height field
 };
 
 struct alignas(64) ViewGeom {

@@ -1,6 +1,7 @@
 #include "mjsense/render/view/view_builder.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 
 #include "mjsense/rays/flex_shapes.h"
@@ -21,19 +22,45 @@ void rotate_back(const double r[9], const double v[3], double out[3]) {
   for (int i = 0; i < 3; ++i) out[i] = r[i] * v[0] + r[3 + i] * v[1] + r[6 + i] * v[2];
 }
 
+// What shapes have that need no more than their sizes.
+void set_primitive(int type, int object, int object_id, ViewGeom& g) {
+  g.type = type;
+  g.behind = type == mjGEOM_PLANE && g.eye[2] < 0;
+  g.object = object;
+  g.object_id = object_id;
+  g.bvh = nullptr;
+  g.clusters = nullptr;
+  g.mesh = nullptr;
+  g.height_field = nullptr;
+}
+
+// The size by which MuJoCo's visualiser scales a shape along its axes, and with texuniform its texture.
+std::array<float, 3> drawn_extent(const ViewGeom& g) {
+  const float* s = g.size;
+  switch (g.type) {
+    case mjGEOM_SPHERE:
+      return {s[0], s[0], s[0]};
+    case mjGEOM_CAPSULE:
+    case mjGEOM_CYLINDER:
+      return {s[0], s[0], s[1]};
+    default:
+      return {s[0], s[1], s[2]};
+  }
+}
+
 }  // namespace
 
 ViewBuilder::ViewBuilder(const mjModel* model, const Look& look, const ViewOptions& options)
     : look_(&look),
       options_(options),
-      unsorted_(max_geoms(model)),
-      sorted_(max_geoms(model)),
-      spheres_(4 * (max_geoms(model) + kSpherePadding)),
+      unsorted_(max_geoms(model) + options.markers),
+      sorted_(unsorted_.size()),
+      spheres_(4 * (unsorted_.size() + kSpherePadding)),
       soft_looks_(look.num_flex_parts() + model->nskin) {
-  order_.reserve(max_geoms(model));
+  order_.reserve(unsorted_.size());
   if (options.layered) {
     view_.layered = true;
-    index_of_id_.resize(max_geoms(model));
+    index_of_id_.resize(unsorted_.size());
     for (int i = 0; i < model->ngeom; ++i)
       fixed_.push_back(is_fixed_body(model, model->geom_bodyid[i]));
   }
@@ -49,34 +76,42 @@ ViewBuilder::ViewBuilder(const mjModel* model, const Look& look, const ViewOptio
 }
 
 const View& ViewBuilder::build(const RayWorld& world, const SharedGeometry& shapes,
-                               const Appearance& appearance, const double position[3],
-                               const double rotation[9], const PixelGrid& grid) {
+                               const Appearance& appearance, std::span<const Marker> markers,
+                               const double position[3], const double rotation[9],
+                               const PixelGrid& grid) {
   view_.grid = grid;
   order_.clear();
   const RayGeom* endless = nullptr;  // the first endless plane
-  const auto add = [&](const RayGeom& source, int id, std::uint32_t flags, int material) {
-    const float* rgba = appearance.rgba().data() + 4 * id;
-    if (rgba[3] == 0 || !(flags & options_.groups) || id == left_out_) return;
-    if (!endless && source.type == mjGEOM_PLANE && source.size[0] == 0 && source.size[1] == 0)
-      endless = &source;
+  // shape(g): what only this kind of object knows of its shape.
+  const auto add_shape = [&](const RayGeom& source, int id, const float* rgba,
+                             const Material* material, auto shape) {
     const int index = static_cast<int>(order_.size());
     ViewGeom& g = unsorted_[index];
     g.id = id;
     g.fixed = static_cast<std::size_t>(id) < fixed_.size() && fixed_[id];
     place(source, position, rotation, g);
-    set_shape(world, shapes, source, g);
+    shape(g);
     const bool sight = find_window(view_, g);
     if (!sight && !options_.shadows) return;
-    set_surface(source, rgba, material < 0 ? nullptr : &appearance.materials()[material], g);
+    set_surface(source, rgba, material, g);
     Order order{sight ? g.transparent : 2, g.nearest, index};
     if (order.rank == 1) {
       const float* p = g.pos;
-      const float reach = g.object == mjOBJ_GEOM ? g.radius : 0;  // MuJoCo's of what is soft
+      const bool soft = g.object == mjOBJ_FLEX || g.object == mjOBJ_SKIN;
+      const float reach = soft ? 0 : g.radius;  // MuJoCo's
       order.key = g.type == mjGEOM_PLANE
                       ? 1e10f
                       : std::sqrt(p[0] * p[0] + p[1] * p[1] + p[2] * p[2]) - reach;
     }
     order_.push_back(order);
+  };
+  const auto add = [&](const RayGeom& source, int id, std::uint32_t flags, int material) {
+    const float* rgba = appearance.rgba().data() + 4 * id;
+    if (rgba[3] == 0 || !(flags & options_.groups) || id == left_out_) return;
+    if (!endless && source.type == mjGEOM_PLANE && source.size[0] == 0 && source.size[1] == 0)
+      endless = &source;
+    add_shape(source, id, rgba, material < 0 ? nullptr : &appearance.materials()[material],
+              [&](ViewGeom& g) { set_shape(world, shapes, source, g); });
   };
   int id = 0;
   for (; id < world.num_geoms(); ++id)
@@ -91,6 +126,12 @@ const View& ViewBuilder::build(const RayWorld& world, const SharedGeometry& shap
     skins->bend(options_.groups);
     for (int i = 0; i < skins->size(); ++i)
       add(skins->geom(i), id++, skins->group(i), skins->material(i));
+  }
+  id = first_marker();
+  for (const Marker& marker : markers) {
+    if (id++ == left_out_) continue;
+    add_shape(marker.shape, id - 1, marker.rgba, &marker.material,
+              [&](ViewGeom& g) { set_primitive(marker.shape.type, marker.object, marker.id, g); });
   }
   std::sort(order_.begin(), order_.end(), [](const Order& a, const Order& b) {
     if (a.rank != b.rank) return a.rank < b.rank;
@@ -118,32 +159,26 @@ const View& ViewBuilder::build(const RayWorld& world, const SharedGeometry& shap
   for (int i = 0; i < 9; ++i) view_.r_wc[i] = static_cast<float>(rotation[i]);
   set_lights(world, appearance, position, rotation);
   if (view_.skybox) set_sky(endless, appearance.sky(), position, rotation);
-  if (mirrored_) set_mirror(world, shapes, appearance, position, rotation);
+  if (mirrored_) set_mirror(world, shapes, appearance, markers, position, rotation);
   return view_;
 }
 
 // The camera is mirrored in the plane: the same pixel rays then meet the mirror in the same points
 // and go on to what is reflected. Its rotation is a reflection too, which disturbs nobody.
 void ViewBuilder::set_mirror(const RayWorld& world, const SharedGeometry& shapes,
-                             const Appearance& appearance, const double position[3],
-                             const double rotation[9]) {
+                             const Appearance& appearance, std::span<const Marker> markers,
+                             const double position[3], const double rotation[9]) {
   view_.mirror = -1;
   view_.reflection = nullptr;
-  for (int id = 0; id < world.num_geoms(); ++id) {
-    const RayGeom& g = world.geom(id);
-    const int material = world.materials()[id];
-    if ((g.type != mjGEOM_PLANE && g.type != mjGEOM_BOX) || material < 0) continue;
-    const float reflectance = appearance.materials()[material].reflectance;
-    if (reflectance <= 0 || appearance.rgba()[4 * id + 3] < kOpaque) continue;
-    if (!(world.flags()[id] & options_.groups)) continue;
+  // True: the search is over. There is one mirror, as in MuJoCo.
+  const auto settles = [&](const RayGeom& g, int id, float alpha, float reflectance) {
+    if (g.type != mjGEOM_PLANE && g.type != mjGEOM_BOX) return false;
+    if (reflectance <= 0 || alpha < kOpaque) return false;
     const double normal[3] = {g.mat[2], g.mat[5], g.mat[8]};
     const double top = g.type == mjGEOM_BOX ? g.size[2] : 0;
     double above = -top;
     for (int k = 0; k < 3; ++k) above += (position[k] - g.pos[k]) * normal[k];
-    if (above < 0) {
-      if (g.type == mjGEOM_PLANE) continue;  // seen from below it is a veil, not a mirror
-      return;
-    }
+    if (above < 0) return g.type == mjGEOM_BOX;  // a plane seen from below is a veil, not a mirror
     double p[3], r[9];
     for (int k = 0; k < 3; ++k) p[k] = position[k] - 2 * above * normal[k];
     for (int j = 0; j < 3; ++j) {
@@ -155,10 +190,20 @@ void ViewBuilder::set_mirror(const RayWorld& world, const SharedGeometry& shapes
     mirrored_->own_headlight_ = false;
     for (int k = 0; k < 3; ++k) mirrored_->headlight_[k] = -rotation[3 * k + 2];
     mirrored_->tint_ = reflectance;
-    view_.reflection = &mirrored_->build(world, shapes, appearance, p, r, view_.grid);
+    view_.reflection = &mirrored_->build(world, shapes, appearance, markers, p, r, view_.grid);
     view_.mirror = id;
-    return;  // one, as in MuJoCo
+    return true;
+  };
+  for (int id = 0; id < world.num_geoms(); ++id) {
+    const int material = world.materials()[id];
+    if (material < 0 || !(world.flags()[id] & options_.groups)) continue;
+    if (settles(world.geom(id), id, appearance.rgba()[4 * id + 3],
+                appearance.materials()[material].reflectance))
+      return;
   }
+  int id = first_marker();
+  for (const Marker& marker : markers)
+    if (settles(marker.shape, id++, marker.rgba[3], marker.material.reflectance)) return;
 }
 
 void ViewBuilder::place(const RayGeom& source, const double position[3], const double rotation[9],
@@ -183,14 +228,7 @@ void ViewBuilder::place(const RayGeom& source, const double position[3], const d
 
 void ViewBuilder::set_shape(const RayWorld& world, const SharedGeometry& shapes,
                             const RayGeom& source, ViewGeom& g) {
-  g.type = source.type;
-  g.behind = g.type == mjGEOM_PLANE && g.eye[2] < 0;
-  g.object = mjOBJ_GEOM;
-  g.object_id = g.id;
-  g.bvh = nullptr;
-  g.clusters = nullptr;
-  g.mesh = nullptr;
-  g.height_field = nullptr;
+  set_primitive(source.type, mjOBJ_GEOM, g.id, g);
   if (g.type == mjGEOM_MESH || g.type == mjGEOM_SDF) {
     g.bvh = shapes.mesh_scenes[source.data];
     g.mesh = look_->mesh(source.data);
@@ -249,27 +287,25 @@ void ViewBuilder::set_surface(const RayGeom& source, const float* rgba, const Ma
     s.texture = nullptr;
     return;
   }
+  const std::array<float, 3> extent = drawn_extent(g);
+  s.from_above = (g.mesh && !s.mapped) || g.height_field;
+  const bool endless = g.type == mjGEOM_PLANE && (g.size[0] <= 0 || g.size[1] <= 0);
   for (int i = 0; i < 2; ++i) {
-    const float size = g.size[i] > 0 ? g.size[i] : 1.0f;
-    s.repeat[i] = material->repeat[i] * (uniform && !s.mapped ? size : 1.0f);
-    const bool from_above = (g.mesh && !s.mapped) || g.height_field;
-    if (from_above || (g.type == mjGEOM_PLANE && g.size[i] <= 0)) s.shift[i] = -0.5f;
-    if (from_above && g.object == mjOBJ_SKIN)  // the texture stays where it is in the world
+    s.repeat[i] = material->repeat[i];
+    if (s.repeat[i] <= 0 && !s.from_above) s.repeat[i] = 1;
+    if (uniform && extent[i] > 0) s.repeat[i] *= extent[i];
+    if (s.from_above || endless) s.shift[i] = -0.5f;
+    if (s.from_above && g.object == mjOBJ_SKIN)  // the texture stays where it is in the world
       s.shift[i] += (i ? -0.5f : 0.5f) * s.repeat[i] * static_cast<float>(source.pos[i]);
   }
   // Cube maps: MuJoCo takes directions in the unit shape that it scales (meshes and planes: in
   // metres).
   const bool in_meters = g.mesh || g.height_field || g.type == mjGEOM_PLANE;
   for (int i = 0; i < 3; ++i) {
-    float size = g.size[i];
-    if (g.type == mjGEOM_SPHERE ||
-        ((g.type == mjGEOM_CAPSULE || g.type == mjGEOM_CYLINDER) && i < 2))
-      size = g.size[0];
-    if ((g.type == mjGEOM_CAPSULE || g.type == mjGEOM_CYLINDER) && i == 2) size = g.size[1];
     if (in_meters) {
-      s.stretch[i] = uniform ? size : 1.0f;
+      s.stretch[i] = uniform ? extent[i] : 1.0f;
     } else {
-      s.stretch[i] = uniform || size <= 0 ? 1.0f : 1.0f / size;
+      s.stretch[i] = uniform || extent[i] <= 0 ? 1.0f : 1.0f / extent[i];
     }
   }
 }

@@ -10,6 +10,7 @@
 
 #include "mjsense/render/view/appearance.h"
 #include "mjsense/render/view/look.h"
+#include "mjsense/render/view/markers.h"
 #include "mjsense/render/view/view.h"
 
 namespace mjsense {
@@ -25,6 +26,7 @@ struct ViewOptions {
   bool reflections = false;
   bool layered = false;  // View::layered
   float near = 0, far = 0;
+  std::size_t markers = 0;  // at most so many
 };
 
 // Owns the geoms of one view; build() fills it anew and allocates nothing.
@@ -34,10 +36,11 @@ class ViewBuilder {
 
   // position, rotation: X_WC, row-major.
   const View& build(const RayWorld& world, const SharedGeometry& shapes,
-                    const Appearance& appearance, const double position[3],
-                    const double rotation[9], const PixelGrid& grid);
+                    const Appearance& appearance, std::span<const Marker> markers,
+                    const double position[3], const double rotation[9], const PixelGrid& grid);
   const View& view() const { return view_; }
   void use_fixed(const FixedTile* tiles) { view_.fixed = tiles; }  // of the view just built
+  // Without markers.
   static std::size_t max_geoms(const mjModel* model) {
     return static_cast<std::size_t>(model->ngeom + model->nskin) + flex_parts(model).size();
   }
@@ -52,11 +55,14 @@ class ViewBuilder {
              ViewGeom& g) const;
   void set_shape(const RayWorld& world, const SharedGeometry& shapes, const RayGeom& source,
                  ViewGeom& g);
+  // Ids of markers follow those of all else.
+  int first_marker() const { return static_cast<int>(unsorted_.size() - options_.markers); }
   const MeshLook* soft_look(int index, const MeshLook& shared, const float* normals);
   void set_surface(const RayGeom& source, const float* rgba, const Material* material,
                    ViewGeom& g) const;
   void set_mirror(const RayWorld& world, const SharedGeometry& shapes, const Appearance& appearance,
-                  const double position[3], const double rotation[9]);
+                  std::span<const Marker> markers, const double position[3],
+                  const double rotation[9]);
   float sky_from(const Sky& sky) const;
   void set_sky(const RayGeom* plane, const Sky& sky, const double position[3],
                const double rotation[9]);

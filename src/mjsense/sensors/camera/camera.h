@@ -7,7 +7,7 @@
 //   rgb           uint8   [B, H, W, 3]  MuJoCo's classic look
 //   depth         float32 [B, H, W, 1]  m; planar: distance to the camera plane; ray: along the
 //                                       pixel's ray; 0 where nothing is
-//   segmentation  int32   [B, H, W, 2]  (id, type): mjOBJ_GEOM, mjOBJ_FLEX or mjOBJ_SKIN; (-1, -1)
+//   segmentation  int32   [B, H, W, 2]  (id, type): mjOBJ_GEOM, _FLEX, _SKIN, _SITE, _TENDON; (-1, -1)
 //                                       where nothing is
 //   body_segmentation, entity_segmentation
 //                 int32   [B, H, W, 1]  body id; index in Scene::entities(); -1 where there is none
@@ -82,7 +82,12 @@ struct CameraSensorCfg : SensorCfg {
   bool clone_data = false;  // Python only: a copy at every read
 
   // Beyond mjlab's.
+  // Sites and tendons that are drawn, as MuJoCo's visualiser does: none unless groups (0 to 5) are given.
+  std::vector<int> enabled_site_groups, enabled_tendon_groups;
+  // Of the lights that are on, the headlight first, so many shine, 0 to 32. MuJoCo's OpenGL has 8.
+  int max_lights = 8;
   double near = 0, far = 0;  // m, planar; what is nearer or farther is not seen; far 0: no limit
+  std::string clip_near = "none";  // none; model: near is where MuJoCo clips, its znear x extent
   // s. An image is taken at the first control step at or after phase + k * update_period.
   double update_period = 0, phase = 0;
   int samples = 1;                    // per pixel of rgb, for anti-aliased edges, 1 to 64

@@ -67,9 +67,16 @@ void validate(const CameraSensorCfg& cfg) {
     fail(fmt::format("width x height is {} x {}: each must be 1..16384", cfg.width, cfg.height));
   if (cfg.enabled_geom_groups.empty())
     fail("enabled_geom_groups is empty: nothing would be seen; choose from 0..5");
-  for (int g : cfg.enabled_geom_groups)
-    if (g < 0 || g >= mjNGROUP)
-      fail(fmt::format("geom group {}: groups are 0..{}", g, mjNGROUP - 1));
+  const auto check_groups = [&](const char* kind, const std::vector<int>& groups) {
+    for (int g : groups)
+      if (g < 0 || g >= mjNGROUP)
+        fail(fmt::format("{} group {}: groups are 0..{}", kind, g, mjNGROUP - 1));
+  };
+  check_groups("geom", cfg.enabled_geom_groups);
+  check_groups("site", cfg.enabled_site_groups);
+  check_groups("tendon", cfg.enabled_tendon_groups);
+  if (cfg.max_lights < 0 || cfg.max_lights > View::kMaxLights)
+    fail(fmt::format("max_lights is {}: must be 0..{}", cfg.max_lights, View::kMaxLights));
   check_pose(cfg, fail);
   if (cfg.fovy) {
     if (!(*cfg.fovy > 0) || !std::isfinite(*cfg.fovy))
@@ -82,6 +89,10 @@ void validate(const CameraSensorCfg& cfg) {
       (cfg.far > 0 && cfg.far <= cfg.near))
     fail(fmt::format("near {} and far {}: need 0 <= near < far, or far 0 for no limit", cfg.near,
                      cfg.far));
+  check_choice(place, "clip_near", cfg.clip_near, std::array<std::string, 2>{"none", "model"});
+  if (cfg.near > 0 && cfg.clip_near == "model")
+    fail(fmt::format("near is {} m and clip_near is 'model': one of them says where to clip",
+                     cfg.near));
   if (!(cfg.update_period >= 0) || !(cfg.phase >= 0) || cfg.update_period > kLongest ||
       cfg.phase > kLongest)
     fail(fmt::format("update_period {} s and phase {} s: each must be 0 to {:g} s",
@@ -102,6 +113,9 @@ void validate(const CameraSensorCfg& cfg) {
       fail(
           "renderer 'opengl' takes clip range and intrinsics from the model, has no lens "
           "distortion, and measures planar depth");
+    if (cfg.max_lights > kClassicLights)
+      fail(fmt::format("renderer 'opengl' has no more than {} lights; max_lights is {}",
+                       kClassicLights, cfg.max_lights));
   }
   check_choice(place, "depth_noise", cfg.depth_noise,
                std::array<std::string, 3>{"none", "d405", "d435"});

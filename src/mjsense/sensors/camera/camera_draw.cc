@@ -78,10 +78,10 @@ void CameraSensor::draw(const World& world, DebugShapes& shapes) {
     }
   };
   rim(far);
-  if (cfg_.near > 0 || grid.orthographic) rim(cfg_.near);
+  if (near_ > 0 || grid.orthographic) rim(near_);
   for (int corner = 0; corner < 4; ++corner) {
     const auto [u, v] = kCorners[corner];
-    line(optics.point(u, v, cfg_.near), optics.point(u, v, far));
+    line(optics.point(u, v, near_), optics.point(u, v, far));
   }
 }
 

@@ -19,13 +19,23 @@ namespace {
 // about the same time.
 constexpr int kImagesPerThread = 4, kBandsPerThread = 16;
 
-ViewOptions view_options(const CameraSensorCfg& cfg, unsigned groups) {
+unsigned bits_of(const std::vector<int>& groups) {
+  unsigned bits = 0;
+  for (int g : groups) bits |= 1u << g;
+  return bits;
+}
+
+MarkerOptions marker_options(const CameraSensorCfg& cfg) {
+  return {bits_of(cfg.enabled_site_groups), bits_of(cfg.enabled_tendon_groups), cfg.use_textures};
+}
+
+ViewOptions view_options(const CameraSensorCfg& cfg, double near) {
   ViewOptions options;
-  options.groups = groups;
+  options.groups = bits_of(cfg.enabled_geom_groups);
   options.textures = cfg.use_textures;
   options.shadows = cfg.use_shadows;
   options.reflections = std::count(cfg.data_types.begin(), cfg.data_types.end(), "rgb") > 0;
-  options.near = static_cast<float>(cfg.near);
+  options.near = static_cast<float>(near);
   options.far = static_cast<float>(cfg.far);
   return options;
 }
@@ -68,16 +78,19 @@ void CameraSensor::initialize(const SensorInit& init) {
       names.emplace_back(model_->names + model_->name_camadr[i]);
     throw_unknown(place, "camera", camera, names);
   }
-  if (model_->nlight >= View::kMaxLights)
-    throw ValueError(fmt::format("{}: the model has {} lights; at most {} are drawn", place,
-                                 model_->nlight, View::kMaxLights - 1));
-  groups_ = 0;
-  for (int g : cfg_.enabled_geom_groups) groups_ |= 1u << g;
+  near_ = cfg_.clip_near == "model" ? model_->vis.map.znear * model_->stat.extent : cfg_.near;
+  if (cfg_.far > 0 && cfg_.far <= near_)
+    throw ValueError(
+        fmt::format("{}: far is {} m, and clip_near 'model' clips at {:.6g} m (znear x "
+                    "extent): need near < far",
+                    place, cfg_.far, near_));
   look_ = look_of(init, wants("rgb") || wants("normals"), wants("rgb") && cfg_.use_textures);
   workspace_.reset();
   clear_fields();
   declare_fields(init.num_worlds);
-  worlds_.assign(init.num_worlds, PerWorld{{}, Appearance(model_)});
+  worlds_.assign(
+      init.num_worlds,
+      PerWorld{{}, Appearance(model_, cfg_.max_lights), Markers(model_, marker_options(cfg_))});
   due_.reserve(init.num_worlds);
 
   PixelGrid grid = grid_in(model_);
@@ -101,10 +114,20 @@ void CameraSensor::initialize(const SensorInit& init) {
   if (cfg_.depth_noise != "none")
     clean_.assign(init.threads,
                   std::vector<float>(static_cast<std::size_t>(cfg_.width) * cfg_.height));
+  const std::size_t markers = worlds_.empty() ? 0 : worlds_[0].markers.capacity();
   gl_.reset();
   if (cfg_.renderer == "opengl") {
-    GlRendererCfg gl{init.num_worlds, camera_,           cfg_.width,       cfg_.height,
-                     groups_,         cfg_.use_textures, cfg_.use_shadows, cfg_.samples};
+    GlRendererCfg gl;
+    gl.num_worlds = init.num_worlds;
+    gl.camera = camera_;
+    gl.width = cfg_.width;
+    gl.height = cfg_.height;
+    gl.groups = bits_of(cfg_.enabled_geom_groups);
+    gl.textures = cfg_.use_textures;
+    gl.shadows = cfg_.use_shadows;
+    gl.samples = cfg_.samples;
+    gl.max_lights = cfg_.max_lights;
+    gl.markers = markers;
     if (!cfg_.camera_name.empty()) {
       gl.fovy = cfg_.fovy;
       gl.orthographic = cfg_.orthographic;
@@ -120,10 +143,11 @@ void CameraSensor::initialize(const SensorInit& init) {
   fixed_layer_.reset();
   if (rgb_ && cfg_.use_shadows && cfg_.samples == 1 && FixedLayer::possible(model_, camera_))
     fixed_layer_ = std::make_unique<FixedLayer>(model_, cfg_.width, cfg_.height);
-  ViewOptions options = view_options(cfg_, groups_);
+  ViewOptions options = view_options(cfg_, near_);
+  options.markers = markers;
   options.layered = fixed_layer_ != nullptr;
   for (int i = 0; i < slots; ++i) workspace_->builders.emplace_back(model_, *look_, options);
-  const int geoms = ViewBuilder::max_geoms(model_);
+  const int geoms = static_cast<int>(ViewBuilder::max_geoms(model_) + markers);
   for (int i = 0; i < init.threads; ++i) workspace_->memory.emplace_back(geoms);
 }
 
@@ -181,12 +205,12 @@ void CameraSensor::declare_fields(int num_worlds) {
             cfg_.depth_kind == "ray" ? "Distance along each pixel's ray; 0 where nothing is seen."
                                      : "Distance to the camera plane; 0 where nothing is seen.");
   if (wants("segmentation"))
-    segmentation_ =
-        add("segmentation", DType::kInt32, {h, w, 2}, "", -1, inf, Storage::kArray,
-            "(id, mjtObj) of each pixel: geom, flex or skin; (-1, -1) where nothing is seen.");
+    segmentation_ = add("segmentation", DType::kInt32, {h, w, 2}, "", -1, inf, Storage::kArray,
+                        "(id, mjtObj) of each pixel: geom, flex, skin, site or tendon; (-1, -1) "
+                        "where nothing is seen.");
   if (wants("body_segmentation"))
     bodies_ = add("body_segmentation", DType::kInt32, {h, w, 1}, "", -1, model_->nbody - 1,
-                  Storage::kArray, "Body id of each pixel's geom; -1 where there is none.");
+                  Storage::kArray, "Body id of each pixel's geom or site; -1 where there is none.");
   if (wants("entity_segmentation"))
     entities_ = add("entity_segmentation", DType::kInt32, {h, w, 1}, "", -1, inf, Storage::kArray,
                     "Entity of each pixel, by its place in the scene; -1 where there is none.");
@@ -235,6 +259,7 @@ void CameraSensor::compute(const World& world) {
   } else {
     w.appearance.copy(m);
   }
+  w.markers.copy(m, world.data);  // poses of sites, paths of tendons
   if (optical_flow_) optical_flow_->take(world, w.grid);
   w.rng = world.rng(stream_of(name()));
   std::ranges::copy(intrinsic_matrix(w.grid), intrinsics_->data.row<float>(world.id).begin());
@@ -267,8 +292,9 @@ ImageTargets CameraSensor::targets(int world, int thread) {
 const View& CameraSensor::build_view(const RayScene& rays, int world, ViewBuilder& builder) const {
   const RayWorld& state = rays.world(world);
   const RayCamera& camera = state.cameras()[camera_];
-  const View& view = builder.build(state, rays.shared(), worlds_[world].appearance, camera.pos,
-                                   camera.mat, worlds_[world].grid);
+  const PerWorld& w = worlds_[world];
+  const View& view = builder.build(state, rays.shared(), w.appearance, w.markers.all(), camera.pos,
+                                   camera.mat, w.grid);
   if (fixed_layer_ && fixed_layer_->shows(view)) builder.use_fixed(fixed_layer_->tiles());
   return view;
 }
@@ -325,7 +351,7 @@ void CameraSensor::render_due(const CastContext& context) {
   if (gl_) {
     for (int id : due_) {
       const ImageTargets image = targets(id, 0);
-      gl_->render(id, rays.world(id), image);
+      gl_->render(id, rays.world(id), worlds_[id].markers.geoms(), image);
       derive(id, image, 0, cfg_.height);
     }
     return;

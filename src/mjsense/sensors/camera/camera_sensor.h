@@ -9,6 +9,7 @@
 #include "mjsense/render/view/camera_model.h"
 #include "mjsense/render/view/fixed_layer.h"
 #include "mjsense/render/view/look.h"
+#include "mjsense/render/view/markers.h"
 #include "mjsense/render/view/view_builder.h"
 #include "mjsense/sensors/camera/camera.h"
 #include "mjsense/sensors/camera/optical_flow.h"
@@ -47,6 +48,7 @@ class CameraSensor final : public Sensor {
   struct PerWorld {
     PixelGrid grid;
     Appearance appearance;
+    Markers markers;
     std::int64_t image = -1;  // number of the image shown, with an update period
     bool due = false;
     Rng rng{0, 0, 0, 0};  // of the moment of the image
@@ -68,7 +70,7 @@ class CameraSensor final : public Sensor {
   CameraSensorCfg cfg_;
   const mjModel* model_ = nullptr;
   int camera_ = -1;
-  unsigned groups_ = 0;
+  double near_ = 0;  // m
   std::vector<PerWorld> worlds_;
   std::vector<float> bent_;
   std::vector<int> due_;

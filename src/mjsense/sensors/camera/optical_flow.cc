@@ -6,6 +6,8 @@
 #include <limits>
 #include <utility>
 
+#include "mjsense/sensors/camera/pixel_owners.h"
+
 namespace mjsense {
 namespace {
 
@@ -154,10 +156,10 @@ void OpticalFlow::write(int world, const ImageTargets& image, int first, int las
     for (int x = 0, end; x < grid.width; x = end) {
       const std::int32_t *id = ids + 2 * x, *next = id;
       for (end = x; end < grid.width && next[0] == id[0] && next[1] == id[1]; ++end) next += 2;
-      const bool rigid = id[1] == mjOBJ_GEOM;
-      const Move* move = rigid ? &w.moves[model_->geom_bodyid[id[0]]] : nullptr;
-      if (!rigid || move->still) {
-        std::fill(out + 2 * x, out + 2 * end, rigid ? 0.0f : kNan);
+      const int body = body_of(model_, id[1], id[0]);
+      const Move* move = body >= 0 ? &w.moves[body] : nullptr;
+      if (!move || move->still) {
+        std::fill(out + 2 * x, out + 2 * end, move ? 0.0f : kNan);
       } else if (pinhole) {
         follow_pinhole(w, *move, y, x, end, image.depth + row, out);
       } else {

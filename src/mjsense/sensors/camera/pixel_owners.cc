@@ -20,11 +20,17 @@ std::vector<std::int32_t> entity_of_each(const SensorInit& init, mjtObj type) {
 
 }  // namespace
 
+int body_of(const mjModel* m, int object, int id) {
+  return object == mjOBJ_GEOM ? m->geom_bodyid[id] : object == mjOBJ_SITE ? m->site_bodyid[id] : -1;
+}
+
 PixelOwners::PixelOwners(const SensorInit& init, int width, int height)
     : model_(init.model),
       geom_entity_(entity_of_each(init, mjOBJ_GEOM)),
       flex_entity_(entity_of_each(init, mjOBJ_FLEX)),
       skin_entity_(entity_of_each(init, mjOBJ_SKIN)),
+      site_entity_(entity_of_each(init, mjOBJ_SITE)),
+      tendon_entity_(entity_of_each(init, mjOBJ_TENDON)),
       scratch_(init.threads,
                std::vector<std::int32_t>(2 * static_cast<std::size_t>(width) * height)) {}
 
@@ -36,12 +42,14 @@ void PixelOwners::write(const ImageTargets& image, int begin, int end, std::int3
                         std::int32_t* entities) const {
   for (int i = begin; i < end; ++i) {
     const int id = image.segmentation[2 * i], type = image.segmentation[2 * i + 1];
-    if (bodies != nullptr) bodies[i] = type == mjOBJ_GEOM ? model_->geom_bodyid[id] : -1;
+    if (bodies != nullptr) bodies[i] = body_of(model_, type, id);
     if (entities != nullptr)
-      entities[i] = type == mjOBJ_GEOM   ? geom_entity_[id]
-                    : type == mjOBJ_FLEX ? flex_entity_[id]
-                    : type == mjOBJ_SKIN ? skin_entity_[id]
-                                         : -1;
+      entities[i] = type == mjOBJ_GEOM     ? geom_entity_[id]
+                    : type == mjOBJ_FLEX   ? flex_entity_[id]
+                    : type == mjOBJ_SKIN   ? skin_entity_[id]
+                    : type == mjOBJ_SITE   ? site_entity_[id]
+                    : type == mjOBJ_TENDON ? tendon_entity_[id]
+                                           : -1;
   }
 }
 

@@ -26,6 +26,17 @@ void check_mode(std::string_view place, const ContactMatch& match) {
   throw ValueError(fmt::format("{}: mode '{}': must be geom, body or subtree", place, match.mode));
 }
 
+void drop_excluded(std::string_view place, const ContactMatch& match,
+                   std::vector<ContactObject>& objects) {
+  const std::vector<std::string> before = labels_of(objects);
+  const Exclude exclude(match.exclude, place);
+  std::erase_if(objects, [&](const ContactObject& o) { return exclude.drops(o.label); });
+  if (objects.empty()) {
+    throw ValueError(
+        fmt::format("{}: nothing is left after excludes of: {}", place, fmt::join(before, ", ")));
+  }
+}
+
 }  // namespace
 
 ContactNames::ContactNames(const mjModel* m) {
@@ -127,6 +138,7 @@ std::vector<ContactObject> ContactNames::by_regex(std::string_view place,
   const std::vector<ContactObject> all = of_entity(place, match);
   std::vector<ContactObject> result;
   for (int i : match_names(match.pattern, labels_of(all), place)) result.push_back(all[i]);
+  drop_excluded(place, match, result);
   return result;
 }
 
@@ -136,15 +148,7 @@ std::vector<ContactObject> ContactNames::primaries(std::string_view sensor,
   check_mode(place, match);
   if (match.pattern.empty()) throw ValueError(fmt::format("{}: no pattern is given", place));
   if (match.entity.empty()) return literal(place, match);
-  std::vector<ContactObject> result = by_regex(place, match);
-  const std::vector<std::string> before = labels_of(result);
-  const Exclude exclude(match.exclude, place);
-  std::erase_if(result, [&](const ContactObject& o) { return exclude.drops(o.label); });
-  if (result.empty()) {
-    throw ValueError(
-        fmt::format("{}: nothing is left after excludes of: {}", place, fmt::join(before, ", ")));
-  }
-  return result;
+  return by_regex(place, match);
 }
 
 std::vector<ContactObject> ContactNames::secondaries(std::string_view sensor,
@@ -164,10 +168,13 @@ std::vector<ContactObject> ContactNames::secondaries(std::string_view sensor,
   if (match.entity.empty()) return literal(place, match);
   if (match.mode == "subtree") {  // a literal name in the peer, and so here
     const std::vector<ContactObject> all = of_entity(place, match);
+    std::vector<ContactObject> result;
     for (const ContactObject& o : all) {
-      if (o.label == match.pattern[0]) return {o};
+      if (o.label == match.pattern[0]) result = {o};
     }
-    throw_unknown(place, "body", match.pattern[0], labels_of(all));
+    if (result.empty()) throw_unknown(place, "body", match.pattern[0], labels_of(all));
+    drop_excluded(place, match, result);
+    return result;
   }
   std::vector<ContactObject> result = by_regex(place, match);
   if (result.size() > 1 && policy == "error") {

@@ -49,13 +49,13 @@ void ContactMemory::update_time(const World& world, const ContactReducer& contac
 
 void ContactMemory::update_events(const World& world, const ContactReducer& contacts) {
   const int w = world.id;
-  std::uint8_t* touch = touch_.data() + static_cast<std::size_t>(w) * num_primaries_;
+  Touch* touch = touch_.data() + static_cast<std::size_t>(w) * num_primaries_;
   bool* touchdown = fields_.touchdown(w);
   bool* liftoff = fields_.liftoff(w);
   for (int p = 0; p < num_primaries_; ++p) {
-    const bool now = contacts.count(w, p) > 0;
-    touchdown[p] |= now && !touch[p];
-    liftoff[p] |= !now && touch[p];
+    const Touch now = contacts.count(w, p) > 0 ? Touch::kContact : Touch::kAir;
+    touchdown[p] |= now == Touch::kContact && touch[p] == Touch::kAir;
+    liftoff[p] |= now == Touch::kAir && touch[p] == Touch::kContact;
     touch[p] = now;
   }
 }
@@ -93,7 +93,7 @@ void ContactMemory::clear_step(int w) {
   }
 }
 
-void ContactMemory::reset(int world, const ContactReducer& contacts) {
+void ContactMemory::reset(int world) {
   const std::size_t begin = static_cast<std::size_t>(world) * num_primaries_;
   substep_[world] = 0;
   clear_step(world);
@@ -103,10 +103,7 @@ void ContactMemory::reset(int world, const ContactReducer& contacts) {
          {fields_.current_air, fields_.last_air, fields_.current_contact, fields_.last_contact})
       rows.fill(world, 0.0f);
   }
-  // A primary that starts in contact has not touched down.
-  for (int p = 0; fields_.touchdown && p < num_primaries_; ++p) {
-    touch_[begin + p] = contacts.count(world, p) > 0;
-  }
+  if (fields_.touchdown) std::fill_n(touch_.begin() + begin, num_primaries_, Touch::kUnknown);
 }
 
 }  // namespace mjsense

@@ -48,20 +48,24 @@ class ContactMemory {
   void set_peak(int world, int primary, const ContactReading& reading);
 
   void begin_control_step(int world) { substep_[world] = 0; }
-  void reset(int world, const ContactReducer& contacts);
+  void reset(int world);
 
  private:
+  // An episode's first substep is where its phases begin: what is there then neither touched down nor
+  // lifted off, whatever state was written after the reset.
+  enum class Touch : std::uint8_t { kUnknown, kAir, kContact };
+
   void clear_step(int world);
   void update_time(const World& world, const ContactReducer& contacts);
   void update_events(const World& world, const ContactReducer& contacts);
 
   Fields fields_;
   int num_primaries_ = 0, decimation_ = 1;
-  std::vector<int> substep_;         // of the control step, by world
-  std::vector<double> since_;        // [B, P] s in contact if > 0, in the air if < 0
-  std::vector<double> step_time_;    // [B] s since the control step began
-  std::vector<double> peak_;         // [B, P] greatest force norm of the step, -1 without contact
-  std::vector<std::uint8_t> touch_;  // [B, P] contact at the last substep
+  std::vector<int> substep_;       // of the control step, by world
+  std::vector<double> since_;      // [B, P] s in contact if > 0, in the air if < 0
+  std::vector<double> step_time_;  // [B] s since the control step began
+  std::vector<double> peak_;       // [B, P] greatest force norm of the step, -1 without contact
+  std::vector<Touch> touch_;       // [B, P] at the last substep
 };
 
 }  // namespace mjsense

@@ -42,7 +42,11 @@ void ContactPass::run(const World& world) {
           r.accepts_other(g2) && std::any_of(first.begin(), first.end(), [&](const Entry& other) {
             return other.reducer == e.reducer && other.primary == e.primary;
           });
-      if (!counted) r.add(world.id, e.primary, contact, -1);
+      if (counted) {
+        r.add_other_way(world.id, e.primary, contact);
+      } else {
+        r.add(world.id, e.primary, contact, -1);
+      }
     }
   }
 }

@@ -29,11 +29,12 @@ const char* const kReduces[] = {"none", "mindist", "maxforce", "netforce"};
 struct Heap {
   std::string xml;
   std::vector<std::string> geoms, bodies;
+  std::string prefix;  // of the names of bodies and their geoms
 };
 
 std::string random_geom(Random& r, Heap& heap) {
   const char* types[] = {"sphere", "box", "capsule", "ellipsoid"};
-  const std::string name = fmt::format("g{}", heap.geoms.size());
+  const std::string name = fmt::format("{}g{}", heap.prefix, heap.geoms.size());
   heap.geoms.push_back(name);
   const int condims[] = {1, 3, 4, 6};
   return fmt::format(
@@ -44,7 +45,7 @@ std::string random_geom(Random& r, Heap& heap) {
 }
 
 void add_body(Random& r, Heap& heap, int depth) {
-  const std::string name = fmt::format("b{}", heap.bodies.size());
+  const std::string name = fmt::format("{}b{}", heap.prefix, heap.bodies.size());
   heap.bodies.push_back(name);
   const double reach = depth ? .15 : .25;
   heap.xml +=
@@ -58,8 +59,9 @@ void add_body(Random& r, Heap& heap, int depth) {
   heap.xml += "</body>";
 }
 
-Heap random_heap(Random& r) {
+Heap random_heap(Random& r, std::string prefix = "") {
   Heap heap;
+  heap.prefix = std::move(prefix);
   heap.xml = fmt::format(
       R"(<mujoco><option cone="{}"/><size memory="20M"/><worldbody><geom name="floor" type="plane" size="3 3 .1"/>)",
       below(r, 2) ? "elliptic" : "pyramidal");
@@ -196,8 +198,64 @@ bool belongs(const mjModel* m, int geom, const std::string& mode, const std::str
   }
 }
 
+// One element of the matrix by its definition: +1 if the contact is the primary's with the secondary
+// as geom 2, -1 as geom 1, the first where it is both; 0 if it is none of theirs.
+int direction(const mjModel* m, const mjContact& c, const std::string& primary_mode,
+              const std::string& primary, const std::string& secondary_mode,
+              const std::string& secondary) {
+  for (int side : {0, 1}) {
+    if (belongs(m, c.geom[side], primary_mode, primary) &&
+        belongs(m, c.geom[1 - side], secondary_mode, secondary)) {
+      return side == 0 ? 1 : -1;
+    }
+  }
+  return 0;
+}
+
+struct PairCounts {
+  int pairs = 0, both_ways = 0;  // both_ways: contacts of a primary that two secondaries share
+};
+
+// pair_found and pair_force against a search of mjData.contact; names are full ones.
+void expect_pairs_of_brute_force(ContactSensor& sensor, const Model& model,
+                                 const std::vector<std::string>& primaries,
+                                 const std::vector<std::string>& secondaries, PairCounts& counts) {
+  const std::string& mode = sensor.cfg().primary.mode;
+  const std::string& other_mode = sensor.cfg().secondary->mode;
+  const auto found = sensor.field("pair_found").data.row<float>(0);
+  const auto force = sensor.field("pair_force").data.row<float>(0);
+  const std::size_t S = secondaries.size();
+  ASSERT_EQ(found.size(), primaries.size() * S);
+  for (std::size_t p = 0; p < primaries.size(); ++p) {
+    std::vector<int> seen(2 * model.d->ncon);
+    for (std::size_t s = 0; s < S; ++s) {
+      int count = 0;
+      double sum[3] = {0, 0, 0}, size = 1;
+      for (int i = 0; i < model.d->ncon; ++i) {
+        const mjContact& c = model.d->contact[i];
+        const int sign = direction(model.m, c, mode, primaries[p], other_mode, secondaries[s]);
+        if (sign == 0) continue;
+        seen[2 * i + (sign > 0)] = 1;
+        mjtNum f[6], w[3];
+        mj_contactForce(model.m, model.d, i, f);
+        mju_mulMatTVec3(w, c.frame, f);
+        for (int k = 0; k < 3; ++k) sum[k] += sign * w[k];
+        size += mju_norm3(f);
+        ++count;
+      }
+      ASSERT_EQ(found[p * S + s], count) << primaries[p] << " with " << secondaries[s];
+      counts.pairs += count > 0;
+      for (int k = 0; k < 3; ++k) {
+        ASSERT_NEAR(force[(p * S + s) * 3 + k], sum[k], 1e-6 * size)
+            << primaries[p] << " on " << secondaries[s];
+      }
+    }
+    for (int i = 0; i < model.d->ncon; ++i) counts.both_ways += seen[2 * i] && seen[2 * i + 1];
+  }
+}
+
 TEST(ContactRandom, PairsOthersAndFrictionSplitMatchBruteForce) {
-  int pairs = 0;
+  PairCounts counts;
   for (int seed = 1000; seed < 1100; ++seed) {
     Random r(seed);
     Heap heap = random_heap(r);
@@ -209,52 +267,33 @@ TEST(ContactRandom, PairsOthersAndFrictionSplitMatchBruteForce) {
     cfg.global_frame = true;
     auto sensor = make_sensor(cfg, model.m);
     const int P = static_cast<int>(cfg.primary.pattern.size());
-    const int S = static_cast<int>(cfg.secondary->pattern.size());
     for (int step = 0; step < 10; ++step) {
       mj_forward(model.m, model.d);
       sensor->compute({0, model.m, model.d});
-      const auto found = sensor->field("pair_found").data.row<float>(0);
-      const auto force = sensor->field("pair_force").data.row<float>(0);
+      expect_pairs_of_brute_force(*sensor, model, cfg.primary.pattern, cfg.secondary->pattern,
+                                  counts);
+      if (HasFatalFailure()) FAIL() << "seed " << seed << ", step " << step;
       for (int p = 0; p < P; ++p) {
         std::vector<int> others;
-        for (int s = 0; s < S; ++s) {
-          int count = 0;
-          double sum[3] = {0, 0, 0}, size = 1;
-          for (int i = 0; i < model.d->ncon; ++i) {
-            const mjContact& c = model.d->contact[i];
-            const auto prim = [&](int side) {
-              return belongs(model.m, c.geom[side], cfg.primary.mode, cfg.primary.pattern[p]);
-            };
-            const auto sec = [&](int side, int which) {
-              return belongs(model.m, c.geom[side], cfg.secondary->mode,
-                             cfg.secondary->pattern[which]);
-            };
-            bool regular = false, reverse = false;
-            for (int any = 0; any < S; ++any) {
-              regular |= prim(0) && sec(1, any);
-              reverse |= prim(1) && sec(0, any);
-            }
-            if (!regular && !reverse) continue;
-            const int sign = regular ? 1 : -1;
-            others.push_back(c.geom[regular ? 1 : 0]);
-            if (!sec(regular ? 1 : 0, s)) continue;
-            mjtNum f[6], w[3];
-            mj_contactForce(model.m, model.d, i, f);
-            mju_mulMatTVec3(w, c.frame, f);
-            for (int k = 0; k < 3; ++k) sum[k] += sign * w[k];
-            size += mju_norm3(f);
-            ++count;
+        for (int i = 0; i < model.d->ncon; ++i) {
+          const mjContact& c = model.d->contact[i];
+          bool regular = false, reverse = false;
+          for (const std::string& secondary : cfg.secondary->pattern) {
+            const int sign = direction(model.m, c, cfg.primary.mode, cfg.primary.pattern[p],
+                                       cfg.secondary->mode, secondary);
+            regular |= sign > 0;
+            reverse |= sign < 0;
           }
-          ASSERT_EQ(found[p * S + s], count);
-          pairs += count > 0;
-          for (int k = 0; k < 3; ++k) ASSERT_NEAR(force[(p * S + s) * 3 + k], sum[k], 1e-6 * size);
+          if (regular || reverse) others.push_back(c.geom[regular ? 1 : 0]);
         }
         for (int k = 0; k < cfg.num_slots; ++k) {
           const int n = p * cfg.num_slots + k;
           const int other = sensor->field("other_geom").data.row<std::int32_t>(0)[n];
-          if (sensor->field("found").data.row<float>(0)[n] == 0) {
+          const float found = sensor->field("found").data.row<float>(0)[n];
+          if (found == 0) {
             ASSERT_EQ(other, -1);
           } else {
+            ASSERT_EQ(found, others.size());
             ASSERT_NE(std::find(others.begin(), others.end(), other), others.end());
             ASSERT_EQ(sensor->field("other_body").data.row<std::int32_t>(0)[n],
                       model.m->geom_bodyid[other]);
@@ -277,7 +316,55 @@ TEST(ContactRandom, PairsOthersAndFrictionSplitMatchBruteForce) {
       for (int k = 0; k < 3; ++k) mj_step(model.m, model.d);
     }
   }
-  EXPECT_GT(pairs, 300);
+  EXPECT_GT(counts.pairs, 300);
+  EXPECT_GT(counts.both_ways, 100);
+}
+
+// Primaries and secondaries of an entity, by regular expressions and with names left out.
+TEST(ContactRandom, SecondariesWithExcludesMatchBruteForce) {
+  PairCounts counts;
+  int excluded = 0;
+  for (int seed = 2000; seed < 2100; ++seed) {
+    Random r(seed);
+    Heap heap = random_heap(r, "e/");
+    Model model(heap.xml + "</sensor></mujoco>");
+    ContactSensorCfg cfg = random_cfg(r, heap, 0);
+    cfg.primary.pattern = {".*"};
+    cfg.primary.entity = "e";
+    cfg.secondary = ContactMatch{kModes[below(r, 3)], {".*"}, "e", {}};
+    cfg.secondary_policy = "each";
+    const bool geoms = cfg.secondary->mode == "geom";
+    // One name as it is, and every name that ends in a random digit.
+    const std::string one = geoms ? "g1" : "b1", digit = std::to_string(below(r, 10));
+    cfg.secondary->exclude = {one, digit + "$"};
+    const auto names = [&](const std::string& mode, bool with_excludes) {
+      std::vector<std::string> result;
+      const bool of_geoms = mode == "geom";
+      for (int id = 0; id < (of_geoms ? model.m->ngeom : model.m->nbody); ++id) {
+        const std::string name = mj_id2name(model.m, of_geoms ? mjOBJ_GEOM : mjOBJ_BODY, id);
+        if (!name.starts_with("e/")) continue;
+        if (with_excludes && (name == "e/" + one || name.ends_with(digit))) {
+          ++excluded;
+        } else {
+          result.push_back(name);
+        }
+      }
+      return result;
+    };
+    const std::vector<std::string> secondaries = names(cfg.secondary->mode, true);
+    auto sensor = make_sensor(cfg, model.m);
+    for (int step = 0; step < 5; ++step) {
+      mj_forward(model.m, model.d);
+      sensor->compute({0, model.m, model.d});
+      expect_pairs_of_brute_force(*sensor, model, names(cfg.primary.mode, false), secondaries,
+                                  counts);
+      if (HasFatalFailure()) FAIL() << "seed " << seed << ", step " << step;
+      for (int k = 0; k < 3; ++k) mj_step(model.m, model.d);
+    }
+  }
+  EXPECT_GT(counts.pairs, 1000);
+  EXPECT_GT(counts.both_ways, 100);
+  EXPECT_GT(excluded, 100);
 }
 
 // A plate of 80 balls: more matches than any fixed buffer, every one counted and summed.

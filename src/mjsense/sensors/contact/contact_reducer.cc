@@ -103,7 +103,12 @@ void ContactReducer::add(int world, int primary, PassContact& contact, int sign)
     const double key = -contact.force_norm();
     if (before == 0 || key < peaks_[row].key) peaks_[row] = {key, contact.id, sign};
   }
-  if (keep_pairs_) add_to_pairs(world, primary, contact, sign);
+  if (keep_pairs_) add_to_pairs(world, primary, contact, sign, {});
+}
+
+void ContactReducer::add_other_way(int world, int primary, PassContact& contact) {
+  if (!keep_pairs_) return;
+  add_to_pairs(world, primary, contact, -1, list(secondary_of_geom_, contact.contact.geom[1]));
 }
 
 // Keeps slots sorted by key; equal keys stay in the order of the contact list.
@@ -141,10 +146,12 @@ void ContactReducer::add_to_sum(ContactSum& sum, bool is_first, PassContact& con
   if (is_first || -weight < sum.strongest.key) sum.strongest = {-weight, contact.id, sign};
 }
 
-void ContactReducer::add_to_pairs(int world, int primary, PassContact& contact, int sign) {
+void ContactReducer::add_to_pairs(int world, int primary, PassContact& contact, int sign,
+                                  std::span<const int> had) {
   const mjContact& c = contact.contact;
   const mjtNum* f = contact.wrench();
   for (int s : list(secondary_of_geom_, c.geom[sign > 0 ? 1 : 0])) {
+    if (std::find(had.begin(), had.end(), s) != had.end()) continue;
     const std::size_t pair =
         (static_cast<std::size_t>(world) * num_primaries_ + primary) * num_secondaries_ + s;
     ++pair_count_[pair];

@@ -99,6 +99,9 @@ class ContactReducer {
 
   void begin(int world);
   void add(int world, int primary, PassContact& contact, int sign);
+  // A contact that was added with the primary as geom 1 and matches as geom 2 too: it is not counted
+  // again, but secondaries on the side of geom 1 have it as well.
+  void add_other_way(int world, int primary, PassContact& contact);
 
   int num_primaries() const { return num_primaries_; }
   int num_slots() const { return num_slots_; }
@@ -137,7 +140,9 @@ class ContactReducer {
                         std::string_view mode);
   void insert(ContactRef* slots, int filled, const ContactRef& ref) const;
   void add_to_sum(ContactSum& sum, bool is_first, PassContact& contact, int sign) const;
-  void add_to_pairs(int world, int primary, PassContact& contact, int sign);
+  // had: secondaries that this contact is not new to.
+  void add_to_pairs(int world, int primary, PassContact& contact, int sign,
+                    std::span<const int> had);
 
   ContactReduce reduce_ = ContactReduce::kNone;
   int num_primaries_ = 0, num_slots_ = 1, num_secondaries_ = 0;

@@ -227,8 +227,7 @@ void ContactSensor::remember(const World& world) {
 
 void ContactSensor::reset(const World& world) {
   const int w = world.id;
-  if (cfg_.track_events) pass_->run(world);
-  memory_.reset(w, reducer_);
+  memory_.reset(w);
   for (const Output& o : outputs_) {
     if (o.history) o.history.fill(w, 0.0f);
   }

@@ -78,7 +78,8 @@ struct ContactSensorCfg : SensorCfg {
 //   pos        [B, N, 3]  m, world              normal, tangent  [B, N, 3]  unit, world
 //   X_history  [B, N, H(, 3)]  of every field X above, newest first, one entry a substep
 //   current_air_time, last_air_time, current_contact_time, last_contact_time  [B, P]  s
-//   touchdown, liftoff  bool [B, P]  a contact began (ended) in this control step
+//   touchdown, liftoff  bool [B, P]  a contact began (ended) in this control step; what is there at
+//                         the first substep after a reset has not begun then
 //   found_any  bool [B, P]  any contact in this control step
 //   force_peak [B, P, 3], dist_at_peak [B, P], pos_at_peak [B, P, 3]  the strongest of the step
 //   first_touch_time [B, P]  s from the start of the control step to its first substep with

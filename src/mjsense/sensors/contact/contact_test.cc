@@ -131,6 +131,76 @@ TEST(Contact, MiddleOfAStackPushesBothWays) {
   }
 }
 
+// Two feet of one trunk press against each other along x, L from the left: the contact is the trunk's
+// with R and, turned round, the trunk's with L.
+//
+//          trunk
+//        L --><-- R
+constexpr char kFeet[] = R"(
+<mujoco><option gravity="0 0 0"/><worldbody><body name="trunk" pos="0 0 1"><freejoint/>
+  <geom size=".1" pos="0 0 .5"/>
+  <body name="L" pos="-.099 0 0"><joint type="slide" axis="1 0 0"/><geom name="L" size=".1" mass="1"/></body>
+  <body name="R" pos=".099 0 0"><joint type="slide" axis="1 0 0"/><geom name="R" size=".1" mass="1"/></body>
+</body></worldbody></mujoco>)";
+
+ContactSensorCfg feet_cfg(std::string name, std::string mode, std::vector<std::string> pattern) {
+  ContactSensorCfg c;
+  c.name = std::move(name);
+  c.primary = {"subtree", {"trunk"}, "bot", {}};
+  c.secondary = ContactMatch{std::move(mode), std::move(pattern), "bot", {}};
+  c.secondary_policy = "each";
+  return c;
+}
+
+TEST(Contact, AContactThatMatchesBothWaysIsInBothPairs) {
+  ContactSensorCfg net = feet_cfg("net", "subtree", {"trunk", "L", "R"});
+  net.reduce = "netforce";
+  Lab lab("bot", kFeet,
+          {feet_cfg("bodies", "body", {"L", "R"}), feet_cfg("subtrees", "subtree", {"L", "R"}),
+           feet_cfg("geoms", "geom", {"R", "L"}), net});
+  lab.sim->forward();
+  for (const char* name : {"bodies", "subtrees", "geoms"}) {
+    EXPECT_THAT(lab.read("found", name), ElementsAre(1))
+        << name;  // one contact, whatever the pairs
+    EXPECT_THAT(lab.read("pair_found", name), ElementsAre(1, 1)) << name;
+    const std::vector<float> force = lab.read("pair_force", name);
+    EXPECT_GT(force[3], 1) << name;  // on R, to the right
+    EXPECT_EQ(force[0], -force[3]) << name;
+    for (int i : {1, 2, 4, 5}) EXPECT_NEAR(force[i], 0, 1e-6) << name;
+  }
+  // The trunk with itself counts once, as geom 1.
+  EXPECT_THAT(lab.read("pair_found", "net"), ElementsAre(1, 1, 1));
+  const std::vector<float> force = lab.read("pair_force", "net");
+  EXPECT_EQ(force[0], force[6]);
+  EXPECT_EQ(force[0], lab.read("force", "net")[0]);
+}
+
+TEST(Contact, ExcludeLeavesSecondariesOut) {
+  ContactSensorCfg each = feet_cfg("each", "geom", {".*"}),
+                   first = feet_cfg("first", "geom", {".*"});
+  ContactSensorCfg literal = feet_cfg("literal", "subtree", {"L"});
+  each.secondary->exclude = {"L", "geom_"};
+  first.secondary->exclude = {"geom_0", "^L$"};
+  literal.secondary->exclude = {"R"};
+  first.secondary_policy = literal.secondary_policy = "first";
+  Lab lab("bot", kFeet, {each, first, literal});
+  lab.sim->forward();
+  EXPECT_THAT(lab.sensor("each").secondary_names(), ElementsAre("geom_0", "R"));  // "geom_": exact
+  EXPECT_THAT(lab.sensor("first").secondary_names(), ElementsAre("R"));
+  EXPECT_THAT(lab.sensor("literal").secondary_names(), ElementsAre("L"));
+  EXPECT_THAT(lab.read("found", "first"), ElementsAre(1));
+
+  for (const char* policy : {"each", "first", "error"}) {
+    ContactSensorCfg c = feet_cfg("none", "subtree", {"L"});
+    c.secondary_policy = policy;
+    c.secondary->exclude = {"L"};
+    EXPECT_THAT([&] { Lab("bot", kFeet, {c}); },
+                ::testing::ThrowsMessage<ValueError>(
+                    HasSubstr("sensor 'none': secondary: nothing is left after excludes of: L")))
+        << policy;
+  }
+}
+
 TEST(Contact, PartsAreMuJoCosPerFieldSensors) {
   Lab lab("box", kBox, {box_cfg()});
   EXPECT_TRUE(lab.scene->find_sensor("c_box_geom_found"));

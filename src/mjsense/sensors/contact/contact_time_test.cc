@@ -196,5 +196,46 @@ TEST(ContactTime, StartingInContactIsNoTouchdownAndResetForgets) {
   mj_deleteModel(m);
 }
 
+// Phases begin with an episode's first substep, whatever was there at the reset: a pose is often
+// written after it. mjlab's timers do the same.
+TEST(ContactTime, TheFirstSubstepAfterAResetIsNoEvent) {
+  char error[500] = "";
+  mjSpec* spec = mj_parseXMLString(kBalls, nullptr, error, sizeof error);
+  mjModel* m = mj_compile(spec, nullptr);
+  mj_deleteSpec(spec);
+  mjData* d = mj_makeData(m);
+  auto s = make_sensor(m, 1);
+  const auto flag = [&](const char* name, int p) { return s->field(name).data.row<bool>(0)[p]; };
+  const auto touch = [&](bool a, bool b) {
+    d->qpos[0] = a ? -0.201 : 0.0;
+    d->qpos[1] = b ? -0.001 : 0.1;
+    mj_forward(m, d);
+  };
+  for (const bool before : {true, false}) {
+    touch(before, before);
+    s->reset({0, m, d});
+    touch(true, false);
+    s->substep({0, m, d});
+    for (int p : {0, 1}) {
+      EXPECT_FALSE(flag("touchdown", p)) << before << p;
+      EXPECT_FALSE(flag("liftoff", p)) << before << p;
+      EXPECT_EQ(s->field("last_air_time").data.row<float>(0)[p], 0);
+      EXPECT_EQ(s->field("last_contact_time").data.row<float>(0)[p], 0);
+    }
+    EXPECT_TRUE(flag("found_any", 0));
+    EXPECT_TRUE(s->compute_first_contact(kDt).row<bool>(0)[0]);
+    EXPECT_TRUE(s->compute_first_air(kDt).row<bool>(0)[1]);
+
+    touch(false, true);
+    s->substep({0, m, d});
+    EXPECT_TRUE(flag("liftoff", 0));
+    EXPECT_TRUE(flag("touchdown", 1));
+    EXPECT_FLOAT_EQ(s->field("last_contact_time").data.row<float>(0)[0], 0.004f);
+    EXPECT_FLOAT_EQ(s->field("last_air_time").data.row<float>(0)[1], 0.004f);
+  }
+  mj_deleteData(d);
+  mj_deleteModel(m);
+}
+
 }  // namespace
 }  // namespace mjsense

@@ -17,6 +17,13 @@ constexpr int kChunk = 12;
 constexpr int kMostMoments = 100'000;  // of a frame's past
 constexpr double kInf = std::numeric_limits<double>::infinity();
 
+// Of the two quaternions of a rotation the one whose largest component is positive, as mjlab's.
+void make_largest_positive(double q[4]) {
+  const double largest =
+      *std::max_element(q, q + 4, [](double a, double b) { return std::abs(a) < std::abs(b); });
+  if (largest < 0) mju_scl(q, q, -1.0, 4);
+}
+
 std::uint32_t group_mask(const std::optional<std::vector<int>>& groups, const std::string& place) {
   if (!groups) return 0x3f;
   std::uint32_t mask = 0;
@@ -143,6 +150,7 @@ void RayCastSensor::compute(const World& world) {
     pose = frames_[f].pose(world.data, alignment_);
     double q[4];
     mju_mat2Quat(q, pose.mat);
+    make_largest_positive(q);
     std::copy_n(pose.pos, 3, frame_pos_->data.row<float>(world.id).data() + 3 * f);
     std::copy_n(q, 4, frame_quat_->data.row<float>(world.id).data() + 4 * f);
   }

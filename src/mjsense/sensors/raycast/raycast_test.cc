@@ -155,6 +155,39 @@ TEST(RayCast, AlignmentTurnsRaysButNotTheFrame) {
   EXPECT_EQ(lab.read("quat_w", "world"), lab.read("quat_w", "base"));
 }
 
+// Of the two quaternions of an orientation: the one whose largest component is positive.
+TEST(RayCast, TheLargestComponentOfAQuaternionIsPositive) {
+  auto cfg = sensor_cfg<RayCastSensorCfg>();
+  cfg->frame = {{"body", "base", "r"}, {"body", "belly", "r"}};
+  Lab lab({cfg});
+  const auto expect = [&](std::initializer_list<double> unnormalised) {
+    double q[4];
+    std::copy(unnormalised.begin(), unnormalised.end(), q);
+    mju_normalize4(q);
+    lab.pose({0, 0, 2, q[0], q[1], q[2], q[3]});
+    int largest = 0;
+    for (int i = 1; i < 4; ++i) largest = std::abs(q[i]) > std::abs(q[largest]) ? i : largest;
+    const float sign = q[largest] < 0 ? -1.0f : 1.0f;
+    std::vector<float> one;
+    for (double x : q) one.push_back(sign * static_cast<float>(x));
+    EXPECT_THAT(lab.read("quat_w"), Pointwise(FloatNear(1e-6f), one));
+    std::vector<float> both = one;
+    both.insert(both.end(), one.begin(), one.end());
+    EXPECT_THAT(lab.read("frame_quat_w"), Pointwise(FloatNear(1e-6f), both));
+  };
+  expect({1, 0, 0, 0});
+  expect({-1, 0, 0, 0});
+  expect({.6, -.7, .3, .2});  // w above 1/2, yet not the largest
+  expect({.6, .1, -.75, .2});
+  expect({.55, .1, .2, -.8});
+  expect({-.1, .2, .3, -.9});
+  for (int k = 0; k < 200; ++k) {  // quaternions of all directions
+    const double a = 0.7 * k, b = 1.3 * k, c = 0.05 * k;
+    expect({std::cos(a) * std::cos(c), std::sin(a) * std::cos(c), std::cos(b) * std::sin(c),
+            std::sin(b) * std::sin(c)});
+  }
+}
+
 TEST(RayCast, GroupsAndTransparencyBelongToTheQuery) {
   auto seen = sensor_cfg<RayCastSensorCfg>("default"),
        third = sensor_cfg<RayCastSensorCfg>("third");

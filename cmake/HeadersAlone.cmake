@@ -1,0 +1,15 @@
+# Every header compiles by itself: ninja headers_alone. A file that includes one header and nothing else, for each.
+file(GLOB_RECURSE headers RELATIVE ${PROJECT_SOURCE_DIR}/src CONFIGURE_DEPENDS ${PROJECT_SOURCE_DIR}/src/mjsense/*.h)
+if(NOT MJSENSE_OPENGL)
+  list(FILTER headers EXCLUDE REGEX "/opengl/")
+endif()
+set(sources)
+foreach(header IN LISTS headers)
+  set(source ${PROJECT_BINARY_DIR}/headers_alone/${header}.cc)
+  file(CONFIGURE OUTPUT ${source} CONTENT "#include \"${header}\"\n")
+  list(APPEND sources ${source})
+endforeach()
+add_library(headers_alone OBJECT EXCLUDE_FROM_ALL ${sources})
+target_link_libraries(headers_alone PRIVATE mjsense ${MJSENSE_PRIVATE_LIBS} GTest::gtest GTest::gmock)
+target_compile_options(headers_alone PRIVATE -O0 -Wall -Wextra -Wno-missing-field-initializers -Wno-unused-function
+                                             -Wno-unused-variable)

@@ -1,0 +1,105 @@
+// Cameras that stand inside a housing: with clip_near "model" they see out of it as MuJoCo's renderer does.
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <string>
+
+#include "mjsense/core/error.h"
+#include "mjsense/rays/testing/scene.h"
+#include "mjsense/sensors/camera/testing/shoot.h"
+
+namespace mjsense {
+namespace {
+
+// A lens of 3 cm and a shell around it, of a mesh and of shapes that cut through the near plane, 4 cm
+// away; things outside, some of which move.
+constexpr char kHousing[] = R"(<mujoco><statistic extent="2" center="0 0 0"/>
+  <visual><map znear="0.02"/><quality numslices="60" numstacks="60" shadowsize="1024"/></visual>
+  <asset><mesh name="shell" vertex="-.05 -.05 .02  .05 -.05 .02  0 .06 .02  -.05 -.05 -.03  .05 -.05 -.03  0 .06 -.03"/>
+    <hfield name="h" nrow="3" ncol="3" size=".5 .5 .1 .1" elevation="0 .2 0 .5 1 .3 0 .4 .2"/></asset>
+  <worldbody><light pos="1 1 3" dir="-.3 -.3 -1"/>
+    <geom type="plane" size="3 3 .1" rgba=".5 .6 .7 1"/><geom type="hfield" hfield="h" pos=".6 .6 0"/>
+    <geom type="box" size=".2 .3 .1" pos="-.5 .3 .1" rgba=".9 .3 .2 1"/>
+    <geom type="cylinder" size=".012 .01" pos="0 0 .97" rgba="0 1 0 1"/>
+    <geom type="mesh" mesh="shell" pos="0 0 1" rgba="1 0 1 1"/>
+    <geom type="capsule" size=".004 .03" pos=".01 0 .965" euler="0 40 0" rgba="1 1 0 1"/>
+    <geom type="sphere" size=".01" pos="-.02 .01 .962" rgba="0 1 1 .5"/>
+    <body pos=".1 -.3 .3"><freejoint/><geom type="ellipsoid" size=".1 .2 .05" rgba=".2 .9 .3 1"/></body>
+    <camera name="c" pos="0 0 1" fovy="70"/></worldbody></mujoco>)";
+
+CameraSensorCfg wide(std::vector<std::string> types) {
+  CameraSensorCfg cfg;
+  cfg.name = "cam";
+  cfg.camera_name = "c";
+  cfg.width = 120;
+  cfg.height = 90;
+  cfg.data_types = std::move(types);
+  cfg.clip_near = "model";
+  return cfg;
+}
+
+TEST(CameraClip, AtTheModelsNearPlaneAsOpenGLDoes) {
+  const testing::TestModel m(kHousing);
+  for (const bool shadows : {false, true}) {  // with shadows what stands still is kept
+    CameraSensorCfg cfg = wide({"rgb", "depth", "segmentation"});
+    cfg.use_shadows = shadows;
+    const testing::Pair pair(cfg, m);
+    if (!pair.opengl) GTEST_SKIP() << pair.missing;
+    EXPECT_LT(pair.other_ids(), 0.006);
+    EXPECT_LT(pair.other_depths(0.002), 0.006);
+    EXPECT_GT(pair.psnr(), 27);  // MuJoCo lights the coarse field at its corners
+  }
+}
+
+// Every field shows what lies beyond: nothing is nearer than the plane, and without it all is.
+TEST(CameraClip, HoldsForEveryField) {
+  const testing::TestModel m(kHousing);
+  RayScene rays(m.model, 1);
+  rays.update(m.world());
+  CameraSensorCfg cfg = wide({"rgb", "depth", "segmentation", "normals", "point_cloud", "flow"});
+  const auto clipped = testing::shoot(cfg, m, rays);
+  cfg.clip_near = "none";
+  const auto all = testing::shoot(cfg, m, rays);
+  cfg.near = 0.04;
+  const auto by_hand = testing::shoot(cfg, m, rays);
+  int nearer = 0;
+  const auto depth = clipped->field("depth").data.row<float>(0);
+  const auto points = clipped->field("point_cloud").data.row<float>(0);
+  for (std::size_t i = 0; i < depth.size(); ++i) {
+    EXPECT_GE(depth[i], 0.04f);
+    EXPECT_EQ(points[3 * i + 2], -depth[i]);
+    nearer += all->field("depth").data.row<float>(0)[i] < 0.04f;
+  }
+  EXPECT_GT(nearer, 100);  // the little things; of the shell only backs are seen
+  for (const Field& field : clipped->fields())
+    EXPECT_TRUE(std::ranges::equal(field.data.all<std::byte>(),
+                                   by_hand->field(field.name).data.all<std::byte>()))
+        << field.name;
+}
+
+TEST(CameraClip, FaultsAreNamed) {
+  const auto message = [](const CameraSensorCfg& cfg) -> std::string {
+    try {
+      const testing::TestModel m(kHousing);
+      RayScene rays(m.model, 1);
+      rays.update(m.world());
+      testing::shoot(cfg, m, rays);
+    } catch (const Error& e) {
+      return e.what();
+    }
+    return "no error";
+  };
+  CameraSensorCfg cfg = wide({"rgb"});
+  cfg.near = 0.1;
+  EXPECT_NE(message(cfg).find("near is 0.1 m and clip_near is 'model'"), std::string::npos);
+  cfg.near = 0;
+  cfg.far = 0.03;
+  EXPECT_NE(message(cfg).find("clips at 0.04 m"), std::string::npos);
+  cfg.far = 0;
+  cfg.clip_near = "modell";
+  EXPECT_NE(message(cfg).find("invalid clip_near 'modell'"), std::string::npos);
+}
+
+}  // namespace
+}  // namespace mjsense
