@@ -63,7 +63,7 @@ struct Recorder::Impl {
 
   RecordingCfg cfg;
   RecordingPlan plan;
-  int streams;  // arrays and the recorder's own
+  int streams;                         // arrays and the recorder's own
   std::vector<std::size_t> row_bytes;  // of a stream in a chunk that is filled
   std::vector<std::int64_t> chunk_rows_of;
 
