@@ -1,7 +1,6 @@
 // CameraSensorCfg in Python.
 
-#include "mjsense/sensors/camera/camera.h"
-
+#include "mjsense/sensors/camera/camera_sensor_cfg.h"
 #include "python/bindings/configs.h"
 
 namespace mjsense::python {

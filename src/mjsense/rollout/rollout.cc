@@ -9,7 +9,7 @@
 #include "mjsense/core/error.h"
 #include "mjsense/observe/json_sensor.h"
 #include "mjsense/rollout/registry.h"
-#include "mjsense/sensors/camera/camera.h"
+#include "mjsense/sensors/camera/camera_sensor_cfg.h"
 
 namespace mjsense {
 namespace {

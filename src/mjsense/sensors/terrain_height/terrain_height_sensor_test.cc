@@ -1,3 +1,5 @@
+#include "mjsense/sensors/terrain_height/terrain_height_sensor.h"
+
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
@@ -6,7 +8,6 @@
 
 #include "mjsense/core/error.h"
 #include "mjsense/scene/scene.h"
-#include "mjsense/sensors/height/terrain_height.h"
 #include "mjsense/sim/simulation.h"
 
 namespace mjsense {
