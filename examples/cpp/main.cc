@@ -1,7 +1,7 @@
 // sees SCENE.xml CAMERA: what that camera sees in the second of two worlds, as CAMERA.ppm.
 
 #include <mjsense/scene/scene.h>
-#include <mjsense/sensors/camera/camera.h>
+#include <mjsense/sensors/camera/camera_sensor_cfg.h>
 #include <mjsense/sim/simulation.h>
 
 #include <exception>

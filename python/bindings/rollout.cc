@@ -245,7 +245,7 @@ nb::list streams(PyRollout& self) {
   for (const auto& sensor : self.rollout().suite().sensors()) {
     nb::object owner = owner_of(std::shared_ptr<Sensor>(self.share(), sensor.get()));
     for (Field& field : sensor->fields()) {
-      list.append(nb::make_tuple(nb::cast(field.spec, nb::rv_policy::copy),
+      list.append(nb::make_tuple(sensor->name(), nb::cast(field.spec, nb::rv_policy::copy),
                                  to_readonly_numpy(field.data.view(), owner)));
     }
   }
@@ -278,7 +278,7 @@ void bind_rollout(nb::module_& m) {
       .def("set_actions", &PyRollout::set_actions, nb::arg("values"))
       .def("actions", &PyRollout::actions)
       .def("action_layout", &action_layout)
-      .def("streams", &streams)
+      .def("streams", &streams, "(sensor, spec, array) of every stream")
       .def("outcome", &outcome, nb::arg("world"), "(reward, success, terminal, truncated, fault)")
       .def(
           "description", [](PyRollout& s, int w) { return s.rollout().task().description(w); },

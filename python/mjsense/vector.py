@@ -22,8 +22,10 @@ from mjsense.simulation import Simulation
 class TaskVectorEnv(VectorEnv):
     """``num_envs`` worlds that play episodes of a task; made by :func:`make_vec`.
 
-    Observations are copies (gymnasium's rule); ``env.rows`` are the sensors' own arrays. A world whose episode has ended begins the
-    next one in the next step, whose action it ignores (autoreset mode NEXT_STEP).
+    An observation is a dict by sensor; a sensor with several streams is a dict of them in turn, nested by their path:
+    ``observation["qpos"]["arm"]``, ``observation["env_states"]["actors"]["mug"]``. Observations are copies (gymnasium's rule);
+    ``env.rows`` are the sensors' own arrays by stream, ``env.rows["qpos/arm"]``. A world whose episode has ended begins the next one in
+    the next step, whose action it ignores (autoreset mode NEXT_STEP).
     """
 
     metadata = {"render_modes": ["rgb_array"], "autoreset_mode": AutoresetMode.NEXT_STEP}
@@ -45,32 +47,28 @@ class TaskVectorEnv(VectorEnv):
         low, high = (np.concatenate([row[k] for row in layout]).astype(np.float32) for k in (1, 2))
         self.single_action_space = gymnasium.spaces.Box(low, high, dtype=np.float32)
         self.action_space = batch_space(self.single_action_space, self.num_envs)
-        self.single_observation_space = gymnasium.spaces.Dict({name: _box(self.specs[name]) for name in self.rows})
+        boxes = {name: _box(spec) for name, spec in self.specs.items()}
+        self.single_observation_space = _space(_nest(self._paths, boxes))
         self.observation_space = batch_space(self.single_observation_space, self.num_envs)
 
     def _build(self, seed: int) -> None:
         self._config.seed = seed
         use_installed_meshes()
         self._rollout = _core.Rollout(self._config)
-        streams = {spec.name: (spec, array) for spec, array in self._rollout.streams()}
-        names = self._wanted
-        if names is None:
-            plain = (name for name, (spec, _) in streams.items() if not spec.is_dict)
-            names = [name for name in plain if not name.startswith(("sensor_param_", "object_image_points"))]
-        unknown = [name for name in names if name not in streams]
-        if unknown:
-            raise ValueError(f"no stream '{unknown[0]}'; there are {', '.join(streams)}")
-        self.rows: dict[str, np.ndarray] = {name: streams[name][1] for name in names}
+        streams = {spec.name: (sensor, spec, array) for sensor, spec, array in self._rollout.streams()}
+        names = _streams(self._wanted, streams)
+        self.rows: dict[str, np.ndarray] = {name: streams[name][2] for name in names}
         """The streams' own arrays [B, ...], as they are now."""
-        self.specs: dict[str, _core.SensorSpec] = {name: streams[name][0] for name in names}
+        self.specs: dict[str, _core.SensorSpec] = {name: streams[name][1] for name in names}
         """Unit, frame and shape of each stream."""
+        self._paths = {name: _path(streams[name][0], name) for name in names}
         self.sim = Simulation._of(self._rollout.simulation())
         """The worlds. Read them as you like; the task writes them."""
         self._next_episode = 0
         self._ended = np.zeros(self.num_envs, bool)
         self._started = False
 
-    def reset(self, *, seed: Seed | None = None, options: dict[str, Any] | None = None) -> tuple[dict[str, np.ndarray], dict]:
+    def reset(self, *, seed: Seed | None = None, options: dict[str, Any] | None = None) -> tuple[dict[str, Any], dict]:
         """Begins a new episode in every world; with a seed, the first ones of that seed."""
         self._check_open()
         mask = np.ones(self.num_envs, bool)
@@ -93,7 +91,7 @@ class TaskVectorEnv(VectorEnv):
         self._ended[worlds] = False
         self._started = True
 
-    def step(self, actions: Any) -> tuple[dict[str, np.ndarray], np.ndarray, np.ndarray, np.ndarray, dict[str, Any]]:
+    def step(self, actions: Any) -> tuple[dict[str, Any], np.ndarray, np.ndarray, np.ndarray, dict[str, Any]]:
         """One control step. Actions ``[num_envs, n]``: actuator commands of the move groups, see ``action_groups``."""
         self._check_open()
         if not self._started:
@@ -131,8 +129,8 @@ class TaskVectorEnv(VectorEnv):
         self._rollout.act()
         return np.array(self._rollout.actions(), dtype=np.float32)
 
-    def _observe(self) -> dict[str, np.ndarray]:
-        return {name: rows.copy() for name, rows in self.rows.items()}
+    def _observe(self) -> dict[str, Any]:
+        return _nest(self._paths, {name: rows.copy() for name, rows in self.rows.items()})
 
     def render(self) -> tuple[np.ndarray, ...] | None:
         """The first camera's picture of every world."""
@@ -152,6 +150,39 @@ class TaskVectorEnv(VectorEnv):
         self._closed = True
         self.sim.close()
         self._rollout = None  # type: ignore[assignment]
+
+
+def _streams(wanted: Sequence[str] | None, streams: dict[str, tuple[str, _core.SensorSpec, np.ndarray]]) -> list[str]:
+    """Names of the streams to observe: those wanted, by their own names or their sensors'; else all that are numbers."""
+    if wanted is None:
+        plain = [name for name, (_, spec, array) in streams.items() if not spec.is_dict and array.size > 0]
+        return [name for name in plain if not name.startswith(("sensor_param_", "object_image_points"))]
+    names: list[str] = []
+    for one in wanted:
+        found = [name for name, (sensor, _, array) in streams.items() if name == one or (sensor == one and array.size > 0)]
+        if not found:
+            raise ValueError(f"no sensor or stream '{one}'; there are {', '.join(streams)}")
+        names += [name for name in found if name not in names]
+    return names
+
+
+def _path(sensor: str, stream: str) -> tuple[str, ...]:
+    """Where a stream stands in an observation: ("qpos", "arm")."""
+    return (sensor, *stream[len(sensor) + 1 :].split("/")) if stream != sensor else (sensor,)
+
+
+def _nest(paths: dict[str, tuple[str, ...]], values: dict[str, Any]) -> dict[str, Any]:
+    nested: dict[str, Any] = {}
+    for name, path in paths.items():
+        inner = nested
+        for key in path[:-1]:
+            inner = inner.setdefault(key, {})
+        inner[path[-1]] = values[name]
+    return nested
+
+
+def _space(boxes: dict[str, Any]) -> gymnasium.spaces.Dict:
+    return gymnasium.spaces.Dict({key: _space(box) if isinstance(box, dict) else box for key, box in boxes.items()})
 
 
 @checked
@@ -180,7 +211,7 @@ def make_vec(
         task, robot: their registered names.
         num_envs: worlds.
         policy: name of a policy that :meth:`TaskVectorEnv.expert_action` asks; none if not given.
-        observations: names of the streams to observe; if not given, all that are numbers.
+        observations: names of sensors ("qpos") or of single streams ("qpos/arm") to observe; if not given, all that are numbers.
         cameras: names of the robot's cameras; all if not given, ``[]`` for none (much faster).
         width, height: pixels of every camera.
         depth: observe depth too.

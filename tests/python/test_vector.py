@@ -31,6 +31,34 @@ def test_spaces(env):
     assert env.specs["tcp_pose"].unit.startswith("m")
 
 
+def test_numbers_by_move_group(env):
+    observation, _ = env.reset(seed=0)
+    space = env.single_observation_space
+    assert space["qpos"]["arm"].shape == (7,) and space["qpos"]["arm"].dtype == np.float32
+    assert list(observation["qpos"]) == ["arm", "gripper"]  # a base has no joints
+    assert observation["qpos"]["arm"].shape == (3, 7) and (observation["qpos"]["arm"][:, 3] < -1).all()
+    assert space["actions/joint_pos"]["gripper"].high == 255
+    assert set(observation["env_states"]) == {"actors", "articulations"} and "mug" in observation["env_states"]["actors"]
+    given = observation["actions/commanded_action"]["given"]
+    assert not given["arm"].any() and observation["actions/ee_pose"]["given"]["arm"].all()
+    assert env.specs["qpos/arm"].unit == "rad" and env.rows["qpos/arm"].shape == (3, 7)
+
+    action = hold(env)
+    observation = env.step(action)[0]
+    assert env.observation_space.contains(observation)
+    np.testing.assert_array_equal(observation["actions/commanded_action"]["arm"], action[:, :7])
+    assert observation["actions/commanded_action"]["given"]["arm"].all()
+    assert observation["grasp_state_pickup_obj"]["gripper"]["held"].dtype == bool
+
+
+def test_observations_are_chosen_by_sensor_or_stream():
+    env = make(num_envs=1, observations=["qpos", "actions/ee_pose/arm", "tcp_pose", "qpos/arm"])
+    observation, _ = env.reset()
+    assert {k: list(v) if isinstance(v, dict) else v.shape for k, v in observation.items()} == {
+        "qpos": ["arm", "gripper"], "actions/ee_pose": ["arm"], "tcp_pose": (1, 7)}  # fmt: skip
+    env.close()
+
+
 def test_step_and_copies(env):
     first, _ = env.reset(seed=0)
     second, reward, terminated, truncated, info = env.step(hold(env))

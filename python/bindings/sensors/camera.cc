@@ -1,7 +1,7 @@
 // CameraSensorCfg in Python.
 
-#include "mjsense/sensors/camera/camera.h"
 #include "mjsense/sensors/camera/camera_sensor.h"
+#include "mjsense/sensors/camera/camera_sensor_cfg.h"
 #include "python/bindings/bindings.h"
 #include "python/bindings/configs.h"
 

@@ -1,15 +1,14 @@
 // Ray sensors and their patterns in Python.
 
-#include "mjsense/sensors/raycast/raycast.h"
-
 #include <nanobind/nanobind.h>
 #include <nanobind/ndarray.h>
 #include <nanobind/stl/optional.h>
 #include <nanobind/stl/string.h>
 
-#include "mjsense/sensors/height/terrain_height.h"
-#include "mjsense/sensors/lidar/lidar.h"
+#include "mjsense/sensors/lidar/lidar_sensor.h"
 #include "mjsense/sensors/lidar/point_cloud.h"
+#include "mjsense/sensors/raycast/raycast_sensor.h"
+#include "mjsense/sensors/terrain_height/terrain_height_sensor.h"
 #include "python/bindings/bindings.h"
 #include "python/bindings/configs.h"
 #include "python/bindings/numpy.h"

@@ -3,7 +3,7 @@
 
 #include <string>
 
-#include "mjsense/sensors/lidar/lidar.h"
+#include "mjsense/sensors/lidar/lidar_sensor.h"
 
 namespace mjsense {
 

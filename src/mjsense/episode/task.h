@@ -47,7 +47,8 @@ struct TaskCfg {
 struct TaskObject {
   std::string role;
   int body = -1;
-  std::string name;  // of the body, for people: "mug"
+  std::string name;   // of the body, for people: "mug"
+  bool thin = false;  // a handle, a wire: its image points may lie on its rim
 };
 
 // One observation's judgement.

@@ -16,9 +16,11 @@ EnvStatesSensor::EnvStatesSensor(std::string name, std::string articulation,
       groups_(std::move(groups)),
       length_(length),
       robot_body_(std::move(robot_body)) {
-  std::size_t needed = 0;
-  for (const JointGroup& group : groups_) needed += group.qpos.size() + group.dof.size();
-  if (static_cast<std::size_t>(std::max(length_, 0)) < needed) {
+  int needed = 0;
+  for (const JointGroup& group : groups_)
+    needed += static_cast<int>(group.qpos.size() + group.dof.size());
+  if (length_ == 0) length_ = needed;
+  if (length_ < needed) {
     throw ValueError(fmt::format("sensor '{}': articulation '{}' needs {} numbers, length is {}",
                                  this->name(), articulation_, needed, length_));
   }

@@ -21,8 +21,8 @@ namespace mjsense {
 // unique, else with '_' for '/', which would make a folder of it in a file.
 class EnvStatesSensor final : public Sensor {
  public:
-  // `length`: N, at least what the groups need (31 is the published width of the Franka: 9 + 9 and
-  // zeros). `robot_body`: free bodies at or below it are no actors; "" none.
+  // `length`: N, at least what the groups need; 0: just that. `robot_body`: free bodies at or below
+  // it are no actors; "" none.
   EnvStatesSensor(std::string name, std::string articulation, std::vector<JointGroup> groups,
                   int length, std::string robot_body);
   std::string_view kind() const override { return "env_states"; }

@@ -120,8 +120,7 @@ void ImagePointsSensor::points_of(const World& world, int object, int camera, co
     for (int i = begin; i < end; ++i) n += m[i] >> object & 1;
     return n;
   };
-  const bool erode =
-      !cameras_[camera].skip_erosion && objects_[object].key.find("handle") == std::string::npos;
+  const bool erode = !cameras_[camera].skip_erosion && objects_[object].erode;
   const Mask* chosen = erode ? masks.eroded : masks.all;
   int count = count_of(chosen);
   if (count == 0 && erode) count = count_of(chosen = masks.all);

@@ -25,8 +25,9 @@ class ImagePointsSensor final : public Sensor {
   static constexpr int kPoints = 10;
   static constexpr int kMaxObjects = 16;
   struct Object {
-    std::string key;  // "pickup_obj", "gripper"; a key with "handle" in it is not eroded
-    BodyRef body;     // its root
+    std::string key;    // its name in the streams
+    BodyRef body;       // its root
+    bool erode = true;  // false for what is thin
   };
   struct Camera {
     std::string name;

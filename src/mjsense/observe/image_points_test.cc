@@ -47,10 +47,11 @@ class Painted : public Sensor {
 };
 
 struct Fixture {
-  explicit Fixture(const std::string& key = "pickup_obj", const std::string& body = "a")
+  explicit Fixture(const std::string& key = "pickup_obj", const std::string& body = "a",
+                   bool erode = true)
       : world(kScene),
         camera(100, 50),
-        points("object_image_points", {{key, BodyRef(body)}}, {{"camera", &camera}}) {
+        points("object_image_points", {{key, BodyRef(body), erode}}, {{"camera", &camera}}) {
     camera.initialize(world.init(2));
     points.initialize(world.init(2));
     prefix = key + "/camera/";
@@ -93,8 +94,8 @@ TEST(ImagePoints, WhatErosionRemovesKeepsAllItsPixels) {
   EXPECT_FLOAT_EQ(f.xy()[18], .14f);
 }
 
-TEST(ImagePoints, AHandleIsNotEroded) {
-  Fixture f("door_handle");
+TEST(ImagePoints, WhatIsThinIsNotEroded) {
+  Fixture f("handle", "a", false);
   f.camera.paint(0, 10, 20, 3, 3);
   f.points.compute(f.world.world());
   EXPECT_EQ(f.count(), 9);

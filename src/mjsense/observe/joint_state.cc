@@ -1,45 +1,47 @@
 #include "mjsense/observe/joint_state.h"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 
 namespace mjsense {
 
-JointStateSensor::JointStateSensor(std::string name, What what, std::vector<JointGroup> groups,
-                                   int str_max_len)
-    : JsonSensor(std::move(name), str_max_len,
-                 what == What::kPosition ? "Joint positions by move group."
-                                         : "Joint velocities by move group.",
-                 what == What::kPosition ? "rad or m" : "rad/s or m/s"),
-      what_(what),
-      groups_(std::move(groups)) {
-  std::ranges::sort(groups_, {}, &JointGroup::name);
-}
+JointStateSensor::JointStateSensor(std::string name, What what, std::vector<JointGroup> groups)
+    : Sensor(std::move(name)), what_(what), groups_(std::move(groups)) {}
 
-void JointStateSensor::write(const World& world, JsonWriter& json) {
+void JointStateSensor::initialize(const SensorInit& init) {
   const bool position = what_ == What::kPosition;
-  const mjtNum* source = position ? world.data->qpos : world.data->qvel;
-  json.begin_object();
+  clear_fields();
   for (const JointGroup& group : groups_) {
-    json.key(group.name).begin_array();
-    for (int address : position ? group.qpos : group.dof) {
-      json.value(static_cast<double>(static_cast<float>(source[address])));
-    }
-    json.end_array();
+    SensorSpec spec;
+    spec.shape = {static_cast<std::int64_t>(addresses(group).size())};
+    spec.unit = joint_unit(init.model, group, position ? "" : "/s");
+    spec.description = fmt::format("Joint {} of move group '{}'.",
+                                   position ? "positions" : "velocities", group.name);
+    add_field(group.name, spec, init.num_worlds);
   }
-  json.end_object();
 }
 
-std::size_t JointStateSensor::max_bytes() const {
-  std::size_t bytes = 2;
-  for (const JointGroup& group : groups_) {
-    bytes +=
-        group_bytes(group.name, what_ == What::kPosition ? group.qpos.size() : group.dof.size());
+void JointStateSensor::compute(const World& world) {
+  const mjtNum* source = what_ == What::kPosition ? world.data->qpos : world.data->qvel;
+  for (std::size_t g = 0; g < groups_.size(); ++g) {
+    std::ranges::transform(addresses(groups_[g]), fields()[g].data.row<float>(world.id).begin(),
+                           [&](int address) { return static_cast<float>(source[address]); });
   }
-  return bytes;
 }
 
-std::size_t group_bytes(std::string_view name, std::size_t numbers) {
-  return name.size() + 6 + numbers * JsonSensor::kNumberBytes;  // "name":[...],
+std::string joint_unit(const mjModel* model, const JointGroup& group, std::string_view per) {
+  bool turns = false, slides = false;
+  for (int dof : group.dof) {
+    const int joint = model->dof_jntid[dof], type = model->jnt_type[joint];
+    // The first three of a free joint are a position.
+    const bool linear =
+        type == mjJNT_SLIDE || (type == mjJNT_FREE && dof < model->jnt_dofadr[joint] + 3);
+    (linear ? slides : turns) = true;
+  }
+  std::string unit = turns ? fmt::format("rad{}", per) : "";
+  if (slides) unit += fmt::format("{}m{}", turns ? " or " : "", per);
+  return unit;
 }
 
 }  // namespace mjsense

@@ -1,10 +1,10 @@
 #pragma once
-// `qpos` and `qvel`: the joints of a robot, by move group, as JSON.
+// `qpos` and `qvel`: the joints of a robot, one stream a move group.
 
 #include <string>
 #include <vector>
 
-#include "mjsense/observe/json_sensor.h"
+#include "mjsense/core/sensor.h"
 
 namespace mjsense {
 
@@ -16,25 +16,26 @@ struct JointGroup {
   std::vector<int> dof;   // addresses into mjData.qvel
 };
 
-// Row {"arm":[...],"base":[],"gripper":[...]}: every group, keys sorted, numbers rounded to float32
-// and widened again.
-class JointStateSensor final : public JsonSensor {
+// Streams <name>/<group>: float32 [n], a group without joints has none of them: [0]. Without
+// bounds: MuJoCo's limits of joints are soft.
+class JointStateSensor final : public Sensor {
  public:
   enum class What { kPosition, kVelocity };
-  JointStateSensor(std::string name, What what, std::vector<JointGroup> groups,
-                   int str_max_len = kDefaultLength);
-
- protected:
-  void write(const World& world, JsonWriter& json) override;
-  std::size_t max_bytes() const override;
+  JointStateSensor(std::string name, What what, std::vector<JointGroup> groups);
+  std::string_view kind() const override { return "joint_state"; }
+  void initialize(const SensorInit& init) override;
+  void compute(const World& world) override;
 
  private:
+  const std::vector<int>& addresses(const JointGroup& group) const {
+    return what_ == What::kPosition ? group.qpos : group.dof;
+  }
+
   What what_;
-  std::vector<JointGroup> groups_;  // sorted by name
+  std::vector<JointGroup> groups_;  // field i belongs to group i
 };
 
-// Room for one list under a key, in the longest case; shared by every sensor that writes {group:
-// numbers}.
-std::size_t group_bytes(std::string_view name, std::size_t numbers);
+// "rad", "m" or both for joints that turn and slide, "" for none. `per`: "/s" for velocities.
+std::string joint_unit(const mjModel* model, const JointGroup& group, std::string_view per = "");
 
 }  // namespace mjsense

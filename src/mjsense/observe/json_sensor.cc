@@ -21,11 +21,6 @@ JsonSensor::JsonSensor(std::string name, int str_max_len, std::string descriptio
 }
 
 void JsonSensor::initialize(const SensorInit& init) {
-  prepare(init);
-  if (max_bytes() > static_cast<std::size_t>(spec_.str_max_len)) {
-    throw ValueError(fmt::format("sensor '{}': its text can need {} bytes, str_max_len is {}",
-                                 name(), max_bytes(), spec_.str_max_len));
-  }
   clear_fields();
   add_field("", spec_, init.num_worlds);
 }

@@ -7,7 +7,6 @@
 #include "mjsense/observe/camera_parameters.h"
 #include "mjsense/observe/env_states.h"
 #include "mjsense/observe/function_sensor.h"
-#include "mjsense/observe/grasp_state.h"
 #include "mjsense/observe/joint_state.h"
 #include "mjsense/observe/pose_sensor.h"
 #include "mjsense/observe/testing/world.h"
@@ -43,7 +42,7 @@ constexpr char kScene[] = R"(
 
 std::vector<JointGroup> groups() { return {{"base", {}, {}}, {"arm", {0}, {0}}}; }
 
-TEST(JointState, IsSortedJsonOfFloat32Values) {
+TEST(JointState, IsOneStreamAGroup) {
   TestWorld w(kScene);
   w.data->qpos[0] = 0.05;
   w.data->qvel[0] = -1e-5;
@@ -51,21 +50,25 @@ TEST(JointState, IsSortedJsonOfFloat32Values) {
   JointStateSensor qvel("qvel", JointStateSensor::What::kVelocity, groups());
   w.compute(qpos);
   w.compute(qvel);
-  EXPECT_EQ(text(qpos), R"({"arm":[0.05000000074505806],"base":[]})");
-  EXPECT_EQ(text(qvel), R"({"arm":[-9.999999747378752e-06],"base":[]})");
-  EXPECT_EQ(qpos.fields()[0].spec.shape, Shape({2000}));
-  EXPECT_TRUE(qpos.fields()[0].spec.is_dict);
+  EXPECT_THAT(values<float>(qpos, "arm"), ElementsAre(0.05f));
+  EXPECT_THAT(values<float>(qvel, "arm"), ElementsAre(-1e-5f));
+  EXPECT_EQ(qpos.field("arm").spec.name, "qpos/arm");
+  EXPECT_EQ(qpos.field("arm").spec.unit, "rad");
+  EXPECT_EQ(qvel.field("arm").spec.unit, "rad/s");
+  EXPECT_EQ(qpos.field("base").spec.shape, Shape({0}));
 }
 
-TEST(JointState, RefusesARowThatCannotHoldTheLongestText) {
-  TestWorld w(kScene);
-  JointStateSensor qpos("qpos", JointStateSensor::What::kPosition, groups(), 40);
-  try {
-    qpos.initialize(w.init());
-    FAIL();
-  } catch (const ValueError& e) {
-    EXPECT_STREQ(e.what(), "sensor 'qpos': its text can need 46 bytes, str_max_len is 40");
-  }
+TEST(JointState, UnitsAreThoseOfTheJoints) {
+  TestWorld w(R"(<mujoco><worldbody>
+    <body><joint type="slide"/><geom size=".1"/></body>
+    <body><joint axis="0 0 1"/><geom size=".1"/></body>
+    <body><freejoint/><geom size=".1"/></body></worldbody></mujoco>)");
+  EXPECT_EQ(joint_unit(w.model, {"", {0}, {0}}), "m");
+  EXPECT_EQ(joint_unit(w.model, {"", {1}, {1}}, "/s"), "rad/s");
+  EXPECT_EQ(joint_unit(w.model, {"", {0, 1}, {0, 1}}, "/s"), "rad/s or m/s");
+  EXPECT_EQ(joint_unit(w.model, {"", {}, {2, 3, 4}}), "m");
+  EXPECT_EQ(joint_unit(w.model, {"", {}, {5, 6, 7}}), "rad");
+  EXPECT_EQ(joint_unit(w.model, {}), "");
 }
 
 TEST(JsonFunction, RefusesTextThatIsTooLongAtTheMomentItIs) {
@@ -127,6 +130,9 @@ TEST(EnvStates, HoldsEveryFreeBodyAndTheRobot) {
               ElementsAre(3, 0, .05f, 1, 0, 0, 0, 0, 1, 2, 3, 4, 5));
   EXPECT_THAT(values<float>(states, "articulations/panda"), ElementsAre(.25f, -2, 0, 0, 0, 0));
   EXPECT_THROW(EnvStatesSensor("env_states", "panda", groups(), 1, "robot/base"), ValueError);
+  EnvStatesSensor least("env_states", "arm", groups(), 0, "robot/base");
+  w.compute(least);
+  EXPECT_THAT(values<float>(least, "articulations/arm"), ElementsAre(.25f, -2));
 }
 
 TEST(CameraParameters, ProjectKnownPoints) {
@@ -170,29 +176,6 @@ TEST(CameraParameters, MatrixOfACameraWithASensor) {
   EXPECT_THAT(K, Pointwise(testing::DoubleNear(1e-3), expected));
   CameraParameterSensor map("sensor_param_map", "map", 640, 480);
   EXPECT_THROW(w.compute(map), ValueError);
-}
-
-TEST(GraspState, TouchingIsNotHolding) {
-  TestWorld w(kScene);
-  GraspStateSensor grasp("grasp_state_pickup_obj", "thing/cube", {{"gripper", "robot/base"}});
-  w.compute(grasp);  // the cube rests on the floor, alone
-  EXPECT_EQ(text(grasp), R"({"gripper":{"held":false,"touching":false}})");
-
-  const auto place = [&](double z) {  // the pad is a sphere at (1, 0, .58)
-    w.data->qpos[1] = 1;
-    w.data->qpos[3] = z;
-    mj_forward(w.model, w.data);
-    grasp.compute(w.world());
-  };
-  place(.58 + .09);
-  EXPECT_EQ(text(grasp), R"({"gripper":{"held":true,"touching":true}})");
-  // Now the cube touches the floor, too: lift the floor to it.
-  w.data->mocap_pos[2] = -.58 + .05 + .05 + .04;
-  w.data->qpos[1] = 1;
-  w.data->qpos[3] = .0499;
-  mj_forward(w.model, w.data);
-  grasp.compute(w.world());
-  EXPECT_EQ(text(grasp), R"({"gripper":{"held":false,"touching":true}})");
 }
 
 }  // namespace

@@ -8,19 +8,21 @@
 
 #include "mjsense/core/error.h"
 #include "mjsense/record/depth.h"
+#include "mjsense/record/molmospaces.h"
 
 namespace mjsense {
 namespace {
 
-void describe(hid_t object, const Sensor& sensor, const SensorSpec& spec) {
+void describe(hid_t object, std::string_view sensor, std::string_view kind,
+              const SensorSpec& spec) {
   h5::set_attribute(object, "unit", spec.unit);
   h5::set_attribute(object, "frame", spec.frame);
   h5::set_attribute(object, "description", spec.description);
-  h5::set_attribute(object, "spec", spec_json(sensor, spec));
+  h5::set_attribute(object, "spec", spec_json(sensor, kind, spec));
 }
 
 void describe_video(hid_t dataset, const RecordingCfg& cfg, const VideoStream& video) {
-  describe(dataset, *video.sensor, video.field->spec);
+  describe(dataset, video.sensor->name(), video.sensor->kind(), video.field->spec);
   h5::set_attribute(dataset, "width", std::int64_t{video.width});
   h5::set_attribute(dataset, "height", std::int64_t{video.height});
   h5::set_attribute(dataset, "fps", cfg.fps.str());
@@ -69,7 +71,7 @@ DType own_dtype(int stream) { return stream == kRewards ? DType::kFloat32 : DTyp
 
 EpisodeFile::EpisodeFile(const std::filesystem::path& path, const RecordingCfg& cfg,
                          const RecordingPlan& plan, const EpisodeMeta& meta)
-    : path_(path), gzip_(cfg.gzip) {
+    : path_(path), gzip_(cfg.gzip), plan_(plan) {
   const h5::H5Lock lock;
   file_ = h5::create_file(path);
   h5::set_attribute(file_, "format", "mjsense 1");
@@ -80,10 +82,9 @@ EpisodeFile::EpisodeFile(const std::filesystem::path& path, const RecordingCfg& 
   for (const char* group : standard_groups()) h5::create_group(trajectory_, group);
   datasets_.reserve(plan.arrays.size() + kOwnStreams);
   for (const ArrayStream& stream : plan.arrays) {
-    add_dataset(stream.place, stream.field->spec.dtype, stream.field->data.shape().without_front(),
-                stream.chunk_rows);
-    describe(datasets_.back().id, *stream.sensor, stream.field->spec);
-    if (stream.field->spec.is_dict) h5::set_attribute(datasets_.back().id, "encoding", "json");
+    add_dataset(stream.place, stream.spec.dtype, stream.spec.shape, stream.chunk_rows);
+    describe(datasets_.back().id, stream.sensor->name(), stream.kind(), stream.spec);
+    if (stream.spec.is_dict) h5::set_attribute(datasets_.back().id, "encoding", "json");
   }
   for (int i = 0; i < kOwnStreams; ++i)
     add_dataset(own_place(i), own_dtype(i), Shape{}, chunk_rows(dtype_size(own_dtype(i))));
@@ -125,7 +126,19 @@ void EpisodeFile::add_dataset(std::string_view place, DType dtype, const Shape& 
   datasets_.push_back(std::move(dataset));
 }
 
+std::span<const std::uint8_t> EpisodeFile::texts_of(const ArrayStream& stream, std::int64_t rows,
+                                                    std::span<const std::uint8_t> kept) {
+  const std::size_t kept_bytes = stream.kept_bytes(), text_bytes = stream.row_bytes();
+  texts_.assign(stream.chunk_rows * text_bytes, 0);
+  for (std::int64_t i = 0; i < rows; ++i)
+    stream.text->write(kept.data() + i * kept_bytes, {&texts_[i * text_bytes], text_bytes});
+  return texts_;
+}
+
 void EpisodeFile::write_chunk(int stream, std::int64_t rows, std::span<const std::uint8_t> chunk) {
+  const auto index = static_cast<std::size_t>(stream);
+  if (index < plan_.arrays.size() && plan_.arrays[index].text)
+    chunk = texts_of(plan_.arrays[index], rows, chunk);
   std::span<const std::uint8_t> bytes = chunk;
   if (gzip_ > 0 && !chunk.empty()) {  // outside the library's lock: here the time goes
     packed_.resize(compressBound(chunk.size()));

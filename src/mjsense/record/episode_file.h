@@ -1,6 +1,6 @@
 #pragma once
 // The HDF5 file of one episode while it is recorded: `traj_0` of a file of its own. Used by one
-// thread.
+// thread; the plan outlives it.
 
 #include <cstdint>
 #include <filesystem>
@@ -27,7 +27,7 @@ class EpisodeFile {
   EpisodeFile& operator=(const EpisodeFile&) = delete;
 
   // Appends `rows` rows of a stream: streams [0, arrays) are the plan's, then OwnStream. `chunk`
-  // has the bytes of a whole chunk, zero beyond the rows. Chunks of a stream come in order, all but
+  // has the kept bytes of a whole chunk, zero beyond the rows: what is text on disk becomes it here. Chunks of a stream come in order, all but
   // the last full.
   void write_chunk(int stream, std::int64_t rows, std::span<const std::uint8_t> chunk);
   void finish(std::string_view obs_scene,
@@ -39,13 +39,17 @@ class EpisodeFile {
     int rank = 0;
     hsize_t dims[Shape::kMaxRank + 1] = {};
   };
+  // A chunk of texts; valid until the next call.
+  std::span<const std::uint8_t> texts_of(const ArrayStream& stream, std::int64_t rows,
+                                         std::span<const std::uint8_t> kept);
   void add_dataset(std::string_view place, DType dtype, const Shape& row, std::int64_t chunk_rows);
 
   std::filesystem::path path_;
   int gzip_;
+  const RecordingPlan& plan_;
   h5::Id file_, trajectory_;
   std::vector<Dataset> datasets_;
-  std::vector<std::uint8_t> packed_;
+  std::vector<std::uint8_t> texts_, packed_;
 };
 
 }  // namespace mjsense

@@ -9,6 +9,7 @@
 #include <numeric>
 
 #include "mjsense/core/error.h"
+#include "mjsense/record/molmospaces.h"
 
 namespace mjsense {
 namespace {
@@ -87,19 +88,13 @@ void check_places(const std::map<std::string, std::string>& owners) {
   }
 }
 
-std::string fingerprint(const RecordingCfg& cfg, const RecordingPlan& plan) {
+std::string fingerprint(const RecordingCfg& cfg, const RecordingPlan& plan,
+                        const nlohmann::json& streams) {
   nlohmann::json settings;
   try {
     settings = nlohmann::json::parse(cfg.settings);
   } catch (const nlohmann::json::exception&) {
     throw ValueError(fmt::format("recording: settings is no JSON text: {:.80}", cfg.settings));
-  }
-  nlohmann::json streams = nlohmann::json::array();
-  for (const Sensor* sensor : cfg.sensors) {
-    for (const Field& field : sensor->fields()) {
-      streams.push_back(fmt::format("{} {}{}", field.spec.name, dtype_name(field.spec.dtype),
-                                    field.spec.shape.str()));
-    }
   }
   nlohmann::json j{{"format", 1},
                    {"house", cfg.house},
@@ -144,19 +139,16 @@ std::int64_t chunk_rows(std::size_t row_bytes) {
       kMostChunkRows);
 }
 
-std::string place_of(std::string_view stream) {
-  constexpr std::string_view kParam = "sensor_param_";
-  if (stream == "qpos" || stream == "qvel") return fmt::format("obs/agent/{}", stream);
-  if (stream.starts_with("actions/") || stream.starts_with("env_states/"))
-    return std::string(stream);
-  if (stream.starts_with(kParam))
-    return fmt::format("obs/sensor_param/{}", stream.substr(kParam.size()));
-  return fmt::format("obs/extra/{}", stream);
-}
+std::string_view ArrayStream::kind() const { return text ? "json" : sensor->kind(); }
+
+std::size_t ArrayStream::row_bytes() const { return spec.shape.size() * dtype_size(spec.dtype); }
+
+std::size_t ArrayStream::kept_bytes() const { return text ? text->row_bytes() : row_bytes(); }
 
 RecordingPlan plan_recording(const RecordingCfg& cfg) {
   RecordingPlan plan;
-  std::map<std::string, std::string> owners;  // place -> "sensor 'x'"
+  nlohmann::json streams = nlohmann::json::array();  // in the suite's order
+  std::map<std::string, std::string> owners;         // place -> "sensor 'x'"
   const auto claim = [&](const std::string& place, const std::string& owner) {
     const auto [at, fresh] = owners.emplace(place, owner);
     if (!fresh)
@@ -171,19 +163,35 @@ RecordingPlan plan_recording(const RecordingCfg& cfg) {
       throw ValueError(
           fmt::format("sensor '{}' has no fields: initialize it before recording", sensor->name()));
     }
-    for (const Field& field : sensor->fields()) {
-      const SensorSpec& spec = field.spec;
+    const std::string owner = fmt::format("sensor '{}'", sensor->name());
+    const auto add_array = [&](ArrayStream stream) {
+      stream.sensor = sensor;
+      stream.place = place_of(stream.spec.name);
+      stream.chunk_rows = chunk_rows(stream.row_bytes());
+      claim(stream.place, owner);
+      plan.arrays.push_back(std::move(stream));
+    };
+    const auto note = [&](const SensorSpec& spec) {
       check_path(sensor->name(), spec.name);
+      streams.push_back(
+          fmt::format("{} {}{}", spec.name, dtype_name(spec.dtype), spec.shape.str()));
+    };
+    for (const Field& field : sensor->fields()) {
       if (field.data.shape().rank() == 0 || field.data.shape()[0] < cfg.num_worlds) {
         throw ValueError(
             fmt::format("sensor '{}': stream '{}' has shape {}, expected rows of {} worlds",
-                        sensor->name(), spec.name, field.data.shape().str(), cfg.num_worlds));
+                        sensor->name(), field.spec.name, field.data.shape().str(), cfg.num_worlds));
       }
-      const std::string owner = fmt::format("sensor '{}'", sensor->name());
-      if (spec.storage == Storage::kArray) {
-        plan.arrays.push_back(
-            {sensor, &field, place_of(spec.name), chunk_rows(field.data.row_bytes())});
-        claim(plan.arrays.back().place, owner);
+    }
+    if (const auto text = text_of(*sensor)) {
+      note(*text);
+      add_array({.spec = *text, .text = std::make_shared<JsonRows>(*sensor, text->str_max_len)});
+      continue;
+    }
+    for (const Field& field : sensor->fields()) {
+      note(field.spec);
+      if (field.spec.storage == Storage::kArray) {
+        add_array({.spec = field.spec, .field = &field});
       } else {
         const std::size_t first = plan.videos.size();
         add_videos(cfg, *sensor, field, plan.videos);
@@ -194,7 +202,7 @@ RecordingPlan plan_recording(const RecordingCfg& cfg) {
   }
   for (const char* group : standard_groups()) owners.erase(group);
   check_places(owners);
-  plan.fingerprint = fingerprint(cfg, plan);
+  plan.fingerprint = fingerprint(cfg, plan, streams);
   return plan;
 }
 
@@ -228,19 +236,12 @@ std::string video_file(const VideoStream& video, int index, int batch, int batch
   return video_file(video.stem, video.extension, index, batch, batches);
 }
 
-std::span<const char* const> standard_groups() {
-  static constexpr const char* kGroups[] = {
-      "actions",   "env_states/actors", "env_states/articulations", "obs/agent",
-      "obs/extra", "obs/sensor_data",   "obs/sensor_param"};
-  return kGroups;
-}
-
-std::string spec_json(const Sensor& sensor, const SensorSpec& spec) {
+std::string spec_json(std::string_view sensor, std::string_view kind, const SensorSpec& spec) {
   constexpr const char* kStorage[] = {"array", "rgb_video", "depth_video"};
   nlohmann::json j{
       {"name", spec.name},
-      {"sensor", sensor.name()},
-      {"kind", sensor.kind()},
+      {"sensor", sensor},
+      {"kind", kind},
       {"dtype", dtype_name(spec.dtype)},
       {"shape", std::vector<std::int64_t>(spec.shape.dims().begin(), spec.shape.dims().end())},
       {"is_dict", spec.is_dict},

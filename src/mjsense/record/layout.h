@@ -1,25 +1,32 @@
 #pragma once
-// Where everything stands: the place of a stream in the HDF5 tree, the names of files, the batches.
-// Pure functions.
+// What becomes of a suite on disk: datasets and videos, the names of files, the batches. Pure
+// functions; the places in the HDF5 tree are molmospaces.h.
 
 #include <cstddef>
 #include <cstdint>
-#include <span>
+#include <memory>
 #include <string>
 #include <string_view>
 #include <vector>
 
 #include "mjsense/core/sensor.h"
+#include "mjsense/record/json_rows.h"
 #include "mjsense/record/recording.h"
 
 namespace mjsense {
 
-// One field of one sensor that becomes one dataset with a row a step.
+// One dataset with a row a step: a field of a sensor as it is, or all of them as JSON text.
 struct ArrayStream {
   const Sensor* sensor = nullptr;
-  const Field* field = nullptr;
-  std::string place;  // "obs/extra/tcp_pose"
+  SensorSpec spec;                       // of the dataset
+  const Field* field = nullptr;          // null if it is text of many
+  std::shared_ptr<const JsonRows> text;  // null if it is a field
+  std::string place;                     // "obs/extra/tcp_pose"
   std::int64_t chunk_rows = 1;
+
+  std::string_view kind() const;   // "json", or the sensor's
+  std::size_t row_bytes() const;   // on disk, before compression
+  std::size_t kept_bytes() const;  // of a row until it is written
 };
 
 enum class VideoKind { kRgb, kDepth16, kDepthRedGreen };
@@ -43,13 +50,11 @@ struct RecordingPlan {
   std::string fingerprint;  // what two recordings must share to be one: JSON text
 };
 
-// Finds the place of every field of every sensor. Throws ValueError when two streams would share a
+// Finds a place for every field of every sensor. Throws ValueError when two streams would share a
 // place, when one would stand inside the other, when a name is no path, and when a video stream is
 // not uint8 [H, W, 3] or float32 [H, W].
 RecordingPlan plan_recording(const RecordingCfg& cfg);
 
-// "qpos" -> "obs/agent/qpos", "feet/force" -> "obs/extra/feet/force" ...
-std::string place_of(std::string_view stream);
 std::int64_t chunk_rows(std::size_t row_bytes);
 
 // Episodes of each batch: sizes differ by one at most, the larger first.
@@ -61,11 +66,8 @@ std::string video_file(std::string_view stem, std::string_view extension, int in
                        int batches);
 constexpr std::size_t kFileNameBytes = 100;  // width of a file name in obs/sensor_data
 
-// Groups that every episode has, empty or not.
-std::span<const char* const> standard_groups();
-
-// The spec of a stream as JSON text: an attribute of its dataset.
-std::string spec_json(const Sensor& sensor, const SensorSpec& spec);
+// The spec of a dataset as JSON text: an attribute of it.
+std::string spec_json(std::string_view sensor, std::string_view kind, const SensorSpec& spec);
 
 // Of two fingerprints: "" if equal, else "'episodes' was 8 and is now 10".
 std::string fingerprint_difference(const std::string& was, const std::string& now);

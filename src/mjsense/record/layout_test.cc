@@ -8,6 +8,7 @@
 
 #include "mjsense/core/error.h"
 #include "mjsense/record/depth.h"
+#include "mjsense/record/molmospaces.h"
 #include "mjsense/record/testing/tools.h"
 
 namespace mjsense {
@@ -56,6 +57,28 @@ TEST(Layout, StreamsStandWhereMolmoSpacesReadersLook) {
   EXPECT_EQ(place_of("water_depth"), "obs/extra/water_depth");
 }
 
+TEST(Layout, NumbersByMoveGroupAreTextForMolmoSpacesReaders) {
+  const Plain qpos("qpos", spec(DType::kFloat32, {7}), "arm");
+  const RecordingPlan p = plan({&qpos});
+  ASSERT_EQ(p.arrays.size(), 1u);
+  EXPECT_EQ(p.arrays[0].place, "obs/agent/qpos");
+  EXPECT_EQ(p.arrays[0].kind(), "json");
+  EXPECT_EQ(p.arrays[0].spec.shape, Shape({2000}));
+  EXPECT_EQ(p.arrays[0].row_bytes(), 2000u);
+  EXPECT_EQ(p.arrays[0].kept_bytes(), 28u);
+  // One field alone, a picture, or another name: as it is.
+  const Plain row("qvel", spec(DType::kFloat32, {7})),
+      picture("grasp_state_cup", spec(DType::kFloat32, {4, 4}), "gripper"),
+      other("joints", spec(DType::kFloat32, {7}), "arm");
+  const RecordingPlan plain = plan({&row, &picture, &other});
+  for (const ArrayStream& stream : plain.arrays) EXPECT_EQ(stream.kind(), "plain");
+  EXPECT_EQ(plain.arrays[2].place, "obs/extra/joints/arm");
+  // 80 numbers of 25 bytes are more than a row of text.
+  const Plain many("qpos", spec(DType::kFloat32, {80}), "arm");
+  EXPECT_EQ(error_of([&] { plan({&many}); }),
+            "sensor 'qpos': its text can need 2012 bytes, a row of it has 2000");
+}
+
 TEST(Layout, BatchesAreThePeersAndEven) {
   EXPECT_THAT(batch_sizes(8, 0), ElementsAre(4, 4));
   EXPECT_THAT(batch_sizes(1, 0), ElementsAre(1));
@@ -82,7 +105,7 @@ TEST(Layout, EveryFieldOfTheSuiteHasAPlace) {
   cfg.num_worlds = 2;
   cfg.sensors = suite.sensors();
   std::size_t fields = 0;
-  for (const Sensor* s : cfg.sensors) fields += s->fields().size();
+  for (const Sensor* s : cfg.sensors) fields += text_of(*s) ? 1 : s->fields().size();
   const RecordingPlan p = plan_recording(cfg);
   EXPECT_EQ(p.arrays.size() + p.videos.size(), fields);
   cfg.video.molmospaces_depth = true;

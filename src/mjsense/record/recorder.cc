@@ -44,7 +44,7 @@ Recorder::Impl::Impl(const RecordingCfg& cfg_) : cfg(cfg_) {
   if (!house->ended()) house->publish_ready();
   decisions = house->decisions();
   for (const ArrayStream& stream : plan.arrays) {
-    row_bytes.push_back(stream.field->data.row_bytes());
+    row_bytes.push_back(stream.kept_bytes());
     chunk_rows_of.push_back(stream.chunk_rows);
   }
   for (int i = 0; i < kOwnStreams; ++i) {

@@ -7,6 +7,18 @@
 #include "mjsense/record/recorder_impl.h"
 
 namespace mjsense {
+namespace {
+
+void copy_row(const ArrayStream& stream, int world, std::uint8_t* to) {
+  if (stream.text) return stream.text->copy(world, to);
+  const std::byte* from = stream.field->data.row_data(world);
+  const std::size_t most = stream.row_bytes();
+  // Of a dict row only the text is copied: what follows is zero here as there.
+  const bool text = stream.spec.is_dict;
+  std::memcpy(to, from, text ? strnlen(reinterpret_cast<const char*>(from), most) : most);
+}
+
+}  // namespace
 
 void Recorder::Impl::append(int world, const StepRow& row) {
   Episode& episode = running(world, "append a step");
@@ -28,20 +40,17 @@ void Recorder::Impl::append(int world, const StepRow& row) {
   const Clock::time_point start = Clock::now();
   const double waited = episode.waited_s;
   for (std::size_t s = 0; s < plan.arrays.size(); ++s) {
-    const Field& field = *plan.arrays[s].field;
-    const std::byte* from = field.data.row_data(world);
-    // Of a dict row only the text is copied: what follows is zero here as there.
-    const std::size_t bytes = field.spec.is_dict
-                                  ? strnlen(reinterpret_cast<const char*>(from), row_bytes[s])
-                                  : row_bytes[s];
-    put_row(episode, world, static_cast<int>(s), from, bytes);
+    const int stream = static_cast<int>(s);
+    if (std::uint8_t* to = next_row(episode, stream)) copy_row(plan.arrays[s], world, to);
+    end_row(episode, world, stream);
   }
   const bool fail = !row.success;
   const void* own[kOwnStreams] = {&row.reward, &row.success, &fail, &row.terminated,
                                   &row.truncated};
   for (int i = 0; i < kOwnStreams; ++i) {
     const int s = static_cast<int>(plan.arrays.size()) + i;
-    put_row(episode, world, s, own[i], row_bytes[s]);
+    std::memcpy(next_row(episode, s), own[i], row_bytes[s]);
+    end_row(episode, world, s);
   }
   ++episode.rows;
   rows += 1;
@@ -51,7 +60,7 @@ void Recorder::Impl::append(int world, const StepRow& row) {
 
 void Recorder::Impl::check_texts(int world, Episode& episode) const {
   for (const ArrayStream& stream : plan.arrays) {
-    if (!stream.field->spec.is_dict) continue;
+    if (stream.text || !stream.spec.is_dict) continue;
     const char* text = reinterpret_cast<const char*>(stream.field->data.row_data(world));
     const std::size_t most = stream.field->data.row_bytes();
     const std::size_t size = strnlen(text, most);
@@ -83,14 +92,14 @@ void Recorder::Impl::copy_frame(const VideoStream& video, int world,
   }
 }
 
-void Recorder::Impl::put_row(Episode& episode, int world, int s, const void* from,
-                             std::size_t bytes) {
+std::uint8_t* Recorder::Impl::next_row(Episode& episode, int s) {
+  if (row_bytes[s] == 0) return nullptr;
   Buffer& chunk = episode.chunks[s];
-  if (episode.chunk_fill[s] == 0 && chunk.empty() && row_bytes[s] > 0)
-    chunk = take_buffer(episode, s);
-  if (bytes > 0)
-    std::memcpy(chunk.data() + static_cast<std::size_t>(episode.chunk_fill[s]) * row_bytes[s], from,
-                bytes);
+  if (episode.chunk_fill[s] == 0 && chunk.empty()) chunk = take_buffer(episode, s);
+  return chunk.data() + static_cast<std::size_t>(episode.chunk_fill[s]) * row_bytes[s];
+}
+
+void Recorder::Impl::end_row(Episode& episode, int world, int s) {
   if (++episode.chunk_fill[s] == chunk_rows_of[s]) hand_over(worlds[world], s);
 }
 

@@ -63,8 +63,8 @@ struct Recorder::Impl {
 
   RecordingCfg cfg;
   RecordingPlan plan;
-  int streams;  // arrays and the recorder's own
-  std::vector<std::size_t> row_bytes;
+  int streams;                         // arrays and the recorder's own
+  std::vector<std::size_t> row_bytes;  // of a stream in a chunk that is filled
   std::vector<std::int64_t> chunk_rows_of;
 
   std::unique_ptr<House> house;  // changed by the writer thread, or while it has nothing to do
@@ -100,7 +100,9 @@ struct Recorder::Impl {
   // Text that was cut is no JSON any more. Nothing of the step is stored then.
   void check_texts(int world, Episode& episode) const;
   void copy_frame(const VideoStream& video, int world, std::span<std::uint8_t> frame) const;
-  void put_row(Episode& episode, int world, int s, const void* from, std::size_t bytes);
+  // Where the next row of a stream goes, zero all over; null if it has no bytes.
+  std::uint8_t* next_row(Episode& episode, int s);
+  void end_row(Episode& episode, int world, int s);
   Buffer take_buffer(Episode& episode, int s);
   void hand_over(const EpisodePtr& episode, int s);
   void finish(int world, std::string_view obs_scene, std::string_view outcome);

@@ -14,6 +14,8 @@
 #include "mjsense/core/pose.h"
 #include "mjsense/core/rng.h"
 #include "mjsense/core/sensor.h"
+#include "mjsense/observe/image_points.h"
+#include "mjsense/observe/joint_state.h"
 #include "mjsense/robots/action.h"
 #include "mjsense/robots/kinematics.h"
 #include "mjsense/robots/robot_cfg.h"
@@ -90,6 +92,9 @@ class Robot {
 
   // Sensors that every task with this robot records (tcp_pose). They refer to this robot.
   std::vector<std::shared_ptr<Sensor>> create_robot_sensors() const;
+  // Its parts that object_image_points shows in pictures: the grippers.
+  std::vector<ImagePointsSensor::Object> image_objects() const;
+  std::vector<JointGroup> joint_groups() const;
 
  private:
   void hold(const World& world, int group, GroupValues& out) const;

@@ -34,8 +34,9 @@ struct MoveGroupCfg {
 // A camera of the robot's MJCF that an episode records.
 struct CameraMount {
   std::string name;         // of the sensor: "wrist_camera"
-  std::string mjcf_camera;  // "gripper/wrist_camera"
+  std::string mjcf_camera;  // local name
   bool record_depth = false;
+  bool image_points = true;  // object_image_points looks through it
 };
 
 // Displacement of the tool that the arm's controllers see and recordings do not; normal, truncated.
@@ -57,8 +58,8 @@ struct RobotCfg {
   std::vector<CameraMount> cameras;
   int image_width = 640, image_height = 368;  // one resolution for all cameras
   ActionNoiseCfg noise;
-  int env_state_size = 31;  // env_states: numbers of the articulation row
-  std::string env_state_name = "panda";
+  int env_state_size = 0;  // env_states: numbers of the articulation row; 0: what the groups need
+  std::string env_state_name;  // of that row; "": the robot's
 };
 
 }  // namespace mjsense

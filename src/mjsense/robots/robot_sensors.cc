@@ -23,4 +23,19 @@ std::vector<std::shared_ptr<Sensor>> Robot::create_robot_sensors() const {
   return sensors;
 }
 
+std::vector<ImagePointsSensor::Object> Robot::image_objects() const {
+  std::vector<ImagePointsSensor::Object> objects;
+  for (const MoveGroup& group : groups_) {
+    if (group.kind == GroupKind::kGripper)
+      objects.push_back({group.name, BodyRef([body = group.root_body](int) { return body; })});
+  }
+  return objects;
+}
+
+std::vector<JointGroup> Robot::joint_groups() const {
+  std::vector<JointGroup> groups;
+  for (const MoveGroup& group : groups_) groups.push_back({group.name, group.qpos, group.dofs});
+  return groups;
+}
+
 }  // namespace mjsense

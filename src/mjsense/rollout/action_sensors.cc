@@ -7,7 +7,7 @@
 #include <cmath>
 
 #include "mjsense/observe/joint_state.h"
-#include "mjsense/observe/json_sensor.h"
+#include "mjsense/scene/resolve.h"
 
 namespace mjsense {
 namespace {
@@ -19,193 +19,217 @@ bool terminal(const Task& task, const World& world) {
          (task.cfg().terminate_upon_success && task.evaluate(world).success);
 }
 
-// "arm: rad; gripper: 0 open .. 255 closed"
-template <class Wanted>
-std::string command_units(const Task& task, Wanted&& wanted) {
-  std::vector<std::string> units;
-  for (const MoveGroup& group : task.robot().groups()) {
-    if (group.controlled() && wanted(group))
-      units.push_back(group.name + ": " + group.command_unit);
-  }
-  return fmt::format("{}", fmt::join(units, "; "));
-}
-std::string command_units(const Task& task) {
-  return command_units(task, [](const MoveGroup&) { return true; });
-}
-
-class ActionSensor : public JsonSensor {
+// Numbers of the robot's groups: fields `<group>`, then `given/<group>`.
+template <class T>
+class ActionSensor : public Sensor {
  public:
-  ActionSensor(std::string name, std::string description, std::string unit, const Task& task,
-               const ActionLog& log)
-      : JsonSensor(std::move(name), kDefaultLength, std::move(description), std::move(unit)),
-        task_(task),
-        log_(log) {
-    const auto groups = task.robot().groups();
-    for (std::size_t g = 0; g < groups.size(); ++g) sorted_.push_back(static_cast<int>(g));
-    std::ranges::sort(sorted_, {}, [&](int g) -> const std::string& { return groups[g].name; });
+  ActionSensor(std::string name, const Task& task, const ActionLog& log)
+      : Sensor(std::move(name)), task_(task), log_(log) {}
+  std::string_view kind() const override { return "action"; }
+
+  void initialize(const SensorInit& init) override {
+    clear_fields();
+    rows_.clear();
+    const auto groups = task_.robot().groups();
+    for (std::size_t g = 0; g < groups.size(); ++g) {
+      SensorSpec spec = group_spec(groups[g]);
+      if (spec.shape.rank() == 0) continue;
+      rows_.push_back({static_cast<int>(g), &add(groups[g].name, spec, init)});
+    }
+    declare_more(init);
+    for (Row& row : rows_) row.given = &add_given(row.numbers->name, init);
+  }
+
+  void compute(const World& world) override {
+    const bool any = shown(world);
+    for (const Row& row : rows_) {
+      const std::span<T> numbers = row.numbers->data.template row<T>(world.id);
+      const bool given = any && write(world, row.group, numbers);
+      if (!given) std::ranges::fill(numbers, T{0});
+      row.given->data.template row<bool>(world.id)[0] = given;
+    }
   }
 
  protected:
+  // What a group's numbers are; of rank 0 if the group has none.
+  virtual SensorSpec group_spec(const MoveGroup& group) const = 0;
+  virtual void declare_more(const SensorInit& /*init*/) {}
+  // False: no group has an action at this observation.
+  virtual bool shown(const World& /*world*/) { return true; }
+  // Fills the numbers of a group; false if it has no action at this observation.
+  virtual bool write(const World& world, int group, std::span<T> row) = 0;
+
+  Field& add(std::string_view name, SensorSpec spec, const SensorInit& init) {
+    spec.dtype = dtype_of<T>();
+    return add_field(name, std::move(spec), init.num_worlds);
+  }
+  Field& add_given(const std::string& name, const SensorInit& init) {
+    SensorSpec spec;
+    spec.dtype = DType::kBool;
+    spec.description =
+        fmt::format("'{}' has an action at this observation; else it reads 0.", name);
+    return add_field("given/" + name, spec, init.num_worlds);
+  }
+
   const MoveGroup& group(int g) const { return task_.robot().groups()[g]; }
   const RobotValues& targets(const World& world) const { return task_.robot().targets(world.id); }
-
-  // The widest row: every group with `numbers` of its own values, or as many as it has.
-  std::size_t bytes(std::size_t numbers = 0) const {
-    std::size_t total = 2;
-    for (int g : sorted_) {
-      const std::size_t own = std::max(group(g).joints.size(), group(g).actuators.size());
-      total += group_bytes(group(g).name, numbers ? numbers : own);
-    }
-    return total;
+  bool is_first(const World& world) const { return !log_[world.id].given; }
+  std::string unit_of(const MoveGroup& g) const {
+    return joint_unit(task_.model(), {g.name, g.qpos, g.dofs});
   }
-
+  // Unit of its commands: of its joints, or the actuator's own where one drives a gripper.
   const Task& task_;
   const ActionLog& log_;
-  std::vector<int> sorted_;  // groups by name
+
+ private:
+  struct Row {
+    int group;
+    Field* numbers;
+    Field* given = nullptr;
+  };
+  std::vector<Row> rows_;
 };
 
-class CommandedAction final : public ActionSensor {
- public:
-  CommandedAction(const Task& task, const ActionLog& log)
-      : ActionSensor("actions/commanded_action", "The policy's action, as it gave it.",
-                     command_units(task), task, log) {}
+std::int64_t count(const std::vector<int>& ids) { return static_cast<std::int64_t>(ids.size()); }
 
- protected:
-  void write(const World& world, JsonWriter& json) override {
-    const Action* action = task_.last_action(world.id);
-    json.begin_object();
-    bool verdict = action && action->success.has_value();
-    const auto write_verdict = [&] {
-      const double value = *action->success ? 1.0 : 0.0;
-      json.key("success").values(std::span<const double>(&value, 1));
-      verdict = false;
-    };
-    for (int g : sorted_) {
-      if (!action || !action->commands[g].given) continue;
-      if (verdict && group(g).name > "success") write_verdict();
-      json.key(group(g).name).begin_array();
-      for (double x : action->commands[g].view()) {
-        json.value(static_cast<double>(static_cast<float>(x)));
-      }
-      json.end_array();
-    }
-    if (verdict) write_verdict();
-    json.end_object();
-  }
-  std::size_t max_bytes() const override { return bytes() + group_bytes("success", 1); }
-};
-
-class JointPos final : public ActionSensor {
- public:
-  JointPos(const Task& task, const ActionLog& log)
-      : ActionSensor("actions/joint_pos", "Targets of the controllers, without noise.",
-                     command_units(task), task, log) {}
-
- protected:
-  void write(const World& world, JsonWriter& json) override {
-    json.begin_object();
-    if (!terminal(task_, world)) {
-      for (int g : sorted_) {
-        if (group(g).controlled()) json.key(group(g).name).values(targets(world)[g].view());
-      }
-    }
-    json.end_object();
-  }
-  std::size_t max_bytes() const override { return bytes(); }
-};
-
-bool has_target_for_each_joint(const MoveGroup& group) {
-  return group.controlled() && group.actuators.size() == group.joints.size();
+SensorSpec spec_of(std::int64_t size, std::string unit, std::string frame,
+                   std::string description) {
+  SensorSpec spec;
+  spec.shape = {size};
+  spec.unit = std::move(unit);
+  spec.frame = std::move(frame);
+  spec.description = std::move(description);
+  return spec;
 }
 
-class JointPosRel final : public ActionSensor {
+class CommandedAction final : public ActionSensor<float> {
  public:
-  JointPosRel(const Task& task, const ActionLog& log)
-      : ActionSensor("actions/joint_pos_rel",
-                     "Targets of the controllers minus the joint positions observed before.",
-                     command_units(task, has_target_for_each_joint), task, log) {}
+  using ActionSensor::ActionSensor;
+
+  void compute(const World& world) override {
+    ActionSensor::compute(world);
+    const Action* action = task_.last_action(world.id);
+    const bool given = action && action->success.has_value();
+    verdict_->data.row<float>(world.id)[0] = given && *action->success ? 1.0f : 0.0f;
+    verdict_given_->data.row<bool>(world.id)[0] = given;
+  }
 
  protected:
-  void write(const World& world, JsonWriter& json) override {
-    const ActionLog::Entry& before = log_[world.id];
-    json.begin_object();
-    if (!before.given) {
-      for (int g : sorted_) {
-        json.key(group(g).name).begin_array();
-        for (std::size_t i = 0; i < group(g).qpos.size(); ++i) json.value(0.0);
-        json.end_array();
-      }
-    } else if (!terminal(task_, world)) {
-      for (int g : sorted_) {
-        const GroupValues& target = targets(world)[g];
-        const GroupValues& qpos = before.qpos[g];
-        if (!has_target_for_each_joint(group(g))) continue;
-        json.key(group(g).name).begin_array();
-        for (int i = 0; i < target.size; ++i) json.value(target.values[i] - qpos.values[i]);
-        json.end_array();
-      }
-    }
-    json.end_object();
+  SensorSpec group_spec(const MoveGroup& g) const override {
+    return spec_of(count(g.actuators), g.command_unit, "",
+                   fmt::format("The policy's command to '{}', as it gave it.", g.name));
   }
-  std::size_t max_bytes() const override { return bytes(); }
+  void declare_more(const SensorInit& init) override {
+    verdict_ =
+        &add("success", spec_of(1, "", "", "The policy's own verdict: 1 success, 0 not."), init);
+    verdict_given_ = &add_given("success", init);
+  }
+  bool write(const World& world, int g, std::span<float> row) override {
+    const Action* action = task_.last_action(world.id);
+    if (!action || !action->commands[g].given) return false;
+    std::ranges::transform(action->commands[g].view(), row.begin(),
+                           [](double x) { return static_cast<float>(x); });
+    return true;
+  }
+
+ private:
+  Field *verdict_ = nullptr, *verdict_given_ = nullptr;
 };
 
-class EePose final : public ActionSensor {
+class JointPos final : public ActionSensor<double> {
  public:
-  EePose(const Task& task, const ActionLog& log)
-      : ActionSensor("actions/ee_pose",
-                     "Where the targets put each group's leaf: robot base frame.", "m, wxyz", task,
-                     log) {}
+  using ActionSensor::ActionSensor;
 
  protected:
-  void write(const World& world, JsonWriter& json) override {
-    json.begin_object();
-    if (!terminal(task_, world)) {
-      for (int g : sorted_) {
-        double row[7];
-        write_pose(task_.robot().fk(g, targets(world)), row);
-        json.key(group(g).name).values(std::span<const double>(row));
-      }
-    }
-    json.end_object();
+  SensorSpec group_spec(const MoveGroup& g) const override {
+    if (!g.controlled()) return {};
+    SensorSpec spec =
+        spec_of(count(g.actuators), g.command_unit, "",
+                fmt::format("Target of the controller of '{}', without noise.", g.name));
+    // The least box around the control ranges, and 0 where nothing is given.
+    spec.low = std::min(0.0, std::ranges::min(g.ctrl_low));
+    spec.high = std::max(0.0, std::ranges::max(g.ctrl_high));
+    return spec;
   }
-  std::size_t max_bytes() const override { return bytes(7); }
+  bool shown(const World& world) override { return !terminal(task_, world); }
+  bool write(const World& world, int g, std::span<double> row) override {
+    std::ranges::copy(targets(world)[g].view(), row.begin());
+    return true;
+  }
 };
 
-class EeTwist final : public ActionSensor {
+class JointPosRel final : public ActionSensor<double> {
  public:
-  EeTwist(const Task& task, const ActionLog& log)
-      : ActionSensor("actions/ee_twist",
-                     "Twist from each leaf as observed before to where the targets put it, in that "
-                     "leaf's axes, per control step.",
-                     "m, rad", task, log) {}
+  using ActionSensor::ActionSensor;
 
  protected:
-  void write(const World& world, JsonWriter& json) override {
-    const ActionLog::Entry& before = log_[world.id];
-    json.begin_object();
-    if (!before.given || !terminal(task_, world)) {
-      for (int g : sorted_) {
-        if (!group(g).controlled()) continue;
-        Twist twist;
-        if (before.given) {
-          twist = log6(inverse(before.leaf[g]) * task_.robot().fk(g, targets(world)));
-        }
-        const double row[6] = {twist.v.x, twist.v.y, twist.v.z, twist.w.x, twist.w.y, twist.w.z};
-        json.key(group(g).name).values(std::span<const double>(row));
-      }
-    }
-    json.end_object();
+  SensorSpec group_spec(const MoveGroup& g) const override {
+    return spec_of(count(g.joints), unit_of(g), "",
+                   fmt::format("Target of '{}' minus its joints as observed before.", g.name));
   }
-  std::size_t max_bytes() const override { return bytes(6); }
+  bool shown(const World& world) override { return is_first(world) || !terminal(task_, world); }
+  bool write(const World& world, int g, std::span<double> row) override {
+    if (is_first(world)) {
+      std::ranges::fill(row, 0.0);
+      return true;
+    }
+    const GroupValues &target = targets(world)[g], &qpos = log_[world.id].qpos[g];
+    if (!group(g).controlled() || target.size != qpos.size) return false;
+    for (int i = 0; i < target.size; ++i) row[i] = target.values[i] - qpos.values[i];
+    return true;
+  }
+};
+
+class EePose final : public ActionSensor<double> {
+ public:
+  using ActionSensor::ActionSensor;
+
+ protected:
+  SensorSpec group_spec(const MoveGroup& g) const override {
+    const int base = task_.robot().base_body();
+    return spec_of(7, "m, wxyz", "body " + name_of(task_.model(), mjOBJ_BODY, base),
+                   fmt::format("Where the targets put the leaf of '{}'.", g.name));
+  }
+  bool shown(const World& world) override { return !terminal(task_, world); }
+  bool write(const World& world, int g, std::span<double> row) override {
+    write_pose(task_.robot().fk(g, targets(world)), row.data());
+    return true;
+  }
+};
+
+class EeTwist final : public ActionSensor<double> {
+ public:
+  using ActionSensor::ActionSensor;
+
+ protected:
+  SensorSpec group_spec(const MoveGroup& g) const override {
+    if (!g.controlled()) return {};
+    return spec_of(6, "m, rad", "the leaf as observed before",
+                   fmt::format("Twist of the leaf of '{}' to where the targets put it, per control "
+                               "step.",
+                               g.name));
+  }
+  bool shown(const World& world) override { return is_first(world) || !terminal(task_, world); }
+  bool write(const World& world, int g, std::span<double> row) override {
+    Twist twist;
+    if (!is_first(world)) {
+      twist = log6(inverse(log_[world.id].leaf[g]) * task_.robot().fk(g, targets(world)));
+    }
+    std::ranges::copy(std::initializer_list<double>{twist.v.x, twist.v.y, twist.v.z, twist.w.x,
+                                                    twist.w.y, twist.w.z},
+                      row.begin());
+    return true;
+  }
 };
 
 }  // namespace
 
 std::vector<std::shared_ptr<Sensor>> action_sensors(const Task& task, const ActionLog& log) {
-  return {std::make_shared<CommandedAction>(task, log), std::make_shared<JointPos>(task, log),
-          std::make_shared<JointPosRel>(task, log), std::make_shared<EeTwist>(task, log),
-          std::make_shared<EePose>(task, log)};
+  return {std::make_shared<CommandedAction>("actions/commanded_action", task, log),
+          std::make_shared<JointPos>("actions/joint_pos", task, log),
+          std::make_shared<JointPosRel>("actions/joint_pos_rel", task, log),
+          std::make_shared<EeTwist>("actions/ee_twist", task, log),
+          std::make_shared<EePose>("actions/ee_pose", task, log)};
 }
 
 }  // namespace mjsense

@@ -1,6 +1,6 @@
 #pragma once
 // The five `actions/*` of an observation: what led to it. Row t belongs to the action between
-// observations t-1 and t; at a terminal observation all but commanded_action are {}.
+// observations t-1 and t.
 
 #include <memory>
 #include <vector>
@@ -10,19 +10,23 @@
 
 namespace mjsense {
 
-// Units: what each group's actuators take (MoveGroup::command_unit: rad of an arm's servos, 0 open .. 255
-// closed of a gripper), m and wxyz (poses). All are JSON, their
-// keys move groups. "Before" is the observation that the action answers.
+// Streams `<sensor>/<group>` and `<sensor>/given/<group>` (bool []: false where the group has no
+// action at this observation; its numbers are 0 then). Units: what each group's actuators
+// take (MoveGroup::command_unit: rad of an arm's servos, 0 open .. 255 closed of a gripper), m and
+// wxyz (poses). "Before" is the observation that the action answers. At a
+// terminal observation nothing is given but commanded_action.
 //
-//   actions/commanded_action  as the policy gave it, rounded to float32; {} first; keeps its value
-//                             at the terminal observation. The policy's own verdict is
-//                             "success":[0.0] or [1.0]
-//   actions/joint_pos         the controllers' targets, without noise; first: what they hold
-//   actions/joint_pos_rel     these minus qpos before; groups that have not as many targets as
-//                             joints are left out; first: zeros for every group
-//   actions/ee_twist          log6(inv(X_BL before) * fk(targets)) = [linear 3 (m), angular 3
-//                             (rad)], in the axes of that leaf, per control step; first: zeros
-//   actions/ee_pose           fk(targets), X_BL of every group; a base gives the identity
+//   actions/commanded_action  float32, as the policy gave it; first: nothing. `success` [1] is the
+//                             policy's own verdict, 0 or 1
+//   actions/joint_pos         float64, the controllers' targets, without noise; first: what they
+//                             hold
+//   actions/joint_pos_rel     float64, these minus qpos before; only of groups that have as many
+//                             targets as joints; first: zeros of every group
+//   actions/ee_twist          float64 [6], log6(inv(X_BL before) * fk(targets)) = [linear 3 (m),
+//                             angular 3 (rad)], in the axes of that leaf, per control step; first:
+//                             zeros
+//   actions/ee_pose           float64 [7], fk(targets), X_BL of every group; a base gives the
+//                             identity
 //
 // They refer to the task and the log, which live longer.
 std::vector<std::shared_ptr<Sensor>> action_sensors(const Task& task, const ActionLog& log);

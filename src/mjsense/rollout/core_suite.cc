@@ -2,9 +2,6 @@
 
 #include <fmt/format.h>
 
-#include <algorithm>
-#include <cctype>
-
 #include "mjsense/episode/policy.h"
 #include "mjsense/observe/camera_parameters.h"
 #include "mjsense/observe/env_states.h"
@@ -19,12 +16,6 @@ namespace mjsense {
 namespace {
 
 constexpr int kTaskInfoLength = 4000;
-
-std::vector<JointGroup> joint_groups(const Robot& robot) {
-  std::vector<JointGroup> groups;
-  for (const MoveGroup& g : robot.groups()) groups.push_back({g.name, g.qpos, g.dofs});
-  return groups;
-}
 
 void add_camera(SensorSuite& suite, const RecordedCamera& camera, const std::string& owner) {
   suite.add(std::make_shared<CameraParameterSensor>(
@@ -43,26 +34,18 @@ void add_camera(SensorSuite& suite, const RecordedCamera& camera, const std::str
             owner);
 }
 
-// Grippers by the names of their groups, then what plays a role in the task.
+// Parts of the robot, then what plays a role in the task.
 std::shared_ptr<Sensor> image_points(const Task& task, const std::vector<RecordedCamera>& cameras) {
-  const Robot& robot = task.robot();
-  std::vector<ImagePointsSensor::Object> objects;
-  for (const MoveGroup& g : robot.groups()) {
-    if (g.kind == GroupKind::kGripper) {
-      objects.push_back({g.name, BodyRef([body = g.root_body](int) { return body; })});
-    }
-  }
+  std::vector<ImagePointsSensor::Object> objects = task.robot().image_objects();
   for (std::size_t i = 0; i < task.objects(0).size(); ++i) {
-    objects.push_back({task.objects(0)[i].role,
-                       BodyRef([&task, i](int world) { return task.objects(world)[i].body; })});
+    const TaskObject& object = task.objects(0)[i];
+    objects.push_back({object.role,
+                       BodyRef([&task, i](int world) { return task.objects(world)[i].body; }),
+                       !object.thin});
   }
   std::vector<ImagePointsSensor::Camera> views;
   for (const RecordedCamera& camera : cameras) {
-    std::string lower = camera.name;
-    std::ranges::transform(lower, lower.begin(), [](unsigned char c) { return std::tolower(c); });
-    if (lower.find("follower") == std::string::npos) {
-      views.push_back({.name = camera.name, .sensor = camera.sensor});
-    }
+    if (camera.image_points) views.push_back({.name = camera.name, .sensor = camera.sensor});
   }
   return std::make_shared<ImagePointsSensor>("object_image_points", std::move(objects),
                                              std::move(views));
@@ -79,9 +62,9 @@ SensorSuite core_suite(const Task& task, const ActionLog& log,
   for (const RecordedCamera& camera : cameras) add_camera(suite, camera, of_task);
 
   using What = JointStateSensor::What;
-  suite.add(std::make_shared<JointStateSensor>("qpos", What::kPosition, joint_groups(robot)),
+  suite.add(std::make_shared<JointStateSensor>("qpos", What::kPosition, robot.joint_groups()),
             of_task);
-  suite.add(std::make_shared<JointStateSensor>("qvel", What::kVelocity, joint_groups(robot)),
+  suite.add(std::make_shared<JointStateSensor>("qvel", What::kVelocity, robot.joint_groups()),
             of_task);
   suite.add(std::make_shared<FunctionSensor<float>>(
                 "robot_base_pose", pose_spec("world", "Pose of the robot's base, on the floor."),
@@ -90,7 +73,8 @@ SensorSuite core_suite(const Task& task, const ActionLog& log,
                 }),
             of_task);
   const char* base = mj_id2name(task.model(), mjOBJ_BODY, robot.base_body());
-  suite.add(std::make_shared<EnvStatesSensor>("env_states", cfg.env_state_name, joint_groups(robot),
+  const std::string& articulation = cfg.env_state_name.empty() ? cfg.name : cfg.env_state_name;
+  suite.add(std::make_shared<EnvStatesSensor>("env_states", articulation, robot.joint_groups(),
                                               cfg.env_state_size, base ? base : ""),
             of_task);
   suite.add(std::make_shared<JsonFunctionSensor>("task_info", kTaskInfoLength,

@@ -16,6 +16,7 @@ struct RecordedCamera {
   std::string mjcf_camera;  // full MuJoCo name
   int width = 640, height = 368;
   bool depth = false;
+  bool image_points = true;  // object_image_points looks through it
   Sensor* sensor = nullptr;  // of the scene: fields rgb, segmentation, and depth if it is recorded
 };
 

@@ -9,7 +9,7 @@
 #include "mjsense/core/error.h"
 #include "mjsense/observe/json_sensor.h"
 #include "mjsense/rollout/registry.h"
-#include "mjsense/sensors/camera/camera.h"
+#include "mjsense/sensors/camera/camera_sensor_cfg.h"
 
 namespace mjsense {
 namespace {
@@ -45,7 +45,8 @@ std::vector<RecordedCamera> chosen_cameras(const RobotCfg& robot, const RolloutC
                        .mjcf_camera = std::string(Robot::kPrefix) + mount->mjcf_camera,
                        .width = cfg.width.value_or(robot.image_width),
                        .height = cfg.height.value_or(robot.image_height),
-                       .depth = cfg.depth || mount->record_depth});
+                       .depth = cfg.depth || mount->record_depth,
+                       .image_points = mount->image_points});
   }
   return cameras;
 }

@@ -1,5 +1,6 @@
 #include "mjsense/rollout/rollout.h"
 
+#include <fmt/format.h>
 #include <gmock/gmock.h>
 
 #include <cmath>
@@ -33,7 +34,16 @@ json row(Rollout& rollout, const std::string& name, int world = 0) {
   return json::parse(text.substr(0, text.find('\0')));
 }
 
-std::vector<double> numbers(const json& list) { return list.get<std::vector<double>>(); }
+// Numbers of one stream.
+template <class T = double>
+std::vector<double> numbers(Rollout& rollout, const std::string& stream) {
+  const auto row = rollout.suite().stream(stream).data.row<T>(0);
+  return {row.begin(), row.end()};
+}
+
+bool given(Rollout& rollout, const std::string& action, const std::string& group) {
+  return rollout.suite().stream("actions/" + action + "/given/" + group).data.row<bool>(0)[0];
+}
 
 void start(Rollout& rollout, std::vector<int> worlds, std::vector<std::int64_t> episodes) {
   rollout.start(worlds, episodes);
@@ -76,27 +86,32 @@ TEST(Rollout, CommandsAreInTheUnitOfTheirActuators) {
 TEST(Rollout, ActionsAreMeasuredFromTheObservationBefore) {
   Rollout rollout(blind());
   start(rollout, {0}, {7});
-  EXPECT_EQ(row(rollout, "actions/commanded_action"), json::object());
-  EXPECT_EQ(row(rollout, "actions/joint_pos_rel"),
-            json::parse(R"({"arm":[0.0,0.0,0.0,0.0,0.0,0.0,0.0],"base":[],"gripper":[0.0,0.0]})"));
-  EXPECT_EQ(row(rollout, "actions/ee_twist")["arm"], json::parse("[0.0,0.0,0.0,0.0,0.0,0.0]"));
-  EXPECT_EQ(row(rollout, "actions/ee_pose")["base"], json::parse("[0.0,0.0,0.0,1.0,0.0,0.0,0.0]"));
+  for (const char* group : {"base", "arm", "gripper"}) {
+    EXPECT_FALSE(given(rollout, "commanded_action", group)) << group;
+    EXPECT_TRUE(given(rollout, "joint_pos_rel", group)) << group;
+    EXPECT_TRUE(given(rollout, "ee_pose", group)) << group;
+  }
+  EXPECT_FALSE(given(rollout, "commanded_action", "success"));
+  EXPECT_THAT(numbers(rollout, "actions/joint_pos_rel/arm"), ElementsAre(0, 0, 0, 0, 0, 0, 0));
+  EXPECT_THAT(numbers(rollout, "actions/joint_pos_rel/gripper"), ElementsAre(0, 0));
+  EXPECT_THAT(numbers(rollout, "actions/ee_twist/arm"), ElementsAre(0, 0, 0, 0, 0, 0));
+  EXPECT_THAT(numbers(rollout, "actions/ee_pose/base"), ElementsAre(0, 0, 0, 1, 0, 0, 0));
 
   const Robot& robot = rollout.task().robot();
   for (int t = 1; t <= 20; ++t) {
-    const auto before = numbers(row(rollout, "qpos")["arm"]);
+    const auto before = numbers<float>(rollout, "qpos/arm");
     const auto leaf_row = rollout.suite().stream("tcp_pose").data.row<float>(0);
     const Pose leaf{{leaf_row[0], leaf_row[1], leaf_row[2]},
                     {leaf_row[3], leaf_row[4], leaf_row[5], leaf_row[6]}};
     rollout.act();
     rollout.step();
-    const auto target = numbers(row(rollout, "actions/joint_pos")["arm"]);
-    const auto relative = numbers(row(rollout, "actions/joint_pos_rel")["arm"]);
-    EXPECT_FALSE(
-        row(rollout, "actions/joint_pos_rel").contains("gripper"));  // one command, two joints
+    const auto target = numbers(rollout, "actions/joint_pos/arm");
+    const auto relative = numbers(rollout, "actions/joint_pos_rel/arm");
+    EXPECT_FALSE(given(rollout, "joint_pos_rel", "gripper"));  // one command, two joints
+    EXPECT_TRUE(given(rollout, "joint_pos_rel", "arm"));
     for (int i = 0; i < 7; ++i) EXPECT_NEAR(relative[i], target[i] - before[i], 1e-6);
     // The target pose, reached from the leaf by the twist.
-    const auto twist = numbers(row(rollout, "actions/ee_twist")["arm"]);
+    const auto twist = numbers(rollout, "actions/ee_twist/arm");
     const Pose reached =
         leaf * exp6({{twist[0], twist[1], twist[2]}, {twist[3], twist[4], twist[5]}});
     RobotValues values;
@@ -104,7 +119,7 @@ TEST(Rollout, ActionsAreMeasuredFromTheObservationBefore) {
     const Pose expected = robot.fk(robot.arm(), values);
     EXPECT_NEAR(norm(reached.p - expected.p), 0, 1e-5);
     EXPECT_NEAR(angle_between(reached.q, expected.q), 0, 1e-5);
-    const auto pose = numbers(row(rollout, "actions/ee_pose")["arm"]);
+    const auto pose = numbers(rollout, "actions/ee_pose/arm");
     EXPECT_NEAR(pose[0], expected.p.x, 1e-12);
     EXPECT_NEAR(pose[3], expected.q.w, 1e-12);
   }
@@ -113,10 +128,8 @@ TEST(Rollout, ActionsAreMeasuredFromTheObservationBefore) {
 TEST(Rollout, AtTheEndOnlyTheCommandIsLeft) {
   Rollout rollout(blind());
   start(rollout, {0}, {7});
-  json before;
   int actions = 0;
   while (!rollout.evaluation(0).terminal && !rollout.evaluation(0).truncated) {
-    before = row(rollout, "actions/commanded_action");
     rollout.act();
     rollout.step();
     ++actions;
@@ -125,10 +138,41 @@ TEST(Rollout, AtTheEndOnlyTheCommandIsLeft) {
   EXPECT_TRUE(rollout.evaluation(0).success);
   EXPECT_GT(actions, 20);
   for (const char* name : {"joint_pos", "joint_pos_rel", "ee_twist", "ee_pose"}) {
-    EXPECT_EQ(row(rollout, std::string("actions/") + name), json::object()) << name;
+    EXPECT_FALSE(given(rollout, name, "arm")) << name;
+    for (double x : numbers(rollout, fmt::format("actions/{}/arm", name))) EXPECT_EQ(x, 0) << name;
   }
-  EXPECT_NE(row(rollout, "actions/commanded_action"), json::object());
+  EXPECT_TRUE(given(rollout, "commanded_action", "arm"));
   EXPECT_EQ(row(rollout, "task_info")["episode_step"], actions);
+}
+
+TEST(Rollout, WhatThePolicySaysIsNumbers) {
+  RolloutCfg cfg = blind();
+  cfg.policy.clear();
+  Rollout rollout(cfg);
+  start(rollout, {0}, {7});
+  Action& action = rollout.action(0);
+  const double hold[7] = {0.1, -0.7, 0, -2.3, 0, 1.6, 0};
+  action.commands[rollout.task().robot().arm()].set(hold);
+  action.success = false;
+  rollout.step();
+  EXPECT_THAT(numbers<float>(rollout, "actions/commanded_action/arm"),
+              ElementsAre(0.1f, -0.7f, 0, -2.3f, 0, 1.6f, 0));
+  EXPECT_TRUE(given(rollout, "commanded_action", "arm"));
+  EXPECT_FALSE(given(rollout, "commanded_action", "gripper"));
+  EXPECT_TRUE(given(rollout, "commanded_action", "success"));
+  EXPECT_THAT(numbers<float>(rollout, "actions/commanded_action/success"), ElementsAre(0));
+  EXPECT_THAT(numbers(rollout, "actions/joint_pos/arm"),
+              ElementsAre(0.1, -0.7, 0, -2.3, 0, 1.6, 0));
+  EXPECT_TRUE(given(rollout, "joint_pos", "gripper"));  // its controller holds something
+
+  const auto& target = rollout.suite().stream("actions/joint_pos/gripper").spec;
+  EXPECT_EQ(target.low, 0);
+  EXPECT_EQ(target.high, 255);
+  EXPECT_EQ(target.unit, "");
+  EXPECT_EQ(rollout.suite().stream("qpos/arm").spec.unit, "rad");
+  EXPECT_EQ(rollout.suite().stream("qvel/arm").spec.unit, "rad/s");
+  EXPECT_EQ(rollout.suite().stream("qpos/base").spec.shape, Shape({0}));
+  EXPECT_EQ(rollout.suite().stream("actions/ee_pose/arm").spec.frame, "body robot_0/base");
 }
 
 // FNV-1a of every row that a world shows.

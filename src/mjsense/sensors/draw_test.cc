@@ -1,4 +1,4 @@
-// What sensors show to a human (Simulation::draw). Ray sensors: raycast_test.cc.
+// What sensors show to a human (Simulation::draw). Ray sensors: raycast_sensor_test.cc.
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -8,7 +8,7 @@
 #include <string>
 
 #include "mjsense/core/error.h"
-#include "mjsense/sensors/camera/camera.h"
+#include "mjsense/sensors/camera/camera_sensor_cfg.h"
 #include "mjsense/sensors/imu/imu_sensor.h"
 #include "mjsense/sensors/testing/every_sensor.h"
 #include "mjsense/sim/simulation.h"

@@ -69,17 +69,23 @@ std::unique_ptr<FakeSensor> dict(const std::string& name, int size, int worlds, 
   return sensor;
 }
 
-void write_groups(JsonWriter& json, const Moment& m, bool terminal_empty) {
-  json.begin_object();
-  if (!terminal_empty || m.t + 1 < m.length) {
-    std::vector<double> arm(7);
-    for (int j = 0; j < 7; ++j) arm[j] = FakeSuite::joint(m.episode, m.t, j);
-    const double gripper[] = {0.00296};
-    json.key("arm").values(std::span<const double>(arm));
-    json.key("base").begin_array().end_array();
-    json.key("gripper").values(std::span<const double>(gripper));
+// An arm, a base without joints and a gripper. `action`: nothing is given at the last step.
+std::unique_ptr<FakeSensor> groups(const std::string& name, bool action, int worlds) {
+  auto sensor = std::make_unique<FakeSensor>(name, [action](FakeSensor& s, const Moment& m) {
+    const bool given = !action || m.t + 1 < m.length;
+    const auto arm = s.row<float>(0, m.world);
+    for (int j = 0; j < 7; ++j) arm[j] = given ? FakeSuite::joint(m.episode, m.t, j) : 0;
+    s.row<double>(2, m.world)[0] = given ? 0.00296 : 0;
+    if (!action) return;
+    for (int f = 3; f < 6; ++f) s.row<bool>(f, m.world)[0] = given;
+  });
+  sensor->declare("arm", spec_of(DType::kFloat32, {7}, "rad", "", "joints"), worlds);
+  sensor->declare("base", spec_of(DType::kFloat32, {0}, "", "", "no joints"), worlds);
+  sensor->declare("gripper", spec_of(DType::kFloat64, {1}, "rad", "", "driver"), worlds);
+  for (const char* group : {"given/arm", "given/base", "given/gripper"}) {
+    if (action) sensor->declare(group, spec_of(DType::kBool, {}, "", "", "there is one"), worlds);
   }
-  json.end_object();
+  return sensor;
 }
 
 template <class T>
@@ -159,10 +165,8 @@ FakeSuite::FakeSuite(const FakeSuiteCfg& cfg) : cfg_(cfg) {
       sensors_.push_back(std::move(depth));
     }
   }
-  const auto groups = [](JsonWriter& json, const Moment& m) { write_groups(json, m, false); };
-  const auto action = [](JsonWriter& json, const Moment& m) { write_groups(json, m, true); };
-  sensors_.push_back(dict("qpos", 2000, B, groups));
-  sensors_.push_back(dict("qvel", 2000, B, groups));
+  sensors_.push_back(groups("qpos", false, B));
+  sensors_.push_back(groups("qvel", false, B));
   sensors_.push_back(numbers<float>("robot_base_pose", {7}, "m, 1", "world", B));
   auto states = std::make_unique<FakeSensor>("env_states", [](FakeSensor& s, const Moment& m) {
     for (int f = 0; f < 2; ++f) {
@@ -185,7 +189,7 @@ FakeSuite::FakeSuite(const FakeSuiteCfg& cfg) : cfg_(cfg) {
   }));
   for (const char* name :
        {"commanded_action", "ee_pose", "ee_twist", "joint_pos", "joint_pos_rel"}) {
-    sensors_.push_back(dict(fmt::format("actions/{}", name), 2000, B, action));
+    sensors_.push_back(groups(fmt::format("actions/{}", name), true, B));
   }
   auto points =
       std::make_unique<FakeSensor>("object_image_points", [](FakeSensor& s, const Moment& m) {
@@ -199,11 +203,14 @@ FakeSuite::FakeSuite(const FakeSuiteCfg& cfg) : cfg_(cfg) {
   points->declare("pickup_obj/wrist_camera/num_points",
                   spec_of(DType::kInt32, {1}, "", "", "valid rows of points"), B);
   sensors_.push_back(std::move(points));
-  sensors_.push_back(dict("grasp_state_pickup_obj", 2000, B, [](JsonWriter& json, const Moment& m) {
-    json.begin_object().key("gripper").begin_object();
-    json.key("held").value(m.t > 3).key("touching").value(m.t > 2);
-    json.end_object().end_object();
-  }));
+  auto grasp =
+      std::make_unique<FakeSensor>("grasp_state_pickup_obj", [](FakeSensor& s, const Moment& m) {
+        s.row<bool>(0, m.world)[0] = m.t > 3;
+        s.row<bool>(1, m.world)[0] = m.t > 2;
+      });
+  grasp->declare("gripper/held", spec_of(DType::kBool, {}, "", "", "holds"), B);
+  grasp->declare("gripper/touching", spec_of(DType::kBool, {}, "", "", "touches"), B);
+  sensors_.push_back(std::move(grasp));
   sensors_.push_back(numbers<float>("tcp_pose", {7}, "m, 1", "robot base", B));
   sensors_.push_back(numbers<std::int64_t>("policy_phase", {}, "", "", B));
   sensors_.push_back(numbers<std::int64_t>("policy_num_retries", {}, "", "", B));

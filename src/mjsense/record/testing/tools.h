@@ -1,9 +1,10 @@
 #pragma once
-// For the tests of this room only.
+// For the tests of recordings, written and read back.
 
 #include <algorithm>
 #include <filesystem>
 #include <fstream>
+#include <functional>
 #include <sstream>
 #include <string>
 #include <vector>
@@ -106,6 +107,22 @@ inline RecordingCfg fake_recording(const fs::path& out, const FakeSuite& suite, 
   cfg.sensors = suite.sensors();
   cfg.settings = R"({"seed":7})";
   return cfg;
+}
+
+// Records and returns the bytes of all HDF5 files, in order.
+inline std::string record(const fs::path& out, int episodes, const Attempts& attempts,
+                          bool video = false,
+                          const std::function<void(RecordingCfg&)>& change = {}) {
+  FakeSuite suite({attempts.worlds, 16, 12, video, video});
+  RecordingCfg cfg = fake_recording(out, suite, attempts.worlds, episodes);
+  if (change) change(cfg);
+  {
+    Recorder recorder(cfg);
+    record_all(recorder, suite, attempts);
+  }
+  std::string bytes;
+  for (const std::string& name : tree(out)) bytes += read_file(out / name);
+  return bytes;
 }
 
 // What() of the error that `run` throws; "" if it throws none.

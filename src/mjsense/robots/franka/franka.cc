@@ -66,6 +66,8 @@ RobotCfg franka_cfg() {
   gripper.pad_sites = {"gripper/left_pad", "gripper/right_pad"};
 
   cfg.groups = {base, arm, gripper};
+  cfg.env_state_name = "panda";  // MolmoSpaces' name and width: 9 + 9 and zeros
+  cfg.env_state_size = 31;
   cfg.cameras = {{"wrist_camera", "gripper/wrist_camera"}, {"exo_camera_1", "exo_camera_1"}};
 
   const char* meshes = std::getenv("MJSENSE_FRANKA_MESHES");

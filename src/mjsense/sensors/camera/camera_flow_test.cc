@@ -9,7 +9,7 @@
 
 #include "mjsense/core/error.h"
 #include "mjsense/scene/scene.h"
-#include "mjsense/sensors/camera/camera.h"
+#include "mjsense/sensors/camera/camera_sensor_cfg.h"
 #include "mjsense/sim/simulation.h"
 
 namespace mjsense {

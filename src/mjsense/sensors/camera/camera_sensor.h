@@ -11,7 +11,7 @@
 #include "mjsense/render/view/look.h"
 #include "mjsense/render/view/markers.h"
 #include "mjsense/render/view/view_builder.h"
-#include "mjsense/sensors/camera/camera.h"
+#include "mjsense/sensors/camera/camera_sensor_cfg.h"
 #include "mjsense/sensors/camera/optical_flow.h"
 #include "mjsense/sensors/camera/pixel_owners.h"
 

@@ -14,7 +14,7 @@
 
 #include "mjsense/core/parallel.h"
 #include "mjsense/core/rng.h"
-#include "mjsense/sensors/lidar/lidar.h"
+#include "mjsense/sensors/lidar/lidar_sensor.h"
 
 namespace mjsense {
 namespace {

@@ -12,7 +12,7 @@
 
 #include "mjsense/core/parallel.h"
 #include "mjsense/core/rng.h"
-#include "mjsense/sensors/raycast/raycast.h"
+#include "mjsense/sensors/raycast/raycast_sensor.h"
 
 namespace mjsense {
 namespace {

@@ -4,7 +4,7 @@
 
 #include <algorithm>
 
-#include "mjsense/sensors/raycast/raycast.h"
+#include "mjsense/sensors/raycast/raycast_sensor.h"
 
 namespace mjsense {
 

@@ -9,11 +9,11 @@
 #include "mjsense/core/sensor.h"
 #include "mjsense/scene/scene.h"
 #include "mjsense/sensors/builtin/builtin_sensor.h"
-#include "mjsense/sensors/camera/camera.h"
+#include "mjsense/sensors/camera/camera_sensor_cfg.h"
 #include "mjsense/sensors/contact/contact_sensor.h"
-#include "mjsense/sensors/height/terrain_height.h"
-#include "mjsense/sensors/lidar/lidar.h"
-#include "mjsense/sensors/raycast/raycast.h"
+#include "mjsense/sensors/lidar/lidar_sensor.h"
+#include "mjsense/sensors/raycast/raycast_sensor.h"
+#include "mjsense/sensors/terrain_height/terrain_height_sensor.h"
 
 namespace mjsense {
 namespace every_sensor_detail {

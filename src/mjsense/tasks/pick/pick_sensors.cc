@@ -1,6 +1,6 @@
 #include "mjsense/observe/function_sensor.h"
-#include "mjsense/observe/grasp_state.h"
 #include "mjsense/observe/pose_sensor.h"
+#include "mjsense/robots/grasp_state.h"
 #include "mjsense/scene/resolve.h"
 #include "mjsense/tasks/pick/pick.h"
 

@@ -1,3 +1,5 @@
+#include "mjsense/sensors/imu/imu_sensor.h"
+
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
@@ -7,7 +9,6 @@
 
 #include "mjsense/core/error.h"
 #include "mjsense/scene/scene.h"
-#include "mjsense/sensors/imu/imu_sensor.h"
 #include "mjsense/sim/simulation.h"
 
 namespace mjsense {

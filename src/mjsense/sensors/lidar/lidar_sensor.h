@@ -14,7 +14,7 @@
 #include <variant>
 #include <vector>
 
-#include "mjsense/sensors/raycast/raycast.h"
+#include "mjsense/sensors/raycast/raycast_sensor.h"
 
 namespace mjsense {
 

@@ -1,4 +1,4 @@
-#include "mjsense/sensors/height/terrain_height.h"
+#include "mjsense/sensors/terrain_height/terrain_height_sensor.h"
 
 #include <fmt/format.h>
 

@@ -12,7 +12,7 @@
 #include <memory>
 #include <string>
 
-#include "mjsense/sensors/raycast/raycast.h"
+#include "mjsense/sensors/raycast/raycast_sensor.h"
 
 namespace mjsense {
 

@@ -1,3 +1,5 @@
+#include "mjsense/sensors/camera/camera_sensor.h"
+
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
@@ -10,7 +12,6 @@
 #include "mjsense/core/testing/allocations.h"
 #include "mjsense/rays/ray_scene.h"
 #include "mjsense/scene/scene.h"
-#include "mjsense/sensors/camera/camera_sensor.h"
 #include "mjsense/sim/simulation.h"
 
 namespace mjsense {

@@ -1,3 +1,5 @@
+#include "mjsense/sensors/contact/contact_sensor.h"
+
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
@@ -5,7 +7,6 @@
 
 #include "mjsense/core/error.h"
 #include "mjsense/scene/scene.h"
-#include "mjsense/sensors/contact/contact_sensor.h"
 #include "mjsense/sim/simulation.h"
 
 namespace mjsense {

@@ -1,4 +1,4 @@
-#include "mjsense/sensors/raycast/raycast.h"
+#include "mjsense/sensors/raycast/raycast_sensor.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -10,7 +10,6 @@
 
 #include "mjsense/core/error.h"
 #include "mjsense/scene/scene.h"
-#include "mjsense/sensors/height/terrain_height.h"
 #include "mjsense/sim/simulation.h"
 
 namespace mjsense {
@@ -430,35 +429,6 @@ TEST(Pattern, EveryRayIsInExactlyOnePacket) {
     EXPECT_THAT(seen, Each(1));
     EXPECT_EQ(bundle.num_packets(), (n + 15) / 16);
   }
-}
-
-TEST(TerrainHeight, LeastOverEachFootsRing) {
-  auto cfg = sensor_cfg<TerrainHeightSensorCfg>();
-  cfg->ray_alignment = "yaw";
-  cfg->max_distance = 1.0;
-  cfg->pattern = RingPattern::single_ring(0.04, 4);
-  cfg->frame = {{"body", "belly", "r"}, {"camera", "eye", "r"}};
-  Lab lab({cfg});
-  lab.pose({0.49, 0, 1.2, 1, 0, 0, 0});
-  EXPECT_THAT(
-      lab.read("heights"),
-      Pointwise(FloatNear(1e-6f), {0.2f, 1.0f}));  // over the step's edge; 2 m up: max_distance
-}
-
-TEST(TerrainHeight, BelowTheGroundIsZeroAndFarAboveIsTheLimit) {
-  auto cfg = sensor_cfg<TerrainHeightSensorCfg>();
-  cfg->max_distance = 1.0;
-  cfg->include_geom_groups = {{0}};
-  cfg->ray_alignment = "world";
-  Lab lab({cfg});
-  const auto at = [&](double x, double z) {
-    lab.pose({x, 0, z, kOnItsSide, kOnItsSide, 0, 0});
-    return lab.read("heights")[0];
-  };
-  EXPECT_FLOAT_EQ(at(-2, 0.25), 0.25f);
-  EXPECT_FLOAT_EQ(at(-2, 50), 1.0f);
-  EXPECT_FLOAT_EQ(at(-2, -0.3), 0.0f);
-  EXPECT_FLOAT_EQ(at(1.5, 0.4), 0.0f) << "inside the step";
 }
 
 }  // namespace

@@ -1,41 +1,41 @@
-#include "mjsense/observe/grasp_state.h"
+#include "mjsense/robots/grasp_state.h"
 
 #include <fmt/format.h>
 
-#include <algorithm>
-
 #include "mjsense/core/error.h"
-#include "mjsense/observe/frame.h"
 
 namespace mjsense {
 
-GraspStateSensor::GraspStateSensor(std::string name, BodyRef object, std::vector<Gripper> grippers,
-                                   int str_max_len)
-    : JsonSensor(std::move(name), str_max_len,
-                 "Whether each gripper touches and holds the object."),
-      object_(std::move(object)),
-      grippers_(std::move(grippers)) {
+GraspStateSensor::GraspStateSensor(std::string name, BodyRef object, std::vector<Gripper> grippers)
+    : Sensor(std::move(name)), object_(std::move(object)), grippers_(std::move(grippers)) {
   if (grippers_.size() > kMaxGrippers) {
     throw ValueError(fmt::format("sensor '{}': {} grippers, at most {}", this->name(),
                                  grippers_.size(), kMaxGrippers));
   }
-  std::ranges::sort(grippers_, {}, &Gripper::name);
 }
 
-void GraspStateSensor::prepare(const SensorInit& init) {
+void GraspStateSensor::initialize(const SensorInit& init) {
   const mjModel* m = init.model;
   const std::string place = fmt::format("sensor '{}'", name());
   object_.resolve(m, place);
   gripper_bits_.assign(m->ngeom, 0);
+  clear_fields();
   for (std::size_t i = 0; i < grippers_.size(); ++i) {
     const int root = object_id(m, mjOBJ_BODY, place, grippers_[i].body);
     for (int g = 0; g < m->ngeom; ++g) {
       if (is_below(m, m->geom_bodyid[g], root)) gripper_bits_[g] |= 1u << i;
     }
+    SensorSpec spec;
+    spec.dtype = DType::kBool;
+    spec.description = fmt::format("'{}' touches the object, and nothing else does but grippers.",
+                                   grippers_[i].name);
+    add_field(grippers_[i].name + "/held", spec, init.num_worlds);
+    spec.description = fmt::format("'{}' touches the object.", grippers_[i].name);
+    add_field(grippers_[i].name + "/touching", spec, init.num_worlds);
   }
 }
 
-void GraspStateSensor::write(const World& world, JsonWriter& json) {
+void GraspStateSensor::compute(const World& world) {
   std::uint32_t touching = 0;
   bool foreign = false;
   const mjModel* m = world.model;
@@ -50,21 +50,11 @@ void GraspStateSensor::write(const World& world, JsonWriter& json) {
     touching |= bits;
     foreign |= bits == 0;
   }
-  json.begin_object();
   for (std::size_t i = 0; i < grippers_.size(); ++i) {
     const bool touches = touching >> i & 1u;
-    json.key(grippers_[i].name).begin_object();
-    json.key("held").value(touches && !foreign);
-    json.key("touching").value(touches);
-    json.end_object();
+    fields()[2 * i].data.row<bool>(world.id)[0] = touches && !foreign;
+    fields()[2 * i + 1].data.row<bool>(world.id)[0] = touches;
   }
-  json.end_object();
-}
-
-std::size_t GraspStateSensor::max_bytes() const {
-  std::size_t bytes = 2;
-  for (const Gripper& g : grippers_) bytes += g.name.size() + 36;
-  return bytes;
 }
 
 }  // namespace mjsense

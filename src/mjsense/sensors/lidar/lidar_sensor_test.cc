@@ -1,4 +1,4 @@
-#include "mjsense/sensors/lidar/lidar.h"
+#include "mjsense/sensors/lidar/lidar_sensor.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>

@@ -1,4 +1,4 @@
-#include "mjsense/sensors/raycast/raycast.h"
+#include "mjsense/sensors/raycast/raycast_sensor.h"
 
 #include <fmt/format.h>
 

@@ -1,0 +1,8 @@
+# What tests share, in folders testing/: a room's tests may use those of the rooms below it.
+file(GLOB_RECURSE shared CONFIGURE_DEPENDS ${PROJECT_SOURCE_DIR}/src/mjsense/*/testing/*.cc)
+add_library(mjsense_testing STATIC ${shared})
+target_link_libraries(mjsense_testing PRIVATE mjsense ${MJSENSE_PRIVATE_LIBS})
+
+# Writes recordings that the Python tests read, kill and resume, and that bench/record.py times.
+add_executable(record_fake ${PROJECT_SOURCE_DIR}/tests/record/fake_writer.cc)
+target_link_libraries(record_fake PRIVATE mjsense_testing mjsense ${MJSENSE_PRIVATE_LIBS})

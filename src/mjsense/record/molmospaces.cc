@@ -1,0 +1,72 @@
+#include "mjsense/record/molmospaces.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+
+#include "mjsense/record/json_rows.h"
+
+namespace mjsense {
+namespace {
+
+constexpr int kTextBytes = 2000;
+
+struct Text {
+  std::string_view sensor;  // ends in '_': every sensor whose name begins so
+  const char *unit, *description;
+};
+
+constexpr Text kTexts[] = {
+    {"qpos", "rad or m", "Joint positions by move group."},
+    {"qvel", "rad/s or m/s", "Joint velocities by move group."},
+    {"actions/commanded_action", "", "The policy's action, as it gave it."},
+    {"actions/joint_pos", "rad or m",
+     "Targets of the position controllers, without noise; grippers: the actuator's command."},
+    {"actions/joint_pos_rel", "rad or m",
+     "Targets of the controllers minus the joint positions observed before."},
+    {"actions/ee_twist", "m, rad",
+     "Twist from each leaf as observed before to where the targets put it, in that leaf's axes, "
+     "per control step."},
+    {"actions/ee_pose", "m, wxyz", "Where the targets put each group's leaf: robot base frame."},
+    {"grasp_state_", "", "Whether each gripper touches and holds the object."},
+};
+
+}  // namespace
+
+std::string place_of(std::string_view stream) {
+  constexpr std::string_view kParam = "sensor_param_";
+  if (stream == "qpos" || stream == "qvel") return fmt::format("obs/agent/{}", stream);
+  if (stream.starts_with("actions/") || stream.starts_with("env_states/"))
+    return std::string(stream);
+  if (stream.starts_with(kParam))
+    return fmt::format("obs/sensor_param/{}", stream.substr(kParam.size()));
+  return fmt::format("obs/extra/{}", stream);
+}
+
+std::span<const char* const> standard_groups() {
+  static constexpr const char* kGroups[] = {
+      "actions",   "env_states/actors", "env_states/articulations", "obs/agent",
+      "obs/extra", "obs/sensor_data",   "obs/sensor_param"};
+  return kGroups;
+}
+
+std::optional<SensorSpec> text_of(const Sensor& sensor) {
+  const auto text = std::ranges::find_if(kTexts, [&](const Text& t) {
+    return t.sensor.ends_with('_') ? sensor.name().starts_with(t.sensor)
+                                   : sensor.name() == t.sensor;
+  });
+  if (text == std::end(kTexts) || !JsonRows::suits(sensor)) return std::nullopt;
+  SensorSpec spec;
+  spec.name = sensor.name();
+  spec.dtype = DType::kUint8;
+  spec.shape = {kTextBytes};
+  spec.unit = text->unit;
+  spec.low = 0;
+  spec.high = 255;
+  spec.is_dict = true;
+  spec.str_max_len = kTextBytes;
+  spec.description = text->description;
+  return spec;
+}
+
+}  // namespace mjsense

@@ -1,0 +1,96 @@
+// Recordings read back: what the recorder wrote, what an interruption left.
+
+#include <fmt/format.h>
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <algorithm>
+
+#include "mjsense/record/testing/tools.h"
+#include "mjsense/replay/check.h"
+#include "mjsense/replay/trajectory.h"
+
+namespace mjsense {
+namespace {
+
+using namespace testing;
+using ::testing::HasSubstr;
+using ::testing::SizeIs;
+
+TEST(Replay, EpisodesReadBackAsWritten) {
+  TempDir dir;
+  record(dir.path, 3, {.worlds = 2, .steps = 70});  // more rows than a chunk of dict rows holds
+  EXPECT_THAT(tree(dir.path), ::testing::ElementsAre("house_0/trajectories_batch_1_of_1.h5"));
+  const h5::H5Lock lock;
+  const h5::Id file = h5::open_file(dir.path / "house_0/trajectories_batch_1_of_1.h5");
+  ASSERT_THAT(trajectory_names(file), SizeIs(3));
+  for (int e = 0; e < 3; ++e) {
+    const h5::Id traj(H5Gopen2(file, fmt::format("traj_{}", e).c_str(), H5P_DEFAULT), H5Gclose,
+                      "traj");
+    const int T = length_of(e, 70);
+    EXPECT_EQ(h5::int_attribute(traj, "episode", -1), e);
+    EXPECT_EQ(h5::text_attribute(traj, "outcome"), "success");
+    EXPECT_EQ(h5::read_text(traj, "obs_scene"), FakeSuite::obs_scene(e));
+    const RowDataset qpos(traj, "obs/agent/qpos"), tcp(traj, "obs/extra/tcp_pose"),
+        fail(traj, "fail");
+    EXPECT_EQ(qpos.rows(), T);
+    EXPECT_TRUE(qpos.is_json());
+    EXPECT_EQ(qpos.shape(), "(T, 2000)");
+    qpos.each_text([&](std::int64_t t, std::string_view text) {
+      EXPECT_THAT(std::string(text),
+                  HasSubstr(fmt::format("{{\"arm\":[{}", static_cast<double>(FakeSuite::joint(
+                                                             e, static_cast<int>(t), 0)))));
+    });
+    std::vector<double> values;
+    tcp.each_number([&](auto piece) { values.insert(values.end(), piece.begin(), piece.end()); });
+    ASSERT_EQ(values.size(), T * 7u);
+    for (int t = 0; t < T; ++t) EXPECT_EQ(values[t * 7 + 3], e * 1000 + t + 0.375);
+    values.clear();
+    fail.each_number([&](auto piece) { values.insert(values.end(), piece.begin(), piece.end()); });
+    EXPECT_EQ(fail.dtype(), "bool");
+    EXPECT_EQ(std::count(values.begin(), values.end(), 1.0), T - 1);
+  }
+}
+
+TEST(Replay, DiscardedAttemptsLeaveNoTrace) {
+  TempDir dir;
+  record(dir.path, 4, {.worlds = 3, .discard_every = 2}, true);
+  const InspectResult result = inspect(dir.path);
+  ASSERT_THAT(result.files, SizeIs(1));
+  EXPECT_EQ(result.files[0].episodes, 4);
+  EXPECT_THAT(tree(dir.path), SizeIs(1 + 4 * 2));
+  EXPECT_TRUE(verify(dir.path).ok()) << verify(dir.path).text();
+}
+
+TEST(Replay, AnUnfinishedRecordingIsReadableAndRepairable) {
+  TempDir dir;
+  record(dir.path, 8, {.worlds = 2, .stop_after = 3}, true);
+  const VerifyResult before = verify(dir.path);
+  EXPECT_EQ(before.unpublished, 3);
+  EXPECT_EQ(before.episodes, 3);
+  EXPECT_EQ(before.videos, 6);
+  ASSERT_THAT(before.findings, SizeIs(1)) << before.text();
+  EXPECT_THAT(before.findings[0].text, HasSubstr("3 finished episodes wait"));
+  EXPECT_THAT(repair(dir.path).text(), HasSubstr("published 3 finished episodes"));
+  const VerifyResult after = verify(dir.path);
+  EXPECT_TRUE(after.ok()) << after.text();
+  EXPECT_EQ(after.episodes, 3);
+  EXPECT_FALSE(fs::exists(dir.path / "house_0/.recording"));
+}
+
+TEST(Replay, OddPicturesArePadded) {
+  TempDir dir;
+  FakeSuite suite({1, 17, 13});
+  RecordingCfg cfg = fake_recording(dir.path, suite, 1, 1);
+  cfg.video.molmospaces_depth = true;
+  {
+    Recorder recorder(cfg);
+    record_all(recorder, suite, {.worlds = 1});
+  }
+  const VerifyResult result = verify(dir.path, {.decode = true});
+  EXPECT_TRUE(result.ok()) << result.text();
+  EXPECT_EQ(result.videos, 3);
+}
+
+}  // namespace
+}  // namespace mjsense

@@ -1,0 +1,126 @@
+#include "mjsense/sensors/terrain_height/terrain_height_sensor.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <memory>
+
+#include "mjsense/core/error.h"
+#include "mjsense/scene/scene.h"
+#include "mjsense/sim/simulation.h"
+
+namespace mjsense {
+namespace {
+
+using ::testing::ElementsAre;
+using ::testing::FloatNear;
+using ::testing::HasSubstr;
+using ::testing::Pointwise;
+
+//        foot            A floor at z = 0, a step 0.5 m high for 0.5 < x < 2.5; 20 m away, at x = 20,
+//   ______|_____         a pit whose ground lies at -3 m.
+//   floor |step |_
+constexpr char kField[] = R"(
+<mujoco><worldbody>
+  <geom name="floor" type="box" size="4 4 .5" pos="0 0 -.5"/>
+  <geom name="step" type="box" size="1 2 .225" pos="1.5 0 .275"/>
+  <geom name="pit" type="box" size="1 1 .5" pos="20 0 -3.5"/>
+  <body name="foot" pos="0 0 2">
+    <freejoint/>
+    <geom size=".01" mass="1" group="3"/>
+    <site name="toe" pos="0 0 -.1"/>
+  </body>
+</worldbody></mujoco>)";
+
+constexpr double kOnItsSide = 0.70710678118654752;  // w and x of a quarter turn about x
+
+std::shared_ptr<TerrainHeightSensorCfg> height(std::string reduction = "min") {
+  auto cfg = std::make_shared<TerrainHeightSensorCfg>();
+  cfg->name = "height";
+  cfg->frame = {{"body", "foot", "r"}};
+  cfg->pattern = GridPattern{.size = {0, 0}};
+  cfg->ray_alignment = "world";
+  cfg->max_distance = 1.0;
+  cfg->reduction = std::move(reduction);
+  return cfg;
+}
+
+struct Lab {
+  std::shared_ptr<Scene> scene;
+  std::unique_ptr<Simulation> sim;
+
+  explicit Lab(std::shared_ptr<const SensorCfg> cfg) {
+    SceneCfg s;
+    s.entities.emplace_back("r", EntityCfg{.model = {.xml = kField}});
+    s.sensors = {std::move(cfg)};
+    scene = std::make_shared<Scene>(std::move(s));
+    sim = std::make_unique<Simulation>(scene, SimulationCfg{});
+  }
+  // With the foot there, lying on its side.
+  std::vector<float> at(double x, double z) {
+    const double qpos[] = {x, 0, z, kOnItsSide, kOnItsSide, 0, 0};
+    std::ranges::copy(qpos, reinterpret_cast<double*>(sim->worlds().state_component("qpos").data));
+    sim->forward();
+    Sensor& sensor = scene->sensor("height");
+    sim->refresh(sensor);
+    const auto row = sensor.field("heights").data.row<float>(0);
+    return {row.begin(), row.end()};
+  }
+};
+
+TEST(TerrainHeight, IsFromTheFrameToTheGroundBelow) {
+  Lab lab(height());
+  EXPECT_THAT(lab.at(-2, 0.25), ElementsAre(FloatNear(0.25f, 1e-6f)));
+  EXPECT_THAT(lab.at(1.5, 0.7), ElementsAre(FloatNear(0.2f, 1e-6f)));
+}
+
+// Three rays, 0.1 m apart along x, the middle one 1 cm before the step: 0.7, 0.7, 0.2 m.
+TEST(TerrainHeight, ReducesTheRaysOfAFrame) {
+  const auto over_the_edge = [](const char* reduction) {
+    auto cfg = height(reduction);
+    cfg->pattern = GridPattern{.size = {0.2, 0}, .resolution = 0.1};
+    return Lab(cfg).at(0.49, 0.7);
+  };
+  EXPECT_THAT(over_the_edge("min"), ElementsAre(FloatNear(0.2f, 1e-6f)));
+  EXPECT_THAT(over_the_edge("max"), ElementsAre(FloatNear(0.7f, 1e-6f)));
+  EXPECT_THAT(over_the_edge("mean"), ElementsAre(FloatNear(1.6f / 3, 1e-6f)));
+  EXPECT_THAT(over_the_edge("none"), Pointwise(FloatNear(1e-6f), {0.7f, 0.7f, 0.2f}));
+}
+
+TEST(TerrainHeight, OneFarRayOfManyIsTheLimit) {
+  auto cfg = height("none");
+  cfg->pattern = GridPattern{.size = {0.2, 0}, .resolution = 0.1};
+  // Two rays end on the floor, more than max_distance below; the third hits the step.
+  EXPECT_THAT(Lab(cfg).at(0.49, 1.2), Pointwise(FloatNear(1e-6f), {1.0f, 1.0f, 0.7f}));
+}
+
+TEST(TerrainHeight, WhereAllRaysMissTheGroundStraightBelowDecides) {
+  Lab lab(height());
+  EXPECT_THAT(lab.at(-2, 50), ElementsAre(1.0f)) << "far above";
+  EXPECT_THAT(lab.at(-2, -0.3), ElementsAre(0.0f)) << "inside the floor";
+  EXPECT_THAT(lab.at(1.5, 0.4), ElementsAre(0.0f)) << "inside the step";
+  EXPECT_THAT(lab.at(20, -1.5), ElementsAre(1.0f))
+      << "1.5 m above the pit's ground, not below z = 0";
+  EXPECT_THAT(lab.at(-10, 0.4), ElementsAre(FloatNear(0.4f, 1e-6f))) << "no ground: above z = 0";
+}
+
+TEST(TerrainHeight, EveryFrameFromItsOwnHeight) {
+  auto cfg = height();
+  cfg->frame = {{"body", "foot", "r"}, {"site", "toe", "r"}};
+  // On its side the toe, 0.1 m below the foot in its axes, is beside it: as high.
+  EXPECT_THAT(Lab(cfg).at(-2, 0.5), Pointwise(FloatNear(1e-6f), {0.5f, 0.5f}));
+}
+
+TEST(TerrainHeight, AnUnknownReductionIsNamed) {
+  try {
+    Lab lab(height("least"));
+    FAIL();
+  } catch (const ValueError& e) {
+    EXPECT_THAT(e.what(),
+                HasSubstr("reduction is 'least': must be 'min', 'max', 'mean' or 'none'"));
+  }
+}
+
+}  // namespace
+}  // namespace mjsense
