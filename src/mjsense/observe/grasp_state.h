@@ -21,6 +21,7 @@ class GraspStateSensor final : public JsonSensor {
   };
   GraspStateSensor(std::string name, BodyRef object, std::vector<Gripper> grippers,
                    int str_max_len = kDefaultLength);
+  mjtStage needs() const override { return mjSTAGE_POS; }
 
  protected:
   void prepare(const SensorInit& init) override;

@@ -23,6 +23,7 @@ class JointStateSensor final : public JsonSensor {
   enum class What { kPosition, kVelocity };
   JointStateSensor(std::string name, What what, std::vector<JointGroup> groups,
                    int str_max_len = kDefaultLength);
+  mjtStage needs() const override { return mjSTAGE_NONE; }
 
  protected:
   void write(const World& world, JsonWriter& json) override;

@@ -59,6 +59,7 @@ class BuiltinSensor : public Sensor {
   std::string_view kind() const override { return "builtin"; }
   void edit_spec(mjSpec* spec) override;
   void initialize(const SensorInit& init) override;
+  mjtStage needs() const override { return needs_; }
   void compute(const World& world) override;
   void draw(const World& world, DebugShapes& shapes) override;  // the frame it is attached to
 
@@ -66,6 +67,7 @@ class BuiltinSensor : public Sensor {
   std::unique_ptr<const BuiltinSensorCfg> cfg_;  // null if found in the model
   int id_ = -1;
   int adr_ = 0, dim_ = 0;
+  mjtStage needs_ = mjSTAGE_ACC;
   int history_adr_ = -1, nsample_ = 0;
   Field* field_ = nullptr;
   Field* history_ = nullptr;
