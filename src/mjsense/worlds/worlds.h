@@ -10,6 +10,7 @@
 #include <mujoco/mjbatch.h>
 #include <mujoco/mujoco.h>
 
+#include <atomic>
 #include <cstdint>
 #include <exception>
 #include <memory>
@@ -103,6 +104,7 @@ class Worlds {
     std::int64_t model_version = 0;  // of the model they were computed with
   };
   enum class Op { kStep, kForward, kReset, kStepRaw, kVisit };
+  class Warnings;
   struct Call {
     Worlds* self;
     Op op;
@@ -113,6 +115,9 @@ class Worlds {
   static void run(const mjModel* m, mjData* d, int w, void* arg);
   void run_world(const mjModel* m, mjData* d, int w, const Call& call);
   bool step_world(const mjModel* m, mjData* d, int w, const Call& call);
+  bool step_unseen(const mjModel* m, mjData* d, int w, int substeps);
+  bool step_whole(const mjModel* m, mjData* d, int w, const Call& call);
+  bool healthy(int w, const Warnings& warnings);
   void apply(std::span<const int> ids, Call call, bool save);
   World view(const mjModel* m, mjData* d, int w) const;
   bool same_state(int w) const;
@@ -135,6 +140,12 @@ class Worlds {
   std::vector<std::uint8_t> diverged_;          // by world: mjtWarning + 1 in this call
   std::vector<Failure> failures_;
   std::vector<int> ids_;  // scratch: the sorted selection
+  // One mjData a thread, in which worlds are stepped that nobody looks at.
+  struct Workbench {
+    mjData* data = nullptr;
+    std::atomic<bool> taken = false;
+  };
+  std::vector<Workbench> workbenches_;
   // Part of a state row that the position and velocity stages do not read: warm start, controls
   // and applied forces.
   std::size_t ctrl_begin_ = 0, ctrl_end_ = 0;

@@ -437,6 +437,34 @@ TEST(Worlds, NameABadControlThatSomebodyLookedAtBefore) {
   EXPECT_THAT(worlds.failures()[0].message, ::testing::HasSubstr("CTRL"));
 }
 
+// MuJoCo's errors jump out of whatever is going on; what the worlds of a thread share is as new.
+TEST(Worlds, InWhichMuJoCoRaisesAnErrorLeaveTheOthersAlone) {
+  const ModelPtr m = load("implicitfast");
+  Worlds worlds(m.get(), 2, 1);
+  Recording hooks(2);
+  hooks.read = mjSTAGE_NONE;
+  auto* solver = static_cast<int*>(mjb_expand(worlds.batch(), "opt.solver", nullptr, nullptr));
+  ASSERT_NE(solver, nullptr);
+  solver[0] = 99;  // found when the box touches the floor
+  worlds.model_changed();
+  worlds.reset({}, -1, hooks);
+  const DataPtr plain = make_data(m.get());
+  int failed = 0;
+  for (int k = 0; k < 120; ++k) {
+    worlds.step(1, hooks);
+    mj_step(m.get(), plain.get());
+    expect_same_state(worlds, 1, m.get(), plain.get());
+    for (const Failure& failure : worlds.failures()) {
+      EXPECT_EQ(failure.world, 0);
+      EXPECT_THAT(failure.message, ::testing::HasSubstr("solver"));
+      EXPECT_EQ(worlds.substeps(0), 0);
+      ++failed;
+    }
+  }
+  EXPECT_GT(failed, 1);
+  EXPECT_LT(failed, 10);
+}
+
 TEST(Worlds, AFailingHookLeavesTheOthersAndTheSimulationUsable) {
   const ModelPtr m = load("Euler");
   Worlds worlds(m.get(), 3, 2);
