@@ -129,7 +129,7 @@ def compare(name: str, scene: mjs.SceneCfg, body: str, touching: str, rounds: in
                 spent[case].append(us(side.step, controls, side.ctrl, decimation))
             for case in what:
                 if ours[case].read:
-                    again[case].append(us(ours[case].again, controls[:1], ours[case].ctrl, decimation))
+                    again[case].append(us(ours[case].again, controls[-1:], ours[case].ctrl, decimation))
             for case in what:
                 assert np.array_equal(ours[case].state, plain.state), f"{name}, {case}: not the states of mj_step"
         peer = statistics.median(spent["plain"][3:])

@@ -323,7 +323,7 @@ bool Worlds::step_world(const mjModel* m, mjData* d, int w, const Call& call) {
   if (stage == mjSTAGE_ACC && (!same_controls(w) || bad_control(m, d))) stage = mjSTAGE_VEL;
   const bool seen = stage != mjSTAGE_NONE || call.hooks->wants_substep() ||
                     call.hooks->stage() != mjSTAGE_NONE || !can_split_step(m);
-  if (!(seen ? step_whole(m, d, w, call) : step_unseen(m, d, w, call.substeps))) return false;
+  if (!(seen ? step_whole(m, d, w, call) : step_unseen(m, d, w, call))) return false;
   remember(m, d, w);
   return true;
 }
@@ -362,9 +362,15 @@ bool Worlds::step_whole(const mjModel* m, mjData* d, int w, const Call& call) {
 // A world that starts from its state alone and leaves nothing else: it is stepped in an mjData that
 // the thread's worlds share and that stays in its cache. A hundred kilobytes for each of many worlds
 // do not, which costs 10 to 30 % of a step of a Go1.
-bool Worlds::step_unseen(const mjModel* m, mjData* d, int w, int substeps) {
-  Workbench* bench = workbenches_.data();
-  while (bench->taken.exchange(true)) ++bench;  // there are as many as threads
+bool Worlds::step_unseen(const mjModel* m, mjData* d, int w, const Call& call) {
+  const int substeps = call.substeps;
+  Workbench* bench = nullptr;
+  for (Workbench& each : workbenches_) {
+    if (each.taken.exchange(true)) continue;
+    bench = &each;
+    break;
+  }
+  if (!bench) return step_whole(m, d, w, call);  // an error of MuJoCo in this call left one behind
   mjData* s = bench->data;
   carry(m, d, s);
   const Warnings warnings(s);

@@ -115,7 +115,7 @@ class Worlds {
   static void run(const mjModel* m, mjData* d, int w, void* arg);
   void run_world(const mjModel* m, mjData* d, int w, const Call& call);
   bool step_world(const mjModel* m, mjData* d, int w, const Call& call);
-  bool step_unseen(const mjModel* m, mjData* d, int w, int substeps);
+  bool step_unseen(const mjModel* m, mjData* d, int w, const Call& call);
   bool step_whole(const mjModel* m, mjData* d, int w, const Call& call);
   bool healthy(int w, const Warnings& warnings);
   void apply(std::span<const int> ids, Call call, bool save);
