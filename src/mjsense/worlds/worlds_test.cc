@@ -254,6 +254,44 @@ TEST(Worlds, UserDataArriveInMjData) {
   EXPECT_THAT(hooks.seen, ::testing::ElementsAre(0, 7, 8));
 }
 
+// What is written between calls is current at the next look, without a step or a forward().
+TEST(Worlds, AVisitMakesWrittenStateCurrent) {
+  const ModelPtr m = load("Euler");
+  Worlds worlds(m.get(), 2, 1);
+  Recording hooks(2);
+  worlds.reset({}, 0, hooks);
+  const DataPtr d(mj_makeData(m.get()), mj_deleteData);
+  mj_resetDataKeyframe(m.get(), d.get(), 0);
+  const ArrayView qpos = worlds.state_component("qpos");
+  reinterpret_cast<double*>(qpos.data + qpos.strides[0])[1] = d->qpos[1] = 0.9;
+  mj_forward(m.get(), d.get());
+  worlds.visit({}, hooks);
+  for (int i = 0; i < m->nsensordata; ++i) EXPECT_EQ(hooks.sensordata[1][i], d->sensordata[i]);
+}
+
+// A world's own value of a model field counts from the next step on, in every stage of it.
+TEST(Worlds, AModelFieldMayChangeBetweenSteps) {
+  const ModelPtr m = load("implicitfast");
+  const ModelPtr heavy = load("implicitfast");
+  Worlds worlds(m.get(), 2, 1);
+  Recording hooks(2);
+  worlds.reset({}, 0, hooks);
+  int size = 0;
+  auto* mass = static_cast<mjtNum*>(mjb_expand(worlds.batch(), "body_mass", &size, nullptr));
+  ASSERT_EQ(size, m->nbody);
+  const DataPtr d(mj_makeData(m.get()), mj_deleteData);
+  mj_resetDataKeyframe(m.get(), d.get(), 0);
+  worlds.step(4, hooks);
+  for (int s = 0; s < 4; ++s) mj_step(m.get(), d.get());
+  mass[size + 2] = heavy->body_mass[2] = 3.5;  // of world 1
+  worlds.model_changed();
+  worlds.step(4, hooks);
+  for (int s = 0; s < 4; ++s) mj_step(heavy.get(), d.get());
+  const ArrayView qpos = worlds.state_component("qpos");
+  EXPECT_EQ(std::memcmp(qpos.data + qpos.strides[0], d->qpos, m->nq * sizeof(double)), 0);
+  EXPECT_NE(std::memcmp(qpos.data, d->qpos, m->nq * sizeof(double)), 0);
+}
+
 TEST(Worlds, ViewsHaveARowAnElement) {
   const ModelPtr m = load("Euler");
   Worlds worlds(m.get(), 2, 1);
