@@ -125,6 +125,133 @@ TEST(Recorder, ResumingGivesTheFilesOfAnUninterruptedRun) {
             record(broken.path, 6, {.worlds = 2}, true, [&](RecordingCfg& c) { c.resume = true; }));
 }
 
+// Killed while its episodes were being published: some videos have their final names already, the file of
+// trajectories is not there. Whoever comes next ends it, and nothing can be added any more.
+TEST(Recorder, AnInterruptedPublicationIsEnded) {
+  TempDir whole;
+  {
+    FakeSuite suite({2, 16, 12, true, true});
+    Recorder recorder(fake_recording(whole.path, suite, 2, 8));
+    record_all(recorder, suite, {.worlds = 2, .stop_after = 3});
+    for (int w = 0; w < 2; ++w)
+      if (recorder.recording(w)) recorder.abandon_episode(w);
+    recorder.complete();
+  }
+  const std::string h5_name = "house_0/trajectories_batch_1_of_2.h5";
+  ASSERT_TRUE(fs::exists(whole.path / h5_name));
+  for (const bool by_repair : {false, true}) {
+    for (const int moved : {0, 2}) {
+      TempDir broken;
+      record(broken.path, 8, {.worlds = 2, .stop_after = 3}, true);
+      const fs::path house = broken.path / "house_0", staging = house / ".recording";
+      std::ofstream(staging / "ending").flush();
+      for (int e = 0; e < moved; ++e) {
+        const fs::path episode = staging / fmt::format("episode_{:08d}", e);
+        const std::string name = fmt::format("episode_{:08d}_wrist_camera_batch_1_of_2.mp4", e);
+        ASSERT_TRUE(fs::exists(episode / "wrist_camera.mp4"));
+        fs::rename(episode / "wrist_camera.mp4", house / name);
+      }
+      if (by_repair) {
+        repair(broken.path);
+      } else {
+        FakeSuite suite({2, 16, 12, true, true});
+        RecordingCfg cfg = fake_recording(broken.path, suite, 2, 8);
+        cfg.resume = true;
+        Recorder recorder(cfg);
+        EXPECT_TRUE(recorder.enough());
+        EXPECT_THAT(error_of([&] { recorder.begin_episode(0, {7, 0}); }), HasSubstr("is complete"));
+      }
+      EXPECT_EQ(tree(broken.path), tree(whole.path)) << moved;
+      EXPECT_EQ(read_file(broken.path / h5_name), read_file(whole.path / h5_name)) << moved;
+      EXPECT_TRUE(verify(broken.path).ok()) << verify(broken.path).text();
+    }
+  }
+}
+
+// A batch is published when its episodes are settled: all earlier ones kept or discarded.
+TEST(Recorder, ABatchWaitsForEarlierEpisodes) {
+  TempDir dir;
+  FakeSuite suite(without_video(3));
+  RecordingCfg cfg = fake_recording(dir.path, suite, 3, 4);
+  cfg.batches = 2;
+  Recorder recorder(cfg);
+  for (int w = 0; w < 3; ++w) recorder.begin_episode(w, {w, 7});
+  const auto finish = [&](int world, std::int64_t episode) {
+    suite.fill(world, episode, 0, 1);
+    recorder.append(world, {1, true, false, true});
+    recorder.finish_episode(world, "{}", "success");
+  };
+  finish(1, 1);
+  finish(2, 2);  // two are kept, but episode 0 may come before them
+  recorder.flush();
+  EXPECT_THAT(tree(dir.path / "house_0"),
+              ::testing::Not(::testing::Contains(HasSubstr("batch_1_of_2"))));
+  EXPECT_FALSE(recorder.enough());
+  recorder.discard_episode(0, "for the test");
+  recorder.flush();
+  EXPECT_THAT(tree(dir.path / "house_0"),
+              ::testing::Contains(HasSubstr("trajectories_batch_1_of_2.h5")));
+}
+
+// A video belongs to its episode: as many frames as steps, of the stated size.
+TEST(Verify, CountsTheFramesOfEveryVideo) {
+  TempDir dir, other;
+  record(dir.path, 3, {.worlds = 1}, true);
+  ASSERT_TRUE(verify(dir.path).ok());
+  const auto video = [](const fs::path& out, int e) {
+    return out / fmt::format("house_0/episode_{:08d}_wrist_camera_batch_1_of_1.mp4", e);
+  };
+  const auto replaced = [&](const fs::path& by, const fs::path& what) {
+    const std::string original = read_file(what);
+    fs::copy_file(by, what, fs::copy_options::overwrite_existing);
+    const VerifyResult result = verify(dir.path);
+    std::ofstream(what, std::ios::binary) << original;
+    EXPECT_EQ(result.findings.size(), 1u) << result.text();
+    return result.ok() ? std::string("whole") : result.findings[0].text;
+  };
+  // Episodes of 6, 7 and 8 steps.
+  EXPECT_THAT(replaced(video(dir.path, 2), video(dir.path, 0)),
+              HasSubstr("has 8 frames, expected 6"));
+  EXPECT_THAT(replaced(video(dir.path, 0), video(dir.path, 1)),
+              HasSubstr("has 6 frames, expected 7"));
+  {
+    FakeSuite suite({1, 20, 12, true, true});
+    Recorder recorder(fake_recording(other.path, suite, 1, 1));
+    record_all(recorder, suite, {.worlds = 1});
+  }
+  EXPECT_THAT(replaced(video(other.path, 0), video(dir.path, 0)),
+              HasSubstr("is 20 x 12 pixels, expected 16 x 12"));
+  fs::remove(video(dir.path, 1));
+  EXPECT_THAT(verify(dir.path).text(), HasSubstr("does not exist"));
+}
+
+// Every step either succeeds or fails.
+TEST(Verify, FailIsTheOppositeOfSuccess) {
+  for (const std::int8_t wrong : {0, 1}) {
+    TempDir dir;
+    record(dir.path, 1, {.worlds = 1});
+    const fs::path path = dir.path / "house_0/trajectories_batch_1_of_1.h5";
+    {
+      const h5::H5Lock lock;
+      h5::Id file = h5::open_file(path, true);
+      {
+        const h5::Id fail(H5Dopen2(file, "traj_0/fail", H5P_DEFAULT), H5Dclose, "fail");
+        const h5::Id type(H5Dget_type(fail), H5Tclose, "type");
+        std::vector<std::int8_t> rows(6);
+        h5::check(H5Dread(fail, type, H5S_ALL, H5S_ALL, H5P_DEFAULT, rows.data()), "read");
+        EXPECT_EQ(rows, (std::vector<std::int8_t>{1, 1, 1, 1, 1, 0}));
+        rows[wrong ? 5 : 2] = wrong;  // both, or neither
+        h5::check(H5Dwrite(fail, type, H5S_ALL, H5S_ALL, H5P_DEFAULT, rows.data()), "write");
+      }
+      file.close("close");
+    }
+    const VerifyResult result = verify(dir.path);
+    EXPECT_FALSE(result.ok());
+    EXPECT_THAT(result.text(),
+                HasSubstr(fmt::format("row {} is not the opposite of success", wrong ? 5 : 2)));
+  }
+}
+
 TEST(Recorder, DiscardedAttemptsLeaveNoTrace) {
   TempDir dir;
   record(dir.path, 4, {.worlds = 3, .discard_every = 2}, true);
