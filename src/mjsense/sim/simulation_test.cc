@@ -42,6 +42,8 @@ struct Height : Sensor {
     resets.assign(init.num_worlds, 0);
   }
   void compute(const World& w) override {
+    if (w.id == fail_in && failure == ErrorKind::kKey) throw KeyError("no name");
+    if (w.id == fail_in && failure == ErrorKind::kRuntime) throw RuntimeError("no luck");
     if (w.id == fail_in) throw ValueError("no value");
     ++computes[w.id];
     row(w.id) = static_cast<float>(w.data->xpos[3 * (w.model->nbody - 1) + 2]);
@@ -61,6 +63,7 @@ struct Height : Sensor {
 
   Stage stage_;
   bool with_substeps = false, is_eager = false;
+  ErrorKind failure = ErrorKind::kValue;
   int fail_in = -1, casts = 0;
   std::vector<int> computes, substeps, resets, cast_ids;
   std::vector<Sensor*> input_list;
@@ -205,6 +208,26 @@ TEST(Simulation, AFailingSensorIsNamedAndTheOthersGoOn) {
   bad->fail_in = -1;
   sim.refresh(*bad);
   EXPECT_THAT(good->computes, Each(1));
+}
+
+// Its name is put before an error, which stays of its kind.
+TEST(Simulation, AnErrorKeepsItsKind) {
+  Simulation sim(scene(), {.num_worlds = 2});
+  auto bad = add(sim, "bad");
+  bad->fail_in = 0;
+  bad->failure = ErrorKind::kKey;
+  EXPECT_THROW(sim.refresh(*bad), KeyError);
+  bad->failure = ErrorKind::kRuntime;
+  EXPECT_THROW(sim.refresh(*bad), RuntimeError);
+  bad->failure = ErrorKind::kValue;
+  EXPECT_THROW(sim.refresh(*bad), ValueError);
+}
+
+TEST(Simulation, StepsAreAsLongAsTheirSubsteps) {
+  Simulation sim(scene(), {.decimation = 5});
+  EXPECT_DOUBLE_EQ(sim.step_dt(), 5 * sim.model()->opt.timestep);
+  sim.step(3);
+  EXPECT_DOUBLE_EQ(sim.worlds().time(0), 3 * sim.step_dt());
 }
 
 TEST(Simulation, AStepAllocatesNothing) {
