@@ -7,8 +7,8 @@
     python tests/mutation/run.py --report         the figures so far, and who survived
 
 The copy is build/mutation/tree with a build folder of its own; results are kept in build/mutation/results.json. A mutant is
-noticed by the first judge that fails: its room's test program, then those of the rooms above it, then the golden hashes, then
-the Python tests that could know. --prefix puts a command before every build and test, as "nice -n 10".
+noticed by the first judge that fails: its room's test program, then those of the others, the rooms that build on it first, then
+the golden hashes, then the Python tests that could know. --prefix puts a command before every build and test, as "nice -n 10".
 """
 
 import argparse
@@ -162,9 +162,10 @@ class Runner:
     def judges(self, room: str):
         """(name, targets to build, call): the nearest first."""
         programs = [r for r in ROOMS if r not in NO_PROGRAM]
-        below = programs[programs.index(room):] if room in programs else []
-        for i, r in enumerate(below):
-            yield f"{r}_test", [f"{r}_test"] if i == 0 else [f"{x}_test" for x in below], lambda r=r: self.program(f"{r}_test")
+        at = programs.index(room) if room in programs else len(programs)
+        nearest = programs[at:] + programs[:at][::-1] if room in programs else []
+        for i, r in enumerate(nearest):
+            yield f"{r}_test", [f"{r}_test"] if i == 0 else [f"{x}_test" for x in nearest], lambda r=r: self.program(f"{r}_test")
         if room not in NO_PROGRAM:
             yield "golden", ["golden_test"], self.golden
         paths = PYTESTS.get(room, ["tests/conformance", "tests/python"])

@@ -8,6 +8,7 @@
 
 #include "mjsense/core/error.h"
 #include "mjsense/core/testing/allocations.h"
+#include "mjsense/sensors/raycast/raycast.h"
 
 namespace mjsense {
 namespace {
@@ -48,7 +49,10 @@ struct Height : Sensor {
     ++computes[w.id];
     row(w.id) = static_cast<float>(w.data->xpos[3 * (w.model->nbody - 1) + 2]);
   }
-  void substep(const World& w) override { ++substeps[w.id]; }
+  void substep(const World& w) override {
+    ++substeps[w.id];
+    last_dt = w.dt();
+  }
   void reset(const World& w) override { ++resets[w.id]; }
   void cast(const CastContext& context) override {
     ++casts;
@@ -64,6 +68,7 @@ struct Height : Sensor {
   Stage stage_;
   bool with_substeps = false, is_eager = false;
   ErrorKind failure = ErrorKind::kValue;
+  double last_dt = 0;
   int fail_in = -1, casts = 0;
   std::vector<int> computes, substeps, resets, cast_ids;
   std::vector<Sensor*> input_list;
@@ -228,6 +233,43 @@ TEST(Simulation, StepsAreAsLongAsTheirSubsteps) {
   EXPECT_DOUBLE_EQ(sim.step_dt(), 5 * sim.model()->opt.timestep);
   sim.step(3);
   EXPECT_DOUBLE_EQ(sim.worlds().time(0), 3 * sim.step_dt());
+}
+
+// mjlab's order of calls: an update stands for the time that it is given.
+TEST(Simulation, AnUpdateByHandLastsAsLongAsItSays) {
+  Simulation sim(scene(), {});
+  auto filter = std::make_shared<Height>("filter");
+  filter->with_substeps = true;
+  sim.add(filter);
+  sim.step_raw(1);
+  sim.update_sensors(0.02);
+  EXPECT_DOUBLE_EQ(filter->last_dt, 0.02);
+  sim.update_sensors();
+  EXPECT_DOUBLE_EQ(filter->last_dt, sim.model()->opt.timestep);
+  EXPECT_THAT(filter->substeps, Each(2));
+}
+
+// Rays meet the world as it is, not as it was when they were first cast.
+TEST(Simulation, RaysFollowTheState) {
+  SceneCfg cfg;
+  cfg.entities.emplace_back("robot", EntityCfg{.model = {.xml = kXml}});
+  cfg.terrain = TerrainCfg{};
+  auto scan = std::make_shared<RayCastSensorCfg>();
+  scan->name = "scan";
+  scan->frame = {{"body", "ball", "robot"}};
+  scan->pattern = UserPattern{.offsets = {{0, 0, 0}}, .directions = {{0, 0, -1}}};
+  cfg.sensors = {scan};
+  const auto made = std::make_shared<Scene>(std::move(cfg));
+  Simulation sim(made, {.num_worlds = 2});
+  Sensor& sensor = made->sensor("scan");
+  sim.refresh(sensor);
+  EXPECT_FLOAT_EQ(sensor.field("distances").data.row<float>(1)[0], 1.0f);
+  const ArrayView qpos = sim.worlds().state_component("qpos");
+  reinterpret_cast<double*>(qpos.data + qpos.strides[0])[2] = 2.5;
+  sim.forward();
+  sim.refresh(sensor);
+  EXPECT_FLOAT_EQ(sensor.field("distances").data.row<float>(0)[0], 1.0f);
+  EXPECT_FLOAT_EQ(sensor.field("distances").data.row<float>(1)[0], 2.5f);
 }
 
 TEST(Simulation, AStepAllocatesNothing) {
