@@ -7,8 +7,8 @@
     python tests/mutation/run.py --report         the figures so far, and who survived
 
 The copy is build/mutation/tree with a build folder of its own; results are kept in build/mutation/results.json. A mutant is
-noticed by the first judge that fails: its room's test program, then those of the others, the rooms that build on it first, then
-the golden hashes, then the Python tests that could know. --prefix puts a command before every build and test, as "nice -n 10".
+noticed by the first judge that fails: its room's test program, then the golden hashes, then the other rooms' programs, those that
+build on it first, then the Python tests that could know. --prefix puts a command before every build and test, as "nice -n 10".
 """
 
 import argparse
@@ -166,8 +166,8 @@ class Runner:
         nearest = programs[at:] + programs[:at][::-1] if room in programs else []
         for i, r in enumerate(nearest):
             yield f"{r}_test", [f"{r}_test"] if i == 0 else [f"{x}_test" for x in nearest], lambda r=r: self.program(f"{r}_test")
-        if room not in NO_PROGRAM:
-            yield "golden", ["golden_test"], self.golden
+            if i == 0:
+                yield "golden", ["golden_test"], self.golden
         paths = PYTESTS.get(room, ["tests/conformance", "tests/python"])
         yield "pytest", ["mjsense_program", "record_fake", "mjsense_python"], lambda: self.pytest(paths)
 

@@ -94,10 +94,13 @@ TEST(Shadow, IsOfWhatStandsBetween) {
     Studio s(std::string(kDark) + kMatte + R"(<worldbody><light pos="0 0 2" dir="0 0 -1" type=")" +
              kind + R"(" cutoff="85"
       exponent="0" diffuse="1 1 1" specular="0 0 0"/><geom type="plane" size="5 5 1" material="matte"/>
-      <geom type="box" size=".2 .2 .1" pos="0 0 3" material="matte"/>
+      <geom type="box" size=".2 .2 .1" pos="0 0 2.2" material="matte"/>
       <geom type="box" size=".2 .2 .1" pos="1 0 .5" material="matte"/></worldbody>)");
     s.options.shadows = true;
     EXPECT_GT(s.from_above(0, 0, 1)[0], 200) << kind << ": the box above the light";
+    // In an image of 2 m of floor too: there the box is near what lies between the light and the tile.
+    const auto wide = s.shoot({0, 0, 1}, {1, 0, 0}, {0, 1, 0}, 16, 90);
+    EXPECT_GT(wide[3 * (8 * 16 + 8)], 200) << kind;
     // The spot at height 2 throws the box's shadow to 1 + (0.4 .. 0.6) / (2 - z) outwards.
     const double x = std::string(kind) == "spot" ? 1.35 : 1.0;
     const Pixel below = s.center({x, 0, 0.3}, {1, 0, 0}, {0, 1, 0}, 1);
