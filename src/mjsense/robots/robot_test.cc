@@ -242,17 +242,22 @@ TEST_F(Franka, ActionNoiseGrowsWithTheMotionAndIsNotRecorded) {
   // The tool would move by 0.1 rad about the first joint's axis.
   const double move = 0.1 * std::hypot(here.p.x, here.p.y);
   const Pose wanted = robot.fk(arm, robot.targets(0));
-  double square = 0;
+  double square = 0, turned = 0;
   const int draws = 2000;
   for (int k = 0; k < draws; ++k) {
     robot.write_ctrl(worlds[0], state, &rng);
     values[arm].set({state.ctrl, 7});
-    const Vec3 off = robot.fk(arm, values).p - wanted.p;
+    const Pose disturbed = robot.fk(arm, values);
+    const Vec3 off = disturbed.p - wanted.p;
+    const double angle = angle_between(disturbed.q, wanted.q);
+    turned += angle * angle;
     for (int i = 0; i < 3; ++i)
       EXPECT_LT(std::abs(off[i]), 0.023);  // 0.02 and what the linear map leaves
     square += dot(off, off);
   }
   EXPECT_NEAR(std::sqrt(square / (3 * draws)), 0.1 * move, 0.01 * move);
+  EXPECT_NEAR(std::sqrt(turned / (3 * draws)), 0.01 * move,
+              0.001 * move);  // rad: a tenth of the metres
   EXPECT_EQ(robot.targets(0)[arm].values[0], target[0]);
 }
 
