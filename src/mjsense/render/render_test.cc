@@ -115,7 +115,7 @@ TEST(Shading, HazeLiesWhereTheFloorMeetsTheSky) {
     <headlight ambient="1 1 1" diffuse="0 0 0" specular="0 0 0"/></visual>)") +
       R"(<asset><texture name="sky" type="skybox" builtin="flat" rgb1="0 1 0" rgb2="0 1 0" width="8" height="48"/></asset>
     <worldbody><geom type="plane" size="0 0 1" rgba="1 0 0 1"/>
-    <geom size="2" pos="0 23 2.4" rgba="1 1 1 1"/><geom type="box" size="1 1 9" pos="40 0 9"/></worldbody>)");
+    <geom size="2" pos="0 23 2.4" rgba="1 1 1 1"/><geom size=".5" pos="-26 0 1.8" rgba="1 1 1 1"/><geom type="box" size="1 1 9" pos="40 0 9"/></worldbody>)");
   s.paint(0, [](int) { return Pixel{0, 255, 0}; });
   const auto falling = [&](double slope, double x, double y) {
     const double fall = 0.2 * slope, l = std::hypot(1, fall);
@@ -129,8 +129,9 @@ TEST(Shading, HazeLiesWhereTheFloorMeetsTheSky) {
   const double outside = 255 * (0.5 / 1.15) / (1 - 0.3 / 1.3);
   expect_pixel(falling(0.5, 0, -1), {0, int(255.5 - outside), int(outside + .5)});
   expect_pixel(falling(-0.1, 0, -1), {0, 255, 0});
-  expect_pixel(falling(1, 0, 1), {255, 255, 255});  // a ball before the haze
-  expect_pixel(falling(-0.1, 1, 0), {0, 255, 0});   // a box behind the sky
+  expect_pixel(falling(1, 0, 1), {255, 255, 255});   // a ball before the haze
+  expect_pixel(falling(1, -1, 0), {255, 255, 255});  // another shortly before where it begins
+  expect_pixel(falling(-0.1, 1, 0), {0, 255, 0});    // a box behind the sky
 }
 
 TEST(Shading, TransparentGeomsAreDrawnTwice) {
