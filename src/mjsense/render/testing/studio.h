@@ -58,7 +58,10 @@ struct Studio {
   ViewOptions options;
   RenderTiles render = best_render_tiles();
 
-  explicit Studio(const std::string& xml) {
+  explicit Studio(std::string xml) {
+    // A model with a camera gets what only images need: blocks of triangles.
+    if (xml.find("<camera") == std::string::npos)
+      xml += "<worldbody><camera pos='0 0 90'/></worldbody>";
     char error[500] = "";
     mjSpec* spec =
         mj_parseXMLString(("<mujoco>" + xml + "</mujoco>").c_str(), nullptr, error, sizeof error);
