@@ -256,20 +256,20 @@ TEST(Simulation, RaysFollowTheState) {
   cfg.terrain = TerrainCfg{};
   auto scan = std::make_shared<RayCastSensorCfg>();
   scan->name = "scan";
-  scan->frame = {{"body", "ball", "robot"}};
-  scan->pattern = UserPattern{.offsets = {{0, 0, 0}}, .directions = {{0, 0, -1}}};
+  scan->frame = {{"body", "world", ""}};
+  scan->pattern = UserPattern{.offsets = {{0, 0, 5}}, .directions = {{0, 0, -1}}};
   cfg.sensors = {scan};
   const auto made = std::make_shared<Scene>(std::move(cfg));
   Simulation sim(made, {.num_worlds = 2});
   Sensor& sensor = made->sensor("scan");
   sim.refresh(sensor);
-  EXPECT_FLOAT_EQ(sensor.field("distances").data.row<float>(1)[0], 1.0f);
+  EXPECT_FLOAT_EQ(sensor.field("distances").data.row<float>(1)[0], 3.9f);
   const ArrayView qpos = sim.worlds().state_component("qpos");
   reinterpret_cast<double*>(qpos.data + qpos.strides[0])[2] = 2.5;
   sim.forward();
   sim.refresh(sensor);
-  EXPECT_FLOAT_EQ(sensor.field("distances").data.row<float>(0)[0], 1.0f);
-  EXPECT_FLOAT_EQ(sensor.field("distances").data.row<float>(1)[0], 2.5f);
+  EXPECT_FLOAT_EQ(sensor.field("distances").data.row<float>(0)[0], 3.9f);
+  EXPECT_FLOAT_EQ(sensor.field("distances").data.row<float>(1)[0], 2.4f);
 }
 
 TEST(Simulation, AStepAllocatesNothing) {
