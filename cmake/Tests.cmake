@@ -13,3 +13,17 @@ foreach(room IN LISTS MJSENSE_ROOMS)
     add_test(NAME ${room} COMMAND ${room}_test)
   endif()
 endforeach()
+
+# Bits that must not change unnoticed: tests/golden, once for each instruction set that the kernels are compiled for. Other
+# optimisation than users get, and another compiler, give other bits.
+if(CMAKE_CXX_COMPILER_ID STREQUAL "GNU" AND NOT CMAKE_CXX_FLAGS MATCHES "-fsanitize")
+  set(MJSENSE_GOLDEN_FILE ${PROJECT_SOURCE_DIR}/tests/golden/hashes.txt)
+  add_executable(golden_test tests/golden/golden_test.cc)
+  target_link_libraries(golden_test PRIVATE mjsense ${MJSENSE_PRIVATE_LIBS})
+  target_compile_definitions(golden_test PRIVATE MJSENSE_GOLDEN_FILE="${MJSENSE_GOLDEN_FILE}")
+  target_compile_options(golden_test PRIVATE -Wall -Wextra -Wno-missing-field-initializers)
+  foreach(isa portable avx2 avx512)
+    add_test(NAME golden_${isa} COMMAND golden_test)
+    set_tests_properties(golden_${isa} PROPERTIES ENVIRONMENT MJSENSE_ISA=${isa} SKIP_RETURN_CODE 77)
+  endforeach()
+endif()

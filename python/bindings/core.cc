@@ -25,7 +25,8 @@ void translate(const std::exception_ptr& error, void*) {
         PyErr_SetString(PyExc_RuntimeError, e.what());
         break;
       case ErrorKind::kKey:
-        PyErr_SetString(nb::module_::import_("mjsense.errors").attr("UnknownNameError").ptr(), e.what());
+        PyErr_SetString(nb::module_::import_("mjsense.errors").attr("UnknownNameError").ptr(),
+                        e.what());
         break;
     }
   }

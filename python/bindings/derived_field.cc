@@ -21,10 +21,14 @@ struct DataField {
 };
 
 template <class T>
-void add(std::vector<DataField>& fields, const char* name, int rows, int columns, const void* (*pointer)(const mjData*)) {
-  if constexpr (std::is_same_v<T, mjtNum>) fields.push_back({name, DType::kFloat64, rows, columns, pointer});
-  if constexpr (std::is_same_v<T, int>) fields.push_back({name, DType::kInt32, rows, columns, pointer});
-  if constexpr (std::is_same_v<T, mjtBool>) fields.push_back({name, DType::kBool, rows, columns, pointer});
+void add(std::vector<DataField>& fields, const char* name, int rows, int columns,
+         const void* (*pointer)(const mjData*)) {
+  if constexpr (std::is_same_v<T, mjtNum>)
+    fields.push_back({name, DType::kFloat64, rows, columns, pointer});
+  if constexpr (std::is_same_v<T, int>)
+    fields.push_back({name, DType::kInt32, rows, columns, pointer});
+  if constexpr (std::is_same_v<T, mjtBool>)
+    fields.push_back({name, DType::kBool, rows, columns, pointer});
 }
 
 std::vector<DataField> data_fields(const mjModel* m) {
@@ -42,16 +46,49 @@ std::vector<DataField> data_fields(const mjModel* m) {
 }
 
 // Fields that MuJoCo computes before accelerations, in the order of mjdata.h. Any other may need all.
-constexpr std::string_view kBeforeAccelerations[] = {
-    "xpos",          "xquat",           "xmat",          "xipos",           "xiquat",
-    "ximat",         "xanchor",         "xaxis",         "geom_xpos",       "geom_xquat",
-    "geom_xmat",     "site_xpos",       "site_xquat",    "site_xmat",       "cam_xpos",
-    "cam_xmat",      "light_xpos",      "light_xdir",    "subtree_com",     "cdof",
-    "cinert",        "flexvert_xpos",   "flexelem_aabb", "flexedge_length", "ten_J",
-    "ten_length",    "actuator_length", "crb",           "M",               "qLD",
-    "qLDiagInv",     "ten_velocity",    "cvel",          "cdof_dot",        "actuator_velocity",
-    "qfrc_bias",     "qfrc_spring",     "qfrc_damper",   "qfrc_gravcomp",   "qfrc_fluid",
-    "qfrc_adhesion", "qfrc_passive",    "flexedge_velocity"};
+constexpr std::string_view kBeforeAccelerations[] = {"xpos",
+                                                     "xquat",
+                                                     "xmat",
+                                                     "xipos",
+                                                     "xiquat",
+                                                     "ximat",
+                                                     "xanchor",
+                                                     "xaxis",
+                                                     "geom_xpos",
+                                                     "geom_xquat",
+                                                     "geom_xmat",
+                                                     "site_xpos",
+                                                     "site_xquat",
+                                                     "site_xmat",
+                                                     "cam_xpos",
+                                                     "cam_xmat",
+                                                     "light_xpos",
+                                                     "light_xdir",
+                                                     "subtree_com",
+                                                     "cdof",
+                                                     "cinert",
+                                                     "flexvert_xpos",
+                                                     "flexelem_aabb",
+                                                     "flexedge_length",
+                                                     "ten_J",
+                                                     "ten_length",
+                                                     "actuator_length",
+                                                     "crb",
+                                                     "M",
+                                                     "qLD",
+                                                     "qLDiagInv",
+                                                     "ten_velocity",
+                                                     "cvel",
+                                                     "cdof_dot",
+                                                     "actuator_velocity",
+                                                     "qfrc_bias",
+                                                     "qfrc_spring",
+                                                     "qfrc_damper",
+                                                     "qfrc_gravcomp",
+                                                     "qfrc_fluid",
+                                                     "qfrc_adhesion",
+                                                     "qfrc_passive",
+                                                     "flexedge_velocity"};
 
 class DerivedField final : public Sensor {
  public:

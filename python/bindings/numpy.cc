@@ -33,7 +33,8 @@ nb::object make_numpy(const ArrayView& view, nb::handle owner) {
   std::array<std::int64_t, Shape::kMaxRank> strides{};  // in elements, as DLPack counts
   for (int i = 0; i < rank; ++i) {
     shape[i] = static_cast<std::size_t>(view.shape[i]);
-    if (view.strides[i] % item != 0) throw RuntimeError("array strides are not a multiple of its element size");
+    if (view.strides[i] % item != 0)
+      throw RuntimeError("array strides are not a multiple of its element size");
     strides[i] = view.strides[i] / item;
   }
   // An empty array may have no memory at all, but an owner must belong to a pointer.

@@ -17,7 +17,8 @@ WeakObject::WeakObject(nb::handle object)
 
 nb::object WeakObject::get() const {
   nb::object object = (*reference_)();
-  if (object.is_none()) throw RuntimeError("a sensor written in Python was deleted while its simulation uses it");
+  if (object.is_none())
+    throw RuntimeError("a sensor written in Python was deleted while its simulation uses it");
   return object;
 }
 

@@ -24,8 +24,8 @@ const char* wanted_of(const std::type_info& type) {
 }
 
 void throw_field_type(nb::handle config, const char* field, nb::handle value, const char* wanted) {
-  const std::string text =
-      config_place(config) + ": " + field + " must be " + wanted + ", not " + nb::cast<std::string>(nb::repr(value));
+  const std::string text = config_place(config) + ": " + field + " must be " + wanted + ", not " +
+                           nb::cast<std::string>(nb::repr(value));
   throw nb::type_error(text.c_str());
 }
 

@@ -18,9 +18,9 @@
 #include <thread>
 
 #include "mjsense/core/error.h"
-#include "mjsense/replay/check.h"
-#include "mjsense/record/testing/fake_suite.h"
 #include "mjsense/record/recorder.h"
+#include "mjsense/record/testing/fake_suite.h"
+#include "mjsense/replay/check.h"
 
 using namespace mjsense;
 

@@ -34,6 +34,14 @@ TEST(Array, RowsOfAnotherTypeAreErrors) {
   }
 }
 
+TEST(Array, SharesMemoryWithRowsOfTheSameSizeOnly) {
+  Array owner(DType::kFloat32, {2, 6});
+  const Array same = Array::shared(owner, DType::kInt32, {2, 3, 2});
+  EXPECT_EQ(same.data(), owner.data());
+  EXPECT_THROW(Array::shared(owner, DType::kFloat32, {3, 4}), ValueError);  // as many bytes
+  EXPECT_THROW(Array::shared(owner, DType::kFloat64, {2, 6}), ValueError);
+}
+
 TEST(Array, RowsAreDenseAlignedAndZero) {
   Array a(DType::kFloat32, {3, 2, 5});
   EXPECT_EQ(reinterpret_cast<std::uintptr_t>(a.data()) % 64, 0u);

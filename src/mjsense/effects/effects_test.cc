@@ -8,6 +8,7 @@
 #include <memory>
 #include <numbers>
 #include <numeric>
+#include <set>
 #include <vector>
 
 #include "mjsense/core/error.h"
@@ -253,7 +254,79 @@ TEST(Calibration, NanPolicies) {
   }
 }
 
+TEST(Calibration, InfinitiesAreNoNumbersEither) {
+  const float inf = std::numeric_limits<float>::infinity(), nan = std::nanf("");
+  Bench sanitize(one(NanPolicy(NanPolicy::Action::kSanitize)), 4);
+  EXPECT_THAT(sanitize.feed_row({inf, 1, -inf, nan}, 0), ElementsAre(0, 1, 0, 0));
+  Bench disabled(one(NanPolicy(NanPolicy::Action::kDisabled)), 2);
+  EXPECT_THAT(disabled.feed_row({inf, -inf}, 0), ElementsAre(inf, -inf));
+  for (const float bad : {inf, -inf}) {
+    Bench error(one(NanPolicy(NanPolicy::Action::kError)), 3);
+    EXPECT_THROW(error.feed_row({1, 2, bad}, 0), RuntimeError) << bad;
+  }
+  Bench warn(one(NanPolicy(NanPolicy::Action::kWarn)), 2);
+  ::testing::internal::CaptureStderr();
+  EXPECT_THAT(warn.feed_row({-inf, 2}, 0), ElementsAre(-inf, 2));  // said, and left as it is
+  warn.feed_row({-inf, 2}, 1);
+  EXPECT_EQ(::testing::internal::GetCapturedStderr(),
+            "sensor 'test', effect 0 (nan_policy): 1 of 2 values are not finite in world 0\n");
+}
+
+// Scale errors belong to the axis of the device, after the rotation: M = diag(s) R.
+TEST(Calibration, MisalignmentScalesTheDevicesAxes) {
+  Misalignment m;
+  m.scale_error = {0.1, 0.0, -0.2};
+  m.angle = {0, 0, std::numbers::pi / 2};  // x of the body reads on y of the device
+  Bench bench(one(m), 3);
+  const std::vector<float> x = bench.feed_row({1, 0, 0}, 0);
+  EXPECT_NEAR(x[0], 0, 1e-6);
+  EXPECT_NEAR(x[1], 1, 1e-6);
+  const std::vector<float> y = bench.feed_row({0, 1, 0}, 0);
+  EXPECT_NEAR(y[0], -1.1, 1e-6);
+  EXPECT_NEAR(y[1], 0, 1e-6);
+  const std::vector<float> z = bench.feed_row({0, 0, 1}, 0);
+  EXPECT_NEAR(z[2], 0.8, 1e-6);
+}
+
+TEST(Calibration, ClipsAtBothEnds) {
+  Bench both(one(Clip({-2}, {3})), 3);
+  EXPECT_THAT(both.feed_row({-5, 0, 5}, 0), ElementsAre(-2, 0, 3));
+  Bench saturated(one(Clip::saturation(4)), 2);
+  EXPECT_THAT(saturated.feed_row({-9, 9}, 0), ElementsAre(-4, 4));
+}
+
 // ---- time
+
+// One delay an episode and a world, from the whole of its range.
+TEST(Delay, IsDrawnAnewInEveryEpisode) {
+  Delay d(0.01);
+  d.delay_max_s = 0.05;
+  Bench bench(one(d), 1);
+  std::vector<double> lags;
+  std::int64_t tick = 0;
+  for (int episode = 1; episode <= 400; ++episode) {
+    bench.reset(tick, episode);
+    float x = 0;
+    for (int t = 0; t < 20; ++t, ++tick) x = bench.feed(static_cast<float>(tick), tick);
+    lags.push_back(static_cast<double>(tick - 1) - x);
+  }
+  const auto [least, most] = std::minmax_element(lags.begin(), lags.end());
+  EXPECT_GE(*least, 1.0);
+  EXPECT_LE(*most, 5.0);
+  EXPECT_EQ(std::set<double>(lags.begin(), lags.end()).size(), 4u);  // 2 to 5 rows: rounded up
+}
+
+// The first row of an episode is never lost: there would be nothing to hold.
+TEST(Dropout, SparesTheFirstRowOfAnEpisode) {
+  Bench bench(one(Dropout(0.9)), 1);
+  std::int64_t tick = 0;
+  for (int episode = 1; episode <= 50; ++episode) {
+    bench.reset(tick, episode);
+    const float fresh = 100.0f * episode;
+    ASSERT_EQ(bench.feed(fresh, tick++), fresh) << "episode " << episode;
+    for (int t = 0; t < 5; ++t) ASSERT_GE(bench.feed(fresh + 1 + t, tick++), fresh);
+  }
+}
 
 TEST(Delay, IsSecondsAndClampsToTheEpisode) {
   Bench bench(one(Delay(0.03)), 1);

@@ -135,6 +135,20 @@ TEST(EnvStates, HoldsEveryFreeBodyAndTheRobot) {
   EXPECT_THAT(values<float>(least, "articulations/arm"), ElementsAre(.25f, -2));
 }
 
+// Bodies that end in one name are told apart by the names of their entities.
+TEST(EnvStates, ActorsOfOneNameKeepTheirEntities) {
+  TestWorld w(R"(<mujoco><worldbody><body name="left/cup"><freejoint/><geom size=".1"/></body>
+    <body name="right/cup" pos="1 0 0"><freejoint/><geom size=".1"/></body>
+    <body name="right/mug" pos="2 0 0"><freejoint/><geom size=".1"/></body></worldbody></mujoco>)");
+  EnvStatesSensor states("env_states", "panda", {}, 3, "");
+  w.compute(states);
+  std::vector<std::string> names;
+  for (const Field& f : states.fields()) names.push_back(f.name);
+  EXPECT_THAT(names, ElementsAre("actors/left_cup", "actors/right_cup", "actors/mug",
+                                 "articulations/panda"));
+  EXPECT_EQ(values<float>(states, "actors/right_cup")[0], 1);
+}
+
 TEST(CameraParameters, ProjectKnownPoints) {
   TestWorld w(kScene);
   CameraParameterSensor camera("sensor_param_camera", "camera", 640, 368);

@@ -13,6 +13,7 @@
 #include "mjsense/core/error.h"
 #include "mjsense/record/house.h"
 #include "mjsense/record/testing/tools.h"
+#include "mjsense/replay/check.h"
 
 namespace mjsense {
 namespace {
@@ -71,6 +72,74 @@ TEST(Recorder, ResumingGivesTheFilesOfAnUninterruptedRun) {
   // Resuming what is complete changes nothing and records nothing.
   EXPECT_EQ(bytes,
             record(broken.path, 6, {.worlds = 2}, true, [&](RecordingCfg& c) { c.resume = true; }));
+}
+
+// Killed while its episodes were being published: some videos have their final names already, the file of
+// trajectories is not there. Whoever comes next ends it, and nothing can be added any more.
+TEST(Recorder, AnInterruptedPublicationIsEnded) {
+  TempDir whole;
+  {
+    FakeSuite suite({2, 16, 12, true, true});
+    Recorder recorder(fake_recording(whole.path, suite, 2, 8));
+    record_all(recorder, suite, {.worlds = 2, .stop_after = 3});
+    for (int w = 0; w < 2; ++w)
+      if (recorder.recording(w)) recorder.abandon_episode(w);
+    recorder.complete();
+  }
+  const std::string h5_name = "house_0/trajectories_batch_1_of_2.h5";
+  ASSERT_TRUE(fs::exists(whole.path / h5_name));
+  for (const bool by_repair : {false, true}) {
+    for (const int moved : {0, 2}) {
+      TempDir broken;
+      record(broken.path, 8, {.worlds = 2, .stop_after = 3}, true);
+      const fs::path house = broken.path / "house_0", staging = house / ".recording";
+      std::ofstream(staging / "ending").flush();
+      for (int e = 0; e < moved; ++e) {
+        const fs::path episode = staging / fmt::format("episode_{:08d}", e);
+        const std::string name = fmt::format("episode_{:08d}_wrist_camera_batch_1_of_2.mp4", e);
+        ASSERT_TRUE(fs::exists(episode / "wrist_camera.mp4"));
+        fs::rename(episode / "wrist_camera.mp4", house / name);
+      }
+      if (by_repair) {
+        repair(broken.path);
+      } else {
+        FakeSuite suite({2, 16, 12, true, true});
+        RecordingCfg cfg = fake_recording(broken.path, suite, 2, 8);
+        cfg.resume = true;
+        Recorder recorder(cfg);
+        EXPECT_TRUE(recorder.enough());
+        EXPECT_THAT(error_of([&] { recorder.begin_episode(0, {7, 0}); }), HasSubstr("is complete"));
+      }
+      EXPECT_EQ(tree(broken.path), tree(whole.path)) << moved;
+      EXPECT_EQ(read_file(broken.path / h5_name), read_file(whole.path / h5_name)) << moved;
+      EXPECT_TRUE(verify(broken.path).ok()) << verify(broken.path).text();
+    }
+  }
+}
+
+// A batch is published when its episodes are settled: all earlier ones kept or discarded.
+TEST(Recorder, ABatchWaitsForEarlierEpisodes) {
+  TempDir dir;
+  FakeSuite suite(without_video(3));
+  RecordingCfg cfg = fake_recording(dir.path, suite, 3, 4);
+  cfg.batches = 2;
+  Recorder recorder(cfg);
+  for (int w = 0; w < 3; ++w) recorder.begin_episode(w, {w, 7});
+  const auto finish = [&](int world, std::int64_t episode) {
+    suite.fill(world, episode, 0, 1);
+    recorder.append(world, {1, true, false, true});
+    recorder.finish_episode(world, "{}", "success");
+  };
+  finish(1, 1);
+  finish(2, 2);  // two are kept, but episode 0 may come before them
+  recorder.flush();
+  EXPECT_THAT(tree(dir.path / "house_0"),
+              ::testing::Not(::testing::Contains(HasSubstr("batch_1_of_2"))));
+  EXPECT_FALSE(recorder.enough());
+  recorder.discard_episode(0, "for the test");
+  recorder.flush();
+  EXPECT_THAT(tree(dir.path / "house_0"),
+              ::testing::Contains(HasSubstr("trajectories_batch_1_of_2.h5")));
 }
 
 TEST(Recorder, FewEncodersGiveTheSameVideos) {

@@ -8,97 +8,19 @@
 #include "mjsense/core/error.h"
 #include "mjsense/rays/ray_scene.h"
 #include "mjsense/render/kernels/tile_memory.h"
+#include "mjsense/render/testing/studio.h"
 #include "mjsense/render/view/camera_model.h"
 #include "mjsense/render/view/view_builder.h"
 
 namespace mjsense {
 namespace {
 
-using Pixel = std::array<int, 3>;
-
-// A model, its ray scene, and images of it from any place.
-struct Studio {
-  std::unique_ptr<mjModel, void (*)(mjModel*)> model{nullptr, mj_deleteModel};
-  std::unique_ptr<mjData, void (*)(mjData*)> data{nullptr, mj_deleteData};
-  std::unique_ptr<RayScene> rays;
-  std::unique_ptr<Look> look;
-  ViewOptions options;
-  RenderTiles render = best_render_tiles();
-
-  explicit Studio(const std::string& xml) {
-    char error[500] = "";
-    mjSpec* spec =
-        mj_parseXMLString(("<mujoco>" + xml + "</mujoco>").c_str(), nullptr, error, sizeof error);
-    if (!spec) throw RuntimeError(error);
-    model.reset(mj_compile(spec, nullptr));
-    if (!model) throw RuntimeError(mjs_getError(spec));
-    mj_deleteSpec(spec);
-    data.reset(mj_makeData(model.get()));
-    mj_forward(model.get(), data.get());
-  }
-  // Overwrites texture `id`: texel i of the image in memory.
-  void paint(int id, auto&& color) {
-    const int n = model->tex_width[id] * model->tex_height[id];
-    for (int i = 0; i < n; ++i) {
-      const Pixel c = color(i);
-      for (int k = 0; k < 3; ++k)
-        model->tex_data[model->tex_adr[id] + 3 * i + k] = static_cast<mjtByte>(c[k]);
-    }
-  }
-  // size x size pixels from `at`, camera axes given by x and y (unit, world).
-  std::vector<std::uint8_t> shoot(std::array<double, 3> at, std::array<double, 3> x,
-                                  std::array<double, 3> y, int size, double fovy = 45,
-                                  int samples = 1) {
-    if (!rays) {
-      rays = std::make_unique<RayScene>(model.get(), 1);
-      look = std::make_unique<Look>(model.get(), true, true);
-      World world;
-      world.model = model.get();
-      world.data = data.get();
-      rays->update(world);
-    }
-    const double z[3] = {x[1] * y[2] - x[2] * y[1], x[2] * y[0] - x[0] * y[2],
-                         x[0] * y[1] - x[1] * y[0]};
-    double r[9];
-    for (int i = 0; i < 3; ++i) {
-      r[3 * i] = x[i];
-      r[3 * i + 1] = y[i];
-      r[3 * i + 2] = z[i];
-    }
-    ViewBuilder builder(model.get(), *look, options);
-    const View& view = builder.build(rays->world(0), rays->shared(), Appearance(model.get()), {},
-                                     at.data(), r, grid_from_fovy(size, size, fovy, false));
-    std::vector<std::uint8_t> image(3 * size * size);
-    TileMemory memory(ViewBuilder::max_geoms(model.get()));
-    ImageTargets targets;
-    targets.rgb = image.data();
-    targets.samples = samples;
-    render(view, targets, 0, (size + kTileSize - 1) / kTileSize, memory.scratch());
-    return image;
-  }
-  Pixel center(std::array<double, 3> at, std::array<double, 3> x, std::array<double, 3> y,
-               double fovy = 45) {
-    const auto image = shoot(at, x, y, 9, fovy);
-    const std::uint8_t* p = image.data() + 3 * (4 * 9 + 4);
-    return {p[0], p[1], p[2]};
-  }
-  Pixel from_above(double x, double y, double height = 2) {
-    return center({x, y, height}, {1, 0, 0}, {0, 1, 0}, 1);
-  }
-};
-
-void expect_pixel(Pixel got, Pixel want, int tolerance = 1) {
-  for (int c = 0; c < 3; ++c)
-    EXPECT_NEAR(got[c], want[c], tolerance) << got[0] << " " << got[1] << " " << got[2] << " for "
-                                            << want[0] << " " << want[1] << " " << want[2];
-}
-
-// Ambient light alone: what is seen is colour times texture.
-constexpr char kFlat[] =
-    R"(<visual><headlight ambient="1 1 1" diffuse="0 0 0" specular="0 0 0"/></visual>)";
-constexpr char kDark[] = R"(<visual><headlight active="0"/></visual>)";
-constexpr char kMatte[] =
-    R"(<asset><material name="matte" specular="0" rgba="1 .5 .2 1"/></asset>)";
+using testing::expect_pixel;
+using testing::kDark;
+using testing::kFlat;
+using testing::kMatte;
+using testing::Pixel;
+using testing::Studio;
 
 TEST(Shading, HeadlightIsAmbientPlusDiffuseTimesCosine) {
   Studio s(std::string(kMatte) +
@@ -196,7 +118,7 @@ TEST(Shading, HazeLiesWhereTheFloorMeetsTheSky) {
     <headlight ambient="1 1 1" diffuse="0 0 0" specular="0 0 0"/></visual>)") +
       R"(<asset><texture name="sky" type="skybox" builtin="flat" rgb1="0 1 0" rgb2="0 1 0" width="8" height="48"/></asset>
     <worldbody><geom type="plane" size="0 0 1" rgba="1 0 0 1"/>
-    <geom size="2" pos="0 23 2.4" rgba="1 1 1 1"/><geom type="box" size="1 1 9" pos="40 0 9"/></worldbody>)");
+    <geom size="2" pos="0 23 2.4" rgba="1 1 1 1"/><geom size=".5" pos="-26 0 1.8" rgba="1 1 1 1"/><geom type="box" size="1 1 9" pos="40 0 9"/></worldbody>)");
   s.paint(0, [](int) { return Pixel{0, 255, 0}; });
   const auto falling = [&](double slope, double x, double y) {
     const double fall = 0.2 * slope, l = std::hypot(1, fall);
@@ -210,8 +132,9 @@ TEST(Shading, HazeLiesWhereTheFloorMeetsTheSky) {
   const double outside = 255 * (0.5 / 1.15) / (1 - 0.3 / 1.3);
   expect_pixel(falling(0.5, 0, -1), {0, int(255.5 - outside), int(outside + .5)});
   expect_pixel(falling(-0.1, 0, -1), {0, 255, 0});
-  expect_pixel(falling(1, 0, 1), {255, 255, 255});  // a ball before the haze
-  expect_pixel(falling(-0.1, 1, 0), {0, 255, 0});   // a box behind the sky
+  expect_pixel(falling(1, 0, 1), {255, 255, 255});   // a ball before the haze
+  expect_pixel(falling(1, -1, 0), {255, 255, 255});  // another shortly before where it begins
+  expect_pixel(falling(-0.1, 1, 0), {0, 255, 0});    // a box behind the sky
 }
 
 TEST(Shading, TransparentGeomsAreDrawnTwice) {

@@ -5,7 +5,11 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <filesystem>
+#include <fstream>
 
+#include "mjsense/core/error.h"
+#include "mjsense/hdf5/h5.h"
 #include "mjsense/record/testing/tools.h"
 #include "mjsense/replay/check.h"
 #include "mjsense/replay/trajectory.h"
@@ -76,6 +80,65 @@ TEST(Replay, AnUnfinishedRecordingIsReadableAndRepairable) {
   EXPECT_TRUE(after.ok()) << after.text();
   EXPECT_EQ(after.episodes, 3);
   EXPECT_FALSE(fs::exists(dir.path / "house_0/.recording"));
+}
+
+// A video belongs to its episode: as many frames as steps, of the stated size.
+TEST(Verify, CountsTheFramesOfEveryVideo) {
+  TempDir dir, other;
+  record(dir.path, 3, {.worlds = 1}, true);
+  ASSERT_TRUE(verify(dir.path).ok());
+  const auto video = [](const fs::path& out, int e) {
+    return out / fmt::format("house_0/episode_{:08d}_wrist_camera_batch_1_of_1.mp4", e);
+  };
+  const auto replaced = [&](const fs::path& by, const fs::path& what) {
+    const std::string original = read_file(what);
+    fs::copy_file(by, what, fs::copy_options::overwrite_existing);
+    const VerifyResult result = verify(dir.path);
+    std::ofstream(what, std::ios::binary) << original;
+    EXPECT_EQ(result.findings.size(), 1u) << result.text();
+    return result.ok() ? std::string("whole") : result.findings[0].text;
+  };
+  // Episodes of 6, 7 and 8 steps.
+  EXPECT_THAT(replaced(video(dir.path, 2), video(dir.path, 0)),
+              HasSubstr("has 8 frames, expected 6"));
+  EXPECT_THAT(replaced(video(dir.path, 0), video(dir.path, 1)),
+              HasSubstr("has 6 frames, expected 7"));
+  {
+    FakeSuite suite({1, 20, 12, true, true});
+    Recorder recorder(fake_recording(other.path, suite, 1, 1));
+    record_all(recorder, suite, {.worlds = 1});
+  }
+  EXPECT_THAT(replaced(video(other.path, 0), video(dir.path, 0)),
+              HasSubstr("is 20 x 12 pixels, expected 16 x 12"));
+  fs::remove(video(dir.path, 1));
+  EXPECT_THAT(verify(dir.path).text(), HasSubstr("does not exist"));
+}
+
+// Every step either succeeds or fails.
+TEST(Verify, FailIsTheOppositeOfSuccess) {
+  for (const std::int8_t wrong : {0, 1}) {
+    TempDir dir;
+    record(dir.path, 1, {.worlds = 1});
+    const fs::path path = dir.path / "house_0/trajectories_batch_1_of_1.h5";
+    {
+      const h5::H5Lock lock;
+      h5::Id file = h5::open_file(path, true);
+      {
+        const h5::Id fail(H5Dopen2(file, "traj_0/fail", H5P_DEFAULT), H5Dclose, "fail");
+        const h5::Id type(H5Dget_type(fail), H5Tclose, "type");
+        std::vector<std::int8_t> rows(6);
+        h5::check(H5Dread(fail, type, H5S_ALL, H5S_ALL, H5P_DEFAULT, rows.data()), "read");
+        EXPECT_EQ(rows, (std::vector<std::int8_t>{1, 1, 1, 1, 1, 0}));
+        rows[wrong ? 5 : 2] = wrong;  // both, or neither
+        h5::check(H5Dwrite(fail, type, H5S_ALL, H5S_ALL, H5P_DEFAULT, rows.data()), "write");
+      }
+      file.close("close");
+    }
+    const VerifyResult result = verify(dir.path);
+    EXPECT_FALSE(result.ok());
+    EXPECT_THAT(result.text(),
+                HasSubstr(fmt::format("row {} is not the opposite of success", wrong ? 5 : 2)));
+  }
 }
 
 TEST(Replay, OddPicturesArePadded) {

@@ -76,6 +76,70 @@ TEST_F(Franka, StartsNearItsStartConfigurationAndStaysThere) {
   for (int i = 0; i < 7; ++i) EXPECT_NEAR(after[i], before[i], 1e-6);
 }
 
+// Whatever the noise, a start lies within the limits: what would be beyond is at the limit.
+TEST_F(Franka, StartsNeverLieBeyondTheLimits) {
+  RobotCfg cfg = robot_cfg("franka");
+  MoveGroupCfg& arm = cfg.groups[1];
+  double low[7], high[7];
+  for (int i = 0; i < 7; ++i) {
+    const int joint = robot.groups()[1].joints[i];
+    ASSERT_TRUE(model->jnt_limited[joint]);
+    low[i] = model->jnt_range[2 * joint];
+    high[i] = model->jnt_range[2 * joint + 1];
+    arm.init[i] = i % 2 ? low[i] + 0.02 : high[i] - 0.02;
+    arm.spread[i] = 0.1;
+  }
+  const Robot near(cfg, model, 1);
+  int at_limit[7] = {}, inside[7] = {};
+  for (int k = 0; k < 200; ++k) {
+    Rng rng(3, 0, 0, k);
+    for (int i = 0; i < model->nv; ++i) data[0]->qvel[i] = 1;
+    near.write_start(state_row(data[0].get()), {}, rng);
+    for (int i = 0; i < 7; ++i) {
+      const double q = data[0]->qpos[near.groups()[1].qpos[i]];
+      EXPECT_GE(q, low[i]);
+      EXPECT_LE(q, high[i]);
+      EXPECT_EQ(data[0]->qvel[near.groups()[1].dofs[i]], 0) << "it starts at rest";
+      EXPECT_EQ(data[0]->ctrl[near.groups()[1].actuators[i]], q) << "and is told to stay";
+      ++(q == low[i] || q == high[i] ? at_limit : inside)[i];
+    }
+  }
+  for (int i = 0; i < 7; ++i) {  // P(beyond) = 0.4
+    EXPECT_NEAR(at_limit[i], 80, 35) << i;
+    EXPECT_NEAR(inside[i], 120, 35) << i;
+  }
+}
+
+// Each joint's noise fills its own width, on both sides.
+TEST_F(Franka, StartNoiseIsAsWideAsItSays) {
+  const double init[] = {0, -0.7853, 0, -2.35619, 0, 1.57079, 0};
+  const double spread[] = {0.025, 0.05, 0.075, 0.1, 0.125, 0.15, 0.175};
+  double least[7] = {}, most[7] = {};
+  for (int k = 0; k < 400; ++k) {
+    Rng rng(9, 0, 0, k);
+    robot.write_start(state_row(data[0].get()), {}, rng);
+    const auto q = arm_qpos(0);
+    for (int i = 0; i < 7; ++i) {
+      least[i] = std::min(least[i], (q[i] - init[i]) / spread[i]);
+      most[i] = std::max(most[i], (q[i] - init[i]) / spread[i]);
+    }
+  }
+  for (int i = 0; i < 7; ++i) {
+    EXPECT_NEAR(least[i], -1, 0.03) << i;
+    EXPECT_NEAR(most[i], 1, 0.03) << i;
+  }
+}
+
+TEST_F(Franka, StartsWhereItsBaseIsPut) {
+  Rng rng(1, 0, 0, 0);
+  const Pose base{{0.3, -0.2, 0.1}, axis_angle({0, 0, 1}, 1.1)};
+  robot.write_start(state_row(data[1].get()), base, rng);
+  mj_forward(model, data[1].get());
+  const Pose seen = robot.base_pose(worlds[1]);
+  EXPECT_LT(norm(seen.p - base.p), 1e-12);
+  EXPECT_LT(angle_between(seen.q, base.q), 1e-7);
+}
+
 TEST_F(Franka, ToolPoseIsForwardKinematicsInTheBaseFrame) {
   RobotValues q;
   robot.read_qpos(worlds[0], q);
@@ -179,17 +243,22 @@ TEST_F(Franka, ActionNoiseGrowsWithTheMotionAndIsNotRecorded) {
   // The tool would move by 0.1 rad about the first joint's axis.
   const double move = 0.1 * std::hypot(here.p.x, here.p.y);
   const Pose wanted = robot.fk(arm, robot.targets(0));
-  double square = 0;
+  double square = 0, turned = 0;
   const int draws = 2000;
   for (int k = 0; k < draws; ++k) {
     robot.write_ctrl(worlds[0], state, &rng);
     values[arm].set({state.ctrl, 7});
-    const Vec3 off = robot.fk(arm, values).p - wanted.p;
+    const Pose disturbed = robot.fk(arm, values);
+    const Vec3 off = disturbed.p - wanted.p;
+    const double angle = angle_between(disturbed.q, wanted.q);
+    turned += angle * angle;
     for (int i = 0; i < 3; ++i)
       EXPECT_LT(std::abs(off[i]), 0.023);  // 0.02 and what the linear map leaves
     square += dot(off, off);
   }
   EXPECT_NEAR(std::sqrt(square / (3 * draws)), 0.1 * move, 0.01 * move);
+  EXPECT_NEAR(std::sqrt(turned / (3 * draws)), 0.01 * move,
+              0.001 * move);  // rad: a tenth of the metres
   EXPECT_EQ(robot.targets(0)[arm].values[0], target[0]);
 }
 

@@ -230,6 +230,75 @@ TEST(Scene, PlacesEntities) {
   EXPECT_EQ(m->key_qpos[m->nq - 1], .5);
 }
 
+// Patterns are asked in their order, and the first that matches a joint gives its position.
+TEST(Scene, TheFirstMatchingJointPatternCounts) {
+  const char* leg = R"(<mujoco><worldbody><body><joint name="hip"/><geom size=".1"/>
+    <body><joint name="knee"/><geom size=".1"/><body><joint name="foot" type="slide" axis="0 0 1"/>
+    <geom size=".1"/></body></body></body></worldbody></mujoco>)";
+  const auto start = [&](std::vector<std::pair<std::string, double>> joint_pos) {
+    SceneCfg cfg;
+    cfg.entities = {{"leg", {.model = {.xml = leg}, .joint_pos = std::move(joint_pos)}}};
+    Scene scene(std::move(cfg));
+    const mjModel* m = scene.model();
+    return std::vector<double>(m->key_qpos, m->key_qpos + m->nq);
+  };
+  EXPECT_THAT(start({{"knee", .5}, {".*", .1}}), ElementsAre(.1, .5, .1));
+  EXPECT_THAT(start({{"h.*|k.*", .2}, {"knee", .5}, {"foot", -.3}}), ElementsAre(.2, .2, -.3));
+  EXPECT_THAT(start({{"foot", .7}}), ElementsAre(0, 0, .7));
+}
+
+TEST(Scene, JoinsMocapKeyframes) {
+  const char* hand =
+      R"(<mujoco><worldbody><body name="hand" mocap="true" pos="1 2 3"><geom size=".1"/></body>
+    </worldbody><keyframe><key mpos="4 5 6" mquat="0 1 0 0"/></keyframe></mujoco>)";
+  SceneCfg cfg;
+  cfg.entities = {{"table", xml(kTable)}, {"hand", xml(hand)}};
+  Scene scene(std::move(cfg));
+  const mjModel* m = scene.model();
+  ASSERT_EQ(m->nmocap, 2);  // the table's base and the hand
+  EXPECT_THAT(std::vector<double>(m->key_mpos + 3, m->key_mpos + 6), ElementsAre(4, 5, 6));
+  EXPECT_THAT(std::vector<double>(m->key_mquat + 4, m->key_mquat + 8), ElementsAre(0, 1, 0, 0));
+}
+
+TEST(Scene, EveryOptionArrives) {
+  SceneCfg cfg;
+  cfg.options.timestep = 0.003;
+  cfg.options.integrator = "rk4";
+  cfg.options.cone = "elliptic";
+  cfg.options.solver = "cg";
+  cfg.options.jacobian = "sparse";
+  cfg.options.impratio = 7;
+  cfg.options.iterations = 31;
+  cfg.options.tolerance = 1e-7;
+  cfg.options.ls_iterations = 17;
+  cfg.options.ls_tolerance = 0.02;
+  cfg.options.ccd_iterations = 23;
+  cfg.options.gravity = {1, 2, 3};
+  cfg.options.magnetic = {4, 5, 6};
+  cfg.options.wind = {7, 8, 9};
+  cfg.options.density = 1.2;
+  cfg.options.viscosity = 0.1;
+  cfg.options.disableflags = {"contact"};
+  cfg.options.enableflags = {"energy"};
+  cfg.entities = {{"ball", xml(kBall)}};
+  Scene scene(std::move(cfg));
+  const mjOption& o = scene.model()->opt;
+  const double numbers[] = {o.timestep,   o.impratio,    o.tolerance,   o.ls_tolerance,
+                            o.density,    o.viscosity,   o.gravity[0],  o.gravity[1],
+                            o.gravity[2], o.magnetic[0], o.magnetic[1], o.magnetic[2],
+                            o.wind[0],    o.wind[1],     o.wind[2]};
+  EXPECT_THAT(numbers, ElementsAre(0.003, 7, 1e-7, 0.02, 1.2, 0.1, 1, 2, 3, 4, 5, 6, 7, 8, 9));
+  EXPECT_EQ(o.integrator, mjINT_RK4);
+  EXPECT_EQ(o.cone, mjCONE_ELLIPTIC);
+  EXPECT_EQ(o.solver, mjSOL_CG);
+  EXPECT_EQ(o.jacobian, mjJAC_SPARSE);
+  EXPECT_EQ(o.iterations, 31);
+  EXPECT_EQ(o.ls_iterations, 17);
+  EXPECT_EQ(o.ccd_iterations, 23);
+  EXPECT_EQ(o.disableflags, mjDSBL_CONTACT);
+  EXPECT_EQ(o.enableflags, mjENBL_ENERGY);
+}
+
 TEST(Scene, JoinsKeyframes) {
   const char* legged =
       "<mujoco><worldbody><body><freejoint/><geom size='.1'/><body><joint name='j' range='-9 "

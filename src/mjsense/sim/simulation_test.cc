@@ -10,6 +10,7 @@
 
 #include "mjsense/core/error.h"
 #include "mjsense/core/testing/allocations.h"
+#include "mjsense/sensors/raycast/raycast_sensor.h"
 
 namespace mjsense {
 namespace {
@@ -44,13 +45,18 @@ struct Height : Sensor {
     resets.assign(init.num_worlds, 0);
   }
   void compute(const World& w) override {
+    if (w.id == fail_in && failure == ErrorKind::kKey) throw KeyError("no name");
+    if (w.id == fail_in && failure == ErrorKind::kRuntime) throw RuntimeError("no luck");
     if (w.id == fail_in) throw ValueError("no value");
     ++computes[w.id];
     solves = w.data->timer[mjTIMER_CONSTRAINT].number;
     positions = w.data->timer[mjTIMER_POSITION].number;
     row(w.id) = static_cast<float>(w.data->xpos[3 * (w.model->nbody - 1) + 2]);
   }
-  void substep(const World& w) override { ++substeps[w.id]; }
+  void substep(const World& w) override {
+    ++substeps[w.id];
+    last_dt = w.dt();
+  }
   void reset(const World& w) override { ++resets[w.id]; }
   void cast(const CastContext& context) override {
     ++casts;
@@ -66,6 +72,8 @@ struct Height : Sensor {
 
   Stage stage_;
   bool with_substeps = false, is_eager = false;
+  ErrorKind failure = ErrorKind::kValue;
+  double last_dt = 0;
   mjtStage reads_up_to = mjSTAGE_ACC;
   int fail_in = -1, casts = 0, solves = 0, positions = 0;  // counted by MuJoCo
   std::vector<int> computes, substeps, resets, cast_ids;
@@ -242,6 +250,63 @@ TEST(Simulation, AFailingSensorIsNamedAndTheOthersGoOn) {
   bad->fail_in = -1;
   sim.refresh(*bad);
   EXPECT_THAT(good->computes, Each(1));
+}
+
+// Its name is put before an error, which stays of its kind.
+TEST(Simulation, AnErrorKeepsItsKind) {
+  Simulation sim(scene(), {.num_worlds = 2});
+  auto bad = add(sim, "bad");
+  bad->fail_in = 0;
+  bad->failure = ErrorKind::kKey;
+  EXPECT_THROW(sim.refresh(*bad), KeyError);
+  bad->failure = ErrorKind::kRuntime;
+  EXPECT_THROW(sim.refresh(*bad), RuntimeError);
+  bad->failure = ErrorKind::kValue;
+  EXPECT_THROW(sim.refresh(*bad), ValueError);
+}
+
+TEST(Simulation, StepsAreAsLongAsTheirSubsteps) {
+  Simulation sim(scene(), {.decimation = 5});
+  EXPECT_DOUBLE_EQ(sim.step_dt(), 5 * sim.model()->opt.timestep);
+  sim.step(3);
+  EXPECT_DOUBLE_EQ(sim.worlds().time(0), 3 * sim.step_dt());
+}
+
+// mjlab's order of calls: an update stands for the time that it is given.
+TEST(Simulation, AnUpdateByHandLastsAsLongAsItSays) {
+  Simulation sim(scene(), {});
+  auto filter = std::make_shared<Height>("filter");
+  filter->with_substeps = true;
+  sim.add(filter);
+  sim.step_raw(1);
+  sim.update_sensors(0.02);
+  EXPECT_DOUBLE_EQ(filter->last_dt, 0.02);
+  sim.update_sensors();
+  EXPECT_DOUBLE_EQ(filter->last_dt, sim.model()->opt.timestep);
+  EXPECT_THAT(filter->substeps, Each(2));
+}
+
+// Rays meet the world as it is, not as it was when they were first cast.
+TEST(Simulation, RaysFollowTheState) {
+  SceneCfg cfg;
+  cfg.entities.emplace_back("robot", EntityCfg{.model = {.xml = kXml}});
+  cfg.terrain = TerrainCfg{};
+  auto scan = std::make_shared<RayCastSensorCfg>();
+  scan->name = "scan";
+  scan->frame = {{"body", "world", ""}};
+  scan->pattern = UserPattern{.offsets = {{0, 0, 5}}, .directions = {{0, 0, -1}}};
+  cfg.sensors = {scan};
+  const auto made = std::make_shared<Scene>(std::move(cfg));
+  Simulation sim(made, {.num_worlds = 2});
+  Sensor& sensor = made->sensor("scan");
+  sim.refresh(sensor);
+  EXPECT_FLOAT_EQ(sensor.field("distances").data.row<float>(1)[0], 3.9f);
+  const ArrayView qpos = sim.worlds().state_component("qpos");
+  reinterpret_cast<double*>(qpos.data + qpos.strides[0])[2] = 2.5;
+  sim.forward();
+  sim.refresh(sensor);
+  EXPECT_FLOAT_EQ(sensor.field("distances").data.row<float>(0)[0], 3.9f);
+  EXPECT_FLOAT_EQ(sensor.field("distances").data.row<float>(1)[0], 2.4f);
 }
 
 TEST(Simulation, AStepAllocatesNothing) {

@@ -94,6 +94,51 @@ struct Moved {
   double* qpos;
 };
 
+// With another object close by on each side in turn: the gripper closes where it touches neither that nor, before it
+// closes, the target; and its way down is free where there is a free one.
+TEST(PickPlanner, ChoosesAGraspBesideWhichThereIsRoom) {
+  Stage stage(1);
+  const auto& pick = static_cast<PickTask&>(*stage.task);
+  const Robot& robot = pick.robot();
+  const mjModel* model = stage.scene->model();
+  const GripperShape gripper(model, robot, robot.gripper());
+  mjData* data = stage.data[0].get();
+  int planned = 0;
+  for (int episode = 0; episode < 4; ++episode) {
+    for (int side = 0; side < 8; ++side) {
+      World world{.id = 0, .model = model, .data = data};
+      stage.task->sample(0, episode, state_row(data));
+      mj_forward(model, data);
+      const auto objects = pick.all_objects();
+      const int target = pick.target(0), other = target == 0 ? 1 : 0;
+      const auto place_of = [&](int object) {
+        return data->qpos + model->jnt_qposadr[model->body_jntadr[objects[object].body]];
+      };
+      const double a = side * M_PI / 4;
+      const double gap = objects[target].shape.radius + objects[other].shape.radius + 0.002;
+      place_of(other)[0] = place_of(target)[0] + gap * std::cos(a);
+      place_of(other)[1] = place_of(target)[1] + gap * std::sin(a);
+      mj_forward(model, data);
+      stage.task->begin(world);
+      stage.policy->reset(world);
+      Action action;
+      stage.policy->act(world, action);
+      if (action.done) continue;
+      ++planned;
+      const Pose grasp = static_cast<PlannerPolicy&>(*stage.policy).grasp_pose(0);
+      for (std::size_t i = 0; i < objects.size(); ++i) {
+        const Pose object{vec3(data->xpos + 3 * objects[i].body),
+                          quat(data->xquat + 4 * objects[i].body)};
+        EXPECT_FALSE(gripper.hits(grasp, object, objects[i].shape, 0.0))
+            << objects[i].kind << " at " << objects[target].kind << ", side " << side;
+      }
+      EXPECT_GT(grasp.p.z - gripper.tip, pick.table_height() + 0.003)
+          << "finger tips above the table";
+    }
+  }
+  EXPECT_GT(planned, 20);
+}
+
 TEST(PickPlanner, GivesUpWhatItCannotReach) {
   Stage stage(1);
   Moved moved(stage, 2.0, 0.0);

@@ -225,7 +225,9 @@ inline bool rasterize(const View& view, int index, PacketMask packets, Tile& til
       const int lane = __builtin_ctz(lanes);
       const float window[4] = {drawn.window[0][lane], drawn.window[1][lane], drawn.window[2][lane],
                                drawn.window[3][lane]};
-      PacketMask over = packets & packets_in_reach(window, drawn.nearest[lane], tile);
+      // What coincides with what is seen already is in reach too: shows() decides.
+      const float nearest = drawn.nearest[lane] * (1 - 2 * kSame);
+      PacketMask over = packets & packets_in_reach(window, nearest, tile);
       for (; over; over &= over - 1) {
         const int q = __builtin_ctz(over);
         if (draw(g, index, drawn, lane, block.face[lane], tile.shaded, tile.pixels[q],

@@ -84,6 +84,49 @@ TEST(FrankaMeshes, AnIncompleteFolderIsAnError) {
   }
 }
 
+// Where the cameras stand, for those who calibrate against it: in the frame of their link, m and degrees.
+TEST(FrankaModel, CamerasStandWhereTheyShould) {
+  const auto scene = scene_of(franka_cfg());
+  const mjModel* m = scene->model();
+  const struct {
+    const char *name, *body;
+    double pos[3], fovy, right[3], up[3];
+  } cameras[] = {
+      {"exo_camera_1",
+       "fr3_link0",
+       {0.1, 0.57, 0.66},
+       71,
+       {-0.70520, -0.70093, 0.10644},
+       {0.48933, -0.37259, 0.78850}},
+      {"gripper/wrist_camera",
+       "gripper/base",
+       {0.078, 0, 0.034},
+       56.74,
+       {0, 1, 0},
+       {0.95394, 0, 0.29998}},
+  };
+  for (const auto& want : cameras) {
+    const int camera = resolve(m, mjOBJ_CAMERA, std::string("robot_0/") + want.name, "test");
+    EXPECT_EQ(m->cam_bodyid[camera],
+              resolve(m, mjOBJ_BODY, std::string("robot_0/") + want.body, "test"));
+    EXPECT_NEAR(m->cam_fovy[camera], want.fovy, 1e-5) << want.name;
+    double r[9];
+    mju_quat2Mat(r, m->cam_quat + 4 * camera);
+    for (int k = 0; k < 3; ++k) {
+      EXPECT_NEAR(m->cam_pos[3 * camera + k], want.pos[k], 1e-9) << want.name;
+      EXPECT_NEAR(r[3 * k], want.right[k], 2e-4) << want.name << " right " << k;
+      EXPECT_NEAR(r[3 * k + 1], want.up[k], 2e-4) << want.name << " up " << k;
+    }
+  }
+  const RobotCfg cfg = franka_cfg();
+  EXPECT_EQ(cfg.image_width, 640);
+  EXPECT_EQ(cfg.image_height, 368);
+  ASSERT_EQ(cfg.cameras.size(), 2u);
+  EXPECT_EQ(cfg.cameras[0].name, "wrist_camera");
+  EXPECT_EQ(cfg.cameras[0].mjcf_camera, "gripper/wrist_camera");
+  EXPECT_EQ(cfg.cameras[1].name, "exo_camera_1");
+}
+
 TEST(FrankaModel, MassesArePublishedOnes) {
   const auto scene = scene_of(franka_cfg());
   const mjModel* m = scene->model();

@@ -3,6 +3,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <array>
 #include <memory>
 
 #include "mjsense/core/error.h"
@@ -78,6 +79,74 @@ TEST(Contact, BoxOnTheFloorPushesDownWithItsWeight) {
   const std::vector<float> g = lab.read("force", "s");
   EXPECT_NEAR(g[2] + g[5] + g[8] + g[11], -9.81, 1e-3);
   EXPECT_THAT(lab.sensor().primary_names(), ElementsAre("box_geom"));
+}
+
+// A box at rest that is pushed along the floor by less than friction holds: what it pushes on the floor is what
+// pushes it, in both tangents. In the contact's own frame the third axis is normal x tangent.
+TEST(Contact, FrictionHoldsAlongBothTangents) {
+  std::vector<ContactSensorCfg> sensors;
+  for (const bool box : {true, false}) {
+    for (const char* kind : {"net", "global", "local"}) {
+      ContactSensorCfg c = box_cfg(box ? "box_geom" : "ground_geom");
+      c.name = std::string(box ? "box_" : "ground_") + kind;
+      c.fields = {"found", "force", "normal", "tangent"};
+      c.num_slots = 4;
+      c.global_frame = std::string(kind) == "global";
+      if (std::string(kind) == "net") {
+        c.reduce = "netforce";
+        c.num_slots = 1;
+      }
+      c.friction_split = true;
+      sensors.push_back(c);
+    }
+  }
+  Lab lab("box", kBox, sensors);
+  lab.pose({0, 0, 0.1, 1, 0, 0, 0});
+  const ArrayView push = lab.sim->worlds().state_component("qfrc_applied");
+  auto* f = reinterpret_cast<double*>(push.data);
+  f[0] = 1.5;
+  f[1] = -2.5;
+  lab.sim->forward();
+  lab.sim->step(1500);
+  const double expected[3] = {1.5, -2.5, -9.81};
+  for (const bool box : {true, false}) {
+    const std::string side = box ? "box_" : "ground_";
+    const double sign = box ? 1 : -1;
+    const auto total = [&](const std::string& sensor, const char* field) {
+      const std::vector<float> rows = lab.read(field, sensor);
+      std::array<double, 3> sum{};
+      for (std::size_t i = 0; i < rows.size(); ++i) sum[i % 3] += rows[i];
+      return sum;
+    };
+    for (const char* kind : {"net", "global"}) {
+      const auto force = total(side + kind, "force"), normal = total(side + kind, "normal_force"),
+                 friction = total(side + kind, "friction_force");
+      for (int k = 0; k < 3; ++k) {
+        EXPECT_NEAR(force[k], sign * expected[k], 2e-2) << side << kind << k;
+        EXPECT_NEAR(normal[k], k == 2 ? sign * expected[k] : 0, 2e-2) << side << kind << k;
+        EXPECT_NEAR(friction[k], k == 2 ? 0 : sign * expected[k], 2e-2) << side << kind << k;
+      }
+    }
+    const std::vector<float> local = lab.read("force", side + "local"),
+                             global = lab.read("force", side + "global"),
+                             n = lab.read("normal", side + "local"),
+                             t = lab.read("tangent", side + "local"),
+                             own = lab.read("friction_force", side + "local");
+    ASSERT_EQ(lab.read("found", side + "local")[0], 4.0f);
+    for (int i = 0; i < 12; i += 3) {
+      const double b[3] = {n[i + 1] * t[i + 2] - n[i + 2] * t[i + 1],
+                           n[i + 2] * t[i] - n[i] * t[i + 2], n[i] * t[i + 1] - n[i + 1] * t[i]};
+      EXPECT_NEAR(n[i + 2], -sign, 1e-6);  // from the primary outwards
+      EXPECT_GT(local[i], 0);              // it presses
+      for (int k = 0; k < 3; ++k)
+        EXPECT_NEAR(local[i] * n[i + k] + local[i + 1] * t[i + k] + local[i + 2] * b[k],
+                    global[i + k], 1e-5)
+            << side << i;
+      EXPECT_EQ(own[i], 0);
+      EXPECT_EQ(own[i + 1], local[i + 1]);
+      EXPECT_EQ(own[i + 2], local[i + 2]);
+    }
+  }
 }
 
 //  [top]     g

@@ -3,11 +3,13 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <array>
 #include <cmath>
 #include <memory>
 #include <numbers>
 
 #include "mjsense/core/error.h"
+#include "mjsense/effects/timing.h"
 #include "mjsense/scene/scene.h"
 #include "mjsense/sim/simulation.h"
 
@@ -81,6 +83,68 @@ TEST(Imu, DataSheetNumbersComeOut) {
   // 0.005 deg/s/sqrt(Hz) at 100 Hz and the rounding to counts: step^2 / 12.
   const double expected = std::hypot(0.005 / std::sqrt(0.01), 1 / 16.4 / std::sqrt(12));
   EXPECT_NEAR(std::sqrt(noise2 / n) / deg, expected, 0.05 * expected);
+}
+
+// A new episode: its filters know nothing of the last one. Other worlds go on.
+TEST(Imu, AResetForgetsTheFiltersOfItsWorlds) {
+  constexpr char kTop[] = R"(<mujoco><option gravity="0 0 0"/><worldbody><body><joint axis="0 0 1"/>
+    <geom size=".1"/><site name="imu"/></body></worldbody></mujoco>)";
+  ImuSensorCfg cfg = imu("");
+  auto delay = std::make_shared<Delay>(0.05);  // 5 rows
+  cfg.effects = {delay};
+  cfg.model.gyroscope.bias_tolerance = {0.3, 0.6, 0.9};
+  SceneCfg scene_cfg;
+  scene_cfg.entities.emplace_back("robot", EntityCfg{.model = {.xml = kTop}});
+  scene_cfg.sensors.push_back(std::make_shared<ImuSensorCfg>(cfg));
+  auto scene = std::make_shared<Scene>(std::move(scene_cfg));
+  Simulation sim(scene, {.num_worlds = 2, .decimation = 5});  // 10 ms
+  const auto spin = [&](int world, double speed) {
+    const ArrayView v = sim.worlds().state_component("qvel");
+    *reinterpret_cast<double*>(v.data + world * v.strides[0]) = speed;
+  };
+  const auto gyro = [&](int world) {
+    sim.refresh(scene->sensor("imu"));
+    const auto row = scene->sensor("imu").field("gyro").data.row<float>(world);
+    return std::array<float, 3>{row[0], row[1], row[2]};
+  };
+  for (int w : {0, 1}) spin(w, 5);
+  sim.forward();
+  sim.step(20);
+  const auto zero = gyro(0), one = gyro(1);
+  EXPECT_NEAR(zero[2], 5, 4 * 0.3);
+  EXPECT_NE(zero[0], one[0]);  // each device has its own bias
+  const int ids[] = {0};
+  sim.reset(ids);
+  sim.step(1);
+  const auto fresh = gyro(0), other = gyro(1);
+  EXPECT_NEAR(fresh[2], 0, 4 * 0.3);  // the top stands still: no row of the last episode comes late
+  for (int k = 0; k < 3; ++k) {
+    EXPECT_NE(fresh[k], zero[k]);  // another device
+    EXPECT_EQ(other[k], one[k]);   // nothing happened there
+  }
+  sim.step(3);
+  EXPECT_EQ(gyro(0), fresh);  // the same device within an episode
+}
+
+// Each axis has the tolerance that its data sheet gives.
+TEST(Imu, EveryAxisHasItsOwnTolerance) {
+  ImuSensorCfg cfg = imu("");
+  cfg.model.accelerometer.bias_tolerance = {0.3, 1.5, 6.0};
+  auto scene = make_scene(cfg);
+  constexpr int kWorlds = 2000;
+  Simulation sim(scene, {.num_worlds = kWorlds});
+  sim.refresh(scene->sensor("imu"));
+  double square[3] = {};
+  const double rest[3] = {0, 9.81, 0};
+  for (int w = 0; w < kWorlds; ++w)
+    for (int k = 0; k < 3; ++k) {
+      const double b = scene->sensor("imu").field("acc").data.row<float>(w)[k] - rest[k];
+      square[k] += b * b / kWorlds;
+    }
+  for (int k = 0; k < 3; ++k) {
+    const double expected = cfg.model.accelerometer.bias_tolerance[k] / 3;
+    EXPECT_NEAR(std::sqrt(square[k]), expected, 5 * expected / std::sqrt(2.0 * kWorlds)) << k;
+  }
 }
 
 TEST(Imu, ErrorsNameSiteAndPreset) {

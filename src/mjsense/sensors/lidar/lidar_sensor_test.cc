@@ -76,6 +76,80 @@ TEST(Lidar, RoundRoomIsAsFarEverywhere) {
   EXPECT_NEAR(p[3 * 45 + 2], -5 * std::sin(15 * mjPI / 180), 1e-5);
 }
 
+//   [red, own colour]   lidar at the origin   [material over own colour]
+// Intensity is the mean of red, green and blue times the cosine of incidence.
+TEST(Lidar, IntensityIsTheColourOfWhatReturned) {
+  Lab lab;
+  constexpr char kWalls[] =
+      R"(<mujoco><asset><material name="m" rgba=".2 .4 .9 1"/></asset><worldbody>
+    <geom type="box" size=".1 9 9" pos="-2.1 0 0" rgba=".9 .1 .2 1"/>
+    <geom type="box" size=".1 9 9" pos="3.1 0 0" rgba="1 1 1 1" material="m"/>
+    <body name="mast"><site name="lidar"/></body></worldbody></mujoco>)";
+  lab.cfg->include_geom_groups = {{0}};
+  lab.cfg->max_distance = 8;
+  lab.cfg->scan = SpinningScan{.channels = 1, .elevations_deg = {0}, .samples = 8};
+  SceneCfg s;
+  s.entities.emplace_back("r", EntityCfg{.model = {.xml = kWalls}});
+  s.sensors = {lab.cfg};
+  lab.scene = std::make_shared<Scene>(std::move(s));
+  lab.sim = std::make_unique<Simulation>(lab.scene, SimulationCfg{});
+  const std::vector<float> intensity = lab.read("intensity"), distance = lab.read("distances"),
+                           points = lab.read("points");
+  const double h = std::sqrt(0.5);
+  const double material = (.2 + .4 + .9) / 3, own = (.9 + .1 + .2) / 3;
+  // Rays at 0, 45, 90 ... 315 degrees; those at 90 and 270 meet nothing.
+  const double expected[8] = {material, material * h, 0, own * h, own, own * h, 0, material * h};
+  for (int i = 0; i < 8; ++i) EXPECT_NEAR(intensity[i], expected[i], 1e-6) << i;
+  for (int i : {2, 6}) {
+    EXPECT_EQ(distance[i], -1);
+    for (int k = 0; k < 3; ++k) EXPECT_EQ(points[3 * i + k], 0) << i;  // no point at the range
+  }
+  EXPECT_NEAR(points[0], 3, 1e-6);
+  EXPECT_NEAR(points[3 * 4], -2, 1e-6);
+}
+
+// What noise carries beyond the range, or below the least distance, did not return.
+TEST(Lidar, NoiseLeavesNoReturnBeyondTheRange) {
+  Lab lab;
+  lab.cfg->range_noise_std = 0.05;
+  lab.cfg->min_distance = 0.5;
+  lab.cfg->max_distance = 5.02;  // the room: 5 m
+  lab.start();
+  lab.sim->step();
+  const std::vector<float> d = lab.read("distances"), p = lab.read("points"),
+                           hit = lab.read("hit_pos_w"), intensity = lab.read("intensity");
+  int lost = 0;
+  for (std::size_t i = 0; i < d.size(); ++i) {
+    const double length =
+        std::sqrt(p[3 * i] * p[3 * i] + p[3 * i + 1] * p[3 * i + 1] + p[3 * i + 2] * p[3 * i + 2]);
+    if (d[i] >= 0) {
+      EXPECT_LE(d[i], 5.02f);
+      EXPECT_NEAR(length, d[i], 1e-5);
+      EXPECT_NEAR(intensity[i], 0.5, 1e-5);
+      continue;
+    }
+    ++lost;
+    EXPECT_EQ(d[i], -1);
+    EXPECT_EQ(length, 0);
+    EXPECT_EQ(intensity[i], 0);
+    EXPECT_EQ(hit[3 * i], 0);  // its origin
+  }
+  // P(noise > 0.02 m) = P(z > 0.4) = 0.345
+  const double n = static_cast<double>(d.size());
+  EXPECT_NEAR(lost / n, 0.345, 4 * std::sqrt(0.345 * 0.655 / n));
+}
+
+TEST(Lidar, ElevationsAreThoseGiven) {
+  Lab lab;
+  lab.cfg->scan = SpinningScan{.channels = 3, .elevations_deg = {-40, 3, 60}, .samples = 1};
+  lab.start();
+  const std::vector<float> p = lab.read("points");
+  for (int c = 0; c < 3; ++c) {
+    const double degrees[] = {-40, 3, 60};
+    EXPECT_NEAR(p[3 * c + 2], 5 * std::sin(degrees[c] * mjPI / 180), 1e-5);
+  }
+}
+
 TEST(Lidar, StandingInTheWorldItSeesTheWorld) {
   Lab lab;
   lab.cfg->frame = {{"body", "world", ""}};

@@ -8,6 +8,7 @@
 
 #include "mjsense/core/error.h"
 #include "mjsense/robots/franka/franka.h"
+#include "mjsense/scene/resolve.h"
 
 namespace mjsense {
 namespace {
@@ -122,6 +123,111 @@ TEST_F(Pick, LyingOnAnotherObjectIsNoSuccess) {
   const Evaluation e = task.evaluate(w);
   EXPECT_FALSE(e.success);
   EXPECT_EQ(e.reward, 0) << "the other object bears it";
+}
+
+// An object that the robot holds, and nothing else touches, is lifted; one that touches anything else is not.
+TEST_F(Pick, SuccessNeedsTheRobotsTouchAlone) {
+  start(0, 1);
+  const int target = task.target(0);
+  // Into the robot: onto a part of the gripper that can be touched.
+  const int gripper = resolve(model, mjOBJ_BODY, "robot_0/gripper/base", "test");
+  const double* g = data->xpos + 3 * gripper;
+  write_vec({g[0], g[1], g[2]}, object_qpos());
+  mj_forward(model, data.get());
+  ASSERT_GT(data->ncon, 0);
+  EXPECT_TRUE(task.evaluate(w).success);
+  EXPECT_FALSE(task.evaluate(w).terminal) << "success ends an episode only if asked";
+
+  // Another object against it, as well held: no success any more.
+  const auto& other = task.all_objects()[target == 0 ? 1 : 0];
+  double* q = data->qpos + model->jnt_qposadr[model->body_jntadr[other.body]];
+  const Vec3 before = vec3(q);
+  const Vec3 far = task.all_objects()[target].shape.points.front();
+  write_vec(Vec3{g[0], g[1], g[2]} + 1.2 * far, q);
+  mj_forward(model, data.get());
+  bool touching = false;
+  for (int i = 0; i < data->ncon; ++i) {
+    const int a = model->geom_bodyid[data->contact[i].geom[0]],
+              b = model->geom_bodyid[data->contact[i].geom[1]];
+    touching |= (a == other.body && b == body()) || (b == other.body && a == body());
+  }
+  ASSERT_TRUE(touching);
+  EXPECT_FALSE(task.evaluate(w).success);
+  write_vec(before, q);
+  mj_forward(model, data.get());
+  EXPECT_TRUE(task.evaluate(w).success);
+}
+
+// One centimetre: not before.
+TEST_F(Pick, SuccessIsOneCentimetreUp) {
+  start(0, 1);
+  const int gripper = resolve(model, mjOBJ_BODY, "robot_0/gripper/base", "test");
+  write_vec(vec3(data->xpos + 3 * gripper), object_qpos());
+  mj_forward(model, data.get());
+  task.begin(w);  // the episode starts here
+  const double z = object_qpos()[2];
+  for (const auto& [up, success] :
+       {std::pair{0.0, false}, {0.0095, false}, {0.0105, true}, {-0.02, false}}) {
+    object_qpos()[2] = z + up;
+    mj_forward(model, data.get());
+    EXPECT_EQ(task.evaluate(w).success, success) << up;
+  }
+}
+
+// Around the target there is room for an open gripper: 7 cm; 2 cm between the others.
+TEST_F(Pick, TheTargetStandsClear) {
+  double least_target = 1, least_other = 1;
+  int tight = 0;
+  constexpr int kEpisodes = 200;
+  for (int episode = 0; episode < kEpisodes; ++episode) {
+    start(0, episode);
+    const auto objects = task.all_objects();
+    const int target = task.target(0);
+    const double* t = data->xpos + 3 * objects[target].body;
+    EXPECT_TRUE(t[0] >= 0.42 && t[0] <= 0.66 && std::abs(t[1]) <= 0.25)
+        << "where the arm reaches it";
+    std::vector<double> radius;
+    for (const auto& object : objects) {
+      double r = 0;
+      const Quat q = quat(data->xquat + 4 * object.body);
+      for (Vec3 point : object.shape.points) {
+        const Vec3 p = rotate(q, point);
+        r = std::max(r, std::hypot(p.x, p.y));
+      }
+      radius.push_back(r);
+    }
+    double here = 1;
+    for (std::size_t a = 0; a < objects.size(); ++a)
+      for (std::size_t b = 0; b < a; ++b) {
+        const double *p = data->xpos + 3 * objects[a].body, *q = data->xpos + 3 * objects[b].body;
+        const double gap = std::hypot(p[0] - q[0], p[1] - q[1]) - radius[a] - radius[b];
+        const bool of_target = static_cast<int>(a) == target || static_cast<int>(b) == target;
+        (of_target ? least_target : least_other) =
+            std::min(of_target ? least_target : least_other, gap);
+        if (of_target) here = std::min(here, gap);
+      }
+    tight += here < 0.07 - 1e-9;
+  }
+  EXPECT_EQ(tight, 0);
+  EXPECT_GE(least_target, 0.07 - 1e-9);
+  EXPECT_LT(least_target, 0.08);  // and no more than that is asked
+  EXPECT_GE(least_other, 0.02 - 1e-9);
+  EXPECT_LT(least_other, 0.03);
+}
+
+// Blocks lie, or stand on a side or an end, each as often.
+TEST_F(Pick, BlocksRestInEveryWay) {
+  int ways[3] = {};
+  for (int episode = 0; episode < 150; ++episode) {
+    start(0, episode);
+    for (const auto& object : task.all_objects()) {
+      if (object.kind != "red_block") continue;
+      const Quat q = quat(data->xquat + 4 * object.body);
+      const double up[3] = {rotate(q, {1, 0, 0}).z, rotate(q, {0, 1, 0}).z, rotate(q, {0, 0, 1}).z};
+      for (int k = 0; k < 3; ++k) ways[k] += std::abs(up[k]) > 0.99;
+    }
+  }
+  for (int k = 0; k < 3; ++k) EXPECT_NEAR(ways[k], 50, 25) << k;
 }
 
 TEST_F(Pick, EndsWithTheHorizonOrADoneAction) {

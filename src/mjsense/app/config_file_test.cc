@@ -1,0 +1,146 @@
+// Every key of an experiment file reaches the option of its name, and no other.
+
+#include <fmt/format.h>
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+#include <unistd.h>
+
+#include <filesystem>
+#include <fstream>
+
+#include "mjsense/app/progress.h"
+#include "mjsense/app/record_command.h"
+#include "mjsense/core/error.h"
+
+namespace mjsense {
+namespace {
+
+using ::testing::ElementsAre;
+using ::testing::HasSubstr;
+using ::testing::IsEmpty;
+
+RecordOptions read(const std::string& toml) {
+  std::string name = (std::filesystem::temp_directory_path() / "mjsense_config_XXXXXX").string();
+  close(mkstemp(name.data()));
+  std::ofstream(name) << toml;
+  RecordOptions options;
+  try {
+    read_config(name, options);
+  } catch (...) {
+    std::filesystem::remove(name);
+    throw;
+  }
+  std::filesystem::remove(name);
+  return options;
+}
+
+// What a file may say, as one text: what it does not say stays as it was.
+std::string text(const RecordOptions& options) {
+  const RecordJobCfg& job = options.job;
+  const RolloutCfg& r = job.rollout;
+  std::string cameras = r.cameras ? "" : "all";
+  for (const std::string& name : r.cameras.value_or(std::vector<std::string>{}))
+    cameras += name + ",";
+  return fmt::format(
+      "task={} robot={} policy={} episodes={} max_attempts={} worlds={} threads={} seed={} out={} "
+      "cameras={} width={} "
+      "height={} depth={} samples={} shadows={} horizon={} noise={} keep={} house={} batches={} "
+      "gzip={} crf={} preset={} "
+      "ffmpeg={} red_green={}",
+      r.task, r.robot, r.policy, job.episodes, job.max_attempts, r.num_worlds, r.threads, r.seed,
+      job.out.string(), cameras, r.width.value_or(0), r.height.value_or(0), r.depth, r.samples,
+      r.shadows, r.horizon.value_or(0), r.action_noise, job.keep_failures, job.house, job.batches,
+      job.gzip, job.video.crf, job.video.preset, job.video.ffmpeg, job.video.molmospaces_depth);
+}
+
+// Replaces the word that begins with `key`.
+std::string with(std::string line, const std::string& key, const std::string& value) {
+  const std::size_t at = line.find(" " + key) == std::string::npos ? 0 : line.find(" " + key) + 1;
+  EXPECT_EQ(line.substr(at, key.size()), key);
+  return line.replace(at, std::min(line.find(' ', at), line.size()) - at, key + value);
+}
+
+TEST(ConfigFile, EveryKeyReachesItsOptionAlone) {
+  const std::string before = text(RecordOptions());
+  const struct {
+    const char *toml, *key, *value;
+  } keys[] = {
+      {"task = 'pour'", "task=", "pour"},
+      {"robot = 'rum'", "robot=", "rum"},
+      {"policy = 'mine'", "policy=", "mine"},
+      {"episodes = 71", "episodes=", "71"},
+      {"max_attempts = 72", "max_attempts=", "72"},
+      {"worlds = 73", "worlds=", "73"},
+      {"threads = 74", "threads=", "74"},
+      {"seed = 75", "seed=", "75"},
+      {"out = 'there'", "out=", "there"},
+      {"cameras = ['a', 'b']", "cameras=", "a,b,"},
+      {"cameras = 'c,d'", "cameras=", "c,d,"},
+      {"cameras = 'none'", "cameras=", ""},
+      {"depth = true", "depth=", "true"},
+      {"samples = 5", "samples=", "5"},
+      {"no_shadows = true", "shadows=", "false"},
+      {"no_shadows = false", "shadows=", "true"},
+      {"horizon = 76", "horizon=", "76"},
+      {"no_noise = true", "noise=", "false"},
+      {"no_noise = false", "noise=", "true"},
+      {"keep_failures = true", "keep=", "true"},
+      {"house = 77", "house=", "77"},
+      {"batches = 3", "batches=", "3"},
+      {"gzip = 8", "gzip=", "8"},
+      {"crf = 31", "crf=", "31"},
+      {"preset = 'slow'", "preset=", "slow"},
+      {"ffmpeg = '/bin/f'", "ffmpeg=", "/bin/f"},
+      {"molmospaces_depth = true", "red_green=", "true"},
+  };
+  for (const auto& [toml, key, value] : keys)
+    EXPECT_EQ(text(read(toml)), with(before, key, value)) << toml;
+  EXPECT_EQ(text(read("size = '64x48'")), with(with(before, "width=", "64"), "height=", "48"));
+  EXPECT_EQ(text(read("")), before);
+  const RecordOptions all = read("seed = 1\nepisodes = 2\nno_noise = true\n");
+  EXPECT_EQ(all.job.rollout.seed, 1u);
+  EXPECT_EQ(all.job.episodes, 2);
+  EXPECT_FALSE(all.job.rollout.action_noise);
+}
+
+TEST(ConfigFile, WrongKeysAndTypesAreErrors) {
+  const auto fault = [](const std::string& toml) -> std::string {
+    try {
+      read(toml);
+    } catch (const Error& error) {
+      return error.what();
+    }
+    return "";
+  };
+  EXPECT_THAT(fault("seed = 1\nsamles = 2\n"),
+              HasSubstr(":2: no key named 'samles'; did you mean 'samples'?"));
+  for (const char* wrong : {"episodes = 1.5", "depth = 1", "task = true", "cameras = [1]",
+                            "cameras = 3", "size = 64", "no_noise = 'yes'"}) {
+    EXPECT_THAT(fault(wrong), HasSubstr("is of a wrong type")) << wrong;
+  }
+  EXPECT_THAT(fault("size = '64'"), HasSubstr("expected WIDTHxHEIGHT"));
+  EXPECT_THAT(fault("cameras = 'a,,b'"), HasSubstr("an empty name"));
+}
+
+TEST(Options, CamerasAndSizes) {
+  RolloutCfg rollout;
+  parse_cameras("wrist_camera,exo_camera_1", rollout);
+  EXPECT_THAT(rollout.cameras.value(), ElementsAre("wrist_camera", "exo_camera_1"));
+  parse_cameras("none", rollout);
+  EXPECT_THAT(rollout.cameras.value(), IsEmpty());
+  parse_size("640x368", rollout);
+  EXPECT_EQ(rollout.width, 640);
+  EXPECT_EQ(rollout.height, 368);
+}
+
+TEST(Texts, OfTimesAndSizes) {
+  EXPECT_EQ(clock_text(61.4), "1:01");
+  EXPECT_EQ(clock_text(3 * 3600 + 59), "3:00:59");
+  EXPECT_EQ(bytes_text(999), "999 B");
+  EXPECT_EQ(bytes_text(1000), "1.0 kB");
+  EXPECT_EQ(bytes_text(1.5e6), "1.5 MB");
+  EXPECT_EQ(bytes_text(123456789), "123 MB");
+}
+
+}  // namespace
+}  // namespace mjsense

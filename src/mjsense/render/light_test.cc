@@ -1,0 +1,152 @@
+// Brightness by formula: Lambert's cosine, lights that are turned away, glowing surfaces, shadows whose edges geometry gives.
+
+#include <gtest/gtest.h>
+
+#include "mjsense/render/testing/studio.h"
+
+namespace mjsense {
+namespace {
+
+using testing::expect_pixel;
+using testing::kDark;
+using testing::kFlat;
+using testing::kMatte;
+using testing::Pixel;
+using testing::Studio;
+
+int byte(double value) { return static_cast<int>(255 * std::clamp(value, 0.0, 1.0) + 0.5); }
+
+//      \ light, 50 degrees from the vertical
+//       \   _
+//         /   \      seen from straight above: at (x, y) the unit sphere's normal is
+//        |     |     (x, y, sqrt(1 - x^2 - y^2)), its brightness the cosine to the light
+//         \ _ /
+TEST(Light, AMatteSphereHasLambertsCosine) {
+  Studio s(std::string(kDark) +
+           R"(<asset><material name="m" specular="0" rgba="1 .5 .2 1"/></asset><worldbody>
+    <light type="directional" dir=".766044443 0 -.642787610" diffuse="1 1 1" specular="0 0 0" castshadow="false"/>
+    <geom size="1" material="m"/></worldbody>)");
+  for (const auto& [x, y] : {std::pair{-0.7, 0.0},
+                             {-0.5, 0.5},
+                             {0.0, 0.0},
+                             {0.0, -0.8},
+                             {0.3, 0.2},
+                             {0.6, 0.1},
+                             {0.8, 0.0},
+                             {0.95, 0.0}}) {
+    const double z = std::sqrt(1 - x * x - y * y);
+    const double cosine = -0.766044443 * x + 0.642787610 * z;  // negative where it is turned away
+    expect_pixel(s.center({x, y, 3}, {1, 0, 0}, {0, 1, 0}, 0.01),
+                 {byte(cosine), byte(0.5 * cosine), byte(0.2 * cosine)});
+  }
+}
+
+// A highlight needs light: where the surface is turned away there is none, however the viewer stands.
+TEST(Light, ASurfaceTurnedAwayDoesNotShine) {
+  const auto seen = [](double degrees) {
+    const double a = degrees * M_PI / 180;
+    Studio s(
+        std::string(kDark) +
+        R"(<asset><material name="m" rgba="0 0 0 1" specular="1" shininess="0.0078125"/></asset>
+      <worldbody><light type="directional" dir=")" +
+        std::to_string(-std::sin(a)) + " 0 " + std::to_string(-std::cos(a)) +
+        R"(" diffuse="1 1 1" specular="1 1 1" castshadow="false"/>
+      <geom type="box" size="1 1 1" material="m"/></worldbody>)");
+    return s.from_above(0, 0, 4)[0];
+  };
+  EXPECT_NEAR(seen(60), byte(std::cos(30 * M_PI / 180)),
+              2);           // halfway is 30 degrees off: exponent 1
+  EXPECT_EQ(seen(100), 0);  // here it would be cos(50 degrees)
+}
+
+TEST(Light, AGlowingSurfaceNeedsNoLight) {
+  Studio s(
+      std::string(kDark) +
+      R"(<asset><material name="m" rgba="1 .5 .2 1" emission=".6" specular="0"/></asset><worldbody>
+    <light pos="0 0 -5" dir="0 0 -1" castshadow="false"/>
+    <geom type="plane" size="5 5 1" material="m"/></worldbody>)");
+  expect_pixel(s.from_above(0, 0), {byte(.6), byte(.3), byte(.12)});
+}
+
+// MuJoCo's rule: where there is no light at all, 0.3 from everywhere.
+TEST(Light, WithoutAnyLightThereIsAnAmbientOne) {
+  Studio s(std::string(kDark) +
+           R"(<worldbody><geom type="plane" size="5 5 1" rgba="1 .5 .2 1"/></worldbody>)");
+  expect_pixel(s.from_above(0, 0), {byte(.3), byte(.15), byte(.06)});
+}
+
+// Lights that cast shadows are added up apart and cannot dim each other; the sum ends at white.
+TEST(Light, TwoLightsAddUp) {
+  Studio s(std::string(kDark) +
+           R"(<asset><material name="m" specular="0" rgba="1 .5 .2 1"/></asset><worldbody>
+    <light type="directional" dir="0 0 -1" diffuse=".4 .4 .4" specular="0 0 0" castshadow="false"/>
+    <light type="directional" dir="0 -.6 -.8" diffuse=".5 .5 .5" specular="0 0 0" castshadow="false"/>
+    <geom type="plane" size="5 5 1" material="m"/></worldbody>)");
+  expect_pixel(s.from_above(0, 0), {byte(.8), byte(.4), byte(.16)});
+}
+
+//   light at z = 2 m
+//        |         a box above the light casts no shadow,
+//        |         one between it and the floor does
+//   -----------
+TEST(Shadow, IsOfWhatStandsBetween) {
+  for (const char* kind : {"spot", "directional"}) {
+    Studio s(std::string(kDark) + kMatte + R"(<worldbody><light pos="0 0 2" dir="0 0 -1" type=")" +
+             kind + R"(" cutoff="85"
+      exponent="0" diffuse="1 1 1" specular="0 0 0"/><geom type="plane" size="5 5 1" material="matte"/>
+      <geom type="box" size=".2 .2 .1" pos="0 0 2.2" material="matte"/>
+      <geom type="box" size=".2 .2 .1" pos="1 0 .5" material="matte"/></worldbody>)");
+    s.options.shadows = true;
+    EXPECT_GT(s.from_above(0, 0, 1)[0], 200) << kind << ": the box above the light";
+    // In an image of 2 m of floor too: there the box is near what lies between the light and the tile.
+    const auto wide = s.shoot({0, 0, 1}, {1, 0, 0}, {0, 1, 0}, 16, 90);
+    EXPECT_GT(wide[3 * (8 * 16 + 8)], 200) << kind;
+    // The spot at height 2 throws the box's shadow to 1 + (0.4 .. 0.6) / (2 - z) outwards.
+    const double x = std::string(kind) == "spot" ? 1.35 : 1.0;
+    const Pixel below = s.center({x, 0, 0.3}, {1, 0, 0}, {0, 1, 0}, 1);
+    EXPECT_EQ(below[0], 0) << kind << ": the box below the light";
+  }
+}
+
+//   \    \      directional light at 45 degrees: a box of x in [-.1, .1], z in [.4, .6]
+//    \ [] \     shades the floor from x = -.1 + .4 to .1 + .6
+//   ---====---
+TEST(Shadow, OfASlantedSunLiesWhereItShould) {
+  for (const char* shape : {"type='box' size='.1 .3 .1'", "type='mesh' mesh='block'"}) {
+    Studio s(std::string(kDark) + kMatte +
+             R"(<asset><mesh name="block" vertex="-.1 -.3 -.1 .1 -.3 -.1 -.1 .3 -.1 .1 .3 -.1
+      -.1 -.3 .1 .1 -.3 .1 -.1 .3 .1 .1 .3 .1"/></asset><worldbody>
+      <light type="directional" pos="-3 0 3" dir="1 0 -1" diffuse="1 1 1" specular="0 0 0"/>
+      <geom type="plane" size="5 5 1" material="matte"/><geom pos="0 0 .5" material="matte" )" +
+             shape + "/></worldbody>");
+    s.options.shadows = true;
+    const auto lit = [&](double x, double y) {
+      return s.center({x, y, 0.2}, {1, 0, 0}, {0, 1, 0}, 0.1)[0] > 100;
+    };
+    EXPECT_TRUE(lit(0.28, 0)) << shape;
+    EXPECT_FALSE(lit(0.32, 0)) << shape;
+    EXPECT_FALSE(lit(0.68, 0)) << shape;
+    EXPECT_TRUE(lit(0.72, 0)) << shape;
+    EXPECT_FALSE(lit(0.5, 0.29)) << shape;
+    EXPECT_TRUE(lit(0.5, 0.31)) << shape;
+    EXPECT_TRUE(lit(-0.5, 0)) << shape;
+  }
+}
+
+// A shadow takes its own light only.
+TEST(Shadow, LeavesTheOtherLights) {
+  Studio s(std::string(kDark) + kMatte + R"(<worldbody>
+    <light type="directional" pos="0 0 3" dir="0 0 -1" diffuse=".5 .5 .5" specular="0 0 0"/>
+    <light type="directional" pos="3 0 3" dir="-1 0 -1" diffuse=".5 .5 .5" specular="0 0 0"/>
+    <geom type="plane" size="5 5 1" material="matte"/><geom type="box" size=".2 .2 .05" pos="0 0 1" material="matte"/>
+    </worldbody>)");
+  s.options.shadows = true;
+  const double slanted = 0.5 * std::sqrt(0.5);
+  const auto floor = [&](double x) { return s.center({x, 0, 0.3}, {1, 0, 0}, {0, 1, 0}, 1)[0]; };
+  EXPECT_NEAR(floor(0), byte(slanted), 1);        // below the box: the second
+  EXPECT_NEAR(floor(-1), byte(0.5), 1);           // where the second's shadow lies: the first
+  EXPECT_NEAR(floor(1), byte(0.5 + slanted), 1);  // both
+}
+
+}  // namespace
+}  // namespace mjsense

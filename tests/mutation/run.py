@@ -1,0 +1,289 @@
+"""Do the tests notice? Makes one small wrong change at a time in a copy of the tree and runs the tests.
+
+    python tests/mutation/run.py                  every mutant of mutants.toml that has no result yet
+    python tests/mutation/run.py --survivors      those that survived, again
+    python tests/mutation/run.py worlds png       rooms, or parts of ids
+    python tests/mutation/run.py --check          only whether every mutant still applies
+    python tests/mutation/run.py --report         the figures so far, and who survived
+
+The copy is build/mutation/tree with a build folder of its own; results are kept in build/mutation/results.json. A mutant is
+noticed by the first judge that fails: its room's test program, then the golden hashes, then the other rooms' programs, those that
+build on it first, then the Python tests that could know. --prefix puts a command before every build and test, as "nice -n 10".
+"""
+
+import argparse
+import dataclasses
+import hashlib
+import json
+import os
+import re
+import shutil
+import signal
+import subprocess
+import sys
+import time
+import tomllib
+from pathlib import Path
+
+HERE = Path(__file__).resolve().parent
+ROOT = HERE.parents[1]
+WORK = ROOT / "build/mutation"
+TREE, RESULTS = WORK / "tree", WORK / "results.json"
+BUILD = TREE / "build/dev"
+
+# In the order of docs/architecture.md: dependencies point up this list, so a mistake shows in a room or in one below.
+ROOMS = ["core", "scene", "worlds", "rays", "render", "sensors", "effects", "sim", "observe", "robots", "tasks", "policies",
+         "record", "rollout", "app", "python"]
+NO_PROGRAM = {"python"}
+PYTESTS = {
+    "record": ["tests/record", "tests/program"],
+    "rollout": ["tests/program", "tests/python"],
+    "app": ["tests/program"],
+    "python": ["tests/python", "tests/conformance"],
+}
+LIMIT_S = 600  # a judge that takes longer has noticed: nothing takes a tenth of this
+
+
+class Failure(Exception):
+    """What is no answer: a mutant that does not apply or does not compile, tests that fail without it."""
+
+
+@dataclasses.dataclass
+class Mutant:
+    id: str
+    file: str
+    what: str
+    old: str
+    new: str
+
+    @property
+    def room(self) -> str:
+        parts = Path(self.file).parts
+        if parts[0] == "python":
+            return "python"
+        if parts[0] == "models":
+            return "robots" if parts[1] == "franka" else "tasks"
+        return parts[2]
+
+    @property
+    def digest(self) -> str:
+        return hashlib.sha256(f"{self.file}\0{self.old}\0{self.new}".encode()).hexdigest()[:16]
+
+    def apply(self, root: Path) -> str:
+        """The file's text with the change."""
+        path = root / self.file
+        if not path.is_file():
+            raise Failure(f"{self.id}: there is no {self.file}")
+        text = path.read_text()
+        found = text.count(self.old)
+        if found != 1:
+            raise Failure(f"{self.id}: its text stands {found} times in {self.file}, expected once:\n{self.old}")
+        return text.replace(self.old, self.new)
+
+
+def load() -> list[Mutant]:
+    mutants = [Mutant(**m) for m in tomllib.loads((HERE / "mutants.toml").read_text())["mutant"]]
+    ids = [m.id for m in mutants]
+    for twice in {i for i in ids if ids.count(i) > 1}:
+        raise Failure(f"{twice}: two mutants have this id")
+    return mutants
+
+
+def check(mutants: list[Mutant]) -> list[str]:
+    errors = []
+    for mutant in mutants:
+        try:
+            mutant.apply(ROOT)
+        except Failure as error:
+            errors.append(str(error))
+    return errors
+
+
+def copy_tree() -> None:
+    """Brings TREE to what stands in the working tree; only files that differ are touched, so that little is built."""
+    names = subprocess.run(["git", "ls-files", "-co", "--exclude-standard"], cwd=ROOT, check=True, capture_output=True, text=True)
+    wanted = [name for name in names.stdout.split("\n") if name and (ROOT / name).is_file()]
+    for name in wanted:
+        source, target = ROOT / name, TREE / name
+        if target.is_file() and target.read_bytes() == source.read_bytes():
+            continue
+        target.parent.mkdir(parents=True, exist_ok=True)
+        shutil.copy(source, target)
+    keep = {TREE / name for name in wanted}
+    for folder in ("src", "python", "tests", "models"):
+        for path in (TREE / folder).rglob("*"):
+            if path.is_file() and path not in keep and "__pycache__" not in path.parts:
+                path.unlink()
+    venv = TREE / ".venv"
+    if not venv.exists():
+        venv.symlink_to((ROOT / ".venv").resolve())
+
+
+class Runner:
+    def __init__(self, prefix: list[str], jobs: int) -> None:
+        self.prefix, self.jobs = prefix, jobs
+
+    def run(self, command: list[str], limit: float = LIMIT_S, **env: str) -> tuple[int, str]:
+        """Exit status (None: took too long) and output."""
+        process = subprocess.Popen([*self.prefix, *command], cwd=TREE, env={**os.environ, **env}, stdout=subprocess.PIPE,
+                                   stderr=subprocess.STDOUT, text=True, errors="replace", start_new_session=True)
+        try:
+            out = process.communicate(timeout=limit)[0]
+        except subprocess.TimeoutExpired:
+            os.killpg(process.pid, signal.SIGKILL)
+            return -signal.SIGKILL, process.communicate()[0]
+        return process.returncode, out
+
+    def build(self, targets: list[str]) -> None:
+        code, out = self.run(["ninja", "-C", str(BUILD), f"-j{self.jobs}", *targets], 3600)
+        if code != 0:
+            raise Failure("does not compile:\n" + "\n".join([line for line in out.splitlines() if "error" in line][:5] or [out[-500:]]))
+
+    def program(self, name: str) -> str:
+        """"" or the test that failed."""
+        code, out = self.run([str(BUILD / name), "--gtest_fail_fast"])
+        if code == 0:
+            return ""
+        failed = re.findall(r"^\[  FAILED  \] ([\w/]+\.[\w/]+)", out, re.M)
+        running = re.findall(r"^\[ RUN      \] (\S+)", out, re.M)
+        return failed[0] if failed else f"{running[-1] if running else name} (ended with {code})"
+
+    def golden(self) -> str:
+        code, out = self.run([str(BUILD / "golden_test")])
+        found = re.search(r"^golden: .*", out, re.M)
+        return "" if code == 0 else found[0] if found else f"golden_test (ended with {code})"
+
+    def pytest(self, paths: list[str]) -> str:
+        code, out = self.run([str(TREE / ".venv/bin/python"), "-m", "pytest", "-x", "-q", "-p", "no:cacheprovider", *paths],
+                             PYTHONPATH=str(BUILD / "python"), PYTHONDONTWRITEBYTECODE="1")
+        failed = re.findall(r"^(?:FAILED|ERROR) (\S+)", out, re.M)
+        return "" if code in (0, 5) else failed[0] if failed else f"pytest (ended with {code})"
+
+    def judges(self, room: str):
+        """(name, targets to build, call): the nearest first."""
+        programs = [r for r in ROOMS if r not in NO_PROGRAM]
+        at = programs.index(room) if room in programs else len(programs)
+        nearest = programs[at:] + programs[:at][::-1] if room in programs else []
+        for i, r in enumerate(nearest):
+            yield f"{r}_test", [f"{r}_test"] if i == 0 else [f"{x}_test" for x in nearest], lambda r=r: self.program(f"{r}_test")
+            if i == 0:
+                yield "golden", ["golden_test"], self.golden
+        paths = PYTESTS.get(room, ["tests/conformance", "tests/python"])
+        yield "pytest", ["mjsense_program", "record_fake", "mjsense_python"], lambda: self.pytest(paths)
+
+    def configure(self) -> None:
+        if not (BUILD / "build.ninja").exists():
+            code, out = self.run(["cmake", "--preset", "dev", "-Wno-dev"], 600)
+            if code != 0:
+                raise Failure(out[-2000:])
+
+    def baseline(self, rooms: set[str]) -> None:
+        """Without a mutant nothing may fail."""
+        self.build(["all"])
+        passed = set()
+        for room in sorted(rooms, key=ROOMS.index):
+            for name, _, judge in self.judges(room):
+                if name == "pytest":
+                    name += " ".join(PYTESTS.get(room, []))
+                if name in passed:
+                    continue
+                if wrong := judge():
+                    raise Failure(f"{name} fails without any mutant: {wrong}")
+                passed.add(name)
+
+    def ask(self, mutant: Mutant, own: bool) -> dict:
+        path = TREE / mutant.file
+        original = path.read_text()
+        start, built = time.time(), None
+        path.write_text(mutant.apply(TREE))
+        try:
+            for i, (name, targets, judge) in enumerate(self.judges(mutant.room)):
+                if own and i > 0:
+                    return {"noticed": False, "own": True, "seconds": round(time.time() - start, 1)}
+                if targets != built:
+                    self.build(targets)
+                    built = targets
+                if test := judge():
+                    return {"noticed": True, "judge": name, "test": test, "seconds": round(time.time() - start, 1)}
+            return {"noticed": False, "seconds": round(time.time() - start, 1)}
+        finally:
+            path.write_text(original)
+
+
+def report(mutants: list[Mutant], results: dict) -> str:
+    lines, survivors, total, noticed, own = [], [], 0, 0, 0
+    for room in ROOMS:
+        known = [(m, results[m.id]) for m in mutants if m.room == room and results.get(m.id, {}).get("digest") == m.digest]
+        if not known:
+            continue
+        seen = sum(r["noticed"] for _, r in known)
+        here = sum(r["noticed"] and (r["judge"] == f"{room}_test" or room in NO_PROGRAM) for _, r in known)
+        lines.append(f"{room:10} {seen:3} of {len(known):3} noticed, {here:3} by the room's own tests")
+        survivors += [f"  {m.id}: {m.what}" for m, r in known if not r["noticed"]]
+        total, noticed, own = total + len(known), noticed + seen, own + here
+    if total:
+        lines.append(f"{'all':10} {noticed:3} of {total:3} noticed ({100 * noticed / total:.0f} %), {own:3} by the room's own tests")
+    return "\n".join(lines + (["survivors:", *survivors] if survivors else []))
+
+
+def main() -> int:
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("which", nargs="*", help="rooms, or parts of ids; all if not given")
+    parser.add_argument("--check", action="store_true", help="only whether every mutant applies")
+    parser.add_argument("--report", action="store_true", help="only the figures so far")
+    parser.add_argument("--again", action="store_true", help="also mutants that have a result")
+    parser.add_argument("--survivors", action="store_true", help="those that survived, again")
+    parser.add_argument("--own", action="store_true", help="ask the room's own tests only; the next run without it asks the others")
+    parser.add_argument("--no-baseline", action="store_true", help="trust that the tests pass without a mutant")
+    parser.add_argument("--prefix", default="nice -n 10", help="before every build and test (%(default)s)")
+    parser.add_argument("--jobs", type=int, default=os.cpu_count(), help="of a build (%(default)s)")
+    options = parser.parse_args()
+    mutants = load()
+    if errors := check(mutants):
+        print("\n".join(errors), file=sys.stderr)
+        return 2
+    if options.check:
+        print(f"all {len(mutants)} mutants apply")
+        return 0
+    results = json.loads(RESULTS.read_text()) if RESULTS.exists() else {}
+    if options.report:
+        print(report(mutants, results))
+        return 0
+    chosen = [m for m in mutants if not options.which or any(w == m.room if w in ROOMS else w in m.id for w in options.which)]
+
+    def due(m: Mutant) -> bool:
+        result = results.get(m.id)
+        if options.again or result is None or result["digest"] != m.digest:
+            return True
+        return not result["noticed"] and (options.survivors or ("own" in result and not options.own))
+
+    chosen = [m for m in chosen if due(m)]
+    WORK.mkdir(parents=True, exist_ok=True)
+    copy_tree()
+    runner = Runner(options.prefix.split(), options.jobs)
+    runner.configure()
+    if not options.no_baseline:
+        runner.baseline({m.room for m in chosen})
+    broken = 0
+    # A mutant of each room in turn, so that a run that is cut short says something of all.
+    turn = {m.id: sum(other.room == m.room for other in chosen[:i]) for i, m in enumerate(chosen)}
+    for i, mutant in enumerate(sorted(chosen, key=lambda m: (turn[m.id], ROOMS.index(m.room)))):
+        try:
+            result = runner.ask(mutant, options.own)
+        except Failure as error:
+            print(f"[{i + 1}/{len(chosen)}] {mutant.id}: ERROR {error}", flush=True)
+            broken += 1
+            continue
+        results[mutant.id] = {**result, "digest": mutant.digest}
+        RESULTS.write_text(json.dumps(results, indent=1))
+        said = f"noticed by {result['judge']}: {result['test']}" if result["noticed"] else "SURVIVED"
+        print(f"[{i + 1}/{len(chosen)}] {mutant.id}: {said} ({result['seconds']} s)", flush=True)
+    print(report(mutants, results))
+    return 2 if broken else 0
+
+
+if __name__ == "__main__":
+    try:
+        sys.exit(main())
+    except Failure as error:
+        sys.exit(f"mutation: {error}")
