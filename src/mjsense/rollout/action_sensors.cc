@@ -150,8 +150,9 @@ class JointPos final : public ActionSensor<double> {
         spec_of(count(g.actuators), command_unit(g), "",
                 fmt::format("Target of the controller of '{}', without noise.", g.name));
     // The least box around the control ranges, and 0 where nothing is given.
-    spec.low = std::min(0.0, std::ranges::min(g.ctrl_low));
-    spec.high = std::max(0.0, std::ranges::max(g.ctrl_high));
+    const double low = std::ranges::min(g.ctrl_low), high = std::ranges::max(g.ctrl_high);
+    if (low > -mjMAXVAL) spec.low = std::min(0.0, low);
+    if (high < mjMAXVAL) spec.high = std::max(0.0, high);
     return spec;
   }
   bool shown(const World& world) override { return !terminal(task_, world); }
