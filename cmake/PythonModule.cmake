@@ -39,5 +39,5 @@ nanobind_add_stub(mjsense_stub MODULE mjsense._core OUTPUT ${MJSENSE_PY_DIR}/_co
                   PYTHON_PATH ${PROJECT_BINARY_DIR}/python)
 
 # scikit-build-core takes python/mjsense itself (pyproject.toml); CMake adds what is built.
-install(TARGETS mjsense_python LIBRARY DESTINATION mjsense COMPONENT python)
-install(FILES ${MJSENSE_PY_DIR}/_core.pyi DESTINATION mjsense COMPONENT python)
+install(TARGETS mjsense_python LIBRARY DESTINATION mjsense COMPONENT python EXCLUDE_FROM_ALL)
+install(FILES ${MJSENSE_PY_DIR}/_core.pyi DESTINATION mjsense COMPONENT python EXCLUDE_FROM_ALL)

@@ -1,5 +1,7 @@
 #include "python/bindings/configs.h"
 
+#include <map>
+#include <utility>
 #include <vector>
 
 #include "mjsense/core/error.h"
@@ -14,6 +16,27 @@ std::span<const CfgKind> cfg_kinds() {
       // clang-format on
   };
   return kinds;
+}
+
+namespace {
+
+std::map<std::string, CfgCheck>& cfg_checks() {
+  static std::map<std::string, CfgCheck> checks = {
+      {"SensorCfg", [](nb::handle config) { read_sensor_cfg(config)->build(); }}};
+  return checks;
+}
+
+}  // namespace
+
+void add_cfg_check(std::string python_class, CfgCheck check) {
+  cfg_checks()[std::move(python_class)] = std::move(check);
+}
+
+void check_cfg(nb::handle config) {
+  for (nb::handle base : config.type().attr("__mro__")) {
+    const auto found = cfg_checks().find(nb::cast<std::string>(base.attr("__name__")));
+    if (found != cfg_checks().end()) return found->second(config);
+  }
 }
 
 std::shared_ptr<SensorCfg> read_sensor_cfg(nb::handle config) {

@@ -4,8 +4,10 @@
 
 #include <nanobind/nanobind.h>
 
+#include <functional>
 #include <memory>
 #include <span>
+#include <string>
 
 #include "mjsense/core/sensor.h"
 #include "mjsense/scene/entity.h"
@@ -50,6 +52,22 @@ std::span<const CfgKind> cfg_kinds();
 
 // Throws TypeError for an object that is no sensor configuration.
 std::shared_ptr<SensorCfg> read_sensor_cfg(nb::handle config);
+
+// Objects of this Python class (or of one below it) are checked so when they are made: mjsense._core.check_cfg.
+using CfgCheck = std::function<void(nb::handle config)>;
+void add_cfg_check(std::string python_class, CfgCheck check);
+void check_cfg(nb::handle config);
+
+// By the C++ configuration's own validate(cfg, place).
+template <class Cfg>
+void add_cfg_check(const char* python_class) {
+  add_cfg_check(python_class, [python_class](nb::handle config) {
+    Cfg cfg;
+    FromPython reader(config);
+    fields(reader, cfg);
+    validate(cfg, python_class);
+  });
+}
 
 template <class Fields>
 void fields(Fields& f, ObjRef& ref) {

@@ -2,9 +2,14 @@
 
 #include <nanobind/nanobind.h>
 #include <nanobind/ndarray.h>
+#include <nanobind/stl/optional.h>
 #include <nanobind/stl/string.h>
+#include <nanobind/stl/vector.h>
 
 #include <cstring>
+#include <numeric>
+#include <optional>
+#include <vector>
 
 #include "mjsense/core/error.h"
 #include "mjsense/effects/calibration.h"
@@ -19,20 +24,25 @@
 namespace mjsense::python {
 
 // Words for enumerations, read by their own functions.
-void read_custom(FromPython& f, nb::handle value, Operation& out) {
+template <class Word>
+void read_word(FromPython& f, nb::handle value, const char* field,
+               Word (*from_name)(std::string_view), Word& out) {
   std::string name;
-  f.read("operation", value, name);
-  out = operation_from_name(name);
+  f.read(field, value, name);
+  try {
+    out = from_name(name);
+  } catch (const ValueError& e) {
+    throw ValueError(config_place(f.config()) + ": " + e.what());
+  }
+}
+void read_custom(FromPython& f, nb::handle value, Operation& out) {
+  read_word(f, value, "operation", &operation_from_name, out);
 }
 void read_custom(FromPython& f, nb::handle value, NanPolicy::Action& out) {
-  std::string name;
-  f.read("action", value, name);
-  out = NanPolicy::action_from_name(name);
+  read_word(f, value, "action", &NanPolicy::action_from_name, out);
 }
 void read_custom(FromPython& f, nb::handle value, Dropout::Mode& out) {
-  std::string name;
-  f.read("mode", value, name);
-  out = Dropout::mode_from_name(name);
+  read_word(f, value, "mode", &Dropout::mode_from_name, out);
 }
 void read_custom(FromPython& f, nb::handle value, Draw& out) {
   nb::object kind = nb::getattr(value, "kind", nb::none());
@@ -185,20 +195,22 @@ class PyChain {
     chain_ = std::make_unique<EffectChain>("pipeline", spec, cfg, num_worlds, period, period);
     out_ = std::make_shared<Array>(DType::kFloat32, chain_->spec().shape.with_front(num_worlds));
     worlds_.resize(num_worlds);
-    reset({});
+    reset(std::nullopt);
   }
 
-  void reset(const std::vector<int>& ids) {
-    const auto one = [this](int w) {
-      ++worlds_[w].episode;
-      chain_->reset(tick(w));
-    };
+  // None: all worlds.
+  void reset(const std::optional<std::vector<int>>& chosen) {
+    std::vector<int> ids(worlds_.size());
+    std::iota(ids.begin(), ids.end(), 0);
+    if (chosen) ids = *chosen;
     for (int w : ids) {
       if (w < 0 || w >= static_cast<int>(worlds_.size()))
         throw ValueError("world id " + std::to_string(w) + " is out of range");
     }
-    for (int w : ids) one(w);
-    for (int w = 0; ids.empty() && w < static_cast<int>(worlds_.size()); ++w) one(w);
+    for (int w : ids) {
+      ++worlds_[w].episode;
+      chain_->reset(tick(w));
+    }
   }
 
   using Rows = nb::ndarray<const float, nb::shape<-1, -1>, nb::c_contig, nb::device::cpu>;
@@ -232,10 +244,25 @@ class PyChain {
 }  // namespace
 
 void bind_effects(nb::module_& m) {
+  const auto class_name = [](nb::handle object) {
+    return nb::cast<std::string>(object.type().attr("__name__"));
+  };
+  add_cfg_check("Effect", [class_name](nb::handle config) {
+    FromPython reader(config);
+    std::shared_ptr<const Effect> effect;
+    read_custom(reader, config, effect);
+    effect->validate(class_name(config));
+  });
+  add_cfg_check("Draw", [class_name](nb::handle config) {
+    FromPython reader(config);
+    Draw draw;
+    read_custom(reader, config, draw);
+    draw.validate(class_name(config));
+  });
   nb::class_<PyChain>(m, "EffectChain", "Effects on rows that come from anywhere.")
       .def(nb::init<nb::handle, int, int, double, std::uint64_t>(), nb::arg("config"),
            nb::arg("size"), nb::arg("num_worlds"), nb::arg("period"), nb::arg("seed"))
-      .def("reset", &PyChain::reset, nb::arg("world_ids"))
+      .def("reset", &PyChain::reset, nb::arg("world_ids").none())
       .def("apply", &PyChain::apply, nb::arg("rows"));
 }
 

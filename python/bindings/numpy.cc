@@ -25,9 +25,8 @@ nb::dlpack::dtype dlpack_type(DType dtype) {
   throw ValueError("unknown dtype");
 }
 
-}  // namespace
-
-nb::object to_numpy(const ArrayView& view, nb::handle owner) {
+template <class... Access>
+nb::object make_numpy(const ArrayView& view, nb::handle owner) {
   const int rank = view.shape.rank();
   const auto item = static_cast<std::int64_t>(dtype_size(view.dtype));
   std::array<std::size_t, Shape::kMaxRank> shape{};
@@ -40,8 +39,16 @@ nb::object to_numpy(const ArrayView& view, nb::handle owner) {
   // An empty array may have no memory at all, but an owner must belong to a pointer.
   static std::byte nothing[64];
   void* data = view.data ? view.data : nothing;
-  return nb::cast(nb::ndarray<nb::numpy>(data, static_cast<std::size_t>(rank), shape.data(), owner,
-                                         strides.data(), dlpack_type(view.dtype)));
+  return nb::cast(nb::ndarray<nb::numpy, Access...>(data, static_cast<std::size_t>(rank),
+                                                    shape.data(), owner, strides.data(),
+                                                    dlpack_type(view.dtype)));
+}
+
+}  // namespace
+
+nb::object to_numpy(const ArrayView& view, nb::handle owner) { return make_numpy<>(view, owner); }
+nb::object to_readonly_numpy(const ArrayView& view, nb::handle owner) {
+  return make_numpy<nb::ro>(view, owner);
 }
 
 }  // namespace mjsense::python

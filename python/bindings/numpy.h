@@ -12,6 +12,8 @@ namespace nb = nanobind;
 
 // A NumPy array on the view's memory, which `owner` keeps alive.
 nb::object to_numpy(const ArrayView& view, nb::handle owner);
+// One that NumPy refuses to write: what a sensor measured.
+nb::object to_readonly_numpy(const ArrayView& view, nb::handle owner);
 
 // A Python object that holds `pointer` until it is collected: the owner of arrays on memory inside
 // *pointer.

@@ -246,7 +246,7 @@ nb::list streams(PyRollout& self) {
     nb::object owner = owner_of(std::shared_ptr<Sensor>(self.share(), sensor.get()));
     for (Field& field : sensor->fields()) {
       list.append(nb::make_tuple(sensor->name(), nb::cast(field.spec, nb::rv_policy::copy),
-                                 to_numpy(field.data.view(), owner)));
+                                 to_readonly_numpy(field.data.view(), owner)));
     }
   }
   return list;

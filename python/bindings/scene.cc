@@ -9,6 +9,7 @@
 #include <nanobind/stl/string.h>
 #include <nanobind/stl/vector.h>
 
+#include "mjsense/core/checks.h"
 #include "mjsense/core/embedded.h"
 #include "mjsense/core/error.h"
 #include "python/bindings/bindings.h"
@@ -144,17 +145,23 @@ std::shared_ptr<const SensorCfg> read_sensor(nb::handle item) {
                                            read_python_spec(item));
 }
 
-// `spec` is the empty MjSpec that the scene is built in, so that Python's spec_fn sees the real
-// thing; `edit` is called with no argument when everything is attached.
-std::shared_ptr<Scene> make_scene(nb::handle config, nb::handle spec, nb::list sensors,
-                                  nb::object edit) {
-  SceneCfg cfg;
+// All but entities, sensors and the base.
+void read_scene_numbers(nb::handle config, SceneCfg& cfg) {
   FromPython reader(config);
   reader("env_spacing", cfg.env_spacing);
   reader("extent", cfg.extent);
   nb::object terrain = config.attr("terrain"), options = config.attr("options");
   if (!terrain.is_none()) reader.read("terrain", terrain, cfg.terrain.emplace());
   reader.read("options", options, cfg.options);
+}
+
+// `spec` is the empty MjSpec that the scene is built in, so that Python's spec_fn sees the real
+// thing; `edit` is called with no argument when everything is attached.
+std::shared_ptr<Scene> make_scene(nb::handle config, nb::handle spec, nb::list sensors,
+                                  nb::object edit) {
+  SceneCfg cfg;
+  FromPython reader(config);
+  read_scene_numbers(config, cfg);
   nb::list alive;
   for (auto [name, entity] : dict_of(config.attr("entities"))) {
     auto& [key, entity_cfg] = cfg.entities.emplace_back();
@@ -225,9 +232,25 @@ nb::object tile_origins(const Scene& scene) {
 }  // namespace
 
 void bind_scene(nb::module_& m) {
-  m.def(
-      "check_cfg", [](nb::handle config) { read_sensor_cfg(config)->build(); },
-      "Raises if a sensor configuration is wrong.");
+  m.def("check_cfg", &check_cfg, nb::arg("config"), "Raises if a configuration is wrong.");
+  add_cfg_check<OptionsCfg>("MujocoCfg");
+  add_cfg_check<SubTerrainCfg>("SubTerrainCfg");
+  add_cfg_check<TerrainCfg>("TerrainCfg");
+  add_cfg_check<EntityCfg>("EntityCfg");
+  add_cfg_check("ObjRef", [](nb::handle config) {
+    ObjRef ref;
+    FromPython reader(config);
+    fields(reader, ref);
+  });
+  add_cfg_check("SceneCfg", [](nb::handle config) {
+    int num_envs = 1;
+    FromPython reader(config);
+    reader("num_envs", num_envs);
+    require_positive(num_envs, "SceneCfg", "num_envs");
+    SceneCfg cfg;
+    read_scene_numbers(config, cfg);
+    validate(cfg, "SceneCfg");
+  });
   m.def(
       "cfg_key", [](nb::handle config) { return read_sensor_cfg(config)->key(); },
       "Key in a scene's registry.");
@@ -272,14 +295,16 @@ void bind_scene(nb::module_& m) {
           "SensorSpec of each field; empty before the simulation exists.")
       .def(
           "arrays",
-          [](const SensorHandle& h) {
+          [](const SensorHandle& h, bool writable) {
             nb::dict arrays;
             nb::object owner = owner_of(h.sensor);
             for (Field& field : h.sensor->fields())
-              arrays[field.name.c_str()] = to_numpy(field.data.view(), owner);
+              arrays[field.name.c_str()] =
+                  (writable ? to_numpy : to_readonly_numpy)(field.data.view(), owner);
             return arrays;
           },
-          "The rows [B, ...] of each field, without a copy.")
+          nb::arg("writable") = false,
+          "The rows [B, ...] of each field, without a copy; writable for who computes them.")
       .def("python_object", [](const SensorHandle& h) -> nb::object {
         auto* sensor = dynamic_cast<PythonSensor*>(h.sensor.get());
         return sensor ? sensor->self() : nb::none();

@@ -22,9 +22,8 @@ namespace {
 
 using Ids = std::optional<std::vector<int>>;
 
-// None is every world; an empty list is no world, which the C++ side would take for every.
-bool nothing(const Ids& ids) { return ids && ids->empty(); }
-std::vector<int> list_of(const Ids& ids) { return ids ? *ids : std::vector<int>{}; }
+// None is every world.
+WorldIds worlds_of(const Ids& ids) { return ids ? WorldIds(*ids) : WorldIds(all_worlds); }
 
 void step(PySimulation& self, int control_steps) {
   self.change("step", [&](Simulation& sim) { sim.step(control_steps); });
@@ -33,24 +32,20 @@ void step(PySimulation& self, int control_steps) {
 
 void reset(PySimulation& self, const Ids& ids, int key, std::optional<std::uint64_t> seed) {
   self.change("reset", [&](Simulation& sim) {
-    const std::vector<int> checked = sim.worlds().checked_ids(list_of(ids));
+    const std::vector<int> checked = sim.worlds().checked_ids(worlds_of(ids));
     if (seed) sim.seed(*seed);
-    if (!nothing(ids)) sim.reset(checked, key);
+    sim.reset(checked, key);
   });
   self.flush_resets();
 }
 
 void reset_sensors(PySimulation& self, const Ids& ids) {
-  self.change("reset_sensors", [&](Simulation& sim) {
-    if (!nothing(ids)) sim.reset_sensors(sim.worlds().checked_ids(list_of(ids)));
-  });
+  self.change("reset_sensors", [&](Simulation& sim) { sim.reset_sensors(worlds_of(ids)); });
   self.flush_resets();
 }
 
 void forward(PySimulation& self, const Ids& ids) {
-  self.change("forward", [&](Simulation& sim) {
-    if (!nothing(ids)) sim.forward(sim.worlds().checked_ids(list_of(ids)));
-  });
+  self.change("forward", [&](Simulation& sim) { sim.forward(worlds_of(ids)); });
   self.flush_resets();
 }
 
@@ -149,9 +144,7 @@ void bind_simulation(nb::module_& m) {
       .def(
           "invalidate",
           [](PySimulation& s, const Ids& ids) {
-            s.change("invalidate", [&](Simulation& sim) {
-              if (!nothing(ids)) sim.invalidate(sim.worlds().checked_ids(list_of(ids)));
-            });
+            s.change("invalidate", [&](Simulation& sim) { sim.invalidate(worlds_of(ids)); });
           },
           nb::arg("world_ids") = nb::none())
       .def(
@@ -192,10 +185,10 @@ void bind_simulation(nb::module_& m) {
           "model_changed",
           [](PySimulation& s, const Ids& ids, bool set_const) {
             s.change("randomize", [&](Simulation& sim) {
-              if (nothing(ids)) return;
-              const std::vector<int> checked = sim.worlds().checked_ids(list_of(ids));
+              const std::vector<int> checked = sim.worlds().checked_ids(worlds_of(ids));
+              if (checked.empty()) return;  // MuJoCo would take it for all
               if (set_const)
-                mjb_setConst(sim.worlds().batch(), checked.empty() ? nullptr : checked.data(),
+                mjb_setConst(sim.worlds().batch(), checked.data(),
                              static_cast<int>(checked.size()));
               sim.worlds().model_changed();
             });

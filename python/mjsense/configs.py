@@ -8,19 +8,28 @@ from __future__ import annotations
 
 import dataclasses
 import math
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
+from types import NoneType
 from typing import Any, ClassVar
 
 import mujoco
 
 from mjsense import _core
+from mjsense._arguments import KnownAttributes
 from mjsense._field_docs import show_field_docs
 
 
+class Config(KnownAttributes):
+    """Base of all configurations: C++ checks them when they are made, and a misspelt attribute is an AttributeError."""
+
+    def __post_init__(self) -> None:
+        _core.check_cfg(self)
+
+
 @dataclass(frozen=True)
-class ObjRef:
+class ObjRef(Config):
     """One MuJoCo element. Its full name is ``entity/name``, or ``name`` without an entity."""
 
     type: str = ""
@@ -37,7 +46,7 @@ class ObjRef:
 
 
 @dataclass
-class EntityCfg:
+class EntityCfg(Config):
     """A model that is attached to the scene; all its names get the prefix ``<entity>/``."""
 
     model: str | Path | mujoco.MjSpec | Callable[[], mujoco.MjSpec]
@@ -52,6 +61,13 @@ class EntityCfg:
     """Joint positions (rad, m) of the keyframe ``init_state`` by regular expression, unless the model has a keyframe."""
     mocap_base: bool = True
     """Hang a model without a free joint under the mocap body ``<entity>/mocap_base``, so that each world can place it."""
+
+    def __post_init__(self) -> None:
+        if not (isinstance(self.model, (str, Path, mujoco.MjSpec)) or callable(self.model)):
+            raise TypeError(
+                f"EntityCfg: model must be a path, XML text, a mujoco.MjSpec or a function that makes one, not {self.model!r}"
+            )
+        super().__post_init__()
 
     def _source(self) -> tuple[str, Any, dict[str, bytes]]:
         """(kind, value, assets): kind path, xml or spec."""
@@ -68,7 +84,7 @@ class EntityCfg:
 
 
 @dataclass
-class SubTerrainCfg:
+class SubTerrainCfg(Config):
     """One kind of tile. Pairs are (value at difficulty 0, value at difficulty 1)."""
 
     kind: str = "flat"
@@ -101,7 +117,7 @@ class SubTerrainCfg:
 
 
 @dataclass
-class TerrainCfg:
+class TerrainCfg(Config):
     """The ground, registered as entity ``terrain``: a plane, or tiles of rising difficulty (levels along x, types along y)."""
 
     terrain_type: str = "plane"
@@ -125,7 +141,7 @@ class TerrainCfg:
 
 
 @dataclass
-class MujocoCfg:
+class MujocoCfg(Config):
     """Physics options of a scene. Entities' own ``<option>`` values are not carried over: one scene, one physics."""
 
     timestep: float = 0.002
@@ -160,7 +176,7 @@ class MujocoCfg:
 
 
 @dataclass
-class SceneCfg:
+class SceneCfg(Config):
     """What all worlds share."""
 
     num_envs: int = 1
@@ -181,6 +197,21 @@ class SceneCfg:
     """A whole model to start from, as it is (path or XML text): names without a prefix, any number of free joints, its own
     ``<option>`` unless ``options`` are set. Its sensors are found; it is no entity."""
 
+    def __post_init__(self) -> None:
+        try:
+            entities = dict(self.entities).values()
+        except (TypeError, ValueError):
+            entities = [None]
+        if not all(isinstance(entity, EntityCfg) for entity in entities):
+            raise TypeError(f"SceneCfg: entities must be a mapping of names to EntityCfg, not {self.entities!r}")
+        if not isinstance(self.sensors, Iterable) or isinstance(self.sensors, (str, SensorCfg)):
+            raise TypeError(f"SceneCfg: sensors must be a sequence, not {self.sensors!r}")
+        if not isinstance(self.base, (str, Path, NoneType)):
+            raise TypeError(f"SceneCfg: base must be a path or XML text, not {self.base!r}")
+        if not (self.spec_fn is None or callable(self.spec_fn)):
+            raise TypeError(f"SceneCfg: spec_fn must be a function, not {self.spec_fn!r}")
+        super().__post_init__()
+
     def _base_spec(self) -> mujoco.MjSpec:
         """The spec that the scene is built in."""
         if self.base is None:
@@ -193,15 +224,12 @@ class SceneCfg:
 
 
 @dataclass
-class SensorCfg:
+class SensorCfg(Config):
     """Base of the built-in sensor configurations."""
 
     kind: ClassVar[str] = ""
     name: str
     """Key in the scene: ``scene[name]``."""
-
-    def __post_init__(self) -> None:
-        _core.check_cfg(self)
 
     @property
     def prefixed_name(self) -> str:
@@ -251,7 +279,7 @@ class BuiltinSensorCfg(SensorCfg):
 
 
 @dataclass(frozen=True)
-class ContactMatch:
+class ContactMatch(Config):
     """Which geoms or bodies take part in a contact."""
 
     mode: str
@@ -264,7 +292,7 @@ class ContactMatch:
 
 
 @dataclass
-class ContactVizCfg:
+class ContactVizCfg(Config):
     """What a viewer draws of every contact in a slot. Colours are rgba, sizes in units of the model's ``stat.meansize``."""
 
     show_points: bool = True
@@ -322,7 +350,7 @@ class ContactSensorCfg(SensorCfg):
 
 
 @dataclass(frozen=True)
-class GridPatternCfg:
+class GridPatternCfg(Config):
     """Parallel rays from the points of a grid, x fastest."""
 
     kind: ClassVar[str] = "grid"
@@ -338,7 +366,7 @@ class GridPatternCfg:
 
 
 @dataclass(frozen=True)
-class PinholeCameraPatternCfg:
+class PinholeCameraPatternCfg(Config):
     """Rays of a pinhole camera that looks along -Z: edge-inclusive, bottom row first."""
 
     kind: ClassVar[str] = "pinhole"
@@ -368,11 +396,11 @@ class PinholeCameraPatternCfg:
 
 
 @dataclass(frozen=True)
-class RingPatternCfg:
+class RingPatternCfg(Config):
     """Parallel rays from the points of circles in the XY plane, after the centre."""
 
     @dataclass(frozen=True)
-    class Ring:
+    class Ring(Config):
         radius: float = 0.1
         """m."""
         num_samples: int = 8
@@ -392,7 +420,7 @@ class RingPatternCfg:
 
 
 @dataclass(frozen=True)
-class UserPatternCfg:
+class UserPatternCfg(Config):
     """Your own rays. One direction for all offsets, or one offset for all directions, will do."""
 
     kind: ClassVar[str] = "user"
@@ -409,7 +437,7 @@ class UserPatternCfg:
 
 
 @dataclass
-class RayCastVizCfg:
+class RayCastVizCfg(Config):
     """What a viewer draws of a ray sensor. Colours are rgba, sizes in units of the model's ``stat.meansize``."""
 
     show_rays: bool = False
@@ -451,6 +479,8 @@ class RayCastSensorCfg(SensorCfg):
     """Take xbody and camera frames too, which mjlab refuses."""
 
     def __post_init__(self) -> None:
+        if not isinstance(self.any_frame, bool):
+            raise TypeError(f"{type(self).__name__} '{self.name}': any_frame must be a bool, not {self.any_frame!r}")
         for ref in (self.frame,) if isinstance(self.frame, ObjRef) else self.frame:
             if not self.any_frame and getattr(ref, "type", "") in ("xbody", "camera"):
                 raise ValueError(
@@ -470,7 +500,7 @@ class TerrainHeightSensorCfg(RayCastSensorCfg):
 
 
 @dataclass(frozen=True)
-class SpinningScanCfg:
+class SpinningScanCfg(Config):
     """Lasers over each other that turn about the frame's z axis; rays are ``[channels, samples]``."""
 
     kind: ClassVar[str] = "spinning"
@@ -493,7 +523,7 @@ class SpinningScanCfg:
 
 
 @dataclass(frozen=True)
-class TableScanCfg:
+class TableScanCfg(Config):
     """Rays from a table of (azimuth, elevation), rad: solid-state and non-repeating lidars."""
 
     kind: ClassVar[str] = "table"
@@ -529,7 +559,7 @@ class LidarSensorCfg(RayCastSensorCfg):
 
 
 @dataclass(frozen=True)
-class CameraIntrinsics:
+class CameraIntrinsics(Config):
     """Focal lengths and principal point in pixels of the image; replaces fovy."""
 
     fx: float
@@ -539,7 +569,7 @@ class CameraIntrinsics:
 
 
 @dataclass(frozen=True)
-class LensDistortion:
+class LensDistortion(Config):
     """Where a lens puts the image of a direction (X, Y, Z), z forward, y down: OpenCV's models.
 
     brown_conrady: x = X/Z, y = Y/Z, ``x' = x (1 + k1 r^2 + k2 r^4 + k3 r^6) + 2 p1 x y + p2 (r^2 + 2 x^2)``, y' alike.
@@ -553,7 +583,7 @@ class LensDistortion:
 
 
 @dataclass
-class CameraVizCfg:
+class CameraVizCfg(Config):
     """What a viewer draws of a camera: the pyramid of what it sees, and its axes (it looks along -z, the blue one)."""
 
     show_frustum: bool = True
@@ -634,6 +664,8 @@ class CameraSensorCfg(SensorCfg):
 
 def replace(cfg: Any, **changes: Any) -> Any:
     """A copy of a configuration with some fields changed."""
+    if not dataclasses.is_dataclass(cfg) or isinstance(cfg, type):
+        raise TypeError(f"replace(): cfg must be a configuration, not {cfg!r}")
     return dataclasses.replace(cfg, **changes)
 
 

@@ -5,10 +5,12 @@ from __future__ import annotations
 import numpy as np
 
 from mjsense import _core
+from mjsense._arguments import checked
 from mjsense.data import ContactData
 from mjsense.sensor import NativeSensor
 
 
+@checked
 class ContactSensor(NativeSensor):
     """Contacts of its primaries; ``data`` is a :class:`mjsense.ContactData`."""
 

@@ -1,5 +1,6 @@
 """What sensors with several fields return. All arrays are float32 unless said otherwise, [B, ...], and share memory with the
-sensor: they hold the values of the moment of the last read of ``.data``. Fields that were not asked for are None."""
+sensor: they hold the values of the moment of the last read of ``.data``, and are read-only. Fields that were not asked for are
+None."""
 
 from __future__ import annotations
 
@@ -11,7 +12,7 @@ import numpy as np
 from mjsense._field_docs import show_field_docs
 
 
-@dataclass(slots=True)
+@dataclass(slots=True, frozen=True)
 class SensorData:
     """Base: the fields of a sensor that is none of the kinds below."""
 
@@ -24,7 +25,7 @@ class SensorData:
         return f"{type(self).__name__}({shown})"
 
 
-@dataclass(slots=True, repr=False)
+@dataclass(slots=True, repr=False, frozen=True)
 class ContactData(SensorData):
     """Contacts of ``P`` primaries with ``S`` slots each; column ``p * S + s``, ``N = P * S``. A slot without contact is zero.
 
@@ -95,7 +96,7 @@ class ContactData(SensorData):
     """[B, P, S, 3] N, world, primary on secondary."""
 
 
-@dataclass(slots=True, repr=False)
+@dataclass(slots=True, repr=False, frozen=True)
 class RayCastData(SensorData):
     """Hits of ``R = F * n`` rays, frame by frame."""
 
@@ -127,7 +128,7 @@ class RayCastData(SensorData):
     """Lidars: [B, R] 0..1."""
 
 
-@dataclass(slots=True, repr=False)
+@dataclass(slots=True, repr=False, frozen=True)
 class CameraData(SensorData):
     """Images; row 0 is the top."""
 
@@ -159,7 +160,7 @@ def make_data(base: type, arrays: dict[str, np.ndarray]) -> Any:
     extra = [name for name in arrays if name not in known]
     if extra:
         namespace = {"__annotations__": {name: "np.ndarray | None" for name in extra}, **dict.fromkeys(extra)}
-        base = dataclass(repr=False)(type(base.__name__, (base,), namespace))
+        base = dataclass(repr=False, frozen=True)(type(base.__name__, (base,), namespace))
     return base(**arrays)
 
 

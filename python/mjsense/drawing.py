@@ -8,6 +8,8 @@ from typing import Any
 import mujoco
 import numpy as np
 
+from mjsense._arguments import KnownAttributes, checked
+
 _GEOMS = {
     "sphere": mujoco.mjtGeom.mjGEOM_SPHERE,
     "arrow": mujoco.mjtGeom.mjGEOM_ARROW,
@@ -17,7 +19,8 @@ _GEOMS = {
 _AXES = ((0.9, 0.0, 0.0), (0.0, 0.9, 0.0), (0.0, 0.0, 0.9))
 
 
-class DebugShapes:
+@checked
+class DebugShapes(KnownAttributes):
     """Spheres, arrows, lines and cylinders in the world frame, as NumPy arrays with one row a shape.
 
     ``draw(scene)`` puts them into a scene of MuJoCo's; the arrays serve every other viewer. It is also the visualizer that a sensor
@@ -30,6 +33,7 @@ class DebugShapes:
         self.meansize = meansize
         """m, the model's ``stat.meansize``: a size that is seen well."""
         self._blocks: list[tuple[Any, ...]] = []
+        self._complete = True
 
     def __len__(self) -> int:
         return len(self.kinds)
@@ -88,8 +92,6 @@ class DebugShapes:
 
         Returns how many found no room: a scene holds ``maxgeom`` geoms.
         """
-        if not isinstance(scene, mujoco.MjvScene):
-            raise TypeError(f"scene must be a mujoco.MjvScene (renderer.scene, viewer.user_scn), not {scene!r}")
         room = min(len(self), max(0, scene.maxgeom - scene.ngeom))
         geoms, identity = scene.geoms[scene.ngeom : scene.ngeom + room], np.eye(3).ravel()
         rows = zip(geoms, self.kinds, self.positions, self.positions + self.vectors, self.widths, self.rgba, self.labels)

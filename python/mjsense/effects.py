@@ -15,13 +15,21 @@ from dataclasses import dataclass
 from typing import Any, ClassVar
 
 from mjsense._field_docs import show_field_docs
-from mjsense.configs import SensorCfg
+from mjsense.configs import Config, SensorCfg
 
 PerComponent = float | Sequence[float]
 
 
+class Draw(Config):
+    """Base of random numbers."""
+
+
+class Effect(Config):
+    """Base of all effects."""
+
+
 @dataclass(frozen=True)
-class Gaussian:
+class Gaussian(Draw):
     """Normal distribution."""
 
     kind: ClassVar[str] = "gaussian"
@@ -30,7 +38,7 @@ class Gaussian:
 
 
 @dataclass(frozen=True)
-class Uniform:
+class Uniform(Draw):
     """[low, high)."""
 
     kind: ClassVar[str] = "uniform"
@@ -39,7 +47,7 @@ class Uniform:
 
 
 @dataclass(frozen=True)
-class Constant:
+class Constant(Draw):
     """Always the same."""
 
     kind: ClassVar[str] = "constant"
@@ -47,7 +55,7 @@ class Constant:
 
 
 @dataclass(frozen=True)
-class Noise:
+class Noise(Effect):
     """A new error for every row and component."""
 
     kind: ClassVar[str] = "noise"
@@ -66,7 +74,7 @@ class Noise:
 
 
 @dataclass(frozen=True)
-class EpisodeBias:
+class EpisodeBias(Effect):
     """A constant error within an episode (turn-on bias)."""
 
     kind: ClassVar[str] = "episode_bias"
@@ -79,7 +87,7 @@ class EpisodeBias:
 
 
 @dataclass(frozen=True)
-class BiasDrift:
+class BiasDrift(Effect):
     """First-order Gauss-Markov bias; with an infinite time constant a random walk."""
 
     kind: ClassVar[str] = "bias_drift"
@@ -93,7 +101,7 @@ class BiasDrift:
 
 
 @dataclass(frozen=True)
-class Scale:
+class Scale(Effect):
     """x <- factor x."""
 
     kind: ClassVar[str] = "scale"
@@ -102,7 +110,7 @@ class Scale:
 
 
 @dataclass(frozen=True)
-class Misalignment:
+class Misalignment(Effect):
     """Scale errors and small rotations of every three components, fixed plus drawn at every reset."""
 
     kind: ClassVar[str] = "misalignment"
@@ -116,7 +124,7 @@ class Misalignment:
 
 
 @dataclass(frozen=True)
-class Clip:
+class Clip(Effect):
     """Limits of a device, or of an observation."""
 
     kind: ClassVar[str] = "clip"
@@ -130,7 +138,7 @@ class Clip:
 
 
 @dataclass(frozen=True)
-class Quantize:
+class Quantize(Effect):
     """Rounds to multiples of step."""
 
     kind: ClassVar[str] = "quantize"
@@ -139,7 +147,7 @@ class Quantize:
 
 
 @dataclass(frozen=True)
-class NanPolicy:
+class NanPolicy(Effect):
     """What becomes of NaN and infinite values."""
 
     kind: ClassVar[str] = "nan_policy"
@@ -149,7 +157,7 @@ class NanPolicy:
 
 
 @dataclass(frozen=True)
-class Delay:
+class Delay(Effect):
     """The row of delay_s ago."""
 
     kind: ClassVar[str] = "delay"
@@ -162,7 +170,7 @@ class Delay:
 
 
 @dataclass(frozen=True)
-class StepDelay:
+class StepDelay(Effect):
     """mjlab's delay, in control steps."""
 
     kind: ClassVar[str] = "step_delay"
@@ -176,7 +184,7 @@ class StepDelay:
 
 
 @dataclass(frozen=True)
-class Rate:
+class Rate(Effect):
     """A device slower than the control loop: rows are held in between."""
 
     kind: ClassVar[str] = "rate"
@@ -187,7 +195,7 @@ class Rate:
 
 
 @dataclass(frozen=True)
-class Dropout:
+class Dropout(Effect):
     """A row is lost with this probability."""
 
     kind: ClassVar[str] = "dropout"

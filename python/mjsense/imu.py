@@ -9,13 +9,13 @@ from typing import Any, ClassVar
 import numpy as np
 
 from mjsense._field_docs import show_field_docs
-from mjsense.configs import ObjRef, SensorCfg
+from mjsense.configs import Config, ObjRef, SensorCfg
 from mjsense.data import SensorData
 from mjsense.sensor import NativeSensor
 
 
 @dataclass(frozen=True)
-class ImuAxis:
+class ImuAxis(Config):
     """Half of a device, in m/s^2 or rad/s. Tolerances are three standard deviations, drawn anew for each episode."""
 
     noise_density: float = 0.0
@@ -34,7 +34,7 @@ class ImuAxis:
 
 
 @dataclass(frozen=True)
-class ImuModel:
+class ImuModel(Config):
     """What a data sheet says of a device; what it does not say is 0."""
 
     accelerometer: ImuAxis = ImuAxis()
@@ -60,7 +60,7 @@ class ImuSensorCfg(SensorCfg):
     """After those of the device: delay, rate, dropout."""
 
 
-@dataclass(slots=True, repr=False)
+@dataclass(slots=True, repr=False, frozen=True)
 class ImuData(SensorData):
     """In the axes of the site."""
 

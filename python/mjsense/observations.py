@@ -9,17 +9,22 @@ from typing import Any
 
 import numpy as np
 
+from mjsense._arguments import checked
 
+
+@checked
 def builtin_sensor(env: Any, sensor_name: str) -> np.ndarray:
     """The sensor's value, ``[B, dim]``."""
     return np.array(env.scene[sensor_name].data)
 
 
+@checked
 def projected_gravity_from_sensor(env: Any, sensor_name: str) -> np.ndarray:
     """Direction of gravity in a body's frame ``[B, 3]``, from a sensor of the world's up vector there: its negation."""
     return -env.scene[sensor_name].data
 
 
+@checked
 def height_scan(env: Any, sensor_name: str, offset: float = 0.0, miss_value: float | None = None) -> np.ndarray:
     """Height of each ray's frame above its hit, less `offset`: ``[B, R]`` m; misses are `miss_value` (max_distance)."""
     sensor = env.scene[sensor_name]
@@ -32,22 +37,26 @@ def height_scan(env: Any, sensor_name: str, offset: float = 0.0, miss_value: flo
     return np.where(data.distances < 0, np.float32(miss_value), heights)
 
 
+@checked
 def foot_height(env: Any, sensor_name: str) -> np.ndarray:
     """Heights of a terrain height sensor, ``[B, F]`` m."""
     return np.array(env.scene[sensor_name].data.heights)
 
 
+@checked
 def foot_contact(env: Any, sensor_name: str) -> np.ndarray:
     """1 where a contact was found, ``[B, N]`` float32."""
     return (env.scene[sensor_name].data.found > 0).astype(np.float32)
 
 
+@checked
 def foot_contact_forces(env: Any, sensor_name: str) -> np.ndarray:
     """Forces compressed to sign(F) log(1 + |F|), component by component: ``[B, 3 N]``."""
     force = env.scene[sensor_name].data.force
     return (np.sign(force) * np.log1p(np.abs(force))).reshape(len(force), -1)
 
 
+@checked
 def foot_air_time(env: Any, sensor_name: str) -> np.ndarray:
     """Present time in the air, ``[B, P]`` s."""
     return np.array(env.scene[sensor_name].data.current_air_time)

@@ -9,9 +9,11 @@ from typing import Any
 import numpy as np
 
 from mjsense import _core, effects
+from mjsense._arguments import KnownAttributes, Seed, checked
 
 
-class ObservationPipeline:
+@checked
+class ObservationPipeline(KnownAttributes):
     """Noise, clip, scale, NaN policy, delay, history, in this order: ``pipeline(values)`` takes ``[B, D]`` once a control step.
 
     For sensors use :class:`mjsense.EffectSensorCfg`: the same effects, inside the simulation.
@@ -35,7 +37,7 @@ class ObservationPipeline:
         delay_per_env_phase: bool = True,
         history_length: int = 0,
         flatten_history_dim: bool = True,
-        seed: int = 0,
+        seed: Seed = 0,
     ) -> None:
         """
         Args:
@@ -71,11 +73,12 @@ class ObservationPipeline:
         self._chain: Any = None
         if operation not in ("add", "scale", "abs"):
             raise ValueError(f"operation must be add, scale or abs, not {operation!r}")
+        self._complete = True
 
     def reset(self, world_ids: Sequence[int] | None = None) -> None:
         """These worlds (None: all) forget what they have seen."""
-        if self._chain is not None and (world_ids is None or len(world_ids)):
-            self._chain.reset([] if world_ids is None else [int(w) for w in world_ids])
+        if self._chain is not None:
+            self._chain.reset(None if world_ids is None else [int(w) for w in world_ids])
 
     def __call__(self, values: Any) -> np.ndarray:
         rows = np.ascontiguousarray(values, dtype=np.float32)

@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from pathlib import Path
 
 from mjsense import _core
+from mjsense._arguments import checked
 from mjsense.data import CameraData, RayCastData
 from mjsense.sensor import NativeSensor
 
@@ -34,12 +36,15 @@ class TerrainHeightSensor(RayCastSensor):
     """Height above the ground below its frames, ``data.heights``."""
 
 
+@checked
 class LidarSensor(RayCastSensor):
     """A lidar: ``data.points``, ``data.intensity`` and all of a RayCastSensor's."""
 
-    def write_point_cloud(self, path: str, world: int = 0) -> None:
+    def write_point_cloud(self, path: str | Path, world: int = 0) -> None:
         """The returns of one world, in the sensor's frame, as .ply or .pcd."""
         data = self.data
+        if not 0 <= world < len(data.points):
+            raise ValueError(f"world {world}: must be in [0, {len(data.points)})")
         _core.write_point_cloud(str(path), data.points[world], data.intensity[world], data.distances[world])
 
 

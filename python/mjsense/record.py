@@ -9,6 +9,7 @@ from types import SimpleNamespace
 from typing import Any
 
 from mjsense import _core
+from mjsense._arguments import Seed, checked
 from mjsense.assets import use_installed_meshes
 from mjsense.sensor import Sensor
 from mjsense.simulation import Simulation
@@ -54,6 +55,7 @@ class RecordSummary(RecordProgress):
     """The folder of the episodes."""
 
 
+@checked
 def record(
     task: str = "pick",
     robot: str = "franka",
@@ -63,7 +65,7 @@ def record(
     episodes: int = 1,
     worlds: int = 4,
     threads: int = 0,
-    seed: int = 0,
+    seed: Seed = 0,
     cameras: Sequence[str] | None = None,
     width: int | None = None,
     height: int | None = None,

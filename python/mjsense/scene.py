@@ -14,6 +14,7 @@ import mujoco
 import numpy as np
 
 from mjsense import _core
+from mjsense._arguments import KnownAttributes, checked
 from mjsense.configs import SceneCfg, SensorCfg
 from mjsense.contact import ContactSensor
 from mjsense.errors import UnknownNameError
@@ -32,7 +33,7 @@ _CLASSES = {
 }
 
 
-class Entity:
+class Entity(KnownAttributes):
     """An attached model: the names of its elements, local (without the prefix), in model order."""
 
     def __init__(self, name: str, description: dict[str, Any]) -> None:
@@ -46,19 +47,18 @@ class Entity:
         self.actuator_names: tuple[str, ...] = description["actuator_names"]
         self.tendon_names: tuple[str, ...] = description["tendon_names"]
         self.camera_names: tuple[str, ...] = description["camera_names"]
+        self._complete = True
 
     def __repr__(self) -> str:
         return f"<entity '{self.name}': {len(self.body_names)} bodies, {len(self.joint_names)} joints>"
 
 
-class Scene:
+@checked
+class Scene(KnownAttributes):
     """Entities, terrain and sensors, compiled into one model. ``scene[key]`` is a sensor or, failing that, an entity."""
 
     def __init__(self, cfg: SceneCfg) -> None:
-        if not isinstance(cfg, SceneCfg):
-            raise TypeError(f"a scene is made of a SceneCfg, not {cfg!r}")
-        if isinstance(cfg.sensors, (SensorCfg, Sensor)) or not hasattr(cfg.sensors, "__iter__"):
-            raise TypeError(f"SceneCfg.sensors must be a sequence, not {cfg.sensors!r}")
+        cfg.__post_init__()  # it may have been changed since it was made
         self.cfg = cfg
         self.spec = cfg._base_spec()
         """The spec the scene is built in."""
@@ -97,6 +97,7 @@ class Scene:
         for sensor_cfg in self.cfg.sensors:
             if isinstance(sensor_cfg, SensorCfg):
                 self._sensors[sensor_cfg.prefixed_name].cfg = sensor_cfg
+        self._complete = True
 
     @staticmethod
     def _item(sensor: Any) -> Any:

@@ -13,6 +13,7 @@ import gymnasium
 import numpy as np
 
 from mjsense import _core, data
+from mjsense._arguments import KnownAttributes, checked
 from mjsense.drawing import DebugShapes
 
 if TYPE_CHECKING:
@@ -32,7 +33,8 @@ def _plain(value: Any) -> Any:
     raise TypeError(f"{type(value).__name__} is no JSON value")
 
 
-class NativeSensor:
+@checked
+class NativeSensor(KnownAttributes):
     """A sensor of the scene that C++ computes."""
 
     _data_type: type = data.SensorData
@@ -48,6 +50,7 @@ class NativeSensor:
         """builtin, contact, raycast, camera ..."""
         self.cfg: Any = None
         """Its configuration; None for a sensor that was found in the model."""
+        self._complete = True
 
     def __repr__(self) -> str:
         return f"<{self.kind} sensor '{self.name}'>"
@@ -62,8 +65,8 @@ class NativeSensor:
     def data(self) -> Any:
         """The measurement of every world as it is now: an array ``[B, ...]``, or an object with one array a field.
 
-        Computed when it is read and not current. The arrays are the sensor's own memory: the next read after a step, reset or
-        forward overwrites them. Copy what you keep.
+        Computed when it is read and not current. The arrays are the sensor's own memory, read-only: the next read after a step,
+        reset or forward overwrites them. Copy what you keep, or change.
         """
         if self._core is None:
             raise RuntimeError(f"sensor '{self.name}' has no data yet: make a Simulation of its scene first")
@@ -153,6 +156,7 @@ class Sensor:
     _mjs_scene_ref: Any = None
     _mjs_value: Any = None
     _mjs_rows: np.ndarray | None = None
+    _mjs_shown: np.ndarray | None = None
     _mjs_pending_dt: float = 0.0
 
     def __init__(self, uuid: str | None = None, observation_space: Any = None) -> None:
@@ -232,7 +236,7 @@ class Sensor:
         if self._mjs_rows is None:
             raise RuntimeError(f"sensor '{self.uuid}' has no rows: give it an observation_space, or is_dict = True")
         self._mjs_core.refresh(self._mjs_handle)
-        return self._mjs_rows
+        return self._mjs_shown
 
     def debug_shapes(self, world: int = 0) -> DebugShapes:
         """What ``debug_vis`` shows of this world."""
@@ -247,9 +251,10 @@ class Sensor:
 
     def _mjs_bind(self, sim: Simulation, handle: _core.SensorHandle) -> None:
         self._mjs_sim_ref, self._mjs_handle, self._mjs_core = weakref.ref(sim), handle, sim._core
-        self._mjs_rows = handle.arrays().get("")
+        self._mjs_rows = handle.arrays(writable=True).get("")
+        self._mjs_shown = handle.arrays().get("")
         if not self.is_dict:
-            self._mjs_value = self._mjs_rows
+            self._mjs_value = self._mjs_shown
         self._mjs_call("initialize", sim, sim)
 
     def _mjs_call(self, method: str, first: Any, owner: Any) -> None:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import difflib
-import difflib
 from collections.abc import Sequence
 from typing import Any
 
@@ -11,6 +10,7 @@ import mujoco
 import numpy as np
 
 from mjsense import _core
+from mjsense._arguments import KnownAttributes, Seed, checked
 from mjsense.drawing import DebugShapes
 from mjsense.errors import UnknownNameError
 from mjsense.scene import Scene
@@ -31,14 +31,15 @@ def _state_property(name: str, text: str) -> property:
     return property(get, put, doc=text + " Live, float64; call forward() after writing.")
 
 
-class Simulation:
+@checked
+class Simulation(KnownAttributes):
     """B worlds of a scene.
 
     After ``step()``, ``reset()`` and ``forward()`` every derived quantity and every sensor belongs to the present state. Worlds
     are independent, results are the same bit for bit at any number of threads.
     """
 
-    def __init__(self, scene: Scene, num_worlds: int | None = None, decimation: int = 1, threads: int = 0, seed: int = 0) -> None:
+    def __init__(self, scene: Scene, num_worlds: int | None = None, decimation: int = 1, threads: int = 0, seed: Seed = 0) -> None:
         """
         Args:
             scene: its sensors belong to this simulation from now on; a second one needs a scene of its own.
@@ -47,8 +48,6 @@ class Simulation:
             threads: 0 takes every CPU that this process may use.
             seed: of random numbers (noise, delays).
         """
-        if not isinstance(scene, Scene):
-            raise TypeError(f"scene must be a mjsense.Scene, not {scene!r}")
         if scene._simulation is not None:
             raise RuntimeError("this scene belongs to a simulation already: make another with Scene(scene.cfg)")
         num_worlds = scene.cfg.num_envs if num_worlds is None else num_worlds
@@ -83,6 +82,7 @@ class Simulation:
                 self._own(sensor, sensor._mjs_handle)
             else:
                 sensor._bind(self._core)
+        self._complete = True
 
     def __repr__(self) -> str:
         if self._core.closed:
@@ -115,7 +115,7 @@ class Simulation:
             for sensor in updated:
                 sensor._mjs_update_pending()
 
-    def reset(self, world_ids: Sequence[int] | None = None, *, seed: int | None = None, key: int | str | None = None) -> None:
+    def reset(self, world_ids: Sequence[int] | None = None, *, seed: Seed | None = None, key: int | str | None = None) -> None:
         """Begins a new episode.
 
         Args:
@@ -347,11 +347,16 @@ class Simulation:
 class DerivedFields:
     """Fields of mjData of every world, as they are now: ``sim.data.xpos`` is float64 ``[B, nbody, 3]``.
 
-    Like a sensor's, the arrays are overwritten by the next read after a change, and cost a copy only when they are read.
+    Like a sensor's, the arrays are read-only, overwritten by the next read after a change, and cost a copy only when they are read.
     """
 
     def __init__(self, sim: Simulation) -> None:
-        self._sim = sim
+        object.__setattr__(self, "_sim", sim)
+
+    def __setattr__(self, name: str, value: Any) -> None:
+        if name not in _STATE:
+            raise AttributeError(f"mjData.{name} is computed from the state: write {', '.join(_STATE[:4])} ...")
+        self._sim._component(name)[...] = value
 
     def __getattr__(self, name: str) -> np.ndarray:
         if name.startswith("_"):
@@ -378,4 +383,6 @@ def _ids(world_ids: Any) -> list[int] | None:
         array = np.flatnonzero(array)
     if array.size and not np.issubdtype(array.dtype, np.integer):
         raise TypeError(f"world_ids must be integers or a mask, not {world_ids!r}")
+    if array.size and not 0 <= array.min() <= array.max() < 2**31:
+        raise ValueError(f"world_ids from {array.min()} to {array.max()}: no such worlds")
     return [int(w) for w in array.reshape(-1)]

@@ -8,11 +8,13 @@ from typing import Any
 import gymnasium
 import numpy as np
 
+from mjsense._arguments import KnownAttributes, checked
 from mjsense.errors import UnknownNameError
 from mjsense.sensor import NativeSensor, Sensor
 
 
-class SensorSuite:
+@checked
+class SensorSuite(KnownAttributes):
     """An ordered set of sensors with unique names.
 
     ``suite.get_observations(sim)`` gives the arrays of all worlds ``[B, ...]``, without a copy;
@@ -21,6 +23,7 @@ class SensorSuite:
 
     def __init__(self, sensors: Iterable[Any] = ()) -> None:
         self.sensors: dict[str, Any] = {}
+        self._complete = True
         self.extend(sensors)
 
     def add(self, sensor: Any) -> None:

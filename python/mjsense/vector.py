@@ -12,11 +12,13 @@ from gymnasium.vector import AutoresetMode, VectorEnv
 from gymnasium.vector.utils import batch_space
 
 from mjsense import _core
+from mjsense._arguments import Seed, checked
 from mjsense.assets import use_installed_meshes
 from mjsense.sensor import _box
 from mjsense.simulation import Simulation
 
 
+@checked
 class TaskVectorEnv(VectorEnv):
     """``num_envs`` worlds that play episodes of a task; made by :func:`make_vec`.
 
@@ -66,7 +68,7 @@ class TaskVectorEnv(VectorEnv):
         self._ended = np.zeros(self.num_envs, bool)
         self._started = False
 
-    def reset(self, *, seed: int | None = None, options: dict[str, Any] | None = None) -> tuple[dict[str, Any], dict]:
+    def reset(self, *, seed: Seed | None = None, options: dict[str, Any] | None = None) -> tuple[dict[str, Any], dict]:
         """Begins a new episode in every world; with a seed, the first ones of that seed."""
         self._check_open()
         mask = np.ones(self.num_envs, bool)
@@ -75,8 +77,6 @@ class TaskVectorEnv(VectorEnv):
             if mask.shape != (self.num_envs,) or not (self._started or mask.all()):
                 raise ValueError(f"reset_mask: shape {mask.shape}, expected ({self.num_envs},), after a first reset of all")
         if seed is not None:
-            if not isinstance(seed, (int, np.integer)) or seed < 0:
-                raise ValueError(f"seed must be an int from 0 on, not {seed!r}")
             if seed != self._config.seed:
                 self._build(int(seed))
                 mask[:] = True
@@ -185,6 +185,7 @@ def _space(boxes: dict[str, Any]) -> gymnasium.spaces.Dict:
     return gymnasium.spaces.Dict({key: _space(box) if isinstance(box, dict) else box for key, box in boxes.items()})
 
 
+@checked
 def make_vec(
     task: str = "pick",
     robot: str = "franka",
@@ -201,7 +202,7 @@ def make_vec(
     horizon: int | None = None,
     action_noise: bool = False,
     threads: int = 0,
-    seed: int = 0,
+    seed: Seed = 0,
     render_mode: str | None = None,
 ) -> TaskVectorEnv:
     """A task as a gymnasium vector environment.

@@ -116,3 +116,43 @@ def test_verify_inspect_repair(mjsense):
     video.unlink()
     done = mjsense("verify", "data", rc=1)
     assert video.name in done.stdout
+
+
+def test_help_names_tasks_robots_and_policies(mjsense):
+    import mjsense as package
+
+    text = mjsense("record", "--help").stdout
+    for line, names in (("which task: ", package.task_names()), ("which robot: ", package.robot_names()),
+                        ("what drives it: ", package.policy_names())):  # fmt: skip
+        assert line + ", ".join(names) in text
+    assert ", ".join(package.task_names()) in mjsense("sensors", "--help").stdout
+
+
+BALL = """<mujoco><option timestep="{timestep}"/><worldbody><geom type="plane" size="1 1 1"/>
+<body name="ball" pos="{x} 0 .09"><freejoint/><geom size=".1"/><site name="imu"/></body></worldbody>
+<sensor><accelerometer name="acc" site="imu"/></sensor></mujoco>"""
+
+
+@pytest.mark.parametrize("command", (["sensors"], ["scan", "--frame", "site:imu", "--out", "x.ply"]))
+def test_scenes_in_which_nothing_can_be_measured(mjsense, command):
+    def run(rc, **values):
+        (mjsense.folder / "ball.xml").write_text(BALL.format(**{"timestep": 0.002, "x": 0, **values}))
+        return mjsense(command[0], "ball.xml", *command[1:], rc=rc)
+
+    done = run(2, x="nan")
+    assert "body_pos of body 'ball' is nan: must be finite" in done.stderr and not done.stdout
+    assert "timestep is 0" in run(2, timestep=0).stderr
+    assert "a timestep of 10 s is long" in run(0, timestep=10).stderr
+    assert not run(0).stderr
+
+
+def test_physics_that_fails_prints_no_table(mjsense):
+    stiff = BALL.format(timestep=0.002, x=0).replace("<freejoint/>", '<joint type="slide" stiffness="-1e13"/><joint damping="-1e6"/>')
+    (mjsense.folder / "ball.xml").write_text(stiff)
+    done = mjsense("sensors", "ball.xml", rc=2)
+    assert "ball.xml: the physics failed: " in done.stderr and not done.stdout
+
+
+def test_a_recording_says_what_its_sheet_shows(mjsense):
+    text = mjsense("record", "pick", "--episodes", 5, "--horizon", 2, "--keep-failures", "--size", "32x24", "-q", "--out", "d").stdout
+    assert "pictures of every camera over time (4 of 5 episodes): d/contact_sheet.png" in text

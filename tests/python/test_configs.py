@@ -86,3 +86,145 @@ def test_contact_errors():
     for kwargs in (dict(reduce="sum"), dict(num_slots=0), dict(fields=("fond",)), dict(fields=()), dict(global_frame=True)):
         with pytest.raises((ValueError, KeyError)):
             mjs.ContactSensorCfg(name="c", primary=match, **kwargs)
+
+
+# One configuration of every class that is right, and what is wrong for it: {field: (values)}. What C++ refuses, it refuses when the
+# object is made.
+SITE, BODY = mjs.ObjRef("site", "imu", "robot"), mjs.ObjRef("body", "trunk", "robot")
+MATCH = mjs.ContactMatch("geom", ".*", "robot")
+RIGHT = {
+    mjs.BuiltinSensorCfg: dict(name="a", sensor_type="gyro", obj=SITE),
+    mjs.ContactSensorCfg: dict(name="a", primary=MATCH),
+    mjs.RayCastSensorCfg: dict(name="a", frame=BODY),
+    mjs.TerrainHeightSensorCfg: dict(name="a", frame=BODY),
+    mjs.LidarSensorCfg: dict(name="a", frame=BODY),
+    mjs.CameraSensorCfg: dict(name="a"),
+    mjs.ImuSensorCfg: dict(name="a", site=SITE),
+    mjs.EffectSensorCfg: dict(name="a", sensor="b"),
+    mjs.ContactMatch: dict(mode="geom", pattern=".*", entity="robot"),
+    mjs.CameraIntrinsics: dict(fx=1.0, fy=1.0, cx=1.0, cy=1.0),
+    mjs.EntityCfg: dict(model="a.xml"),
+    mjs.RingPatternCfg.Ring: {},
+    mjs.UserPatternCfg: {},
+    mjs.TableScanCfg: dict(angles=((0.0, 0.0),)),
+    mjs.effects.Rate: dict(rate_hz=10.0),
+}
+WRONG = [
+    (mjs.ContactMatch, dict(mode="goem"), "mode is 'goem': must be one of geom, body, subtree; did you mean 'geom'"),
+    (mjs.ContactMatch, dict(pattern=()), "no pattern"),
+    (mjs.ContactMatch, dict(pattern="("), "missing|unterminated|parenthes"),
+    (mjs.ContactMatch, dict(exclude=("[",)), "ContactMatch"),
+    (mjs.ContactSensorCfg, dict(num_slots=0), "num_slots is 0"),
+    (mjs.ContactSensorCfg, dict(secondary=mjs.ContactMatch("geom", ("a", "b"))), "secondary: 2 patterns"),
+    (mjs.ContactSensorCfg, dict(viz=mjs.ContactVizCfg(), reduce="maxfroce"), "maxforce"),
+    (mjs.ContactVizCfg, dict(point_color=(2.0, 0, 0, 1)), "point_color"),
+    (mjs.ContactVizCfg, dict(axis_length=-1.0), "axis_length"),
+    (mjs.RayCastVizCfg, dict(hit_radius=-1.0), "hit_radius"),
+    (mjs.CameraVizCfg, dict(line_width=-1.0), "line_width"),
+    (mjs.GridPatternCfg, dict(resolution=0.0), "GridPatternCfg: grid resolution is 0"),
+    (mjs.GridPatternCfg, dict(direction=(0, 0, 0)), "direction"),
+    (mjs.PinholeCameraPatternCfg, dict(fovy=180.0), "fovy is 180"),
+    (mjs.PinholeCameraPatternCfg, dict(width=0), "0 x 12"),
+    (mjs.RingPatternCfg, dict(include_center=False), "no rays"),
+    (mjs.RingPatternCfg.Ring, dict(num_samples=0), "ring of radius"),
+    (mjs.UserPatternCfg, dict(times=(1.0,)), "must be 0 or before"),
+    (mjs.UserPatternCfg, dict(offsets=((0, 0, 0),) * 2, directions=((0, 0, -1),) * 3), "give as many, or one"),
+    (mjs.SpinningScanCfg, dict(channels=0), "SpinningScanCfg: channels is 0"),
+    (mjs.TableScanCfg, dict(angles=()), "no rows"),
+    (mjs.TableScanCfg, dict(rays_per_scan=5), "rays_per_scan is 5"),
+    (mjs.LidarSensorCfg, dict(dropout=1.5), "dropout is 1.5"),
+    (mjs.RayCastSensorCfg, dict(frame=mjs.ObjRef("goem", "a")), "frame 'a' is a 'goem'"),
+    (mjs.RayCastSensorCfg, dict(ray_alignment="yow"), "must be 'base', 'yaw' or 'world'"),
+    (mjs.RayCastSensorCfg, dict(name=""), "needs a name"),
+    (mjs.TerrainHeightSensorCfg, dict(reduction="men"), "did you mean"),
+    (mjs.CameraSensorCfg, dict(data_types=("rbg",)), "did you mean 'rgb'"),
+    (mjs.CameraIntrinsics, dict(fx=0.0), "fx and fy positive"),
+    (mjs.LensDistortion, dict(model="fisheye"), "takes 4 coefficients"),
+    (mjs.LensDistortion, dict(model="fishey"), "invalid distortion model"),
+    (mjs.ImuAxis, dict(range=-1.0), "range is -1"),
+    (mjs.ImuAxis, dict(bias_drift=1.0), "bias_drift_time_s is 0"),
+    (mjs.ImuSensorCfg, dict(preset="mpu6500"), "mpu6050"),
+    (mjs.ImuSensorCfg, dict(effects=(3,)), "not an effect: 3"),
+    (mjs.EffectSensorCfg, dict(sensor=""), "no sensor to read"),
+    (mjs.EffectSensorCfg, dict(history_length=-1), "history_length is -1"),
+    (mjs.effects.Dropout, dict(probability=2.0), "Dropout: probability is 2: must be between 0 and 1"),
+    (mjs.effects.Dropout, dict(mode="hodl"), "Dropout: mode is 'hodl': must be one of hold, nan, zero"),
+    (mjs.effects.Noise, dict(operation="ad"), "Noise: operation is 'ad'"),
+    (mjs.effects.Noise, dict(density=-1.0), "density is -1"),
+    (mjs.effects.Noise, dict(draw="x"), "draw"),
+    (mjs.effects.Gaussian, dict(std=-1.0), "Gaussian: std is -1"),
+    (mjs.effects.Uniform, dict(low=1.0), "low 1 is above high 0"),
+    (mjs.effects.EpisodeBias, dict(operation="set"), "operation"),
+    (mjs.effects.BiasDrift, dict(std=1.0), "needs a finite time_constant_s"),
+    (mjs.effects.BiasDrift, dict(time_constant_s=0.0), "time_constant_s is 0"),
+    (mjs.effects.Misalignment, dict(angle_std=-1.0), "angle_std is -1"),
+    (mjs.effects.Clip, dict(low=1.0, high=0.0), "low 1 is above high 0"),
+    (mjs.effects.Quantize, dict(step=-1.0), "step is -1"),
+    (mjs.effects.NanPolicy, dict(action="ignore"), "disabled, warn, sanitize"),
+    (mjs.effects.Delay, dict(delay_s=-1.0), "delay_s is -1"),
+    (mjs.effects.StepDelay, dict(min_lag=2, max_lag=1), "need 0 <= min_lag <= max_lag"),
+    (mjs.effects.Rate, dict(rate_hz=0.0), "rate_hz is 0"),
+    (mjs.MujocoCfg, dict(timestep=0.0), "timestep is 0"),
+    (mjs.MujocoCfg, dict(integrator="rk5"), "integrator = 'rk5' is not known"),
+    (mjs.MujocoCfg, dict(disableflags=("contct",)), "contact"),
+    (mjs.TerrainCfg, dict(terrain_type="hills"), "plane, generator"),
+    (mjs.TerrainCfg, dict(levels=0), "levels is 0"),
+    (mjs.SubTerrainCfg, dict(kind="stair"), "did you mean 'stairs'"),
+    (mjs.EntityCfg, dict(quat=(0, 0, 0, 0)), "no rotation"),
+    (mjs.EntityCfg, dict(model=3), "model must be a path"),
+    (mjs.EntityCfg, dict(joint_pos={"(": 0.0}), "joint_pos"),
+    (mjs.SceneCfg, dict(num_envs=0), "num_envs is 0"),
+    (mjs.SceneCfg, dict(extent=-1.0), "extent is -1"),
+    (mjs.ObjRef, dict(name=3), "name must be a str"),
+    (mjs.BuiltinSensorCfg, dict(interp="cubik"), "cubic"),
+]  # fmt: skip
+ALL = {
+    value
+    for module in (mjs, mjs.effects)
+    for value in vars(module).values()
+    if dataclasses.is_dataclass(value) and hasattr(value, "__post_init__") and value is not mjs.SensorCfg
+} | {mjs.RingPatternCfg.Ring}
+
+
+@pytest.mark.parametrize("cls, kwargs, text", WRONG, ids=lambda v: v.__name__ if isinstance(v, type) else None)
+def test_wrong_configurations_are_refused_when_they_are_made(cls, kwargs, text):
+    with pytest.raises((ValueError, KeyError, TypeError), match=text):
+        cls(**{**RIGHT.get(cls, {}), **kwargs})
+
+
+@pytest.mark.parametrize("cls", sorted(ALL, key=lambda c: c.__name__), ids=lambda c: c.__name__)
+def test_no_number_may_be_nan_and_nothing_may_be_of_another_type(cls):
+    right = RIGHT.get(cls, {})
+    made = cls(**right)
+    for field in dataclasses.fields(cls):
+        value = getattr(made, field.name)
+        nan = float("nan")
+        wrong = [object()]
+        if isinstance(value, float):
+            wrong = [nan, "x", None]
+        elif isinstance(value, bool):
+            wrong = [3, "x"]
+        elif isinstance(value, int):
+            wrong = [1.5, "x", nan]
+        elif isinstance(value, str) and field.name not in ("model",):
+            wrong = [3]
+        elif isinstance(value, tuple) and value and isinstance(value[0], float):
+            wrong = [(nan, *value[1:]), "x"]
+        for bad in wrong:
+            if field.name in ("assets", "draw") or isinstance(bad, str) and isinstance(value, str):
+                continue
+            with pytest.raises((ValueError, KeyError, TypeError)):
+                cls(**{**right, field.name: bad})
+                pytest.fail(f"{cls.__name__}({field.name}={bad!r}) is taken")
+
+
+def test_every_configuration_has_its_wrong_example():
+    assert {cls for cls, _, _ in WRONG} >= ALL - {mjs.effects.Constant, mjs.effects.Scale, mjs.ImuModel}
+
+
+def test_the_scene_says_the_same():
+    """What is made wrong after it was made right is refused by the scene, in the same words."""
+    cfg = mjs.ContactSensorCfg(name="feet", primary=MATCH)
+    cfg.num_slots = 0
+    with pytest.raises(ValueError, match="sensor 'feet': num_slots is 0: must be at least 1"):
+        mjs.Scene(mjs.SceneCfg(sensors=(cfg,)))

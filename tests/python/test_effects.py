@@ -48,17 +48,17 @@ def test_history_of_a_sensor():
 @pytest.mark.parametrize(
     "effect, text",
     [
-        (effects.Delay(-1), "delay"),
-        (effects.Dropout(2.0), "probability"),
-        (effects.Dropout(0.1, "drop"), "hold"),
-        (effects.Noise(operation="mul"), "scale"),
-        (effects.Scale((1, 2)), "factor"),
-        ("noise", "not an effect"),
+        (lambda: effects.Delay(-1), "delay"),
+        (lambda: effects.Dropout(2.0), "probability"),
+        (lambda: effects.Dropout(0.1, "drop"), "hold"),
+        (lambda: effects.Noise(operation="mul"), "scale"),
+        (lambda: effects.Scale((1, 2)), "factor"),
+        (lambda: "noise", "not an effect"),
     ],
 )
 def test_errors(effect, text):
     with pytest.raises((ValueError, TypeError), match=text):
-        simulation(effect)
+        simulation(effect())
 
 
 def test_unknown_sensor():

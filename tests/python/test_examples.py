@@ -17,7 +17,7 @@ SAYS = {"01": "landed: [9.81 9.81 9.81 9.81]", "02": "picture: (3, 48, 64, 3) ui
 
 @pytest.mark.parametrize("name", sorted(p.name for p in EXAMPLES.glob("*.py")))
 def test_example(name, tmp_path):
-    env = {**os.environ, "PYTHONPATH": str(Path(mjsense.__file__).absolute().parents[1])}
+    env = {**os.environ, "PYTHONPATH": str(Path(mjsense.__file__).absolute().parents[1]), "TMPDIR": str(tmp_path)}
     done = subprocess.run(
         [sys.executable, EXAMPLES / name], cwd=tmp_path, env=env, capture_output=True, text=True, timeout=300
     )
@@ -27,15 +27,16 @@ def test_example(name, tmp_path):
 
 @pytest.mark.skipif(not (BUILD / "CMakeCache.txt").exists(), reason="not imported from a build folder")
 def test_cpp_project(tmp_path):
-    """examples/cpp finds the installed library, builds, and takes a picture."""
+    """The installed program runs; examples/cpp finds the installed library, builds, and takes a picture."""
 
     def run(*command):
-        done = subprocess.run([str(c) for c in command], cwd=tmp_path, capture_output=True, text=True, timeout=300)
+        env = {k: v for k, v in os.environ.items() if k != "LD_LIBRARY_PATH"}
+        done = subprocess.run([str(c) for c in command], cwd=tmp_path, env=env, capture_output=True, text=True, timeout=300)
         assert done.returncode == 0, done.stdout + done.stderr
 
     run("cmake", "--install", BUILD, "--prefix", "installed")
-    run("cmake", "-S", EXAMPLES / "cpp", "-B", "build", "-G", "Ninja",
-        f"-DCMAKE_PREFIX_PATH={tmp_path / 'installed'}", f"-DPython_EXECUTABLE={sys.executable}")  # fmt: skip
+    run("installed/bin/mjsense", "sensors", EXAMPLES.parent / "models/robots/quadruped.xml")
+    run("cmake", "-S", EXAMPLES / "cpp", "-B", "build", "-G", "Ninja", f"-DCMAKE_PREFIX_PATH={tmp_path / 'installed'}")
     run("cmake", "--build", "build")
     run("build/sees", EXAMPLES.parent / "bench" / "gallery.xml", "front")
     header, pixels = (tmp_path / "front.ppm").read_bytes().split(b"255\n", 1)

@@ -18,8 +18,17 @@ def test_delay_and_partial_reset():
     pipeline = mjs.ObservationPipeline(2, delay_min_lag=2, delay_max_lag=2)
     out = [pipeline(f)[:, 0].tolist() for f in frames(3)]
     assert out == [[0, 10], [0, 10], [0, 10]]
+    pipeline.reset([])  # no world
     pipeline.reset([1])
     assert pipeline(frames(4)[3])[:, 0].tolist() == [1, 13]
+
+
+def test_reset_of_none_is_reset_of_all():
+    pipeline = mjs.ObservationPipeline(2, delay_min_lag=2, delay_max_lag=2)
+    for f in frames(3):
+        pipeline(f)
+    pipeline.reset()
+    assert pipeline(frames(4)[3])[:, 0].tolist() == [3, 13]
 
 
 def test_history_is_oldest_first_and_backfilled():

@@ -1,6 +1,5 @@
 import pydoc
 import types
-from pathlib import Path
 
 import mujoco
 
@@ -34,37 +33,6 @@ def test_registries():
     assert any(name.endswith(".xml") for name in mjs.embedded_models())
     scene = mjs.Scene(mjs.SceneCfg(entities={"robot": mjs.EntityCfg(model="embedded:franka/fr3.xml")}))
     assert scene["robot"].joint_names
-
-
-QUADRUPED = """
-<mujoco>
-  <worldbody>
-    <body name="trunk" pos="0 0 .3">
-      <freejoint/>
-      <geom type="box" size=".2 .1 .05" mass="5"/>
-      <site name="imu"/>
-      <camera name="front" pos=".2 0 0" xyaxes="0 -1 0 0 0 1"/>
-      <geom name="FL_foot" size=".03" pos=".2 .1 -.27"/>
-      <geom name="FR_foot" size=".03" pos=".2 -.1 -.27"/>
-      <geom name="RL_foot" size=".03" pos="-.2 .1 -.27"/>
-      <geom name="RR_foot" size=".03" pos="-.2 -.1 -.27"/>
-    </body>
-  </worldbody>
-</mujoco>
-"""
-
-
-def test_readme(tmp_path, monkeypatch):
-    readme = (Path(__file__).parents[2] / "README.md").read_text()
-    code = readme.split("## In Python")[1].split("```python\n")[1].split("```")[0]
-    (tmp_path / "go1.xml").write_text(QUADRUPED)
-    monkeypatch.chdir(tmp_path)
-    names = {}
-    exec(code, names)
-    scene = names["scene"]
-    assert scene["robot/imu_acc"].data.shape == (64, 3)
-    assert scene["feet"].data.force.shape == (64, 4, 3)
-    assert scene["front"].data.rgb.shape == (64, 120, 160, 3)
 
 
 def test_help_shows_every_field():

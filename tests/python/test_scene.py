@@ -66,23 +66,23 @@ def test_lookup_error_names_the_nearest():
 @pytest.mark.parametrize(
     "cfg, text",
     [
-        (dict(entities={"a": mjs.EntityCfg(model="/nowhere.xml")}), "nowhere.xml"),
-        (dict(entities={"a": mjs.EntityCfg(model="<mujoco><worldbdy/></mujoco>")}), "worldbdy"),
-        (dict(entities={"a": mjs.EntityCfg(model=17)}), "EntityCfg.model"),
-        (dict(entities={"a": mjs.EntityCfg(model=BALL, pos=(1, 2))}), "pos must be 3 numbers"),
-        (dict(entities={"a": BALL}), "entities must be a configuration"),
-        (dict(entities=None), "NoneType"),
-        (dict(terrain="plane"), "terrain must be a configuration"),
-        (dict(sensors=(17,)), "17"),
-        (dict(sensors=None), "must be a sequence"),
-        (dict(extent="big"), "extent must be a number"),
-        (dict(options=mjs.MujocoCfg(timestep=-1)), "timestep"),
-        (dict(options=mjs.MujocoCfg(iterations=1.5)), "iterations must be an int"),
+        (lambda: dict(entities={"a": mjs.EntityCfg(model="/nowhere.xml")}), "nowhere.xml"),
+        (lambda: dict(entities={"a": mjs.EntityCfg(model="<mujoco><worldbdy/></mujoco>")}), "worldbdy"),
+        (lambda: dict(entities={"a": mjs.EntityCfg(model=17)}), "EntityCfg: model must be"),
+        (lambda: dict(entities={"a": mjs.EntityCfg(model=BALL, pos=(1, 2))}), "pos must be 3 numbers"),
+        (lambda: dict(entities={"a": BALL}), "entities must be a mapping of names to EntityCfg"),
+        (lambda: dict(entities=None), "must be a mapping"),
+        (lambda: dict(terrain="plane"), "terrain must be a configuration"),
+        (lambda: dict(sensors=(17,)), "17"),
+        (lambda: dict(sensors=None), "must be a sequence"),
+        (lambda: dict(extent="big"), "extent must be a number"),
+        (lambda: dict(options=mjs.MujocoCfg(timestep=-1)), "timestep"),
+        (lambda: dict(options=mjs.MujocoCfg(iterations=1.5)), "iterations must be an int"),
     ],
 )
 def test_bad_scenes(cfg, text):
     with pytest.raises((ValueError, TypeError), match=text):
-        mjs.Scene(mjs.SceneCfg(**cfg))
+        mjs.Scene(mjs.SceneCfg(**cfg()))
 
 
 def test_entities_are_any_mapping():

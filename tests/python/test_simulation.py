@@ -77,6 +77,22 @@ def test_partial_reset(sim):
     assert not sim.time.any()
 
 
+@pytest.mark.parametrize("none", [[], (), np.array([], dtype=int), np.zeros(4, dtype=bool)])
+def test_an_empty_list_of_worlds_is_none(sim, none):
+    sim.step(3)
+    before = sim.state.copy()
+    sim.reset(none)
+    sim.reset_sensors(none)
+    sim.set_state(none, qpos=np.zeros((0, 7)))
+    sim.randomize("geom_rgba", np.zeros((0, *sim.model.geom_rgba.shape)), none)
+    sim.forward(none)
+    sim.invalidate(none)
+    np.testing.assert_array_equal(sim.state, before)
+    assert not any(sim.model.geom_rgba[-1] == 0) and (sim.time > 0).all()
+    sim.reset(None)
+    assert not sim.time.any()
+
+
 def test_reset_to_keyframe():
     xml = ARM.replace("</actuator>", '</actuator><keyframe><key qpos=".5 -.5"/></keyframe>')
     scene = mjs.Scene(mjs.SceneCfg(entities={"arm": mjs.EntityCfg(model=xml)}))

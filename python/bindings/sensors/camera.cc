@@ -1,6 +1,8 @@
 // CameraSensorCfg in Python.
 
+#include "mjsense/sensors/camera/camera_sensor.h"
 #include "mjsense/sensors/camera/camera_sensor_cfg.h"
+#include "python/bindings/bindings.h"
 #include "python/bindings/configs.h"
 
 namespace mjsense::python {
@@ -61,6 +63,12 @@ void fields(Fields& f, CameraSensorCfg& c) {
   f("renderer", c.renderer);
   f("debug_vis", c.debug_vis);
   f("viz", c.viz);
+}
+
+void bind_camera(nb::module_&) {
+  add_cfg_check<CameraIntrinsics>("CameraIntrinsics");
+  add_cfg_check<LensDistortion>("LensDistortion");
+  add_cfg_check<CameraVizCfg>("CameraVizCfg");
 }
 
 CfgKind camera_kind() { return cfg_kind<CameraSensorCfg>("camera"); }

@@ -55,6 +55,8 @@ void fields(Fields& f, ContactSensorCfg& c) {
 CfgKind contact_kind() { return cfg_kind<ContactSensorCfg>("contact"); }
 
 void bind_contact(nb::module_& m) {
+  add_cfg_check<ContactMatch>("ContactMatch");
+  add_cfg_check<ContactVizCfg>("ContactVizCfg");
   const auto tuple_of = [](const std::vector<std::string>& names) {
     nb::list list;
     for (const std::string& name : names) list.append(name);

@@ -3,6 +3,7 @@
 #include <nanobind/nanobind.h>
 
 #include "mjsense/sensors/imu/imu_sensor.h"
+#include "python/bindings/bindings.h"
 #include "python/bindings/configs.h"
 
 namespace mjsense::python {
@@ -34,6 +35,11 @@ void fields(Fields& f, ImuSensorCfg& c) {
   f("model", c.model);
   f("orientation", c.orientation);
   f("effects", c.effects);
+}
+
+void bind_imu(nb::module_&) {
+  add_cfg_check<ImuModel::Axis>("ImuAxis");
+  add_cfg_check<ImuModel>("ImuModel");
 }
 
 CfgKind imu_kind() { return cfg_kind<ImuSensorCfg>("imu"); }

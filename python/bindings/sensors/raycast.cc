@@ -167,6 +167,14 @@ nb::object rows_of(const std::vector<std::array<double, 3>>& vectors) {
 }  // namespace
 
 void bind_raycast(nb::module_& m) {
+  add_cfg_check<GridPattern>("GridPatternCfg");
+  add_cfg_check<PinholePattern>("PinholeCameraPatternCfg");
+  add_cfg_check<RingPattern::Ring>("Ring");
+  add_cfg_check<RingPattern>("RingPatternCfg");
+  add_cfg_check<UserPattern>("UserPatternCfg");
+  add_cfg_check<RayCastVizCfg>("RayCastVizCfg");
+  add_cfg_check<SpinningScan>("SpinningScanCfg");
+  add_cfg_check<TableScan>("TableScanCfg");
   m.def(
       "pattern_rays",
       [](nb::handle config) {

@@ -2,6 +2,7 @@
 // input.
 
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 #include <mujoco/mujoco.h>
 
 #include <CLI/CLI.hpp>
@@ -26,10 +27,16 @@ namespace {
 constexpr int kFailed = 1;
 constexpr int kWrongInput = 2;
 
+// "which task: pick, place"
+std::string one_of(const std::string& what, const std::vector<std::string>& names) {
+  return fmt::format("{}: {}", what, fmt::join(names, ", "));
+}
+
 // Options that record and sensors share.
 void add_rollout_options(CLI::App& app, RolloutCfg& cfg) {
-  app.add_option("--robot", cfg.robot, "which robot")->capture_default_str();
-  app.add_option("--policy", cfg.policy, "what drives it")->capture_default_str();
+  app.add_option("--robot", cfg.robot, one_of("which robot", robot_names()))->capture_default_str();
+  app.add_option("--policy", cfg.policy, one_of("what drives it", policy_names()))
+      ->capture_default_str();
   app.add_option("--threads", cfg.threads, "0: every CPU this process may use")
       ->capture_default_str();
   app.add_option("--seed", cfg.seed, "same seed, same episodes")->capture_default_str();
@@ -51,7 +58,8 @@ void add_rollout_options(CLI::App& app, RolloutCfg& cfg) {
 CLI::App& add_record(CLI::App& program, RecordOptions& options) {
   RecordJobCfg& job = options.job;
   CLI::App& app = *program.add_subcommand("record", "play episodes of a task and keep them");
-  app.add_option("task", job.rollout.task, "which task")->capture_default_str();
+  app.add_option("task", job.rollout.task, one_of("which task", task_names()))
+      ->capture_default_str();
   add_rollout_options(app, job.rollout);
   app.add_option("--episodes", job.episodes, "how many to keep")->capture_default_str();
   app.add_option("--worlds", job.rollout.num_worlds, "how many run at one time")
@@ -84,7 +92,7 @@ constexpr int kMostSteps = 1'000'000'000;
 
 CLI::App& add_sensors(CLI::App& program, SensorsOptions& options) {
   CLI::App& app = *program.add_subcommand("sensors", "what is measured, and what it costs");
-  app.add_option("what", options.what, "an MJCF file or the name of a task")
+  app.add_option("what", options.what, one_of("an MJCF file or the name of a task", task_names()))
       ->required()
       ->type_name("SCENE.xml|TASK");
   add_rollout_options(app, options.rollout);

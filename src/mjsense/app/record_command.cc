@@ -62,7 +62,12 @@ std::vector<std::pair<std::string, double>> time_split(const RecordSummary& s) {
   return split;
 }
 
-std::string summary_text(const RecordSummary& s, const std::string& sheet) {
+// A picture of the recording, and what it shows.
+struct Sheet {
+  std::string path, shows;
+};
+
+std::string summary_text(const RecordSummary& s, const Sheet& sheet) {
   const RecordProgress& p = s.progress;
   const int ended = p.succeeded + p.failed;
   std::string out;
@@ -90,11 +95,12 @@ std::string summary_text(const RecordSummary& s, const std::string& sheet) {
     out += fmt::format("\n{}{} in all\n", tree_text(s.house_dir.string()),
                        bytes_text(static_cast<double>(bytes_below(s.house_dir))));
   }
-  if (!sheet.empty()) out += "\npictures of every camera over time: " + sheet + "\n";
+  if (!sheet.path.empty())
+    out += fmt::format("\npictures of every camera over time ({}): {}\n", sheet.shows, sheet.path);
   return out;
 }
 
-std::string summary_json(const RecordSummary& s, const std::string& sheet) {
+std::string summary_json(const RecordSummary& s, const Sheet& sheet) {
   nlohmann::json out;
   const RecordProgress& p = s.progress;
   out["kept"] = p.kept;
@@ -114,7 +120,7 @@ std::string summary_json(const RecordSummary& s, const std::string& sheet) {
   out["write_s"] = s.record.write_s + s.record.commit_s;
   out["raw_bytes"] = s.record.raw_bytes;
   out["path"] = s.house_dir.string();
-  out["contact_sheet"] = sheet.empty() ? nlohmann::json() : nlohmann::json(sheet);
+  out["contact_sheet"] = sheet.path.empty() ? nlohmann::json() : nlohmann::json(sheet.path);
   return out.dump(2) + "\n";
 }
 
@@ -164,11 +170,11 @@ int run_record(const RecordOptions& options) {
     }
     line.finish();
   }
-  std::string sheet;
+  Sheet sheet;
   if (options.sheet && summary.progress.kept > 0 && summary.progress.frames > 0 &&
       !summary.interrupted) {
-    sheet = (job.out / "contact_sheet.png").string();
-    contact_sheet(summary.house_dir, sheet, 4, 8, job.video.ffmpeg);
+    sheet.path = (job.out / "contact_sheet.png").string();
+    sheet.shows = contact_sheet(summary.house_dir, sheet.path, 4, 8, job.video.ffmpeg);
   }
   if (options.json) {
     fmt::print("{}", summary_json(summary, sheet));

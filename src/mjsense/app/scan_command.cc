@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <memory>
 
+#include "mjsense/app/scene_file.h"
 #include "mjsense/core/error.h"
 #include "mjsense/scene/scene.h"
 #include "mjsense/sensors/lidar/point_cloud.h"
@@ -30,8 +31,10 @@ int run_scan(const ScanOptions& options) {
   cfg.base.path = options.scene;
   cfg.sensors.push_back(lidar);
   const auto scene = std::make_shared<Scene>(std::move(cfg));
+  print_warnings(*scene);
   Simulation simulation(scene, {.decimation = std::max(1, options.steps)});
   if (options.steps > 0) simulation.step();
+  check_physics(simulation, options.scene);
   Sensor& sensor = scene->sensor("scan");
   simulation.refresh(sensor);
   const auto rows = [&](const char* field) { return sensor.field(field).data.row<float>(0); };

@@ -6,6 +6,7 @@
 #include <nlohmann/json.hpp>
 #include <set>
 
+#include "mjsense/app/scene_file.h"
 #include "mjsense/app/table.h"
 #include "mjsense/core/error.h"
 
@@ -93,13 +94,14 @@ std::vector<Line> task_lines(Rollout& rollout, int steps) {
   return lines_of(rollout.simulation(), sensors, taken + (steps > 0 ? 1 : 0));
 }
 
-std::vector<Line> scene_lines(Simulation& simulation, int steps) {
+std::vector<Line> scene_lines(Simulation& simulation, int steps, const std::string& place) {
   std::vector<Sensor*> sensors;
   for (const auto& sensor : simulation.scene().sensors()) sensors.push_back(sensor.get());
   simulation.measure_cost(true);
   for (int k = 0; k < steps; ++k) {
     simulation.step();
     simulation.refresh(sensors);
+    check_physics(simulation, place);
   }
   return lines_of(simulation, sensors, steps);
 }
@@ -115,7 +117,8 @@ int run_sensors(const SensorsOptions& options) {
     SceneCfg cfg;
     cfg.base.path = options.what;
     Simulation simulation(std::make_shared<Scene>(std::move(cfg)), {});
-    print(scene_lines(simulation, options.steps), options.json);
+    print_warnings(simulation.scene());
+    print(scene_lines(simulation, options.steps, options.what), options.json);
     return 0;
   }
   RolloutCfg rollout_cfg = options.rollout;

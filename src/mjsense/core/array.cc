@@ -97,6 +97,11 @@ Array Array::shared(Array& owner, DType dtype, const Shape& shape) {
 
 void Array::fill_zero() { std::memset(data_.get(), 0, bytes()); }
 
+void Array::throw_other_type(DType asked) const {
+  throw RuntimeError(fmt::format("an array {} of {} is read as {}", shape_.str(),
+                                 dtype_name(dtype_), dtype_name(asked)));
+}
+
 void Array::Free::operator()(std::byte* p) const {
   if (owned) ::operator delete[](p, kAlign);
 }

@@ -104,21 +104,26 @@ class Array {
   std::byte* row_data(int w) { return data_.get() + w * row_bytes(); }
   const std::byte* row_data(int w) const { return data_.get() + w * row_bytes(); }
 
-  // Row w as a flat span. T must be the array's element type.
+  // Row w as a flat span. T must be the array's element type: RuntimeError if it is another, whose
+  // rows would not end where these do.
   template <class T>
   std::span<T> row(int w) {
+    check_type<T>();
     return {reinterpret_cast<T*>(row_data(w)), row_elements_};
   }
   template <class T>
   std::span<const T> row(int w) const {
+    check_type<T>();
     return {reinterpret_cast<const T*>(row_data(w)), row_elements_};
   }
   template <class T>
   std::span<T> all() {
+    check_type<T>();
     return {reinterpret_cast<T*>(data()), static_cast<std::size_t>(shape_.size())};
   }
   template <class T>
   std::span<const T> all() const {
+    check_type<T>();
     return {reinterpret_cast<const T*>(data()), static_cast<std::size_t>(shape_.size())};
   }
 
@@ -126,6 +131,13 @@ class Array {
   void fill_zero();
 
  private:
+  template <class T>
+  void check_type() const {
+    if (dtype_of<T>() != dtype_) [[unlikely]]
+      throw_other_type(dtype_of<T>());
+  }
+  [[noreturn]] void throw_other_type(DType asked) const;
+
   struct Free {
     Free() : owned(true) {}
     explicit Free(bool owned) : owned(owned) {}

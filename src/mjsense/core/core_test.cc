@@ -5,6 +5,7 @@
 #include <cmath>
 #include <limits>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "mjsense/core/array.h"
@@ -18,6 +19,20 @@ namespace {
 
 using ::testing::ElementsAre;
 using ::testing::HasSubstr;
+
+TEST(Array, RowsOfAnotherTypeAreErrors) {
+  Array a(DType::kFloat32, {3, 2});
+  EXPECT_EQ(a.row<float>(2).size(), 2u);
+  EXPECT_THROW(a.row<double>(2), RuntimeError);
+  EXPECT_THROW(a.row<std::int32_t>(0), RuntimeError);
+  EXPECT_THROW(a.all<std::uint8_t>(), RuntimeError);
+  try {
+    std::as_const(a).row<double>(0);
+    FAIL();
+  } catch (const RuntimeError& e) {
+    EXPECT_STREQ(e.what(), "an array (3, 2) of float32 is read as float64");
+  }
+}
 
 TEST(Array, RowsAreDenseAlignedAndZero) {
   Array a(DType::kFloat32, {3, 2, 5});

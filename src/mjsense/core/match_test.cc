@@ -6,12 +6,12 @@
 
 #include <cstdio>
 #include <cstdlib>
-#include <filesystem>
 #include <fstream>
 #include <iostream>
 #include <sstream>
 
 #include "mjsense/core/error.h"
+#include "mjsense/core/testing/temp_dir.h"
 
 namespace mjsense {
 namespace {
@@ -225,8 +225,8 @@ std::string ours(const std::vector<std::string>& patterns, const std::vector<std
 }
 
 TEST(Match, TenThousandListsAgainstPython) {
-  const std::string script =
-      (std::filesystem::path(::testing::TempDir()) / "mjsense_match_oracle.py").string();
+  const testing::TempDir dir;
+  const std::string script = dir.file("oracle.py");
   std::ofstream(script) << kOracle;
   const char* given = std::getenv("MJSENSE_MATCH_SEED");
   const std::string seed = given ? given : "1";

@@ -6,9 +6,15 @@
 #include <cmath>
 #include <cstdio>
 
+#include "mjsense/core/checks.h"
 #include "mjsense/core/error.h"
 
 namespace mjsense {
+
+void Scale::validate(std::string_view place) const {
+  check_values(factor, place, "factor");
+  require_finite(factor, place, "factor");
+}
 
 void Scale::initialize(const EffectInit& init) {
   check_numeric(init);
@@ -19,14 +25,18 @@ void Scale::apply(const EffectMoment& /*moment*/, const EffectRow& row) {
   row.transform([&](double x, int i) { return x * component(factor, i); });
 }
 
+void Misalignment::validate(std::string_view place) const {
+  require_finite(scale_error, place, "scale_error");
+  require_finite(angle, place, "angle");
+  require_not_negative(scale_error_std, place, "scale_error_std");
+  require_not_negative(angle_std, place, "angle_std");
+}
+
 void Misalignment::initialize(const EffectInit& init) {
   check_numeric(init);
   if (init.size % 3 != 0) {
     throw ValueError(
         fmt::format("{}: needs rows of 3-vectors, the row has {} values", init.place, init.size));
-  }
-  if (scale_error_std < 0 || angle_std < 0) {
-    throw ValueError(fmt::format("{}: a standard deviation is negative", init.place));
   }
   stream_ = init.stream;
   matrix_.assign(static_cast<std::size_t>(init.num_worlds) * 9, 0.0);
@@ -69,16 +79,16 @@ void Misalignment::apply(const EffectMoment& moment, const EffectRow& row) {
   }
 }
 
+void Clip::validate(std::string_view place) const {
+  check_values(low, place, "low");
+  check_values(high, place, "high");
+  check_order(low, high, place);
+}
+
 void Clip::initialize(const EffectInit& init) {
   check_numeric(init);
   check_components(low, "low", init);
   check_components(high, "high", init);
-  for (int i = 0; i < init.size; ++i) {
-    if (component(low, i) > component(high, i)) {
-      throw ValueError(fmt::format("{}: low {} is above high {}", init.place, component(low, i),
-                                   component(high, i)));
-    }
-  }
 }
 
 void Clip::apply(const EffectMoment& /*moment*/, const EffectRow& row) {
@@ -89,12 +99,14 @@ void Clip::apply(const EffectMoment& /*moment*/, const EffectRow& row) {
   });
 }
 
+void Quantize::validate(std::string_view place) const {
+  check_values(step, place, "step");
+  require_not_negative(step, place, "step");
+}
+
 void Quantize::initialize(const EffectInit& init) {
   check_numeric(init);
   check_components(step, "step", init);
-  for (double s : step) {
-    if (s < 0) throw ValueError(fmt::format("{}: step is {}: must not be negative", init.place, s));
-  }
 }
 
 void Quantize::apply(const EffectMoment& /*moment*/, const EffectRow& row) {
@@ -109,7 +121,8 @@ NanPolicy::Action NanPolicy::action_from_name(std::string_view name) {
   for (int i = 0; i < 4; ++i) {
     if (names[i] == name) return static_cast<Action>(i);
   }
-  throw ValueError(fmt::format("nan_policy '{}': must be disabled, warn, sanitize or error", name));
+  throw ValueError(
+      fmt::format("nan_policy is '{}': must be one of disabled, warn, sanitize, error", name));
 }
 
 void NanPolicy::initialize(const EffectInit& init) {

@@ -20,6 +20,7 @@ struct Scale : Effect {
   explicit Scale(PerComponent factor) : factor(std::move(factor)) {}
   std::unique_ptr<Effect> clone() const override { return std::make_unique<Scale>(*this); }
   std::string kind() const override { return "scale"; }
+  void validate(std::string_view place) const override;
   void initialize(const EffectInit& init) override;
   void apply(const EffectMoment& moment, const EffectRow& row) override;
 };
@@ -32,6 +33,7 @@ struct Misalignment : Effect {
 
   std::unique_ptr<Effect> clone() const override { return std::make_unique<Misalignment>(*this); }
   std::string kind() const override { return "misalignment"; }
+  void validate(std::string_view place) const override;
   void initialize(const EffectInit& init) override;
   void reset(const EffectMoment& moment) override;
   void apply(const EffectMoment& moment, const EffectRow& row) override;
@@ -52,6 +54,7 @@ struct Clip : Effect {
   static Clip saturation(double range) { return {{-range}, {range}}; }
   std::unique_ptr<Effect> clone() const override { return std::make_unique<Clip>(*this); }
   std::string kind() const override { return "clip"; }
+  void validate(std::string_view place) const override;
   void initialize(const EffectInit& init) override;
   void apply(const EffectMoment& moment, const EffectRow& row) override;
 };
@@ -64,6 +67,7 @@ struct Quantize : Effect {
   explicit Quantize(PerComponent step) : step(std::move(step)) {}
   std::unique_ptr<Effect> clone() const override { return std::make_unique<Quantize>(*this); }
   std::string kind() const override { return "quantize"; }
+  void validate(std::string_view place) const override;
   void initialize(const EffectInit& init) override;
   void apply(const EffectMoment& moment, const EffectRow& row) override;
 };

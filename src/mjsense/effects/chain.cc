@@ -8,6 +8,21 @@
 
 namespace mjsense {
 
+namespace {
+
+std::string place_of(const Effects& effects, std::size_t i, std::string_view place) {
+  return fmt::format("{}, effect {} ({})", place, i, effects[i]->kind());
+}
+
+}  // namespace
+
+void validate(const Effects& effects, std::string_view place) {
+  for (std::size_t i = 0; i < effects.size(); ++i) {
+    if (!effects[i]) throw ValueError(fmt::format("{}: effect {} is null", place, i));
+    effects[i]->validate(place_of(effects, i, place));
+  }
+}
+
 EffectChain::EffectChain(std::string name, const SensorSpec& input, const EffectChainCfg& cfg,
                          int num_worlds, double tick_s, double period)
     : spec_(input),
@@ -20,10 +35,11 @@ EffectChain::EffectChain(std::string name, const SensorSpec& input, const Effect
     throw ValueError(
         fmt::format("sensor '{}': history_length is {}: negative", name, cfg.history_length));
   }
+  const std::string place = fmt::format("sensor '{}'", name);
+  validate(cfg.effects, place);
   for (std::size_t i = 0; i < cfg.effects.size(); ++i) {
-    const std::string kind = cfg.effects[i]->kind();
     EffectInit init;
-    init.place = fmt::format("sensor '{}', effect {} ({})", name, i, kind);
+    init.place = place_of(cfg.effects, i, place);
     init.num_worlds = num_worlds;
     init.dtype = dtype_;
     init.size = size_;

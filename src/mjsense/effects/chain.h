@@ -6,6 +6,7 @@
 #include <memory>
 #include <span>
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include "mjsense/core/spec.h"
@@ -14,6 +15,9 @@
 namespace mjsense {
 
 using Effects = std::vector<std::shared_ptr<const Effect>>;
+
+// Throws ValueError for an effect that is null or wrong whatever row it meets: "<place>, effect 1 (dropout): ...".
+void validate(const Effects& effects, std::string_view place);
 
 struct EffectChainCfg {
   Effects effects;  // applied in this order

@@ -7,6 +7,7 @@
 #include <memory>
 #include <span>
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include "mjsense/core/array.h"
@@ -78,7 +79,10 @@ class Effect {
   virtual std::unique_ptr<Effect> clone() const = 0;
   virtual std::string kind() const = 0;
 
-  // Checks the configuration, throws ValueError; allocates. Nothing allocates afterwards.
+  // Throws ValueError for what is wrong whatever row it will meet: when a configuration is made, and before
+  // initialize(). `place` starts the message.
+  virtual void validate(std::string_view /*place*/) const {}
+  // Throws ValueError for what does not suit the row; allocates. Nothing allocates afterwards.
   virtual void initialize(const EffectInit& init) = 0;
   virtual void apply(const EffectMoment& moment, const EffectRow& row) = 0;
   // A new episode of this world; apply() with first follows.
@@ -95,6 +99,11 @@ using PerComponent = std::vector<double>;
 inline double component(const PerComponent& values, int i) {
   return values.size() == 1 ? values[0] : values[i];
 }
+// At least one value, none of them NaN.
+void check_values(const PerComponent& values, std::string_view place, std::string_view name);
+// No component of `low` above that of `high`.
+void check_order(const PerComponent& low, const PerComponent& high, std::string_view place);
+// One value, or as many as the row has.
 void check_components(const PerComponent& values, const char* name, const EffectInit& init);
 void check_numeric(const EffectInit& init);  // float32 or float64, else ValueError
 
@@ -110,7 +119,8 @@ struct Draw {
   static Draw uniform(PerComponent low, PerComponent high);
   static Draw constant(PerComponent value);
 
-  void check(const EffectInit& init) const;
+  void validate(std::string_view place) const;
+  void check(const EffectInit& init) const;  // that it suits the row
   double sample(Rng& rng, int i) const;
 };
 

@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <utility>
 
+#include "mjsense/core/checks.h"
 #include "mjsense/core/error.h"
 #include "mjsense/scene/scene.h"
 
@@ -22,8 +23,10 @@ ChainTick tick_of(const World& world) {
 }  // namespace
 
 std::unique_ptr<Sensor> EffectSensorCfg::build() const {
-  if (sensor.empty())
-    throw ValueError(fmt::format("sensor '{}': no sensor to read is given", name));
+  const std::string place = sensor_place(name);
+  if (sensor.empty()) throw ValueError(fmt::format("{}: no sensor to read is given", place));
+  require_not_negative(history_length, place, "history_length");
+  validate(effects, place);
   return std::make_unique<EffectSensor>(*this);
 }
 

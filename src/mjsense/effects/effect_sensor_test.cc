@@ -95,7 +95,7 @@ TEST(EffectSensor, BitEqualAtAnyBatchAndThreadCount) {
   alone.reset();
   for (int k = 0; k < 60; ++k) {
     for (auto& sim : sims) {
-      if (k % 20 == 10) sim->reset({{kAlone}});
+      if (k % 20 == 10) sim->reset(std::vector<int>{kAlone});
       sim->step();
       sim->refresh(sim->scene().sensor("noisy"));
     }

@@ -13,6 +13,7 @@
 #include "mjsense/core/error.h"
 #include "mjsense/core/testing/allocations.h"
 #include "mjsense/effects/chain.h"
+#include "mjsense/effects/effect_sensor.h"
 #include "mjsense/effects/pipeline.h"
 
 namespace mjsense {
@@ -422,10 +423,42 @@ TEST(Chain, ErrorsNameSensorEffectAndValue) {
               HasSubstr("sensor 'test', effect 0 (noise): std has 2 values: must be 1, or 3"));
   EXPECT_THAT(message(one(Noise(Draw::gaussian({-1})))), HasSubstr("std is -1"));
   EXPECT_THAT(message(one(Clip({2}, {1}))), HasSubstr("low 2 is above high 1"));
-  EXPECT_THAT(message(one(Rate(0))), HasSubstr("rate_hz is 0: must be positive"));
+  EXPECT_THAT(message(one(Rate(0))), HasSubstr("rate_hz is 0: must be above 0"));
   EXPECT_THAT(message(one(Dropout(1.5))), HasSubstr("probability is 1.5"));
   EXPECT_THAT(message(one(Misalignment()), 4), HasSubstr("3-vectors"));
   EXPECT_THAT(message(one(Delay(-1))), HasSubstr("delay_s is -1"));
+}
+
+TEST(EffectSensor, RefusesAWrongEffectBeforeThereIsARow) {
+  const auto message = [](Effects effects) -> std::string {
+    EffectSensorCfg cfg;
+    cfg.name = "noisy";
+    cfg.sensor = "clean";
+    cfg.effects = std::move(effects);
+    try {
+      cfg.build();
+    } catch (const ValueError& e) {
+      return e.what();
+    }
+    return "";
+  };
+  const double nan = std::nan("");
+  EXPECT_EQ(message(one(Dropout(0.5))), "");
+  EXPECT_EQ(message(one(Dropout(2))),
+            "sensor 'noisy', effect 0 (dropout): probability is 2: must be between 0 and 1");
+  EXPECT_THAT(message({nullptr}), HasSubstr("effect 0 is null"));
+  StepDelay lags(2, 1);
+  BiasDrift drift;
+  drift.std = {-1};
+  Misalignment tilt;
+  tilt.angle = {nan, 0, 0};
+  for (const Effects& wrong :
+       {one(Noise(Draw::gaussian({nan}))), one(Noise(Draw::uniform({1}, {0}))),
+        one(Noise(Draw::constant({}))), one(EpisodeBias(Draw::gaussian({-1}))), one(drift),
+        one(Scale({nan})), one(tilt), one(Clip({2}, {1})), one(Quantize({-1})), one(Delay(nan)),
+        one(lags), one(Rate(nan)), one(Dropout(nan))}) {
+    EXPECT_THAT(message(wrong), HasSubstr("sensor 'noisy', effect 0"));
+  }
 }
 
 TEST(Chain, AllocatesNothing) {

@@ -6,6 +6,7 @@
 #include <cmath>
 #include <utility>
 
+#include "mjsense/core/checks.h"
 #include "mjsense/core/error.h"
 
 namespace mjsense {
@@ -18,14 +19,17 @@ Noise Noise::with_density(PerComponent density) {
   return n;
 }
 
+void Noise::validate(std::string_view place) const {
+  draw.validate(place);
+  check_values(density, place, "density");
+  require_not_negative(density, place, "density");
+}
+
 void Noise::initialize(const EffectInit& init) {
   check_numeric(init);
   draw.check(init);
   check_components(density, "density", init);
-  for (double d : density) {
-    if (d < 0) throw ValueError(fmt::format("{}: density is {}: negative", init.place, d));
-    has_density_ |= d > 0;
-  }
+  has_density_ = std::ranges::any_of(density, [](double d) { return d > 0; });
   if (has_density_ && !(init.period > 0)) {
     throw ValueError(fmt::format("{}: a density needs a period > 0", init.place));
   }
@@ -43,6 +47,8 @@ void Noise::apply(const EffectMoment& moment, const EffectRow& row) {
 }
 
 EpisodeBias::EpisodeBias(Draw d, Operation op) : draw(std::move(d)), operation(op) {}
+
+void EpisodeBias::validate(std::string_view place) const { draw.validate(place); }
 
 void EpisodeBias::initialize(const EffectInit& init) {
   check_numeric(init);
@@ -70,18 +76,22 @@ void EpisodeBias::apply(const EffectMoment& moment, const EffectRow& row) {
   row.transform([&](double x, int i) { return x + bias[i]; });
 }
 
+void BiasDrift::validate(std::string_view place) const {
+  for (const auto& [name, values] : {std::pair{"std", &std}, std::pair{"density", &density}}) {
+    check_values(*values, place, name);
+    require_not_negative(*values, place, name);
+  }
+  require(time_constant_s > 0, place, "time_constant_s", time_constant_s, "positive");
+  if (std::isinf(time_constant_s) && std::ranges::any_of(std, [](double s) { return s > 0; })) {
+    throw ValueError(
+        fmt::format("{}: std needs a finite time_constant_s; a random walk has density", place));
+  }
+}
+
 void BiasDrift::initialize(const EffectInit& init) {
   check_numeric(init);
   check_components(std, "std", init);
   check_components(density, "density", init);
-  if (!(time_constant_s > 0)) {
-    throw ValueError(
-        fmt::format("{}: time_constant_s is {}: must be positive", init.place, time_constant_s));
-  }
-  if (std::isinf(time_constant_s) && std::ranges::any_of(std, [](double s) { return s > 0; })) {
-    throw ValueError(fmt::format(
-        "{}: std needs a finite time_constant_s; a random walk has density", init.place));
-  }
   stream_ = init.stream;
   size_ = init.size;
   bias_.assign(static_cast<std::size_t>(init.num_worlds) * init.size, 0.0);

@@ -24,6 +24,7 @@ struct Noise : Effect {
 
   std::unique_ptr<Effect> clone() const override { return std::make_unique<Noise>(*this); }
   std::string kind() const override { return "noise"; }
+  void validate(std::string_view place) const override;
   void initialize(const EffectInit& init) override;
   void apply(const EffectMoment& moment, const EffectRow& row) override;
 
@@ -46,6 +47,7 @@ struct EpisodeBias : Effect {
 
   std::unique_ptr<Effect> clone() const override { return std::make_unique<EpisodeBias>(*this); }
   std::string kind() const override { return "episode_bias"; }
+  void validate(std::string_view place) const override;
   void initialize(const EffectInit& init) override;
   void reset(const EffectMoment& moment) override;
   void apply(const EffectMoment& moment, const EffectRow& row) override;
@@ -68,6 +70,7 @@ struct BiasDrift : Effect {
 
   std::unique_ptr<Effect> clone() const override { return std::make_unique<BiasDrift>(*this); }
   std::string kind() const override { return "bias_drift"; }
+  void validate(std::string_view place) const override;
   void initialize(const EffectInit& init) override;
   void apply(const EffectMoment& moment, const EffectRow& row) override;
   bool eager() const override { return true; }

@@ -7,19 +7,13 @@
 #include <cstring>
 #include <limits>
 
+#include "mjsense/core/checks.h"
 #include "mjsense/core/error.h"
 
 namespace mjsense {
 namespace {
 
 constexpr double kTimeEps = 1e-9;  // s, against the rounding of tick * period
-
-void check_not_negative(double x, const char* name, const EffectInit& init) {
-  if (!(x >= 0) || std::isinf(x)) {
-    throw ValueError(
-        fmt::format("{}: {} is {}: must be finite and not negative", init.place, name, x));
-  }
-}
 
 }  // namespace
 
@@ -56,10 +50,13 @@ double FrameRing::time(int world, int age) const {
   return times_[index(world, std::min(age, count_[world] - 1))];
 }
 
+void Delay::validate(std::string_view place) const {
+  require_not_negative(delay_s, place, "delay_s");
+  require_not_negative(delay_max_s, place, "delay_max_s");
+  require_not_negative(jitter_s, place, "jitter_s");
+}
+
 void Delay::initialize(const EffectInit& init) {
-  check_not_negative(delay_s, "delay_s", init);
-  check_not_negative(delay_max_s, "delay_max_s", init);
-  check_not_negative(jitter_s, "jitter_s", init);
   if (interpolate) check_numeric(init);
   if (!(init.period > 0)) throw ValueError(fmt::format("{}: needs a period > 0", init.place));
   const double longest = std::max(delay_s, delay_max_s) + jitter_s;
@@ -102,18 +99,16 @@ void Delay::apply(const EffectMoment& moment, const EffectRow& row) {
   }
 }
 
-void StepDelay::initialize(const EffectInit& init) {
+void StepDelay::validate(std::string_view place) const {
   if (min_lag < 0 || max_lag < min_lag) {
-    throw ValueError(fmt::format("{}: lags [{}, {}]: need 0 <= min_lag <= max_lag", init.place,
-                                 min_lag, max_lag));
-  }
-  if (!(hold_probability >= 0 && hold_probability <= 1)) {
     throw ValueError(
-        fmt::format("{}: hold_probability is {}: must be in [0, 1]", init.place, hold_probability));
+        fmt::format("{}: lags [{}, {}]: need 0 <= min_lag <= max_lag", place, min_lag, max_lag));
   }
-  if (update_period < 0) {
-    throw ValueError(fmt::format("{}: update_period is {}: negative", init.place, update_period));
-  }
+  require_probability(hold_probability, place, "hold_probability");
+  require_not_negative(update_period, place, "update_period");
+}
+
+void StepDelay::initialize(const EffectInit& init) {
   ring_.initialize(init.num_worlds, init.size * dtype_size(init.dtype), max_lag + 1);
   lag_.assign(init.num_worlds, 0);
   rows_.assign(init.num_worlds, 0);
@@ -151,10 +146,12 @@ void StepDelay::apply(const EffectMoment& moment, const EffectRow& row) {
   std::memcpy(row.data, ring_.frame(w, lag_[w]), row.bytes());
 }
 
+void Rate::validate(std::string_view place) const {
+  require_positive(rate_hz, place, "rate_hz");
+  require_finite(phase_s, place, "phase_s");
+}
+
 void Rate::initialize(const EffectInit& init) {
-  if (!(rate_hz > 0) || std::isinf(rate_hz)) {
-    throw ValueError(fmt::format("{}: rate_hz is {}: must be positive", init.place, rate_hz));
-  }
   row_bytes_ = init.size * dtype_size(init.dtype);
   held_.assign(init.num_worlds * row_bytes_, std::byte{0});
   phase_.assign(init.num_worlds, phase_s);
@@ -185,14 +182,14 @@ Dropout::Mode Dropout::mode_from_name(std::string_view name) {
   if (name == "hold") return Mode::kHold;
   if (name == "nan") return Mode::kNan;
   if (name == "zero") return Mode::kZero;
-  throw ValueError(fmt::format("dropout mode '{}': must be hold, nan or zero", name));
+  throw ValueError(fmt::format("mode is '{}': must be one of hold, nan, zero", name));
+}
+
+void Dropout::validate(std::string_view place) const {
+  require_probability(probability, place, "probability");
 }
 
 void Dropout::initialize(const EffectInit& init) {
-  if (!(probability >= 0 && probability <= 1)) {
-    throw ValueError(
-        fmt::format("{}: probability is {}: must be in [0, 1]", init.place, probability));
-  }
   if (mode == Mode::kNan) check_numeric(init);
   row_bytes_ = init.size * dtype_size(init.dtype);
   if (mode == Mode::kHold) held_.assign(init.num_worlds * row_bytes_, std::byte{0});

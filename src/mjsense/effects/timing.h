@@ -46,6 +46,7 @@ struct Delay : Effect {
   explicit Delay(double delay_s) : delay_s(delay_s) {}
   std::unique_ptr<Effect> clone() const override { return std::make_unique<Delay>(*this); }
   std::string kind() const override { return "delay"; }
+  void validate(std::string_view place) const override;
   void initialize(const EffectInit& init) override;
   void apply(const EffectMoment& moment, const EffectRow& row) override;
   bool eager() const override { return true; }
@@ -70,6 +71,7 @@ struct StepDelay : Effect {
   StepDelay(int min_lag, int max_lag) : min_lag(min_lag), max_lag(max_lag) {}
   std::unique_ptr<Effect> clone() const override { return std::make_unique<StepDelay>(*this); }
   std::string kind() const override { return "step_delay"; }
+  void validate(std::string_view place) const override;
   void initialize(const EffectInit& init) override;
   void apply(const EffectMoment& moment, const EffectRow& row) override;
   bool eager() const override { return true; }
@@ -92,6 +94,7 @@ struct Rate : Effect {
   explicit Rate(double rate_hz, double phase_s = 0.0) : rate_hz(rate_hz), phase_s(phase_s) {}
   std::unique_ptr<Effect> clone() const override { return std::make_unique<Rate>(*this); }
   std::string kind() const override { return "rate"; }
+  void validate(std::string_view place) const override;
   void initialize(const EffectInit& init) override;
   void apply(const EffectMoment& moment, const EffectRow& row) override;
   bool eager() const override { return true; }
@@ -118,6 +121,7 @@ struct Dropout : Effect {
   static Mode mode_from_name(std::string_view name);  // hold nan zero; throws ValueError
   std::unique_ptr<Effect> clone() const override { return std::make_unique<Dropout>(*this); }
   std::string kind() const override { return "dropout"; }
+  void validate(std::string_view place) const override;
   void initialize(const EffectInit& init) override;
   void apply(const EffectMoment& moment, const EffectRow& row) override;
   bool eager() const override { return mode == Mode::kHold; }

@@ -61,7 +61,7 @@ void SensorSuite::bind(Simulation& simulation) {
   }
 }
 
-void SensorSuite::refresh(std::span<const int> ids) {
+void SensorSuite::refresh(WorldIds ids) {
   if (!simulation_ || bound_.size() < sensors_.size()) {
     throw ValueError("the suite has sensors that are not bound to a simulation: call bind()");
   }

@@ -11,6 +11,7 @@
 #include <vector>
 
 #include "mjsense/core/sensor.h"
+#include "mjsense/worlds/world_ids.h"
 
 namespace mjsense {
 
@@ -34,8 +35,8 @@ class SensorSuite {
   // Adds the sensors to the simulation, each once; those added later need another call. The
   // simulation lives longer.
   void bind(Simulation& simulation);
-  // Makes every row current, in the worlds `ids` (empty: all).
-  void refresh(std::span<const int> ids = {});
+  // Makes every row current, in the worlds `ids`.
+  void refresh(WorldIds ids = all_worlds);
   // Fields of all sensors in order: a sensor with several has several streams. Valid after bind().
   std::vector<const Field*> streams() const;
   const Field& stream(std::string_view name) const;  // throws KeyError with the nearest names

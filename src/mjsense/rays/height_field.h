@@ -3,7 +3,9 @@
 // two triangles a cell, split along (row, col) - (row + 1, col + 1); below it stands a base box.
 // Each lane walks the cells under its ray, leaps over blocks that it passes above, and looks for a
 // change of sign of z - h: neighbouring cells share their borders' values, so no ray slips through
-// a seam.
+// a seam. On which side of the surface a ray is follows from how it came there; z - h is asked only
+// where nothing else says it, because at a flat top, in the very plane through which rays enter and
+// leave, its sign is that of a rounding error.
 
 #include <mujoco/mujoco.h>
 
@@ -42,6 +44,10 @@ struct Cell {
     h10 = gather(data + field.cols, at) * field.size[2];
     h11 = gather(data + field.cols + 1, at) * field.size[2];
   }
+  Int prim(const HeightField& field, Mask first) const {
+    return (truncate(y0) * int_of(field.cols - 1) + truncate(x0)) * int_of(2) +
+           select(first, int_of(0), int_of(1));
+  }
   // Slopes per cell of the triangle that (x, y) lies in: `first` holds (0, 1), the other (1, 0).
   Float slope_x(Mask first) const { return select(first, h01 - h00, h11 - h10); }
   Float slope_y(Mask first) const { return select(first, h11 - h01, h10 - h00); }
@@ -49,6 +55,25 @@ struct Cell {
     const Float fx = x - x0, fy = y - y0;
     const Mask first = fy <= fx;
     return fma(slope_x(first), fx, fma(slope_y(first), fy, h00));
+  }
+};
+
+// The cell that holds a point, or the nearest one.
+struct FieldPoint {
+  Float x, y;  // grid coordinates
+  Cell cell;
+
+  FieldPoint(const HeightField& field, Vec3f p)
+      : x(grid(p.x, field.size[0], field.cols)),
+        y(grid(p.y, field.size[1], field.rows)),
+        cell(field, truncate(min(floor(x), static_cast<float>(field.cols - 2))),
+             truncate(min(floor(y), static_cast<float>(field.rows - 2)))) {}
+  Int prim(const HeightField& field) const { return cell.prim(field, y - cell.y0 <= x - cell.x0); }
+
+ private:
+  static Float grid(Float x, float half, int points) {
+    const float last = static_cast<float>(points - 1);
+    return min(max((x + half) * (last / (2 * half)), 0.0f), last);
   }
 };
 
@@ -90,6 +115,7 @@ struct GridRay {
 // Where each lane is: its cell, and when it came there.
 struct Walk {
   Float cx, cy, t;
+  Float side;  // of the surface: 1 above, -1 below, 0 not known yet
   Mask active;
   Mask fresh;  // came by a leap: the height above the surface at t is not known
 
@@ -115,13 +141,17 @@ struct Walk {
     const Mask above = active & (min(ray.z_at(t), ray.z_at(out)) > top);
     if (!any(above)) return above;
     const Mask sideways = out_x <= out_y;
-    const Float within_x = min(max(floor(ray.x_at(out)), low_x), low_x + (kBlock - 1));
-    const Float within_y = min(max(floor(ray.y_at(out)), low_y), low_y + (kBlock - 1));
+    // Along the far border of the grid too, a cell of the block that there is.
+    const Float high_x = min(low_x + (kBlock - 1), static_cast<float>(field.cols - 2));
+    const Float high_y = min(low_y + (kBlock - 1), static_cast<float>(field.rows - 2));
+    const Float within_x = min(max(floor(ray.x_at(out)), low_x), high_x);
+    const Float within_y = min(max(floor(ray.y_at(out)), low_y), high_y);
     const Float next_x = select(sideways, select(ray.right, edge_x, edge_x - 1.0f), within_x);
     const Float next_y = select(sideways, within_y, select(ray.up, edge_y, edge_y - 1.0f));
     cx = select(above, next_x, cx);
     cy = select(above, next_y, cy);
     t = select(above, out, t);
+    side = select(above, 1.0f, side);
     fresh = fresh | above;
     active = active & ~(above & (out >= ray.length));
     stay_inside(field);
@@ -129,21 +159,22 @@ struct Walk {
   }
 };
 
-// The surface between `start` and `stop` on each active lane.
-inline void march(const HeightField& field, Vec3f o, Vec3f d, Float start, Float stop, Mask active,
-                  bool cull, FieldHit& hit) {
+// The surface between `start` and `stop` on each active lane, from this `side` of it. Returns the
+// side on which the ray ends.
+inline Float march(const HeightField& field, Vec3f o, Vec3f d, Float start, Float stop, Float side,
+                   Mask active, bool cull, FieldHit& hit) {
   const GridRay ray(field, o, d, start, stop);
   const float per_x = (field.cols - 1) / (2 * field.size[0]);
   const float per_y = (field.rows - 1) / (2 * field.size[1]);
   const Float diagonal = ray.dy - ray.dx, inv_diagonal = Float(1.0f) / diagonal;
   const Mask still_diagonal = abs(diagonal) < Float(1e-20f);
-  Walk walk{floor(ray.x), floor(ray.y), 0.0f, active, mask_of(kAllLanes)};
+  Walk walk{floor(ray.x), floor(ray.y), 0.0f, side, active, mask_of(kAllLanes)};
   walk.cx = min(max(walk.cx, 0.0f), static_cast<float>(field.cols - 2));
   walk.cy = min(max(walk.cy, 0.0f), static_cast<float>(field.rows - 2));
   // Leaps pay where rays cross many cells.
   const bool far =
       any(active & (ray.length * (abs(ray.dx) + abs(ray.dy)) > Float(HeightField::kBlock)));
-  Float fa = 0.0f, side = 0.0f;  // height above the surface at walk.t; its sign so far
+  Float fa = 0.0f;  // height above the surface at walk.t; its sign is that of the side, or it is 0
   while (any(walk.active)) {
     const Mask leapt = far ? walk.leap(field, ray) : mask_of(0);
     const Mask here = walk.active & ~leapt;
@@ -154,8 +185,9 @@ inline void march(const HeightField& field, Vec3f o, Vec3f d, Float start, Float
     const Mask fresh = walk.fresh & here;
     if (any(fresh)) {
       const Float f = ray.z_at(ta) - cell.height(ray.x_at(ta), ray.y_at(ta));
-      fa = select(fresh, f, fa);
-      side = select(fresh, select(f < Float(0.0f), -1.0f, 1.0f), side);
+      const Mask unknown = fresh & (abs(walk.side) < Float(0.5f));
+      walk.side = select(unknown, select(f < Float(0.0f), -1.0f, 1.0f), walk.side);
+      fa = select(fresh, select(walk.side < Float(0.0f), min(f, 0.0f), max(f, 0.0f)), fa);
       walk.fresh = walk.fresh & ~fresh;
     }
     const Float next_x = ray.reaches_x(walk.cx + select(ray.right, 1.0f, 0.0f));
@@ -169,7 +201,7 @@ inline void march(const HeightField& field, Vec3f o, Vec3f d, Float start, Float
       const Float t0 = part == 0 ? ta : tm, t1 = part == 0 ? tm : tb;
       const Float fb = ray.z_at(t1) - cell.height(ray.x_at(t1), ray.y_at(t1));
       const Mask crossing =
-          open & (fb * side <= Float(0.0f)) & (part == 0 ? mask_of(kAllLanes) : tm < tb);
+          open & (fb * walk.side <= Float(0.0f)) & (part == 0 ? mask_of(kAllLanes) : tm < tb);
       if (any(crossing)) {
         const Float drop = fa - fb;
         const Float t = t0 + (t1 - t0) * select(abs(drop) > Float(1e-30f), fa / drop, 0.0f);
@@ -177,13 +209,11 @@ inline void march(const HeightField& field, Vec3f o, Vec3f d, Float start, Float
         const Mask first = ray.y_at(middle) - walk.cy <= ray.x_at(middle) - walk.cx;
         const Vec3f n = Sphere::normal(
             nullptr, {-cell.slope_x(first) * per_x, -cell.slope_y(first) * per_y, 1.0f});
-        const Int prim =
-            (iy * int_of(field.cols - 1) + ix) * int_of(2) + select(first, int_of(0), int_of(1));
-        const Mask seen = cull ? crossing & (side > Float(0.0f)) : crossing;
-        take(hit, seen, start + t, prim, n);
+        const Mask seen = cull ? crossing & (walk.side > Float(0.0f)) : crossing;
+        take(hit, seen, start + t, cell.prim(field, first), n);
         open = open & ~seen;
         walk.active = walk.active & ~seen;
-        side = select(crossing, -side, side);
+        walk.side = select(crossing, -walk.side, walk.side);
       }
       fa = select(here, fb, fa);
     }
@@ -194,6 +224,7 @@ inline void march(const HeightField& field, Vec3f o, Vec3f d, Float start, Float
     walk.stay_inside(field);
     walk.t = select(here, tb, walk.t);
   }
+  return walk.side;
 }
 
 inline FieldHit intersect_height_field(const HeightField& field, Vec3f o, Vec3f d, Float limit,
@@ -207,33 +238,37 @@ inline FieldHit intersect_height_field(const HeightField& field, Vec3f o, Vec3f 
 
   const float top[3] = {field.size[0], field.size[1], 0.5f * field.size[2]};
   const Vec3f ot = {o.x, o.y, o.z - top[2]};
-  const Interval in = Box::interval(top, ot, d);
+  const Interval in = Box::interval(top, ot, d), level = slab(top[2], ot.z, d.z);
   const Float start = max(in.enter, 0.0f), stop = min(in.leave, limit);
-  const Mask active = (in.enter <= in.leave) & (in.leave >= Float(0.0f)) & (start <= stop);
+  Mask active = (in.enter <= in.leave) & (in.leave >= Float(0.0f)) & (start <= stop);
   if (!any(active)) return hit;
 
-  // Walls: where the ray enters or leaves through a side, below the surface's rim.
-  const float last_x = static_cast<float>(field.cols - 1),
-              last_y = static_cast<float>(field.rows - 1);
-  const float per_x = last_x / (2 * field.size[0]), per_y = last_y / (2 * field.size[1]);
+  // A wall: where the ray enters through a side, below the surface's rim.
   const Mask entering = active & (in.enter >= Float(0.0f));
-  const Mask leaving = active & (in.leave <= limit);
-  for (int end = 0; end < 2; ++end) {
-    if (end == 1 && cull) break;
-    const Float t = end == 0 ? in.enter : in.leave;
-    const Mask m = end == 0 ? entering : leaving;
-    if (!any(m)) continue;
-    const Vec3f p = along(ot, t, d);
-    const Vec3f n = Box::normal(top, p);
-    const Mask wall = m & (abs(n.z) < Float(0.5f));
-    if (!any(wall)) continue;
-    const Float gx = min(max((p.x + field.size[0]) * per_x, 0.0f), last_x);
-    const Float gy = min(max((p.y + field.size[1]) * per_y, 0.0f), last_y);
-    const Float cx = min(floor(gx), last_x - 1), cy = min(floor(gy), last_y - 1);
-    const Cell cell(field, truncate(cx), truncate(cy));
-    take(hit, wall & (p.z + top[2] <= cell.height(gx, gy)), t, int_of(-1), n);
+  const Mask from_base = (d.z > Float(0.0f)) & (level.enter >= in.enter);
+  const Mask through_side = entering & (level.enter < in.enter);
+  if (any(through_side)) {
+    const Vec3f p = along(ot, in.enter, d);
+    const FieldPoint at(field, p);
+    const Mask wall = through_side & (p.z + top[2] <= at.cell.height(at.x, at.y));
+    take(hit, wall, in.enter, int_of(-1), Box::normal(top, p));
+    active = active & ~wall;
   }
-  march(field, o, d, start, min(stop, hit.t), active, cull, hit);
+  const Float side = select(entering, select(from_base, -1.0f, 1.0f), 0.0f);
+  const Float end = march(field, o, d, start, min(stop, hit.t), side, active, cull, hit);
+
+  // Who leaves from below the surface comes out: through a wall, or where the surface is the top.
+  const Mask into_base = (d.z < Float(0.0f)) & (level.leave <= in.leave);
+  const Mask out = active & (end < Float(0.0f)) & (in.leave <= limit) & ~into_base;
+  if (!cull && any(out)) {
+    const Vec3f p = along(ot, in.leave, d);
+    const FieldPoint at(field, p);
+    const Mask upwards = (d.z > Float(0.0f)) & (level.leave <= in.leave);
+    const Vec3f wall = Box::normal(top, p);
+    const Vec3f n = {select(upwards, 0.0f, wall.x), select(upwards, 0.0f, wall.y),
+                     select(upwards, 1.0f, wall.z)};
+    take(hit, out, in.leave, select(upwards, at.prim(field), int_of(-1)), n);
+  }
   return hit;
 }
 

@@ -3,60 +3,22 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
-#include <cstdlib>
 #include <cstring>
 #include <string>
 #include <vector>
 
 #include "mjsense/core/testing/allocations.h"
 #include "mjsense/rays/testing/scene.h"
+#include "mjsense/rays/testing/truth.h"
 
 namespace mjsense {
 namespace {
 
+using testing::agree;
+using testing::mujoco_ray;
+using testing::ray_count;
 using testing::TestModel;
-
-struct Truth {
-  double t = -1;
-  int geom = -1;
-  double normal[3] = {0, 0, 0};
-};
-
-Truth mujoco_ray(const TestModel& m, const double o[3], const double d[3],
-                 const mjtByte* groups = nullptr, int exclude = -1) {
-  Truth r;
-  r.t = mj_ray(m.model, m.data, o, d, groups, 1, exclude, &r.geom, r.normal);
-  return r;
-}
-
-// Same surface at the same place; where they differ, the ray must graze: moved by 5 micrometres,
-// mj_ray itself changes its mind.
-bool agree(const TestModel& m, const double o[3], const double d[3], const Hit& hit) {
-  const auto same = [&](const Truth& r) {
-    if (r.t < 0 || !hit) return (r.t < 0) == !hit;
-    // A plane met at a grazing angle a kilometre away is where directions in float32 show.
-    return std::abs(hit.t - r.t) <= (r.t > 100 ? 1e-3 * r.t : 1e-5 * std::max(1.0, 0.1 * r.t));
-  };
-  if (same(mujoco_ray(m, o, d))) return true;
-  double lowest = 1e300, highest = -1e300;
-  for (int i = 0; i < 27; ++i) {
-    for (double e : {2e-6, 5e-6, 1e-5}) {
-      const double moved[3] = {o[0] + e * (i % 3 - 1), o[1] + e * (i / 3 % 3 - 1),
-                               o[2] + e * (i / 9 - 1)};
-      const Truth r = mujoco_ray(m, moved, d);
-      if (same(r)) return true;
-      lowest = std::min(lowest, r.t < 0 ? 1e10 : r.t);
-      highest = std::max(highest, r.t < 0 ? 1e10 : r.t);
-    }
-  }
-  const double t = !hit ? 1e10 : hit.t;
-  return lowest <= t && t <= highest;
-}
-
-long ray_count(long routine) {
-  const char* n = std::getenv("MJSENSE_TEST_RAYS");
-  return n != nullptr ? std::atol(n) : routine;
-}
+using testing::Truth;
 
 class RandomRays : public ::testing::TestWithParam<const char*> {};
 

@@ -68,9 +68,9 @@ struct InspectResult {
 
 InspectResult inspect(const std::filesystem::path& path);
 
-// A PNG with one row of pictures per camera and episode (at most `episodes`), `columns` moments
-// from first to last frame.
-void contact_sheet(const std::filesystem::path& path, const std::filesystem::path& png,
-                   int episodes = 4, int columns = 8, const std::string& ffmpeg = "");
+// A PNG with one row of pictures per camera and episode (the first `episodes`), `columns` moments from first to last frame.
+// Returns how many episodes it shows, as it says in its first line: "4 of 8 episodes".
+std::string contact_sheet(const std::filesystem::path& path, const std::filesystem::path& png,
+                          int episodes = 4, int columns = 8, const std::string& ffmpeg = "");
 
 }  // namespace mjsense

@@ -27,13 +27,16 @@ struct Strip {
   int tile_width() const { return std::max(8, kTileHeight * width / std::max(1, height)); }
 };
 
-std::vector<Strip> find_strips(const fs::path& path, int episodes, const std::string& ffmpeg) {
+// Those of the first `shown` episodes, of which there are `episodes`.
+std::vector<Strip> find_strips(const fs::path& path, int shown, const std::string& ffmpeg,
+                               int& episodes) {
   std::vector<Strip> strips;
+  episodes = 0;
   for (const RecordedFile& recorded : recorded_files(path)) {
     const h5::H5Lock lock;
     const h5::Id file = h5::open_file(recorded.path);
     for (const std::string& name : trajectory_names(file)) {
-      if (episodes-- <= 0) return strips;
+      if (++episodes > shown) continue;
       const h5::Id trajectory(H5Gopen2(file, name.c_str(), H5P_DEFAULT), H5Gclose, name);
       if (!h5::exists(trajectory, "obs/sensor_data")) continue;
       const h5::Id videos(H5Gopen2(trajectory, "obs/sensor_data", H5P_DEFAULT), H5Gclose, name);
@@ -89,11 +92,12 @@ std::vector<std::uint8_t> colour_depth(const std::vector<std::uint8_t>& raw) {
 
 }  // namespace
 
-void contact_sheet(const fs::path& path, const fs::path& png, int episodes, int columns,
-                   const std::string& ffmpeg) {
+std::string contact_sheet(const fs::path& path, const fs::path& png, int episodes, int columns,
+                          const std::string& ffmpeg) {
   if (episodes < 1 || columns < 1)
     throw ValueError(fmt::format("contact sheet: {} episodes, {} columns", episodes, columns));
-  const std::vector<Strip> strips = find_strips(path, episodes, ffmpeg);
+  int all = 0;
+  const std::vector<Strip> strips = find_strips(path, episodes, ffmpeg, all);
   if (strips.empty())
     throw ValueError(fmt::format("contact sheet: '{}' holds no videos", path.string()));
 
@@ -101,11 +105,13 @@ void contact_sheet(const fs::path& path, const fs::path& png, int episodes, int 
   for (const Strip& s : strips) tile_width = std::max(tile_width, s.tile_width());
   const int row_height = kLabelHeight + kTileHeight + kGap;
   const int width = kGap + columns * (tile_width + kGap),
-            height = kGap + static_cast<int>(strips.size()) * row_height;
+            height = kLabelHeight + static_cast<int>(strips.size()) * row_height;
   std::vector<std::uint8_t> sheet(static_cast<std::size_t>(width) * height * 3, 24);
+  const std::string title = fmt::format("{} of {} episodes", std::min(episodes, all), all);
+  draw_text(sheet, width, kGap, kGap, title);
   for (std::size_t s = 0; s < strips.size(); ++s) {
     const Strip& strip = strips[s];
-    const int top = kGap + static_cast<int>(s) * row_height;
+    const int top = kLabelHeight + static_cast<int>(s) * row_height;
     draw_text(sheet, width, kGap, top + 3, strip.label);
     std::vector<int> frames;  // first to last, evenly
     for (int c = 0; c < columns; ++c) {
@@ -130,6 +136,7 @@ void contact_sheet(const fs::path& path, const fs::path& png, int episodes, int 
     }
   }
   write_png(png, sheet, width, height, 3);
+  return title;
 }
 
 }  // namespace mjsense

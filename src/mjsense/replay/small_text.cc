@@ -10,11 +10,11 @@ constexpr int kScale = 2, kColumns = 3, kRows = 5;
 
 // Five rows of three pixels, a digit each: 2 is the middle one, 7 all three.
 const char* glyph(char c) {
-  static constexpr const char* kDigits[] = {"75557", "26227", "71747", "71717", "55711",
+  static constexpr const char* kDigits[] = {"25552", "26227", "71747", "71717", "55711",
                                             "74717", "74757", "71244", "75757", "75717"};
   static constexpr const char* kLetters[] = {
       "25755", "65656", "34443", "65556", "74647", "74644", "34553", "55755", "72227",
-      "11152", "55655", "44447", "57755", "65555", "25552", "65644", "25573", "65655",
+      "11152", "55655", "44447", "57755", "65555", "75557", "65644", "25573", "65655",
       "34216", "72222", "55557", "55552", "55775", "55255", "55222", "71247"};
   if (c >= '0' && c <= '9') return kDigits[c - '0'];
   const int letter = std::toupper(static_cast<unsigned char>(c)) - 'A';

@@ -1,9 +1,11 @@
 #include "mjsense/robots/robot.h"
 
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 
 #include <algorithm>
 #include <cmath>
+#include <set>
 
 #include "mjsense/core/error.h"
 #include "mjsense/scene/resolve.h"
@@ -26,6 +28,25 @@ double truncated_normal(Rng& rng, double deviation, double limit) {
     const double x = deviation * rng.normal();
     if (std::abs(x) <= limit) return x;
   }
+}
+
+// A servo whose control is a joint's position has its unit; others take what their range says.
+std::string command_unit(const mjModel* m, const MoveGroup& group) {
+  std::set<std::string> units;
+  for (std::size_t i = 0; i < group.actuators.size(); ++i) {
+    const int a = group.actuators[i];
+    const double* gain = m->actuator_gainprm + mjNGAIN * a;
+    const double* bias = m->actuator_biasprm + mjNBIAS * a;
+    if (m->actuator_trntype[a] == mjTRN_JOINT && gain[0] != 0 && gain[0] == -bias[1]) {
+      units.insert(m->jnt_type[m->actuator_trnid[2 * a]] == mjJNT_SLIDE ? "m" : "rad");
+    } else if (group.kind == GroupKind::kGripper) {
+      units.insert(
+          fmt::format("{:g} open .. {:g} closed", group.open_command, group.closed_command));
+    } else {
+      units.insert(fmt::format("{:g} .. {:g}", group.ctrl_low[i], group.ctrl_high[i]));
+    }
+  }
+  return fmt::format("{}", fmt::join(units, " or "));
 }
 
 }  // namespace
@@ -76,6 +97,7 @@ Robot::Robot(RobotCfg cfg, const mjModel* model, int num_worlds, std::string_vie
     const int index = static_cast<int>(groups_.size());
     if (g.kind == GroupKind::kArm && arm_ < 0) arm_ = index;
     if (g.kind == GroupKind::kGripper && gripper_ < 0) gripper_ = index;
+    group.command_unit = command_unit(model, group);
     groups_.push_back(std::move(group));
   }
 

@@ -30,6 +30,8 @@ struct MoveGroup {
   std::vector<int> joints, qpos, dofs;  // ids, addresses in qpos and qvel
   std::vector<int> actuators;           // empty: nothing to command (a mocap base)
   std::vector<double> ctrl_low, ctrl_high;
+  std::string
+      command_unit;  // "rad", "m" of position servos of joints; else what ctrl takes: "0 open .. 255 closed"
   int leaf_site = -1;  // -1: the leaf is the base frame itself
   int root_body = -1;
   // Grippers only.

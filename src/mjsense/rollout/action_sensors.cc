@@ -1,6 +1,7 @@
 #include "mjsense/rollout/action_sensors.h"
 
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 
 #include <algorithm>
 #include <cmath>
@@ -77,10 +78,6 @@ class ActionSensor : public Sensor {
     return joint_unit(task_.model(), {g.name, g.qpos, g.dofs});
   }
   // Unit of its commands: of its joints, or the actuator's own where one drives a gripper.
-  std::string command_unit(const MoveGroup& g) const {
-    return g.kind == GroupKind::kGripper ? "" : unit_of(g);
-  }
-
   const Task& task_;
   const ActionLog& log_;
 
@@ -119,7 +116,7 @@ class CommandedAction final : public ActionSensor<float> {
 
  protected:
   SensorSpec group_spec(const MoveGroup& g) const override {
-    return spec_of(count(g.actuators), command_unit(g), "",
+    return spec_of(count(g.actuators), g.command_unit, "",
                    fmt::format("The policy's command to '{}', as it gave it.", g.name));
   }
   void declare_more(const SensorInit& init) override {
@@ -147,7 +144,7 @@ class JointPos final : public ActionSensor<double> {
   SensorSpec group_spec(const MoveGroup& g) const override {
     if (!g.controlled()) return {};
     SensorSpec spec =
-        spec_of(count(g.actuators), command_unit(g), "",
+        spec_of(count(g.actuators), g.command_unit, "",
                 fmt::format("Target of the controller of '{}', without noise.", g.name));
     // The least box around the control ranges, and 0 where nothing is given.
     const double low = std::ranges::min(g.ctrl_low), high = std::ranges::max(g.ctrl_high);

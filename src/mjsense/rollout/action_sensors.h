@@ -11,8 +11,9 @@
 namespace mjsense {
 
 // Streams `<sensor>/<group>` and `<sensor>/given/<group>` (bool []: false where the group has no
-// action at this observation; its numbers are 0 then). Units: rad or m (joints), the actuators' own
-// (grippers), m and wxyz (poses). "Before" is the observation that the action answers. At a
+// action at this observation; its numbers are 0 then). Units: what each group's actuators
+// take (MoveGroup::command_unit: rad of an arm's servos, 0 open .. 255 closed of a gripper), m and
+// wxyz (poses). "Before" is the observation that the action answers. At a
 // terminal observation nothing is given but commanded_action.
 //
 //   actions/commanded_action  float32, as the policy gave it; first: nothing. `success` [1] is the

@@ -127,7 +127,6 @@ std::span<const int> Rollout::active_worlds() {
 }
 
 void Rollout::for_each(std::span<const int> worlds, std::function<void(const World&)> body) {
-  if (worlds.empty()) return;
   EachActive hooks(std::move(body));
   simulation_->worlds().visit(worlds, hooks);
 }

@@ -61,6 +61,27 @@ TEST(Rollout, TheSuiteStandsInItsPublishedOrder) {
   EXPECT_EQ(rollout.suite().owner("grasp_pose"), "policy 'planner'");
 }
 
+// docs/observations.md shows these lines.
+TEST(Rollout, AFunctionOfAWorldIsASensor) {
+  Rollout rollout(blind());
+  start(rollout, {0}, {7});
+  const Robot& robot = rollout.task().robot();
+  SensorSuite suite;
+  suite.add(
+      std::make_shared<FunctionSensor<float>>("gripper_opening", SensorSpec{.unit = "m"},
+                                              [&robot](const World& world, std::span<float> row) {
+                                                row[0] = robot.opening(world, robot.gripper());
+                                              }));
+  EXPECT_THAT(suite.names(), ElementsAre("gripper_opening"));
+}
+
+TEST(Rollout, CommandsAreInTheUnitOfTheirActuators) {
+  Rollout rollout(blind());
+  for (const char* name : {"actions/commanded_action", "actions/joint_pos"})
+    EXPECT_EQ(rollout.suite().stream(name).spec.unit, "arm: rad; gripper: 0 open .. 255 closed");
+  EXPECT_EQ(rollout.suite().stream("actions/joint_pos_rel").spec.unit, "arm: rad");
+}
+
 // Row t belongs to the action between the observations t-1 and t.
 TEST(Rollout, ActionsAreMeasuredFromTheObservationBefore) {
   Rollout rollout(blind());

@@ -8,7 +8,9 @@
 #include <set>
 #include <utility>
 
+#include "mjsense/core/checks.h"
 #include "mjsense/core/error.h"
+#include "mjsense/core/match.h"
 #include "mjsense/scene/assets.h"
 #include "mjsense/scene/compiler_settings.h"
 #include "mjsense/scene/options.h"
@@ -116,16 +118,15 @@ void check_nothing_lost(const std::vector<Census>& child, const std::vector<Cens
   }
 }
 
-std::array<double, 4> unit_quat(const EntityCfg& cfg, const std::string& place) {
+double squared_norm(const std::array<double, 4>& quat) {
   double norm = 0;
-  for (double q : cfg.quat) norm += q * q;
-  if (!(norm > 1e-12) || !std::isfinite(norm)) {
-    throw ValueError(fmt::format("{}: quat ({}) is no rotation; expected w, x, y, z", place,
-                                 fmt::join(cfg.quat, ", ")));
-  }
-  for (double x : cfg.pos) {
-    if (!std::isfinite(x)) throw ValueError(fmt::format("{}: pos is not finite", place));
-  }
+  for (double q : quat) norm += q * q;
+  return norm;
+}
+
+std::array<double, 4> unit_quat(const EntityCfg& cfg, const std::string& place) {
+  validate(cfg, place);
+  const double norm = squared_norm(cfg.quat);
   std::array<double, 4> unit;
   for (int i = 0; i < 4; ++i) unit[i] = cfg.quat[i] / std::sqrt(norm);
   return unit;
@@ -145,6 +146,19 @@ void set_pose(mjsBody* body, const EntityCfg& cfg, const std::string& place) {
 }
 
 }  // namespace
+
+void validate(const EntityCfg& cfg, std::string_view place) {
+  const double norm = squared_norm(cfg.quat);
+  if (!(norm > 1e-12) || !std::isfinite(norm)) {
+    throw ValueError(fmt::format("{}: quat ({}) is no rotation; expected w, x, y, z", place,
+                                 fmt::join(cfg.quat, ", ")));
+  }
+  require_finite(cfg.pos, place, "pos");
+  for (const auto& [pattern, value] : cfg.joint_pos) {
+    Regex(pattern, fmt::format("{}: joint_pos", place));
+    require_finite(value, place, fmt::format("joint_pos of '{}'", pattern));
+  }
+}
 
 Attached attach_entity(mjSpec* scene, const std::string& name, const EntityCfg& cfg, Vfs& vfs,
                        std::vector<std::string>& warnings) {

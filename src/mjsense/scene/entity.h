@@ -6,6 +6,7 @@
 #include <array>
 #include <map>
 #include <string>
+#include <string_view>
 #include <utility>
 #include <vector>
 
@@ -35,6 +36,9 @@ struct EntityCfg {
   // world can place it. False attaches it to the world as it is (static scenery).
   bool mocap_base = true;
 };
+
+// Throws ValueError for what is wrong whatever the model is.
+void validate(const EntityCfg& cfg, std::string_view place);
 
 // One MuJoCo element. Full name = "entity/name" if entity is non-empty, else "name".
 struct ObjRef {

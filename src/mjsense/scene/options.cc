@@ -8,6 +8,7 @@
 #include <span>
 #include <utility>
 
+#include "mjsense/core/checks.h"
 #include "mjsense/core/error.h"
 
 namespace mjsense {
@@ -20,20 +21,20 @@ std::string lower(std::string_view text) {
   return out;
 }
 
-int word(std::string_view field, std::string_view value,
+int word(std::string_view place, std::string_view field, std::string_view value,
          std::span<const std::pair<const char*, int>> known) {
   std::vector<std::string> names;
   for (const auto& [name, number] : known) {
     if (lower(value) == lower(name)) return number;
     names.emplace_back(name);
   }
-  throw ValueError(fmt::format("options: {} = '{}' is not known; expected one of {}", field, value,
-                               fmt::join(names, ", ")));
+  throw ValueError(fmt::format("{}: {} = '{}' is not known; expected one of {}", place, field,
+                               value, fmt::join(names, ", ")));
 }
 
 // MuJoCo's XML names of the flags, lower case without spaces: "Frictionloss" -> "frictionloss",
 // "Clampctrl" -> "clampctrl".
-int flags(std::string_view field, const std::vector<std::string>& wanted,
+int flags(std::string_view place, std::string_view field, const std::vector<std::string>& wanted,
           std::span<const char* const> known) {
   std::vector<std::string> names;
   for (const char* name : known) {
@@ -46,15 +47,11 @@ int flags(std::string_view field, const std::vector<std::string>& wanted,
     const auto it = std::find(names.begin(), names.end(), flag);
     if (it == names.end()) {
       throw ValueError(
-          fmt::format("options: {} has no flag '{}'{}", field, flag, suggest(flag, names)));
+          fmt::format("{}: {} has no flag '{}'{}", place, field, flag, suggest(flag, names)));
     }
     bits |= 1 << (it - names.begin());
   }
   return bits;
-}
-
-void require(bool good, std::string_view field, double value, std::string_view expected) {
-  if (!good) throw ValueError(fmt::format("options: {} = {} must be {}", field, value, expected));
 }
 
 constexpr std::pair<const char*, int> kIntegrators[] = {{"Euler", mjINT_EULER},
@@ -69,24 +66,25 @@ constexpr std::pair<const char*, int> kSolvers[] = {
 constexpr std::pair<const char*, int> kJacobians[] = {
     {"dense", mjJAC_DENSE}, {"sparse", mjJAC_SPARSE}, {"auto", mjJAC_AUTO}};
 
-}  // namespace
-
-void apply_options(const OptionsCfg& cfg, mjOption& option) {
-  require(std::isfinite(cfg.timestep) && cfg.timestep > 0, "timestep", cfg.timestep,
+void apply(const OptionsCfg& cfg, std::string_view place, mjOption& option) {
+  require(std::isfinite(cfg.timestep) && cfg.timestep > 0, place, "timestep", cfg.timestep,
           "a positive number of seconds");
-  require(cfg.impratio > 0, "impratio", cfg.impratio, "positive");
-  require(cfg.iterations > 0, "iterations", cfg.iterations, "positive");
-  require(cfg.ls_iterations > 0, "ls_iterations", cfg.ls_iterations, "positive");
-  require(cfg.ccd_iterations > 0, "ccd_iterations", cfg.ccd_iterations, "positive");
-  require(cfg.tolerance >= 0, "tolerance", cfg.tolerance, "0 or positive");
-  require(cfg.ls_tolerance >= 0, "ls_tolerance", cfg.ls_tolerance, "0 or positive");
-  require(cfg.density >= 0, "density", cfg.density, "0 or positive");
-  require(cfg.viscosity >= 0, "viscosity", cfg.viscosity, "0 or positive");
+  require_positive(cfg.impratio, place, "impratio");
+  require_positive(cfg.iterations, place, "iterations");
+  require_positive(cfg.ls_iterations, place, "ls_iterations");
+  require_positive(cfg.ccd_iterations, place, "ccd_iterations");
+  require_not_negative(cfg.tolerance, place, "tolerance");
+  require_not_negative(cfg.ls_tolerance, place, "ls_tolerance");
+  require_not_negative(cfg.density, place, "density");
+  require_not_negative(cfg.viscosity, place, "viscosity");
+  require_finite(cfg.gravity, place, "gravity");
+  require_finite(cfg.magnetic, place, "magnetic");
+  require_finite(cfg.wind, place, "wind");
   option.timestep = cfg.timestep;
-  option.integrator = word("integrator", cfg.integrator, kIntegrators);
-  option.cone = word("cone", cfg.cone, kCones);
-  option.solver = word("solver", cfg.solver, kSolvers);
-  option.jacobian = word("jacobian", cfg.jacobian, kJacobians);
+  option.integrator = word(place, "integrator", cfg.integrator, kIntegrators);
+  option.cone = word(place, "cone", cfg.cone, kCones);
+  option.solver = word(place, "solver", cfg.solver, kSolvers);
+  option.jacobian = word(place, "jacobian", cfg.jacobian, kJacobians);
   option.impratio = cfg.impratio;
   option.iterations = cfg.iterations;
   option.tolerance = cfg.tolerance;
@@ -98,9 +96,20 @@ void apply_options(const OptionsCfg& cfg, mjOption& option) {
   std::copy(cfg.wind.begin(), cfg.wind.end(), option.wind);
   option.density = cfg.density;
   option.viscosity = cfg.viscosity;
-  option.disableflags = flags("disableflags", cfg.disableflags, {mjDISABLESTRING, mjNDISABLE});
-  option.enableflags = flags("enableflags", cfg.enableflags, {mjENABLESTRING, mjNENABLE});
+  option.disableflags =
+      flags(place, "disableflags", cfg.disableflags, {mjDISABLESTRING, mjNDISABLE});
+  option.enableflags = flags(place, "enableflags", cfg.enableflags, {mjENABLESTRING, mjNENABLE});
 }
+
+}  // namespace
+
+void validate(const OptionsCfg& cfg, std::string_view place) {
+  mjOption option;
+  mj_defaultOption(&option);
+  apply(cfg, place, option);
+}
+
+void apply_options(const OptionsCfg& cfg, mjOption& option) { apply(cfg, "options", option); }
 
 std::vector<std::string> differing_options(const mjOption& a, const mjOption& b) {
   std::vector<std::string> names;

@@ -6,6 +6,7 @@
 
 #include <array>
 #include <string>
+#include <string_view>
 #include <vector>
 
 namespace mjsense {
@@ -32,6 +33,8 @@ struct OptionsCfg {
 };
 
 // Throws ValueError for a value out of range or an unknown word, with the known ones.
+void validate(const OptionsCfg& cfg, std::string_view place);
+// Validates.
 void apply_options(const OptionsCfg& cfg, mjOption& option);
 
 // Names of the fields in which two sets of options differ.

@@ -13,6 +13,7 @@
 #include <sstream>
 
 #include "mjsense/core/error.h"
+#include "mjsense/core/testing/temp_dir.h"
 #include "mjsense/scene/scene.h"
 #include "mjsense/scene/spec.h"
 
@@ -134,7 +135,8 @@ constexpr const char* kMeshXml =
     "material='m'/></body></worldbody></mujoco>";
 
 TEST(RoundTrip, FilesOnDisk) {
-  const auto dir = std::filesystem::path(::testing::TempDir()) / "mjsense_roundtrip";
+  const testing::TempDir temporary;
+  const auto& dir = temporary.path;
   std::filesystem::create_directories(dir / "meshes");
   std::ofstream(dir / "meshes" / "tet.obj") << kObj;
   std::ofstream(dir / "robot.xml") << kMeshXml;

@@ -7,9 +7,11 @@
 #include <cmath>
 #include <utility>
 
+#include "mjsense/core/checks.h"
 #include "mjsense/core/error.h"
 #include "mjsense/scene/attach.h"
 #include "mjsense/scene/compiler_settings.h"
+#include "mjsense/scene/model_check.h"
 #include "mjsense/scene/model_sensors/model_sensor.h"
 #include "mjsense/scene/resolve.h"
 #include "mjsense/scene/spec.h"
@@ -48,6 +50,12 @@ Entity describe(const mjModel* model, const std::string& name, bool fixed_base) 
 
 }  // namespace
 
+void validate(const SceneCfg& cfg, std::string_view place) {
+  require_not_negative(cfg.env_spacing, place, "env_spacing");
+  if (cfg.extent) require_positive(*cfg.extent, place, "extent");
+  validate(cfg.options, place == "scene" ? "options" : place);
+}
+
 struct Scene::Impl {
   SceneCfg cfg;
   Vfs vfs;
@@ -58,6 +66,7 @@ struct Scene::Impl {
   std::vector<Entity> entities;
   std::vector<std::unique_ptr<Sensor>> sensors;
   std::vector<std::string> warnings;
+  std::weak_ptr<void> claim;
 
   void build();
   void attach();
@@ -114,18 +123,14 @@ void Scene::Impl::check_base_alone() {
 
 // Base, options, terrain, entities.
 void Scene::Impl::attach() {
+  validate(cfg, "scene");
   spec = cfg.spec           ? SpecPtr(cfg.spec, SpecDelete{false})
          : cfg.base.empty() ? SpecPtr(mj_makeSpec())
                             : parse_model(cfg.base, "scene base");
   attached.push_back(adopt_base(spec.get(), cfg.base, vfs, warnings));
   set_options();
   if (std::isnan(spec->stat.meansize)) spec->stat.meansize = 0.03;
-  if (cfg.extent) {
-    if (!(*cfg.extent > 0)) {
-      throw ValueError(fmt::format("scene: extent = {} must be positive (m)", *cfg.extent));
-    }
-    spec->stat.extent = *cfg.extent;
-  }
+  if (cfg.extent) spec->stat.extent = *cfg.extent;
   spec->compiler.savecompiled = 0;             // numbers are saved exactly
   spec->compiler.conflict = mjCONFLICT_MERGE;  // sizes: the larger wins
   check_base_alone();
@@ -178,6 +183,7 @@ void Scene::Impl::compile() {
     model = mjsense::compile(spec.get(), vfs);
   }
   if (!model) throw ValueError(fmt::format("scene: {}", one_line(mjs_getError(spec.get()))));
+  check_model(model.get(), warnings);
   merge_initial_states(attached, model.get());
   if (!mj_copyBack(spec.get(), model.get())) {  // the keyframe, for to_xml()
     throw RuntimeError(fmt::format("scene: {}", mjs_getError(spec.get())));
@@ -197,6 +203,18 @@ const std::map<std::string, std::string>& Scene::assets() const { return impl_->
 const std::vector<std::unique_ptr<Sensor>>& Scene::sensors() const { return impl_->sensors; }
 const std::vector<Entity>& Scene::entities() const { return impl_->entities; }
 const std::vector<std::string>& Scene::warnings() const { return impl_->warnings; }
+
+std::shared_ptr<void> Scene::claim() {
+  if (!impl_->claim.expired()) {
+    throw RuntimeError(
+        "this scene belongs to a simulation already, whose rows its sensors hold: make another "
+        "Scene "
+        "of the same configuration");
+  }
+  std::shared_ptr<void> claim = std::make_shared<char>();
+  impl_->claim = claim;
+  return claim;
+}
 
 std::string Scene::to_xml() const { return save_xml(impl_->spec.get()); }
 

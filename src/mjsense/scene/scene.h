@@ -41,6 +41,9 @@ struct SceneCfg {
   mjSpec* spec = nullptr;
 };
 
+// Throws ValueError for numbers and options that no scene can have.
+void validate(const SceneCfg& cfg, std::string_view place);
+
 // Names of an entity's elements, local (without the prefix), in model order. An element that its
 // MJCF leaves unnamed is given a name: its type and its number among the entity's elements of that
 // type, "geom_3"; a free joint "floating_base_joint".
@@ -73,6 +76,10 @@ class Scene {
   const std::vector<std::unique_ptr<Sensor>>& sensors() const;
   Sensor* find_sensor(std::string_view key) const;  // null if there is none
   Sensor& sensor(std::string_view key) const;       // throws KeyError with the nearest names
+
+  // The sensors hold the rows of one simulation at a time: this scene is taken until the result is
+  // destroyed. Throws RuntimeError if it is taken.
+  std::shared_ptr<void> claim();
 
   const std::vector<Entity>& entities() const;        // the terrain, if any, first
   const Entity& entity(std::string_view name) const;  // throws KeyError with the nearest names

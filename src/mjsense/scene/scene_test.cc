@@ -1,5 +1,6 @@
 #include "mjsense/scene/scene.h"
 
+#include <fmt/format.h>
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
@@ -113,6 +114,36 @@ TEST(Scene, SaysWhatIsWrongWithAnEntity) {
             "entity 'terrain': the name is taken by the scene's terrain");
 }
 
+// MuJoCo compiles these, and says at most that there is a NaN somewhere.
+TEST(Scene, RefusesNumbersInWhichNothingCanBeMeasured) {
+  const auto base_fault = [](const std::string& inside) {
+    SceneCfg cfg;
+    cfg.base.xml = "<mujoco>" + inside + "</mujoco>";
+    return fault(std::move(cfg));
+  };
+  EXPECT_EQ(
+      base_fault(
+          R"(<worldbody><body name="b" pos="nan 0 0"><freejoint/><geom size=".1"/></body></worldbody>)"),
+      "scene: body_pos of body 'b' is nan: must be finite");
+  EXPECT_EQ(base_fault(R"(<worldbody><camera name="eye" fovy="nan"/></worldbody>)"),
+            "scene: cam_fovy of camera 'eye' is nan: must be finite");
+  EXPECT_EQ(base_fault(R"(<worldbody><site name="s" pos="inf 0 0"/></worldbody>)"),
+            "scene: site_pos of site 's' is inf: must be finite");
+  for (const char* wrong : {"nan", "0", "-1", "inf"})
+    EXPECT_THAT(base_fault(fmt::format(
+                    R"(<option timestep="{}"/><worldbody><geom size=".1"/></worldbody>)", wrong)),
+                HasSubstr(fmt::format("scene: timestep is {}: must be a positive", wrong)));
+  EXPECT_EQ(
+      base_fault(R"(<size nuser_body="1"/><worldbody><body name="b" user="nan"/></worldbody>)"),
+      "no error");
+
+  SceneCfg cfg;
+  cfg.base.xml =
+      R"(<mujoco><option timestep="10"/><worldbody><geom size=".1"/></worldbody></mujoco>)";
+  EXPECT_THAT(Scene(std::move(cfg)).warnings(),
+              ElementsAre(HasSubstr("a timestep of 10 s is long")));
+}
+
 TEST(Scene, SaysWhatIsWrongWithAnOption) {
   const auto option_fault = [](const std::function<void(OptionsCfg&)>& edit) {
     SceneCfg cfg;
@@ -122,7 +153,7 @@ TEST(Scene, SaysWhatIsWrongWithAnOption) {
   EXPECT_THAT(option_fault([](auto& o) { o.integrator = "rk5"; }),
               HasSubstr("integrator = 'rk5' is not known; expected one of Euler, RK4"));
   EXPECT_EQ(option_fault([](auto& o) { o.integrator = "euler"; }), "no error");
-  EXPECT_THAT(option_fault([](auto& o) { o.timestep = 0; }), HasSubstr("timestep = 0 must be"));
+  EXPECT_THAT(option_fault([](auto& o) { o.timestep = 0; }), HasSubstr("timestep is 0: must be"));
   EXPECT_EQ(option_fault([](auto& o) { o.disableflags = {"contacts"}; }),
             "options: disableflags has no flag 'contacts'; did you mean 'contact'?");
   EXPECT_THAT(option_fault([](auto& o) { o.enableflags = {"contact"}; }),

@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "mjsense/core/checks.h"
 #include "mjsense/core/error.h"
 #include "mjsense/core/rng.h"
 #include "mjsense/scene/terrain_tile.h"
@@ -12,33 +13,14 @@
 namespace mjsense {
 namespace {
 
-void require(bool good, const std::string& what) {
-  if (!good) throw ValueError("terrain: " + what);
-}
-
-void check(const std::string& name, const SubTerrainCfg& s, const TerrainCfg& cfg) {
-  const auto sub = [&](std::string_view text) {
-    return fmt::format("sub-terrain '{}': {}", name, text);
-  };
-  const double side = std::min(cfg.tile_size[0], cfg.tile_size[1]);
-  require(s.proportion >= 0 && std::isfinite(s.proportion),
-          sub(fmt::format("proportion = {} must be >= 0", s.proportion)));
-  require(s.platform_width > 0 && s.platform_width < side,
-          sub(fmt::format("platform_width = {} m must be between 0 and the tile's {} m",
-                          s.platform_width, side)));
-  require(s.spacing > 0, sub("spacing must be positive (m)"));
-  require(s.step_width > 0, sub("step_width must be positive (m)"));
-  require(s.pit_depth > 0, sub("pit_depth must be positive (m)"));
-  require(s.waves > 0, sub("waves must be positive"));
-  for (int i = 0; i < 2; ++i) {
-    require(s.stone_width[i] > 0.02, sub("stone_width must be more than 0.02 m"));
-    require(s.gap[i] >= 0, sub("gap must be >= 0 (m)"));
-    require(s.step_height[i] > 0, sub("step_height must be positive (m)"));
-    require(s.amplitude[i] >= 0, sub("amplitude must be >= 0 (m)"));
-    require(s.slope[i] >= 0, sub("slope must be >= 0; use inverted for a pit"));
-    require(std::abs(s.stone_height[i]) < s.pit_depth,
-            sub("stone_height must be less than pit_depth"));
+// The sub-terrains asked for, or one of every kind.
+auto sub_terrains(const TerrainCfg& cfg) {
+  auto all = cfg.sub_terrains;
+  if (!all.empty()) return all;
+  for (std::string_view kind : kTileKinds) {
+    all.emplace_back(kind, SubTerrainCfg{.kind = std::string(kind)});
   }
+  return all;
 }
 
 // How many columns each sub-terrain gets: by proportion, in order, ends of the columns rounded
@@ -46,7 +28,6 @@ void check(const std::string& name, const SubTerrainCfg& s, const TerrainCfg& cf
 std::vector<int> share_columns(const TerrainCfg& cfg, int types) {
   double total = 0;
   for (const auto& [name, sub] : cfg.sub_terrains) total += sub.proportion;
-  require(total > 0, "the proportions of the sub-terrains add up to 0");
   std::vector<int> column(types);
   for (int j = 0; j < types; ++j) {
     const double x = (j + 0.5) / types * total;
@@ -61,26 +42,56 @@ std::vector<int> share_columns(const TerrainCfg& cfg, int types) {
 
 }  // namespace
 
-Terrain::Terrain(TerrainCfg cfg) : cfg_(std::move(cfg)) {
-  if (cfg_.terrain_type == "plane") return;
-  require(cfg_.terrain_type == "generator",
-          fmt::format("unknown terrain_type '{}'; expected plane or generator", cfg_.terrain_type));
-  if (cfg_.sub_terrains.empty()) {
-    for (const char* kind : {"flat", "rough", "waves", "slope", "stairs", "stepping_stones"}) {
-      cfg_.sub_terrains.emplace_back(kind, SubTerrainCfg{.kind = kind});
-    }
+void validate(const SubTerrainCfg& s, std::string_view place) {
+  require_word(s.kind, kTileKinds, place, "kind");
+  require_not_negative(s.proportion, place, "proportion");
+  require_positive(s.platform_width, place, "platform_width");
+  require_positive(s.spacing, place, "spacing");
+  require_positive(s.step_width, place, "step_width");
+  require_positive(s.pit_depth, place, "pit_depth");
+  require_positive(s.waves, place, "waves");
+  require_not_negative(s.gap, place, "gap");
+  require_not_negative(s.amplitude, place, "amplitude");
+  for (int i = 0; i < 2; ++i) {
+    require(s.stone_width[i] > 0.02 && std::isfinite(s.stone_width[i]), place, "stone_width",
+            s.stone_width[i], "more than 0.02 m");
+    require_positive(s.step_height[i], place, "step_height");
+    require(s.slope[i] >= 0 && std::isfinite(s.slope[i]), place, "slope", s.slope[i],
+            "0 or more; use inverted for a pit");
+    require(std::abs(s.stone_height[i]) < s.pit_depth, place, "stone_height", s.stone_height[i],
+            "less than pit_depth");
   }
-  require(cfg_.levels > 0, fmt::format("levels = {} must be positive", cfg_.levels));
-  require(cfg_.types >= 0, fmt::format("types = {} must be >= 0", cfg_.types));
-  require(cfg_.tile_size[0] > 0 && cfg_.tile_size[1] > 0, "tile_size must be positive (m)");
-  require(
-      cfg_.resolution > 0 && cfg_.resolution <= std::min(cfg_.tile_size[0], cfg_.tile_size[1]) / 2,
-      fmt::format("resolution = {} m must be positive and at most half a tile", cfg_.resolution));
-  require(cfg_.border >= 0, fmt::format("border = {} m must be >= 0", cfg_.border));
-  require(cfg_.max_init_level < cfg_.levels,
-          fmt::format("max_init_level = {}, but there are {} levels", cfg_.max_init_level,
-                      cfg_.levels));
-  for (const auto& [name, sub] : cfg_.sub_terrains) check(name, sub, cfg_);
+}
+
+void validate(const TerrainCfg& cfg, std::string_view place) {
+  constexpr std::string_view kTypes[] = {"plane", "generator"};
+  require_word(cfg.terrain_type, kTypes, place, "terrain_type");
+  require_positive(cfg.levels, place, "levels");
+  require_not_negative(cfg.types, place, "types");
+  for (double side : cfg.tile_size) require_positive(side, place, "tile_size");
+  const double side = std::min(cfg.tile_size[0], cfg.tile_size[1]);
+  require(cfg.resolution > 0 && cfg.resolution <= side / 2, place, "resolution", cfg.resolution,
+          "positive and at most half a tile (m)");
+  require_finite(cfg.difficulty, place, "difficulty");
+  require_not_negative(cfg.border, place, "border");
+  require(cfg.max_init_level < cfg.levels, place, "max_init_level", cfg.max_init_level,
+          fmt::format("less than the {} levels", cfg.levels));
+  double total = 0;
+  for (const auto& [name, sub] : sub_terrains(cfg)) {
+    const std::string of = fmt::format("{}: sub-terrain '{}'", place, name);
+    validate(sub, of);
+    require(sub.platform_width < side || cfg.terrain_type == "plane", of, "platform_width",
+            sub.platform_width, fmt::format("less than the tile's {} m", side));
+    total += sub.proportion;
+  }
+  if (total <= 0)
+    throw ValueError(fmt::format("{}: the proportions of the sub-terrains add up to 0", place));
+}
+
+Terrain::Terrain(TerrainCfg cfg) : cfg_(std::move(cfg)) {
+  validate(cfg_, "terrain");
+  if (cfg_.terrain_type == "plane") return;
+  cfg_.sub_terrains = sub_terrains(cfg_);
   levels_ = cfg_.levels;
   types_ = cfg_.types > 0 ? cfg_.types : static_cast<int>(cfg_.sub_terrains.size());
   column_ = share_columns(cfg_, types_);

@@ -7,6 +7,7 @@
 #include <array>
 #include <cstdint>
 #include <string>
+#include <string_view>
 #include <utility>
 #include <vector>
 
@@ -36,6 +37,9 @@ struct SubTerrainCfg {
   double pit_depth = 1.0;                         // m, stepping_stones
 };
 
+// Throws ValueError that names the field.
+void validate(const SubTerrainCfg& cfg, std::string_view place);
+
 struct TerrainCfg {
   std::string terrain_type = "plane";  // plane generator
 
@@ -52,9 +56,11 @@ struct TerrainCfg {
   std::uint64_t seed = 0;
 };
 
+void validate(const TerrainCfg& cfg, std::string_view place);
+
 class Terrain {
  public:
-  // Throws ValueError that names the field.
+  // Validates.
   explicit Terrain(TerrainCfg cfg);
 
   // Adds the body "terrain" to the world: a plane "terrain", or geoms named

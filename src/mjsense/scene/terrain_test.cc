@@ -163,14 +163,15 @@ TEST(Terrain, SaysWhatIsWrong) {
     }
     return "";
   };
-  EXPECT_THAT(fault({.terrain_type = "hills"}), HasSubstr("expected plane or generator"));
-  EXPECT_THAT(fault({.terrain_type = "generator", .levels = 0}), HasSubstr("levels = 0"));
+  EXPECT_THAT(fault({.terrain_type = "hills"}),
+              HasSubstr("terrain_type is 'hills': must be one of plane, generator"));
+  EXPECT_THAT(fault({.terrain_type = "generator", .levels = 0}), HasSubstr("levels is 0"));
   EXPECT_THAT(fault({.terrain_type = "generator", .sub_terrains = {{"x", {.kind = "stair"}}}}),
               HasSubstr("did you mean 'stairs'"));
   EXPECT_THAT(fault({.terrain_type = "generator", .sub_terrains = {{"x", {.platform_width = 9}}}}),
-              HasSubstr("sub-terrain 'x': platform_width = 9 m"));
+              HasSubstr("sub-terrain 'x': platform_width is 9"));
   EXPECT_THAT(fault({.terrain_type = "generator", .max_init_level = 5}),
-              HasSubstr("max_init_level = 5"));
+              HasSubstr("max_init_level is 5"));
 }
 
 }  // namespace

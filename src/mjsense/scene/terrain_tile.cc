@@ -8,7 +8,7 @@
 #include <numbers>
 #include <vector>
 
-#include "mjsense/core/error.h"
+#include "mjsense/core/checks.h"
 
 namespace mjsense {
 namespace {
@@ -195,15 +195,10 @@ void add_box(mjsBody* body, const std::string& name, std::array<double, 2> centr
 }
 
 double build_tile(const SubTerrainCfg& cfg, Tile& tile) {
-  if (cfg.kind == "flat") return flat(cfg, tile);
-  if (cfg.kind == "rough") return rough(cfg, tile);
-  if (cfg.kind == "waves") return waves(cfg, tile);
-  if (cfg.kind == "slope") return slope(cfg, tile);
-  if (cfg.kind == "stairs") return stairs(cfg, tile);
-  if (cfg.kind == "stepping_stones") return stepping_stones(cfg, tile);
-  const std::vector<std::string> kinds = {"flat",  "rough",  "waves",
-                                          "slope", "stairs", "stepping_stones"};
-  throw ValueError(fmt::format("terrain: unknown kind '{}'{}", cfg.kind, suggest(cfg.kind, kinds)));
+  using Build = double (*)(const SubTerrainCfg&, Tile&);
+  constexpr Build kBuild[] = {flat, rough, waves, slope, stairs, stepping_stones};
+  static_assert(std::size(kBuild) == std::size(kTileKinds));
+  return kBuild[require_word(cfg.kind, kTileKinds, "terrain", "kind")](cfg, tile);
 }
 
 }  // namespace mjsense

@@ -5,6 +5,7 @@
 
 #include <array>
 #include <string>
+#include <string_view>
 
 #include "mjsense/core/rng.h"
 #include "mjsense/scene/terrain.h"
@@ -21,6 +22,9 @@ struct Tile {
   double resolution;             // m
   Rng rng;
 };
+
+inline constexpr std::array<std::string_view, 6> kTileKinds = {
+    "flat", "rough", "waves", "slope", "stairs", "stepping_stones"};
 
 // Adds the tile's geoms; returns the height (m) of its surface at the centre. Throws ValueError for
 // an unknown kind.

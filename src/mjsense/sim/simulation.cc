@@ -152,6 +152,7 @@ Simulation::Simulation(std::shared_ptr<Scene> scene, const SimulationCfg& cfg)
     : cfg_(cfg), scene_(std::move(scene)) {
   if (cfg.decimation < 1)
     throw ValueError(fmt::format("decimation is {}: must be at least 1", cfg.decimation));
+  claim_ = scene_->claim();
   worlds_ = std::make_unique<Worlds>(scene_->model(), cfg.num_worlds, cfg.threads);
   worlds_->seed(cfg.seed);
   // Not worlds_->threads(): MuJoCo's pool is never larger than the number of worlds, but one image
@@ -243,11 +244,7 @@ void Simulation::collect(std::vector<Slot*>& slots, Wanted&& wanted) {
 }
 
 void Simulation::mark_stale(std::span<const int> ids) {
-  if (ids.empty()) {
-    for (std::int64_t& v : version_) ++v;
-  } else {
-    for (int w : ids) ++version_[w];
-  }
+  for (int w : ids) ++version_[w];
 }
 
 void Simulation::compute(std::span<Slot* const> slots, std::span<const int> ids, Change change,
@@ -283,9 +280,7 @@ void Simulation::cast(std::span<Slot* const> slots, std::span<const int> ids, in
     for (Slot* slot : slots) {
       if (slot->sensor->stage() != stage || slot->phase != phase) continue;
       Borrowed due(*this);
-      const int n = ids.empty() ? cfg_.num_worlds : static_cast<int>(ids.size());
-      for (int k = 0; k < n; ++k) {
-        const int w = ids.empty() ? k : ids[k];
+      for (int w : ids) {
         if (slot->computed[w] != version_[w]) due->ids.push_back(w);
       }
       if (due->ids.empty()) continue;
@@ -297,7 +292,7 @@ void Simulation::cast(std::span<Slot* const> slots, std::span<const int> ids, in
   }
 }
 
-void Simulation::step(int control_steps, std::span<const int> ids) {
+void Simulation::step(int control_steps, WorldIds ids) {
   if (control_steps < 1) throw ValueError(fmt::format("step({}): at least 1", control_steps));
   for (int k = 0; k < control_steps; ++k) {
     const bool last = k + 1 == control_steps;
@@ -307,12 +302,13 @@ void Simulation::step(int control_steps, std::span<const int> ids) {
       if (last) s.read = false;
       return wanted;
     });
-    mark_stale(ids);
-    compute(due->slots, ids, Change::kStep);
+    worlds_->checked_ids(ids, due->ids);
+    mark_stale(due->ids);
+    compute(due->slots, due->ids, Change::kStep);
   }
 }
 
-void Simulation::reset(std::span<const int> ids, int key) {
+void Simulation::reset(WorldIds ids, int key) {
   const std::vector<int> sorted = worlds_->checked_ids(ids);
   Borrowed due(*this);
   collect(due->slots, [](Slot& s) { return s.sensor->eager(); });
@@ -320,7 +316,7 @@ void Simulation::reset(std::span<const int> ids, int key) {
   compute(due->slots, sorted, Change::kReset, key);
 }
 
-void Simulation::forward(std::span<const int> ids) {
+void Simulation::forward(WorldIds ids) {
   const std::vector<int> sorted = worlds_->checked_ids(ids);
   Borrowed due(*this);
   collect(due->slots, [](Slot& s) { return s.sensor->eager(); });
@@ -329,17 +325,17 @@ void Simulation::forward(std::span<const int> ids) {
 }
 
 void Simulation::step_raw(int substeps) {
-  mark_stale({});
+  invalidate();
   worlds_->step_raw(substeps);
 }
 
 void Simulation::update_sensors(double dt) {
   Hooks hooks(*this, Hooks::Only::kSubstep, dt);
-  mark_stale({});
-  worlds_->visit({}, hooks);
+  invalidate();
+  worlds_->visit(all_worlds, hooks);
 }
 
-void Simulation::reset_sensors(std::span<const int> ids) {
+void Simulation::reset_sensors(WorldIds ids) {
   const std::vector<int> sorted = worlds_->checked_ids(ids);
   Hooks hooks(*this, Hooks::Only::kReset);
   mark_stale(sorted);
@@ -355,29 +351,24 @@ double Simulation::ray_scene_cost() const {
   return std::accumulate(rays_s_.begin(), rays_s_.end(), 0.0);
 }
 
-void Simulation::invalidate(std::span<const int> ids) { mark_stale(worlds_->checked_ids(ids)); }
+void Simulation::invalidate(WorldIds ids) { mark_stale(worlds_->checked_ids(ids)); }
 
-void Simulation::refresh(std::span<Sensor* const> sensors, std::span<const int> ids) {
+void Simulation::refresh(std::span<Sensor* const> sensors, WorldIds ids) {
   make_current(sensors, ids);
   for (const Sensor* sensor : sensors) slot_of(*sensor).read = true;  // only if it can be computed
 }
 
-void Simulation::make_current(std::span<Sensor* const> sensors, std::span<const int> ids) {
+void Simulation::make_current(std::span<Sensor* const> sensors, WorldIds ids) {
   Borrowed due(*this);
   for (const Sensor* sensor : sensors) {
     slot_of(*sensor).wanted = true;
   }
   collect(due->slots, [](const Slot&) { return false; });
-  const int n = ids.empty() ? cfg_.num_worlds : static_cast<int>(ids.size());
-  for (int k = 0; k < n; ++k) {
-    const int w = ids.empty() ? k : ids[k];
-    for (const Slot* slot : due->slots) {
-      if (slot->computed[w] != version_[w]) {
-        due->ids.push_back(w);
-        break;
-      }
-    }
-  }
+  worlds_->checked_ids(ids, due->ids);
+  std::erase_if(due->ids, [&](int w) {
+    return std::ranges::all_of(due->slots,
+                               [&](const Slot* slot) { return slot->computed[w] == version_[w]; });
+  });
   if (!due->ids.empty()) compute(due->slots, due->ids, Change::kNone);
 }
 
@@ -403,7 +394,7 @@ DebugShapes Simulation::draw(int world, std::span<Sensor* const> sensors) {
       if (slot->sensor->debug_vis()) chosen.push_back(slot->sensor);
     }
   }
-  const std::vector<int> ids = worlds_->checked_ids({&world, 1});
+  const std::vector<int> ids = worlds_->checked_ids(std::span(&world, 1));
   DebugShapes shapes(model()->stat.meansize);
   if (chosen.empty()) return shapes;
   make_current(chosen, ids);

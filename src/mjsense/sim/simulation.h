@@ -28,7 +28,8 @@ struct SimulationCfg {
 
 class Simulation {
  public:
-  // Every world starts reset, at the model's defaults.
+  // Every world starts reset, at the model's defaults. Throws RuntimeError if another simulation has
+  // this scene.
   Simulation(std::shared_ptr<Scene> scene, const SimulationCfg& cfg);
   ~Simulation();
   Simulation(const Simulation&) = delete;
@@ -43,37 +44,37 @@ class Simulation {
   int decimation() const { return cfg_.decimation; }
   double step_dt() const { return cfg_.decimation * model()->opt.timestep; }  // s, one control step
 
-  // Empty ids: all worlds; the others stand still.
-  void step(int control_steps = 1, std::span<const int> ids = {});
-  // Empty ids: all worlds. key: keyframe, -1 the model's defaults.
-  void reset(std::span<const int> ids = {}, int key = -1);
+  // Worlds that are not among the ids stand still.
+  void step(int control_steps = 1, WorldIds ids = all_worlds);
+  // key: keyframe, -1 the model's defaults.
+  void reset(WorldIds ids = all_worlds, int key = -1);
   // Random numbers start again from this seed; reset() usually follows.
   void seed(std::uint64_t seed) { worlds_->seed(seed); }
   // Makes derived fields and sensors current after state rows were written.
-  void forward(std::span<const int> ids = {});
+  void forward(WorldIds ids = all_worlds);
 
   // mjlab's order of calls, by hand: plain mj_step, then one update of the sensors' per-substep
   // state.
   void step_raw(int substeps);
   void update_sensors(double dt = 0.0);  // dt: s that this update stands for; 0: the timestep
   // Forgets the episode in the sensors of these worlds, physics untouched.
-  void reset_sensors(std::span<const int> ids = {});
+  void reset_sensors(WorldIds ids = all_worlds);
 
   // Adds a sensor that is not part of the scene (observation sensors, users' own) and initializes
   // it.
   void add(std::shared_ptr<Sensor> sensor);
-  // Makes the sensor's rows current, in the worlds `ids` (empty: all). They stay so until the next
-  // step, reset or forward.
+  // Makes the sensor's rows current, in the worlds `ids`. They stay so until the next step, reset or
+  // forward.
   void refresh(Sensor& sensor) {
     Sensor* one[] = {&sensor};
     refresh(one);
   }
-  void refresh(std::span<Sensor* const> sensors, std::span<const int> ids = {});
+  void refresh(std::span<Sensor* const> sensors, WorldIds ids = all_worlds);
   // What these sensors show of one world as it is now, to be seen by a human; empty: those with
   // debug_vis. Drawing does not count as reading.
   DebugShapes draw(int world, std::span<Sensor* const> sensors = {});
   // State was changed in a way that only the caller knows.
-  void invalidate(std::span<const int> ids = {});
+  void invalidate(WorldIds ids = all_worlds);
 
   // Time that a sensor has taken since measure_cost(true).
   struct Cost {
@@ -98,11 +99,11 @@ class Simulation {
   void initialize_scene();
   void initialize(Sensor& sensor);
   Slot& slot_of(const Sensor& sensor) const;
-  // Makes `change` happen and `slots` (each after its inputs) current in the worlds `ids`
-  // (empty: all).
+  // Makes `change` happen and `slots` (each after its inputs) current in the worlds `ids`; here and
+  // below: checked, in order.
   void compute(std::span<Slot* const> slots, std::span<const int> ids, Change change, int key = -1);
   void cast(std::span<Slot* const> slots, std::span<const int> ids, int phase);
-  void make_current(std::span<Sensor* const> sensors, std::span<const int> ids);
+  void make_current(std::span<Sensor* const> sensors, WorldIds ids);
   template <class Wanted>
   void collect(std::vector<Slot*>& slots, Wanted&& wanted);
   void mark_stale(std::span<const int> ids);
@@ -116,6 +117,7 @@ class Simulation {
   SimulationCfg cfg_;
   Shared shared_;
   std::shared_ptr<Scene> scene_;
+  std::shared_ptr<void> claim_;  // on the scene
   std::unique_ptr<Worlds> worlds_;
   std::unique_ptr<ThreadPool> pool_;
   std::unique_ptr<RayScene> rays_;

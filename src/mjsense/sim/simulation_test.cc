@@ -225,6 +225,61 @@ TEST(Simulation, AStepAllocatesNothing) {
   EXPECT_EQ(count.since(), 0);
 }
 
+// An empty filter ("the worlds that are done") must not become every world.
+TEST(Simulation, AnEmptyListOfWorldsIsNone) {
+  Simulation sim(scene(), {.num_worlds = 3});
+  auto h = add(sim, "h");
+  sim.step(5);
+  sim.refresh(*h);
+  const std::vector<int> computes = h->computes, none;
+  sim.reset(none);
+  sim.forward(none);
+  sim.reset_sensors(none);
+  sim.invalidate(none);
+  sim.step(4, none);
+  EXPECT_THAT(h->resets, ElementsAre(0, 0, 0));
+  EXPECT_EQ(sim.worlds().substeps(0), 5);
+  sim.refresh(*h);
+  EXPECT_EQ(h->computes, computes) << "nothing became stale";
+  Sensor* one[] = {h.get()};
+  sim.invalidate();
+  sim.refresh(one, none);
+  EXPECT_EQ(h->computes, computes);
+  sim.reset(all_worlds);
+  EXPECT_THAT(h->resets, ElementsAre(1, 1, 1));
+}
+
+TEST(Simulation, WorldsThatAreNotThereAreErrors) {
+  Simulation sim(scene(), {.num_worlds = 3});
+  auto h = add(sim, "h");
+  Sensor* one[] = {h.get()};
+  for (const std::vector<int>& bad : {std::vector<int>{3}, {-1}, {1, 1}}) {
+    EXPECT_THROW(sim.step(1, bad), ValueError);
+    EXPECT_THROW(sim.reset(bad), ValueError);
+    EXPECT_THROW(sim.forward(bad), ValueError);
+    EXPECT_THROW(sim.refresh(one, bad), ValueError);
+    EXPECT_THROW(sim.invalidate(bad), ValueError);
+    EXPECT_THROW(sim.reset_sensors(bad), ValueError);
+  }
+}
+
+TEST(Simulation, ASceneBelongsToOneSimulationAtATime) {
+  const auto shared = scene();
+  {
+    Simulation first(shared, {.num_worlds = 4});
+    try {
+      Simulation second(shared, {});
+      FAIL() << "two simulations of one scene";
+    } catch (const RuntimeError& e) {
+      EXPECT_THAT(e.what(), HasSubstr("belongs to a simulation already"));
+    }
+    first.step();
+  }
+  EXPECT_THROW(Simulation(shared, {.num_worlds = 0}), ValueError);
+  Simulation after(shared, {.num_worlds = 2});
+  after.step();
+}
+
 TEST(Simulation, ReadsOfForeignSensorsAreErrors) {
   Simulation sim(scene(), {});
   Height foreign("foreign");

@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cstring>
+#include <numeric>
 
 #include "mjsense/core/error.h"
 #include "mjsense/core/parallel.h"
@@ -129,8 +130,19 @@ double Worlds::time(int world) const {
   return static_cast<double>(clocks_[world].substep) * model()->opt.timestep;
 }
 
-std::vector<int> Worlds::checked_ids(std::span<const int> ids) const {
-  std::vector<int> sorted(ids.begin(), ids.end());
+std::vector<int> Worlds::checked_ids(WorldIds ids) const {
+  std::vector<int> sorted;
+  checked_ids(ids, sorted);
+  return sorted;
+}
+
+void Worlds::checked_ids(WorldIds ids, std::vector<int>& sorted) const {
+  if (ids.all()) {
+    sorted.resize(num_worlds_);
+    std::iota(sorted.begin(), sorted.end(), 0);
+    return;
+  }
+  sorted.assign(ids.list().begin(), ids.list().end());
   std::sort(sorted.begin(), sorted.end());
   for (std::size_t i = 0; i < sorted.size(); ++i) {
     if (sorted[i] < 0 || sorted[i] >= num_worlds_) {
@@ -139,7 +151,6 @@ std::vector<int> Worlds::checked_ids(std::span<const int> ids) const {
     if (i > 0 && sorted[i] == sorted[i - 1])
       throw ValueError(fmt::format("world id {} is given twice", sorted[i]));
   }
-  return sorted;
 }
 
 ArrayView Worlds::state() {
@@ -163,16 +174,16 @@ ArrayView Worlds::state_component(std::string_view name) {
   throw_unknown("simulation", "state component", name, names);
 }
 
-void Worlds::step(int substeps, WorldHooks& hooks, std::span<const int> ids) {
+void Worlds::step(int substeps, WorldHooks& hooks, WorldIds ids) {
   if (substeps < 1) throw ValueError(fmt::format("substeps is {}: must be at least 1", substeps));
   apply(ids, {this, Op::kStep, substeps, -1, &hooks}, true);
 }
 
-void Worlds::forward(std::span<const int> ids, WorldHooks& hooks) {
+void Worlds::forward(WorldIds ids, WorldHooks& hooks) {
   apply(ids, {this, Op::kForward, 0, -1, &hooks}, true);
 }
 
-void Worlds::reset(std::span<const int> ids, int key, WorldHooks& hooks) {
+void Worlds::reset(WorldIds ids, int key, WorldHooks& hooks) {
   if (key < -1 || key >= model()->nkey) {
     throw ValueError(
         fmt::format("keyframe {}: the model has {} (-1: its defaults)", key, model()->nkey));
@@ -182,10 +193,10 @@ void Worlds::reset(std::span<const int> ids, int key, WorldHooks& hooks) {
 
 void Worlds::step_raw(int substeps) {
   if (substeps < 1) throw ValueError(fmt::format("substeps is {}: must be at least 1", substeps));
-  apply({}, {this, Op::kStepRaw, substeps, -1, nullptr}, true);
+  apply(all_worlds, {this, Op::kStepRaw, substeps, -1, nullptr}, true);
 }
 
-void Worlds::visit(std::span<const int> ids, WorldHooks& hooks) {
+void Worlds::visit(WorldIds ids, WorldHooks& hooks) {
   apply(ids, {this, Op::kVisit, 0, -1, &hooks}, false);
 }
 
@@ -302,22 +313,15 @@ void Worlds::run(const mjModel* m, mjData* d, int w, void* arg) {
   orders_before(arg);
 }
 
-void Worlds::apply(std::span<const int> ids, Call call, bool save) {
-  ids_.assign(ids.begin(), ids.end());
-  if (!std::is_sorted(ids_.begin(), ids_.end()) ||
-      (!ids_.empty() && (ids_.front() < 0 || ids_.back() >= num_worlds_)) ||
-      std::adjacent_find(ids_.begin(), ids_.end()) != ids_.end()) {
-    ids_ = checked_ids(ids);
-  }
+void Worlds::apply(WorldIds ids, Call call, bool save) {
+  checked_ids(ids, ids_);
   if (call.op != Op::kVisit) failures_.clear();
-  const int* selection = ids_.empty() ? nullptr : ids_.data();
-  const int n = static_cast<int>(ids_.size());
-  apply_ordered(batch_, selection, n, run, &call, save ? 1 : 0);
+  if (ids_.empty()) return;  // MuJoCo would take it for all
+  apply_ordered(batch_, ids_.data(), static_cast<int>(ids_.size()), run, &call, save ? 1 : 0);
 
   // Worlds that failed are reset alone, with the keyframe of their last reset; the others went on.
   std::vector<int> failed;
-  for (int k = 0; k < (selection ? n : num_worlds_); ++k) {
-    const int w = selection ? selection[k] : k;
+  for (int w : ids_) {
     if (mjb_status(batch_)[w]) {
       failures_.push_back({w, fmt::format("MuJoCo: {}", mjb_error(batch_, w))});
     } else if (diverged_[w]) {

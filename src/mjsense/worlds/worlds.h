@@ -16,6 +16,7 @@
 
 #include "mjsense/core/array.h"
 #include "mjsense/core/sensor.h"
+#include "mjsense/worlds/world_ids.h"
 
 namespace mjsense {
 
@@ -56,16 +57,16 @@ class Worlds {
   // always takes the same key draws the same numbers in whatever world it runs.
   void rekey(int world, std::uint32_t key);
 
-  // Empty ids: every world. Ids are checked (range, duplicates) and may come in any order.
-  void step(int substeps, WorldHooks& hooks, std::span<const int> ids = {});
-  void forward(std::span<const int> ids, WorldHooks& hooks);
+  // Ids are checked (range, duplicates) before anything happens.
+  void step(int substeps, WorldHooks& hooks, WorldIds ids = all_worlds);
+  void forward(WorldIds ids, WorldHooks& hooks);
   // key: keyframe, -1 the model's defaults.
-  void reset(std::span<const int> ids, int key, WorldHooks& hooks);
+  void reset(WorldIds ids, int key, WorldHooks& hooks);
   // Plain mj_step: derived fields stay one substep behind the state, as MuJoCo's users know it.
   void step_raw(int substeps);
   // refreshed() on worlds as they are. State rows written since the last call are made current
   // first.
-  void visit(std::span<const int> ids, WorldHooks& hooks);
+  void visit(WorldIds ids, WorldHooks& hooks);
   // Model fields of the batch (mjb_expand) were written: the next step must not reuse what was
   // computed from the old ones.
   void model_changed() { model_version_++; }
@@ -81,7 +82,9 @@ class Worlds {
 
   std::int64_t substeps(int world) const { return clocks_[world].substep; }
   double time(int world) const;
-  std::vector<int> checked_ids(std::span<const int> ids) const;
+  // The ids in order, all of them written out. Throws ValueError for one out of range or given twice.
+  std::vector<int> checked_ids(WorldIds ids) const;
+  void checked_ids(WorldIds ids, std::vector<int>& sorted) const;  // into a buffer
 
  private:
   struct Clock {
@@ -100,7 +103,7 @@ class Worlds {
   static void run(const mjModel* m, mjData* d, int w, void* arg);
   void run_world(const mjModel* m, mjData* d, int w, const Call& call);
   bool step_world(const mjModel* m, mjData* d, int w, const Call& call);
-  void apply(std::span<const int> ids, Call call, bool save);
+  void apply(WorldIds ids, Call call, bool save);
   World view(const mjModel* m, mjData* d, int w) const;
   bool derived_current(int w) const;
   void remember(int w);

@@ -7,6 +7,7 @@
 #include <cstring>
 #include <limits>
 #include <memory>
+#include <type_traits>
 #include <vector>
 
 #include "mjsense/core/error.h"
@@ -84,7 +85,7 @@ TEST_P(Integrators, EqualTheNaiveLoopBitForBitAndAreFresh) {
     Worlds worlds(m.get(), kWorlds, threads);
     Recording hooks(kWorlds);
     hooks.every = every;
-    worlds.reset({}, -1, hooks);
+    worlds.reset(all_worlds, -1, hooks);
     std::vector<DataPtr> naive;
     for (int w = 0; w < kWorlds; ++w) naive.emplace_back(mj_makeData(m.get()), mj_deleteData);
     DataPtr fresh(mj_makeData(m.get()), mj_deleteData);
@@ -123,7 +124,7 @@ TEST(Worlds, SeeStateWrittenThroughTheViews) {
   const ModelPtr m = load("Euler");
   Worlds worlds(m.get(), 2, 1);
   Recording hooks(2);
-  worlds.reset({}, 0, hooks);
+  worlds.reset(all_worlds, 0, hooks);
   DataPtr d(mj_makeData(m.get()), mj_deleteData);
   mj_resetDataKeyframe(m.get(), d.get(), 0);
   const ArrayView qpos = worlds.state_component("qpos");
@@ -137,7 +138,7 @@ TEST(Worlds, ResetOnlyTheOnesNamed) {
   const ModelPtr m = load("implicitfast");
   Worlds worlds(m.get(), 4, 2);
   Recording hooks(4);
-  worlds.reset({}, 0, hooks);
+  worlds.reset(all_worlds, 0, hooks);
   worlds.step(10, hooks);
   const std::vector<double> before = hooks.sensordata[1];
   const int ids[] = {3, 0};
@@ -149,14 +150,34 @@ TEST(Worlds, ResetOnlyTheOnesNamed) {
   const int bad[] = {1, 1}, far[] = {4};
   EXPECT_THROW(worlds.reset(bad, -1, hooks), ValueError);
   EXPECT_THROW(worlds.reset(far, -1, hooks), ValueError);
-  EXPECT_THROW(worlds.reset({}, 7, hooks), ValueError);
+  EXPECT_THROW(worlds.reset(all_worlds, 7, hooks), ValueError);
+}
+
+TEST(Worlds, AnEmptyListIsNoWorld) {
+  const ModelPtr m = load("Euler");
+  Worlds worlds(m.get(), 3, 2);
+  Recording hooks(3);
+  worlds.reset(all_worlds, 0, hooks);
+  worlds.step(2, hooks);
+  const std::vector<int> resets = hooks.resets, refreshes = hooks.refreshes, none;
+  worlds.step(5, hooks, none);
+  worlds.reset(none, 0, hooks);
+  worlds.forward(none, hooks);
+  worlds.visit(none, hooks);
+  EXPECT_EQ(hooks.resets, resets);
+  EXPECT_EQ(hooks.refreshes, refreshes);
+  EXPECT_EQ(worlds.substeps(1), 2);
+  EXPECT_TRUE(worlds.checked_ids(none).empty());
+  EXPECT_THAT(worlds.checked_ids(all_worlds), ::testing::ElementsAre(0, 1, 2));
+  EXPECT_THAT(worlds.checked_ids(std::vector<int>{2, 0}), ::testing::ElementsAre(0, 2));
+  static_assert(!std::is_default_constructible_v<WorldIds>, "{} would not say which worlds");
 }
 
 TEST(Worlds, OneThatDivergesIsNamedAndResetAlone) {
   const ModelPtr m = load("Euler");
   Worlds worlds(m.get(), 3, 2);
   Recording hooks(3);
-  worlds.reset({}, 0, hooks);
+  worlds.reset(all_worlds, 0, hooks);
   worlds.step(5, hooks);
   const ArrayView qvel = worlds.state_component("qvel");
   reinterpret_cast<double*>(qvel.data + qvel.strides[0])[0] =

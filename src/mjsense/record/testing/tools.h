@@ -1,8 +1,6 @@
 #pragma once
 // For the tests of recordings, written and read back.
 
-#include <unistd.h>
-
 #include <algorithm>
 #include <filesystem>
 #include <fstream>
@@ -11,25 +9,13 @@
 #include <string>
 #include <vector>
 
+#include "mjsense/core/testing/temp_dir.h"
 #include "mjsense/record/recorder.h"
 #include "mjsense/record/testing/fake_suite.h"
 
 namespace mjsense::testing {
 
 namespace fs = std::filesystem;
-
-struct TempDir {
-  fs::path path;
-  TempDir() {
-    std::string name = (fs::temp_directory_path() / "mjsense_record_XXXXXX").string();
-    path = mkdtemp(name.data());
-  }
-  ~TempDir() {
-    std::error_code ignored;
-    fs::permissions(path, fs::perms::owner_all, ignored);
-    fs::remove_all(path, ignored);
-  }
-};
 
 inline std::string read_file(const fs::path& path) {
   std::ifstream in(path, std::ios::binary);

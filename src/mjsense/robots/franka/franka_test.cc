@@ -9,6 +9,7 @@
 #include <fstream>
 
 #include "mjsense/core/error.h"
+#include "mjsense/core/testing/temp_dir.h"
 #include "mjsense/scene/resolve.h"
 #include "mjsense/scene/scene.h"
 
@@ -16,14 +17,13 @@ namespace mjsense {
 namespace {
 
 namespace fs = std::filesystem;
-using testing::HasSubstr;
+using ::testing::HasSubstr;
 
 // A folder of eight tetrahedra in place of the robot's meshes.
 struct Meshes {
-  Meshes() : folder(fs::path(testing::TempDir()) / "franka_meshes") {
-    fs::create_directories(folder);
+  Meshes() {
     for (int i = 0; i < 8; ++i) {
-      std::ofstream file(folder / ("link" + std::to_string(i) + ".stl"), std::ios::binary);
+      std::ofstream file(folder.path / ("link" + std::to_string(i) + ".stl"), std::ios::binary);
       const std::array<char, 80> header{};
       file.write(header.data(), header.size());
       const std::uint32_t count = 4;
@@ -36,13 +36,10 @@ struct Meshes {
         file.write("\0\0", 2);
       }
     }
-    setenv("MJSENSE_FRANKA_MESHES", folder.c_str(), 1);
+    setenv("MJSENSE_FRANKA_MESHES", folder.path.c_str(), 1);
   }
-  ~Meshes() {
-    unsetenv("MJSENSE_FRANKA_MESHES");
-    fs::remove_all(folder);
-  }
-  fs::path folder;
+  ~Meshes() { unsetenv("MJSENSE_FRANKA_MESHES"); }
+  testing::TempDir folder;
 };
 
 std::unique_ptr<Scene> scene_of(const RobotCfg& robot) {
@@ -77,7 +74,7 @@ TEST(FrankaMeshes, ReplaceTheShapesAndNothingElse) {
 
 TEST(FrankaMeshes, AnIncompleteFolderIsAnError) {
   const Meshes meshes;
-  fs::remove(meshes.folder / "link6.stl");
+  fs::remove(meshes.folder.path / "link6.stl");
   try {
     franka_cfg();
     FAIL();

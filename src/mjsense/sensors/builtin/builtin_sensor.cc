@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "mjsense/core/checks.h"
 #include "mjsense/core/error.h"
 #include "mjsense/scene/model_sensors/builtin_types.h"
 #include "mjsense/scene/resolve.h"
@@ -109,11 +110,10 @@ void BuiltinSensorCfg::validate() const {
     throw ValueError(fmt::format("{}: cutoff = {} cannot be applied to the unit vector of {}",
                                  place, cutoff, type.name));
   }
-  if (!(noise >= 0)) throw ValueError(fmt::format("{}: noise = {} must be >= 0", place, noise));
-  if (nsample < 0) throw ValueError(fmt::format("{}: nsample = {} must be >= 0", place, nsample));
-  if (!(delay >= 0)) throw ValueError(fmt::format("{}: delay = {} s must be >= 0", place, delay));
-  if (!(interval >= 0))
-    throw ValueError(fmt::format("{}: interval = {} s must be >= 0", place, interval));
+  require_not_negative(noise, place, "noise");
+  require_not_negative(nsample, place, "nsample");
+  require_not_negative(delay, place, "delay");
+  require_not_negative(interval, place, "interval");
   if ((delay > 0 || interval > 0) && nsample == 0) {
     throw ValueError(fmt::format("{}: delay and interval need a history: nsample > 0", place));
   }

@@ -7,6 +7,7 @@
 #include <array>
 #include <cmath>
 
+#include "mjsense/core/checks.h"
 #include "mjsense/core/error.h"
 #include "mjsense/sensors/camera/camera_sensor.h"
 
@@ -44,6 +45,35 @@ void check_fovy(double degrees, std::string_view place) {
   if (degrees < 180) return;
   throw ValueError(fmt::format("{}: fovy is {} degrees: a perspective camera sees less than 180",
                                place, degrees));
+}
+
+void validate(const CameraIntrinsics& k, std::string_view place) {
+  const bool finite = std::isfinite(k.fx + k.fy + k.cx + k.cy);
+  if (!finite || k.fx <= 0 || k.fy <= 0)
+    throw ValueError(fmt::format(
+        "{}: intrinsics fx {} fy {} cx {} cy {} (pixels): all must be finite, fx and fy "
+        "positive",
+        place, k.fx, k.fy, k.cx, k.cy));
+}
+
+void validate(const LensDistortion& lens, std::string_view place) {
+  check_choice(std::string(place), "distortion model", lens.model,
+               std::array<std::string, 3>{"none", "brown_conrady", "fisheye"});
+  const std::size_t needed = lens.model == "none" ? 0 : lens.model == "fisheye" ? 4 : 5;
+  if (lens.coefficients.size() != needed)
+    throw ValueError(fmt::format("{}: distortion '{}' takes {} coefficients, got {}", place,
+                                 lens.model, needed, lens.coefficients.size()));
+  for (double k : lens.coefficients)
+    if (!std::isfinite(k))
+      throw ValueError(
+          fmt::format("{}: distortion has the coefficient {}: must be finite", place, k));
+}
+
+void validate(const CameraVizCfg& viz, std::string_view place) {
+  require_not_negative(viz.frustum_depth, place, "frustum_depth");
+  require_color(viz.frustum_color, place, "frustum_color");
+  require_not_negative(viz.line_width, place, "line_width");
+  require_not_negative(viz.axis_length, place, "axis_length");
 }
 
 void validate(const CameraSensorCfg& cfg) {
@@ -122,27 +152,10 @@ void validate(const CameraSensorCfg& cfg) {
   const auto has_depth = std::count(cfg.data_types.begin(), cfg.data_types.end(), "depth") > 0;
   if (cfg.depth_noise != "none" && (!has_depth || cfg.depth_kind != "planar" || cfg.orthographic))
     fail("depth_noise is for planar depth of a perspective camera");
-  check_choice(place, "distortion model", cfg.distortion.model,
-               std::array<std::string, 3>{"none", "brown_conrady", "fisheye"});
-  const std::size_t needed = cfg.distortion.model == "none"      ? 0
-                             : cfg.distortion.model == "fisheye" ? 4
-                                                                 : 5;
-  if (cfg.distortion.coefficients.size() != needed)
-    fail(fmt::format("distortion '{}' takes {} coefficients, got {}", cfg.distortion.model, needed,
-                     cfg.distortion.coefficients.size()));
-  for (double k : cfg.distortion.coefficients)
-    if (!std::isfinite(k))
-      fail(fmt::format("distortion has the coefficient {}: must be finite", k));
-  if (cfg.intrinsics) {
-    const CameraIntrinsics& k = *cfg.intrinsics;
-    const bool finite = std::isfinite(k.fx + k.fy + k.cx + k.cy);
-    if (!finite || k.fx <= 0 || k.fy <= 0)
-      fail(
-          fmt::format("intrinsics fx {} fy {} cx {} cy {} (pixels): all must be finite, fx and fy "
-                      "positive",
-                      k.fx, k.fy, k.cx, k.cy));
-  }
-  if (cfg.orthographic && (cfg.intrinsics || needed > 0))
+  validate(cfg.distortion, place);
+  if (cfg.intrinsics) validate(*cfg.intrinsics, place);
+  validate(cfg.viz, place);
+  if (cfg.orthographic && (cfg.intrinsics || cfg.distortion.model != "none"))
     fail("an orthographic camera has no intrinsics and no lens distortion");
   if (!cfg.camera_name.empty() && !cfg.parent_body.empty())
     fail(

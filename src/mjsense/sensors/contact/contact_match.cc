@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <unordered_map>
 
+#include "mjsense/core/checks.h"
 #include "mjsense/core/error.h"
 #include "mjsense/core/match.h"
 
@@ -21,11 +22,6 @@ std::string_view kind_of(const ContactMatch& match) {
   return match.mode == "geom" ? "geom" : "body";
 }
 
-void check_mode(std::string_view place, const ContactMatch& match) {
-  if (match.mode == "geom" || match.mode == "body" || match.mode == "subtree") return;
-  throw ValueError(fmt::format("{}: mode '{}': must be geom, body or subtree", place, match.mode));
-}
-
 void drop_excluded(std::string_view place, const ContactMatch& match,
                    std::vector<ContactObject>& objects) {
   const std::vector<std::string> before = labels_of(objects);
@@ -38,6 +34,35 @@ void drop_excluded(std::string_view place, const ContactMatch& match,
 }
 
 }  // namespace
+
+void validate(const ContactMatch& match, std::string_view place) {
+  constexpr std::string_view kModes[] = {"geom", "body", "subtree"};
+  require_word(match.mode, kModes, place, "mode");
+  if (match.pattern.empty()) throw ValueError(fmt::format("{}: no pattern is given", place));
+  for (const std::string& pattern : match.pattern) {
+    if (pattern.empty()) throw ValueError(fmt::format("{}: a pattern is empty", place));
+    // The subtree of a secondary has a literal name.
+    if (!match.entity.empty() && match.mode != "subtree") Regex(pattern, place);
+  }
+  Exclude(match.exclude, place);
+}
+
+void validate_primary(const ContactMatch& match, std::string_view place) {
+  validate(match, place);
+  for (const std::string& pattern : match.pattern) {
+    if (!match.entity.empty()) Regex(pattern, place);
+  }
+}
+
+void validate_secondary(const ContactMatch& match, std::string_view policy,
+                        std::string_view place) {
+  validate(match, place);
+  if (policy != "each" && policy != "any" && match.pattern.size() != 1) {
+    throw ValueError(
+        fmt::format("{}: {} patterns: must be a single name (policy 'each' takes several)", place,
+                    match.pattern.size()));
+  }
+}
 
 ContactNames::ContactNames(const mjModel* m) {
   for (int b = 0; b < m->nbody; ++b) {
@@ -145,8 +170,7 @@ std::vector<ContactObject> ContactNames::by_regex(std::string_view place,
 std::vector<ContactObject> ContactNames::primaries(std::string_view sensor,
                                                    const ContactMatch& match) const {
   const std::string place = fmt::format("sensor '{}': primary", sensor);
-  check_mode(place, match);
-  if (match.pattern.empty()) throw ValueError(fmt::format("{}: no pattern is given", place));
+  validate_primary(match, place);
   if (match.entity.empty()) return literal(place, match);
   return by_regex(place, match);
 }
@@ -155,15 +179,9 @@ std::vector<ContactObject> ContactNames::secondaries(std::string_view sensor,
                                                      const ContactMatch& match,
                                                      std::string_view policy) const {
   const std::string place = fmt::format("sensor '{}': secondary", sensor);
-  check_mode(place, match);
+  validate_secondary(match, policy, place);
   if (policy == "each") {
-    if (match.pattern.empty()) throw ValueError(fmt::format("{}: no pattern is given", place));
     return match.entity.empty() ? literal(place, match) : by_regex(place, match);
-  }
-  if (match.pattern.size() != 1) {
-    throw ValueError(
-        fmt::format("{}: {} patterns: must be a single name (policy 'each' takes several)", place,
-                    match.pattern.size()));
   }
   if (match.entity.empty()) return literal(place, match);
   if (match.mode == "subtree") {  // a literal name in the peer, and so here

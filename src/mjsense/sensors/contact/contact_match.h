@@ -20,6 +20,11 @@ struct ContactMatch {
   std::vector<std::string> exclude;
 };
 
+// Throw ValueError for what is wrong in any model. `place` starts the message: "sensor 'feet': primary".
+void validate(const ContactMatch& match, std::string_view place);
+void validate_primary(const ContactMatch& match, std::string_view place);
+void validate_secondary(const ContactMatch& match, std::string_view policy, std::string_view place);
+
 // One matched geom, body or subtree.
 struct ContactObject {
   int id = -1;        // geom id in mode geom, else body id

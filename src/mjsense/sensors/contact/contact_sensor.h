@@ -36,6 +36,8 @@ struct ContactVizCfg {
   double point_radius = 0.3, axis_length = 2.0, force_width = 0.3;
 };
 
+void validate(const ContactVizCfg& viz, std::string_view place);
+
 struct ContactSensorCfg : SensorCfg {
   ContactMatch primary;
   std::optional<ContactMatch> secondary;  // none: contacts with anything

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 
+#include "mjsense/core/checks.h"
 #include "mjsense/core/error.h"
 #include "mjsense/sensors/contact/contact_fields.h"
 #include "mjsense/sensors/contact/contact_sensor.h"
@@ -15,8 +16,18 @@ bool contains(const std::vector<std::string>& list, std::string_view x) {
 
 }  // namespace
 
+void validate(const ContactVizCfg& viz, std::string_view place) {
+  require_color(viz.point_color, place, "point_color");
+  require_color(viz.force_color, place, "force_color");
+  require_not_negative(viz.force_scale, place, "force_scale");
+  require_not_negative(viz.point_radius, place, "point_radius");
+  require_not_negative(viz.axis_length, place, "axis_length");
+  require_not_negative(viz.force_width, place, "force_width");
+}
+
 std::unique_ptr<Sensor> ContactSensorCfg::build() const {
-  const std::string place = fmt::format("sensor '{}'", name);
+  const std::string place = sensor_place(name);
+  validate_primary(primary, place + ": primary");
   if (fields.empty()) throw ValueError(fmt::format("{}: no fields are asked for", place));
   for (std::size_t i = 0; i < fields.size(); ++i) {
     if (!contains(contact_fields(), fields[i]))
@@ -37,6 +48,7 @@ std::unique_ptr<Sensor> ContactSensorCfg::build() const {
     throw ValueError(fmt::format("{}: secondary_policy '{}'{}", place, secondary_policy,
                                  suggest(secondary_policy, policies)));
   }
+  if (secondary) validate_secondary(*secondary, secondary_policy, place + ": secondary");
   if (secondary_policy == "each" && !secondary) {
     throw ValueError(fmt::format("{}: secondary_policy 'each' needs a secondary", place));
   }
@@ -45,6 +57,7 @@ std::unique_ptr<Sensor> ContactSensorCfg::build() const {
     throw ValueError(
         fmt::format("{}: global_frame needs 'normal' and 'tangent' among fields", place));
   }
+  validate(viz, place);
   return std::make_unique<ContactSensor>(*this);
 }
 

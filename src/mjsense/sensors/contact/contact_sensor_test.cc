@@ -210,6 +210,38 @@ TEST(Contact, PartsAreMuJoCosPerFieldSensors) {
   EXPECT_THAT(lab.read("", "c_box_geom_found"), ElementsAre(4.0f));
 }
 
+// What is wrong in any model is refused before there is one.
+TEST(Contact, RefusesAWrongConfigurationWhenItIsBuilt) {
+  const auto message = [](auto change) -> std::string {
+    ContactSensorCfg cfg = box_cfg();
+    change(cfg);
+    try {
+      cfg.build();
+    } catch (const Error& e) {
+      return e.what();
+    }
+    return "";
+  };
+  using Cfg = ContactSensorCfg;
+  const std::string place = "sensor '" + box_cfg().name + "': ";
+  EXPECT_EQ(message([](Cfg&) {}), "");
+  EXPECT_EQ(
+      message([](Cfg& c) { c.primary.mode = "goem"; }),
+      place + "primary: mode is 'goem': must be one of geom, body, subtree; did you mean 'geom'?");
+  EXPECT_THAT(message([](Cfg& c) { c.primary.pattern = {"("}; }), HasSubstr("primary"));
+  EXPECT_THAT(message([](Cfg& c) { c.primary.pattern.clear(); }), HasSubstr("no pattern"));
+  EXPECT_THAT(message([](Cfg& c) {
+                c.secondary = ContactMatch{"bdoy", {"a"}, "", {}};
+              }),
+              HasSubstr("secondary: mode is 'bdoy'"));
+  EXPECT_THAT(message([](Cfg& c) {
+                c.secondary = ContactMatch{"geom", {"a", "b"}, "", {}};
+              }),
+              HasSubstr("secondary: 2 patterns"));
+  EXPECT_THAT(message([](Cfg& c) { c.viz.point_color[0] = 2; }), HasSubstr("point_color is (2,"));
+  EXPECT_THAT(message([](Cfg& c) { c.name = ""; }), HasSubstr("needs a name"));
+}
+
 TEST(Contact, ErrorsNameSensorAndNearest) {
   const auto message = [](ContactSensorCfg cfg) -> std::string {
     try {

@@ -2,6 +2,7 @@
 #include <map>
 #include <numbers>
 
+#include "mjsense/core/checks.h"
 #include "mjsense/core/error.h"
 #include "mjsense/effects/calibration.h"
 #include "mjsense/effects/noise.h"
@@ -43,6 +44,26 @@ ImuModel imu_preset(const std::string& name) {
   std::vector<std::string> names;
   for (const auto& [key, model] : kPresets) names.push_back(key);
   throw_unknown("imu", "preset", name, names);
+}
+
+void validate(const ImuModel::Axis& a, std::string_view place) {
+  const std::pair<const char*, double> numbers[] = {
+      {"noise_density", a.noise_density},
+      {"scale_tolerance", a.scale_tolerance},
+      {"cross_axis_tolerance", a.cross_axis_tolerance},
+      {"range", a.range},
+      {"resolution", a.resolution},
+      {"bias_drift", a.bias_drift},
+      {"bias_drift_time_s", a.bias_drift_time_s}};
+  for (const auto& [name, value] : numbers) require_not_negative(value, place, name);
+  require_not_negative(a.bias_tolerance, place, "bias_tolerance");
+  require(a.bias_drift == 0 || a.bias_drift_time_s > 0, place, "bias_drift_time_s",
+          a.bias_drift_time_s, "positive where there is a bias_drift");
+}
+
+void validate(const ImuModel& model, std::string_view place) {
+  validate(model.accelerometer, std::string(place) + ": accelerometer");
+  validate(model.gyroscope, std::string(place) + ": gyroscope");
 }
 
 Effects imu_effects(const ImuModel::Axis& axis) {

@@ -4,6 +4,7 @@
 
 #include <utility>
 
+#include "mjsense/core/checks.h"
 #include "mjsense/core/error.h"
 #include "mjsense/scene/model_sensors/builtin_draw.h"
 
@@ -31,6 +32,9 @@ std::vector<std::string> site_names(mjSpec* spec) {
 }  // namespace
 
 std::unique_ptr<Sensor> ImuSensorCfg::build() const {
+  const std::string place = sensor_place(name);
+  validate(model, place);
+  validate(effects, place);
   if (site.name.empty() || (!site.type.empty() && site.type != "site")) {
     throw ValueError(fmt::format("sensor '{}': needs a site, not {} '{}'", name,
                                  site.type.empty() ? "object" : site.type, site.name));

@@ -39,6 +39,10 @@ struct ImuModel {
 // Throws KeyError with the names there are.
 ImuModel imu_preset(const std::string& name);
 
+// Throw ValueError.
+void validate(const ImuModel::Axis& axis, std::string_view place);
+void validate(const ImuModel& model, std::string_view place);
+
 // The effects of one half of a device, in the order of its signal path: axes, bias, noise, range, counts.
 Effects imu_effects(const ImuModel::Axis& axis);
 

@@ -6,6 +6,7 @@
 #include <cmath>
 #include <numbers>
 
+#include "mjsense/core/checks.h"
 #include "mjsense/core/error.h"
 #include "mjsense/sensors/lidar/npy.h"
 
@@ -19,12 +20,6 @@ std::array<double, 3> direction(double azimuth, double elevation) {
           std::sin(elevation)};
 }
 
-void check(bool good, const std::string& place, const char* name, double value,
-           const char* expected) {
-  if (!good)
-    throw ValueError(fmt::format("{}: {} is {}: must be {}", place, name, value, expected));
-}
-
 }  // namespace
 
 std::unique_ptr<Sensor> LidarSensorCfg::build() const {
@@ -36,15 +31,12 @@ LidarSensor::LidarSensor(const LidarSensorCfg& cfg) : RayCastSensor(cfg), lidar_
   exclude_world_ = false;
   if (cfg.pattern != PatternCfg(GridPattern{}))
     throw ValueError(place() + ": a pattern is set, but a lidar's rays are those of its scan");
-  const auto check_noise = [&](const char* name, double value) {
-    check(value >= 0 && std::isfinite(value), place(), name, value, "0 or more, and finite");
-  };
-  check_noise("range_noise_std", cfg.range_noise_std);
-  check_noise("range_noise_relative", cfg.range_noise_relative);
-  check_noise("range_resolution", cfg.range_resolution);
-  check(cfg.dropout >= 0 && cfg.dropout <= 1, place(), "dropout", cfg.dropout, "between 0 and 1");
+  require_not_negative(cfg.range_noise_std, place(), "range_noise_std");
+  require_not_negative(cfg.range_noise_relative, place(), "range_noise_relative");
+  require_not_negative(cfg.range_resolution, place(), "range_resolution");
+  require_probability(cfg.dropout, place(), "dropout");
+  std::visit([&](const auto& scan) { mjsense::validate(scan, place()); }, cfg.scan);
   if (const auto* s = std::get_if<SpinningScan>(&cfg.scan)) {
-    check_spinning(*s);
     rate_hz_ = s->rate_hz;
   } else {
     const TableScan& t = std::get<TableScan>(cfg.scan);
@@ -53,43 +45,59 @@ LidarSensor::LidarSensor(const LidarSensorCfg& cfg) : RayCastSensor(cfg), lidar_
   }
   disturbed_ = cfg.range_noise_std > 0 || cfg.range_noise_relative > 0 ||
                cfg.range_resolution > 0 || cfg.dropout > 0;
-  check(rate_hz_ > 0 && std::isfinite(rate_hz_), place(), "rate_hz", rate_hz_,
-        "above 0, and finite");
 }
 
-void LidarSensor::check_spinning(const SpinningScan& s) const {
-  check(s.channels >= 1, place(), "channels", s.channels, "at least 1");
-  check(s.samples >= 1, place(), "samples", s.samples, "at least 1");
-  check_ray_count(static_cast<double>(s.channels) * s.samples, place());
-  check(s.azimuth_span_deg > 0 && s.azimuth_span_deg <= 360, place(), "azimuth_span_deg",
-        s.azimuth_span_deg, "above 0 and at most 360");
-  check(std::isfinite(s.azimuth_start_deg), place(), "azimuth_start_deg", s.azimuth_start_deg,
-        "finite");
+void validate(const SpinningScan& s, std::string_view place) {
+  require(s.channels >= 1, place, "channels", s.channels, "at least 1");
+  require(s.samples >= 1, place, "samples", s.samples, "at least 1");
+  check_ray_count(static_cast<double>(s.channels) * s.samples, place);
+  require(s.azimuth_span_deg > 0 && s.azimuth_span_deg <= 360, place, "azimuth_span_deg",
+          s.azimuth_span_deg, "above 0 and at most 360");
+  require_finite(s.azimuth_start_deg, place, "azimuth_start_deg");
   if (!s.elevations_deg.empty() && static_cast<int>(s.elevations_deg.size()) != s.channels)
     throw ValueError(fmt::format("{}: elevations_deg has {} values, channels is {}: one a channel",
-                                 place(), s.elevations_deg.size(), s.channels));
-  const auto check_elevation = [&](const char* name, double degrees) {
-    check(std::abs(degrees) <= 90, place(), name, degrees, "between -90 and 90");
+                                 place, s.elevations_deg.size(), s.channels));
+  const auto require_elevation = [&](const char* name, double degrees) {
+    require(std::abs(degrees) <= 90, place, name, degrees, "between -90 and 90");
   };
-  check_elevation("elevation_min_deg", s.elevation_min_deg);
-  check_elevation("elevation_max_deg", s.elevation_max_deg);
-  for (double degrees : s.elevations_deg) check_elevation("elevations_deg", degrees);
+  require_elevation("elevation_min_deg", s.elevation_min_deg);
+  require_elevation("elevation_max_deg", s.elevation_max_deg);
+  for (double degrees : s.elevations_deg) require_elevation("elevations_deg", degrees);
+  require_positive(s.rate_hz, place, "rate_hz");
+}
+
+namespace {
+
+void check_rows(const std::vector<std::array<double, 2>>& angles, const TableScan& t,
+                std::string_view place) {
+  for (std::size_t i = 0; i < angles.size(); ++i)
+    if (!std::isfinite(angles[i][0] + angles[i][1]))
+      throw ValueError(fmt::format("{}: row {} of the scan's table is ({}, {}): must be finite",
+                                   place, i, angles[i][0], angles[i][1]));
+  const int rows = static_cast<int>(angles.size());
+  if (t.rays_per_scan > rows)
+    throw ValueError(
+        fmt::format("{}: rays_per_scan is {}: must be between 0 and the table's {} rows", place,
+                    t.rays_per_scan, rows));
+}
+
+}  // namespace
+
+void validate(const TableScan& t, std::string_view place) {
+  if (!t.file.empty() && !t.angles.empty())
+    throw ValueError(fmt::format("{}: the scan has a file and angles: give one of them", place));
+  if (t.file.empty() && t.angles.empty())
+    throw ValueError(fmt::format("{}: the scan's table has no rows: give a file or angles", place));
+  require(t.rays_per_scan >= 0, place, "rays_per_scan", t.rays_per_scan, "0 or more");
+  require_positive(t.rate_hz, place, "rate_hz");
+  if (t.file.empty()) check_rows(t.angles, t, place);
 }
 
 void LidarSensor::read_table(const TableScan& t) {
-  if (!t.file.empty() && !t.angles.empty())
-    throw ValueError(place() + ": the scan has a file and angles: give one of them");
   angles_ = t.file.empty() ? t.angles : read_npy_pairs(t.file, place());
   if (angles_.empty()) throw ValueError(place() + ": the scan's table has no rows");
-  for (std::size_t i = 0; i < angles_.size(); ++i)
-    if (!std::isfinite(angles_[i][0] + angles_[i][1]))
-      throw ValueError(fmt::format("{}: row {} of the scan's table is ({}, {}): must be finite",
-                                   place(), i, angles_[i][0], angles_[i][1]));
+  check_rows(angles_, t, place());
   const int rows = static_cast<int>(angles_.size());
-  if (t.rays_per_scan < 0 || t.rays_per_scan > rows)
-    throw ValueError(
-        fmt::format("{}: rays_per_scan is {}: must be between 0 and the table's {} rows", place(),
-                    t.rays_per_scan, rows));
   if (t.rays_per_scan > 0) num_parts_ = rows / t.rays_per_scan;
   angles_.resize(t.rays_per_scan > 0 ? num_parts_ * t.rays_per_scan : rows);
 }

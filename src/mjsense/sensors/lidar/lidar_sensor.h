@@ -40,6 +40,10 @@ struct TableScan {
   double rate_hz = 10.0;  // scans a second
 };
 
+// Throw ValueError; what a table's file holds is read by the sensor.
+void validate(const SpinningScan& scan, std::string_view place);
+void validate(const TableScan& scan, std::string_view place);
+
 // `pattern` is not for lidars, and hit ids are always there.
 struct LidarSensorCfg : RayCastSensorCfg {
   LidarSensorCfg() {
@@ -74,7 +78,6 @@ class LidarSensor : public RayCastSensor {
   void finish(const RayScene& rays, int world, RayScratch& scratch) override;
 
  private:
-  void check_spinning(const SpinningScan& scan) const;
   void read_table(const TableScan& scan);
   RayPattern spinning(const SpinningScan& scan) const;
   RayPattern table(const TableScan& scan) const;

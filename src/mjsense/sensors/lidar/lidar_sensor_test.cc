@@ -4,14 +4,13 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
-#include <cstdio>
 #include <cstring>
-#include <filesystem>
 #include <fstream>
 #include <limits>
 #include <memory>
 
 #include "mjsense/core/error.h"
+#include "mjsense/core/testing/temp_dir.h"
 #include "mjsense/scene/scene.h"
 #include "mjsense/sensors/lidar/npy.h"
 #include "mjsense/sensors/lidar/point_cloud.h"
@@ -222,12 +221,9 @@ TEST(Lidar, ErrorsSayWhatIsWrong) {
   EXPECT_THAT(with([](Cfg& c) { c.range_noise_std = -1; }), HasSubstr("range_noise_std"));
 }
 
-std::string temporary(const char* name) {
-  return (std::filesystem::temp_directory_path() / name).string();
-}
-
 TEST(Npy, ReadsFloatPairsAndRefusesOthers) {
-  const std::string path = temporary("mjsense_npy_test.npy");
+  const testing::TempDir dir;
+  const std::string path = dir.file("pairs.npy");
   const auto write = [&](std::string dict, std::vector<float> values) {
     dict.resize(118, ' ');
     std::ofstream out(path, std::ios::binary);
@@ -244,11 +240,11 @@ TEST(Npy, ReadsFloatPairsAndRefusesOthers) {
   EXPECT_THROW(read_npy_pairs(path, "here"), RuntimeError);
   write("{'descr': '<f4', 'fortran_order': False, 'shape': (2, 3), }", {1, 2, 3, 4, 5, 6});
   EXPECT_THROW(read_npy_pairs(path, "here"), RuntimeError);
-  std::remove(path.c_str());
 }
 
 TEST(PointCloud, LeavesOutWhatDidNotReturn) {
-  const std::string path = temporary("mjsense_cloud_test.ply");
+  const testing::TempDir dir;
+  const std::string path = dir.file("cloud.ply");
   const float points[] = {1, 2, 3, 0, 0, 0, 4, 5, 6}, intensity[] = {0.5f, 0, 1},
               distances[] = {3, -1, 8};
   write_point_cloud(path, points, intensity, distances);
@@ -261,7 +257,6 @@ TEST(PointCloud, LeavesOutWhatDidNotReturn) {
   std::memcpy(last, text.data() + body + 16, 16);
   EXPECT_EQ(last[2], 6);
   EXPECT_EQ(last[3], 1);
-  std::remove(path.c_str());
   EXPECT_THROW(write_point_cloud("cloud.xyz", points), ValueError);
 }
 

@@ -31,20 +31,22 @@ std::vector<double> grid_axis(double size, double resolution) {
 }
 
 RayPattern make(const GridPattern& g, const mjModel*, std::string_view place) {
-  if (!(g.resolution > 0) || !std::isfinite(g.resolution))
-    throw ValueError(
-        fmt::format("{}: grid resolution is {}: must be above 0", place, g.resolution));
-  for (double s : g.size)
-    if (!(s >= 0) || !std::isfinite(s))
-      throw ValueError(
-          fmt::format("{}: grid size is ({}, {}): must be 0 or more", place, g.size[0], g.size[1]));
-  check_ray_count((g.size[0] / g.resolution + 1) * (g.size[1] / g.resolution + 1), place);
   const Direction d = unit(g.direction, place);
   RayPattern pattern;
   for (double y : grid_axis(g.size[1], g.resolution))
     for (double x : grid_axis(g.size[0], g.resolution)) pattern.offsets.push_back({x, y, 0});
   pattern.directions.assign(pattern.offsets.size(), d);
   return pattern;
+}
+
+void check_pinhole(double width, double height, double fovy, std::string_view place) {
+  if (!(width >= 1 && height >= 1))
+    throw ValueError(fmt::format("{}: pinhole pattern of {} x {} rays: both must be at least 1",
+                                 place, width, height));
+  if (!(fovy > 0 && fovy < 180))
+    throw ValueError(
+        fmt::format("{}: pinhole fovy is {} degrees: must lie between 0 and 180", place, fovy));
+  check_ray_count(width * height, place);
 }
 
 double linspace(int i, int count) { return count > 1 ? -1.0 + 2.0 * i / (count - 1) : -1.0; }
@@ -73,13 +75,7 @@ RayPattern make(const PinholePattern& p, const mjModel* model, std::string_view 
       fovy = 2 * std::atan(tan_v) * 180 / std::numbers::pi;
     }
   }
-  if (width < 1 || height < 1)
-    throw ValueError(fmt::format("{}: pinhole pattern of {} x {} rays: both must be at least 1",
-                                 place, width, height));
-  if (!(fovy > 0 && fovy < 180))
-    throw ValueError(
-        fmt::format("{}: pinhole fovy is {} degrees: must lie between 0 and 180", place, fovy));
-  check_ray_count(static_cast<double>(width) * height, place);
+  check_pinhole(width, height, fovy, place);
   if (tan_h == 0) tan_h = tan_v * width / height;
   RayPattern pattern;
   for (int v = 0; v < height; ++v)
@@ -95,12 +91,6 @@ RayPattern make(const RingPattern& r, const mjModel*, std::string_view place) {
   RayPattern pattern;
   if (r.include_center) pattern.offsets.push_back({0, 0, 0});
   for (const RingPattern::Ring& ring : r.rings) {
-    if (ring.num_samples < 1 || !(ring.radius >= 0) || !std::isfinite(ring.radius))
-      throw ValueError(
-          fmt::format("{}: ring of radius {} with {} samples: the radius must be 0 or more, the "
-                      "samples at least 1",
-                      place, ring.radius, ring.num_samples));
-    check_ray_count(static_cast<double>(pattern.offsets.size()) + ring.num_samples, place);
     for (int i = 0; i < ring.num_samples; ++i) {
       const double angle = 2 * std::numbers::pi * i / ring.num_samples;
       pattern.offsets.push_back({ring.radius * std::cos(angle), ring.radius * std::sin(angle), 0});
@@ -112,27 +102,10 @@ RayPattern make(const RingPattern& r, const mjModel*, std::string_view place) {
 
 RayPattern make(const UserPattern& u, const mjModel*, std::string_view place) {
   const std::size_t n = std::max(u.offsets.size(), u.directions.size());
-  for (std::size_t count : {u.offsets.size(), u.directions.size()})
-    if (count != n && count != 1)
-      throw ValueError(
-          fmt::format("{}: pattern of {} offsets and {} directions: give as many, or one", place,
-                      u.offsets.size(), u.directions.size()));
   RayPattern pattern;
   for (std::size_t i = 0; i < n; ++i) {
-    const std::array<double, 3>& o = u.offsets[u.offsets.size() == 1 ? 0 : i];
-    for (double x : o)
-      if (!std::isfinite(x))
-        throw ValueError(fmt::format("{}: offset {} of the pattern is ({}, {}, {}): must be finite",
-                                     place, i, o[0], o[1], o[2]));
-    pattern.offsets.push_back(o);
+    pattern.offsets.push_back(u.offsets[u.offsets.size() == 1 ? 0 : i]);
     pattern.directions.push_back(unit(u.directions[u.directions.size() == 1 ? 0 : i], place));
-  }
-  if (!u.times.empty() && u.times.size() != n)
-    throw ValueError(fmt::format("{}: pattern of {} rays and {} times", place, n, u.times.size()));
-  for (std::size_t i = 0; i < u.times.size(); ++i) {
-    if (!(u.times[i] <= 0) || !std::isfinite(u.times[i]))
-      throw ValueError(fmt::format("{}: time {} of the pattern is {} s: must be 0 or before", place,
-                                   i, u.times[i]));
   }
   pattern.times = u.times;
   return pattern;
@@ -143,6 +116,70 @@ RayPattern make(const UserPattern& u, const mjModel*, std::string_view place) {
 void check_ray_count(double rays, std::string_view place) {
   if (rays > kMaxRays)
     throw ValueError(fmt::format("{}: {:.0f} rays; at most {:.0f}", place, rays, kMaxRays));
+}
+
+void validate(const GridPattern& g, std::string_view place) {
+  if (!(g.resolution > 0) || !std::isfinite(g.resolution))
+    throw ValueError(
+        fmt::format("{}: grid resolution is {}: must be above 0", place, g.resolution));
+  for (double s : g.size)
+    if (!(s >= 0) || !std::isfinite(s))
+      throw ValueError(
+          fmt::format("{}: grid size is ({}, {}): must be 0 or more", place, g.size[0], g.size[1]));
+  check_ray_count((g.size[0] / g.resolution + 1) * (g.size[1] / g.resolution + 1), place);
+  unit(g.direction, place);
+}
+
+void validate(const PinholePattern& p, std::string_view place) {
+  if (p.camera.empty()) check_pinhole(p.width, p.height, p.fovy, place);
+}
+
+void validate(const RingPattern::Ring& ring, std::string_view place) {
+  if (ring.num_samples < 1 || !(ring.radius >= 0) || !std::isfinite(ring.radius))
+    throw ValueError(
+        fmt::format("{}: ring of radius {} with {} samples: the radius must be 0 or more, the "
+                    "samples at least 1",
+                    place, ring.radius, ring.num_samples));
+}
+
+void validate(const RingPattern& r, std::string_view place) {
+  unit(r.direction, place);
+  double rays = r.include_center;
+  for (const RingPattern::Ring& ring : r.rings) {
+    validate(ring, place);
+    rays += ring.num_samples;
+  }
+  check_ray_count(rays, place);
+  if (rays == 0) throw ValueError(fmt::format("{}: the pattern has no rays", place));
+}
+
+void validate(const UserPattern& u, std::string_view place) {
+  const std::size_t n = std::max(u.offsets.size(), u.directions.size());
+  if (n == 0) throw ValueError(fmt::format("{}: the pattern has no rays", place));
+  for (std::size_t count : {u.offsets.size(), u.directions.size()})
+    if (count != n && count != 1)
+      throw ValueError(
+          fmt::format("{}: pattern of {} offsets and {} directions: give as many, or one", place,
+                      u.offsets.size(), u.directions.size()));
+  for (std::size_t i = 0; i < u.offsets.size(); ++i) {
+    const std::array<double, 3>& o = u.offsets[i];
+    for (double x : o)
+      if (!std::isfinite(x))
+        throw ValueError(fmt::format("{}: offset {} of the pattern is ({}, {}, {}): must be finite",
+                                     place, i, o[0], o[1], o[2]));
+  }
+  for (const Direction& d : u.directions) unit(d, place);
+  if (!u.times.empty() && u.times.size() != n)
+    throw ValueError(fmt::format("{}: pattern of {} rays and {} times", place, n, u.times.size()));
+  for (std::size_t i = 0; i < u.times.size(); ++i) {
+    if (!(u.times[i] <= 0) || !std::isfinite(u.times[i]))
+      throw ValueError(fmt::format("{}: time {} of the pattern is {} s: must be 0 or before", place,
+                                   i, u.times[i]));
+  }
+}
+
+void validate(const PatternCfg& cfg, std::string_view place) {
+  std::visit([&](const auto& p) { validate(p, place); }, cfg);
 }
 
 PinholePattern PinholePattern::from_intrinsic_matrix(const std::array<double, 9>& k, int width,
@@ -166,9 +203,8 @@ RingPattern RingPattern::single_ring(double radius, int num_samples) {
 }
 
 RayPattern make_pattern(const PatternCfg& cfg, const mjModel* model, std::string_view place) {
-  RayPattern pattern = std::visit([&](const auto& p) { return make(p, model, place); }, cfg);
-  if (pattern.size() == 0) throw ValueError(fmt::format("{}: the pattern has no rays", place));
-  return pattern;
+  validate(cfg, place);
+  return std::visit([&](const auto& p) { return make(p, model, place); }, cfg);
 }
 
 }  // namespace mjsense

@@ -72,9 +72,16 @@ using PatternCfg = std::variant<GridPattern, PinholePattern, RingPattern, UserPa
 // Throws ValueError for more rays than a sensor may have.
 void check_ray_count(double rays, std::string_view place);
 
-// Throws ValueError for anything that gives no rays, endless ones or NaN; KeyError for an unknown
-// camera. `model` may be null unless a pattern names a camera. `place` starts every message:
+// Throws ValueError for anything that gives no rays, endless ones or NaN. `place` starts every message:
 // "sensor 'scan'".
+void validate(const GridPattern& grid, std::string_view place);
+void validate(const PinholePattern& pinhole, std::string_view place);
+void validate(const RingPattern::Ring& ring, std::string_view place);
+void validate(const RingPattern& rings, std::string_view place);
+void validate(const UserPattern& user, std::string_view place);
+void validate(const PatternCfg& cfg, std::string_view place);
+
+// Validates; KeyError for an unknown camera. `model` may be null unless a pattern names a camera.
 RayPattern make_pattern(const PatternCfg& cfg, const mjModel* model, std::string_view place);
 
 }  // namespace mjsense

@@ -19,14 +19,19 @@ RayAlignment ray_alignment(std::string_view name, std::string_view place) {
       fmt::format("{}: ray_alignment is '{}': must be 'base', 'yaw' or 'world'", place, name));
 }
 
-RayFrame::RayFrame(const mjModel* m, const Scene* scene, const ObjRef& ref,
-                   std::string_view place) {
+void validate_frame(const ObjRef& ref, std::string_view place) {
+  if (ref.name.empty()) throw ValueError(fmt::format("{}: a frame has no name", place));
   const std::array<std::string_view, 5> types = {"body", "xbody", "site", "geom", "camera"};
   if (std::find(types.begin(), types.end(), ref.type) == types.end())
     throw ValueError(
         fmt::format("{}: frame '{}' is a '{}': must be 'body', 'site', or 'geom' "
                     "('xbody' and 'camera' will do too)",
                     place, ref.full_name(), ref.type));
+}
+
+RayFrame::RayFrame(const mjModel* m, const Scene* scene, const ObjRef& ref,
+                   std::string_view place) {
+  validate_frame(ref, place);
   const ResolvedObj obj = resolve(m, scene, ref, place);
   type_ = obj.type;
   id_ = obj.id;

@@ -27,6 +27,9 @@ struct FramePose {
   float align[9];  // row-major A: origin = pos + A offset, direction = A direction
 };
 
+// Throws ValueError unless `ref` is of a type that may carry rays, and has a name.
+void validate_frame(const ObjRef& ref, std::string_view place);
+
 class RayFrame {
  public:
   // `ref` may name a body, xbody (both the body's own frame, not its inertial one), site, geom or

@@ -6,6 +6,7 @@
 #include <cmath>
 #include <limits>
 
+#include "mjsense/core/checks.h"
 #include "mjsense/core/error.h"
 #include "mjsense/core/parallel.h"
 
@@ -38,11 +39,22 @@ std::uint32_t group_mask(const std::optional<std::vector<int>>& groups, const st
 
 }  // namespace
 
+void validate(const RayCastVizCfg& viz, std::string_view place) {
+  require_color(viz.hit_color, place, "hit_color");
+  require_color(viz.ray_color, place, "ray_color");
+  require_color(viz.miss_color, place, "miss_color");
+  require_color(viz.normal_color, place, "normal_color");
+  require_not_negative(viz.hit_radius, place, "hit_radius");
+  require_not_negative(viz.ray_width, place, "ray_width");
+  require_not_negative(viz.normal_length, place, "normal_length");
+}
+
 std::unique_ptr<Sensor> RayCastSensorCfg::build() const {
   return std::make_unique<RayCastSensor>(*this);
 }
 
 RayCastSensor::RayCastSensor(const RayCastSensorCfg& cfg) : Sensor(cfg.key()), cfg_(cfg) {
+  sensor_place(cfg.name);
   if (cfg.frame.empty()) throw ValueError(place() + ": no frame given");
   alignment_ = ray_alignment(cfg.ray_alignment, place());
   filter_.groups = group_mask(cfg.include_geom_groups, place());
@@ -52,6 +64,9 @@ RayCastSensor::RayCastSensor(const RayCastSensorCfg& cfg) : Sensor(cfg.key()), c
   if (!(cfg.min_distance >= 0 && cfg.min_distance < cfg.max_distance))
     throw ValueError(fmt::format("{}: min_distance is {} m: must lie in [0, max_distance = {})",
                                  place(), cfg.min_distance, cfg.max_distance));
+  for (const ObjRef& ref : cfg.frame) validate_frame(ref, place());
+  mjsense::validate(cfg.pattern, place());
+  mjsense::validate(cfg.viz, place());
 }
 
 RayCastSensor::~RayCastSensor() = default;

@@ -44,6 +44,8 @@ struct RayCastVizCfg {
   double hit_radius = 0.5, ray_width = 0.1, normal_length = 5.0;
 };
 
+void validate(const RayCastVizCfg& viz, std::string_view place);
+
 struct RayCastSensorCfg : SensorCfg {
   std::vector<ObjRef> frame;  // body (its own frame, not the inertial one), site, geom, camera
   PatternCfg pattern = GridPattern{};

@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <cmath>
 #include <memory>
+#include <utility>
 
 #include "mjsense/core/error.h"
 #include "mjsense/scene/scene.h"
@@ -86,6 +87,31 @@ std::string error_of(const std::shared_ptr<RayCastSensorCfg>& cfg) {
     return e.what();
   }
   return "";
+}
+
+// What is wrong in any model is refused before there is one.
+TEST(RayCast, RefusesAWrongConfigurationWhenItIsBuilt) {
+  const auto message = [](auto change) -> std::string {
+    const auto cfg = sensor_cfg<RayCastSensorCfg>();
+    change(*cfg);
+    try {
+      cfg->build();
+    } catch (const Error& e) {
+      return e.what();
+    }
+    return "";
+  };
+  using Cfg = RayCastSensorCfg;
+  EXPECT_EQ(message([](Cfg&) {}), "");
+  EXPECT_THAT(message([](Cfg& c) { c.pattern = GridPattern{.resolution = 0}; }),
+              HasSubstr("grid resolution is 0: must be above 0"));
+  EXPECT_THAT(message([](Cfg& c) { c.pattern = PinholePattern{.fovy = 180}; }), HasSubstr("fovy"));
+  EXPECT_THAT(message([](Cfg& c) { c.pattern = RingPattern{.include_center = false}; }),
+              HasSubstr("no rays"));
+  EXPECT_THAT(message([](Cfg& c) { c.pattern = UserPattern{.times = {1}}; }), HasSubstr("time 0"));
+  EXPECT_EQ(message([](Cfg& c) { c.pattern = PinholePattern::from_mujoco_camera("eye"); }), "");
+  EXPECT_THAT(message([](Cfg& c) { c.frame[0].type = "goem"; }), HasSubstr("is a 'goem'"));
+  EXPECT_THAT(message([](Cfg& c) { c.viz.ray_width = -1; }), HasSubstr("ray_width is -1"));
 }
 
 TEST(RayCast, SeesItsChildButNotItself) {
@@ -233,6 +259,65 @@ TEST(RayCast, ATeleportIsInTheNextReadingAndOnlyThatWorldChanges) {
   const int ids[] = {1};
   lab.sim->reset(ids);
   EXPECT_EQ(lab.read("hit_pos_w"), before);
+}
+
+// Height scans of robots that stand where they are spawned, and all over the tiles, seams included.
+TEST(RayCast, HeightScansOnGeneratedTerrain) {
+  constexpr int kWorlds = 96;
+  SceneCfg s;
+  s.terrain = TerrainCfg{.terrain_type = "generator",
+                         .sub_terrains = {{"slope", {.kind = "slope"}},
+                                          {"pit", {.kind = "slope", .inverted = true}},
+                                          {"rough", {.kind = "rough"}},
+                                          {"waves", {.kind = "waves"}}},
+                         .levels = 4};
+  s.entities.emplace_back(
+      "r", EntityCfg{.model = {.xml = "<mujoco><worldbody><body name='base'><freejoint/><geom "
+                                      "size='.05'/></body></worldbody></mujoco>"}});
+  auto cfg = sensor_cfg<RayCastSensorCfg>();
+  cfg->pattern = GridPattern{.size = {1.6, 1.0}};
+  cfg->max_distance = 50;
+  s.sensors = {cfg};
+  auto scene = std::make_shared<Scene>(std::move(s));
+  Simulation sim(scene, {.num_worlds = kWorlds});
+  const mjModel* m = sim.model();
+  auto& sensor = dynamic_cast<RayCastSensor&>(scene->sensor("ray"));
+  const std::vector<double> origins = scene->env_origins(kWorlds);
+  const ArrayView qpos = sim.worlds().state_component("qpos");
+  const std::unique_ptr<mjData, void (*)(mjData*)> data(mj_makeData(m), mj_deleteData);
+  mj_forward(m, data.get());
+  Rng rng(1, 0, 0, 0);
+  long wrong = 0, rays = 0;
+  for (int round = 0; round < 8; ++round) {
+    for (int w = 0; w < kWorlds; ++w) {
+      double* q = reinterpret_cast<double*>(qpos.data + w * qpos.strides[0]);
+      const double astray = round == 0 ? 0 : round == 1 ? 4 : rng.uniform(0, 6);
+      for (int k = 0; k < 2; ++k) q[k] = origins[3 * w + k] + astray * (rng.below(3) - 1);
+      q[2] = origins[3 * w + 2] + (round == 0 ? 0.3 : 3);
+    }
+    sim.forward();
+    sim.refresh(sensor);
+    for (int w = 0; w < kWorlds; ++w) {
+      const double* q = reinterpret_cast<const double*>(qpos.data + w * qpos.strides[0]);
+      const auto distances = std::as_const(sensor.field("distances").data).row<float>(w);
+      for (std::size_t i = 0; i < distances.size(); ++i, ++rays) {
+        const auto& at = sensor.pattern().offsets[i];
+        const double down[3] = {0, 0, -1};
+        // On a seam, and on the border of a tile, either neighbour may be the truth.
+        bool right = false;
+        for (double dx : {0.0, -1e-6, 1e-6})
+          for (double dy : {0.0, -1e-6, 1e-6}) {
+            const double o[3] = {q[0] + at[0] + dx, q[1] + at[1] + dy, q[2] + at[2]};
+            int geom = -1;
+            const double truth = mj_ray(m, data.get(), o, down, nullptr, 1, 2, &geom, nullptr);
+            right |= std::abs(distances[i] - truth) < 1e-5;
+          }
+        wrong += !right;
+      }
+    }
+  }
+  EXPECT_GT(rays, 100000);
+  EXPECT_EQ(wrong, 0);
 }
 
 TEST(RayCast, BitEqualAtAnyNumberOfThreadsAndWorlds) {

@@ -6,7 +6,7 @@
 #include <array>
 #include <string_view>
 
-#include "mjsense/core/error.h"
+#include "mjsense/core/checks.h"
 
 namespace mjsense {
 
@@ -16,11 +16,7 @@ std::unique_ptr<Sensor> TerrainHeightSensorCfg::build() const {
 
 TerrainHeightSensor::TerrainHeightSensor(const TerrainHeightSensorCfg& cfg) : RayCastSensor(cfg) {
   constexpr std::array<std::string_view, 4> kNames = {"min", "max", "mean", "none"};
-  const auto found = std::find(kNames.begin(), kNames.end(), cfg.reduction);
-  if (found == kNames.end())
-    throw ValueError(fmt::format("{}: reduction is '{}': must be 'min', 'max', 'mean' or 'none'",
-                                 place(), cfg.reduction));
-  reduction_ = static_cast<Reduction>(found - kNames.begin());
+  reduction_ = static_cast<Reduction>(require_word(cfg.reduction, kNames, place(), "reduction"));
 }
 
 void TerrainHeightSensor::initialize(const SensorInit& init) {

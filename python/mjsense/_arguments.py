@@ -1,0 +1,138 @@
+"""Wrong arguments and misspelt attributes of the Python API are said in one sentence.
+
+What an argument may be is what its annotation says. ``checked`` reads the annotations of a function, or of every public method of
+a class, once; a call then costs one test for each argument that is given.
+"""
+
+from __future__ import annotations
+
+import difflib
+import functools
+import inspect
+import re
+from collections.abc import Callable
+from numbers import Integral, Real
+from pathlib import PurePath
+from types import FunctionType
+from typing import Any, TypeVar
+
+import numpy as np
+
+Seed = int
+"""An int of 64 bits from 0 on."""
+
+T = TypeVar("T")
+
+
+def _is_int(value: Any) -> bool:
+    return isinstance(value, Integral) and not isinstance(value, bool) and -(2**31) <= value < 2**31
+
+
+def _is_seed(value: Any) -> bool:
+    return isinstance(value, Integral) and not isinstance(value, bool) and 0 <= value < 2**64
+
+
+def _is_list(value: Any) -> bool:
+    return hasattr(value, "__iter__") and not isinstance(value, (str, bytes))
+
+
+# What an annotation may consist of: the test, and the words for it. Names of classes are tested by name.
+_KINDS: dict[str, tuple[Callable[[Any], bool], str]] = {
+    "None": (lambda value: value is None, "None"),
+    "int": (_is_int, "an int of 32 bits"),
+    "Seed": (_is_seed, "an int of 64 bits from 0 on"),
+    "float": (lambda value: isinstance(value, Real) and not isinstance(value, bool), "a number"),
+    "bool": (lambda value: isinstance(value, (bool, np.bool_)), "a bool"),
+    "str": (lambda value: isinstance(value, str), "a str"),
+    "Path": (lambda value: isinstance(value, PurePath), "a Path"),
+    "Callable": (callable, "a function"),
+    "Sequence[str]": (lambda value: _is_list(value) and all(isinstance(v, str) for v in value), "a sequence of str"),
+    "Sequence": (_is_list, "a sequence"),
+    "Iterable": (_is_list, "a sequence"),
+    "Mapping": (lambda value: hasattr(value, "keys"), "a mapping"),
+    "dict": (lambda value: isinstance(value, dict), "a dict"),
+}
+_ANYTHING = {"Any", "np.ndarray", "Sequence[int]"}  # world ids have a test of their own: masks will do
+
+
+def _kind(word: str) -> tuple[Callable[[Any], bool], str] | None:
+    if word in _ANYTHING:
+        return None
+    for name in (word, word.split("[")[0]):
+        if name in _KINDS:
+            return _KINDS[name]
+    cls = word.split(".")[-1]
+    return (lambda value: any(base.__name__ == cls for base in type(value).__mro__)), f"a {word}"
+
+
+def _check_of(place: str, name: str, annotation: Any) -> Callable[[Any], None] | None:
+    """A function that raises for a value that the annotation does not allow; None if it allows all."""
+    if not isinstance(annotation, str):
+        return None
+    kinds = [_kind(word.strip()) for word in re.split(r"\|(?![^\[]*\])", annotation)]
+    if None in kinds:
+        return None
+    tests = [test for test, _ in kinds]
+    words = " or ".join(text for _, text in kinds)
+
+    def check(value: Any) -> None:
+        for test in tests:
+            if test(value):
+                return
+        out_of_range = "an int" in words and isinstance(value, Integral) and not isinstance(value, bool)
+        raise (ValueError if out_of_range else TypeError)(f"{place}: {name} must be {words}, not {value!r}")
+
+    return check
+
+
+def checked(target: T, owner: str = "") -> T:
+    """A function, or a class with public methods, whose arguments are checked by their annotations."""
+    if isinstance(target, type):
+        for name, value in list(vars(target).items()):
+            if isinstance(value, FunctionType) and (name in ("__init__", "__call__", "__getitem__") or name[0] != "_"):
+                setattr(target, name, checked(value, target.__name__))
+        return target
+    function: Any = target
+    place = f"{owner}()" if function.__name__ == "__init__" else f"{owner}.{function.__name__}()".lstrip(".")
+    parameters = inspect.signature(function).parameters
+    checks = {name: _check_of(place, name, p.annotation) for name, p in parameters.items() if p.kind is not p.VAR_KEYWORD}
+    if not any(checks.values()):
+        return target
+    positional = [checks.get(name) for name, p in parameters.items() if p.kind is p.POSITIONAL_OR_KEYWORD]
+
+    @functools.wraps(function)
+    def call(*args: Any, **kwargs: Any) -> Any:
+        for value, check in zip(args, positional):
+            if check is not None:
+                check(value)
+        for name, value in kwargs.items():
+            check = checks.get(name)
+            if check is not None:
+                check(value)
+        return function(*args, **kwargs)
+
+    return call
+
+
+class KnownAttributes:
+    """Assigning to an attribute that does not exist is an error: ``sim.qposs = 3``. Classes of yours may add what they like."""
+
+    _complete = False
+    """Set when __init__ has made all attributes; dataclasses have a list of theirs."""
+
+    def __setattr__(self, name: str, value: Any) -> None:
+        cls = type(self)
+        fields = getattr(cls, "__dataclass_fields__", {})
+        if (
+            (fields or self._complete)
+            and name[0] != "_"
+            and name not in fields
+            and name not in self.__dict__
+            and not hasattr(cls, name)
+            and cls.__module__.split(".")[0] == "mjsense"
+        ):
+            known = {*fields, *self.__dict__, *dir(cls)}
+            near = difflib.get_close_matches(name, [k for k in known if k[0] != "_"], 3)
+            hint = f"; did you mean {' or '.join(map(repr, near))}?" if near else ""
+            raise AttributeError(f"{cls.__name__} has no attribute '{name}'{hint}")
+        object.__setattr__(self, name, value)

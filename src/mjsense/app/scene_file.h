@@ -1,0 +1,15 @@
+#pragma once
+// What commands that measure in an MJCF file share.
+
+#include <string>
+
+#include "mjsense/sim/simulation.h"
+
+namespace mjsense {
+
+// What was found odd in the scene, on stderr.
+void print_warnings(const Scene& scene);
+// Throws RuntimeError if a world failed in the last call: a table of a scene that flew apart says nothing.
+void check_physics(const Simulation& simulation, const std::string& place);
+
+}  // namespace mjsense

@@ -1,0 +1,245 @@
+// Height fields whose surface lies where rays are hard to judge: flat tops in the plane where a ray
+// enters the field, steps, heights of few values, rays through grid points, edges and corners.
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <string>
+#include <vector>
+
+#include "mjsense/rays/ray_scene.h"
+#include "mjsense/rays/testing/scene.h"
+#include "mjsense/rays/testing/truth.h"
+
+namespace mjsense {
+namespace {
+
+using testing::agree;
+using testing::mujoco_ray;
+using testing::ray_count;
+using testing::TestModel;
+using testing::Truth;
+
+//  kPlateaus  --__/--\_   noise, clipped at both ends
+//  kSteps     __|--|_     0 or 1
+//  kEightBit  -_=-_=      noise of a few values of 255
+//  kBowl      --\__/--    the rim is clipped
+//  kPyramid   __/--\__    a slope tile
+//  kFlat      ______      nothing but the base
+enum Ground { kPlateaus, kSteps, kEightBit, kBowl, kPyramid, kFlat, kNumGrounds };
+
+double height(Rng& rng, Ground ground, double x, double y) {  // at x, y in -1..1
+  switch (ground) {
+    case kPlateaus:
+      return std::clamp(rng.uniform(-0.5, 1.5), 0.0, 1.0);
+    case kSteps:
+      return rng.below(3) == 0 ? 0.0 : 1.0;
+    case kEightBit:
+      return std::floor(rng.uniform(0, 6)) * 51 / 255;
+    case kBowl:
+      return std::min(x * x + y * y, 0.6);
+    case kPyramid:
+      return std::min(1 - std::max(std::abs(x), std::abs(y)), 0.7);
+    default:
+      return 0.0;
+  }
+}
+
+// A ray in the world: its origin and direction.
+struct Ray {
+  double o[3], d[3];
+};
+
+// One height field somewhere, and rays in its frame.
+class Field {
+ public:
+  Field(Rng& rng, Ground ground) : model_(xml(rng, ground)) {}
+
+  const TestModel& model() const { return model_; }
+  double half(int axis) const { return size()[axis]; }
+  double top() const { return size()[2]; }
+
+  // Where a ray comes from and goes to, in the field's frame.
+  std::array<double, 3> point(Rng& rng) const {
+    const mjModel* m = model_.model;
+    std::array<double, 3> p{};
+    const int n[2] = {m->hfield_ncol[0], m->hfield_nrow[0]};
+    for (int k = 0; k < 2; ++k) {
+      // In a cell, or on a grid line, so that two in line are an edge, a corner, the border.
+      const double at = rng.below(2) ? rng.uniform(0, n[k] - 1) : rng.below(n[k]);
+      p[k] = half(k) * (2 * at / (n[k] - 1) - 1);
+    }
+    p[2] = rng.below(3) == 0 ? rng.uniform(0, top()) : top();
+    return p;
+  }
+  void to_world(const double local[3], double world[3]) const {
+    mju_mulMatVec3(world, model_.data->geom_xmat, local);
+    for (int k = 0; k < 3; ++k) world[k] += model_.data->geom_xpos[k];
+  }
+  // Clear of the box around the field and its base.
+  bool outside(const double world[3]) const {
+    double from[3], p[3];
+    mju_sub3(from, world, model_.data->geom_xpos);
+    mju_mulMatTVec3(p, model_.data->geom_xmat, from);
+    const double clear = 1e-3;
+    return std::abs(p[0]) > half(0) + clear || std::abs(p[1]) > half(1) + clear ||
+           p[2] > top() + clear || p[2] < -size()[3] - clear;
+  }
+  // For a person: the ray in the field's frame, and the field's size.
+  std::string local(const Ray& ray) const {
+    double from[3], o[3], d[3];
+    mju_sub3(from, ray.o, model_.data->geom_xpos);
+    mju_mulMatTVec3(o, model_.data->geom_xmat, from);
+    mju_mulMatTVec3(d, model_.data->geom_xmat, ray.d);
+    return testing::vec({o[0], o[1], o[2]}) + "along " + testing::vec({d[0], d[1], d[2]}) +
+           "of a field " + testing::vec({half(0), half(1), top()});
+  }
+  void turn(const double local[3], double world[3]) const {
+    mju_mulMatVec3(world, model_.data->geom_xmat, local);
+  }
+
+ private:
+  const mjtNum* size() const { return model_.model->hfield_size; }
+
+  static std::string xml(Rng& rng, Ground ground) {
+    const int rows = 2 + rng.below(24), cols = 2 + rng.below(24);
+    std::string heights;
+    for (int r = 0; r < rows; ++r)
+      for (int c = 0; c < cols; ++c)
+        heights +=
+            testing::vec({height(rng, ground, 2.0 * c / (cols - 1) - 1, 2.0 * r / (rows - 1) - 1)});
+    const double far = rng.below(3) == 0 ? 0 : rng.below(2) ? 3 : 40;
+    const double tilt = rng.below(2) ? 0 : rng.below(2) ? 10 : 180;
+    const auto within = [&](double x) { return x > 0 ? rng.uniform(-x, x) : 0.0; };
+    return "<mujoco><asset><hfield name='ground' nrow='" + std::to_string(rows) + "' ncol='" +
+           std::to_string(cols) + "' elevation='" + heights + "' size='" +
+           testing::vec({rng.uniform(0.3, 5), rng.uniform(0.3, 5), rng.uniform(0.02, 2),
+                         rng.uniform(0.01, 1)}) +
+           "'/></asset><worldbody><geom type='hfield' hfield='ground' pos='" +
+           testing::vec({within(far), within(far), within(far)}) + "' euler='" +
+           testing::vec({within(tilt), within(tilt), tilt > 0 ? within(180) : 0.0}) +
+           "'/></worldbody></mujoco>";
+  }
+
+  TestModel model_;
+};
+
+Ray random_ray(Rng& rng, const Field& field) {
+  const auto target = field.point(rng);
+  double d[3] = {0, 0, -1};
+  const int kind = rng.below(6);
+  if (kind >= 2) testing::random_direction(rng, d);
+  if (kind >= 2 && kind < 5) d[2] = -std::abs(d[2]);
+  if (kind == 1) d[2] = 1;             // out of the ground
+  if (kind == 4) d[2] *= 0.01;         // grazing
+  if (kind == 3) d[rng.below(2)] = 0;  // along the grid
+  mju_normalize3(d);
+  // Far before the target, close before it, or behind it: above, inside.
+  const double away = rng.below(8) == 0   ? 1e-4
+                      : rng.below(8) == 0 ? rng.uniform(-1, 0)
+                                          : rng.uniform(0, 10);
+  double o[3];
+  for (int k = 0; k < 3; ++k) o[k] = target[k] - away * d[k];
+  Ray ray;
+  field.to_world(o, ray.o);
+  field.turn(d, ray.d);
+  return ray;
+}
+
+class HeightFields : public ::testing::TestWithParam<int> {
+ protected:
+  void SetUp() override {
+    if (GetParam() > static_cast<int>(cpu_isa())) GTEST_SKIP() << "not on this CPU";
+  }
+  Isa isa() const { return static_cast<Isa>(GetParam()); }
+};
+
+INSTANTIATE_TEST_SUITE_P(Isas, HeightFields, ::testing::Values(0, 1, 2), [](const auto& info) {
+  return std::string(isa_name(static_cast<Isa>(info.param)));
+});
+
+// MJSENSE_TEST_RAYS=10000000 for the long run.
+TEST_P(HeightFields, NoRayPassesThrough) {
+  Rng rng(11, 0, 0, 0);
+  const long total = ray_count(120000), per_field = 400;
+  long wrong = 0, hits = 0;
+  for (long i = 0, ray_of_field = per_field; i < total;) {
+    const auto ground = static_cast<Ground>(i / per_field % kNumGrounds);
+    const Field field(rng, ground);
+    RayScene scene(field.model().model, 1, isa());
+    scene.update(field.model().world());
+    for (ray_of_field = 0; ray_of_field < per_field && i < total; ++ray_of_field, ++i) {
+      const Ray ray = random_ray(rng, field);
+      const Hit hit = scene.trace(0, {}, ray.o, ray.d);
+      hits += hit.geom >= 0;
+      if (agree(field.model(), ray.o, ray.d, hit)) continue;
+      if (++wrong <= 5)
+        ADD_FAILURE() << "ground " << ground << " ray " << ray_of_field << " of field "
+                      << i / per_field << ": t " << hit.t << " prim " << hit.prim << ", mj_ray "
+                      << mujoco_ray(field.model(), ray.o, ray.d).t << " from " << field.local(ray);
+    }
+  }
+  EXPECT_EQ(wrong, 0);
+  EXPECT_GT(hits, total / 2) << "too few hits to mean anything";
+}
+
+// The other questions that the same march answers: what a ray from outside meets is a front face,
+// and it is hidden where it meets something.
+TEST_P(HeightFields, CulledAndOccludedAlike) {
+  Rng rng(12, 0, 0, 0);
+  int lanes = 0, hits = 0;
+  for (int i = 0; i < 600; ++i) {
+    const Field field(rng, static_cast<Ground>(i % kNumGrounds));
+    RayScene scene(field.model().model, 1, isa());
+    RayScratch scratch(scene.num_objects());
+    scene.update(field.model().world());
+    for (int packet = 0; packet < 8; ++packet) {
+      RayPacket rays{};
+      mju_copy3(rays.origin, field.model().data->geom_xpos);
+      for (int lane = 0; lane < kPacket; ++lane) {
+        const Ray ray = random_ray(rng, field);
+        for (int k = 0; k < 3; ++k) {
+          rays.o[k][lane] = static_cast<float>(ray.o[k] - rays.origin[k]);
+          rays.d[k][lane] = static_cast<float>(ray.d[k]);
+        }
+        rays.tmax[lane] = field.outside(ray.o) ? static_cast<float>(rng.uniform(0, 20)) : -1;
+      }
+      HitPacket all, culled;
+      scene.trace(0, {}, rays, all, scratch);
+      scene.trace(0, {.backfaces = RayFilter::Backfaces::kCull}, rays, culled, scratch);
+      const std::uint32_t hidden = scene.occluded(0, {}, rays, scratch);
+      for (int lane = 0; lane < kPacket; ++lane) {
+        if (rays.tmax[lane] < 0) continue;
+        ++lanes;
+        hits += all.geom[lane] >= 0;
+        ASSERT_EQ(all.t[lane], culled.t[lane]) << "field " << i << " lane " << lane;
+        ASSERT_EQ(all.geom[lane] >= 0, (hidden >> lane & 1) != 0) << "field " << i;
+      }
+    }
+  }
+  EXPECT_GT(lanes, 30000);
+  EXPECT_GT(hits, lanes / 3);
+}
+
+// A ray that comes out of the ground sees the surface from below, and its normal is up.
+TEST_P(HeightFields, FromInsideThroughAFlatTop) {
+  const TestModel m(
+      "<mujoco><asset><hfield name='h' nrow='3' ncol='3' size='1 1 .7 .1' elevation='1 1 1  1 1 1 "
+      " 1 1 0'/></asset><worldbody><geom type='hfield' hfield='h' pos='.1 .2 .3'/></worldbody>"
+      "</mujoco>");
+  RayScene scene(m.model, 1, isa());
+  scene.update(m.world());
+  for (double x : {-0.7, -0.5, 0.1, 0.3}) {
+    const double o[3] = {x, 0.05, 0.4}, up[3] = {0, 0, 1};
+    const Hit hit = scene.trace(0, {}, o, up);
+    EXPECT_NEAR(hit.t, 0.6, 1e-6);
+    EXPECT_EQ(hit.normal, (std::array<float, 3>{0, 0, 1}));
+    EXPECT_GE(hit.prim, 0);
+    EXPECT_LT(scene.trace(0, {.backfaces = RayFilter::Backfaces::kCull}, o, up).geom, 0);
+  }
+}
+
+}  // namespace
+}  // namespace mjsense

@@ -1,0 +1,28 @@
+#pragma once
+// Which worlds a call is about.
+
+#include <concepts>
+#include <span>
+
+namespace mjsense {
+
+struct AllWorlds {};
+inline constexpr AllWorlds all_worlds;
+
+// `all_worlds`, or a list of ids in any order, which may be empty: no world. Made of whatever is a
+// span of ints; the caller's list must live as long as the call.
+class WorldIds {
+ public:
+  WorldIds(AllWorlds) : all_(true) {}
+  template <class List>
+  requires std::convertible_to<List&&, std::span<const int>> WorldIds(List&& ids) : ids_(ids) {}
+
+  bool all() const { return all_; }
+  std::span<const int> list() const { return ids_; }  // empty if all()
+
+ private:
+  std::span<const int> ids_;
+  bool all_ = false;
+};
+
+}  // namespace mjsense

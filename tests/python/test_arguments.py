@@ -1,0 +1,201 @@
+"""Wrong arguments of every public method, and misspelt attributes, are said in one sentence."""
+
+import inspect
+import types
+
+import numpy as np
+import pytest
+from scenes import BALL, ball_scene, feet_cfg
+
+import mjsense as mjs
+
+SKIPPED = (mjs.Sensor, mjs.TaskVectorEnv)  # users write the methods of the one; the other is made of a task, see below
+CLASSES = [
+    value
+    for value in vars(mjs).values()
+    if isinstance(value, type)
+    and not issubclass(value, (Exception, *SKIPPED))
+    and not hasattr(value, "__dataclass_fields__")
+    and value.__module__.startswith("mjsense.")
+    and value is not mjs.SensorSpec
+]
+FUNCTIONS = [mjs.record, mjs.make_vec, mjs.replace, *(f for f in vars(mjs.observations).values() if isinstance(f, types.FunctionType))]
+
+
+def methods_of(cls):
+    for name, value in inspect.getmembers(cls, inspect.isfunction):
+        if name == "__init__" or name[0] != "_":
+            yield value
+
+
+def parameters_of(function):
+    """Those that are declared to be something."""
+    found = inspect.signature(function).parameters.values()
+    return [p for p in found if p.annotation not in (p.empty, "Any", "np.ndarray", "Sequence[int] | None") and p.kind < 4 and p.kind != 2]
+
+
+def ids(function):
+    return function.__qualname__
+
+
+NATIVE = {mjs.NativeSensor, mjs.BuiltinSensor, mjs.Entity}  # made by scenes only
+STATIC = {f.__qualname__: f for c in {*CLASSES, mjs.TaskVectorEnv} - NATIVE for f in methods_of(c) if ids(f) != "TaskVectorEnv.__init__" if f.__module__.startswith("mjsense")}
+STATIC |= {f.__qualname__: f for f in FUNCTIONS if f is not mjs.replace and f.__name__ != "checked"}
+
+
+@pytest.mark.parametrize("function", [f for f in STATIC.values() if "NativeSensor.__init__" not in ids(f)], ids=ids)
+def test_wrong_types_are_named(function):
+    for parameter in parameters_of(function):
+        if "Any" in parameter.annotation and "[" not in parameter.annotation:
+            continue
+        with pytest.raises(TypeError, match=rf"\(\): {parameter.name} must be "):
+            function(*[None] * ("self" in inspect.signature(function).parameters), **{parameter.name: types.SimpleNamespace()})
+
+
+@pytest.fixture(scope="module")
+def live():
+    """An object of every class, and arguments that are right."""
+    scene = mjs.Scene(
+        mjs.SceneCfg(
+            entities={"ball": mjs.EntityCfg(model=BALL)},
+            terrain=mjs.TerrainCfg(),
+            sensors=(
+                feet_cfg(track_air_time=True),
+                mjs.RayCastSensorCfg(name="scan", frame=mjs.ObjRef("body", "ball", "ball")),
+                mjs.LidarSensorCfg(name="lidar", frame=mjs.ObjRef("body", "ball", "ball"), scan=mjs.SpinningScanCfg(samples=4)),
+                mjs.TerrainHeightSensorCfg(name="height", frame=mjs.ObjRef("body", "ball", "ball")),
+                mjs.CameraSensorCfg(name="eye", width=4, height=4),
+                mjs.ImuSensorCfg(name="imu", site=mjs.ObjRef("site", "imu", "ball")),
+            ),
+        )
+    )
+    sim = mjs.Simulation(scene, num_worlds=2)
+    objects = [scene, sim, *(scene[k] for k in ("touch", "scan", "lidar", "height", "eye", "imu", "ball/acc")), scene["ball"]]
+    objects += [mjs.SensorSuite([scene["scan"]]), mjs.ObservationPipeline(2), sim.debug_shapes(0, "scan")]
+    return {type(o): o for o in objects}, sim
+
+
+RIGHT = {"field": "geom_friction", "values": 1.0, "name": "geom_friction", "uuid": "scan", "kind": "line", "dt": 0.1, "sensors": [],
+         "env": None, "center": (0, 0, 0), "start": (0, 0, 0), "end": (0, 0, 1), "radius": 0.1, "color": (1, 0, 0, 1), "num_envs": 2,
+         "position": (0, 0, 0), "rotation_matrix": np.eye(3), "path": "x.nothing", "scene": None, "sensor": None}  # fmt: skip
+WRONG = ("3", 1.5, -1, 2**40, 10**30, np.nan, None, True, b"x", object(), [0.5], [-1], [7], ["a"], {}, np.zeros((1, 2, 3)))
+
+
+@pytest.mark.parametrize("cls", CLASSES, ids=lambda c: c.__name__)
+def test_no_wrong_argument_shows_a_binding(cls, live):
+    objects, sim = live
+    if cls not in objects:
+        assert cls in (mjs.NativeSensor, mjs.BuiltinSensor), "give the fixture an object of it"
+        return
+    for function in methods_of(cls):
+        if function.__name__ in ("__init__", "close", "reset_sensors"):
+            continue
+        call = getattr(objects[cls], function.__name__)
+        parameters = inspect.signature(call).parameters.values()
+        for parameter in parameters:
+            for wrong in WRONG:
+                needed = {p.name: RIGHT[p.name] for p in parameters if p.default is p.empty and p.kind < 2 and p is not parameter}
+                if parameter.kind in (2, 4):
+                    continue
+                try:
+                    call(**{**needed, parameter.name: wrong})
+                except Exception as error:
+                    assert isinstance(error, (TypeError, ValueError, KeyError, RuntimeError, AttributeError)), (call, wrong)
+                    text = str(error)
+                    assert "incompatible function arguments" not in text and "SimpleNamespace" not in text, (call, parameter, wrong)
+
+
+@pytest.mark.parametrize(
+    "kwargs, text",
+    [
+        (dict(num_worlds=1.5), r"Simulation\(\): num_worlds must be an int of 32 bits or None, not 1.5"),
+        (dict(num_worlds="4"), "num_worlds must be"),
+        (dict(num_worlds=0), "num_worlds"),
+        (dict(num_worlds=True), "num_worlds must be"),
+        (dict(decimation=0), "decimation"),
+        (dict(decimation=2.0), "decimation must be"),
+        (dict(threads=-1), "threads"),
+        (dict(seed=-1), "seed must be an int of 64 bits from 0 on, not -1"),
+        (dict(seed=2**64), "seed must be"),
+        (dict(seed="x"), "seed must be"),
+    ],
+)
+def test_simulation_arguments(kwargs, text):
+    with pytest.raises((TypeError, ValueError), match=text):
+        mjs.Simulation(ball_scene(), **kwargs)
+
+
+def test_methods_say_what_is_wrong():
+    sim = mjs.Simulation(ball_scene(), num_worlds=np.int64(2), decimation=np.int32(1))  # NumPy's ints are ints
+    for call, text in [
+        (lambda: sim.step("3"), r"Simulation.step\(\): control_steps must be an int of 32 bits, not '3'"),
+        (lambda: sim.step(control_steps=1.5), "control_steps must be"),
+        (lambda: sim.step(-1), "-1"),
+        (lambda: sim.reset(seed=-1), "seed must be"),
+        (lambda: sim.reset("all"), "world_ids must be integers or a mask, not 'all'"),
+        (lambda: sim.reset([0.5]), "world_ids must be integers"),
+        (lambda: sim.reset([2]), "2"),
+        (lambda: sim.randomize(3, 1.0), "field must be a str, not 3"),
+        (lambda: mjs.record(out="x", cameras="wrist_camera"), "cameras must be a sequence of str or None, not 'wrist_camera'"),
+        (lambda: mjs.record(out="x", episodes=1.5), r"record\(\): episodes must be an int"),
+        (lambda: mjs.make_vec(num_envs="2"), r"make_vec\(\): num_envs must be"),
+    ]:
+        with pytest.raises((TypeError, ValueError), match=text):
+            call()
+
+
+def test_misspelt_attributes():
+    scene = ball_scene(feet_cfg())
+    sim = mjs.Simulation(scene)
+    for owner, name, near in [
+        (sim, "qposs", "qpos"),
+        (scene, "sensorss", "sensors"),
+        (scene["ball"], "body_name", "body_names"),
+        (scene["touch"], "dat", "data"),
+        (scene["touch"].cfg, "num_slot", "num_slots"),
+        (mjs.SceneCfg(), "num_env", "num_envs"),
+        (mjs.MujocoCfg(), "time_step", "timestep"),
+        (mjs.TerrainCfg(), "level", "levels"),
+        (mjs.CameraSensorCfg(name="a"), "with", "width"),
+        (mjs.SensorSuite(), "sensor", "sensors"),
+        (mjs.ObservationPipeline(1), "num_env", "num_envs"),
+        (mjs.DebugShapes(), "mean_size", "meansize"),
+    ]:
+        with pytest.raises(AttributeError, match=f"has no attribute '{name}'; did you mean .*'{near}'"):
+            setattr(owner, name, 3)
+    with pytest.raises(AttributeError, match="mjData.xpos is computed from the state"):
+        sim.data.xpos = 3
+    with pytest.raises(AttributeError):
+        scene["touch"].data.force = 3
+    sim.data.ctrl = 0  # a part of the state may be written
+    sim.qpos = sim.qpos.copy()
+
+
+def test_classes_of_users_may_have_more_attributes():
+    class Mine(mjs.Simulation):
+        def __init__(self, scene):
+            super().__init__(scene)
+            self.extra = 3
+
+    assert Mine(ball_scene()).extra == 3
+
+
+def test_measurements_are_read_only():
+    class Own(mjs.Sensor):
+        uuid = "own"
+        observation_space = __import__("gymnasium").spaces.Box(0, 10, (1,), np.float32)
+
+        def compute(self, sim):
+            return sim.qpos[:, 2:3].astype(np.float32)
+
+    own = Own()
+    scene = ball_scene(feet_cfg(), own)
+    sim = mjs.Simulation(scene, num_worlds=2)
+    for array in (scene["ball/acc"].data, scene["touch"].data.force, scene["touch"].fields["found"], own.data, own.rows, sim.data.xpos):
+        with pytest.raises(ValueError, match="read-only"):
+            array[:] = 3
+    sim.step()
+    assert own.data[0, 0] == np.float32(sim.qpos[0, 2])
+    copy = scene["ball/acc"].data.copy()
+    copy[:] = 3
+    assert np.shares_memory(np.from_dlpack(scene["ball/acc"].data), scene["ball/acc"].data)

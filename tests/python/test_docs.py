@@ -1,0 +1,125 @@
+"""The pages are tests: what they show runs as it stands (CONTRIBUTING, "Pages")."""
+
+import importlib.util
+import os
+import re
+import shlex
+import subprocess
+import sys
+from pathlib import Path
+from types import SimpleNamespace
+from unittest.mock import MagicMock
+
+import mujoco
+import pytest
+
+import mjsense as mjs
+
+ROOT = Path(__file__).parents[2]
+PROGRAM = Path(os.environ.get("MJSENSE_PROGRAM", ROOT / "build/dev/mjsense"))
+PAGES = [ROOT / "README.md", ROOT / "CONTRIBUTING.md", *sorted(ROOT.glob("docs/*.md")), *sorted(ROOT.glob("src/mjsense/**/page.md"))]
+FENCE = re.compile(r"^```(\w+)\n(.*?)^```$", re.MULTILINE | re.DOTALL)
+MISSING = [name for name in ("matplotlib", "rerun") if importlib.util.find_spec(name) is None]
+SHORT = ["--episodes", "1", "--horizon", "2", "--keep-failures", "--size", "64x48", "-q", "--no-sheet"]  # of recordings
+
+
+def blocks(page, *languages):
+    """[(line, code)] of the fenced blocks in these languages, those in HTML comments too."""
+    text = page.read_text()
+    return [(text.count("\n", 0, m.start()) + 2, m[2]) for m in FENCE.finditer(text) if m[1] in languages]
+
+
+def pages(*languages):
+    return [pytest.param(p, id=str(p.relative_to(ROOT))) for p in PAGES if blocks(p, *languages)]
+
+
+def test_every_block_is_in_a_language_that_is_tested():
+    for page in PAGES:
+        known = blocks(page, "python", "cpp", "cmake", "toml")
+        assert page.read_text().count("\n```") == 2 * len(known), page
+
+
+class Viewer:
+    """MuJoCo's viewer, closed by its user after two frames."""
+
+    def __init__(self, model, data):
+        self.user_scn, self.frames = mujoco.MjvScene(model, 1000), 0
+
+    def __enter__(self):
+        return self
+
+    def __exit__(self, *exception):
+        assert self.user_scn.ngeom > 0
+
+    def is_running(self):
+        self.frames += 1
+        return self.frames <= 2
+
+    def sync(self): ...
+
+
+@pytest.mark.parametrize("page", pages("python"))
+def test_python(page, tmp_path, monkeypatch):
+    """All blocks of a page, one after the other, in an empty folder. Other people's viewers are not needed to run them."""
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setitem(sys.modules, "mujoco.viewer", SimpleNamespace(launch_passive=Viewer))
+    monkeypatch.setattr(mujoco, "viewer", sys.modules["mujoco.viewer"], raising=False)
+    for name in ("matplotlib", "matplotlib.pyplot", "rerun"):
+        if name.split(".")[0] in MISSING:
+            monkeypatch.setitem(sys.modules, name, MagicMock())
+    names = {"__name__": "page"}
+    for line, code in blocks(page, "python"):
+        exec(compile("\n" * (line - 1) + code, str(page), "exec"), names)  # errors show the page's line
+
+
+def squeezed(text):
+    return "".join(text.split())
+
+
+@pytest.mark.parametrize("page", pages("cpp", "cmake"))
+def test_cpp_stands_in_a_file_that_is_compiled(page):
+    files = [*ROOT.glob("examples/cpp/*"), *ROOT.glob("src/mjsense/**/*_test.cc")]
+    compiled = "".join(squeezed(f.read_text()) for f in files if f.is_file())
+    for line, code in blocks(page, "cpp", "cmake"):
+        assert all(squeezed(part) in compiled for part in code.strip().split("\n\n")), f"{page}:{line}"
+
+
+def run(arguments, cwd):
+    done = subprocess.run([PROGRAM, *arguments], cwd=cwd, capture_output=True, text=True, timeout=300)
+    assert done.returncode == 0, f"mjsense {shlex.join(arguments)}\n{done.stdout}{done.stderr}"
+
+
+@pytest.mark.parametrize("page", pages("toml"))
+def test_experiment_files(page, tmp_path):
+    for _, text in blocks(page, "toml"):
+        (tmp_path / "job.toml").write_text(text)
+        run(["record", "--config", "job.toml", *SHORT], tmp_path)
+
+
+def command_lines(page):
+    """The lines that begin with the program's name, without their comments."""
+    return [shlex.split(line, comments=True)[1:] for line in re.findall(r"^    (mjsense .*)$", page.read_text(), re.MULTILINE)]
+
+
+@pytest.mark.parametrize("page", [p for p in pages("python", "toml") if command_lines(p.values[0])])
+def test_command_lines(page, tmp_path):
+    """As they stand, from a folder with the repository's models; recordings are cut short."""
+    for folder in ("models", "bench"):
+        (tmp_path / folder).symlink_to(ROOT / folder)
+    # What lines refer to.
+    import numpy as np
+
+    np.save(tmp_path / "mid360.npy", np.random.default_rng(0).uniform(-0.5, 0.5, (20000, 2)))
+    lines = command_lines(page)
+    if not any(line[0] == "record" for line in lines):
+        run(["record", "pick", "--out", "data", *SHORT], tmp_path)
+    for line in lines:
+        if line[0] == "record":
+            words = [line[i] for i in range(len(line)) if "--episodes" not in line[max(0, i - 1) : i + 1]]
+            run([*words, *SHORT], tmp_path)
+        else:
+            run(line, tmp_path)
+
+
+def test_models_of_the_pages_are_there():
+    assert "robots/quadruped.xml" in mjs.embedded_models()
