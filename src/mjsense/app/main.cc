@@ -20,6 +20,7 @@
 #include "mjsense/app/sensors_command.h"
 #include "mjsense/core/error.h"
 #include "mjsense/replay/check.h"
+#include "mjsense/rollout/registry.h"
 
 namespace mjsense {
 namespace {
