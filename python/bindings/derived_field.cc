@@ -2,7 +2,9 @@
 
 #include <mujoco/mjxmacro.h>
 
+#include <algorithm>
 #include <cstring>
+#include <string_view>
 #include <type_traits>
 
 #include "mjsense/core/error.h"
@@ -39,11 +41,26 @@ std::vector<DataField> data_fields(const mjModel* m) {
   return fields;
 }
 
+// Fields that MuJoCo computes before accelerations, in the order of mjdata.h. Any other may need all.
+constexpr std::string_view kBeforeAccelerations[] = {
+    "xpos",          "xquat",           "xmat",          "xipos",           "xiquat",
+    "ximat",         "xanchor",         "xaxis",         "geom_xpos",       "geom_xquat",
+    "geom_xmat",     "site_xpos",       "site_xquat",    "site_xmat",       "cam_xpos",
+    "cam_xmat",      "light_xpos",      "light_xdir",    "subtree_com",     "cdof",
+    "cinert",        "flexvert_xpos",   "flexelem_aabb", "flexedge_length", "ten_J",
+    "ten_length",    "actuator_length", "crb",           "M",               "qLD",
+    "qLDiagInv",     "ten_velocity",    "cvel",          "cdof_dot",        "actuator_velocity",
+    "qfrc_bias",     "qfrc_spring",     "qfrc_damper",   "qfrc_gravcomp",   "qfrc_fluid",
+    "qfrc_adhesion", "qfrc_passive",    "flexedge_velocity"};
+
 class DerivedField final : public Sensor {
  public:
   explicit DerivedField(DataField field)
       : Sensor("mjData." + field.name), field_(std::move(field)) {}
   std::string_view kind() const override { return "mjdata"; }
+  mjtStage needs() const override {
+    return std::ranges::count(kBeforeAccelerations, field_.name) ? mjSTAGE_VEL : mjSTAGE_ACC;
+  }
 
   void initialize(const SensorInit& init) override {
     clear_fields();

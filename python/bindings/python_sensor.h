@@ -42,6 +42,8 @@ class PythonSensor final : public Sensor {
 
   std::string_view kind() const override { return "python"; }
   Stage stage() const override { return Stage::kBatch; }
+  // What it reads of the simulation in Python is brought up to date when it reads it.
+  mjtStage needs() const override { return mjSTAGE_NONE; }
   void edit_spec(mjSpec* spec) override;
   void initialize(const SensorInit& init) override;
   void compute(const World&) override {}

@@ -32,9 +32,9 @@ class Scene;
 class Shared;
 class ThreadPool;
 
-// One world as a sensor sees it. In compute() and substep() every derived field of `data` belongs
-// to its present state: positions, velocities, accelerations, contacts and their forces. `model`
-// holds the world's own values of randomised fields and is valid during the call only. MuJoCo
+// One world as a sensor sees it. In compute() and substep() the derived fields of `data` belong to
+// its present state: positions and contacts, velocities, accelerations and forces, as far as the
+// sensor needs() them; in reset() all of them. `model` holds the world's own values of randomised fields and is valid during the call only. MuJoCo
 // errors leave a call by longjmp: hold no object with a destructor across a MuJoCo function that
 // can fail.
 struct World {
@@ -120,6 +120,11 @@ class Sensor {
   virtual void draw(const World& world, DebugShapes& shapes);
 
   virtual Stage stage() const { return Stage::kRow; }
+  // The last stage of MuJoCo's computation whose results compute() and substep() read:
+  // mjSTAGE_NONE the state alone, mjSTAGE_POS poses and contacts, mjSTAGE_VEL, mjSTAGE_ACC
+  // accelerations and forces. A stage that nobody needs is not computed, and the last costs a
+  // constraint solve a control step. Asked once, after initialize().
+  virtual mjtStage needs() const { return mjSTAGE_ACC; }
   // True if compute() must run exactly once a control step, read or not (delays, rates, filters).
   virtual bool eager() const { return false; }
   // Keys of the sensors of its scene that initialize() looks at: they are initialized first.

@@ -34,6 +34,7 @@ class EffectSensor : public Sensor {
   void reset(const World& world) override;
   // Delays, drifts and histories must see every control step.
   bool eager() const override { return eager_; }
+  mjtStage needs() const override { return mjSTAGE_NONE; }  // rows of another sensor
   std::span<Sensor* const> inputs() const override { return {&inner_, 1}; }
 
   const Sensor& clean() const { return *inner_; }

@@ -21,6 +21,7 @@ class CameraParameterSensor final : public Sensor {
   // `camera`: full MuJoCo name. width, height: pixels, of the recorded picture.
   CameraParameterSensor(std::string name, std::string camera, int width, int height);
   std::string_view kind() const override { return "camera_parameters"; }
+  mjtStage needs() const override { return mjSTAGE_POS; }
   void initialize(const SensorInit& init) override;
   void compute(const World& world) override;
 

@@ -26,6 +26,7 @@ class EnvStatesSensor final : public Sensor {
   EnvStatesSensor(std::string name, std::string articulation, std::vector<JointGroup> groups,
                   int length, std::string robot_body);
   std::string_view kind() const override { return "env_states"; }
+  mjtStage needs() const override { return mjSTAGE_NONE; }
   void initialize(const SensorInit& init) override;
   void compute(const World& world) override;
 

@@ -38,6 +38,7 @@ class ImagePointsSensor final : public Sensor {
   ImagePointsSensor(std::string name, std::vector<Object> objects, std::vector<Camera> cameras);
   std::string_view kind() const override { return "image_points"; }
   Stage stage() const override { return Stage::kPostCast; }
+  mjtStage needs() const override { return mjSTAGE_NONE; }
   std::span<Sensor* const> inputs() const override { return inputs_; }
   void initialize(const SensorInit& init) override;
   void compute(const World& world) override;

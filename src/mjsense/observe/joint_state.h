@@ -23,6 +23,7 @@ class JointStateSensor final : public Sensor {
   enum class What { kPosition, kVelocity };
   JointStateSensor(std::string name, What what, std::vector<JointGroup> groups);
   std::string_view kind() const override { return "joint_state"; }
+  mjtStage needs() const override { return mjSTAGE_NONE; }
   void initialize(const SensorInit& init) override;
   void compute(const World& world) override;
 

@@ -22,6 +22,7 @@ class PoseSensor final : public Sensor {
   // `reference` with an empty name: the world.
   PoseSensor(std::string name, Ref frame, Ref reference = {}, std::string description = "");
   std::string_view kind() const override { return "pose"; }
+  mjtStage needs() const override { return mjSTAGE_POS; }
   void initialize(const SensorInit& init) override;
   void compute(const World& world) override;
 

@@ -16,6 +16,7 @@ class SharedField final : public Sensor {
               std::function<void(SensorSpec&)> adapt = {});
   std::string_view kind() const override { return "shared"; }
   Stage stage() const override;
+  mjtStage needs() const override { return mjSTAGE_NONE; }
   std::span<Sensor* const> inputs() const override { return {&source_, 1}; }
   void initialize(const SensorInit& init) override;
   void compute(const World& /*world*/) override {}

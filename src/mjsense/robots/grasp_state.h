@@ -21,6 +21,7 @@ class GraspStateSensor final : public Sensor {
   };
   GraspStateSensor(std::string name, BodyRef object, std::vector<Gripper> grippers);
   std::string_view kind() const override { return "grasp_state"; }
+  mjtStage needs() const override { return mjSTAGE_POS; }
   void initialize(const SensorInit& init) override;
   void compute(const World& world) override;
 

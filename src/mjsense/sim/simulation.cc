@@ -57,6 +57,7 @@ struct Simulation::Slot {
   std::vector<std::int64_t> computed;  // by world: version_ to which the row belongs
   std::vector<double> compute_s;       // by world
   double cast_s = 0;
+  mjtStage needs = mjSTAGE_ACC;
   int phase = 0;        // passes that must come before: 1 + that of an input which casts
   bool casts = false;   // stage kCast or kBatch: finished by cast()
   bool read = false;    // since the last step
@@ -96,13 +97,23 @@ class Simulation::Hooks final : public WorldHooks {
   enum class Only { kNothing, kSubstep, kReset };
   Hooks(Simulation& sim, std::span<Slot* const> slots, int phase)
       : sim_(sim), slots_(slots), phase_(phase) {
-    for (const Slot* s : slots) rays_ |= s->phase == phase && s->sensor->stage() == Stage::kCast;
+    for (const Slot* s : slots) {
+      if (s->phase != phase) continue;
+      rays_ |= s->sensor->stage() == Stage::kCast;
+      stage_ = std::max(stage_, s->needs);
+    }
+    if (rays_) stage_ = std::max(stage_, mjSTAGE_POS);
   }
 
   // Nothing but substep() or reset() of every sensor.
   Hooks(Simulation& sim, Only only, double elapsed = 0.0)
-      : sim_(sim), only_(only), elapsed_(elapsed) {}
+      : sim_(sim),
+        only_(only),
+        elapsed_(elapsed),
+        stage_(only == Only::kSubstep ? sim.substep_stage_ : mjSTAGE_ACC) {}
 
+  mjtStage stage() const override { return stage_; }
+  mjtStage substep_stage() const override { return sim_.substep_stage_; }
   bool wants_substep() const override { return sim_.any_substep_; }
 
   void substep(const World& world) override {
@@ -145,6 +156,7 @@ class Simulation::Hooks final : public WorldHooks {
   int phase_ = 0;
   Only only_ = Only::kNothing;
   double elapsed_ = 0.0;
+  mjtStage stage_ = mjSTAGE_NONE;
   bool rays_ = false;
 };
 
@@ -210,7 +222,11 @@ void Simulation::initialize(Sensor& sensor) {
     slot->phase = std::max(slot->phase, in.phase + (in.casts ? 1 : 0));
   }
   if (sensor.stage() == Stage::kCast) rays();
-  any_substep_ |= sensor.wants_substep();
+  slot->needs = sensor.needs();
+  if (sensor.wants_substep()) {
+    any_substep_ = true;
+    substep_stage_ = std::max(substep_stage_, slot->needs);
+  }
   slots_.push_back(std::move(slot));
 }
 

@@ -127,6 +127,7 @@ class Simulation {
   std::vector<std::int64_t> rays_version_;    // of the poses in the ray scene
   std::vector<double> rays_s_;                // time spent on them, by world
   bool any_substep_ = false;
+  mjtStage substep_stage_ = mjSTAGE_NONE;  // that the sensors need which want every substep
   bool measure_cost_ = false;
 };
 

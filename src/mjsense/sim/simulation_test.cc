@@ -4,6 +4,8 @@
 #include <gtest/gtest.h>
 
 #include <memory>
+#include <string>
+#include <utility>
 #include <vector>
 
 #include "mjsense/core/error.h"
@@ -44,6 +46,8 @@ struct Height : Sensor {
   void compute(const World& w) override {
     if (w.id == fail_in) throw ValueError("no value");
     ++computes[w.id];
+    solves = w.data->timer[mjTIMER_CONSTRAINT].number;
+    positions = w.data->timer[mjTIMER_POSITION].number;
     row(w.id) = static_cast<float>(w.data->xpos[3 * (w.model->nbody - 1) + 2]);
   }
   void substep(const World& w) override { ++substeps[w.id]; }
@@ -55,13 +59,15 @@ struct Height : Sensor {
   }
   bool wants_substep() const override { return with_substeps; }
   bool eager() const override { return is_eager; }
+  mjtStage needs() const override { return reads_up_to; }
   Stage stage() const override { return stage_; }
   std::span<Sensor* const> inputs() const override { return input_list; }
   float& row(int w) { return fields()[0].data.row<float>(w)[0]; }
 
   Stage stage_;
   bool with_substeps = false, is_eager = false;
-  int fail_in = -1, casts = 0;
+  mjtStage reads_up_to = mjSTAGE_ACC;
+  int fail_in = -1, casts = 0, solves = 0, positions = 0;  // counted by MuJoCo
   std::vector<int> computes, substeps, resets, cast_ids;
   std::vector<Sensor*> input_list;
   std::function<void()> on_cast;
@@ -100,6 +106,37 @@ TEST(Simulation, DescribesThePresentState) {
   sim.refresh(*h);
   const auto* qpos = reinterpret_cast<const double*>(sim.worlds().state_component("qpos").data);
   EXPECT_FLOAT_EQ(h->row(0), static_cast<float>(qpos[2]));
+}
+
+// What a step computes beyond the integration is what the sensors need that are read.
+TEST(Simulation, ComputesTheStagesThatItsSensorsNeed) {
+  Simulation sim(scene(), {.decimation = 2});
+  const auto sensor = [&](mjtStage stage) {
+    auto s = std::make_shared<Height>("h" + std::to_string(stage));
+    s->reads_up_to = stage;
+    sim.add(s);
+    return s;
+  };
+  auto none = sensor(mjSTAGE_NONE), place = sensor(mjSTAGE_POS), force = sensor(mjSTAGE_ACC);
+  auto* push = reinterpret_cast<double*>(sim.worlds().state_component("qfrc_applied").data);
+  const auto step = [&](Height& read) {
+    push[0] += 0.1;  // no solve is used again
+    sim.step();
+    sim.refresh(read);
+  };
+  const auto count = [&](Height& read) {
+    step(read);
+    const int positions = read.positions, solves = read.solves;
+    for (int k = 0; k < 10; ++k) step(read);
+    return std::pair(read.positions - positions, read.solves - solves);
+  };
+  EXPECT_EQ(count(*none), std::pair(20, 20));
+  EXPECT_EQ(count(*place), std::pair(20, 20));
+  EXPECT_EQ(count(*force), std::pair(20, 30));
+  const auto* qpos = reinterpret_cast<const double*>(sim.worlds().state_component("qpos").data);
+  sim.step();
+  sim.refresh(*place);
+  EXPECT_FLOAT_EQ(place->row(0), static_cast<float>(qpos[2]));
 }
 
 TEST(Simulation, PartialResetRefreshesExactlyThoseWorlds) {

@@ -1,11 +1,16 @@
 #pragma once
 // B parallel worlds: a thin owner of MuJoCo's mjBatch (persistent, one mjData a world). Steps,
-// resets, clocks, and the promise that after step(), reset() and forward() every derived field of a
-// world belongs to its present state.
+// resets, clocks, and the promise that whoever looks at a world sees derived fields that belong to
+// its present state.
+//
+// MuJoCo computes them in stages (mjtStage): positions, velocities, accelerations with the
+// constraint solve. A world remembers how far it got at its present state. A stage is computed when
+// somebody reads it, at most once for a state, and the next step starts from what is there.
 
 #include <mujoco/mjbatch.h>
 #include <mujoco/mujoco.h>
 
+#include <atomic>
 #include <cstdint>
 #include <exception>
 #include <memory>
@@ -21,13 +26,16 @@
 namespace mjsense {
 
 // What happens inside the parallel pass over worlds, on MuJoCo's threads. Exceptions are caught,
-// and rethrown by the call.
+// and rethrown by the call. "Fresh": derived fields up to the stage named belong to the state.
 class WorldHooks {
  public:
   virtual ~WorldHooks() = default;
+  // The last stage that refreshed() and substep() read; mjSTAGE_NONE: the state alone.
+  virtual mjtStage stage() const { return mjSTAGE_ACC; }
+  virtual mjtStage substep_stage() const { return mjSTAGE_ACC; }
   virtual bool wants_substep() const { return false; }
   virtual void substep(const World& world) = 0;  // after every physics step, world fresh
-  virtual void reset(const World& world) = 0;    // this world begins a new episode, world fresh
+  virtual void reset(const World& world) = 0;    // a new episode begins; fresh in all stages
   virtual void refreshed(
       const World& world) = 0;  // once, at the end of step/reset/forward/visit, world fresh
 };
@@ -92,7 +100,14 @@ class Worlds {
     std::uint32_t key = 0;
     std::uint64_t moment = 0;
   };
+  // Which of a world's derived fields belong to its remembered state row.
+  struct Derived {
+    mjtStage stage = mjSTAGE_NONE;   // up to here
+    bool behind = false;             // step_raw() left them one substep behind, and so they stay
+    std::int64_t model_version = 0;  // of the model they were computed with
+  };
   enum class Op { kStep, kForward, kReset, kStepRaw, kVisit };
+  class Warnings;
   struct Call {
     Worlds* self;
     Op op;
@@ -103,10 +118,17 @@ class Worlds {
   static void run(const mjModel* m, mjData* d, int w, void* arg);
   void run_world(const mjModel* m, mjData* d, int w, const Call& call);
   bool step_world(const mjModel* m, mjData* d, int w, const Call& call);
+  bool step_unseen(const mjModel* m, mjData* d, int w, const Call& call);
+  bool step_whole(const mjModel* m, mjData* d, int w, const Call& call);
+  bool healthy(int w, const Warnings& warnings);
   void apply(WorldIds ids, Call call, bool save);
   World view(const mjModel* m, mjData* d, int w) const;
-  bool derived_current(int w) const;
-  void remember(int w);
+  bool same_state(int w) const;
+  bool same_controls(int w) const;
+  bool same_columns(int w, std::size_t begin, std::size_t end) const;
+  void remember(const mjModel* m, const mjData* d, int w);
+  void bring(const mjModel* m, mjData* d, int w, mjtStage stage);
+  void bring_late(const mjModel* m, mjData* d, int w, mjtStage stage);
 
   mjBatch* batch_ = nullptr;
   int num_worlds_;
@@ -116,15 +138,20 @@ class Worlds {
   std::vector<Clock> clocks_;
   std::vector<int> reset_key_;      // keyframe of each world's last reset
   std::vector<mjtNum> remembered_;  // state rows to which the derived fields belong
-  std::vector<std::int64_t>
-      derived_version_;  // model version of the derived fields; -1: one substep behind
+  std::vector<Derived> derived_;
   std::vector<std::exception_ptr> exceptions_;  // of hooks, by world
   std::vector<std::uint8_t> diverged_;          // by world: mjtWarning + 1 in this call
   std::vector<Failure> failures_;
   std::vector<int> ids_;  // scratch: the sorted selection
-  std::size_t ctrl_begin_ = 0,
-              ctrl_end_ =
-                  0;  // part of a state row that the position and velocity stages do not read
+  // One mjData a thread, in which worlds are stepped that nobody looks at.
+  struct Workbench {
+    mjData* data = nullptr;
+    std::atomic<bool> taken = false;
+  };
+  std::vector<Workbench> workbenches_;
+  // Part of a state row that the position and velocity stages do not read: warm start, controls
+  // and applied forces.
+  std::size_t ctrl_begin_ = 0, ctrl_end_ = 0;
 };
 
 }  // namespace mjsense

@@ -3,10 +3,16 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <algorithm>
+#include <array>
 #include <cmath>
 #include <cstring>
 #include <limits>
+#include <map>
 #include <memory>
+#include <string>
+#include <string_view>
+#include <tuple>
 #include <type_traits>
 #include <vector>
 
@@ -18,19 +24,24 @@ namespace {
 using ModelPtr = std::unique_ptr<mjModel, decltype(&mj_deleteModel)>;
 using DataPtr = std::unique_ptr<mjData, decltype(&mj_deleteData)>;
 
-// A hand that drops a box on a plane: contacts, an actuator, every sensor stage.
+// A hand that drops a box on a plane: contacts, actuators with and without state, a constraint that
+// can be switched, a mocap body in the way, sensors of every stage.
 constexpr char kXml[] = R"(
 <mujoco>
   <option timestep="0.004" integrator="%s"/>
+  <size nuserdata="2"/>
   <worldbody>
     <geom name="floor" type="plane" size="0 0 .1"/>
     <body name="arm" pos="0 0 1"><joint name="hinge" axis="0 1 0" damping=".1"/>
       <geom type="capsule" fromto="0 0 0 .4 0 0" size=".04" mass="1"/>
       <body pos=".4 0 0"><joint name="elbow" axis="0 1 0"/><geom type="box" size=".1 .1 .1" mass=".5"/>
         <site name="tip"/></body></body>
+    <body name="post" mocap="true" pos="1.15 0 .1"><geom type="box" size=".02 .1 .1"/></body>
     <body name="box" pos="1 0 .2"><freejoint/><geom type="box" size=".1 .1 .1" mass=".3"/></body>
   </worldbody>
-  <actuator><motor name="m" joint="hinge" gear="4"/><position joint="elbow" kp="20"/></actuator>
+  <actuator><motor name="m" joint="hinge" gear="4"/><position joint="elbow" kp="20"/>
+    <general name="slow" joint="elbow" dyntype="filter" dynprm=".1" gainprm="2"/></actuator>
+  <equality><joint joint1="hinge" joint2="elbow" active="false"/></equality>
   <sensor><accelerometer site="tip"/><velocimeter site="tip"/><framepos objtype="site" objname="tip"/></sensor>
   <keyframe><key name="up" qpos="0.5 0.3 1 0 .5 1 0 0 0"/></keyframe>
 </mujoco>)";
@@ -47,11 +58,16 @@ ModelPtr load(const char* integrator) {
 
 struct Recording : WorldHooks {
   bool every = false;
+  mjtStage read = mjSTAGE_ACC, read_every = mjSTAGE_ACC;
   std::vector<std::vector<double>> sensordata;  // by world, as last refreshed
   std::vector<int> substeps, resets, refreshes;
   std::vector<double> force;
+  std::vector<std::array<int, 3>> computed;  // how often positions, velocities, solves
   int throw_in = -1;
-  explicit Recording(int n) : sensordata(n), substeps(n), resets(n), refreshes(n), force(n) {}
+  explicit Recording(int n)
+      : sensordata(n), substeps(n), resets(n), refreshes(n), force(n), computed(n) {}
+  mjtStage stage() const override { return read; }
+  mjtStage substep_stage() const override { return read_every; }
   bool wants_substep() const override { return every; }
   void substep(const World& w) override { ++substeps[w.id]; }
   void reset(const World& w) override { ++resets[w.id]; }
@@ -59,9 +75,42 @@ struct Recording : WorldHooks {
     ++refreshes[w.id];
     sensordata[w.id].assign(w.data->sensordata, w.data->sensordata + w.model->nsensordata);
     force[w.id] = w.data->nefc > 0 ? w.data->efc_force[0] : 0;
+    const mjTimerStat* timer = w.data->timer;
+    computed[w.id] = {timer[mjTIMER_POSITION].number, timer[mjTIMER_VELOCITY].number,
+                      timer[mjTIMER_CONSTRAINT].number};
     if (w.id == throw_in) throw ValueError("hook failed");
   }
+  // The sensors of the stages that were asked for, and the first force, are those of mj_forward.
+  void expect_fresh(int w, const mjModel* m, const mjData* d) const {
+    for (int i = 0; i < m->nsensor; ++i) {
+      if (m->sensor_needstage[i] > read) continue;
+      for (int k = 0; k < m->sensor_dim[i]; ++k) {
+        ASSERT_EQ(sensordata[w][m->sensor_adr[i] + k], d->sensordata[m->sensor_adr[i] + k])
+            << "sensor " << i << " of stage " << m->sensor_needstage[i];
+      }
+    }
+    if (read == mjSTAGE_ACC) {
+      ASSERT_EQ(force[w], d->nefc > 0 ? d->efc_force[0] : 0.0);
+    }
+  }
 };
+
+DataPtr make_data(const mjModel* m) { return DataPtr(mj_makeData(m), mj_deleteData); }
+
+// The whole state row, warm start and all.
+void expect_same_state(Worlds& worlds, int w, const mjModel* m, const mjData* d) {
+  std::vector<mjtNum> row(mj_stateSize(m, mjSTATE_INTEGRATION));
+  mj_getState(m, d, row.data(), mjSTATE_INTEGRATION);
+  const ArrayView state = worlds.state();
+  ASSERT_EQ(std::memcmp(state.data + w * state.strides[0], row.data(), row.size() * sizeof(mjtNum)),
+            0)
+      << "world " << w;
+}
+
+double* state_row(Worlds& worlds, const char* component, int w) {
+  const ArrayView view = worlds.state_component(component);
+  return reinterpret_cast<double*>(view.data + w * view.strides[0]);
+}
 
 void drive(Worlds& worlds, int step) {
   const ArrayView ctrl = worlds.state_component("ctrl");
@@ -72,53 +121,235 @@ void drive(Worlds& worlds, int step) {
   }
 }
 
-class Integrators : public ::testing::TestWithParam<std::tuple<const char*, bool>> {};
+class Integrators : public ::testing::TestWithParam<std::tuple<const char*, bool, int>> {};
 
-// Taken apart and reused, the stages give the states of plain mj_step bit for bit, and the sensors
-// of mj_forward there.
+// Taken apart and reused, whatever is read when, the stages give the states of plain mj_step bit for
+// bit, and the sensors of mj_forward there.
 TEST_P(Integrators, EqualTheNaiveLoopBitForBitAndAreFresh) {
-  const auto [integrator, every] = GetParam();
+  const auto [integrator, every, decimation] = GetParam();
   const ModelPtr m = load(integrator);
-  constexpr int kWorlds = 3, kSteps = 60, kDecimation = 4;
-  std::vector<double> states;
+  constexpr int kWorlds = 3, kSteps = 60;
+  constexpr mjtStage kRead[] = {mjSTAGE_ACC, mjSTAGE_NONE, mjSTAGE_VEL, mjSTAGE_NONE,
+                                mjSTAGE_ACC, mjSTAGE_ACC,  mjSTAGE_POS};
   for (int threads : {1, 2, 5}) {
     Worlds worlds(m.get(), kWorlds, threads);
     Recording hooks(kWorlds);
     hooks.every = every;
     worlds.reset(all_worlds, -1, hooks);
     std::vector<DataPtr> naive;
-    for (int w = 0; w < kWorlds; ++w) naive.emplace_back(mj_makeData(m.get()), mj_deleteData);
-    DataPtr fresh(mj_makeData(m.get()), mj_deleteData);
+    for (int w = 0; w < kWorlds; ++w) naive.push_back(make_data(m.get()));
+    const DataPtr fresh = make_data(m.get());
     for (int k = 0; k < kSteps; ++k) {
-      drive(worlds, k);
-      for (int w = 0; w < kWorlds; ++w) {
-        naive[w]->ctrl[0] = std::sin(0.3 * k + w);
-        naive[w]->ctrl[1] = 0.2 * w;
-        for (int s = 0; s < kDecimation; ++s) mj_step(m.get(), naive[w].get());
-      }
-      worlds.step(kDecimation, hooks);
+      const int drawn = k / 3;  // controls that stay for a while let a solve be used again
+      drive(worlds, drawn);
+      hooks.read = kRead[k % 7];
+      hooks.read_every = kRead[k % 5];
+      worlds.step(decimation, hooks);
       ASSERT_TRUE(worlds.failures().empty());
       for (int w = 0; w < kWorlds; ++w) {
-        const ArrayView qpos = worlds.state_component("qpos");
-        ASSERT_EQ(
-            std::memcmp(qpos.data + w * qpos.strides[0], naive[w]->qpos, m->nq * sizeof(double)), 0)
-            << "world " << w << " step " << k;
+        naive[w]->ctrl[0] = std::sin(0.3 * drawn + w);
+        naive[w]->ctrl[1] = 0.2 * w;
+        for (int s = 0; s < decimation; ++s) mj_step(m.get(), naive[w].get());
+        expect_same_state(worlds, w, m.get(), naive[w].get());
         mj_copyData(fresh.get(), m.get(), naive[w].get());
         mj_forward(m.get(), fresh.get());
-        for (int i = 0; i < m->nsensordata; ++i)
-          ASSERT_EQ(hooks.sensordata[w][i], fresh->sensordata[i]);
-        ASSERT_EQ(hooks.force[w], fresh->nefc > 0 ? fresh->efc_force[0] : 0.0);
+        hooks.expect_fresh(w, m.get(), fresh.get());
+        if (HasFatalFailure()) FAIL() << "step " << k << ", threads " << threads;
       }
     }
-    EXPECT_EQ(hooks.substeps[1], every ? kSteps * kDecimation : 0);
-    EXPECT_DOUBLE_EQ(worlds.time(2), kSteps * kDecimation * 0.004);
+    EXPECT_EQ(hooks.substeps[1], every ? kSteps * decimation : 0);
+    EXPECT_DOUBLE_EQ(worlds.time(2), kSteps * decimation * 0.004);
   }
 }
 
 INSTANTIATE_TEST_SUITE_P(All, Integrators,
                          ::testing::Combine(::testing::Values("Euler", "implicit", "implicitfast",
+                                                              "RK4", "discrete"),
+                                            ::testing::Bool(), ::testing::Values(1, 4)));
+
+// What may be written between two steps: to a plain mjData, and to a world in the same way.
+struct Write {
+  const char* name;
+  const char* component;
+  int index;
+  double value;
+};
+constexpr Write kWrites[] = {
+    {"nothing", "userdata", 0, 0.0},
+    {"time", "time", 0, 7.0},
+    {"qpos", "qpos", 1, 0.7},
+    {"qvel", "qvel", 0, -2.0},
+    {"act", "act", 0, 0.4},
+    {"ctrl", "ctrl", 0, 0.8},
+    {"qfrc_applied", "qfrc_applied", 1, 3.0},
+    {"xfrc_applied", "xfrc_applied", 6 * 4 + 2, 5.0},
+    {"mocap_pos", "mocap_pos", 0, 1.1},
+    {"mocap_quat", "mocap_quat", 3, 0.3},
+    {"eq_active", "eq_active", 0, 1.0},
+    {"userdata", "userdata", 1, 2.5},
+    {"qacc_warmstart", "qacc_warmstart", 2, 40.0},
+};
+
+void write_plain(const mjModel* m, mjData* d, const Write& write) {
+  const auto whole = [&](int bit) {
+    std::vector<mjtNum> values(mj_stateSize(m, bit));
+    mj_getState(m, d, values.data(), bit);
+    values.at(write.index) = write.value;
+    mj_setState(m, d, values.data(), bit);
+  };
+  const std::map<std::string_view, int> bits = {{"time", mjSTATE_TIME},
+                                                {"qpos", mjSTATE_QPOS},
+                                                {"qvel", mjSTATE_QVEL},
+                                                {"act", mjSTATE_ACT},
+                                                {"ctrl", mjSTATE_CTRL},
+                                                {"qfrc_applied", mjSTATE_QFRC_APPLIED},
+                                                {"xfrc_applied", mjSTATE_XFRC_APPLIED},
+                                                {"mocap_pos", mjSTATE_MOCAP_POS},
+                                                {"mocap_quat", mjSTATE_MOCAP_QUAT},
+                                                {"eq_active", mjSTATE_EQ_ACTIVE},
+                                                {"userdata", mjSTATE_USERDATA},
+                                                {"qacc_warmstart", mjSTATE_WARMSTART}};
+  whole(bits.at(write.component));
+}
+
+class Writes : public ::testing::TestWithParam<std::tuple<const char*, Write>> {};
+
+// A step from a state that was written through the views, without forward(), is mj_step from there,
+// whatever was read before and whether somebody looks between the write and the step.
+TEST_P(Writes, BetweenStepsAreSeenByTheNext) {
+  const auto [integrator, write] = GetParam();
+  const ModelPtr m = load(integrator);
+  for (const int decimation : {1, 4}) {
+    for (const mjtStage read : {mjSTAGE_NONE, mjSTAGE_VEL, mjSTAGE_ACC}) {
+      for (const mjtStage look : {mjSTAGE_NONE, mjSTAGE_VEL, mjSTAGE_ACC}) {
+        Worlds worlds(m.get(), 2, 2);
+        Recording hooks(2);
+        worlds.reset({}, 0, hooks);
+        const DataPtr plain = make_data(m.get());
+        mj_resetDataKeyframe(m.get(), plain.get(), 0);
+        for (int k = 0; k < 12; ++k) {
+          if (k >= 8 && k < 10) {
+            write_plain(m.get(), plain.get(), write);
+            state_row(worlds, write.component, 1)[write.index] = write.value;
+            hooks.read = look;
+            worlds.visit({}, hooks);
+          }
+          hooks.read = read;
+          worlds.step(decimation, hooks);
+          for (int s = 0; s < decimation; ++s) mj_step(m.get(), plain.get());
+          expect_same_state(worlds, 1, m.get(), plain.get());
+          if (HasFatalFailure())
+            FAIL() << write.name << ", decimation " << decimation << ", read " << read << ", look "
+                   << look << ", step " << k;
+        }
+      }
+    }
+  }
+}
+
+INSTANTIATE_TEST_SUITE_P(All, Writes,
+                         ::testing::Combine(::testing::Values("Euler", "implicit", "implicitfast",
                                                               "RK4"),
-                                            ::testing::Bool()));
+                                            ::testing::ValuesIn(kWrites)),
+                         [](const auto& info) {
+                           return std::string(std::get<0>(info.param)) + "_" +
+                                  std::get<1>(info.param).name;
+                         });
+
+TEST(Worlds, AChangedModelIsSeenByTheNextStep) {
+  const ModelPtr m = load("Euler"), heavy = load("Euler");
+  for (int b = 1; b < heavy->nbody; ++b) heavy->body_mass[b] *= 3;
+  for (const mjtStage read : {mjSTAGE_NONE, mjSTAGE_VEL, mjSTAGE_ACC}) {
+    Worlds worlds(m.get(), 2, 1);
+    Recording hooks(2);
+    hooks.read = read;
+    worlds.reset({}, 0, hooks);
+    worlds.step(3, hooks);
+    const DataPtr plain = make_data(m.get());
+    mj_resetDataKeyframe(m.get(), plain.get(), 0);
+    for (int s = 0; s < 3; ++s) mj_step(m.get(), plain.get());
+    auto* mass = static_cast<mjtNum*>(mjb_expand(worlds.batch(), "body_mass", nullptr, nullptr));
+    std::copy_n(heavy->body_mass, heavy->nbody, mass + heavy->nbody);
+    worlds.model_changed();
+    worlds.step(1, hooks);
+    mj_step(heavy.get(), plain.get());
+    expect_same_state(worlds, 1, m.get(), plain.get());
+  }
+}
+
+// Between a step and the next somebody may read what nobody read before: the forces are those of
+// the controls of the step, and the next step is that of the new ones.
+TEST(Worlds, WhatIsReadLateBelongsToTheControlsOfTheStep) {
+  const ModelPtr m = load("implicitfast");
+  Worlds worlds(m.get(), 1, 1);
+  Recording hooks(1);
+  worlds.reset({}, 0, hooks);
+  const DataPtr plain = make_data(m.get()), fresh = make_data(m.get());
+  mj_resetDataKeyframe(m.get(), plain.get(), 0);
+  for (int k = 0; k < 20; ++k) {
+    plain->ctrl[0] = state_row(worlds, "ctrl", 0)[0] = std::sin(0.5 * k);
+    hooks.read = mjSTAGE_NONE;
+    worlds.step(2, hooks);
+    for (int s = 0; s < 2; ++s) mj_step(m.get(), plain.get());
+    state_row(worlds, "ctrl", 0)[0] = 100.0;  // for the next step, which will see another
+    for (const mjtStage read : {mjSTAGE_VEL, mjSTAGE_ACC}) {
+      hooks.read = read;
+      worlds.visit({}, hooks);
+      mj_copyData(fresh.get(), m.get(), plain.get());
+      mj_forward(m.get(), fresh.get());
+      hooks.expect_fresh(0, m.get(), fresh.get());
+    }
+    EXPECT_EQ(state_row(worlds, "ctrl", 0)[0], 100.0);
+    state_row(worlds, "ctrl", 0)[0] = plain->ctrl[0];
+    expect_same_state(worlds, 0, m.get(), plain.get());
+  }
+}
+
+// How often positions, velocities and the solve were computed in 10 control steps.
+std::array<int, 3> computed_in_steps(const char* integrator, mjtStage read, int decimation,
+                                     bool changing_controls, bool every = false,
+                                     mjtStage read_every = mjSTAGE_ACC) {
+  const ModelPtr m = load(integrator);
+  Worlds worlds(m.get(), 1, 1);
+  Recording hooks(1);
+  hooks.every = every;
+  hooks.read = read;
+  hooks.read_every = read_every;
+  worlds.reset({}, 0, hooks);
+  worlds.step(decimation, hooks);
+  const std::array<int, 3> before = hooks.computed[0];
+  for (int k = 0; k < 10; ++k) {
+    if (changing_controls) drive(worlds, k + 1);
+    worlds.step(decimation, hooks);
+    worlds.visit({}, hooks);  // nothing is out of date
+  }
+  std::array<int, 3> counts;
+  for (int i = 0; i < 3; ++i) counts[i] = hooks.computed[0][i] - before[i];
+  return counts;
+}
+
+TEST(Worlds, ComputeAStageOnceForAStateAndOnlyIfItIsRead) {
+  using ::testing::ElementsAre;
+  for (const char* integrator : {"Euler", "implicit", "implicitfast"}) {
+    for (const int n : {1, 4}) {
+      const int steps = 10 * n;
+      EXPECT_THAT(computed_in_steps(integrator, mjSTAGE_NONE, n, true),
+                  ElementsAre(steps, steps, steps));
+      EXPECT_THAT(computed_in_steps(integrator, mjSTAGE_VEL, n, true),
+                  ElementsAre(steps, steps, steps));
+      EXPECT_THAT(computed_in_steps(integrator, mjSTAGE_ACC, n, true),
+                  ElementsAre(steps, steps, steps + 10));
+      EXPECT_THAT(computed_in_steps(integrator, mjSTAGE_ACC, n, false),
+                  ElementsAre(steps, steps, steps));
+      EXPECT_THAT(computed_in_steps(integrator, mjSTAGE_ACC, n, true, true),
+                  ElementsAre(steps, steps, steps + 10));
+      EXPECT_THAT(computed_in_steps(integrator, mjSTAGE_NONE, n, true, true, mjSTAGE_POS),
+                  ElementsAre(steps, steps, steps));
+    }
+  }
+  // Four evaluations a step.
+  EXPECT_THAT(computed_in_steps("RK4", mjSTAGE_VEL, 1, true), ElementsAre(40, 40, 40));
+}
 
 TEST(Worlds, SeeStateWrittenThroughTheViews) {
   const ModelPtr m = load("Euler");
@@ -193,6 +424,66 @@ TEST(Worlds, OneThatDivergesIsNamedAndResetAlone) {
             0.5);  // the keyframe of its last reset
   worlds.step(5, hooks);
   EXPECT_TRUE(worlds.failures().empty());
+}
+
+// Nobody reads anything, and still the step that went wrong is the one that says so.
+TEST(Worlds, ThatDivergeUnseenAreNamedAtOnce) {
+  const ModelPtr m = load("Euler");
+  for (const mjtStage read : {mjSTAGE_NONE, mjSTAGE_ACC}) {
+    Worlds worlds(m.get(), 2, 1);
+    Recording hooks(2);
+    hooks.read = read;
+    worlds.reset({}, 0, hooks);
+    state_row(worlds, "qpos", 1)[4] = 9.99e9;  // height of the box; MuJoCo's limit is 1e10
+    state_row(worlds, "qvel", 1)[4] = 9.9e9;
+    worlds.step(1, hooks);
+    ASSERT_EQ(worlds.failures().size(), 1u);
+    EXPECT_EQ(worlds.failures()[0].world, 1);
+    EXPECT_THAT(worlds.failures()[0].message, ::testing::HasSubstr("QPOS"));
+    worlds.step(1, hooks);
+    EXPECT_TRUE(worlds.failures().empty());
+  }
+}
+
+// Forces made with a bad control are not used again: the step must find it.
+TEST(Worlds, NameABadControlThatSomebodyLookedAtBefore) {
+  const ModelPtr m = load("Euler");
+  Worlds worlds(m.get(), 1, 1);
+  Recording hooks(1);
+  worlds.reset({}, 0, hooks);
+  state_row(worlds, "ctrl", 0)[0] = std::numeric_limits<double>::quiet_NaN();
+  worlds.forward({}, hooks);
+  worlds.step(1, hooks);
+  ASSERT_EQ(worlds.failures().size(), 1u);
+  EXPECT_THAT(worlds.failures()[0].message, ::testing::HasSubstr("CTRL"));
+}
+
+// MuJoCo's errors jump out of whatever is going on; what the worlds of a thread share is as new.
+TEST(Worlds, InWhichMuJoCoRaisesAnErrorLeaveTheOthersAlone) {
+  const ModelPtr m = load("implicitfast");
+  Worlds worlds(m.get(), 2, 1);
+  Recording hooks(2);
+  hooks.read = mjSTAGE_NONE;
+  auto* solver = static_cast<int*>(mjb_expand(worlds.batch(), "opt.solver", nullptr, nullptr));
+  ASSERT_NE(solver, nullptr);
+  solver[0] = 99;  // found when the box touches the floor
+  worlds.model_changed();
+  worlds.reset({}, -1, hooks);
+  const DataPtr plain = make_data(m.get());
+  int failed = 0;
+  for (int k = 0; k < 120; ++k) {
+    worlds.step(1, hooks);
+    mj_step(m.get(), plain.get());
+    expect_same_state(worlds, 1, m.get(), plain.get());
+    for (const Failure& failure : worlds.failures()) {
+      EXPECT_EQ(failure.world, 0);
+      EXPECT_THAT(failure.message, ::testing::HasSubstr("solver"));
+      EXPECT_EQ(worlds.substeps(0), 0);
+      ++failed;
+    }
+  }
+  EXPECT_GT(failed, 1);
+  EXPECT_LT(failed, 10);
 }
 
 TEST(Worlds, AFailingHookLeavesTheOthersAndTheSimulationUsable) {

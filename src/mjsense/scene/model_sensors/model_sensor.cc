@@ -13,6 +13,7 @@ void ModelSensor::initialize(const SensorInit& init) {
   id_ = resolve(m, mjOBJ_SENSOR, name(), fmt::format("sensor '{}'", name()));
   adr_ = m->sensor_adr[id_];
   dim_ = m->sensor_dim[id_];
+  needs_ = static_cast<mjtStage>(m->sensor_needstage[id_]);
   history_adr_ = m->sensor_historyadr[id_];
   nsample_ = history_adr_ < 0 ? 0 : m->sensor_history[2 * id_];
   SensorSpec spec = describe_builtin(m, id_);

@@ -14,12 +14,14 @@ class ModelSensor : public Sensor {
 
   std::string_view kind() const override { return "builtin"; }
   void initialize(const SensorInit& init) override;
+  mjtStage needs() const override { return needs_; }
   void compute(const World& world) override;
   void draw(const World& world, DebugShapes& shapes) override;  // the frame it is attached to
 
  private:
   int id_ = -1;
   int adr_ = 0, dim_ = 0;
+  mjtStage needs_ = mjSTAGE_ACC;
   int history_adr_ = -1, nsample_ = 0;
   Field* field_ = nullptr;
   Field* history_ = nullptr;

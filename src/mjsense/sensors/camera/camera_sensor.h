@@ -32,6 +32,7 @@ class CameraSensor final : public Sensor {
 
   std::string_view kind() const override { return "camera"; }
   Stage stage() const override { return Stage::kCast; }
+  mjtStage needs() const override { return mjSTAGE_POS; }
   // A camera with its own rate must see every control step: what it shows between two images is the
   // older one.
   bool eager() const override { return cfg_.update_period > 0; }

@@ -14,6 +14,7 @@ class ContactFieldSensor : public Sensor {
   ContactFieldSensor(ContactSensor* owner, int primary, std::string field);
 
   std::string_view kind() const override { return "contact_field"; }
+  mjtStage needs() const override { return owner_->needs(); }
   void initialize(const SensorInit& init) override;  // after its owner
   void compute(const World& world) override;
   std::span<Sensor* const> inputs() const override { return {&owner_as_sensor_, 1}; }

@@ -42,6 +42,17 @@ bool ContactSensor::wants_substep() const {
   return cfg_.track_air_time || cfg_.history_length > 0 || cfg_.track_events || cfg_.latch;
 }
 
+mjtStage ContactSensor::needs() const {
+  bool force = cfg_.latch || cfg_.friction_split || cfg_.secondary_policy == "each" ||
+               cfg_.reduce == "netforce" ||
+               (cfg_.reduce == "maxforce" && (cfg_.other_ids || cfg_.debug_vis));
+  for (const std::string& field : cfg_.fields) {
+    force |= field == "force" || field == "torque";
+    force |= field != "found" && cfg_.reduce == "maxforce";
+  }
+  return force ? mjSTAGE_ACC : mjSTAGE_POS;
+}
+
 void ContactSensor::edit_spec(mjSpec* spec) {
   const ContactNames names(spec);
   primary_names_ = labels_of(names.primaries(name(), cfg_.primary));
@@ -71,6 +82,9 @@ void ContactSensor::initialize(const SensorInit& init) {
     config.secondary_mode = cfg_.secondary->mode;
   }
   config.reduce = contact_reduce_from_name(cfg_.reduce, name());
+  if (config.reduce == ContactReduce::kMaxForce && needs() < mjSTAGE_ACC) {
+    config.reduce = ContactReduce::kNone;  // nobody sees which contacts the slots hold
+  }
   config.num_slots = cfg_.num_slots;
   config.keep_peak = cfg_.latch;
   config.keep_pairs = cfg_.secondary_policy == "each";
@@ -78,14 +92,15 @@ void ContactSensor::initialize(const SensorInit& init) {
   secondary_names_ = labels_of(config.secondaries);
   reducer_ = ContactReducer(init.model, init.num_worlds, config);
 
-  // The first contact sensor of the scene that is read at the same times owns the pass.
+  // The first contact sensor of the scene that is read at the same times and stages owns the pass.
   pass_ = nullptr;
   if (init.scene) {
     ContactSensor* first = nullptr;
     bool listed = false;
     for (const std::unique_ptr<Sensor>& s : init.scene->sensors()) {
       auto* contact = dynamic_cast<ContactSensor*>(s.get());
-      if (!contact || contact->wants_substep() != wants_substep()) continue;
+      if (!contact || contact->wants_substep() != wants_substep() || contact->needs() != needs())
+        continue;
       if (!first) first = contact;
       listed |= contact == this;
     }

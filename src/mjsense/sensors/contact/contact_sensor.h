@@ -101,6 +101,9 @@ class ContactSensor : public Sensor {
   std::vector<std::unique_ptr<Sensor>> parts() override;
   void initialize(const SensorInit& init) override;
   bool wants_substep() const override;
+  // Whether there is a contact, where and how deep follows from positions; forces, and an order or
+  // a sum by force, from the solve.
+  mjtStage needs() const override;
   void substep(const World& world) override;
   void compute(const World& world) override;
   void reset(const World& world) override;

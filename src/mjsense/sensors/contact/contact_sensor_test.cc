@@ -202,6 +202,53 @@ TEST(Contact, ExcludeLeavesSecondariesOut) {
   }
 }
 
+// Whether and where there is contact is known without the solve; whoever asks for that alone does not
+// pay for it, and leaves nothing half done for who asks for forces afterwards.
+TEST(Contact, WithoutForcesNeedsPositionsOnly) {
+  const auto needs = [](auto&& change) {
+    ContactSensorCfg cfg = box_cfg();
+    cfg.fields = {"found"};
+    change(cfg);
+    return ContactSensor(cfg).needs();
+  };
+  using Cfg = ContactSensorCfg;
+  EXPECT_EQ(needs([](Cfg&) {}), mjSTAGE_POS);
+  EXPECT_EQ(needs([](Cfg& c) { c.track_air_time = c.track_events = true; }), mjSTAGE_POS);
+  EXPECT_EQ(needs([](Cfg& c) {
+              c.fields = {"found", "dist", "normal"}, c.reduce = "mindist";
+            }),
+            mjSTAGE_POS);
+  EXPECT_EQ(needs([](Cfg& c) { c.fields = {"found", "dist"}; }), mjSTAGE_ACC);  // of the strongest
+  EXPECT_EQ(needs([](Cfg& c) { c.fields = {"torque"}, c.reduce = "none"; }), mjSTAGE_ACC);
+  EXPECT_EQ(needs([](Cfg& c) { c.reduce = "netforce"; }), mjSTAGE_ACC);
+  EXPECT_EQ(needs([](Cfg& c) { c.latch = true; }), mjSTAGE_ACC);
+  EXPECT_EQ(needs([](Cfg& c) { c.friction_split = true; }), mjSTAGE_ACC);
+  EXPECT_EQ(needs([](Cfg& c) { c.other_ids = true; }), mjSTAGE_ACC);
+
+  ContactSensorCfg found = box_cfg(), net = box_cfg();
+  found.name = "found";
+  found.fields = {"found"};
+  net.fields = {"found", "force", "pos"};
+  net.reduce = "netforce";
+  Lab late("box", kBox, {found, net}), first("box", kBox, {found, net});
+  for (Lab* lab : {&late, &first}) {
+    lab->pose({0, 0, 0.12, 0.97, 0.2, 0.14, 0});
+    lab->sim->forward();
+  }
+  bool touched = false;
+  for (int i = 0; i < 100; ++i) {
+    late.sim->step();
+    first.sim->step();
+    const std::vector<float> force = first.read("force");
+    ASSERT_EQ(late.read("found", "found"), first.read("found"));
+    if (i % 3) continue;  // the other steps go on without a solve at their end
+    ASSERT_EQ(late.read("force"), force) << i;
+    ASSERT_EQ(late.read("pos"), first.read("pos")) << i;
+    touched |= force[2] < 0;
+  }
+  EXPECT_TRUE(touched);
+}
+
 TEST(Contact, PartsAreMuJoCosPerFieldSensors) {
   Lab lab("box", kBox, {box_cfg()});
   EXPECT_TRUE(lab.scene->find_sensor("c_box_geom_found"));

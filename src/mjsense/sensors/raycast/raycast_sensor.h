@@ -70,6 +70,7 @@ class RayCastSensor : public Sensor {
 
   std::string_view kind() const override { return "raycast"; }
   Stage stage() const override { return Stage::kCast; }
+  mjtStage needs() const override { return mjSTAGE_POS; }
   void initialize(const SensorInit& init) override;
   bool wants_substep() const override { return !history_.empty(); }
   void substep(const World& world) override;
