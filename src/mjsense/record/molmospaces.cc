@@ -13,16 +13,16 @@ constexpr int kTextBytes = 2000;
 
 struct Text {
   std::string_view sensor;  // ends in '_': every sensor whose name begins so
-  const char *unit, *description;
+  const char* unit;         // null: those of its streams, "arm: rad; gripper: 0 open .. 255 closed"
+  const char* description;
 };
 
 constexpr Text kTexts[] = {
     {"qpos", "rad or m", "Joint positions by move group."},
     {"qvel", "rad/s or m/s", "Joint velocities by move group."},
-    {"actions/commanded_action", "", "The policy's action, as it gave it."},
-    {"actions/joint_pos", "rad or m",
-     "Targets of the position controllers, without noise; grippers: the actuator's command."},
-    {"actions/joint_pos_rel", "rad or m",
+    {"actions/commanded_action", nullptr, "The policy's action, as it gave it."},
+    {"actions/joint_pos", nullptr, "Targets of the controllers, without noise."},
+    {"actions/joint_pos_rel", nullptr,
      "Targets of the controllers minus the joint positions observed before."},
     {"actions/ee_twist", "m, rad",
      "Twist from each leaf as observed before to where the targets put it, in that leaf's axes, "
@@ -30,6 +30,15 @@ constexpr Text kTexts[] = {
     {"actions/ee_pose", "m, wxyz", "Where the targets put each group's leaf: robot base frame."},
     {"grasp_state_", "", "Whether each gripper touches and holds the object."},
 };
+
+std::string units_of(const Sensor& sensor) {
+  std::string units;
+  for (const Field& field : sensor.fields()) {
+    if (field.spec.unit.empty()) continue;
+    units += fmt::format("{}{}: {}", units.empty() ? "" : "; ", field.name, field.spec.unit);
+  }
+  return units;
+}
 
 }  // namespace
 
@@ -60,7 +69,7 @@ std::optional<SensorSpec> text_of(const Sensor& sensor) {
   spec.name = sensor.name();
   spec.dtype = DType::kUint8;
   spec.shape = {kTextBytes};
-  spec.unit = text->unit;
+  spec.unit = text->unit ? text->unit : units_of(sensor);
   spec.low = 0;
   spec.high = 255;
   spec.is_dict = true;

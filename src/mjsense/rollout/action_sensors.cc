@@ -1,12 +1,10 @@
 #include "mjsense/rollout/action_sensors.h"
 
 #include <fmt/format.h>
-#include <fmt/ranges.h>
 
 #include <algorithm>
 #include <cmath>
 
-#include "mjsense/observe/joint_state.h"
 #include "mjsense/scene/resolve.h"
 
 namespace mjsense {
@@ -74,10 +72,6 @@ class ActionSensor : public Sensor {
   const MoveGroup& group(int g) const { return task_.robot().groups()[g]; }
   const RobotValues& targets(const World& world) const { return task_.robot().targets(world.id); }
   bool is_first(const World& world) const { return !log_[world.id].given; }
-  std::string unit_of(const MoveGroup& g) const {
-    return joint_unit(task_.model(), {g.name, g.qpos, g.dofs});
-  }
-  // Unit of its commands: of its joints, or the actuator's own where one drives a gripper.
   const Task& task_;
   const ActionLog& log_;
 
@@ -147,8 +141,9 @@ class JointPos final : public ActionSensor<double> {
         spec_of(count(g.actuators), g.command_unit, "",
                 fmt::format("Target of the controller of '{}', without noise.", g.name));
     // The least box around the control ranges, and 0 where nothing is given.
-    spec.low = std::min(0.0, std::ranges::min(g.ctrl_low));
-    spec.high = std::max(0.0, std::ranges::max(g.ctrl_high));
+    const double low = std::ranges::min(g.ctrl_low), high = std::ranges::max(g.ctrl_high);
+    if (low > -mjMAXVAL) spec.low = std::min(0.0, low);
+    if (high < mjMAXVAL) spec.high = std::max(0.0, high);
     return spec;
   }
   bool shown(const World& world) override { return !terminal(task_, world); }
@@ -158,13 +153,17 @@ class JointPos final : public ActionSensor<double> {
   }
 };
 
+bool has_target_for_each_joint(const MoveGroup& group) {
+  return group.controlled() && group.actuators.size() == group.joints.size();
+}
+
 class JointPosRel final : public ActionSensor<double> {
  public:
   using ActionSensor::ActionSensor;
 
  protected:
   SensorSpec group_spec(const MoveGroup& g) const override {
-    return spec_of(count(g.joints), unit_of(g), "",
+    return spec_of(count(g.joints), has_target_for_each_joint(g) ? g.command_unit : "", "",
                    fmt::format("Target of '{}' minus its joints as observed before.", g.name));
   }
   bool shown(const World& world) override { return is_first(world) || !terminal(task_, world); }
@@ -174,7 +173,7 @@ class JointPosRel final : public ActionSensor<double> {
       return true;
     }
     const GroupValues &target = targets(world)[g], &qpos = log_[world.id].qpos[g];
-    if (!group(g).controlled() || target.size != qpos.size) return false;
+    if (!has_target_for_each_joint(group(g))) return false;
     for (int i = 0; i < target.size; ++i) row[i] = target.values[i] - qpos.values[i];
     return true;
   }

@@ -11,6 +11,7 @@
 #include "mjsense/core/error.h"
 #include "mjsense/core/testing/allocations.h"
 #include "mjsense/observe/function_sensor.h"
+#include "mjsense/record/molmospaces.h"
 
 namespace mjsense {
 namespace {
@@ -77,9 +78,19 @@ TEST(Rollout, AFunctionOfAWorldIsASensor) {
 
 TEST(Rollout, CommandsAreInTheUnitOfTheirActuators) {
   Rollout rollout(blind());
-  for (const char* name : {"actions/commanded_action", "actions/joint_pos"})
-    EXPECT_EQ(rollout.suite().stream(name).spec.unit, "arm: rad; gripper: 0 open .. 255 closed");
-  EXPECT_EQ(rollout.suite().stream("actions/joint_pos_rel").spec.unit, "arm: rad");
+  const auto unit = [&](const std::string& stream) {
+    return rollout.suite().stream("actions/" + stream).spec.unit;
+  };
+  for (const std::string name : {"commanded_action", "joint_pos"}) {
+    EXPECT_EQ(unit(name + "/arm"), "rad");
+    EXPECT_EQ(unit(name + "/gripper"), "0 open .. 255 closed");
+    // And of the dataset that a recording makes of them.
+    EXPECT_EQ(text_of(rollout.suite().get("actions/" + name))->unit,
+              "arm: rad; gripper: 0 open .. 255 closed");
+  }
+  EXPECT_EQ(unit("joint_pos_rel/arm"), "rad");
+  EXPECT_EQ(unit("joint_pos_rel/gripper"), "");  // one command, two joints: never measured
+  EXPECT_EQ(text_of(rollout.suite().get("actions/joint_pos_rel"))->unit, "arm: rad");
 }
 
 // Row t belongs to the action between the observations t-1 and t.
@@ -168,7 +179,6 @@ TEST(Rollout, WhatThePolicySaysIsNumbers) {
   const auto& target = rollout.suite().stream("actions/joint_pos/gripper").spec;
   EXPECT_EQ(target.low, 0);
   EXPECT_EQ(target.high, 255);
-  EXPECT_EQ(target.unit, "");
   EXPECT_EQ(rollout.suite().stream("qpos/arm").spec.unit, "rad");
   EXPECT_EQ(rollout.suite().stream("qvel/arm").spec.unit, "rad/s");
   EXPECT_EQ(rollout.suite().stream("qpos/base").spec.shape, Shape({0}));
