@@ -89,7 +89,7 @@ Hashes play(SceneCfg cfg, int steps) {
   // No libm in what drives the scene: a triangle wave.
   const auto wave = [](double x) { return 4 * std::abs(x - std::floor(x + 0.5)) - 1; };
   const int key = m->nkey > 0 ? 0 : -1;
-  sim.reset({}, key);
+  sim.reset(all_worlds, key);
   for (int w = 0; w < kWorlds; ++w)
     for (int i = 0; i < m->nv; ++i) row("qvel", w)[i] += 0.1 * wave(0.37 * i + 0.21 * w);
   sim.forward();

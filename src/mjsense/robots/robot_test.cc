@@ -78,7 +78,7 @@ TEST_F(Franka, StartsNearItsStartConfigurationAndStaysThere) {
 
 // Whatever the noise, a start lies within the limits: what would be beyond is at the limit.
 TEST_F(Franka, StartsNeverLieBeyondTheLimits) {
-  RobotCfg cfg = robot_cfg("franka");
+  RobotCfg cfg = franka_cfg();
   MoveGroupCfg& arm = cfg.groups[1];
   double low[7], high[7];
   for (int i = 0; i < 7; ++i) {

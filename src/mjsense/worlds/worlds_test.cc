@@ -224,7 +224,7 @@ TEST_P(Writes, BetweenStepsAreSeenByTheNext) {
       for (const mjtStage look : {mjSTAGE_NONE, mjSTAGE_VEL, mjSTAGE_ACC}) {
         Worlds worlds(m.get(), 2, 2);
         Recording hooks(2);
-        worlds.reset({}, 0, hooks);
+        worlds.reset(all_worlds, 0, hooks);
         const DataPtr plain = make_data(m.get());
         mj_resetDataKeyframe(m.get(), plain.get(), 0);
         for (int k = 0; k < 12; ++k) {
@@ -232,7 +232,7 @@ TEST_P(Writes, BetweenStepsAreSeenByTheNext) {
             write_plain(m.get(), plain.get(), write);
             state_row(worlds, write.component, 1)[write.index] = write.value;
             hooks.read = look;
-            worlds.visit({}, hooks);
+            worlds.visit(all_worlds, hooks);
           }
           hooks.read = read;
           worlds.step(decimation, hooks);
@@ -263,7 +263,7 @@ TEST(Worlds, AChangedModelIsSeenByTheNextStep) {
     Worlds worlds(m.get(), 2, 1);
     Recording hooks(2);
     hooks.read = read;
-    worlds.reset({}, 0, hooks);
+    worlds.reset(all_worlds, 0, hooks);
     worlds.step(3, hooks);
     const DataPtr plain = make_data(m.get());
     mj_resetDataKeyframe(m.get(), plain.get(), 0);
@@ -283,7 +283,7 @@ TEST(Worlds, WhatIsReadLateBelongsToTheControlsOfTheStep) {
   const ModelPtr m = load("implicitfast");
   Worlds worlds(m.get(), 1, 1);
   Recording hooks(1);
-  worlds.reset({}, 0, hooks);
+  worlds.reset(all_worlds, 0, hooks);
   const DataPtr plain = make_data(m.get()), fresh = make_data(m.get());
   mj_resetDataKeyframe(m.get(), plain.get(), 0);
   for (int k = 0; k < 20; ++k) {
@@ -294,7 +294,7 @@ TEST(Worlds, WhatIsReadLateBelongsToTheControlsOfTheStep) {
     state_row(worlds, "ctrl", 0)[0] = 100.0;  // for the next step, which will see another
     for (const mjtStage read : {mjSTAGE_VEL, mjSTAGE_ACC}) {
       hooks.read = read;
-      worlds.visit({}, hooks);
+      worlds.visit(all_worlds, hooks);
       mj_copyData(fresh.get(), m.get(), plain.get());
       mj_forward(m.get(), fresh.get());
       hooks.expect_fresh(0, m.get(), fresh.get());
@@ -315,13 +315,13 @@ std::array<int, 3> computed_in_steps(const char* integrator, mjtStage read, int 
   hooks.every = every;
   hooks.read = read;
   hooks.read_every = read_every;
-  worlds.reset({}, 0, hooks);
+  worlds.reset(all_worlds, 0, hooks);
   worlds.step(decimation, hooks);
   const std::array<int, 3> before = hooks.computed[0];
   for (int k = 0; k < 10; ++k) {
     if (changing_controls) drive(worlds, k + 1);
     worlds.step(decimation, hooks);
-    worlds.visit({}, hooks);  // nothing is out of date
+    worlds.visit(all_worlds, hooks);  // nothing is out of date
   }
   std::array<int, 3> counts;
   for (int i = 0; i < 3; ++i) counts[i] = hooks.computed[0][i] - before[i];
@@ -408,7 +408,7 @@ TEST(Worlds, EveryPartOfTheStateMayBeWrittenBetweenSteps) {
   for (const Write& write : writes) {
     Worlds worlds(m.get(), 2, 1);
     Recording hooks(2);
-    worlds.reset({}, -1, hooks);
+    worlds.reset(all_worlds, -1, hooks);
     const DataPtr d(mj_makeData(m.get()), mj_deleteData);
     for (int s = 0; s < 6; ++s) mj_step(m.get(), d.get());
     worlds.step(6, hooks);
@@ -447,7 +447,7 @@ TEST(Worlds, AConstraintMayBeReleasedBetweenSteps) {
   mj_deleteSpec(spec);
   Worlds worlds(m.get(), 1, 1);
   Recording hooks(1);
-  worlds.reset({}, -1, hooks);
+  worlds.reset(all_worlds, -1, hooks);
   const DataPtr d(mj_makeData(m.get()), mj_deleteData);
   for (int s = 0; s < 6; ++s) mj_step(m.get(), d.get());
   worlds.step(6, hooks);
@@ -476,13 +476,13 @@ TEST(Worlds, UserDataArriveInMjData) {
   };
   Worlds worlds(m.get(), 1, 1);
   Reader hooks(1);
-  worlds.reset({}, -1, hooks);
+  worlds.reset(all_worlds, -1, hooks);
   auto* data = reinterpret_cast<double*>(worlds.state_component("userdata").data);
   data[1] = 7;
   worlds.step(2, hooks);
   EXPECT_THAT(hooks.seen, ::testing::ElementsAre(0, 7, 0));
   data[2] = 8;
-  worlds.visit({}, hooks);
+  worlds.visit(all_worlds, hooks);
   EXPECT_THAT(hooks.seen, ::testing::ElementsAre(0, 7, 8));
 }
 
@@ -491,13 +491,13 @@ TEST(Worlds, AVisitMakesWrittenStateCurrent) {
   const ModelPtr m = load("Euler");
   Worlds worlds(m.get(), 2, 1);
   Recording hooks(2);
-  worlds.reset({}, 0, hooks);
+  worlds.reset(all_worlds, 0, hooks);
   const DataPtr d(mj_makeData(m.get()), mj_deleteData);
   mj_resetDataKeyframe(m.get(), d.get(), 0);
   const ArrayView qpos = worlds.state_component("qpos");
   reinterpret_cast<double*>(qpos.data + qpos.strides[0])[1] = d->qpos[1] = 0.9;
   mj_forward(m.get(), d.get());
-  worlds.visit({}, hooks);
+  worlds.visit(all_worlds, hooks);
   for (int i = 0; i < m->nsensordata; ++i) EXPECT_EQ(hooks.sensordata[1][i], d->sensordata[i]);
 }
 
@@ -507,7 +507,7 @@ TEST(Worlds, AModelFieldMayChangeBetweenSteps) {
   const ModelPtr heavy = load("implicitfast");
   Worlds worlds(m.get(), 2, 1);
   Recording hooks(2);
-  worlds.reset({}, 0, hooks);
+  worlds.reset(all_worlds, 0, hooks);
   int size = 0;
   auto* mass = static_cast<mjtNum*>(mjb_expand(worlds.batch(), "body_mass", &size, nullptr));
   ASSERT_EQ(size, m->nbody);
@@ -544,7 +544,7 @@ TEST(Worlds, AControlThatIsNoNumberIsAFailure) {
   const ModelPtr m = load("Euler");
   Worlds worlds(m.get(), 2, 1);
   Recording hooks(2);
-  worlds.reset({}, 0, hooks);
+  worlds.reset(all_worlds, 0, hooks);
   const ArrayView ctrl = worlds.state_component("ctrl");
   *reinterpret_cast<double*>(ctrl.data) = std::numeric_limits<double>::quiet_NaN();
   worlds.step(1, hooks);
@@ -570,25 +570,25 @@ TEST(Worlds, ClocksCountEpisodesAndTicks) {
   const ModelPtr m = load("Euler");
   Worlds worlds(m.get(), 2, 1);
   Clock hooks(2);
-  worlds.reset({}, -1, hooks);
+  worlds.reset(all_worlds, -1, hooks);
   EXPECT_EQ(hooks.episode, 1);
   worlds.step(3, hooks);
-  worlds.reset({}, -1, hooks);
+  worlds.reset(all_worlds, -1, hooks);
   EXPECT_EQ(hooks.episode, 2);
   EXPECT_EQ(hooks.tick, 3);  // never the same numbers twice
   EXPECT_EQ(hooks.substep, 0);
   worlds.step_raw(4);
-  worlds.visit({}, hooks);
+  worlds.visit(all_worlds, hooks);
   EXPECT_EQ(hooks.tick, 7);
   EXPECT_EQ(hooks.substep, 4);
   EXPECT_DOUBLE_EQ(worlds.time(1), 4 * 0.004);
   worlds.seed(5);
-  worlds.visit({}, hooks);
+  worlds.visit(all_worlds, hooks);
   EXPECT_EQ(hooks.episode, 0);
   EXPECT_EQ(hooks.tick, 0);
   EXPECT_EQ(hooks.key, 1u);
   worlds.rekey(1, 17);
-  worlds.reset({}, -1, hooks);
+  worlds.reset(all_worlds, -1, hooks);
   EXPECT_EQ(hooks.episode, 1);
   EXPECT_EQ(hooks.key, 17u);
 }
@@ -606,7 +606,7 @@ TEST(Worlds, ASubstepHookSeesFreshForces) {
   Worlds worlds(m.get(), 1, 1);
   Forces hooks(1);
   hooks.every = true;
-  worlds.reset({}, 0, hooks);
+  worlds.reset(all_worlds, 0, hooks);
   worlds.step(8, hooks);
   const DataPtr d(mj_makeData(m.get()), mj_deleteData);
   mj_resetDataKeyframe(m.get(), d.get(), 0);
@@ -689,7 +689,7 @@ TEST(Worlds, ThatDivergeUnseenAreNamedAtOnce) {
     Worlds worlds(m.get(), 2, 1);
     Recording hooks(2);
     hooks.read = read;
-    worlds.reset({}, 0, hooks);
+    worlds.reset(all_worlds, 0, hooks);
     state_row(worlds, "qpos", 1)[4] = 9.99e9;  // height of the box; MuJoCo's limit is 1e10
     state_row(worlds, "qvel", 1)[4] = 9.9e9;
     worlds.step(1, hooks);
@@ -706,9 +706,9 @@ TEST(Worlds, NameABadControlThatSomebodyLookedAtBefore) {
   const ModelPtr m = load("Euler");
   Worlds worlds(m.get(), 1, 1);
   Recording hooks(1);
-  worlds.reset({}, 0, hooks);
+  worlds.reset(all_worlds, 0, hooks);
   state_row(worlds, "ctrl", 0)[0] = std::numeric_limits<double>::quiet_NaN();
-  worlds.forward({}, hooks);
+  worlds.forward(all_worlds, hooks);
   worlds.step(1, hooks);
   ASSERT_EQ(worlds.failures().size(), 1u);
   EXPECT_THAT(worlds.failures()[0].message, ::testing::HasSubstr("CTRL"));
@@ -724,7 +724,7 @@ TEST(Worlds, InWhichMuJoCoRaisesAnErrorLeaveTheOthersAlone) {
   ASSERT_NE(solver, nullptr);
   solver[0] = 99;  // found when the box touches the floor
   worlds.model_changed();
-  worlds.reset({}, -1, hooks);
+  worlds.reset(all_worlds, -1, hooks);
   const DataPtr plain = make_data(m.get());
   int failed = 0;
   for (int k = 0; k < 120; ++k) {
