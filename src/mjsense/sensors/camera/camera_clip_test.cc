@@ -74,10 +74,11 @@ TEST(CameraClip, HoldsForEveryField) {
     nearer += all->field("depth").data.row<float>(0)[i] < 0.04f;
   }
   EXPECT_GT(nearer, 100);  // the little things; of the shell only backs are seen
-  for (const Field& field : clipped->fields())
+  for (const Field& field : clipped->fields()) {
     const Array& other = by_hand->field(field.name).data;
     ASSERT_EQ(field.data.bytes(), other.bytes());
-    EXPECT_EQ(std::memcmp(field.data.data(), other.data(), other.bytes()), 0);
+    EXPECT_EQ(std::memcmp(field.data.data(), other.data(), other.bytes()), 0) << field.name;
+  }
 }
 
 TEST(CameraClip, FaultsAreNamed) {
