@@ -18,9 +18,11 @@ namespace {
 
 constexpr int kWorlds = 16, kSteps = 12;
 
-// Row `row` plays world `w`: its random numbers, its start and its controls.
+// Row `row` plays world `w`: its random numbers (those of a reset, too), its start and its controls.
 void begin(Simulation& sim, int row, int w) {
   sim.worlds().rekey(row, static_cast<std::uint32_t>(w));
+  const int ids[] = {row};
+  sim.reset(ids);
   const ArrayView qvel = sim.worlds().state_component("qvel");
   auto* v = reinterpret_cast<double*>(qvel.data + row * qvel.strides[0]);
   for (int i = 0; i < sim.model()->nv; ++i) v[i] = std::sin(1.7 * i + w);
@@ -130,12 +132,6 @@ TEST(EverySensor, HasAnExampleAndReturnsWhatItDeclares) {
       }
     }
     EXPECT_GT(examples, 0) << kind.cfg->kind;
-  }
-}
-
-TEST(EverySensor, HasDefaultsThatAreInRange) {
-  for (const SensorKind& kind : sensor_kinds()) {
-    check_fields(*kind.cfg, kind.cfg->defaults.get(), kind.cfg->kind);
   }
 }
 
