@@ -118,7 +118,7 @@ TEST(TerrainHeight, AnUnknownReductionIsNamed) {
     FAIL();
   } catch (const ValueError& e) {
     EXPECT_THAT(e.what(),
-                HasSubstr("reduction is 'least': must be 'min', 'max', 'mean' or 'none'"));
+                HasSubstr("reduction is 'least': must be one of min, max, mean, none"));
   }
 }
 
