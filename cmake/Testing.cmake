@@ -1,5 +1,6 @@
 # What tests share, in folders testing/: a room's tests may use those of the rooms below it.
-file(GLOB_RECURSE shared CONFIGURE_DEPENDS ${PROJECT_SOURCE_DIR}/src/mjsense/*/testing/*.cc)
+file(GLOB_RECURSE shared CONFIGURE_DEPENDS ${PROJECT_SOURCE_DIR}/src/mjsense/*.cc)
+list(FILTER shared INCLUDE REGEX "/testing/[^/]*\\.cc$")
 add_library(mjsense_testing STATIC ${shared})
 target_link_libraries(mjsense_testing PRIVATE mjsense ${MJSENSE_PRIVATE_LIBS})
 

@@ -9,8 +9,6 @@ void bind_core(nanobind::module_& m);
 void bind_scene(nanobind::module_& m);
 void bind_simulation(nanobind::module_& m);
 void bind_contact(nanobind::module_& m);
-void bind_camera(nanobind::module_& m);
-void bind_imu(nanobind::module_& m);
 void bind_effects(nanobind::module_& m);
 void bind_raycast(nanobind::module_& m);
 void bind_rollout(nanobind::module_& m);

@@ -12,8 +12,6 @@ NB_MODULE(_core, m) {
   mjsense::python::bind_scene(m);
   mjsense::python::bind_simulation(m);
   mjsense::python::bind_contact(m);
-  mjsense::python::bind_camera(m);
-  mjsense::python::bind_imu(m);
   mjsense::python::bind_effects(m);
   mjsense::python::bind_raycast(m);
   mjsense::python::bind_rollout(m);

@@ -13,40 +13,10 @@
 #include "mjsense/rollout/registry.h"
 #include "python/bindings/bindings.h"
 #include "python/bindings/py_simulation.h"
-#include "python/bindings/reader.h"
+#include "python/bindings/fields.h"
 #include "python/bindings/sensor_handle.h"
 
 namespace mjsense::python {
-
-template <class Fields>
-void fields(Fields& f, RolloutCfg& c) {
-  f("task", c.task);
-  f("robot", c.robot);
-  f("policy", c.policy);
-  f("num_worlds", c.num_worlds);
-  f("threads", c.threads);
-  f("seed", c.seed);
-  f("cameras", c.cameras);
-  f("width", c.width);
-  f("height", c.height);
-  f("depth", c.depth);
-  f("samples", c.samples);
-  f("shadows", c.shadows);
-  f("horizon", c.horizon);
-  f("action_noise", c.action_noise);
-}
-
-template <class Fields>
-void fields(Fields& f, RecordJobCfg& c) {
-  fields(f, c.rollout);
-  f("episodes", c.episodes);
-  f("max_attempts", c.max_attempts);
-  f("keep_failures", c.keep_failures);
-  f("resume", c.resume);
-  f("house", c.house);
-  f("batches", c.batches);
-  f("gzip", c.gzip);
-}
 
 namespace {
 
@@ -97,12 +67,10 @@ nb::dict progress_dict(const RecordProgress& p) {
   return d;
 }
 
-nb::dict record(nb::handle config, const std::string& out, nb::object progress, nb::list sensors,
+nb::dict record(nb::dict options, nb::object progress, nb::list sensors,
                 nb::object make_simulation) {
   RecordJobCfg cfg;
-  FromPython reader(config);
-  fields(reader, cfg);
-  cfg.out = out;
+  read_options(options, struct_of<RecordJobCfg>(), &cfg);
   PythonMembers members{sensors, make_simulation, {}};
   if (sensors.size() > 0) {
     cfg.rollout.more_sensors = [&members](const auto& sim) { return make_members(members, sim); };
@@ -156,10 +124,9 @@ nb::dict record(nb::handle config, const std::string& out, nb::object progress, 
 // B worlds that play episodes with actions from Python.
 class PyRollout {
  public:
-  explicit PyRollout(nb::handle config) {
+  explicit PyRollout(nb::dict options) {
     RolloutCfg cfg;
-    FromPython reader(config);
-    fields(reader, cfg);
+    read_options(options, struct_of<RolloutCfg>(), &cfg);
     nb::gil_scoped_release unlock;
     rollout_ = std::make_shared<Rollout>(cfg);
   }
@@ -263,13 +230,13 @@ nb::tuple outcome(PyRollout& self, int w) {
 }  // namespace
 
 void bind_rollout(nb::module_& m) {
-  m.def("record", &record, nb::arg("config"), nb::arg("out"), nb::arg("progress").none(),
+  m.def("record", &record, nb::arg("options"), nb::arg("progress").none(),
         nb::arg("sensors"), nb::arg("make_simulation"));
   m.def("task_names", &task_names, "Names of the tasks there are.");
   m.def("robot_names", &robot_names, "Names of the robots there are.");
   m.def("policy_names", &policy_names, "Names of the policies there are.");
   nb::class_<PyRollout>(m, "Rollout", "The C++ rollout.")
-      .def(nb::init<nb::handle>(), nb::arg("config"))
+      .def(nb::init<nb::dict>(), nb::arg("options"))
       .def("start", &PyRollout::start, nb::arg("worlds"), nb::arg("episodes"))
       .def(
           "stop", [](PyRollout& s, int w) { s.rollout().stop(w); }, nb::arg("world"))

@@ -9,95 +9,16 @@
 #include <nanobind/stl/string.h>
 #include <nanobind/stl/vector.h>
 
-#include "mjsense/core/checks.h"
+#include "mjsense/app/schema.h"
 #include "mjsense/core/embedded.h"
 #include "mjsense/core/error.h"
 #include "python/bindings/bindings.h"
-#include "python/bindings/configs.h"
+#include "python/bindings/fields.h"
 #include "python/bindings/numpy.h"
 #include "python/bindings/python_sensor.h"
 #include "python/bindings/sensor_handle.h"
 
 namespace mjsense::python {
-
-template <class Fields>
-void fields(Fields& f, OptionsCfg& c) {
-  f("timestep", c.timestep);
-  f("integrator", c.integrator);
-  f("cone", c.cone);
-  f("solver", c.solver);
-  f("jacobian", c.jacobian);
-  f("impratio", c.impratio);
-  f("iterations", c.iterations);
-  f("tolerance", c.tolerance);
-  f("ls_iterations", c.ls_iterations);
-  f("ls_tolerance", c.ls_tolerance);
-  f("ccd_iterations", c.ccd_iterations);
-  f("gravity", c.gravity);
-  f("magnetic", c.magnetic);
-  f("wind", c.wind);
-  f("density", c.density);
-  f("viscosity", c.viscosity);
-  f("disableflags", c.disableflags);
-  f("enableflags", c.enableflags);
-}
-
-template <class Fields>
-void fields(Fields& f, SubTerrainCfg& c) {
-  f("kind", c.kind);
-  f("proportion", c.proportion);
-  f("inverted", c.inverted);
-  f("platform_width", c.platform_width);
-  f("amplitude", c.amplitude);
-  f("spacing", c.spacing);
-  f("waves", c.waves);
-  f("slope", c.slope);
-  f("step_height", c.step_height);
-  f("step_width", c.step_width);
-  f("stone_width", c.stone_width);
-  f("gap", c.gap);
-  f("stone_height", c.stone_height);
-  f("pit_depth", c.pit_depth);
-}
-
-// Any mapping, or pairs; TypeError for what is neither.
-nb::dict dict_of(nb::handle mapping) {
-  return nb::cast<nb::dict>(nb::module_::import_("builtins").attr("dict")(mapping));
-}
-
-// Mappings keep their order: names of tiles, regular expressions of joints.
-template <class Value>
-void read_custom(FromPython& f, nb::handle mapping,
-                 std::vector<std::pair<std::string, Value>>& out) {
-  out.clear();
-  for (auto [key, value] : dict_of(mapping)) {
-    auto& [name, read] = out.emplace_back();
-    f.read("key", key, name);
-    f.read(name.c_str(), value, read);
-  }
-}
-
-template <class Fields>
-void fields(Fields& f, TerrainCfg& c) {
-  f("terrain_type", c.terrain_type);
-  f("sub_terrains", c.sub_terrains);
-  f("levels", c.levels);
-  f("types", c.types);
-  f("tile_size", c.tile_size);
-  f("difficulty", c.difficulty);
-  f("resolution", c.resolution);
-  f("border", c.border);
-  f("max_init_level", c.max_init_level);
-  f("seed", c.seed);
-}
-
-template <class Fields>
-void fields(Fields& f, EntityCfg& c) {
-  f("pos", c.pos);
-  f("quat", c.quat);
-  f("joint_pos", c.joint_pos);
-  f("mocap_base", c.mocap_base);
-}
 
 namespace {
 
@@ -145,30 +66,16 @@ std::shared_ptr<const SensorCfg> read_sensor(nb::handle item) {
                                            read_python_spec(item));
 }
 
-// All but entities, sensors and the base.
-void read_scene_numbers(nb::handle config, SceneCfg& cfg) {
-  FromPython reader(config);
-  reader("env_spacing", cfg.env_spacing);
-  reader("extent", cfg.extent);
-  nb::object terrain = config.attr("terrain"), options = config.attr("options");
-  if (!terrain.is_none()) reader.read("terrain", terrain, cfg.terrain.emplace());
-  reader.read("options", options, cfg.options);
-}
-
 // `spec` is the empty MjSpec that the scene is built in, so that Python's spec_fn sees the real
 // thing; `edit` is called with no argument when everything is attached.
 std::shared_ptr<Scene> make_scene(nb::handle config, nb::handle spec, nb::list sensors,
                                   nb::object edit) {
   SceneCfg cfg;
-  FromPython reader(config);
-  read_scene_numbers(config, cfg);
+  read_struct(config, cfg);
   nb::list alive;
-  for (auto [name, entity] : dict_of(config.attr("entities"))) {
-    auto& [key, entity_cfg] = cfg.entities.emplace_back();
-    reader.read("entities", name, key);
-    reader.read("entities", entity, entity_cfg);
-    entity_cfg.model = read_source(entity, alive);
-  }
+  std::size_t i = 0;
+  for (auto [name, entity] : dict_of(config.attr("entities")))
+    cfg.entities[i++].second.model = read_source(entity, alive);
   for (nb::handle sensor : sensors) cfg.sensors.push_back(read_sensor(sensor));
   cfg.spec = spec_of(spec);
   // Called below only: `edit` need not outlive this function, and the stored config may be
@@ -233,43 +140,10 @@ nb::object tile_origins(const Scene& scene) {
 
 void bind_scene(nb::module_& m) {
   m.def("check_cfg", &check_cfg, nb::arg("config"), "Raises if a configuration is wrong.");
-  add_cfg_check<OptionsCfg>("MujocoCfg");
-  add_cfg_check<SubTerrainCfg>("SubTerrainCfg");
-  add_cfg_check<TerrainCfg>("TerrainCfg");
-  add_cfg_check<EntityCfg>("EntityCfg");
-  add_cfg_check("ObjRef", [](nb::handle config) {
-    ObjRef ref;
-    FromPython reader(config);
-    fields(reader, ref);
-  });
-  add_cfg_check("SceneCfg", [](nb::handle config) {
-    int num_envs = 1;
-    FromPython reader(config);
-    reader("num_envs", num_envs);
-    require_positive(num_envs, "SceneCfg", "num_envs");
-    SceneCfg cfg;
-    read_scene_numbers(config, cfg);
-    validate(cfg, "SceneCfg");
-  });
   m.def(
       "cfg_key", [](nb::handle config) { return read_sensor_cfg(config)->key(); },
       "Key in a scene's registry.");
-  m.def(
-      "cfg_defaults",
-      [] {
-        nb::dict all;
-        for (const CfgKind& kind : cfg_kinds()) all[kind.name] = kind.defaults();
-        const auto add = [&all](const char* name, auto cfg) {
-          ToPython writer;
-          fields(writer, cfg);
-          all[name] = writer.values;
-        };
-        add("options", OptionsCfg{});
-        add("terrain", TerrainCfg{});
-        add("sub_terrain", SubTerrainCfg{});
-        return all;
-      },
-      "Defaults of the C++ configurations, by kind.");
+  m.def("schema", &schema_json, "All configurations and data classes, as JSON.");
   m.def(
       "embedded_models",
       [] {

@@ -8,42 +8,15 @@ if _mujoco.mj_versionString() != _MUJOCO:
         f"mjsense is built for MuJoCo {_MUJOCO}, found {_mujoco.mj_versionString()}: pip install 'mujoco-core=={_MUJOCO}'"
     )
 
-from mjsense import effects, observations
+from mjsense import configs, effects, observations
 from mjsense._core import SensorSpec, __version__, embedded_models, policy_names, robot_names, task_names
-from mjsense.configs import (
-    BuiltinSensorCfg,
-    CameraIntrinsics,
-    CameraSensorCfg,
-    CameraVizCfg,
-    ContactMatch,
-    ContactSensorCfg,
-    ContactVizCfg,
-    EntityCfg,
-    GridPatternCfg,
-    LensDistortion,
-    LidarSensorCfg,
-    MujocoCfg,
-    ObjRef,
-    PinholeCameraPatternCfg,
-    RayCastSensorCfg,
-    RayCastVizCfg,
-    RingPatternCfg,
-    SceneCfg,
-    SensorCfg,
-    SpinningScanCfg,
-    SubTerrainCfg,
-    TableScanCfg,
-    TerrainCfg,
-    TerrainHeightSensorCfg,
-    UserPatternCfg,
-    replace,
-)
+from mjsense.configs import *  # noqa: F403
 from mjsense.contact import ContactSensor
-from mjsense.data import CameraData, ContactData, RayCastData, SensorData
+from mjsense.data import CameraData, ContactData, ImuData, RayCastData, SensorData
 from mjsense.drawing import DebugShapes
 from mjsense.effects import EffectSensorCfg
 from mjsense.errors import UnknownNameError
-from mjsense.imu import ImuAxis, ImuData, ImuModel, ImuSensor, ImuSensorCfg
+from mjsense.imu import ImuSensor
 from mjsense.pipeline import ObservationPipeline
 from mjsense.raycast import CameraSensor, LidarSensor, RayCastSensor, TerrainHeightSensor
 from mjsense.record import RecordProgress, RecordSummary, record
@@ -55,15 +28,11 @@ from mjsense.vector import TaskVectorEnv, make_vec
 
 # fmt: off
 __all__ = [
-    "BuiltinSensor", "BuiltinSensorCfg", "CameraData", "CameraIntrinsics", "CameraSensor", "CameraSensorCfg",
-    "CameraVizCfg", "ContactData", "ContactMatch", "ContactSensor", "ContactSensorCfg", "ContactVizCfg", "DebugShapes",
-    "EffectSensorCfg", "Entity", "EntityCfg",
-    "GridPatternCfg", "ImuAxis", "ImuData", "ImuModel", "ImuSensor", "ImuSensorCfg", "LensDistortion", "LidarSensor",
-    "LidarSensorCfg", "MujocoCfg", "NativeSensor", "ObjRef", "ObservationPipeline", "PinholeCameraPatternCfg",
-    "RayCastData", "RayCastSensor", "RayCastSensorCfg", "RayCastVizCfg", "RecordProgress", "RecordSummary",
-    "RingPatternCfg", "Scene", "SceneCfg", "Sensor", "SensorCfg", "SensorData", "SensorError", "SensorSpec",
-    "SensorSuite", "Simulation", "SpinningScanCfg", "SubTerrainCfg", "TableScanCfg", "TaskVectorEnv", "TerrainCfg",
-    "TerrainHeightSensor", "TerrainHeightSensorCfg", "UnknownNameError", "UserPatternCfg", "effects",
-    "embedded_models", "make_vec", "observations", "policy_names", "record", "replace", "robot_names", "task_names",
+    *configs.__all__,
+    "BuiltinSensor", "CameraData", "CameraSensor", "ContactData", "ContactSensor", "DebugShapes", "EffectSensorCfg",
+    "Entity", "ImuData", "ImuSensor", "LidarSensor", "NativeSensor", "ObservationPipeline", "RayCastData",
+    "RayCastSensor", "RecordProgress", "RecordSummary", "Scene", "Sensor", "SensorData", "SensorError", "SensorSpec",
+    "SensorSuite", "Simulation", "TaskVectorEnv", "TerrainHeightSensor", "UnknownNameError", "effects",
+    "embedded_models", "make_vec", "observations", "policy_names", "record", "robot_names", "task_names",
     "__version__",
 ]

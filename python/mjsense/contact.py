@@ -6,15 +6,12 @@ import numpy as np
 
 from mjsense import _core
 from mjsense._arguments import checked
-from mjsense.data import ContactData
 from mjsense.sensor import NativeSensor
 
 
 @checked
 class ContactSensor(NativeSensor):
     """Contacts of its primaries; ``data`` is a :class:`mjsense.ContactData`."""
-
-    _data_type = ContactData
 
     @property
     def primary_names(self) -> tuple[str, ...]:

@@ -7,14 +7,12 @@ from pathlib import Path
 
 from mjsense import _core
 from mjsense._arguments import checked
-from mjsense.data import CameraData, RayCastData
+from mjsense.data import CameraData
 from mjsense.sensor import NativeSensor
 
 
 class RayCastSensor(NativeSensor):
     """Rays from frames; ``data`` is a :class:`mjsense.RayCastData`."""
-
-    _data_type = RayCastData
 
     @property
     def num_frames(self) -> int:
@@ -50,8 +48,6 @@ class LidarSensor(RayCastSensor):
 
 class CameraSensor(NativeSensor):
     """Images; ``data`` is a :class:`mjsense.CameraData`."""
-
-    _data_type = CameraData
 
     @property
     def data(self) -> CameraData:

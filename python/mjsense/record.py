@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from types import SimpleNamespace
 from typing import Any
 
 from mjsense import _core
@@ -62,7 +61,7 @@ def record(
     policy: str = "planner",
     *,
     out: str | Path,
-    episodes: int = 1,
+    # options of a recording
     worlds: int = 4,
     threads: int = 0,
     seed: Seed = 0,
@@ -74,13 +73,19 @@ def record(
     shadows: bool = True,
     horizon: int | None = None,
     action_noise: bool = True,
-    sensors: Iterable[Sensor] = (),
-    keep_failures: bool = False,
+    episodes: int = 1,
     max_attempts: int = 0,
+    keep_failures: bool = False,
     resume: bool = False,
     house: int = 0,
     batches: int = 0,
     gzip: int = 4,
+    ffmpeg: str = "",
+    crf: int = 24,
+    preset: str = "veryfast",
+    molmospaces_depth: bool = False,
+    # end of options
+    sensors: Iterable[Sensor] = (),
     progress: Callable[[RecordProgress], None] | None = None,
 ) -> RecordSummary:
     """Plays episodes and keeps them as HDF5 and MP4 in ``out/house_<house>/``.
@@ -92,29 +97,37 @@ def record(
     Args:
         task, robot, policy: their registered names, see :func:`task_names` and so on.
         out: folder.
-        episodes: how many to keep.
-        worlds: played at the same time.
-        threads: 0 takes every CPU that this process may use.
-        cameras: names of the robot's cameras; all if not given.
-        width, height: pixels of every camera; the robot's own if not given.
-        depth: record the depth of every camera, losslessly.
-        samples: rays per pixel of rgb.
-        horizon: control steps after which an attempt has failed.
+
+        Options:
+        worlds: How many run at one time.
+        threads: Of the simulation; 0: every CPU this process may use.
+        seed: Same seed, same episodes.
+        cameras: Names of the robot's cameras, in this order; by default all, none for an empty list.
+        width: Of pictures; by default the robot's. [pixels]
+        height: Of pictures; by default the robot's. [pixels]
+        depth: Also the depth of every camera, losslessly.
+        samples: Rays a pixel of rgb: smooth edges for time.
+        shadows: Pictures have shadows.
+        horizon: Control steps after which an episode is cut; by default the task's.
+        action_noise: Commands reach the arm with noise.
+        episodes: How many to keep.
+        max_attempts: Episodes to try; 0: six times those to keep.
+        keep_failures: Keep episodes that fail, too.
+        resume: Go on with an interrupted recording; everything that decides the data must be the same.
+        house: Number of the ``house_N`` folder below it.
+        batches: HDF5 files that episodes are spread over; 0: one for every four.
+        gzip: Compression of arrays, 0 to 9.
+        ffmpeg: The program; by default ``$MJSENSE_FFMPEG``, else that of ``PATH``.
+        crf: Quality of videos, 0 lossless to 51.
+        preset: Effort of the video encoder, ultrafast to veryslow; see the file formats.
+        molmospaces_depth: Also depth as MolmoSpaces' loaders read it: a lossy red-green video.
+        Others:
         sensors: of your own, with an observation_space or is_dict: recorded with the suite.
-        keep_failures: also attempts without success.
-        max_attempts: 0: six times the episodes.
-        resume: go on with what is in the folder; it must have the same settings.
-        house: number of the folder below `out`.
-        batches: files that the episodes are spread over; 0: one for every four episodes.
-        gzip: compression of HDF5, 0 to 9.
         progress: called about ten times a second.
     """
-    config = SimpleNamespace(
-        task=task, robot=robot, policy=policy, num_worlds=worlds, threads=threads, seed=seed,
-        cameras=None if cameras is None else list(cameras), width=width, height=height, depth=depth, samples=samples,
-        shadows=shadows, horizon=horizon, action_noise=action_noise, episodes=episodes, max_attempts=max_attempts,
-        keep_failures=keep_failures, resume=resume, house=house, batches=batches, gzip=gzip,
-    )  # fmt: skip
+    options = dict(locals())
+    del options["sensors"], options["progress"]
+    options["out"] = str(out)
     own = list(sensors)
     for sensor in own:
         if not isinstance(sensor, Sensor):
@@ -123,6 +136,6 @@ def record(
             raise ValueError(f"sensor '{sensor.uuid}' cannot be recorded: give it an observation_space, or is_dict = True")
     report = None if progress is None else lambda p: progress(RecordProgress(**p))
     use_installed_meshes()
-    made = _core.record(config, str(out), report, own, Simulation._of)
+    made = _core.record(options, report, own, Simulation._of)
     made["path"] = Path(made["path"])
     return RecordSummary(**made)

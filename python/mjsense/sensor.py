@@ -37,8 +37,6 @@ def _plain(value: Any) -> Any:
 class NativeSensor(KnownAttributes):
     """A sensor of the scene that C++ computes."""
 
-    _data_type: type = data.SensorData
-
     def __init__(self, handle: _core.SensorHandle) -> None:
         self._handle = handle
         self._core: _core.Simulation | None = None
@@ -59,7 +57,7 @@ class NativeSensor(KnownAttributes):
         self._core = core
         arrays = self._handle.arrays()
         self._fields = MappingProxyType(arrays)
-        self._data = arrays[""] if "" in arrays else data.make_data(self._data_type, arrays)
+        self._data = arrays[""] if "" in arrays else data.make_data(data.DATA_OF_KIND.get(self.kind, data.SensorData), arrays)
 
     @property
     def data(self) -> Any:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from types import SimpleNamespace
 from typing import Any
 
 import gymnasium
@@ -30,13 +29,13 @@ class TaskVectorEnv(VectorEnv):
 
     metadata = {"render_modes": ["rgb_array"], "autoreset_mode": AutoresetMode.NEXT_STEP}
 
-    def __init__(self, config: SimpleNamespace, observations: Sequence[str] | None, render_mode: str | None) -> None:
+    def __init__(self, options: dict[str, Any], observations: Sequence[str] | None, render_mode: str | None) -> None:
         if render_mode not in (None, "rgb_array"):
             raise ValueError(f"render_mode must be None or 'rgb_array', not {render_mode!r}")
-        self._config, self._wanted, self.render_mode = config, observations, render_mode
-        self.num_envs = config.num_worlds
+        self._options, self._wanted, self.render_mode = options, observations, render_mode
+        self.num_envs = options["num_worlds"]
         self._closed = False
-        self._build(config.seed)
+        self._build(options["seed"])
         layout = self._rollout.action_layout()
         self.action_groups: dict[str, slice] = {}
         """Columns of the action by move group."""
@@ -52,9 +51,9 @@ class TaskVectorEnv(VectorEnv):
         self.observation_space = batch_space(self.single_observation_space, self.num_envs)
 
     def _build(self, seed: int) -> None:
-        self._config.seed = seed
+        self._options["seed"] = seed
         use_installed_meshes()
-        self._rollout = _core.Rollout(self._config)
+        self._rollout = _core.Rollout(self._options)
         streams = {spec.name: (sensor, spec, array) for sensor, spec, array in self._rollout.streams()}
         names = _streams(self._wanted, streams)
         self.rows: dict[str, np.ndarray] = {name: streams[name][2] for name in names}
@@ -77,7 +76,7 @@ class TaskVectorEnv(VectorEnv):
             if mask.shape != (self.num_envs,) or not (self._started or mask.all()):
                 raise ValueError(f"reset_mask: shape {mask.shape}, expected ({self.num_envs},), after a first reset of all")
         if seed is not None:
-            if seed != self._config.seed:
+            if seed != self._options["seed"]:
                 self._build(int(seed))
                 mask[:] = True
             self._next_episode = 0
@@ -190,9 +189,12 @@ def make_vec(
     task: str = "pick",
     robot: str = "franka",
     *,
-    num_envs: int = 1,
     policy: str | None = None,
     observations: Sequence[str] | None = None,
+    # options of a recording
+    num_envs: int = 1,
+    threads: int = 0,
+    seed: Seed = 0,
     cameras: Sequence[str] | None = None,
     width: int | None = None,
     height: int | None = None,
@@ -201,29 +203,32 @@ def make_vec(
     shadows: bool = True,
     horizon: int | None = None,
     action_noise: bool = False,
-    threads: int = 0,
-    seed: Seed = 0,
+    # end of options
     render_mode: str | None = None,
 ) -> TaskVectorEnv:
     """A task as a gymnasium vector environment.
 
     Args:
         task, robot: their registered names.
-        num_envs: worlds.
         policy: name of a policy that :meth:`TaskVectorEnv.expert_action` asks; none if not given.
         observations: names of sensors ("qpos") or of single streams ("qpos/arm") to observe; if not given, all that are numbers.
-        cameras: names of the robot's cameras; all if not given, ``[]`` for none (much faster).
-        width, height: pixels of every camera.
-        depth: observe depth too.
-        samples: rays per pixel of rgb.
-        horizon: control steps until truncation.
-        action_noise: disturb the arm's commands as recordings do.
-        threads: 0 takes every CPU that this process may use.
-        seed: of the episodes, until reset(seed=...).
+
+        Options:
+        num_envs: How many run at one time.
+        threads: Of the simulation; 0: every CPU this process may use.
+        seed: Same seed, same episodes.
+        cameras: Names of the robot's cameras, in this order; by default all, none for an empty list.
+        width: Of pictures; by default the robot's. [pixels]
+        height: Of pictures; by default the robot's. [pixels]
+        depth: Also the depth of every camera, losslessly.
+        samples: Rays a pixel of rgb: smooth edges for time.
+        shadows: Pictures have shadows.
+        horizon: Control steps after which an episode is cut; by default the task's.
+        action_noise: Commands reach the arm with noise.
+        Others:
+        render_mode: None or rgb_array.
     """
-    config = SimpleNamespace(
-        task=task, robot=robot, policy=policy or "", num_worlds=num_envs, threads=threads, seed=seed,
-        cameras=None if cameras is None else list(cameras), width=width, height=height, depth=depth, samples=samples,
-        shadows=shadows, horizon=horizon, action_noise=action_noise,
-    )  # fmt: skip
-    return TaskVectorEnv(config, observations, render_mode)
+    options = dict(locals())
+    del options["observations"], options["render_mode"]
+    options |= {"policy": policy or "", "num_worlds": options.pop("num_envs")}
+    return TaskVectorEnv(options, observations, render_mode)

@@ -5,50 +5,6 @@ import pickle
 import pytest
 
 import mjsense as mjs
-from mjsense import _core
-
-CLASSES = {
-    "builtin": mjs.BuiltinSensorCfg,
-    "contact": mjs.ContactSensorCfg,
-    "lidar": mjs.LidarSensorCfg,
-    "raycast": mjs.RayCastSensorCfg,
-    "terrain_height": mjs.TerrainHeightSensorCfg,
-    "camera": mjs.CameraSensorCfg,
-    "effect": mjs.EffectSensorCfg,
-    "imu": mjs.ImuSensorCfg,
-    "options": mjs.MujocoCfg,
-    "terrain": mjs.TerrainCfg,
-    "sub_terrain": mjs.SubTerrainCfg,
-}
-
-
-def plain(value):
-    """Ours and C++'s way to say nothing, and words without case."""
-    if value is None or value == "" or value == ():
-        return None
-    if isinstance(value, dict):
-        return None if not any(plain(v) for k, v in value.items() if k != "mode") else {k: plain(v) for k, v in value.items()}
-    if dataclasses.is_dataclass(value):
-        return plain(dataclasses.asdict(value))
-    if isinstance(value, (list, tuple)):
-        return [plain(v) for v in value]
-    if isinstance(value, float):
-        return round(value, 6)  # colours are single precision there
-    return value.lower() if isinstance(value, str) else value
-
-
-@pytest.mark.parametrize("kind", list(_core.cfg_defaults()))
-def test_defaults_are_those_of_cpp(kind):
-    ours = {f.name: f for f in dataclasses.fields(CLASSES[kind])}
-    theirs = _core.cfg_defaults()[kind]
-    assert set(ours) - set(theirs) <= {"pattern", "any_frame"}
-    for name, value in theirs.items():
-        field = ours[name]
-        if field.default is not dataclasses.MISSING:
-            assert plain(field.default) == plain(value), name
-        elif field.default_factory is not dataclasses.MISSING and name not in ("pattern", "scan"):
-            assert plain(field.default_factory()) == plain(value), name
-
 
 def imu(**kwargs):
     return mjs.BuiltinSensorCfg(
@@ -121,30 +77,30 @@ WRONG = [
     (mjs.ContactVizCfg, dict(axis_length=-1.0), "axis_length"),
     (mjs.RayCastVizCfg, dict(hit_radius=-1.0), "hit_radius"),
     (mjs.CameraVizCfg, dict(line_width=-1.0), "line_width"),
-    (mjs.GridPatternCfg, dict(resolution=0.0), "GridPatternCfg: grid resolution is 0"),
+    (mjs.GridPatternCfg, dict(resolution=0.0), "GridPatternCfg: resolution is 0"),
     (mjs.GridPatternCfg, dict(direction=(0, 0, 0)), "direction"),
     (mjs.PinholeCameraPatternCfg, dict(fovy=180.0), "fovy is 180"),
-    (mjs.PinholeCameraPatternCfg, dict(width=0), "0 x 12"),
+    (mjs.PinholeCameraPatternCfg, dict(width=0), "width is 0"),
     (mjs.RingPatternCfg, dict(include_center=False), "no rays"),
-    (mjs.RingPatternCfg.Ring, dict(num_samples=0), "ring of radius"),
-    (mjs.UserPatternCfg, dict(times=(1.0,)), "must be 0 or before"),
+    (mjs.RingPatternCfg.Ring, dict(num_samples=0), "num_samples is 0"),
+    (mjs.UserPatternCfg, dict(times=(1.0,)), "times.0. is 1: must be at most 0"),
     (mjs.UserPatternCfg, dict(offsets=((0, 0, 0),) * 2, directions=((0, 0, -1),) * 3), "give as many, or one"),
     (mjs.SpinningScanCfg, dict(channels=0), "SpinningScanCfg: channels is 0"),
     (mjs.TableScanCfg, dict(angles=()), "no rows"),
     (mjs.TableScanCfg, dict(rays_per_scan=5), "rays_per_scan is 5"),
     (mjs.LidarSensorCfg, dict(dropout=1.5), "dropout is 1.5"),
     (mjs.RayCastSensorCfg, dict(frame=mjs.ObjRef("goem", "a")), "frame 'a' is a 'goem'"),
-    (mjs.RayCastSensorCfg, dict(ray_alignment="yow"), "must be 'base', 'yaw' or 'world'"),
+    (mjs.RayCastSensorCfg, dict(ray_alignment="yow"), "must be one of base, yaw, world"),
     (mjs.RayCastSensorCfg, dict(name=""), "needs a name"),
     (mjs.TerrainHeightSensorCfg, dict(reduction="men"), "did you mean"),
     (mjs.CameraSensorCfg, dict(data_types=("rbg",)), "did you mean 'rgb'"),
-    (mjs.CameraIntrinsics, dict(fx=0.0), "fx and fy positive"),
+    (mjs.CameraIntrinsics, dict(fx=0.0), "fx is 0: must be above 0"),
     (mjs.LensDistortion, dict(model="fisheye"), "takes 4 coefficients"),
-    (mjs.LensDistortion, dict(model="fishey"), "invalid distortion model"),
+    (mjs.LensDistortion, dict(model="fishey"), "did you mean 'fisheye'"),
     (mjs.ImuAxis, dict(range=-1.0), "range is -1"),
     (mjs.ImuAxis, dict(bias_drift=1.0), "bias_drift_time_s is 0"),
     (mjs.ImuSensorCfg, dict(preset="mpu6500"), "mpu6050"),
-    (mjs.ImuSensorCfg, dict(effects=(3,)), "not an effect: 3"),
+    (mjs.ImuSensorCfg, dict(effects=(3,)), "effects must be one of Noise, .*, not 3"),
     (mjs.EffectSensorCfg, dict(sensor=""), "no sensor to read"),
     (mjs.EffectSensorCfg, dict(history_length=-1), "history_length is -1"),
     (mjs.effects.Dropout, dict(probability=2.0), "Dropout: probability is 2: must be between 0 and 1"),
@@ -165,7 +121,7 @@ WRONG = [
     (mjs.effects.StepDelay, dict(min_lag=2, max_lag=1), "need 0 <= min_lag <= max_lag"),
     (mjs.effects.Rate, dict(rate_hz=0.0), "rate_hz is 0"),
     (mjs.MujocoCfg, dict(timestep=0.0), "timestep is 0"),
-    (mjs.MujocoCfg, dict(integrator="rk5"), "integrator = 'rk5' is not known"),
+    (mjs.MujocoCfg, dict(integrator="rk5"), "integrator is 'rk5'.*rk4"),
     (mjs.MujocoCfg, dict(disableflags=("contct",)), "contact"),
     (mjs.TerrainCfg, dict(terrain_type="hills"), "plane, generator"),
     (mjs.TerrainCfg, dict(levels=0), "levels is 0"),

@@ -53,7 +53,7 @@ def test_history_of_a_sensor():
         (lambda: effects.Dropout(0.1, "drop"), "hold"),
         (lambda: effects.Noise(operation="mul"), "scale"),
         (lambda: effects.Scale((1, 2)), "factor"),
-        (lambda: "noise", "not an effect"),
+        (lambda: "noise", "effects must be one of"),
     ],
 )
 def test_errors(effect, text):

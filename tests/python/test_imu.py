@@ -32,5 +32,5 @@ def test_presets_and_own_models_and_the_clean_value():
 
 
 def test_unknown_preset():
-    with pytest.raises(KeyError, match="did you mean 'mpu6050'"):
+    with pytest.raises(ValueError, match="did you mean 'mpu6050'"):
         scene(preset="mpu6500")

@@ -38,5 +38,5 @@ def test_registries():
 def test_help_shows_every_field():
     text = pydoc.plain(pydoc.render_doc(mjs.LidarSensorCfg))
     assert "Each ray leaves from where the frame was at its own moment of the sweep." in text  # its own
-    assert "m; hits farther away are misses." in text  # inherited
+    assert "Hits farther away are misses. [m]" in text  # inherited
     assert "[B, H, W, 3] uint8." in pydoc.plain(pydoc.render_doc(mjs.CameraData))

@@ -72,7 +72,7 @@ def test_lookup_error_names_the_nearest():
         (lambda: dict(entities={"a": mjs.EntityCfg(model=BALL, pos=(1, 2))}), "pos must be 3 numbers"),
         (lambda: dict(entities={"a": BALL}), "entities must be a mapping of names to EntityCfg"),
         (lambda: dict(entities=None), "must be a mapping"),
-        (lambda: dict(terrain="plane"), "terrain must be a configuration"),
+        (lambda: dict(terrain="plane"), "terrain must be TerrainCfg or None"),
         (lambda: dict(sensors=(17,)), "17"),
         (lambda: dict(sensors=None), "must be a sequence"),
         (lambda: dict(extent="big"), "extent must be a number"),

@@ -2,106 +2,84 @@
 #include <toml++/toml.h>
 
 #include <filesystem>
-#include <functional>
-#include <map>
 
-#include "mjsense/app/record_command.h"
+#include "mjsense/app/field_options.h"
 #include "mjsense/core/error.h"
 
 namespace mjsense {
 namespace {
 
-// What a key of the file sets. A setter returns false if the value is of another type.
-using Setter = std::function<bool(const toml::node&)>;
+using Kind = FieldType::Kind;
 
-template <class T>
-Setter into(T& target) {
-  return [&target](const toml::node& node) {
-    const auto value = node.value_exact<T>();
-    if (value) target = *value;
-    return value.has_value();
-  };
-}
-
-template <class T>
-Setter whole_number(T& target) {
-  return [&target](const toml::node& node) {
-    const auto value = node.value_exact<std::int64_t>();
-    if (value) target = static_cast<T>(*value);
-    return value.has_value();
-  };
-}
-
-Setter text(std::function<void(const std::string&)> parse) {
-  return [parse = std::move(parse)](const toml::node& node) {
-    const auto value = node.value_exact<std::string>();
-    if (value) parse(*value);
-    return value.has_value();
-  };
-}
-
-Setter unless(bool& target) {
-  return [&target](const toml::node& node) {
-    const auto value = node.value_exact<bool>();
-    if (value) target = !*value;
-    return value.has_value();
-  };
-}
-
-// A list of names, or the text of the command line.
-Setter cameras(RolloutCfg& rollout) {
-  return [&rollout](const toml::node& node) {
-    if (const auto value = node.value_exact<std::string>()) {
-      parse_cameras(*value, rollout);
-      return true;
+// False if the value is of another type, or does not fit.
+bool read_node(const FieldType& type, void* out, const toml::node& node) {
+  switch (type.kind) {
+    case Kind::kBool: {
+      const auto value = node.value_exact<bool>();
+      if (value) *static_cast<bool*>(out) = *value;
+      return value.has_value();
     }
-    const toml::array* list = node.as_array();
-    if (!list) return false;
-    std::vector<std::string> names;
-    for (const toml::node& item : *list) {
-      const auto name = item.value_exact<std::string>();
-      if (!name) return false;
-      names.push_back(*name);
+    case Kind::kInt:
+    case Kind::kUnsigned: {
+      const auto value = node.value_exact<std::int64_t>();
+      return value && set_integer(type, out, *value);
     }
-    rollout.cameras = std::move(names);
-    return true;
-  };
+    case Kind::kNumber: {
+      const auto value = node.value<double>();
+      if (value && node.is_number()) set_number(type, out, *value);
+      return value && node.is_number();
+    }
+    case Kind::kText: {
+      const auto value = node.value_exact<std::string>();
+      if (value) *static_cast<std::string*>(out) = *value;
+      return value.has_value();
+    }
+    case Kind::kPath: {
+      const auto value = node.value_exact<std::string>();
+      if (value) *static_cast<std::filesystem::path*>(out) = *value;
+      return value.has_value();
+    }
+    case Kind::kOptional:
+      type.clear(out);
+      return read_node(type.element(), type.append(out), node);
+    case Kind::kList: {
+      const toml::array* list = node.as_array();
+      type.clear(out);
+      for (std::size_t i = 0; list && i < list->size(); ++i) {
+        if (!read_node(type.element(), type.append(out), *list->get(i))) return false;
+      }
+      return list;
+    }
+    default:
+      return false;
+  }
 }
 
-std::map<std::string, Setter> setters(RecordOptions& options) {
-  RecordJobCfg& job = options.job;
-  RolloutCfg& rollout = job.rollout;
-  return {
-      {"task", into(rollout.task)},
-      {"robot", into(rollout.robot)},
-      {"policy", into(rollout.policy)},
-      {"episodes", whole_number(job.episodes)},
-      {"max_attempts", whole_number(job.max_attempts)},
-      {"worlds", whole_number(rollout.num_worlds)},
-      {"threads", whole_number(rollout.threads)},
-      {"seed", whole_number(rollout.seed)},
-      {"out", text([&job](const std::string& path) { job.out = path; })},
-      {"cameras", cameras(rollout)},
-      {"size", text([&rollout](const std::string& size) { parse_size(size, rollout); })},
-      {"depth", into(rollout.depth)},
-      {"samples", whole_number(rollout.samples)},
-      {"no_shadows", unless(rollout.shadows)},
-      {"horizon", whole_number(rollout.horizon)},
-      {"no_noise", unless(rollout.action_noise)},
-      {"keep_failures", into(job.keep_failures)},
-      {"house", whole_number(job.house)},
-      {"batches", whole_number(job.batches)},
-      {"gzip", whole_number(job.gzip)},
-      {"crf", whole_number(job.video.crf)},
-      {"preset", into(job.video.preset)},
-      {"ffmpeg", into(job.video.ffmpeg)},
-      {"molmospaces_depth", into(job.video.molmospaces_depth)},
-  };
+// A key of the file: a field's option, or its opposite.
+struct Key {
+  const FieldDecl* field;
+  bool opposite;
+};
+
+void read_key(const Key& key, void* object, const toml::node& node, const std::string& place) {
+  const FieldDecl& field = *key.field;
+  const auto text = node.value_exact<std::string>();
+  void* value = at(object, field);
+  if (!read_node(*field.type, value, node)) {
+    // Lists may also be written as on the command line.
+    const Kind kind = field.type->kind == Kind::kOptional ? field.type->element().kind : field.type->kind;
+    if (kind != Kind::kList || !text)
+      throw ValueError(fmt::format("{}: the value of '{}' is of a wrong type: must be {}", place,
+                                   field.option_name(), expected(*field.type)));
+    read_text(field, object, *text);
+  }
+  if (key.opposite) *static_cast<bool*>(value) = !*static_cast<bool*>(value);
+  check_field(field, object, place);
 }
 
 }  // namespace
 
-void read_config(const std::string& path, RecordOptions& options) {
+void read_toml(const std::string& path, const StructDecl& decl, void* object) {
   if (!std::filesystem::is_regular_file(path)) {
     throw ValueError(fmt::format("{}: no such file", path));
   }
@@ -112,17 +90,26 @@ void read_config(const std::string& path, RecordOptions& options) {
     throw ValueError(
         fmt::format("{}:{}: {}", path, e.source().begin.line, std::string(e.description())));
   }
-  const std::map<std::string, Setter> known = setters(options);
-  std::vector<std::string> names;
-  for (const auto& [name, setter] : known) names.push_back(name);
+  std::map<std::string, Key> known;
+  std::vector<std::string> names = {"size"};
+  for (const FieldDecl& field : decl.fields) {
+    known[field.option_name()] = {&field, false};
+    if (field.type->kind == Kind::kBool)
+      known[fmt::format("no_{}", field.option_name())] = {&field, true};
+  }
+  for (const auto& [name, key] : known) names.push_back(name);
   for (const auto& [key, node] : table) {
     const std::string name(key.str());
     const auto place = fmt::format("{}:{}", path, node.source().begin.line);
-    const auto setter = known.find(name);
-    if (setter == known.end()) throw_unknown(place, "key", name, names);
-    if (!setter->second(node)) {
-      throw ValueError(fmt::format("{}: the value of '{}' is of a wrong type", place, name));
+    if (name == "size") {
+      const auto text = node.value_exact<std::string>();
+      if (!text) throw ValueError(fmt::format("{}: the value of 'size' is of a wrong type: must be a str", place));
+      read_size(decl, object, *text);
+      continue;
     }
+    const auto found = known.find(name);
+    if (found == known.end()) throw_unknown(place, "key", name, names);
+    read_key(found->second, object, node, place);
   }
 }
 

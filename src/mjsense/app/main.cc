@@ -15,8 +15,10 @@
 #include <vector>
 
 #include "mjsense/app/external.h"
+#include "mjsense/app/field_options.h"
 #include "mjsense/app/record_command.h"
 #include "mjsense/app/scan_command.h"
+#include "mjsense/app/schema.h"
 #include "mjsense/app/sensors_command.h"
 #include "mjsense/core/error.h"
 #include "mjsense/replay/check.h"
@@ -33,56 +35,23 @@ std::string one_of(const std::string& what, const std::vector<std::string>& name
   return fmt::format("{}: {}", what, fmt::join(names, ", "));
 }
 
-// Options that record and sensors share.
-void add_rollout_options(CLI::App& app, RolloutCfg& cfg) {
-  app.add_option("--robot", cfg.robot, one_of("which robot", robot_names()))->capture_default_str();
-  app.add_option("--policy", cfg.policy, one_of("what drives it", policy_names()))
-      ->capture_default_str();
-  app.add_option("--threads", cfg.threads, "0: every CPU this process may use")
-      ->capture_default_str();
-  app.add_option("--seed", cfg.seed, "same seed, same episodes")->capture_default_str();
-  app.add_option_function<std::string>(
-         "--cameras", [&cfg](const std::string& text) { parse_cameras(text, cfg); },
-         "names with commas between, or none; default: all of the robot's")
-      ->type_name("NAMES");
-  app.add_option_function<std::string>(
-         "--size", [&cfg](const std::string& text) { parse_size(text, cfg); },
-         "of the pictures; default: the robot's")
-      ->type_name("WxH");
-  app.add_flag("--depth", cfg.depth, "record depth of every camera");
-  app.add_option("--samples", cfg.samples, "rays a pixel of rgb")->capture_default_str();
-  app.add_flag("!--no-shadows", cfg.shadows, "render without shadows");
-  app.add_option("--horizon", cfg.horizon, "control steps after which an episode is cut");
-  app.add_flag("!--no-noise", cfg.action_noise, "commands reach the arm without noise");
+// What there is to choose from, behind the fields' own words.
+void add_choices(CLI::App& app) {
+  for (const auto& [option, names] :
+       {std::pair{"--robot", robot_names()}, std::pair{"--policy", policy_names()}}) {
+    CLI::Option* o = app.get_option(option);
+    o->description(one_of(o->get_description(), names));
+  }
 }
 
 CLI::App& add_record(CLI::App& program, RecordOptions& options) {
-  RecordJobCfg& job = options.job;
   CLI::App& app = *program.add_subcommand("record", "play episodes of a task and keep them");
-  app.add_option("task", job.rollout.task, one_of("which task", task_names()))
+  app.add_option("task", options.job.rollout.task, one_of("which task", task_names()))
       ->capture_default_str();
-  add_rollout_options(app, job.rollout);
-  app.add_option("--episodes", job.episodes, "how many to keep")->capture_default_str();
-  app.add_option("--worlds", job.rollout.num_worlds, "how many run at one time")
-      ->capture_default_str();
-  app.add_option("--out", job.out, "folder for the files")->type_name("DIR");
-  app.add_flag("--resume", job.resume, "go on with an interrupted recording");
+  add_field_options(app, struct_of<RecordJobCfg>(), &options.job, {"task"});
+  add_choices(app);
   app.add_option("--config", "TOML file with these options; the command line wins")
       ->type_name("FILE");
-  app.add_flag("--keep-failures", job.keep_failures, "keep episodes that fail, too");
-  app.add_option("--max-attempts", job.max_attempts, "0: six times the episodes")
-      ->capture_default_str();
-  app.add_option("--house", job.house, "number of the house_N folder")->capture_default_str();
-  app.add_option("--batches", job.batches, "HDF5 files; 0: one for four episodes")
-      ->capture_default_str();
-  app.add_option("--gzip", job.gzip, "compression of arrays, 0 to 9")->capture_default_str();
-  app.add_option("--crf", job.video.crf, "quality of videos, 0 lossless to 51")
-      ->capture_default_str();
-  app.add_option("--preset", job.video.preset, "effort of the video encoder")
-      ->capture_default_str();
-  app.add_option("--ffmpeg", job.video.ffmpeg, "the program; default: of PATH")->type_name("PATH");
-  app.add_flag("--molmospaces-depth", job.video.molmospaces_depth,
-               "also depth as MolmoSpaces' loaders read it (lossy)");
   app.add_flag("!--no-sheet", options.sheet, "write no contact sheet");
   app.add_flag("--json", options.json, "summary as JSON");
   app.add_flag("-q,--quiet", options.quiet, "no progress");
@@ -96,7 +65,8 @@ CLI::App& add_sensors(CLI::App& program, SensorsOptions& options) {
   app.add_option("what", options.what, one_of("an MJCF file or the name of a task", task_names()))
       ->required()
       ->type_name("SCENE.xml|TASK");
-  add_rollout_options(app, options.rollout);
+  add_field_options(app, struct_of<RolloutCfg>(), &options.rollout, {"task", "worlds"});
+  add_choices(app);
   app.add_option("--steps", options.steps, "to measure the cost over; 0: do not measure")
       ->capture_default_str()
       ->check(CLI::Range(0, kMostSteps));
@@ -180,8 +150,8 @@ void print(const std::string& text) { fmt::print("{}{}", text, text.ends_with('\
 void read_config_argument(int argc, char** argv, RecordOptions& options) {
   for (int i = 2; i < argc; ++i) {
     const std::string word = argv[i];
-    if (word == "--config" && i + 1 < argc) read_config(argv[i + 1], options);
-    if (word.starts_with("--config=")) read_config(word.substr(9), options);
+    if (word == "--config" && i + 1 < argc) read_toml(argv[i + 1], struct_of<RecordJobCfg>(), &options.job);
+    if (word.starts_with("--config=")) read_toml(word.substr(9), struct_of<RecordJobCfg>(), &options.job);
   }
 }
 
@@ -211,6 +181,9 @@ int run(int argc, char** argv) {
   add_path_command(program, "repair", "publish what an interrupted recording has finished",
                    repair_options);
 
+  CLI::App& schema =
+      *program.add_subcommand("schema", "all configurations and their fields, as JSON");
+
   std::vector<std::string> known;
   for (const CLI::App* app : program.get_subcommands({})) known.push_back(app->get_name());
   if (argc < 2) {
@@ -233,6 +206,10 @@ int run(int argc, char** argv) {
   if (record.parsed()) return run_record(record_options);
   if (sensors.parsed()) return run_sensors(sensors_options);
   if (scan.parsed()) return run_scan(scan_options);
+  if (schema.parsed()) {
+    print(schema_json());
+    return 0;
+  }
   if (inspect_app.parsed()) {
     const InspectResult result = inspect(existing(inspect_options.path));
     print(inspect_options.json ? result.json() : result.text());

@@ -2,7 +2,6 @@
 
 #include <fmt/format.h>
 
-#include <charconv>
 #include <csignal>
 #include <cstdio>
 #include <nlohmann/json.hpp>
@@ -125,34 +124,6 @@ std::string summary_json(const RecordSummary& s, const Sheet& sheet) {
 }
 
 }  // namespace
-
-void parse_size(const std::string& text, RolloutCfg& rollout) {
-  int width = 0, height = 0;
-  const char* end = text.data() + text.size();
-  const auto [x, e1] = std::from_chars(text.data(), end, width);
-  if (e1 == std::errc() && x != end && *x == 'x') {
-    const auto [rest, e2] = std::from_chars(x + 1, end, height);
-    if (e2 == std::errc() && rest == end && width > 0 && height > 0) {
-      rollout.width = width;
-      rollout.height = height;
-      return;
-    }
-  }
-  throw ValueError(fmt::format("size '{}': expected WIDTHxHEIGHT, as 640x368", text));
-}
-
-void parse_cameras(const std::string& text, RolloutCfg& rollout) {
-  std::vector<std::string> names;
-  if (text != "none") {
-    for (std::size_t begin = 0; begin <= text.size();) {
-      const std::size_t end = std::min(text.find(',', begin), text.size());
-      if (end == begin) throw ValueError(fmt::format("cameras '{}': an empty name", text));
-      names.push_back(text.substr(begin, end - begin));
-      begin = end + 1;
-    }
-  }
-  rollout.cameras = std::move(names);
-}
 
 int run_record(const RecordOptions& options) {
   const RecordJobCfg& job = options.job;

@@ -6,15 +6,9 @@
 #include <cmath>
 #include <cstdio>
 
-#include "mjsense/core/checks.h"
 #include "mjsense/core/error.h"
 
 namespace mjsense {
-
-void Scale::validate(std::string_view place) const {
-  check_values(factor, place, "factor");
-  require_finite(factor, place, "factor");
-}
 
 void Scale::initialize(const EffectInit& init) {
   check_numeric(init);
@@ -23,13 +17,6 @@ void Scale::initialize(const EffectInit& init) {
 
 void Scale::apply(const EffectMoment& /*moment*/, const EffectRow& row) {
   row.transform([&](double x, int i) { return x * component(factor, i); });
-}
-
-void Misalignment::validate(std::string_view place) const {
-  require_finite(scale_error, place, "scale_error");
-  require_finite(angle, place, "angle");
-  require_not_negative(scale_error_std, place, "scale_error_std");
-  require_not_negative(angle_std, place, "angle_std");
 }
 
 void Misalignment::initialize(const EffectInit& init) {
@@ -79,11 +66,7 @@ void Misalignment::apply(const EffectMoment& moment, const EffectRow& row) {
   }
 }
 
-void Clip::validate(std::string_view place) const {
-  check_values(low, place, "low");
-  check_values(high, place, "high");
-  check_order(low, high, place);
-}
+void Clip::validate(std::string_view place) const { check_order(low, high, place); }
 
 void Clip::initialize(const EffectInit& init) {
   check_numeric(init);
@@ -99,11 +82,6 @@ void Clip::apply(const EffectMoment& /*moment*/, const EffectRow& row) {
   });
 }
 
-void Quantize::validate(std::string_view place) const {
-  check_values(step, place, "step");
-  require_not_negative(step, place, "step");
-}
-
 void Quantize::initialize(const EffectInit& init) {
   check_numeric(init);
   check_components(step, "step", init);
@@ -114,15 +92,6 @@ void Quantize::apply(const EffectMoment& /*moment*/, const EffectRow& row) {
     const double s = component(step, i);
     return s > 0 ? s * std::round(x / s) : x;
   });
-}
-
-NanPolicy::Action NanPolicy::action_from_name(std::string_view name) {
-  const std::string_view names[] = {"disabled", "warn", "sanitize", "error"};
-  for (int i = 0; i < 4; ++i) {
-    if (names[i] == name) return static_cast<Action>(i);
-  }
-  throw ValueError(
-      fmt::format("nan_policy is '{}': must be one of disabled, warn, sanitize, error", name));
 }
 
 void NanPolicy::initialize(const EffectInit& init) {

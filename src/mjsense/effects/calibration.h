@@ -20,10 +20,17 @@ struct Scale : Effect {
   explicit Scale(PerComponent factor) : factor(std::move(factor)) {}
   std::unique_ptr<Effect> clone() const override { return std::make_unique<Scale>(*this); }
   std::string kind() const override { return "scale"; }
-  void validate(std::string_view place) const override;
   void initialize(const EffectInit& init) override;
   void apply(const EffectMoment& moment, const EffectRow& row) override;
 };
+template <class V>
+void visit_fields(V& v, Scale& c) {
+  v.object("Scale", "x <- factor x.", "scale")
+      .frozen()
+      .module("effects");
+  v("factor", c.factor, "By which values are multiplied.").or_one().not_empty();
+  v.include(static_cast<Effect&>(c));
+}
 
 // v <- M v for every three components, M = (I + diag(s)) R(a): scale errors s (1) and misalignment
 // angles a (rad) about x, y, z, each fixed plus a Gaussian drawn at every reset.
@@ -33,7 +40,6 @@ struct Misalignment : Effect {
 
   std::unique_ptr<Effect> clone() const override { return std::make_unique<Misalignment>(*this); }
   std::string kind() const override { return "misalignment"; }
-  void validate(std::string_view place) const override;
   void initialize(const EffectInit& init) override;
   void reset(const EffectMoment& moment) override;
   void apply(const EffectMoment& moment, const EffectRow& row) override;
@@ -43,6 +49,17 @@ struct Misalignment : Effect {
   std::vector<double> matrix_;       // [B, 3, 3]
   std::vector<std::uint8_t> drawn_;  // by world
 };
+template <class V>
+void visit_fields(V& v, Misalignment& c) {
+  v.object("Misalignment", "Scale errors and small rotations of every three components, fixed plus drawn at every reset.", "misalignment")
+      .frozen()
+      .module("effects");
+  v("scale_error", c.scale_error, "Of x, y, z.");
+  v("angle", c.angle, "About x, y, z.").unit("rad");
+  v("scale_error_std", c.scale_error_std, "Of what is drawn.").at_least(0);
+  v("angle_std", c.angle_std, "Of what is drawn.").unit("rad").at_least(0);
+  v.include(static_cast<Effect&>(c));
+}
 
 // x <- min(max(x, low), high): the range of a device (saturation), or a clip of an observation.
 struct Clip : Effect {
@@ -58,6 +75,15 @@ struct Clip : Effect {
   void initialize(const EffectInit& init) override;
   void apply(const EffectMoment& moment, const EffectRow& row) override;
 };
+template <class V>
+void visit_fields(V& v, Clip& c) {
+  v.object("Clip", "Limits of a device, or of an observation.", "clip")
+      .frozen()
+      .module("effects");
+  v("low", c.low, "Values are at least this.").may_be_infinite().or_one().not_empty();
+  v("high", c.high, "Values are at most this.").may_be_infinite().or_one().not_empty();
+  v.include(static_cast<Effect&>(c));
+}
 
 // x <- step round(x / step), halves away from zero: one count of an analog-digital converter.
 struct Quantize : Effect {
@@ -67,19 +93,29 @@ struct Quantize : Effect {
   explicit Quantize(PerComponent step) : step(std::move(step)) {}
   std::unique_ptr<Effect> clone() const override { return std::make_unique<Quantize>(*this); }
   std::string kind() const override { return "quantize"; }
-  void validate(std::string_view place) const override;
   void initialize(const EffectInit& init) override;
   void apply(const EffectMoment& moment, const EffectRow& row) override;
 };
+template <class V>
+void visit_fields(V& v, Quantize& c) {
+  v.object("Quantize", "Rounds to multiples of step.", "quantize")
+      .frozen()
+      .module("effects");
+  v("step", c.step, "One count; 0: none.").at_least(0).or_one().not_empty();
+  v.include(static_cast<Effect&>(c));
+}
 
 // What becomes of NaN and infinite values.
+enum class NanAction { kDisabled, kWarn, kSanitize, kError };
+template <>
+inline constexpr std::array<std::string_view, 4> kWords<NanAction>{"disabled", "warn", "sanitize",
+                                                                   "error"};
 struct NanPolicy : Effect {
-  enum class Action { kDisabled, kWarn, kSanitize, kError };
-  Action action = Action::kSanitize;  // warn: said once on stderr. sanitize: 0. error: RuntimeError
+  using Action = NanAction;
+  Word<Action> action = Action::kSanitize;
 
   NanPolicy() = default;
   explicit NanPolicy(Action action) : action(action) {}
-  static Action action_from_name(std::string_view name);  // throws ValueError
   std::unique_ptr<Effect> clone() const override { return std::make_unique<NanPolicy>(*this); }
   std::string kind() const override { return "nan_policy"; }
   void initialize(const EffectInit& init) override;
@@ -89,5 +125,14 @@ struct NanPolicy : Effect {
   std::string place_;
   std::vector<std::uint8_t> warned_;  // by world
 };
+template <class V>
+void visit_fields(V& v, NanPolicy& c) {
+  v.object("NanPolicy", "What becomes of NaN and infinite values.", "nan_policy")
+      .frozen()
+      .module("effects");
+  v("action", c.action,
+    "disabled: nothing; warn: said once on stderr; sanitize: 0; error: RuntimeError.");
+  v.include(static_cast<Effect&>(c));
+}
 
 }  // namespace mjsense

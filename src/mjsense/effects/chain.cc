@@ -5,6 +5,7 @@
 #include <cstring>
 
 #include "mjsense/core/error.h"
+#include "mjsense/effects/all_effects.h"
 
 namespace mjsense {
 
@@ -19,7 +20,7 @@ std::string place_of(const Effects& effects, std::size_t i, std::string_view pla
 void validate(const Effects& effects, std::string_view place) {
   for (std::size_t i = 0; i < effects.size(); ++i) {
     if (!effects[i]) throw ValueError(fmt::format("{}: effect {} is null", place, i));
-    effects[i]->validate(place_of(effects, i, place));
+    check_effect(effects[i], place_of(effects, i, place));
   }
 }
 

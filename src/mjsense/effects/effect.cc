@@ -11,12 +11,6 @@
 
 namespace mjsense {
 
-void check_values(const PerComponent& values, std::string_view place, std::string_view name) {
-  if (values.empty()) throw ValueError(fmt::format("{}: {} has no value", place, name));
-  for (double x : values) {
-    if (std::isnan(x)) throw ValueError(fmt::format("{}: {} is not a number", place, name));
-  }
-}
 
 void check_order(const PerComponent& low, const PerComponent& high, std::string_view place) {
   const std::size_t n = std::max(low.size(), high.size());
@@ -46,64 +40,37 @@ void check_numeric(const EffectInit& init) {
 }
 
 Draw Draw::gaussian(PerComponent std, PerComponent mean) {
-  Draw d;
-  d.kind = Kind::kGaussian;
-  d.std = std::move(std);
-  d.mean = std::move(mean);
-  return d;
+  return {Gaussian{std::move(std), std::move(mean)}};
 }
 
 Draw Draw::uniform(PerComponent low, PerComponent high) {
-  Draw d;
-  d.kind = Kind::kUniform;
-  d.low = std::move(low);
-  d.high = std::move(high);
-  return d;
+  return {Uniform{std::move(low), std::move(high)}};
 }
 
-Draw Draw::constant(PerComponent value) {
-  Draw d;
-  d.kind = Kind::kConstant;
-  d.value = std::move(value);
-  return d;
-}
+Draw Draw::constant(PerComponent value) { return {Constant{std::move(value)}}; }
 
-void Draw::validate(std::string_view place) const {
-  const std::pair<const char*, const PerComponent*> all[] = {
-      {"mean", &mean}, {"std", &std}, {"low", &low}, {"high", &high}, {"value", &value}};
-  for (const auto& [name, values] : all) {
-    check_values(*values, place, name);
-    require_finite(*values, place, name);
-  }
-  require_not_negative(std, place, "std");
-  check_order(low, high, place);
-}
+void Uniform::validate(std::string_view place) const { check_order(low, high, place); }
 
 void Draw::check(const EffectInit& init) const {
-  check_components(mean, "mean", init);
-  check_components(std, "std", init);
-  check_components(low, "low", init);
-  check_components(high, "high", init);
-  check_components(value, "value", init);
+  if (const auto* g = std::get_if<Gaussian>(&law)) {
+    check_components(g->mean, "mean", init);
+    check_components(g->std, "std", init);
+  } else if (const auto* u = std::get_if<Uniform>(&law)) {
+    check_components(u->low, "low", init);
+    check_components(u->high, "high", init);
+  } else {
+    check_components(std::get<Constant>(law).value, "value", init);
+  }
 }
 
 double Draw::sample(Rng& rng, int i) const {
-  switch (kind) {
-    case Kind::kGaussian:
-      return component(mean, i) + component(std, i) * rng.normal();
-    case Kind::kUniform:
-      return rng.uniform(component(low, i), component(high, i));
-    case Kind::kConstant:
-      break;
+  if (const auto* g = std::get_if<Gaussian>(&law)) {
+    return component(g->mean, i) + component(g->std, i) * rng.normal();
   }
-  return component(value, i);
-}
-
-Operation operation_from_name(std::string_view name) {
-  if (name == "add") return Operation::kAdd;
-  if (name == "scale") return Operation::kScale;
-  if (name == "abs") return Operation::kAbs;
-  throw ValueError(fmt::format("operation is '{}': must be one of add, scale, abs", name));
+  if (const auto* u = std::get_if<Uniform>(&law)) {
+    return rng.uniform(component(u->low, i), component(u->high, i));
+  }
+  return component(std::get<Constant>(law).value, i);
 }
 
 }  // namespace mjsense

@@ -11,6 +11,7 @@
 #include <vector>
 
 #include "mjsense/core/array.h"
+#include "mjsense/core/fields.h"
 #include "mjsense/core/rng.h"
 #include "mjsense/core/spec.h"
 
@@ -79,8 +80,9 @@ class Effect {
   virtual std::unique_ptr<Effect> clone() const = 0;
   virtual std::string kind() const = 0;
 
-  // Throws ValueError for what is wrong whatever row it will meet: when a configuration is made, and before
-  // initialize(). `place` starts the message.
+  // Throws ValueError for what its fields say of each other, whatever row it will meet: check_fields()
+  // calls it after the ranges, when a configuration is made and before initialize(). `place` starts
+  // the message.
   virtual void validate(std::string_view /*place*/) const {}
   // Throws ValueError for what does not suit the row; allocates. Nothing allocates afterwards.
   virtual void initialize(const EffectInit& init) = 0;
@@ -90,43 +92,77 @@ class Effect {
   // True if it must see every row, read or not.
   virtual bool eager() const { return false; }
 
-  // Fields of the sensor it applies to; empty: all.
   std::vector<std::string> fields;
 };
+template <class V>
+void visit_fields(V& v, Effect& c) {
+  v.object("Effect", "One imperfection.");
+  v("fields", c.fields, "Of the sensor; empty: all.");
+}
 
 // One value for all components or one for each.
 using PerComponent = std::vector<double>;
 inline double component(const PerComponent& values, int i) {
   return values.size() == 1 ? values[0] : values[i];
 }
-// At least one value, none of them NaN.
-void check_values(const PerComponent& values, std::string_view place, std::string_view name);
 // No component of `low` above that of `high`.
 void check_order(const PerComponent& low, const PerComponent& high, std::string_view place);
 // One value, or as many as the row has.
 void check_components(const PerComponent& values, const char* name, const EffectInit& init);
 void check_numeric(const EffectInit& init);  // float32 or float64, else ValueError
 
-// A random number: gaussian(mean, std), uniform [low, high) or the constant `value`.
+// The laws of random numbers. Each takes one value for all components or one for each.
+struct Gaussian {
+  PerComponent std = {0.0}, mean = {0.0};
+};
+struct Uniform {
+  PerComponent low = {0.0}, high = {0.0};
+
+  void validate(std::string_view place) const;  // low <= high
+};
+struct Constant {
+  PerComponent value = {0.0};
+};
+
+// A random number.
 struct Draw {
-  enum class Kind { kGaussian, kUniform, kConstant };
-  Kind kind = Kind::kGaussian;
-  PerComponent mean = {0.0}, std = {0.0};  // gaussian
-  PerComponent low = {0.0}, high = {0.0};  // uniform
-  PerComponent value = {0.0};              // constant
+  using Law = std::variant<Gaussian, Uniform, Constant>;
+  Law law;
 
   static Draw gaussian(PerComponent std, PerComponent mean = {0.0});
   static Draw uniform(PerComponent low, PerComponent high);
   static Draw constant(PerComponent value);
 
-  void validate(std::string_view place) const;
   void check(const EffectInit& init) const;  // that it suits the row
   double sample(Rng& rng, int i) const;
 };
+template <>
+inline constexpr const char* kChoiceName<Draw::Law> = "Draw";
+template <>
+inline constexpr int kPlainAlternative<Draw::Law> = 2;
+
+template <class V>
+void visit_fields(V& v, Gaussian& c) {
+  v.object("Gaussian", "Normal distribution.", "gaussian").frozen().module("effects");
+  v("std", c.std, "Standard deviation.").at_least(0).or_one().not_empty();
+  v("mean", c.mean, "Its centre.").or_one().not_empty();
+}
+template <class V>
+void visit_fields(V& v, Uniform& c) {
+  v.object("Uniform", "Evenly in [low, high).", "uniform").frozen().module("effects");
+  v("low", c.low, "The smallest value.").or_one().not_empty();
+  v("high", c.high, "Above the largest one.").or_one().not_empty();
+}
+template <class V>
+void visit_fields(V& v, Constant& c) {
+  v.object("Constant", "Always the same.", "constant").frozen().module("effects");
+  v("value", c.value, "The number.").or_one().not_empty();
+}
 
 // How a random number e meets a value x: x + e, x e, or e alone.
 enum class Operation { kAdd, kScale, kAbs };
-Operation operation_from_name(std::string_view name);  // add scale abs; throws ValueError
+template <>
+inline constexpr std::array<std::string_view, 3> kWords<Operation>{"add", "scale", "abs"};
 inline double operate(Operation operation, double x, double e) {
   return operation == Operation::kAdd ? x + e : operation == Operation::kScale ? x * e : e;
 }

@@ -25,10 +25,11 @@ ChainTick tick_of(const World& world) {
 std::unique_ptr<Sensor> EffectSensorCfg::build() const {
   const std::string place = sensor_place(name);
   if (sensor.empty()) throw ValueError(fmt::format("{}: no sensor to read is given", place));
-  require_not_negative(history_length, place, "history_length");
-  validate(effects, place);
+  check_fields(*this, place);
   return std::make_unique<EffectSensor>(*this);
 }
+
+SensorKind effect_kind() { return sensor_kind<EffectSensorCfg>(); }
 
 EffectSensor::EffectSensor(EffectSensorCfg cfg, Sensor* inner)
     : Sensor(cfg.name), cfg_(std::move(cfg)), inner_(inner) {}

@@ -6,20 +6,35 @@
 #include <string>
 #include <vector>
 
-#include "mjsense/core/sensor.h"
+#include "mjsense/core/sensor_fields.h"
+#include "mjsense/effects/all_effects.h"
 #include "mjsense/effects/chain.h"
 
 namespace mjsense {
 
 struct EffectSensorCfg : SensorCfg {
-  std::string sensor;               // key of the clean sensor in the same scene: "robot/imu_acc"
-  Effects effects;                  // in this order; each may be limited to some fields
-  std::vector<std::string> fields;  // of the clean sensor; empty: all
-  int history_length = 0;           // rows, oldest first, of every field; 0: none
+  std::string sensor;
+  Effects effects;
+  std::vector<std::string> fields;
+  int history_length = 0;
   bool flatten_history = true;
 
   std::unique_ptr<Sensor> build() const override;
 };
+template <class V>
+void visit_fields(V& v, EffectSensorCfg& c) {
+  v.object("EffectSensorCfg",
+           "A sensor of the scene seen through effects; it has the same fields.", "effect")
+      .module("effects");
+  v.extends(static_cast<SensorCfg&>(c));
+  v("sensor", c.sensor, "Key of the clean sensor: ``robot/imu_acc``.");
+  v("effects", c.effects, "In this order; each may be limited to some fields.");
+  v("fields", c.fields, "Of the clean sensor; empty: all.");
+  v("history_length", c.history_length,
+    "Rows of every field, oldest first; the first of an episode fills all. 0: no history.")
+      .at_least(0);
+  v("flatten_history", c.flatten_history, "[h d] instead of [h, *shape].");
+}
 
 class EffectSensor : public Sensor {
  public:

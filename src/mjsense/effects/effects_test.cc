@@ -518,8 +518,8 @@ TEST(EffectSensor, RefusesAWrongEffectBeforeThereIsARow) {
   const double nan = std::nan("");
   EXPECT_EQ(message(one(Dropout(0.5))), "");
   EXPECT_EQ(message(one(Dropout(2))),
-            "sensor 'noisy', effect 0 (dropout): probability is 2: must be between 0 and 1");
-  EXPECT_THAT(message({nullptr}), HasSubstr("effect 0 is null"));
+            "sensor 'noisy': effects[0]: probability is 2: must be between 0 and 1");
+  EXPECT_THAT(message({nullptr}), HasSubstr("effects[0] is null"));
   StepDelay lags(2, 1);
   BiasDrift drift;
   drift.std = {-1};
@@ -530,7 +530,7 @@ TEST(EffectSensor, RefusesAWrongEffectBeforeThereIsARow) {
         one(Noise(Draw::constant({}))), one(EpisodeBias(Draw::gaussian({-1}))), one(drift),
         one(Scale({nan})), one(tilt), one(Clip({2}, {1})), one(Quantize({-1})), one(Delay(nan)),
         one(lags), one(Rate(nan)), one(Dropout(nan))}) {
-    EXPECT_THAT(message(wrong), HasSubstr("sensor 'noisy', effect 0"));
+    EXPECT_THAT(message(wrong), HasSubstr("sensor 'noisy': effects[0]"));
   }
 }
 

@@ -6,7 +6,6 @@
 #include <cmath>
 #include <utility>
 
-#include "mjsense/core/checks.h"
 #include "mjsense/core/error.h"
 
 namespace mjsense {
@@ -17,12 +16,6 @@ Noise Noise::with_density(PerComponent density) {
   Noise n;
   n.density = std::move(density);
   return n;
-}
-
-void Noise::validate(std::string_view place) const {
-  draw.validate(place);
-  check_values(density, place, "density");
-  require_not_negative(density, place, "density");
 }
 
 void Noise::initialize(const EffectInit& init) {
@@ -47,8 +40,6 @@ void Noise::apply(const EffectMoment& moment, const EffectRow& row) {
 }
 
 EpisodeBias::EpisodeBias(Draw d, Operation op) : draw(std::move(d)), operation(op) {}
-
-void EpisodeBias::validate(std::string_view place) const { draw.validate(place); }
 
 void EpisodeBias::initialize(const EffectInit& init) {
   check_numeric(init);
@@ -77,11 +68,6 @@ void EpisodeBias::apply(const EffectMoment& moment, const EffectRow& row) {
 }
 
 void BiasDrift::validate(std::string_view place) const {
-  for (const auto& [name, values] : {std::pair{"std", &std}, std::pair{"density", &density}}) {
-    check_values(*values, place, name);
-    require_not_negative(*values, place, name);
-  }
-  require(time_constant_s > 0, place, "time_constant_s", time_constant_s, "positive");
   if (std::isinf(time_constant_s) && std::ranges::any_of(std, [](double s) { return s > 0; })) {
     throw ValueError(
         fmt::format("{}: std needs a finite time_constant_s; a random walk has density", place));

@@ -13,7 +13,7 @@ namespace mjsense {
 // x <- x + e (or x e, or e), e fresh for every row and component.
 struct Noise : Effect {
   Draw draw;
-  Operation operation = Operation::kAdd;
+  Word<Operation> operation = Operation::kAdd;
   // unit / sqrt(Hz); adds a Gaussian of std = density / sqrt(period), whose Allan deviation is
   // density / sqrt(tau): the "noise density" of a data sheet. Comes on top of `draw`.
   PerComponent density = {0.0};
@@ -24,7 +24,6 @@ struct Noise : Effect {
 
   std::unique_ptr<Effect> clone() const override { return std::make_unique<Noise>(*this); }
   std::string kind() const override { return "noise"; }
-  void validate(std::string_view place) const override;
   void initialize(const EffectInit& init) override;
   void apply(const EffectMoment& moment, const EffectRow& row) override;
 
@@ -33,13 +32,27 @@ struct Noise : Effect {
   double density_factor_ = 0.0;  // 1 / sqrt(period)
   bool has_density_ = false;
 };
+template <class V>
+void visit_fields(V& v, Noise& c) {
+  v.object("Noise", "A new error for every row and component.", "noise")
+      .frozen()
+      .module("effects");
+  v("draw", c.draw.law, "Gaussian, Uniform or Constant; a number: Constant.");
+  v("operation", c.operation, "What the error does to the value; abs: it replaces it.");
+  v("density", c.density,
+    "The noise density of a data sheet: std = density / sqrt(period), on top of draw.")
+      .unit("unit/sqrt(Hz)")
+      .at_least(0)
+      .or_one().not_empty();
+  v.include(static_cast<Effect&>(c));
+}
 
 // x <- x + b, b constant over an episode (turn-on bias). At every reset b <- operation(b, e), from
 // 0: kAbs draws it anew, kAdd walks from episode to episode (mjlab's additive-bias model with
 // "add").
 struct EpisodeBias : Effect {
   Draw draw;
-  Operation operation = Operation::kAbs;
+  Word<Operation> operation = Operation::kAbs;
   bool per_component = true;  // false: one number for the whole row
 
   EpisodeBias() = default;
@@ -47,7 +60,6 @@ struct EpisodeBias : Effect {
 
   std::unique_ptr<Effect> clone() const override { return std::make_unique<EpisodeBias>(*this); }
   std::string kind() const override { return "episode_bias"; }
-  void validate(std::string_view place) const override;
   void initialize(const EffectInit& init) override;
   void reset(const EffectMoment& moment) override;
   void apply(const EffectMoment& moment, const EffectRow& row) override;
@@ -58,6 +70,17 @@ struct EpisodeBias : Effect {
   std::vector<double> bias_;         // [B, size]
   std::vector<std::uint8_t> drawn_;  // by world
 };
+template <class V>
+void visit_fields(V& v, EpisodeBias& c) {
+  v.object("EpisodeBias", "A constant error within an episode (turn-on bias).", "episode_bias")
+      .frozen()
+      .module("effects");
+  v("draw", c.draw.law, "Gaussian, Uniform or Constant; a number: Constant.");
+  v("operation", c.operation,
+    "At every reset: abs draws the bias anew, add lets it walk from episode to episode.");
+  v("per_component", c.per_component, "False: one number for the whole row.");
+  v.include(static_cast<Effect&>(c));
+}
 
 // x <- x + b with db = -b / tau dt + sigma sqrt(2 / tau) dW: a first-order Gauss-Markov process
 // with standard deviation sigma and autocorrelation exp(-|t| / tau). It starts from its stationary
@@ -80,5 +103,16 @@ struct BiasDrift : Effect {
   int size_ = 0;
   std::vector<double> bias_;  // [B, size]
 };
+template <class V>
+void visit_fields(V& v, BiasDrift& c) {
+  v.object("BiasDrift", "First-order Gauss-Markov bias; with an infinite time constant a random walk.", "bias_drift")
+      .frozen()
+      .module("effects");
+  v("std", c.std, "Of the stationary process.").at_least(0).or_one().not_empty();
+  v("time_constant_s", c.time_constant_s, "In which it forgets.").positive().may_be_infinite();
+  v("density", c.density, "Of the random walk.").unit("unit/sqrt(s)").at_least(0).or_one().not_empty();
+  v("start_at_zero", c.start_at_zero, "An episode begins without bias, not with a random one.");
+  v.include(static_cast<Effect&>(c));
+}
 
 }  // namespace mjsense

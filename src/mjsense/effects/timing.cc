@@ -7,7 +7,6 @@
 #include <cstring>
 #include <limits>
 
-#include "mjsense/core/checks.h"
 #include "mjsense/core/error.h"
 
 namespace mjsense {
@@ -48,12 +47,6 @@ const std::byte* FrameRing::frame(int world, int age) const {
 
 double FrameRing::time(int world, int age) const {
   return times_[index(world, std::min(age, count_[world] - 1))];
-}
-
-void Delay::validate(std::string_view place) const {
-  require_not_negative(delay_s, place, "delay_s");
-  require_not_negative(delay_max_s, place, "delay_max_s");
-  require_not_negative(jitter_s, place, "jitter_s");
 }
 
 void Delay::initialize(const EffectInit& init) {
@@ -100,12 +93,10 @@ void Delay::apply(const EffectMoment& moment, const EffectRow& row) {
 }
 
 void StepDelay::validate(std::string_view place) const {
-  if (min_lag < 0 || max_lag < min_lag) {
+  if (max_lag < min_lag) {
     throw ValueError(
         fmt::format("{}: lags [{}, {}]: need 0 <= min_lag <= max_lag", place, min_lag, max_lag));
   }
-  require_probability(hold_probability, place, "hold_probability");
-  require_not_negative(update_period, place, "update_period");
 }
 
 void StepDelay::initialize(const EffectInit& init) {
@@ -146,11 +137,6 @@ void StepDelay::apply(const EffectMoment& moment, const EffectRow& row) {
   std::memcpy(row.data, ring_.frame(w, lag_[w]), row.bytes());
 }
 
-void Rate::validate(std::string_view place) const {
-  require_positive(rate_hz, place, "rate_hz");
-  require_finite(phase_s, place, "phase_s");
-}
-
 void Rate::initialize(const EffectInit& init) {
   row_bytes_ = init.size * dtype_size(init.dtype);
   held_.assign(init.num_worlds * row_bytes_, std::byte{0});
@@ -176,17 +162,6 @@ void Rate::apply(const EffectMoment& moment, const EffectRow& row) {
   } else {
     std::memcpy(row.data, held, row_bytes_);
   }
-}
-
-Dropout::Mode Dropout::mode_from_name(std::string_view name) {
-  if (name == "hold") return Mode::kHold;
-  if (name == "nan") return Mode::kNan;
-  if (name == "zero") return Mode::kZero;
-  throw ValueError(fmt::format("mode is '{}': must be one of hold, nan, zero", name));
-}
-
-void Dropout::validate(std::string_view place) const {
-  require_probability(probability, place, "probability");
 }
 
 void Dropout::initialize(const EffectInit& init) {

@@ -33,9 +33,10 @@ class FrameRing {
 };
 
 // Output at time t: the row measured at t - lag, lag = delay + jitter.
-//   delay   drawn for each world and episode from [delay_s, delay_max_s] (delay_max_s < delay_s:
-//   fixed) jitter  uniform in [-jitter_s, jitter_s], fresh for every row; the output never goes
-//   back in time
+// clang-format off: a table
+//   delay   drawn for each world and episode from [delay_s, delay_max_s] (delay_max_s < delay_s: fixed)
+//   jitter  uniform in [-jitter_s, jitter_s], fresh for every row; the output never goes back in time
+// clang-format on
 // Without interpolation: the newest row not younger than that. Before there is one: the first row
 // of the episode.
 struct Delay : Effect {
@@ -46,7 +47,6 @@ struct Delay : Effect {
   explicit Delay(double delay_s) : delay_s(delay_s) {}
   std::unique_ptr<Effect> clone() const override { return std::make_unique<Delay>(*this); }
   std::string kind() const override { return "delay"; }
-  void validate(std::string_view place) const override;
   void initialize(const EffectInit& init) override;
   void apply(const EffectMoment& moment, const EffectRow& row) override;
   bool eager() const override { return true; }
@@ -56,6 +56,19 @@ struct Delay : Effect {
   FrameRing ring_;
   std::vector<double> lag_, output_time_;  // s, by world
 };
+template <class V>
+void visit_fields(V& v, Delay& c) {
+  v.object("Delay", "The row of delay_s ago.", "delay")
+      .frozen()
+      .module("effects");
+  v("delay_s", c.delay_s, "By which rows are late.").at_least(0);
+  v("delay_max_s", c.delay_max_s,
+    "Larger than delay_s: drawn between them for each world and episode.")
+      .at_least(0);
+  v("jitter_s", c.jitter_s, "Uniform in +-jitter_s, fresh for every row.").at_least(0);
+  v("interpolate", c.interpolate, "Linear between rows; floats only.");
+  v.include(static_cast<Effect&>(c));
+}
 
 // mjlab's delay, in rows: output = the row `lag` rows ago, at most as many as there are since the
 // reset. lag is uniform in [min_lag, max_lag], drawn every update_period rows (0: every row) but
@@ -83,6 +96,19 @@ struct StepDelay : Effect {
   FrameRing ring_;
   std::vector<int> lag_, rows_, phase_;  // by world
 };
+template <class V>
+void visit_fields(V& v, StepDelay& c) {
+  v.object("StepDelay", "mjlab's delay, in control steps.", "step_delay")
+      .frozen()
+      .module("effects");
+  v("min_lag", c.min_lag, "The least.").at_least(0);
+  v("max_lag", c.max_lag, "The most; drawn between them.").at_least(0);
+  v("per_world", c.per_world, "False: all worlds have the same lag.");
+  v("hold_probability", c.hold_probability, "That a drawn lag is not taken.").within(0, 1);
+  v("update_period", c.update_period, "Steps between draws; 0: every step.").at_least(0);
+  v("per_world_phase", c.per_world_phase, "Worlds draw at steps of their own.");
+  v.include(static_cast<Effect&>(c));
+}
 
 // A device slower than the control loop: a new row at phase + k / rate_hz, held in between.
 struct Rate : Effect {
@@ -94,7 +120,6 @@ struct Rate : Effect {
   explicit Rate(double rate_hz, double phase_s = 0.0) : rate_hz(rate_hz), phase_s(phase_s) {}
   std::unique_ptr<Effect> clone() const override { return std::make_unique<Rate>(*this); }
   std::string kind() const override { return "rate"; }
-  void validate(std::string_view place) const override;
   void initialize(const EffectInit& init) override;
   void apply(const EffectMoment& moment, const EffectRow& row) override;
   bool eager() const override { return true; }
@@ -107,21 +132,32 @@ struct Rate : Effect {
   std::vector<std::int64_t> number_;  // of the row held
   std::vector<std::uint8_t> is_new_;  // the row of the present tick was taken
 };
+template <class V>
+void visit_fields(V& v, Rate& c) {
+  v.object("Rate", "A device slower than the control loop: rows are held in between.", "rate")
+      .frozen()
+      .module("effects");
+  v("rate_hz", c.rate_hz, "New rows a second.").positive();
+  v("phase_s", c.phase_s, "Of the first one.");
+  v("random_phase", c.random_phase, "Uniform over a period, for each world and episode.");
+  v.include(static_cast<Effect&>(c));
+}
 
 // A row is lost with this probability: the last one that arrived is held, or NaN or 0 is given. The
 // first of an episode always arrives.
+enum class DropoutMode { kHold, kNan, kZero };
+template <>
+inline constexpr std::array<std::string_view, 3> kWords<DropoutMode>{"hold", "nan", "zero"};
 struct Dropout : Effect {
-  enum class Mode { kHold, kNan, kZero };
+  using Mode = DropoutMode;
   double probability = 0.0;
-  Mode mode = Mode::kHold;
+  Word<Mode> mode = Mode::kHold;
 
   Dropout() = default;
   explicit Dropout(double probability, Mode mode = Mode::kHold)
       : probability(probability), mode(mode) {}
-  static Mode mode_from_name(std::string_view name);  // hold nan zero; throws ValueError
   std::unique_ptr<Effect> clone() const override { return std::make_unique<Dropout>(*this); }
   std::string kind() const override { return "dropout"; }
-  void validate(std::string_view place) const override;
   void initialize(const EffectInit& init) override;
   void apply(const EffectMoment& moment, const EffectRow& row) override;
   bool eager() const override { return mode == Mode::kHold; }
@@ -131,5 +167,14 @@ struct Dropout : Effect {
   std::size_t row_bytes_ = 0;
   std::vector<std::byte> held_;  // [B, row]
 };
+template <class V>
+void visit_fields(V& v, Dropout& c) {
+  v.object("Dropout", "A row is lost with this probability.", "dropout")
+      .frozen()
+      .module("effects");
+  v("probability", c.probability, "That a row is lost; the first of an episode never is.").within(0, 1);
+  v("mode", c.mode, "What is given instead; hold: the last row.");
+  v.include(static_cast<Effect&>(c));
+}
 
 }  // namespace mjsense

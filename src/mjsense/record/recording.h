@@ -7,6 +7,8 @@
 #include <string>
 #include <vector>
 
+#include "mjsense/core/fields.h"
+
 namespace mjsense {
 
 class Sensor;
@@ -23,19 +25,44 @@ struct Fps {
 };
 
 struct VideoCfg {
-  std::string ffmpeg;  // the program; "": $MJSENSE_FFMPEG, else "ffmpeg" of PATH
-  // ffmpeg processes at one time; 0: 32. Streams beyond them wait in raw files on disk.
+  std::string ffmpeg;
   int max_encoders = 0;
-  // Frames of a stream that wait in memory; when they are full, append() waits.
   int queue_frames = 3;
-  // Per encoder. The bytes of a video depend on it, so it is never taken from the machine.
   int threads = 1;
-  int crf = 24;                     // x264 quality: 0 lossless .. 51
-  std::string preset = "veryfast";  // x264 effort; docs/formats.md has the figures
-  int keyint = 250;                // most frames between key frames: fewer seek faster, more shrink
-  double depth_unit = 0.0002;      // metres per unit of the 16-bit depth video; reaches to 13.1 m
-  bool molmospaces_depth = false;  // also MolmoSpaces' lossy red-green depth MP4, for its loaders
+  int crf = 24;
+  std::string preset = "veryfast";
+  int keyint = 250;
+  double depth_unit = 0.0002;
+  bool molmospaces_depth = false;
 };
+template <class V>
+void visit_fields(V& v, VideoCfg& c) {
+  v.object("VideoCfg", "How pictures are kept.");
+  v("ffmpeg", c.ffmpeg, "The program; by default ``$MJSENSE_FFMPEG``, else that of ``PATH``.");
+  v("crf", c.crf, "Quality of videos, 0 lossless to 51.").within(0, 51);
+  v("preset", c.preset, "Effort of the video encoder, ultrafast to veryslow; see the file formats.");
+  v("molmospaces_depth", c.molmospaces_depth,
+    "Also depth as MolmoSpaces' loaders read it: a lossy red-green video.");
+  v("max_encoders", c.max_encoders,
+    "ffmpeg processes at one time; 0: 32. Streams beyond them wait in raw files on disk.")
+      .at_least(0)
+      .hidden();
+  v("queue_frames", c.queue_frames,
+    "Frames of a stream that wait in memory; when they are full, the simulation waits.")
+      .at_least(1)
+      .hidden();
+  v("encoder_threads", c.threads,
+    "Of each encoder. The bytes of a video depend on it, so it is never taken from the machine.")
+      .at_least(1)
+      .hidden();
+  v("keyint", c.keyint, "Most frames between key frames: fewer seek faster, more shrink.")
+      .at_least(1)
+      .hidden();
+  v("depth_unit", c.depth_unit, "Of the 16-bit depth video; 0.0002 reaches to 13.1 m.")
+      .unit("m")
+      .positive()
+      .hidden();
+}
 
 struct RecordingCfg {
   std::filesystem::path out_dir;

@@ -5,7 +5,9 @@
 #include <algorithm>
 #include <chrono>
 #include <cmath>
+#include <functional>
 #include <limits>
+#include <map>
 
 #include "mjsense/core/error.h"
 #include "mjsense/rollout/registry.h"
@@ -22,38 +24,44 @@ double since(Clock::time_point start) {
 // What the data depend on: not the number of worlds or threads. A recording resumes only with equal
 // settings.
 std::string settings_of(const RecordJobCfg& job, Rollout& rollout) {
-  const RolloutCfg& cfg = rollout.cfg();
+  const TaskCfg& task = rollout.task().cfg();
+  std::map<std::string, std::function<void(JsonWriter&)>> entries;
+  for (const FieldDecl& field : struct_of<RecordJobCfg>().fields) {
+    if (field.fingerprint && !field.is_resolved)
+      entries[field.fingerprint] = [&](JsonWriter& json) { write_json(json, field, &job); };
+  }
+  // What fields become that leave it to the robot or the task.
+  entries["cameras"] = [&](JsonWriter& json) {
+    json.begin_array();
+    for (const RecordedCamera& camera : rollout.cameras()) {
+      json.begin_object();
+      json.key("depth").value(camera.depth);
+      json.key("height").value(camera.height);
+      json.key("name").value(camera.name);
+      json.key("width").value(camera.width);
+      json.end_object();
+    }
+    json.end_array();
+  };
+  entries["horizon"] = [&](JsonWriter& json) { json.value(task.horizon); };
+  entries["policy_dt_ms"] = [&](JsonWriter& json) { json.value(task.policy_dt_ms); };
+  // Sizes that change with the scene and with what robots are drawn with.
+  entries["model"] = [&](JsonWriter& json) {
+    const mjModel* m = rollout.task().model();
+    json.begin_object();
+    json.key("nbody").value(static_cast<std::int64_t>(m->nbody));
+    json.key("ngeom").value(static_cast<std::int64_t>(m->ngeom));
+    json.key("nmeshvert").value(static_cast<std::int64_t>(m->nmeshvert));
+    json.key("ntexdata").value(static_cast<std::int64_t>(m->ntexdata));
+    json.end_object();
+  };
   std::vector<std::uint8_t> text(1 << 16);
   JsonWriter json(text);
   json.begin_object();
-  json.key("action_noise").value(cfg.action_noise);
-  json.key("cameras").begin_array();
-  for (const RecordedCamera& camera : rollout.cameras()) {
-    json.begin_object();
-    json.key("depth").value(camera.depth);
-    json.key("height").value(camera.height);
-    json.key("name").value(camera.name);
-    json.key("width").value(camera.width);
-    json.end_object();
+  for (const auto& [key, write] : entries) {
+    json.key(key);
+    write(json);
   }
-  json.end_array();
-  json.key("horizon").value(rollout.task().cfg().horizon);
-  json.key("keep_failures").value(job.keep_failures);
-  // Sizes that change with the scene and with what robots are drawn with.
-  const mjModel* m = rollout.task().model();
-  json.key("model").begin_object();
-  json.key("nbody").value(static_cast<std::int64_t>(m->nbody));
-  json.key("ngeom").value(static_cast<std::int64_t>(m->ngeom));
-  json.key("nmeshvert").value(static_cast<std::int64_t>(m->nmeshvert));
-  json.key("ntexdata").value(static_cast<std::int64_t>(m->ntexdata));
-  json.end_object();
-  json.key("policy").value(cfg.policy);
-  json.key("policy_dt_ms").value(rollout.task().cfg().policy_dt_ms);
-  json.key("robot").value(cfg.robot);
-  json.key("samples").value(cfg.samples);
-  json.key("seed").value(static_cast<std::int64_t>(cfg.seed));
-  json.key("shadows").value(cfg.shadows);
-  json.key("task").value(cfg.task);
   json.end_object();
   return {text.begin(), text.begin() + static_cast<std::ptrdiff_t>(json.size())};
 }
@@ -122,9 +130,7 @@ class RecordJob {
  private:
   // No more worlds than episodes.
   static RecordJobCfg checked(RecordJobCfg cfg) {
-    if (cfg.episodes < 1) {
-      throw ValueError(fmt::format("episodes is {}: must be at least 1", cfg.episodes));
-    }
+    check_fields(cfg, "");
     if (cfg.rollout.policy.empty()) {
       throw ValueError(fmt::format("record needs a policy{}", suggest("", policy_names())));
     }

@@ -15,17 +15,34 @@
 namespace mjsense {
 
 struct RecordJobCfg {
+  RecordJobCfg() { rollout.num_worlds = 4; }
   RolloutCfg rollout;
   std::filesystem::path out;
-  int episodes = 1;            // to keep
-  int max_attempts = 0;        // 0: six times as many, as MolmoSpaces
-  bool keep_failures = false;  // else only successes count and stay
+  int episodes = 1;
+  int max_attempts = 0;
+  bool keep_failures = false;
   bool resume = false;
   int house = 0;
-  int batches = 0;  // files; 0: as MolmoSpaces does
+  int batches = 0;
   int gzip = 4;
   VideoCfg video;
 };
+template <class V>
+void visit_fields(V& v, RecordJobCfg& c) {
+  v.object("RecordJobCfg", "A recording of episodes.");
+  v.include(c.rollout);
+  v("out", c.out, "Folder for the files.");
+  v("episodes", c.episodes, "How many to keep.").at_least(1);
+  v("max_attempts", c.max_attempts, "Episodes to try; 0: six times those to keep.").at_least(0);
+  v("keep_failures", c.keep_failures, "Keep episodes that fail, too.").decides_data();
+  v("resume", c.resume,
+    "Go on with an interrupted recording; everything that decides the data must be the same.");
+  v("house", c.house, "Number of the ``house_N`` folder below it.").at_least(0);
+  v("batches", c.batches, "HDF5 files that episodes are spread over; 0: one for every four.")
+      .at_least(0);
+  v("gzip", c.gzip, "Compression of arrays, 0 to 9.").within(0, 9);
+  v.include(c.video);
+}
 
 // Worlds take attempts 0, 1, 2 ... as they become free. Which attempts are kept, and every byte of
 // them, depends on seed and number alone: not on the number of worlds, threads, or an interruption.

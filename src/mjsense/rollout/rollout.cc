@@ -79,12 +79,7 @@ class Rollout::EachActive final : public WorldHooks {
 };
 
 Rollout::Rollout(const RolloutCfg& cfg) : cfg_(cfg) {
-  if (cfg.num_worlds < 1) {
-    throw ValueError(fmt::format("worlds is {}: must be at least 1", cfg.num_worlds));
-  }
-  if (cfg.horizon && *cfg.horizon < 1) {
-    throw ValueError(fmt::format("horizon is {}: must be at least 1", *cfg.horizon));
-  }
+  check_fields(cfg, "");
   task_ = make_task(cfg.task, task_cfg(cfg));
   if (!cfg.policy.empty()) policy_ = make_policy(cfg.policy);
   cameras_ = chosen_cameras(task_->cfg().robot, cfg);

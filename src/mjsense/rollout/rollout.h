@@ -21,6 +21,7 @@
 #include <string>
 #include <vector>
 
+#include "mjsense/core/fields.h"
 #include "mjsense/episode/policy.h"
 #include "mjsense/episode/task.h"
 #include "mjsense/observe/suite.h"
@@ -33,22 +34,51 @@ namespace mjsense {
 struct RolloutCfg {
   std::string task = "pick";
   std::string robot = "franka";
-  std::string policy = "planner";  // "": actions come from the caller
+  std::string policy = "planner";
   int num_worlds = 1;
-  int threads = 0;  // 0: the CPUs this process may use
+  int threads = 0;
   std::uint64_t seed = 0;
-  // Of the robot's, in this order; unset: all, empty: none.
   std::optional<std::vector<std::string>> cameras;
-  std::optional<int> width, height;  // pixels; unset: the robot's
-  bool depth = false;                // of every camera; else as the robot's mounts say
-  int samples = 1;                   // rays per pixel of rgb
+  std::optional<int> width, height;
+  bool depth = false;
+  int samples = 1;
   bool shadows = true;
-  std::optional<int> horizon;  // control steps
+  std::optional<int> horizon;
   bool action_noise = true;
   // Makes further sensors for the suite, recorded like the others.
   std::function<std::vector<std::shared_ptr<Sensor>>(const std::shared_ptr<Simulation>&)>
       more_sensors;
 };
+template <class V>
+void visit_fields(V& v, RolloutCfg& c) {
+  v.object("RolloutCfg", "Worlds that play episodes of a task.");
+  v("task", c.task, "Which task.").decides_data();
+  v("robot", c.robot, "Which robot.").decides_data();
+  v("policy", c.policy, "What drives it.").decides_data();
+  v("num_worlds", c.num_worlds, "How many run at one time.").option("worlds").at_least(1);
+  v("threads", c.threads, "Of the simulation; 0: every CPU this process may use.").at_least(0);
+  v("seed", c.seed, "Same seed, same episodes.").decides_data();
+  v("cameras", c.cameras,
+    "Names of the robot's cameras, in this order; by default all, none for an empty list.")
+      .decides_data_as("cameras");
+  v("width", c.width, "Of pictures; by default the robot's.")
+      .unit("pixels")
+      .at_least(1)
+      .decides_data_as("cameras");
+  v("height", c.height, "Of pictures; by default the robot's.")
+      .unit("pixels")
+      .at_least(1)
+      .decides_data_as("cameras");
+  v("depth", c.depth, "Also the depth of every camera, losslessly.").decides_data_as("cameras");
+  v("samples", c.samples, "Rays a pixel of rgb: smooth edges for time.").at_least(1).decides_data();
+  v("shadows", c.shadows, "Pictures have shadows.").decides_data();
+  v("horizon", c.horizon, "Control steps after which an episode is cut; by default the task's.")
+      .at_least(1)
+      .decides_data_as("horizon");
+  v("action_noise", c.action_noise, "Commands reach the arm with noise.")
+      .option("noise")
+      .decides_data();
+}
 
 // Where the time of steps went, wall seconds.
 struct RolloutTimes {

@@ -10,6 +10,8 @@
 #include <utility>
 #include <vector>
 
+#include "mjsense/core/fields.h"
+
 namespace mjsense {
 
 // Where an MJCF comes from: a path, an XML text, or a file of models/ ("embedded:franka/fr3.xml").
@@ -24,30 +26,54 @@ struct ModelSource {
 
 struct EntityCfg {
   ModelSource model;
-  // Pose of the entity's root in the world: of its free body, else of the mocap body that a fixed
-  // base hangs under. The identity keeps what the XML says.
-  std::array<double, 3> pos{0, 0, 0};      // m
-  std::array<double, 4> quat{1, 0, 0, 0};  // wxyz
-  // Values of hinges and slides in the keyframe init_state, used when the XML has no keyframe of
-  // its own: (regular expression that matches the whole local name, rad or m), the first match
-  // counts, 0 without one.
+  std::array<double, 3> pos{0, 0, 0};
+  std::array<double, 4> quat{1, 0, 0, 0};
   std::vector<std::pair<std::string, double>> joint_pos;
-  // An entity without a free joint is hung under the mocap body "<name>/mocap_base", so that each
-  // world can place it. False attaches it to the world as it is (static scenery).
   bool mocap_base = true;
 };
+template <class V>
+void visit_fields(V& v, EntityCfg& c) {
+  v.object("EntityCfg",
+           "A model that is attached to the scene; all its names get the prefix ``<entity>/``.");
+  v.python("model", "str | Path | mujoco.MjSpec | Callable[[], mujoco.MjSpec]", "",
+           "Path of an MJCF file, XML text, ``embedded:<file>`` (see "
+           ":func:`mjsense.embedded_models`), an MjSpec, or a function that makes one.")
+      .required();
+  v.python("assets", "Mapping[str, bytes]", "field(default_factory=dict)",
+           "Files that XML text refers to, by name.");
+  v("pos", c.pos,
+    "Of the entity's root in the world: of its free body, else of the mocap body that a fixed base "
+    "hangs under.")
+      .unit("m");
+  v("quat", c.quat, "Of the same, wxyz; the identity keeps what the XML says.");
+  v("joint_pos", c.joint_pos,
+    "Joint positions (rad, m) of the keyframe ``init_state`` by regular expression that matches the "
+    "whole local name, the first match counts; unless the model has a keyframe.");
+  v("mocap_base", c.mocap_base,
+    "Hang a model without a free joint under the mocap body ``<entity>/mocap_base``, so that each "
+    "world can place it; False: attach it to the world as it is.");
+}
 
-// Throws ValueError for what is wrong whatever the model is.
+// Its rotation and its regular expressions.
 void validate(const EntityCfg& cfg, std::string_view place);
 
 // One MuJoCo element. Full name = "entity/name" if entity is non-empty, else "name".
 struct ObjRef {
-  std::string
-      type;  // body (inertial frame) xbody (body frame) joint geom site actuator tendon camera ...
+  std::string type;
   std::string name;
   std::string entity;
   bool empty() const { return type.empty() && name.empty(); }
   std::string full_name() const { return entity.empty() ? name : entity + "/" + name; }
 };
+template <class V>
+void visit_fields(V& v, ObjRef& c) {
+  v.object("ObjRef",
+           "One MuJoCo element. Its full name is ``entity/name``, or ``name`` without an entity.")
+      .frozen();
+  v("type", c.type,
+    "body (inertial frame), xbody (body frame), joint, geom, site, actuator, tendon, camera, and so on.");
+  v("name", c.name, "Its name in the entity.");
+  v("entity", c.entity, "Whose name it is.").or_none();
+}
 
 }  // namespace mjsense

@@ -4,11 +4,9 @@
 
 #include <algorithm>
 #include <cctype>
-#include <cmath>
 #include <span>
 #include <utility>
 
-#include "mjsense/core/checks.h"
 #include "mjsense/core/error.h"
 
 namespace mjsense {
@@ -19,17 +17,6 @@ std::string lower(std::string_view text) {
   std::transform(out.begin(), out.end(), out.begin(),
                  [](unsigned char c) { return std::tolower(c); });
   return out;
-}
-
-int word(std::string_view place, std::string_view field, std::string_view value,
-         std::span<const std::pair<const char*, int>> known) {
-  std::vector<std::string> names;
-  for (const auto& [name, number] : known) {
-    if (lower(value) == lower(name)) return number;
-    names.emplace_back(name);
-  }
-  throw ValueError(fmt::format("{}: {} = '{}' is not known; expected one of {}", place, field,
-                               value, fmt::join(names, ", ")));
 }
 
 // MuJoCo's XML names of the flags, lower case without spaces: "Frictionloss" -> "frictionloss",
@@ -54,37 +41,21 @@ int flags(std::string_view place, std::string_view field, const std::vector<std:
   return bits;
 }
 
-constexpr std::pair<const char*, int> kIntegrators[] = {{"Euler", mjINT_EULER},
-                                                        {"RK4", mjINT_RK4},
-                                                        {"implicit", mjINT_IMPLICIT},
-                                                        {"implicitfast", mjINT_IMPLICITFAST},
-                                                        {"discrete", mjINT_DISCRETE}};
-constexpr std::pair<const char*, int> kCones[] = {{"pyramidal", mjCONE_PYRAMIDAL},
-                                                  {"elliptic", mjCONE_ELLIPTIC}};
-constexpr std::pair<const char*, int> kSolvers[] = {
-    {"PGS", mjSOL_PGS}, {"CG", mjSOL_CG}, {"Newton", mjSOL_NEWTON}};
-constexpr std::pair<const char*, int> kJacobians[] = {
-    {"dense", mjJAC_DENSE}, {"sparse", mjJAC_SPARSE}, {"auto", mjJAC_AUTO}};
+}  // namespace
 
-void apply(const OptionsCfg& cfg, std::string_view place, mjOption& option) {
-  require(std::isfinite(cfg.timestep) && cfg.timestep > 0, place, "timestep", cfg.timestep,
-          "a positive number of seconds");
-  require_positive(cfg.impratio, place, "impratio");
-  require_positive(cfg.iterations, place, "iterations");
-  require_positive(cfg.ls_iterations, place, "ls_iterations");
-  require_positive(cfg.ccd_iterations, place, "ccd_iterations");
-  require_not_negative(cfg.tolerance, place, "tolerance");
-  require_not_negative(cfg.ls_tolerance, place, "ls_tolerance");
-  require_not_negative(cfg.density, place, "density");
-  require_not_negative(cfg.viscosity, place, "viscosity");
-  require_finite(cfg.gravity, place, "gravity");
-  require_finite(cfg.magnetic, place, "magnetic");
-  require_finite(cfg.wind, place, "wind");
+void validate(const OptionsCfg& cfg, std::string_view place) {
+  flags(place, "disableflags", cfg.disableflags, {mjDISABLESTRING, mjNDISABLE});
+  flags(place, "enableflags", cfg.enableflags, {mjENABLESTRING, mjNENABLE});
+}
+
+void apply_options(const OptionsCfg& cfg, mjOption& option) {
+  constexpr std::string_view place = "options";
+  check_fields(cfg, place);
   option.timestep = cfg.timestep;
-  option.integrator = word(place, "integrator", cfg.integrator, kIntegrators);
-  option.cone = word(place, "cone", cfg.cone, kCones);
-  option.solver = word(place, "solver", cfg.solver, kSolvers);
-  option.jacobian = word(place, "jacobian", cfg.jacobian, kJacobians);
+  option.integrator = cfg.integrator;
+  option.cone = cfg.cone;
+  option.solver = cfg.solver;
+  option.jacobian = cfg.jacobian;
   option.impratio = cfg.impratio;
   option.iterations = cfg.iterations;
   option.tolerance = cfg.tolerance;
@@ -100,16 +71,6 @@ void apply(const OptionsCfg& cfg, std::string_view place, mjOption& option) {
       flags(place, "disableflags", cfg.disableflags, {mjDISABLESTRING, mjNDISABLE});
   option.enableflags = flags(place, "enableflags", cfg.enableflags, {mjENABLESTRING, mjNENABLE});
 }
-
-}  // namespace
-
-void validate(const OptionsCfg& cfg, std::string_view place) {
-  mjOption option;
-  mj_defaultOption(&option);
-  apply(cfg, place, option);
-}
-
-void apply_options(const OptionsCfg& cfg, mjOption& option) { apply(cfg, "options", option); }
 
 std::vector<std::string> differing_options(const mjOption& a, const mjOption& b) {
   std::vector<std::string> names;

@@ -7,7 +7,6 @@
 #include <cmath>
 #include <utility>
 
-#include "mjsense/core/checks.h"
 #include "mjsense/core/error.h"
 #include "mjsense/scene/attach.h"
 #include "mjsense/scene/compiler_settings.h"
@@ -50,11 +49,15 @@ Entity describe(const mjModel* model, const std::string& name, bool fixed_base) 
 
 }  // namespace
 
-void validate(const SceneCfg& cfg, std::string_view place) {
-  require_not_negative(cfg.env_spacing, place, "env_spacing");
-  if (cfg.extent) require_positive(*cfg.extent, place, "extent");
-  validate(cfg.options, place == "scene" ? "options" : place);
+namespace {
+
+// Terrain, entities, options and sensors are checked where they are used.
+void check_scene(const SceneCfg& cfg) {
+  for (const char* field : {"env_spacing", "extent"})
+    check_field(*struct_of<SceneCfg>().find(field), &cfg, "scene");
 }
+
+}  // namespace
 
 struct Scene::Impl {
   SceneCfg cfg;
@@ -123,7 +126,7 @@ void Scene::Impl::check_base_alone() {
 
 // Base, options, terrain, entities.
 void Scene::Impl::attach() {
-  validate(cfg, "scene");
+  check_scene(cfg);
   spec = cfg.spec           ? SpecPtr(cfg.spec, SpecDelete{false})
          : cfg.base.empty() ? SpecPtr(mj_makeSpec())
                             : parse_model(cfg.base, "scene base");

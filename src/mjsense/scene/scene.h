@@ -40,9 +40,27 @@ struct SceneCfg {
   // the real thing.
   mjSpec* spec = nullptr;
 };
-
-// Throws ValueError for numbers and options that no scene can have.
-void validate(const SceneCfg& cfg, std::string_view place);
+template <class V>
+void visit_fields(V& v, SceneCfg& c) {
+  v.object("SceneCfg", "What all worlds share.");
+  v.python("num_envs", "int", "1", "B, unless ``Simulation(num_worlds=...)`` says otherwise.");
+  v("env_spacing", c.env_spacing, "Between the origins of neighbouring worlds on a plane.")
+      .unit("m")
+      .at_least(0);
+  v("terrain", c.terrain, "The ground.");
+  v("entities", c.entities, "Attached in this order.");
+  v.python("sensors", "Sequence[Any]", "()",
+           "Sensor configurations, configurations of your own with ``build()``, or "
+           ":class:`mjsense.Sensor` objects.");
+  v("extent", c.extent, "Overrides ``stat.extent`` of the model.").unit("m").positive();
+  v.python("spec_fn", "Callable[[mujoco.MjSpec], None] | None", "None",
+           "Edits the spec last, before compilation.");
+  v("options", c.options, "Of the physics.");
+  v.python("base", "str | Path | None", "None",
+           "A whole model to start from, as it is (path or XML text): names without a prefix, any "
+           "number of free joints, its own ``<option>`` unless ``options`` are set. Its sensors are "
+           "found; it is no entity.");
+}
 
 // Names of an entity's elements, local (without the prefix), in model order. An element that its
 // MJCF leaves unnamed is given a name: its type and its number among the entity's elements of that

@@ -150,10 +150,9 @@ TEST(Scene, SaysWhatIsWrongWithAnOption) {
     edit(cfg.options);
     return fault(std::move(cfg));
   };
-  EXPECT_THAT(option_fault([](auto& o) { o.integrator = "rk5"; }),
-              HasSubstr("integrator = 'rk5' is not known; expected one of Euler, RK4"));
-  EXPECT_EQ(option_fault([](auto& o) { o.integrator = "euler"; }), "no error");
-  EXPECT_THAT(option_fault([](auto& o) { o.timestep = 0; }), HasSubstr("timestep is 0: must be"));
+  EXPECT_EQ(option_fault([](OptionsCfg& o) { o.integrator = "euler"; }), "no error");
+  EXPECT_THAT(option_fault([](auto& o) { o.timestep = 0; }),
+              HasSubstr("options: timestep is 0: must be above 0"));
   EXPECT_EQ(option_fault([](auto& o) { o.disableflags = {"contacts"}; }),
             "options: disableflags has no flag 'contacts'; did you mean 'contact'?");
   EXPECT_THAT(option_fault([](auto& o) { o.enableflags = {"contact"}; }),

@@ -16,9 +16,9 @@ namespace {
 // The sub-terrains asked for, or one of every kind.
 auto sub_terrains(const TerrainCfg& cfg) {
   auto all = cfg.sub_terrains;
-  if (!all.empty()) return all;
-  for (std::string_view kind : kTileKinds) {
-    all.emplace_back(kind, SubTerrainCfg{.kind = std::string(kind)});
+  for (std::size_t kind = 0; cfg.sub_terrains.empty() && kind < kWords<SubTerrain>.size(); ++kind) {
+    all.emplace_back(kWords<SubTerrain>[kind],
+                     SubTerrainCfg{.kind = static_cast<SubTerrain>(kind)});
   }
   return all;
 }
@@ -43,44 +43,20 @@ std::vector<int> share_columns(const TerrainCfg& cfg, int types) {
 }  // namespace
 
 void validate(const SubTerrainCfg& s, std::string_view place) {
-  require_word(s.kind, kTileKinds, place, "kind");
-  require_not_negative(s.proportion, place, "proportion");
-  require_positive(s.platform_width, place, "platform_width");
-  require_positive(s.spacing, place, "spacing");
-  require_positive(s.step_width, place, "step_width");
-  require_positive(s.pit_depth, place, "pit_depth");
-  require_positive(s.waves, place, "waves");
-  require_not_negative(s.gap, place, "gap");
-  require_not_negative(s.amplitude, place, "amplitude");
-  for (int i = 0; i < 2; ++i) {
-    require(s.stone_width[i] > 0.02 && std::isfinite(s.stone_width[i]), place, "stone_width",
-            s.stone_width[i], "more than 0.02 m");
-    require_positive(s.step_height[i], place, "step_height");
-    require(s.slope[i] >= 0 && std::isfinite(s.slope[i]), place, "slope", s.slope[i],
-            "0 or more; use inverted for a pit");
-    require(std::abs(s.stone_height[i]) < s.pit_depth, place, "stone_height", s.stone_height[i],
-            "less than pit_depth");
-  }
+  for (double height : s.stone_height)
+    require(std::abs(height) < s.pit_depth, place, "stone_height", height, "less than pit_depth");
 }
 
 void validate(const TerrainCfg& cfg, std::string_view place) {
-  constexpr std::string_view kTypes[] = {"plane", "generator"};
-  require_word(cfg.terrain_type, kTypes, place, "terrain_type");
-  require_positive(cfg.levels, place, "levels");
-  require_not_negative(cfg.types, place, "types");
-  for (double side : cfg.tile_size) require_positive(side, place, "tile_size");
   const double side = std::min(cfg.tile_size[0], cfg.tile_size[1]);
-  require(cfg.resolution > 0 && cfg.resolution <= side / 2, place, "resolution", cfg.resolution,
+  require(cfg.resolution <= side / 2, place, "resolution", cfg.resolution,
           "positive and at most half a tile (m)");
-  require_finite(cfg.difficulty, place, "difficulty");
-  require_not_negative(cfg.border, place, "border");
   require(cfg.max_init_level < cfg.levels, place, "max_init_level", cfg.max_init_level,
           fmt::format("less than the {} levels", cfg.levels));
   double total = 0;
   for (const auto& [name, sub] : sub_terrains(cfg)) {
-    const std::string of = fmt::format("{}: sub-terrain '{}'", place, name);
-    validate(sub, of);
-    require(sub.platform_width < side || cfg.terrain_type == "plane", of, "platform_width",
+    require(sub.platform_width < side || cfg.terrain_type == TerrainType::kPlane,
+            fmt::format("{}: sub_terrains['{}']", place, name), "platform_width",
             sub.platform_width, fmt::format("less than the tile's {} m", side));
     total += sub.proportion;
   }
@@ -89,8 +65,8 @@ void validate(const TerrainCfg& cfg, std::string_view place) {
 }
 
 Terrain::Terrain(TerrainCfg cfg) : cfg_(std::move(cfg)) {
-  validate(cfg_, "terrain");
-  if (cfg_.terrain_type == "plane") return;
+  check_fields(cfg_, "terrain");
+  if (cfg_.terrain_type == TerrainType::kPlane) return;
   cfg_.sub_terrains = sub_terrains(cfg_);
   levels_ = cfg_.levels;
   types_ = cfg_.types > 0 ? cfg_.types : static_cast<int>(cfg_.sub_terrains.size());

@@ -11,56 +11,104 @@
 #include <utility>
 #include <vector>
 
+#include "mjsense/core/fields.h"
+
 namespace mjsense {
 
-// One kind of tile. A range is (value at difficulty 0, value at difficulty 1).
-struct SubTerrainCfg {
-  // flat             nothing
-  // rough            height field of uniform noise in [-amplitude, amplitude], a knot every
-  // `spacing` waves            height field: amplitude * sin along both axes, `waves` periods a
-  // tile slope            height field: pyramid that rises to a platform with `slope` stairs boxes:
-  // pyramid of steps of `step_height` and `step_width` up to a platform stepping_stones  boxes of
-  // `stone_width` with gaps of `gap` over a pit, around a platform
-  std::string kind = "flat";
-  double proportion = 1.0;                        // share of the columns
-  bool inverted = false;                          // slope, stairs: down into a pit
-  double platform_width = 2.0;                    // m, the flat square at the centre of the tile
-  std::array<double, 2> amplitude{0.01, 0.08};    // m, rough and waves
-  double spacing = 0.2;                           // m, rough
-  int waves = 2;                                  // waves
-  std::array<double, 2> slope{0.0, 0.6};          // rise over run
-  std::array<double, 2> step_height{0.03, 0.20};  // m
-  double step_width = 0.3;                        // m
-  std::array<double, 2> stone_width{1.0, 0.35};   // m
-  std::array<double, 2> gap{0.05, 0.35};          // m
-  std::array<double, 2> stone_height{0.0, 0.05};  // m, stones stand up to this much higher or lower
-  double pit_depth = 1.0;                         // m, stepping_stones
-};
+// clang-format off: a table
+//   flat             nothing
+//   rough            height field of uniform noise in [-amplitude, amplitude], a knot every `spacing`
+//   waves            height field: amplitude * sin along both axes, `waves` periods a tile
+//   slope            height field: pyramid that rises to a platform with `slope`
+//   stairs           boxes: pyramid of steps of `step_height` and `step_width` up to a platform
+//   stepping_stones  boxes of `stone_width` with gaps of `gap` over a pit, around a platform
+// clang-format on
+enum class SubTerrain { kFlat, kRough, kWaves, kSlope, kStairs, kSteppingStones };
+template <>
+inline constexpr std::array<std::string_view, 6> kWords<SubTerrain>{
+    "flat", "rough", "waves", "slope", "stairs", "stepping_stones"};
 
-// Throws ValueError that names the field.
+struct SubTerrainCfg {
+  Word<SubTerrain> kind;
+  double proportion = 1.0;
+  bool inverted = false;
+  double platform_width = 2.0;
+  std::array<double, 2> amplitude{0.01, 0.08};
+  double spacing = 0.2;
+  int waves = 2;
+  std::array<double, 2> slope{0.0, 0.6};
+  std::array<double, 2> step_height{0.03, 0.20};
+  double step_width = 0.3;
+  std::array<double, 2> stone_width{1.0, 0.35};
+  std::array<double, 2> gap{0.05, 0.35};
+  std::array<double, 2> stone_height{0.0, 0.05};
+  double pit_depth = 1.0;
+};
+template <class V>
+void visit_fields(V& v, SubTerrainCfg& c) {
+  v.object("SubTerrainCfg",
+           "One kind of tile. Pairs are (value at difficulty 0, value at difficulty 1).");
+  v("kind", c.kind, "What it looks like.");
+  v("proportion", c.proportion, "Share of the columns.").at_least(0);
+  v("inverted", c.inverted, "slope, stairs: down into a pit.");
+  v("platform_width", c.platform_width, "The flat square at the centre.").unit("m").positive();
+  v("amplitude", c.amplitude, "rough and waves: half the height.").unit("m").at_least(0);
+  v("spacing", c.spacing, "rough: between the knots.").unit("m").positive();
+  v("waves", c.waves, "waves: periods a tile.").at_least(1);
+  v("slope", c.slope, "slope: rise over run; inverted for a pit.").at_least(0);
+  v("step_height", c.step_height, "stairs: of a step.").unit("m").positive();
+  v("step_width", c.step_width, "stairs: of a step.").unit("m").positive();
+  v("stone_width", c.stone_width, "stepping_stones: of a stone.").unit("m").above(0.02);
+  v("gap", c.gap, "stepping_stones: between stones.").unit("m").at_least(0);
+  v("stone_height", c.stone_height, "stepping_stones: by which stones stand higher or lower.")
+      .unit("m");
+  v("pit_depth", c.pit_depth, "stepping_stones: below them.").unit("m").positive();
+}
+
+// What its fields say of each other.
 void validate(const SubTerrainCfg& cfg, std::string_view place);
 
-struct TerrainCfg {
-  std::string terrain_type = "plane";  // plane generator
+enum class TerrainType { kPlane, kGenerator };
+template <>
+inline constexpr std::array<std::string_view, 2> kWords<TerrainType>{"plane", "generator"};
 
-  // The generator's tiles: level i along +x with rising difficulty, type j along +y, the whole
-  // centred on the world's origin, tiles meeting at z = 0.
-  std::vector<std::pair<std::string, SubTerrainCfg>> sub_terrains;  // empty: one of every kind
+// The generator's tiles: level i along +x with rising difficulty, type j along +y, the whole
+// centred on the world's origin, tiles meeting at z = 0.
+struct TerrainCfg {
+  Word<TerrainType> terrain_type;
+  std::vector<std::pair<std::string, SubTerrainCfg>> sub_terrains;
   int levels = 5;
-  int types = 0;                               // columns; 0: one for each sub-terrain
-  std::array<double, 2> tile_size{8.0, 8.0};   // m
-  std::array<double, 2> difficulty{0.0, 1.0};  // of the first and the last level
-  double resolution = 0.1;                     // m, of height fields
-  double border = 5.0;                         // m, flat, around all tiles; 0: none
-  int max_init_level = -1;                     // highest level that a world starts on; -1: any
+  int types = 0;
+  std::array<double, 2> tile_size{8.0, 8.0};
+  std::array<double, 2> difficulty{0.0, 1.0};
+  double resolution = 0.1;
+  double border = 5.0;
+  int max_init_level = -1;
   std::uint64_t seed = 0;
 };
+template <class V>
+void visit_fields(V& v, TerrainCfg& c) {
+  v.object("TerrainCfg",
+           "The ground, registered as entity ``terrain``: a plane, or tiles of rising difficulty "
+           "(levels along x, types along y).");
+  v("terrain_type", c.terrain_type, "An infinite plane, or tiles.");
+  v("sub_terrains", c.sub_terrains, "Kinds of tiles by name; empty: one of every kind.");
+  v("levels", c.levels, "Tiles along x.").at_least(1);
+  v("types", c.types, "Columns; 0: one for each sub-terrain.").at_least(0);
+  v("tile_size", c.tile_size, "In x and y.").unit("m").positive();
+  v("difficulty", c.difficulty, "Of the first and the last level.");
+  v("resolution", c.resolution, "Of height fields.").unit("m").positive();
+  v("border", c.border, "Flat, around all tiles; 0: none.").unit("m").at_least(0);
+  v("max_init_level", c.max_init_level, "Highest level that a world starts on; -1: any.")
+      .at_least(-1);
+  v("seed", c.seed, "Of the tiles and of where worlds start.");
+}
 
 void validate(const TerrainCfg& cfg, std::string_view place);
 
 class Terrain {
  public:
-  // Validates.
+  // Throws ValueError for what check_fields() refuses.
   explicit Terrain(TerrainCfg cfg);
 
   // Adds the body "terrain" to the world: a plane "terrain", or geoms named

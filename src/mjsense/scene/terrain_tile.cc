@@ -8,7 +8,6 @@
 #include <numbers>
 #include <vector>
 
-#include "mjsense/core/checks.h"
 
 namespace mjsense {
 namespace {
@@ -197,8 +196,8 @@ void add_box(mjsBody* body, const std::string& name, std::array<double, 2> centr
 double build_tile(const SubTerrainCfg& cfg, Tile& tile) {
   using Build = double (*)(const SubTerrainCfg&, Tile&);
   constexpr Build kBuild[] = {flat, rough, waves, slope, stairs, stepping_stones};
-  static_assert(std::size(kBuild) == std::size(kTileKinds));
-  return kBuild[require_word(cfg.kind, kTileKinds, "terrain", "kind")](cfg, tile);
+  static_assert(std::size(kBuild) == kWords<SubTerrain>.size());
+  return kBuild[static_cast<std::size_t>(static_cast<SubTerrain>(cfg.kind))](cfg, tile);
 }
 
 }  // namespace mjsense

@@ -23,11 +23,7 @@ struct Tile {
   Rng rng;
 };
 
-inline constexpr std::array<std::string_view, 6> kTileKinds = {
-    "flat", "rough", "waves", "slope", "stairs", "stepping_stones"};
-
-// Adds the tile's geoms; returns the height (m) of its surface at the centre. Throws ValueError for
-// an unknown kind.
+// Adds the tile's geoms; returns the height (m) of its surface at the centre.
 double build_tile(const SubTerrainCfg& cfg, Tile& tile);
 
 // A box with its top at `top` and its bottom at `bottom`, sizes in m.

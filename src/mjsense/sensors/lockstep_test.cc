@@ -113,5 +113,31 @@ TEST(Lockstep, AStepAllocatesNothing) {
   }
 }
 
+TEST(EverySensor, HasAnExampleAndReturnsWhatItDeclares) {
+  Simulation sim(std::make_shared<Scene>(every_sensor_scene()), {.num_worlds = 2});
+  for (const SensorKind& kind : sensor_kinds()) {
+    int examples = 0;
+    for (const Sensor* s : sensors(sim)) {
+      if (s->kind() != kind.cfg->kind) continue;
+      ++examples;
+      for (const Field& field : s->fields()) {
+        if (!kind.data) continue;
+        const DataField& declared = kind.data->field(field.name);
+        EXPECT_EQ(field.spec.dtype, declared.dtype) << field.spec.name;
+        EXPECT_EQ(field.spec.unit, declared.unit) << field.spec.name;
+        EXPECT_EQ(field.spec.shape.rank(), std::ranges::count(declared.shape, ','))
+            << field.spec.name;
+      }
+    }
+    EXPECT_GT(examples, 0) << kind.cfg->kind;
+  }
+}
+
+TEST(EverySensor, HasDefaultsThatAreInRange) {
+  for (const SensorKind& kind : sensor_kinds()) {
+    check_fields(*kind.cfg, kind.cfg->defaults.get(), kind.cfg->kind);
+  }
+}
+
 }  // namespace
 }  // namespace mjsense

@@ -6,7 +6,6 @@
 #include <algorithm>
 #include <cmath>
 
-#include "mjsense/core/checks.h"
 #include "mjsense/core/error.h"
 #include "mjsense/scene/model_sensors/builtin_types.h"
 #include "mjsense/scene/resolve.h"
@@ -15,21 +14,6 @@
 
 namespace mjsense {
 namespace {
-
-constexpr std::array<std::string_view, 3> kInterp = {"zoh", "linear", "cubic"};
-constexpr std::array<std::string_view, 4> kDataTypes = {"real", "positive", "axis", "quaternion"};
-constexpr std::array<std::string_view, 3> kStages = {"pos", "vel", "acc"};
-
-template <std::size_t N>
-int index_of(const std::array<std::string_view, N>& words, std::string_view word,
-             std::string_view field, std::string_view place) {
-  const auto it = std::find(words.begin(), words.end(), word);
-  if (it == words.end()) {
-    throw ValueError(
-        fmt::format("{}: {} '{}' is not one of {}", place, field, word, fmt::join(words, ", ")));
-  }
-  return static_cast<int>(it - words.begin());
-}
 
 std::string or_list(const std::vector<std::string>& words) {
   if (words.size() == 1) return words[0];
@@ -82,6 +66,7 @@ std::string BuiltinSensorCfg::key() const {
 void BuiltinSensorCfg::validate() const {
   if (name.empty()) throw ValueError("sensor '': a sensor needs a name");
   const std::string place = fmt::format("sensor '{}'", key());
+  check_fields(*this, place);
   const BuiltinType& type = builtin_type(sensor_type, place);
 
   const std::vector<std::string> objects = allowed_objects(type.group);
@@ -104,25 +89,17 @@ void BuiltinSensorCfg::validate() const {
     if (!refs.empty()) check_object(ref, refs, "ref", type.name, place);
   }
 
-  if (!std::isfinite(cutoff))
-    throw ValueError(fmt::format("{}: cutoff = {} is not finite", place, cutoff));
   if (cutoff > 0 && is_unit(type.type)) {
     throw ValueError(fmt::format("{}: cutoff = {} cannot be applied to the unit vector of {}",
                                  place, cutoff, type.name));
   }
-  require_not_negative(noise, place, "noise");
-  require_not_negative(nsample, place, "nsample");
-  require_not_negative(delay, place, "delay");
-  require_not_negative(interval, place, "interval");
   if ((delay > 0 || interval > 0) && nsample == 0) {
     throw ValueError(fmt::format("{}: delay and interval need a history: nsample > 0", place));
   }
-  if (!(phase <= 0) || (phase < 0 && phase <= -interval)) {
+  if (phase < 0 && phase <= -interval) {
     throw ValueError(fmt::format("{}: phase = {} s must be in (-interval, 0] = (-{}, 0]", place,
                                  phase, interval));
   }
-  index_of(kInterp, interp, "interp", place);
-
   if (type.group == BuiltinGroup::kRangefinder) range_mask(data, place);
   if (enclosed && type.group != BuiltinGroup::kInside) {
     throw ValueError(
@@ -131,8 +108,6 @@ void BuiltinSensorCfg::validate() const {
   if (type.group == BuiltinGroup::kUser) {
     if (dim < 1)
       throw ValueError(fmt::format("{}: a user sensor requires dim >= 1, not {}", place, dim));
-    index_of(kDataTypes, datatype, "datatype", place);
-    index_of(kStages, needstage, "needstage", place);
   }
   if (type.group == BuiltinGroup::kPlugin && plugin.empty() == instance.empty()) {
     throw ValueError(
@@ -174,7 +149,7 @@ void BuiltinSensor::edit_spec(mjSpec* spec) {
   sensor->cutoff = std::max(0.0, cfg_->cutoff);
   sensor->noise = cfg_->noise;
   sensor->nsample = cfg_->nsample;
-  sensor->interp = index_of(kInterp, cfg_->interp, "interp", place);
+  sensor->interp = static_cast<int>(static_cast<BuiltinInterp>(cfg_->interp));
   sensor->delay = cfg_->delay;
   sensor->interval[0] = cfg_->interval;
   sensor->interval[1] = cfg_->phase;
@@ -187,10 +162,9 @@ void BuiltinSensor::edit_spec(mjSpec* spec) {
       break;
     case BuiltinGroup::kUser:
       sensor->dim = cfg_->dim;
-      sensor->datatype =
-          static_cast<mjtDataType>(index_of(kDataTypes, cfg_->datatype, "datatype", place));
+      sensor->datatype = cfg_->datatype;
       sensor->needstage = static_cast<mjtStage>(
-          mjSTAGE_POS + index_of(kStages, cfg_->needstage, "needstage", place));
+          mjSTAGE_POS + static_cast<int>(static_cast<BuiltinStage>(cfg_->needstage)));
       break;
     case BuiltinGroup::kPlugin:
       sensor->plugin.active = 1;
@@ -212,5 +186,7 @@ void BuiltinSensor::edit_spec(mjSpec* spec) {
       break;
   }
 }
+
+SensorKind builtin_kind() { return sensor_kind<BuiltinSensorCfg>(); }
 
 }  // namespace mjsense

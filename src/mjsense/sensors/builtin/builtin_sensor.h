@@ -7,47 +7,81 @@
 #include <string>
 #include <vector>
 
-#include "mjsense/core/sensor.h"
+#include "mjsense/core/sensor_fields.h"
 #include "mjsense/scene/entity.h"
 #include "mjsense/scene/model_sensors/model_sensor.h"
 
 namespace mjsense {
 
-struct BuiltinSensorCfg : SensorCfg {
-  std::string sensor_type;  // as in MJCF: "accelerometer", "framepos", "rangefinder" ...
-  ObjRef obj;               // what it is attached to
-  ObjRef ref;               // the frame it is relative to; the second object of camprojection,
-                            // insidesite, distance, normal, fromto, tactile
-  // > 0 clamps every number to [-cutoff, cutoff], a rangefinder's -1 too. Distance, normal and
-  // fromto: the largest distance (m) that is looked for.
-  double cutoff = 0.0;
+enum class BuiltinInterp { kZoh, kLinear, kCubic };
+template <>
+inline constexpr std::array<std::string_view, 3> kWords<BuiltinInterp>{"zoh", "linear", "cubic"};
+template <>
+inline constexpr std::array<std::string_view, 4> kWords<mjtDataType>{"real", "positive", "axis",
+                                                                     "quaternion"};
+enum class BuiltinStage { kPos, kVel, kAcc };
+template <>
+inline constexpr std::array<std::string_view, 3> kWords<BuiltinStage>{"pos", "vel", "acc"};
 
-  // Sampling and latency, with MuJoCo's meaning. A reading is taken every `interval` (s; 0: every
-  // physics step) at the phase in (-interval, 0], and shows `delay` seconds (0: none) later. Both
-  // need nsample > 0, the length of the history. What is read between samples: zoh, linear or
-  // cubic.
+struct BuiltinSensorCfg : SensorCfg {
+  std::string sensor_type;
+  ObjRef obj, ref;
+  double cutoff = 0.0;
   double delay = 0.0;
   double interval = 0.0;
   double phase = 0.0;
   int nsample = 0;
-  std::string interp = "zoh";
-
-  double noise = 0.0;  // standard deviation, stored in the model, never applied by MuJoCo
-
-  // rangefinder: its fields, in this order of dist dir origin point normal depth; one set a ray.
+  Word<BuiltinInterp> interp;
+  double noise = 0.0;
   std::vector<std::string> data{"dist"};
-  bool enclosed = false;          // insidesite: by how much the whole object juts out, m
-  int dim = 0;                    // user
-  std::string datatype = "real";  // user: real positive axis quaternion
-  std::string needstage = "acc";  // user: pos vel acc
-  std::string plugin;             // plugin: its identifier ...
-  std::string instance;           // ... or the full name of an instance in an entity's XML
+  bool enclosed = false;
+  int dim = 0;
+  Word<mjtDataType> datatype;
+  Word<BuiltinStage> needstage = BuiltinStage::kAcc;
+  std::string plugin, instance;
 
   // Throws ValueError for everything that can be known without a model.
   void validate() const;
   std::unique_ptr<Sensor> build() const override;
   std::string key() const override;  // "entity/name" if obj has an entity
 };
+
+inline constexpr std::array<std::string_view, 6> kRangeFields{"dist",  "dir",    "origin",
+                                                              "point", "normal", "depth"};
+
+template <class V>
+void visit_fields(V& v, BuiltinSensorCfg& c) {
+  v.object("BuiltinSensorCfg",
+           "One of MuJoCo's own sensors; ``data`` is float32 ``[B, dim]``. Registered as "
+           "``entity/name``.",
+           "builtin");
+  v.extends(static_cast<SensorCfg&>(c));
+  v("sensor_type", c.sensor_type,
+    "accelerometer, gyro, framepos, jointpos, rangefinder and so on: the MJCF name.");
+  v("obj", c.obj, "What is measured.").or_none();
+  v("ref", c.ref,
+    "Frame in which a frame sensor's value is expressed, the world without one; the second object of "
+    "camprojection, insidesite, distance, normal, fromto, tactile.")
+      .or_none();
+  v("cutoff", c.cutoff,
+    "Positive: every component is limited to [-cutoff, cutoff] (a rangefinder's -1 too). Distance, "
+    "normal and fromto: the largest distance that is looked for, m.");
+  v("delay", c.delay, "Between a reading and its showing. Needs nsample.").unit("s").at_least(0);
+  v("interval", c.interval, "Between readings; 0: every physics step. Needs nsample.")
+      .unit("s")
+      .at_least(0);
+  v("phase", c.phase, "When readings are taken, in (-interval, 0].").unit("s").at_most(0);
+  v("nsample", c.nsample, "Readings kept, newest first, in the field ``history``.").at_least(0);
+  v("interp", c.interp, "What is read between readings.");
+  v("noise", c.noise, "Standard deviation; stored in the model, never applied by MuJoCo.").at_least(0);
+  v("data", c.data, "Rangefinder: what of each ray, in this order.").one_of(kRangeFields);
+  v("enclosed", c.enclosed, "insidesite: by how much the whole object juts out, m.");
+  v("dim", c.dim, "User sensors: numbers in a row.").at_least(0);
+  v("datatype", c.datatype, "User sensors: what the numbers are.");
+  v("needstage", c.needstage, "User sensors: what must be computed before.");
+  v("plugin", c.plugin, "Plugin sensors: identifier.");
+  v("instance", c.instance, "Plugin sensors: full name of an instance in an entity's XML.");
+}
 
 // Fields: "" float32 [dim]; with a history (nsample > 0) also "history" float32 [nsample, dim], the
 // samples taken so far, undelayed, newest first (0 before the first).

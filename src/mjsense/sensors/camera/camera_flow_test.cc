@@ -183,20 +183,20 @@ void expect_flow_of_point_cloud(const std::shared_ptr<CameraSensorCfg>& cfg, dou
     }
     const double r2 = right * right + down * down;
     const auto& k = cfg->distortion.coefficients;
-    if (cfg->distortion.model == "brown_conrady") {
+    if (cfg->distortion.model == LensKind::kBrownConrady) {
       const double radial = 1 + k[0] * r2 + k[1] * r2 * r2 + k[4] * r2 * r2 * r2;
       const double bent =
           right * radial + 2 * k[2] * right * down + k[3] * (r2 + 2 * right * right);
       down = down * radial + k[2] * (r2 + 2 * down * down) + 2 * k[3] * right * down;
       right = bent;
-    } else if (cfg->distortion.model == "fisheye") {
+    } else if (cfg->distortion.model == LensKind::kFisheye) {
       const double t = std::atan(std::sqrt(r2));
       const double scale = (t + k[0] * t * t * t) / std::sqrt(r2);
       right *= scale;
       down *= scale;
     }
     if (std::isnan(u)) {  // only far out of the previous image
-      EXPECT_NE(cfg->distortion.model, "none");
+      EXPECT_NE(cfg->distortion.model.text(), "none");
       EXPECT_GT(std::hypot(right * focal / kWidth, down * focal / kHeight), 0.6);
       ++far_out;
       return;

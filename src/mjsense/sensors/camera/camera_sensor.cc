@@ -10,6 +10,7 @@
 #include "mjsense/core/shared.h"
 #include "mjsense/rays/ray_scene.h"
 #include "mjsense/render/kernels/tile_memory.h"
+#include "mjsense/sensors/camera/camera_data.h"
 #include "mjsense/sensors/camera/depth_noise.h"
 
 namespace mjsense {
@@ -78,7 +79,7 @@ void CameraSensor::initialize(const SensorInit& init) {
       names.emplace_back(model_->names + model_->name_camadr[i]);
     throw_unknown(place, "camera", camera, names);
   }
-  near_ = cfg_.clip_near == "model" ? model_->vis.map.znear * model_->stat.extent : cfg_.near;
+  near_ = cfg_.clip_near == ClipNear::kModel ? model_->vis.map.znear * model_->stat.extent : cfg_.near;
   if (cfg_.far > 0 && cfg_.far <= near_)
     throw ValueError(
         fmt::format("{}: far is {} m, and clip_near 'model' clips at {:.6g} m (znear x "
@@ -96,8 +97,8 @@ void CameraSensor::initialize(const SensorInit& init) {
   PixelGrid grid = grid_in(model_);
   check_grid(grid);
   std::optional<LensModel> lens;
-  if (cfg_.distortion.model != "none") {
-    lens = {cfg_.distortion.model == "fisheye" ? Lens::kFisheye : Lens::kBrownConrady,
+  if (cfg_.distortion.model != LensKind::kNone) {
+    lens = {cfg_.distortion.model == LensKind::kFisheye ? Lens::kFisheye : Lens::kBrownConrady,
             cfg_.distortion.coefficients};
     bent_ = bent_rays(grid, lens->lens, lens->coefficients, place.c_str());
     grid.bent = bent_.data();
@@ -111,12 +112,12 @@ void CameraSensor::initialize(const SensorInit& init) {
   if (bodies_ || entities_) owners_ = std::make_unique<PixelOwners>(init, cfg_.width, cfg_.height);
 
   clean_.clear();
-  if (cfg_.depth_noise != "none")
+  if (cfg_.depth_noise != DepthNoise::kNone)
     clean_.assign(init.threads,
                   std::vector<float>(static_cast<std::size_t>(cfg_.width) * cfg_.height));
   const std::size_t markers = worlds_.empty() ? 0 : worlds_[0].markers.capacity();
   gl_.reset();
-  if (cfg_.renderer == "opengl") {
+  if (cfg_.renderer == CameraRenderer::kOpenGl) {
     GlRendererCfg gl;
     gl.num_worlds = init.num_worlds;
     gl.camera = camera_;
@@ -171,9 +172,9 @@ void CameraSensor::check_grid(const PixelGrid& grid) const {
   const std::string place = fmt::format("camera '{}'", name());
   const bool orthographic = model_->cam_projection[camera_] == mjPROJ_ORTHOGRAPHIC;
   if (cfg_.fovy && !grid.orthographic) check_fovy(*cfg_.fovy, place);
-  if (orthographic && (cfg_.intrinsics || cfg_.distortion.model != "none"))
+  if (orthographic && (cfg_.intrinsics || cfg_.distortion.model != LensKind::kNone))
     throw ValueError(place + ": an orthographic camera has no intrinsics and no lens distortion");
-  if (orthographic && cfg_.depth_noise != "none")
+  if (orthographic && cfg_.depth_noise != DepthNoise::kNone)
     throw ValueError(place + ": depth_noise is for planar depth of a perspective camera");
 }
 
@@ -181,55 +182,31 @@ void CameraSensor::declare_fields(int num_worlds) {
   const std::int64_t h = cfg_.height, w = cfg_.width;
   const std::string frame =
       fmt::format("camera {}", cfg_.camera_name.empty() ? name() : cfg_.camera_name);
-  const auto add = [&](const char* field, DType dtype, Shape shape, const char* unit, double low,
-                       double high, Storage storage, const char* text) {
-    SensorSpec spec;
-    spec.dtype = dtype;
-    spec.shape = shape;
-    spec.unit = unit;
-    spec.frame = frame;
+  const auto add = [&](const char* field, Shape shape, double low, double high,
+                       Storage storage = Storage::kArray) {
+    SensorSpec spec = kCameraData.spec(field, shape, frame);
     spec.low = low;
     spec.high = high;
     spec.storage = storage;
-    spec.description = text;
     return &add_field(field, spec, num_worlds);
   };
   constexpr double inf = std::numeric_limits<double>::infinity();
   rgb_ = depth_ = segmentation_ = bodies_ = entities_ = normals_ = points_ = flow_ = nullptr;
-  if (wants("rgb"))
-    rgb_ = add("rgb", DType::kUint8, {h, w, 3}, "", 0, 255, Storage::kRgbVideo,
-               "Colour image, row 0 at the top.");
-  if (wants("depth"))
-    depth_ =
-        add("depth", DType::kFloat32, {h, w, 1}, "m", 0, inf, Storage::kDepthVideo,
-            cfg_.depth_kind == "ray" ? "Distance along each pixel's ray; 0 where nothing is seen."
-                                     : "Distance to the camera plane; 0 where nothing is seen.");
-  if (wants("segmentation"))
-    segmentation_ = add("segmentation", DType::kInt32, {h, w, 2}, "", -1, inf, Storage::kArray,
-                        "(id, mjtObj) of each pixel: geom, flex, skin, site or tendon; (-1, -1) "
-                        "where nothing is seen.");
+  if (wants("rgb")) rgb_ = add("rgb", {h, w, 3}, 0, 255, Storage::kRgbVideo);
+  if (wants("depth")) {
+    depth_ = add("depth", {h, w, 1}, 0, inf, Storage::kDepthVideo);
+    if (cfg_.depth_kind == DepthKind::kRay)
+      depth_->spec.description = "Distance along each pixel's ray; 0 where nothing is seen.";
+  }
+  if (wants("segmentation")) segmentation_ = add("segmentation", {h, w, 2}, -1, inf);
   if (wants("body_segmentation"))
-    bodies_ = add("body_segmentation", DType::kInt32, {h, w, 1}, "", -1, model_->nbody - 1,
-                  Storage::kArray, "Body id of each pixel's geom or site; -1 where there is none.");
-  if (wants("entity_segmentation"))
-    entities_ = add("entity_segmentation", DType::kInt32, {h, w, 1}, "", -1, inf, Storage::kArray,
-                    "Entity of each pixel, by its place in the scene; -1 where there is none.");
-  if (wants("normals"))
-    normals_ = add("normals", DType::kFloat32, {h, w, 3}, "", -1, 1, Storage::kArray,
-                   "Unit surface normal in the camera frame; 0 where nothing is seen.");
-  if (wants("point_cloud"))
-    points_ = add(
-        "point_cloud", DType::kFloat32, {h, w, 3}, "m", -inf, inf, Storage::kArray,
-        "Point in the camera frame (x right, y up, looking along -z); NaN where nothing is seen.");
-  if (wants("flow"))
-    flow_ = add("flow", DType::kFloat32, {h, w, 2}, "pixels", -inf, inf, Storage::kArray,
-                "Where what a pixel sees was in the previous image, minus where it is (u right, v "
-                "down); NaN where nothing rigid is seen.");
-  intrinsics_ =
-      add("intrinsics", DType::kFloat32, {3, 3}, "pixels", -inf, inf, Storage::kArray,
-          "K: image point (u right, v down) of a direction (x right, y down, z forward).");
-  pose_ = add("pose", DType::kFloat32, {4, 4}, "m", -inf, inf, Storage::kArray,
-              "X_WC of the image; the camera looks along its -z axis, y is up in the image.");
+    bodies_ = add("body_segmentation", {h, w, 1}, -1, model_->nbody - 1);
+  if (wants("entity_segmentation")) entities_ = add("entity_segmentation", {h, w, 1}, -1, inf);
+  if (wants("normals")) normals_ = add("normals", {h, w, 3}, -1, 1);
+  if (wants("point_cloud")) points_ = add("point_cloud", {h, w, 3}, -inf, inf);
+  if (wants("flow")) flow_ = add("flow", {h, w, 2}, -inf, inf);
+  intrinsics_ = add("intrinsics", {3, 3}, -inf, inf);
+  pose_ = add("pose", {4, 4}, -inf, inf);
   pose_->spec.frame = "world";
 }
 
@@ -282,7 +259,7 @@ ImageTargets CameraSensor::targets(int world, int thread) {
   if (segmentation_) t.segmentation = segmentation_->data.row<std::int32_t>(world).data();
   if (normals_) t.normals = normals_->data.row<float>(world).data();
   if (points_) t.points = points_->data.row<float>(world).data();
-  t.ray_depth = cfg_.depth_kind == "ray";
+  t.ray_depth = cfg_.depth_kind == DepthKind::kRay;
   t.samples = cfg_.samples;
   if (optical_flow_) optical_flow_->complete(t, thread);
   if (owners_) owners_->complete(t, thread);

@@ -19,9 +19,6 @@ namespace mjsense {
 
 // Throws ValueError for anything that can be wrong before there is a model.
 void validate(const CameraSensorCfg& cfg);
-void validate(const CameraIntrinsics& intrinsics, std::string_view place);
-void validate(const LensDistortion& lens, std::string_view place);
-void validate(const CameraVizCfg& viz, std::string_view place);
 // Throws ValueError from 180 degrees on.
 void check_fovy(double degrees, std::string_view place);
 

@@ -31,75 +31,191 @@
 #include <string>
 #include <vector>
 
-#include "mjsense/core/sensor.h"
+#include "mjsense/core/sensor_fields.h"
 
 namespace mjsense {
 
-// Pixels of the image that is rendered. Replaces fovy and the model's own intrinsics.
 struct CameraIntrinsics {
   double fx = 0, fy = 0, cx = 0, cy = 0;
 };
+template <class V>
+void visit_fields(V& v, CameraIntrinsics& c) {
+  v.object("CameraIntrinsics",
+           "Focal lengths and principal point in pixels of the image; replaces fovy and what the "
+           "model says.")
+      .frozen();
+  v("fx", c.fx, "Focal length in u.").unit("pixels").positive().required();
+  v("fy", c.fy, "Focal length in v.").unit("pixels").positive().required();
+  v("cx", c.cx, "Principal point, to the right.").unit("pixels").required();
+  v("cy", c.cy, "Principal point, down.").unit("pixels").required();
+}
 
-// Where a lens puts the image of a direction. x = X/Z, y = Y/Z (OpenCV camera frame), r = |(x, y)|,
-// theta = atan r.
-//   brown_conrady, coefficients k1 k2 p1 p2 k3:
-//     x' = x (1 + k1 r^2 + k2 r^4 + k3 r^6) + 2 p1 x y + p2 (r^2 + 2 x^2)
-//     y' = y (1 + k1 r^2 + k2 r^4 + k3 r^6) + p1 (r^2 + 2 y^2) + 2 p2 x y
-//   fisheye, coefficients k1 k2 k3 k4:
-//     r' = theta (1 + k1 theta^2 + k2 theta^4 + k3 theta^6 + k4 theta^8)
+enum class LensKind { kNone, kBrownConrady, kFisheye };
+template <>
+inline constexpr std::array<std::string_view, 3> kWords<LensKind>{"none", "brown_conrady",
+                                                                  "fisheye"};
+
+// x = X/Z, y = Y/Z (OpenCV camera frame), r = |(x, y)|, theta = atan r.
 struct LensDistortion {
-  std::string model = "none";  // none brown_conrady fisheye
+  Word<LensKind> model;
   std::vector<double> coefficients;
 };
+template <class V>
+void visit_fields(V& v, LensDistortion& c) {
+  v.object("LensDistortion",
+           "Where a lens puts the image of a direction (X, Y, Z), z forward, y down: OpenCV's "
+           "models.\n\n"
+           "brown_conrady: x = X/Z, y = Y/Z, ``x' = x (1 + k1 r^2 + k2 r^4 + k3 r^6) + 2 p1 x y + p2 "
+           "(r^2 + 2 x^2)``, y' alike.\n"
+           "fisheye: ``r' = theta (1 + k1 theta^2 + k2 theta^4 + k3 theta^6 + k4 theta^8)``, theta "
+           "the angle to the axis, up to 89 degrees.")
+      .frozen();
+  v("model", c.model, "Which of them.");
+  v("coefficients", c.coefficients, "brown_conrady: k1 k2 p1 p2 k3; fisheye: k1 k2 k3 k4.");
+}
 
-// What a viewer draws of a camera: the pyramid of what it sees, from `near` (or its own place) on,
-// and its axes.
+// That it has as many coefficients as its model takes.
+void validate(const LensDistortion& lens, std::string_view place);
+
 struct CameraVizCfg {
   bool show_frustum = true, show_frame = true;
-  double frustum_depth = 0;  // m, planar (through a lens: along the rays); 0: `far`, or without one
-                             // ten times the model's stat.meansize
+  double frustum_depth = 0;
   std::array<float, 4> frustum_color{1, 0.6f, 0, 1};
-  double line_width = 2;     // pixels
-  double axis_length = 5.0;  // of the frame, in units of stat.meansize
+  double line_width = 2;
+  double axis_length = 5.0;
 };
+template <class V>
+void visit_fields(V& v, CameraVizCfg& c) {
+  v.object("CameraVizCfg",
+           "What a viewer draws of a camera: the pyramid of what it sees, from ``near`` (or its own "
+           "place) on, and its axes (it looks along -z, the blue one).");
+  v("show_frustum", c.show_frustum, "The pyramid.");
+  v("show_frame", c.show_frame, "The axes.");
+  v("frustum_depth", c.frustum_depth,
+    "From the camera plane (through a lens: along the rays); 0: ``far``, or without one 10 "
+    "``stat.meansize``.")
+      .unit("m")
+      .at_least(0);
+  v("frustum_color", c.frustum_color, "Of the pyramid, rgba.").within(0, 1);
+  v("line_width", c.line_width, "Of the pyramid.").unit("pixels").at_least(0);
+  v("axis_length", c.axis_length, "Of the axes, in units of ``stat.meansize``.").at_least(0);
+}
+
+enum class DepthKind { kPlanar, kRay };
+template <>
+inline constexpr std::array<std::string_view, 2> kWords<DepthKind>{"planar", "ray"};
+enum class DepthNoise { kNone, kD405, kD435 };
+template <>
+inline constexpr std::array<std::string_view, 3> kWords<DepthNoise>{"none", "d405", "d435"};
+enum class ClipNear { kNone, kModel };
+template <>
+inline constexpr std::array<std::string_view, 2> kWords<ClipNear>{"none", "model"};
+enum class CameraRenderer { kRays, kOpenGl };
+template <>
+inline constexpr std::array<std::string_view, 2> kWords<CameraRenderer>{"rays", "opengl"};
+
+inline constexpr std::array<std::string_view, 8> kCameraDataTypes{
+    "rgb",     "depth",       "segmentation", "body_segmentation", "entity_segmentation",
+    "normals", "point_cloud", "flow"};
 
 struct CameraSensorCfg : SensorCfg {
-  std::string camera_name;  // an existing camera (full name); empty: a new camera called `name`
-  std::string parent_body;  // of a new camera, full name; empty: the world
-  std::array<double, 3> pos{0, 0, 1};  // m, in the parent body
+  std::string camera_name;
+  std::string parent_body;
+  std::array<double, 3> pos{0, 0, 1};
   std::array<double, 4> quat{1, 0, 0, 0};
-  // Degrees (orthographic: height of the image, m). Not given: the camera's own, 45 for a new one.
-  // Of a wrapped camera it is this sensor's alone, as is `orthographic`: others that look through
-  // it, and the model, keep theirs.
   std::optional<double> fovy;
-  int width = 160, height = 120;  // pixels; the model's own resolution is not used
-  // Of rgb depth segmentation body_segmentation entity_segmentation normals point_cloud flow.
+  int width = 160, height = 120;
   std::vector<std::string> data_types{"rgb"};
   bool use_textures = true;
   bool use_shadows = false;
   std::vector<int> enabled_geom_groups{0, 1, 2};
   bool orthographic = false;
-  bool clone_data = false;  // Python only: a copy at every read
+  bool clone_data = false;  // read by Python
 
   // Beyond mjlab's.
-  // Sites and tendons that are drawn, as MuJoCo's visualiser does: none unless groups (0 to 5) are given.
   std::vector<int> enabled_site_groups, enabled_tendon_groups;
-  // Of the lights that are on, the headlight first, so many shine, 0 to 32. MuJoCo's OpenGL has 8.
   int max_lights = 8;
-  double near = 0, far = 0;  // m, planar; what is nearer or farther is not seen; far 0: no limit
-  std::string clip_near = "none";  // none; model: near is where MuJoCo clips, its znear x extent
-  // s. An image is taken at the first control step at or after phase + k * update_period.
+  double near = 0, far = 0;
+  Word<ClipNear> clip_near;
   double update_period = 0, phase = 0;
-  int samples = 1;                    // per pixel of rgb, for anti-aliased edges, 1 to 64
-  std::string depth_kind = "planar";  // planar ray
+  int samples = 1;
+  Word<DepthKind> depth_kind;
   std::optional<CameraIntrinsics> intrinsics;
   LensDistortion distortion;
-  std::string depth_noise = "none";  // none d405 d435: on the field depth only (depth_noise.h)
-  std::string renderer = "rays";     // rays opengl (MuJoCo's own renderer, where it was built in)
+  Word<DepthNoise> depth_noise;
+  Word<CameraRenderer> renderer;
   bool debug_vis = false;
   CameraVizCfg viz;
 
   std::unique_ptr<Sensor> build() const override;
 };
+template <class V>
+void visit_fields(V& v, CameraSensorCfg& c) {
+  v.object("CameraSensorCfg",
+           "A camera of the model (``camera_name``), or a new one. ``data`` is a "
+           ":class:`mjsense.CameraData`.",
+           "camera");
+  v.extends(static_cast<SensorCfg&>(c));
+  v("camera_name", c.camera_name,
+    "Full name of an existing camera, ``robot/wrist``; without one: a new camera called as the "
+    "sensor.")
+      .or_none();
+  v("parent_body", c.parent_body,
+    "Full name of the body that carries a new camera; the world without one.")
+      .or_none();
+  v("pos", c.pos, "Of a new camera in the parent body.").unit("m");
+  v("quat", c.quat,
+    "wxyz, of a new camera in the parent body: x right, y up, looking along -z.");
+  v("fovy", c.fovy,
+    "Vertical, degrees; orthographic: height of the image, m. None: the camera's own, 45 for a new "
+    "one. Beside ``camera_name`` it is this sensor's alone.")
+      .positive();
+  v("width", c.width, "The resolution in the MJCF plays no part.").unit("pixels").within(1, 16384);
+  v("height", c.height, "Likewise.").unit("pixels").within(1, 16384);
+  v("data_types", c.data_types, "Which fields there are.").one_of(kCameraDataTypes).not_empty();
+  v("use_textures", c.use_textures, "Textures of materials, and the skybox.");
+  v("use_shadows", c.use_shadows, "Of lights that cast them.");
+  v("enabled_geom_groups", c.enabled_geom_groups, "Groups (0 to 5) that are seen.")
+      .within(0, 5)
+      .not_empty();
+  v("orthographic", c.orthographic,
+    "Parallel rays. Beside ``camera_name`` it is this sensor's alone.");
+  v("clone_data", c.clone_data, "``data`` is a copy at every read.");
+  v("enabled_site_groups", c.enabled_site_groups,
+    "Groups (0 to 5) of sites that are drawn, as MuJoCo draws them.")
+      .within(0, 5);
+  v("enabled_tendon_groups", c.enabled_tendon_groups,
+    "Groups (0 to 5) of tendons that are drawn, as MuJoCo draws them.")
+      .within(0, 5);
+  v("max_lights", c.max_lights,
+    "Of the lights that are on, the headlight first, so many shine. MuJoCo's OpenGL has 8.")
+      .within(0, 32);
+  v("near", c.near, "From the camera plane; what is nearer is not seen.").unit("m").at_least(0);
+  v("far", c.far, "From the camera plane; what is farther is not seen; 0: no limit.")
+      .unit("m")
+      .at_least(0)
+      .may_be_infinite();
+  v("clip_near", c.clip_near,
+    "model: ``near`` is where MuJoCo's renderers clip, ``visual/map/znear`` times the model's "
+    "extent.");
+  v("update_period", c.update_period, "Between images; 0: at every read.")
+      .unit("s")
+      .within(0, 1e6);  // more would be a mistake, and physics steps are counted in whole numbers
+  v("phase", c.phase,
+    "Images are taken at the first control step at or after phase + k * update_period, and at a "
+    "reset.")
+      .unit("s")
+      .within(0, 1e6);
+  v("samples", c.samples, "Per pixel of rgb, for smooth edges.").within(1, 64);
+  v("depth_kind", c.depth_kind,
+    "planar: distance to the camera plane; ray: along the pixel's ray.");
+  v("intrinsics", c.intrinsics, "Instead of fovy and of what the MJCF says.");
+  v("distortion", c.distortion, "Of the lens; the image is as distorted as the lens leaves it.");
+  v("depth_noise", c.depth_noise,
+    "What these stereo cameras make of ``depth``; the other fields stay exact.");
+  v("renderer", c.renderer, "opengl: MuJoCo's own renderer, where it was built in.");
+  v("debug_vis", c.debug_vis, "Drawn by ``Simulation.draw(scene)`` unasked.");
+  v("viz", c.viz, "How it is drawn.");
+}
 
 }  // namespace mjsense

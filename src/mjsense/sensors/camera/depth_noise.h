@@ -10,6 +10,7 @@
 #include <string_view>
 
 #include "mjsense/core/rng.h"
+#include "mjsense/sensors/camera/camera_sensor_cfg.h"
 
 namespace mjsense {
 
@@ -23,8 +24,7 @@ struct StereoCamera {
   double grazing_slope;      // tangent of the angle between its normal and the pixel's ray
 };
 
-// "d405" or "d435".
-StereoCamera stereo_preset(std::string_view name);
+StereoCamera stereo_preset(DepthNoise noise);
 
 // depth [height, width] planar m, in place, 0 where nothing is; fx in image pixels; scratch as long
 // as depth.

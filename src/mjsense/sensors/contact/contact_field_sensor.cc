@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <utility>
 
+#include "mjsense/sensors/contact/contact_data.h"
 #include "mjsense/sensors/contact/contact_fields.h"
 
 namespace mjsense {
@@ -18,9 +19,11 @@ ContactFieldSensor::ContactFieldSensor(ContactSensor* owner, int primary, std::s
 
 void ContactFieldSensor::initialize(const SensorInit& init) {
   clear_fields();
-  SensorSpec spec = contact_field_spec(field_, /*world_axes=*/owner_->cfg().reduce == "netforce");
-  const std::int64_t dim = spec.shape.size();
-  spec.shape = {owner_->cfg().num_slots * dim};
+  const bool net = owner_->cfg().reduce == ContactReduce::kNetForce;
+  const std::int64_t dim = field_ == "found" || field_ == "dist" ? 1 : 3;
+  SensorSpec spec = kContactData.spec(field_, {owner_->cfg().num_slots * dim},
+                                      contact_field_frame(field_, net));
+  if (field_ == "found") spec.low = 0.0;
   add_field("", std::move(spec), init.num_worlds);
 }
 

@@ -3,51 +3,14 @@
 #include <cstddef>
 #include <utility>
 
-#include "mjsense/core/error.h"
 
 namespace mjsense {
 
-const std::vector<std::string>& contact_fields() {
-  static const std::vector<std::string> kFields = {"found", "force",  "torque", "dist",
-                                                   "pos",   "normal", "tangent"};
-  return kFields;
-}
-
-SensorSpec contact_spec(Shape shape, DType dtype, std::string unit, std::string frame,
-                        std::string description) {
-  SensorSpec spec;
-  spec.dtype = dtype;
-  spec.shape = shape;
-  spec.unit = std::move(unit);
-  spec.frame = std::move(frame);
-  spec.description = std::move(description);
-  return spec;
-}
-
-SensorSpec contact_field_spec(std::string_view field, bool world_axes) {
-  const std::string axes = world_axes ? "world" : "contact";
-  SensorSpec s;
-  if (field == "found") {
-    s = contact_spec({}, DType::kFloat32, "", "",
-                     "Number of matching contacts, 0 in an empty slot.");
-    s.low = 0.0;
-  } else if (field == "force") {
-    s = contact_spec({3}, DType::kFloat32, "N", axes, "Force of the primary on the other side.");
-  } else if (field == "torque") {
-    s = contact_spec({3}, DType::kFloat32, "N m", axes, "Torque of the primary on the other side.");
-  } else if (field == "dist") {
-    s = contact_spec({}, DType::kFloat32, "m", "", "Signed distance, negative in penetration.");
-  } else if (field == "pos") {
-    s = contact_spec({3}, DType::kFloat32, "m", "world", "Contact point.");
-  } else if (field == "normal") {
-    s = contact_spec({3}, DType::kFloat32, "", "world", "Unit normal, from the primary outwards.");
-  } else if (field == "tangent") {
-    s = contact_spec({3}, DType::kFloat32, "", "world",
-                     "Unit vector of the contact frame's y axis.");
-  } else {
-    throw_unknown("contact sensor", "field", field, contact_fields());
-  }
-  return s;
+std::string contact_field_frame(std::string_view field, bool world_axes) {
+  if (field.starts_with("pos") || field.starts_with("normal") || field.starts_with("tangent"))
+    return field == "normal_force" ? contact_field_frame("force", world_axes) : "world";
+  if (field.find("force") == field.npos && field.find("torque") == field.npos) return "";
+  return world_axes ? "world" : "contact";
 }
 
 namespace {

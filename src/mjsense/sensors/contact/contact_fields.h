@@ -10,12 +10,6 @@
 
 namespace mjsense {
 
-// The seven that may be asked for: found force torque dist pos normal tangent.
-const std::vector<std::string>& contact_fields();
-
-// Of one slot, [] or [3]; world_axes: of force and torque. KeyError if unknown.
-SensorSpec contact_field_spec(std::string_view field, bool world_axes);
-
 // Index of the first value of a field (also normal_force, friction_force) in a ContactReading seen as
 // doubles; -1 for found, which is not in it.
 int contact_field_offset(std::string_view field);
@@ -24,7 +18,7 @@ inline const double* contact_values(const ContactReading& reading, int offset) {
   return reinterpret_cast<const double*>(&reading) + offset;
 }
 
-SensorSpec contact_spec(Shape shape, DType dtype, std::string unit, std::string frame,
-                        std::string description);
+// Frame of a field's rows; world_axes: of force and torque.
+std::string contact_field_frame(std::string_view field, bool world_axes);
 
 }  // namespace mjsense

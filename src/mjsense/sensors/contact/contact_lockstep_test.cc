@@ -35,10 +35,11 @@ std::shared_ptr<Scene> make_scene() {
   entity.model.xml = kHeap;
   cfg.entities.emplace_back("heap", entity);
   cfg.terrain = TerrainCfg{};
-  for (const char* reduce : {"none", "mindist", "maxforce", "netforce"}) {
+  for (std::size_t i = 0; i < kWords<ContactReduce>.size(); ++i) {
+    const auto reduce = static_cast<ContactReduce>(i);
     for (bool memory : {false, true}) {
       ContactSensorCfg c;
-      c.name = std::string(reduce) + (memory ? "_memory" : "");
+      c.name = std::string(word(reduce)) + (memory ? "_memory" : "");
       c.primary = {"body", {".*"}, "heap", {}};
       c.fields = {"found", "force", "torque", "dist", "pos", "normal", "tangent"};
       c.reduce = reduce;

@@ -5,7 +5,6 @@
 #include <algorithm>
 #include <unordered_map>
 
-#include "mjsense/core/checks.h"
 #include "mjsense/core/error.h"
 #include "mjsense/core/match.h"
 
@@ -19,7 +18,7 @@ std::vector<std::string> labels_of(const std::vector<ContactObject>& objects) {
 }
 
 std::string_view kind_of(const ContactMatch& match) {
-  return match.mode == "geom" ? "geom" : "body";
+  return match.mode == ContactMode::kGeom ? "geom" : "body";
 }
 
 void drop_excluded(std::string_view place, const ContactMatch& match,
@@ -36,13 +35,11 @@ void drop_excluded(std::string_view place, const ContactMatch& match,
 }  // namespace
 
 void validate(const ContactMatch& match, std::string_view place) {
-  constexpr std::string_view kModes[] = {"geom", "body", "subtree"};
-  require_word(match.mode, kModes, place, "mode");
   if (match.pattern.empty()) throw ValueError(fmt::format("{}: no pattern is given", place));
   for (const std::string& pattern : match.pattern) {
     if (pattern.empty()) throw ValueError(fmt::format("{}: a pattern is empty", place));
     // The subtree of a secondary has a literal name.
-    if (!match.entity.empty() && match.mode != "subtree") Regex(pattern, place);
+    if (!match.entity.empty() && match.mode != ContactMode::kSubtree) Regex(pattern, place);
   }
   Exclude(match.exclude, place);
 }
@@ -54,10 +51,10 @@ void validate_primary(const ContactMatch& match, std::string_view place) {
   }
 }
 
-void validate_secondary(const ContactMatch& match, std::string_view policy,
-                        std::string_view place) {
+void validate_secondary(const ContactMatch& match, ContactPolicy policy, std::string_view place) {
   validate(match, place);
-  if (policy != "each" && policy != "any" && match.pattern.size() != 1) {
+  if (policy != ContactPolicy::kEach && policy != ContactPolicy::kAny &&
+      match.pattern.size() != 1) {
     throw ValueError(
         fmt::format("{}: {} patterns: must be a single name (policy 'each' takes several)", place,
                     match.pattern.size()));
@@ -92,7 +89,7 @@ ContactNames::ContactNames(mjSpec* spec) {
 }
 
 const std::vector<ContactNames::Element>& ContactNames::elements(const ContactMatch& match) const {
-  return match.mode == "geom" ? geoms_ : bodies_;
+  return match.mode == ContactMode::kGeom ? geoms_ : bodies_;
 }
 
 bool ContactNames::in_terrain(int body) const {
@@ -177,14 +174,14 @@ std::vector<ContactObject> ContactNames::primaries(std::string_view sensor,
 
 std::vector<ContactObject> ContactNames::secondaries(std::string_view sensor,
                                                      const ContactMatch& match,
-                                                     std::string_view policy) const {
+                                                     ContactPolicy policy) const {
   const std::string place = fmt::format("sensor '{}': secondary", sensor);
   validate_secondary(match, policy, place);
-  if (policy == "each") {
+  if (policy == ContactPolicy::kEach) {
     return match.entity.empty() ? literal(place, match) : by_regex(place, match);
   }
   if (match.entity.empty()) return literal(place, match);
-  if (match.mode == "subtree") {  // a literal name in the peer, and so here
+  if (match.mode == ContactMode::kSubtree) {  // a literal name in the peer, and so here
     const std::vector<ContactObject> all = of_entity(place, match);
     std::vector<ContactObject> result;
     for (const ContactObject& o : all) {
@@ -195,7 +192,7 @@ std::vector<ContactObject> ContactNames::secondaries(std::string_view sensor,
     return result;
   }
   std::vector<ContactObject> result = by_regex(place, match);
-  if (result.size() > 1 && policy == "error") {
+  if (result.size() > 1 && policy == ContactPolicy::kError) {
     throw ValueError(fmt::format("{}: '{}' matches {} names: {}", place, match.pattern[0],
                                  result.size(), fmt::join(labels_of(result), ", ")));
   }

@@ -7,23 +7,46 @@
 #include <string_view>
 #include <vector>
 
+#include "mjsense/core/fields.h"
+
 namespace mjsense {
+
+enum class ContactMode { kGeom, kBody, kSubtree };
+template <>
+inline constexpr std::array<std::string_view, 3> kWords<ContactMode>{"geom", "body", "subtree"};
+
+enum class ContactPolicy { kFirst, kError, kAny, kEach };
+template <>
+inline constexpr std::array<std::string_view, 4> kWords<ContactPolicy>{"first", "error", "any",
+                                                                       "each"};
 
 // With an entity, each pattern is a regular expression (Python's meaning) for the whole local name;
 // the result is in model order. Without one, patterns are full MuJoCo names, in the given order.
 struct ContactMatch {
-  std::string mode = "geom";         // geom, body, or subtree: a body and everything below it
-  std::vector<std::string> pattern;  // each must match something, and no name two of them
-  std::string entity;                // "" for full names
-  // With an entity: names left out. An entry with a regex character is searched anywhere in the
-  // name, another must equal it.
+  Word<ContactMode> mode;
+  std::vector<std::string> pattern;
+  std::string entity;
   std::vector<std::string> exclude;
 };
+template <class V>
+void visit_fields(V& v, ContactMatch& c) {
+  v.object("ContactMatch", "Which geoms or bodies take part in a contact.").frozen();
+  v("mode", c.mode, "A subtree is a body and all its descendants.").required();
+  v("pattern", c.pattern,
+    "With an entity: regular expressions that must match a whole local name. Without: full MuJoCo "
+    "names, literally. Each must match something, and no name two of them.")
+      .required()
+      .or_one();
+  v("entity", c.entity, "Whose names these are.").or_none();
+  v("exclude", c.exclude,
+    "With an entity: names to leave out; one with any of ``.*+?[]{}()\\|^$`` is a regular "
+    "expression that is searched.");
+}
 
 // Throw ValueError for what is wrong in any model. `place` starts the message: "sensor 'feet': primary".
 void validate(const ContactMatch& match, std::string_view place);
 void validate_primary(const ContactMatch& match, std::string_view place);
-void validate_secondary(const ContactMatch& match, std::string_view policy, std::string_view place);
+void validate_secondary(const ContactMatch& match, ContactPolicy policy, std::string_view place);
 
 // One matched geom, body or subtree.
 struct ContactObject {
@@ -42,7 +65,7 @@ class ContactNames {
   std::vector<ContactObject> primaries(std::string_view sensor, const ContactMatch& match) const;
   // policy: first, error, or each (several patterns, every match).
   std::vector<ContactObject> secondaries(std::string_view sensor, const ContactMatch& match,
-                                         std::string_view policy) const;
+                                         ContactPolicy policy) const;
 
  private:
   struct Element {

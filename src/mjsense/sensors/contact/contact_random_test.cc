@@ -23,8 +23,9 @@ int below(Random& r, int n) { return std::uniform_int_distribution<int>(0, n - 1
 
 const std::vector<std::string> kAll = {"found", "force",  "torque", "dist",
                                        "pos",   "normal", "tangent"};
-const char* const kModes[] = {"geom", "body", "subtree"};
-const char* const kReduces[] = {"none", "mindist", "maxforce", "netforce"};
+constexpr ContactMode kModes[] = {ContactMode::kGeom, ContactMode::kBody, ContactMode::kSubtree};
+constexpr ContactReduce kReduces[] = {ContactReduce::kNone, ContactReduce::kMinDist,
+                                      ContactReduce::kMaxForce, ContactReduce::kNetForce};
 
 struct Heap {
   std::string xml;
@@ -97,13 +98,13 @@ ContactSensorCfg random_cfg(Random& r, const Heap& heap, int index) {
 std::string mujoco_sensors(const ContactSensorCfg& cfg) {
   std::string xml;
   for (std::size_t p = 0; p < cfg.primary.pattern.size(); ++p) {
-    xml += fmt::format(R"(<contact name="{}_{}" {}1="{}" )", cfg.name, p, cfg.primary.mode,
+    xml += fmt::format(R"(<contact name="{}_{}" {}1="{}" )", cfg.name, p, cfg.primary.mode.text(),
                        cfg.primary.pattern[p]);
     if (cfg.secondary)
-      xml += fmt::format(R"({}2="{}" )", cfg.secondary->mode, cfg.secondary->pattern[0]);
+      xml += fmt::format(R"({}2="{}" )", cfg.secondary->mode.text(), cfg.secondary->pattern[0]);
     xml +=
         fmt::format(R"(num="{}" reduce="{}" data="found force torque dist pos normal tangent"/>)",
-                    cfg.num_slots, cfg.reduce);
+                    cfg.num_slots, cfg.reduce.text());
   }
   return xml;
 }
@@ -148,7 +149,8 @@ void expect_equal_to_mujoco(ContactSensor& sensor, const Model& model) {
         const int dim = static_cast<int>(row.size()) / (P * K);
         for (int i = 0; i < dim; ++i, ++native) {
           ASSERT_NEAR(row[(p * K + k) * dim + i], *native, 1e-6 * std::max(1.0, std::abs(*native)))
-              << name << " " << sensor.cfg().reduce << " " << sensor.cfg().primary.mode << " slot "
+              << name << " " << sensor.cfg().reduce.text() << " "
+              << sensor.cfg().primary.mode.text() << " slot "
               << k << " " << field << "[" << i << "] of " << model.d->ncon << " contacts";
         }
       }
@@ -188,20 +190,20 @@ TEST(ContactRandom, EveryFieldModeAndReductionIsMuJoCos) {
 
 // ---- what MuJoCo does not have
 
-bool belongs(const mjModel* m, int geom, const std::string& mode, const std::string& name) {
+bool belongs(const mjModel* m, int geom, ContactMode mode, const std::string& name) {
   if (geom < 0) return false;
-  if (mode == "geom") return geom == mj_name2id(m, mjOBJ_GEOM, name.c_str());
+  if (mode == ContactMode::kGeom) return geom == mj_name2id(m, mjOBJ_GEOM, name.c_str());
   const int object = mj_name2id(m, mjOBJ_BODY, name.c_str());
   for (int body = m->geom_bodyid[geom];; body = m->body_parentid[body]) {
     if (body == object) return true;
-    if (mode == "body" || body == 0) return false;
+    if (mode == ContactMode::kBody || body == 0) return false;
   }
 }
 
 // One element of the matrix by its definition: +1 if the contact is the primary's with the secondary
 // as geom 2, -1 as geom 1, the first where it is both; 0 if it is none of theirs.
-int direction(const mjModel* m, const mjContact& c, const std::string& primary_mode,
-              const std::string& primary, const std::string& secondary_mode,
+int direction(const mjModel* m, const mjContact& c, ContactMode primary_mode,
+              const std::string& primary, ContactMode secondary_mode,
               const std::string& secondary) {
   for (int side : {0, 1}) {
     if (belongs(m, c.geom[side], primary_mode, primary) &&
@@ -220,8 +222,8 @@ struct PairCounts {
 void expect_pairs_of_brute_force(ContactSensor& sensor, const Model& model,
                                  const std::vector<std::string>& primaries,
                                  const std::vector<std::string>& secondaries, PairCounts& counts) {
-  const std::string& mode = sensor.cfg().primary.mode;
-  const std::string& other_mode = sensor.cfg().secondary->mode;
+  const ContactMode mode = sensor.cfg().primary.mode;
+  const ContactMode other_mode = sensor.cfg().secondary->mode;
   const auto found = sensor.field("pair_found").data.row<float>(0);
   const auto force = sensor.field("pair_force").data.row<float>(0);
   const std::size_t S = secondaries.size();
@@ -337,9 +339,9 @@ TEST(ContactRandom, SecondariesWithExcludesMatchBruteForce) {
     // One name as it is, and every name that ends in a random digit.
     const std::string one = geoms ? "g1" : "b1", digit = std::to_string(below(r, 10));
     cfg.secondary->exclude = {one, digit + "$"};
-    const auto names = [&](const std::string& mode, bool with_excludes) {
+    const auto names = [&](ContactMode mode, bool with_excludes) {
       std::vector<std::string> result;
-      const bool of_geoms = mode == "geom";
+      const bool of_geoms = mode == ContactMode::kGeom;
       for (int id = 0; id < (of_geoms ? model.m->ngeom : model.m->nbody); ++id) {
         const std::string name = mj_id2name(model.m, of_geoms ? mjOBJ_GEOM : mjOBJ_BODY, id);
         if (!name.starts_with("e/")) continue;

@@ -10,27 +10,19 @@
 namespace mjsense {
 namespace {
 
-bool belongs(const mjModel* m, int geom, std::string_view mode, int id) {
-  if (mode == "geom") return geom == id;
+bool belongs(const mjModel* m, int geom, ContactMode mode, int id) {
+  if (mode == ContactMode::kGeom) return geom == id;
   int body = m->geom_bodyid[geom];
-  if (mode == "body") return body == id;
+  if (mode == ContactMode::kBody) return body == id;
   while (body > id) body = m->body_parentid[body];  // a parent's id is smaller than its child's
   return body == id;
 }
 
 }  // namespace
 
-ContactReduce contact_reduce_from_name(std::string_view name, std::string_view place) {
-  static const std::vector<std::string> kNames = {"none", "mindist", "maxforce", "netforce"};
-  for (std::size_t i = 0; i < kNames.size(); ++i) {
-    if (kNames[i] == name) return static_cast<ContactReduce>(i);
-  }
-  throw_unknown(place, "reduce", name, kNames);
-}
-
 ContactReducer::Lists ContactReducer::lists_of(const mjModel* m,
                                                const std::vector<ContactObject>& objects,
-                                               std::string_view mode) {
+                                               ContactMode mode) {
   Lists lists;
   for (int g = 0; g < m->ngeom; ++g) {
     lists.begin.push_back(static_cast<int>(lists.values.size()));

@@ -16,7 +16,9 @@
 namespace mjsense {
 
 enum class ContactReduce { kNone, kMinDist, kMaxForce, kNetForce };
-ContactReduce contact_reduce_from_name(std::string_view name, std::string_view place);  // KeyError
+template <>
+inline constexpr std::array<std::string_view, 4> kWords<ContactReduce>{"none", "mindist",
+                                                                       "maxforce", "netforce"};
 
 // mj_contactForce, without the call for contacts that are plain constraints: force and torque in the
 // contact frame. A pyramid's edges come in pairs, one pair for each friction direction.
@@ -84,7 +86,7 @@ class ContactReducer {
  public:
   struct Config {
     std::vector<ContactObject> primaries, secondaries;  // no secondaries: contacts with anything
-    std::string_view primary_mode, secondary_mode;
+    ContactMode primary_mode{}, secondary_mode{};
     ContactReduce reduce = ContactReduce::kMaxForce;
     int num_slots = 1;
     bool keep_peak = false;   // also the strongest of all contacts, whatever `reduce` selects
@@ -137,7 +139,7 @@ class ContactReducer {
     return {lists.values.data() + lists.begin[geom], lists.values.data() + lists.begin[geom + 1]};
   }
   static Lists lists_of(const mjModel* model, const std::vector<ContactObject>& objects,
-                        std::string_view mode);
+                        ContactMode mode);
   void insert(ContactRef* slots, int filled, const ContactRef& ref) const;
   void add_to_sum(ContactSum& sum, bool is_first, PassContact& contact, int sign) const;
   // had: secondaries that this contact is not new to.

@@ -11,6 +11,7 @@
 #include "mjsense/core/error.h"
 #include "mjsense/scene/scene.h"
 #include "mjsense/sensors/contact/contact_field_sensor.h"
+#include "mjsense/sensors/contact/contact_data.h"
 #include "mjsense/sensors/contact/contact_fields.h"
 #include "mjsense/sensors/contact/contact_pass.h"
 
@@ -57,7 +58,7 @@ void ContactSensor::edit_spec(mjSpec* spec) {
   const ContactNames names(spec);
   primary_names_ = labels_of(names.primaries(name(), cfg_.primary));
   secondary_names_.clear();
-  if (cfg_.secondary && cfg_.secondary_policy != "any") {
+  if (cfg_.secondary && cfg_.secondary_policy != ContactPolicy::kAny) {
     secondary_names_ = labels_of(names.secondaries(name(), *cfg_.secondary, cfg_.secondary_policy));
   }
 }
@@ -77,17 +78,17 @@ void ContactSensor::initialize(const SensorInit& init) {
   ContactReducer::Config config;
   config.primaries = names.primaries(name(), cfg_.primary);
   config.primary_mode = cfg_.primary.mode;
-  if (cfg_.secondary && cfg_.secondary_policy != "any") {
+  if (cfg_.secondary && cfg_.secondary_policy != ContactPolicy::kAny) {
     config.secondaries = names.secondaries(name(), *cfg_.secondary, cfg_.secondary_policy);
     config.secondary_mode = cfg_.secondary->mode;
   }
-  config.reduce = contact_reduce_from_name(cfg_.reduce, name());
+  config.reduce = cfg_.reduce;
   if (config.reduce == ContactReduce::kMaxForce && needs() < mjSTAGE_ACC) {
     config.reduce = ContactReduce::kNone;  // nobody sees which contacts the slots hold
   }
   config.num_slots = cfg_.num_slots;
   config.keep_peak = cfg_.latch;
-  config.keep_pairs = cfg_.secondary_policy == "each";
+  config.keep_pairs = cfg_.secondary_policy == ContactPolicy::kEach;
   primary_names_ = labels_of(config.primaries);
   secondary_names_ = labels_of(config.secondaries);
   reducer_ = ContactReducer(init.model, init.num_worlds, config);
@@ -130,85 +131,66 @@ void ContactSensor::add_outputs(const SensorInit& init) {
   const std::int64_t N = P * cfg_.num_slots, H = cfg_.history_length;
   const bool world_axes = cfg_.global_frame || reducer_.is_net();
   const int B = init.num_worlds;
-  const auto add = [&](const char* field, SensorSpec spec) {
-    return &add_field(field, std::move(spec), B);
+  const auto add = [&](const std::string& field, Shape shape) -> Array& {
+    const std::string frame = contact_field_frame(field, world_axes);
+    SensorSpec spec = kContactData.spec(field, shape, frame);
+    if (field == "found") spec.low = 0.0;
+    return add_field(field, std::move(spec), B).data;
   };
-  const auto rows = [&](const char* field, SensorSpec spec) {
-    return Rows<float>(add(field, std::move(spec))->data);
+  const auto rows = [&](const std::string& field, Shape shape) {
+    return Rows<float>(add(field, shape));
   };
+  const auto flags = [&](const std::string& field) { return Rows<bool>(add(field, {P})); };
 
   needs_wrench_ = cfg_.friction_split;
-  for (const std::string& field : cfg_.fields) {
-    SensorSpec spec = contact_field_spec(field, world_axes);
-    const bool vector = spec.shape.rank() == 1;
-    spec.shape = vector ? Shape{N, 3} : Shape{N};
-    outputs_.push_back(
-        {contact_field_offset(field), vector ? 3 : 1, rows(field.c_str(), spec), {}});
+  const auto add_slots = [&](const std::string& field) {
+    const int offset = contact_field_offset(field);
+    const bool vector = field != "found" && field != "dist";
+    outputs_.push_back({offset, vector ? 3 : 1, rows(field, vector ? Shape{N, 3} : Shape{N}), {}});
     needs_wrench_ |= field == "force" || field == "torque";
-  }
+  };
+  for (const std::string& field : cfg_.fields) add_slots(field);
   if (cfg_.friction_split) {
-    const std::string axes = world_axes ? "world" : "contact";
-    const auto part = [&](const char* field, const char* text) {
-      outputs_.push_back({contact_field_offset(field),
-                          3,
-                          rows(field, contact_spec({N, 3}, DType::kFloat32, "N", axes, text)),
-                          {}});
-    };
-    part("normal_force", "Normal part of force.");
-    part("friction_force", "Tangential part of force.");
+    add_slots("normal_force");
+    add_slots("friction_force");
   }
   for (std::size_t i = 0; H > 0 && i < cfg_.fields.size(); ++i) {
-    SensorSpec spec = contact_field_spec(cfg_.fields[i], world_axes);
-    spec.shape = outputs_[i].dim == 3 ? Shape{N, H, 3} : Shape{N, H};
-    spec.description += " The last substeps, newest first.";
-    outputs_[i].history = rows((cfg_.fields[i] + "_history").c_str(), spec);
+    outputs_[i].history =
+        rows(cfg_.fields[i] + "_history", outputs_[i].dim == 3 ? Shape{N, H, 3} : Shape{N, H});
   }
 
   if (cfg_.other_ids) {
-    const auto id = [&](const char* field, const char* text) {
-      Array& data = add(field, contact_spec({N}, DType::kInt32, "", "", text))->data;
+    const auto ids = [&](const char* field) {
+      Array& data = add(field, {N});
       std::ranges::fill(data.all<std::int32_t>(), -1);
       return Rows<std::int32_t>(data);
     };
-    other_geom_ = id("other_geom", "MuJoCo geom id of the other side, -1 if none.");
-    other_body_ = id("other_body", "MuJoCo body id of the other side, -1 if none.");
+    other_geom_ = ids("other_geom");
+    other_body_ = ids("other_body");
   }
-  if (cfg_.secondary_policy == "each") {
-    pair_found_ = rows("pair_found", contact_spec({P, S}, DType::kFloat32, "", "",
-                                                  "Number of contacts of primary and secondary."));
-    pair_force_ = rows("pair_force", contact_spec({P, S, 3}, DType::kFloat32, "N", "world",
-                                                  "Net force of the primary on the secondary."));
+  if (cfg_.secondary_policy == ContactPolicy::kEach) {
+    pair_found_ = rows("pair_found", {P, S});
+    pair_force_ = rows("pair_force", {P, S, 3});
   }
 
   ContactMemory::Fields m;
-  const auto seconds = [&](const char* field, const char* text) {
-    return rows(field, contact_spec({P}, DType::kFloat32, "s", "", text));
-  };
-  const auto flag = [&](const char* field, const char* text) {
-    return Rows<bool>(add(field, contact_spec({P}, DType::kBool, "", "", text))->data);
-  };
   if (cfg_.track_air_time) {
-    m.current_air = seconds("current_air_time", "Time since the contact was lost.");
-    m.last_air = seconds("last_air_time", "Length of the last phase in the air.");
-    m.current_contact = seconds("current_contact_time", "Time since the contact began.");
-    m.last_contact = seconds("last_contact_time", "Length of the last contact.");
+    m.current_air = rows("current_air_time", {P});
+    m.last_air = rows("last_air_time", {P});
+    m.current_contact = rows("current_contact_time", {P});
+    m.last_contact = rows("last_contact_time", {P});
     if (!contains(cfg_.fields, "found")) m.current_air = {};  // the timers stay 0, as in mjlab
   }
   if (cfg_.track_events) {
-    m.touchdown = flag("touchdown", "A contact began in this control step.");
-    m.liftoff = flag("liftoff", "A contact ended in this control step.");
+    m.touchdown = flags("touchdown");
+    m.liftoff = flags("liftoff");
   }
   if (cfg_.latch) {
-    const std::string axes = world_axes ? "world" : "contact";
-    m.found_any = flag("found_any", "There was a contact in this control step.");
-    m.force_peak = rows("force_peak", contact_spec({P, 3}, DType::kFloat32, "N", axes,
-                                                   "Strongest force of this control step."));
-    m.dist_at_peak = rows("dist_at_peak", contact_spec({P}, DType::kFloat32, "m", "",
-                                                       "Signed distance at the strongest force."));
-    m.pos_at_peak = rows("pos_at_peak", contact_spec({P, 3}, DType::kFloat32, "m", "world",
-                                                     "Contact point of the strongest force."));
-    m.first_touch_time = seconds("first_touch_time",
-                                 "From the start of the control step to its first contact, or -1.");
+    m.found_any = flags("found_any");
+    m.force_peak = rows("force_peak", {P, 3});
+    m.dist_at_peak = rows("dist_at_peak", {P});
+    m.pos_at_peak = rows("pos_at_peak", {P, 3});
+    m.first_touch_time = rows("first_touch_time", {P});
   }
   memory_ = ContactMemory(B, static_cast<int>(P), init.decimation, m);
 }

@@ -16,7 +16,7 @@
 #include <string>
 #include <vector>
 
-#include "mjsense/core/sensor.h"
+#include "mjsense/core/sensor_fields.h"
 #include "mjsense/sensors/contact/contact_match.h"
 #include "mjsense/sensors/contact/contact_memory.h"
 #include "mjsense/sensors/contact/contact_reducer.h"
@@ -25,51 +25,102 @@ namespace mjsense {
 
 class ContactPass;
 
-// What a viewer draws of every contact in a slot. Sizes in units of the model's stat.meansize.
 struct ContactVizCfg {
-  bool show_points = true, show_frames = true;
-  bool show_forces =
-      true;  // the force of the primary on the other: an arrow that ends at the point
-  double force_scale = 0.0;  // m per N; 0: the model's vis.map.force, as MuJoCo's own arrows
+  bool show_points = true, show_frames = true, show_forces = true;
+  double force_scale = 0.0;
   std::array<float, 4> point_color{1, 0.5f, 0, 1};
   std::array<float, 4> force_color{0.9f, 0.1f, 0.9f, 1};
   double point_radius = 0.3, axis_length = 2.0, force_width = 0.3;
 };
-
-void validate(const ContactVizCfg& viz, std::string_view place);
+template <class V>
+void visit_fields(V& v, ContactVizCfg& c) {
+  v.object("ContactVizCfg",
+           "What a viewer draws of every contact in a slot. Colours are rgba, sizes in units of the "
+           "model's ``stat.meansize``.");
+  v("show_points", c.show_points, "A ball at the contact point.");
+  v("show_frames", c.show_frames,
+    "Axes of the contact: x (red) is the normal, from the primary to the secondary.");
+  v("show_forces", c.show_forces,
+    "The force that the primary exerts on the secondary, as an arrow that ends at the contact point.");
+  v("force_scale", c.force_scale,
+    "Length of that arrow; 0: the model's ``vis.map.force``, as MuJoCo's own arrows.")
+      .unit("m/N")
+      .at_least(0);
+  v("point_color", c.point_color, "Of the balls.").within(0, 1);
+  v("force_color", c.force_color, "Of the arrows.").within(0, 1);
+  v("point_radius", c.point_radius, "Of the balls.").at_least(0);
+  v("axis_length", c.axis_length, "Of the axes.").at_least(0);
+  v("force_width", c.force_width, "Of the arrows.").at_least(0);
+}
 
 struct ContactSensorCfg : SensorCfg {
   ContactMatch primary;
-  std::optional<ContactMatch> secondary;  // none: contacts with anything
-  // first: of several matches the first in model order. error: several matches are an error. any:
-  // no filter, `secondary` is not looked at. each: every match, and who touches whom is reported.
-  std::string secondary_policy = "first";
-
-  // Of found force torque dist pos normal tangent; each becomes a field.
+  std::optional<ContactMatch> secondary;
   std::vector<std::string> fields = {"found", "force"};
-  // none: contact-list order. mindist: deepest first. maxforce: strongest first. netforce: one
-  // synthetic contact at the force-weighted centroid, with the net wrench in the world frame.
-  std::string reduce = "maxforce";
-  int num_slots = 1;  // K contacts a primary
-  bool global_frame =
-      false;  // force and torque in world axes; needs normal and tangent among fields
-  bool track_air_time =
-      false;               // needs "found" among fields, without it the timers stay 0 (as in mjlab)
-  int history_length = 0;  // H substeps of every requested field, newest first; <= 0: none
+  Word<ContactReduce> reduce = ContactReduce::kMaxForce;
+  int num_slots = 1;
+  Word<ContactPolicy> secondary_policy;
+  bool track_air_time = false;
+  bool global_frame = false;
+  int history_length = 0;
 
   // Beyond mjlab. All are exact: they look at every substep, and at every contact, not at the
   // slots.
-  bool track_events = false;  // fields touchdown, liftoff
-  bool latch = false;  // fields found_any, force_peak, dist_at_peak, pos_at_peak, first_touch_time
-  bool friction_split = false;  // fields normal_force, friction_force
-  bool other_ids = false;       // fields other_geom, other_body
+  bool track_events = false;
+  bool latch = false;
+  bool friction_split = false;
+  bool other_ids = false;
 
-  bool debug = false;  // prints what was matched
+  bool debug = false;
   bool debug_vis = false;
   ContactVizCfg viz;
 
   std::unique_ptr<Sensor> build() const override;  // throws ValueError or KeyError
 };
+
+inline constexpr std::array<std::string_view, 7> kContactFields{"found", "force",  "torque", "dist",
+                                                                "pos",   "normal", "tangent"};
+
+template <class V>
+void visit_fields(V& v, ContactSensorCfg& c) {
+  v.object("ContactSensorCfg",
+           "Contacts of primaries, optionally with one secondary only. ``data`` is a "
+           ":class:`mjsense.ContactData`.\n\n"
+           "The normal points from the primary to the secondary; forces are what the **primary "
+           "exerts on the secondary**: a box on the floor reads (0, 0, -m g) in the world frame.",
+           "contact");
+  v.extends(static_cast<SensorCfg&>(c));
+  v("primary", c.primary, "Whose contacts these are.").required();
+  v("secondary", c.secondary, "What they are with; without one: with anything.");
+  v("fields", c.fields, "What is measured of each contact.").one_of(kContactFields).not_empty();
+  v("reduce", c.reduce,
+    "Which contacts come first: none: in MuJoCo's order; mindist: the deepest; maxforce: the "
+    "strongest; netforce: one synthetic contact at the force-weighted centroid, with the net wrench "
+    "in the world frame.");
+  v("num_slots", c.num_slots, "S, contacts kept for each primary.").at_least(1);
+  v("secondary_policy", c.secondary_policy,
+    "When several elements match the secondary: first: the first in model order; error: an error; "
+    "any: no filter, the secondary is not looked at; each: every match, and who touches whom is "
+    "reported.");
+  v("track_air_time", c.track_air_time,
+    "Timers of flight and contact; without found among the fields they stay 0, as in mjlab.");
+  v("global_frame", c.global_frame,
+    "Forces and torques in the world frame instead of the contact frame (x = normal); needs normal "
+    "and tangent.");
+  v("history_length", c.history_length,
+    "H, substeps kept of every field, newest first; 0 or less: none.")
+      .at_most(65535);
+  v("track_events", c.track_events,
+    "touchdown and liftoff: exact, also when both happened within one control step.");
+  v("latch", c.latch,
+    "What happened at any time in the control step: found_any, force_peak, dist_at_peak, "
+    "pos_at_peak, first_touch_time.");
+  v("friction_split", c.friction_split, "The fields normal_force and friction_force.");
+  v("other_ids", c.other_ids, "The fields other_geom and other_body.");
+  v("debug", c.debug, "Print what was matched.");
+  v("debug_vis", c.debug_vis, "Drawn by ``Simulation.draw(scene)`` unasked.");
+  v("viz", c.viz, "How it is drawn.");
+}
 
 // Fields (float32 unless said; B worlds, P primaries, K slots, N = P K with index p K + k, S
 // secondaries, H history). A slot without a contact is all zero.

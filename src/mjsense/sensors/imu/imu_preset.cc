@@ -47,23 +47,8 @@ ImuModel imu_preset(const std::string& name) {
 }
 
 void validate(const ImuModel::Axis& a, std::string_view place) {
-  const std::pair<const char*, double> numbers[] = {
-      {"noise_density", a.noise_density},
-      {"scale_tolerance", a.scale_tolerance},
-      {"cross_axis_tolerance", a.cross_axis_tolerance},
-      {"range", a.range},
-      {"resolution", a.resolution},
-      {"bias_drift", a.bias_drift},
-      {"bias_drift_time_s", a.bias_drift_time_s}};
-  for (const auto& [name, value] : numbers) require_not_negative(value, place, name);
-  require_not_negative(a.bias_tolerance, place, "bias_tolerance");
   require(a.bias_drift == 0 || a.bias_drift_time_s > 0, place, "bias_drift_time_s",
           a.bias_drift_time_s, "positive where there is a bias_drift");
-}
-
-void validate(const ImuModel& model, std::string_view place) {
-  validate(model.accelerometer, std::string(place) + ": accelerometer");
-  validate(model.gyroscope, std::string(place) + ": gyroscope");
 }
 
 Effects imu_effects(const ImuModel::Axis& axis) {

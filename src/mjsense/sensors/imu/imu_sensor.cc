@@ -7,6 +7,7 @@
 #include "mjsense/core/checks.h"
 #include "mjsense/core/error.h"
 #include "mjsense/scene/model_sensors/builtin_draw.h"
+#include "mjsense/sensors/imu/imu_data.h"
 
 namespace mjsense {
 namespace {
@@ -33,14 +34,15 @@ std::vector<std::string> site_names(mjSpec* spec) {
 
 std::unique_ptr<Sensor> ImuSensorCfg::build() const {
   const std::string place = sensor_place(name);
-  validate(model, place);
-  validate(effects, place);
+  check_fields(*this, place);
   if (site.name.empty() || (!site.type.empty() && site.type != "site")) {
     throw ValueError(fmt::format("sensor '{}': needs a site, not {} '{}'", name,
                                  site.type.empty() ? "object" : site.type, site.name));
   }
   return std::make_unique<ImuSensor>(*this);
 }
+
+SensorKind imu_kind() { return sensor_kind<ImuSensorCfg>(&kImuData); }
 
 ImuSensor::ImuSensor(ImuSensorCfg cfg) : Sensor(cfg.name), cfg_(std::move(cfg)) {
   try {
@@ -67,19 +69,14 @@ void ImuSensor::initialize(const SensorInit& init) {
   parts_.clear();
   eager_ = false;
   const std::string frame = "site " + cfg_.site.full_name();
-  const auto add = [&](const char* part, int size, const char* unit, const std::string& axes,
-                       const char* text, Effects effects) {
+  const auto add = [&](const char* part, int size, const std::string& axes, Effects effects) {
     const int id = mj_name2id(init.model, mjOBJ_SENSOR, mujoco_name(part).c_str());
     if (id < 0) {
       throw ValueError(
           fmt::format("sensor '{}': the model has no sensor '{}'", name(), mujoco_name(part)));
     }
     if (parts_.empty()) accelerometer_ = id;
-    SensorSpec spec;
-    spec.shape = {size};
-    spec.unit = unit;
-    spec.frame = axes;
-    spec.description = text;
+    SensorSpec spec = kImuData.spec(part, {size}, axes);
     const double tick_s = init.model->opt.timestep;
     EffectChainCfg chain_cfg;
     chain_cfg.effects = std::move(effects);
@@ -95,12 +92,9 @@ void ImuSensor::initialize(const SensorInit& init) {
     effects.insert(effects.end(), cfg_.effects.begin(), cfg_.effects.end());
     return effects;
   };
-  add("acc", 3, "m/s^2", frame, "Specific force: +9.81 along up at rest.",
-      device(model_.accelerometer));
-  add("gyro", 3, "rad/s", frame, "Angular velocity.", device(model_.gyroscope));
-  if (cfg_.orientation) {
-    add("quat", 4, "", "world", "Orientation of the site, wxyz, without errors.", {});
-  }
+  add("acc", 3, frame, device(model_.accelerometer));
+  add("gyro", 3, frame, device(model_.gyroscope));
+  if (cfg_.orientation) add("quat", 4, "world", {});
 }
 
 void ImuSensor::compute(const World& world) {

@@ -6,7 +6,8 @@
 #include <string>
 #include <vector>
 
-#include "mjsense/core/sensor.h"
+#include "mjsense/core/sensor_fields.h"
+#include "mjsense/effects/all_effects.h"
 #include "mjsense/effects/chain.h"
 #include "mjsense/scene/entity.h"
 
@@ -16,17 +17,38 @@ namespace mjsense {
 // devices, drawn anew for each episode; what a sheet does not give is 0.
 struct ImuModel {
   struct Axis {
-    double noise_density = 0.0;              // unit / sqrt(Hz)
-    std::array<double, 3> bias_tolerance{};  // unit, x y z
-    double scale_tolerance = 0.0;            // 1
-    double cross_axis_tolerance = 0.0;       // 1
-    double range = 0.0;                      // unit, +-; 0: unlimited
-    double resolution = 0.0;                 // unit, of one count; 0: continuous
-    double bias_drift = 0.0;                 // unit, standard deviation of a Gauss-Markov bias
+    double noise_density = 0.0;
+    std::array<double, 3> bias_tolerance{};
+    double scale_tolerance = 0.0;
+    double cross_axis_tolerance = 0.0;
+    double range = 0.0;
+    double resolution = 0.0;
+    double bias_drift = 0.0;
     double bias_drift_time_s = 0.0;
   };
-  Axis accelerometer, gyroscope;  // m/s^2, rad/s
+  Axis accelerometer, gyroscope;
 };
+template <class V>
+void visit_fields(V& v, ImuModel::Axis& c) {
+  v.object("ImuAxis",
+           "Half of a device, in m/s^2 or rad/s. Tolerances are three standard deviations, drawn "
+           "anew for each episode.")
+      .frozen();
+  v("noise_density", c.noise_density, "White noise.").unit("unit/sqrt(Hz)").at_least(0);
+  v("bias_tolerance", c.bias_tolerance, "Turn-on bias of x, y, z.").unit("unit").at_least(0);
+  v("scale_tolerance", c.scale_tolerance, "Error of scale.").at_least(0);
+  v("cross_axis_tolerance", c.cross_axis_tolerance, "What an axis sees of the others.").at_least(0);
+  v("range", c.range, "Values are limited to +-range; 0: unlimited.").unit("unit").at_least(0);
+  v("resolution", c.resolution, "Of one count; 0: continuous.").unit("unit").at_least(0);
+  v("bias_drift", c.bias_drift, "Standard deviation of a Gauss-Markov bias.").unit("unit").at_least(0);
+  v("bias_drift_time_s", c.bias_drift_time_s, "Its time constant.").at_least(0);
+}
+template <class V>
+void visit_fields(V& v, ImuModel& c) {
+  v.object("ImuModel", "What a data sheet says of a device; what it does not say is 0.").frozen();
+  v("accelerometer", c.accelerometer, "In m/s^2.");
+  v("gyroscope", c.gyroscope, "In rad/s.");
+}
 
 // Presets:
 //   ideal       no errors
@@ -41,20 +63,38 @@ ImuModel imu_preset(const std::string& name);
 
 // Throw ValueError.
 void validate(const ImuModel::Axis& axis, std::string_view place);
-void validate(const ImuModel& model, std::string_view place);
 
 // The effects of one half of a device, in the order of its signal path: axes, bias, noise, range, counts.
 Effects imu_effects(const ImuModel::Axis& axis);
 
+inline constexpr std::array<std::string_view, 4> kImuPresets{"ideal", "mpu6050", "icm42688p", ""};
+
 struct ImuSensorCfg : SensorCfg {
-  ObjRef site;  // type "site" (or empty)
+  ObjRef site;
   std::string preset = "ideal";
-  ImuModel model;            // used if preset is ""
-  bool orientation = false;  // also field "quat", without errors
-  Effects effects;  // after those of the device, on acc and gyro alike: delay, rate, dropout
+  ImuModel model;
+  bool orientation = false;
+  Effects effects;
 
   std::unique_ptr<Sensor> build() const override;
 };
+template <class V>
+void visit_fields(V& v, ImuSensorCfg& c) {
+  v.object("ImuSensorCfg",
+           "Accelerometer and gyroscope at a site, with the errors of a device. ``data`` is an "
+           ":class:`mjsense.ImuData`.\n\nThe clean values are the built-in sensors ``<name>_acc`` and "
+           "``<name>_gyro``.",
+           "imu");
+  v.extends(static_cast<SensorCfg&>(c));
+  v("site", c.site, "Where it is mounted.").or_none();
+  v("preset", c.preset,
+    "ideal, mpu6050 (InvenSense PS-MPU-6000A-00 rev. 3.4), icm42688p (TDK DS-000347 rev. 1.7); "
+    "\"\": model.")
+      .one_of(kImuPresets);
+  v("model", c.model, "Used if preset is \"\".");
+  v("orientation", c.orientation, "Also the site's orientation, without errors.");
+  v("effects", c.effects, "After those of the device, on acc and gyro alike: delay, rate, dropout.");
+}
 
 // Fields, in the axes of the site:
 //   acc   [B, 3]  m/s^2, specific force R^T (a - g): +9.81 along up at rest, 0 in free fall

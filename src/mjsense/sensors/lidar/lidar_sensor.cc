@@ -6,9 +6,9 @@
 #include <cmath>
 #include <numbers>
 
-#include "mjsense/core/checks.h"
 #include "mjsense/core/error.h"
 #include "mjsense/sensors/lidar/npy.h"
+#include "mjsense/sensors/raycast/raycast_data.h"
 
 namespace mjsense {
 namespace {
@@ -22,6 +22,8 @@ std::array<double, 3> direction(double azimuth, double elevation) {
 
 }  // namespace
 
+SensorKind lidar_kind() { return sensor_kind<LidarSensorCfg>(&kRayCastData); }
+
 std::unique_ptr<Sensor> LidarSensorCfg::build() const {
   return std::make_unique<LidarSensor>(*this);
 }
@@ -31,11 +33,7 @@ LidarSensor::LidarSensor(const LidarSensorCfg& cfg) : RayCastSensor(cfg), lidar_
   exclude_world_ = false;
   if (cfg.pattern != PatternCfg(GridPattern{}))
     throw ValueError(place() + ": a pattern is set, but a lidar's rays are those of its scan");
-  require_not_negative(cfg.range_noise_std, place(), "range_noise_std");
-  require_not_negative(cfg.range_noise_relative, place(), "range_noise_relative");
-  require_not_negative(cfg.range_resolution, place(), "range_resolution");
-  require_probability(cfg.dropout, place(), "dropout");
-  std::visit([&](const auto& scan) { mjsense::validate(scan, place()); }, cfg.scan);
+  check_fields(cfg, place());
   if (const auto* s = std::get_if<SpinningScan>(&cfg.scan)) {
     rate_hz_ = s->rate_hz;
   } else {
@@ -48,34 +46,16 @@ LidarSensor::LidarSensor(const LidarSensorCfg& cfg) : RayCastSensor(cfg), lidar_
 }
 
 void validate(const SpinningScan& s, std::string_view place) {
-  require(s.channels >= 1, place, "channels", s.channels, "at least 1");
-  require(s.samples >= 1, place, "samples", s.samples, "at least 1");
   check_ray_count(static_cast<double>(s.channels) * s.samples, place);
-  require(s.azimuth_span_deg > 0 && s.azimuth_span_deg <= 360, place, "azimuth_span_deg",
-          s.azimuth_span_deg, "above 0 and at most 360");
-  require_finite(s.azimuth_start_deg, place, "azimuth_start_deg");
   if (!s.elevations_deg.empty() && static_cast<int>(s.elevations_deg.size()) != s.channels)
     throw ValueError(fmt::format("{}: elevations_deg has {} values, channels is {}: one a channel",
                                  place, s.elevations_deg.size(), s.channels));
-  const auto require_elevation = [&](const char* name, double degrees) {
-    require(std::abs(degrees) <= 90, place, name, degrees, "between -90 and 90");
-  };
-  require_elevation("elevation_min_deg", s.elevation_min_deg);
-  require_elevation("elevation_max_deg", s.elevation_max_deg);
-  for (double degrees : s.elevations_deg) require_elevation("elevations_deg", degrees);
-  require_positive(s.rate_hz, place, "rate_hz");
 }
 
 namespace {
 
-void check_rows(const std::vector<std::array<double, 2>>& angles, const TableScan& t,
-                std::string_view place) {
-  for (std::size_t i = 0; i < angles.size(); ++i)
-    if (!std::isfinite(angles[i][0] + angles[i][1]))
-      throw ValueError(fmt::format("{}: row {} of the scan's table is ({}, {}): must be finite",
-                                   place, i, angles[i][0], angles[i][1]));
-  const int rows = static_cast<int>(angles.size());
-  if (t.rays_per_scan > rows)
+void check_rows(std::size_t rows, const TableScan& t, std::string_view place) {
+  if (t.rays_per_scan > static_cast<int>(rows))
     throw ValueError(
         fmt::format("{}: rays_per_scan is {}: must be between 0 and the table's {} rows", place,
                     t.rays_per_scan, rows));
@@ -88,15 +68,16 @@ void validate(const TableScan& t, std::string_view place) {
     throw ValueError(fmt::format("{}: the scan has a file and angles: give one of them", place));
   if (t.file.empty() && t.angles.empty())
     throw ValueError(fmt::format("{}: the scan's table has no rows: give a file or angles", place));
-  require(t.rays_per_scan >= 0, place, "rays_per_scan", t.rays_per_scan, "0 or more");
-  require_positive(t.rate_hz, place, "rate_hz");
-  if (t.file.empty()) check_rows(t.angles, t, place);
+  if (t.file.empty()) check_rows(t.angles.size(), t, place);
 }
 
 void LidarSensor::read_table(const TableScan& t) {
   angles_ = t.file.empty() ? t.angles : read_npy_pairs(t.file, place());
   if (angles_.empty()) throw ValueError(place() + ": the scan's table has no rows");
-  check_rows(angles_, t, place());
+  TableScan read = t;  // numbers of a file as those of a table
+  read.file.clear();
+  read.angles = angles_;
+  check_fields(read, place());
   const int rows = static_cast<int>(angles_.size());
   if (t.rays_per_scan > 0) num_parts_ = rows / t.rays_per_scan;
   angles_.resize(t.rays_per_scan > 0 ? num_parts_ * t.rays_per_scan : rows);
@@ -153,10 +134,8 @@ void LidarSensor::initialize(const SensorInit& init) {
   if (disturbed_ && lidar_.motion_distortion)
     origins_ = Array(DType::kFloat32, {init.num_worlds, num_rays(), 3});
   const double far = cfg_.max_distance;
-  points_ = &add("points", DType::kFloat32, {num_rays(), 3}, "m", "sensor", -far, far,
-                 "point of each return; 0 if none", init.num_worlds);
-  intensity_ = &add("intensity", DType::kFloat32, {num_rays()}, "", "", 0, 1,
-                    "albedo times cosine of incidence of each return; 0 if none", init.num_worlds);
+  points_ = &add("points", {num_rays(), 3}, "sensor", -far, far, init.num_worlds);
+  intensity_ = &add("intensity", {num_rays()}, "", 0, 1, init.num_worlds);
 }
 
 void LidarSensor::compute(const World& world) {

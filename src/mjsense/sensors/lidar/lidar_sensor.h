@@ -18,48 +18,98 @@
 
 namespace mjsense {
 
-// `channels` lasers over each other turn about the frame's z axis, counter-clockwise, from
-// azimuth_start; one reading is one sweep, the last firing now.
+// One reading is one sweep, the last firing now.
 struct SpinningScan {
   int channels = 16;
-  double elevation_min_deg = -15.0, elevation_max_deg = 15.0;  // evenly spaced, the lowest first
-  std::vector<double> elevations_deg;  // or one elevation a channel, in this order
-  int samples = 360;                   // firings of each channel in a sweep
-  double azimuth_start_deg = 0.0, azimuth_span_deg = 360.0;  // 0: along +x
-  double rate_hz = 10.0;                                     // sweeps a second
+  double elevation_min_deg = -15.0, elevation_max_deg = 15.0;
+  std::vector<double> elevations_deg;
+  int samples = 360;
+  double azimuth_start_deg = 0.0, azimuth_span_deg = 360.0;
+  double rate_hz = 10.0;
 };
+template <class V>
+void visit_fields(V& v, SpinningScan& c) {
+  v.object("SpinningScanCfg",
+           "Lasers over each other that turn about the frame's z axis; rays are ``[channels, "
+           "samples]``.",
+           "spinning")
+      .frozen();
+  v("channels", c.channels, "Lasers.").at_least(1);
+  v("elevation_min_deg", c.elevation_min_deg, "Of channel 0, above the xy plane.").within(-90, 90);
+  v("elevation_max_deg", c.elevation_max_deg,
+    "Of the last channel; the others lie evenly between.")
+      .within(-90, 90);
+  v("elevations_deg", c.elevations_deg, "One a channel instead of evenly spaced ones.")
+      .within(-90, 90);
+  v("samples", c.samples, "Firings of each channel in a sweep.").at_least(1);
+  v("azimuth_start_deg", c.azimuth_start_deg, "Of the first firing; 0: along +x; counter-clockwise.");
+  v("azimuth_span_deg", c.azimuth_span_deg, "Of a sweep.").above(0).at_most(360);
+  v("rate_hz", c.rate_hz, "Turns a second; matters with motion distortion only.").positive();
+}
 
-// Rays from a table of (azimuth, elevation) in radians: solid-state lidars, or a pattern that does
-// not repeat within a reading.
 struct TableScan {
-  std::string file;  // .npy of shape (M, 2), such as mujoco-lidar's Livox tables
-  std::vector<std::array<double, 2>> angles;  // or the table itself
-  // Rows that a scan takes, the next ones at the next scan; 0: all. Rows left over at the end are
-  // not used.
+  std::string file;
+  std::vector<std::array<double, 2>> angles;
   int rays_per_scan = 0;
-  double rate_hz = 10.0;  // scans a second
+  double rate_hz = 10.0;
 };
+template <class V>
+void visit_fields(V& v, TableScan& c) {
+  v.object("TableScanCfg",
+           "Rays from a table of (azimuth, elevation), rad: solid-state and non-repeating lidars.",
+           "table")
+      .frozen();
+  v("file", c.file, "An .npy file of shape (M, 2), such as mujoco-lidar's Livox tables.");
+  v("angles", c.angles, "The table itself, [M, 2].").unit("rad");
+  v("rays_per_scan", c.rays_per_scan,
+    "Rows that a scan takes, the next ones at the next scan; 0: all. Rows left over at the end are "
+    "not used.")
+      .at_least(0);
+  v("rate_hz", c.rate_hz, "Scans a second.").positive();
+}
 
-// Throw ValueError; what a table's file holds is read by the sensor.
+using ScanCfg = std::variant<SpinningScan, TableScan>;
+template <>
+inline constexpr const char* kChoiceName<ScanCfg> = "LidarScanCfg";
+
+// What their fields say of each other; what a table's file holds is read by the sensor.
 void validate(const SpinningScan& scan, std::string_view place);
 void validate(const TableScan& scan, std::string_view place);
 
-// `pattern` is not for lidars, and hit ids are always there.
 struct LidarSensorCfg : RayCastSensorCfg {
   LidarSensorCfg() {
     max_distance = 100.0;
     min_distance = 0.1;
+    any_frame = true;
   }
-  std::variant<SpinningScan, TableScan> scan;
-  // Each ray leaves from where the frame was at its own moment of the sweep.
+  ScanCfg scan;
   bool motion_distortion = false;
-  double range_noise_std = 0.0;       // m
-  double range_noise_relative = 0.0;  // standard deviation in parts of the range, added in squares
-  double range_resolution = 0.0;      // m, distances are rounded to multiples; 0: not at all
-  double dropout = 0.0;               // probability that a return is lost
+  double range_noise_std = 0.0;
+  double range_noise_relative = 0.0;
+  double range_resolution = 0.0;
+  double dropout = 0.0;
 
   std::unique_ptr<Sensor> build() const override;
 };
+template <class V>
+void visit_fields(V& v, LidarSensorCfg& c) {
+  v.object("LidarSensorCfg",
+           "A spinning or table lidar. ``data`` is a :class:`mjsense.RayCastData` with points and "
+           "intensity; ``pattern`` is not for lidars, and hit ids are always there.",
+           "lidar");
+  v.extends(static_cast<RayCastSensorCfg&>(c));
+  v("scan", c.scan, "Where its rays point.");
+  v("motion_distortion", c.motion_distortion,
+    "Each ray leaves from where the frame was at its own moment of the sweep.");
+  v("range_noise_std", c.range_noise_std, "Standard deviation of distances.").unit("m").at_least(0);
+  v("range_noise_relative", c.range_noise_relative,
+    "Standard deviation in parts of the range, added in squares.")
+      .at_least(0);
+  v("range_resolution", c.range_resolution, "Distances are rounded to multiples of it; 0: exact.")
+      .unit("m")
+      .at_least(0);
+  v("dropout", c.dropout, "Probability that a return is lost.").within(0, 1);
+}
 
 class LidarSensor : public RayCastSensor {
  public:

@@ -279,7 +279,7 @@ TEST(Lidar, ErrorsSayWhatIsWrong) {
   EXPECT_THAT(with([](Cfg& c) {
                 c.scan = TableScan{.angles = {{0, 0}, {0, kNan}}};
               }),
-              HasSubstr("row 1"));
+              HasSubstr("scan: angles[1][1] is nan: must be finite"));
   EXPECT_THAT(with([](Cfg& c) { c.scan = SpinningScan{.elevation_max_deg = 120}; }),
               HasSubstr("elevation_max_deg is 120"));
   EXPECT_THAT(with([](Cfg& c) { c.scan = SpinningScan{.azimuth_start_deg = kNan}; }),

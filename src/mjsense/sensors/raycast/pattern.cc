@@ -119,13 +119,6 @@ void check_ray_count(double rays, std::string_view place) {
 }
 
 void validate(const GridPattern& g, std::string_view place) {
-  if (!(g.resolution > 0) || !std::isfinite(g.resolution))
-    throw ValueError(
-        fmt::format("{}: grid resolution is {}: must be above 0", place, g.resolution));
-  for (double s : g.size)
-    if (!(s >= 0) || !std::isfinite(s))
-      throw ValueError(
-          fmt::format("{}: grid size is ({}, {}): must be 0 or more", place, g.size[0], g.size[1]));
   check_ray_count((g.size[0] / g.resolution + 1) * (g.size[1] / g.resolution + 1), place);
   unit(g.direction, place);
 }
@@ -134,21 +127,11 @@ void validate(const PinholePattern& p, std::string_view place) {
   if (p.camera.empty()) check_pinhole(p.width, p.height, p.fovy, place);
 }
 
-void validate(const RingPattern::Ring& ring, std::string_view place) {
-  if (ring.num_samples < 1 || !(ring.radius >= 0) || !std::isfinite(ring.radius))
-    throw ValueError(
-        fmt::format("{}: ring of radius {} with {} samples: the radius must be 0 or more, the "
-                    "samples at least 1",
-                    place, ring.radius, ring.num_samples));
-}
 
 void validate(const RingPattern& r, std::string_view place) {
   unit(r.direction, place);
   double rays = r.include_center;
-  for (const RingPattern::Ring& ring : r.rings) {
-    validate(ring, place);
-    rays += ring.num_samples;
-  }
+  for (const RingPattern::Ring& ring : r.rings) rays += ring.num_samples;
   check_ray_count(rays, place);
   if (rays == 0) throw ValueError(fmt::format("{}: the pattern has no rays", place));
 }
@@ -161,25 +144,9 @@ void validate(const UserPattern& u, std::string_view place) {
       throw ValueError(
           fmt::format("{}: pattern of {} offsets and {} directions: give as many, or one", place,
                       u.offsets.size(), u.directions.size()));
-  for (std::size_t i = 0; i < u.offsets.size(); ++i) {
-    const std::array<double, 3>& o = u.offsets[i];
-    for (double x : o)
-      if (!std::isfinite(x))
-        throw ValueError(fmt::format("{}: offset {} of the pattern is ({}, {}, {}): must be finite",
-                                     place, i, o[0], o[1], o[2]));
-  }
   for (const Direction& d : u.directions) unit(d, place);
   if (!u.times.empty() && u.times.size() != n)
     throw ValueError(fmt::format("{}: pattern of {} rays and {} times", place, n, u.times.size()));
-  for (std::size_t i = 0; i < u.times.size(); ++i) {
-    if (!(u.times[i] <= 0) || !std::isfinite(u.times[i]))
-      throw ValueError(fmt::format("{}: time {} of the pattern is {} s: must be 0 or before", place,
-                                   i, u.times[i]));
-  }
-}
-
-void validate(const PatternCfg& cfg, std::string_view place) {
-  std::visit([&](const auto& p) { validate(p, place); }, cfg);
 }
 
 PinholePattern PinholePattern::from_intrinsic_matrix(const std::array<double, 9>& k, int width,
@@ -203,8 +170,12 @@ RingPattern RingPattern::single_ring(double radius, int num_samples) {
 }
 
 RayPattern make_pattern(const PatternCfg& cfg, const mjModel* model, std::string_view place) {
-  validate(cfg, place);
-  return std::visit([&](const auto& p) { return make(p, model, place); }, cfg);
+  return std::visit(
+      [&](const auto& p) {
+        check_fields(p, place);
+        return make(p, model, place);
+      },
+      cfg);
 }
 
 }  // namespace mjsense

@@ -9,6 +9,8 @@
 #include <variant>
 #include <vector>
 
+#include "mjsense/core/fields.h"
+
 namespace mjsense {
 
 // N rays; offsets in m, directions of length 1.
@@ -19,37 +21,56 @@ struct RayPattern {
   std::size_t size() const { return directions.size(); }
 };
 
-// Parallel rays from a grid in the frame's xy plane. Along each axis at -size/2 + k * resolution:
-// both ends where resolution divides size, else it stops short. x varies fastest. Size 0 is one
-// ray.
+// Along each axis at -size/2 + k * resolution: both ends where resolution divides size, else it
+// stops short. x varies fastest. Size 0 is one ray.
 struct GridPattern {
   bool operator==(const GridPattern&) const = default;
-  std::array<double, 2> size{1.0, 1.0};  // m
-  double resolution = 0.1;               // m
+  std::array<double, 2> size{1.0, 1.0};
+  double resolution = 0.1;
   std::array<double, 3> direction{0, 0, -1};
 };
+template <class V>
+void visit_fields(V& v, GridPattern& c) {
+  v.object("GridPatternCfg", "Parallel rays from the points of a grid, x fastest.", "grid").frozen();
+  v("size", c.size, "In x and y, around the frame.").unit("m").at_least(0);
+  v("resolution", c.resolution, "Between rays.").unit("m").positive();
+  v("direction", c.direction, "Of all rays; any length but 0.");
+}
 
-// Rays from one point through the edges (not the centres) of an image's pixels, looking along -z.
-// u = linspace(-1, 1, width) varies fastest; the first row is the bottom of MuJoCo's image.
+// u = linspace(-1, 1, width) varies fastest; horizontally tan(fovx / 2) = tan(fovy / 2) * width /
+// height.
 struct PinholePattern {
   bool operator==(const PinholePattern&) const = default;
   int width = 16, height = 12;
-  double fovy = 45.0;  // degrees; horizontally tan(fovx / 2) = tan(fovy / 2) * width / height
-  std::string camera;  // resolution and field of view of this camera instead; not its pose
+  double fovy = 45.0;
+  std::string camera;
 
   // K row-major, 3x3: fovy = 2 atan(height / (2 fy)); fx, cx and cy play no part.
   static PinholePattern from_intrinsic_matrix(const std::array<double, 9>& k, int width,
                                               int height);
   static PinholePattern from_mujoco_camera(std::string camera_name);
 };
+template <class V>
+void visit_fields(V& v, PinholePattern& c) {
+  v.object("PinholeCameraPatternCfg",
+           "Rays of a pinhole camera that looks along -Z, through the edges (not the centres) of its "
+           "pixels, bottom row first.",
+           "pinhole")
+      .frozen();
+  v("width", c.width, "Rays in a row.").at_least(1);
+  v("height", c.height, "Rows.").at_least(1);
+  v("fovy", c.fovy, "Vertical field of view.").unit("degrees").positive();
+  v("camera_name", c.camera,
+    "Take resolution and angles from this camera of the model instead; not its pose.")
+      .or_none();
+}
 
-// Parallel rays from rings around the frame's z axis: the centre first, then ring after ring,
-// counter-clockwise from +x.
+// The centre first, then ring after ring, counter-clockwise from +x.
 struct RingPattern {
   bool operator==(const RingPattern&) const = default;
   struct Ring {
     bool operator==(const Ring&) const = default;
-    double radius = 0.1;  // m
+    double radius = 0.1;
     int num_samples = 8;
   };
   std::vector<Ring> rings;
@@ -58,30 +79,56 @@ struct RingPattern {
 
   static RingPattern single_ring(double radius = 0.1, int num_samples = 8);
 };
+template <class V>
+void visit_fields(V& v, RingPattern::Ring& c) {
+  v.object("RingPatternCfg.Ring", "One circle of rays.").frozen();
+  v("radius", c.radius, "Around the frame's z axis.").unit("m").at_least(0);
+  v("num_samples", c.num_samples, "Rays on it.").at_least(1);
+}
+template <class V>
+void visit_fields(V& v, RingPattern& c) {
+  v.object("RingPatternCfg",
+           "Parallel rays from the points of circles in the XY plane, after the centre.", "ring")
+      .frozen();
+  v("rings", c.rings, "From the inside out, or in any order.");
+  v("include_center", c.include_center, "Also a ray from the centre.");
+  v("direction", c.direction, "Of all rays; any length but 0.");
+}
 
-// The caller's own rays. One direction for all offsets, or one offset for all directions, will do.
 struct UserPattern {
   bool operator==(const UserPattern&) const = default;
-  std::vector<std::array<double, 3>> offsets{{0, 0, 0}};      // m
-  std::vector<std::array<double, 3>> directions{{0, 0, -1}};  // any length but 0
-  std::vector<double> times;  // s <= 0, one a ray or none: the frame is where it was then
+  std::vector<std::array<double, 3>> offsets{{0, 0, 0}};
+  std::vector<std::array<double, 3>> directions{{0, 0, -1}};
+  std::vector<double> times;
 };
+template <class V>
+void visit_fields(V& v, UserPattern& c) {
+  v.object("UserPatternCfg",
+           "Your own rays. One direction for all offsets, or one offset for all directions, will do.",
+           "user")
+      .frozen();
+  v("offsets", c.offsets, "Where they start, [n, 3].").unit("m");
+  v("directions", c.directions, "Where they point, [n, 3], of any length but 0.");
+  v("times", c.times, "[n] or none: each ray leaves from where the frame was then.")
+      .unit("s")
+      .at_most(0);
+}
 
 using PatternCfg = std::variant<GridPattern, PinholePattern, RingPattern, UserPattern>;
+template <>
+inline constexpr const char* kChoiceName<PatternCfg> = "RayPatternCfg";
 
 // Throws ValueError for more rays than a sensor may have.
 void check_ray_count(double rays, std::string_view place);
 
-// Throws ValueError for anything that gives no rays, endless ones or NaN. `place` starts every message:
-// "sensor 'scan'".
+// What their fields say of each other: that they give rays, and not too many. `place` starts every
+// message: "sensor 'scan'".
 void validate(const GridPattern& grid, std::string_view place);
 void validate(const PinholePattern& pinhole, std::string_view place);
-void validate(const RingPattern::Ring& ring, std::string_view place);
 void validate(const RingPattern& rings, std::string_view place);
 void validate(const UserPattern& user, std::string_view place);
-void validate(const PatternCfg& cfg, std::string_view place);
 
-// Validates; KeyError for an unknown camera. `model` may be null unless a pattern names a camera.
+// ValueError for what check_fields() refuses, KeyError for an unknown camera. `model` may be null unless a pattern names a camera.
 RayPattern make_pattern(const PatternCfg& cfg, const mjModel* model, std::string_view place);
 
 }  // namespace mjsense

@@ -11,14 +11,6 @@
 
 namespace mjsense {
 
-RayAlignment ray_alignment(std::string_view name, std::string_view place) {
-  if (name == "base") return RayAlignment::kBase;
-  if (name == "yaw") return RayAlignment::kYaw;
-  if (name == "world") return RayAlignment::kWorld;
-  throw ValueError(
-      fmt::format("{}: ray_alignment is '{}': must be 'base', 'yaw' or 'world'", place, name));
-}
-
 void validate_frame(const ObjRef& ref, std::string_view place) {
   if (ref.name.empty()) throw ValueError(fmt::format("{}: a frame has no name", place));
   const std::array<std::string_view, 5> types = {"body", "xbody", "site", "geom", "camera"};

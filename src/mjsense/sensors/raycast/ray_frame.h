@@ -17,8 +17,8 @@ enum class RayAlignment {
   kWorld,  // not at all
 };
 
-// "base", "yaw" or "world"; ValueError otherwise.
-RayAlignment ray_alignment(std::string_view name, std::string_view place);
+template <>
+inline constexpr std::array<std::string_view, 3> kWords<RayAlignment>{"base", "yaw", "world"};
 
 // Pose of a frame F and the rotation that its rays get.
 struct FramePose {

@@ -9,6 +9,7 @@
 #include "mjsense/core/checks.h"
 #include "mjsense/core/error.h"
 #include "mjsense/core/parallel.h"
+#include "mjsense/sensors/raycast/raycast_data.h"
 
 namespace mjsense {
 namespace {
@@ -39,15 +40,7 @@ std::uint32_t group_mask(const std::optional<std::vector<int>>& groups, const st
 
 }  // namespace
 
-void validate(const RayCastVizCfg& viz, std::string_view place) {
-  require_color(viz.hit_color, place, "hit_color");
-  require_color(viz.ray_color, place, "ray_color");
-  require_color(viz.miss_color, place, "miss_color");
-  require_color(viz.normal_color, place, "normal_color");
-  require_not_negative(viz.hit_radius, place, "hit_radius");
-  require_not_negative(viz.ray_width, place, "ray_width");
-  require_not_negative(viz.normal_length, place, "normal_length");
-}
+SensorKind raycast_kind() { return sensor_kind<RayCastSensorCfg>(&kRayCastData); }
 
 std::unique_ptr<Sensor> RayCastSensorCfg::build() const {
   return std::make_unique<RayCastSensor>(*this);
@@ -56,34 +49,31 @@ std::unique_ptr<Sensor> RayCastSensorCfg::build() const {
 RayCastSensor::RayCastSensor(const RayCastSensorCfg& cfg) : Sensor(cfg.key()), cfg_(cfg) {
   sensor_place(cfg.name);
   if (cfg.frame.empty()) throw ValueError(place() + ": no frame given");
-  alignment_ = ray_alignment(cfg.ray_alignment, place());
+  check_fields(cfg, place());
+  for (const ObjRef& ref : cfg.frame) {
+    if (!cfg.any_frame && (ref.type == "xbody" || ref.type == "camera"))
+      throw ValueError(
+          fmt::format("{}: frame '{}' is a {}: must be 'body', 'site', or 'geom' "
+                      "(any_frame takes xbody and camera)",
+                      place(), ref.full_name(), ref.type));
+  }
+  alignment_ = cfg.ray_alignment;
   filter_.groups = group_mask(cfg.include_geom_groups, place());
-  if (!(cfg.max_distance > 0))
-    throw ValueError(
-        fmt::format("{}: max_distance is {} m: must be above 0", place(), cfg.max_distance));
-  if (!(cfg.min_distance >= 0 && cfg.min_distance < cfg.max_distance))
+  if (!(cfg.min_distance < cfg.max_distance))
     throw ValueError(fmt::format("{}: min_distance is {} m: must lie in [0, max_distance = {})",
                                  place(), cfg.min_distance, cfg.max_distance));
   for (const ObjRef& ref : cfg.frame) validate_frame(ref, place());
-  mjsense::validate(cfg.pattern, place());
-  mjsense::validate(cfg.viz, place());
 }
 
 RayCastSensor::~RayCastSensor() = default;
 
 std::string RayCastSensor::place() const { return fmt::format("sensor '{}'", name()); }
 
-Field& RayCastSensor::add(std::string_view name, DType dtype, Shape shape, std::string unit,
-                          std::string frame, double low, double high, std::string description,
-                          int num_worlds) {
-  SensorSpec spec;
-  spec.dtype = dtype;
-  spec.shape = shape;
-  spec.unit = std::move(unit);
-  spec.frame = std::move(frame);
+Field& RayCastSensor::add(std::string_view name, Shape shape, std::string frame, double low,
+                          double high, int num_worlds) {
+  SensorSpec spec = kRayCastData.spec(name, shape, std::move(frame));
   spec.low = low;
   spec.high = high;
-  spec.description = std::move(description);
   return add_field(name, std::move(spec), num_worlds);
 }
 
@@ -116,26 +106,17 @@ void RayCastSensor::initialize(const SensorInit& init) {
   clear_fields();
   const int b = init.num_worlds, n = num_rays(), f = num_frames();
   const double far = cfg_.max_distance;
-  const DType f32 = DType::kFloat32, i32 = DType::kInt32;
-  distances_ = &add("distances", f32, {n}, "m", "", -1, far,
-                    "distance along each ray to the nearest surface; -1: none", b);
-  hit_pos_ = &add("hit_pos_w", f32, {n, 3}, "m", "world", -kInf, kInf,
-                  "where each ray hits; its origin if nowhere", b);
-  normals_ = &add("normals_w", f32, {n, 3}, "", "world", -1, 1,
-                  "unit normal of the surface hit; 0 if none", b);
-  frame_pos_ =
-      &add("frame_pos_w", f32, {f, 3}, "m", "world", -kInf, kInf, "position of each frame", b);
-  frame_quat_ =
-      &add("frame_quat_w", f32, {f, 4}, "", "world", -1, 1, "orientation (wxyz) of each frame", b);
-  pos_ = &add("pos_w", f32, {3}, "m", "world", -kInf, kInf, "position of frame 0", b);
-  quat_ = &add("quat_w", f32, {4}, "", "world", -1, 1, "orientation (wxyz) of frame 0", b);
+  distances_ = &add("distances", {n}, "", -1, far, b);
+  hit_pos_ = &add("hit_pos_w", {n, 3}, "world", -kInf, kInf, b);
+  normals_ = &add("normals_w", {n, 3}, "world", -1, 1, b);
+  frame_pos_ = &add("frame_pos_w", {f, 3}, "world", -kInf, kInf, b);
+  frame_quat_ = &add("frame_quat_w", {f, 4}, "world", -1, 1, b);
+  pos_ = &add("pos_w", {3}, "world", -kInf, kInf, b);
+  quat_ = &add("quat_w", {4}, "world", -1, 1, b);
   if (cfg_.hit_ids) {
-    geom_id_ = &add("geom_id", i32, {n}, "", "", -1, objects - 1,
-                    "geom that each ray hits, -1 none; geoms + flex id for a flex", b);
-    body_id_ = &add("body_id", i32, {n}, "", "", -1, m->nbody - 1,
-                    "body of the geom that each ray hits; -1 none", b);
-    material_id_ = &add("material_id", i32, {n}, "", "", -1, m->nmat - 1,
-                        "material of the geom that each ray hits; -1 none", b);
+    geom_id_ = &add("geom_id", {n}, "", -1, objects - 1, b);
+    body_id_ = &add("body_id", {n}, "", -1, m->nbody - 1, b);
+    material_id_ = &add("material_id", {n}, "", -1, m->nmat - 1, b);
   }
 }
 

@@ -21,7 +21,7 @@
 #include <vector>
 
 #include "mjsense/core/debug_shapes.h"
-#include "mjsense/core/sensor.h"
+#include "mjsense/core/sensor_fields.h"
 #include "mjsense/rays/packet.h"
 #include "mjsense/rays/ray_scene.h"
 #include "mjsense/scene/entity.h"
@@ -32,10 +32,8 @@
 
 namespace mjsense {
 
-// What a viewer draws of a ray sensor. Colours are rgba; sizes in units of the model's
-// stat.meansize.
 struct RayCastVizCfg {
-  bool show_rays = false;  // arrows from origin to hit
+  bool show_rays = false;
   bool show_normals = false;
   std::array<float, 4> hit_color{0, 1, 1, 1};
   std::array<float, 4> ray_color{0, 1, 0, 0.8f};
@@ -43,25 +41,68 @@ struct RayCastVizCfg {
   std::array<float, 4> normal_color{1, 1, 0, 1};
   double hit_radius = 0.5, ray_width = 0.1, normal_length = 5.0;
 };
-
-void validate(const RayCastVizCfg& viz, std::string_view place);
+template <class V>
+void visit_fields(V& v, RayCastVizCfg& c) {
+  v.object("RayCastVizCfg",
+           "What a viewer draws of a ray sensor. Colours are rgba, sizes in units of the model's "
+           "``stat.meansize``.");
+  v("show_rays", c.show_rays, "Arrows from origin to hit.");
+  v("show_normals", c.show_normals, "Arrows along the normals of what is hit.");
+  v("hit_color", c.hit_color, "Of balls at the hits.").within(0, 1);
+  v("ray_color", c.ray_color, "Of rays that hit.").within(0, 1);
+  v("miss_color", c.miss_color, "Of rays that miss.").within(0, 1);
+  v("normal_color", c.normal_color, "Of normals.").within(0, 1);
+  v("hit_radius", c.hit_radius, "Of the balls.").at_least(0);
+  v("ray_width", c.ray_width, "Of the arrows.").at_least(0);
+  v("normal_length", c.normal_length, "Of the normals.").at_least(0);
+}
 
 struct RayCastSensorCfg : SensorCfg {
-  std::vector<ObjRef> frame;  // body (its own frame, not the inertial one), site, geom, camera
+  std::vector<ObjRef> frame;
   PatternCfg pattern = GridPattern{};
-  std::string ray_alignment = "base";  // base yaw world: what of the frame's turn the rays follow
-  double max_distance = 10.0;          // m; a hit beyond it is none
-  bool exclude_parent_body = true;     // the frame's body is not seen; its children are
-  std::optional<std::vector<int>> include_geom_groups{{0, 1, 2}};  // nullopt: all
+  Word<RayAlignment> ray_alignment;
+  double max_distance = 10.0;
+  bool exclude_parent_body = true;
+  std::optional<std::vector<int>> include_geom_groups{{0, 1, 2}};
   bool debug_vis = false;
   RayCastVizCfg viz;
 
   // Beyond mjlab's.
-  double min_distance = 0.0;  // m; a hit nearer than this is none (and hides what is behind it)
-  bool hit_ids = true;        // fields geom_id, body_id, material_id
+  double min_distance = 0.0;
+  bool hit_ids = true;
+  bool any_frame = false;
 
   std::unique_ptr<Sensor> build() const override;
 };
+template <class V>
+void visit_fields(V& v, RayCastSensorCfg& c) {
+  v.object("RayCastSensorCfg",
+           "Rays from frames against everything visible. ``data`` is a "
+           ":class:`mjsense.RayCastData`.",
+           "raycast");
+  v.extends(static_cast<SensorCfg&>(c));
+  v("frame", c.frame,
+    "Bodies (their own frame, not the inertial one), sites or geoms that the rays start from.")
+      .or_one();
+  v("pattern", c.pattern, "The rays of one frame.");
+  v("ray_alignment", c.ray_alignment,
+    "base: offsets and directions turn with the frame; yaw: only with its heading; world: not at "
+    "all.");
+  v("max_distance", c.max_distance, "Hits farther away are misses.")
+      .unit("m")
+      .positive()
+      .may_be_infinite();
+  v("exclude_parent_body", c.exclude_parent_body,
+    "Rays pass through the body they start from (not through its children).");
+  v("include_geom_groups", c.include_geom_groups, "Groups that rays see; None: all.").within(0, 5);
+  v("debug_vis", c.debug_vis, "Drawn by ``Simulation.draw(scene)`` unasked.");
+  v("viz", c.viz, "How it is drawn.");
+  v("min_distance", c.min_distance, "Nearer hits are misses, and hide what is behind them.")
+      .unit("m")
+      .at_least(0);
+  v("hit_ids", c.hit_ids, "The fields geom_id, body_id and material_id of what was hit.");
+  v("any_frame", c.any_frame, "Take xbody and camera frames too, which mjlab refuses.");
+}
 
 class RayCastSensor : public Sensor {
  public:
@@ -111,8 +152,8 @@ class RayCastSensor : public Sensor {
   virtual void finish(const RayScene& rays, int world, RayScratch& scratch);
   virtual bool wants_finish() const { return false; }
   std::string place() const;
-  Field& add(std::string_view name, DType dtype, Shape shape, std::string unit, std::string frame,
-             double low, double high, std::string description, int num_worlds);
+  Field& add(std::string_view name, Shape shape, std::string frame, double low, double high,
+             int num_worlds);
   // Makes ray r of this world one that hits nothing. hit_pos_w is the caller's.
   void forget(int world, int r);
   // What rays of this frame see.

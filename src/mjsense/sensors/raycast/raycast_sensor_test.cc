@@ -104,11 +104,11 @@ TEST(RayCast, RefusesAWrongConfigurationWhenItIsBuilt) {
   using Cfg = RayCastSensorCfg;
   EXPECT_EQ(message([](Cfg&) {}), "");
   EXPECT_THAT(message([](Cfg& c) { c.pattern = GridPattern{.resolution = 0}; }),
-              HasSubstr("grid resolution is 0: must be above 0"));
+              HasSubstr("sensor 'ray': pattern: resolution is 0: must be above 0"));
   EXPECT_THAT(message([](Cfg& c) { c.pattern = PinholePattern{.fovy = 180}; }), HasSubstr("fovy"));
   EXPECT_THAT(message([](Cfg& c) { c.pattern = RingPattern{.include_center = false}; }),
               HasSubstr("no rays"));
-  EXPECT_THAT(message([](Cfg& c) { c.pattern = UserPattern{.times = {1}}; }), HasSubstr("time 0"));
+  EXPECT_THAT(message([](Cfg& c) { c.pattern = UserPattern{.times = {1}}; }), HasSubstr("times[0] is 1: must be at most 0"));
   EXPECT_EQ(message([](Cfg& c) { c.pattern = PinholePattern::from_mujoco_camera("eye"); }), "");
   EXPECT_THAT(message([](Cfg& c) { c.frame[0].type = "goem"; }), HasSubstr("is a 'goem'"));
   EXPECT_THAT(message([](Cfg& c) { c.viz.ray_width = -1; }), HasSubstr("ray_width is -1"));
@@ -162,8 +162,9 @@ TEST(RayCast, DistancesAtBothLimitsCount) {
 
 TEST(RayCast, AlignmentTurnsRaysButNotTheFrame) {
   std::vector<std::shared_ptr<const SensorCfg>> cfgs;
-  for (const char* alignment : {"base", "yaw", "world"}) {
-    auto cfg = sensor_cfg<RayCastSensorCfg>(alignment);
+  for (RayAlignment alignment :
+       {RayAlignment::kBase, RayAlignment::kYaw, RayAlignment::kWorld}) {
+    auto cfg = sensor_cfg<RayCastSensorCfg>(std::string(word(alignment)).c_str());
     cfg->frame = {{"site", "scan", "r"}};  // turned by 90 degrees about z
     cfg->pattern = UserPattern{{{0.3, 0, 0}}, {{0, 0, -2}}};
     cfg->ray_alignment = alignment;
@@ -230,6 +231,7 @@ TEST(RayCast, GroupsAndTransparencyBelongToTheQuery) {
 
 TEST(RayCast, FramesMayBeCamerasAndSeveral) {
   auto cfg = sensor_cfg<RayCastSensorCfg>();
+  cfg->any_frame = true;
   cfg->frame = {{"camera", "eye", "r"}, {"xbody", "belly", "r"}};
   cfg->pattern = PinholePattern::from_mujoco_camera("r/eye");
   cfg->exclude_parent_body = false;  // the camera belongs to the world body, and so does the floor
@@ -342,8 +344,8 @@ TEST(RayCast, ErrorsNameSensorFoundAndExpected) {
     return error_of(cfg);
   };
   using Cfg = RayCastSensorCfg;
-  EXPECT_THAT(with([](Cfg& c) { c.ray_alignment = "foo"; }),
-              HasSubstr("sensor 'ray': ray_alignment is 'foo'"));
+  EXPECT_THAT(with([](Cfg& c) { c.frame = {{"camera", "eye", "r"}}; }),
+              HasSubstr("sensor 'ray': frame 'r/eye' is a camera: must be 'body', 'site', or 'geom'"));
   EXPECT_THAT(with([](Cfg& c) { c.frame = {}; }), HasSubstr("no frame"));
   EXPECT_THAT(with([](Cfg& c) {
                 c.frame = {{"joint", "root", "r"}};
@@ -362,7 +364,7 @@ TEST(RayCast, ErrorsNameSensorFoundAndExpected) {
   EXPECT_THAT(with([](Cfg& c) {
                 c.include_geom_groups = {{0, 6}};
               }),
-              HasSubstr("groups are 0 to 5"));
+              HasSubstr("include_geom_groups[1] is 6: must be between 0 and 5"));
   EXPECT_THAT(with([](Cfg& c) { c.max_distance = 0; }), HasSubstr("max_distance"));
   EXPECT_THAT(with([](Cfg& c) { c.min_distance = 10; }), HasSubstr("min_distance"));
   EXPECT_THAT(with([](Cfg& c) { c.pattern = GridPattern{.resolution = 0}; }),

@@ -6,7 +6,7 @@
 #include <array>
 #include <string_view>
 
-#include "mjsense/core/checks.h"
+#include "mjsense/sensors/raycast/raycast_data.h"
 
 namespace mjsense {
 
@@ -14,20 +14,17 @@ std::unique_ptr<Sensor> TerrainHeightSensorCfg::build() const {
   return std::make_unique<TerrainHeightSensor>(*this);
 }
 
-TerrainHeightSensor::TerrainHeightSensor(const TerrainHeightSensorCfg& cfg) : RayCastSensor(cfg) {
-  constexpr std::array<std::string_view, 4> kNames = {"min", "max", "mean", "none"};
-  reduction_ = static_cast<Reduction>(require_word(cfg.reduction, kNames, place(), "reduction"));
-}
+SensorKind terrain_height_kind() { return sensor_kind<TerrainHeightSensorCfg>(&kRayCastData); }
+
+TerrainHeightSensor::TerrainHeightSensor(const TerrainHeightSensorCfg& cfg)
+    : RayCastSensor(cfg), reduction_(cfg.reduction) {}
 
 void TerrainHeightSensor::initialize(const SensorInit& init) {
   RayCastSensor::initialize(init);
-  SensorSpec spec;
-  spec.shape = reduction_ == Reduction::kNone ? Shape{num_frames(), num_rays_per_frame()}
-                                              : Shape{num_frames()};
-  spec.unit = "m";
-  spec.frame = "world";
-  spec.description = "height of each frame above the surface below it";
-  heights_ = &add_field("heights", std::move(spec), init.num_worlds);
+  const Shape shape = reduction_ == HeightReduction::kNone
+                          ? Shape{num_frames(), num_rays_per_frame()}
+                          : Shape{num_frames()};
+  heights_ = &add_field("heights", kRayCastData.spec("heights", shape, "world"), init.num_worlds);
 }
 
 void TerrainHeightSensor::finish(const RayScene& rays, int world, RayScratch& scratch) {
@@ -50,14 +47,14 @@ void TerrainHeightSensor::finish(const RayScene& rays, int world, RayScratch& sc
       float h = missing;
       if (distance[r] >= 0)
         h = normal[3 * r + 2] < 0 ? 0.0f : static_cast<float>(z - hit[3 * r + 2]);
-      if (reduction_ == Reduction::kNone) out[r] = h;
+      if (reduction_ == HeightReduction::kNone) out[r] = h;
       least = i == 0 ? h : std::min(least, h);
       most = i == 0 ? h : std::max(most, h);
       sum += h;
     }
-    if (reduction_ == Reduction::kMin) out[f] = least;
-    if (reduction_ == Reduction::kMax) out[f] = most;
-    if (reduction_ == Reduction::kMean) out[f] = static_cast<float>(sum / n);
+    if (reduction_ == HeightReduction::kMin) out[f] = least;
+    if (reduction_ == HeightReduction::kMax) out[f] = most;
+    if (reduction_ == HeightReduction::kMean) out[f] = static_cast<float>(sum / n);
   }
 }
 

@@ -16,11 +16,25 @@
 
 namespace mjsense {
 
+enum class HeightReduction { kMin, kMax, kMean, kNone };
+template <>
+inline constexpr std::array<std::string_view, 4> kWords<HeightReduction>{"min", "max", "mean",
+                                                                         "none"};
+
 struct TerrainHeightSensorCfg : RayCastSensorCfg {
-  std::string reduction = "min";  // min max mean none, over a frame's rays
+  Word<HeightReduction> reduction;
 
   std::unique_ptr<Sensor> build() const override;
 };
+template <class V>
+void visit_fields(V& v, TerrainHeightSensorCfg& c) {
+  v.object("TerrainHeightSensorCfg",
+           "Height of frames above what lies below them. ``data.heights`` is float32 ``[B, F]``, "
+           "``[B, F, n]`` without reduction.",
+           "terrain_height");
+  v.extends(static_cast<RayCastSensorCfg&>(c));
+  v("reduction", c.reduction, "Over a frame's rays.");
+}
 
 class TerrainHeightSensor : public RayCastSensor {
  public:
@@ -33,10 +47,9 @@ class TerrainHeightSensor : public RayCastSensor {
   void finish(const RayScene& rays, int world, RayScratch& scratch) override;
 
  private:
-  enum class Reduction { kMin, kMax, kMean, kNone };
   float height_without_hits(const RayScene& rays, int world, int frame, RayScratch& scratch) const;
 
-  Reduction reduction_;
+  HeightReduction reduction_;
   Field* heights_ = nullptr;
 };
 

@@ -1,21 +1,23 @@
 #pragma once
-// One of every kind of scene sensor, in a scene where all of them have something to measure. Tests that hold for all sensors
-// (sensors/lockstep_test.cc) take this list.
+// Every kind of scene sensor, in a scene where all of them have something to measure: for tests that hold for all sensors.
 
+#include <algorithm>
+#include <iterator>
 #include <memory>
 #include <utility>
 #include <vector>
 
 #include "mjsense/core/sensor.h"
 #include "mjsense/scene/scene.h"
-#include "mjsense/sensors/builtin/builtin_sensor.h"
-#include "mjsense/sensors/camera/camera_sensor_cfg.h"
-#include "mjsense/sensors/contact/contact_sensor.h"
-#include "mjsense/sensors/lidar/lidar_sensor.h"
-#include "mjsense/sensors/raycast/raycast_sensor.h"
-#include "mjsense/sensors/terrain_height/terrain_height_sensor.h"
+#include "mjsense/sensors/all_sensors.h"
+#include "mjsense/sensors/testing/example.h"
 
 namespace mjsense {
+
+#define MJSENSE_DECLARE(name) SensorCfgs name##_examples();
+MJSENSE_SENSORS(MJSENSE_DECLARE)
+#undef MJSENSE_DECLARE
+
 namespace every_sensor_detail {
 
 inline constexpr char kRobot[] = R"(
@@ -52,70 +54,15 @@ inline constexpr char kWedge[] = R"(
 <mujoco><asset><mesh name="wedge" vertex="0 0 0 .2 0 0 0 .2 0 0 0 .2"/></asset>
   <worldbody><body name="wedge" pos="1.1 0 .3"><freejoint/><geom name="wedge" type="mesh" mesh="wedge" mass=".2"/></body></worldbody></mujoco>)";
 
-template <class Cfg, class Fill>
-std::shared_ptr<const SensorCfg> make(const char* name, Fill&& fill) {
-  auto cfg = std::make_shared<Cfg>();
-  cfg->name = name;
-  fill(*cfg);
-  return cfg;
-}
-
 }  // namespace every_sensor_detail
 
-// One of every kind of scene sensor. A new kind adds its lines here.
-inline std::vector<std::shared_ptr<const SensorCfg>> every_sensor() {
-  using every_sensor_detail::make;
-  return {
-      make<BuiltinSensorCfg>("acc",
-                             [](auto& c) {
-                               c.sensor_type = "accelerometer";
-                               c.obj = {"site", "imu", "robot"};
-                             }),
-      make<ContactSensorCfg>("touch",
-                             [](auto& c) {
-                               c.primary = {.mode = "body", .pattern = {".*"}, .entity = "robot"};
-                               c.fields = {"found", "force", "dist", "pos", "normal"};
-                               c.num_slots = 2;
-                               c.track_air_time = c.latch = true;
-                               c.history_length = 3;
-                             }),
-      make<RayCastSensorCfg>("scan",
-                             [](auto& c) {
-                               c.frame = {{"body", "trunk", "robot"}};
-                               c.ray_alignment = "yaw";
-                             }),
-      make<TerrainHeightSensorCfg>("height",
-                                   [](auto& c) {
-                                     c.frame = {{"site", "imu", "robot"}};
-                                   }),
-      make<LidarSensorCfg>("lidar",
-                           [](auto& c) {
-                             c.frame = {{"site", "imu", "robot"}};
-                             c.scan = SpinningScan{.channels = 4, .samples = 60};
-                             c.motion_distortion = true;
-                             c.range_noise_std = 0.01;
-                             c.dropout = 0.1;
-                           }),
-      make<CameraSensorCfg>("eye",
-                            [](auto& c) {
-                              c.camera_name = "robot/eye";
-                              c.width = 48;
-                              c.height = 32;
-                              c.data_types = {"rgb", "depth", "segmentation", "flow"};
-                              c.use_shadows = true;
-                            }),
-      make<CameraSensorCfg>(
-          "flow",
-          [](auto& c) {
-            c.camera_name = "robot/eye";
-            c.width = 40;
-            c.height = 40;
-            c.data_types = {"flow", "normals", "body_segmentation", "entity_segmentation"};
-            c.intrinsics = CameraIntrinsics{20, 20, 20, 20};
-            c.distortion = {"fisheye", {0.01, 0, 0, 0}};
-            c.update_period = 0.01;
-          }),
-  };
+// What the folders of the sensors give as examples.
+inline SensorCfgs every_sensor() {
+  SensorCfgs all;
+#define MJSENSE_ADD(name) std::ranges::copy(name##_examples(), std::back_inserter(all));
+  MJSENSE_SENSORS(MJSENSE_ADD)
+#undef MJSENSE_ADD
+  return all;
 }
 
 // A two-wheeled robot with a mast and an arm that swings; a box, a ball and a mesh to see and to touch; textures and a light.

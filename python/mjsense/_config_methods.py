@@ -1,0 +1,148 @@
+"""What configurations can do: the generated dataclasses of the same names (configs.py, effects.py) inherit from these."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from pathlib import Path
+from types import NoneType
+from typing import TYPE_CHECKING, Any
+
+import mujoco
+
+from mjsense import _core
+from mjsense._arguments import KnownAttributes
+
+if TYPE_CHECKING:
+    from typing_extensions import Self
+
+
+class Config(KnownAttributes):
+    """Base of all configurations: C++ checks them when they are made, and a misspelt attribute is an AttributeError."""
+
+    def __post_init__(self) -> None:
+        _core.check_cfg(self)
+
+
+class ObjRef(Config):
+    name: str
+    entity: str | None
+
+    @property
+    def full_name(self) -> str:
+        return f"{self.entity}/{self.name}" if self.entity else self.name
+
+
+class EntityCfg(Config):
+    model: Any
+    assets: Any
+
+    def __post_init__(self) -> None:
+        if not (isinstance(self.model, (str, Path, mujoco.MjSpec)) or callable(self.model)):
+            raise TypeError(
+                f"EntityCfg: model must be a path, XML text, a mujoco.MjSpec or a function that makes one, not {self.model!r}"
+            )
+        super().__post_init__()
+
+    def _source(self) -> tuple[str, Any, dict[str, bytes]]:
+        """(kind, value, assets): kind path, xml or spec."""
+        model, assets = self.model, dict(self.assets)
+        if callable(model):
+            model = model()
+        if isinstance(model, mujoco.MjSpec):
+            return "spec", model, {**model.assets, **assets}
+        if isinstance(model, str) and model.lstrip().startswith("<"):
+            return "xml", model, assets
+        if isinstance(model, (str, Path)):
+            return "path", str(model), assets
+        raise TypeError(f"EntityCfg.model must be a path, XML text or a mujoco.MjSpec, not {model!r}")
+
+
+class SceneCfg(Config):
+    num_envs: int
+    entities: Mapping[str, Any]
+    sensors: Sequence[Any]
+    base: str | Path | None
+    spec_fn: Callable[[mujoco.MjSpec], None] | None
+
+    def __post_init__(self) -> None:
+        try:
+            entities = dict(self.entities).values()
+        except (TypeError, ValueError):
+            entities = [None]
+        if not all(isinstance(entity, EntityCfg) for entity in entities):
+            raise TypeError(f"SceneCfg: entities must be a mapping of names to EntityCfg, not {self.entities!r}")
+        if not isinstance(self.sensors, Iterable) or isinstance(self.sensors, (str, SensorCfg)):
+            raise TypeError(f"SceneCfg: sensors must be a sequence, not {self.sensors!r}")
+        if not isinstance(self.base, (str, Path, NoneType)):
+            raise TypeError(f"SceneCfg: base must be a path or XML text, not {self.base!r}")
+        if not (self.spec_fn is None or callable(self.spec_fn)):
+            raise TypeError(f"SceneCfg: spec_fn must be a function, not {self.spec_fn!r}")
+        if not isinstance(self.num_envs, int) or isinstance(self.num_envs, bool):
+            raise TypeError(f"SceneCfg: num_envs must be an int, not {self.num_envs!r}")
+        if self.num_envs < 1:
+            raise ValueError(f"SceneCfg: num_envs is {self.num_envs}: must be at least 1")
+        super().__post_init__()
+
+    def _base_spec(self) -> mujoco.MjSpec:
+        """The spec that the scene is built in."""
+        if self.base is None:
+            return mujoco.MjSpec()
+        text = str(self.base)
+        return mujoco.MjSpec.from_string(text) if text.lstrip().startswith("<") else mujoco.MjSpec.from_file(text)
+
+
+class SensorCfg(Config):
+    @property
+    def prefixed_name(self) -> str:
+        """Key in the scene's registry."""
+        return _core.cfg_key(self)
+
+
+class RayPattern(Config):
+    def generate_rays(self) -> tuple[Any, Any]:
+        """Offsets (m) and unit directions, float32 ``[n, 3]`` each, in the local frame."""
+        return _core.pattern_rays(self)
+
+
+class GridPatternCfg(RayPattern):
+    pass
+
+
+class UserPatternCfg(RayPattern):
+    pass
+
+
+class PinholeCameraPatternCfg(RayPattern):
+    @classmethod
+    def from_intrinsic_matrix(cls, intrinsic_matrix: Sequence[float], width: int, height: int) -> Self:
+        """From a 3x3 matrix, as 9 numbers or rows; only its fy is used."""
+        flat = [x for row in intrinsic_matrix for x in (row if hasattr(row, "__iter__") else (row,))]
+        if len(flat) != 9 or not flat[4] > 0:
+            raise ValueError(f"intrinsic_matrix must be 3x3 with a positive fy, not {intrinsic_matrix!r}")
+        return cls(width=width, height=height, fovy=math.degrees(2 * math.atan(height / (2 * float(flat[4])))))
+
+    @classmethod
+    def from_mujoco_camera(cls, camera_name: str) -> Self:
+        """Resolution and angles of a camera of the model."""
+        return cls(camera_name=camera_name)
+
+
+class RingPatternCfg(RayPattern):
+    Ring: Any
+
+    @classmethod
+    def single_ring(cls, radius: float = 0.1, num_samples: int = 8, **kwargs: Any) -> Self:
+        return cls(rings=(cls.Ring(radius, num_samples),), **kwargs)
+
+
+class Noise(Config):
+    @classmethod
+    def with_density(cls, density: float | Sequence[float], **kwargs: Any) -> Self:
+        return cls(density=density, **kwargs)
+
+
+class Clip(Config):
+    @classmethod
+    def saturation(cls, limit: float, **kwargs: Any) -> Self:
+        return cls(-limit, limit, **kwargs)

@@ -1,0 +1,31 @@
+"""The base of what sensors with several fields return (data.py)."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, fields
+from typing import Any
+
+import numpy as np
+
+
+@dataclass(slots=True, frozen=True)
+class SensorData:
+    """Base: the fields of a sensor that is none of the kinds below."""
+
+    def __repr__(self) -> str:
+        shown = ", ".join(
+            f"{f.name}={getattr(self, f.name).dtype}{list(getattr(self, f.name).shape)}"
+            for f in fields(self)
+            if getattr(self, f.name) is not None
+        )
+        return f"{type(self).__name__}({shown})"
+
+
+def make_data(base: type, arrays: dict[str, np.ndarray]) -> Any:
+    """An instance of `base` with these fields; fields that it does not name are added in a class of their own."""
+    known = {f.name for f in fields(base)}
+    extra = [name for name in arrays if name not in known]
+    if extra:
+        namespace = {"__annotations__": {name: "np.ndarray | None" for name in extra}, **dict.fromkeys(extra)}
+        base = dataclass(repr=False, frozen=True)(type(base.__name__, (base,), namespace))
+    return base(**arrays)

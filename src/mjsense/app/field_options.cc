@@ -1,0 +1,124 @@
+#include "mjsense/app/field_options.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cctype>
+
+#include "mjsense/core/error.h"
+
+namespace mjsense {
+namespace {
+
+using Kind = FieldType::Kind;
+
+bool is_flag(const FieldDecl& field) { return field.type->kind == Kind::kBool; }
+
+bool flag_default(const StructDecl& decl, const FieldDecl& field) {
+  return *static_cast<const bool*>(at(decl.defaults.get(), field));
+}
+
+std::string dashed(std::string name) {
+  std::ranges::replace(name, '_', '-');
+  return name;
+}
+
+const char* type_name(const FieldType& type) {
+  switch (type.kind) {
+    case Kind::kOptional:
+      return type_name(type.element());
+    case Kind::kInt:
+    case Kind::kUnsigned:
+      return "INT";
+    case Kind::kNumber:
+      return "FLOAT";
+    case Kind::kPath:
+      return "DIR";
+    case Kind::kList:
+      return "NAMES";
+    default:
+      return "TEXT";
+  }
+}
+
+std::string help(const FieldDecl& field) {
+  std::string text = field.sentence;
+  std::erase(text, '`');
+  text.pop_back();  // as a line of a list: no sentence
+  text[0] = static_cast<char>(std::tolower(static_cast<unsigned char>(text[0])));
+  if (*field.unit_) text += fmt::format(" [{}]", field.unit_);
+  return text;
+}
+
+void set_field(const StructDecl& decl, void* object, const std::string& assignment) {
+  const std::size_t equals = assignment.find('=');
+  if (equals == std::string::npos)
+    throw ValueError(fmt::format("--set {}: expected NAME=VALUE", assignment));
+  std::string name = assignment.substr(0, equals);
+  std::ranges::replace(name, '-', '_');
+  std::vector<std::string> names;
+  for (const FieldDecl& field : decl.fields) {
+    if (name == field.option_name() || name == field.name)
+      return read_text(field, object, std::string_view(assignment).substr(equals + 1));
+    names.emplace_back(field.option_name());
+  }
+  throw_unknown("--set", "field", name, names);
+}
+
+}  // namespace
+
+void add_field_options(CLI::App& app, const StructDecl& decl, void* object,
+                       std::initializer_list<std::string_view> skip) {
+  for (const FieldDecl& field : decl.fields) {
+    const std::string name = dashed(field.option_name());
+    if (field.is_hidden || std::ranges::find(skip, name) != skip.end()) continue;
+    if (is_flag(field)) {
+      const bool standard = flag_default(decl, field);
+      bool& value = *static_cast<bool*>(at(object, field));
+      app.add_flag(standard ? "!--no-" + name : "--" + name, value,
+                   (standard ? "not: " : "") + help(field));
+      continue;
+    }
+    app.add_option_function<std::string>(
+           "--" + name,
+           [&field, object](const std::string& text) {
+             try {
+               read_text(field, object, text);
+             } catch (const ValueError& e) {
+               throw ValueError(std::string("--") + e.what());
+             }
+           },
+           help(field))
+        ->type_name(type_name(*field.type))
+        ->default_str(write_text(field, object));
+  }
+  app.add_option_function<std::string>(
+         "--size", [&decl, object](const std::string& text) { read_size(decl, object, text); },
+         "width and height at once")
+      ->type_name("WxH");
+  app.add_option_function<std::vector<std::string>>(
+         "--set",
+         [&decl, object](const std::vector<std::string>& all) {
+           for (const std::string& one : all) set_field(decl, object, one);
+         },
+         "any field by its name, also those without an option")
+      ->type_name("NAME=VALUE")
+      ->expected(1)
+      ->take_all();
+}
+
+void read_size(const StructDecl& decl, void* object, std::string_view text) {
+  const std::size_t x = text.find('x');
+  const FieldDecl &width = *decl.find("width"), &height = *decl.find("height");
+  try {
+    if (x == text.npos) throw ValueError("");
+    read_text(width, object, text.substr(0, x));
+    read_text(height, object, text.substr(x + 1));
+    check_field(width, object, "");
+    check_field(height, object, "");
+  } catch (const ValueError&) {
+    throw ValueError(fmt::format("size '{}': expected WIDTHxHEIGHT, as 640x368", text));
+  }
+}
+
+}  // namespace mjsense

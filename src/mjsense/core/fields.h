@@ -1,0 +1,492 @@
+#pragma once
+// One declaration of a field. Beside a configuration stands
+//
+//   template <class V>
+//   void visit_fields(V& v, ContactSensorCfg& c) {
+//     v.object("ContactSensorCfg", "Contacts of primaries.", "contact");
+//     v("num_slots", c.num_slots, "Contacts kept for each primary.").at_least(1);
+//     v("max_distance", c.max_distance, "Hits farther away are misses.").unit("m").positive();
+//   }
+//
+// and everything else reads it: the checks below, Python, the program's options, experiment files,
+// the fingerprint of a recording, the documentation. The sentence is no option: without one the
+// code does not compile. A reader is written once, over the table that struct_of<T>() makes of the
+// visit, and not once for each struct.
+
+#include <array>
+#include <cstddef>
+#include <cstdint>
+#include <filesystem>
+#include <limits>
+#include <memory>
+#include <optional>
+#include <span>
+#include <string>
+#include <string_view>
+#include <type_traits>
+#include <utility>
+#include <variant>
+#include <vector>
+
+namespace mjsense {
+
+// Text that says something, known at compile time.
+class Sentence {
+ public:
+  consteval Sentence(const char* text) : text_(text) {  // NOLINT: a literal is one
+    std::size_t length = 0;
+    while (text[length] != 0) ++length;
+    if (length < 2 || text[length - 1] != '.') throw "needs a sentence that ends with a full stop";
+  }
+  constexpr const char* text() const { return text_; }
+
+ private:
+  const char* text_;
+};
+
+// The words of an enumeration whose values count from 0. Beside the enumeration:
+//   template <> inline constexpr std::array<std::string_view, 2> kWords<Side>{"left", "right"};
+template <class E>
+inline constexpr std::nullptr_t kWords = nullptr;
+
+template <class E>
+concept Worded = std::is_enum_v<E> && !std::is_same_v<decltype(kWords<E>), const std::nullptr_t>;
+
+template <Worded E>
+std::string_view word(E value) {
+  return kWords<E>[static_cast<std::size_t>(value)];
+}
+
+// Number of `text` among `words`, whatever its case. ValueError "sensor 'feet': reduce is 'max':
+// must be one of none, mindist, maxforce, netforce; did you mean 'maxforce'?"
+int word_index(std::string_view text, std::span<const std::string_view> words,
+               std::string_view place, std::string_view field);
+
+// A member that is one of the words: `cfg.reduce = ContactReduce::kNone` or `cfg.reduce = "none"`.
+// A word that there is not does not compile.
+template <Worded E>
+class Word {
+ public:
+  constexpr Word() = default;
+  constexpr Word(E value) : value_(value) {}                // NOLINT: it is one
+  consteval Word(const char* text) : value_(find(text)) {}  // NOLINT: a literal names one
+  constexpr operator E() const { return value_; }           // NOLINT
+  std::string_view text() const { return word(value_); }
+  friend constexpr bool operator==(Word a, Word b) { return a.value_ == b.value_; }
+  friend constexpr bool operator==(Word a, E b) { return a.value_ == b; }
+
+ private:
+  static consteval E find(std::string_view text) {
+    for (std::size_t i = 0; i < kWords<E>.size(); ++i) {
+      if (kWords<E>[i] == text) return static_cast<E>(i);
+    }
+    throw "there is no such word";
+  }
+  E value_{};
+};
+
+template <Worded E>
+E from_word(std::string_view text, std::string_view place, std::string_view field) {
+  return static_cast<E>(word_index(text, kWords<E>, place, field));
+}
+
+class JsonWriter;
+struct StructDecl;
+
+// What a value is, and how to reach into it.
+struct FieldType {
+  enum class Kind {
+    kBool,
+    kInt,
+    kUnsigned,
+    kNumber,
+    kText,
+    kPath,
+    kWord,      // an enumeration
+    kArray,     // of a fixed length
+    kList,      // std::vector
+    kOptional,  // as a list of 0 or 1
+    kMap,       // std::vector of (name, value), in order
+    kObject,    // a struct with fields of its own
+    kChoice,    // one of several structs, told apart by their kinds
+  };
+  Kind kind;
+  std::size_t bytes = 0;                     // of a number
+  std::span<const std::string_view> words{}; // kWord
+  // kArray, kList, kOptional, kMap
+  const FieldType& (*element)() = nullptr;
+  std::size_t (*count)(const void* list) = nullptr;
+  void* (*at)(void* list, std::size_t i) = nullptr;
+  std::string* (*key_at)(void* list, std::size_t i) = nullptr;  // kMap
+  void (*clear)(void* list) = nullptr;
+  void* (*append)(void* list) = nullptr;
+  // kObject
+  const StructDecl& (*object)() = nullptr;
+  // kChoice: its Python name, what there is, which one it is, and making it another
+  const char* choice = nullptr;
+  std::span<const StructDecl* const> (*alternatives)() = nullptr;
+  int (*which)(const void* value) = nullptr;
+  void* (*get)(void* value) = nullptr;
+  void* (*emplace)(void* value, int alternative) = nullptr;
+  int plain = -1;  // the alternative that a plain number stands for: it is its first field
+};
+
+// One field. The functions below add what is to be known of it, in a chain.
+struct FieldDecl {
+  const char* name;
+  const char* sentence;
+  const FieldType* type;  // null: only Python knows what it is
+  std::size_t offset;
+  const char* owner;  // the struct that declares it: a base, for what is inherited
+
+  const char* unit_ = "";
+  double low = -std::numeric_limits<double>::max(), high = std::numeric_limits<double>::max();
+  bool above_low = false;  // low itself is out
+  bool is_required = false, is_or_none = false, is_or_one = false, is_not_empty = false;
+  std::span<const std::string_view> words{};  // of a text or a list of texts
+  const char* option_ = nullptr;              // its name for people who record
+  const char* fingerprint = nullptr;
+  bool is_hidden = false, is_resolved = false;
+  const char* python_type = "";
+  const char* python_default = "";
+
+  FieldDecl& unit(const char* u) { return unit_ = u, *this; }
+  // What it, or each of its components, may be. NaN never is, infinity only where said.
+  FieldDecl& at_least(double x) { return low = x, *this; }
+  FieldDecl& at_most(double x) { return high = x, *this; }
+  FieldDecl& within(double a, double b) { return low = a, high = b, *this; }
+  FieldDecl& above(double x) { return low = x, above_low = true, *this; }
+  FieldDecl& positive() { return above(0); }
+  FieldDecl& may_be_infinite() {
+    constexpr double kInfinity = std::numeric_limits<double>::infinity();
+    if (low == -std::numeric_limits<double>::max()) low = -kInfinity;
+    if (high == std::numeric_limits<double>::max()) high = kInfinity;
+    return *this;
+  }
+  FieldDecl& one_of(std::span<const std::string_view> w) { return words = w, *this; }
+  FieldDecl& not_empty() { return is_not_empty = true, *this; }
+  // How Python writes it: without a default; None for what is empty here; one value for a list of it.
+  FieldDecl& required() { return is_required = true, *this; }
+  FieldDecl& or_none() { return is_or_none = true, *this; }
+  FieldDecl& or_one() { return is_or_one = true, *this; }
+  // Recordings: its name as an option, where that is another; not an option of its own; whether a
+  // recording resumes only with an equal value, and under which key its settings keep that.
+  FieldDecl& option(const char* o) { return option_ = o, *this; }
+  FieldDecl& hidden() { return is_hidden = true, *this; }
+  FieldDecl& decides_data() { return fingerprint = name, *this; }
+  FieldDecl& decides_data_as(const char* key) {  // what becomes of it stands under this key
+    return fingerprint = key, is_resolved = true, *this;
+  }
+  const char* option_name() const { return option_ ? option_ : name; }
+};
+
+struct StructDecl {
+  struct Base {
+    const char *name, *sentence;
+    bool frozen;
+  };
+  const char* name = "";  // in Python
+  const char* sentence = "";
+  const char* kind = "";    // "contact", "grid" ...: what tells alternatives apart
+  const char* module = "";  // of Python, where that is not configs
+  bool frozen = false;
+  std::vector<Base> bases;  // the direct one first
+  std::vector<FieldDecl> fields;
+  std::shared_ptr<const void> defaults;
+  std::shared_ptr<void> (*make)() = nullptr;
+  // What its fields say of each other: validate(cfg, place) beside the struct, or its member.
+  void (*validate)(const void* object, std::string_view place) = nullptr;
+
+  const FieldDecl* find(std::string_view field) const;
+};
+
+inline void* at(void* object, const FieldDecl& field) {
+  return static_cast<char*>(object) + field.offset;
+}
+inline const void* at(const void* object, const FieldDecl& field) {
+  return static_cast<const char*>(object) + field.offset;
+}
+
+template <class T>
+const FieldType& field_type();
+
+// The only visitor: makes the table.
+class FieldVisitor {
+ public:
+  FieldVisitor(StructDecl& decl, const void* instance) : decl_(decl), instance_(instance) {}
+
+  // First of all: the struct itself.
+  FieldVisitor& object(const char* name, Sentence sentence, const char* kind = "");
+  FieldVisitor& frozen();  // in Python
+  FieldVisitor& module(const char* name) { return depth_ == 0 ? decl_.module = name, *this : *this; }
+
+  template <class T>
+  FieldDecl& operator()(const char* name, T& member, Sentence sentence) {
+    return add(name, &member, &field_type<T>(), sentence);
+  }
+  // A field that only Python has.
+  FieldDecl& python(const char* name, const char* type, const char* default_value,
+                    Sentence sentence);
+  // The fields of a base, which is one in Python, too.
+  template <class B>
+  void extends(B& base) {
+    const char* owner = owner_;
+    ++depth_;
+    visit_fields(*this, base);
+    --depth_;
+    owner_ = owner;
+  }
+  // The fields of a part, as if they were our own.
+  template <class B>
+  void include(B& part) {
+    ++included_;
+    extends(part);
+    --included_;
+  }
+
+ private:
+  FieldDecl& add(const char* name, const void* member, const FieldType* type, Sentence sentence);
+  StructDecl& decl_;
+  const void* instance_;
+  const char* owner_ = "";
+  int depth_ = 0, included_ = 0;
+};
+
+template <class T>
+concept Described = requires(FieldVisitor& v, T& t) { visit_fields(v, t); };
+
+template <Described T>
+const StructDecl& struct_of() {
+  static const StructDecl kDecl = [] {
+    StructDecl decl;
+    auto instance = std::make_shared<T>();
+    FieldVisitor visitor(decl, instance.get());
+    visit_fields(visitor, *instance);
+    decl.defaults = std::move(instance);
+    decl.make = []() -> std::shared_ptr<void> { return std::make_shared<T>(); };
+    if constexpr (requires(const T& t) { t.validate(std::string_view()); }) {
+      decl.validate = [](const void* object, std::string_view place) {
+        static_cast<const T*>(object)->validate(place);
+      };
+    } else if constexpr (requires(const T& t) { validate(t, std::string_view()); }) {
+      decl.validate = [](const void* object, std::string_view place) {
+        validate(*static_cast<const T*>(object), place);
+      };
+    }
+    return decl;
+  }();
+  return kDecl;
+}
+
+// ValueError for the first field that is out of its range, not a number, or no known word:
+// "sensor 'feet': num_slots is 0: must be at least 1".
+void check_fields(const StructDecl& decl, const void* object, std::string_view place);
+
+// Of one field alone.
+void check_field(const FieldDecl& field, const void* object, std::string_view place);
+
+template <Described T>
+void check_fields(const T& object, std::string_view place) {
+  check_fields(struct_of<T>(), &object, place);
+}
+
+// A value as people write it: "3", "true", "maxforce", "0,0,1", "wrist,exo", "none" for an empty
+// list. ValueError names the field (by its option) and what was expected.
+void read_text(const FieldDecl& field, void* object, std::string_view text);
+// The other way; "" for an optional without a value.
+std::string write_text(const FieldDecl& field, const void* object);
+// Of a bool, a number or a text.
+void write_json(JsonWriter& json, const FieldDecl& field, const void* object);
+// Numbers of any width. False if it does not fit.
+bool set_integer(const FieldType& type, void* value, std::int64_t x);
+std::int64_t get_integer(const FieldType& type, const void* value);
+void set_number(const FieldType& type, void* value, double x);
+double get_number(const FieldType& type, const void* value);
+// "an int", "a number", "3 numbers" ...
+std::string expected(const FieldType& type);
+
+// ------------------------------------------------------------------------------- types of values
+
+namespace field_detail {
+
+using Kind = FieldType::Kind;
+
+template <class T>
+constexpr FieldType scalar(Kind kind) {
+  return {.kind = kind, .bytes = sizeof(T)};
+}
+
+// Lists, optionals, arrays and maps by the same functions.
+template <class L, class T>
+constexpr FieldType container(Kind kind) {
+  return {.kind = kind, .element = &field_type<T>};
+}
+
+template <class T>
+  requires std::is_same_v<T, bool>
+constexpr FieldType make() {
+  return scalar<T>(Kind::kBool);
+}
+template <class T>
+  requires(std::is_integral_v<T> && !std::is_same_v<T, bool>)
+constexpr FieldType make() {
+  return scalar<T>(std::is_signed_v<T> ? Kind::kInt : Kind::kUnsigned);
+}
+template <class T>
+  requires std::is_floating_point_v<T>
+constexpr FieldType make() {
+  return scalar<T>(Kind::kNumber);
+}
+template <class T>
+  requires std::is_same_v<T, std::string>
+constexpr FieldType make() {
+  return {.kind = Kind::kText};
+}
+template <class T>
+  requires std::is_same_v<T, std::filesystem::path>
+constexpr FieldType make() {
+  return {.kind = Kind::kPath};
+}
+template <Worded T>
+constexpr FieldType make() {
+  return {.kind = Kind::kWord, .bytes = sizeof(T), .words = kWords<T>};
+}
+template <class T>
+inline constexpr bool kIsWord = false;
+template <class E>
+inline constexpr bool kIsWord<Word<E>> = true;
+template <class W>
+  requires kIsWord<W>
+constexpr FieldType make() {
+  using E = decltype([](auto w) {
+    return []<class T>(Word<T>) { return T{}; }(w);
+  }(W{}));
+  return {.kind = Kind::kWord, .bytes = sizeof(W), .words = kWords<E>};
+}
+template <Described T>
+constexpr FieldType make() {
+  return {.kind = Kind::kObject, .object = &struct_of<T>};
+}
+
+template <class T>
+inline constexpr bool kIsArray = false;
+template <class T, std::size_t N>
+inline constexpr bool kIsArray<std::array<T, N>> = true;
+template <class T>
+inline constexpr bool kIsList = false;
+template <class T>
+inline constexpr bool kIsList<std::vector<T>> = true;
+template <class T>
+inline constexpr bool kIsMap = false;
+template <class T>
+inline constexpr bool kIsMap<std::vector<std::pair<std::string, T>>> = true;
+template <class T>
+inline constexpr bool kIsOptional = false;
+template <class T>
+inline constexpr bool kIsOptional<std::optional<T>> = true;
+template <class T>
+inline constexpr bool kIsVariant = false;
+template <class... T>
+inline constexpr bool kIsVariant<std::variant<T...>> = true;
+
+template <class L>
+  requires kIsArray<L>
+constexpr FieldType make() {
+  FieldType t = container<L, typename L::value_type>(Kind::kArray);
+  t.count = [](const void*) { return std::tuple_size_v<L>; };
+  t.at = [](void* list, std::size_t i) -> void* { return &(*static_cast<L*>(list))[i]; };
+  return t;
+}
+template <class L>
+  requires(kIsList<L> && !kIsMap<L>)
+constexpr FieldType make() {
+  FieldType t = container<L, typename L::value_type>(Kind::kList);
+  t.count = [](const void* list) { return static_cast<const L*>(list)->size(); };
+  t.at = [](void* list, std::size_t i) -> void* { return &(*static_cast<L*>(list))[i]; };
+  t.clear = [](void* list) { static_cast<L*>(list)->clear(); };
+  t.append = [](void* list) -> void* { return &static_cast<L*>(list)->emplace_back(); };
+  return t;
+}
+template <class L>
+  requires kIsMap<L>
+constexpr FieldType make() {
+  FieldType t = container<L, typename L::value_type::second_type>(Kind::kMap);
+  t.count = [](const void* list) { return static_cast<const L*>(list)->size(); };
+  t.at = [](void* list, std::size_t i) -> void* { return &(*static_cast<L*>(list))[i].second; };
+  t.key_at = [](void* list, std::size_t i) { return &(*static_cast<L*>(list))[i].first; };
+  t.clear = [](void* list) { static_cast<L*>(list)->clear(); };
+  t.append = [](void* list) -> void* { return &static_cast<L*>(list)->emplace_back().second; };
+  return t;
+}
+template <class L>
+  requires kIsOptional<L>
+constexpr FieldType make() {
+  FieldType t = container<L, typename L::value_type>(Kind::kOptional);
+  t.count = [](const void* o) -> std::size_t { return static_cast<const L*>(o)->has_value(); };
+  t.at = [](void* o, std::size_t) -> void* { return &**static_cast<L*>(o); };
+  t.clear = [](void* o) { static_cast<L*>(o)->reset(); };
+  t.append = [](void* o) -> void* { return &static_cast<L*>(o)->emplace(); };
+  return t;
+}
+
+template <class V>
+struct Variant;
+template <class... T>
+struct Variant<std::variant<T...>> {
+  using V = std::variant<T...>;
+  static std::span<const StructDecl* const> alternatives() {
+    static const std::array<const StructDecl*, sizeof...(T)> kAll{&struct_of<T>()...};
+    return kAll;
+  }
+  static void* get(void* value) {
+    return std::visit([](auto& x) -> void* { return &x; }, *static_cast<V*>(value));
+  }
+  static void* emplace(void* value, int alternative) {
+    using Make = void (*)(V&);
+    static constexpr Make kMake[] = {[](V& v) { v = T{}; }...};
+    kMake[alternative](*static_cast<V*>(value));
+    return get(value);
+  }
+};
+
+// The name of a choice in Python, beside the variant: template <> ... kChoiceName<PatternCfg>.
+template <class V>
+  requires kIsVariant<V>
+constexpr FieldType make();
+
+}  // namespace field_detail
+
+template <class V>
+inline constexpr const char* kChoiceName = "";
+template <class V>
+inline constexpr int kPlainAlternative = -1;
+
+template <class V>
+  requires field_detail::kIsVariant<V>
+constexpr FieldType field_detail::make() {
+  using Of = Variant<V>;
+  return {.kind = Kind::kChoice,
+          .choice = kChoiceName<V>,
+          .alternatives = &Of::alternatives,
+          .which = [](const void* v) { return static_cast<int>(static_cast<const V*>(v)->index()); },
+          .get = &Of::get,
+          .emplace = &Of::emplace,
+          .plain = kPlainAlternative<V>};
+}
+
+// Another type of value specialises this: see effects/all_effects.h.
+template <class T>
+struct CustomFieldType;
+
+template <class T>
+const FieldType& field_type() {
+  if constexpr (requires { CustomFieldType<T>::make(); }) {
+    static const FieldType kType = CustomFieldType<T>::make();
+    return kType;
+  } else {
+    static constexpr FieldType kType = field_detail::make<T>();
+    return kType;
+  }
+}
+
+}  // namespace mjsense

@@ -1,0 +1,65 @@
+#include "mjsense/effects/all_effects.h"
+
+#include <vector>
+
+namespace mjsense {
+namespace {
+
+using Shared = std::shared_ptr<const Effect>;
+
+struct Alternative {
+  const StructDecl* decl;
+  std::unique_ptr<Effect> (*make)();
+};
+
+template <class... E>
+std::vector<Alternative> alternatives(EffectTypes<E...>) {
+  return {{&struct_of<E>(), []() -> std::unique_ptr<Effect> { return std::make_unique<E>(); }}...};
+}
+
+const std::vector<Alternative>& all() {
+  static const std::vector<Alternative> kAll = alternatives(AllEffects{});
+  return kAll;
+}
+
+// Fields are counted from the whole object, wherever its base stands in it.
+void* whole(const Shared& effect) {
+  return const_cast<void*>(dynamic_cast<const void*>(effect.get()));
+}
+
+}  // namespace
+
+FieldType CustomFieldType<Shared>::make() {
+  FieldType t{.kind = FieldType::Kind::kChoice, .choice = "Effect"};
+  t.alternatives = []() -> std::span<const StructDecl* const> {
+    static const std::vector<const StructDecl*> kDecls = [] {
+      std::vector<const StructDecl*> decls;
+      for (const Alternative& a : all()) decls.push_back(a.decl);
+      return decls;
+    }();
+    return kDecls;
+  };
+  t.which = [](const void* value) {
+    const auto& effect = *static_cast<const Shared*>(value);
+    for (std::size_t i = 0; effect && i < all().size(); ++i) {
+      if (effect->kind() == all()[i].decl->kind) return static_cast<int>(i);
+    }
+    return -1;
+  };
+  t.get = [](void* value) { return whole(*static_cast<Shared*>(value)); };
+  t.emplace = [](void* value, int alternative) {
+    auto& effect = *static_cast<Shared*>(value);
+    effect = all()[alternative].make();
+    return whole(effect);
+  };
+  return t;
+}
+
+void check_effect(const Shared& effect, std::string_view place) {
+  const FieldType& type = field_type<Shared>();
+  const int which = type.which(&effect);
+  if (which < 0) return effect->validate(place);
+  check_fields(*type.alternatives()[which], whole(effect), place);
+}
+
+}  // namespace mjsense

@@ -1,0 +1,15 @@
+#include "mjsense/sensors/testing/example.h"
+
+#include "mjsense/sensors/imu/imu_sensor.h"
+
+namespace mjsense {
+
+SensorCfgs imu_examples() {
+  return {example<ImuSensorCfg>("imu", [](ImuSensorCfg& c) {
+    c.site = {"site", "imu", "robot"};
+    c.preset = "mpu6050";
+    c.orientation = true;
+  })};
+}
+
+}  // namespace mjsense

@@ -1,0 +1,15 @@
+#include "mjsense/sensors/testing/example.h"
+
+#include "mjsense/effects/effect_sensor.h"
+
+namespace mjsense {
+
+SensorCfgs effect_examples() {
+  return {example<EffectSensorCfg>("noisy", [](EffectSensorCfg& c) {
+    c.sensor = "robot/acc";
+    c.effects = {std::make_shared<Noise>(Draw::gaussian({0.1})), std::make_shared<Delay>(0.004)};
+    c.history_length = 2;
+  })};
+}
+
+}  // namespace mjsense

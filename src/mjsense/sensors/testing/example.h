@@ -1,0 +1,22 @@
+#pragma once
+// Examples of a kind of sensor in the scene of every_sensor.h, for tests that hold for all sensors.
+// Each sensor's folder gives its own in testing/example.cc.
+
+#include <memory>
+#include <vector>
+
+#include "mjsense/core/sensor.h"
+
+namespace mjsense {
+
+using SensorCfgs = std::vector<std::shared_ptr<const SensorCfg>>;
+
+template <class Cfg, class Fill>
+std::shared_ptr<const SensorCfg> example(const char* name, Fill&& fill) {
+  auto cfg = std::make_shared<Cfg>();
+  cfg->name = name;
+  fill(*cfg);
+  return cfg;
+}
+
+}  // namespace mjsense
