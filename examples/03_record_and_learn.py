@@ -18,7 +18,7 @@ with h5py.File(next(summary.path.glob("*.h5"))) as file:
 
 env = mjs.make_vec("pick", num_envs=2, policy="planner", cameras=[], seed=7)
 observation, _ = env.reset()
-print("observation:", {name: rows.shape for name, rows in observation.items() if "/" not in name})
+print("observation:", {"arm": observation["qpos"]["arm"].shape, "tool": observation["tcp_pose"].shape})
 picked = [False, False]
 for step in range(150):
     observation, reward, terminated, truncated, info = env.step(env.expert_action())

@@ -98,7 +98,7 @@ def test_sensors_of_a_scene(mjsense):
 
 def test_sensors_of_a_task(mjsense):
     table = json.loads(mjsense("sensors", "pick", "--json", "--size", "64x48", "--steps", 2).stdout)
-    names = [s["name"] if s["name"].startswith("actions/") else s["name"].split("/")[0] for s in table]
+    names = ["/".join(s["name"].split("/")[: 2 if s["name"].startswith("actions/") else 1]) for s in table]
     assert list(dict.fromkeys(names)) == [
         "sensor_param_wrist_camera", "wrist_camera", "sensor_param_exo_camera_1", "exo_camera_1", "qpos", "qvel",
         "robot_base_pose", "env_states", "task_info", "actions/commanded_action", "actions/joint_pos",
