@@ -12,8 +12,8 @@
 #include "mjsense/rollout/record_job.h"
 #include "mjsense/rollout/registry.h"
 #include "python/bindings/bindings.h"
-#include "python/bindings/py_simulation.h"
 #include "python/bindings/fields.h"
+#include "python/bindings/py_simulation.h"
 #include "python/bindings/sensor_handle.h"
 
 namespace mjsense::python {
@@ -230,8 +230,8 @@ nb::tuple outcome(PyRollout& self, int w) {
 }  // namespace
 
 void bind_rollout(nb::module_& m) {
-  m.def("record", &record, nb::arg("options"), nb::arg("progress").none(),
-        nb::arg("sensors"), nb::arg("make_simulation"));
+  m.def("record", &record, nb::arg("options"), nb::arg("progress").none(), nb::arg("sensors"),
+        nb::arg("make_simulation"));
   m.def("task_names", &task_names, "Names of the tasks there are.");
   m.def("robot_names", &robot_names, "Names of the robots there are.");
   m.def("policy_names", &policy_names, "Names of the policies there are.");

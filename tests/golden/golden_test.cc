@@ -172,10 +172,11 @@ Hashes legged() {
   SceneCfg scene;
   scene.terrain = TerrainCfg{
       .terrain_type = "generator", .levels = 2, .tile_size = {4, 4}, .border = 1, .seed = 3};
-  for (const char* kind : {"rough", "slope", "stairs", "waves"}) {
+  for (const SubTerrain kind :
+       {SubTerrain::kRough, SubTerrain::kSlope, SubTerrain::kStairs, SubTerrain::kWaves}) {
     SubTerrainCfg sub{.kind = kind};
     sub.platform_width = 1;
-    scene.terrain->sub_terrains.emplace_back(kind, sub);
+    scene.terrain->sub_terrains.emplace_back(word(kind), sub);
   }
   add_entity(scene, "dog", kDog, {-1.2, -5.2, 0.75});
   const auto feet = std::vector<std::string>{".*_foot"};

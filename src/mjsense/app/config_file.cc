@@ -67,7 +67,8 @@ void read_key(const Key& key, void* object, const toml::node& node, const std::s
   void* value = at(object, field);
   if (!read_node(*field.type, value, node)) {
     // Lists may also be written as on the command line.
-    const Kind kind = field.type->kind == Kind::kOptional ? field.type->element().kind : field.type->kind;
+    const Kind kind =
+        field.type->kind == Kind::kOptional ? field.type->element().kind : field.type->kind;
     if (kind != Kind::kList || !text)
       throw ValueError(fmt::format("{}: the value of '{}' is of a wrong type: must be {}", place,
                                    field.option_name(), expected(*field.type)));
@@ -103,7 +104,9 @@ void read_toml(const std::string& path, const StructDecl& decl, void* object) {
     const auto place = fmt::format("{}:{}", path, node.source().begin.line);
     if (name == "size") {
       const auto text = node.value_exact<std::string>();
-      if (!text) throw ValueError(fmt::format("{}: the value of 'size' is of a wrong type: must be a str", place));
+      if (!text)
+        throw ValueError(
+            fmt::format("{}: the value of 'size' is of a wrong type: must be a str", place));
       read_size(decl, object, *text);
       continue;
     }

@@ -150,8 +150,10 @@ void print(const std::string& text) { fmt::print("{}{}", text, text.ends_with('\
 void read_config_argument(int argc, char** argv, RecordOptions& options) {
   for (int i = 2; i < argc; ++i) {
     const std::string word = argv[i];
-    if (word == "--config" && i + 1 < argc) read_toml(argv[i + 1], struct_of<RecordJobCfg>(), &options.job);
-    if (word.starts_with("--config=")) read_toml(word.substr(9), struct_of<RecordJobCfg>(), &options.job);
+    if (word == "--config" && i + 1 < argc)
+      read_toml(argv[i + 1], struct_of<RecordJobCfg>(), &options.job);
+    if (word.starts_with("--config="))
+      read_toml(word.substr(9), struct_of<RecordJobCfg>(), &options.job);
   }
 }
 

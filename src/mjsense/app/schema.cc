@@ -16,9 +16,9 @@ namespace {
 using Json = nlohmann::ordered_json;
 using Kind = FieldType::Kind;
 
-constexpr const char* kKindNames[] = {"bool", "int",  "unsigned", "number", "text",   "path",
-                                      "word", "array", "list",    "optional", "map", "object",
-                                      "choice"};
+constexpr const char* kKindNames[] = {"bool", "int",    "unsigned", "number", "text",
+                                      "path", "word",   "array",    "list",   "optional",
+                                      "map",  "object", "choice"};
 
 // JSON knows no infinity; single precision shows its shortest text.
 Json number(double x, std::size_t bytes) {
@@ -38,7 +38,8 @@ class Schema {
     out["frozen"] = decl.frozen;
     out["doc"] = decl.sentence;
     for (const StructDecl::Base& base : decl.bases)
-      out["bases"].push_back({{"name", base.name}, {"doc", base.sentence}, {"frozen", base.frozen}});
+      out["bases"].push_back(
+          {{"name", base.name}, {"doc", base.sentence}, {"frozen", base.frozen}});
     for (const FieldDecl& field : decl.fields) out["fields"].push_back(describe(decl, field));
     structs_[decl.name] = std::move(out);
   }

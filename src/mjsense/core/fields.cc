@@ -141,17 +141,19 @@ void check_list(const FieldDecl& field, const FieldType& type, const void* value
   const FieldType& element = type.element();
   for (std::size_t i = 0; i < n; ++i) {
     if (right_numbers(field, element, type.at(list, i))) continue;
-    const bool whole = type.kind == Kind::kOptional || element.kind == Kind::kText ||
-                       (field.is_or_one && n == 1);
-    const std::string part = whole                      ? name
-                             : type.kind == Kind::kMap ? fmt::format("{}['{}']", name, *type.key_at(list, i))
-                                                       : fmt::format("{}[{}]", name, i);
+    const bool whole =
+        type.kind == Kind::kOptional || element.kind == Kind::kText || (field.is_or_one && n == 1);
+    const std::string part = whole ? name
+                             : type.kind == Kind::kMap
+                                 ? fmt::format("{}['{}']", name, *type.key_at(list, i))
+                                 : fmt::format("{}[{}]", name, i);
     check_value(field, element, type.at(list, i), place, part);
     if (field.words.empty() || element.kind != Kind::kText) continue;
     const auto& text = *static_cast<const std::string*>(type.at(list, i));
     for (std::size_t k = 0; k < i; ++k) {
       if (*static_cast<const std::string*>(type.at(list, k)) == text)
-        throw ValueError(fmt::format("{}{}{} has '{}' twice", place, place.empty() ? "" : ": ", name, text));
+        throw ValueError(
+            fmt::format("{}{}{} has '{}' twice", place, place.empty() ? "" : ": ", name, text));
     }
   }
 }
@@ -295,13 +297,10 @@ FieldDecl& FieldVisitor::python(const char* name, const char* type, const char* 
 
 FieldDecl& FieldVisitor::add(const char* name, const void* member, const FieldType* type,
                              Sentence sentence) {
-  const auto offset =
-      static_cast<std::size_t>(static_cast<const char*>(member) - static_cast<const char*>(instance_));
-  return decl_.fields.emplace_back(FieldDecl{.name = name,
-                                             .sentence = sentence.text(),
-                                             .type = type,
-                                             .offset = offset,
-                                             .owner = owner_});
+  const auto offset = static_cast<std::size_t>(static_cast<const char*>(member) -
+                                               static_cast<const char*>(instance_));
+  return decl_.fields.emplace_back(FieldDecl{
+      .name = name, .sentence = sentence.text(), .type = type, .offset = offset, .owner = owner_});
 }
 
 void check_fields(const StructDecl& decl, const void* object, std::string_view place) {
@@ -316,7 +315,8 @@ void check_field(const FieldDecl& field, const void* object, std::string_view pl
 
 void read_text(const FieldDecl& field, void* object, std::string_view text) {
   if (read_value(field, *field.type, at(object, field), text)) return;
-  throw ValueError(fmt::format("{} is '{}': must be {}", field.option_name(), text, expected(*field.type)));
+  throw ValueError(
+      fmt::format("{} is '{}': must be {}", field.option_name(), text, expected(*field.type)));
 }
 
 std::string write_text(const FieldDecl& field, const void* object) {
@@ -340,11 +340,14 @@ void write_json(JsonWriter& json, const FieldDecl& field, const void* object) {
 bool set_integer(const FieldType& type, void* value, std::int64_t x) {
   const auto set = [&]<class T>(T) {
     const auto narrow = static_cast<T>(x);
-    if (static_cast<std::int64_t>(narrow) != x || (type.kind == Kind::kUnsigned && x < 0)) return false;
+    if (static_cast<std::int64_t>(narrow) != x || (type.kind == Kind::kUnsigned && x < 0))
+      return false;
     std::memcpy(value, &narrow, sizeof narrow);
     return true;
   };
-  return type.bytes == 8 ? set(std::int64_t{}) : type.bytes == 4 ? set(std::int32_t{}) : set(std::int8_t{});
+  return type.bytes == 8   ? set(std::int64_t{})
+         : type.bytes == 4 ? set(std::int32_t{})
+                           : set(std::int8_t{});
 }
 
 std::int64_t get_integer(const FieldType& type, const void* value) {
@@ -352,7 +355,9 @@ std::int64_t get_integer(const FieldType& type, const void* value) {
     std::memcpy(&x, value, sizeof x);
     return x;
   };
-  return type.bytes == 8 ? get(std::int64_t{}) : type.bytes == 4 ? get(std::int32_t{}) : get(std::int8_t{});
+  return type.bytes == 8   ? get(std::int64_t{})
+         : type.bytes == 4 ? get(std::int32_t{})
+                           : get(std::int8_t{});
 }
 
 void set_number(const FieldType& type, void* value, double x) {

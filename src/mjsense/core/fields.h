@@ -111,8 +111,8 @@ struct FieldType {
     kChoice,    // one of several structs, told apart by their kinds
   };
   Kind kind;
-  std::size_t bytes = 0;                     // of a number
-  std::span<const std::string_view> words{}; // kWord
+  std::size_t bytes = 0;                      // of a number
+  std::span<const std::string_view> words{};  // kWord
   // kArray, kList, kOptional, kMap
   const FieldType& (*element)() = nullptr;
   std::size_t (*count)(const void* list) = nullptr;
@@ -218,7 +218,9 @@ class FieldVisitor {
   // First of all: the struct itself.
   FieldVisitor& object(const char* name, Sentence sentence, const char* kind = "");
   FieldVisitor& frozen();  // in Python
-  FieldVisitor& module(const char* name) { return depth_ == 0 ? decl_.module = name, *this : *this; }
+  FieldVisitor& module(const char* name) {
+    return depth_ == 0 ? decl_.module = name, *this : *this;
+  }
 
   template <class T>
   FieldDecl& operator()(const char* name, T& member, Sentence sentence) {
@@ -253,7 +255,9 @@ class FieldVisitor {
 };
 
 template <class T>
-concept Described = requires(FieldVisitor& v, T& t) { visit_fields(v, t); };
+concept Described = requires(FieldVisitor& v, T& t) {
+  visit_fields(v, t);
+};
 
 template <Described T>
 const StructDecl& struct_of() {
@@ -323,30 +327,21 @@ constexpr FieldType container(Kind kind) {
 }
 
 template <class T>
-  requires std::is_same_v<T, bool>
-constexpr FieldType make() {
-  return scalar<T>(Kind::kBool);
-}
+requires std::is_same_v<T, bool>
+constexpr FieldType make() { return scalar<T>(Kind::kBool); }
 template <class T>
-  requires(std::is_integral_v<T> && !std::is_same_v<T, bool>)
-constexpr FieldType make() {
+requires(std::is_integral_v<T> && !std::is_same_v<T, bool>) constexpr FieldType make() {
   return scalar<T>(std::is_signed_v<T> ? Kind::kInt : Kind::kUnsigned);
 }
 template <class T>
-  requires std::is_floating_point_v<T>
-constexpr FieldType make() {
-  return scalar<T>(Kind::kNumber);
-}
+requires std::is_floating_point_v<T>
+constexpr FieldType make() { return scalar<T>(Kind::kNumber); }
 template <class T>
-  requires std::is_same_v<T, std::string>
-constexpr FieldType make() {
-  return {.kind = Kind::kText};
-}
+requires std::is_same_v<T, std::string>
+constexpr FieldType make() { return {.kind = Kind::kText}; }
 template <class T>
-  requires std::is_same_v<T, std::filesystem::path>
-constexpr FieldType make() {
-  return {.kind = Kind::kPath};
-}
+requires std::is_same_v<T, std::filesystem::path>
+constexpr FieldType make() { return {.kind = Kind::kPath}; }
 template <Worded T>
 constexpr FieldType make() {
   return {.kind = Kind::kWord, .bytes = sizeof(T), .words = kWords<T>};
@@ -356,11 +351,9 @@ inline constexpr bool kIsWord = false;
 template <class E>
 inline constexpr bool kIsWord<Word<E>> = true;
 template <class W>
-  requires kIsWord<W>
+requires kIsWord<W>
 constexpr FieldType make() {
-  using E = decltype([](auto w) {
-    return []<class T>(Word<T>) { return T{}; }(w);
-  }(W{}));
+  using E = decltype([](auto w) { return []<class T>(Word<T>) { return T{}; }(w); }(W{}));
   return {.kind = Kind::kWord, .bytes = sizeof(W), .words = kWords<E>};
 }
 template <Described T>
@@ -390,7 +383,7 @@ template <class... T>
 inline constexpr bool kIsVariant<std::variant<T...>> = true;
 
 template <class L>
-  requires kIsArray<L>
+requires kIsArray<L>
 constexpr FieldType make() {
   FieldType t = container<L, typename L::value_type>(Kind::kArray);
   t.count = [](const void*) { return std::tuple_size_v<L>; };
@@ -398,8 +391,7 @@ constexpr FieldType make() {
   return t;
 }
 template <class L>
-  requires(kIsList<L> && !kIsMap<L>)
-constexpr FieldType make() {
+requires(kIsList<L> && !kIsMap<L>) constexpr FieldType make() {
   FieldType t = container<L, typename L::value_type>(Kind::kList);
   t.count = [](const void* list) { return static_cast<const L*>(list)->size(); };
   t.at = [](void* list, std::size_t i) -> void* { return &(*static_cast<L*>(list))[i]; };
@@ -408,7 +400,7 @@ constexpr FieldType make() {
   return t;
 }
 template <class L>
-  requires kIsMap<L>
+requires kIsMap<L>
 constexpr FieldType make() {
   FieldType t = container<L, typename L::value_type::second_type>(Kind::kMap);
   t.count = [](const void* list) { return static_cast<const L*>(list)->size(); };
@@ -419,7 +411,7 @@ constexpr FieldType make() {
   return t;
 }
 template <class L>
-  requires kIsOptional<L>
+requires kIsOptional<L>
 constexpr FieldType make() {
   FieldType t = container<L, typename L::value_type>(Kind::kOptional);
   t.count = [](const void* o) -> std::size_t { return static_cast<const L*>(o)->has_value(); };
@@ -451,7 +443,7 @@ struct Variant<std::variant<T...>> {
 
 // The name of a choice in Python, beside the variant: template <> ... kChoiceName<PatternCfg>.
 template <class V>
-  requires kIsVariant<V>
+requires kIsVariant<V>
 constexpr FieldType make();
 
 }  // namespace field_detail
@@ -462,16 +454,17 @@ template <class V>
 inline constexpr int kPlainAlternative = -1;
 
 template <class V>
-  requires field_detail::kIsVariant<V>
+requires field_detail::kIsVariant<V>
 constexpr FieldType field_detail::make() {
   using Of = Variant<V>;
-  return {.kind = Kind::kChoice,
-          .choice = kChoiceName<V>,
-          .alternatives = &Of::alternatives,
-          .which = [](const void* v) { return static_cast<int>(static_cast<const V*>(v)->index()); },
-          .get = &Of::get,
-          .emplace = &Of::emplace,
-          .plain = kPlainAlternative<V>};
+  return {
+      .kind = Kind::kChoice,
+      .choice = kChoiceName<V>,
+      .alternatives = &Of::alternatives,
+      .which = [](const void* v) { return static_cast<int>(static_cast<const V*>(v)->index()); },
+      .get = &Of::get,
+      .emplace = &Of::emplace,
+      .plain = kPlainAlternative<V>};
 }
 
 // Another type of value specialises this: see effects/all_effects.h.

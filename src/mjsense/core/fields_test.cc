@@ -88,15 +88,21 @@ TEST(Fields, EveryValueIsChecked) {
   EXPECT_EQ(fault([](Cfg&) {}), "");
   EXPECT_EQ(fault([](Cfg& c) { c.steps = 0; }), "sensor 'x': steps is 0: must be at least 1");
   EXPECT_EQ(fault([&](Cfg& c) { c.pos[1] = nan; }), "sensor 'x': pos[1] is nan: must be finite");
-  EXPECT_EQ(fault([&](Cfg& c) { c.pos[1] = INFINITY; }), "sensor 'x': pos[1] is inf: must be finite");
+  EXPECT_EQ(fault([&](Cfg& c) { c.pos[1] = INFINITY; }),
+            "sensor 'x': pos[1] is inf: must be finite");
   EXPECT_EQ(fault([&](Cfg& c) { c.reach = nan; }), "sensor 'x': reach is nan: must be a number");
   EXPECT_EQ(fault([&](Cfg& c) { c.foot = Wheel{0}; }),
             "sensor 'x': foot: radius is 0: must be above 0");
   EXPECT_EQ(fault([&](Cfg& c) { c.foot = Leg{8}; }),
             "sensor 'x': foot: joints is 8: must be between 1 and 7");
-  EXPECT_EQ(fault([&](Cfg& c) { c.spares = {{"rear", {nan}}}; }),
+  EXPECT_EQ(fault([&](Cfg& c) {
+              c.spares = {{"rear", {nan}}};
+            }),
             "sensor 'x': spares['rear']: radius is nan: must be above 0");
-  EXPECT_EQ(fault([](Cfg& c) { c.marks = {"a", "c"}; }), "sensor 'x': marks is 'c': must be one of a, b; did you mean 'a' or 'b'?");
+  EXPECT_EQ(fault([](Cfg& c) {
+              c.marks = {"a", "c"};
+            }),
+            "sensor 'x': marks is 'c': must be one of a, b; did you mean 'a' or 'b'?");
   EXPECT_EQ(fault([](Cfg& c) { c.marks = {"a", "a"}; }), "sensor 'x': marks has 'a' twice");
   EXPECT_EQ(fault([](Cfg& c) { c.marks = {}; }), "sensor 'x': marks is empty; choose from a, b");
 }

@@ -25,9 +25,7 @@ struct Scale : Effect {
 };
 template <class V>
 void visit_fields(V& v, Scale& c) {
-  v.object("Scale", "x <- factor x.", "scale")
-      .frozen()
-      .module("effects");
+  v.object("Scale", "x <- factor x.", "scale").frozen().module("effects");
   v("factor", c.factor, "By which values are multiplied.").or_one().not_empty();
   v.include(static_cast<Effect&>(c));
 }
@@ -51,7 +49,10 @@ struct Misalignment : Effect {
 };
 template <class V>
 void visit_fields(V& v, Misalignment& c) {
-  v.object("Misalignment", "Scale errors and small rotations of every three components, fixed plus drawn at every reset.", "misalignment")
+  v.object("Misalignment",
+           "Scale errors and small rotations of every three components, fixed plus drawn at every "
+           "reset.",
+           "misalignment")
       .frozen()
       .module("effects");
   v("scale_error", c.scale_error, "Of x, y, z.");
@@ -77,9 +78,7 @@ struct Clip : Effect {
 };
 template <class V>
 void visit_fields(V& v, Clip& c) {
-  v.object("Clip", "Limits of a device, or of an observation.", "clip")
-      .frozen()
-      .module("effects");
+  v.object("Clip", "Limits of a device, or of an observation.", "clip").frozen().module("effects");
   v("low", c.low, "Values are at least this.").may_be_infinite().or_one().not_empty();
   v("high", c.high, "Values are at most this.").may_be_infinite().or_one().not_empty();
   v.include(static_cast<Effect&>(c));
@@ -98,9 +97,7 @@ struct Quantize : Effect {
 };
 template <class V>
 void visit_fields(V& v, Quantize& c) {
-  v.object("Quantize", "Rounds to multiples of step.", "quantize")
-      .frozen()
-      .module("effects");
+  v.object("Quantize", "Rounds to multiples of step.", "quantize").frozen().module("effects");
   v("step", c.step, "One count; 0: none.").at_least(0).or_one().not_empty();
   v.include(static_cast<Effect&>(c));
 }

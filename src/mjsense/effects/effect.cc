@@ -11,7 +11,6 @@
 
 namespace mjsense {
 
-
 void check_order(const PerComponent& low, const PerComponent& high, std::string_view place) {
   const std::size_t n = std::max(low.size(), high.size());
   if (std::min(low.size(), high.size()) > 1 && low.size() != high.size()) {

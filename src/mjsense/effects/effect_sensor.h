@@ -23,8 +23,8 @@ struct EffectSensorCfg : SensorCfg {
 };
 template <class V>
 void visit_fields(V& v, EffectSensorCfg& c) {
-  v.object("EffectSensorCfg",
-           "A sensor of the scene seen through effects; it has the same fields.", "effect")
+  v.object("EffectSensorCfg", "A sensor of the scene seen through effects; it has the same fields.",
+           "effect")
       .module("effects");
   v.extends(static_cast<SensorCfg&>(c));
   v("sensor", c.sensor, "Key of the clean sensor: ``robot/imu_acc``.");

@@ -34,16 +34,15 @@ struct Noise : Effect {
 };
 template <class V>
 void visit_fields(V& v, Noise& c) {
-  v.object("Noise", "A new error for every row and component.", "noise")
-      .frozen()
-      .module("effects");
+  v.object("Noise", "A new error for every row and component.", "noise").frozen().module("effects");
   v("draw", c.draw.law, "Gaussian, Uniform or Constant; a number: Constant.");
   v("operation", c.operation, "What the error does to the value; abs: it replaces it.");
   v("density", c.density,
     "The noise density of a data sheet: std = density / sqrt(period), on top of draw.")
       .unit("unit/sqrt(Hz)")
       .at_least(0)
-      .or_one().not_empty();
+      .or_one()
+      .not_empty();
   v.include(static_cast<Effect&>(c));
 }
 
@@ -105,12 +104,18 @@ struct BiasDrift : Effect {
 };
 template <class V>
 void visit_fields(V& v, BiasDrift& c) {
-  v.object("BiasDrift", "First-order Gauss-Markov bias; with an infinite time constant a random walk.", "bias_drift")
+  v.object("BiasDrift",
+           "First-order Gauss-Markov bias; with an infinite time constant a random walk.",
+           "bias_drift")
       .frozen()
       .module("effects");
   v("std", c.std, "Of the stationary process.").at_least(0).or_one().not_empty();
   v("time_constant_s", c.time_constant_s, "In which it forgets.").positive().may_be_infinite();
-  v("density", c.density, "Of the random walk.").unit("unit/sqrt(s)").at_least(0).or_one().not_empty();
+  v("density", c.density, "Of the random walk.")
+      .unit("unit/sqrt(s)")
+      .at_least(0)
+      .or_one()
+      .not_empty();
   v("start_at_zero", c.start_at_zero, "An episode begins without bias, not with a random one.");
   v.include(static_cast<Effect&>(c));
 }

@@ -58,9 +58,7 @@ struct Delay : Effect {
 };
 template <class V>
 void visit_fields(V& v, Delay& c) {
-  v.object("Delay", "The row of delay_s ago.", "delay")
-      .frozen()
-      .module("effects");
+  v.object("Delay", "The row of delay_s ago.", "delay").frozen().module("effects");
   v("delay_s", c.delay_s, "By which rows are late.").at_least(0);
   v("delay_max_s", c.delay_max_s,
     "Larger than delay_s: drawn between them for each world and episode.")
@@ -169,10 +167,9 @@ struct Dropout : Effect {
 };
 template <class V>
 void visit_fields(V& v, Dropout& c) {
-  v.object("Dropout", "A row is lost with this probability.", "dropout")
-      .frozen()
-      .module("effects");
-  v("probability", c.probability, "That a row is lost; the first of an episode never is.").within(0, 1);
+  v.object("Dropout", "A row is lost with this probability.", "dropout").frozen().module("effects");
+  v("probability", c.probability, "That a row is lost; the first of an episode never is.")
+      .within(0, 1);
   v("mode", c.mode, "What is given instead; hold: the last row.");
   v.include(static_cast<Effect&>(c));
 }

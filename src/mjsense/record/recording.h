@@ -40,7 +40,8 @@ void visit_fields(V& v, VideoCfg& c) {
   v.object("VideoCfg", "How pictures are kept.");
   v("ffmpeg", c.ffmpeg, "The program; by default ``$MJSENSE_FFMPEG``, else that of ``PATH``.");
   v("crf", c.crf, "Quality of videos, 0 lossless to 51.").within(0, 51);
-  v("preset", c.preset, "Effort of the video encoder, ultrafast to veryslow; see the file formats.");
+  v("preset", c.preset,
+    "Effort of the video encoder, ultrafast to veryslow; see the file formats.");
   v("molmospaces_depth", c.molmospaces_depth,
     "Also depth as MolmoSpaces' loaders read it: a lossy red-green video.");
   v("max_encoders", c.max_encoders,

@@ -151,7 +151,8 @@ void validate(const EntityCfg& cfg, std::string_view place) {
     throw ValueError(fmt::format("{}: quat ({}) is no rotation; expected w, x, y, z", place,
                                  fmt::join(cfg.quat, ", ")));
   }
-  for (const auto& [pattern, value] : cfg.joint_pos) Regex(pattern, fmt::format("{}: joint_pos", place));
+  for (const auto& [pattern, value] : cfg.joint_pos)
+    Regex(pattern, fmt::format("{}: joint_pos", place));
 }
 
 Attached attach_entity(mjSpec* scene, const std::string& name, const EntityCfg& cfg, Vfs& vfs,

@@ -47,7 +47,8 @@ void visit_fields(V& v, EntityCfg& c) {
       .unit("m");
   v("quat", c.quat, "Of the same, wxyz; the identity keeps what the XML says.");
   v("joint_pos", c.joint_pos,
-    "Joint positions (rad, m) of the keyframe ``init_state`` by regular expression that matches the "
+    "Joint positions (rad, m) of the keyframe ``init_state`` by regular expression that matches "
+    "the "
     "whole local name, the first match counts; unless the model has a keyframe.");
   v("mocap_base", c.mocap_base,
     "Hang a model without a free joint under the mocap body ``<entity>/mocap_base``, so that each "
@@ -71,7 +72,8 @@ void visit_fields(V& v, ObjRef& c) {
            "One MuJoCo element. Its full name is ``entity/name``, or ``name`` without an entity.")
       .frozen();
   v("type", c.type,
-    "body (inertial frame), xbody (body frame), joint, geom, site, actuator, tendon, camera, and so on.");
+    "body (inertial frame), xbody (body frame), joint, geom, site, actuator, tendon, camera, and "
+    "so on.");
   v("name", c.name, "Its name in the entity.");
   v("entity", c.entity, "Whose name it is.").or_none();
 }

@@ -14,8 +14,8 @@
 namespace mjsense {
 
 template <>
-inline constexpr std::array<std::string_view, 5> kWords<mjtIntegrator>{
-    "euler", "rk4", "implicit", "implicitfast", "discrete"};
+inline constexpr std::array<std::string_view, 5> kWords<mjtIntegrator>{"euler", "rk4", "implicit",
+                                                                       "implicitfast", "discrete"};
 template <>
 inline constexpr std::array<std::string_view, 2> kWords<mjtCone>{"pyramidal", "elliptic"};
 template <>
@@ -44,9 +44,10 @@ struct OptionsCfg {
 };
 template <class V>
 void visit_fields(V& v, OptionsCfg& c) {
-  v.object("MujocoCfg",
-           "Physics options of a scene. Entities' own ``<option>`` values are not carried over: one "
-           "scene, one physics.");
+  v.object(
+      "MujocoCfg",
+      "Physics options of a scene. Entities' own ``<option>`` values are not carried over: one "
+      "scene, one physics.");
   v("timestep", c.timestep, "Of one substep.").unit("s").positive();
   v("integrator", c.integrator, "How a state becomes the next one.");
   v("cone", c.cone, "Of friction.");

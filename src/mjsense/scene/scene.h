@@ -56,10 +56,11 @@ void visit_fields(V& v, SceneCfg& c) {
   v.python("spec_fn", "Callable[[mujoco.MjSpec], None] | None", "None",
            "Edits the spec last, before compilation.");
   v("options", c.options, "Of the physics.");
-  v.python("base", "str | Path | None", "None",
-           "A whole model to start from, as it is (path or XML text): names without a prefix, any "
-           "number of free joints, its own ``<option>`` unless ``options`` are set. Its sensors are "
-           "found; it is no entity.");
+  v.python(
+      "base", "str | Path | None", "None",
+      "A whole model to start from, as it is (path or XML text): names without a prefix, any "
+      "number of free joints, its own ``<option>`` unless ``options`` are set. Its sensors are "
+      "found; it is no entity.");
 }
 
 // Names of an entity's elements, local (without the prefix), in model order. An element that its

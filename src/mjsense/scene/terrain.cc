@@ -17,8 +17,8 @@ namespace {
 auto sub_terrains(const TerrainCfg& cfg) {
   auto all = cfg.sub_terrains;
   for (std::size_t kind = 0; cfg.sub_terrains.empty() && kind < kWords<SubTerrain>.size(); ++kind) {
-    all.emplace_back(kWords<SubTerrain>[kind],
-                     SubTerrainCfg{.kind = static_cast<SubTerrain>(kind)});
+    all.emplace_back(
+        kWords<SubTerrain>[kind], SubTerrainCfg { .kind = static_cast<SubTerrain>(kind) });
   }
   return all;
 }

@@ -163,7 +163,8 @@ TEST(Terrain, SaysWhatIsWrong) {
     }
     return "";
   };
-  EXPECT_THAT(fault({.terrain_type = "generator", .levels = 0}), HasSubstr("terrain: levels is 0: must be at least 1"));
+  EXPECT_THAT(fault({.terrain_type = "generator", .levels = 0}),
+              HasSubstr("terrain: levels is 0: must be at least 1"));
   EXPECT_THAT(fault({.terrain_type = "generator", .sub_terrains = {{"x", {.gap = {0, -1}}}}}),
               HasSubstr("terrain: sub_terrains['x']: gap[1] is -1: must be at least 0"));
   EXPECT_THAT(fault({.terrain_type = "generator", .sub_terrains = {{"x", {.platform_width = 9}}}}),

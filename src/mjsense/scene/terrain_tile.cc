@@ -8,7 +8,6 @@
 #include <numbers>
 #include <vector>
 
-
 namespace mjsense {
 namespace {
 

@@ -8,11 +8,10 @@
 #include <string>
 
 #include "mjsense/core/error.h"
-#include "mjsense/sensors/camera/camera_sensor_cfg.h"
-#include "mjsense/sensors/imu/imu_sensor.h"
 #include "mjsense/sensors/builtin/builtin_sensor.h"
 #include "mjsense/sensors/camera/camera_sensor_cfg.h"
 #include "mjsense/sensors/contact/contact_sensor.h"
+#include "mjsense/sensors/imu/imu_sensor.h"
 #include "mjsense/sensors/lidar/lidar_sensor.h"
 #include "mjsense/sensors/raycast/raycast_sensor.h"
 #include "mjsense/sensors/testing/every_sensor.h"

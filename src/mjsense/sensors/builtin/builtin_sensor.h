@@ -60,7 +60,8 @@ void visit_fields(V& v, BuiltinSensorCfg& c) {
     "accelerometer, gyro, framepos, jointpos, rangefinder and so on: the MJCF name.");
   v("obj", c.obj, "What is measured.").or_none();
   v("ref", c.ref,
-    "Frame in which a frame sensor's value is expressed, the world without one; the second object of "
+    "Frame in which a frame sensor's value is expressed, the world without one; the second object "
+    "of "
     "camprojection, insidesite, distance, normal, fromto, tactile.")
       .or_none();
   v("cutoff", c.cutoff,
@@ -73,7 +74,8 @@ void visit_fields(V& v, BuiltinSensorCfg& c) {
   v("phase", c.phase, "When readings are taken, in (-interval, 0].").unit("s").at_most(0);
   v("nsample", c.nsample, "Readings kept, newest first, in the field ``history``.").at_least(0);
   v("interp", c.interp, "What is read between readings.");
-  v("noise", c.noise, "Standard deviation; stored in the model, never applied by MuJoCo.").at_least(0);
+  v("noise", c.noise, "Standard deviation; stored in the model, never applied by MuJoCo.")
+      .at_least(0);
   v("data", c.data, "Rangefinder: what of each ray, in this order.").one_of(kRangeFields);
   v("enclosed", c.enclosed, "insidesite: by how much the whole object juts out, m.");
   v("dim", c.dim, "User sensors: numbers in a row.").at_least(0);

@@ -21,7 +21,8 @@ inline constexpr DataField kCameraDataFields[] = {
 // clang-format on
 
 inline constexpr DataClass kCameraData{
-    "CameraData", "Images; row 0 is the top. With depth_kind \"ray\" depth is along each pixel's ray.",
+    "CameraData",
+    "Images; row 0 is the top. With depth_kind \"ray\" depth is along each pixel's ray.",
     kCameraDataFields};
 
 }  // namespace mjsense

@@ -63,7 +63,8 @@ TEST_P(CameraAgainstOpenGL, DepthIdsAndColoursAgree) {
   for (const char* name : {"rays", "opengl", "opengl smooth"}) {
     auto camera = std::make_shared<CameraSensorCfg>();
     camera->name = name;
-    camera->renderer = std::string(name) == "rays" ? CameraRenderer::kRays : CameraRenderer::kOpenGl;
+    camera->renderer =
+        std::string(name) == "rays" ? CameraRenderer::kRays : CameraRenderer::kOpenGl;
     camera->samples = std::string(name) == "opengl smooth" ? 4 : 1;
     camera->camera_name = "w/c";
     camera->width = kWidth;

@@ -79,7 +79,8 @@ void CameraSensor::initialize(const SensorInit& init) {
       names.emplace_back(model_->names + model_->name_camadr[i]);
     throw_unknown(place, "camera", camera, names);
   }
-  near_ = cfg_.clip_near == ClipNear::kModel ? model_->vis.map.znear * model_->stat.extent : cfg_.near;
+  near_ =
+      cfg_.clip_near == ClipNear::kModel ? model_->vis.map.znear * model_->stat.extent : cfg_.near;
   if (cfg_.far > 0 && cfg_.far <= near_)
     throw ValueError(
         fmt::format("{}: far is {} m, and clip_near 'model' clips at {:.6g} m (znear x "

@@ -79,7 +79,8 @@ void validate(const CameraSensorCfg& cfg) {
                        kClassicLights, cfg.max_lights));
   }
   const auto has_depth = std::count(cfg.data_types.begin(), cfg.data_types.end(), "depth") > 0;
-  if (cfg.depth_noise != DepthNoise::kNone && (!has_depth || cfg.depth_kind != DepthKind::kPlanar || cfg.orthographic))
+  if (cfg.depth_noise != DepthNoise::kNone &&
+      (!has_depth || cfg.depth_kind != DepthKind::kPlanar || cfg.orthographic))
     fail("depth_noise is for planar depth of a perspective camera");
   if (cfg.orthographic && (cfg.intrinsics || cfg.distortion.model != LensKind::kNone))
     fail("an orthographic camera has no intrinsics and no lens distortion");

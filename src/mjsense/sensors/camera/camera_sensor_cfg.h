@@ -62,13 +62,14 @@ struct LensDistortion {
 };
 template <class V>
 void visit_fields(V& v, LensDistortion& c) {
-  v.object("LensDistortion",
-           "Where a lens puts the image of a direction (X, Y, Z), z forward, y down: OpenCV's "
-           "models.\n\n"
-           "brown_conrady: x = X/Z, y = Y/Z, ``x' = x (1 + k1 r^2 + k2 r^4 + k3 r^6) + 2 p1 x y + p2 "
-           "(r^2 + 2 x^2)``, y' alike.\n"
-           "fisheye: ``r' = theta (1 + k1 theta^2 + k2 theta^4 + k3 theta^6 + k4 theta^8)``, theta "
-           "the angle to the axis, up to 89 degrees.")
+  v.object(
+       "LensDistortion",
+       "Where a lens puts the image of a direction (X, Y, Z), z forward, y down: OpenCV's "
+       "models.\n\n"
+       "brown_conrady: x = X/Z, y = Y/Z, ``x' = x (1 + k1 r^2 + k2 r^4 + k3 r^6) + 2 p1 x y + p2 "
+       "(r^2 + 2 x^2)``, y' alike.\n"
+       "fisheye: ``r' = theta (1 + k1 theta^2 + k2 theta^4 + k3 theta^6 + k4 theta^8)``, theta "
+       "the angle to the axis, up to 89 degrees.")
       .frozen();
   v("model", c.model, "Which of them.");
   v("coefficients", c.coefficients, "brown_conrady: k1 k2 p1 p2 k3; fisheye: k1 k2 k3 k4.");
@@ -86,9 +87,10 @@ struct CameraVizCfg {
 };
 template <class V>
 void visit_fields(V& v, CameraVizCfg& c) {
-  v.object("CameraVizCfg",
-           "What a viewer draws of a camera: the pyramid of what it sees, from ``near`` (or its own "
-           "place) on, and its axes (it looks along -z, the blue one).");
+  v.object(
+      "CameraVizCfg",
+      "What a viewer draws of a camera: the pyramid of what it sees, from ``near`` (or its own "
+      "place) on, and its axes (it looks along -z, the blue one).");
   v("show_frustum", c.show_frustum, "The pyramid.");
   v("show_frame", c.show_frame, "The axes.");
   v("frustum_depth", c.frustum_depth,
@@ -164,8 +166,7 @@ void visit_fields(V& v, CameraSensorCfg& c) {
     "Full name of the body that carries a new camera; the world without one.")
       .or_none();
   v("pos", c.pos, "Of a new camera in the parent body.").unit("m");
-  v("quat", c.quat,
-    "wxyz, of a new camera in the parent body: x right, y up, looking along -z.");
+  v("quat", c.quat, "wxyz, of a new camera in the parent body: x right, y up, looking along -z.");
   v("fovy", c.fovy,
     "Vertical, degrees; orthographic: height of the image, m. None: the camera's own, 45 for a new "
     "one. Beside ``camera_name`` it is this sensor's alone.")

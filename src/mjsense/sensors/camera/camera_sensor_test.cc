@@ -486,7 +486,8 @@ TEST(Camera, FaultsAreNamed) {
     return "no error";
   };
   CameraSensorCfg cfg = camera(4, 3, {"rgbd"});
-  EXPECT_THAT(message([&] { cfg.build(); }), HasSubstr("data_types is 'rgbd': must be one of rgb, depth"));
+  EXPECT_THAT(message([&] { cfg.build(); }),
+              HasSubstr("data_types is 'rgbd': must be one of rgb, depth"));
   cfg.data_types = {};
   EXPECT_THAT(message([&] { cfg.build(); }), HasSubstr("data_types is empty"));
   cfg = camera(4, 3, {"rgb"}, "w/tpo");
@@ -514,7 +515,10 @@ TEST(Camera, FaultsAreNamed) {
   EXPECT_THAT(with([](Cfg& c) { c.pos[0] = kNan; }), HasSubstr("must be finite"));
   EXPECT_THAT(with([](Cfg& c) { c.quat = {0, 0, 0, 0}; }), HasSubstr("quat is"));
   EXPECT_THAT(with([](Cfg& c) { c.enabled_geom_groups.clear(); }), HasSubstr("is empty"));
-  EXPECT_THAT(with([](Cfg& c) { c.intrinsics = {1, 1, kNan, 1}; }), HasSubstr("intrinsics: cx is nan: must be finite"));
+  EXPECT_THAT(with([](Cfg& c) {
+                c.intrinsics = {1, 1, kNan, 1};
+              }),
+              HasSubstr("intrinsics: cx is nan: must be finite"));
   EXPECT_THAT(with([](Cfg& c) {
                 c.intrinsics = {1, 1, 1, 1};
                 c.fovy = 60;

@@ -43,7 +43,8 @@ inline constexpr DataField kContactDataFields[] = {
 
 inline constexpr DataClass kContactData{
     "ContactData",
-    "Contacts of ``P`` primaries with ``S`` slots each; column ``p * S + s``, ``N = P * S``. A slot "
+    "Contacts of ``P`` primaries with ``S`` slots each; column ``p * S + s``, ``N = P * S``. A "
+    "slot "
     "without contact is zero.\n\nForce is what the primary exerts on the secondary; normals point "
     "from the primary to the secondary.",
     kContactDataFields};

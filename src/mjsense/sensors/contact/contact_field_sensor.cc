@@ -21,8 +21,8 @@ void ContactFieldSensor::initialize(const SensorInit& init) {
   clear_fields();
   const bool net = owner_->cfg().reduce == ContactReduce::kNetForce;
   const std::int64_t dim = field_ == "found" || field_ == "dist" ? 1 : 3;
-  SensorSpec spec = kContactData.spec(field_, {owner_->cfg().num_slots * dim},
-                                      contact_field_frame(field_, net));
+  SensorSpec spec =
+      kContactData.spec(field_, {owner_->cfg().num_slots * dim}, contact_field_frame(field_, net));
   if (field_ == "found") spec.low = 0.0;
   add_field("", std::move(spec), init.num_worlds);
 }

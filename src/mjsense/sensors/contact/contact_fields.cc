@@ -3,7 +3,6 @@
 #include <cstddef>
 #include <utility>
 
-
 namespace mjsense {
 
 std::string contact_field_frame(std::string_view field, bool world_axes) {

@@ -150,8 +150,8 @@ void expect_equal_to_mujoco(ContactSensor& sensor, const Model& model) {
         for (int i = 0; i < dim; ++i, ++native) {
           ASSERT_NEAR(row[(p * K + k) * dim + i], *native, 1e-6 * std::max(1.0, std::abs(*native)))
               << name << " " << sensor.cfg().reduce.text() << " "
-              << sensor.cfg().primary.mode.text() << " slot "
-              << k << " " << field << "[" << i << "] of " << model.d->ncon << " contacts";
+              << sensor.cfg().primary.mode.text() << " slot " << k << " " << field << "[" << i
+              << "] of " << model.d->ncon << " contacts";
         }
       }
     }

@@ -10,8 +10,8 @@
 
 #include "mjsense/core/error.h"
 #include "mjsense/scene/scene.h"
-#include "mjsense/sensors/contact/contact_field_sensor.h"
 #include "mjsense/sensors/contact/contact_data.h"
+#include "mjsense/sensors/contact/contact_field_sensor.h"
 #include "mjsense/sensors/contact/contact_fields.h"
 #include "mjsense/sensors/contact/contact_pass.h"
 

@@ -34,14 +34,16 @@ struct ContactVizCfg {
 };
 template <class V>
 void visit_fields(V& v, ContactVizCfg& c) {
-  v.object("ContactVizCfg",
-           "What a viewer draws of every contact in a slot. Colours are rgba, sizes in units of the "
-           "model's ``stat.meansize``.");
+  v.object(
+      "ContactVizCfg",
+      "What a viewer draws of every contact in a slot. Colours are rgba, sizes in units of the "
+      "model's ``stat.meansize``.");
   v("show_points", c.show_points, "A ball at the contact point.");
   v("show_frames", c.show_frames,
     "Axes of the contact: x (red) is the normal, from the primary to the secondary.");
   v("show_forces", c.show_forces,
-    "The force that the primary exerts on the secondary, as an arrow that ends at the contact point.");
+    "The force that the primary exerts on the secondary, as an arrow that ends at the contact "
+    "point.");
   v("force_scale", c.force_scale,
     "Length of that arrow; 0: the model's ``vis.map.force``, as MuJoCo's own arrows.")
       .unit("m/N")
@@ -95,7 +97,8 @@ void visit_fields(V& v, ContactSensorCfg& c) {
   v("fields", c.fields, "What is measured of each contact.").one_of(kContactFields).not_empty();
   v("reduce", c.reduce,
     "Which contacts come first: none: in MuJoCo's order; mindist: the deepest; maxforce: the "
-    "strongest; netforce: one synthetic contact at the force-weighted centroid, with the net wrench "
+    "strongest; netforce: one synthetic contact at the force-weighted centroid, with the net "
+    "wrench "
     "in the world frame.");
   v("num_slots", c.num_slots, "S, contacts kept for each primary.").at_least(1);
   v("secondary_policy", c.secondary_policy,

@@ -214,7 +214,8 @@ constexpr char kFeet[] = R"(
   <body name="R" pos=".099 0 0"><joint type="slide" axis="1 0 0"/><geom name="R" size=".1" mass="1"/></body>
 </body></worldbody></mujoco>)";
 
-ContactSensorCfg feet_cfg(std::string name, Word<ContactMode> mode, std::vector<std::string> pattern) {
+ContactSensorCfg feet_cfg(std::string name, Word<ContactMode> mode,
+                          std::vector<std::string> pattern) {
   ContactSensorCfg c;
   c.name = std::move(name);
   c.primary = {"subtree", {"trunk"}, "bot", {}};
@@ -344,15 +345,17 @@ TEST(Contact, RefusesAWrongConfigurationWhenItIsBuilt) {
   const std::string place = "sensor '" + box_cfg().name + "': ";
   EXPECT_EQ(message([](Cfg&) {}), "");
   EXPECT_EQ(message([](Cfg& c) { c.fields = {"fond"}; }),
-            place + "fields is 'fond': must be one of found, force, torque, dist, pos, normal, "
-                    "tangent; did you mean 'found'?");
+            place +
+                "fields is 'fond': must be one of found, force, torque, dist, pos, normal, "
+                "tangent; did you mean 'found'?");
   EXPECT_THAT(message([](Cfg& c) { c.primary.pattern = {"("}; }), HasSubstr("primary"));
   EXPECT_THAT(message([](Cfg& c) { c.primary.pattern.clear(); }), HasSubstr("no pattern"));
   EXPECT_THAT(message([](Cfg& c) {
                 c.secondary = ContactMatch{"geom", {"a", "b"}, "", {}};
               }),
               HasSubstr("secondary: 2 patterns"));
-  EXPECT_THAT(message([](Cfg& c) { c.viz.point_color[0] = 2; }), HasSubstr("viz: point_color[0] is 2: must be between 0 and 1"));
+  EXPECT_THAT(message([](Cfg& c) { c.viz.point_color[0] = 2; }),
+              HasSubstr("viz: point_color[0] is 2: must be between 0 and 1"));
   EXPECT_THAT(message([](Cfg& c) { c.name = ""; }), HasSubstr("needs a name"));
 }
 

@@ -40,7 +40,9 @@ void visit_fields(V& v, ImuModel::Axis& c) {
   v("cross_axis_tolerance", c.cross_axis_tolerance, "What an axis sees of the others.").at_least(0);
   v("range", c.range, "Values are limited to +-range; 0: unlimited.").unit("unit").at_least(0);
   v("resolution", c.resolution, "Of one count; 0: continuous.").unit("unit").at_least(0);
-  v("bias_drift", c.bias_drift, "Standard deviation of a Gauss-Markov bias.").unit("unit").at_least(0);
+  v("bias_drift", c.bias_drift, "Standard deviation of a Gauss-Markov bias.")
+      .unit("unit")
+      .at_least(0);
   v("bias_drift_time_s", c.bias_drift_time_s, "Its time constant.").at_least(0);
 }
 template <class V>
@@ -80,11 +82,12 @@ struct ImuSensorCfg : SensorCfg {
 };
 template <class V>
 void visit_fields(V& v, ImuSensorCfg& c) {
-  v.object("ImuSensorCfg",
-           "Accelerometer and gyroscope at a site, with the errors of a device. ``data`` is an "
-           ":class:`mjsense.ImuData`.\n\nThe clean values are the built-in sensors ``<name>_acc`` and "
-           "``<name>_gyro``.",
-           "imu");
+  v.object(
+      "ImuSensorCfg",
+      "Accelerometer and gyroscope at a site, with the errors of a device. ``data`` is an "
+      ":class:`mjsense.ImuData`.\n\nThe clean values are the built-in sensors ``<name>_acc`` and "
+      "``<name>_gyro``.",
+      "imu");
   v.extends(static_cast<SensorCfg&>(c));
   v("site", c.site, "Where it is mounted.").or_none();
   v("preset", c.preset,
@@ -93,7 +96,8 @@ void visit_fields(V& v, ImuSensorCfg& c) {
       .one_of(kImuPresets);
   v("model", c.model, "Used if preset is \"\".");
   v("orientation", c.orientation, "Also the site's orientation, without errors.");
-  v("effects", c.effects, "After those of the device, on acc and gyro alike: delay, rate, dropout.");
+  v("effects", c.effects,
+    "After those of the device, on acc and gyro alike: delay, rate, dropout.");
 }
 
 // Fields, in the axes of the site:

@@ -36,13 +36,13 @@ void visit_fields(V& v, SpinningScan& c) {
       .frozen();
   v("channels", c.channels, "Lasers.").at_least(1);
   v("elevation_min_deg", c.elevation_min_deg, "Of channel 0, above the xy plane.").within(-90, 90);
-  v("elevation_max_deg", c.elevation_max_deg,
-    "Of the last channel; the others lie evenly between.")
+  v("elevation_max_deg", c.elevation_max_deg, "Of the last channel; the others lie evenly between.")
       .within(-90, 90);
   v("elevations_deg", c.elevations_deg, "One a channel instead of evenly spaced ones.")
       .within(-90, 90);
   v("samples", c.samples, "Firings of each channel in a sweep.").at_least(1);
-  v("azimuth_start_deg", c.azimuth_start_deg, "Of the first firing; 0: along +x; counter-clockwise.");
+  v("azimuth_start_deg", c.azimuth_start_deg,
+    "Of the first firing; 0: along +x; counter-clockwise.");
   v("azimuth_span_deg", c.azimuth_span_deg, "Of a sweep.").above(0).at_most(360);
   v("rate_hz", c.rate_hz, "Turns a second; matters with motion distortion only.").positive();
 }

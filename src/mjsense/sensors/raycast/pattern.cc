@@ -127,7 +127,6 @@ void validate(const PinholePattern& p, std::string_view place) {
   if (p.camera.empty()) check_pinhole(p.width, p.height, p.fovy, place);
 }
 
-
 void validate(const RingPattern& r, std::string_view place) {
   unit(r.direction, place);
   double rays = r.include_center;

@@ -31,7 +31,8 @@ struct GridPattern {
 };
 template <class V>
 void visit_fields(V& v, GridPattern& c) {
-  v.object("GridPatternCfg", "Parallel rays from the points of a grid, x fastest.", "grid").frozen();
+  v.object("GridPatternCfg", "Parallel rays from the points of a grid, x fastest.", "grid")
+      .frozen();
   v("size", c.size, "In x and y, around the frame.").unit("m").at_least(0);
   v("resolution", c.resolution, "Between rays.").unit("m").positive();
   v("direction", c.direction, "Of all rays; any length but 0.");
@@ -52,10 +53,11 @@ struct PinholePattern {
 };
 template <class V>
 void visit_fields(V& v, PinholePattern& c) {
-  v.object("PinholeCameraPatternCfg",
-           "Rays of a pinhole camera that looks along -Z, through the edges (not the centres) of its "
-           "pixels, bottom row first.",
-           "pinhole")
+  v.object(
+       "PinholeCameraPatternCfg",
+       "Rays of a pinhole camera that looks along -Z, through the edges (not the centres) of its "
+       "pixels, bottom row first.",
+       "pinhole")
       .frozen();
   v("width", c.width, "Rays in a row.").at_least(1);
   v("height", c.height, "Rows.").at_least(1);
@@ -103,9 +105,10 @@ struct UserPattern {
 };
 template <class V>
 void visit_fields(V& v, UserPattern& c) {
-  v.object("UserPatternCfg",
-           "Your own rays. One direction for all offsets, or one offset for all directions, will do.",
-           "user")
+  v.object(
+       "UserPatternCfg",
+       "Your own rays. One direction for all offsets, or one offset for all directions, will do.",
+       "user")
       .frozen();
   v("offsets", c.offsets, "Where they start, [n, 3].").unit("m");
   v("directions", c.directions, "Where they point, [n, 3], of any length but 0.");

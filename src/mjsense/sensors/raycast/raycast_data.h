@@ -23,7 +23,7 @@ inline constexpr DataField kRayCastDataFields[] = {
 };
 // clang-format on
 
-inline constexpr DataClass kRayCastData{"RayCastData", "Hits of ``R = F * n`` rays, frame by frame.",
-                                        kRayCastDataFields};
+inline constexpr DataClass kRayCastData{
+    "RayCastData", "Hits of ``R = F * n`` rays, frame by frame.", kRayCastDataFields};
 
 }  // namespace mjsense

@@ -108,7 +108,8 @@ TEST(RayCast, RefusesAWrongConfigurationWhenItIsBuilt) {
   EXPECT_THAT(message([](Cfg& c) { c.pattern = PinholePattern{.fovy = 180}; }), HasSubstr("fovy"));
   EXPECT_THAT(message([](Cfg& c) { c.pattern = RingPattern{.include_center = false}; }),
               HasSubstr("no rays"));
-  EXPECT_THAT(message([](Cfg& c) { c.pattern = UserPattern{.times = {1}}; }), HasSubstr("times[0] is 1: must be at most 0"));
+  EXPECT_THAT(message([](Cfg& c) { c.pattern = UserPattern{.times = {1}}; }),
+              HasSubstr("times[0] is 1: must be at most 0"));
   EXPECT_EQ(message([](Cfg& c) { c.pattern = PinholePattern::from_mujoco_camera("eye"); }), "");
   EXPECT_THAT(message([](Cfg& c) { c.frame[0].type = "goem"; }), HasSubstr("is a 'goem'"));
   EXPECT_THAT(message([](Cfg& c) { c.viz.ray_width = -1; }), HasSubstr("ray_width is -1"));
@@ -162,8 +163,7 @@ TEST(RayCast, DistancesAtBothLimitsCount) {
 
 TEST(RayCast, AlignmentTurnsRaysButNotTheFrame) {
   std::vector<std::shared_ptr<const SensorCfg>> cfgs;
-  for (RayAlignment alignment :
-       {RayAlignment::kBase, RayAlignment::kYaw, RayAlignment::kWorld}) {
+  for (RayAlignment alignment : {RayAlignment::kBase, RayAlignment::kYaw, RayAlignment::kWorld}) {
     auto cfg = sensor_cfg<RayCastSensorCfg>(std::string(word(alignment)).c_str());
     cfg->frame = {{"site", "scan", "r"}};  // turned by 90 degrees about z
     cfg->pattern = UserPattern{{{0.3, 0, 0}}, {{0, 0, -2}}};
@@ -344,8 +344,11 @@ TEST(RayCast, ErrorsNameSensorFoundAndExpected) {
     return error_of(cfg);
   };
   using Cfg = RayCastSensorCfg;
-  EXPECT_THAT(with([](Cfg& c) { c.frame = {{"camera", "eye", "r"}}; }),
-              HasSubstr("sensor 'ray': frame 'r/eye' is a camera: must be 'body', 'site', or 'geom'"));
+  EXPECT_THAT(
+      with([](Cfg& c) {
+        c.frame = {{"camera", "eye", "r"}};
+      }),
+      HasSubstr("sensor 'ray': frame 'r/eye' is a camera: must be 'body', 'site', or 'geom'"));
   EXPECT_THAT(with([](Cfg& c) { c.frame = {}; }), HasSubstr("no frame"));
   EXPECT_THAT(with([](Cfg& c) {
                 c.frame = {{"joint", "root", "r"}};

@@ -85,7 +85,8 @@ TEST(TerrainHeight, ReducesTheRaysOfAFrame) {
   EXPECT_THAT(over_the_edge(HeightReduction::kMin), ElementsAre(FloatNear(0.2f, 1e-6f)));
   EXPECT_THAT(over_the_edge(HeightReduction::kMax), ElementsAre(FloatNear(0.7f, 1e-6f)));
   EXPECT_THAT(over_the_edge(HeightReduction::kMean), ElementsAre(FloatNear(1.6f / 3, 1e-6f)));
-  EXPECT_THAT(over_the_edge(HeightReduction::kNone), Pointwise(FloatNear(1e-6f), {0.7f, 0.7f, 0.2f}));
+  EXPECT_THAT(over_the_edge(HeightReduction::kNone),
+              Pointwise(FloatNear(1e-6f), {0.7f, 0.7f, 0.2f}));
 }
 
 TEST(TerrainHeight, OneFarRayOfManyIsTheLimit) {

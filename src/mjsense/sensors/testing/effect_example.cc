@@ -1,6 +1,5 @@
-#include "mjsense/sensors/testing/example.h"
-
 #include "mjsense/effects/effect_sensor.h"
+#include "mjsense/sensors/testing/example.h"
 
 namespace mjsense {
 

@@ -5,8 +5,9 @@
 namespace mjsense {
 
 SensorCfgs terrain_height_examples() {
-  return {example<TerrainHeightSensorCfg>(
-      "height", [](TerrainHeightSensorCfg& c) { c.frame = {{"site", "imu", "robot"}}; })};
+  return {example<TerrainHeightSensorCfg>("height", [](TerrainHeightSensorCfg& c) {
+    c.frame = {{"site", "imu", "robot"}};
+  })};
 }
 
 }  // namespace mjsense
