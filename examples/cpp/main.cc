@@ -1,8 +1,6 @@
 // sees SCENE.xml CAMERA: what that camera sees in the second of two worlds, as CAMERA.ppm.
 
-#include <mjsense/scene/scene.h>
-#include <mjsense/sensors/camera/camera_sensor_cfg.h>
-#include <mjsense/sim/simulation.h>
+#include <mjsense/mjsense.h>
 
 #include <exception>
 #include <fstream>

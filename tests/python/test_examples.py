@@ -8,6 +8,7 @@ from pathlib import Path
 import pytest
 
 import mjsense
+from test_installed import PUBLIC
 
 EXAMPLES = Path(__file__).parents[2] / "examples"
 BUILD = Path(mjsense.__file__).absolute().parents[2]
@@ -35,6 +36,8 @@ def test_cpp_project(tmp_path):
         assert done.returncode == 0, done.stdout + done.stderr
 
     run("cmake", "--install", BUILD, "--prefix", "installed")
+    headers = {str(h.relative_to(tmp_path / "installed/include")) for h in (tmp_path / "installed/include").rglob("*.h")}
+    assert headers == set(PUBLIC)
     run("installed/bin/mjsense", "sensors", EXAMPLES.parent / "models/robots/quadruped.xml")
     run("cmake", "-S", EXAMPLES / "cpp", "-B", "build", "-G", "Ninja", f"-DCMAKE_PREFIX_PATH={tmp_path / 'installed'}")
     run("cmake", "--build", "build")

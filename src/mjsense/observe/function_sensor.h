@@ -26,7 +26,9 @@ class FunctionSensor final : public Sensor {
     clear_fields();
     add_field("", spec_, init.num_worlds);
   }
-  void compute(const World& world) override { fn_(world, fields()[0].data.row<T>(world.id)); }
+  void compute(const World& world) override {
+    fn_(world, fields()[0].data.template row<T>(world.id));
+  }
 
  private:
   SensorSpec spec_;
