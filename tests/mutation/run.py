@@ -57,6 +57,7 @@ class Mutant:
     what: str
     old: str
     new: str
+    tested_in: str = ""  # the room whose tests know it, if not its own: interfaces are tested where something implements them
 
     @property
     def room(self) -> str:
@@ -66,6 +67,10 @@ class Mutant:
         if parts[0] == "models":
             return "robots" if parts[1] == "franka" else "tasks"
         return parts[2]
+
+    @property
+    def judged_in(self) -> str:
+        return self.tested_in or self.room
 
     @property
     def digest(self) -> str:
@@ -203,7 +208,7 @@ class Runner:
         start, built = time.time(), None
         path.write_text(mutant.apply(TREE))
         try:
-            for i, (name, targets, judge) in enumerate(self.judges(mutant.room)):
+            for i, (name, targets, judge) in enumerate(self.judges(mutant.judged_in)):
                 if own and i > 0:
                     return {"noticed": False, "own": True, "seconds": round(time.time() - start, 1)}
                 if targets != built:
@@ -223,7 +228,7 @@ def report(mutants: list[Mutant], results: dict) -> str:
         if not known:
             continue
         seen = sum(r["noticed"] for _, r in known)
-        here = sum(r["noticed"] and (r["judge"] == f"{room}_test" or room not in PROGRAMS) for _, r in known)
+        here = sum(r["noticed"] and (r["judge"] == f"{m.judged_in}_test" or m.judged_in not in PROGRAMS) for m, r in known)
         lines.append(f"{room:10} {seen:3} of {len(known):3} noticed, {here:3} by the room's own tests")
         survivors += [f"  {m.id}: {m.what}" for m, r in known if not r["noticed"]]
         total, noticed, own = total + len(known), noticed + seen, own + here
@@ -269,7 +274,7 @@ def main() -> int:
     runner = Runner(options.prefix.split(), options.jobs)
     runner.configure()
     if not options.no_baseline:
-        runner.baseline({m.room for m in chosen}, options.own)
+        runner.baseline({m.judged_in for m in chosen}, options.own)
     broken = 0
     # A mutant of each room in turn, so that a run that is cut short says something of all.
     turn = {m.id: sum(other.room == m.room for other in chosen[:i]) for i, m in enumerate(chosen)}

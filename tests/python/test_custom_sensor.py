@@ -242,8 +242,13 @@ def test_dict_sensor_is_json_on_disk():
         sensor.data
 
 
+class Reset(Height):
+    def reset(self, world_ids=None):
+        self.worlds = world_ids
+
+
 def test_suite():
-    suite = mjs.SensorSuite([Height()])
+    suite = mjs.SensorSuite([Reset()])
     with pytest.raises(AssertionError, match="'height' is duplicated sensor uuid"):
         suite.add(Height())
     scene = ball_scene(feet_cfg(fields=("found",)))
@@ -260,6 +265,10 @@ def test_suite():
     with pytest.raises(ValueError, match="batch_index 2"):
         suite.get_observations(sim, None, 2)
     assert len(suite) == 3 and "touch" in suite
+    suite.reset([1])
+    assert suite.get("height").worlds == [1]
+    suite.reset()
+    assert suite.get("height").worlds is None
 
 
 def test_nothing_is_leaked():
