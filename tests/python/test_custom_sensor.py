@@ -258,6 +258,7 @@ def test_suite():
     assert list(batch) == ["height", "touch", "ball/acc"]
     assert batch["height"].shape == (2, 1) and batch["ball/acc"] is scene["ball/acc"].data
     one = suite.get_observations(sim, None, 1)
+    assert not np.shares_memory(one["height"], suite.get("height").rows)
     assert one["height"].shape == (1,) and one["touch"]["found"].shape == (1,)
     assert suite.observation_spaces.contains(one)
     with pytest.raises(KeyError, match="no sensor 'heigth'"):
