@@ -242,8 +242,13 @@ def test_dict_sensor_is_json_on_disk():
         sensor.data
 
 
+class Reset(Height):
+    def reset(self, world_ids=None):
+        self.worlds = world_ids
+
+
 def test_suite():
-    suite = mjs.SensorSuite([Height()])
+    suite = mjs.SensorSuite([Reset()])
     with pytest.raises(AssertionError, match="'height' is duplicated sensor uuid"):
         suite.add(Height())
     scene = ball_scene(feet_cfg(fields=("found",)))
@@ -253,6 +258,7 @@ def test_suite():
     assert list(batch) == ["height", "touch", "ball/acc"]
     assert batch["height"].shape == (2, 1) and batch["ball/acc"] is scene["ball/acc"].data
     one = suite.get_observations(sim, None, 1)
+    assert not np.shares_memory(one["height"], suite.get("height").rows)
     assert one["height"].shape == (1,) and one["touch"]["found"].shape == (1,)
     assert suite.observation_spaces.contains(one)
     with pytest.raises(KeyError, match="no sensor 'heigth'"):
@@ -260,6 +266,10 @@ def test_suite():
     with pytest.raises(ValueError, match="batch_index 2"):
         suite.get_observations(sim, None, 2)
     assert len(suite) == 3 and "touch" in suite
+    suite.reset([1])
+    assert suite.get("height").worlds == [1]
+    suite.reset()
+    assert suite.get("height").worlds is None
 
 
 def test_nothing_is_leaked():

@@ -1,5 +1,8 @@
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
+from scenes import ball_scene
 
 import mjsense as mjs
 
@@ -52,3 +55,21 @@ def test_pipeline_errors():
     with pytest.raises(RuntimeError):
         mjs.ObservationPipeline(1, nan_policy="error")([[float("nan")]])
     assert mjs.ObservationPipeline(1, nan_policy="sanitize")([[float("nan")]]).tolist() == [[0.0]]
+
+
+def test_height_scan():
+    rays = dict(frame=mjs.ObjRef("body", "ball", "ball"), pattern=mjs.GridPatternCfg(size=(0.4, 0), resolution=0.2))
+    scene = ball_scene(
+        mjs.RayCastSensorCfg(name="scan", max_distance=5.0, **rays), mjs.RayCastSensorCfg(name="short", max_distance=0.5, **rays)
+    )
+    env = SimpleNamespace(scene=scene, sim=mjs.Simulation(scene, num_worlds=2))
+    np.testing.assert_allclose(mjs.observations.height_scan(env, "scan"), np.ones((2, 3)), atol=1e-6)
+    np.testing.assert_allclose(mjs.observations.height_scan(env, "scan", offset=0.25), np.full((2, 3), 0.75), atol=1e-6)
+    assert (mjs.observations.height_scan(env, "short") == 0.5).all()
+    assert (mjs.observations.height_scan(env, "short", miss_value=9.0) == 9.0).all()
+
+
+def test_contact_forces_keep_their_sign():
+    force = np.array([[[0.0, 1.0, -1.0], [np.e - 1, 1 - np.e, 0.0]]])
+    env = SimpleNamespace(scene={"touch": SimpleNamespace(data=SimpleNamespace(force=force))})
+    np.testing.assert_allclose(mjs.observations.foot_contact_forces(env, "touch"), [[0, np.log(2), -np.log(2), 1, -1, 0]])

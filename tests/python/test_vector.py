@@ -81,8 +81,10 @@ def test_same_seed_same_episode(env):
 def test_truncation_and_autoreset():
     env = make(horizon=4, num_envs=2)
     env.reset()
-    flags = [env.step(hold(env))[3].tolist() for _ in range(7)]
-    assert flags == [[False] * 2] * 3 + [[True] * 2] + [[False] * 2] * 3
+    steps = [env.step(hold(env)) for _ in range(7)]
+    assert [step[3].tolist() for step in steps] == [[False] * 2] * 3 + [[True] * 2] + [[False] * 2] * 3
+    # The fifth begins anew: nothing was tried that could have succeeded.
+    assert [step[4]["_success"].tolist() for step in steps] == [[True] * 2] * 4 + [[False] * 2] + [[True] * 2] * 2
     env.close()
 
 

@@ -78,6 +78,9 @@ TEST(Match, RefusesWhatTheTwoReadDifferently) {
         "\\x4"}) {
     EXPECT_THAT(refusal(pattern), HasSubstr("not supported")) << pattern;
   }
+  for (const char* pattern : {"^*", "$?", "\\b+", "a|*", "a{2}{3}"}) {
+    EXPECT_THAT(refusal(pattern), HasSubstr("nothing that this could repeat")) << pattern;
+  }
   EXPECT_EQ(refusal("FR_\\Z"),
             "x: 'FR_\\Z' is not a regular expression: not supported: \\Z at position 3");
 }

@@ -70,6 +70,36 @@ TEST_F(Fr3, ForwardKinematicsAndJacobianAreMuJoCos) {
   }
 }
 
+// Joints that do not stand at their body's origin, and a slide.
+TEST(Chain, OfOffsetJointsIsMuJoCos) {
+  const char* xml = R"(<mujoco><worldbody><body name="base" pos=".1 0 .2" euler="10 0 20">
+      <geom size=".1"/>
+      <body pos="0 .1 .3" euler="0 30 0"><joint name="a" pos=".1 -.2 .05" axis=".2 1 0" range="-90 90"/><geom size=".1"/>
+        <body pos=".2 0 0"><joint name="b" type="slide" pos=".1 0 0" axis="1 0 1" range="-1 1"/><geom size=".1"/>
+          <body pos="0 .2 0"><joint name="c" pos="0 .1 -.1" axis="0 0 1" range="-90 90"/><geom size=".1"/>
+            <site name="leaf" pos=".1 .1 .1" euler="0 0 40"/></body></body></body></body></worldbody></mujoco>)";
+  char error[500] = "";
+  mjSpec* spec = mj_parseXMLString(xml, nullptr, error, sizeof(error));
+  ASSERT_TRUE(spec) << error;
+  mjModel* model = mj_compile(spec, nullptr);
+  mjData* data = mj_makeData(model);
+  const int joints[] = {0, 1, 2};
+  const Chain chain(model, 1, 0, joints);
+  const std::array<double, 3> q{0.7, -0.3, -1.1};
+  std::copy(q.begin(), q.end(), data->qpos);
+  mj_kinematics(model, data);
+  const Pose leaf = inverse(pose_from_mat(data->xpos + 3, data->xmat + 9)) *
+                    pose_from_mat(data->site_xpos, data->site_xmat);
+  std::array<double, 6 * 3> jac;
+  for (const Pose& pose : {chain.fk(q), chain.jacobian(q, jac)}) {
+    EXPECT_LT(norm(pose.p - leaf.p), 1e-12);
+    EXPECT_LT(angle_between(pose.q, leaf.q), 1e-7);
+  }
+  mj_deleteData(data);
+  mj_deleteModel(model);
+  mj_deleteSpec(spec);
+}
+
 TEST_F(Fr3, InverseKinematicsConvergesOnReachablePoses) {
   Rng rng(2, 0, 0, 0);
   int solved = 0;

@@ -262,6 +262,30 @@ TEST_F(Franka, ActionNoiseGrowsWithTheMotionAndIsNotRecorded) {
   EXPECT_EQ(robot.targets(0)[arm].values[0], target[0]);
 }
 
+// A motion of 0.25 m would have a deviation of 0.025 m.
+TEST_F(Franka, ActionNoiseIsTruncated) {
+  const StateRow state = state_row(data[0].get());
+  const int arm = robot.arm();
+  Action action;
+  auto target = arm_qpos(0);
+  target[0] += 0.6;
+  action.commands[arm].set(target);
+  robot.command(worlds[0], action);
+  const Pose wanted = robot.fk(arm, robot.targets(0));
+  RobotValues values;
+  robot.read_qpos(worlds[0], values);
+  Rng rng(1, 0, 0, 0);
+  double farthest = 0;
+  for (int k = 0; k < 500; ++k) {
+    robot.write_ctrl(worlds[0], state, &rng);
+    values[arm].set({state.ctrl, 7});
+    farthest = std::max(farthest, norm(robot.fk(arm, values).p - wanted.p));
+  }
+  // To the corner of a cube of 2 x 0.02 m, and what the linear map leaves.
+  EXPECT_LT(farthest, 1.1 * std::sqrt(3.0) * 0.02);
+  EXPECT_GT(farthest, 0.025);
+}
+
 TEST_F(Franka, UnknownNamesAreErrorsWithTheNearest) {
   try {
     robot.group_index("griper");

@@ -19,6 +19,8 @@ namespace {
 using nlohmann::json;
 using testing::ElementsAre;
 using testing::HasSubstr;
+using testing::IsEmpty;
+using testing::Not;
 
 RolloutCfg blind(int num_worlds = 1, int threads = 1) {
   RolloutCfg cfg;
@@ -60,6 +62,32 @@ TEST(Rollout, TheSuiteStandsInItsPublishedOrder) {
                   "obj_end", "tcp_pose", "policy_phase", "policy_num_retries", "grasp_pose"));
   EXPECT_EQ(rollout.suite().owner("tcp_pose"), "robot 'franka'");
   EXPECT_EQ(rollout.suite().owner("grasp_pose"), "policy 'planner'");
+}
+
+TEST(Rollout, CamerasAreVideosAndImagePointsOfThoseThatGiveThem) {
+  RolloutCfg cfg = blind();
+  cfg.cameras.reset();
+  cfg.width = 16;
+  cfg.height = 8;
+  cfg.depth = true;
+  Rollout rollout(cfg);
+  std::vector<RecordedCamera> cameras = rollout.cameras();
+  ASSERT_GE(cameras.size(), 2u);
+  for (const RecordedCamera& camera : cameras) {
+    EXPECT_EQ(rollout.suite().stream(camera.name).spec.storage, Storage::kRgbVideo);
+    const SensorSpec& depth = rollout.suite().stream(camera.name + "_depth").spec;
+    EXPECT_EQ(depth.storage, Storage::kDepthVideo);
+    EXPECT_EQ(depth.shape, Shape({8, 16}));
+  }
+  cameras[0].image_points = false;
+  const ActionLog log(1);
+  const SensorSuite suite = core_suite(rollout.task(), log, cameras);
+  Sensor& points = suite.get("object_image_points");
+  points.initialize({.model = rollout.task().model(), .num_worlds = 1});
+  EXPECT_THAT(points.fields(), Not(IsEmpty()));
+  for (const Field& field : points.fields()) {
+    EXPECT_THAT(field.name, Not(HasSubstr(cameras[0].name)));
+  }
 }
 
 // docs/observations.md shows these lines.
@@ -156,6 +184,23 @@ TEST(Rollout, AtTheEndOnlyTheCommandIsLeft) {
   EXPECT_EQ(row(rollout, "task_info")["episode_step"], actions);
 }
 
+TEST(Rollout, ATimeOutLeavesTheLastAction) {
+  RolloutCfg cfg = blind();
+  cfg.horizon = 3;
+  Rollout rollout(cfg);
+  start(rollout, {0}, {7});
+  for (int t = 0; t < 3; ++t) {
+    EXPECT_FALSE(rollout.evaluation(0).truncated);
+    rollout.act();
+    rollout.step();
+  }
+  EXPECT_TRUE(rollout.evaluation(0).truncated);
+  EXPECT_FALSE(rollout.evaluation(0).terminal);
+  for (const char* name : {"joint_pos", "joint_pos_rel", "ee_twist", "ee_pose"}) {
+    EXPECT_TRUE(given(rollout, name, "arm")) << name;
+  }
+}
+
 TEST(Rollout, WhatThePolicySaysIsNumbers) {
   RolloutCfg cfg = blind();
   cfg.policy.clear();
@@ -197,7 +242,13 @@ std::uint64_t hash(Rollout& rollout, int world) {
 }
 
 // Hashes of the first observations of episodes 0 .. 4, played as worlds become free.
-std::map<std::int64_t, std::vector<std::uint64_t>> play(const RolloutCfg& cfg) {
+std::map<std::int64_t, std::vector<std::uint64_t>> play(RolloutCfg cfg) {
+  cfg.more_sensors = [](const std::shared_ptr<Simulation>&) {  // one with noise
+    return std::vector<std::shared_ptr<Sensor>>{std::make_shared<FunctionSensor<double>>(
+        "noise", SensorSpec{}, [](const World& world, std::span<double> row) {
+          row[0] = world.rng(stream_of("noise")).uniform();
+        })};
+  };
   Rollout rollout(cfg);
   std::map<std::int64_t, std::vector<std::uint64_t>> seen;
   std::int64_t next = 0;

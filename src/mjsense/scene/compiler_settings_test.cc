@@ -300,6 +300,19 @@ TEST(CompilerSettings, WhatCannotBeAppliedIsRefused) {
           HasSubstr("no support for buffer textures"))));
 }
 
+// Of <visual> the first entity counts that writes it, be it MuJoCo's default.
+TEST(CompilerSettings, WhatIsWrittenCountsAlsoIfItIsTheDefault) {
+  const auto lit = [](const char* compiler, double ambient) {
+    return fmt::format(R"(<mujoco><compiler {}/><visual><headlight ambient="{} .1 .1"/></visual>
+        <worldbody><body name="b"><geom size=".1"/></body></worldbody></mujoco>)",
+                       compiler, ambient);
+  };
+  SceneCfg cfg;
+  cfg.entities = {{"first", {.model = {.xml = lit("fusestatic='true'", .1)}}},
+                  {"second", {.model = {.xml = lit("", .5)}}}};
+  EXPECT_FLOAT_EQ(Scene(std::move(cfg)).model()->vis.headlight.ambient[0], .1f);
+}
+
 TEST(CompilerSettings, ABaseKeepsThemForItselfOnly) {
   const auto scene = [](const std::string& compiler, bool alone) {
     SceneCfg cfg;

@@ -55,6 +55,7 @@ struct Height : Sensor {
   }
   void substep(const World& w) override {
     ++substeps[w.id];
+    solves = w.data->timer[mjTIMER_CONSTRAINT].number;
     last_dt = w.dt();
   }
   void reset(const World& w) override { ++resets[w.id]; }
@@ -145,6 +146,22 @@ TEST(Simulation, ComputesTheStagesThatItsSensorsNeed) {
   sim.step();
   sim.refresh(*place);
   EXPECT_FLOAT_EQ(place->row(0), static_cast<float>(qpos[2]));
+}
+
+// A sensor that sees every substep has the forces there, if it asks for them.
+TEST(Simulation, SubstepsHaveTheStagesThatTheirSensorsNeed) {
+  for (const mjtStage stage : {mjSTAGE_POS, mjSTAGE_ACC}) {
+    Simulation sim(scene(), {.decimation = 2});
+    auto s = std::make_shared<Height>("h");
+    s->with_substeps = true;
+    s->reads_up_to = stage;
+    sim.add(s);
+    sim.step();
+    const int before = s->solves;
+    reinterpret_cast<double*>(sim.worlds().state_component("qfrc_applied").data)[0] = 0.1;
+    sim.step();  // the first substep solves anew, the second uses the solve of the sensor
+    EXPECT_EQ(s->solves - before, stage == mjSTAGE_ACC ? 3 : 2);
+  }
 }
 
 TEST(Simulation, PartialResetRefreshesExactlyThoseWorlds) {

@@ -55,6 +55,7 @@ TEST(PickPlanner, PicksUpMostObjects) {
   for (int e = 0; e < episodes; ++e) {
     const EpisodeResult& r = results[e];
     successes += r.success;
+    EXPECT_FALSE(r.success && r.truncated) << text[e] << ": the planner says when it is done";
     if (wanted)
       printf("%3d %-32s steps %3d success %d gave_up %d truncated %d reward %.4f\n", e,
              text[e].c_str(), r.steps, r.success, r.gave_up, r.truncated, r.reward);
