@@ -1,4 +1,4 @@
-"""Our images a second in a scene of camera_scenes.py: what all camera benchmarks compare with their peer."""
+"""Our images a second in a view of camera_scenes.py: what all camera benchmarks compare with their peer."""
 
 from __future__ import annotations
 
@@ -6,10 +6,12 @@ import dataclasses
 import os
 import statistics
 import time
+from collections.abc import Sequence
 
 import camera_scenes
 import harness  # noqa: F401  finds mjsense
 import numpy as np
+from camera_scenes import View
 
 import mjsense as mjs
 
@@ -17,28 +19,53 @@ CPUS = len(os.sched_getaffinity(0))
 RUNS = 5
 
 
-class Ours:
-    """One camera in `worlds` worlds; every call of `frame` moves everything (camera_scenes.poses), then times the images alone."""
+@dataclasses.dataclass(frozen=True)
+class Shot:
+    size: tuple[int, int]
+    kinds: tuple[str, ...] = ("rgb",)
+    shadows: bool = True
 
-    def __init__(self, name: str, size: tuple[int, int], kinds: tuple[str, ...], worlds: int, threads: int = CPUS) -> None:
-        width, height = size
-        camera = mjs.CameraSensorCfg(
-            name="cam", camera_name=f"w/{camera_scenes.CAMERAS[name]}", width=width, height=height, data_types=kinds, use_shadows=True
-        )
-        entity = mjs.EntityCfg(model=getattr(camera_scenes, name)())
-        self.scene = mjs.Scene(mjs.SceneCfg(entities={"w": entity}, sensors=(camera,)))
+
+class Ours:
+    """Shots of one view in `worlds` worlds; every call of `frame` changes everything that the view changes, then times one shot's images
+    alone."""
+
+    def __init__(self, view: View, shots: Sequence[Shot], worlds: int, threads: int = CPUS) -> None:
+        cameras = [
+            mjs.CameraSensorCfg(
+                name=f"cam{i}", camera_name=f"w/{view.camera}", width=shot.size[0], height=shot.size[1], data_types=shot.kinds,
+                use_shadows=shot.shadows,
+            )
+            for i, shot in enumerate(shots)
+        ]  # fmt: skip
+        entity = mjs.EntityCfg(model=getattr(camera_scenes, view.scene)())
+        self.view = view
+        self.scene = mjs.Scene(mjs.SceneCfg(entities={"w": entity}, sensors=cameras))
         self.sim = mjs.Simulation(self.scene, num_worlds=worlds, threads=threads)
+        self.cameras = [self.scene[camera.name] for camera in cameras]
         self.qpos = self.sim.model.qpos0.copy()
         self.frames = 0
 
-    def frame(self) -> tuple[float, float]:
+    def frame(self, shot: int = 0) -> tuple[float, float]:
         """CPU seconds of all threads, and wall seconds."""
         self.sim.qpos[:] = camera_scenes.poses(self.qpos, self.sim.num_worlds, self.frames)
+        for name, values in camera_scenes.model_fields(self.sim.model, self.view, self.sim.num_worlds, self.frames, "w/").items():
+            self.sim.randomize(name, values)
         self.frames += 1
         self.sim.forward()
         cpu, wall = time.process_time(), time.perf_counter()
-        self.sim.refresh([self.scene["cam"]])
+        self.sim.refresh([self.cameras[shot]])
         return time.process_time() - cpu, time.perf_counter() - wall
+
+    def rate(self, shot: int = 0) -> float:
+        """Images a CPU second."""
+        self.frame(shot)
+        return self.sim.num_worlds / statistics.median(self.frame(shot)[0] for _ in range(RUNS))
+
+
+def of_scene(name: str) -> View:
+    """The camera of a scene where one is enough."""
+    return View(name, name, camera_scenes.CAMERAS[name])
 
 
 @dataclasses.dataclass
@@ -47,8 +74,8 @@ class Result:
     first: dict[str, np.ndarray]  # the images of world 0 in frame 0
 
 
-def measure(name: str, size: tuple[int, int], kinds: tuple[str, ...], worlds: int) -> Result:
-    ours = Ours(name, size, kinds, worlds)
+def measure(view: View, size: tuple[int, int], kinds: tuple[str, ...], worlds: int, shadows: bool = True) -> Result:
+    ours = Ours(view, [Shot(size, kinds, shadows)], worlds)
     ours.frame()
-    first = {kind: getattr(ours.scene["cam"].data, kind)[0].copy() for kind in kinds}
-    return Result(worlds / statistics.median(ours.frame()[0] for _ in range(RUNS)), first)
+    first = {kind: getattr(ours.cameras[0].data, kind)[0].copy() for kind in kinds}
+    return Result(ours.rate(), first)

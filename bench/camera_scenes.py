@@ -5,6 +5,7 @@ The environments of peers import this file too: nothing but MuJoCo and NumPy is 
 
 from __future__ import annotations
 
+import dataclasses
 import pathlib
 
 import mujoco
@@ -12,7 +13,7 @@ import numpy as np
 from fetch import wheel
 
 HERE = pathlib.Path(__file__).resolve().parent
-CAMERAS = {"panda": "view", "kitchen": "view", "go1": "head"}  # what the benchmarks measure
+CAMERAS = {"panda": "view", "kitchen": "view", "go1": "head"}  # of each scene, where one is enough
 SHOWN_GROUPS = (0, 1, 2)
 
 
@@ -23,6 +24,54 @@ def compiled(name: str) -> mujoco.MjModel:
 def poses(qpos: np.ndarray, worlds: int, frame: int) -> np.ndarray:
     """[worlds, nq]: everything moves a little from frame to frame and world to world; frame 0 of world 0 is `qpos`."""
     return qpos + 1e-3 * (frame + np.arange(worlds)[:, None] / worlds)
+
+
+@dataclasses.dataclass(frozen=True)
+class View:
+    """What a benchmark of cameras looks at, and what differs from image to image and world to world besides the state."""
+
+    label: str
+    scene: str
+    camera: str
+    moves: bool = False  # the camera's own place in the model; one that a body carries moves with the state
+    randomised: bool = False  # lights and materials
+
+
+# What people train with first; a camera that stands still over one scene is the case that a cache of what stands still helps most.
+VIEWS = {
+    "panda_wrist": View("Panda's wrist camera", "panda", "robot0_eye_in_hand"),
+    "panda_moving": View("Panda table, camera moving", "panda", "view", moves=True),
+    "kitchen_moving": View("kitchen, camera moving", "kitchen", "view", moves=True),
+    "go1_head": View("Go1's head camera", "go1", "head"),
+    "panda_randomised": View("Panda table, camera, lights, materials randomised", "panda", "view", moves=True, randomised=True),
+    "kitchen_randomised": View("kitchen, camera, lights, materials randomised", "kitchen", "view", moves=True, randomised=True),
+    "panda_fixed": View("Panda table, camera fixed", "panda", "view"),
+    "kitchen_fixed": View("kitchen, camera fixed", "kitchen", "view"),
+}
+
+
+def model_fields(model: mujoco.MjModel, view: View, worlds: int, frame: int, prefix: str = "") -> dict[str, np.ndarray]:
+    """Fields of the model, [worlds, ...], that this frame's images have of their own."""
+    fields = {}
+    phase = frame + np.arange(worlds) / worlds
+    if view.moves:
+        camera = model.cam(prefix + view.camera).id
+        pos, quat = (np.tile(x, (worlds, 1, 1)) for x in (model.cam_pos, model.cam_quat))
+        pos[:, camera] += 0.05 * np.stack([np.sin(phase), np.cos(1.7 * phase), np.sin(2.3 * phase)], -1)
+        for world, angle in enumerate(0.05 * np.sin(1.3 * phase)):
+            mujoco.mju_mulQuat(quat[world, camera], model.cam_quat[camera], np.array([np.cos(angle), 0, np.sin(angle), 0]))
+        fields |= {"cam_pos": pos, "cam_quat": quat}
+    if view.randomised:
+        rng = np.random.default_rng(frame)
+        for name, spread in (("light_pos", 0.2), ("light_dir", 0.1)):
+            value = getattr(model, name)
+            fields[name] = value + rng.uniform(-spread, spread, (worlds, *value.shape))
+        fields["light_dir"] /= np.linalg.norm(fields["light_dir"], axis=-1, keepdims=True)
+        for name in ("mat_rgba", "geom_rgba"):
+            value = getattr(model, name)
+            fields[name] = value * np.append(rng.uniform(0.5, 1, 3), 1) * rng.uniform(0.8, 1, (worlds, len(value), 1)) ** [1, 1, 1, 0]
+        fields["light_diffuse"] = model.light_diffuse * rng.uniform(0.6, 1, (worlds, model.nlight, 3))
+    return fields
 
 
 def describe(model: mujoco.MjModel) -> str:

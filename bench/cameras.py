@@ -1,51 +1,49 @@
-"""Images a second of CPU time: ours beside MuJoCo's classic renderer (EGL, llvmpipe), poses changed before every image.
+"""Images a second of CPU time: ours beside MuJoCo's classic renderer (EGL, in software), everything that a view changes changed before
+every image (camera_scenes.VIEWS): moving cameras and randomised worlds first, a camera that stands still as a case of its own.
 
-The classic renderer runs in one process a CPU at a time, without multisampling (its fastest setting); we in one process with as
-many threads. CPU time of all threads is counted, so that other work on the machine does not decide. Rendering alone is timed:
-physics and mj_forward are not, updating our ray scene and MuJoCo's mjvScene are. Names of scenes as arguments measure these alone.
+The classic renderer has shadow maps of 4096 (MuJoCo's default), of 1024, or none, and no multisampling (its fastest setting); both
+sides have one thread, and CPU time is counted, so that other work on the machine does not decide. Rendering alone is timed: physics
+and mj_forward are not, updating our ray scene and MuJoCo's mjvScene are. Names of views and sizes as arguments (panda_wrist, 640x480)
+measure these alone.
 """
 
 from __future__ import annotations
 
 import os
-import statistics
 import sys
-from concurrent.futures import ThreadPoolExecutor
 
 import camera_scenes
-from camera_rate import CPUS, measure
+from camera_rate import Ours, Shot
+from camera_scenes import VIEWS
 from fetch import Unavailable, run_peer, wheel
 from harness import Row, report
 
-SIZES = ((84, 84), (224, 224), (640, 480))
-GOALS = {  # rgb with shadows, depth
-    "panda": ((90, 20, 6), (35, 10, 4)),
-    "kitchen": ((180, 45, 12), (18, 6, 3)),
-    "go1": ((110, 30, 7), (20, 7, 3)),
-}
-
-
-def classic(name: str, size: tuple[int, int], kind: str) -> float:
-    """Images a CPU second of as many processes as there are CPUs."""
-    os.environ.setdefault("LP_NUM_THREADS", "1")  # one process a CPU: llvmpipe's own threads would only be in the way
-    with ThreadPoolExecutor() as pool:
-        runs = [pool.submit(run_peer, None, "classic_cameras", name, *map(str, size), kind) for _ in range(CPUS)]
-    return statistics.harmonic_mean([run.result()["images_per_second"] for run in runs])
+SIZES = ((84, 84), (640, 480))
+WORLDS = 8
+MAPS = {"4096": "classic, shadow maps 4096", "1024": "classic, shadow maps 1024"}
 
 
 def main() -> None:
-    wheel("PyOpenGL")  # before the processes of the classic renderer want it at the same time
-    names = [n for n in GOALS if n in sys.argv] or list(GOALS)
+    os.environ.setdefault("LP_NUM_THREADS", "0")  # llvmpipe draws in the thread that calls it
+    wheel("PyOpenGL")
+    views = [v for v in VIEWS if v in sys.argv] or list(VIEWS)
+    sizes = [s for s in SIZES if f"{s[0]}x{s[1]}" in sys.argv] or list(SIZES)
     rows = []
-    for name in names:
-        print(f"{name}: {camera_scenes.describe(camera_scenes.compiled(name))}", file=sys.stderr)
-        for index, size in enumerate(SIZES):
-            for goals, kind in zip(GOALS[name], ("rgb", "depth")):
-                case = f"{name} {size[0]}x{size[1]} {kind}{' with shadows' if kind == 'rgb' else ''}"
-                peer = classic(name, size, kind)
-                ours = measure(name, size, (kind,), 8 * CPUS).rate
-                rows.append(Row(case, ours, "images/CPU s", peer, "classic", goal=goals[index]))
-                print(f"{case}: {ours:.0f} against {peer:.1f}", file=sys.stderr)
+    for name in views:
+        view = VIEWS[name]
+        print(f"{name}: {camera_scenes.describe(camera_scenes.compiled(view.scene))}", file=sys.stderr)
+        kinds = (("rgb",), True), (("rgb",), False), (("depth",), False)
+        ours = Ours(view, [Shot(size, *kind) for size in sizes for kind in kinds], WORLDS, threads=1)
+        for index, size in enumerate(sizes):
+            case = f"{view.label}, {size[0]}x{size[1]}"
+            shadows, plain, depth = (ours.rate(3 * index + kind) for kind in range(3))
+            peer = run_peer(None, "classic_cameras", name, *map(str, size))
+            unit = "images/CPU s"
+            rows += [Row(f"{case}, rgb with shadows", shadows, unit, peer[k], label) for k, label in MAPS.items()]
+            rows.append(Row(f"{case}, rgb without shadows", plain, unit, peer["plain"], "classic without shadows"))
+            rows.append(Row(f"{case}, depth", depth, unit, peer["depth"], "classic without shadows"))
+            for row in rows[-4:]:
+                print(f"{row.case}: {row.ours:.1f} against {row.peer:.2f} ({row.peer_name})", file=sys.stderr)
     report("Cameras", rows)
 
 

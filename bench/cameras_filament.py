@@ -14,7 +14,7 @@ import tempfile
 
 import camera_scenes
 import numpy as np
-from camera_rate import CPUS, measure
+from camera_rate import CPUS, measure, of_scene
 from fetch import Unavailable, run_peer
 from harness import Row, report
 from images import same_depth, write_sheet
@@ -34,7 +34,7 @@ def main() -> None:
                 with tempfile.NamedTemporaryFile(suffix=".npz") as file:
                     peer = run_peer("filament", "filament_cameras", name, str(width), str(height), kind, file.name)
                     image = np.load(file.name)["image"]
-                ours = measure(name, (width, height), (kind,), 8 * CPUS)
+                ours = measure(of_scene(name), (width, height), (kind,), 8 * CPUS)
                 case = f"{name} {width}x{height} {kind}{' with shadows' if kind == 'rgb' else ''}"
                 rows.append(Row(case, ours.rate, "images/CPU s", peer["images_per_second"], "Filament"))
                 print(f"{case}: {ours.rate:.0f} against {rows[-1].peer:.1f}", file=sys.stderr)

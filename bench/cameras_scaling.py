@@ -11,7 +11,7 @@ import statistics
 import sys
 
 import camera_scenes
-from camera_rate import CPUS, RUNS, Ours
+from camera_rate import CPUS, RUNS, Ours, Shot, of_scene
 from fetch import Unavailable
 from harness import Row, report
 
@@ -21,7 +21,7 @@ SMALL, MIDDLE, LARGE = (84, 84), (224, 224), (640, 480)
 def by_worlds(name: str) -> list[Row]:
     rows: list[Row] = []
     for worlds in (1, 16, 256):
-        case = Ours(name, SMALL, ("rgb",), worlds, threads=1)
+        case = Ours(of_scene(name), [Shot(SMALL)], worlds, threads=1)
         case.frame()
         # 256 images in each measurement, for one alone is short.
         seconds = [sum(case.frame()[0] for _ in range(256 // worlds)) for _ in range(RUNS)]
@@ -32,7 +32,7 @@ def by_worlds(name: str) -> list[Row]:
 def by_pixels(name: str) -> list[Row]:
     rows: list[Row] = []
     for width, height in (SMALL, MIDDLE, LARGE):
-        case = Ours(name, (width, height), ("rgb",), 16, threads=1)
+        case = Ours(of_scene(name), [Shot((width, height))], 16, threads=1)
         case.frame()
         seconds = [case.frame()[0] for _ in range(RUNS)]
         cost = 1e9 * statistics.median(seconds) / 16 / (width * height)
@@ -48,7 +48,7 @@ def lower(case: str, cost: float, unit: str, before: list[Row], first: str) -> R
 def by_threads(name: str) -> list[Row]:
     rows = []
     for size, worlds in ((SMALL, 64), (MIDDLE, 8), (LARGE, 1)):
-        cases = [Ours(name, size, ("rgb",), worlds, threads) for threads in (1, 2)]
+        cases = [Ours(of_scene(name), [Shot(size)], worlds, threads) for threads in (1, 2)]
         one, two = median_seconds(*cases, runs=2 * RUNS + 1)
         text = f"{name}: {worlds} of {size[0]}x{size[1]}, two threads"
         rows.append(Row(text, 1000 * two, "ms", 1000 * one, "one thread", higher_is_better=False, goal=1.9))

@@ -1,8 +1,9 @@
 """Images a second of CPU time beside mujoco_warp's cameras on the CPU, the renderer of mjlab's CameraSensor.
 
-64 worlds, 84 x 84, rgb and depth together. Ours has shadows; the peer once without, its default, and once with. Poses change before
-every image; physics and kinematics are not timed. A row says on how many pixels the depths are the same, so that both are known
-to draw the same scene; --pictures=FOLDER writes what both drew. The first run compiles the peer's kernels, about a minute.
+64 worlds, 84 x 84, rgb and depth together, both with shadows and both without (the peer's default), in the views of camera_scenes.VIEWS;
+physics and kinematics are not timed. Rows say on how many pixels the depths are the same, so that both are known to draw the same
+scene; --pictures=FOLDER writes what both drew. Names of views as arguments measure these alone. The first run compiles the peer's
+kernels, about a minute.
 """
 
 from __future__ import annotations
@@ -12,15 +13,14 @@ import pathlib
 import sys
 import tempfile
 
-import camera_scenes
 import numpy as np
 from camera_rate import measure
+from camera_scenes import VIEWS
 from fetch import Unavailable, run_peer
 from harness import Row, report
 from images import same_depth, write_sheet
 
 WIDTH, HEIGHT, WORLDS = 84, 84, 64
-GOAL = 8
 
 
 def main() -> None:
@@ -28,17 +28,19 @@ def main() -> None:
     parser.add_argument("--pictures", type=pathlib.Path, metavar="FOLDER")
     folder = parser.parse_known_args()[0].pictures
     rows = []
-    for name in camera_scenes.CAMERAS:
-        size = camera_scenes.describe(camera_scenes.compiled(name))
-        ours = measure(name, (WIDTH, HEIGHT), ("rgb", "depth"), WORLDS)
-        for shadows, goal in (("plain", GOAL), ("shadows", None)):
+    for name in [v for v in VIEWS if v in sys.argv] or VIEWS:
+        view = VIEWS[name]
+        for shadows in (True, False):
+            ours = measure(view, (WIDTH, HEIGHT), ("rgb", "depth"), WORLDS, shadows)
+            setting = "shadows" if shadows else "plain"
             with tempfile.NamedTemporaryFile(suffix=".npz") as file:
-                peer = run_peer("warp", "warp_cameras", name, str(WIDTH), str(HEIGHT), str(WORLDS), shadows, file.name)
+                peer = run_peer("warp", "warp_cameras", name, str(WIDTH), str(HEIGHT), str(WORLDS), setting, file.name)
                 first = dict(np.load(file.name))
-            case = f"{name}: {size}" if shadows == "plain" else "- the peer with shadows too"
-            rows.append(Row(case, ours.rate, "images/CPU s", peer["images_per_second"], "mujoco_warp", goal=goal))
+            case = f"{view.label}, {'with' if shadows else 'without'} shadows"
+            rows.append(Row(case, ours.rate, "images/CPU s", peer["images_per_second"], "mujoco_warp, the same setting"))
             print(f"{case}: {ours.rate:.0f} against {rows[-1].peer:.0f}", file=sys.stderr)
-        rows.append(Row("- the same depth within 1 cm", same_depth(ours.first["depth"][..., 0], first["depth"]), "% of pixels"))
+        same = same_depth(ours.first["depth"][..., 0], first["depth"])
+        rows.append(Row("- the same depth within 1 cm", same, "% of pixels"))
         if folder:
             write_sheet(folder / f"{name}_warp.png", ours.first["rgb"], first["rgb"])
     report(f"Cameras, {WORLDS} worlds, {WIDTH} x {HEIGHT}, rgb and depth", rows)

@@ -1,4 +1,5 @@
-"""Contact sensing on Unitree Go1 robots on rough terrain: what it adds to a step, next to MuJoCo's own contact sensors.
+"""Contact sensing: one world with few and with all primaries touching (contact_bench.cc), and Unitree Go1 robots on rough terrain: what it
+adds to a step, next to MuJoCo's own contact sensors.
 
 The robot is mjlab's, taken from its wheel on PyPI. All cases run the same physics; CPU time of one thread, so
 that other programs on the machine matter little. MuJoCo's sensors give the seven fields of the four feet at the end of a step;
@@ -13,7 +14,7 @@ import time
 
 import mujoco
 from fetch import Unavailable, run_peer, wheel
-from harness import Row, report
+from harness import Row, google_benchmarks, report
 
 import mjsense as mjs
 
@@ -83,10 +84,27 @@ def added_us(case: Case, physics: Case) -> float:
     return 1e6 * statistics.median(a - b for a, b in zip(case.seconds, physics.seconds)) / case.sim.num_worlds / DECIMATION
 
 
+def one_world() -> list[Row]:
+    """Seven fields of primaries of which few or all touch."""
+    rows = []
+    m = google_benchmarks("contact/(ours|mujoco)")
+    for name, other in m.items():
+        kind, primaries, _ = name.removeprefix("contact/").split("/")
+        if kind == "mujoco_7_fields":
+            case = f"one world, primaries: {primaries}, contacts: {other['contacts']:.0f}"
+            for ours, memory in (("ours_7_fields", ""), ("ours_with_memory", "; ours with air time, events, peak, history of 4")):
+                cost = m[name.replace(kind, ours)]
+                if cost["contacts"] != other["contacts"]:
+                    raise RuntimeError(f"{name}: {cost['contacts']:.0f} contacts on our side")
+                rows.append(Row(case + memory, cost["cpu"] * 1e-3, "us", other["cpu"] * 1e-3, "MuJoCo's contact sensors",
+                                higher_is_better=False))  # fmt: skip
+    return rows
+
+
 def main() -> None:
     quick = "--quick" in sys.argv
     rounds, steps = (10, 2) if quick else (60, 2)
-    rows = []
+    rows = one_world()
     xml = wheel("mjlab") / "mjlab/asset_zoo/robots/unitree_go1/xmls/go1.xml"
     imu = [f"robot/imu_{s}" for s in ("ang_vel", "lin_vel", "lin_acc")]
     memory = {"track_air_time": True, "track_events": True, "latch": True, "history_length": DECIMATION}

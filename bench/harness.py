@@ -12,12 +12,14 @@ import json
 import os
 import pathlib
 import statistics
+import subprocess
 import sys
 import time
 from collections.abc import Callable
 
 ROOT = pathlib.Path(__file__).resolve().parents[1]
 RELEASE = ROOT / "build" / "release"  # what ./dev bench builds
+RESULTS = ROOT / ".cache" / "bench" / "results"  # of the last runs, for page.py
 if not (RELEASE / "python").exists():
     sys.exit(f"{RELEASE} is missing: ./dev bench builds it")
 sys.path.insert(0, str(RELEASE / "python"))  # so that `import mjsense` after this module finds what is measured
@@ -26,6 +28,31 @@ sys.path.insert(0, str(RELEASE / "python"))  # so that `import mjsense` after th
 def program(name: str) -> str:
     """The path of a built program."""
     return str(RELEASE / name)
+
+
+def run_program(name: str, *options: str, **environment: str) -> str:
+    """What a built program prints."""
+    return subprocess.run([program(name), *options], check=True, env={**os.environ, **environment}, stdout=subprocess.PIPE,
+                          stderr=subprocess.DEVNULL, text=True).stdout  # fmt: skip
+
+
+def google_benchmarks(names: str, runs: int = 5, **environment: str) -> dict[str, dict]:
+    """Benchmarks of mjsense_bench whose names match, in turns: medians of real and CPU nanoseconds, items of one iteration, and the
+    counters of the first, by name."""
+    text = run_program("mjsense_bench", f"--benchmark_filter={names}", "--benchmark_format=json", "--benchmark_min_time=0.1",
+                       f"--benchmark_repetitions={runs}", "--benchmark_enable_random_interleaving=true", **environment)  # fmt: skip
+    same: dict[str, list[dict]] = {}
+    for run in json.loads(text[text.index("{") :])["benchmarks"]:
+        if run["run_type"] == "iteration":
+            same.setdefault(run["run_name"].removesuffix("/real_time"), []).append(run)
+    medians = {}
+    for name, all_runs in same.items():
+        real, cpu = (statistics.median(r[k] for r in all_runs) for k in ("real_time", "cpu_time"))
+        # items_per_second counts real time where that was asked for.
+        per_second = statistics.median(r.get("items_per_second", 0.0) for r in all_runs)
+        counted = real if "/real_time" in all_runs[0]["name"] else cpu
+        medians[name] = {**all_runs[0], "real": real, "cpu": cpu, "items": per_second * counted * 1e-9}
+    return medians
 
 
 @dataclasses.dataclass
@@ -69,25 +96,49 @@ def machine() -> str:
     return f"{model}, {len(os.sched_getaffinity(0))} CPUs"
 
 
-def _number(x: float | None) -> str:
+LOAD_BEFORE = os.getloadavg()[0]  # a benchmark imports this module before it measures
+
+
+def load() -> str:
+    """How much the machine had to do beside: the load averages of a minute before and after."""
+    return f"load average {LOAD_BEFORE:.1f} before, {os.getloadavg()[0]:.1f} after"
+
+
+def number(x: float | None) -> str:
     if x is None:
         return ""
     return f"{x:,.0f}" if abs(x) >= 1000 else f"{x:.3g}"
 
 
+def table(rows: list[dict]) -> str:
+    """Rows of one case beside each other, a column for every peer: its figure, and ours as a multiple of it (better is more)."""
+    peers = list(dict.fromkeys(r["peer_name"] for r in rows if r["peer"] is not None))
+    cases: dict[tuple, list[dict]] = {}
+    for i, row in enumerate(rows):
+        key = (row["case"], row["unit"]) if row["peer"] is not None else (row["case"], row["unit"], i)
+        cases.setdefault(key, []).append(row)
+    lines = [f"| case | unit | ours |{''.join(f' {p} |' for p in peers)}", f"| --- | --- | ---: |{' ---: |' * len(peers)}"]
+    for (case, unit, *_), same in cases.items():
+        beside = {r["peer_name"]: f"{number(r['peer'])} ({r['ratio']:.3g} x)" for r in same if r["peer"] is not None}
+        lines.append(f"| {case} | {unit} | {number(same[0]['ours'])} |{''.join(f' {beside.get(p, str())} |' for p in peers)}")
+    return "\n".join(lines)
+
+
 def report(title: str, rows: list[Row]) -> None:
-    """Print the table, or with --json one object a line."""
+    """Print the table, or with --json one object a line; keep it for page.py."""
     parser = argparse.ArgumentParser()
     parser.add_argument("--json", action="store_true")
     args, _ = parser.parse_known_args()
+    flat = [{**dataclasses.asdict(row), "ratio": row.ratio} for row in rows]
+    RESULTS.mkdir(parents=True, exist_ok=True)
+    kept = {"title": title, "machine": machine(), "load": load(), "rows": flat}
+    parts = [a for a in sys.argv[1:] if not a.startswith("-")]  # a benchmark may be run in parts
+    (RESULTS / f"{'-'.join([pathlib.Path(sys.argv[0]).stem, *parts])}.json").write_text(json.dumps(kept, indent=1))
     if args.json:
-        for row in rows:
-            print(json.dumps({"title": title, "machine": machine(), **dataclasses.asdict(row), "ratio": row.ratio}))
+        for row in flat:
+            print(json.dumps({"title": title, "machine": machine(), "load": load(), **row}))
         return
-    print(f"\n## {title}\n\n{machine()}\n")
-    print("| case | ours | peer | unit | ratio | goal |\n| --- | ---: | ---: | --- | ---: | ---: |")
+    print(f"\n## {title}\n\n{machine()}; {load()}\n\n{table(flat)}")
     for row in rows:
-        ratio = f"{row.ratio:.2f} x" if row.ratio is not None else ""
-        peer = f"{_number(row.peer)} ({row.peer_name})" if row.peer is not None else ""
-        goal = f"{row.goal:g} x" if row.goal is not None else ""
-        print(f"| {row.case} | {_number(row.ours)} | {peer} | {row.unit} | {ratio} | {goal} |")
+        if row.goal is not None and row.ratio is not None and row.ratio < row.goal:
+            print(f"below its goal of {row.goal:.3g} x: {row.case}, {row.ratio:.3g} x {row.peer_name}", file=sys.stderr)

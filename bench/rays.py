@@ -1,22 +1,17 @@
 """Height scans and a lidar beside mj_ray, mj_multiRay, mujoco_warp (the engine under mjlab's ray sensors) and mujoco-lidar on the CPU, the
 update of a world's top level, and threads: lidar_bench.cc and height_scan_bench.cc, run as one program.
 
-The robots are mjlab's Go1 and G1. Peers of Python run in an environment of their own (fetch.py) in the scenes that our program saved. Rates
+Before every scan the robot has another pose, joints included; only the rays and bringing what they see up to date are timed. The robots
+are mjlab's Go1 and G1. Peers of Python run in an environment of their own (fetch.py) in the scenes that our program saved. Rates
 count processor time of one core, so that a busy machine counts for both sides alike.
 """
 
-import json
-import os
 import pathlib
-import statistics
-import subprocess
 import sys
 import tempfile
 
 from fetch import Unavailable, run_peer, wheel
-from harness import Row, program, report
-
-RUNS = 5
+from harness import Row, google_benchmarks, report, run_program
 
 
 def robots() -> dict[str, str]:
@@ -29,40 +24,15 @@ def robots() -> dict[str, str]:
     return {"MJSENSE_BENCH_QUADRUPED": f"{folder}/unitree_go1/xmls/go1.xml", "MJSENSE_BENCH_HUMANOID": f"{folder}/unitree_g1/xmls/g1.xml"}
 
 
-def bench(*options: str, **environment: str) -> str:
-    command = [program("mjsense_bench"), *options]
-    environment = {**os.environ, **environment}
-    return subprocess.run(command, check=True, env=environment, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL, text=True).stdout
-
-
-def measure(models: dict[str, str]) -> dict[str, dict]:
-    """Medians of real and CPU nanoseconds, rays of one iteration and the scene's geoms and faces, by benchmark."""
-    text = bench("--benchmark_filter=height_scan|lidar|top_level", "--benchmark_format=json", "--benchmark_min_time=0.2",
-                 f"--benchmark_repetitions={RUNS}", "--benchmark_enable_random_interleaving=true", **models)
-    runs: dict[str, list[dict]] = {}
-    for run in json.loads(text[text.index("{"):])["benchmarks"]:
-        if run["run_type"] == "iteration":
-            runs.setdefault(run["run_name"].removesuffix("/real_time"), []).append(run)
-    medians = {}
-    for name, same in runs.items():
-        real, cpu = (statistics.median(r[k] for r in same) for k in ("real_time", "cpu_time"))
-        # items_per_second counts real time where that was asked for.
-        per_second = statistics.median(r.get("items_per_second", 0.0) for r in same)
-        counted = real if "/real_time" in same[0]["name"] else cpu
-        size = {k: same[0].get(k, 0) for k in ("geoms", "faces")}
-        medians[name] = {"real": real, "cpu": cpu, "rays": per_second * counted * 1e-9, **size}
-    return medians
-
-
 def rate(m: dict) -> float:
-    return m["rays"] / m["cpu"] * 1e3
+    return m["items"] / m["cpu"] * 1e3
 
 
 def peer(models: dict[str, str], benchmark: str, script: str, *kind: str) -> float | None:
     """M rays per CPU second of a peer in the scene of this benchmark; None, and a line that says why, if it cannot be had."""
     with tempfile.TemporaryDirectory() as folder:
         scene = str(pathlib.Path(folder) / "scene.mjb")
-        bench(f"--benchmark_filter={benchmark}", "--benchmark_min_time=0.01", MJSENSE_BENCH_SAVE=scene, **models)
+        run_program("mjsense_bench", f"--benchmark_filter={benchmark}$", "--benchmark_min_time=0.01", MJSENSE_BENCH_SAVE=scene, **models)
         try:
             return run_peer("warp", script, scene, *kind)["rays_per_second"] * 1e-6
         except Unavailable as error:
@@ -72,7 +42,7 @@ def peer(models: dict[str, str], benchmark: str, script: str, *kind: str) -> flo
 
 def main() -> None:
     models = robots()
-    m = measure(models)
+    m = google_benchmarks("height_scan|lidar|top_level", **models)
     unit = "M rays per CPU second"
     rows = []
     room = f"lidar 16 x 360 on a humanoid in a room, {m['lidar/1']['geoms']:.0f} geoms, {m['lidar/1']['faces'] / 1000:.0f}k faces"
@@ -91,9 +61,11 @@ def main() -> None:
     for name, case in (("height_scan/boxes", "height scan, boxes"), ("lidar", "lidar")):
         rows.append(Row(f"{case}, two threads and one", m[f"{name}/2"]["real"] * 1e-3, "us", m[f"{name}/1"]["real"] * 1e-3,
                         "one thread", higher_is_better=False, goal=1.9))
-    top = m["top_level"]
-    case = f"top level of a world of {top['geoms']:.0f} geoms"
-    rows.append(Row(case, top["cpu"] * 1e-3, "us", 5.0, "goal", higher_is_better=False, goal=1))
+    many = "lidar in 16 worlds, a step of physics (not timed) between"
+    rows.append(Row(many, rate(m["lidar_worlds"]), unit, rate(m["lidar_worlds_mj_multiRay"]), "mj_multiRay", goal=5))
+    for pose in ("moving", "still"):
+        top = m[f"top_level/{pose}"]
+        rows.append(Row(f"top level of a world of {top['geoms']:.0f} geoms, the robot {pose}", top["cpu"] * 1e-3, "us"))
     report("Rays", rows)
 
 

@@ -104,7 +104,7 @@ def main() -> None:
             peer_writes(scratch / "peer", rgb, metres, rows, episodes)
             peer_cpu.append(processor_seconds() - before)
 
-        _, peer_s = median_seconds(ours, peer, runs=3)
+        _, peer_s = median_seconds(ours, peer, runs=5)
         walls = sorted(walls[1:], key=lambda w: w["wall_s"])
         split = walls[len(walls) // 2]
         case = f"{episodes} x {steps} steps, 2 RGB{' + 2 depth' if with_depth else ''}, {WIDTH}x{HEIGHT}"

@@ -5,7 +5,7 @@ import subprocess
 import sys
 
 HERE = pathlib.Path(__file__).parent
-SHARED = {"run", "harness", "fetch", "opengl", "images", "camera_scenes", "camera_rate", "pictures"}  # not benchmarks
+SHARED = {"run", "harness", "fetch", "opengl", "images", "camera_scenes", "camera_rate", "pictures", "page"}  # not benchmarks
 
 
 def main() -> int:

@@ -19,7 +19,11 @@ lidar = MjLidarWrapper(model, "head", backend="warp", cutoff_dist=30.0, args={"d
 elevation, azimuth = np.meshgrid(np.radians(np.linspace(-15, 15, 16)), np.radians(np.arange(360.0)), indexing="ij")
 azimuth, elevation = azimuth.ravel().astype(np.float32), elevation.ravel().astype(np.float32)
 seconds = []
+poses = [data.qpos.copy(), data.qpos.copy()]  # in turns, the joints differ
+poses[1][7:] += np.random.default_rng(2).uniform(-0.2, 0.2, model.nq - 7)
 for i in range(30):
+    data.qpos[:] = poses[i % 2]
+    mujoco.mj_forward(model, data)
     start = time.process_time()
     distances = lidar.trace_rays(data, azimuth, elevation)
     if i >= 10:

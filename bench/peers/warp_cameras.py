@@ -1,6 +1,6 @@
 """Images a second of mujoco_warp's ray-traced cameras on the CPU, the renderer of mjlab's CameraSensor:
 
-    warp_cameras SCENE WIDTH HEIGHT WORLDS shadows|plain images.npz
+    warp_cameras VIEW WIDTH HEIGHT WORLDS shadows|plain images.npz
 
 rgb and depth together, textures, skybox and all lights; without shadows unless asked for. Timed are the refit of its BVH and the images;
 poses are brought up to date before, as for ours. images.npz gets rgb and depth of world 0 in frame 0.
@@ -24,7 +24,8 @@ def main() -> None:
     name, width, height, worlds = sys.argv[1], *map(int, sys.argv[2:5])
     shadows, images = sys.argv[5] == "shadows", sys.argv[6]
     wp.config.quiet = True
-    model = camera_scenes.compiled(name)
+    view = camera_scenes.VIEWS[name]
+    model = camera_scenes.compiled(view.scene)
     data = mujoco.MjData(model)
     mujoco.mj_forward(model, data)
     skybox = bool((model.tex_type == mujoco.mjtTexture.mjTEXTURE_SKYBOX).any())
@@ -32,11 +33,13 @@ def main() -> None:
         m, d = mjw.put_model(model), mjw.put_data(model, data, nworld=worlds)
         context = mjw.create_render_context(
             model, nworld=worlds, cam_res=(width, height), render_rgb=True, render_depth=True, use_shadows=shadows,
-            render_skybox=skybox, enabled_geom_groups=list(camera_scenes.SHOWN_GROUPS), cam_active=[camera_scenes.CAMERAS[name]],
+            render_skybox=skybox, enabled_geom_groups=list(camera_scenes.SHOWN_GROUPS), cam_active=[view.camera],
         )
         seconds = []
         for frame in range(RUNS + 1):
             d.qpos.assign(camera_scenes.poses(model.qpos0, worlds, frame).astype(np.float32))
+            for field, values in camera_scenes.model_fields(model, view, worlds, frame).items():
+                setattr(m, field, wp.array(values.astype(np.float32), dtype=getattr(m, field).dtype))
             mjw.kinematics(m, d)
             mjw.com_pos(m, d)
             mjw.camlight(m, d)

@@ -48,7 +48,9 @@ def main() -> None:
     groups = [0, 1, 2] if sys.argv[2] == "height" else [0, 1, 2, 3, 4, 5]
     with wp.ScopedDevice("cpu"):
         m, d = mjw.put_model(model), mjw.put_data(model, data, nworld=worlds)
-        d.qpos.assign(np.stack(states).astype(np.float32))
+        rng = np.random.default_rng(2)
+        poses = [np.stack(states), np.stack(states)]  # in turns, the joints differ: what is under the rays moves
+        poses[1][:, 7:] += rng.uniform(-0.2, 0.2, poses[1][:, 7:].shape)
         mjw.kinematics(m, d)
         context = mjw.create_render_context(model, nworld=worlds, cam_res=(4, 4), enabled_geom_groups=groups)
         pnt, vec = (wp.array(np.ascontiguousarray(a, np.float32), dtype=wp.vec3f) for a in (points, directions))
@@ -57,6 +59,9 @@ def main() -> None:
         mask = mjw._src.types.vec6f(*(-1 if g in groups else 0 for g in range(6)))
         seconds = []
         for i in range(30):
+            d.qpos.assign(poses[i % 2].astype(np.float32))
+            mjw.kinematics(m, d)
+            wp.synchronize()
             start = time.process_time()
             mjw.refit_bvh(m, d, context)
             mjw.rays(m, d, pnt, vec, mask, True, body, *out, context)

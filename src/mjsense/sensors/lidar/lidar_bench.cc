@@ -1,16 +1,19 @@
 // Spinning lidar, 16 x 360 rays from the head of a humanoid, on one thread; mjsense, mj_multiRay
-// and mj_ray in one run. items_per_second are rays. MJSENSE_BENCH_HUMANOID names an MJCF (a G1's)
+// and mj_ray in one run, the robot in another pose before every scan; and in many worlds with a
+// step of physics between. items_per_second are rays. MJSENSE_BENCH_HUMANOID names an MJCF (a G1's)
 // to stand in for the stand-in; it needs a body at whose height rays make sense:
 // MJSENSE_BENCH_HUMANOID_BODY, default torso_link.
 
 #include <benchmark/benchmark.h>
 #include <mujoco/mujoco.h>
 
+#include <algorithm>
 #include <cmath>
 #include <cstdlib>
 #include <memory>
 #include <numeric>
 #include <string>
+#include <vector>
 
 #include "mjsense/core/parallel.h"
 #include "mjsense/core/rng.h"
@@ -92,27 +95,35 @@ mjModel* load() {
 
 struct Fixture {
   mjModel* m = load();
-  mjData* d = mj_makeData(m);
+  mjData* d;                 // this scan's pose
+  std::vector<mjData*> all;  // of every world in turns: poses in which the joints differ too
   std::unique_ptr<LidarSensor> sensor;
   std::unique_ptr<RayScene> rays;
 
-  explicit Fixture(int threads = 1) {
+  explicit Fixture(int threads = 1, int worlds = 1) {
     // For peers in Python (bench/peers): the same scene.
     if (const char* path = std::getenv("MJSENSE_BENCH_SAVE")) mj_saveModel(m, path, nullptr, 0);
-    mj_forward(m, d);
+    Rng rng(6, 0, 0, 0);
+    for (int i = 0; i < std::max(2, worlds); ++i) {
+      d = all.emplace_back(mj_makeData(m));
+      for (int j = 7; i > 0 && j < m->nq; ++j) d->qpos[j] += rng.uniform(-0.2, 0.2);
+      mj_forward(m, d);
+    }
+    d = all[0];
     LidarSensorCfg cfg;
     cfg.name = "lidar";
     cfg.frame = {{"site", "head", ""}};
     cfg.include_geom_groups = std::nullopt;
     cfg.max_distance = 30;
     sensor = std::make_unique<LidarSensor>(cfg);
-    sensor->initialize({.model = m, .num_worlds = 1, .threads = threads});
-    rays = std::make_unique<RayScene>(m, 1);
+    sensor->initialize({.model = m, .num_worlds = worlds, .threads = threads});
+    rays = std::make_unique<RayScene>(m, worlds);
   }
   ~Fixture() {
-    mj_deleteData(d);
+    for (mjData* x : all) mj_deleteData(x);
     mj_deleteModel(m);
   }
+  void next() { d = d == all[0] ? all[1] : all[0]; }
   int body() const { return m->site_bodyid[mj_name2id(m, mjOBJ_SITE, "head")]; }
   const double* head() const { return d->site_xpos + 3 * mj_name2id(m, mjOBJ_SITE, "head"); }
 };
@@ -122,9 +133,10 @@ void lidar(benchmark::State& state) {
   ThreadPool pool(static_cast<int>(state.range(0)));
   World world;
   world.model = f.m;
-  world.data = f.d;
   const int ids[] = {0};
   for (auto _ : state) {
+    f.next();
+    world.data = f.d;
     f.rays->update(world);
     f.sensor->compute(world);
     f.sensor->cast({f.rays.get(), ids, pool});
@@ -142,28 +154,79 @@ void lidar_mj_multiRay(benchmark::State& state) {
   const RayPattern& p = f.sensor->pattern();
   std::vector<double> distance(p.size()), normals(3 * p.size());
   std::vector<int> geoms(p.size());
-  for (auto _ : state)
+  for (auto _ : state) {
+    f.next();
     mj_multiRay(f.m, f.d, f.head(), p.directions[0].data(), nullptr, 1, f.body(), geoms.data(),
                 distance.data(), normals.data(), static_cast<int>(p.size()), 30);
+  }
   state.SetItemsProcessed(state.iterations() * p.size());
 }
 
 void lidar_mj_ray(benchmark::State& state) {
   Fixture f;
   const RayPattern& p = f.sensor->pattern();
-  for (auto _ : state)
+  for (auto _ : state) {
+    f.next();
     for (const auto& d : p.directions) {
       int geom;
       double normal[3];
       benchmark::DoNotOptimize(
           mj_ray(f.m, f.d, f.head(), d.data(), nullptr, 1, f.body(), &geom, normal));
     }
+  }
   state.SetItemsProcessed(state.iterations() * p.size());
+}
+
+// Physics between the scans, which is not timed, takes the caches.
+constexpr int kWorlds = 16;
+
+void lidar_worlds(benchmark::State& state) {
+  Fixture f(1, kWorlds);
+  ThreadPool pool(1);
+  std::vector<int> ids(kWorlds);
+  std::iota(ids.begin(), ids.end(), 0);
+  for (auto _ : state) {
+    state.PauseTiming();
+    for (mjData* d : f.all) mj_step(f.m, d);
+    for (mjData* d : f.all) mj_kinematics(f.m, d);
+    state.ResumeTiming();
+    for (int w : ids) {
+      World world;
+      world.id = w;
+      world.model = f.m;
+      world.data = f.all[w];
+      f.rays->update(world);
+      f.sensor->compute(world);
+    }
+    f.sensor->cast({f.rays.get(), ids, pool});
+  }
+  state.SetItemsProcessed(state.iterations() * kWorlds * f.sensor->num_rays());
+}
+
+void lidar_worlds_mj_multiRay(benchmark::State& state) {
+  Fixture f(1, kWorlds);
+  const RayPattern& p = f.sensor->pattern();
+  std::vector<double> distance(p.size()), normals(3 * p.size());
+  std::vector<int> geoms(p.size());
+  for (auto _ : state) {
+    state.PauseTiming();
+    for (mjData* d : f.all) mj_step(f.m, d);
+    for (mjData* d : f.all) mj_kinematics(f.m, d);
+    state.ResumeTiming();
+    for (mjData* d : f.all) {
+      f.d = d;
+      mj_multiRay(f.m, d, f.head(), p.directions[0].data(), nullptr, 1, f.body(), geoms.data(),
+                  distance.data(), normals.data(), static_cast<int>(p.size()), 30);
+    }
+  }
+  state.SetItemsProcessed(state.iterations() * kWorlds * p.size());
 }
 
 BENCHMARK(lidar)->Arg(1)->Arg(2)->UseRealTime();
 BENCHMARK(lidar_mj_multiRay);
 BENCHMARK(lidar_mj_ray);
+BENCHMARK(lidar_worlds);
+BENCHMARK(lidar_worlds_mj_multiRay);
 
 }  // namespace
 }  // namespace mjsense
