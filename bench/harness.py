@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """What every benchmark here shares: the built program and Python package, two things timed in turn in one run, medians, and one table.
 
 A script `bench/<name>.py` measures and calls `report(rows)`. Run it alone after `./dev bench` built what it needs, or all of them with

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Pictures side by side, and how far apart they are."""
 
 from __future__ import annotations

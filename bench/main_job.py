@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The main job end to end: a planner drives a Franka to pick, two cameras watch, episodes land on disk.
 
 Steps and frames a second over the whole job, and where the time goes. `encoders` and `files` are processor seconds spent

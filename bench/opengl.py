@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Makes MuJoCo's classic renderer usable. To be imported before mujoco, which looks for PyOpenGL once, when it is imported itself."""
 
 import importlib.util

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Writes the tables of docs/performance.md and README.md from the last runs: `python bench/page.py`. No figure is typed by hand.
 
 Every benchmark leaves its rows in .cache/bench/results. Between `<!-- bench NAME -->` and `<!-- end -->` a page has that benchmark's table,

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """What fresh sensors cost: a control step of a Simulation beside plain mj_step of MuJoCo's own batch, which leaves everything a substep old.
 
 Both start from the same states, get the same controls, new ones at every step, and go through the same states bit for bit. CPU time

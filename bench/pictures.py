@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Side-by-side sheets: ours, MuJoCo's classic renderer, and their difference (times 3); and how far apart they are.
 
     .venv/bin/python bench/pictures.py FOLDER [scene ...]        scenes: gallery soft pick kitchen go1 panda
@@ -11,12 +12,11 @@ from __future__ import annotations
 import pathlib
 import sys
 
-import opengl  # noqa: F401  before mujoco
-
 import camera_scenes
 import harness  # noqa: F401  finds mjsense
 import mujoco
 import numpy as np
+import opengl  # noqa: F401  before mujoco
 from fetch import Unavailable
 from images import ssim, write_png
 

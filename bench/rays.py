@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Height scans and a lidar beside mj_ray, mj_multiRay, mujoco_warp (the engine under mjlab's ray sensors) and mujoco-lidar on the CPU, the
 update of a world's top level, and threads: lidar_bench.cc and height_scan_bench.cc, run as one program.
 

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Writing and encoding: our recorder against a plain sequential writer in Python (h5py + ffmpeg), as MolmoSpaces saves.
 
 Both get the same pictures and rows, made before the clock starts, and both end with complete files. The peer keeps an
@@ -17,7 +18,6 @@ import tempfile
 
 import h5py
 import numpy as np
-
 from harness import Row, median_seconds, program, report
 
 WIDTH, HEIGHT = 640, 368

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Run all benchmarks (or those named) one after the other: `./dev bench [name ...]`."""
 
 import pathlib

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 # One benchmark program, made of the x_bench.cc beside the code.
 find_package(benchmark REQUIRED)
 file(GLOB_RECURSE benches CONFIGURE_DEPENDS ${PROJECT_SOURCE_DIR}/src/mjsense/*_bench.cc)

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 # Everything mjsense links. Debian packages (apt.txt) and the wheel mujoco-core; nothing is downloaded at configure time.
 
 # MuJoCo's version. Where pip or a Python without the extension must know it too, a test says that they agree

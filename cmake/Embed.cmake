@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 # models/**.xml are compiled into the library, so that the program needs no files of its own at run time.
 file(GLOB_RECURSE MJSENSE_MODELS CONFIGURE_DEPENDS ${PROJECT_SOURCE_DIR}/models/*.xml)
 set(MJSENSE_EMBEDDED ${PROJECT_BINARY_DIR}/embedded_models.cc)

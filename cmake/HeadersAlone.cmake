@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 # Every header compiles by itself: ninja headers_alone. A file that includes one header and nothing else, for each.
 file(GLOB_RECURSE headers RELATIVE ${PROJECT_SOURCE_DIR}/src CONFIGURE_DEPENDS ${PROJECT_SOURCE_DIR}/src/mjsense/*.h)
 if(NOT MJSENSE_OPENGL)

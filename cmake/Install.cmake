@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 # find_package(mjsense): the public headers, the static library, and the libraries it needs found again in the same way.
 include(GNUInstallDirs)
 include(CMakePackageConfigHelpers)

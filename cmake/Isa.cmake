@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 # Instruction sets. The library runs on any x86-64. Files named *_avx2.cc and *_avx512.cc are compiled for these and chosen at
 # run time (core/cpu.h), so that a machine without them never meets an illegal instruction.
 # GCC 12 warns of uninitialised values inside its own AVX-512 headers. What it vectorises in straight lines at -O3 loses the

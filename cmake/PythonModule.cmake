@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 # The Python package. The extension is mjsense/_core.abi3.so: nanobind in split mode (its run-time part is the package
 # nanobind-backend), so that one wheel serves every CPython from 3.11 on. It is made of
 # python/bindings, which stands above every room of C++.

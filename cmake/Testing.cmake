@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 # What tests share, in folders testing/: a room's tests may use those of the rooms below it.
 file(GLOB_RECURSE shared CONFIGURE_DEPENDS ${PROJECT_SOURCE_DIR}/src/mjsense/*.cc)
 list(FILTER shared INCLUDE REGEX "/testing/[^/]*\\.cc$")

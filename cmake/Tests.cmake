@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 # One test program per room, made of the x_test.cc beside the code; ctest runs each as one test.
 find_package(GTest REQUIRED)
 file(GLOB MJSENSE_ROOMS RELATIVE ${PROJECT_SOURCE_DIR}/src/mjsense CONFIGURE_DEPENDS ${PROJECT_SOURCE_DIR}/src/mjsense/*)

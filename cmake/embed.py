@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """embed.py MODELS_DIR OUT.cc: write every MJCF below MODELS_DIR as a string of mjsense::embedded_models()."""
 import pathlib
 import sys

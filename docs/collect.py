@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Collects the pages that stand in the rooms (src/mjsense/sensors/*/page.md and so on) into the documentation."""
 
 import pathlib

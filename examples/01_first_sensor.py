@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """A scene, four worlds, an accelerometer: what it reads in free fall and after landing."""
 
 import mjsense as mjs

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """A sensor of your own, beside a camera and a lidar-like scan, in one suite."""
 
 import gymnasium

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Record picks of a planner, then meet the same task as a gymnasium environment."""
 
 import sys

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Three worlds that look different: colour, light and camera randomised; pictures, ids and a point cloud."""
 
 import numpy as np

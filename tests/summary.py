@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """summary.py FOLDER: how many tests passed, and why those that were skipped were. Reads the XML of googletest and pytest there."""
 
 import pathlib

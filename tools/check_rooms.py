@@ -1,4 +1,5 @@
 #!/usr/bin/env python3
+# SPDX-License-Identifier: Apache-2.0
 """Fails where an include runs against the order of the rooms, which the table in docs/architecture.md gives.
 
 A file may include its own room and the rooms above it in that table. Tests, benchmarks and folders testing/ may include

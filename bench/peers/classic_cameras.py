@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Images a second of MuJoCo's classic renderer through EGL: classic_cameras VIEW WIDTH HEIGHT.
 
 rgb with shadow maps of 4096 (MuJoCo's default) and of 1024, rgb without shadows, and depth; without multisampling, its fastest
@@ -10,10 +11,9 @@ import statistics
 import sys
 import time
 
-import opengl  # noqa: F401  before mujoco
-
 import camera_scenes
 import mujoco
+import opengl  # noqa: F401  before mujoco
 
 RUNS = 5
 

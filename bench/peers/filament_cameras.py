@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Images a second of MuJoCo's Filament renderer through Vulkan, in software where there is no GPU:
 
     filament_cameras SCENE WIDTH HEIGHT rgb|depth image.npz
@@ -14,7 +15,7 @@ import time
 
 import camera_scenes
 import mujoco
-import mujoco.studio.window  # noqa: F401  registers Filament's materials
+import mujoco.studio.window
 import numpy as np
 from mujoco import mjrf
 from mujoco.rendering.filament.model_scene import ModelScene

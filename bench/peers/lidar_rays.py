@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Rays a second of mujoco-lidar (Warp on the CPU) in the scene that lidar_bench.cc saved: lidar_rays scene.mjb."""
 
 import json

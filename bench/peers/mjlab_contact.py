@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """What mjlab's sensors cost on the CPU: 64 Go1 on rough terrain, IMU and feet as in bench/contact.py.
 
 The scene is mjlab's own: Scene and Simulation on the device "cpu", its Go1 held by its actuators, four of its rough terrains, its physics

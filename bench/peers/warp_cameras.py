@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Images a second of mujoco_warp's ray-traced cameras on the CPU, the renderer of mjlab's CameraSensor:
 
     warp_cameras VIEW WIDTH HEIGHT WORLDS shadows|plain images.npz

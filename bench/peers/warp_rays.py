@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Rays a second of mujoco_warp on the CPU, the engine under mjlab's ray sensors, in a scene that our benchmarks saved:
 warp_rays scene.mjb lidar|height.
 """

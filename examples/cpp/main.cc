@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // sees SCENE.xml CAMERA: what that camera sees in the second of two worlds, as CAMERA.ppm.
 
 #include <mjsense/mjsense.h>

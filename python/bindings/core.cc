@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Errors, specs and versions in Python.
 
 #include <mujoco/mujoco.h>

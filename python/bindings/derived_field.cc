@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "python/bindings/derived_field.h"
 
 #include <mujoco/mjxmacro.h>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #pragma once
 // A field of mjData as a sensor: sim.data.xpos in Python is fresh, lazy and cached in the same way
 // as any measurement.

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // A chain of effects that is driven by hand.
 
 #include <nanobind/nanobind.h>

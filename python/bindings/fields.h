@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #pragma once
 // Reads Python objects into C++ configurations, by the table of their fields.
 

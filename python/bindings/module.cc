@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // The extension mjsense._core. Users see it through the package mjsense.
 
 #include <nanobind/nanobind.h>

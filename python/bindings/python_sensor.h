@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #pragma once
 // A sensor written in Python, as the simulation sees it: computed for all worlds at once, on the
 // caller's thread.

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Episodes in Python: recording them, and playing them with the caller's actions.
 
 #include "mjsense/rollout/rollout.h"

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Scenes in Python. python/mjsense/scene.py makes the public class of it.
 
 #include "mjsense/scene/scene.h"

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Simulations in Python. python/mjsense/simulation.py makes the public class of it.
 
 #include "mjsense/sim/simulation.h"

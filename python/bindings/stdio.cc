@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // libc's streams under the names that libhdf5_shared.a has for them (cmake/PythonModule.cmake).
 
 #include <cstdio>

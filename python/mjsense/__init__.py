@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """mjsense: batched sensors for MuJoCo, from the simulator to the policy to the disk."""
 
 import mujoco as _mujoco  # first: it loads the libmujoco that the extension shares

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Wrong arguments and misspelt attributes of the Python API are said in one sentence.
 
 What an argument may be is what its annotation says. ``checked`` reads the annotations of a function, or of every public method of

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """What configurations can do: the generated dataclasses of the same names (configs.py, effects.py) inherit from these."""
 
 from __future__ import annotations
@@ -14,7 +15,7 @@ from mjsense import _core
 from mjsense._arguments import KnownAttributes
 
 if TYPE_CHECKING:
-    from typing_extensions import Self
+    from typing import Self
 
 
 class Config(KnownAttributes):

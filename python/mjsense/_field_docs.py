@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Shows what stands under a dataclass's fields in ``help()``: Python forgets these strings when it compiles a class."""
 
 from __future__ import annotations

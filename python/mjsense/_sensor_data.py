@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The base of what sensors with several fields return (data.py)."""
 
 from __future__ import annotations
@@ -26,6 +27,6 @@ def make_data(base: type, arrays: dict[str, np.ndarray]) -> Any:
     known = {f.name for f in fields(base)}
     extra = [name for name in arrays if name not in known]
     if extra:
-        namespace = {"__annotations__": {name: "np.ndarray | None" for name in extra}, **dict.fromkeys(extra)}
+        namespace = {"__annotations__": dict.fromkeys(extra, "np.ndarray | None"), **dict.fromkeys(extra)}
         base = dataclass(repr=False, frozen=True)(type(base.__name__, (base,), namespace))
     return base(**arrays)

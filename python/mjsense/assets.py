@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Meshes that other installed packages bring. Robots are drawn with shapes of our own without them; motion is the same."""
 
 from __future__ import annotations

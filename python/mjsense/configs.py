@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Configurations of scenes and sensors: plain dataclasses, all checked by C++ when they are made.
 
 Units stand in brackets; without one: metres, radians, seconds, newtons. Quaternions are (w, x, y, z). Shapes: ``B`` worlds, ``P``

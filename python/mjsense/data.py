@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """What sensors with several fields return. The arrays share memory with the sensor: they hold the values of the moment of the last
 read of ``.data``, and are read-only. Fields that were not asked for are None.
 
@@ -171,6 +172,6 @@ DATA_OF_KIND: dict[str, type] = {
 }
 """By a sensor's kind; others return an array."""
 
-__all__ = ["CameraData", "ContactData", "DATA_OF_KIND", "ImuData", "RayCastData", "SensorData", "make_data"]
+__all__ = ["DATA_OF_KIND", "CameraData", "ContactData", "ImuData", "RayCastData", "SensorData", "make_data"]
 
 show_field_docs(__name__)

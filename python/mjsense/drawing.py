@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """What sensors show a human of their measurements: shapes in the world, for any viewer."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """What real sensors do to a value. Effects wrap a sensor of the scene, in this order, in its unit and in seconds::
 
     mjs.EffectSensorCfg(name="imu", sensor="robot/imu_acc", effects=(

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Errors of mjsense: ValueError, RuntimeError, and a KeyError that prints as a sentence."""
 
 

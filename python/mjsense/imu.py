@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Inertial measurement units."""
 
 from mjsense.configs import ImuAxis, ImuModel, ImuSensorCfg

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Observation functions on sensors, with mjlab's names: ``height_scan(sim, sensor_name="scan")``.
 
 `env` is anything with a ``scene``: a :class:`mjsense.Simulation`, or an environment that has one. They return new arrays.

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """mjlab's observation pipeline for values that do not come from a sensor."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Sensors that trace rays."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Recording episodes."""
 
 from __future__ import annotations
@@ -5,7 +6,6 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
 
 from mjsense import _core
 from mjsense._arguments import Seed, checked

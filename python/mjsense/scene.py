@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Scenes: what all worlds share."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Sensors as Python sees them: those computed in C++, and the base class of your own."""
 
 from __future__ import annotations

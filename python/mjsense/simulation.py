@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Simulations: B worlds of one scene, stepped together, with every sensor fresh."""
 
 from __future__ import annotations

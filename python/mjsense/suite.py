@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Suites: what a policy observes and what a recording stores."""
 
 from __future__ import annotations
@@ -95,7 +96,7 @@ class SensorSuite(KnownAttributes):
                 out[uuid] = _copied(sensor.data[batch_index])
             else:
                 rows = {name: array[batch_index].copy() for name, array in sensor.fields.items()}
-                out[uuid] = rows[""] if "" in rows else rows
+                out[uuid] = rows.get("", rows)
         return out
 
 

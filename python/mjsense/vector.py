@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Tasks as gymnasium vector environments."""
 
 from __future__ import annotations

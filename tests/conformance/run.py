@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """run.py CASES.jsonl RESULTS.json: runs the executable cases of scene sensors through mjsense's Python API.
 
 The cases' script is mjlab's order of calls, and their expectations hold its caches: contact data are a snapshot until
@@ -15,10 +16,10 @@ from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
+from mjsense.pipeline import ObservationPipeline
 
 import mjsense as mjs
 from mjsense import observations
-from mjsense.pipeline import ObservationPipeline
 
 KINDS = {
     "builtin": mjs.BuiltinSensorCfg,

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The executable cases, graded: |x - v| <= atol + rtol |v|; integers and shapes exact. Divergences follow MuJoCo."""
 
 import json

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Are the bits the same as before? Plays five scenes and compares hashes of the states, of every sensor's rows and of the images
 // with the file of hashes. See README.md: what a difference means, and how the file is renewed.
 //

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Writes the hashes of this CPU anew: python tests/golden/renew.py "why the bits changed" [--build build/dev]
 
 Every instruction set of the kernels that this CPU has is run; lines of other CPUs stay, and are wrong from here on until somebody

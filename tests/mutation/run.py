@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Do the tests notice? Makes one small wrong change at a time in a copy of the tree and runs the tests.
 
     python tests/mutation/run.py                  every mutant of mutants.toml that has no result yet

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Every mutant applies to the code as it stands: whoever moves its text moves it here too."""
 
 from pathlib import Path

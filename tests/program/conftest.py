@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Drives the mjsense program as a user does: build/dev/mjsense, or $MJSENSE_PROGRAM."""
 
 import os

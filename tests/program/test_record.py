@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """mjsense record: what is on disk, that it depends on nothing but the seed, and that it stops cleanly."""
 
 import json

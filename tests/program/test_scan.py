@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """mjsense scan: a lidar's view of a scene as a point cloud."""
 
 import numpy as np

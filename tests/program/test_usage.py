@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The other words of mjsense, and wrong input: one clear line, exit code 2, nothing half-written."""
 
 import json

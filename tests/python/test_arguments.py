@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Wrong arguments of every public method, and misspelt attributes, are said in one sentence."""
 
 import inspect
@@ -83,7 +84,7 @@ WRONG = ("3", 1.5, -1, 2**40, 10**30, np.nan, None, True, b"x", object(), [0.5],
 
 @pytest.mark.parametrize("cls", CLASSES, ids=lambda c: c.__name__)
 def test_no_wrong_argument_shows_a_binding(cls, live):
-    objects, sim = live
+    objects, _sim = live
     if cls not in objects:
         assert cls in (mjs.NativeSensor, mjs.BuiltinSensor), "give the fixture an object of it"
         return

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 import mujoco
 import numpy as np
 import pytest
@@ -145,7 +146,7 @@ SITE, TENDON = int(mujoco.mjtObj.mjOBJ_SITE), int(mujoco.mjtObj.mjOBJ_TENDON)
 def test_sites_and_tendons_move_with_their_world(renderer):
     s, sim = marked(renderer, num_worlds=3)
     for _ in range(3):  # so that what stands still is kept
-        s["eye"].data.rgb  # noqa: B018
+        s["eye"].data.rgb
         sim.forward()
     for world in range(3):
         sim.qpos[world, 0] = 0.3 * world
@@ -175,7 +176,7 @@ def test_sites_and_tendons_belong_to_the_entity_that_brought_them():
 
 def test_the_flow_of_a_site_is_that_of_its_body():
     s, sim = marked()
-    s["eye"].data.flow  # noqa: B018, the image before
+    s["eye"].data.flow
     sim.qpos[0, 0] = 0.1
     sim.forward()
     data = s["eye"].data

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 import copy
 import dataclasses
 import pickle
@@ -5,6 +6,7 @@ import pickle
 import pytest
 
 import mjsense as mjs
+
 
 def imu(**kwargs):
     return mjs.BuiltinSensorCfg(
@@ -167,7 +169,7 @@ def test_no_number_may_be_nan_and_nothing_may_be_of_another_type(cls):
         elif isinstance(value, tuple) and value and isinstance(value[0], float):
             wrong = [(nan, *value[1:]), "x"]
         for bad in wrong:
-            if field.name in ("assets", "draw") or isinstance(bad, str) and isinstance(value, str):
+            if field.name in ("assets", "draw") or (isinstance(bad, str) and isinstance(value, str)):
                 continue
             with pytest.raises((ValueError, KeyError, TypeError)):
                 cls(**{**right, field.name: bad})

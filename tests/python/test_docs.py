@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The pages are tests: what they show runs as it stands (CONTRIBUTING, "Pages")."""
 
 import importlib.util

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Every example runs, and says what it should."""
 
 import os
@@ -6,9 +7,9 @@ import sys
 from pathlib import Path
 
 import pytest
+from test_installed import PUBLIC
 
 import mjsense
-from test_installed import PUBLIC
 
 EXAMPLES = Path(__file__).parents[2] / "examples"
 BUILD = Path(mjsense.__file__).absolute().parents[2]

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """What is read, when, and what is written in between changes no bit of the states: they are those of plain mj_step."""
 
 import mujoco
@@ -101,7 +102,7 @@ def test_writes_and_reads_between_steps(integrator, decimation, threads):
 
 
 def test_fields_of_mjdata_are_fresh_whatever_was_read_before():
-    sim, read = simulation("implicitfast", 1, 2)
+    sim, _read = simulation("implicitfast", 1, 2)
     fresh = mujoco.MjData(sim.model)
     sim.qpos[:, 0] = 0.6
     sim.forward()

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """What is generated from the declarations in C++ is as they say."""
 
 import importlib.util

@@ -13,7 +13,7 @@ def includes(header):
 
 
 def test_public_headers_include_public_headers_only():
-    assert PUBLIC == sorted(set(PUBLIC), key=lambda h: (h != "mjsense/mjsense.h", h))
+    assert sorted(set(PUBLIC), key=lambda h: (h != "mjsense/mjsense.h", h)) == PUBLIC
     for header in PUBLIC:
         private = [i for i in includes(header) if i not in PUBLIC]
         assert not private, f"{header} includes what is not installed: {private} (cmake/PublicHeaders.cmake)"

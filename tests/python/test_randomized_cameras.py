@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """A world with its own values looks like a model that was compiled with them: to the bit, by either renderer."""
 
 import mujoco

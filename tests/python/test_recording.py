@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 import gymnasium
 import h5py
 import numpy as np

@@ -1,10 +1,11 @@
+# SPDX-License-Identifier: Apache-2.0
 import gc
 import threading
 
 import mujoco
 import numpy as np
 import pytest
-from scenes import ARM, BALL, ball_scene, feet_cfg
+from scenes import ARM, ball_scene, feet_cfg
 
 import mjsense as mjs
 

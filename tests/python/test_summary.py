@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """./dev test ends with what tests/summary.py says."""
 
 import subprocess

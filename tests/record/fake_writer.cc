@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Records a suite without physics: what the Python tests of the files read, kill and resume.
 //   record_fake OUT [--episodes N] [--worlds B] [--steps T] [--batches n] [--discard K]
 //               [--width W] [--height H] [--cameras C] [--no-video] [--no-depth] [--red-green]

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """What MolmoSpaces' own scripts ask of a recording, written anew from their documented behaviour.
 
 Chain of the peer: repair_video_paths -> validate_trajectories -> calculate_stats, then training loaders.

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """kill -9 at random moments: every finished episode stays readable, resuming goes on, nothing twice."""
 
 import random

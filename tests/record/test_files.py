@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Files as h5py, ffmpeg and MolmoSpaces' readers see them."""
 
 import json
@@ -6,7 +7,6 @@ import subprocess
 import h5py
 import numpy as np
 import pytest
-
 import readers
 
 EPISODES, WIDTH, HEIGHT = 8, 64, 48

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // What contact sensors know beyond their rows.
 
 #include <nanobind/nanobind.h>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Every key of an experiment file reaches the option of its name, and no other.
 
 #include <fmt/format.h>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #pragma once
 // Words that the program does not know run `mjsense-<word>` from PATH, as git does.
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // The `mjsense` program. Exit codes: 0 done; 1 some episodes or checks failed; 2 wrong usage or
 // input.
 

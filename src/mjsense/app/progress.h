@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #pragma once
 // The line that tells a person how a recording goes: on a terminal one line that changes, else a
 // line whenever an episode ends.

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #pragma once
 // `mjsense scan SCENE.xml --frame site:head --out cloud.ply`: what a lidar sees, as a point cloud.
 

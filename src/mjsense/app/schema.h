@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #pragma once
 // Everything that can be configured and everything that sensors return, as JSON: what generators of
 // code and documentation read (tools/generate.py).

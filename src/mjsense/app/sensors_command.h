@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #pragma once
 // `mjsense sensors SCENE.xml|TASK`: every stream, what it means, and what it costs.
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #pragma once
 // Typed n-dimensional arrays: what a sensor owns, a suite observes, a recording stores and Python
 // sees without a copy.

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #pragma once
 // Checks that configurations share. Each throws ValueError "<place>: <field> is <value>: must be <expected>".
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #pragma once
 // Which of the kernels compiled for several instruction sets (files *_avx2.cc, *_avx512.cc) this
 // CPU can run.

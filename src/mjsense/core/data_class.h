@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #pragma once
 // What a sensor with several fields returns: one declaration beside the sensor, from which its
 // specs, Python's data class and the tables of its page are made.

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #pragma once
 // What sensors show a human of their measurements: simple shapes in the world, as plain data. A
 // viewer of MuJoCo takes them as geoms (append_to), any other one reads them.

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "mjsense/core/debug_shapes.h"
 
 #include <gtest/gtest.h>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #pragma once
 // The files of models/, compiled into the library (cmake/embed.py).
 

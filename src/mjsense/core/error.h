@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #pragma once
 // Errors that name the place, the value, the expectation and the nearest valid names.
 

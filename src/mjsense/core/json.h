@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #pragma once
 // JSON text of dict sensors, byte for byte what Python's
 // json.dumps(x, sort_keys=True, separators=(",", ":")) gives (spec: floats as their shortest round

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #pragma once
 // Regular expressions with the meaning of Python's `re`: case-sensitive, Unicode. Names of elements
 // are matched by them. PCRE2 does the work; pattern_subset.h says which patterns are taken: all 52

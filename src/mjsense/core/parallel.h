@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #pragma once
 // A pool for casting rays and shading tiles. Ours, because a run allocates nothing, hands out items in
 // order and names the lowest that failed; as fast as TBB's parallel_for (64 items on two threads: 0.3

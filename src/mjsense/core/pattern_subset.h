@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #pragma once
 // Regular expressions that Python's `re` and PCRE2 read alike. Users write Python's; PCRE2 matches
 // them. What the two read differently, or only one knows, is refused rather than translated.

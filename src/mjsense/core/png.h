@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #pragma once
 // Pictures for people: contact sheets, depth previews, failing tests. 8-bit PNG over zlib; the same
 // pixels give the same bytes.

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #pragma once
 // Rigid-body poses in double precision: vectors, unit quaternions (wxyz), SE(3) with its
 // exponential and logarithm.

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #pragma once
 // Random numbers that are a pure function of (seed, world, stream, step, draw): the same at any
 // thread count and any order. Philox4x32-10: Salmon et al., "Parallel random numbers: as easy as 1,

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #pragma once
 // The one idea of mjsense: a named, typed, batched measurement. Given B worlds a sensor owns
 // preallocated rows [B, ...] and fills row w from world w. Scene sensors, observation sensors and

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #pragma once
 // Sensor configurations as tables of fields: a kind of sensor is what readers know of all of them.
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #pragma once
 // Things that several sensors of a simulation need and one of them makes: textures, tables.
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #pragma once
 // What a measurement is, apart from its value: the policy's space, the file on disk and the docs
 // are derived from it.

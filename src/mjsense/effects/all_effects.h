@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #pragma once
 // The effects there are, as one choice: what stands here is known to Python and to every reader of
 // fields.

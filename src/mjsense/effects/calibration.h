@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #pragma once
 // Deterministic errors of a measuring device: scale, misalignment, range, resolution, invalid
 // numbers.

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #pragma once
 // Effects one after the other on the rows of B worlds, then history. Needs no simulation: an
 // EffectSensor drives one for each field, a test or a script may drive one by hand.

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #pragma once
 // One imperfection of a sensor: noise, bias, delay, dropout ... An effect changes a row in place,
 // in the row's own unit; times are seconds. Random numbers depend on (seed, world, stream, tick)

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #pragma once
 // A sensor seen through effects. It reads another sensor and has the same fields; the other one
 // keeps the clean value.

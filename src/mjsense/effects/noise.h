@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #pragma once
 // Random errors: white noise, a bias per episode, a bias that drifts.
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #pragma once
 // mjlab's observation pipeline as a preset: noise, clip, scale, NaN policy, delay, history, in this
 // order.

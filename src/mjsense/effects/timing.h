@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #pragma once
 // When a value arrives: delay, jitter, lower rate, lost frames. All take rows of any element type
 // unless said.

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #pragma once
 // What a planner of grasps asks of a task, whichever it is: the objects within reach, which of them
 // is meant, and what they stand on.

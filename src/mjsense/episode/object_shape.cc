@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "mjsense/episode/object_shape.h"
 
 #include <fmt/format.h>

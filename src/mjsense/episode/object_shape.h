@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #pragma once
 // The surface of a rigid object as points: what placing and grasping look at.
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "mjsense/episode/policy.h"
 #include "mjsense/observe/function_sensor.h"
 #include "mjsense/observe/pose_sensor.h"

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #pragma once
 // A task: its scene, its episodes, and what counts as done. Life:
 //

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "mjsense/hdf5/h5.h"
 
 #include <fmt/format.h>

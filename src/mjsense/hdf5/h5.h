@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #pragma once
 // The HDF5 C API with owners, errors as exceptions, and the file properties that make the same data
 // the same bytes. The serial library is not thread-safe: hold an H5Lock around everything here.

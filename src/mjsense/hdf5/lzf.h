@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #pragma once
 // Reading what h5py wrote with compression="lzf", as MolmoSpaces does: the filter is h5py's and not
 // part of the HDF5 library. liblzf would save 40 of these 86 lines and cost a dependency.

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #pragma once
 // `sensor_param_<camera>`: where a camera is and how it projects, in OpenCV's conventions.
 

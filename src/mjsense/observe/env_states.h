@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #pragma once
 // `env_states`: what it takes to put the scene back as it was - every free body, and the robot's
 // joints.

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #pragma once
 // A sensor that is one function of a world: what a task, a robot or a policy knows and nobody else
 // computes.

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #pragma once
 // `object_image_points`: for each object and camera, up to ten pixels that show it.
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #pragma once
 // `qpos` and `qvel`: the joints of a robot, one stream a move group.
 

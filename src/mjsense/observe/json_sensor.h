@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #pragma once
 // Sensors whose row is JSON text, for what is no number: uint8[str_max_len], sorted keys, no blanks,
 // padded with 0. The text is written at the moment of sensing, so that what a policy reads and what

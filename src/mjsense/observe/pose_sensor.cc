@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "mjsense/observe/pose_sensor.h"
 
 #include <fmt/format.h>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #pragma once
 // The pose of a body or site, float32 [7] = position (m), quaternion (wxyz), in the world or in
 // another frame.

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "mjsense/observe/shared_field.h"
 
 #include "mjsense/core/error.h"

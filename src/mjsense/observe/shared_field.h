@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #pragma once
 // One field of another sensor as a sensor of its own: the rows are shared, nothing is copied. So a
 // camera of the scene is `wrist_camera` and `wrist_camera_depth` in a suite.

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #pragma once
 // An ordered set of sensors with unique names: what a policy observes and what a recording stores.
 //

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #pragma once
 // Which geoms a packet can meet: the rays lie in a beam, a box of origins swept along a range of
 // slopes over the axis that all directions agree on. Its cross-section over each geom's box

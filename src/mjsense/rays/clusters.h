@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #pragma once
 // The triangles of a shape in blocks of 16 neighbours, under a tree of boxes with 16 children a node:
 // what an image draws where it is finer than the triangles. Laid out for kernels, which take a block

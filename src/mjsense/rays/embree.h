@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #pragma once
 // Embree 4 or 3 behind one face: a device, and packets of 16 rays against a scene of triangles.
 // Unnamed namespace: each instruction set keeps its own copy.

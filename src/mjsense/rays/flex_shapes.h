@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #pragma once
 // The flexes of one world: their surfaces (flex_surface.h) where the world's vertices are now, in
 // the frame of the flex's first vertex (world axes), so that single precision is enough anywhere.

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #pragma once
 // The surface of a flex as MuJoCo draws it, and rays and cameras meet it: what all worlds share.
 //   dimension 2   two sheets, `radius` before and behind the triangles along smooth normals of the

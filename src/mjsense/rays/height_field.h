@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #pragma once
 // A packet against a height field in its own frame, for kernels_impl.h. The surface z = h(x, y) is
 // two triangles a cell, split along (row, col) - (row + 1, col + 1); below it stands a base box.

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Height fields whose surface lies where rays are hard to judge: flat tops in the plane where a ray
 // enters the field, steps, heights of few values, rays through grid points, edges and corners.
 

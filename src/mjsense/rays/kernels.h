@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #pragma once
 // The functions that exist once per instruction set (kernels_portable.cc, kernels_avx2.cc,
 // kernels_avx512.cc, all made of kernels_impl.h). Structures only: nothing here may be compiled

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "mjsense/rays/kernels_impl.h"
 
 namespace mjsense {

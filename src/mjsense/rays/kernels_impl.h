@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #pragma once
 // The kernels: a packet of 16 rays against candidate geoms, kWidth lanes at a time. Included by one
 // .cc file per instruction set.

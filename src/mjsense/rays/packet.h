@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #pragma once
 // Rays and hits in groups of 16, as the kernels take them: arrays by component, no allocation.
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #pragma once
 // Everything that rays and cameras of B worlds can hit. Geometry (a BVH per mesh) exists once; a
 // world adds its geoms' poses. Answers are those of mj_ray, to 1e-5 m at 10 m:

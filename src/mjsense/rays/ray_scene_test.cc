@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "mjsense/rays/ray_scene.h"
 
 #include <gtest/gtest.h>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #pragma once
 // What rays see of one world: poses and visual properties of its geoms, copied out of MuJoCo in the
 // parallel pass over worlds, so that casting needs no mjData.

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #pragma once
 // The shapes that all worlds share: a BVH for each mesh; height fields, which rays march over; for
 // cameras the triangles of both in blocks; the triangles of flexes.

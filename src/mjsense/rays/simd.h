@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #pragma once
 // Vectors of kWidth floats for the kernels: AVX-512 (16), AVX2 (8), or plain arrays of 4 that any
 // compiler vectorises. Everything lies in an unnamed namespace, because each instruction set must

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #pragma once
 // The skins of one world: meshes bent by bones, as MuJoCo draws them. Cameras see them; rays do not,
 // as mj_ray does not.

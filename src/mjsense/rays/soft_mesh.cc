@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "mjsense/rays/soft_mesh.h"
 
 #include <fmt/format.h>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #pragma once
 // Triangles whose vertices move: a BVH of their own in every world, refitted when they have moved.
 

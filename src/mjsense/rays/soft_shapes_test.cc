@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Flexes and skins against MuJoCo's own visualiser, for vertices and bones anywhere.
 
 #include <gtest/gtest.h>

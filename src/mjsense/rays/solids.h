@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #pragma once
 // Analytic shapes in their own frame, for kernels_impl.h. intersect() gives the distance along unit
 // directions, kNoHit where there is none: a solid's entry if it lies ahead, else its exit (never

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #pragma once
 // Depth as 16 bits: ours, linear and exact to half a unit over the whole range; and MolmoSpaces',
 // 0.05 to 0.55 m in the red and green bytes of a picture.

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #pragma once
 // Frames to video files through ffmpeg programs: one thread feeds them all.
 //

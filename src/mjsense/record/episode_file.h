@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #pragma once
 // The HDF5 file of one episode while it is recorded: `traj_0` of a file of its own. Used by one
 // thread; the plan outlives it.

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #pragma once
 // The directory of one house, as a small store that survives kill -9 at any moment:
 //

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #pragma once
 // The numbers of a sensor as JSON text, one text a step: {"arm":[0.1,0.2],"base":[]}.
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #pragma once
 // What becomes of a suite on disk: datasets and videos, the names of files, the batches. Pure
 // functions; the places in the HDF5 tree are molmospaces.h.

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #pragma once
 // MolmoSpaces' layout of an episode: which group of the file a stream stands in, and which sensors
 // its readers expect as JSON text.

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #pragma once
 // Starting other programs from a process with many threads: posix_spawn, no inherited descriptors,
 // no signals.

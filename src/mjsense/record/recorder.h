@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #pragma once
 // Episodes -> HDF5 + video, streamed while they run.
 //

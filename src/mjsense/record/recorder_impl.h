@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #pragma once
 // The recorder's two sides: the caller's (recorder.cc, recorder_append.cc), which copies rows into
 // chunks and frames into queues, and the writer thread's (recorder_writer.cc), which does everything

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #pragma once
 // What a recording is: which sensors, how many episodes, where and how they are kept.
 // docs/formats.md shows the files.

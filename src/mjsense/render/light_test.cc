@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Brightness by formula: Lambert's cosine, lights that are turned away, glowing surfaces, shadows whose edges geometry gives.
 
 #include <gtest/gtest.h>

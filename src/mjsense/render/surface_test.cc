@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // What a pixel shows: texels by the place on a shape, triangles drawn as shapes of the same outline, what is
 // transparent, mirrored or out of the image.
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #pragma once
 // Looking at recordings: verify, repair, inspect, contact sheet. `path` is an output directory, a
 // house directory or one .h5 file. Files of MolmoSpaces are understood too. Each result is data;

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #pragma once
 // Reading the JSON rows of dict sensors: as Python's json.loads accepts them, with NaN and
 // Infinity.

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Recordings read back: what the recorder wrote, what an interruption left.
 
 #include <fmt/format.h>

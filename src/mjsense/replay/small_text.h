@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #pragma once
 // Labels in pictures: capital letters of 6 x 10 pixels.
 

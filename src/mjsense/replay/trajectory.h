@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #pragma once
 // Reading recordings back: where the files are, the datasets of a trajectory, rows in pieces of
 // bounded size.

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #pragma once
 // What a video file holds, found with the ffmpeg program alone (not every installation has
 // ffprobe).

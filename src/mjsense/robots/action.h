@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #pragma once
 // What a policy commands for one control step of one world: plain memory, no allocation.
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #pragma once
 // `grasp_state_<role>`: does a gripper touch the object, and does it hold it alone.
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #pragma once
 // Forward and inverse kinematics of a chain of a compiled model, from its fixed transforms alone:
 // no mjData, so that any thread may plan for any world.

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #pragma once
 // A robot of a compiled model: move groups, controllers, kinematics. State is per world, in arrays
 // indexed by world; every function that takes a World (or a world index) touches that world's alone

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #pragma once
 // What a robot is, as data: its MJCF, move groups, start configuration, cameras. One function a
 // robot fills one in.

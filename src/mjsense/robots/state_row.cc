@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "mjsense/robots/state_row.h"
 
 #include "mjsense/worlds/worlds.h"

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #pragma once
 // The state of one world that an episode writes: MuJoCo's own rows, wherever they live. Call
 // forward() after writing.

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #pragma once
 // What each world looked like when its last action was chosen: relative actions are measured from
 // there.

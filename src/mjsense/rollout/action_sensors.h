@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #pragma once
 // The five `actions/*` of an observation: what led to it. Row t belongs to the action between
 // observations t-1 and t.

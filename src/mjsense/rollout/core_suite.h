@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #pragma once
 // The suite of an episode: what a policy observes and a recording holds, in its published order.
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #pragma once
 // The main job: episodes of a task, played in B worlds, kept on disk.
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #pragma once
 // The robots, tasks and policies that have a name: what the program's options and Python's strings
 // choose from. Each make throws KeyError with the nearest names.

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #pragma once
 // B worlds that play episodes of a task, in lock step: the loop under recording, gym environments
 // and benchmarks.

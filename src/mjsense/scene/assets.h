@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #pragma once
 // Files that an entity's model refers to: meshes, height fields, textures, skins.
 

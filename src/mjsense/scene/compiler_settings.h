@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #pragma once
 // Settings of <compiler> that MuJoCo applies when it compiles a model as a whole. Most (angle,
 // inertiafromgeom, boundmass, alignfree ...) stay with the elements of an attached model; these it

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Every setting of <compiler>: an entity is in a scene what its model is alone, and so is what
 // to_xml() writes.
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #pragma once
 // What a scene is made of: attached MJCF models, and references to their elements.
 

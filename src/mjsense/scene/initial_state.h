@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #pragma once
 // The keyframe init_state: the first keyframes of all entities, joined.
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #pragma once
 // What MuJoCo compiles without a word and nothing can be measured in.
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #pragma once
 // Simulation options of a scene. Entities' own <option> values are not carried over: one scene, one
 // physics.

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #pragma once
 // From names to ids, for sensors. `place` starts every message: "sensor 'imu'".
 

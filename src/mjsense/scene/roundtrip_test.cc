@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // to_xml() compiles to the same model again: every size, every name, every number.
 
 #include <fmt/format.h>

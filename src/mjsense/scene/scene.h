@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #pragma once
 // A scene: what all worlds share. Entities and terrain attached into one spec, sensors registered,
 // the model compiled.

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #pragma once
 // MuJoCo's mjSpec in C++: owners, names, and its messages as exceptions and strings. libmujoco of
 // the wheel is built with another C++ library than ours: touch mjString, mjDoubleVec ... only

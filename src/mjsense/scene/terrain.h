@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #pragma once
 // The ground of a scene: an infinite plane, or generated tiles of rising difficulty (levels x
 // types).

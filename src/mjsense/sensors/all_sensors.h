@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #pragma once
 // The sensors there are. What stands here is known to Python, to the documentation, and to the tests
 // that hold for every sensor.

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // What sensors show to a human (Simulation::draw). Ray sensors: raycast_sensor_test.cc.
 
 #include <gmock/gmock.h>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // What must hold for every kind of sensor: row w among B worlds is row w alone, bit for bit, at any number of threads; a
 // partial reset touches its worlds only; a step allocates nothing.
 

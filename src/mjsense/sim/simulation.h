@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #pragma once
 // Scene + worlds + sensors: steps physics and keeps every measurement fresh.
 //

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #pragma once
 // B parallel worlds: a thin owner of MuJoCo's mjBatch (persistent, one mjData a world). Steps,
 // resets, clocks, and the promise that whoever looks at a world sees derived fields that belong to

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #pragma once
 // Counts heap allocations of this process (all threads) made through operator new. For tests only: including this header
 // replaces the global operator new (weakly, so that several files of a test program may).

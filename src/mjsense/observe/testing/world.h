@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #pragma once
 // For tests of this room: one MuJoCo world from an XML text, and a sensor computed on it.
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #pragma once
 // Where a parallel gripper can take an object that lies on a support, from above.
 //

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // The pick without sensors: what planning and physics cost, and how often it succeeds.
 //   mjsense_bench --benchmark_filter=Pick
 

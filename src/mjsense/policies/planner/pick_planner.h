@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #pragma once
 // Picks up the target of a task that has a GraspScene: open, pregrasp, grasp, settle, close, lift. Waypoints are
 // timed by simulation time; the tool moves on screws between them; inverse kinematics follows from

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "mjsense/policies/planner/pick_planner.h"
 
 #include <gtest/gtest.h>

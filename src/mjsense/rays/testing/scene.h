@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #pragma once
 // Scenes for the tests of rays: random geoms of every type, compiled by MuJoCo, with one mjData.
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #pragma once
 // A suite without physics, in the shape of a Franka pick: every value is a function of (episode,
 // step), so that tests and benchmarks know what must be on disk.

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "mjsense/core/cpu.h"
 #include "mjsense/render/view/view.h"
 

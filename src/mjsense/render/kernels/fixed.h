@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #pragma once
 // The layer of fixed geoms of a tile, and who casts shadows on what the tile shows. Part of the tile
 // kernels.

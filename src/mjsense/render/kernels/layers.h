@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #pragma once
 // What lies before and inside the opaque surfaces of a packet: transparent geoms, reflections. Part of
 // the tile kernels.

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #pragma once
 // From what a packet of pixels sees to the images. Part of the tile kernels.
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #pragma once
 // Triangles drawn into a tile, where it has more pixels than the shape has triangles: each is set up
 // once for the tile instead of being met by every packet of rays. Part of the tile kernels.

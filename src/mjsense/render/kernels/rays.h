@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #pragma once
 // Packets of 16 pixels against one geom. Part of the tile kernels: compiled once per instruction
 // set.

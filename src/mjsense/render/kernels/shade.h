@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #pragma once
 // From surfaces to colours: MuJoCo's classic light model (OpenGL's fixed function, evaluated at every
 // pixel). Part of the tile kernels.

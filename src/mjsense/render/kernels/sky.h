@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #pragma once
 // What lies behind the opaque surfaces of a packet: the sky, and the haze before it. Part of the tile
 // kernels.

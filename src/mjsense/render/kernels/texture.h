@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #pragma once
 // Texture coordinates and filtering as OpenGL does them: bilinear, between two levels of the
 // pyramid. Part of the tile kernels.

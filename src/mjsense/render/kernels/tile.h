@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #pragma once
 // A tile of 16 x 16 pixels: which geoms it can see, what each pixel sees, what colour that is. Part
 // of the tile kernels.

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #pragma once
 // Which geom the pixels of packets see first. Part of the tile kernels.
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #pragma once
 // What the pixels of a tile see first: by rays, or drawn where that is cheaper. Part of the tile
 // kernels.

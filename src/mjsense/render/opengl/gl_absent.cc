@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Stands in for render/opengl/ in builds without it.
 #include <fmt/format.h>
 

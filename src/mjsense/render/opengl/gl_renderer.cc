@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "mjsense/render/opengl/gl_renderer.h"
 
 #include <EGL/egl.h>

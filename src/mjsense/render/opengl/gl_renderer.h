@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #pragma once
 // MuJoCo's own OpenGL renderer, offscreen, as a reference: for comparing pictures, and for those who want exactly its look.
 // Present when the library was built with MJSENSE_OPENGL; needs libEGL and a driver (Mesa's llvmpipe does) at run time.

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #pragma once
 // One world's own values of every field of the model that a picture depends on.
 

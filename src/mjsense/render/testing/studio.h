@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #pragma once
 // Scenes of a few geoms, and pictures of them whose pixels can be computed by hand.
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #pragma once
 // What an image depends on besides poses: colours, materials and lights, as one world has them.
 

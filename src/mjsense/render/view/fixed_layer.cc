@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "mjsense/render/view/fixed_layer.h"
 
 #include <cstring>

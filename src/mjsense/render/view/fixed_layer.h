@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #pragma once
 // What a camera that stands still sees of geoms that stand still, which of it lies in their shadow, and
 // its colours where nothing that moves casts one: found once, kept, and used for every image and world in

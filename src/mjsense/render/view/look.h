@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #pragma once
 // What surfaces look like, taken from the model once and shared by all cameras and worlds: textures
 // with their mipmaps, and the normals and texture coordinates of mesh faces as MuJoCo's classic

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #pragma once
 // Sites and tendons of one world as MuJoCo's visualiser makes them: a site is the shape that it has, a
 // tendon a chain of capsules along its path, hanging through where it is a slack string.

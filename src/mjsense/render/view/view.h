@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #pragma once
 // One image about to be rendered: everything it can show, in the camera's frame (x right, y up,
 // looking along -z), where rays start at the origin and single precision is enough. Plain

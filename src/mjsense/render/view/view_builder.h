@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #pragma once
 // Brings a world into a camera's frame: what is in sight, nearest first, with its materials and
 // lights.

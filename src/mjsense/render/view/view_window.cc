@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "mjsense/render/view/view_window.h"
 
 #include <mujoco/mujoco.h>

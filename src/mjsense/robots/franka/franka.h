@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #pragma once
 // Franka Research 3 with a Robotiq-like gripper on a pedestal: the station of the DROID data set.
 

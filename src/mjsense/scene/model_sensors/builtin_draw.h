@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #pragma once
 // What a sensor of MuJoCo's shows of itself: the frame it is attached to.
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "mjsense/scene/model_sensors/builtin_spec.h"
 
 #include <fmt/format.h>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #pragma once
 // Unit, frame, bounds and meaning of a MuJoCo sensor, read off the compiled model.
 

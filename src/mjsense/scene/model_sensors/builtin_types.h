@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #pragma once
 // The table of MuJoCo's sensor types: what each takes, measures, and in which unit and frame.
 

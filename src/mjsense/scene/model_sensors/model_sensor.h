@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #pragma once
 // A sensor that stands in the model, found under its name: its row is the sensor's numbers in
 // mjData.sensordata, as float32 [B, dim], and with a history `history` [B, nsample, dim].

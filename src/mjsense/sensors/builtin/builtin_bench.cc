@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // What a built-in sensor costs beyond MuJoCo's own computation: the copy of its row, beside a physics step of the same model.
 
 #include <benchmark/benchmark.h>

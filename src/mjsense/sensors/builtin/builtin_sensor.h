@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #pragma once
 // MuJoCo's own sensors. The row is the sensor's slice of mjData.sensordata as float32 [B, dim];
 // what the numbers mean is in the table of builtin_types.h and in the field's SensorSpec.

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Cameras that stand inside a housing: with clip_near "model" they see out of it as MuJoCo's renderer does.
 
 #include <gtest/gtest.h>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // What a camera shows of itself: its frustum and its frame, where they were when the image was
 // taken.
 

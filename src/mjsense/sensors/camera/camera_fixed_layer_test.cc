@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // A camera that has kept what stands still makes the same image as one that has not, bit for bit.
 
 #include <gtest/gtest.h>

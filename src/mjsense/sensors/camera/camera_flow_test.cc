@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // CameraSensor's optical flow: where each pixel's surface point was in the previous image.
 
 #include <gtest/gtest.h>

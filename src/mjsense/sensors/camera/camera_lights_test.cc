@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Which lights shine, where there are more than MuJoCo's OpenGL has.
 
 #include <gtest/gtest.h>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Sites and tendons in images: what MuJoCo's visualiser makes of them, and nothing unless asked for.
 
 #include <gtest/gtest.h>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // The same scene by rays and by MuJoCo's own renderer.
 
 #include <gtest/gtest.h>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Images against single rays of the ray scene: every pixel of random scenes of every geom type.
 
 #include <gtest/gtest.h>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // What a camera's configuration may say.
 
 #include <fmt/format.h>

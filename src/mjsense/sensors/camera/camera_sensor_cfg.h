@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #pragma once
 // CameraSensor: images of every world from one camera, by ray casting on the CPU. No OpenGL, no
 // display, no GPU.

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // What is lit and what is not, against single rays to the light.
 
 #include <gtest/gtest.h>

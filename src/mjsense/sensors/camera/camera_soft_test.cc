@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // What bends: flexes and skins in images.
 
 #include <gtest/gtest.h>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Where a texture lies on every shape, against MuJoCo's own renderer: 2D and cube, per object and per
 // metre, repeated and not.
 

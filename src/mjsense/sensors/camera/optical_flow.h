@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #pragma once
 // Optical flow from poses: where the surface point that a pixel sees was in the camera's previous
 // image. Exact for rigid bodies, moving or not; the point is followed whether it was visible then or

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "mjsense/sensors/camera/pixel_owners.h"
 
 #include "mjsense/scene/resolve.h"

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #pragma once
 // To which body and which entity the object that a pixel sees belongs.
 

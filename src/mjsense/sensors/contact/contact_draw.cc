@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // What a contact sensor shows of itself: the contacts in its slots.
 
 #include <fmt/format.h>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #pragma once
 // One field of one primary as a sensor of its own: what mjlab's registry calls
 // "<sensor>_<primary>_<field>". Contact frame, whatever the owner's global_frame says.

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Row w among B worlds is row w alone, bit for bit, at any number of threads; and a step allocates
 // nothing.
 

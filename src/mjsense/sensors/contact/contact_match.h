@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #pragma once
 // Which geoms, bodies or subtrees a contact sensor watches: rules over names, resolved to ids.
 

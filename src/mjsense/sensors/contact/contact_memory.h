@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #pragma once
 // What a contact sensor remembers from substep to substep: air and contact times, touchdown and
 // lift-off, and the latch over a control step.

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #pragma once
 // One walk over mjData.contact per world and moment, for all contact sensors that want it at the
 // same time: a table from each geom to the primaries it belongs to makes the cost grow with the

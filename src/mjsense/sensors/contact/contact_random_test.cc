@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Random heaps of bodies: every field, mode and reduction against MuJoCo's own contact sensors, and
 // what MuJoCo does not have against a brute-force search of mjData.contact.
 

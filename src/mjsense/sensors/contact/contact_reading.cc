@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "mjsense/sensors/contact/contact_reading.h"
 
 #include <algorithm>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #pragma once
 // One slot of a contact sensor in double precision: what is read from mjData for a selected
 // contact.

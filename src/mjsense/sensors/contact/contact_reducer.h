@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #pragma once
 // What one contact sensor keeps of the contacts of a pass: per primary a count, the K best contacts
 // or their net wrench. Nothing is limited but K; nothing allocates after the constructor.

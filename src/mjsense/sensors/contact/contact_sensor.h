@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #pragma once
 // Contacts of chosen geoms, bodies or subtrees (primaries), with everything or with chosen others
 // (secondaries).

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Air time, events, latch and history against an exact replay: what the sensor says at the end of
 // every control step is recomputed from the list of all substeps.
 

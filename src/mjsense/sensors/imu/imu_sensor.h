@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #pragma once
 // An inertial measurement unit at a site: accelerometer and gyroscope of one device, with its errors.
 

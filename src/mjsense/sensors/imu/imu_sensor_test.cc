@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "mjsense/sensors/imu/imu_sensor.h"
 
 #include <gmock/gmock.h>

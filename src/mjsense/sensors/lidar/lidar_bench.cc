@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Spinning lidar, 16 x 360 rays from the head of a humanoid, on one thread; mjsense, mj_multiRay
 // and mj_ray in one run, the robot in another pose before every scan; and in many worlds with a
 // step of physics between. items_per_second are rays. MJSENSE_BENCH_HUMANOID names an MJCF (a G1's)

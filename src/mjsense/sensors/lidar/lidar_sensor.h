@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #pragma once
 // LidarSensor: a RayCastSensor whose rays are a lidar's, with its noise, its returns' intensity and
 // its point cloud.

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #pragma once
 // Reading NumPy's .npy files: as much of the format as scan tables need.
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #pragma once
 // Point clouds on disk: PLY and PCD, binary little-endian, x y z in metres and intensity.
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Height scan: 187 rays (1.6 x 1 m, 0.1 m apart) under the trunk of a quadruped, 64 worlds, on one
 // thread; mjsense and mj_ray in one run. Before every scan the robot has another pose, its joints
 // too. items_per_second are rays. MJSENSE_BENCH_QUADRUPED names an MJCF (a Go1's) to stand in for

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #pragma once
 // Ray patterns: where a sensor's rays start and where they point, in the sensor's frame.
 

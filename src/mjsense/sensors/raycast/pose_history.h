@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #pragma once
 // Where frames were during the last moments: for rays that are cast at different times of one
 // reading (a lidar's sweep).

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #pragma once
 // A pattern's rays sorted into packets of 16 neighbours, once. Coherent packets are what makes
 // casting fast: all rays of one meet the same few geoms.

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #pragma once
 // The frame that rays are attached to: a body, site, geom or camera of the model.
 

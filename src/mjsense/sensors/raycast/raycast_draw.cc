@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // What a ray sensor shows of itself.
 
 #include <fmt/format.h>

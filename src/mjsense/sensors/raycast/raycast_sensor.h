@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #pragma once
 // RayCastSensor: distances, hit points and normals of rays that travel with one or more frames.
 //

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #pragma once
 // TerrainHeightSensor: how high frames (feet, a base) are above what lies below them. A
 // RayCastSensor with one more field:

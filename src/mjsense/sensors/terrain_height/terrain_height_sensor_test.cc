@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "mjsense/sensors/terrain_height/terrain_height_sensor.h"
 
 #include <gmock/gmock.h>

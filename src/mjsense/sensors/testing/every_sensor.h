@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #pragma once
 // Every kind of scene sensor, in a scene where all of them have something to measure: for tests that hold for all sensors.
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #pragma once
 // Examples of a kind of sensor in the scene of every_sensor.h, for tests that hold for all sensors.
 // Each sensor's folder gives its own in testing/example.cc.

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "mjsense/tasks/pick/pick.h"
 
 #include <fmt/format.h>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #pragma once
 // Pick up one of the objects on a table: success is the object 1 cm up and touched by nothing but
 // the robot.

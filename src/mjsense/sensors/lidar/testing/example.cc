@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "mjsense/sensors/testing/example.h"
 
 #include "mjsense/sensors/lidar/lidar_sensor.h"
