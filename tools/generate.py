@@ -75,7 +75,8 @@ from mjsense.configs import SensorCfg
 ''',
 }
 
-DATA = '''"""What sensors with several fields return. The arrays share memory with the sensor: they hold the values of the moment of the last
+DATA = '''# SPDX-License-Identifier: Apache-2.0
+"""What sensors with several fields return. The arrays share memory with the sensor: they hold the values of the moment of the last
 read of ``.data``, and are read-only. Fields that were not asked for are None.
 
 %s

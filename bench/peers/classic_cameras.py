@@ -13,7 +13,7 @@ import time
 
 import camera_scenes
 import mujoco
-import opengl  # noqa: F401  before mujoco
+import opengl
 
 RUNS = 5
 

@@ -172,6 +172,6 @@ DATA_OF_KIND: dict[str, type] = {
 }
 """By a sensor's kind; others return an array."""
 
-__all__ = ["DATA_OF_KIND", "CameraData", "ContactData", "ImuData", "RayCastData", "SensorData", "make_data"]
+__all__ = ["CameraData", "ContactData", "DATA_OF_KIND", "ImuData", "RayCastData", "SensorData", "make_data"]
 
 show_field_docs(__name__)

@@ -11,7 +11,7 @@ import pytest
 HERE = Path(__file__).parent
 sys.path.insert(0, str(HERE))
 
-import run  # noqa: E402
+import run
 
 
 def cases(name):

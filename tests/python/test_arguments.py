@@ -164,7 +164,7 @@ def test_misspelt_attributes():
     ]:
         with pytest.raises(AttributeError, match=f"has no attribute '{name}'; did you mean .*'{near}'"):
             setattr(owner, name, 3)
-    with pytest.raises(AttributeError, match="mjData.xpos is computed from the state"):
+    with pytest.raises(AttributeError, match=r"mjData\.xpos is computed from the state"):
         sim.data.xpos = 3
     with pytest.raises(AttributeError):
         scene["touch"].data.force = 3

@@ -127,7 +127,7 @@ def test_errors(sim):
         sim.draw(scene, sensors=["clock"])
     with pytest.raises(ValueError, match="world id 2: must be in"):
         sim.draw(scene, world=2)
-    with pytest.raises(TypeError, match="scene must be a mujoco.MjvScene, not"):
+    with pytest.raises(TypeError, match=r"scene must be a mujoco\.MjvScene, not"):
         sim.draw(sim.model)
     with pytest.raises(ValueError, match="no shape is a 'ball'"):
         sim.debug_shapes().of("ball")
