@@ -10,7 +10,7 @@ import time
 from collections.abc import Sequence
 
 import camera_scenes
-import harness
+import harness  # noqa: F401  finds mjsense
 import numpy as np
 from camera_scenes import View
 

@@ -13,10 +13,10 @@ import pathlib
 import sys
 
 import camera_scenes
-import harness
+import harness  # noqa: F401  finds mjsense
 import mujoco
 import numpy as np
-import opengl
+import opengl  # noqa: F401  before mujoco
 from fetch import Unavailable
 from images import ssim, write_png
 

@@ -13,7 +13,7 @@ import time
 
 import camera_scenes
 import mujoco
-import opengl
+import opengl  # noqa: F401  before mujoco
 
 RUNS = 5
 

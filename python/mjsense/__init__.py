@@ -11,7 +11,7 @@ if _mujoco.mj_versionString() != _MUJOCO:
 
 from mjsense import configs, effects, observations
 from mjsense._core import SensorSpec, __version__, embedded_models, policy_names, robot_names, task_names
-from mjsense.configs import *
+from mjsense.configs import *  # noqa: F403
 from mjsense.contact import ContactSensor
 from mjsense.data import CameraData, ContactData, ImuData, RayCastData, SensorData
 from mjsense.drawing import DebugShapes
