@@ -89,7 +89,7 @@ def one_world() -> list[Row]:
     """Seven fields of primaries of which few or all touch."""
     rows = []
     m = google_benchmarks("contact/(ours|mujoco)")
-    for name, other in m.items():
+    for name, other in sorted(m.items(), key=lambda item: [int(n) for n in item[0].split("/")[-2:]]):
         kind, primaries, _ = name.removeprefix("contact/").split("/")
         if kind == "mujoco_7_fields":
             case = f"one world, primaries: {primaries}, contacts: {other['contacts']:.0f}"
