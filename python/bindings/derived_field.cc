@@ -46,7 +46,8 @@ std::vector<DataField> data_fields(const mjModel* m) {
   return fields;
 }
 
-// Fields that MuJoCo computes before accelerations, in the order of mjdata.h. Any other may need all.
+// Fields that MuJoCo computes before accelerations, in the order of mjdata.h. Any other may need
+// all.
 constexpr std::string_view kBeforeAccelerations[] = {"xpos",
                                                      "xquat",
                                                      "xmat",

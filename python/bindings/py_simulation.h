@@ -6,13 +6,14 @@
 // them is gone.
 // Threads: every call runs without the interpreter's lock and takes the simulation's own mutex, so
 // that Python threads take turns. The mutex is recursive because a sensor written in Python reads
-// other sensors while it is computed.
+// other sensors while it is computed; it is never waited for with the interpreter's lock held.
 
 #include <nanobind/nanobind.h>
 
 #include <memory>
 #include <mutex>
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include "mjsense/core/error.h"
@@ -21,6 +22,42 @@
 #include "python/bindings/python_sensor.h"
 
 namespace mjsense::python {
+
+// Whose turn it is with a simulation, and whether it is at work. Everything that Python holds of
+// one simulation shares one of these.
+class Turns {
+ public:
+  // `what` names the call in the message when a sensor's own code makes it.
+  template <class Body>
+  void change(std::string_view what, Body&& body) {
+    nb::gil_scoped_release unlock;
+    std::lock_guard lock(mutex_);
+    if (depth_ > 0) {
+      throw RuntimeError(
+          std::string(what) +
+          "() is called while the simulation is at work: a sensor's code may read other "
+          "sensors and the state, but not change them");
+    }
+    const Depth in(depth_);
+    body();
+  }
+  template <class Body>
+  void read(Body&& body) {
+    nb::gil_scoped_release unlock;
+    std::lock_guard lock(mutex_);
+    const Depth in(depth_);
+    body();
+  }
+
+ private:
+  struct Depth {
+    explicit Depth(int& depth) : depth(depth) { ++depth; }
+    ~Depth() { --depth; }
+    int& depth;
+  };
+  std::recursive_mutex mutex_;
+  int depth_ = 0;
+};
 
 class PySimulation {
  public:
@@ -31,41 +68,24 @@ class PySimulation {
     sim_ = std::make_shared<Simulation>(std::move(scene), cfg);
   }
   // One that somebody else made.
-  explicit PySimulation(std::shared_ptr<Simulation> sim) : sim_(std::move(sim)) {}
+  explicit PySimulation(std::shared_ptr<Simulation> sim,
+                        std::shared_ptr<Turns> turns = std::make_shared<Turns>())
+      : sim_(std::move(sim)), turns_(std::move(turns)) {}
 
   void close() {
     std::shared_ptr<Simulation> last;
-    {
-      nb::gil_scoped_release unlock;
-      std::lock_guard lock(mutex_);
-      if (depth_ > 0) throw RuntimeError("close() is called while the simulation is at work");
-      last = std::move(sim_);
-    }
+    turns_->change("close", [&] { last = std::move(sim_); });
   }
   bool closed() const { return sim_ == nullptr; }
 
   // `what` names the call in the message when a sensor's own code makes it.
   template <class Body>
   void change(const char* what, Body&& body) {
-    nb::gil_scoped_release unlock;
-    std::lock_guard lock(mutex_);
-    Simulation& sim = open();
-    if (depth_ > 0) {
-      throw RuntimeError(
-          std::string(what) +
-          "() is called while the simulation is at work: a sensor's code may read other "
-          "sensors and the state, but not change them");
-    }
-    const Depth in(depth_);
-    body(sim);
+    turns_->change(what, [&] { body(open()); });
   }
   template <class Body>
   void read(Body&& body) {
-    nb::gil_scoped_release unlock;
-    std::lock_guard lock(mutex_);
-    Simulation& sim = open();
-    const Depth in(depth_);
-    body(sim);
+    turns_->read([&] { body(open()); });
   }
 
   Simulation& open() const {
@@ -84,14 +104,8 @@ class PySimulation {
   void add_python(std::shared_ptr<PythonSensor> sensor) { python_.push_back(std::move(sensor)); }
 
  private:
-  struct Depth {
-    explicit Depth(int& depth) : depth(depth) { ++depth; }
-    ~Depth() { --depth; }
-    int& depth;
-  };
   std::shared_ptr<Simulation> sim_;
-  std::recursive_mutex mutex_;
-  int depth_ = 0;
+  std::shared_ptr<Turns> turns_ = std::make_shared<Turns>();
   std::vector<std::shared_ptr<PythonSensor>> python_;
 };
 

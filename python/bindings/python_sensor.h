@@ -19,8 +19,8 @@ namespace mjsense::python {
 
 namespace nb = nanobind;
 
-// A Python object that C++ refers to without keeping it alive, for references in a circle would never be freed. May be copied
-// and destroyed by any thread.
+// A Python object that C++ refers to without keeping it alive, for references in a circle would
+// never be freed. May be copied and destroyed by any thread.
 class WeakObject {
  public:
   explicit WeakObject(nb::handle object);

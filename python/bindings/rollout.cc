@@ -21,8 +21,9 @@ namespace mjsense::python {
 
 namespace {
 
-// Python's sensors as members of a rollout's suite, and the Python simulation that they see. C++ copies and destroys its
-// configuration without the interpreter's lock, so it holds this by a pointer.
+// Python's sensors as members of a rollout's suite, and the Python simulation that they see. C++
+// copies and destroys its configuration without the interpreter's lock, so it holds this by a
+// pointer.
 struct PythonMembers {
   nb::list sensors;
   nb::object make_simulation;
@@ -139,20 +140,20 @@ class PyRollout {
   Rollout& rollout() { return *rollout_; }
   const std::shared_ptr<Rollout>& share() const { return rollout_; }
 
+  // The worlds as a simulation, which takes turns with the rollout.
+  PySimulation* simulation() const { return new PySimulation(rollout_->simulation_ptr(), turns_); }
+
   void start(const std::vector<int>& worlds, const std::vector<std::int64_t>& episodes) {
-    nb::gil_scoped_release unlock;
-    std::lock_guard lock(mutex_);
-    rollout_->start(worlds, episodes);
+    turns_->change("start", [&] { rollout_->start(worlds, episodes); });
+  }
+  void stop(int world) {
+    turns_->change("stop", [&] { rollout_->stop(world); });
   }
   void act() {
-    nb::gil_scoped_release unlock;
-    std::lock_guard lock(mutex_);
-    rollout_->act();
+    turns_->change("act", [&] { rollout_->act(); });
   }
   void step() {
-    nb::gil_scoped_release unlock;
-    std::lock_guard lock(mutex_);
-    rollout_->step();
+    turns_->change("step", [&] { rollout_->step(); });
   }
 
   // Commands of all controlled groups in a row, [B, n].
@@ -166,37 +167,44 @@ class PyRollout {
       throw ValueError(fmt::format("actions: shape ({}, {}), expected ({}, {})", values.shape(0),
                                    values.shape(1), rollout_->num_worlds(), width));
     }
-    std::lock_guard lock(mutex_);
-    for (int w = 0; w < rollout_->num_worlds(); ++w) {
-      Action action;
-      const double* at = values.data() + w * width;
-      for (std::size_t g = 0; g < groups.size(); ++g) {
-        const std::size_t n = groups[g].actuators.size();
-        if (n > 0) action.commands[g].set({at, n});
-        at += n;
+    const double* at = values.data();
+    turns_->change("set_actions", [&] {
+      for (int w = 0; w < rollout_->num_worlds(); ++w) {
+        Action action;
+        for (std::size_t g = 0; g < groups.size(); ++g) {
+          const std::size_t n = groups[g].actuators.size();
+          if (n > 0) action.commands[g].set({at, n});
+          at += n;
+        }
+        rollout_->action(w) = action;
       }
-      rollout_->action(w) = action;
-    }
+    });
   }
-  nb::object actions() {
+  std::vector<std::vector<double>> actions() {
     const auto& groups = rollout_->task().robot().groups();
-    nb::list rows;
-    for (int w = 0; w < rollout_->num_worlds(); ++w) {
-      nb::list row;
-      for (std::size_t g = 0; g < groups.size(); ++g) {
-        const GroupValues& given = rollout_->action(w).commands[g];
-        const GroupValues& held = rollout_->task().robot().targets(w)[g];
-        for (std::size_t k = 0; k < groups[g].actuators.size(); ++k)
-          row.append((given.given ? given : held).values[k]);
+    std::vector<std::vector<double>> rows(rollout_->num_worlds());
+    turns_->read([&] {
+      for (int w = 0; w < rollout_->num_worlds(); ++w) {
+        for (std::size_t g = 0; g < groups.size(); ++g) {
+          const GroupValues& given = rollout_->action(w).commands[g];
+          const GroupValues& held = rollout_->task().robot().targets(w)[g];
+          for (std::size_t k = 0; k < groups[g].actuators.size(); ++k)
+            rows[w].push_back((given.given ? given : held).values[k]);
+        }
       }
-      rows.append(row);
-    }
+    });
     return rows;
+  }
+  // The evaluation of a world and why it failed, if it did.
+  std::pair<Evaluation, std::string> outcome(int world) {
+    std::pair<Evaluation, std::string> found;
+    turns_->read([&] { found = {rollout_->evaluation(world), rollout_->fault(world)}; });
+    return found;
   }
 
  private:
   std::shared_ptr<Rollout> rollout_;
-  std::mutex mutex_;
+  std::shared_ptr<Turns> turns_ = std::make_shared<Turns>();
 };
 
 nb::list action_layout(PyRollout& self) {
@@ -224,8 +232,8 @@ nb::tuple outcome(PyRollout& self, int w) {
   Rollout& r = self.rollout();
   if (w < 0 || w >= r.num_worlds())
     throw ValueError(fmt::format("world {}: must be in [0, {})", w, r.num_worlds()));
-  const Evaluation& e = r.evaluation(w);
-  return nb::make_tuple(e.reward, e.success, e.terminal, e.truncated, r.fault(w));
+  const auto [e, fault] = self.outcome(w);
+  return nb::make_tuple(e.reward, e.success, e.terminal, e.truncated, fault);
 }
 
 }  // namespace
@@ -239,8 +247,7 @@ void bind_rollout(nb::module_& m) {
   nb::class_<PyRollout>(m, "Rollout", "The C++ rollout.")
       .def(nb::init<nb::dict>(), nb::arg("options"))
       .def("start", &PyRollout::start, nb::arg("worlds"), nb::arg("episodes"))
-      .def(
-          "stop", [](PyRollout& s, int w) { s.rollout().stop(w); }, nb::arg("world"))
+      .def("stop", &PyRollout::stop, nb::arg("world"))
       .def("act", &PyRollout::act)
       .def("step", &PyRollout::step)
       .def("set_actions", &PyRollout::set_actions, nb::arg("values"))
@@ -252,9 +259,7 @@ void bind_rollout(nb::module_& m) {
           "description", [](PyRollout& s, int w) { return s.rollout().task().description(w); },
           nb::arg("world"))
       .def_prop_ro("fps", [](PyRollout& s) { return s.rollout().task().fps(); })
-      .def(
-          "simulation", [](PyRollout& s) { return new PySimulation(s.rollout().simulation_ptr()); },
-          nb::rv_policy::take_ownership);
+      .def("simulation", &PyRollout::simulation, nb::rv_policy::take_ownership);
 }
 
 }  // namespace mjsense::python

@@ -26,14 +26,12 @@ class ContactSensor(NativeSensor):
 
     def compute_first_contact(self, dt: float, abs_tol: float = 1e-6) -> np.ndarray:
         """Which primaries came into contact within the last `dt` seconds: bool ``[B, P]``. Needs track_air_time."""
-        return self._within("current_contact_time", dt, abs_tol)
+        return self._first("contact", dt, abs_tol)
 
     def compute_first_air(self, dt: float, abs_tol: float = 1e-6) -> np.ndarray:
         """Which primaries took off within the last `dt` seconds: bool ``[B, P]``. Needs track_air_time."""
-        return self._within("current_air_time", dt, abs_tol)
+        return self._first("air", dt, abs_tol)
 
-    def _within(self, timer: str, dt: float, abs_tol: float) -> np.ndarray:
-        time = getattr(self.data, timer)
-        if time is None:
-            raise RuntimeError(f"sensor '{self.name}' does not track air time: set track_air_time=True")
-        return (time > 0.0) & (time < dt + abs_tol)
+    def _first(self, phase: str, dt: float, abs_tol: float) -> np.ndarray:
+        self.data  # makes it current
+        return _core.contact_first(self._handle, phase, dt, abs_tol)

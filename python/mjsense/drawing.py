@@ -93,6 +93,7 @@ class DebugShapes(KnownAttributes):
 
         Returns how many found no room: a scene holds ``maxgeom`` geoms.
         """
+        # What DebugShapes::append_to does in C++, which MuJoCo's Python gives no pointer to its scene.
         room = min(len(self), max(0, scene.maxgeom - scene.ngeom))
         geoms, identity = scene.geoms[scene.ngeom : scene.ngeom + room], np.eye(3).ravel()
         rows = zip(geoms, self.kinds, self.positions, self.positions + self.vectors, self.widths, self.rgba, self.labels)

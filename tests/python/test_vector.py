@@ -132,3 +132,27 @@ def test_bad_use(env):
     for call in (lambda: other.step(np.zeros((1, 8))), other.reset, other.expert_action):
         with pytest.raises(RuntimeError, match="closed"):
             call()
+
+
+def test_a_step_and_the_simulation_take_turns():
+    """A sensor's code may not change the worlds while the environment steps them, as it may not while the simulation does."""
+    env = make()
+    said = []
+
+    class Meddler(mjs.Sensor):
+        uuid = "meddler"
+        observation_space = gymnasium.spaces.Box(0, 1, (1,), np.float32)
+
+        def compute(self, sim):
+            try:
+                env.sim.reset()
+            except RuntimeError as error:
+                said.append(str(error))
+            return np.zeros((env.num_envs, 1))
+
+    env.reset(seed=0)
+    meddler = env.sim.add(Meddler())
+    assert meddler.data.shape == (3, 1)  # read: from now on part of every step
+    env.step(hold(env))
+    assert len(said) == 2 and all("reset() is called while the simulation is at work" in text for text in said)
+    env.close()

@@ -3,9 +3,13 @@
 
 #include <nanobind/nanobind.h>
 #include <nanobind/stl/string.h>
+#include <nanobind/stl/string_view.h>
+
+#include <memory>
 
 #include "mjsense/sensors/contact/contact_sensor.h"
 #include "python/bindings/bindings.h"
+#include "python/bindings/numpy.h"
 #include "python/bindings/sensor_handle.h"
 
 namespace mjsense::python {
@@ -24,6 +28,17 @@ void bind_contact(nb::module_& m) {
   m.def("contact_secondary_names", [tuple_of](const SensorHandle& h) {
     return tuple_of(h.as<ContactSensor>().secondary_names());
   });
+  m.def(
+      "contact_first",
+      [](const SensorHandle& h, std::string_view phase, double dt, double abs_tol) {
+        const auto& sensor = h.as<ContactSensor>();
+        auto first =
+            std::make_shared<Array>(phase == "air" ? sensor.compute_first_air(dt, abs_tol)
+                                                   : sensor.compute_first_contact(dt, abs_tol));
+        return to_numpy(first->view(), owner_of(first));
+      },
+      nb::arg("sensor"), nb::arg("phase"), nb::arg("dt"), nb::arg("abs_tol"),
+      "bool [B, P]: contact (or air) began less than dt + abs_tol ago.");
 }
 
 }  // namespace mjsense::python

@@ -148,7 +148,10 @@ void JsonRows::write(const std::uint8_t* row, std::span<std::uint8_t> text) cons
   }
   close_to(0);
   json.end_object();
-  json.finish();
+  if (!json.finish()) {
+    throw RuntimeError(
+        fmt::format("a row of JSON takes {} bytes, its stream has {}", json.size(), text.size()));
+  }
 }
 
 }  // namespace mjsense

@@ -14,7 +14,8 @@
 namespace mjsense {
 namespace {
 
-// Seconds since it was made; 0 and no look at the clock (25 ns, as much as a small sensor) when off.
+// Seconds since it was made; 0 and no look at the clock (25 ns, as much as a small sensor) when
+// off.
 class Timer {
  public:
   explicit Timer(bool on) : on_(on) {
@@ -36,8 +37,9 @@ void guarded(const Sensor& sensor, Body&& body) {
   try {
     body();
   } catch (const Error& e) {
-    if (std::string_view(e.what()).find(sensor.name()) != std::string_view::npos) throw;
-    const std::string message = fmt::format("sensor '{}': {}", sensor.name(), e.what());
+    const std::string named = fmt::format("'{}'", sensor.name());
+    if (std::string_view(e.what()).find(named) != std::string_view::npos) throw;
+    const std::string message = fmt::format("sensor {}: {}", named, e.what());
     switch (e.kind()) {
       case ErrorKind::kValue:
         throw ValueError(message);

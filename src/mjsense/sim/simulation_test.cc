@@ -283,6 +283,19 @@ TEST(Simulation, AnErrorKeepsItsKind) {
   EXPECT_THROW(sim.refresh(*bad), ValueError);
 }
 
+// Also if its name is a part of the message: the "a" of "no value".
+TEST(Simulation, AnErrorNamesItsSensor) {
+  Simulation sim(scene(), {.num_worlds = 2});
+  auto bad = add(sim, "a");
+  bad->fail_in = 0;
+  try {
+    sim.refresh(*bad);
+    FAIL() << "no error";
+  } catch (const ValueError& e) {
+    EXPECT_STREQ(e.what(), "sensor 'a': no value");
+  }
+}
+
 TEST(Simulation, StepsAreAsLongAsTheirSubsteps) {
   Simulation sim(scene(), {.decimation = 5});
   EXPECT_DOUBLE_EQ(sim.step_dt(), 5 * sim.model()->opt.timestep);

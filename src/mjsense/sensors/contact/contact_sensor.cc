@@ -356,7 +356,8 @@ void ContactSensor::shift_history(int w, int begin, int end) {
 
 Array ContactSensor::first(double dt, double abs_tol, std::string_view field_name) const {
   if (!cfg_.track_air_time) {
-    throw RuntimeError(fmt::format("sensor '{}': track_air_time is off", name()));
+    throw RuntimeError(
+        fmt::format("sensor '{}' does not track air time: set track_air_time", name()));
   }
   const Array& time = field(field_name).data;
   Array result(DType::kBool, time.shape());
