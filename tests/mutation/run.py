@@ -148,7 +148,8 @@ class Runner:
     def build(self, targets: list[str]) -> None:
         code, out = self.run(["ninja", "-C", str(BUILD), f"-j{self.jobs}", *targets], 3600)
         if code != 0:
-            raise Failure("does not compile:\n" + "\n".join([line for line in out.splitlines() if "error" in line][:5] or [out[-500:]]))
+            errors = [line for line in out.splitlines() if "error" in line]
+            raise Failure("does not compile:\n" + "\n".join(errors[:5] or [out[-500:]]))
 
     def program(self, name: str) -> str:
         """"" or the test that failed."""
@@ -234,7 +235,8 @@ def report(mutants: list[Mutant], results: dict) -> str:
         survivors += [f"  {m.id}: {m.what}" for m, r in known if not r["noticed"]]
         total, noticed, own = total + len(known), noticed + seen, own + here
     if total:
-        lines.append(f"{'all':10} {noticed:3} of {total:3} noticed ({100 * noticed / total:.0f} %), {own:3} by the room's own tests")
+        share = 100 * noticed / total
+        lines.append(f"{'all':10} {noticed:3} of {total:3} noticed ({share:.0f} %), {own:3} by the room's own tests")
     return "\n".join(lines + (["survivors:", *survivors] if survivors else []))
 
 
@@ -245,7 +247,7 @@ def main() -> int:
     parser.add_argument("--report", action="store_true", help="only the figures so far")
     parser.add_argument("--again", action="store_true", help="also mutants that have a result")
     parser.add_argument("--survivors", action="store_true", help="those that survived, again")
-    parser.add_argument("--own", action="store_true", help="ask the room's own tests only; the next run without it asks the others")
+    parser.add_argument("--own", action="store_true", help="ask the room's own tests only; a run without it asks the others")
     parser.add_argument("--no-baseline", action="store_true", help="trust that the tests pass without a mutant")
     parser.add_argument("--prefix", default="nice -n 10", help="before every build and test (%(default)s)")
     parser.add_argument("--jobs", type=int, default=os.cpu_count(), help="of a build (%(default)s)")

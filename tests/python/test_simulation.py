@@ -113,6 +113,10 @@ def test_set_state(sim):
         sim.set_state(qpos=[1, 2])
     with pytest.raises(KeyError, match="did you mean 'qpos'"):
         sim.set_state(qpo=[1])
+    before = sim.data.qpos.copy()
+    with pytest.raises(ValueError, match="qvel: shape"):  # and nothing is written
+        sim.set_state(qpos=[0, 0, 9, 1, 0, 0, 0], qvel=[1])
+    np.testing.assert_array_equal(sim.data.qpos, before)
 
 
 def test_randomize_says_what_is_wrong(sim):

@@ -65,6 +65,19 @@ TEST(ObjectShape, PointsLieOnTheSurfaces) {
   EXPECT_NEAR(box.radius, std::hypot(0.01, 0.02), 1e-9);
 }
 
+TEST(ObjectShape, PartsBelowTheBodyStandWhereTheyAreWelded) {
+  const auto model = compile(
+      "<geom size='.01'/><body pos='0 0 .1' euler='90 0 0'><body pos='0 .2 0'><geom "
+      "size='.02'/></body></body>");
+  const auto shape = object_shape(model.get(), 1);  // y of the tilted body is z of the object
+  EXPECT_LT(worst(shape,
+                  [](Vec3 p) {
+                    return std::min(norm(p) - 0.01, norm(p - Vec3{0, 0, 0.3}) - 0.02);
+                  }),
+            1e-9);
+  EXPECT_NEAR(shape.high, 0.32, 1e-9);
+}
+
 TEST(ObjectShape, SeenButNotTouchedGeomsDoNotCount) {
   const auto model = compile("<geom size='.01'/><geom size='.5' contype='0' conaffinity='0'/>");
   EXPECT_NEAR(object_shape(model.get(), 1).reach, 0.01, 1e-9);

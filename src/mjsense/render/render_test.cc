@@ -246,5 +246,16 @@ TEST(CameraModel, DistortionIsUndone) {
       ValueError);
 }
 
+// What is wider or narrower than the sensor is a part of it, with square pixels if the sensor has them.
+TEST(Grid, APictureIsCutOutOfTheSensor) {
+  const float focal[4] = {0.004f, 0.004f, 0, 0}, size[2] = {0.004f, 0.003f};
+  const PixelGrid wide = grid_from_sensor(8, 4, focal, size);
+  EXPECT_NEAR(8 * wide.dx, 1.0, 1e-6);
+  EXPECT_NEAR(std::abs(wide.dy), wide.dx, 1e-6);
+  const PixelGrid high = grid_from_sensor(4, 8, focal, size);
+  EXPECT_NEAR(8 * std::abs(high.dy), 0.75, 1e-6);
+  EXPECT_NEAR(high.dx, std::abs(high.dy), 1e-6);
+}
+
 }  // namespace
 }  // namespace mjsense
