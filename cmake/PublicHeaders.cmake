@@ -6,15 +6,19 @@ set(MJSENSE_PUBLIC_HEADERS
   mjsense/core/array.h
   mjsense/core/checks.h
   mjsense/core/cpu.h
+  mjsense/core/data_class.h
   mjsense/core/debug_shapes.h
   mjsense/core/error.h
+  mjsense/core/fields.h
   mjsense/core/json.h
   mjsense/core/parallel.h
   mjsense/core/pose.h
   mjsense/core/rng.h
   mjsense/core/sensor.h
+  mjsense/core/sensor_fields.h
   mjsense/core/shared.h
   mjsense/core/spec.h
+  mjsense/effects/all_effects.h
   mjsense/effects/calibration.h
   mjsense/effects/chain.h
   mjsense/effects/effect.h

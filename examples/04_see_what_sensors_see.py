@@ -80,7 +80,7 @@ data = mujoco.MjData(sim.model)
 mujoco.mj_setState(sim.model, data, sim.state[world], mujoco.mjtState.mjSTATE_INTEGRATION)
 mujoco.mj_forward(sim.model, data)
 view = mujoco.MjvCamera()
-view.lookat, view.distance, view.azimuth, view.elevation = (*data.body("dog/trunk").xpos, 0.1, 0, -0.1), 1.5, 125, -20
+view.lookat, view.distance, view.azimuth, view.elevation = data.body("dog/trunk").xpos + (0.1, 0, -0.1), 1.5, 125, -20
 try:
     renderer = mujoco.Renderer(sim.model, 480, 640)
 except (ImportError, RuntimeError) as error:

@@ -1,20 +1,21 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
-// Everything that a program of yours needs: #include <mjsense/mjsense.h>. Each header may be
-// included alone as well.
-
-#include "mjsense/core/array.h"
+// Everything that a program of yours needs: #include "mjsense/core/array.h"
 #include "mjsense/core/checks.h"
 #include "mjsense/core/cpu.h"
+#include "mjsense/core/data_class.h"
 #include "mjsense/core/debug_shapes.h"
 #include "mjsense/core/error.h"
+#include "mjsense/core/fields.h"
 #include "mjsense/core/json.h"
 #include "mjsense/core/parallel.h"
 #include "mjsense/core/pose.h"
 #include "mjsense/core/rng.h"
 #include "mjsense/core/sensor.h"
+#include "mjsense/core/sensor_fields.h"
 #include "mjsense/core/shared.h"
 #include "mjsense/core/spec.h"
+#include "mjsense/effects/all_effects.h"
 #include "mjsense/effects/calibration.h"
 #include "mjsense/effects/chain.h"
 #include "mjsense/effects/effect.h"
