@@ -1,6 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
-// Everything that a program of yours needs: #include "mjsense/core/array.h"
+// Everything that a program of yours needs: #include <mjsense/mjsense.h>. Each header may be
+// included alone as well.
+
+#include "mjsense/core/array.h"
 #include "mjsense/core/checks.h"
 #include "mjsense/core/cpu.h"
 #include "mjsense/core/data_class.h"
