@@ -454,9 +454,10 @@ inline constexpr const char* kChoiceName = "";
 template <class V>
 inline constexpr int kPlainAlternative = -1;
 
+namespace field_detail {
 template <class V>
-requires field_detail::kIsVariant<V>
-constexpr FieldType field_detail::make() {
+requires kIsVariant<V>
+constexpr FieldType make() {
   using Of = Variant<V>;
   return {
       .kind = Kind::kChoice,
@@ -467,6 +468,7 @@ constexpr FieldType field_detail::make() {
       .emplace = &Of::emplace,
       .plain = kPlainAlternative<V>};
 }
+}  // namespace field_detail
 
 // Another type of value specialises this: see effects/all_effects.h.
 template <class T>
