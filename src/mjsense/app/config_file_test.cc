@@ -4,15 +4,14 @@
 #include <fmt/format.h>
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
-#include <unistd.h>
 
-#include <filesystem>
 #include <fstream>
 
 #include "mjsense/app/field_options.h"
 #include "mjsense/app/progress.h"
 #include "mjsense/app/record_command.h"
 #include "mjsense/core/error.h"
+#include "mjsense/core/testing/temp_dir.h"
 
 namespace mjsense {
 namespace {
@@ -22,17 +21,11 @@ using ::testing::HasSubstr;
 using ::testing::IsEmpty;
 
 RecordOptions read(const std::string& toml) {
-  std::string name = (std::filesystem::temp_directory_path() / "mjsense_config_XXXXXX").string();
-  close(mkstemp(name.data()));
+  const mjsense::testing::TempDir folder;
+  const std::string name = folder.file("experiment.toml");
   std::ofstream(name) << toml;
   RecordOptions options;
-  try {
-    read_toml(name, struct_of<RecordJobCfg>(), &options.job);
-  } catch (...) {
-    std::filesystem::remove(name);
-    throw;
-  }
-  std::filesystem::remove(name);
+  read_toml(name, struct_of<RecordJobCfg>(), &options.job);
   return options;
 }
 
