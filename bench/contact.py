@@ -111,6 +111,7 @@ def main() -> None:
     memory = {"track_air_time": True, "track_events": True, "latch": True, "history_length": DECIMATION}
     cases = {
         "physics": Case(xml, 64),
+        "imu": Case(xml, 64, read=imu),
         "fields": Case(xml, 64, (feet(),), ["feet", *imu]),
         "memory": Case(xml, 64, (feet(**memory),), ["feet", *imu]),
         "mujoco": Case(xml, 64, read=[*imu, *(f"robot/{f}_contact" for f in FEET)], native=True),
@@ -120,8 +121,10 @@ def main() -> None:
             case.measure(steps)
     rows.append(Row("64 Go1 on rough terrain: physics", cases["physics"].us_per_world_step(), "us a world-substep"))
     physics = cases["physics"]
+    rows.append(Row("IMU alone, which wants the constraints solved at the new state", share(cases["imu"], physics), "% of physics",
+                    higher_is_better=False))  # fmt: skip
     peer = share(cases["mujoco"], physics)
-    rows.append(Row("IMU and feet, 7 fields", share(cases["fields"], physics), "% of physics", peer, "MuJoCo's sensors",
+    rows.append(Row("IMU and feet, 7 fields, that solve among it", share(cases["fields"], physics), "% of physics", peer, "MuJoCo's sensors",
                     higher_is_better=False))
     remembered = Row("the same with air time, events, peak, history", share(cases["memory"], physics), "% of physics",
                      higher_is_better=False)

@@ -12,11 +12,13 @@ from __future__ import annotations
 import pathlib
 import sys
 
+import opengl  # noqa: F401  before mujoco
+
+# isort: split
 import camera_scenes
 import harness  # noqa: F401  finds mjsense
 import mujoco
 import numpy as np
-import opengl  # noqa: F401  before mujoco
 from fetch import Unavailable
 from images import ssim, write_png
 

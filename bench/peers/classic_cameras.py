@@ -11,9 +11,11 @@ import statistics
 import sys
 import time
 
+import opengl  # noqa: F401  before mujoco
+
+# isort: split
 import camera_scenes
 import mujoco
-import opengl  # noqa: F401  before mujoco
 
 RUNS = 5
 
