@@ -18,14 +18,30 @@ namespace fs = std::filesystem;
 namespace mjsense {
 namespace {
 
-constexpr int kTileHeight = 132, kGap = 4, kLabelHeight = 18;
+constexpr int kTileHeight = 132, kGap = 4, kLine = kTextHeight + kGap;
+constexpr std::uint8_t kBackground = 24;
 
+// One camera of one episode.
 struct Strip {
-  std::string label;
+  std::string episode, camera;  // what the sheet says
   fs::path video;
   int width = 0, height = 0, frames = 0;  // of the video
   bool depth16 = false;
+  double unit = 0;  // m, of depth
   int tile_width() const { return std::max(8, kTileHeight * width / std::max(1, height)); }
+
+  // Which frames `columns` tiles show: first to last, evenly.
+  std::vector<int> moments(int columns) const {
+    std::vector<int> shown;
+    for (int c = 0; c < columns; ++c) {
+      const int n =
+          columns == 1
+              ? 0
+              : static_cast<int>(static_cast<std::int64_t>(c) * (frames - 1) / (columns - 1));
+      if (shown.empty() || n != shown.back()) shown.push_back(n);
+    }
+    return shown;
+  }
 };
 
 // Those of the first `shown` episodes, of which there are `episodes`.
@@ -46,6 +62,7 @@ std::vector<Strip> find_strips(const fs::path& path, int shown, const std::strin
         Strip strip;
         strip.video = recorded.path.parent_path() / read_file_name(videos, key);
         strip.depth16 = h5::text_attribute(dataset, "encoding") == "depth16";
+        strip.unit = h5::double_attribute(dataset, "metres_per_unit", 0);
         const VideoProbe probe = probe_video(strip.video, false, ffmpeg);
         if (!probe.error.empty())
           throw RuntimeError(
@@ -53,9 +70,10 @@ std::vector<Strip> find_strips(const fs::path& path, int shown, const std::strin
         strip.width = probe.width;
         strip.height = probe.height;
         strip.frames = probe.frames;
-        strip.label =
-            fmt::format("{} {}  {}  {} frames  {}", recorded.path.parent_path().filename().string(),
-                        name, key, strip.frames, h5::text_attribute(trajectory, "outcome"));
+        strip.episode = fmt::format("{}  {}", recorded.name, name);
+        if (const std::string outcome = h5::text_attribute(trajectory, "outcome"); !outcome.empty())
+          strip.episode += ": " + outcome;
+        strip.camera = fmt::format("{}, {} frames", key, strip.frames);
         strips.push_back(std::move(strip));
       }
     }
@@ -73,7 +91,10 @@ void colour(double x, std::uint8_t* rgb) {
     rgb[c] = static_cast<std::uint8_t>(kStops[i][c] + (at - i) * (kStops[i + 1][c] - kStops[i][c]));
 }
 
-std::vector<std::uint8_t> colour_depth(const std::vector<std::uint8_t>& raw) {
+// Pictures of depth values, the nearest and the farthest of all of them at the ends of the colours;
+// the label comes to say which these are.
+std::vector<std::uint8_t> colour_depth(const std::vector<std::uint8_t>& raw, double unit,
+                                       std::string& label) {
   std::vector<std::uint16_t> depth(raw.size() / 2);
   std::memcpy(depth.data(), raw.data(), depth.size() * 2);
   std::uint16_t near = kDepthFar, far = kDepthInvalid;
@@ -82,14 +103,44 @@ std::vector<std::uint8_t> colour_depth(const std::vector<std::uint8_t>& raw) {
     near = std::min(near, d);
     far = std::max(far, d);
   }
+  if (near <= far && unit > 0)
+    label += fmt::format(", {:.2f} m (yellow) to {:.2f} m (blue)", near * unit, far * unit);
   std::vector<std::uint8_t> rgb(depth.size() * 3);
   for (std::size_t i = 0; i < depth.size(); ++i) {
-    const double range = std::max(1, far - near);
+    const double span = std::max(1, far - near);
     if (depth[i] != kDepthInvalid)
-      colour(depth[i] == kDepthFar ? 1.0 : (depth[i] - near) / range, &rgb[3 * i]);
+      colour(depth[i] == kDepthFar ? 1.0 : (depth[i] - near) / span, &rgb[3 * i]);
   }
   return rgb;
 }
+
+class Canvas {
+ public:
+  Canvas(int width, int height)
+      : width_(width),
+        height_(height),
+        rgb_(static_cast<std::size_t>(width) * height * 3, kBackground) {}
+
+  void text(int x, int y, std::string_view text) { draw_text(rgb_, width_, x, y, text); }
+  void picture(int x, int y, int width, int height, const std::uint8_t* rgb) {
+    for (int row = 0; row < height; ++row)
+      std::memcpy(at(x, y + row), rgb + std::size_t{3} * width * row, std::size_t{3} * width);
+  }
+  // Text on a ground of its own, as in the corner of a picture.
+  void tag(int x, int y, std::string_view text) {
+    const int width = text_width(text) + kGap;
+    for (int row = 0; row < kLine - kGap; ++row)
+      std::memset(at(x, y + row), kBackground, std::size_t{3} * width);
+    this->text(x + kGap, y + kGap / 2, text);
+  }
+  void write(const fs::path& png) const { write_png(png, rgb_, width_, height_, 3); }
+
+ private:
+  std::uint8_t* at(int x, int y) { return &rgb_[(static_cast<std::size_t>(y) * width_ + x) * 3]; }
+
+  int width_, height_;
+  std::vector<std::uint8_t> rgb_;
+};
 
 }  // namespace
 
@@ -98,45 +149,46 @@ std::string contact_sheet(const fs::path& path, const fs::path& png, int episode
   if (episodes < 1 || columns < 1)
     throw ValueError(fmt::format("contact sheet: {} episodes, {} columns", episodes, columns));
   int all = 0;
-  const std::vector<Strip> strips = find_strips(path, episodes, ffmpeg, all);
+  std::vector<Strip> strips = find_strips(path, episodes, ffmpeg, all);
   if (strips.empty())
     throw ValueError(fmt::format("contact sheet: '{}' holds no videos", path.string()));
 
-  int tile_width = 0;
-  for (const Strip& s : strips) tile_width = std::max(tile_width, s.tile_width());
-  const int row_height = kLabelHeight + kTileHeight + kGap;
-  const int width = kGap + columns * (tile_width + kGap),
-            height = kLabelHeight + static_cast<int>(strips.size()) * row_height;
-  std::vector<std::uint8_t> sheet(static_cast<std::size_t>(width) * height * 3, 24);
+  // Pictures first: what is written above depth is known from them.
+  std::vector<std::vector<std::uint8_t>> pictures;
   const std::string title = fmt::format("{} of {} episodes", std::min(episodes, all), all);
-  draw_text(sheet, width, kGap, kGap, title);
+  int tile_width = 0, width = text_width(title), height = kGap + kLine;
+  for (std::size_t s = 0; s < strips.size(); ++s) {
+    Strip& strip = strips[s];
+    pictures.push_back(grab_frames(strip.video, strip.moments(columns), strip.tile_width(),
+                                   kTileHeight, strip.depth16, ffmpeg));
+    if (strip.depth16) pictures[s] = colour_depth(pictures[s], strip.unit, strip.camera);
+    tile_width = std::max(tile_width, strip.tile_width());
+    width = std::max({width, text_width(strip.episode), text_width(strip.camera)});
+    height += kLine + kTileHeight + kGap;
+    if (s == 0 || strip.episode != strips[s - 1].episode) height += kGap + kLine;
+  }
+  width = std::max(width + kGap, columns * (tile_width + kGap)) + kGap;
+
+  Canvas sheet(width, height);
+  sheet.text(kGap, kGap, title);
+  int y = kGap + kLine;
   for (std::size_t s = 0; s < strips.size(); ++s) {
     const Strip& strip = strips[s];
-    const int top = kLabelHeight + static_cast<int>(s) * row_height;
-    draw_text(sheet, width, kGap, top + 3, strip.label);
-    std::vector<int> frames;  // first to last, evenly
-    for (int c = 0; c < columns; ++c) {
-      const int n =
-          columns == 1
-              ? 0
-              : static_cast<int>(static_cast<std::int64_t>(c) * (strip.frames - 1) / (columns - 1));
-      if (frames.empty() || n != frames.back()) frames.push_back(n);
+    if (s == 0 || strip.episode != strips[s - 1].episode) {
+      sheet.text(kGap, y + kGap, strip.episode);
+      y += kGap + kLine;
     }
-    std::vector<std::uint8_t> pixels =
-        grab_frames(strip.video, frames, strip.tile_width(), kTileHeight, strip.depth16, ffmpeg);
-    if (strip.depth16) pixels = colour_depth(pixels);
-    const std::size_t line = static_cast<std::size_t>(strip.tile_width()) * 3,
-                      tile = line * kTileHeight;
-    for (std::size_t c = 0; c < std::min(frames.size(), pixels.size() / tile); ++c) {
-      const int left = kGap + static_cast<int>(c) * (tile_width + kGap);
-      for (int y = 0; y < kTileHeight; ++y) {
-        const std::size_t to =
-            (static_cast<std::size_t>(top + kLabelHeight + y) * width + left) * 3;
-        std::memcpy(&sheet[to], &pixels[c * tile + y * line], line);
-      }
+    sheet.text(kGap, y, strip.camera);
+    y += kLine;
+    const std::vector<int> moments = strip.moments(columns);
+    const std::size_t bytes = std::size_t{3} * strip.tile_width() * kTileHeight;
+    for (std::size_t c = 0; c < std::min(moments.size(), pictures[s].size() / bytes); ++c) {
+      const int x = kGap + static_cast<int>(c) * (tile_width + kGap);
+      sheet.picture(x, y, strip.tile_width(), kTileHeight, &pictures[s][c * bytes]);
     }
+    y += kTileHeight + kGap;
   }
-  write_png(png, sheet, width, height, 3);
+  sheet.write(png);
   return title;
 }
 

@@ -1,0 +1,102 @@
+// SPDX-License-Identifier: Apache-2.0
+// Who judges the judge: what testing/truth.h lets pass, and what it does not.
+
+#include "mjsense/rays/testing/truth.h"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+
+namespace mjsense {
+namespace {
+
+using testing::agree;
+using testing::Neighbours;
+using testing::TestModel;
+
+Hit at(double t) {
+  Hit hit;
+  hit.t = t;
+  hit.geom = 0;
+  return hit;
+}
+const Hit kNothing;
+
+//      | |
+//    __v_v      a box 1 m high on a floor
+//   |    |
+// --+----+---
+const TestModel& step() {
+  static const TestModel model(
+      "<mujoco><worldbody><geom type='plane' size='0 0 1'/>"
+      "<geom type='box' size='1 1 .5' pos='0 0 .5'/></worldbody></mujoco>");
+  return model;
+}
+
+TEST(Truth, AHitIsWhereMjRayIs) {
+  const double o[3] = {0.3, 0.2, 4}, down[3] = {0, 0, -1};
+  EXPECT_TRUE(agree(step(), o, down, at(3)));
+  EXPECT_TRUE(agree(step(), o, down, at(3.0000005)));  // a rounding or two
+  EXPECT_FALSE(agree(step(), o, down, at(3.00001)));
+  EXPECT_FALSE(agree(step(), o, down, at(2.99999)));
+  EXPECT_FALSE(agree(step(), o, down, at(4)));
+  EXPECT_FALSE(agree(step(), o, down, kNothing));
+  const double up[3] = {0, 0, 1};
+  EXPECT_TRUE(agree(step(), o, up, kNothing));
+  EXPECT_FALSE(agree(step(), o, up, at(3)));
+}
+
+// At the edge of a plate mj_ray changes its mind between two values: both are right where a rounding
+// decides, and nothing between them is.
+TEST(Truth, AtAnEdgeBothSidesAreRightAndNothingBetween) {
+  const TestModel shelf(
+      "<mujoco><worldbody><geom type='plane' size='0 0 1'/>"
+      "<geom type='box' size='1 1 .001' pos='0 0 .999'/></worldbody></mujoco>");
+  const double down[3] = {0, 0, -1};
+  for (double beside : {0.0, 2e-7, -2e-7}) {
+    const double o[3] = {1 + beside, 0.2, 4};
+    EXPECT_TRUE(agree(shelf, o, down, at(3))) << beside;
+    EXPECT_TRUE(agree(shelf, o, down, at(4))) << beside;
+    for (double t : {2.9999, 3.01, 3.5, 3.9999}) EXPECT_FALSE(agree(shelf, o, down, at(t))) << t;
+    EXPECT_FALSE(agree(shelf, o, down, kNothing));
+  }
+  for (double beside : {1e-5, -1e-5}) {
+    const double o[3] = {1 + beside, 0.2, 4};
+    EXPECT_EQ(agree(shelf, o, down, at(3)), beside < 0);
+    EXPECT_EQ(agree(shelf, o, down, at(4)), beside > 0);
+  }
+}
+
+// Where a ray nearly runs along the floor, a turn by a rounding is metres on it.
+TEST(Truth, WhatIsGrazedIsMetWhereATurnedRayMeetsIt) {
+  const double slope = 1e-5, d[3] = {std::sqrt(1 - slope * slope), 0, -slope};
+  const double o[3] = {5, 0, 1e-3};
+  const double t = o[2] / slope;  // 100 m
+  const double turned = o[2] / (slope + 0.9 * Neighbours::kRoundings);
+  ASSERT_GT(t - turned, 1);
+  EXPECT_TRUE(agree(step(), o, d, at(t)));
+  EXPECT_TRUE(agree(step(), o, d, at(turned)));
+  EXPECT_TRUE(agree(step(), o, d, at(0.5 * (t + turned))));
+  EXPECT_FALSE(agree(step(), o, d, at(t - 4 * (t - turned))));
+  EXPECT_FALSE(agree(step(), o, d, kNothing));
+}
+
+// Along a wall, in its plane: in, out, or in somewhere on the way.
+TEST(Truth, InTheBordersPlaneItIsMetAnywhereOrNotAtAll) {
+  const double along[3] = {0, 1, 0};
+  const double in_it[3] = {1, -3, 0.5}, beside[3] = {1 + 1e-5, -3, 0.5};
+  const double within[3] = {1 - 1e-5, -3, 0.5};
+  for (double t : {2.0, 2.7, 3.9}) {
+    EXPECT_TRUE(agree(step(), in_it, along, at(t))) << t;
+    EXPECT_FALSE(agree(step(), beside, along, at(t))) << t;
+    EXPECT_EQ(agree(step(), within, along, at(t)), t == 2) << t;
+  }
+  EXPECT_TRUE(agree(step(), in_it, along, kNothing));
+  EXPECT_TRUE(agree(step(), beside, along, kNothing));
+  EXPECT_FALSE(agree(step(), within, along, kNothing));
+  EXPECT_FALSE(agree(step(), in_it, along, at(1.9)));
+  EXPECT_FALSE(agree(step(), in_it, along, at(4.1)));
+}
+
+}  // namespace
+}  // namespace mjsense
