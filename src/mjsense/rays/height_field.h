@@ -6,7 +6,9 @@
 // change of sign of z - h: neighbouring cells share their borders' values, so no ray slips through
 // a seam. On which side of the surface a ray is follows from how it came there; z - h is asked only
 // where nothing else says it, because at a flat top, in the very plane through which rays enter and
-// leave, its sign is that of a rounding error.
+// leave, its sign is that of a rounding error. So is on which side of the field's border a ray is
+// that runs in its plane: when a ray leaves the field is known from the box around it alone, and
+// until then it stays in the cells along the border.
 
 #include <mujoco/mujoco.h>
 
@@ -86,13 +88,16 @@ struct GridRay {
   Float length;      // m
   Mask right, up, still_x, still_y;
   Float inv_x, inv_y;
+  Float columns, rows;  // of the far border
 
   GridRay(const HeightField& field, Vec3f o, Vec3f d, Float start, Float stop) {
     const float per_x = (field.cols - 1) / (2 * field.size[0]);
     const float per_y = (field.rows - 1) / (2 * field.size[1]);
     const Vec3f p = along(o, start, d);
-    x = (p.x + field.size[0]) * per_x;
-    y = (p.y + field.size[1]) * per_y;
+    columns = static_cast<float>(field.cols - 1);
+    rows = static_cast<float>(field.rows - 1);
+    x = min(max((p.x + field.size[0]) * per_x, 0.0f), columns);
+    y = min(max((p.y + field.size[1]) * per_y, 0.0f), rows);
     z = p.z;
     dx = d.x * per_x;
     dy = d.y * per_y;
@@ -108,9 +113,15 @@ struct GridRay {
   Float x_at(Float t) const { return fma(t, dx, x); }
   Float y_at(Float t) const { return fma(t, dy, y); }
   Float z_at(Float t) const { return fma(t, dz, z); }
-  // When it crosses the line at this column or row.
-  Float reaches_x(Float column) const { return select(still_x, kNoHit, (column - x) * inv_x); }
-  Float reaches_y(Float row) const { return select(still_y, kNoHit, (row - y) * inv_y); }
+  // When it crosses the line at this column or row, of which there are cells on both sides.
+  Float reaches_x(Float column) const {
+    const Mask border = (column <= Float(0.0f)) | (column >= columns);
+    return select(still_x | border, kNoHit, (column - x) * inv_x);
+  }
+  Float reaches_y(Float row) const {
+    const Mask border = (row <= Float(0.0f)) | (row >= rows);
+    return select(still_y | border, kNoHit, (row - y) * inv_y);
+  }
 };
 
 // Where each lane is: its cell, and when it came there.
@@ -120,12 +131,10 @@ struct Walk {
   Mask active;
   Mask fresh;  // came by a leap: the height above the surface at t is not known
 
+  // Lanes that are done must not read outside.
   void stay_inside(const HeightField& field) {
-    const Float last_x = static_cast<float>(field.cols - 2),
-                last_y = static_cast<float>(field.rows - 2);
-    active = active & (cx >= Float(0.0f)) & (cy >= Float(0.0f)) & (cx <= last_x) & (cy <= last_y);
-    cx = min(max(cx, 0.0f), last_x);  // lanes that are done must not read outside
-    cy = min(max(cy, 0.0f), last_y);
+    cx = min(max(cx, 0.0f), static_cast<float>(field.cols - 2));
+    cy = min(max(cy, 0.0f), static_cast<float>(field.rows - 2));
   }
 
   // Lanes that pass above all of their block leap to its border. Returns them.
@@ -170,8 +179,7 @@ inline Float march(const HeightField& field, Vec3f o, Vec3f d, Float start, Floa
   const Float diagonal = ray.dy - ray.dx, inv_diagonal = Float(1.0f) / diagonal;
   const Mask still_diagonal = abs(diagonal) < Float(1e-20f);
   Walk walk{floor(ray.x), floor(ray.y), 0.0f, side, active, mask_of(kAllLanes)};
-  walk.cx = min(max(walk.cx, 0.0f), static_cast<float>(field.cols - 2));
-  walk.cy = min(max(walk.cy, 0.0f), static_cast<float>(field.rows - 2));
+  walk.stay_inside(field);
   // Leaps pay where rays cross many cells.
   const bool far =
       any(active & (ray.length * (abs(ray.dx) + abs(ray.dy)) > Float(HeightField::kBlock)));

@@ -82,16 +82,21 @@ inline void find_all_casters(const View& view, const FixedTile* fixed, const Til
   find_casters(view, fixed ? Part::kMoving : Part::kAll, low, high, scratch, used, out.moving);
 }
 
-inline void keep_hits(const Hits& hits, int packet, FixedTile& out) {
-  for (int k = 0; k < kLanes; k += kWidth) {
-    const int at = packet * kLanes + k;
-    store(out.t + at, load(hits.t + k));
-    store(out.id + at, load(hits.id + k));
-    store(out.prim + at, load(hits.prim + k));
-    store(out.u + at, load(hits.u + k));
-    store(out.v + at, load(hits.v + k));
-    for (int c = 0; c < 3; ++c) store(out.n[c] + at, load(hits.n[c] + k));
-  }
+// What a layer keeps of the hits of packet `packet`, array by array: visit(of the hits, of the layer).
+template <class HitsOrConst, class TileOrConst, class Visit>
+inline void each_kept(HitsOrConst& hits, int packet, TileOrConst& kept, Visit visit) {
+  const int at = packet * kLanes;
+  visit(hits.t, kept.t + at);
+  visit(hits.id, kept.id + at);
+  visit(hits.prim, kept.prim + at);
+  visit(hits.u, kept.u + at);
+  visit(hits.v, kept.v + at);
+  for (int c = 0; c < 3; ++c) visit(hits.n[c], kept.n[c] + at);
+}
+
+template <class T>
+inline void copy_lanes(const T* from, T* to) {
+  for (int k = 0; k < kLanes; k += kWidth) store(to + k, load(from + k));
 }
 
 // Draws the fixed geoms among `count` in scratch.opaque into the tile, and keeps what is known then;
@@ -107,7 +112,7 @@ inline void make_fixed(const View& view, int count, int packets, bool colors, Ti
   for (int i = 0; i < view.num_lights; ++i) shadows.moving[i].count = 0;
   for (int q = 0; q < packets; ++q) {
     const Hits& hits = tile.hits[q];
-    keep_hits(hits, q, out);
+    each_kept(hits, q, out, [](const auto* from, auto* to) { copy_lanes(from, to); });
     const std::uint32_t lanes = hit_lanes(hits);
     if (!lanes) continue;
     Surfaces surfaces;
@@ -180,15 +185,7 @@ inline void load_fixed(const View& view, const FixedTile& from, int packets, Til
   PacketMask shown = 0;
   for (int q = 0; q < packets; ++q) {
     Hits& hits = tile.hits[q];
-    for (int k = 0; k < kLanes; k += kWidth) {
-      const int at = q * kLanes + k;
-      store(hits.t + k, load(from.t + at));
-      store(hits.id + k, load(from.id + at));
-      store(hits.prim + k, load(from.prim + at));
-      store(hits.u + k, load(from.u + at));
-      store(hits.v + k, load(from.v + at));
-      for (int c = 0; c < 3; ++c) store(hits.n[c] + k, load(from.n[c] + at));
-    }
+    each_kept(hits, q, from, [](auto* to, const auto* kept) { copy_lanes(kept, to); });
     int last = -1, index = -1;
     for (int i = 0; i < kLanes; ++i) {
       if (hits.id[i] != last) {  // most packets see few

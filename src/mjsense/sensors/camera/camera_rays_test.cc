@@ -6,6 +6,8 @@
 #include <algorithm>
 #include <cmath>
 #include <string>
+#include <utility>
+#include <vector>
 
 #include "mjsense/rays/ray_scene.h"
 #include "mjsense/rays/testing/scene.h"
@@ -14,6 +16,33 @@
 
 namespace mjsense {
 namespace {
+
+// The camera "c" of a scene.
+CameraSensorCfg camera_c(int width, int height, std::vector<std::string> data_types) {
+  CameraSensorCfg cfg;
+  cfg.name = "cam";
+  cfg.camera_name = "c";
+  cfg.width = width;
+  cfg.height = height;
+  cfg.data_types = std::move(data_types);
+  return cfg;
+}
+
+// Calls visit(pixel, d, length) with each pixel's direction in the world; its depth is the distance
+// along the ray divided by `length`.
+template <class Visit>
+void each_pixel(const testing::TestModel& m, int width, int height, double fovy, Visit visit) {
+  const double top = std::tan(0.5 * fovy * M_PI / 180), right = top * width / height;
+  for (int i = 0; i < width * height; ++i) {
+    const int x = i % width, y = i / width;
+    const double c[3] = {right * (2 * (x + 0.5) / width - 1), top * (1 - 2 * (y + 0.5) / height),
+                         -1};
+    double d[3];
+    mju_mulMatVec3(d, m.data->cam_xmat, c);
+    const double length = mju_normalize3(d);
+    visit(i, d, length);
+  }
+}
 
 TEST(CameraAgainstRays, EveryPixelSeesWhatItsRayMeets) {
   constexpr int kWidth = 61, kHeight = 47, kScenes = 24;
@@ -35,41 +64,27 @@ TEST(CameraAgainstRays, EveryPixelSeesWhatItsRayMeets) {
     testing::TestModel m(xml);
     RayScene rays(m.model, 1);
     rays.update(m.world());
-    CameraSensorCfg cfg;
-    cfg.name = "cam";
-    cfg.camera_name = "c";
-    cfg.width = kWidth;
-    cfg.height = kHeight;
-    cfg.data_types = {"depth", "segmentation"};
-    const auto camera = testing::shoot(cfg, m, rays);
+    const auto camera =
+        testing::shoot(camera_c(kWidth, kHeight, {"depth", "segmentation"}), m, rays);
     const auto depth = camera->field("depth").data.row<float>(0);
     const auto ids = camera->field("segmentation").data.row<std::int32_t>(0);
 
     RayFilter filter;
     filter.groups = 0x7;
     filter.backfaces = RayFilter::Backfaces::kCull;
-    const double top = std::tan(35 * M_PI / 180), right = top * kWidth / kHeight;
-    const double *origin = m.data->cam_xpos, *r = m.data->cam_xmat;
-    for (int y = 0; y < kHeight; ++y)
-      for (int x = 0; x < kWidth; ++x) {
-        const double c[3] = {right * (2 * (x + 0.5) / kWidth - 1),
-                             top * (1 - 2 * (y + 0.5) / kHeight), -1};
-        double d[3];
-        for (int k = 0; k < 3; ++k)
-          d[k] = r[3 * k] * c[0] + r[3 * k + 1] * c[1] + r[3 * k + 2] * c[2];
-        const Hit hit = rays.trace(0, filter, origin, d);
-        const double planar = hit.t / std::hypot(c[0], c[1], c[2]);
-        const int i = y * kWidth + x;
-        ++pixels;
-        hits += hit.geom >= 0;
-        if (ids[2 * i] != hit.geom) {
-          ++other_geom;
-        } else if (hit.geom >= 0) {
-          // Far away on a plane a rounded direction moves the hit by the distance squared.
-          const double rounding = 1e-5 * (1 + planar) + 1e-7 * planar * planar;
-          off += std::abs(depth[i] - planar) > rounding;
-        }
+    each_pixel(m, kWidth, kHeight, 70, [&](int i, const double* d, double length) {
+      const Hit hit = rays.trace(0, filter, m.data->cam_xpos, d);
+      const double planar = hit.t / length;
+      ++pixels;
+      hits += hit.geom >= 0;
+      if (ids[2 * i] != hit.geom) {
+        ++other_geom;
+      } else if (hit.geom >= 0) {
+        // Far away on a plane a rounded direction moves the hit by the distance squared.
+        const double rounding = 1e-5 * (1 + planar) + 1e-7 * planar * planar;
+        off += std::abs(depth[i] - planar) > rounding;
       }
+    });
   }
   EXPECT_GT(hits, pixels / 4);
   EXPECT_LT(other_geom, pixels / 5000);  // edges, by rounding
@@ -97,29 +112,15 @@ TEST(CameraAgainstRays, FlatTopsOfHeightFields) {
         "'/></body></worldbody></mujoco>");
     RayScene rays(m.model, 1);
     rays.update(m.world());
-    CameraSensorCfg cfg;
-    cfg.name = "cam";
-    cfg.camera_name = "c";
-    cfg.width = kWidth;
-    cfg.height = kHeight;
-    cfg.data_types = {"depth"};
-    const auto camera = testing::shoot(cfg, m, rays);
+    const auto camera = testing::shoot(camera_c(kWidth, kHeight, {"depth"}), m, rays);
     const auto depth = camera->field("depth").data.row<float>(0);
-    const double top = std::tan(30 * M_PI / 180), right = top * kWidth / kHeight;
-    const double *origin = m.data->cam_xpos, *r = m.data->cam_xmat;
-    for (int y = 0; y < kHeight; ++y)
-      for (int x = 0; x < kWidth; ++x) {
-        const double c[3] = {right * (2 * (x + 0.5) / kWidth - 1),
-                             top * (1 - 2 * (y + 0.5) / kHeight), -1};
-        double d[3];
-        mju_mulMatVec3(d, r, c);
-        const double length = mju_normalize3(d);
-        const testing::Truth truth = testing::mujoco_ray(m, origin, d);
-        ++pixels;
-        if (truth.t < 0) continue;
-        ++ground;
-        off += std::abs(depth[y * kWidth + x] - truth.t / length) > 1e-5 * (1 + truth.t);
-      }
+    each_pixel(m, kWidth, kHeight, 60, [&](int i, const double* d, double length) {
+      const testing::Truth truth = testing::mujoco_ray(m, m.data->cam_xpos, d);
+      ++pixels;
+      if (truth.t < 0) return;
+      ++ground;
+      off += std::abs(depth[i] - truth.t / length) > 1e-5 * (1 + truth.t);
+    });
   }
   EXPECT_GT(ground, pixels / 3);
   EXPECT_LT(off, pixels / 5000);  // edges of steps, by rounding
