@@ -26,6 +26,8 @@ set(MJSENSE_PUBLIC_HEADERS
   mjsense/effects/noise.h
   mjsense/effects/pipeline.h
   mjsense/effects/timing.h
+  mjsense/episode/active_worlds.h
+  mjsense/episode/object_sensors.h
   mjsense/episode/policy.h
   mjsense/episode/task.h
   mjsense/observe/camera_parameters.h
@@ -50,6 +52,7 @@ set(MJSENSE_PUBLIC_HEADERS
   mjsense/robots/kinematics.h
   mjsense/robots/robot.h
   mjsense/robots/robot_cfg.h
+  mjsense/robots/scene_robot.h
   mjsense/robots/state_row.h
   mjsense/rollout/action_log.h
   mjsense/rollout/core_suite.h

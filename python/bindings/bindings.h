@@ -12,6 +12,7 @@ void bind_simulation(nanobind::module_& m);
 void bind_contact(nanobind::module_& m);
 void bind_effects(nanobind::module_& m);
 void bind_raycast(nanobind::module_& m);
+void bind_recorder(nanobind::module_& m);
 void bind_rollout(nanobind::module_& m);
 
 }  // namespace mjsense::python

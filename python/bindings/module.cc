@@ -15,5 +15,6 @@ NB_MODULE(_core, m) {
   mjsense::python::bind_contact(m);
   mjsense::python::bind_effects(m);
   mjsense::python::bind_raycast(m);
+  mjsense::python::bind_recorder(m);
   mjsense::python::bind_rollout(m);
 }

@@ -35,8 +35,8 @@ class Turns {
     if (depth_ > 0) {
       throw RuntimeError(
           std::string(what) +
-          "() is called while the simulation is at work: a sensor's code may read other "
-          "sensors and the state, but not change them");
+          "() is called while the simulation is at work: code of a sensor, task or policy may "
+          "read sensors and the state, but not move the worlds");
     }
     const Depth in(depth_);
     body();
@@ -47,6 +47,13 @@ class Turns {
     std::lock_guard lock(mutex_);
     const Depth in(depth_);
     body();
+  }
+  // For code that runs for the simulation. Called without the interpreter's lock.
+  template <class Body>
+  auto work(Body&& body) {
+    std::lock_guard lock(mutex_);
+    const Depth in(depth_);
+    return body();
   }
 
  private:

@@ -6,6 +6,7 @@
 #include <fmt/format.h>
 #include <nanobind/nanobind.h>
 #include <nanobind/ndarray.h>
+#include <nanobind/stl/optional.h>
 #include <nanobind/stl/shared_ptr.h>
 #include <nanobind/stl/string.h>
 #include <nanobind/stl/vector.h>
@@ -14,45 +15,56 @@
 #include "mjsense/rollout/registry.h"
 #include "python/bindings/bindings.h"
 #include "python/bindings/fields.h"
-#include "python/bindings/py_simulation.h"
-#include "python/bindings/sensor_handle.h"
+#include "python/bindings/host.h"
+#include "python/bindings/numpy.h"
+#include "python/bindings/python_policy.h"
+#include "python/bindings/python_task.h"
 
 namespace mjsense::python {
 
 namespace {
 
-// Python's sensors as members of a rollout's suite, and the Python simulation that they see. C++
-// copies and destroys its configuration without the interpreter's lock, so it holds this by a
-// pointer.
-struct PythonMembers {
-  nb::list sensors;
-  nb::object make_simulation;
-  nb::object simulation;
+// Objects of Python's that play in a rollout: `parts` has a task or None, a policy or None, and
+// sensors. C++ copies and destroys its configuration without the interpreter's lock.
+class Parts {
+ public:
+  Parts(nb::object parts, nb::object make_simulation)
+      : host_(std::make_shared<PythonHost>(std::move(make_simulation))),
+        task_(nb::object(parts[0])),
+        policy_(nb::object(parts[1])),
+        sensors_(nb::object(parts[2])) {}
 
-  // Nothing of Python's may hold on to a rollout that has ended.
-  void close() {
-    if (simulation) simulation.attr("close")();
-  }
-};
+  const std::shared_ptr<PythonHost>& host() const { return host_; }
 
-std::vector<std::shared_ptr<Sensor>> make_members(PythonMembers& members,
-                                                  const std::shared_ptr<Simulation>& sim) {
-  nb::gil_scoped_acquire lock;
-  auto* shared = new PySimulation(sim);
-  members.simulation = members.make_simulation(nb::cast(shared, nb::rv_policy::take_ownership));
-  std::vector<std::shared_ptr<Sensor>> made;
-  for (nb::handle object : members.sensors) {
-    auto sensor = std::make_shared<PythonSensor>(nb::cast<std::string>(object.attr("uuid")),
-                                                 WeakObject(object), read_python_spec(object));
-    sensor->on_initialized = [weak = std::weak_ptr<PythonSensor>(sensor), &members] {
-      auto self = weak.lock();
-      self->self().attr("_mjs_bind")(members.simulation, SensorHandle{self});
+  void join(RolloutCfg& cfg) const {
+    if (!task_.get().is_none()) {
+      const bool own_horizon = !cfg.horizon;
+      cfg.make_task = [task = task_, host = host_, own_horizon](TaskCfg wanted) {
+        nb::gil_scoped_acquire lock;
+        return PythonTask::make(nb::borrow(task.get()), host, std::move(wanted), own_horizon);
+      };
+    }
+    if (!policy_.get().is_none()) {
+      cfg.make_policy = [policy = policy_, host = host_] {
+        nb::gil_scoped_acquire lock;
+        return std::make_unique<PythonPolicy>(nb::borrow(policy.get()), host);
+      };
+    }
+    if (nb::len(sensors_.get()) > 0) {
+      cfg.more_sensors = [sensors = sensors_, host = host_](Rollout& rollout) {
+        nb::gil_scoped_acquire lock;
+        return host->members(sensors.get(), rollout.simulation_ptr());
+      };
+    }
+    cfg.made = [](Rollout& rollout) {
+      if (auto* policy = dynamic_cast<PythonPolicy*>(rollout.policy())) policy->observe(rollout);
     };
-    shared->add_python(sensor);
-    made.push_back(sensor);
   }
-  return made;
-}
+
+ private:
+  std::shared_ptr<PythonHost> host_;
+  Held task_, policy_, sensors_;
+};
 
 nb::dict progress_dict(const RecordProgress& p) {
   nb::dict d;
@@ -69,14 +81,12 @@ nb::dict progress_dict(const RecordProgress& p) {
   return d;
 }
 
-nb::dict record(nb::dict options, nb::object progress, nb::list sensors,
+nb::dict record(nb::dict options, nb::object progress, nb::object objects,
                 nb::object make_simulation) {
   RecordJobCfg cfg;
   read_options(options, struct_of<RecordJobCfg>(), &cfg);
-  PythonMembers members{sensors, make_simulation, {}};
-  if (sensors.size() > 0) {
-    cfg.rollout.more_sensors = [&members](const auto& sim) { return make_members(members, sim); };
-  }
+  const Parts parts(objects, make_simulation);
+  parts.join(cfg.rollout);
   StopFlag stop{0};
   nb::object error;  // of `progress`, or KeyboardInterrupt
   const auto report = [&](const RecordProgress& p) {
@@ -95,10 +105,10 @@ nb::dict record(nb::dict options, nb::object progress, nb::list sensors,
     nb::gil_scoped_release unlock;
     s = record_episodes(cfg, report, &stop);
   } catch (...) {
-    members.close();
+    parts.host()->close();
     throw;
   }
-  members.close();
+  parts.host()->close();
   if (error) {
     PyErr_SetObject(reinterpret_cast<PyObject*>(Py_TYPE(error.ptr())), error.ptr());
     throw nb::python_error();
@@ -126,9 +136,11 @@ nb::dict record(nb::dict options, nb::object progress, nb::list sensors,
 // B worlds that play episodes with actions from Python.
 class PyRollout {
  public:
-  explicit PyRollout(nb::dict options) {
+  PyRollout(nb::dict options, nb::object objects, nb::object make_simulation)
+      : parts_(objects, make_simulation), turns_(parts_.host()->turns()) {
     RolloutCfg cfg;
     read_options(options, struct_of<RolloutCfg>(), &cfg);
+    parts_.join(cfg);
     nb::gil_scoped_release unlock;
     rollout_ = std::make_shared<Rollout>(cfg);
   }
@@ -138,10 +150,8 @@ class PyRollout {
   }
 
   Rollout& rollout() { return *rollout_; }
-  const std::shared_ptr<Rollout>& share() const { return rollout_; }
-
-  // The worlds as a simulation, which takes turns with the rollout.
-  PySimulation* simulation() const { return new PySimulation(rollout_->simulation_ptr(), turns_); }
+  // mjsense.Simulation of the worlds, which takes turns with the rollout.
+  nb::object simulation() const { return parts_.host()->simulation(rollout_->simulation_ptr()); }
 
   void start(const std::vector<int>& worlds, const std::vector<std::int64_t>& episodes) {
     turns_->change("start", [&] { rollout_->start(worlds, episodes); });
@@ -155,36 +165,46 @@ class PyRollout {
   void step() {
     turns_->change("step", [&] { rollout_->step(); });
   }
+  void reseed(std::uint64_t seed) {
+    turns_->change("reseed", [&] { rollout_->reseed(seed); });
+  }
 
-  // Commands of all controlled groups in a row, [B, n].
+  // Commands of all controlled groups in a row, [B, n]; `done` [B]: the episode ends after them.
   using Commands = nb::ndarray<const double, nb::shape<-1, -1>, nb::c_contig, nb::device::cpu>;
-  void set_actions(const Commands& values) {
-    const auto& groups = rollout_->task().robot().groups();
-    std::size_t width = 0;
-    for (const MoveGroup& group : groups) width += group.actuators.size();
-    if (values.shape(0) != static_cast<std::size_t>(rollout_->num_worlds()) ||
-        values.shape(1) != width) {
-      throw ValueError(fmt::format("actions: shape ({}, {}), expected ({}, {})", values.shape(0),
-                                   values.shape(1), rollout_->num_worlds(), width));
-    }
+  using Flags = nb::ndarray<const bool, nb::shape<-1>, nb::c_contig, nb::device::cpu>;
+  void set_actions(const Commands& values, std::optional<Flags> done) {
+    check(values.shape(0), values.shape(1), "(B, n)");
+    if (done && done->size() != values.shape(0))
+      throw ValueError(fmt::format("done: {} flags for {} worlds", done->size(), values.shape(0)));
     const double* at = values.data();
+    const bool* flags = done ? done->data() : nullptr;
     turns_->change("set_actions", [&] {
       for (int w = 0; w < rollout_->num_worlds(); ++w) {
-        Action action;
-        for (std::size_t g = 0; g < groups.size(); ++g) {
-          const std::size_t n = groups[g].actuators.size();
-          if (n > 0) action.commands[g].set({at, n});
-          at += n;
-        }
-        rollout_->action(w) = action;
+        rollout_->action(w) = action(at + w * width());
+        if (flags) rollout_->action(w).done = flags[w];
       }
     });
   }
-  std::vector<std::vector<double>> actions() {
+  // Chunks [B, steps, n].
+  using Chunks = nb::ndarray<const double, nb::shape<-1, -1, -1>, nb::c_contig, nb::device::cpu>;
+  void step_chunk(const Chunks& values, bool stop_on_success) {
+    check(values.shape(0), values.shape(2), "(B, steps, n)");
+    const std::size_t B = values.shape(0), steps = values.shape(1);
+    std::vector<Action> actions(B * steps);
+    for (std::size_t w = 0; w < B; ++w) {
+      for (std::size_t k = 0; k < steps; ++k)
+        actions[k * B + w] = action(values.data() + (w * steps + k) * width());
+    }
+    turns_->change("step_chunk", [&] { rollout_->step_chunk(actions, stop_on_success); });
+  }
+  // What act() chose, [B, n], and which worlds it said to be done in.
+  nb::tuple actions() {
     const auto& groups = rollout_->task().robot().groups();
     std::vector<std::vector<double>> rows(rollout_->num_worlds());
+    std::vector<int> done(rollout_->num_worlds());
     turns_->read([&] {
       for (int w = 0; w < rollout_->num_worlds(); ++w) {
+        done[w] = rollout_->action(w).done;
         for (std::size_t g = 0; g < groups.size(); ++g) {
           const GroupValues& given = rollout_->action(w).commands[g];
           const GroupValues& held = rollout_->task().robot().targets(w)[g];
@@ -193,73 +213,97 @@ class PyRollout {
         }
       }
     });
-    return rows;
+    return nb::make_tuple(rows, done);
   }
-  // The evaluation of a world and why it failed, if it did.
-  std::pair<Evaluation, std::string> outcome(int world) {
-    std::pair<Evaluation, std::string> found;
-    turns_->read([&] { found = {rollout_->evaluation(world), rollout_->fault(world)}; });
-    return found;
+  template <class Body>
+  void read(Body&& body) {
+    turns_->read([&] { body(*rollout_); });
   }
 
  private:
+  std::size_t width() const {
+    std::size_t width = 0;
+    for (const MoveGroup& group : rollout_->task().robot().groups())
+      width += group.actuators.size();
+    return width;
+  }
+  void check(std::size_t worlds, std::size_t width, const char* what) const {
+    if (worlds == static_cast<std::size_t>(rollout_->num_worlds()) && width == this->width())
+      return;
+    throw ValueError(fmt::format("actions: {} worlds of {} commands, expected {} = {} worlds of {}",
+                                 worlds, width, what, rollout_->num_worlds(), this->width()));
+  }
+  Action action(const double* commands) const {
+    Action action;
+    const auto groups = rollout_->task().robot().groups();
+    for (std::size_t g = 0; g < groups.size(); ++g) {
+      const std::size_t n = groups[g].actuators.size();
+      if (n > 0) action.commands[static_cast<int>(g)].set({commands, n});
+      commands += n;
+    }
+    return action;
+  }
+
+  Parts parts_;
+  std::shared_ptr<Turns> turns_;
   std::shared_ptr<Rollout> rollout_;
-  std::shared_ptr<Turns> turns_ = std::make_shared<Turns>();
 };
 
-nb::list action_layout(PyRollout& self) {
-  nb::list layout;
-  for (const MoveGroup& group : self.rollout().task().robot().groups()) {
-    if (group.controlled())
-      layout.append(nb::make_tuple(group.name, group.ctrl_low, group.ctrl_high));
-  }
-  return layout;
-}
-
-nb::list streams(PyRollout& self) {
-  nb::list list;
-  for (const auto& sensor : self.rollout().suite().sensors()) {
-    nb::object owner = owner_of(std::shared_ptr<Sensor>(self.share(), sensor.get()));
-    for (Field& field : sensor->fields()) {
-      list.append(nb::make_tuple(sensor->name(), nb::cast(field.spec, nb::rv_policy::copy),
-                                 to_readonly_numpy(field.data.view(), owner)));
+// (reward, success, terminal, truncated) [B] each, and {world: why it cannot go on}.
+nb::tuple outcomes(PyRollout& self) {
+  const int B = self.rollout().num_worlds();
+  const auto make = [&](DType dtype) { return std::make_shared<Array>(dtype, Shape{B}); };
+  const auto reward = make(DType::kFloat64), success = make(DType::kBool),
+             terminal = make(DType::kBool), truncated = make(DType::kBool);
+  std::vector<std::pair<int, std::string>> faults;
+  self.read([&](Rollout& rollout) {
+    for (int w = 0; w < B; ++w) {
+      const Evaluation& e = rollout.evaluation(w);
+      reward->all<double>()[w] = e.reward;
+      success->all<bool>()[w] = e.success;
+      terminal->all<bool>()[w] = e.terminal;
+      truncated->all<bool>()[w] = e.truncated;
+      if (!rollout.fault(w).empty()) faults.emplace_back(w, rollout.fault(w));
     }
-  }
-  return list;
-}
-
-nb::tuple outcome(PyRollout& self, int w) {
-  Rollout& r = self.rollout();
-  if (w < 0 || w >= r.num_worlds())
-    throw ValueError(fmt::format("world {}: must be in [0, {})", w, r.num_worlds()));
-  const auto [e, fault] = self.outcome(w);
-  return nb::make_tuple(e.reward, e.success, e.terminal, e.truncated, fault);
+  });
+  nb::dict why;
+  for (const auto& [w, text] : faults) why[nb::int_(w)] = text;
+  const auto numpy = [](const std::shared_ptr<Array>& a) {
+    return to_numpy(a->view(), owner_of(a));
+  };
+  return nb::make_tuple(numpy(reward), numpy(success), numpy(terminal), numpy(truncated), why);
 }
 
 }  // namespace
 
 void bind_rollout(nb::module_& m) {
-  m.def("record", &record, nb::arg("options"), nb::arg("progress").none(), nb::arg("sensors"),
+  m.def("record", &record, nb::arg("options"), nb::arg("progress").none(), nb::arg("objects"),
         nb::arg("make_simulation"));
   m.def("task_names", &task_names, "Names of the tasks there are.");
   m.def("robot_names", &robot_names, "Names of the robots there are.");
   m.def("policy_names", &policy_names, "Names of the policies there are.");
   nb::class_<PyRollout>(m, "Rollout", "The C++ rollout.")
-      .def(nb::init<nb::dict>(), nb::arg("options"))
+      .def(nb::init<nb::dict, nb::object, nb::object>(), nb::arg("options"), nb::arg("objects"),
+           nb::arg("make_simulation"))
       .def("start", &PyRollout::start, nb::arg("worlds"), nb::arg("episodes"))
       .def("stop", &PyRollout::stop, nb::arg("world"))
       .def("act", &PyRollout::act)
       .def("step", &PyRollout::step)
-      .def("set_actions", &PyRollout::set_actions, nb::arg("values"))
+      .def("reseed", &PyRollout::reseed, nb::arg("seed"))
+      .def("step_chunk", &PyRollout::step_chunk, nb::arg("values"), nb::arg("stop_on_success"))
+      .def("set_actions", &PyRollout::set_actions, nb::arg("values"), nb::arg("done") = nb::none())
+
       .def("actions", &PyRollout::actions)
-      .def("action_layout", &action_layout)
-      .def("streams", &streams, "(sensor, spec, array) of every stream")
-      .def("outcome", &outcome, nb::arg("world"), "(reward, success, terminal, truncated, fault)")
+      .def("action_layout", [](PyRollout& s) { return action_layout(s.rollout().task().robot()); })
+      .def(
+          "streams", [](PyRollout& s) { return suite_streams(s.rollout()); },
+          "(sensor, spec, array) of every stream")
+      .def("outcomes", &outcomes, "(reward, success, terminal, truncated, {world: fault})")
       .def(
           "description", [](PyRollout& s, int w) { return s.rollout().task().description(w); },
           nb::arg("world"))
       .def_prop_ro("fps", [](PyRollout& s) { return s.rollout().task().fps(); })
-      .def("simulation", &PyRollout::simulation, nb::rv_policy::take_ownership);
+      .def("simulation", &PyRollout::simulation);
 }
 
 }  // namespace mjsense::python

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // Scenes in Python. python/mjsense/scene.py makes the public class of it.
 
-#include "mjsense/scene/scene.h"
+#include "python/bindings/scene.h"
 
 #include <nanobind/nanobind.h>
 #include <nanobind/stl/optional.h>
@@ -67,25 +67,10 @@ std::shared_ptr<const SensorCfg> read_sensor(nb::handle item) {
                                            read_python_spec(item));
 }
 
-// `spec` is the empty MjSpec that the scene is built in, so that Python's spec_fn sees the real
-// thing; `edit` is called with no argument when everything is attached.
 std::shared_ptr<Scene> make_scene(nb::handle config, nb::handle spec, nb::list sensors,
                                   nb::object edit) {
-  SceneCfg cfg;
-  read_struct(config, cfg);
   nb::list alive;
-  std::size_t i = 0;
-  for (auto [name, entity] : dict_of(config.attr("entities")))
-    cfg.entities[i++].second.model = read_source(entity, alive);
-  for (nb::handle sensor : sensors) cfg.sensors.push_back(read_sensor(sensor));
-  cfg.spec = spec_of(spec);
-  // Called below only: `edit` need not outlive this function, and the stored config may be
-  // destroyed without the lock.
-  nb::handle call = edit;
-  cfg.spec_fn = [call](mjSpec*) {
-    nb::gil_scoped_acquire lock;
-    call();
-  };
+  SceneCfg cfg = read_scene(config, spec, sensors, edit, alive);
   nb::gil_scoped_release unlock;
   return std::make_shared<Scene>(std::move(cfg));
 }
@@ -138,6 +123,23 @@ nb::object tile_origins(const Scene& scene) {
 }
 
 }  // namespace
+
+SceneCfg read_scene(nb::handle config, nb::handle spec, nb::list sensors, nb::handle edit,
+                    nb::list& alive) {
+  SceneCfg cfg;
+  read_struct(config, cfg);
+  std::size_t i = 0;
+  for (auto [name, entity] : dict_of(config.attr("entities")))
+    cfg.entities[i++].second.model = read_source(entity, alive);
+  for (nb::handle sensor : sensors) cfg.sensors.push_back(read_sensor(sensor));
+  cfg.spec = spec_of(spec);
+  // Called once, while the Scene is made: the stored config may be destroyed without the lock.
+  cfg.spec_fn = [edit](mjSpec*) {
+    nb::gil_scoped_acquire lock;
+    edit();
+  };
+  return cfg;
+}
 
 void bind_scene(nb::module_& m) {
   m.def("check_cfg", &check_cfg, nb::arg("config"), "Raises if a configuration is wrong.");

@@ -178,7 +178,7 @@ void bind_simulation(nb::module_& m) {
           "derived_field",
           [](PySimulation& s, const std::string& name) {
             auto sensor = make_derived_field(name, s.open().model());
-            s.change("add", [&](Simulation& sim) { sim.add(sensor); });
+            s.read([&](Simulation& sim) { sim.add(sensor); });
             return SensorHandle{sensor};
           },
           nb::arg("name"), "A field of mjData as a sensor.")

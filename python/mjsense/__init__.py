@@ -10,30 +10,35 @@ if _mujoco.mj_versionString() != _MUJOCO:
     )
 
 from mjsense import configs, effects, observations
-from mjsense._core import SensorSpec, __version__, embedded_models, policy_names, robot_names, task_names
+from mjsense._core import SensorSpec, __version__, embedded_models, robot_names
 from mjsense.configs import *  # noqa: F403
 from mjsense.contact import ContactSensor
 from mjsense.data import CameraData, ContactData, ImuData, RayCastData, SensorData
 from mjsense.drawing import DebugShapes
 from mjsense.effects import EffectSensorCfg
+from mjsense.env import TaskEnv, make
 from mjsense.errors import UnknownNameError
 from mjsense.imu import ImuSensor
 from mjsense.pipeline import ObservationPipeline
+from mjsense.policy import Policy, policy_names, register_policy
 from mjsense.raycast import CameraSensor, LidarSensor, RayCastSensor, TerrainHeightSensor
 from mjsense.record import RecordProgress, RecordSummary, record
+from mjsense.recorder import Recorder
 from mjsense.scene import Entity, Scene
 from mjsense.sensor import BuiltinSensor, NativeSensor, Sensor, SensorError
 from mjsense.simulation import Simulation
 from mjsense.suite import SensorSuite
+from mjsense.task import Task, WorldState, register_task, task_names
 from mjsense.vector import TaskVectorEnv, make_vec
 
 # fmt: off
 __all__ = [
     *configs.__all__,
     "BuiltinSensor", "CameraData", "CameraSensor", "ContactData", "ContactSensor", "DebugShapes", "EffectSensorCfg",
-    "Entity", "ImuData", "ImuSensor", "LidarSensor", "NativeSensor", "ObservationPipeline", "RayCastData",
-    "RayCastSensor", "RecordProgress", "RecordSummary", "Scene", "Sensor", "SensorData", "SensorError", "SensorSpec",
-    "SensorSuite", "Simulation", "TaskVectorEnv", "TerrainHeightSensor", "UnknownNameError", "effects",
-    "embedded_models", "make_vec", "observations", "policy_names", "record", "robot_names", "task_names",
+    "Entity", "ImuData", "ImuSensor", "LidarSensor", "NativeSensor", "ObservationPipeline", "Policy", "RayCastData",
+    "RayCastSensor", "RecordProgress", "RecordSummary", "Recorder", "Scene", "Sensor", "SensorData", "SensorError", "SensorSpec",
+    "SensorSuite", "Simulation", "Task", "TaskEnv", "TaskVectorEnv", "TerrainHeightSensor", "UnknownNameError", "WorldState",
+    "effects", "embedded_models", "make", "make_vec", "observations", "policy_names", "record", "register_policy",
+    "register_task", "robot_names", "task_names",
     "__version__",
 ]

@@ -37,6 +37,10 @@ def _is_list(value: Any) -> bool:
     return hasattr(value, "__iter__") and not isinstance(value, (str, bytes))
 
 
+def _is_a(value: Any, name: str) -> bool:
+    return any(base.__name__ == name for base in type(value).__mro__)
+
+
 # What an annotation may consist of: the test, and the words for it. Names of classes are tested by name.
 _KINDS: dict[str, tuple[Callable[[Any], bool], str]] = {
     "None": (lambda value: value is None, "None"),
@@ -50,6 +54,11 @@ _KINDS: dict[str, tuple[Callable[[Any], bool], str]] = {
     "Sequence[str]": (lambda value: _is_list(value) and all(isinstance(v, str) for v in value), "a sequence of str"),
     "Sequence": (_is_list, "a sequence"),
     "Iterable": (_is_list, "a sequence"),
+    "Tasks": (lambda value: isinstance(value, str) or callable(value) or _is_a(value, "Task"), "a mjsense.Task or the name of one"),
+    "Policies": (
+        lambda value: value is None or isinstance(value, str) or callable(value) or _is_a(value, "Policy"),
+        "a mjsense.Policy, a function, or the name of one",
+    ),
     "Mapping": (lambda value: hasattr(value, "keys"), "a mapping"),
     "dict": (lambda value: isinstance(value, dict), "a dict"),
 }
@@ -63,7 +72,7 @@ def _kind(word: str) -> tuple[Callable[[Any], bool], str] | None:
         if name in _KINDS:
             return _KINDS[name]
     cls = word.split(".")[-1]
-    return (lambda value: any(base.__name__ == cls for base in type(value).__mro__)), f"a {word}"
+    return (lambda value: _is_a(value, cls)), f"a {word}"
 
 
 def _check_of(place: str, name: str, annotation: Any) -> Callable[[Any], None] | None:

@@ -9,6 +9,7 @@ from pathlib import Path
 
 from mjsense import _core
 from mjsense._arguments import Seed, checked
+from mjsense._parts import Policies, Tasks, parts_of
 from mjsense.assets import use_installed_meshes
 from mjsense.sensor import Sensor
 from mjsense.simulation import Simulation
@@ -56,9 +57,9 @@ class RecordSummary(RecordProgress):
 
 @checked
 def record(
-    task: str = "pick",
-    robot: str = "franka",
-    policy: str = "planner",
+    task: Tasks = "pick",
+    robot: str | Path | None = None,
+    policy: Policies = "planner",
     *,
     out: str | Path,
     # options of a recording
@@ -73,6 +74,7 @@ def record(
     shadows: bool = True,
     horizon: int | None = None,
     action_noise: bool = True,
+    terminate_upon_success: bool = False,
     episodes: int = 1,
     max_attempts: int = 0,
     keep_failures: bool = False,
@@ -95,7 +97,9 @@ def record(
     ``resume=True`` to go on.
 
     Args:
-        task, robot, policy: their registered names, see :func:`task_names` and so on.
+        task: a :class:`Task`, its class, or a registered name (:func:`task_names`).
+        robot: a registered name (:func:`robot_names`) or the path of a ``.toml``; None is the task's own.
+        policy: a :class:`Policy`, a function ``obs -> actions``, or a registered name (:func:`policy_names`).
         out: folder.
 
         Options:
@@ -110,6 +114,7 @@ def record(
         shadows: Pictures have shadows.
         horizon: Control steps after which an episode is cut; by default the task's.
         action_noise: Commands reach the arm with noise.
+        terminate_upon_success: An episode ends at its first success.
         episodes: How many to keep.
         max_attempts: Episodes to try; 0: six times those to keep.
         keep_failures: Keep episodes that fail, too.
@@ -128,14 +133,9 @@ def record(
     options = dict(locals())
     del options["sensors"], options["progress"]
     options["out"] = str(out)
-    own = list(sensors)
-    for sensor in own:
-        if not isinstance(sensor, Sensor):
-            raise TypeError(f"not a mjsense.Sensor: {sensor!r}")
-        if sensor._mjs_row_spec() is None:
-            raise ValueError(f"sensor '{sensor.uuid}' cannot be recorded: give it an observation_space, or is_dict = True")
+    objects = parts_of(options, sensors)
     report = None if progress is None else lambda p: progress(RecordProgress(**p))
     use_installed_meshes()
-    made = _core.record(options, report, own, Simulation._of)
+    made = _core.record(options, report, objects, Simulation._of)
     made["path"] = Path(made["path"])
     return RecordSummary(**made)

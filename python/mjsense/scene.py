@@ -6,7 +6,7 @@ from __future__ import annotations
 import difflib
 import warnings
 import weakref
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from functools import cached_property
 from types import MappingProxyType
 from typing import Any
@@ -59,6 +59,12 @@ class Scene(KnownAttributes):
     """Entities, terrain and sensors, compiled into one model. ``scene[key]`` is a sensor or, failing that, an entity."""
 
     def __init__(self, cfg: SceneCfg) -> None:
+        items, edit = self._prepare(cfg)
+        self._core = _core.Scene.make(cfg, self.spec, items, edit)
+        self._finish()
+
+    def _prepare(self, cfg: SceneCfg) -> tuple[list[Any], Callable[[], None]]:
+        """What C++ makes the scene of, beside the configuration and the spec: its sensors, and the last edit."""
         cfg.__post_init__()  # it may have been changed since it was made
         self.cfg = cfg
         self.spec = cfg._base_spec()
@@ -75,14 +81,20 @@ class Scene(KnownAttributes):
             if cfg.spec_fn is not None:
                 cfg.spec_fn(self.spec)
 
-        self._core = _core.Scene.make(cfg, self.spec, items, edit)
+        return items, edit
+
+    def _finish(self) -> None:
         for text in self._core.warnings():
-            warnings.warn(text, stacklevel=2)
+            warnings.warn(text, stacklevel=3)
         self._register()
 
     @classmethod
-    def _of(cls, core: Any) -> Scene:
-        """Of a C++ scene that something else made."""
+    def _of(cls, core: Any, prepared: Scene | None = None) -> Scene:
+        """Of a C++ scene that something else made, of what ``prepared`` said."""
+        if prepared is not None:
+            prepared._core = core
+            prepared._finish()
+            return prepared
         self = cls.__new__(cls)
         self.cfg, self.spec, self._core, self._simulation = SceneCfg(), None, core, None
         self._register()

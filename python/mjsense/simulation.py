@@ -57,11 +57,13 @@ class Simulation(KnownAttributes):
         self._adopt(scene)
 
     @classmethod
-    def _of(cls, core: Any) -> Simulation:
-        """Of a C++ simulation that something else steps."""
+    def _of(cls, core: Any, prepared: Scene | None = None) -> Simulation:
+        """Of a C++ simulation that something else steps; ``prepared``: what its scene was made of, if Python did."""
         self = cls.__new__(cls)
         self._core = core
-        self._adopt(Scene._of(core.scene()))
+        scene = Scene._of(core.scene(), prepared)
+        scene._simulation = core
+        self._adopt(scene)
         return self
 
     def _adopt(self, scene: Scene) -> None:

@@ -3,7 +3,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
+from pathlib import Path
 from typing import Any
 
 import gymnasium
@@ -13,9 +14,12 @@ from gymnasium.vector.utils import batch_space
 
 from mjsense import _core
 from mjsense._arguments import Seed, checked
+from mjsense._parts import Policies, Tasks, parts_of
+from mjsense._streams import choose_streams, nest, stream_path
 from mjsense.assets import use_installed_meshes
-from mjsense.sensor import _box
+from mjsense.sensor import Sensor, _box
 from mjsense.simulation import Simulation
+from mjsense.task import group_slices
 
 
 @checked
@@ -24,52 +28,65 @@ class TaskVectorEnv(VectorEnv):
 
     An observation is a dict by sensor; a sensor with several streams is a dict of them in turn, nested by their path:
     ``observation["qpos"]["arm"]``, ``observation["env_states"]["actors"]["mug"]``. Observations are copies (gymnasium's rule);
-    ``env.rows`` are the sensors' own arrays by stream, ``env.rows["qpos/arm"]``. A world whose episode has ended begins the next one in
-    the next step, whose action it ignores (autoreset mode NEXT_STEP).
+    ``env.rows`` are the sensors' own arrays by stream, ``env.rows["qpos/arm"]``.
+
+    ``terminated``: the task says that the episode is over, the policy said ``done``, or success with ``terminate_upon_success``.
+    ``truncated``: the horizon, or physics that diverged. When an episode has ended, by ``autoreset_mode``:
+
+    - ``next_step``: the world begins the next one in the next step, whose action it ignores;
+    - ``same_step``: it has begun the next one already when ``step`` returns; ``infos["final_obs"]`` and ``infos["final_info"]``
+      are of the last moment of the old one;
+    - ``disabled``: it stands still until ``reset(options={"reset_mask": mask})``.
+
+    ``infos["success"]`` is bool ``[num_envs]``; ``infos["_success"]`` says for which worlds, as gymnasium's masks do.
     """
 
     metadata = {"render_modes": ["rgb_array"], "autoreset_mode": AutoresetMode.NEXT_STEP}
 
-    def __init__(self, options: dict[str, Any], observations: Sequence[str] | None, render_mode: str | None) -> None:
+    def __init__(
+        self,
+        options: dict[str, Any],
+        objects: Any,
+        observations: Sequence[str] | None,
+        render_mode: str | None,
+        autoreset_mode: str | AutoresetMode,
+    ) -> None:
         if render_mode not in (None, "rgb_array"):
             raise ValueError(f"render_mode must be None or 'rgb_array', not {render_mode!r}")
-        self._options, self._wanted, self.render_mode = options, observations, render_mode
+        self.autoreset_mode = _autoreset_mode(autoreset_mode)
+        self.metadata = {**self.metadata, "autoreset_mode": self.autoreset_mode}
+        self.render_mode = render_mode
         self.num_envs = options["num_worlds"]
         self._closed = False
-        self._build(options["seed"])
-        layout = self._rollout.action_layout()
-        self.action_groups: dict[str, slice] = {}
-        """Columns of the action by move group."""
-        start = 0
-        for name, low, _ in layout:
-            self.action_groups[name] = slice(start, start + len(low))
-            start += len(low)
-        low, high = (np.concatenate([row[k] for row in layout]).astype(np.float32) for k in (1, 2))
-        self.single_action_space = gymnasium.spaces.Box(low, high, dtype=np.float32)
-        self.action_space = batch_space(self.single_action_space, self.num_envs)
-        boxes = {name: _box(spec) for name, spec in self.specs.items()}
-        self.single_observation_space = _space(_nest(self._paths, boxes))
-        self.observation_space = batch_space(self.single_observation_space, self.num_envs)
-
-    def _build(self, seed: int) -> None:
-        self._options["seed"] = seed
+        self._seed = options["seed"]
         use_installed_meshes()
-        self._rollout = _core.Rollout(self._options)
+        self._rollout = _core.Rollout(options, objects, Simulation._of)
         streams = {spec.name: (sensor, spec, array) for sensor, spec, array in self._rollout.streams()}
-        names = _streams(self._wanted, streams)
+        names = choose_streams(observations, streams)
         self.rows: dict[str, np.ndarray] = {name: streams[name][2] for name in names}
         """The streams' own arrays [B, ...], as they are now."""
         self.specs: dict[str, _core.SensorSpec] = {name: streams[name][1] for name in names}
         """Unit, frame and shape of each stream."""
-        self._paths = {name: _path(streams[name][0], name) for name in names}
-        self.sim = Simulation._of(self._rollout.simulation())
+        self._paths = {name: stream_path(streams[name][0], name) for name in names}
+        self.sim: Simulation = self._rollout.simulation()
         """The worlds. Read them as you like; the task writes them."""
         self._next_episode = 0
         self._ended = np.zeros(self.num_envs, bool)
         self._started = False
+        layout = self._rollout.action_layout()
+        self.action_groups: dict[str, slice] = group_slices(layout)
+        """Columns of the action by move group."""
+        low, high = (np.concatenate([[], *(row[k] for row in layout)]).astype(np.float32) for k in (1, 2))
+        self.single_action_space = gymnasium.spaces.Box(low, high, dtype=np.float32)
+        self.action_space = batch_space(self.single_action_space, self.num_envs)
+        boxes = {name: _box(spec) for name, spec in self.specs.items()}
+        self.single_observation_space = _space(nest(self._paths, boxes))
+        self.observation_space = batch_space(self.single_observation_space, self.num_envs)
+        self.expert_done = np.zeros(self.num_envs, bool)
+        """Which worlds the policy said to be done in, with the last :meth:`expert_action`."""
 
-    def reset(self, *, seed: Seed | None = None, options: dict[str, Any] | None = None) -> tuple[dict[str, Any], dict]:
-        """Begins a new episode in every world; with a seed, the first ones of that seed."""
+    def reset(self, *, seed: Any = None, options: dict[str, Any] | None = None) -> tuple[dict[str, Any], dict]:
+        """Begins a new episode in every world, or in those of ``options["reset_mask"]``; with a seed, the first ones of that seed."""
         self._check_open()
         mask = np.ones(self.num_envs, bool)
         if options and "reset_mask" in options:
@@ -77,12 +94,25 @@ class TaskVectorEnv(VectorEnv):
             if mask.shape != (self.num_envs,) or not (self._started or mask.all()):
                 raise ValueError(f"reset_mask: shape {mask.shape}, expected ({self.num_envs},), after a first reset of all")
         if seed is not None:
-            if seed != self._options["seed"]:
-                self._build(int(seed))
-                mask[:] = True
+            seed = self._one_seed(seed)
+            super().reset(seed=seed)
+            self._rollout.reseed(seed)
+            self._seed = seed
             self._next_episode = 0
+            mask[:] = True
         self._begin(np.flatnonzero(mask))
         return self._observe(), {}
+
+    def _one_seed(self, seed: Any) -> int:
+        """Episodes are numbered from one seed; gymnasium's list of seeds, s, s + 1, ..., stands for its first."""
+        if np.ndim(seed) == 1 and len(seed) == self.num_envs:
+            if list(seed) != [seed[0] + i for i in range(self.num_envs)]:
+                raise ValueError("seed: a list must be s, s + 1, ...: the worlds' episodes are numbered from one seed")
+            seed = seed[0]
+        if isinstance(seed, bool) or not isinstance(seed, (int, np.integer)) or not 0 <= seed < 2**64:
+            error = ValueError if isinstance(seed, (int, np.integer)) and not isinstance(seed, bool) else TypeError
+            raise error(f"seed must be an int of 64 bits from 0 on, not {seed!r}")
+        return int(seed)
 
     def _begin(self, worlds: np.ndarray) -> None:
         episodes = list(range(self._next_episode, self._next_episode + len(worlds)))
@@ -91,46 +121,92 @@ class TaskVectorEnv(VectorEnv):
         self._ended[worlds] = False
         self._started = True
 
-    def step(self, actions: Any) -> tuple[dict[str, Any], np.ndarray, np.ndarray, np.ndarray, dict[str, Any]]:
-        """One control step. Actions ``[num_envs, n]``: actuator commands of the move groups, see ``action_groups``."""
+    def step(self, actions: Any, done: Any = None) -> tuple[dict[str, Any], np.ndarray, np.ndarray, np.ndarray, dict[str, Any]]:
+        """One control step.
+
+        Args:
+            actions: ``[num_envs, n]``: actuator commands of the move groups, see ``action_groups``.
+            done: bool ``[num_envs]``, if you like: the policy has finished, the episode ends after this step.
+        """
+        values = self._checked(actions, (self.num_envs, *self.single_action_space.shape))
+        flags = None if done is None else np.ascontiguousarray(done, dtype=bool)
+
+        def play() -> None:
+            self._rollout.set_actions(values, flags)
+            self._rollout.step()
+
+        return self._play(play)
+
+    def step_chunk(
+        self, actions: Any, stop_on_success: bool = False
+    ) -> tuple[dict[str, Any], np.ndarray, np.ndarray, np.ndarray, dict[str, Any]]:
+        """Several control steps with one observation, after the last.
+
+        A world stops early where its episode ends, with ``stop_on_success`` also at its first success. Rewards are summed.
+
+        Args:
+            actions: ``[num_envs, steps, n]``.
+        """
+        shape = np.shape(actions)
+        steps = shape[1] if len(shape) == 3 and shape[1] > 0 else "steps"
+        values = self._checked(actions, (self.num_envs, steps, *self.single_action_space.shape))
+        return self._play(lambda: self._rollout.step_chunk(values, stop_on_success))
+
+    def _checked(self, actions: Any, shape: tuple[Any, ...]) -> np.ndarray:
         self._check_open()
         if not self._started:
             raise RuntimeError("call reset() before step()")
         actions = np.ascontiguousarray(actions, dtype=np.float64)
-        if actions.shape != self.action_space.shape:
-            raise ValueError(f"actions: shape {actions.shape}, expected {self.action_space.shape}")
-        if not np.isfinite(actions).all():
-            raise ValueError(f"actions of worlds {np.flatnonzero(~np.isfinite(actions).all(1)).tolist()} are not finite")
-        fresh = self._ended.copy()
-        if fresh.any():
-            for world in np.flatnonzero(fresh):
-                self._rollout.stop(int(world))
-        if not fresh.all():
-            self._rollout.set_actions(actions)
-            self._rollout.step()
-        if fresh.any():
-            self._begin(np.flatnonzero(fresh))
-        reward = np.zeros(self.num_envs)
-        terminated, truncated, success = (np.zeros(self.num_envs, bool) for _ in range(3))
-        faults = np.full(self.num_envs, "", object)
-        for world in np.flatnonzero(~fresh):
-            reward[world], success[world], terminated[world], truncated[world], faults[world] = self._rollout.outcome(int(world))
-        broken = faults != ""
-        truncated |= broken
+        if actions.shape != shape:
+            raise ValueError(f"actions: shape {actions.shape}, expected ({', '.join(map(str, shape))})")
+        finite = np.isfinite(actions).reshape(self.num_envs, -1).all(1)
+        if not finite.all():
+            raise ValueError(f"actions of worlds {np.flatnonzero(~finite).tolist()} are not finite")
+        return actions
+
+    def _play(self, play: Any) -> tuple[dict[str, Any], np.ndarray, np.ndarray, np.ndarray, dict[str, Any]]:
+        resting = self._ended.copy()
+        for world in np.flatnonzero(resting):
+            self._rollout.stop(int(world))
+        if not resting.all():
+            play()
+        reward, success, terminated, truncated, faults = self._rollout.outcomes()
+        for values in (reward, success, terminated, truncated):
+            values[resting] = 0
+        for world in faults:
+            truncated[world] = not resting[world]
+        infos: dict[str, Any] = {"success": success, "_success": ~resting}
+        broken = [world for world in faults if not resting[world]]
+        if broken:
+            infos["fault"], infos["_fault"] = np.full(self.num_envs, "", object), np.zeros(self.num_envs, bool)
+            for world in broken:
+                infos["fault"][world], infos["_fault"][world] = faults[world], True
         self._ended = terminated | truncated
-        infos: dict[str, Any] = {"success": success, "_success": ~fresh}
-        if broken.any():
-            infos |= {"fault": faults, "_fault": broken}
+        if self.autoreset_mode == AutoresetMode.NEXT_STEP and resting.any():
+            self._begin(np.flatnonzero(resting))
+        elif self.autoreset_mode == AutoresetMode.DISABLED:
+            self._ended |= resting
+        elif self.autoreset_mode == AutoresetMode.SAME_STEP and self._ended.any():
+            over = self._ended.copy()
+            last = self._observe()
+            final = np.full(self.num_envs, None, object)
+            for world in np.flatnonzero(over):
+                final[world] = _row(last, world)
+            infos = {"final_obs": final, "_final_obs": over, "final_info": {**infos, "_success": over}, "_final_info": over}
+            self._begin(np.flatnonzero(over))
+            infos |= {"success": np.where(over, False, success), "_success": ~over}
         return self._observe(), reward, terminated, truncated, infos
 
     def expert_action(self) -> np.ndarray:
-        """What the task's own policy would do now, ``[num_envs, n]``. Needs ``make_vec(..., policy="planner")``."""
+        """What the policy of ``make_vec(..., policy="planner")`` would do now, ``[num_envs, n]``; ``expert_done`` is its word."""
         self._check_open()
         self._rollout.act()
-        return np.array(self._rollout.actions(), dtype=np.float32)
+        actions, done = self._rollout.actions()
+        self.expert_done = np.array(done, bool)
+        return np.array(actions, dtype=np.float32)
 
     def _observe(self) -> dict[str, Any]:
-        return _nest(self._paths, {name: rows.copy() for name, rows in self.rows.items()})
+        return nest(self._paths, {name: rows.copy() for name, rows in self.rows.items()})
 
     def render(self) -> tuple[np.ndarray, ...] | None:
         """The first camera's picture of every world."""
@@ -152,33 +228,18 @@ class TaskVectorEnv(VectorEnv):
         self._rollout = None  # type: ignore[assignment]
 
 
-def _streams(wanted: Sequence[str] | None, streams: dict[str, tuple[str, _core.SensorSpec, np.ndarray]]) -> list[str]:
-    """Names of the streams to observe: those wanted, by their own names or their sensors'; else all that are numbers."""
-    if wanted is None:
-        plain = [name for name, (_, spec, array) in streams.items() if not spec.is_dict and array.size > 0]
-        return [name for name in plain if not name.startswith(("sensor_param_", "object_image_points"))]
-    names: list[str] = []
-    for one in wanted:
-        found = [name for name, (sensor, _, array) in streams.items() if name == one or (sensor == one and array.size > 0)]
-        if not found:
-            raise ValueError(f"no sensor or stream '{one}'; there are {', '.join(streams)}")
-        names += [name for name in found if name not in names]
-    return names
+def _autoreset_mode(mode: str | AutoresetMode) -> AutoresetMode:
+    if isinstance(mode, AutoresetMode):
+        return mode
+    words = [known.name.lower() for known in AutoresetMode]
+    if mode not in words:
+        raise ValueError(f"autoreset_mode must be one of {', '.join(words)}, not {mode!r}")
+    return AutoresetMode[mode.upper()]
 
 
-def _path(sensor: str, stream: str) -> tuple[str, ...]:
-    """Where a stream stands in an observation: ("qpos", "arm")."""
-    return (sensor, *stream[len(sensor) + 1 :].split("/")) if stream != sensor else (sensor,)
-
-
-def _nest(paths: dict[str, tuple[str, ...]], values: dict[str, Any]) -> dict[str, Any]:
-    nested: dict[str, Any] = {}
-    for name, path in paths.items():
-        inner = nested
-        for key in path[:-1]:
-            inner = inner.setdefault(key, {})
-        inner[path[-1]] = values[name]
-    return nested
+def _row(observation: dict[str, Any], world: int) -> dict[str, Any]:
+    """One world's observation."""
+    return {key: _row(value, world) if isinstance(value, dict) else value[world] for key, value in observation.items()}
 
 
 def _space(boxes: dict[str, Any]) -> gymnasium.spaces.Dict:
@@ -187,11 +248,12 @@ def _space(boxes: dict[str, Any]) -> gymnasium.spaces.Dict:
 
 @checked
 def make_vec(
-    task: str = "pick",
-    robot: str = "franka",
+    task: Tasks = "pick",
+    robot: str | Path | None = None,
     *,
-    policy: str | None = None,
+    policy: Policies = None,
     observations: Sequence[str] | None = None,
+    sensors: Iterable[Sensor] = (),
     # options of a recording
     num_envs: int = 1,
     threads: int = 0,
@@ -204,15 +266,20 @@ def make_vec(
     shadows: bool = True,
     horizon: int | None = None,
     action_noise: bool = False,
+    terminate_upon_success: bool = False,
     # end of options
+    use_sensors: bool = True,
+    autoreset_mode: str | AutoresetMode = "next_step",
     render_mode: str | None = None,
 ) -> TaskVectorEnv:
     """A task as a gymnasium vector environment.
 
     Args:
-        task, robot: their registered names.
-        policy: name of a policy that :meth:`TaskVectorEnv.expert_action` asks; none if not given.
+        task: a :class:`Task`, its class, or a registered name (:func:`task_names`).
+        robot: a registered name (:func:`robot_names`) or the path of a ``.toml``; None is the task's own.
+        policy: what :meth:`TaskVectorEnv.expert_action` asks: a :class:`Policy`, a function or a registered name.
         observations: names of sensors ("qpos") or of single streams ("qpos/arm") to observe; if not given, all that are numbers.
+        sensors: of your own, with an observation_space or is_dict: observed with the suite.
 
         Options:
         num_envs: How many run at one time.
@@ -226,10 +293,15 @@ def make_vec(
         shadows: Pictures have shadows.
         horizon: Control steps after which an episode is cut; by default the task's.
         action_noise: Commands reach the arm with noise.
+        terminate_upon_success: An episode ends at its first success.
         Others:
+        use_sensors: Task, robot and policy bring their sensors; without them only those that are given.
+        autoreset_mode: next_step, same_step or disabled.
         render_mode: None or rgb_array.
     """
     options = dict(locals())
-    del options["observations"], options["render_mode"]
-    options |= {"policy": policy or "", "num_worlds": options.pop("num_envs")}
-    return TaskVectorEnv(options, observations, render_mode)
+    for name in ("observations", "sensors", "autoreset_mode", "render_mode"):
+        del options[name]
+    options["num_worlds"] = options.pop("num_envs")
+    objects = parts_of(options, sensors)
+    return TaskVectorEnv(options, objects, observations, render_mode, autoreset_mode)

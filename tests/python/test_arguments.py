@@ -10,7 +10,8 @@ from scenes import BALL, ball_scene, feet_cfg
 
 import mjsense as mjs
 
-SKIPPED = (mjs.Sensor, mjs.TaskVectorEnv)  # users write the methods of the one; the other is made of a task, see below
+# Users write the methods of the first three; the last is made of a task, see below.
+SKIPPED = (mjs.Sensor, mjs.Task, mjs.Policy, mjs.TaskVectorEnv)
 CLASSES = [
     value
     for value in vars(mjs).values()
@@ -20,7 +21,7 @@ CLASSES = [
     and value.__module__.startswith("mjsense.")
     and value is not mjs.SensorSpec
 ]
-FUNCTIONS = [mjs.record, mjs.make_vec, mjs.replace, *(f for f in vars(mjs.observations).values() if isinstance(f, types.FunctionType))]
+FUNCTIONS = [mjs.record, mjs.make, mjs.make_vec, mjs.replace, *(f for f in vars(mjs.observations).values() if isinstance(f, types.FunctionType))]
 
 
 def methods_of(cls):
@@ -54,7 +55,7 @@ def test_wrong_types_are_named(function):
 
 
 @pytest.fixture(scope="module")
-def live():
+def live(tmp_path_factory):
     """An object of every class, and arguments that are right."""
     scene = mjs.Scene(
         mjs.SceneCfg(
@@ -73,12 +74,15 @@ def live():
     sim = mjs.Simulation(scene, num_worlds=2)
     objects = [scene, sim, *(scene[k] for k in ("touch", "scan", "lidar", "height", "eye", "imu", "ball/acc")), scene["ball"]]
     objects += [mjs.SensorSuite([scene["scan"]]), mjs.ObservationPipeline(2), sim.debug_shapes(0, "scan")]
+    objects += [mjs.Recorder(tmp_path_factory.mktemp("data"), sim, [scene["scan"]]), mjs.make("pick", cameras=[]), mjs.WorldState(sim, 0, 0)]
+    objects[-2].reset()
     return {type(o): o for o in objects}, sim
 
 
 RIGHT = {"field": "geom_friction", "values": 1.0, "name": "geom_friction", "uuid": "scan", "kind": "line", "dt": 0.1, "sensors": [],
          "env": None, "center": (0, 0, 0), "start": (0, 0, 0), "end": (0, 0, 1), "radius": 0.1, "color": (1, 0, 0, 1), "num_envs": 2,
-         "position": (0, 0, 0), "rotation_matrix": np.eye(3), "path": "x.nothing", "scene": None, "sensor": None}  # fmt: skip
+         "position": (0, 0, 0), "rotation_matrix": np.eye(3), "path": "x.nothing", "scene": None, "sensor": None, "world": 0,
+         "episode": 0, "body": "ball/ball", "joint": "ball/root", "pos": (0, 0, 0), "value": 0.0, "actions": [[0.0] * 8]}  # fmt: skip
 WRONG = ("3", 1.5, -1, 2**40, 10**30, np.nan, None, True, b"x", object(), [0.5], [-1], [7], ["a"], {}, np.zeros((1, 2, 3)))
 
 

@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
-// A policy: what to command next, world by world.
+// A policy: what to command next. Write reset() and act() for one world, which run in parallel, or
+// reset_all() and act_all() for all of them at once; whoever plays episodes calls the latter alone,
+// once a step.
 
 #include <memory>
 #include <span>
@@ -10,10 +12,12 @@
 
 #include "mjsense/core/pose.h"
 #include "mjsense/core/sensor.h"
+#include "mjsense/episode/active_worlds.h"
 #include "mjsense/robots/action.h"
 
 namespace mjsense {
 
+class Simulation;
 class Task;
 
 struct Phase {
@@ -26,13 +30,20 @@ class Policy {
   virtual ~Policy() = default;
   virtual std::string_view name() const = 0;
 
+  // The worlds in which it acts. Called before initialize(), by those who have a simulation.
+  virtual void bind(const std::shared_ptr<Simulation>& /*simulation*/) {}
   // Called once by Task::register_policy: allocates for the task's worlds.
   virtual void initialize(Task& task) = 0;
   // A new episode of a fresh world. Throws nothing for a task that it cannot solve: the first
   // action gives up.
-  virtual void reset(const World& world) = 0;
+  virtual void reset(const World& /*world*/) {}
   // The action for the next control step. Touches this world's state alone: worlds act in parallel.
-  virtual void act(const World& world, Action& action) = 0;
+  virtual void act(const World& world, Action& action);
+
+  // All worlds at once, on the caller's thread. `actions` has a row for every world there is; those
+  // of the active ones are empty and wait to be filled.
+  virtual void reset_all(ActiveWorlds& worlds);
+  virtual void act_all(ActiveWorlds& worlds, std::span<Action> actions);
 
   // Every phase there is: obs_scene's policy_phases. Empty: it knows none.
   virtual std::span<const Phase> phases() const { return {}; }

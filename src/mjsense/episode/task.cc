@@ -3,6 +3,7 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <nlohmann/json.hpp>
 
 #include "mjsense/core/error.h"
@@ -20,12 +21,52 @@ Task::Task(TaskCfg cfg) : cfg_(std::move(cfg)) {
     throw ValueError(fmt::format("task: horizon = {} must be positive", cfg_.horizon));
 }
 
+SceneCfg Task::whole_scene_cfg() const {
+  SceneCfg scene = scene_cfg();
+  scene.options.timestep = 0.001 * cfg_.sim_dt_ms;
+  const std::string name(Robot::kPrefix.substr(0, Robot::kPrefix.size() - 1));
+  const auto place = std::ranges::find(scene.entities, name, [](const auto& e) { return e.first; });
+  const bool reserved = place != scene.entities.end() && place->second.model.empty();
+  if (cfg_.robot.name.empty()) {
+    if (reserved) {
+      throw ValueError(fmt::format("task '{}' needs a robot: none is given", this->name()));
+    }
+    return scene;
+  }
+  if (place != scene.entities.end() && !reserved) {
+    throw ValueError(
+        fmt::format("task '{}' has a robot in its scene, entity '{}': robot '{}' cannot join it",
+                    this->name(), name, cfg_.robot.name));
+  }
+  EntityCfg robot;
+  robot.model = cfg_.robot.model;
+  if (reserved) {
+    place->second = robot;
+  } else {
+    scene.entities.emplace_back(name, robot);
+  }
+  if (cfg_.robot.edit_spec) {
+    scene.spec_fn = [first = scene.spec_fn, edit = cfg_.robot.edit_spec](mjSpec* spec) {
+      if (first) first(spec);
+      edit(spec, std::string(Robot::kPrefix));
+    };
+  }
+  return scene;
+}
+
 void Task::initialize(const mjModel* model, int num_worlds) {
   if (num_worlds <= 0)
     throw ValueError(fmt::format("task: {} worlds, at least 1 is needed", num_worlds));
   model_ = model;
   num_worlds_ = num_worlds;
-  robot_ = std::make_unique<Robot>(cfg_.robot, model, num_worlds);
+  if (cfg_.robot.name.empty()) {
+    const std::string entity = robot_entity();
+    cfg_.robot = scene_robot(model, entity, robot_groups(), fmt::format("task '{}'", name()));
+    robot_ =
+        std::make_unique<Robot>(cfg_.robot, model, num_worlds, entity.empty() ? "" : entity + "/");
+  } else {
+    robot_ = std::make_unique<Robot>(cfg_.robot, model, num_worlds);
+  }
   episodes_.assign(num_worlds, {});
   initialize_task();
 }
@@ -40,8 +81,12 @@ void Task::register_policy(Policy& policy) {
 void Task::sample(int world, std::int64_t episode, const StateRow& state) {
   episodes_[world] = {.number = episode};
   Rng rng(cfg_.seed, 0, stream_of("task/sample"), static_cast<std::uint64_t>(episode));
-  const Pose base = sample_scene(world, rng, state);
-  robot_->write_start(state, base, rng);
+  const std::optional<Pose> base = sample_scene(world, rng, state);
+  const int body = robot_->base_body();
+  robot_->write_start(
+      state,
+      base.value_or(Pose{vec3(model_->body_pos + 3 * body), quat(model_->body_quat + 4 * body)}),
+      rng);
 }
 
 void Task::begin(const World& world) {
@@ -63,11 +108,20 @@ void Task::apply(const World& world, const Action& action, const StateRow& state
   ++episode.step;
 }
 
-Evaluation Task::judge(int world, double reward, bool success) const {
+void Task::begin_all(ActiveWorlds& worlds) {
+  worlds.for_each([this](const World& world) { begin(world); });
+}
+
+void Task::evaluate_all(ActiveWorlds& worlds, std::span<Evaluation> out) {
+  worlds.for_each(
+      [this, all = out.data()](const World& world) { all[world.id] = evaluate(world); });
+}
+
+Evaluation Task::judge(int world, double reward, bool success, bool over) const {
   const Episode& episode = episodes_[world];
   return {.reward = reward,
           .success = success,
-          .terminal = episode.done || (success && cfg_.terminate_upon_success),
+          .terminal = over || episode.done || (success && cfg_.terminate_upon_success),
           .truncated = episode.step >= cfg_.horizon};
 }
 

@@ -2,16 +2,19 @@
 #pragma once
 // A task: its scene, its episodes, and what counts as done. Life:
 //
-//   scene_cfg()              before compilation: robot, furniture, objects, lights
+//   whole_scene_cfg()        before compilation: scene_cfg() - furniture, objects, lights - and the
+//                            robot
+//   bind(simulation)         its worlds, where there is a simulation
 //   initialize(model, B)     after compilation: resolves names; the robot exists from here on
 //   register_policy(policy)  once
-//   an episode of a world:   sample(w, episode, state), forward, begin(world), policy.reset(world),
+//   episodes of worlds:      sample(w, episode, state), forward, begin_all, policy.reset_all,
 //                            observe
-//   a control step:          policy.act(world, action), apply(world, action, state), step, observe,
-//                            evaluate(world)
+//   a control step:          policy.act_all, apply(world, action, state), advance, step, observe,
+//                            evaluate_all
 //
 // State is per world; functions that take a world touch that world's alone and may run in parallel
-// with the others.
+// with the others. A task that judges all worlds at once overrides the *_all functions, whose
+// defaults call those of one world.
 
 #include <mujoco/mujoco.h>
 
@@ -26,16 +29,20 @@
 #include "mjsense/core/json.h"
 #include "mjsense/core/pose.h"
 #include "mjsense/core/sensor.h"
+#include "mjsense/episode/active_worlds.h"
 #include "mjsense/robots/robot.h"
+#include "mjsense/robots/scene_robot.h"
 #include "mjsense/scene/scene.h"
 
 namespace mjsense {
 
 class GraspScene;
 class Policy;
+class SensorSuite;
+class Simulation;
 
 struct TaskCfg {
-  RobotCfg robot;
+  RobotCfg robot;  // without a name: the task's scene has its own, if any
   std::uint64_t seed = 0;
   int horizon = 500;      // control steps after which an episode is truncated
   int policy_dt_ms = 66;  // one control step
@@ -55,8 +62,10 @@ struct TaskObject {
 // One observation's judgement.
 struct Evaluation {
   double reward = 0;
-  bool success = false;    // momentary, not latched
-  bool terminal = false;   // done action received, or success with terminate_upon_success
+  bool success = false;  // momentary, not latched
+  // The task says that the episode is over, the policy has said done, or success with
+  // terminate_upon_success.
+  bool terminal = false;
   bool truncated = false;  // the horizon is reached
 };
 
@@ -80,8 +89,25 @@ class Task {
   int decimation() const { return cfg_.policy_dt_ms / cfg_.sim_dt_ms; }
   double fps() const { return 1000.0 / cfg_.policy_dt_ms; }
 
-  virtual SceneCfg scene_cfg() const = 0;  // the caller appends sensors
+  // Everything but the robot of cfg(); the caller appends sensors. The robot stands where an entity
+  // "robot_0" without a model keeps its place among the others, else last.
+  virtual SceneCfg scene_cfg() const = 0;
+  // With the robot, and the timestep of cfg().
+  SceneCfg whole_scene_cfg() const;
+  // The entity of scene_cfg() that is the robot where cfg() names none; "": whatever has actuators.
+  virtual std::string robot_entity() const { return "robot_0"; }
+  // Patterns of the names of its actuators by move group, for such a robot; none: one group of all.
+  virtual ActuatorGroups robot_groups() const { return {}; }
+  // Cameras of the scene that an episode records, besides the robot's; full names.
+  virtual std::vector<CameraMount> cameras() const { return {}; }
+  // Keyframe from which episodes start before sample(); -1: the model's defaults.
+  virtual int start_key() const { return -1; }
+
+  // The worlds in which it is played. Called before initialize(), by those who have a simulation.
+  virtual void bind(const std::shared_ptr<Simulation>& /*simulation*/) {}
   void initialize(const mjModel* model, int num_worlds);
+  // From here on episodes are those of this seed.
+  void reseed(std::uint64_t seed) { cfg_.seed = seed; }
   const mjModel* model() const { return model_; }
   int num_worlds() const { return num_worlds_; }
   Robot& robot() { return *robot_; }
@@ -103,6 +129,15 @@ class Task {
   // episode, step).
   void apply(const World& world, const Action& action, const StateRow& state);
   virtual Evaluation evaluate(const World& world) const = 0;
+
+  // --- all active worlds at once, on the caller's thread
+  virtual void begin_all(ActiveWorlds& worlds);
+  // The actions are applied; the worlds are about to move.
+  virtual void advance() {}
+  // Fills the evaluations of the active worlds; `out` has one for every world there is.
+  virtual void evaluate_all(ActiveWorlds& worlds, std::span<Evaluation> out);
+  // True: write_info() is made of what evaluate_all() found, and is asked after it.
+  virtual bool info_follows_evaluation() const { return false; }
 
   std::int64_t episode(int world) const { return episodes_[world].number; }
   int episode_step(int world) const { return episodes_[world].step; }
@@ -135,18 +170,22 @@ class Task {
   // Sensors beyond the core that this task records (obj_start, grasp_state_*, obj_end). They refer
   // to this task.
   virtual std::vector<std::shared_ptr<Sensor>> create_task_sensors() const = 0;
+  // The whole suite before it is bound: a task may take sensors out, or put them in another order.
+  virtual void edit_suite(SensorSuite& /*suite*/) const {}
 
  protected:
   virtual void initialize_task() = 0;  // model() and robot() are there
-  // Writes everything except the robot's joints; returns where the robot's base stands.
-  virtual Pose sample_scene(int world, Rng& rng, const StateRow& state) = 0;
+  // Writes everything except the joints of cfg()'s robot; returns where the robot's base stands,
+  // nothing for where the model has it.
+  virtual std::optional<Pose> sample_scene(int world, Rng& rng, const StateRow& state) = 0;
   // Further members of obs_scene with text values, in this order.
   virtual std::vector<std::pair<std::string, std::string>> scene_info(int world) const {
     (void)world;
     return {};
   }
-  // terminal and truncated of an observation with this success.
-  Evaluation judge(int world, double reward, bool success) const;
+  // terminal and truncated of an observation with this success; `over`: the episode is, for a
+  // reason of the task's.
+  Evaluation judge(int world, double reward, bool success, bool over = false) const;
 
  private:
   struct Episode {

@@ -3,6 +3,8 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
+
 #include "mjsense/core/error.h"
 #include "mjsense/sim/simulation.h"
 
@@ -21,6 +23,23 @@ void SensorSuite::add(std::shared_ptr<Sensor> sensor, std::string_view owner) {
 
 void SensorSuite::extend(std::span<const std::shared_ptr<Sensor>> sensors, std::string_view owner) {
   for (const auto& sensor : sensors) add(sensor, owner);
+}
+
+void SensorSuite::select(std::span<const std::string> names) {
+  if (simulation_) throw ValueError("a suite that is bound to a simulation cannot be changed");
+  std::vector<std::shared_ptr<Sensor>> sensors;
+  std::vector<std::string> owners;
+  for (const std::string& name : names) {
+    const int i = index(name);
+    if (i < 0) throw_unknown("suite", "sensor", name, this->names());
+    if (std::ranges::find(sensors, sensors_[i]) != sensors.end()) {
+      throw ValueError(fmt::format("suite: sensor '{}' is given twice", name));
+    }
+    sensors.push_back(sensors_[i]);
+    owners.push_back(owners_[i]);
+  }
+  sensors_ = std::move(sensors);
+  owners_ = std::move(owners);
 }
 
 int SensorSuite::index(std::string_view name) const {

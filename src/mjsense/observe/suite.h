@@ -26,6 +26,10 @@ class SensorSuite {
   // In order; the first clash throws, those before it stay added.
   void extend(std::span<const std::shared_ptr<Sensor>> sensors, std::string_view owner = "");
 
+  // Keeps these alone, in this order. Throws KeyError for an unknown name, ValueError for one given
+  // twice or once the suite is bound.
+  void select(std::span<const std::string> names);
+
   std::span<const std::shared_ptr<Sensor>> sensors() const { return sensors_; }
   std::size_t size() const { return sensors_.size(); }
   std::vector<std::string> names() const;

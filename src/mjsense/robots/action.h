@@ -13,7 +13,7 @@ namespace mjsense {
 
 // Values of one move group: joint positions, or the commands of its actuators.
 struct GroupValues {
-  static constexpr int kMaxSize = 8;
+  static constexpr int kMaxSize = 32;
   std::array<double, kMaxSize> values{};
   int size = 0;
   bool given = false;  // false: the policy says nothing about this group, its controller holds

@@ -203,6 +203,7 @@ void Robot::write_start(const StateRow& state, const Pose& base, Rng& rng) const
       state.qpos[group.qpos[i]] = q;
       state.qvel[group.dofs[i]] = 0;
     }
+    if (group.kind == GroupKind::kActuators) continue;  // as the scene has them
     for (std::size_t i = 0; i < group.actuators.size(); ++i) {
       state.ctrl[group.actuators[i]] =
           group.kind == GroupKind::kGripper ? group.open_command : state.qpos[group.qpos[i]];
@@ -214,9 +215,10 @@ void Robot::hold(const World& world, int g, GroupValues& out) const {
   const MoveGroup& group = groups_[g];
   out.size = static_cast<int>(group.actuators.size());
   for (int i = 0; i < out.size; ++i) {
-    const double value = group.kind != GroupKind::kGripper ? world.data->qpos[group.qpos[i]]
-                         : is_open(world, g)               ? group.open_command
-                                                           : group.closed_command;
+    const double value = group.kind == GroupKind::kActuators ? world.data->ctrl[group.actuators[i]]
+                         : group.kind != GroupKind::kGripper ? world.data->qpos[group.qpos[i]]
+                         : is_open(world, g)                 ? group.open_command
+                                                             : group.closed_command;
     out.values[i] = std::clamp(value, group.ctrl_low[i], group.ctrl_high[i]);
   }
   out.given = false;

@@ -14,7 +14,8 @@
 
 namespace mjsense {
 
-enum class GroupKind { kBase, kArm, kGripper };
+// kActuators: whatever they drive; without a command they stay as they are.
+enum class GroupKind { kBase, kArm, kGripper, kActuators };
 
 // Names are local to the robot's MJCF, without the "robot_0/" prefix.
 struct MoveGroupCfg {

@@ -11,12 +11,9 @@
 namespace mjsense {
 namespace {
 
-// True at an observation after which the episode is over by the policy's word or by success; a
-// time-out is not.
-bool terminal(const Task& task, const World& world) {
-  return task.done_received(world.id) ||
-         (task.cfg().terminate_upon_success && task.evaluate(world).success);
-}
+// True at an observation after which the episode is over by the policy's word; by the task's, see
+// blank_actions(). A time-out is neither.
+bool terminal(const Task& task, const World& world) { return task.done_received(world.id); }
 
 // Numbers of the robot's groups: fields `<group>`, then `given/<group>`.
 template <class T>
@@ -230,6 +227,21 @@ std::vector<std::shared_ptr<Sensor>> action_sensors(const Task& task, const Acti
           std::make_shared<JointPosRel>("actions/joint_pos_rel", task, log),
           std::make_shared<EeTwist>("actions/ee_twist", task, log),
           std::make_shared<EePose>("actions/ee_pose", task, log)};
+}
+
+void blank_actions(SensorSuite& suite, int world, bool first) {
+  for (const char* name :
+       {"actions/joint_pos", "actions/ee_pose", "actions/joint_pos_rel", "actions/ee_twist"}) {
+    if (first && (name == std::string_view("actions/joint_pos_rel") ||
+                  name == std::string_view("actions/ee_twist"))) {
+      continue;  // zeros, and shown as such
+    }
+    Sensor* sensor = suite.find(name);
+    if (!sensor) continue;
+    for (Field& field : sensor->fields()) {
+      std::fill_n(field.data.row_data(world), field.data.row_bytes(), std::byte{0});
+    }
+  }
 }
 
 }  // namespace mjsense

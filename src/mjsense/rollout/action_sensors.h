@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "mjsense/episode/task.h"
+#include "mjsense/observe/suite.h"
 #include "mjsense/rollout/action_log.h"
 
 namespace mjsense {
@@ -31,5 +32,9 @@ namespace mjsense {
 //
 // They refer to the task and the log, which live longer.
 std::vector<std::shared_ptr<Sensor>> action_sensors(const Task& task, const ActionLog& log);
+
+// Empties the rows of this world that show nothing at a terminal observation: the judgement comes
+// after the sensors. `first`: no action was taken yet.
+void blank_actions(SensorSuite& suite, int world, bool first);
 
 }  // namespace mjsense

@@ -73,7 +73,9 @@ SensorSuite core_suite(const Task& task, const ActionLog& log,
                   write_pose(robot.base_pose(world), row.data());
                 }),
             of_task);
-  const char* base = mj_id2name(task.model(), mjOBJ_BODY, robot.base_body());
+  // Everything hangs below the world: it is no part of a robot.
+  const char* base =
+      robot.base_body() > 0 ? mj_id2name(task.model(), mjOBJ_BODY, robot.base_body()) : nullptr;
   const std::string& articulation = cfg.env_state_name.empty() ? cfg.name : cfg.env_state_name;
   suite.add(std::make_shared<EnvStatesSensor>("env_states", articulation, robot.joint_groups(),
                                               cfg.env_state_size, base ? base : ""),

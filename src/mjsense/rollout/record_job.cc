@@ -46,6 +46,11 @@ std::string settings_of(const RecordJobCfg& job, Rollout& rollout) {
   };
   entries["horizon"] = [&](JsonWriter& json) { json.value(task.horizon); };
   entries["policy_dt_ms"] = [&](JsonWriter& json) { json.value(task.policy_dt_ms); };
+  // Only where they are not what they always were: files of before stay what they are.
+  entries.erase("terminate_upon_success");
+  entries.erase("use_sensors");
+  if (job.rollout.terminate_upon_success)
+    entries["terminate_upon_success"] = [](JsonWriter& json) { json.value(true); };
   // Sizes that change with the scene and with what robots are drawn with.
   entries["model"] = [&](JsonWriter& json) {
     const mjModel* m = rollout.task().model();
@@ -132,7 +137,9 @@ class RecordJob {
   // No more worlds than episodes.
   static RecordJobCfg checked(RecordJobCfg cfg) {
     check_fields(cfg, "");
-    if (cfg.rollout.policy.empty()) {
+    if (!cfg.rollout.use_sensors)
+      throw ValueError("record needs the sensors: use_sensors must be true");
+    if (cfg.rollout.policy.empty() && !cfg.rollout.make_policy) {
       throw ValueError(fmt::format("record needs a policy{}", suggest("", policy_names())));
     }
     cfg.rollout.num_worlds = std::min(cfg.rollout.num_worlds, cfg.episodes);

@@ -1,6 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "mjsense/rollout/registry.h"
 
+#include <fmt/format.h>
+
+#include <mutex>
+
 #include "mjsense/core/error.h"
 #include "mjsense/policies/planner/pick_planner.h"
 #include "mjsense/robots/franka/franka.h"
@@ -9,56 +13,88 @@
 namespace mjsense {
 namespace {
 
-template <class Make>
-struct Entry {
-  const char* name;
-  Make* make;
+// Things of one kind by name; `group` and `kind` are for messages: "tasks", "task".
+template <class Factory>
+class Registry {
+ public:
+  struct Entry {
+    std::string name;
+    Factory make;
+  };
+  Registry(const char* group, const char* kind, std::vector<Entry> ours)
+      : group_(group), kind_(kind), entries_(std::move(ours)) {}
+
+  std::vector<std::string> names() const {
+    const std::lock_guard lock(mutex_);
+    return names_of(entries_);
+  }
+  Factory at(std::string_view name) const {
+    const std::lock_guard lock(mutex_);
+    for (const Entry& entry : entries_) {
+      if (name == entry.name) return entry.make;
+    }
+    throw_unknown(group_, kind_, name, names_of(entries_));
+  }
+  void add(std::string name, Factory make) {
+    if (name.empty()) throw ValueError(fmt::format("a {} needs a name", kind_));
+    const std::lock_guard lock(mutex_);
+    for (const Entry& entry : entries_) {
+      if (name == entry.name)
+        throw ValueError(fmt::format("there is a {} called '{}' already", kind_, name));
+    }
+    entries_.push_back({std::move(name), std::move(make)});
+  }
+
+ private:
+  static std::vector<std::string> names_of(const std::vector<Entry>& entries) {
+    std::vector<std::string> names;
+    for (const Entry& entry : entries) names.push_back(entry.name);
+    return names;
+  }
+
+  const char *group_, *kind_;
+  mutable std::mutex mutex_;
+  std::vector<Entry> entries_;
 };
 
-constexpr Entry<RobotCfg()> kRobots[] = {
-    {"franka", franka_cfg},
-};
-
-constexpr Entry<std::unique_ptr<Task>(TaskCfg)> kTasks[] = {
-    {"pick",
-     [](TaskCfg c) -> std::unique_ptr<Task> { return std::make_unique<PickTask>(std::move(c)); }},
-};
-
-constexpr Entry<std::unique_ptr<Policy>()> kPolicies[] = {
-    {"planner", []() -> std::unique_ptr<Policy> { return std::make_unique<PickPlanner>(); }},
-};
-
-template <class Make, std::size_t N>
-std::vector<std::string> names_of(const Entry<Make> (&entries)[N]) {
-  std::vector<std::string> names;
-  for (const Entry<Make>& entry : entries) names.emplace_back(entry.name);
-  return names;
+Registry<std::function<RobotCfg()>>& robots() {
+  static Registry<std::function<RobotCfg()>> all("robots", "robot", {{"franka", franka_cfg}});
+  return all;
 }
 
-// `group` and `kind` are for the message: "robots", "robot".
-template <class Make, std::size_t N>
-Make* look_up(const Entry<Make> (&entries)[N], const char* group, const char* kind,
-              std::string_view name) {
-  for (const Entry<Make>& entry : entries) {
-    if (name == entry.name) return entry.make;
-  }
-  throw_unknown(group, kind, name, names_of(entries));
+Registry<TaskFactory>& tasks() {
+  static Registry<TaskFactory> all(
+      "tasks", "task",
+      {{"pick", [](TaskCfg c) { return std::make_unique<PickTask>(std::move(c)); }}});
+  return all;
+}
+
+Registry<PolicyFactory>& policies() {
+  static Registry<PolicyFactory> all("policies", "policy",
+                                     {{"planner", [] { return std::make_unique<PickPlanner>(); }}});
+  return all;
 }
 
 }  // namespace
 
-std::vector<std::string> robot_names() { return names_of(kRobots); }
-std::vector<std::string> task_names() { return names_of(kTasks); }
-std::vector<std::string> policy_names() { return names_of(kPolicies); }
+std::vector<std::string> robot_names() { return robots().names(); }
+std::vector<std::string> task_names() { return tasks().names(); }
+std::vector<std::string> policy_names() { return policies().names(); }
 
-RobotCfg robot_cfg(std::string_view name) { return look_up(kRobots, "robots", "robot", name)(); }
+RobotCfg robot_cfg(std::string_view name) { return robots().at(name)(); }
 
 std::unique_ptr<Task> make_task(std::string_view name, TaskCfg cfg) {
-  return look_up(kTasks, "tasks", "task", name)(std::move(cfg));
+  return tasks().at(name)(std::move(cfg));
 }
 
-std::unique_ptr<Policy> make_policy(std::string_view name) {
-  return look_up(kPolicies, "policies", "policy", name)();
+std::unique_ptr<Policy> make_policy(std::string_view name) { return policies().at(name)(); }
+
+void register_task(std::string name, TaskFactory make) {
+  tasks().add(std::move(name), std::move(make));
+}
+
+void register_policy(std::string name, PolicyFactory make) {
+  policies().add(std::move(name), std::move(make));
 }
 
 }  // namespace mjsense

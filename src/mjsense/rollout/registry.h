@@ -1,8 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 // The robots, tasks and policies that have a name: what the program's options and Python's strings
-// choose from. Each make throws KeyError with the nearest names.
+// choose from. Yours join them by register_task() and register_policy(). Each make throws KeyError
+// with the nearest names.
 
+#include <functional>
 #include <memory>
 #include <string>
 #include <string_view>
@@ -13,13 +15,20 @@
 
 namespace mjsense {
 
+using TaskFactory = std::function<std::unique_ptr<Task>(TaskCfg)>;
+using PolicyFactory = std::function<std::unique_ptr<Policy>()>;
+
 std::vector<std::string> robot_names();
 RobotCfg robot_cfg(std::string_view name);
 
+// Ours first, then yours in the order in which they came.
 std::vector<std::string> task_names();
 std::unique_ptr<Task> make_task(std::string_view name, TaskCfg cfg);
+// Throws ValueError for a name that is taken, or empty. Any thread may call it.
+void register_task(std::string name, TaskFactory make);
 
 std::vector<std::string> policy_names();
 std::unique_ptr<Policy> make_policy(std::string_view name);
+void register_policy(std::string name, PolicyFactory make);
 
 }  // namespace mjsense

@@ -9,7 +9,7 @@
 
 #include "mjsense/core/error.h"
 #include "mjsense/observe/json_sensor.h"
-#include "mjsense/rollout/registry.h"
+#include "mjsense/rollout/action_sensors.h"
 #include "mjsense/sensors/camera/camera_sensor_cfg.h"
 
 namespace mjsense {
@@ -23,27 +23,35 @@ double since(Clock::time_point start) {
 
 TaskCfg task_cfg(const RolloutCfg& cfg) {
   TaskCfg out;
-  out.robot = robot_cfg(cfg.robot);
+  if (!cfg.robot.empty()) out.robot = robot_cfg(cfg.robot);
   out.seed = cfg.seed;
   out.action_noise = cfg.action_noise;
+  out.terminate_upon_success = cfg.terminate_upon_success;
   if (cfg.horizon) out.horizon = *cfg.horizon;
   return out;
 }
 
-std::vector<RecordedCamera> chosen_cameras(const RobotCfg& robot, const RolloutCfg& cfg) {
+// The robot's, then the task's.
+std::vector<RecordedCamera> chosen_cameras(const Task& task, const RolloutCfg& cfg) {
+  const RobotCfg& robot = task.cfg().robot;
+  std::vector<CameraMount> mounts = robot.cameras;
+  for (CameraMount& mount : mounts) mount.mjcf_camera.insert(0, Robot::kPrefix);
+  for (CameraMount& mount : task.cameras()) mounts.push_back(std::move(mount));
   std::vector<std::string> names;
-  for (const CameraMount& mount : robot.cameras) names.push_back(mount.name);
+  for (const CameraMount& mount : mounts) names.push_back(mount.name);
   std::vector<RecordedCamera> cameras;
   for (const std::string& name : cfg.cameras.value_or(names)) {
-    const auto mount = std::ranges::find(robot.cameras, name, &CameraMount::name);
-    if (mount == robot.cameras.end()) {
-      throw_unknown(fmt::format("robot '{}'", robot.name), "camera", name, names);
+    const auto mount = std::ranges::find(mounts, name, &CameraMount::name);
+    if (mount == mounts.end()) {
+      throw_unknown(robot.name.empty() ? fmt::format("task '{}'", task.name())
+                                       : fmt::format("robot '{}'", robot.name),
+                    "camera", name, names);
     }
     if (std::ranges::find(cameras, name, &RecordedCamera::name) != cameras.end()) {
       throw ValueError(fmt::format("camera '{}' is given twice", name));
     }
     cameras.push_back({.name = name,
-                       .mjcf_camera = std::string(Robot::kPrefix) + mount->mjcf_camera,
+                       .mjcf_camera = mount->mjcf_camera,
                        .width = cfg.width.value_or(robot.image_width),
                        .height = cfg.height.value_or(robot.image_height),
                        .depth = cfg.depth || mount->record_depth,
@@ -79,37 +87,77 @@ class Rollout::EachActive final : public WorldHooks {
   std::function<void(const World&)> body_;
 };
 
-Rollout::Rollout(const RolloutCfg& cfg) : cfg_(cfg) {
-  check_fields(cfg, "");
-  task_ = make_task(cfg.task, task_cfg(cfg));
-  if (!cfg.policy.empty()) policy_ = make_policy(cfg.policy);
-  cameras_ = chosen_cameras(task_->cfg().robot, cfg);
+// Some of the worlds, for tasks and policies.
+class Rollout::Some final : public ActiveWorlds {
+ public:
+  Some(Rollout& rollout, std::span<const int> ids) : rollout_(rollout), ids_(ids) {}
+  std::span<const int> ids() const override { return ids_; }
+  void for_each(std::function<void(const World&)> body) override {
+    rollout_.for_each(ids_, std::move(body));
+  }
 
-  SceneCfg scene_cfg = task_->scene_cfg();
+ private:
+  Rollout& rollout_;
+  std::span<const int> ids_;
+};
+
+Rollout::Rollout(const RolloutCfg& cfg) : cfg_(cfg) {
+  check_fields(cfg_, "");
+  task_ = cfg_.make_task ? cfg_.make_task(task_cfg(cfg_)) : make_task(cfg_.task, task_cfg(cfg_));
+  if (cfg_.make_policy) {
+    policy_ = cfg_.make_policy();
+  } else if (!cfg_.policy.empty()) {
+    policy_ = make_policy(cfg_.policy);
+  }
+  make();
+}
+
+Rollout::Rollout(RolloutCfg cfg, std::shared_ptr<Task> task, std::shared_ptr<Policy> policy)
+    : cfg_(std::move(cfg)), task_(std::move(task)), policy_(std::move(policy)) {
+  const TaskCfg& own = task_->cfg();
+  cfg_.task = task_->name();
+  cfg_.robot = own.robot.name;
+  cfg_.policy = policy_ ? policy_->name() : "";
+  cfg_.seed = own.seed;
+  cfg_.horizon = own.horizon;
+  cfg_.action_noise = own.action_noise;
+  cfg_.terminate_upon_success = own.terminate_upon_success;
+  check_fields(cfg_, "");
+  make();
+}
+
+void Rollout::make() {
+  cameras_ = chosen_cameras(*task_, cfg_);
+  SceneCfg scene_cfg = task_->whole_scene_cfg();
   for (const RecordedCamera& camera : cameras_) {
-    scene_cfg.sensors.push_back(std::make_shared<CameraSensorCfg>(camera_cfg(camera, cfg)));
+    scene_cfg.sensors.push_back(std::make_shared<CameraSensorCfg>(camera_cfg(camera, cfg_)));
   }
   auto scene = std::make_shared<Scene>(std::move(scene_cfg));
-  simulation_ = std::make_shared<Simulation>(scene, SimulationCfg{.num_worlds = cfg.num_worlds,
+  simulation_ = std::make_shared<Simulation>(scene, SimulationCfg{.num_worlds = cfg_.num_worlds,
                                                                   .decimation = task_->decimation(),
-                                                                  .threads = cfg.threads,
-                                                                  .seed = cfg.seed});
+                                                                  .threads = cfg_.threads,
+                                                                  .seed = cfg_.seed});
   simulation_->measure_cost(true);
   for (RecordedCamera& camera : cameras_) camera.sensor = &scene->sensor(camera.name);
-  task_->initialize(scene->model(), cfg.num_worlds);
+  task_->bind(simulation_);
+  if (policy_) policy_->bind(simulation_);
+  task_->initialize(scene->model(), cfg_.num_worlds);
   if (policy_) task_->register_policy(*policy_);
-  log_ = std::make_unique<ActionLog>(cfg.num_worlds);
-  suite_ = core_suite(*task_, *log_, cameras_);
-  if (cfg.more_sensors) suite_.extend(cfg.more_sensors(simulation_), "the caller");
+  log_ = std::make_unique<ActionLog>(cfg_.num_worlds);
+  if (cfg_.use_sensors) suite_ = core_suite(*task_, *log_, cameras_);
+  if (cfg_.more_sensors) suite_.extend(cfg_.more_sensors(*this), "the caller");
+  if (cfg_.use_sensors) task_->edit_suite(suite_);
   suite_.bind(*simulation_);
 
-  actions_.resize(cfg.num_worlds);
-  evaluations_.resize(cfg.num_worlds);
-  faults_.resize(cfg.num_worlds);
-  active_.assign(cfg.num_worlds, 0);
-  refused_.assign(cfg.num_worlds, 0);
-  for (int w = 0; w < cfg.num_worlds; ++w) rows_.push_back(state_row(simulation_->worlds(), w));
-  ids_.reserve(cfg.num_worlds);
+  actions_.resize(cfg_.num_worlds);
+  evaluations_.resize(cfg_.num_worlds);
+  faults_.resize(cfg_.num_worlds);
+  active_.assign(cfg_.num_worlds, 0);
+  refused_.assign(cfg_.num_worlds, 0);
+  for (int w = 0; w < cfg_.num_worlds; ++w) rows_.push_back(state_row(simulation_->worlds(), w));
+  ids_.reserve(cfg_.num_worlds);
+  moving_.reserve(cfg_.num_worlds);
+  if (cfg_.made) cfg_.made(*this);
 }
 
 Rollout::~Rollout() = default;
@@ -135,6 +183,13 @@ void Rollout::take_failures() {
   for (const Failure& failure : simulation_->failures()) set_fault(failure.world, failure.message);
 }
 
+void Rollout::reseed(std::uint64_t seed) {
+  std::ranges::fill(active_, 0);
+  cfg_.seed = seed;
+  task_->reseed(seed);
+  simulation_->seed(seed);
+}
+
 void Rollout::start(std::span<const int> worlds, std::span<const std::int64_t> episodes) {
   if (worlds.size() != episodes.size()) {
     throw ValueError(
@@ -151,50 +206,97 @@ void Rollout::start(std::span<const int> worlds, std::span<const std::int64_t> e
     actions_[w] = Action{};
     simulation_->worlds().rekey(w, static_cast<std::uint32_t>(episodes[k]));
   }
-  simulation_->reset(sorted);
+  simulation_->reset(sorted, task_->start_key());
   for (std::size_t k = 0; k < worlds.size(); ++k) {
     task_->sample(worlds[k], episodes[k], rows_[worlds[k]]);
     log_->begin(worlds[k]);
   }
   simulation_->forward(sorted);
   take_failures();
-  for_each(sorted, [this](const World& world) {
-    task_->begin(world);
-    if (policy_) policy_->reset(world);
-  });
+  Some begins(*this, sorted);
+  task_->begin_all(begins);
+  if (policy_) policy_->reset_all(begins);
   times_.reset += since(begun);
-  observe();
+  sense();
+  moving_.assign(sorted.begin(), sorted.end());
+  std::erase_if(moving_, [this](int w) { return !faults_[w].empty(); });
+  evaluate(moving_);
+  finish_rows();
 }
 
 void Rollout::act() {
   if (!policy_) throw ValueError("this rollout has no policy: write action(world) before step()");
   const auto begun = Clock::now();
-  for_each(active_worlds(), [this](const World& world) {
-    actions_[world.id] = Action{};
-    policy_->act(world, actions_[world.id]);
-  });
+  for (int w : active_worlds()) actions_[w] = Action{};
+  if (!ids_.empty()) {
+    Some worlds(*this, ids_);
+    policy_->act_all(worlds, actions_);
+  }
   times_.policy += since(begun);
 }
 
-void Rollout::step() {
-  if (active_worlds().empty()) return;
+// Applies the actions of these worlds and moves them. `answers`: the actions answer the observation
+// that there is.
+void Rollout::move(std::span<const int> worlds, bool answers) {
   auto begun = Clock::now();
-  for_each(ids_, [this](const World& world) {
-    log_->remember(world, task_->robot());
-    task_->apply(world, actions_[world.id], rows_[world.id]);
-  });
+  if (answers) {
+    for_each(worlds, [this](const World& world) {
+      log_->remember(world, task_->robot());
+      task_->apply(world, actions_[world.id], rows_[world.id]);
+    });
+  } else {
+    for_each(worlds, [this](const World& world) {
+      task_->apply(world, actions_[world.id], rows_[world.id]);
+    });
+  }
+  task_->advance();
   times_.policy += since(begun);
 
   begun = Clock::now();
   const double rows = row_cost(), cast = cast_cost();
-  guard_rows([this] { simulation_->step(1, ids_); });
+  guard_rows([this, &worlds] { simulation_->step(1, worlds); });
   take_failures();
   const double spent_rows = (row_cost() - rows) / threads();
   const double spent_cast = cast_cost() - cast;
   times_.sensing += spent_rows;
   times_.rendering += spent_cast;
   times_.physics += since(begun) - spent_rows - spent_cast;
-  observe();
+}
+
+void Rollout::step() {
+  if (active_worlds().empty()) return;
+  move(ids_, true);
+  sense();
+  evaluate(ids_);
+  finish_rows();
+}
+
+void Rollout::step_chunk(std::span<const Action> actions, bool stop_on_success) {
+  const auto B = static_cast<std::size_t>(num_worlds());
+  if (actions.empty() || actions.size() % B != 0) {
+    throw ValueError(fmt::format("step_chunk: {} actions are not one or more for each of {} worlds",
+                                 actions.size(), B));
+  }
+  const std::size_t steps = actions.size() / B;
+  std::vector<double> reward(B);
+  const auto goes_on = [&](int w) {
+    const Evaluation& now = evaluations_[w];
+    return active_[w] && faults_[w].empty() && !now.terminal && !now.truncated &&
+           !(stop_on_success && now.success);
+  };
+  moving_.assign(active_worlds().begin(), active_worlds().end());
+  for (std::size_t k = 0; k < steps && !moving_.empty(); ++k) {
+    for (int w : moving_) actions_[w] = actions[k * B + w];
+    move(moving_, k == 0);
+    std::erase_if(moving_, [&](int w) { return !faults_[w].empty(); });
+    if (moving_.empty()) break;
+    evaluate(moving_);
+    for (int w : moving_) reward[w] += evaluations_[w].reward;
+    std::erase_if(moving_, [&](int w) { return !goes_on(w); });
+  }
+  for (int w : active_worlds()) evaluations_[w].reward = reward[w];
+  sense();
+  finish_rows();
 }
 
 // A row that does not fit ends the episode of its world alone.
@@ -210,15 +312,36 @@ bool Rollout::guard_rows(const std::function<void()>& body) {
   }
 }
 
-void Rollout::observe() {
+void Rollout::sense() {
   const auto begun = Clock::now();
   const double cast = cast_cost();
   while (!active_worlds().empty() && !guard_rows([this] { suite_.refresh(ids_); })) {
   }
-  for_each(ids_, [this](const World& world) { evaluations_[world.id] = task_->evaluate(world); });
   const double spent_cast = cast_cost() - cast;
   times_.rendering += spent_cast;
   times_.sensing += since(begun) - spent_cast;
+}
+
+// Each world once an observation: a task may remember what it judged.
+void Rollout::evaluate(std::span<const int> worlds) {
+  if (worlds.empty()) return;
+  const auto begun = Clock::now();
+  Some some(*this, worlds);
+  task_->evaluate_all(some, evaluations_);
+  times_.sensing += since(begun);
+}
+
+// Rows that depend on the judgement, which is made after the sensors.
+void Rollout::finish_rows() {
+  for (int w : ids_) {
+    if (evaluations_[w].terminal) blank_actions(suite_, w, !(*log_)[w].given);
+  }
+  Sensor* info = task_->info_follows_evaluation() ? suite_.find("task_info") : nullptr;
+  if (!info) return;
+  while (!active_worlds().empty() && !guard_rows([this, info] {
+    for_each(ids_, [info](const World& world) { info->compute(world); });
+  })) {
+  }
 }
 
 double Rollout::row_cost() const {

@@ -8,6 +8,7 @@
 //   while (...) {
 //     rollout.act();                   the policy's actions; or write rollout.action(w) yourself
 //     rollout.step();                  apply -> controllers -> physics -> sensors -> judgement
+//                                      or step_chunk(actions): several, sensors after the last
 //     rollout.suite(), rollout.evaluation(w), rollout.fault(w)
 //   }
 //
@@ -28,9 +29,12 @@
 #include "mjsense/observe/suite.h"
 #include "mjsense/rollout/action_log.h"
 #include "mjsense/rollout/core_suite.h"
+#include "mjsense/rollout/registry.h"
 #include "mjsense/sim/simulation.h"
 
 namespace mjsense {
+
+class Rollout;
 
 struct RolloutCfg {
   std::string task = "pick";
@@ -46,15 +50,23 @@ struct RolloutCfg {
   bool shadows = true;
   std::optional<int> horizon;
   bool action_noise = true;
-  // Makes further sensors for the suite, recorded like the others.
-  std::function<std::vector<std::shared_ptr<Sensor>>(const std::shared_ptr<Simulation>&)>
-      more_sensors;
+  bool terminate_upon_success = false;
+  bool use_sensors = true;
+  // Make the task and the policy instead of the registered ones; `task` and `policy` above are then
+  // what people read.
+  TaskFactory make_task;
+  PolicyFactory make_policy;
+  // Makes further sensors for the suite, recorded like the others. The rollout is being made: task,
+  // policy, simulation, cameras and the suite so far are there.
+  std::function<std::vector<std::shared_ptr<Sensor>>(Rollout&)> more_sensors;
+  // Called once everything is there.
+  std::function<void(Rollout&)> made;
 };
 template <class V>
 void visit_fields(V& v, RolloutCfg& c) {
   v.object("RolloutCfg", "Worlds that play episodes of a task.");
   v("task", c.task, "Which task.").decides_data();
-  v("robot", c.robot, "Which robot.").decides_data();
+  v("robot", c.robot, "Which robot; none for a task whose scene has its own.").decides_data();
   v("policy", c.policy, "What drives it.").decides_data();
   v("num_worlds", c.num_worlds, "How many run at one time.").option("worlds").at_least(1);
   v("threads", c.threads, "Of the simulation; 0: every CPU this process may use.").at_least(0);
@@ -79,6 +91,12 @@ void visit_fields(V& v, RolloutCfg& c) {
   v("action_noise", c.action_noise, "Commands reach the arm with noise.")
       .option("noise")
       .decides_data();
+  v("terminate_upon_success", c.terminate_upon_success, "An episode ends at its first success.")
+      .decides_data_as("terminate_upon_success");
+  v("use_sensors", c.use_sensors,
+    "Task, robot and policy bring their sensors; without them only those that are given.")
+      .decides_data_as("use_sensors")
+      .hidden();
 }
 
 // Where the time of steps went, wall seconds.
@@ -94,6 +112,8 @@ class Rollout {
  public:
   // Throws KeyError for an unknown task, robot, policy or camera, ValueError for bad sizes.
   explicit Rollout(const RolloutCfg& cfg);
+  // Of a task and a policy (or null) that exist; robot, seed, horizon and noise are the task's own.
+  Rollout(RolloutCfg cfg, std::shared_ptr<Task> task, std::shared_ptr<Policy> policy);
   ~Rollout();
   Rollout(const Rollout&) = delete;
   Rollout& operator=(const Rollout&) = delete;
@@ -107,6 +127,8 @@ class Rollout {
   SensorSuite& suite() { return suite_; }
   const std::vector<RecordedCamera>& cameras() const { return cameras_; }
 
+  // Stops all worlds; episodes started from here on are those of this seed.
+  void reseed(std::uint64_t seed);
   // World worlds[k] plays episode episodes[k] from its start. Its faults are forgotten.
   void start(std::span<const int> worlds, std::span<const std::int64_t> episodes);
   // This world plays nothing until it is started again; it stands still.
@@ -119,6 +141,10 @@ class Rollout {
   Action& action(int world) { return actions_[world]; }
   // One control step; then suite and evaluations of the active worlds are current.
   void step();
+  // Control steps with these actions [steps, B], sensed after the last alone. A world stops early
+  // where its episode ends, or with its first success if `stop_on_success`; the evaluation is that
+  // of its last step, its reward the sum over all. Throws ValueError if there is no whole step.
+  void step_chunk(std::span<const Action> actions, bool stop_on_success = false);
 
   const Evaluation& evaluation(int world) const { return evaluations_[world]; }
   // Why this world's episode cannot go on: physics that diverged (MuJoCo's text), a row that does
@@ -131,10 +157,15 @@ class Rollout {
 
  private:
   class EachActive;
+  class Some;
+  void make();
   std::span<const int> active_worlds();
   void for_each(std::span<const int> worlds, std::function<void(const World&)> body);
+  void move(std::span<const int> worlds, bool answers);
+  void evaluate(std::span<const int> worlds);
+  void finish_rows();
   bool guard_rows(const std::function<void()>& body);
-  void observe();
+  void sense();
   void take_failures();
   void set_fault(int world, std::string text);
   double row_cost() const;
@@ -142,8 +173,8 @@ class Rollout {
   int threads() const;
 
   RolloutCfg cfg_;
-  std::unique_ptr<Task> task_;
-  std::unique_ptr<Policy> policy_;
+  std::shared_ptr<Task> task_;
+  std::shared_ptr<Policy> policy_;
   std::vector<RecordedCamera> cameras_;
   std::unique_ptr<ActionLog> log_;
   SensorSuite suite_;
@@ -154,6 +185,7 @@ class Rollout {
   std::vector<char> active_, refused_;
   std::vector<StateRow> rows_;  // [B]
   std::vector<int> ids_;        // scratch of active_worlds()
+  std::vector<int> moving_;     // scratch of start() and step_chunk()
   RolloutTimes times_;
 };
 

@@ -244,7 +244,7 @@ std::uint64_t hash(Rollout& rollout, int world) {
 
 // Hashes of the first observations of episodes 0 .. 4, played as worlds become free.
 std::map<std::int64_t, std::vector<std::uint64_t>> play(RolloutCfg cfg) {
-  cfg.more_sensors = [](const std::shared_ptr<Simulation>&) {  // one with noise
+  cfg.more_sensors = [](Rollout&) {  // one with noise
     return std::vector<std::shared_ptr<Sensor>>{std::make_shared<FunctionSensor<double>>(
         "noise", SensorSpec{}, [](const World& world, std::span<double> row) {
           row[0] = world.rng(stream_of("noise")).uniform();

@@ -20,7 +20,7 @@ struct Stage {
     cfg.robot = franka_cfg();
     cfg.action_noise = noise;
     task = std::make_unique<PickTask>(cfg);
-    scene = std::make_unique<Scene>(task->scene_cfg());
+    scene = std::make_unique<Scene>(task->whole_scene_cfg());
     task->initialize(scene->model(), 1);
     policy = std::make_unique<PickPlanner>();
     task->register_policy(*policy);

@@ -92,24 +92,19 @@ void add_look(mjSpec* spec) {
 
 SceneCfg PickTask::scene_cfg() const {
   SceneCfg scene;
-  EntityCfg room, robot;
+  EntityCfg room;
   room.model.path = "embedded:tasks/pick.xml";
-  robot.model = cfg().robot.model;
-  scene.entities = {{"room", room}, {"robot_0", robot}};
+  scene.entities = {{"room", room}, {"robot_0", {}}};  // a place for the robot
   for (const Kind& kind : kKinds) {
     EntityCfg object;
     object.model.path = fmt::format("embedded:objects/{}.xml", kind.name);
     scene.entities.emplace_back(kind.name, object);
   }
   scene.extent = 2.0;
-  scene.options.timestep = 0.001 * cfg().sim_dt_ms;
   // An elliptic cone with impratio above 1 keeps a held object from creeping out of the pads.
   scene.options.cone = "elliptic";
   scene.options.impratio = 10;
-  scene.spec_fn = [edit = cfg().robot.edit_spec](mjSpec* spec) {
-    add_look(spec);
-    if (edit) edit(spec, std::string(Robot::kPrefix));
-  };
+  scene.spec_fn = add_look;
   return scene;
 }
 
@@ -138,7 +133,7 @@ void PickTask::place(int object, const Pose& pose, const StateRow& state) const 
   std::fill(qvel, qvel + 6, 0.0);
 }
 
-Pose PickTask::sample_scene(int world, Rng& rng, const StateRow& state) {
+std::optional<Pose> PickTask::sample_scene(int world, Rng& rng, const StateRow& state) {
   const int n = static_cast<int>(objects_.size());
   const int target = static_cast<int>(rng.below(n));
   targets_[world].index = target;
@@ -185,7 +180,7 @@ Pose PickTask::sample_scene(int world, Rng& rng, const StateRow& state) {
     const Vec3 position{best.x, best.y, table_height_ - prints[object].low + kDrop};
     place(object, {position, axis_angle({0, 0, 1}, rng.uniform(-pi, pi)) * rest}, state);
   }
-  return {};
+  return Pose{};
 }
 
 void PickTask::begin(const World& world) {

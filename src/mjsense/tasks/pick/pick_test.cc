@@ -38,7 +38,7 @@ struct Pick : testing::Test {
   double* object_qpos() { return data->qpos + model->jnt_qposadr[model->body_jntadr[body()]]; }
 
   PickTask task{franka()};
-  Scene scene{task.scene_cfg()};
+  Scene scene{task.whole_scene_cfg()};
   const mjModel* model = scene.model();
   std::unique_ptr<mjData, DataDelete> data{mj_makeData(model)};
   World w;

@@ -1,0 +1,58 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "python/bindings/host.h"
+
+#include <nanobind/stl/string.h>
+
+#include "python/bindings/sensor_handle.h"
+
+namespace mjsense::python {
+
+Held::Held(nb::object object)
+    : object_(new nb::object(std::move(object)), [](nb::object* held) {
+        // What outlives the interpreter has nobody left to give it back to.
+        if (!nb::is_alive()) return;
+        nb::gil_scoped_acquire lock;
+        delete held;
+      }) {}
+
+void PythonHost::add_note(nb::python_error& error, const std::string& place) {
+  nb::object value = nb::borrow(error.value());
+  value.attr("add_note")("in " + place);
+}
+
+void PythonHost::set_scene(nb::object scene, nb::object alive) {
+  scene_ = Held(std::move(scene));
+  alive_ = Held(std::move(alive));
+}
+
+nb::object PythonHost::simulation(const std::shared_ptr<Simulation>& sim) {
+  if (!simulation_) {
+    core_ = new PySimulation(sim, turns_);
+    nb::object core = nb::cast(core_, nb::rv_policy::take_ownership);
+    simulation_ = Held(make_.get()(core, scene_ ? scene_.get() : nb::none()));
+  }
+  return nb::borrow(simulation_.get());
+}
+
+std::vector<std::shared_ptr<Sensor>> PythonHost::members(nb::handle sensors,
+                                                         const std::shared_ptr<Simulation>& sim) {
+  nb::object shown = simulation(sim);
+  std::vector<std::shared_ptr<Sensor>> made;
+  for (nb::handle object : sensors) {
+    auto sensor = std::make_shared<PythonSensor>(nb::cast<std::string>(object.attr("uuid")),
+                                                 WeakObject(object), read_python_spec(object));
+    sensor->on_initialized = [weak = std::weak_ptr<PythonSensor>(sensor), held = simulation_] {
+      auto self = weak.lock();
+      self->self().attr("_mjs_bind")(held.get(), SensorHandle{self});
+    };
+    core_->add_python(sensor);
+    made.push_back(sensor);
+  }
+  return made;
+}
+
+void PythonHost::close() {
+  if (simulation_) nb::borrow(simulation_.get()).attr("close")();
+}
+
+}  // namespace mjsense::python

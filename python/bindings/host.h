@@ -1,0 +1,78 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+// What a rollout has of Python's: its worlds there, and code of users that runs for it.
+
+#include <nanobind/nanobind.h>
+
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "mjsense/sim/simulation.h"
+#include "python/bindings/py_simulation.h"
+
+namespace mjsense::python {
+
+// A Python object that any thread may copy and destroy.
+class Held {
+ public:
+  Held() = default;
+  explicit Held(nb::object object);
+  nb::handle get() const { return object_ ? nb::handle(*object_) : nb::handle(); }
+  explicit operator bool() const { return object_ != nullptr; }
+
+ private:
+  std::shared_ptr<nb::object> object_;
+};
+
+// C++ calls it without the interpreter's lock, except where a function says that it needs it. A task
+// or a policy runs on the caller's thread, while the simulation counts as at work: it may read the
+// simulation and write its state, but not step or reset it.
+class PythonHost {
+ public:
+  explicit PythonHost(nb::object make_simulation) : make_(std::move(make_simulation)) {}
+
+  const std::shared_ptr<Turns>& turns() const { return turns_; }
+
+  // Runs `body` with the interpreter's lock. An exception of Python's comes out as it is, with a note
+  // that names `place`: "task 'push': evaluate()".
+  template <class Body>
+  auto call(const std::string& place, Body&& body) {
+    return turns_->work([&] {
+      nb::gil_scoped_acquire lock;
+      try {
+        return body();
+      } catch (nb::python_error& error) {
+        add_note(error, place);
+        throw;
+      }
+    });
+  }
+
+  // mjsense.Scene that prepared the rollout's scene, and what that refers to; before simulation().
+  // Needs the lock.
+  void set_scene(nb::object scene, nb::object alive);
+  // mjsense.Simulation of these worlds, made when it is first wanted. Needs the lock.
+  nb::object simulation(const std::shared_ptr<Simulation>& sim);
+  // mjsense.Sensor objects as members of a suite. Needs the lock.
+  std::vector<std::shared_ptr<Sensor>> members(nb::handle sensors,
+                                               const std::shared_ptr<Simulation>& sim);
+  // Nothing of Python's may hold on to a rollout that has ended. Needs the lock.
+  void close();
+
+ private:
+  static void add_note(nb::python_error& error, const std::string& place);
+
+  std::shared_ptr<Turns> turns_ = std::make_shared<Turns>();
+  Held make_, scene_, alive_, simulation_;
+  PySimulation* core_ = nullptr;  // simulation_ keeps it alive
+};
+
+// For settings that are optional in Python: an attribute, or what it is without.
+template <class T>
+T item_or(nb::handle dict, const char* key, T otherwise) {
+  nb::object value = dict.attr("get")(key);
+  return value.is_none() ? otherwise : nb::cast<T>(value);
+}
+
+}  // namespace mjsense::python

@@ -1,0 +1,79 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+// A policy written in Python (mjsense.Policy, python/mjsense/policy.py), as a rollout sees it: called
+// once a step for all worlds, or once a chunk of actions.
+
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "mjsense/episode/policy.h"
+#include "mjsense/episode/task.h"
+#include "python/bindings/host.h"
+
+namespace mjsense {
+class Rollout;
+}
+
+namespace mjsense::python {
+
+// (sensor, spec, rows) of every stream of a rollout's suite; the rows are read-only and outlive it.
+nb::list suite_streams(Rollout& rollout);
+// (name, low, high) of every controlled move group.
+nb::list action_layout(const Robot& robot);
+
+class PythonPolicy final : public PlannerPolicy {
+ public:
+  // Needs the interpreter's lock.
+  PythonPolicy(nb::object policy, std::shared_ptr<PythonHost> host);
+
+  std::string_view name() const override { return name_; }
+  void bind(const std::shared_ptr<Simulation>& simulation) override { simulation_ = simulation; }
+  void initialize(Task& task) override;
+  // The suite exists: act() will see its rows.
+  void observe(Rollout& rollout);
+  void reset_all(ActiveWorlds& worlds) override;
+  void act_all(ActiveWorlds& worlds, std::span<Action> actions) override;
+
+  std::span<const Phase> phases() const override { return phases_; }
+  int phase(int world) const override { return phase_[world]; }
+  int num_retries(int world) const override { return retries_[world]; }
+  Pose grasp_pose(int /*world*/) const override { return {}; }
+  bool has_grasp_pose() const override { return false; }
+  std::vector<std::shared_ptr<Sensor>> create_policy_sensors() const override;
+
+ private:
+  // What act() returned: `steps` actions for every world, and how many a world has left.
+  struct Chunk {
+    std::size_t steps = 0;
+    std::vector<double> values;        // [B, steps, n]
+    std::vector<std::uint8_t> given;   // by move group
+    std::vector<std::uint8_t> done;    // [B], of the last step
+    std::vector<std::int8_t> success;  // [B], -1: nothing is said
+    std::vector<std::size_t> left;     // [B]
+  };
+  std::string place(const char* method) const;
+  std::string layout_text() const;
+  void call_act();
+  void read(nb::handle value);
+  void read_group(nb::handle value, std::size_t first, std::size_t width, const std::string& what);
+  void read_flags(nb::handle value, const char* what, auto&& set);
+  void read_phases();
+  void fill(int world, Action& action);
+
+  Held policy_;
+  std::shared_ptr<PythonHost> host_;
+  std::weak_ptr<Simulation> simulation_;
+  Task* task_ = nullptr;
+  std::string name_;
+  std::vector<std::string> phase_names_;
+  std::vector<Phase> phases_;
+  std::vector<int> phase_, retries_;  // [B]
+  Held act_, observation_, wanted_, as_array_;
+  bool* wanted_rows_ = nullptr;     // [B] of wanted_
+  std::vector<int> group_, width_;  // of the controlled move groups
+  std::size_t n_ = 0;               // their widths together
+  Chunk chunk_;
+};
+
+}  // namespace mjsense::python

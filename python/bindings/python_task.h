@@ -1,0 +1,89 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+// A task written in Python (mjsense.Task, python/mjsense/task.py), as a rollout sees it. Python is
+// called once a step for all worlds, and at the start of an episode.
+
+#include <map>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "mjsense/episode/grasp_scene.h"
+#include "mjsense/episode/task.h"
+#include "python/bindings/host.h"
+
+namespace mjsense::python {
+
+class PythonTask final : public Task, public GraspScene {
+ public:
+  // `cfg`: what the rollout wants. Needs the interpreter's lock.
+  static std::unique_ptr<PythonTask> make(nb::object task, std::shared_ptr<PythonHost> host,
+                                          TaskCfg cfg, bool own_horizon);
+
+  std::string_view name() const override { return name_; }
+  std::string_view type() const override { return type_; }
+  SceneCfg scene_cfg() const override;
+  std::string robot_entity() const override { return robot_entity_; }
+  ActuatorGroups robot_groups() const override { return groups_; }
+  std::vector<CameraMount> cameras() const override { return cameras_; }
+  int start_key() const override { return model()->nkey > 0 ? 0 : -1; }
+  void bind(const std::shared_ptr<Simulation>& simulation) override { simulation_ = simulation; }
+
+  void begin(const World& world) override;
+  Evaluation evaluate(const World& world) const override { return found_[world.id]; }
+  void begin_all(ActiveWorlds& worlds) override;
+  void evaluate_all(ActiveWorlds& worlds, std::span<Evaluation> out) override;
+  bool info_follows_evaluation() const override { return true; }
+
+  std::span<const TaskObject> objects(int world) const override { return objects_[world]; }
+  std::string description(int world) const override;
+  Referrals referrals(int world) const override;
+  Pose start_pose(int world, std::string_view role) const override;
+  std::optional<Pose> goal_pose(int world, std::string_view role) const override;
+  void write_info(const World& world, JsonWriter& json) const override;
+  std::vector<std::shared_ptr<Sensor>> create_task_sensors() const override;
+  void edit_suite(SensorSuite& suite) const override;
+
+  const GraspScene* grasp_scene() const override { return graspable_.empty() ? nullptr : this; }
+  std::span<const GraspObject> all_objects() const override { return graspable_; }
+  int target(int world) const override { return target_[world]; }
+  double table_height() const override { return table_height_; }
+
+ protected:
+  void initialize_task() override;
+  std::optional<Pose> sample_scene(int world, Rng& rng, const StateRow& state) override;
+  std::vector<std::pair<std::string, std::string>> scene_info(int world) const override;
+
+ private:
+  // What evaluate() says of every world beside its judgement.
+  struct Info {
+    char kind = 'f';             // bool, int or float, as NumPy calls them
+    std::size_t width = 0;       // 0: one value a world, else a list of so many
+    std::vector<double> values;  // [B, max(width, 1)]
+  };
+  PythonTask(TaskCfg cfg, nb::object task, std::shared_ptr<PythonHost> host);
+  std::string place(const char* method) const;
+  template <class Body>
+  auto call(const char* method, Body&& body) const {
+    return host_->call(place(method), std::forward<Body>(body));
+  }
+  std::size_t role_index(std::string_view role) const;
+  void set_objects(int world, nb::handle roles);
+  void read_info(nb::handle info);
+
+  Held task_;
+  std::shared_ptr<PythonHost> host_;
+  std::weak_ptr<Simulation> simulation_;
+  std::string name_, type_, robot_entity_;
+  ActuatorGroups groups_;
+  std::vector<CameraMount> cameras_;
+  std::vector<std::vector<TaskObject>> objects_;  // [B]
+  std::vector<std::vector<Pose>> starts_;         // [B], of the objects
+  std::vector<Evaluation> found_;                 // [B]
+  std::map<std::string, Info> info_;
+  std::vector<GraspObject> graspable_;
+  std::vector<int> target_;  // [B], of graspable_
+  double table_height_ = 0;
+};
+
+}  // namespace mjsense::python

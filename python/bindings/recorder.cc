@@ -1,0 +1,188 @@
+// SPDX-License-Identifier: Apache-2.0
+// The recorder in Python, for loops of the user's own. python/mjsense/recorder.py makes the public
+// class of it.
+
+#include "mjsense/record/recorder.h"
+
+#include <fmt/format.h>
+#include <nanobind/nanobind.h>
+#include <nanobind/stl/string.h>
+#include <nanobind/stl/string_view.h>
+#include <nanobind/stl/vector.h>
+
+#include "mjsense/core/error.h"
+#include "mjsense/observe/shared_field.h"
+#include "python/bindings/bindings.h"
+#include "python/bindings/fields.h"
+#include "python/bindings/py_simulation.h"
+#include "python/bindings/sensor_handle.h"
+
+namespace mjsense::python {
+namespace {
+
+// Fields of a camera that are films.
+struct Film {
+  const char *field, *suffix;
+  Storage storage;
+};
+constexpr Film kFilms[] = {{"rgb", "", Storage::kRgbVideo},
+                           {"depth", "_depth", Storage::kDepthVideo}};
+
+// `episodes` and so on: fields of RecordJobCfg, of which a recorder takes what concerns files.
+class PyRecorder {
+ public:
+  PyRecorder(PySimulation& sim, nb::list handles, const std::string& out, std::int64_t fps_num,
+             std::int64_t fps_den, const std::string& settings, nb::dict options)
+      : sim_(sim), simulation_(nb::find(&sim)) {
+    RecordingCfg cfg;
+    cfg.out_dir = out;
+    cfg.num_worlds = sim.open().num_worlds();
+    cfg.fps = {fps_num, fps_den};
+    cfg.settings = settings;
+    for (const char* name : {"house", "episodes", "batches", "gzip"}) {
+      int& value = std::string_view(name) == "house"      ? cfg.house
+                   : std::string_view(name) == "episodes" ? cfg.episodes
+                   : std::string_view(name) == "batches"  ? cfg.batches
+                                                          : cfg.gzip;
+      value = nb::cast<int>(options[name]);
+      options.attr("pop")(name);
+    }
+    cfg.resume = nb::cast<bool>(options["resume"]);
+    options.attr("pop")("resume");
+    read_options(options, struct_of<VideoCfg>(), &cfg.video);
+    for (nb::handle handle : handles) add(nb::cast<SensorHandle&>(handle).sensor);
+    for (const auto& sensor : sensors_) cfg.sensors.push_back(sensor.get());
+    nb::gil_scoped_release unlock;
+    recorder_ = std::make_unique<Recorder>(cfg);
+  }
+  ~PyRecorder() {
+    nb::gil_scoped_release unlock;
+    recorder_.reset();
+  }
+
+  void begin(int world, std::int64_t episode, std::uint64_t seed) {
+    check(world);
+    unlocked([&] { recorder_->begin_episode(world, {.episode = episode, .seed = seed}); });
+  }
+  void append(const std::vector<int>& worlds, const std::vector<double>& reward,
+              const std::vector<bool>& terminated, const std::vector<bool>& truncated,
+              const std::vector<bool>& success) {
+    for (int w : worlds) check(w);
+    std::vector<Sensor*> fresh;
+    for (const auto& sensor : sources_) fresh.push_back(sensor.get());
+    sim_.read([&](Simulation& sim) { sim.refresh(fresh, worlds); });
+    unlocked([&] {
+      for (std::size_t i = 0; i < worlds.size(); ++i) {
+        recorder_->append(worlds[i], {.reward = static_cast<float>(reward[i]),
+                                      .terminated = terminated[i],
+                                      .truncated = truncated[i],
+                                      .success = success[i]});
+      }
+    });
+  }
+  void finish(int world, const std::string& scene, const std::string& outcome) {
+    check(world);
+    unlocked([&] { recorder_->finish_episode(world, scene, outcome); });
+  }
+  void discard(int world, const std::string& why) {
+    check(world);
+    unlocked([&] { recorder_->discard_episode(world, why); });
+  }
+  void abandon(int world) {
+    check(world);
+    unlocked([&] { recorder_->abandon_episode(world); });
+  }
+  void flush() {
+    unlocked([&] { recorder_->flush(); });
+  }
+  void complete() {
+    unlocked([&] { recorder_->complete(); });
+  }
+
+  Recorder& recorder() { return *recorder_; }
+  bool recording(int world) const {
+    check(world);
+    return recorder_->recording(world);
+  }
+
+ private:
+  template <class Body>
+  void unlocked(Body&& body) {
+    nb::gil_scoped_release unlock;
+    body();
+  }
+  void check(int world) const {
+    const int B = sim_.open().num_worlds();
+    if (world < 0 || world >= B)
+      throw ValueError(fmt::format("world {}: must be in [0, {})", world, B));
+  }
+  // A camera becomes films, as in the recordings of tasks.
+  void add(const std::shared_ptr<Sensor>& sensor) {
+    sources_.push_back(sensor);
+    bool films = false;
+    for (const Film& film : kFilms) {
+      for (const Field& field : sensor->fields()) {
+        if (sensor->kind() != "camera" || field.name != film.field) continue;
+        films = true;
+        auto shown = std::make_shared<SharedField>(
+            sensor->name() + film.suffix, *sensor, film.field, [&film](SensorSpec& spec) {
+              spec.storage = film.storage;
+              if (film.storage == Storage::kDepthVideo)
+                spec.shape = {spec.shape.dims()[0], spec.shape.dims()[1]};
+            });
+        shown->initialize({.model = nullptr, .num_worlds = sim_.open().num_worlds()});
+        sensors_.push_back(std::move(shown));
+      }
+    }
+    if (!films) sensors_.push_back(sensor);
+  }
+
+  PySimulation& sim_;
+  nb::object simulation_;                         // keeps it alive
+  std::vector<std::shared_ptr<Sensor>> sources_;  // what is refreshed
+  std::vector<std::shared_ptr<Sensor>> sensors_;  // what is stored
+  std::unique_ptr<Recorder> recorder_;
+};
+
+nb::dict stats(PyRecorder& self) {
+  const RecordStats s = self.recorder().stats();
+  nb::dict d;
+  d["rows"] = s.rows;
+  d["frames"] = s.frames;
+  d["raw_bytes"] = s.raw_bytes;
+  d["published_bytes"] = s.published_bytes;
+  d["copy_s"] = s.copy_s;
+  d["wait_s"] = s.wait_s;
+  d["write_s"] = s.write_s;
+  d["commit_s"] = s.commit_s;
+  d["encode_cpu_s"] = s.encode_cpu_s;
+  return d;
+}
+
+}  // namespace
+
+void bind_recorder(nb::module_& m) {
+  const auto world = nb::arg("world");
+  nb::class_<PyRecorder>(m, "Recorder", "The C++ recorder.")
+      .def(nb::init<PySimulation&, nb::list, const std::string&, std::int64_t, std::int64_t,
+                    const std::string&, nb::dict>(),
+           nb::arg("simulation"), nb::arg("sensors"), nb::arg("out"), nb::arg("fps_num"),
+           nb::arg("fps_den"), nb::arg("settings"), nb::arg("options"))
+      .def("begin_episode", &PyRecorder::begin, world, nb::arg("episode"), nb::arg("seed"))
+      .def("append", &PyRecorder::append, nb::arg("worlds"), nb::arg("reward"),
+           nb::arg("terminated"), nb::arg("truncated"), nb::arg("success"))
+      .def("finish_episode", &PyRecorder::finish, world, nb::arg("obs_scene"), nb::arg("outcome"))
+      .def("discard_episode", &PyRecorder::discard, world, nb::arg("why"))
+      .def("abandon_episode", &PyRecorder::abandon, world)
+      .def("flush", &PyRecorder::flush)
+      .def("complete", &PyRecorder::complete)
+      .def("recording", &PyRecorder::recording, world)
+      .def("decided", [](PyRecorder& r, std::int64_t n) { return r.recorder().decided(n); })
+      .def_prop_ro("kept", [](PyRecorder& r) { return r.recorder().kept(); })
+      .def_prop_ro("discarded", [](PyRecorder& r) { return r.recorder().discarded(); })
+      .def_prop_ro("enough", [](PyRecorder& r) { return r.recorder().enough(); })
+      .def_prop_ro("path", [](PyRecorder& r) { return r.recorder().house_dir().string(); })
+      .def("stats", &stats);
+}
+
+}  // namespace mjsense::python

@@ -1,0 +1,33 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Tasks, policies and sensors of the user's, on their way into a rollout."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable
+from typing import Any
+
+from mjsense.policy import Policy, policy_of
+from mjsense.sensor import Sensor
+from mjsense.task import Task, task_of
+
+Tasks = str | Task | type[Task] | Callable[[], Task]
+"""A task, what makes one, or its registered name."""
+Policies = str | Policy | type[Policy] | Callable[[dict[str, Any]], Any] | None
+"""A policy, a function from observations to actions, or its registered name."""
+
+
+def parts_of(options: dict[str, Any], sensors: Iterable[Sensor]) -> tuple[Task | None, Policy | None, list[Sensor]]:
+    """(task, policy, sensors) written in Python; the options get the names of all."""
+    options["task"], task = task_of(options["task"])
+    options["policy"], policy = policy_of(options["policy"])
+    robot = options["robot"]
+    if robot is None:
+        robot = task.robot if task is not None else "franka"
+    options["robot"] = "" if robot is None else str(robot)
+    own = list(sensors)
+    for sensor in [*own, *(task._mjs_sensors() if task else ()), *(policy._mjs_sensors() if policy else ())]:
+        if not isinstance(sensor, Sensor):
+            raise TypeError(f"not a mjsense.Sensor: {sensor!r}")
+        if sensor._mjs_row_spec() is None:
+            raise ValueError(f"sensor '{sensor.uuid}' cannot be recorded: give it an observation_space, or is_dict = True")
+    return task, policy, own

@@ -1,0 +1,44 @@
+# SPDX-License-Identifier: Apache-2.0
+"""From the streams of a suite to the nested dict that environments and policies show."""
+
+from __future__ import annotations
+
+import difflib
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+Streams = Mapping[str, tuple[str, Any, Any]]
+"""stream -> (sensor, spec, rows)"""
+
+
+def choose_streams(wanted: Sequence[str] | None, streams: Streams) -> list[str]:
+    """Names of the streams to observe: those wanted, by their own names or their sensors'; else all that are numbers."""
+    if wanted is None:
+        plain = [name for name, (_, spec, array) in streams.items() if not spec.is_dict and array.size > 0]
+        return [name for name in plain if not name.startswith(("sensor_param_", "object_image_points"))]
+    names: list[str] = []
+    for one in wanted:
+        found = [name for name, (sensor, _, array) in streams.items() if name == one or (sensor == one and array.size > 0)]
+        if not found:
+            known = [*dict.fromkeys(sensor for sensor, _, _ in streams.values()), *streams]
+            near = difflib.get_close_matches(one, known, 3)
+            hint = f"did you mean {' or '.join(map(repr, near))}?" if near else f"there are {', '.join(streams)}"
+            raise ValueError(f"no sensor or stream '{one}'; {hint}")
+        names += [name for name in found if name not in names]
+    return names
+
+
+def stream_path(sensor: str, stream: str) -> tuple[str, ...]:
+    """Where a stream stands in an observation: ("qpos", "arm")."""
+    return (sensor, *stream[len(sensor) + 1 :].split("/")) if stream != sensor else (sensor,)
+
+
+def nest(paths: Mapping[str, tuple[str, ...]], values: Mapping[str, Any]) -> dict[str, Any]:
+    """{"qpos/arm": x} -> {"qpos": {"arm": x}}"""
+    nested: dict[str, Any] = {}
+    for name, path in paths.items():
+        inner = nested
+        for key in path[:-1]:
+            inner = inner.setdefault(key, {})
+        inner[path[-1]] = values[name]
+    return nested

@@ -1,0 +1,74 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Tasks as single gymnasium environments."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import gymnasium
+import numpy as np
+
+from mjsense._arguments import Seed, checked
+from mjsense._parts import Tasks
+from mjsense.vector import TaskVectorEnv, _row, make_vec
+
+
+@checked
+class TaskEnv(gymnasium.Env):
+    """One world that plays episodes of a task; made by :func:`make`. It is a :class:`TaskVectorEnv` of one, without the batch axis."""
+
+    metadata = {"render_modes": ["rgb_array"]}
+
+    def __init__(self, worlds: TaskVectorEnv) -> None:
+        self.worlds = worlds
+        """The vector environment behind it."""
+        self.render_mode = worlds.render_mode
+        self.observation_space = worlds.single_observation_space
+        self.action_space = worlds.single_action_space
+        self.action_groups = worlds.action_groups
+        """Columns of the action by move group."""
+        self.sim = worlds.sim
+        """The world. Read it as you like; the task writes it."""
+
+    def reset(self, *, seed: Seed | None = None, options: dict[str, Any] | None = None) -> tuple[dict[str, Any], dict[str, Any]]:
+        """Begins the next episode; with a seed, the first one of that seed."""
+        super().reset(seed=seed)
+        observation, _ = self.worlds.reset(seed=seed)
+        return _row(observation, 0), {}
+
+    def step(self, action: Any) -> tuple[dict[str, Any], float, bool, bool, dict[str, Any]]:
+        """One control step. The action ``[n]``: actuator commands of the move groups, see ``action_groups``."""
+        return self._single(*self.worlds.step(np.asarray(action)[None]))
+
+    def step_chunk(self, actions: Any, stop_on_success: bool = False) -> tuple[dict[str, Any], float, bool, bool, dict[str, Any]]:
+        """Several control steps ``[steps, n]`` with one observation, after the last; see :meth:`TaskVectorEnv.step_chunk`."""
+        return self._single(*self.worlds.step_chunk(np.asarray(actions)[None], stop_on_success))
+
+    @staticmethod
+    def _single(
+        observation: dict[str, Any], reward: np.ndarray, terminated: np.ndarray, truncated: np.ndarray, infos: dict[str, Any]
+    ) -> tuple[dict[str, Any], float, bool, bool, dict[str, Any]]:
+        info: dict[str, Any] = {"success": bool(infos["success"][0])}
+        if "fault" in infos:
+            info["fault"] = infos["fault"][0]
+        return _row(observation, 0), float(reward[0]), bool(terminated[0]), bool(truncated[0]), info
+
+    def render(self) -> Any:
+        """The first camera's picture."""
+        pictures = self.worlds.render()
+        return None if pictures is None else pictures[0]
+
+    def close(self) -> None:
+        """Frees the world."""
+        self.worlds.close()
+
+
+@checked
+def make(task: Tasks = "pick", robot: str | Path | None = None, **options: Any) -> TaskEnv:
+    """A task as a gymnasium environment of one world. The options are those of :func:`make_vec`, but ``num_envs`` and
+    ``autoreset_mode``: after the end of an episode call ``reset()``."""
+    for word in ("num_envs", "autoreset_mode"):
+        if word in options:
+            raise TypeError(f"make() has no {word}: that is make_vec()'s")
+    return TaskEnv(make_vec(task, robot, num_envs=1, autoreset_mode="disabled", **options))

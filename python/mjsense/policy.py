@@ -1,0 +1,165 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Policies written in Python: what to command next, for all worlds at once."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from mjsense import _core
+from mjsense._streams import choose_streams, nest, stream_path
+from mjsense.task import episode_rng, group_slices, snake_case
+
+if TYPE_CHECKING:
+    from mjsense.simulation import Simulation
+
+
+class Policy:
+    """Base class of policies. Write ``act``; a plain function ``obs -> actions``, such as a trained network, is a policy too.
+
+    Shapes: ``B`` worlds, ``n`` commands of all controlled move groups, ``H`` steps.
+    """
+
+    name: str = ""
+    """What files and messages call it; if not given, the class's name in small letters."""
+    observation: Sequence[str] | None = None
+    """Names of the sensors ("qpos") or streams ("qpos/arm") that ``act`` sees; None: all that are numbers, as ``make_vec`` shows
+    them."""
+    phases: Mapping[str, int] = {}
+    """Numbers of its phases, if it follows some: ``self.phase`` ``[B]`` then holds the present ones, ``self.num_retries`` ``[B]``
+    how often it began again; files hold both."""
+
+    # Set before initialize().
+    sim: Simulation
+    """The worlds."""
+    num_worlds: int
+    """B."""
+    action_groups: dict[str, slice]
+    """Columns of an action by move group."""
+    action_low: np.ndarray
+    """Least commands, float64 ``[n]``."""
+    action_high: np.ndarray
+    """Greatest commands, float64 ``[n]``."""
+    wanted: np.ndarray
+    """Worlds of which ``act`` is asked, bool ``[B]``: those that play, and have come to the end of their chunk."""
+    phase: np.ndarray
+    num_retries: np.ndarray
+
+    # ------------------------------------------------------------------------------------------------- yours to write
+
+    def initialize(self) -> None:
+        """Called once the worlds exist."""
+
+    def reset(self, ids: np.ndarray) -> None:
+        """These worlds begin a new episode; ``obs`` does not show it yet, ``self.sim`` does."""
+
+    def act(self, obs: dict[str, Any]) -> Any:
+        """The next commands.
+
+        Args:
+            obs: the suite's rows ``[B, ...]``, read-only and live: nested as ``make_vec`` has them, ``obs["qpos"]["arm"]``.
+
+        Returns:
+            ``[B, n]``, or ``[B, H, n]`` for the next ``H`` steps, or a dict: move group -> ``[B, k]`` or ``[B, H, k]`` (a group that is
+            left out holds), or ``"action"`` -> ``[B, n]``; and if you like ``"done"`` and ``"success"``, bool ``[B]``: the episode
+            ends after this, and your own verdict of it.
+        """
+        raise NotImplementedError(f"{type(self).__name__}: write act(obs)")
+
+    def sensors(self) -> Iterable[Any]:
+        """Sensors of yours that observations and recordings with this policy have."""
+        return ()
+
+    # --------------------------------------------------------------------------------------------------------- reading
+
+    def rng(self, world: int) -> np.random.Generator:
+        """Random numbers for this world's episode: what is drawn from them depends on the seed and the episode alone."""
+        if self._mjs_rngs[world] is None:
+            self._mjs_rngs[world] = episode_rng(self._mjs_seed, int(self._mjs_episodes[world]), "policy")
+        return self._mjs_rngs[world]
+
+    # ------------------------------------------------------------------------------- called by mjsense (the C++ adapter)
+
+    def _mjs_name(self) -> str:
+        return self.name or snake_case(type(self).__name__)
+
+    def _mjs_settings(self) -> dict[str, Any]:
+        return {"name": self._mjs_name(), "phases": dict(self.phases)}
+
+    def _mjs_sensors(self) -> list[Any]:
+        return list(self.sensors())
+
+    def _mjs_bind(self, sim: Simulation, streams: list[Any], layout: list[Any]) -> tuple[dict[str, Any], np.ndarray]:
+        self.sim, self.num_worlds = sim, sim.num_worlds
+        self.action_groups = group_slices(layout)
+        self.action_low, self.action_high = (np.concatenate([[], *(row[k] for row in layout)]) for k in (1, 2))
+        self.wanted = np.zeros(self.num_worlds, bool)
+        self.phase, self.num_retries = (np.zeros(self.num_worlds, np.int64) for _ in range(2))
+        self._mjs_rngs: list[np.random.Generator | None] = [None] * self.num_worlds
+        self._mjs_episodes = np.zeros(self.num_worlds, np.int64)
+        self._mjs_seed = 0
+        rows = {spec.name: (sensor, spec, array) for sensor, spec, array in streams}
+        names = choose_streams(self.observation, rows)
+        obs = nest({name: stream_path(rows[name][0], name) for name in names}, {name: rows[name][2] for name in names})
+        self.initialize()
+        return obs, self.wanted
+
+    def _mjs_reset(self, ids: list[int], episodes: list[int], seed: int) -> None:
+        self._mjs_seed = seed
+        for world, episode in zip(ids, episodes):
+            self._mjs_episodes[world], self._mjs_rngs[world] = episode, None
+        self.reset(np.array(ids))
+
+
+class FunctionPolicy(Policy):
+    """A function ``obs -> actions``."""
+
+    def __init__(self, function: Callable[[dict[str, Any]], Any], name: str = "", observation: Sequence[str] | None = None) -> None:
+        self.name = name or snake_case(getattr(function, "__name__", type(function).__name__).strip("<>"))
+        self.observation = observation
+        self._function = function
+
+    def act(self, obs: dict[str, Any]) -> Any:
+        return self._function(obs)
+
+
+_POLICIES: dict[str, Callable[[], Policy]] = {}
+
+
+def register_policy(name: str, make: Callable[[], Policy]) -> None:
+    """Lets ``mjs.record(policy=name)`` find a policy of yours.
+
+    Args:
+        name: not taken yet.
+        make: the class, or a function that makes one.
+    """
+    if name in policy_names():
+        raise ValueError(f"there is a policy called '{name}' already")
+    if not name or not callable(make):
+        raise TypeError(f"register_policy: {name!r} must be a name and {make!r} a class or a function")
+    _POLICIES[name] = make
+
+
+def policy_names() -> list[str]:
+    """Names of the policies there are, yours last."""
+    return [*_core.policy_names(), *_POLICIES]
+
+
+def policy_of(policy: Any) -> tuple[str, Policy | None]:
+    """(name for messages and files, the object if it is written in Python); "" for None."""
+    if policy is None:
+        return "", None
+    if isinstance(policy, str):
+        if policy not in _POLICIES:
+            return policy, None
+        policy = _POLICIES[policy]()
+    if isinstance(policy, type) and issubclass(policy, Policy):
+        policy = policy()
+    if not isinstance(policy, Policy):
+        if not callable(policy):
+            names = ", ".join(policy_names())
+            raise TypeError(f"policy must be a mjsense.Policy, a function or the name of one ({names}), not {policy!r}")
+        policy = FunctionPolicy(policy)
+    return policy._mjs_name(), policy

@@ -1,0 +1,398 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Tasks written in Python: a scene, how an episode begins, what is good."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from typing import TYPE_CHECKING, Any, ClassVar
+
+import mujoco
+import numpy as np
+
+from mjsense import _core
+from mjsense._arguments import checked
+from mjsense.errors import UnknownNameError
+
+if TYPE_CHECKING:
+    from mjsense.configs import SceneCfg
+    from mjsense.scene import Scene
+    from mjsense.simulation import Simulation
+
+
+class Task:
+    """Base class of tasks. Write ``scene``, ``evaluate``, and what else your task has; all worlds are judged by one call a step.
+
+    Life: ``scene()`` once, ``initialize(sim)`` once; then for every episode ``sample(rng, world)``, and ``begin(ids)`` once its
+    world shows that state; after that and after every control step ``evaluate(sim)``. Shapes: ``B`` worlds.
+
+    >>> class Reach(mjs.Task): ...
+    >>> mjs.record(Reach(), robot="franka", policy=my_policy, out="data")
+    >>> env = mjs.make_vec(Reach(), robot="franka", num_envs=64)
+    """
+
+    name: str = ""
+    """What files and messages call it; if not given, the class's name in small letters."""
+    task_type: str = ""
+    """``task_type`` of ``obs_scene`` in files; if not given, the name."""
+    horizon: int = 500
+    """Control steps after which an episode is truncated."""
+    policy_dt_ms: int | None = None
+    """One control step, ms; None: the robot's, 66 without one."""
+    sim_dt_ms: int | None = None
+    """One physics step, ms; None: the robot's, 2 without one."""
+    robot: str | None = None
+    """Robot that the task is played with unless another is asked for; None: the scene has its own."""
+    robot_entity: str = "robot"
+    """Where the scene has its own robot: the entity that it is; "" takes whatever has actuators."""
+    move_groups: Mapping[str, str | Sequence[str]] = {}
+    """For such a robot: names (regular expressions) of actuators by move group; none: one group, ``joints``, of all. An action is
+    their controls."""
+    cameras: Mapping[str, str] = {}
+    """Cameras of the scene that episodes show, besides the robot's: name -> the model's camera."""
+    objects: Mapping[str, str] | Callable[[int], Mapping[str, str]] = {}
+    """What plays a role: role -> body, the main one first. A method ``objects(world)`` says it for each episode; the roles must
+    always be the same."""
+    graspable: Sequence[str] = ()
+    """Bodies that the planner may see and grasp; the first of ``objects`` is its target."""
+    table_height: float = 0.0
+    """On which they stand, m."""
+
+    # Set before initialize().
+    sim: Simulation
+    """The worlds."""
+    num_worlds: int
+    """B."""
+    action_groups: dict[str, slice]
+    """Columns of an action by move group."""
+
+    _mjs_taken: ClassVar[str] = "task"
+    _mjs_found: tuple[Any, ...] | None = None
+
+    # ------------------------------------------------------------------------------------------------- yours to write
+
+    def scene(self) -> SceneCfg:
+        """Everything but the robot that the task is played with, which joins it as the entity ``robot_0``."""
+        raise NotImplementedError(f"{type(self).__name__}: write scene()")
+
+    def initialize(self, sim: Simulation) -> None:
+        """The model is compiled: resolve names, allocate."""
+
+    def sample(self, rng: np.random.Generator, world: WorldState) -> Any:
+        """Writes the start of an episode into ``world``, whose state is the scene's ``init_state``.
+
+        Random numbers come from ``rng``, which depends on the seed and the episode's number alone.
+
+        Returns:
+            Where the robot's base stands in the world, position (m) and quaternion (wxyz) ``[7]``; None leaves it where it is.
+        """
+
+    def begin(self, ids: np.ndarray) -> None:
+        """New episodes of these worlds begin from what ``self.sim`` shows."""
+
+    def evaluate(self, sim: Simulation) -> Any:
+        """Judges what all worlds show.
+
+        Worlds that play nothing may hold anything; what is said of them does not count. A method ``evaluate(sim, ids)`` is also
+        told which worlds are judged: each once an observation.
+
+        Returns:
+            ``(reward, success)``, both ``[B]``, or a dict with ``reward`` and ``success``, and if you like ``terminated`` ``[B]``
+            (the episode is over) and ``info``: name -> ``[B]`` or ``[B, k]`` of numbers, which files hold as ``task_info``.
+        """
+        raise NotImplementedError(f"{type(self).__name__}: write evaluate(sim)")
+
+    def description(self, world: int) -> str:
+        """What is to be done, in words; if not written, the first line of the class's documentation."""
+        own = type(self).__doc__
+        return own.strip().split("\n")[0] if own else self._mjs_name()
+
+    def referrals(self, world: int) -> Mapping[str, Sequence[tuple[str, float]]]:
+        """How people call the objects: role -> (text, probability) each."""
+        return {role: [(body.split("/")[-1], 1.0)] for role, body in self._mjs_roles(world).items()}
+
+    def scene_info(self, world: int) -> Mapping[str, str]:
+        """Further texts for ``obs_scene``."""
+        return {}
+
+    def sensors(self) -> Iterable[Any]:
+        """Sensors of yours that observations and recordings of this task have."""
+        return ()
+
+    def suite(self, names: list[str]) -> Sequence[str] | None:
+        """Which of the suite's sensors to keep, in which order; None keeps them all."""
+        return None
+
+    # --------------------------------------------------------------------------------------------------------- reading
+
+    def get_info(self) -> list[dict[str, Any]]:
+        """``task_info`` of every world at the present observation, without ``episode_step``."""
+        if self._mjs_found is None:
+            raise RuntimeError(f"task '{self._mjs_name()}': nothing was evaluated yet")
+        _, success, _, info = self._mjs_found
+        rows = [{"success": bool(value)} for value in success]
+        for key, (kind, width, values) in (info or {}).items():
+            cast = {"b": bool, "i": int, "f": float}[kind]
+            for row, value in zip(rows, values):
+                row[key] = [cast(v) for v in value] if width else cast(value[0])
+        return rows
+
+    # ------------------------------------------------------------------------------- called by mjsense (the C++ adapter)
+
+    def _mjs_name(self) -> str:
+        return self.name or snake_case(type(self).__name__)
+
+    def _mjs_settings(self) -> dict[str, Any]:
+        name = self._mjs_name()
+        groups = [(group, [p] if isinstance(p, str) else list(p)) for group, p in dict(self.move_groups).items()]
+        return {
+            "name": name,
+            "task_type": self.task_type or name,
+            "horizon": self.horizon,
+            "policy_dt_ms": self.policy_dt_ms,
+            "sim_dt_ms": self.sim_dt_ms,
+            "robot_entity": self.robot_entity,
+            "move_groups": groups,
+            "cameras": list(dict(self.cameras).items()),
+            "table_height": float(self.table_height),
+        }
+
+    def _mjs_scene(self) -> tuple[Any, ...]:
+        from mjsense.configs import SceneCfg
+        from mjsense.scene import Scene
+
+        cfg = self.scene()
+        if not isinstance(cfg, SceneCfg):
+            raise TypeError(f"scene() must return a mjsense.SceneCfg, not {cfg!r}")
+        scene: Scene = Scene.__new__(Scene)
+        items, edit = scene._prepare(cfg)
+        return cfg, scene.spec, items, edit, scene
+
+    def _mjs_bind(self, sim: Simulation, layout: list[tuple[str, list[float], list[float]]]) -> None:
+        taken = getattr(self, "sim", None)
+        if taken is not None and not taken._core.closed and taken is not sim:
+            raise RuntimeError(f"task '{self._mjs_name()}' is played already: make one for each environment")
+        self.sim, self.num_worlds = sim, sim.num_worlds
+        self.action_groups = group_slices(layout)
+        self._mjs_found = None
+        self._mjs_ids = takes_ids(self.evaluate)
+        self.initialize(sim)
+
+    def _mjs_roles(self, world: int) -> dict[str, str]:
+        objects = self.objects
+        return dict(objects(world) if callable(objects) else objects)
+
+    def _mjs_graspable(self) -> list[str]:
+        return list(self.graspable)
+
+    def _mjs_sample(self, world: int, episode: int, seed: int) -> list[float] | None:
+        base = self.sample(episode_rng(seed, episode, "task"), WorldState(self.sim, world, episode))
+        if base is None:
+            return None
+        return [float(x) for x in np.asarray(base, dtype=np.float64).reshape(-1)]
+
+    def _mjs_begin(self, ids: list[int]) -> None:
+        self.begin(np.array(ids))
+
+    def _mjs_evaluate(self, ids: list[int]) -> tuple[Any, ...]:
+        found = self.evaluate(self.sim, np.array(ids)) if self._mjs_ids else self.evaluate(self.sim)  # type: ignore[call-arg]
+        terminated = info = None
+        if isinstance(found, Mapping):
+            unknown = set(found) - {"reward", "success", "terminated", "info"}
+            if unknown or "reward" not in found or "success" not in found:
+                raise ValueError(f"returned a dict of {sorted(found)}; it needs reward and success, and may have terminated and info")
+            reward, success, terminated, info = found["reward"], found["success"], found.get("terminated"), found.get("info")
+        elif isinstance(found, tuple) and len(found) == 2:
+            reward, success = found
+        else:
+            raise TypeError(f"must return (reward, success), each [B], or a dict of them, not {found!r}")
+        self._mjs_found = (
+            self._mjs_column("reward", reward, np.float64),
+            self._mjs_column("success", success, np.bool_),
+            np.zeros(self.num_worlds, bool) if terminated is None else self._mjs_column("terminated", terminated, np.bool_),
+            None if info is None else self._mjs_info(info),
+        )
+        return self._mjs_found
+
+    def _mjs_column(self, what: str, value: Any, dtype: Any) -> np.ndarray:
+        array = np.asarray(value)
+        if array.shape != (self.num_worlds,):
+            raise ValueError(f"{what} has shape {array.shape}, expected ({self.num_worlds},): one value a world")
+        return np.ascontiguousarray(array, dtype=dtype)
+
+    def _mjs_info(self, info: Mapping[str, Any]) -> dict[str, tuple[str, int, np.ndarray]]:
+        columns = {}
+        for key, value in info.items():
+            array = np.asarray(value)
+            if array.dtype.kind not in "biuf" or array.ndim not in (1, 2) or array.shape[0] != self.num_worlds:
+                raise ValueError(
+                    f"info '{key}' is {array.dtype}{list(array.shape)}; expected numbers [{self.num_worlds}] or [{self.num_worlds}, k]"
+                )
+            kind = "i" if array.dtype.kind == "u" else array.dtype.kind
+            width = array.shape[1] if array.ndim == 2 else 0
+            columns[key] = kind, width, np.ascontiguousarray(array.reshape(self.num_worlds, -1), dtype=np.float64)
+        return columns
+
+    def _mjs_description(self, world: int) -> str:
+        return self.description(world)
+
+    def _mjs_referrals(self, world: int) -> dict[str, list[tuple[str, float]]]:
+        return {role: [(str(text), float(p)) for text, p in texts] for role, texts in self.referrals(world).items()}
+
+    def _mjs_scene_info(self, world: int) -> dict[str, str]:
+        return dict(self.scene_info(world))
+
+    def _mjs_sensors(self) -> list[Any]:
+        return list(self.sensors())
+
+    def _mjs_suite(self, names: list[str]) -> list[str] | None:
+        wanted = self.suite(names)
+        return None if wanted is None else list(wanted)
+
+
+@checked
+class WorldState:
+    """The state of one world at the start of an episode, to be written. Names are those of the model: ``"mug/mug"``."""
+
+    def __init__(self, sim: Simulation, world: int, episode: int) -> None:
+        self._sim = sim
+        self.id = world
+        """Row of the world. What an episode is must not depend on it."""
+        self.episode = episode
+        """Number of the episode."""
+
+    @property
+    def model(self) -> mujoco.MjModel:
+        """A copy of the model, for looking things up."""
+        return self._sim.model
+
+    @property
+    def qpos(self) -> np.ndarray:
+        """Joint positions ``[nq]``, live."""
+        return self._sim.qpos[self.id]
+
+    @property
+    def qvel(self) -> np.ndarray:
+        """Joint velocities ``[nv]``, live."""
+        return self._sim.qvel[self.id]
+
+    @property
+    def ctrl(self) -> np.ndarray:
+        """Controls ``[nu]``, live."""
+        return self._sim.ctrl[self.id]
+
+    @property
+    def mocap_pos(self) -> np.ndarray:
+        """Positions of mocap bodies ``[nmocap, 3]`` m, live."""
+        return self._sim.mocap_pos[self.id]
+
+    @property
+    def mocap_quat(self) -> np.ndarray:
+        """Orientations of mocap bodies ``[nmocap, 4]`` wxyz, live."""
+        return self._sim.mocap_quat[self.id]
+
+    def place(self, body: str, pos: Sequence[float], quat: Sequence[float] = (1, 0, 0, 0), velocity: Sequence[float] | None = None) -> None:
+        """Puts a free or mocap body somewhere.
+
+        Args:
+            body: its name.
+            pos: of its frame in the world, m ``[3]``.
+            quat: wxyz ``[4]``.
+            velocity: of a free body, m/s in world axes and rad/s in its own ``[6]``; at rest if not given.
+        """
+        model = self.model
+        index = self._id(mujoco.mjtObj.mjOBJ_BODY, "body", body)
+        mocap = model.body_mocapid[index]
+        if mocap >= 0:
+            self.mocap_pos[mocap], self.mocap_quat[mocap] = pos, quat
+            return
+        joint = model.body_jntadr[index]
+        if joint < 0 or model.jnt_type[joint] != mujoco.mjtJoint.mjJNT_FREE:
+            raise ValueError(f"place: body '{body}' is neither free nor a mocap body")
+        address, dof = model.jnt_qposadr[joint], model.jnt_dofadr[joint]
+        self.qpos[address : address + 3] = pos
+        self.qpos[address + 3 : address + 7] = quat
+        self.qvel[dof : dof + 6] = 0 if velocity is None else velocity
+
+    def set_joint(self, joint: str, value: float | Sequence[float], velocity: float | Sequence[float] = 0.0) -> None:
+        """Writes a joint's position (rad, m; 7 values of a free one) and velocity."""
+        model = self.model
+        index = self._id(mujoco.mjtObj.mjOBJ_JOINT, "joint", joint)
+        kind = model.jnt_type[index]
+        nq, nv = {0: (7, 6), 1: (4, 3)}.get(int(kind), (1, 1))
+        address, dof = model.jnt_qposadr[index], model.jnt_dofadr[index]
+        self.qpos[address : address + nq] = value
+        self.qvel[dof : dof + nv] = velocity
+
+    def _id(self, kind: Any, word: str, name: str) -> int:
+        index = mujoco.mj_name2id(self.model, kind, name)
+        if index < 0:
+            import difflib
+
+            count = {"body": self.model.nbody, "joint": self.model.njnt}[word]
+            names = [mujoco.mj_id2name(self.model, kind, i) or "" for i in range(count)]
+            near = difflib.get_close_matches(name, names, 3)
+            hint = f"; did you mean {' or '.join(map(repr, near))}?" if near else f"; there are {', '.join(filter(None, names[:12]))}"
+            raise UnknownNameError(f"no {word} named '{name}'{hint}")
+        return index
+
+
+def snake_case(name: str) -> str:
+    """PushCube -> push_cube"""
+    return re.sub(r"(?<=[a-z0-9])(?=[A-Z])", "_", name).lower()
+
+
+def takes_ids(function: Callable[..., Any]) -> bool:
+    """Whether evaluate() or reset() asks for the worlds it is for, besides its first argument."""
+    import inspect
+
+    return len(inspect.signature(function).parameters) > 1
+
+
+def group_slices(layout: list[tuple[str, list[float], list[float]]]) -> dict[str, slice]:
+    """Columns of an action by move group."""
+    slices, start = {}, 0
+    for name, low, _ in layout:
+        slices[name] = slice(start, start + len(low))
+        start += len(low)
+    return slices
+
+
+def episode_rng(seed: int, episode: int, stream: str) -> np.random.Generator:
+    """Random numbers of an episode: a function of these alone."""
+    return np.random.default_rng([seed, episode, *stream.encode()])
+
+
+_TASKS: dict[str, Callable[[], Task]] = {}
+
+
+def register_task(name: str, make: Callable[[], Task]) -> None:
+    """Lets ``mjs.record(name)`` and ``mjs.make_vec(name)`` find a task of yours.
+
+    Args:
+        name: not taken yet.
+        make: the class, or a function that makes one.
+    """
+    if name in task_names():
+        raise ValueError(f"there is a task called '{name}' already")
+    if not name or not callable(make):
+        raise TypeError(f"register_task: {name!r} must be a name and {make!r} a class or a function")
+    _TASKS[name] = make
+
+
+def task_names() -> list[str]:
+    """Names of the tasks there are, yours last."""
+    return [*_core.task_names(), *_TASKS]
+
+
+def task_of(task: Any) -> tuple[str, Task | None]:
+    """(name for messages and files, the object if it is written in Python)."""
+    if isinstance(task, str):
+        if task not in _TASKS:
+            return task, None
+        task = _TASKS[task]
+    if isinstance(task, type) or (callable(task) and not isinstance(task, Task)):
+        task = task()
+    if not isinstance(task, Task):
+        raise TypeError(f"task must be a mjsense.Task or the name of one ({', '.join(task_names())}), not {task!r}")
+    return task._mjs_name(), task

@@ -1,0 +1,46 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "mjsense/episode/object_sensors.h"
+
+#include "mjsense/core/error.h"
+#include "mjsense/observe/function_sensor.h"
+#include "mjsense/observe/pose_sensor.h"
+#include "mjsense/robots/grasp_state.h"
+#include "mjsense/scene/resolve.h"
+
+namespace mjsense {
+namespace {
+
+std::size_t index_of(const Task& task, const std::string& role) {
+  std::vector<std::string> roles;
+  for (const TaskObject& object : task.objects(0)) {
+    if (object.role == role) return roles.size();
+    roles.push_back(object.role);
+  }
+  throw_unknown("task '" + std::string(task.name()) + "'", "role", role, roles);
+}
+
+}  // namespace
+
+std::shared_ptr<Sensor> start_pose_sensor(const Task& task, const std::string& name,
+                                          const std::string& role) {
+  return std::make_shared<FunctionSensor<float>>(
+      name, pose_spec("world", "Pose of the object when the episode began."),
+      [&task, role](const World& world, std::span<float> row) {
+        write_pose(task.start_pose(world.id, role), row.data());
+      });
+}
+
+std::shared_ptr<Sensor> grasp_state_sensor(const Task& task, const std::string& role) {
+  std::vector<GraspStateSensor::Gripper> grippers;
+  for (const MoveGroup& group : task.robot().groups()) {
+    if (group.kind == GroupKind::kGripper)
+      grippers.push_back({group.name, name_of(task.model(), mjOBJ_BODY, group.root_body)});
+  }
+  if (grippers.empty()) return nullptr;
+  return std::make_shared<GraspStateSensor>(
+      "grasp_state_" + role,
+      BodyRef([&task, i = index_of(task, role)](int world) { return task.objects(world)[i].body; }),
+      std::move(grippers));
+}
+
+}  // namespace mjsense

@@ -1,0 +1,22 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "mjsense/episode/policy.h"
+
+#include <fmt/format.h>
+
+#include "mjsense/core/error.h"
+
+namespace mjsense {
+
+void Policy::act(const World& /*world*/, Action& /*action*/) {
+  throw ValueError(fmt::format("policy '{}' acts for all worlds at once: call act_all()", name()));
+}
+
+void Policy::reset_all(ActiveWorlds& worlds) {
+  worlds.for_each([this](const World& world) { reset(world); });
+}
+
+void Policy::act_all(ActiveWorlds& worlds, std::span<Action> actions) {
+  worlds.for_each([this, all = actions.data()](const World& world) { act(world, all[world.id]); });
+}
+
+}  // namespace mjsense

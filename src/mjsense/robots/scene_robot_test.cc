@@ -1,0 +1,108 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "mjsense/robots/scene_robot.h"
+
+#include <gmock/gmock.h>
+
+#include "mjsense/core/error.h"
+#include "mjsense/robots/robot.h"
+#include "mjsense/scene/scene.h"
+
+namespace mjsense {
+namespace {
+
+using testing::ElementsAre;
+using testing::HasSubstr;
+
+// Two hinges, each with a motor, two slides that a tendon moves, and one that nothing drives.
+constexpr const char* kArm = R"(
+<mujoco>
+  <worldbody>
+    <body name="link">
+      <joint name="a" axis="0 0 1"/><joint name="b" axis="0 1 0"/><geom size=".1"/>
+      <body><joint name="left" type="slide"/><geom size=".1"/></body>
+      <body><joint name="right" type="slide"/><geom size=".1"/></body>
+      <body><joint name="loose"/><geom size=".1"/></body>
+    </body>
+  </worldbody>
+  <tendon><fixed name="both"><joint joint="left" coef="1"/><joint joint="right" coef="1"/></fixed></tendon>
+  <actuator>
+    <motor name="motor_a" joint="a" ctrlrange="-2 2" ctrllimited="true"/>
+    <motor name="motor_b" joint="b"/>
+    <position name="fingers" tendon="both"/>
+  </actuator>
+</mujoco>)";
+
+struct SceneRobot : testing::Test {
+  static SceneCfg scene_cfg() {
+    EntityCfg arm;
+    arm.model.xml = kArm;
+    SceneCfg cfg;
+    cfg.entities = {{"arm", arm}};
+    return cfg;
+  }
+  Scene scene{scene_cfg()};
+  const mjModel* model = scene.model();
+
+  std::string error(const std::string& entity, const ActuatorGroups& groups) const {
+    try {
+      scene_robot(model, entity, groups, "task 'x'");
+      return "";
+    } catch (const Error& e) {
+      return e.what();
+    }
+  }
+};
+
+TEST_F(SceneRobot, IsWhateverHasActuators) {
+  const RobotCfg cfg = scene_robot(model, "arm", {}, "");
+  EXPECT_EQ(cfg.base_body, "mocap_base");
+  ASSERT_EQ(cfg.groups.size(), 2u);
+  EXPECT_EQ(cfg.groups[0].name, "base");
+  EXPECT_EQ(cfg.groups[1].name, "joints");
+  EXPECT_THAT(cfg.groups[1].actuators, ElementsAre("motor_a", "motor_b", "fingers"));
+  EXPECT_THAT(cfg.groups[1].joints, ElementsAre("a", "b", "left", "right", "loose"));
+
+  const RobotCfg whole = scene_robot(model, "", {}, "");
+  EXPECT_EQ(whole.base_body, "world");
+  EXPECT_THAT(whole.groups[1].actuators, ElementsAre("arm/motor_a", "arm/motor_b", "arm/fingers"));
+}
+
+TEST_F(SceneRobot, GroupsHaveTheJointsThatTheyDrive) {
+  const RobotCfg cfg =
+      scene_robot(model, "arm", {{"gripper", {"fingers"}}, {"turns", {"motor_.*"}}}, "");
+  EXPECT_THAT(cfg.groups[1].joints, ElementsAre("left", "right"));
+  EXPECT_THAT(cfg.groups[2].joints, ElementsAre("a", "b"));
+}
+
+TEST_F(SceneRobot, WithoutACommandControlsStay) {
+  Robot robot(scene_robot(model, "arm", {}, ""), model, 1, "arm/");
+  mjData* data = mj_makeData(model);
+  const World world{.id = 0, .model = model, .data = data};
+  data->ctrl[0] = 1.5;
+  data->ctrl[1] = -7;
+  Rng rng(0, 0, 0, 0);
+  robot.write_start(state_row(data), {{1, 2, 3}, {}}, rng);
+  EXPECT_EQ(data->mocap_pos[0], 1);
+  EXPECT_EQ(data->ctrl[0], 1.5);
+  mj_forward(model, data);
+  robot.reset(world);
+  EXPECT_THAT(robot.targets(0)[1].view(), ElementsAre(1.5, -7, 0));
+  Action action;
+  const double command[] = {5, 1, 2};  // the first is limited
+  action.commands[1].set(command);
+  robot.command(world, action);
+  robot.write_ctrl(world, state_row(data), nullptr);
+  EXPECT_THAT(std::vector<double>(data->ctrl, data->ctrl + 3), ElementsAre(2, 1, 2));
+  mj_deleteData(data);
+}
+
+TEST_F(SceneRobot, WrongNamesAreErrors) {
+  EXPECT_EQ(error("amr", {}),
+            "task 'x': no entity that is the robot named 'amr'; did you mean 'arm'?");
+  EXPECT_THAT(error("arm", {{"g", {"motr_a"}}}), HasSubstr("task 'x', move group 'g'"));
+  EXPECT_THAT(error("arm", {{"g", {"motor_a"}}, {"h", {"motor_.*"}}}),
+              HasSubstr("actuator 'motor_a' is in move group 'g' already"));
+}
+
+}  // namespace
+}  // namespace mjsense

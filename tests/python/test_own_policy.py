@@ -1,0 +1,286 @@
+# SPDX-License-Identifier: Apache-2.0
+import time
+
+import gymnasium
+import h5py
+import numpy as np
+import pytest
+from tasks import Cart, Driver
+from test_own_task import json_rows, record, trajectories
+
+import mjsense as mjs
+
+HOLD = np.array([0, -0.7, 0, -2.3, 0, 1.6, 0, 0])
+
+
+def pick(policy, **kwargs):
+    return mjs.make_vec("pick", policy=policy, **{"num_envs": 3, "cameras": [], "threads": 2, **kwargs})
+
+
+def test_a_function_is_a_policy(tmp_path):
+    def hold(obs):
+        return np.tile(HOLD, (len(obs["tcp_pose"]), 1))
+
+    summary = mjs.record("pick", policy=hold, out=tmp_path, episodes=1, horizon=3, cameras=[], keep_failures=True)
+    rows = trajectories(summary)[0]
+    commands = json_rows(rows["actions/commanded_action"])
+    assert commands[0] == {} and commands[3]["arm"] == pytest.approx(HOLD[:7]) and commands[3]["gripper"] == [0]
+    with h5py.File(next(summary.path.glob("*.h5"))) as file:
+        settings = file.attrs["recording"]
+    assert '"policy":"hold"' in settings
+
+
+def test_it_sees_what_the_environment_shows():
+    seen = []
+
+    class Look(mjs.Policy):
+        def act(self, obs):
+            seen.append(obs)
+            return np.tile(HOLD, (self.num_worlds, 1))
+
+    env = pick(Look)
+    observation, _ = env.reset(seed=0)
+    env.expert_action()
+
+    def same(one, other):
+        assert one.keys() == other.keys()
+        for key in one:
+            if isinstance(one[key], dict):
+                same(one[key], other[key])
+            else:
+                np.testing.assert_array_equal(one[key], other[key])
+
+    same(seen[0], observation)
+    assert not seen[0]["qpos"]["arm"].flags.writeable
+    observation = env.step(env.expert_action())[0]
+    same(seen[0], observation)  # live
+    env.close()
+
+
+def test_it_may_choose_what_it_sees():
+    class Look(mjs.Policy):
+        observation = ("qpos/arm", "tcp_pose")
+
+        def act(self, obs):
+            assert list(obs) == ["qpos", "tcp_pose"] and list(obs["qpos"]) == ["arm"]
+            return np.tile(HOLD, (self.num_worlds, 1))
+
+    env = pick(Look)
+    env.reset()
+    env.expert_action()
+    env.close()
+    Look.observation = ("qpso",)
+    with pytest.raises(ValueError, match="did you mean 'qpos'"):
+        pick(Look)
+
+
+def test_layout_and_life():
+    calls = []
+
+    class Note(mjs.Policy):
+        def initialize(self):
+            calls.append("initialize")
+
+        def reset(self, ids):
+            calls.append(ids.tolist())
+
+        def act(self, obs):
+            calls.append(self.wanted.tolist())
+            return np.zeros((3, 8))
+
+    policy = Note()
+    env = pick(policy)
+    assert policy.action_groups == {"arm": slice(0, 7), "gripper": slice(7, 8)} and policy.num_worlds == 3
+    assert policy.action_high[7] == 255 and policy.action_low.shape == (8,)
+    env.reset()
+    env.expert_action()
+    env.reset(options={"reset_mask": np.array([False, True, False])})
+    assert calls == ["initialize", [0, 1, 2], [True] * 3, [1]]
+    env.close()
+
+
+def test_groups_that_are_left_out_hold():
+    class Close(mjs.Policy):
+        def act(self, obs):
+            return {"gripper": np.full((3, 1), 255.0), "success": [False, True, False]}
+
+    env = pick(Close)
+    first, _ = env.reset(seed=0)
+    action = env.expert_action()
+    np.testing.assert_allclose(action[:, :7], first["qpos"]["arm"], atol=1e-6)
+    assert (action[:, 7] == 255).all()
+    env.close()
+
+
+def test_done_ends_an_episode(tmp_path):
+    class Stop(mjs.Policy):
+        def reset(self, ids):
+            self.left = 5
+
+        def act(self, obs):
+            self.left -= 1
+            done = np.full(self.num_worlds, self.left == 0)
+            return {"action": np.tile(HOLD, (self.num_worlds, 1)), "done": done, "success": ~done}
+
+    summary = mjs.record("pick", policy=Stop(), out=tmp_path, episodes=1, cameras=[], keep_failures=True)
+    assert summary.lengths == [6] and summary.failures == {"the policy gave up": 1}
+    rows = trajectories(summary)[0]
+    assert rows["terminated"].tolist() == [False] * 5 + [True] and not rows["truncated"].any()
+    commands = json_rows(rows["actions/commanded_action"])
+    assert commands[-1]["success"] == [0.0] and commands[-2]["success"] == [1.0]
+    assert json_rows(rows["actions/joint_pos"])[-1] == {}
+
+    env = pick(Stop)
+    env.reset()
+    for step in range(5):
+        action = env.expert_action()
+        terminated = env.step(action, done=env.expert_done)[2]
+        assert terminated.all() == (step == 4)
+    env.close()
+
+
+def test_chunks_are_asked_for_when_they_end(tmp_path):
+    class Ramp(mjs.Policy):
+        """Four commands at a time."""
+
+        def __init__(self):
+            self.asked = []
+
+        def act(self, obs):
+            self.asked.append(self.wanted.tolist())
+            k = len(self.asked)
+            return np.tile(0.1 * k + 0.01 * np.arange(4)[None, :, None], (self.num_worlds, 1, 1))
+
+    policy = Ramp()
+    summary = record(tmp_path, Cart(), policy=policy, episodes=2, worlds=2, horizon=6)
+    assert policy.asked == [[True, True], [True, True]]
+    for rows in trajectories(summary):
+        commands = [row["joints"][0] for row in json_rows(rows["actions/commanded_action"])[1:]]
+        assert commands == pytest.approx([0.1, 0.11, 0.12, 0.13, 0.2, 0.21])
+
+    # A world that begins anew asks alone; the other goes on with its chunk.
+    policy = Ramp()
+    env = mjs.make_vec(Cart(), policy=policy, num_envs=2, cameras=[], autoreset_mode="disabled")
+    env.reset()
+    env.step(env.expert_action())
+    env.reset(options={"reset_mask": np.array([False, True])})
+    np.testing.assert_allclose(env.expert_action()[:, 0], [0.11, 0.2])
+    assert policy.asked == [[True, True], [False, True]]
+    env.close()
+
+
+def test_phases_are_on_disk(tmp_path):
+    class Staged(mjs.Policy):
+        phases = {"wait": 0, "go": 7}
+
+        def act(self, obs):
+            self.phase[:] = np.where(obs["qpos"]["joints"][:, 0] > 0, 7, 0)
+            self.num_retries += 1
+            return np.ones((self.num_worlds, 1))
+
+    rows = trajectories(record(tmp_path, policy=Staged(), episodes=1))[0]
+    assert set(rows["obs/extra/policy_phase"]) <= {0, 7} and rows["obs/extra/policy_phase"][-1] == 7
+    assert rows["obs/extra/policy_num_retries"].tolist() == list(range(21))
+    assert b'"policy_phases":{"wait":0,"go":7}' in rows["obs_scene"]
+
+
+def test_random_numbers_are_of_the_episode(tmp_path):
+    class Chance(mjs.Policy):
+        def act(self, obs):
+            return np.array([[self.rng(w).uniform(-1, 1)] for w in range(self.num_worlds)])
+
+    runs = [trajectories(record(tmp_path / str(worlds), policy=Chance(), worlds=worlds, seed=3)) for worlds in (1, 3)]
+    for one, other in zip(*runs, strict=True):
+        np.testing.assert_array_equal(one["actions/commanded_action"], other["actions/commanded_action"])
+    assert not np.array_equal(runs[0][0]["actions/commanded_action"], runs[0][1]["actions/commanded_action"])
+
+
+def test_its_sensors(tmp_path):
+    class Thinker(Driver):
+        def sensors(self):
+            policy = self
+
+            class Acts(mjs.Sensor):
+                uuid = "acts"
+                observation_space = gymnasium.spaces.Box(0, 100, (1,), np.int64)
+
+                def compute(self, sim):
+                    return np.full((sim.num_worlds, 1), policy.acts)
+
+            self.own = [Acts()]
+            return self.own
+
+    task = Cart()
+    rows = trajectories(record(tmp_path, task, policy=Thinker(task), episodes=1))[0]
+    assert rows["obs/extra/acts"][:, 0].tolist() == list(range(21))
+
+
+@pytest.mark.parametrize(
+    "value, error, text",
+    [
+        (np.zeros((3, 7)), ValueError, r"policy 'wrong': act\(\) returned shape \(3, 7\), expected \(3, 8\), or \(3, H, 8\) for H steps; 8 are arm 7, gripper 1"),
+        (np.zeros(8), ValueError, r"returned shape \(8,\)"),
+        ({"arm": np.zeros((3, 8))}, ValueError, r"returned 'arm' of shape \(3, 8\), expected \(3, 7\)"),
+        ({"arms": np.zeros((3, 7))}, KeyError, "did you mean 'arm'"),
+        ({"action": np.zeros((3, 8)), "done": True}, ValueError, r"'done' of shape \(1,\), expected \(3,\)"),
+        ({"arm": np.zeros((3, 2, 7)), "gripper": np.zeros((3, 1))}, ValueError, "has 1 steps, another group 2"),
+        ("up", ValueError, None),
+        (np.full((3, 8), np.nan), ValueError, r"actions of worlds \[0, 1, 2\] are not finite"),
+    ],
+)  # fmt: skip
+def test_errors_say_what_was_expected(value, error, text):
+    class Wrong(mjs.Policy):
+        def act(self, obs):
+            return value
+
+    env = pick(Wrong)
+    env.reset()
+    with pytest.raises(error, match=text):
+        env.step(env.expert_action())
+    env.close()
+
+
+def test_errors_of_its_code_are_named(tmp_path):
+    class Broken(mjs.Policy):
+        def act(self, obs):
+            raise ArithmeticError("no")
+
+    for play in (lambda: mjs.record("pick", policy=Broken(), out=tmp_path, cameras=[]), lambda: env.expert_action()):
+        env = pick(Broken)
+        env.reset()
+        with pytest.raises(ArithmeticError, match="no") as caught:
+            play()
+        assert caught.value.__notes__ == ["in policy 'broken': act()"]
+        env.close()
+
+
+def test_by_name(tmp_path):
+    mjs.register_policy("still", lambda: mjs.policy.FunctionPolicy(lambda obs: np.zeros((len(obs["qpos"]["joints"]), 1)), "still"))
+    assert "still" in mjs.policy_names()
+    assert record(tmp_path, policy="still", episodes=1).kept == 1
+    with pytest.raises(ValueError, match="there is a policy called 'planner' already"):
+        mjs.register_policy("planner", Driver)
+    with pytest.raises(TypeError, match=r"policy must be a mjsense\.Policy, a function, or the name of one"):
+        mjs.record("pick", policy=3, out=tmp_path)
+
+
+def test_a_constant_costs_little():
+    """What a policy of Python's adds to a step of 64 worlds: the call, and reading what it returns."""
+    command = np.tile(HOLD, (64, 1))
+
+    class Constant(mjs.Policy):
+        observation = ("qpos",)
+
+        def act(self, obs):
+            return command
+
+    env = pick(Constant, num_envs=64)
+    env.reset()
+    act = env._rollout.act
+    times = []
+    for _ in range(200):
+        start = time.perf_counter()
+        act()
+        times.append(time.perf_counter() - start)
+    env.close()
+    assert np.median(times) < 200e-6  # 50 on an idle machine
