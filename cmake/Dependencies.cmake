@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: Apache-2.0
 # Everything mjsense links. Debian packages (apt.txt) and the wheel mujoco-core; nothing is downloaded at configure time.
 
-# MuJoCo's version. Where pip or a Python without the extension must know it too, a test says that they agree
+# MuJoCo's series: any 4.0.x will do. Where pip or Python must know it too, a test says that they agree
 # (tests/python/test_installed.py).
-set(MJSENSE_MUJOCO 4.0.1)
+set(MJSENSE_MUJOCO 4.0)
 
 # The installed package reads this file too (mjsenseConfig.cmake): find_package there says what is missing, an error here.
 macro(mjsense_find)
@@ -37,11 +37,12 @@ execute_process(
   COMMAND ${Python_EXECUTABLE} -c
           "import importlib.util as u; s = u.find_spec('mujoco'); print(s.submodule_search_locations[0] if s else '')"
   OUTPUT_VARIABLE MUJOCO_DIR OUTPUT_STRIP_TRAILING_WHITESPACE)
-set(MUJOCO_LIBRARY "${MUJOCO_DIR}/libmujoco.so.${MJSENSE_MUJOCO}")
-if(NOT MUJOCO_DIR OR NOT EXISTS "${MUJOCO_LIBRARY}")
+file(GLOB MUJOCO_LIBRARIES "${MUJOCO_DIR}/libmujoco.so.${MJSENSE_MUJOCO}.*")
+if(NOT MUJOCO_DIR OR NOT MUJOCO_LIBRARIES)
   mjsense_missing("MuJoCo ${MJSENSE_MUJOCO} not found in ${Python_EXECUTABLE}: run ./dev setup, or pip install \
-'mujoco-core==${MJSENSE_MUJOCO}' there, or name another Python by -DPython_EXECUTABLE=...")
+'mujoco-core==${MJSENSE_MUJOCO}.*' there, or name another Python by -DPython_EXECUTABLE=...")
 endif()
+list(GET MUJOCO_LIBRARIES -1 MUJOCO_LIBRARY)
 if(NOT TARGET mujoco::mujoco)
   add_library(mujoco::mujoco SHARED IMPORTED GLOBAL)
   set_target_properties(mujoco::mujoco PROPERTIES IMPORTED_LOCATION ${MUJOCO_LIBRARY}

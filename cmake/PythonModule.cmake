@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-# The Python package. The extension is mjsense/_core.abi3.so: nanobind in split mode (its run-time part is the package
+# The Python package. It names no libmujoco: that of the installed mujoco-core is loaded before (mjsense/_libmujoco.py). The extension is mjsense/_core.abi3.so: nanobind in split mode (its run-time part is the package
 # nanobind-backend), so that one wheel serves every CPython from 3.11 on. It is made of
 # python/bindings, which stands above every room of C++.
 find_package(Python 3.11 REQUIRED COMPONENTS Interpreter Development.Module)
@@ -9,7 +9,7 @@ find_package(nanobind CONFIG REQUIRED)
 
 file(GLOB_RECURSE MJSENSE_PY_SOURCES CONFIGURE_DEPENDS ${PROJECT_SOURCE_DIR}/python/bindings/*.cc)
 nanobind_add_module(mjsense_python BACKEND_MODULE nanobind_backend NOMINSIZE NB_SUPPRESS_WARNINGS ${MJSENSE_PY_SOURCES})
-target_include_directories(mjsense_python PRIVATE ${PROJECT_SOURCE_DIR})
+target_include_directories(mjsense_python PRIVATE ${PROJECT_SOURCE_DIR} ${MUJOCO_DIR}/include)
 target_compile_definitions(mjsense_python PRIVATE MJSENSE_VERSION="${PROJECT_VERSION}")
 target_compile_options(mjsense_python PRIVATE -Wall -Wextra -Wno-missing-field-initializers)
 
@@ -27,7 +27,7 @@ target_link_options(mjsense_python PRIVATE -Wl,--exclude-libs,ALL -Wl,-Bsymbolic
 # build/<preset>/python is a ready package: the extension, and links to the Python files. PYTHONPATH=build/dev/python.
 set(MJSENSE_PY_DIR ${PROJECT_BINARY_DIR}/python/mjsense)
 set_target_properties(mjsense_python PROPERTIES OUTPUT_NAME _core LIBRARY_OUTPUT_DIRECTORY ${MJSENSE_PY_DIR}
-                                                INSTALL_RPATH "$ORIGIN/../mujoco")
+                                                MJSENSE_MUJOCO_LATER ON SKIP_BUILD_RPATH ON)
 file(GLOB_RECURSE MJSENSE_PY_FILES CONFIGURE_DEPENDS RELATIVE ${PROJECT_SOURCE_DIR}/python/mjsense
      ${PROJECT_SOURCE_DIR}/python/mjsense/*.py ${PROJECT_SOURCE_DIR}/python/mjsense/py.typed)
 foreach(file IN LISTS MJSENSE_PY_FILES)

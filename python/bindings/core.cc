@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // Errors, specs and versions in Python.
 
-#include <mujoco/mujoco.h>
 #include <nanobind/nanobind.h>
 #include <nanobind/stl/string.h>
 
@@ -52,9 +51,6 @@ std::string spec_repr(const SensorSpec& s) {
 void bind_core(nb::module_& m) {
   nb::register_exception_translator(translate);
   m.attr("__version__") = MJSENSE_VERSION;
-  m.def(
-      "mujoco_version", [] { return std::string(mj_versionString()); },
-      "Version of the libmujoco that is loaded.");
 
   nb::class_<SensorSpec>(m, "SensorSpec", "What a measurement is, apart from its value.")
       .def_prop_ro(

@@ -9,6 +9,7 @@ NB_MODULE(_core, m) {
   m.doc() = "The C++ side of mjsense.";
   // Interpreters tear modules down in no order we control; a leak report there tells users nothing.
   nanobind::set_leak_warnings(false);
+  mjsense::python::bind_libmujoco(m);
   mjsense::python::bind_core(m);
   mjsense::python::bind_scene(m);
   mjsense::python::bind_simulation(m);

@@ -1,13 +1,13 @@
 # SPDX-License-Identifier: Apache-2.0
 """mjsense: batched sensors for MuJoCo, from the simulator to the policy to the disk."""
 
-import mujoco as _mujoco  # first: it loads the libmujoco that the extension shares
+from mjsense import _libmujoco
 
-_MUJOCO = "4.0.1"
-if _mujoco.mj_versionString() != _MUJOCO:
-    raise ImportError(
-        f"mjsense is built for MuJoCo {_MUJOCO}, found {_mujoco.mj_versionString()}: pip install 'mujoco-core=={_MUJOCO}'"
-    )
+_libmujoco.load()  # first: the extension shares what `import mujoco` loads
+
+from mjsense import _core
+
+_libmujoco.check(_core)
 
 from mjsense import configs, effects, observations
 from mjsense._core import SensorSpec, __version__, embedded_models, robot_names

@@ -4,6 +4,8 @@
 import re
 from pathlib import Path
 
+from mjsense import _libmujoco
+
 ROOT = Path(__file__).parents[2]
 PUBLIC = re.findall(r"^  (mjsense/\S+\.h)$", (ROOT / "cmake/PublicHeaders.cmake").read_text(), re.MULTILINE)
 
@@ -25,11 +27,8 @@ def test_the_umbrella_is_every_public_header():
     assert ["mjsense/mjsense.h", *includes("mjsense/mjsense.h")] == PUBLIC
 
 
-def test_one_version_of_mujoco():
-    version = re.search(r"set\(MJSENSE_MUJOCO (\S+)\)", (ROOT / "cmake/Dependencies.cmake").read_text())[1]
-    for file, found in {
-        "pyproject.toml": r"mujoco-core==([\d.]+)",
-        "requirements.txt": r"mujoco-core==([\d.]+)",
-        "python/mjsense/__init__.py": r'_MUJOCO = "([\d.]+)"',
-    }.items():
-        assert set(re.findall(found, (ROOT / file).read_text())) == {version}, file
+def test_one_series_of_mujoco():
+    series = re.search(r"set\(MJSENSE_MUJOCO (\S+)\)", (ROOT / "cmake/Dependencies.cmake").read_text())[1]
+    assert series == ".".join(map(str, _libmujoco.SERIES))
+    for file in ("pyproject.toml", "requirements.txt", "python/mjsense/_libmujoco.py"):
+        assert set(re.findall(r"mujoco-core>=[\d.]+,<[\d.]+", (ROOT / file).read_text())) == {_libmujoco.REQUIREMENT}, file

@@ -3,11 +3,16 @@
 
 #include <fmt/format.h>
 
+#include <cstddef>
+#include <cstring>
 #include <filesystem>
 #include <vector>
 
 #include "mjsense/core/error.h"
 #include "mjsense/scene/resolve.h"
+
+// Null in MuJoCo 4.0.0.
+extern "C" __attribute__((weak)) const char* mjs_getInStringVec(const mjStringVec* source, int i);
 
 namespace mjsense {
 namespace {
@@ -58,6 +63,19 @@ class Adopter {
   Vfs& vfs_;
 };
 
+// Name `i` of a list; null beyond its end.
+const char* name_in(const mjStringVec* names, int i) {
+  if (mjs_getInStringVec) return mjs_getInStringVec(names, i);
+  // MuJoCo 4.0.0 has no such function. Its list is a vector of its own standard library's strings, of which it reads one.
+  constexpr std::ptrdiff_t kString = 24;
+  struct {
+    const char *begin, *end;
+  } list;
+  std::memcpy(&list, names, sizeof list);
+  if (!list.begin || i >= (list.end - list.begin) / kString) return nullptr;
+  return mjs_getString(reinterpret_cast<const mjString*>(list.begin + i * kString));
+}
+
 }  // namespace
 
 void adopt_assets(mjSpec* child, const ModelSource& source, const std::string& entity, Vfs& vfs) {
@@ -78,7 +96,7 @@ void adopt_assets(mjSpec* child, const ModelSource& source, const std::string& e
     rename(e, texture->file, true);
     const char* dir = mjs_getString(mjs_getCompiler(e)->texturedir);
     for (int i = 0; i < 6; ++i) {
-      const char* file = mjs_getInStringVec(texture->cubefiles, i);
+      const char* file = name_in(texture->cubefiles, i);
       if (!file || !*file) continue;
       mjs_setInStringVec(texture->cubefiles, i, adopt(e, dir, file).c_str());
     }

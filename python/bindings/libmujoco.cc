@@ -1,0 +1,108 @@
+// SPDX-License-Identifier: Apache-2.0
+// Is the libmujoco that Python has loaded the one that this was compiled for? The extension is not linked to a file of a certain
+// name (mjsense/_libmujoco.py loads what is installed), so it looks at the structs that both sides read and write.
+
+#include <mujoco/mjbatch.h>
+#include <mujoco/mujoco.h>
+#include <nanobind/nanobind.h>
+#include <nanobind/stl/string.h>
+
+#include <cstddef>
+#include <cstring>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "python/bindings/bindings.h"
+
+namespace mjsense::python {
+
+namespace nb = nanobind;
+
+namespace {
+
+constexpr std::size_t kBeyond = 1024;  // how much larger than ours a struct is looked for
+constexpr unsigned char kFirst = 0xA5, kSecond = 0x5A;
+
+// Bytes that `set_default` writes from the beginning of a T on, rounded up as the compiler pads T.
+template <class T>
+std::size_t written(void (*set_default)(T*)) {
+  constexpr std::size_t bytes = sizeof(T) + kBeyond;
+  constexpr std::size_t words = (bytes + sizeof(std::max_align_t) - 1) / sizeof(std::max_align_t);
+  std::vector<std::max_align_t> memory[2] = {std::vector<std::max_align_t>(words),
+                                             std::vector<std::max_align_t>(words)};
+  const unsigned char* rows[2];
+  for (int i = 0; i < 2; ++i) {
+    std::memset(memory[i].data(), i == 0 ? kFirst : kSecond, words * sizeof(std::max_align_t));
+    set_default(reinterpret_cast<T*>(memory[i].data()));
+    rows[i] = reinterpret_cast<const unsigned char*>(memory[i].data());
+  }
+  std::size_t last = bytes;
+  while (last > 0 && rows[0][last - 1] == kFirst && rows[1][last - 1] == kSecond) --last;
+  return (last + alignof(T) - 1) / alignof(T) * alignof(T);
+}
+
+class Comparison {
+ public:
+  template <class T>
+  void of(const char* name, void (*set_default)(T*)) {
+    const std::size_t found = written(set_default);
+    if (found != sizeof(T)) {
+      add(std::string(name) + " has " + std::to_string(found) + " bytes, expected " +
+          std::to_string(sizeof(T)));
+    }
+  }
+  void add(const std::string& text) { text_ += (text_.empty() ? "" : "; ") + text; }
+  const std::string& text() const { return text_; }
+
+ private:
+  std::string text_;
+};
+
+// mjModel and mjData end with the same number, which compilation gives to both.
+bool model_and_data_agree() {
+  const std::unique_ptr<mjSpec, decltype(&mj_deleteSpec)> spec(mj_makeSpec(), &mj_deleteSpec);
+  const std::unique_ptr<mjModel, decltype(&mj_deleteModel)> model(mj_compile(spec.get(), nullptr),
+                                                                  &mj_deleteModel);
+  if (!model) return false;
+  const std::unique_ptr<mjData, decltype(&mj_deleteData)> data(mj_makeData(model.get()),
+                                                               &mj_deleteData);
+  return data && model->signature != 0 && model->signature == data->signature;
+}
+
+// What differs; empty if nothing does.
+std::string layout_difference() {
+  Comparison compare;
+  compare.of("mjOption", &mj_defaultOption);
+  compare.of("mjVisual", &mj_defaultVisual);
+  compare.of("mjSpec", &mjs_defaultSpec);
+  compare.of("mjsBody", &mjs_defaultBody);
+  compare.of("mjsCamera", &mjs_defaultCamera);
+  compare.of("mjsGeom", &mjs_defaultGeom);
+  compare.of("mjsHField", &mjs_defaultHField);
+  compare.of("mjsJoint", &mjs_defaultJoint);
+  compare.of("mjsMesh", &mjs_defaultMesh);
+  compare.of("mjsSensor", &mjs_defaultSensor);
+  compare.of("mjsSite", &mjs_defaultSite);
+  compare.of("mjsTexture", &mjs_defaultTexture);
+  compare.of("mjvOption", &mjv_defaultOption);
+  compare.of("mjvScene", &mjv_defaultScene);
+  compare.of("mjBatchConfig", &mjb_defaultConfig);
+  // Only now: what is below follows pointers.
+  if (compare.text().empty() && !model_and_data_agree())
+    compare.add("mjModel or mjData is not as expected");
+  return compare.text();
+}
+
+}  // namespace
+
+void bind_libmujoco(nb::module_& m) {
+  m.attr("mujoco_headers") = mjVERSION_HEADER;
+  m.def(
+      "mujoco_version", [] { return std::string(mj_versionString()); },
+      "Version of the libmujoco that is loaded.");
+  m.def("mujoco_layout_difference", &layout_difference,
+        "How its structs differ from those this was compiled with; empty: they do not.");
+}
+
+}  // namespace mjsense::python
