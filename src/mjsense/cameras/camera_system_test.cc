@@ -1,0 +1,289 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "mjsense/cameras/camera_system.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <functional>
+#include <nlohmann/json.hpp>
+#include <numbers>
+
+#include "mjsense/cameras/visibility.h"
+#include "mjsense/core/error.h"
+#include "mjsense/rays/ray_scene.h"
+#include "mjsense/sensors/camera/camera_sensor_cfg.h"
+
+namespace mjsense {
+namespace {
+
+using ::testing::HasSubstr;
+
+constexpr double kDeg = std::numbers::pi / 180;
+
+// A robot with a camera on a turned body, a ball, and a wall east of it.
+constexpr char kXml[] = R"(
+<mujoco>
+  <worldbody>
+    <light pos="0 0 3"/>
+    <geom name="floor" type="plane" size="3 3 .1" pos="0 0 -1"/>
+    <body name="wall" pos=".4 0 0"><geom type="box" size=".01 2 2"/></body>
+    <body name="ball"><geom type="sphere" size=".1"/></body>
+    <body name="robot_0/base" pos="0 0 .3" euler="0 0 90">
+      <geom type="box" size=".01 .01 .01"/>
+      <camera name="robot_0/eye" pos=".1 .2 .3" euler="10 20 30" fovy="50"/>
+    </body>
+  </worldbody>
+</mujoco>)";
+
+class Hooks final : public WorldHooks {
+ public:
+  explicit Hooks(std::function<void(const World&)> body) : body_(std::move(body)) {}
+  void substep(const World& /*world*/) override {}
+  void reset(const World& /*world*/) override {}
+  void refreshed(const World& world) override { body_(world); }
+
+ private:
+  std::function<void(const World&)> body_;
+};
+
+struct Bench {
+  std::shared_ptr<Simulation> sim;
+  CameraSystem cameras;
+
+  explicit Bench(CameraSystemCfg cfg, int worlds = 1)
+      : cameras(std::move(cfg), "robot_0/", "base") {
+    SceneCfg scene;
+    scene.base.xml = kXml;
+    for (std::size_t i = 0; i < cameras.cfg().cameras.size(); ++i) {
+      const auto& mounted = cameras.mounted(static_cast<int>(i));
+      if (!mounted.is_new) continue;
+      auto camera = std::make_shared<CameraSensorCfg>();
+      camera->name = mounted.camera;
+      camera->parent_body = mounted.body;
+      write_vec(mounted.pose.p, camera->pos.data());
+      write_quat(mounted.pose.q, camera->quat.data());
+      camera->fovy = mounted.fovy;
+      scene.sensors.push_back(camera);
+    }
+    sim = std::make_shared<Simulation>(std::make_shared<Scene>(scene),
+                                       SimulationCfg{.num_worlds = worlds});
+    cameras.initialize(*sim);
+  }
+  int body(const char* name) const { return mj_name2id(sim->model(), mjOBJ_BODY, name); }
+  // The first reason why a camera of some world has no place.
+  std::string place(std::uint64_t seed, const std::vector<std::uint64_t>& episodes) {
+    std::vector<std::string> why(sim->num_worlds());
+    const int objects[] = {body("ball")};
+    Hooks hooks([&](const World& w) {
+      why[w.id] = cameras.place(w, seed, episodes[w.id], {0, 0, 0}, objects);
+    });
+    sim->worlds().visit(all_worlds, hooks);
+    sim->worlds().model_changed();
+    sim->forward();
+    for (const std::string& text : why) {
+      if (!text.empty()) return text;
+    }
+    return "";
+  }
+  Pose pose(const char* camera, int world = 0) const {
+    Pose found;
+    Hooks hooks([&](const World& w) {
+      const int id = mj_name2id(w.model, mjOBJ_CAMERA, camera);
+      if (w.id == world)
+        found = pose_from_mat(w.data->cam_xpos + 3 * id, w.data->cam_xmat + 9 * id);
+    });
+    sim->worlds().visit(all_worlds, hooks);
+    return found;
+  }
+};
+
+CameraMountCfg mount(const char* name, MountKind kind) {
+  CameraMountCfg c;
+  c.name = name;
+  c.mount = kind;
+  if (kind == MountKind::kMjcf) c.camera = "eye";
+  return c;
+}
+
+Vec3 forward(const Pose& pose) { return rotate(pose.q, {0, 0, -1}); }
+Vec3 up(const Pose& pose) { return rotate(pose.q, {0, 1, 0}); }
+
+void expect_near(Vec3 a, Vec3 b, double tolerance) {
+  EXPECT_NEAR(norm(a - b), 0, tolerance) << a.x << " " << a.y << " " << a.z;
+}
+
+TEST(LookAt, LooksAtTheTargetWithUpUp) {
+  const Pose pose = look_at({1, 2, 3}, {1, 5, 3}, {0, 0, 1});
+  expect_near(forward(pose), {0, 1, 0}, 1e-12);
+  expect_near(up(pose), {0, 0, 1}, 1e-12);
+  // Straight down "up" says nothing: x does.
+  expect_near(up(look_at({0, 0, 1}, {0, 0, 0}, {0, 0, 1})), {1, 0, 0}, 1e-12);
+  expect_near(up(look_at({0, 0, 0}, {1, 0, 0}, {1, 0, 0})), {0, 1, 0}, 1e-12);
+}
+
+TEST(CameraSystem, MountsStandWhereTheyAreSaidTo) {
+  CameraSystemCfg cfg;
+  cfg.cameras = {mount("wrist", MountKind::kMjcf), mount("shoulder", MountKind::kBody),
+                 mount("above", MountKind::kLookAt), mount("corner", MountKind::kFixed)};
+  cfg.cameras[1].pos = {1, 0, 0};
+  cfg.cameras[2].pos = {0, 0, 1};
+  cfg.cameras[2].target = {1, 0, 1};
+  cfg.cameras[3].pos = {0, -2, 0};
+  Bench bench(cfg);
+  EXPECT_FALSE(bench.cameras.varies());
+  EXPECT_EQ(bench.cameras.mounted(0).camera, "robot_0/eye");
+  expect_near(bench.pose("shoulder").p, {0, 1, .3}, 1e-12);  // the base is turned by 90 degrees
+  expect_near(forward(bench.pose("shoulder")), {0, 0, -1}, 1e-12);
+  expect_near(bench.pose("above").p, {0, 0, 1.3}, 1e-12);
+  expect_near(forward(bench.pose("above")), {0, 1, 0}, 1e-12);
+  expect_near(forward(bench.pose("corner")), {0, 1, 0}, 1e-12);
+}
+
+TEST(CameraSystem, NoiseIsBoundedAndOfTheEpisodeAlone) {
+  CameraSystemCfg cfg;
+  cfg.cameras = {mount("wrist", MountKind::kMjcf), mount("corner", MountKind::kFixed)};
+  cfg.cameras[0].pos_noise = {.01, 0, 0};  // along its own x
+  cfg.cameras[0].rot_noise = {0, 0, 5};
+  cfg.cameras[0].fovy_noise = 4;
+  cfg.cameras[1].pos = {0, -2, 0};
+  cfg.cameras[1].pos_noise = {0, 0, .5};  // towards what it looks at
+  Bench bench(cfg, 3), other(cfg, 1);
+  const Pose rest = bench.pose("robot_0/eye");
+  double most = 0;
+  for (std::uint64_t episode = 0; episode < 40; episode += 2) {
+    ASSERT_EQ(bench.place(7, {episode, episode + 1, episode}), "");
+    ASSERT_EQ(other.place(7, {episode + 1}), "");
+    EXPECT_EQ(bench.cameras.frozen(0), bench.cameras.frozen(2));
+    EXPECT_EQ(bench.cameras.frozen(1), other.cameras.frozen(0));
+    EXPECT_NE(bench.cameras.frozen(0), bench.cameras.frozen(1));
+    const Pose now = bench.pose("robot_0/eye");
+    const Vec3 moved = rotate(conjugate(rest.q), now.p - rest.p);
+    EXPECT_LE(std::abs(moved.x), .01 + 1e-9);
+    EXPECT_NEAR(moved.y, 0, 1e-9);
+    EXPECT_NEAR(moved.z, 0, 1e-9);
+    expect_near(forward(now), forward(rest), 1e-6);  // it turned about its own axis
+    EXPECT_LE(angle_between(rest.q, now.q), 5 * kDeg + 1e-9);
+    most = std::max(most, angle_between(rest.q, now.q));
+    const Pose corner = bench.pose("corner");
+    EXPECT_NEAR(corner.p.x, 0, 1e-9);
+    EXPECT_NEAR(corner.p.y, -2, .5);
+    EXPECT_NE(corner.p.y, -2);
+    const auto frozen = nlohmann::json::parse(bench.cameras.frozen(0));
+    EXPECT_EQ(frozen["wrist"]["body"], "robot_0/base");
+    EXPECT_NEAR(frozen["wrist"]["fovy"].get<double>(), 50, 4);
+    EXPECT_NEAR(frozen["corner"]["pos"][1].get<double>(), corner.p.y, 1e-12);
+    EXPECT_NEAR(frozen["corner"]["forward"][1].get<double>(), 1, 1e-9);
+  }
+  EXPECT_GT(most, 3 * kDeg);
+}
+
+TEST(CameraSystem, ACameraDrawsTheSameBesideOthers) {
+  CameraSystemCfg one, two;
+  CameraMountCfg orbit = mount("exo", MountKind::kOrbit);
+  orbit.distance_range = {.5, .8};
+  one.cameras = {orbit};
+  two.cameras = {mount("wrist", MountKind::kMjcf), orbit};
+  two.cameras[0].fovy_noise = 3;
+  Bench a(one), b(two);
+  ASSERT_EQ(a.place(1, {5}), "");
+  ASSERT_EQ(b.place(1, {5}), "");
+  const Pose pa = a.pose("exo"), pb = b.pose("exo");
+  EXPECT_EQ(pa.p.x, pb.p.x);
+  EXPECT_EQ(pa.q.w, pb.q.w);
+}
+
+// A ball of radius r at distance d on the axis covers a disc of f tan(asin(r / d)) pixels.
+TEST(Visibility, ABallCoversItsDisc) {
+  Bench bench(CameraSystemCfg{});
+  std::vector<double> shares;
+  const int bodies[] = {bench.body("ball"), bench.body("wall")};
+  const int width = 640, height = 480;
+  for (double distance : {.5, 1.0, 2.0}) {
+    Hooks hooks([&](const World& w) {
+      bench.sim->rays().update(w);
+      shares = visible_shares(bench.sim->rays(), 0,
+                              {look_at({0, -distance, 0}, {0, 0, 0}, {0, 0, 1}), 60, width, height},
+                              bodies);
+    });
+    bench.sim->worlds().visit(all_worlds, hooks);
+    const double focal = .5 * height / std::tan(30 * kDeg);
+    const double radius = focal * std::tan(std::asin(.1 / distance));
+    const double share = std::numbers::pi * radius * radius / (width * height);
+    EXPECT_NEAR(shares[0], share, .02 * share + 1e-4);
+    EXPECT_GT(shares[1], 0);
+  }
+}
+
+TEST(CameraSystem, AnOrbitFindsAPlaceThatSeesTheObject) {
+  CameraSystemCfg cfg;
+  cfg.cameras = {mount("exo", MountKind::kOrbit)};
+  CameraMountCfg& c = cfg.cameras[0];
+  c.distance_range = {.6, 1};
+  c.height_range = {-.1, .1};
+  c.min_visible = .005;
+  Bench bench(cfg);
+  for (std::uint64_t episode = 0; episode < 30; ++episode) {
+    ASSERT_EQ(bench.place(0, {episode}), "");
+    const Pose pose = bench.pose("exo");
+    const Vec3 flat{pose.p.x, pose.p.y, 0};
+    EXPECT_GE(norm(flat), .6 - 1e-9);
+    EXPECT_LE(norm(flat), 1 + 1e-9);
+    EXPECT_LE(std::abs(pose.p.z), .1 + 1e-9);
+    expect_near(forward(pose), normalized(-pose.p), 1e-9);
+    EXPECT_LT(pose.p.x, .4);  // not behind the wall
+  }
+}
+
+TEST(CameraSystem, WithoutAPlaceTheEpisodeFailsOrTakesTheBest) {
+  CameraSystemCfg cfg;
+  cfg.cameras = {mount("exo", MountKind::kOrbit)};
+  CameraMountCfg& c = cfg.cameras[0];
+  c.distance_range = {.6, 1};
+  c.azimuth_range = {-10, 10};  // behind the wall
+  c.min_visible = .005;
+  c.max_attempts = 5;
+  EXPECT_THAT(Bench(cfg).place(0, {0}),
+              HasSubstr("camera 'exo': of 5 poses around (0.000, 0.000, 0.000) the best shows"));
+  c.relaxed = true;
+  EXPECT_EQ(Bench(cfg).place(0, {0}), "");
+}
+
+TEST(CameraSystem, FaultsOfAConfigurationNameTheCamera) {
+  const auto fault = [](const std::function<void(CameraMountCfg&)>& change, MountKind kind) {
+    CameraSystemCfg cfg;
+    cfg.cameras = {mount("eye_1", kind)};
+    cfg.cameras[0].pos = {1, 0, 0};
+    change(cfg.cameras[0]);
+    try {
+      CameraSystem(cfg, "robot_0/", "base");
+    } catch (const ValueError& e) {
+      return std::string(e.what());
+    }
+    return std::string();
+  };
+  EXPECT_THAT(fault([](auto& c) { c.camera = ""; }, MountKind::kMjcf), HasSubstr("camera 'eye_1'"));
+  EXPECT_THAT(fault([](auto& c) { c.camera = "x"; }, MountKind::kBody),
+              HasSubstr("for mount 'mjcf'"));
+  EXPECT_THAT(fault([](auto& c) { c.body = "x"; }, MountKind::kOrbit),
+              HasSubstr("this is 'orbit'"));
+  EXPECT_THAT(fault([](auto& c) { c.quat = {}; }, MountKind::kBody), HasSubstr("quat is zero"));
+  EXPECT_THAT(fault([](auto& c) { c.target = c.pos; }, MountKind::kFixed), HasSubstr("nowhere"));
+  EXPECT_THAT(fault(
+                  [](auto& c) {
+                    c.distance_range = {2, 1};
+                  },
+                  MountKind::kOrbit),
+              HasSubstr("distance_range is from 2 to 1"));
+  EXPECT_THAT(fault([](auto& c) { c.fovy_noise = 50; }, MountKind::kOrbit), HasSubstr("leaves"));
+  CameraSystemCfg twice;
+  twice.cameras = {mount("a", MountKind::kOrbit), mount("a", MountKind::kMjcf)};
+  EXPECT_THROW(CameraSystem(twice, "robot_0/", "base"), ValueError);
+  CameraSystemCfg unknown;
+  unknown.cameras = {mount("wrist", MountKind::kMjcf)};
+  unknown.cameras[0].camera = "ey";
+  EXPECT_THROW(Bench bench(unknown), KeyError);
+}
+
+}  // namespace
+}  // namespace mjsense

@@ -1,0 +1,61 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "mjsense/cameras/visibility.h"
+
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+
+#include "mjsense/observe/frame.h"
+
+namespace mjsense {
+namespace {
+
+constexpr double kMostRays = 16384;
+
+}  // namespace
+
+std::vector<double> visible_shares(const RayScene& rays, int world, const Lookout& from,
+                                   std::span<const int> bodies) {
+  const mjModel* m = rays.model();
+  RayFilter filter;
+  filter.groups = 0b111;
+  filter.backfaces = RayFilter::Backfaces::kCull;
+  RayScratch scratch(rays.num_objects());
+
+  const double per_ray = std::max(1.0, std::sqrt(from.width * from.height / kMostRays));
+  const int columns = std::max(1, static_cast<int>(from.width / per_ray));
+  const int rows = std::max(1, static_cast<int>(from.height / per_ray));
+  const double focal =
+      0.5 * from.height / std::tan(0.5 * from.fovy * std::numbers::pi / 180);  // pixels
+
+  std::vector<std::int64_t> seen(m->ngeom, 0);
+  RayPacket packet{};
+  write_vec(from.camera.p, packet.origin);
+  HitPacket hits;
+  for (int row = 0; row < rows; ++row) {
+    const double y = 0.5 * from.height - (row + 0.5) * from.height / rows;
+    for (int first = 0; first < columns; first += kPacket) {
+      for (int k = 0; k < kPacket; ++k) {
+        const double x = (first + k + 0.5) * from.width / columns - 0.5 * from.width;
+        const Vec3 d = rotate(from.camera.q, normalized(Vec3{x, y, -focal}));
+        for (int i = 0; i < 3; ++i) packet.d[i][k] = static_cast<float>(d[i]);
+        packet.tmax[k] = first + k < columns ? kNoHit : -1.0f;
+      }
+      rays.trace(world, filter, packet, hits, scratch);
+      for (int k = 0; k < kPacket; ++k) {
+        if (hits.geom[k] >= 0 && hits.geom[k] < m->ngeom) ++seen[hits.geom[k]];
+      }
+    }
+  }
+  std::vector<double> shares;
+  for (int body : bodies) {
+    std::int64_t count = 0;
+    for (int g = 0; g < m->ngeom; ++g) {
+      if (seen[g] > 0 && is_below(m, m->geom_bodyid[g], body)) count += seen[g];
+    }
+    shares.push_back(static_cast<double>(count) / (static_cast<double>(rows) * columns));
+  }
+  return shares;
+}
+
+}  // namespace mjsense
