@@ -1,0 +1,246 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "mjsense/scenes/episode_scene.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <filesystem>
+#include <numbers>
+
+#include "mjsense/core/error.h"
+#include "mjsense/scene/resolve.h"
+
+namespace mjsense {
+namespace {
+
+using std::numbers::pi;
+
+constexpr double kHand = 0.085;    // m, what the usual grippers open
+constexpr double kReach = 0.25;    // m, half of what is still an object to carry
+constexpr double kInside = 0.002;  // m
+
+Quat rest_of(std::string_view name) {
+  if (name == "side") return axis_angle({0, 1, 0}, 0.5 * pi);
+  if (name == "end") return axis_angle({1, 0, 0}, 0.5 * pi);
+  return {};
+}
+
+std::string last_part(const std::string& name) { return name.substr(name.rfind('/') + 1); }
+
+bool is_free(const mjModel* m, int body) {
+  return m->body_jntnum[body] == 1 && m->jnt_type[m->body_jntadr[body]] == mjJNT_FREE;
+}
+
+bool touches(const mjModel* m, int body) {
+  for (int g = m->body_geomadr[body]; g >= 0 && g < m->body_geomadr[body] + m->body_geomnum[body];
+       ++g) {
+    if (m->geom_contype[g] != 0 || m->geom_conaffinity[g] != 0) return true;
+  }
+  return false;
+}
+
+// A hand goes around its narrowest horizontal or vertical extent.
+bool can_be_held(const ObjectShape& shape) {
+  double low[3] = {1e10, 1e10, 1e10}, high[3] = {-1e10, -1e10, -1e10};
+  for (Vec3 p : shape.points) {
+    for (int i = 0; i < 3; ++i) {
+      low[i] = std::min(low[i], p[i]);
+      high[i] = std::max(high[i], p[i]);
+    }
+  }
+  double least = 1e10;
+  for (int i = 0; i < 3; ++i) least = std::min(least, high[i] - low[i]);
+  return least <= kHand && shape.reach <= kReach;
+}
+
+bool upright(const double* quat) { return std::abs(quat[1]) + std::abs(quat[2]) < 1e-9; }
+
+void apply_look(mjSpec* spec, const SceneFileCfg& cfg) {
+  if (cfg.headlight) {
+    auto& light = spec->visual.headlight;
+    for (int i = 0; i < 3; ++i) {
+      light.ambient[i] = static_cast<float>(cfg.headlight->ambient);
+      light.diffuse[i] = static_cast<float>(cfg.headlight->diffuse);
+      light.specular[i] = static_cast<float>(cfg.headlight->specular);
+    }
+  }
+  spec->visual.quality.shadowsize = 4096;
+  if (cfg.sky) {
+    mjsTexture* sky = mjs_addTexture(spec, nullptr);
+    sky->type = mjTEXTURE_SKYBOX;
+    sky->builtin = mjBUILTIN_GRADIENT;
+    std::ranges::copy(cfg.sky->top, sky->rgb1);
+    std::ranges::copy(cfg.sky->bottom, sky->rgb2);
+    sky->width = 256;
+    sky->height = 256 * 6;
+  }
+}
+
+}  // namespace
+
+EpisodeScene::EpisodeScene(SceneFileCfg cfg) : cfg_(std::move(cfg)) { check_fields(cfg_, ""); }
+
+std::string EpisodeScene::place() const { return fmt::format("scene '{}'", cfg_.name); }
+
+SceneCfg EpisodeScene::scene_cfg(const std::string& robot) const {
+  SceneCfg scene;
+  for (const SceneEntityCfg& one : cfg_.entities) {
+    EntityCfg entity;
+    const bool beside = !cfg_.folder.empty() && !one.model.starts_with("embedded:") &&
+                        std::filesystem::path(one.model).is_relative();
+    entity.model.path =
+        beside ? (std::filesystem::path(cfg_.folder) / one.model).string() : one.model;
+    entity.pos = one.pos;
+    entity.quat = one.quat;
+    scene.entities.emplace_back(one.name, entity);
+    if (scene.entities.size() == 1) scene.entities.emplace_back(robot, EntityCfg{});
+  }
+  if (scene.entities.empty()) scene.entities.emplace_back(robot, EntityCfg{});
+  scene.extent = cfg_.extent;
+  scene.options = cfg_.options;
+  scene.spec_fn = [cfg = cfg_](mjSpec* spec) { apply_look(spec, cfg); };
+  return scene;
+}
+
+void EpisodeScene::initialize(const mjModel* model, int num_worlds, std::string_view robot_prefix) {
+  model_ = model;
+  find_objects(robot_prefix);
+  find_regions();
+  present_.assign(num_worlds * objects_.size(), 1);
+}
+
+void EpisodeScene::bind(Simulation& simulation) {
+  if (!cfg_.vary.empty()) look_ = std::make_unique<Look>(cfg_.vary, simulation, place());
+}
+
+void EpisodeScene::find_objects(std::string_view robot_prefix) {
+  objects_.clear();
+  for (const SceneObjectCfg& one : cfg_.objects) {
+    const int body = resolve(model_, mjOBJ_BODY, one.body, place());
+    if (!is_free(model_, body))
+      throw ValueError(fmt::format("{}: object '{}' has no free joint", place(), one.body));
+    SceneObject object{body, last_part(one.body),       one.text, one.other_texts,
+                       {},   object_shape(model_, body)};
+    if (object.text.empty()) object.text = object.kind;
+    for (const std::string& rest : one.rests) object.rests.push_back(rest_of(rest));
+    objects_.push_back(std::move(object));
+  }
+  if (!cfg_.objects.empty()) return;
+  for (int body = 1; body < model_->nbody; ++body) {
+    const std::string name = name_of(model_, mjOBJ_BODY, body);
+    if (!is_free(model_, body) || name.empty() || name.starts_with(robot_prefix)) continue;
+    if (!touches(model_, body)) continue;
+    SceneObject object{body, last_part(name), "", {}, {Quat{}}, object_shape(model_, body)};
+    if (!can_be_held(object.shape)) continue;
+    object.text = object.kind;
+    std::ranges::replace(object.text, '_', ' ');
+    objects_.push_back(std::move(object));
+  }
+}
+
+void EpisodeScene::find_regions() {
+  regions_.clear();
+  for (const SceneRegionCfg& one : cfg_.regions) {
+    const std::string who = fmt::format("{}, region '{}'", place(), one.name);
+    const int g = resolve(model_, mjOBJ_GEOM, one.on, who);
+    const double* half = model_->geom_size + 3 * g;
+    bool level = model_->geom_type[g] == mjGEOM_BOX && upright(model_->geom_quat + 4 * g);
+    Pose pose{vec3(model_->geom_pos + 3 * g), quat(model_->geom_quat + 4 * g)};
+    Region region{};
+    region.height = pose.p.z;
+    for (int body = model_->geom_bodyid[g]; body > 0; body = model_->body_parentid[body]) {
+      const Pose of_body{vec3(model_->body_pos + 3 * body), quat(model_->body_quat + 4 * body)};
+      level = level && model_->body_jntnum[body] == 0 && upright(model_->body_quat + 4 * body);
+      pose = of_body * pose;
+      region.height = of_body.p.z + region.height;
+    }
+    region.height += half[2];
+    if (!level)
+      throw ValueError(
+          fmt::format("{}: geom '{}' must be a level box that does not move", who, one.on));
+    const auto area = [](const std::array<double, 4>& a) { return Area{a[0], a[1], a[2], a[3]}; };
+    if (one.area == std::array<double, 4>{}) {
+      const Vec3 x = rotate(pose.q, {half[0], 0, 0}), y = rotate(pose.q, {0, half[1], 0});
+      const double wide = std::abs(x.x) + std::abs(y.x), deep = std::abs(x.y) + std::abs(y.y);
+      region.area = {pose.p.x - wide, pose.p.x + wide, pose.p.y - deep, pose.p.y + deep};
+    } else {
+      region.area = area(one.area);
+    }
+    region.target_area = one.target_area ? area(*one.target_area) : region.area;
+    regions_.push_back(region);
+  }
+}
+
+Pose EpisodeScene::sample(int world, int target, std::uint64_t seed, std::uint64_t episode,
+                          Rng& rng, const StateRow& state) {
+  const auto n = static_cast<int>(objects_.size());
+  char* present = present_.data() + static_cast<std::size_t>(world) * n;
+  std::fill(present, present + n, 1);
+  if (cfg_.count[0] > 0 && n > 0) {
+    Rng draw(seed, 0, stream_of("scene/count"), episode);
+    const int most = std::min(cfg_.count[1], n), least = std::min(cfg_.count[0], n);
+    int wanted = least + static_cast<int>(draw.below(static_cast<std::uint32_t>(most - least + 1)));
+    std::fill(present, present + n, 0);
+    present[target] = 1;
+    while (--wanted > 0) {  // one of the others, each as likely
+      int k = static_cast<int>(
+          draw.below(static_cast<std::uint32_t>(std::count(present, present + n, 0))));
+      for (int i = 0; i < n; ++i) {
+        if (!present[i] && k-- == 0) present[i] = 1;
+      }
+    }
+  }
+  if (!regions_.empty() && n > 0) {
+    std::vector<Resting> resting;
+    std::vector<Pose> poses(n);
+    for (int i = 0; i < n; ++i) {
+      resting.push_back({&objects_[i].shape, objects_[i].rests});
+      poses[i].p = {100.0 + i, 100.0, 0.5};  // where nobody looks
+    }
+    lay_out(resting, target, {present, static_cast<std::size_t>(n)}, regions_,
+            {cfg_.gap, cfg_.target_gap, cfg_.drop}, rng, poses);
+    for (int i = 0; i < n; ++i) {
+      const int joint = model_->body_jntadr[objects_[i].body];
+      double* qpos = state.qpos + model_->jnt_qposadr[joint];
+      double* qvel = state.qvel + model_->jnt_dofadr[joint];
+      write_vec(poses[i].p, qpos);
+      write_quat(poses[i].q, qpos + 3);
+      std::fill(qvel, qvel + 6, 0.0);
+    }
+  }
+  const SceneRobotCfg& r = cfg_.robot;
+  Rng draw(seed, 0, stream_of("scene/robot"), episode);
+  const auto around = [&](double half) { return half > 0 ? draw.uniform(-half, half) : 0.0; };
+  const double x = r.pos[0] + around(r.pos_spread[0]), y = r.pos[1] + around(r.pos_spread[1]);
+  const double yaw = r.yaw + around(r.yaw_spread);
+  return {{x, y, r.pos[2]}, yaw == 0 ? Quat{} : axis_angle({0, 0, 1}, yaw * pi / 180)};
+}
+
+bool EpisodeScene::vary_look(int world, std::uint64_t seed, std::uint64_t episode) const {
+  if (!look_) return false;
+  Rng rng(seed, 0, stream_of("scene/look"), episode);
+  look_->vary(world, rng);
+  return true;
+}
+
+std::string EpisodeScene::fault(const World& world) const {
+  const mjModel* m = world.model;
+  for (int i = 0; i < world.data->ncon; ++i) {
+    const mjContact& contact = world.data->contact[i];
+    if (contact.exclude || contact.dist > -kInside || contact.geom[0] < 0 || contact.geom[1] < 0)
+      continue;
+    const int a = m->geom_bodyid[contact.geom[0]], b = m->geom_bodyid[contact.geom[1]];
+    for (std::size_t k = 0; k < objects_.size(); ++k) {
+      if (!present(world.id, static_cast<int>(k))) continue;
+      const int body = objects_[k].body;
+      if (m->body_rootid[a] != body && m->body_rootid[b] != body) continue;
+      const int other = m->body_rootid[a] == body ? b : a;
+      return fmt::format("{}: '{}' starts {:.1f} mm inside '{}'", place(), objects_[k].kind,
+                         -1000 * contact.dist, name_of(m, mjOBJ_BODY, other));
+    }
+  }
+  return "";
+}
+
+}  // namespace mjsense

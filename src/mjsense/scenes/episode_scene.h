@@ -1,0 +1,72 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+// A scene of data (scene_file.h) in which episodes are played: what it is compiled from, the
+// objects in it, and their places at the start of an episode. Everything that differs is a function
+// of (seed, episode).
+
+#include <memory>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "mjsense/episode/object_shape.h"
+#include "mjsense/robots/state_row.h"
+#include "mjsense/scene/scene.h"
+#include "mjsense/scenes/layout.h"
+#include "mjsense/scenes/look.h"
+#include "mjsense/scenes/scene_file.h"
+
+namespace mjsense {
+
+// A body with a free joint that a task may be about.
+struct SceneObject {
+  int body = -1;
+  std::string kind;                 // last part of its name: "mug"
+  std::string text;                 // what people call it
+  std::vector<std::string> others;  // what else they call it
+  std::vector<Quat> rests;
+  ObjectShape shape;
+};
+
+class EpisodeScene {
+ public:
+  explicit EpisodeScene(SceneFileCfg cfg);
+
+  const SceneFileCfg& cfg() const { return cfg_; }
+  // Everything but the robot, for which there is a place after the first entity, called `robot`.
+  SceneCfg scene_cfg(const std::string& robot) const;
+  // Finds objects and surfaces. Bodies of the robot, whose names start with `robot_prefix`, are no
+  // objects. Throws KeyError, ValueError; in a scene without objects only object() does.
+  void initialize(const mjModel* model, int num_worlds, std::string_view robot_prefix);
+  // For looks that vary, once there are worlds.
+  void bind(Simulation& simulation);
+
+  std::span<const SceneObject> objects() const { return objects_; }
+  std::span<const Region> regions() const { return regions_; }
+  // Whether an object takes part in the episode of this world; the others stand far away.
+  bool present(int world, int object) const { return present_[world * objects_.size() + object]; }
+
+  // The start of an episode, `target` the object that it is about: writes the objects' joints and
+  // returns where the robot's base stands. `rng` gives the places.
+  Pose sample(int world, int target, std::uint64_t seed, std::uint64_t episode, Rng& rng,
+              const StateRow& state);
+  // The episode's lights and colours; false if there is nothing to vary.
+  bool vary_look(int world, std::uint64_t seed, std::uint64_t episode) const;
+  // What is wrong with the start that this fresh world shows: an object inside something by more
+  // than 2 mm. "" if nothing is.
+  std::string fault(const World& world) const;
+
+ private:
+  void find_objects(std::string_view robot_prefix);
+  void find_regions();
+  std::string place() const;
+
+  SceneFileCfg cfg_;
+  const mjModel* model_ = nullptr;
+  std::vector<SceneObject> objects_;
+  std::vector<Region> regions_;
+  std::vector<char> present_;  // [B, objects]
+  std::unique_ptr<Look> look_;
+};
+
+}  // namespace mjsense

@@ -1,0 +1,290 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "mjsense/scenes/episode_scene.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <fstream>
+#include <functional>
+#include <numbers>
+#include <set>
+
+#include "mjsense/core/error.h"
+#include "mjsense/core/testing/temp_dir.h"
+
+namespace mjsense {
+namespace {
+
+using ::testing::HasSubstr;
+
+constexpr char kRoom[] = R"(
+<mujoco>
+  <asset>
+    <texture name="oak" type="2d" builtin="flat" rgb1="1 0 0" width="4" height="4"/>
+    <texture name="ash" type="2d" builtin="flat" rgb1="0 1 0" width="4" height="4"/>
+    <material name="top" texture="oak" rgba=".8 .6 .4 1"/>
+  </asset>
+  <worldbody>
+    <light name="lamp" pos="0 0 3" dir="0 0 -1" diffuse=".5 .5 .5"/>
+    <geom type="plane" size="2 2 .1"/>
+    <body name="table" pos="1 0 0"><geom name="top" type="box" size=".5 .4 .01" pos="0 0 .5" material="top"/></body>
+    <body name="shelf" pos="0 1 0"><geom name="board" type="box" size=".3 .2 .01" pos="0 0 1"/></body>
+  </worldbody>
+</mujoco>)";
+
+std::string object(const char* name, const char* geom) {
+  return std::string("<mujoco><worldbody><body name=\"") + name + "\"><freejoint/>" + geom +
+         "</body></worldbody></mujoco>";
+}
+
+// Files of a scene with two cubes, a can and a wardrobe.
+struct Files {
+  testing::TempDir dir;
+  SceneFileCfg cfg;
+
+  Files() {
+    write("room.xml", kRoom);
+    write("cube.xml", object("cube", R"(<geom type="box" size=".02 .02 .02"/>)"));
+    write("can.xml", object("can", R"(<geom type="cylinder" size=".03 .05"/>)"));
+    write("wardrobe.xml", object("wardrobe", R"(<geom type="box" size=".3 .3 .9" pos="0 0 .9"/>)"));
+    cfg.name = "two_tables";
+    cfg.folder = dir.path.string();
+    cfg.entities = {{"room", "room.xml"},
+                    {"a", "cube.xml", {0, 0, .2}},
+                    {"b", "cube.xml", {.2, 0, .2}},
+                    {"c", "can.xml", {.4, 0, .2}},
+                    {"w", "wardrobe.xml", {-1, -1, 0}}};
+    cfg.regions = {{"table", "room/top"}};
+  }
+  void write(const char* name, const std::string& text) const {
+    std::ofstream(dir.path / name) << text;
+  }
+};
+
+// The scene's worlds, with no robot but its place.
+struct Played {
+  EpisodeScene scene;
+  std::shared_ptr<Simulation> sim;
+
+  explicit Played(SceneFileCfg cfg, int worlds = 1) : scene(std::move(cfg)) {
+    SceneCfg whole = scene.scene_cfg("robot_0");
+    std::erase_if(whole.entities, [](const auto& entity) { return entity.first == "robot_0"; });
+    sim = std::make_shared<Simulation>(std::make_shared<Scene>(whole),
+                                       SimulationCfg{.num_worlds = worlds});
+    scene.initialize(sim->model(), worlds, "robot_0/");
+    scene.bind(*sim);
+  }
+  Pose start(std::uint64_t episode, int target = 0, int world = 0) {
+    Rng rng(3, 0, stream_of("places"), episode);
+    const Pose base = scene.sample(world, target, 3, episode, rng, state_row(sim->worlds(), world));
+    if (scene.vary_look(world, 3, episode)) sim->worlds().model_changed();
+    sim->forward();
+    return base;
+  }
+  Vec3 at(int object, int world = 0) const {
+    const mjModel* m = sim->model();
+    const double* qpos = state_row(sim->worlds(), world).qpos;
+    return vec3(qpos + m->jnt_qposadr[m->body_jntadr[scene.objects()[object].body]]);
+  }
+  std::string fault() const {
+    std::string found;
+    struct Hooks final : WorldHooks {
+      std::function<void(const World&)> body;
+      void substep(const World& /*world*/) override {}
+      void reset(const World& /*world*/) override {}
+      void refreshed(const World& world) override { body(world); }
+    } hooks;
+    hooks.body = [&](const World& world) { found = scene.fault(world); };
+    sim->worlds().visit(all_worlds, hooks);
+    return found;
+  }
+};
+
+TEST(EpisodeScene, WhatAHandCanHoldIsAnObject) {
+  const Files files;
+  Played played(files.cfg);
+  std::vector<std::string> kinds;
+  for (const SceneObject& o : played.scene.objects()) kinds.push_back(o.kind);
+  EXPECT_THAT(kinds, ::testing::ElementsAre("cube", "cube", "can"));  // not the wardrobe
+}
+
+TEST(EpisodeScene, ObjectsStandOnTheSurfaceClearOfEachOther) {
+  Files files;
+  files.cfg.regions[0].target_area = std::array<double, 4>{.9, 1.1, -.1, .1};
+  Played played(files.cfg);
+  for (std::uint64_t episode = 0; episode < 50; ++episode) {
+    played.start(episode, 2);
+    EXPECT_EQ(played.fault(), "") << episode;
+    for (int i = 0; i < 3; ++i) {
+      const Vec3 p = played.at(i);
+      EXPECT_NEAR(p.z, .51 + (i == 2 ? .05 : .02) + .0003, 1e-9);
+      EXPECT_LE(std::abs(p.x - 1), i == 2 ? .1 : .5);
+      EXPECT_LE(std::abs(p.y), i == 2 ? .1 : .4);
+      for (int k = 0; k < i; ++k) {
+        const Vec3 d = p - played.at(k);
+        const double radii = (i == 2 ? .03 : .02 * std::sqrt(2)) + .02 * std::sqrt(2);
+        EXPECT_GE(std::hypot(d.x, d.y), radii + (i == 2 ? .07 : .02) - 1e-6);
+      }
+    }
+  }
+}
+
+TEST(EpisodeScene, AStartIsOfItsSeedAndEpisodeAlone) {
+  Files files;
+  files.cfg.robot.pos_spread = {.1, .2};
+  files.cfg.robot.yaw_spread = 30;
+  Played one(files.cfg), three(files.cfg, 3);
+  const Pose base = one.start(7), other = three.start(7, 0, 2);
+  EXPECT_EQ(one.at(1).x, three.at(1, 2).x);
+  EXPECT_EQ(base.p.y, other.p.y);
+  EXPECT_NE(base.p.y, 0);
+  EXPECT_LE(std::abs(base.p.x), .1);
+  EXPECT_LE(std::abs(base.p.y), .2);
+  EXPECT_LE(angle_between(base.q, {}), std::numbers::pi / 6);
+  one.start(8);
+  EXPECT_NE(one.at(1).x, three.at(1, 2).x);
+}
+
+TEST(EpisodeScene, AsManyObjectsAsCounted) {
+  Files files;
+  files.cfg.count = {1, 2};
+  Played played(files.cfg);
+  std::set<int> counts, companions;
+  for (std::uint64_t episode = 0; episode < 60; ++episode) {
+    played.start(episode, 1);
+    EXPECT_TRUE(played.scene.present(0, 1));
+    int count = 0;
+    for (int i = 0; i < 3; ++i) {
+      const bool there = played.scene.present(0, i);
+      count += there;
+      if (there) companions.insert(i);
+      EXPECT_EQ(there, played.at(i).x < 10);
+    }
+    counts.insert(count);
+  }
+  EXPECT_THAT(counts, ::testing::ElementsAre(1, 2));
+  EXPECT_THAT(companions, ::testing::ElementsAre(0, 1, 2));
+}
+
+TEST(EpisodeScene, SeveralSurfacesAreAllUsed) {
+  Files files;
+  files.cfg.regions.push_back({"shelf", "room/board"});
+  Played played(files.cfg);
+  std::set<long> heights;
+  for (std::uint64_t episode = 0; episode < 20; ++episode) {
+    played.start(episode);
+    EXPECT_EQ(played.fault(), "");
+    heights.insert(std::lround(100 * played.at(0).z));
+  }
+  EXPECT_THAT(heights, ::testing::ElementsAre(53, 103));
+}
+
+TEST(EpisodeScene, AStartInsideSomethingIsNamed) {
+  Files files;
+  Played played(files.cfg);
+  played.start(0);
+  const mjModel* m = played.sim->model();
+  double* qpos = state_row(played.sim->worlds(), 0).qpos;
+  qpos[m->jnt_qposadr[m->body_jntadr[played.scene.objects()[0].body]] + 2] -= .01;
+  played.sim->forward();
+  EXPECT_THAT(played.fault(),
+              HasSubstr("scene 'two_tables': 'cube' starts 9.7 mm inside 'room/table'"));
+}
+
+TEST(EpisodeScene, LooksVaryWithinTheirBoundsAndOfTheEpisodeAlone) {
+  Files files;
+  SceneVaryCfg lamp, top;
+  lamp.what = VaryKind::kLight;
+  lamp.pattern = "room/.*";
+  lamp.brightness = {.5, 1.5};
+  lamp.pos = {.2, 0, 0};
+  lamp.angle = 10;
+  top.what = VaryKind::kMaterial;
+  top.pattern = "room/top";
+  top.hue = 20;
+  top.textures = {"room/oak", "room/ash"};
+  files.cfg.vary = {lamp, top};
+  Played played(files.cfg, 2);
+  mjBatch* batch = played.sim->worlds().batch();
+  const mjModel* m = played.sim->model();
+  const int light = mj_name2id(m, mjOBJ_LIGHT, "room/lamp");
+  const int material = mj_name2id(m, mjOBJ_MATERIAL, "room/top");
+  std::set<int> textures;
+  for (std::uint64_t episode = 0; episode < 40; ++episode) {
+    played.start(episode, 0, 0);
+    played.start(episode, 0, 1);
+    const auto* pos =
+        static_cast<const double*>(mjb_expanded(batch, "light_pos", nullptr, nullptr));
+    const auto* dir =
+        static_cast<const double*>(mjb_expanded(batch, "light_dir", nullptr, nullptr));
+    const auto* diffuse =
+        static_cast<const float*>(mjb_expanded(batch, "light_diffuse", nullptr, nullptr));
+    const auto* rgba = static_cast<const float*>(mjb_expanded(batch, "mat_rgba", nullptr, nullptr));
+    const auto* texture =
+        static_cast<const int*>(mjb_expanded(batch, "mat_texid", nullptr, nullptr));
+    ASSERT_TRUE(pos && dir && diffuse && rgba && texture);
+    for (int w = 0; w < 2; ++w) {
+      const double* p = pos + 3 * (w * m->nlight + light);
+      EXPECT_LE(std::abs(p[0]), .2);
+      EXPECT_EQ(p[1], 0);
+      EXPECT_EQ(p[0], pos[3 * light]);
+      const Vec3 d = vec3(dir + 3 * (w * m->nlight + light));
+      EXPECT_NEAR(norm(d), 1, 1e-12);
+      EXPECT_GE(-d.z, std::cos(10 * std::numbers::pi / 180) - 1e-12);
+      const float* colour = diffuse + 3 * (w * m->nlight + light);
+      EXPECT_GE(colour[0], .25f);
+      EXPECT_LE(colour[0], .75f);
+      EXPECT_FLOAT_EQ(colour[0], colour[2]);  // grey stays grey
+      const float* brown = rgba + 4 * (w * m->nmat + material);
+      EXPECT_FLOAT_EQ(std::max({brown[0], brown[1], brown[2]}), .8f);
+      textures.insert(texture[mjNTEXROLE * (w * m->nmat + material) + mjTEXROLE_RGB]);
+    }
+  }
+  EXPECT_EQ(textures.size(), 2u);
+}
+
+TEST(ShiftColour, TurnsTheHueScalesTheValue) {
+  float red[3] = {1, 0, 0};
+  shift_colour(120, 0, .5, red);
+  EXPECT_NEAR(red[0], 0, 1e-6);
+  EXPECT_NEAR(red[1], .5, 1e-6);
+  EXPECT_NEAR(red[2], 0, 1e-6);
+  float brown[3] = {.6f, .4f, .2f};
+  shift_colour(0, 0, 1, brown);
+  EXPECT_NEAR(brown[0], .6, 1e-6);
+  EXPECT_NEAR(brown[1], .4, 1e-6);
+  EXPECT_NEAR(brown[2], .2, 1e-6);
+}
+
+TEST(EpisodeScene, FaultsNameWhatIsWrong) {
+  const auto fault = [](const std::function<void(SceneFileCfg&)>& change) {
+    Files files;
+    change(files.cfg);
+    try {
+      Played played(files.cfg);
+    } catch (const Error& e) {
+      return std::string(e.what());
+    }
+    return std::string();
+  };
+  EXPECT_THAT(fault([](auto& c) { c.regions[0].on = "room/tap"; }),
+              HasSubstr("scene 'two_tables', region 'table': no geom named 'room/tap'; did you "
+                        "mean 'room/top'?"));
+  EXPECT_THAT(fault([](auto& c) { c.objects = {{"room/table"}}; }), HasSubstr("has no free joint"));
+  EXPECT_THAT(fault([](auto& c) { c.count = {3, 1}; }), HasSubstr("count is 3, 1"));
+  EXPECT_THAT(fault([](auto& c) {
+                c.regions[0].area = {1, 0, 0, 1};
+              }),
+              HasSubstr("least x, most x"));
+  EXPECT_THAT(fault([](auto& c) {
+                SceneVaryCfg vary;
+                vary.pattern = "rom/.*";
+                c.vary = {vary};
+              }),
+              HasSubstr("vary light"));
+  EXPECT_THAT(fault([](auto& c) { c.entities[1].name = "b"; }), HasSubstr("two entities"));
+}
+
+}  // namespace
+}  // namespace mjsense

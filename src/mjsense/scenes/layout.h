@@ -1,0 +1,44 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+// Where objects stand at the start of an episode: on level surfaces, in one of the ways in which
+// they rest, clear of each other.
+
+#include <span>
+#include <vector>
+
+#include "mjsense/core/pose.h"
+#include "mjsense/core/rng.h"
+#include "mjsense/episode/object_shape.h"
+
+namespace mjsense {
+
+struct Area {
+  double x0, x1, y0, y1;  // m, world
+};
+
+// A level surface.
+struct Region {
+  Area area, target_area;
+  double height;  // m
+};
+
+struct LayoutCfg {
+  double gap = 0.02;         // m, free between two objects
+  double target_gap = 0.07;  // m, free around the target: room for an open gripper
+  double drop = 0.0003;      // m above the surface
+  int attempts = 200;        // places to try for an object, then the one with most room
+};
+
+// An object to be placed: its shape, and the ways in which it rests.
+struct Resting {
+  const ObjectShape* shape;
+  std::span<const Quat> rests;
+};
+
+// Poses X_WO of `objects`, the target first, the others in order; those that are not `present`
+// keep what `poses` has. A function of the random numbers alone.
+void lay_out(std::span<const Resting> objects, int target, std::span<const char> present,
+             std::span<const Region> regions, const LayoutCfg& cfg, Rng& rng,
+             std::span<Pose> poses);
+
+}  // namespace mjsense

@@ -1,0 +1,51 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "mjsense/scenes/scene_file.h"
+
+#include <fmt/format.h>
+
+#include "mjsense/core/error.h"
+
+namespace mjsense {
+namespace {
+
+void check_area(const std::array<double, 4>& area, const std::string& who) {
+  if (area == std::array<double, 4>{}) return;
+  if (!(area[0] <= area[1] && area[2] <= area[3]))
+    throw ValueError(fmt::format("{} is {}, {}, {}, {}: least x, most x, least y, most y", who,
+                                 area[0], area[1], area[2], area[3]));
+}
+
+}  // namespace
+
+void validate(const SceneFileCfg& cfg, std::string_view place) {
+  const std::string who = fmt::format("{}{}scene '{}'", place, place.empty() ? "" : ", ", cfg.name);
+  if (cfg.name.empty()) throw ValueError(who + ": it has no name");
+  for (std::size_t i = 0; i < cfg.entities.size(); ++i) {
+    for (std::size_t k = 0; k < i; ++k) {
+      if (cfg.entities[i].name == cfg.entities[k].name)
+        throw ValueError(
+            fmt::format("{}: two entities are called '{}'", who, cfg.entities[i].name));
+    }
+  }
+  for (const SceneRegionCfg& region : cfg.regions) {
+    check_area(region.area, fmt::format("{}, region '{}': area", who, region.name));
+    if (region.target_area)
+      check_area(*region.target_area,
+                 fmt::format("{}, region '{}': target_area", who, region.name));
+  }
+  if (cfg.count[0] > cfg.count[1] || cfg.count[0] == 0 || cfg.count[0] < -1)
+    throw ValueError(fmt::format("{}: count is {}, {}: least, most, from 1 on (or -1, -1)", who,
+                                 cfg.count[0], cfg.count[1]));
+  for (const SceneVaryCfg& vary : cfg.vary) {
+    const std::string what = fmt::format("{}, vary {} '{}'", who, vary.what.text(), vary.pattern);
+    if (vary.brightness[0] > vary.brightness[1])
+      throw ValueError(fmt::format("{}: brightness is from {} to {}: least first", what,
+                                   vary.brightness[0], vary.brightness[1]));
+    if (vary.what != VaryKind::kMaterial && !vary.textures.empty())
+      throw ValueError(what + ": textures are for materials");
+    if (vary.what != VaryKind::kLight && (vary.pos != std::array<double, 3>{} || vary.angle > 0))
+      throw ValueError(what + ": pos and angle are for lights");
+  }
+}
+
+}  // namespace mjsense

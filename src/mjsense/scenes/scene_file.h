@@ -1,0 +1,178 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+// What an episode plays in, as data: models, the objects among them, where they may stand, where
+// the robot stands, and what differs from episode to episode.
+
+#include <array>
+#include <optional>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "mjsense/core/fields.h"
+#include "mjsense/scene/options.h"
+
+namespace mjsense {
+
+struct SceneEntityCfg {
+  std::string name;
+  std::string model;
+  std::array<double, 3> pos{};
+  std::array<double, 4> quat{1, 0, 0, 0};
+};
+template <class V>
+void visit_fields(V& v, SceneEntityCfg& c) {
+  v.object("SceneEntityCfg", "A model of a scene; its names get the prefix ``<name>/``.");
+  v("name", c.name, "Of the entity.").required();
+  v("model", c.model, "An MJCF: a path, beside the scene's file, or ``embedded:<file>``.")
+      .required();
+  v("pos", c.pos, "Where it stands.").unit("m");
+  v("quat", c.quat, "How it is turned, wxyz.");
+}
+
+// How an object may rest: as its model has it, on its side (turned about y), on an end (about x).
+inline constexpr std::array<std::string_view, 3> kRests{"upright", "side", "end"};
+
+struct SceneObjectCfg {
+  std::string body;
+  std::string text;
+  std::vector<std::string> other_texts;
+  std::vector<std::string> rests{"upright"};
+};
+template <class V>
+void visit_fields(V& v, SceneObjectCfg& c) {
+  v.object("SceneObjectCfg", "A body with a free joint that a task may be about.");
+  v("body", c.body, "Full name in the scene, ``mug/mug``.").required();
+  v("text", c.text, "What people call it; without it the last part of its name.").or_none();
+  v("other_texts", c.other_texts, "What else they call it.");
+  v("rests", c.rests, "How it may rest.").one_of(kRests).not_empty();
+}
+
+struct SceneRegionCfg {
+  std::string name;
+  std::string on;
+  std::array<double, 4> area{};
+  std::optional<std::array<double, 4>> target_area;
+};
+template <class V>
+void visit_fields(V& v, SceneRegionCfg& c) {
+  v.object("SceneRegionCfg", "A level surface on which objects may stand.");
+  v("name", c.name, "Of the region.").required();
+  v("on", c.on, "Full name of the box geom whose top it is.").required();
+  v("area", c.area,
+    "Where origins of objects may be: least x, most x, least y, most y in the world; all 0: the "
+    "whole top.")
+      .unit("m");
+  v("target_area", c.target_area, "The same for the object that a task is about.").unit("m");
+}
+
+struct SceneRobotCfg {
+  std::array<double, 3> pos{};
+  double yaw = 0;
+  std::array<double, 2> pos_spread{};
+  double yaw_spread = 0;
+};
+template <class V>
+void visit_fields(V& v, SceneRobotCfg& c) {
+  v.object("SceneRobotCfg", "Where the robot's base stands at the start of an episode.");
+  v("pos", c.pos, "On the floor.").unit("m");
+  v("yaw", c.yaw, "About the vertical, degrees.");
+  v("pos_spread", c.pos_spread, "Half width of uniform noise in x and y.").unit("m").at_least(0);
+  v("yaw_spread", c.yaw_spread, "Half width of uniform noise, degrees.").at_least(0);
+}
+
+enum class VaryKind { kLight, kMaterial, kGeom };
+template <>
+inline constexpr std::array<std::string_view, 3> kWords<VaryKind>{"light", "material", "geom"};
+
+struct SceneVaryCfg {
+  Word<VaryKind> what;
+  std::string pattern;
+  std::array<double, 2> brightness{1, 1};
+  double hue = 0;
+  double saturation = 0;
+  std::array<double, 3> pos{};
+  double angle = 0;
+  std::vector<std::string> textures;
+};
+template <class V>
+void visit_fields(V& v, SceneVaryCfg& c) {
+  v.object("SceneVaryCfg", "What looks different in every episode; all draws are uniform.");
+  v("what", c.what, "Lights, materials or geoms (without a material).");
+  v("pattern", c.pattern, "Regular expression that matches the whole full name of each.")
+      .required();
+  v("brightness", c.brightness, "Factor on the colour, least and most.").at_least(0);
+  v("hue", c.hue, "Half width of a turn of the hue, degrees.").within(0, 180);
+  v("saturation", c.saturation, "Half width of a shift of the saturation.").within(0, 1);
+  v("pos", c.pos, "light: half widths of a move.").unit("m").at_least(0);
+  v("angle", c.angle, "light: most by which its direction turns, degrees.").within(0, 90);
+  v("textures", c.textures, "material: full names of textures, one of which it has.");
+}
+
+struct SceneSkyCfg {
+  std::array<double, 3> top{0.55, 0.67, 0.80}, bottom{0.86, 0.89, 0.92};
+};
+template <class V>
+void visit_fields(V& v, SceneSkyCfg& c) {
+  v.object("SceneSkyCfg", "The colours around.");
+  v("top", c.top, "Of the zenith, rgb.").within(0, 1);
+  v("bottom", c.bottom, "Of the nadir, rgb.").within(0, 1);
+}
+
+struct SceneHeadlightCfg {
+  double ambient = 0.1, diffuse = 0.4, specular = 0.5;
+};
+template <class V>
+void visit_fields(V& v, SceneHeadlightCfg& c) {
+  v.object("SceneHeadlightCfg", "The light at the camera, grey.");
+  v("ambient", c.ambient, "From everywhere.").within(0, 1);
+  v("diffuse", c.diffuse, "Scattered.").within(0, 1);
+  v("specular", c.specular, "Mirrored.").within(0, 1);
+}
+
+struct SceneFileCfg {
+  std::string name;
+  std::vector<SceneEntityCfg> entities;
+  std::vector<SceneObjectCfg> objects;
+  std::vector<SceneRegionCfg> regions;
+  SceneRobotCfg robot;
+  std::vector<SceneVaryCfg> vary;
+  std::optional<SceneSkyCfg> sky;
+  std::optional<SceneHeadlightCfg> headlight;
+  OptionsCfg options;
+  std::optional<double> extent;
+  double gap = 0.02, target_gap = 0.07;
+  double drop = 0.0003;
+  std::array<int, 2> count{-1, -1};
+  std::string folder;  // of the file: models beside it
+};
+template <class V>
+void visit_fields(V& v, SceneFileCfg& c) {
+  v.object("SceneFileCfg",
+           "What an episode plays in: models, objects, where they may stand, and what differs.");
+  v("name", c.name, "Of the scene.").required();
+  v("entities", c.entities, "Its models, in this order.");
+  v("objects", c.objects,
+    "Bodies that a task may be about; without any: all that have a free joint and that a hand can "
+    "hold.");
+  v("regions", c.regions, "Where they may stand.");
+  v("robot", c.robot, "Where the robot stands.");
+  v("vary", c.vary, "What looks different in every episode.");
+  v("sky", c.sky, "The colours around.");
+  v("headlight", c.headlight, "The light at the camera; without it MuJoCo's.");
+  v("options", c.options, "Of the physics.");
+  v("extent", c.extent, "``stat.extent`` of the model.").unit("m").positive();
+  v("gap", c.gap, "Free between two objects.").unit("m").at_least(0);
+  v("target_gap", c.target_gap, "Free around the object that a task is about.")
+      .unit("m")
+      .at_least(0);
+  v("drop", c.drop, "Above the surface at the start.").unit("m").at_least(0);
+  v("count", c.count,
+    "Objects that are there, the target among them, least and most; -1: all. The others stand far "
+    "away.");
+}
+
+// What its fields say of each other. Throws ValueError.
+void validate(const SceneFileCfg& cfg, std::string_view place);
+
+}  // namespace mjsense
