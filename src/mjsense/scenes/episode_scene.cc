@@ -5,7 +5,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <filesystem>
 #include <numbers>
 
 #include "mjsense/core/error.h"
@@ -85,12 +84,10 @@ std::string EpisodeScene::place() const { return fmt::format("scene '{}'", cfg_.
 
 SceneCfg EpisodeScene::scene_cfg(const std::string& robot) const {
   SceneCfg scene;
+  scene.base.path = cfg_.base;
   for (const SceneEntityCfg& one : cfg_.entities) {
     EntityCfg entity;
-    const bool beside = !cfg_.folder.empty() && !one.model.starts_with("embedded:") &&
-                        std::filesystem::path(one.model).is_relative();
-    entity.model.path =
-        beside ? (std::filesystem::path(cfg_.folder) / one.model).string() : one.model;
+    entity.model.path = one.model;
     entity.pos = one.pos;
     entity.quat = one.quat;
     scene.entities.emplace_back(one.name, entity);

@@ -49,12 +49,11 @@ struct Files {
     write("can.xml", object("can", R"(<geom type="cylinder" size=".03 .05"/>)"));
     write("wardrobe.xml", object("wardrobe", R"(<geom type="box" size=".3 .3 .9" pos="0 0 .9"/>)"));
     cfg.name = "two_tables";
-    cfg.folder = dir.path.string();
-    cfg.entities = {{"room", "room.xml"},
-                    {"a", "cube.xml", {0, 0, .2}},
-                    {"b", "cube.xml", {.2, 0, .2}},
-                    {"c", "can.xml", {.4, 0, .2}},
-                    {"w", "wardrobe.xml", {-1, -1, 0}}};
+    cfg.entities = {{"room", dir.file("room.xml")},
+                    {"a", dir.file("cube.xml"), {0, 0, .2}},
+                    {"b", dir.file("cube.xml"), {.2, 0, .2}},
+                    {"c", dir.file("can.xml"), {.4, 0, .2}},
+                    {"w", dir.file("wardrobe.xml"), {-1, -1, 0}}};
     cfg.regions = {{"table", "room/top"}};
   }
   void write(const char* name, const std::string& text) const {

@@ -132,6 +132,8 @@ void visit_fields(V& v, SceneHeadlightCfg& c) {
 
 struct SceneFileCfg {
   std::string name;
+  std::string extends;
+  std::string base;
   std::vector<SceneEntityCfg> entities;
   std::vector<SceneObjectCfg> objects;
   std::vector<SceneRegionCfg> regions;
@@ -144,18 +146,22 @@ struct SceneFileCfg {
   double gap = 0.02, target_gap = 0.07;
   double drop = 0.0003;
   std::array<int, 2> count{-1, -1};
-  std::string folder;  // of the file: models beside it
 };
 template <class V>
 void visit_fields(V& v, SceneFileCfg& c) {
   v.object("SceneFileCfg",
            "What an episode plays in: models, objects, where they may stand, and what differs.");
   v("name", c.name, "Of the scene.").required();
+  v("extends", c.extends,
+    "A scene, by name or file, whose values it has where it does not say another.")
+      .or_none();
+  v("base", c.base, "An MJCF to start from, as it is, beside the file: names without a prefix.")
+      .or_none();
   v("entities", c.entities, "Its models, in this order.");
   v("objects", c.objects,
-    "Bodies that a task may be about; without any: all that have a free joint and that a hand can "
+    "Bodies that a task may be about; none named: all that have a free joint and that a hand can "
     "hold.");
-  v("regions", c.regions, "Where they may stand.");
+  v("regions", c.regions, "Where they may stand; none: where their models have them.");
   v("robot", c.robot, "Where the robot stands.");
   v("vary", c.vary, "What looks different in every episode.");
   v("sky", c.sky, "The colours around.");

@@ -1,0 +1,56 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "mjsense/core/data_file.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <filesystem>
+#include <fstream>
+#include <sstream>
+
+#include "mjsense/core/embedded.h"
+#include "mjsense/core/error.h"
+
+namespace mjsense {
+namespace {
+
+namespace fs = std::filesystem;
+
+constexpr std::string_view kEmbedded = "embedded:";
+
+}  // namespace
+
+std::vector<std::string> DataFolder::names() const {
+  std::vector<std::string> names;
+  for (const EmbeddedFile& file : embedded_files()) {
+    if (!file.name.starts_with(folder) || !file.name.ends_with(tail)) continue;
+    const std::string_view name =
+        file.name.substr(folder.size(), file.name.size() - folder.size() - tail.size());
+    if (name.find('/') == std::string_view::npos) names.emplace_back(name);
+  }
+  return names;
+}
+
+DataFile DataFolder::find(std::string_view name) const {
+  const std::vector<std::string> known = names();
+  if (std::ranges::find(known, name) != known.end()) {
+    const std::string file = fmt::format("{}{}{}", folder, name, tail);
+    return {fmt::format("{}{}", kEmbedded, file), std::string(embedded_file(file))};
+  }
+  if (!name.ends_with(".toml")) throw_unknown(fmt::format("{}s", kind), kind, name, known);
+  const std::string path(name);
+  if (!fs::is_regular_file(path)) throw ValueError(fmt::format("{}: no such file", path));
+  std::stringstream text;
+  text << std::ifstream(path).rdbuf();
+  return {fs::absolute(path).lexically_normal().string(), text.str()};
+}
+
+std::string beside(std::string_view path, const std::string& name) {
+  if (name.starts_with(kEmbedded) || fs::path(name).is_absolute()) return name;
+  const bool embedded = path.starts_with(kEmbedded);
+  const fs::path file = embedded ? path.substr(kEmbedded.size()) : path;
+  const std::string joined = (file.parent_path() / name).lexically_normal().generic_string();
+  return embedded ? std::string(kEmbedded) + joined : joined;
+}
+
+}  // namespace mjsense

@@ -1,0 +1,55 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "mjsense/scenes/load_scene.h"
+
+#include <fmt/format.h>
+
+#include <filesystem>
+
+#include "mjsense/core/data_file.h"
+#include "mjsense/core/error.h"
+#include "mjsense/core/toml_fields.h"
+
+namespace mjsense {
+namespace {
+
+constexpr DataFolder kScenes{"scene", "scenes/", "/scene.toml"};
+constexpr int kMostBases = 8;
+
+void read(const DataFile& file, SceneFileCfg& cfg, int depth) {
+  SceneFileCfg own;
+  read_toml_fields(file.text, file.path, own);
+  if (!own.extends.empty()) {
+    if (depth == kMostBases)
+      throw ValueError(fmt::format("{}: extends goes round in a circle", file.path));
+    const bool is_path = own.extends.ends_with(".toml");
+    read(kScenes.find(is_path ? beside(file.path, own.extends) : own.extends), cfg, depth + 1);
+  }
+  const std::vector<SceneEntityCfg> inherited = cfg.entities;
+  const std::string base = cfg.base;
+  read_toml_fields(file.text, file.path, cfg);
+  // What the file itself names stands beside it.
+  if (!own.entities.empty()) {
+    for (SceneEntityCfg& entity : cfg.entities) entity.model = beside(file.path, entity.model);
+  }
+  if (!own.base.empty()) cfg.base = beside(file.path, own.base);
+}
+
+}  // namespace
+
+std::vector<std::string> scene_names() { return kScenes.names(); }
+
+SceneFileCfg load_scene(std::string_view name) {
+  SceneFileCfg cfg;
+  if (name.ends_with(".xml")) {
+    cfg.base = std::string(name);
+    if (!std::filesystem::is_regular_file(cfg.base))
+      throw ValueError(fmt::format("{}: no such file", cfg.base));
+    cfg.name = std::filesystem::path(cfg.base).stem().string();
+    return cfg;
+  }
+  read(kScenes.find(name), cfg, 0);
+  check_fields(cfg, fmt::format("scene '{}'", name));
+  return cfg;
+}
+
+}  // namespace mjsense

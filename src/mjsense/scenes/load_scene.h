@@ -1,0 +1,21 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+// Scenes by name and from files: ours are models/scenes/<name>/scene.toml.
+
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "mjsense/scenes/scene_file.h"
+
+namespace mjsense {
+
+// Of ours.
+std::vector<std::string> scene_names();
+
+// One of ours by its name, one of a scene.toml by its path, or an MJCF by its path (.xml): the whole
+// model, its bodies as they lie there. Throws KeyError with the nearest names; ValueError that says
+// file, line and key of what is wrong.
+SceneFileCfg load_scene(std::string_view name_or_path);
+
+}  // namespace mjsense
