@@ -24,8 +24,6 @@ void read(const DataFile& file, SceneFileCfg& cfg, int depth) {
     const bool is_path = own.extends.ends_with(".toml");
     read(kScenes.find(is_path ? beside(file.path, own.extends) : own.extends), cfg, depth + 1);
   }
-  const std::vector<SceneEntityCfg> inherited = cfg.entities;
-  const std::string base = cfg.base;
   read_toml_fields(file.text, file.path, cfg);
   // What the file itself names stands beside it.
   if (!own.entities.empty()) {
