@@ -5,6 +5,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <numbers>
 
 #include "mjsense/core/error.h"
@@ -105,6 +106,7 @@ void EpisodeScene::initialize(const mjModel* model, int num_worlds, std::string_
   find_objects(robot_prefix);
   find_regions();
   present_.assign(num_worlds * objects_.size(), 1);
+  support_.assign(num_worlds, regions_.empty() ? 0.0 : regions_[0].height);
 }
 
 void EpisodeScene::bind(Simulation& simulation) {
@@ -191,12 +193,13 @@ Pose EpisodeScene::sample(int world, int target, std::uint64_t seed, std::uint64
   if (!regions_.empty() && n > 0) {
     std::vector<Resting> resting;
     std::vector<Pose> poses(n);
+    std::vector<int> region_of(n);
     for (int i = 0; i < n; ++i) {
       resting.push_back({&objects_[i].shape, objects_[i].rests});
       poses[i].p = {100.0 + i, 100.0, 0.5};  // where nobody looks
     }
     lay_out(resting, target, {present, static_cast<std::size_t>(n)}, regions_,
-            {cfg_.gap, cfg_.target_gap, cfg_.drop}, rng, poses);
+            {cfg_.gap, cfg_.target_gap, cfg_.drop}, rng, poses, region_of);
     for (int i = 0; i < n; ++i) {
       const int joint = model_->body_jntadr[objects_[i].body];
       double* qpos = state.qpos + model_->jnt_qposadr[joint];
@@ -205,6 +208,14 @@ Pose EpisodeScene::sample(int world, int target, std::uint64_t seed, std::uint64
       write_quat(poses[i].q, qpos + 3);
       std::fill(qvel, qvel + 6, 0.0);
     }
+    support_[world] = regions_[region_of[target]].height;
+  } else if (n > 0) {
+    const double* qpos =
+        state.qpos + model_->jnt_qposadr[model_->body_jntadr[objects_[target].body]];
+    const Pose pose{vec3(qpos), quat(qpos + 3)};
+    support_[world] = std::numeric_limits<double>::max();
+    for (Vec3 point : objects_[target].shape.points)
+      support_[world] = std::min(support_[world], (pose * point).z);
   }
   const SceneRobotCfg& r = cfg_.robot;
   Rng draw(seed, 0, stream_of("scene/robot"), episode);

@@ -46,6 +46,9 @@ class EpisodeScene {
   // Whether an object takes part in the episode of this world; the others stand far away.
   bool present(int world, int object) const { return present_[world * objects_.size() + object]; }
 
+  // Height (m) of what the target stands on at the start of this world's episode.
+  double support_height(int world) const { return support_[world]; }
+
   // The start of an episode, `target` the object that it is about: writes the objects' joints and
   // returns where the robot's base stands. `rng` gives the places.
   Pose sample(int world, int target, std::uint64_t seed, std::uint64_t episode, Rng& rng,
@@ -65,7 +68,8 @@ class EpisodeScene {
   const mjModel* model_ = nullptr;
   std::vector<SceneObject> objects_;
   std::vector<Region> regions_;
-  std::vector<char> present_;  // [B, objects]
+  std::vector<char> present_;    // [B, objects]
+  std::vector<double> support_;  // [B]
   std::unique_ptr<Look> look_;
 };
 

@@ -174,6 +174,7 @@ TEST(EpisodeScene, SeveralSurfacesAreAllUsed) {
   for (std::uint64_t episode = 0; episode < 20; ++episode) {
     played.start(episode);
     EXPECT_EQ(played.fault(), "");
+    EXPECT_NEAR(played.scene.support_height(0), played.at(0).z - .0203, 1e-9);
     heights.insert(std::lround(100 * played.at(0).z));
   }
   EXPECT_THAT(heights, ::testing::ElementsAre(53, 103));

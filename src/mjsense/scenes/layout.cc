@@ -38,8 +38,8 @@ struct Spot {
 }  // namespace
 
 void lay_out(std::span<const Resting> objects, int target, std::span<const char> present,
-             std::span<const Region> regions, const LayoutCfg& cfg, Rng& rng,
-             std::span<Pose> poses) {
+             std::span<const Region> regions, const LayoutCfg& cfg, Rng& rng, std::span<Pose> poses,
+             std::span<int> region_of) {
   const int n = static_cast<int>(objects.size());
   std::vector<Placed> placed;
   for (int k = 0; k < n; ++k) {
@@ -79,6 +79,7 @@ void lay_out(std::span<const Resting> objects, int target, std::span<const char>
     }
     placed.push_back({object, region, best.x, best.y, print.radius});
     const Vec3 position{best.x, best.y, regions[region].height - print.low + cfg.drop};
+    region_of[object] = region;
     poses[object] = {position, axis_angle({0, 0, 1}, rng.uniform(-pi, pi)) * rest};
   }
 }
