@@ -47,7 +47,7 @@ class PythonTask final : public Task, public GraspScene {
   const GraspScene* grasp_scene() const override { return graspable_.empty() ? nullptr : this; }
   std::span<const GraspObject> all_objects() const override { return graspable_; }
   int target(int world) const override { return target_[world]; }
-  double table_height() const override { return table_height_; }
+  double support_height(int /*world*/) const override { return table_height_; }
 
  protected:
   void initialize_task() override;

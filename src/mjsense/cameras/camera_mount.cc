@@ -19,8 +19,8 @@ bool any(const std::array<double, 3>& v) {
 }  // namespace
 
 bool CameraMountCfg::varies() const {
-  return mount == MountKind::kOrbit || fovy_noise > 0 || any(pos_noise) || any(rot_noise) ||
-         any(target_noise);
+  return mount == MountKind::kOrbit || (mount == MountKind::kMjcf && fovy) || fovy_noise > 0 ||
+         any(pos_noise) || any(rot_noise) || any(target_noise);
 }
 
 void validate(const CameraMountCfg& c, std::string_view place) {

@@ -23,6 +23,7 @@ struct CameraMountCfg {
   std::string name;
   Word<MountKind> mount;
   std::string camera;
+  bool of_scene = false;
   std::string body;
   std::array<double, 3> pos{};
   std::array<double, 4> quat{1, 0, 0, 0};
@@ -41,7 +42,7 @@ struct CameraMountCfg {
   bool image_points = true;
   bool erosion = true;
 
-  // Its pose or its lens is another in every episode.
+  // Its pose or its lens is another in every episode, or its lens not that of the model.
   bool varies() const;
 };
 template <class V>
@@ -56,6 +57,7 @@ void visit_fields(V& v, CameraMountCfg& c) {
     "on a body, looking at a point of it; fixed: in the world, looking at a point; orbit: in the "
     "world, somewhere around what the episode is about.");
   v("camera", c.camera, "mjcf: its name there, without the robot's prefix.").or_none();
+  v("of_scene", c.of_scene, "mjcf: ``camera`` is a full name in the scene.");
   v("body", c.body, "body, look_at: which one, without the robot's prefix; its base without one.")
       .or_none();
   v("pos", c.pos, "body, look_at: in the body; fixed: in the world.").unit("m");

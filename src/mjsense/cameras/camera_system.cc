@@ -61,7 +61,7 @@ CameraSystem::CameraSystem(CameraSystemCfg cfg, std::string prefix, std::string 
   validate(cfg_, "");
   for (const CameraMountCfg& c : cfg_.cameras) {
     Mounted m;
-    m.camera = c.mount == MountKind::kMjcf ? prefix_ + c.camera : c.name;
+    m.camera = c.mount != MountKind::kMjcf ? c.name : c.of_scene ? c.camera : prefix_ + c.camera;
     m.is_new = c.mount != MountKind::kMjcf;
     m.fovy = c.fovy.value_or(kDefaultFovy);
     if (c.mount == MountKind::kBody || c.mount == MountKind::kLookAt)

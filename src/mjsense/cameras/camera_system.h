@@ -55,10 +55,12 @@ class CameraSystem {
     double fovy = 45;
   };
   const Mounted& mounted(int camera) const { return mounted_[camera]; }
+  int width(int camera) const { return cfg_.cameras[camera].width.value_or(cfg_.width); }
+  int height(int camera) const { return cfg_.cameras[camera].height.value_or(cfg_.height); }
 
   // Throws KeyError for a camera that the model does not have.
   void initialize(Simulation& simulation);
-  // Some camera differs from episode to episode.
+  // Some camera must be placed at the start of an episode.
   bool varies() const { return varies_; }
 
   // Poses and lenses for an episode, written to the world's own model. `world` is fresh; `centre`
@@ -80,8 +82,6 @@ class CameraSystem {
   Lens with_noise(int camera, Rng& rng) const;
   std::string orbit(int camera, const World& world, Rng& rng, Vec3 centre,
                     std::span<const int> objects, Lens& out) const;
-  int width(int camera) const { return cfg_.cameras[camera].width.value_or(cfg_.width); }
-  int height(int camera) const { return cfg_.cameras[camera].height.value_or(cfg_.height); }
 
   CameraSystemCfg cfg_;
   std::string prefix_;

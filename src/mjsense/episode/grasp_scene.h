@@ -21,7 +21,8 @@ class GraspScene {
   virtual ~GraspScene() = default;
   virtual std::span<const GraspObject> all_objects() const = 0;  // target and distractors
   virtual int target(int world) const = 0;                       // index in all_objects()
-  virtual double table_height() const = 0;                       // m
+  virtual double support_height(
+      int world) const = 0;  // m, of what the target stands on at the start
 };
 
 }  // namespace mjsense

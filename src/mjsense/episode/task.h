@@ -42,7 +42,8 @@ class SensorSuite;
 class Simulation;
 
 struct TaskCfg {
-  RobotCfg robot;  // without a name: the task's scene has its own, if any
+  RobotCfg robot;     // without a name: the task's scene has its own, if any
+  std::string scene;  // name or file; "": the task's own
   std::uint64_t seed = 0;
   int horizon = 500;      // control steps after which an episode is truncated
   int policy_dt_ms = 66;  // one control step
@@ -129,6 +130,9 @@ class Task {
   // episode, step).
   void apply(const World& world, const Action& action, const StateRow& state);
   virtual Evaluation evaluate(const World& world) const = 0;
+
+  // Why the start that this fresh world shows cannot be played; "": it can.
+  virtual std::string start_fault(const World& /*world*/) const { return ""; }
 
   // --- all active worlds at once, on the caller's thread
   virtual void begin_all(ActiveWorlds& worlds);

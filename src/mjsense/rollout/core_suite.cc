@@ -26,13 +26,19 @@ void add_camera(SensorSuite& suite, const RecordedCamera& camera, const std::str
       std::make_shared<SharedField>(camera.name, *camera.sensor, "rgb",
                                     [](SensorSpec& spec) { spec.storage = Storage::kRgbVideo; }),
       owner);
-  if (!camera.depth) return;
-  suite.add(std::make_shared<SharedField>(camera.name + "_depth", *camera.sensor, "depth",
-                                          [&camera](SensorSpec& spec) {
-                                            spec.storage = Storage::kDepthVideo;
-                                            spec.shape = {camera.height, camera.width};
-                                          }),
-            owner);
+  if (camera.depth) {
+    suite.add(std::make_shared<SharedField>(camera.name + "_depth", *camera.sensor, "depth",
+                                            [&camera](SensorSpec& spec) {
+                                              spec.storage = Storage::kDepthVideo;
+                                              spec.shape = {camera.height, camera.width};
+                                            }),
+              owner);
+  }
+  if (camera.segmentation) {
+    suite.add(std::make_shared<SharedField>(camera.name + "_segmentation", *camera.sensor,
+                                            "segmentation"),
+              owner);
+  }
 }
 
 // Parts of the robot, then what plays a role in the task.
@@ -46,7 +52,9 @@ std::shared_ptr<Sensor> image_points(const Task& task, const std::vector<Recorde
   }
   std::vector<ImagePointsSensor::Camera> views;
   for (const RecordedCamera& camera : cameras) {
-    if (camera.image_points) views.push_back({.name = camera.name, .sensor = camera.sensor});
+    if (camera.image_points)
+      views.push_back(
+          {.name = camera.name, .sensor = camera.sensor, .skip_erosion = !camera.erosion});
   }
   return std::make_shared<ImagePointsSensor>("object_image_points", std::move(objects),
                                              std::move(views));

@@ -17,11 +17,13 @@ struct RecordedCamera {
   std::string mjcf_camera;  // full MuJoCo name
   int width = 640, height = 368;
   bool depth = false;
+  bool segmentation = false;
   bool image_points = true;  // object_image_points looks through it
+  bool erosion = true;       // and keeps off the rim of what it sees
   Sensor* sensor = nullptr;  // of the scene: fields rgb, segmentation, and depth if it is recorded
 };
 
-// Per camera [sensor_param_<c>, <c>, <c>_depth], qpos, qvel, robot_base_pose, env_states,
+// Per camera [sensor_param_<c>, <c>, <c>_depth, <c>_segmentation], qpos, qvel, robot_base_pose, env_states,
 // task_info, actions/*, object_image_points, then the task's, the robot's and the policy's own
 // sensors. Names are unique; a clash names both owners. The sensors refer to task, log and cameras,
 // which live longer.

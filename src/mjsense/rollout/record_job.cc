@@ -49,6 +49,11 @@ std::string settings_of(const RecordJobCfg& job, Rollout& rollout) {
   // Only where they are not what they always were: files of before stay what they are.
   entries.erase("terminate_upon_success");
   entries.erase("use_sensors");
+  for (const auto& [key, value] : {std::pair{"scene", job.rollout.scene},
+                                   std::pair{"camera_system", job.rollout.camera_system}}) {
+    entries.erase(key);
+    if (!value.empty()) entries[key] = [value](JsonWriter& json) { json.value(value); };
+  }
   if (job.rollout.terminate_upon_success)
     entries["terminate_upon_success"] = [](JsonWriter& json) { json.value(true); };
   // Sizes that change with the scene and with what robots are drawn with.
@@ -202,7 +207,7 @@ class RecordJob {
   void end(int w, bool success, const std::string& outcome) {
     timed([&] {
       if (success || (cfg_.keep_failures && lengths_[w] > 1 && !rollout_.refused(w))) {
-        recorder_.finish_episode(w, rollout_.task().obs_scene(w), outcome);
+        recorder_.finish_episode(w, rollout_.obs_scene(w), outcome);
       } else {
         recorder_.discard_episode(w, outcome);
       }

@@ -10,6 +10,7 @@
 #include "mjsense/core/error.h"
 #include "mjsense/observe/json_sensor.h"
 #include "mjsense/rollout/action_sensors.h"
+#include "mjsense/rollout/episode_cameras.h"
 #include "mjsense/sensors/camera/camera_sensor_cfg.h"
 
 namespace mjsense {
@@ -24,52 +25,11 @@ double since(Clock::time_point start) {
 TaskCfg task_cfg(const RolloutCfg& cfg) {
   TaskCfg out;
   if (!cfg.robot.empty()) out.robot = robot_cfg(cfg.robot);
+  out.scene = cfg.scene;
   out.seed = cfg.seed;
   out.action_noise = cfg.action_noise;
   out.terminate_upon_success = cfg.terminate_upon_success;
   if (cfg.horizon) out.horizon = *cfg.horizon;
-  return out;
-}
-
-// The robot's, then the task's.
-std::vector<RecordedCamera> chosen_cameras(const Task& task, const RolloutCfg& cfg) {
-  const RobotCfg& robot = task.cfg().robot;
-  std::vector<CameraMount> mounts = robot.cameras;
-  for (CameraMount& mount : mounts) mount.mjcf_camera.insert(0, Robot::kPrefix);
-  for (CameraMount& mount : task.cameras()) mounts.push_back(std::move(mount));
-  std::vector<std::string> names;
-  for (const CameraMount& mount : mounts) names.push_back(mount.name);
-  std::vector<RecordedCamera> cameras;
-  for (const std::string& name : cfg.cameras.value_or(names)) {
-    const auto mount = std::ranges::find(mounts, name, &CameraMount::name);
-    if (mount == mounts.end()) {
-      throw_unknown(robot.name.empty() ? fmt::format("task '{}'", task.name())
-                                       : fmt::format("robot '{}'", robot.name),
-                    "camera", name, names);
-    }
-    if (std::ranges::find(cameras, name, &RecordedCamera::name) != cameras.end()) {
-      throw ValueError(fmt::format("camera '{}' is given twice", name));
-    }
-    cameras.push_back({.name = name,
-                       .mjcf_camera = mount->mjcf_camera,
-                       .width = cfg.width.value_or(robot.image_width),
-                       .height = cfg.height.value_or(robot.image_height),
-                       .depth = cfg.depth || mount->record_depth,
-                       .image_points = mount->image_points});
-  }
-  return cameras;
-}
-
-CameraSensorCfg camera_cfg(const RecordedCamera& camera, const RolloutCfg& cfg) {
-  CameraSensorCfg out;
-  out.name = camera.name;
-  out.camera_name = camera.mjcf_camera;
-  out.width = camera.width;
-  out.height = camera.height;
-  out.data_types = {"rgb", "segmentation"};
-  if (camera.depth) out.data_types.push_back("depth");
-  out.use_shadows = cfg.shadows;
-  out.samples = cfg.samples;
   return out;
 }
 
@@ -117,6 +77,7 @@ Rollout::Rollout(RolloutCfg cfg, std::shared_ptr<Task> task, std::shared_ptr<Pol
   const TaskCfg& own = task_->cfg();
   cfg_.task = task_->name();
   cfg_.robot = own.robot.name;
+  cfg_.scene = own.scene;
   cfg_.policy = policy_ ? policy_->name() : "";
   cfg_.seed = own.seed;
   cfg_.horizon = own.horizon;
@@ -127,10 +88,12 @@ Rollout::Rollout(RolloutCfg cfg, std::shared_ptr<Task> task, std::shared_ptr<Pol
 }
 
 void Rollout::make() {
-  cameras_ = chosen_cameras(*task_, cfg_);
+  camera_system_ = std::make_unique<CameraSystem>(choose_cameras(*task_, cfg_));
+  cameras_ = recorded_cameras(*camera_system_);
   SceneCfg scene_cfg = task_->whole_scene_cfg();
-  for (const RecordedCamera& camera : cameras_) {
-    scene_cfg.sensors.push_back(std::make_shared<CameraSensorCfg>(camera_cfg(camera, cfg_)));
+  for (std::size_t i = 0; i < cameras_.size(); ++i) {
+    scene_cfg.sensors.push_back(std::make_shared<CameraSensorCfg>(
+        camera_sensor_cfg(*camera_system_, static_cast<int>(i), cameras_[i], cfg_)));
   }
   auto scene = std::make_shared<Scene>(std::move(scene_cfg));
   simulation_ = std::make_shared<Simulation>(scene, SimulationCfg{.num_worlds = cfg_.num_worlds,
@@ -139,6 +102,7 @@ void Rollout::make() {
                                                                   .seed = cfg_.seed});
   simulation_->measure_cost(true);
   for (RecordedCamera& camera : cameras_) camera.sensor = &scene->sensor(camera.name);
+  camera_system_->initialize(*simulation_);
   task_->bind(simulation_);
   if (policy_) policy_->bind(simulation_);
   task_->initialize(scene->model(), cfg_.num_worlds);
@@ -213,6 +177,7 @@ void Rollout::start(std::span<const int> worlds, std::span<const std::int64_t> e
   }
   simulation_->forward(sorted);
   take_failures();
+  place_cameras(sorted);
   Some begins(*this, sorted);
   task_->begin_all(begins);
   if (policy_) policy_->reset_all(begins);
@@ -222,6 +187,37 @@ void Rollout::start(std::span<const int> worlds, std::span<const std::int64_t> e
   std::erase_if(moving_, [this](int w) { return !faults_[w].empty(); });
   evaluate(moving_);
   finish_rows();
+}
+
+// Cameras that differ from episode to episode find their places, and starts that cannot be played
+// are found out.
+void Rollout::place_cameras(std::span<const int> worlds) {
+  std::vector<std::string> why(num_worlds());
+  for_each(worlds, [&](const World& world) {
+    std::string& text = why[world.id];
+    text = task_->start_fault(world);
+    if (!text.empty() || !camera_system_->varies()) return;
+    std::vector<int> objects;
+    for (const TaskObject& object : task_->objects(world.id)) {
+      if (object.body >= 0) objects.push_back(object.body);
+    }
+    text = camera_system_->place(world, cfg_.seed, static_cast<std::uint64_t>(episode(world.id)),
+                                 middle_of(*task_, world), objects);
+  });
+  for (int w : worlds) {
+    if (!why[w].empty()) set_fault(w, std::move(why[w]));
+  }
+  if (!camera_system_->varies()) return;
+  simulation_->worlds().model_changed();
+  simulation_->forward(worlds);
+  take_failures();
+}
+
+std::string Rollout::obs_scene(int world) const {
+  std::string scene = task_->obs_scene(world);
+  if (cfg_.camera_system.empty()) return scene;
+  return fmt::format("{},\"cameras\":{}}}", scene.substr(0, scene.rfind('}')),
+                     camera_system_->frozen(world));
 }
 
 void Rollout::act() {

@@ -23,6 +23,7 @@
 #include <string>
 #include <vector>
 
+#include "mjsense/cameras/camera_system.h"
 #include "mjsense/core/fields.h"
 #include "mjsense/episode/policy.h"
 #include "mjsense/episode/task.h"
@@ -39,10 +40,12 @@ class Rollout;
 struct RolloutCfg {
   std::string task = "pick";
   std::string robot = "franka";
+  std::string scene;
   std::string policy = "planner";
   int num_worlds = 1;
   int threads = 0;
   std::uint64_t seed = 0;
+  std::string camera_system;
   std::optional<std::vector<std::string>> cameras;
   std::optional<int> width, height;
   bool depth = false;
@@ -67,12 +70,17 @@ void visit_fields(V& v, RolloutCfg& c) {
   v.object("RolloutCfg", "Worlds that play episodes of a task.");
   v("task", c.task, "Which task.").decides_data();
   v("robot", c.robot, "Which robot; none for a task whose scene has its own.").decides_data();
+  v("scene", c.scene, "Which scene, by its name or a file; by default the task's.")
+      .decides_data_as("scene");
   v("policy", c.policy, "What drives it.").decides_data();
   v("num_worlds", c.num_worlds, "How many run at one time.").option("worlds").at_least(1);
   v("threads", c.threads, "Of the simulation; 0: every CPU this process may use.").at_least(0);
   v("seed", c.seed, "Same seed, same episodes.").decides_data();
+  v("camera_system", c.camera_system,
+    "Cameras of the robot's, by the system's name or a file; by default those of its model.")
+      .decides_data_as("camera_system");
   v("cameras", c.cameras,
-    "Names of the robot's cameras, in this order; by default all, none for an empty list.")
+    "Names of the cameras, in this order; by default all, none for an empty list.")
       .decides_data_as("cameras");
   v("width", c.width, "Of pictures; by default the robot's.")
       .unit("pixels")
@@ -127,6 +135,10 @@ class Rollout {
   SensorSuite& suite() { return suite_; }
   const std::vector<RecordedCamera>& cameras() const { return cameras_; }
 
+  // What a recording says of this world's episode: the task's, and where a named camera system has
+  // put its cameras. JSON text.
+  std::string obs_scene(int world) const;
+
   // Stops all worlds; episodes started from here on are those of this seed.
   void reseed(std::uint64_t seed);
   // World worlds[k] plays episode episodes[k] from its start. Its faults are forgotten.
@@ -167,6 +179,7 @@ class Rollout {
   bool guard_rows(const std::function<void()>& body);
   void sense();
   void take_failures();
+  void place_cameras(std::span<const int> worlds);
   void set_fault(int world, std::string text);
   double row_cost() const;
   double cast_cost() const;
@@ -175,6 +188,7 @@ class Rollout {
   RolloutCfg cfg_;
   std::shared_ptr<Task> task_;
   std::shared_ptr<Policy> policy_;
+  std::unique_ptr<CameraSystem> camera_system_;
   std::vector<RecordedCamera> cameras_;
   std::unique_ptr<ActionLog> log_;
   SensorSuite suite_;

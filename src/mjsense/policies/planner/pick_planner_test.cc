@@ -134,7 +134,7 @@ TEST(PickPlanner, ChoosesAGraspBesideWhichThereIsRoom) {
         EXPECT_FALSE(gripper.hits(grasp, object, objects[i].shape, 0.0))
             << objects[i].kind << " at " << objects[target].kind << ", side " << side;
       }
-      EXPECT_GT(grasp.p.z - gripper.tip, pick.table_height() + 0.003)
+      EXPECT_GT(grasp.p.z - gripper.tip, pick.support_height(0) + 0.003)
           << "finger tips above the table";
     }
   }

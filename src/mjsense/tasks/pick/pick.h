@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
-// Pick up one of the objects on a table: success is the object 1 cm up and touched by nothing but
+// Pick up one of the objects of a scene: success is the object 1 cm up and touched by nothing but
 // the robot.
 
 #include <array>
@@ -9,6 +9,7 @@
 
 #include "mjsense/episode/grasp_scene.h"
 #include "mjsense/episode/task.h"
+#include "mjsense/scenes/episode_scene.h"
 
 namespace mjsense {
 
@@ -16,10 +17,13 @@ class PickTask final : public Task, public GraspScene {
  public:
   static constexpr std::string_view kRole = "pickup_obj";
 
-  explicit PickTask(TaskCfg cfg) : Task(std::move(cfg)) {}
+  // In cfg.scene; by default on a table in a room.
+  explicit PickTask(TaskCfg cfg);
   std::string_view name() const override { return "pick"; }
   std::string_view type() const override { return "pick"; }
   SceneCfg scene_cfg() const override;
+  void bind(const std::shared_ptr<Simulation>& simulation) override;
+  std::string start_fault(const World& world) const override { return scene_.fault(world); }
 
   void begin(const World& world) override;
   // Reward: height above the start (m), where nothing but the robot bears the object.
@@ -40,7 +44,7 @@ class PickTask final : public Task, public GraspScene {
   const GraspScene* grasp_scene() const override { return this; }
   std::span<const GraspObject> all_objects() const override { return objects_; }
   int target(int world) const override { return targets_[world].index; }
-  double table_height() const override { return table_height_; }
+  double support_height(int world) const override { return scene_.support_height(world); }
 
  protected:
   void initialize_task() override;
@@ -53,14 +57,14 @@ class PickTask final : public Task, public GraspScene {
     TaskObject object;
     Pose start;
   };
-  void place(int object, const Pose& pose, const StateRow& state) const;
   bool borne_by_others(const World& world, int body) const;
   bool lifted(const World& world) const;
 
+  EpisodeScene scene_;
+  std::weak_ptr<Simulation> simulation_;
   std::vector<GraspObject> objects_;
   std::vector<Target> targets_;  // [B]
   int robot_root_ = -1;
-  double table_height_ = 0;
 };
 
 }  // namespace mjsense

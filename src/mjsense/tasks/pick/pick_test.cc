@@ -72,7 +72,7 @@ TEST_F(Pick, ObjectsStandFreeOnTheTable) {
         low = std::min(low, p.z);
         r = std::max(r, std::hypot(p.x, p.y));
       }
-      EXPECT_NEAR(data->xpos[3 * object.body + 2] + low, task.table_height(), 1e-3);
+      EXPECT_NEAR(data->xpos[3 * object.body + 2] + low, task.support_height(0), 1e-3);
       for (std::size_t other = 0; other < radius.size(); ++other) {
         const double *a = data->xpos + 3 * object.body, *b = data->xpos + 3 * objects[other].body;
         EXPECT_GT(std::hypot(a[0] - b[0], a[1] - b[1]), r + radius[other])

@@ -1,0 +1,122 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "mjsense/rollout/episode_cameras.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+
+#include "mjsense/cameras/load_cameras.h"
+#include "mjsense/core/error.h"
+#include "mjsense/rollout/rollout.h"
+
+namespace mjsense {
+namespace {
+
+CameraMountCfg of_model(const CameraMount& mount, bool of_scene) {
+  CameraMountCfg out;
+  out.name = mount.name;
+  out.mount = MountKind::kMjcf;
+  out.camera = mount.mjcf_camera;
+  out.of_scene = of_scene;
+  out.depth = mount.record_depth;
+  out.image_points = mount.image_points;
+  return out;
+}
+
+}  // namespace
+
+CameraSystem choose_cameras(const Task& task, const RolloutCfg& cfg) {
+  const RobotCfg& robot = task.cfg().robot;
+  CameraSystemCfg system;
+  system.width = robot.image_width;
+  system.height = robot.image_height;
+  if (!cfg.camera_system.empty()) {
+    system = load_camera_system(cfg.camera_system, fmt::format("embedded:robots/{}/robot.toml", robot.name));
+  } else {
+    for (const CameraMount& mount : robot.cameras) system.cameras.push_back(of_model(mount, false));
+  }
+  for (const CameraMount& mount : task.cameras()) system.cameras.push_back(of_model(mount, true));
+
+  if (cfg.cameras) {
+    std::vector<std::string> names;
+    for (const CameraMountCfg& camera : system.cameras) names.push_back(camera.name);
+    std::vector<CameraMountCfg> chosen;
+    for (const std::string& name : *cfg.cameras) {
+      const auto mount = std::ranges::find(system.cameras, name, &CameraMountCfg::name);
+      if (mount == system.cameras.end()) {
+        throw_unknown(!cfg.camera_system.empty() ? fmt::format("camera system '{}'", system.name)
+                      : robot.name.empty()       ? fmt::format("task '{}'", task.name())
+                                                 : fmt::format("robot '{}'", robot.name),
+                      "camera", name, names);
+      }
+      if (std::ranges::find(chosen, name, &CameraMountCfg::name) != chosen.end())
+        throw ValueError(fmt::format("camera '{}' is given twice", name));
+      chosen.push_back(*mount);
+    }
+    system.cameras = std::move(chosen);
+  }
+  for (CameraMountCfg& camera : system.cameras) {
+    if (cfg.width) camera.width = cfg.width;
+    if (cfg.height) camera.height = cfg.height;
+    camera.depth = camera.depth || cfg.depth;
+  }
+  return {std::move(system), std::string(Robot::kPrefix), robot.base_body};
+}
+
+std::vector<RecordedCamera> recorded_cameras(const CameraSystem& system) {
+  std::vector<RecordedCamera> cameras;
+  for (std::size_t i = 0; i < system.cfg().cameras.size(); ++i) {
+    const CameraMountCfg& mount = system.cfg().cameras[i];
+    const int camera = static_cast<int>(i);
+    cameras.push_back({.name = mount.name,
+                       .mjcf_camera = system.mounted(camera).camera,
+                       .width = system.width(camera),
+                       .height = system.height(camera),
+                       .depth = mount.depth,
+                       .segmentation = mount.segmentation,
+                       .image_points = mount.image_points,
+                       .erosion = mount.erosion});
+  }
+  return cameras;
+}
+
+CameraSensorCfg camera_sensor_cfg(const CameraSystem& system, int camera,
+                                  const RecordedCamera& recorded, const RolloutCfg& cfg) {
+  const CameraSystem::Mounted& mounted = system.mounted(camera);
+  CameraSensorCfg out;
+  out.name = recorded.name;
+  if (mounted.is_new) {
+    out.parent_body = mounted.body;
+    write_vec(mounted.pose.p, out.pos.data());
+    write_quat(mounted.pose.q, out.quat.data());
+    out.fovy = mounted.fovy;
+  } else {
+    out.camera_name = mounted.camera;
+  }
+  out.width = recorded.width;
+  out.height = recorded.height;
+  out.data_types = {"rgb", "segmentation"};
+  if (recorded.depth) out.data_types.push_back("depth");
+  out.use_shadows = cfg.shadows;
+  out.samples = cfg.samples;
+  return out;
+}
+
+Vec3 middle_of(const Task& task, const World& world) {
+  Vec3 sum;
+  int count = 0;
+  for (const TaskObject& object : task.objects(world.id)) {
+    if (object.body < 0) continue;
+    sum = sum + vec3(world.data->xpos + 3 * object.body);
+    ++count;
+  }
+  const auto groups = task.robot().groups();
+  for (std::size_t g = 0; g < groups.size(); ++g) {
+    if (groups[g].kind != GroupKind::kGripper) continue;
+    sum = sum + task.robot().leaf_pose(world, static_cast<int>(g)).p;
+    ++count;
+  }
+  return count > 0 ? (1.0 / count) * sum : sum;
+}
+
+}  // namespace mjsense
