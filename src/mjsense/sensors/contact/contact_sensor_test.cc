@@ -212,9 +212,9 @@ TEST(Contact, TheTerrainIsAnEntity) {
       "<mujoco><worldbody><body name='b' pos='0 0 .1'><freejoint/>"
       "<geom name='g' type='box' size='.1 .1 .1' mass='1'/></body></worldbody></mujoco>";
   cfg.entities.emplace_back("box", box);
-  for (const char* mode : {"geom", "body"}) {
+  for (const ContactMode mode : {ContactMode::kGeom, ContactMode::kBody}) {
     auto c = std::make_shared<ContactSensorCfg>();
-    c->name = mode;
+    c->name = word(mode);
     c->primary = {mode, {".*"}, "terrain", {}};
     c->secondary = ContactMatch{"geom", {"g"}, "box", {}};
     c->fields = {"force"};
