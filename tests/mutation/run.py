@@ -4,6 +4,7 @@
     python tests/mutation/run.py                  every mutant of mutants.toml that has no result yet
     python tests/mutation/run.py --survivors      those that survived, again
     python tests/mutation/run.py worlds png       rooms, or parts of ids
+    python tests/mutation/run.py --judge pytest scan-in-world    ask this judge alone
     python tests/mutation/run.py --check          only whether every mutant still applies
     python tests/mutation/run.py --report         the figures so far, and who survived
 
@@ -204,13 +205,15 @@ class Runner:
                     raise Failure(f"{name} fails without any mutant: {wrong}")
                 passed.add(name)
 
-    def ask(self, mutant: Mutant, own: bool) -> dict:
+    def ask(self, mutant: Mutant, own: bool, only: str) -> dict:
         path = TREE / mutant.file
         original = path.read_text()
         start, built = time.time(), None
         path.write_text(mutant.apply(TREE))
         try:
             for i, (name, targets, judge) in enumerate(self.judges(mutant.judged_in)):
+                if only and name != only:
+                    continue
                 if own and i > 0:
                     return {"noticed": False, "own": True, "seconds": round(time.time() - start, 1)}
                 if targets != built:
@@ -218,7 +221,7 @@ class Runner:
                     built = targets
                 if test := judge():
                     return {"noticed": True, "judge": name, "test": test, "seconds": round(time.time() - start, 1)}
-            return {"noticed": False, "seconds": round(time.time() - start, 1)}
+            return {"noticed": False, **({"own": True} if only else {}), "seconds": round(time.time() - start, 1)}
         finally:
             path.write_text(original)
 
@@ -248,6 +251,7 @@ def main() -> int:
     parser.add_argument("--again", action="store_true", help="also mutants that have a result")
     parser.add_argument("--survivors", action="store_true", help="those that survived, again")
     parser.add_argument("--own", action="store_true", help="ask the room's own tests only; a run without it asks the others")
+    parser.add_argument("--judge", default="", help="ask this one only: pytest, golden, sensors_test ...")
     parser.add_argument("--no-baseline", action="store_true", help="trust that the tests pass without a mutant")
     parser.add_argument("--prefix", default="nice -n 10", help="before every build and test (%(default)s)")
     parser.add_argument("--jobs", type=int, default=os.cpu_count(), help="of a build (%(default)s)")
@@ -283,7 +287,7 @@ def main() -> int:
     turn = {m.id: sum(other.room == m.room for other in chosen[:i]) for i, m in enumerate(chosen)}
     for i, mutant in enumerate(sorted(chosen, key=lambda m: (turn[m.id], ROOMS.index(m.room)))):
         try:
-            result = runner.ask(mutant, options.own)
+            result = runner.ask(mutant, options.own, options.judge)
         except Failure as error:
             print(f"[{i + 1}/{len(chosen)}] {mutant.id}: ERROR {error}", flush=True)
             broken += 1

@@ -5,6 +5,7 @@
 
 #include <gtest/gtest.h>
 
+#include <array>
 #include <cmath>
 
 namespace mjsense {
@@ -14,10 +15,11 @@ using testing::agree;
 using testing::Neighbours;
 using testing::TestModel;
 
-Hit at(double t) {
+Hit at(double t, std::array<float, 3> normal = {0, 0, 1}) {
   Hit hit;
   hit.t = t;
   hit.geom = 0;
+  hit.normal = normal;
   return hit;
 }
 const Hit kNothing;
@@ -86,16 +88,27 @@ TEST(Truth, InTheBordersPlaneItIsMetAnywhereOrNotAtAll) {
   const double along[3] = {0, 1, 0};
   const double in_it[3] = {1, -3, 0.5}, beside[3] = {1 + 1e-5, -3, 0.5};
   const double within[3] = {1 - 1e-5, -3, 0.5};
+  const auto wall = [](double t) { return at(t, {1, 0, 0}); };
   for (double t : {2.0, 2.7, 3.9}) {
-    EXPECT_TRUE(agree(step(), in_it, along, at(t))) << t;
-    EXPECT_FALSE(agree(step(), beside, along, at(t))) << t;
-    EXPECT_EQ(agree(step(), within, along, at(t)), t == 2) << t;
+    EXPECT_TRUE(agree(step(), in_it, along, wall(t))) << t;
+    EXPECT_FALSE(agree(step(), beside, along, wall(t))) << t;
+    EXPECT_EQ(agree(step(), within, along, wall(t)), t == 2) << t;
   }
   EXPECT_TRUE(agree(step(), in_it, along, kNothing));
   EXPECT_TRUE(agree(step(), beside, along, kNothing));
   EXPECT_FALSE(agree(step(), within, along, kNothing));
-  EXPECT_FALSE(agree(step(), in_it, along, at(1.9)));
-  EXPECT_FALSE(agree(step(), in_it, along, at(4.1)));
+  EXPECT_FALSE(agree(step(), in_it, along, wall(1.9)));
+  EXPECT_FALSE(agree(step(), in_it, along, wall(4.1)));
+}
+
+// It is no excuse that there is a surface, if every ray is stopped before it.
+TEST(Truth, ASurfaceBehindASurfaceIsNotMet) {
+  const double o[3] = {0.3, 0.2, 4}, down[3] = {0, 0, -1};
+  EXPECT_FALSE(agree(step(), o, down, at(4)));
+  EXPECT_FALSE(agree(step(), o, down, at(4, {0, 0, -1})));
+  const double inside[3] = {0.3, 0.2, 0.4};
+  EXPECT_TRUE(agree(step(), inside, down, at(0.4)));
+  EXPECT_FALSE(agree(step(), inside, down, kNothing));
 }
 
 }  // namespace

@@ -3,7 +3,9 @@
 
 #include <algorithm>
 #include <cstring>
+#include <nlohmann/json.hpp>
 #include <string>
+#include <vector>
 
 #include "mjsense/core/error.h"
 #include "mjsense/core/png.h"
@@ -18,8 +20,23 @@ namespace fs = std::filesystem;
 namespace mjsense {
 namespace {
 
-constexpr int kTileHeight = 132, kGap = 4, kLine = kTextHeight + kGap;
+constexpr int kTileHeight = 132, kGap = 4, kLine = kTextHeight + kGap, kApart = 14;
 constexpr std::uint8_t kBackground = 24;
+
+// What the episode's task was in words, and how it ended: "Pick up the red block: success".
+std::string story(hid_t trajectory) {
+  std::string text;
+  if (h5::exists(trajectory, "obs_scene")) {
+    const auto scene =
+        nlohmann::json::parse(h5::read_text(trajectory, "obs_scene"), nullptr, false);
+    if (scene.is_object() && scene.contains("task_description") &&
+        scene["task_description"].is_string())
+      text = scene["task_description"];
+  }
+  const std::string outcome = h5::text_attribute(trajectory, "outcome");
+  if (!text.empty() && !outcome.empty()) text += ": ";
+  return text + outcome;
+}
 
 // One camera of one episode.
 struct Strip {
@@ -56,6 +73,7 @@ std::vector<Strip> find_strips(const fs::path& path, int shown, const std::strin
       if (++episodes > shown) continue;
       const h5::Id trajectory(H5Gopen2(file, name.c_str(), H5P_DEFAULT), H5Gclose, name);
       if (!h5::exists(trajectory, "obs/sensor_data")) continue;
+      const std::string told = story(trajectory);
       const h5::Id videos(H5Gopen2(trajectory, "obs/sensor_data", H5P_DEFAULT), H5Gclose, name);
       for (const std::string& key : h5::children(videos)) {
         const h5::Id dataset(H5Dopen2(videos, key.c_str(), H5P_DEFAULT), H5Dclose, key);
@@ -70,9 +88,7 @@ std::vector<Strip> find_strips(const fs::path& path, int shown, const std::strin
         strip.width = probe.width;
         strip.height = probe.height;
         strip.frames = probe.frames;
-        strip.episode = fmt::format("{}  {}", recorded.name, name);
-        if (const std::string outcome = h5::text_attribute(trajectory, "outcome"); !outcome.empty())
-          strip.episode += ": " + outcome;
+        strip.episode = fmt::format("{}  {}  {}", recorded.name, name, told);
         strip.camera = fmt::format("{}, {} frames", key, strip.frames);
         strips.push_back(std::move(strip));
       }
@@ -126,13 +142,6 @@ class Canvas {
     for (int row = 0; row < height; ++row)
       std::memcpy(at(x, y + row), rgb + std::size_t{3} * width * row, std::size_t{3} * width);
   }
-  // Text on a ground of its own, as in the corner of a picture.
-  void tag(int x, int y, std::string_view text) {
-    const int width = text_width(text) + kGap;
-    for (int row = 0; row < kLine - kGap; ++row)
-      std::memset(at(x, y + row), kBackground, std::size_t{3} * width);
-    this->text(x + kGap, y + kGap / 2, text);
-  }
   void write(const fs::path& png) const { write_png(png, rgb_, width_, height_, 3); }
 
  private:
@@ -165,7 +174,7 @@ std::string contact_sheet(const fs::path& path, const fs::path& png, int episode
     tile_width = std::max(tile_width, strip.tile_width());
     width = std::max({width, text_width(strip.episode), text_width(strip.camera)});
     height += kLine + kTileHeight + kGap;
-    if (s == 0 || strip.episode != strips[s - 1].episode) height += kGap + kLine;
+    if (s == 0 || strip.episode != strips[s - 1].episode) height += kApart + kLine;
   }
   width = std::max(width + kGap, columns * (tile_width + kGap)) + kGap;
 
@@ -175,16 +184,21 @@ std::string contact_sheet(const fs::path& path, const fs::path& png, int episode
   for (std::size_t s = 0; s < strips.size(); ++s) {
     const Strip& strip = strips[s];
     if (s == 0 || strip.episode != strips[s - 1].episode) {
-      sheet.text(kGap, y + kGap, strip.episode);
-      y += kGap + kLine;
+      sheet.text(kGap, y + kApart, strip.episode);
+      y += kApart + kLine;
     }
     sheet.text(kGap, y, strip.camera);
+    const int said = kGap + text_width(strip.camera) + 2 * kTextAdvance;
     y += kLine;
     const std::vector<int> moments = strip.moments(columns);
     const std::size_t bytes = std::size_t{3} * strip.tile_width() * kTileHeight;
     for (std::size_t c = 0; c < std::min(moments.size(), pictures[s].size() / bytes); ++c) {
       const int x = kGap + static_cast<int>(c) * (tile_width + kGap);
       sheet.picture(x, y, strip.tile_width(), kTileHeight, &pictures[s][c * bytes]);
+      // The frame's number above its right edge, where the line is free.
+      const std::string number = std::to_string(moments[c]);
+      const int left = x + strip.tile_width() - text_width(number);
+      if (left >= said) sheet.text(left, y - kLine, number);
     }
     y += kTileHeight + kGap;
   }

@@ -60,12 +60,18 @@ class Sheet {
   std::vector<Band> tiles(Band strip) const {
     return bands(width_, [&](int x) { return at(x, strip.begin) != kGround; });
   }
-  // Whether the line at `y` says exactly this.
-  bool reads(int y, std::string_view text) const {
+  // Whether the line at `y` begins with this and, unless `more`, ends there; or says it before `end`.
+  bool reads(int y, std::string_view text, bool more = false) const {
+    return reads(kEdge, y, text, more ? kEdge + text_width(text) : width_);
+  }
+  bool ends(int y, int end, std::string_view text) const {
+    return reads(end - text_width(text), y, text, end);
+  }
+  bool reads(int begin, int y, std::string_view text, int end) const {
     std::vector<std::uint8_t> line(std::size_t{3} * width_ * kTextHeight, 0);
-    draw_text(line, width_, kEdge, 0, text);
+    draw_text(line, width_, begin, 0, text);
     for (int row = 0; row < kTextHeight; ++row)
-      for (int x = 0; x < width_; ++x)
+      for (int x = begin; x < end; ++x)
         if ((line[3 * (static_cast<std::size_t>(row) * width_ + x)] > 0) !=
             (at(x, y + row) == Rgb{225, 225, 225}))
           return false;
@@ -120,11 +126,17 @@ TEST(ContactSheet, ShowsEpisodesFromFirstToLastFrame) {
   };
   EXPECT_THAT(frames(strips[0]), ElementsAre(0, 1, 3, 5));
   EXPECT_THAT(frames(strips[2]), ElementsAre(0, 2, 4, 6));
-  const std::string file = "house_0/trajectories_batch_1_of_1.h5  traj_";
   for (int e = 0; e < 2; ++e) {
     const int top = strips[2 * e].begin;
-    EXPECT_TRUE(sheet.reads(top - kLine, "wrist_camera, " + std::to_string(6 + e) + " frames"));
-    EXPECT_TRUE(sheet.reads(top - 2 * kLine, file + std::to_string(e) + ": success"));
+    EXPECT_TRUE(
+        sheet.reads(top - kLine, "wrist_camera, " + std::to_string(6 + e) + " frames", true));
+    EXPECT_TRUE(sheet.reads(
+        top - 2 * kLine, fmt::format("house_0/trajectories_batch_1_of_1.h5  traj_{0}  Pick up the "
+                                     "cup {0}: success",
+                                     e)));
+    const std::vector<Band> tiles = sheet.tiles(strips[2 * e]);
+    EXPECT_TRUE(sheet.ends(top - kLine, tiles[2].end, std::to_string(3 + e)));
+    EXPECT_TRUE(sheet.ends(top - kLine, tiles[3].end, std::to_string(5 + e)));
   }
   // As many as asked for, and no frame twice.
   contact_sheet(dir.path, png, 1, 20);
@@ -142,15 +154,15 @@ TEST(ContactSheet, DepthIsColouredFromNearToFar) {
   TempDir dir;
   record_ball(dir.path, 1);
   const fs::path png = dir.path / "sheet.png";
-  contact_sheet(dir.path, png, 1, 3);
+  contact_sheet(dir.path, png, 1, 6);
   const Sheet sheet(png);
   const std::vector<Band> strips = sheet.strips();
   ASSERT_THAT(strips, SizeIs(2));
   const int top = strips[1].begin;
   const std::vector<Band> tiles = sheet.tiles(strips[1]);
-  ASSERT_THAT(tiles, SizeIs(3));
+  ASSERT_THAT(tiles, SizeIs(6));
   double near = 1e9, far = 0;
-  for (int t : {0, 2, 5})
+  for (int t = 0; t < 6; ++t)
     for (int y = 0; y < 24; ++y)
       for (int x = 0; x < 32; ++x) {
         const double z = FakeSuite::depth(x, y, t);
@@ -160,7 +172,8 @@ TEST(ContactSheet, DepthIsColouredFromNearToFar) {
       }
   EXPECT_TRUE(sheet.reads(top - kLine, fmt::format("wrist_camera_depth, 6 frames, {:.2f} m (yellow)"
                                                    " to {:.2f} m (blue)",
-                                                   near, far)));
+                                                   near, far),
+                          true));
   constexpr Rgb kNothing = {0, 0, 0}, kFarthest = {20, 20, 60}, kNearest = {250, 220, 90};
   int nearest = 0, farthest = 0;
   std::set<Rgb> colours;

@@ -142,6 +142,33 @@ TEST(Verify, FailIsTheOppositeOfSuccess) {
   }
 }
 
+// Files without the names of their videos, as MolmoSpaces leaves them: of the same batch and number.
+TEST(Repair, NamesTheVideosOfTheirOwnBatch) {
+  TempDir dir;
+  record(dir.path, 6, {.worlds = 1}, true);
+  const fs::path path = dir.path / "house_0/trajectories_batch_2_of_2.h5";
+  const auto in_videos = [&](bool write, auto&& act) {
+    const h5::H5Lock lock;
+    h5::Id file = h5::open_file(path, write);
+    {
+      const h5::Id videos(H5Gopen2(file, "traj_1/obs/sensor_data", H5P_DEFAULT), H5Gclose, "videos");
+      act(videos);
+    }
+    file.close("close");
+  };
+  std::string was, is;
+  in_videos(true, [&](hid_t videos) {
+    was = read_file_name(videos, "wrist_camera");
+    h5::check(H5Ldelete(videos, "wrist_camera", H5P_DEFAULT), "delete");
+  });
+  EXPECT_EQ(was, "episode_00000001_wrist_camera_batch_2_of_2.mp4");
+  EXPECT_THAT(repair(dir.path).text(), HasSubstr("added 1 names of videos"));
+  in_videos(false, [&](hid_t videos) { is = read_file_name(videos, "wrist_camera"); });
+  EXPECT_EQ(is, was);
+  EXPECT_TRUE(verify(dir.path).ok()) << verify(dir.path).text();
+  EXPECT_THAT(repair(dir.path).text(), HasSubstr("nothing to repair"));
+}
+
 TEST(Replay, OddPicturesArePadded) {
   TempDir dir;
   FakeSuite suite({1, 17, 13});

@@ -594,6 +594,32 @@ TEST(Worlds, ClocksCountEpisodesAndTicks) {
   EXPECT_EQ(hooks.key, 17u);
 }
 
+// step_raw() is mj_step and nothing else: what is read after it is what mj_step left, one step behind
+// the state, until the next step.
+TEST(Worlds, AfterRawStepsWhatIsReadIsWhatMjStepLeft) {
+  const ModelPtr m = load("Euler");
+  Worlds worlds(m.get(), 1, 1);
+  Recording hooks(1);
+  worlds.reset(all_worlds, 0, hooks);
+  const DataPtr d = make_data(m.get());
+  mj_resetDataKeyframe(m.get(), d.get(), 0);
+  mj_forward(m.get(), d.get());
+  worlds.step_raw(5);
+  worlds.visit(all_worlds, hooks);
+  for (int k = 0; k < 5; ++k) mj_step(m.get(), d.get());
+  hooks.expect_fresh(0, m.get(), d.get());
+  const std::vector<double> behind = hooks.sensordata[0];
+  const DataPtr fresh = make_data(m.get());
+  mj_copyData(fresh.get(), m.get(), d.get());
+  mj_forward(m.get(), fresh.get());
+  EXPECT_NE(behind, std::vector<double>(fresh->sensordata, fresh->sensordata + m->nsensordata));
+  worlds.step(1, hooks);
+  mj_step(m.get(), d.get());
+  expect_same_state(worlds, 0, m.get(), d.get());
+  mj_forward(m.get(), d.get());
+  hooks.expect_fresh(0, m.get(), d.get());
+}
+
 // Forces belong to the state at every substep, not at the last one alone.
 TEST(Worlds, ASubstepHookSeesFreshForces) {
   struct Forces : Recording {

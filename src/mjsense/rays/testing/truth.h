@@ -1,13 +1,12 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
-// MuJoCo's own rays as the truth for ours. They count in double, ours in float32: so a hit is right
-// if it is mj_ray's, for the ray itself or for one that float32 can hardly tell from it. No other
-// excuse counts: a ray that slips through a seam agrees with none of its neighbours.
+// MuJoCo's own rays as the truth for ours. They count in double, ours in float32: so what ours say is
+// right if mj_ray says it, of the ray itself or of one that float32 can hardly tell from it. A ray that
+// slips through a seam comes farther than any of these.
 
 #include <mujoco/mujoco.h>
 
 #include <algorithm>
-#include <array>
 #include <cmath>
 #include <cstdlib>
 #include <string>
@@ -30,14 +29,13 @@ inline Truth mujoco_ray(const TestModel& m, const double o[3], const double d[3]
   return r;
 }
 
-// A ray's neighbourhood: all that are moved along the axes by `move` metres and turned towards them
+// A ray and its neighbours: all that are moved along the axes by `move` metres and turned towards them
 // by kRoundings radians at most, as float32 does with a ray that it brings into a geom's frame: a
 // few roundings of numbers as large as the way to the far side of the farthest geom.
 class Neighbours {
  public:
   static constexpr double kRoundings = 4 * 0x1p-24;
   static constexpr double kMiss = 1e30;
-  using Offset = std::array<double, 6>;  // -1..1, of the origin and of the direction
 
   Neighbours(const TestModel& m, const double o[3], const double d[3]) : m_(m) {
     mju_copy3(o_, o);
@@ -48,73 +46,76 @@ class Neighbours {
     move_ = kRoundings * reach;
   }
 
-  // How far mj_ray's ray of this offset comes; kMiss if it meets nothing. What it meets up to
-  // `behind` metres before its origin counts too, as a negative distance.
-  double distance(const Offset& offset, double behind = 0) const {
-    double o[3], d[3];
-    for (int k = 0; k < 3; ++k) d[k] = d_[k] + kRoundings * offset[3 + k];
-    if (offset != Offset{}) mju_normalize3(d);
-    for (int k = 0; k < 3; ++k) o[k] = o_[k] + move_ * offset[k] - behind * d[k];
-    const double t = mujoco_ray(m_, o, d).t;
-    return t < 0 ? kMiss : t - behind;
-  }
-
-  // To a corner, or large and small in every direction: on the tip of a roof only a small step aside
-  // is left.
-  static Offset any(Rng& rng) {
-    const bool corner = rng.below(2) != 0;
-    Offset offset;
-    for (double& x : offset) {
-      const double size = corner ? 1.0 : std::exp2(-rng.uniform(0, 16));
-      x = rng.below(4) == 0 ? 0.0 : rng.below(2) ? size : -size;
+  // How far mj_ray says that the ray comes; kMiss if it meets nothing.
+  double distance() const { return distance(o_, d_); }
+  // One of its neighbours.
+  double distance(Rng& rng) const {
+    double by[6], o[3], d[3];
+    any(rng, by);
+    for (int k = 0; k < 3; ++k) {
+      o[k] = o_[k] + move_ * by[k];
+      d[k] = d_[k] + kRoundings * by[3 + k];
     }
-    return offset;
+    mju_normalize3(d);
+    return distance(o, d);
   }
 
+  // What the roundings are at t metres.
+  double rounding(double t) const { return move_ + kRoundings * t; }
   bool same(double t, const Hit& hit) const {
     if (t == kMiss || !hit) return (t == kMiss) == !hit;
-    return std::abs(hit.t - t) <= move_ + kRoundings * t;
+    return std::abs(hit.t - t) <= rounding(t);
   }
 
-  // Whether one between two rays, which come less far and farther than the hit, comes just as far.
-  // So it is on a surface that is grazed; at an edge there is none.
-  bool same_between(Offset nearer, Offset farther, const Hit& hit, double behind) const {
-    for (int i = 0; i < 48; ++i) {
-      Offset middle;
-      for (int k = 0; k < 6; ++k) middle[k] = 0.5 * (nearer[k] + farther[k]);
-      if (same(distance(middle), hit)) return true;
-      (distance(middle, behind) < hit.t ? nearer : farther) = middle;
+  // Whether the ray's point at the hit lies on a surface, looking down at it from beside the point.
+  bool on_surface(const Hit& hit, Rng& rng) const {
+    constexpr double kAbove = 1e-4;
+    double up[3], from[3], by[6];
+    for (int k = 0; k < 3; ++k) up[k] = hit.normal[k];
+    if (mju_normalize3(up) < 0.5) return false;
+    const double down[3] = {-up[0], -up[1], -up[2]};
+    for (int i = 0; i < 300; ++i) {
+      any(rng, by);
+      const double sideways = mju_dot3(by, up);
+      for (int k = 0; k < 3; ++k)
+        from[k] = o_[k] + hit.t * d_[k] + kAbove * up[k] +
+                  rounding(hit.t) * (by[k] - sideways * up[k]);
+      if (std::abs(distance(from, down) - kAbove) <= rounding(hit.t)) return true;
     }
     return false;
   }
 
  private:
+  double distance(const double o[3], const double d[3]) const {
+    const double t = mujoco_ray(m_, o, d).t;
+    return t < 0 ? kMiss : t;
+  }
+
+  // Numbers from -1 to 1: a corner, or large ones and small ones, since on the tip of a roof only a
+  // small step aside is left.
+  static void any(Rng& rng, double by[6]) {
+    const bool corner = rng.below(2) != 0;
+    for (int k = 0; k < 6; ++k) {
+      const double size = corner ? 1.0 : std::exp2(-rng.uniform(0, 16));
+      by[k] = rng.below(4) == 0 ? 0.0 : rng.below(2) ? size : -size;
+    }
+  }
+
   const TestModel& m_;
   double o_[3], d_[3], move_;
 };
 
-// Whether mj_ray says so, of the ray or of one in its neighbourhood.
+// Whether mj_ray says so, of the ray or of a neighbour. Where it is grazed a surface is met anywhere
+// on a long way, by roundings that differ from point to point: there it is enough that a neighbour
+// comes that far, and that the ray is at a surface then.
 inline bool agree(const TestModel& m, const double o[3], const double d[3], const Hit& hit) {
   const Neighbours ray(m, o, d);
-  if (ray.same(ray.distance({}), hit)) return true;
-  // A ray that starts on a surface may have passed it.
-  for (const double behind : {0.0, 0.01}) {
-    if (behind > 0 && !(hit.t < behind)) break;
-    Rng rng(1, 0, 0, 0);
-    Neighbours::Offset last[2];  // that came less far than the hit, and farther
-    bool known[2] = {false, false};
-    int pairs = 300;
-    for (int i = 0; i < 20000; ++i) {
-      const Neighbours::Offset offset = Neighbours::any(rng);
-      if (ray.same(ray.distance(offset), hit)) return true;
-      if (!hit || pairs == 0) continue;
-      const bool farther = ray.distance(offset, behind) > hit.t;
-      last[farther] = offset;
-      known[farther] = true;
-      if (!known[!farther]) continue;
-      if (ray.same_between(last[0], last[1], hit, behind)) return true;
-      --pairs;
-    }
+  if (ray.same(ray.distance(), hit)) return true;
+  Rng rng(1, 0, 0, 0);
+  const bool on_surface = !!hit && ray.on_surface(hit, rng);
+  for (int i = 0; i < 20000; ++i) {
+    const double t = ray.distance(rng);
+    if (ray.same(t, hit) || (on_surface && t > hit.t)) return true;
   }
   return false;
 }

@@ -71,7 +71,7 @@ TEST(CameraMarkers, AreThoseOfMujocosScene) {
   options.tendongroup[3] = 1;
   mjvCamera camera;
   mjv_defaultCamera(&camera);
-  std::set<int> tendons;
+  std::set<int> tendons, types;
   for (int i = 0; i < 20; ++i) {
     run(m, 10);
     markers.copy(m.model, m.data);
@@ -88,12 +88,20 @@ TEST(CameraMarkers, AreThoseOfMujocosScene) {
       EXPECT_TRUE(std::equal(theirs.pos, theirs.pos + 3, ours.shape.pos));
       EXPECT_TRUE(std::equal(theirs.mat, theirs.mat + 9, ours.shape.mat));
       EXPECT_TRUE(std::equal(theirs.rgba, theirs.rgba + 4, ours.rgba));
+      // Theirs: half sizes along the axes; ours: what a geom of that type has.
+      const bool round = theirs.type == mjGEOM_CAPSULE || theirs.type == mjGEOM_CYLINDER;
+      EXPECT_EQ(ours.shape.size[0], theirs.size[0]);
+      EXPECT_EQ(ours.shape.size[1], theirs.size[round ? 2 : 1]) << theirs.type;
+      EXPECT_EQ(ours.shape.size[2], round ? 0 : theirs.size[2]) << theirs.type;
+      types.insert(theirs.type);
       if (theirs.objtype == mjOBJ_TENDON) tendons.insert(theirs.objid);
     }
     EXPECT_EQ(next, markers.all().size());
     EXPECT_LE(next, markers.capacity());
   }
   EXPECT_EQ(tendons, (std::set<int>{0, 1, 2, 3, 4}));
+  EXPECT_EQ(types, (std::set<int>{mjGEOM_SPHERE, mjGEOM_CAPSULE, mjGEOM_ELLIPSOID,
+                                  mjGEOM_CYLINDER, mjGEOM_BOX}));
   mjv_freeScene(&scene);
 }
 

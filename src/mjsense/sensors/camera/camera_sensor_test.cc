@@ -128,6 +128,29 @@ TEST(Camera, PixelsKnowTheirBodiesAndEntities) {
   EXPECT_GT(seen[1], seen[2]);
 }
 
+// A cloth above a floor, each an entity.
+TEST(Camera, PixelsOfAFlexKnowItsEntity) {
+  SceneCfg cfg;
+  cfg.terrain.emplace();
+  EntityCfg cloth;
+  cloth.model.xml = R"(<mujoco><worldbody><flexcomp name="cloth" type="grid" dim="2" count="5 5 1"
+    spacing=".3 .3 .3" pos="0 0 1"><edge equality="true"/></flexcomp></worldbody></mujoco>)";
+  cfg.entities.emplace_back("curtain", cloth);
+  CameraSensorCfg all = camera(32, 16, {"segmentation", "entity_segmentation"});
+  all.pos = {0, 0, 5};
+  cfg.sensors.push_back(std::make_shared<CameraSensorCfg>(all));
+  Lab lab(std::move(cfg), {});
+  const auto ids = lab.read<std::int32_t>("segmentation");
+  const auto owners = lab.read<std::int32_t>("entity_segmentation");
+  int seen[2] = {};
+  for (std::size_t i = 0; i < owners.size(); ++i) {
+    ASSERT_EQ(owners[i], ids[2 * i + 1] == mjOBJ_FLEX) << ids[2 * i + 1];
+    ++seen[owners[i]];
+  }
+  EXPECT_GT(seen[0], 100);
+  EXPECT_GT(seen[1], 20);
+}
+
 TEST(Camera, OneCameraServesSensorsWithDifferentGroups) {
   CameraSensorCfg without_ball = camera(8, 6, {"segmentation"}, "w/top");
   CameraSensorCfg with_hidden = without_ball;

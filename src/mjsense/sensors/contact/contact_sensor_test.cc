@@ -203,6 +203,35 @@ TEST(Contact, MiddleOfAStackPushesBothWays) {
   }
 }
 
+// The ground has names of its own, with no "terrain/" before them.
+TEST(Contact, TheTerrainIsAnEntity) {
+  SceneCfg cfg;
+  cfg.terrain = TerrainCfg{};
+  EntityCfg box;
+  box.model.xml =
+      "<mujoco><worldbody><body name='b' pos='0 0 .1'><freejoint/>"
+      "<geom name='g' type='box' size='.1 .1 .1' mass='1'/></body></worldbody></mujoco>";
+  cfg.entities.emplace_back("box", box);
+  for (const ContactMode mode : {ContactMode::kGeom, ContactMode::kBody}) {
+    auto c = std::make_shared<ContactSensorCfg>();
+    c->name = word(mode);
+    c->primary = {mode, {".*"}, "terrain", {}};
+    c->secondary = ContactMatch{"geom", {"g"}, "box", {}};
+    c->fields = {"force"};
+    c->reduce = ContactReduce::kNetForce;
+    c->global_frame = true;
+    cfg.sensors.push_back(c);
+  }
+  auto scene = std::make_shared<Scene>(std::move(cfg));
+  Simulation sim(scene, {});
+  sim.step(1000);
+  for (const char* mode : {"geom", "body"}) {
+    sim.refresh(scene->sensor(mode));
+    EXPECT_NEAR(std::abs(scene->sensor(mode).field("force").data.row<float>(0)[2]), 9.81, 0.01)
+        << mode;
+  }
+}
+
 // Two feet of one trunk press against each other along x, L from the left: the contact is the trunk's
 // with R and, turned round, the trunk's with L.
 //

@@ -241,6 +241,21 @@ TEST(Lidar, BeforeTheFirstMomentTheFrameStoodStill) {
   EXPECT_NEAR(d[2 * 90 + 45], -1, 0);
 }
 
+// Put elsewhere as a new episode begins, it did not fly there during the sweep.
+TEST(Lidar, AResetForgetsWhereTheFrameWas) {
+  Lab lab;
+  lab.cfg->include_geom_groups = {{1}};  // the wall at x = 4
+  lab.cfg->motion_distortion = true;
+  lab.cfg->scan =
+      TableScan{.angles = std::vector<std::array<double, 2>>(11, {0.0, 0.0}), .rate_hz = 10};
+  lab.start();
+  for (int i = 0; i < 100; ++i) lab.sim->step();
+  EXPECT_THAT(lab.read("distances"), Each(FloatNear(4, 1e-4f)));
+  lab.set("qpos", 0, 1.0);
+  lab.sim->reset_sensors();  // time goes on
+  EXPECT_THAT(lab.read("distances"), Each(FloatNear(3, 1e-4f)));
+}
+
 TEST(Lidar, TableAdvancesWithEveryScan) {
   Lab lab;
   std::vector<std::array<double, 2>> angles;

@@ -183,6 +183,25 @@ TEST(RayCast, AlignmentTurnsRaysButNotTheFrame) {
   EXPECT_EQ(lab.read("quat_w", "world"), lab.read("quat_w", "base"));
 }
 
+// A frame that points up has a heading still: where its x axis comes over the top it does not turn.
+TEST(RayCast, AHeadingGoesOnOverTheTop) {
+  const double heading = 0.7;
+  for (double pitch : {-1.3, -M_PI / 2 + 0.05, -M_PI / 2, -M_PI / 2 - 0.05, M_PI / 2 + 0.05}) {
+    double yaw[4], nose[4], q[4], mat[9];
+    const double z[3] = {0, 0, 1}, y[3] = {0, 1, 0};
+    mju_axisAngle2Quat(yaw, z, heading);
+    mju_axisAngle2Quat(nose, y, pitch);
+    mju_mulQuat(q, yaw, nose);
+    mju_quat2Mat(mat, q);
+    float out[9];
+    align_rays(RayAlignment::kYaw, mat, out);
+    const float c = static_cast<float>(std::cos(heading)), s = static_cast<float>(std::sin(heading));
+    EXPECT_THAT(std::vector<float>(out, out + 9),
+                Pointwise(FloatNear(1e-6f), std::vector<float>{c, -s, 0, s, c, 0, 0, 0, 1}))
+        << pitch;
+  }
+}
+
 // Of the two quaternions of an orientation: the one whose largest component is positive.
 TEST(RayCast, TheLargestComponentOfAQuaternionIsPositive) {
   auto cfg = sensor_cfg<RayCastSensorCfg>();
@@ -418,6 +437,21 @@ TEST(Pattern, GridStopsShortWhereTheResolutionDoesNotDivide) {
   ASSERT_EQ(p.size(), 3u);
   EXPECT_DOUBLE_EQ(p.offsets[0][0], -0.25);
   EXPECT_NEAR(p.offsets[2][0], 0.15, 1e-12);
+}
+
+TEST(Pattern, RingsHaveACentreIfAsked) {
+  const auto offsets = [](bool center) {
+    const RingPattern ring{.rings = {{.radius = 0.5, .num_samples = 4}}, .include_center = center};
+    std::vector<double> xy;
+    for (const auto& o : make_pattern(ring, nullptr, "test").offsets)
+      xy.insert(xy.end(), {o[0], o[1]});
+    return xy;
+  };
+  const std::vector<double> ring = {0.5, 0, 0, 0.5, -0.5, 0, 0, -0.5};
+  std::vector<double> with_center = {0, 0};
+  with_center.insert(with_center.end(), ring.begin(), ring.end());
+  EXPECT_THAT(offsets(false), Pointwise(::testing::DoubleNear(1e-12), ring));
+  EXPECT_THAT(offsets(true), Pointwise(::testing::DoubleNear(1e-12), with_center));
 }
 
 TEST(Pattern, EveryRayIsInExactlyOnePacket) {

@@ -4,8 +4,10 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <nlohmann/json.hpp>
 #include <set>
+#include <vector>
 
 #include "mjsense/core/error.h"
 #include "mjsense/robots/franka/franka.h"
@@ -245,6 +247,31 @@ TEST_F(Pick, EndsWithTheHorizonOrADoneAction) {
   start(0, 1);
   EXPECT_FALSE(task.evaluate(w).terminal) << "a new episode";
   EXPECT_EQ(task.last_action(0), nullptr);
+}
+
+// From the same state the same command reaches the arm with other noise in another episode and in the
+// next step, and with the same in another world.
+TEST_F(Pick, ActionNoiseBelongsToTheEpisodeAndTheStep) {
+  start(0, 5);
+  const std::vector<double> qpos(data->qpos, data->qpos + model->nq);
+  const int arm = task.robot().arm();
+  RobotValues now;
+  task.robot().read_qpos(w, now);
+  std::vector<double> target(now[arm].view().begin(), now[arm].view().end());
+  for (double& q : target) q += 0.05;
+  const auto noisy = [&](int world, std::int64_t episode, int step) {
+    start(world, episode);
+    std::copy(qpos.begin(), qpos.end(), data->qpos);
+    mj_forward(model, data.get());
+    Action action;
+    action.commands[arm].set(target);
+    for (int i = 0; i <= step; ++i) task.apply(w, action, state_row(data.get()));
+    return std::vector<double>(data->ctrl, data->ctrl + model->nu);
+  };
+  const std::vector<double> ctrl = noisy(0, 5, 0);
+  EXPECT_EQ(ctrl, noisy(2, 5, 0));
+  EXPECT_NE(ctrl, noisy(0, 6, 0));
+  EXPECT_NE(ctrl, noisy(0, 5, 1));
 }
 
 TEST_F(Pick, TellsWhatItIs) {
