@@ -25,7 +25,7 @@ def parts_of(options: dict[str, Any], sensors: Iterable[Sensor]) -> tuple[Task |
         robot = task.robot if task is not None else "franka"
     options["robot"] = "" if robot is None else str(robot)
     own = list(sensors)
-    for sensor in [*own, *(task._mjs_sensors() if task else ()), *(policy._mjs_sensors() if policy else ())]:
+    for sensor in [*own, *(task._mjs_make_sensors() if task else ()), *(policy._mjs_make_sensors() if policy else ())]:
         if not isinstance(sensor, Sensor):
             raise TypeError(f"not a mjsense.Sensor: {sensor!r}")
         if sensor._mjs_row_spec() is None:

@@ -47,6 +47,8 @@ class Policy:
     phase: np.ndarray
     num_retries: np.ndarray
 
+    _mjs_own: Sequence[Any] = ()
+
     # ------------------------------------------------------------------------------------------------- yours to write
 
     def initialize(self) -> None:
@@ -88,8 +90,12 @@ class Policy:
     def _mjs_settings(self) -> dict[str, Any]:
         return {"name": self._mjs_name(), "phases": dict(self.phases)}
 
+    def _mjs_make_sensors(self) -> list[Any]:
+        self._mjs_own = list(self.sensors())  # kept here: C++ refers to them without keeping them alive
+        return self._mjs_own
+
     def _mjs_sensors(self) -> list[Any]:
-        return list(self.sensors())
+        return self._mjs_own
 
     def _mjs_bind(self, sim: Simulation, streams: list[Any], layout: list[Any]) -> tuple[dict[str, Any], np.ndarray]:
         self.sim, self.num_worlds = sim, sim.num_worlds

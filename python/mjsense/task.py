@@ -5,7 +5,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from typing import TYPE_CHECKING, Any, ClassVar
+from typing import TYPE_CHECKING, Any
 
 import mujoco
 import numpy as np
@@ -66,7 +66,7 @@ class Task:
     action_groups: dict[str, slice]
     """Columns of an action by move group."""
 
-    _mjs_taken: ClassVar[str] = "task"
+    _mjs_own: Sequence[Any] = ()
     _mjs_found: tuple[Any, ...] | None = None
 
     # ------------------------------------------------------------------------------------------------- yours to write
@@ -242,8 +242,12 @@ class Task:
     def _mjs_scene_info(self, world: int) -> dict[str, str]:
         return dict(self.scene_info(world))
 
+    def _mjs_make_sensors(self) -> list[Any]:
+        self._mjs_own = list(self.sensors())  # kept here: C++ refers to them without keeping them alive
+        return self._mjs_own
+
     def _mjs_sensors(self) -> list[Any]:
-        return list(self.sensors())
+        return self._mjs_own
 
     def _mjs_suite(self, names: list[str]) -> list[str] | None:
         wanted = self.suite(names)

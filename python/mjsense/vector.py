@@ -239,7 +239,7 @@ def _autoreset_mode(mode: str | AutoresetMode) -> AutoresetMode:
 
 def _row(observation: dict[str, Any], world: int) -> dict[str, Any]:
     """One world's observation."""
-    return {key: _row(value, world) if isinstance(value, dict) else value[world] for key, value in observation.items()}
+    return {key: _row(value, world) if isinstance(value, dict) else value[world, ...] for key, value in observation.items()}
 
 
 def _space(boxes: dict[str, Any]) -> gymnasium.spaces.Dict:

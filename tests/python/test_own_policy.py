@@ -207,8 +207,7 @@ def test_its_sensors(tmp_path):
                 def compute(self, sim):
                     return np.full((sim.num_worlds, 1), policy.acts)
 
-            self.own = [Acts()]
-            return self.own
+            return [Acts()]
 
     task = Cart()
     rows = trajectories(record(tmp_path, task, policy=Thinker(task), episodes=1))[0]

@@ -41,7 +41,8 @@ void add_camera(SensorSuite& suite, const RecordedCamera& camera, const std::str
   }
 }
 
-// Parts of the robot, then what plays a role in the task.
+// Parts of the robot, then what plays a role in the task. Null where there is nothing to be seen, or
+// nothing to see it with.
 std::shared_ptr<Sensor> image_points(const Task& task, const std::vector<RecordedCamera>& cameras) {
   std::vector<ImagePointsSensor::Object> objects = task.robot().image_objects();
   for (std::size_t i = 0; i < task.objects(0).size(); ++i) {
@@ -56,6 +57,7 @@ std::shared_ptr<Sensor> image_points(const Task& task, const std::vector<Recorde
       views.push_back(
           {.name = camera.name, .sensor = camera.sensor, .skip_erosion = !camera.erosion});
   }
+  if (objects.empty() || views.empty()) return nullptr;
   return std::make_shared<ImagePointsSensor>("object_image_points", std::move(objects),
                                              std::move(views));
 }
@@ -97,7 +99,7 @@ SensorSuite core_suite(const Task& task, const ActionLog& log,
                                                  }),
             of_task);
   suite.extend(action_sensors(task, log), of_task);
-  if (!cameras.empty()) suite.add(image_points(task, cameras), of_task);
+  if (auto points = image_points(task, cameras)) suite.add(std::move(points), of_task);
   suite.extend(task.create_task_sensors(), of_task);
   suite.extend(robot.create_robot_sensors(), fmt::format("robot '{}'", robot.name()));
   if (const Policy* policy = task.policy()) {

