@@ -71,3 +71,6 @@ if(NOT TARGET mjsense_hdf5)
 endif()
 
 set(MJSENSE_PRIVATE_LIBS fmt::fmt nlohmann_json::nlohmann_json PkgConfig::PCRE2 embree mjsense_hdf5 Threads::Threads)
+if(MJSENSE_STATIC)
+  include(StaticLibraries)
+endif()

@@ -23,6 +23,10 @@ add_custom_target(mjsense_python_hdf5 DEPENDS ${MJSENSE_PY_HDF5})
 add_dependencies(mjsense_python mjsense_python_hdf5)
 target_link_libraries(mjsense_python PRIVATE mjsense ${MJSENSE_PY_HDF5} ${MJSENSE_PRIVATE_LIBS})
 target_link_options(mjsense_python PRIVATE -Wl,--exclude-libs,ALL -Wl,-Bsymbolic)
+if(MJSENSE_STATIC)
+  target_sources(mjsense_python PRIVATE ${PROJECT_SOURCE_DIR}/packaging/old_glibc.cc)
+  target_link_options(mjsense_python PRIVATE ${MJSENSE_STATIC_LINK})
+endif()
 
 # build/<preset>/python is a ready package: the extension, and links to the Python files. PYTHONPATH=build/dev/python.
 set(MJSENSE_PY_DIR ${PROJECT_BINARY_DIR}/python/mjsense)

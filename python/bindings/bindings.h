@@ -15,5 +15,6 @@ void bind_effects(nanobind::module_& m);
 void bind_raycast(nanobind::module_& m);
 void bind_recorder(nanobind::module_& m);
 void bind_rollout(nanobind::module_& m);
+void bind_program(nanobind::module_& m);
 
 }  // namespace mjsense::python

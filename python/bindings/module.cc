@@ -18,4 +18,5 @@ NB_MODULE(_core, m) {
   mjsense::python::bind_raycast(m);
   mjsense::python::bind_recorder(m);
   mjsense::python::bind_rollout(m);
+  mjsense::python::bind_program(m);
 }

@@ -11,6 +11,7 @@ from mjsense import _core
 from mjsense._arguments import Seed, checked
 from mjsense._parts import Policies, Tasks, parts_of
 from mjsense.assets import use_installed_meshes
+from mjsense.ffmpeg import use_installed_ffmpeg
 from mjsense.sensor import Sensor
 from mjsense.simulation import Simulation
 
@@ -136,6 +137,7 @@ def record(
     objects = parts_of(options, sensors)
     report = None if progress is None else lambda p: progress(RecordProgress(**p))
     use_installed_meshes()
+    use_installed_ffmpeg()
     made = _core.record(options, report, objects, Simulation._of)
     made["path"] = Path(made["path"])
     return RecordSummary(**made)

@@ -50,8 +50,8 @@ void check_ffmpeg(const VideoCfg& cfg, std::span<const VideoStream> videos) {
   } catch (const Error& error) {
     throw RuntimeError(
         fmt::format("recording {} video streams needs ffmpeg: {}; install it (apt-get install "
-                    "ffmpeg) or name it "
-                    "in $MJSENSE_FFMPEG",
+                    "ffmpeg, or for Python pip install 'mjsense[video]') or name it in "
+                    "$MJSENSE_FFMPEG",
                     videos.size(), error.what()));
   }
   constexpr const char* kEncoders[] = {"libx264", "ffv1", "libx264rgb"};

@@ -17,6 +17,7 @@
 #include <utility>
 
 #include "mjsense/core/error.h"
+#include "mjsense/record/close_inherited.h"
 
 extern char** environ;
 
@@ -89,8 +90,7 @@ Child start_process(const std::vector<std::string>& argv, bool pipe_in, bool pip
   posix_spawn_file_actions_adddup2(&actions, child_in.get(), 0);
   posix_spawn_file_actions_adddup2(&actions, child_out.get(), 1);
   posix_spawn_file_actions_adddup2(&actions, child.log.get(), 2);
-  posix_spawn_file_actions_addclosefrom_np(&actions,
-                                           3);  // files that libraries opened without O_CLOEXEC
+  close_inherited(&actions);
 
   posix_spawnattr_t attributes;
   posix_spawnattr_init(&attributes);

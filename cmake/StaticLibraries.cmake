@@ -1,0 +1,31 @@
+# SPDX-License-Identifier: Apache-2.0
+# The wheel's libraries: packaging/libraries.sh has made them. Only the linker's input changes: headers, and so objects, are those of
+# every other build.
+set(MJSENSE_STATIC_DIR ${PROJECT_SOURCE_DIR}/build/wheel/lib)
+if(NOT EXISTS ${MJSENSE_STATIC_DIR}/libembree.a)
+  message(FATAL_ERROR "MJSENSE_STATIC: no libraries in ${MJSENSE_STATIC_DIR}: run ./dev wheel")
+endif()
+find_library(PCRE2_STATIC libpcre2-8.a REQUIRED)
+find_library(ZLIB_STATIC libz.a REQUIRED)
+
+# mjsense_static(NAME LIKE ARCHIVE...): what includes and defines as LIKE and links the archives.
+function(mjsense_static name like)
+  add_library(${name} INTERFACE)
+  foreach(what INCLUDE_DIRECTORIES SYSTEM_INCLUDE_DIRECTORIES COMPILE_DEFINITIONS COMPILE_OPTIONS)
+    get_target_property(value ${like} INTERFACE_${what})
+    if(value)
+      set_target_properties(${name} PROPERTIES INTERFACE_${what} "${value}")
+    endif()
+  endforeach()
+  target_link_libraries(${name} INTERFACE ${ARGN})
+endfunction()
+mjsense_static(mjsense_static_fmt fmt::fmt ${MJSENSE_STATIC_DIR}/libfmt.a)
+mjsense_static(mjsense_static_pcre2 PkgConfig::PCRE2 ${PCRE2_STATIC})
+mjsense_static(mjsense_static_embree embree ${MJSENSE_STATIC_DIR}/libembree.a)
+mjsense_static(mjsense_static_hdf5 mjsense_hdf5 ${HDF5_STATIC} ${SZ_STATIC} ${AEC_STATIC} ${ZLIB_STATIC})
+set(MJSENSE_PRIVATE_LIBS mjsense_static_fmt nlohmann_json::nlohmann_json mjsense_static_pcre2 mjsense_static_embree
+                         mjsense_static_hdf5 Threads::Threads)
+
+# libstdc++ inside as well, and glibc's names as they were in the version that packaging/libraries.sh chose.
+set(MJSENSE_STATIC_LINK -static-libstdc++ -L${MJSENSE_STATIC_DIR}/glibc -Wl,-rpath-link,${MJSENSE_STATIC_DIR}/glibc
+                        -Wl,--version-script=${PROJECT_SOURCE_DIR}/packaging/exports.map -pthread)

@@ -1,0 +1,87 @@
+#!/usr/bin/env bash
+# What the wheel is linked with, into build/wheel/lib; fast when it is there:
+#   Embree and fmt, static, from Debian's sources of the very versions whose headers apt.txt installs;
+#   glibc 2.28 as a linker sees it (names and versions, no code), from ziglang, so that the wheel runs wherever that is.
+# Every other static library comes with Debian's -dev packages. usage: packaging/libraries.sh PYTHON_WITH_ZIGLANG
+set -euo pipefail
+cd "$(dirname "${BASH_SOURCE[0]}")/.."
+python=$(realpath -s "$1")
+work=$PWD/build/wheel
+lib=$work/lib
+glibc=2.28
+jobs=${MJSENSE_JOBS:-$(nproc)}
+mkdir -p "$work/src" "$lib"
+
+say() { printf '\033[1m%s\033[0m\n' "$*" >&2; }
+
+# An apt that knows the sources of what this machine's apt installs.
+apt=$work/apt
+source_apt() {
+  mkdir -p "$apt/lists/partial" "$apt/parts"
+  rm -f "$apt"/parts/*
+  local file
+  for file in /etc/apt/sources.list /etc/apt/sources.list.d/*; do
+    case $file in
+      *.sources) sed 's/^Types: deb$/Types: deb-src/' "$file" > "$apt/parts/$(basename "$file")" ;;
+      *.list) [ ! -f "$file" ] || sed -n 's/^deb /deb-src /p' "$file" > "$apt/parts/$(basename "$file")" ;;
+    esac
+  done
+  apt-get -q -o Dir::Etc::sourcelist=/dev/null -o Dir::Etc::sourceparts="$apt/parts" \
+    -o Dir::State::lists="$apt/lists" -o APT::Sandbox::User=root "$@"
+}
+
+# fetch PACKAGE DEV_PACKAGE: unpacks the source of the installed version; prints its folder.
+fetch() {
+  local installed name=$1
+  installed=$(dpkg-query -W -f '${source:Upstream-Version}' "$2")
+  if ! ls "$work/src/${name}_$installed".orig.tar.* >/dev/null 2>&1; then
+    (cd "$work/src" && source_apt update >&2 && source_apt source --tar-only "$name" >&2)
+  fi
+  rm -rf "$work/src/$name"
+  mkdir "$work/src/$name"
+  tar -xf "$work/src/${name}_$installed".orig.tar.* -C "$work/src/$name" --strip-components 1
+  echo "$work/src/$name"
+}
+
+build_embree() {
+  local src
+  src=$(fetch embree libembree-dev)
+  # Rays meet triangles and thick lines; other curves take most of the time that it compiles.
+  sed -i -E '/vtbl\[Geometry::GTY_/{/GTY_ROUND_LINEAR_CURVE/!d}' "$src"/kernels/geometry/curve_intersector_virtual_*.cpp
+  local unused=() name
+  for name in QUAD GRID SUBDIVISION INSTANCE USER POINT; do unused+=("-DEMBREE_GEOMETRY_$name=OFF"); done
+  cmake -S "$src" -B "$work/embree" -G Ninja -Wno-dev -DCMAKE_BUILD_TYPE=Release -DCMAKE_POSITION_INDEPENDENT_CODE=ON \
+    -DCMAKE_CXX_COMPILER_LAUNCHER=ccache -DCMAKE_INSTALL_PREFIX="$work/embree/installed" -DCMAKE_INSTALL_LIBDIR=lib \
+    -DEMBREE_STATIC_LIB=ON -DEMBREE_TASKING_SYSTEM=INTERNAL -DEMBREE_ISPC_SUPPORT=OFF -DEMBREE_TUTORIALS=OFF -DBUILD_TESTING=OFF \
+    -DEMBREE_MAX_ISA=NONE -DEMBREE_ISA_SSE2=ON -DEMBREE_ISA_SSE42=OFF -DEMBREE_ISA_AVX=OFF -DEMBREE_ISA_AVX2=ON \
+    -DEMBREE_ISA_AVX512=ON "${unused[@]}" >&2
+  cmake --build "$work/embree" -j "$jobs" >&2
+  cmake --install "$work/embree" >/dev/null
+  # One archive, whose parts name each other in circles.
+  { echo "create $lib/libembree.a"; find "$work/embree/installed/lib" -name '*.a' -printf 'addlib %p\n'; printf 'save\nend\n'; } | ar -M
+}
+
+build_fmt() {
+  local src
+  src=$(fetch fmtlib libfmt-dev)
+  # With the installed headers: what is compiled elsewhere against the shared library is compiled alike.
+  g++ -std=c++20 -O2 -fPIC -DFMT_SHARED -DFMT_EXPORT -c "$src/src/format.cc" -o "$work/src/fmt.o"
+  ar rcs "$lib/libfmt.a" "$work/src/fmt.o"
+}
+
+build_glibc() {
+  local cache=$work/zig stubs=$lib/glibc name
+  rm -rf "$stubs" "$cache"
+  mkdir -p "$stubs" "$cache"
+  echo 'int main(void) { return 0; }' > "$work/src/empty.c"
+  ZIG_GLOBAL_CACHE_DIR=$cache ZIG_LOCAL_CACHE_DIR=$cache "$python" -m ziglang cc -target x86_64-linux-gnu.$glibc \
+    "$work/src/empty.c" -o "$work/src/empty" -lm -lpthread -ldl -lrt >&2
+  cp "$(dirname "$(find "$cache" -name libc.so.6)")"/*.so.* "$(find "$cache" -name libc_nonshared.a)" "$stubs"
+  mv "$stubs/libld.so.2" "$stubs/ld-linux-x86-64.so.2"
+  for name in m pthread dl rt; do ln -s "$(cd "$stubs" && echo lib$name.so.*)" "$stubs/lib$name.so"; done
+  echo "GROUP ( $stubs/libc.so.6 $stubs/libc_nonshared.a AS_NEEDED ( $stubs/ld-linux-x86-64.so.2 ) )" > "$stubs/libc.so"
+}
+
+[ -f "$lib/libembree.a" ] || { say "building Embree (once)"; build_embree; }
+[ -f "$lib/libfmt.a" ] || { say "building fmt (once)"; build_fmt; }
+[ -f "$lib/glibc/libc.so" ] || { say "preparing glibc $glibc (once)"; build_glibc; }

@@ -1,0 +1,35 @@
+// SPDX-License-Identifier: Apache-2.0
+// The `mjsense` program in the wheel.
+
+#include "mjsense/app/program.h"
+
+#include <nanobind/nanobind.h>
+#include <nanobind/stl/string.h>
+#include <nanobind/stl/vector.h>
+
+#include <cstdio>
+#include <string>
+#include <vector>
+
+#include "python/bindings/bindings.h"
+
+namespace mjsense::python {
+
+namespace nb = nanobind;
+
+void bind_program(nb::module_& m) {
+  m.def(
+      "run_program",
+      [](std::vector<std::string> words) {
+        std::vector<char*> argv;
+        for (std::string& word : words) argv.push_back(word.data());
+        argv.push_back(nullptr);
+        nb::gil_scoped_release unlock;
+        const int code = run_program(static_cast<int>(words.size()), argv.data());
+        std::fflush(stdout);
+        return code;
+      },
+      nb::arg("argv"), "The exit code of the program, called with these words.");
+}
+
+}  // namespace mjsense::python

@@ -1,0 +1,24 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The ``mjsense`` program: ``python -m mjsense``, and the command that the package installs."""
+
+from __future__ import annotations
+
+import signal
+import sys
+
+from mjsense import _core
+from mjsense.assets import use_installed_meshes
+from mjsense.ffmpeg import use_installed_ffmpeg
+
+
+def main() -> int:
+    """Runs the program with this process's arguments; its exit code."""
+    # Ctrl-C is the program's affair, as where no Python is.
+    signal.signal(signal.SIGINT, signal.SIG_DFL)
+    use_installed_meshes()
+    use_installed_ffmpeg()
+    return _core.run_program(["mjsense", *sys.argv[1:]])
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,27 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The ffmpeg that writes videos: that of ``PATH`` or, where there is none, that of the package imageio-ffmpeg (extra ``video``)."""
+
+from __future__ import annotations
+
+import importlib.util
+import os
+import shutil
+from pathlib import Path
+
+_FFMPEG = "MJSENSE_FFMPEG"
+
+
+def installed_ffmpeg() -> Path | None:
+    """The program in imageio-ffmpeg, None without it. Imports nothing."""
+    spec = importlib.util.find_spec("imageio_ffmpeg")
+    for root in (spec.submodule_search_locations or ()) if spec else ():
+        for file in sorted(Path(root, "binaries").glob("ffmpeg-*")):
+            if os.access(file, os.X_OK):
+                return file
+    return None
+
+
+def use_installed_ffmpeg() -> None:
+    """Writes videos with imageio-ffmpeg's program if ``PATH`` has none. ``MJSENSE_FFMPEG`` has priority."""
+    if not os.environ.get(_FFMPEG) and shutil.which("ffmpeg") is None and (file := installed_ffmpeg()):
+        os.environ[_FFMPEG] = str(file)

@@ -1,0 +1,245 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "mjsense/app/program.h"
+
+#include <fmt/format.h>
+#include <fmt/ranges.h>
+#include <mujoco/mujoco.h>
+
+#include <CLI/CLI.hpp>
+#include <cstdio>
+#include <exception>
+#include <filesystem>
+#include <mutex>
+#include <set>
+#include <string>
+#include <vector>
+
+#include "mjsense/app/external.h"
+#include "mjsense/app/field_options.h"
+#include "mjsense/app/record_command.h"
+#include "mjsense/app/scan_command.h"
+#include "mjsense/app/schema.h"
+#include "mjsense/app/sensors_command.h"
+#include "mjsense/core/error.h"
+#include "mjsense/replay/check.h"
+#include "mjsense/rollout/registry.h"
+
+namespace mjsense {
+namespace {
+
+constexpr int kFailed = 1;
+constexpr int kWrongInput = 2;
+
+// "which task: pick, place"
+std::string one_of(const std::string& what, const std::vector<std::string>& names) {
+  return fmt::format("{}: {}", what, fmt::join(names, ", "));
+}
+
+// What there is to choose from, behind the fields' own words.
+void add_choices(CLI::App& app) {
+  for (const auto& [option, names] :
+       {std::pair{"--robot", robot_names()}, std::pair{"--policy", policy_names()}}) {
+    CLI::Option* o = app.get_option(option);
+    o->description(one_of(o->get_description(), names));
+  }
+}
+
+CLI::App& add_record(CLI::App& program, RecordOptions& options) {
+  CLI::App& app = *program.add_subcommand("record", "play episodes of a task and keep them");
+  app.add_option("task", options.job.rollout.task, one_of("which task", task_names()))
+      ->capture_default_str();
+  add_field_options(app, struct_of<RecordJobCfg>(), &options.job, {"task"});
+  add_choices(app);
+  app.add_option("--config", "TOML file with these options; the command line wins")
+      ->type_name("FILE");
+  app.add_flag("!--no-sheet", options.sheet, "write no contact sheet");
+  app.add_flag("--json", options.json, "summary as JSON");
+  app.add_flag("-q,--quiet", options.quiet, "no progress");
+  return app;
+}
+
+constexpr int kMostSteps = 1'000'000'000;
+
+CLI::App& add_sensors(CLI::App& program, SensorsOptions& options) {
+  CLI::App& app = *program.add_subcommand("sensors", "what is measured, and what it costs");
+  app.add_option("what", options.what, one_of("an MJCF file or the name of a task", task_names()))
+      ->required()
+      ->type_name("SCENE.xml|TASK");
+  add_field_options(app, struct_of<RolloutCfg>(), &options.rollout, {"task", "worlds"});
+  add_choices(app);
+  app.add_option("--steps", options.steps, "to measure the cost over; 0: do not measure")
+      ->capture_default_str()
+      ->check(CLI::Range(0, kMostSteps));
+  app.add_flag("--json", options.json, "as JSON");
+  return app;
+}
+
+CLI::App& add_scan(CLI::App& program, ScanOptions& options) {
+  CLI::App& app = *program.add_subcommand("scan", "what a lidar sees, as a point cloud");
+  app.add_option("scene", options.scene, "an MJCF file")
+      ->required()
+      ->check(CLI::ExistingFile)
+      ->type_name("SCENE.xml");
+  app.add_option("--frame", options.frame, "what carries the lidar: site:NAME, body:NAME, ...")
+      ->required()
+      ->type_name("TYPE:NAME");
+  app.add_option("--out", options.out, "the file, .ply or .pcd")->required()->type_name("FILE");
+  CLI::Option* table = app.add_option("--table", options.table.file,
+                                      "azimuths and elevations in rad instead of a spinning scan")
+                           ->check(CLI::ExistingFile)
+                           ->type_name("FILE.npy");
+  app.add_option("--rays", options.table.rays_per_scan, "rows of the table to cast; 0: all")
+      ->capture_default_str()
+      ->needs(table);
+  const auto add_spinning = [&](const char* name, auto& value, const char* help) {
+    app.add_option(name, value, help)->capture_default_str()->excludes(table);
+  };
+  add_spinning("--channels", options.spinning.channels, "lasers");
+  add_spinning("--samples", options.spinning.samples, "firings a turn");
+  add_spinning("--low", options.spinning.elevation_min_deg, "degrees, the lowest laser");
+  add_spinning("--high", options.spinning.elevation_max_deg, "degrees, the highest laser");
+  app.add_option("--max-distance", options.max_distance, "m")->capture_default_str();
+  app.add_option("--steps", options.steps, "physics steps before the scan")
+      ->capture_default_str()
+      ->check(CLI::Range(0, kMostSteps));
+  app.add_flag("--world", options.world, "points in the world, not in the lidar's frame");
+  return app;
+}
+
+struct PathOptions {
+  std::string path, sheet, ffmpeg;
+  bool json = false, decode = false;
+};
+
+CLI::App& add_path_command(CLI::App& program, const char* name, const char* help,
+                           PathOptions& options) {
+  CLI::App& app = *program.add_subcommand(name, help);
+  app.add_option("path", options.path, "a recording, a house_N folder or an .h5 file")->required();
+  app.add_flag("--json", options.json, "as JSON");
+  return app;
+}
+
+// MuJoCo's messages may have several lines.
+std::string one_line(std::string text) {
+  text.erase(text.find_last_not_of(" \n") + 1);
+  for (std::size_t at; (at = text.find('\n')) != std::string::npos;) text.replace(at, 1, "; ");
+  return text;
+}
+
+// MuJoCo's warnings, each once, on stderr and in no file. A world that diverges is reported with its episode.
+void show_warnings() {
+  mju_user_warning = [](const char* text) {
+    static std::mutex mutex;
+    static std::set<std::string> shown;
+    const std::string warning = text;
+    if (warning.find("simulation is unstable") != std::string::npos) return;
+    const std::lock_guard lock(mutex);
+    if (shown.insert(warning).second)
+      fmt::print(stderr, "mjsense: MuJoCo: {}\n", one_line(warning));
+  };
+}
+
+const std::string& existing(const std::string& path) {
+  if (!std::filesystem::exists(path)) throw ValueError(path + ": no such file or directory");
+  return path;
+}
+
+void print(const std::string& text) { fmt::print("{}{}", text, text.ends_with('\n') ? "" : "\n"); }
+
+// --config must be read before the command line is: what is given there wins.
+void read_config_argument(int argc, char** argv, RecordOptions& options) {
+  for (int i = 2; i < argc; ++i) {
+    const std::string word = argv[i];
+    if (word == "--config" && i + 1 < argc)
+      read_toml(argv[i + 1], struct_of<RecordJobCfg>(), &options.job);
+    if (word.starts_with("--config="))
+      read_toml(word.substr(9), struct_of<RecordJobCfg>(), &options.job);
+  }
+}
+
+int run(int argc, char** argv) {
+  show_warnings();
+  CLI::App program("Senses of MuJoCo worlds: measured, rendered, recorded.", "mjsense");
+  program.set_version_flag("--version", "mjsense " MJSENSE_VERSION);
+  program.require_subcommand(1);
+  program.footer("Any other word runs mjsense-<word> from PATH.");
+
+  RecordOptions record_options;
+  SensorsOptions sensors_options;
+  ScanOptions scan_options;
+  PathOptions inspect_options, verify_options, repair_options;
+  CLI::App& record = add_record(program, record_options);
+  CLI::App& sensors = add_sensors(program, sensors_options);
+  CLI::App& scan = add_scan(program, scan_options);
+  CLI::App& inspect_app =
+      add_path_command(program, "inspect", "trees, statistics, pictures", inspect_options);
+  inspect_app.add_option("--sheet", inspect_options.sheet, "write a contact sheet")
+      ->type_name("FILE.png");
+  inspect_app.add_option("--ffmpeg", inspect_options.ffmpeg, "the program")->type_name("PATH");
+  CLI::App& verify_app =
+      add_path_command(program, "verify", "is a recording whole and readable", verify_options);
+  verify_app.add_flag("--decode", verify_options.decode, "decode every frame");
+  verify_app.add_option("--ffmpeg", verify_options.ffmpeg, "the program")->type_name("PATH");
+  add_path_command(program, "repair", "publish what an interrupted recording has finished",
+                   repair_options);
+
+  CLI::App& schema =
+      *program.add_subcommand("schema", "all configurations and their fields, as JSON");
+
+  std::vector<std::string> known;
+  for (const CLI::App* app : program.get_subcommands({})) known.push_back(app->get_name());
+  if (argc < 2) {
+    fmt::print(stderr, "{}", program.help());
+    return kWrongInput;
+  }
+  const std::string word = argv[1];
+  if (!word.empty() && word[0] != '-' && std::ranges::find(known, word) == known.end()) {
+    run_external(word, argv + 1, known);
+  }
+  if (word == "record") read_config_argument(argc, argv, record_options);
+  try {
+    program.parse(argc, argv);
+  } catch (const CLI::ParseError& e) {
+    if (e.get_exit_code() == 0) return program.exit(e);  // --help, --version
+    throw ValueError(
+        fmt::format("{} (mjsense{} --help shows how)", e.what(), word[0] == '-' ? "" : " " + word));
+  }
+
+  if (record.parsed()) return run_record(record_options);
+  if (sensors.parsed()) return run_sensors(sensors_options);
+  if (scan.parsed()) return run_scan(scan_options);
+  if (schema.parsed()) {
+    print(schema_json());
+    return 0;
+  }
+  if (inspect_app.parsed()) {
+    const InspectResult result = inspect(existing(inspect_options.path));
+    print(inspect_options.json ? result.json() : result.text());
+    if (!inspect_options.sheet.empty()) {
+      contact_sheet(inspect_options.path, inspect_options.sheet, 4, 8, inspect_options.ffmpeg);
+    }
+    return 0;
+  }
+  if (verify_app.parsed()) {
+    const VerifyResult result =
+        verify(existing(verify_options.path), {verify_options.decode, verify_options.ffmpeg});
+    print(verify_options.json ? result.json() : result.text());
+    return result.ok() ? 0 : kFailed;
+  }
+  const RepairResult result = repair(existing(repair_options.path));
+  print(repair_options.json ? result.json() : result.text());
+  return 0;
+}
+
+}  // namespace
+
+int run_program(int argc, char** argv) {
+  try {
+    return run(argc, argv);
+  } catch (const std::exception& e) {
+    fmt::print(stderr, "mjsense: {}\n", one_line(e.what()));
+    return kWrongInput;
+  }
+}
+
+}  // namespace mjsense

@@ -1,0 +1,11 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+// The `mjsense` program, as a function: the executable and the Python package's command are the same.
+
+namespace mjsense {
+
+// Exit codes: 0 done; 1 some episodes or checks failed; 2 wrong usage or input. Errors are told on
+// stderr. An unknown word may replace this process (external.h).
+int run_program(int argc, char** argv);
+
+}  // namespace mjsense
