@@ -8,6 +8,7 @@ import os
 import statistics
 import time
 from collections.abc import Sequence
+from typing import Any
 
 import camera_scenes
 import harness  # noqa: F401  finds mjsense
@@ -23,7 +24,7 @@ RUNS = 5
 @dataclasses.dataclass(frozen=True)
 class Shot:
     size: tuple[int, int]
-    kinds: tuple[str, ...] = ("rgb",)
+    kinds: tuple[Any, ...] = ("rgb",)
     shadows: bool = True
 
 

@@ -37,7 +37,7 @@ def run_program(name: str, *options: str, **environment: str) -> str:
                           stderr=subprocess.DEVNULL, text=True).stdout  # fmt: skip
 
 
-def google_benchmarks(names: str, runs: int = 5, **environment: str) -> dict[str, dict]:
+def google_benchmarks(names: str, runs: int = 5, /, **environment: str) -> dict[str, dict]:
     """Benchmarks of mjsense_bench whose names match, in turns: medians of real and CPU nanoseconds, items of one iteration, and the
     counters of the first, by name."""
     text = run_program("mjsense_bench", f"--benchmark_filter={names}", "--benchmark_format=json", "--benchmark_min_time=0.1",

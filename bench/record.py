@@ -44,6 +44,7 @@ def depth(steps: int) -> np.ndarray:
 def encode(frames: np.ndarray, path: pathlib.Path, codec: list[str]) -> None:
     command = ["ffmpeg", "-y", "-v", "error", "-f", "rawvideo", "-pix_fmt", "rgb24", "-s", f"{WIDTH}x{HEIGHT}", "-r", "15.15", "-i", "-"]
     process = subprocess.Popen([*command, *codec, path], stdin=subprocess.PIPE)
+    assert process.stdin
     for frame in frames:
         process.stdin.write(frame.tobytes())
     process.stdin.close()

@@ -12,6 +12,7 @@ set(MJSENSE_PUBLIC_HEADERS
   mjsense/core/fields.h
   mjsense/core/json.h
   mjsense/core/parallel.h
+  mjsense/core/path_field.h
   mjsense/core/pose.h
   mjsense/core/rng.h
   mjsense/core/sensor.h

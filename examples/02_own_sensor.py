@@ -60,4 +60,4 @@ for _ in range(5):
 
 front = observation["front"]
 print("picture:", front.rgb.shape, front.rgb.dtype, " depth at its centre:", front.depth[:, 24, 32, 0].round(2), "m")
-print("space of one world:", suite.observation_spaces["scan"]["distances"])
+print("space of one world:", suite.observation_spaces["scan"])

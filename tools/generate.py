@@ -106,6 +106,11 @@ def methods() -> set[str]:
     return {node.name for node in tree.body if isinstance(node, ast.ClassDef)}
 
 
+def is_empty(value: Any) -> bool:
+    """What Python writes as None: no text, a struct with no field set."""
+    return value == "" or (isinstance(value, dict) and not any(value["fields"].values()))
+
+
 class Generator:
     def __init__(self, schema: dict[str, Any]) -> None:
         self.structs: dict[str, Any] = schema["structs"]
@@ -144,7 +149,7 @@ class Generator:
 
     def default(self, t: dict[str, Any], value: Any, field: dict[str, Any]) -> str:
         kind = t["kind"]
-        if field["or_none"] and (value == "" or (isinstance(value, dict) and not any(value["fields"].values()))):
+        if field["or_none"] and is_empty(value):
             return "None"
         if kind == "number":
             return f"math.{value}" if value == "inf" else "-math.inf" if value == "-inf" else repr(float(value))

@@ -1,19 +1,21 @@
 // SPDX-License-Identifier: Apache-2.0
-// A chain of effects that is driven by hand.
+// The observation pipeline, driven by hand.
 
 #include <nanobind/nanobind.h>
 #include <nanobind/ndarray.h>
 #include <nanobind/stl/optional.h>
-#include <nanobind/stl/string.h>
 #include <nanobind/stl/vector.h>
 
 #include <cstring>
+#include <memory>
 #include <numeric>
 #include <optional>
+#include <string>
 #include <vector>
 
 #include "mjsense/core/error.h"
 #include "mjsense/effects/all_effects.h"
+#include "mjsense/effects/pipeline.h"
 #include "python/bindings/bindings.h"
 #include "python/bindings/fields.h"
 #include "python/bindings/numpy.h"
@@ -22,23 +24,15 @@ namespace mjsense::python {
 
 namespace {
 
-// Effects on float32 rows [B, D] that come from anywhere.
-class PyChain {
+// Effects on float32 rows [B, D] that come from anywhere; D is that of the first rows.
+class PyPipeline {
  public:
-  PyChain(nb::handle config, int size, int num_worlds, double period, std::uint64_t seed)
-      : seed_(seed) {
-    if (num_worlds < 1 || size < 1)
-      throw ValueError("a chain needs at least one world and one component");
-    if (!(period > 0)) throw ValueError("period must be positive (s)");
-    EffectChainCfg cfg;
+  PyPipeline(nb::handle config, int num_worlds, std::uint64_t seed) : seed_(seed) {
+    if (num_worlds < 1) throw ValueError("observation pipeline: num_envs must be at least 1");
+    PipelineCfg cfg;
     read_struct(config, cfg);
-    SensorSpec spec;
-    spec.name = "pipeline";
-    spec.shape = {size};
-    chain_ = std::make_unique<EffectChain>("pipeline", spec, cfg, num_worlds, period, period);
-    out_ = std::make_shared<Array>(DType::kFloat32, chain_->spec().shape.with_front(num_worlds));
+    cfg_ = pipeline(cfg);
     worlds_.resize(num_worlds);
-    reset(std::nullopt);
   }
 
   // None: all worlds.
@@ -50,25 +44,30 @@ class PyChain {
       if (w < 0 || w >= static_cast<int>(worlds_.size()))
         throw ValueError("world id " + std::to_string(w) + " is out of range");
     }
-    for (int w : ids) {
-      ++worlds_[w].episode;
-      chain_->reset(tick(w));
-    }
+    if (!chain_) return;  // has seen nothing
+    for (int w : ids) start_episode(w);
   }
 
   using Rows = nb::ndarray<const float, nb::shape<-1, -1>, nb::c_contig, nb::device::cpu>;
-  nb::object apply(const Rows& rows) {
-    const std::size_t bytes = rows.shape(1) * sizeof(float);
-    if (rows.shape(0) != worlds_.size())
-      throw ValueError("expected one row for each of " + std::to_string(worlds_.size()) +
-                       " worlds");
-    for (std::size_t w = 0; w < worlds_.size(); ++w) {
+  NumpyArray apply(const Rows& rows) {
+    const auto size = static_cast<std::int64_t>(rows.shape(1));
+    if (rows.shape(0) != worlds_.size() || size < 1 || (chain_ && size != size_)) {
+      throw ValueError("shape (" + std::to_string(rows.shape(0)) + ", " + std::to_string(size) +
+                       "): expected (" + std::to_string(worlds_.size()) + ", " +
+                       (chain_ ? std::to_string(size_) : "D") + ")");
+    }
+    if (!chain_) make_chain(size);
+    const auto out =
+        std::make_shared<Array>(DType::kFloat32, chain_->spec().shape.with_front(rows.shape(0)));
+    const std::size_t bytes = size * sizeof(float);
+    for (int w = 0; w < static_cast<int>(worlds_.size()); ++w) {
       ++worlds_[w].tick;
       const auto* in = reinterpret_cast<const std::byte*>(rows.data()) + w * bytes;
-      chain_->apply(tick(static_cast<int>(w)), {in, bytes},
-                    {out_->row_data(static_cast<int>(w)), out_->row_bytes()});
+      const std::span<std::byte> kept{out_.row_data(w), out_.row_bytes()};
+      chain_->apply(tick(w), {in, bytes}, kept);
+      std::memcpy(out->row_data(w), kept.data(), kept.size());
     }
-    return to_numpy(out_->view(), owner_of(out_));
+    return to_numpy(out->view(), owner_of(out));
   }
 
  private:
@@ -78,8 +77,26 @@ class PyChain {
   ChainTick tick(int w) const {
     return {w, static_cast<std::uint32_t>(w), seed_, worlds_[w].tick, worlds_[w].episode};
   }
-  std::unique_ptr<EffectChain> chain_;
-  std::shared_ptr<Array> out_;
+  void make_chain(std::int64_t size) {
+    SensorSpec spec;
+    spec.name = "pipeline";
+    spec.shape = {size};
+    const int n = static_cast<int>(worlds_.size());
+    auto chain = std::make_unique<EffectChain>("pipeline", spec, cfg_, n, 1.0, 1.0);
+    out_ = Array(DType::kFloat32, chain->spec().shape.with_front(n));
+    chain_ = std::move(chain);
+    size_ = size;
+    for (int w = 0; w < n; ++w) start_episode(w);
+  }
+  void start_episode(int w) {
+    ++worlds_[w].episode;
+    chain_->reset(tick(w));
+  }
+
+  EffectChainCfg cfg_;
+  std::unique_ptr<EffectChain> chain_;  // made with the first rows
+  std::int64_t size_ = 0;
+  Array out_;  // its output, whose rows are its memory of the history
   std::vector<World> worlds_;
   std::uint64_t seed_;
 };
@@ -87,11 +104,11 @@ class PyChain {
 }  // namespace
 
 void bind_effects(nb::module_& m) {
-  nb::class_<PyChain>(m, "EffectChain", "Effects on rows that come from anywhere.")
-      .def(nb::init<nb::handle, int, int, double, std::uint64_t>(), nb::arg("config"),
-           nb::arg("size"), nb::arg("num_worlds"), nb::arg("period"), nb::arg("seed"))
-      .def("reset", &PyChain::reset, nb::arg("world_ids").none())
-      .def("apply", &PyChain::apply, nb::arg("rows"));
+  nb::class_<PyPipeline>(m, "ObservationPipeline", "The C++ pipeline.")
+      .def(nb::init<nb::handle, int, std::uint64_t>(), nb::arg("config"), nb::arg("num_worlds"),
+           nb::arg("seed"))
+      .def("reset", &PyPipeline::reset, nb::arg("world_ids").none())
+      .def("apply", &PyPipeline::apply, nb::arg("rows"));
 }
 
 }  // namespace mjsense::python

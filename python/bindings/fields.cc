@@ -188,7 +188,7 @@ void check_cfg(nb::handle config) {
   const std::string kind = kind_of(config);
   for (const SensorKind& known : sensor_kinds()) {
     if (kind == known.cfg->kind) {
-      read_sensor_cfg(config)->build();
+      static_cast<void>(read_sensor_cfg(config)->build());
       return;
     }
   }

@@ -27,7 +27,7 @@ nb::dlpack::dtype dlpack_type(DType dtype) {
 }
 
 template <class... Access>
-nb::object make_numpy(const ArrayView& view, nb::handle owner) {
+NumpyArray make_numpy(const ArrayView& view, nb::handle owner) {
   const int rank = view.shape.rank();
   const auto item = static_cast<std::int64_t>(dtype_size(view.dtype));
   std::array<std::size_t, Shape::kMaxRank> shape{};
@@ -41,15 +41,16 @@ nb::object make_numpy(const ArrayView& view, nb::handle owner) {
   // An empty array may have no memory at all, but an owner must belong to a pointer.
   static std::byte nothing[64];
   void* data = view.data ? view.data : nothing;
-  return nb::cast(nb::ndarray<nb::numpy, Access...>(data, static_cast<std::size_t>(rank),
-                                                    shape.data(), owner, strides.data(),
-                                                    dlpack_type(view.dtype)));
+  nb::object array =
+      nb::cast(nb::ndarray<nb::numpy, Access...>(data, static_cast<std::size_t>(rank), shape.data(),
+                                                 owner, strides.data(), dlpack_type(view.dtype)));
+  return nb::steal<NumpyArray>(array.release());
 }
 
 }  // namespace
 
-nb::object to_numpy(const ArrayView& view, nb::handle owner) { return make_numpy<>(view, owner); }
-nb::object to_readonly_numpy(const ArrayView& view, nb::handle owner) {
+NumpyArray to_numpy(const ArrayView& view, nb::handle owner) { return make_numpy<>(view, owner); }
+NumpyArray to_readonly_numpy(const ArrayView& view, nb::handle owner) {
   return make_numpy<nb::ro>(view, owner);
 }
 

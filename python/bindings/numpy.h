@@ -11,10 +11,16 @@ namespace mjsense::python {
 
 namespace nb = nanobind;
 
+// A Python object that is one: so signatures say what comes back.
+class NumpyArray : public nb::object {
+  static bool any(PyObject*) { return true; }  // none is ever taken as an argument
+  NB_OBJECT(NumpyArray, nb::object, "numpy.ndarray", any)
+};
+
 // A NumPy array on the view's memory, which `owner` keeps alive.
-nb::object to_numpy(const ArrayView& view, nb::handle owner);
+NumpyArray to_numpy(const ArrayView& view, nb::handle owner);
 // One that NumPy refuses to write: what a sensor measured.
-nb::object to_readonly_numpy(const ArrayView& view, nb::handle owner);
+NumpyArray to_readonly_numpy(const ArrayView& view, nb::handle owner);
 
 // A Python object that holds `pointer` until it is collected: the owner of arrays on memory inside
 // *pointer.

@@ -94,14 +94,14 @@ nb::dict entity_names(const Entity& e) {
 }
 
 template <class T, class From>
-nb::object array_of(const std::vector<From>& values, const Shape& shape) {
+NumpyArray array_of(const std::vector<From>& values, const Shape& shape) {
   auto array = std::make_shared<Array>(dtype_of<T>(), shape);
   auto out = array->template all<T>();
   for (std::size_t i = 0; i < values.size(); ++i) out[i] = static_cast<T>(values[i]);
   return to_numpy(array->view(), owner_of(array));
 }
 
-nb::object env_origins(const Scene& scene, int num_worlds) {
+NumpyArray env_origins(const Scene& scene, int num_worlds) {
   return array_of<float>(scene.env_origins(num_worlds), {num_worlds, 3});
 }
 
@@ -110,15 +110,15 @@ const Terrain* tiles_of(const Scene& scene) {
   return scene.terrain() && scene.terrain()->levels() > 0 ? scene.terrain() : nullptr;
 }
 
-nb::object env_tiles(const Scene& scene, int num_worlds) {
+std::optional<NumpyArray> env_tiles(const Scene& scene, int num_worlds) {
   const Terrain* tiles = tiles_of(scene);
-  if (!tiles) return nb::none();
+  if (!tiles) return std::nullopt;
   return array_of<std::int32_t>(tiles->env_tiles(num_worlds), {num_worlds, 2});
 }
 
-nb::object tile_origins(const Scene& scene) {
+std::optional<NumpyArray> tile_origins(const Scene& scene) {
   const Terrain* tiles = tiles_of(scene);
-  if (!tiles) return nb::none();
+  if (!tiles) return std::nullopt;
   return array_of<float>(tiles->tile_origins(), {tiles->levels(), tiles->types(), 3});
 }
 

@@ -52,7 +52,7 @@ void forward(PySimulation& self, const Ids& ids) {
 
 // Rows [B, bytes] of a field of the model: Python knows its type and shape from MuJoCo's own
 // bindings.
-nb::object model_field(PySimulation& self, const std::string& name) {
+NumpyArray model_field(PySimulation& self, const std::string& name) {
   Simulation& sim = self.open();
   int size = 0, element = 0;
   void* data = mjb_expand(sim.worlds().batch(), name.c_str(), &size, &element);

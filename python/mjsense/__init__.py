@@ -10,7 +10,8 @@ from mjsense import _core
 _libmujoco.check(_core)
 
 from mjsense import configs, effects, observations
-from mjsense._core import SensorSpec, __version__, embedded_models, robot_names
+from mjsense._core import SensorSpec, embedded_models, robot_names
+from mjsense._core import __version__ as __version__  # pyright: ignore[reportAttributeAccessIssue]  # stubs leave it out
 from mjsense.configs import *  # noqa: F403
 from mjsense.contact import ContactSensor
 from mjsense.data import CameraData, ContactData, ImuData, RayCastData, SensorData

@@ -15,7 +15,7 @@ from collections.abc import Callable
 from numbers import Integral, Real
 from pathlib import PurePath
 from types import FunctionType
-from typing import Any, TypeVar
+from typing import Any, TypeVar, cast
 
 import numpy as np
 
@@ -26,11 +26,11 @@ T = TypeVar("T")
 
 
 def _is_int(value: Any) -> bool:
-    return isinstance(value, Integral) and not isinstance(value, bool) and -(2**31) <= value < 2**31
+    return isinstance(value, Integral) and not isinstance(value, bool) and -(2**31) <= int(value) < 2**31
 
 
 def _is_seed(value: Any) -> bool:
-    return isinstance(value, Integral) and not isinstance(value, bool) and 0 <= value < 2**64
+    return isinstance(value, Integral) and not isinstance(value, bool) and 0 <= int(value) < 2**64
 
 
 def _is_list(value: Any) -> bool:
@@ -80,10 +80,11 @@ def _check_of(place: str, name: str, annotation: Any) -> Callable[[Any], None] |
     if not isinstance(annotation, str):
         return None
     kinds = [_kind(word.strip()) for word in re.split(r"\|(?![^\[]*\])", annotation)]
-    if None in kinds:
+    known = [kind for kind in kinds if kind is not None]
+    if len(known) < len(kinds):
         return None
-    tests = [test for test, _ in kinds]
-    words = " or ".join(text for _, text in kinds)
+    tests = [test for test, _ in known]
+    words = " or ".join(text for _, text in known)
 
     def check(value: Any) -> None:
         for test in tests:
@@ -121,7 +122,7 @@ def checked(target: T, owner: str = "") -> T:
                 check(value)
         return function(*args, **kwargs)
 
-    return call
+    return cast(T, call)
 
 
 class KnownAttributes:

@@ -3,11 +3,10 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from pathlib import Path
 from types import NoneType
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, cast
 
 import mujoco
 
@@ -20,6 +19,10 @@ if TYPE_CHECKING:
 
 class Config(KnownAttributes):
     """Base of all configurations: C++ checks them when they are made, and a misspelt attribute is an AttributeError."""
+
+    if TYPE_CHECKING:
+
+        def __init__(self, *args: Any, **kwargs: Any) -> None: ...  # each dataclass has its own
 
     def __post_init__(self) -> None:
         _core.check_cfg(self)
@@ -49,7 +52,7 @@ class EntityCfg(Config):
         """(kind, value, assets): kind path, xml or spec."""
         model, assets = self.model, dict(self.assets)
         if callable(model):
-            model = model()
+            model = cast(Any, model())
         if isinstance(model, mujoco.MjSpec):
             return "spec", model, {**model.assets, **assets}
         if isinstance(model, str) and model.lstrip().startswith("<"):
@@ -116,12 +119,12 @@ class UserPatternCfg(RayPattern):
 
 class PinholeCameraPatternCfg(RayPattern):
     @classmethod
-    def from_intrinsic_matrix(cls, intrinsic_matrix: Sequence[float], width: int, height: int) -> Self:
-        """From a 3x3 matrix, as 9 numbers or rows; only its fy is used."""
-        flat = [x for row in intrinsic_matrix for x in (row if hasattr(row, "__iter__") else (row,))]
-        if len(flat) != 9 or not flat[4] > 0:
-            raise ValueError(f"intrinsic_matrix must be 3x3 with a positive fy, not {intrinsic_matrix!r}")
-        return cls(width=width, height=height, fovy=math.degrees(2 * math.atan(height / (2 * float(flat[4])))))
+    def from_intrinsic_matrix(cls, intrinsic_matrix: Any, width: int, height: int) -> Self:
+        """From a 3x3 matrix, as 9 numbers or rows; only its fy is used. ValueError if that is not positive."""
+        flat = [float(x) for row in intrinsic_matrix for x in (row if hasattr(row, "__iter__") else (row,))]
+        if len(flat) != 9:
+            raise ValueError(f"intrinsic_matrix must be 3x3, not {intrinsic_matrix!r}")
+        return cls(width=width, height=height, fovy=_core.pinhole_fovy(flat, height))
 
     @classmethod
     def from_mujoco_camera(cls, camera_name: str) -> Self:

@@ -83,7 +83,8 @@ class DebugShapes(KnownAttributes):
         chosen = self.kinds == kind
         part = DebugShapes(self.env_idx, self.meansize)
         labels = [label for label, keep in zip(self.labels, chosen) if keep]
-        part._extend(*(a[chosen] for a in (self.kinds, self.positions, self.vectors, self.widths, self.rgba)), labels)
+        places = self.positions[chosen], self.vectors[chosen]
+        part._extend(self.kinds[chosen], *places, self.widths[chosen], self.rgba[chosen], labels)
         return part
 
     # ---------------------------------------------------------------------------------------------------- in MuJoCo's scenes

@@ -99,7 +99,7 @@ class NativeSensor(KnownAttributes):
     @property
     def observation_space(self) -> gymnasium.Space:
         """gymnasium space of one world's value: a Box, or a Dict of one Box a field."""
-        spaces = {name: _box(spec) for name, spec in self.specs.items()}
+        spaces: dict[str, gymnasium.Space] = {name: _box(spec) for name, spec in self.specs.items()}
         return spaces[""] if "" in spaces else gymnasium.spaces.Dict(spaces)
 
     def debug_shapes(self, world: int = 0) -> DebugShapes:
@@ -154,8 +154,8 @@ class Sensor:
     _mjs_sim_ref: Any = None
     _mjs_scene_ref: Any = None
     _mjs_value: Any = None
-    _mjs_rows: np.ndarray | None = None
-    _mjs_shown: np.ndarray | None = None
+    _mjs_rows: Any = None
+    _mjs_shown: Any = None
     _mjs_pending_dt: float = 0.0
 
     def __init__(self, uuid: str | None = None, observation_space: Any = None) -> None:

@@ -132,7 +132,7 @@ class Simulation(KnownAttributes):
             if found < 0:
                 names = [self.scene.model.key(i).name for i in range(self.scene.model.nkey)]
                 raise ValueError(f"no keyframe '{key}'; there are {names}")
-            key = found
+            key = int(found)
         self._core.reset(_ids(world_ids), -1 if key is None else key, seed)
 
     def forward(self, world_ids: Sequence[int] | None = None) -> None:
@@ -352,6 +352,8 @@ class DerivedFields:
 
     Like a sensor's, the arrays are read-only, overwritten by the next read after a change, and cost a copy only when they are read.
     """
+
+    _sim: Simulation
 
     def __init__(self, sim: Simulation) -> None:
         object.__setattr__(self, "_sim", sim)

@@ -12,6 +12,7 @@
 #include "mjsense/core/fields.h"
 #include "mjsense/core/json.h"
 #include "mjsense/core/parallel.h"
+#include "mjsense/core/path_field.h"
 #include "mjsense/core/pose.h"
 #include "mjsense/core/rng.h"
 #include "mjsense/core/sensor.h"

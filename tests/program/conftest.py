@@ -22,6 +22,5 @@ def mjsense(tmp_path):
         assert done.returncode == rc, f"exit code {done.returncode}\n{done.stdout}\n{done.stderr}"
         return done
 
-    run.program = PROGRAM
-    run.folder = tmp_path
+    vars(run).update(program=PROGRAM, folder=tmp_path)
     return run

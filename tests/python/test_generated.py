@@ -35,8 +35,8 @@ def test_every_field_says_what_it_is():
 
 def test_words_are_types_and_are_shown_by_help():
     assert "Literal" in str(inspect.signature(mjs.ContactSensorCfg).parameters["reduce"])
-    assert "maxforce" in mjs.ContactSensorCfg.__doc__
-    assert "discrete" in mjs.MujocoCfg.__doc__
+    assert "maxforce" in str(mjs.ContactSensorCfg.__doc__)
+    assert "discrete" in str(mjs.MujocoCfg.__doc__)
 
 
 def test_an_option_reaches_every_reader():

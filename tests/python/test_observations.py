@@ -50,9 +50,31 @@ def test_noise_is_seeded():
         mjs.ObservationPipeline(1, operation="mul")
 
 
+def test_biases_and_leaving_them_out():
+    settings = dict(noise=0.25, bias=1.0, episode_bias=mjs.effects.EpisodeBias(mjs.effects.Constant(10.0)))
+    assert mjs.ObservationPipeline(1, **settings)([[0.5, 1.5]]).tolist() == [[11.75, 12.75]]
+    assert mjs.ObservationPipeline(1, enable_corruption=False, **settings)([[0.5, 1.5]]).tolist() == [[0.5, 1.5]]
+
+
 def test_pipeline_errors():
     with pytest.raises(ValueError, match=r"shape \(3, 1\): expected \(2, D\)"):
         mjs.ObservationPipeline(2)(np.zeros((3, 1)))
+    for wrong, text in [
+        (dict(clip=(1, 0)), "low 1 is above high 0"),
+        (dict(clip=(0, 1, 2)), "clip must be 2 numbers"),
+        (dict(operation="mul"), "ObservationPipeline: operation is 'mul': must be one of add, scale, abs"),
+        (dict(nan_policy="sanitise"), "did you mean 'sanitize'"),
+        (dict(delay_min_lag=2, delay_max_lag=1), "need 0 <= min_lag <= max_lag"),
+        (dict(delay_hold_prob=2.0), "delay_hold_prob is 2: must be between 0 and 1"),
+        (dict(history_length=-1), "history_length is -1"),
+        (dict(noise="much"), "noise must be"),
+    ]:
+        with pytest.raises((ValueError, TypeError), match=text):
+            mjs.ObservationPipeline(1, **wrong)
+    pipeline = mjs.ObservationPipeline(1)
+    pipeline([[0.0]])
+    with pytest.raises(ValueError, match=r"shape \(1, 2\): expected \(1, 1\)"):
+        pipeline([[0.0, 0.0]])
     with pytest.raises(RuntimeError):
         mjs.ObservationPipeline(1, nan_policy="error")([[float("nan")]])
     assert mjs.ObservationPipeline(1, nan_policy="sanitize")([[float("nan")]]).tolist() == [[0.0]]

@@ -5,6 +5,7 @@ import types
 import mujoco
 
 import mjsense as mjs
+from mjsense import _core
 
 
 def test_everything_public_is_exported():
@@ -24,7 +25,7 @@ def test_every_public_class_and_function_says_what_it_is():
 
 
 def test_one_mujoco():
-    assert mjs._core.mujoco_version() == mujoco.mj_versionString()
+    assert _core.mujoco_version() == mujoco.mj_versionString()
     with open("/proc/self/maps") as maps:
         assert len({line.split()[-1] for line in maps if "libmujoco.so" in line}) == 1
 

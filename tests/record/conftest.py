@@ -23,5 +23,5 @@ def record_fake():
             assert done.returncode == 0, done.stderr
         return done
 
-    run.program = program
+    vars(run).update(program=program)
     return run

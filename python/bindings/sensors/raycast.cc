@@ -3,7 +3,9 @@
 
 #include <nanobind/nanobind.h>
 #include <nanobind/ndarray.h>
+#include <nanobind/stl/array.h>
 #include <nanobind/stl/optional.h>
+#include <nanobind/stl/pair.h>
 #include <nanobind/stl/string.h>
 
 #include "mjsense/sensors/lidar/point_cloud.h"
@@ -17,7 +19,7 @@ namespace mjsense::python {
 
 namespace {
 
-nb::object rows_of(const std::vector<std::array<double, 3>>& vectors) {
+NumpyArray rows_of(const std::vector<std::array<double, 3>>& vectors) {
   auto array =
       std::make_shared<Array>(DType::kFloat32, Shape{static_cast<std::int64_t>(vectors.size()), 3});
   auto out = array->all<float>();
@@ -37,7 +39,7 @@ void bind_raycast(nb::module_& m) {
         const FieldDecl& field = *struct_of<RayCastSensorCfg>().find("pattern");
         read_value(config, field, config, &cfg.pattern);
         const RayPattern rays = make_pattern(cfg.pattern, nullptr, "pattern");
-        return nb::make_tuple(rows_of(rays.offsets), rows_of(rays.directions));
+        return std::pair(rows_of(rays.offsets), rows_of(rays.directions));
       },
       "Offsets and directions, float32 [n, 3], of a pattern.");
   m.def(
@@ -53,6 +55,12 @@ void bind_raycast(nb::module_& m) {
       nb::arg("path"), nb::arg("points"), nb::arg("intensity") = nb::none(),
       nb::arg("distances") = nb::none(),
       "Writes points [..., 3] as .ply or .pcd; those with distance < 0 are left out.");
+  m.def(
+      "pinhole_fovy",
+      [](const std::array<double, 9>& matrix, int height) {
+        return PinholePattern::from_intrinsic_matrix(matrix, 1, height).fovy;
+      },
+      nb::arg("matrix"), nb::arg("height"), "Degrees, of a camera with this 3x3 matrix.");
   m.def("ray_counts", [](const SensorHandle& h) {
     const auto& sensor = h.as<RayCastSensor>();
     return nb::make_tuple(sensor.num_frames(), sensor.num_rays_per_frame());

@@ -15,6 +15,22 @@ using Kind = FieldType::Kind;
 
 bool is_flag(const FieldDecl& field) { return field.type->kind == Kind::kBool; }
 
+bool has_text(const FieldType& type) {
+  switch (type.kind) {
+    case Kind::kMap:
+    case Kind::kObject:
+    case Kind::kChoice:
+      return false;
+    case Kind::kOptional:
+      return has_text(type.element());
+    case Kind::kArray:
+    case Kind::kList:  // of what has no commas of its own
+      return has_text(type.element()) && !type.element().element;
+    default:
+      return true;
+  }
+}
+
 bool flag_default(const StructDecl& decl, const FieldDecl& field) {
   return *static_cast<const bool*>(at(decl.defaults.get(), field));
 }
@@ -72,7 +88,8 @@ void add_field_options(CLI::App& app, const StructDecl& decl, void* object,
                        std::initializer_list<std::string_view> skip) {
   for (const FieldDecl& field : decl.fields) {
     const std::string name = dashed(field.option_name());
-    if (field.is_hidden || std::ranges::find(skip, name) != skip.end()) continue;
+    if (field.is_hidden || !field.type || !has_text(*field.type)) continue;
+    if (std::ranges::find(skip, name) != skip.end()) continue;
     if (is_flag(field)) {
       const bool standard = flag_default(decl, field);
       bool& value = *static_cast<bool*>(at(object, field));
@@ -93,6 +110,9 @@ void add_field_options(CLI::App& app, const StructDecl& decl, void* object,
         ->type_name(type_name(*field.type))
         ->default_str(write_text(field, object));
   }
+}
+
+void add_set_options(CLI::App& app, const StructDecl& decl, void* object) {
   app.add_option_function<std::string>(
          "--size", [&decl, object](const std::string& text) { read_size(decl, object, text); },
          "width and height at once")

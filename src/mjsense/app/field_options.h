@@ -10,11 +10,13 @@
 
 namespace mjsense {
 
-// An option for every field that is not hidden: --name VALUE, --name for what is false by default,
-// --no-name for what is true; and --set name=value for every field. `skip`: names that the command
-// has as arguments of its own.
+// An option for every field that is not hidden and can be written as one text: --name VALUE, --name
+// for what is false by default, --no-name for what is true. `skip`: names that the command has as
+// arguments of its own, or that mean nothing to it.
 void add_field_options(CLI::App& app, const StructDecl& decl, void* object,
                        std::initializer_list<std::string_view> skip);
+// --size WxH, and --set name=value for every field.
+void add_set_options(CLI::App& app, const StructDecl& decl, void* object);
 
 // "640x368" -> the fields width and height. ValueError.
 void read_size(const StructDecl& decl, void* object, std::string_view text);

@@ -49,6 +49,7 @@ CLI::App& add_record(CLI::App& program, RecordOptions& options) {
   app.add_option("task", options.job.rollout.task, one_of("which task", task_names()))
       ->capture_default_str();
   add_field_options(app, struct_of<RecordJobCfg>(), &options.job, {"task"});
+  add_set_options(app, struct_of<RecordJobCfg>(), &options.job);
   add_choices(app);
   app.add_option("--config", "TOML file with these options; the command line wins")
       ->type_name("FILE");
@@ -66,6 +67,7 @@ CLI::App& add_sensors(CLI::App& program, SensorsOptions& options) {
       ->required()
       ->type_name("SCENE.xml|TASK");
   add_field_options(app, struct_of<RolloutCfg>(), &options.rollout, {"task", "worlds"});
+  add_set_options(app, struct_of<RolloutCfg>(), &options.rollout);
   add_choices(app);
   app.add_option("--steps", options.steps, "to measure the cost over; 0: do not measure")
       ->capture_default_str()
@@ -84,21 +86,16 @@ CLI::App& add_scan(CLI::App& program, ScanOptions& options) {
       ->required()
       ->type_name("TYPE:NAME");
   app.add_option("--out", options.out, "the file, .ply or .pcd")->required()->type_name("FILE");
-  CLI::Option* table = app.add_option("--table", options.table.file,
-                                      "azimuths and elevations in rad instead of a spinning scan")
-                           ->check(CLI::ExistingFile)
-                           ->type_name("FILE.npy");
-  app.add_option("--rays", options.table.rays_per_scan, "rows of the table to cast; 0: all")
-      ->capture_default_str()
-      ->needs(table);
-  const auto add_spinning = [&](const char* name, auto& value, const char* help) {
-    app.add_option(name, value, help)->capture_default_str()->excludes(table);
-  };
-  add_spinning("--channels", options.spinning.channels, "lasers");
-  add_spinning("--samples", options.spinning.samples, "firings a turn");
-  add_spinning("--low", options.spinning.elevation_min_deg, "degrees, the lowest laser");
-  add_spinning("--high", options.spinning.elevation_max_deg, "degrees, the highest laser");
-  app.add_option("--max-distance", options.max_distance, "m")->capture_default_str();
+  // The scene stands still: the rate of a scan and the distortion by motion mean nothing.
+  add_field_options(app, struct_of<TableScan>(), &options.table, {"rate-hz"});
+  CLI::Option* table = app.get_option("--table")->check(CLI::ExistingFile)->type_name("FILE.npy");
+  app.get_option("--rays")->needs(table);
+  const std::size_t others = app.get_options().size();
+  add_field_options(app, struct_of<SpinningScan>(), &options.spinning, {"rate-hz"});
+  const std::vector<CLI::Option*> all = app.get_options({});
+  for (std::size_t i = others; i < all.size(); ++i) all[i]->excludes(table);
+  add_field_options(app, struct_of<LidarSensorCfg>(), &options.lidar,
+                    {"name", "any-frame", "debug-vis", "hit-ids", "motion-distortion"});
   app.add_option("--steps", options.steps, "physics steps before the scan")
       ->capture_default_str()
       ->check(CLI::Range(0, kMostSteps));
@@ -126,7 +123,8 @@ std::string one_line(std::string text) {
   return text;
 }
 
-// MuJoCo's warnings, each once, on stderr and in no file. A world that diverges is reported with its episode.
+// MuJoCo's warnings, each once, on stderr and in no file. A world that diverges is reported with
+// its episode.
 void show_warnings() {
   mju_user_warning = [](const char* text) {
     static std::mutex mutex;

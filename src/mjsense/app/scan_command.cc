@@ -19,14 +19,13 @@ int run_scan(const ScanOptions& options) {
   if (colon == std::string::npos)
     throw ValueError(
         fmt::format("--frame {}: expected a type and a name, such as site:head", options.frame));
-  auto lidar = std::make_shared<LidarSensorCfg>();
+  auto lidar = std::make_shared<LidarSensorCfg>(options.lidar);
   lidar->name = "scan";
   lidar->frame = {{options.frame.substr(0, colon), options.frame.substr(colon + 1), ""}};
   if (options.table.file.empty())
     lidar->scan = options.spinning;
   else
     lidar->scan = options.table;
-  lidar->max_distance = options.max_distance;
 
   SceneCfg cfg;
   cfg.base.path = options.scene;

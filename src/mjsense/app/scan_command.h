@@ -13,10 +13,10 @@ struct ScanOptions {
   std::string frame;  // "site:head": what carries the lidar, and its name in the file
   std::string out;    // .ply or .pcd
   SpinningScan spinning;
-  TableScan table;              // if it names a file
-  double max_distance = 100.0;  // m
-  int steps = 0;                // physics steps before the scan
-  bool world = false;           // points in the world instead of the lidar's frame
+  TableScan table;       // if it names a file
+  LidarSensorCfg lidar;  // but for its frame and scan
+  int steps = 0;         // physics steps before the scan
+  bool world = false;    // points in the world instead of the lidar's frame
 };
 
 int run_scan(const ScanOptions& options);

@@ -10,7 +10,8 @@ namespace mjsense {
 
 // What was found odd in the scene, on stderr.
 void print_warnings(const Scene& scene);
-// Throws RuntimeError if a world failed in the last call: a table of a scene that flew apart says nothing.
+// Throws RuntimeError if a world failed in the last call: a table of a scene that flew apart says
+// nothing.
 void check_physics(const Simulation& simulation, const std::string& place);
 
 }  // namespace mjsense

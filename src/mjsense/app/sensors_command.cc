@@ -19,8 +19,8 @@ struct Line {
   double microseconds;  // a step and world; negative: counted with the sensor's first stream
 };
 
-// Streams of some sensors, the cost of each at its first stream. What sensors share (a camera of the scene shown as colour and
-// as depth) is counted with the first that reads it.
+// Streams of some sensors, the cost of each at its first stream. What sensors share (a camera of
+// the scene shown as colour and as depth) is counted with the first that reads it.
 std::vector<Line> lines_of(Simulation& simulation, std::span<Sensor* const> sensors, int steps) {
   std::vector<Line> lines;
   std::set<const Sensor*> counted;

@@ -4,6 +4,7 @@
 // sees without a copy.
 
 #include <array>
+#include <cassert>
 #include <cstddef>
 #include <cstdint>
 #include <initializer_list>
@@ -65,8 +66,8 @@ class Shape {
   std::span<const std::int64_t> dims() const {
     return {dims_.data(), static_cast<std::size_t>(rank_)};
   }
-  Shape with_front(std::int64_t dim) const;  // (dim, *this)
-  Shape without_front() const;
+  [[nodiscard]] Shape with_front(std::int64_t dim) const;  // (dim, *this)
+  [[nodiscard]] Shape without_front() const;
   bool operator==(const Shape& other) const;
   std::string str() const;  // "(3, 4)", "()"
 
@@ -93,17 +94,18 @@ class Array {
   Array() = default;
   Array(DType dtype, const Shape& shape);
   // The memory of another array, which must live longer, under a shape of as many bytes a row.
-  static Array shared(Array& owner, DType dtype, const Shape& shape);
+  [[nodiscard]] static Array shared(Array& owner, DType dtype, const Shape& shape);
 
-  bool empty() const { return data_ == nullptr; }
+  [[nodiscard]] bool empty() const { return data_ == nullptr; }
   DType dtype() const { return dtype_; }
   const Shape& shape() const { return shape_; }
   std::size_t bytes() const { return shape_.size() * dtype_size(dtype_); }
   std::size_t row_bytes() const { return row_elements_ * dtype_size(dtype_); }
   std::byte* data() { return data_.get(); }
   const std::byte* data() const { return data_.get(); }
-  std::byte* row_data(int w) { return data_.get() + w * row_bytes(); }
-  const std::byte* row_data(int w) const { return data_.get() + w * row_bytes(); }
+  // Of world w, which must be one of the B: development builds stop at another.
+  std::byte* row_data(int w) { return data_.get() + row_begin(w); }
+  const std::byte* row_data(int w) const { return data_.get() + row_begin(w); }
 
   // Row w as a flat span. T must be the array's element type: RuntimeError if it is another, whose
   // rows would not end where these do.
@@ -132,6 +134,10 @@ class Array {
   void fill_zero();
 
  private:
+  std::size_t row_begin(int w) const {
+    assert(w >= 0 && shape_.rank() > 0 && w < shape_[0] && "Array: no row of this world");
+    return w * row_bytes();
+  }
   template <class T>
   void check_type() const {
     if (dtype_of<T>() != dtype_) [[unlikely]]

@@ -69,6 +69,14 @@ TEST(Errors, NameTheNearest) {
   }
 }
 
+#ifndef NDEBUG
+TEST(ArrayDeathTest, DevelopmentBuildsStopAtAWorldThatThereIsNot) {
+  Array rows(DType::kFloat32, {2, 3});
+  EXPECT_DEATH(static_cast<void>(rows.row<float>(2)), "no row of this world");
+  EXPECT_DEATH(static_cast<void>(rows.row_data(-1)), "no row of this world");
+}
+#endif
+
 TEST(Rng, SameNumbersInAnyOrderAndUniform) {
   Rng a(7, 3, stream_of("imu"), 11), b(7, 3, stream_of("imu"), 11),
       other(7, 4, stream_of("imu"), 11);

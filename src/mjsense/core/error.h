@@ -39,13 +39,13 @@ struct RuntimeError : Error {
 
 // The (at most `most`) candidates nearest to `name` by edit distance, best first; none that share
 // too little.
-std::vector<std::string> nearest_names(std::string_view name,
-                                       std::span<const std::string> candidates,
-                                       std::size_t most = 3);
+[[nodiscard]] std::vector<std::string> nearest_names(std::string_view name,
+                                                     std::span<const std::string> candidates,
+                                                     std::size_t most = 3);
 
 // "; did you mean 'a' or 'b'?" or, when nothing is near, "; available: a, b, c" (the first 12). ""
 // if there are none.
-std::string suggest(std::string_view name, std::span<const std::string> candidates);
+[[nodiscard]] std::string suggest(std::string_view name, std::span<const std::string> candidates);
 
 // KeyError "sensor 'feet': no geom named 'FR_fot'; did you mean 'FR_foot'?"
 [[noreturn]] void throw_unknown(std::string_view place, std::string_view kind,

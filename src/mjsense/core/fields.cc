@@ -8,9 +8,12 @@
 #include <charconv>
 #include <cmath>
 #include <cstring>
+#include <deque>
+#include <mutex>
 
 #include "mjsense/core/error.h"
 #include "mjsense/core/json.h"
+#include "mjsense/core/path_field.h"
 
 namespace mjsense {
 namespace {
@@ -269,6 +272,36 @@ const FieldDecl* StructDecl::find(std::string_view field) const {
   const auto it = std::ranges::find_if(fields, [&](const FieldDecl& f) { return f.name == field; });
   return it == fields.end() ? nullptr : &*it;
 }
+
+std::shared_ptr<void> StructDecl::make() const { return {create(), destroy}; }
+
+const StructDecl& field_detail::make_struct(const StructOf& of) {
+  StructDecl decl;
+  decl.create = of.create;
+  decl.destroy = of.destroy;
+  decl.validate = of.validate;
+  const std::shared_ptr<void> instance = decl.make();
+  FieldVisitor visitor(decl, instance.get());
+  of.visit(visitor, instance.get());
+  decl.defaults = instance;
+  static std::mutex mutex;
+  static std::deque<StructDecl> all;  // where they stay
+  const std::lock_guard lock(mutex);
+  return all.emplace_back(std::move(decl));
+}
+
+FieldType CustomFieldType<std::filesystem::path>::make() {
+  return {.kind = FieldType::Kind::kPath};
+}
+
+template const FieldType& field_type<bool>();
+template const FieldType& field_type<int>();
+template const FieldType& field_type<float>();
+template const FieldType& field_type<double>();
+template const FieldType& field_type<std::string>();
+template const FieldType& field_type<std::vector<std::string>>();
+template const FieldType& field_type<std::vector<double>>();
+template const FieldType& field_type<std::array<float, 4>>();
 
 FieldVisitor& FieldVisitor::object(const char* name, Sentence sentence, const char* kind) {
   if (included_ > 0) return *this;

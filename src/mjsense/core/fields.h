@@ -17,7 +17,6 @@
 #include <array>
 #include <cstddef>
 #include <cstdint>
-#include <filesystem>
 #include <limits>
 #include <memory>
 #include <optional>
@@ -35,8 +34,7 @@ namespace mjsense {
 class Sentence {
  public:
   consteval Sentence(const char* text) : text_(text) {  // NOLINT: a literal is one
-    std::size_t length = 0;
-    while (text[length] != 0) ++length;
+    const std::size_t length = __builtin_strlen(text);
     if (length < 2 || text[length - 1] != '.') throw "needs a sentence that ends with a full stop";
   }
   constexpr const char* text() const { return text_; }
@@ -68,6 +66,7 @@ int word_index(std::string_view text, std::span<const std::string_view> words,
 template <Worded E>
 class Word {
  public:
+  using Enum = E;
   constexpr Word() = default;
   constexpr Word(E value) : value_(value) {}                // NOLINT: it is one
   consteval Word(const char* text) : value_(find(text)) {}  // NOLINT: a literal names one
@@ -166,7 +165,8 @@ struct FieldDecl {
   }
   FieldDecl& one_of(std::span<const std::string_view> w) { return words = w, *this; }
   FieldDecl& not_empty() { return is_not_empty = true, *this; }
-  // How Python writes it: without a default; None for what is empty here; one value for a list of it.
+  // How Python writes it: without a default; None for what is empty here; one value for a list of
+  // it.
   FieldDecl& required() { return is_required = true, *this; }
   FieldDecl& or_none() { return is_or_none = true, *this; }
   FieldDecl& or_one() { return is_or_one = true, *this; }
@@ -194,11 +194,13 @@ struct StructDecl {
   std::vector<Base> bases;  // the direct one first
   std::vector<FieldDecl> fields;
   std::shared_ptr<const void> defaults;
-  std::shared_ptr<void> (*make)() = nullptr;
   // What its fields say of each other: validate(cfg, place) beside the struct, or its member.
   void (*validate)(const void* object, std::string_view place) = nullptr;
+  void* (*create)() = nullptr;
+  void (*destroy)(void* object) = nullptr;
 
   const FieldDecl* find(std::string_view field) const;
+  std::shared_ptr<void> make() const;  // one with the defaults
 };
 
 inline void* at(void* object, const FieldDecl& field) {
@@ -260,26 +262,40 @@ concept Described = requires(FieldVisitor& v, T& t) {
   visit_fields(v, t);
 };
 
+namespace field_detail {
+
+// What a table needs to know of a type: functions, so that the rest is compiled once.
+struct StructOf {
+  void* (*create)();
+  void (*destroy)(void* object);
+  void (*visit)(FieldVisitor& visitor, void* object);
+  void (*validate)(const void* object, std::string_view place);
+};
+const StructDecl& make_struct(const StructOf& of);
+
+template <class T>
+constexpr auto validator() -> void (*)(const void* object, std::string_view place) {
+  if constexpr (requires(const T& t) { t.validate(std::string_view()); }) {
+    return [](const void* object, std::string_view place) {
+      static_cast<const T*>(object)->validate(place);
+    };
+  } else if constexpr (requires(const T& t) { validate(t, std::string_view()); }) {
+    return [](const void* object, std::string_view place) {
+      validate(*static_cast<const T*>(object), place);
+    };
+  } else {
+    return nullptr;
+  }
+}
+
+}  // namespace field_detail
+
 template <Described T>
 const StructDecl& struct_of() {
-  static const StructDecl kDecl = [] {
-    StructDecl decl;
-    auto instance = std::make_shared<T>();
-    FieldVisitor visitor(decl, instance.get());
-    visit_fields(visitor, *instance);
-    decl.defaults = std::move(instance);
-    decl.make = []() -> std::shared_ptr<void> { return std::make_shared<T>(); };
-    if constexpr (requires(const T& t) { t.validate(std::string_view()); }) {
-      decl.validate = [](const void* object, std::string_view place) {
-        static_cast<const T*>(object)->validate(place);
-      };
-    } else if constexpr (requires(const T& t) { validate(t, std::string_view()); }) {
-      decl.validate = [](const void* object, std::string_view place) {
-        validate(*static_cast<const T*>(object), place);
-      };
-    }
-    return decl;
-  }();
+  static const StructDecl& kDecl = field_detail::make_struct(
+      {[]() -> void* { return new T(); }, [](void* object) { delete static_cast<T*>(object); },
+       [](FieldVisitor& v, void* object) { visit_fields(v, *static_cast<T*>(object)); },
+       field_detail::validator<T>()});
   return kDecl;
 }
 
@@ -312,56 +328,24 @@ std::string expected(const FieldType& type);
 
 // ------------------------------------------------------------------------------- types of values
 
+// The name of a choice in Python, beside the variant: template <> ... kChoiceName<PatternCfg>.
+template <class V>
+inline constexpr const char* kChoiceName = "";
+template <class V>
+inline constexpr int kPlainAlternative = -1;
+
+// Another type of value specialises this: see effects/all_effects.h, core/path_field.h.
+template <class T>
+struct CustomFieldType;
+
 namespace field_detail {
 
 using Kind = FieldType::Kind;
 
 template <class T>
-constexpr FieldType scalar(Kind kind) {
-  return {.kind = kind, .bytes = sizeof(T)};
-}
-
-// Lists, optionals, arrays and maps by the same functions.
-template <class L, class T>
-constexpr FieldType container(Kind kind) {
-  return {.kind = kind, .element = &field_type<T>};
-}
-
-template <class T>
-requires std::is_same_v<T, bool>
-constexpr FieldType make() { return scalar<T>(Kind::kBool); }
-template <class T>
-requires(std::is_integral_v<T> && !std::is_same_v<T, bool>) constexpr FieldType make() {
-  return scalar<T>(std::is_signed_v<T> ? Kind::kInt : Kind::kUnsigned);
-}
-template <class T>
-requires std::is_floating_point_v<T>
-constexpr FieldType make() { return scalar<T>(Kind::kNumber); }
-template <class T>
-requires std::is_same_v<T, std::string>
-constexpr FieldType make() { return {.kind = Kind::kText}; }
-template <class T>
-requires std::is_same_v<T, std::filesystem::path>
-constexpr FieldType make() { return {.kind = Kind::kPath}; }
-template <Worded T>
-constexpr FieldType make() {
-  return {.kind = Kind::kWord, .bytes = sizeof(T), .words = kWords<T>};
-}
-template <class T>
 inline constexpr bool kIsWord = false;
 template <class E>
 inline constexpr bool kIsWord<Word<E>> = true;
-template <class W>
-requires kIsWord<W>
-constexpr FieldType make() {
-  using E = decltype([](auto w) { return []<class T>(Word<T>) { return T{}; }(w); }(W{}));
-  return {.kind = Kind::kWord, .bytes = sizeof(W), .words = kWords<E>};
-}
-template <Described T>
-constexpr FieldType make() {
-  return {.kind = Kind::kObject, .object = &struct_of<T>};
-}
-
 template <class T>
 inline constexpr bool kIsArray = false;
 template <class T, std::size_t N>
@@ -383,43 +367,43 @@ inline constexpr bool kIsVariant = false;
 template <class... T>
 inline constexpr bool kIsVariant<std::variant<T...>> = true;
 
+// Lists, optionals, arrays and maps by the same functions.
 template <class L>
-requires kIsArray<L>
-constexpr FieldType make() {
-  FieldType t = container<L, typename L::value_type>(Kind::kArray);
-  t.count = [](const void*) { return std::tuple_size_v<L>; };
-  t.at = [](void* list, std::size_t i) -> void* { return &(*static_cast<L*>(list))[i]; };
-  return t;
+constexpr FieldType array() {
+  return {.kind = Kind::kArray,
+          .element = &field_type<typename L::value_type>,
+          .count = [](const void*) { return std::tuple_size_v<L>; },
+          .at = [](void* list, std::size_t i) -> void* { return &(*static_cast<L*>(list))[i]; }};
 }
 template <class L>
-requires(kIsList<L> && !kIsMap<L>) constexpr FieldType make() {
-  FieldType t = container<L, typename L::value_type>(Kind::kList);
-  t.count = [](const void* list) { return static_cast<const L*>(list)->size(); };
-  t.at = [](void* list, std::size_t i) -> void* { return &(*static_cast<L*>(list))[i]; };
-  t.clear = [](void* list) { static_cast<L*>(list)->clear(); };
-  t.append = [](void* list) -> void* { return &static_cast<L*>(list)->emplace_back(); };
-  return t;
+constexpr FieldType list() {
+  return {.kind = Kind::kList,
+          .element = &field_type<typename L::value_type>,
+          .count = [](const void* list) { return static_cast<const L*>(list)->size(); },
+          .at = [](void* list, std::size_t i) -> void* { return &(*static_cast<L*>(list))[i]; },
+          .clear = [](void* list) { static_cast<L*>(list)->clear(); },
+          .append = [](void* list) -> void* { return &static_cast<L*>(list)->emplace_back(); }};
 }
 template <class L>
-requires kIsMap<L>
-constexpr FieldType make() {
-  FieldType t = container<L, typename L::value_type::second_type>(Kind::kMap);
-  t.count = [](const void* list) { return static_cast<const L*>(list)->size(); };
-  t.at = [](void* list, std::size_t i) -> void* { return &(*static_cast<L*>(list))[i].second; };
-  t.key_at = [](void* list, std::size_t i) { return &(*static_cast<L*>(list))[i].first; };
-  t.clear = [](void* list) { static_cast<L*>(list)->clear(); };
-  t.append = [](void* list) -> void* { return &static_cast<L*>(list)->emplace_back().second; };
-  return t;
+constexpr FieldType map() {
+  return {
+      .kind = Kind::kMap,
+      .element = &field_type<typename L::value_type::second_type>,
+      .count = [](const void* list) { return static_cast<const L*>(list)->size(); },
+      .at = [](void* list, std::size_t i) -> void* { return &(*static_cast<L*>(list))[i].second; },
+      .key_at = [](void* list, std::size_t i) { return &(*static_cast<L*>(list))[i].first; },
+      .clear = [](void* list) { static_cast<L*>(list)->clear(); },
+      .append = [](void* list) -> void* { return &static_cast<L*>(list)->emplace_back().second; }};
 }
 template <class L>
-requires kIsOptional<L>
-constexpr FieldType make() {
-  FieldType t = container<L, typename L::value_type>(Kind::kOptional);
-  t.count = [](const void* o) -> std::size_t { return static_cast<const L*>(o)->has_value(); };
-  t.at = [](void* o, std::size_t) -> void* { return &**static_cast<L*>(o); };
-  t.clear = [](void* o) { static_cast<L*>(o)->reset(); };
-  t.append = [](void* o) -> void* { return &static_cast<L*>(o)->emplace(); };
-  return t;
+constexpr FieldType optional() {
+  return {
+      .kind = Kind::kOptional,
+      .element = &field_type<typename L::value_type>,
+      .count = [](const void* o) -> std::size_t { return static_cast<const L*>(o)->has_value(); },
+      .at = [](void* o, std::size_t) -> void* { return &**static_cast<L*>(o); },
+      .clear = [](void* o) { static_cast<L*>(o)->reset(); },
+      .append = [](void* o) -> void* { return &static_cast<L*>(o)->emplace(); }};
 }
 
 template <class V>
@@ -430,6 +414,9 @@ struct Variant<std::variant<T...>> {
   static std::span<const StructDecl* const> alternatives() {
     static const std::array<const StructDecl*, sizeof...(T)> kAll{&struct_of<T>()...};
     return kAll;
+  }
+  static int which(const void* value) {
+    return static_cast<int>(static_cast<const V*>(value)->index());
   }
   static void* get(void* value) {
     return std::visit([](auto& x) -> void* { return &x; }, *static_cast<V*>(value));
@@ -442,37 +429,46 @@ struct Variant<std::variant<T...>> {
   }
 };
 
-// The name of a choice in Python, beside the variant: template <> ... kChoiceName<PatternCfg>.
-template <class V>
-requires kIsVariant<V>
-constexpr FieldType make();
-
-}  // namespace field_detail
-
-template <class V>
-inline constexpr const char* kChoiceName = "";
-template <class V>
-inline constexpr int kPlainAlternative = -1;
-
-namespace field_detail {
-template <class V>
-requires kIsVariant<V>
-constexpr FieldType make() {
-  using Of = Variant<V>;
-  return {
-      .kind = Kind::kChoice,
-      .choice = kChoiceName<V>,
-      .alternatives = &Of::alternatives,
-      .which = [](const void* v) { return static_cast<int>(static_cast<const V*>(v)->index()); },
-      .get = &Of::get,
-      .emplace = &Of::emplace,
-      .plain = kPlainAlternative<V>};
-}
-}  // namespace field_detail
-
-// Another type of value specialises this: see effects/all_effects.h.
 template <class T>
-struct CustomFieldType;
+constexpr FieldType make() {
+  if constexpr (std::is_same_v<T, bool>) {
+    return {.kind = Kind::kBool, .bytes = sizeof(T)};
+  } else if constexpr (std::is_integral_v<T>) {
+    return {.kind = std::is_signed_v<T> ? Kind::kInt : Kind::kUnsigned, .bytes = sizeof(T)};
+  } else if constexpr (std::is_floating_point_v<T>) {
+    return {.kind = Kind::kNumber, .bytes = sizeof(T)};
+  } else if constexpr (std::is_same_v<T, std::string>) {
+    return {.kind = Kind::kText};
+  } else if constexpr (kIsWord<T>) {
+    return {.kind = Kind::kWord, .bytes = sizeof(T), .words = kWords<typename T::Enum>};
+  } else if constexpr (Worded<T>) {
+    return {.kind = Kind::kWord, .bytes = sizeof(T), .words = kWords<T>};
+  } else if constexpr (kIsArray<T>) {
+    return array<T>();
+  } else if constexpr (kIsMap<T>) {
+    return map<T>();
+  } else if constexpr (kIsList<T>) {
+    return list<T>();
+  } else if constexpr (kIsOptional<T>) {
+    return optional<T>();
+  } else if constexpr (kIsVariant<T>) {
+    using Of = Variant<T>;
+    return {.kind = Kind::kChoice,
+            .choice = kChoiceName<T>,
+            .alternatives = &Of::alternatives,
+            .which = &Of::which,
+            .get = &Of::get,
+            .emplace = &Of::emplace,
+            .plain = kPlainAlternative<T>};
+  } else {
+    static_assert(Described<T>,
+                  "no type of a field: it needs visit_fields() beside it; for a path include "
+                  "core/path_field.h");
+    return {.kind = Kind::kObject, .object = &struct_of<T>};
+  }
+}
+
+}  // namespace field_detail
 
 template <class T>
 const FieldType& field_type() {
@@ -484,5 +480,15 @@ const FieldType& field_type() {
     return kType;
   }
 }
+
+// What most structs are made of is compiled once.
+extern template const FieldType& field_type<bool>();
+extern template const FieldType& field_type<int>();
+extern template const FieldType& field_type<float>();
+extern template const FieldType& field_type<double>();
+extern template const FieldType& field_type<std::string>();
+extern template const FieldType& field_type<std::vector<std::string>>();
+extern template const FieldType& field_type<std::vector<double>>();
+extern template const FieldType& field_type<std::array<float, 4>>();
 
 }  // namespace mjsense

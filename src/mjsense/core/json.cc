@@ -99,21 +99,9 @@ JsonWriter& JsonWriter::value(std::string_view text) {
   return *this;
 }
 
-JsonWriter& JsonWriter::null() {
-  separate();
-  put("null");
-  return *this;
-}
-
 JsonWriter& JsonWriter::values(std::span<const double> xs) {
   begin_array();
   for (double x : xs) value(x);
-  return end_array();
-}
-
-JsonWriter& JsonWriter::values(std::span<const float> xs) {
-  begin_array();
-  for (float x : xs) value(static_cast<double>(x));
   return end_array();
 }
 

@@ -30,19 +30,17 @@ class JsonWriter {
   JsonWriter& value(bool x);
   JsonWriter& value(std::string_view text);
   JsonWriter& value(const char* text) { return value(std::string_view(text)); }
-  JsonWriter& null();
 
-  // A list of numbers. Floats are widened to double first, as NumPy's tolist() does.
+  // A list of numbers.
   JsonWriter& values(std::span<const double> xs);
-  JsonWriter& values(std::span<const float> xs);
 
   // Bytes that the whole text needs, also when it did not fit.
   std::size_t size() const { return size_; }
-  bool fits() const { return size_ <= row_.size(); }
+  [[nodiscard]] bool fits() const { return size_ <= row_.size(); }
 
   // Pads with 0. Returns fits(): a text that does not fit is the caller's error to report, never
   // cut silently.
-  bool finish();
+  [[nodiscard]] bool finish();
 
  private:
   void put(char c);

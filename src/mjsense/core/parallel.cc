@@ -46,7 +46,8 @@ void ThreadPool::run_raw(int n, Fn fn, void* ctx) {
   }
   work(0);
   if (!alone) {
-    // Whoever has not woken up by now is not waited for: of 64 empty items that is 0.3 us instead of 47.
+    // Whoever has not woken up by now is not waited for: of 64 empty items that is 0.3 us instead
+    // of 47.
     std::unique_lock lock(mutex_);
     open_ = false;
     done_.wait(lock, [this] { return active_ == 0; });

@@ -156,7 +156,7 @@ class Sensor {
 struct SensorCfg {
   std::string name;
   virtual ~SensorCfg() = default;
-  virtual std::unique_ptr<Sensor> build() const = 0;
+  [[nodiscard]] virtual std::unique_ptr<Sensor> build() const = 0;
   // Key in the scene's registry: "robot/imu" for a built-in sensor on an entity, else the plain
   // name.
   virtual std::string key() const { return name; }

@@ -19,17 +19,16 @@ void visit_fields(V& v, SensorCfg& c) {
 struct SensorKind {
   const StructDecl* cfg;  // its kind is the sensor's kind()
   const DataClass* data;  // null: a plain array
+  SensorCfg* (*base)(void* fields);
+
   // A default configuration, and where its fields are.
-  std::shared_ptr<SensorCfg> (*make)(void** fields);
+  std::shared_ptr<SensorCfg> make(void** fields) const;
 };
 
 template <class Cfg>
 SensorKind sensor_kind(const DataClass* data = nullptr) {
-  return {&struct_of<Cfg>(), data, [](void** fields) -> std::shared_ptr<SensorCfg> {
-            auto cfg = std::make_shared<Cfg>();
-            *fields = cfg.get();
-            return cfg;
-          }};
+  return {&struct_of<Cfg>(), data,
+          [](void* fields) -> SensorCfg* { return static_cast<Cfg*>(fields); }};
 }
 
 }  // namespace mjsense

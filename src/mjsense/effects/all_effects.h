@@ -26,14 +26,4 @@ struct CustomFieldType<std::shared_ptr<const Effect>> {
 // Its fields, and what they say of each other. ValueError.
 void check_effect(const std::shared_ptr<const Effect>& effect, std::string_view place);
 
-template <class V>
-void visit_fields(V& v, EffectChainCfg& c) {
-  v.object("EffectChainCfg", "Effects one after the other, then history.");
-  v("effects", c.effects, "In this order; each may be limited to some fields.");
-  v("history_length", c.history_length,
-    "Rows of every field, oldest first; the first of an episode fills all. 0: no history.")
-      .at_least(0);
-  v("flatten_history", c.flatten_history, "[h d] instead of [h, *shape].");
-}
-
 }  // namespace mjsense

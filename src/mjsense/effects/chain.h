@@ -17,7 +17,8 @@ namespace mjsense {
 
 using Effects = std::vector<std::shared_ptr<const Effect>>;
 
-// Throws ValueError for an effect that is null or wrong whatever row it meets: "<place>, effect 1 (dropout): ...".
+// Throws ValueError for an effect that is null or wrong whatever row it meets: "<place>, effect 1
+// (dropout): ...".
 void validate(const Effects& effects, std::string_view place);
 
 struct EffectChainCfg {

@@ -78,12 +78,12 @@ struct EffectInit {
 class Effect {
  public:
   virtual ~Effect() = default;
-  virtual std::unique_ptr<Effect> clone() const = 0;
+  [[nodiscard]] virtual std::unique_ptr<Effect> clone() const = 0;
   virtual std::string kind() const = 0;
 
-  // Throws ValueError for what its fields say of each other, whatever row it will meet: check_fields()
-  // calls it after the ranges, when a configuration is made and before initialize(). `place` starts
-  // the message.
+  // Throws ValueError for what its fields say of each other, whatever row it will meet:
+  // check_fields() calls it after the ranges, when a configuration is made and before initialize().
+  // `place` starts the message.
   virtual void validate(std::string_view /*place*/) const {}
   // Throws ValueError for what does not suit the row; allocates. Nothing allocates afterwards.
   virtual void initialize(const EffectInit& init) = 0;

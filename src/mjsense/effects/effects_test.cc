@@ -472,8 +472,10 @@ TEST(Chain, HistoryIsOldestFirstAndBackfilled) {
 
 TEST(Chain, PeersPipelineInItsOrder) {
   PipelineCfg cfg;
-  cfg.noise = Noise(Draw::constant({0.5}));
-  cfg.clip = {{-1.0, 3.0}};
+  cfg.noise = Constant{{0.5}};
+  cfg.bias = {0.25};
+  cfg.episode_bias = EpisodeBias(Draw::constant({-0.25}));
+  cfg.clip = {-1.0, 3.0};
   cfg.scale = {2.0};
   cfg.delay = StepDelay(1, 1);
   cfg.history_length = 2;
@@ -482,6 +484,13 @@ TEST(Chain, PeersPipelineInItsOrder) {
   EXPECT_THAT(bench.feed_row({1}, 1), ElementsAre(1, 1));
   EXPECT_THAT(bench.feed_row({9}, 2), ElementsAre(1, 3));
   EXPECT_THAT(bench.feed_row({0}, 3), ElementsAre(3, 6));
+
+  cfg.enable_corruption = false;
+  cfg.delay = {};
+  cfg.history_length = 0;
+  EXPECT_THAT(Bench(pipeline(cfg), 1).feed_row({1}, 0), ElementsAre(2));
+  cfg.delay = StepDelay(2, 1);
+  EXPECT_THROW(static_cast<void>(pipeline(cfg)), ValueError);
 }
 
 TEST(Chain, ErrorsNameSensorEffectAndValue) {

@@ -9,8 +9,8 @@
 namespace mjsense {
 
 // A point p_W (m) lands on pixel (u, v) = (k0 / k2, k1 / k2) with
-// k = intrinsic_cv * extrinsic_cv * [p_W, 1]; u to the right, v down, (0, 0) the outer corner of the
-// top left pixel. Streams, all float64:
+// k = intrinsic_cv * extrinsic_cv * [p_W, 1]; u to the right, v down, (0, 0) the outer corner of
+// the top left pixel. Streams, all float64:
 //   <name>/cam2world_gl [4, 4]  X_WC, columns right, down, forward, position. Despite its published
 //                               name its axes are OpenCV's (x right, y down, z forward).
 //   <name>/extrinsic_cv [3, 4]  top rows of its inverse: world to camera

@@ -105,10 +105,4 @@ const Field& SensorSuite::stream(std::string_view name) const {
   throw_unknown("suite", "stream", name, names);
 }
 
-std::size_t SensorSuite::bytes_per_world() const {
-  std::size_t bytes = 0;
-  for (const Field* field : streams()) bytes += field->data.row_bytes();
-  return bytes;
-}
-
 }  // namespace mjsense

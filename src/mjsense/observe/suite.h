@@ -45,7 +45,6 @@ class SensorSuite {
   // Fields of all sensors in order: a sensor with several has several streams. Valid after bind().
   std::vector<const Field*> streams() const;
   const Field& stream(std::string_view name) const;  // throws KeyError with the nearest names
-  std::size_t bytes_per_world() const;
 
  private:
   int index(std::string_view name) const;  // -1 if there is none

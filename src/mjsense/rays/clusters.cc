@@ -58,7 +58,8 @@ class Builder {
       if (finer.size() == parts.size()) break;
       parts = std::move(finer);
     }
-    // Halves differ by a block at most, so that leaves come in one round: no node has more children.
+    // Halves differ by a block at most, so that leaves come in one round: no node has more
+    // children.
     assert(parts.size() <= kClusterSize);
     for (std::size_t i = 0; i < parts.size(); ++i) {
       const bool leaf = parts[i].size() <= kClusterSize;

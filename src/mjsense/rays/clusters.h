@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
-// The triangles of a shape in blocks of 16 neighbours, under a tree of boxes with 16 children a node:
-// what an image draws where it is finer than the triangles. Laid out for kernels, which take a block
-// or a node at a time.
+// The triangles of a shape in blocks of 16 neighbours, under a tree of boxes with 16 children a
+// node: what an image draws where it is finer than the triangles. Laid out for kernels, which take
+// a block or a node at a time.
 
 #include <vector>
 
@@ -17,8 +17,8 @@ struct alignas(64) TriangleBlock {
 
 struct alignas(64) ClusterNode {
   float center[3][kClusterSize], half[3][kClusterSize];  // box of each child, m
-  // All normals of a child's triangles are within an angle of `axis`; its sine, 1 if that is 90 degrees
-  // or more.
+  // All normals of a child's triangles are within an angle of `axis`; its sine, 1 if that is 90
+  // degrees or more.
   float axis[3][kClusterSize], spread[kClusterSize];
   int child[kClusterSize];  // of `nodes`; ~child of `blocks`
   int count;

@@ -17,15 +17,16 @@ struct FlexSurface {
   int dim = 0;
   int num_vertices = 0;  // of the flex; surface vertex v + num_vertices is v of the second sheet
   bool flat = false;     // shaded by faces
-  // [F, 3] surface vertices. Dimension 2: element e has faces 2 e and 2 e + 1, then comes the border;
-  // dimension 3: shell by shell; dimension 1: none. Faces of one material are
+  // [F, 3] surface vertices. Dimension 2: element e has faces 2 e and 2 e + 1, then comes the
+  // border; dimension 3: shell by shell; dimension 1: none. Faces of one material are
   // together, if elements differ in it.
   std::vector<int> faces;
   std::vector<int> texcoords;  // [F, 3] into the flex's texture coordinates; empty: it has none
   std::vector<int> edges;      // [E, 2] vertices, dimension 1 only
   std::vector<float> rest;     // [num_vertices, 3] m, as the model describes it
 
-  // Faces [first, first + count), which share the material of mjModel's element `element`; all edges.
+  // Faces [first, first + count), which share the material of mjModel's element `element`; all
+  // edges.
   struct Part {
     int element, first, count;
   };

@@ -84,13 +84,13 @@ class RayScene {
   void trace_focused(int world, const RayFilter& filter, const RayPacket& rays, HitPacket& hits,
                      RayScratch& scratch) const;
   // Bit i: something lies on ray i before its tmax.
-  std::uint32_t occluded(int world, const RayFilter& filter, const RayPacket& rays,
-                         RayScratch& scratch) const;
+  [[nodiscard]] std::uint32_t occluded(int world, const RayFilter& filter, const RayPacket& rays,
+                                       RayScratch& scratch) const;
 
   // One ray, for tests and tools. `direction` need not have length 1: t is in metres along it all
   // the same.
-  Hit trace(int world, const RayFilter& filter, const double origin[3],
-            const double direction[3]) const;
+  [[nodiscard]] Hit trace(int world, const RayFilter& filter, const double origin[3],
+                          const double direction[3]) const;
 
  private:
   const mjModel* model_;

@@ -2,8 +2,8 @@
 #pragma once
 // Vectors of kWidth floats for the kernels: AVX-512 (16), AVX2 (8), or plain arrays of 4 that any
 // compiler vectorises. Everything lies in an unnamed namespace, because each instruction set must
-// keep its own copy. Ours and not Highway: three widths of 264 lines, that compile a fifth faster and
-// whose roundings the equality of bits over instruction sets rests on.
+// keep its own copy. Ours and not Highway: three widths of 264 lines, that compile a fifth faster
+// and whose roundings the equality of bits over instruction sets rests on.
 
 #if defined(__AVX512F__) || defined(__AVX2__)
 #include <immintrin.h>

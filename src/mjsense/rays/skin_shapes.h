@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
-// The skins of one world: meshes bent by bones, as MuJoCo draws them. Cameras see them; rays do not,
-// as mj_ray does not.
+// The skins of one world: meshes bent by bones, as MuJoCo draws them. Cameras see them; rays do
+// not, as mj_ray does not.
 
 #include <mujoco/mujoco.h>
 

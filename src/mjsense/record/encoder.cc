@@ -10,7 +10,6 @@
 
 #include <algorithm>
 #include <cerrno>
-#include <chrono>
 #include <condition_variable>
 #include <cstring>
 #include <deque>
@@ -26,12 +25,6 @@ namespace {
 
 constexpr int kDefaultEncoders = 32;
 constexpr int kReapPeriodMs = 4;  // how often ending encoders are looked after
-
-using Clock = std::chrono::steady_clock;
-
-double seconds_since(Clock::time_point start) {
-  return std::chrono::duration<double>(Clock::now() - start).count();
-}
 
 }  // namespace
 
@@ -70,7 +63,7 @@ struct EncoderPool::Impl {
   std::vector<std::unique_ptr<Stream>> streams;
   int running = 0;  // ffmpeg processes
   bool stop = false;
-  double waited = 0, cpu = 0;
+  double cpu = 0;
   Fd wake_fd;
   std::thread thread;
 
@@ -107,13 +100,6 @@ struct EncoderPool::Impl {
   }
   int waiting() const {
     return count([](const Stream& s) { return !s.direct && s.closed && s.child.pid < 0; });
-  }
-
-  void wait_until(std::unique_lock<std::mutex>& lock, auto&& ready) {
-    if (ready()) return;
-    const auto start = Clock::now();
-    changed.wait(lock, ready);
-    waited += seconds_since(start);
   }
 
   // The pool's thread: writes what producers queued, starts encoders on complete spool files,
@@ -276,9 +262,9 @@ EncoderPool::Stream* EncoderPool::open(const VideoStream& video,
     return direct < impl_->max_direct && impl_->running < impl_->max_encoders;
   };
   if (may_spool) {
-    impl_->wait_until(lock, [&] { return impl_->waiting() < impl_->max_waiting; });
+    impl_->changed.wait(lock, [&] { return impl_->waiting() < impl_->max_waiting; });
   } else {
-    impl_->wait_until(lock, slot_free);
+    impl_->changed.wait(lock, slot_free);
   }
   stream->direct = slot_free();
   if (stream->direct) {
@@ -299,7 +285,7 @@ EncoderPool::Stream* EncoderPool::open(const VideoStream& video,
 
 std::span<std::uint8_t> EncoderPool::reserve(Stream* stream) {
   std::unique_lock lock(impl_->mutex);
-  impl_->wait_until(lock, [&] {
+  impl_->changed.wait(lock, [&] {
     return stream->failed() || stream->filled - stream->taken < stream->ring.size();
   });
   if (stream->failed()) return {};
@@ -328,11 +314,6 @@ void EncoderPool::abort(Stream* stream) {
     stream->aborted = true;
   }
   impl_->wake();
-}
-
-double EncoderPool::waited_s() const {
-  const std::lock_guard lock(impl_->mutex);
-  return impl_->waited;
 }
 
 double EncoderPool::cpu_s() const {

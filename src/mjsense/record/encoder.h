@@ -51,13 +51,12 @@ class EncoderPool {
   Stream* open(const VideoStream& video, const std::filesystem::path& output, OnDone on_done);
   // The place of the next frame; waits while the queue is full. Empty when the stream has failed:
   // on_done tells why.
-  std::span<std::uint8_t> reserve(Stream* stream);
+  [[nodiscard]] std::span<std::uint8_t> reserve(Stream* stream);
   void commit(Stream* stream);
   void close(Stream* stream);  // no more frames; the stream must not be used any more
   void abort(Stream* stream);  // no more frames, and the video is not wanted
 
-  double waited_s() const;  // time that open() and reserve() waited
-  double cpu_s() const;     // processor time of the programs that have ended
+  double cpu_s() const;  // processor time of the programs that have ended
 
  private:
   struct Impl;

@@ -28,8 +28,8 @@ class EpisodeFile {
   EpisodeFile& operator=(const EpisodeFile&) = delete;
 
   // Appends `rows` rows of a stream: streams [0, arrays) are the plan's, then OwnStream. `chunk`
-  // has the kept bytes of a whole chunk, zero beyond the rows: what is text on disk becomes it here. Chunks of a stream come in order, all but
-  // the last full.
+  // has the kept bytes of a whole chunk, zero beyond the rows: what is text on disk becomes it
+  // here. Chunks of a stream come in order, all but the last full.
   void write_chunk(int stream, std::int64_t rows, std::span<const std::uint8_t> chunk);
   void finish(std::string_view obs_scene,
               std::string_view outcome);  // closes; throws when the disk refuses

@@ -27,7 +27,7 @@ class Fd {
 
   int get() const { return fd_; }
   explicit operator bool() const { return fd_ >= 0; }
-  int release();
+  [[nodiscard]] int release();  // the caller closes it
   void reset();
 
  private:

@@ -65,13 +65,13 @@ class Recorder {
   // Undecided: a resumed recording attempts it again.
   void abandon_episode(int world);
 
-  bool recording(int world) const;
+  [[nodiscard]] bool recording(int world) const;
   // True if this attempt was finished or discarded, now or before the recording was resumed.
-  bool decided(std::int64_t episode) const;
+  [[nodiscard]] bool decided(std::int64_t episode) const;
   int kept() const;  // episodes finished so far, published or not
   int discarded() const;
   // cfg.episodes are kept and no earlier attempt is undecided: nothing more to attempt.
-  bool enough() const;
+  [[nodiscard]] bool enough() const;
 
   // Waits until every finished episode is safe on disk.
   void flush();

@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 // The recorder's two sides: the caller's (recorder.cc, recorder_append.cc), which copies rows into
-// chunks and frames into queues, and the writer thread's (recorder_writer.cc), which does everything
-// that waits for a disk.
+// chunks and frames into queues, and the writer thread's (recorder_writer.cc), which does
+// everything that waits for a disk.
 
 #include <atomic>
 #include <chrono>

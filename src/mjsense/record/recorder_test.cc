@@ -75,8 +75,8 @@ TEST(Recorder, ResumingGivesTheFilesOfAnUninterruptedRun) {
             record(broken.path, 6, {.worlds = 2}, true, [&](RecordingCfg& c) { c.resume = true; }));
 }
 
-// Killed while its episodes were being published: some videos have their final names already, the file of
-// trajectories is not there. Whoever comes next ends it, and nothing can be added any more.
+// Killed while its episodes were being published: some videos have their final names already, the
+// file of trajectories is not there. Whoever comes next ends it, and nothing can be added any more.
 TEST(Recorder, AnInterruptedPublicationIsEnded) {
   TempDir whole;
   {

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Brightness by formula: Lambert's cosine, lights that are turned away, glowing surfaces, shadows whose edges geometry gives.
+// Brightness by formula: Lambert's cosine, lights that are turned away, glowing surfaces, shadows
+// whose edges geometry gives.
 
 #include <gtest/gtest.h>
 
@@ -42,7 +43,8 @@ TEST(Light, AMatteSphereHasLambertsCosine) {
   }
 }
 
-// A highlight needs light: where the surface is turned away there is none, however the viewer stands.
+// A highlight needs light: where the surface is turned away there is none, however the viewer
+// stands.
 TEST(Light, ASurfaceTurnedAwayDoesNotShine) {
   const auto seen = [](double degrees) {
     const double a = degrees * M_PI / 180;
@@ -99,7 +101,8 @@ TEST(Shadow, IsOfWhatStandsBetween) {
       <geom type="box" size=".2 .2 .1" pos="1 0 .5" material="matte"/></worldbody>)");
     s.options.shadows = true;
     EXPECT_GT(s.from_above(0, 0, 1)[0], 200) << kind << ": the box above the light";
-    // In an image of 2 m of floor too: there the box is near what lies between the light and the tile.
+    // In an image of 2 m of floor too: there the box is near what lies between the light and the
+    // tile.
     const auto wide = s.shoot({0, 0, 1}, {1, 0, 0}, {0, 1, 0}, 16, 90);
     EXPECT_GT(wide[3 * (8 * 16 + 8)], 200) << kind;
     // The spot at height 2 throws the box's shadow to 1 + (0.4 .. 0.6) / (2 - z) outwards.

@@ -62,7 +62,8 @@ TEST(Shading, SpecularHighlightIsWhereHalfwayMeetsTheNormal) {
 }
 
 TEST(Shading, ShadowsHaveSharpKnownEdges) {
-  // A box of half size 0.2 at height 1, light at height 3: its shadow reaches to 0.2 * 3 / 1.8 = 1/3.
+  // A box of half size 0.2 at height 1, light at height 3: its shadow reaches to 0.2 * 3 / 1.8 =
+  // 1/3.
   Studio s(std::string(kDark) + kMatte + R"(<worldbody>
     <light pos="0 0 3" dir="0 0 -1" diffuse="1 1 1" specular="0 0 0" castshadow="true" cutoff="80" exponent="0"/>
     <geom type="plane" size="5 5 1" material="matte"/><geom type="box" size=".2 .2 .2" pos="0 0 1" material="matte"/>
@@ -83,7 +84,8 @@ TEST(Texture, PlaneStartsAtTheCornerAndRepeats) {
     <geom type="plane" size="1 1 1" material="m"/></worldbody>)");
   const std::array<Pixel, 4> texels{{{255, 0, 0}, {0, 255, 0}, {0, 0, 255}, {255, 255, 255}}};
   s.paint(0, [&](int i) { return texels[i]; });
-  // Across: two repeats of two texels, centres at x = -.75 -.25 .25 .75. Row 0 of the image is at +y.
+  // Across: two repeats of two texels, centres at x = -.75 -.25 .25 .75. Row 0 of the image is at
+  // +y.
   expect_pixel(s.from_above(-0.75, 0.5), texels[0]);
   expect_pixel(s.from_above(-0.25, 0.5), texels[1]);
   expect_pixel(s.from_above(0.25, 0.5), texels[0]);
@@ -111,8 +113,8 @@ TEST(Texture, CubeFacesAndSkyFollowOpenGL) {
   expect_pixel(s.center({9, 0, 9}, {0, -1, 0}, {0, 0, 1}), faces[0]);
 }
 
-// The sky is a cylinder of radius 0.7 * 50 * 1 m; the camera is 7 m over the floor, so that a ray that
-// falls by 0.2 s a metre meets the floor at 1 / s of that radius.
+// The sky is a cylinder of radius 0.7 * 50 * 1 m; the camera is 7 m over the floor, so that a ray
+// that falls by 0.2 s a metre meets the floor at 1 / s of that radius.
 TEST(Shading, HazeLiesWhereTheFloorMeetsTheSky) {
   Studio s(
       std::string(R"(<statistic extent="1"/><visual><map haze=".3"/><rgba haze="0 0 1 1"/>
@@ -150,7 +152,8 @@ TEST(Shading, FloorMirrorsWithItsReflectance) {
     <geom type="plane" size="5 5 1" material="mirror"/><geom type="box" size=".5 .1 .5" pos="0 1 1" rgba="1 0 0 1"/>
     </worldbody>)");
   s.options.reflections = true;
-  // From (0, -1, 1) down at 45 degrees: the floor at the origin, in it the box's front at height 0.9.
+  // From (0, -1, 1) down at 45 degrees: the floor at the origin, in it the box's front at height
+  // 0.9.
   const double h = std::sqrt(0.5);
   expect_pixel(s.center({0, -1, 1}, {1, 0, 0}, {0, h, h}, 1), {128, 0, 51});
   expect_pixel(s.center({3, -1, 1}, {1, 0, 0}, {0, h, h}, 1), {0, 0, 51});
@@ -246,7 +249,8 @@ TEST(CameraModel, DistortionIsUndone) {
       ValueError);
 }
 
-// What is wider or narrower than the sensor is a part of it, with square pixels if the sensor has them.
+// What is wider or narrower than the sensor is a part of it, with square pixels if the sensor has
+// them.
 TEST(Grid, APictureIsCutOutOfTheSensor) {
   const float focal[4] = {0.004f, 0.004f, 0, 0}, size[2] = {0.004f, 0.003f};
   const PixelGrid wide = grid_from_sensor(8, 4, focal, size);

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// What a pixel shows: texels by the place on a shape, triangles drawn as shapes of the same outline, what is
-// transparent, mirrored or out of the image.
+// What a pixel shows: texels by the place on a shape, triangles drawn as shapes of the same
+// outline, what is transparent, mirrored or out of the image.
 
 #include <gtest/gtest.h>
 
@@ -68,7 +68,8 @@ TEST(Texture, GoesAroundASphereFromXToY) {
   }
 }
 
-// The caps of a capsule end where the texture ends: its first row at the upper pole, its last at the lower.
+// The caps of a capsule end where the texture ends: its first row at the upper pole, its last at
+// the lower.
 TEST(Texture, EndsAtThePolesOfACapsule) {
   Studio s(painted("<geom type='capsule' size='.5 .3' material='m'/>"));
   constexpr Pixel kRows[] = {kRed, kRed, kBlue, kBlue};
@@ -149,7 +150,8 @@ TEST(Texture, UniformOnesAreCountedByTheMetre) {
               2 * borders_per_metre("4 4 1", "texrepeat='3 3'"), 0.3);
 }
 
-// A mesh of twelve triangles is the box of the same corners: in what is seen, how far it is and where it faces.
+// A mesh of twelve triangles is the box of the same corners: in what is seen, how far it is and
+// where it faces.
 TEST(Triangles, DrawTheBoxThatTheyBound) {
   const std::string mesh =
       R"(<asset><mesh name="block" vertex="-.3 -.2 -.1 .3 -.2 -.1 -.3 .2 -.1 .3 .2 -.1
@@ -259,8 +261,8 @@ TEST(Surface, OnlyTheTopOfABoxReflects) {
 TEST(Surface, SamplesSoftenEdgesInBothDirections) {
   Studio s(std::string(kFlat) +
            R"(<worldbody><geom type="box" size=".5 .5 .5" rgba="1 1 1 1"/></worldbody>)");
-  // 8 pixels over 2 m from 10 m above, by parallel rays: pixels of 0.25 m, the box's edge at 0.5 m. Moved by
-  // a quarter of a pixel, a quarter of the pixels along the edge is covered.
+  // 8 pixels over 2 m from 10 m above, by parallel rays: pixels of 0.25 m, the box's edge at 0.5 m.
+  // Moved by a quarter of a pixel, a quarter of the pixels along the edge is covered.
   for (const bool rows : {false, true}) {
     const double shift = 0.0625;
     const Picture p = s.take({rows ? 0 : shift, rows ? shift : 0, 10}, {1, 0, 0}, {0, 1, 0},
@@ -286,7 +288,8 @@ TEST(Window, WhatReachesBehindTheCameraIsSeenWhole) {
       -.1 -20 .1 .1 -20 .1 -.1 20 .1 .1 20 .1"/></asset><worldbody><geom pos=".5 0 0" rgba="1 1 1 1" )" +
              shape + "/></worldbody>");
     const Picture p = s.take({0, 0, 0}, {1, 0, 0}, {0, 0, 1}, grid_from_fovy(64, 64, 90, false));
-    // The beam's near side is at x = 0.4: it fills the row of the horizon from 0.4 / 20 to the right border.
+    // The beam's near side is at x = 0.4: it fills the row of the horizon from 0.4 / 20 to the
+    // right border.
     for (const int x : {36, 45, 55, 63}) EXPECT_EQ(p.id(x, 32), 0) << shape << " " << x;
     for (const int x : {0, 20, 31}) EXPECT_EQ(p.id(x, 32), -1) << shape << " " << x;
     EXPECT_EQ(p.id(40, 5), -1) << shape;
@@ -313,7 +316,8 @@ TEST(Window, OfParallelRaysDoesNotShrink) {
   }
 }
 
-// What stands still is kept; what moves over it, its shadow, and anything that is not as it was are drawn.
+// What stands still is kept; what moves over it, its shadow, and anything that is not as it was are
+// drawn.
 TEST(FixedLayer, IsUsedWhereNothingOfItHasChanged) {
   Studio s(std::string(kDark) + kMatte + R"(<worldbody>
     <light pos="0 0 3" dir="0 0 -1" cutoff="80" exponent="0" diffuse="1 1 1" specular="0 0 0"/>

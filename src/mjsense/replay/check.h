@@ -33,7 +33,8 @@ struct VerifyOptions {
 
 // Structure, names and types; equal lengths; every JSON row parses; every video exists and has T
 // frames of the stated size.
-VerifyResult verify(const std::filesystem::path& path, const VerifyOptions& options = {});
+[[nodiscard]] VerifyResult verify(const std::filesystem::path& path,
+                                  const VerifyOptions& options = {});
 
 struct RepairResult {
   std::vector<std::string> actions;  // what was done, one sentence each
@@ -67,10 +68,11 @@ struct InspectResult {
   std::string json() const;
 };
 
-InspectResult inspect(const std::filesystem::path& path);
+[[nodiscard]] InspectResult inspect(const std::filesystem::path& path);
 
-// A PNG with one row of pictures per camera and episode (the first `episodes`), `columns` moments from first to last frame.
-// Returns how many episodes it shows, as it says in its first line: "4 of 8 episodes".
+// A PNG with one row of pictures per camera and episode (the first `episodes`), `columns` moments
+// from first to last frame. Returns how many episodes it shows, as it says in its first line: "4 of
+// 8 episodes".
 std::string contact_sheet(const std::filesystem::path& path, const std::filesystem::path& png,
                           int episodes = 4, int columns = 8, const std::string& ffmpeg = "");
 

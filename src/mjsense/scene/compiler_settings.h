@@ -18,9 +18,9 @@ namespace mjsense {
 // discardvisual, fitaabb, lengthrange.
 std::vector<std::string> whole_model_settings(const mjSpec* spec);
 
-// The model as its own compilation makes it, in numbers, without such settings: attached, it is what
-// it is alone. Named elements keep their names. Throws ValueError, or RuntimeError for what MJCF
-// cannot say; both start with `place`.
+// The model as its own compilation makes it, in numbers, without such settings: attached, it is
+// what it is alone. Named elements keep their names. Throws ValueError, or RuntimeError for what
+// MJCF cannot say; both start with `place`.
 SpecPtr apply_whole_model_settings(SpecPtr spec, const Vfs& vfs, std::string_view place);
 
 }  // namespace mjsense

@@ -34,7 +34,8 @@ constexpr const char* kObj =
     "v 0 0 0\nv 1 0 0\nv 0 2 0\nv 0 0 3\nf 1 3 2\nf 1 2 4\nf 2 3 4\nf 1 4 3\n";
 
 // A floating base with a welded head, a light arm with a muscle, geoms for looks only, a mesh and a
-// box fitted to it. Inertias on the arm and the tip need no balancing, unless the setting makes it so.
+// box fitted to it. Inertias on the arm and the tip need no balancing, unless the setting makes it
+// so.
 std::string robot(const std::string& compiler) {
   return fmt::format(R"(<mujoco><compiler {}/>
     <option timestep=".01"/>

@@ -225,7 +225,8 @@ TEST(RoundTrip, GeneratedTerrain) {
   expect_round_trip(Scene(std::move(cfg)));
 }
 
-// Every model below the folders MJSENSE_TEST_MODELS (separated by ':') that MuJoCo itself loads, twice in one scene.
+// Every model below the folders MJSENSE_TEST_MODELS (separated by ':') that MuJoCo itself loads,
+// twice in one scene.
 TEST(RoundTrip, ModelsOfFolders) {
   const char* folders = std::getenv("MJSENSE_TEST_MODELS");
   if (!folders) GTEST_SKIP() << "MJSENSE_TEST_MODELS is not set";

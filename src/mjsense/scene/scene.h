@@ -22,9 +22,9 @@
 namespace mjsense {
 
 struct SceneCfg {
-  // A whole model to start from, as it is: names without a prefix, any number of free joints, its own
-  // options unless `options` are set. Its sensors are discovered; it is no entity. Empty: an empty
-  // world.
+  // A whole model to start from, as it is: names without a prefix, any number of free joints, its
+  // own options unless `options` are set. Its sensors are discovered; it is no entity. Empty: an
+  // empty world.
   ModelSource base;
   // Attached next, without a prefix.
   std::optional<TerrainCfg> terrain;
@@ -37,8 +37,8 @@ struct SceneCfg {
   // Called last, before compilation; sensors that it adds are not discovered.
   std::function<void(mjSpec*)> spec_fn;
   // Spec that the scene is built in (its contents are the base) and that must live as long as the
-  // scene; null: one of the scene's own. The Python package passes its MjSpec's, so that spec_fn sees
-  // the real thing.
+  // scene; null: one of the scene's own. The Python package passes its MjSpec's, so that spec_fn
+  // sees the real thing.
   mjSpec* spec = nullptr;
 };
 template <class V>
@@ -99,7 +99,7 @@ class Scene {
 
   // The sensors hold the rows of one simulation at a time: this scene is taken until the result is
   // destroyed. Throws RuntimeError if it is taken.
-  std::shared_ptr<void> claim();
+  [[nodiscard]] std::shared_ptr<void> claim();
 
   const std::vector<Entity>& entities() const;        // the terrain, if any, first
   const Entity& entity(std::string_view name) const;  // throws KeyError with the nearest names

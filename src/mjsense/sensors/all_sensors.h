@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
-// The sensors there are. What stands here is known to Python, to the documentation, and to the tests
-// that hold for every sensor.
+// The sensors there are. What stands here is known to Python, to the documentation, and to the
+// tests that hold for every sensor.
 
 #include <span>
 

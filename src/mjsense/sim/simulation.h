@@ -73,7 +73,7 @@ class Simulation {
   void refresh(std::span<Sensor* const> sensors, WorldIds ids = all_worlds);
   // What these sensors show of one world as it is now, to be seen by a human; empty: those with
   // debug_vis. Drawing does not count as reading.
-  DebugShapes draw(int world, std::span<Sensor* const> sensors = {});
+  [[nodiscard]] DebugShapes draw(int world, std::span<Sensor* const> sensors = {});
   // State was changed in a way that only the caller knows.
   void invalidate(WorldIds ids = all_worlds);
 

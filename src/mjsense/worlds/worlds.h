@@ -92,7 +92,7 @@ class Worlds {
   std::int64_t substeps(int world) const { return clocks_[world].substep; }
   double time(int world) const;
   // The ids in order, all of them written out. Throws ValueError for one out of range or given twice.
-  std::vector<int> checked_ids(WorldIds ids) const;
+  [[nodiscard]] std::vector<int> checked_ids(WorldIds ids) const;
   void checked_ids(WorldIds ids, std::vector<int>& sorted) const;  // into a buffer
 
  private:

@@ -124,8 +124,8 @@ void drive(Worlds& worlds, int step) {
 
 class Integrators : public ::testing::TestWithParam<std::tuple<const char*, bool, int>> {};
 
-// Taken apart and reused, whatever is read when, the stages give the states of plain mj_step bit for
-// bit, and the sensors of mj_forward there.
+// Taken apart and reused, whatever is read when, the stages give the states of plain mj_step bit
+// for bit, and the sensors of mj_forward there.
 TEST_P(Integrators, EqualTheNaiveLoopBitForBitAndAreFresh) {
   const auto [integrator, every, decimation] = GetParam();
   const ModelPtr m = load(integrator);
@@ -380,8 +380,8 @@ constexpr char kHand[] = R"(
   <sensor><framepos objtype="body" objname="hand"/><framequat objtype="body" objname="hand"/></sensor>
 </mujoco>)";
 
-// Whatever part of the state is written between two steps, the next step is that of a mjData in which
-// the same was written.
+// Whatever part of the state is written between two steps, the next step is that of a mjData in
+// which the same was written.
 TEST(Worlds, EveryPartOfTheStateMayBeWrittenBetweenSteps) {
   char error[512] = "";
   mjSpec* spec = mj_parseXMLString(kHand, nullptr, error, sizeof error);

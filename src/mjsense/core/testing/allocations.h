@@ -1,7 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
-// Counts heap allocations of this process (all threads) made through operator new. For tests only: including this header
-// replaces the global operator new (weakly, so that several files of a test program may).
+// Counts heap allocations of this process (all threads) made through operator new. For tests only:
+// including this header replaces the global operator new (weakly, so that several files of a test
+// program may).
 
 #include <atomic>
 #include <cstdlib>
@@ -22,7 +23,8 @@ class AllocationCount {
 
 }  // namespace mjsense
 
-// The address sanitiser has an operator new of its own, which finds more than a count: there nothing is counted.
+// The address sanitiser has an operator new of its own, which finds more than a count: there
+// nothing is counted.
 #ifndef __SANITIZE_ADDRESS__
 
 #pragma GCC diagnostic push

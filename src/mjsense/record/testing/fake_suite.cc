@@ -6,6 +6,7 @@
 #include <cmath>
 #include <functional>
 #include <limits>
+#include <stdexcept>
 
 #include "mjsense/core/error.h"
 #include "mjsense/core/json.h"
@@ -61,10 +62,10 @@ SensorSpec dict_spec(int size) {
 using WriteJson = std::function<void(JsonWriter&, const Moment&)>;
 
 std::unique_ptr<FakeSensor> dict(const std::string& name, int size, int worlds, WriteJson write) {
-  auto sensor = std::make_unique<FakeSensor>(name, [write](FakeSensor& s, const Moment& m) {
+  auto sensor = std::make_unique<FakeSensor>(name, [write, name](FakeSensor& s, const Moment& m) {
     JsonWriter json(s.row<std::uint8_t>(0, m.world));
     write(json, m);
-    json.finish();
+    if (!json.finish()) throw std::logic_error(name + ": the text does not fit");
   });
   sensor->declare("", dict_spec(size), worlds);
   return sensor;

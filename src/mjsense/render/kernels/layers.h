@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
-// What lies before and inside the opaque surfaces of a packet: transparent geoms, reflections. Part of
-// the tile kernels.
+// What lies before and inside the opaque surfaces of a packet: transparent geoms, reflections. Part
+// of the tile kernels.
 
 #include "mjsense/render/kernels/fixed.h"
 #include "mjsense/render/kernels/shade.h"

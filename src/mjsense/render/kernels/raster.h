@@ -1,12 +1,12 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
-// Triangles drawn into a tile, where it has more pixels than the shape has triangles: each is set up
-// once for the tile instead of being met by every packet of rays. Part of the tile kernels.
+// Triangles drawn into a tile, where it has more pixels than the shape has triangles: each is set
+// up once for the tile instead of being met by every packet of rays. Part of the tile kernels.
 //
-// With corners c0 c1 c2 in the camera's frame, the ray d = (x, y, -1) of a pixel passes inside the edge
-// from c1 to c2 where d . (c2 - c1) x (c2 + c1) >= 0 (Pluecker's test): a linear function of x and y,
-// exactly opposite for the neighbour across the edge, so that nothing shows between them. 1 / t is
-// linear too: d . N / (c0 . N) with N = (c1 - c0) x (c2 - c0).
+// With corners c0 c1 c2 in the camera's frame, the ray d = (x, y, -1) of a pixel passes inside the
+// edge from c1 to c2 where d . (c2 - c1) x (c2 + c1) >= 0 (Pluecker's test): a linear function of x
+// and y, exactly opposite for the neighbour across the edge, so that nothing shows between them. 1
+// / t is linear too: d . N / (c0 . N) with N = (c1 - c0) x (c2 - c0).
 
 #include "mjsense/render/kernels/trace.h"
 
@@ -98,7 +98,8 @@ inline Float linear(const float (*f)[kClusterSize], int lane, Float x, Float y) 
   return fma(splat(f[0][lane]), x, fma(splat(f[1][lane]), y, splat(-f[2][lane])));
 }
 
-// Lanes of a packet that see triangle `lane` of the block as the nearest so far, written to its hits.
+// Lanes of a packet that see triangle `lane` of the block as the nearest so far, written to its
+// hits.
 inline bool draw(const ViewGeom& g, int index, const Drawn& drawn, int lane, int face, bool shaded,
                  const Pixels& pixels, Hits& h) {
   bool changed = false;

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
-// From surfaces to colours: MuJoCo's classic light model (OpenGL's fixed function, evaluated at every
-// pixel). Part of the tile kernels.
+// From surfaces to colours: MuJoCo's classic light model (OpenGL's fixed function, evaluated at
+// every pixel). Part of the tile kernels.
 //
 //   base    clamp(emission + sum over lights without shadows)
 //   light   attenuation * spot * (ambient + diffuse + specular)
@@ -106,8 +106,8 @@ inline void add_light(const ViewLight& light, const Lit& lit, const Surfaces& s,
   }
 }
 
-// What casts shadows on a tile, by light. In a layered view fixed lanes of a packet know already where
-// fixed geoms leave them in the dark.
+// What casts shadows on a tile, by light. In a layered view fixed lanes of a packet know already
+// where fixed geoms leave them in the dark.
 struct Shadows {
   Casters fixed[View::kMaxLights], moving[View::kMaxLights];  // not layered: all are moving
   const FixedTile* known = nullptr;

@@ -14,8 +14,8 @@ struct alignas(64) LightRays {
   int geom[kLanes];
 };
 
-// What lies between points around `center` and a light: all within `radius` of center + s axis, s in
-// [0, longest].
+// What lies between points around `center` and a light: all within `radius` of center + s axis, s
+// in [0, longest].
 struct Shaft {
   float center[3], axis[3];
   float radius, longest;
@@ -70,8 +70,8 @@ inline bool meets_box(const Shaft& shaft, const ViewGeom& g) {
   return enter <= exit;
 }
 
-// Rays from on or above a height field that climb more steeply than it does anywhere: they do not come
-// back to it.
+// Rays from on or above a height field that climb more steeply than it does anywhere: they do not
+// come back to it.
 inline Mask leaves_ground(const HeightField& field, Vec3f o, Vec3f d, Mask on_ground) {
   const Float level = sqrt(fma(d.x, d.x, d.y * d.y));
   return (on_ground | (splat(field.top) <= o.z)) & (level * splat(1.01f * field.steepest) < d.z);

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
-// What lies behind the opaque surfaces of a packet: the sky, and the haze before it. Part of the tile
-// kernels.
+// What lies behind the opaque surfaces of a packet: the sky, and the haze before it. Part of the
+// tile kernels.
 
 #include "mjsense/render/kernels/shade.h"
 
@@ -32,9 +32,9 @@ inline void shade_background(const View& view, const Pixels& pixels, std::uint32
   }
 }
 
-// MuJoCo's sky hangs on a cylinder around the camera, and on what it hides haze lies: the inside of a
-// cone that rises from the plane at 1 - width of the cylinder's radius to its rim at the height of
-// the camera. Densest where the plane meets the cylinder, it fades towards both borders.
+// MuJoCo's sky hangs on a cylinder around the camera, and on what it hides haze lies: the inside of
+// a cone that rises from the plane at 1 - width of the cylinder's radius to its rim at the height
+// of the camera. Densest where the plane meets the cylinder, it fades towards both borders.
 inline void add_haze(const View& view, const Pixels& pixels, const Hits& hits, Colors& out) {
   const View::Haze& haze = view.haze;
   const Float zero = splat(0.0f), one = splat(1.0f), distance = splat(view.sky_distance);

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
-// The surfaces that the pixels of a packet show: points, normals, materials, textures. Part of the tile
-// kernels.
+// The surfaces that the pixels of a packet show: points, normals, materials, textures. Part of the
+// tile kernels.
 
 #include "mjsense/render/kernels/texture.h"
 

@@ -146,8 +146,8 @@ inline Coordinates box_uv(const ViewGeom& g, Vec3f p, Vec3f n) {
           ky};
 }
 
-// Coordinates of MuJoCo's curved primitives: p on the surface, geom frame. `per_meter`: how fast they
-// change, at most.
+// Coordinates of MuJoCo's curved primitives: p on the surface, geom frame. `per_meter`: how fast
+// they change, at most.
 inline void curved_uv(const ViewGeom& g, const float* p, const float* n, float& u, float& v,
                       float& per_meter_u, float& per_meter_v) {
   const float* s = g.size;

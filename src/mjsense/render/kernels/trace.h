@@ -54,8 +54,8 @@ inline PacketMask packets_in_reach(const float* window, float nearest, const Til
   return packets;
 }
 
-// What stays the same from packet to packet while one geom is traced. Packets are independent of each
-// other, so that the CPU works on several at once.
+// What stays the same from packet to packet while one geom is traced. Packets are independent of
+// each other, so that the CPU works on several at once.
 struct Tracing {
   const ViewGeom& geom;
   int index;  // of the geom in the view

@@ -1,7 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
-// MuJoCo's own OpenGL renderer, offscreen, as a reference: for comparing pictures, and for those who want exactly its look.
-// Present when the library was built with MJSENSE_OPENGL; needs libEGL and a driver (Mesa's llvmpipe does) at run time.
+// MuJoCo's own OpenGL renderer, offscreen, as a reference: for comparing pictures, and for those
+// who want exactly its look. Present when the library was built with MJSENSE_OPENGL; needs libEGL
+// and a driver (Mesa's llvmpipe does) at run time.
 
 #include <mujoco/mujoco.h>
 
@@ -36,8 +37,8 @@ class GlRenderer {
   virtual ~GlRenderer() = default;
   // Takes the world's own colours, materials, sizes, lights and field of view. Worlds in parallel.
   virtual void remember(int world, const mjModel* model) = 0;
-  // Fills rgb, depth (planar) and segmentation of `targets`; poses as `state` has them, markers as given,
-  // the rest as remembered.
+  // Fills rgb, depth (planar) and segmentation of `targets`; poses as `state` has them, markers as
+  // given, the rest as remembered.
   virtual void render(int world, const RayWorld& state, std::span<const mjvGeom> markers,
                       const ImageTargets& targets) = 0;
 };

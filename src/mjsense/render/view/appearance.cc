@@ -51,8 +51,8 @@ void Appearance::copy(const mjModel* m) {
   copy_lights(m);
 }
 
-// MuJoCo gives each light that is on a place, the headlight the first, and OpenGL has so many; image lights
-// take one and show nothing.
+// MuJoCo gives each light that is on a place, the headlight the first, and OpenGL has so many;
+// image lights take one and show nothing.
 void Appearance::copy_lights(const mjModel* m) {
   num_lights_ = 0;
   int places = 0;

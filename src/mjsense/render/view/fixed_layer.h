@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
-// What a camera that stands still sees of geoms that stand still, which of it lies in their shadow, and
-// its colours where nothing that moves casts one: found once, kept, and used for every image and world in
-// which none of it has changed. Images are the same with and without it, bit for bit: kernels always draw
-// the fixed part first.
+// What a camera that stands still sees of geoms that stand still, which of it lies in their shadow,
+// and its colours where nothing that moves casts one: found once, kept, and used for every image
+// and world in which none of it has changed. Images are the same with and without it, bit for bit:
+// kernels always draw the fixed part first.
 
 #include <mujoco/mujoco.h>
 
@@ -13,8 +13,9 @@
 
 namespace mjsense {
 
-// Bodies that stand still between resets: without a joint up to the world. A mocap body with children is
-// the base of something and counts as such; one without is a target or marker, and moves.
+// Bodies that stand still between resets: without a joint up to the world. A mocap body with
+// children is the base of something and counts as such; one without is a target or marker, and
+// moves.
 bool is_fixed_body(const mjModel* model, int body);
 
 class FixedLayer {

@@ -46,8 +46,8 @@ Between between(int i, int size, int half) {
   return {first, std::min(first + 1, size - 1), x - static_cast<float>(first)};
 }
 
-// The next level of one image, interpolated at its texels' centres as OpenGL drivers do: the mean of
-// 2 x 2 where sizes are even; where they are odd nothing drifts and no border is lost.
+// The next level of one image, interpolated at its texels' centres as OpenGL drivers do: the mean
+// of 2 x 2 where sizes are even; where they are odd nothing drifts and no border is lost.
 void halve(const std::uint32_t* src, int width, int height, std::uint32_t* dst, int w2, int h2) {
   for (int y = 0; y < h2; ++y) {
     const Between v = between(y, height, h2);

@@ -12,10 +12,10 @@
 
 namespace mjsense {
 
-// A pyramid of images, RGBA8, in one array: level 0 first, row 0 first; a cube map has its six faces
-// (+x -x +y -y +z -z) one after another in each level. Each row ends with a texel more, what lies right
-// of its last (the first of a 2D texture, which repeats; the last of a cube's face): kernels read
-// neighbours in pairs. Tables by level, for gathering.
+// A pyramid of images, RGBA8, in one array: level 0 first, row 0 first; a cube map has its six
+// faces (+x -x +y -y +z -z) one after another in each level. Each row ends with a texel more, what
+// lies right of its last (the first of a 2D texture, which repeats; the last of a cube's face):
+// kernels read neighbours in pairs. Tables by level, for gathering.
 struct Texture {
   static constexpr int kMaxLevels = 15;
   bool cube = false;

@@ -8,7 +8,8 @@ namespace {
 
 constexpr int kCatenaryPoints = 100;  // MuJoCo draws no more
 
-// What mjv_addGeoms() can make, at most, of all sites and tendons, and of slider-cranks, which come along.
+// What mjv_addGeoms() can make, at most, of all sites and tendons, and of slider-cranks, which come
+// along.
 std::size_t most_geoms(const mjModel* m, const MarkerOptions& options) {
   std::size_t most = options.site_groups ? m->nsite : 0;
   for (int i = 0; options.tendon_groups && i < m->ntendon; ++i) {

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
-// Sites and tendons of one world as MuJoCo's visualiser makes them: a site is the shape that it has, a
-// tendon a chain of capsules along its path, hanging through where it is a slack string.
+// Sites and tendons of one world as MuJoCo's visualiser makes them: a site is the shape that it
+// has, a tendon a chain of capsules along its path, hanging through where it is a slack string.
 
 #include <mujoco/mujoco.h>
 
@@ -30,7 +30,8 @@ class Markers {
  public:
   // Without groups there are none, and nothing costs memory or time.
   Markers(const mjModel* model, const MarkerOptions& options);
-  // Takes those of the world as they are now; its kinematics and tendons are up to date. No allocation.
+  // Takes those of the world as they are now; its kinematics and tendons are up to date. No
+  // allocation.
   void copy(const mjModel* model, mjData* data);
 
   std::span<const Marker> all() const { return {markers_.data(), count_}; }

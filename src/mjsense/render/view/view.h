@@ -91,8 +91,8 @@ struct View {
   ViewLight lights[kMaxLights];
   int num_lights = 0;
   bool shadows = false;
-  // Fixed geoms are drawn first, for themselves. `fixed`: the image's tiles of them, row by row, if they
-  // are known.
+  // Fixed geoms are drawn first, for themselves. `fixed`: the image's tiles of them, row by row, if
+  // they are known.
   bool layered = false;
   const FixedTile* fixed = nullptr;
   const int* index_of_id = nullptr;  // of geoms in sight, in `geoms`
@@ -107,8 +107,8 @@ struct View {
     float rgb[3];
   } haze;
   float sky_from = 0;  // planar m: what is nearer is neither hidden nor hazy
-  // The first geom that reflects, in sight or not: -1 if there is none. What it shows is the scene as a
-  // camera behind it sees it through it, added to its own colour.
+  // The first geom that reflects, in sight or not: -1 if there is none. What it shows is the scene
+  // as a camera behind it sees it through it, added to its own colour.
   int mirror = -1;  // geom id
   const View* reflection = nullptr;
 };
@@ -127,9 +127,9 @@ struct ImageTargets {
 
 inline constexpr int kTileSize = 16;  // pixels; a tile is 4 x 4 packets of 4 x 4 pixels
 
-// What a tile shows of the fixed geoms: Hits by packet, the lanes of each packet that a light does not
-// reach, because a fixed geom stands in its way or the surface is turned away, and the colours where
-// nothing else casts a shadow.
+// What a tile shows of the fixed geoms: Hits by packet, the lanes of each packet that a light does
+// not reach, because a fixed geom stands in its way or the surface is turned away, and the colours
+// where nothing else casts a shadow.
 struct alignas(64) FixedTile {
   static constexpr int kPixels = kTileSize * kTileSize;
   float t[kPixels], u[kPixels], v[kPixels], n[3][kPixels];

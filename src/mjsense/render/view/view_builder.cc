@@ -35,7 +35,8 @@ void set_primitive(int type, int object, int object_id, ViewGeom& g) {
   g.height_field = nullptr;
 }
 
-// The size by which MuJoCo's visualiser scales a shape along its axes, and with texuniform its texture.
+// The size by which MuJoCo's visualiser scales a shape along its axes, and with texuniform its
+// texture.
 std::array<float, 3> drawn_extent(const ViewGeom& g) {
   const float* s = g.size;
   switch (g.type) {

@@ -6,8 +6,8 @@
 
 namespace mjsense {
 
-// Fills center, radius, window and nearest of `g`, whose pose and box are known. False: none of it can be in
-// the image of view.grid between view.near and view.far.
+// Fills center, radius, window and nearest of `g`, whose pose and box are known. False: none of it
+// can be in the image of view.grid between view.near and view.far.
 bool find_window(const View& view, ViewGeom& g);
 
 }  // namespace mjsense

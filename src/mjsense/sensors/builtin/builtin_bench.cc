@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// What a built-in sensor costs beyond MuJoCo's own computation: the copy of its row, beside a physics step of the same model.
+// What a built-in sensor costs beyond MuJoCo's own computation: the copy of its row, beside a
+// physics step of the same model.
 
 #include <benchmark/benchmark.h>
 

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
-// For tests: one built-in sensor of every type, as XML and as configuration, on a robot that has one of everything.
+// For tests: one built-in sensor of every type, as XML and as configuration, on a robot that has
+// one of everything.
 
 #include <fmt/format.h>
 

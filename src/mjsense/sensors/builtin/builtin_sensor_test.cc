@@ -87,8 +87,8 @@ void disturb(mjSpec* spec, int seed) {
   }
 }
 
-// Configured sensors, discovered ones, and MuJoCo alone on the same XML: the same numbers, on random
-// robots in random states.
+// Configured sensors, discovered ones, and MuJoCo alone on the same XML: the same numbers, on
+// random robots in random states.
 TEST(BuiltinSensor, EveryTypeAgreesWithMujoco) {
   const std::vector<Case> cases = all_cases();
   std::string sensors;
@@ -296,8 +296,8 @@ TEST(BuiltinSensor, HistoryIsNewestFirst) {
   }
 }
 
-// Through a simulation: after each control step the rows are those of a plain mj_step loop, made current by mj_forward.
-// Delays and intervals too, which live in MuJoCo's history buffer.
+// Through a simulation: after each control step the rows are those of a plain mj_step loop, made
+// current by mj_forward. Delays and intervals too, which live in MuJoCo's history buffer.
 TEST(BuiltinSensor, SimulationShowsTheFreshState) {
   const std::vector<Case> cases = all_cases();
   std::string sensors;

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Cameras that stand inside a housing: with clip_near "model" they see out of it as MuJoCo's renderer does.
+// Cameras that stand inside a housing: with clip_near "model" they see out of it as MuJoCo's
+// renderer does.
 
 #include <gtest/gtest.h>
 
@@ -14,8 +15,8 @@
 namespace mjsense {
 namespace {
 
-// A lens of 3 cm and a shell around it, of a mesh and of shapes that cut through the near plane, 4 cm
-// away; things outside, some of which move.
+// A lens of 3 cm and a shell around it, of a mesh and of shapes that cut through the near plane, 4
+// cm away; things outside, some of which move.
 constexpr char kHousing[] = R"(<mujoco><statistic extent="2" center="0 0 0"/>
   <visual><map znear="0.02"/><quality numslices="60" numstacks="60" shadowsize="1024"/></visual>
   <asset><mesh name="shell" vertex="-.05 -.05 .02  .05 -.05 .02  0 .06 .02  -.05 -.05 -.03  .05 -.05 -.03  0 .06 -.03"/>

@@ -19,8 +19,8 @@ namespace {
 constexpr int kWidth = 40, kHeight = 30;
 constexpr double kFocal = 15;  // pixels: 90 degrees high
 
-// A camera 2 m before a wall, on three slides and a ball joint, looking along -z at a plate 1 m away
-// on a slide of its own. There is no gravity: nothing moves unless its pose is written.
+// A camera 2 m before a wall, on three slides and a ball joint, looking along -z at a plate 1 m
+// away on a slide of its own. There is no gravity: nothing moves unless its pose is written.
 constexpr char kWorld[] = R"(
 <mujoco>
   <worldbody>

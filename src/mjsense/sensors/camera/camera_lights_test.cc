@@ -20,7 +20,8 @@ CameraSensorCfg one_pixel(int max_lights) {
   return cfg;
 }
 
-// Red of a white floor under twelve lights, each of which adds 5 % of full white; so does the headlight.
+// Red of a white floor under twelve lights, each of which adds 5 % of full white; so does the
+// headlight.
 int brightness(int max_lights, const std::string& head, const std::string& first = "") {
   std::string lights = first;
   for (int i = 0; i < 12; ++i)

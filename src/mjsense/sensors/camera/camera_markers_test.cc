@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Sites and tendons in images: what MuJoCo's visualiser makes of them, and nothing unless asked for.
+// Sites and tendons in images: what MuJoCo's visualiser makes of them, and nothing unless asked
+// for.
 
 #include <gtest/gtest.h>
 
@@ -15,8 +16,8 @@
 namespace mjsense {
 namespace {
 
-// Sites of every shape on bodies that move; tendons over a sphere, through a cylinder, over a pulley, at
-// their limit, and a slack string.
+// Sites of every shape on bodies that move; tendons over a sphere, through a cylinder, over a
+// pulley, at their limit, and a slack string.
 constexpr char kScene[] = R"(<mujoco>
   <visual><quality numslices="60" numstacks="60" shadowsize="1024"/></visual><statistic extent="2" center="0 0 0"/>
   <asset><texture name="t" type="2d" builtin="checker" rgb1=".8 .2 .2" rgb2=".2 .2 .8" width="64" height="64"/>

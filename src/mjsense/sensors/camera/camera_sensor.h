@@ -43,7 +43,6 @@ class CameraSensor final : public Sensor {
   void draw(const World& world, DebugShapes& shapes) override;
 
   const CameraSensorCfg& cfg() const { return cfg_; }
-  int camera_id() const { return camera_; }
 
  private:
   struct Workspace;

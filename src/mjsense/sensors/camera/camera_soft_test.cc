@@ -148,8 +148,8 @@ TEST(CameraFlex, GroupsAndAlphaHideIt) {
   EXPECT_EQ(studio.image<std::int32_t>("segmentation")[2 * pixel(4, 4, 8)], 0);
 }
 
-// Light comes from the upper left: the cloth's shadow lies on the floor to its right, a ball's on the
-// cloth.
+// Light comes from the upper left: the cloth's shadow lies on the floor to its right, a ball's on
+// the cloth.
 TEST(CameraFlex, ClothCastsAndReceivesShadows) {
   const TestModel m(scene(
       kCloth,

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Where a texture lies on every shape, against MuJoCo's own renderer: 2D and cube, per object and per
-// metre, repeated and not.
+// Where a texture lies on every shape, against MuJoCo's own renderer: 2D and cube, per object and
+// per metre, repeated and not.
 
 #include <gtest/gtest.h>
 

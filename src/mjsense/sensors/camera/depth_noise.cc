@@ -32,8 +32,8 @@ Run run_of(double before, double z, double after) {
 }  // namespace
 
 StereoCamera stereo_preset(DepthNoise noise) {
-  // Baselines and ranges of the data sheets; 0.08 pixels of disparity noise give their accuracy figures (2% at 2 m and
-  // 0.5 m with margin).
+  // Baselines and ranges of the data sheets; 0.08 pixels of disparity noise give their accuracy
+  // figures (2% at 2 m and 0.5 m with margin).
   if (noise == DepthNoise::kD405) return {0.018, 848, 0.08, 0.07, 2.0, 0.5, 0.7, 6};
   return {0.050, 848, 0.08, 0.195, 10.0, 0.5, 0.7, 6};
 }

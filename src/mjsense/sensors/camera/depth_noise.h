@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
-// What a stereo depth camera makes of true depth. With focal length f (native pixels) and baseline b:
+// What a stereo depth camera makes of true depth. With focal length f (native pixels) and baseline
+// b:
 //   measured  disparity = f b / z + noise, rounded to 1/32 pixel; z = f b / disparity. So its spread
 //             grows with z^2.
 //   lost      what is measured nearer than the camera can match or farther than it is sold for; some

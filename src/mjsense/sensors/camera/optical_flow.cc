@@ -93,8 +93,8 @@ bool OpticalFlow::project(const PixelGrid& grid, const double p[3], double uv[2]
   return true;
 }
 
-// One row's pixels [begin, end) of a body, by what the general way below comes to for a pinhole: all
-// is linear in depth and in x.
+// One row's pixels [begin, end) of a body, by what the general way below comes to for a pinhole:
+// all is linear in depth and in x.
 void OpticalFlow::follow_pinhole(const PerWorld& w, const Move& move, int y, int begin, int end,
                                  const float* depth, float* flow) const {
   const PixelGrid &now = w.now.grid, &before = w.before.grid;

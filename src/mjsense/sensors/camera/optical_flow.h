@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 // Optical flow from poses: where the surface point that a pixel sees was in the camera's previous
-// image. Exact for rigid bodies, moving or not; the point is followed whether it was visible then or
-// not.
+// image. Exact for rigid bodies, moving or not; the point is followed whether it was visible then
+// or not.
 
 #include <mujoco/mujoco.h>
 
@@ -31,10 +31,10 @@ class OpticalFlow {
 
   // The next image of this world is the first of its episode: nothing moves in it.
   void reset(int world) { worlds_[world].any = false; }
-  // An image of the world as it is now is taken along the rays of `grid`. It follows the one before,
-  // or replaces that if it was taken at the same time (after forward()). As long as no step was taken
-  // since the reset, when poses are written by hand, every image follows the one before it; of a
-  // clocked camera, every one is a first image. No allocation.
+  // An image of the world as it is now is taken along the rays of `grid`. It follows the one
+  // before, or replaces that if it was taken at the same time (after forward()). As long as no step
+  // was taken since the reset, when poses are written by hand, every image follows the one before
+  // it; of a clocked camera, every one is a first image. No allocation.
   void take(const World& world, const PixelGrid& grid);
 
   // Buffers of this thread for what write() needs and `targets` lacks.
@@ -51,8 +51,8 @@ class OpticalFlow {
     std::vector<Pose> bodies;  // X_WB [nbody]
     PixelGrid grid;
   };
-  // p in the camera frame of the previous image = r p in that of the present one + t, for the points
-  // of a body.
+  // p in the camera frame of the previous image = r p in that of the present one + t, for the
+  // points of a body.
   struct Move {
     double r[9], t[3];
     bool still;  // nothing has moved: flow is 0 to the last bit

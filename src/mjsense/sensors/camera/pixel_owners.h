@@ -12,8 +12,8 @@
 
 namespace mjsense {
 
-// The body that carries an object of segmentation; -1: nothing is there, or many carry it (flexes, skins,
-// tendons).
+// The body that carries an object of segmentation; -1: nothing is there, or many carry it (flexes,
+// skins, tendons).
 int body_of(const mjModel* model, int object, int id);
 
 class PixelOwners {

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Cost of contact sensing in one world: ours (one pass for all sensors), and MuJoCo's own contact sensors
-// for the same content (one a primary, all fields packed). Report CPU time a world-step.
+// Cost of contact sensing in one world: ours (one pass for all sensors), and MuJoCo's own contact
+// sensors for the same content (one a primary, all fields packed). Report CPU time a world-step.
 
 #include <benchmark/benchmark.h>
 #include <fmt/format.h>

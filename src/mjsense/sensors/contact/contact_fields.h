@@ -11,8 +11,8 @@
 
 namespace mjsense {
 
-// Index of the first value of a field (also normal_force, friction_force) in a ContactReading seen as
-// doubles; -1 for found, which is not in it.
+// Index of the first value of a field (also normal_force, friction_force) in a ContactReading seen
+// as doubles; -1 for found, which is not in it.
 int contact_field_offset(std::string_view field);
 
 inline const double* contact_values(const ContactReading& reading, int offset) {

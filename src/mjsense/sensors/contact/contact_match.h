@@ -44,7 +44,8 @@ void visit_fields(V& v, ContactMatch& c) {
     "expression that is searched.");
 }
 
-// Throw ValueError for what is wrong in any model. `place` starts the message: "sensor 'feet': primary".
+// Throw ValueError for what is wrong in any model. `place` starts the message: "sensor 'feet':
+// primary".
 void validate(const ContactMatch& match, std::string_view place);
 void validate_primary(const ContactMatch& match, std::string_view place);
 void validate_secondary(const ContactMatch& match, ContactPolicy policy, std::string_view place);

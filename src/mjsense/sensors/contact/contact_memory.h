@@ -48,12 +48,11 @@ class ContactMemory {
   bool strike(int world, int primary, double force_norm);
   void set_peak(int world, int primary, const ContactReading& reading);
 
-  void begin_control_step(int world) { substep_[world] = 0; }
   void reset(int world);
 
  private:
-  // An episode's first substep is where its phases begin: what is there then neither touched down nor
-  // lifted off, whatever state was written after the reset.
+  // An episode's first substep is where its phases begin: what is there then neither touched down
+  // nor lifted off, whatever state was written after the reset.
   enum class Touch : std::uint8_t { kUnknown, kAir, kContact };
 
   void clear_step(int world);

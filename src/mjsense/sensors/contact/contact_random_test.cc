@@ -201,8 +201,8 @@ bool belongs(const mjModel* m, int geom, ContactMode mode, const std::string& na
   }
 }
 
-// One element of the matrix by its definition: +1 if the contact is the primary's with the secondary
-// as geom 2, -1 as geom 1, the first where it is both; 0 if it is none of theirs.
+// One element of the matrix by its definition: +1 if the contact is the primary's with the
+// secondary as geom 2, -1 as geom 1, the first where it is both; 0 if it is none of theirs.
 int direction(const mjModel* m, const mjContact& c, ContactMode primary_mode,
               const std::string& primary, ContactMode secondary_mode,
               const std::string& secondary) {

@@ -170,12 +170,4 @@ std::span<const double> ContactReducer::pair_force(int world) const {
   return {pair_force_.data() + world * n, n};
 }
 
-std::size_t ContactReducer::bytes_per_world() const {
-  const std::size_t worlds = num_touched_.size();
-  const std::size_t total = sizeof(int) * (touched_.size() + count_.size() + pair_count_.size()) +
-                            sizeof(ContactRef) * (slots_.size() + peaks_.size()) +
-                            sizeof(ContactSum) * sums_.size() + sizeof(double) * pair_force_.size();
-  return worlds ? total / worlds : 0;
-}
-
 }  // namespace mjsense

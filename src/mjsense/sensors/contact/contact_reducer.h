@@ -21,8 +21,8 @@ template <>
 inline constexpr std::array<std::string_view, 4> kWords<ContactReduce>{"none", "mindist",
                                                                        "maxforce", "netforce"};
 
-// mj_contactForce, without the call for contacts that are plain constraints: force and torque in the
-// contact frame. A pyramid's edges come in pairs, one pair for each friction direction.
+// mj_contactForce, without the call for contacts that are plain constraints: force and torque in
+// the contact frame. A pyramid's edges come in pairs, one pair for each friction direction.
 inline void contact_wrench(const mjModel* m, const mjData* d, int id, mjtNum wrench[6]) {
   const mjContact& c = d->contact[id];
   const bool plain =
@@ -102,8 +102,8 @@ class ContactReducer {
 
   void begin(int world);
   void add(int world, int primary, PassContact& contact, int sign);
-  // A contact that was added with the primary as geom 1 and matches as geom 2 too: it is not counted
-  // again, but secondaries on the side of geom 1 have it as well.
+  // A contact that was added with the primary as geom 1 and matches as geom 2 too: it is not
+  // counted again, but secondaries on the side of geom 1 have it as well.
   void add_other_way(int world, int primary, PassContact& contact);
 
   int num_primaries() const { return num_primaries_; }
@@ -127,8 +127,6 @@ class ContactReducer {
   const ContactRef& peak(int world, int primary) const;  // needs keep_peak, not netforce
   std::span<const std::int32_t> pair_count(int world) const;
   std::span<const double> pair_force(int world) const;  // [P, S, 3]
-
-  std::size_t bytes_per_world() const;
 
  private:
   // Values by geom, packed: those of geom g are values[begin[g] .. begin[g + 1]).

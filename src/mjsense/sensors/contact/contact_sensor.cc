@@ -235,8 +235,6 @@ void ContactSensor::reset(const World& world) {
   }
 }
 
-void ContactSensor::begin_control_step(int world) { memory_.begin_control_step(world); }
-
 int ContactSensor::read_slot(const World& world, int primary, int slot,
                              ContactReading& reading) const {
   const int count = reducer_.count(world.id, primary);
@@ -312,8 +310,8 @@ void ContactSensor::write_slot(int w, int slot, int found, const ContactReading&
   }
 }
 
-// Moves every slot's history on by one substep. A slot that has been empty for H substeps is all zero
-// and left alone; neighbours that are not move together.
+// Moves every slot's history on by one substep. A slot that has been empty for H substeps is all
+// zero and left alone; neighbours that are not move together.
 void ContactSensor::write_history(int w) {
   const int K = cfg_.num_slots, P = reducer_.num_primaries();
   std::uint16_t* left = history_left_.data() + static_cast<std::size_t>(w) * P * K;

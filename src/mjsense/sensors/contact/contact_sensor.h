@@ -174,16 +174,13 @@ class ContactSensor : public Sensor {
   // bool [B, P]: the present contact (air) phase began less than dt + abs_tol ago. A touch that
   // began and ended inside a control step is invisible to these; `touchdown` sees it. RuntimeError
   // without track_air_time.
-  Array compute_first_contact(double dt, double abs_tol = 1e-6) const;
-  Array compute_first_air(double dt, double abs_tol = 1e-6) const;
-
-  // The next substep starts a control step: latches and events are cleared then. Only for callers
-  // that drive substep() by themselves; Simulation counts `decimation` substeps from the reset.
-  void begin_control_step(int world);
+  [[nodiscard]] Array compute_first_contact(double dt, double abs_tol = 1e-6) const;
+  [[nodiscard]] Array compute_first_air(double dt, double abs_tol = 1e-6) const;
 
   // One slot as MuJoCo's own sensor has it: in the contact frame whatever cfg says. Valid after
   // compute(). Returns the number of matching contacts, 0 if the slot is empty.
-  int read_slot(const World& world, int primary, int slot, ContactReading& reading) const;
+  [[nodiscard]] int read_slot(const World& world, int primary, int slot,
+                              ContactReading& reading) const;
 
  private:
   struct Output;

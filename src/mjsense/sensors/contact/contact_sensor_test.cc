@@ -82,8 +82,9 @@ TEST(Contact, BoxOnTheFloorPushesDownWithItsWeight) {
   EXPECT_THAT(lab.sensor().primary_names(), ElementsAre("box_geom"));
 }
 
-// A box at rest that is pushed along the floor by less than friction holds: what it pushes on the floor is what
-// pushes it, in both tangents. In the contact's own frame the third axis is normal x tangent.
+// A box at rest that is pushed along the floor by less than friction holds: what it pushes on the
+// floor is what pushes it, in both tangents. In the contact's own frame the third axis is normal x
+// tangent.
 TEST(Contact, FrictionHoldsAlongBothTangents) {
   std::vector<ContactSensorCfg> sensors;
   for (const bool box : {true, false}) {
@@ -232,8 +233,8 @@ TEST(Contact, TheTerrainIsAnEntity) {
   }
 }
 
-// Two feet of one trunk press against each other along x, L from the left: the contact is the trunk's
-// with R and, turned round, the trunk's with L.
+// Two feet of one trunk press against each other along x, L from the left: the contact is the
+// trunk's with R and, turned round, the trunk's with L.
 //
 //          trunk
 //        L --><-- R
@@ -304,8 +305,8 @@ TEST(Contact, ExcludeLeavesSecondariesOut) {
   }
 }
 
-// Whether and where there is contact is known without the solve; whoever asks for that alone does not
-// pay for it, and leaves nothing half done for who asks for forces afterwards.
+// Whether and where there is contact is known without the solve; whoever asks for that alone does
+// not pay for it, and leaves nothing half done for who asks for forces afterwards.
 TEST(Contact, WithoutForcesNeedsPositionsOnly) {
   const auto needs = [](auto&& change) {
     ContactSensorCfg cfg = box_cfg();

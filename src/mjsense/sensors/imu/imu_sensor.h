@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
-// An inertial measurement unit at a site: accelerometer and gyroscope of one device, with its errors.
+// An inertial measurement unit at a site: accelerometer and gyroscope of one device, with its
+// errors.
 
 #include <array>
 #include <memory>
@@ -14,8 +15,8 @@
 
 namespace mjsense {
 
-// What a data sheet says of a device, in SI units. Tolerances are taken as three standard deviations of
-// devices, drawn anew for each episode; what a sheet does not give is 0.
+// What a data sheet says of a device, in SI units. Tolerances are taken as three standard
+// deviations of devices, drawn anew for each episode; what a sheet does not give is 0.
 struct ImuModel {
   struct Axis {
     double noise_density = 0.0;
@@ -67,7 +68,8 @@ ImuModel imu_preset(const std::string& name);
 // Throw ValueError.
 void validate(const ImuModel::Axis& axis, std::string_view place);
 
-// The effects of one half of a device, in the order of its signal path: axes, bias, noise, range, counts.
+// The effects of one half of a device, in the order of its signal path: axes, bias, noise, range,
+// counts.
 Effects imu_effects(const ImuModel::Axis& axis);
 
 inline constexpr std::array<std::string_view, 4> kImuPresets{"ideal", "mpu6050", "icm42688p", ""};
@@ -105,8 +107,8 @@ void visit_fields(V& v, ImuSensorCfg& c) {
 //   acc   [B, 3]  m/s^2, specific force R^T (a - g): +9.81 along up at rest, 0 in free fall
 //   gyro  [B, 3]  rad/s, R^T omega
 //   quat  [B, 4]  wxyz, of the site in the world
-// The clean values are MuJoCo's sensors "<name>_acc", "<name>_gyro" (and "<name>_quat"), which the scene
-// registers too.
+// The clean values are MuJoCo's sensors "<name>_acc", "<name>_gyro" (and "<name>_quat"), which the
+// scene registers too.
 class ImuSensor : public Sensor {
  public:
   explicit ImuSensor(ImuSensorCfg cfg);

@@ -154,7 +154,7 @@ PinholePattern PinholePattern::from_intrinsic_matrix(const std::array<double, 9>
   if (!(k[4] > 0))
     throw ValueError(
         fmt::format("pinhole pattern: fy is {} in the intrinsic matrix: must be above 0", k[4]));
-  return {width, height, 2 * std::atan(height / (2 * k[4])) * 180 / std::numbers::pi, ""};
+  return {width, height, 2 * std::atan(height / (2 * k[4])) * (180 / std::numbers::pi), ""};
 }
 
 PinholePattern PinholePattern::from_mujoco_camera(std::string camera_name) {

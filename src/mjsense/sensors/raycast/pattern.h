@@ -132,7 +132,8 @@ void validate(const PinholePattern& pinhole, std::string_view place);
 void validate(const RingPattern& rings, std::string_view place);
 void validate(const UserPattern& user, std::string_view place);
 
-// ValueError for what check_fields() refuses, KeyError for an unknown camera. `model` may be null unless a pattern names a camera.
+// ValueError for what check_fields() refuses, KeyError for an unknown camera. `model` may be null
+// unless a pattern names a camera.
 RayPattern make_pattern(const PatternCfg& cfg, const mjModel* model, std::string_view place);
 
 }  // namespace mjsense

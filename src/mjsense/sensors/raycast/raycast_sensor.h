@@ -140,7 +140,8 @@ class RayCastSensor : public Sensor {
   }
 
  protected:
-  // A pattern may be cast in parts of equal size, one after the other; part() says whose turn it is.
+  // A pattern may be cast in parts of equal size, one after the other; part() says whose turn it
+  // is.
   virtual int num_parts() const { return 1; }
   virtual int part(const World& /*world*/) const { return 0; }
   // The rays of one frame, for the pattern given.

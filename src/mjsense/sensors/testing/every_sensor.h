@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
-// Every kind of scene sensor, in a scene where all of them have something to measure: for tests that hold for all sensors.
+// Every kind of scene sensor, in a scene where all of them have something to measure: for tests
+// that hold for all sensors.
 
 #include <algorithm>
 #include <iterator>
@@ -66,7 +67,8 @@ inline SensorCfgs every_sensor() {
   return all;
 }
 
-// A two-wheeled robot with a mast and an arm that swings; a box, a ball and a mesh to see and to touch; textures and a light.
+// A two-wheeled robot with a mast and an arm that swings; a box, a ball and a mesh to see and to
+// touch; textures and a light.
 inline SceneCfg every_sensor_scene() {
   using namespace every_sensor_detail;
   SceneCfg cfg;
