@@ -1,0 +1,24 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+// Values of TOML files as values of fields: what every reader of such files shares.
+
+#include <string>
+#include <string_view>
+#include <toml++/toml.h>
+
+#include "mjsense/core/fields.h"
+
+namespace mjsense {
+
+// ValueError "x.toml:3: ..." where the text is no TOML. `path` is what messages say.
+toml::table parse_toml(std::string_view text, const std::string& path);
+
+// "x.toml:3": where a node stands.
+std::string toml_place(const std::string& path, const toml::node& node);
+
+// A bool, number, text, path or word, or lists, arrays and optionals of them. False if the value is
+// of another type, or does not fit. ValueError, beginning with `place`, for a word that there is not.
+bool read_toml_value(const FieldType& type, void* out, const toml::node& node,
+                     std::string_view place, std::string_view name);
+
+}  // namespace mjsense
