@@ -1,11 +1,11 @@
 # SPDX-License-Identifier: Apache-2.0
-"""embed.py MODELS_DIR OUT.cc: write every MJCF below MODELS_DIR as a string of mjsense::embedded_models()."""
+"""embed.py MODELS_DIR OUT.cc: write every MJCF and TOML below MODELS_DIR as a string of mjsense::embedded_models()."""
 import pathlib
 import sys
 
 root, out = map(pathlib.Path, sys.argv[1:])
 lines = ['#include "mjsense/core/embedded.h"', "", "#include <array>", "", "namespace mjsense {", "namespace {"]
-files = sorted(root.rglob("*.xml"))
+files = sorted(p for p in root.rglob("*") if p.suffix in (".xml", ".toml"))
 for i, path in enumerate(files):
     data = path.read_bytes()
     rows = [",".join(str(b) for b in data[k:k + 120]) for k in range(0, len(data), 120)]

@@ -17,5 +17,6 @@ NB_MODULE(_core, m) {
   mjsense::python::bind_effects(m);
   mjsense::python::bind_raycast(m);
   mjsense::python::bind_recorder(m);
+  mjsense::python::bind_robot(m);
   mjsense::python::bind_rollout(m);
 }

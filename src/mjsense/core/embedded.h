@@ -8,7 +8,7 @@
 namespace mjsense {
 
 struct EmbeddedFile {
-  std::string_view name;  // path below models/: "franka/fr3.xml"
+  std::string_view name;  // path below models/: "robots/quadruped.xml"
   std::string_view text;
 };
 

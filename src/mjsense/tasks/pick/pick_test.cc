@@ -8,7 +8,7 @@
 #include <set>
 
 #include "mjsense/core/error.h"
-#include "mjsense/robots/franka/franka.h"
+#include "mjsense/robots/load_robot.h"
 #include "mjsense/scene/resolve.h"
 
 namespace mjsense {
@@ -22,7 +22,7 @@ struct DataDelete {
 
 TaskCfg franka() {
   TaskCfg cfg;
-  cfg.robot = franka_cfg();
+  cfg.robot = robot_cfg("franka");
   return cfg;
 }
 
