@@ -49,8 +49,12 @@ set(MJSENSE_PUBLIC_HEADERS
   mjsense/record/recording.h
   mjsense/replay/check.h
   mjsense/robots/action.h
-  mjsense/robots/franka/franka.h
+  mjsense/robots/base_placement.h
+  mjsense/robots/controllers/controller.h
+  mjsense/robots/controllers/controller_cfg.h
   mjsense/robots/kinematics.h
+  mjsense/robots/load_robot.h
+  mjsense/robots/move_group.h
   mjsense/robots/robot.h
   mjsense/robots/robot_cfg.h
   mjsense/robots/scene_robot.h

@@ -14,6 +14,7 @@ void bind_contact(nanobind::module_& m);
 void bind_effects(nanobind::module_& m);
 void bind_raycast(nanobind::module_& m);
 void bind_recorder(nanobind::module_& m);
+void bind_robot(nanobind::module_& m);
 void bind_rollout(nanobind::module_& m);
 void bind_program(nanobind::module_& m);
 

@@ -17,6 +17,7 @@ NB_MODULE(_core, m) {
   mjsense::python::bind_effects(m);
   mjsense::python::bind_raycast(m);
   mjsense::python::bind_recorder(m);
+  mjsense::python::bind_robot(m);
   mjsense::python::bind_rollout(m);
   mjsense::python::bind_program(m);
 }

@@ -46,7 +46,7 @@ nb::list action_layout(const Robot& robot) {
   nb::list layout;
   for (const MoveGroup& group : robot.groups()) {
     if (group.controlled())
-      layout.append(nb::make_tuple(group.name, group.ctrl_low, group.ctrl_high));
+      layout.append(nb::make_tuple(group.name, group.command_low, group.command_high));
   }
   return layout;
 }
@@ -87,8 +87,8 @@ void PythonPolicy::initialize(Task& task) {
   for (std::size_t g = 0; g < groups.size(); ++g) {
     if (!groups[g].controlled()) continue;
     group_.push_back(static_cast<int>(g));
-    width_.push_back(static_cast<int>(groups[g].actuators.size()));
-    n_ += groups[g].actuators.size();
+    width_.push_back(groups[g].command_size);
+    n_ += groups[g].command_size;
   }
   phase_.assign(B, 0);
   retries_.assign(B, 0);

@@ -43,7 +43,11 @@ std::unique_ptr<PythonTask> PythonTask::make(nb::object task, std::shared_ptr<Py
                                              TaskCfg cfg, bool own_horizon) {
   nb::object settings = task.attr("_mjs_settings")();
   cfg.policy_dt_ms = item_or(settings, "policy_dt_ms", cfg.policy_dt_ms);
+  const int of_robot = cfg.sim_dt_ms;
   cfg.sim_dt_ms = item_or(settings, "sim_dt_ms", cfg.sim_dt_ms);
+  // The controllers' period is the robot's as long as the physics' is.
+  cfg.ctrl_dt_ms =
+      item_or(settings, "ctrl_dt_ms", cfg.sim_dt_ms == of_robot ? cfg.ctrl_dt_ms : 0);
   if (own_horizon) cfg.horizon = item_or(settings, "horizon", cfg.horizon);
   std::unique_ptr<PythonTask> made(
       new PythonTask(std::move(cfg), std::move(task), std::move(host)));
@@ -87,7 +91,7 @@ void PythonTask::initialize_task() {
     nb::list groups;
     for (const MoveGroup& group : robot().groups()) {
       if (group.controlled())
-        groups.append(nb::make_tuple(group.name, group.ctrl_low, group.ctrl_high));
+        groups.append(nb::make_tuple(group.name, group.command_low, group.command_high));
     }
     task_.get().attr("_mjs_bind")(host_->simulation(sim), groups);
     graspable_.clear();

@@ -208,8 +208,9 @@ class PyRollout {
         for (std::size_t g = 0; g < groups.size(); ++g) {
           const GroupValues& given = rollout_->action(w).commands[g];
           const GroupValues& held = rollout_->task().robot().targets(w)[g];
-          for (std::size_t k = 0; k < groups[g].actuators.size(); ++k)
-            rows[w].push_back((given.given ? given : held).values[k]);
+          const bool command = given.given || groups[g].target_size != groups[g].command_size;
+          for (int k = 0; k < groups[g].command_size; ++k)
+            rows[w].push_back((command ? given : held).values[k]);
         }
       }
     });
@@ -224,7 +225,7 @@ class PyRollout {
   std::size_t width() const {
     std::size_t width = 0;
     for (const MoveGroup& group : rollout_->task().robot().groups())
-      width += group.actuators.size();
+      width += group.command_size;
     return width;
   }
   void check(std::size_t worlds, std::size_t width, const char* what) const {
@@ -237,7 +238,7 @@ class PyRollout {
     Action action;
     const auto groups = rollout_->task().robot().groups();
     for (std::size_t g = 0; g < groups.size(); ++g) {
-      const std::size_t n = groups[g].actuators.size();
+      const std::size_t n = groups[g].command_size;
       if (n > 0) action.commands[static_cast<int>(g)].set({commands, n});
       commands += n;
     }

@@ -151,7 +151,9 @@ void bind_scene(nb::module_& m) {
       "embedded_models",
       [] {
         nb::list names;
-        for (const EmbeddedFile& file : embedded_files()) names.append(std::string(file.name));
+        for (const EmbeddedFile& file : embedded_files()) {
+          if (file.name.ends_with(".xml")) names.append(std::string(file.name));
+        }
         return names;
       },
       "Names of the models that are part of mjsense: EntityCfg(model=\"embedded:<name>\").");

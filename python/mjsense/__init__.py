@@ -23,6 +23,7 @@ from mjsense.imu import ImuSensor
 from mjsense.pipeline import ObservationPipeline
 from mjsense.policy import Policy, policy_names, register_policy
 from mjsense.raycast import CameraSensor, LidarSensor, RayCastSensor, TerrainHeightSensor
+from mjsense.robot import MoveGroup, Robot, RobotCamera
 from mjsense.record import RecordProgress, RecordSummary, record
 from mjsense.recorder import Recorder
 from mjsense.scene import Entity, Scene
@@ -36,10 +37,10 @@ from mjsense.vector import TaskVectorEnv, make_vec
 __all__ = [
     *configs.__all__,
     "BuiltinSensor", "CameraData", "CameraSensor", "ContactData", "ContactSensor", "DebugShapes", "EffectSensorCfg",
-    "Entity", "ImuData", "ImuSensor", "LidarSensor", "NativeSensor", "ObservationPipeline", "Policy", "RayCastData",
-    "RayCastSensor", "RecordProgress", "RecordSummary", "Recorder", "Scene", "Sensor", "SensorData", "SensorError", "SensorSpec",
-    "SensorSuite", "Simulation", "Task", "TaskEnv", "TaskVectorEnv", "TerrainHeightSensor", "UnknownNameError", "WorldState",
-    "effects", "embedded_models", "make", "make_vec", "observations", "policy_names", "record", "register_policy",
-    "register_task", "robot_names", "task_names",
+    "Entity", "ImuData", "ImuSensor", "LidarSensor", "MoveGroup", "NativeSensor", "ObservationPipeline", "Policy", "RayCastData",
+    "RayCastSensor", "RecordProgress", "RecordSummary", "Recorder", "Robot", "RobotCamera", "Scene", "Sensor", "SensorData",
+    "SensorError", "SensorSpec", "SensorSuite", "Simulation", "Task", "TaskEnv", "TaskVectorEnv", "TerrainHeightSensor",
+    "UnknownNameError", "WorldState", "effects", "embedded_models", "make", "make_vec", "observations", "policy_names", "record",
+    "register_policy", "register_task", "robot_names", "task_names",
     "__version__",
 ]

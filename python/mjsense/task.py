@@ -39,6 +39,8 @@ class Task:
     """Control steps after which an episode is truncated."""
     policy_dt_ms: int | None = None
     """One control step, ms; None: the robot's, 66 without one."""
+    ctrl_dt_ms: int | None = None
+    """One step of the robot's controllers, ms; None: the robot's, ``sim_dt_ms`` without one."""
     sim_dt_ms: int | None = None
     """One physics step, ms; None: the robot's, 2 without one."""
     robot: str | None = None
@@ -150,6 +152,7 @@ class Task:
             "task_type": self.task_type or name,
             "horizon": self.horizon,
             "policy_dt_ms": self.policy_dt_ms,
+            "ctrl_dt_ms": self.ctrl_dt_ms,
             "sim_dt_ms": self.sim_dt_ms,
             "robot_entity": self.robot_entity,
             "move_groups": groups,

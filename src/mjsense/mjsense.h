@@ -49,7 +49,7 @@
 #include "mjsense/record/recording.h"
 #include "mjsense/replay/check.h"
 #include "mjsense/robots/action.h"
-#include "mjsense/robots/franka/franka.h"
+#include "mjsense/robots/load_robot.h"
 #include "mjsense/robots/kinematics.h"
 #include "mjsense/robots/robot.h"
 #include "mjsense/robots/robot_cfg.h"

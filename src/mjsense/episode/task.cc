@@ -12,11 +12,15 @@
 namespace mjsense {
 
 Task::Task(TaskCfg cfg) : cfg_(std::move(cfg)) {
-  if (cfg_.sim_dt_ms <= 0 || cfg_.policy_dt_ms <= 0 || cfg_.policy_dt_ms % cfg_.sim_dt_ms != 0) {
-    throw ValueError(
-        fmt::format("task: policy_dt_ms = {} must be a positive multiple of sim_dt_ms = {}",
-                    cfg_.policy_dt_ms, cfg_.sim_dt_ms));
-  }
+  if (cfg_.ctrl_dt_ms == 0) cfg_.ctrl_dt_ms = cfg_.sim_dt_ms;
+  const auto check = [](const char* name, int period, const char* of, int part) {
+    if (part > 0 && period > 0 && period % part == 0) return;
+    throw ValueError(fmt::format("task: {} = {} must be a positive multiple of {} = {}", name,
+                                 period, of, part));
+  };
+  check("policy_dt_ms", cfg_.policy_dt_ms, "sim_dt_ms", cfg_.sim_dt_ms);
+  check("ctrl_dt_ms", cfg_.ctrl_dt_ms, "sim_dt_ms", cfg_.sim_dt_ms);
+  check("policy_dt_ms", cfg_.policy_dt_ms, "ctrl_dt_ms", cfg_.ctrl_dt_ms);
   if (cfg_.horizon <= 0)
     throw ValueError(fmt::format("task: horizon = {} must be positive", cfg_.horizon));
 }
@@ -59,13 +63,14 @@ void Task::initialize(const mjModel* model, int num_worlds) {
     throw ValueError(fmt::format("task: {} worlds, at least 1 is needed", num_worlds));
   model_ = model;
   num_worlds_ = num_worlds;
+  const ControlPeriods periods{0.001 * cfg_.policy_dt_ms, 0.001 * cfg_.ctrl_dt_ms};
   if (cfg_.robot.name.empty()) {
     const std::string entity = robot_entity();
     cfg_.robot = scene_robot(model, entity, robot_groups(), fmt::format("task '{}'", name()));
-    robot_ =
-        std::make_unique<Robot>(cfg_.robot, model, num_worlds, entity.empty() ? "" : entity + "/");
+    robot_ = std::make_unique<Robot>(cfg_.robot, model, num_worlds,
+                                     entity.empty() ? "" : entity + "/", periods);
   } else {
-    robot_ = std::make_unique<Robot>(cfg_.robot, model, num_worlds);
+    robot_ = std::make_unique<Robot>(cfg_.robot, model, num_worlds, Robot::kPrefix, periods);
   }
   episodes_.assign(num_worlds, {});
   initialize_task();
@@ -82,11 +87,7 @@ void Task::sample(int world, std::int64_t episode, const StateRow& state) {
   episodes_[world] = {.number = episode};
   Rng rng(cfg_.seed, 0, stream_of("task/sample"), static_cast<std::uint64_t>(episode));
   const std::optional<Pose> base = sample_scene(world, rng, state);
-  const int body = robot_->base_body();
-  robot_->write_start(
-      state,
-      base.value_or(Pose{vec3(model_->body_pos + 3 * body), quat(model_->body_quat + 4 * body)}),
-      rng);
+  robot_->write_start(state, base, rng);
 }
 
 void Task::begin(const World& world) {

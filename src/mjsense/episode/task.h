@@ -45,8 +45,9 @@ struct TaskCfg {
   RobotCfg robot;     // without a name: the task's scene has its own, if any
   std::string scene;  // name or file; "": the task's own
   std::uint64_t seed = 0;
-  int horizon = 500;      // control steps after which an episode is truncated
-  int policy_dt_ms = 66;  // one control step
+  int horizon = 500;      // policy steps after which an episode is truncated
+  int policy_dt_ms = 66;  // one action of the policy
+  int ctrl_dt_ms = 0;     // one step of the robot's controllers; 0: as the physics
   int sim_dt_ms = 2;      // one physics step
   bool action_noise = true;
   bool terminate_upon_success = false;
@@ -86,8 +87,9 @@ class Task {
   const TaskCfg& cfg() const { return cfg_; }
   virtual std::string_view name() const = 0;  // registry name
   virtual std::string_view type() const = 0;  // task_type of obs_scene: "pick"
-  // Physics steps per control step.
+  // Physics steps per policy step, and per step of the controllers.
   int decimation() const { return cfg_.policy_dt_ms / cfg_.sim_dt_ms; }
+  int control_decimation() const { return cfg_.ctrl_dt_ms / cfg_.sim_dt_ms; }
   double fps() const { return 1000.0 / cfg_.policy_dt_ms; }
 
   // Everything but the robot of cfg(); the caller appends sensors. The robot stands where an entity

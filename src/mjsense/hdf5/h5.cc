@@ -284,4 +284,12 @@ std::int64_t int_attribute(hid_t object, const char* name, std::int64_t otherwis
   return value;
 }
 
+double double_attribute(hid_t object, const char* name, double otherwise) {
+  if (!has_attribute(object, name)) return otherwise;
+  const Id attribute(H5Aopen(object, name, H5P_DEFAULT), H5Aclose, name);
+  double value = otherwise;
+  check(H5Aread(attribute, H5T_NATIVE_DOUBLE, &value), name);
+  return value;
+}
+
 }  // namespace mjsense::h5

@@ -77,5 +77,6 @@ void set_attribute(hid_t object, const char* name, std::uint64_t value);
 bool has_attribute(hid_t object, const char* name);
 std::string text_attribute(hid_t object, const char* name);  // "" if absent
 std::int64_t int_attribute(hid_t object, const char* name, std::int64_t otherwise);
+double double_attribute(hid_t object, const char* name, double otherwise);
 
 }  // namespace mjsense::h5

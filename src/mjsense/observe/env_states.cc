@@ -11,9 +11,11 @@
 namespace mjsense {
 
 EnvStatesSensor::EnvStatesSensor(std::string name, std::string articulation,
-                                 std::vector<JointGroup> groups, int length, std::string robot_body)
+                                 std::vector<JointGroup> groups, int length, std::string robot_body,
+                                 std::string robot)
     : Sensor(std::move(name)),
       articulation_(std::move(articulation)),
+      robot_(std::move(robot)),
       groups_(std::move(groups)),
       length_(length),
       robot_body_(std::move(robot_body)) {
@@ -21,10 +23,37 @@ EnvStatesSensor::EnvStatesSensor(std::string name, std::string articulation,
   for (const JointGroup& group : groups_)
     needed += static_cast<int>(group.qpos.size() + group.dof.size());
   if (length_ == 0) length_ = needed;
-  if (length_ < needed) {
+  if (!articulation_.empty() && length_ < needed) {
     throw ValueError(fmt::format("sensor '{}': articulation '{}' needs {} numbers, length is {}",
                                  this->name(), articulation_, needed, length_));
   }
+}
+
+// Bodies that hang on the world and have joints other than a free one of their own.
+std::vector<EnvStatesSensor::Articulation> EnvStatesSensor::find_articulations(
+    const mjModel* m, int robot_body) const {
+  std::vector<Articulation> found;
+  const int robot_root = robot_body < 0 ? -1 : m->body_rootid[robot_body];
+  for (int root = 1; root < m->nbody; ++root) {
+    if (m->body_rootid[root] != root) continue;
+    Articulation each;
+    bool inside = root == robot_root;
+    for (int j = 0; j < m->njnt; ++j) {
+      if (m->body_rootid[m->jnt_bodyid[j]] != root) continue;
+      const int type = m->jnt_type[j];
+      inside |= type != mjJNT_FREE;
+      const int nq = type == mjJNT_FREE ? 7 : type == mjJNT_BALL ? 4 : 1;
+      const int nv = type == mjJNT_FREE ? 6 : type == mjJNT_BALL ? 3 : 1;
+      for (int k = 0; k < nq; ++k) each.qpos.push_back(m->jnt_qposadr[j] + k);
+      for (int k = 0; k < nv; ++k) each.dof.push_back(m->jnt_dofadr[j] + k);
+    }
+    if (!inside || each.qpos.empty()) continue;
+    const char* name = mj_id2name(m, mjOBJ_BODY, root);
+    each.name = root == robot_root ? robot_ : name ? name : fmt::format("body_{}", root);
+    std::ranges::replace(each.name, '/', '_');
+    found.push_back(std::move(each));
+  }
+  return found;
 }
 
 void EnvStatesSensor::initialize(const SensorInit& init) {
@@ -54,6 +83,17 @@ void EnvStatesSensor::initialize(const SensorInit& init) {
     spec.description = "Free joint of the body: position, quaternion, linear and angular velocity.";
     add_field(fmt::format("actors/{}", actor), spec, init.num_worlds);
   }
+  articulations_.clear();
+  if (!robot_.empty()) articulations_ = find_articulations(m, robot);
+  for (const Articulation& each : articulations_) {
+    SensorSpec spec;
+    spec.dtype = DType::kFloat64;
+    spec.shape = {static_cast<std::int64_t>(each.qpos.size() + each.dof.size())};
+    spec.unit = "rad or m, rad/s or m/s";
+    spec.description = "qpos of all its joints in the model's order, then their qvel.";
+    add_field(fmt::format("articulations/{}", each.name), spec, init.num_worlds);
+  }
+  if (articulation_.empty()) return;
   SensorSpec spec;
   spec.shape = {length_};
   spec.unit = "rad or m, rad/s or m/s";
@@ -68,6 +108,14 @@ void EnvStatesSensor::compute(const World& world) {
     for (int k = 0; k < 7; ++k) row[k] = static_cast<float>(d->qpos[actors_[i].qpos + k]);
     for (int k = 0; k < 6; ++k) row[7 + k] = static_cast<float>(d->qvel[actors_[i].dof + k]);
   }
+  for (std::size_t i = 0; i < articulations_.size(); ++i) {
+    const Articulation& each = articulations_[i];
+    const auto row = fields()[actors_.size() + i].data.row<double>(world.id);
+    std::size_t n = 0;
+    for (int address : each.qpos) row[n++] = d->qpos[address];
+    for (int address : each.dof) row[n++] = d->qvel[address];
+  }
+  if (articulation_.empty()) return;
   const auto row = fields().back().data.row<float>(world.id);
   std::size_t n = 0;
   for (const JointGroup& group : groups_) {

@@ -12,20 +12,26 @@
 namespace mjsense {
 
 // Streams
+//   env_states/articulations/<name>   float64 [nq + nv]: qpos, then qvel, of every joint of a body
+//                                     that has joints inside, in model order, passive joints among
+//                                     them: written back they restore it exactly. One for the robot,
+//                                     by its name, and one for each such body of the scene, by its
+//                                     root's
 //   env_states/actors/<name>          float32 [13]: position 3 (m), quaternion 4 (wxyz), velocity 6
 //                                     (m/s in world axes, rad/s in body axes): MuJoCo's qpos and
 //                                     qvel of the free joint, which written back restore the body.
 //                                     One for each free body outside the robot.
-//   env_states/articulations/<robot>  float32 [N]: qpos of all groups in order, then their qvel,
-//                                     then zeros
+//   env_states/articulations/<peer>   float32 [N]: qpos of all groups in order, then their qvel,
+//                                     then zeros: MolmoSpaces' row, where it is asked for
 // An actor is called as its body, without the entity's prefix ("mug" for "mug/mug") where that is
 // unique, else with '_' for '/', which would make a folder of it in a file.
 class EnvStatesSensor final : public Sensor {
  public:
   // `length`: N, at least what the groups need; 0: just that. `robot_body`: free bodies at or below
-  // it are no actors; "" none.
+  // it are no actors; "" none. `articulation`: the name of MolmoSpaces' row, "": there is none.
+  // `robot`: the name of the robot's whole row; "": no such rows, of nobody.
   EnvStatesSensor(std::string name, std::string articulation, std::vector<JointGroup> groups,
-                  int length, std::string robot_body);
+                  int length, std::string robot_body, std::string robot = "");
   std::string_view kind() const override { return "env_states"; }
   mjtStage needs() const override { return mjSTAGE_NONE; }
   void initialize(const SensorInit& init) override;
@@ -35,11 +41,18 @@ class EnvStatesSensor final : public Sensor {
   struct Actor {
     int qpos, dof;
   };
-  std::string articulation_;
+  struct Articulation {
+    std::string name;
+    std::vector<int> qpos, dof;
+  };
+  std::vector<Articulation> find_articulations(const mjModel* model, int robot_body) const;
+
+  std::string articulation_, robot_;
   std::vector<JointGroup> groups_;
   int length_;
   std::string robot_body_;
-  std::vector<Actor> actors_;  // field i belongs to actor i; the articulation is the last field
+  std::vector<Actor> actors_;                // field i belongs to actor i
+  std::vector<Articulation> articulations_;  // their fields follow; MolmoSpaces' row is the last
 };
 
 }  // namespace mjsense

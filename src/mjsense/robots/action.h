@@ -11,7 +11,7 @@
 
 namespace mjsense {
 
-// Values of one move group: joint positions, or the commands of its actuators.
+// Values of one move group: joint positions (a free joint has 7), or a command.
 struct GroupValues {
   static constexpr int kMaxSize = 32;
   std::array<double, kMaxSize> values{};
@@ -33,14 +33,14 @@ struct GroupValues {
 
 // One GroupValues a move group, in the robot's order.
 struct RobotValues {
-  static constexpr int kMaxGroups = 8;
+  static constexpr int kMaxGroups = 16;
   std::array<GroupValues, kMaxGroups> groups{};
   GroupValues& operator[](int g) { return groups[g]; }
   const GroupValues& operator[](int g) const { return groups[g]; }
 };
 
 struct Action {
-  RobotValues commands;         // of actuators; "base": [] is given with size 0
+  RobotValues commands;         // as each group's controller takes them; "base": [] has size 0
   bool done = false;            // the policy has finished: after this step the episode ends
   std::optional<bool> success;  // the policy's own verdict; {done, success: false} gives up
 };

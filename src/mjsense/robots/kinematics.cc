@@ -16,7 +16,11 @@ namespace {
 // Iterations from the caller's configuration, then from each new one. A solution is usually found
 // within 10.
 constexpr double kDamping = 1e-12;
-constexpr int kAttempt = 30;
+constexpr int kAttempt = 25;
+// Of a new attempt: the nearest of so many configurations begins it, and no joint goes farther in
+// one iteration.
+constexpr int kCandidates = 16;
+constexpr double kFarthest = 0.4;  // rad or m
 
 // Solves (J J^T + eps I) y = e for a [6, n] Jacobian, by Cholesky factorisation, and returns J^T y.
 void damped_step(std::span<const double> jacobian, int n, double eps, const double (&e)[6],
@@ -146,13 +150,14 @@ void Chain::joint_motion(std::span<const double> q, const Twist& twist,
 
 // Additive recurrence: the fractional parts of k * alpha_i, alpha_i powers of the generalised
 // golden ratio, fill the box of joint ranges evenly whatever their number.
-void Chain::restart(int k, std::span<double> q) const {
+void Chain::spread(int k, std::span<double> q, std::span<const bool> moves) const {
   const int n = static_cast<int>(links_.size());
   double phi = 1.5;  // the root of x^(n+1) = x + 1
   for (int i = 0; i < 30; ++i) phi = std::pow(1.0 + phi, 1.0 / (n + 1));
   double alpha = 1.0;
   for (int i = 0; i < n; ++i) {
     alpha /= phi;
+    if (!moves.empty() && !moves[i]) continue;
     const double u = std::fmod(0.5 + k * alpha, 1.0);
     const double low = std::max(low_[i], -std::numbers::pi),
                  high = std::min(high_[i], std::numbers::pi);
@@ -160,22 +165,50 @@ void Chain::restart(int k, std::span<double> q) const {
   }
 }
 
-bool Chain::ik(const Pose& target, std::span<double> q, int max_iterations,
-               double tolerance) const {
+void Chain::restart(const Pose& target, int attempt, std::span<double> q,
+                    std::span<const bool> moves) const {
+  std::array<double, kMaxJoints> storage;
+  const std::span<double> other(storage.data(), q.size());
+  std::ranges::copy(q, other.begin());
+  double nearest = std::numeric_limits<double>::infinity();
+  for (int k = 0; k < kCandidates; ++k) {
+    spread(1 + attempt * kCandidates + k, other, moves);
+    const double distance = norm(log6(inverse(fk(other)) * target));
+    if (distance >= nearest) continue;
+    nearest = distance;
+    std::ranges::copy(other, q.begin());
+  }
+}
+
+bool Chain::ik(const Pose& target, std::span<double> q, int max_iterations, double tolerance,
+               std::span<const bool> moves) const {
   const int n = static_cast<int>(links_.size());
   std::array<double, 6 * kMaxJoints> jac;
   std::array<double, kMaxJoints> dq;
   int restarts = 0;
   for (int iteration = 0; iteration < max_iterations; ++iteration) {
-    if (iteration >= kTracking && (iteration - kTracking) % kAttempt == 0) restart(++restarts, q);
+    const bool tracking = iteration < kTracking;
+    if (!tracking && (iteration - kTracking) % kAttempt == 0) restart(target, restarts++, q, moves);
     const Pose leaf = jacobian(q, {jac.data(), static_cast<std::size_t>(6 * n)});
     const Twist body = log6(inverse(leaf) * target);
     if (norm(body) < tolerance) return true;
+    if (!moves.empty()) {
+      for (int k = 0; k < n; ++k) {
+        for (int i = 0; !moves[k] && i < 6; ++i) jac[i * n + k] = 0;
+      }
+    }
     const Vec3 v = rotate(leaf.q, body.v), w = rotate(leaf.q, body.w);
     const double e[6] = {v.x, v.y, v.z, w.x, w.y, w.z};
     damped_step({jac.data(), static_cast<std::size_t>(6 * n)}, n, kDamping, e,
                 {dq.data(), static_cast<std::size_t>(n)});
-    for (int k = 0; k < n; ++k) q[k] = std::clamp(q[k] + dq[k], low_[k], high_[k]);
+    if (!tracking) {
+      double farthest = kFarthest;
+      for (int k = 0; k < n; ++k) farthest = std::max(farthest, std::abs(dq[k]));
+      for (int k = 0; k < n; ++k) dq[k] *= kFarthest / farthest;
+    }
+    for (int k = 0; k < n; ++k) {
+      if (moves.empty() || moves[k]) q[k] = std::clamp(q[k] + dq[k], low_[k], high_[k]);
+    }
   }
   return false;
 }

@@ -15,7 +15,7 @@ namespace mjsense {
 // Hinges and slides from body `base` (excluded) to site `leaf`; J = joints().size() of them move.
 class Chain {
  public:
-  static constexpr int kMaxJoints = 16;
+  static constexpr int kMaxJoints = 32;
   static constexpr int kTracking = 100;  // iterations of ik() that stay with its start
 
   // Joints that `moving` does not list stay at the model's qpos0.
@@ -39,13 +39,15 @@ class Chain {
   // (J J^T + 1e-12 I)^-1 e with e = log6(T^-1 T*) in base axes, clipped to the joint ranges in
   // every iteration. True if |e| < tolerance within max_iterations; q is otherwise the last
   // iterate. The first kTracking iterations start at q, so that a solution near q is found where
-  // there is one; if they end in a corner of the ranges, the others start at configurations spread
-  // over them.
+  // there is one; if they end in a corner of the ranges, the others begin anew where, of
+  // configurations spread over them, the leaf is nearest to the target. `moves` [J]: which joints may move; all where it is empty.
   bool ik(const Pose& target, std::span<double> q, int max_iterations = 1000,
-          double tolerance = 1e-4) const;
+          double tolerance = 1e-4, std::span<const bool> moves = {}) const;
 
  private:
-  void restart(int k, std::span<double> q) const;
+  void spread(int k, std::span<double> q, std::span<const bool> moves) const;
+  void restart(const Pose& target, int attempt, std::span<double> q,
+               std::span<const bool> moves) const;
 
   struct Link {
     Pose fixed;         // from the previous link's moved frame

@@ -6,18 +6,16 @@
 #include <memory>
 #include <string>
 
-#include "mjsense/core/embedded.h"
 #include "mjsense/core/rng.h"
+#include "mjsense/robots/load_robot.h"
 
 namespace mjsense {
 namespace {
 
 struct Fr3 : testing::Test {
   void SetUp() override {
-    const std::string xml(embedded_file("franka/fr3.xml"));
-    char error[500] = "";
-    mjSpec* spec = mj_parseXMLString(xml.c_str(), nullptr, error, sizeof(error));
-    ASSERT_TRUE(spec) << error;
+    const RobotCfg robot = robot_cfg("franka");
+    mjSpec* spec = mj_copySpec(robot.model.spec);
     model = mj_compile(spec, nullptr);
     ASSERT_TRUE(model) << mjs_getError(spec);
     mj_deleteSpec(spec);

@@ -6,101 +6,48 @@
 
 #include <algorithm>
 #include <cmath>
-#include <set>
 
 #include "mjsense/core/error.h"
+#include "mjsense/robots/noise.h"
 #include "mjsense/scene/resolve.h"
 
 namespace mjsense {
 namespace {
 
-constexpr int kMaxValues = GroupValues::kMaxSize;
-
-void check_size(const std::string& place, const char* what, std::size_t found, std::size_t most) {
-  if (found > most)
-    throw ValueError(fmt::format("{}: {} {}, at most {} are possible", place, found, what, most));
-}
-
-double truncated_normal(Rng& rng, double deviation, double limit) {
-  if (!(deviation > 0)) return 0.0;
-  // Far inside the bell the distribution is flat, and rejection would take for ever.
-  if (deviation > 100 * limit) return rng.uniform(-limit, limit);
-  for (;;) {
-    const double x = deviation * rng.normal();
-    if (std::abs(x) <= limit) return x;
+void check_groups(const std::string& place, std::size_t found) {
+  if (found > RobotValues::kMaxGroups) {
+    throw ValueError(fmt::format("{}: {} move groups, at most {} are possible", place, found,
+                                 RobotValues::kMaxGroups));
   }
-}
-
-// A servo whose control is a joint's position has its unit; others take what their range says.
-std::string command_unit(const mjModel* m, const MoveGroup& group) {
-  std::set<std::string> units;
-  for (std::size_t i = 0; i < group.actuators.size(); ++i) {
-    const int a = group.actuators[i];
-    const double* gain = m->actuator_gainprm + mjNGAIN * a;
-    const double* bias = m->actuator_biasprm + mjNBIAS * a;
-    if (m->actuator_trntype[a] == mjTRN_JOINT && gain[0] != 0 && gain[0] == -bias[1]) {
-      units.insert(m->jnt_type[m->actuator_trnid[2 * a]] == mjJNT_SLIDE ? "m" : "rad");
-    } else if (group.kind == GroupKind::kGripper) {
-      units.insert(
-          fmt::format("{:g} open .. {:g} closed", group.open_command, group.closed_command));
-    } else {
-      units.insert(fmt::format("{:g} .. {:g}", group.ctrl_low[i], group.ctrl_high[i]));
-    }
-  }
-  return fmt::format("{}", fmt::join(units, " or "));
 }
 
 }  // namespace
 
-Robot::Robot(RobotCfg cfg, const mjModel* model, int num_worlds, std::string_view prefix)
+Robot::Robot(RobotCfg cfg, const mjModel* model, int num_worlds, std::string_view prefix,
+             std::optional<ControlPeriods> periods)
     : cfg_(std::move(cfg)), model_(model), prefix_(prefix) {
   const std::string place = "robot '" + cfg_.name + "'";
-  const auto find = [&](mjtObj type, const std::string& name) {
-    return resolve(model, type, prefix_ + name, place);
-  };
-  base_body_ = find(mjOBJ_BODY, cfg_.base_body);
-  base_mocap_ = model->body_mocapid[base_body_];
-  check_size(place, "move groups", cfg_.groups.size(), RobotValues::kMaxGroups);
+  base_body_ = resolve(model, mjOBJ_BODY, prefix_ + cfg_.base_body, place);
+  check_groups(place, cfg_.groups.size());
+  ControllerInit init{model, num_worlds, base_body_,
+                      periods.value_or(ControlPeriods{0.001 * cfg_.policy_dt_ms,
+                                                      0.001 * cfg_.ctrl_dt_ms}),
+                      prefix_, place};
+  std::vector<int> base_joints;
   for (const MoveGroupCfg& g : cfg_.groups) {
-    const std::string group_place = place + ", move group '" + g.name + "'";
-    check_size(group_place, "joints", g.joints.size(), kMaxValues);
-    check_size(group_place, "actuators", g.actuators.size(), kMaxValues);
-    if (!g.init.empty() && g.init.size() != g.joints.size())
-      throw ValueError(fmt::format("{}: {} start positions for {} joints", group_place,
-                                   g.init.size(), g.joints.size()));
-    MoveGroup group;
-    group.name = g.name;
-    group.kind = g.kind;
-    for (const std::string& name : g.joints) {
-      const int id = find(mjOBJ_JOINT, name);
-      group.joints.push_back(id);
-      group.qpos.push_back(model->jnt_qposadr[id]);
-      group.dofs.push_back(model->jnt_dofadr[id]);
-    }
-    for (const std::string& name : g.actuators) {
-      const int id = find(mjOBJ_ACTUATOR, name);
-      const bool limited = model->actuator_ctrllimited[id];
-      group.actuators.push_back(id);
-      group.ctrl_low.push_back(limited ? model->actuator_ctrlrange[2 * id] : -mjMAXVAL);
-      group.ctrl_high.push_back(limited ? model->actuator_ctrlrange[2 * id + 1] : mjMAXVAL);
-    }
-    if (!g.leaf_site.empty()) group.leaf_site = find(mjOBJ_SITE, g.leaf_site);
-    if (!g.root_body.empty()) group.root_body = find(mjOBJ_BODY, g.root_body);
-    group.open_command = g.open_command;
-    group.closed_command = g.closed_command;
-    group.max_opening = g.max_opening;
-    if (g.kind == GroupKind::kGripper) {
-      if (g.pad_sites.size() != 2)
-        throw ValueError(
-            fmt::format("{}: needs 2 pad sites, has {}", group_place, g.pad_sites.size()));
-      for (int i = 0; i < 2; ++i) group.pad_sites[i] = find(mjOBJ_SITE, g.pad_sites[i]);
-    }
+    init.place = place + ", move group '" + g.name + "'";
+    MoveGroup group = resolve_group(g, model, prefix_, init.place);
+    controllers_.push_back(make_controller(g.controller, group, init));
+    controllers_.back()->describe(group);
+    every_step_ |= controllers_.back()->every_step();
     const int index = static_cast<int>(groups_.size());
     if (g.kind == GroupKind::kArm && arm_ < 0) arm_ = index;
     if (g.kind == GroupKind::kGripper && gripper_ < 0) gripper_ = index;
-    group.command_unit = command_unit(model, group);
+    if (g.kind == GroupKind::kBase)
+      base_joints.insert(base_joints.end(), group.joints.begin(), group.joints.end());
     groups_.push_back(std::move(group));
   }
+  placement_ = BasePlacement(model, base_body_, base_joints, place);
 
   std::vector<int> moving;
   for (const MoveGroup& g : groups_) moving.insert(moving.end(), g.joints.begin(), g.joints.end());
@@ -113,9 +60,12 @@ Robot::Robot(RobotCfg cfg, const mjModel* model, int num_worlds, std::string_vie
     chains_.push_back(std::make_unique<Chain>(model, base_body_, g.leaf_site, moving));
     for (int joint : chains_.back()->joints()) {
       for (int k = 0; k < static_cast<int>(groups_.size()); ++k) {
-        const auto& joints = groups_[k].joints;
-        const auto at = std::find(joints.begin(), joints.end(), joint);
-        if (at != joints.end()) source.emplace_back(k, static_cast<int>(at - joints.begin()));
+        const auto& qpos = groups_[k].qpos;
+        const auto at = std::find(qpos.begin(), qpos.end(), model->jnt_qposadr[joint]);
+        if (at != qpos.end()) {
+          source.emplace_back(k, static_cast<int>(at - qpos.begin()));
+          break;
+        }
       }
     }
   }
@@ -146,13 +96,11 @@ Pose Robot::tcp_pose(const World& world, int group) const {
 }
 
 double Robot::opening(const World& world, int gripper) const {
-  const auto& pads = groups_[gripper].pad_sites;
-  return norm(vec3(world.data->site_xpos + 3 * pads[0]) -
-              vec3(world.data->site_xpos + 3 * pads[1]));
+  return gripper_opening(groups_[gripper], world);
 }
 
 bool Robot::is_open(const World& world, int gripper) const {
-  return opening(world, gripper) > 0.5 * groups_[gripper].max_opening;
+  return gripper_is_open(groups_[gripper], world);
 }
 
 void Robot::read_qpos(const World& world, RobotValues& out) const {
@@ -186,47 +134,71 @@ Pose Robot::fk(int group, const RobotValues& values) const {
   return chains_[group]->fk({q, source.size()});
 }
 
-void Robot::write_start(const StateRow& state, const Pose& base, Rng& rng) const {
-  if (base_mocap_ >= 0) {
-    write_vec(base.p, state.mocap_pos + 3 * base_mocap_);
-    write_quat(base.q, state.mocap_quat + 4 * base_mocap_);
+bool Robot::ik(int group, const Pose& target, RobotValues& values, int max_iterations) const {
+  if (!chains_[group]) return false;
+  double q[Chain::kMaxJoints];
+  bool moves[Chain::kMaxJoints];
+  const auto& source = source_[group];
+  for (std::size_t i = 0; i < source.size(); ++i) {
+    const GroupValues& from = values[source[i].first];
+    q[i] = from.values[source[i].second < from.size ? source[i].second : 0];
+    moves[i] = source[i].first == group;
   }
+  const std::size_t n = source.size();
+  if (!chains_[group]->ik(target, {q, n}, max_iterations, 1e-4, {moves, n})) return false;
+  for (std::size_t i = 0; i < n; ++i) {
+    if (moves[i]) values[group].values[source[i].second] = q[i];
+  }
+  return true;
+}
+
+Pose Robot::target_pose(const World& world, int group) const {
+  if (!chains_[group]) return {};
+  const RobotValues& targets = targets_[world.id];
+  double q[Chain::kMaxJoints];
+  const auto& source = source_[group];
+  for (std::size_t i = 0; i < source.size(); ++i) {
+    const auto [g, k] = source[i];
+    const GroupValues& from = targets[g];
+    // A gripper's one target stands for all its joints.
+    q[i] = from.size > 0 ? from.values[k < from.size ? k : 0] : world.data->qpos[groups_[g].qpos[k]];
+  }
+  return chains_[group]->fk({q, source.size()});
+}
+
+void Robot::write_start(const StateRow& state, const std::optional<Pose>& base, Rng& rng) const {
+  if (base) placement_.write(state, *base);
   for (std::size_t g = 0; g < groups_.size(); ++g) {
     const MoveGroup& group = groups_[g];
     const MoveGroupCfg& cfg = cfg_.groups[g];
     for (std::size_t i = 0; i < cfg.init.size(); ++i) {
       double q = cfg.init[i];
       if (!cfg.spread.empty()) q += rng.uniform(-cfg.spread[i], cfg.spread[i]);
-      const int joint = group.joints[i];
-      if (model_->jnt_limited[joint])
-        q = std::clamp(q, model_->jnt_range[2 * joint], model_->jnt_range[2 * joint + 1]);
       state.qpos[group.qpos[i]] = q;
-      state.qvel[group.dofs[i]] = 0;
     }
-    if (group.kind == GroupKind::kActuators) continue;  // as the scene has them
-    for (std::size_t i = 0; i < group.actuators.size(); ++i) {
-      state.ctrl[group.actuators[i]] =
-          group.kind == GroupKind::kGripper ? group.open_command : state.qpos[group.qpos[i]];
+    if (!cfg.init.empty()) {
+      for (int dof : group.dofs) state.qvel[dof] = 0;
+      for (int joint : group.joints) {
+        if (!model_->jnt_limited[joint] || model_->jnt_type[joint] == mjJNT_BALL) continue;
+        double& q = state.qpos[model_->jnt_qposadr[joint]];
+        q = std::clamp(q, model_->jnt_range[2 * joint], model_->jnt_range[2 * joint + 1]);
+      }
     }
+    controllers_[g]->start(state);
   }
 }
 
-void Robot::hold(const World& world, int g, GroupValues& out) const {
-  const MoveGroup& group = groups_[g];
-  out.size = static_cast<int>(group.actuators.size());
-  for (int i = 0; i < out.size; ++i) {
-    const double value = group.kind == GroupKind::kActuators ? world.data->ctrl[group.actuators[i]]
-                         : group.kind != GroupKind::kGripper ? world.data->qpos[group.qpos[i]]
-                         : is_open(world, g)                 ? group.open_command
-                                                             : group.closed_command;
-    out.values[i] = std::clamp(value, group.ctrl_low[i], group.ctrl_high[i]);
-  }
-  out.given = false;
+// The target of a group that has no command.
+std::span<double> Robot::holding(int world, int g) {
+  GroupValues& target = targets_[world][g];
+  target.size = groups_[g].target_size;
+  target.given = false;
+  return {target.values.data(), static_cast<std::size_t>(target.size)};
 }
 
 void Robot::reset(const World& world) {
   for (std::size_t g = 0; g < groups_.size(); ++g)
-    hold(world, static_cast<int>(g), targets_[world.id][g]);
+    controllers_[g]->reset(world, holding(world.id, static_cast<int>(g)));
 }
 
 void Robot::command(const World& world, const Action& action) {
@@ -237,21 +209,22 @@ void Robot::command(const World& world, const Action& action) {
     if (!wanted.given) {
       // Held from the first step that leaves the group out: reading qpos every step would let it
       // drift.
-      if (target.given) hold(world, static_cast<int>(g), target);
+      if (target.given) controllers_[g]->hold(world, holding(world.id, static_cast<int>(g)));
       continue;
     }
-    if (wanted.size != static_cast<int>(group.actuators.size()))
+    if (wanted.size != group.command_size)
       throw ValueError(
           fmt::format("robot '{}': move group '{}' takes {} commands, the action has {}", cfg_.name,
-                      group.name, group.actuators.size(), wanted.size));
+                      group.name, group.command_size, wanted.size));
     for (int i = 0; i < wanted.size; ++i) {
       if (!std::isfinite(wanted.values[i]))
         throw ValueError(fmt::format("robot '{}': command {} of move group '{}' is {}", cfg_.name,
                                      i, group.name, wanted.values[i]));
-      target.values[i] = std::clamp(wanted.values[i], group.ctrl_low[i], group.ctrl_high[i]);
     }
-    target.size = wanted.size;
+    target.size = group.target_size;
     target.given = true;
+    controllers_[g]->command(world, wanted.view(),
+                             {target.values.data(), static_cast<std::size_t>(target.size)});
   }
 }
 
@@ -259,11 +232,24 @@ void Robot::write_ctrl(const World& world, const StateRow& state, Rng* noise) co
   for (std::size_t g = 0; g < groups_.size(); ++g) {
     const MoveGroup& group = groups_[g];
     GroupValues values = targets_[world.id][g];
-    if (noise && group.kind == GroupKind::kArm)
-      add_arm_noise(world, static_cast<int>(g), *noise,
-                    {values.values.data(), static_cast<std::size_t>(values.size)});
-    for (int i = 0; i < values.size; ++i) state.ctrl[group.actuators[i]] = values.values[i];
+    const std::span<double> target(values.values.data(), static_cast<std::size_t>(values.size));
+    if (noise && group.kind == GroupKind::kArm && chains_[g] && group.targets_are_qpos()) {
+      add_arm_noise(world, static_cast<int>(g), *noise, target);
+    } else if (noise) {
+      controllers_[g]->disturb(world, *noise, target);
+    }
+    controllers_[g]->begin(world, target, state);
   }
+}
+
+mjtStage Robot::control(const World& world, int index) const {
+  mjtStage valid = mjSTAGE_ACC;
+  const StateRow state = state_row(world.data);
+  for (const auto& controller : controllers_) {
+    if (controller->every_step())
+      valid = std::min(valid, controller->compute(world, index, state));
+  }
+  return valid;
 }
 
 void Robot::add_arm_noise(const World& world, int g, Rng& rng, std::span<double> target) const {

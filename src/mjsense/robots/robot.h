@@ -7,6 +7,7 @@
 #include <mujoco/mujoco.h>
 
 #include <memory>
+#include <optional>
 #include <span>
 #include <string>
 #include <string_view>
@@ -18,36 +19,22 @@
 #include "mjsense/observe/image_points.h"
 #include "mjsense/observe/joint_state.h"
 #include "mjsense/robots/action.h"
+#include "mjsense/robots/base_placement.h"
+#include "mjsense/robots/controllers/controller.h"
 #include "mjsense/robots/kinematics.h"
+#include "mjsense/robots/move_group.h"
 #include "mjsense/robots/robot_cfg.h"
 #include "mjsense/robots/state_row.h"
 
 namespace mjsense {
-
-// A named set of joints with a controller.
-struct MoveGroup {
-  std::string name;
-  GroupKind kind = GroupKind::kArm;
-  std::vector<int> joints, qpos, dofs;  // ids, addresses in qpos and qvel
-  std::vector<int> actuators;           // empty: nothing to command (a mocap base)
-  std::vector<double> ctrl_low, ctrl_high;
-  std::string
-      command_unit;  // "rad", "m" of position servos of joints; else what ctrl takes: "0 open .. 255 closed"
-  int leaf_site = -1;  // -1: the leaf is the base frame itself
-  int root_body = -1;
-  // Grippers only.
-  double open_command = 0, closed_command = 0, max_opening = 0;
-  int pad_sites[2] = {-1, -1};
-
-  bool controlled() const { return !actuators.empty(); }
-};
 
 class Robot {
  public:
   static constexpr std::string_view kPrefix = "robot_0/";
 
   // Resolves every name of cfg; throws KeyError naming the first that `model` does not have.
-  Robot(RobotCfg cfg, const mjModel* model, int num_worlds, std::string_view prefix = kPrefix);
+  Robot(RobotCfg cfg, const mjModel* model, int num_worlds, std::string_view prefix = kPrefix,
+        std::optional<ControlPeriods> periods = {});
 
   const RobotCfg& cfg() const { return cfg_; }
   const std::string& name() const { return cfg_.name; }
@@ -55,8 +42,8 @@ class Robot {
   std::span<const MoveGroup> groups() const { return groups_; }
   int group_index(std::string_view name) const;  // throws KeyError
   const MoveGroup& group(std::string_view name) const { return groups_[group_index(name)]; }
-  int arm() const { return arm_; }          // index of the first arm
-  int gripper() const { return gripper_; }  // index of the first gripper
+  int arm() const { return arm_; }          // index of the first arm, -1: it has none
+  int gripper() const { return gripper_; }  // index of the first gripper, -1: it has none
   int base_body() const { return base_body_; }
 
   // --- what a fresh world shows
@@ -76,19 +63,32 @@ class Robot {
   // From the base to the group's leaf, through every joint of a move group on the way. Not for a
   // base, which has none.
   const Chain& chain(int group) const { return *chains_[group]; }
+  // Moves the joints of `group` alone until its leaf is at `target` (base frame); the other groups
+  // stand as `values` says (in: the start, out: the solution). False, and `values` as they were, if
+  // it is not reached. For a path: max_iterations = Chain::kTracking stays near the start.
+  bool ik(int group, const Pose& target, RobotValues& values, int max_iterations = 1000) const;
+  // X_BL where the controllers' targets put the leaf; joints without a target stay where they are.
+  Pose target_pose(const World& world, int group) const;
 
   // --- controllers
-  // Start configuration with noise drawn from rng, robot standing at X_WB; controls hold it.
-  void write_start(const StateRow& state, const Pose& base, Rng& rng) const;
+  const Controller& controller(int group) const { return *controllers_[group]; }
+  // Start configuration with noise drawn from rng, robot standing at X_WB, or where it stands;
+  // controls hold it. Throws ValueError where nothing can carry the base there.
+  void write_start(const StateRow& state, const std::optional<Pose>& base, Rng& rng) const;
   // A new episode: the targets are what the controllers hold now (arm: its qpos; gripper: open or
   // closed as it is).
   void reset(const World& world);
-  // New targets: the action clipped to the control ranges; groups that it leaves out hold. Throws
+  // New targets: what the controllers make of the action; groups that it leaves out hold. Throws
   // ValueError when a group has the wrong number of values.
   void command(const World& world, const Action& action);
-  // Writes the targets to ctrl, with the arm's action noise if rng is not null.
+  // Controls of the first control step, with noise on the targets if rng is not null.
   void write_ctrl(const World& world, const StateRow& state, Rng* noise) const;
-  // Un-noised targets of the controlled groups: what actions/joint_pos records.
+  // Control step `index` (from 1) after that, in the pass over the worlds; only where a controller
+  // has something to do there. Returns the last of MuJoCo's stages that stays valid.
+  bool controls_every_step() const { return every_step_; }
+  mjtStage control(const World& world, int index) const;
+  // Un-noised targets of the groups whose controllers aim at positions: what actions/joint_pos
+  // records.
   const RobotValues& targets(int world) const { return targets_[world]; }
 
   // Sensors that every task with this robot records (tcp_pose). They refer to this robot.
@@ -98,17 +98,20 @@ class Robot {
   std::vector<JointGroup> joint_groups() const;
 
  private:
-  void hold(const World& world, int group, GroupValues& out) const;
+  std::span<double> holding(int world, int group);
   void add_arm_noise(const World& world, int group, Rng& rng, std::span<double> q) const;
 
   RobotCfg cfg_;
   const mjModel* model_;
   std::string prefix_;
   std::vector<MoveGroup> groups_;
-  std::vector<std::unique_ptr<Chain>> chains_;  // per group, null without a leaf
+  std::vector<std::unique_ptr<Controller>> controllers_;  // per group
+  std::vector<std::unique_ptr<Chain>> chains_;            // per group, null without a leaf
   // Per group, per joint of its chain: (group, index) of its value.
   std::vector<std::vector<std::pair<int, int>>> source_;
-  int arm_ = -1, gripper_ = -1, base_body_ = -1, base_mocap_ = -1;
+  int arm_ = -1, gripper_ = -1, base_body_ = -1;
+  bool every_step_ = false;
+  BasePlacement placement_;
   std::vector<RobotValues> targets_;  // [B]; `given` false: the group holds
 };
 

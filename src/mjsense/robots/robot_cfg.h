@@ -1,67 +1,184 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
-// What a robot is, as data: its MJCF, move groups, start configuration, cameras. One function a
-// robot fills one in.
+// What a robot is, as data: the MJCF files that make it up, move groups with their controllers,
+// start configuration, cameras. A robot.toml says it (robots/load_robot.h); its keys are the fields
+// below.
 
 #include <mujoco/mujoco.h>
 
+#include <array>
 #include <functional>
+#include <optional>
 #include <string>
 #include <string_view>
 #include <vector>
 
+#include "mjsense/core/fields.h"
+#include "mjsense/robots/controllers/controller_cfg.h"
 #include "mjsense/scene/entity.h"
 
 namespace mjsense {
 
 // kActuators: whatever they drive; without a command they stay as they are.
-enum class GroupKind { kBase, kArm, kGripper, kActuators };
+enum class GroupKind { kBase, kTorso, kArm, kGripper, kHead, kActuators };
+template <>
+inline constexpr std::array<std::string_view, 6> kWords<GroupKind>{"base",    "torso", "arm",
+                                                                   "gripper", "head",  "actuators"};
 
-// Names are local to the robot's MJCF, without the "robot_0/" prefix.
+// Names are local to the robot's model, without the "robot_0/" prefix.
 struct MoveGroupCfg {
   std::string name;  // "arm"
-  GroupKind kind = GroupKind::kArm;
+  Word<GroupKind> kind = GroupKind::kArm;
   std::vector<std::string> joints, actuators;
-  std::string leaf_site;       // the group's tool frame; "" for a base
-  std::string root_body;       // its subtree is the group: the gripper's geoms of grasp_state_*
-  std::vector<double> init;    // start joint positions, rad or m
-  std::vector<double> spread;  // half widths of their uniform start noise; empty: none
+  ControllerCfg controller;
+  std::string leaf_site;
+  std::string root_body;
+  std::vector<double> init;
+  std::vector<double> spread;
   // Grippers only.
-  double open_command = 0, closed_command = 0;     // of the actuator
-  double max_opening = 0;                          // m, between the pads
-  std::vector<std::string> pad_sites;              // two, on the pads' faces
-  double pad_half_width = 0, pad_half_length = 0;  // m, across and along the approach
+  double open_command = 0, closed_command = 0;
+  double max_opening = 0;
+  std::vector<std::string> pad_sites;
+  double pad_half_width = 0, pad_half_length = 0;
 };
+template <class V>
+void visit_fields(V& v, MoveGroupCfg& c) {
+  v.object("MoveGroupCfg", "Joints of a robot that are commanded together.");
+  v("name", c.name, "What actions and observations call it.").required();
+  v("kind", c.kind, "What it is: the first arm and gripper are those that tasks use.").required();
+  v("joints", c.joints, "Its joints, in the order of its numbers.");
+  v("actuators", c.actuators, "Its actuators, in the order of its targets; none: nothing drives it.");
+  v("controller", c.controller, "What a command means.");
+  v("leaf_site", c.leaf_site, "Site of its tool frame; none: the robot's base frame.");
+  v("root_body", c.root_body, "Body whose subtree is the group; a gripper's geoms are there.");
+  v("init", c.init, "Start positions (qpos) of its joints: rad or m.");
+  v("spread", c.spread, "Half widths of the uniform noise of the start; none: no noise.").at_least(0);
+  v("open_command", c.open_command, "Of a gripper's actuators: open.");
+  v("closed_command", c.closed_command, "Of a gripper's actuators: closed.");
+  v("max_opening", c.max_opening, "Of a gripper, between the pads.").unit("m").at_least(0);
+  v("pad_sites", c.pad_sites, "Two sites on the faces of a gripper's pads.");
+  v("pad_half_width", c.pad_half_width, "Of a pad, across the approach.").unit("m").at_least(0);
+  v("pad_half_length", c.pad_half_length, "Of a pad, along the approach.").unit("m").at_least(0);
+}
+void validate(const MoveGroupCfg& cfg, std::string_view place);
 
-// A camera of the robot's MJCF that an episode records.
+// A camera of the robot's model that an episode records.
 struct CameraMount {
   std::string name;         // of the sensor: "wrist_camera"
   std::string mjcf_camera;  // local name
   bool record_depth = false;
-  bool image_points = true;  // object_image_points looks through it
+  bool image_points = true;
 };
+template <class V>
+void visit_fields(V& v, CameraMount& c) {
+  v.object("CameraMount", "A camera of the robot that an episode records.");
+  v("name", c.name, "Of its stream.").required();
+  v("camera", c.mjcf_camera, "Camera of the model.").required();
+  v("depth", c.record_depth, "Its depth is recorded, too.");
+  v("image_points", c.image_points, "``object_image_points`` looks through it.");
+}
 
 // Displacement of the tool that the arm's controllers see and recordings do not; normal, truncated.
 struct ActionNoiseCfg {
-  double scale = 0.1;           // standard deviation per metre that the command would move the tool
-  double rotation_ratio = 0.1;  // rotation deviation (rad) per position deviation (m)
-  double max_position = 0.02;   // m, truncation
-  double max_rotation = 0.1;    // rad
+  double scale = 0.1;
+  double rotation_ratio = 0.1;
+  double max_position = 0.02;
+  double max_rotation = 0.1;
 };
+template <class V>
+void visit_fields(V& v, ActionNoiseCfg& c) {
+  v.object("ActionNoiseCfg", "Displacement of the tool by noise on an arm's commands.");
+  v("scale", c.scale, "Standard deviation per metre that the command would move the tool.")
+      .at_least(0);
+  v("rotation_ratio", c.rotation_ratio, "Rotation (rad) per displacement (m).").at_least(0);
+  v("max_position", c.max_position, "Where it is cut.").unit("m").positive();
+  v("max_rotation", c.max_rotation, "Where it is cut.").unit("rad").positive();
+}
+
+// A model that hangs on the robot's: a gripper on the flange of an arm.
+struct PartCfg {
+  std::string model;
+  std::string to;
+  std::string prefix;
+  std::array<double, 3> pos{0, 0, 0};
+  std::array<double, 4> quat{1, 0, 0, 0};
+};
+template <class V>
+void visit_fields(V& v, PartCfg& c) {
+  v.object("PartCfg", "A model that hangs on the robot's.");
+  v("model", c.model, "Its MJCF, from the file's folder, or ``embedded:<file>``.").required();
+  v("to", c.to, "Site or body that it hangs on.").required();
+  v("prefix", c.prefix, "Of its names.");
+  v("pos", c.pos, "Of its root where it hangs.").unit("m");
+  v("quat", c.quat, "Likewise, wxyz.");
+}
+
+// Meshes that take the place of shapes where a folder has them.
+struct MeshesCfg {
+  std::string env;
+  std::string folder;
+  std::string replace;
+  std::string material;
+  std::vector<std::pair<std::string, std::string>> files;
+};
+template <class V>
+void visit_fields(V& v, MeshesCfg& c) {
+  v.object("MeshesCfg", "Meshes that take the place of shapes where a folder has them.");
+  v("env", c.env, "Environment variable that names the folder; it goes before ``folder``.");
+  v("folder", c.folder, "The folder, from the file's own; nothing happens where there is none.");
+  v("replace", c.replace, "Regular expression of the names of the geoms that they replace.");
+  v("material", c.material, "Of the meshes.");
+  v("files", c.files, "File of the mesh of each body.");
+}
 
 struct RobotCfg {
-  std::string name;  // "franka"
+  std::string name;
+  std::string description;
   ModelSource model;
   // Called on the scene's spec before compilation with the prefix of the robot's names; may be
   // empty.
   std::function<void(mjSpec* spec, const std::string& prefix)> edit_spec;
-  std::string base_body;             // mocap body on the floor: the robot base frame
+  std::string base_body;             // the robot's base frame
   std::vector<MoveGroupCfg> groups;  // in this order everywhere
   std::vector<CameraMount> cameras;
   int image_width = 640, image_height = 368;  // one resolution for all cameras
   ActionNoiseCfg noise;
-  int env_state_size = 0;  // env_states: numbers of the articulation row; 0: what the groups need
-  std::string env_state_name;  // of that row; "": the robot's
+  int policy_dt_ms = 66, ctrl_dt_ms = 2, sim_dt_ms = 2;
+  std::string env_state_name;  // of the row of env_states in MolmoSpaces' form; "": there is none
+  int env_state_size = 0;      // its numbers; 0: what the groups need
+
+  // What the file says where its model comes from; load_robot() makes `model` and `edit_spec` of it.
+  std::string mjcf;
+  std::vector<PartCfg> parts;
+  std::optional<MeshesCfg> meshes;
+  std::string file;  // that it was read from
 };
+template <class V>
+void visit_fields(V& v, RobotCfg& c) {
+  v.object("RobotCfg", "What a robot is.");
+  v("name", c.name, "What messages and recordings call it; by default its folder's name.");
+  v("description", c.description, "A sentence for people.");
+  v("model", c.mjcf, "Its MJCF, from the file's folder, or ``embedded:<file>``.").required();
+  v("parts", c.parts, "Models that hang on it, in this order.");
+  v("meshes", c.meshes, "Meshes that take the place of shapes.");
+  v("base", c.base_body, "Body that is the robot's base frame.").required();
+  v("groups", c.groups, "Its move groups; their order is that of actions and observations.");
+  v("cameras", c.cameras, "Cameras that an episode records.");
+  v("width", c.image_width, "Of their pictures.").unit("pixels").at_least(1);
+  v("height", c.image_height, "Of their pictures.").unit("pixels").at_least(1);
+  v("noise", c.noise, "On the commands of arms.");
+  v("policy_dt_ms", c.policy_dt_ms, "One action of a policy.").unit("ms").at_least(1);
+  v("ctrl_dt_ms", c.ctrl_dt_ms, "One step of the controllers; divides ``policy_dt_ms``.")
+      .unit("ms")
+      .at_least(1);
+  v("sim_dt_ms", c.sim_dt_ms, "One step of the physics; divides ``ctrl_dt_ms``.")
+      .unit("ms")
+      .at_least(1);
+  v("env_state_name", c.env_state_name,
+    "Name of a further row of ``env_states`` in MolmoSpaces' form; none: there is no such row.");
+  v("env_state_size", c.env_state_size, "Numbers of that row; 0: what the groups need.").at_least(0);
+}
+// Periods that divide, unique names.
+void validate(const RobotCfg& cfg, std::string_view place);
 
 }  // namespace mjsense

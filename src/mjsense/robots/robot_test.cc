@@ -5,7 +5,7 @@
 #include <gtest/gtest.h>
 
 #include "mjsense/core/error.h"
-#include "mjsense/robots/franka/franka.h"
+#include "mjsense/robots/load_robot.h"
 #include "mjsense/scene/scene.h"
 
 namespace mjsense {
@@ -22,7 +22,7 @@ struct Franka : testing::Test {
   static SceneCfg scene_cfg() {
     SceneCfg cfg;
     EntityCfg entity;
-    entity.model = franka_cfg().model;
+    entity.model = robot_cfg("franka").model;
     cfg.entities = {{"robot_0", entity}};
     return cfg;
   }
@@ -50,7 +50,7 @@ struct Franka : testing::Test {
 
   Scene scene{scene_cfg()};
   const mjModel* model = scene.model();
-  Robot robot{franka_cfg(), model, 2};
+  Robot robot{robot_cfg("franka"), model, 2};
   std::unique_ptr<mjData, DataDelete> data[2];
   World worlds[2];
 };
@@ -79,7 +79,7 @@ TEST_F(Franka, StartsNearItsStartConfigurationAndStaysThere) {
 
 // Whatever the noise, a start lies within the limits: what would be beyond is at the limit.
 TEST_F(Franka, StartsNeverLieBeyondTheLimits) {
-  RobotCfg cfg = franka_cfg();
+  RobotCfg cfg = robot_cfg("franka");
   MoveGroupCfg& arm = cfg.groups[1];
   double low[7], high[7];
   for (int i = 0; i < 7; ++i) {
@@ -294,7 +294,7 @@ TEST_F(Franka, UnknownNamesAreErrorsWithTheNearest) {
   } catch (const KeyError& e) {
     EXPECT_THAT(e.what(), HasSubstr("'gripper'"));
   }
-  RobotCfg wrong = franka_cfg();
+  RobotCfg wrong = robot_cfg("franka");
   wrong.groups[1].joints[2] = "fr3_jont3";
   try {
     Robot broken(wrong, model, 1);

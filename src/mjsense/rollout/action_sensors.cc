@@ -108,7 +108,7 @@ class CommandedAction final : public ActionSensor<float> {
 
  protected:
   SensorSpec group_spec(const MoveGroup& g) const override {
-    return spec_of(count(g.actuators), g.command_unit, "",
+    return spec_of(g.command_size, g.command_unit, "",
                    fmt::format("The policy's command to '{}', as it gave it.", g.name));
   }
   void declare_more(const SensorInit& init) override {
@@ -134,9 +134,9 @@ class JointPos final : public ActionSensor<double> {
 
  protected:
   SensorSpec group_spec(const MoveGroup& g) const override {
-    if (!g.controlled()) return {};
+    if (g.target_size == 0) return {};
     SensorSpec spec =
-        spec_of(count(g.actuators), g.command_unit, "",
+        spec_of(g.target_size, g.target_unit, "",
                 fmt::format("Target of the controller of '{}', without noise.", g.name));
     // The least box around the control ranges, and 0 where nothing is given.
     const double low = std::ranges::min(g.ctrl_low), high = std::ranges::max(g.ctrl_high);
@@ -151,17 +151,13 @@ class JointPos final : public ActionSensor<double> {
   }
 };
 
-bool has_target_for_each_joint(const MoveGroup& group) {
-  return group.controlled() && group.actuators.size() == group.joints.size();
-}
-
 class JointPosRel final : public ActionSensor<double> {
  public:
   using ActionSensor::ActionSensor;
 
  protected:
   SensorSpec group_spec(const MoveGroup& g) const override {
-    return spec_of(count(g.joints), has_target_for_each_joint(g) ? g.command_unit : "", "",
+    return spec_of(count(g.qpos), g.targets_are_qpos() ? g.target_unit : "", "",
                    fmt::format("Target of '{}' minus its joints as observed before.", g.name));
   }
   bool shown(const World& world) override { return is_first(world) || !terminal(task_, world); }
@@ -171,7 +167,7 @@ class JointPosRel final : public ActionSensor<double> {
       return true;
     }
     const GroupValues &target = targets(world)[g], &qpos = log_[world.id].qpos[g];
-    if (!has_target_for_each_joint(group(g))) return false;
+    if (!group(g).targets_are_qpos()) return false;
     for (int i = 0; i < target.size; ++i) row[i] = target.values[i] - qpos.values[i];
     return true;
   }
@@ -189,7 +185,7 @@ class EePose final : public ActionSensor<double> {
   }
   bool shown(const World& world) override { return !terminal(task_, world); }
   bool write(const World& world, int g, std::span<double> row) override {
-    write_pose(task_.robot().fk(g, targets(world)), row.data());
+    write_pose(task_.robot().target_pose(world, g), row.data());
     return true;
   }
 };
@@ -200,7 +196,7 @@ class EeTwist final : public ActionSensor<double> {
 
  protected:
   SensorSpec group_spec(const MoveGroup& g) const override {
-    if (!g.controlled()) return {};
+    if (g.target_size == 0) return {};
     return spec_of(6, "m, rad", "the leaf as observed before",
                    fmt::format("Twist of the leaf of '{}' to where the targets put it, per control "
                                "step.",
@@ -210,7 +206,7 @@ class EeTwist final : public ActionSensor<double> {
   bool write(const World& world, int g, std::span<double> row) override {
     Twist twist;
     if (!is_first(world)) {
-      twist = log6(inverse(log_[world.id].leaf[g]) * task_.robot().fk(g, targets(world)));
+      twist = log6(inverse(log_[world.id].leaf[g]) * task_.robot().target_pose(world, g));
     }
     std::ranges::copy(std::initializer_list<double>{twist.v.x, twist.v.y, twist.v.z, twist.w.x,
                                                     twist.w.y, twist.w.z},

@@ -18,10 +18,10 @@ namespace mjsense {
 // wxyz (poses). "Before" is the observation that the action answers. At a
 // terminal observation nothing is given but commanded_action.
 //
-//   actions/commanded_action  float32, as the policy gave it; first: nothing. `success` [1] is the
+//   actions/commanded_action  float32, as the policy gave it to the group's controller; first: nothing. `success` [1] is the
 //                             policy's own verdict, 0 or 1
-//   actions/joint_pos         float64, the controllers' targets, without noise; first: what they
-//                             hold
+//   actions/joint_pos         float64, the joint positions that the controllers aim at, without
+//                             noise, of groups whose controller aims at some; first: what they hold
 //   actions/joint_pos_rel     float64, these minus qpos before; only of groups that have as many
 //                             targets as joints; first: zeros of every group
 //   actions/ee_twist          float64 [6], log6(inv(X_BL before) * fk(targets)) = [linear 3 (m),

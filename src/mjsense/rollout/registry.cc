@@ -7,7 +7,6 @@
 
 #include "mjsense/core/error.h"
 #include "mjsense/policies/planner/pick_planner.h"
-#include "mjsense/robots/franka/franka.h"
 #include "mjsense/tasks/pick/pick.h"
 
 namespace mjsense {
@@ -57,11 +56,6 @@ class Registry {
   std::vector<Entry> entries_;
 };
 
-Registry<std::function<RobotCfg()>>& robots() {
-  static Registry<std::function<RobotCfg()>> all("robots", "robot", {{"franka", franka_cfg}});
-  return all;
-}
-
 Registry<TaskFactory>& tasks() {
   static Registry<TaskFactory> all(
       "tasks", "task",
@@ -77,11 +71,8 @@ Registry<PolicyFactory>& policies() {
 
 }  // namespace
 
-std::vector<std::string> robot_names() { return robots().names(); }
 std::vector<std::string> task_names() { return tasks().names(); }
 std::vector<std::string> policy_names() { return policies().names(); }
-
-RobotCfg robot_cfg(std::string_view name) { return robots().at(name)(); }
 
 std::unique_ptr<Task> make_task(std::string_view name, TaskCfg cfg) {
   return tasks().at(name)(std::move(cfg));

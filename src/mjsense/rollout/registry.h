@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
-// The robots, tasks and policies that have a name: what the program's options and Python's strings
-// choose from. Yours join them by register_task() and register_policy(). Each make throws KeyError
-// with the nearest names.
+// The robots (robots/load_robot.h), tasks and policies that have a name: what the program's options
+// and Python's strings choose from. Yours join them by register_task() and register_policy(). Each
+// make throws KeyError with the nearest names.
 
 #include <functional>
 #include <memory>
@@ -12,14 +12,12 @@
 
 #include "mjsense/episode/policy.h"
 #include "mjsense/episode/task.h"
+#include "mjsense/robots/load_robot.h"
 
 namespace mjsense {
 
 using TaskFactory = std::function<std::unique_ptr<Task>(TaskCfg)>;
 using PolicyFactory = std::function<std::unique_ptr<Policy>()>;
-
-std::vector<std::string> robot_names();
-RobotCfg robot_cfg(std::string_view name);
 
 // Ours first, then yours in the order in which they came.
 std::vector<std::string> task_names();

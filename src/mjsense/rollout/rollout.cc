@@ -24,7 +24,12 @@ double since(Clock::time_point start) {
 
 TaskCfg task_cfg(const RolloutCfg& cfg) {
   TaskCfg out;
-  if (!cfg.robot.empty()) out.robot = robot_cfg(cfg.robot);
+  if (!cfg.robot.empty()) {
+    out.robot = robot_cfg(cfg.robot);
+    out.policy_dt_ms = out.robot.policy_dt_ms;
+    out.ctrl_dt_ms = out.robot.ctrl_dt_ms;
+    out.sim_dt_ms = out.robot.sim_dt_ms;
+  }
   out.scene = cfg.scene;
   out.seed = cfg.seed;
   out.action_noise = cfg.action_noise;
@@ -106,6 +111,11 @@ void Rollout::make() {
   task_->bind(simulation_);
   if (policy_) policy_->bind(simulation_);
   task_->initialize(scene->model(), cfg_.num_worlds);
+  if (task_->robot().controls_every_step()) {
+    simulation_->set_control(task_->control_decimation(), [this](const World& world, int index) {
+      return index == 0 ? mjSTAGE_ACC : task_->robot().control(world, index);
+    });
+  }
   if (policy_) task_->register_policy(*policy_);
   log_ = std::make_unique<ActionLog>(cfg_.num_worlds);
   if (cfg_.use_sensors) suite_ = core_suite(*task_, *log_, cameras_);

@@ -6,6 +6,7 @@
 
 #include <array>
 #include <map>
+#include <memory>
 #include <string>
 #include <string_view>
 #include <utility>
@@ -15,11 +16,12 @@
 
 namespace mjsense {
 
-// Where an MJCF comes from: a path, an XML text, or a file of models/ ("embedded:franka/fr3.xml").
+// Where an MJCF comes from: a path, an XML text, or a file of models/ ("embedded:objects/mug.xml").
 struct ModelSource {
   std::string path;                           // read from disk, relative assets beside it
   std::string xml;                            // or this text
   const mjSpec* spec = nullptr;               // or this spec, which is copied
+  std::shared_ptr<const mjSpec> owner;        // keeps `spec` alive where nobody else does
   std::map<std::string, std::string> assets;  // name -> bytes, for xml and spec
 
   bool empty() const { return path.empty() && xml.empty() && spec == nullptr; }

@@ -119,6 +119,9 @@ class Simulation::Hooks final : public WorldHooks {
   mjtStage substep_stage() const override { return sim_.substep_stage_; }
   bool wants_substep() const override { return sim_.any_substep_; }
 
+  int control_every() const override { return sim_.control_every_; }
+  mjtStage control(const World& world, int index) override { return sim_.control_(world, index); }
+
   void substep(const World& world) override {
     for (auto& slot : sim_.slots_) {
       if (slot->sensor->wants_substep())
@@ -325,6 +328,12 @@ void Simulation::step(int control_steps, WorldIds ids) {
     mark_stale(due->ids);
     compute(due->slots, due->ids, Change::kStep);
   }
+}
+
+void Simulation::set_control(int every, Control control) {
+  if (every < 1) throw ValueError(fmt::format("control every {} substeps: at least 1", every));
+  control_ = std::move(control);
+  control_every_ = control_ ? every : 0;
 }
 
 void Simulation::reset(WorldIds ids, int key) {

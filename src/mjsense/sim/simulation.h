@@ -7,6 +7,7 @@
 // forwarded since.
 
 #include <cstdint>
+#include <functional>
 #include <memory>
 #include <span>
 #include <vector>
@@ -44,6 +45,11 @@ class Simulation {
   int num_worlds() const { return cfg_.num_worlds; }
   int decimation() const { return cfg_.decimation; }
   double step_dt() const { return cfg_.decimation * model()->opt.timestep; }  // s, one control step
+
+  // From here on `control` is called before every `every`-th physics step of a step(), in the
+  // parallel pass: WorldHooks::control() says what it may do. An empty one: never again.
+  using Control = std::function<mjtStage(const World& world, int index)>;
+  void set_control(int every, Control control);
 
   // Worlds that are not among the ids stand still.
   void step(int control_steps = 1, WorldIds ids = all_worlds);
@@ -130,6 +136,8 @@ class Simulation {
   bool any_substep_ = false;
   mjtStage substep_stage_ = mjSTAGE_NONE;  // that the sensors need which want every substep
   bool measure_cost_ = false;
+  int control_every_ = 0;
+  Control control_;
 };
 
 }  // namespace mjsense

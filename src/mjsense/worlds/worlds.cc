@@ -334,7 +334,7 @@ bool Worlds::step_world(const mjModel* m, mjData* d, int w, const Call& call) {
   if (stage != mjSTAGE_NONE && (derived_[w].behind || !same_state(w))) stage = mjSTAGE_NONE;
   if (stage == mjSTAGE_ACC && (!same_controls(w) || bad_control(m, d))) stage = mjSTAGE_VEL;
   const bool seen = stage != mjSTAGE_NONE || call.hooks->wants_substep() ||
-                    call.hooks->stage() != mjSTAGE_NONE || !can_split_step(m);
+                    call.hooks->control_every() > 0 || call.hooks->stage() != mjSTAGE_NONE || !can_split_step(m);
   if (!(seen ? step_whole(m, d, w, call) : step_unseen(m, d, w, call))) return false;
   remember(m, d, w);
   return true;
@@ -343,12 +343,15 @@ bool Worlds::step_world(const mjModel* m, mjData* d, int w, const Call& call) {
 bool Worlds::step_whole(const mjModel* m, mjData* d, int w, const Call& call) {
   const bool split = can_split_step(m);
   const bool every = call.hooks->wants_substep();
+  const int control_every = call.hooks->control_every();
   const Warnings warnings(d);
   mjtStage& stage = derived_[w].stage;
   mj_checkPos(m, d);
   mj_checkVel(m, d);
   for (int k = 0; k < call.substeps; ++k) {
     if (!healthy(w, warnings)) return false;
+    if (control_every > 0 && k % control_every == 0)
+      stage = std::min(stage, call.hooks->control(view(m, d, w), k / control_every));
     const mjtStage from = stage;
     stage = mjSTAGE_NONE;  // also if MuJoCo jumps out of the step
     if (split) {

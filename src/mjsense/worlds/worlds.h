@@ -36,6 +36,12 @@ class WorldHooks {
   virtual mjtStage substep_stage() const { return mjSTAGE_ACC; }
   virtual bool wants_substep() const { return false; }
   virtual void substep(const World& world) = 0;  // after every physics step, world fresh
+  // Controllers that look at the state: control() is called before physics steps 0, n, 2n ... of a
+  // step(), n = control_every(); 0: never. Of the world the state alone is current; controls and
+  // mocap poses may be written. Returns the last stage that is still valid then: mjSTAGE_VEL after
+  // controls, mjSTAGE_NONE after mocap poses, mjSTAGE_ACC if nothing was written. `index` counts.
+  virtual int control_every() const { return 0; }
+  virtual mjtStage control(const World& /*world*/, int /*index*/) { return mjSTAGE_ACC; }
   virtual void reset(const World& world) = 0;    // a new episode begins; fresh in all stages
   virtual void refreshed(
       const World& world) = 0;  // once, at the end of step/reset/forward/visit, world fresh

@@ -8,7 +8,7 @@
 
 #include "mjsense/policies/planner/pick_loop.h"
 #include "mjsense/policies/planner/pick_planner.h"
-#include "mjsense/robots/franka/franka.h"
+#include "mjsense/robots/load_robot.h"
 #include "mjsense/tasks/pick/pick.h"
 
 namespace mjsense {
@@ -17,7 +17,7 @@ namespace {
 struct Stage {
   explicit Stage(bool noise) {
     TaskCfg cfg;
-    cfg.robot = franka_cfg();
+    cfg.robot = robot_cfg("franka");
     cfg.action_noise = noise;
     task = std::make_unique<PickTask>(cfg);
     scene = std::make_unique<Scene>(task->whole_scene_cfg());

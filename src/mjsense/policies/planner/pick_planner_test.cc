@@ -10,7 +10,7 @@
 
 #include "mjsense/core/parallel.h"
 #include "mjsense/policies/planner/pick_loop.h"
-#include "mjsense/robots/franka/franka.h"
+#include "mjsense/robots/load_robot.h"
 #include "mjsense/tasks/pick/pick.h"
 
 namespace mjsense {
@@ -24,7 +24,7 @@ using DataPtr = std::unique_ptr<mjData, DataDelete>;
 struct Stage {
   explicit Stage(int num_worlds, bool noise = false) {
     TaskCfg cfg;
-    cfg.robot = franka_cfg();
+    cfg.robot = robot_cfg("franka");
     cfg.action_noise = noise;
     task = std::make_unique<PickTask>(cfg);
     scene = std::make_unique<Scene>(task->whole_scene_cfg());

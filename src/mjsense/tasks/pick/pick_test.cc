@@ -10,7 +10,7 @@
 #include <vector>
 
 #include "mjsense/core/error.h"
-#include "mjsense/robots/franka/franka.h"
+#include "mjsense/robots/load_robot.h"
 #include "mjsense/scene/resolve.h"
 
 namespace mjsense {
@@ -24,7 +24,7 @@ struct DataDelete {
 
 TaskCfg franka() {
   TaskCfg cfg;
-  cfg.robot = franka_cfg();
+  cfg.robot = robot_cfg("franka");
   return cfg;
 }
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "mjsense/robots/franka/franka.h"
+#include "mjsense/robots/meshes.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -11,6 +11,7 @@
 
 #include "mjsense/core/error.h"
 #include "mjsense/core/testing/temp_dir.h"
+#include "mjsense/robots/load_robot.h"
 #include "mjsense/scene/resolve.h"
 #include "mjsense/scene/scene.h"
 
@@ -53,9 +54,9 @@ std::unique_ptr<Scene> scene_of(const RobotCfg& robot) {
 }
 
 TEST(FrankaMeshes, ReplaceTheShapesAndNothingElse) {
-  const auto plain = scene_of(franka_cfg());
+  const auto plain = scene_of(robot_cfg("franka"));
   const Meshes meshes;
-  const auto real = scene_of(franka_cfg());
+  const auto real = scene_of(robot_cfg("franka"));
   const mjModel *a = plain->model(), *b = real->model();
   EXPECT_EQ(a->nmesh, 0);
   EXPECT_EQ(b->nmesh, 8);
@@ -77,7 +78,7 @@ TEST(FrankaMeshes, AnIncompleteFolderIsAnError) {
   const Meshes meshes;
   fs::remove(meshes.folder.path / "link6.stl");
   try {
-    franka_cfg();
+    robot_cfg("franka");
     FAIL();
   } catch (const ValueError& e) {
     EXPECT_THAT(e.what(), HasSubstr("MJSENSE_FRANKA_MESHES"));
@@ -87,7 +88,7 @@ TEST(FrankaMeshes, AnIncompleteFolderIsAnError) {
 
 // Where the cameras stand, for those who calibrate against it: in the frame of their link, m and degrees.
 TEST(FrankaModel, CamerasStandWhereTheyShould) {
-  const auto scene = scene_of(franka_cfg());
+  const auto scene = scene_of(robot_cfg("franka"));
   const mjModel* m = scene->model();
   const struct {
     const char *name, *body;
@@ -119,7 +120,7 @@ TEST(FrankaModel, CamerasStandWhereTheyShould) {
       EXPECT_NEAR(r[3 * k + 1], want.up[k], 2e-4) << want.name << " up " << k;
     }
   }
-  const RobotCfg cfg = franka_cfg();
+  const RobotCfg cfg = robot_cfg("franka");
   EXPECT_EQ(cfg.image_width, 640);
   EXPECT_EQ(cfg.image_height, 368);
   ASSERT_EQ(cfg.cameras.size(), 2u);
@@ -129,7 +130,7 @@ TEST(FrankaModel, CamerasStandWhereTheyShould) {
 }
 
 TEST(FrankaModel, MassesArePublishedOnes) {
-  const auto scene = scene_of(franka_cfg());
+  const auto scene = scene_of(robot_cfg("franka"));
   const mjModel* m = scene->model();
   const double masses[] = {2.3966,       2.9274653454, 2.9355370338, 2.2449013699,
                            2.6155955791, 2.3271207594, 1.8170376524, 0.6271432862};

@@ -1,0 +1,128 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+// The controllers that a move group may have: what a command means, as data.
+
+#include <array>
+#include <string>
+#include <variant>
+#include <vector>
+
+#include "mjsense/core/fields.h"
+
+namespace mjsense {
+
+struct JointPositionCfg {};
+template <class V>
+void visit_fields(V& v, JointPositionCfg&) {
+  v.object("JointPositionCfg", "A command is what the actuators take: positions.",
+           "joint_position");
+}
+
+struct JointPositionRelativeCfg {
+  double threshold = 1e-6;
+};
+template <class V>
+void visit_fields(V& v, JointPositionRelativeCfg& c) {
+  v.object("JointPositionRelativeCfg", "A command is a motion away from the present positions.",
+           "joint_position_relative");
+  v("threshold", c.threshold, "A joint whose command is smaller keeps its target.").at_least(0);
+}
+
+struct JointVelocityCfg {};
+template <class V>
+void visit_fields(V& v, JointVelocityCfg&) {
+  v.object("JointVelocityCfg",
+           "A command is a velocity, of velocity servos or of position servos' targets.",
+           "joint_velocity");
+}
+
+struct TorsoHeightCfg {
+  std::array<double, 2> range{0, 0.738};
+  std::vector<double> ratio;
+};
+template <class V>
+void visit_fields(V& v, TorsoHeightCfg& c) {
+  v.object("TorsoHeightCfg", "One command bends several joints that lift the torso.",
+           "torso_height");
+  v("range", c.range, "Of the command.").unit("rad");
+  v("ratio", c.ratio, "Each joint's position per unit of the command.").required();
+}
+
+struct HolonomicBaseCfg {
+  double noise = 0.1;
+  double max_position_noise = 0.02;
+  double max_rotation_noise = 0.05;
+};
+template <class V>
+void visit_fields(V& v, HolonomicBaseCfg& c) {
+  v.object("HolonomicBaseCfg",
+           "A command is a place on the floor, x, y and yaw, of two slides and a hinge.",
+           "holonomic_base");
+  v("noise", c.noise, "Standard deviation per unit of the motion.").at_least(0);
+  v("max_position_noise", c.max_position_noise, "Where it is cut.").unit("m").positive();
+  v("max_rotation_noise", c.max_rotation_noise, "Where it is cut.").unit("rad").positive();
+}
+
+struct DifferentialBaseCfg {
+  double max_speed = 1.0;
+  double max_turn = 2.0;
+  double wheel_radius = 0.1;
+  double track = 0.5;
+};
+template <class V>
+void visit_fields(V& v, DifferentialBaseCfg& c) {
+  v.object("DifferentialBaseCfg",
+           "A command is a speed ahead and a turning speed, of two wheels (left, right) or of two "
+           "slides and a hinge.",
+           "differential_base");
+  v("max_speed", c.max_speed, "Commands beyond it are cut.").unit("m/s").positive();
+  v("max_turn", c.max_turn, "Commands beyond it are cut.").unit("rad/s").positive();
+  v("wheel_radius", c.wheel_radius, "Of wheels.").unit("m").positive();
+  v("track", c.track, "Between the wheels.").unit("m").positive();
+}
+
+struct MocapBaseCfg {
+  double max_speed = 1.0;
+  double max_turn = 2.0;
+};
+template <class V>
+void visit_fields(V& v, MocapBaseCfg& c) {
+  v.object("MocapBaseCfg", "A command is a pose in the world, of a base that is a mocap body.",
+           "mocap_base");
+  v("max_speed", c.max_speed, "It goes there no faster.").unit("m/s").positive();
+  v("max_turn", c.max_turn, "It turns there no faster.").unit("rad/s").positive();
+}
+
+struct FreeBaseCfg {
+  std::string target;
+  double max_speed = 1.0;
+  double max_turn = 2.0;
+};
+template <class V>
+void visit_fields(V& v, FreeBaseCfg& c) {
+  v.object("FreeBaseCfg",
+           "A command is a pose in the world, of a floating base that is welded to a mocap body.",
+           "free_base");
+  v("target", c.target, "The mocap body.").required();
+  v("max_speed", c.max_speed, "The target goes there no faster.").unit("m/s").positive();
+  v("max_turn", c.max_turn, "The target turns there no faster.").unit("rad/s").positive();
+}
+
+struct NoControllerCfg {};
+template <class V>
+void visit_fields(V& v, NoControllerCfg&) {
+  v.object("NoControllerCfg", "It takes no command and stays as it starts.", "none");
+}
+
+using ControllerCfg =
+    std::variant<JointPositionCfg, JointPositionRelativeCfg, JointVelocityCfg, TorsoHeightCfg,
+                 HolonomicBaseCfg, DifferentialBaseCfg, MocapBaseCfg, FreeBaseCfg, NoControllerCfg>;
+template <>
+inline constexpr const char* kChoiceName<ControllerCfg> = "ControllerCfg";
+
+// "joint_position" ...
+inline const char* controller_kind(const ControllerCfg& cfg) {
+  return std::visit([]<class C>(const C&) { return struct_of<C>().kind; }, cfg);
+}
+
+}  // namespace mjsense

@@ -1,0 +1,26 @@
+// SPDX-License-Identifier: Apache-2.0
+// Commands are what the actuators take, clipped to their ranges.
+#include "mjsense/robots/controllers/actuated.h"
+#include "mjsense/robots/controllers/kinds.h"
+
+namespace mjsense {
+namespace {
+
+class JointPosition final : public ActuatedController {
+ public:
+  using ActuatedController::ActuatedController;
+  void command(const World& /*world*/, std::span<const double> command,
+               std::span<double> target) override {
+    for (int i = 0; i < size(); ++i) target[i] = clip(i, command[i]);
+  }
+};
+
+}  // namespace
+
+std::unique_ptr<Controller> make_kind(const JointPositionCfg& /*cfg*/,
+                                                const MoveGroup& group,
+                                                const ControllerInit& init) {
+  return std::make_unique<JointPosition>(group, init);
+}
+
+}  // namespace mjsense

@@ -1,0 +1,33 @@
+// SPDX-License-Identifier: Apache-2.0
+// No command: the group stays as it starts.
+#include "mjsense/robots/controllers/actuated.h"
+#include "mjsense/robots/controllers/kinds.h"
+
+namespace mjsense {
+namespace {
+
+class NoController final : public ActuatedController {
+ public:
+  using ActuatedController::ActuatedController;
+  void describe(MoveGroup& /*group*/) const override {}
+  void hold(const World& /*world*/, std::span<double> /*target*/) override {}
+  void command(const World& /*world*/, std::span<const double> /*command*/,
+               std::span<double> /*target*/) override {}
+  void begin(const World& /*world*/, std::span<const double> /*target*/,
+             const StateRow& /*state*/) override {}
+};
+
+}  // namespace
+
+std::unique_ptr<Controller> make_kind(const NoControllerCfg& /*cfg*/,
+                                               const MoveGroup& group,
+                                               const ControllerInit& init) {
+  return std::make_unique<NoController>(group, init);
+}
+
+std::unique_ptr<Controller> make_controller(const ControllerCfg& cfg, const MoveGroup& group,
+                                            const ControllerInit& init) {
+  return std::visit([&](const auto& kind) { return make_kind(kind, group, init); }, cfg);
+}
+
+}  // namespace mjsense

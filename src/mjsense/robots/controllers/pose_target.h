@@ -1,0 +1,43 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+// A mocap body that goes to a commanded pose no faster than it may: what bases that are mocap
+// bodies, or hang on one, share.
+
+#include <vector>
+
+#include "mjsense/core/pose.h"
+#include "mjsense/robots/controllers/controller.h"
+
+namespace mjsense {
+
+class PoseTarget : public Controller {
+ public:
+  // `mocap`: number of the mocap body; it stands at X_WB * X_BM for a base at X_WB.
+  PoseTarget(int mocap, const Pose& base_to_mocap, double max_speed, double max_turn,
+             const ControllerInit& init);
+
+  void describe(MoveGroup& group) const override;
+  void start(const StateRow& /*state*/) const override {}
+  void hold(const World& world, std::span<double> target) override;
+  void command(const World& world, std::span<const double> command,
+               std::span<double> target) override;
+  void begin(const World& world, std::span<const double> target, const StateRow& state) override;
+  bool every_step() const override { return true; }
+  mjtStage compute(const World& world, int index, const StateRow& state) override;
+
+ protected:
+  void write(const Pose& base, const StateRow& state) const;
+
+ private:
+  int mocap_;
+  Pose base_to_mocap_;
+  double max_step_, max_turn_;  // m and rad a control step
+  std::string place_;
+  struct Goal {
+    bool given = false;
+    Pose base;  // X_WB
+  };
+  std::vector<Goal> goals_;  // [B]
+};
+
+}  // namespace mjsense

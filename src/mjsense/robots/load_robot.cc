@@ -1,0 +1,105 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "mjsense/robots/load_robot.h"
+
+#include <fmt/format.h>
+
+#include <filesystem>
+#include <set>
+
+#include "mjsense/core/data_file.h"
+#include "mjsense/core/error.h"
+#include "mjsense/core/toml_fields.h"
+#include "mjsense/robots/meshes.h"
+#include "mjsense/scene/parts.h"
+
+namespace mjsense {
+namespace {
+
+namespace fs = std::filesystem;
+
+constexpr std::string_view kEmbedded = "embedded:";
+constexpr DataFolder kRobots{"robot", "robots/", "/robot.toml"};
+
+void check_unique(std::string_view place, const char* what, const std::string& name,
+                  std::set<std::string>& seen) {
+  if (name.empty()) throw ValueError(fmt::format("{}: a {} has an empty name", place, what));
+  if (name.find('/') != std::string::npos)
+    throw ValueError(fmt::format("{}: {} '{}': '/' is not allowed in a name", place, what, name));
+  if (!seen.insert(name).second)
+    throw ValueError(fmt::format("{}: there are two {}s '{}'", place, what, name));
+}
+
+}  // namespace
+
+void validate(const MoveGroupCfg& cfg, std::string_view place) {
+  if (!cfg.spread.empty() && cfg.spread.size() != cfg.init.size()) {
+    throw ValueError(fmt::format("{}: '{}' has {} widths of start noise for {} start positions",
+                                 place, cfg.name, cfg.spread.size(), cfg.init.size()));
+  }
+  if (cfg.kind == GroupKind::kBase && !cfg.init.empty()) {
+    throw ValueError(fmt::format(
+        "{}: '{}' is a base and has start positions: where it stands is the task's", place,
+        cfg.name));
+  }
+  if (cfg.kind == GroupKind::kGripper && cfg.pad_sites.size() != 2) {
+    throw ValueError(fmt::format("{}: the gripper '{}' needs 2 pad_sites, has {}", place, cfg.name,
+                                 cfg.pad_sites.size()));
+  }
+}
+
+void validate(const RobotCfg& cfg, std::string_view place) {
+  std::set<std::string> groups, cameras;
+  for (const MoveGroupCfg& group : cfg.groups)
+    check_unique(place, "move group", group.name, groups);
+  for (const CameraMount& camera : cfg.cameras)
+    check_unique(place, "camera", camera.name, cameras);
+  if (cfg.policy_dt_ms % cfg.ctrl_dt_ms != 0 || cfg.ctrl_dt_ms % cfg.sim_dt_ms != 0) {
+    throw ValueError(
+        fmt::format("{}: policy_dt_ms = {} must be a multiple of ctrl_dt_ms = {}, and that of "
+                    "sim_dt_ms = {}",
+                    place, cfg.policy_dt_ms, cfg.ctrl_dt_ms, cfg.sim_dt_ms));
+  }
+  if (!cfg.env_state_name.empty() && cfg.env_state_name == cfg.name) {
+    throw ValueError(
+        fmt::format("{}: env_state_name '{}' is the robot's own name", place, cfg.name));
+  }
+}
+
+RobotCfg parse_robot(std::string_view text, const std::string& path) {
+  RobotCfg cfg;
+  cfg.file = path;
+  const std::string file = path.starts_with(kEmbedded) ? path.substr(kEmbedded.size()) : path;
+  cfg.name = fs::path(file).parent_path().filename().string();
+  read_toml_fields(text, path, cfg);
+  if (cfg.name.empty()) throw ValueError(fmt::format("{}: 'name' is empty", path));
+  cfg.model.path = beside(path, cfg.mjcf);
+  if (!cfg.parts.empty()) {
+    std::vector<ModelPart> parts;
+    for (const PartCfg& part : cfg.parts)
+      parts.push_back({beside(path, part.model), part.to, part.prefix, part.pos, part.quat});
+    const std::shared_ptr<mjSpec> spec =
+        compose_model(cfg.model, parts, fmt::format("robot '{}'", cfg.name));
+    cfg.model = {.spec = spec.get(), .owner = spec};
+  }
+  if (cfg.meshes) cfg.edit_spec = use_meshes(*cfg.meshes, path);
+  return cfg;
+}
+
+std::string robot_xml(const RobotCfg& cfg) {
+  const std::string place = fmt::format("robot '{}'", cfg.name);
+  const SpecPtr spec = parse_model(cfg.model, place);
+  if (cfg.edit_spec) cfg.edit_spec(spec.get(), "");
+  const Vfs vfs;
+  if (!compile(spec.get(), vfs))
+    throw ValueError(fmt::format("{}: {}", place, one_line(mjs_getError(spec.get()))));
+  return save_xml(spec.get());
+}
+
+std::vector<std::string> robot_names() { return kRobots.names(); }
+
+RobotCfg robot_cfg(std::string_view name) {
+  const DataFile file = kRobots.find(name);
+  return parse_robot(file.text, file.path);
+}
+
+}  // namespace mjsense

@@ -1,0 +1,152 @@
+// SPDX-License-Identifier: Apache-2.0
+// A robot.toml says what a robot is, or an error says file, line and key of what is wrong.
+#include "mjsense/robots/load_robot.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <filesystem>
+#include <fstream>
+
+#include "mjsense/core/error.h"
+#include "mjsense/core/testing/temp_dir.h"
+#include "mjsense/robots/robot.h"
+#include "mjsense/scene/scene.h"
+
+namespace mjsense {
+namespace {
+
+using ::testing::ElementsAre;
+using ::testing::HasSubstr;
+
+constexpr const char* kArm = R"(<mujoco>
+  <compiler angle="radian"/>
+  <worldbody><body name="base" mocap="true"><body name="link" pos="0 0 0.2">
+    <joint name="lift" axis="0 1 0" range="-2 2"/><geom size=".05" mass="1"/>
+    <site name="flange" pos="0 0 0.3"/>
+  </body></body></worldbody>
+  <actuator><position name="lift" joint="lift" kp="500" dampratio="1" ctrlrange="-2 2"/></actuator>
+  <keyframe><key name="home" qpos="1"/></keyframe>
+</mujoco>)";
+constexpr const char* kTool = R"(<mujoco>
+  <worldbody><body name="tool"><geom size=".02" mass=".1"/><site name="tip" pos="0 0 .1"/></body></worldbody>
+</mujoco>)";
+constexpr const char* kToml = R"(model = "arm.xml"
+base = "base"
+width = 320
+ctrl_dt_ms = 6
+[[parts]]
+model = "tool.xml"
+to = "flange"
+prefix = "tool/"
+pos = [0, 0, 0.05]
+[[groups]]
+name = "arm"
+kind = "arm"
+joints = ["lift"]
+actuators = ["lift"]
+controller = { kind = "joint_position_relative", threshold = 0.001 }
+leaf_site = "tool/tip"
+init = [0.5]
+spread = [0.1]
+)";
+
+struct RobotFile : ::testing::Test {
+  RobotFile() {
+    std::filesystem::create_directory(folder.path / "lifter");
+    write("arm.xml", kArm);
+    write("tool.xml", kTool);
+  }
+  void write(const char* name, const std::string& text) {
+    std::ofstream(folder.path / "lifter" / name) << text;
+  }
+  std::string path() const { return (folder.path / "lifter" / "robot.toml").string(); }
+  RobotCfg load(const std::string& toml) {
+    write("robot.toml", toml);
+    return robot_cfg(path());
+  }
+  std::string fault(const std::string& toml) {
+    try {
+      load(toml);
+    } catch (const Error& e) {
+      return e.what();
+    }
+    return "no error";
+  }
+  // kToml with one text in place of another.
+  static std::string with(const std::string& old, const std::string& now) {
+    std::string text = kToml;
+    return text.replace(text.find(old), old.size(), now);
+  }
+  mjsense::testing::TempDir folder;
+};
+
+TEST_F(RobotFile, SaysWhatARobotIs) {
+  const RobotCfg cfg = load(kToml);
+  EXPECT_EQ(cfg.name, "lifter");
+  EXPECT_EQ(cfg.file, path());
+  EXPECT_EQ(cfg.image_width, 320);
+  EXPECT_EQ(cfg.image_height, 368);
+  EXPECT_EQ(cfg.ctrl_dt_ms, 6);
+  ASSERT_EQ(cfg.groups.size(), 1u);
+  EXPECT_THAT(cfg.groups[0].joints, ElementsAre("lift"));
+  ASSERT_TRUE(std::holds_alternative<JointPositionRelativeCfg>(cfg.groups[0].controller));
+  EXPECT_EQ(std::get<JointPositionRelativeCfg>(cfg.groups[0].controller).threshold, 0.001);
+}
+
+TEST_F(RobotFile, ItsPartsHangWhereTheyShould) {
+  const RobotCfg cfg = load(kToml);
+  SceneCfg scene_cfg;
+  EntityCfg entity;
+  entity.model = cfg.model;
+  scene_cfg.entities = {{"robot_0", entity}};
+  const Scene scene(scene_cfg);
+  const mjModel* m = scene.model();
+  const int tool = mj_name2id(m, mjOBJ_BODY, "robot_0/tool/tool");
+  ASSERT_GE(tool, 0);
+  EXPECT_EQ(m->body_parentid[tool], mj_name2id(m, mjOBJ_BODY, "robot_0/link"));
+  EXPECT_NEAR(m->body_pos[3 * tool + 2], 0.35, 1e-12);
+  EXPECT_TRUE(scene.warnings().empty()) << scene.warnings()[0];
+  const Robot robot(cfg, m, 1);
+  RobotValues q;
+  const double lift = 0;
+  q[0].set({&lift, 1});
+  EXPECT_NEAR(robot.fk(0, q).p.z, 0.2 + 0.3 + 0.05 + 0.1, 1e-12);
+}
+
+TEST_F(RobotFile, ErrorsNameFileLineAndKey) {
+  const std::string file = path();
+  EXPECT_EQ(fault(with("joints", "jonts")),
+            file + ":13: no key of 'groups[0]' named 'jonts'; did you mean 'joints'?");
+  EXPECT_THAT(fault(with("kind = \"arm\"", "kind = \"arn\"")),
+              HasSubstr(file + ":12: groups[0].kind is 'arn': must be one of base, torso, arm"));
+  EXPECT_THAT(fault(with("[0.5]", "0.5")),
+              HasSubstr(file + ":17: the value of 'groups[0].init' is of a wrong type"));
+  EXPECT_THAT(fault(with("name = \"arm\"\n", "")), HasSubstr("'groups[0]': 'name' is missing"));
+  EXPECT_THAT(fault(with("[0.1]", "[0.1, 0.2]")),
+              HasSubstr("'arm' has 2 widths of start noise for 1 start positions"));
+  EXPECT_THAT(fault(with("[0.1]", "[-0.1]")), HasSubstr(":18: groups[0]: spread[0] is -0.1"));
+  EXPECT_THAT(fault(with("ctrl_dt_ms = 6", "ctrl_dt_ms = 4")), HasSubstr("policy_dt_ms = 66"));
+  EXPECT_THAT(fault(with("joint_position_relative", "joint_posision")),
+              HasSubstr(":15: groups[0].controller.kind is 'joint_posision': must be one of"));
+  EXPECT_THAT(fault(with("threshold", "treshold")), HasSubstr("did you mean 'threshold'?"));
+  EXPECT_THAT(fault(with("to = \"flange\"", "to = \"flang\"")),
+              HasSubstr("no site or body named 'flang'; did you mean 'flange'?"));
+  EXPECT_THAT(fault(with("tool.xml", "tol.xml")), HasSubstr("tol.xml"));
+  EXPECT_THAT(fault("model = \n"), HasSubstr(file + ":1:"));
+  EXPECT_THAT(fault("base = \"base\"\n"), HasSubstr("'model' is missing"));
+}
+
+TEST(RobotNames, AreKnownOrTheNearestIsSaid) {
+  for (const std::string& name : robot_names()) EXPECT_EQ(robot_cfg(name).name, name);
+  try {
+    robot_cfg("frnka");
+    FAIL();
+  } catch (const KeyError& e) {
+    EXPECT_THAT(e.what(), HasSubstr("no robot named 'frnka'; did you mean 'franka'?"));
+  }
+  EXPECT_THROW(robot_cfg("nowhere/robot.toml"), ValueError);
+}
+
+}  // namespace
+}  // namespace mjsense

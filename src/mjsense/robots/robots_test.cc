@@ -1,0 +1,293 @@
+// SPDX-License-Identifier: Apache-2.0
+// What holds of every robot there is: kinematics against MuJoCo, controllers that reach what they
+// are told, a base that stands anywhere.
+
+#include <fmt/format.h>
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <numbers>
+
+#include "mjsense/core/error.h"
+#include "mjsense/robots/load_robot.h"
+#include "mjsense/robots/robot.h"
+#include "mjsense/scene/scene.h"
+
+namespace mjsense {
+namespace {
+
+using testing::HasSubstr;
+
+struct DataDelete {
+  void operator()(mjData* data) const { mj_deleteData(data); }
+};
+
+// One robot alone in one world.
+struct Alone {
+  explicit Alone(const std::string& name) : cfg(robot_cfg(name)) {
+    SceneCfg scene_cfg;
+    EntityCfg entity;
+    entity.model = cfg.model;
+    scene_cfg.entities = {{"robot_0", entity}};
+    scene_cfg.options.timestep = 0.001 * cfg.sim_dt_ms;
+    scene = std::make_unique<Scene>(scene_cfg);
+    model = scene->model();
+    robot = std::make_unique<Robot>(cfg, model, 1);
+    data.reset(mj_makeData(model));
+    world = {.id = 0, .model = model, .data = data.get()};
+  }
+  void start(const Pose& base = {}, std::uint64_t seed = 7) {
+    mj_resetData(model, data.get());
+    Rng rng(seed, 0, 0, 0);
+    robot->write_start(state_row(data.get()), base, rng);
+    mj_forward(model, data.get());
+    robot->reset(world);
+  }
+  // One policy step: command, controls and physics at their periods.
+  void play(const Action& action) {
+    robot->command(world, action);
+    const int controls = cfg.policy_dt_ms / cfg.ctrl_dt_ms,
+              substeps = cfg.ctrl_dt_ms / cfg.sim_dt_ms;
+    robot->write_ctrl(world, state_row(data.get()), nullptr);
+    for (int k = 0; k < controls; ++k) {
+      if (k > 0 && robot->controls_every_step()) robot->control(world, k);
+      for (int i = 0; i < substeps; ++i) mj_step(model, data.get());
+    }
+    mj_forward(model, data.get());
+  }
+  void play(const Action& action, double seconds) {
+    for (double t = 0; t < seconds; t += 0.001 * cfg.policy_dt_ms) play(action);
+  }
+  int find(GroupKind kind) const {
+    for (std::size_t g = 0; g < robot->groups().size(); ++g)
+      if (robot->groups()[g].kind == kind) return static_cast<int>(g);
+    return -1;
+  }
+
+  RobotCfg cfg;
+  std::unique_ptr<Scene> scene;
+  const mjModel* model = nullptr;
+  std::unique_ptr<Robot> robot;
+  std::unique_ptr<mjData, DataDelete> data;
+  World world;
+};
+
+Pose anywhere(Rng& rng) {
+  const Vec3 axis = normalized(Vec3{rng.normal(), rng.normal(), rng.normal()});
+  return {{rng.uniform(-3, 3), rng.uniform(-3, 3), rng.uniform(-1, 1)},
+          axis_angle(axis, rng.uniform(0, 3.0))};
+}
+
+Pose on_the_floor(Rng& rng) {
+  return {{rng.uniform(-3, 3), rng.uniform(-3, 3), 0},
+          axis_angle({0, 0, 1}, rng.uniform(-std::numbers::pi, std::numbers::pi))};
+}
+
+void expect_same(const Pose& a, const Pose& b, double tolerance, const char* what) {
+  EXPECT_LT(norm(a.p - b.p), tolerance) << what;
+  // An angle by arc cosine has half the digits.
+  const Quat d = conjugate(a.q) * b.q;
+  EXPECT_LT(std::sqrt(d.x * d.x + d.y * d.y + d.z * d.z), tolerance) << what;
+}
+
+// Chain joints of a group: random within their ranges.
+void randomize(const Robot& robot, const mjModel* m, mjData* d, Rng& rng) {
+  for (const MoveGroup& group : robot.groups()) {
+    if (group.kind == GroupKind::kBase) continue;
+    for (std::size_t i = 0; i < group.joints.size(); ++i) {
+      const int j = group.joints[i];
+      const double low = m->jnt_limited[j] ? m->jnt_range[2 * j] : -std::numbers::pi;
+      const double high = m->jnt_limited[j] ? m->jnt_range[2 * j + 1] : std::numbers::pi;
+      d->qpos[m->jnt_qposadr[j]] = rng.uniform(low, high);
+    }
+  }
+}
+
+struct EveryRobot : testing::TestWithParam<std::string> {
+  Alone alone{GetParam()};
+};
+
+TEST_P(EveryRobot, StandsWhereItIsPut) {
+  Rng rng(1, 0, 0, 0);
+  for (int k = 0; k < 20; ++k) {
+    const Pose base = k < 10 ? on_the_floor(rng) : anywhere(rng);
+    alone.start(base, k);
+    expect_same(alone.robot->base_pose(alone.world), base, 1e-12, "base");
+  }
+}
+
+TEST_P(EveryRobot, ForwardKinematicsAreMuJoCosWhereverItStands) {
+  const Robot& robot = *alone.robot;
+  Rng rng(2, 0, 0, 0);
+  for (int k = 0; k < 100; ++k) {
+    alone.start(anywhere(rng), k);
+    randomize(robot, alone.model, alone.data.get(), rng);
+    mj_kinematics(alone.model, alone.data.get());
+    RobotValues q;
+    robot.read_qpos(alone.world, q);
+    for (std::size_t g = 0; g < robot.groups().size(); ++g) {
+      const int group = static_cast<int>(g);
+      expect_same(robot.fk(group, q), robot.tcp_pose(alone.world, group), 1e-12,
+                  robot.groups()[g].name.c_str());
+    }
+  }
+}
+
+// Of poses that the arm has in random configurations, the other groups as they start.
+TEST_P(EveryRobot, InverseKinematicsReachesWhatCanBeReached) {
+  const Robot& robot = *alone.robot;
+  alone.start();
+  for (std::size_t g = 0; g < robot.groups().size(); ++g) {
+    const MoveGroup& group = robot.groups()[g];
+    if (group.kind != GroupKind::kArm) continue;
+    RobotValues start;
+    robot.read_qpos(alone.world, start);
+    Rng rng(3, 0, 0, 0);
+    int solved = 0;
+    constexpr int kPoses = 1000;
+    for (int k = 0; k < kPoses; ++k) {
+      RobotValues goal = start, q = start;
+      for (std::size_t i = 0; i < group.joints.size(); ++i) {
+        const double* range = alone.model->jnt_range + 2 * group.joints[i];
+        goal[static_cast<int>(g)].values[i] = rng.uniform(range[0], range[1]);
+      }
+      const int index = static_cast<int>(g);
+      const Pose target = robot.fk(index, goal);
+      if (!robot.ik(index, target, q)) continue;
+      const Pose reached = robot.fk(index, q);
+      EXPECT_LT(norm(reached.p - target.p), 1e-4);
+      EXPECT_LT(angle_between(reached.q, target.q), 1e-4);
+      for (std::size_t other = 0; other < robot.groups().size(); ++other) {
+        if (other == g) continue;
+        EXPECT_EQ(q[static_cast<int>(other)].values, start[static_cast<int>(other)].values);
+      }
+      ++solved;
+    }
+    EXPECT_GE(solved, 990) << group.name;
+  }
+}
+
+TEST_P(EveryRobot, WithoutACommandItStaysWhereItStarts) {
+  Rng rng(4, 0, 0, 0);
+  alone.start(on_the_floor(rng));
+  const Robot& robot = *alone.robot;
+  RobotValues before, after;
+  robot.read_qpos(alone.world, before);
+  const Pose base = robot.base_pose(alone.world);
+  alone.play({}, 2.0);
+  robot.read_qpos(alone.world, after);
+  for (std::size_t g = 0; g < robot.groups().size(); ++g) {
+    for (int i = 0; i < before[static_cast<int>(g)].size; ++i) {
+      EXPECT_NEAR(after[static_cast<int>(g)].values[i], before[static_cast<int>(g)].values[i], 0.02)
+          << robot.groups()[g].name << " " << i;
+    }
+  }
+  expect_same(robot.base_pose(alone.world), base, 2e-3, "base");
+}
+
+TEST_P(EveryRobot, ArmsGoWhereTheyAreTold) {
+  const Robot& robot = *alone.robot;
+  Rng rng(5, 0, 0, 0);
+  alone.start(on_the_floor(rng));
+  RobotValues now;
+  robot.read_qpos(alone.world, now);
+  Action action;
+  for (std::size_t g = 0; g < robot.groups().size(); ++g) {
+    const MoveGroup& group = robot.groups()[g];
+    if (group.kind != GroupKind::kArm) continue;
+    std::vector<double> target;
+    for (int i = 0; i < group.command_size; ++i) {
+      const double q = now[static_cast<int>(g)].values[i];
+      target.push_back(std::clamp(q + rng.uniform(-0.3, 0.3), group.ctrl_low[i] + 0.02,
+                                  group.ctrl_high[i] - 0.02));
+    }
+    action.commands[static_cast<int>(g)].set(target);
+  }
+  alone.play(action, 3.0);
+  robot.read_qpos(alone.world, now);
+  for (std::size_t g = 0; g < robot.groups().size(); ++g) {
+    const GroupValues& told = action.commands[static_cast<int>(g)];
+    for (int i = 0; told.given && i < told.size; ++i) {
+      EXPECT_NEAR(now[static_cast<int>(g)].values[i], told.values[i], 0.02)
+          << robot.groups()[g].name << " " << i;
+      EXPECT_EQ(robot.targets(0)[static_cast<int>(g)].values[i], told.values[i]);
+    }
+  }
+}
+
+TEST_P(EveryRobot, GrippersOpenAndClose) {
+  const Robot& robot = *alone.robot;
+  alone.start();
+  for (std::size_t g = 0; g < robot.groups().size(); ++g) {
+    const MoveGroup& group = robot.groups()[g];
+    if (group.kind != GroupKind::kGripper) continue;
+    const int index = static_cast<int>(g);
+    EXPECT_NEAR(robot.opening(alone.world, index), group.max_opening, 0.003) << "it starts open";
+    Action action;
+    action.commands[index].set({&group.closed_command, 1});
+    alone.play(action, 2.0);
+    EXPECT_LT(robot.opening(alone.world, index), 0.002) << group.name;
+    action.commands[index].set({&group.open_command, 1});
+    alone.play(action, 2.0);
+    EXPECT_NEAR(robot.opening(alone.world, index), group.max_opening, 0.003) << group.name;
+  }
+}
+
+TEST_P(EveryRobot, AMovingBaseGoesWhereItIsTold) {
+  const Robot& robot = *alone.robot;
+  const int base = alone.find(GroupKind::kBase);
+  if (base < 0 || !robot.groups()[base].controlled()) GTEST_SKIP() << "its base does not move";
+  alone.start({{1, 0.5, 0}, axis_angle({0, 0, 1}, 0.4)});
+  const Pose goal{{1.4, 0.2, 0}, axis_angle({0, 0, 1}, 0.9)};
+  Action action;
+  const MoveGroup& group = robot.groups()[base];
+  if (group.command_size == 3) {
+    const double place[] = {goal.p.x, goal.p.y, 0.9};
+    action.commands[base].set(place);
+  } else {
+    double pose[7];
+    write_pose(goal, pose);
+    action.commands[base].set(pose);
+  }
+  alone.play(action, 4.0);
+  expect_same(robot.base_pose(alone.world), goal, 5e-3, "base");
+  // Tool and kinematics do not notice that the base is elsewhere.
+  RobotValues q;
+  robot.read_qpos(alone.world, q);
+  for (std::size_t g = 0; g < robot.groups().size(); ++g) {
+    expect_same(robot.fk(static_cast<int>(g), q),
+                robot.tcp_pose(alone.world, static_cast<int>(g)), 1e-12, "tool");
+  }
+}
+
+INSTANTIATE_TEST_SUITE_P(Robots, EveryRobot, testing::ValuesIn(robot_names()),
+                         [](const auto& info) { return info.param; });
+
+TEST(Robots, AreTheseByName) {
+  EXPECT_THAT(robot_names(),
+              testing::ElementsAre("bimanual_yam", "floating_rum", "franka", "franka_hand",
+                                   "i2rt_yam", "mobile_franka", "rby1"));
+}
+
+// MolmoSpaces' groups, their numbers and their order.
+TEST(Robots, GroupsAreMolmoSpaces) {
+  const auto groups = [](const char* name) {
+    const Alone alone(name);
+    std::string text;
+    for (const MoveGroup& g : alone.robot->groups())
+      text += fmt::format("{} {}/{} ", g.name, g.qpos.size(), g.command_size);
+    return text;
+  };
+  EXPECT_EQ(groups("franka"), "base 0/0 arm 7/7 gripper 2/1 ");
+  EXPECT_EQ(groups("mobile_franka"), "base 3/3 arm 7/7 gripper 2/1 ");
+  EXPECT_EQ(groups("i2rt_yam"), "base 0/0 arm 6/6 gripper 2/1 ");
+  EXPECT_EQ(groups("bimanual_yam"),
+            "base 0/0 left_arm 6/6 right_arm 6/6 left_gripper 2/1 right_gripper 2/1 ");
+  EXPECT_EQ(groups("floating_rum"), "base 7/7 gripper 2/1 ");
+  EXPECT_EQ(groups("rby1"),
+            "base 3/3 torso 6/1 left_arm 7/7 right_arm 7/7 left_gripper 2/1 right_gripper 2/1 head "
+            "2/0 ");
+}
+
+}  // namespace
+}  // namespace mjsense

@@ -1,0 +1,76 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "mjsense/scene/parts.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+
+#include "mjsense/core/error.h"
+#include "mjsense/scene/assets.h"
+#include "mjsense/scene/compiler_settings.h"
+#include "mjsense/scene/initial_state.h"
+
+namespace mjsense {
+namespace {
+
+template <class Element>
+void copy_pose(const Element* from, mjsFrame* to) {
+  std::copy_n(from->pos, 3, to->pos);
+  std::copy_n(from->quat, 4, to->quat);
+  to->alt = from->alt;
+}
+
+// Where the part hangs: a frame as the site, or as the body itself.
+mjsFrame* mount(mjSpec* model, const std::string& name, const std::string& place) {
+  if (mjsElement* element = mjs_findElement(model, mjOBJ_SITE, name.c_str())) {
+    mjsFrame* frame = mjs_addFrame(mjs_getParent(element), mjs_getFrame(element));
+    copy_pose(mjs_asSite(element), frame);
+    return frame;
+  }
+  if (mjsBody* body = mjs_findBody(model, name.c_str())) return mjs_addFrame(body, nullptr);
+  std::vector<std::string> names = spec_names(model, mjOBJ_SITE);
+  const std::vector<std::string> bodies = spec_names(model, mjOBJ_BODY);
+  names.insert(names.end(), bodies.begin(), bodies.end());
+  throw_unknown(place, "site or body", name, names);
+}
+
+void attach_part(mjSpec* model, const ModelPart& part, std::string_view of) {
+  const std::string place = fmt::format("{}: part '{}'", of, part.path);
+  Vfs vfs;
+  std::vector<std::string> unheard;
+  const ModelSource source{.path = part.path};
+  SpecPtr child = parse_model(source, place);
+  adopt_assets(child.get(), source, "", vfs);
+  take_keyframes(child.get(), place, unheard);
+  if (!whole_model_settings(child.get()).empty())
+    child = apply_whole_model_settings(std::move(child), vfs, place);
+  mj_defaultOption(&child->option);
+  child->authored.option = 0;
+  child->authored.disableflags = child->authored.enableflags = child->authored.disableactuator = 0;
+
+  mjsFrame* at = mount(model, part.to, place);
+  mjsFrame* frame = mjs_addFrame(mjs_getParent(at->element), at);
+  std::copy(part.pos.begin(), part.pos.end(), frame->pos);
+  std::copy(part.quat.begin(), part.quat.end(), frame->quat);
+  // The model keeps the part alive: it is attached by reference.
+  if (!mjs_attach(frame->element, child->element, part.prefix.c_str(), ""))
+    throw ValueError(fmt::format("{}: {}", place, one_line(mjs_getError(model))));
+}
+
+}  // namespace
+
+SpecPtr compose_model(const ModelSource& model, std::span<const ModelPart> parts,
+                      std::string_view place) {
+  SpecPtr spec = parse_model(model, place);
+  Vfs vfs;
+  std::vector<std::string> unheard;
+  adopt_assets(spec.get(), model, "", vfs);
+  // MuJoCo warns that a part without a prefix may be saved wrongly; save_xml() knows.
+  std::vector<std::string> warnings;
+  const WarningCapture capture(warnings);
+  if (!parts.empty()) take_keyframes(spec.get(), std::string(place), unheard);
+  for (const ModelPart& part : parts) attach_part(spec.get(), part, place);
+  return spec;
+}
+
+}  // namespace mjsense
