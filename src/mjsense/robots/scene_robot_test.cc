@@ -81,7 +81,7 @@ TEST_F(SceneRobot, WithoutACommandControlsStay) {
   data->ctrl[0] = 1.5;
   data->ctrl[1] = -7;
   Rng rng(0, 0, 0, 0);
-  robot.write_start(state_row(data), {{1, 2, 3}, {}}, rng);
+  robot.write_start(state_row(data), Pose{{1, 2, 3}, {}}, rng);
   EXPECT_EQ(data->mocap_pos[0], 1);
   EXPECT_EQ(data->ctrl[0], 1.5);
   mj_forward(model, data);

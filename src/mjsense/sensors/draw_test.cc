@@ -235,7 +235,7 @@ TEST(Draw, ABuiltinSensorIsTheFrameItIsAttachedTo) {
 TEST(Draw, OnlyOneWorldIsLookedAtAndDrawingIsNoReading) {
   auto cfg = top_camera();
   Lab lab({cfg}, 2);
-  lab.sim->draw(1);
+  (void)lab.sim->draw(1);
   const Array& pose = lab.scene->sensor("cam").field("pose").data;
   EXPECT_EQ(pose.row<float>(0)[15], 0);
   EXPECT_EQ(pose.row<float>(1)[15], 1);

@@ -258,9 +258,9 @@ TEST(Bases, FixedOnesSayWhatWouldCarryThem) {
   const std::unique_ptr<mjData, DataDelete> data(mj_makeData(scene.model()));
   const Robot robot(cfg, scene.model(), 1);
   Rng rng(1, 0, 0, 0);
-  robot.write_start(state_row(data.get()), {{1, 2, 3}, {}}, rng);
+  robot.write_start(state_row(data.get()), Pose{{1, 2, 3}, {}}, rng);
   try {
-    robot.write_start(state_row(data.get()), {{1, 2, 2}, {}}, rng);
+    robot.write_start(state_row(data.get()), Pose{{1, 2, 2}, {}}, rng);
     FAIL();
   } catch (const ValueError& e) {
     EXPECT_THAT(e.what(), HasSubstr("its base 'robot_0/base' cannot stand at (1, 2, 2)"));
