@@ -3,6 +3,8 @@
 
 #include <nanobind/stl/string.h>
 
+#include <filesystem>
+
 #include "mjsense/app/schema.h"
 #include "mjsense/core/error.h"
 #include "mjsense/sensors/all_sensors.h"
