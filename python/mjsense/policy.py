@@ -78,9 +78,10 @@ class Policy:
 
     def rng(self, world: int) -> np.random.Generator:
         """Random numbers for this world's episode: what is drawn from them depends on the seed and the episode alone."""
-        if self._mjs_rngs[world] is None:
-            self._mjs_rngs[world] = episode_rng(self._mjs_seed, int(self._mjs_episodes[world]), "policy")
-        return self._mjs_rngs[world]
+        rng = self._mjs_rngs[world]
+        if rng is None:
+            rng = self._mjs_rngs[world] = episode_rng(self._mjs_seed, int(self._mjs_episodes[world]), "policy")
+        return rng
 
     # ------------------------------------------------------------------------------- called by mjsense (the C++ adapter)
 

@@ -132,7 +132,7 @@ class Task:
         if self._mjs_found is None:
             raise RuntimeError(f"task '{self._mjs_name()}': nothing was evaluated yet")
         _, success, _, info = self._mjs_found
-        rows = [{"success": bool(value)} for value in success]
+        rows: list[dict[str, Any]] = [{"success": bool(value)} for value in success]
         for key, (kind, width, values) in (info or {}).items():
             cast = {"b": bool, "i": int, "f": float}[kind]
             for row, value in zip(rows, values):

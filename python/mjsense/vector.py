@@ -60,7 +60,7 @@ class TaskVectorEnv(VectorEnv):
         self._closed = False
         self._seed = options["seed"]
         use_installed_meshes()
-        self._rollout = _core.Rollout(options, objects, Simulation._of)
+        self._rollout: Any = _core.Rollout(options, objects, Simulation._of)
         streams = {spec.name: (sensor, spec, array) for sensor, spec, array in self._rollout.streams()}
         names = choose_streams(observations, streams)
         self.rows: dict[str, np.ndarray] = {name: streams[name][2] for name in names}
@@ -191,7 +191,7 @@ class TaskVectorEnv(VectorEnv):
             last = self._observe()
             final = np.full(self.num_envs, None, object)
             for world in np.flatnonzero(over):
-                final[world] = _row(last, world)
+                final[world] = _row(last, int(world))
             infos = {"final_obs": final, "_final_obs": over, "final_info": {**infos, "_success": over}, "_final_info": over}
             self._begin(np.flatnonzero(over))
             infos |= {"success": np.where(over, False, success), "_success": ~over}

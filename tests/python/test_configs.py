@@ -2,6 +2,7 @@
 import copy
 import dataclasses
 import pickle
+from typing import Any
 
 import pytest
 
@@ -136,7 +137,7 @@ WRONG = [
     (mjs.ObjRef, dict(name=3), "name must be a str"),
     (mjs.BuiltinSensorCfg, dict(interp="cubik"), "cubic"),
 ]  # fmt: skip
-ALL = {
+ALL: set[Any] = {
     value
     for module in (mjs, mjs.effects)
     for value in vars(module).values()
@@ -150,7 +151,7 @@ def test_wrong_configurations_are_refused_when_they_are_made(cls, kwargs, text):
         cls(**{**RIGHT.get(cls, {}), **kwargs})
 
 
-@pytest.mark.parametrize("cls", sorted(ALL, key=lambda c: c.__name__), ids=lambda c: getattr(c, "__name__", None))
+@pytest.mark.parametrize("cls", sorted(ALL, key=lambda c: c.__name__), ids=lambda c: c.__name__)
 def test_no_number_may_be_nan_and_nothing_may_be_of_another_type(cls):
     right = RIGHT.get(cls, {})
     made = cls(**right)

@@ -5,6 +5,7 @@ import gymnasium
 import h5py
 import numpy as np
 import pytest
+from mjsense.policy import FunctionPolicy
 from tasks import Cart, Driver
 from test_own_task import json_rows, record, trajectories
 
@@ -254,7 +255,7 @@ def test_errors_of_its_code_are_named(tmp_path):
 
 
 def test_by_name(tmp_path):
-    mjs.register_policy("still", lambda: mjs.policy.FunctionPolicy(lambda obs: np.zeros((len(obs["qpos"]["joints"]), 1)), "still"))
+    mjs.register_policy("still", lambda: FunctionPolicy(lambda obs: np.zeros((len(obs["qpos"]["joints"]), 1)), "still"))
     assert "still" in mjs.policy_names()
     assert record(tmp_path, policy="still", episodes=1).kept == 1
     with pytest.raises(ValueError, match="there is a policy called 'planner' already"):

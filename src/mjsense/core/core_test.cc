@@ -39,8 +39,9 @@ TEST(Array, SharesMemoryWithRowsOfTheSameSizeOnly) {
   Array owner(DType::kFloat32, {2, 6});
   const Array same = Array::shared(owner, DType::kInt32, {2, 3, 2});
   EXPECT_EQ(same.data(), owner.data());
-  EXPECT_THROW(Array::shared(owner, DType::kFloat32, {3, 4}), ValueError);  // as many bytes
-  EXPECT_THROW(Array::shared(owner, DType::kFloat64, {2, 6}), ValueError);
+  EXPECT_THROW(static_cast<void>(Array::shared(owner, DType::kFloat32, {3, 4})),
+               ValueError);  // as many bytes
+  EXPECT_THROW(static_cast<void>(Array::shared(owner, DType::kFloat64, {2, 6})), ValueError);
 }
 
 TEST(Array, RowsAreDenseAlignedAndZero) {

@@ -31,7 +31,6 @@ class Bench {
  public:
   Bench(const EffectChainCfg& cfg, int size, int num_worlds = 1, std::uint64_t seed = 1)
       : seed_(seed),
-        size_(size),
         chain_("test", spec(size), cfg, num_worlds, kPeriod, kPeriod),
         out_(chain_.spec().shape.size() * num_worlds) {}
   Bench(Effects effects, int size, int num_worlds = 1, std::uint64_t seed = 1)
@@ -63,7 +62,6 @@ class Bench {
   }
   std::uint64_t seed_;
   std::int64_t episode_ = 1;
-  int size_;
   EffectChain chain_;
   std::vector<float> out_;
 };

@@ -52,7 +52,7 @@ std::string settings_of(const RecordJobCfg& job, Rollout& rollout) {
   for (const auto& [key, value] : {std::pair{"scene", job.rollout.scene},
                                    std::pair{"camera_system", job.rollout.camera_system}}) {
     entries.erase(key);
-    if (!value.empty()) entries[key] = [value](JsonWriter& json) { json.value(value); };
+    if (!value.empty()) entries[key] = [value = value](JsonWriter& json) { json.value(value); };
   }
   if (job.rollout.terminate_upon_success)
     entries["terminate_upon_success"] = [](JsonWriter& json) { json.value(true); };
