@@ -3,6 +3,9 @@
 # kernels, file formats and what tests share stay inside.
 set(MJSENSE_PUBLIC_HEADERS
   mjsense/mjsense.h
+  mjsense/cameras/camera_mount.h
+  mjsense/cameras/camera_system.h
+  mjsense/cameras/load_cameras.h
   mjsense/core/array.h
   mjsense/core/checks.h
   mjsense/core/cpu.h
@@ -29,6 +32,7 @@ set(MJSENSE_PUBLIC_HEADERS
   mjsense/effects/timing.h
   mjsense/episode/active_worlds.h
   mjsense/episode/object_sensors.h
+  mjsense/episode/object_shape.h
   mjsense/episode/policy.h
   mjsense/episode/task.h
   mjsense/observe/camera_parameters.h
@@ -69,6 +73,11 @@ set(MJSENSE_PUBLIC_HEADERS
   mjsense/scene/options.h
   mjsense/scene/scene.h
   mjsense/scene/terrain.h
+  mjsense/scenes/episode_scene.h
+  mjsense/scenes/layout.h
+  mjsense/scenes/load_scene.h
+  mjsense/scenes/look.h
+  mjsense/scenes/scene_file.h
   mjsense/sensors/builtin/builtin_sensor.h
   mjsense/sensors/camera/camera_sensor_cfg.h
   mjsense/sensors/contact/contact_match.h

@@ -136,7 +136,8 @@ def record(
     options["out"] = str(out)
     objects = parts_of(options, sensors)
     report = None if progress is None else lambda p: progress(RecordProgress(**p))
-    use_installed_meshes()
+    if meshes == "real":
+        use_installed_meshes()
     use_installed_ffmpeg()
     made = _core.record(options, report, objects, Simulation._of)
     made["path"] = Path(made["path"])

@@ -59,7 +59,8 @@ class TaskVectorEnv(VectorEnv):
         self.num_envs = options["num_worlds"]
         self._closed = False
         self._seed = options["seed"]
-        use_installed_meshes()
+        if options["meshes"] == "real":
+            use_installed_meshes()
         self._rollout: Any = _core.Rollout(options, objects, Simulation._of)
         streams = {spec.name: (sensor, spec, array) for sensor, spec, array in self._rollout.streams()}
         names = choose_streams(observations, streams)

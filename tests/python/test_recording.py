@@ -1,4 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
+import os
+import subprocess
+from pathlib import Path
+
 import gymnasium
 import h5py
 import numpy as np
@@ -6,6 +10,7 @@ import pytest
 
 import mjsense as mjs
 
+PROGRAM = os.environ.get("MJSENSE_PROGRAM", Path(__file__).parents[2] / "build/dev/mjsense")
 SMALL = dict(worlds=2, width=48, height=32, shadows=False, seed=1)
 
 
@@ -82,3 +87,25 @@ def test_interrupt(tmp_path):
     # What was finished stays, and the recording can go on.
     summary = mjs.record(out=tmp_path, episodes=2, resume=True, **SMALL)
     assert summary.kept == 2 and summary.enough
+
+
+def test_the_program_writes_the_same_bytes(tmp_path):
+    options = ["--episodes", "1", "--horizon", "3", "--keep-failures", "--size", "48x32", "--no-shadows", "--seed", "1"]
+    subprocess.run([PROGRAM, "record", "pick", "--out", tmp_path / "a", "-q", "--no-sheet", *options], check=True, capture_output=True)
+    mjs.record("pick", out=tmp_path / "b", episodes=1, horizon=3, keep_failures=True, width=48, height=32, shadows=False, seed=1)
+    names = sorted(path.name for path in (tmp_path / "a/house_0").iterdir())
+    assert names == sorted(path.name for path in (tmp_path / "b/house_0").iterdir()) and len(names) == 3
+    for name in names:
+        assert (tmp_path / "a/house_0" / name).read_bytes() == (tmp_path / "b/house_0" / name).read_bytes(), name
+
+
+def test_meshes_are_chosen(tmp_path, monkeypatch):
+    monkeypatch.delenv("MJSENSE_FRANKA_MESHES", raising=False)
+    monkeypatch.setattr("mjsense.assets.franka_meshes", lambda: None)
+    with pytest.raises(ValueError, match="robot 'franka': there are no real meshes"):
+        mjs.record(out=tmp_path, meshes="real", **SMALL)
+    with pytest.raises(ValueError, match="meshes.*must be one of auto, shapes, real"):
+        mjs.make_vec("pick", meshes="mesh")
+    monkeypatch.setenv("MJSENSE_FRANKA_MESHES", str(tmp_path / "nowhere"))
+    with pytest.raises(ValueError, match="MJSENSE_FRANKA_MESHES"):
+        mjs.make_vec("pick")

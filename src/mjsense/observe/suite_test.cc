@@ -49,6 +49,19 @@ TEST(Suite, KeepsOrderAndNamesBothOwnersOfAClash) {
   EXPECT_THAT(error_of([&] { suite.refresh(); }), testing::HasSubstr("bind()"));
 }
 
+TEST(Suite, SelectedAreThoseAloneInThatOrder) {
+  SensorSuite suite;
+  for (const char* name : {"a", "b", "c"}) suite.add(std::make_shared<Picture>(name), name);
+  const std::vector<std::string> wanted{"c", "a"}, twice{"c", "c"}, unknown{"d"};
+  suite.select(wanted);
+  EXPECT_THAT(suite.names(), testing::ElementsAre("c", "a"));
+  EXPECT_EQ(suite.owner("c"), "c");
+  EXPECT_EQ(error_of([&] { suite.select(twice); }), "suite: sensor 'c' is given twice");
+  EXPECT_THAT(error_of([&] { suite.select(unknown); }),
+              testing::HasSubstr("no sensor named 'd'"));
+  EXPECT_EQ(suite.size(), 2u) << "as it was";
+}
+
 TEST(Suite, ExtendKeepsWhatCameBeforeTheClash) {
   SensorSuite suite;
   const std::shared_ptr<Sensor> more[] = {std::make_shared<Picture>("a"),

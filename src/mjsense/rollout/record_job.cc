@@ -54,6 +54,8 @@ std::string settings_of(const RecordJobCfg& job, Rollout& rollout) {
     entries.erase(key);
     if (!value.empty()) entries[key] = [value = value](JsonWriter& json) { json.value(value); };
   }
+  entries.erase("meshes");
+  if (task.robot.edit_spec) entries["meshes"] = [](JsonWriter& json) { json.value("real"); };
   if (job.rollout.terminate_upon_success)
     entries["terminate_upon_success"] = [](JsonWriter& json) { json.value(true); };
   // Sizes that change with the scene and with what robots are drawn with.

@@ -31,6 +31,13 @@ TaskCfg task_cfg(const RolloutCfg& cfg) {
     out.sim_dt_ms = out.robot.sim_dt_ms;
   }
   out.scene = cfg.scene;
+  if (cfg.meshes == "shapes") out.robot.edit_spec = {};
+  if (cfg.meshes == "real" && !out.robot.edit_spec) {
+    throw ValueError(
+        fmt::format("robot '{}': there are no real meshes; meshes are shapes or auto, unless an "
+                    "environment variable names their folder (see the robot's page)",
+                    cfg.robot));
+  }
   out.seed = cfg.seed;
   out.action_noise = cfg.action_noise;
   out.terminate_upon_success = cfg.terminate_upon_success;

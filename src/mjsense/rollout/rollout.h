@@ -15,12 +15,14 @@
 // An episode is a function of (seed, number): it does not depend on B, on its world, on threads, or
 // on what ran beside it.
 
+#include <array>
 #include <cstdint>
 #include <functional>
 #include <memory>
 #include <optional>
 #include <span>
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include "mjsense/cameras/camera_system.h"
@@ -37,6 +39,10 @@ namespace mjsense {
 
 class Rollout;
 
+// What robots are drawn with: shapes of ours, real meshes of other packages, or these where there
+// are some.
+inline constexpr std::array<std::string_view, 3> kMeshes{"auto", "shapes", "real"};
+
 struct RolloutCfg {
   std::string task = "pick";
   std::string robot = "franka";
@@ -51,6 +57,7 @@ struct RolloutCfg {
   bool depth = false;
   int samples = 1;
   bool shadows = true;
+  std::string meshes = "auto";  // one of kMeshes
   std::optional<int> horizon;
   bool action_noise = true;
   bool terminate_upon_success = false;
@@ -93,6 +100,11 @@ void visit_fields(V& v, RolloutCfg& c) {
   v("depth", c.depth, "Also the depth of every camera, losslessly.").decides_data_as("cameras");
   v("samples", c.samples, "Rays a pixel of rgb: smooth edges for time.").at_least(1).decides_data();
   v("shadows", c.shadows, "Pictures have shadows.").decides_data();
+  v("meshes", c.meshes,
+    "The robot is drawn with shapes of ours, its real meshes, or these where its environment "
+    "variable (``MJSENSE_FRANKA_MESHES``) names them; it moves the same.")
+      .one_of(kMeshes)
+      .decides_data_as("meshes");
   v("horizon", c.horizon, "Control steps after which an episode is cut; by default the task's.")
       .at_least(1)
       .decides_data_as("horizon");
