@@ -175,6 +175,47 @@ TEST_P(HeightFields, NoRayPassesThrough) {
   EXPECT_GT(hits, total / 2) << "too few hits to mean anything";
 }
 
+//   |\  |          a ray in the plane in which the field ends: from below the surface, from above it,
+//   | \_|__        up, down and along. A rounding decides on which side of the border it is, but
+//  -|-->|          not whether it comes out where there is nothing.
+//   |___|
+TEST_P(HeightFields, InTheBordersPlaneNoRayPassesEither) {
+  Rng rng(13, 0, 0, 0);
+  int wrong = 0, hits = 0, rays = 0;
+  for (int i = 0; i < 180; ++i) {
+    const Field field(rng, static_cast<Ground>(i % kNumGrounds));
+    RayScene scene(field.model().model, 1, isa());
+    scene.update(field.model().world());
+    for (int k = 0; k < 40; ++k) {
+      const int across = rng.below(2);
+      double p[3], d[3], o[3];
+      for (int j = 0; j < 2; ++j) p[j] = rng.uniform(-field.half(j), field.half(j));
+      p[across] = rng.below(2) ? field.half(across) : -field.half(across);
+      p[2] = rng.uniform(0, field.top());
+      testing::random_direction(rng, d);
+      if (rng.below(2)) d[0] = d[1] = 0;
+      d[across] = 0;
+      mju_normalize3(d);
+      // Out of the plane by nothing, or by what is left where sines and cosines should cancel.
+      if (rng.below(2)) d[across] = (rng.below(2) ? 1 : -1) * std::pow(10, -rng.uniform(12, 19));
+      const double away = rng.below(2) ? 0 : rng.uniform(0, 3);
+      for (int j = 0; j < 3; ++j) o[j] = p[j] - away * d[j];
+      Ray ray;
+      field.to_world(o, ray.o);
+      field.turn(d, ray.d);
+      const Hit hit = scene.trace(0, {}, ray.o, ray.d);
+      ++rays;
+      hits += hit.geom >= 0;
+      const std::string text = disagreement(field.model(), ray.o, ray.d, hit);
+      if (text.empty()) continue;
+      ADD_FAILURE() << "ray " << k << " of field " << i << ": " << text << "; in its frame from "
+                    << field.local(ray);
+      ASSERT_LT(++wrong, 5);
+    }
+  }
+  EXPECT_GT(hits, rays / 3);
+}
+
 // The other questions that the same march answers: what a ray from outside meets is a front face,
 // and it is hidden where it meets something.
 TEST_P(HeightFields, CulledAndOccludedAlike) {
