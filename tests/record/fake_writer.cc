@@ -2,7 +2,7 @@
 // Records a suite without physics: what the Python tests of the files read, kill and resume.
 //   record_fake OUT [--episodes N] [--worlds B] [--steps T] [--batches n] [--discard K]
 //               [--width W] [--height H] [--cameras C] [--no-video] [--no-depth] [--red-green]
-//               [--encoders E] [--threads n] [--gzip G] [--resume]
+//               [--encoders E] [--threads n] [--gzip G] [--timeout S] [--resume]
 //               [--step-ms MS] [--stop-after N] [--print] [--measure]
 //   record_fake verify|repair|inspect PATH
 //   record_fake sheet PATH PNG
@@ -99,6 +99,7 @@ int record(const std::string& out, const Options& o) {
   cfg.video.max_encoders = o.number("--encoders", 0);
   cfg.video.threads = o.number("--threads", 1);
   cfg.video.molmospaces_depth = o.flag("--red-green");
+  if (o.flag("--timeout")) cfg.video.ffmpeg_timeout = o.number("--timeout", 60);
   Recorder recorder(cfg);
 
   const bool measure = o.flag("--measure");

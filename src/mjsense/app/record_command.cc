@@ -153,6 +153,7 @@ int run_record(const RecordOptions& options) {
   } else {
     fmt::print("{}", summary_text(summary, sheet));
   }
+  for (const std::string& damage : summary.damage) fmt::print(stderr, "mjsense: {}\n", damage);
   if (summary.interrupted) {
     fmt::print(stderr,
                "interrupted: the finished episodes are safe; go on with --resume, or end it with "

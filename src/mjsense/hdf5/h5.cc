@@ -4,8 +4,11 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <cstring>
+#include <system_error>
 
 #include "mjsense/core/error.h"
+#include "mjsense/hdf5/guard.h"
 #include "mjsense/hdf5/lzf.h"
 
 namespace mjsense::h5 {
@@ -15,6 +18,8 @@ std::recursive_mutex& library() {
   static std::recursive_mutex mutex;
   return mutex;
 }
+
+bool nobody_else = false;
 
 // The innermost message is the reason ("No space left on device"), the outermost the deed.
 std::string library_error() {
@@ -46,12 +51,25 @@ void write_attribute(hid_t object, const char* name, hid_t file_type, hid_t memo
   check(H5Awrite(attribute, memory, data), name);
 }
 
+// Throws unless there is exactly one element of this class, of at most `most_bytes`.
+void require_one(hid_t space, hid_t type, H5T_class_t cls, std::size_t most_bytes,
+                 std::string_view name) {
+  const bool simple = H5Sget_simple_extent_type(space) != H5S_NULL;
+  const hssize_t count = simple ? H5Sget_simple_extent_npoints(space) : 0;
+  if (count != 1)
+    throw RuntimeError(fmt::format("'{}' holds {} values, expected 1", name, count));
+  const char* expected = cls == H5T_STRING ? "text" : "number";
+  if (H5Tget_class(type) != cls) throw RuntimeError(fmt::format("'{}' is no {}", name, expected));
+  if (H5Tget_size(type) > most_bytes)
+    throw RuntimeError(fmt::format("'{}' is a {} of {} bytes", name, expected, H5Tget_size(type)));
+}
+
 std::string read_string(hid_t type, auto&& read) {
   if (H5Tis_variable_str(type) > 0) {
     char* text = nullptr;
     const Id memory = text_type();
     read(static_cast<hid_t>(memory), static_cast<void*>(&text));
-    std::string result = text ? text : "";
+    std::string result(text ? text : "", text ? strnlen(text, kMostTextBytes) : 0);
     H5free_memory(text);
     return result;
   }
@@ -62,7 +80,8 @@ std::string read_string(hid_t type, auto&& read) {
 
 }  // namespace
 
-H5Lock::H5Lock() : lock_(library()) {
+H5Lock::H5Lock() {
+  if (!nobody_else) lock_ = std::unique_lock(library());
   static const bool once = [] {
     // Errors are our exceptions, not text on stderr. And after a full disk the library must not
     // try, at exit, to write once more what could not be written.
@@ -76,6 +95,8 @@ H5Lock::H5Lock() : lock_(library()) {
   (void)once;
   (void)quiet;
 }
+
+void H5Lock::alone() { nobody_else = true; }
 
 Id::Id(hid_t id, herr_t (*close)(hid_t), std::string_view what) : id_(id), close_(close) {
   if (id < 0) throw RuntimeError(fmt::format("{}: {}", what, library_error()));
@@ -119,7 +140,9 @@ Id create_file(const std::filesystem::path& path) {
   H5Pset_obj_track_times(creation, false);
   H5Pset_istore_k(creation, 8);  // small chunk indices: an episode has many datasets of few chunks
   const Id access = file_access();
-  return {H5Fcreate(path.c_str(), H5F_ACC_TRUNC, creation, access), H5Fclose,
+  std::error_code ignored;  // what cannot be removed is an error of the next line
+  std::filesystem::remove(path, ignored);
+  return {H5Fcreate(path.c_str(), H5F_ACC_EXCL, creation, access), H5Fclose,
           fmt::format("cannot create '{}'", path.string())};
 }
 
@@ -199,7 +222,11 @@ bool exists(hid_t parent, const std::string& path) {
   std::size_t end = 0;
   while (end != std::string::npos) {
     end = path.find('/', end + 1);
-    if (H5Lexists(parent, path.substr(0, end).c_str(), H5P_DEFAULT) <= 0) return false;
+    const std::string part = path.substr(0, end);
+    if (H5Lexists(parent, part.c_str(), H5P_DEFAULT) <= 0) return false;
+    H5L_info_t info;
+    if (H5Lget_info(parent, part.c_str(), &info, H5P_DEFAULT) < 0 || info.type != H5L_TYPE_HARD)
+      return false;
   }
   return true;
 }
@@ -207,10 +234,13 @@ bool exists(hid_t parent, const std::string& path) {
 std::vector<std::string> children(hid_t group) {
   std::vector<std::string> names;
   const auto add = [](hid_t, const char* name, const H5L_info_t*, void* out) -> herr_t {
-    static_cast<std::vector<std::string>*>(out)->emplace_back(name);
-    return 0;
+    auto& all = *static_cast<std::vector<std::string>*>(out);
+    all.emplace_back(name);
+    return all.size() > kMostNames ? 1 : 0;
   };
   check(H5Literate(group, H5_INDEX_NAME, H5_ITER_INC, nullptr, add, &names), "listing a group");
+  if (names.size() > kMostNames)
+    throw RuntimeError(fmt::format("a group has more than {} names", kMostNames));
   std::sort(names.begin(), names.end());
   return names;
 }
@@ -238,9 +268,11 @@ void write_text(hid_t parent, const std::string& path, std::string_view text) {
 }
 
 std::string read_text(hid_t parent, const std::string& path) {
-  const Id dataset(H5Dopen2(parent, path.c_str(), H5P_DEFAULT), H5Dclose, path);
+  const Id dataset = open_dataset(parent, path);
+  check_storage(dataset, path);
   const Id type(H5Dget_type(dataset), H5Tclose, path);
-  if (H5Tget_class(type) != H5T_STRING) throw RuntimeError(fmt::format("{}: not a text", path));
+  const Id space(H5Dget_space(dataset), H5Sclose, path);
+  require_one(space, type, H5T_STRING, kMostTextBytes, path);
   return read_string(type, [&](hid_t memory, void* out) {
     check(H5Dread(dataset, memory, H5S_ALL, H5S_ALL, H5P_DEFAULT, out), path);
   });
@@ -271,7 +303,8 @@ std::string text_attribute(hid_t object, const char* name) {
   if (!has_attribute(object, name)) return "";
   const Id attribute(H5Aopen(object, name, H5P_DEFAULT), H5Aclose, name);
   const Id type(H5Aget_type(attribute), H5Tclose, name);
-  if (H5Tget_class(type) != H5T_STRING) return "";
+  const Id space(H5Aget_space(attribute), H5Sclose, name);
+  require_one(space, type, H5T_STRING, kMostTextBytes, name);
   return read_string(
       type, [&](hid_t memory, void* out) { check(H5Aread(attribute, memory, out), name); });
 }
@@ -279,6 +312,9 @@ std::string text_attribute(hid_t object, const char* name) {
 std::int64_t int_attribute(hid_t object, const char* name, std::int64_t otherwise) {
   if (!has_attribute(object, name)) return otherwise;
   const Id attribute(H5Aopen(object, name, H5P_DEFAULT), H5Aclose, name);
+  const Id type(H5Aget_type(attribute), H5Tclose, name);
+  const Id space(H5Aget_space(attribute), H5Sclose, name);
+  require_one(space, type, H5T_INTEGER, sizeof(std::int64_t), name);
   std::int64_t value = otherwise;
   check(H5Aread(attribute, H5T_NATIVE_INT64, &value), name);
   return value;
@@ -287,6 +323,9 @@ std::int64_t int_attribute(hid_t object, const char* name, std::int64_t otherwis
 double double_attribute(hid_t object, const char* name, double otherwise) {
   if (!has_attribute(object, name)) return otherwise;
   const Id attribute(H5Aopen(object, name, H5P_DEFAULT), H5Aclose, name);
+  const Id type(H5Aget_type(attribute), H5Tclose, name);
+  const Id space(H5Aget_space(attribute), H5Sclose, name);
+  require_one(space, type, H5T_FLOAT, sizeof(double), name);
   double value = otherwise;
   check(H5Aread(attribute, H5T_NATIVE_DOUBLE, &value), name);
   return value;

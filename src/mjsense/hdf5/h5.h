@@ -20,6 +20,8 @@ namespace mjsense::h5 {
 class H5Lock {
  public:
   H5Lock();
+  // For the child of a fork, where nobody else is: the mutex still belongs to a thread of its parent.
+  static void alone();
 
  private:
   std::unique_lock<std::recursive_mutex> lock_;
@@ -51,6 +53,7 @@ class Id {
 // Throws RuntimeError "what: <what HDF5 says>" if `status` is negative.
 void check(herr_t status, std::string_view what);
 
+// In the place of a file that is there; a link is replaced, not followed.
 Id create_file(const std::filesystem::path& path);
 Id open_file(const std::filesystem::path& path, bool writable = false);
 Id create_group(hid_t parent,
@@ -62,20 +65,24 @@ Id link_properties();  // creates missing groups, names in UTF-8
 Id memory_type(DType dtype);  // bool: the enum {FALSE, TRUE} of int8, which h5py reads as bool
 Id text_type();               // variable-length UTF-8
 
-bool exists(hid_t parent, const std::string& path);  // every part of the path
-std::vector<std::string> children(hid_t group);      // names, sorted by code point
+// Every part of the path; false where one is a link to elsewhere.
+bool exists(hid_t parent, const std::string& path);
+// Names, sorted by code point. Throws RuntimeError beyond 100,000.
+std::vector<std::string> children(hid_t group);
 bool is_group(hid_t parent, const std::string& name);
 std::vector<hsize_t> dims(hid_t dataset);
 
 void write_text(hid_t parent, const std::string& path, std::string_view text);  // a scalar dataset
-std::string read_text(hid_t parent, const std::string& path);  // variable or fixed length
+// One text of variable or fixed length, at most 16 MiB; RuntimeError for anything else.
+std::string read_text(hid_t parent, const std::string& path);
 
 void set_attribute(hid_t object, const char* name, std::string_view value);
 void set_attribute(hid_t object, const char* name, double value);
 void set_attribute(hid_t object, const char* name, std::int64_t value);
 void set_attribute(hid_t object, const char* name, std::uint64_t value);
 bool has_attribute(hid_t object, const char* name);
-std::string text_attribute(hid_t object, const char* name);  // "" if absent
+// Of one text, "" if absent; of one number, `otherwise` if absent. RuntimeError for anything else.
+std::string text_attribute(hid_t object, const char* name);
 std::int64_t int_attribute(hid_t object, const char* name, std::int64_t otherwise);
 double double_attribute(hid_t object, const char* name, double otherwise);
 

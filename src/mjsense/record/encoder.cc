@@ -24,6 +24,7 @@ namespace mjsense {
 namespace {
 
 constexpr int kDefaultEncoders = 32;
+constexpr int kWatchPeriodMs = 250;  // how often running ones are looked at
 constexpr int kReapPeriodMs = 4;  // how often ending encoders are looked after
 
 }  // namespace
@@ -39,6 +40,9 @@ class EncoderPool::Stream {
   bool closed = false;  // the producer is done
   bool aborted = false;
   std::string failure;
+  double idle_s = 0;       // since its ffmpeg has last taken or written something
+  std::int64_t written = 0;  // bytes that went into its ffmpeg
+  std::int64_t seen = 0;   // of its input or output, when it last did
 
   // Ring of frames: [taken, filled) wait for the pool's thread, which has written `offset` bytes of
   // the first.
@@ -54,6 +58,7 @@ class EncoderPool::Stream {
 struct EncoderPool::Impl {
   VideoCfg cfg;
   Fps fps;
+  const std::atomic<int>* leave;  // at 2 or more: whoever waits wants to leave
   int max_encoders;
   int max_direct;   // encoders that streams may hold while they grow; the others drain spool files
   int max_waiting;  // spool files that wait for an encoder
@@ -67,7 +72,8 @@ struct EncoderPool::Impl {
   Fd wake_fd;
   std::thread thread;
 
-  Impl(const VideoCfg& cfg_, const Fps& fps_, int streams_at_once) : cfg(cfg_), fps(fps_) {
+  Impl(const VideoCfg& cfg_, const Fps& fps_, int streams_at_once, const std::atomic<int>* leave_)
+      : cfg(cfg_), fps(fps_), leave(leave_) {
     max_encoders = cfg.max_encoders > 0 ? cfg.max_encoders : kDefaultEncoders;
     const bool enough = streams_at_once <= max_encoders;
     max_direct = enough ? max_encoders : max_encoders - std::max(1, max_encoders / 4);
@@ -112,6 +118,7 @@ struct EncoderPool::Impl {
     pthread_sigmask(SIG_BLOCK, &pipe, nullptr);
     std::vector<pollfd> polled;
     std::vector<Stream*> ready;
+    Clock::time_point last = Clock::now();
     while (true) {
       polled.assign(1, {wake_fd.get(), POLLIN, 0});
       ready.assign(1, nullptr);
@@ -126,15 +133,52 @@ struct EncoderPool::Impl {
           ready.push_back(stream.get());
         }
       }
-      poll(polled.data(), polled.size(), ending ? kReapPeriodMs : -1);
+      const bool waiting = polled.size() > 1;
+      poll(polled.data(), polled.size(), ending ? kReapPeriodMs : waiting ? kWatchPeriodMs : -1);
+      // A pause of ours (Ctrl-Z, a sleeping machine) is not theirs.
+      const double elapsed = std::min(seconds_since(last), 1e-3 * 4 * kWatchPeriodMs);
+      last = Clock::now();
       std::uint64_t drained;
       while (read(wake_fd.get(), &drained, sizeof drained) > 0) {
       }
       for (std::size_t i = 1; i < polled.size(); ++i) {
         if (polled[i].revents != 0) feed(*ready[i]);
       }
+      watch(elapsed);
       look_after();
     }
+  }
+
+  // Ends encoders that have not moved for too long.
+  void watch(double elapsed) {
+    constexpr double kHurrySeconds = 2;
+    const bool hurry = leave && leave->load() >= 2;
+    const double most = hurry ? std::min(kHurrySeconds, cfg.ffmpeg_timeout) : cfg.ffmpeg_timeout;
+    const std::lock_guard lock(mutex);
+    for (const auto& stream : streams) {
+      const bool ending = stream->child.pid >= 0 && !stream->child.in;
+      if (stream->failed() || !(ending || (stream->direct && stream->has_frames()))) {
+        stream->idle_s = 0;
+        continue;
+      }
+      const std::int64_t now = ending ? moved(*stream) : stream->written;
+      stream->idle_s = now == stream->seen ? stream->idle_s + elapsed : 0;
+      stream->seen = now;
+      if (stream->idle_s < most) continue;
+      stream->failure = fmt::format("ffmpeg {} for {:g} s and was ended (ffmpeg_timeout)",
+                                    ending ? "did not come to its end" : "took no picture", most);
+      changed.notify_all();
+    }
+  }
+
+  // How far an ffmpeg has come that gets no more from us: in the file that it reads, or in the one
+  // that it writes.
+  static std::int64_t moved(const Stream& stream) {
+    const std::int64_t read =
+        stream.spool_file ? lseek(stream.spool_file.get(), 0, SEEK_CUR) : stream.written;
+    std::error_code ignored;
+    const auto size = std::filesystem::file_size(stream.output, ignored);
+    return read + (ignored ? 0 : static_cast<std::int64_t>(size));
   }
 
   // Writes as much as the sink takes now.
@@ -157,6 +201,7 @@ struct EncoderPool::Impl {
                                                      std::strerror(errno));
       } else {
         stream.offset += static_cast<std::size_t>(n);
+        stream.written += n;
         if (stream.offset < size) continue;
         stream.offset = 0;
         ++stream.taken;
@@ -194,10 +239,13 @@ struct EncoderPool::Impl {
     if (stream.direct) {
       stream.child.in.reset();  // the end of its input
     } else if (stream.child.pid < 0 && running < max_encoders) {
-      stream.spool_file.reset();
+      stream.spool_file = Fd(::open(stream.spool.c_str(), O_RDONLY | O_NOFOLLOW | O_CLOEXEC));
       try {
-        stream.child = start_process(
-            encoder_command(cfg, fps, *stream.video, stream.spool, stream.output), false, false);
+        if (!stream.spool_file)
+          throw RuntimeError(fmt::format("cannot read '{}': {}", stream.spool.string(),
+                                         std::strerror(errno)));
+        stream.child = start_process(encoder_command(cfg, fps, *stream.video, stream.output),
+                                     stream.spool_file);
         ++running;
       } catch (const Error& error) {
         stream.failure = error.what();
@@ -242,8 +290,9 @@ struct EncoderPool::Impl {
   }
 };
 
-EncoderPool::EncoderPool(const VideoCfg& cfg, const Fps& fps, int streams_at_once)
-    : impl_(std::make_unique<Impl>(cfg, fps, streams_at_once)) {}
+EncoderPool::EncoderPool(const VideoCfg& cfg, const Fps& fps, int streams_at_once,
+                         const std::atomic<int>* stop)
+    : impl_(std::make_unique<Impl>(cfg, fps, streams_at_once, stop)) {}
 EncoderPool::~EncoderPool() = default;
 
 EncoderPool::Stream* EncoderPool::open(const VideoStream& video,
@@ -269,12 +318,12 @@ EncoderPool::Stream* EncoderPool::open(const VideoStream& video,
   stream->direct = slot_free();
   if (stream->direct) {
     stream->child =
-        start_process(encoder_command(impl_->cfg, impl_->fps, video, "-", output), true, false);
+        start_process(encoder_command(impl_->cfg, impl_->fps, video, output), true, false);
     ++impl_->running;
   } else {
     stream->spool = output.string() + ".raw";
     stream->spool_file =
-        Fd(::open(stream->spool.c_str(), O_WRONLY | O_CREAT | O_TRUNC | O_CLOEXEC, 0644));
+        Fd(::open(stream->spool.c_str(), O_WRONLY | O_CREAT | O_EXCL | O_NOFOLLOW | O_CLOEXEC, 0644));
     if (!stream->spool_file) {
       throw RuntimeError(
           fmt::format("cannot write '{}': {}", stream->spool.string(), std::strerror(errno)));

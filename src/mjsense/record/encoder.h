@@ -6,8 +6,10 @@
 // the worlds have more streams than max_encoders, the surplus streams write raw frames to a file
 // beside their video, and encoders take these files up as they come free; the video is the same,
 // byte for byte. Either way the producer waits while `queue_frames` of its frames are not taken
-// yet, so memory is bounded and no frame is lost.
+// yet, so memory is bounded and no frame is lost. An ffmpeg that takes nothing, or does not end, for
+// VideoCfg::ffmpeg_timeout is ended, and its stream has failed.
 
+#include <atomic>
 #include <cstddef>
 #include <cstdint>
 #include <filesystem>
@@ -22,10 +24,9 @@
 
 namespace mjsense {
 
-// What ffmpeg is told: raw frames from `input` ("-": its stdin) to `output`.
+// What ffmpeg is told: raw frames from its stdin to `output`.
 std::vector<std::string> encoder_command(const VideoCfg& cfg, const Fps& fps,
                                          const VideoStream& video,
-                                         const std::filesystem::path& input,
                                          const std::filesystem::path& output);
 
 // Throws RuntimeError unless the ffmpeg program runs and has the encoders that the videos need.
@@ -43,7 +44,8 @@ class EncoderPool {
   using OnDone = std::function<void(const Result&)>;
 
   // `streams_at_once`: the most streams that grow at the same time.
-  EncoderPool(const VideoCfg& cfg, const Fps& fps, int streams_at_once);
+  EncoderPool(const VideoCfg& cfg, const Fps& fps, int streams_at_once,
+              const std::atomic<int>* stop = nullptr);
   ~EncoderPool();  // kills what still runs
 
   // Waits for a free encoder, or for disk space to be drained. `video` outlives the stream. Throws

@@ -1,15 +1,21 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <fmt/format.h>
 
+#include <algorithm>
+
 #include "mjsense/core/error.h"
 #include "mjsense/record/encoder.h"
 #include "mjsense/record/process.h"
 
 namespace mjsense {
+namespace {
+
+constexpr double kQuestionSeconds = 20;
+
+}  // namespace
 
 std::vector<std::string> encoder_command(const VideoCfg& cfg, const Fps& fps,
                                          const VideoStream& video,
-                                         const std::filesystem::path& input,
                                          const std::filesystem::path& output) {
   const bool grey = video.kind == VideoKind::kDepth16;
   std::vector<std::string> a = {ffmpeg_program(cfg.ffmpeg)};
@@ -18,7 +24,7 @@ std::vector<std::string> encoder_command(const VideoCfg& cfg, const Fps& fps,
   add({"-f", "rawvideo", "-pixel_format", grey ? "gray16le" : "rgb24"});
   add({"-video_size", fmt::format("{}x{}", video.width, video.height)});
   add({"-framerate", fmt::format("{}/{}", fps.num, fps.den)});
-  add({"-i", input == "-" ? "pipe:0" : input.string()});
+  add({"-protocol_whitelist", "pipe", "-i", "pipe:0"});
   add({"-an", "-threads", fmt::format("{}", cfg.threads)});
   switch (video.kind) {
     case VideoKind::kRgb:
@@ -37,7 +43,7 @@ std::vector<std::string> encoder_command(const VideoCfg& cfg, const Fps& fps,
       break;
   }
   add({"-fflags", "+bitexact", "-flags:v", "+bitexact", "-map_metadata", "-1", "-f",
-       video.extension == ".mkv" ? "matroska" : "mp4", output.string()});
+       video.extension == ".mkv" ? "matroska" : "mp4", "file:" + output.string()});
   return a;
 }
 
@@ -46,7 +52,8 @@ void check_ffmpeg(const VideoCfg& cfg, std::span<const VideoStream> videos) {
   const std::string program = ffmpeg_program(cfg.ffmpeg);
   std::string listing;
   try {
-    listing = run_process({program, "-hide_banner", "-loglevel", "error", "-encoders"});
+    listing = run_process({program, "-hide_banner", "-loglevel", "error", "-encoders"},
+                          {.silence_s = std::min(kQuestionSeconds, cfg.ffmpeg_timeout)});
   } catch (const Error& error) {
     throw RuntimeError(
         fmt::format("recording {} video streams needs ffmpeg: {}; install it (apt-get install "

@@ -8,6 +8,7 @@
 #include <cstring>
 
 #include "mjsense/core/error.h"
+#include "mjsense/hdf5/guard.h"
 #include "mjsense/record/depth.h"
 #include "mjsense/record/molmospaces.h"
 
@@ -105,6 +106,7 @@ void EpisodeFile::add_dataset(std::string_view place, DType dtype, const Shape& 
   hsize_t chunk[Shape::kMaxRank + 1] = {static_cast<hsize_t>(chunk_rows)};
   hsize_t most[Shape::kMaxRank + 1] = {H5S_UNLIMITED};
   dataset.rank = row.rank() + 1;
+  dataset.row_bytes = static_cast<std::size_t>(row.size()) * dtype_size(dtype);
   for (int i = 0; i < row.rank(); ++i) {
     // A row of no elements is stored as such; HDF5 wants its chunks to have a size all the same.
     const auto size = static_cast<hsize_t>(row[i]);
@@ -140,6 +142,8 @@ void EpisodeFile::write_chunk(int stream, std::int64_t rows, std::span<const std
   const auto index = static_cast<std::size_t>(stream);
   if (index < plan_.arrays.size() && plan_.arrays[index].text)
     chunk = texts_of(plan_.arrays[index], rows, chunk);
+  if (!chunk.empty())
+    datasets_[index].sum.add(chunk.data(), static_cast<std::size_t>(rows) * datasets_[index].row_bytes);
   std::span<const std::uint8_t> bytes = chunk;
   if (gzip_ > 0 && !chunk.empty()) {  // outside the library's lock: here the time goes
     packed_.resize(compressBound(chunk.size()));
@@ -160,13 +164,29 @@ void EpisodeFile::write_chunk(int stream, std::int64_t rows, std::span<const std
   h5::check(H5Dwrite_chunk(dataset.id, H5P_DEFAULT, 0, offset, bytes.size(), bytes.data()), what);
 }
 
-void EpisodeFile::finish(std::string_view obs_scene, std::string_view outcome) {
+void EpisodeFile::write_scene(std::string_view obs_scene, std::string_view outcome) {
+  Checksum sum;
+  sum.add(obs_scene.data(), obs_scene.size());
   const h5::H5Lock lock;
   h5::write_text(trajectory_, "obs_scene", obs_scene);
+  h5::set_attribute(h5::open_dataset(trajectory_, "obs_scene"), kChecksumAttribute, sum.text());
   h5::set_attribute(trajectory_, "outcome", outcome);
+}
+
+void EpisodeFile::finish(std::span<const VideoSum> videos) {
+  const h5::H5Lock lock;
+  for (const Dataset& dataset : datasets_)
+    h5::set_attribute(dataset.id, kChecksumAttribute, dataset.sum.text());
+  for (std::size_t v = 0; v < videos.size(); ++v) {
+    const h5::Id dataset =
+        h5::open_dataset(trajectory_, "obs/sensor_data/" + plan_.videos[v].key);
+    h5::set_attribute(dataset, kChecksumAttribute, videos[v].crc);
+    h5::set_attribute(dataset, kBytesAttribute, videos[v].bytes);
+  }
   datasets_.clear();
   trajectory_.reset();
   file_.close(fmt::format("cannot write '{}'", path_.string()));
+  seal_file(path_);
 }
 
 }  // namespace mjsense

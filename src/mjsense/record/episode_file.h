@@ -6,10 +6,12 @@
 #include <cstdint>
 #include <filesystem>
 #include <span>
+#include <string>
 #include <string_view>
 #include <vector>
 
 #include "mjsense/hdf5/h5.h"
+#include "mjsense/record/checksum.h"
 #include "mjsense/record/layout.h"
 
 namespace mjsense {
@@ -31,13 +33,21 @@ class EpisodeFile {
   // has the kept bytes of a whole chunk, zero beyond the rows: what is text on disk becomes it
   // here. Chunks of a stream come in order, all but the last full.
   void write_chunk(int stream, std::int64_t rows, std::span<const std::uint8_t> chunk);
-  void finish(std::string_view obs_scene,
-              std::string_view outcome);  // closes; throws when the disk refuses
+  void write_scene(std::string_view obs_scene, std::string_view outcome);
+  // Of the videos, in the plan's order: their checksums and sizes. Closes; throws when the disk
+  // refuses.
+  struct VideoSum {
+    std::string crc;
+    std::int64_t bytes = 0;
+  };
+  void finish(std::span<const VideoSum> videos);
 
  private:
   struct Dataset {
     h5::Id id;
     int rank = 0;
+    std::size_t row_bytes = 0;
+    Checksum sum;  // of all rows
     hsize_t dims[Shape::kMaxRank + 1] = {};
   };
   // A chunk of texts; valid until the next call.

@@ -4,19 +4,23 @@
 #include <fcntl.h>
 #include <fmt/format.h>
 #include <sys/file.h>
+#include <sys/stat.h>
 #include <unistd.h>
 
 #include <algorithm>
+#include <array>
 #include <cerrno>
 #include <charconv>
+#include <cstdio>
 #include <cstring>
-#include <fstream>
+#include <limits>
 #include <nlohmann/json.hpp>
 #include <optional>
-#include <sstream>
 
 #include "mjsense/core/error.h"
-#include "mjsense/hdf5/h5.h"
+#include "mjsense/core/plain_file.h"
+#include "mjsense/hdf5/guard.h"
+#include "mjsense/record/checksum.h"
 #include "mjsense/record/layout.h"
 
 namespace fs = std::filesystem;
@@ -25,6 +29,8 @@ namespace mjsense {
 namespace {
 
 constexpr const char* kEndingFile = "ending";  // publish_all() has begun
+constexpr const char* kDescription = "recording.json";
+constexpr const char* kLock = "lock";
 
 [[noreturn]] void throw_file(const char* deed, const fs::path& path, int error) {
   throw RuntimeError(fmt::format("cannot {} '{}': {}", deed, path.string(), std::strerror(error)));
@@ -47,8 +53,10 @@ void make_dir(const fs::path& path) {
 
 void write_whole(const fs::path& path, std::string_view text) {
   const fs::path part = path.string() + ".part";
+  unlink(part.c_str());
   {
-    const Fd fd(open(part.c_str(), O_WRONLY | O_CREAT | O_TRUNC | O_CLOEXEC, 0644));
+    const Fd fd(
+        open(part.c_str(), O_WRONLY | O_CREAT | O_EXCL | O_NOFOLLOW | O_CLOEXEC, 0644));
     if (!fd || write(fd.get(), text.data(), text.size()) != static_cast<ssize_t>(text.size()) ||
         fsync(fd.get()) != 0) {
       const int error = errno;
@@ -59,11 +67,35 @@ void write_whole(const fs::path& path, std::string_view text) {
   move(part, path);
 }
 
-std::string read_whole(const fs::path& path) {
-  std::ifstream in(path, std::ios::binary);
-  std::stringstream text;
-  text << in.rdbuf();
-  return text.str();
+// A file of ours, which is short; "" if it is none.
+std::string read_whole(const fs::path& folder, const char* name) {
+  constexpr std::int64_t kMostBytes = 1 << 24;
+  try {
+    const Fd file = open_plain(folder, name);
+    std::string text(static_cast<std::size_t>(std::min(size_of(file), kMostBytes)), '\0');
+    const ssize_t n = pread(file.get(), text.data(), text.size(), 0);
+    text.resize(std::max<ssize_t>(0, n));
+    return text;
+  } catch (const Error&) {
+    return "";
+  }
+}
+
+// Throws where a name of ours is a link to a place that we would write to.
+void require_no_link(const fs::path& path) {
+  if (fs::is_symlink(path))
+    throw ValueError(fmt::format("'{}' is a link, which is not followed: remove it", path.string()));
+}
+
+// What the recording of this house must be if it is to be published: JSON text of our own making.
+bool is_description(const std::string& text) {
+  const auto json = nlohmann::json::parse(text, nullptr, false);
+  const auto number = [&](const char* name) {
+    return json.contains(name) && json[name].is_number_integer() && json[name] > 0 &&
+           json[name] <= std::numeric_limits<int>::max();
+  };
+  return json.is_object() && number("episodes") && number("batches") &&
+         json["batches"] <= json["episodes"];
 }
 
 void remove_tree(const fs::path& path) {
@@ -96,50 +128,84 @@ std::vector<fs::path> entries(const fs::path& dir) {
 
 using Moves = std::vector<std::pair<fs::path, fs::path>>;
 
+// {"recording": text, "episodes": [0, 1 ...]} of a published file.
+std::string describe_published(const fs::path& path) {
+  const h5::H5Lock lock;
+  const h5::Id file = h5::open_file(path);
+  nlohmann::json out{{"recording", h5::text_attribute(file, "recording")},
+                     {"episodes", nlohmann::json::array()}};
+  for (const std::string& trajectory : h5::children(file)) {
+    if (trajectory.starts_with("traj_"))
+      out["episodes"].push_back(h5::int_attribute(h5::open_group(file, trajectory), "episode", -1));
+  }
+  return out.dump(-1, ' ', false, nlohmann::json::error_handler_t::replace);
+}
+
+std::string final_name_of(const StagedVideo& video, int index, int batch, int batches) {
+  const fs::path name = video.name;
+  return video_file(name.stem().string(), name.extension().string(), index, batch, batches);
+}
+
 // Writes the final names of the videos of traj_{index} into the file, and notes what has to be
 // moved where.
 void name_videos(hid_t trajectory, const fs::path& staged, const fs::path& house, int index,
                  int batch, int batches, Moves& moves) {
-  const h5::Id names(H5Gopen2(trajectory, "obs/sensor_data", H5P_DEFAULT), H5Gclose,
-                     "obs/sensor_data");
-  for (const std::string& key : h5::children(names)) {
-    const h5::Id dataset(H5Dopen2(names, key.c_str(), H5P_DEFAULT), H5Dclose, key);
-    char name[kFileNameBytes + 1] = {};
-    h5::check(H5Dread(dataset, H5T_NATIVE_UINT8, H5S_ALL, H5S_ALL, H5P_DEFAULT, name), key);
-    const fs::path staged_name = name;
-    const std::string final_name = video_file(
-        staged_name.stem().string(), staged_name.extension().string(), index, batch, batches);
-    std::memset(name, 0, sizeof name);
-    std::memcpy(name, final_name.data(), std::min(final_name.size(), kFileNameBytes));
-    h5::check(H5Dwrite(dataset, H5T_NATIVE_UINT8, H5S_ALL, H5S_ALL, H5P_DEFAULT, name), key);
-    moves.emplace_back(staged / staged_name, house / final_name);
+  const h5::Id names = h5::open_group(trajectory, "obs/sensor_data");
+  for (const StagedVideo& video : staged_videos(trajectory)) {
+    const std::string final_name = final_name_of(video, index, batch, batches);
+    std::array<char, kFileNameBytes> bytes{};
+    std::memcpy(bytes.data(), final_name.data(), std::min(final_name.size(), bytes.size()));
+    const h5::Id dataset = h5::open_dataset(names, video.key);
+    if (h5::dims(dataset) != std::vector<hsize_t>{kFileNameBytes})
+      throw RuntimeError(fmt::format("'{}' is no row of {} bytes", video.key, kFileNameBytes));
+    h5::check(H5Dwrite(dataset, H5T_NATIVE_UINT8, H5S_ALL, H5S_ALL, H5P_DEFAULT, bytes.data()),
+              video.key);
+    moves.emplace_back(staged / video.name, house / final_name);
   }
+}
+
+// Takes the disk space of a file before it is written: on a full disk that is a plain error, while
+// the HDF5 library may crash where it cannot write in the middle of a copy.
+void reserve(const fs::path& path, std::int64_t bytes) {
+  const Fd file(open(path.c_str(), O_WRONLY | O_NOFOLLOW | O_CLOEXEC));
+  if (!file) throw_file("write", path, errno);
+  if (fallocate(file.get(), FALLOC_FL_KEEP_SIZE, 0, bytes) == 0) return;
+  if (errno == ENOSPC || errno == EDQUOT || errno == EFBIG) throw_file("write", path, errno);
+  // Where space cannot be reserved (some network file systems), at least ask how much there is.
+  std::error_code error;
+  const fs::space_info space = fs::space(path, error);
+  if (!error && space.available < static_cast<std::uintmax_t>(bytes))
+    throw_file("write", path, ENOSPC);
 }
 
 }  // namespace
 
-int Decisions::kept() const {
-  return static_cast<int>(std::count_if(kept_by_episode.begin(), kept_by_episode.end(),
-                                        [](const auto& d) { return d.second; }));
+void Decisions::add(std::int64_t episode, bool kept) {
+  if (!kept_by_episode_.emplace(episode, kept).second) return;
+  kept_ += kept;
+  for (auto at = kept_by_episode_.find(next_);
+       at != kept_by_episode_.end() && at->first == next_; ++at, ++next_) {
+    if (at->second) settled_.push_back(next_);
+  }
 }
 
-std::vector<std::int64_t> Decisions::first(int most, bool settled) const {
+std::vector<std::int64_t> Decisions::all_kept() const {
   std::vector<std::int64_t> episodes;
-  std::int64_t next = 0;
-  for (const auto& [episode, is_kept] : kept_by_episode) {
-    if (settled && episode != next++) break;
-    if (is_kept && static_cast<int>(episodes.size()) < most) episodes.push_back(episode);
+  for (const auto& [episode, is_kept] : kept_by_episode_) {
+    if (is_kept) episodes.push_back(episode);
   }
   return episodes;
 }
 
 House::House(const fs::path& dir, const std::string& fingerprint, bool resume)
     : dir_(dir), staging_(dir / kStagingDir), fingerprint_(fingerprint) {
+  if (!is_description(fingerprint))
+    throw RuntimeError(fmt::format("'{}': its description of a recording cannot be read",
+                                   (staging_ / kDescription).string()));
   const auto description = nlohmann::json::parse(fingerprint);
-  episodes_ = description.at("episodes");
-  batch_sizes_ = batch_sizes(episodes_, description.at("batches"));
-  published_.resize(batch_sizes_.size());
+  batches_ = batches_of(description.at("episodes"), description.at("batches"));
 
+  require_no_link(staging_);
   const bool any_published = load_published(fingerprint);
   const std::string unfinished = unfinished_recording(dir);
   if (!resume && (any_published || !unfinished.empty())) {
@@ -152,22 +218,25 @@ House::House(const fs::path& dir, const std::string& fingerprint, bool resume)
       !difference.empty()) {
     throw ValueError(fmt::format("'{}' holds a different recording: {}", dir.string(), difference));
   }
-  if (unfinished.empty() && any_published) {
+  // A lock without the mark of the end: it goes on, though recording.json was lost.
+  const bool goes_on = fs::exists(staging_ / kLock) && !fs::exists(staging_ / kEndingFile);
+  if (unfinished.empty() && any_published && !goes_on) {
     ended_ = true;
     return;
   }
   make_dir(staging_);
-  const fs::path lock = staging_ / "lock";
-  lock_ = Fd(open(lock.c_str(), O_RDWR | O_CREAT | O_CLOEXEC, 0644));
+  const fs::path lock = staging_ / kLock;
+  lock_ = Fd(open(lock.c_str(), O_RDWR | O_CREAT | O_NOFOLLOW | O_CLOEXEC, 0644));
   if (!lock_) throw_file("write", lock, errno);
   // The second question: whether it came to its end between our reading and our lock.
   if (flock(lock_.get(), LOCK_EX | LOCK_NB) != 0 || unfinished != unfinished_recording(dir)) {
     throw ValueError(fmt::format("another process records into '{}'", dir.string()));
   }
+  if (read_whole(staging_, kDescription) != fingerprint)
+    write_whole(staging_ / kDescription, unfinished.empty() ? fingerprint : unfinished);
   load_staged();
-  if (unfinished.empty()) write_whole(staging_ / "recording.json", fingerprint);
   if (fs::exists(staging_ / kEndingFile)) publish_all();
-  if (!ended_ && std::all_of(published_.begin(), published_.end(), [](bool p) { return p; })) end();
+  if (!ended_ && static_cast<int>(published_.size()) == batches_.count) end();
 }
 
 bool House::load_published(const std::string& fingerprint) {
@@ -176,41 +245,91 @@ bool House::load_published(const std::string& fingerprint) {
     const std::string name = path.filename().string();
     if (!name.starts_with("trajectories_batch_") || path.extension() != ".h5") continue;
     any = true;
-    const h5::H5Lock lock;
-    const h5::Id file = h5::open_file(path);
-    const std::string was = h5::text_attribute(file, "recording");
+    const auto bytes = static_cast<std::uint64_t>(size_of(open_plain(dir_, name)));
+    const auto found = nlohmann::json::parse(
+        h5::in_child(path.string(), bytes, [&] { return describe_published(path); }), nullptr,
+        false);
+    const std::string was = found.is_object() ? found.at("recording").get<std::string>() : "";
     const auto difference =
         was.empty() ? "it was not recorded by mjsense" : fingerprint_difference(was, fingerprint);
     if (!difference.empty()) {
       throw ValueError(
           fmt::format("'{}' belongs to a different recording: {}", path.string(), difference));
     }
-    for (std::size_t b = 0; b < batch_sizes_.size(); ++b) {
-      if (name == batch_file(static_cast<int>(b), static_cast<int>(batch_sizes_.size())))
-        published_[b] = true;
-    }
-    for (const std::string& trajectory : h5::children(file)) {
-      if (!trajectory.starts_with("traj_")) continue;
-      const h5::Id group(H5Gopen2(file, trajectory.c_str(), H5P_DEFAULT), H5Gclose, trajectory);
-      decisions_.kept_by_episode[h5::int_attribute(group, "episode", -1)] = true;
-    }
+    int batch = 0, batches = 0;
+    if (std::sscanf(name.c_str(), "trajectories_batch_%d_of_%d.h5", &batch, &batches) == 2 &&
+        batch >= 1 && batch <= batches_.count && name == batch_file(batch - 1, batches_.count))
+      published_.insert(batch - 1);
+    for (const std::int64_t episode : found.at("episodes")) decisions_.add(episode, true);
   }
   return any;
 }
 
+// Moves videos back that an interrupted publication had moved already: then every episode is whole
+// in its folder or it is not, and one that is not takes nothing from the others.
+void House::bring_back(const std::map<std::int64_t, StagedEpisode>& staged, bool ending) {
+  Decisions then = decisions_;
+  for (const auto& [episode, found] : staged) then.add(episode, true);
+  const std::vector<std::int64_t> order = ending ? then.all_kept() : then.settled();
+  int batch = 0;
+  for (std::size_t at = 0; at < order.size(); ++at) {
+    const auto found = staged.find(order[at]);
+    if (found == staged.end()) continue;
+    while (batch + 1 < batches_.count && batches_.first(batch + 1) <= static_cast<std::int64_t>(at))
+      ++batch;
+    const int index = static_cast<int>(static_cast<std::int64_t>(at) - batches_.first(batch));
+    for (const StagedVideo& video : found->second.videos) {
+      const fs::path home = staging_ / episode_name(found->first) / video.name,
+                     away = dir_ / final_name_of(video, index, batch, batches_.count);
+      if (!published_.contains(batch) && !fs::exists(home) && is_plain_file(away)) move(away, home);
+    }
+  }
+}
+
+void House::set_aside(const fs::path& folder, const std::string& why) {
+  const fs::path damaged = dir_ / kDamagedDir;
+  require_no_link(damaged);
+  make_dir(damaged);
+  fs::path to = damaged / folder.filename();
+  for (int n = 2; fs::exists(fs::symlink_status(to)); ++n)
+    to = damaged / fmt::format("{}.{}", folder.filename().string(), n);
+  move(folder, to);
+  sync(damaged);
+  damage_.push_back(fmt::format("{} {}; it was set aside as '{}'", folder.filename().string(), why,
+                                to.string()));
+}
+
 void House::load_staged() {
-  const bool known = fs::exists(staging_ / "recording.json");
+  std::map<std::int64_t, StagedEpisode> staged;
+  const bool ending = fs::exists(staging_ / kEndingFile);
   for (const fs::path& path : entries(staging_)) {
     const std::string name = path.filename().string();
-    if (name == "lock" || name == "recording.json" || (known && name == kEndingFile)) continue;
+    if (name == kLock || name == kDescription || name == kEndingFile) continue;
     const auto finished = episode_number(name, ""), discarded = episode_number(name, ".discarded");
-    // Without recording.json this is the rest of a directory that was being removed.
-    if (known && finished && !decisions_.contains(*finished)) {
-      decisions_.kept_by_episode[*finished] = true;
-    } else if (known && discarded) {
-      decisions_.kept_by_episode[*discarded] = false;
+    if (finished && !decisions_.contains(*finished)) {
+      try {
+        StagedEpisode episode = read_staged(path);
+        const std::string difference = fingerprint_difference(episode.recording, fingerprint_);
+        if (!difference.empty())
+          throw RuntimeError("belongs to a different recording: " + difference);
+        staged.emplace(*finished, std::move(episode));
+      } catch (const Error& e) {
+        set_aside(path, e.what());
+      }
+    } else if (discarded) {
+      decisions_.add(*discarded, false);
     } else {
       remove_tree(path);
+    }
+  }
+  bring_back(staged, ending);
+  for (const auto& [number, episode] : staged) {
+    const fs::path folder = staging_ / episode_name(number);
+    try {
+      check_staged_videos(folder, episode);
+      decisions_.add(number, true);
+    } catch (const Error& e) {
+      set_aside(folder, e.what());
     }
   }
 }
@@ -223,7 +342,9 @@ fs::path House::part_dir(std::int64_t episode) const {
 
 void House::begin(std::int64_t episode) {
   remove_tree(part_dir(episode));
-  make_dir(part_dir(episode));
+  // It must be new: a folder that somebody else put there may hold links.
+  if (mkdir(part_dir(episode).c_str(), 0755) != 0)
+    throw_file("create the directory", part_dir(episode), errno);
 }
 
 void House::keep(std::int64_t episode) {
@@ -232,33 +353,31 @@ void House::keep(std::int64_t episode) {
   sync(part);
   move(part, staging_ / episode_name(episode));
   sync(staging_);
-  decisions_.kept_by_episode[episode] = true;
+  decisions_.add(episode, true);
 }
 
 void House::discard(std::int64_t episode, const std::string& why) {
   write_whole(staging_ / (episode_name(episode) + ".discarded"), why);
   sync(staging_);
   remove_tree(part_dir(episode));
-  decisions_.kept_by_episode[episode] = false;
+  decisions_.add(episode, false);
 }
 
 void House::abandon(std::int64_t episode) { remove_tree(part_dir(episode)); }
 
 std::vector<std::int64_t> House::batch_of(int batch, const std::vector<std::int64_t>& kept) const {
-  std::size_t first = 0;
-  for (int b = 0; b < batch; ++b) first += batch_sizes_[b];
-  const std::size_t last = std::min(first + batch_sizes_[batch], kept.size());
-  if (first >= last) return {};
-  return {kept.begin() + static_cast<std::ptrdiff_t>(first),
-          kept.begin() + static_cast<std::ptrdiff_t>(last)};
+  const auto most = static_cast<std::int64_t>(kept.size());
+  const std::int64_t first = std::min(batches_.first(batch), most),
+                     last = std::min(batches_.first(batch + 1), most);
+  return {kept.begin() + first, kept.begin() + last};
 }
 
 void House::publish_ready() {
-  const std::vector<std::int64_t> kept = decisions_.first(episodes_, true);
-  for (std::size_t b = 0; b < batch_sizes_.size(); ++b) {
-    const std::vector<std::int64_t> episodes = batch_of(static_cast<int>(b), kept);
-    if (!published_[b] && static_cast<int>(episodes.size()) == batch_sizes_[b])
-      publish(static_cast<int>(b), episodes);
+  const std::vector<std::int64_t>& kept = decisions_.settled();
+  for (; next_batch_ < batches_.count &&
+         batches_.first(next_batch_ + 1) <= static_cast<std::int64_t>(kept.size());
+       ++next_batch_) {
+    if (!published_.contains(next_batch_)) publish(next_batch_, batch_of(next_batch_, kept));
   }
 }
 
@@ -268,22 +387,28 @@ void House::publish_all() {
   // From here on the order of episodes is settled, also for a process that finds us interrupted.
   write_whole(staging_ / kEndingFile, "");
   sync(staging_);
-  const std::vector<std::int64_t> kept = decisions_.first(episodes_, false);
-  for (std::size_t b = 0; b < batch_sizes_.size(); ++b) {
-    const std::vector<std::int64_t> episodes = batch_of(static_cast<int>(b), kept);
-    if (!published_[b] && !episodes.empty()) publish(static_cast<int>(b), episodes);
+  const std::vector<std::int64_t> kept = decisions_.all_kept();
+  for (int b = next_batch_; b < batches_.count; ++b) {
+    const std::vector<std::int64_t> episodes = batch_of(b, kept);
+    if (episodes.empty()) break;
+    if (!published_.contains(b)) publish(b, episodes);
   }
   end();
 }
 
 void House::publish(int batch, const std::vector<std::int64_t>& episodes) {
-  const int batches = static_cast<int>(batch_sizes_.size());
+  const int batches = batches_.count;
   const fs::path part = staging_ / "batch.part";
   const std::string what = fmt::format("cannot write '{}'", part.string());
   Moves moves;
   {
     const h5::H5Lock lock;
     h5::Id file = h5::create_file(part);
+    std::int64_t most = 1 << 17;  // what a file has beside its episodes, and then some
+    for (const std::int64_t episode : episodes)
+      most += static_cast<std::int64_t>(
+          fs::file_size(staging_ / episode_name(episode) / kEpisodeFile) * 9 / 8);
+    reserve(part, most);
     h5::set_attribute(file, "format", "mjsense 1");
     h5::set_attribute(file, "recording", fingerprint_);
     for (std::size_t i = 0; i < episodes.size(); ++i) {
@@ -292,11 +417,12 @@ void House::publish(int batch, const std::vector<std::int64_t>& episodes) {
       h5::Id source = h5::open_file(staged / kEpisodeFile);
       h5::check(H5Ocopy(source, "traj_0", file, name.c_str(), H5P_DEFAULT, h5::link_properties()),
                 what);
-      h5::Id trajectory(H5Gopen2(file, name.c_str(), H5P_DEFAULT), H5Gclose, name);
+      const h5::Id trajectory = h5::open_group(file, name);
       name_videos(trajectory, staged, dir_, static_cast<int>(i), batch, batches, moves);
     }
     file.close(what);
   }
+  seal_file(part);
   sync(part);
   for (const auto& [from, to] : moves) {
     // A missing one was moved before an earlier attempt to publish was interrupted.
@@ -308,7 +434,7 @@ void House::publish(int batch, const std::vector<std::int64_t>& episodes) {
   const fs::path final_path = dir_ / batch_file(batch, batches);
   move(part, final_path);
   sync(dir_);
-  published_[batch] = true;
+  published_.insert(batch);
   published_bytes_ += static_cast<std::int64_t>(fs::file_size(final_path));
   for (const std::int64_t episode : episodes) remove_tree(staging_ / episode_name(episode));
 }
@@ -317,22 +443,35 @@ void House::end() {
   ended_ = true;
   for (const fs::path& path : entries(staging_)) {
     const fs::path name = path.filename();
-    if (name != "recording.json" && name != "lock" && name != kEndingFile) remove_tree(path);
+    if (name != kDescription && name != kLock && name != kEndingFile) remove_tree(path);
   }
-  remove_tree(staging_ / "recording.json");  // before the mark that says it has ended
+  // The mark that says it has ended goes last.
+  remove_tree(staging_ / kDescription);
+  remove_tree(staging_ / kLock);
   lock_.reset();
   remove_tree(staging_);
 }
 
 std::string unfinished_recording(const fs::path& house) {
-  return read_whole(house / kStagingDir / "recording.json");
+  const fs::path staging = house / kStagingDir;
+  if (!is_plain_folder(staging)) return "";
+  if (std::string text = read_whole(staging, kDescription); is_description(text)) return text;
+  // Lost or damaged: every finished episode carries the same text.
+  for (const fs::path& episode : finished_episodes(house)) {
+    try {
+      if (std::string text = read_staged(episode).recording; is_description(text)) return text;
+    } catch (const Error&) {
+      continue;
+    }
+  }
+  return "";
 }
 
 std::vector<fs::path> finished_episodes(const fs::path& house) {
   std::vector<fs::path> found;
+  if (!is_plain_folder(house / kStagingDir)) return found;
   for (const fs::path& path : entries(house / kStagingDir)) {
-    if (episode_number(path.filename().string(), "") && fs::exists(path / kEpisodeFile))
-      found.push_back(path);
+    if (episode_number(path.filename().string(), "")) found.push_back(path);
   }
   return found;
 }

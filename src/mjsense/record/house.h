@@ -8,31 +8,44 @@
 //   .recording/episode_00000007/                  finished, waits until its batch is whole
 //   .recording/episode_00000008.discarded         attempted, not kept
 //   .recording/episode_00000009.part.1234/        running in process 1234, worthless after it
+//   damaged/episode_00000010/                     finished, found broken later: set aside
 //
 // Every change of state is one rename. A batch is published by moving videos first and the HDF5
 // file last; when that is interrupted, doing it again ends in the same state, because the order of
-// episodes is that of their numbers.
+// episodes is that of their numbers. What an earlier process left is checked before it is published,
+// and no name that stands in a file leads out of its folder.
 
 #include <cstdint>
 #include <filesystem>
 #include <map>
+#include <set>
 #include <string>
 #include <vector>
 
-#include "mjsense/record/process.h"
+#include "mjsense/core/fd.h"
+#include "mjsense/record/layout.h"
+#include "mjsense/record/staged_episode.h"
 
 namespace mjsense {
 
 // Which attempts were decided, and how.
-struct Decisions {
-  std::map<std::int64_t, bool> kept_by_episode;
+class Decisions {
+ public:
+  void add(std::int64_t episode, bool kept);  // once for each
 
-  bool contains(std::int64_t episode) const { return kept_by_episode.contains(episode); }
-  int kept() const;
-  int discarded() const { return static_cast<int>(kept_by_episode.size()) - kept(); }
-  // The first `most` kept episodes, in order. `settled`: only those whose place no undecided
-  // attempt can take any more.
-  std::vector<std::int64_t> first(int most, bool settled) const;
+  bool contains(std::int64_t episode) const { return kept_by_episode_.contains(episode); }
+  int kept() const { return kept_; }
+  int discarded() const { return static_cast<int>(kept_by_episode_.size()) - kept_; }
+  // The kept episodes whose place no undecided attempt can take any more, in order.
+  const std::vector<std::int64_t>& settled() const { return settled_; }
+  // All kept episodes, in order.
+  std::vector<std::int64_t> all_kept() const;
+
+ private:
+  std::map<std::int64_t, bool> kept_by_episode_;
+  std::vector<std::int64_t> settled_;
+  std::int64_t next_ = 0;  // the lowest that is undecided
+  int kept_ = 0;
 };
 
 class House {
@@ -55,20 +68,25 @@ class House {
   void publish_ready();  // the batches whose episodes are all decided
   void publish_all();    // also batches that lack episodes; ends the recording
   std::int64_t published_bytes() const { return published_bytes_; }
+  // What was found broken, a sentence each: these attempts are undecided again.
+  const std::vector<std::string>& damage() const { return damage_; }
 
  private:
   bool load_published(const std::string& fingerprint);
   void load_staged();
+  void bring_back(const std::map<std::int64_t, StagedEpisode>& staged, bool ending);
+  void set_aside(const std::filesystem::path& folder, const std::string& why);
   void publish(int batch, const std::vector<std::int64_t>& episodes);
   std::vector<std::int64_t> batch_of(int batch, const std::vector<std::int64_t>& kept) const;
   void end();
 
   std::filesystem::path dir_, staging_;
   std::string fingerprint_;
-  int episodes_ = 0;
-  std::vector<int> batch_sizes_;
-  std::vector<bool> published_;
+  Batches batches_;
+  std::set<int> published_;
+  int next_batch_ = 0;  // those before it are published
   Decisions decisions_;
+  std::vector<std::string> damage_;
   std::int64_t published_bytes_ = 0;
   bool ended_ = false;
   Fd lock_;
@@ -77,8 +95,10 @@ class House {
 // The names under which a house keeps what is not published.
 inline constexpr const char* kStagingDir = ".recording";
 inline constexpr const char* kEpisodeFile = "traj.h5";
+inline constexpr const char* kDamagedDir = "damaged";
 
-// recording.json of a house: "" when it holds no unfinished recording.
+// recording.json of a house, or what its finished episodes say when that is lost: "" when it holds no unfinished
+// recording.
 std::string unfinished_recording(const std::filesystem::path& house);
 // Directories of finished, unpublished episodes, in order.
 std::vector<std::filesystem::path> finished_episodes(const std::filesystem::path& house);

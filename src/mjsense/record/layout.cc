@@ -100,7 +100,7 @@ std::string fingerprint(const RecordingCfg& cfg, const RecordingPlan& plan,
   nlohmann::json j{{"format", 1},
                    {"house", cfg.house},
                    {"episodes", cfg.episodes},
-                   {"batches", batch_sizes(cfg.episodes, cfg.batches).size()},
+                   {"batches", batches_of(cfg.episodes, cfg.batches).count},
                    {"fps", cfg.fps.str()},
                    {"gzip", cfg.gzip},
                    {"streams", streams},
@@ -207,7 +207,7 @@ RecordingPlan plan_recording(const RecordingCfg& cfg) {
   return plan;
 }
 
-std::vector<int> batch_sizes(int episodes, int batches) {
+Batches batches_of(int episodes, int batches) {
   if (episodes <= 0)
     throw ValueError(fmt::format("recording: episodes is {}, expected at least 1", episodes));
   if (batches < 0 || batches > episodes) {
@@ -218,8 +218,17 @@ std::vector<int> batch_sizes(int episodes, int batches) {
   if (batches == 0)
     batches = std::max(
         1, static_cast<int>(std::nearbyint(episodes / 4.0)));  // Python's round(): half to even
-  std::vector<int> sizes(batches, episodes / batches);
-  for (int b = 0; b < episodes % batches; ++b) ++sizes[b];
+  return {episodes, batches};
+}
+
+std::int64_t Batches::first(int batch) const {
+  return std::int64_t{batch} * (episodes / count) + std::min(batch, episodes % count);
+}
+
+std::vector<int> batch_sizes(int episodes, int batches) {
+  const Batches all = batches_of(episodes, batches);
+  std::vector<int> sizes;
+  for (int b = 0; b < all.count; ++b) sizes.push_back(all.size(b));
   return sizes;
 }
 

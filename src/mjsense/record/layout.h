@@ -61,6 +61,14 @@ std::int64_t chunk_rows(std::size_t row_bytes);
 // Episodes of each batch: sizes differ by one at most, the larger first.
 std::vector<int> batch_sizes(int episodes, int batches);
 
+// The same without a list of them: which episodes are in which batch.
+struct Batches {
+  int episodes = 0, count = 0;
+  std::int64_t first(int batch) const;  // position of its first episode; of `count`: `episodes`
+  int size(int batch) const { return static_cast<int>(first(batch + 1) - first(batch)); }
+};
+Batches batches_of(int episodes, int batches);
+
 std::string batch_file(int batch, int batches);  // batch from 0
 std::string video_file(const VideoStream& video, int index, int batch, int batches);  // final name
 std::string video_file(std::string_view stem, std::string_view extension, int index, int batch,

@@ -3,6 +3,7 @@
 
 #include <fcntl.h>
 #include <fmt/format.h>
+#include <poll.h>
 #include <signal.h>
 #include <spawn.h>
 #include <sys/mman.h>
@@ -52,21 +53,9 @@ std::pair<Fd, Fd> make_pipe() {
 
 }  // namespace
 
-Fd& Fd::operator=(Fd&& other) noexcept {
-  if (this != &other) {
-    reset();
-    fd_ = other.release();
-  }
-  return *this;
-}
+namespace {
 
-int Fd::release() { return std::exchange(fd_, -1); }
-
-void Fd::reset() {
-  if (fd_ >= 0) close(release());
-}
-
-Child start_process(const std::vector<std::string>& argv, bool pipe_in, bool pipe_out) {
+Child start(const std::vector<std::string>& argv, bool pipe_in, bool pipe_out, int input) {
   Child child;
   child.log = Fd(memfd_create("stderr", MFD_CLOEXEC));
   if (!child.log) throw_system("cannot create an anonymous file");
@@ -76,7 +65,7 @@ Child start_process(const std::vector<std::string>& argv, bool pipe_in, bool pip
     fcntl(child.in.get(), F_SETFL, O_NONBLOCK);
     fcntl(child.in.get(), F_SETPIPE_SZ,
           1 << 20);  // fewer wake-ups a frame; refused quietly beyond the user's limit
-  } else {
+  } else if (input < 0) {
     child_in = Fd(open("/dev/null", O_RDONLY | O_CLOEXEC));
   }
   if (pipe_out) {
@@ -87,7 +76,7 @@ Child start_process(const std::vector<std::string>& argv, bool pipe_in, bool pip
 
   posix_spawn_file_actions_t actions;
   posix_spawn_file_actions_init(&actions);
-  posix_spawn_file_actions_adddup2(&actions, child_in.get(), 0);
+  posix_spawn_file_actions_adddup2(&actions, input >= 0 ? input : child_in.get(), 0);
   posix_spawn_file_actions_adddup2(&actions, child_out.get(), 1);
   posix_spawn_file_actions_adddup2(&actions, child.log.get(), 2);
   close_inherited(&actions);
@@ -113,6 +102,16 @@ Child start_process(const std::vector<std::string>& argv, bool pipe_in, bool pip
     throw RuntimeError(
         fmt::format("cannot start the program '{}': {}", argv[0], std::strerror(error)));
   return child;
+}
+
+}  // namespace
+
+Child start_process(const std::vector<std::string>& argv, bool pipe_in, bool pipe_out) {
+  return start(argv, pipe_in, pipe_out, -1);
+}
+
+Child start_process(const std::vector<std::string>& argv, const Fd& input) {
+  return start(argv, false, false, input.get());
 }
 
 bool wait_process(Child& child, bool block, Exit& result) {
@@ -150,28 +149,38 @@ void kill_process(Child& child) {
   wait_process(child, true, ignored);
 }
 
-std::string run_process(const std::vector<std::string>& argv) {
+std::string run_process(const std::vector<std::string>& argv, const Patience& patience,
+                        std::string* words) {
   Child child = start_process(argv, false, true);
   std::string output;
-  std::uint8_t buffer[1 << 14];
-  while (const std::size_t n = read_fully(child.out.get(), buffer))
-    output.append(reinterpret_cast<char*>(buffer), n);
-  Exit result;
-  wait_process(child, true, result);
-  if (!result.ok)
-    throw RuntimeError(fmt::format("the program '{}' failed: {}", argv[0], result.why));
-  return output;
-}
-
-std::size_t read_fully(int fd, std::span<std::uint8_t> bytes) {
-  std::size_t done = 0;
-  while (done < bytes.size()) {
-    const ssize_t n = read(fd, bytes.data() + done, bytes.size() - done);
+  const auto give_up = [&](const std::string& why) {
+    kill_process(child);
+    throw RuntimeError(fmt::format("the program '{}' was ended: {}", argv[0], why));
+  };
+  char buffer[1 << 14];
+  while (true) {
+    pollfd polled{child.out.get(), POLLIN, 0};
+    const int ready = poll(&polled, 1, static_cast<int>(1000 * patience.silence_s));
+    if (ready < 0 && errno == EINTR) continue;
+    if (ready == 0) give_up(fmt::format("it said nothing for {:g} s", patience.silence_s));
+    const ssize_t n = read(child.out.get(), buffer, sizeof buffer);
     if (n < 0 && errno == EINTR) continue;
     if (n <= 0) break;
-    done += static_cast<std::size_t>(n);
+    output.append(buffer, static_cast<std::size_t>(n));
+    if (output.size() > patience.most_bytes)
+      give_up(fmt::format("it said more than {} bytes", patience.most_bytes));
   }
-  return done;
+  Exit result;
+  // It may have closed its output and go on.
+  for (double waited = 0; !wait_process(child, false, result); waited += 5e-4) {
+    if (waited > patience.silence_s)
+      give_up(fmt::format("it did not end for {:g} s", patience.silence_s));
+    usleep(500);
+  }
+  if (!result.ok)
+    throw RuntimeError(fmt::format("the program '{}' failed: {}", argv[0], result.why));
+  if (words) *words = last_words(child.log.get());
+  return output;
 }
 
 std::string ffmpeg_program(const std::string& wanted) {

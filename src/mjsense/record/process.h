@@ -12,27 +12,9 @@
 #include <string_view>
 #include <vector>
 
+#include "mjsense/core/fd.h"
+
 namespace mjsense {
-
-// A file descriptor with an owner.
-class Fd {
- public:
-  Fd() = default;
-  explicit Fd(int fd) : fd_(fd) {}
-  ~Fd() { reset(); }
-  Fd(Fd&& other) noexcept : fd_(other.release()) {}
-  Fd& operator=(Fd&& other) noexcept;
-  Fd(const Fd&) = delete;
-  Fd& operator=(const Fd&) = delete;
-
-  int get() const { return fd_; }
-  explicit operator bool() const { return fd_ >= 0; }
-  [[nodiscard]] int release();  // the caller closes it
-  void reset();
-
- private:
-  int fd_ = -1;
-};
 
 struct Child {
   pid_t pid = -1;
@@ -45,6 +27,8 @@ struct Child {
 // terminal reaches only us and we decide what becomes of it; if we are killed it sees the end of
 // its input and ends. Throws RuntimeError when it cannot start.
 Child start_process(const std::vector<std::string>& argv, bool pipe_in, bool pipe_out);
+// The same with an open file as its stdin: where it stands in it tells how far it has come.
+Child start_process(const std::vector<std::string>& argv, const Fd& input);
 
 struct Exit {
   bool ok = false;
@@ -56,11 +40,16 @@ struct Exit {
 bool wait_process(Child& child, bool block, Exit& result);
 void kill_process(Child& child);  // SIGKILL, and waits
 
-// Runs a program to its end; its whole stdout. Throws RuntimeError if it fails.
-std::string run_process(const std::vector<std::string>& argv);
+// How long a program may say nothing, and how much it may say.
+struct Patience {
+  double silence_s = 60;
+  std::size_t most_bytes = std::size_t{1} << 30;
+};
 
-// Reads until `bytes` are there or the end; returns how many were read.
-std::size_t read_fully(int fd, std::span<std::uint8_t> bytes);
+// Runs a program to its end; its whole stdout, and the end of its stderr in `words`. Throws RuntimeError if it fails or
+// goes beyond our patience; it is killed then.
+std::string run_process(const std::vector<std::string>& argv, const Patience& patience = {},
+                        std::string* words = nullptr);
 
 // The ffmpeg program to use: `wanted`, else $MJSENSE_FFMPEG, else "ffmpeg".
 std::string ffmpeg_program(const std::string& wanted);

@@ -7,6 +7,7 @@
 #include <nlohmann/json.hpp>
 
 #include "mjsense/core/error.h"
+#include "mjsense/core/plain_file.h"
 #include "mjsense/record/recorder_impl.h"
 
 namespace mjsense {
@@ -18,6 +19,9 @@ void validate(const RecordingCfg& cfg) {
       throw ValueError(fmt::format("recording: {} is {}, expected {}", what, value, expected));
   };
   if (cfg.out_dir.empty()) throw ValueError("recording: no output directory was given");
+  if (printable(cfg.out_dir.string()) != cfg.out_dir.string())
+    throw ValueError(fmt::format("recording: the output directory '{}' has control characters",
+                                 printable(cfg.out_dir.string())));
   require(cfg.num_worlds > 0, "num_worlds", cfg.num_worlds, "at least 1");
   require(cfg.house >= 0, "house", cfg.house, "0 or more");
   require(cfg.fps.num > 0 && cfg.fps.den > 0, "fps", fmt::format("{}/{}", cfg.fps.num, cfg.fps.den),
@@ -28,6 +32,8 @@ void validate(const RecordingCfg& cfg) {
   require(cfg.video.threads > 0, "threads per encoder", cfg.video.threads, "at least 1");
   require(cfg.video.queue_frames > 0, "queue_frames", cfg.video.queue_frames, "at least 1");
   require(cfg.video.max_encoders >= 0, "max_encoders", cfg.video.max_encoders, "0 (32) or more");
+  require(cfg.video.ffmpeg_timeout > 0, "ffmpeg_timeout", cfg.video.ffmpeg_timeout,
+          "seconds, positive");
   require(cfg.video.depth_unit > 0, "depth_unit", cfg.video.depth_unit,
           "metres per unit, positive");
 }
@@ -36,7 +42,7 @@ void validate(const RecordingCfg& cfg) {
 
 Recorder::Impl::Impl(const RecordingCfg& cfg_) : cfg(cfg_) {
   validate(cfg);
-  batch_sizes(cfg.episodes, cfg.batches);
+  batches_of(cfg.episodes, cfg.batches);
   plan = plan_recording(cfg);
   check_names();
   check_ffmpeg(cfg.video, plan.videos);
@@ -44,6 +50,7 @@ Recorder::Impl::Impl(const RecordingCfg& cfg_) : cfg(cfg_) {
                                   plan.fingerprint, cfg.resume);
   if (!house->ended()) house->publish_ready();
   decisions = house->decisions();
+  saved = decisions.kept();
   for (const ArrayStream& stream : plan.arrays) {
     row_bytes.push_back(stream.kept_bytes());
     chunk_rows_of.push_back(stream.chunk_rows);
@@ -59,7 +66,8 @@ Recorder::Impl::Impl(const RecordingCfg& cfg_) : cfg(cfg_) {
     free_chunks[s].resize(static_cast<std::size_t>(kBuffersPerWorld) * cfg.num_worlds);
   if (!plan.videos.empty()) {
     pool = std::make_unique<EncoderPool>(cfg.video, cfg.fps,
-                                         static_cast<int>(plan.videos.size()) * cfg.num_worlds);
+                                         static_cast<int>(plan.videos.size()) * cfg.num_worlds,
+                                         cfg.stop);
   }
   writer = std::thread([this] { write_jobs(); });
 }
@@ -79,7 +87,7 @@ Recorder::Impl::~Impl() {
 }
 
 void Recorder::Impl::check_names() const {
-  const int batches = static_cast<int>(batch_sizes(cfg.episodes, cfg.batches).size());
+  const int batches = batches_of(cfg.episodes, cfg.batches).count;
   for (const VideoStream& video : plan.videos) {
     const std::string name = video_file(video, cfg.episodes, batches - 1, batches);
     if (name.size() > kFileNameBytes) {
@@ -215,7 +223,7 @@ void Recorder::Impl::leave(int world, const Episode& episode) {
   const std::lock_guard lock(mutex);
   worlds[world].reset();
   if (episode.fate != Fate::kAbandoned)
-    decisions.kept_by_episode[episode.meta.episode] = episode.fate == Fate::kKept;
+    decisions.add(episode.meta.episode, episode.fate == Fate::kKept);
 }
 
 void Recorder::Impl::abort_videos(Episode& episode) {
@@ -280,6 +288,10 @@ int Recorder::kept() const {
   return impl_->decisions.kept();
 }
 
+int Recorder::saved() const { return impl_->saved; }
+
+std::vector<std::string> Recorder::damage() const { return impl_->house->damage(); }
+
 int Recorder::discarded() const {
   const std::lock_guard lock(impl_->mutex);
   return impl_->decisions.discarded();
@@ -288,8 +300,7 @@ int Recorder::discarded() const {
 bool Recorder::enough() const {
   const std::lock_guard lock(impl_->mutex);
   return impl_->house->ended() ||
-         static_cast<int>(impl_->decisions.first(impl_->cfg.episodes, true).size()) >=
-             impl_->cfg.episodes;
+         static_cast<int>(impl_->decisions.settled().size()) >= impl_->cfg.episodes;
 }
 
 void Recorder::flush() { impl_->flush(); }

@@ -26,6 +26,7 @@
 #include <memory>
 #include <string>
 #include <string_view>
+#include <vector>
 
 #include "mjsense/record/recording.h"
 
@@ -68,7 +69,10 @@ class Recorder {
   [[nodiscard]] bool recording(int world) const;
   // True if this attempt was finished or discarded, now or before the recording was resumed.
   [[nodiscard]] bool decided(std::int64_t episode) const;
-  int kept() const;  // episodes finished so far, published or not
+  int kept() const;   // episodes finished so far, published or not
+  int saved() const;  // of these, those that are whole on disk: no fault takes them any more
+  // What an earlier process left and was found broken, a sentence each: set aside, attempted again.
+  [[nodiscard]] std::vector<std::string> damage() const;
   int discarded() const;
   // cfg.episodes are kept and no earlier attempt is undecided: nothing more to attempt.
   [[nodiscard]] bool enough() const;

@@ -82,6 +82,7 @@ struct Recorder::Impl {
   std::exception_ptr failure;
   std::thread writer;
 
+  std::atomic<int> saved{0};  // episodes that are whole on disk
   std::atomic<std::int64_t> rows{0}, frames{0}, published_bytes{0};
   std::atomic<double> copy_s{0}, wait_s{0}, write_s{0}, commit_s{0};
 
@@ -125,7 +126,9 @@ struct Recorder::Impl {
   void write_jobs();
   void run(Job& job, bool failed);
   void after(Job& job);
-  void settle(const Episode& episode, bool failed);
+  void settle(Episode& episode, bool failed);
+  // Counts what the encoders left: an exit code of 0 is believed of nobody.
+  std::vector<EpisodeFile::VideoSum> check_videos(const Episode& episode) const;
 };
 
 }  // namespace mjsense

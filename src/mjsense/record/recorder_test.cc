@@ -12,8 +12,10 @@
 #include <thread>
 
 #include "mjsense/core/error.h"
+#include "mjsense/core/plain_file.h"
 #include "mjsense/record/house.h"
 #include "mjsense/record/testing/tools.h"
+#include "mjsense/record/video_file.h"
 #include "mjsense/replay/check.h"
 
 namespace mjsense {
@@ -160,10 +162,10 @@ TEST(Recorder, ASlowEncoderHoldsTheProducerAndLosesNothing) {
   TempDir dir, tools;
   FakeSuite suite({1, 16, 12, true, false});
   RecordingCfg cfg = fake_recording(dir.path, suite, 1, 1);
-  // Takes one frame in 10 ms, and writes a line for each.
+  // Takes one frame in 10 ms.
   cfg.video.ffmpeg = fake_ffmpeg(
       tools.path,
-      "while n=$(head -c 576 | wc -c); [ $n -gt 0 ]; do echo $n >> $out; sleep 0.01; done");
+      "for i in $(seq 60); do head -c 576; sleep 0.01; done | ffmpeg \"$@\"");
   cfg.video.queue_frames = 2;
   constexpr int kSteps = 60;
   Recorder recorder(cfg);
@@ -174,9 +176,9 @@ TEST(Recorder, ASlowEncoderHoldsTheProducerAndLosesNothing) {
   }
   recorder.finish_episode(0, "{}");
   recorder.complete();
-  std::string lines;
-  for (int t = 0; t < kSteps; ++t) lines += "576\n";
-  EXPECT_EQ(read_file(dir.path / "house_0/episode_00000000_wrist_camera_batch_1_of_1.mp4"), lines);
+  const Fd video = open_plain(dir.path / "house_0",
+                              "episode_00000000_wrist_camera_batch_1_of_1.mp4");
+  EXPECT_EQ(read_video_facts(video.get()).frames, kSteps);
   EXPECT_GT(recorder.stats().frames, 0);
 }
 
@@ -184,7 +186,7 @@ TEST(Recorder, AProducerWaitsForAnEncoderThatTakesNothing) {
   TempDir dir, tools;
   FakeSuite suite({1, 320, 240, true, false});
   RecordingCfg cfg = fake_recording(dir.path, suite, 1, 1);
-  cfg.video.ffmpeg = fake_ffmpeg(tools.path, "sleep 0.5; cat > $out");
+  cfg.video.ffmpeg = fake_ffmpeg(tools.path, "sleep 0.5; exec ffmpeg \"$@\"");
   cfg.video.queue_frames = 2;
   Recorder recorder(cfg);
   recorder.begin_episode(0, {});
@@ -196,8 +198,9 @@ TEST(Recorder, AProducerWaitsForAnEncoderThatTakesNothing) {
   EXPECT_GT(recorder.stats().wait_s, 0.2);
   recorder.finish_episode(0, "{}");
   recorder.complete();
-  EXPECT_EQ(fs::file_size(dir.path / "house_0/episode_00000000_wrist_camera_batch_1_of_1.mp4"),
-            320u * 240 * 3 * kFrames);
+  const Fd video = open_plain(dir.path / "house_0",
+                              "episode_00000000_wrist_camera_batch_1_of_1.mp4");
+  EXPECT_EQ(read_video_facts(video.get()).frames, kFrames);
 }
 
 // ---- faults: one clear error, nothing under a final name
@@ -246,6 +249,49 @@ TEST(RecorderFaults, FfmpegFailsAtTheEnd) {
   });
   EXPECT_THAT(error, HasSubstr("exit code 1: no trailer"));
   expect_nothing_published(dir.path);
+}
+
+// An exit code of 0 is not enough: what was written is counted.
+TEST(RecorderFaults, FfmpegLies) {
+  const std::pair<const char*, const char*> lies[] = {
+      {"cat > /dev/null; echo garbage > $out", "is no whole video: it is neither MP4 nor Matroska"},
+      {"cat > /dev/null", "does not exist"},
+      {"cat > /dev/null; : > $out", "is no whole video: it is empty"},
+      {"head -c 1728 | ffmpeg \"$@\"", "has 3 frames, expected 6"},
+      {"ffmpeg \"$@\"; head -c 700 $out > $out.x; mv $out.x $out", "it was cut"}};
+  for (const auto& [body, complaint] : lies) {
+    TempDir dir, tools;
+    FakeSuite suite({1, 16, 12, true, false});
+    RecordingCfg cfg = fake_recording(dir.path, suite, 1, 1);
+    cfg.video.ffmpeg = fake_ffmpeg(tools.path, body);
+    const std::string error = error_of([&] {
+      Recorder recorder(cfg);
+      record_all(recorder, suite, {.worlds = 1});
+    });
+    EXPECT_THAT(error, AllOf(HasSubstr("episode 0 cannot be recorded: video 'wrist_camera'"),
+                             HasSubstr(complaint)));
+    expect_nothing_published(dir.path);
+    EXPECT_THAT(finished_episodes(dir.path / "house_0"), IsEmpty());
+  }
+}
+
+// A hung encoder is ended, with a word.
+TEST(RecorderFaults, FfmpegHangs) {
+  for (const char* body : {"kill -STOP $$", "exec sleep 1000", "cat > /dev/null; exec sleep 1000"}) {
+    TempDir dir, tools;
+    FakeSuite suite({1, 320, 240, true, false});
+    RecordingCfg cfg = fake_recording(dir.path, suite, 1, 1);
+    cfg.video.ffmpeg = fake_ffmpeg(tools.path, body);
+    cfg.video.ffmpeg_timeout = 0.6;
+    const std::string error = error_of([&] {
+      Recorder recorder(cfg);
+      record_all(recorder, suite, {.worlds = 1, .steps = 20});
+    });
+    EXPECT_THAT(error, HasSubstr(std::string(body).starts_with("cat")
+                                     ? "did not come to its end for 0.6 s"
+                                     : "took no picture for 0.6 s"));
+    expect_nothing_published(dir.path);
+  }
 }
 
 TEST(RecorderFaults, ExistingOutput) {

@@ -2,7 +2,10 @@
 #include <fmt/format.h>
 
 #include "mjsense/core/error.h"
+#include "mjsense/core/plain_file.h"
+#include "mjsense/record/checksum.h"
 #include "mjsense/record/recorder_impl.h"
+#include "mjsense/record/video_file.h"
 
 namespace mjsense {
 
@@ -61,7 +64,7 @@ void Recorder::Impl::run(Job& job, bool failed) {
       break;
     case Job::kClose:
       if (!failed && episode.file && episode.fate == Fate::kKept)
-        episode.file->finish(job.obs_scene, job.outcome);
+        episode.file->write_scene(job.obs_scene, job.outcome);
       break;
     case Job::kSettle:
       settle(episode, failed);
@@ -71,10 +74,7 @@ void Recorder::Impl::run(Job& job, bool failed) {
 }
 
 void Recorder::Impl::after(Job& job) {
-  if (job.kind == Job::kClose) {
-    job.episode->file.reset();
-    part_done(job.episode);
-  }
+  if (job.kind == Job::kClose) part_done(job.episode);
   {
     const std::lock_guard lock(mutex);
     if (job.kind == Job::kChunk && !job.chunk.empty())
@@ -84,15 +84,53 @@ void Recorder::Impl::after(Job& job) {
   progress.notify_all();
 }
 
-void Recorder::Impl::settle(const Episode& episode, bool failed) {
+std::vector<EpisodeFile::VideoSum> Recorder::Impl::check_videos(const Episode& episode) const {
+  std::vector<EpisodeFile::VideoSum> sums;
+  for (const VideoStream& video : plan.videos) {
+    const std::string name = video.stem + video.extension;
+    const auto refuse = [&](const std::string& why) {
+      throw RuntimeError(
+          fmt::format("episode {} cannot be recorded: video '{}': ffmpeg ended as if all were well, but {}",
+                      episode.meta.episode, video.key, why));
+    };
+    try {
+      const Fd file = open_plain(part_dir(episode), name);
+      const VideoFacts facts = read_video_facts(file.get());
+      const auto fits = [](int got, int asked) { return got == asked || got == asked + asked % 2; };
+      if (!facts.error.empty()) refuse(fmt::format("'{}' is no whole video: {}", name, facts.error));
+      if (facts.frames != episode.rows)
+        refuse(fmt::format("'{}' has {} frames, expected {}", name, facts.frames, episode.rows));
+      if (!fits(facts.width, video.width) || !fits(facts.height, video.height))
+        refuse(fmt::format("'{}' is {} x {} pixels, expected {} x {}", name, facts.width,
+                           facts.height, video.width, video.height));
+      sums.push_back({checksum_of(file.get()), size_of(file)});
+    } catch (const RuntimeError& e) {
+      if (std::string_view(e.what()).starts_with("episode ")) throw;
+      refuse(e.what());
+    }
+  }
+  return sums;
+}
+
+void Recorder::Impl::settle(Episode& episode, bool failed) {
   const std::int64_t number = episode.meta.episode;
+  if (failed || episode.fate != Fate::kKept) episode.file.reset();
   if (failed || episode.fate == Fate::kAbandoned) {
     house->abandon(number);
   } else if (episode.fate == Fate::kDiscarded) {
     house->discard(number, episode.why);
     house->publish_ready();
   } else {
+    try {
+      episode.file->finish(check_videos(episode));
+      episode.file.reset();
+    } catch (...) {
+      episode.file.reset();
+      house->abandon(number);
+      throw;
+    }
     house->keep(number);
+    saved = house->decisions().kept();
     house->publish_ready();
   }
   published_bytes = house->published_bytes();

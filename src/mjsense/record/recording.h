@@ -3,6 +3,7 @@
 // What a recording is: which sensors, how many episodes, where and how they are kept.
 // docs/formats.md shows the files.
 
+#include <atomic>
 #include <cstdint>
 #include <filesystem>
 #include <string>
@@ -34,6 +35,7 @@ struct VideoCfg {
   std::string preset = "veryfast";
   int keyint = 250;
   double depth_unit = 0.0002;
+  double ffmpeg_timeout = 60;
   bool molmospaces_depth = false;
 };
 template <class V>
@@ -60,6 +62,11 @@ void visit_fields(V& v, VideoCfg& c) {
   v("keyint", c.keyint, "Most frames between key frames: fewer seek faster, more shrink.")
       .at_least(1)
       .hidden();
+  v("ffmpeg_timeout", c.ffmpeg_timeout,
+    "How long an ffmpeg may take no picture, or not come to its end, before it is ended.")
+      .unit("s")
+      .positive()
+      .hidden();
   v("depth_unit", c.depth_unit, "Of the 16-bit depth video; 0.0002 reaches to 13.1 m.")
       .unit("m")
       .positive()
@@ -82,6 +89,8 @@ struct RecordingCfg {
   bool resume = false;  // go on with what is there; else existing output is an error
   int gzip = 4;         // 0: no compression .. 9
   VideoCfg video;
+  // At 2 or more whoever asked wants to leave: an ffmpeg that hangs gets 2 s instead of its time-out.
+  const std::atomic<int>* stop = nullptr;
 };
 
 // One attempt. Numbers start at 0 and leave no gap: they, and not the order of finishing, give the

@@ -32,18 +32,20 @@ struct VerifyOptions {
 };
 
 // Structure, names and types; equal lengths; every JSON row parses; every video exists and has T
-// frames of the stated size.
+// frames of the stated size; checksums of files, datasets and videos. Always ends with findings: a
+// file is read in a process of its own, within limits that its size decides.
 [[nodiscard]] VerifyResult verify(const std::filesystem::path& path,
                                   const VerifyOptions& options = {});
 
 struct RepairResult {
-  std::vector<std::string> actions;  // what was done, one sentence each
+  std::vector<std::string> actions;   // what was done, one sentence each
+  std::vector<std::string> failures;  // what could not be, and why
   std::string text() const;
   std::string json() const;
 };
 
 // Ends interrupted recordings: publishes the finished episodes of {house}/.recording, removes
-// unfinished ones, and writes names of videos into files whose obs/sensor_data lacks them. A
+// unfinished ones, sets damaged ones aside in {house}/damaged, and writes names of videos into files whose obs/sensor_data lacks them. A
 // recording that shall go on is resumed, not repaired.
 RepairResult repair(const std::filesystem::path& path);
 

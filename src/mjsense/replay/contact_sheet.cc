@@ -8,8 +8,11 @@
 #include <vector>
 
 #include "mjsense/core/error.h"
+#include "mjsense/core/plain_file.h"
 #include "mjsense/core/png.h"
+#include "mjsense/hdf5/guard.h"
 #include "mjsense/record/depth.h"
+#include "mjsense/record/video_file.h"
 #include "mjsense/replay/check.h"
 #include "mjsense/replay/small_text.h"
 #include "mjsense/replay/trajectory.h"
@@ -22,6 +25,9 @@ namespace {
 
 constexpr int kTileHeight = 132, kGap = 4, kLine = kTextHeight + kGap, kApart = 14;
 constexpr std::uint8_t kBackground = 24;
+// Beyond these it is no sheet to look at, whatever a file asks for.
+constexpr int kMostTileWidth = 8 * kTileHeight, kMostFrames = 10'000'000;
+constexpr std::size_t kMostStrips = 512, kMostText = 200;
 
 // What the episode's task was in words, and how it ended: "Pick up the red block: success".
 std::string story(hid_t trajectory) {
@@ -45,7 +51,9 @@ struct Strip {
   int width = 0, height = 0, frames = 0;  // of the video
   bool depth16 = false;
   double unit = 0;  // m, of depth
-  int tile_width() const { return std::max(8, kTileHeight * width / std::max(1, height)); }
+  int tile_width() const {
+    return std::clamp(kTileHeight * width / std::max(1, height), 8, kMostTileWidth);
+  }
 
   // Which frames `columns` tiles show: first to last, evenly.
   std::vector<int> moments(int columns) const {
@@ -61,37 +69,73 @@ struct Strip {
   }
 };
 
+using Json = nlohmann::json;
+
+// What one file names: {"episodes": 4, "strips": [[trajectory, story, key, video, encoding, unit] ...]}.
+std::string describe(const fs::path& path, int shown) {
+  Json out{{"episodes", 0}, {"strips", Json::array()}};
+  const h5::H5Lock lock;
+  const h5::Id file = h5::open_file(path);
+  const std::vector<std::string> names = trajectory_names(file);
+  out["episodes"] = names.size();
+  for (std::size_t i = 0; i < std::min<std::size_t>(names.size(), std::max(0, shown)); ++i) {
+    const h5::Id trajectory = h5::open_group(file, names[i]);
+    if (!h5::exists(trajectory, "obs/sensor_data")) continue;
+    const std::string told = story(trajectory).substr(0, kMostText);
+    const h5::Id videos = h5::open_group(trajectory, "obs/sensor_data");
+    for (const std::string& key : h5::children(videos)) {
+      const h5::Id dataset = h5::open_dataset(videos, key);
+      out["strips"].push_back({names[i], told, key.substr(0, kMostText),
+                               read_file_name(videos, key), h5::text_attribute(dataset, "encoding"),
+                               h5::double_attribute(dataset, "metres_per_unit", 0)});
+    }
+  }
+  return out.dump(-1, ' ', false, Json::error_handler_t::replace);
+}
+
+VideoFacts facts_of(const fs::path& folder, const std::string& video, const std::string& ffmpeg) {
+  const Fd file = open_plain(folder, video);
+  VideoFacts facts = read_video_facts(file.get());
+  if (!facts.error.empty()) {  // of a form that perhaps ffmpeg knows
+    const VideoProbe probe = probe_video(folder / video, false, kMostFrames, ffmpeg);
+    facts = {probe.frames, probe.width, probe.height, probe.error};
+  }
+  if (!facts.error.empty() || facts.frames < 1 || facts.width < 1 || facts.height < 1)
+    throw RuntimeError(fmt::format("contact sheet: '{}': {}", (folder / video).string(),
+                                   facts.error.empty() ? "it holds no picture" : facts.error));
+  return facts;
+}
+
 // Those of the first `shown` episodes, of which there are `episodes`.
 std::vector<Strip> find_strips(const fs::path& path, int shown, const std::string& ffmpeg,
                                int& episodes) {
   std::vector<Strip> strips;
   episodes = 0;
   for (const RecordedFile& recorded : recorded_files(path)) {
-    const h5::H5Lock lock;
-    const h5::Id file = h5::open_file(recorded.path);
-    for (const std::string& name : trajectory_names(file)) {
-      if (++episodes > shown) continue;
-      const h5::Id trajectory(H5Gopen2(file, name.c_str(), H5P_DEFAULT), H5Gclose, name);
-      if (!h5::exists(trajectory, "obs/sensor_data")) continue;
-      const std::string told = story(trajectory);
-      const h5::Id videos(H5Gopen2(trajectory, "obs/sensor_data", H5P_DEFAULT), H5Gclose, name);
-      for (const std::string& key : h5::children(videos)) {
-        const h5::Id dataset(H5Dopen2(videos, key.c_str(), H5P_DEFAULT), H5Dclose, key);
-        Strip strip;
-        strip.video = recorded.path.parent_path() / read_file_name(videos, key);
-        strip.depth16 = h5::text_attribute(dataset, "encoding") == "depth16";
-        strip.unit = h5::double_attribute(dataset, "metres_per_unit", 0);
-        const VideoProbe probe = probe_video(strip.video, false, ffmpeg);
-        if (!probe.error.empty())
-          throw RuntimeError(
-              fmt::format("contact sheet: '{}': {}", strip.video.string(), probe.error));
-        strip.width = probe.width;
-        strip.height = probe.height;
-        strip.frames = probe.frames;
-        strip.episode = fmt::format("{}  {}  {}", recorded.name, name, told);
-        strip.camera = fmt::format("{}, {} frames", key, strip.frames);
-        strips.push_back(std::move(strip));
-      }
+    const fs::path folder = recorded.path.parent_path();
+    const auto bytes = static_cast<std::uint64_t>(
+        size_of(open_plain(folder, recorded.path.filename().string())));
+    const Json found =
+        Json::parse(h5::in_child(recorded.name, bytes,
+                                 [&] { return describe(recorded.path, shown - episodes); }),
+                    nullptr, false);
+    if (found.is_discarded()) throw RuntimeError(recorded.name + ": reading it gave no answer");
+    episodes += found.at("episodes").get<int>();
+    for (const Json& s : found.at("strips")) {
+      if (strips.size() == kMostStrips)
+        throw ValueError(fmt::format("contact sheet: more than {} rows of pictures", kMostStrips));
+      const std::string trajectory = s.at(0), told = s.at(1), key = s.at(2), video = s.at(3);
+      const VideoFacts facts = facts_of(folder, video, ffmpeg);
+      Strip strip;
+      strip.video = folder / video;
+      strip.depth16 = s.at(4) == "depth16";
+      strip.unit = s.at(5).is_number() ? s.at(5).get<double>() : 0;
+      strip.width = facts.width;
+      strip.height = facts.height;
+      strip.frames = static_cast<int>(std::min<std::int64_t>(facts.frames, kMostFrames));
+      strip.episode = fmt::format("{}  {}  {}", recorded.name, trajectory, told);
+      strip.camera = fmt::format("{}, {} frames", key, strip.frames);
+      strips.push_back(std::move(strip));
     }
   }
   return strips;

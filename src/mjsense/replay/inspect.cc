@@ -8,6 +8,8 @@
 #include <nlohmann/json.hpp>
 
 #include "mjsense/core/error.h"
+#include "mjsense/core/plain_file.h"
+#include "mjsense/hdf5/guard.h"
 #include "mjsense/replay/check.h"
 #include "mjsense/replay/json_text.h"
 #include "mjsense/replay/trajectory.h"
@@ -16,6 +18,9 @@ namespace fs = std::filesystem;
 
 namespace mjsense {
 namespace {
+
+// Rows of a file may be so much larger than the file before they are a bomb.
+constexpr std::uint64_t kMostUnpacked = 200, kFreeBytes = std::uint64_t{1} << 30;
 
 // Mean and spread in one pass that stays exact for values far from zero (Welford).
 struct Accumulator {
@@ -57,7 +62,10 @@ struct Stream {
 class Inspector {
  public:
   InspectResult run(const fs::path& path) {
-    for (const RecordedFile& file : recorded_files(path)) add_file(file);
+    for (const RecordedFile& file : recorded_files(path)) {
+      bytes_ += fs::file_size(file.path);
+      add_file(file);
+    }
     for (auto& [name, stream] : streams_) {
       stream.values.store(stream.stats);
       result_.streams.push_back(std::move(stream.stats));
@@ -73,11 +81,11 @@ class Inspector {
     const h5::Id file = h5::open_file(recorded.path);
     if (result_.settings.empty()) result_.settings = h5::text_attribute(file, "recording");
     for (const std::string& name : trajectory_names(file)) {
-      const h5::Id trajectory(H5Gopen2(file, name.c_str(), H5P_DEFAULT), H5Gclose, name);
+      const h5::Id trajectory = h5::open_group(file, name);
       ++entry.episodes;
       add_trajectory(trajectory, entry);
       if (!h5::exists(trajectory, "obs/sensor_data")) continue;
-      const h5::Id videos(H5Gopen2(trajectory, "obs/sensor_data", H5P_DEFAULT), H5Gclose, name);
+      const h5::Id videos = h5::open_group(trajectory, "obs/sensor_data");
       for (const std::string& key : h5::children(videos))
         result_.videos.push_back(read_file_name(videos, key));
     }
@@ -85,9 +93,12 @@ class Inspector {
   }
 
   void add_trajectory(hid_t trajectory, InspectResult::File& entry) {
-    visit_datasets(trajectory, [&](const std::string& name) {
+    h5::each_dataset(trajectory, [&](const std::string& name) {
       if (name.starts_with("obs/sensor_data/")) return;
       const RowDataset dataset(trajectory, name);
+      unpacked_ += dataset.bytes();
+      if (unpacked_ > kFreeBytes + kMostUnpacked * bytes_)
+        throw RuntimeError(fmt::format("'{}': the files claim far more than they hold", name));
       Stream& stream = stream_of(dataset, name);
       if (dataset.is_json()) {
         dataset.each_text([&](std::int64_t, std::string_view text) {
@@ -133,12 +144,53 @@ class Inspector {
 
   InspectResult result_;
   std::map<std::string, Stream> streams_;
+  std::uint64_t bytes_ = 0, unpacked_ = 0;
 };
+
+// The answer of the process that reads.
+std::string to_json(const InspectResult& r) {
+  nlohmann::json out{{"videos", r.videos}, {"settings", r.settings}};
+  for (const InspectResult::File& f : r.files)
+    out["files"].push_back({f.path, f.bytes, f.episodes, f.successes, f.steps});
+  for (const StreamStats& s : r.streams)
+    out["streams"].push_back({s.name, s.dtype, s.shape, s.unit, s.frame, s.description, s.count,
+                              s.nan, s.infinite, s.mean, s.std, s.min, s.max});
+  return out.dump(-1, ' ', false, nlohmann::json::error_handler_t::replace);
+}
+
+InspectResult from_json(const std::string& text) {
+  const auto in = nlohmann::json::parse(text, nullptr, false);
+  if (in.is_discarded()) throw RuntimeError("reading the recording gave no answer");
+  InspectResult r;
+  r.videos = in.at("videos");
+  r.settings = in.at("settings");
+  for (const auto& f : in.value("files", nlohmann::json::array()))
+    r.files.push_back({f.at(0), f.at(1), f.at(2), f.at(3), f.at(4)});
+  // JSON has no infinity: a spread of numbers that overflow comes as null.
+  const auto number = [](const nlohmann::json& j) {
+    return j.is_number() ? j.get<double>() : std::numeric_limits<double>::quiet_NaN();
+  };
+  for (const auto& s : in.value("streams", nlohmann::json::array()))
+    r.streams.push_back({s.at(0), s.at(1), s.at(2), s.at(3), s.at(4), s.at(5), s.at(6), s.at(7),
+                         s.at(8), number(s.at(9)), number(s.at(10)), number(s.at(11)),
+                         number(s.at(12))});
+  return r;
+}
 
 std::string size_text(std::int64_t bytes) {
   if (bytes < 1 << 10) return fmt::format("{} B", bytes);
   if (bytes < 1 << 20) return fmt::format("{:.1f} KiB", static_cast<double>(bytes) / (1 << 10));
   return fmt::format("{:.1f} MiB", static_cast<double>(bytes) / (1 << 20));
+}
+
+std::string printable_lines(const std::string& text) {
+  std::string out;
+  for (std::size_t start = 0; start < text.size();) {
+    const std::size_t end = std::min(text.find('\n', start), text.size());
+    out += printable(std::string_view(text).substr(start, end - start)) + "\n";
+    start = end + 1;
+  }
+  return out;
 }
 
 std::vector<std::string> split_path(const std::string& path) {
@@ -174,7 +226,13 @@ std::string line_of(const StreamStats& s, const std::string& name, int indent) {
 
 }  // namespace
 
-InspectResult inspect(const fs::path& path) { return Inspector().run(path); }
+InspectResult inspect(const fs::path& path) {
+  std::uint64_t bytes = 0;
+  for (const RecordedFile& file : recorded_files(path))
+    bytes += static_cast<std::uint64_t>(
+        size_of(open_plain(file.path.parent_path(), file.path.filename().string())));
+  return from_json(h5::in_child(path.string(), bytes, [&] { return to_json(Inspector().run(path)); }));
+}
 
 std::string InspectResult::text() const {
   std::string out;
@@ -196,7 +254,7 @@ std::string InspectResult::text() const {
     out += line_of(s, parts.back(), 2 * static_cast<int>(depth)) + "\n";
     last = std::move(parts);
   }
-  return out;
+  return printable_lines(out);
 }
 
 std::string InspectResult::json() const {
@@ -217,7 +275,7 @@ std::string InspectResult::json() const {
     if (s.count > 0) one.update({{"mean", s.mean}, {"std", s.std}, {"min", s.min}, {"max", s.max}});
     j["streams"].push_back(std::move(one));
   }
-  return j.dump(2);
+  return j.dump(2, ' ', false, nlohmann::json::error_handler_t::replace);
 }
 
 }  // namespace mjsense

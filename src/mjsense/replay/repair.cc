@@ -7,6 +7,9 @@
 #include <nlohmann/json.hpp>
 
 #include "mjsense/core/error.h"
+#include "mjsense/core/plain_file.h"
+#include "mjsense/hdf5/guard.h"
+#include "mjsense/record/checksum.h"
 #include "mjsense/record/house.h"
 #include "mjsense/record/layout.h"
 #include "mjsense/replay/check.h"
@@ -18,17 +21,27 @@ namespace mjsense {
 namespace {
 
 void finish_house(const fs::path& house, std::vector<std::string>& actions) {
+  const fs::path staging = house / kStagingDir;
+  if (!is_plain_folder(staging))
+    throw ValueError(fmt::format("'{}' is a link, which is not followed: remove it", staging.string()));
   const std::string fingerprint = unfinished_recording(house);
   if (fingerprint.empty()) {
-    fs::remove_all(house / kStagingDir);
+    if (const std::size_t episodes = finished_episodes(house).size(); episodes > 0)
+      throw RuntimeError(fmt::format(
+          "'{}' holds {} finished episodes, and none of them says what recording they belong to; "
+          "nothing was removed",
+          staging.string(), episodes));
+    fs::remove_all(staging);
     actions.push_back(fmt::format("{}: removed the remains of '{}'", house.string(), kStagingDir));
     return;
   }
   const std::size_t waiting = finished_episodes(house).size();
   House store(house, fingerprint, true);
   store.publish_all();
+  for (const std::string& damage : store.damage())
+    actions.push_back(fmt::format("{}: {}", house.string(), damage));
   actions.push_back(fmt::format("{}: published {} finished episodes and ended the recording",
-                                house.string(), waiting));
+                                house.string(), waiting - store.damage().size()));
 }
 
 void add_file_name(hid_t sensor_data, const std::string& key, const std::string& name) {
@@ -43,66 +56,91 @@ void add_file_name(hid_t sensor_data, const std::string& key, const std::string&
 }
 
 // What MolmoSpaces leaves out: the names of the videos of each camera that has parameters.
-int name_videos(const fs::path& path) {
-  int batch = 0, batches = 0, added = 0;
-  if (std::sscanf(path.filename().c_str(), "trajectories_batch_%d_of_%d.h5", &batch, &batches) != 2)
-    return 0;
-  const auto each_missing = [&](hid_t file, auto&& found) {
-    for (const std::string& trajectory : trajectory_names(file)) {
-      const std::string params = trajectory + "/obs/sensor_param";
-      if (!h5::exists(file, params)) continue;
-      const h5::Id group(H5Gopen2(file, params.c_str(), H5P_DEFAULT), H5Gclose, params);
-      for (const std::string& camera : h5::children(group)) {
-        for (const std::string& key : {camera, camera + "_depth"}) {
-          const std::string name =
-              video_file(key, ".mp4", std::atoi(trajectory.c_str() + 5), batch - 1, batches);
-          const std::string place = trajectory + "/obs/sensor_data";
-          if (!h5::exists(file, place + "/" + key) && fs::exists(path.parent_path() / name))
-            found(place, key, name);
-        }
+std::string missing_names(const fs::path& path, int batch, int batches) {
+  nlohmann::json missing = nlohmann::json::array();
+  const h5::H5Lock lock;
+  const h5::Id file = h5::open_file(path);
+  for (const std::string& trajectory : trajectory_names(file)) {
+    const std::string params = trajectory + "/obs/sensor_param";
+    if (!h5::exists(file, params)) continue;
+    for (const std::string& camera : h5::children(h5::open_group(file, params))) {
+      for (const std::string& key : {camera, camera + "_depth"}) {
+        const std::string name =
+            video_file(key, ".mp4", std::atoi(trajectory.c_str() + 5), batch - 1, batches);
+        const std::string place = trajectory + "/obs/sensor_data";
+        if (!h5::exists(file, place + "/" + key) && is_plain_name(name) &&
+            printable(name) == name && name.size() <= kFileNameBytes &&
+            is_plain_file(path.parent_path() / name))
+          missing.push_back({place, key, name});
       }
     }
-  };
-  const h5::H5Lock lock;
-  {
-    const h5::Id file =
-        h5::open_file(path);  // most files need nothing: they are not opened for writing
-    each_missing(file, [&](auto&&...) { ++added; });
   }
-  if (added == 0) return 0;
+  return missing.dump();
+}
+
+int name_videos(const fs::path& path) {
+  int batch = 0, batches = 0;
+  if (std::sscanf(path.filename().c_str(), "trajectories_batch_%d_of_%d.h5", &batch, &batches) != 2)
+    return 0;
+  const Fd bytes = open_plain(path.parent_path(), path.filename().string());
+  const Seal seal = check_seal(bytes.get());
+  if (seal == Seal::kBroken)
+    throw RuntimeError(fmt::format("'{}' is damaged: its checksum is wrong", path.string()));
+  const auto missing = nlohmann::json::parse(
+      h5::in_child(path.string(), static_cast<std::uint64_t>(size_of(bytes)),
+                   [&] { return missing_names(path, batch, batches); }));
+  if (missing.empty()) return 0;  // most files need nothing: they are not opened for writing
+  const h5::H5Lock lock;
   h5::Id file = h5::open_file(path, true);
-  each_missing(file,
-               [&](const std::string& place, const std::string& key, const std::string& name) {
-                 add_file_name(h5::create_group(file, place), key, name);
-               });
+  for (const auto& m : missing) {
+    const std::string place = m.at(0);
+    if (!h5::exists(file, place)) h5::create_group(file, place);
+    add_file_name(h5::open_group(file, place), m.at(1), m.at(2));
+  }
   file.close(fmt::format("cannot write '{}'", path.string()));
-  return added;
+  if (seal == Seal::kWhole) seal_file(path);
+  return static_cast<int>(missing.size());
 }
 
 }  // namespace
 
+// What cannot be repaired is named, and does not keep the rest from being repaired.
 RepairResult repair(const fs::path& path) {
   RepairResult result;
+  const auto attempt = [&](const fs::path& what, auto&& deed) {
+    try {
+      deed();
+    } catch (const Error& e) {
+      result.failures.push_back(fmt::format("{}: {}", what.string(), e.what()));
+    }
+  };
   if (fs::is_directory(path)) {
     for (const fs::path& house : recorded_houses(path)) {
-      if (fs::exists(house / kStagingDir)) finish_house(house, result.actions);
+      if (fs::exists(fs::symlink_status(house / kStagingDir)))
+        attempt(house, [&] { finish_house(house, result.actions); });
     }
   }
   for (const RecordedFile& file : recorded_files(path)) {
-    const int added = file.published ? name_videos(file.path) : 0;
-    if (added > 0)
-      result.actions.push_back(
-          fmt::format("{}: added {} names of videos", file.path.string(), added));
+    if (!file.published) continue;
+    attempt(file.path, [&] {
+      if (const int added = name_videos(file.path); added > 0)
+        result.actions.push_back(
+            fmt::format("{}: added {} names of videos", file.path.string(), added));
+    });
   }
   return result;
 }
 
 std::string RepairResult::text() const {
   std::string out;
-  for (const std::string& action : actions) out += action + "\n";
+  for (const std::string& action : actions) out += printable(action) + "\n";
+  for (const std::string& failure : failures) out += "cannot repair " + printable(failure) + "\n";
   return out.empty() ? "nothing to repair\n" : out;
 }
 
-std::string RepairResult::json() const { return nlohmann::json{{"actions", actions}}.dump(2); }
+std::string RepairResult::json() const {
+  return nlohmann::json{{"actions", actions}, {"failures", failures}}.dump(
+      2, ' ', false, nlohmann::json::error_handler_t::replace);
+}
 
 }  // namespace mjsense

@@ -7,6 +7,7 @@
 #include <cstdlib>
 
 #include "mjsense/core/error.h"
+#include "mjsense/core/plain_file.h"
 #include "mjsense/record/house.h"
 #include "mjsense/replay/json_text.h"
 
@@ -16,6 +17,7 @@ namespace mjsense {
 namespace {
 
 constexpr std::size_t kPieceBytes = 1 << 22;
+constexpr std::size_t kMostNameBytes = 4096;
 constexpr hsize_t kLeastTextWidth =
     100;  // MolmoSpaces' dict rows are 1000 bytes and more, its other uint8 rows are 1
 
@@ -58,7 +60,7 @@ std::vector<fs::path> recorded_houses(const fs::path& path) {
   require_exists(path);
   if (fs::is_regular_file(path)) return {path.parent_path()};
   const auto is_house = [](const fs::path& dir) {
-    if (fs::exists(dir / kStagingDir)) return true;
+    if (is_plain_folder(dir / kStagingDir)) return true;
     return std::any_of(fs::directory_iterator(dir), fs::directory_iterator(),
                        [](const fs::directory_entry& e) { return is_trajectory_file(e.path()); });
   };
@@ -92,26 +94,12 @@ std::vector<std::string> trajectory_names(hid_t file) {
   return names;
 }
 
-void visit_datasets(hid_t group, const std::function<void(const std::string&)>& visit) {
-  const std::function<void(hid_t, const std::string&)> walk = [&](hid_t at,
-                                                                  const std::string& prefix) {
-    for (const std::string& name : h5::children(at)) {
-      if (h5::is_group(at, name)) {
-        const h5::Id child(H5Gopen2(at, name.c_str(), H5P_DEFAULT), H5Gclose, name);
-        walk(child, prefix + name + "/");
-      } else {
-        visit(prefix + name);
-      }
-    }
-  };
-  walk(group, "");
-}
-
 RowDataset::RowDataset(hid_t parent, const std::string& path)
     : path_(path),
-      id_(H5Dopen2(parent, path.c_str(), H5P_DEFAULT), H5Dclose, path),
+      id_(h5::open_dataset(parent, path)),
       type_(H5Dget_type(id_), H5Tclose, path),
-      dims_(h5::dims(id_)) {
+      dims_(h5::dims(id_)),
+      bytes_(h5::check_storage(id_, path)) {
   const bool bytes = H5Tequal(type_, H5T_STD_U8LE) > 0 && dims_.size() == 2;
   const bool described = h5::has_attribute(id_, "spec");
   json_ = bytes &&
@@ -125,13 +113,14 @@ std::int64_t RowDataset::row_size() const {
 }
 
 bool RowDataset::is_bool() const {
-  return H5Tget_class(type_) == H5T_ENUM && H5Tget_nmembers(type_) == 2 &&
-         H5Tget_member_index(type_, "TRUE") >= 0;
+  return H5Tget_class(type_) == H5T_ENUM && H5Tget_size(type_) == 1 &&
+         H5Tget_nmembers(type_) == 2 && H5Tget_member_index(type_, "TRUE") >= 0;
 }
 
 bool RowDataset::is_number() const {
   const H5T_class_t cls = H5Tget_class(type_);
-  return cls == H5T_FLOAT || cls == H5T_INTEGER || is_bool();
+  const bool plain = cls == H5T_FLOAT || cls == H5T_INTEGER;
+  return (plain && H5Tget_size(type_) <= sizeof(double)) || is_bool();
 }
 
 std::string RowDataset::dtype() const {
@@ -190,6 +179,20 @@ void RowDataset::each_text(const std::function<void(std::int64_t, std::string_vi
   }
 }
 
+void RowDataset::each_bytes(const std::function<void(std::string_view)>& visit) const {
+  const std::size_t element = H5Tget_size(type_);
+  const auto width = static_cast<std::size_t>(row_size()) * element;
+  if (width == 0) return;
+  const std::int64_t at_once = rows_at_once(element);
+  std::string piece;
+  for (std::int64_t first = 0; first < rows(); first += at_once) {
+    const std::int64_t count = std::min(at_once, rows() - first);
+    piece.resize(width * static_cast<std::size_t>(count));
+    read(first, count, type_, piece.data());
+    visit(piece);
+  }
+}
+
 void RowDataset::each_number(const std::function<void(std::span<const double>)>& visit) const {
   if (row_size() == 0) return;
   const std::int64_t at_once = rows_at_once(sizeof(double));
@@ -210,12 +213,11 @@ void RowDataset::each_number(const std::function<void(std::span<const double>)>&
 }
 
 std::string read_file_name(hid_t sensor_data, const std::string& key) {
-  const h5::Id dataset(H5Dopen2(sensor_data, key.c_str(), H5P_DEFAULT), H5Dclose, key);
-  const std::vector<hsize_t> size = h5::dims(dataset);
-  std::string name(size.size() == 1 ? size[0] : 0, '\0');
-  if (!name.empty())
-    h5::check(H5Dread(dataset, H5T_NATIVE_UINT8, H5S_ALL, H5S_ALL, H5P_DEFAULT, name.data()), key);
-  return std::string(trim_row(name));
+  const std::string bytes = h5::read_bytes(sensor_data, key, kMostNameBytes);
+  std::string name(trim_row(bytes));
+  if (!is_plain_name(name) || printable(name) != name)
+    throw RuntimeError(fmt::format("names a video '{:.100}', which is no plain file name of its folder", printable(name)));
+  return name;
 }
 
 }  // namespace mjsense

@@ -9,6 +9,7 @@
 #include <string>
 #include <vector>
 
+#include "mjsense/hdf5/guard.h"
 #include "mjsense/hdf5/h5.h"
 
 namespace mjsense {
@@ -28,15 +29,13 @@ std::vector<std::filesystem::path> recorded_houses(const std::filesystem::path& 
 // "traj_0", "traj_1" ... in the order of their numbers.
 std::vector<std::string> trajectory_names(hid_t file);
 
-// Calls visit("obs/agent/qpos") for every dataset, sorted.
-void visit_datasets(hid_t group, const std::function<void(const std::string& path)>& visit);
-
-// A dataset with one row a step.
+// A dataset with one row a step. What it claims to be is checked before anything is read.
 class RowDataset {
  public:
   RowDataset(hid_t parent, const std::string& path);
   std::int64_t rows() const { return dims_.empty() ? 1 : static_cast<std::int64_t>(dims_[0]); }
   std::int64_t row_size() const;  // elements
+  std::uint64_t bytes() const { return bytes_; }
   bool scalar() const { return dims_.empty(); }
   bool is_json() const { return json_; }
   bool is_bool() const;
@@ -47,6 +46,8 @@ class RowDataset {
 
   // Calls visit(t, text) with each row of JSON text, without its padding.
   void each_text(const std::function<void(std::int64_t t, std::string_view text)>& visit) const;
+  // Calls visit(bytes) with pieces of all elements, in order, as the file has them.
+  void each_bytes(const std::function<void(std::string_view bytes)>& visit) const;
   // Calls visit(values) with pieces of all elements, in order; bool as 0 and 1.
   void each_number(const std::function<void(std::span<const double> values)>& visit) const;
 
@@ -57,10 +58,11 @@ class RowDataset {
   std::string path_;
   h5::Id id_, type_;
   std::vector<hsize_t> dims_;
+  std::uint64_t bytes_ = 0;  // of all rows
   bool json_ = false;
 };
 
-// The name of a video in obs/sensor_data.
+// The name of a video in obs/sensor_data. Throws RuntimeError unless it is a plain name.
 std::string read_file_name(hid_t sensor_data, const std::string& key);
 
 }  // namespace mjsense

@@ -2,13 +2,16 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <limits>
 #include <nlohmann/json.hpp>
 #include <set>
 
 #include "mjsense/core/error.h"
 #include "mjsense/core/parallel.h"
+#include "mjsense/core/plain_file.h"
+#include "mjsense/record/checksum.h"
 #include "mjsense/record/house.h"
-#include "mjsense/record/layout.h"
+#include "mjsense/record/video_file.h"
 #include "mjsense/replay/check.h"
 #include "mjsense/replay/json_text.h"
 #include "mjsense/replay/trajectory.h"
@@ -19,11 +22,205 @@ namespace fs = std::filesystem;
 namespace mjsense {
 namespace {
 
+using Json = nlohmann::json;
+
+constexpr std::int64_t kMostSteps = 10'000'000;  // of one episode: a week at 15 Hz
+constexpr std::size_t kMostFindings = 200;       // of one file
+// Rows of a file may be so much larger than the file before they are a bomb.
+constexpr std::uint64_t kMostUnpacked = 200, kFreeBytes = std::uint64_t{1} << 30;
+
 struct VideoCheck {
   std::string place;
-  fs::path path;
+  fs::path folder;
+  std::string name;
   std::int64_t frames = 0;
   std::int64_t width = 0, height = 0;  // 0: not stated
+  std::string crc;                     // "" if not stated
+};
+
+// One file, read in a process of its own: what is found there goes home as JSON text.
+class FileVerifier {
+ public:
+  FileVerifier(const RecordedFile& recorded, std::uint64_t bytes, bool sealed)
+      : recorded_(recorded), bytes_(bytes), sealed_(sealed) {}
+
+  std::string run() {
+    try {
+      check_file();
+    } catch (const Error& e) {
+      error(recorded_.name, e.what());
+    }
+    out_["episodes"] = episodes_;
+    out_["steps"] = steps_;
+    return out_.dump(-1, ' ', false, Json::error_handler_t::replace);
+  }
+
+ private:
+  void add(bool is_error, const std::string& place, const std::string& text) {
+    if (++findings_ == kMostFindings)
+      return out_["findings"].push_back({is_error, recorded_.name, "has more findings than these"});
+    if (findings_ < kMostFindings)
+      out_["findings"].push_back({is_error, printable(place), printable(text)});
+  }
+  void error(const std::string& place, const std::string& text) { add(true, place, text); }
+  void note(const std::string& place, const std::string& text) { add(false, place, text); }
+
+  void check_file() {
+    const h5::H5Lock lock;
+    const h5::Id file = h5::open_file(recorded_.path);
+    haddr_t end = 0;
+    if (!sealed_ && H5Fget_eoa(file, &end) >= 0 && end < bytes_)
+      error(recorded_.name, fmt::format("has {} bytes behind its end", bytes_ - end));
+    const bool ours = h5::has_attribute(file, "recording");
+    const std::vector<std::string> names = trajectory_names(file);
+    if (names.empty()) error(recorded_.name, "holds no trajectory");
+    for (std::size_t i = 0; i < names.size(); ++i) {
+      const std::string place = recorded_.name + " " + names[i];
+      if (names[i] != fmt::format("traj_{}", i)) {
+        error(recorded_.name,
+              fmt::format("trajectory {} is named '{}', expected 'traj_{}'", i, names[i], i));
+      }
+      try {
+        check_trajectory(h5::open_group(file, names[i]), place);
+      } catch (const Error& e) {
+        error(place, e.what());
+      }
+    }
+    if (ours && without_sum_ > 0) {
+      note(recorded_.name, fmt::format("has no checksums of {} datasets and videos: recorded before there were any", without_sum_));
+    } else if (ours && !sealed_) {
+      note(recorded_.name, "was changed since it was recorded: it has no checksum of the whole file");
+    }
+  }
+
+  void check_trajectory(hid_t trajectory, const std::string& place) {
+    ++episodes_;
+    if (!h5::exists(trajectory, "success"))
+      return error(place, "has no 'success': its length is unknown");
+    const std::int64_t T = RowDataset(trajectory, "success").rows();
+    if (T > kMostSteps) return error(place, fmt::format("claims {} steps", T));
+    steps_ += T;
+    if (T == 0) error(place, "has no steps");
+    for (const char* name : {"rewards", "fail", "terminated", "truncated", "obs_scene"}) {
+      if (!h5::exists(trajectory, name)) error(place, fmt::format("has no '{}'", name));
+    }
+    h5::each_dataset(trajectory, [&](const std::string& name) {
+      if (name.starts_with("obs/sensor_data/")) return;
+      try {
+        check_dataset(trajectory, name, T, place + "/" + name);
+      } catch (const Error& e) {
+        error(place + "/" + name, e.what());
+      }
+    });
+    check_success(trajectory, place);
+    for (const char* name : {"obs/agent/qpos", "obs/agent/qvel"}) {
+      if (!h5::exists(trajectory, name))
+        note(place, fmt::format("has no '{}', which MolmoSpaces' tools ask for", name));
+    }
+    check_sensor_data(trajectory, T, place);
+  }
+
+  // What is compared with the checksum that stands beside the data.
+  void compare(hid_t object, const std::string& place, const Checksum& sum) {
+    const std::string stated = h5::text_attribute(object, kChecksumAttribute);
+    if (stated.empty()) {
+      ++without_sum_;
+    } else if (stated != sum.text()) {
+      error(place, fmt::format("is not what was recorded: its checksum is {}, expected {}",
+                               sum.text(), stated));
+    }
+  }
+
+  void check_dataset(hid_t trajectory, const std::string& name, std::int64_t T,
+                     const std::string& place) {
+    const RowDataset dataset(trajectory, name);
+    unpacked_ += dataset.bytes();
+    if (unpacked_ > kFreeBytes + kMostUnpacked * bytes_)
+      return error(place, "is not read: the file claims far more than it holds");
+    Checksum sum;
+    if (name == "obs_scene") {
+      const std::string text = h5::read_text(trajectory, name);
+      if (const auto wrong = parse_json(text); !wrong.empty())
+        error(place, "is no JSON text: " + wrong);
+      sum.add(text.data(), text.size());
+      return compare(dataset.id(), place, sum);
+    }
+    if (dataset.scalar() || dataset.rows() != T) {
+      return error(
+          place, fmt::format("has {} rows, expected {}", dataset.scalar() ? 0 : dataset.rows(), T));
+    }
+    if (dataset.is_json()) {
+      int bad = 0;
+      dataset.each_text([&](std::int64_t t, std::string_view text) {
+        const std::string wrong = parse_json(text);
+        if (!wrong.empty() && bad++ == 0)
+          error(place, fmt::format("row {} is no JSON text: {}", t, wrong));
+      });
+      if (bad > 1) error(place, fmt::format("{} rows are no JSON text", bad));
+    }
+    if (!dataset.is_number()) return;
+    dataset.each_bytes([&](std::string_view bytes) { sum.add(bytes.data(), bytes.size()); });
+    compare(dataset.id(), place, sum);
+  }
+
+  void check_success(hid_t trajectory, const std::string& place) {
+    if (!h5::exists(trajectory, "fail")) return;
+    std::vector<std::int8_t> success, fail;
+    const auto read = [&](const char* name, std::vector<std::int8_t>& out) {
+      const RowDataset dataset(trajectory, name);
+      if (dataset.rows() > kMostSteps || dataset.row_size() != 1 || !dataset.is_number()) return;
+      dataset.each_number([&](auto v) {
+        for (const double x : v) out.push_back(x == 0 ? 0 : x == 1 ? 1 : 2);
+      });
+    };
+    read("success", success);
+    read("fail", fail);
+    for (std::size_t t = 0; t < std::min(success.size(), fail.size()); ++t) {
+      if (success[t] + fail[t] != 1)
+        return error(place + "/fail", fmt::format("row {} is not the opposite of success", t));
+    }
+  }
+
+  void check_sensor_data(hid_t trajectory, std::int64_t T, const std::string& place) {
+    std::set<std::string> named;
+    if (h5::exists(trajectory, "obs/sensor_data")) {
+      const h5::Id group = h5::open_group(trajectory, "obs/sensor_data");
+      for (const std::string& key : h5::children(group)) {
+        named.insert(key);
+        const std::string video_place = place + "/obs/sensor_data/" + key;
+        try {
+          const h5::Id dataset = h5::open_dataset(group, key);
+          const std::string crc = h5::text_attribute(dataset, kChecksumAttribute);
+          if (crc.empty()) ++without_sum_;
+          out_["videos"].push_back({{"place", printable(video_place)},
+                                    {"name", read_file_name(group, key)},
+                                    {"frames", T},
+                                    {"width", h5::int_attribute(dataset, "width", 0)},
+                                    {"height", h5::int_attribute(dataset, "height", 0)},
+                                    {"crc", crc}});
+        } catch (const Error& e) {
+          error(video_place, e.what());
+        }
+      }
+    }
+    if (!h5::text_attribute(trajectory, "outcome").empty() ||
+        !h5::exists(trajectory, "obs/sensor_param"))
+      return;
+    for (const std::string& camera :
+         h5::children(h5::open_group(trajectory, "obs/sensor_param"))) {
+      if (!named.contains(camera))
+        note(place, fmt::format("names no video of camera '{}' (repair adds the names)", camera));
+    }
+  }
+
+  const RecordedFile& recorded_;
+  std::uint64_t bytes_;
+  bool sealed_;
+  Json out_{{"findings", Json::array()}, {"videos", Json::array()}};
+  std::size_t findings_ = 0;
+  int episodes_ = 0, without_sum_ = 0;
+  std::int64_t steps_ = 0;
+  std::uint64_t unpacked_ = 0;
 };
 
 class Verifier {
@@ -41,123 +238,45 @@ class Verifier {
 
  private:
   void error(const std::string& place, std::string text) {
-    result_.findings.push_back({true, place, std::move(text)});
+    result_.findings.push_back({true, printable(place), printable(text)});
   }
   void note(const std::string& place, std::string text) {
-    result_.findings.push_back({false, place, std::move(text)});
+    result_.findings.push_back({false, printable(place), printable(text)});
   }
 
   void check_file(const RecordedFile& recorded) {
     (recorded.published ? result_.files : result_.unpublished) += 1;
-    const h5::H5Lock lock;
     try {
-      const h5::Id file = h5::open_file(recorded.path);
-      const std::vector<std::string> names = trajectory_names(file);
-      if (names.empty()) error(recorded.name, "holds no trajectory");
-      for (std::size_t i = 0; i < names.size(); ++i) {
-        if (names[i] != fmt::format("traj_{}", i)) {
-          error(recorded.name,
-                fmt::format("trajectory {} is named '{}', expected 'traj_{}'", i, names[i], i));
-        }
-        const h5::Id trajectory(H5Gopen2(file, names[i].c_str(), H5P_DEFAULT), H5Gclose, names[i]);
-        check_trajectory(trajectory, recorded, recorded.name + " " + names[i]);
-      }
+      const fs::path folder = recorded.path.parent_path();
+      if (!recorded.published && !is_plain_folder(folder))
+        return error(recorded.name, "stands in a link, which is not followed");
+      const Fd file = open_plain(folder, recorded.path.filename().string());
+      const auto bytes = static_cast<std::uint64_t>(size_of(file));
+      const Seal seal = check_seal(file.get());
+      if (seal == Seal::kBroken) error(recorded.name, "is damaged: its checksum is wrong");
+      take(recorded, Json::parse(h5::in_child(recorded.name, bytes, [&] {
+             return FileVerifier(recorded, bytes, seal != Seal::kNone).run();
+           })));
+    } catch (const Json::exception&) {
+      error(recorded.name, "is damaged: reading it gave no answer");
     } catch (const Error& e) {
       error(recorded.name, e.what());
     }
   }
 
-  void check_trajectory(hid_t trajectory, const RecordedFile& recorded, const std::string& place) {
-    ++result_.episodes;
-    if (!h5::exists(trajectory, "success"))
-      return error(place, "has no 'success': its length is unknown");
-    const std::int64_t T = RowDataset(trajectory, "success").rows();
-    result_.steps += static_cast<int>(T);
-    if (T == 0) error(place, "has no steps");
-    for (const char* name : {"rewards", "fail", "terminated", "truncated", "obs_scene"}) {
-      if (!h5::exists(trajectory, name)) error(place, fmt::format("has no '{}'", name));
-    }
-    visit_datasets(trajectory, [&](const std::string& name) {
-      if (name.starts_with("obs/sensor_data/")) return;
-      try {
-        check_dataset(trajectory, name, T, place + "/" + name);
-      } catch (const Error& e) {
-        error(place + "/" + name, e.what());
-      }
-    });
-    check_success(trajectory, place);
-    for (const char* name : {"obs/agent/qpos", "obs/agent/qvel"}) {
-      if (!h5::exists(trajectory, name))
-        note(place, fmt::format("has no '{}', which MolmoSpaces' tools ask for", name));
-    }
-    check_sensor_data(trajectory, recorded, T, place);
-  }
-
-  void check_dataset(hid_t trajectory, const std::string& name, std::int64_t T,
-                     const std::string& place) {
-    const RowDataset dataset(trajectory, name);
-    if (name == "obs_scene") {
-      if (const auto wrong = parse_json(h5::read_text(trajectory, name)); !wrong.empty())
-        error(place, "is no JSON text: " + wrong);
-      return;
-    }
-    if (dataset.scalar() || dataset.rows() != T) {
-      return error(
-          place, fmt::format("has {} rows, expected {}", dataset.scalar() ? 0 : dataset.rows(), T));
-    }
-    if (dataset.is_json()) {
-      int bad = 0;
-      dataset.each_text([&](std::int64_t t, std::string_view text) {
-        const std::string wrong = parse_json(text);
-        if (!wrong.empty() && bad++ == 0)
-          error(place, fmt::format("row {} is no JSON text: {}", t, wrong));
-      });
-      if (bad > 1) error(place, fmt::format("{} rows are no JSON text", bad));
-    } else if (dataset.is_number()) {
-      dataset.each_number([](std::span<const double>) {});  // that every chunk can be read
-    }
-  }
-
-  void check_success(hid_t trajectory, const std::string& place) {
-    if (!h5::exists(trajectory, "fail")) return;
-    std::vector<double> success, fail;
-    RowDataset(trajectory, "success").each_number([&](auto v) {
-      success.insert(success.end(), v.begin(), v.end());
-    });
-    RowDataset(trajectory, "fail").each_number([&](auto v) {
-      fail.insert(fail.end(), v.begin(), v.end());
-    });
-    for (std::size_t t = 0; t < std::min(success.size(), fail.size()); ++t) {
-      if (success[t] + fail[t] != 1)
-        return error(place + "/fail", fmt::format("row {} is not the opposite of success", t));
-    }
-  }
-
-  void check_sensor_data(hid_t trajectory, const RecordedFile& recorded, std::int64_t T,
-                         const std::string& place) {
-    std::set<std::string> named;
-    if (h5::exists(trajectory, "obs/sensor_data")) {
-      const h5::Id group(H5Gopen2(trajectory, "obs/sensor_data", H5P_DEFAULT), H5Gclose,
-                         "obs/sensor_data");
-      for (const std::string& key : h5::children(group)) {
-        named.insert(key);
-        const h5::Id dataset(H5Dopen2(group, key.c_str(), H5P_DEFAULT), H5Dclose, key);
-        VideoCheck video{place + "/obs/sensor_data/" + key,
-                         recorded.path.parent_path() / read_file_name(group, key), T};
-        video.width = h5::int_attribute(dataset, "width", 0);
-        video.height = h5::int_attribute(dataset, "height", 0);
-        used_.insert(video.path);
+  void take(const RecordedFile& recorded, const Json& found) {
+    result_.episodes += found.at("episodes").get<int>();
+    result_.steps += static_cast<int>(std::min<std::int64_t>(
+        found.at("steps").get<std::int64_t>(), std::numeric_limits<int>::max() - result_.steps));
+    for (const Json& f : found.at("findings")) result_.findings.push_back({f.at(0), f.at(1), f.at(2)});
+    for (const Json& v : found.at("videos")) {
+      VideoCheck video{v.at("place"),  recorded.path.parent_path(), v.at("name"), v.at("frames"),
+                       v.at("width"), v.at("height"),              v.at("crc")};
+      if (used_.insert(video.folder / video.name).second) {
         videos_.push_back(std::move(video));
+      } else {
+        error(video.place, fmt::format("'{}' is also the video of another episode", video.name));
       }
-    }
-    if (!h5::text_attribute(trajectory, "outcome").empty() ||
-        !h5::exists(trajectory, "obs/sensor_param"))
-      return;
-    const h5::Id params(H5Gopen2(trajectory, "obs/sensor_param", H5P_DEFAULT), H5Gclose,
-                        "obs/sensor_param");
-    for (const std::string& camera : h5::children(params)) {
-      if (!named.contains(camera))
-        note(place, fmt::format("names no video of camera '{}' (repair adds the names)", camera));
     }
   }
 
@@ -173,23 +292,42 @@ class Verifier {
   }
 
   std::string check_video(const VideoCheck& video) const {
-    const std::string name = video.path.filename().string();
-    if (!fs::is_regular_file(video.path)) return fmt::format("'{}' does not exist", name);
-    const VideoProbe probe = probe_video(video.path, options_.decode, options_.ffmpeg);
-    if (!probe.error.empty()) return fmt::format("'{}' cannot be read: {}", name, probe.error);
-    if (probe.frames != video.frames)
-      return fmt::format("'{}' has {} frames, expected {}", name, probe.frames, video.frames);
-    // 4:2:0 videos of odd pictures have one more column or row.
-    const auto fits = [](int got, std::int64_t stated) {
-      return stated == 0 || got == stated || got == (stated + 1) / 2 * 2;
-    };
-    if (fits(probe.width, video.width) && fits(probe.height, video.height)) return "";
-    return fmt::format("'{}' is {} x {} pixels, expected {} x {}", name, probe.width, probe.height,
-                       video.width, video.height);
+    Fd file;
+    try {
+      file = open_plain(video.folder, video.name);
+      VideoFacts facts = read_video_facts(file.get());
+      // Containers of others may be of a form that only ffmpeg knows.
+      if (!facts.error.empty() || options_.decode) {
+        const VideoProbe probe = probe_video(video.folder / video.name, options_.decode,
+                                             video.frames, options_.ffmpeg);
+        if (!probe.error.empty())
+          return fmt::format("'{}' cannot be read: {}", video.name, probe.error);
+        facts = {probe.frames, probe.width, probe.height, ""};
+      }
+      if (facts.frames != video.frames)
+        return fmt::format("'{}' has {} frames, expected {}", video.name, facts.frames,
+                           video.frames);
+      // 4:2:0 videos of odd pictures have one more column or row.
+      const auto fits = [](int got, std::int64_t stated) {
+        return stated == 0 || got == stated || got == (stated + 1) / 2 * 2;
+      };
+      if (!fits(facts.width, video.width) || !fits(facts.height, video.height))
+        return fmt::format("'{}' is {} x {} pixels, expected {} x {}", video.name, facts.width,
+                           facts.height, video.width, video.height);
+      if (video.crc.empty()) return "";
+      if (const std::string crc = checksum_of(file.get()); crc != video.crc)
+        return fmt::format("'{}' is damaged: its checksum is {}, expected {}", video.name, crc,
+                           video.crc);
+      return "";
+    } catch (const Error& e) {
+      return e.what();
+    }
   }
 
   void check_leftovers(const fs::path& house) {
     const std::string place = house.filename().string();
+    if (fs::is_symlink(house / kStagingDir))
+      return error(place, fmt::format("'{}' is a link, which is not followed", kStagingDir));
     if (fs::exists(house / kStagingDir)) {
       const std::size_t waiting = finished_episodes(house).size();
       error(place, fmt::format("is unfinished: {} finished episodes wait to be published; resume "
@@ -199,6 +337,8 @@ class Verifier {
     }
     for (const fs::directory_entry& entry : fs::directory_iterator(house)) {
       const fs::path& path = entry.path();
+      if (path.filename() == kDamagedDir)
+        note(place + "/" + kDamagedDir, "holds episodes that were damaged and set aside");
       const bool video = path.extension() == ".mp4" || path.extension() == ".mkv";
       if (video && !used_.contains(path))
         note(place + "/" + path.filename().string(), "belongs to no episode");
@@ -237,7 +377,7 @@ std::string VerifyResult::json() const {
   j["findings"] = nlohmann::json::array();
   for (const Finding& f : findings)
     j["findings"].push_back({{"error", f.error}, {"place", f.place}, {"text", f.text}});
-  return j.dump(2);
+  return j.dump(2, ' ', false, nlohmann::json::error_handler_t::replace);
 }
 
 }  // namespace mjsense

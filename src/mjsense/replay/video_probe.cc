@@ -3,6 +3,7 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <cstdio>
 #include <sstream>
 
@@ -11,20 +12,58 @@
 
 namespace mjsense {
 
-VideoProbe probe_video(const std::filesystem::path& path, bool decode, const std::string& ffmpeg) {
+namespace {
+
+constexpr double kPatience = 20;  // s without a word
+constexpr std::size_t kLineBytes = 96;
+
+// "-f mov -c:v h264 -i file:/data/x.mp4"
+std::vector<std::string> input_of(const std::filesystem::path& path) {
+  const bool matroska = path.extension() == ".mkv";
+  return {"-protocol_whitelist",
+          "file",
+          "-f",
+          matroska ? "matroska" : "mov",
+          "-codec_whitelist",
+          "h264,ffv1",
+          "-an",
+          "-sn",
+          "-dn",
+          "-i",
+          "file:" + path.string()};
+}
+
+std::vector<std::string> command_of(const std::filesystem::path& path, const std::string& ffmpeg,
+                                    std::initializer_list<std::string> options) {
+  std::vector<std::string> command = {ffmpeg_program(ffmpeg), "-nostdin", "-hide_banner",
+                                      "-loglevel", "error"};
+  command.insert(command.end(), options);
+  const auto input = input_of(path);
+  command.insert(command.end(), input.begin(), input.end());
+  command.insert(command.end(), {"-map", "0:v:0"});
+  return command;
+}
+
+}  // namespace
+
+VideoProbe probe_video(const std::filesystem::path& path, bool decode, std::int64_t expected,
+                       const std::string& ffmpeg) {
   VideoProbe probe;
-  std::vector<std::string> command = {
-      ffmpeg_program(ffmpeg), "-nostdin", "-hide_banner", "-loglevel", "error", "-xerror", "-i",
-      path.string(),          "-map",     "0:v:0"};
+  std::vector<std::string> command =
+      command_of(path, ffmpeg, {"-xerror", "-err_detect", "crccheck+bitstream+buffer+explode"});
   if (!decode) command.insert(command.end(), {"-c", "copy"});
   command.insert(command.end(), {"-f", "framecrc", "pipe:1"});
   std::string listing;
   try {
-    listing = run_process(command);
+    const auto most = static_cast<std::size_t>(2 * std::max<std::int64_t>(0, expected) + 100);
+    std::string words;
+    listing = run_process(command, {.silence_s = kPatience, .most_bytes = most * kLineBytes}, &words);
+    // FFV1 says which of its slices are damaged, and ends as if all were well.
+    if (decode && !words.empty()) probe.error = words;
   } catch (const Error& error) {
     probe.error = error.what();
-    return probe;
   }
+  if (!probe.error.empty()) return probe;
   // "#dimensions 0: 640x368", then one line a frame.
   std::istringstream lines(listing);
   for (std::string line; std::getline(lines, line);) {
@@ -46,10 +85,12 @@ std::vector<std::uint8_t> grab_frames(const std::filesystem::path& path,
   const std::string filters =
       fmt::format("select='{}',setpts=N/(FRAME_RATE*TB),scale={}:{}:flags={}", select, width,
                   height, grey16 ? "neighbor" : "area");
-  const std::string raw =
-      run_process({ffmpeg_program(ffmpeg), "-nostdin", "-hide_banner", "-loglevel", "error", "-i",
-                   path.string(), "-map", "0:v:0", "-vf", filters, "-f", "rawvideo", "-pix_fmt",
-                   grey16 ? "gray16le" : "rgb24", "pipe:1"});
+  std::vector<std::string> command = command_of(path, ffmpeg, {});
+  command.insert(command.end(),
+                 {"-vf", filters, "-frames:v", fmt::format("{}", frames.size()), "-f", "rawvideo",
+                  "-pix_fmt", grey16 ? "gray16le" : "rgb24", "pipe:1"});
+  const std::size_t most = frames.size() * width * height * 3 + 1;
+  const std::string raw = run_process(command, {.silence_s = 3 * kPatience, .most_bytes = most});
   return {raw.begin(), raw.end()};
 }
 

@@ -79,7 +79,7 @@ std::string settings_of(const RecordJobCfg& job, Rollout& rollout) {
   return {text.begin(), text.begin() + static_cast<std::ptrdiff_t>(json.size())};
 }
 
-RecordingCfg recording_cfg(const RecordJobCfg& job, Rollout& rollout) {
+RecordingCfg recording_cfg(const RecordJobCfg& job, Rollout& rollout, const StopFlag* stop) {
   RecordingCfg cfg;
   cfg.out_dir = job.out;
   cfg.house = job.house;
@@ -92,17 +92,18 @@ RecordingCfg recording_cfg(const RecordJobCfg& job, Rollout& rollout) {
   cfg.resume = job.resume;
   cfg.gzip = job.gzip;
   cfg.video = job.video;
+  cfg.stop = stop;
   return cfg;
 }
 
 class RecordJob {
  public:
-  explicit RecordJob(const RecordJobCfg& cfg)
+  RecordJob(const RecordJobCfg& cfg, const StopFlag* stop)
       : cfg_(checked(cfg)),
         rollout_(cfg_.rollout),
-        recorder_(recording_cfg(cfg_, rollout_)),
+        recorder_(recording_cfg(cfg_, rollout_, stop)),
         lengths_(rollout_.num_worlds(), 0),
-        max_attempts_(cfg.max_attempts > 0 ? cfg.max_attempts : 6 * cfg.episodes) {
+        max_attempts_(cfg.max_attempts > 0 ? cfg.max_attempts : 6 * std::int64_t{cfg.episodes}) {
     for (const RecordedCamera& camera : rollout_.cameras()) pictures_ += camera.depth ? 2 : 1;
   }
 
@@ -137,6 +138,7 @@ class RecordJob {
     summary_.times = rollout_.times();
     summary_.record = recorder_.stats();
     summary_.house_dir = recorder_.house_dir();
+    summary_.damage = recorder_.damage();
     return summary_;
   }
 
@@ -236,7 +238,7 @@ class RecordJob {
   }
 
   void update_progress() {
-    progress_.kept = recorder_.kept();
+    progress_.kept = recorder_.saved();
     progress_.wanted = cfg_.episodes;
     progress_.running = running_;
     progress_.running_steps = 0;
@@ -272,7 +274,7 @@ double RecordProgress::seconds_left() const {
 RecordSummary record_episodes(const RecordJobCfg& cfg,
                               const std::function<void(const RecordProgress&)>& progress,
                               const StopFlag* stop) {
-  return RecordJob(cfg).run(progress, stop);
+  return RecordJob(cfg, stop).run(progress, stop);
 }
 
 }  // namespace mjsense

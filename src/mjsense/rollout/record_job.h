@@ -71,6 +71,7 @@ struct RecordSummary {
       0;  // wall seconds in the recorder: copying, and waiting for encoders and the disk
   RecordStats record;
   std::filesystem::path house_dir;
+  std::vector<std::string> damage;  // see Recorder::damage()
 };
 
 // 0: go on. 1: start no more episodes, finish those that run. 2: abandon them, keep what is

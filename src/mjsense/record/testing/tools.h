@@ -35,14 +35,15 @@ inline std::vector<std::string> tree(const fs::path& dir) {
   return names;
 }
 
-// An executable script in the place of ffmpeg. `body` sees the output file as $out; the question
-// for encoders is answered.
+// An executable script in the place of ffmpeg. `body` sees the output file as $out, and can run the
+// true one with what was asked as `ffmpeg "$@"`; the question for encoders is answered.
 inline std::string fake_ffmpeg(const fs::path& dir, const std::string& body) {
   const fs::path path = dir / "ffmpeg";
   std::ofstream(path) << "#!/bin/sh\n"
                          "case \"$*\" in *-encoders*) echo ' V libx264 x'; echo ' V ffv1 x'; echo "
                          "' V libx264rgb x'; exit 0;; esac\n"
                          "for out; do :; done\n"
+                         "out=${out#file:}\n"
                       << body << "\n";
   fs::permissions(path, fs::perms::owner_all);
   return path.string();

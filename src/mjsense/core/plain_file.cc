@@ -1,0 +1,99 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "mjsense/core/plain_file.h"
+
+#include <fcntl.h>
+#include <fmt/format.h>
+#include <sys/stat.h>
+
+#include <algorithm>
+#include <cerrno>
+#include <cstring>
+
+#include "mjsense/core/error.h"
+
+namespace mjsense {
+namespace {
+
+constexpr std::size_t kMostNameBytes = 255;
+
+bool is_control(char c) { return static_cast<unsigned char>(c) < 0x20 || c == 0x7F; }
+
+const char* kind_of(mode_t mode) {
+  if (S_ISDIR(mode)) return "a folder";
+  if (S_ISFIFO(mode)) return "a pipe";
+  if (S_ISSOCK(mode)) return "a socket";
+  return "a device";
+}
+
+// Bytes of the UTF-8 character that begins here; 0 if there is none.
+std::size_t character(std::string_view text) {
+  const auto byte = [&](std::size_t i) { return static_cast<unsigned char>(text[i]); };
+  const unsigned char first = byte(0);
+  if (first < 0x80) return is_control(text[0]) ? 0 : 1;
+  const std::size_t size = first >= 0xF0 && first < 0xF5   ? 4
+                           : first >= 0xE0 && first < 0xF0 ? 3
+                           : first >= 0xC2 && first < 0xE0 ? 2
+                                                           : 0;
+  if (size == 0 || size > text.size()) return 0;
+  for (std::size_t i = 1; i < size; ++i) {
+    if ((byte(i) & 0xC0) != 0x80) return 0;
+  }
+  if (first == 0xC2 && byte(1) < 0xA0) return 0;                       // C1 controls
+  if ((first == 0xE0 && byte(1) < 0xA0) || (first == 0xED && byte(1) >= 0xA0)) return 0;
+  if ((first == 0xF0 && byte(1) < 0x90) || (first == 0xF4 && byte(1) >= 0x90)) return 0;
+  return size;
+}
+
+}  // namespace
+
+bool is_plain_name(std::string_view name) {
+  return !name.empty() && name.size() <= kMostNameBytes && name != "." && name != ".." &&
+         name.find('/') == name.npos && std::none_of(name.begin(), name.end(), is_control);
+}
+
+Fd open_plain(const std::filesystem::path& folder, std::string_view name) {
+  const auto fail = [&](std::string_view why) {
+    throw RuntimeError(fmt::format("'{}' {}", printable(name), why));
+  };
+  if (!is_plain_name(name)) fail("is no plain file name, which stays in its folder");
+  const Fd dir(open(folder.empty() ? "." : folder.c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC));
+  if (!dir) fail(fmt::format("cannot be opened: {}", std::strerror(errno)));
+  // Without O_NONBLOCK a pipe would make us wait for its writer.
+  Fd file(openat(dir.get(), std::string(name).c_str(),
+                 O_RDONLY | O_NOFOLLOW | O_NONBLOCK | O_CLOEXEC));
+  if (!file && errno == ELOOP) fail("is a link, which is not followed");
+  if (!file && errno == ENOENT) fail("does not exist");
+  if (!file) fail(fmt::format("cannot be opened: {}", std::strerror(errno)));
+  struct stat about = {};
+  if (fstat(file.get(), &about) != 0)
+    fail(fmt::format("cannot be opened: {}", std::strerror(errno)));
+  if (!S_ISREG(about.st_mode)) fail(fmt::format("is {}, expected a file", kind_of(about.st_mode)));
+  return file;
+}
+
+bool is_plain_file(const std::filesystem::path& path) {
+  struct stat about = {};
+  return lstat(path.c_str(), &about) == 0 && S_ISREG(about.st_mode);
+}
+
+bool is_plain_folder(const std::filesystem::path& path) {
+  struct stat about = {};
+  return lstat(path.c_str(), &about) == 0 && S_ISDIR(about.st_mode);
+}
+
+std::int64_t size_of(const Fd& file) {
+  struct stat about = {};
+  return fstat(file.get(), &about) == 0 ? static_cast<std::int64_t>(about.st_size) : 0;
+}
+
+std::string printable(std::string_view text) {
+  std::string out;
+  for (std::size_t at = 0; at < text.size();) {
+    const std::size_t size = character(text.substr(at));
+    out += size == 0 ? std::string_view("?") : text.substr(at, size);
+    at += std::max<std::size_t>(1, size);
+  }
+  return out;
+}
+
+}  // namespace mjsense

@@ -1,0 +1,34 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+// Files whose names come from other files: only plain names inside one folder, no links, no pipes.
+
+#include <cstdint>
+#include <filesystem>
+#include <string>
+#include <string_view>
+
+#include "mjsense/core/fd.h"
+
+namespace mjsense {
+
+// A name that stays in its folder: not empty, at most 255 bytes, no slash, no NUL, no control
+// character, not "." or "..".
+[[nodiscard]] bool is_plain_name(std::string_view name);
+
+// Opens the regular file `name` of `folder` for reading. Throws RuntimeError that says what it is
+// instead: missing, a link, a pipe, no plain name.
+[[nodiscard]] Fd open_plain(const std::filesystem::path& folder, std::string_view name);
+
+// True for what open_plain() would open.
+[[nodiscard]] bool is_plain_file(const std::filesystem::path& path);
+
+// True for a folder that is no link.
+[[nodiscard]] bool is_plain_folder(const std::filesystem::path& path);
+
+[[nodiscard]] std::int64_t size_of(const Fd& file);
+
+// Text from a file as a terminal may see it: control characters, and bytes that are no UTF-8,
+// become '?'.
+[[nodiscard]] std::string printable(std::string_view text);
+
+}  // namespace mjsense

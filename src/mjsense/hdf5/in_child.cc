@@ -1,0 +1,154 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <fcntl.h>
+#include <fmt/format.h>
+#include <poll.h>
+#include <signal.h>
+#include <sys/prctl.h>
+#include <sys/resource.h>
+#include <sys/wait.h>
+#include <unistd.h>
+
+#include <cerrno>
+#include <chrono>
+#include <cstdio>
+#include <cstring>
+#include <vector>
+
+#include "mjsense/core/error.h"
+#include "mjsense/core/fd.h"
+#include "mjsense/hdf5/guard.h"
+
+namespace mjsense::h5 {
+namespace {
+
+constexpr std::uint64_t kLeastSeconds = 20, kBytesPerSecond = 2'000'000;
+constexpr std::uint64_t kMemory = std::uint64_t{1} << 30;
+constexpr std::size_t kMostAnswer = std::size_t{1} << 28;
+// The last byte of an answer: without it the child did not come to its end.
+constexpr char kDone = 'D', kThrown = 'T';
+
+void set_limit(decltype(RLIMIT_CPU) what, std::uint64_t most) {
+  const rlimit limit{most, most};
+  setrlimit(what, &limit);  // a lower one of the user's stays
+}
+
+// Bytes of address space that this process has.
+std::uint64_t address_space() {
+  unsigned long pages = 0;
+  if (FILE* file = std::fopen("/proc/self/statm", "re")) {
+    if (std::fscanf(file, "%lu", &pages) != 1) pages = 0;
+    std::fclose(file);
+  }
+  return pages * static_cast<std::uint64_t>(sysconf(_SC_PAGESIZE));
+}
+
+// No handlers of our program, no files written, no more processor and memory than a file deserves.
+void confine(int answer, std::uint64_t seconds) {
+  prctl(PR_SET_PDEATHSIG, SIGKILL);
+  // Locks that our program holds must not outlive it in us.
+  close_range(3, static_cast<unsigned>(answer) - 1, 0);
+  close_range(static_cast<unsigned>(answer) + 1, ~0U, 0);
+  for (const int signal : {SIGSEGV, SIGBUS, SIGILL, SIGFPE, SIGABRT, SIGTERM, SIGINT, SIGALRM})
+    ::signal(signal, SIG_DFL);
+  sigset_t none;
+  sigemptyset(&none);
+  pthread_sigmask(SIG_SETMASK, &none, nullptr);
+  if (const Fd null(open("/dev/null", O_WRONLY | O_CLOEXEC)); null)
+    dup2(null.get(), STDERR_FILENO);  // the C library's words when memory is found corrupt
+  set_limit(RLIMIT_CPU, seconds);
+  set_limit(RLIMIT_CORE, 0);
+  set_limit(RLIMIT_FSIZE, 0);
+#ifndef __SANITIZE_ADDRESS__
+  if (const std::uint64_t now = address_space(); now > 0) set_limit(RLIMIT_AS, now + kMemory);
+#endif
+}
+
+void send(int fd, const std::string& text) {
+  for (std::size_t done = 0; done < text.size();) {
+    const ssize_t n = write(fd, text.data() + done, text.size() - done);
+    if (n < 0 && errno == EINTR) continue;
+    if (n <= 0) return;
+    done += static_cast<std::size_t>(n);
+  }
+}
+
+[[noreturn]] void child(int fd, std::uint64_t seconds, const std::function<std::string()>& read) {
+  confine(fd, seconds);
+  std::string answer;
+  try {
+    answer = read() + kDone;
+  } catch (const std::bad_alloc&) {
+    answer = std::string("it needs more than 1 GiB of memory") + kThrown;
+  } catch (const std::exception& e) {
+    answer = e.what() + std::string(1, kThrown);
+  }
+  send(fd, answer);
+  _exit(0);
+}
+
+// What the child says. False unless it came to its end within `seconds`.
+bool listen(int fd, std::uint64_t seconds, std::string& answer) {
+  using Clock = std::chrono::steady_clock;
+  const auto end = Clock::now() + std::chrono::seconds(seconds);
+  std::vector<char> piece(1 << 16);
+  while (answer.size() < kMostAnswer) {
+    const auto left = std::chrono::duration_cast<std::chrono::milliseconds>(end - Clock::now());
+    pollfd polled{fd, POLLIN, 0};
+    const int ready = poll(&polled, 1, static_cast<int>(std::max<std::int64_t>(0, left.count())));
+    if (ready < 0 && errno == EINTR) continue;
+    if (ready <= 0) return false;
+    const ssize_t n = read(fd, piece.data(), piece.size());
+    if (n < 0 && errno == EINTR) continue;
+    if (n <= 0) return n == 0;
+    answer.append(piece.data(), static_cast<std::size_t>(n));
+  }
+  return false;
+}
+
+}  // namespace
+
+std::string in_child(std::string_view what, std::uint64_t file_bytes,
+                     const std::function<std::string()>& read) {
+  const std::uint64_t seconds = kLeastSeconds + file_bytes / kBytesPerSecond;
+  int ends[2];
+  if (pipe2(ends, O_CLOEXEC) != 0)
+    throw RuntimeError(fmt::format("{}: cannot create a pipe: {}", what, std::strerror(errno)));
+  Fd out(ends[0]), in(ends[1]);
+  pid_t pid;
+  {
+    const H5Lock lock;  // so that no other thread is inside the library when it is copied
+    pid = fork();
+    if (pid == 0) {
+      out.reset();
+      H5Lock::alone();
+      child(in.get(), seconds, read);
+    }
+  }
+  if (pid < 0)
+    throw RuntimeError(fmt::format("{}: cannot start a process: {}", what, std::strerror(errno)));
+  in.reset();
+  std::string answer;
+  if (!listen(out.get(), 3 * seconds, answer)) kill(pid, SIGKILL);
+  int status = 0;
+  pid_t got;
+  do {
+    got = waitpid(pid, &status, 0);
+  } while (got < 0 && errno == EINTR);
+  const bool ended = got < 0 || (WIFEXITED(status) && WEXITSTATUS(status) == 0);
+  if (ended && !answer.empty() && (answer.back() == kDone || answer.back() == kThrown)) {
+    const bool thrown = answer.back() == kThrown;
+    answer.pop_back();
+    if (thrown) throw RuntimeError(answer);
+    return answer;
+  }
+  if (got >= 0 && WIFSIGNALED(status)) {
+    const int signal = WTERMSIG(status);
+    if (signal == SIGXCPU || signal == SIGKILL)
+      throw RuntimeError(fmt::format("{}: reading it did not end within {} s: it is damaged", what, seconds));
+    throw RuntimeError(fmt::format("{}: the HDF5 library crashed on it ({}): it is damaged", what,
+                                   strsignal(signal)));
+  }
+  throw RuntimeError(fmt::format("{}: reading it did not come to an end: it is damaged", what));
+}
+
+}  // namespace mjsense::h5

@@ -1,0 +1,89 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "mjsense/record/checksum.h"
+
+#include <fcntl.h>
+#include <fmt/format.h>
+#include <sys/stat.h>
+#include <unistd.h>
+#include <zlib.h>
+
+#include <algorithm>
+#include <cerrno>
+#include <cstring>
+#include <vector>
+
+#include "mjsense/core/error.h"
+#include "mjsense/core/fd.h"
+
+namespace mjsense {
+namespace {
+
+constexpr std::size_t kPieceBytes = 1 << 18;
+
+std::string seal_text(const std::string& crc, std::int64_t bytes) {
+  return fmt::format("\nmjsense: crc32 {} of the {:>16} bytes above\n", crc, bytes);
+}
+
+// The first `bytes` of a file; fewer where it ends before.
+std::string checksum_of(int fd, std::int64_t bytes) {
+  Checksum sum;
+  std::vector<std::uint8_t> piece(kPieceBytes);
+  for (std::int64_t at = 0; at < bytes;) {
+    const std::int64_t most = std::min<std::int64_t>(kPieceBytes, bytes - at);
+    const ssize_t n = pread(fd, piece.data(), static_cast<std::size_t>(most), at);
+    if (n < 0 && errno == EINTR) continue;
+    if (n < 0) throw RuntimeError(fmt::format("cannot be read: {}", std::strerror(errno)));
+    if (n == 0) break;
+    sum.add(piece.data(), static_cast<std::size_t>(n));
+    at += n;
+  }
+  return sum.text();
+}
+
+std::int64_t file_size(int fd) {
+  struct stat about = {};
+  return fstat(fd, &about) == 0 ? static_cast<std::int64_t>(about.st_size) : 0;
+}
+
+}  // namespace
+
+void Checksum::add(const void* bytes, std::size_t count) {
+  crc_ = static_cast<std::uint32_t>(crc32_z(crc_, static_cast<const Bytef*>(bytes), count));
+}
+
+std::string Checksum::text() const { return fmt::format("{:08x}", crc_); }
+
+std::string checksum_of(int fd) { return checksum_of(fd, file_size(fd)); }
+
+void seal_file(const std::filesystem::path& path) {
+  const Fd file(open(path.c_str(), O_RDWR | O_CLOEXEC | O_NOFOLLOW));
+  const auto fail = [&] {
+    throw RuntimeError(fmt::format("cannot write '{}': {}", path.string(), std::strerror(errno)));
+  };
+  if (!file) fail();
+  const std::int64_t size = file_size(file.get());
+  const std::string seal = seal_text(checksum_of(file.get(), size), size);
+  const ssize_t written = pwrite(file.get(), seal.data(), seal.size(), size);
+  if (written >= 0 && written != static_cast<ssize_t>(seal.size())) errno = ENOSPC;
+  if (written != static_cast<ssize_t>(seal.size())) fail();
+}
+
+Seal check_seal(int fd) {
+  const std::string form = seal_text("00000000", 0);
+  const std::int64_t end = file_size(fd) - static_cast<std::int64_t>(form.size());
+  if (end < 0) return Seal::kNone;
+  std::string found(form.size(), '\0');
+  if (pread(fd, found.data(), found.size(), end) != static_cast<ssize_t>(found.size()))
+    return Seal::kNone;
+  if (found == seal_text(checksum_of(fd, end), end)) return Seal::kWhole;
+  // Damage may have hit the line itself: it is one as long as most of it is.
+  std::size_t same = 0, fixed = 0;
+  for (std::size_t i = 0; i < form.size(); ++i) {
+    if (form[i] == '0') continue;
+    ++fixed;
+    same += found[i] == form[i];
+  }
+  return 2 * same > fixed ? Seal::kBroken : Seal::kNone;
+}
+
+}  // namespace mjsense

@@ -1,0 +1,100 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "mjsense/record/staged_episode.h"
+
+#include <fmt/format.h>
+
+#include <nlohmann/json.hpp>
+
+#include "mjsense/core/error.h"
+#include "mjsense/core/plain_file.h"
+#include "mjsense/hdf5/guard.h"
+#include "mjsense/record/checksum.h"
+#include "mjsense/record/house.h"
+#include "mjsense/record/layout.h"
+#include "mjsense/record/video_file.h"
+
+namespace fs = std::filesystem;
+
+namespace mjsense {
+namespace {
+
+using Json = nlohmann::json;
+
+// A copy in memory alone: what the library cannot copy must not be copied into a file of ours.
+void try_copy(hid_t file) {
+  const h5::Id access(H5Pcreate(H5P_FILE_ACCESS), H5Pclose, "HDF5 property list");
+  h5::check(H5Pset_fapl_core(access, std::size_t{1} << 20, false), "HDF5 memory file");
+  const h5::Id copy(H5Fcreate("copy", H5F_ACC_TRUNC, H5P_DEFAULT, access), H5Fclose,
+                    "HDF5 memory file");
+  h5::check(H5Ocopy(file, "traj_0", copy, "traj_0", H5P_DEFAULT, H5P_DEFAULT), "cannot be copied");
+}
+
+std::string describe(const fs::path& path) {
+  const h5::H5Lock lock;
+  const h5::Id file = h5::open_file(path);
+  const h5::Id trajectory = h5::open_group(file, "traj_0");
+  h5::each_dataset(trajectory, [&](const std::string& name) {
+    h5::check_storage(h5::open_dataset(trajectory, name), name);
+  });
+  try_copy(file);
+  const std::vector<hsize_t> rows = h5::dims(h5::open_dataset(trajectory, "success"));
+  Json out{{"recording", h5::text_attribute(file, "recording")},
+           {"steps", rows.empty() ? 0 : rows[0]},
+           {"videos", Json::array()}};
+  for (const StagedVideo& video : staged_videos(trajectory))
+    out["videos"].push_back({video.key, video.name, video.crc});
+  return out.dump();
+}
+
+}  // namespace
+
+std::vector<StagedVideo> staged_videos(hid_t trajectory) {
+  std::vector<StagedVideo> videos;
+  const h5::Id names = h5::open_group(trajectory, "obs/sensor_data");
+  for (const std::string& key : h5::children(names)) {
+    std::string name = h5::read_bytes(names, key, kFileNameBytes);
+    name.resize(name.find_last_not_of('\0') + 1);
+    if (!is_plain_name(name))
+      throw RuntimeError(fmt::format("names a video '{}', which is no plain file name of its folder", printable(name)));
+    const h5::Id dataset = h5::open_dataset(names, key);
+    videos.push_back({key, name, h5::text_attribute(dataset, kChecksumAttribute)});
+  }
+  return videos;
+}
+
+StagedEpisode read_staged(const fs::path& folder) {
+  if (!is_plain_folder(folder)) throw RuntimeError("is no folder");
+  const Fd file = open_plain(folder, kEpisodeFile);
+  if (check_seal(file.get()) == Seal::kBroken)
+    throw RuntimeError(fmt::format("'{}' is damaged: its checksum is wrong", kEpisodeFile));
+  StagedEpisode episode;
+  try {
+    const Json found =
+        Json::parse(h5::in_child(kEpisodeFile, static_cast<std::uint64_t>(size_of(file)),
+                                 [&] { return describe(folder / kEpisodeFile); }));
+    episode.recording = found.at("recording");
+    episode.steps = found.at("steps");
+    for (const Json& v : found.at("videos")) episode.videos.push_back({v.at(0), v.at(1), v.at(2)});
+  } catch (const Json::exception&) {
+    throw RuntimeError(fmt::format("'{}' is damaged: reading it gave no answer", kEpisodeFile));
+  }
+  return episode;
+}
+
+void check_staged_video(const fs::path& folder, const StagedVideo& video, std::int64_t steps) {
+  const Fd file = open_plain(folder, video.name);
+  const VideoFacts facts = read_video_facts(file.get());
+  if (!facts.error.empty())
+    throw RuntimeError(fmt::format("'{}' is no whole video: {}", video.name, facts.error));
+  if (facts.frames != steps)
+    throw RuntimeError(
+        fmt::format("'{}' has {} frames, expected {}", video.name, facts.frames, steps));
+  if (!video.crc.empty() && checksum_of(file.get()) != video.crc)
+    throw RuntimeError(fmt::format("'{}' is damaged: its checksum is wrong", video.name));
+}
+
+void check_staged_videos(const fs::path& folder, const StagedEpisode& episode) {
+  for (const StagedVideo& video : episode.videos) check_staged_video(folder, video, episode.steps);
+}
+
+}  // namespace mjsense

@@ -1,0 +1,410 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Faults, one kind a function: each makes trials and returns what was lost, unnoticed, crashed and hung."""
+
+from __future__ import annotations
+
+import functools
+import os
+import random
+import resource
+import shutil
+import signal
+import subprocess
+import time
+from dataclasses import dataclass, field
+from pathlib import Path
+
+import crafted
+import h5py
+
+SECONDS, MEMORY = 20, 1 << 30  # what a look at a hostile file may take
+
+
+@dataclass
+class Row:
+    """A line of the table: all but `trials` must be 0."""
+
+    kind: str
+    trials: int = 0
+    lost: int = 0
+    unnoticed: int = 0
+    crashed: int = 0
+    hung: int = 0
+    notes: list[str] = field(default_factory=list)
+
+    def wrong(self, what: str, note: str):
+        setattr(self, what, getattr(self, what) + 1)
+        self.notes.append(f"{self.kind}: {what}: {note}")
+
+    @property
+    def clean(self) -> bool:
+        return self.trials > 0 and not (self.lost or self.unnoticed or self.crashed or self.hung)
+
+
+@dataclass
+class Lab:
+    """Where the trials run: the program that records without physics, and an empty folder."""
+
+    program: Path
+    folder: Path
+
+    def run(self, *arguments, seconds=120, **kwargs):
+        return subprocess.run(
+            [self.program, *map(str, arguments)], capture_output=True, text=True, errors="replace", timeout=seconds, **kwargs
+        )
+
+    def fresh(self, name) -> Path:
+        path = self.folder / name
+        shutil.rmtree(path, ignore_errors=True)
+        path.mkdir(parents=True)
+        return path
+
+    @functools.cached_property
+    def sound(self) -> Path:
+        """A whole recording of two files with videos of both kinds."""
+        out = self.fresh("sound")
+        done = self.run(out, "--episodes", 4, "--batches", 2, "--worlds", 2, "--steps", 10, "--width", 32, "--height", 24)
+        assert done.returncode == 0, done.stderr
+        return out
+
+    def copy(self, name="copy") -> Path:
+        out = self.fresh(name)
+        shutil.copytree(self.sound, out, dirs_exist_ok=True)
+        return out
+
+
+def limit_memory():
+    resource.setrlimit(resource.RLIMIT_CORE, (0, 0))
+
+
+def look(lab: Lab, row: Row, what: str, command: str, path: Path, *more):
+    """One command on a hostile or damaged recording: it ends by itself, in time and in bounds. None if it did not."""
+    before = resource.getrusage(resource.RUSAGE_CHILDREN)
+    try:
+        done = lab.run(command, path, *more, seconds=3 * SECONDS, preexec_fn=limit_memory)
+    except subprocess.TimeoutExpired:
+        row.wrong("hung", f"{command} of {what}")
+        return None
+    after = resource.getrusage(resource.RUSAGE_CHILDREN)
+    seconds = after.ru_utime + after.ru_stime - before.ru_utime - before.ru_stime
+    if done.returncode not in (0, 1, 2):
+        row.wrong("crashed", f"{command} of {what}: {done.returncode} {done.stderr[-300:]}")
+        return None
+    if seconds > SECONDS + 5:
+        row.wrong("hung", f"{command} of {what}: {seconds:.0f} s of processor time")
+    if after.ru_maxrss > before.ru_maxrss and after.ru_maxrss * 1024 > MEMORY + (200 << 20):
+        row.wrong("crashed", f"{command} of {what}: {after.ru_maxrss // 1024} MiB of memory")
+    return done
+
+
+def snapshot(folder: Path) -> dict:
+    return {str(p.relative_to(folder)): (p.read_bytes() if p.is_file() and not p.is_symlink() else None) for p in folder.rglob("*")}
+
+
+def hostile(lab: Lab, names=None) -> Row:
+    """Crafted files: no command crashes, hangs or reaches outside; verify calls none whole."""
+    row = Row("crafted files, read by verify, inspect, repair and the contact sheet")
+    for name, craft in crafted.CASES.items():
+        if names is not None and name not in names:
+            continue
+        out = lab.copy("hostile/data")
+        secret = out.parent / crafted.SECRET
+        shutil.rmtree(secret, ignore_errors=True)
+        secret.mkdir()
+        (secret / "keep.txt").write_text("mine")
+        craft(out / "house_0")
+        before = snapshot(secret)
+        row.trials += 1
+        done = look(lab, row, name, "verify", out)
+        if done and done.returncode == 0:
+            row.wrong("unnoticed", f"{name}: {done.stdout[-200:]}")
+        if done and "\x1b" in done.stdout + done.stderr:
+            row.wrong("crashed", f"{name}: control characters reach the terminal")
+        look(lab, row, name, "inspect", out)
+        look(lab, row, name, "sheet", out, lab.folder / "sheet.png")
+        look(lab, row, name, "repair", out)
+        if snapshot(secret) != before:
+            row.wrong("lost", f"{name}: a file outside was touched")
+    return row
+
+
+def damaged_files(lab: Lab):
+    return [p for p in sorted(lab.sound.rglob("*")) if p.is_file()]
+
+
+def flips(lab: Lab, trials: int, seed=0) -> Row:
+    """One bit of one file, of every kind of file in turn."""
+    row = Row("flipped bits in HDF5, MP4 and Matroska files")
+    rng = random.Random(seed)
+    kinds = {}
+    for path in damaged_files(lab):
+        kinds.setdefault(path.suffix, []).append(path)
+    out = lab.copy("flips")
+    for n in range(trials):
+        path = rng.choice(kinds[sorted(kinds)[n % len(kinds)]])
+        victim = out / path.relative_to(lab.sound)
+        data = bytearray(path.read_bytes())
+        at, bit = rng.randrange(len(data)), rng.randrange(8)
+        data[at] ^= 1 << bit
+        victim.write_bytes(data)
+        row.trials += 1
+        done = look(lab, row, f"bit {bit} of byte {at} of {path.name}", "verify", out)
+        if done and done.returncode == 0:
+            row.wrong("unnoticed", f"bit {bit} of byte {at} of {path.name}: {done.stdout[-200:]}")
+        victim.write_bytes(path.read_bytes())
+    done = lab.run("verify", out)
+    if done.returncode != 0 or "note" in done.stdout:
+        row.wrong("unnoticed", f"false alarm: {done.stdout}")
+    return row
+
+
+def truncations(lab: Lab, trials: int, seed=1) -> Row:
+    row = Row("truncated files")
+    rng = random.Random(seed)
+    paths = damaged_files(lab)
+    out = lab.copy("cuts")
+    for n in range(trials):
+        path = paths[n % len(paths)]
+        victim = out / path.relative_to(lab.sound)
+        data = path.read_bytes()
+        size = rng.choice([rng.randrange(len(data)), len(data) - 1 - rng.randrange(min(100, len(data)))])
+        victim.write_bytes(data[:size])
+        row.trials += 1
+        done = look(lab, row, f"{path.name} cut to {size}", "verify", out)
+        # Without its last line, and whole otherwise: data are as recorded, and a note says that the line is missing.
+        if done and done.returncode == 0 and "was changed since it was recorded" not in done.stdout:
+            row.wrong("unnoticed", f"{path.name} cut to {size}")
+        victim.write_bytes(data)
+    return row
+
+
+def mutate(data: bytes, rng: random.Random) -> bytes:
+    out = bytearray(data)
+    for _ in range(rng.randrange(1, 20)):
+        at = rng.randrange(len(out))
+        kind = rng.randrange(4)
+        if kind == 0:
+            out[at] = rng.randrange(256)
+        elif kind == 1:
+            out[at : at + 4] = rng.choice([b"\xff\xff\xff\xff", b"\0\0\0\0", b"\x7f\xff\xff\xff", b"\0\0\0\x80"])
+        elif kind == 2:
+            length = rng.randrange(1, 64)
+            out[at : at + length] = out[rng.randrange(len(out)) :][:length]
+        else:
+            out[at : at + 1] = bytes([out[at] ^ 1 << rng.randrange(8)])
+    return bytes(out)
+
+
+def mutations(lab: Lab, trials: int, seed=2) -> Row:
+    """Many changes in one file, its checksum cut off so that the readers behind it are met."""
+    row = Row("mutated HDF5, MP4 and Matroska files without checksums")
+    rng = random.Random(seed)
+    bare = lab.copy("bare")
+    for path in bare.rglob("*.h5"):
+        with h5py.File(path, "r+") as f:
+            remove_checksums(f)
+    paths = [p for p in sorted(bare.rglob("*")) if p.is_file()]
+    for n in range(trials):
+        path = paths[n % len(paths)]
+        data = path.read_bytes()
+        path.write_bytes(mutate(data, rng))
+        row.trials += 1
+        command = ["verify", "verify", "inspect", "repair"][n % 4]
+        kept = snapshot(bare) if command == "repair" else None
+        look(lab, row, f"mutant {n} of {path.name}", command, bare)
+        path.write_bytes(data)
+        if kept is not None:
+            for p in paths:
+                if p.read_bytes() != kept[str(p.relative_to(bare))]:
+                    p.write_bytes(kept[str(p.relative_to(bare))] if p != path else data)
+    return row
+
+
+def remove_checksums(f: h5py.File):
+    f.visititems(lambda name, item: [item.attrs.pop(a) for a in ("crc32", "bytes") if a in item.attrs] and None)
+
+
+def contents(out: Path) -> dict:
+    return {str(p.relative_to(out)): p.read_bytes() for p in out.rglob("*") if p.is_file()}
+
+
+KILLED = ["--episodes", "7", "--batches", "3", "--worlds", "3", "--steps", "8", "--discard", "4", "--print"]
+
+
+def kills(lab: Lab, trials: int, seed=3) -> Row:
+    """kill -9 at any moment, then --resume: every finished episode stays, and the end is the same to the byte."""
+    row = Row("kill -9 of the program, then --resume")
+    rng = random.Random(seed)
+    whole = lab.fresh("whole")
+    assert lab.run(whole, *KILLED).returncode == 0
+    expected = contents(whole)
+    while row.trials < trials:
+        out, finished = lab.fresh("killed"), []
+        for _ in range(12):
+            process = subprocess.Popen(
+                [lab.program, out, *KILLED, "--resume", "--step-ms", "3"], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
+            )
+            time.sleep(rng.uniform(0.02, 0.8))
+            process.send_signal(signal.SIGKILL)
+            said = process.communicate()
+            finished += [line.split()[1] for line in said[0].splitlines() if line.startswith("finished")]
+            if process.returncode == 0:
+                break
+            row.trials += 1
+            if process.returncode != -signal.SIGKILL:
+                row.wrong("crashed", f"{process.returncode} {said[1]}")
+        done = lab.run(out, *KILLED, "--resume")
+        if done.returncode != 0:
+            row.wrong("crashed", done.stderr)
+        if contents(out) != expected or len(set(finished)) != len(finished):
+            row.wrong("lost", f"after {row.trials} kills: {sorted(set(expected) ^ set(contents(out)))}")
+    return row
+
+
+def full_disks(lab: Lab, trials: int) -> Row:
+    """A disk of a few hundred kilobytes more each time: a clear error, what was finished stays and is published on a larger one."""
+    row = Row("full disks")
+    options = ["--episodes", "7", "--batches", "3", "--worlds", "2", "--steps", "8", "--width", "32", "--height", "24"]
+    for n in range(trials):
+        size = 40_960 + n * (1_600_000 // trials) // 4096 * 4096
+        disk = lab.fresh("disk")
+        script = f"mount -t tmpfs -o size={size} none {disk} && {lab.program} {disk}/out {' '.join(options)} --print; rc=$?; " \
+                 f"{lab.program} verify {disk}/out >&2; cp -r {disk}/out {disk}.kept 2>/dev/null; exit $rc"  # fmt: skip
+        shutil.rmtree(f"{disk}.kept", ignore_errors=True)
+        try:
+            done = subprocess.run(["unshare", "-m", "sh", "-c", script], capture_output=True, text=True, timeout=120)
+        except subprocess.TimeoutExpired:
+            row.trials += 1
+            row.wrong("hung", f"disk of {size}")
+            continue
+        row.trials += 1
+        if done.returncode not in (0, 2):
+            row.wrong("crashed", f"disk of {size}: {done.returncode} {done.stderr[-300:]}")
+        finished = {line.split()[1] for line in done.stdout.splitlines() if line.startswith("finished")}
+        kept = Path(f"{disk}.kept")
+        if kept.exists():
+            resumed = lab.run(kept, *options, "--resume")
+            if resumed.returncode != 0 or lab.run("verify", kept).returncode != 0:
+                row.wrong("lost", f"disk of {size}: {resumed.stderr} {lab.run('verify', kept).stdout[-400:]}")
+        elif finished:
+            row.wrong("lost", f"disk of {size}: {finished}")
+    return row
+
+
+def staged(lab: Lab) -> Row:
+    """What waits in .recording is damaged: the rest is saved, the damaged episode is set aside and recorded again."""
+    row = Row("damage to an unfinished recording, then repair or --resume")
+    options = ["--episodes", "4", "--batches", "1", "--worlds", "1", "--steps", "8", "--width", "32", "--height", "24"]
+    whole = lab.fresh("whole_staged")
+    assert lab.run(whole, *options).returncode == 0
+    expected = contents(whole)
+    victims = {
+        "description removed": lambda s: (s / "recording.json").unlink(),
+        "description emptied": lambda s: (s / "recording.json").write_text(""),
+        "description broken": lambda s: (s / "recording.json").write_text("{nonsense"),
+        "file removed": lambda s: (s / "episode_00000001/traj.h5").unlink(),
+        "file cut": lambda s: cut(s / "episode_00000001/traj.h5"),
+        "file emptied": lambda s: (s / "episode_00000001/traj.h5").write_bytes(b""),
+        "video removed": lambda s: min((s / "episode_00000001").glob("*.mp4")).unlink(),
+        "video cut": lambda s: cut(min((s / "episode_00000001").glob("*.mp4"))),
+        "depth cut": lambda s: cut(min((s / "episode_00000001").glob("*.mkv"))),
+        "video flipped": lambda s: flip(min((s / "episode_00000001").glob("*.mp4"))),
+        "video is a link": lambda s: link(min((s / "episode_00000001").glob("*.mp4"))),
+        "episode is a link": lambda s: link(s / "episode_00000001"),
+        "part is a link": lambda s: (s / "batch.part").symlink_to(s.parents[2] / crafted.SECRET / "keep.txt"),
+    }
+    for command in ("repair", "resume"):
+        for name, damage in victims.items():
+            out = lab.fresh("staged/data")
+            secret = out.parent / crafted.SECRET
+            shutil.rmtree(secret, ignore_errors=True)
+            secret.mkdir()
+            (secret / "keep.txt").write_text("mine")
+            lab.run(out, *options, "--stop-after", 3)
+            damage(out / "house_0/.recording")
+            row.trials += 1
+            whole_after = 3 if name.startswith(("description", "part")) else 2
+            if command == "repair":
+                done = look(lab, row, name, "repair", out)
+                check = look(lab, row, name, "verify", out)
+                if not done or not check or check.returncode != 0 or f"{whole_after} episodes" not in check.stdout:
+                    row.wrong("lost", f"{name}: repair: {done and done.stdout + done.stderr} {check and check.stdout}")
+            else:
+                done = lab.run(out, *options, "--resume")
+                found = {k: v for k, v in contents(out).items() if "/damaged/" not in k}
+                if done.returncode != 0 or found != expected:
+                    row.wrong("lost", f"{name}: resume: {done.stderr}")
+            if (secret / "keep.txt").read_text() != "mine":
+                row.wrong("lost", f"{name}: a file outside was touched")
+    return row
+
+
+def cut(path: Path):
+    data = path.read_bytes()
+    path.write_bytes(data[: len(data) // 2])
+
+
+def flip(path: Path):
+    data = bytearray(path.read_bytes())
+    data[len(data) // 2] ^= 4
+    path.write_bytes(data)
+
+
+def link(path: Path):
+    moved = path.parents[4] / crafted.SECRET / path.name
+    path.rename(moved)
+    path.symlink_to(moved)
+
+
+# ffmpegs that lie or hang. $out is the file, "$@" what was asked.
+ENCODERS = {
+    "garbage": "cat > /dev/null; echo garbage > $out",
+    "nothing": "cat > /dev/null",
+    "an empty file": "cat > /dev/null; : > $out",
+    "fewer frames": 'head -c 9000 | "$real" "$@" -frames:v 3',
+    "a cut file": '"$real" "$@"; head -c 700 $out > $out.x; mv $out.x $out',
+    "dies": "head -c 2000 > /dev/null; kill -9 $$",
+    "stops": "kill -STOP $$",
+    "never reads": "sleep 1000",
+    "never ends": 'cat > /dev/null; sleep 1000',
+}
+
+
+def encoders(lab: Lab, names=None) -> Row:
+    """Whatever ffmpeg does: the program ends by itself with a message, and nothing broken is called saved."""
+    row = Row("ffmpeg that lies, dies or hangs")
+    real = shutil.which("ffmpeg")
+    for name, body in ENCODERS.items():
+        if names is not None and name not in names:
+            continue
+        tools, out = lab.fresh("tools"), lab.fresh("encoded")
+        script = tools / "ffmpeg"
+        script.write_text(
+            f'#!/bin/sh\nreal={real}\ncase "$*" in *-encoders*) exec "$real" "$@";; esac\nfor out; do :; done\n'
+            f'out="${{out#file:}}"\n{body}\n'
+        )
+        script.chmod(0o755)
+        row.trials += 1
+        options = ["--episodes", 2, "--worlds", 1, "--steps", 400, "--no-depth", "--timeout", 2]
+        try:
+            done = lab.run(out, *options, seconds=60, env={**os.environ, "MJSENSE_FFMPEG": str(script)})
+        except subprocess.TimeoutExpired:
+            row.wrong("hung", name)
+            continue
+        if done.returncode == 0:
+            row.wrong("unnoticed", name)
+        elif done.returncode != 2 or "ffmpeg" not in done.stderr:
+            row.wrong("crashed", f"{name}: {done.returncode} {done.stderr}")
+        if list(out.rglob("*.mp4")) and any(".part." not in str(p) for p in out.rglob("*.mp4")):
+            row.wrong("lost", f"{name}: published {list(out.rglob('*.mp4'))}")
+    script = lab.fresh("tools") / "ffmpeg"
+    script.write_text("#!/bin/sh\nsleep 1000\n")
+    script.chmod(0o755)
+    row.trials += 1
+    try:
+        done = lab.run(lab.fresh("encoded"), "--timeout", 2, seconds=60, env={**os.environ, "MJSENSE_FFMPEG": str(script)})
+        if done.returncode != 2 or "said nothing for" not in done.stderr:
+            row.wrong("crashed", f"-encoders hangs: {done.returncode} {done.stderr}")
+    except subprocess.TimeoutExpired:
+        row.wrong("hung", "-encoders hangs")
+    return row
