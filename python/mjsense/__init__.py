@@ -36,9 +36,9 @@ from mjsense.imu import ImuSensor
 from mjsense.pipeline import ObservationPipeline
 from mjsense.policy import Policy, policy_names, register_policy
 from mjsense.raycast import CameraSensor, LidarSensor, RayCastSensor, TerrainHeightSensor
-from mjsense.robot import MoveGroup, Robot, RobotCamera
 from mjsense.record import RecordProgress, RecordSummary, record
 from mjsense.recorder import Recorder
+from mjsense.robot import MoveGroup, Robot, RobotCamera
 from mjsense.scene import Entity, Scene
 from mjsense.sensor import BuiltinSensor, NativeSensor, Sensor, SensorError
 from mjsense.simulation import Simulation
