@@ -34,7 +34,7 @@ class TimeToWall(mjs.Sensor):
     def compute(self, sim):
         ahead = sim.scene["scan"].data.distances.min(axis=1, keepdims=True)  # m; sensors may read sensors
         speed = np.maximum(sim.qvel[:, :1], 1e-6)
-        return np.where(ahead < 0, np.inf, ahead / speed)
+        return np.where(ahead < 0, np.inf, ahead / speed).astype(np.float32)
 
 
 mast = mjs.ObjRef("site", "mast", "room")

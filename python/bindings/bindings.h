@@ -17,5 +17,7 @@ void bind_recorder(nanobind::module_& m);
 void bind_robot(nanobind::module_& m);
 void bind_rollout(nanobind::module_& m);
 void bind_program(nanobind::module_& m);
+void bind_core_sensors(nanobind::module_& m);
+void bind_task_view(nanobind::module_& m);
 
 }  // namespace mjsense::python

@@ -3,11 +3,13 @@
 
 #include <nanobind/nanobind.h>
 #include <nanobind/stl/string.h>
+#include <nanobind/stl/vector.h>
 
 #include "mjsense/core/error.h"
 #include "mjsense/core/spec.h"
 #include "python/bindings/bindings.h"
 #include "python/bindings/numpy.h"
+#include "python/bindings/python_sensor.h"
 
 namespace mjsense::python {
 namespace {
@@ -16,6 +18,9 @@ namespace {
 void translate(const std::exception_ptr& error, void*) {
   try {
     std::rethrow_exception(error);
+  } catch (const PythonRowError& e) {
+    const nb::handle exception = e.exception.get();
+    PyErr_SetObject(reinterpret_cast<PyObject*>(Py_TYPE(exception.ptr())), exception.ptr());
   } catch (const Error& e) {
     switch (e.kind()) {
       case ErrorKind::kValue:
@@ -51,6 +56,15 @@ std::string spec_repr(const SensorSpec& s) {
 void bind_core(nb::module_& m) {
   nb::register_exception_translator(translate);
   m.attr("__version__") = MJSENSE_VERSION;
+
+  m.def(
+      "unknown_name",
+      [](const std::string& place, const std::string& kind, const std::string& name,
+         const std::vector<std::string>& names) {
+        return place + ": no " + kind + " named '" + name + "'" + suggest(name, names);
+      },
+      nb::arg("place"), nb::arg("kind"), nb::arg("name"), nb::arg("names"),
+      "What is said of a name that does not exist.");
 
   nb::class_<SensorSpec>(m, "SensorSpec", "What a measurement is, apart from its value.")
       .def_prop_ro(

@@ -7,14 +7,6 @@
 
 namespace mjsense::python {
 
-Held::Held(nb::object object)
-    : object_(new nb::object(std::move(object)), [](nb::object* held) {
-        // What outlives the interpreter has nobody left to give it back to.
-        if (!nb::is_alive()) return;
-        nb::gil_scoped_acquire lock;
-        delete held;
-      }) {}
-
 void PythonHost::add_note(nb::python_error& error, const std::string& place) {
   nb::object value = nb::borrow(error.value());
   value.attr("add_note")("in " + place);
@@ -29,7 +21,8 @@ nb::object PythonHost::simulation(const std::shared_ptr<Simulation>& sim) {
   if (!simulation_) {
     core_ = new PySimulation(sim, turns_);
     nb::object core = nb::cast(core_, nb::rv_policy::take_ownership);
-    simulation_ = Held(make_.get()(core, scene_ ? scene_.get() : nb::none()));
+    nb::object view = nb::cast(TaskView(cell_));
+    simulation_ = Held(make_.get()(core, scene_ ? scene_.get() : nb::none(), view));
   }
   return nb::borrow(simulation_.get());
 }
@@ -37,8 +30,13 @@ nb::object PythonHost::simulation(const std::shared_ptr<Simulation>& sim) {
 std::vector<std::shared_ptr<Sensor>> PythonHost::members(nb::handle sensors,
                                                          const std::shared_ptr<Simulation>& sim) {
   nb::object shown = simulation(sim);
+  nb::object prepared = nb::module_::import_("mjsense._members").attr("prepare")(shown, sensors);
   std::vector<std::shared_ptr<Sensor>> made;
-  for (nb::handle object : sensors) {
+  for (nb::handle object : prepared) {
+    if (nb::isinstance<SensorHandle>(object)) {
+      made.push_back(nb::cast<SensorHandle&>(object).sensor);
+      continue;
+    }
     auto sensor = std::make_shared<PythonSensor>(nb::cast<std::string>(object.attr("uuid")),
                                                  WeakObject(object), read_python_spec(object));
     sensor->on_initialized = [weak = std::weak_ptr<PythonSensor>(sensor), held = simulation_] {
@@ -52,6 +50,7 @@ std::vector<std::shared_ptr<Sensor>> PythonHost::members(nb::handle sensors,
 }
 
 void PythonHost::close() {
+  end();
   if (simulation_) nb::borrow(simulation_.get()).attr("close")();
 }
 

@@ -9,21 +9,11 @@
 #include <vector>
 
 #include "mjsense/sim/simulation.h"
+#include "python/bindings/held.h"
 #include "python/bindings/py_simulation.h"
+#include "python/bindings/task_view.h"
 
 namespace mjsense::python {
-
-// A Python object that any thread may copy and destroy.
-class Held {
- public:
-  Held() = default;
-  explicit Held(nb::object object);
-  nb::handle get() const { return object_ ? nb::handle(*object_) : nb::handle(); }
-  explicit operator bool() const { return object_ != nullptr; }
-
- private:
-  std::shared_ptr<nb::object> object_;
-};
 
 // C++ calls it without the interpreter's lock, except where a function says that it needs it. A task
 // or a policy runs on the caller's thread, while the simulation counts as at work: it may read the
@@ -54,7 +44,10 @@ class PythonHost {
   void set_scene(nb::object scene, nb::object alive);
   // mjsense.Simulation of these worlds, made when it is first wanted. Needs the lock.
   nb::object simulation(const std::shared_ptr<Simulation>& sim);
-  // mjsense.Sensor objects as members of a suite. Needs the lock.
+  // The rollout that is being made, whose task and robot sensors may ask for until it has ended.
+  void set_rollout(Rollout& rollout) { *cell_ = &rollout; }
+  void end() { *cell_ = nullptr; }
+  // Sensors as members of a suite. Needs the lock.
   std::vector<std::shared_ptr<Sensor>> members(nb::handle sensors,
                                                const std::shared_ptr<Simulation>& sim);
   // Nothing of Python's may hold on to a rollout that has ended. Needs the lock.
@@ -65,6 +58,7 @@ class PythonHost {
 
   std::shared_ptr<Turns> turns_ = std::make_shared<Turns>();
   Held make_, scene_, alive_, simulation_;
+  TaskView::Cell cell_ = std::make_shared<Rollout*>(nullptr);
   PySimulation* core_ = nullptr;  // simulation_ keeps it alive
 };
 

@@ -18,6 +18,8 @@ NB_MODULE(_core, m) {
   mjsense::python::bind_raycast(m);
   mjsense::python::bind_recorder(m);
   mjsense::python::bind_robot(m);
+  mjsense::python::bind_core_sensors(m);
+  mjsense::python::bind_task_view(m);
   mjsense::python::bind_rollout(m);
   mjsense::python::bind_program(m);
 }

@@ -7,14 +7,40 @@
 #include "mjsense/core/error.h"
 
 namespace mjsense::python {
+namespace {
+
+// Deletes a reference to Python from any thread. What outlives the interpreter has nobody left to
+// give it back to.
+template <class T>
+void give_back(T* reference) {
+  if (!nb::is_alive()) return;
+  nb::gil_scoped_acquire lock;
+  delete reference;
+}
+
+nb::list list_of(std::span<const int> ids) {
+  nb::list list;
+  for (int w : ids) list.append(w);
+  return list;
+}
+
+// `faults`: [(world, exception)] of a mjsense.Sensor.
+void throw_faults(nb::handle faults) {
+  if (nb::len(faults) == 0) return;
+  std::vector<RowError::Fault> all;
+  Held first;
+  for (nb::handle fault : faults) {
+    nb::object exception = fault[1];
+    if (all.empty()) first = Held(exception);
+    all.push_back({nb::cast<int>(fault[0]), nb::cast<std::string>(nb::str(exception))});
+  }
+  throw PythonRowError(std::move(all), std::move(first));
+}
+
+}  // namespace
 
 WeakObject::WeakObject(nb::handle object)
-    : reference_(new nb::weakref(object), [](nb::weakref* reference) {
-        // What outlives the interpreter has nobody left to give it back to.
-        if (!nb::is_alive()) return;
-        nb::gil_scoped_acquire lock;
-        delete reference;
-      }) {}
+    : reference_(new nb::weakref(object), give_back<nb::weakref>) {}
 
 nb::object WeakObject::get() const {
   nb::object object = (*reference_)();
@@ -23,6 +49,8 @@ nb::object WeakObject::get() const {
   return object;
 }
 
+Held::Held(nb::object object) : object_(new nb::object(std::move(object)), give_back<nb::object>) {}
+
 void PythonSensor::edit_spec(mjSpec*) {
   nb::gil_scoped_acquire lock;
   self().attr("_mjs_edit_spec")();
@@ -30,50 +58,74 @@ void PythonSensor::edit_spec(mjSpec*) {
 
 void PythonSensor::initialize(const SensorInit& init) {
   clear_fields();
-  if (spec_) add_field("", *spec_, init.num_worlds);
+  for (const auto& [name, spec] : spec_.fields) add_field(name, spec, init.num_worlds);
+  step_dt_ = init.decimation * init.model->opt.timestep;
+  seeds_.assign(init.num_worlds, 0);
   reset_.assign(init.num_worlds, 0);
   if (on_initialized) {
     nb::gil_scoped_acquire lock;
-    on_initialized();
+    std::exchange(on_initialized, nullptr)();
   }
 }
 
-void PythonSensor::cast(const CastContext&) {
+void PythonSensor::cast(const CastContext& context) {
   nb::gil_scoped_acquire lock;
   flush_resets();
-  self().attr("_mjs_compute_rows")();
+  throw_faults(self().attr("_mjs_compute_rows")(list_of(context.ids), seeds_of(context.ids)));
+}
+
+void PythonSensor::control_step(std::span<const int> ids) {
+  if (!spec_.updates) return;
+  nb::gil_scoped_acquire lock;
+  flush_resets();
+  throw_faults(self().attr("_mjs_control_step")(list_of(ids), step_dt_, seeds_of(ids)));
+}
+
+// The same for the same moment of an episode, whatever its world.
+void PythonSensor::draw_seed(const World& world) {
+  seeds_[world.id] = world.rng(stream_of(name())).next();
+}
+
+nb::list PythonSensor::seeds_of(std::span<const int> ids) const {
+  nb::list list;
+  for (int w : ids) list.append(seeds_[w]);
+  return list;
 }
 
 void PythonSensor::reset(const World& world) {
+  draw_seed(world);
   reset_[world.id] = 1;
   any_reset_ = true;
 }
 
 void PythonSensor::flush_resets() {
   if (!any_reset_.exchange(false)) return;
-  nb::list ids;
+  std::vector<int> ids;
   for (std::size_t w = 0; w < reset_.size(); ++w) {
-    if (reset_[w]) ids.append(w);
+    if (reset_[w]) ids.push_back(static_cast<int>(w));
     reset_[w] = 0;
   }
-  self().attr("_mjs_reset")(ids);
+  self().attr("_mjs_reset")(list_of(ids), seeds_of(ids));
 }
 
-std::optional<SensorSpec> read_python_spec(nb::handle sensor) {
-  nb::object declared = sensor.attr("_mjs_row_spec")();
-  if (declared.is_none()) return {};
-  SensorSpec spec;
-  spec.dtype = dtype_from_name(nb::cast<std::string>(declared["dtype"]));
-  spec.shape =
-      Shape(std::span<const std::int64_t>(nb::cast<std::vector<std::int64_t>>(declared["shape"])));
-  spec.unit = nb::cast<std::string>(declared["unit"]);
-  spec.frame = nb::cast<std::string>(declared["frame"]);
-  spec.low = nb::cast<double>(declared["low"]);
-  spec.high = nb::cast<double>(declared["high"]);
-  spec.is_dict = nb::cast<bool>(declared["is_dict"]);
-  if (spec.is_dict) spec.str_max_len = static_cast<int>(spec.shape[0]);
-  spec.description = nb::cast<std::string>(declared["description"]);
-  return spec;
+PythonSensorSpec read_python_spec(nb::handle sensor) {
+  PythonSensorSpec declared;
+  declared.updates = nb::cast<bool>(sensor.attr("_mjs_updates")());
+  for (nb::handle field : nb::object(sensor.attr("_mjs_row_specs")())) {
+    SensorSpec spec;
+    spec.dtype = dtype_from_name(nb::cast<std::string>(field["dtype"]));
+    spec.shape =
+        Shape(std::span<const std::int64_t>(nb::cast<std::vector<std::int64_t>>(field["shape"])));
+    spec.unit = nb::cast<std::string>(field["unit"]);
+    spec.frame = nb::cast<std::string>(field["frame"]);
+    spec.low = nb::cast<double>(field["low"]);
+    spec.high = nb::cast<double>(field["high"]);
+    spec.is_dict = nb::cast<bool>(field["is_dict"]);
+    if (spec.is_dict) spec.str_max_len = static_cast<int>(spec.shape[0]);
+    spec.description = nb::cast<std::string>(field["description"]);
+    declared.fields.emplace_back(nb::cast<std::string>(field["name"]), std::move(spec));
+  }
+  return declared;
 }
 
 }  // namespace mjsense::python

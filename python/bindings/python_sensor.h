@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
-// A sensor written in Python, as the simulation sees it: computed for all worlds at once, on the
-// caller's thread.
+// A sensor written in Python, as the simulation sees it: computed on the caller's thread, for all
+// worlds whose rows are wanted at once.
 
 #include <nanobind/nanobind.h>
 
@@ -9,15 +9,16 @@
 #include <cstdint>
 #include <functional>
 #include <memory>
-#include <optional>
 #include <string>
+#include <utility>
 #include <vector>
 
+#include "mjsense/core/control_step.h"
+#include "mjsense/core/row_error.h"
 #include "mjsense/core/sensor.h"
+#include "python/bindings/held.h"
 
 namespace mjsense::python {
-
-namespace nb = nanobind;
 
 // A Python object that C++ refers to without keeping it alive, for references in a circle would
 // never be freed. May be copied and destroyed by any thread.
@@ -31,14 +32,30 @@ class WeakObject {
   std::shared_ptr<nb::weakref> reference_;
 };
 
-// Calls _mjs_edit_spec(), _mjs_compute_rows() and _mjs_reset(ids) of a mjsense.Sensor
-// (python/mjsense/sensor.py); its initialize(sim) is called by the Python simulation, once that
-// exists. Any thread may call and destroy this: it takes the interpreter's lock where it needs it.
-class PythonSensor final : public Sensor {
+// Rows that a sensor written in Python could not fill. Python sees the exception of the first world.
+struct PythonRowError : RowError {
+  PythonRowError(std::vector<Fault> faults, Held exception)
+      : RowError(std::move(faults)), exception(std::move(exception)) {}
+  Held exception;
+};
+
+// What a sensor written in Python declares of its rows: the fields, none if its value is a Python
+// object only, and whether it wants to hear of every control step.
+struct PythonSensorSpec {
+  std::vector<std::pair<std::string, SensorSpec>> fields;
+  bool updates = false;
+};
+PythonSensorSpec read_python_spec(nb::handle sensor);
+
+// Calls _mjs_edit_spec(), _mjs_compute_rows(ids, seeds), _mjs_control_step(ids, dt, seeds) and
+// _mjs_reset(ids, seeds) of a mjsense.Sensor (python/mjsense/sensor.py), seeds for the random numbers
+// that it draws in each of these worlds; its initialize(sim) is called by the Python simulation, once
+// that exists. Any thread may call and destroy this: it takes the interpreter's lock where it needs
+// it.
+class PythonSensor final : public Sensor, public ControlStepListener {
  public:
-  // `spec`: of its one field; without one it has none, and its value is a Python object only.
   // `self` is kept alive by the Python scene or simulation that it belongs to.
-  PythonSensor(std::string name, WeakObject self, std::optional<SensorSpec> spec)
+  PythonSensor(std::string name, WeakObject self, PythonSensorSpec spec)
       : Sensor(std::move(name)), self_(std::move(self)), spec_(std::move(spec)) {}
 
   std::string_view kind() const override { return "python"; }
@@ -47,8 +64,10 @@ class PythonSensor final : public Sensor {
   mjtStage needs() const override { return mjSTAGE_NONE; }
   void edit_spec(mjSpec* spec) override;
   void initialize(const SensorInit& init) override;
-  void compute(const World&) override {}
+  void compute(const World& world) override { draw_seed(world); }
+  // Throws PythonRowError for the worlds whose rows could not be filled; the others are.
   void cast(const CastContext& context) override;
+  void control_step(std::span<const int> ids) override;
   void reset(const World& world) override;
 
   // Called with the interpreter's lock when the rows exist.
@@ -59,14 +78,15 @@ class PythonSensor final : public Sensor {
   nb::object self() const { return self_.get(); }
 
  private:
+  void draw_seed(const World& world);
+  nb::list seeds_of(std::span<const int> ids) const;
+
   WeakObject self_;
-  std::optional<SensorSpec> spec_;
-  std::vector<std::uint8_t> reset_;  // [B] worlds reset since the last call into Python
+  PythonSensorSpec spec_;
+  double step_dt_ = 0;                // s, one control step
+  std::vector<std::uint32_t> seeds_;  // [B] of the moment of the last compute() or reset()
+  std::vector<std::uint8_t> reset_;   // [B] worlds reset since the last call into Python
   std::atomic<bool> any_reset_{false};
 };
-
-// Spec of a mjsense.Sensor's rows from its observation_space, unit and frame; none if it declares
-// no space.
-std::optional<SensorSpec> read_python_spec(nb::handle sensor);
 
 }  // namespace mjsense::python

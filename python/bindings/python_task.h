@@ -20,6 +20,9 @@ class PythonTask final : public Task, public GraspScene {
   static std::unique_ptr<PythonTask> make(nb::object task, std::shared_ptr<PythonHost> host,
                                           TaskCfg cfg, bool own_horizon);
 
+  // The user's object. Needs the lock.
+  nb::object object() const { return nb::borrow(task_.get()); }
+
   std::string_view name() const override { return name_; }
   std::string_view type() const override { return type_; }
   SceneCfg scene_cfg() const override;

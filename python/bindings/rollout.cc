@@ -56,6 +56,7 @@ class Parts {
         return host->members(sensors.get(), rollout.simulation_ptr());
       };
     }
+    cfg.making = [host = host_](Rollout& rollout) { host->set_rollout(rollout); };
     cfg.made = [](Rollout& rollout) {
       if (auto* policy = dynamic_cast<PythonPolicy*>(rollout.policy())) policy->observe(rollout);
     };
@@ -103,7 +104,8 @@ nb::dict record(nb::dict options, nb::object progress, nb::object objects,
   RecordSummary s;
   try {
     nb::gil_scoped_release unlock;
-    s = record_episodes(cfg, report, &stop);
+    // Code of users that runs for it may read the worlds, not move them.
+    parts.host()->turns()->work([&] { s = record_episodes(cfg, report, &stop); });
   } catch (...) {
     parts.host()->close();
     throw;
@@ -142,9 +144,15 @@ class PyRollout {
     read_options(options, struct_of<RolloutCfg>(), &cfg);
     parts_.join(cfg);
     nb::gil_scoped_release unlock;
-    rollout_ = std::make_shared<Rollout>(cfg);
+    try {
+      rollout_ = std::make_shared<Rollout>(cfg);
+    } catch (...) {
+      parts_.host()->end();
+      throw;
+    }
   }
   ~PyRollout() {
+    parts_.host()->end();
     nb::gil_scoped_release unlock;
     rollout_.reset();
   }

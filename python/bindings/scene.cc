@@ -48,7 +48,7 @@ ModelSource read_source(nb::handle config, nb::list& alive) {
 // A sensor written in Python among a scene's configured ones.
 class PythonSensorCfg final : public SensorCfg {
  public:
-  PythonSensorCfg(std::string key, nb::handle sensor, std::optional<SensorSpec> spec)
+  PythonSensorCfg(std::string key, nb::handle sensor, PythonSensorSpec spec)
       : sensor_(sensor), spec_(std::move(spec)) {
     name = std::move(key);
   }
@@ -58,7 +58,7 @@ class PythonSensorCfg final : public SensorCfg {
 
  private:
   WeakObject sensor_;
-  std::optional<SensorSpec> spec_;
+  PythonSensorSpec spec_;
 };
 
 std::shared_ptr<const SensorCfg> read_sensor(nb::handle item) {

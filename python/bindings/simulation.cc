@@ -13,6 +13,7 @@
 #include <algorithm>
 
 #include "python/bindings/bindings.h"
+#include "python/bindings/data_copies.h"
 #include "python/bindings/derived_field.h"
 #include "python/bindings/numpy.h"
 #include "python/bindings/py_simulation.h"
@@ -159,6 +160,20 @@ void bind_simulation(nb::module_& m) {
             return SensorHandle{sensor};
           },
           nb::arg("sensor"), "Adds a mjsense.Sensor that is not part of the scene.")
+      .def(
+          "add_native",
+          [](PySimulation& s, const SensorHandle& h) {
+            s.change("add", [&](Simulation& sim) { sim.add(h.sensor); });
+          },
+          nb::arg("sensor"), "Adds a C++ sensor that is not part of the scene.")
+      .def(
+          "data_copies",
+          [](PySimulation& s, nb::list datas) {
+            auto sensor = make_data_copies(datas);
+            s.read([&](Simulation& sim) { sim.add(sensor); });
+            return SensorHandle{sensor};
+          },
+          nb::arg("datas"), "mujoco.MjData objects that show the worlds when this is refreshed.")
       .def(
           "own_sensor",
           [](PySimulation& s, const SensorHandle& h) {

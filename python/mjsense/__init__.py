@@ -14,6 +14,19 @@ from mjsense._core import SensorSpec, embedded_models, robot_names
 from mjsense._core import __version__ as __version__  # pyright: ignore[reportAttributeAccessIssue]  # stubs leave it out
 from mjsense.configs import *  # noqa: F403
 from mjsense.contact import ContactSensor
+from mjsense.core_sensors import (
+    CameraImageSensor,
+    CameraParameterSensor,
+    EnvStatesSensor,
+    FunctionSensor,
+    GraspStateSensor,
+    ImagePointsSensor,
+    JointPositionSensor,
+    JointVelocitySensor,
+    PoseSensor,
+    RobotBasePoseSensor,
+    TcpPoseSensor,
+)
 from mjsense.data import CameraData, ContactData, ImuData, RayCastData, SensorData
 from mjsense.drawing import DebugShapes
 from mjsense.effects import EffectSensorCfg
@@ -23,9 +36,9 @@ from mjsense.imu import ImuSensor
 from mjsense.pipeline import ObservationPipeline
 from mjsense.policy import Policy, policy_names, register_policy
 from mjsense.raycast import CameraSensor, LidarSensor, RayCastSensor, TerrainHeightSensor
-from mjsense.robot import MoveGroup, Robot, RobotCamera
 from mjsense.record import RecordProgress, RecordSummary, record
 from mjsense.recorder import Recorder
+from mjsense.robot import MoveGroup, Robot, RobotCamera
 from mjsense.scene import Entity, Scene
 from mjsense.sensor import BuiltinSensor, NativeSensor, Sensor, SensorError
 from mjsense.simulation import Simulation
@@ -36,11 +49,14 @@ from mjsense.vector import TaskVectorEnv, make_vec
 # fmt: off
 __all__ = [
     *configs.__all__,
-    "BuiltinSensor", "CameraData", "CameraSensor", "ContactData", "ContactSensor", "DebugShapes", "EffectSensorCfg",
-    "Entity", "ImuData", "ImuSensor", "LidarSensor", "MoveGroup", "NativeSensor", "ObservationPipeline", "Policy", "RayCastData",
-    "RayCastSensor", "RecordProgress", "RecordSummary", "Recorder", "Robot", "RobotCamera", "Scene", "Sensor", "SensorData",
-    "SensorError", "SensorSpec", "SensorSuite", "Simulation", "Task", "TaskEnv", "TaskVectorEnv", "TerrainHeightSensor",
-    "UnknownNameError", "WorldState", "effects", "embedded_models", "make", "make_vec", "observations", "policy_names", "record",
-    "register_policy", "register_task", "robot_names", "task_names",
+    "BuiltinSensor", "CameraData", "CameraImageSensor", "CameraParameterSensor", "CameraSensor", "ContactData",
+    "ContactSensor", "DebugShapes", "EffectSensorCfg", "Entity", "EnvStatesSensor", "FunctionSensor",
+    "GraspStateSensor", "ImagePointsSensor", "ImuData", "ImuSensor", "JointPositionSensor", "JointVelocitySensor",
+    "LidarSensor", "MoveGroup", "NativeSensor", "ObservationPipeline", "Policy", "PoseSensor", "RayCastData",
+    "RayCastSensor", "RecordProgress", "RecordSummary", "Recorder", "Robot", "RobotBasePoseSensor", "RobotCamera",
+    "Scene", "Sensor", "SensorData", "SensorError", "SensorSpec", "SensorSuite", "Simulation", "Task", "TaskEnv",
+    "TaskVectorEnv", "TcpPoseSensor", "TerrainHeightSensor", "UnknownNameError", "WorldState", "effects",
+    "embedded_models", "make", "make_vec", "observations", "policy_names", "record", "register_policy", "register_task",
+    "robot_names", "task_names",
     "__version__",
 ]

@@ -6,8 +6,8 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable
 from typing import Any
 
+from mjsense._members import member
 from mjsense.policy import Policy, policy_of
-from mjsense.sensor import Sensor
 from mjsense.task import Task, task_of
 
 Tasks = str | Task | type[Task] | Callable[[], Task]
@@ -16,7 +16,7 @@ Policies = str | Policy | type[Policy] | Callable[[dict[str, Any]], Any] | None
 """A policy, a function from observations to actions, or its registered name."""
 
 
-def parts_of(options: dict[str, Any], sensors: Iterable[Sensor]) -> tuple[Task | None, Policy | None, list[Sensor]]:
+def parts_of(options: dict[str, Any], sensors: Iterable[Any]) -> tuple[Task | None, Policy | None, list[Any]]:
     """(task, policy, sensors) written in Python; the options get the names of all."""
     options["task"], task = task_of(options["task"])
     options["policy"], policy = policy_of(options["policy"])
@@ -24,10 +24,7 @@ def parts_of(options: dict[str, Any], sensors: Iterable[Sensor]) -> tuple[Task |
     if robot is None:
         robot = task.robot if task is not None else "franka"
     options["robot"] = "" if robot is None else str(robot)
-    own = list(sensors)
-    for sensor in [*own, *(task._mjs_make_sensors() if task else ()), *(policy._mjs_make_sensors() if policy else ())]:
-        if not isinstance(sensor, Sensor):
-            raise TypeError(f"not a mjsense.Sensor: {sensor!r}")
-        if sensor._mjs_row_spec() is None:
-            raise ValueError(f"sensor '{sensor.uuid}' cannot be recorded: give it an observation_space, or is_dict = True")
-    return task, policy, own
+    for part in (task, policy):
+        for sensor in part._mjs_make_sensors() if part else ():
+            member(sensor)
+    return task, policy, [member(sensor) for sensor in sensors]

@@ -6,13 +6,13 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 from mjsense import _core
 from mjsense._arguments import Seed, checked
 from mjsense._parts import Policies, Tasks, parts_of
 from mjsense.assets import use_installed_meshes
 from mjsense.ffmpeg import use_installed_ffmpeg
-from mjsense.sensor import Sensor
 from mjsense.simulation import Simulation
 
 
@@ -88,7 +88,7 @@ def record(
     preset: str = "veryfast",
     molmospaces_depth: bool = False,
     # end of options
-    sensors: Iterable[Sensor] = (),
+    sensors: Iterable[Any] = (),
     progress: Callable[[RecordProgress], None] | None = None,
 ) -> RecordSummary:
     """Plays episodes and keeps them as HDF5 and MP4 in ``out/house_<house>/``.
@@ -128,7 +128,9 @@ def record(
         preset: Effort of the video encoder, ultrafast to veryslow; see the file formats.
         molmospaces_depth: Also depth as MolmoSpaces' loaders read it: a lossy red-green video.
         Others:
-        sensors: of your own, with an observation_space or is_dict: recorded with the suite.
+        sensors: of your own, with an observation_space or is_dict, of the core suite, or written for MolmoSpaces: recorded with the
+            suite. An error of one in a world refuses that world's episode (see ``failures``); one that fails in every world from the
+            first observation on ends the recording.
         progress: called about ten times a second.
     """
     options = dict(locals())

@@ -13,7 +13,7 @@ import numpy as np
 
 from mjsense import _core
 from mjsense._arguments import KnownAttributes, Seed, checked
-from mjsense.sensor import NativeSensor, Sensor
+from mjsense.sensor import Sensor, as_sensor
 from mjsense.simulation import Simulation
 from mjsense.suite import SensorSuite
 
@@ -72,12 +72,11 @@ class Recorder(KnownAttributes):
             settings: what made the data, as JSON; kept in every file, and equal where a recording is resumed.
         """
         chosen = list(simulation.scene.sensors.values() if sensors is None else sensors)
+        chosen = [as_sensor(sensor) for sensor in chosen]
         for sensor in chosen:
-            if not isinstance(sensor, (NativeSensor, Sensor)):
-                raise TypeError(f"not a sensor: {sensor!r}")
-            if isinstance(sensor, Sensor) and sensor._mjs_core is None:
+            if (sensor._mjs_core if isinstance(sensor, Sensor) else sensor._core) is None:
                 simulation.add(sensor)
-            if isinstance(sensor, Sensor) and sensor._mjs_row_spec() is None:
+            if isinstance(sensor, Sensor) and not sensor._mjs_fields:
                 raise ValueError(f"sensor '{sensor.uuid}' cannot be recorded: give it an observation_space, or is_dict = True")
         SensorSuite(chosen)  # names are unique
         rate = _rate(fps, simulation)

@@ -21,7 +21,7 @@ from mjsense.contact import ContactSensor
 from mjsense.errors import UnknownNameError
 from mjsense.imu import ImuSensor
 from mjsense.raycast import CameraSensor, LidarSensor, RayCastSensor, TerrainHeightSensor
-from mjsense.sensor import BuiltinSensor, NativeSensor, Sensor
+from mjsense.sensor import BuiltinSensor, NativeSensor, Sensor, as_sensor
 
 _CLASSES = {
     "builtin": BuiltinSensor,
@@ -123,6 +123,8 @@ class Scene(KnownAttributes):
                 raise TypeError(f"{type(sensor).__name__}.build() must return a mjsense.Sensor, not {built!r}")
             built.uuid = getattr(sensor, "prefixed_name", "") or built.uuid or sensor.name
             return built
+        if hasattr(sensor, "get_observation") and not isinstance(sensor, NativeSensor):
+            return as_sensor(sensor)
         raise TypeError(f"sensors: neither a sensor configuration nor a mjsense.Sensor: {sensor!r}")
 
     def __repr__(self) -> str:

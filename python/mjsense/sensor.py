@@ -3,18 +3,21 @@
 
 from __future__ import annotations
 
+import copy
+import functools
 import inspect
 import json
 import weakref
 from collections.abc import Mapping, Sequence
 from types import MappingProxyType
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, ClassVar
 
 import gymnasium
 import numpy as np
 
 from mjsense import _core, data
 from mjsense._arguments import KnownAttributes, checked
+from mjsense._rows import Row, leaves, nested, rows_of_space, rows_of_value
 from mjsense.drawing import DebugShapes
 
 if TYPE_CHECKING:
@@ -71,6 +74,11 @@ class NativeSensor(KnownAttributes):
             raise RuntimeError(f"sensor '{self.name}' has no data yet: make a Simulation of its scene first")
         self._core.refresh(self._handle)
         return self._data
+
+    def _row(self, world: int) -> Any:
+        """The present value of one world, for the taker to keep."""
+        rows = {name: array[world].copy() for name, array in self.fields.items()}
+        return rows.get("", rows)
 
     @property
     def fields(self) -> Mapping[str, np.ndarray]:
@@ -130,18 +138,25 @@ def _box(spec: _core.SensorSpec) -> gymnasium.spaces.Box:
 class Sensor:
     """Base class of sensors written in Python. Write one of these methods, whichever suits:
 
-    - ``compute(sim)`` returns the rows of all worlds, an array ``[B, ...]``;
-    - ``_compute_data()`` the same, without an argument (as in mjlab);
-    - ``get_observation(env, task, batch_index=0)`` returns the row of one world (as in MolmoSpaces).
+    - ``compute(sim)`` returns the values of all worlds, ``[B, ...]``; ``compute(sim, world_ids)`` those of these worlds, in their order;
+    - ``_compute_data()`` the same as ``compute(sim)``, without an argument (as in mjlab);
+    - ``get_observation(env, task, batch_index=0)`` returns the value of one world (as in MolmoSpaces). `env` is
+      :attr:`mjsense.Simulation.env`; `task` is None but in recordings and environments.
 
-    The value is computed when it is read and not current, once for all. With an ``observation_space`` the rows are kept in one
-    array of its dtype and shape, which suites and recordings read; without one ``data`` is whatever you return.
+    The first two have one instance for all worlds, which keeps its state by world. The third has one instance a world: the one that is
+    given belongs to world 0, the others are deep copies of it, made when it comes to its simulation; its ``reset()`` has no arguments.
+    (With a ``reset(world_ids)`` it is one for all worlds, too.)
+
+    The value is computed when it is read and not current, once. With an ``observation_space`` the rows are kept in arrays of its dtype
+    and shape, which suites and recordings read; a value with another dtype or shape, or outside the bounds, is an error. Python's own
+    numbers and lists take the declared dtype. A ``gymnasium.spaces.Dict`` stands for a nested dict of arrays; for an empty one the arrays
+    are those of a first value. Without a space ``data`` is whatever you return.
     """
 
     uuid: str = ""
     """Name in scenes, suites and files."""
     observation_space: Any = None
-    """gymnasium space of one world's row: Box, Discrete, MultiBinary or MultiDiscrete."""
+    """gymnasium space of one world's value: Box, Discrete, MultiBinary, MultiDiscrete, or a Dict of such."""
     is_dict: bool = False
     """The value of a world is a dict, kept as JSON text of at most ``str_max_len`` bytes."""
     str_max_len: int = 2000
@@ -154,11 +169,14 @@ class Sensor:
     _mjs_sim_ref: Any = None
     _mjs_scene_ref: Any = None
     _mjs_value: Any = None
-    _mjs_rows: Any = None
+    _mjs_fields: list[Row] | None = None  # declared; [] if the value is a Python object only
+    _mjs_rows: Any = None  # a list: of each field, None without any
     _mjs_shown: Any = None
-    _mjs_pending_dt: float = 0.0
+    _mjs_instances: list[Any] | None = None  # by world; None: one computes all worlds at once
+    _mjs_faults: dict[int, SensorError] | None = None  # of reset(), by world, until the value is asked for
+    _mjs_worked: bool = False  # a row of it was right once
 
-    def __init__(self, uuid: str | None = None, observation_space: Any = None) -> None:
+    def __init__(self, uuid: str | None = None, observation_space: Any = None, **kwargs: Any) -> None:
         if uuid is not None:
             self.uuid = uuid
         if observation_space is not None:
@@ -176,22 +194,20 @@ class Sensor:
         """Called once the model is compiled: resolve names, allocate."""
 
     def compute(self, sim: Simulation) -> Any:
-        """Rows of all worlds, ``[B, ...]``."""
+        """Values of all worlds, ``[B, ...]``. It may run more than once a step (a world began anew): change state in update()."""
         if _overrides(self, "_compute_data"):
             value = self._compute_data()
             if value is None:
                 raise ValueError("_compute_data() returned None")
             return value
-        if _overrides(self, "get_observation"):
-            return [self.get_observation(sim, None, w) for w in range(sim.num_worlds)]
         raise NotImplementedError("write compute(sim), _compute_data() or get_observation(env, task, batch_index)")
 
     def _compute_data(self) -> Any:
         raise NotImplementedError
 
     def get_observation(self, env: Any, task: Any = None, batch_index: int = 0, *args: Any, **kwargs: Any) -> Any:
-        """Row of one world."""
-        return self.data[batch_index]
+        """Value of one world; called once for each state of it."""
+        return self._mjs_row(batch_index)
 
     def update(self, dt: float) -> None:
         """Called after every control step with its length (s), before the value of that step is computed."""
@@ -223,15 +239,15 @@ class Sensor:
 
     @property
     def data(self) -> Any:
-        """The present value, of all worlds."""
+        """The present value, of all worlds: an array ``[B, ...]``, a nested dict of such, a list of dicts by world (is_dict)."""
         if self._mjs_core is None:
             raise RuntimeError(f"sensor '{self.uuid}' has no data yet: it belongs to no simulation")
         self._mjs_core.refresh(self._mjs_handle)
         return self._mjs_value
 
     @property
-    def rows(self) -> np.ndarray:
-        """What a recording stores: ``[B, ...]``, for is_dict sensors JSON text in uint8 ``[B, str_max_len]``."""
+    def rows(self) -> Any:
+        """What a recording stores: ``[B, ...]``, or a nested dict of such; for is_dict sensors JSON text in uint8 ``[B, str_max_len]``."""
         if self._mjs_rows is None:
             raise RuntimeError(f"sensor '{self.uuid}' has no rows: give it an observation_space, or is_dict = True")
         self._mjs_core.refresh(self._mjs_handle)
@@ -241,25 +257,78 @@ class Sensor:
         """What ``debug_vis`` shows of this world."""
         return self.simulation.debug_shapes(world, self)
 
-    # ------------------------------------------------------------------------------- called by mjsense (the C++ adapter)
+    # ----------------------------------------------------------------------------------------- called by mjsense: its life
+
+    def _mjs_original(self) -> Any:
+        """The object whose methods are the user's."""
+        return self
+
+    def _mjs_by_world(self) -> bool:
+        """The user's method is get_observation()."""
+        return _overrides(self, "get_observation") and not (_overrides(self, "compute") or _overrides(self, "_compute_data"))
+
+    def _mjs_is_shared(self) -> bool:
+        """One instance serves all worlds."""
+        return not self._mjs_by_world() or (_overrides(self, "reset") and _takes(self.reset, 1))
 
     def _mjs_edit_spec(self) -> None:
         scene = self._mjs_scene_ref() if self._mjs_scene_ref else None
         if scene is not None:
-            self._mjs_call("edit_spec", scene.spec, scene)
+            self._mjs_call(self, "edit_spec", scene.spec, scene)
 
     def _mjs_bind(self, sim: Simulation, handle: _core.SensorHandle) -> None:
+        self._mjs_make_instances(sim)
         self._mjs_sim_ref, self._mjs_handle, self._mjs_core = weakref.ref(sim), handle, sim._core
-        self._mjs_rows = handle.arrays(writable=True).get("")
-        self._mjs_shown = handle.arrays().get("")
-        if not self.is_dict:
-            self._mjs_value = self._mjs_shown
-        self._mjs_call("initialize", sim, sim)
+        self._mjs_faults, self._mjs_worked = {}, False
+        if self._mjs_fields:
+            written, shown = handle.arrays(writable=True), handle.arrays()
+            self._mjs_rows = [written[row.name] for row in self._mjs_fields]
+            self._mjs_shown = nested(self._mjs_fields, [shown[row.name] for row in self._mjs_fields])
+        self._mjs_value = self._mjs_shown
+        if self.is_dict or (self._mjs_by_world() and not self._mjs_fields):
+            self._mjs_value = [None] * sim.num_worlds
+        for instance in self._mjs_originals():
+            self._mjs_call(instance, "initialize", sim, sim)
 
-    def _mjs_call(self, method: str, first: Any, owner: Any) -> None:
+    def _mjs_make_instances(self, sim: Simulation) -> None:
+        if not self._mjs_by_world():
+            if sim.num_worlds > 1 and _overrides(self, "reset") and not _takes(self.reset, 1):
+                raise TypeError(f"sensor '{self.uuid}': one instance computes all worlds, so its reset() must take world_ids")
+            return
+        first = self._mjs_original()
+        if self._mjs_is_shared():
+            self._mjs_instances = [first] * sim.num_worlds
+        elif self._mjs_instances is None or len(self._mjs_instances) != sim.num_worlds:
+            self._mjs_instances = [first] + [self._mjs_copy(sim, first) for _ in range(1, sim.num_worlds)]
+
+    def _mjs_copy(self, sim: Simulation, first: Any) -> Any:
+        """A sensor like it for another world. What it refers to of the simulation is the same one."""
+        kept = [sim, sim.scene, *sim.scene.sensors.values(), *sim._python]
+        kept += [value for name, value in vars(self).items() if name.startswith("_mjs_")]
+        kept.append(getattr(first, "observation_space", None))
+        if "model" in vars(sim.scene):
+            kept.append(sim.scene.model)
+        memo = {id(thing): thing for thing in kept if thing is not first}
+        try:
+            return copy.deepcopy(first, memo)
+        except Exception as error:
+            raise SensorError(
+                f"sensor '{self.uuid}': one instance a world is needed, and it cannot be copied "
+                f"({type(error).__name__}: {error}); give it a __deepcopy__, or a reset(world_ids) that keeps its state by world"
+            ) from error
+
+    def _mjs_originals(self) -> list[Any]:
+        """Every instance once."""
+        if self._mjs_instances is None or self._mjs_is_shared():
+            return [self._mjs_original()]
+        return self._mjs_instances
+
+    def _mjs_call(self, instance: Any, method: str, first: Any, owner: Any) -> None:
         """Calls edit_spec or initialize with our arguments or, where it takes more, with mjlab's."""
-        function = getattr(self, method)
-        wanted = len([p for p in inspect.signature(function).parameters.values() if p.default is p.empty and p.kind < 2])
+        function = getattr(instance, method, None)
+        if function is None:
+            return
+        wanted = len(_required(function))
         with _named(self, method):
             if method == "edit_spec" and wanted == 2:
                 function(first, owner._entities_of_spec())
@@ -268,9 +337,22 @@ class Sensor:
             else:
                 function(first)
 
-    def _mjs_reset(self, world_ids: list[int]) -> None:
+    def _mjs_reset(self, world_ids: list[int], seeds: Sequence[int] = ()) -> None:
+        if self._mjs_instances is not None and not self._mjs_is_shared():
+            with _Dice(seeds, world_ids, 1) as dice:
+                for world in world_ids:
+                    reset = getattr(self._mjs_instances[world], "reset", None)
+                    self._mjs_faults.pop(world, None)
+                    dice.seed(world)
+                    try:
+                        with _named(self, "reset", world):
+                            if reset is not None:
+                                reset()
+                    except SensorError as error:
+                        self._mjs_faults[world] = error
+            return
         with _named(self, "reset"):
-            if not inspect.signature(self.reset).parameters:
+            if not _takes(self.reset, 1):
                 self.reset()
             else:
                 self.reset(None if len(world_ids) == self.simulation.num_worlds else world_ids)
@@ -279,77 +361,301 @@ class Sensor:
         if not _overrides(self, "debug_vis"):
             raise ValueError(f"sensor '{self.uuid}' has nothing to draw: write debug_vis(visualizer)")
         with _named(self, "debug_vis"):
-            self.debug_vis(shapes)
+            (self._mjs_instances[shapes.env_idx] if self._mjs_instances else self).debug_vis(shapes)
 
-    def _mjs_update_pending(self) -> None:
-        if self._mjs_pending_dt:
-            dt, self._mjs_pending_dt = self._mjs_pending_dt, 0.0
-            with _named(self, "update"):
-                self.update(dt)
+    def _mjs_updates(self) -> bool:
+        """It wants to hear of every control step."""
+        return _overrides(self, "update")
 
-    def _mjs_compute_rows(self) -> None:
+    def _mjs_control_step(self, world_ids: list[int], dt: float, seeds: Sequence[int] = ()) -> list[tuple[int, SensorError]]:
         if self._mjs_sim_ref is None:
-            return  # the simulation is being made; initialize() has not been called
-        self._mjs_update_pending()
+            return []
+        if self._mjs_instances is None or self._mjs_is_shared():
+            with _named(self, "update"):
+                self._mjs_original().update(*((dt, world_ids) if _takes(self._mjs_original().update, 2) else (dt,)))
+            return []
+        faults = []
+        with self.simulation.env._asked() as env, _Dice(seeds, world_ids, 2) as dice:
+            for world in world_ids:
+                env.current_batch_index = world
+                dice.seed(world)
+                try:
+                    with _named(self, "update", world):
+                        self._mjs_instances[world].update(dt)
+                except SensorError as error:
+                    faults.append((world, error))
+        return faults
+
+    # ---------------------------------------------------------------------------------------- called by mjsense: its values
+
+    def _mjs_compute_rows(self, world_ids: list[int], seeds: Sequence[int] = ()) -> list[tuple[int, SensorError]]:
+        """Computes these worlds. Returns (world, error) of those whose value is wrong; raises where none can be right."""
+        if self._mjs_sim_ref is None:
+            return []  # the simulation is being made; initialize() has not been called
+        by_world = self._mjs_instances is not None
+        faults = self._mjs_compute_worlds(world_ids, seeds) if by_world else self._mjs_compute_batch(world_ids)
+        if len(faults) < len(world_ids):
+            self._mjs_worked = True
+        elif not self._mjs_worked and faults:
+            raise faults[0][1]  # it never works: no matter of single episodes
+        return faults
+
+    def _mjs_compute_worlds(self, world_ids: list[int], seeds: Sequence[int]) -> list[tuple[int, SensorError]]:
+        faults = []
+        with self.simulation.env._asked() as env, _Dice(seeds, world_ids, 0) as dice:
+            for world in world_ids:
+                env.current_batch_index = world
+                dice.seed(world)
+                try:
+                    if world in self._mjs_faults:
+                        raise self._mjs_faults.pop(world)
+                    with _named(self, "get_observation", world):
+                        value = _observe(self._mjs_instances[world], env, env.task, world)
+                        self._mjs_put(world, value)
+                except SensorError as error:
+                    faults.append((world, error))
+        return faults
+
+    def _mjs_observe(self, env: Any, task: Any, world: int) -> Any:
+        """Asks the instance of this world now."""
+        return _observe(self._mjs_instances[world] if self._mjs_instances else self._mjs_original(), env, task, world)
+
+    def _mjs_put(self, world: int, value: Any) -> None:
+        """Keeps the value of one world."""
+        if not self._mjs_fields:
+            self._mjs_value[world] = value
+        elif self.is_dict:
+            self._mjs_write_json(world, value)
+        else:
+            arrays = [row.array(leaf) for row, leaf in zip(self._mjs_fields, leaves(value, self._mjs_fields))]
+            for row, array in zip(self._mjs_fields, arrays):
+                for _, text in row.outside(array[None]):
+                    raise ValueError(text)
+            for rows, array in zip(self._mjs_rows, arrays):
+                rows[world] = array
+
+    def _mjs_compute_batch(self, world_ids: list[int]) -> list[tuple[int, SensorError]]:
         sim = self.simulation
         with _named(self, "compute"):
-            value = self.compute(sim)
-            if self._mjs_rows is None:
+            some = _takes(self.compute, 2)
+            value = self.compute(sim, list(world_ids)) if some else self.compute(sim)
+            of = world_ids if some else list(range(sim.num_worlds))
+            if self.is_dict:
+                return self._mjs_put_dicts(world_ids, of, list(value))
+            if not self._mjs_fields:
                 self._mjs_value = value
-            elif self.is_dict:
-                self._mjs_value = list(value)
-                self._mjs_write_json(self._mjs_value, sim.num_worlds)
-            else:
-                self._mjs_write_rows(value)
+                return []
+            values = leaves(value, self._mjs_fields)
+            arrays = [row.array(leaf, len(of)) for row, leaf in zip(self._mjs_fields, values)]
+        picked = [of.index(world) for world in world_ids] if len(of) != len(world_ids) else slice(None)
+        faults: dict[int, SensorError] = {}
+        for row, rows, array in zip(self._mjs_fields, self._mjs_rows, arrays):
+            rows[world_ids] = array[picked]
+            for i, text in row.outside(array[picked]):
+                faults.setdefault(world_ids[i], SensorError(f"sensor '{self.uuid}', world {world_ids[i]}: compute(): {text}"))
+        return sorted(faults.items())
 
-    def _mjs_write_rows(self, value: Any) -> None:
-        rows = self._mjs_rows
-        array = np.asarray(value)
-        if array.shape != rows.shape:
-            raise ValueError(f"shape {array.shape} is not {rows.shape}: B worlds, then the observation_space")
-        if not np.can_cast(array.dtype, rows.dtype, casting="same_kind"):
-            raise ValueError(f"{array.dtype} values do not fit the observation_space's {rows.dtype}")
-        rows[...] = array
+    def _mjs_put_dicts(self, world_ids: list[int], of: list[int], values: list[Any]) -> list[tuple[int, SensorError]]:
+        if len(values) != len(of):
+            raise ValueError(f"{len(values)} values for {len(of)} worlds")
+        faults = []
+        for world in world_ids:
+            try:
+                with _named(self, "compute", world):
+                    self._mjs_write_json(world, values[of.index(world)])
+            except SensorError as error:
+                faults.append((world, error))
+        return faults
 
-    def _mjs_write_json(self, values: list[Any], num_worlds: int) -> None:
-        if len(values) != num_worlds:
-            raise ValueError(f"{len(values)} values for {num_worlds} worlds")
-        for world, value in enumerate(values):
-            text = encode_json(value)
-            if len(text) > self.str_max_len:
-                raise ValueError(f"world {world}: JSON text of {len(text)} bytes, str_max_len is {self.str_max_len}")
-            self._mjs_rows[world] = 0
-            self._mjs_rows[world, : len(text)] = np.frombuffer(text, np.uint8)
+    def _mjs_write_json(self, world: int, value: Any) -> None:
+        text = encode_json(value)
+        if len(text) > self.str_max_len:
+            raise ValueError(f"JSON text of {len(text)} bytes, str_max_len is {self.str_max_len}")
+        row = self._mjs_rows[0][world]
+        row[:] = 0
+        row[: len(text)] = np.frombuffer(text, np.uint8)
+        self._mjs_value[world] = value
 
-    def _mjs_row_spec(self) -> dict[str, Any] | None:
+    def _mjs_row(self, world: int) -> Any:
+        """The present value of one world, for the taker to keep."""
+        value = self.data
+        if self._mjs_fields and not self.is_dict:
+            return nested(self._mjs_fields, [np.array(array[world]) for array in leaves(value, self._mjs_fields)])
+        return copy.copy(value[world])
+
+    def _mjs_probe(self, sim: Simulation) -> None:
+        """Finds the arrays of values that the space leaves open, from a copy's value of world 0 as it is now."""
+        space = self.observation_space
+        if self.is_dict or not isinstance(space, gymnasium.spaces.Dict) or space.spaces or not self._mjs_by_world():
+            return
+        probe = self._mjs_copy(sim, self._mjs_original())
+        try:
+            with sim.env._asked() as env:
+                env.current_batch_index = 0
+                value = _observe(probe, env, env.task, 0)
+        except Exception as error:
+            raise SensorError(
+                f"sensor '{self.uuid}': its observation_space names no arrays, and it has no value yet to find them in "
+                f"({type(error).__name__}: {error}): declare a Dict of Boxes"
+            ) from error
+        self._mjs_fields = rows_of_value(value)
+
+    def _mjs_declared(self) -> list[Row]:
+        if self.is_dict:
+            return [Row((), (int(self.str_max_len),), np.dtype(np.uint8))]
+        if self._mjs_fields is not None and self._mjs_fields[:1] and not rows_of_space(self.observation_space):
+            return self._mjs_fields  # found by a probe
+        try:
+            return rows_of_space(self.observation_space)
+        except TypeError as error:
+            raise TypeError(f"sensor '{self.uuid}': {error}") from None
+
+    def _mjs_row_specs(self) -> list[dict[str, Any]]:
+        """What C++ needs to know of the rows."""
         if not self.uuid:
             raise ValueError(f"{type(self).__name__} has no uuid")
-        common = {"unit": self.unit, "frame": self.frame, "description": (type(self).__doc__ or "").strip().split("\n")[0]}
-        if self.is_dict:
-            return {"dtype": "uint8", "shape": [self.str_max_len], "is_dict": True, "low": 0, "high": 255, **common}
-        space = self.observation_space
-        if space is None or getattr(space, "shape", None) is None or getattr(space, "dtype", None) is None:
-            return None
-        dtype = np.dtype(space.dtype).name
-        return {
-            "dtype": {"int8": "int32", "int16": "int32", "float16": "float32"}.get(dtype, dtype),
-            "shape": list(space.shape),
-            "is_dict": False,
-            "low": float(np.min(getattr(space, "low", -np.inf))),
-            "high": float(np.max(getattr(space, "high", np.inf))),
-            **common,
-        }
+        self._mjs_fields = self._mjs_declared()
+        description = (type(self._mjs_original()).__doc__ or "").strip().split("\n")[0]
+        specs = []
+        for row in self._mjs_fields:
+            low, high = (0.0, 255.0) if self.is_dict else row.bounds()
+            try:
+                kept = row.kept
+            except ValueError as error:
+                raise ValueError(f"sensor '{self.uuid}': {error}") from None
+            specs.append({
+                "name": row.name, "dtype": kept, "shape": list(row.shape), "low": low, "high": high, "is_dict": self.is_dict,
+                "unit": self.unit, "frame": self.frame, "description": description,
+            })  # fmt: skip
+        return specs
+
+
+class ForeignSensor(Sensor):
+    """A sensor of another library, made for MolmoSpaces: any object with a uuid and ``get_observation(env, task, batch_index)``."""
+
+    def __init__(self, original: Any) -> None:
+        self.original = original
+        """The object that was given; world 0's."""
+        self.uuid = original.uuid
+        self.observation_space = getattr(original, "observation_space", None)
+        self.is_dict = bool(getattr(original, "is_dict", False))
+        self.str_max_len = int(getattr(original, "str_max_len", Sensor.str_max_len))
+        self.unit, self.frame = str(getattr(original, "unit", "")), str(getattr(original, "frame", ""))
+
+    def __repr__(self) -> str:
+        return f"<{type(self.original).__name__} '{self.uuid}'>"
+
+    def get_observation(self, env: Any, task: Any = None, batch_index: int = 0, *args: Any, **kwargs: Any) -> Any:
+        instance = self._mjs_instances[batch_index] if self._mjs_instances else self.original
+        return _observe(instance, env, task, batch_index)
+
+    def _mjs_original(self) -> Any:
+        return self.original
+
+    def _mjs_by_world(self) -> bool:
+        return True
+
+    def _mjs_is_shared(self) -> bool:
+        reset = getattr(self.original, "reset", None)
+        return reset is not None and bool(_required(reset))
+
+    def _mjs_reset(self, world_ids: list[int], seeds: Sequence[int] = ()) -> None:
+        if not self._mjs_is_shared():
+            return super()._mjs_reset(world_ids, seeds)
+        with _named(self, "reset"):
+            self.original.reset(world_ids)
+
+    def _mjs_call(self, instance: Any, method: str, first: Any, owner: Any) -> None:
+        """It has no edit_spec or initialize of ours."""
+
+    def _mjs_updates(self) -> bool:
+        update = getattr(self.original, "update", None)
+        return callable(update) and len(_required(update)) == 1
+
+
+def as_sensor(thing: Any) -> Any:
+    """A sensor of ours, or one of another library as one; TypeError for anything else."""
+    if isinstance(thing, (Sensor, NativeSensor)):
+        return thing
+    if isinstance(thing, type):
+        raise TypeError(f"not a sensor but a class: make one, {thing.__name__}(...)")
+    if callable(getattr(thing, "get_observation", None)) and isinstance(getattr(thing, "uuid", None), str):
+        return ForeignSensor(thing)
+    raise TypeError(f"not a mjsense.Sensor, nor an object with a uuid and get_observation(env, task, batch_index): {thing!r}")
 
 
 def _overrides(sensor: Sensor, method: str) -> bool:
     return getattr(type(sensor), method) is not getattr(Sensor, method)
 
 
-class _named:
-    """Errors of user code say which sensor and which of its methods failed; the traceback stays."""
+@functools.lru_cache(maxsize=1024)
+def _parameters_of(function: Any) -> tuple[inspect.Parameter, ...]:
+    try:
+        return tuple(inspect.signature(function).parameters.values())
+    except (TypeError, ValueError):
+        return ()
 
-    def __init__(self, sensor: Sensor, method: str) -> None:
-        self.place = f"sensor '{sensor.uuid}': {method}()"
+
+def _parameters(function: Any) -> tuple[inspect.Parameter, ...]:
+    """Those that a call gives."""
+    return _parameters_of(function.__func__)[1:] if inspect.ismethod(function) else _parameters_of(function)
+
+
+def _required(function: Any) -> list[inspect.Parameter]:
+    """Positional parameters without a default."""
+    return [p for p in _parameters(function) if p.default is p.empty and p.kind < 2]
+
+
+def _takes(function: Any, count: int) -> bool:
+    """It has so many positional parameters."""
+    return len([p for p in _parameters(function) if p.kind < 2]) >= count
+
+
+def _observe(instance: Any, env: Any, task: Any, world: int) -> Any:
+    """Calls get_observation() as MolmoSpaces does."""
+    function = instance.get_observation
+    names = {p.name for p in _parameters(function)}
+    if "batch_index" in names or any(p.kind is p.VAR_KEYWORD for p in _parameters(function)):
+        return function(env, task, batch_index=world)
+    return function(env, task)
+
+
+class _Dice:
+    """NumPy's global random numbers while sensors are asked: a stream of their own for each world and moment, the same in whatever world
+    and beside whatever others an episode runs; those of the program go on as if nothing had happened."""
+
+    _own: ClassVar[list[Any]] = []  # a generator for each level: a sensor may read another one while it is asked
+    _depth: ClassVar[int] = 0
+
+    def __init__(self, seeds: Sequence[int], world_ids: Sequence[int], occasion: int) -> None:
+        self._seeds = {world: (seed + occasion) % 2**32 for world, seed in zip(world_ids, seeds)}
+        self._before: Any = None
+
+    def __enter__(self) -> _Dice:
+        if self._seeds:
+            if _Dice._depth == len(self._own):
+                self._own.append(np.random.MT19937(0))
+            self._before = np.random.get_bit_generator()
+            np.random.set_bit_generator(self._own[_Dice._depth])
+            _Dice._depth += 1
+        return self
+
+    def seed(self, world: int) -> None:
+        if self._seeds:
+            np.random.seed(self._seeds[world])
+
+    def __exit__(self, *exception: object) -> None:
+        if self._seeds:
+            _Dice._depth -= 1
+            np.random.set_bit_generator(self._before)
+
+
+class _named:
+    """Errors of user code say which sensor, world and method failed; the traceback stays."""
+
+    def __init__(self, sensor: Sensor, method: str, world: int | None = None) -> None:
+        place = "" if world is None else f", world {world}"
+        self.place = f"sensor '{sensor.uuid}'{place}: {method}()"
 
     def __enter__(self) -> None: ...
 
@@ -359,7 +665,7 @@ class _named:
 
 
 class SensorError(RuntimeError):
-    """Code of a sensor written in Python failed; ``__cause__`` is its exception."""
+    """Code of a sensor written in Python failed, or its value is not what it declares; ``__cause__`` is its exception."""
 
 
 class BuiltinSensor(NativeSensor):

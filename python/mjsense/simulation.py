@@ -14,8 +14,9 @@ from mjsense import _core
 from mjsense._arguments import KnownAttributes, Seed, checked
 from mjsense.drawing import DebugShapes
 from mjsense.errors import UnknownNameError
+from mjsense.peer_env import PeerEnv
 from mjsense.scene import Scene
-from mjsense.sensor import NativeSensor, Sensor
+from mjsense.sensor import NativeSensor, Sensor, as_sensor
 
 _IDS = {"geom_matid": "nmat", "flex_matid": "nmat", "mat_texid": "ntex"}
 """Fields of ids that sensors follow, and how many there are."""
@@ -57,17 +58,24 @@ class Simulation(KnownAttributes):
         self._adopt(scene)
 
     @classmethod
-    def _of(cls, core: Any, prepared: Scene | None = None) -> Simulation:
-        """Of a C++ simulation that something else steps; ``prepared``: what its scene was made of, if Python did."""
+    def _of(cls, core: Any, prepared: Scene | None = None, view: Any = None) -> Simulation:
+        """Of a C++ simulation that something else steps.
+
+        Args:
+            prepared: what its scene was made of, if Python did.
+            view: of the task that is played in it.
+        """
         self = cls.__new__(cls)
         self._core = core
         scene = Scene._of(core.scene(), prepared)
         scene._simulation = core
-        self._adopt(scene)
+        self._adopt(scene, view)
         return self
 
-    def _adopt(self, scene: Scene) -> None:
+    def _adopt(self, scene: Scene, view: Any = None) -> None:
         self.scene = scene
+        self._view = view
+        self._env: PeerEnv | None = None
         self.num_worlds: int = self._core.num_worlds
         """B."""
         self.decimation: int = self._core.decimation
@@ -107,16 +115,7 @@ class Simulation(KnownAttributes):
 
     def step(self, control_steps: int = 1) -> None:
         """Advances every world by control steps of ``decimation`` substeps each."""
-        updated = [sensor for sensor in self._python if type(sensor).update is not Sensor.update]
-        if not updated:
-            self._core.step(control_steps)
-            return
-        for _ in range(control_steps):
-            for sensor in updated:
-                sensor._mjs_pending_dt += self.step_dt
-            self._core.step(1)
-            for sensor in updated:
-                sensor._mjs_update_pending()
+        self._core.step(control_steps)
 
     def reset(self, world_ids: Sequence[int] | None = None, *, seed: Seed | None = None, key: int | str | None = None) -> None:
         """Begins a new episode.
@@ -177,6 +176,13 @@ class Simulation(KnownAttributes):
     mocap_quat = _state_property("mocap_quat", "Mocap orientations [B, nmocap, 4].")
     eq_active = _state_property("eq_active", "Which equality constraints are active [B, neq].")
     userdata = _state_property("userdata", "User data [B, nuserdata].")
+
+    @property
+    def env(self) -> PeerEnv:
+        """The worlds as sensors written for MolmoSpaces see them: what ``get_observation(env, task, batch_index)`` is given."""
+        if self._env is None:
+            self._env = PeerEnv(self, self._view)
+        return self._env
 
     @property
     def data(self) -> DerivedFields:
@@ -256,12 +262,24 @@ class Simulation(KnownAttributes):
 
     # --------------------------------------------------------------------------------------------------------- sensors
 
-    def add(self, sensor: Sensor) -> Sensor:
-        """Adds a sensor that is not part of the scene, for suites; returns it."""
-        if not isinstance(sensor, Sensor):
-            raise TypeError(f"not a mjsense.Sensor: {sensor!r}")
+    def add(self, sensor: Any) -> Any:
+        """Adds a sensor that is not part of the scene, for suites; returns it.
+
+        It may be one of your own, one of the core suite (:class:`mjsense.PoseSensor`), or an object of another library with a uuid and
+        ``get_observation(env, task, batch_index)``, for which a sensor that wraps it is returned.
+        """
+        sensor = as_sensor(sensor)
+        if isinstance(sensor, NativeSensor):
+            if sensor._core is not None:
+                raise RuntimeError(f"sensor '{sensor.uuid}' belongs to a simulation already")
+            if not hasattr(sensor, "_make"):
+                raise TypeError(f"sensor '{sensor.uuid}' belongs to a scene")
+            self._core.add_native(sensor._make(self))
+            sensor._bind(self._core)
+            return sensor
         if sensor._mjs_core is not None:
             raise RuntimeError(f"sensor '{sensor.uuid}' belongs to a simulation already")
+        sensor._mjs_probe(self)
         self._own(sensor, self._core.add_sensor(sensor))
         return sensor
 
@@ -337,9 +355,9 @@ class Simulation(KnownAttributes):
     def update_sensors(self, dt: float = 0.0) -> None:
         """One update of the sensors' per-substep state (air time, history), after step_raw(1). dt 0: the timestep."""
         for sensor in self._python:
-            if type(sensor).update is not Sensor.update:
-                sensor._mjs_pending_dt += dt or self.physics_dt
-                sensor._mjs_update_pending()
+            if sensor._mjs_updates():
+                for _, error in sensor._mjs_control_step(list(range(self.num_worlds)), dt or self.physics_dt):
+                    raise error
         self._core.update_sensors(dt)
 
     def reset_sensors(self, world_ids: Sequence[int] | None = None) -> None:

@@ -7,11 +7,10 @@ from collections.abc import Iterable, Iterator, Sequence
 from typing import Any
 
 import gymnasium
-import numpy as np
 
 from mjsense._arguments import KnownAttributes, checked
 from mjsense.errors import UnknownNameError
-from mjsense.sensor import NativeSensor, Sensor
+from mjsense.sensor import Sensor, as_sensor
 
 
 @checked
@@ -28,9 +27,8 @@ class SensorSuite(KnownAttributes):
         self.extend(sensors)
 
     def add(self, sensor: Any) -> None:
-        """Adds a sensor of the scene or one of your own."""
-        if not isinstance(sensor, (Sensor, NativeSensor)):
-            raise TypeError(f"not a sensor: {sensor!r}")
+        """Adds a sensor of the scene, of the core suite, one of your own, or one written for MolmoSpaces."""
+        sensor = as_sensor(sensor)
         uuid = sensor.uuid
         if not uuid:
             raise ValueError(f"{type(sensor).__name__} has no uuid")
@@ -76,12 +74,13 @@ class SensorSuite(KnownAttributes):
 
         Args:
             env: a Simulation, or anything that has one as ``sim``.
-            task: handed to get_observation() of your sensors.
+            task: one of yours, to hand to get_observation() of the sensors that have it. Without one such a sensor's value is that of
+                ``data``: asked for once a state.
             batch_index: one world; all of them if not given.
         """
         sim = getattr(env, "sim", env)
         for sensor in self.sensors.values():
-            if isinstance(sensor, Sensor) and sensor._mjs_core is None:
+            if (sensor._mjs_core if isinstance(sensor, Sensor) else sensor._core) is None:
                 sim.add(sensor)
         if batch_index is None:
             sim.refresh(list(self.sensors.values()))
@@ -90,15 +89,10 @@ class SensorSuite(KnownAttributes):
             raise ValueError(f"batch_index {batch_index}: must be in [0, {sim.num_worlds})")
         out = {}
         for uuid, sensor in self.sensors.items():
-            if isinstance(sensor, Sensor) and type(sensor).get_observation is not Sensor.get_observation:
-                out[uuid] = sensor.get_observation(env, task, batch_index)
+            if isinstance(sensor, Sensor) and task is not None and sensor._mjs_by_world():
+                out[uuid] = sensor._mjs_observe(sim.env if env is sim else env, task, batch_index)
             elif isinstance(sensor, Sensor):
-                out[uuid] = _copied(sensor.data[batch_index])
+                out[uuid] = sensor._mjs_row(batch_index)
             else:
-                rows = {name: array[batch_index].copy() for name, array in sensor.fields.items()}
-                out[uuid] = rows.get("", rows)
+                out[uuid] = sensor._row(batch_index)
         return out
-
-
-def _copied(row: Any) -> Any:
-    return row.copy() if isinstance(row, np.ndarray) else row

@@ -17,7 +17,7 @@ from mjsense._arguments import Seed, checked
 from mjsense._parts import Policies, Tasks, parts_of
 from mjsense._streams import choose_streams, nest, stream_path
 from mjsense.assets import use_installed_meshes
-from mjsense.sensor import Sensor, _box
+from mjsense.sensor import _box
 from mjsense.simulation import Simulation
 from mjsense.task import group_slices
 
@@ -254,7 +254,7 @@ def make_vec(
     *,
     policy: Policies = None,
     observations: Sequence[str] | None = None,
-    sensors: Iterable[Sensor] = (),
+    sensors: Iterable[Any] = (),
     # options of a recording
     num_envs: int = 1,
     threads: int = 0,
@@ -280,7 +280,8 @@ def make_vec(
         robot: a registered name (:func:`robot_names`) or the path of a ``.toml``; None is the task's own.
         policy: what :meth:`TaskVectorEnv.expert_action` asks: a :class:`Policy`, a function or a registered name.
         observations: names of sensors ("qpos") or of single streams ("qpos/arm") to observe; if not given, all that are numbers.
-        sensors: of your own, with an observation_space or is_dict: observed with the suite.
+        sensors: of your own, as in :func:`record`: observed with the suite. An error of one in a world ends that world's episode:
+            ``truncated``, and ``info["fault"]`` says why.
 
         Options:
         num_envs: How many run at one time.

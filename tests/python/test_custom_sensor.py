@@ -23,7 +23,7 @@ class Height(mjs.Sensor):
 
     def compute(self, sim):
         self.calls += 1
-        return sim.qpos[:, 2:3]
+        return sim.qpos[:, 2:3].astype(np.float32)
 
 
 class HeightOfMjlab(mjs.Sensor):
@@ -158,6 +158,91 @@ class Broken(mjs.Sensor):
         return np.ones(sim.num_worlds)
 
 
+def test_one_instance_for_all_worlds_hears_which_begin_anew():
+    class Wipes(Height):
+        def reset(self):
+            pass
+
+    mjs.Simulation(ball_scene(Wipes()), num_worlds=1)
+    with pytest.raises(TypeError, match=r"'height': one instance computes all worlds, so its reset\(\) must take world_ids"):
+        mjs.Simulation(ball_scene(Wipes()), num_worlds=2)
+
+
+def test_values_of_some_worlds():
+    class Some(mjs.Sensor):
+        uuid = "some"
+        observation_space = gymnasium.spaces.Dict({"id": gymnasium.spaces.Discrete(3), "in": gymnasium.spaces.Dict({"x": BOX})})
+
+        def __init__(self):
+            super().__init__()
+            self.asked, self.heard = [], []
+
+        def compute(self, sim, world_ids):
+            self.asked.append(world_ids)
+            return {"id": np.array(world_ids), "in": {"x": np.full((len(world_ids), 1), len(self.asked), np.float32)}}
+
+        def update(self, dt, world_ids):
+            self.heard.append((dt, world_ids))
+
+    sensor = Some()
+    sim = mjs.Simulation(ball_scene(sensor), num_worlds=3)
+    assert sensor.data["id"].tolist() == [0, 1, 2]
+    sim.reset([1])
+    np.testing.assert_array_equal(sensor.data["in"]["x"][:, 0], [1, 2, 1])
+    sim.step()
+    assert sensor.asked == [[0, 1, 2], [1], [0, 1, 2]] and sensor.heard == [(sim.step_dt, [0, 1, 2])]
+    assert sensor.rows["id"].dtype == np.int64
+
+
+def test_bounds_are_kept_world_by_world():
+    class Bounded(mjs.Sensor):
+        uuid = "bounded"
+        observation_space = gymnasium.spaces.Box(np.array([0, -np.inf]), np.array([1, np.inf]), dtype=np.float64)
+        value = (0.5, np.nan)
+
+        def get_observation(self, env, task, batch_index=0):
+            return np.array(self.value if batch_index == 1 else [0.5, np.nan])
+
+    sensor = Bounded()
+    sim = mjs.Simulation(ball_scene(sensor), num_worlds=2)
+    assert np.isnan(sensor.data[:, 1]).all()
+    for value, text in [((2.0, 0.0), "2.0 at [0] is outside the observation_space's [0.0, 1.0]"), ((np.nan, 0), "nan at [0]")]:
+        sensor._mjs_instances[1].value = value
+        sim.invalidate()
+        with pytest.raises(mjs.SensorError) as error:
+            sensor.data
+        assert str(error.value).startswith("sensor 'bounded', world 1: get_observation(): ValueError: " + text)
+
+
+def test_wrong_keys():
+    class Keys(mjs.Sensor):
+        uuid = "keys"
+        observation_space = gymnasium.spaces.Dict({"a": BOX, "b": BOX})
+
+        def get_observation(self, env, task, batch_index=0):
+            return {"a": [1.0], "c": [2.0]}
+
+    sim = mjs.Simulation(ball_scene())
+    with pytest.raises(mjs.SensorError, match="keys are not the observation_space's: missing b; unknown c"):
+        sim.add(Keys()).data
+
+
+def test_one_sensor_may_ask_another():
+    class Outer(mjs.Sensor):
+        uuid = "outer"
+        observation_space = BOX
+
+        def get_observation(self, env, task, batch_index=0):
+            inner = env.scene["height"].data[batch_index]
+            assert env.current_batch_index == batch_index
+            return inner
+
+    sim = mjs.Simulation(ball_scene(Outer(), HeightOfMolmo()), num_worlds=3)
+    sim.qpos[:, 2] = [1, 2, 3]
+    sim.forward()
+    np.testing.assert_array_equal(sim.scene["outer"].data[:, 0], [1, 2, 3])
+
+
 def test_errors_name_the_sensor_and_leave_the_simulation_usable():
     sensor = Broken()
     sim = mjs.Simulation(ball_scene(sensor), num_worlds=2)
@@ -184,6 +269,11 @@ def test_errors_name_the_sensor_and_leave_the_simulation_usable():
         (np.zeros((3, 1)), r"shape \(3, 1\) is not \(2, 1\)"),
         (np.zeros(2), "shape"),
         (np.array([["a"], ["b"]]), "do not fit"),
+        (np.zeros((2, 1)), "float64 values do not fit the observation_space's float32"),
+        (np.zeros((2, 1), np.int32), "int32 values do not fit"),
+        ([[1.0], [np.float64(1)]], "float64 values do not fit"),
+        ([[True], ["a"]], "do not fit"),
+        ({"a": np.zeros((2, 1), np.float32)}, "shape"),
         (None, "shape"),
     ],
 )

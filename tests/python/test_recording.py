@@ -22,7 +22,7 @@ class Hand(mjs.Sensor):
     unit = "m"
 
     def compute(self, sim):
-        return sim.data.xpos[:, :3, 2]
+        return sim.data.xpos[:, :3, 2].astype(np.float32)
 
 
 @pytest.fixture(scope="module")

@@ -30,9 +30,9 @@ void JsonSensor::compute(const World& world) {
   JsonWriter json(fields()[0].data.row<std::uint8_t>(world.id));
   write(world, json);
   if (!json.finish()) {
-    throw RowTooLong(
-        world.id, fmt::format("sensor '{}', world {}: its text needs {} bytes, str_max_len is {}",
-                              name(), world.id, json.size(), spec_.str_max_len));
+    throw RowError(world.id,
+                   fmt::format("sensor '{}', world {}: its text needs {} bytes, str_max_len is {}",
+                               name(), world.id, json.size(), spec_.str_max_len));
   }
 }
 

@@ -6,17 +6,11 @@
 
 #include <string>
 
-#include "mjsense/core/error.h"
 #include "mjsense/core/json.h"
+#include "mjsense/core/row_error.h"
 #include "mjsense/core/sensor.h"
 
 namespace mjsense {
-
-// A JSON text that is longer than its row. Never cut: the episode of this world cannot be recorded.
-struct RowTooLong : ValueError {
-  RowTooLong(int world, const std::string& message) : ValueError(message), world(world) {}
-  int world;
-};
 
 class JsonSensor : public Sensor {
  public:
@@ -24,7 +18,8 @@ class JsonSensor : public Sensor {
   std::string_view kind() const override { return "json"; }
 
   void initialize(const SensorInit& init) override;
-  // Throws RowTooLong with the sensor, the size and the limit.
+  // Throws RowError with the sensor, the size and the limit where the text is longer than its row: it
+  // is never cut.
   void compute(const World& world) final;
 
  protected:

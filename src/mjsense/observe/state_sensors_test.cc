@@ -84,8 +84,9 @@ TEST(JsonFunction, RefusesTextThatIsTooLongAtTheMomentItIs) {
   try {
     info.compute(w.world());
     FAIL();
-  } catch (const RowTooLong& e) {
-    EXPECT_EQ(e.world, 0);
+  } catch (const RowError& e) {
+    ASSERT_EQ(e.faults.size(), 1u);
+    EXPECT_EQ(e.faults[0].world, 0);
     EXPECT_STREQ(e.what(),
                  "sensor 'task_info', world 0: its text needs 24 bytes, str_max_len is 16");
   }

@@ -239,6 +239,14 @@ House::House(const fs::path& dir, const std::string& fingerprint, bool resume)
   if (!ended_ && static_cast<int>(published_.size()) == batches_.count) end();
 }
 
+House::~House() {
+  const bool published = std::ranges::any_of(published_, [](bool p) { return p; });
+  if (ended_ || published || !decisions_.kept_by_episode.empty()) return;
+  end();
+  std::error_code not_empty;
+  fs::remove(dir_, not_empty);
+}
+
 bool House::load_published(const std::string& fingerprint) {
   bool any = false;
   for (const fs::path& path : entries(dir_)) {

@@ -54,6 +54,11 @@ class House {
   // is a different one, or another process records into it; RuntimeError when the directory cannot
   // be written.
   House(const std::filesystem::path& dir, const std::string& fingerprint, bool resume);
+  // A recording in which nothing was decided leaves nothing behind: what failed at its first step
+  // blocks nobody.
+  ~House();
+  House(const House&) = delete;
+  House& operator=(const House&) = delete;
 
   const std::filesystem::path& dir() const { return dir_; }
   std::filesystem::path part_dir(std::int64_t episode) const;

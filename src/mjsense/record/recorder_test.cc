@@ -77,6 +77,28 @@ TEST(Recorder, ResumingGivesTheFilesOfAnUninterruptedRun) {
             record(broken.path, 6, {.worlds = 2}, true, [&](RecordingCfg& c) { c.resume = true; }));
 }
 
+// What ended before anything was decided blocks nobody; what was decided stays.
+TEST(Recorder, ARecordingInWhichNothingWasDecidedLeavesNothing) {
+  TempDir dir;
+  FakeSuite suite({2, 16, 12, true, true});
+  for (const bool begun : {false, true}) {
+    {
+      Recorder recorder(fake_recording(dir.path, suite, 2, 4));
+      if (begun) recorder.begin_episode(1, {.episode = 0});
+    }
+    EXPECT_TRUE(tree(dir.path).empty());
+    EXPECT_FALSE(fs::exists(dir.path / "house_0"));
+  }
+  {
+    Recorder recorder(fake_recording(dir.path, suite, 2, 4));
+    recorder.begin_episode(0, {.episode = 0});
+    recorder.discard_episode(0, "no");
+  }
+  EXPECT_TRUE(fs::exists(dir.path / "house_0/.recording/recording.json"));
+  EXPECT_THAT(error_of([&] { Recorder again(fake_recording(dir.path, suite, 2, 4)); }),
+              HasSubstr("unfinished recording"));
+}
+
 // Killed while its episodes were being published: some videos have their final names already, the
 // file of trajectories is not there. Whoever comes next ends it, and nothing can be added any more.
 TEST(Recorder, AnInterruptedPublicationIsEnded) {

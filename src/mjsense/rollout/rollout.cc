@@ -8,7 +8,7 @@
 #include <functional>
 
 #include "mjsense/core/error.h"
-#include "mjsense/observe/json_sensor.h"
+#include "mjsense/core/row_error.h"
 #include "mjsense/rollout/action_sensors.h"
 #include "mjsense/rollout/episode_cameras.h"
 #include "mjsense/sensors/camera/camera_sensor_cfg.h"
@@ -100,6 +100,7 @@ Rollout::Rollout(RolloutCfg cfg, std::shared_ptr<Task> task, std::shared_ptr<Pol
 }
 
 void Rollout::make() {
+  if (cfg_.making) cfg_.making(*this);
   camera_system_ = std::make_unique<CameraSystem>(choose_cameras(*task_, cfg_));
   cameras_ = recorded_cameras(*camera_system_);
   SceneCfg scene_cfg = task_->whole_scene_cfg();
@@ -312,15 +313,19 @@ void Rollout::step_chunk(std::span<const Action> actions, bool stop_on_success) 
   finish_rows();
 }
 
-// A row that does not fit ends the episode of its world alone.
+// A row that cannot be filled ends the episode of its world alone.
 bool Rollout::guard_rows(const std::function<void()>& body) {
   try {
     body();
     return true;
-  } catch (const RowTooLong& e) {
-    if (!active_[e.world] || !faults_[e.world].empty()) throw;
-    set_fault(e.world, e.what());
-    refused_[e.world] = true;
+  } catch (const RowError& e) {
+    for (const RowError::Fault& fault : e.faults) {
+      if (!active_[fault.world] || !faults_[fault.world].empty()) throw;
+    }
+    for (const RowError::Fault& fault : e.faults) {
+      set_fault(fault.world, fault.text);
+      refused_[fault.world] = true;
+    }
     return false;
   }
 }

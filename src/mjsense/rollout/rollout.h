@@ -69,8 +69,8 @@ struct RolloutCfg {
   // Makes further sensors for the suite, recorded like the others. The rollout is being made: task,
   // policy, simulation, cameras and the suite so far are there.
   std::function<std::vector<std::shared_ptr<Sensor>>(Rollout&)> more_sensors;
-  // Called once everything is there.
-  std::function<void(Rollout&)> made;
+  // Called when there is nothing but task and policy, and once everything is there.
+  std::function<void(Rollout&)> making, made;
 };
 template <class V>
 void visit_fields(V& v, RolloutCfg& c) {
@@ -171,10 +171,10 @@ class Rollout {
   void step_chunk(std::span<const Action> actions, bool stop_on_success = false);
 
   const Evaluation& evaluation(int world) const { return evaluations_[world]; }
-  // Why this world's episode cannot go on: physics that diverged (MuJoCo's text), a row that does
-  // not fit. "" if it can. Its rows mean nothing until it is started again.
+  // Why this world's episode cannot go on: physics that diverged (MuJoCo's text), a row that could
+  // not be filled. "" if it can. Its rows mean nothing until it is started again.
   const std::string& fault(int world) const { return faults_[world]; }
-  // The fault is a row that does not fit: nothing of this episode may be kept.
+  // The fault is a row that could not be filled: nothing of this episode may be kept.
   bool refused(int world) const { return refused_[world]; }
 
   const RolloutTimes& times() const { return times_; }

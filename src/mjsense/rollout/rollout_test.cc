@@ -10,6 +10,7 @@
 #include <nlohmann/json.hpp>
 
 #include "mjsense/core/error.h"
+#include "mjsense/core/row_error.h"
 #include "mjsense/core/testing/allocations.h"
 #include "mjsense/observe/function_sensor.h"
 #include "mjsense/record/molmospaces.h"
@@ -352,6 +353,50 @@ TEST(Rollout, ARowThatDoesNotFitEndsItsEpisodeAlone) {
   EXPECT_EQ(rollout.fault(0), "");
   EXPECT_FALSE(rollout.refused(0));
   EXPECT_EQ(row(rollout, "task_info", 0)["episode_step"], 5);
+}
+
+// Fills its rows in one go, but for two worlds at one step.
+struct Batch final : Sensor {
+  explicit Batch(const Task& task) : Sensor("batch"), task(task) {}
+  std::string_view kind() const override { return "batch"; }
+  Stage stage() const override { return Stage::kBatch; }
+  void initialize(const SensorInit& init) override {
+    add_field("", {.dtype = DType::kInt64}, init.num_worlds);
+    computed.assign(init.num_worlds, 0);
+  }
+  void compute(const World& /*world*/) override {}
+  void cast(const CastContext& context) override {
+    std::vector<RowError::Fault> faults;
+    for (int w : context.ids) {
+      ++computed[w];
+      if (w != 1 && task.episode_step(w) == 2)
+        faults.push_back({w, fmt::format("sensor 'batch', world {}: no row", w)});
+    }
+    if (!faults.empty()) throw RowError(faults);
+  }
+  const Task& task;
+  std::vector<int> computed;
+};
+
+TEST(Rollout, RowsThatCannotBeFilledEndTheirEpisodesAlone) {
+  RolloutCfg cfg = blind(3);
+  std::shared_ptr<Batch> batch;
+  cfg.more_sensors = [&](Rollout& rollout) {
+    batch = std::make_shared<Batch>(rollout.task());
+    return std::vector<std::shared_ptr<Sensor>>{batch};
+  };
+  Rollout rollout(cfg);
+  start(rollout, {0, 1, 2}, {0, 1, 2});
+  for (int t = 0; t < 4; ++t) {
+    rollout.act();
+    rollout.step();
+  }
+  for (int w : {0, 2}) {
+    EXPECT_EQ(rollout.fault(w), fmt::format("sensor 'batch', world {}: no row", w));
+    EXPECT_TRUE(rollout.refused(w));
+  }
+  EXPECT_EQ(rollout.fault(1), "");
+  EXPECT_THAT(batch->computed, ElementsAre(3, 5, 3));  // no row was computed twice
 }
 
 TEST(Rollout, WrongNamesAndNumbersAreOneClearLine) {

@@ -5,10 +5,13 @@
 
 #include <algorithm>
 #include <chrono>
+#include <exception>
 #include <functional>
 #include <numeric>
 
+#include "mjsense/core/control_step.h"
 #include "mjsense/core/error.h"
+#include "mjsense/core/row_error.h"
 #include "mjsense/rays/ray_scene.h"
 
 namespace mjsense {
@@ -36,6 +39,8 @@ template <class Body>
 void guarded(const Sensor& sensor, Body&& body) {
   try {
     body();
+  } catch (const RowError&) {
+    throw;  // names it
   } catch (const Error& e) {
     const std::string named = fmt::format("'{}'", sensor.name());
     if (std::string_view(e.what()).find(named) != std::string_view::npos) throw;
@@ -51,6 +56,28 @@ void guarded(const Sensor& sensor, Body&& body) {
   }
 }
 
+// Runs `first`, then `next` until it returns false: what has happened is told to all, whatever rows
+// could not be filled. Then the first fault is thrown.
+template <class First, class Next>
+void after_all(First&& first, Next&& next) {
+  std::exception_ptr fault;
+  const auto keep = [&](auto&& body) {
+    try {
+      return body();
+    } catch (const RowError&) {
+      if (!fault) fault = std::current_exception();
+      return true;
+    }
+  };
+  keep([&] {
+    first();
+    return true;
+  });
+  while (keep(next)) {
+  }
+  if (fault) std::rethrow_exception(fault);
+}
+
 }  // namespace
 
 // A sensor and where its rows stand.
@@ -61,6 +88,7 @@ struct Simulation::Slot {
   std::vector<double> compute_s;       // by world
   double cast_s = 0;
   mjtStage needs = mjSTAGE_ACC;
+  ControlStepListener* listener = nullptr;  // the sensor, if it is one
   int phase = 0;        // passes that must come before: 1 + that of an input which casts
   bool casts = false;   // stage kCast or kBatch: finished by cast()
   bool read = false;    // since the last step
@@ -218,6 +246,7 @@ void Simulation::initialize(Sensor& sensor) {
   guarded(sensor, [&] { sensor.initialize(init); });
   auto slot = std::make_unique<Slot>();
   slot->sensor = &sensor;
+  slot->listener = dynamic_cast<ControlStepListener*>(&sensor);
   slot->computed.assign(cfg_.num_worlds, 0);
   slot->compute_s.assign(cfg_.num_worlds, 0.0);
   slot->casts = sensor.stage() == Stage::kCast || sensor.stage() == Stage::kBatch;
@@ -280,7 +309,15 @@ void Simulation::compute(std::span<Slot* const> slots, std::span<const int> ids,
     } else {
       switch (change) {
         case Change::kStep:
-          worlds_->step(cfg_.decimation, hooks, ids);
+          after_all([&] { worlds_->step(cfg_.decimation, hooks, ids); },
+                    // By number: one that hears of it may add others.
+                    [&, i = std::size_t{0}]() mutable {
+                      if (i == slots_.size()) return false;
+                      const Slot& slot = *slots_[i++];
+                      if (slot.listener)
+                        guarded(*slot.sensor, [&] { slot.listener->control_step(ids); });
+                      return true;
+                    });
           break;
         case Change::kForward:
           worlds_->forward(ids, hooks);
@@ -307,7 +344,15 @@ void Simulation::cast(std::span<Slot* const> slots, std::span<const int> ids, in
       }
       if (due->ids.empty()) continue;
       const Timer timer(measure_cost_);
-      guarded(*slot->sensor, [&] { slot->sensor->cast({rays_.get(), due->ids, *pool_}); });
+      try {
+        guarded(*slot->sensor, [&] { slot->sensor->cast({rays_.get(), due->ids, *pool_}); });
+      } catch (const RowError& e) {
+        for (int w : due->ids) {
+          if (std::ranges::find(e.faults, w, &RowError::Fault::world) == e.faults.end())
+            slot->computed[w] = version_[w];
+        }
+        throw;
+      }
       slot->cast_s += timer.seconds();
       for (int w : due->ids) slot->computed[w] = version_[w];
     }

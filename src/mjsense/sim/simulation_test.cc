@@ -9,7 +9,9 @@
 #include <utility>
 #include <vector>
 
+#include "mjsense/core/control_step.h"
 #include "mjsense/core/error.h"
+#include "mjsense/core/row_error.h"
 #include "mjsense/core/testing/allocations.h"
 #include "mjsense/sensors/raycast/raycast_sensor.h"
 
@@ -220,6 +222,89 @@ TEST(Simulation, EagerSensorsAndTheirInputsRunEveryControlStep) {
   EXPECT_THAT(filter->computes, Each(5));
   EXPECT_THAT(in->computes, Each(5));
   EXPECT_THAT(filter->substeps, Each(15));
+}
+
+// One that counts control steps, and cannot fill the rows of some worlds.
+struct Stepped final : Sensor, ControlStepListener {
+  explicit Stepped(std::string name) : Sensor(std::move(name)) {}
+  std::string_view kind() const override { return "stepped"; }
+  Stage stage() const override { return Stage::kBatch; }
+  void initialize(const SensorInit& init) override {
+    add_field("", {.shape = {1}}, init.num_worlds);
+    steps.assign(init.num_worlds, 0);
+    casts.assign(init.num_worlds, 0);
+  }
+  void compute(const World& /*world*/) override {}
+  void control_step(std::span<const int> ids) override {
+    for (int w : ids) ++steps[w];
+    if (!fail_step.empty()) throw RowError(fail_step);
+  }
+  void cast(const CastContext& context) override {
+    std::vector<RowError::Fault> faults;
+    for (int w : context.ids) {
+      ++casts[w];
+      steps_at_cast = steps;
+      for (const RowError::Fault& fault : fail) {
+        if (fault.world == w) faults.push_back(fault);
+      }
+    }
+    if (!faults.empty()) throw RowError(faults);
+  }
+  std::vector<int> steps, casts, steps_at_cast;
+  std::vector<RowError::Fault> fail, fail_step;
+};
+
+TEST(Simulation, TellsSensorsOfEveryControlStepBeforeTheirRows) {
+  Simulation sim(scene(), {.num_worlds = 3, .decimation = 2});
+  auto sensor = std::make_shared<Stepped>("s");
+  sim.add(sensor);
+  sim.step(2);  // also of one that nobody reads
+  EXPECT_THAT(sensor->steps, Each(2));
+  EXPECT_THAT(sensor->casts, Each(0));
+  sim.refresh(*sensor);
+  const int ids[] = {0, 2};
+  sim.step(1, ids);
+  EXPECT_THAT(sensor->steps, ElementsAre(3, 2, 3));
+  EXPECT_EQ(sensor->steps_at_cast, sensor->steps);
+  sim.reset();
+  sim.forward();
+  sim.invalidate();
+  sim.refresh(*sensor);
+  EXPECT_THAT(sensor->steps, ElementsAre(3, 2, 3));
+}
+
+TEST(Simulation, RowsThatCannotBeFilledAreAskedForAgainTheOthersNot) {
+  Simulation sim(scene(), {.num_worlds = 4});
+  auto first = std::make_shared<Stepped>("first"), second = std::make_shared<Stepped>("second");
+  sim.add(first);
+  sim.add(second);
+  sim.refresh(*first);
+  sim.refresh(*second);
+  first->fail = {{1, "sensor 'first', world 1: no"}, {3, "sensor 'first', world 3: no"}};
+  first->fail_step = {{2, "sensor 'first', world 2: no"}};
+  try {
+    sim.step();
+    FAIL();
+  } catch (const RowError& e) {
+    EXPECT_STREQ(e.what(), "sensor 'first', world 2: no");
+  }
+  EXPECT_THAT(first->steps, Each(1));
+  EXPECT_THAT(second->steps, Each(1));  // heard of it all the same
+  try {
+    sim.refresh(*first);
+    FAIL();
+  } catch (const RowError& e) {
+    ASSERT_EQ(e.faults.size(), 2u);
+    EXPECT_EQ(e.faults[1].world, 3);
+  }
+  EXPECT_THAT(first->casts, Each(2));
+  EXPECT_THROW(sim.refresh(*first), RowError);
+  EXPECT_THAT(first->casts, ElementsAre(2, 3, 2, 3));
+  const int ids[] = {0, 2};
+  Sensor* both[] = {first.get(), second.get()};
+  sim.refresh(both, ids);
+  EXPECT_THAT(first->casts, ElementsAre(2, 3, 2, 3));
+  EXPECT_THAT(second->casts, ElementsAre(2, 1, 2, 1));
 }
 
 TEST(Simulation, CastsAfterComputingAndFiltersAfterCasts) {

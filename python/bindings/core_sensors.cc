@@ -1,0 +1,118 @@
+// SPDX-License-Identifier: Apache-2.0
+// The sensors of the core suite for Python's: python/mjsense/core_sensors.py makes public classes of
+// them, which resolve names.
+
+#include <nanobind/nanobind.h>
+#include <nanobind/stl/pair.h>
+#include <nanobind/stl/string.h>
+#include <nanobind/stl/tuple.h>
+#include <nanobind/stl/vector.h>
+
+#include <memory>
+#include <tuple>
+#include <utility>
+#include <vector>
+
+#include "mjsense/observe/camera_parameters.h"
+#include "mjsense/observe/env_states.h"
+#include "mjsense/observe/image_points.h"
+#include "mjsense/observe/joint_state.h"
+#include "mjsense/observe/pose_sensor.h"
+#include "mjsense/observe/shared_field.h"
+#include "mjsense/robots/grasp_state.h"
+#include "python/bindings/bindings.h"
+#include "python/bindings/sensor_handle.h"
+
+namespace mjsense::python {
+
+namespace nb = nanobind;
+
+namespace {
+
+// (name, addresses in qpos, addresses in qvel)
+using Group = std::tuple<std::string, std::vector<int>, std::vector<int>>;
+
+std::vector<JointGroup> groups_of(const std::vector<Group>& groups) {
+  std::vector<JointGroup> all;
+  for (const auto& [name, qpos, dof] : groups) all.push_back({name, qpos, dof});
+  return all;
+}
+
+SensorHandle joint_state(const std::string& name, bool velocity, const std::vector<Group>& groups) {
+  using What = JointStateSensor::What;
+  return {std::make_shared<JointStateSensor>(name, velocity ? What::kVelocity : What::kPosition,
+                                             groups_of(groups))};
+}
+
+// A frame: (type, name).
+using Frame = std::pair<std::string, std::string>;
+
+SensorHandle pose(const std::string& name, const Frame& frame, const Frame& reference,
+                  const std::string& description) {
+  return {std::make_shared<PoseSensor>(name, PoseSensor::Ref{frame.first, frame.second},
+                                       PoseSensor::Ref{reference.first, reference.second},
+                                       description)};
+}
+
+SensorHandle camera_parameters(const std::string& name, const std::string& camera, int width,
+                               int height) {
+  return {std::make_shared<CameraParameterSensor>(name, camera, width, height)};
+}
+
+SensorHandle env_states(const std::string& name, const std::string& articulation,
+                        const std::vector<Group>& groups, int length, const std::string& robot_body,
+                        const std::string& robot) {
+  return {std::make_shared<EnvStatesSensor>(name, articulation, groups_of(groups), length,
+                                            robot_body, robot)};
+}
+
+SensorHandle grasp_state(const std::string& name, const std::string& object,
+                         const std::vector<std::pair<std::string, std::string>>& grippers) {
+  std::vector<GraspStateSensor::Gripper> all;
+  for (const auto& [gripper, body] : grippers) all.push_back({gripper, body});
+  return {std::make_shared<GraspStateSensor>(name, BodyRef(object), std::move(all))};
+}
+
+// objects: (key, body, erode); cameras: (name, sensor of the scene, skip erosion).
+SensorHandle image_points(const std::string& name,
+                          const std::vector<std::tuple<std::string, std::string, bool>>& objects,
+                          nb::list cameras) {
+  std::vector<ImagePointsSensor::Object> bodies;
+  for (const auto& [key, body, erode] : objects) bodies.push_back({key, BodyRef(body), erode});
+  std::vector<ImagePointsSensor::Camera> views;
+  for (nb::handle camera : cameras) {
+    views.push_back({.name = nb::cast<std::string>(camera[0]),
+                     .sensor = nb::cast<SensorHandle&>(camera[1]).sensor.get(),
+                     .skip_erosion = nb::cast<bool>(camera[2])});
+  }
+  return {std::make_shared<ImagePointsSensor>(name, std::move(bodies), std::move(views))};
+}
+
+SensorHandle shared_field(const std::string& name, const SensorHandle& source,
+                          const std::string& field) {
+  return {std::make_shared<SharedField>(name, *source.sensor, field, [field](SensorSpec& spec) {
+    if (field == "rgb") spec.storage = Storage::kRgbVideo;
+    if (field == "depth") {
+      spec.storage = Storage::kDepthVideo;
+      spec.shape = {spec.shape[0], spec.shape[1]};
+    }
+  })};
+}
+
+}  // namespace
+
+void bind_core_sensors(nb::module_& m) {
+  m.def("make_joint_state", &joint_state, nb::arg("name"), nb::arg("velocity"), nb::arg("groups"));
+  m.def("make_pose", &pose, nb::arg("name"), nb::arg("frame"), nb::arg("reference"),
+        nb::arg("description"));
+  m.def("make_camera_parameters", &camera_parameters, nb::arg("name"), nb::arg("camera"),
+        nb::arg("width"), nb::arg("height"));
+  m.def("make_env_states", &env_states, nb::arg("name"), nb::arg("articulation"), nb::arg("groups"),
+        nb::arg("length"), nb::arg("robot_body"), nb::arg("robot"));
+  m.def("make_grasp_state", &grasp_state, nb::arg("name"), nb::arg("object"), nb::arg("grippers"));
+  m.def("make_image_points", &image_points, nb::arg("name"), nb::arg("objects"),
+        nb::arg("cameras"));
+  m.def("make_shared_field", &shared_field, nb::arg("name"), nb::arg("source"), nb::arg("field"));
+}
+
+}  // namespace mjsense::python

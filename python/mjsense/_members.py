@@ -1,0 +1,36 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Sensors of the user's as members of a rollout's suite: a recording, an environment."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from typing import TYPE_CHECKING, Any
+
+from mjsense.sensor import NativeSensor, Sensor, as_sensor
+
+if TYPE_CHECKING:
+    from mjsense.simulation import Simulation
+
+
+def member(thing: Any) -> Any:
+    """A sensor that may become one; TypeError or ValueError if it cannot."""
+    sensor = as_sensor(thing)
+    if isinstance(sensor, NativeSensor) and not hasattr(sensor, "_make"):
+        raise ValueError(f"sensor '{sensor.uuid}' belongs to a scene: give its values as a sensor of your own")
+    return sensor
+
+
+def prepare(sim: Simulation, sensors: Iterable[Any]) -> list[Any]:
+    """What C++ adds to the suite: a Sensor, or the handle of one that it computes itself. The simulation keeps them alive."""
+    members = []
+    for sensor in map(member, sensors):
+        if not isinstance(sensor, Sensor):
+            members.append(sensor._make(sim))
+            continue
+        sensor._mjs_core = None  # it may have been in a recording before
+        sensor._mjs_probe(sim)
+        if not sensor._mjs_row_specs():
+            raise ValueError(f"sensor '{sensor.uuid}' cannot be recorded: give it an observation_space, or is_dict = True")
+        members.append(sensor)
+        sim._python.append(sensor)
+    return members

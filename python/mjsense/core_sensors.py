@@ -1,0 +1,387 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The sensors of the core suite as classes: put them into a SensorSuite, a Simulation, a recording."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from types import MappingProxyType
+from typing import TYPE_CHECKING, Any
+
+import mujoco
+
+from mjsense import _core
+from mjsense._arguments import checked
+from mjsense._streams import nest
+from mjsense.errors import UnknownNameError
+from mjsense.sensor import NativeSensor, Sensor
+
+if TYPE_CHECKING:
+    from mjsense.simulation import Simulation
+
+
+class CoreSensor(NativeSensor):
+    """Base: a sensor that C++ computes, made when it comes to its simulation."""
+
+    def __init__(self, uuid: str, kind: str) -> None:
+        if not uuid:
+            raise ValueError(f"{type(self).__name__} has no uuid")
+        self._handle: Any = None
+        self._core: Any = None
+        self._data: Any = None
+        self._fields: Mapping[str, Any] = {}
+        self.name: str = uuid
+        self.kind: str = kind
+        self.cfg: Any = None
+
+    def _make(self, sim: Simulation) -> _core.SensorHandle:
+        """The C++ sensor for this simulation, which is then to be added to it."""
+        self._handle, self._core, self._fields = self._build(sim), sim._core, {}
+        return self._handle
+
+    def _build(self, sim: Simulation) -> _core.SensorHandle:
+        raise NotImplementedError
+
+    def _bind(self, core: _core.Simulation) -> None:
+        self._core = core
+        self._fields = MappingProxyType(self._handle.arrays())
+        self._data = _nested(self._fields)
+
+    def _row(self, world: int) -> Any:
+        return _nested(super()._row(world))
+
+    @property
+    def data(self) -> Any:
+        """The present values: an array ``[B, ...]``, or a dict of them by field, nested as the fields' names are."""
+        if self._core is None:
+            raise RuntimeError(f"sensor '{self.name}' has no data yet: it belongs to no simulation")
+        if not self._fields:
+            self._bind(self._core)
+        return super().data
+
+    @property
+    def specs(self) -> dict[str, _core.SensorSpec]:
+        """What each field is: dtype, shape, unit, frame. A sensor with one field calls it ''."""
+        if self._handle is None:
+            raise RuntimeError(f"sensor '{self.name}' has no fields yet: it belongs to no simulation")
+        return super().specs
+
+
+def _nested(fields: Any) -> Any:
+    if not isinstance(fields, Mapping):
+        return fields
+    return fields[""] if "" in fields else nest({name: tuple(name.split("/")) for name in fields}, dict(fields))
+
+
+def _sim_groups(sim: Simulation, place: str, groups: Mapping[str, Sequence[str]] | None) -> list[tuple[str, list[int], list[int]]]:
+    """Addresses of the joints of each group; without groups those of the robot, or all joints as one."""
+    model = sim.model
+    if groups is None and sim._view is not None:
+        return [(g["name"], g["qpos"], g["dofs"]) for g in sim._view.groups()]
+    if groups is None:
+        return [("joints", list(range(model.nq)), list(range(model.nv)))]
+    out = []
+    for name, joints in groups.items():
+        qpos: list[int] = []
+        dofs: list[int] = []
+        for joint in joints:
+            i = _id(model, mujoco.mjtObj.mjOBJ_JOINT, joint, f"{place}: group '{name}'")
+            sizes = {mujoco.mjtJoint.mjJNT_FREE: (7, 6), mujoco.mjtJoint.mjJNT_BALL: (4, 3)}
+            nq, nv = sizes.get(mujoco.mjtJoint(model.jnt_type[i]), (1, 1))
+            qpos += range(model.jnt_qposadr[i], model.jnt_qposadr[i] + nq)
+            dofs += range(model.jnt_dofadr[i], model.jnt_dofadr[i] + nv)
+        out.append((name, [int(a) for a in qpos], [int(a) for a in dofs]))
+    return out
+
+
+def _id(model: mujoco.MjModel, kind: mujoco.mjtObj, name: str, place: str) -> int:
+    found = mujoco.mj_name2id(model, kind, name)
+    if found >= 0:
+        return found
+    counts = {mujoco.mjtObj.mjOBJ_JOINT: model.njnt, mujoco.mjtObj.mjOBJ_BODY: model.nbody, mujoco.mjtObj.mjOBJ_CAMERA: model.ncam}
+    names = [mujoco.mj_id2name(model, kind, i) or "" for i in range(counts[kind])]
+    raise UnknownNameError(_core.unknown_name(place, kind.name[6:].lower(), name, names))
+
+
+@checked
+class JointPositionSensor(CoreSensor):
+    """Joint positions, one field a group: float32 ``[B, n]``, rad or m."""
+
+    _velocity = False
+
+    def __init__(self, groups: Mapping[str, Sequence[str]] | None = None, uuid: str = "qpos") -> None:
+        """
+        Args:
+            groups: full names of the joints by group; if not given the robot's move groups, in a plain simulation all joints as one.
+            uuid: name in suites and files.
+        """
+        super().__init__(uuid, "joint_state")
+        self._groups = None if groups is None else {name: list(joints) for name, joints in groups.items()}
+        self._complete = True
+
+    def _build(self, sim: Simulation) -> _core.SensorHandle:
+        return _core.make_joint_state(self.name, self._velocity, _sim_groups(sim, f"sensor '{self.name}'", self._groups))
+
+
+@checked
+class JointVelocitySensor(JointPositionSensor):
+    """Joint velocities, one field a group: float32 ``[B, n]``, rad/s or m/s."""
+
+    _velocity = True
+
+    def __init__(self, groups: Mapping[str, Sequence[str]] | None = None, uuid: str = "qvel") -> None:
+        """
+        Args:
+            groups: full names of the joints by group; if not given the robot's move groups, in a plain simulation all joints as one.
+            uuid: name in suites and files.
+        """
+        super().__init__(groups, uuid)
+
+
+@checked
+class PoseSensor(CoreSensor):
+    """Pose of a body or site, float32 ``[B, 7]``: position (m), quaternion (wxyz), in the world or in another frame."""
+
+    def __init__(
+        self,
+        uuid: str,
+        *,
+        body: str | None = None,
+        site: str | None = None,
+        reference_body: str | None = None,
+        reference_site: str | None = None,
+        description: str = "",
+    ) -> None:
+        """
+        Args:
+            uuid: name in suites and files.
+            body, site: whose pose, one of them: the full name, ``robot/tool``.
+            reference_body, reference_site: in whose frame; the world without.
+            description: one sentence.
+        """
+        super().__init__(uuid, "pose")
+        if (body is None) == (site is None) or (reference_body is not None and reference_site is not None):
+            raise ValueError(f"sensor '{uuid}': needs a body or a site, and at most one reference")
+        self._frames = [
+            ("body", b) if b is not None else ("site", s) if s is not None else ("", "")
+            for b, s in ((body, site), (reference_body, reference_site))
+        ]
+        self._description = description
+        self._complete = True
+
+    def _build(self, sim: Simulation) -> _core.SensorHandle:
+        return _core.make_pose(self.name, *self._frames, self._description)
+
+
+@checked
+class TcpPoseSensor(CoreSensor):
+    """Pose of a gripper's tool in the robot's base frame, which stands on the floor: float32 ``[B, 7]``, m and wxyz. Needs a robot."""
+
+    def __init__(self, gripper: str | None = None, uuid: str = "tcp_pose") -> None:
+        """
+        Args:
+            gripper: its move group; the first if not given.
+            uuid: name in suites and files.
+        """
+        super().__init__(uuid, "pose")
+        self._gripper = gripper
+        self._complete = True
+
+    def _build(self, sim: Simulation) -> _core.SensorHandle:
+        grippers = {g["name"]: g for g in _robot(sim, self).groups() if g["kind"] == "gripper"}
+        name = self._gripper or next(iter(grippers), "")
+        if name not in grippers:
+            raise UnknownNameError(_core.unknown_name(f"sensor '{self.name}'", "gripper", name, list(grippers)))
+        site, body = sim.model.site(grippers[name]["leaf_site"]).name, sim.model.body(sim._view.base_body).name
+        return _core.make_pose(self.name, ("site", site), ("body", body), "Pose of the tool in the robot's base frame.")
+
+
+@checked
+class RobotBasePoseSensor(CoreSensor):
+    """Pose of the robot's base in the world: float32 ``[B, 7]``, m and wxyz. Needs a robot."""
+
+    def __init__(self, uuid: str = "robot_base_pose") -> None:
+        """
+        Args:
+            uuid: name in suites and files.
+        """
+        super().__init__(uuid, "pose")
+        self._complete = True
+
+    def _build(self, sim: Simulation) -> _core.SensorHandle:
+        body = sim.model.body(_robot(sim, self).base_body).name
+        return _core.make_pose(self.name, ("body", body), ("", ""), "Pose of the robot's base, on the floor.")
+
+
+@checked
+class EnvStatesSensor(CoreSensor):
+    """What it takes to put the scene back: every free body outside the robot, and the robot's joints.
+
+    Fields ``actors/<body>`` float32 ``[B, 13]`` (m, wxyz, m/s, rad/s: MuJoCo's qpos and qvel of the free joint);
+    ``articulations/<name>`` float64 ``[B, nq + nv]`` of the robot and of every body with joints inside; and, where it is asked for,
+    MolmoSpaces' ``articulations/<articulation>`` float32 ``[B, length]`` (qpos of all groups, then their qvel, then zeros).
+    """
+
+    def __init__(
+        self,
+        groups: Mapping[str, Sequence[str]] | None = None,
+        articulation: str = "",
+        length: int = 0,
+        robot_body: str = "",
+        robot: str = "robot",
+        uuid: str = "env_states",
+    ) -> None:
+        """
+        Args:
+            groups: full names of the robot's joints by group; if not given its move groups, in a plain simulation none.
+            articulation: what MolmoSpaces' field is called; "": there is none.
+            length: of its row; 0: what the groups need.
+            robot_body: free bodies at or below it are no actors; the robot's base if not given.
+            robot: what the robot's field is called; "": no fields of bodies with joints inside.
+            uuid: name in suites and files.
+        """
+        super().__init__(uuid, "env_states")
+        self._groups = None if groups is None else {name: list(joints) for name, joints in groups.items()}
+        self._rest = articulation, length, robot_body, robot
+        self._complete = True
+
+    def _build(self, sim: Simulation) -> _core.SensorHandle:
+        articulation, length, body, robot = self._rest
+        groups = self._groups if self._groups is not None or sim._view is not None else {}
+        if not body and sim._view is not None and sim._view.base_body > 0:
+            body = sim.model.body(sim._view.base_body).name
+        addresses = _sim_groups(sim, f"sensor '{self.name}'", groups)
+        return _core.make_env_states(self.name, articulation, addresses, length, body, robot)
+
+
+@checked
+class CameraParameterSensor(CoreSensor):
+    """Where a camera is and how it projects: fields ``cam2world_gl`` float64 ``[B, 4, 4]`` (axes right, down, forward), ``extrinsic_cv``
+    ``[B, 3, 4]``, ``intrinsic_cv`` ``[B, 3, 3]`` (pixels)."""
+
+    def __init__(self, camera: str, width: int = 640, height: int = 480, uuid: str | None = None) -> None:
+        """
+        Args:
+            camera: full name of the camera in the model, ``robot/wrist``; in recordings also that of its stream.
+            width, height: of the picture, pixels.
+            uuid: name in suites and files; ``sensor_param_<camera>`` if not given.
+        """
+        super().__init__(uuid or f"sensor_param_{camera}", "camera_parameters")
+        self._camera, self._size = camera, (width, height)
+        self._complete = True
+
+    def _build(self, sim: Simulation) -> _core.SensorHandle:
+        streams = {} if sim._view is None else {c["name"]: c["mjcf_camera"] for c in sim._view.cameras()}
+        camera = streams.get(self._camera, self._camera)
+        _id(sim.model, mujoco.mjtObj.mjOBJ_CAMERA, camera, f"sensor '{self.name}'")
+        return _core.make_camera_parameters(self.name, camera, *self._size)
+
+
+@checked
+class CameraImageSensor(CoreSensor):
+    """One field of a camera of the scene under a name of the suite, without a copy: rgb uint8 ``[B, H, W, 3]``, depth float32 ``[B, H, W]``."""
+
+    def __init__(self, camera: str, field: str = "rgb", uuid: str | None = None) -> None:
+        """
+        Args:
+            camera: name of the scene's camera sensor.
+            field: one of its ``data_types``.
+            uuid: name in suites and files; the camera's, with ``_<field>`` but for rgb, if not given.
+        """
+        super().__init__(uuid or (camera if field == "rgb" else f"{camera}_{field}"), "shared")
+        self._camera, self._field = camera, field
+        self._complete = True
+
+    def _build(self, sim: Simulation) -> _core.SensorHandle:
+        return _core.make_shared_field(self.name, _camera(sim, self, self._camera)._handle, self._field)
+
+
+@checked
+class ImagePointsSensor(CoreSensor):
+    """Up to ten pixels that show each object in each camera: fields ``<object>/<camera>/points`` float32 ``[B, 10, 2]`` (fractions of the
+    picture, NaN where there is none) and ``num_points`` int32 ``[B, 1]``."""
+
+    def __init__(self, objects: Mapping[str, str], cameras: Sequence[str], thin: Sequence[str] = (), uuid: str = "object_image_points") -> None:
+        """
+        Args:
+            objects: full names of bodies by the key of the object.
+            cameras: names of the scene's camera sensors, which have a segmentation.
+            thin: keys of objects whose points may lie on their rim.
+            uuid: name in suites and files.
+        """
+        super().__init__(uuid, "image_points")
+        self._objects, self._cameras, self._thin = dict(objects), list(cameras), set(thin)
+        self._complete = True
+
+    def _build(self, sim: Simulation) -> _core.SensorHandle:
+        cameras = [(name, _camera(sim, self, name)._handle, False) for name in self._cameras]
+        return _core.make_image_points(self.name, [(k, b, k not in self._thin) for k, b in self._objects.items()], cameras)
+
+
+@checked
+class GraspStateSensor(CoreSensor):
+    """Whether grippers touch and hold an object: fields ``<gripper>/held`` and ``<gripper>/touching``, bool ``[B]``. Held: it touches
+    nothing else."""
+
+    def __init__(self, object: str, grippers: Mapping[str, str] | None = None, uuid: str | None = None) -> None:
+        """
+        Args:
+            object: full name of its body.
+            grippers: full names of root bodies by gripper; the robot's if not given.
+            uuid: name in suites and files; ``grasp_state_<object>`` if not given.
+        """
+        super().__init__(uuid or f"grasp_state_{object}", "grasp_state")
+        self._object, self._grippers = object, grippers
+        self._complete = True
+
+    def _build(self, sim: Simulation) -> _core.SensorHandle:
+        grippers = self._grippers
+        if grippers is None:
+            found = [g for g in _robot(sim, self).groups() if g["kind"] == "gripper"]
+            grippers = {g["name"]: sim.model.body(g["root_body"]).name for g in found}
+        return _core.make_grasp_state(self.name, self._object, list(grippers.items()))
+
+
+def _robot(sim: Simulation, sensor: CoreSensor) -> _core.TaskView:
+    if sim._view is None:
+        raise ValueError(f"sensor '{sensor.name}' needs a robot, which simulations of recordings and make_vec have: name it yourself")
+    return sim._view
+
+
+def _camera(sim: Simulation, sensor: CoreSensor, name: str) -> NativeSensor:
+    cameras = {key: s for key, s in sim.scene.sensors.items() if s.kind == "camera"} if sim.scene.sensors else {}
+    if name not in cameras:
+        raise UnknownNameError(_core.unknown_name(f"sensor '{sensor.name}'", "camera sensor", name, list(cameras)))
+    return cameras[name]
+
+
+class FunctionSensor(Sensor):
+    """A function as a sensor: ``function(env, world)`` returns the value of one world."""
+
+    def __init__(
+        self,
+        uuid: str,
+        function: Callable[[Any, int], Any],
+        observation_space: Any = None,
+        *,
+        is_dict: bool = False,
+        str_max_len: int = 2000,
+        unit: str = "",
+        frame: str = "",
+    ) -> None:
+        """
+        Args:
+            uuid: name in suites and files.
+            function: of :attr:`mjsense.Simulation.env` and the world's id; it keeps no state.
+            observation_space: of one world's value.
+            is_dict: the value is a dict, kept as JSON text of at most ``str_max_len`` bytes.
+            str_max_len, unit, frame: see :class:`Sensor`.
+        """
+        super().__init__(uuid, observation_space)
+        self._function = function
+        self.is_dict, self.str_max_len, self.unit, self.frame = is_dict, str_max_len, unit, frame
+
+    def get_observation(self, env: Any, task: Any = None, batch_index: int = 0, *args: Any, **kwargs: Any) -> Any:
+        return self._function(env, batch_index)
+
+    def _mjs_is_shared(self) -> bool:
+        return True
