@@ -87,7 +87,7 @@ void set_field(const StructDecl& decl, void* object, const std::string& assignme
 void add_field_options(CLI::App& app, const StructDecl& decl, void* object,
                        std::initializer_list<std::string_view> skip) {
   for (const FieldDecl& field : decl.fields) {
-    const std::string name = dashed(field.option_name());
+    const std::string name = dashed(field.flag_name());
     if (field.is_hidden || !field.type || !has_text(*field.type)) continue;
     if (std::ranges::find(skip, name) != skip.end()) continue;
     if (is_flag(field)) {

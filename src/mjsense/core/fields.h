@@ -145,6 +145,7 @@ struct FieldDecl {
   bool is_required = false, is_or_none = false, is_or_one = false, is_not_empty = false;
   std::span<const std::string_view> words{};  // of a text or a list of texts
   const char* option_ = nullptr;              // its name for people who record
+  const char* flag_ = nullptr;                // its name on the command line alone
   const char* fingerprint = nullptr;
   bool is_hidden = false, is_resolved = false;
   const char* python_type = "";
@@ -173,12 +174,14 @@ struct FieldDecl {
   // Recordings: its name as an option, where that is another; not an option of its own; whether a
   // recording resumes only with an equal value, and under which key its settings keep that.
   FieldDecl& option(const char* o) { return option_ = o, *this; }
+  FieldDecl& flag(const char* f) { return flag_ = f, *this; }
   FieldDecl& hidden() { return is_hidden = true, *this; }
   FieldDecl& decides_data() { return fingerprint = name, *this; }
   FieldDecl& decides_data_as(const char* key) {  // what becomes of it stands under this key
     return fingerprint = key, is_resolved = true, *this;
   }
   const char* option_name() const { return option_ ? option_ : name; }
+  const char* flag_name() const { return flag_ ? flag_ : option_name(); }
 };
 
 struct StructDecl {

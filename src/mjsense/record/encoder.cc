@@ -10,6 +10,7 @@
 
 #include <algorithm>
 #include <cerrno>
+#include <chrono>
 #include <condition_variable>
 #include <cstring>
 #include <deque>
@@ -23,9 +24,15 @@ namespace mjsense {
 
 namespace {
 
+using Clock = std::chrono::steady_clock;
+
+double seconds_since(Clock::time_point start) {
+  return std::chrono::duration<double>(Clock::now() - start).count();
+}
+
 constexpr int kDefaultEncoders = 32;
 constexpr int kWatchPeriodMs = 250;  // how often running ones are looked at
-constexpr int kReapPeriodMs = 4;  // how often ending encoders are looked after
+constexpr int kReapPeriodMs = 4;     // how often ending encoders are looked after
 
 }  // namespace
 
@@ -40,9 +47,9 @@ class EncoderPool::Stream {
   bool closed = false;  // the producer is done
   bool aborted = false;
   std::string failure;
-  double idle_s = 0;       // since its ffmpeg has last taken or written something
+  double idle_s = 0;         // since its ffmpeg has last taken or written something
   std::int64_t written = 0;  // bytes that went into its ffmpeg
-  std::int64_t seen = 0;   // of its input or output, when it last did
+  std::int64_t seen = 0;     // of its input or output, when it last did
 
   // Ring of frames: [taken, filled) wait for the pool's thread, which has written `offset` bytes of
   // the first.
@@ -242,8 +249,8 @@ struct EncoderPool::Impl {
       stream.spool_file = Fd(::open(stream.spool.c_str(), O_RDONLY | O_NOFOLLOW | O_CLOEXEC));
       try {
         if (!stream.spool_file)
-          throw RuntimeError(fmt::format("cannot read '{}': {}", stream.spool.string(),
-                                         std::strerror(errno)));
+          throw RuntimeError(
+              fmt::format("cannot read '{}': {}", stream.spool.string(), std::strerror(errno)));
         stream.child = start_process(encoder_command(cfg, fps, *stream.video, stream.output),
                                      stream.spool_file);
         ++running;
@@ -322,8 +329,8 @@ EncoderPool::Stream* EncoderPool::open(const VideoStream& video,
     ++impl_->running;
   } else {
     stream->spool = output.string() + ".raw";
-    stream->spool_file =
-        Fd(::open(stream->spool.c_str(), O_WRONLY | O_CREAT | O_EXCL | O_NOFOLLOW | O_CLOEXEC, 0644));
+    stream->spool_file = Fd(
+        ::open(stream->spool.c_str(), O_WRONLY | O_CREAT | O_EXCL | O_NOFOLLOW | O_CLOEXEC, 0644));
     if (!stream->spool_file) {
       throw RuntimeError(
           fmt::format("cannot write '{}': {}", stream->spool.string(), std::strerror(errno)));

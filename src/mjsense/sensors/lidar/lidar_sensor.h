@@ -38,10 +38,10 @@ void visit_fields(V& v, SpinningScan& c) {
   v("channels", c.channels, "Lasers.").at_least(1);
   v("elevation_min_deg", c.elevation_min_deg, "Of channel 0, above the xy plane.")
       .within(-90, 90)
-      .option("low");
+      .flag("low");
   v("elevation_max_deg", c.elevation_max_deg, "Of the last channel; the others lie evenly between.")
       .within(-90, 90)
-      .option("high");
+      .flag("high");
   v("elevations_deg", c.elevations_deg, "One a channel instead of evenly spaced ones.")
       .within(-90, 90);
   v("samples", c.samples, "Firings of each channel in a sweep.").at_least(1);
@@ -64,13 +64,13 @@ void visit_fields(V& v, TableScan& c) {
            "table")
       .frozen();
   v("file", c.file, "An .npy file of shape (M, 2), such as mujoco-lidar's Livox tables.")
-      .option("table");
+      .flag("table");
   v("angles", c.angles, "The table itself, [M, 2].").unit("rad");
   v("rays_per_scan", c.rays_per_scan,
     "Rows that a scan takes, the next ones at the next scan; 0: all. Rows left over at the end are "
     "not used.")
       .at_least(0)
-      .option("rays");
+      .flag("rays");
   v("rate_hz", c.rate_hz, "Scans a second.").positive();
 }
 
