@@ -10,6 +10,7 @@
 
 #include <algorithm>
 #include <cerrno>
+#include <chrono>
 #include <condition_variable>
 #include <cstring>
 #include <deque>
@@ -25,7 +26,13 @@ namespace {
 
 constexpr int kDefaultEncoders = 32;
 constexpr int kWatchPeriodMs = 250;  // how often running ones are looked at
-constexpr int kReapPeriodMs = 4;  // how often ending encoders are looked after
+constexpr int kReapPeriodMs = 4;     // how often ending encoders are looked after
+
+using Clock = std::chrono::steady_clock;
+
+double seconds_since(Clock::time_point start) {
+  return std::chrono::duration<double>(Clock::now() - start).count();
+}
 
 }  // namespace
 
