@@ -93,10 +93,10 @@ class Policy:
 
     def _mjs_make_sensors(self) -> list[Any]:
         self._mjs_own = list(self.sensors())  # kept here: C++ refers to them without keeping them alive
-        return self._mjs_own
+        return self._mjs_sensors()
 
     def _mjs_sensors(self) -> list[Any]:
-        return self._mjs_own
+        return list(self._mjs_own)
 
     def _mjs_bind(self, sim: Simulation, streams: list[Any], layout: list[Any]) -> tuple[dict[str, Any], np.ndarray]:
         self.sim, self.num_worlds = sim, sim.num_worlds

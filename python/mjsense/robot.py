@@ -7,6 +7,7 @@ import os
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -76,12 +77,12 @@ class Robot(KnownAttributes):
         self.base: str = self._core.base
         """The body that is its base frame."""
         arrays = {"command_low", "command_high", "low", "high", "init"}
+
+        def value_of(key: str, value: Any) -> Any:
+            return np.array(value, np.float64) if key in arrays else tuple(value) if isinstance(value, list) else value
+
         self.groups: dict[str, MoveGroup] = {
-            info["name"]: MoveGroup(**{
-                key: np.array(value, np.float64) if key in arrays else tuple(value) if isinstance(value, list) else value
-                for key, value in info.items()
-            })
-            for info in self._core.groups
+            info["name"]: MoveGroup(**{key: value_of(key, value) for key, value in info.items()}) for info in self._core.groups
         }
         """Its move groups, in the order of actions and observations."""
         self.cameras: tuple[RobotCamera, ...] = tuple(RobotCamera(*camera) for camera in self._core.cameras)

@@ -247,10 +247,10 @@ class Task:
 
     def _mjs_make_sensors(self) -> list[Any]:
         self._mjs_own = list(self.sensors())  # kept here: C++ refers to them without keeping them alive
-        return self._mjs_own
+        return self._mjs_sensors()
 
     def _mjs_sensors(self) -> list[Any]:
-        return self._mjs_own
+        return list(self._mjs_own)
 
     def _mjs_suite(self, names: list[str]) -> list[str] | None:
         wanted = self.suite(names)

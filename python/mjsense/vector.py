@@ -129,7 +129,7 @@ class TaskVectorEnv(VectorEnv):
             actions: ``[num_envs, n]``: actuator commands of the move groups, see ``action_groups``.
             done: bool ``[num_envs]``, if you like: the policy has finished, the episode ends after this step.
         """
-        values = self._checked(actions, (self.num_envs, *self.single_action_space.shape))
+        values = self._checked(actions, (self.num_envs, *(self.single_action_space.shape or ())))
         flags = None if done is None else np.ascontiguousarray(done, dtype=bool)
 
         def play() -> None:
@@ -150,7 +150,7 @@ class TaskVectorEnv(VectorEnv):
         """
         shape = np.shape(actions)
         steps = shape[1] if len(shape) == 3 and shape[1] > 0 else "steps"
-        values = self._checked(actions, (self.num_envs, steps, *self.single_action_space.shape))
+        values = self._checked(actions, (self.num_envs, steps, *(self.single_action_space.shape or ())))
         return self._play(lambda: self._rollout.step_chunk(values, stop_on_success))
 
     def _checked(self, actions: Any, shape: tuple[Any, ...]) -> np.ndarray:

@@ -104,7 +104,7 @@ def test_meshes_are_chosen(tmp_path, monkeypatch):
     monkeypatch.setattr("mjsense.assets.franka_meshes", lambda: None)
     with pytest.raises(ValueError, match="robot 'franka': there are no real meshes"):
         mjs.record(out=tmp_path, meshes="real", **SMALL)
-    with pytest.raises(ValueError, match="meshes.*must be one of auto, shapes, real"):
+    with pytest.raises(ValueError, match=r"meshes.*must be one of auto, shapes, real"):
         mjs.make_vec("pick", meshes="mesh")
     monkeypatch.setenv("MJSENSE_FRANKA_MESHES", str(tmp_path / "nowhere"))
     with pytest.raises(ValueError, match="MJSENSE_FRANKA_MESHES"):

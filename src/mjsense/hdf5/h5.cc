@@ -245,11 +245,6 @@ std::vector<std::string> children(hid_t group) {
   return names;
 }
 
-bool is_group(hid_t parent, const std::string& name) {
-  const Id object(H5Oopen(parent, name.c_str(), H5P_DEFAULT), H5Oclose, name);
-  return H5Iget_type(object) == H5I_GROUP;
-}
-
 std::vector<hsize_t> dims(hid_t dataset) {
   const Id space(H5Dget_space(dataset), H5Sclose, "HDF5 space");
   std::vector<hsize_t> sizes(std::max(0, H5Sget_simple_extent_ndims(space)));

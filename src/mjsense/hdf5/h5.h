@@ -69,7 +69,6 @@ Id text_type();               // variable-length UTF-8
 bool exists(hid_t parent, const std::string& path);
 // Names, sorted by code point. Throws RuntimeError beyond 100,000.
 std::vector<std::string> children(hid_t group);
-bool is_group(hid_t parent, const std::string& name);
 std::vector<hsize_t> dims(hid_t dataset);
 
 void write_text(hid_t parent, const std::string& path, std::string_view text);  // a scalar dataset

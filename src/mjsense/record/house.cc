@@ -241,7 +241,8 @@ House::House(const fs::path& dir, const std::string& fingerprint, bool resume)
 
 House::~House() {
   const bool published = std::ranges::any_of(published_, [](bool p) { return p; });
-  if (ended_ || published || !decisions_.kept_by_episode.empty()) return;
+  const bool decided = decisions_.kept() + decisions_.discarded() > 0;
+  if (ended_ || published || decided) return;
   end();
   std::error_code not_empty;
   fs::remove(dir_, not_empty);

@@ -43,7 +43,7 @@ struct Band {  // of rows or columns
 class Sheet {
  public:
   explicit Sheet(const fs::path& png) {
-    const VideoProbe probe = probe_video(png, false, "");
+    const VideoProbe probe = probe_video(png, false, 1, "");
     width_ = probe.width;
     height_ = probe.height;
     const int first = 0;

@@ -113,16 +113,6 @@ void Robot::read_qpos(const World& world, RobotValues& out) const {
   }
 }
 
-void Robot::read_qvel(const World& world, RobotValues& out) const {
-  for (std::size_t g = 0; g < groups_.size(); ++g) {
-    const auto& address = groups_[g].dofs;
-    out[g].size = static_cast<int>(address.size());
-    out[g].given = true;
-    for (std::size_t i = 0; i < address.size(); ++i)
-      out[g].values[i] = world.data->qvel[address[i]];
-  }
-}
-
 Pose Robot::fk(int group, const RobotValues& values) const {
   if (!chains_[group]) return {};
   double q[Chain::kMaxJoints];

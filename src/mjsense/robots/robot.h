@@ -53,7 +53,6 @@ class Robot {
   double opening(const World& world, int gripper) const;       // m, between the pads
   bool is_open(const World& world, int gripper) const;         // above half of max_opening
   void read_qpos(const World& world, RobotValues& out) const;  // every group
-  void read_qvel(const World& world, RobotValues& out) const;
 
   // --- kinematics, in the base frame
   // Leaf of `group` where each joint stands at its group's value; a group with fewer values than

@@ -1,0 +1,62 @@
+#!/usr/bin/env python3
+# SPDX-License-Identifier: Apache-2.0
+"""Every C++ file past clang's front end, with the commands of a build by GCC: what one compiler alone refuses or warns of.
+
+usage: tools/other_compiler.py BUILD [FILE ...]     without files: all of src/
+"""
+
+from __future__ import annotations
+
+import json
+import os
+import shlex
+import subprocess
+import sys
+from concurrent.futures import ThreadPoolExecutor
+from pathlib import Path
+
+ROOT = Path(__file__).resolve().parent.parent
+
+
+def command_of(entry: dict[str, str]) -> list[str]:
+    """The command that checks the file and writes nothing."""
+    words = shlex.split(entry["command"])
+    if Path(words[0]).name == "ccache":
+        words = words[1:]
+    flags = []
+    skip = False
+    for word in words[1:]:
+        if skip or word == "-c":
+            skip = False
+        elif word in ("-o", "-MF", "-MT"):
+            skip = True
+        elif word != "-MD":
+            flags.append(word)
+    return ["clang++", *flags, "-fsyntax-only", "-Werror", "-Wno-unknown-warning-option"]
+
+
+def main(arguments: list[str]) -> int:
+    if not arguments:
+        print(__doc__, file=sys.stderr)
+        return 2
+    wanted = {str((ROOT / name).resolve()) for name in arguments[1:]}
+    entries = [
+        entry
+        for entry in json.loads(Path(arguments[0], "compile_commands.json").read_text())
+        if Path(entry["file"]).is_relative_to(ROOT / "src") and (not wanted or entry["file"] in wanted)
+    ]
+
+    def check(entry: dict[str, str]) -> bool:
+        done = subprocess.run(command_of(entry), cwd=entry["directory"], capture_output=True, text=True)
+        if done.returncode:
+            print(done.stderr, file=sys.stderr)
+        return done.returncode == 0
+
+    with ThreadPoolExecutor(os.cpu_count()) as pool:
+        wrong = list(pool.map(check, entries)).count(False)
+    print(f"clang: {len(entries)} files, {wrong} refused", file=sys.stderr)
+    return 1 if wrong else 0
+
+
+if __name__ == "__main__":
+    raise SystemExit(main(sys.argv[1:]))
