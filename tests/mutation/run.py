@@ -67,7 +67,7 @@ class Mutant:
         if parts[0] == "python":
             return "python"
         if parts[0] == "models":
-            return "robots" if parts[1] == "franka" else "tasks"
+            return "robots" if parts[1] == "robots" else "scenes"
         return parts[2]
 
     @property
