@@ -42,6 +42,10 @@ PythonTask::PythonTask(TaskCfg cfg, nb::object task, std::shared_ptr<PythonHost>
 std::unique_ptr<PythonTask> PythonTask::make(nb::object task, std::shared_ptr<PythonHost> host,
                                              TaskCfg cfg, bool own_horizon) {
   nb::object settings = task.attr("_mjs_settings")();
+  if (!cfg.scene.empty()) {
+    throw ValueError(fmt::format("task '{}' makes its scene itself: it cannot take the scene '{}'",
+                                 nb::cast<std::string>(settings["name"]), cfg.scene));
+  }
   cfg.policy_dt_ms = item_or(settings, "policy_dt_ms", cfg.policy_dt_ms);
   const int of_robot = cfg.sim_dt_ms;
   cfg.sim_dt_ms = item_or(settings, "sim_dt_ms", cfg.sim_dt_ms);

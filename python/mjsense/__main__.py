@@ -15,7 +15,8 @@ def main() -> int:
     """Runs the program with this process's arguments; its exit code."""
     # Ctrl-C is the program's affair, as where no Python is.
     signal.signal(signal.SIGINT, signal.SIG_DFL)
-    use_installed_meshes()
+    if {"real", "--meshes=real"} & set(sys.argv):
+        use_installed_meshes()
     use_installed_ffmpeg()
     return _core.run_program(["mjsense", *sys.argv[1:]])
 

@@ -73,6 +73,7 @@ def record(
     depth: bool = False,
     samples: int = 1,
     shadows: bool = True,
+    meshes: Literal["auto", "shapes", "real"] = "auto",
     horizon: int | None = None,
     action_noise: bool = True,
     terminate_upon_success: bool = False,
@@ -113,6 +114,8 @@ def record(
         depth: Also the depth of every camera, losslessly.
         samples: Rays a pixel of rgb: smooth edges for time.
         shadows: Pictures have shadows.
+        meshes: The robot is drawn with shapes of ours, its real meshes, or these where its environment variable
+            (``MJSENSE_FRANKA_MESHES``) names them; it moves the same.
         horizon: Control steps after which an episode is cut; by default the task's.
         action_noise: Commands reach the arm with noise.
         terminate_upon_success: An episode ends at its first success.

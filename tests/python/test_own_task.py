@@ -313,6 +313,11 @@ def test_its_code_may_not_move_the_worlds(tmp_path):
             play()
 
 
+def test_it_makes_its_scene_itself():
+    with pytest.raises(ValueError, match="task 'cart' makes its scene itself: it cannot take the scene 'table'"):
+        make(scene="table")
+
+
 def test_by_name():
     mjs.register_task("carting", Cart)
     assert "carting" in mjs.task_names()
