@@ -64,9 +64,11 @@ def record(
     *,
     out: str | Path,
     # options of a recording
+    scene: str = "",
     worlds: int = 4,
     threads: int = 0,
     seed: Seed = 0,
+    camera_system: str = "",
     cameras: Sequence[str] | None = None,
     width: int | None = None,
     height: int | None = None,
@@ -105,10 +107,12 @@ def record(
         out: folder.
 
         Options:
+        scene: Which scene, by its name or a file; by default the task's.
         worlds: How many run at one time.
         threads: Of the simulation; 0: every CPU this process may use.
         seed: Same seed, same episodes.
-        cameras: Names of the robot's cameras, in this order; by default all, none for an empty list.
+        camera_system: Cameras of the robot's, by the system's name or a file; by default those of its model.
+        cameras: Names of the cameras, in this order; by default all, none for an empty list.
         width: Of pictures; by default the robot's. [pixels]
         height: Of pictures; by default the robot's. [pixels]
         depth: Also the depth of every camera, losslessly.

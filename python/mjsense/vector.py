@@ -256,9 +256,11 @@ def make_vec(
     observations: Sequence[str] | None = None,
     sensors: Iterable[Any] = (),
     # options of a recording
+    scene: str = "",
     num_envs: int = 1,
     threads: int = 0,
     seed: Seed = 0,
+    camera_system: str = "",
     cameras: Sequence[str] | None = None,
     width: int | None = None,
     height: int | None = None,
@@ -285,10 +287,12 @@ def make_vec(
             ``truncated``, and ``info["fault"]`` says why.
 
         Options:
+        scene: Which scene, by its name or a file; by default the task's.
         num_envs: How many run at one time.
         threads: Of the simulation; 0: every CPU this process may use.
         seed: Same seed, same episodes.
-        cameras: Names of the robot's cameras, in this order; by default all, none for an empty list.
+        camera_system: Cameras of the robot's, by the system's name or a file; by default those of its model.
+        cameras: Names of the cameras, in this order; by default all, none for an empty list.
         width: Of pictures; by default the robot's. [pixels]
         height: Of pictures; by default the robot's. [pixels]
         depth: Also the depth of every camera, losslessly.
