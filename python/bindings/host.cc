@@ -39,9 +39,10 @@ std::vector<std::shared_ptr<Sensor>> PythonHost::members(nb::handle sensors,
     }
     auto sensor = std::make_shared<PythonSensor>(nb::cast<std::string>(object.attr("uuid")),
                                                  WeakObject(object), read_python_spec(object));
-    sensor->on_initialized = [weak = std::weak_ptr<PythonSensor>(sensor), held = simulation_] {
+    // The simulation owns the sensor: in a circle they would never be freed.
+    sensor->on_initialized = [weak = std::weak_ptr<PythonSensor>(sensor), host = weak_from_this()] {
       auto self = weak.lock();
-      self->self().attr("_mjs_bind")(held.get(), SensorHandle{self});
+      self->self().attr("_mjs_bind")(host.lock()->simulation_.get(), SensorHandle{self});
     };
     core_->add_python(sensor);
     made.push_back(sensor);

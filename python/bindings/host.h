@@ -18,7 +18,7 @@ namespace mjsense::python {
 // C++ calls it without the interpreter's lock, except where a function says that it needs it. A task
 // or a policy runs on the caller's thread, while the simulation counts as at work: it may read the
 // simulation and write its state, but not step or reset it.
-class PythonHost {
+class PythonHost : public std::enable_shared_from_this<PythonHost> {
  public:
   explicit PythonHost(nb::object make_simulation) : make_(std::move(make_simulation)) {}
 

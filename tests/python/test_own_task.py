@@ -340,17 +340,26 @@ def test_one_task_plays_in_one_place_at_a_time(tmp_path):
     make(task).close()
 
 
-def test_memory_is_freed():
-    task = Cart()
+@pytest.mark.parametrize("closed", [True, False])
+def test_memory_is_freed(closed):
+    class Height(mjs.Sensor):
+        uuid = "height"
+        observation_space = gymnasium.spaces.Box(-2, 2, (1,), np.float64)
+
+        def compute(self, sim):
+            return sim.qpos[:, :1]
+
+    task, sensor = Cart(), Height()
     policy = Driver(task)
-    env = make(task, policy=policy)
+    env = make(task, policy=policy, sensors=[sensor])
     env.reset()
     env.expert_action()
-    gone = [weakref.ref(task), weakref.ref(policy), weakref.ref(env.sim)]
-    env.close()
-    del env, task, policy
+    gone = [weakref.ref(object) for object in (task, policy, sensor, env, env.sim)]
+    if closed:
+        env.close()
+    del env, task, policy, sensor
     gc.collect()
-    assert [ref() for ref in gone] == [None] * 3
+    assert [ref() for ref in gone] == [None] * 5
 
 
 def test_get_info():
