@@ -71,6 +71,8 @@ def _kind(word: str) -> tuple[Callable[[Any], bool], str] | None:
     for name in (word, word.split("[")[0]):
         if name in _KINDS:
             return _KINDS[name]
+    if word.startswith("Literal["):  # C++ knows the words, and the nearest one
+        return _KINDS["str"]
     cls = word.split(".")[-1]
     return (lambda value: _is_a(value, cls)), f"a {word}"
 
