@@ -148,7 +148,7 @@ def test_a_step_and_the_simulation_take_turns():
                 env.sim.reset()
             except RuntimeError as error:
                 said.append(str(error))
-            return np.zeros((env.num_envs, 1))
+            return np.zeros((env.num_envs, 1), np.float32)
 
     env.reset(seed=0)
     meddler = env.sim.add(Meddler())
