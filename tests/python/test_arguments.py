@@ -76,6 +76,11 @@ def live(tmp_path_factory):
     objects += [mjs.SensorSuite([scene["scan"]]), mjs.ObservationPipeline(2), sim.debug_shapes(0, "scan")]
     objects += [mjs.Recorder(tmp_path_factory.mktemp("data"), sim, [scene["scan"]]), mjs.make("pick", cameras=[]), mjs.WorldState(sim, 0, 0)]
     objects[-2].reset()
+    objects += [
+        mjs.JointPositionSensor(), mjs.JointVelocitySensor(), mjs.PoseSensor("p", body="ball/ball"), mjs.TcpPoseSensor(),
+        mjs.RobotBasePoseSensor(), mjs.EnvStatesSensor(), mjs.CameraParameterSensor("eye"), mjs.CameraImageSensor("eye"),
+        mjs.ImagePointsSensor({}, []), mjs.GraspStateSensor("ball/ball"),
+    ]  # fmt: skip
     return {type(o): o for o in objects}, sim
 
 

@@ -430,7 +430,7 @@ def test_a_job_that_never_works_ends_and_blocks_nobody(tmp_path):
 
 
 def test_what_cannot_be_a_sensor(tmp_path):
-    for thing, text in ((3, "not a mjsense.Sensor"), (Counter, "not a sensor but a class")):
+    for thing, text in ((3, "not a sensor: 3 is not a mjsense.Sensor"), (Counter, "not a sensor but a class")):
         with pytest.raises(TypeError, match=text):
             mjs.record(out=tmp_path, sensors=[thing])
         with pytest.raises(TypeError, match=text):
