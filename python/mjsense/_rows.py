@@ -45,7 +45,7 @@ class Row:
 
     def bounds(self) -> tuple[float, float]:
         """Least and largest of the bounds."""
-        if self.low is None or not self.low.size:
+        if self.low is None or self.high is None or not self.low.size:
             return -np.inf, np.inf
         return float(np.min(self.low)), float(np.max(self.high))
 
@@ -85,7 +85,7 @@ class Row:
 
     def outside(self, rows: np.ndarray) -> Iterator[tuple[int, str]]:
         """(index, what is wrong) of the rows ``[n, ...]`` with a value outside the bounds."""
-        if self.low is None or not rows.size:
+        if self.low is None or self.high is None or not rows.size:
             return
         low, high = np.broadcast_to(self.low, self.shape), np.broadcast_to(self.high, self.shape)
         bad = ~((rows >= low) & (rows <= high))

@@ -370,7 +370,7 @@ class Base(MoveGroup):
         body = self._view.base_body
         return _frame(self.mj_data.xpos[body], self.mj_data.xmat[body])
 
-    leaf_frame_to_world = root_frame_to_world = pose
+    leaf_frame_to_world = root_frame_to_world = pose  # pyright: ignore[reportIncompatibleMethodOverride]  # a property too
 
     @property
     def is_mobile(self) -> bool:

@@ -173,7 +173,7 @@ class Sensor:
     _mjs_rows: Any = None  # a list: of each field, None without any
     _mjs_shown: Any = None
     _mjs_instances: list[Any] | None = None  # by world; None: one computes all worlds at once
-    _mjs_faults: dict[int, SensorError] | None = None  # of reset(), by world, until the value is asked for
+    _mjs_faults: Any = None  # dict[int, SensorError]: of reset(), by world, until the value is asked for
     _mjs_worked: bool = False  # a row of it was right once
 
     def __init__(self, uuid: str | None = None, observation_space: Any = None, **kwargs: Any) -> None:
@@ -438,7 +438,8 @@ class Sensor:
         sim = self.simulation
         with _named(self, "compute"):
             some = _takes(self.compute, 2)
-            value = self.compute(sim, list(world_ids)) if some else self.compute(sim)
+            compute: Any = self.compute
+            value = compute(sim, list(world_ids)) if some else compute(sim)
             of = world_ids if some else list(range(sim.num_worlds))
             if self.is_dict:
                 return self._mjs_put_dicts(world_ids, of, list(value))
@@ -620,6 +621,9 @@ def _observe(instance: Any, env: Any, task: Any, world: int) -> Any:
     return function(env, task)
 
 
+_RANDOM: Any = np.random  # its stubs leave out get_bit_generator() and set_bit_generator()
+
+
 class _Dice:
     """NumPy's global random numbers while sensors are asked: a stream of their own for each world and moment, the same in whatever world
     and beside whatever others an episode runs; those of the program go on as if nothing had happened."""
@@ -635,8 +639,8 @@ class _Dice:
         if self._seeds:
             if _Dice._depth == len(self._own):
                 self._own.append(np.random.MT19937(0))
-            self._before = np.random.get_bit_generator()
-            np.random.set_bit_generator(self._own[_Dice._depth])
+            self._before = _RANDOM.get_bit_generator()
+            _RANDOM.set_bit_generator(self._own[_Dice._depth])
             _Dice._depth += 1
         return self
 
@@ -647,7 +651,7 @@ class _Dice:
     def __exit__(self, *exception: object) -> None:
         if self._seeds:
             _Dice._depth -= 1
-            np.random.set_bit_generator(self._before)
+            _RANDOM.set_bit_generator(self._before)
 
 
 class _named:

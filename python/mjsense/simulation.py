@@ -272,9 +272,10 @@ class Simulation(KnownAttributes):
         if isinstance(sensor, NativeSensor):
             if sensor._core is not None:
                 raise RuntimeError(f"sensor '{sensor.uuid}' belongs to a simulation already")
-            if not hasattr(sensor, "_make"):
+            make = getattr(sensor, "_make", None)
+            if make is None:
                 raise TypeError(f"sensor '{sensor.uuid}' belongs to a scene")
-            self._core.add_native(sensor._make(self))
+            self._core.add_native(make(self))
             sensor._bind(self._core)
             return sensor
         if sensor._mjs_core is not None:

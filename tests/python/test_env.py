@@ -33,8 +33,8 @@ def test_a_single_environment_is_the_first_of_many():
     assert task.observation_space.contains(observation) and info == {}
     for _ in range(3):
         np.testing.assert_array_equal(observation["qpos"]["joints"], others["qpos"]["joints"][0])
-        observation, reward, terminated, truncated, info = task.step(task.action_space.high)  # pyright: ignore[reportAttributeAccessIssue]
-        others, rewards, *_ = many.step(many.action_space.high)  # pyright: ignore[reportAttributeAccessIssue]
+        observation, reward, terminated, truncated, info = task.step(task.action_space.high)
+        others, rewards, *_ = many.step(many.action_space.high)
         assert type(reward) is float and reward == rewards[0] and type(terminated) is bool and info == {"success": False}
     assert truncated
     task.reset()
