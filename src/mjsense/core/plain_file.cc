@@ -7,6 +7,7 @@
 
 #include <algorithm>
 #include <cerrno>
+#include <cstdio>
 #include <cstring>
 
 #include "mjsense/core/error.h"
@@ -84,6 +85,28 @@ bool is_plain_folder(const std::filesystem::path& path) {
 std::int64_t size_of(const Fd& file) {
   struct stat about = {};
   return fstat(file.get(), &about) == 0 ? static_cast<std::int64_t>(about.st_size) : 0;
+}
+
+void write_file(const std::filesystem::path& path,
+                std::initializer_list<std::span<const std::byte>> pieces) {
+  const std::string part = path.string() + ".part";
+  const auto fail = [&] {
+    const int error = errno;
+    unlink(part.c_str());
+    throw RuntimeError(fmt::format("cannot write '{}': {}", path.string(), std::strerror(error)));
+  };
+  unlink(part.c_str());  // of an earlier attempt, or a link that leads elsewhere
+  Fd file(open(part.c_str(), O_WRONLY | O_CREAT | O_EXCL | O_NOFOLLOW | O_CLOEXEC, 0644));
+  if (!file) fail();
+  for (std::span<const std::byte> left : pieces) {
+    while (!left.empty()) {
+      const ssize_t n = write(file.get(), left.data(), left.size());
+      if (n < 0 && errno == EINTR) continue;
+      if (n <= 0) fail();
+      left = left.subspan(static_cast<std::size_t>(n));
+    }
+  }
+  if (close(file.release()) != 0 || rename(part.c_str(), path.c_str()) != 0) fail();
 }
 
 std::string printable(std::string_view text) {

@@ -4,6 +4,7 @@
 #include <fcntl.h>
 #include <fmt/format.h>
 #include <sys/file.h>
+#include <sys/resource.h>
 #include <sys/stat.h>
 #include <unistd.h>
 
@@ -169,6 +170,9 @@ void name_videos(hid_t trajectory, const fs::path& staged, const fs::path& house
 void reserve(const fs::path& path, std::int64_t bytes) {
   const Fd file(open(path.c_str(), O_WRONLY | O_NOFOLLOW | O_CLOEXEC));
   if (!file) throw_file("write", path, errno);
+  rlimit limit{};
+  if (getrlimit(RLIMIT_FSIZE, &limit) == 0 && limit.rlim_cur < static_cast<rlim_t>(bytes))
+    throw_file("write", path, EFBIG);
   if (fallocate(file.get(), FALLOC_FL_KEEP_SIZE, 0, bytes) == 0) return;
   if (errno == ENOSPC || errno == EDQUOT || errno == EFBIG) throw_file("write", path, errno);
   // Where space cannot be reserved (some network file systems), at least ask how much there is.
