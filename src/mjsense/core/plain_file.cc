@@ -39,7 +39,7 @@ std::size_t character(std::string_view text) {
   for (std::size_t i = 1; i < size; ++i) {
     if ((byte(i) & 0xC0) != 0x80) return 0;
   }
-  if (first == 0xC2 && byte(1) < 0xA0) return 0;                       // C1 controls
+  if (first == 0xC2 && byte(1) < 0xA0) return 0;  // C1 controls
   if ((first == 0xE0 && byte(1) < 0xA0) || (first == 0xED && byte(1) >= 0xA0)) return 0;
   if ((first == 0xF0 && byte(1) < 0x90) || (first == 0xF4 && byte(1) >= 0x90)) return 0;
   return size;
@@ -60,8 +60,8 @@ Fd open_plain(const std::filesystem::path& folder, std::string_view name) {
   const Fd dir(open(folder.empty() ? "." : folder.c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC));
   if (!dir) fail(fmt::format("cannot be opened: {}", std::strerror(errno)));
   // Without O_NONBLOCK a pipe would make us wait for its writer.
-  Fd file(openat(dir.get(), std::string(name).c_str(),
-                 O_RDONLY | O_NOFOLLOW | O_NONBLOCK | O_CLOEXEC));
+  Fd file(
+      openat(dir.get(), std::string(name).c_str(), O_RDONLY | O_NOFOLLOW | O_NONBLOCK | O_CLOEXEC));
   if (!file && errno == ELOOP) fail("is a link, which is not followed");
   if (!file && errno == ENOENT) fail("does not exist");
   if (!file) fail(fmt::format("cannot be opened: {}", std::strerror(errno)));

@@ -70,8 +70,10 @@ TEST(PlainFile, PrintableText) {
   EXPECT_EQ(printable("wrist_camera µ 日"), "wrist_camera µ 日");
   EXPECT_EQ(printable("\x1b[31mred\x1b[0m\n"), "?[31mred?[0m?");
   EXPECT_EQ(printable("\xff\xfe.mp4"), "??.mp4");
-  EXPECT_EQ(printable("\xc2\x9b" "31m"), "??31m");  // the one-byte form of escape and bracket
-  EXPECT_EQ(printable("\xed\xa0\x80"), "???");      // half of a pair
+  EXPECT_EQ(printable("\xc2\x9b"
+                      "31m"),
+            "??31m");                           // the one-byte form of escape and bracket
+  EXPECT_EQ(printable("\xed\xa0\x80"), "???");  // half of a pair
   EXPECT_EQ(printable("cut \xe6\x97"), "cut ??");
 }
 

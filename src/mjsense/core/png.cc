@@ -4,7 +4,6 @@
 #include <fmt/format.h>
 #include <zlib.h>
 
-
 #include "mjsense/core/error.h"
 #include "mjsense/core/plain_file.h"
 

@@ -66,9 +66,8 @@ Recorder::Impl::Impl(const RecordingCfg& cfg_) : cfg(cfg_) {
   for (int s = 0; s < streams; ++s)
     free_chunks[s].resize(static_cast<std::size_t>(kBuffersPerWorld) * cfg.num_worlds);
   if (!plan.videos.empty()) {
-    pool = std::make_unique<EncoderPool>(cfg.video, cfg.fps,
-                                         static_cast<int>(plan.videos.size()) * cfg.num_worlds,
-                                         cfg.stop);
+    pool = std::make_unique<EncoderPool>(
+        cfg.video, cfg.fps, static_cast<int>(plan.videos.size()) * cfg.num_worlds, cfg.stop);
   }
   writer = std::thread([this] { write_jobs(); });
 }

@@ -179,8 +179,7 @@ Worlds::Worlds(const mjModel* model, int num_worlds, int threads) : num_worlds_(
   if (num_worlds < 1)
     throw ValueError(fmt::format("num_worlds is {}: must be at least 1", num_worlds));
   if (threads < 0 || threads > kMostThreads)
-    throw ValueError(
-        fmt::format("threads is {}: must be 0 (all) to {}", threads, kMostThreads));
+    throw ValueError(fmt::format("threads is {}: must be 0 (all) to {}", threads, kMostThreads));
   check_memory(model, num_worlds);
   mjBatchConfig config;
   mjb_defaultConfig(&config);
@@ -376,7 +375,8 @@ bool Worlds::step_world(const mjModel* m, mjData* d, int w, const Call& call) {
   if (stage != mjSTAGE_NONE && (derived_[w].behind || !same_state(w))) stage = mjSTAGE_NONE;
   if (stage == mjSTAGE_ACC && (!same_controls(w) || bad_control(m, d))) stage = mjSTAGE_VEL;
   const bool seen = stage != mjSTAGE_NONE || call.hooks->wants_substep() ||
-                    call.hooks->control_every() > 0 || call.hooks->stage() != mjSTAGE_NONE || !can_split_step(m);
+                    call.hooks->control_every() > 0 || call.hooks->stage() != mjSTAGE_NONE ||
+                    !can_split_step(m);
   if (!(seen ? step_whole(m, d, w, call) : step_unseen(m, d, w, call))) return false;
   remember(m, d, w);
   return true;
