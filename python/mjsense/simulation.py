@@ -20,6 +20,22 @@ from mjsense.sensor import NativeSensor, Sensor, as_sensor
 
 _IDS = {"geom_matid": "nmat", "flex_matid": "nmat", "mat_texid": "ntex"}
 """Fields of ids that sensors follow, and how many there are."""
+_WHOLE = {
+    "geom_contype", "geom_conaffinity", "geom_condim", "geom_priority", "geom_group", "geom_matid", "geom_castshadow",
+    "geom_dataid", "site_group", "site_matid", "jnt_group", "jnt_limited", "jnt_actfrclimited", "jnt_actgravcomp",
+    "light_active", "light_castshadow", "light_type", "cam_projection", "flex_contype", "flex_conaffinity", "flex_condim",
+    "flex_priority", "flex_group", "flex_matid", "flex_selfcollide", "skin_group", "skin_matid", "mat_texid",
+    "mat_texuniform", "eq_active0", "tendon_group", "tendon_matid", "tendon_limited", "tendon_actfrclimited",
+    "actuator_group", "actuator_ctrllimited", "actuator_forcelimited", "actuator_actlimited", "actuator_actearly",
+    "geom_type",
+}  # fmt: skip
+"""Integers and flags that may differ between worlds. All others say how large things are and where they stand: MuJoCo indexes
+memory with them."""
+_FIXED = {
+    "actuator_delay", "sensor_delay", "sensor_interval", "efm0_L", "bvh_aabb", "oct_aabb", "oct_coeff", "numeric_data",
+    "tuple_objprm",
+}  # fmt: skip
+"""Real numbers that may not: sizes of buffers and parts of structures follow from them."""
 _STATE = ("qpos", "qvel", "act", "ctrl", "qfrc_applied", "xfrc_applied", "mocap_pos", "mocap_quat", "eq_active", "userdata")
 
 
@@ -115,7 +131,12 @@ class Simulation(KnownAttributes):
 
     def step(self, control_steps: int = 1) -> None:
         """Advances every world by control steps of ``decimation`` substeps each."""
-        self._core.step(control_steps)
+        if control_steps <= 1:  # the core says what is wrong with 0
+            self._core.step(control_steps)
+            return
+        # One by one: between two of them Ctrl-C is heard.
+        for _ in range(control_steps):
+            self._core.step(1)
 
     def reset(self, world_ids: Sequence[int] | None = None, *, seed: Seed | None = None, key: int | str | None = None) -> None:
         """Begins a new episode.
@@ -218,12 +239,22 @@ class Simulation(KnownAttributes):
         Values are ``[worlds, ...]`` or broadcast to it. Quantities that MuJoCo derives from the field follow, and so do rays and
         images. Meshes, height fields and the pixels of textures cannot differ between worlds: ValueError.
         """
+        self._check_randomizable(field)
         target = self.model_field(field)
         rows = self._rows(world_ids)
         try:
             values = np.broadcast_to(np.asarray(values, target.dtype), target[rows].shape)
         except (TypeError, ValueError) as error:
             raise ValueError(f"{field}: values must be of shape {target[rows].shape} or broadcast to it: {error}") from None
+        if field.endswith("_condim") and not np.isin(values, (1, 3, 4, 6)).all():
+            raise ValueError(f"{field}: values must be 1, 3, 4 or 6")
+        if field in ("geom_type", "light_type", "cam_projection"):
+            self._check_types(field, values)
+        if field == "geom_dataid":
+            model, meshes = self.model, self.model.geom_type == mujoco.mjtGeom.mjGEOM_MESH
+            fits = np.where(meshes, (values >= 0) & (values < model.nmesh), values == model.geom_dataid)
+            if not fits.all():
+                raise ValueError(f"geom_dataid: ids of meshes, 0 to {model.nmesh - 1}, for geoms that are meshes; the others keep theirs")
         if field in _IDS:
             count = getattr(self.model, _IDS[field])
             if (values < -1).any() or (values >= count).any():
@@ -231,6 +262,26 @@ class Simulation(KnownAttributes):
         target[rows] = values
         self._core.model_changed(_ids(world_ids), field in mujoco.MjModel._setconst_inputs)
         self.forward(world_ids)
+
+    def _check_types(self, field: str, values: np.ndarray) -> None:
+        """Geoms may become other primitives; meshes, height fields and signed distances stay what they are."""
+        if field == "geom_type":
+            kinds = mujoco.mjtGeom
+            primitives = [int(k) for k in (kinds.mjGEOM_PLANE, kinds.mjGEOM_SPHERE, kinds.mjGEOM_CAPSULE, kinds.mjGEOM_ELLIPSOID,
+                                           kinds.mjGEOM_CYLINDER, kinds.mjGEOM_BOX)]  # fmt: skip
+            fits = (values == self.model.geom_type) | (np.isin(values, primitives) & np.isin(self.model.geom_type, primitives))
+        else:
+            fits = (values >= 0) & (values <= (1 if field == "cam_projection" else 3))
+        if not fits.all():
+            raise ValueError(f"{field}: {np.unique(values[~fits]).tolist()} cannot be given here")
+
+    def _check_randomizable(self, field: str) -> None:
+        like = getattr(self.model, field, None)
+        if not isinstance(like, np.ndarray):
+            return  # model_field() says what there is
+        real = like.dtype.kind == "f"
+        if (real and field in _FIXED) or (not real and field not in _WHOLE):
+            raise ValueError(f"{field}: part of the model's structure, which is the same in all worlds")
 
     def model_field(self, name: str) -> np.ndarray:
         """A field of the model with a value per world, ``[B, ...]``, live: see :meth:`randomize`."""

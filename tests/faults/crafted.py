@@ -77,7 +77,7 @@ def _(house, value):
         f["traj_0"].attrs["outcome"] = value
 
 
-@variants("encoding_is", {k: v for k, v in ATTRIBUTES.items() if k != "text"})
+@variants("encoding_is", {k: v for k, v in ATTRIBUTES.items() if k not in ("text", "fixed_text")})
 def _(house, value):
     with change(house) as f:
         f["traj_0/obs/agent/qpos"].attrs["encoding"] = value

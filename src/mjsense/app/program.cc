@@ -6,7 +6,9 @@
 #include <mujoco/mujoco.h>
 
 #include <CLI/CLI.hpp>
+#include <cerrno>
 #include <cstdio>
+#include <cstring>
 #include <exception>
 #include <filesystem>
 #include <mutex>
@@ -226,14 +228,18 @@ int run(int argc, char** argv) {
   }
   const RepairResult result = repair(existing(repair_options.path));
   print(repair_options.json ? result.json() : result.text());
-  return 0;
+  return result.failures.empty() ? 0 : kFailed;
 }
 
 }  // namespace
 
 int run_program(int argc, char** argv) {
   try {
-    return run(argc, argv);
+    const int code = run(argc, argv);
+    // A full disk behind > is no success.
+    if (std::fflush(stdout) != 0 || std::ferror(stdout))
+      throw RuntimeError(fmt::format("cannot write to stdout: {}", std::strerror(errno)));
+    return code;
   } catch (const std::exception& e) {
     fmt::print(stderr, "mjsense: {}\n", one_line(e.what()));
     return kWrongInput;

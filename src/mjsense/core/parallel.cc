@@ -1,9 +1,14 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "mjsense/core/parallel.h"
 
+#include <fmt/format.h>
 #include <sched.h>
 
 #include <algorithm>
+#include <new>
+
+#include "mjsense/core/error.h"
+#include "mjsense/core/process_state.h"
 
 namespace mjsense {
 
@@ -14,11 +19,37 @@ int available_cpus() {
 }
 
 ThreadPool::ThreadPool(int threads) {
+  if (threads > kMostThreads)
+    throw ValueError(fmt::format("threads is {}: must be at most {}", threads, kMostThreads));
   const int count = threads > 0 ? threads : available_cpus();
-  for (int t = 1; t < count; ++t) workers_.emplace_back([this, t] { worker(t); });
+  try {
+    workers_.reserve(count - 1);
+    for (int t = 1; t < count; ++t) workers_.emplace_back([this, t] { worker(t); });
+  } catch (const std::exception& e) {
+    // Those that run wait on what would be destroyed under them.
+    const std::size_t started = workers_.size();
+    {
+      const std::lock_guard lock(mutex_);
+      stop_ = true;
+    }
+    wake_.notify_all();
+    for (std::thread& w : workers_) w.join();
+    throw RuntimeError(fmt::format("cannot start thread {} of {}: {}; ask for fewer threads",
+                                   started + 2, count, e.what()));
+  }
+  add_owner(this);
 }
 
 ThreadPool::~ThreadPool() {
+  if (forget_owner(this)) {
+    // The threads stayed in the parent of a fork. Fresh ones in their place, for what waits on a
+    // condition cannot be destroyed, nor a thread that was not joined.
+    new (&workers_) std::vector<std::thread>();
+    new (&mutex_) std::mutex();
+    new (&wake_) std::condition_variable();
+    new (&done_) std::condition_variable();
+    return;
+  }
   {
     const std::lock_guard lock(mutex_);
     stop_ = true;

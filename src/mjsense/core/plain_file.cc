@@ -7,6 +7,7 @@
 
 #include <algorithm>
 #include <cerrno>
+#include <cstdio>
 #include <cstring>
 
 #include "mjsense/core/error.h"
@@ -38,7 +39,7 @@ std::size_t character(std::string_view text) {
   for (std::size_t i = 1; i < size; ++i) {
     if ((byte(i) & 0xC0) != 0x80) return 0;
   }
-  if (first == 0xC2 && byte(1) < 0xA0) return 0;                       // C1 controls
+  if (first == 0xC2 && byte(1) < 0xA0) return 0;  // C1 controls
   if ((first == 0xE0 && byte(1) < 0xA0) || (first == 0xED && byte(1) >= 0xA0)) return 0;
   if ((first == 0xF0 && byte(1) < 0x90) || (first == 0xF4 && byte(1) >= 0x90)) return 0;
   return size;
@@ -59,8 +60,8 @@ Fd open_plain(const std::filesystem::path& folder, std::string_view name) {
   const Fd dir(open(folder.empty() ? "." : folder.c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC));
   if (!dir) fail(fmt::format("cannot be opened: {}", std::strerror(errno)));
   // Without O_NONBLOCK a pipe would make us wait for its writer.
-  Fd file(openat(dir.get(), std::string(name).c_str(),
-                 O_RDONLY | O_NOFOLLOW | O_NONBLOCK | O_CLOEXEC));
+  Fd file(
+      openat(dir.get(), std::string(name).c_str(), O_RDONLY | O_NOFOLLOW | O_NONBLOCK | O_CLOEXEC));
   if (!file && errno == ELOOP) fail("is a link, which is not followed");
   if (!file && errno == ENOENT) fail("does not exist");
   if (!file) fail(fmt::format("cannot be opened: {}", std::strerror(errno)));
@@ -84,6 +85,28 @@ bool is_plain_folder(const std::filesystem::path& path) {
 std::int64_t size_of(const Fd& file) {
   struct stat about = {};
   return fstat(file.get(), &about) == 0 ? static_cast<std::int64_t>(about.st_size) : 0;
+}
+
+void write_file(const std::filesystem::path& path,
+                std::initializer_list<std::span<const std::byte>> pieces) {
+  const std::string part = path.string() + ".part";
+  const auto fail = [&] {
+    const int error = errno;
+    unlink(part.c_str());
+    throw RuntimeError(fmt::format("cannot write '{}': {}", path.string(), std::strerror(error)));
+  };
+  unlink(part.c_str());  // of an earlier attempt, or a link that leads elsewhere
+  Fd file(open(part.c_str(), O_WRONLY | O_CREAT | O_EXCL | O_NOFOLLOW | O_CLOEXEC, 0644));
+  if (!file) fail();
+  for (std::span<const std::byte> left : pieces) {
+    while (!left.empty()) {
+      const ssize_t n = write(file.get(), left.data(), left.size());
+      if (n < 0 && errno == EINTR) continue;
+      if (n <= 0) fail();
+      left = left.subspan(static_cast<std::size_t>(n));
+    }
+  }
+  if (close(file.release()) != 0 || rename(part.c_str(), path.c_str()) != 0) fail();
 }
 
 std::string printable(std::string_view text) {

@@ -2,8 +2,11 @@
 #pragma once
 // Files whose names come from other files: only plain names inside one folder, no links, no pipes.
 
+#include <cstddef>
 #include <cstdint>
 #include <filesystem>
+#include <initializer_list>
+#include <span>
 #include <string>
 #include <string_view>
 
@@ -26,6 +29,11 @@ namespace mjsense {
 [[nodiscard]] bool is_plain_folder(const std::filesystem::path& path);
 
 [[nodiscard]] std::int64_t size_of(const Fd& file);
+
+// Writes a file whole or not at all: under another name first. Throws RuntimeError that names it
+// and says why the system refuses.
+void write_file(const std::filesystem::path& path,
+                std::initializer_list<std::span<const std::byte>> pieces);
 
 // Text from a file as a terminal may see it: control characters, and bytes that are no UTF-8,
 // become '?'.

@@ -4,12 +4,8 @@
 #include <fmt/format.h>
 #include <zlib.h>
 
-#include <cerrno>
-#include <cstdio>
-#include <cstring>
-#include <memory>
-
 #include "mjsense/core/error.h"
+#include "mjsense/core/plain_file.h"
 
 namespace mjsense {
 namespace {
@@ -76,17 +72,7 @@ std::vector<std::uint8_t> encode_png(std::span<const std::uint8_t> pixels, int w
 void write_png(const std::filesystem::path& path, std::span<const std::uint8_t> pixels, int width,
                int height, int channels) {
   const std::vector<std::uint8_t> bytes = encode_png(pixels, width, height, channels);
-  std::filesystem::path part = path;
-  part += ".part";
-  bool ok = false;
-  if (std::FILE* file = std::fopen(part.c_str(), "wb")) {
-    ok = std::fwrite(bytes.data(), 1, bytes.size(), file) == bytes.size();
-    ok = std::fclose(file) == 0 && ok;
-  }
-  if (ok && std::rename(part.c_str(), path.c_str()) == 0) return;
-  const int error = errno;
-  std::remove(part.c_str());
-  throw RuntimeError(fmt::format("cannot write '{}': {}", path.string(), std::strerror(error)));
+  write_file(path, {std::as_bytes(std::span(bytes))});
 }
 
 }  // namespace mjsense

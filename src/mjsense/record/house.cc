@@ -4,6 +4,7 @@
 #include <fcntl.h>
 #include <fmt/format.h>
 #include <sys/file.h>
+#include <sys/resource.h>
 #include <sys/stat.h>
 #include <unistd.h>
 
@@ -55,8 +56,7 @@ void write_whole(const fs::path& path, std::string_view text) {
   const fs::path part = path.string() + ".part";
   unlink(part.c_str());
   {
-    const Fd fd(
-        open(part.c_str(), O_WRONLY | O_CREAT | O_EXCL | O_NOFOLLOW | O_CLOEXEC, 0644));
+    const Fd fd(open(part.c_str(), O_WRONLY | O_CREAT | O_EXCL | O_NOFOLLOW | O_CLOEXEC, 0644));
     if (!fd || write(fd.get(), text.data(), text.size()) != static_cast<ssize_t>(text.size()) ||
         fsync(fd.get()) != 0) {
       const int error = errno;
@@ -84,7 +84,8 @@ std::string read_whole(const fs::path& folder, const char* name) {
 // Throws where a name of ours is a link to a place that we would write to.
 void require_no_link(const fs::path& path) {
   if (fs::is_symlink(path))
-    throw ValueError(fmt::format("'{}' is a link, which is not followed: remove it", path.string()));
+    throw ValueError(
+        fmt::format("'{}' is a link, which is not followed: remove it", path.string()));
 }
 
 // What the recording of this house must be if it is to be published: JSON text of our own making.
@@ -169,6 +170,9 @@ void name_videos(hid_t trajectory, const fs::path& staged, const fs::path& house
 void reserve(const fs::path& path, std::int64_t bytes) {
   const Fd file(open(path.c_str(), O_WRONLY | O_NOFOLLOW | O_CLOEXEC));
   if (!file) throw_file("write", path, errno);
+  rlimit limit{};
+  if (getrlimit(RLIMIT_FSIZE, &limit) == 0 && limit.rlim_cur < static_cast<rlim_t>(bytes))
+    throw_file("write", path, EFBIG);
   if (fallocate(file.get(), FALLOC_FL_KEEP_SIZE, 0, bytes) == 0) return;
   if (errno == ENOSPC || errno == EDQUOT || errno == EFBIG) throw_file("write", path, errno);
   // Where space cannot be reserved (some network file systems), at least ask how much there is.
@@ -183,8 +187,8 @@ void reserve(const fs::path& path, std::int64_t bytes) {
 void Decisions::add(std::int64_t episode, bool kept) {
   if (!kept_by_episode_.emplace(episode, kept).second) return;
   kept_ += kept;
-  for (auto at = kept_by_episode_.find(next_);
-       at != kept_by_episode_.end() && at->first == next_; ++at, ++next_) {
+  for (auto at = kept_by_episode_.find(next_); at != kept_by_episode_.end() && at->first == next_;
+       ++at, ++next_) {
     if (at->second) settled_.push_back(next_);
   }
 }
@@ -304,8 +308,8 @@ void House::set_aside(const fs::path& folder, const std::string& why) {
     to = damaged / fmt::format("{}.{}", folder.filename().string(), n);
   move(folder, to);
   sync(damaged);
-  damage_.push_back(fmt::format("{} {}; it was set aside as '{}'", folder.filename().string(), why,
-                                to.string()));
+  damage_.push_back(
+      fmt::format("{} {}; it was set aside as '{}'", folder.filename().string(), why, to.string()));
 }
 
 void House::load_staged() {

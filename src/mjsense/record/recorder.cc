@@ -8,6 +8,7 @@
 
 #include "mjsense/core/error.h"
 #include "mjsense/core/plain_file.h"
+#include "mjsense/core/process_state.h"
 #include "mjsense/record/recorder_impl.h"
 
 namespace mjsense {
@@ -65,9 +66,8 @@ Recorder::Impl::Impl(const RecordingCfg& cfg_) : cfg(cfg_) {
   for (int s = 0; s < streams; ++s)
     free_chunks[s].resize(static_cast<std::size_t>(kBuffersPerWorld) * cfg.num_worlds);
   if (!plan.videos.empty()) {
-    pool = std::make_unique<EncoderPool>(cfg.video, cfg.fps,
-                                         static_cast<int>(plan.videos.size()) * cfg.num_worlds,
-                                         cfg.stop);
+    pool = std::make_unique<EncoderPool>(
+        cfg.video, cfg.fps, static_cast<int>(plan.videos.size()) * cfg.num_worlds, cfg.stop);
   }
   writer = std::thread([this] { write_jobs(); });
 }
@@ -256,8 +256,13 @@ void Recorder::Impl::post(Job job) {
   work.notify_one();
 }
 
-Recorder::Recorder(const RecordingCfg& cfg) : impl_(std::make_unique<Impl>(cfg)) {}
-Recorder::~Recorder() = default;
+Recorder::Recorder(const RecordingCfg& cfg) : impl_(std::make_unique<Impl>(cfg)) {
+  add_owner(impl_.get());
+}
+Recorder::~Recorder() {
+  // In a forked process its threads are not there to be joined.
+  if (forget_owner(impl_.get())) static_cast<void>(impl_.release());
+}
 
 void Recorder::begin_episode(int world, const EpisodeMeta& meta) { impl_->begin(world, meta); }
 void Recorder::append(int world, const StepRow& row) { impl_->append(world, row); }

@@ -4,11 +4,13 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <cmath>
 #include <cstring>
 #include <numeric>
 
 #include "mjsense/core/error.h"
 #include "mjsense/core/parallel.h"
+#include "mjsense/core/process_state.h"
 
 #ifdef __SANITIZE_THREAD__
 #include <sanitizer/tsan_interface.h>
@@ -57,6 +59,7 @@ constexpr Component kComponents[] = {{"time", mjSTATE_TIME, 0},
 
 // Warnings after which the numbers of a world mean nothing. A bad control is one: MuJoCo would
 // silently use zeros.
+constexpr int kBadState = mjNWARNING;  // not a warning of MuJoCo's: written state is no number
 constexpr int kFatalWarnings[] = {mjWARN_BADQPOS, mjWARN_BADQVEL, mjWARN_BADQACC, mjWARN_BADCTRL};
 
 // Whether a step may be mj_step taken apart, so that it starts from stages that are there already
@@ -116,6 +119,40 @@ void step_from(mjtStage stage, const mjModel* m, mjData* d) {
   }
 }
 
+// The name of the first component of a state that holds NaN or infinity; "" if none does.
+std::string_view bad_component(mjBatch* batch, int w) {
+  const auto size = static_cast<std::size_t>(mjb_nstate(batch));
+  const mjtNum* row = mjb_state(batch) + w * size;
+  // A sum of zeros is none if a term is bad; such states are rare and looked at twice.
+  mjtNum sum = 0;
+  for (std::size_t i = 0; i < size; ++i) sum += row[i] * 0;
+  if (sum == 0) return "";
+  for (const Component& c : kComponents) {
+    int count = 0;
+    const mjtNum* part = mjb_stateComponent(batch, c.bit, &count) + w * size;
+    for (int i = 0; i < count; ++i) {
+      if (!std::isfinite(part[i])) return c.name;
+    }
+  }
+  return "";
+}
+
+// A world is one mjData and three copies of its state: asked for too many, MuJoCo would end the
+// program, or the system would.
+void check_memory(const mjModel* m, int num_worlds) {
+  mjData* d = mj_makeData(m);
+  const std::uint64_t state = 3 * sizeof(mjtNum) * mj_stateSize(m, mjSTATE_INTEGRATION);
+  const std::uint64_t each = sizeof(mjData) + d->nbuffer + state, space = each + d->narena;
+  mj_deleteData(d);
+  const auto require = [&](std::uint64_t needed, std::uint64_t available, const char* what) {
+    if (needed > available)
+      throw ValueError(fmt::format("num_worlds is {}: they need {} of {}, and {} are left",
+                                   num_worlds, gigabytes(needed), what, gigabytes(available)));
+  };
+  require(each * num_worlds, available_memory(), "memory");
+  require(space * num_worlds, available_address_space(), "address space");
+}
+
 }  // namespace
 
 // The warnings that a world had before, to see which came.
@@ -141,7 +178,9 @@ class Worlds::Warnings {
 Worlds::Worlds(const mjModel* model, int num_worlds, int threads) : num_worlds_(num_worlds) {
   if (num_worlds < 1)
     throw ValueError(fmt::format("num_worlds is {}: must be at least 1", num_worlds));
-  if (threads < 0) throw ValueError(fmt::format("threads is {}: must be 0 (all) or more", threads));
+  if (threads < 0 || threads > kMostThreads)
+    throw ValueError(fmt::format("threads is {}: must be 0 (all) to {}", threads, kMostThreads));
+  check_memory(model, num_worlds);
   mjBatchConfig config;
   mjb_defaultConfig(&config);
   config.nthread = threads > 0 ? threads : available_cpus();
@@ -152,6 +191,7 @@ Worlds::Worlds(const mjModel* model, int num_worlds, int threads) : num_worlds_(
   mjModel unmarked = *model;
   unmarked.vis.global.bvactive = 0;
   batch_ = mjb_makeBatch(&unmarked, num_worlds, &config, error, sizeof error);
+  if (batch_) add_owner(this);
   if (!batch_) throw RuntimeError(fmt::format("cannot make {} worlds: {}", num_worlds, error));
   num_state_ = static_cast<std::size_t>(mjb_nstate(batch_));
   workbenches_ = std::vector<Workbench>(mjb_nthread(batch_));
@@ -173,6 +213,7 @@ Worlds::Worlds(const mjModel* model, int num_worlds, int threads) : num_worlds_(
 }
 
 Worlds::~Worlds() {
+  if (forget_owner(this)) return;  // MuJoCo's pool would wait for threads that are not here
   mjb_deleteBatch(batch_);
   for (Workbench& bench : workbenches_) mj_deleteData(bench.data);
 }
@@ -334,7 +375,8 @@ bool Worlds::step_world(const mjModel* m, mjData* d, int w, const Call& call) {
   if (stage != mjSTAGE_NONE && (derived_[w].behind || !same_state(w))) stage = mjSTAGE_NONE;
   if (stage == mjSTAGE_ACC && (!same_controls(w) || bad_control(m, d))) stage = mjSTAGE_VEL;
   const bool seen = stage != mjSTAGE_NONE || call.hooks->wants_substep() ||
-                    call.hooks->control_every() > 0 || call.hooks->stage() != mjSTAGE_NONE || !can_split_step(m);
+                    call.hooks->control_every() > 0 || call.hooks->stage() != mjSTAGE_NONE ||
+                    !can_split_step(m);
   if (!(seen ? step_whole(m, d, w, call) : step_unseen(m, d, w, call))) return false;
   remember(m, d, w);
   return true;
@@ -415,6 +457,10 @@ void Worlds::run_world(const mjModel* m, mjData* d, int w, const Call& call) {
       if (!step_world(m, d, w, call)) return;  // apply() resets it
       break;
     case Op::kForward:
+      if (!bad_component(batch_, w).empty()) {
+        diverged_[w] = kBadState + 1;  // apply() resets it
+        return;
+      }
       derived.stage = mjSTAGE_NONE;
       bring(m, d, w, mjSTAGE_ACC);
       remember(m, d, w);
@@ -470,6 +516,10 @@ void Worlds::run(const mjModel* m, mjData* d, int w, void* arg) {
 }
 
 void Worlds::apply(WorldIds ids, Call call, bool save) {
+  if (is_orphan(this))
+    throw RuntimeError(
+        "simulation: this process was forked from the one that made it, and its threads stayed "
+        "there; make it after the fork, or start processes with 'spawn'");
   checked_ids(ids, ids_);
   if (call.op != Op::kVisit) failures_.clear();
   if (ids_.empty()) return;  // MuJoCo would take it for all
@@ -491,6 +541,14 @@ void Worlds::apply(WorldIds ids, Call call, bool save) {
       }
     } else if (diverged_[w]) {
       const int warning = diverged_[w] - 1;
+      if (warning == kBadState) {
+        failures_.push_back({w, fmt::format("the state that was written holds NaN or infinity ({})",
+                                            bad_component(batch_, w))});
+        diverged_[w] = 0;
+        derived_[w] = {};
+        failed.push_back(w);
+        continue;
+      }
       const auto& stat = mjb_warning(batch_)[w * mjNWARNING + warning];
       failures_.push_back({w, fmt::format("MuJoCo: {} (at {:.4f} s)",
                                           mju_warningText(warning, stat.lastinfo), time(w))});

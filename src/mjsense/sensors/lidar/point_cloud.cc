@@ -3,10 +3,10 @@
 
 #include <fmt/format.h>
 
-#include <fstream>
 #include <vector>
 
 #include "mjsense/core/error.h"
+#include "mjsense/core/plain_file.h"
 
 namespace mjsense {
 
@@ -42,12 +42,7 @@ void write_point_cloud(const std::string& path, std::span<const float> points,
   } else {
     throw ValueError(fmt::format("point cloud '{}': the name must end in .ply or .pcd", path));
   }
-  std::ofstream out(path, std::ios::binary);
-  out << header;
-  out.write(reinterpret_cast<const char*>(rows.data()),
-            static_cast<std::streamsize>(rows.size() * sizeof(float)));
-  out.flush();
-  if (!out) throw RuntimeError(fmt::format("point cloud '{}': cannot be written", path));
+  write_file(path, {std::as_bytes(std::span(header)), std::as_bytes(std::span(rows))});
 }
 
 }  // namespace mjsense

@@ -1,0 +1,120 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "mjsense/core/plain_file.h"
+
+#include <fmt/format.h>
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+#include <sys/resource.h>
+#include <sys/stat.h>
+#include <sys/wait.h>
+
+#include <fstream>
+
+#include "mjsense/core/error.h"
+#include "mjsense/core/parallel.h"
+#include "mjsense/core/testing/temp_dir.h"
+
+namespace mjsense {
+namespace {
+
+using ::testing::HasSubstr;
+using ::testing::StartsWith;
+
+std::string refused(const std::filesystem::path& folder, std::string_view name) {
+  try {
+    const Fd file = open_plain(folder, name);
+    return "";
+  } catch (const RuntimeError& e) {
+    return e.what();
+  }
+}
+
+TEST(PlainFile, OnlyFilesOfTheFolder) {
+  testing::TempDir dir;
+  std::ofstream(dir.path / "video.mp4") << "x";
+  std::filesystem::create_symlink("/etc/passwd", dir.path / "link");
+  std::filesystem::create_directory(dir.path / "folder");
+  mkfifo((dir.path / "pipe").c_str(), 0600);
+  EXPECT_EQ(refused(dir.path, "video.mp4"), "");
+  EXPECT_THAT(refused(dir.path, "link"), HasSubstr("is a link, which is not followed"));
+  EXPECT_THAT(refused(dir.path, "folder"), HasSubstr("is a folder, expected a file"));
+  EXPECT_THAT(refused(dir.path, "pipe"), HasSubstr("is a pipe, expected a file"));
+  EXPECT_THAT(refused(dir.path, "none"), HasSubstr("does not exist"));
+  for (const std::string& name :
+       {std::string("../x"), std::string("/etc/passwd"), std::string("folder/x"), std::string("."),
+        std::string(".."), std::string(""), std::string("a\nb"), std::string("a\0b", 3),
+        std::string(256, 'x')}) {
+    EXPECT_THAT(refused(dir.path, name), HasSubstr("is no plain file name")) << name;
+  }
+}
+
+TEST(PlainFile, WrittenWholeOrNotAtAll) {
+  testing::TempDir dir;
+  const std::filesystem::path mine = dir.path / "mine", out = dir.path / "out";
+  std::ofstream(mine) << "mine";
+  std::filesystem::create_symlink(mine, dir.path / "out.part");  // planted
+  const std::string text = "text";
+  write_file(out, {std::as_bytes(std::span(text)), std::as_bytes(std::span(text))});
+  EXPECT_EQ(std::filesystem::file_size(out), 8u);
+  EXPECT_EQ(std::filesystem::file_size(mine), 4u);
+  EXPECT_FALSE(std::filesystem::is_symlink(out));
+  try {
+    write_file(dir.path / "no" / "folder", {});
+    FAIL();
+  } catch (const RuntimeError& e) {
+    EXPECT_THAT(e.what(), StartsWith("cannot write '"));
+  }
+}
+
+TEST(PlainFile, PrintableText) {
+  EXPECT_EQ(printable("wrist_camera µ 日"), "wrist_camera µ 日");
+  EXPECT_EQ(printable("\x1b[31mred\x1b[0m\n"), "?[31mred?[0m?");
+  EXPECT_EQ(printable("\xff\xfe.mp4"), "??.mp4");
+  EXPECT_EQ(printable("\xc2\x9b"
+                      "31m"),
+            "??31m");                           // the one-byte form of escape and bracket
+  EXPECT_EQ(printable("\xed\xa0\x80"), "???");  // half of a pair
+  EXPECT_EQ(printable("cut \xe6\x97"), "cut ??");
+}
+
+// What the system does not give is an error, and nobody waits for what was started.
+TEST(ThreadPool, ThreadsThatCannotBeStarted) {
+  EXPECT_THROW(ThreadPool(1'000'000), ValueError);
+#if !defined(__SANITIZE_ADDRESS__) && !defined(__SANITIZE_THREAD__)
+  const pid_t pid = fork();
+  if (pid == 0) {
+    alarm(20);
+    const rlimit limit{std::uint64_t{3} << 30, std::uint64_t{3} << 30};
+    setrlimit(RLIMIT_AS, &limit);  // a thread takes 8 MiB of it
+    try {
+      const ThreadPool pool(4000);
+      _exit(2);
+    } catch (const RuntimeError& e) {
+      _exit(std::string(e.what()).find("ask for fewer threads") != std::string::npos ? 0 : 3);
+    }
+  }
+  int status = 0;
+  waitpid(pid, &status, 0);
+  EXPECT_TRUE(WIFEXITED(status) && WEXITSTATUS(status) == 0) << status;
+#endif
+}
+
+// In the child of a fork the threads are not there: its end does not wait for them.
+TEST(ThreadPool, EndsInTheChildOfAFork) {
+  auto pool = std::make_unique<ThreadPool>(3);
+  pool->run(8, [](int, int) {});
+  const pid_t pid = fork();
+  if (pid == 0) {
+    alarm(20);
+    pool.reset();
+    int sum = 0;
+    ThreadPool(1).run(3, [&](int item, int) { sum += item; });
+    _exit(sum == 3 ? 0 : 1);
+  }
+  int status = 0;
+  waitpid(pid, &status, 0);
+  EXPECT_TRUE(WIFEXITED(status) && WEXITSTATUS(status) == 0) << status;
+}
+
+}  // namespace
+}  // namespace mjsense
