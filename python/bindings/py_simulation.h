@@ -7,6 +7,7 @@
 // Threads: every call runs without the interpreter's lock and takes the simulation's own mutex, so
 // that Python threads take turns. The mutex is recursive because a sensor written in Python reads
 // other sensors while it is computed; it is never waited for with the interpreter's lock held.
+// Processes: a fork's copy raises (birthplace.h).
 
 #include <nanobind/nanobind.h>
 
@@ -18,6 +19,7 @@
 
 #include "mjsense/core/error.h"
 #include "mjsense/sim/simulation.h"
+#include "python/bindings/birthplace.h"
 #include "python/bindings/numpy.h"
 #include "python/bindings/python_sensor.h"
 
@@ -30,6 +32,7 @@ class Turns {
   // `what` names the call in the message when a sensor's own code makes it.
   template <class Body>
   void change(std::string_view what, Body&& body) {
+    place_.check("the simulation");
     nb::gil_scoped_release unlock;
     std::lock_guard lock(mutex_);
     if (depth_ > 0) {
@@ -43,6 +46,7 @@ class Turns {
   }
   template <class Body>
   void read(Body&& body) {
+    place_.check("the simulation");
     nb::gil_scoped_release unlock;
     std::lock_guard lock(mutex_);
     const Depth in(depth_);
@@ -51,6 +55,7 @@ class Turns {
   // For code that runs for the simulation. Called without the interpreter's lock.
   template <class Body>
   auto work(Body&& body) {
+    place_.check("the simulation");
     std::lock_guard lock(mutex_);
     const Depth in(depth_);
     return body();
@@ -62,6 +67,7 @@ class Turns {
     ~Depth() { --depth; }
     int& depth;
   };
+  const Birthplace place_;
   std::recursive_mutex mutex_;
   int depth_ = 0;
 };
@@ -72,7 +78,7 @@ class PySimulation {
                std::uint64_t seed) {
     const SimulationCfg cfg{num_worlds, decimation, threads, seed};
     nb::gil_scoped_release unlock;
-    sim_ = std::make_shared<Simulation>(std::move(scene), cfg);
+    sim_ = make_shared_here<Simulation>(std::move(scene), cfg);
   }
   // One that somebody else made.
   explicit PySimulation(std::shared_ptr<Simulation> sim,

@@ -53,7 +53,7 @@ class PyRecorder {
     for (nb::handle handle : handles) add(nb::cast<SensorHandle&>(handle).sensor);
     for (const auto& sensor : sensors_) cfg.sensors.push_back(sensor.get());
     nb::gil_scoped_release unlock;
-    recorder_ = std::make_unique<Recorder>(cfg);
+    recorder_ = make_shared_here<Recorder>(cfg);
   }
   ~PyRecorder() {
     nb::gil_scoped_release unlock;
@@ -108,6 +108,7 @@ class PyRecorder {
  private:
   template <class Body>
   void unlocked(Body&& body) {
+    place_.check("the recorder");
     nb::gil_scoped_release unlock;
     body();
   }
@@ -141,7 +142,8 @@ class PyRecorder {
   nb::object simulation_;                         // keeps it alive
   std::vector<std::shared_ptr<Sensor>> sources_;  // what is refreshed
   std::vector<std::shared_ptr<Sensor>> sensors_;  // what is stored
-  std::unique_ptr<Recorder> recorder_;
+  const Birthplace place_;
+  std::shared_ptr<Recorder> recorder_;
 };
 
 nb::dict stats(PyRecorder& self) {

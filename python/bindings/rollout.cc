@@ -145,7 +145,7 @@ class PyRollout {
     parts_.join(cfg);
     nb::gil_scoped_release unlock;
     try {
-      rollout_ = std::make_shared<Rollout>(cfg);
+      rollout_ = make_shared_here<Rollout>(cfg);
     } catch (...) {
       parts_.host()->end();
       throw;

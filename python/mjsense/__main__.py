@@ -5,6 +5,7 @@ from __future__ import annotations
 
 import signal
 import sys
+from itertools import pairwise
 
 from mjsense import _core
 from mjsense.assets import use_installed_meshes
@@ -15,10 +16,11 @@ def main() -> int:
     """Runs the program with this process's arguments; its exit code."""
     # Ctrl-C is the program's affair, as where no Python is.
     signal.signal(signal.SIGINT, signal.SIG_DFL)
-    if {"real", "--meshes=real"} & set(sys.argv):
+    words = sys.argv[1:]
+    if "--meshes=real" in words or ("--meshes", "real") in pairwise(words):
         use_installed_meshes()
     use_installed_ffmpeg()
-    return _core.run_program(["mjsense", *sys.argv[1:]])
+    return _core.run_program(["mjsense", *words])
 
 
 if __name__ == "__main__":

@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING, Any, ClassVar
 import gymnasium
 import numpy as np
 
-from mjsense import _core, data
+from mjsense import _core, _show, data
 from mjsense._arguments import KnownAttributes, checked
 from mjsense._rows import Row, leaves, nested, rows_of_space, rows_of_value
 from mjsense.drawing import DebugShapes
@@ -55,7 +55,18 @@ class NativeSensor(KnownAttributes):
         self._complete = True
 
     def __repr__(self) -> str:
-        return f"<{self.kind} sensor '{self.name}'>"
+        return _show.line(f"{self.kind} sensor '{self.name}'", self._shown())
+
+    def _repr_html_(self) -> str:
+        """For notebooks: its fields, and thumbnails of the first world's images."""
+        images = {}
+        if self.kind == "camera" and self._core is not None and not self._core.closed:
+            images = {name or self.name: rows[0] for name, rows in self.fields.items() if rows.ndim == 4}
+        return _show.table(f"{self.kind} sensor '{self.name}'", self._shown(), images)
+
+    def _shown(self) -> list[_show.Row]:
+        worlds = next((len(array) for array in self._fields.values()), None)
+        return _show.rows_of(self.specs, worlds) if self._fields else []
 
     def _bind(self, core: _core.Simulation) -> None:
         self._core = core
@@ -183,7 +194,20 @@ class Sensor:
             self.observation_space = observation_space
 
     def __repr__(self) -> str:
-        return f"<{type(self).__name__} '{self.uuid}'>"
+        return _show.line(f"{type(self).__name__} '{self.uuid}'", self._mjs_about())
+
+    def _repr_html_(self) -> str:
+        """For notebooks: what it is, and a thumbnail if its row is an image."""
+        live = self._mjs_shown is not None and not self._mjs_core.closed
+        images = {self.uuid: self.rows[0]} if live and self._mjs_shown.ndim == 4 else {}
+        return _show.table(f"{type(self).__name__} '{self.uuid}'", self._mjs_about(), images)
+
+    def _mjs_about(self) -> list[_show.Row]:
+        spec = self._mjs_row_spec() if self.uuid else None
+        if spec is None:
+            return []
+        worlds = [] if self._mjs_shown is None else [len(self._mjs_shown)]
+        return [_show.Row("", spec["dtype"], (*worlds, *spec["shape"]), self.unit, self.frame, spec["description"])]
 
     # ------------------------------------------------------------------------------------------------- yours to write
 

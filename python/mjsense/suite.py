@@ -41,6 +41,13 @@ class SensorSuite(KnownAttributes):
         for sensor in sensors:
             self.add(sensor)
 
+    def __repr__(self) -> str:
+        return f"<suite of {len(self.sensors)} sensors: {', '.join(self.sensors)}>"
+
+    def _repr_html_(self) -> str:
+        """For notebooks: each sensor as it shows itself."""
+        return "".join(sensor._repr_html_() for sensor in self.sensors.values())
+
     def get(self, uuid: str) -> Any:
         """The sensor of this name."""
         if uuid not in self.sensors:

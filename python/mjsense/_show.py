@@ -1,0 +1,103 @@
+# SPDX-License-Identifier: Apache-2.0
+"""How sensors show themselves: a line of text, and in notebooks a table with thumbnails of images."""
+
+from __future__ import annotations
+
+import base64
+import html
+import struct
+import zlib
+from collections.abc import Mapping
+from typing import Any, NamedTuple
+
+import numpy as np
+
+_THUMBNAIL = 160
+"""Pixels, the longer side at most."""
+
+
+class Row(NamedTuple):
+    """What is shown of one field."""
+
+    name: str
+    """Empty for the only or main one."""
+    dtype: str
+    shape: tuple[int, ...]
+    """With the worlds, if they are known."""
+    unit: str
+    frame: str
+    sentence: str
+
+    def text(self) -> str:
+        """'force float32 [64, 4, 3] N in world'."""
+        shape = f"{self.dtype} [{', '.join(map(str, self.shape))}]"
+        return " ".join(filter(None, (self.name, shape, self.unit, self.frame and f"in {self.frame}")))
+
+
+def rows_of(specs: Mapping[str, Any], num_worlds: int | None) -> list[Row]:
+    """From the specs of a sensor's fields."""
+    worlds = () if num_worlds is None else (num_worlds,)
+    return [Row(name, s.dtype, (*worlds, *s.shape), s.unit, s.frame, s.description) for name, s in specs.items()]
+
+
+def line(head: str, rows: list[Row]) -> str:
+    """``<contact sensor 'feet': found float32 [64, 4]; force float32 [64, 4, 3] N>``."""
+    return f"<{head}: {'; '.join(row.text() for row in rows)}>" if rows else f"<{head}>"
+
+
+def table(head: str, rows: list[Row], images: Mapping[str, np.ndarray]) -> str:
+    """HTML of the same, with the images ``[H, W, C]`` that can be shown."""
+    columns = ("field", "dtype", "shape", "unit", "frame", "")
+    body = "".join(
+        "<tr>" + "".join(f"<td style='text-align:left'>{html.escape(cell)}</td>" for cell in _cells(row)) + "</tr>" for row in rows
+    )
+    shown = "".join(
+        f"<figure style='display:inline-block;margin:4px'><img src='{source}'/><figcaption>{html.escape(name)}</figcaption></figure>"
+        for name, image in images.items()
+        if (source := thumbnail(image))
+    )
+    header = "".join(f"<th style='text-align:left'>{column}</th>" for column in columns)
+    fields = f"<table><tr>{header}</tr>{body}</table>" if rows else ""
+    return f"<div><b>{html.escape(head)}</b>{fields}{shown}</div>"
+
+
+def _cells(row: Row) -> tuple[str, ...]:
+    return row.name, row.dtype, f"[{', '.join(map(str, row.shape))}]", row.unit, row.frame, row.sentence
+
+
+def thumbnail(image: np.ndarray) -> str | None:
+    """A data URL of a small PNG; None for what is no picture of numbers we can colour."""
+    if image.ndim != 3 or min(image.shape) < 1:
+        return None
+    step = -(-max(image.shape[:2]) // _THUMBNAIL)
+    pixels = _coloured(image[::step, ::step])
+    return None if pixels is None else "data:image/png;base64," + base64.b64encode(_png(pixels)).decode("ascii")
+
+
+def _coloured(image: np.ndarray) -> np.ndarray | None:
+    """uint8 [H, W, 3] of an image: colours as they are, near things bright, each id a colour of its own, normals as usual."""
+    channels = image.shape[2]
+    if image.dtype == np.uint8 and channels == 3:
+        return image
+    if image.dtype.kind == "f" and channels == 1:
+        seen = np.isfinite(image) & (image > 0)
+        low, high = (image[seen].min(), image[seen].max()) if seen.any() else (0.0, 1.0)
+        grey = np.where(seen, 255 - 215 * (image - low) / max(high - low, 1e-9), 0)
+        return np.repeat(np.nan_to_num(grey).astype(np.uint8), 3, axis=2)
+    if image.dtype.kind == "i" and channels in (1, 2):
+        ids = image[..., :1].astype(np.int64)
+        return np.where(ids < 0, 0, 64 + ids * np.array([73, 151, 211]) % 192).astype(np.uint8)
+    if image.dtype.kind == "f" and channels == 3:
+        return np.clip(127.5 * (np.nan_to_num(image) + 1), 0, 255).astype(np.uint8)
+    return None
+
+
+def _png(pixels: np.ndarray) -> bytes:
+    height, width = pixels.shape[:2]
+    lines = np.concatenate([np.zeros((height, 1), np.uint8), np.ascontiguousarray(pixels).reshape(height, -1)], axis=1)
+
+    def chunk(kind: bytes, data: bytes) -> bytes:
+        return struct.pack(">I", len(data)) + kind + data + struct.pack(">I", zlib.crc32(kind + data))
+
+    header = struct.pack(">IIBBBBB", width, height, 8, 2, 0, 0, 0)
+    return b"\x89PNG\r\n\x1a\n" + chunk(b"IHDR", header) + chunk(b"IDAT", zlib.compress(lines.tobytes())) + chunk(b"IEND", b"")

@@ -1,0 +1,69 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The program in the Python package is the executable, as a function; and the ffmpeg that it finds."""
+
+import os
+import subprocess
+import sys
+
+import pytest
+
+from mjsense import ffmpeg
+
+
+def run(*words, **env):
+    return subprocess.run(
+        [sys.executable, "-m", "mjsense", *words], capture_output=True, text=True, env={**os.environ, **env}, timeout=120
+    )
+
+
+def test_it_is_the_program():
+    version = run("--version")
+    assert (version.returncode, version.stderr) == (0, "")
+    assert version.stdout.startswith("mjsense ")
+    assert "record" in run("--help").stdout
+    wrong = run("sensrs")
+    assert (wrong.returncode, wrong.stderr) == (2, "mjsense: no command 'sensrs'; did you mean 'sensors'?\n")
+
+
+def test_other_words_run_programs_of_the_path(tmp_path):
+    program = tmp_path / "mjsense-hello"
+    program.write_text('#!/bin/sh\necho "hello $1"\nexit 7\n')
+    program.chmod(0o755)
+    said = run("hello", "you", PATH=f"{tmp_path}{os.pathsep}{os.environ['PATH']}")
+    assert (said.returncode, said.stdout) == (7, "hello you\n")
+
+
+@pytest.fixture
+def imageio(tmp_path, monkeypatch):
+    binaries = tmp_path / "imageio_ffmpeg/binaries"
+    binaries.mkdir(parents=True)
+    (tmp_path / "imageio_ffmpeg/__init__.py").write_text("raise ImportError('must not be imported')")
+    (binaries / "README.md").touch()
+    program = binaries / "ffmpeg-linux-x86_64-v7.0.2"
+    program.touch()
+    program.chmod(0o755)
+    monkeypatch.syspath_prepend(tmp_path)
+    monkeypatch.delitem(sys.modules, "imageio_ffmpeg", raising=False)
+    monkeypatch.setenv("MJSENSE_FFMPEG", "")
+    return program
+
+
+def test_ffmpeg_of_the_path_comes_first(imageio, tmp_path, monkeypatch):
+    own = tmp_path / "bin/ffmpeg"
+    own.parent.mkdir()
+    monkeypatch.setenv("PATH", str(own.parent))
+    ffmpeg.use_installed_ffmpeg()
+    assert os.environ["MJSENSE_FFMPEG"] == str(imageio)
+    ffmpeg.use_installed_ffmpeg()
+    monkeypatch.setenv("MJSENSE_FFMPEG", "")
+    own.touch()
+    own.chmod(0o755)
+    ffmpeg.use_installed_ffmpeg()
+    assert os.environ["MJSENSE_FFMPEG"] == ""
+
+
+def test_a_named_ffmpeg_is_kept(imageio, monkeypatch):
+    monkeypatch.setenv("PATH", "")
+    monkeypatch.setenv("MJSENSE_FFMPEG", "/opt/ffmpeg")
+    ffmpeg.use_installed_ffmpeg()
+    assert os.environ["MJSENSE_FFMPEG"] == "/opt/ffmpeg"

@@ -1,0 +1,77 @@
+# SPDX-License-Identifier: Apache-2.0
+"""A sensor shows itself by shape, unit and frame, and an image in a notebook by a thumbnail."""
+
+import base64
+import re
+import struct
+import zlib
+
+import gymnasium
+import numpy as np
+from scenes import ball_scene, feet_cfg
+
+import mjsense as mjs
+
+
+class Height(mjs.Sensor):
+    """How high the ball is."""
+
+    uuid = "height"
+    unit = "m"
+    frame = "world"
+    observation_space = gymnasium.spaces.Box(-np.inf, np.inf, (1,), np.float32)
+
+    def compute(self, sim):
+        return sim.data.xpos[:, 1:2, 2]
+
+
+def thumbnails(text):
+    pictures = []
+    for source in re.findall(r"src='data:image/png;base64,([^']+)'", text):
+        png = base64.b64decode(source)
+        width, height = struct.unpack(">II", png[16:24])
+        length = struct.unpack(">I", png[33:37])[0]
+        pixels = np.frombuffer(zlib.decompress(png[41 : 41 + length]), np.uint8).reshape(height, 1 + 3 * width)
+        assert (pixels[:, 0] == 0).all()
+        pictures.append(pixels[:, 1:].reshape(height, width, 3))
+    return pictures
+
+
+def test_text():
+    scene = ball_scene(feet_cfg(fields=("found", "force")))
+    assert repr(scene["touch"]) == "<contact sensor 'touch'>"  # nothing is known before a simulation
+    height = Height()
+    assert repr(height) == "<Height 'height': float32 [1] m in world>"
+    sim = mjs.Simulation(scene, num_worlds=3)
+    sim.add(height)
+    assert repr(scene["ball/acc"]) == f"<builtin sensor 'ball/acc': float32 [3, 3] m/s^2 in {scene['ball/acc'].spec.frame}>"
+    assert repr(scene["touch"]).startswith("<contact sensor 'touch': found float32 [3, 1]; force float32 [3, 1, 3] N in ")
+    assert repr(height) == "<Height 'height': float32 [3, 1] m in world>"
+    suite = mjs.SensorSuite([scene["touch"], height])
+    assert repr(suite) == "<suite of 2 sensors: touch, height>"
+    assert suite._repr_html_().count("<table>") == 2
+    sim.close()
+    assert "m/s^2" in repr(scene["ball/acc"])  # also when all is over
+
+
+def test_html():
+    eye = mjs.CameraSensorCfg(
+        name="eye", pos=(0, -2, 1), quat=(0.7071, 0.7071, 0, 0), width=400, height=200, data_types=("rgb", "depth", "segmentation", "normals")
+    )
+    scene = ball_scene(eye)
+    sim = mjs.Simulation(scene, num_worlds=2)
+    shown = scene["eye"]._repr_html_()
+    rgb, depth, *others = thumbnails(shown)
+    assert len(others) == 2
+    np.testing.assert_array_equal(rgb, scene["eye"].data.rgb[0, ::3, ::3])
+    z = scene["eye"].data.depth[0, ::3, ::3, 0]
+    assert (depth[z == 0] == 0).all()
+    assert depth[z == z[z > 0].min()].min() == 255  # near is bright
+    assert "[2, 200, 400, 3]" in shown and "Colour image" in shown
+    assert "<script>" not in mjs.SensorSuite([Named()])._repr_html_()
+    sim.close()
+    assert not thumbnails(scene["eye"]._repr_html_())
+
+
+class Named(Height):
+    uuid = "<script>"
