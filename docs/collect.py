@@ -1,18 +1,19 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Collects the pages that stand in the rooms (src/mjsense/sensors/*/page.md and so on) into the documentation."""
+"""Collects the pages that stand in the rooms (src/mjsense/sensors/*/page.md and so on) and beside robots into the documentation."""
 
 import pathlib
 
 from mkdocs.structure.files import File
 
-SOURCE = pathlib.Path(__file__).parent.parent / "src" / "mjsense"
-ROOMS = ("sensors", "robots", "tasks", "policies")
+ROOT = pathlib.Path(__file__).parent.parent
+SOURCE = ROOT / "src" / "mjsense"
+ROOMS = {"sensors": SOURCE, "robots": ROOT / "models", "tasks": SOURCE, "policies": SOURCE}
 ALONE = ("effects",)  # rooms with one page
 
 
 def on_files(files, config):
-    for room in ROOMS:
-        pages = sorted((SOURCE / room).glob("*/page.md"))
+    for room, root in ROOMS.items():
+        pages = sorted((root / room).glob("*/page.md"))
         for page in pages:
             files.append(File.generated(config, f"{room}/{page.parent.name}.md", content=page.read_text().replace("../../../../docs/", "../")))
             for picture in sorted(page.parent.glob("*.svg")) + sorted(page.parent.glob("*.png")):

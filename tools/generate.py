@@ -332,7 +332,7 @@ class Generator:
         for name in SIGNATURES:
             path = PACKAGE / name
             out[path] = self.signature(path.read_text(), name)
-        for page in [*sorted((ROOT / "docs").glob("*.md")), *sorted((ROOT / "src").rglob("page.md"))]:
+        for page in [*sorted((ROOT / "docs").glob("*.md")), *sorted((ROOT / "src").rglob("page.md")), *sorted((ROOT / "models").rglob("page.md"))]:
             old = page.read_text()
             if "<!-- end -->" in old:
                 out[page] = self.tables(old)

@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 // Robots in Python: what a robot.toml says, and kinematics of the robot alone.
 
+#include "mjsense/robots/robot.h"
+
 #include <mujoco/mujoco.h>
 #include <nanobind/nanobind.h>
 #include <nanobind/stl/string.h>
@@ -8,8 +10,8 @@
 
 #include <memory>
 
+#include "mjsense/core/embedded.h"
 #include "mjsense/robots/load_robot.h"
-#include "mjsense/robots/robot.h"
 #include "mjsense/scene/resolve.h"
 #include "mjsense/scene/scene.h"
 #include "python/bindings/bindings.h"
@@ -107,6 +109,12 @@ class PyRobot {
 }  // namespace
 
 void bind_robot(nb::module_& m) {
+  m.def(
+      "robot_text",
+      [](const std::string& name) {
+        return std::string(embedded_file("robots/" + name + "/robot.toml"));
+      },
+      "The robot.toml of one of ours.");
   nb::class_<PyRobot>(m, "Robot", "A robot, as C++ sees it.")
       .def(nb::init<const std::string&>(), nb::arg("name_or_path"))
       .def_prop_ro("name", [](const PyRobot& r) { return r.cfg().name; })

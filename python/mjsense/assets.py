@@ -5,26 +5,39 @@ from __future__ import annotations
 
 import importlib.util
 import os
+import sys
+import tomllib
+from collections.abc import Iterable
 from pathlib import Path
 
-_FRANKA = "MJSENSE_FRANKA_MESHES"
+
+_PACKAGE = "package:"
 
 
-def franka_meshes() -> Path | None:
-    """The folder of the Franka's meshes in gymnasium-robotics (extra ``assets``), None without it. Imports nothing."""
-    spec = importlib.util.find_spec("gymnasium_robotics")
-    for root in (spec.submodule_search_locations or ()) if spec else ():
-        folder = Path(root, "envs", "assets", "kitchen_franka", "franka_assets", "meshes", "visual")
-        if (folder / "link0.stl").is_file():
-            return folder
-    return None
+def installed_meshes(robots: Iterable[str]) -> dict[str, Path]:
+    """Folders of meshes by the environment variable that names them, of robots given by the texts of their files. Imports nothing."""
+    found = {}
+    for text in robots:
+        meshes = tomllib.loads(text).get("meshes", {})
+        if "env" not in meshes or not meshes.get("folder", "").startswith(_PACKAGE):
+            continue
+        package, _, inside = meshes["folder"].removeprefix(_PACKAGE).partition("/")
+        spec = importlib.util.find_spec(package)
+        for root in (spec.submodule_search_locations or ()) if spec else ():
+            folder = Path(root, inside)
+            if all((folder / file).is_file() for file in meshes.get("files", {}).values()):
+                found[meshes["env"]] = folder
+    return found
 
 
 def use_installed_meshes() -> None:
-    """Draws robots with the meshes there are, for tasks made from now on. ``MJSENSE_FRANKA_MESHES``, even if empty, has priority."""
-    if _FRANKA not in os.environ and (folder := franka_meshes()):
-        os.environ[_FRANKA] = str(folder)
+    """Draws robots with the meshes there are, for tasks made from now on. A variable that is set, even if empty, has priority."""
+    from mjsense import _core
+
+    for variable, folder in installed_meshes(map(_core.robot_text, _core.robot_names())).items():
+        os.environ.setdefault(variable, str(folder))
 
 
-if __name__ == "__main__":
-    print(franka_meshes() or "")
+if __name__ == "__main__":  # as lines for a shell, of the robots in a folder
+    for variable, folder in installed_meshes(p.read_text() for p in Path(sys.argv[1]).glob("*/robot.toml")).items():
+        print(f"export {variable}=${{{variable}-{folder}}}")

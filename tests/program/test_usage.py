@@ -123,7 +123,7 @@ def test_help_names_tasks_robots_and_policies(mjsense):
     import mjsense as package
 
     text = mjsense("record", "--help").stdout
-    for line, names in (("which task: ", package.task_names()), ("which robot: ", package.robot_names()),
+    for line, names in (("which task: ", package.task_names()), ("has its own: ", package.robot_names()),
                         ("what drives it: ", package.policy_names())):  # fmt: skip
         assert line + ", ".join(names) in text
     assert ", ".join(package.task_names()) in mjsense("sensors", "--help").stdout

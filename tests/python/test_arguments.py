@@ -79,7 +79,7 @@ def live(tmp_path_factory):
     objects += [
         mjs.JointPositionSensor(), mjs.JointVelocitySensor(), mjs.PoseSensor("p", body="ball/ball"), mjs.TcpPoseSensor(),
         mjs.RobotBasePoseSensor(), mjs.EnvStatesSensor(), mjs.CameraParameterSensor("eye"), mjs.CameraImageSensor("eye"),
-        mjs.ImagePointsSensor({}, []), mjs.GraspStateSensor("ball/ball"),
+        mjs.ImagePointsSensor({}, []), mjs.GraspStateSensor("ball/ball"), mjs.Robot("franka"),
     ]  # fmt: skip
     return {type(o): o for o in objects}, sim
 
@@ -87,7 +87,8 @@ def live(tmp_path_factory):
 RIGHT = {"field": "geom_friction", "values": 1.0, "name": "geom_friction", "uuid": "scan", "kind": "line", "dt": 0.1, "sensors": [],
          "env": None, "center": (0, 0, 0), "start": (0, 0, 0), "end": (0, 0, 1), "radius": 0.1, "color": (1, 0, 0, 1), "num_envs": 2,
          "position": (0, 0, 0), "rotation_matrix": np.eye(3), "path": "x.nothing", "scene": None, "sensor": None, "world": 0,
-         "episode": 0, "body": "ball/ball", "joint": "ball/root", "pos": (0, 0, 0), "value": 0.0, "actions": [[0.0] * 8]}  # fmt: skip
+         "episode": 0, "body": "ball/ball", "joint": "ball/root", "pos": (0, 0, 0), "value": 0.0, "actions": [[0.0] * 8],
+         "group": "arm", "pose": [0.5, 0, 0.9, 0, 1, 0, 0]}  # fmt: skip
 WRONG = ("3", 1.5, -1, 2**40, 10**30, np.nan, None, True, b"x", object(), [0.5], [-1], [7], ["a"], {}, np.zeros((1, 2, 3)))
 
 

@@ -4,7 +4,7 @@ import os
 
 import pytest
 
-from mjsense import assets
+from mjsense import _core, assets
 
 
 @pytest.fixture
@@ -12,7 +12,8 @@ def package(tmp_path, monkeypatch):
     """A gymnasium_robotics that holds a mesh and must not be imported."""
     folder = tmp_path / "gymnasium_robotics/envs/assets/kitchen_franka/franka_assets/meshes/visual"
     folder.mkdir(parents=True)
-    (folder / "link0.stl").touch()
+    for link in range(8):
+        (folder / f"link{link}.stl").touch()
     (tmp_path / "gymnasium_robotics/__init__.py").write_text("raise ImportError")
     monkeypatch.syspath_prepend(tmp_path)
     importlib.invalidate_caches()
@@ -20,7 +21,9 @@ def package(tmp_path, monkeypatch):
 
 
 def test_meshes_are_found_without_import(package):
-    assert assets.franka_meshes() == package
+    texts = map(_core.robot_text, _core.robot_names())
+    assert assets.installed_meshes(texts) == {"MJSENSE_FRANKA_MESHES": package}
+    assert assets.installed_meshes(["model = 'x.xml'"]) == {}
 
 
 def test_the_users_choice_has_priority(package, monkeypatch):

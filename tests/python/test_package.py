@@ -33,7 +33,7 @@ def test_one_mujoco():
 def test_registries():
     assert "pick" in mjs.task_names() and "franka" in mjs.robot_names() and "planner" in mjs.policy_names()
     assert any(name.endswith(".xml") for name in mjs.embedded_models())
-    scene = mjs.Scene(mjs.SceneCfg(entities={"robot": mjs.EntityCfg(model="embedded:robots/franka/fr3.xml")}))
+    scene = mjs.Scene(mjs.SceneCfg(entities={"robot": mjs.Robot("franka").entity()}))
     assert scene["robot"].joint_names
 
 

@@ -8,7 +8,10 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <cstdio>
+#include <fstream>
 #include <set>
+#include <stdexcept>
 #include <string>
 #include <vector>
 
@@ -43,11 +46,20 @@ struct Band {  // of rows or columns
 class Sheet {
  public:
   explicit Sheet(const fs::path& png) {
-    const VideoProbe probe = probe_video(png, false, 1, "");
-    width_ = probe.width;
-    height_ = probe.height;
-    const int first = 0;
-    rgb_ = grab_frames(png, {&first, 1}, width_, height_, false, "");
+    std::uint8_t head[24];  // of a PNG: signature, then IHDR with width and height
+    std::ifstream(png, std::ios::binary).read(reinterpret_cast<char*>(head), sizeof head);
+    const auto number = [&](int at) {
+      return head[at] << 24 | head[at + 1] << 16 | head[at + 2] << 8 | head[at + 3];
+    };
+    width_ = number(16);
+    height_ = number(20);
+    rgb_.resize(std::size_t{3} * width_ * height_);
+    const std::string command =
+        "ffmpeg -loglevel error -i '" + png.string() + "' -f rawvideo -pix_fmt rgb24 -";
+    FILE* pipe = popen(command.c_str(), "r");
+    const std::size_t read = pipe ? fread(rgb_.data(), 1, rgb_.size(), pipe) : 0;
+    if (pipe == nullptr || pclose(pipe) != 0 || read != rgb_.size())
+      throw std::runtime_error("cannot read " + png.string());
   }
   Rgb at(int x, int y) const {
     const std::uint8_t* p = &rgb_[3 * (static_cast<std::size_t>(y) * width_ + x)];
@@ -170,9 +182,10 @@ TEST(ContactSheet, DepthIsColouredFromNearToFar) {
         near = std::min(near, z);
         far = std::max(far, z);
       }
-  EXPECT_TRUE(sheet.reads(top - kLine, fmt::format("wrist_camera_depth, 6 frames, {:.2f} m (yellow)"
-                                                   " to {:.2f} m (blue)",
-                                                   near, far),
+  EXPECT_TRUE(sheet.reads(top - kLine,
+                          fmt::format("wrist_camera_depth, 6 frames, {:.2f} m (yellow)"
+                                      " to {:.2f} m (blue)",
+                                      near, far),
                           true));
   constexpr Rgb kNothing = {0, 0, 0}, kFarthest = {20, 20, 60}, kNearest = {250, 220, 90};
   int nearest = 0, farthest = 0;

@@ -37,9 +37,9 @@ void validate(const MoveGroupCfg& cfg, std::string_view place) {
                                  place, cfg.name, cfg.spread.size(), cfg.init.size()));
   }
   if (cfg.kind == GroupKind::kBase && !cfg.init.empty()) {
-    throw ValueError(fmt::format(
-        "{}: '{}' is a base and has start positions: where it stands is the task's", place,
-        cfg.name));
+    throw ValueError(
+        fmt::format("{}: '{}' is a base and has start positions: where it stands is the task's",
+                    place, cfg.name));
   }
   if (cfg.kind == GroupKind::kGripper && cfg.pad_sites.size() != 2) {
     throw ValueError(fmt::format("{}: the gripper '{}' needs 2 pad_sites, has {}", place, cfg.name,
@@ -51,8 +51,7 @@ void validate(const RobotCfg& cfg, std::string_view place) {
   std::set<std::string> groups, cameras;
   for (const MoveGroupCfg& group : cfg.groups)
     check_unique(place, "move group", group.name, groups);
-  for (const CameraMount& camera : cfg.cameras)
-    check_unique(place, "camera", camera.name, cameras);
+  for (const CameraMount& camera : cfg.cameras) check_unique(place, "camera", camera.name, cameras);
   if (cfg.policy_dt_ms % cfg.ctrl_dt_ms != 0 || cfg.ctrl_dt_ms % cfg.sim_dt_ms != 0) {
     throw ValueError(
         fmt::format("{}: policy_dt_ms = {} must be a multiple of ctrl_dt_ms = {}, and that of "

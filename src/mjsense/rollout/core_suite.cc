@@ -86,10 +86,10 @@ SensorSuite core_suite(const Task& task, const ActionLog& log,
   // Everything hangs below the world: it is no part of a robot.
   const char* base =
       robot.base_body() > 0 ? mj_id2name(task.model(), mjOBJ_BODY, robot.base_body()) : nullptr;
-  suite.add(std::make_shared<EnvStatesSensor>("env_states", cfg.env_state_name,
-                                              robot.joint_groups(), cfg.env_state_size,
-                                              base ? base : "", cfg.name),
-            of_task);
+  suite.add(
+      std::make_shared<EnvStatesSensor>("env_states", cfg.env_state_name, robot.joint_groups(),
+                                        cfg.env_state_size, base ? base : "", cfg.name),
+      of_task);
   suite.add(std::make_shared<JsonFunctionSensor>("task_info", kTaskInfoLength,
                                                  "What the task says about the state.",
                                                  [&task](const World& world, JsonWriter& json) {

@@ -620,6 +620,55 @@ TEST(Worlds, AfterRawStepsWhatIsReadIsWhatMjStepLeft) {
   hooks.expect_fresh(0, m.get(), d.get());
 }
 
+// Controllers are asked before physics steps 0, n, 2n ... and see the state that they control; what
+// was computed from old controls or poses is not reused, whatever was read in between.
+TEST(Worlds, ControlsOfTheStateAreThoseOfTheNaiveLoop) {
+  struct Controller : WorldHooks {
+    mjtStage reads = mjSTAGE_NONE;
+    std::vector<int> indices;
+    mjtStage stage() const override { return reads; }
+    void substep(const World& /*world*/) override {}
+    void reset(const World& /*world*/) override {}
+    void refreshed(const World& /*world*/) override {}
+    int control_every() const override { return 3; }
+    static void act(const mjModel* m, mjData* d) {
+      for (int i = 0; i < m->nu; ++i) d->ctrl[i] = 0.3 * std::sin(3 * d->qpos[0] + i) - d->qvel[0];
+      for (int i = 0; i < m->nmocap; ++i) d->mocap_pos[3 * i] += 0.001;
+    }
+    mjtStage control(const World& world, int index) override {
+      indices.push_back(index);
+      act(world.model, world.data);
+      return world.model->nmocap > 0 ? mjSTAGE_NONE : mjSTAGE_VEL;
+    }
+  };
+  for (const bool hand : {false, true}) {
+    char error[512] = "";
+    ModelPtr m = load("Euler");
+    if (hand) {
+      mjSpec* spec = mj_parseXMLString(kHand, nullptr, error, sizeof error);
+      ASSERT_TRUE(spec) << error;
+      m.reset(mj_compile(spec, nullptr));
+      mj_deleteSpec(spec);
+    }
+    Worlds worlds(m.get(), 1, 1);
+    Controller hooks;
+    worlds.reset(all_worlds, -1, hooks);
+    const DataPtr d = make_data(m.get());
+    mj_resetData(m.get(), d.get());
+    for (const mjtStage reads : {mjSTAGE_NONE, mjSTAGE_ACC, mjSTAGE_VEL, mjSTAGE_ACC}) {
+      hooks.reads = reads;
+      hooks.indices.clear();
+      worlds.step(8, hooks);
+      EXPECT_EQ(hooks.indices, (std::vector<int>{0, 1, 2}));
+      for (int k = 0; k < 8; ++k) {
+        if (k % 3 == 0) Controller::act(m.get(), d.get());
+        mj_step(m.get(), d.get());
+      }
+      expect_same_state(worlds, 0, m.get(), d.get());
+    }
+  }
+}
+
 // Forces belong to the state at every substep, not at the last one alone.
 TEST(Worlds, ASubstepHookSeesFreshForces) {
   struct Forces : Recording {

@@ -210,7 +210,8 @@ void PickPlanner::act(const World& world, Action& action) {
   }
   for (std::size_t g = 0; g < robot.groups().size(); ++g) {
     const MoveGroup& group = robot.groups()[g];
-    if (group.kind == GroupKind::kBase) action.commands[g].set({});
+    // One that drives is left out: it holds.
+    if (group.kind == GroupKind::kBase && !group.controlled()) action.commands[g].set({});
   }
   action.commands[arm].set({plan.q.data(), n});
   action.commands[robot.gripper()].set({&leg.gripper, 1});
