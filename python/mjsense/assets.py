@@ -10,7 +10,6 @@ import tomllib
 from collections.abc import Iterable
 from pathlib import Path
 
-
 _PACKAGE = "package:"
 
 

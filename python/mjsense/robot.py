@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 
-from mjsense import _core, assets
+from mjsense import _core
 from mjsense._arguments import KnownAttributes, checked
 from mjsense.configs import EntityCfg
 from mjsense.errors import UnknownNameError
@@ -66,7 +66,6 @@ class Robot(KnownAttributes):
     """
 
     def __init__(self, name_or_path: str | Path) -> None:
-        assets.use_installed_meshes()
         self._core = _core.Robot(os.fspath(name_or_path))
         self.name: str = self._core.name
         """What messages and recordings call it."""

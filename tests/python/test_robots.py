@@ -106,9 +106,12 @@ def test_a_robots_state_can_be_restored(tmp_path):
 
 
 def test_no_code_knows_a_robot_by_its_name():
-    """Outside the robots' folders: but for the default of what is recorded."""
+    """Outside the robots' folders: but for the default of what is recorded, and an example in a sentence of help."""
     names = re.compile("|".join(mjs.robot_names()), re.IGNORECASE)
-    known = {("rollout.h", 'std::string robot = "franka";')}
+    known = {
+        ("rollout.h", 'std::string robot = "franka";'),
+        ("rollout.h", '"variable (``MJSENSE_FRANKA_MESHES``) names them; it moves the same.")'),
+    }
     for path in (ROOT / "src/mjsense").rglob("*"):
         if path.suffix not in (".h", ".cc") or path.name.endswith(("_test.cc", "_bench.cc")) or "testing" in path.parts:
             continue

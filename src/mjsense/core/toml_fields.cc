@@ -105,8 +105,8 @@ class Reader {
     std::vector<std::string_view> kinds;
     for (const StructDecl* decl : type.alternatives()) kinds.emplace_back(decl->kind);
     if (!kind)
-      throw ValueError(fmt::format("{}: '{}' needs a kind: one of {}", place, name,
-                                   fmt::join(kinds, ", ")));
+      throw ValueError(
+          fmt::format("{}: '{}' needs a kind: one of {}", place, name, fmt::join(kinds, ", ")));
     const auto word = kind->value_exact<std::string>();
     if (!word) wrong(type, node, name);
     const int which = word_index(*word, kinds, place, fmt::format("{}.kind", name));

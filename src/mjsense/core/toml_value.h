@@ -2,9 +2,10 @@
 #pragma once
 // Values of TOML files as values of fields: what every reader of such files shares.
 
+#include <toml++/toml.h>
+
 #include <string>
 #include <string_view>
-#include <toml++/toml.h>
 
 #include "mjsense/core/fields.h"
 

@@ -93,7 +93,8 @@ void BasePlacement::write(const StateRow& state, const Pose& base) const {
     return;
   }
   if (!fault_.empty())
-    throw ValueError(fmt::format("{}: its base '{}' cannot be placed: {}", place_, base_name_, fault_));
+    throw ValueError(
+        fmt::format("{}: its base '{}' cannot be placed: {}", place_, base_name_, fault_));
   if (mocap_ >= 0 && is_mocap_) {
     write_vec(base.p, state.mocap_pos + 3 * mocap_);
     write_quat(base.q, state.mocap_quat + 4 * mocap_);

@@ -44,7 +44,7 @@ class BasePlacement {
   int free_qpos_ = -1, free_dof_ = -1;
   int mocap_ = -1;
   bool is_mocap_ = false;  // the base itself
-  Pose root_;  // X_WR of the model: of the mocap body, or of what stands in the world
+  Pose root_;              // X_WR of the model: of the mocap body, or of what stands in the world
   std::vector<Link> links_;
   Pose tail_;
   std::vector<int> dofs_;  // of the links

@@ -62,9 +62,10 @@ std::function<void(mjSpec* spec, const std::string& prefix)> use_meshes(
   }
   for (const auto& [body, file] : cfg.files) {
     if (fs::is_regular_file(folder / file)) continue;
-    throw ValueError(fmt::format("{}: '{}' is no file; the folder must hold the {} meshes that {} "
-                                 "names",
-                                 who, (folder / file).string(), cfg.files.size(), robot_file));
+    throw ValueError(
+        fmt::format("{}: '{}' is no file; the folder must hold the {} meshes that {} "
+                    "names",
+                    who, (folder / file).string(), cfg.files.size(), robot_file));
   }
   return [cfg, folder](mjSpec* spec, const std::string& prefix) {
     replace(cfg, folder, spec, prefix);

@@ -13,9 +13,9 @@ namespace mjsense {
 struct MoveGroup {
   std::string name;
   GroupKind kind = GroupKind::kArm;
-  std::vector<int> joints;              // ids
-  std::vector<int> qpos, dofs;          // addresses; a free joint has 7 and 6, a ball 4 and 3
-  std::vector<int> actuators;           // empty: nothing drives it (a mocap base)
+  std::vector<int> joints;                  // ids
+  std::vector<int> qpos, dofs;              // addresses; a free joint has 7 and 6, a ball 4 and 3
+  std::vector<int> actuators;               // empty: nothing drives it (a mocap base)
   std::vector<double> ctrl_low, ctrl_high;  // of the actuators
   // What a command is: numbers of it, and their unit: "rad"; else "0 open .. 255 closed".
   int command_size = 0;

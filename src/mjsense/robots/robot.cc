@@ -29,10 +29,13 @@ Robot::Robot(RobotCfg cfg, const mjModel* model, int num_worlds, std::string_vie
   const std::string place = "robot '" + cfg_.name + "'";
   base_body_ = resolve(model, mjOBJ_BODY, prefix_ + cfg_.base_body, place);
   check_groups(place, cfg_.groups.size());
-  ControllerInit init{model, num_worlds, base_body_,
-                      periods.value_or(ControlPeriods{0.001 * cfg_.policy_dt_ms,
-                                                      0.001 * cfg_.ctrl_dt_ms}),
-                      prefix_, place};
+  ControllerInit init{
+      model,
+      num_worlds,
+      base_body_,
+      periods.value_or(ControlPeriods{0.001 * cfg_.policy_dt_ms, 0.001 * cfg_.ctrl_dt_ms}),
+      prefix_,
+      place};
   std::vector<int> base_joints;
   for (const MoveGroupCfg& g : cfg_.groups) {
     init.place = place + ", move group '" + g.name + "'";
@@ -151,7 +154,8 @@ Pose Robot::target_pose(const World& world, int group) const {
     const auto [g, k] = source[i];
     const GroupValues& from = targets[g];
     // A gripper's one target stands for all its joints.
-    q[i] = from.size > 0 ? from.values[k < from.size ? k : 0] : world.data->qpos[groups_[g].qpos[k]];
+    q[i] =
+        from.size > 0 ? from.values[k < from.size ? k : 0] : world.data->qpos[groups_[g].qpos[k]];
   }
   return chains_[group]->fk({q, source.size()});
 }
@@ -236,8 +240,7 @@ mjtStage Robot::control(const World& world, int index) const {
   mjtStage valid = mjSTAGE_ACC;
   const StateRow state = state_row(world.data);
   for (const auto& controller : controllers_) {
-    if (controller->every_step())
-      valid = std::min(valid, controller->compute(world, index, state));
+    if (controller->every_step()) valid = std::min(valid, controller->compute(world, index, state));
   }
   return valid;
 }

@@ -47,12 +47,14 @@ void visit_fields(V& v, MoveGroupCfg& c) {
   v("name", c.name, "What actions and observations call it.").required();
   v("kind", c.kind, "What it is: the first arm and gripper are those that tasks use.").required();
   v("joints", c.joints, "Its joints, in the order of its numbers.");
-  v("actuators", c.actuators, "Its actuators, in the order of its targets; none: nothing drives it.");
+  v("actuators", c.actuators,
+    "Its actuators, in the order of its targets; none: nothing drives it.");
   v("controller", c.controller, "What a command means.");
   v("leaf_site", c.leaf_site, "Site of its tool frame; none: the robot's base frame.");
   v("root_body", c.root_body, "Body whose subtree is the group; a gripper's geoms are there.");
   v("init", c.init, "Start positions (qpos) of its joints: rad or m.");
-  v("spread", c.spread, "Half widths of the uniform noise of the start; none: no noise.").at_least(0);
+  v("spread", c.spread, "Half widths of the uniform noise of the start; none: no noise.")
+      .at_least(0);
   v("open_command", c.open_command, "Of a gripper's actuators: open.");
   v("closed_command", c.closed_command, "Of a gripper's actuators: closed.");
   v("max_opening", c.max_opening, "Of a gripper, between the pads.").unit("m").at_least(0);
@@ -176,7 +178,8 @@ void visit_fields(V& v, RobotCfg& c) {
       .at_least(1);
   v("env_state_name", c.env_state_name,
     "Name of a further row of ``env_states`` in MolmoSpaces' form; none: there is no such row.");
-  v("env_state_size", c.env_state_size, "Numbers of that row; 0: what the groups need.").at_least(0);
+  v("env_state_size", c.env_state_size, "Numbers of that row; 0: what the groups need.")
+      .at_least(0);
 }
 // Periods that divide, unique names.
 void validate(const RobotCfg& cfg, std::string_view place);

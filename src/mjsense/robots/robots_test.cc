@@ -255,8 +255,8 @@ TEST_P(EveryRobot, AMovingBaseGoesWhereItIsTold) {
   RobotValues q;
   robot.read_qpos(alone.world, q);
   for (std::size_t g = 0; g < robot.groups().size(); ++g) {
-    expect_same(robot.fk(static_cast<int>(g), q),
-                robot.tcp_pose(alone.world, static_cast<int>(g)), 1e-12, "tool");
+    expect_same(robot.fk(static_cast<int>(g), q), robot.tcp_pose(alone.world, static_cast<int>(g)),
+                1e-12, "tool");
   }
 }
 

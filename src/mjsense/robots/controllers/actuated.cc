@@ -71,13 +71,12 @@ void ActuatedController::start(const StateRow& state) const {
 
 void ActuatedController::hold(const World& world, std::span<double> target) {
   for (int i = 0; i < size(); ++i) {
-    const double value = group_.kind == GroupKind::kActuators
-                             ? world.data->ctrl[group_.actuators[i]]
-                         : group_.kind == GroupKind::kGripper
-                             ? (gripper_is_open(group_, world) ? group_.open_command
-                                                               : group_.closed_command)
-                         : is_position_servo(model_, group_.actuators[i]) ? position(world, i)
-                                                                          : 0.0;
+    const double value =
+        group_.kind == GroupKind::kActuators ? world.data->ctrl[group_.actuators[i]]
+        : group_.kind == GroupKind::kGripper
+            ? (gripper_is_open(group_, world) ? group_.open_command : group_.closed_command)
+        : is_position_servo(model_, group_.actuators[i]) ? position(world, i)
+                                                         : 0.0;
     target[i] = clip(i, value);
   }
 }

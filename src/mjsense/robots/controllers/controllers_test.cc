@@ -191,11 +191,12 @@ TEST(Controllers, WheelsTurnAsTheBaseShouldMove) {
   group.kind = GroupKind::kBase;
   group.actuators = {"l", "r"};
   group.controller = DifferentialBaseCfg{1.0, 2.0, 0.1, 0.5};
-  OneGroup r(R"(<mujoco><worldbody><body name="base"><freejoint/><geom type="box" size=".2 .2 .05" mass="5"/>
+  OneGroup r(
+      R"(<mujoco><worldbody><body name="base"><freejoint/><geom type="box" size=".2 .2 .05" mass="5"/>
       <body name="l" pos="0 .25 0"><joint name="l" axis="0 1 0" damping=".1"/><geom type="cylinder" size=".1 .02" quat="1 1 0 0" mass="1"/></body>
       <body name="r" pos="0 -.25 0"><joint name="r" axis="0 1 0" damping=".1"/><geom type="cylinder" size=".1 .02" quat="1 1 0 0" mass="1"/></body>
       </body></worldbody><actuator><velocity name="l" joint="l" kv="1"/><velocity name="r" joint="r" kv="1"/></actuator></mujoco>)",
-             group);
+      group);
   r.play({0.5, 1.0});
   EXPECT_NEAR(r.data->ctrl[0], (0.5 - 0.25) / 0.1, 1e-12);
   EXPECT_NEAR(r.data->ctrl[1], (0.5 + 0.25) / 0.1, 1e-12);
@@ -205,8 +206,9 @@ TEST(Controllers, MocapBasesGoNoFasterThanTheyMay) {
   MoveGroupCfg group;
   group.kind = GroupKind::kBase;
   group.controller = MocapBaseCfg{0.5, 1.0};
-  OneGroup r(R"(<mujoco><worldbody><body name="base" mocap="true"><geom size=".1"/></body></worldbody></mujoco>)",
-             group);
+  OneGroup r(
+      R"(<mujoco><worldbody><body name="base" mocap="true"><geom size=".1"/></body></worldbody></mujoco>)",
+      group);
   r.play({1, 0, 0, 1, 0, 0, 0}, 10);  // 0.6 s
   EXPECT_NEAR(r.robot->base_pose(r.world).p.x, 0.3, 1e-9);
   r.play({1, 0, 0, 1, 0, 0, 0}, 30);

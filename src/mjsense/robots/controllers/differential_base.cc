@@ -99,9 +99,8 @@ class Planar final : public DifferentialBase {
 
 }  // namespace
 
-std::unique_ptr<Controller> make_kind(const DifferentialBaseCfg& cfg,
-                                                   const MoveGroup& group,
-                                                   const ControllerInit& init) {
+std::unique_ptr<Controller> make_kind(const DifferentialBaseCfg& cfg, const MoveGroup& group,
+                                      const ControllerInit& init) {
   if (group.actuators.size() == 2) return std::make_unique<Wheels>(cfg, group, init);
   return std::make_unique<Planar>(cfg, group, init);
 }

@@ -27,14 +27,15 @@ class FreeBase final : public PoseTarget {
 }  // namespace
 
 std::unique_ptr<Controller> make_kind(const FreeBaseCfg& cfg, const MoveGroup& /*group*/,
-                                           const ControllerInit& init) {
+                                      const ControllerInit& init) {
   const mjModel* m = init.model;
   const int base = init.base_body;
   const int joint = m->body_jntnum[base] == 1 ? m->body_jntadr[base] : -1;
   if (joint < 0 || m->jnt_type[joint] != mjJNT_FREE) {
-    throw ValueError(fmt::format("{}: the controller 'free_base' needs a free joint, the base '{}' "
-                                 "has none",
-                                 init.place, name_of(m, mjOBJ_BODY, base)));
+    throw ValueError(
+        fmt::format("{}: the controller 'free_base' needs a free joint, the base '{}' "
+                    "has none",
+                    init.place, name_of(m, mjOBJ_BODY, base)));
   }
   const int target = resolve(m, mjOBJ_BODY, init.prefix + cfg.target, init.place);
   if (m->body_mocapid[target] < 0) {

@@ -43,7 +43,7 @@ class HolonomicBase final : public ActuatedController {
 }  // namespace
 
 std::unique_ptr<Controller> make_kind(const HolonomicBaseCfg& cfg, const MoveGroup& group,
-                                                const ControllerInit& init) {
+                                      const ControllerInit& init) {
   return std::make_unique<HolonomicBase>(cfg, group, init);
 }
 

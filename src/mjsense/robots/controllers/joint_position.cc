@@ -17,9 +17,8 @@ class JointPosition final : public ActuatedController {
 
 }  // namespace
 
-std::unique_ptr<Controller> make_kind(const JointPositionCfg& /*cfg*/,
-                                                const MoveGroup& group,
-                                                const ControllerInit& init) {
+std::unique_ptr<Controller> make_kind(const JointPositionCfg& /*cfg*/, const MoveGroup& group,
+                                      const ControllerInit& init) {
   return std::make_unique<JointPosition>(group, init);
 }
 

@@ -38,9 +38,8 @@ class JointPositionRelative final : public ActuatedController {
 
 }  // namespace
 
-std::unique_ptr<Controller> make_kind(const JointPositionRelativeCfg& cfg,
-                                                         const MoveGroup& group,
-                                                         const ControllerInit& init) {
+std::unique_ptr<Controller> make_kind(const JointPositionRelativeCfg& cfg, const MoveGroup& group,
+                                      const ControllerInit& init) {
   return std::make_unique<JointPositionRelative>(cfg, group, init);
 }
 

@@ -97,11 +97,10 @@ class MovingTargets final : public ActuatedController {
 
 }  // namespace
 
-std::unique_ptr<Controller> make_kind(const JointVelocityCfg& /*cfg*/,
-                                                const MoveGroup& group,
-                                                const ControllerInit& init) {
-  const bool velocity = std::ranges::all_of(
-      group.actuators, [&](int a) { return is_velocity_servo(init.model, a); });
+std::unique_ptr<Controller> make_kind(const JointVelocityCfg& /*cfg*/, const MoveGroup& group,
+                                      const ControllerInit& init) {
+  const bool velocity =
+      std::ranges::all_of(group.actuators, [&](int a) { return is_velocity_servo(init.model, a); });
   if (velocity) return std::make_unique<VelocityServos>(group, init);
   return std::make_unique<MovingTargets>(group, init);
 }

@@ -11,12 +11,12 @@
 namespace mjsense {
 
 std::unique_ptr<Controller> make_kind(const MocapBaseCfg& cfg, const MoveGroup& /*group*/,
-                                            const ControllerInit& init) {
+                                      const ControllerInit& init) {
   const int mocap = init.model->body_mocapid[init.base_body];
   if (mocap < 0) {
-    throw ValueError(fmt::format(
-        "{}: the controller 'mocap_base' needs a mocap body, the base '{}' is none", init.place,
-        name_of(init.model, mjOBJ_BODY, init.base_body)));
+    throw ValueError(
+        fmt::format("{}: the controller 'mocap_base' needs a mocap body, the base '{}' is none",
+                    init.place, name_of(init.model, mjOBJ_BODY, init.base_body)));
   }
   return std::make_unique<PoseTarget>(mocap, Pose{}, cfg.max_speed, cfg.max_turn, init);
 }

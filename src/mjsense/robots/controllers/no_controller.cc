@@ -19,9 +19,8 @@ class NoController final : public ActuatedController {
 
 }  // namespace
 
-std::unique_ptr<Controller> make_kind(const NoControllerCfg& /*cfg*/,
-                                               const MoveGroup& group,
-                                               const ControllerInit& init) {
+std::unique_ptr<Controller> make_kind(const NoControllerCfg& /*cfg*/, const MoveGroup& group,
+                                      const ControllerInit& init) {
   return std::make_unique<NoController>(group, init);
 }
 

@@ -35,9 +35,10 @@ void PoseTarget::command(const World& world, std::span<const double> command,
   const Quat q = quat(command.data() + 3);
   const double size = q.w * q.w + q.x * q.x + q.y * q.y + q.z * q.z;
   if (!(size > 1e-12)) {
-    throw ValueError(fmt::format("{}: the command ({}, {}, {}, {}) is no rotation; expected x, y, z "
-                                 "and w, x, y, z",
-                                 place_, q.w, q.x, q.y, q.z));
+    throw ValueError(
+        fmt::format("{}: the command ({}, {}, {}, {}) is no rotation; expected x, y, z "
+                    "and w, x, y, z",
+                    place_, q.w, q.x, q.y, q.z));
   }
   goals_[world.id] = {true, {vec3(command.data()), normalized(q)}};
 }

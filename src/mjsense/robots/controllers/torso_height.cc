@@ -41,7 +41,7 @@ class TorsoHeight final : public ActuatedController {
 }  // namespace
 
 std::unique_ptr<Controller> make_kind(const TorsoHeightCfg& cfg, const MoveGroup& group,
-                                              const ControllerInit& init) {
+                                      const ControllerInit& init) {
   return std::make_unique<TorsoHeight>(cfg, group, init);
 }
 
