@@ -8,65 +8,10 @@
 #include <string>
 
 #include "mjsense/core/error.h"
+#include "mjsense/core/testing/png.h"
 
 namespace mjsense {
 namespace {
-
-std::uint32_t u32(const std::uint8_t* p) { return p[0] << 24 | p[1] << 16 | p[2] << 8 | p[3]; }
-
-struct Picture {
-  int width = 0, height = 0, channels = 0;
-  std::vector<std::uint8_t> pixels;
-};
-
-// A decoder by the PNG specification (11.2, 12.3), of 8-bit pictures that are not interlaced.
-Picture decode(std::span<const std::uint8_t> png) {
-  constexpr std::uint8_t kSignature[8] = {0x89, 'P', 'N', 'G', 0x0d, 0x0a, 0x1a, 0x0a};
-  EXPECT_TRUE(png.size() > 8 && std::equal(kSignature, kSignature + 8, png.begin()));
-  Picture out;
-  std::vector<std::uint8_t> packed;
-  std::string order;
-  for (std::size_t at = 8; at + 12 <= png.size();) {
-    const std::uint32_t size = u32(&png[at]);
-    const std::string type(png.begin() + at + 4, png.begin() + at + 8);
-    const std::uint8_t* body = &png[at] + 8;
-    EXPECT_EQ(u32(body + size), crc32(0, &png[at] + 4, size + 4)) << type;  // over type and body
-    order += type + " ";
-    if (type == "IHDR") {
-      EXPECT_EQ(size, 13u);
-      out.width = static_cast<int>(u32(body));
-      out.height = static_cast<int>(u32(body + 4));
-      EXPECT_EQ(body[8], 8);  // bits a sample
-      constexpr int kChannels[] = {1, 0, 3, 0,
-                                   2, 0, 4};  // by colour type, 0: not without a palette
-      out.channels = body[9] < 7 ? kChannels[body[9]] : 0;
-      EXPECT_EQ(body[10] + body[11] + body[12], 0);  // deflate, the five filters, not interlaced
-    }
-    if (type == "IDAT") packed.insert(packed.end(), body, body + size);
-    at += 12 + size;
-  }
-  EXPECT_EQ(order, "IHDR IDAT IEND ");
-  const std::size_t stride = static_cast<std::size_t>(out.width) * out.channels;
-  std::vector<std::uint8_t> rows((stride + 1) * out.height);
-  uLongf size = rows.size();
-  EXPECT_EQ(uncompress(rows.data(), &size, packed.data(), packed.size()), Z_OK);
-  EXPECT_EQ(size, rows.size());
-  out.pixels.assign(stride * out.height, 0);
-  for (int y = 0; y < out.height; ++y) {
-    const std::uint8_t* row = &rows[y * (stride + 1)];
-    std::uint8_t* to = out.pixels.data() + y * stride;
-    const auto left = [&](std::size_t i) {
-      return i < static_cast<std::size_t>(out.channels) ? 0 : to[i - out.channels];
-    };
-    for (std::size_t i = 0; i < stride; ++i) {
-      const int above = y > 0 ? to[i - stride] : 0;
-      const int by_filter[] = {0, left(i), above, (left(i) + above) / 2};
-      EXPECT_LT(row[0], 4);
-      to[i] = static_cast<std::uint8_t>(row[1 + i] + by_filter[row[0] % 4]);
-    }
-  }
-  return out;
-}
 
 TEST(Png, ADecoderFindsEveryPixelOfEveryKind) {
   for (const int channels : {1, 3, 4}) {
@@ -74,7 +19,7 @@ TEST(Png, ADecoderFindsEveryPixelOfEveryKind) {
     std::vector<std::uint8_t> pixels(width * height * channels);
     for (std::size_t i = 0; i < pixels.size(); ++i)
       pixels[i] = static_cast<std::uint8_t>(i * i * 31 + 7);
-    const Picture back = decode(encode_png(pixels, width, height, channels));
+    const testing::Picture back = testing::decode_png(encode_png(pixels, width, height, channels));
     EXPECT_EQ(back.width, width);
     EXPECT_EQ(back.height, height);
     EXPECT_EQ(back.channels, channels);
@@ -87,13 +32,13 @@ TEST(Png, ReadsBackPixelByPixel) {
   std::vector<std::uint8_t> pixels(width * height * 3);
   for (std::size_t i = 0; i < pixels.size(); ++i) pixels[i] = static_cast<std::uint8_t>(i * 37);
   const auto png = encode_png(pixels, width, height, 3);
-  EXPECT_EQ(u32(&png[16]), 5u);
-  EXPECT_EQ(u32(&png[20]), 3u);
+  EXPECT_EQ(testing::png_number(&png[16]), 5u);
+  EXPECT_EQ(testing::png_number(&png[20]), 3u);
   const std::size_t idat = 8 + 12 + 13;
   ASSERT_EQ(std::string(png.begin() + idat + 4, png.begin() + idat + 8), "IDAT");
   std::vector<std::uint8_t> rows((width * 3 + 1) * height);
   uLongf size = rows.size();
-  ASSERT_EQ(uncompress(rows.data(), &size, &png[idat + 8], u32(&png[idat])), Z_OK);
+  ASSERT_EQ(uncompress(rows.data(), &size, &png[idat + 8], testing::png_number(&png[idat])), Z_OK);
   ASSERT_EQ(size, rows.size());
   for (int y = 0; y < height; ++y) {
     for (int i = 0; i < width * 3; ++i) {

@@ -8,17 +8,15 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <cstdio>
-#include <fstream>
 #include <set>
-#include <stdexcept>
 #include <string>
+#include <utility>
 #include <vector>
 
+#include "mjsense/core/testing/png.h"
 #include "mjsense/record/testing/tools.h"
 #include "mjsense/replay/check.h"
 #include "mjsense/replay/small_text.h"
-#include "mjsense/replay/video_probe.h"
 
 namespace mjsense {
 namespace {
@@ -46,20 +44,13 @@ struct Band {  // of rows or columns
 class Sheet {
  public:
   explicit Sheet(const fs::path& png) {
-    std::uint8_t head[24];  // of a PNG: signature, then IHDR with width and height
-    std::ifstream(png, std::ios::binary).read(reinterpret_cast<char*>(head), sizeof head);
-    const auto number = [&](int at) {
-      return head[at] << 24 | head[at + 1] << 16 | head[at + 2] << 8 | head[at + 3];
-    };
-    width_ = number(16);
-    height_ = number(20);
-    rgb_.resize(std::size_t{3} * width_ * height_);
-    const std::string command =
-        "ffmpeg -loglevel error -i '" + png.string() + "' -f rawvideo -pix_fmt rgb24 -";
-    FILE* pipe = popen(command.c_str(), "r");
-    const std::size_t read = pipe ? fread(rgb_.data(), 1, rgb_.size(), pipe) : 0;
-    if (pipe == nullptr || pclose(pipe) != 0 || read != rgb_.size())
-      throw std::runtime_error("cannot read " + png.string());
+    const std::string bytes = read_file(png);
+    Picture picture =
+        decode_png({reinterpret_cast<const std::uint8_t*>(bytes.data()), bytes.size()});
+    width_ = picture.width;
+    height_ = picture.height;
+    EXPECT_EQ(picture.channels, 3);
+    rgb_ = std::move(picture.pixels);
   }
   Rgb at(int x, int y) const {
     const std::uint8_t* p = &rgb_[3 * (static_cast<std::size_t>(y) * width_ + x)];
