@@ -134,7 +134,7 @@ std::string in_child(std::string_view what, std::uint64_t file_bytes,
     throw RuntimeError(fmt::format("{}: cannot start a process: {}", what, std::strerror(errno)));
   in.reset();
   std::string answer;
-  if (!listen(out.get(), 3 * seconds, answer)) kill(pid, SIGKILL);
+  if (!listen(out.get(), 6 * seconds, answer)) kill(pid, SIGKILL);
   int status = 0;
   pid_t got;
   do {
