@@ -1,19 +1,11 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <fmt/format.h>
 
-#include <algorithm>
-
 #include "mjsense/core/error.h"
 #include "mjsense/record/encoder.h"
 #include "mjsense/record/process.h"
 
 namespace mjsense {
-namespace {
-
-constexpr double kQuestionSeconds = 20;
-
-}  // namespace
-
 std::vector<std::string> encoder_command(const VideoCfg& cfg, const Fps& fps,
                                          const VideoStream& video,
                                          const std::filesystem::path& output) {
@@ -53,7 +45,7 @@ void check_ffmpeg(const VideoCfg& cfg, std::span<const VideoStream> videos) {
   std::string listing;
   try {
     listing = run_process({program, "-hide_banner", "-loglevel", "error", "-encoders"},
-                          {.silence_s = std::min(kQuestionSeconds, cfg.ffmpeg_timeout)});
+                          {.silence_s = cfg.ffmpeg_timeout});
   } catch (const Error& error) {
     throw RuntimeError(
         fmt::format("recording {} video streams needs ffmpeg: {}; install it (apt-get install "

@@ -14,7 +14,7 @@ namespace mjsense {
 
 namespace {
 
-constexpr double kPatience = 20;  // s without a word
+constexpr double kPatience = 60;  // s without a word
 constexpr std::size_t kLineBytes = 96;
 
 // "-f mov -c:v h264 -i file:/data/x.mp4"
@@ -90,7 +90,7 @@ std::vector<std::uint8_t> grab_frames(const std::filesystem::path& path,
                  {"-vf", filters, "-frames:v", fmt::format("{}", frames.size()), "-f", "rawvideo",
                   "-pix_fmt", grey16 ? "gray16le" : "rgb24", "pipe:1"});
   const std::size_t most = frames.size() * width * height * 3 + 1;
-  const std::string raw = run_process(command, {.silence_s = 3 * kPatience, .most_bytes = most});
+  const std::string raw = run_process(command, {.silence_s = 2 * kPatience, .most_bytes = most});
   return {raw.begin(), raw.end()};
 }
 

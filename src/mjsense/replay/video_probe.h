@@ -18,7 +18,7 @@ struct VideoProbe {
 };
 
 // Counts packets; with `decode`, decodes every frame, and every complaint of the decoder is an error. Gives up beyond
-// twice the `expected` frames and when nothing comes for 20 s.
+// twice the `expected` frames and when nothing comes for 60 s.
 VideoProbe probe_video(const std::filesystem::path& path, bool decode, std::int64_t expected,
                        const std::string& ffmpeg);
 
