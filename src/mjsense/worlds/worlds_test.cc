@@ -777,17 +777,18 @@ TEST(Worlds, ThatDivergeUnseenAreNamedAtOnce) {
   }
 }
 
-// Forces made with a bad control are not used again: the step must find it.
-TEST(Worlds, NameABadControlThatSomebodyLookedAtBefore) {
+// Whoever brings forces to a bad control says so at once, and the next step is as good as new.
+TEST(Worlds, NameABadControlWhenItIsLookedAt) {
   const ModelPtr m = load("Euler");
   Worlds worlds(m.get(), 1, 1);
   Recording hooks(1);
   worlds.reset(all_worlds, 0, hooks);
   state_row(worlds, "ctrl", 0)[0] = std::numeric_limits<double>::quiet_NaN();
   worlds.forward(all_worlds, hooks);
-  worlds.step(1, hooks);
   ASSERT_EQ(worlds.failures().size(), 1u);
   EXPECT_THAT(worlds.failures()[0].message, ::testing::HasSubstr("CTRL"));
+  worlds.step(1, hooks);
+  EXPECT_TRUE(worlds.failures().empty());
 }
 
 // MuJoCo's errors jump out of whatever is going on; what the worlds of a thread share is as new.
