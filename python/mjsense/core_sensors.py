@@ -169,7 +169,7 @@ class PoseSensor(CoreSensor):
         self._complete = True
 
     def _build(self, sim: Simulation) -> _core.SensorHandle:
-        return _core.make_pose(self.name, *self._frames, self._description)
+        return _core.make_pose(self.name, self._frames[0], self._frames[1], self._description)
 
 
 @checked

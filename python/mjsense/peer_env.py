@@ -467,7 +467,8 @@ class PeerPolicy:
     """A planner that drives the robot, in the world whose sensor is asked."""
 
     def __init__(self, env: PeerEnv, view: _core.TaskView) -> None:
-        self._env, self._view = env, view
+        self._env = env
+        self._view: Any = view
 
     def get_all_phases(self) -> dict[str, int]:
         """Numbers of the phases."""
@@ -503,7 +504,8 @@ class _Infos(Sequence):
     """What the task says of each world, read when it is asked for."""
 
     def __init__(self, view: _core.TaskView, worlds: int) -> None:
-        self._view, self._worlds = view, worlds
+        self._view: Any = view
+        self._worlds = worlds
 
     def __len__(self) -> int:
         return self._worlds
@@ -525,7 +527,7 @@ class PeerTask:
 
     def __init__(self, env: PeerEnv, view: _core.TaskView) -> None:
         self.env = self._env = env
-        self._view = view
+        self._view: Any = view
         self.config = PeerConfig(self)
         """Of the experiment, as far as sensors read it."""
         self._policy: PeerPolicy | None = None

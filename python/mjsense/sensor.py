@@ -183,7 +183,7 @@ class Sensor:
     _mjs_fields: list[Row] | None = None  # declared; [] if the value is a Python object only
     _mjs_rows: Any = None  # a list: of each field, None without any
     _mjs_shown: Any = None
-    _mjs_instances: list[Any] | None = None  # by world; None: one computes all worlds at once
+    _mjs_instances: Any = None  # a list by world; None: one computes all worlds at once
     _mjs_faults: Any = None  # dict[int, SensorError]: of reset(), by world, until the value is asked for
     _mjs_worked: bool = False  # a row of it was right once
 
@@ -198,16 +198,16 @@ class Sensor:
 
     def _repr_html_(self) -> str:
         """For notebooks: what it is, and a thumbnail if its row is an image."""
-        live = self._mjs_shown is not None and not self._mjs_core.closed
+        live = isinstance(self._mjs_shown, np.ndarray) and not self._mjs_core.closed
         images = {self.uuid: self.rows[0]} if live and self._mjs_shown.ndim == 4 else {}
         return _show.table(f"{type(self).__name__} '{self.uuid}'", self._mjs_about(), images)
 
     def _mjs_about(self) -> list[_show.Row]:
-        spec = self._mjs_row_spec() if self.uuid else None
-        if spec is None:
-            return []
-        worlds = [] if self._mjs_shown is None else [len(self._mjs_shown)]
-        return [_show.Row("", spec["dtype"], (*worlds, *spec["shape"]), self.unit, self.frame, spec["description"])]
+        worlds = [len(self._mjs_rows[0])] if self._mjs_rows else []
+        return [
+            _show.Row(spec["name"], spec["dtype"], (*worlds, *spec["shape"]), self.unit, self.frame, spec["description"])
+            for spec in (self._mjs_row_specs() if self.uuid else [])
+        ]
 
     # ------------------------------------------------------------------------------------------------- yours to write
 

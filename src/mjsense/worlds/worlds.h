@@ -42,7 +42,7 @@ class WorldHooks {
   // controls, mjSTAGE_NONE after mocap poses, mjSTAGE_ACC if nothing was written. `index` counts.
   virtual int control_every() const { return 0; }
   virtual mjtStage control(const World& /*world*/, int /*index*/) { return mjSTAGE_ACC; }
-  virtual void reset(const World& world) = 0;    // a new episode begins; fresh in all stages
+  virtual void reset(const World& world) = 0;  // a new episode begins; fresh in all stages
   virtual void refreshed(
       const World& world) = 0;  // once, at the end of step/reset/forward/visit, world fresh
 };

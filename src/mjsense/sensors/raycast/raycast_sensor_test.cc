@@ -195,7 +195,8 @@ TEST(RayCast, AHeadingGoesOnOverTheTop) {
     mju_quat2Mat(mat, q);
     float out[9];
     align_rays(RayAlignment::kYaw, mat, out);
-    const float c = static_cast<float>(std::cos(heading)), s = static_cast<float>(std::sin(heading));
+    const float c = static_cast<float>(std::cos(heading)),
+                s = static_cast<float>(std::sin(heading));
     EXPECT_THAT(std::vector<float>(out, out + 9),
                 Pointwise(FloatNear(1e-6f), std::vector<float>{c, -s, 0, s, c, 0, 0, 0, 1}))
         << pitch;
