@@ -309,8 +309,8 @@ def staged(lab: Lab) -> Row:
         "video cut": lambda s: cut(min((s / "episode_00000001").glob("*.mp4"))),
         "depth cut": lambda s: cut(min((s / "episode_00000001").glob("*.mkv"))),
         "video flipped": lambda s: flip(min((s / "episode_00000001").glob("*.mp4"))),
-        "video is a link": lambda s: link(min((s / "episode_00000001").glob("*.mp4"))),
-        "episode is a link": lambda s: link(s / "episode_00000001"),
+        "video is a link": lambda s: link(min((s / "episode_00000001").glob("*.mp4")), s),
+        "episode is a link": lambda s: link(s / "episode_00000001", s),
         "part is a link": lambda s: (s / "batch.part").symlink_to(s.parents[2] / crafted.SECRET / "keep.txt"),
     }
     for command in ("repair", "resume"):
@@ -350,8 +350,8 @@ def flip(path: Path):
     path.write_bytes(data)
 
 
-def link(path: Path):
-    moved = path.parents[4] / crafted.SECRET / path.name
+def link(path: Path, staging: Path):
+    moved = staging.parents[2] / crafted.SECRET / path.name
     path.rename(moved)
     path.symlink_to(moved)
 

@@ -4,7 +4,8 @@
 //               [--width W] [--height H] [--cameras C] [--no-video] [--no-depth] [--red-green]
 //               [--encoders E] [--threads n] [--gzip G] [--timeout S] [--resume]
 //               [--step-ms MS] [--stop-after N] [--print] [--measure]
-//   record_fake verify|repair|inspect PATH
+//   record_fake verify PATH [decode]
+//   record_fake repair|inspect PATH
 //   record_fake sheet PATH PNG
 // Every K-th attempt is discarded (0: none). --print says "finished E" after each episode that is
 // safe on disk; --measure says how long recording took.
@@ -172,7 +173,7 @@ int record(const std::string& out, const Options& o) {
 
 int look(const std::string& command, const std::string& path, const std::string& png) {
   if (command == "verify") {
-    const VerifyResult result = verify(path, {.decode = true});
+    const VerifyResult result = verify(path, {.decode = png == "decode"});
     fmt::print("{}", result.text());
     return result.ok() ? 0 : 1;
   }
