@@ -786,7 +786,7 @@ TEST(Worlds, NameABadControlWhenItIsLookedAt) {
   state_row(worlds, "ctrl", 0)[0] = std::numeric_limits<double>::quiet_NaN();
   worlds.forward(all_worlds, hooks);
   ASSERT_EQ(worlds.failures().size(), 1u);
-  EXPECT_THAT(worlds.failures()[0].message, ::testing::HasSubstr("CTRL"));
+  EXPECT_THAT(worlds.failures()[0].message, ::testing::HasSubstr("(ctrl)"));
   worlds.step(1, hooks);
   EXPECT_TRUE(worlds.failures().empty());
 }
