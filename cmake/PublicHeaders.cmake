@@ -18,6 +18,7 @@ set(MJSENSE_PUBLIC_HEADERS
   mjsense/core/path_field.h
   mjsense/core/pose.h
   mjsense/core/rng.h
+  mjsense/core/row_error.h
   mjsense/core/sensor.h
   mjsense/core/sensor_fields.h
   mjsense/core/shared.h

@@ -66,7 +66,7 @@ class Robot(KnownAttributes):
     """
 
     def __init__(self, name_or_path: str | Path) -> None:
-        self._core = _core.Robot(os.fspath(name_or_path))
+        self._core: Any = _core.Robot(os.fspath(name_or_path))
         self.name: str = self._core.name
         """What messages and recordings call it."""
         self.description: str = self._core.description

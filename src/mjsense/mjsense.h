@@ -18,6 +18,7 @@
 #include "mjsense/core/path_field.h"
 #include "mjsense/core/pose.h"
 #include "mjsense/core/rng.h"
+#include "mjsense/core/row_error.h"
 #include "mjsense/core/sensor.h"
 #include "mjsense/core/sensor_fields.h"
 #include "mjsense/core/shared.h"
