@@ -16,7 +16,7 @@ for python in "$@"; do
     export PATH=$venv/bin  # no ffmpeg but that of imageio-ffmpeg
     time python -c 'import mjsense'
     mjsense --version
-    mjsense record pick --episodes 2 --worlds 2 --width 64 --height 48 --out "$venv/data" --quiet
+    mjsense record pick --episodes 2 --worlds 2 --size 64x48 --out "$venv/data" --quiet
     mjsense verify --decode "$venv/data"
   )
 done

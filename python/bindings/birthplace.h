@@ -17,13 +17,13 @@ namespace mjsense::python {
 class Birthplace {
  public:
   bool here() const { return getpid() == pid_; }
-  // Throws in a child of fork(). `what`: "the simulation".
+  // Throws in a child of fork(). `what`: "simulation".
   void check(const char* what) const {
     if (here()) return;
-    throw RuntimeError(std::string(what) + " was made in process " + std::to_string(pid_) +
-                       ", of which this one (" + std::to_string(getpid()) +
-                       ") is a fork that has none of its threads: make one after the fork, or "
-                       "start processes by multiprocessing's method \"spawn\" or \"forkserver\"");
+    throw RuntimeError(std::string(what) + ": this process (" + std::to_string(getpid()) +
+                       ") was forked from the one that made it (" + std::to_string(pid_) +
+                       "), and its threads stayed there; make it after the fork, or start "
+                       "processes with 'spawn' or 'forkserver'");
   }
 
  private:

@@ -29,10 +29,11 @@ namespace mjsense::python {
 // one simulation shares one of these.
 class Turns {
  public:
+  bool here() const { return place_.here(); }
   // `what` names the call in the message when a sensor's own code makes it.
   template <class Body>
   void change(std::string_view what, Body&& body) {
-    place_.check("the simulation");
+    place_.check("simulation");
     nb::gil_scoped_release unlock;
     std::lock_guard lock(mutex_);
     if (depth_ > 0) {
@@ -46,7 +47,7 @@ class Turns {
   }
   template <class Body>
   void read(Body&& body) {
-    place_.check("the simulation");
+    place_.check("simulation");
     nb::gil_scoped_release unlock;
     std::lock_guard lock(mutex_);
     const Depth in(depth_);
@@ -55,7 +56,7 @@ class Turns {
   // For code that runs for the simulation. Called without the interpreter's lock.
   template <class Body>
   auto work(Body&& body) {
-    place_.check("the simulation");
+    place_.check("simulation");
     std::lock_guard lock(mutex_);
     const Depth in(depth_);
     return body();
@@ -86,6 +87,7 @@ class PySimulation {
       : sim_(std::move(sim)), turns_(std::move(turns)) {}
 
   void close() {
+    if (!turns_->here()) return sim_.reset();  // a fork's copy is only forgotten
     std::shared_ptr<Simulation> last;
     turns_->change("close", [&] { last = std::move(sim_); });
   }

@@ -108,7 +108,7 @@ class PyRecorder {
  private:
   template <class Body>
   void unlocked(Body&& body) {
-    place_.check("the recorder");
+    place_.check("recorder");
     nb::gil_scoped_release unlock;
     body();
   }

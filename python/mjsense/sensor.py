@@ -79,7 +79,7 @@ class NativeSensor(KnownAttributes):
         """The measurement of every world as it is now: an array ``[B, ...]``, or an object with one array a field.
 
         Computed when it is read and not current. The arrays are the sensor's own memory, read-only: the next read after a step,
-        reset or forward overwrites them. Copy what you keep, or change.
+        reset or forward writes them again, and step() itself may. Copy what you keep, or change.
         """
         if self._core is None:
             raise RuntimeError(f"sensor '{self.name}' has no data yet: make a Simulation of its scene first")

@@ -44,15 +44,15 @@ def sim():
     return sim
 
 
-@pytest.mark.parametrize("call", ["step", "reset", "forward", "close"])
+@pytest.mark.parametrize("call", ["step", "reset", "forward"])
 def test_a_copy_raises(sim, call):
-    with pytest.raises(RuntimeError, match=rf"made in process {os.getpid()}, of which this one .* is a fork"):
+    with pytest.raises(RuntimeError, match=rf"simulation: this process .* was forked from the one that made it \({os.getpid()}\)"):
         in_fork(getattr(sim, call))
     sim.step()  # the original goes on
 
 
 def test_reading_what_is_not_current_raises(sim):
-    with pytest.raises(RuntimeError, match="fork"):
+    with pytest.raises(RuntimeError, match="was forked"):
         in_fork(lambda: sim.scene["eye"].data)
 
 
@@ -75,6 +75,6 @@ def test_a_copy_may_be_dropped_and_a_new_one_made():
 def test_an_environment_of_a_task(tmp_path):
     env = mjs.make_vec("pick", num_envs=2, cameras=[])
     env.reset(seed=1)
-    with pytest.raises(RuntimeError, match="fork"):
+    with pytest.raises(RuntimeError, match="was forked"):
         in_fork(lambda: env.step(env.action_space.sample()))
     env.close()
