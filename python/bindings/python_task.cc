@@ -50,8 +50,7 @@ std::unique_ptr<PythonTask> PythonTask::make(nb::object task, std::shared_ptr<Py
   const int of_robot = cfg.sim_dt_ms;
   cfg.sim_dt_ms = item_or(settings, "sim_dt_ms", cfg.sim_dt_ms);
   // The controllers' period is the robot's as long as the physics' is.
-  cfg.ctrl_dt_ms =
-      item_or(settings, "ctrl_dt_ms", cfg.sim_dt_ms == of_robot ? cfg.ctrl_dt_ms : 0);
+  cfg.ctrl_dt_ms = item_or(settings, "ctrl_dt_ms", cfg.sim_dt_ms == of_robot ? cfg.ctrl_dt_ms : 0);
   if (own_horizon) cfg.horizon = item_or(settings, "horizon", cfg.horizon);
   std::unique_ptr<PythonTask> made(
       new PythonTask(std::move(cfg), std::move(task), std::move(host)));

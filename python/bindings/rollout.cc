@@ -232,8 +232,7 @@ class PyRollout {
  private:
   std::size_t width() const {
     std::size_t width = 0;
-    for (const MoveGroup& group : rollout_->task().robot().groups())
-      width += group.command_size;
+    for (const MoveGroup& group : rollout_->task().robot().groups()) width += group.command_size;
     return width;
   }
   void check(std::size_t worlds, std::size_t width, const char* what) const {

@@ -28,7 +28,8 @@ Id open_link(hid_t parent, const std::string& name) {
   H5L_info_t info;
   if (H5Lexists(parent, name.c_str(), H5P_DEFAULT) <= 0) refuse(name, "does not exist");
   check(H5Lget_info(parent, name.c_str(), &info, H5P_DEFAULT), name);
-  if (info.type == H5L_TYPE_EXTERNAL) refuse(name, "is a link to another file, which is not followed");
+  if (info.type == H5L_TYPE_EXTERNAL)
+    refuse(name, "is a link to another file, which is not followed");
   if (info.type != H5L_TYPE_HARD) refuse(name, "is a soft link, which is not followed");
   return {H5Oopen(parent, name.c_str(), H5P_DEFAULT), H5Oclose, name};
 }
@@ -93,7 +94,8 @@ Id open_dataset(hid_t parent, const std::string& path) {
 std::uint64_t check_storage(hid_t dataset, const std::string& name) {
   const Id properties(H5Dget_create_plist(dataset), H5Pclose, name);
   const H5D_layout_t layout = H5Pget_layout(properties);
-  if (H5Pget_external_count(properties) != 0) refuse(name, "lies in other files, which are not read");
+  if (H5Pget_external_count(properties) != 0)
+    refuse(name, "lies in other files, which are not read");
   if (layout != H5D_COMPACT && layout != H5D_CONTIGUOUS && layout != H5D_CHUNKED)
     refuse(name, "is put together from other datasets, which is not read");
   const Id type(H5Dget_type(dataset), H5Tclose, name);

@@ -15,9 +15,9 @@
 
 namespace mjsense::h5 {
 
-inline constexpr int kMostDepth = 32;                           // groups inside groups
-inline constexpr std::size_t kMostNames = 100'000;              // of one group, or of one file
-inline constexpr std::size_t kMostTextBytes = std::size_t{1} << 24;   // of one text
+inline constexpr int kMostDepth = 32;                                // groups inside groups
+inline constexpr std::size_t kMostNames = 100'000;                   // of one group, or of one file
+inline constexpr std::size_t kMostTextBytes = std::size_t{1} << 24;  // of one text
 inline constexpr std::uint64_t kMostRowBytes = std::uint64_t{1} << 26;  // of one row or one chunk
 
 // Opens `path` link by link. Only hard links are followed: soft and external ones are a

@@ -150,7 +150,8 @@ std::string in_child(std::string_view what, std::uint64_t file_bytes,
   if (got >= 0 && WIFSIGNALED(status)) {
     const int signal = WTERMSIG(status);
     if (signal == SIGXCPU || signal == SIGKILL)
-      throw RuntimeError(fmt::format("{}: reading it did not end within {} s: it is damaged", what, seconds));
+      throw RuntimeError(
+          fmt::format("{}: reading it did not end within {} s: it is damaged", what, seconds));
     throw RuntimeError(fmt::format("{}: the HDF5 library crashed on it ({}): it is damaged", what,
                                    strsignal(signal)));
   }

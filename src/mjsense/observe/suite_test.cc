@@ -57,8 +57,7 @@ TEST(Suite, SelectedAreThoseAloneInThatOrder) {
   EXPECT_THAT(suite.names(), testing::ElementsAre("c", "a"));
   EXPECT_EQ(suite.owner("c"), "c");
   EXPECT_EQ(error_of([&] { suite.select(twice); }), "suite: sensor 'c' is given twice");
-  EXPECT_THAT(error_of([&] { suite.select(unknown); }),
-              testing::HasSubstr("no sensor named 'd'"));
+  EXPECT_THAT(error_of([&] { suite.select(unknown); }), testing::HasSubstr("no sensor named 'd'"));
   EXPECT_EQ(suite.size(), 2u) << "as it was";
 }
 

@@ -143,7 +143,8 @@ void EpisodeFile::write_chunk(int stream, std::int64_t rows, std::span<const std
   if (index < plan_.arrays.size() && plan_.arrays[index].text)
     chunk = texts_of(plan_.arrays[index], rows, chunk);
   if (!chunk.empty())
-    datasets_[index].sum.add(chunk.data(), static_cast<std::size_t>(rows) * datasets_[index].row_bytes);
+    datasets_[index].sum.add(chunk.data(),
+                             static_cast<std::size_t>(rows) * datasets_[index].row_bytes);
   std::span<const std::uint8_t> bytes = chunk;
   if (gzip_ > 0 && !chunk.empty()) {  // outside the library's lock: here the time goes
     packed_.resize(compressBound(chunk.size()));
@@ -178,8 +179,7 @@ void EpisodeFile::finish(std::span<const VideoSum> videos) {
   for (const Dataset& dataset : datasets_)
     h5::set_attribute(dataset.id, kChecksumAttribute, dataset.sum.text());
   for (std::size_t v = 0; v < videos.size(); ++v) {
-    const h5::Id dataset =
-        h5::open_dataset(trajectory_, "obs/sensor_data/" + plan_.videos[v].key);
+    const h5::Id dataset = h5::open_dataset(trajectory_, "obs/sensor_data/" + plan_.videos[v].key);
     h5::set_attribute(dataset, kChecksumAttribute, videos[v].crc);
     h5::set_attribute(dataset, kBytesAttribute, videos[v].bytes);
   }

@@ -186,8 +186,7 @@ TEST(Recorder, ASlowEncoderHoldsTheProducerAndLosesNothing) {
   RecordingCfg cfg = fake_recording(dir.path, suite, 1, 1);
   // Takes one frame in 10 ms.
   cfg.video.ffmpeg = fake_ffmpeg(
-      tools.path,
-      "for i in $(seq 60); do head -c 576; sleep 0.01; done | ffmpeg \"$@\"");
+      tools.path, "for i in $(seq 60); do head -c 576; sleep 0.01; done | ffmpeg \"$@\"");
   cfg.video.queue_frames = 2;
   constexpr int kSteps = 60;
   Recorder recorder(cfg);
@@ -198,8 +197,8 @@ TEST(Recorder, ASlowEncoderHoldsTheProducerAndLosesNothing) {
   }
   recorder.finish_episode(0, "{}");
   recorder.complete();
-  const Fd video = open_plain(dir.path / "house_0",
-                              "episode_00000000_wrist_camera_batch_1_of_1.mp4");
+  const Fd video =
+      open_plain(dir.path / "house_0", "episode_00000000_wrist_camera_batch_1_of_1.mp4");
   EXPECT_EQ(read_video_facts(video.get()).frames, kSteps);
   EXPECT_GT(recorder.stats().frames, 0);
 }
@@ -220,8 +219,8 @@ TEST(Recorder, AProducerWaitsForAnEncoderThatTakesNothing) {
   EXPECT_GT(recorder.stats().wait_s, 0.2);
   recorder.finish_episode(0, "{}");
   recorder.complete();
-  const Fd video = open_plain(dir.path / "house_0",
-                              "episode_00000000_wrist_camera_batch_1_of_1.mp4");
+  const Fd video =
+      open_plain(dir.path / "house_0", "episode_00000000_wrist_camera_batch_1_of_1.mp4");
   EXPECT_EQ(read_video_facts(video.get()).frames, kFrames);
 }
 
@@ -299,7 +298,8 @@ TEST(RecorderFaults, FfmpegLies) {
 
 // A hung encoder is ended, with a word.
 TEST(RecorderFaults, FfmpegHangs) {
-  for (const char* body : {"kill -STOP $$", "exec sleep 1000", "cat > /dev/null; exec sleep 1000"}) {
+  for (const char* body :
+       {"kill -STOP $$", "exec sleep 1000", "cat > /dev/null; exec sleep 1000"}) {
     TempDir dir, tools;
     FakeSuite suite({1, 320, 240, true, false});
     RecordingCfg cfg = fake_recording(dir.path, suite, 1, 1);
@@ -309,9 +309,9 @@ TEST(RecorderFaults, FfmpegHangs) {
       Recorder recorder(cfg);
       record_all(recorder, suite, {.worlds = 1, .steps = 20});
     });
-    EXPECT_THAT(error, HasSubstr(std::string(body).starts_with("cat")
-                                     ? "did not come to its end for 0.6 s"
-                                     : "took no picture for 0.6 s"));
+    EXPECT_THAT(error,
+                HasSubstr(std::string(body).starts_with("cat") ? "did not come to its end for 0.6 s"
+                                                               : "took no picture for 0.6 s"));
     expect_nothing_published(dir.path);
   }
 }

@@ -55,7 +55,8 @@ std::vector<StagedVideo> staged_videos(hid_t trajectory) {
     std::string name = h5::read_bytes(names, key, kFileNameBytes);
     name.resize(name.find_last_not_of('\0') + 1);
     if (!is_plain_name(name))
-      throw RuntimeError(fmt::format("names a video '{}', which is no plain file name of its folder", printable(name)));
+      throw RuntimeError(fmt::format(
+          "names a video '{}', which is no plain file name of its folder", printable(name)));
     const h5::Id dataset = h5::open_dataset(names, key);
     videos.push_back({key, name, h5::text_attribute(dataset, kChecksumAttribute)});
   }

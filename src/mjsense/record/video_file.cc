@@ -199,8 +199,8 @@ class Matroska {
     while (begin < end) {
       if (++elements_ > kMostElements) throw Unreadable{"it has too many elements"};
       std::uint8_t head[16];
-      const std::size_t got =
-          file_.read(begin, {head, static_cast<std::size_t>(std::min<std::uint64_t>(16, end - begin))});
+      const std::size_t got = file_.read(
+          begin, {head, static_cast<std::size_t>(std::min<std::uint64_t>(16, end - begin))});
       std::size_t at = 0;
       const std::uint64_t id = variable({head, got}, at, true);
       const std::uint64_t size = variable({head, got}, at, false);

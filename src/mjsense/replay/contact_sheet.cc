@@ -113,8 +113,8 @@ std::vector<Strip> find_strips(const fs::path& path, int shown, const std::strin
   episodes = 0;
   for (const RecordedFile& recorded : recorded_files(path)) {
     const fs::path folder = recorded.path.parent_path();
-    const auto bytes = static_cast<std::uint64_t>(
-        size_of(open_plain(folder, recorded.path.filename().string())));
+    const auto bytes =
+        static_cast<std::uint64_t>(size_of(open_plain(folder, recorded.path.filename().string())));
     const Json found =
         Json::parse(h5::in_child(recorded.name, bytes,
                                  [&] { return describe(recorded.path, shown - episodes); }),

@@ -231,7 +231,8 @@ InspectResult inspect(const fs::path& path) {
   for (const RecordedFile& file : recorded_files(path))
     bytes += static_cast<std::uint64_t>(
         size_of(open_plain(file.path.parent_path(), file.path.filename().string())));
-  return from_json(h5::in_child(path.string(), bytes, [&] { return to_json(Inspector().run(path)); }));
+  return from_json(
+      h5::in_child(path.string(), bytes, [&] { return to_json(Inspector().run(path)); }));
 }
 
 std::string InspectResult::text() const {

@@ -23,7 +23,8 @@ namespace {
 void finish_house(const fs::path& house, std::vector<std::string>& actions) {
   const fs::path staging = house / kStagingDir;
   if (!is_plain_folder(staging))
-    throw ValueError(fmt::format("'{}' is a link, which is not followed: remove it", staging.string()));
+    throw ValueError(
+        fmt::format("'{}' is a link, which is not followed: remove it", staging.string()));
   const std::string fingerprint = unfinished_recording(house);
   if (fingerprint.empty()) {
     if (const std::size_t episodes = finished_episodes(house).size(); episodes > 0)
@@ -86,9 +87,9 @@ int name_videos(const fs::path& path) {
   const Seal seal = check_seal(bytes.get());
   if (seal == Seal::kBroken)
     throw RuntimeError(fmt::format("'{}' is damaged: its checksum is wrong", path.string()));
-  const auto missing = nlohmann::json::parse(
-      h5::in_child(path.string(), static_cast<std::uint64_t>(size_of(bytes)),
-                   [&] { return missing_names(path, batch, batches); }));
+  const auto missing =
+      nlohmann::json::parse(h5::in_child(path.string(), static_cast<std::uint64_t>(size_of(bytes)),
+                                         [&] { return missing_names(path, batch, batches); }));
   if (missing.empty()) return 0;  // most files need nothing: they are not opened for writing
   const h5::H5Lock lock;
   h5::Id file = h5::open_file(path, true);

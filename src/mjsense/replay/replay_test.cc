@@ -151,7 +151,8 @@ TEST(Repair, NamesTheVideosOfTheirOwnBatch) {
     const h5::H5Lock lock;
     h5::Id file = h5::open_file(path, write);
     {
-      const h5::Id videos(H5Gopen2(file, "traj_1/obs/sensor_data", H5P_DEFAULT), H5Gclose, "videos");
+      const h5::Id videos(H5Gopen2(file, "traj_1/obs/sensor_data", H5P_DEFAULT), H5Gclose,
+                          "videos");
       act(videos);
     }
     file.close("close");

@@ -216,7 +216,8 @@ std::string read_file_name(hid_t sensor_data, const std::string& key) {
   const std::string bytes = h5::read_bytes(sensor_data, key, kMostNameBytes);
   std::string name(trim_row(bytes));
   if (!is_plain_name(name) || printable(name) != name)
-    throw RuntimeError(fmt::format("names a video '{:.100}', which is no plain file name of its folder", printable(name)));
+    throw RuntimeError(fmt::format(
+        "names a video '{:.100}', which is no plain file name of its folder", printable(name)));
   return name;
 }
 

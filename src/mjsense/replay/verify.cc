@@ -87,9 +87,12 @@ class FileVerifier {
       }
     }
     if (ours && without_sum_ > 0) {
-      note(recorded_.name, fmt::format("has no checksums of {} datasets and videos: recorded before there were any", without_sum_));
+      note(recorded_.name,
+           fmt::format("has no checksums of {} datasets and videos: recorded before there were any",
+                       without_sum_));
     } else if (ours && !sealed_) {
-      note(recorded_.name, "was changed since it was recorded: it has no checksum of the whole file");
+      note(recorded_.name,
+           "was changed since it was recorded: it has no checksum of the whole file");
     }
   }
 
@@ -168,7 +171,9 @@ class FileVerifier {
     std::vector<std::int8_t> success, fail;
     const auto read = [&](const char* name, std::vector<std::int8_t>& out) {
       const RowDataset dataset(trajectory, name);
-      if (dataset.rows() > kMostSteps || dataset.row_size() != 1 || !dataset.is_number()) return;
+      if (!dataset.is_number())
+        return error(place + "/" + name, fmt::format("is {}, expected bool", dataset.dtype()));
+      if (dataset.rows() > kMostSteps || dataset.row_size() != 1) return;
       dataset.each_number([&](auto v) {
         for (const double x : v) out.push_back(x == 0 ? 0 : x == 1 ? 1 : 2);
       });
@@ -206,8 +211,7 @@ class FileVerifier {
     if (!h5::text_attribute(trajectory, "outcome").empty() ||
         !h5::exists(trajectory, "obs/sensor_param"))
       return;
-    for (const std::string& camera :
-         h5::children(h5::open_group(trajectory, "obs/sensor_param"))) {
+    for (const std::string& camera : h5::children(h5::open_group(trajectory, "obs/sensor_param"))) {
       if (!named.contains(camera))
         note(place, fmt::format("names no video of camera '{}' (repair adds the names)", camera));
     }
@@ -268,10 +272,13 @@ class Verifier {
     result_.episodes += found.at("episodes").get<int>();
     result_.steps += static_cast<int>(std::min<std::int64_t>(
         found.at("steps").get<std::int64_t>(), std::numeric_limits<int>::max() - result_.steps));
-    for (const Json& f : found.at("findings")) result_.findings.push_back({f.at(0), f.at(1), f.at(2)});
+    for (const Json& f : found.at("findings"))
+      result_.findings.push_back({f.at(0), f.at(1), f.at(2)});
     for (const Json& v : found.at("videos")) {
-      VideoCheck video{v.at("place"),  recorded.path.parent_path(), v.at("name"), v.at("frames"),
-                       v.at("width"), v.at("height"),              v.at("crc")};
+      VideoCheck video{v.at("place"), recorded.path.parent_path(),
+                       v.at("name"),  v.at("frames"),
+                       v.at("width"), v.at("height"),
+                       v.at("crc")};
       if (used_.insert(video.folder / video.name).second) {
         videos_.push_back(std::move(video));
       } else {
@@ -298,8 +305,8 @@ class Verifier {
       VideoFacts facts = read_video_facts(file.get());
       // Containers of others may be of a form that only ffmpeg knows.
       if (!facts.error.empty() || options_.decode) {
-        const VideoProbe probe = probe_video(video.folder / video.name, options_.decode,
-                                             video.frames, options_.ffmpeg);
+        const VideoProbe probe =
+            probe_video(video.folder / video.name, options_.decode, video.frames, options_.ffmpeg);
         if (!probe.error.empty())
           return fmt::format("'{}' cannot be read: {}", video.name, probe.error);
         facts = {probe.frames, probe.width, probe.height, ""};

@@ -57,7 +57,8 @@ VideoProbe probe_video(const std::filesystem::path& path, bool decode, std::int6
   try {
     const auto most = static_cast<std::size_t>(2 * std::max<std::int64_t>(0, expected) + 100);
     std::string words;
-    listing = run_process(command, {.silence_s = kPatience, .most_bytes = most * kLineBytes}, &words);
+    listing =
+        run_process(command, {.silence_s = kPatience, .most_bytes = most * kLineBytes}, &words);
     // FFV1 says which of its slices are damaged, and ends as if all were well.
     if (decode && !words.empty()) probe.error = words;
   } catch (const Error& error) {

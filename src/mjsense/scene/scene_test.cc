@@ -77,7 +77,8 @@ constexpr const char* kBall =
 TEST(Scene, SaysWhatIsWrongWithAnEntity) {
   EXPECT_EQ(fault("a", {.model = {.path = "/nowhere/a.xml"}}),
             "entity 'a': no file '/nowhere/a.xml'");
-  EXPECT_THAT(fault("a", {.model = {.path = "embedded:robots/franka/fr4.xml"}}), HasSubstr("franka/fr"));
+  EXPECT_THAT(fault("a", {.model = {.path = "embedded:robots/franka/fr4.xml"}}),
+              HasSubstr("franka/fr"));
   EXPECT_EQ(fault("a", {}), "entity 'a': no model; give a path or an XML text");
   EXPECT_THAT(fault("a", {.model = {.path = "x.xml", .xml = kBall}}), HasSubstr("not both"));
   EXPECT_THAT(fault("a", xml("<mujoco><worldbody><geom sise='1'/></worldbody></mujoco>")),

@@ -104,8 +104,9 @@ bool PickPlanner::choose_grasp(const World& world, Grasp& chosen) const {
   const auto objects = scene_->all_objects();
   const auto& target = objects[scene_->target(world.id)];
   const Pose tool = robot.leaf_pose(world, robot.arm()), base = robot.base_pose(world);
-  const std::vector<Grasp> grasps = propose_grasps(
-      *gripper_shape_, target.shape, object_pose(world, target.body), scene_->support_height(world.id), tool);
+  const std::vector<Grasp> grasps =
+      propose_grasps(*gripper_shape_, target.shape, object_pose(world, target.body),
+                     scene_->support_height(world.id), tool);
   std::array<double, Chain::kMaxJoints> q;
   read_arm(world, q);
   int tried = 0;

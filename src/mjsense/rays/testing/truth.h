@@ -78,8 +78,8 @@ class Neighbours {
       any(rng, by);
       const double sideways = mju_dot3(by, up);
       for (int k = 0; k < 3; ++k)
-        from[k] = o_[k] + hit.t * d_[k] + kAbove * up[k] +
-                  rounding(hit.t) * (by[k] - sideways * up[k]);
+        from[k] =
+            o_[k] + hit.t * d_[k] + kAbove * up[k] + rounding(hit.t) * (by[k] - sideways * up[k]);
       if (std::abs(distance(from, down) - kAbove) <= rounding(hit.t)) return true;
     }
     return false;

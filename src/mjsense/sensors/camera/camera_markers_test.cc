@@ -101,8 +101,8 @@ TEST(CameraMarkers, AreThoseOfMujocosScene) {
     EXPECT_LE(next, markers.capacity());
   }
   EXPECT_EQ(tendons, (std::set<int>{0, 1, 2, 3, 4}));
-  EXPECT_EQ(types, (std::set<int>{mjGEOM_SPHERE, mjGEOM_CAPSULE, mjGEOM_ELLIPSOID,
-                                  mjGEOM_CYLINDER, mjGEOM_BOX}));
+  EXPECT_EQ(types, (std::set<int>{mjGEOM_SPHERE, mjGEOM_CAPSULE, mjGEOM_ELLIPSOID, mjGEOM_CYLINDER,
+                                  mjGEOM_BOX}));
   mjv_freeScene(&scene);
 }
 
