@@ -13,6 +13,7 @@ static_assert(kRows * kScale == kTextHeight && (kColumns + 1) * kScale == kTextA
 // Rows from the top, a digit in base 32 each, whose bits are the pixels from left to right: e is
 // .###. and h is #...#. The line is below the seventh; rows that are not given are empty. The zero
 // has a stroke, so that it is no O, and a D has corners.
+// clang-format off
 constexpr std::string_view kGlyphs[] = {
     "",                                                   // space
     "4444404", "aa", "aavavaa", "4fke5u4", "op248j3",     // ! " # $ %
@@ -41,6 +42,7 @@ constexpr std::string_view kGlyphs[] = {
     "00hhhhf1e", "00v248v",                               // y z
     "2448442", "4444444", "8442448", "008l2",             // { | } ~
 };
+// clang-format on
 static_assert(std::size(kGlyphs) == '~' - ' ' + 1);
 constexpr std::string_view kOther = "vhhhhhv";
 
