@@ -100,7 +100,9 @@ class FileVerifier {
     ++episodes_;
     if (!h5::exists(trajectory, "success"))
       return error(place, "has no 'success': its length is unknown");
-    const std::int64_t T = RowDataset(trajectory, "success").rows();
+    const RowDataset success(trajectory, "success");
+    if (!success.is_number()) return error(place, "has a 'success' that is no row of booleans");
+    const std::int64_t T = success.rows();
     if (T > kMostSteps) return error(place, fmt::format("claims {} steps", T));
     steps_ += T;
     if (T == 0) error(place, "has no steps");
