@@ -2,7 +2,7 @@
 # find_package(mjsense): the public headers, the static library, and the libraries it needs found again in the same way.
 include(GNUInstallDirs)
 include(CMakePackageConfigHelpers)
-if(NOT SKBUILD)
+if(NOT SKBUILD AND NOT MJSENSE_STATIC)
   install(TARGETS mjsense mjsense_hdf5 EXPORT mjsenseTargets ARCHIVE DESTINATION ${CMAKE_INSTALL_LIBDIR})
   install(TARGETS mjsense_program RUNTIME DESTINATION ${CMAKE_INSTALL_BINDIR})
   include(PublicHeaders)

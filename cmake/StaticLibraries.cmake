@@ -22,7 +22,7 @@ endfunction()
 mjsense_static(mjsense_static_fmt fmt::fmt ${MJSENSE_STATIC_DIR}/libfmt.a)
 mjsense_static(mjsense_static_pcre2 PkgConfig::PCRE2 ${PCRE2_STATIC})
 mjsense_static(mjsense_static_embree embree ${MJSENSE_STATIC_DIR}/libembree.a)
-mjsense_static(mjsense_static_hdf5 mjsense_hdf5 ${HDF5_STATIC} ${SZ_STATIC} ${AEC_STATIC} ${ZLIB_STATIC})
+mjsense_static(mjsense_static_hdf5 mjsense_hdf5 ${HDF5_STATIC} ${SZ_STATIC} ${AEC_STATIC} ${ZLIB_STATIC} ${CMAKE_DL_LIBS} m)
 set(MJSENSE_PRIVATE_LIBS mjsense_static_fmt nlohmann_json::nlohmann_json mjsense_static_pcre2 mjsense_static_embree
                          mjsense_static_hdf5 Threads::Threads)
 
