@@ -60,7 +60,7 @@ def in_child(body):
 @pytest.mark.filterwarnings("ignore:This process:DeprecationWarning")
 def test_fork(sim):
     sim.step()
-    assert "make one after the fork" in in_child(sim.step)
+    assert "after the fork" in in_child(sim.step)
     assert in_child(sim.close) == "nothing"
     sim.step()  # the parent goes on
 
