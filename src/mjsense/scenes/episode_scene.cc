@@ -9,7 +9,10 @@
 #include <numbers>
 
 #include "mjsense/core/error.h"
+#include "mjsense/observe/frame.h"
+#include "mjsense/scene/parts.h"
 #include "mjsense/scene/resolve.h"
+#include "mjsense/scene/spec.h"
 
 namespace mjsense {
 namespace {
@@ -33,9 +36,9 @@ bool is_free(const mjModel* m, int body) {
 }
 
 bool touches(const mjModel* m, int body) {
-  for (int g = m->body_geomadr[body]; g >= 0 && g < m->body_geomadr[body] + m->body_geomnum[body];
-       ++g) {
-    if (m->geom_contype[g] != 0 || m->geom_conaffinity[g] != 0) return true;
+  for (int g = 0; g < m->ngeom; ++g) {
+    const bool solid = m->geom_contype[g] != 0 || m->geom_conaffinity[g] != 0;
+    if (solid && is_below(m, m->geom_bodyid[g], body)) return true;
   }
   return false;
 }
@@ -52,6 +55,21 @@ bool can_be_held(const ObjectShape& shape) {
   double least = 1e10;
   for (int i = 0; i < 3; ++i) least = std::min(least, high[i] - low[i]);
   return least <= kHand && shape.reach <= kReach;
+}
+
+// The model with a free joint at its body.
+std::shared_ptr<mjSpec> with_free_joint(const SceneEntityCfg& entity, const std::string& place) {
+  const std::string who = fmt::format("{}, entity '{}'", place, entity.name);
+  std::shared_ptr<mjSpec> spec = compose_model({.path = entity.model}, {}, who);
+  mjsElement* first = mjs_firstChild(mjs_findBody(spec.get(), "world"), mjOBJ_BODY, 0);
+  if (first == nullptr) throw ValueError(fmt::format("{}: free = true, but it has no body", who));
+  mjsBody* body = mjs_asBody(first);
+  if (mjs_firstChild(body, mjOBJ_JOINT, 0) != nullptr)
+    throw ValueError(
+        fmt::format("{}: free = true, but body '{}' has a joint", who, element_name(first)));
+  if (element_name(first).empty()) mjs_setName(first, entity.name.c_str());
+  mjs_addFreeJoint(body);
+  return spec;
 }
 
 bool upright(const double* quat) { return std::abs(quat[1]) + std::abs(quat[2]) < 1e-9; }
@@ -79,16 +97,25 @@ void apply_look(mjSpec* spec, const SceneFileCfg& cfg) {
 
 }  // namespace
 
-EpisodeScene::EpisodeScene(SceneFileCfg cfg) : cfg_(std::move(cfg)) { check_fields(cfg_, ""); }
+EpisodeScene::EpisodeScene(SceneFileCfg cfg) : cfg_(std::move(cfg)) {
+  check_fields(cfg_, "");
+  for (const SceneEntityCfg& entity : cfg_.entities)
+    freed_.push_back(entity.free ? with_free_joint(entity, place()) : nullptr);
+}
 
 std::string EpisodeScene::place() const { return fmt::format("scene '{}'", cfg_.name); }
 
 SceneCfg EpisodeScene::scene_cfg(const std::string& robot) const {
   SceneCfg scene;
   scene.base.path = cfg_.base;
-  for (const SceneEntityCfg& one : cfg_.entities) {
+  for (std::size_t i = 0; i < cfg_.entities.size(); ++i) {
+    const SceneEntityCfg& one = cfg_.entities[i];
     EntityCfg entity;
-    entity.model.path = one.model;
+    if (freed_[i]) {
+      entity.model.spec = freed_[i].get();
+    } else {
+      entity.model.path = one.model;
+    }
     entity.pos = one.pos;
     entity.quat = one.quat;
     scene.entities.emplace_back(one.name, entity);

@@ -108,6 +108,21 @@ TEST(EpisodeScene, WhatAHandCanHoldIsAnObject) {
   EXPECT_THAT(kinds, ::testing::ElementsAre("cube", "cube", "can"));  // not the wardrobe
 }
 
+TEST(EpisodeScene, AModelWithoutAJointIsFreed) {
+  Files files;
+  files.write("block.xml",
+              "<mujoco><worldbody><body><body><geom type='box' size='.02 .02 .03'/>"
+              "</body></body></worldbody></mujoco>");
+  files.cfg.entities.push_back({"block", files.dir.file("block.xml"), {}, {1, 0, 0, 0}, true});
+  Played played(files.cfg);
+  ASSERT_EQ(played.scene.objects().size(), 4u);
+  EXPECT_EQ(played.scene.objects()[3].kind, "block");
+  played.start(0, 3);
+  EXPECT_NEAR(played.at(3).z, .5403, 1e-9);
+  files.cfg.entities.back().model = files.dir.file("cube.xml");
+  EXPECT_THROW(EpisodeScene{files.cfg}, ValueError);
+}
+
 TEST(EpisodeScene, ObjectsStandOnTheSurfaceClearOfEachOther) {
   Files files;
   files.cfg.regions[0].target_area = std::array<double, 4>{.9, 1.1, -.1, .1};

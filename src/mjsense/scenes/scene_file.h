@@ -19,6 +19,7 @@ struct SceneEntityCfg {
   std::string model;
   std::array<double, 3> pos{};
   std::array<double, 4> quat{1, 0, 0, 0};
+  bool free = false;
 };
 template <class V>
 void visit_fields(V& v, SceneEntityCfg& c) {
@@ -28,6 +29,9 @@ void visit_fields(V& v, SceneEntityCfg& c) {
       .required();
   v("pos", c.pos, "Where it stands.").unit("m");
   v("quat", c.quat, "How it is turned, wxyz.");
+  v("free", c.free,
+    "Its body gets a free joint, which models of single objects often lack; a body without a name "
+    "is called as the entity.");
 }
 
 // How an object may rest: as its model has it, on its side (turned about y), on an end (about x).
