@@ -39,6 +39,12 @@ std::vector<std::string> camera_system_names(std::string_view robot_file) {
 }
 
 CameraSystemCfg load_camera_system(std::string_view name, std::string_view robot_file) {
+  // Another robot's: "franka/droid".
+  if (const auto slash = name.find('/'); slash != name.npos && !name.ends_with(kTail)) {
+    const std::string other =
+        fmt::format("{}robots/{}/robot.toml", kEmbedded, name.substr(0, slash));
+    return load_camera_system(name.substr(slash + 1), other);
+  }
   const std::string folder = folder_of(robot_file);
   const std::vector<std::string> names = camera_system_names(robot_file);
   DataFile file;

@@ -14,7 +14,8 @@ namespace mjsense {
 // Of the robot whose file this is ("embedded:robots/franka/robot.toml", or a path).
 std::vector<std::string> camera_system_names(std::string_view robot_file);
 
-// One of the robot's by its name, or any by its path, which ends in .toml. Throws KeyError with the
+// One of the robot's by its name, another robot's of ours ("franka/droid"), or any by its path, which
+// ends in .toml. Throws KeyError with the
 // nearest names; ValueError that says file, line and key of what is wrong.
 CameraSystemCfg load_camera_system(std::string_view name_or_path, std::string_view robot_file);
 
