@@ -241,7 +241,7 @@ TEST(Draw, OnlyOneWorldIsLookedAtAndDrawingIsNoReading) {
   EXPECT_EQ(pose.row<float>(1)[15], 1);
   lab.sim->step();
   EXPECT_EQ(pose.row<float>(0)[15], 0);
-  EXPECT_THROW(lab.sim->draw(2), ValueError);
+  EXPECT_THROW((void)lab.sim->draw(2), ValueError);
 }
 
 TEST(Draw, EverySensorDrawsOrSaysThatItHasNothing) {

@@ -548,7 +548,7 @@ TEST(Camera, FaultsAreNamed) {
                 c.fovy = 60;
               }),
               HasSubstr("both fovy and intrinsics"));
-  EXPECT_THAT(with([](Cfg& c) { c.distortion = {"fisheye", {kNan, 0, 0, 0}}; }), HasSubstr("nan"));
+  EXPECT_THAT(with([&](Cfg& c) { c.distortion = {"fisheye", {kNan, 0, 0, 0}}; }), HasSubstr("nan"));
   EXPECT_THAT(with([](Cfg& c) { c.pos = {1, 2, 3}; }, "w/top"), HasSubstr("stays where it is"));
   EXPECT_THAT(with([](Cfg& c) { c.fovy = 200; }, "w/top"), HasSubstr("less than 180"));
   // What an ideal fisheye of this focal length would put in the corners lies behind the camera.
