@@ -162,6 +162,17 @@ def test_interrupted_then_resumed_is_as_if_nothing_had_happened(mjsense, signals
     assert contents(mjsense.folder / "data") == contents(mjsense.folder / "whole")
 
 
+def test_a_scene_that_was_changed_is_another_recording(mjsense):
+    scene = mjsense.folder / "scene.toml"
+    scene.write_text('name = "mine"\nextends = "table"\ngap = 0.02\n')
+    args = ["record", "pick", "--scene", scene, "--cameras", "none", "--horizon", 3, "--keep-failures", "--episodes", 2, "--out", "data", "-q"]
+    mjsense(*args, "--max-attempts", 1, rc=1)
+    scene.write_text('name = "mine"\nextends = "table"\ngap = 0.03\n')
+    assert "'settings/files/scene' was" in mjsense(*args, "--resume", rc=2).stderr
+    scene.write_text('name = "mine"\nextends = "table"\ngap = 0.02\n')
+    assert "is complete" in mjsense(*args, "--resume", rc=2).stderr  # the same again: nothing else is wrong
+
+
 def test_progress_is_plain_lines_where_nobody_watches(mjsense):
     done = mjsense("record", "pick", "--cameras", "none", "--horizon", 4, "--keep-failures", "--out", "data")
     assert "1/1 episodes" in done.stderr and "\r" not in done.stderr and "\033" not in done.stderr

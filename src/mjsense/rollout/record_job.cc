@@ -6,11 +6,14 @@
 #include <algorithm>
 #include <chrono>
 #include <cmath>
+#include <fstream>
 #include <functional>
 #include <limits>
 #include <map>
+#include <sstream>
 
 #include "mjsense/core/error.h"
+#include "mjsense/record/checksum.h"
 #include "mjsense/rollout/registry.h"
 
 namespace mjsense {
@@ -20,6 +23,23 @@ using Clock = std::chrono::steady_clock;
 
 double since(Clock::time_point start) {
   return std::chrono::duration<double>(Clock::now() - start).count();
+}
+
+// What stands in the files that a job names, so that one which was changed since is found out.
+// Models beside them are not read: what they become shows in the sizes of the model.
+std::map<std::string, std::string> checksums_of_files(const RolloutCfg& cfg) {
+  std::map<std::string, std::string> sums;
+  for (const auto& [key, path] : {std::pair{"camera_system", cfg.camera_system},
+                                  std::pair{"robot", cfg.robot}, std::pair{"scene", cfg.scene}}) {
+    if (!path.ends_with(".toml") && !path.ends_with(".xml")) continue;
+    std::stringstream text;
+    text << std::ifstream(path).rdbuf();
+    const std::string bytes = text.str();
+    Checksum sum;
+    sum.add(bytes.data(), bytes.size());
+    sums[key] = sum.text();
+  }
+  return sums;
 }
 
 // What the data depend on: not the number of worlds or threads. A recording resumes only with equal
@@ -53,6 +73,14 @@ std::string settings_of(const RecordJobCfg& job, Rollout& rollout) {
                                    std::pair{"camera_system", job.rollout.camera_system}}) {
     entries.erase(key);
     if (!value.empty()) entries[key] = [value = value](JsonWriter& json) { json.value(value); };
+  }
+  const std::map<std::string, std::string> sums = checksums_of_files(job.rollout);
+  if (!sums.empty()) {
+    entries["files"] = [&sums](JsonWriter& json) {
+      json.begin_object();
+      for (const auto& [key, sum] : sums) json.key(key).value(sum);
+      json.end_object();
+    };
   }
   entries.erase("meshes");
   if (task.robot.edit_spec) entries["meshes"] = [](JsonWriter& json) { json.value("real"); };
