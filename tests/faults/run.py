@@ -43,7 +43,12 @@ def update(rows: list[faults.Row]) -> None:
 
 def main(arguments: list[str]) -> int:
     table = "--no-table" not in arguments
-    asked = dict(re.fullmatch(r"(\w+)(?:=(\d+))?", a).groups() for a in arguments if a != "--no-table") or dict.fromkeys(TRIALS)
+    words = [re.fullmatch(r"(\w+)(?:=(\d+))?", a) for a in arguments if a != "--no-table"]
+    unknown = [a for a, w in zip((a for a in arguments if a != "--no-table"), words, strict=True) if w is None or w[1] not in TRIALS]
+    if unknown:
+        print(f"{__doc__}\nnot a kind: {', '.join(unknown)}; there are {', '.join(TRIALS)}", file=sys.stderr)
+        return 2
+    asked = dict(w.groups() for w in words if w) or dict.fromkeys(TRIALS)
     program = Path(os.environ.get("MJSENSE_RECORD_FAKE", ROOT / "build/dev/record_fake"))
     rows = []
     with tempfile.TemporaryDirectory() as folder:
