@@ -56,16 +56,16 @@ Pose look_at(Vec3 eye, Vec3 target, Vec3 up) {
   return {eye, quat_from_columns(right, cross(right, forward), -forward)};
 }
 
-CameraSystem::CameraSystem(CameraSystemCfg cfg, std::string prefix, std::string base)
-    : cfg_(std::move(cfg)), prefix_(std::move(prefix)) {
+CameraSystem::CameraSystem(CameraSystemCfg cfg, const std::string& prefix, const std::string& base)
+    : cfg_(std::move(cfg)) {
   validate(cfg_, "");
   for (const CameraMountCfg& c : cfg_.cameras) {
     Mounted m;
-    m.camera = c.mount != MountKind::kMjcf ? c.name : c.of_scene ? c.camera : prefix_ + c.camera;
+    m.camera = c.mount != MountKind::kMjcf ? c.name : c.of_scene ? c.camera : prefix + c.camera;
     m.is_new = c.mount != MountKind::kMjcf;
     m.fovy = c.fovy.value_or(kDefaultFovy);
     if (c.mount == MountKind::kBody || c.mount == MountKind::kLookAt)
-      m.body = prefix_ + (c.body.empty() ? base : c.body);
+      m.body = prefix + (c.body.empty() ? base : c.body);
     switch (c.mount) {
       case MountKind::kMjcf:
         break;

@@ -42,7 +42,7 @@ void validate(const CameraSystemCfg& cfg, std::string_view place);
 class CameraSystem {
  public:
   // `prefix`: of the robot's names in the model; `base`: the robot's base body, without it.
-  CameraSystem(CameraSystemCfg cfg, std::string prefix, std::string base);
+  CameraSystem(CameraSystemCfg cfg, const std::string& prefix, const std::string& base);
 
   const CameraSystemCfg& cfg() const { return cfg_; }
   // Full MuJoCo name of a camera; and for what is no camera of the robot's MJCF, where a new one of
@@ -84,7 +84,6 @@ class CameraSystem {
                     std::span<const int> objects, Lens& out) const;
 
   CameraSystemCfg cfg_;
-  std::string prefix_;
   std::vector<Mounted> mounted_;
   std::vector<int> ids_;    // of the model
   std::vector<Lens> rest_;  // without noise
