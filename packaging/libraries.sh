@@ -51,14 +51,13 @@ build_embree() {
   local unused=() name
   for name in QUAD GRID SUBDIVISION INSTANCE USER POINT; do unused+=("-DEMBREE_GEOMETRY_$name=OFF"); done
   cmake -S "$src" -B "$work/embree" -G Ninja -Wno-dev -DCMAKE_BUILD_TYPE=Release -DCMAKE_POSITION_INDEPENDENT_CODE=ON \
-    -DCMAKE_CXX_COMPILER_LAUNCHER=ccache -DCMAKE_INSTALL_PREFIX="$work/embree/installed" -DCMAKE_INSTALL_LIBDIR=lib \
+    -DCMAKE_CXX_COMPILER_LAUNCHER=ccache \
     -DEMBREE_STATIC_LIB=ON -DEMBREE_TASKING_SYSTEM=INTERNAL -DEMBREE_ISPC_SUPPORT=OFF -DEMBREE_TUTORIALS=OFF -DBUILD_TESTING=OFF \
     -DEMBREE_MAX_ISA=NONE -DEMBREE_ISA_SSE2=ON -DEMBREE_ISA_SSE42=OFF -DEMBREE_ISA_AVX=OFF -DEMBREE_ISA_AVX2=ON \
     -DEMBREE_ISA_AVX512=ON "${unused[@]}" >&2
   cmake --build "$work/embree" -j "$jobs" >&2
-  cmake --install "$work/embree" >/dev/null
   # One archive, whose parts name each other in circles.
-  { echo "create $lib/libembree.a"; find "$work/embree/installed/lib" -name '*.a' -printf 'addlib %p\n'; printf 'save\nend\n'; } | ar -M
+  { echo "create $lib/libembree.a"; find "$work/embree" -name '*.a' -printf 'addlib %p\n'; printf 'save\nend\n'; } | ar -M
 }
 
 build_fmt() {
