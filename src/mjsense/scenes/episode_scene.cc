@@ -13,6 +13,7 @@
 #include "mjsense/scene/parts.h"
 #include "mjsense/scene/resolve.h"
 #include "mjsense/scene/spec.h"
+#include "mjsense/scenes/generators/generator.h"
 
 namespace mjsense {
 namespace {
@@ -99,6 +100,7 @@ void apply_look(mjSpec* spec, const SceneFileCfg& cfg) {
 
 EpisodeScene::EpisodeScene(SceneFileCfg cfg) : cfg_(std::move(cfg)) {
   check_fields(cfg_, "");
+  if (!cfg_.generator.empty()) generated_ = generate(cfg_);
   for (const SceneEntityCfg& entity : cfg_.entities)
     freed_.push_back(entity.free ? with_free_joint(entity, place()) : nullptr);
 }
@@ -108,6 +110,13 @@ std::string EpisodeScene::place() const { return fmt::format("scene '{}'", cfg_.
 SceneCfg EpisodeScene::scene_cfg(const std::string& robot) const {
   SceneCfg scene;
   scene.base.path = cfg_.base;
+  if (!generated_.empty()) {
+    EntityCfg room;
+    room.model = generated_;
+    room.mocap_base = false;
+    scene.entities.emplace_back("room", room);
+    scene.entities.emplace_back(robot, EntityCfg{});
+  }
   for (std::size_t i = 0; i < cfg_.entities.size(); ++i) {
     const SceneEntityCfg& one = cfg_.entities[i];
     EntityCfg entity;

@@ -30,7 +30,7 @@ struct SceneObject {
 
 class EpisodeScene {
  public:
-  // Reads the models of entities that get a free joint. Throws ValueError.
+  // Makes the house of a scene that is generated; reads the models of entities that get a free joint. Throws ValueError.
   explicit EpisodeScene(SceneFileCfg cfg);
 
   const SceneFileCfg& cfg() const { return cfg_; }
@@ -66,6 +66,7 @@ class EpisodeScene {
 
   SceneFileCfg cfg_;
   const mjModel* model_ = nullptr;
+  ModelSource generated_;                       // empty: the scene has no generator
   std::vector<std::shared_ptr<mjSpec>> freed_;  // models that were given a free joint
   std::vector<SceneObject> objects_;
   std::vector<Region> regions_;

@@ -3,7 +3,9 @@
 
 #include <fmt/format.h>
 
+#include <charconv>
 #include <filesystem>
+#include <optional>
 
 #include "mjsense/core/data_file.h"
 #include "mjsense/core/error.h"
@@ -32,20 +34,37 @@ void read(const DataFile& file, SceneFileCfg& cfg, int depth) {
   if (!own.base.empty()) cfg.base = beside(file.path, own.base);
 }
 
+// Cuts ":7" off; nothing where there is no such end.
+std::optional<int> cut_house(std::string_view& name) {
+  const std::size_t colon = name.rfind(':');
+  if (colon == std::string_view::npos || colon == 0 || colon + 1 == name.size()) return {};
+  int house = 0;
+  const auto [end, error] =
+      std::from_chars(name.data() + colon + 1, name.data() + name.size(), house);
+  if (error != std::errc() || end != name.data() + name.size() || house < 0) return {};
+  name = name.substr(0, colon);
+  return house;
+}
+
 }  // namespace
 
 std::vector<std::string> scene_names() { return kScenes.names(); }
 
 SceneFileCfg load_scene(std::string_view name) {
   SceneFileCfg cfg;
+  const std::optional<int> house = cut_house(name);
   if (name.ends_with(".xml")) {
     cfg.base = std::string(name);
     if (!std::filesystem::is_regular_file(cfg.base))
       throw ValueError(fmt::format("{}: no such file", cfg.base));
     cfg.name = std::filesystem::path(cfg.base).stem().string();
-    return cfg;
+  } else {
+    read(kScenes.find(name), cfg, 0);
   }
-  read(kScenes.find(name), cfg, 0);
+  if (house) cfg.house = *house;
+  if (cfg.generator.empty() && (house || cfg.house > 0 || !cfg.parameters.empty()))
+    throw ValueError(fmt::format("scene '{}' has no generator: {} mean nothing", name,
+                                 cfg.parameters.empty() ? "houses" : "parameters"));
   check_fields(cfg, fmt::format("scene '{}'", name));
   return cfg;
 }

@@ -14,7 +14,7 @@ namespace mjsense {
 std::vector<std::string> scene_names();
 
 // One of ours by its name, one of a scene.toml by its path, or an MJCF by its path (.xml): the whole
-// model, its bodies as they lie there. Throws KeyError with the nearest names; ValueError that says
+// model, its bodies as they lie there. "kitchen:7" is house 7 of a scene with a generator. Throws KeyError with the nearest names; ValueError that says
 // file, line and key of what is wrong.
 SceneFileCfg load_scene(std::string_view name_or_path);
 

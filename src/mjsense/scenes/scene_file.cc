@@ -20,7 +20,11 @@ void check_area(const std::array<double, 4>& area, const std::string& who) {
 void validate(const SceneFileCfg& cfg, std::string_view place) {
   const std::string who = fmt::format("{}{}scene '{}'", place, place.empty() ? "" : ", ", cfg.name);
   if (cfg.name.empty()) throw ValueError(who + ": it has no name");
+  if (!cfg.generator.empty() && !cfg.base.empty())
+    throw ValueError(who + ": it has a generator and a base; a generated room is an entity");
   for (std::size_t i = 0; i < cfg.entities.size(); ++i) {
+    if (!cfg.generator.empty() && cfg.entities[i].name == "room")
+      throw ValueError(who + ": entity 'room' is the one that its generator makes");
     for (std::size_t k = 0; k < i; ++k) {
       if (cfg.entities[i].name == cfg.entities[k].name)
         throw ValueError(

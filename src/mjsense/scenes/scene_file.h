@@ -7,6 +7,7 @@
 #include <optional>
 #include <string>
 #include <string_view>
+#include <utility>
 #include <vector>
 
 #include "mjsense/core/fields.h"
@@ -138,6 +139,9 @@ struct SceneFileCfg {
   std::string name;
   std::string extends;
   std::string base;
+  std::string generator;
+  int house = 0;
+  std::vector<std::pair<std::string, double>> parameters;
   std::vector<SceneEntityCfg> entities;
   std::vector<SceneObjectCfg> objects;
   std::vector<SceneRegionCfg> regions;
@@ -161,6 +165,11 @@ void visit_fields(V& v, SceneFileCfg& c) {
       .or_none();
   v("base", c.base, "An MJCF to start from, as it is, beside the file: names without a prefix.")
       .or_none();
+  v("generator", c.generator,
+    "What makes its first entity, ``room``, and what belongs to it: one house of a street.")
+      .or_none();
+  v("house", c.house, "Which of the generator's; ``<scene>:7`` is house 7 of a scene.").at_least(0);
+  v("parameters", c.parameters, "Numbers for the generator, by its names.");
   v("entities", c.entities, "Its models, in this order.");
   v("objects", c.objects,
     "Bodies that a task may be about; none named: all that have a free joint and that a hand can "

@@ -1,0 +1,44 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "mjsense/scenes/generators/generator.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+
+#include "mjsense/core/error.h"
+#include "mjsense/scenes/generators/shelf.h"
+
+namespace mjsense {
+
+std::span<const Generator> generators() {
+  static const std::vector<Generator> all{shelf_generator()};
+  return all;
+}
+
+ModelSource generate(SceneFileCfg& cfg) {
+  const std::string place = fmt::format("scene '{}'", cfg.name);
+  const auto all = generators();
+  const auto one = std::ranges::find(all, cfg.generator, &Generator::name);
+  if (one == all.end()) {
+    std::vector<std::string> names;
+    for (const Generator& g : all) names.emplace_back(g.name);
+    throw_unknown(place, "generator", cfg.generator, names);
+  }
+  const auto number = static_cast<std::uint64_t>(cfg.house);
+  House house{number, Rng(0, 0, stream_of(fmt::format("house/{}", one->name)), number), {}};
+  std::vector<std::string> known;
+  for (const GeneratorParameter& parameter : one->parameters) {
+    known.emplace_back(parameter.name);
+    house.parameters.push_back(parameter.value);
+  }
+  for (const auto& [name, value] : cfg.parameters) {
+    const auto at = std::ranges::find(known, name);
+    if (at == known.end()) {
+      throw_unknown(fmt::format("{}, generator '{}'", place, one->name), "parameter", name, known);
+    }
+    house.parameters[at - known.begin()] = value;
+  }
+  return one->make(house, cfg);
+}
+
+}  // namespace mjsense
