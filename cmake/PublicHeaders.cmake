@@ -46,6 +46,9 @@ set(MJSENSE_PUBLIC_HEADERS
   mjsense/observe/pose_sensor.h
   mjsense/observe/shared_field.h
   mjsense/observe/suite.h
+  mjsense/policies/planner/follower.h
+  mjsense/policies/planner/plan.h
+  mjsense/policies/planner/task_planner.h
   mjsense/rays/packet.h
   mjsense/rays/ray_geom.h
   mjsense/rays/ray_scene.h
@@ -66,6 +69,7 @@ set(MJSENSE_PUBLIC_HEADERS
   mjsense/robots/state_row.h
   mjsense/rollout/action_log.h
   mjsense/rollout/core_suite.h
+  mjsense/rollout/planners.h
   mjsense/rollout/record_job.h
   mjsense/rollout/registry.h
   mjsense/rollout/rollout.h

@@ -6,7 +6,7 @@
 #include <mutex>
 
 #include "mjsense/core/error.h"
-#include "mjsense/policies/planner/pick_planner.h"
+#include "mjsense/rollout/planners.h"
 #include "mjsense/tasks/pick/pick.h"
 
 namespace mjsense {
@@ -64,8 +64,7 @@ Registry<TaskFactory>& tasks() {
 }
 
 Registry<PolicyFactory>& policies() {
-  static Registry<PolicyFactory> all("policies", "policy",
-                                     {{"planner", [] { return std::make_unique<PickPlanner>(); }}});
+  static Registry<PolicyFactory> all("policies", "policy", {{"planner", make_any_planner}});
   return all;
 }
 

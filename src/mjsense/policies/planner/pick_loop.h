@@ -11,6 +11,21 @@
 
 namespace mjsense {
 
+// The physics of one control step, with the controllers that go on in it; then derived fields are
+// fresh.
+inline void physics_steps(Task& task, World& world, mjData* data) {
+  const bool controlled = task.robot().controls_every_step();
+  for (int i = 0; i < task.decimation(); ++i) {
+    if (controlled && i > 0 && i % task.control_decimation() == 0) {
+      mj_forward(world.model, data);
+      task.robot().control(world, i / task.control_decimation());
+    }
+    mj_step(world.model, data);
+  }
+  mj_forward(world.model, data);
+  world.substep += task.decimation();
+}
+
 struct EpisodeResult {
   int steps = 0;  // control steps
   bool success = false;
@@ -34,9 +49,7 @@ inline EpisodeResult run_episode(Task& task, Policy& policy, mjData* data, int w
   for (;;) {
     policy.act(world, action);
     task.apply(world, action, state_row(data));
-    for (int i = 0; i < task.decimation(); ++i) mj_step(model, data);
-    mj_forward(model, data);
-    world.substep += task.decimation();
+    physics_steps(task, world, data);
     world.first = false;
     ++result.steps;
     const Evaluation e = task.evaluate(world);

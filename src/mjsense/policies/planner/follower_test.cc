@@ -1,0 +1,225 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "mjsense/policies/planner/follower.h"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <memory>
+
+#include "mjsense/core/testing/allocations.h"
+#include "mjsense/policies/planner/pick_loop.h"
+#include "mjsense/policies/planner/task_planner.h"
+#include "mjsense/robots/load_robot.h"
+#include "mjsense/tasks/pick/pick.h"
+
+namespace mjsense {
+namespace {
+
+// A robot at a table, and plain MuJoCo.
+struct Stage {
+  explicit Stage(const char* robot_name) {
+    TaskCfg cfg;
+    cfg.robot = robot_cfg(robot_name);
+    cfg.policy_dt_ms = cfg.robot.policy_dt_ms;
+    cfg.ctrl_dt_ms = cfg.robot.ctrl_dt_ms;
+    cfg.sim_dt_ms = cfg.robot.sim_dt_ms;
+    cfg.action_noise = false;
+    task = std::make_unique<PickTask>(cfg);
+    scene = std::make_unique<Scene>(task->whole_scene_cfg());
+    task->initialize(scene->model(), 1);
+    data.reset(mj_makeData(scene->model()));
+    world = {.id = 0, .model = scene->model(), .data = data.get()};
+    task->sample(0, 0, state_row(data.get()));
+    mj_forward(world.model, world.data);
+    task->begin(world);
+  }
+  const Robot& robot() const { return task->robot(); }
+  void step(const Action& action) {
+    task->apply(world, action, state_row(world.data));
+    physics_steps(*task, world, data.get());
+  }
+  std::unique_ptr<PickTask> task;
+  std::unique_ptr<Scene> scene;
+  std::unique_ptr<mjData, decltype(&mj_deleteData)> data{nullptr, mj_deleteData};
+  World world;
+};
+
+Pose moved(Pose pose, Vec3 by) {
+  pose.p = pose.p + by;
+  return pose;
+}
+
+TEST(Follower, TwoToolsGoAtTheSameTimeAndGrippersKeepTheirCommand) {
+  Stage stage("bimanual_yam");
+  const Robot& robot = stage.robot();
+  const auto hands = hands_of(robot, stage.world.model);
+  ASSERT_EQ(hands.size(), 2u);
+  Follower follower;
+  follower.initialize(robot, stage.world.model, 1);
+  follower.restart(stage.world);
+  Plan& plan = follower.plan(0);
+  Pose from[2], to[2];
+  for (int k = 0; k < 2; ++k) {
+    from[k] = follower.tool_target(stage.world, hands[k].tool);
+    to[k] = moved(from[k], {0.05, 0, 0.04 + 0.02 * k});
+  }
+  plan.move_tool(1, hands[0].tool, from[0], to[0], 0.1, 1.0);
+  plan.segments[0].tools.push_back({hands[1].tool, from[1], log6(inverse(from[1]) * to[1]), 0.5});
+  plan.segments[0].grip(hands[0].gripper, 0.0);
+  plan.wait(2, 0.5);
+  follower.begin(stage.world);
+  int steps = 0;
+  for (; !follower.finished(0) && steps < 100; ++steps) {
+    Action action;
+    const AllocationCount count;
+    follower.follow(stage.world, action);
+    EXPECT_EQ(count.since(), 0) << "while following";
+    EXPECT_FALSE(action.commands[hands[1].gripper].given) << "no plan has named it";
+    ASSERT_TRUE(action.commands[hands[0].gripper].given);
+    EXPECT_EQ(action.commands[hands[0].gripper].values[0], 0.0);
+    EXPECT_EQ(follower.failure(stage.world), PlanFailure::kNone);
+    stage.step(action);
+  }
+  const double seconds = norm(to[0].p - from[0].p) / 0.1 + 1.5;
+  EXPECT_EQ(steps, static_cast<int>(std::ceil(seconds / 0.066)) + 1);
+  for (int k = 0; k < 2; ++k)
+    EXPECT_LT(norm(robot.tcp_pose(stage.world, hands[k].tool).p - to[k].p), 0.01) << k;
+}
+
+TEST(Follower, ABaseDrivesAlongAPathWhileTheToolStaysInTheWorld) {
+  Stage stage("mobile_franka");
+  const Robot& robot = stage.robot();
+  const int base = robot.group_index("base"), arm = robot.arm();
+  Follower follower;
+  follower.initialize(robot, stage.world.model, 1);
+  follower.restart(stage.world);
+  const Pose tool = robot.leaf_pose(stage.world, arm);
+  const Pose start = robot.base_pose(stage.world);
+  RobotValues now;
+  robot.read_qpos(stage.world, now);
+  CommandPath path{base, {0, 2}, {}};
+  for (double back : {0.0, 0.08}) {
+    const double at[3] = {now[base].values[0] - back, now[base].values[1], now[base].values[2]};
+    path.points.insert(path.points.end(), at, at + 3);
+  }
+  Plan& plan = follower.plan(0);
+  plan.move_groups(1, {path}, 1.0);
+  plan.segments[0].tools.push_back({arm, tool, {}, 0, true});
+  follower.begin(stage.world);
+  while (!follower.finished(0)) {
+    Action action;
+    follower.follow(stage.world, action);
+    ASSERT_EQ(follower.failure(stage.world), PlanFailure::kNone);
+    stage.step(action);
+    EXPECT_LT(norm(robot.leaf_pose(stage.world, arm).p - tool.p), 0.03);
+  }
+  EXPECT_NEAR(norm(robot.base_pose(stage.world).p - start.p), 0.08, 0.01);
+  EXPECT_LT(norm(robot.leaf_pose(stage.world, arm).p - tool.p), 0.01);
+}
+
+// What a segment was to reach is commanded where it ends between two steps.
+TEST(Follower, AGroupReachesTheEndOfItsPath) {
+  Stage stage("franka");
+  const int arm = stage.robot().arm();
+  Follower follower;
+  follower.initialize(stage.robot(), stage.world.model, 1);
+  follower.restart(stage.world);
+  const auto q = follower.joints(0)[arm].view();
+  CommandPath path{arm, {0, 0.1}, {q.begin(), q.end()}};
+  path.points.insert(path.points.end(), q.begin(), q.end());
+  path.points.back() += 0.1;
+  Plan& plan = follower.plan(0);
+  plan.move_groups(1, {path});
+  plan.wait(2, 0.2);
+  follower.begin(stage.world);
+  Action action;
+  for (int i = 0; i < 3; ++i) {
+    action = {};
+    follower.follow(stage.world, action);
+    stage.step(action);
+  }
+  EXPECT_EQ(follower.phase(0), 2);
+  EXPECT_EQ(action.commands[arm].values[6], path.points.back());
+}
+
+TEST(Follower, AFloatingHandGoesWhereItsToolIsWanted) {
+  Stage stage("floating_rum");
+  const Robot& robot = stage.robot();
+  Rng rng(0, 0, 0, 0);
+  robot.write_start(state_row(stage.world.data), Pose{{0.3, 0, 1.2}, {0, 1, 0, 0}}, rng);
+  mj_forward(stage.world.model, stage.world.data);
+  const auto hands = hands_of(robot, stage.world.model);
+  ASSERT_EQ(hands.size(), 1u);
+  EXPECT_EQ(hands[0].tool, hands[0].gripper);
+  Follower follower;
+  follower.initialize(robot, stage.world.model, 1);
+  follower.restart(stage.world);
+  const Pose from = robot.leaf_pose(stage.world, hands[0].tool);
+  const Pose to = moved(from, {0, 0.1, 0.1});
+  follower.plan(0).move_tool_in_world(1, hands[0].tool, from, to, 0.2, 0.5);
+  follower.begin(stage.world);
+  while (!follower.finished(0)) {
+    Action action;
+    follower.follow(stage.world, action);
+    ASSERT_EQ(follower.failure(stage.world), PlanFailure::kNone);
+    stage.step(action);
+  }
+  EXPECT_LT(norm(robot.leaf_pose(stage.world, hands[0].tool).p - to.p), 0.01);
+}
+
+// Two stages, the second planned from what the first left; nothing at all for the third attempt.
+class TwoStages final : public TaskPlanner {
+ public:
+  explicit TwoStages(int bad_stage) : bad_stage_(bad_stage) {}
+  std::vector<PlanRequest> requests;
+
+ protected:
+  void initialize_planner() override {}
+  void make_plan(const World&, const PlanRequest& request, Plan& plan) override {
+    requests.push_back(request);
+    if (request.stage == bad_stage_) return;
+    plan.wait(1 + request.stage, 0.1);
+    plan.more = request.stage == 0;
+  }
+
+ private:
+  int bad_stage_;
+};
+
+TEST(TaskPlanner, AsksForTheNextStageAndEndsOnce) {
+  Stage stage("franka");
+  TwoStages planner(-1);
+  planner.initialize(*stage.task);
+  planner.reset(stage.world);
+  std::vector<int> phases;
+  Action action;
+  for (int i = 0; i < 10 && !action.done; ++i) {
+    planner.act(stage.world, action);
+    phases.push_back(planner.phase(0));
+    stage.step(action);
+  }
+  EXPECT_EQ(phases, (std::vector<int>{1, 1, 2, 2, 2}));
+  EXPECT_FALSE(action.success.has_value());
+  ASSERT_EQ(planner.requests.size(), 2u);
+  EXPECT_EQ(planner.requests[1].stage, 1);
+  EXPECT_EQ(planner.num_retries(0), 0);
+}
+
+TEST(TaskPlanner, AStageWithoutAWayBeginsAgainThenGivesUp) {
+  Stage stage("franka");
+  TwoStages planner(1);
+  planner.initialize(*stage.task);
+  planner.reset(stage.world);
+  Action action;
+  for (int i = 0; i < 30 && !action.done; ++i) {
+    planner.act(stage.world, action);
+    stage.step(action);
+  }
+  EXPECT_EQ(action.success, std::optional<bool>(false));
+  EXPECT_EQ(planner.num_retries(0), 3);
+  EXPECT_EQ(planner.last_failure(0), PlanFailure::kUnplanned);
+  EXPECT_EQ(planner.requests.size(), 8u);
+}
+
+}  // namespace
+}  // namespace mjsense
