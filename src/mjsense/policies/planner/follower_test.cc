@@ -4,45 +4,13 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
-#include <memory>
 
 #include "mjsense/core/testing/allocations.h"
-#include "mjsense/policies/planner/pick_loop.h"
 #include "mjsense/policies/planner/task_planner.h"
-#include "mjsense/robots/load_robot.h"
-#include "mjsense/tasks/pick/pick.h"
+#include "mjsense/policies/planner/testing/stage.h"
 
 namespace mjsense {
 namespace {
-
-// A robot at a table, and plain MuJoCo.
-struct Stage {
-  explicit Stage(const char* robot_name) {
-    TaskCfg cfg;
-    cfg.robot = robot_cfg(robot_name);
-    cfg.policy_dt_ms = cfg.robot.policy_dt_ms;
-    cfg.ctrl_dt_ms = cfg.robot.ctrl_dt_ms;
-    cfg.sim_dt_ms = cfg.robot.sim_dt_ms;
-    cfg.action_noise = false;
-    task = std::make_unique<PickTask>(cfg);
-    scene = std::make_unique<Scene>(task->whole_scene_cfg());
-    task->initialize(scene->model(), 1);
-    data.reset(mj_makeData(scene->model()));
-    world = {.id = 0, .model = scene->model(), .data = data.get()};
-    task->sample(0, 0, state_row(data.get()));
-    mj_forward(world.model, world.data);
-    task->begin(world);
-  }
-  const Robot& robot() const { return task->robot(); }
-  void step(const Action& action) {
-    task->apply(world, action, state_row(world.data));
-    physics_steps(*task, world, data.get());
-  }
-  std::unique_ptr<PickTask> task;
-  std::unique_ptr<Scene> scene;
-  std::unique_ptr<mjData, decltype(&mj_deleteData)> data{nullptr, mj_deleteData};
-  World world;
-};
 
 Pose moved(Pose pose, Vec3 by) {
   pose.p = pose.p + by;
@@ -50,7 +18,7 @@ Pose moved(Pose pose, Vec3 by) {
 }
 
 TEST(Follower, TwoToolsGoAtTheSameTimeAndGrippersKeepTheirCommand) {
-  Stage stage("bimanual_yam");
+  TableStage stage("bimanual_yam");
   const Robot& robot = stage.robot();
   const auto hands = hands_of(robot, stage.world.model);
   ASSERT_EQ(hands.size(), 2u);
@@ -87,7 +55,7 @@ TEST(Follower, TwoToolsGoAtTheSameTimeAndGrippersKeepTheirCommand) {
 }
 
 TEST(Follower, ABaseDrivesAlongAPathWhileTheToolStaysInTheWorld) {
-  Stage stage("mobile_franka");
+  TableStage stage("mobile_franka");
   const Robot& robot = stage.robot();
   const int base = robot.group_index("base"), arm = robot.arm();
   Follower follower;
@@ -119,7 +87,7 @@ TEST(Follower, ABaseDrivesAlongAPathWhileTheToolStaysInTheWorld) {
 
 // What a segment was to reach is commanded where it ends between two steps.
 TEST(Follower, AGroupReachesTheEndOfItsPath) {
-  Stage stage("franka");
+  TableStage stage("franka");
   const int arm = stage.robot().arm();
   Follower follower;
   follower.initialize(stage.robot(), stage.world.model, 1);
@@ -143,7 +111,7 @@ TEST(Follower, AGroupReachesTheEndOfItsPath) {
 }
 
 TEST(Follower, AFloatingHandGoesWhereItsToolIsWanted) {
-  Stage stage("floating_rum");
+  TableStage stage("floating_rum");
   const Robot& robot = stage.robot();
   Rng rng(0, 0, 0, 0);
   robot.write_start(state_row(stage.world.data), Pose{{0.3, 0, 1.2}, {0, 1, 0, 0}}, rng);
@@ -187,7 +155,7 @@ class TwoStages final : public TaskPlanner {
 };
 
 TEST(TaskPlanner, AsksForTheNextStageAndEndsOnce) {
-  Stage stage("franka");
+  TableStage stage("franka");
   TwoStages planner(-1);
   planner.initialize(*stage.task);
   planner.reset(stage.world);
@@ -206,7 +174,7 @@ TEST(TaskPlanner, AsksForTheNextStageAndEndsOnce) {
 }
 
 TEST(TaskPlanner, AStageWithoutAWayBeginsAgainThenGivesUp) {
-  Stage stage("franka");
+  TableStage stage("franka");
   TwoStages planner(1);
   planner.initialize(*stage.task);
   planner.reset(stage.world);

@@ -1,0 +1,249 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "mjsense/policies/planner/collision.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "mjsense/observe/frame.h"
+
+namespace mjsense {
+namespace {
+
+constexpr double kTurnStep = 0.04;    // rad between two configurations that are looked at
+constexpr double kSlideStep = 0.015;  // m
+
+bool is_solid(const mjModel* m, int g) {
+  const int type = m->geom_type[g];
+  return (m->geom_contype[g] || m->geom_conaffinity[g]) && type != mjGEOM_HFIELD &&
+         type != mjGEOM_SDF;
+}
+
+bool may_touch(const mjModel* m, int a, int b) {
+  return (m->geom_contype[a] & m->geom_conaffinity[b]) ||
+         (m->geom_contype[b] & m->geom_conaffinity[a]);
+}
+
+bool is_neighbour(const mjModel* m, int a, int b) {
+  const int wa = m->body_weldid[m->geom_bodyid[a]], wb = m->body_weldid[m->geom_bodyid[b]];
+  return wa == wb || m->body_weldid[m->body_parentid[wa]] == wb ||
+         m->body_weldid[m->body_parentid[wb]] == wa;
+}
+
+// mj_geomDistance without a segment. Nothing with a destructor lives across it: a MuJoCo error leaves by longjmp.
+double distance(const mjModel* m, mjData* d, int a, int b, double most) {
+  return mj_geomDistance(m, d, a, b, most, nullptr);
+}
+
+}  // namespace
+
+CollisionModel::CollisionModel(const mjModel* model, const Robot& robot, std::vector<int> joints)
+    : model_(model), robot_(&robot), joints_(std::move(joints)) {
+  const int root = model->body_rootid[robot.base_body()];
+  std::vector<char> moves(model->nbody, 0);
+  for (int b = 1; b < model->nbody; ++b) {
+    moves[b] = moves[model->body_parentid[b]];
+    for (int j = model->body_jntadr[b]; j < model->body_jntadr[b] + model->body_jntnum[b]; ++j)
+      moves[b] = moves[b] || std::ranges::count(joints_, j) > 0;
+  }
+  std::vector<int> own;
+  for (int g = 0; g < model->ngeom; ++g) {
+    if (!is_solid(model, g)) continue;
+    const int body = model->geom_bodyid[g];
+    const bool of_robot = body > 0 && model->body_rootid[body] == root;
+    if (of_robot) own.push_back(g);
+    if (moves[body]) moving_.push_back(g);
+    if (!of_robot && !moves[body]) scene_.push_back(g);
+  }
+  // Links that meet at the start are built so.
+  mjData* d = take();
+  for (std::size_t g = 0; g < robot.groups().size(); ++g) {
+    const auto& init = robot.cfg().groups[g].init;
+    for (std::size_t i = 0; i < init.size(); ++i) d->qpos[robot.groups()[g].qpos[i]] = init[i];
+  }
+  mj_kinematics(model, d);
+  for (std::size_t i = 0; i < own.size(); ++i) {
+    for (std::size_t k = i + 1; k < own.size(); ++k) {
+      const int a = own[i], b = own[k];
+      if (!moves[model->geom_bodyid[a]] && !moves[model->geom_bodyid[b]]) continue;
+      if (is_neighbour(model, a, b) || distance(model, d, a, b, 0.002) < 0.002) continue;
+      self_.emplace_back(a, b);
+    }
+  }
+  give_back(d);
+}
+
+CollisionModel::~CollisionModel() {
+  for (mjData* d : unused_) mj_deleteData(d);
+}
+
+mjData* CollisionModel::take() {
+  {
+    const std::lock_guard lock(mutex_);
+    if (!unused_.empty()) {
+      mjData* d = unused_.back();
+      unused_.pop_back();
+      return d;
+    }
+  }
+  return mj_makeData(model_);
+}
+
+void CollisionModel::give_back(mjData* data) {
+  const std::lock_guard lock(mutex_);
+  unused_.push_back(data);
+}
+
+CollisionQuery::CollisionQuery(CollisionModel& model, const World& world)
+    : cm_(model), m_(world.model), d_(model.take()), scene_(model.scene_) {
+  mju_copy(d_->qpos, world.data->qpos, m_->nq);
+  mju_copy(d_->mocap_pos, world.data->mocap_pos, 3 * m_->nmocap);
+  mju_copy(d_->mocap_quat, world.data->mocap_quat, 4 * m_->nmocap);
+  between_.resize(cm_.joints_.size());
+}
+
+CollisionQuery::~CollisionQuery() { cm_.give_back(d_); }
+
+void CollisionQuery::ignore(int body) {
+  std::erase_if(scene_, [&](int g) { return is_below(m_, m_->geom_bodyid[g], body); });
+}
+
+void CollisionQuery::allow(int gripper, int body) {
+  allowed_gripper_.push_back(cm_.robot_->groups()[gripper].root_body);
+  allowed_body_.push_back(body);
+}
+
+void CollisionQuery::hold(int tool, int gripper, int body, const Pose& tool_object) {
+  ignore(body);
+  mj_kinematics(m_, d_);
+  Held& held = held_.emplace_back();
+  held.site = cm_.robot_->groups()[tool].leaf_site;
+  held.gripper_body = cm_.robot_->groups()[gripper].root_body;
+  held.body = body;
+  held.tool_object = tool_object;
+  const Pose object{vec3(d_->xpos + 3 * body), quat(d_->xquat + 4 * body)};
+  for (int g = 0; g < m_->ngeom; ++g) {
+    if (!is_solid(m_, g) || !is_below(m_, m_->geom_bodyid[g], body)) continue;
+    held.geoms.push_back(g);
+    held.object_geom.push_back(inverse(object) *
+                               pose_from_mat(d_->geom_xpos + 3 * g, d_->geom_xmat + 9 * g));
+  }
+}
+
+void CollisionQuery::open(int gripper) {
+  const MoveGroup& group = cm_.robot_->groups()[gripper];
+  const auto& init = cm_.robot_->cfg().groups[gripper].init;
+  for (int j = 0; j < m_->njnt; ++j) {
+    const int type = m_->jnt_type[j];
+    if ((type != mjJNT_HINGE && type != mjJNT_SLIDE) ||
+        !is_below(m_, m_->jnt_bodyid[j], group.root_body))
+      continue;
+    const int qpos = m_->jnt_qposadr[j];
+    d_->qpos[qpos] = m_->qpos0[qpos];
+  }
+  for (std::size_t i = 0; i < init.size(); ++i) d_->qpos[group.qpos[i]] = init[i];
+}
+
+void CollisionQuery::place(int body, const Pose& pose) {
+  const int joint = m_->body_jntadr[body];
+  if (joint < 0 || m_->jnt_type[joint] != mjJNT_FREE) return;
+  write_pose(pose, d_->qpos + m_->jnt_qposadr[joint]);
+}
+
+void CollisionQuery::place_base(const Pose& base) { place(cm_.robot_->base_body(), base); }
+
+void CollisionQuery::move_held() {
+  for (const Held& held : held_) {
+    const Pose tool = pose_from_mat(d_->site_xpos + 3 * held.site, d_->site_xmat + 9 * held.site);
+    const Pose object = tool * held.tool_object;
+    for (std::size_t i = 0; i < held.geoms.size(); ++i) {
+      const Pose geom = object * held.object_geom[i];
+      double q[4];
+      write_vec(geom.p, d_->geom_xpos + 3 * held.geoms[i]);
+      write_quat(geom.q, q);
+      mju_quat2Mat(d_->geom_xmat + 9 * held.geoms[i], q);
+    }
+  }
+}
+
+// Bounding sphere of one against the box around the other.
+bool CollisionQuery::near_enough(int moving, int other) const {
+  const double reach = m_->geom_rbound[moving] + margin_;
+  const double* c = d_->geom_xpos + 3 * moving;
+  const double *x = d_->geom_xpos + 3 * other, *r = d_->geom_xmat + 9 * other;
+  const double v[3] = {c[0] - x[0], c[1] - x[1], c[2] - x[2]};
+  if (m_->geom_type[moving] == mjGEOM_PLANE) return true;
+  if (m_->geom_type[other] == mjGEOM_PLANE) return v[0] * r[2] + v[1] * r[5] + v[2] * r[8] < reach;
+  const double* aabb = m_->geom_aabb + 6 * other;
+  double outside = 0;
+  for (int i = 0; i < 3; ++i) {
+    const double p = v[0] * r[i] + v[1] * r[3 + i] + v[2] * r[6 + i] - aabb[i];
+    const double o = std::max(0.0, std::abs(p) - aabb[3 + i]);
+    outside += o * o;
+  }
+  return outside < reach * reach;
+}
+
+bool CollisionQuery::hit(int a, int b) {
+  if (!near_enough(a, b) || !near_enough(b, a)) return false;
+  if (distance(m_, d_, a, b, std::max(margin_, 1e-9)) >= margin_) return false;
+  touching_ = {a, b};
+  return true;
+}
+
+bool CollisionQuery::is_robot_allowed(int geom, int other) const {
+  for (std::size_t i = 0; i < allowed_body_.size(); ++i) {
+    if (is_below(m_, m_->geom_bodyid[other], allowed_body_[i]) &&
+        is_below(m_, m_->geom_bodyid[geom], allowed_gripper_[i]))
+      return true;
+  }
+  return false;
+}
+
+bool CollisionQuery::free_here() {
+  mj_kinematics(m_, d_);
+  move_held();
+  for (int g : cm_.moving_) {
+    for (int other : scene_) {
+      if (may_touch(m_, g, other) && hit(g, other) && !is_robot_allowed(g, other)) return false;
+    }
+  }
+  for (const auto& [a, b] : cm_.self_) {
+    if (hit(a, b)) return false;
+  }
+  for (const Held& held : held_) {
+    for (int g : held.geoms) {
+      for (int other : scene_) {
+        if (may_touch(m_, g, other) && hit(g, other)) return false;
+      }
+      for (int other : cm_.moving_) {
+        if (!is_below(m_, m_->geom_bodyid[other], held.gripper_body) && hit(g, other)) return false;
+      }
+    }
+  }
+  return true;
+}
+
+bool CollisionQuery::free(std::span<const double> q) {
+  for (std::size_t i = 0; i < q.size(); ++i) d_->qpos[m_->jnt_qposadr[cm_.joints_[i]]] = q[i];
+  return free_here();
+}
+
+bool CollisionQuery::free_between(std::span<const double> from, std::span<const double> to) {
+  double steps = 1;
+  for (std::size_t i = 0; i < from.size(); ++i) {
+    const double step = m_->jnt_type[cm_.joints_[i]] == mjJNT_SLIDE ? kSlideStep : kTurnStep;
+    steps = std::max(steps, std::abs(to[i] - from[i]) / step);
+  }
+  // Coarse, then finer: what is in the way is found early.
+  const int n = 1 << static_cast<int>(std::ceil(std::log2(steps)));
+  for (int stride = n; stride > 1; stride /= 2) {
+    for (int k = stride / 2; k < n; k += stride) {
+      const double s = static_cast<double>(k) / n;
+      for (std::size_t i = 0; i < from.size(); ++i) between_[i] = from[i] + s * (to[i] - from[i]);
+      if (!free(between_)) return false;
+    }
+  }
+  return true;
+}
+
+}  // namespace mjsense
