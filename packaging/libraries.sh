@@ -48,6 +48,9 @@ build_embree() {
   src=$(fetch embree libembree-dev)
   # Rays meet triangles and thick lines; other curves take most of the time that it compiles.
   sed -i -E '/vtbl\[Geometry::GTY_/{/GTY_ROUND_LINEAR_CURVE/!d}' "$src"/kernels/geometry/curve_intersector_virtual_*.cpp
+  # What is compiled for AVX alone is wanted by AVX2, too.
+  sed -i 's/SET(ISA_LOWEST_AVX 2)/SET(ISA_LOWEST_AVX 3)/' "$src/CMakeLists.txt"
+  sed -i 's/^  IF (${ISA} EQUAL ${AVX})$/  IF (${ISA} EQUAL ${ISA_LOWEST_AVX})/' "$src/kernels/CMakeLists.txt"
   local unused=() name
   for name in QUAD GRID SUBDIVISION INSTANCE USER POINT; do unused+=("-DEMBREE_GEOMETRY_$name=OFF"); done
   cmake -S "$src" -B "$work/embree" -G Ninja -Wno-dev -DCMAKE_BUILD_TYPE=Release -DCMAKE_POSITION_INDEPENDENT_CODE=ON \
@@ -81,6 +84,15 @@ build_glibc() {
   echo "GROUP ( $stubs/libc.so.6 $stubs/libc_nonshared.a AS_NEEDED ( $stubs/ld-linux-x86-64.so.2 ) )" > "$stubs/libc.so"
 }
 
-[ -f "$lib/libembree.a" ] || { say "building Embree (once)"; build_embree; }
-[ -f "$lib/libfmt.a" ] || { say "building fmt (once)"; build_fmt; }
-[ -f "$lib/glibc/libc.so" ] || { say "preparing glibc $glibc (once)"; build_glibc; }
+# once FILE WHAT FUNCTION: makes a file unless the same recipe has made it.
+once() {
+  local recipe
+  recipe=$(declare -f fetch "$3" | sha256sum)
+  [ -f "$1" ] && [ "$(cat "$work/$3.recipe" 2>/dev/null)" = "$recipe" ] && return
+  say "$2 (once)"
+  "$3"
+  echo "$recipe" > "$work/$3.recipe"
+}
+once "$lib/libembree.a" "building Embree" build_embree
+once "$lib/libfmt.a" "building fmt" build_fmt
+once "$lib/glibc/libc.so" "preparing glibc $glibc" build_glibc

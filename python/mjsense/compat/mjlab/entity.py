@@ -1,0 +1,190 @@
+# SPDX-License-Identifier: Apache-2.0
+"""``mjlab.entity``: a spec, what is edited in it, and where it begins."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field
+from typing import Any
+
+import mujoco
+import numpy as np
+
+from mjsense import configs
+from mjsense.compat.mjlab._names import find, value_of
+from mjsense.compat.mjlab.actuator import ActuatorCfg, TransmissionType, XmlActuatorCfg
+
+_FREE = mujoco.mjtJoint.mjJNT_FREE
+
+
+@dataclass
+class EntityArticulationInfoCfg:
+    """What moves it."""
+
+    actuators: tuple[ActuatorCfg, ...] = ()
+    soft_joint_pos_limit_factor: float = 1.0
+
+
+@dataclass
+class EntityCfg:
+    """A model that is attached to the scene.
+
+    ``spec_fn`` makes its spec; then lights, cameras, textures, materials, meshes, geoms and collisions, in this order, edit it (anything
+    with ``edit_spec(spec)``), and actuators are added.
+    """
+
+    @dataclass
+    class InitialStateCfg:
+        """The keyframe ``init_state``: m, wxyz, rad; joints by the first expression that matches; None: the model's own keyframe."""
+
+        pos: tuple[float, float, float] = (0.0, 0.0, 0.0)
+        rot: tuple[float, float, float, float] = (1.0, 0.0, 0.0, 0.0)
+        lin_vel: tuple[float, float, float] = (0.0, 0.0, 0.0)
+        ang_vel: tuple[float, float, float] = (0.0, 0.0, 0.0)
+        joint_pos: dict[str, float] | None = field(default_factory=lambda: {".*": 0.0})
+        joint_vel: dict[str, float] = field(default_factory=lambda: {".*": 0.0})
+
+    init_state: InitialStateCfg = field(default_factory=InitialStateCfg)
+    spec_fn: Callable[[], mujoco.MjSpec] = field(default_factory=lambda: mujoco.MjSpec)
+    articulation: EntityArticulationInfoCfg | None = None
+    sort_actuators: bool = False
+    lights: tuple[Any, ...] = ()
+    cameras: tuple[Any, ...] = ()
+    textures: tuple[Any, ...] = ()
+    materials: tuple[Any, ...] = ()
+    meshes: tuple[Any, ...] = ()
+    geoms: tuple[Any, ...] = ()
+    collisions: tuple[Any, ...] = ()
+
+    def spec(self) -> mujoco.MjSpec:
+        """A new spec of the entity, edited, with its keyframe."""
+        spec = self.spec_fn()
+        for edits in (self.lights, self.cameras, self.textures, self.materials, self.meshes, self.geoms, self.collisions):
+            for edit in edits:
+                edit.edit_spec(spec)
+        _add_actuators(spec, self)
+        _add_keyframe(spec, self)
+        return spec
+
+    def native(self) -> configs.EntityCfg:
+        spec = self.spec()
+        if any(joint.type == _FREE for joint in spec.joints):
+            return configs.EntityCfg(model=spec)
+        return configs.EntityCfg(model=spec, pos=self.init_state.pos, quat=self.init_state.rot)
+
+
+def _joints(spec: mujoco.MjSpec) -> list[str]:
+    return [joint.name for joint in spec.joints if joint.type != _FREE]
+
+
+def _add_actuators(spec: mujoco.MjSpec, cfg: EntityCfg) -> None:
+    names = {TransmissionType.JOINT: _joints(spec), TransmissionType.TENDON: [t.name for t in spec.tendons],
+             TransmissionType.SITE: [s.name for s in spec.sites]}  # fmt: skip
+    chosen: list[tuple[ActuatorCfg, str]] = []
+    for actuator in cfg.articulation.actuators if cfg.articulation is not None else ():
+        kind = TransmissionType(actuator.transmission_type)
+        chosen += [(actuator, name) for name in find(actuator.target_names_expr, names[kind], kind.value)[1]]
+    if cfg.sort_actuators:
+        kinds = list(names)
+
+        def place(item: tuple[ActuatorCfg, str]) -> tuple[int, int, int]:
+            kind = TransmissionType(item[0].transmission_type)
+            return (0, 0, 0) if isinstance(item[0], XmlActuatorCfg) else (1, kinds.index(kind), names[kind].index(item[1]))
+
+        chosen.sort(key=place)
+    for actuator, name in chosen:
+        actuator.edit_spec(spec, [name])
+
+
+def _add_keyframe(spec: mujoco.MjSpec, cfg: EntityCfg) -> None:
+    state = cfg.init_state
+    if state.joint_pos is None:
+        if not spec.keys:
+            raise ValueError("EntityCfg: init_state.joint_pos is None, which takes the model's keyframe, but the model has none")
+        spec.keys[0].name = "init_state"
+        return
+    joints = _joints(spec)
+    angles = [float(value_of(state.joint_pos, name, 0.0)) for name in joints]
+    root = [*state.pos, *state.rot] if len(joints) < len(spec.joints) else []
+    key = spec.add_key(name="init_state", qpos=[*root, *angles])
+    if cfg.articulation is not None and cfg.articulation.actuators and joints:
+        by_name = dict(zip(joints, angles))
+        key.ctrl = np.array([by_name.get(actuator.target, 0.0) for actuator in spec.actuators])
+
+
+class Entity:
+    """An attached entity: the local names of its elements in model order. ``native`` is ours."""
+
+    def __init__(self, native: Any, cfg: Any) -> None:
+        self.native = native
+        self.cfg = cfg
+
+    def __repr__(self) -> str:
+        return f"<Entity of mjlab: {self.native!r}>"
+
+    @property
+    def is_fixed_base(self) -> bool:
+        """No free joint."""
+        return self.native.fixed_base
+
+    @property
+    def body_names(self) -> tuple[str, ...]:
+        return self.native.body_names
+
+    @property
+    def geom_names(self) -> tuple[str, ...]:
+        return self.native.geom_names
+
+    @property
+    def site_names(self) -> tuple[str, ...]:
+        return self.native.site_names
+
+    @property
+    def joint_names(self) -> tuple[str, ...]:
+        """Without the free joint."""
+        names = self.native.joint_names
+        return names if self.is_fixed_base else names[1:]
+
+    @property
+    def actuator_names(self) -> tuple[str, ...]:
+        return self.native.actuator_names
+
+    @property
+    def tendon_names(self) -> tuple[str, ...]:
+        return self.native.tendon_names
+
+    @property
+    def camera_names(self) -> tuple[str, ...]:
+        return self.native.camera_names
+
+    @property
+    def num_joints(self) -> int:
+        """Without the free joint."""
+        return len(self.joint_names)
+
+    def find_bodies(self, name_keys: str | Sequence[str], preserve_order: bool = False) -> tuple[list[int], list[str]]:
+        """Local indices and names of the bodies that whole expressions match; UnknownNameError for one without any."""
+        return find(name_keys, self.body_names, "body", preserve_order)
+
+    def find_joints(self, name_keys: str | Sequence[str], preserve_order: bool = False) -> tuple[list[int], list[str]]:
+        """Likewise, of joints."""
+        return find(name_keys, self.joint_names, "joint", preserve_order)
+
+    def find_geoms(self, name_keys: str | Sequence[str], preserve_order: bool = False) -> tuple[list[int], list[str]]:
+        """Likewise, of geoms."""
+        return find(name_keys, self.geom_names, "geom", preserve_order)
+
+    def find_sites(self, name_keys: str | Sequence[str], preserve_order: bool = False) -> tuple[list[int], list[str]]:
+        """Likewise, of sites."""
+        return find(name_keys, self.site_names, "site", preserve_order)
+
+    def find_actuators(self, name_keys: str | Sequence[str], preserve_order: bool = False) -> tuple[list[int], list[str]]:
+        """Likewise, of actuators."""
+        return find(name_keys, self.actuator_names, "actuator", preserve_order)
+
+    def find_tendons(self, name_keys: str | Sequence[str], preserve_order: bool = False) -> tuple[list[int], list[str]]:
+        """Likewise, of tendons."""
+        return find(name_keys, self.tendon_names, "tendon", preserve_order)
+
+
+__all__ = ["Entity", "EntityArticulationInfoCfg", "EntityCfg"]

@@ -1,0 +1,161 @@
+# SPDX-License-Identifier: Apache-2.0
+"""``mjlab.scene``: entities, terrain and sensors."""
+
+from __future__ import annotations
+
+import weakref
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from typing import Any
+
+import mujoco
+
+import mjsense
+from mjsense import configs
+from mjsense.compat.mjlab._tensors import ids, tensor
+from mjsense.compat.mjlab.entity import Entity, EntityCfg
+from mjsense.compat.mjlab.sensor import SENSOR_CLASSES, BuiltinSensor, CameraSensor, RayCastSensor, Sensor, SensorContext
+from mjsense.compat.mjlab.sensor_cfg import SensorCfg
+from mjsense.compat.mjlab.terrains import TerrainEntityCfg
+from mjsense.errors import UnknownNameError
+
+
+@dataclass(kw_only=True)
+class SceneCfg:
+    """What all worlds share."""
+
+    num_envs: int = 1
+    env_spacing: float = 2.0
+    terrain: TerrainEntityCfg | None = None
+    entities: dict[str, EntityCfg] = field(default_factory=dict)
+    sensors: tuple[SensorCfg, ...] = ()
+    extent: float | None = None
+    spec_fn: Callable[[mujoco.MjSpec], None] | None = None
+
+    def native(self, options: configs.MujocoCfg | None = None) -> configs.SceneCfg:
+        """What it means here, checked."""
+        return configs.SceneCfg(
+            num_envs=self.num_envs,
+            env_spacing=self.env_spacing,
+            terrain=None if self.terrain is None else self.terrain.native(),
+            entities={name: entity.native() for name, entity in self.entities.items()},
+            sensors=tuple(sensor.native() if isinstance(sensor, SensorCfg) else sensor for sensor in self.sensors),
+            extent=self.extent,
+            spec_fn=self.spec_fn,
+            options=configs.MujocoCfg() if options is None else options,
+        )
+
+
+_SCENES: weakref.WeakValueDictionary[int, Scene] = weakref.WeakValueDictionary()
+"""By the identity of the model or spec that they gave out, which they keep."""
+
+
+def scene_of(given: Any) -> Scene:
+    """The scene whose ``compile()`` or ``spec`` this is; ValueError if it is none's."""
+    scene = _SCENES.get(id(given))
+    if scene is None or not (given is scene.native.model or given is scene.native.spec):
+        raise ValueError("Simulation: model must be what scene.compile() returned, or spec scene.spec")
+    return scene
+
+
+class Scene:
+    """``scene[name]`` is a sensor or an entity. ``native`` is ours; with the simulation it is made again with its options."""
+
+    def __init__(self, scene_cfg: SceneCfg, device: str = "cpu") -> None:
+        if str(device) != "cpu":
+            raise ValueError(f"Scene: device is '{device}': everything is on the 'cpu'")
+        self._cfg = scene_cfg
+        self._wrapped: dict[str, Sensor] = {}
+        self._simulation: Any = None
+        self._make(None)
+
+    def _make(self, options: configs.MujocoCfg | None) -> None:
+        self.native = mjsense.Scene(self._cfg.native(options))
+        by_name = {cfg.prefixed_name: cfg for cfg in self._cfg.sensors if isinstance(cfg, SensorCfg)}
+        cameras, rays = [], []
+        for name, sensor in self.native.sensors.items():
+            if isinstance(sensor, mjsense.Sensor):  # one of the user's, as it is
+                continue
+            known = self._wrapped.get(name)
+            if known is None:
+                wrapper = SENSOR_CLASSES.get(sensor.kind, BuiltinSensor)
+                known = self._wrapped[name] = wrapper(sensor, by_name.get(name), name)
+            known.native = sensor
+            if isinstance(known, CameraSensor):
+                known.camera_idx = mujoco.mj_name2id(self.native.model, mujoco.mjtObj.mjOBJ_CAMERA, known.camera_name)
+                cameras.append(known)
+            elif isinstance(known, RayCastSensor):
+                rays.append(known)
+        self._context = SensorContext(cameras, rays) if cameras or rays else None
+        self._entities = {name: Entity(e, self._cfg.entities.get(name, self._cfg.terrain)) for name, e in self.native.entities.items()}
+        _SCENES[id(self.native.model)] = _SCENES[id(self.native.spec)] = self
+
+    def __getitem__(self, key: str) -> Any:
+        if key in self.sensors:
+            return self.sensors[key]
+        if key in self._entities:
+            return self._entities[key]
+        raise UnknownNameError(f"Scene element '{key}' not found. Available: {', '.join([*self._entities, *self.sensors])}")
+
+    @property
+    def sensors(self) -> dict[str, Any]:
+        """Configured sensors, then those of the entities' XML."""
+        return {name: self._wrapped.get(name, sensor) for name, sensor in self.native.sensors.items()}
+
+    @property
+    def entities(self) -> dict[str, Entity]:
+        """The terrain, if there is one, first."""
+        return self._entities
+
+    @property
+    def terrain(self) -> Entity | None:
+        """None without one."""
+        return self._entities.get("terrain") if self._cfg.terrain is not None else None
+
+    @property
+    def spec(self) -> mujoco.MjSpec:
+        return self.native.spec
+
+    @property
+    def num_envs(self) -> int:
+        """B."""
+        return self._cfg.num_envs
+
+    @property
+    def env_spacing(self) -> float:
+        """m."""
+        return self._cfg.env_spacing
+
+    @property
+    def env_origins(self) -> Any:
+        """float32 ``[B, 3]`` m."""
+        return tensor(self.native.env_origins(self.num_envs))
+
+    @property
+    def device(self) -> str:
+        return "cpu"
+
+    @property
+    def sensor_context(self) -> SensorContext | None:
+        """None without cameras and ray sensors."""
+        return self._context
+
+    def compile(self) -> mujoco.MjModel:
+        """The model, for a simulation. It is compiled already."""
+        return self.native.model
+
+    def initialize(self, mj_model: Any = None, model: Any = None, data: Any = None) -> None:
+        """Nothing to do: the simulation has done it."""
+
+    def update(self, dt: float) -> None:
+        """After a physics step: air times and histories."""
+        if self._simulation is not None:
+            self._simulation.update_sensors(dt)
+
+    def reset(self, env_ids: Any = None) -> None:
+        """Sensors forget the episode of these worlds; all if not given."""
+        if self._simulation is not None:
+            self._simulation.reset_sensors(ids(env_ids))
+
+
+__all__ = ["Scene", "SceneCfg"]

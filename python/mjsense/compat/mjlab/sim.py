@@ -1,0 +1,112 @@
+# SPDX-License-Identifier: Apache-2.0
+"""``mjlab.sim``: worlds of a scene, stepped in mjlab's order of calls."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import Any
+
+import mujoco
+
+import mjsense
+from mjsense import configs
+from mjsense.compat.mjlab._tensors import Cache, ids
+from mjsense.compat.mjlab.scene import scene_of
+
+
+@dataclass
+class MujocoCfg:
+    """Physics options."""
+
+    timestep: float = 0.002
+    integrator: str = "implicitfast"
+    impratio: float = 1.0
+    cone: str = "pyramidal"
+    jacobian: str = "auto"
+    solver: str = "newton"
+    iterations: int = 100
+    tolerance: float = 1e-8
+    ls_iterations: int = 50
+    ls_tolerance: float = 0.01
+    ccd_iterations: int = 50
+    gravity: tuple[float, float, float] = (0.0, 0.0, -9.81)
+    disableflags: tuple[str, ...] = ()
+    enableflags: tuple[str, ...] = ()
+
+    def native(self) -> configs.MujocoCfg:
+        return configs.MujocoCfg(**vars(self))
+
+
+@dataclass(kw_only=True)
+class SimulationCfg:
+    """Only ``mujoco`` matters: there is room for every contact."""
+
+    nconmax: int | None = None
+    njmax: int | None = None
+    contact_sensor_maxmatch: int = 64
+    broadphase: str | None = None
+    broadphase_filter: tuple[str, ...] | None = None
+    ls_parallel: bool | None = None
+    mujoco: MujocoCfg = field(default_factory=MujocoCfg)
+    nan_guard: Any = None
+
+
+class Simulation:
+    """``num_envs`` worlds of the scene whose model this is. ``native`` is ours.
+
+    ``step()`` is one plain physics step: derived quantities are those of the state before, until ``forward()``.
+    """
+
+    def __init__(self, num_envs: int, cfg: SimulationCfg, model: mujoco.MjModel | None = None, device: str = "cpu", *,
+                 spec: mujoco.MjSpec | None = None, threads: int = 0) -> None:  # fmt: skip
+        if str(device) != "cpu":
+            raise ValueError(f"Simulation: device is '{device}': everything is on the 'cpu'")
+        self.scene = scene_of(spec if model is None else model)
+        self.cfg, self.num_envs, self.device = cfg, num_envs, "cpu"
+        self.scene._cfg.num_envs = num_envs
+        self.scene._make(cfg.mujoco.native())
+        self.native = mjsense.Simulation(self.scene.native, num_envs, threads=threads)
+        self.scene._simulation = self.native
+        self._tensors = Cache()
+
+    @property
+    def mj_model(self) -> mujoco.MjModel:
+        """A copy of the model, for looking things up."""
+        return self.native.model
+
+    @property
+    def data(self) -> Data:
+        """Fields of mjData as tensors."""
+        return Data(self)
+
+    def step(self) -> None:
+        """One physics step."""
+        self.native.step_raw(1)
+
+    def forward(self) -> None:
+        """Derived quantities of the state as it is."""
+        self.native.forward()
+
+    def sense(self) -> None:
+        """Nothing to do: cameras and rays are computed when they are read, of the state as it is then."""
+
+    def reset(self, env_ids: Any = None) -> None:
+        """These worlds to the model's own pose; all if not given."""
+        self.native.reset(ids(env_ids))
+
+    def close(self) -> None:
+        """Frees the worlds."""
+        self.native.close()
+
+
+class Data:
+    """``sim.data.qpos``: ``[B, nq]`` float64 on the worlds' own memory. Write the state (qpos, qvel, ctrl ...), then call ``forward()``."""
+
+    def __init__(self, sim: Simulation) -> None:
+        self._sim = sim
+
+    def __getattr__(self, name: str) -> Any:
+        return self._sim._tensors(name, getattr(self._sim.native.data, name))
+
+
+__all__ = ["Data", "MujocoCfg", "Simulation", "SimulationCfg"]

@@ -1,0 +1,252 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Configurations written for mjlab: its own task files build with the import changed, and read what plain MuJoCo says."""
+
+import math
+
+import mjlab_files
+import mujoco
+import numpy as np
+import pytest
+from mjsense.compat.mjlab import sensor as ml
+from mjsense.compat.mjlab._tensors import HAS_TORCH
+from mjsense.compat.mjlab.entity import EntityCfg
+from mjsense.compat.mjlab.scene import Scene, SceneCfg
+from mjsense.compat.mjlab.sim import Simulation, SimulationCfg
+from mjsense.compat.mjlab.terrains import TerrainEntityCfg
+from wheels import wheel
+
+WORLDS = 3
+TASKS = {
+    "go1_rough": ("tasks.velocity.config.go1.env_cfgs", "unitree_go1_rough_env_cfg", {}),
+    "go1_flat": ("tasks.velocity.config.go1.env_cfgs", "unitree_go1_flat_env_cfg", {}),
+    "g1_rough": ("tasks.velocity.config.g1.env_cfgs", "unitree_g1_rough_env_cfg", {}),
+    "g1_flat": ("tasks.velocity.config.g1.env_cfgs", "unitree_g1_flat_env_cfg", {"play": True}),
+    "yam": ("tasks.manipulation.config.yam.env_cfgs", "yam_lift_cube_env_cfg", {}),
+    "yam_camera": ("tasks.manipulation.config.yam.env_cfgs", "yam_lift_cube_vision_env_cfg", {"cam_type": "rgb"}),
+    "yam_masks": ("tasks.manipulation.config.yam.env_cfgs", "yam_multi_cube_seg_env_cfg", {}),
+}
+
+
+OBJECTS = {"geom": mujoco.mjtObj.mjOBJ_GEOM, "body": mujoco.mjtObj.mjOBJ_BODY, "subtree": mujoco.mjtObj.mjOBJ_XBODY}
+BITS = {"found": 1, "force": 2, "torque": 4, "dist": 8, "pos": 16, "normal": 32, "tangent": 64}
+REDUCE = {"none": 0, "mindist": 1, "maxforce": 2, "netforce": 3}
+
+
+def plain_contacts(cfg):
+    """Adds MuJoCo's own contact sensors, one for each primary and field, to the scene's spec; as mjlab does."""
+    names = Scene(cfg)
+
+    def add(spec):
+        for sensor in cfg.sensors:
+            if not isinstance(sensor, ml.ContactSensorCfg):
+                continue
+            one, other = sensor.primary, sensor.secondary
+            entity = f"{one.entity}/" if one.entity else ""
+            there = {"reftype": OBJECTS[other.mode], "refname": f"{other.entity}/{other.pattern}" if other.entity else other.pattern}
+            for name in names[sensor.name].primary_names:
+                for field in sensor.fields:
+                    spec.add_sensor(
+                        name=f"plain_{sensor.name}_{name}_{field}", type=mujoco.mjtSensor.mjSENS_CONTACT, objtype=OBJECTS[one.mode],
+                        objname=entity + name, intprm=[BITS[field], REDUCE[sensor.reduce], sensor.num_slots], **there)  # fmt: skip
+
+    return add
+
+
+def array(value):
+    """Of a tensor or an array, on its memory."""
+    return np.from_dlpack(value) if HAS_TORCH else value
+
+
+@pytest.fixture(params=TASKS)
+def worlds(request, monkeypatch):
+    """(scene, simulation) of a task of mjlab's, in its start pose above the ground, and plain MuJoCo in the same states."""
+    module, function, options = TASKS[request.param]
+    cfg = getattr(mjlab_files.load(monkeypatch, wheel("mjlab"), module), function)(**options)
+    cfg.scene.spec_fn = plain_contacts(cfg.scene)
+    scene = Scene(cfg.scene, device="cpu")
+    sim = Simulation(WORLDS, cfg.sim, scene.compile(), device="cpu", threads=2)
+    scene.initialize(sim.mj_model, None, sim.data)
+    model = sim.mj_model
+    assert (model.opt.timestep, model.opt.iterations) == (cfg.sim.mujoco.timestep, cfg.sim.mujoco.iterations)
+    plain = [mujoco.MjData(model) for _ in range(WORLDS)]
+    qpos, ctrl = array(sim.data.qpos), array(sim.data.ctrl)
+    for world, data in enumerate(plain):
+        mujoco.mj_resetDataKeyframe(model, data, 0)
+        rng = np.random.default_rng(world)
+        if model.joint(0).type == mujoco.mjtJoint.mjJNT_FREE:
+            data.qpos[:3] += array(scene.env_origins)[world]
+        data.qpos[7:] += rng.uniform(-0.1, 0.1, model.nq - 7)
+        data.ctrl += rng.uniform(-0.2, 0.2, model.nu)
+        qpos[world], ctrl[world] = data.qpos, data.ctrl
+    sim.forward()
+    scene.reset()
+    yield scene, sim, plain
+    sim.close()
+
+
+def own(model, data, name):
+    sensor = model.sensor(name)
+    return np.float32(data.sensordata[sensor.adr[0] : sensor.adr[0] + sensor.dim[0]])
+
+
+def test_a_task_of_mjlabs(worlds):
+    scene, sim, plain = worlds
+    model, dt = sim.mj_model, sim.mj_model.opt.timestep
+    contacts = [s for s in scene.sensors.values() if isinstance(s, ml.ContactSensor)]
+    air = {s.name: np.zeros((WORLDS, len(s.primary_names)), np.float32) for s in contacts}
+    forces = {s.name: [] for s in contacts}
+    touched = False
+    for _ in range(24):
+        sim.step()
+        scene.update(dt)
+        for data in plain:
+            mujoco.mj_step(model, data)
+        np.testing.assert_array_equal(array(sim.data.qpos), [d.qpos for d in plain])
+        for sensor in contacts:
+            for field in sensor.cfg.fields:
+                expected = [np.concatenate([own(model, d, f"plain_{sensor.name}_{p}_{field}") for p in sensor.primary_names]) for d in plain]
+                actual = array(getattr(sensor.data, field))
+                np.testing.assert_allclose(actual.reshape(WORLDS, -1), expected, rtol=2e-6, atol=1e-6, err_msg=f"{sensor.name} {field}")
+            found = array(sensor.data.found) > 0
+            touched |= bool(found.any())
+            air[sensor.name] = np.where(found, 0, air[sensor.name] + np.float32(dt))
+            forces[sensor.name].insert(0, np.array(array(sensor.data.force)))
+            if sensor.cfg.track_air_time:
+                np.testing.assert_allclose(array(sensor.data.current_air_time), air[sensor.name], atol=1e-6)
+            if length := sensor.cfg.history_length:
+                history = array(sensor.data.force_history)
+                for age, force in enumerate(forces[sensor.name][:length]):
+                    np.testing.assert_array_equal(history[:, :, age], force)
+    assert touched or "robot/imu_ang_vel" not in scene.sensors
+    sim.forward()
+    sim.sense()
+    for data in plain:
+        mujoco.mj_forward(model, data)
+    for name, sensor in scene.sensors.items():
+        if type(sensor) is ml.BuiltinSensor and name in {s.name for s in scene.spec.sensors}:
+            np.testing.assert_array_equal(array(sensor.data), [own(model, d, name) for d in plain], name)
+        elif isinstance(sensor, ml.RayCastSensor):
+            check_rays(sensor, model, plain)
+        elif isinstance(sensor, ml.CameraSensor):
+            check_camera(scene, sensor, model, plain)
+
+
+def check_rays(sensor, model, plain):
+    """Against mj_ray, from frames turned by their heading, as all of these tasks have them."""
+    assert sensor.cfg.ray_alignment == "yaw"
+    data = sensor.data
+    frames = (sensor.cfg.frame,) if isinstance(sensor.cfg.frame, ml.ObjRef) else sensor.cfg.frame
+    offsets = np.array(sensor.native.cfg.pattern.generate_rays()[0], float)
+    assert (sensor.num_frames, sensor.num_rays_per_frame) == (len(frames), len(offsets))
+    groups = np.array([group in sensor.cfg.include_geom_groups for group in range(6)], np.uint8)
+    hit = np.zeros(1, np.int32)
+    for world, d in enumerate(plain):
+        for f, frame in enumerate(frames):
+            element = d.site(frame.prefixed_name()) if frame.type == "site" else d.body(frame.prefixed_name())
+            body = model.site(frame.prefixed_name()).bodyid[0] if frame.type == "site" else element.id
+            place, turn = (element.xpos, element.xmat.reshape(3, 3))
+            heading = math.atan2(turn[1, 0], turn[0, 0])
+            c, s = math.cos(heading), math.sin(heading)
+            np.testing.assert_allclose(array(data.frame_pos_w)[world, f], place, rtol=1e-6, atol=1e-6)
+            heights = []
+            for ray in range(len(offsets)):
+                x, y, z = offsets[ray]
+                start = place + (c * x - s * y, s * x + c * y, z)
+                distance = mujoco.mj_ray(model, d, start, np.array([0.0, 0, -1]), groups, 1, body, hit)
+                distance = distance if 0 <= distance <= sensor.cfg.max_distance else -1
+                ours = array(data.distances)[world, f * len(offsets) + ray]
+                assert ours == pytest.approx(distance, abs=1e-5), (sensor.name, world, frame, ray)
+                inside = array(data.normals_w)[world, f * len(offsets) + ray, 2] < 0  # it leaves a box that the frame is in
+                heights.append(0 if inside else distance)
+            if isinstance(sensor, ml.TerrainHeightSensor) and min(heights) >= 0:
+                assert array(data.heights)[world, f] == pytest.approx(min(heights), abs=2e-5)
+
+
+def check_camera(scene, sensor, model, plain):
+    data, cfg = sensor.data, sensor.cfg
+    for kind, channels in (("rgb", 3), ("depth", 1), ("segmentation", 2)):
+        image = getattr(data, kind)
+        assert (image is not None) == (kind in cfg.data_types)
+        if image is not None:
+            assert tuple(image.shape) == (WORLDS, cfg.height, cfg.width, channels)
+            np.testing.assert_array_equal(array(image), array(getattr(scene.sensor_context, f"get_{kind}")(sensor.camera_idx)))
+    if data.depth is None:
+        return
+    groups = np.array([group in cfg.enabled_geom_groups for group in range(6)], np.uint8)
+    hit = np.zeros(1, np.int32)
+    checked = 0
+    for world, d in enumerate(plain):
+        camera = d.camera(sensor.camera_name)
+        focal = cfg.height / 2 / math.tan(math.radians(model.cam_fovy[camera.id]) / 2)
+        for row in range(0, cfg.height, 5):
+            for column in range(0, cfg.width, 5):
+                ray = np.array([(column + 0.5 - cfg.width / 2) / focal, -(row + 0.5 - cfg.height / 2) / focal, -1])
+                depth = mujoco.mj_ray(model, d, camera.xpos, camera.xmat.reshape(3, 3) @ ray, groups, 1, -1, hit)
+                if array(data.segmentation)[world, row, column, 0] == hit[0]:  # not at an edge
+                    assert array(data.depth)[world, row, column, 0] == pytest.approx(max(depth, 0), abs=1e-4)
+                    checked += 1
+    assert checked > 100
+
+
+def test_configurations_are_checked_when_the_scene_is_made():
+    height = ml.TerrainHeightSensorCfg(name="height", frame=(), viz=ml.TerrainHeightSensorCfg.VizCfg(show_rays=True))
+    with pytest.raises(ValueError, match="sensor 'height': frame is empty"):
+        height.native()
+    ref = ml.ObjRef(type="body", name="", entity="box")
+    height.frame = (ref,)
+    ref.name = "box"
+    assert height.native().frame[0].full_name == "box/box" and height.native().viz.show_rays
+    with pytest.raises(ValueError, match="device is 'cuda:0'"):
+        Scene(SceneCfg(), device="cuda:0")
+    with pytest.raises(ValueError, match=r"must be what scene\.compile"):
+        Simulation(1, SimulationCfg(), mujoco.MjModel.from_xml_string("<mujoco/>"))
+
+
+def box():
+    spec = mujoco.MjSpec()
+    body = spec.worldbody.add_body(name="box")
+    body.add_freejoint(name="free")
+    body.add_geom(name="geom", type=mujoco.mjtGeom.mjGEOM_BOX, size=(0.1, 0.1, 0.1), mass=2)
+    return spec
+
+
+def test_a_scene_of_ones_own():
+    match = ml.ContactMatch("geom", "g.*", "box")
+    touch = ml.ContactSensorCfg("touch", match, ml.ContactMatch("body", "terrain"), reduce="netforce")
+    cfg = SceneCfg(
+        num_envs=4, env_spacing=3.0, terrain=TerrainEntityCfg(), sensors=(touch,),
+        entities={"box": EntityCfg(spec_fn=box, init_state=EntityCfg.InitialStateCfg(pos=(0, 0, 0.1)))})  # fmt: skip
+    scene = Scene(cfg)
+    assert scene["touch"].primary_names == ["geom"]
+    sim = Simulation(scene.num_envs, SimulationCfg(), scene.compile())
+    assert (scene.num_envs, sim.num_envs, sim.device, scene.device) == (4, 4, "cpu", "cpu")
+    origins = array(scene.env_origins)
+    assert origins.shape == (4, 3) and np.ptp(origins[:, 0]) == 3
+    array(sim.data.qpos)[:] = sim.mj_model.key_qpos[0]
+    sim.forward()
+    for _ in range(100):
+        sim.step()
+        scene.update(sim.mj_model.opt.timestep)
+    np.testing.assert_allclose(array(scene["touch"].data.force)[:, 0], np.tile([0, 0, -2 * 9.81], (4, 1)), atol=0.05)
+    assert scene.entities["box"].find_geoms(".*") == ([0], ["geom"]) and not scene["box"].is_fixed_base
+    sim.reset([1])
+    assert array(sim.data.qpos)[1, 2] == 0 and array(sim.data.qpos)[0, 2] > 0.09
+    assert scene.sensor_context is None and scene["terrain"] is scene.terrain
+    with pytest.raises(KeyError, match="Scene element 'tuch' not found"):
+        scene["tuch"]
+
+
+@pytest.mark.skipif(not HAS_TORCH, reason="no torch")
+def test_tensors_share_memory():
+    import torch  # pyright: ignore[reportMissingImports]
+
+    scene = Scene(SceneCfg(num_envs=2, entities={"box": EntityCfg(spec_fn=box)}, sensors=(
+        ml.BuiltinSensorCfg("place", "framepos", ml.ObjRef("body", "box", "box")),)))  # fmt: skip
+    sim = Simulation(2, SimulationCfg(), scene.compile())
+    place = scene["box/place"].data
+    assert isinstance(place, torch.Tensor) and place is scene["box/place"].data
+    sim.data.qpos[:, 0] = torch.tensor([1.0, 2.0])
+    sim.forward()
+    assert scene["box/place"].data is place and place[:, 0].tolist() == [1, 2]
+    sim.reset(torch.tensor([0]))
+    assert scene["box/place"].data[:, 0].tolist() == [0, 2]
