@@ -19,6 +19,7 @@
 #include <mujoco/mujoco.h>
 
 #include <cstdint>
+#include <functional>
 #include <memory>
 #include <optional>
 #include <span>
@@ -40,10 +41,13 @@ class GraspScene;
 class Policy;
 class SensorSuite;
 class Simulation;
+struct SceneFileCfg;
 
 struct TaskCfg {
   RobotCfg robot;     // without a name: the task's scene has its own, if any
   std::string scene;  // name or file; "": the task's own
+  // Makes a scene in the place of a named one, which `scene` then is only for people.
+  std::function<SceneFileCfg()> make_scene;
   std::uint64_t seed = 0;
   int horizon = 500;      // policy steps after which an episode is truncated
   int policy_dt_ms = 66;  // one action of the policy

@@ -31,6 +31,7 @@ TaskCfg task_cfg(const RolloutCfg& cfg) {
     out.sim_dt_ms = out.robot.sim_dt_ms;
   }
   out.scene = cfg.scene;
+  out.make_scene = cfg.make_scene;
   if (cfg.meshes == "shapes") out.robot.edit_spec = {};
   if (cfg.meshes == "real" && !out.robot.edit_spec) {
     throw ValueError(

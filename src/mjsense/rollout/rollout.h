@@ -62,10 +62,11 @@ struct RolloutCfg {
   bool action_noise = true;
   bool terminate_upon_success = false;
   bool use_sensors = true;
-  // Make the task and the policy instead of the registered ones; `task` and `policy` above are then
-  // what people read.
+  // Make the task, the policy and the scene instead of those with a name; `task`, `policy` and
+  // `scene` above are then what people read.
   TaskFactory make_task;
   PolicyFactory make_policy;
+  std::function<SceneFileCfg()> make_scene;
   // Makes further sensors for the suite, recorded like the others. The rollout is being made: task,
   // policy, simulation, cameras and the suite so far are there.
   std::function<std::vector<std::shared_ptr<Sensor>>(Rollout&)> more_sensors;

@@ -109,7 +109,8 @@ std::string EpisodeScene::place() const { return fmt::format("scene '{}'", cfg_.
 
 SceneCfg EpisodeScene::scene_cfg(const std::string& robot) const {
   SceneCfg scene;
-  scene.base.path = cfg_.base;
+  if (cfg_.models) scene = cfg_.models();
+  if (!cfg_.base.empty()) scene.base.path = cfg_.base;
   if (!generated_.empty()) {
     EntityCfg room;
     room.model = generated_;
@@ -131,9 +132,12 @@ SceneCfg EpisodeScene::scene_cfg(const std::string& robot) const {
     if (scene.entities.size() == 1) scene.entities.emplace_back(robot, EntityCfg{});
   }
   if (scene.entities.empty()) scene.entities.emplace_back(robot, EntityCfg{});
-  scene.extent = cfg_.extent;
-  scene.options = cfg_.options;
-  scene.spec_fn = [cfg = cfg_](mjSpec* spec) { apply_look(spec, cfg); };
+  if (cfg_.extent) scene.extent = cfg_.extent;
+  if (!cfg_.models) scene.options = cfg_.options;
+  scene.spec_fn = [cfg = cfg_, first = scene.spec_fn](mjSpec* spec) {
+    apply_look(spec, cfg);
+    if (first) first(spec);
+  };
   return scene;
 }
 

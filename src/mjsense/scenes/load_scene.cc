@@ -69,4 +69,9 @@ SceneFileCfg load_scene(std::string_view name) {
   return cfg;
 }
 
+SceneFileCfg task_scene(const TaskCfg& cfg, std::string_view own) {
+  if (cfg.make_scene) return cfg.make_scene();
+  return load_scene(cfg.scene.empty() ? own : std::string_view(cfg.scene));
+}
+
 }  // namespace mjsense

@@ -22,6 +22,8 @@ void validate(const SceneFileCfg& cfg, std::string_view place) {
   if (cfg.name.empty()) throw ValueError(who + ": it has no name");
   if (!cfg.generator.empty() && !cfg.base.empty())
     throw ValueError(who + ": it has a generator and a base; a generated room is an entity");
+  if (cfg.models && !(cfg.base.empty() && cfg.entities.empty() && cfg.generator.empty()))
+    throw ValueError(who + ": code makes its models: no base, entities or generator, too");
   for (std::size_t i = 0; i < cfg.entities.size(); ++i) {
     if (!cfg.generator.empty() && cfg.entities[i].name == "room")
       throw ValueError(who + ": entity 'room' is the one that its generator makes");

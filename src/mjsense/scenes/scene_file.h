@@ -4,6 +4,7 @@
 // the robot stands, and what differs from episode to episode.
 
 #include <array>
+#include <functional>
 #include <optional>
 #include <string>
 #include <string_view>
@@ -12,6 +13,7 @@
 
 #include "mjsense/core/fields.h"
 #include "mjsense/scene/options.h"
+#include "mjsense/scene/scene.h"
 
 namespace mjsense {
 
@@ -154,6 +156,8 @@ struct SceneFileCfg {
   double gap = 0.02, target_gap = 0.07;
   double drop = 0.0003;
   std::array<int, 2> count{-1, -1};
+  // Models made by code, in the place of `base` and `entities`; called whenever they are compiled.
+  std::function<SceneCfg()> models;
 };
 template <class V>
 void visit_fields(V& v, SceneFileCfg& c) {
@@ -189,6 +193,8 @@ void visit_fields(V& v, SceneFileCfg& c) {
   v("count", c.count,
     "Objects that are there, the target among them, least and most; -1: all. The others stand far "
     "away.");
+  v.python("models", "Callable[[], SceneCfg] | None", "None",
+           "Makes the models, in the place of ``base`` and ``entities``.");
 }
 
 // What its fields say of each other. Throws ValueError.

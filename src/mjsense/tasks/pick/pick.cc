@@ -23,8 +23,7 @@ constexpr double kGoal = 0.05;  // m, goal above the start
 
 PickTask::PickTask(TaskCfg cfg)
     : Task(std::move(cfg)),
-      scene_(load_scene(this->cfg().scene.empty() ? kScene : std::string_view(this->cfg().scene))) {
-}
+      scene_(task_scene(this->cfg(), kScene)) {}
 
 SceneCfg PickTask::scene_cfg() const { return scene_.scene_cfg(robot_entity()); }
 
