@@ -94,9 +94,9 @@ from mjsense._sensor_data import SensorData, make_data
 
 # Signatures with the options of a recording: parameters renamed, defaults of their own.
 SIGNATURES = {
-    "record.py": ("RecordJobCfg", {"num_worlds": "worlds"}, {}, ("task", "robot", "policy", "out")),
+    "record.py": ("RecordJobCfg", {"num_worlds": "worlds"}, {}, ("task", "robot", "policy", "scene", "out")),
     "vector.py": (
-        "RolloutCfg", {"num_worlds": "num_envs"}, {"num_worlds": "1", "action_noise": "False"}, ("task", "robot", "policy"),
+        "RolloutCfg", {"num_worlds": "num_envs"}, {"num_worlds": "1", "action_noise": "False"}, ("task", "robot", "policy", "scene"),
     ),
 }  # fmt: skip
 

@@ -3,6 +3,7 @@
 
 #include <nanobind/stl/string.h>
 
+#include "python/bindings/scene.h"
 #include "python/bindings/sensor_handle.h"
 
 namespace mjsense::python {
@@ -12,9 +13,14 @@ void PythonHost::add_note(nb::python_error& error, const std::string& place) {
   value.attr("add_note")("in " + place);
 }
 
-void PythonHost::set_scene(nb::object scene, nb::object alive) {
-  scene_ = Held(std::move(scene));
+SceneCfg PythonHost::read_prepared(nb::object prepared) {
+  nb::list alive;
+  SceneCfg cfg =
+      read_scene(prepared[0], prepared[1], nb::cast<nb::list>(prepared[2]), prepared[3], alive);
+  alive.append(prepared);
+  scene_ = Held(nb::object(prepared[4]));
   alive_ = Held(std::move(alive));
+  return cfg;
 }
 
 nb::object PythonHost::simulation(const std::shared_ptr<Simulation>& sim) {

@@ -39,9 +39,9 @@ class PythonHost : public std::enable_shared_from_this<PythonHost> {
     });
   }
 
-  // mjsense.Scene that prepared the rollout's scene, and what that refers to; before simulation().
-  // Needs the lock.
-  void set_scene(nb::object scene, nb::object alive);
+  // The rollout's scene, as `prepared`, which _mjs_scene() of a task or a scene returned, describes
+  // it; before simulation(). Needs the lock.
+  SceneCfg read_prepared(nb::object prepared);
   // mjsense.Simulation of these worlds, made when it is first wanted. Needs the lock.
   nb::object simulation(const std::shared_ptr<Simulation>& sim);
   // The rollout that is being made, whose task and robot sensors may ask for until it has ended.

@@ -13,7 +13,6 @@
 #include "mjsense/episode/object_sensors.h"
 #include "mjsense/observe/suite.h"
 #include "mjsense/scene/resolve.h"
-#include "python/bindings/scene.h"
 
 namespace mjsense::python {
 namespace {
@@ -42,7 +41,7 @@ PythonTask::PythonTask(TaskCfg cfg, nb::object task, std::shared_ptr<PythonHost>
 std::unique_ptr<PythonTask> PythonTask::make(nb::object task, std::shared_ptr<PythonHost> host,
                                              TaskCfg cfg, bool own_horizon) {
   nb::object settings = task.attr("_mjs_settings")();
-  if (!cfg.scene.empty()) {
+  if (!cfg.scene.empty() || cfg.make_scene) {
     throw ValueError(fmt::format("task '{}' makes its scene itself: it cannot take the scene '{}'",
                                  nb::cast<std::string>(settings["name"]), cfg.scene));
   }
@@ -72,13 +71,7 @@ std::string PythonTask::place(const char* method) const {
 
 SceneCfg PythonTask::scene_cfg() const {
   return call("scene", [&] {
-    nb::object prepared = task_.get().attr("_mjs_scene")();
-    nb::list alive;
-    SceneCfg cfg =
-        read_scene(prepared[0], prepared[1], nb::cast<nb::list>(prepared[2]), prepared[3], alive);
-    alive.append(prepared);
-    host_->set_scene(prepared[4], alive);
-    return cfg;
+    return host_->read_prepared(task_.get().attr("_mjs_scene")());
   });
 }
 

@@ -13,6 +13,7 @@
 
 #include "mjsense/rollout/record_job.h"
 #include "mjsense/rollout/registry.h"
+#include "mjsense/scenes/scene_file.h"
 #include "python/bindings/bindings.h"
 #include "python/bindings/fields.h"
 #include "python/bindings/host.h"
@@ -24,15 +25,16 @@ namespace mjsense::python {
 
 namespace {
 
-// Objects of Python's that play in a rollout: `parts` has a task or None, a policy or None, and
-// sensors. C++ copies and destroys its configuration without the interpreter's lock.
+// Objects of Python's that play in a rollout: `parts` has a task or None, a policy or None, sensors,
+// and a scene or None. C++ copies and destroys its configuration without the interpreter's lock.
 class Parts {
  public:
   Parts(nb::object parts, nb::object make_simulation)
       : host_(std::make_shared<PythonHost>(std::move(make_simulation))),
         task_(nb::object(parts[0])),
         policy_(nb::object(parts[1])),
-        sensors_(nb::object(parts[2])) {}
+        sensors_(nb::object(parts[2])),
+        scene_(nb::object(parts[3])) {}
 
   const std::shared_ptr<PythonHost>& host() const { return host_; }
 
@@ -50,6 +52,12 @@ class Parts {
         return std::make_unique<PythonPolicy>(nb::borrow(policy.get()), host);
       };
     }
+    if (!scene_.get().is_none()) {
+      cfg.make_scene = [scene = scene_, host = host_] {
+        nb::gil_scoped_acquire lock;
+        return read_scene_file(nb::borrow(scene.get()), host);
+      };
+    }
     if (nb::len(sensors_.get()) > 0) {
       cfg.more_sensors = [sensors = sensors_, host = host_](Rollout& rollout) {
         nb::gil_scoped_acquire lock;
@@ -64,7 +72,20 @@ class Parts {
 
  private:
   std::shared_ptr<PythonHost> host_;
-  Held task_, policy_, sensors_;
+  // The configuration with what only Python has: a function that makes its models.
+  static SceneFileCfg read_scene_file(nb::object scene, const std::shared_ptr<PythonHost>& host) {
+    SceneFileCfg cfg;
+    read_struct(scene, cfg);
+    if (!scene.attr("models").is_none()) {
+      cfg.models = [scene = Held(scene), host, place = fmt::format("scene '{}': models()", cfg.name)] {
+        return host->call(place,
+                          [&] { return host->read_prepared(scene.get().attr("_mjs_scene")()); });
+      };
+    }
+    return cfg;
+  }
+
+  Held task_, policy_, sensors_, scene_;
 };
 
 nb::dict progress_dict(const RecordProgress& p) {

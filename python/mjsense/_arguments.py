@@ -59,6 +59,10 @@ _KINDS: dict[str, tuple[Callable[[Any], bool], str]] = {
         lambda value: value is None or isinstance(value, str) or callable(value) or _is_a(value, "Policy"),
         "a mjsense.Policy, a function, or the name of one",
     ),
+    "Scenes": (
+        lambda value: isinstance(value, (str, PurePath)) or callable(value) or _is_a(value, "SceneFileCfg"),
+        "the name or file of a scene, a mjsense.SceneFileCfg, or a function that makes a mjsense.SceneCfg",
+    ),
     "Mapping": (lambda value: hasattr(value, "keys"), "a mapping"),
     "dict": (lambda value: isinstance(value, dict), "a dict"),
 }

@@ -62,6 +62,22 @@ class EntityCfg(Config):
         raise TypeError(f"EntityCfg.model must be a path, XML text or a mujoco.MjSpec, not {model!r}")
 
 
+class SceneFileCfg(Config):
+    name: str
+    models: Callable[[], Any] | None
+
+    def __post_init__(self) -> None:
+        if not (self.models is None or callable(self.models)):
+            raise TypeError(f"SceneFileCfg '{self.name}': models must be a function that makes a mjsense.SceneCfg, not {self.models!r}")
+        super().__post_init__()
+
+    def _mjs_scene(self) -> tuple[Any, ...]:
+        from mjsense.scene import prepared
+
+        assert self.models is not None
+        return prepared(self.models(), "models()")
+
+
 class SceneCfg(Config):
     num_envs: int
     entities: Mapping[str, Any]

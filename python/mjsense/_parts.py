@@ -4,9 +4,11 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable
+from pathlib import Path
 from typing import Any
 
 from mjsense._members import member
+from mjsense.configs import SceneCfg, SceneFileCfg
 from mjsense.policy import Policy, policy_of
 from mjsense.task import Task, task_of
 
@@ -14,17 +16,31 @@ Tasks = str | Task | type[Task] | Callable[[], Task]
 """A task, what makes one, or its registered name."""
 Policies = str | Policy | type[Policy] | Callable[[dict[str, Any]], Any] | None
 """A policy, a function from observations to actions, or its registered name."""
+Scenes = str | Path | SceneFileCfg | Callable[[], SceneCfg]
+"""A scene: its name, its file, what such a file would say, or a function that makes its models."""
+
+Parts = tuple[Task | None, Policy | None, list[Any], SceneFileCfg | None]
 
 
-def parts_of(options: dict[str, Any], sensors: Iterable[Any]) -> tuple[Task | None, Policy | None, list[Any]]:
-    """(task, policy, sensors) written in Python; the options get the names of all."""
+def parts_of(options: dict[str, Any], sensors: Iterable[Any]) -> Parts:
+    """(task, policy, sensors, scene) written in Python; the options get the names of all."""
     options["task"], task = task_of(options["task"])
     options["policy"], policy = policy_of(options["policy"])
     robot = options["robot"]
     if robot is None:
         robot = task.robot if task is not None else "franka"
     options["robot"] = "" if robot is None else str(robot)
+    options["scene"], scene = scene_of(options["scene"])
     for part in (task, policy):
         for sensor in part._mjs_make_sensors() if part else ():
             member(sensor)
-    return task, policy, [member(sensor) for sensor in sensors]
+    return task, policy, [member(sensor) for sensor in sensors], scene
+
+
+def scene_of(scene: Scenes) -> tuple[str, SceneFileCfg | None]:
+    """(name for messages and files, the object if it is made in Python)."""
+    if isinstance(scene, (str, Path)):
+        return str(scene), None
+    if not isinstance(scene, SceneFileCfg):
+        scene = SceneFileCfg(name=getattr(scene, "__name__", type(scene).__name__).strip("<>"), models=scene)
+    return scene.name, scene

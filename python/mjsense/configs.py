@@ -680,6 +680,155 @@ class TerrainHeightSensorCfg(RayCastSensorCfg):
     """Over a frame's rays."""
 
 
+@dataclass
+class SceneRobotCfg(_config_methods.Config):
+    """Where the robot's base stands at the start of an episode."""
+
+    pos: Sequence[float] = (0.0, 0.0, 0.0)
+    """On the floor. [m]"""
+    yaw: float = 0.0
+    """About the vertical, degrees."""
+    pos_spread: Sequence[float] = (0.0, 0.0)
+    """Half width of uniform noise in x and y. [m]"""
+    yaw_spread: float = 0.0
+    """Half width of uniform noise, degrees."""
+
+
+@dataclass
+class SceneFileCfg(_config_methods.SceneFileCfg):
+    """What an episode plays in: models, objects, where they may stand, and what differs."""
+
+    name: str
+    """Of the scene."""
+    extends: str | None = None
+    """A scene, by name or file, whose values it has where it does not say another."""
+    base: str | None = None
+    """An MJCF to start from, as it is, beside the file: names without a prefix."""
+    generator: str | None = None
+    """What makes its first entity, ``room``, and what belongs to it: one house of a street."""
+    house: int = 0
+    """Which of the generator's; ``<scene>:7`` is house 7 of a scene."""
+    parameters: Mapping[str, float] = field(default_factory=dict)
+    """Numbers for the generator, by its names."""
+    entities: Sequence[SceneEntityCfg] = ()
+    """Its models, in this order."""
+    objects: Sequence[SceneObjectCfg] = ()
+    """Bodies that a task may be about; none named: all that have a free joint and that a hand can hold."""
+    regions: Sequence[SceneRegionCfg] = ()
+    """Where they may stand; none: where their models have them."""
+    robot: SceneRobotCfg = field(default_factory=SceneRobotCfg)
+    """Where the robot stands."""
+    vary: Sequence[SceneVaryCfg] = ()
+    """What looks different in every episode."""
+    sky: SceneSkyCfg | None = None
+    """The colours around."""
+    headlight: SceneHeadlightCfg | None = None
+    """The light at the camera; without it MuJoCo's."""
+    options: MujocoCfg = field(default_factory=MujocoCfg)
+    """Of the physics."""
+    extent: float | None = None
+    """``stat.extent`` of the model. [m]"""
+    gap: float = 0.02
+    """Free between two objects. [m]"""
+    target_gap: float = 0.07
+    """Free around the object that a task is about. [m]"""
+    drop: float = 0.0003
+    """Above the surface at the start. [m]"""
+    count: Sequence[int] = (-1, -1)
+    """Objects that are there, the target among them, least and most; -1: all. The others stand far away."""
+    models: Callable[[], SceneCfg] | None = None
+    """Makes the models, in the place of ``base`` and ``entities``."""
+
+
+@dataclass
+class SceneEntityCfg(_config_methods.Config):
+    """A model of a scene; its names get the prefix ``<name>/``."""
+
+    name: str
+    """Of the entity."""
+    model: str
+    """An MJCF: a path, beside the scene's file, or ``embedded:<file>``."""
+    pos: Sequence[float] = (0.0, 0.0, 0.0)
+    """Where it stands. [m]"""
+    quat: Sequence[float] = (1.0, 0.0, 0.0, 0.0)
+    """How it is turned, wxyz."""
+    free: bool = False
+    """Its body gets a free joint, which models of single objects often lack; a body without a name is called as the
+    entity."""
+
+
+@dataclass
+class SceneObjectCfg(_config_methods.Config):
+    """A body with a free joint that a task may be about."""
+
+    body: str
+    """Full name in the scene, ``mug/mug``."""
+    text: str | None = None
+    """What people call it; without it the last part of its name."""
+    other_texts: Sequence[str] = ()
+    """What else they call it."""
+    rests: Sequence[Literal["upright", "side", "end"]] = ("upright",)
+    """How it may rest."""
+
+
+@dataclass
+class SceneRegionCfg(_config_methods.Config):
+    """A level surface on which objects may stand."""
+
+    name: str
+    """Of the region."""
+    on: str
+    """Full name of the box geom whose top it is."""
+    area: Sequence[float] = (0.0, 0.0, 0.0, 0.0)
+    """Where origins of objects may be: least x, most x, least y, most y in the world; all 0: the whole top. [m]"""
+    target_area: Sequence[float] | None = None
+    """The same for the object that a task is about. [m]"""
+
+
+@dataclass
+class SceneVaryCfg(_config_methods.Config):
+    """What looks different in every episode; all draws are uniform."""
+
+    what: Literal["light", "material", "geom"] = "light"
+    """Lights, materials or geoms (without a material)."""
+    pattern: str
+    """Regular expression that matches the whole full name of each."""
+    brightness: Sequence[float] = (1.0, 1.0)
+    """Factor on the colour, least and most."""
+    hue: float = 0.0
+    """Half width of a turn of the hue, degrees."""
+    saturation: float = 0.0
+    """Half width of a shift of the saturation."""
+    pos: Sequence[float] = (0.0, 0.0, 0.0)
+    """light: half widths of a move. [m]"""
+    angle: float = 0.0
+    """light: most by which its direction turns, degrees."""
+    textures: Sequence[str] = ()
+    """material: full names of textures, one of which it has."""
+
+
+@dataclass
+class SceneSkyCfg(_config_methods.Config):
+    """The colours around."""
+
+    top: Sequence[float] = (0.55, 0.67, 0.8)
+    """Of the zenith, rgb."""
+    bottom: Sequence[float] = (0.86, 0.89, 0.92)
+    """Of the nadir, rgb."""
+
+
+@dataclass
+class SceneHeadlightCfg(_config_methods.Config):
+    """The light at the camera, grey."""
+
+    ambient: float = 0.1
+    """From everywhere."""
+    diffuse: float = 0.4
+    """Scattered."""
+    specular: float = 0.5
+    """Mirrored."""
+
+
 LidarScanCfg = SpinningScanCfg | TableScanCfg
 
 
@@ -713,6 +862,14 @@ __all__ = [
     "RayCastVizCfg",
     "RingPatternCfg",
     "SceneCfg",
+    "SceneEntityCfg",
+    "SceneFileCfg",
+    "SceneHeadlightCfg",
+    "SceneObjectCfg",
+    "SceneRegionCfg",
+    "SceneRobotCfg",
+    "SceneSkyCfg",
+    "SceneVaryCfg",
     "SensorCfg",
     "SpinningScanCfg",
     "SubTerrainCfg",

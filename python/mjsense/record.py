@@ -10,7 +10,7 @@ from typing import Any, Literal
 
 from mjsense import _core
 from mjsense._arguments import Seed, checked
-from mjsense._parts import Policies, Tasks, parts_of
+from mjsense._parts import Policies, Scenes, Tasks, parts_of
 from mjsense.assets import use_installed_meshes
 from mjsense.ffmpeg import use_installed_ffmpeg
 from mjsense.simulation import Simulation
@@ -63,8 +63,8 @@ def record(
     policy: Policies = "planner",
     *,
     out: str | Path,
+    scene: Scenes = "",
     # options of a recording
-    scene: str = "",
     worlds: int = 4,
     threads: int = 0,
     seed: Seed = 0,
@@ -105,9 +105,9 @@ def record(
         robot: a registered name (:func:`robot_names`) or the path of a ``.toml``; None is the task's own.
         policy: a :class:`Policy`, a function ``obs -> actions``, or a registered name (:func:`policy_names`).
         out: folder.
+        scene: a name, a file, a :class:`SceneFileCfg`, or a function that makes a :class:`SceneCfg`; by default the task's own.
 
         Options:
-        scene: Which scene, by its name or a file; by default the task's.
         worlds: How many run at one time.
         threads: Of the simulation; 0: every CPU this process may use.
         seed: Same seed, same episodes.

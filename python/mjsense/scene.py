@@ -192,3 +192,12 @@ class Scene(KnownAttributes):
     def tile_origins(self) -> np.ndarray | None:
         """Spawn points of the tiles, float32 ``[levels, types, 3]`` m; None without generated terrain."""
         return self._core.tile_origins()
+
+
+def prepared(cfg: Any, place: str) -> tuple[Any, ...]:
+    """What C++ makes the scene of a rollout of: the configuration, its spec, its sensors, its last edit, and the Scene to be."""
+    if not isinstance(cfg, SceneCfg):
+        raise TypeError(f"{place} must return a mjsense.SceneCfg, not {cfg!r}")
+    scene: Scene = Scene.__new__(Scene)
+    items, edit = scene._prepare(cfg)
+    return cfg, scene.spec, items, edit, scene

@@ -161,15 +161,9 @@ class Task:
         }
 
     def _mjs_scene(self) -> tuple[Any, ...]:
-        from mjsense.configs import SceneCfg
-        from mjsense.scene import Scene
+        from mjsense.scene import prepared
 
-        cfg = self.scene()
-        if not isinstance(cfg, SceneCfg):
-            raise TypeError(f"scene() must return a mjsense.SceneCfg, not {cfg!r}")
-        scene: Scene = Scene.__new__(Scene)
-        items, edit = scene._prepare(cfg)
-        return cfg, scene.spec, items, edit, scene
+        return prepared(self.scene(), "scene()")
 
     def _mjs_bind(self, sim: Simulation, layout: list[tuple[str, list[float], list[float]]]) -> None:
         taken = getattr(self, "sim", None)

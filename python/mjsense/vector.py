@@ -14,7 +14,7 @@ from gymnasium.vector.utils import batch_space
 
 from mjsense import _core
 from mjsense._arguments import Seed, checked
-from mjsense._parts import Policies, Tasks, parts_of
+from mjsense._parts import Policies, Scenes, Tasks, parts_of
 from mjsense._streams import choose_streams, nest, stream_path
 from mjsense.assets import use_installed_meshes
 from mjsense.sensor import _box
@@ -252,11 +252,11 @@ def make_vec(
     task: Tasks = "pick",
     robot: str | Path | None = None,
     *,
+    scene: Scenes = "",
     policy: Policies = None,
     observations: Sequence[str] | None = None,
     sensors: Iterable[Any] = (),
     # options of a recording
-    scene: str = "",
     num_envs: int = 1,
     threads: int = 0,
     seed: Seed = 0,
@@ -281,13 +281,13 @@ def make_vec(
     Args:
         task: a :class:`Task`, its class, or a registered name (:func:`task_names`).
         robot: a registered name (:func:`robot_names`) or the path of a ``.toml``; None is the task's own.
+        scene: a name, a file, a :class:`SceneFileCfg`, or a function that makes a :class:`SceneCfg`; by default the task's own.
         policy: what :meth:`TaskVectorEnv.expert_action` asks: a :class:`Policy`, a function or a registered name.
         observations: names of sensors ("qpos") or of single streams ("qpos/arm") to observe; if not given, all that are numbers.
         sensors: of your own, as in :func:`record`: observed with the suite. An error of one in a world ends that world's episode:
             ``truncated``, and ``info["fault"]`` says why.
 
         Options:
-        scene: Which scene, by its name or a file; by default the task's.
         num_envs: How many run at one time.
         threads: Of the simulation; 0: every CPU this process may use.
         seed: Same seed, same episodes.

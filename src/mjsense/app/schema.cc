@@ -9,6 +9,7 @@
 
 #include "mjsense/rollout/record_job.h"
 #include "mjsense/scene/scene.h"
+#include "mjsense/scenes/scene_file.h"
 #include "mjsense/sensors/all_sensors.h"
 
 namespace mjsense {
@@ -170,6 +171,7 @@ const Schema& schema() {
       schema.add(*kind.cfg);
       if (kind.data) schema.add(*kind.data, kind.cfg->kind);
     }
+    schema.add(struct_of<SceneFileCfg>());
     schema.add(struct_of<RecordJobCfg>());
     schema.add(struct_of<RolloutCfg>());
     return schema;
