@@ -5,6 +5,7 @@ set(MJSENSE_PUBLIC_HEADERS
   mjsense/mjsense.h
   mjsense/cameras/camera_mount.h
   mjsense/cameras/camera_system.h
+  mjsense/cameras/frozen_cameras.h
   mjsense/cameras/load_cameras.h
   mjsense/core/array.h
   mjsense/core/checks.h

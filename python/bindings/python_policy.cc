@@ -11,6 +11,7 @@
 
 #include "mjsense/core/error.h"
 #include "mjsense/rollout/rollout.h"
+#include "python/bindings/fields.h"
 #include "python/bindings/numpy.h"
 
 namespace mjsense::python {
@@ -119,6 +120,15 @@ std::vector<std::shared_ptr<Sensor>> PythonPolicy::create_policy_sensors() const
       sensors.push_back(std::move(own));
   });
   return sensors;
+}
+
+std::vector<std::pair<std::string, std::string>> PythonPolicy::info(int world) const {
+  return host_->call(place("info"), [&] {
+    std::vector<std::pair<std::string, std::string>> all;
+    for (auto [key, text] : dict_of(policy_.get().attr("info")(world)))
+      all.emplace_back(nb::cast<std::string>(nb::str(key)), nb::cast<std::string>(nb::str(text)));
+    return all;
+  });
 }
 
 void PythonPolicy::reset_all(ActiveWorlds& worlds) {

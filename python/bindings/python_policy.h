@@ -40,6 +40,7 @@ class PythonPolicy final : public PlannerPolicy {
   int num_retries(int world) const override { return retries_[world]; }
   Pose grasp_pose(int /*world*/) const override { return {}; }
   bool has_grasp_pose() const override { return false; }
+  std::vector<std::pair<std::string, std::string>> info(int world) const override;
   std::vector<std::shared_ptr<Sensor>> create_policy_sensors() const override;
 
  private:

@@ -789,7 +789,7 @@ class SceneRegionCfg(_config_methods.Config):
 class SceneVaryCfg(_config_methods.Config):
     """What looks different in every episode; all draws are uniform."""
 
-    what: Literal["light", "material", "geom"] = "light"
+    what: Literal["light", "material", "geom"]
     """Lights, materials or geoms (without a material)."""
     pattern: str
     """Regular expression that matches the whole full name of each."""

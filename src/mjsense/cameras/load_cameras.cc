@@ -5,7 +5,10 @@
 
 #include <algorithm>
 #include <filesystem>
+#include <fstream>
+#include <sstream>
 
+#include "mjsense/cameras/frozen_cameras.h"
 #include "mjsense/core/data_file.h"
 #include "mjsense/core/error.h"
 #include "mjsense/core/toml_fields.h"
@@ -15,13 +18,23 @@ namespace {
 
 namespace fs = std::filesystem;
 
-constexpr std::string_view kEmbedded = "embedded:", kTail = ".toml";
+constexpr std::string_view kEmbedded = "embedded:", kTail = ".toml", kFrozen = ".json";
+
+bool is_file(std::string_view name) { return name.ends_with(kTail) || name.ends_with(kFrozen); }
 
 // "embedded:robots/franka/cameras/", or a folder on disk.
 std::string folder_of(std::string_view robot_file) { return beside(robot_file, "cameras/"); }
 
 DataFolder embedded(const std::string& folder) {
   return {"camera system", std::string_view(folder).substr(kEmbedded.size()), kTail};
+}
+
+std::string read_text(const std::string& path) {
+  std::ifstream in(path);
+  if (!in) throw ValueError(fmt::format("{}: no such file", path));
+  std::stringstream text;
+  text << in.rdbuf();
+  return text.str();
 }
 
 }  // namespace
@@ -40,10 +53,16 @@ std::vector<std::string> camera_system_names(std::string_view robot_file) {
 
 CameraSystemCfg load_camera_system(std::string_view name, std::string_view robot_file) {
   // Another robot's: "franka/droid".
-  if (const auto slash = name.find('/'); slash != name.npos && !name.ends_with(kTail)) {
+  if (const auto slash = name.find('/'); slash != name.npos && !is_file(name)) {
     const std::string other =
         fmt::format("{}robots/{}/robot.toml", kEmbedded, name.substr(0, slash));
     return load_camera_system(name.substr(slash + 1), other);
+  }
+  if (name.ends_with(kFrozen)) {
+    CameraSystemCfg cfg = read_frozen(read_text(std::string(name)), name);
+    cfg.name = fs::path(name).stem().string();
+    check_fields(cfg, fmt::format("camera system '{}'", cfg.name));
+    return cfg;
   }
   const std::string folder = folder_of(robot_file);
   const std::vector<std::string> names = camera_system_names(robot_file);

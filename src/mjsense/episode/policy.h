@@ -8,6 +8,7 @@
 #include <span>
 #include <string>
 #include <string_view>
+#include <utility>
 #include <vector>
 
 #include "mjsense/core/pose.h"
@@ -47,6 +48,8 @@ class Policy {
 
   // Every phase there is: obs_scene's policy_phases. Empty: it knows none.
   virtual std::span<const Phase> phases() const { return {}; }
+  // Further members of obs_scene with text values, in this order: which network, of which step.
+  virtual std::vector<std::pair<std::string, std::string>> info(int /*world*/) const { return {}; }
   // Sensors that this policy adds to the suite. They refer to this policy.
   virtual std::vector<std::shared_ptr<Sensor>> create_policy_sensors() const { return {}; }
 };

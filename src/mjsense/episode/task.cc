@@ -142,6 +142,14 @@ std::string Task::obs_scene(int world) const {
     for (const Phase& phase : policy_->phases()) phases[std::string(phase.name)] = phase.number;
   }
   for (const auto& [key, value] : scene_info(world)) scene[key] = value;
+  if (policy_) {
+    for (const auto& [key, value] : policy_->info(world)) {
+      if (scene.contains(key))
+        throw ValueError(fmt::format("policy '{}': info() has '{}', which the task says already",
+                                     policy_->name(), key));
+      scene[key] = value;
+    }
+  }
   return scene.dump();
 }
 

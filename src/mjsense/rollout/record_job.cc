@@ -31,7 +31,7 @@ std::map<std::string, std::string> checksums_of_files(const RolloutCfg& cfg) {
   std::map<std::string, std::string> sums;
   for (const auto& [key, path] : {std::pair{"camera_system", cfg.camera_system},
                                   std::pair{"robot", cfg.robot}, std::pair{"scene", cfg.scene}}) {
-    if (!path.ends_with(".toml") && !path.ends_with(".xml")) continue;
+    if (!path.ends_with(".toml") && !path.ends_with(".xml") && !path.ends_with(".json")) continue;
     std::stringstream text;
     text << std::ifstream(path).rdbuf();
     const std::string bytes = text.str();
@@ -40,6 +40,15 @@ std::map<std::string, std::string> checksums_of_files(const RolloutCfg& cfg) {
     sums[key] = sum.text();
   }
   return sums;
+}
+
+// Of the whole compiled model: for a scene that code makes, there is no file to compare.
+std::string checksum_of_model(const mjModel* model) {
+  std::vector<char> bytes(mj_sizeModel(model));
+  mj_saveModel(model, nullptr, bytes.data(), static_cast<mjtSize>(bytes.size()));
+  Checksum sum;
+  sum.add(bytes.data(), bytes.size());
+  return sum.text();
 }
 
 // What the data depend on: not the number of worlds or threads. A recording resumes only with equal
@@ -74,7 +83,8 @@ std::string settings_of(const RecordJobCfg& job, Rollout& rollout) {
     entries.erase(key);
     if (!value.empty()) entries[key] = [value = value](JsonWriter& json) { json.value(value); };
   }
-  const std::map<std::string, std::string> sums = checksums_of_files(job.rollout);
+  std::map<std::string, std::string> sums = checksums_of_files(job.rollout);
+  if (job.rollout.make_scene) sums["scene"] = checksum_of_model(rollout.task().model());
   if (!sums.empty()) {
     entries["files"] = [&sums](JsonWriter& json) {
       json.begin_object();

@@ -105,7 +105,7 @@ struct SceneVaryCfg {
 template <class V>
 void visit_fields(V& v, SceneVaryCfg& c) {
   v.object("SceneVaryCfg", "What looks different in every episode; all draws are uniform.");
-  v("what", c.what, "Lights, materials or geoms (without a material).");
+  v("what", c.what, "Lights, materials or geoms (without a material).").required();
   v("pattern", c.pattern, "Regular expression that matches the whole full name of each.")
       .required();
   v("brightness", c.brightness, "Factor on the colour, least and most.").at_least(0);

@@ -1,0 +1,129 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Scenes that a function of the user's makes, for tasks of ours; cameras of an episode, frozen and used again."""
+
+import json
+
+import h5py
+import numpy as np
+import pytest
+
+import mjsense as mjs
+
+BENCH = """
+<mujoco>
+  <worldbody>
+    <light name="lamp" pos="0.5 0 2.5" dir="0 0 -1"/>
+    <geom type="plane" size="3 3 0.1"/>
+    <geom name="top" type="box" size="0.3 0.5 0.02" pos="0.55 0 0.58"/>
+  </worldbody>
+</mujoco>"""
+THINGS = {"mug": "mug", "can": "soup_can", "cube": "blue_cube"}
+TOP = mjs.SceneRegionCfg(name="top", on="bench/top", area=(0.4, 0.75, -0.4, 0.4), target_area=(0.45, 0.62, -0.2, 0.2))
+SMALL = dict(width=64, height=48)
+
+
+def bench(xml=BENCH):
+    things = {name: mjs.EntityCfg(model=f"embedded:objects/{model}.xml") for name, model in THINGS.items()}
+    entities = {"bench": mjs.EntityCfg(model=xml, mocap_base=False), **things}
+    return mjs.SceneCfg(entities=entities, options=mjs.MujocoCfg(cone="elliptic", impratio=10))
+
+
+def scene(**fields):
+    return mjs.SceneFileCfg(name="bench", models=bench, regions=[TOP], **fields)
+
+
+def test_a_task_of_ours_is_played_in_it(tmp_path):
+    made = mjs.record("pick", scene=scene(count=(2, 3)), out=tmp_path, episodes=2, worlds=2, **SMALL)
+    assert made.kept == 2, made.failures
+    with h5py.File(made.path / "trajectories_batch_1_of_1.h5") as file:
+        text = json.loads(file["traj_0/obs_scene"][()])["text"]
+    assert text in {"Pick up the mug", "Pick up the soup can", "Pick up the blue cube"}
+
+
+def test_objects_stand_on_its_regions():
+    env = mjs.make_vec("pick", scene=scene(), num_envs=4, cameras=[])
+    env.reset(seed=3)
+    model, heights = env.sim.model, {}
+    for name, kind in THINGS.items():
+        heights[name] = env.sim.data.xpos[:, model.body(f"{name}/{kind}").id, 2]
+        assert (heights[name] > 0.58).all() and (heights[name] < 0.75).all(), (name, heights)
+    env.close()
+
+
+def test_a_function_alone_will_do(tmp_path):
+    """Without regions things stay where their models have them: here one in the other, which is said and not played."""
+    made = mjs.record("pick", scene=bench, out=tmp_path, episodes=1, max_attempts=1, cameras=[])
+    assert made.kept == 0 and "scene 'bench': 'mug' starts 42.0 mm inside" in next(iter(made.failures))
+
+
+@pytest.mark.parametrize(
+    "what, message",
+    [
+        (3, "scene must be the name or file of a scene"),
+        (lambda: 3, r"models\(\) must return a mjsense.SceneCfg, not 3"),
+        (mjs.SceneFileCfg(name="both", models=bench, base="x.xml"), "scene 'both': code makes its models"),
+        (mjs.SceneFileCfg(name="lost", models=bench, regions=[mjs.SceneRegionCfg(name="r", on="bench/tip")]), "bench/top"),
+    ],
+)
+def test_faults_are_said(what, message):
+    with pytest.raises(Exception, match=message):
+        mjs.make_vec("pick", scene=what, cameras=[])
+
+
+def test_a_task_with_a_scene_of_its_own_takes_no_other():
+    class Mine(mjs.Task):
+        def scene(self):
+            return bench()
+
+    with pytest.raises(ValueError, match="makes its scene itself"):
+        mjs.make_vec(Mine, robot="franka", scene=bench)
+
+
+def test_a_recording_resumes_only_with_the_same_scene(tmp_path):
+    options = dict(out=tmp_path, episodes=1, cameras=[])
+    mjs.record("pick", scene=scene(), **options)
+    other = mjs.SceneFileCfg(name="bench", models=lambda: bench(BENCH.replace("0.3 0.5 0.02", "0.3 0.5 0.03")), regions=[TOP])
+    with pytest.raises(ValueError, match="files"):
+        mjs.record("pick", scene=other, resume=True, **{**options, "episodes": 1})
+    assert mjs.record("pick", scene=scene(), resume=True, **options).kept == 1
+
+
+def camera_rows(path, key="traj_0"):
+    with h5py.File(path / "trajectories_batch_1_of_1.h5") as file:
+        rows = {name: [np.array(group[k]) for k in sorted(group)] for name, group in file[f"{key}/obs/sensor_param"].items()}
+        return rows, json.loads(file[f"{key}/obs_scene"][()])
+
+
+def test_frozen_cameras_stand_where_they_stood(tmp_path):
+    first = mjs.record("pick", camera_system="omni_purpose", out=tmp_path / "a", episodes=1, worlds=1, seed=5, **SMALL)
+    rows, scene = camera_rows(first.path)
+    frozen = tmp_path / "cameras.json"
+    frozen.write_text(json.dumps(scene["cameras"]))
+    again = mjs.record("pick", camera_system=str(frozen), out=tmp_path / "b", episodes=1, worlds=1, seed=5, **SMALL)
+    same, _ = camera_rows(again.path)
+    assert list(same) == list(rows) and len(rows) == 5
+    for name in rows:
+        for a, b in zip(rows[name], same[name]):
+            np.testing.assert_allclose(a, b, atol=1e-5, err_msg=name)  # poses are float32 on their way
+
+
+def test_what_frozen_cameras_lack_is_said(tmp_path):
+    file = tmp_path / "cameras.json"
+    for text, message in (("[]", "must be JSON, cameras by name"), ('{"eye": {"pos": [1, 2]}}', "'eye': 'pos' must be 3 numbers"),
+                          ('{"eye": {"pos": [1, 2, 3], "fovy": 4, "quat": [1, 0, 0, 0], "body": "desk"}}', "body 'desk' is no robot's")):  # fmt: skip
+        file.write_text(text)
+        with pytest.raises(ValueError, match=message):
+            mjs.make_vec("pick", camera_system=str(file))
+
+
+def test_a_policy_says_what_it_is(tmp_path):
+    class Still(mjs.Policy):
+        def act(self, obs):
+            return {"done": np.ones(self.num_worlds, bool)}
+
+        def info(self, world):
+            return {"checkpoint": "step 9000"}
+
+    made = mjs.record("pick", policy=Still, out=tmp_path, episodes=1, keep_failures=True, cameras=[])
+    with h5py.File(made.path / "trajectories_batch_1_of_1.h5") as file:
+        assert json.loads(file["traj_0/obs_scene"][()])["checkpoint"] == "step 9000"
