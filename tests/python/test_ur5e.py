@@ -1,9 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
 """A robot that mjsense does not know, from somebody else's package, recorded in a task and by a policy that are written here."""
 
-import os
 import subprocess
-from pathlib import Path
+import sys
 
 import numpy as np
 import pytest
@@ -11,9 +10,14 @@ from wheels import wheel
 
 import mjsense as mjs
 
-PROGRAM = os.environ.get("MJSENSE_PROGRAM", Path(__file__).parents[2] / "build/dev/mjsense")
-BLOCK = "<mujoco><worldbody><body name='block'><freejoint/><geom type='box' size='.03 .03 .03' mass='.1'/></body></worldbody></mujoco>"
-VIEW = "<mujoco><worldbody><camera name='side' pos='1.2 -.9 .6' xyaxes='.6 .8 0 -.32 .24 .92'/></worldbody></mujoco>"
+WORLD = """
+<mujoco>
+  <option integrator="implicitfast" cone="elliptic" impratio="10"/>
+  <worldbody>
+    <geom type="plane" size="3 3 .1"/> <camera name="side" pos="1.2 -.9 .6" xyaxes=".6 .8 0 -.32 .24 .92"/>
+    <body name="block"> <freejoint/> <geom type="box" size=".03 .03 .03" mass=".1"/> </body>
+  </worldbody>
+</mujoco>"""
 PAD = "<mujoco><worldbody><body name='pad'><site name='face'/></body></worldbody></mujoco>"
 ROBOT = """
 name = "ur5e"
@@ -30,9 +34,7 @@ kind = "arm"
 joints = ["shoulder_pan_joint", "shoulder_lift_joint", "elbow_joint", "wrist_1_joint", "wrist_2_joint", "wrist_3_joint"]
 actuators = ["shoulder_pan", "shoulder_lift", "elbow", "wrist_1", "wrist_2", "wrist_3"]
 leaf_site = "gripper/pinch"
-root_body = "shoulder_link"
 init = [-1.57, -1.57, 1.57, -1.57, -1.57, 0]
-spread = [0.05, 0.05, 0.05, 0.05, 0.05, 0.05]
 [[groups]]
 name = "gripper"
 kind = "gripper"
@@ -50,25 +52,23 @@ class Push(mjs.Task):
     """Push the block 10 cm."""
 
     horizon = 120
-    objects = {"block": "block/block"}
-    cameras = {"side": "view/side"}
+    objects = {"block": "block"}
+    cameras = {"side": "side"}
 
     def scene(self):
-        block, view = mjs.EntityCfg(model=BLOCK), mjs.EntityCfg(model=VIEW, mocap_base=False)
-        options = mjs.MujocoCfg(integrator="implicitfast", cone="elliptic", impratio=10)
-        return mjs.SceneCfg(terrain=mjs.TerrainCfg(), entities={"block": block, "view": view}, options=options)
+        return mjs.SceneCfg(base=WORLD)
 
     def initialize(self, sim):
-        self.start, self.block = np.zeros((sim.num_worlds, 3)), sim.model.body("block/block").id
+        self.start, self.block = np.zeros(sim.num_worlds), sim.model.body("block").id
 
     def sample(self, rng, world):
-        world.place("block/block", [rng.uniform(-0.05, 0.05), 0.5 + rng.uniform(-0.03, 0.03), 0.03])
+        world.place("block", [rng.uniform(-0.05, 0.05), 0.5 + rng.uniform(-0.03, 0.03), 0.03])
 
     def begin(self, ids):
-        self.start[ids] = self.sim.data.xpos[ids, self.block]
+        self.start[ids] = self.sim.data.xpos[ids, self.block, 1]
 
     def evaluate(self, sim):
-        pushed = (sim.data.xpos[:, self.block] - self.start)[:, 1]
+        pushed = sim.data.xpos[:, self.block, 1] - self.start
         return {"reward": pushed, "success": pushed > 0.1, "info": {"pushed": pushed}}
 
 
@@ -85,8 +85,9 @@ class Pusher(mjs.Policy):
         self.phase[ids] = 0
 
     def act(self, obs):
-        block, tips, arm = obs["env_states"]["actors"]["block"][:, :3], obs["tcp_pose"][:, :3], obs["qpos"]["arm"].copy()
-        goals = block + np.where(self.phase[:, None] == 2, [0, 0.05, 0], [0, -0.12, 0])
+        block = obs["env_states"]["actors"]["block"][:, :3] * [-1, -1, 1]  # in the robot's base frame: half a turn
+        tips, arm = obs["tcp_pose"][:, :3], obs["qpos"]["arm"].copy()
+        goals = block + np.where(self.phase[:, None] == 2, [0, -0.05, 0], [0, 0.12, 0])
         goals[:, 2] = np.where(self.phase == 0, 0.15, 0.02)
         there = np.linalg.norm(tips - goals, axis=1) < 0.02
         self.phase[:] = np.minimum(self.phase + (there & (self.phase < 2)), 2)
@@ -104,5 +105,5 @@ def test_a_ur5e_is_recorded(tmp_path):
     robot = tmp_path / "ur5e.toml"
     summary = mjs.record(Push, robot=robot, policy=Pusher(robot), out=tmp_path / "data", **options)
     assert summary.kept == 2 and summary.failed == 0, summary
-    done = subprocess.run([PROGRAM, "verify", tmp_path / "data", "--decode"], capture_output=True, text=True)
+    done = subprocess.run([sys.executable, "-m", "mjsense", "verify", tmp_path / "data", "--decode"], capture_output=True, text=True)
     assert done.returncode == 0 and "whole" in done.stdout, done.stdout
