@@ -70,9 +70,7 @@ std::string PythonTask::place(const char* method) const {
 }
 
 SceneCfg PythonTask::scene_cfg() const {
-  return call("scene", [&] {
-    return host_->read_prepared(task_.get().attr("_mjs_scene")());
-  });
+  return call("scene", [&] { return host_->read_prepared(task_.get().attr("_mjs_scene")()); });
 }
 
 void PythonTask::initialize_task() {

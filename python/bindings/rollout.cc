@@ -77,7 +77,8 @@ class Parts {
     SceneFileCfg cfg;
     read_struct(scene, cfg);
     if (!scene.attr("models").is_none()) {
-      cfg.models = [scene = Held(scene), host, place = fmt::format("scene '{}': models()", cfg.name)] {
+      cfg.models = [scene = Held(scene), host,
+                    place = fmt::format("scene '{}': models()", cfg.name)] {
         return host->call(place,
                           [&] { return host->read_prepared(scene.get().attr("_mjs_scene")()); });
       };

@@ -16,7 +16,6 @@ from mjsense.errors import UnknownNameError
 
 if TYPE_CHECKING:
     from mjsense.configs import SceneCfg
-    from mjsense.scene import Scene
     from mjsense.simulation import Simulation
 
 

@@ -6,7 +6,6 @@
 #include <nlohmann/json.hpp>
 
 #include "mjsense/core/error.h"
-#include "mjsense/robots/robot.h"
 
 namespace mjsense {
 namespace {
@@ -22,7 +21,8 @@ std::array<double, N> numbers(const Json& camera, const char* key, const std::st
   return found->get<std::array<double, N>>();
 }
 
-CameraMountCfg read_camera(const std::string& name, const Json& camera, const std::string& who) {
+CameraMountCfg read_camera(const std::string& name, const Json& camera, std::string_view prefix,
+                           const std::string& who) {
   if (!camera.is_object()) throw ValueError(who + ": must be an object");
   CameraMountCfg out;
   out.name = name;
@@ -41,22 +41,24 @@ CameraMountCfg read_camera(const std::string& name, const Json& camera, const st
   out.mount = MountKind::kBody;
   out.quat = numbers<4>(camera, "quat", who);
   const std::string body = camera["body"].is_string() ? camera["body"].get<std::string>() : "";
-  if (!body.starts_with(Robot::kPrefix))
+  if (!body.starts_with(prefix))
     throw ValueError(fmt::format("{}: body '{}' is no robot's", who, body));
-  out.body = body.substr(Robot::kPrefix.size());
+  out.body = body.substr(prefix.size());
   return out;
 }
 
 }  // namespace
 
-CameraSystemCfg read_frozen(std::string_view json, std::string_view place) {
+CameraSystemCfg read_frozen(std::string_view json, std::string_view prefix,
+                            std::string_view place) {
   const Json all = Json::parse(json, nullptr, /*allow_exceptions=*/false);
   if (!all.is_object() || all.empty())
     throw ValueError(fmt::format(
         "{}: must be JSON, cameras by name, as obs_scene has them under 'cameras'", place));
   CameraSystemCfg system;
   for (const auto& [name, camera] : all.items())
-    system.cameras.push_back(read_camera(name, camera, fmt::format("{}, camera '{}'", place, name)));
+    system.cameras.push_back(
+        read_camera(name, camera, prefix, fmt::format("{}, camera '{}'", place, name)));
   return system;
 }
 

@@ -10,7 +10,8 @@
 namespace mjsense {
 
 // What CameraSystem::frozen() wrote, and obs_scene has under `cameras`: a system without noise.
-// `place`: for messages, where the text is from. Throws ValueError.
-CameraSystemCfg read_frozen(std::string_view json, std::string_view place);
+// Bodies are the robot's, whose names there begin with `prefix`; `place`: for messages, where the
+// text is from. Throws ValueError.
+CameraSystemCfg read_frozen(std::string_view json, std::string_view prefix, std::string_view place);
 
 }  // namespace mjsense

@@ -51,15 +51,16 @@ std::vector<std::string> camera_system_names(std::string_view robot_file) {
   return names;
 }
 
-CameraSystemCfg load_camera_system(std::string_view name, std::string_view robot_file) {
+CameraSystemCfg load_camera_system(std::string_view name, std::string_view robot_file,
+                                   std::string_view prefix) {
   // Another robot's: "franka/droid".
   if (const auto slash = name.find('/'); slash != name.npos && !is_file(name)) {
     const std::string other =
         fmt::format("{}robots/{}/robot.toml", kEmbedded, name.substr(0, slash));
-    return load_camera_system(name.substr(slash + 1), other);
+    return load_camera_system(name.substr(slash + 1), other, prefix);
   }
   if (name.ends_with(kFrozen)) {
-    CameraSystemCfg cfg = read_frozen(read_text(std::string(name)), name);
+    CameraSystemCfg cfg = read_frozen(read_text(std::string(name)), prefix, name);
     cfg.name = fs::path(name).stem().string();
     check_fields(cfg, fmt::format("camera system '{}'", cfg.name));
     return cfg;

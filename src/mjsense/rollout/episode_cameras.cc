@@ -31,7 +31,7 @@ CameraSystem choose_cameras(const Task& task, const RolloutCfg& cfg) {
   system.width = robot.image_width;
   system.height = robot.image_height;
   if (!cfg.camera_system.empty()) {
-    system = load_camera_system(cfg.camera_system, robot.file);
+    system = load_camera_system(cfg.camera_system, robot.file, Robot::kPrefix);
   } else {
     for (const CameraMount& mount : robot.cameras) system.cameras.push_back(of_model(mount, false));
   }

@@ -21,9 +21,7 @@ constexpr double kGoal = 0.05;  // m, goal above the start
 
 }  // namespace
 
-PickTask::PickTask(TaskCfg cfg)
-    : Task(std::move(cfg)),
-      scene_(task_scene(this->cfg(), kScene)) {}
+PickTask::PickTask(TaskCfg cfg) : Task(std::move(cfg)), scene_(task_scene(this->cfg(), kScene)) {}
 
 SceneCfg PickTask::scene_cfg() const { return scene_.scene_cfg(robot_entity()); }
 
