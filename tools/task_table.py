@@ -1,0 +1,118 @@
+# SPDX-License-Identifier: Apache-2.0
+"""How often the planners succeed, by task and robot: writes the table of docs/tasks.md.
+
+    python tools/task_table.py [--episodes 50] [--only TASK[/ROBOT]] [--perturb]
+
+Plays every pair of CASES without cameras, each attempt an episode of its own seed, and keeps failures, too. What was played is kept
+in .cache/tasks, so that a part can be played again alone.
+"""
+
+from __future__ import annotations
+
+import argparse
+import collections
+import json
+import sys
+import tempfile
+from pathlib import Path
+from typing import Any
+
+import h5py
+import numpy as np
+
+ROOT = Path(__file__).resolve().parents[1]
+for build in ("release", "dev"):
+    if (ROOT / "build" / build / "python").exists():
+        sys.path.insert(0, str(ROOT / "build" / build / "python"))
+        break
+
+import mjsense as mjs
+
+PAGE, RESULTS = ROOT / "docs" / "tasks.md", ROOT / ".cache" / "tasks"
+BEGIN, END = "<!-- task table -->", "<!-- end -->"
+# task, robot, scene ("" is the task's own).
+CASES = (
+    ("pick", "franka", ""),
+)
+
+
+def approach_angles(episodes: list[dict[str, Any]]) -> list[float]:
+    """Degrees between the last grasp's approach and straight down, of the episodes that have one."""
+    angles = []
+    for episode in episodes:
+        if episode["approach"] is not None:
+            angles.append(float(np.degrees(np.arccos(np.clip(-episode["approach"], -1, 1)))))
+    return angles
+
+
+def episodes_of(path: Path) -> list[dict[str, Any]]:
+    """Of each episode: retries, and the z component of the grasp's approach, None without a grasp."""
+    found = []
+    for file in sorted(path.glob("*.h5")):
+        with h5py.File(file) as data:
+            for episode in data.values():
+                extra = episode["obs/extra"]
+                retries = int(extra["policy_num_retries"][-1]) if "policy_num_retries" in extra else 0
+                approach = None
+                if "grasp_pose" in extra:
+                    w, x, y, z = extra["grasp_pose"][-1][3:]
+                    if w or x or y or z:
+                        approach = float(w * w - x * x - y * y + z * z)
+                found.append({"retries": retries, "approach": approach, "success": bool(episode["success"][-1])})
+    return found
+
+
+def play(task: str, robot: str, scene: str, episodes: int, **options: Any) -> dict[str, Any]:
+    with tempfile.TemporaryDirectory() as out:
+        made = mjs.record(task, robot, out=out, scene=scene, episodes=episodes, max_attempts=episodes, keep_failures=True,
+                          worlds=min(8, episodes), cameras=[], **options)  # fmt: skip
+        found = episodes_of(made.path)
+    angles = approach_angles(found)
+    return {
+        "task": task, "robot": robot, "scene": scene,
+        "episodes": made.succeeded + made.failed,
+        "success": made.succeeded / max(1, made.succeeded + made.failed),
+        "length": float(np.median(made.lengths)) if made.lengths else 0.0,
+        "retried": sum(e["retries"] > 0 for e in found) / max(1, len(found)),
+        "steep": sum(a < 30 for a in angles) / len(angles) if angles else None,
+        "steps_per_second": made.steps / made.seconds,
+        "first_action_ms": 1000 * made.times["reset"] / max(1, made.succeeded + made.failed),
+        "failures": collections.Counter(made.failures).most_common(3),
+    }  # fmt: skip
+
+
+def row(r: dict[str, Any]) -> str:
+    scene = f" in `{r['scene']}`" if r["scene"] else ""
+    slanted = "" if r["steep"] is None else f"{1 - r['steep']:.0%}"
+    why = "; ".join(f"{count} {what}" for what, count in r["failures"])
+    return (f"| `{r['task']}`{scene} | {r['robot']} | {r['success']:.0%} of {r['episodes']} | {r['length']:.0f} | {r['retried']:.0%} | "
+            f"{slanted} | {r['first_action_ms']:.0f} | {r['steps_per_second']:.0f} | {why} |")  # fmt: skip
+
+
+def table(results: list[dict[str, Any]]) -> str:
+    head = ["| task | robot | success | steps | retried | slanted | first plan, ms | steps/s | why not |",
+            "| --- | --- | ---: | ---: | ---: | ---: | ---: | ---: | --- |"]  # fmt: skip
+    return "\n".join([*head, *map(row, results)])
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--episodes", type=int, default=50)
+    parser.add_argument("--only", default="", help="TASK or TASK/ROBOT")
+    arguments = parser.parse_args()
+    RESULTS.mkdir(parents=True, exist_ok=True)
+    results = []
+    for task, robot, scene in CASES:
+        kept = RESULTS / f"{task}-{robot}-{scene.replace('/', '.') or 'own'}.json"
+        if arguments.only in ("", task, f"{task}/{robot}"):
+            kept.write_text(json.dumps(play(task, robot, scene, arguments.episodes)))
+        if kept.exists():
+            results.append(json.loads(kept.read_text()))
+            print(row(results[-1]), flush=True)
+    text = PAGE.read_text()
+    before, rest = text.split(BEGIN, 1)
+    PAGE.write_text(f"{before}{BEGIN}\n{table(results)}\n{END}{rest.split(END, 1)[1]}")
+
+
+if __name__ == "__main__":
+    main()
