@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "mjsense/core/error.h"
+#include "mjsense/policies/planner/opening_planner.h"
 #include "mjsense/policies/planner/pick_planner.h"
 
 namespace mjsense {
@@ -17,7 +18,9 @@ struct Planners {
   std::mutex mutex;
   // By task type; ours, then others in the order in which they came.
   std::vector<std::pair<std::string, PlannerFactory>> entries{
-      {"pick", [] { return std::make_unique<PickPlanner>(); }}};
+      {"pick", [] { return std::make_unique<PickPlanner>(); }},
+      {"open", [] { return std::make_unique<OpeningPlanner>(); }},
+      {"close", [] { return std::make_unique<OpeningPlanner>(); }}};
 };
 
 Planners& planners() {

@@ -7,6 +7,7 @@
 
 #include "mjsense/core/error.h"
 #include "mjsense/rollout/planners.h"
+#include "mjsense/tasks/opening/opening.h"
 #include "mjsense/tasks/pick/pick.h"
 
 namespace mjsense {
@@ -59,7 +60,12 @@ class Registry {
 Registry<TaskFactory>& tasks() {
   static Registry<TaskFactory> all(
       "tasks", "task",
-      {{"pick", [](TaskCfg c) { return std::make_unique<PickTask>(std::move(c)); }}});
+      {{"pick", [](TaskCfg c) { return std::make_unique<PickTask>(std::move(c)); }},
+       {"open",
+        [](TaskCfg c) { return std::make_unique<OpeningTask>(std::move(c), OpeningKind::kOpen); }},
+       {"close", [](TaskCfg c) {
+          return std::make_unique<OpeningTask>(std::move(c), OpeningKind::kClose);
+        }}});
   return all;
 }
 

@@ -221,8 +221,11 @@ Pose EpisodeScene::sample(int world, int target, std::uint64_t seed, std::uint64
     const int most = std::min(cfg_.count[1], n), least = std::min(cfg_.count[0], n);
     int wanted = least + static_cast<int>(draw.below(static_cast<std::uint32_t>(most - least + 1)));
     std::fill(present, present + n, 0);
-    present[target] = 1;
-    while (--wanted > 0) {  // one of the others, each as likely
+    if (target >= 0) {
+      present[target] = 1;
+      --wanted;
+    }
+    while (wanted-- > 0) {  // one of the others, each as likely
       int k = static_cast<int>(
           draw.below(static_cast<std::uint32_t>(std::count(present, present + n, 0))));
       for (int i = 0; i < n; ++i) {
@@ -248,8 +251,8 @@ Pose EpisodeScene::sample(int world, int target, std::uint64_t seed, std::uint64
       write_quat(poses[i].q, qpos + 3);
       std::fill(qvel, qvel + 6, 0.0);
     }
-    support_[world] = regions_[region_of[target]].height;
-  } else if (n > 0) {
+    if (target >= 0) support_[world] = regions_[region_of[target]].height;
+  } else if (n > 0 && target >= 0) {
     const double* qpos =
         state.qpos + model_->jnt_qposadr[model_->body_jntadr[objects_[target].body]];
     const Pose pose{vec3(qpos), quat(qpos + 3)};

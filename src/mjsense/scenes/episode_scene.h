@@ -49,7 +49,7 @@ class EpisodeScene {
   // Height (m) of what the target stands on at the start of this world's episode.
   double support_height(int world) const { return support_[world]; }
 
-  // The start of an episode, `target` the object that it is about: writes the objects' joints and
+  // The start of an episode, `target` the object that it is about, -1: none of them: writes the objects' joints and
   // returns where the robot's base stands. `rng` gives the places.
   Pose sample(int world, int target, std::uint64_t seed, std::uint64_t episode, Rng& rng,
               const StateRow& state);

@@ -44,7 +44,7 @@ void lay_out(std::span<const Resting> objects, int target, std::span<const char>
   std::vector<Placed> placed;
   for (int k = 0; k < n; ++k) {
     // The target first, then the others in order.
-    const int object = k == 0 ? target : k <= target ? k - 1 : k;
+    const int object = target < 0 ? k : k == 0 ? target : k <= target ? k - 1 : k;
     if (!present[object]) continue;
     const auto many = static_cast<std::uint32_t>(regions.size());
     const int region = many == 1 ? 0 : static_cast<int>(rng.below(many));

@@ -35,7 +35,7 @@ struct Resting {
   std::span<const Quat> rests;
 };
 
-// Poses X_WO of `objects` and the regions on which they stand, the target first, the others in order;
+// Poses X_WO of `objects` and the regions on which they stand, the target first (-1: there is none), the others in order;
 // those that are not `present` keep what is there. A function of the random numbers alone.
 void lay_out(std::span<const Resting> objects, int target, std::span<const char> present,
              std::span<const Region> regions, const LayoutCfg& cfg, Rng& rng, std::span<Pose> poses,

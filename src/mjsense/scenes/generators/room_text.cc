@@ -142,7 +142,7 @@ ModelSource RoomText::model() const {
   source.xml = fmt::format(
       "<mujoco model=\"{}\">\n<compiler angle=\"radian\" autolimits=\"true\"/>\n"
       "<default><geom friction=\"0.9 0.005 0.0001\"/>\n"
-      "<default class=\"furniture\"><geom contype=\"0\" conaffinity=\"1\" "
+      "<default class=\"furniture\"><geom contype=\"0\" conaffinity=\"3\" "
       "condim=\"3\"/></default>\n"
       "<default class=\"shown\"><geom contype=\"0\" conaffinity=\"0\" group=\"2\" mass=\"0\"/>"
       "</default></default>\n<asset>\n{}</asset>\n<worldbody>\n{}</worldbody>\n</mujoco>\n",

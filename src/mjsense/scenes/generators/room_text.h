@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
-// Writes the MJCF of a generated room. Furniture has contype 0 and conaffinity 1: robots and objects
-// touch it, pieces of it never touch each other.
+// Writes the MJCF of a generated room. Furniture has contype 0 and conaffinity 3: objects (contype 1)
+// and robots (contype 2) touch it, pieces of it never touch each other.
 
 #include <array>
 #include <cstdint>

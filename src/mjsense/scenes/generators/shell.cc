@@ -45,7 +45,7 @@ void write_shell(RoomText& room, const ShellCfg& s) {
   const double x = (s.x0 + s.x1) / 2, y = (s.y0 + s.y1) / 2, wide = s.x1 - s.x0, deep = s.y1 - s.y0;
   room.add(
       fmt::format("<geom name=\"floor\" type=\"plane\" pos=\"{} {} 0\" size=\"{} {} 0.1\" "
-                  "material=\"{}\" contype=\"0\" conaffinity=\"1\"/>",
+                  "material=\"{}\" contype=\"0\" conaffinity=\"3\"/>",
                   x, y, wide / 2 + kWall, deep / 2 + kWall, s.floor));
   room.slab("ceiling", s.ceiling, Facing::kDown, {x, y, s.height}, wide, deep, kWall);
   const double mid = s.height / 2;

@@ -1,0 +1,35 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+// Opens and closes: takes the handle of an OpeningTask's target and goes with it along its arc or
+// line.
+
+#include "mjsense/policies/planner/task_planner.h"
+#include "mjsense/tasks/opening/opening.h"
+
+namespace mjsense {
+
+struct OpeningPlannerCfg {
+  double there = 0.20, fast = 0.08, slow = 0.04;  // m/s, of the tool: to the pregrasp, with the
+                                                  // handle, to the handle
+  double fastest_joint = 0.8;                     // rad/s on the way there
+  double settle = 0.1, close_time = 0.5;          // s
+  int grasps = 40;                                // tried before giving up
+};
+
+class OpeningPlanner final : public TaskPlanner {
+ public:
+  explicit OpeningPlanner(OpeningPlannerCfg cfg = {}, TaskPlannerCfg planner = {})
+      : TaskPlanner(planner), cfg_(cfg) {}
+  std::span<const Phase> phases() const override;
+
+ protected:
+  void initialize_planner() override;  // throws ValueError for another task, or without a hand
+  void make_plan(const World& world, const PlanRequest& request, Plan& plan) override;
+  int first_phase() const override;
+
+ private:
+  OpeningPlannerCfg cfg_;
+  const OpeningTask* opening_ = nullptr;
+};
+
+}  // namespace mjsense

@@ -1,0 +1,257 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "mjsense/tasks/opening/articulation.h"
+
+#include <algorithm>
+#include <array>
+#include <cctype>
+#include <cmath>
+
+#include "mjsense/observe/frame.h"
+#include "mjsense/scene/resolve.h"
+
+namespace mjsense {
+namespace {
+
+constexpr double kLeastTravel = 0.05, kLeastSwing = 0.3;   // m, rad: less is a button or a knob
+constexpr double kLeastLever = 0.08;                       // m, from a hinge to its handle
+constexpr double kThick = 0.062;                           // m, that a hand goes round
+constexpr double kLeastLength = 0.012, kMostLength = 0.8;  // m, of a handle
+constexpr double kProtrusion = 0.0015;                     // m, beyond everything else
+
+// Words in names, and the category that each means.
+constexpr std::array<std::pair<std::string_view, std::string_view>, 14> kWordsOfThings{
+    {{"drawer", "drawer"},
+     {"microwave", "microwave"},
+     {"micro", "microwave"},
+     {"freezer", "freezer"},
+     {"fridge", "fridge"},
+     {"refrigerator", "fridge"},
+     {"oven", "oven"},
+     {"dishwasher", "dishwasher"},
+     {"cabinet", "cabinet"},
+     {"cupboard", "cabinet"},
+     {"wardrobe", "wardrobe"},
+     {"window", "window"},
+     {"box", "box"},
+     {"door", "door"}}};
+
+std::string lower(std::string text) {
+  std::ranges::transform(text, text.begin(), [](unsigned char c) { return std::tolower(c); });
+  return text;
+}
+
+struct Box {
+  Vec3 low{1e10, 1e10, 1e10}, high{-1e10, -1e10, -1e10};
+  void add(Vec3 p) {
+    low = {std::min(low.x, p.x), std::min(low.y, p.y), std::min(low.z, p.z)};
+    high = {std::max(high.x, p.x), std::max(high.y, p.y), std::max(high.z, p.z)};
+  }
+};
+
+// A geom that moves with the joint: its box in the frame of the joint's body.
+struct Part {
+  int geom;
+  Pose pose;  // of the box
+  Vec3 half;
+  bool named;  // "handle" or "knob"
+  Box box;     // along the body's axes
+};
+
+// Pose of `body` in the frame of `root`, null if something between them moves.
+std::optional<Pose> rigid_pose(const mjModel* m, int body, int root) {
+  Pose pose;
+  for (; body != root; body = m->body_parentid[body]) {
+    if (m->body_jntnum[body] > 0) return {};
+    pose = Pose{vec3(m->body_pos + 3 * body), quat(m->body_quat + 4 * body)} * pose;
+  }
+  return pose;
+}
+
+std::vector<Part> parts_of(const mjModel* m, int root) {
+  std::vector<Part> parts;
+  for (int g = 0; g < m->ngeom; ++g) {
+    if (m->geom_contype[g] == 0 && m->geom_conaffinity[g] == 0) continue;
+    const int body = m->geom_bodyid[g];
+    if (!is_below(m, body, root)) continue;
+    const std::optional<Pose> pose = rigid_pose(m, body, root);
+    if (!pose) continue;
+    const double* aabb = m->geom_aabb + 6 * g;
+    Part part{
+        g,
+        *pose * Pose{vec3(m->geom_pos + 3 * g), quat(m->geom_quat + 4 * g)} * Pose{vec3(aabb), {}},
+        vec3(aabb + 3),
+        false,
+        {}};
+    const std::string name =
+        lower(name_of(m, mjOBJ_GEOM, g) + " " + (body == root ? "" : name_of(m, mjOBJ_BODY, body)));
+    part.named = name.find("handle") != name.npos || name.find("knob") != name.npos;
+    for (int corner = 0; corner < 8; ++corner)
+      part.box.add(part.pose * Vec3{corner & 1 ? part.half.x : -part.half.x,
+                                    corner & 2 ? part.half.y : -part.half.y,
+                                    corner & 4 ? part.half.z : -part.half.z});
+    parts.push_back(part);
+  }
+  return parts;
+}
+
+Vec3 axis_of(const Pose& pose, int i) {
+  return rotate(pose.q, {i == 0 ? 1.0 : 0, i == 1 ? 1.0 : 0, i == 2 ? 1.0 : 0});
+}
+
+// Half of the extent of a part along a direction.
+double half_along(const Part& part, Vec3 direction) {
+  double sum = 0;
+  for (int i = 0; i < 3; ++i) sum += std::abs(dot(direction, axis_of(part.pose, i))) * part.half[i];
+  return sum;
+}
+
+// Whether its two shorter extents fit into a hand, and which is the longest.
+bool is_bar(const Part& part, int& longest) {
+  longest = 0;
+  for (int i = 1; i < 3; ++i) {
+    if (part.half[i] > part.half[longest]) longest = i;
+  }
+  for (int i = 0; i < 3; ++i) {
+    if (i != longest && 2 * part.half[i] > kThick) return false;
+  }
+  const double length = 2 * part.half[longest];
+  return length >= kLeastLength && length <= kMostLength;
+}
+
+// How far a part stands out beyond the others in a direction along the body's axes.
+double protrusion(const std::vector<Part>& parts, const Part& one, int axis, int sign) {
+  const auto reach = [&](const Part& p) { return sign > 0 ? p.box.high[axis] : -p.box.low[axis]; };
+  double others = -1e10;
+  for (const Part& p : parts) {
+    // What is itself a handle's - its posts - does not hide it.
+    if (p.geom != one.geom && !(one.named && p.named)) others = std::max(others, reach(p));
+  }
+  return reach(one) - others;
+}
+
+std::optional<Handle> find_handle(const std::vector<Part>& parts) {
+  if (parts.size() < 2) return {};
+  const bool any_named = std::ranges::any_of(parts, &Part::named);
+  std::optional<Handle> best;
+  double furthest = kProtrusion;
+  for (const Part& part : parts) {
+    int longest = 0;
+    if ((any_named && !part.named) || !is_bar(part, longest)) continue;
+    for (int axis = 0; axis < 3; ++axis) {
+      for (int sign = -1; sign <= 1; sign += 2) {
+        const Vec3 outward{axis == 0 ? double(sign) : 0, axis == 1 ? double(sign) : 0,
+                           axis == 2 ? double(sign) : 0};
+        Vec3 along = axis_of(part.pose, longest);
+        // A bar stands across the direction in which it stands out; a knob has no long side.
+        if (std::abs(dot(along, outward)) > 0.5) {
+          const int other = (longest + 1) % 3;
+          along = axis_of(part.pose, other);
+          if (2 * part.half[longest] > kThick) continue;
+        }
+        const double out = protrusion(parts, part, axis, sign);
+        if (out <= furthest) continue;
+        furthest = out;
+        Handle handle{part.geom, part.pose.p, along, half_along(part, along), outward, 0, 0};
+        handle.half_across = half_along(part, normalized(cross(along, outward)));
+        handle.half_outward = half_along(part, outward);
+        best = handle;
+      }
+    }
+  }
+  return best;
+}
+
+std::string category_of(const mjModel* m, int body, bool slide) {
+  std::string found;
+  for (int b = body; b > 0 && found.empty(); b = m->body_parentid[b]) {
+    const std::string name = lower(name_of(m, mjOBJ_BODY, b));
+    for (const auto& [word, category] : kWordsOfThings) {
+      // "door" alone says little: what it is the door of stands further up, or beside it.
+      if (category == "door" && b != body) continue;
+      if (name.find(word) != name.npos && !(category == "door" && m->body_parentid[b] > 0)) {
+        found = category;
+        break;
+      }
+    }
+  }
+  if (found.empty()) {
+    for (int j = m->body_jntadr[body]; j < m->body_jntadr[body] + m->body_jntnum[body]; ++j) {
+      const std::string name = lower(name_of(m, mjOBJ_JOINT, j));
+      for (const auto& [word, category] : kWordsOfThings) {
+        if (found.empty() && name.find(word) != name.npos) found = category;
+      }
+    }
+  }
+  return found.empty() ? (slide ? "drawer" : "door") : found;
+}
+
+}  // namespace
+
+double Articulation::at(double f) const {
+  const double sign = open >= closed ? 1 : -1;
+  return std::clamp(sign * f * range(), low, high);
+}
+
+Pose Articulation::motion(double from, double to, Vec3 axis, Vec3 anchor) const {
+  if (slide) return {(to - from) * axis, {}};
+  const Quat q = axis_angle(axis, to - from);
+  return {anchor - rotate(q, anchor), q};
+}
+
+std::vector<Articulation> find_articulations(const mjModel* m, std::string_view robot_prefix) {
+  std::vector<char> driven(m->njnt, 0);
+  for (int a = 0; a < m->nu; ++a) {
+    const int type = m->actuator_trntype[a], id = m->actuator_trnid[2 * a];
+    if (type == mjTRN_JOINT || type == mjTRN_JOINTINPARENT) driven[id] = 1;
+    if (type != mjTRN_TENDON) continue;
+    for (int w = m->tendon_adr[id]; w < m->tendon_adr[id] + m->tendon_num[id]; ++w) {
+      if (m->wrap_type[w] == mjWRAP_JOINT) driven[m->wrap_objid[w]] = 1;
+    }
+  }
+  std::vector<Articulation> found;
+  for (int j = 0; j < m->njnt; ++j) {
+    const bool slide = m->jnt_type[j] == mjJNT_SLIDE;
+    if ((!slide && m->jnt_type[j] != mjJNT_HINGE) || !m->jnt_limited[j] || driven[j]) continue;
+    const int body = m->jnt_bodyid[j];
+    if (m->body_jntnum[body] != 1) continue;
+    // Nothing of the robot; nothing that hangs on what moves by itself.
+    const std::string root = name_of(m, mjOBJ_BODY, m->body_rootid[body]);
+    const std::string name = name_of(m, mjOBJ_BODY, body);
+    if (!robot_prefix.empty() && (root.starts_with(robot_prefix) || name.starts_with(robot_prefix)))
+      continue;
+    bool carried = false;
+    for (int b = m->body_parentid[body]; b > 0; b = m->body_parentid[b])
+      carried = carried || m->body_jntnum[b] > 0;
+    if (carried) continue;
+    Articulation one;
+    one.joint = j;
+    one.body = body;
+    one.qpos = m->jnt_qposadr[j];
+    one.dof = m->jnt_dofadr[j];
+    one.slide = slide;
+    one.low = m->jnt_range[2 * j];
+    one.high = m->jnt_range[2 * j + 1];
+    if (one.range() < (slide ? kLeastTravel : kLeastSwing)) continue;
+    const bool low_is_closed = std::abs(one.low) <= std::abs(one.high);
+    one.closed = std::clamp(0.0, one.low, one.high);
+    one.open = low_is_closed ? one.high : one.low;
+    const std::optional<Handle> handle = find_handle(parts_of(m, body));
+    if (!handle) continue;
+    one.handle = *handle;
+    if (!slide) {
+      const Vec3 lever = one.handle.middle - vec3(m->jnt_pos + 3 * j),
+                 axis = vec3(m->jnt_axis + 3 * j);
+      if (norm(lever - dot(lever, axis) * axis) < kLeastLever) continue;
+    }
+    one.name = name;
+    one.category = category_of(m, body, slide);
+    // A slide that pulls its handle straight out of a cabinet is a drawer of it.
+    const double pull = dot(vec3(m->jnt_axis + 3 * j), one.handle.outward);
+    if (slide && one.category == "cabinet" && std::abs(pull) > 0.7) one.category = "drawer";
+    one.text = one.category;
+    found.push_back(std::move(one));
+  }
+  return found;
+}
+
+}  // namespace mjsense

@@ -1,0 +1,67 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "mjsense/tasks/opening/base_search.h"
+
+#include <cmath>
+
+namespace mjsense {
+
+BaseSearch::BaseSearch(const mjModel* model, const Robot& robot, const HandleReach& reach,
+                       BaseSearchCfg cfg)
+    : model_(model), robot_(robot), reach_(reach), cfg_(cfg) {}
+
+HandleReach::Start BaseSearch::placed(const HandleReach::Start& start, const Pose& base) const {
+  HandleReach::Start out = start;
+  std::vector<double> qvel(model_->nv), ctrl(model_->nu);
+  const StateRow row{out.qpos.data(), qvel.data(), ctrl.data(),
+                     model_->nmocap > 0 ? out.mocap_pos.data() : nullptr,
+                     model_->nmocap > 0 ? out.mocap_quat.data() : nullptr};
+  Rng none(0, 0, 0, 0);
+  robot_.write_start(row, base, none);
+  for (std::size_t g = 0; g < robot_.groups().size(); ++g) {
+    const std::vector<double>& init = robot_.cfg().groups[g].init;
+    for (std::size_t i = 0; i < init.size(); ++i) out.qpos[robot_.groups()[g].qpos[i]] = init[i];
+  }
+  return out;
+}
+
+std::vector<Pose> BaseSearch::places(const HandleReach::Start& start, const Articulation& one,
+                                     double from, double to, const Pose& usual) const {
+  {
+    const std::lock_guard lock(mutex_);
+    const auto known = known_.find(one.joint);
+    if (known != known_.end()) return known->second;
+  }
+  std::vector<Pose> found = search(start, one, from, to, usual);
+  const std::lock_guard lock(mutex_);
+  return known_.try_emplace(one.joint, std::move(found)).first->second;
+}
+
+std::vector<Pose> BaseSearch::search(const HandleReach::Start& start, const Articulation& one,
+                                     double from, double to, const Pose& usual) const {
+  // The handle as it is seen from above, and where it looks.
+  const Pose body = reach_.body_pose(start, one, from);
+  const Vec3 handle = body * one.handle.middle, out = rotate(body.q, one.handle.outward);
+  const double flat = std::hypot(out.x, out.y);
+  const Vec3 away = flat > 0.3 ? Vec3{out.x / flat, out.y / flat, 0} : Vec3{-1, 0, 0};
+  const Vec3 side{-away.y, away.x, 0};
+  Rng rng(0, 0, stream_of("opening/base"), static_cast<std::uint64_t>(one.joint));
+  std::vector<Pose> found;
+  for (int i = 0; i < cfg_.candidates && static_cast<int>(found.size()) < cfg_.wanted; ++i) {
+    Pose base = usual;
+    if (i > 0) {
+      const double distance = rng.uniform(cfg_.nearest, cfg_.farthest),
+                   aside = rng.uniform(-cfg_.aside, cfg_.aside),
+                   turn = rng.uniform(-cfg_.turn, cfg_.turn);
+      const Vec3 at = handle + distance * away + aside * side;
+      base.p = {at.x, at.y, usual.p.z};
+      const Vec3 look = handle + -0.3 * away - at;
+      base.q = axis_angle({0, 0, 1}, std::atan2(look.y, look.x) + turn);
+    }
+    const HandleReach::Start there = placed(start, base);
+    if (!reach_.stands_free(there)) continue;
+    if (reach_.find(there, one, from, to, cfg_.grasps)) found.push_back(base);
+  }
+  return found;
+}
+
+}  // namespace mjsense

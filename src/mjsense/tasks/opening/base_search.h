@@ -1,0 +1,45 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+// Where a robot's base can stand to open or close something.
+
+#include <map>
+#include <mutex>
+#include <vector>
+
+#include "mjsense/tasks/opening/reach.h"
+
+namespace mjsense {
+
+struct BaseSearchCfg {
+  int candidates = 80;  // places tried for a target
+  int wanted = 6;       // places kept
+  int grasps = 10;      // tried at each
+  // m and rad, about a point before the handle.
+  double nearest = 0.30, farthest = 0.90, aside = 0.55, turn = 0.35;
+};
+
+class BaseSearch {
+ public:
+  BaseSearch(const mjModel* model, const Robot& robot, const HandleReach& reach,
+             BaseSearchCfg cfg = {});
+
+  // The start with the robot's base there, in its start configuration without noise.
+  HandleReach::Start placed(const HandleReach::Start& start, const Pose& base) const;
+  // Places X_WB from which `one` goes from `from` to `to`, at the height of `usual`, which is tried
+  // first. A function of the arguments of the first call for this articulation: found once, then kept.
+  std::vector<Pose> places(const HandleReach::Start& start, const Articulation& one, double from,
+                           double to, const Pose& usual) const;
+
+ private:
+  std::vector<Pose> search(const HandleReach::Start& start, const Articulation& one, double from,
+                           double to, const Pose& usual) const;
+
+  const mjModel* model_;
+  const Robot& robot_;
+  const HandleReach& reach_;
+  BaseSearchCfg cfg_;
+  mutable std::mutex mutex_;
+  mutable std::map<int, std::vector<Pose>> known_;  // by joint
+};
+
+}  // namespace mjsense

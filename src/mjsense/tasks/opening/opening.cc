@@ -1,0 +1,198 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "mjsense/tasks/opening/opening.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+
+#include "mjsense/core/error.h"
+#include "mjsense/scenes/load_scene.h"
+
+namespace mjsense {
+namespace {
+
+constexpr std::string_view kScene = "kitchen";
+// Where planners stop: fractions of the range. A drawer is pulled well out, a door swung until it is
+// plainly open.
+constexpr double kAimSlide = 0.55, kAimHinge = 0.38;
+// A base stands a little different in every episode.
+constexpr double kSpread = 0.02, kTurn = 0.05;  // m, rad
+constexpr int kTries = 12;                      // grasps tried from it
+
+}  // namespace
+
+OpeningTask::OpeningTask(TaskCfg cfg, OpeningKind kind)
+    : Task(std::move(cfg)),
+      kind_(kind),
+      scene_(load_scene(this->cfg().scene.empty() ? kScene : std::string_view(this->cfg().scene))) {
+}
+
+SceneCfg OpeningTask::scene_cfg() const { return scene_.scene_cfg(robot_entity()); }
+
+void OpeningTask::bind(const std::shared_ptr<Simulation>& simulation) {
+  simulation_ = simulation;
+  scene_.bind(*simulation);
+}
+
+void OpeningTask::initialize_task() {
+  scene_.initialize(model(), num_worlds(), robot_entity() + "/");
+  articulations_ = find_articulations(model(), robot_entity() + "/");
+  if (articulations_.empty())
+    throw ValueError(fmt::format(
+        "task '{}': scene '{}' has nothing that opens: no hinge or slide with a range and a handle",
+        name(), scene_.cfg().name));
+  reach_ = std::make_unique<HandleReach>(model(), robot());
+  bases_ = std::make_unique<BaseSearch>(model(), robot(), *reach_);
+  targets_.assign(num_worlds(), {});
+  for (Target& target : targets_)
+    target.object = {std::string(kRole), articulations_[0].body, articulations_[0].text};
+}
+
+double OpeningTask::aim(const Articulation& one) const {
+  return kind_ == OpeningKind::kClose ? one.closed : one.at(one.slide ? kAimSlide : kAimHinge);
+}
+
+std::optional<Pose> OpeningTask::find_base(const Articulation& one, double from, const Pose& usual,
+                                           Rng& rng, const HandleReach::Start& start) const {
+  const double to = aim(one);
+  // Places are those of the middle of what episodes begin with.
+  const double middle =
+      kind_ == OpeningKind::kOpen ? one.closed : one.at(0.5 * (kLeastStart + kMostStart));
+  std::vector<Pose> places = bases_->places(start, one, middle, to, usual);
+  while (!places.empty()) {
+    const auto k = rng.below(static_cast<std::uint32_t>(places.size()));
+    const Pose place = places[k];
+    places.erase(places.begin() + k);
+    const Vec3 move{rng.uniform(-kSpread, kSpread), rng.uniform(-kSpread, kSpread), 0};
+    const double turn = rng.uniform(-kTurn, kTurn);
+    const Pose moved{place.p + move, normalized(axis_angle({0, 0, 1}, turn) * place.q)};
+    for (const Pose& base : {moved, place}) {
+      const HandleReach::Start there = bases_->placed(start, base);
+      if (reach_->stands_free(there) && reach_->find(there, one, from, to, kTries)) return base;
+    }
+  }
+  return {};
+}
+
+std::optional<Pose> OpeningTask::sample_scene(int world, Rng& rng, const StateRow& state) {
+  const auto episode = static_cast<std::uint64_t>(this->episode(world));
+  const std::shared_ptr<Simulation> simulation = simulation_.lock();
+  if (scene_.vary_look(world, cfg().seed, episode) && simulation)
+    simulation->worlds().model_changed();
+  const Pose usual = scene_.sample(world, -1, cfg().seed, episode, rng, state);
+  for (const Articulation& one : articulations_) state.qpos[one.qpos] = one.closed;
+
+  // Categories are equally likely, and so are the things of one. A target that cannot be reached
+  // leaves its place to the next.
+  std::vector<std::string> categories;
+  for (const Articulation& one : articulations_) {
+    if (std::ranges::find(categories, one.category) == categories.end())
+      categories.push_back(one.category);
+  }
+  std::vector<int> order;
+  std::vector<std::vector<int>> left(categories.size());
+  for (std::size_t i = 0; i < articulations_.size(); ++i) {
+    const auto c = std::ranges::find(categories, articulations_[i].category) - categories.begin();
+    left[c].push_back(static_cast<int>(i));
+  }
+  while (!left.empty()) {
+    const auto c = rng.below(static_cast<std::uint32_t>(left.size()));
+    const auto k = rng.below(static_cast<std::uint32_t>(left[c].size()));
+    order.push_back(left[c][k]);
+    left[c].erase(left[c].begin() + k);
+    if (left[c].empty()) left.erase(left.begin() + c);
+  }
+  Target& target = targets_[world];
+  target.reached = false;
+  std::optional<Pose> base;
+  for (int index : order) {
+    const Articulation& one = articulations_[index];
+    const double from =
+        kind_ == OpeningKind::kOpen ? one.closed : one.at(rng.uniform(kLeastStart, kMostStart));
+    base = find_base(one, from, usual, rng, reach_->start_of(state));
+    if (!base && index != order.back()) continue;
+    target.index = index;
+    target.reached = base.has_value();
+    target.object = {std::string(kRole), one.body, one.text};
+    state.qpos[one.qpos] = from;
+    state.qvel[one.dof] = 0;
+    break;
+  }
+  return base ? base : usual;
+}
+
+void OpeningTask::begin(const World& world) {
+  Task::begin(world);
+  Target& target = targets_[world.id];
+  const Articulation& one = articulations_[target.index];
+  target.start = {vec3(world.data->xpos + 3 * one.body), quat(world.data->xquat + 4 * one.body)};
+  const double wanted = kind_ == OpeningKind::kOpen ? one.at(kOpened) : one.at(1 - kClosed);
+  target.goal =
+      one.motion(world.data->qpos[one.qpos], wanted, vec3(world.data->xaxis + 3 * one.joint),
+                 vec3(world.data->xanchor + 3 * one.joint)) *
+      target.start;
+}
+
+std::string OpeningTask::start_fault(const World& world) const {
+  const std::string fault = scene_.fault(world);
+  if (!fault.empty()) return fault;
+  const Target& target = targets_[world.id];
+  if (target.reached) return "";
+  return fmt::format(
+      "task '{}': robot '{}' reaches no handle in scene '{}' from anywhere; last tried '{}'",
+      name(), robot().name(), scene_.cfg().name, articulations_[target.index].name);
+}
+
+double OpeningTask::reward(const World& world) const {
+  const Articulation& target = articulations_[targets_[world.id].index];
+  if (kind_ == OpeningKind::kClose) return 1 - target.fraction(world.data->qpos[target.qpos]);
+  double most = 0;
+  for (const Articulation& one : articulations_) {
+    if (one.category == target.category)
+      most = std::max(most, one.fraction(world.data->qpos[one.qpos]));
+  }
+  return most;
+}
+
+bool OpeningTask::succeeded(double reward) const {
+  return reward >= (kind_ == OpeningKind::kOpen ? kOpened : kClosed);
+}
+
+Evaluation OpeningTask::evaluate(const World& world) const {
+  const double reward = this->reward(world);
+  return judge(world.id, reward, succeeded(reward));
+}
+
+std::string OpeningTask::description(int world) const {
+  return fmt::format("{} the {}", kind_ == OpeningKind::kOpen ? "Open" : "Close",
+                     targets_[world].object.name);
+}
+
+Task::Referrals OpeningTask::referrals(int world) const {
+  return {{std::string(kRole), {{targets_[world].object.name, 1.0}}}};
+}
+
+Pose OpeningTask::start_pose(int world, std::string_view role) const {
+  if (role != kRole) {
+    const std::vector<std::string> roles{std::string(kRole)};
+    throw_unknown(fmt::format("task '{}'", name()), "role", role, roles);
+  }
+  return targets_[world].start;
+}
+
+std::optional<Pose> OpeningTask::goal_pose(int world, std::string_view role) const {
+  (void)start_pose(world, role);
+  return targets_[world].goal;
+}
+
+void OpeningTask::write_info(const World& world, JsonWriter& json) const {
+  const Articulation& target = articulations_[targets_[world.id].index];
+  const auto first = std::ranges::find(articulations_, target.category, &Articulation::category);
+  json.key("episode_step").value(episode_step(world.id));
+  json.key("joint_position").value(world.data->qpos[first->qpos]);
+  json.key("success").value(succeeded(reward(world)));
+}
+
+}  // namespace mjsense

@@ -1,0 +1,85 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+// Open or close something of a scene: a drawer, a door of a cabinet, a microwave, a fridge. Whatever
+// articulation.h finds in the model may be the target of an episode.
+
+#include <string>
+#include <vector>
+
+#include "mjsense/episode/task.h"
+#include "mjsense/scenes/episode_scene.h"
+#include "mjsense/tasks/opening/articulation.h"
+#include "mjsense/tasks/opening/base_search.h"
+#include "mjsense/tasks/opening/reach.h"
+
+namespace mjsense {
+
+enum class OpeningKind { kOpen, kClose };
+
+class OpeningTask final : public Task {
+ public:
+  static constexpr std::string_view kRole = "pickup_obj";
+  // Fractions of the range; success, and where a close begins.
+  static constexpr double kOpened = 0.15, kClosed = 0.85;
+  static constexpr double kLeastStart = 0.35, kMostStart = 0.65;
+
+  // In cfg.scene; by default in a kitchen.
+  OpeningTask(TaskCfg cfg, OpeningKind kind);
+  std::string_view name() const override { return type(); }
+  std::string_view type() const override { return kind_ == OpeningKind::kOpen ? "open" : "close"; }
+  SceneCfg scene_cfg() const override;
+  void bind(const std::shared_ptr<Simulation>& simulation) override;
+  // An object inside something, or a target that the robot reaches from nowhere.
+  std::string start_fault(const World& world) const override;
+
+  void begin(const World& world) override;
+  // Reward of open: the most of |q| / range over all things of the target's category; of close: 1 -
+  // |q| / range of the target. Success: it is at least 0.15, 0.85.
+  Evaluation evaluate(const World& world) const override;
+
+  std::span<const TaskObject> objects(int world) const override {
+    return {&targets_[world].object, 1};
+  }
+  std::string description(int world) const override;  // "Open the drawer"
+  Referrals referrals(int world) const override;
+  Pose start_pose(int world, std::string_view role) const override;
+  // The body where the joint is as far as counts.
+  std::optional<Pose> goal_pose(int world, std::string_view role) const override;
+  // episode_step, joint_position (rad or m, of the first thing of the category), success.
+  void write_info(const World& world, JsonWriter& json) const override;
+  std::vector<std::shared_ptr<Sensor>> create_task_sensors() const override;
+
+  // --- for planners
+  OpeningKind kind() const { return kind_; }
+  std::span<const Articulation> articulations() const { return articulations_; }
+  const Articulation& target(int world) const { return articulations_[targets_[world].index]; }
+  const HandleReach& reach() const { return *reach_; }
+  // Joint position that a planner brings the target to: well beyond what counts.
+  double aim(const Articulation& one) const;
+
+ protected:
+  void initialize_task() override;
+  std::optional<Pose> sample_scene(int world, Rng& rng, const StateRow& state) override;
+
+ private:
+  struct Target {
+    int index = 0;
+    bool reached = true;
+    TaskObject object;
+    Pose start, goal;
+  };
+  double reward(const World& world) const;
+  bool succeeded(double reward) const;
+  std::optional<Pose> find_base(const Articulation& one, double from, const Pose& usual, Rng& rng,
+                                const HandleReach::Start& start) const;
+
+  OpeningKind kind_;
+  EpisodeScene scene_;
+  std::weak_ptr<Simulation> simulation_;
+  std::vector<Articulation> articulations_;
+  std::unique_ptr<HandleReach> reach_;
+  std::unique_ptr<BaseSearch> bases_;
+  std::vector<Target> targets_;  // [B]
+};
+
+}  // namespace mjsense

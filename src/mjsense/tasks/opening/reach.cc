@@ -1,0 +1,248 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "mjsense/tasks/opening/reach.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <numbers>
+
+#include "mjsense/observe/frame.h"
+#include "mjsense/scene/resolve.h"
+
+namespace mjsense {
+namespace {
+
+constexpr std::array<double, 5> kTilts{0, 0.35, -0.35, 0.7, -0.7};  // rad, about the handle
+constexpr std::array<double, 3> kTurns{0, 0.4, -0.4};               // rad, across the handle
+constexpr std::array<double, 3> kPlaces{0, 0.45, -0.45};            // of its half length
+constexpr double kSideGap = 0.004;                                  // m, pads to the handle
+
+}  // namespace
+
+std::vector<ArmAndHand> arms_with_hands(const Robot& robot, const mjModel* model) {
+  std::vector<ArmAndHand> hands;
+  const auto groups = robot.groups();
+  for (int g = 0; g < static_cast<int>(groups.size()); ++g) {
+    if (groups[g].kind != GroupKind::kGripper || groups[g].leaf_site < 0) continue;
+    for (int a = 0; a < static_cast<int>(groups.size()); ++a) {
+      if (groups[a].kind != GroupKind::kArm || groups[a].leaf_site < 0) continue;
+      const bool same = groups[a].leaf_site == groups[g].leaf_site ||
+                        is_below(model, groups[g].root_body, groups[a].root_body);
+      if (!same) continue;
+      hands.push_back({a, g});
+      break;
+    }
+  }
+  return hands;
+}
+
+std::vector<HandleGrasp> propose_handle_grasps(const Handle& handle, const Pose& body,
+                                               double max_opening) {
+  std::vector<HandleGrasp> grasps;
+  const Vec3 along = rotate(body.q, handle.along), outward = rotate(body.q, handle.outward);
+  const Vec3 middle = body * handle.middle;
+  const bool knob = handle.half_along < 0.03;
+  for (int side = 0; side < (knob ? 2 : 1); ++side) {
+    // The fingers close across the bar; a knob may be taken both ways.
+    const Vec3 bar = side == 0 ? along : normalized(cross(along, outward));
+    const double across = side == 0 ? handle.half_across : handle.half_along;
+    if (2 * across + 2 * kSideGap > max_opening) continue;
+    for (double turn : kTurns) {
+      for (double tilt : kTilts) {
+        for (double place : kPlaces) {
+          if (knob && place != 0) continue;
+          Vec3 approach = rotate(axis_angle(bar, tilt), -outward);
+          const Vec3 close = normalized(cross(bar, approach));
+          approach = rotate(axis_angle(close, turn), approach);
+          for (int flip = -1; flip <= 1; flip += 2) {
+            const Vec3 y = static_cast<double>(flip) * close;
+            const Vec3 position = middle + (place * handle.half_along) * bar;
+            const double cost =
+                std::abs(tilt) + 1.2 * std::abs(turn) + 0.3 * std::abs(place) + 0.1 * side;
+            grasps.push_back(
+                {{position, quat_from_columns(cross(y, approach), y, approach)}, cost});
+          }
+        }
+      }
+    }
+  }
+  std::ranges::stable_sort(grasps, {}, &HandleGrasp::cost);
+  return grasps;
+}
+
+ScratchData::~ScratchData() {
+  for (mjData* data : free_) mj_deleteData(data);
+}
+
+mjData* ScratchData::take() {
+  {
+    const std::lock_guard lock(mutex_);
+    if (!free_.empty()) {
+      mjData* data = free_.back();
+      free_.pop_back();
+      return data;
+    }
+  }
+  return mj_makeData(model_);
+}
+
+void ScratchData::give(mjData* data) {
+  const std::lock_guard lock(mutex_);
+  free_.push_back(data);
+}
+
+HandleReach::HandleReach(const mjModel* model, const Robot& robot, HandleReachCfg cfg)
+    : model_(model),
+      robot_(robot),
+      cfg_(cfg),
+      hands_(arms_with_hands(robot, model)),
+      of_robot_(model->nbody, 0),
+      of_gripper_(model->nbody, -1),
+      scratch_(model) {
+  for (int b = 1; b < model->nbody; ++b) {
+    of_robot_[b] = name_of(model, mjOBJ_BODY, b).starts_with(robot.prefix());
+    // Links without a name belong to what carries them.
+    if (!of_robot_[b] && name_of(model, mjOBJ_BODY, b).empty())
+      of_robot_[b] = of_robot_[model->body_parentid[b]];
+    for (const ArmAndHand& hand : hands_) {
+      if (is_below(model, b, robot.groups()[hand.gripper].root_body)) of_gripper_[b] = hand.gripper;
+    }
+  }
+}
+
+HandleReach::Start HandleReach::start_of(const mjData* d) const {
+  return {{d->qpos, d->qpos + model_->nq},
+          {d->mocap_pos, d->mocap_pos + 3 * model_->nmocap},
+          {d->mocap_quat, d->mocap_quat + 4 * model_->nmocap}};
+}
+
+HandleReach::Start HandleReach::start_of(const StateRow& state) const {
+  Start start{{state.qpos, state.qpos + model_->nq}, {}, {}};
+  if (model_->nmocap > 0) {
+    start.mocap_pos.assign(state.mocap_pos, state.mocap_pos + 3 * model_->nmocap);
+    start.mocap_quat.assign(state.mocap_quat, state.mocap_quat + 4 * model_->nmocap);
+  }
+  return start;
+}
+
+void HandleReach::show(mjData* data, const RobotValues& values) const {
+  for (const ArmAndHand& hand : hands_) {
+    const auto& qpos = robot_.groups()[hand.arm].qpos;
+    for (std::size_t i = 0; i < qpos.size(); ++i) data->qpos[qpos[i]] = values[hand.arm].values[i];
+  }
+}
+
+// Nothing of the robot is inside something else; `hand` may touch what it holds.
+bool HandleReach::free(mjData* data, const Articulation* held, const ArmAndHand* hand) const {
+  mj_kinematics(model_, data);
+  mj_collision(model_, data);
+  for (int i = 0; i < data->ncon; ++i) {
+    const mjContact& contact = data->contact[i];
+    if (contact.exclude || contact.geom[0] < 0 || contact.geom[1] < 0) continue;
+    if (contact.dist > -cfg_.inside) continue;
+    int mine = model_->geom_bodyid[contact.geom[0]], other = model_->geom_bodyid[contact.geom[1]];
+    if (of_robot_[mine] == of_robot_[other]) continue;
+    if (!of_robot_[mine]) std::swap(mine, other);
+    if (held && of_gripper_[mine] == hand->gripper && is_below(model_, other, held->body)) continue;
+    return false;
+  }
+  return true;
+}
+
+bool HandleReach::stands_free(const Start& start) const {
+  mjData* data = scratch_.take();
+  std::ranges::copy(start.qpos, data->qpos);
+  std::ranges::copy(start.mocap_pos, data->mocap_pos);
+  std::ranges::copy(start.mocap_quat, data->mocap_quat);
+  const bool ok = free(data, nullptr, nullptr);
+  scratch_.give(data);
+  return ok;
+}
+
+Pose HandleReach::body_pose(const Start& start, const Articulation& one, double q) const {
+  mjData* data = scratch_.take();
+  std::ranges::copy(start.qpos, data->qpos);
+  std::ranges::copy(start.mocap_pos, data->mocap_pos);
+  std::ranges::copy(start.mocap_quat, data->mocap_quat);
+  data->qpos[one.qpos] = q;
+  mj_kinematics(model_, data);
+  const Pose pose{vec3(data->xpos + 3 * one.body), quat(data->xquat + 4 * one.body)};
+  scratch_.give(data);
+  return pose;
+}
+
+std::optional<HandleWay> HandleReach::find(const Start& start, const Articulation& one, double from,
+                                           double to, int most_tries) const {
+  mjData* data = scratch_.take();
+  const auto reset = [&](double q) {
+    std::ranges::copy(start.qpos, data->qpos);
+    std::ranges::copy(start.mocap_pos, data->mocap_pos);
+    std::ranges::copy(start.mocap_quat, data->mocap_quat);
+    data->qpos[one.qpos] = q;
+  };
+  std::optional<HandleWay> found;
+  reset(from);
+  mj_kinematics(model_, data);
+  const World world{.id = 0, .model = model_, .data = data};
+  RobotValues now;
+  robot_.read_qpos(world, now);
+  const Pose to_base = inverse(robot_.base_pose(world));
+  const Pose body{vec3(data->xpos + 3 * one.body), quat(data->xquat + 4 * one.body)};
+  const Vec3 axis = vec3(data->xaxis + 3 * one.joint), anchor = vec3(data->xanchor + 3 * one.joint);
+
+  for (const ArmAndHand& hand : hands_) {
+    if (found) break;
+    const double opening = robot_.groups()[hand.gripper].max_opening;
+    int tries = 0;
+    for (const HandleGrasp& grasp : propose_handle_grasps(one.handle, body, opening)) {
+      if (found || ++tries > most_tries) break;
+      HandleWay way;
+      way.hand = hand;
+      way.grasp = grasp.pose;
+      const Vec3 approach = rotate(grasp.pose.q, {0, 0, 1});
+      way.pregrasp = to_base * Pose{grasp.pose.p - cfg_.pregrasp * approach, grasp.pose.q};
+      RobotValues q = now;
+      if (!robot_.ik(hand.arm, way.pregrasp, q, 2 * Chain::kTracking)) continue;
+      const RobotValues before = q;
+      if (!robot_.ik(hand.arm, to_base * grasp.pose, q, Chain::kTracking)) continue;
+      way.at = q;
+      bool ok = true;
+      for (int k = 0; k < cfg_.points && ok; ++k) {
+        const double joint = std::lerp(from, to, static_cast<double>(k) / (cfg_.points - 1));
+        const Pose tool = to_base * one.motion(from, joint, axis, anchor) * grasp.pose;
+        ok = k == 0 || robot_.ik(hand.arm, tool, q, Chain::kTracking);
+        way.along.push_back(q);
+        way.tool.push_back(tool);
+      }
+      if (!ok) continue;
+      // It can reach all that; is it in nothing's way?
+      reset(from);
+      const auto is_free = [&](const RobotValues& values, bool holds) {
+        show(data, values);
+        return free(data, holds ? &one : nullptr, &hand);
+      };
+      ok = is_free(before, false) && is_free(way.at, true);
+      for (std::size_t k = 0; k < way.along.size() && ok; ++k) {
+        reset(std::lerp(from, to, static_cast<double>(k) / (cfg_.points - 1)));
+        ok = is_free(way.along[k], true);
+      }
+      reset(from);
+      const auto& joints = robot_.groups()[hand.arm].qpos;
+      for (int k = 1; k < cfg_.checks && ok; ++k) {
+        RobotValues between = now;
+        for (std::size_t i = 0; i < joints.size(); ++i)
+          between[hand.arm].values[i] =
+              std::lerp(now[hand.arm].values[i], before[hand.arm].values[i],
+                        static_cast<double>(k) / cfg_.checks);
+        ok = is_free(between, false);
+      }
+      if (!ok) continue;
+      way.go = {now, before};
+      found = std::move(way);
+    }
+  }
+  scratch_.give(data);
+  return found;
+}
+
+}  // namespace mjsense

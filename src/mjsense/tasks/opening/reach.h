@@ -1,0 +1,107 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+// How an arm takes a handle and moves it along: joint positions all the way, free of collisions, by
+// MuJoCo on data of its own. The task asks where a base can stand; the planner follows.
+
+#include <mujoco/mujoco.h>
+
+#include <memory>
+#include <mutex>
+#include <optional>
+#include <span>
+#include <vector>
+
+#include "mjsense/core/rng.h"
+#include "mjsense/robots/robot.h"
+#include "mjsense/tasks/opening/articulation.h"
+
+namespace mjsense {
+
+// An arm and its gripper: move groups of a robot.
+struct ArmAndHand {
+  int arm = -1, gripper = -1;
+};
+// Those whose gripper is an arm's leaf, in the robot's order.
+std::vector<ArmAndHand> arms_with_hands(const Robot& robot, const mjModel* model);
+
+// Where the tool takes a handle: z the approach, y the closing direction, the origin between the
+// finger tips.
+struct HandleGrasp {
+  Pose pose;  // X_WT
+  double cost = 0;
+};
+// By rising cost: straight on in the middle first, then from other sides and places. `body` is the
+// pose of the handle's body.
+std::vector<HandleGrasp> propose_handle_grasps(const Handle& handle, const Pose& body,
+                                               double max_opening);
+
+// One way to do it, of one arm.
+struct HandleWay {
+  ArmAndHand hand;
+  Pose grasp;                   // X_WT
+  std::vector<RobotValues> go;  // joint positions from the start to the pregrasp, at least two
+  RobotValues at;               // at the handle
+  // Along with the handle: joint positions, and the tool's poses in the base frame; the first is
+  // where the handle is now.
+  std::vector<RobotValues> along;
+  std::vector<Pose> tool;
+  Pose pregrasp;  // X_BT
+};
+
+struct HandleReachCfg {
+  double pregrasp = 0.04;  // m before the grasp, against the approach
+  int points = 11;         // of the arc, ends included
+  double inside = 0.001;   // m, the deepest contact that counts as none
+  int checks = 10;         // of the way to the pregrasp
+};
+
+// Data to try configurations in, handed out to one caller at a time; safe for any thread.
+class ScratchData {
+ public:
+  explicit ScratchData(const mjModel* model) : model_(model) {}
+  ~ScratchData();
+  ScratchData(const ScratchData&) = delete;
+  ScratchData& operator=(const ScratchData&) = delete;
+  mjData* take();
+  void give(mjData* data);
+
+ private:
+  const mjModel* model_;
+  std::mutex mutex_;
+  std::vector<mjData*> free_;
+};
+
+class HandleReach {
+ public:
+  HandleReach(const mjModel* model, const Robot& robot, HandleReachCfg cfg = {});
+
+  std::span<const ArmAndHand> hands() const { return hands_; }
+  // Positions and mocap poses of a world from which ways are sought.
+  struct Start {
+    std::vector<double> qpos, mocap_pos, mocap_quat;
+  };
+  Start start_of(const mjData* data) const;
+  Start start_of(const StateRow& state) const;
+  // The articulation goes from `from` to `to`, the robot standing as `start` says. Nothing: it
+  // cannot, or stands in something. At most `most_tries` grasps are tried an arm.
+  std::optional<HandleWay> find(const Start& start, const Articulation& one, double from, double to,
+                                int most_tries) const;
+  // X_WB of the articulation's body, its joint at `q`.
+  Pose body_pose(const Start& start, const Articulation& one, double q) const;
+  // Whether the robot at the start touches nothing.
+  bool stands_free(const Start& start) const;
+
+ private:
+  bool free(mjData* data, const Articulation* held, const ArmAndHand* hand) const;
+  void show(mjData* data, const RobotValues& values) const;
+
+  const mjModel* model_;
+  const Robot& robot_;
+  HandleReachCfg cfg_;
+  std::vector<ArmAndHand> hands_;
+  std::vector<char> of_robot_;   // [nbody]
+  std::vector<int> of_gripper_;  // [nbody] group, -1
+  mutable ScratchData scratch_;
+};
+
+}  // namespace mjsense
