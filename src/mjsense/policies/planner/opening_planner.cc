@@ -26,7 +26,21 @@ void OpeningPlanner::initialize_planner() {
         "policy 'planner' needs an arm with a gripper; robot '{}' has none", robot().name()));
 }
 
-void OpeningPlanner::make_plan(const World& world, const PlanRequest& /*request*/, Plan& plan) {
+// Lets go of whatever it has and draws the hands back, before it looks again.
+void OpeningPlanner::back_off(const World& world, Plan& plan) const {
+  for (const ArmAndHand& hand : opening_->reach().hands())
+    plan.wait(kOpenGripper, cfg_.close_time)
+        .grip(hand.gripper, robot().groups()[hand.gripper].open_command);
+  for (const ArmAndHand& hand : opening_->reach().hands()) {
+    const Pose from = robot().tcp_pose(world, hand.arm);
+    const Pose to = from * Pose{{0, 0, -cfg_.back}, {}};
+    plan.move_tool(kRetreat, hand.arm, from, to, cfg_.fast, cfg_.settle);
+  }
+  plan.more = true;
+}
+
+void OpeningPlanner::make_plan(const World& world, const PlanRequest& request, Plan& plan) {
+  if (request.attempt > 0 && request.stage == 0) return back_off(world, plan);
   const Articulation& one = opening_->target(world.id);
   const double from = world.data->qpos[one.qpos], to = opening_->aim(one);
   const auto way =
@@ -57,7 +71,7 @@ void OpeningPlanner::make_plan(const World& world, const PlanRequest& /*request*
   };
   const Pose at = inverse(robot().base_pose(world)) * way->grasp;
   plan.wait(kOpenGripper, 0).grip(hand, gripper.open_command);
-  plan.move_groups(kPregrasp, {path(way->go, cfg_.there, cfg_.fastest_joint)});
+  plan.move_groups(kPregrasp, {path(way->go, cfg_.there, cfg_.fastest_joint)}, cfg_.settle);
   plan.move_tool(kGrasp, arm, way->pregrasp, at, cfg_.slow, cfg_.settle);
   plan.move_tool(kCloseGripper, arm, at, at, cfg_.slow, cfg_.close_time)
       .grip(hand, gripper.closed_command);

@@ -13,6 +13,7 @@ struct OpeningPlannerCfg {
                                                   // handle, to the handle
   double fastest_joint = 0.8;                     // rad/s on the way there
   double settle = 0.1, close_time = 0.5;          // s
+  double back = 0.08;                             // m, before another attempt
   int grasps = 40;                                // tried before giving up
 };
 
@@ -28,6 +29,8 @@ class OpeningPlanner final : public TaskPlanner {
   int first_phase() const override;
 
  private:
+  void back_off(const World& world, Plan& plan) const;
+
   OpeningPlannerCfg cfg_;
   const OpeningTask* opening_ = nullptr;
 };

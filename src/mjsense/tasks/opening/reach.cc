@@ -92,13 +92,15 @@ void ScratchData::give(mjData* data) {
 }
 
 HandleReach::HandleReach(const mjModel* model, const Robot& robot, HandleReachCfg cfg)
-    : model_(model),
+    : own_(mj_copyModel(nullptr, model), mj_deleteModel),
+      model_(own_.get()),
       robot_(robot),
       cfg_(cfg),
       hands_(arms_with_hands(robot, model)),
       of_robot_(model->nbody, 0),
+      fixed_(model->nbody, 0),
       of_gripper_(model->nbody, -1),
-      scratch_(model) {
+      scratch_(own_.get()) {
   for (int b = 1; b < model->nbody; ++b) {
     of_robot_[b] = name_of(model, mjOBJ_BODY, b).starts_with(robot.prefix());
     // Links without a name belong to what carries them.
@@ -107,6 +109,16 @@ HandleReach::HandleReach(const mjModel* model, const Robot& robot, HandleReachCf
     for (const ArmAndHand& hand : hands_) {
       if (is_below(model, b, robot.groups()[hand.gripper].root_body)) of_gripper_[b] = hand.gripper;
     }
+  }
+  // MuJoCo looks for no contact between two bodies that do not move: a pedestal under a mocap body,
+  // a cupboard. In this model the robot's are said to move.
+  for (int b = 1; b < model->nbody; ++b) {
+    if (!of_robot_[b]) continue;
+    fixed_[b] = model->body_weldid[b] == 0 || b == robot.base_body();
+    if (model->body_weldid[b] == 0) own_->body_weldid[b] = b;
+  }
+  for (int g = 0; g < model->ngeom; ++g) {
+    if (of_robot_[model->geom_bodyid[g]]) own_->geom_margin[g] = cfg_.clearance;
   }
 }
 
@@ -132,17 +144,19 @@ void HandleReach::show(mjData* data, const RobotValues& values) const {
   }
 }
 
-// Nothing of the robot is inside something else; `hand` may touch what it holds.
-bool HandleReach::free(mjData* data, const Articulation* held, const ArmAndHand* hand) const {
+// Everything else is as far from the robot; `hand` may touch what it holds.
+bool HandleReach::free(mjData* data, double clearance, const Articulation* held,
+                       const ArmAndHand* hand) const {
   mj_kinematics(model_, data);
   mj_collision(model_, data);
   for (int i = 0; i < data->ncon; ++i) {
     const mjContact& contact = data->contact[i];
     if (contact.exclude || contact.geom[0] < 0 || contact.geom[1] < 0) continue;
-    if (contact.dist > -cfg_.inside) continue;
     int mine = model_->geom_bodyid[contact.geom[0]], other = model_->geom_bodyid[contact.geom[1]];
     if (of_robot_[mine] == of_robot_[other]) continue;
     if (!of_robot_[mine]) std::swap(mine, other);
+    // What it stands on touches its base.
+    if (contact.dist > (fixed_[mine] ? cfg_.contact : clearance)) continue;
     if (held && of_gripper_[mine] == hand->gripper && is_below(model_, other, held->body)) continue;
     return false;
   }
@@ -154,7 +168,7 @@ bool HandleReach::stands_free(const Start& start) const {
   std::ranges::copy(start.qpos, data->qpos);
   std::ranges::copy(start.mocap_pos, data->mocap_pos);
   std::ranges::copy(start.mocap_quat, data->mocap_quat);
-  const bool ok = free(data, nullptr, nullptr);
+  const bool ok = free(data, cfg_.clearance, nullptr, nullptr);
   scratch_.give(data);
   return ok;
 }
@@ -169,6 +183,25 @@ Pose HandleReach::body_pose(const Start& start, const Articulation& one, double 
   const Pose pose{vec3(data->xpos + 3 * one.body), quat(data->xquat + 4 * one.body)};
   scratch_.give(data);
   return pose;
+}
+
+// The arm goes straight from one configuration to the next; the first may be anywhere.
+bool HandleReach::way_is_free(mjData* data, int arm, std::span<const RobotValues> way) const {
+  const std::size_t n = robot_.groups()[arm].qpos.size();
+  for (std::size_t k = way.size() - 1; k > 0; --k) {  // the end is the likeliest to be barred
+    const auto &a = way[k - 1][arm].values, &b = way[k][arm].values;
+    double most = 0;
+    for (std::size_t i = 0; i < n; ++i) most = std::max(most, std::abs(b[i] - a[i]));
+    const int steps = std::max(2, static_cast<int>(std::ceil(most / cfg_.step)));
+    for (int s = steps; s > 0; --s) {
+      RobotValues between = way[k];
+      for (std::size_t i = 0; i < n; ++i)
+        between[arm].values[i] = std::lerp(a[i], b[i], static_cast<double>(s) / steps);
+      show(data, between);
+      if (!free(data, cfg_.clearance, nullptr, nullptr)) return false;
+    }
+  }
+  return true;
 }
 
 std::optional<HandleWay> HandleReach::find(const Start& start, const Articulation& one, double from,
@@ -201,11 +234,13 @@ std::optional<HandleWay> HandleReach::find(const Start& start, const Articulatio
       way.grasp = grasp.pose;
       const Vec3 approach = rotate(grasp.pose.q, {0, 0, 1});
       way.pregrasp = to_base * Pose{grasp.pose.p - cfg_.pregrasp * approach, grasp.pose.q};
+      // From the posture that arms begin with, so that a little noise on it changes nothing.
       RobotValues q = now;
+      q[hand.arm].set(robot_.cfg().groups[hand.arm].init);
+      if (q[hand.arm].size != now[hand.arm].size) q[hand.arm] = now[hand.arm];
       if (!robot_.ik(hand.arm, way.pregrasp, q, 2 * Chain::kTracking)) continue;
       const RobotValues before = q;
       if (!robot_.ik(hand.arm, to_base * grasp.pose, q, Chain::kTracking)) continue;
-      way.at = q;
       bool ok = true;
       for (int k = 0; k < cfg_.points && ok; ++k) {
         const double joint = std::lerp(from, to, static_cast<double>(k) / (cfg_.points - 1));
@@ -215,29 +250,24 @@ std::optional<HandleWay> HandleReach::find(const Start& start, const Articulatio
         way.tool.push_back(tool);
       }
       if (!ok) continue;
-      // It can reach all that; is it in nothing's way?
-      reset(from);
-      const auto is_free = [&](const RobotValues& values, bool holds) {
-        show(data, values);
-        return free(data, holds ? &one : nullptr, &hand);
-      };
-      ok = is_free(before, false) && is_free(way.at, true);
+      // It can reach all that; is anything in the way?
       for (std::size_t k = 0; k < way.along.size() && ok; ++k) {
         reset(std::lerp(from, to, static_cast<double>(k) / (cfg_.points - 1)));
-        ok = is_free(way.along[k], true);
-      }
-      reset(from);
-      const auto& joints = robot_.groups()[hand.arm].qpos;
-      for (int k = 1; k < cfg_.checks && ok; ++k) {
-        RobotValues between = now;
-        for (std::size_t i = 0; i < joints.size(); ++i)
-          between[hand.arm].values[i] =
-              std::lerp(now[hand.arm].values[i], before[hand.arm].values[i],
-                        static_cast<double>(k) / cfg_.checks);
-        ok = is_free(between, false);
+        show(data, way.along[k]);
+        ok = free(data, cfg_.contact, &one, &hand);
       }
       if (!ok) continue;
+      reset(from);
       way.go = {now, before};
+      ok = way_is_free(data, hand.arm, way.go);
+      for (std::size_t k = 0; k < cfg_.detours.size() && !ok; ++k) {
+        RobotValues by = before;
+        const Pose back = way.pregrasp * Pose{{0, 0, -cfg_.detours[k]}, {}};
+        if (!robot_.ik(hand.arm, back, by, Chain::kTracking)) continue;
+        way.go = {now, by, before};
+        ok = way_is_free(data, hand.arm, way.go);
+      }
+      if (!ok) continue;
       found = std::move(way);
     }
   }

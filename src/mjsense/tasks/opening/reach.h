@@ -5,6 +5,7 @@
 
 #include <mujoco/mujoco.h>
 
+#include <array>
 #include <memory>
 #include <mutex>
 #include <optional>
@@ -40,7 +41,6 @@ struct HandleWay {
   ArmAndHand hand;
   Pose grasp;                   // X_WT
   std::vector<RobotValues> go;  // joint positions from the start to the pregrasp, at least two
-  RobotValues at;               // at the handle
   // Along with the handle: joint positions, and the tool's poses in the base frame; the first is
   // where the handle is now.
   std::vector<RobotValues> along;
@@ -49,10 +49,13 @@ struct HandleWay {
 };
 
 struct HandleReachCfg {
-  double pregrasp = 0.04;  // m before the grasp, against the approach
-  int points = 11;         // of the arc, ends included
-  double inside = 0.001;   // m, the deepest contact that counts as none
-  int checks = 10;         // of the way to the pregrasp
+  double pregrasp = 0.04;    // m before the grasp, against the approach
+  int points = 11;           // of the arc, ends included
+  double clearance = 0.010;  // m, of the robot to everything on the way there
+  double contact = -0.001;   // m, what counts as touching while it has the handle
+  double step = 0.10;        // rad, of any joint between two checks of the way
+  // m before the pregrasp: by way of such points it goes where the straight way is barred.
+  std::array<double, 2> detours{0.12, 0.22};
 };
 
 // Data to try configurations in, handed out to one caller at a time; safe for any thread.
@@ -88,18 +91,21 @@ class HandleReach {
                                 int most_tries) const;
   // X_WB of the articulation's body, its joint at `q`.
   Pose body_pose(const Start& start, const Articulation& one, double q) const;
-  // Whether the robot at the start touches nothing.
+  // Whether the robot at the start is clear of everything.
   bool stands_free(const Start& start) const;
 
  private:
-  bool free(mjData* data, const Articulation* held, const ArmAndHand* hand) const;
+  bool free(mjData* data, double clearance, const Articulation* held, const ArmAndHand* hand) const;
   void show(mjData* data, const RobotValues& values) const;
+  bool way_is_free(mjData* data, int arm, std::span<const RobotValues> way) const;
 
-  const mjModel* model_;
+  std::shared_ptr<mjModel> own_;  // the model, with margins about the robot
+  const mjModel* model_;          // that
   const Robot& robot_;
   HandleReachCfg cfg_;
   std::vector<ArmAndHand> hands_;
   std::vector<char> of_robot_;   // [nbody]
+  std::vector<char> fixed_;      // [nbody] of the robot, and no joint below the base moves it
   std::vector<int> of_gripper_;  // [nbody] group, -1
   mutable ScratchData scratch_;
 };
