@@ -24,6 +24,7 @@ void OpeningPlanner::initialize_planner() {
   if (opening_->reach().hands().empty())
     throw ValueError(fmt::format(
         "policy 'planner' needs an arm with a gripper; robot '{}' has none", robot().name()));
+  ways_.assign(task().num_worlds(), {});
 }
 
 // Lets go of whatever it has and draws the hands back, before it looks again.
@@ -39,44 +40,53 @@ void OpeningPlanner::back_off(const World& world, Plan& plan) const {
   plan.more = true;
 }
 
+// Joint positions at times, the tool at `speed` between them.
+CommandPath OpeningPlanner::path(int arm, std::span<const RobotValues> points, double speed) const {
+  const std::size_t n = robot().groups()[arm].qpos.size();
+  CommandPath out{.group = arm};
+  double time = 0;
+  for (std::size_t k = 0; k < points.size(); ++k) {
+    if (k > 0) {
+      const Pose a = robot().fk(arm, points[k - 1]), b = robot().fk(arm, points[k]);
+      double most = 0;
+      for (std::size_t i = 0; i < n; ++i)
+        most = std::max(most, std::abs(points[k][arm].values[i] - points[k - 1][arm].values[i]));
+      time += std::max({norm(b.p - a.p) / speed, most / cfg_.fastest_joint, 1e-3});
+    }
+    out.times.push_back(time);
+    const auto& values = points[k][arm].values;
+    out.points.insert(out.points.end(), values.begin(), values.begin() + n);
+  }
+  return out;
+}
+
+// To the pregrasp; there it looks again where the handle is, takes it and goes along.
 void OpeningPlanner::make_plan(const World& world, const PlanRequest& request, Plan& plan) {
-  if (request.attempt > 0 && request.stage == 0) return back_off(world, plan);
+  const int first = request.attempt > 0 ? 1 : 0;  // stage
+  if (request.stage < first) return back_off(world, plan);
+  const HandleReach& reach = opening_->reach();
   const Articulation& one = opening_->target(world.id);
   const double from = world.data->qpos[one.qpos], to = opening_->aim(one);
-  const auto way =
-      opening_->reach().find(opening_->reach().start_of(world.data), one, from, to, cfg_.grasps);
-  if (!way) return;
-  const int arm = way->hand.arm, hand = way->hand.gripper;
+  HandleWay& way = ways_[world.id];
+  const auto start = reach.start_of(world.data);
+  auto found = request.stage == first ? reach.find(start, one, from, to, cfg_.grasps)
+                                      : reach.again(start, one, from, to, way);
+  if (!found) return;
+  way = *std::move(found);
+  plan.grasp = way.grasp;
+  const int arm = way.hand.arm, hand = way.hand.gripper;
   const MoveGroup& gripper = robot().groups()[hand];
-  const std::size_t n = robot().groups()[arm].qpos.size();
-  plan.grasp = way->grasp;
-
-  // Joint positions at times, the tool at `speed` between them.
-  const auto path = [&](std::span<const RobotValues> points, double speed, double turn) {
-    CommandPath out{.group = arm};
-    double time = 0;
-    for (std::size_t k = 0; k < points.size(); ++k) {
-      if (k > 0) {
-        const Pose a = robot().fk(arm, points[k - 1]), b = robot().fk(arm, points[k]);
-        double most = 0;
-        for (std::size_t i = 0; i < n; ++i)
-          most = std::max(most, std::abs(points[k][arm].values[i] - points[k - 1][arm].values[i]));
-        time += std::max({norm(b.p - a.p) / speed, most / turn, 1e-3});
-      }
-      out.times.push_back(time);
-      const auto values = points[k][arm].values;
-      out.points.insert(out.points.end(), values.begin(), values.begin() + n);
-    }
-    return out;
-  };
-  const Pose at = inverse(robot().base_pose(world)) * way->grasp;
-  plan.wait(kOpenGripper, 0).grip(hand, gripper.open_command);
-  plan.move_groups(kPregrasp, {path(way->go, cfg_.there, cfg_.fastest_joint)}, cfg_.settle);
-  plan.move_tool(kGrasp, arm, way->pregrasp, at, cfg_.slow, cfg_.settle);
+  if (request.stage == first) {
+    plan.wait(kOpenGripper, 0).grip(hand, gripper.open_command);
+    plan.move_groups(kPregrasp, {path(arm, way.go, cfg_.there)}, cfg_.settle);
+    plan.more = true;
+    return;
+  }
+  const Pose at = inverse(robot().base_pose(world)) * way.grasp;
+  plan.move_tool(kGrasp, arm, tool_target(world, arm), at, cfg_.slow, cfg_.settle);
   plan.move_tool(kCloseGripper, arm, at, at, cfg_.slow, cfg_.close_time)
       .grip(hand, gripper.closed_command);
-  plan.move_groups(kLift, {path(way->along, cfg_.fast, cfg_.fastest_joint)}, cfg_.settle)
-      .holds(hand);
+  plan.move_groups(kLift, {path(arm, way.along, cfg_.fast)}, cfg_.settle).holds(hand);
 }
 
 }  // namespace mjsense

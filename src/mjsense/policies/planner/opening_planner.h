@@ -29,10 +29,12 @@ class OpeningPlanner final : public TaskPlanner {
   int first_phase() const override;
 
  private:
+  CommandPath path(int arm, std::span<const RobotValues> points, double speed) const;
   void back_off(const World& world, Plan& plan) const;
 
   OpeningPlannerCfg cfg_;
   const OpeningTask* opening_ = nullptr;
+  std::vector<HandleWay> ways_;  // [B] what the arm is at
 };
 
 }  // namespace mjsense

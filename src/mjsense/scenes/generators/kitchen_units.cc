@@ -181,9 +181,9 @@ void write_oven_unit(RoomText& room, KitchenStyle& style, double y0, double wide
              {style.deep / 2 - 0.05, wide / 2 - 0.03, 0.003});
   room.open_body("oven_0", {0, y, 0});
   room.open_body("oven_0/door", {0, 0, low});
-  room.add(
-      fmt::format("<joint name=\"oven_0/hinge\" type=\"hinge\" axis=\"0 -1 0\" range=\"0 1.4\" "
-                  "damping=\"0.6\" frictionloss=\"3.5\" armature=\"0.02\"/>"));
+  room.add(fmt::format(
+      "<joint name=\"oven_0/hinge\" type=\"hinge\" axis=\"0 -1 0\" range=\"0 1.4\" "
+      "damping=\"0.6\" frictionloss=\"1.2\" stiffness=\"2\" springref=\"0\" armature=\"0.02\"/>"));
   const double high = panel - low - kGap;
   room.box("oven_0/leaf", "steel", {kPanel / 2, 0, high / 2},
            {kPanel / 2, wide / 2 - kGap / 2, high / 2}, "density=\"150\"");

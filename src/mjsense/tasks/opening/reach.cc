@@ -204,75 +204,111 @@ bool HandleReach::way_is_free(mjData* data, int arm, std::span<const RobotValues
   return true;
 }
 
+// What a start shows of the robot and of what it is to move.
+struct HandleReach::Seen {
+  RobotValues now;
+  Pose to_base;  // X_BW
+  Pose body;     // X_W of the handle's body
+  Vec3 axis, anchor;
+};
+
+HandleReach::Seen HandleReach::see(mjData* data, const Start& start, const Articulation& one,
+                                   double q) const {
+  set(data, start, one, q);
+  mj_kinematics(model_, data);
+  const World world{.id = 0, .model = model_, .data = data};
+  Seen seen;
+  robot_.read_qpos(world, seen.now);
+  seen.to_base = inverse(robot_.base_pose(world));
+  seen.body = {vec3(data->xpos + 3 * one.body), quat(data->xquat + 4 * one.body)};
+  seen.axis = vec3(data->xaxis + 3 * one.joint);
+  seen.anchor = vec3(data->xanchor + 3 * one.joint);
+  return seen;
+}
+
+void HandleReach::set(mjData* data, const Start& start, const Articulation& one, double q) const {
+  std::ranges::copy(start.qpos, data->qpos);
+  std::ranges::copy(start.mocap_pos, data->mocap_pos);
+  std::ranges::copy(start.mocap_quat, data->mocap_quat);
+  data->qpos[one.qpos] = q;
+}
+
+// The arm's positions while it has the handle, from `q` at the handle on.
+bool HandleReach::go_along(const Seen& seen, const Articulation& one, double from, double to,
+                           RobotValues q, HandleWay& way) const {
+  for (int k = 0; k < cfg_.points; ++k) {
+    const double joint = std::lerp(from, to, static_cast<double>(k) / (cfg_.points - 1));
+    const Pose tool = seen.to_base * one.motion(from, joint, seen.axis, seen.anchor) * way.grasp;
+    if (!robot_.ik(way.hand.arm, tool, q, Chain::kTracking)) return false;
+    way.along.push_back(q);
+  }
+  return true;
+}
+
+bool HandleReach::try_grasp(mjData* data, const Start& start, const Seen& seen,
+                            const Articulation& one, double from, double to, HandleWay& way) const {
+  const int arm = way.hand.arm;
+  way.pregrasp = seen.to_base * way.grasp * Pose{{0, 0, -cfg_.pregrasp}, {}};
+  // From the posture that arms begin with, so that a little noise on it changes nothing.
+  RobotValues before = seen.now;
+  before[arm].set(robot_.cfg().groups[arm].init);
+  if (before[arm].size != seen.now[arm].size) before[arm] = seen.now[arm];
+  if (!robot_.ik(arm, way.pregrasp, before, 2 * Chain::kTracking)) return false;
+  if (!go_along(seen, one, from, to, before, way)) return false;
+  // It can reach all that; is anything in the way?
+  for (std::size_t k = 0; k < way.along.size(); ++k) {
+    set(data, start, one, std::lerp(from, to, static_cast<double>(k) / (cfg_.points - 1)));
+    show(data, way.along[k]);
+    if (!free(data, cfg_.contact, &one, &way.hand)) return false;
+  }
+  set(data, start, one, from);
+  way.go = {seen.now, before};
+  bool ok = way_is_free(data, arm, way.go);
+  for (std::size_t k = 0; k < cfg_.detours.size() && !ok; ++k) {
+    RobotValues by = before;
+    const Pose back = way.pregrasp * Pose{{0, 0, -cfg_.detours[k]}, {}};
+    if (!robot_.ik(arm, back, by, Chain::kTracking)) continue;
+    way.go = {seen.now, by, before};
+    ok = way_is_free(data, arm, way.go);
+  }
+  return ok;
+}
+
 std::optional<HandleWay> HandleReach::find(const Start& start, const Articulation& one, double from,
                                            double to, int most_tries) const {
   mjData* data = scratch_.take();
-  const auto reset = [&](double q) {
-    std::ranges::copy(start.qpos, data->qpos);
-    std::ranges::copy(start.mocap_pos, data->mocap_pos);
-    std::ranges::copy(start.mocap_quat, data->mocap_quat);
-    data->qpos[one.qpos] = q;
-  };
+  const Seen seen = see(data, start, one, from);
   std::optional<HandleWay> found;
-  reset(from);
-  mj_kinematics(model_, data);
-  const World world{.id = 0, .model = model_, .data = data};
-  RobotValues now;
-  robot_.read_qpos(world, now);
-  const Pose to_base = inverse(robot_.base_pose(world));
-  const Pose body{vec3(data->xpos + 3 * one.body), quat(data->xquat + 4 * one.body)};
-  const Vec3 axis = vec3(data->xaxis + 3 * one.joint), anchor = vec3(data->xanchor + 3 * one.joint);
-
   for (const ArmAndHand& hand : hands_) {
-    if (found) break;
-    const double opening = robot_.groups()[hand.gripper].max_opening;
     int tries = 0;
-    for (const HandleGrasp& grasp : propose_handle_grasps(one.handle, body, opening)) {
+    const double opening = robot_.groups()[hand.gripper].max_opening;
+    for (const HandleGrasp& grasp : propose_handle_grasps(one.handle, seen.body, opening)) {
       if (found || ++tries > most_tries) break;
       HandleWay way;
       way.hand = hand;
       way.grasp = grasp.pose;
-      const Vec3 approach = rotate(grasp.pose.q, {0, 0, 1});
-      way.pregrasp = to_base * Pose{grasp.pose.p - cfg_.pregrasp * approach, grasp.pose.q};
-      // From the posture that arms begin with, so that a little noise on it changes nothing.
-      RobotValues q = now;
-      q[hand.arm].set(robot_.cfg().groups[hand.arm].init);
-      if (q[hand.arm].size != now[hand.arm].size) q[hand.arm] = now[hand.arm];
-      if (!robot_.ik(hand.arm, way.pregrasp, q, 2 * Chain::kTracking)) continue;
-      const RobotValues before = q;
-      if (!robot_.ik(hand.arm, to_base * grasp.pose, q, Chain::kTracking)) continue;
-      bool ok = true;
-      for (int k = 0; k < cfg_.points && ok; ++k) {
-        const double joint = std::lerp(from, to, static_cast<double>(k) / (cfg_.points - 1));
-        const Pose tool = to_base * one.motion(from, joint, axis, anchor) * grasp.pose;
-        ok = k == 0 || robot_.ik(hand.arm, tool, q, Chain::kTracking);
-        way.along.push_back(q);
-        way.tool.push_back(tool);
-      }
-      if (!ok) continue;
-      // It can reach all that; is anything in the way?
-      for (std::size_t k = 0; k < way.along.size() && ok; ++k) {
-        reset(std::lerp(from, to, static_cast<double>(k) / (cfg_.points - 1)));
-        show(data, way.along[k]);
-        ok = free(data, cfg_.contact, &one, &hand);
-      }
-      if (!ok) continue;
-      reset(from);
-      way.go = {now, before};
-      ok = way_is_free(data, hand.arm, way.go);
-      for (std::size_t k = 0; k < cfg_.detours.size() && !ok; ++k) {
-        RobotValues by = before;
-        const Pose back = way.pregrasp * Pose{{0, 0, -cfg_.detours[k]}, {}};
-        if (!robot_.ik(hand.arm, back, by, Chain::kTracking)) continue;
-        way.go = {now, by, before};
-        ok = way_is_free(data, hand.arm, way.go);
-      }
-      if (!ok) continue;
-      found = std::move(way);
+      way.on_body = inverse(seen.body) * grasp.pose;
+      if (try_grasp(data, start, seen, one, from, to, way)) found = std::move(way);
     }
   }
   scratch_.give(data);
   return found;
+}
+
+std::optional<HandleWay> HandleReach::again(const Start& start, const Articulation& one,
+                                            double from, double to, const HandleWay& before) const {
+  mjData* data = scratch_.take();
+  const Seen seen = see(data, start, one, from);
+  scratch_.give(data);
+  HandleWay way;
+  way.hand = before.hand;
+  way.on_body = before.on_body;
+  way.grasp = seen.body * before.on_body;
+  way.pregrasp = seen.to_base * way.grasp * Pose{{0, 0, -cfg_.pregrasp}, {}};
+  RobotValues q = seen.now;
+  if (!robot_.ik(way.hand.arm, way.pregrasp, q, Chain::kTracking)) return {};
+  if (!go_along(seen, one, from, to, q, way)) return {};
+  return way;
 }
 
 }  // namespace mjsense

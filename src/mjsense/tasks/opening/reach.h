@@ -39,13 +39,11 @@ std::vector<HandleGrasp> propose_handle_grasps(const Handle& handle, const Pose&
 // One way to do it, of one arm.
 struct HandleWay {
   ArmAndHand hand;
-  Pose grasp;                   // X_WT
-  std::vector<RobotValues> go;  // joint positions from the start to the pregrasp, at least two
-  // Along with the handle: joint positions, and the tool's poses in the base frame; the first is
-  // where the handle is now.
-  std::vector<RobotValues> along;
-  std::vector<Pose> tool;
-  Pose pregrasp;  // X_BT
+  Pose grasp;                      // X_WT
+  Pose on_body;                    // the same in the frame of the handle's body
+  std::vector<RobotValues> go;     // joint positions from the start to the pregrasp, at least two
+  std::vector<RobotValues> along;  // with the handle; the first is where it is now
+  Pose pregrasp;                   // X_BT
 };
 
 struct HandleReachCfg {
@@ -89,12 +87,22 @@ class HandleReach {
   // cannot, or stands in something. At most `most_tries` grasps are tried an arm.
   std::optional<HandleWay> find(const Start& start, const Articulation& one, double from, double to,
                                 int most_tries) const;
+  // The rest of a way for an arm that has gone to its pregrasp, the handle being where it is now.
+  std::optional<HandleWay> again(const Start& start, const Articulation& one, double from,
+                                 double to, const HandleWay& before) const;
   // X_WB of the articulation's body, its joint at `q`.
   Pose body_pose(const Start& start, const Articulation& one, double q) const;
   // Whether the robot at the start is clear of everything.
   bool stands_free(const Start& start) const;
 
  private:
+  struct Seen;
+  Seen see(mjData* data, const Start& start, const Articulation& one, double q) const;
+  void set(mjData* data, const Start& start, const Articulation& one, double q) const;
+  bool go_along(const Seen& seen, const Articulation& one, double from, double to, RobotValues q,
+                HandleWay& way) const;
+  bool try_grasp(mjData* data, const Start& start, const Seen& seen, const Articulation& one,
+                 double from, double to, HandleWay& way) const;
   bool free(mjData* data, double clearance, const Articulation* held, const ArmAndHand* hand) const;
   void show(mjData* data, const RobotValues& values) const;
   bool way_is_free(mjData* data, int arm, std::span<const RobotValues> way) const;
