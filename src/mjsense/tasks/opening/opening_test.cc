@@ -1,0 +1,288 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "mjsense/tasks/opening/opening.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <cstring>
+#include <fstream>
+#include <map>
+#include <nlohmann/json.hpp>
+#include <numbers>
+#include <set>
+
+#include "mjsense/core/error.h"
+#include "mjsense/core/testing/temp_dir.h"
+#include "mjsense/robots/load_robot.h"
+#include "mjsense/scene/resolve.h"
+
+namespace mjsense {
+namespace {
+
+using std::numbers::pi;
+using ::testing::HasSubstr;
+
+struct DataDelete {
+  void operator()(mjData* data) const { mj_deleteData(data); }
+};
+
+TaskCfg franka(const std::string& scene = "") {
+  TaskCfg cfg;
+  cfg.robot = robot_cfg("franka");
+  cfg.scene = scene;
+  return cfg;
+}
+
+struct Stage {
+  Stage(TaskCfg cfg, OpeningKind kind, int worlds = 3)
+      : task(std::move(cfg), kind), scene(task.whole_scene_cfg()), model(scene.model()) {
+    task.initialize(model, worlds);
+    data.reset(mj_makeData(model));
+  }
+  World start(int world, std::int64_t episode) {
+    mj_resetData(model, data.get());
+    task.sample(world, episode, state_row(data.get()));
+    mj_forward(model, data.get());
+    const World w{.id = world, .model = model, .data = data.get()};
+    task.begin(w);
+    return w;
+  }
+  nlohmann::json info(const World& w) {
+    std::vector<std::uint8_t> row(500);
+    JsonWriter json(row);
+    json.begin_object();
+    task.write_info(w, json);
+    json.end_object();
+    EXPECT_TRUE(json.finish());
+    return nlohmann::json::parse(reinterpret_cast<const char*>(row.data()));
+  }
+  OpeningTask task;
+  Scene scene;
+  const mjModel* model;
+  std::unique_ptr<mjData, DataDelete> data;
+};
+
+using ModelPtr = std::shared_ptr<mjModel>;
+ModelPtr compiled(const std::string& bodies) {
+  const std::string xml = "<mujoco><worldbody>" + bodies + "</worldbody></mujoco>";
+  char error[500] = "";
+  mjSpec* spec = mj_parseXMLString(xml.c_str(), nullptr, error, sizeof error);
+  EXPECT_NE(spec, nullptr) << error;
+  ModelPtr model(mj_compile(spec, nullptr), mj_deleteModel);
+  EXPECT_NE(model, nullptr) << mjs_getError(spec);
+  mj_deleteSpec(spec);
+  return model;
+}
+
+// A front of 0.4 x 0.2 m at x = 0 that looks to -x, with a bar 5 cm before it.
+std::string box_with_bar(const std::string& name, const std::string& joint,
+                         const std::string& more = "") {
+  return "<body name='" + name + "' pos='1 0 0.5'>" + joint +
+         "<geom type='box' size='.01 .2 .1'/>"
+         "<geom type='capsule' fromto='-.05 -.07 .02 -.05 .07 .02' size='.008'/>" +
+         more + "</body>";
+}
+
+TEST(Articulations, ABarBeforeTheFrontIsTheHandle) {
+  const ModelPtr m = compiled(
+      box_with_bar("drawer", "<joint type='slide' axis='-1 0 0' range='0 .3' limited='true'/>"));
+  const auto found = find_articulations(m.get(), "");
+  ASSERT_EQ(found.size(), 1u);
+  const Articulation& one = found[0];
+  EXPECT_TRUE(one.slide);
+  EXPECT_EQ(one.category, "drawer");
+  EXPECT_EQ(one.handle.geom, 1);
+  EXPECT_NEAR(norm(one.handle.middle - Vec3{-.05, 0, .02}), 0, 1e-6);
+  EXPECT_NEAR(std::abs(one.handle.along.y), 1, 1e-6);
+  EXPECT_NEAR(one.handle.outward.x, -1, 1e-9);
+  EXPECT_NEAR(one.handle.half_across, .008, 1e-4);
+  EXPECT_NEAR(one.handle.half_along, .078, 1e-3);
+}
+
+TEST(Articulations, WhatDoesNotOpenIsNone) {
+  const std::string slide = "<joint type='slide' axis='-1 0 0' range='0 .3' limited='true'/>";
+  const struct {
+    const char* why;
+    std::string body;
+  } cases[] = {
+      {"no range", box_with_bar("a", "<joint type='slide' axis='-1 0 0'/>")},
+      {"a button",
+       box_with_bar("b", "<joint type='slide' axis='1 0 0' range='0 .02' limited='true'/>")},
+      {"a knob: it turns about its handle",
+       box_with_bar(
+           "c", "<joint type='hinge' axis='1 0 0' pos='0 0 .02' range='0 90' limited='true'/>")},
+      {"no handle", "<body name='d'>" + slide + "<geom type='box' size='.1 .1 .1'/></body>"},
+      {"two joints: no door", box_with_bar("e", slide + "<joint type='hinge' axis='0 0 1'/>")},
+  };
+  for (const auto& c : cases)
+    EXPECT_TRUE(find_articulations(compiled(c.body).get(), "").empty()) << c.why;
+  EXPECT_TRUE(find_articulations(compiled(box_with_bar("robot/x", slide)).get(), "robot/").empty());
+}
+
+TEST(Articulations, NamesSayWhatItIs) {
+  const std::string hinge =
+      "<joint type='hinge' axis='0 0 1' pos='0 .2 0' range='-100 0' limited='true'/>";
+  const std::string aside = "<joint type='slide' axis='0 1 0' range='0 .3' limited='true'/>";
+  const std::string out = "<joint type='slide' axis='1 0 0' range='-.3 .01' limited='true'/>";
+  const std::map<std::string, std::string> expected{
+      {box_with_bar("Microwave_Door", hinge), "microwave"},
+      {box_with_bar("room/fridge_0/door", hinge), "fridge"},
+      {box_with_bar("cabinet_top", out), "drawer"},
+      {box_with_bar("cabinet_sliding", aside), "cabinet"},
+      {box_with_bar("thing", hinge), "door"}};
+  for (const auto& [body, category] : expected) {
+    const auto found = find_articulations(compiled(body).get(), "");
+    ASSERT_EQ(found.size(), 1u) << body;
+    EXPECT_EQ(found[0].category, category);
+  }
+  // A range about 0 from below: closed at its end near 0, open at the other.
+  const auto found = find_articulations(compiled(box_with_bar("cabinet_top", out)).get(), "");
+  EXPECT_EQ(found[0].closed, 0);
+  EXPECT_EQ(found[0].open, -.3);
+  EXPECT_NEAR(found[0].at(0.5), -.155, 1e-12);
+  EXPECT_NEAR(found[0].fraction(-.155), 0.5, 1e-12);
+}
+
+TEST(Articulations, MotionIsThatOfMuJoCo) {
+  for (const char* joint :
+       {"<joint type='hinge' axis='.2 .1 1' pos='0 .2 0' range='-100 0' limited='true'/>",
+        "<joint type='slide' axis='-1 .3 0' range='0 .3' limited='true'/>"}) {
+    const ModelPtr m =
+        compiled("<body pos='.3 .1 0' euler='0 20 40'>" + box_with_bar("x", joint) + "</body>");
+    const auto found = find_articulations(m.get(), "");
+    ASSERT_EQ(found.size(), 1u);
+    const Articulation& one = found[0];
+    const std::unique_ptr<mjData, DataDelete> d(mj_makeData(m.get()));
+    const auto pose = [&](double q) {
+      d->qpos[one.qpos] = q;
+      mj_kinematics(m.get(), d.get());
+      return Pose{vec3(d->xpos + 3 * one.body), quat(d->xquat + 4 * one.body)};
+    };
+    const Pose before = pose(0.1);
+    const Vec3 axis = vec3(d->xaxis + 3 * one.joint), anchor = vec3(d->xanchor + 3 * one.joint);
+    const Pose moved = one.motion(0.1, -0.4, axis, anchor) * before, truth = pose(-0.4);
+    EXPECT_NEAR(norm(moved.p - truth.p), 0, 1e-12);
+    EXPECT_NEAR(angle_between(moved.q, truth.q), 0, 1e-7);
+  }
+}
+
+TEST(Opening, AKitchenHasWhatKitchensHave) {
+  for (const char* scene : {"kitchen", "kitchen:1", "kitchen:2"}) {
+    const Stage stage(franka(scene), OpeningKind::kOpen);
+    std::map<std::string, int> count;
+    for (const Articulation& one : stage.task.articulations()) {
+      ++count[one.category];
+      EXPECT_THAT(name_of(stage.model, mjOBJ_GEOM, one.handle.geom), HasSubstr("/handle"));
+    }
+    EXPECT_GE(count["drawer"], 5) << scene;
+    EXPECT_GE(count["cabinet"], 6) << scene;
+    for (const char* one : {"fridge", "freezer", "oven", "microwave"})
+      EXPECT_EQ(count[one], 1) << scene << one;
+  }
+}
+
+TEST(Opening, AnEpisodeDependsOnItsNumberAlone) {
+  Stage stage(franka(), OpeningKind::kClose), other(franka(), OpeningKind::kClose, 1);
+  stage.start(0, 5);
+  std::vector<double> qpos(stage.data->qpos, stage.data->qpos + stage.model->nq);
+  const std::string what = stage.task.description(0);
+  stage.start(2, 6);
+  EXPECT_NE(qpos, std::vector<double>(stage.data->qpos, stage.data->qpos + stage.model->nq));
+  stage.start(2, 5);
+  EXPECT_EQ(qpos, std::vector<double>(stage.data->qpos, stage.data->qpos + stage.model->nq));
+  other.start(0, 5);  // its first: nothing was found before
+  EXPECT_EQ(qpos, std::vector<double>(other.data->qpos, other.data->qpos + other.model->nq));
+  EXPECT_EQ(what, stage.task.description(2));
+}
+
+TEST(Opening, StartsCanBePlayedAndDiffer) {
+  Stage stage(franka(), OpeningKind::kOpen);
+  std::set<std::string> texts;
+  std::set<double> places;
+  for (int episode = 0; episode < 20; ++episode) {
+    const World w = stage.start(0, episode);
+    EXPECT_EQ(stage.task.start_fault(w), "");
+    for (int i = 0; i < stage.data->ncon; ++i)
+      EXPECT_GT(stage.data->contact[i].dist, -0.002) << episode;
+    const Evaluation e = stage.task.evaluate(w);
+    EXPECT_EQ(e.reward, 0);
+    EXPECT_FALSE(e.success);
+    texts.insert(stage.task.description(0));
+    places.insert(stage.task.robot().base_pose(w).p.y);
+  }
+  EXPECT_GE(texts.size(), 4u);
+  EXPECT_EQ(places.size(), 20u);
+}
+
+// Open: the most of all things of the category, whichever it is; 0.15 of the range is enough.
+TEST(Opening, OpenCountsEveryThingOfTheKind) {
+  Stage stage(franka(), OpeningKind::kOpen);
+  const World w = stage.start(1, 3);
+  const Articulation& target = stage.task.target(1);
+  for (const Articulation& one : stage.task.articulations()) {
+    stage.data->qpos[one.qpos] = one.at(0.149);
+    const bool counts = one.category == target.category;
+    EXPECT_NEAR(stage.task.evaluate(w).reward, counts ? 0.149 : 0, 1e-12) << one.name;
+    EXPECT_FALSE(stage.task.evaluate(w).success);
+    stage.data->qpos[one.qpos] = one.at(0.1501);
+    EXPECT_EQ(stage.task.evaluate(w).success, counts) << one.name;
+    EXPECT_EQ(stage.info(w)["success"], counts);
+    stage.data->qpos[one.qpos] = one.closed;
+  }
+  stage.data->qpos[target.qpos] = -0.02 * target.range();  // beyond its end: |q|
+  EXPECT_NEAR(stage.task.evaluate(w).reward, 0.02, 1e-12);
+}
+
+TEST(Opening, CloseCountsTheTargetAlone) {
+  Stage stage(franka(), OpeningKind::kClose);
+  for (int episode = 0; episode < 4; ++episode) {
+    const World w = stage.start(1, episode);
+    const Articulation& target = stage.task.target(1);
+    const Evaluation e = stage.task.evaluate(w);
+    EXPECT_GE(e.reward, 0.35);
+    EXPECT_LE(e.reward, 0.65);
+    for (const Articulation& one : stage.task.articulations()) {
+      if (one.joint != target.joint) stage.data->qpos[one.qpos] = one.open;
+    }
+    EXPECT_EQ(stage.task.evaluate(w).reward, e.reward);
+    stage.data->qpos[target.qpos] = target.at(0.149);
+    EXPECT_NEAR(stage.task.evaluate(w).reward, 0.851, 1e-12);
+    EXPECT_TRUE(stage.task.evaluate(w).success);
+    stage.data->qpos[target.qpos] = target.at(0.151);
+    EXPECT_FALSE(stage.task.evaluate(w).success);
+    EXPECT_THAT(stage.task.description(1), HasSubstr("Close the " + target.text));
+    // Where it counts as closed is where obj_end says.
+    stage.data->qpos[target.qpos] = target.at(0.15);
+    mj_kinematics(stage.model, stage.data.get());
+    const Pose goal = *stage.task.goal_pose(1, "pickup_obj");
+    EXPECT_NEAR(norm(goal.p - vec3(stage.data->xpos + 3 * target.body)), 0, 1e-9);
+    EXPECT_NEAR(angle_between(goal.q, quat(stage.data->xquat + 4 * target.body)), 0, 1e-7);
+    const auto first =
+        std::ranges::find(stage.task.articulations(), target.category, &Articulation::category);
+    EXPECT_EQ(stage.info(w)["joint_position"], stage.data->qpos[first->qpos]);
+  }
+}
+
+TEST(Opening, ARobotDoesNotStandInACupboard) {
+  Stage stage(franka(), OpeningKind::kOpen);
+  const BaseSearch search(stage.model, stage.task.robot(), stage.task.reach());
+  stage.start(0, 0);
+  const auto start = stage.task.reach().start_of(stage.data.get());
+  EXPECT_TRUE(stage.task.reach().stands_free(start));
+  const auto at = [&](double x) { return search.placed(start, {{x, 0, 0}, {}}); };
+  EXPECT_FALSE(stage.task.reach().stands_free(at(0.1)));  // the pedestal in the fronts
+  EXPECT_TRUE(stage.task.reach().stands_free(at(-0.9)));
+}
+
+TEST(Opening, ErrorsSayWhatIsMissing) {
+  try {
+    Stage stage(franka("table"), OpeningKind::kOpen);
+    FAIL() << "a table has nothing that opens";
+  } catch (const ValueError& e) {
+    EXPECT_THAT(e.what(), HasSubstr("task 'open': scene 'table' has nothing that opens"));
+  }
+}
+
+}  // namespace
+}  // namespace mjsense
