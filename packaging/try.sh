@@ -2,6 +2,7 @@
 # Installs a wheel into fresh venvs and uses it as a newcomer does, without ffmpeg in PATH. usage: packaging/try.sh WHEEL [PYTHON ...]
 set -euo pipefail
 wheel=$(realpath "$1")
+newcomer=$(realpath "$(dirname "${BASH_SOURCE[0]}")/newcomer.sh")
 shift
 [ $# -gt 0 ] || set -- python3
 work=$(mktemp -d)
@@ -10,13 +11,6 @@ for python in "$@"; do
   echo "== $("$python" --version)"
   venv=$work/$(basename "$python")
   "$python" -m venv "$venv"
-  "$venv/bin/python" -m pip install -q --disable-pip-version-check "mjsense[video] @ file://$wheel"
-  (
-    cd "$work"
-    export PATH=$venv/bin  # no ffmpeg but that of imageio-ffmpeg
-    time python -c 'import mjsense'
-    mjsense --version
-    mjsense record pick --episodes 2 --worlds 2 --size 64x48 --out "$venv/data" --quiet
-    mjsense verify --decode "$venv/data"
-  )
+  "$venv/bin/python" -m pip install -q --disable-pip-version-check "mjsense[video] @ file://$wheel" h5py
+  "$newcomer" "$venv"
 done

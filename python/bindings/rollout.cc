@@ -333,6 +333,7 @@ void bind_rollout(nb::module_& m) {
           "description", [](PyRollout& s, int w) { return s.rollout().task().description(w); },
           nb::arg("world"))
       .def_prop_ro("fps", [](PyRollout& s) { return s.rollout().task().fps(); })
+      .def_prop_ro("horizon", [](PyRollout& s) { return s.rollout().task().cfg().horizon; })
       .def("simulation", &PyRollout::simulation);
 }
 

@@ -9,7 +9,7 @@ from mjsense import _core
 
 _libmujoco.check(_core)
 
-from mjsense import configs, effects, observations
+from mjsense import _gymnasium, configs, effects, observations
 from mjsense._core import SensorSpec, embedded_models, robot_names
 from mjsense._core import __version__ as __version__  # pyright: ignore[reportAttributeAccessIssue]  # stubs leave it out
 from mjsense.configs import *  # noqa: F403
@@ -45,6 +45,8 @@ from mjsense.simulation import Simulation
 from mjsense.suite import SensorSuite
 from mjsense.task import Task, WorldState, register_task, task_names
 from mjsense.vector import TaskVectorEnv, make_vec
+
+_gymnasium.register_all()
 
 # fmt: off
 __all__ = [

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 import mujoco
 import numpy as np
 
-from mjsense import _core
+from mjsense import _core, _gymnasium
 from mjsense._arguments import checked
 from mjsense.errors import UnknownNameError
 
@@ -378,6 +378,7 @@ def register_task(name: str, make: Callable[[], Task]) -> None:
     if not name or not callable(make):
         raise TypeError(f"register_task: {name!r} must be a name and {make!r} a class or a function")
     _TASKS[name] = make
+    _gymnasium.register(name)
 
 
 def task_names() -> list[str]:

@@ -71,6 +71,8 @@ class TaskVectorEnv(VectorEnv):
         self._paths = {name: stream_path(streams[name][0], name) for name in names}
         self.sim: Simulation = self._rollout.simulation()
         """The worlds. Read them as you like; the task writes them."""
+        self.horizon: int = self._rollout.horizon
+        """Control steps after which an episode is truncated."""
         self._next_episode = 0
         self._ended = np.zeros(self.num_envs, bool)
         self._started = False

@@ -238,7 +238,7 @@ def test_a_scene_of_ones_own():
 
 @pytest.mark.skipif(not HAS_TORCH, reason="no torch")
 def test_tensors_share_memory():
-    import torch  # pyright: ignore[reportMissingImports]
+    import torch
 
     scene = Scene(SceneCfg(num_envs=2, entities={"box": EntityCfg(spec_fn=box)}, sensors=(
         ml.BuiltinSensorCfg("place", "framepos", ml.ObjRef("body", "box", "box")),)))  # fmt: skip

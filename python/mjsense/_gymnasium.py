@@ -1,0 +1,32 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Tasks in gymnasium's registry: ``gymnasium.make("mjsense/Pick-Franka-v0")`` once mjsense is imported."""
+
+from __future__ import annotations
+
+import re
+
+import gymnasium
+
+from mjsense import _core
+
+
+def env_id(task: str, robot: str | None = None) -> str:
+    """``mjsense/PickAndPlace-Franka-v0``; without a robot ``mjsense/PickAndPlace-v0``, with the task's own."""
+    words = ["".join(part.capitalize() for part in name.split("_")) for name in (task, robot) if name]
+    return f"mjsense/{'-'.join(words)}-v0"
+
+
+def register(task: str, robot: str | None = None) -> None:
+    """Registers a task, if gymnasium can have its name and has not got it; its options are those of :func:`mjsense.make` and :func:`mjsense.make_vec`."""
+    if not re.fullmatch(r"\w+", task) or env_id(task, robot) in gymnasium.registry:
+        return  # a name that gymnasium has no place for
+    kwargs = {"task": task} if robot is None else {"task": task, "robot": robot}
+    gymnasium.register(
+        env_id(task, robot), entry_point="mjsense.env:make", vector_entry_point="mjsense.vector:make_vec", kwargs=kwargs, order_enforce=False)
+
+
+def register_all() -> None:
+    """Every task, with its own robot and with each that there is. Whether the two go together is found when they are made."""
+    for task in _core.task_names():
+        for robot in (None, *_core.robot_names()):
+            register(task, robot)

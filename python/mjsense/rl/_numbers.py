@@ -1,0 +1,88 @@
+# SPDX-License-Identifier: Apache-2.0
+"""What trainers share: observations as one row of numbers a world, actions around a middle."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+import gymnasium
+import numpy as np
+from gymnasium.vector import AutoresetMode
+
+from mjsense._streams import choose_streams
+from mjsense.vector import TaskVectorEnv
+
+
+def checked_env(env: Any, who: str) -> TaskVectorEnv:
+    """TypeError or ValueError unless it is an environment that begins the next episode in the step that ends one."""
+    if not isinstance(env, TaskVectorEnv):
+        raise TypeError(f"{who}: env must be what mjsense.make_vec() returns, not {env!r}")
+    if env.autoreset_mode != AutoresetMode.SAME_STEP:
+        raise ValueError(f"{who}: autoreset_mode is '{env.autoreset_mode.name.lower()}': make_vec(..., autoreset_mode='same_step') is needed")
+    return env
+
+
+class Numbers:
+    """Streams of numbers, each world's joined to one row: float32 ``[B, n]``."""
+
+    def __init__(self, env: TaskVectorEnv, observations: Sequence[str] | None = None) -> None:
+        self._paths = env._paths
+        streams = {name: (env._paths[name][0], env.specs[name], rows) for name, rows in env.rows.items()}
+        chosen = list(streams) if observations is None else choose_streams(observations, streams)
+        self.names = [name for name in chosen if not is_image(env.rows[name])]
+        """The streams, in the order of the columns."""
+        self.images = [name for name in chosen if is_image(env.rows[name])]
+        """Streams that are pictures, no numbers."""
+        self.columns: dict[str, slice] = {}
+        """Where each stream is."""
+        at = 0
+        for name in self.names:
+            width = int(np.prod(env.rows[name].shape[1:], dtype=int))
+            self.columns[name] = slice(at, at + width)
+            at += width
+        self.size = at
+        """n."""
+
+    def box(self) -> gymnasium.spaces.Box:
+        """The space of one world's row."""
+        return gymnasium.spaces.Box(-np.inf, np.inf, (self.size,), np.float32)
+
+    def of(self, observation: dict[str, Any], worlds: int) -> np.ndarray:
+        """A new row for each world, ``[worlds, n]``."""
+        out = np.empty((worlds, self.size), np.float32)
+        for name, columns in self.columns.items():
+            out[:, columns] = stream_of(observation, self._paths[name]).reshape(worlds, -1)
+        return out
+
+
+def is_image(rows: np.ndarray) -> bool:
+    """``[B, H, W, C]`` bytes."""
+    return rows.ndim == 4 and rows.dtype == np.uint8
+
+
+def stream_of(observation: Any, path: Sequence[str]) -> np.ndarray:
+    """A stream of a nested observation."""
+    for key in path:
+        observation = observation[key]
+    return observation
+
+
+class Actions:
+    """Commands = ``mean + scale * action``, within the limits of the actuators, float64 ``[B, n]``."""
+
+    def __init__(self, space: gymnasium.spaces.Box, mean: Any, scale: Any) -> None:
+        self.low, self.high = np.float64(space.low), np.float64(space.high)
+        bounded = np.isfinite(self.low) & np.isfinite(self.high)
+        low, high = np.where(bounded, self.low, -1.0), np.where(bounded, self.high, 1.0)
+        self.mean = self._row("action_mean", (low + high) / 2 if mean is None else mean)
+        self.scale = self._row("action_scale", (high - low) / 2 if scale is None else scale)
+
+    def _row(self, name: str, value: Any) -> np.ndarray:
+        try:
+            return np.broadcast_to(np.asarray(value, np.float64), self.low.shape)
+        except (TypeError, ValueError):
+            raise ValueError(f"{name}: {value!r} is neither a number nor {self.low.size} numbers") from None
+
+    def commands(self, actions: np.ndarray) -> np.ndarray:
+        return np.clip(self.mean + self.scale * actions, self.low, self.high)

@@ -1,0 +1,76 @@
+# SPDX-License-Identifier: Apache-2.0
+"""rsl-rl: tasks as its ``VecEnv``. Needs ``pip install rsl-rl-lib``."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import numpy as np
+import torch  # pyright: ignore[reportMissingImports]
+from rsl_rl.env import VecEnv  # pyright: ignore[reportMissingImports]
+from tensordict import TensorDict  # pyright: ignore[reportMissingImports]
+
+from mjsense.rl._numbers import Actions, Numbers, checked_env
+
+
+class RslRlVecEnv(VecEnv):
+    """A :class:`mjsense.TaskVectorEnv` for the runners of rsl-rl 5.
+
+    Args:
+        env: of ``make_vec(..., autoreset_mode="same_step")``.
+        groups: observation groups, each the names of its sensors or streams (None: all): float32 ``[B, n]`` rows of a TensorDict; if not
+            given, one group ``policy`` of everything.
+        action_mean, action_scale: a command is ``action_mean + action_scale * action``, numbers or ``[n]``; if not given, the middle and half
+            the width of the actuators' range. Commands are kept within that range.
+        device: of the trainer; the worlds are on the CPU.
+    """
+
+    def __init__(
+        self,
+        env: Any,
+        groups: Mapping[str, Sequence[str] | None] | None = None,
+        *,
+        action_mean: Any = None,
+        action_scale: Any = None,
+        device: str = "cpu",
+    ) -> None:
+        self.env = checked_env(env, "RslRlVecEnv")
+        self.numbers = {name: Numbers(env, chosen) for name, chosen in (groups or {"policy": None}).items()}
+        """By group: where each stream is in the row."""
+        self._commands = Actions(env.single_action_space, action_mean, action_scale)
+        self.num_envs: int = env.num_envs
+        self.num_actions: int = env.single_action_space.shape[0]
+        self.max_episode_length: int = env.horizon
+        self.device = device
+        self.cfg: dict[str, Any] = {}
+        self.episode_length_buf = torch.zeros(self.num_envs, dtype=torch.long, device=device)
+        """Steps of the present episodes. Writing it changes no episode: the task counts its own."""
+        observation, _ = env.reset()
+        self._last = self._observation(observation)
+
+    def _observation(self, observation: dict[str, Any]) -> Any:
+        rows = {name: torch.from_numpy(numbers.of(observation, self.num_envs)) for name, numbers in self.numbers.items()}
+        return TensorDict(rows, batch_size=[self.num_envs]).to(self.device)
+
+    def get_observations(self) -> Any:
+        """Those of the last step."""
+        return self._last
+
+    def step(self, actions: Any) -> tuple[Any, Any, Any, dict[str, Any]]:
+        """One control step; worlds whose episode ended have begun the next. Returns (observations, rewards ``[B]``, dones ``[B]``, extras)."""
+        commands = self._commands.commands(actions.detach().cpu().numpy().astype(np.float64))
+        observation, reward, terminated, truncated, infos = self.env.step(commands)
+        done = terminated | truncated
+        self._last = self._observation(observation)
+        self.episode_length_buf += 1
+        over = torch.from_numpy(done).to(self.device)
+        self.episode_length_buf[over] = 0
+        extras: dict[str, Any] = {"time_outs": torch.from_numpy(truncated & ~terminated).to(self.device), "log": {}}
+        if done.any():
+            extras["log"]["/success"] = float(infos["final_info"]["success"][done].mean())
+        return self._last, torch.from_numpy(reward.astype(np.float32)).to(self.device), over, extras
+
+    def close(self) -> None:
+        """Frees the worlds."""
+        self.env.close()

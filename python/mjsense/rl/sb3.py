@@ -1,0 +1,108 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Stable-Baselines3: tasks as its ``VecEnv``. Needs ``pip install stable-baselines3``."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+import gymnasium
+import numpy as np
+from stable_baselines3.common.vec_env import VecEnv  # pyright: ignore[reportMissingImports]
+
+from mjsense.rl._numbers import Actions, Numbers, checked_env, stream_of
+
+
+class SB3VecEnv(VecEnv):
+    """A :class:`mjsense.TaskVectorEnv` for the algorithms of Stable-Baselines3.
+
+    Observations are one row of float32 ``[n]`` (``MlpPolicy``), with pictures a dict of ``"state"`` and them (``MultiInputPolicy``);
+    actions are in [-1, 1].
+
+    Args:
+        env: of ``make_vec(..., autoreset_mode="same_step")``.
+        observations: names of sensors or streams to observe; if not given, all that ``env`` has.
+        action_mean, action_scale: a command is ``action_mean + action_scale * action``, numbers or ``[n]``; if not given, the middle and half
+            the width of the actuators' range. Commands are kept within that range.
+    """
+
+    def __init__(self, env: Any, observations: Sequence[str] | None = None, *, action_mean: Any = None, action_scale: Any = None) -> None:
+        self.env = checked_env(env, "SB3VecEnv")
+        self.numbers = Numbers(self.env, observations)
+        """Where each stream is in the row."""
+        self._images = self.numbers.images
+        self._commands = Actions(env.single_action_space, action_mean, action_scale)
+        self._actions: np.ndarray | None = None
+        self._returns, self._lengths = np.zeros(env.num_envs), np.zeros(env.num_envs, int)
+        space: Any = self.numbers.box()
+        if self._images:
+            spaces = {name: gymnasium.spaces.Box(0, 255, env.rows[name].shape[1:], np.uint8) for name in self._images}
+            space = gymnasium.spaces.Dict({"state": space, **spaces})
+        self.render_mode = env.render_mode
+        super().__init__(env.num_envs, space, gymnasium.spaces.Box(-1, 1, env.single_action_space.shape, np.float32))
+
+    def _observation(self, observation: Any, worlds: int) -> Any:
+        numbers = self.numbers.of(observation, worlds)
+        if not self._images:
+            return numbers
+        paths = self.env._paths
+        return {"state": numbers, **{name: stream_of(observation, paths[name]) for name in self._images}}
+
+    def reset(self) -> Any:
+        """Begins a new episode in every world; after ``seed(s)`` the first ones of that seed."""
+        seed = self._seeds[0]
+        observation, _ = self.env.reset(seed=seed)
+        self._reset_seeds()
+        self._returns[:] = self._lengths[:] = 0
+        return self._observation(observation, self.num_envs)
+
+    def step_async(self, actions: np.ndarray) -> None:
+        """Remembers the actions ``[B, n]``."""
+        self._actions = self._commands.commands(np.asarray(actions, np.float64))
+
+    def step_wait(self) -> tuple[Any, np.ndarray, np.ndarray, list[dict[str, Any]]]:
+        """Plays them. Infos of worlds whose episode ended have ``terminal_observation``, ``TimeLimit.truncated``, ``episode``, ``is_success``."""
+        observation, reward, terminated, truncated, infos = self.env.step(self._actions)
+        done = terminated | truncated
+        self._returns += reward
+        self._lengths += 1
+        out: list[dict[str, Any]] = [{} for _ in range(self.num_envs)]
+        for world in np.flatnonzero(done):
+            last = self._observation(infos["final_obs"][world], 1)
+            final = infos["final_info"]
+            out[world] = {
+                "terminal_observation": {key: value[0] if key == "state" else value for key, value in last.items()} if self._images else last[0],
+                "TimeLimit.truncated": bool(truncated[world] and not terminated[world]),
+                "episode": {"r": float(self._returns[world]), "l": int(self._lengths[world])},
+                "is_success": bool(final["success"][world]),
+            }
+            if "fault" in final and final["fault"][world]:
+                out[world]["fault"] = final["fault"][world]
+        self._returns[done] = self._lengths[done] = 0
+        return self._observation(observation, self.num_envs), reward.astype(np.float32), done, out
+
+    def close(self) -> None:
+        """Frees the worlds."""
+        self.env.close()
+
+    def get_images(self) -> Sequence[Any]:
+        """The first camera's picture of every world."""
+        return list(self.env.render() or [None] * self.num_envs)
+
+    def get_attr(self, attr_name: str, indices: Any = None) -> list[Any]:
+        """An attribute of the environment, once for each world."""
+        return [getattr(self.env, attr_name)] * len(self._get_indices(indices))
+
+    def set_attr(self, attr_name: str, value: Any, indices: Any = None) -> None:
+        """Sets an attribute of the environment, which all worlds share; ValueError for some of them."""
+        if len(self._get_indices(indices)) != self.num_envs:
+            raise ValueError(f"set_attr('{attr_name}'): the worlds are one environment, and have it in common")
+        setattr(self.env, attr_name, value)
+
+    def env_method(self, method_name: str, *args: Any, indices: Any = None, **kwargs: Any) -> list[Any]:
+        """Calls a method of the environment once; its result for each world."""
+        return [getattr(self.env, method_name)(*args, **kwargs)] * len(self._get_indices(indices))
+
+    def env_is_wrapped(self, wrapper_class: type, indices: Any = None) -> list[bool]:
+        """Episodes are counted here, as ``Monitor`` does."""
+        return [wrapper_class.__name__ == "Monitor"] * len(self._get_indices(indices))
