@@ -14,7 +14,7 @@ import time
 
 import h5py
 import numpy as np
-import torch
+import torch  # pyright: ignore[reportMissingImports]
 
 import mjsense as mjs
 
@@ -139,8 +139,8 @@ class ClonePolicy(mjs.Policy):
 def success(policy, episodes):
     """Share of unseen episodes in which the object was lifted at the last step or before."""
     with tempfile.TemporaryDirectory() as out:
-        options = dict(episodes=episodes, max_attempts=episodes, worlds=50, seed=10_000, horizon=STEPS, cameras=[], action_noise=False)
-        made = mjs.record("pick", policy=policy, out=out, terminate_upon_success=True, **options)
+        made = mjs.record("pick", policy=policy, out=out, episodes=episodes, max_attempts=episodes, worlds=50, seed=10_000, horizon=STEPS,
+                          cameras=[], action_noise=False, terminate_upon_success=True)  # fmt: skip
         return made.succeeded / (made.succeeded + made.failed)
 
 
