@@ -12,20 +12,6 @@
 namespace mjsense {
 namespace {
 
-std::array<float, 6> box_around(const float* vertices, int count) {
-  std::array<float, 6> box{};
-  for (int k = 0; k < 3; ++k) {
-    float low = std::numeric_limits<float>::infinity(), high = -low;
-    for (int i = 0; i < count; ++i) {
-      low = std::min(low, vertices[3 * i + k]);
-      high = std::max(high, vertices[3 * i + k]);
-    }
-    box[k] = 0.5f * (low + high);
-    box[3 + k] = 0.5f * (high - low);
-  }
-  return box;
-}
-
 struct Triangles {
   std::vector<float> vertices;  // [n, 3] m
   std::vector<int> faces;       // [m, 3]
@@ -84,50 +70,17 @@ std::vector<float> highest_points(const HeightField& field) {
 
 }  // namespace
 
-SceneHandle build_triangles(RTCDevice device, const float* vertices, int num_vertices,
-                            const int* faces, int num_faces) {
-  SceneHandle scene(rtcNewScene(device));
-  rtcSetSceneFlags(scene.get(), kSceneFlags);
-  rtcSetSceneBuildQuality(scene.get(), RTC_BUILD_QUALITY_HIGH);
-  RTCGeometry geometry = rtcNewGeometry(device, RTC_GEOMETRY_TYPE_TRIANGLE);
-  void* v = rtcSetNewGeometryBuffer(geometry, RTC_BUFFER_TYPE_VERTEX, 0, RTC_FORMAT_FLOAT3,
-                                    3 * sizeof(float), num_vertices);
-  void* f = rtcSetNewGeometryBuffer(geometry, RTC_BUFFER_TYPE_INDEX, 0, RTC_FORMAT_UINT3,
-                                    3 * sizeof(int), num_faces);
-  if (v == nullptr || f == nullptr)
-    throw RuntimeError(
-        fmt::format("ray scene: Embree could not allocate a mesh of {} vertices and {} faces",
-                    num_vertices, num_faces));
-  std::copy_n(vertices, 3 * num_vertices, static_cast<float*>(v));
-  std::copy_n(faces, 3 * num_faces, static_cast<int*>(f));
-  rtcCommitGeometry(geometry);
-  rtcAttachGeometry(scene.get(), geometry);
-  rtcReleaseGeometry(geometry);
-  rtcCommitScene(scene.get());
-  return scene;
-}
-
 SharedGeometry::SharedGeometry(const mjModel* m) {
-  // One thread: the BVH, and with it every answer, is the same on every machine.
-  device.reset(rtcNewDevice("threads=1"));
-  if (!device)
-    throw RuntimeError(fmt::format("ray scene: Embree gave no device (error {})",
-                                   static_cast<int>(rtcGetDeviceError(nullptr))));
-
+  device = ray_device();
   // All meshes, shown or not: a world may give a geom another one.
-  meshes.resize(m->nmesh);
-  mesh_scenes.assign(m->nmesh, nullptr);
-  mesh_clusters.resize(m->nmesh);
+  const bool images = m->ncam > 0;
   for (int i = 0; i < m->nmesh; ++i) {
-    const float* vertices = m->mesh_vert + 3 * m->mesh_vertadr[i];
-    bounds.meshes.push_back(box_around(vertices, m->mesh_vertnum[i]));
-    if (m->mesh_facenum[i] == 0) continue;
-    meshes[i] = build_triangles(device.get(), vertices, m->mesh_vertnum[i],
-                                m->mesh_face + 3 * m->mesh_faceadr[i], m->mesh_facenum[i]);
-    mesh_scenes[i] = meshes[i].get();
-    if (m->ncam > 0)
-      mesh_clusters[i] =
-          build_clusters(vertices, m->mesh_face + 3 * m->mesh_faceadr[i], m->mesh_facenum[i]);
+    const auto count = [](int n) { return 3 * static_cast<std::size_t>(n); };
+    meshes.push_back(mesh_geometry(
+        {m->mesh_vert + count(m->mesh_vertadr[i]), count(m->mesh_vertnum[i])},
+        {m->mesh_face + count(m->mesh_faceadr[i]), count(m->mesh_facenum[i])}, images));
+    mesh_scenes.push_back(meshes[i]->scene.get());
+    bounds.meshes.push_back(meshes[i]->box);
   }
   for (int i = 0; i < m->nflex; ++i) flexes.push_back(flex_surface(m, i));
   for (int i = 0; i < m->nhfield; ++i) {
@@ -136,14 +89,10 @@ SharedGeometry::SharedGeometry(const mjModel* m) {
     field.rows = m->hfield_nrow[i];
     field.cols = m->hfield_ncol[i];
     std::copy_n(m->hfield_size + 4 * i, 4, field.size);
-    if (m->ncam > 0) {
+    if (images) {
       const Triangles surface = surface_of(field);
-      const int count = static_cast<int>(surface.faces.size() / 3);
-      surfaces.push_back(build_triangles(device.get(), surface.vertices.data(),
-                                         field.rows * field.cols, surface.faces.data(), count));
-      field.scene = surfaces.back().get();
-      surface_clusters.push_back(
-          build_clusters(surface.vertices.data(), surface.faces.data(), count));
+      surfaces.push_back(mesh_geometry(surface.vertices, surface.faces, images));
+      field.scene = surfaces.back()->scene.get();
     }
     block_tops.push_back(highest_points(field));
     field.block_tops = block_tops.back().data();

@@ -9,21 +9,11 @@
 #include <memory>
 #include <vector>
 
-#include "mjsense/rays/clusters.h"
-#include "mjsense/rays/embree.h"
 #include "mjsense/rays/flex_surface.h"
 #include "mjsense/rays/kernels.h"
+#include "mjsense/rays/mesh_geometry.h"
 
 namespace mjsense {
-
-struct DeviceRelease {
-  void operator()(RTCDevice device) const { rtcReleaseDevice(device); }
-};
-struct SceneRelease {
-  void operator()(RTCScene scene) const { rtcReleaseScene(scene); }
-};
-using DeviceHandle = std::unique_ptr<RTCDeviceTy, DeviceRelease>;
-using SceneHandle = std::unique_ptr<RTCSceneTy, SceneRelease>;
 
 // Local boxes (center, half) of the shared shapes, by mesh and height-field id.
 struct ShapeBounds {
@@ -33,28 +23,25 @@ struct ShapeBounds {
 struct SharedGeometry {
   explicit SharedGeometry(const mjModel* model);
 
-  DeviceHandle device;
-  std::vector<SceneHandle> meshes;             // null for a mesh without faces
-  std::vector<void*> mesh_scenes;              // the same, for the kernels
+  std::shared_ptr<RTCDeviceTy> device;
+  std::vector<std::shared_ptr<const MeshGeometry>> meshes;
+  std::vector<void*> mesh_scenes;              // theirs, for the kernels; null without faces
   std::vector<HeightField> height_fields;      // data: the model's
   std::vector<std::vector<float>> block_tops;  // of each height field
-  std::vector<SceneHandle> surfaces;  // of height fields, if the model has cameras: rays march
-  // For images; none if the model has no camera.
-  std::vector<Clusters> mesh_clusters, surface_clusters;
+  // Of height fields, if the model has cameras: rays march.
+  std::vector<std::shared_ptr<const MeshGeometry>> surfaces;
   ShapeBounds bounds;
   std::vector<FlexSurface> flexes;  // what does not move of them
 
-  const Clusters* clusters_of_mesh(int id) const { return clusters(mesh_clusters, id); }
-  const Clusters* clusters_of_height_field(int id) const { return clusters(surface_clusters, id); }
+  // For images; null if the model has no camera.
+  const Clusters* clusters_of_mesh(int id) const { return clusters(meshes, id); }
+  const Clusters* clusters_of_height_field(int id) const { return clusters(surfaces, id); }
 
  private:
-  static const Clusters* clusters(const std::vector<Clusters>& all, std::size_t id) {
-    return id < all.size() && !all[id].nodes.empty() ? &all[id] : nullptr;
+  static const Clusters* clusters(const std::vector<std::shared_ptr<const MeshGeometry>>& all,
+                                  std::size_t id) {
+    return id < all.size() && !all[id]->clusters.nodes.empty() ? &all[id]->clusters : nullptr;
   }
 };
-
-// A scene of one triangle mesh; positions and indices are copied.
-SceneHandle build_triangles(RTCDevice device, const float* vertices, int num_vertices,
-                            const int* faces, int num_faces);
 
 }  // namespace mjsense

@@ -5,6 +5,7 @@
 #include <array>
 #include <cmath>
 
+#include "mjsense/core/by_content.h"
 #include "mjsense/rays/flex_surface.h"
 
 namespace mjsense {
@@ -68,7 +69,78 @@ void halve(const std::uint32_t* src, int width, int height, std::uint32_t* dst, 
   }
 }
 
+// Corner k of face f: where it is, m, and its texture coordinates.
+template <class Position, class Texcoord>
+void add_coordinates(MeshTables& tables, int faces, Position position, Texcoord texcoord) {
+  tables.uvs.resize(static_cast<std::size_t>(faces) * 6);
+  tables.density.resize(faces);
+  for (int f = 0; f < faces; ++f) {
+    float* uv = tables.uvs.data() + 6 * f;
+    for (int k = 0; k < 3; ++k) std::copy_n(texcoord(f, k), 2, uv + 2 * k);
+    float normal[3];
+    const float area = cross(position(f, 0), position(f, 1), position(f, 2), normal);
+    const float uv_area =
+        std::abs((uv[2] - uv[0]) * (uv[5] - uv[1]) - (uv[4] - uv[0]) * (uv[3] - uv[1]));
+    tables.density[f] = area > 0 ? std::sqrt(uv_area / area) : 0;
+  }
+}
+
+std::shared_ptr<const MeshTables> mesh_tables(const mjModel* m, int id) {
+  const int faces = m->mesh_facenum[id], first = m->mesh_faceadr[id];
+  const bool has_uv = m->mesh_texcoordadr[id] >= 0;
+  // The mesh's own part of an array with `width` numbers a row.
+  const auto part = [](auto* all, int begin, int count, int width) {
+    return std::span(all + static_cast<std::size_t>(begin) * width,
+                     static_cast<std::size_t>(count) * width);
+  };
+  const auto vert = part(m->mesh_vert, m->mesh_vertadr[id], m->mesh_vertnum[id], 3);
+  const auto normal = part(m->mesh_normal, m->mesh_normaladr[id], m->mesh_normalnum[id], 3);
+  const auto vertices = part(m->mesh_face, first, faces, 3);
+  const auto normals = part(m->mesh_facenormal, first, faces, 3);
+  std::span<float> texcoord;
+  std::span<int> texcoords;
+  if (has_uv) {
+    texcoord = part(m->mesh_texcoord, m->mesh_texcoordadr[id], m->mesh_texcoordnum[id], 2);
+    texcoords = part(m->mesh_facetexcoord, first, faces, 3);
+  }
+  static ByContent<MeshTables> all;
+  ContentKey key;
+  for (const auto& values : {vert, normal, texcoord}) key.add(values);
+  for (const auto& values : {vertices, normals, texcoords}) key.add(values);
+  return all.get(key, [&] {
+    auto tables = std::make_shared<MeshTables>();
+    tables->normals.resize(static_cast<std::size_t>(faces) * 9);
+    for (int f = 0; f < faces; ++f) {
+      const int *v = &vertices[3 * f], *n = &normals[3 * f];
+      float flat[3];
+      const float length = cross(&vert[3 * v[0]], &vert[3 * v[1]], &vert[3 * v[2]], flat);
+      for (float& x : flat) x = length > 0 ? x / length : 0;
+      for (int k = 0; k < 3; ++k) {
+        const float* smooth = &normal[3 * n[k]];
+        const float cosine = smooth[0] * flat[0] + smooth[1] * flat[1] + smooth[2] * flat[2];
+        const float* use = !has_uv && cosine < kCrease ? flat : smooth;
+        std::copy(use, use + 3, tables->normals.begin() + 9 * f + 3 * k);
+      }
+    }
+    if (has_uv)
+      add_coordinates(
+          *tables, faces, [&](int f, int k) { return &vert[3 * vertices[3 * f + k]]; },
+          [&](int f, int k) { return &texcoord[2 * texcoords[3 * f + k]]; });
+    return tables;
+  });
+}
+
 }  // namespace
+
+MeshLook MeshTables::look() const {
+  const auto data = [](const std::vector<float>& v) { return v.empty() ? nullptr : v.data(); };
+  return {data(normals), data(uvs), data(density)};
+}
+
+void Look::keep(std::shared_ptr<const MeshTables> tables, MeshLook& look) {
+  look = tables->look();
+  tables_.push_back(std::move(tables));
+}
 
 Look::Look(const mjModel* model, bool meshes, bool textures) {
   textures_.resize(model->ntex);
@@ -79,7 +151,7 @@ Look::Look(const mjModel* model, bool meshes, bool textures) {
   for (int i = 0; i < model->ntex && textures; ++i) add_texture(model, i);
   for (int i = 0; i < model->ntex && !skybox_; ++i)
     if (model->tex_type[i] == mjTEXTURE_SKYBOX && textures_[i].levels > 0) skybox_ = &textures_[i];
-  for (int i = 0; i < model->nmesh && meshes; ++i) add_mesh(model, i);
+  for (int i = 0; i < model->nmesh && meshes; ++i) keep(mesh_tables(model, i), meshes_[i]);
 }
 
 void Look::add_texture(const mjModel* model, int id) {
@@ -143,46 +215,19 @@ void Look::add_texture(const mjModel* model, int id) {
   }
 }
 
-void Look::add_mesh(const mjModel* model, int id) {
-  const int faces = model->mesh_facenum[id];
-  const int first = model->mesh_faceadr[id];
-  const float* vert = model->mesh_vert + 3 * model->mesh_vertadr[id];
-  const float* normal = model->mesh_normal + 3 * model->mesh_normaladr[id];
-  const bool has_uv = model->mesh_texcoordadr[id] >= 0;
-  std::vector<float>& normals = tables_.emplace_back(static_cast<std::size_t>(faces) * 9);
-  for (int f = 0; f < faces; ++f) {
-    const int* v = model->mesh_face + 3 * (first + f);
-    const int* n = model->mesh_facenormal + 3 * (first + f);
-    float flat[3];
-    const float length = cross(vert + 3 * v[0], vert + 3 * v[1], vert + 3 * v[2], flat);
-    for (float& x : flat) x = length > 0 ? x / length : 0;
-    for (int k = 0; k < 3; ++k) {
-      const float* smooth = normal + 3 * n[k];
-      const float cosine = smooth[0] * flat[0] + smooth[1] * flat[1] + smooth[2] * flat[2];
-      const float* use = !has_uv && cosine < kCrease ? flat : smooth;
-      std::copy(use, use + 3, normals.begin() + 9 * f + 3 * k);
-    }
-  }
-  meshes_[id].normals = normals.data();
-  if (!has_uv) return;
-  const float* texcoord = model->mesh_texcoord + 2 * model->mesh_texcoordadr[id];
-  add_coordinates(
-      meshes_[id], faces,
-      [&](int f, int k) { return vert + 3 * model->mesh_face[3 * (first + f) + k]; },
-      [&](int f, int k) { return texcoord + 2 * model->mesh_facetexcoord[3 * (first + f) + k]; });
-}
-
 void Look::add_flex(const mjModel* model, int id, bool textures) {
   const FlexSurface s = flex_surface(model, id);
   for (const FlexSurface::Part& part : s.parts) {
-    MeshLook& look = flex_parts_.emplace_back();
+    flex_parts_.emplace_back();
     if (s.texcoords.empty() || !textures) continue;
+    auto tables = std::make_shared<MeshTables>();
     const float* texcoord = model->flex_texcoord + 2 * model->flex_texcoordadr[id];
     const auto corner = [&](int f, int k) { return 3 * (part.first + f) + k; };
     add_coordinates(
-        look, part.count,
+        *tables, part.count,
         [&](int f, int k) { return &s.rest[3 * (s.faces[corner(f, k)] % s.num_vertices)]; },
         [&](int f, int k) { return texcoord + 2 * s.texcoords[corner(f, k)]; });
+    keep(std::move(tables), flex_parts_.back());
   }
 }
 
@@ -191,26 +236,11 @@ void Look::add_skin(const mjModel* model, int id) {
   const float* vert = model->skin_vert + 3 * model->skin_vertadr[id];
   const float* texcoord = model->skin_texcoord + 2 * model->skin_texcoordadr[id];
   const int* face = model->skin_face + 3 * model->skin_faceadr[id];
+  auto tables = std::make_shared<MeshTables>();
   add_coordinates(
-      skins_[id], model->skin_facenum[id], [&](int f, int k) { return vert + 3 * face[3 * f + k]; },
+      *tables, model->skin_facenum[id], [&](int f, int k) { return vert + 3 * face[3 * f + k]; },
       [&](int f, int k) { return texcoord + 2 * face[3 * f + k]; });
-}
-
-template <class Position, class Texcoord>
-void Look::add_coordinates(MeshLook& look, int faces, Position position, Texcoord texcoord) {
-  float* uvs = tables_.emplace_back(static_cast<std::size_t>(faces) * 6).data();
-  float* density = tables_.emplace_back(faces).data();
-  for (int f = 0; f < faces; ++f) {
-    float* uv = uvs + 6 * f;
-    for (int k = 0; k < 3; ++k) std::copy_n(texcoord(f, k), 2, uv + 2 * k);
-    float normal[3];
-    const float area = cross(position(f, 0), position(f, 1), position(f, 2), normal);
-    const float uv_area =
-        std::abs((uv[2] - uv[0]) * (uv[5] - uv[1]) - (uv[4] - uv[0]) * (uv[3] - uv[1]));
-    density[f] = area > 0 ? std::sqrt(uv_area / area) : 0;
-  }
-  look.uvs = uvs;
-  look.density = density;
+  keep(std::move(tables), skins_[id]);
 }
 
 }  // namespace mjsense

@@ -7,6 +7,7 @@
 #include <mujoco/mujoco.h>
 
 #include <cstdint>
+#include <memory>
 #include <span>
 #include <vector>
 
@@ -32,6 +33,14 @@ struct MeshLook {
   const float* density = nullptr;  // [F] texture units per metre
 };
 
+// What a mesh's faces look like; what there is none of is empty.
+struct MeshTables {
+  std::vector<float> normals;  // [F, 3 corners, 3]
+  std::vector<float> uvs;      // [F, 3 corners, 2]
+  std::vector<float> density;  // [F]
+  MeshLook look() const;
+};
+
 class Look {
  public:
   // `meshes`: prepare all of them, shown or not, as a world may give a geom another one or another
@@ -50,17 +59,14 @@ class Look {
 
  private:
   void add_texture(const mjModel* model, int id);
-  void add_mesh(const mjModel* model, int id);
   void add_flex(const mjModel* model, int id, bool textures);
   void add_skin(const mjModel* model, int id);
-  // Corner k of face f: where it is, m, and its texture coordinates.
-  template <class Position, class Texcoord>
-  void add_coordinates(MeshLook& look, int faces, Position position, Texcoord texcoord);
+  void keep(std::shared_ptr<const MeshTables> tables, MeshLook& look);
 
   std::vector<Texture> textures_;
   std::vector<MeshLook> meshes_, flex_parts_, skins_;
   std::vector<std::vector<std::uint32_t>> texels_;
-  std::vector<std::vector<float>> tables_;
+  std::vector<std::shared_ptr<const MeshTables>> tables_;  // of meshes the process's, by content
   const Texture* skybox_ = nullptr;
 };
 

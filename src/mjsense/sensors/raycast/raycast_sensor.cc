@@ -161,11 +161,16 @@ void RayCastSensor::cast(const CastContext& context) {
   const int packets = bundles_.front().num_packets(), chunks = (packets + kChunk - 1) / kChunk;
   const int per_world = chunks * num_frames();
   const int worlds = static_cast<int>(context.ids.size());
-  context.pool.run(worlds * per_world, [&](int item, int thread) {
-    const int world = context.ids[item / per_world], part = item % per_world;
-    const int begin = part % chunks * kChunk;
-    trace_packets(*context.rays, world, part / chunks, begin, std::min(begin + kChunk, packets),
-                  scratch_[thread]);
+  // A thread takes whole worlds where there are enough of them: parts of one on two threads fetch
+  // its geoms into both caches (64 worlds of a height scan, two threads: 29 against 39 M rays/s).
+  const int parts_of_item = worlds >= 4 * context.pool.size() ? per_world : 1;
+  context.pool.run(worlds * per_world / parts_of_item, [&](int item, int thread) {
+    for (int k = 0; k < parts_of_item; ++k) {
+      const int at = item * parts_of_item + k, world = context.ids[at / per_world];
+      const int part = at % per_world, begin = part % chunks * kChunk;
+      trace_packets(*context.rays, world, part / chunks, begin, std::min(begin + kChunk, packets),
+                    scratch_[thread]);
+    }
   });
   if (wants_finish())
     context.pool.run(worlds, [&](int item, int thread) {

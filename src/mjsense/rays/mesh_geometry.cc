@@ -1,0 +1,88 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "mjsense/rays/mesh_geometry.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <limits>
+#include <mutex>
+
+#include "mjsense/core/by_content.h"
+#include "mjsense/core/error.h"
+
+namespace mjsense {
+namespace {
+
+std::array<float, 6> box_around(std::span<const float> vertices) {
+  std::array<float, 6> box{};
+  for (int k = 0; k < 3; ++k) {
+    float low = std::numeric_limits<float>::infinity(), high = -low;
+    for (std::size_t i = k; i < vertices.size(); i += 3) {
+      low = std::min(low, vertices[i]);
+      high = std::max(high, vertices[i]);
+    }
+    box[k] = 0.5f * (low + high);
+    box[3 + k] = 0.5f * (high - low);
+  }
+  return box;
+}
+
+}  // namespace
+
+std::shared_ptr<RTCDeviceTy> ray_device() {
+  static std::mutex mutex;
+  static std::weak_ptr<RTCDeviceTy> kept;
+  const std::lock_guard lock(mutex);
+  if (auto device = kept.lock()) return device;
+  // One thread: a BVH, and with it every answer, is the same on every machine.
+  std::shared_ptr<RTCDeviceTy> device(rtcNewDevice("threads=1"), [](RTCDevice d) {
+    if (d) rtcReleaseDevice(d);
+  });
+  if (!device)
+    throw RuntimeError(fmt::format("ray scene: Embree gave no device (error {})",
+                                   static_cast<int>(rtcGetDeviceError(nullptr))));
+  kept = device;
+  return device;
+}
+
+SceneHandle build_triangles(RTCDevice device, std::span<const float> vertices,
+                            std::span<const int> faces) {
+  SceneHandle scene(rtcNewScene(device));
+  rtcSetSceneFlags(scene.get(), kSceneFlags);
+  rtcSetSceneBuildQuality(scene.get(), RTC_BUILD_QUALITY_HIGH);
+  RTCGeometry geometry = rtcNewGeometry(device, RTC_GEOMETRY_TYPE_TRIANGLE);
+  void* v = rtcSetNewGeometryBuffer(geometry, RTC_BUFFER_TYPE_VERTEX, 0, RTC_FORMAT_FLOAT3,
+                                    3 * sizeof(float), vertices.size() / 3);
+  void* f = rtcSetNewGeometryBuffer(geometry, RTC_BUFFER_TYPE_INDEX, 0, RTC_FORMAT_UINT3,
+                                    3 * sizeof(int), faces.size() / 3);
+  if (v == nullptr || f == nullptr)
+    throw RuntimeError(
+        fmt::format("ray scene: Embree could not allocate a mesh of {} vertices and {} faces",
+                    vertices.size() / 3, faces.size() / 3));
+  std::ranges::copy(vertices, static_cast<float*>(v));
+  std::ranges::copy(faces, static_cast<int*>(f));
+  rtcCommitGeometry(geometry);
+  rtcAttachGeometry(scene.get(), geometry);
+  rtcReleaseGeometry(geometry);
+  rtcCommitScene(scene.get());
+  return scene;
+}
+
+std::shared_ptr<const MeshGeometry> mesh_geometry(std::span<const float> vertices,
+                                                  std::span<const int> faces, bool clusters) {
+  static ByContent<MeshGeometry> all;
+  const ContentKey key = ContentKey().add(vertices).add(faces).add(std::span(&clusters, 1));
+  return all.get(key, [&] {
+    auto made = std::make_shared<MeshGeometry>();
+    made->box = box_around(vertices);
+    if (faces.empty()) return made;
+    made->device = ray_device();
+    made->scene = build_triangles(made->device.get(), vertices, faces);
+    if (clusters)
+      made->clusters =
+          build_clusters(vertices.data(), faces.data(), static_cast<int>(faces.size() / 3));
+    return made;
+  });
+}
+
+}  // namespace mjsense

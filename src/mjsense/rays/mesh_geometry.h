@@ -1,0 +1,42 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+// A triangle mesh as rays and images meet it, once in a process: simulations of the same robot share
+// it.
+
+#include <array>
+#include <memory>
+#include <span>
+
+#include "mjsense/rays/clusters.h"
+#include "mjsense/rays/embree.h"
+
+namespace mjsense {
+
+struct DeviceRelease {
+  void operator()(RTCDevice device) const { rtcReleaseDevice(device); }
+};
+struct SceneRelease {
+  void operator()(RTCScene scene) const { rtcReleaseScene(scene); }
+};
+using DeviceHandle = std::unique_ptr<RTCDeviceTy, DeviceRelease>;
+using SceneHandle = std::unique_ptr<RTCSceneTy, SceneRelease>;
+
+// That of the process, which ends with the last that holds it. Throws RuntimeError.
+std::shared_ptr<RTCDeviceTy> ray_device();
+
+// A scene of one triangle mesh; positions [n, 3] and indices [m, 3] are copied.
+SceneHandle build_triangles(RTCDevice device, std::span<const float> vertices,
+                            std::span<const int> faces);
+
+struct MeshGeometry {
+  std::shared_ptr<RTCDeviceTy> device;
+  SceneHandle scene;           // null without faces
+  Clusters clusters;           // empty unless wanted
+  std::array<float, 6> box{};  // around all vertices: center, half
+};
+
+// Of these vertices [n, 3] (m) and faces [m, 3]; `clusters`: for images, too.
+std::shared_ptr<const MeshGeometry> mesh_geometry(std::span<const float> vertices,
+                                                  std::span<const int> faces, bool clusters);
+
+}  // namespace mjsense

@@ -1,0 +1,74 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "mjsense/rays/mesh_geometry.h"
+
+#include <gtest/gtest.h>
+
+#include <thread>
+#include <vector>
+
+#include "mjsense/core/by_content.h"
+
+namespace mjsense {
+namespace {
+
+const std::vector<float> kVertices{0, 0, 0, 1, 0, 0, 0, 1, 0, 0, 0, 1};
+const std::vector<int> kFaces{0, 1, 2, 0, 1, 3, 0, 2, 3, 1, 2, 3};
+
+TEST(MeshGeometry, EqualContentIsOneThing) {
+  const auto a = mesh_geometry(kVertices, kFaces, true);
+  const auto b = mesh_geometry(std::vector(kVertices), std::vector(kFaces), true);
+  EXPECT_EQ(a.get(), b.get());
+  EXPECT_FALSE(a->clusters.nodes.empty());
+  EXPECT_EQ(a->box, (std::array<float, 6>{0.5f, 0.5f, 0.5f, 0.5f, 0.5f, 0.5f}));
+  EXPECT_EQ(a->device.get(), ray_device().get());
+}
+
+TEST(MeshGeometry, OtherContentIsAnother) {
+  const auto a = mesh_geometry(kVertices, kFaces, true);
+  EXPECT_NE(a, mesh_geometry(kVertices, kFaces, false));
+  for (std::size_t i = 0; i < kVertices.size(); ++i) {
+    std::vector<float> other = kVertices;
+    other[i] += 1e-6f;
+    EXPECT_NE(a, mesh_geometry(other, kFaces, true)) << i;
+  }
+  std::vector<int> turned = kFaces;
+  std::swap(turned[0], turned[1]);
+  EXPECT_NE(a, mesh_geometry(kVertices, turned, true));
+}
+
+TEST(MeshGeometry, EndsWithWhoHoldsIt) {
+  std::weak_ptr<const MeshGeometry> seen;
+  {
+    const auto a = mesh_geometry(kVertices, kFaces, false);
+    seen = a;
+  }
+  EXPECT_TRUE(seen.expired());
+  EXPECT_NE(mesh_geometry(kVertices, kFaces, false), nullptr);
+}
+
+TEST(MeshGeometry, ManyThreadsMayAskForIt) {
+  std::vector<std::shared_ptr<const MeshGeometry>> made(8);
+  {
+    std::vector<std::jthread> threads;
+    for (auto& one : made)
+      threads.emplace_back([&one] { one = mesh_geometry(kVertices, kFaces, true); });
+  }
+  for (const auto& one : made) EXPECT_EQ(one, made[0]);
+}
+
+// Two arrays are not their concatenation, and order counts.
+TEST(ContentKey, TellsArraysApart) {
+  const std::vector<int> a{1, 2, 3}, b{4, 5}, ab{1, 2, 3, 4, 5};
+  const auto key = [](auto... parts) {
+    ContentKey k;
+    (k.add(std::span<const int>(parts)), ...);
+    return k;
+  };
+  EXPECT_EQ(key(a, b), key(a, b));
+  EXPECT_NE(key(a, b), key(ab));
+  EXPECT_NE(key(a, b), key(b, a));
+  EXPECT_NE(key(a), key(a, std::vector<int>{}));
+}
+
+}  // namespace
+}  // namespace mjsense
