@@ -3,32 +3,50 @@
 
 from __future__ import annotations
 
-import ast
 import dataclasses
-import inspect
+import functools
 import sys
-import textwrap
+from typing import Any
 
 
 def show_field_docs(module_name: str) -> None:
-    """Appends its fields to the docstring of every dataclass of this module, those of its bases included."""
-    module = sys.modules[module_name]
+    """Appends its fields to the docstring of every dataclass of this module, those of its bases included; when it is first asked for."""
+    for cls in list(vars(sys.modules[module_name]).values()):
+        if isinstance(cls, type) and cls.__module__ == module_name and dataclasses.is_dataclass(cls):
+            cls.__doc__ = _Doc(cls.__doc__ or "")  # type: ignore[assignment]
+
+
+class _Doc:
+    """A docstring that is made when it is read: importing ast and parsing the module takes longer than everything else in it."""
+
+    def __init__(self, text: str) -> None:
+        self.text = text
+
+    def __get__(self, instance: Any, cls: Any) -> str:
+        import inspect
+
+        known = {k: v for base in reversed(cls.__mro__) for k, v in _texts(base.__module__).get(base.__name__, {}).items()}
+        lines = [line for f in dataclasses.fields(cls) for line in _lines(f, known.get(f.name, ""))]
+        return "\n".join([inspect.cleandoc(self.text), "", *lines]).rstrip() + "\n"
+
+
+@functools.cache
+def _texts(module_name: str) -> dict[str, dict[str, str]]:
+    """What stands under the fields, by class and field."""
+    import ast
+    import inspect
+
     try:
-        tree = ast.parse(inspect.getsource(module))
-    except OSError:  # installed without sources
-        return
-    texts: dict[str, dict[str, str]] = {}
-    for node in ast.walk(tree):
-        if isinstance(node, ast.ClassDef):
-            texts[node.name] = dict(_fields(node))
-    for cls in vars(module).values():
-        if inspect.isclass(cls) and cls.__module__ == module_name and dataclasses.is_dataclass(cls):
-            known = {k: v for base in reversed(cls.__mro__) for k, v in texts.get(base.__name__, {}).items()}
-            lines = [line for f in dataclasses.fields(cls) for line in _lines(f, known.get(f.name, ""))]
-            cls.__doc__ = "\n".join([inspect.cleandoc(cls.__doc__ or ""), "", *lines]).rstrip() + "\n"
+        tree = ast.parse(inspect.getsource(sys.modules[module_name]))
+    except (OSError, TypeError):  # installed without sources, or built in
+        return {}
+    return {node.name: dict(_fields(node)) for node in ast.walk(tree) if isinstance(node, ast.ClassDef)}
 
 
-def _fields(node: ast.ClassDef):
+def _fields(node: Any):
+    import ast
+    import inspect
+
     for field, text in zip(node.body, node.body[1:]):
         if (isinstance(field, ast.AnnAssign) and isinstance(field.target, ast.Name) and isinstance(text, ast.Expr)
                 and isinstance(text.value, ast.Constant) and isinstance(text.value.value, str)):  # fmt: skip
@@ -36,5 +54,7 @@ def _fields(node: ast.ClassDef):
 
 
 def _lines(field: dataclasses.Field, text: str) -> list[str]:
+    import textwrap
+
     default = "" if field.default is dataclasses.MISSING else f" = {field.default!r}"
     return [f"{field.name}: {field.type}{default}", *textwrap.indent(text, "    ").splitlines()]

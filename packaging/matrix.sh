@@ -1,0 +1,26 @@
+#!/usr/bin/env bash
+# Installs a wheel with all its extras, and beside each neighbour (packaging/resolve.py names them), into environments of their own, and
+# runs there what is tested with these packages alone. Slow, and torch brings CUDA: 6 GB. usage: packaging/matrix.sh WHEEL [NAME ...]
+set -euo pipefail
+wheel=$(realpath "$1")
+shift
+cd "$(dirname "${BASH_SOURCE[0]}")/.."
+python=$PWD/.venv/bin/python
+if [ $# = 0 ]; then
+  mapfile -t names < <(cd packaging && "$python" -c 'import resolve; print(*resolve.ENVIRONMENTS, sep="\n")')
+  set -- "${names[@]}"
+fi
+failed=0
+for name in "$@"; do
+  echo "== $name"
+  venv=build/matrix/${name// /-}
+  rm -rf "$venv"
+  "$python" -m venv "$venv"
+  mapfile -t others < <(cd packaging && "$python" -c 'import resolve, sys; print(*resolve.ENVIRONMENTS[sys.argv[1]], sep="\n")' "$name")
+  "$venv/bin/python" -m pip install -q --disable-pip-version-check "$wheel" pytest h5py "${others[@]}" || { failed=1; continue; }
+  "$venv/bin/python" -m pip check || failed=1
+  "$venv/bin/python" -m pip list --disable-pip-version-check --format freeze | grep -i -E '^(mujoco|torch|numpy|gymnasium|h5py|rsl|stable)' || true
+  "$venv/bin/python" -m pytest -q -p no:cacheprovider tests/python/test_load_order.py tests/python/test_libmujoco.py tests/python/test_rl.py \
+    tests/python/test_mjlab_compat.py || failed=1
+done
+exit $failed

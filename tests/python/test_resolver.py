@@ -1,0 +1,31 @@
+# SPDX-License-Identifier: Apache-2.0
+"""What pip would install beside mjsense has one MuJoCo, of the series that we are built for."""
+
+import sys
+from pathlib import Path
+
+import pytest
+
+from mjsense import _libmujoco
+
+sys.path.append(str(Path(__file__).parents[2] / "packaging"))
+import resolve
+
+
+@pytest.mark.parametrize("name", ["gymnasium-robotics", "mujoco-warp"])  # packaging/matrix.sh installs all of them
+def test_one_mujoco_beside(name):
+    try:
+        found = resolve.resolve(resolve.ENVIRONMENTS[name])
+    except resolve.Unavailable as error:
+        pytest.skip(str(error))
+    core = found["mujoco-core"]
+    assert tuple(int(n) for n in core.split(".")[:2]) == _libmujoco.SERIES
+    assert found["mujoco"] == core  # its files need a core of the very same version
+    for requirement in resolve.ENVIRONMENTS[name]:
+        assert requirement.split(">")[0] in found
+
+
+def test_every_extra_is_asked_for():
+    asked = resolve.ENVIRONMENTS["all extras"]
+    assert {"torch>=2.2", "imageio-ffmpeg>=0.5", "mujoco>=4.0,<4.1"} <= set(asked)
+    assert len(asked) == sum(map(len, resolve.EXTRAS.values()))
