@@ -42,7 +42,7 @@ def with_rsl(task, env):
     worlds = RslRlVecEnv(env, action_mean=task.stand, action_scale=SCALE)
     runner = OnPolicyRunner(worlds, {
         "num_steps_per_env": 24, "save_interval": 10**9, "logger": "tensorboard", "obs_groups": {"actor": ["policy"], "critic": ["policy"]},
-        "actor": {**net, "distribution_cfg": {"class_name": "GaussianDistribution", "init_std": 1.0, "std_type": "scalar"}}, "critic": net,
+        "actor": {**net, "distribution_cfg": {"class_name": "GaussianDistribution", "init_std": 0.5, "std_type": "scalar"}}, "critic": net,
         "algorithm": {
             "class_name": "PPO", "learning_rate": 1e-3, "schedule": "adaptive", "desired_kl": 0.01, "gamma": 0.99, "lam": 0.95,
             "entropy_coef": 0.005, "num_learning_epochs": 5, "num_mini_batches": 4, "clip_param": 0.2, "value_loss_coef": 1.0,
@@ -70,7 +70,7 @@ def with_sb3(task, env):
     worlds.action_space = type(worlds.action_space)(-10, 10, worlds.action_space.shape, np.float32)  # servos have limits of their own
     steps = 24 * env.num_envs
     trainer = PPO("MlpPolicy", worlds, n_steps=24, batch_size=steps // 4, n_epochs=5, learning_rate=1e-3, target_kl=0.02, seed=0, device="cpu",
-                  policy_kwargs={"net_arch": [256, 128, 64], "log_std_init": 0.0})  # fmt: skip
+                  policy_kwargs={"net_arch": [256, 128, 64], "log_std_init": -0.7})  # fmt: skip
 
     def act(observation):
         return trainer.predict(worlds.normalize_obs(observation), deterministic=True)[0]

@@ -89,8 +89,8 @@ class Walk(mjs.Task):
         steps = sensors["feet"].compute_first_contact(0.02)
         air = (np.minimum(sensors["feet"].data.last_air_time - 0.15, 0.15) * steps).sum(1)
         good = 1.5 * np.exp(-error[0] / 0.25) + 0.75 * np.exp(-error[1] / 0.25) + 5 * air
-        bad = (1.0 * np.square(speed[:, 2]) + 2.0 * np.square(up[:, :2]).sum(1) + 0.05 * np.square(turn[:, :2]).sum(1)
-               + 0.1 * np.square(sim.ctrl - self.before).sum(1) + 0.02 * np.square(sim.qpos[:, 7:] - self.stand).sum(1))  # fmt: skip
+        bad = (1.0 * np.square(speed[:, 2]) + 2.0 * np.square(up[:, :2]).sum(1) + 0.02 * np.square(turn[:, :2]).sum(1)
+               + 0.03 * np.square(sim.ctrl - self.before).sum(1) + 0.02 * np.square(sim.qpos[:, 7:] - self.stand).sum(1))  # fmt: skip
         reward = 0.02 * np.maximum(good - bad, 0)  # never below 0: to fall must not be a way out
         self.before[:] = sim.ctrl
         fallen = (up[:, 2] < 0.5) | (sim.qpos[:, 2] - self.places[:, 2] < -1)
