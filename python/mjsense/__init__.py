@@ -8,6 +8,7 @@ _libmujoco.load()  # first: the extension shares what `import mujoco` loads
 from mjsense import _core
 
 _libmujoco.check(_core)
+_core.leave_no_log_file()
 
 from mjsense import _gymnasium, configs, effects, observations
 from mjsense._core import SensorSpec, embedded_models, robot_names

@@ -95,6 +95,18 @@ def test_interrupt(sim):
     assert time.time() - begun < 5
 
 
+def test_no_log_file_is_dropped(sim, tmp_path, monkeypatch):
+    """MuJoCo warns of a world that diverges, on the terminal, and in no file of the user's folder."""
+    monkeypatch.chdir(tmp_path)
+    sim.qpos[1].flat[0] = np.nan
+    sim.step()
+    assert sim.failures
+    plain = mujoco.MjData(sim.model)
+    plain.qpos[:] = np.nan
+    mujoco.mj_step(sim.model, plain)
+    assert not list(tmp_path.iterdir())
+
+
 @pytest.mark.parametrize("name", ["qpos", "qvel", "ctrl", "mocap_pos", "xfrc_applied"])
 def test_bad_state_is_reported_by_forward(name):
     scene = mjs.Scene(mjs.SceneCfg(base="<mujoco><worldbody><body name='m' mocap='true'><geom size='.1'/></body>"

@@ -15,6 +15,16 @@ namespace {
 
 using Kind = FieldType::Kind;
 
+// For what is read as on the command line: its errors get the place.
+template <class Read>
+void at_place(const std::string& place, Read&& read) {
+  try {
+    read();
+  } catch (const ValueError& e) {
+    throw ValueError(fmt::format("{}: {}", place, e.what()));
+  }
+}
+
 // A key of the file: a field's option, or its opposite.
 struct Key {
   const FieldDecl* field;
@@ -32,7 +42,7 @@ void read_key(const Key& key, void* object, const toml::node& node, const std::s
     if (kind != Kind::kList || !text)
       throw ValueError(fmt::format("{}: the value of '{}' is of a wrong type: must be {}", place,
                                    field.option_name(), expected(*field.type)));
-    read_text(field, object, *text);
+    at_place(place, [&] { read_text(field, object, *text); });
   }
   if (key.opposite) *static_cast<bool*>(value) = !*static_cast<bool*>(value);
   check_field(field, object, place);
@@ -46,7 +56,12 @@ void read_toml(const std::string& path, const StructDecl& decl, void* object) {
   }
   std::stringstream text;
   text << std::ifstream(path).rdbuf();
-  const toml::table table = parse_toml(text.str(), path);
+  read_toml_text(text.str(), path, decl, object);
+}
+
+void read_toml_text(std::string_view text, const std::string& path, const StructDecl& decl,
+                    void* object) {
+  const toml::table table = parse_toml(text, path);
   std::map<std::string, Key> known;
   std::vector<std::string> names = {"size"};
   for (const FieldDecl& field : decl.fields) {
@@ -63,7 +78,7 @@ void read_toml(const std::string& path, const StructDecl& decl, void* object) {
       if (!text)
         throw ValueError(
             fmt::format("{}: the value of 'size' is of a wrong type: must be a str", place));
-      read_size(decl, object, *text);
+      at_place(place, [&] { read_size(decl, object, *text); });
       continue;
     }
     const auto found = known.find(name);

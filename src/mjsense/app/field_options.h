@@ -24,5 +24,8 @@ void read_size(const StructDecl& decl, void* object, std::string_view text);
 // A TOML file whose keys are the options, with '_' for '-'. ValueError "x.toml:3: no key named
 // 'episods'; did you mean 'episodes'?"
 void read_toml(const std::string& path, const StructDecl& decl, void* object);
+// The same of its text; `path` is its name in errors.
+void read_toml_text(std::string_view text, const std::string& path, const StructDecl& decl,
+                    void* object);
 
 }  // namespace mjsense

@@ -23,8 +23,10 @@
 #include "mjsense/app/schema.h"
 #include "mjsense/app/sensors_command.h"
 #include "mjsense/core/error.h"
+#include "mjsense/core/plain_file.h"
 #include "mjsense/replay/check.h"
 #include "mjsense/rollout/registry.h"
+#include "mjsense/scene/mujoco_log.h"
 
 namespace mjsense {
 namespace {
@@ -159,6 +161,7 @@ void read_config_argument(int argc, char** argv, RecordOptions& options) {
 
 int run(int argc, char** argv) {
   show_warnings();
+  leave_no_log_file();
   CLI::App program("Senses of MuJoCo worlds: measured, rendered, recorded.", "mjsense");
   program.set_version_flag("--version", "mjsense " MJSENSE_VERSION);
   program.require_subcommand(1);
@@ -241,7 +244,8 @@ int run_program(int argc, char** argv) {
       throw RuntimeError(fmt::format("cannot write to stdout: {}", std::strerror(errno)));
     return code;
   } catch (const std::exception& e) {
-    fmt::print(stderr, "mjsense: {}\n", one_line(e.what()));
+    // It may quote a file of a stranger's.
+    fmt::print(stderr, "mjsense: {}\n", printable(one_line(e.what())));
     return kWrongInput;
   }
 }

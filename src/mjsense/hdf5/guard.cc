@@ -9,6 +9,7 @@
 
 #include "mjsense/core/error.h"
 #include "mjsense/core/plain_file.h"
+#include "mjsense/hdf5/chunks.h"
 
 namespace mjsense::h5 {
 namespace {
@@ -116,6 +117,7 @@ std::uint64_t check_storage(hid_t dataset, const std::string& name) {
   const std::uint64_t most = multiply(stored, kMostRatio);
   if (all > kFreeBytes && all - kFreeBytes > most)
     refuse(name, fmt::format("claims {} bytes and stores {}", all, stored));
+  check_chunks(dataset, name);
   return all;
 }
 

@@ -11,6 +11,7 @@
 #include <string_view>
 #include <vector>
 
+#include "mjsense/core/error.h"
 #include "mjsense/hdf5/h5.h"
 
 namespace mjsense::h5 {
@@ -26,8 +27,8 @@ inline constexpr std::uint64_t kMostRowBytes = std::uint64_t{1} << 26;  // of on
 [[nodiscard]] Id open_dataset(hid_t parent, const std::string& path);
 
 // Bytes of a dataset's elements as the file's type has them. Throws RuntimeError when it lies in
-// other files, when its rows or chunks are larger than kMostRowBytes, or when it claims far more than what
-// is stored can hold.
+// other files, when its rows or chunks are larger than kMostRowBytes, when it claims far more than what
+// is stored can hold, or when a chunk does not unpack to its size.
 std::uint64_t check_storage(hid_t dataset, const std::string& name);
 
 // Calls visit("obs/agent/qpos") for every dataset below `group`, sorted. Throws RuntimeError where
@@ -37,9 +38,15 @@ void each_dataset(hid_t group, const std::function<void(const std::string& path)
 // A dataset of single bytes [n], n <= most.
 [[nodiscard]] std::string read_bytes(hid_t parent, const std::string& path, std::size_t most);
 
+// Somebody ended the process that read a file, which says nothing about the file.
+struct Ended : RuntimeError {
+  using RuntimeError::RuntimeError;
+};
+
 // Runs `read` in a child process, whose crash, hang or hunger becomes a RuntimeError "what: ...";
 // an exception there becomes one with its words here. `file_bytes` decides how much time it gets:
-// 20 s of the processor for small files. The child has 1 GiB beyond what this process holds.
+// 20 s of the processor for small files. The child has 1 GiB beyond what this process holds, and
+// hears no signal that is sent to our process group.
 [[nodiscard]] std::string in_child(std::string_view what, std::uint64_t file_bytes,
                                    const std::function<std::string()>& read);
 

@@ -27,8 +27,24 @@ constexpr std::size_t kMostAnswer = std::size_t{1} << 28;
 // The last byte of an answer: without it the child did not come to its end.
 constexpr char kDone = 'D', kThrown = 'T';
 
-void set_limit(decltype(RLIMIT_CPU) what, std::uint64_t most) {
-  const rlimit limit{most, most};
+// No signal reaches this thread while it lives, nor the child that is forked then.
+class SignalsBlocked {
+ public:
+  SignalsBlocked() {
+    sigset_t all;
+    sigfillset(&all);
+    pthread_sigmask(SIG_SETMASK, &all, &before_);
+  }
+  ~SignalsBlocked() { pthread_sigmask(SIG_SETMASK, &before_, nullptr); }
+  SignalsBlocked(const SignalsBlocked&) = delete;
+  SignalsBlocked& operator=(const SignalsBlocked&) = delete;
+
+ private:
+  sigset_t before_;
+};
+
+void set_limit(decltype(RLIMIT_CPU) what, std::uint64_t most, std::uint64_t beyond = 0) {
+  const rlimit limit{most, most + beyond};
   setrlimit(what, &limit);  // a lower one of the user's stays
 }
 
@@ -51,17 +67,22 @@ void close_files(unsigned first, unsigned last) {
 // No handlers of our program, no files written, no more processor and memory than a file deserves.
 void confine(int answer, std::uint64_t seconds) {
   prctl(PR_SET_PDEATHSIG, SIGKILL);
+  // Ctrl-C is for our parent: read as a crash of ours, it would speak of a file that is damaged.
+  // What was sent to the group until now is discarded by being ignored.
+  setpgid(0, 0);
+  for (const int signal : {SIGINT, SIGTERM, SIGHUP, SIGQUIT, SIGTSTP, SIGALRM, SIGUSR1, SIGUSR2})
+    ::signal(signal, SIG_IGN);
   // Locks that our program holds must not outlive it in us.
   close_files(3, static_cast<unsigned>(answer) - 1);
   close_files(static_cast<unsigned>(answer) + 1, ~0U);
-  for (const int signal : {SIGSEGV, SIGBUS, SIGILL, SIGFPE, SIGABRT, SIGTERM, SIGINT, SIGALRM})
+  for (const int signal : {SIGSEGV, SIGBUS, SIGILL, SIGFPE, SIGABRT, SIGTERM, SIGXCPU})
     ::signal(signal, SIG_DFL);
   sigset_t none;
   sigemptyset(&none);
   pthread_sigmask(SIG_SETMASK, &none, nullptr);
   if (const Fd null(open("/dev/null", O_WRONLY | O_CLOEXEC)); null)
     dup2(null.get(), STDERR_FILENO);  // the C library's words when memory is found corrupt
-  set_limit(RLIMIT_CPU, seconds);
+  set_limit(RLIMIT_CPU, seconds, 1);  // SIGXCPU first: who is killed was killed by somebody else
   set_limit(RLIMIT_CORE, 0);
   set_limit(RLIMIT_FSIZE, 0);
 #ifndef __SANITIZE_ADDRESS__
@@ -123,6 +144,7 @@ std::string in_child(std::string_view what, std::uint64_t file_bytes,
   pid_t pid;
   {
     const H5Lock lock;  // so that no other thread is inside the library when it is copied
+    const SignalsBlocked blocked;
     pid = fork();
     if (pid == 0) {
       out.reset();
@@ -134,7 +156,8 @@ std::string in_child(std::string_view what, std::uint64_t file_bytes,
     throw RuntimeError(fmt::format("{}: cannot start a process: {}", what, std::strerror(errno)));
   in.reset();
   std::string answer;
-  if (!listen(out.get(), 6 * seconds, answer)) kill(pid, SIGKILL);
+  const bool heard = listen(out.get(), 6 * seconds, answer);
+  if (!heard) kill(pid, SIGKILL);
   int status = 0;
   pid_t got;
   do {
@@ -149,9 +172,12 @@ std::string in_child(std::string_view what, std::uint64_t file_bytes,
   }
   if (got >= 0 && WIFSIGNALED(status)) {
     const int signal = WTERMSIG(status);
-    if (signal == SIGXCPU || signal == SIGKILL)
+    if (signal == SIGXCPU || (signal == SIGKILL && !heard))
       throw RuntimeError(
           fmt::format("{}: reading it did not end within {} s: it is damaged", what, seconds));
+    if (signal == SIGKILL || signal == SIGTERM)
+      throw Ended(fmt::format("{}: the process that read it was ended from outside ({})", what,
+                              strsignal(signal)));
     throw RuntimeError(fmt::format("{}: the HDF5 library crashed on it ({}): it is damaged", what,
                                    strsignal(signal)));
   }

@@ -9,8 +9,6 @@
 namespace mjsense {
 namespace {
 
-constexpr H5Z_filter_t kLzf = 32000;  // registered with the HDF Group
-
 std::size_t filter(unsigned flags, std::size_t count, const unsigned* values, std::size_t bytes,
                    std::size_t* capacity, void** buffer) {
   if (!(flags & H5Z_FLAG_REVERSE)) return 0;  // reading only
@@ -63,8 +61,9 @@ std::size_t lzf_unpack(std::span<const std::uint8_t> packed, std::span<std::uint
 }
 
 void register_lzf() {
-  if (H5Zfilter_avail(kLzf) > 0) return;
-  static const H5Z_class2_t kClass{H5Z_CLASS_T_VERS, kLzf, 0, 1, "lzf", nullptr, nullptr, filter};
+  if (H5Zfilter_avail(kLzfFilter) > 0) return;
+  static const H5Z_class2_t kClass{H5Z_CLASS_T_VERS, kLzfFilter, 0,     1, "lzf",
+                                   nullptr,          nullptr,    filter};
   H5Zregister(&kClass);
 }
 

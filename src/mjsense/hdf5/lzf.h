@@ -9,6 +9,8 @@
 
 namespace mjsense {
 
+inline constexpr int kLzfFilter = 32000;  // registered with the HDF Group
+
 // Bytes written to `out`; 0 if `packed` is damaged or needs more room.
 std::size_t lzf_unpack(std::span<const std::uint8_t> packed, std::span<std::uint8_t> out);
 

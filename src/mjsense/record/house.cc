@@ -22,6 +22,7 @@
 #include "mjsense/core/plain_file.h"
 #include "mjsense/hdf5/guard.h"
 #include "mjsense/record/checksum.h"
+#include "mjsense/record/description.h"
 #include "mjsense/record/layout.h"
 
 namespace fs = std::filesystem;
@@ -90,7 +91,7 @@ void require_no_link(const fs::path& path) {
 
 // What the recording of this house must be if it is to be published: JSON text of our own making.
 bool is_description(const std::string& text) {
-  const auto json = nlohmann::json::parse(text, nullptr, false);
+  const nlohmann::json json = parse_description(text);
   const auto number = [&](const char* name) {
     return json.contains(name) && json[name].is_number_integer() && json[name] > 0 &&
            json[name] <= std::numeric_limits<int>::max();
@@ -206,7 +207,7 @@ House::House(const fs::path& dir, const std::string& fingerprint, bool resume)
   if (!is_description(fingerprint))
     throw RuntimeError(fmt::format("'{}': its description of a recording cannot be read",
                                    (staging_ / kDescription).string()));
-  const auto description = nlohmann::json::parse(fingerprint);
+  const nlohmann::json description = parse_description(fingerprint);
   batches_ = batches_of(description.at("episodes"), description.at("batches"));
 
   require_no_link(staging_);
@@ -326,6 +327,8 @@ void House::load_staged() {
         if (!difference.empty())
           throw RuntimeError("belongs to a different recording: " + difference);
         staged.emplace(*finished, std::move(episode));
+      } catch (const h5::Ended&) {
+        throw;
       } catch (const Error& e) {
         set_aside(path, e.what());
       }

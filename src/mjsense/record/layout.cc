@@ -10,6 +10,7 @@
 #include <numeric>
 
 #include "mjsense/core/error.h"
+#include "mjsense/record/description.h"
 #include "mjsense/record/molmospaces.h"
 
 namespace mjsense {
@@ -264,8 +265,7 @@ std::string spec_json(std::string_view sensor, std::string_view kind, const Sens
 
 std::string fingerprint_difference(const std::string& was, const std::string& now) {
   if (was == now) return "";
-  const auto a = nlohmann::json::parse(was, nullptr, false),
-             b = nlohmann::json::parse(now, nullptr, false);
+  const nlohmann::json a = parse_description(was), b = parse_description(now);
   if (!a.is_object() || !b.is_object()) return "its description cannot be read";
   const nlohmann::json difference = nlohmann::json::diff(a, b);
   if (difference.empty()) return "";

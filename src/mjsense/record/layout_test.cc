@@ -196,5 +196,17 @@ TEST(Depth, RedGreenIsThePeersForm) {
   EXPECT_EQ(code(5), 0);
 }
 
+// From a file of a stranger's, deep enough to end any stack.
+TEST(Fingerprint, OfNoUseIsNeverEqual) {
+  const std::string ours = R"({"a":1})";
+  const std::string deep =
+      R"({"a":)" + std::string(1'000'000, '[') + std::string(1'000'000, ']') + "}";
+  for (const std::string& other : {deep, std::string(5 << 20, ' ') + ours, std::string("[1"),
+                                   std::string("[]"), std::string("\xff"), std::string()}) {
+    EXPECT_EQ(fingerprint_difference(other, ours), "its description cannot be read");
+    EXPECT_EQ(fingerprint_difference(ours, other), "its description cannot be read");
+  }
+}
+
 }  // namespace
 }  // namespace mjsense

@@ -5,7 +5,6 @@
 #include <fmt/format.h>
 #include <poll.h>
 #include <signal.h>
-#include <spawn.h>
 #include <sys/mman.h>
 #include <sys/resource.h>
 #include <sys/wait.h>
@@ -18,9 +17,7 @@
 #include <utility>
 
 #include "mjsense/core/error.h"
-#include "mjsense/record/close_inherited.h"
-
-extern char** environ;
+#include "mjsense/record/spawn.h"
 
 namespace mjsense {
 namespace {
@@ -51,10 +48,6 @@ std::pair<Fd, Fd> make_pipe() {
   return {Fd(ends[0]), Fd(ends[1])};
 }
 
-}  // namespace
-
-namespace {
-
 Child start(const std::vector<std::string>& argv, bool pipe_in, bool pipe_out, int input) {
   Child child;
   child.log = Fd(memfd_create("stderr", MFD_CLOEXEC));
@@ -74,33 +67,7 @@ Child start(const std::vector<std::string>& argv, bool pipe_in, bool pipe_out, i
     child_out = Fd(open("/dev/null", O_WRONLY | O_CLOEXEC));
   }
 
-  posix_spawn_file_actions_t actions;
-  posix_spawn_file_actions_init(&actions);
-  posix_spawn_file_actions_adddup2(&actions, input >= 0 ? input : child_in.get(), 0);
-  posix_spawn_file_actions_adddup2(&actions, child_out.get(), 1);
-  posix_spawn_file_actions_adddup2(&actions, child.log.get(), 2);
-  close_inherited(&actions);
-
-  posix_spawnattr_t attributes;
-  posix_spawnattr_init(&attributes);
-  sigset_t none, all;
-  sigemptyset(&none);
-  sigfillset(&all);
-  posix_spawnattr_setsigmask(&attributes, &none);
-  posix_spawnattr_setsigdefault(&attributes, &all);
-  posix_spawnattr_setpgroup(&attributes, 0);
-  posix_spawnattr_setflags(&attributes,
-                           POSIX_SPAWN_SETSIGMASK | POSIX_SPAWN_SETSIGDEF | POSIX_SPAWN_SETPGROUP);
-
-  std::vector<char*> args;
-  for (const std::string& a : argv) args.push_back(const_cast<char*>(a.c_str()));
-  args.push_back(nullptr);
-  const int error = posix_spawnp(&child.pid, args[0], &actions, &attributes, args.data(), environ);
-  posix_spawn_file_actions_destroy(&actions);
-  posix_spawnattr_destroy(&attributes);
-  if (error != 0)
-    throw RuntimeError(
-        fmt::format("cannot start the program '{}': {}", argv[0], std::strerror(error)));
+  child.pid = spawn(argv, input >= 0 ? input : child_in.get(), child_out.get(), child.log.get());
   return child;
 }
 

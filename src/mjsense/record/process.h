@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
-// Starting other programs from a process with many threads: posix_spawn, no inherited descriptors,
-// no signals.
+// Starting other programs from a process with many threads: no inherited descriptors, no signals
+// but those that we send.
 
 #include <sys/types.h>
 

@@ -10,6 +10,7 @@
 #include "mjsense/core/error.h"
 #include "mjsense/core/plain_file.h"
 #include "mjsense/hdf5/guard.h"
+#include "mjsense/record/description.h"
 #include "mjsense/replay/check.h"
 #include "mjsense/replay/json_text.h"
 #include "mjsense/replay/trajectory.h"
@@ -259,8 +260,7 @@ std::string InspectResult::text() const {
 }
 
 std::string InspectResult::json() const {
-  nlohmann::json j{{"videos", videos},
-                   {"recording", nlohmann::json::parse(settings, nullptr, false)}};
+  nlohmann::json j{{"videos", videos}, {"recording", parse_description(settings)}};
   if (j["recording"].is_discarded()) j["recording"] = nullptr;
   for (const File& f : files) {
     j["files"].push_back({{"path", f.path},

@@ -4,7 +4,6 @@
 #include <fmt/format.h>
 
 #include <charconv>
-#include <cmath>
 #include <limits>
 
 namespace mjsense {
@@ -136,16 +135,42 @@ class Parser {
     ++at_;
   }
 
+  std::size_t digits(const char* expected) {
+    const std::size_t start = at_;
+    while (peek() >= '0' && peek() <= '9') ++at_;
+    if (at_ == start) throw SyntaxError{at_, expected};
+    return at_ - start;
+  }
+
+  // "-12.5e-3": no zeros before others, digits on both sides of the point.
   void number() {
+    const std::size_t start = at_;
+    if (peek() == '-') ++at_;
+    const bool zero = peek() == '0';
+    if (digits("a value") > 1 && zero) throw SyntaxError{start, "no zeros before a number"};
+    if (peek() == '.') {
+      ++at_;
+      digits("a digit");
+    }
+    if (peek() == 'e' || peek() == 'E') {
+      ++at_;
+      if (peek() == '+' || peek() == '-') ++at_;
+      digits("a digit");
+    }
+    if (on_number_) on_number_(path_, value_of(text_.substr(start, at_ - start)));
+  }
+
+  // As Python reads them, numbers beyond the range of double are infinite or 0.
+  static double value_of(std::string_view number) {
     double x = 0;
-    const char* first = text_.data() + at_;
-    const auto [end, error] = std::from_chars(first, text_.data() + text_.size(), x);
-    const bool letter =
-        end != first && std::isalpha(static_cast<unsigned char>(*first == '-' ? first[1] : *first));
-    if (end == first || letter || error == std::errc::invalid_argument)
-      throw SyntaxError{at_, "a value"};
-    at_ += static_cast<std::size_t>(end - first);
-    number_is(x);
+    const auto read = std::from_chars(number.data(), number.data() + number.size(), x);
+    if (read.ec != std::errc::result_out_of_range) return x;
+    const std::size_t exponent = number.find_first_of("eE");
+    const bool negative = number.starts_with('-');
+    const bool small =
+        exponent == number.npos ? number[negative] == '0' : number[exponent + 1] == '-';
+    const double value = small ? 0 : std::numeric_limits<double>::infinity();
+    return negative ? -value : value;
   }
 
   std::string_view text_;

@@ -4,6 +4,7 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <limits>
 #include <map>
 #include <vector>
 
@@ -15,7 +16,7 @@ namespace {
 TEST(JsonText, AcceptsWhatPythonWrites) {
   for (const char* text : {"{}", "[]", "{\"a\":[1,-0.0,1e-05,1.0],\"b\":{\"c\":null}}",
                            "{\"x\":NaN,\"y\":Infinity,\"z\":-Infinity}", " {\"a\" : true} ",
-                           "\"\\u00e9\\n\"", "1e400"}) {
+                           "\"\\u00e9\\n\"", "1e400", "0", "-0", "[0.5,1E+2,10,-0e0]"}) {
     EXPECT_EQ(parse_json(text), "") << text;
   }
 }
@@ -25,8 +26,9 @@ TEST(JsonText, NamesThePlaceOfAFault) {
   EXPECT_EQ(parse_json("{\"a\":[1,2"), "byte 9: expected ',' or ']'");
   EXPECT_EQ(parse_json("{\"a\" 1}"), "byte 5: expected ':'");
   EXPECT_EQ(parse_json("{\"a\":1} x"), "byte 8: expected the end");
-  for (const char* text : {"{\"a\":}", "{a:1}", "[1,]", "{\"a\":1,}", "nan", "inf", "+1", "\"\\x\"",
-                           "\"\\u12\"", "[", "tru"}) {
+  for (const char* text : {"{\"a\":}", "{a:1}",     "[1,]", "{\"a\":1,}", "nan", "inf",  "+1",
+                           "\"\\x\"",  "\"\\u12\"", "[",    "tru",        "00",  "-01",  "1.",
+                           ".5",       "-",         "1e",   "1e+",        "0x1", "1.e3", "-inf"}) {
     EXPECT_NE(parse_json(text), "") << text;
   }
   EXPECT_NE(parse_json(std::string(1000, '[')), "");
@@ -47,6 +49,21 @@ TEST(JsonText, VisitsNumbersWithTheirPaths) {
   EXPECT_EQ(seen["arm"], (std::vector<double>{1, 2.5}));
   EXPECT_EQ(seen["g/held"], (std::vector<double>{1}));
   EXPECT_TRUE(std::isnan(seen["n"].at(0)));
+}
+
+TEST(JsonText, NumbersBeyondTheRangeOfDoubleAreAsInPython) {
+  constexpr double kInfinity = std::numeric_limits<double>::infinity();
+  const std::string tiny = "0." + std::string(400, '0') + "1", huge(400, '9');
+  for (const auto& [text, expected] : std::map<std::string, double>{{"1e400", kInfinity},
+                                                                    {"-1E400", -kInfinity},
+                                                                    {"1e-400", 0},
+                                                                    {"-0.5", -0.5},
+                                                                    {tiny, 0},
+                                                                    {huge, kInfinity}}) {
+    double value = 1;
+    ASSERT_EQ(parse_json(text, [&](const std::string&, double x) { value = x; }), "") << text;
+    EXPECT_EQ(value, expected) << text;
+  }
 }
 
 TEST(Lzf, UnpacksRunsAndReferences) {

@@ -330,6 +330,13 @@ TEST(Npy, ReadsFloatPairsAndRefusesOthers) {
   EXPECT_THROW(read_npy_pairs(path, "here"), RuntimeError);
   write("{'descr': '<f4', 'fortran_order': False, 'shape': (2, 3), }", {1, 2, 3, 4, 5, 6});
   EXPECT_THROW(read_npy_pairs(path, "here"), RuntimeError);
+  // Headers that claim more than any memory holds, and one that ends where a value begins.
+  for (const char* rows : {"400000000000", "4611686018427387904", "9223372036854775807"}) {
+    write(fmt::format("{{'descr': '<f8', 'fortran_order': False, 'shape': ({}, 2), }}", rows), {});
+    EXPECT_THROW(read_npy_pairs(path, "here"), RuntimeError) << rows;
+  }
+  write("{'descr': '<f8', 'fortran_order': False, 'shape':", {1, 2});
+  EXPECT_THROW(read_npy_pairs(path, "here"), RuntimeError);
 }
 
 TEST(PointCloud, LeavesOutWhatDidNotReturn) {

@@ -3,12 +3,14 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <cstdint>
 #include <cstring>
 #include <fstream>
 #include <string_view>
 
 #include "mjsense/core/error.h"
+#include "mjsense/core/plain_file.h"
 
 namespace mjsense {
 namespace {
@@ -28,9 +30,8 @@ std::string_view entry(std::string_view header, std::string_view key, const Sour
   const std::size_t at = header.find(fmt::format("'{}':", key));
   if (at == std::string_view::npos) fail(source, fmt::format("its header has no '{}'", key));
   std::string_view rest = header.substr(at + key.size() + 3);
-  const std::size_t begin = rest.find_first_not_of(' ');
-  rest = rest.substr(begin);
-  return rest.substr(0, rest.front() == '(' ? rest.find(')') + 1 : rest.find(','));
+  rest.remove_prefix(std::min(rest.find_first_not_of(' '), rest.size()));
+  return rest.substr(0, rest.starts_with('(') ? rest.find(')') + 1 : rest.find(','));
 }
 
 }  // namespace
@@ -58,12 +59,19 @@ std::vector<std::array<double, 2>> read_npy_pairs(const std::string& path, std::
   long rows = -1, columns = -1;
   if (std::sscanf(std::string(shape).c_str(), "(%ld, %ld)", &rows, &columns) != 2 || columns != 2 ||
       rows < 1 || (!single && type != "'<f8'") || order != "False")
-    fail(source, fmt::format("holds {} of shape {}, fortran_order {}: expected '<f4' or '<f8' of "
-                             "shape (M, 2) in C order",
-                             type, shape, order));
-  std::vector<char> raw(static_cast<std::size_t>(rows) * 2 * (single ? 4 : 8));
-  if (!in.read(raw.data(), static_cast<std::streamsize>(raw.size())))
+    fail(source, fmt::format("holds {:.40} of shape {:.40}, fortran_order {:.40}: expected '<f4' "
+                             "or '<f8' of shape (M, 2) in C order",
+                             printable(type), printable(shape), printable(order)));
+  // What the header claims is no reason to take memory: what is there is.
+  const std::streamoff begin = in.tellg();
+  const std::streamoff end = in.seekg(0, std::ios::end).tellg();
+  const std::size_t row_bytes = single ? 8 : 16;
+  if (begin < 0 || end < begin ||
+      static_cast<std::size_t>(end - begin) / row_bytes < static_cast<std::size_t>(rows))
     fail(source, fmt::format("ends before its {} rows", rows));
+  std::vector<char> raw(static_cast<std::size_t>(rows) * row_bytes);
+  if (!in.seekg(begin).read(raw.data(), static_cast<std::streamsize>(raw.size())))
+    fail(source, fmt::format("cannot be read to its {} rows", rows));
   std::vector<std::array<double, 2>> pairs(rows);
   for (long i = 0; i < 2 * rows; ++i) {
     float f;

@@ -1,0 +1,29 @@
+# SPDX-License-Identifier: Apache-2.0
+# Fuzz targets (libFuzzer, which comes with clang): the readers of what strangers send, with sanitisers. ./dev fuzz runs them.
+# They need few rooms; the rest of the library is not built for them.
+if(NOT CMAKE_CXX_COMPILER_ID MATCHES "Clang")
+  message(FATAL_ERROR "MJSENSE_FUZZ needs clang: cmake --preset fuzz")
+endif()
+set(MJSENSE_FUZZ_SOURCES ${MJSENSE_SOURCES})
+list(FILTER MJSENSE_FUZZ_SOURCES INCLUDE REGEX "/mjsense/(core|hdf5|record|replay)/|/app/(config_file|field_options)\\.cc$|/lidar/npy\\.cc$")
+list(FILTER MJSENSE_FUZZ_SOURCES EXCLUDE REGEX "/(in_child|embedded)\\.cc$")
+set(flags -fsanitize=address,undefined -fno-sanitize-recover=undefined -fno-omit-frame-pointer)
+add_library(mjsense_fuzzed STATIC EXCLUDE_FROM_ALL ${MJSENSE_FUZZ_SOURCES} tests/fuzz/in_process.cc)
+target_compile_options(mjsense_fuzzed PUBLIC ${flags} PRIVATE -fsanitize=fuzzer-no-link)
+target_link_options(mjsense_fuzzed PUBLIC ${flags})
+target_include_directories(mjsense_fuzzed PUBLIC src ${PROJECT_SOURCE_DIR})
+target_link_libraries(mjsense_fuzzed PUBLIC mujoco::mujoco ${MJSENSE_PRIVATE_LIBS})
+
+set_source_files_properties(src/mjsense/core/toml_value.cc PROPERTIES
+                            COMPILE_OPTIONS -fsanitize-ignorelist=${PROJECT_SOURCE_DIR}/tests/fuzz/ignored.txt)
+
+add_custom_target(fuzz)
+file(GLOB targets CONFIGURE_DEPENDS ${PROJECT_SOURCE_DIR}/tests/fuzz/*_fuzz.cc)
+foreach(source IN LISTS targets)
+  get_filename_component(name ${source} NAME_WE)
+  add_executable(${name} EXCLUDE_FROM_ALL ${source})
+  target_compile_options(${name} PRIVATE -fsanitize=fuzzer)
+  target_link_options(${name} PRIVATE -fsanitize=fuzzer)
+  target_link_libraries(${name} PRIVATE mjsense_fuzzed)
+  add_dependencies(fuzz ${name})
+endforeach()

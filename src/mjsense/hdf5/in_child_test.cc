@@ -1,0 +1,83 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+#include <signal.h>
+#include <sys/wait.h>
+#include <unistd.h>
+
+#include <new>
+
+#include "mjsense/core/error.h"
+#include "mjsense/hdf5/guard.h"
+
+namespace mjsense::h5 {
+namespace {
+
+using ::testing::HasSubstr;
+
+std::string complaint(const std::function<std::string()>& read) {
+  try {
+    static_cast<void>(in_child("x.h5", 0, read));
+  } catch (const Ended& e) {
+    return std::string("ended: ") + e.what();
+  } catch (const RuntimeError& e) {
+    return e.what();
+  }
+  return "";
+}
+
+TEST(InChild, AnswersAndErrorsComeHome) {
+  EXPECT_EQ(in_child("x.h5", 0, [] { return std::string("said"); }), "said");
+  EXPECT_EQ(complaint([]() -> std::string { throw RuntimeError("so it is"); }), "so it is");
+}
+
+TEST(InChild, ACrashIsAFinding) {
+  EXPECT_THAT(complaint([]() -> std::string { std::abort(); }),
+              HasSubstr("x.h5: the HDF5 library crashed on it (Aborted): it is damaged"));
+  EXPECT_THAT(complaint([]() -> std::string { _exit(0); }), HasSubstr("did not come to an end"));
+}
+
+TEST(InChild, WhoIsEndedFromOutsideSaysNothingOfTheFile) {
+  for (const int signal : {SIGKILL, SIGTERM}) {
+    EXPECT_THAT(complaint([signal]() -> std::string {
+                  kill(getpid(), signal);
+                  return "";
+                }),
+                HasSubstr("ended: x.h5: the process that read it was ended from outside"));
+  }
+}
+
+// Ctrl-C for all programs of a terminal: ours hears it, and the reader goes on.
+int read_in_the_rain() {
+  if (setpgid(0, 0) != 0) return 2;
+  struct sigaction action = {};
+  action.sa_handler = [](int) {};
+  for (const int signal : {SIGINT, SIGTERM, SIGHUP}) sigaction(signal, &action, nullptr);
+  const pid_t rain = fork();
+  if (rain == 0) {
+    const pid_t group = getppid();
+    setpgid(0, 0);
+    while (getppid() == group) {
+      for (const int signal : {SIGINT, SIGTERM, SIGHUP}) kill(-group, signal);
+      usleep(20);
+    }
+    _exit(0);
+  }
+  int wrong = 0;
+  for (int n = 0; n < 200; ++n) wrong += !complaint([] { return std::string("said"); }).empty();
+  kill(rain, SIGKILL);
+  waitpid(rain, nullptr, 0);
+  return wrong == 0 ? 0 : 1;
+}
+
+TEST(InChild, SignalsToOurGroupAreNoDamage) {
+  const pid_t pid = fork();
+  if (pid == 0) _exit(read_in_the_rain());
+  int status = 0;
+  ASSERT_EQ(waitpid(pid, &status, 0), pid);
+  EXPECT_TRUE(WIFEXITED(status)) << "signal " << WTERMSIG(status);
+  EXPECT_EQ(WEXITSTATUS(status), 0);
+}
+
+}  // namespace
+}  // namespace mjsense::h5

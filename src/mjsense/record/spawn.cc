@@ -1,0 +1,104 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "mjsense/record/spawn.h"
+
+#include <fcntl.h>
+#include <fmt/format.h>
+#include <signal.h>
+#include <sys/syscall.h>
+#include <sys/wait.h>
+#include <unistd.h>
+
+#include <cerrno>
+#include <cstdlib>
+#include <cstring>
+#include <filesystem>
+#include <system_error>
+
+#include "mjsense/core/error.h"
+
+namespace mjsense {
+namespace {
+
+constexpr int kFirstOther = 3;     // the first descriptor that is no standard stream
+constexpr long kCloseRange = 436;  // by its number: glibc has a name for it since 2.34 only
+
+struct Plan {
+  char* const* argv;
+  int streams[3];
+  const std::vector<int>* open;  // our descriptors, for kernels before 5.9
+  volatile int error = 0;        // written by the child, in our memory
+};
+
+// The child of vfork() runs in our memory while we wait: system calls only. All signals are blocked.
+[[noreturn]] __attribute__((noinline)) void become(Plan& plan) {
+  const auto fail = [&] {
+    plan.error = errno;
+    _exit(127);
+  };
+  // From here on what is sent to the group of our parent is not for us...
+  if (setpgid(0, 0) != 0) fail();
+  int moved[3];  // out of the way of each other
+  for (int i = 0; i < 3; ++i) {
+    moved[i] = fcntl(plan.streams[i], F_DUPFD_CLOEXEC, kFirstOther);
+    if (moved[i] < 0) fail();
+  }
+  for (int i = 0; i < 3; ++i) {
+    if (dup2(moved[i], i) < 0) fail();
+  }
+  if (syscall(kCloseRange, kFirstOther, ~0U, 0U) != 0) {
+    for (const int fd : *plan.open) close(fd);
+    for (const int fd : moved) close(fd);
+  }
+  // ...and what was sent before is forgotten: to ignore a signal discards it.
+  for (int signal = 1; signal < NSIG; ++signal) {
+    struct sigaction action = {};
+    action.sa_handler = SIG_IGN;
+    sigaction(signal, &action, nullptr);
+    action.sa_handler = SIG_DFL;
+    sigaction(signal, &action, nullptr);
+  }
+  sigset_t none;
+  sigemptyset(&none);
+  sigprocmask(SIG_SETMASK, &none, nullptr);
+  execvp(plan.argv[0], plan.argv);
+  fail();
+  __builtin_unreachable();
+}
+
+std::vector<int> open_descriptors() {
+  std::vector<int> open;
+  std::error_code ignored;  // one that is gone when the child closes it does no harm
+  for (const auto& entry : std::filesystem::directory_iterator("/proc/self/fd", ignored)) {
+    const int fd = std::atoi(entry.path().filename().c_str());
+    if (fd >= kFirstOther) open.push_back(fd);
+  }
+  return open;
+}
+
+}  // namespace
+
+pid_t spawn(const std::vector<std::string>& argv, int in, int out, int log) {
+  std::vector<char*> args;
+  for (const std::string& a : argv) args.push_back(const_cast<char*>(a.c_str()));
+  args.push_back(nullptr);
+  const std::vector<int> open = open_descriptors();
+  Plan plan{args.data(), {in, out, log}, &open};
+
+  sigset_t all, before;
+  sigfillset(&all);
+  pthread_sigmask(SIG_SETMASK, &all, &before);  // no handler of ours runs in the child
+  const pid_t pid = vfork();                    // NOLINT(clang-analyzer-security.insecureAPI.vfork)
+  if (pid == 0) become(plan);
+  const int error = pid < 0 ? errno : plan.error;
+  pthread_sigmask(SIG_SETMASK, &before, nullptr);
+  if (pid > 0 && error != 0) {
+    while (waitpid(pid, nullptr, 0) < 0 && errno == EINTR) {
+    }
+  }
+  if (error != 0)
+    throw RuntimeError(
+        fmt::format("cannot start the program '{}': {}", argv[0], std::strerror(error)));
+  return pid;
+}
+
+}  // namespace mjsense

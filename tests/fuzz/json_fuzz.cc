@@ -1,0 +1,67 @@
+// SPDX-License-Identifier: Apache-2.0
+// JSON rows, and the JSON text that says what a recording is. Another parser is asked too: what
+// both can know they must agree on.
+
+#include <nlohmann/json.hpp>
+
+#include "mjsense/core/error.h"
+#include "mjsense/record/layout.h"
+#include "mjsense/replay/json_text.h"
+#include "tests/fuzz/fuzz.h"
+
+namespace {
+
+constexpr const char* kRecording =
+    R"({"batches":1,"episodes":4,"settings":{"task":"pick","seed":0},"streams":[{"place":"rewards"}]})";
+
+int depth_of(std::string_view text) {
+  int depth = 0, most = 0;
+  for (const char c : text) {
+    depth += (c == '[' || c == '{') - (c == ']' || c == '}');
+    most = std::max(most, depth);
+  }
+  return most;
+}
+
+}  // namespace
+
+extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
+  using namespace mjsense;
+  const std::string text(reinterpret_cast<const char*>(data), size);
+  std::size_t numbers = 0;
+  const std::string wrong = parse_json(text, [&](const std::string& path, double) {
+    if (path.size() > text.size()) fuzz::broken("a path is made of keys", path);
+    ++numbers;
+  });
+  if (numbers > size) fuzz::broken("a number takes a byte", text);
+  // Ours takes NaN and Infinity as Python does, and leaves the encoding of texts alone. To the other
+  // one a NUL is the end.
+  const bool accepted = nlohmann::json::accept(text);
+  const bool odd = text.find('\0') != std::string::npos || text.starts_with("\xEF\xBB\xBF");
+  if (accepted && !wrong.empty() && depth_of(text) < 60 && !odd)
+    fuzz::broken("JSON is JSON", wrong + " in " + text);
+  const bool ascii = std::all_of(text.begin(), text.end(), [](char c) { return (c & 0x80) == 0; });
+  const bool plain = ascii && text.find_first_of("NI\\") == std::string::npos;
+  if (!accepted && wrong.empty() && plain) {
+    // A number beyond the range of double is infinite here and an error there.
+    try {
+      static_cast<void>(nlohmann::json::parse(text));
+    } catch (const nlohmann::json::out_of_range&) {
+      return 0;
+    } catch (const nlohmann::json::exception& e) {
+      fuzz::broken("what is no JSON is found", e.what() + (" in " + text));
+    }
+  }
+  // Of two descriptions of a recording, one comes from a file.
+  for (const auto& [was, now] :
+       {std::pair<std::string, std::string>{text, kRecording}, {kRecording, text}}) {
+    try {
+      const std::string difference = fingerprint_difference(was, now);
+      if (difference.empty() && was != now &&
+          nlohmann::json::parse(was, nullptr, false) != nlohmann::json::parse(now, nullptr, false))
+        fuzz::broken("different recordings differ", text);
+    } catch (const Error&) {
+    }
+  }
+  return 0;
+}

@@ -1,0 +1,20 @@
+// SPDX-License-Identifier: Apache-2.0
+// A table of scan angles in NumPy's format: as many rows as the file holds, or an error.
+
+#include "mjsense/core/error.h"
+#include "mjsense/sensors/lidar/npy.h"
+#include "tests/fuzz/fuzz.h"
+
+extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
+  using namespace mjsense;
+  static fuzz::MemoryFile file;
+  file.write(data, size);
+  try {
+    const auto pairs = read_npy_pairs(file.path(), "sensor 'lidar'");
+    if (pairs.empty() || 8 * pairs.size() > size) fuzz::broken("rows are in the file", "");
+  } catch (const Error& e) {
+    if (!std::string_view(e.what()).starts_with("sensor 'lidar': scan table '/proc"))
+      fuzz::broken("an error names sensor and file", e.what());
+  }
+  return 0;
+}

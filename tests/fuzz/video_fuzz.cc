@@ -1,0 +1,17 @@
+// SPDX-License-Identifier: Apache-2.0
+// The tables of an MP4 or Matroska file: what they claim is bounded by what the file holds.
+
+#include "mjsense/record/video_file.h"
+#include "tests/fuzz/fuzz.h"
+
+extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
+  using namespace mjsense;
+  static fuzz::MemoryFile file;
+  file.write(data, size);
+  const VideoFacts facts = read_video_facts(file.fd());
+  if (facts.frames < 0 || facts.width < 0 || facts.height < 0)
+    fuzz::broken("sizes are not negative", "");
+  if (facts.error.empty() && static_cast<std::uint64_t>(facts.frames) > size)
+    fuzz::broken("a picture takes a byte", "");
+  return 0;
+}
