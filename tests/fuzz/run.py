@@ -108,7 +108,8 @@ def main(arguments: list[str]) -> int:
     if unknown:
         print(f"no target named {', '.join(unknown)}; there are {', '.join(SEEDS)}", file=sys.stderr)
         return 2
-    return 0 if all([run(name, seconds) for name in arguments or SEEDS]) else 1
+    sound = [run(name, seconds) for name in arguments or SEEDS]
+    return 0 if all(sound) else 1
 
 
 if __name__ == "__main__":

@@ -40,7 +40,7 @@ def in_simulation(sensor, tmp_path):
     sim = mjs.Simulation(ball_scene(), num_worlds=2)
     sim.add(sensor)
     sim.step()
-    sensor.rows  # noqa: B018
+    return sensor.rows
 
 
 def in_recording(sensor, tmp_path):
