@@ -27,3 +27,8 @@ foreach(source IN LISTS targets)
   target_link_libraries(${name} PRIVATE mjsense_fuzzed)
   add_dependencies(fuzz ${name})
 endforeach()
+
+# The recorder without physics with the same sanitisers, and its readers in a process of their own: for tests/faults.
+add_executable(record_fake EXCLUDE_FROM_ALL tests/record/fake_writer.cc src/mjsense/record/testing/fake_suite.cc src/mjsense/hdf5/in_child.cc)
+target_link_libraries(record_fake PRIVATE mjsense_fuzzed)
+add_dependencies(fuzz record_fake)

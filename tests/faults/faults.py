@@ -6,6 +6,7 @@ from __future__ import annotations
 import functools
 import os
 import random
+import re
 import resource
 import shutil
 import signal
@@ -77,6 +78,16 @@ def limit_memory():
     resource.setrlimit(resource.RLIMIT_CORE, (0, 0))
 
 
+def sanitisers_words(said: str) -> str:
+    """What ASan or UBSan found in our code; the HDF5 library's own faults, in a process that is made for them, are not ours."""
+    for report in re.split(r"(?===\d+==ERROR: |\S+: runtime error: )", said)[1:]:
+        frames = re.findall(r"^\s+#\d+ \S+ in (\S+)", report, re.MULTILINE)
+        own = [f for f in frames if not f.startswith(("__interceptor", "__asan", "__sanitizer", "mem", "str", "malloc", "calloc", "realloc"))]
+        if "runtime error" in report.splitlines()[0] or not own or not own[0].startswith("H5"):
+            return report[:1500]
+    return ""
+
+
 def look(lab: Lab, row: Row, what: str, command: str, path: Path, *more):
     """One command on a hostile or damaged recording: it ends by itself, in time and in bounds. None if it did not."""
     before = resource.getrusage(resource.RUSAGE_CHILDREN)
@@ -90,6 +101,8 @@ def look(lab: Lab, row: Row, what: str, command: str, path: Path, *more):
     if done.returncode not in (0, 1, 2):
         row.wrong("crashed", f"{command} of {what}: {done.returncode} {done.stderr[-300:]}")
         return None
+    if words := sanitisers_words(done.stderr):
+        row.wrong("crashed", f"{command} of {what}: {words}")
     if seconds > SECONDS + 5:
         row.wrong("hung", f"{command} of {what}: {seconds:.0f} s of processor time")
     if after.ru_maxrss > before.ru_maxrss and after.ru_maxrss * 1024 > MEMORY + (200 << 20):

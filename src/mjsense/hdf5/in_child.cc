@@ -21,6 +21,18 @@
 namespace mjsense::h5 {
 namespace {
 
+// A sanitiser needs its handlers, its address space and stderr for what it has to say.
+#ifdef __has_feature
+#define MJSENSE_HAS_FEATURE(x) __has_feature(x)
+#else
+#define MJSENSE_HAS_FEATURE(x) 0
+#endif
+#if defined(__SANITIZE_ADDRESS__) || MJSENSE_HAS_FEATURE(address_sanitizer)
+constexpr bool kSanitised = true;
+#else
+constexpr bool kSanitised = false;
+#endif
+
 constexpr std::uint64_t kLeastSeconds = 20, kBytesPerSecond = 2'000'000;
 constexpr std::uint64_t kMemory = std::uint64_t{1} << 30;
 constexpr std::size_t kMostAnswer = std::size_t{1} << 28;
@@ -75,19 +87,18 @@ void confine(int answer, std::uint64_t seconds) {
   // Locks that our program holds must not outlive it in us.
   close_files(3, static_cast<unsigned>(answer) - 1);
   close_files(static_cast<unsigned>(answer) + 1, ~0U);
-  for (const int signal : {SIGSEGV, SIGBUS, SIGILL, SIGFPE, SIGABRT, SIGTERM, SIGXCPU})
-    ::signal(signal, SIG_DFL);
+  for (const int signal : {SIGTERM, SIGXCPU}) ::signal(signal, SIG_DFL);
   sigset_t none;
   sigemptyset(&none);
   pthread_sigmask(SIG_SETMASK, &none, nullptr);
-  if (const Fd null(open("/dev/null", O_WRONLY | O_CLOEXEC)); null)
-    dup2(null.get(), STDERR_FILENO);  // the C library's words when memory is found corrupt
   set_limit(RLIMIT_CPU, seconds, 1);  // SIGXCPU first: who is killed was killed by somebody else
   set_limit(RLIMIT_CORE, 0);
+  if (kSanitised) return;
+  for (const int signal : {SIGSEGV, SIGBUS, SIGILL, SIGFPE, SIGABRT}) ::signal(signal, SIG_DFL);
+  if (const Fd null(open("/dev/null", O_WRONLY | O_CLOEXEC)); null)
+    dup2(null.get(), STDERR_FILENO);  // the C library's words when memory is found corrupt
   set_limit(RLIMIT_FSIZE, 0);
-#ifndef __SANITIZE_ADDRESS__
   if (const std::uint64_t now = address_space(); now > 0) set_limit(RLIMIT_AS, now + kMemory);
-#endif
 }
 
 void send(int fd, const std::string& text) {
