@@ -132,20 +132,75 @@ inline bool passes(const KernelWorld& world, const KernelFilter& filter, int geo
   return filter.hidden == nullptr || filter.hidden[geom] == 0;
 }
 
-// Nearest first. Shell's sort: counts are small.
-inline void sort_candidates(RayCandidate* c, int count) {
+// Calls take(geom, nearest) for each geom that the beam touches and that passes the filter, where
+// geoms stand in blocks; in no order.
+template <class Take>
+void for_each_in_blocks(const Beam& beam, const KernelWorld& world, const KernelFilter& filter,
+                        Take&& take) {
+  const KernelBoxes& all = world.boxes;
+  for_each_box(beam, world.blocks, [&](int block, float) {
+    const int first = block * KernelWorld::kBlock, left = all.count - first;
+    const KernelBoxes part{{all.low[0] + first, all.low[1] + first, all.low[2] + first},
+                           {all.high[0] + first, all.high[1] + first, all.high[2] + first},
+                           all.ids + first,
+                           left < KernelWorld::kBlock ? left : KernelWorld::kBlock};
+    for_each_box(beam, part, [&](int i, float nearest) {
+      if (passes(world, filter, part.ids[i])) take(part.ids[i], nearest);
+    });
+  });
+}
+
+// By rising key. Shell's sort: counts are small, and nearly in order.
+template <class T, class Key>
+void sort_by(T* c, int count, Key key) {
   for (int gap = count > 64 ? 31 : count > 12 ? 5 : 1; gap > 0; gap = gap > 5 ? 5 : gap / 5) {
     for (int i = gap; i < count; ++i) {
-      const RayCandidate x = c[i];
+      const T x = c[i];
       int j = i;
-      for (; j >= gap && c[j - gap].t > x.t; j -= gap) c[j] = c[j - gap];
+      for (; j >= gap && key(c[j - gap]) > key(x); j -= gap) c[j] = c[j - gap];
       c[j] = x;
     }
   }
 }
 
+// Nearest first.
+inline void sort_candidates(RayCandidate* c, int count) {
+  sort_by(c, count, [](const RayCandidate& x) { return x.t; });
+}
+
+// gather() and focus() for blocks; apart, for what is rare must not make what is common slow (100
+// geoms: 86 instead of 102 M rays/s). Sorted by number first, so that what is equally near comes in
+// the same order with blocks and without: the same bits.
+[[gnu::noinline]] inline int gather_blocks(const KernelWorld& world, const KernelFilter& filter,
+                                           const RayPacket& rays, RayCandidate* out) {
+  int count = 0;
+  for_each_in_blocks(Beam(&rays, 1), world, filter, [&](int i, float nearest) {
+    out[count++] = {nearest, i};
+  });
+  sort_by(out, count, [](const RayCandidate& x) { return x.geom; });
+  sort_candidates(out, count);
+  return count;
+}
+
+[[gnu::noinline]] inline int focus_blocks(const KernelWorld& world, const KernelFilter& filter,
+                                          const RayPacket* packets, int num_packets,
+                                          float* const* low, float* const* high, int* ids) {
+  int count = 0;
+  for_each_in_blocks(Beam(packets, num_packets), world, filter,
+                     [&](int i, float) { ids[count++] = i; });
+  sort_by(ids, count, [](int i) { return i; });
+  for (int n = 0; n < count; ++n) {
+    for (int k = 0; k < 3; ++k) {
+      low[k][n] = world.boxes.low[k][world.place[ids[n]]];
+      high[k][n] = world.boxes.high[k][world.place[ids[n]]];
+    }
+  }
+  return count;
+}
+
 inline int gather(const KernelWorld& world, const KernelFilter& filter, const RayPacket& rays,
                   RayCandidate* out) {
+  if (world.blocks.count > 0) return gather_blocks(world, filter, rays, out);
   int count = 0;
   for_each_box(Beam(&rays, 1), world.boxes, [&](int i, float nearest) {
     if (passes(world, filter, i)) out[count++] = {nearest, i};
@@ -165,6 +220,8 @@ inline int gather_from(const KernelBoxes& boxes, const RayPacket& rays, RayCandi
 
 inline int focus(const KernelWorld& world, const KernelFilter& filter, const RayPacket* packets,
                  int num_packets, float* const* low, float* const* high, int* ids) {
+  if (world.blocks.count > 0)
+    return focus_blocks(world, filter, packets, num_packets, low, high, ids);
   int count = 0;
   for_each_box(Beam(packets, num_packets), world.boxes, [&](int i, float) {
     if (!passes(world, filter, i)) return;

@@ -41,8 +41,11 @@ struct KernelBoxes {
 };
 
 struct KernelWorld {
+  static constexpr int kBlock = 64;
   const RayGeom* geoms;
-  KernelBoxes boxes;           // of all geoms and flexes
+  const KernelBoxes& boxes;    // of all geoms and flexes
+  const int* place;            // which of the boxes is a geom's; null: its own number
+  const KernelBoxes& blocks;   // around each kBlock boxes that follow each other; none: count is 0
   const std::uint32_t* flags;  // [padded]
   const int* bodies;           // [padded]
   void* const* flex_scenes;    // RTCScene by flex id

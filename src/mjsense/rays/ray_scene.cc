@@ -29,9 +29,11 @@ KernelFilter kernel_filter(const RayFilter& f) {
 }
 
 KernelWorld kernel_world(const RayWorld& w) {
-  const auto &low = w.low(), &high = w.high();
+  const BoxList& boxes = w.boxes();
   return {w.geoms().data(),
-          {{low[0], low[1], low[2]}, {high[0], high[1], high[2]}, nullptr, w.num_objects()},
+          boxes.all(),
+          boxes.place(),
+          boxes.blocks(),
           w.flags().data(),
           w.bodies().data(),
           w.flexes() ? w.flexes()->scenes() : nullptr};

@@ -11,7 +11,6 @@
 namespace mjsense {
 namespace {
 
-constexpr int kPad = 16;
 constexpr float kEndless = 1e30f;
 
 }  // namespace
@@ -20,15 +19,12 @@ RayWorld::RayWorld(RayWorld&&) noexcept = default;
 RayWorld::~RayWorld() = default;
 
 RayWorld::RayWorld(const mjModel* m, const SharedGeometry& shapes)
-    : num_geoms_(static_cast<int>(m->ngeom)), shapes_(&shapes) {
+    : num_geoms_(static_cast<int>(m->ngeom)),
+      shapes_(&shapes),
+      boxes_(static_cast<int>(m->ngeom + m->nflex)) {
   const int count = static_cast<int>(m->ngeom + m->nflex);
-  const int padded = (count + kPad - 1) / kPad * kPad;
+  const int padded = boxes_.padded();
   geoms_.resize(count);
-  bounds_ = Array(DType::kFloat32, {6, padded});
-  for (int k = 0; k < 3; ++k) {
-    low_[k] = bounds_.row<float>(k).data();
-    high_[k] = bounds_.row<float>(3 + k).data();
-  }
   flags_.assign(padded, 0);
   bodies_.assign(padded, -1);
   materials_.assign(count, -1);
@@ -62,6 +58,7 @@ void RayWorld::update(const mjModel* m, const mjData* d) {
     set_world_box(i);
   }
   if (flexes_) update_flexes(m, d);
+  boxes_.update();
   if (skins_) skins_->update(m, d);
   for (int i = 0; i < m->nlight; ++i) {
     std::copy_n(d->light_xpos + 3 * i, 3, lights_[i].pos);
@@ -148,12 +145,11 @@ void RayWorld::set_local_box(RayGeom& g) const {
 void RayWorld::set_world_box(int i) {
   const RayGeom& g = geoms_[i];
   const float *c = g.center, *h = g.half;
+  float low[3], high[3];
   for (int k = 0; k < 3; ++k) {
-    float* low = bounds_.row<float>(k).data() + i;
-    float* high = bounds_.row<float>(3 + k).data() + i;
     if (g.type == mjGEOM_PLANE) {
-      *low = -kEndless;
-      *high = kEndless;
+      low[k] = -kEndless;
+      high[k] = kEndless;
       continue;
     }
     const float* r = g.rot + 3 * k;
@@ -161,9 +157,10 @@ void RayWorld::set_world_box(int i) {
         static_cast<float>(g.pos[k] + static_cast<double>(r[0] * c[0] + r[1] * c[1] + r[2] * c[2]));
     float reach = std::abs(r[0]) * h[0] + std::abs(r[1]) * h[1] + std::abs(r[2]) * h[2];
     reach += 1e-6f + 4e-7f * (std::abs(x) + reach);
-    *low = x - reach;
-    *high = x + reach;
+    low[k] = x - reach;
+    high[k] = x + reach;
   }
+  boxes_.set(i, low, high);
 }
 
 }  // namespace mjsense

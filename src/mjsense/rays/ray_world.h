@@ -5,13 +5,12 @@
 
 #include <mujoco/mujoco.h>
 
-#include <array>
 #include <cstdint>
 #include <memory>
 #include <span>
 #include <vector>
 
-#include "mjsense/core/array.h"
+#include "mjsense/rays/box_list.h"
 #include "mjsense/rays/ray_geom.h"
 
 namespace mjsense {
@@ -44,9 +43,7 @@ class RayWorld {
 
   const RayGeom& geom(int id) const { return geoms_[id]; }
   std::span<const RayGeom> geoms() const { return geoms_; }
-  // Boxes in the world, by coordinate [num_objects, padded to 16]; planes reach to +-1e30.
-  const std::array<const float*, 3>& low() const { return low_; }
-  const std::array<const float*, 3>& high() const { return high_; }
+  const BoxList& boxes() const { return boxes_; }  // in the world
   // Bit g of group g; kTransparent if its alpha is 0; 0 for padding.
   static constexpr std::uint32_t kTransparent = 0x100;
   std::span<const std::uint32_t> flags() const { return flags_; }
@@ -72,8 +69,7 @@ class RayWorld {
   const SharedGeometry* shapes_;
   std::unique_ptr<FlexShapes> flexes_;
   std::unique_ptr<SkinShapes> skins_;
-  Array bounds_;                                // [6, padded]
-  std::array<const float*, 3> low_{}, high_{};  // its rows
+  BoxList boxes_;
   std::vector<std::uint32_t> flags_;
   std::vector<int> bodies_, materials_;
   std::vector<float> rgba_;
