@@ -36,6 +36,7 @@ set(MJSENSE_PUBLIC_HEADERS
   mjsense/episode/active_worlds.h
   mjsense/episode/object_sensors.h
   mjsense/episode/object_shape.h
+  mjsense/episode/perturbation.h
   mjsense/episode/policy.h
   mjsense/episode/task.h
   mjsense/observe/camera_parameters.h

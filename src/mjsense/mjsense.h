@@ -35,6 +35,7 @@
 #include "mjsense/episode/active_worlds.h"
 #include "mjsense/episode/object_sensors.h"
 #include "mjsense/episode/object_shape.h"
+#include "mjsense/episode/perturbation.h"
 #include "mjsense/episode/policy.h"
 #include "mjsense/episode/task.h"
 #include "mjsense/observe/camera_parameters.h"

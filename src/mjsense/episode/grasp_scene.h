@@ -5,7 +5,9 @@
 
 #include <span>
 #include <string>
+#include <vector>
 
+#include "mjsense/core/sensor.h"
 #include "mjsense/episode/object_shape.h"
 
 namespace mjsense {
@@ -16,6 +18,16 @@ struct GraspObject {
   ObjectShape shape;
 };
 
+// Where a task wants its target put.
+class PlaceScene {
+ public:
+  virtual ~PlaceScene() = default;
+  // Body on, in or beside which it is to come to rest.
+  virtual int receptacle(int world) const = 0;
+  // Where the middle of its underside may be (m, world), best first, as the world stands; `out` is empty.
+  virtual void places(const World& world, std::vector<Vec3>& out) const = 0;
+};
+
 class GraspScene {
  public:
   virtual ~GraspScene() = default;
@@ -23,6 +35,8 @@ class GraspScene {
   virtual int target(int world) const = 0;                       // index in all_objects()
   virtual double support_height(
       int world) const = 0;  // m, of what the target stands on at the start
+  // Null: it is only to be picked up.
+  virtual const PlaceScene* place_scene() const { return nullptr; }
 };
 
 }  // namespace mjsense

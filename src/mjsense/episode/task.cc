@@ -94,12 +94,21 @@ void Task::begin(const World& world) {
   Episode& episode = episodes_[world.id];
   episode.step = 0;
   episode.done = false;
+  episode.perturbation.begin(cfg_.perturb, cfg_.seed, episode.number);
   robot_->reset(world);
 }
 
 void Task::apply(const World& world, const Action& action, const StateRow& state) {
   Episode& episode = episodes_[world.id];
-  robot_->command(world, action);
+  if (episode.perturbation.kind() == Perturbation::Kind::kNone) {
+    robot_->command(world, action);
+  } else {
+    Action disturbed = action;
+    const auto of = objects(world.id);
+    episode.perturbation.apply(world, *robot_, of.empty() ? -1 : of[0].body, episode.step,
+                               disturbed, state);
+    robot_->command(world, disturbed);
+  }
   // The world's index is no part of the key: an episode is the same wherever it runs.
   Rng noise(cfg_.seed, static_cast<std::uint32_t>(episode.step), stream_of("task/action_noise"),
             static_cast<std::uint64_t>(episode.number));

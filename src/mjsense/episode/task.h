@@ -31,6 +31,7 @@
 #include "mjsense/core/pose.h"
 #include "mjsense/core/sensor.h"
 #include "mjsense/episode/active_worlds.h"
+#include "mjsense/episode/perturbation.h"
 #include "mjsense/robots/robot.h"
 #include "mjsense/robots/scene_robot.h"
 #include "mjsense/scene/scene.h"
@@ -55,6 +56,8 @@ struct TaskCfg {
   int sim_dt_ms = 2;      // one physics step
   bool action_noise = true;
   bool terminate_upon_success = false;
+  double perturb =
+      0;  // share of episodes in which something goes wrong on purpose (perturbation.h)
 };
 
 // An object that plays a role in an episode: "pickup_obj" -> a body.
@@ -152,6 +155,8 @@ class Task {
   std::int64_t episode(int world) const { return episodes_[world].number; }
   int episode_step(int world) const { return episodes_[world].step; }
   bool done_received(int world) const { return episodes_[world].done; }
+  // What goes wrong on purpose in this world's episode.
+  const Perturbation& perturbation(int world) const { return episodes_[world].perturbation; }
   // As the policy gave it, before clipping and noise; null before the first.
   const Action* last_action(int world) const {
     return episodes_[world].step > 0 ? &episodes_[world].action : nullptr;
@@ -203,6 +208,7 @@ class Task {
     int step = 0;
     bool done = false;
     Action action;
+    Perturbation perturbation;
   };
   TaskCfg cfg_;
   const mjModel* model_ = nullptr;

@@ -8,19 +8,36 @@
 #include <vector>
 
 #include "mjsense/core/error.h"
+#include "mjsense/policies/planner/manipulation_planner.h"
 #include "mjsense/policies/planner/opening_planner.h"
 #include "mjsense/policies/planner/pick_planner.h"
 
 namespace mjsense {
 namespace {
 
+std::unique_ptr<PlannerPolicy> make_manipulation() {
+  return std::make_unique<ManipulationPlanner>();
+}
+
+// On the plain tables an arm that moves its tool alone takes things from above, as it always did,
+// seed for seed; everywhere else, and with any other hand, from wherever it likes.
+std::unique_ptr<PlannerPolicy> make_picker(const Task& task) {
+  const std::string& scene = task.cfg().scene;
+  const bool plain = scene.empty() || scene == "table" || scene == "varied_table";
+  if (plain && PickPlanner::can_use(task.robot())) return std::make_unique<PickPlanner>();
+  return make_manipulation();
+}
+
 struct Planners {
   std::mutex mutex;
   // By task type; ours, then others in the order in which they came.
   std::vector<std::pair<std::string, PlannerFactory>> entries{
-      {"pick", [] { return std::make_unique<PickPlanner>(); }},
       {"open", [] { return std::make_unique<OpeningPlanner>(); }},
-      {"close", [] { return std::make_unique<OpeningPlanner>(); }}};
+      {"close", [] { return std::make_unique<OpeningPlanner>(); }},
+      {"pick_and_place", make_manipulation},
+      {"pick_and_place_next_to", make_manipulation},
+      {"pick_and_place_color", make_manipulation},
+      {"packing", make_manipulation}};
 };
 
 Planners& planners() {
@@ -30,10 +47,11 @@ Planners& planners() {
 
 class AnyPlanner final : public PlannerPolicy {
  public:
-  std::string_view name() const override { return "planner"; }
+  explicit AnyPlanner(bool from_anywhere) : from_anywhere_(from_anywhere) {}
+  std::string_view name() const override { return from_anywhere_ ? "free_planner" : "planner"; }
   void bind(const std::shared_ptr<Simulation>& simulation) override { simulation_ = simulation; }
   void initialize(Task& task) override {
-    planner_ = make_planner(task);
+    planner_ = make_planner(task, from_anywhere_);
     if (simulation_) planner_->bind(simulation_);
     simulation_.reset();
     planner_->initialize(task);
@@ -56,6 +74,7 @@ class AnyPlanner final : public PlannerPolicy {
   }
 
  private:
+  bool from_anywhere_;
   std::unique_ptr<PlannerPolicy> planner_;
   std::shared_ptr<Simulation> simulation_;  // until there is a planner to be bound to it
 };
@@ -73,7 +92,7 @@ void register_planner(std::string task_type, PlannerFactory make) {
   all.entries.emplace_back(std::move(task_type), std::move(make));
 }
 
-std::unique_ptr<PlannerPolicy> make_planner(const Task& task) {
+std::unique_ptr<PlannerPolicy> make_planner(const Task& task, bool from_anywhere) {
   Planners& all = planners();
   PlannerFactory make;
   std::string types;
@@ -85,13 +104,14 @@ std::unique_ptr<PlannerPolicy> make_planner(const Task& task) {
     }
   }
   if (make) return make();
-  if (task.grasp_scene()) return std::make_unique<PickPlanner>();
+  if (task.grasp_scene()) return from_anywhere ? make_manipulation() : make_picker(task);
   throw ValueError(fmt::format(
       "policy 'planner' cannot do task '{}': it knows tasks of type {}, and picks where "
       "a task has a GraspScene",
       task.name(), types));
 }
 
-std::unique_ptr<Policy> make_any_planner() { return std::make_unique<AnyPlanner>(); }
+std::unique_ptr<Policy> make_any_planner() { return std::make_unique<AnyPlanner>(false); }
+std::unique_ptr<Policy> make_free_planner() { return std::make_unique<AnyPlanner>(true); }
 
 }  // namespace mjsense

@@ -9,6 +9,7 @@
 #include "mjsense/rollout/planners.h"
 #include "mjsense/tasks/opening/opening.h"
 #include "mjsense/tasks/pick/pick.h"
+#include "mjsense/tasks/pick_and_place/pick_and_place.h"
 
 namespace mjsense {
 namespace {
@@ -57,20 +58,29 @@ class Registry {
   std::vector<Entry> entries_;
 };
 
+template <PlaceKind kind>
+std::unique_ptr<Task> pick_and_place(TaskCfg cfg) {
+  return std::make_unique<PickAndPlaceTask>(kind, std::move(cfg));
+}
+
 Registry<TaskFactory>& tasks() {
   static Registry<TaskFactory> all(
       "tasks", "task",
       {{"pick", [](TaskCfg c) { return std::make_unique<PickTask>(std::move(c)); }},
        {"open",
         [](TaskCfg c) { return std::make_unique<OpeningTask>(std::move(c), OpeningKind::kOpen); }},
-       {"close", [](TaskCfg c) {
-          return std::make_unique<OpeningTask>(std::move(c), OpeningKind::kClose);
-        }}});
+       {"close",
+        [](TaskCfg c) { return std::make_unique<OpeningTask>(std::move(c), OpeningKind::kClose); }},
+       {"pick_and_place", pick_and_place<PlaceKind::kInOrOn>},
+       {"pick_and_place_next_to", pick_and_place<PlaceKind::kNextTo>},
+       {"pick_and_place_color", pick_and_place<PlaceKind::kColor>},
+       {"packing", pick_and_place<PlaceKind::kPacking>}});
   return all;
 }
 
 Registry<PolicyFactory>& policies() {
-  static Registry<PolicyFactory> all("policies", "policy", {{"planner", make_any_planner}});
+  static Registry<PolicyFactory> all(
+      "policies", "policy", {{"planner", make_any_planner}, {"free_planner", make_free_planner}});
   return all;
 }
 

@@ -41,6 +41,7 @@ TaskCfg task_cfg(const RolloutCfg& cfg) {
   }
   out.seed = cfg.seed;
   out.action_noise = cfg.action_noise;
+  out.perturb = cfg.perturb;
   out.terminate_upon_success = cfg.terminate_upon_success;
   if (cfg.horizon) out.horizon = *cfg.horizon;
   return out;
@@ -95,6 +96,7 @@ Rollout::Rollout(RolloutCfg cfg, std::shared_ptr<Task> task, std::shared_ptr<Pol
   cfg_.seed = own.seed;
   cfg_.horizon = own.horizon;
   cfg_.action_noise = own.action_noise;
+  cfg_.perturb = own.perturb;
   cfg_.terminate_upon_success = own.terminate_upon_success;
   check_fields(cfg_, "");
   make();

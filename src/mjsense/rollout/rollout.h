@@ -61,6 +61,7 @@ struct RolloutCfg {
   std::optional<int> horizon;
   bool action_noise = true;
   bool terminate_upon_success = false;
+  double perturb = 0;
   bool use_sensors = true;
   // Make the task, the policy and the scene instead of those with a name; `task`, `policy` and
   // `scene` above are then what people read.
@@ -112,6 +113,12 @@ void visit_fields(V& v, RolloutCfg& c) {
   v("action_noise", c.action_noise, "Commands reach the arm with noise.")
       .option("noise")
       .decides_data();
+  v("perturb", c.perturb,
+    "Share of episodes in which something goes wrong on purpose: the object is shoved, or slips "
+    "from "
+    "the hand.")
+      .within(0, 1)
+      .decides_data_as("perturb");
   v("terminate_upon_success", c.terminate_upon_success, "An episode ends at its first success.")
       .decides_data_as("terminate_upon_success");
   v("use_sensors", c.use_sensors,

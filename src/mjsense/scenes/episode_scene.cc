@@ -162,6 +162,8 @@ void EpisodeScene::find_objects(std::string_view robot_prefix) {
     SceneObject object{body, last_part(one.body),       one.text, one.other_texts,
                        {},   object_shape(model_, body)};
     if (object.text.empty()) object.text = object.kind;
+    object.receptacle = one.receptacle;
+    object.color = one.color;
     for (const std::string& rest : one.rests) object.rests.push_back(rest_of(rest));
     objects_.push_back(std::move(object));
   }
@@ -211,21 +213,33 @@ void EpisodeScene::find_regions() {
   }
 }
 
+std::vector<int> EpisodeScene::where(bool receptacle) const {
+  std::vector<int> found;
+  for (std::size_t i = 0; i < objects_.size(); ++i) {
+    if (objects_[i].receptacle == receptacle) found.push_back(static_cast<int>(i));
+  }
+  return found;
+}
+
 Pose EpisodeScene::sample(int world, int target, std::uint64_t seed, std::uint64_t episode,
                           Rng& rng, const StateRow& state) {
+  return sample(world, std::span(&target, target >= 0 ? 1u : 0u), seed, episode, rng, state);
+}
+
+Pose EpisodeScene::sample(int world, std::span<const int> wanted, std::uint64_t seed,
+                          std::uint64_t episode, Rng& rng, const StateRow& state) {
+  const int target = wanted.empty() ? -1 : wanted[0];
   const auto n = static_cast<int>(objects_.size());
   char* present = present_.data() + static_cast<std::size_t>(world) * n;
   std::fill(present, present + n, 1);
   if (cfg_.count[0] > 0 && n > 0) {
     Rng draw(seed, 0, stream_of("scene/count"), episode);
     const int most = std::min(cfg_.count[1], n), least = std::min(cfg_.count[0], n);
-    int wanted = least + static_cast<int>(draw.below(static_cast<std::uint32_t>(most - least + 1)));
+    int many = least + static_cast<int>(draw.below(static_cast<std::uint32_t>(most - least + 1)));
     std::fill(present, present + n, 0);
-    if (target >= 0) {
-      present[target] = 1;
-      --wanted;
-    }
-    while (wanted-- > 0) {  // one of the others, each as likely
+    for (int i : wanted) present[i] = 1;
+    many -= static_cast<int>(wanted.size());
+    while (many-- > 0) {  // one of the others, each as likely
       int k = static_cast<int>(
           draw.below(static_cast<std::uint32_t>(std::count(present, present + n, 0))));
       for (int i = 0; i < n; ++i) {
@@ -241,7 +255,7 @@ Pose EpisodeScene::sample(int world, int target, std::uint64_t seed, std::uint64
       resting.push_back({&objects_[i].shape, objects_[i].rests});
       poses[i].p = {100.0 + i, 100.0, 0.5};  // where nobody looks
     }
-    lay_out(resting, target, {present, static_cast<std::size_t>(n)}, regions_,
+    lay_out(resting, wanted, {present, static_cast<std::size_t>(n)}, regions_,
             {cfg_.gap, cfg_.target_gap, cfg_.drop}, rng, poses, region_of);
     for (int i = 0; i < n; ++i) {
       const int joint = model_->body_jntadr[objects_[i].body];

@@ -26,6 +26,8 @@ struct SceneObject {
   std::vector<std::string> others;  // what else they call it
   std::vector<Quat> rests;
   ObjectShape shape;
+  bool receptacle = false;  // things are put in or on it
+  std::string color;
 };
 
 class EpisodeScene {
@@ -53,6 +55,12 @@ class EpisodeScene {
   // returns where the robot's base stands. `rng` gives the places.
   Pose sample(int world, int target, std::uint64_t seed, std::uint64_t episode, Rng& rng,
               const StateRow& state);
+  // The same, about several: they are there, and within reach; the first is the target.
+  Pose sample(int world, std::span<const int> wanted, std::uint64_t seed, std::uint64_t episode,
+              Rng& rng, const StateRow& state);
+  // Indices of the objects to pick up, and of the receptacles.
+  std::vector<int> things() const { return where(false); }
+  std::vector<int> receptacles() const { return where(true); }
   // The episode's lights and colours; false if there is nothing to vary.
   bool vary_look(int world, std::uint64_t seed, std::uint64_t episode) const;
   // What is wrong with the start that this fresh world shows: an object inside something by more
@@ -62,6 +70,7 @@ class EpisodeScene {
  private:
   void find_objects(std::string_view robot_prefix);
   void find_regions();
+  std::vector<int> where(bool receptacle) const;
   std::string place() const;
 
   SceneFileCfg cfg_;

@@ -37,18 +37,22 @@ struct Spot {
 
 }  // namespace
 
-void lay_out(std::span<const Resting> objects, int target, std::span<const char> present,
-             std::span<const Region> regions, const LayoutCfg& cfg, Rng& rng, std::span<Pose> poses,
-             std::span<int> region_of) {
+void lay_out(std::span<const Resting> objects, std::span<const int> wanted,
+             std::span<const char> present, std::span<const Region> regions, const LayoutCfg& cfg,
+             Rng& rng, std::span<Pose> poses, std::span<int> region_of) {
   const int n = static_cast<int>(objects.size());
   std::vector<Placed> placed;
-  for (int k = 0; k < n; ++k) {
-    // The target first, then the others in order.
-    const int object = target < 0 ? k : k == 0 ? target : k <= target ? k - 1 : k;
+  const int target = wanted.empty() ? -1 : wanted[0];
+  std::vector<int> order(wanted.begin(), wanted.end());
+  for (int object = 0; object < n; ++object) {
+    if (std::ranges::count(wanted, object) == 0) order.push_back(object);
+  }
+  for (int object : order) {
     if (!present[object]) continue;
     const auto many = static_cast<std::uint32_t>(regions.size());
     const int region = many == 1 ? 0 : static_cast<int>(rng.below(many));
-    const Area& area = object == target ? regions[region].target_area : regions[region].area;
+    const bool near = std::ranges::count(wanted, object) > 0;
+    const Area& area = near ? regions[region].target_area : regions[region].area;
     const Quat rest =
         objects[object].rests[rng.below(static_cast<std::uint32_t>(objects[object].rests.size()))];
     const Footprint print = footprint(*objects[object].shape, rest);

@@ -35,10 +35,11 @@ struct Resting {
   std::span<const Quat> rests;
 };
 
-// Poses X_WO of `objects` and the regions on which they stand, the target first (-1: there is none), the others in order;
-// those that are not `present` keep what is there. A function of the random numbers alone.
-void lay_out(std::span<const Resting> objects, int target, std::span<const char> present,
-             std::span<const Region> regions, const LayoutCfg& cfg, Rng& rng, std::span<Pose> poses,
-             std::span<int> region_of);
+// Poses X_WO of `objects` and the regions on which they stand: those that are `wanted` first, in this order and in
+// the regions' target areas - the first of them, if any, is the target -, then the others in order; those that
+// are not `present` keep what is there. A function of the random numbers alone.
+void lay_out(std::span<const Resting> objects, std::span<const int> wanted,
+             std::span<const char> present, std::span<const Region> regions, const LayoutCfg& cfg,
+             Rng& rng, std::span<Pose> poses, std::span<int> region_of);
 
 }  // namespace mjsense

@@ -45,6 +45,8 @@ struct SceneObjectCfg {
   std::string text;
   std::vector<std::string> other_texts;
   std::vector<std::string> rests{"upright"};
+  bool receptacle = false;
+  std::string color;
 };
 template <class V>
 void visit_fields(V& v, SceneObjectCfg& c) {
@@ -53,6 +55,8 @@ void visit_fields(V& v, SceneObjectCfg& c) {
   v("text", c.text, "What people call it; without it the last part of its name.").or_none();
   v("other_texts", c.other_texts, "What else they call it.");
   v("rests", c.rests, "How it may rest.").one_of(kRests).not_empty();
+  v("receptacle", c.receptacle, "Things are put in or on it; it is not picked up itself.");
+  v("color", c.color, "Of a receptacle: what tells it from others of its kind.").or_none();
 }
 
 struct SceneRegionCfg {

@@ -9,6 +9,7 @@
 #include <numbers>
 
 #include "mjsense/observe/frame.h"
+#include "mjsense/policies/planner/squeeze.h"
 
 namespace mjsense {
 namespace {
@@ -17,9 +18,6 @@ using std::numbers::pi;
 
 constexpr int kYaws = 24;              // closing directions over half a turn
 constexpr double kSupportGap = 0.004;  // m, finger tips above the support
-constexpr double kSideGap = 0.006;     // m, free on each side of the object before closing
-constexpr double kFaceDepth = 0.002;   // m, what counts as one face
-constexpr double kFaceWidth = 0.010;   // m, of the face that both pads touch
 constexpr double kTopGap = 0.012;      // m, of the tool's origin below the top of a high object
 // Slides of the grasp along the object, across the closing direction.
 constexpr std::array<double, 5> kSlides{0.0, 0.012, -0.012, 0.024, -0.024};
@@ -27,44 +25,6 @@ constexpr std::array<double, 5> kSlides{0.0, 0.012, -0.012, 0.024, -0.024};
 struct DataDelete {
   void operator()(mjData* data) const { mj_deleteData(data); }
 };
-
-// Extent of the surface between the pads, and of the faces that they would touch.
-struct Squeeze {
-  double low = std::numeric_limits<double>::infinity(), high = -low;
-  double face = 0;  // m, overlap of the two faces across the closing direction
-};
-
-Squeeze squeeze(std::span<const Vec3> points, Vec3 center, Vec3 close, Vec3 across,
-                double half_width, double half_length) {
-  const auto inside = [&](Vec3 r) {
-    return std::abs(dot(r, across)) <= half_width && std::abs(r.z) <= half_length;
-  };
-  Squeeze s;
-  for (Vec3 p : points) {
-    const Vec3 r = p - center;
-    if (!inside(r)) continue;
-    const double c = dot(r, close);
-    s.low = std::min(s.low, c);
-    s.high = std::max(s.high, c);
-  }
-  if (!(s.low < s.high)) return s;
-  double low0 = 1, low1 = -1, high0 = 1, high1 = -1;
-  for (Vec3 p : points) {
-    const Vec3 r = p - center;
-    if (!inside(r)) continue;
-    const double c = dot(r, close), u = dot(r, across);
-    if (c < s.low + kFaceDepth) {
-      low0 = std::min(low0, u);
-      low1 = std::max(low1, u);
-    }
-    if (c > s.high - kFaceDepth) {
-      high0 = std::min(high0, u);
-      high1 = std::max(high1, u);
-    }
-  }
-  s.face = std::min(low1, high1) - std::max(low0, high0);
-  return s;
-}
 
 }  // namespace
 
@@ -154,9 +114,11 @@ std::vector<Grasp> propose_grasps(const GripperShape& gripper, const ObjectShape
       const Vec3 close{std::cos(yaw), std::sin(yaw), 0}, across{-close.y, close.x, 0};
       for (double slide : kSlides) {
         const Vec3 center = Vec3{object.p.x, object.p.y, z} + slide * across;
-        const Squeeze s = squeeze(points, center, close, across, half_width, half_length);
+        const Squeeze s =
+            squeeze(points, center, close, across, {0, 0, 1}, half_width, half_length);
         const double width = s.high - s.low;
-        if (!(width > 0.004 && width < gripper.max_opening - 2 * kSideGap) || s.face < kFaceWidth)
+        if (!(width > kLeastWidth && width < gripper.max_opening - 2 * kSideGap) ||
+            s.face < kFaceWidth)
           continue;
         const Vec3 position = center + (0.5 * (s.low + s.high)) * close;
         // The tool's y axis may point either way along the closing direction.

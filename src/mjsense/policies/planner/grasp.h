@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
-// Where a parallel gripper can take an object that lies on a support, from above.
+// Where a parallel gripper can take an object: from above, as it lies on a support, or from anywhere.
 //
 // Tool frame: z the approach, y the closing direction, the origin between the finger tips.
 
@@ -28,6 +28,8 @@ struct GripperShape {
 
   // From the gripper group's geoms that touch, at its start configuration.
   GripperShape(const mjModel* model, const Robot& robot, int gripper);
+  // Height (m) of the lowest corner of a box in the world.
+  double lowest(const Pose& tool) const;
   // True if one of the points lies within `margin` of a box.
   bool hits(const Pose& tool, const Pose& object, const ObjectShape& shape, double margin) const;
 };
@@ -43,5 +45,16 @@ struct Grasp {
 // enough to hold against turning.
 std::vector<Grasp> propose_grasps(const GripperShape& gripper, const ObjectShape& shape,
                                   const Pose& object, double support_height, const Pose& tool);
+
+// Grasps of an object in its own frame, whatever it stands on: closing directions all over the
+// sphere, sixteen approaches about each; chosen by the same faces. The open gripper touches the object in none.
+// `cost` is 8 * distance to the object's origin (m).
+std::vector<Grasp> grasps_all_around(const GripperShape& gripper, const ObjectShape& shape);
+
+// The grasps of an object at X_WO in the world, by rising cost = distance to the tool (m) + 0.01 * turn (deg) - 2
+// * (approach . wanted) + 8 * distance to the object's origin (m). With wanted = -z these are the costs of
+// propose_grasps; another direction asks for grasps from there.
+std::vector<Grasp> rank_grasps(std::span<const Grasp> of_object, const Pose& object,
+                               const Pose& tool, Vec3 wanted);
 
 }  // namespace mjsense

@@ -4,6 +4,7 @@
 
 #include <mujoco/mujoco.h>
 
+#include <chrono>
 #include <cstdint>
 
 #include "mjsense/episode/policy.h"
@@ -31,7 +32,8 @@ struct EpisodeResult {
   bool success = false;
   bool gave_up = false;
   bool truncated = false;
-  double reward = 0;  // of the last observation
+  double reward = 0;        // of the last observation
+  double first_plan_s = 0;  // wall
 };
 
 inline EpisodeResult run_episode(Task& task, Policy& policy, mjData* data, int world_id,
@@ -43,8 +45,11 @@ inline EpisodeResult run_episode(Task& task, Policy& policy, mjData* data, int w
   World world{.id = world_id, .model = model, .data = data};
   world.first = true;
   task.begin(world);
-  policy.reset(world);
   EpisodeResult result;
+  const auto before = std::chrono::steady_clock::now();
+  policy.reset(world);
+  result.first_plan_s =
+      std::chrono::duration<double>(std::chrono::steady_clock::now() - before).count();
   Action action;
   for (;;) {
     policy.act(world, action);

@@ -32,20 +32,26 @@ std::span<const Phase> PickPlanner::phases() const { return kManipulationPhases;
 
 int PickPlanner::first_phase() const { return kOpenGripper; }
 
+bool PickPlanner::can_use(const Robot& robot) {
+  return robot.arm() >= 0 && robot.gripper() >= 0 &&
+         std::ranges::equal(robot.chain(robot.arm()).joints(), robot.groups()[robot.arm()].joints);
+}
+
 void PickPlanner::initialize_planner() {
   scene_ = task().grasp_scene();
   if (!scene_)
     throw ValueError(fmt::format("policy 'planner' picks; it cannot do task '{}'", task().name()));
+  if (can_use(robot())) {
+    gripper_shape_ = std::make_unique<GripperShape>(task().model(), robot(), robot().gripper());
+    return;
+  }
   if (robot().arm() < 0 || robot().gripper() < 0)
     throw ValueError(fmt::format(
         "policy 'planner' needs an arm and a gripper; robot '{}' lacks one", robot().name()));
-  const auto driven = robot().chain(robot().arm()).joints();
-  if (!std::ranges::equal(driven, robot().groups()[robot().arm()].joints))
-    throw ValueError(
-        fmt::format("policy 'planner' moves the tool by the arm alone; that of robot '{}' moves "
-                    "with others too",
-                    robot().name()));
-  gripper_shape_ = std::make_unique<GripperShape>(task().model(), robot(), robot().gripper());
+  throw ValueError(
+      fmt::format("policy 'planner' moves the tool by the arm alone; that of robot '{}' moves "
+                  "with others too",
+                  robot().name()));
 }
 
 void PickPlanner::read_arm(const World& world, std::span<double> q) const {

@@ -22,6 +22,8 @@ struct PickPlannerCfg {
 class PickPlanner final : public TaskPlanner {
  public:
   explicit PickPlanner(PickPlannerCfg cfg = {}) : TaskPlanner(cfg.planner), cfg_(cfg) {}
+  // It has a gripper on an arm, whose joints alone move the tool.
+  static bool can_use(const Robot& robot);
   std::span<const Phase> phases() const override;
 
  protected:

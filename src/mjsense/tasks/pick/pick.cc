@@ -32,7 +32,8 @@ void PickTask::bind(const std::shared_ptr<Simulation>& simulation) {
 
 void PickTask::initialize_task() {
   scene_.initialize(model(), num_worlds(), robot_entity() + "/");
-  if (scene_.objects().empty())
+  things_ = scene_.things();
+  if (things_.empty())
     throw ValueError(fmt::format(
         "task 'pick': scene '{}' has nothing to pick up: no body with a free joint that a hand can "
         "hold",
@@ -49,7 +50,7 @@ void PickTask::initialize_task() {
 
 std::optional<Pose> PickTask::sample_scene(int world, Rng& rng, const StateRow& state) {
   const auto episode = static_cast<std::uint64_t>(this->episode(world));
-  const int target = static_cast<int>(rng.below(static_cast<std::uint32_t>(objects_.size())));
+  const int target = things_[rng.below(static_cast<std::uint32_t>(things_.size()))];
   const SceneObject& object = scene_.objects()[target];
   targets_[world].index = target;
   targets_[world].object = {std::string(kRole), object.body, object.text};

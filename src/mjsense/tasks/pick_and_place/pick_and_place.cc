@@ -1,0 +1,328 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "mjsense/tasks/pick_and_place/pick_and_place.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <numbers>
+
+#include "mjsense/core/error.h"
+#include "mjsense/scenes/load_scene.h"
+#include "mjsense/tasks/pick_and_place/support.h"
+
+namespace mjsense {
+namespace {
+
+using std::numbers::pi;
+
+constexpr std::string_view kScene = "tableware";
+constexpr double kGoal = 0.03;                                   // m, goal above the start
+constexpr double kMoved = 0.1, kMovedBeside = 0.05;              // m, most of the receptacle
+constexpr double kTurned = 45 * pi / 180;                        // most of its tilt; its turn
+constexpr double kBeside = 0.05 + 0.01;                          // m, most from above
+constexpr double kSamePlace = 0.005, kSameTurn = 10 * pi / 180;  // of a pose carried forward
+constexpr double kSameHeight = 0.01;  // m, of undersides without contact forces
+constexpr double kBesideGap = 0.03;   // m that a planner aims at
+
+Pose pose_of(const World& world, int body) {
+  return {vec3(world.data->xpos + 3 * body), quat(world.data->xquat + 4 * body)};
+}
+
+// What is said of receptacles that are alike but for the colour: "bowl".
+const std::string& noun(const SceneObject& object) {
+  return object.others.empty() ? object.text : object.others[0];
+}
+
+}  // namespace
+
+PickAndPlaceTask::PickAndPlaceTask(PlaceKind kind, TaskCfg cfg)
+    : Task(std::move(cfg)),
+      kind_(kind),
+      scene_(load_scene(this->cfg().scene.empty() ? kScene : std::string_view(this->cfg().scene))) {
+}
+
+std::string_view PickAndPlaceTask::name() const {
+  switch (kind_) {
+    case PlaceKind::kNextTo:
+      return "pick_and_place_next_to";
+    case PlaceKind::kColor:
+      return "pick_and_place_color";
+    case PlaceKind::kPacking:
+      return "packing";
+    default:
+      return "pick_and_place";
+  }
+}
+
+SceneCfg PickAndPlaceTask::scene_cfg() const { return scene_.scene_cfg(robot_entity()); }
+
+void PickAndPlaceTask::bind(const std::shared_ptr<Simulation>& simulation) {
+  simulation_ = simulation;
+  scene_.bind(*simulation);
+}
+
+void PickAndPlaceTask::initialize_task() {
+  scene_.initialize(model(), num_worlds(), robot_entity() + "/");
+  const auto place = fmt::format("task '{}': scene '{}'", name(), scene_.cfg().name);
+  if (scene_.things().empty())
+    throw ValueError(fmt::format(
+        "{} has nothing to pick up: no body with a free joint that a hand can hold", place));
+  if (kind_ == PlaceKind::kNextTo) {
+    if (scene_.objects().size() < 2)
+      throw ValueError(fmt::format("{} has one object; there is nothing to put it next to", place));
+  } else if (scene_.receptacles().empty()) {
+    throw ValueError(
+        fmt::format("{} has no receptacle: none of its objects says receptacle = true", place));
+  }
+  objects_.clear();
+  for (const SceneObject& object : scene_.objects())
+    objects_.push_back({object.body, object.kind, object.shape});
+  if (kind_ == PlaceKind::kColor || kind_ == PlaceKind::kPacking) {
+    Rng any(0, 0, 0, 0);
+    if (choose(any).empty())
+      throw ValueError(
+          fmt::format("{} {}", place,
+                      kind_ == PlaceKind::kColor
+                          ? "has no two receptacles of one kind (other_texts) with different colors"
+                          : "has no receptacle whose kind is a box"));
+  }
+  episodes_.assign(num_worlds(), {});
+  for (Episode& episode : episodes_) {
+    episode.objects[0].role = kObject;
+    episode.objects[1].role = kReceptacle;
+    episode.supported.reserve(static_cast<std::size_t>(std::max(cfg().horizon, 0)) + 2);
+  }
+  robot_root_ = model()->body_rootid[robot().base_body()];
+}
+
+// The object, where it goes, and what else must be there; empty if the scene lacks it.
+std::vector<int> PickAndPlaceTask::choose(Rng& rng) const {
+  const auto any = [&](const std::vector<int>& of) {
+    return of[rng.below(static_cast<std::uint32_t>(of.size()))];
+  };
+  const auto objects = scene_.objects();
+  const int target = any(scene_.things());
+  std::vector<int> where;
+  const auto rivals = [&](int r) {
+    std::vector<int> found;
+    for (int other : scene_.receptacles()) {
+      if (noun(objects[other]) == noun(objects[r]) && objects[other].color != objects[r].color)
+        found.push_back(other);
+    }
+    return found;
+  };
+  if (kind_ == PlaceKind::kNextTo) {
+    for (int i = 0; i < static_cast<int>(objects.size()); ++i) {
+      if (i != target) where.push_back(i);
+    }
+  }
+  for (int r : scene_.receptacles()) {
+    if (kind_ == PlaceKind::kInOrOn ||
+        (kind_ == PlaceKind::kColor && !objects[r].color.empty() && !rivals(r).empty()) ||
+        (kind_ == PlaceKind::kPacking && objects[r].kind.find("box") != std::string::npos))
+      where.push_back(r);
+  }
+  if (where.empty()) return {};
+  const int receptacle = any(where);
+  std::vector<int> wanted{target, receptacle};
+  if (kind_ == PlaceKind::kColor) wanted.push_back(any(rivals(receptacle)));
+  return wanted;
+}
+
+std::optional<Pose> PickAndPlaceTask::sample_scene(int world, Rng& rng, const StateRow& state) {
+  const auto number = static_cast<std::uint64_t>(this->episode(world));
+  const std::vector<int> wanted = choose(rng);
+  Episode& episode = episodes_[world];
+  episode.target = wanted[0];
+  episode.receptacle = wanted[1];
+  for (int k = 0; k < 2; ++k) {
+    const SceneObject& object = scene_.objects()[wanted[k]];
+    episode.objects[k].body = object.body;
+    episode.objects[k].name = object.text;
+  }
+  const std::shared_ptr<Simulation> simulation = simulation_.lock();
+  if (scene_.vary_look(world, cfg().seed, number) && simulation)
+    simulation->worlds().model_changed();
+  return scene_.sample(world, wanted, cfg().seed, number, rng, state);
+}
+
+void PickAndPlaceTask::begin(const World& world) {
+  Task::begin(world);
+  Episode& episode = episodes_[world.id];
+  episode.start = pose_of(world, episode.objects[0].body);
+  episode.receptacle_start = pose_of(world, episode.objects[1].body);
+  episode.supported.clear();
+  episode.judgement = {};
+}
+
+const PickAndPlaceTask::Judgement& PickAndPlaceTask::judge_now(const World& world) const {
+  Episode& episode = episodes_[world.id];
+  Judgement& now = episode.judgement;
+  if (now.step == episode_step(world.id)) return now;
+  now = {};
+  now.step = episode_step(world.id);
+  const int object = episode.objects[0].body, receptacle = episode.objects[1].body;
+  const Pose of_object = pose_of(world, object), of_receptacle = pose_of(world, receptacle);
+  const Pose relative = inverse(of_receptacle) * of_object;
+  now.supported = carries(world, receptacle, object);
+  now.pos_diff = now.rot_diff = std::numeric_limits<double>::infinity();
+  for (const Pose& earlier : episode.supported) {
+    const double moved = norm(earlier.p - relative.p);
+    const double turned = angle_between(earlier.q, relative.q);
+    now.carried_forward = now.carried_forward || (moved <= kSamePlace && turned <= kSameTurn);
+    if (moved >= now.pos_diff) continue;
+    now.pos_diff = moved;
+    now.rot_diff = turned;
+  }
+  if (now.supported && episode.supported.size() < episode.supported.capacity())
+    episode.supported.push_back(relative);
+  now.robot_contact = touched_by(world, object, robot_root_);
+  now.position_error = norm(of_object.p - world_box(world, receptacle).center());
+  const Pose displaced = inverse(episode.receptacle_start) * of_receptacle;
+  now.moved = displaced.p;
+  now.turned = angle_between({}, displaced.q);
+  // Between its axis that was up and up: a turn about it is no tilt.
+  const Vec3 up = rotate(conjugate(episode.receptacle_start.q), {0, 0, 1});
+  now.tilted = std::acos(std::clamp(rotate(of_receptacle.q, up).z, -1.0, 1.0));
+  now.success = kind_ == PlaceKind::kNextTo
+                    ? is_next_to(world, now)
+                    : (now.supported || now.carried_forward) && !now.robot_contact &&
+                          norm(now.moved) <= kMoved && now.tilted <= kTurned;
+  return now;
+}
+
+bool PickAndPlaceTask::is_next_to(const World& world, const Judgement& now) const {
+  const Episode& episode = episodes_[world.id];
+  const int object = episode.objects[0].body, other = episode.objects[1].body;
+  const WorldBox a = world_box(world, object), b = world_box(world, other);
+  const double gap = gap_from_above(a, b);
+  if (gap < 0 || gap > kBeside || norm(now.moved) > kMovedBeside || now.turned > kTurned)
+    return false;
+  const int under = bearer(world, object), under_other = bearer(world, other);
+  if (under >= 0 && under_other >= 0) return under == under_other;
+  return std::abs(a.low.z - b.low.z) <= kSameHeight;
+}
+
+Evaluation PickAndPlaceTask::evaluate(const World& world) const {
+  const Judgement& now = judge_now(world);
+  return judge(world.id, std::exp(-now.position_error), now.success);
+}
+
+void PickAndPlaceTask::places(const World& world, std::vector<Vec3>& out) const {
+  const Episode& episode = episodes_[world.id];
+  const int body = episode.objects[1].body;
+  const WorldBox box = world_box(world, body);
+  const Vec3 c = box.center();
+  if (kind_ == PlaceKind::kNextTo) {
+    const WorldBox object = world_box(world, episode.objects[0].body);
+    // However the object will be turned.
+    const double half = 0.5 * std::max(object.high.x - object.low.x, object.high.y - object.low.y);
+    const double x = 0.5 * (box.high.x - box.low.x) + kBesideGap + half;
+    const double y = 0.5 * (box.high.y - box.low.y) + kBesideGap + half;
+    for (double along : {0.0, 0.02, -0.02}) {
+      for (int side = -1; side <= 1; side += 2) {
+        out.push_back({c.x + along, c.y + side * y, box.low.z});
+        out.push_back({c.x + side * x, c.y + along, box.low.z});
+      }
+    }
+    const Vec3 base = vec3(world.data->xpos + 3 * robot().base_body());
+    std::ranges::stable_sort(out, {},
+                             [&](Vec3 p) { return std::hypot(p.x - base.x, p.y - base.y); });
+    return;
+  }
+  // Low where it is open, else on the rim.
+  const Pose pose = pose_of(world, body);
+  const auto surface = [&](double x, double y) {
+    double top = -std::numeric_limits<double>::infinity();
+    for (Vec3 point : objects_[episode.receptacle].shape.points) {
+      const Vec3 p = pose * point;
+      if (std::hypot(p.x - x, p.y - y) < 0.012) top = std::max(top, p.z);
+    }
+    return top;
+  };
+  for (double radius : {0.0, 0.02, 0.04}) {
+    for (int k = 0; k < (radius > 0 ? 6 : 1); ++k) {
+      const double x = c.x + radius * std::cos(k * pi / 3), y = c.y + radius * std::sin(k * pi / 3);
+      const double z = surface(x, y);
+      if (std::isfinite(z)) out.push_back({x, y, z});
+    }
+  }
+  out.push_back({c.x, c.y, box.high.z});
+}
+
+std::string PickAndPlaceTask::place_text(int world) const {
+  const Episode& episode = episodes_[world];
+  const SceneObject& object = scene_.objects()[episode.receptacle];
+  if (kind_ == PlaceKind::kColor) return object.color + " " + noun(object);
+  return object.text;
+}
+
+std::string PickAndPlaceTask::description(int world) const {
+  const std::string& name = episodes_[world].objects[0].name;
+  const std::string where = place_text(world);
+  switch (kind_) {
+    case PlaceKind::kNextTo:
+      return fmt::format("Pick up the {} and place it next to the {}", name, where);
+    case PlaceKind::kPacking:
+      return fmt::format("Pick up the {} and place it into the {}", name, where);
+    default:
+      return fmt::format("Pick up the {} and place it in or on the {}", name, where);
+  }
+}
+
+Task::Referrals::value_type PickAndPlaceTask::referral(const char* key, int index) const {
+  const SceneObject& object = scene_.objects()[index];
+  std::vector<Referral> texts{{object.text, object.others.empty() ? 1.0 : 0.5}};
+  for (const std::string& other : object.others)
+    texts.push_back({other, 0.5 / static_cast<double>(object.others.size())});
+  return {key, std::move(texts)};
+}
+
+Task::Referrals PickAndPlaceTask::referrals(int world) const {
+  const Episode& episode = episodes_[world];
+  Referrals all{referral("pickup_name", episode.target),
+                referral("place_name", episode.receptacle)};
+  // Where its colour tells it from another, no name without the colour will do.
+  if (kind_ == PlaceKind::kColor) all[1].second = {{place_text(world), 1.0}};
+  return all;
+}
+
+Pose PickAndPlaceTask::start_pose(int world, std::string_view role) const {
+  if (role == kObject) return episodes_[world].start;
+  if (role == kReceptacle) return episodes_[world].receptacle_start;
+  const std::vector<std::string> roles{std::string(kObject), std::string(kReceptacle)};
+  throw_unknown(fmt::format("task '{}'", name()), "role", role, roles);
+}
+
+std::optional<Pose> PickAndPlaceTask::goal_pose(int world, std::string_view role) const {
+  Pose pose = start_pose(world, role);
+  if (role == kReceptacle) return {};
+  pose.p.z += kGoal;
+  return pose;
+}
+
+void PickAndPlaceTask::write_info(const World& world, JsonWriter& json) const {
+  const Judgement& now = judge_now(world);
+  json.key("carry_forward_pos_diff").value(now.pos_diff);
+  json.key("carry_forward_rot_diff").value(now.rot_diff);
+  json.key("episode_step").value(episode_step(world.id));
+  json.key("position_error").value(now.position_error);
+  const double moved[3] = {now.moved.x, now.moved.y, now.moved.z};
+  json.key("receptacle_pos_displacement").values(std::span<const double>(moved));
+  json.key("receptacle_rot_displacement").value(now.turned);
+  json.key("receptacle_tilt_displacement").value(now.tilted);
+  json.key("robot_contact").value(now.robot_contact);
+  json.key("success").value(now.success);
+  json.key("supported_by_carry_forward").value(now.carried_forward);
+  json.key("supported_by_receptacle").value(now.supported);
+}
+
+std::vector<std::pair<std::string, std::string>> PickAndPlaceTask::scene_info(int world) const {
+  return {{"text", description(world)},
+          {"object_name", episodes_[world].objects[0].name},
+          {"place_receptacle_name", episodes_[world].objects[1].name}};
+}
+
+}  // namespace mjsense

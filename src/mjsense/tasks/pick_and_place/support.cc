@@ -1,0 +1,132 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "mjsense/tasks/pick_and_place/support.h"
+
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+
+#include "mjsense/observe/frame.h"
+
+namespace mjsense {
+namespace {
+
+const double kSteep = std::cos(30 * std::numbers::pi / 180);
+constexpr double kShare = 0.5;    // of the weight; of the box from above
+constexpr double kClose = 0.010;  // m
+
+struct Touch {
+  int other;  // body
+  const mjContact* contact;
+  double sign;  // of the contact's frame: its normal points to the object
+  int id;
+};
+
+// Calls f for every contact of `object`'s subtree with something else.
+template <class F>
+void each_touch(const World& world, int object, F&& f) {
+  const mjModel* m = world.model;
+  for (int i = 0; i < world.data->ncon; ++i) {
+    const mjContact& contact = world.data->contact[i];
+    if (contact.exclude || contact.geom[0] < 0 || contact.geom[1] < 0) continue;
+    const int a = m->geom_bodyid[contact.geom[0]], b = m->geom_bodyid[contact.geom[1]];
+    const bool first = is_below(m, a, object), second = is_below(m, b, object);
+    if (first == second) continue;
+    f(Touch{second ? a : b, &contact, second ? 1.0 : -1.0, i});
+  }
+}
+
+Vec3 force_of(const World& world, const Touch& touch) {
+  double f[6];
+  mj_contactForce(world.model, world.data, touch.id, f);
+  const double* r = touch.contact->frame;  // rows are the axes
+  Vec3 sum;
+  for (int k = 0; k < 3; ++k) sum = sum + (touch.sign * f[k]) * vec3(r + 3 * k);
+  return sum;
+}
+
+}  // namespace
+
+WorldBox world_box(const World& world, int body) {
+  const mjModel* m = world.model;
+  WorldBox box{{1e10, 1e10, 1e10}, {-1e10, -1e10, -1e10}};
+  double* const low[3] = {&box.low.x, &box.low.y, &box.low.z};
+  double* const high[3] = {&box.high.x, &box.high.y, &box.high.z};
+  for (int g = 0; g < m->ngeom; ++g) {
+    if (!is_below(m, m->geom_bodyid[g], body)) continue;
+    const double *r = world.data->geom_xmat + 9 * g, *aabb = m->geom_aabb + 6 * g;
+    for (int k = 0; k < 3; ++k) {
+      double middle = world.data->geom_xpos[3 * g + k], half = 0;
+      for (int i = 0; i < 3; ++i) {
+        middle += r[3 * k + i] * aabb[i];
+        half += std::abs(r[3 * k + i]) * aabb[3 + i];
+      }
+      *low[k] = std::min(*low[k], middle - half);
+      *high[k] = std::max(*high[k], middle + half);
+    }
+  }
+  return box;
+}
+
+Vec3 contact_force(const World& world, int carrier, int object) {
+  Vec3 sum;
+  each_touch(world, object, [&](const Touch& touch) {
+    if (is_below(world.model, touch.other, carrier)) sum = sum + force_of(world, touch);
+  });
+  return sum;
+}
+
+bool bears(const World& world, Vec3 force, int object) {
+  const double weight =
+      world.model->body_subtreemass[object] * norm(vec3(world.model->opt.gravity));
+  return force.z > 0 && force.z >= kSteep * norm(force) && force.z >= kShare * weight;
+}
+
+bool seems_to_carry(const World& world, int carrier, int object) {
+  const WorldBox box = world_box(world, object), below = world_box(world, carrier);
+  bool found = false;
+  each_touch(world, object, [&](const Touch& touch) {
+    if (found || !is_below(world.model, touch.other, carrier)) return;
+    found =
+        touch.contact->pos[2] < box.center().z && touch.sign * touch.contact->frame[2] >= kSteep;
+  });
+  if (found) return true;
+  const double wide = std::min(box.high.x, below.high.x) - std::max(box.low.x, below.low.x);
+  const double deep = std::min(box.high.y, below.high.y) - std::max(box.low.y, below.low.y);
+  const double whole = (box.high.x - box.low.x) * (box.high.y - box.low.y);
+  return wide > 0 && deep > 0 && wide * deep >= kShare * whole &&
+         std::abs(box.low.z - below.high.z) <= kClose;
+}
+
+int bearer(const World& world, int object) {
+  int best = -1;
+  double most = 0;
+  each_touch(world, object, [&](const Touch& one) {
+    // The sum of each root is made where it is met; a few contacts make it no matter how often.
+    const int root = world.model->body_rootid[one.other];
+    Vec3 sum;
+    each_touch(world, object, [&](const Touch& touch) {
+      if (world.model->body_rootid[touch.other] == root) sum = sum + force_of(world, touch);
+    });
+    if (!bears(world, sum, object) || sum.z <= most) return;
+    most = sum.z;
+    best = root;
+  });
+  return best;
+}
+
+double gap_from_above(const WorldBox& a, const WorldBox& b) {
+  const double x = std::max(a.low.x - b.high.x, b.low.x - a.high.x);
+  const double y = std::max(a.low.y - b.high.y, b.low.y - a.high.y);
+  if (x < 0 && y < 0) return std::max(x, y);
+  return std::hypot(std::max(x, 0.0), std::max(y, 0.0));
+}
+
+bool touched_by(const World& world, int body, int other_root) {
+  bool found = false;
+  each_touch(world, body, [&](const Touch& touch) {
+    found = found || is_below(world.model, touch.other, other_root);
+  });
+  return found;
+}
+
+}  // namespace mjsense

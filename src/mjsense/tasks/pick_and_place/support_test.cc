@@ -1,0 +1,105 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "mjsense/tasks/pick_and_place/support.h"
+
+#include <gtest/gtest.h>
+
+#include <memory>
+
+namespace mjsense {
+namespace {
+
+// A table, a tray on it, and a block of 0.2 kg; seen from the side:
+//
+//          block
+//     _______________
+//    |     tray      |
+//   =====================  table, its top at z = 0
+struct Support : testing::Test {
+  static constexpr const char* kModel = R"(<mujoco><worldbody>
+    <body name="table" pos="0 0 -0.05"><geom type="box" size="1 1 0.05"/></body>
+    <body name="tray" pos="0 0 0.01"><freejoint/><geom type="box" size="0.1 0.1 0.01" mass="0.5"/></body>
+    <body name="block" pos="0 0 0.5"><freejoint/><geom type="box" size="0.03 0.03 0.03" mass="0.2"/></body>
+    <body name="wall" pos="-0.5 0 0.2"><geom type="box" size="0.01 0.5 0.2"/></body>
+  </worldbody></mujoco>)";
+  Support() {
+    char error[500] = "";
+    mjSpec* spec = mj_parseXMLString(kModel, nullptr, error, sizeof(error));
+    model.reset(mj_compile(spec, nullptr));
+    mj_deleteSpec(spec);
+    data.reset(mj_makeData(model.get()));
+    world = {.id = 0, .model = model.get(), .data = data.get()};
+  }
+  // The block at rest, or pushed by `push` N along x until nothing changes.
+  void put(double x, double y, double z, double push = 0, int steps = 1000) {
+    mj_resetData(model.get(), data.get());
+    double* q = data->qpos + 7;
+    q[0] = x, q[1] = y, q[2] = z;
+    data->xfrc_applied[6 * kBlock] = push;
+    for (int i = 0; i < steps; ++i) mj_step(model.get(), data.get());
+    mj_forward(model.get(), data.get());
+  }
+  static constexpr int kTable = 1, kTray = 2, kBlock = 3, kWall = 4;
+  std::unique_ptr<mjModel, decltype(&mj_deleteModel)> model{nullptr, mj_deleteModel};
+  std::unique_ptr<mjData, decltype(&mj_deleteData)> data{nullptr, mj_deleteData};
+  World world;
+};
+
+TEST_F(Support, ATrayBearsTheWeightOfABlock) {
+  put(0, 0, 0.05);
+  const Vec3 force = contact_force(world, kTray, kBlock);
+  EXPECT_NEAR(force.z, 0.2 * 9.81, 0.02);
+  EXPECT_NEAR(contact_force(world, kBlock, kTray).z, -0.2 * 9.81, 0.02) << "and is pressed down";
+  EXPECT_TRUE(bears(world, force, kBlock));
+  EXPECT_TRUE(carries(world, kTray, kBlock));
+  EXPECT_EQ(bearer(world, kBlock), kTray);
+  EXPECT_EQ(bearer(world, kTray), kTable);
+  EXPECT_FALSE(carries(world, kTable, kBlock));
+  EXPECT_FALSE(carries(world, kBlock, kTray));
+  EXPECT_TRUE(touched_by(world, kBlock, kTray));
+  EXPECT_FALSE(touched_by(world, kBlock, kTable));
+}
+
+TEST_F(Support, BesideTheTrayTheTableBears) {
+  put(0.2, 0, 0.03);
+  EXPECT_FALSE(carries(world, kTray, kBlock));
+  EXPECT_TRUE(carries(world, kTable, kBlock));
+  EXPECT_EQ(bearer(world, kBlock), kTable);
+}
+
+// Pressed against a wall by more than its weight the block hangs on friction: the force of the wall is not upright.
+TEST_F(Support, AWallDoesNotBear) {
+  put(-0.459, 0, 0.2, -60);
+  const Vec3 force = contact_force(world, kWall, kBlock);
+  ASSERT_GT(force.x, 30);
+  EXPECT_GT(force.z, 1.0) << "it does hold it up";
+  EXPECT_FALSE(bears(world, force, kBlock));
+  EXPECT_FALSE(carries(world, kWall, kBlock));
+}
+
+// Where nothing has been solved, or there is a hair's breadth between the two.
+TEST_F(Support, WithoutForcesTheBoxesDecide) {
+  put(0, 0, 0.02 + 0.03 + 0.005, 0, 0);
+  EXPECT_EQ(norm(contact_force(world, kTray, kBlock)), 0);
+  EXPECT_TRUE(seems_to_carry(world, kTray, kBlock));
+  put(0, 0, 0.02 + 0.03 + 0.011, 0, 0);
+  EXPECT_FALSE(seems_to_carry(world, kTray, kBlock)) << "more than 1 cm above";
+  put(0.1 - 0.001, 0, 0.055, 0, 0);
+  EXPECT_TRUE(seems_to_carry(world, kTray, kBlock)) << "more than half of it over the tray";
+  put(0.1 + 0.001, 0, 0.055, 0, 0);
+  EXPECT_FALSE(seems_to_carry(world, kTray, kBlock));
+}
+
+TEST_F(Support, BoxesAndGaps) {
+  put(0.2, 0.05, 0.03, 0, 0);
+  const WorldBox a = world_box(world, kTray), b = world_box(world, kBlock);
+  EXPECT_NEAR(b.low.x, 0.17, 1e-12);
+  EXPECT_NEAR(a.high.z, 0.02, 1e-12);
+  EXPECT_NEAR(gap_from_above(a, b), 0.07, 1e-12);
+  const WorldBox corner{{0.13, 0.14, 0}, {0.2, 0.2, 1}};
+  EXPECT_NEAR(gap_from_above(a, corner), 0.05, 1e-12) << "3, 4, 5";
+  const WorldBox over{{0.08, 0, 5}, {0.3, 0.1, 6}};
+  EXPECT_NEAR(gap_from_above(a, over), -0.02, 1e-12);
+}
+
+}  // namespace
+}  // namespace mjsense
