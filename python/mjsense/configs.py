@@ -769,6 +769,10 @@ class SceneObjectCfg(_config_methods.Config):
     """What else they call it."""
     rests: Sequence[Literal["upright", "side", "end"]] = ("upright",)
     """How it may rest."""
+    receptacle: bool = False
+    """Things are put in or on it; it is not picked up itself."""
+    color: str | None = None
+    """Of a receptacle: what tells it from others of its kind."""
 
 
 @dataclass

@@ -78,6 +78,7 @@ def record(
     meshes: Literal["auto", "shapes", "real"] = "auto",
     horizon: int | None = None,
     action_noise: bool = True,
+    perturb: float = 0.0,
     terminate_upon_success: bool = False,
     episodes: int = 1,
     max_attempts: int = 0,
@@ -122,6 +123,8 @@ def record(
             (``MJSENSE_FRANKA_MESHES``) names them; it moves the same.
         horizon: Control steps after which an episode is cut; by default the task's.
         action_noise: Commands reach the arm with noise.
+        perturb: Share of episodes in which something goes wrong on purpose: the object is shoved, or slips from the
+            hand.
         terminate_upon_success: An episode ends at its first success.
         episodes: How many to keep.
         max_attempts: Episodes to try; 0: six times those to keep.

@@ -272,6 +272,7 @@ def make_vec(
     meshes: Literal["auto", "shapes", "real"] = "auto",
     horizon: int | None = None,
     action_noise: bool = False,
+    perturb: float = 0.0,
     terminate_upon_success: bool = False,
     # end of options
     use_sensors: bool = True,
@@ -304,6 +305,8 @@ def make_vec(
             (``MJSENSE_FRANKA_MESHES``) names them; it moves the same.
         horizon: Control steps after which an episode is cut; by default the task's.
         action_noise: Commands reach the arm with noise.
+        perturb: Share of episodes in which something goes wrong on purpose: the object is shoved, or slips from the
+            hand.
         terminate_upon_success: An episode ends at its first success.
         Others:
         use_sensors: Task, robot and policy bring their sensors; without them only those that are given.

@@ -63,7 +63,7 @@ class PickTask final : public Task, public GraspScene {
   EpisodeScene scene_;
   std::weak_ptr<Simulation> simulation_;
   std::vector<GraspObject> objects_;
-  std::vector<int> things_;  // of objects_, what may be the target
+  std::vector<int> things_;      // of objects_, what may be the target
   std::vector<Target> targets_;  // [B]
   int robot_root_ = -1;
 };
