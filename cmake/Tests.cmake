@@ -16,6 +16,12 @@ foreach(room IN LISTS MJSENSE_ROOMS)
   endif()
 endforeach()
 
+# What kernels do where the CPU has no wide vectors.
+foreach(room rays render)
+  add_test(NAME ${room}_portable COMMAND ${room}_test)
+  set_tests_properties(${room}_portable PROPERTIES ENVIRONMENT MJSENSE_ISA=portable)
+endforeach()
+
 # Bits that must not change unnoticed: tests/golden, once for each instruction set that the kernels are compiled for. Other
 # optimisation than users get, and another compiler, give other bits.
 if(CMAKE_CXX_COMPILER_ID STREQUAL "GNU" AND NOT CMAKE_CXX_FLAGS MATCHES "-fsanitize")
