@@ -2,6 +2,7 @@
 #include "mjsense/sensors/lidar/lidar_sensor.h"
 
 #include <gmock/gmock.h>
+#include <fmt/format.h>
 #include <gtest/gtest.h>
 
 #include <cmath>
