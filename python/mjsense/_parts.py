@@ -5,6 +5,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable
 from pathlib import Path
+from types import NoneType
 from typing import Any
 
 from mjsense._members import member
@@ -29,6 +30,8 @@ def parts_of(options: dict[str, Any], sensors: Iterable[Any]) -> Parts:
     robot = options["robot"]
     if robot is None:
         robot = task.robot if task is not None else "franka"
+        if not isinstance(robot, (str, Path, NoneType)):
+            raise TypeError(f"{type(task).__name__}.robot is {robot!r}: must be the name of a robot, the path of its .toml, or None")
     options["robot"] = "" if robot is None else str(robot)
     options["scene"], scene = scene_of(options["scene"])
     for part in (task, policy):

@@ -148,6 +148,13 @@ def test_a_robot_by_name_joins_the_scene():
     with pytest.raises(KeyError, match="did you mean 'franka'"):
         make(Watch, robot="frank")
 
+    class Methodical(Cart):
+        def robot(self):
+            """Somebody's name for a method of theirs."""
+
+    with pytest.raises(TypeError, match=r"Methodical\.robot is <bound method .*: must be the name of a robot"):
+        make(Methodical)
+
 
 def test_cpp_planner_on_a_task_written_here(tmp_path):
     class Lift(mjs.Task):
