@@ -37,6 +37,12 @@ def use_installed_meshes() -> None:
         os.environ.setdefault(variable, str(folder))
 
 
+def name_package_folders() -> None:
+    """Tells the library where installed packages are, for scenes that name files of them. A variable that is set has priority."""
+    folders = dict.fromkeys(path for path in sys.path if Path(path).name in ("site-packages", "dist-packages"))
+    os.environ.setdefault("MJSENSE_PACKAGES", os.pathsep.join(folders))
+
+
 if __name__ == "__main__":  # as lines for a shell, of the robots in a folder
     for variable, folder in installed_meshes(p.read_text() for p in Path(sys.argv[1]).glob("*/robot.toml")).items():
         print(f"export {variable}=${{{variable}-{folder}}}")

@@ -16,7 +16,7 @@ namespace {
 
 namespace fs = std::filesystem;
 
-constexpr std::string_view kEmbedded = "embedded:";
+constexpr std::string_view kEmbedded = "embedded:", kPackage = "package:";
 
 }  // namespace
 
@@ -26,7 +26,7 @@ std::vector<std::string> DataFolder::names() const {
     if (!file.name.starts_with(folder) || !file.name.ends_with(tail)) continue;
     const std::string_view name =
         file.name.substr(folder.size(), file.name.size() - folder.size() - tail.size());
-    if (name.find('/') == std::string_view::npos) names.emplace_back(name);
+    if (nested || name.find('/') == std::string_view::npos) names.emplace_back(name);
   }
   return names;
 }
@@ -46,7 +46,8 @@ DataFile DataFolder::find(std::string_view name) const {
 }
 
 std::string beside(std::string_view path, const std::string& name) {
-  if (name.starts_with(kEmbedded) || fs::path(name).is_absolute()) return name;
+  if (name.starts_with(kEmbedded) || name.starts_with(kPackage) || fs::path(name).is_absolute())
+    return name;
   const bool embedded = path.starts_with(kEmbedded);
   const fs::path file = embedded ? path.substr(kEmbedded.size()) : path;
   const std::string joined = (file.parent_path() / name).lexically_normal().generic_string();

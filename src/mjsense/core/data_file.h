@@ -19,6 +19,7 @@ struct DataFolder {
   std::string_view kind;    // for messages: "scene"
   std::string_view folder;  // "scenes/"
   std::string_view tail;    // "/scene.toml"
+  bool nested = false;      // names may have folders: "libero/kitchen"
 
   std::vector<std::string> names() const;
   // One of ours by its name, or any by its path, which ends in .toml. Throws KeyError with the
@@ -26,7 +27,7 @@ struct DataFolder {
   DataFile find(std::string_view name_or_path) const;
 };
 
-// `name` as the file at `path` means it: from its own folder, unless it is absolute or embedded.
+// `name` as the file at `path` means it: from its own folder, unless it is absolute, embedded or in a package.
 std::string beside(std::string_view path, const std::string& name);
 
 }  // namespace mjsense

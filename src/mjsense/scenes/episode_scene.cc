@@ -13,6 +13,7 @@
 #include "mjsense/scene/parts.h"
 #include "mjsense/scene/resolve.h"
 #include "mjsense/scene/spec.h"
+#include "mjsense/scenes/entity_model.h"
 #include "mjsense/scenes/generators/generator.h"
 
 namespace mjsense {
@@ -58,19 +59,13 @@ bool can_be_held(const ObjectShape& shape) {
   return least <= kHand && shape.reach <= kReach;
 }
 
-// The model with a free joint at its body.
-std::shared_ptr<mjSpec> with_free_joint(const SceneEntityCfg& entity, const std::string& place) {
-  const std::string who = fmt::format("{}, entity '{}'", place, entity.name);
-  std::shared_ptr<mjSpec> spec = compose_model({.path = entity.model}, {}, who);
-  mjsElement* first = mjs_firstChild(mjs_findBody(spec.get(), "world"), mjOBJ_BODY, 0);
-  if (first == nullptr) throw ValueError(fmt::format("{}: free = true, but it has no body", who));
-  mjsBody* body = mjs_asBody(first);
-  if (mjs_firstChild(body, mjOBJ_JOINT, 0) != nullptr)
-    throw ValueError(
-        fmt::format("{}: free = true, but body '{}' has a joint", who, element_name(first)));
-  if (element_name(first).empty()) mjs_setName(first, entity.name.c_str());
-  mjs_addFreeJoint(body);
-  return spec;
+// Robots of ours have contype 2 and conaffinity 1. Furniture that is touched and touches nothing by
+// itself (contype 0, conaffinity 1), as scenes of others have it, is touched by them, too.
+void let_robots_touch(mjSpec* spec) {
+  for (mjsElement* element : spec_elements(spec, mjOBJ_GEOM)) {
+    mjsGeom* geom = mjs_asGeom(element);
+    if (geom->contype == 0 && (geom->conaffinity & 1) != 0) geom->conaffinity |= 2;
+  }
 }
 
 bool upright(const double* quat) { return std::abs(quat[1]) + std::abs(quat[2]) < 1e-9; }
@@ -102,7 +97,7 @@ EpisodeScene::EpisodeScene(SceneFileCfg cfg) : cfg_(std::move(cfg)) {
   check_fields(cfg_, "");
   if (!cfg_.generator.empty()) generated_ = generate(cfg_);
   for (const SceneEntityCfg& entity : cfg_.entities)
-    freed_.push_back(entity.free ? with_free_joint(entity, place()) : nullptr);
+    edited_.push_back(edited_model(entity, place()));
 }
 
 std::string EpisodeScene::place() const { return fmt::format("scene '{}'", cfg_.name); }
@@ -121,10 +116,10 @@ SceneCfg EpisodeScene::scene_cfg(const std::string& robot) const {
   for (std::size_t i = 0; i < cfg_.entities.size(); ++i) {
     const SceneEntityCfg& one = cfg_.entities[i];
     EntityCfg entity;
-    if (freed_[i]) {
-      entity.model.spec = freed_[i].get();
+    if (edited_[i]) {
+      entity.model.spec = edited_[i].get();
     } else {
-      entity.model.path = one.model;
+      entity.model.path = model_path(one.model, place());
     }
     entity.pos = one.pos;
     entity.quat = one.quat;
@@ -136,6 +131,7 @@ SceneCfg EpisodeScene::scene_cfg(const std::string& robot) const {
   if (!cfg_.models) scene.options = cfg_.options;
   scene.spec_fn = [cfg = cfg_, first = scene.spec_fn](mjSpec* spec) {
     apply_look(spec, cfg);
+    let_robots_touch(spec);
     if (first) first(spec);
   };
   return scene;

@@ -75,8 +75,8 @@ class EpisodeScene {
 
   SceneFileCfg cfg_;
   const mjModel* model_ = nullptr;
-  ModelSource generated_;                       // empty: the scene has no generator
-  std::vector<std::shared_ptr<mjSpec>> freed_;  // models that were given a free joint
+  ModelSource generated_;                        // empty: the scene has no generator
+  std::vector<std::shared_ptr<mjSpec>> edited_;  // models of which the scene changes something
   std::vector<SceneObject> objects_;
   std::vector<Region> regions_;
   std::vector<char> present_;    // [B, objects]

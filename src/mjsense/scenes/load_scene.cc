@@ -14,7 +14,7 @@
 namespace mjsense {
 namespace {
 
-constexpr DataFolder kScenes{"scene", "scenes/", "/scene.toml"};
+constexpr DataFolder kScenes{"scene", "scenes/", "/scene.toml", true};
 constexpr int kMostBases = 8;
 
 void read(const DataFile& file, SceneFileCfg& cfg, int depth) {

@@ -23,18 +23,32 @@ struct SceneEntityCfg {
   std::array<double, 3> pos{};
   std::array<double, 4> quat{1, 0, 0, 0};
   bool free = false;
+  std::vector<std::string> without;
+  std::optional<std::array<int, 2>> inertia_groups;
+  int hidden_group = -1;
 };
 template <class V>
 void visit_fields(V& v, SceneEntityCfg& c) {
   v.object("SceneEntityCfg", "A model of a scene; its names get the prefix ``<name>/``.");
   v("name", c.name, "Of the entity.").required();
-  v("model", c.model, "An MJCF: a path, beside the scene's file, or ``embedded:<file>``.")
+  v("model", c.model,
+    "An MJCF: a path, beside the scene's file, ``embedded:<file>``, or "
+    "``package:<package>/<file>`` "
+    "of an installed Python package.")
       .required();
   v("pos", c.pos, "Where it stands.").unit("m");
   v("quat", c.quat, "How it is turned, wxyz.");
   v("free", c.free,
     "Its body gets a free joint, which models of single objects often lack; a body without a name "
     "is called as the entity.");
+  v("without", c.without,
+    "Bodies that are left out, each with the whole tree in which it is: the robot of a model that "
+    "has one.");
+  v("inertia_groups", c.inertia_groups,
+    "Groups of the geoms whose masses count, first and last, instead of what the model says.");
+  v("hidden_group", c.hidden_group,
+    "Geoms of this group are there to be touched and are not seen; -1: those of group 3 and up.")
+      .within(-1, 5);
 }
 
 // How an object may rest: as its model has it, on its side (turned about y), on an end (about x).

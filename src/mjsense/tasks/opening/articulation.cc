@@ -16,7 +16,7 @@ constexpr double kLeastTravel = 0.05, kLeastSwing = 0.3;   // m, rad: less is a 
 constexpr double kLeastLever = 0.08;                       // m, from a hinge to its handle
 constexpr double kThick = 0.062;                           // m, that a hand goes round
 constexpr double kLeastLength = 0.012, kMostLength = 0.8;  // m, of a handle
-constexpr double kProtrusion = 0.0015;                     // m, beyond everything else
+constexpr double kProtrusion = 0.0008;                     // m, beyond everything else
 
 // Words in names, and the category that each means.
 constexpr std::array<std::pair<std::string_view, std::string_view>, 14> kWordsOfThings{

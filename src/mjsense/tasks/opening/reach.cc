@@ -17,6 +17,29 @@ constexpr std::array<double, 3> kTurns{0, 0.4, -0.4};               // rad, acro
 constexpr std::array<double, 3> kPlaces{0, 0.45, -0.45};            // of its half length
 constexpr double kSideGap = 0.004;                                  // m, pads to the handle
 
+// Fingers close along any direction across the approach: where the pads are, in the tool's frame.
+Quat closing_turn(const MoveGroup& gripper, const mjModel* model) {
+  if (gripper.pad_sites[0] < 0 || gripper.leaf_site < 0) return {};
+  const std::unique_ptr<mjData, void (*)(mjData*)> data(mj_makeData(model), mj_deleteData);
+  for (std::size_t i = 0; i < gripper.qpos.size(); ++i) {  // open: the range's wider end
+    const int joint = gripper.joints[std::min(i, gripper.joints.size() - 1)];
+    const double low = model->jnt_range[2 * joint], high = model->jnt_range[2 * joint + 1];
+    if (model->jnt_type[joint] == mjJNT_SLIDE && model->jnt_limited[joint])
+      data->qpos[gripper.qpos[i]] = std::abs(low) > std::abs(high) ? low : high;
+  }
+  mj_kinematics(model, data.get());
+  const Pose tool = pose_from_mat(data->site_xpos + 3 * gripper.leaf_site,
+                                  data->site_xmat + 9 * gripper.leaf_site);
+  const Vec3 apart =
+      rotate(conjugate(tool.q), vec3(data->site_xpos + 3 * gripper.pad_sites[1]) -
+                                    vec3(data->site_xpos + 3 * gripper.pad_sites[0]));
+  if (std::hypot(apart.x, apart.y) < 1e-4) return {};
+  const double angle = 0.5 * std::numbers::pi - std::atan2(apart.y, apart.x);
+  // A right angle or none: pads that are a little off the middle turn nothing.
+  return axis_angle({0, 0, 1},
+                    0.5 * std::numbers::pi * std::round(angle / (0.5 * std::numbers::pi)));
+}
+
 }  // namespace
 
 std::vector<ArmAndHand> arms_with_hands(const Robot& robot, const mjModel* model) {
@@ -29,7 +52,7 @@ std::vector<ArmAndHand> arms_with_hands(const Robot& robot, const mjModel* model
       const bool same = groups[a].leaf_site == groups[g].leaf_site ||
                         is_below(model, groups[g].root_body, groups[a].root_body);
       if (!same) continue;
-      hands.push_back({a, g});
+      hands.push_back({a, g, closing_turn(groups[g], model)});
       break;
     }
   }
@@ -286,8 +309,8 @@ std::optional<HandleWay> HandleReach::find(const Start& start, const Articulatio
       if (found || ++tries > most_tries) break;
       HandleWay way;
       way.hand = hand;
-      way.grasp = grasp.pose;
-      way.on_body = inverse(seen.body) * grasp.pose;
+      way.grasp = grasp.pose * Pose{{}, hand.turn};
+      way.on_body = inverse(seen.body) * way.grasp;
       if (try_grasp(data, start, seen, one, from, to, way)) found = std::move(way);
     }
   }

