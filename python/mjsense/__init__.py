@@ -10,7 +10,7 @@ from mjsense import _core
 _libmujoco.check(_core)
 _core.leave_no_log_file()
 
-from mjsense import _gymnasium, configs, effects, observations
+from mjsense import _gymnasium, assets, configs, effects, observations
 from mjsense._core import SensorSpec, embedded_models, robot_names
 from mjsense._core import __version__ as __version__  # pyright: ignore[reportAttributeAccessIssue]  # stubs leave it out
 from mjsense.configs import *  # noqa: F403
@@ -46,6 +46,8 @@ from mjsense.simulation import Simulation
 from mjsense.suite import SensorSuite
 from mjsense.task import Task, WorldState, register_task, task_names
 from mjsense.vector import TaskVectorEnv, make_vec
+
+assets.name_package_folders()
 
 _gymnasium.register_all()
 

@@ -700,6 +700,8 @@ class SceneFileCfg(_config_methods.SceneFileCfg):
 
     name: str
     """Of the scene."""
+    description: str = ""
+    """A sentence for people."""
     extends: str | None = None
     """A scene, by name or file, whose values it has where it does not say another."""
     base: str | None = None
@@ -747,7 +749,8 @@ class SceneEntityCfg(_config_methods.Config):
     name: str
     """Of the entity."""
     model: str
-    """An MJCF: a path, beside the scene's file, or ``embedded:<file>``."""
+    """An MJCF: a path, beside the scene's file, ``embedded:<file>``, or ``package:<package>/<file>`` of an installed
+    Python package."""
     pos: Sequence[float] = (0.0, 0.0, 0.0)
     """Where it stands. [m]"""
     quat: Sequence[float] = (1.0, 0.0, 0.0, 0.0)
@@ -755,6 +758,12 @@ class SceneEntityCfg(_config_methods.Config):
     free: bool = False
     """Its body gets a free joint, which models of single objects often lack; a body without a name is called as the
     entity."""
+    without: Sequence[str] = ()
+    """Bodies that are left out, each with the whole tree in which it is: the robot of a model that has one."""
+    inertia_groups: Sequence[int] | None = None
+    """Groups of the geoms whose masses count, first and last, instead of what the model says."""
+    hidden_group: int = -1
+    """Geoms of this group are there to be touched and are not seen; -1: those of group 3 and up."""
 
 
 @dataclass

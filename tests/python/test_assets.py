@@ -34,3 +34,14 @@ def test_the_users_choice_has_priority(package, monkeypatch):
     assets.use_installed_meshes()
     assert os.environ["MJSENSE_FRANKA_MESHES"] == str(package)
     monkeypatch.delenv("MJSENSE_FRANKA_MESHES")
+
+
+def test_folders_of_packages_are_named(monkeypatch, tmp_path):
+    folder = tmp_path / "site-packages"
+    monkeypatch.syspath_prepend(folder)
+    monkeypatch.delenv("MJSENSE_PACKAGES", raising=False)
+    assets.name_package_folders()
+    assert os.environ["MJSENSE_PACKAGES"].split(os.pathsep)[0] == str(folder)
+    monkeypatch.setenv("MJSENSE_PACKAGES", "")
+    assets.name_package_folders()
+    assert os.environ["MJSENSE_PACKAGES"] == ""

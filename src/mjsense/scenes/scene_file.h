@@ -157,6 +157,7 @@ void visit_fields(V& v, SceneHeadlightCfg& c) {
 
 struct SceneFileCfg {
   std::string name;
+  std::string description;
   std::string extends;
   std::string base;
   std::string generator;
@@ -182,6 +183,7 @@ void visit_fields(V& v, SceneFileCfg& c) {
   v.object("SceneFileCfg",
            "What an episode plays in: models, objects, where they may stand, and what differs.");
   v("name", c.name, "Of the scene.").required();
+  v("description", c.description, "A sentence for people.");
   v("extends", c.extends,
     "A scene, by name or file, whose values it has where it does not say another.")
       .or_none();
