@@ -32,7 +32,16 @@ PAGE, RESULTS = ROOT / "docs" / "tasks.md", ROOT / ".cache" / "tasks"
 BEGIN, END = "<!-- task table -->", "<!-- end -->"
 # task, robot, scene ("" is the task's own).
 CASES = (
-    ("pick", "franka", ""),
+    *(("pick", robot, "") for robot in ("franka", "mobile_franka", "i2rt_yam", "bimanual_yam", "floating_rum", "rby1")),
+    ("pick", "franka", "tableware"),
+    ("pick", "franka", "shelf"),
+    *(("pick_and_place", robot, "") for robot in ("franka", "mobile_franka", "i2rt_yam", "bimanual_yam", "floating_rum", "rby1")),
+    ("pick_and_place_next_to", "franka", ""),
+    ("pick_and_place_color", "franka", ""),
+    ("packing", "franka", ""),
+    *((task, robot, "") for task in ("open", "close") for robot in ("franka", "mobile_franka", "i2rt_yam", "rby1")),
+    ("door_opening", "rby1", ""),
+    *(("nav_to_obj", robot, "") for robot in ("rby1", "mobile_franka")),
 )
 
 

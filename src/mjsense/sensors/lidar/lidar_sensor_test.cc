@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "mjsense/sensors/lidar/lidar_sensor.h"
 
-#include <gmock/gmock.h>
 #include <fmt/format.h>
+#include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
 #include <cmath>
