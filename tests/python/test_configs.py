@@ -67,6 +67,11 @@ RIGHT = {
     mjs.UserPatternCfg: {},
     mjs.TableScanCfg: dict(angles=((0.0, 0.0),)),
     mjs.effects.Rate: dict(rate_hz=10.0),
+    mjs.SceneEntityCfg: dict(name="mug", model="mug.xml"),
+    mjs.SceneFileCfg: dict(name="bench"),
+    mjs.SceneObjectCfg: dict(body="mug/mug"),
+    mjs.SceneRegionCfg: dict(name="top", on="bench/top"),
+    mjs.SceneVaryCfg: dict(what="light", pattern=".*"),
 }
 WRONG = [
     (mjs.ContactMatch, dict(mode="goem"), "mode is 'goem': must be one of geom, body, subtree; did you mean 'geom'"),
@@ -136,6 +141,15 @@ WRONG = [
     (mjs.SceneCfg, dict(extent=-1.0), "extent is -1"),
     (mjs.ObjRef, dict(name=3), "name must be a str"),
     (mjs.BuiltinSensorCfg, dict(interp="cubik"), "cubic"),
+    (mjs.SceneEntityCfg, dict(pos=(float("inf"), 0, 0)), "pos"),
+    (mjs.SceneFileCfg, dict(count=(3, 2)), "count is 3, 2"),
+    (mjs.SceneFileCfg, dict(models=3), "models must be a function"),
+    (mjs.SceneObjectCfg, dict(rests=("sideways",)), "upright, side, end"),
+    (mjs.SceneRegionCfg, dict(area=(float("nan"), 0, 0, 0)), "area"),
+    (mjs.SceneRobotCfg, dict(yaw_spread=-1.0), "yaw_spread is -1"),
+    (mjs.SceneVaryCfg, dict(hue=200.0), "hue is 200"),
+    (mjs.SceneSkyCfg, dict(top=(2.0, 0, 0)), "top"),
+    (mjs.SceneHeadlightCfg, dict(ambient=2.0), "ambient is 2"),
 ]  # fmt: skip
 ALL: set[Any] = {
     value

@@ -3,6 +3,7 @@
 
 #include <cmath>
 
+#include "mjsense/rays/box_list.h"
 #include "mjsense/rays/flex_shapes.h"
 #include "mjsense/rays/kernels.h"
 #include "mjsense/rays/shared_geometry.h"

@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "mjsense/rays/box_list.h"
 #include "mjsense/rays/flex_shapes.h"
 #include "mjsense/rays/shared_geometry.h"
 #include "mjsense/rays/skin_shapes.h"
@@ -21,9 +22,9 @@ RayWorld::~RayWorld() = default;
 RayWorld::RayWorld(const mjModel* m, const SharedGeometry& shapes)
     : num_geoms_(static_cast<int>(m->ngeom)),
       shapes_(&shapes),
-      boxes_(static_cast<int>(m->ngeom + m->nflex)) {
+      boxes_(std::make_unique<BoxList>(static_cast<int>(m->ngeom + m->nflex))) {
   const int count = static_cast<int>(m->ngeom + m->nflex);
-  const int padded = boxes_.padded();
+  const int padded = boxes_->padded();
   geoms_.resize(count);
   flags_.assign(padded, 0);
   bodies_.assign(padded, -1);
@@ -58,7 +59,7 @@ void RayWorld::update(const mjModel* m, const mjData* d) {
     set_world_box(i);
   }
   if (flexes_) update_flexes(m, d);
-  boxes_.update();
+  boxes_->update();
   if (skins_) skins_->update(m, d);
   for (int i = 0; i < m->nlight; ++i) {
     std::copy_n(d->light_xpos + 3 * i, 3, lights_[i].pos);
@@ -160,7 +161,7 @@ void RayWorld::set_world_box(int i) {
     low[k] = x - reach;
     high[k] = x + reach;
   }
-  boxes_.set(i, low, high);
+  boxes_->set(i, low, high);
 }
 
 }  // namespace mjsense

@@ -10,7 +10,6 @@
 #include <span>
 #include <vector>
 
-#include "mjsense/rays/box_list.h"
 #include "mjsense/rays/ray_geom.h"
 
 namespace mjsense {
@@ -23,6 +22,7 @@ struct RayCamera {
   double pos[3], mat[9];
 };
 
+class BoxList;
 class FlexShapes;
 class SkinShapes;
 struct SharedGeometry;
@@ -43,7 +43,7 @@ class RayWorld {
 
   const RayGeom& geom(int id) const { return geoms_[id]; }
   std::span<const RayGeom> geoms() const { return geoms_; }
-  const BoxList& boxes() const { return boxes_; }  // in the world
+  const BoxList& boxes() const { return *boxes_; }  // in the world
   // Bit g of group g; kTransparent if its alpha is 0; 0 for padding.
   static constexpr std::uint32_t kTransparent = 0x100;
   std::span<const std::uint32_t> flags() const { return flags_; }
@@ -69,7 +69,7 @@ class RayWorld {
   const SharedGeometry* shapes_;
   std::unique_ptr<FlexShapes> flexes_;
   std::unique_ptr<SkinShapes> skins_;
-  BoxList boxes_;
+  std::unique_ptr<BoxList> boxes_;
   std::vector<std::uint32_t> flags_;
   std::vector<int> bodies_, materials_;
   std::vector<float> rgba_;
