@@ -8,7 +8,6 @@ set(MJSENSE_PUBLIC_HEADERS
   mjsense/cameras/frozen_cameras.h
   mjsense/cameras/load_cameras.h
   mjsense/core/array.h
-  mjsense/core/by_content.h
   mjsense/core/checks.h
   mjsense/core/cpu.h
   mjsense/core/data_class.h
