@@ -149,7 +149,7 @@ def test_a_robot_by_name_joins_the_scene():
         make(Watch, robot="frank")
 
     class Methodical(Cart):
-        def robot(self):
+        def robot(self):  # pyright: ignore[reportIncompatibleVariableOverride]
             """Somebody's name for a method of theirs."""
 
     with pytest.raises(TypeError, match=r"Methodical\.robot is <bound method .*: must be the name of a robot"):
