@@ -92,7 +92,8 @@ def look(lab: Lab, row: Row, what: str, command: str, path: Path, *more):
     """One command on a hostile or damaged recording: it ends by itself, in time and in bounds. None if it did not."""
     before = resource.getrusage(resource.RUSAGE_CHILDREN)
     try:
-        done = lab.run(command, path, *more, seconds=3 * SECONDS, preexec_fn=limit_memory)
+        # The limit is of processor time; beside other work that may take long.
+        done = lab.run(command, path, *more, seconds=10 * SECONDS, preexec_fn=limit_memory)
     except subprocess.TimeoutExpired:
         row.wrong("hung", f"{command} of {what}")
         return None

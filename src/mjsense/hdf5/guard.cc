@@ -117,7 +117,6 @@ std::uint64_t check_storage(hid_t dataset, const std::string& name) {
   const std::uint64_t most = multiply(stored, kMostRatio);
   if (all > kFreeBytes && all - kFreeBytes > most)
     refuse(name, fmt::format("claims {} bytes and stores {}", all, stored));
-  check_chunks(dataset, name);
   return all;
 }
 
@@ -133,6 +132,7 @@ std::string read_bytes(hid_t parent, const std::string& path, std::size_t most) 
   if (H5Tget_class(type) != H5T_INTEGER || H5Tget_size(type) != 1 || size.size() != 1)
     refuse(path, "is no row of bytes");
   if (size[0] > most) refuse(path, fmt::format("has {} bytes, expected at most {}", size[0], most));
+  check_chunks(dataset, path);
   std::string bytes(size[0], '\0');
   if (!bytes.empty())
     check(H5Dread(dataset, H5T_NATIVE_UINT8, H5S_ALL, H5S_ALL, H5P_DEFAULT, bytes.data()), path);

@@ -27,8 +27,8 @@ inline constexpr std::uint64_t kMostRowBytes = std::uint64_t{1} << 26;  // of on
 [[nodiscard]] Id open_dataset(hid_t parent, const std::string& path);
 
 // Bytes of a dataset's elements as the file's type has them. Throws RuntimeError when it lies in
-// other files, when its rows or chunks are larger than kMostRowBytes, when it claims far more than what
-// is stored can hold, or when a chunk does not unpack to its size.
+// other files, when its rows or chunks are larger than kMostRowBytes, or when it claims far more than what
+// is stored can hold. What is read then goes through check_chunks() first.
 std::uint64_t check_storage(hid_t dataset, const std::string& name);
 
 // Calls visit("obs/agent/qpos") for every dataset below `group`, sorted. Throws RuntimeError where

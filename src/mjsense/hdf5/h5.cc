@@ -8,6 +8,7 @@
 #include <system_error>
 
 #include "mjsense/core/error.h"
+#include "mjsense/hdf5/chunks.h"
 #include "mjsense/hdf5/guard.h"
 #include "mjsense/hdf5/lzf.h"
 
@@ -267,6 +268,7 @@ std::string read_text(hid_t parent, const std::string& path) {
   const Id type(H5Dget_type(dataset), H5Tclose, path);
   const Id space(H5Dget_space(dataset), H5Sclose, path);
   require_one(space, type, H5T_STRING, kMostTextBytes, path);
+  check_chunks(dataset, path);
   return read_string(type, [&](hid_t memory, void* out) {
     check(H5Dread(dataset, memory, H5S_ALL, H5S_ALL, H5P_DEFAULT, out), path);
   });

@@ -84,7 +84,12 @@ std::string read_whole(const fs::path& folder, const char* name) {
 
 // Throws where a name of ours is a link to a place that we would write to.
 void require_no_link(const fs::path& path) {
-  if (fs::is_symlink(path))
+  struct stat about = {};
+  if (lstat(path.c_str(), &about) != 0) {
+    if (errno != ENOENT && errno != ENOTDIR) throw_file("write", path, errno);
+    return;
+  }
+  if (S_ISLNK(about.st_mode))
     throw ValueError(
         fmt::format("'{}' is a link, which is not followed: remove it", path.string()));
 }

@@ -437,6 +437,8 @@ TEST(RecorderFaults, WrongConfigurationsAreNamed) {
     return error_of([&] { record(dir.path, 1, {}, false, change); });
   };
   EXPECT_THAT(error([](RecordingCfg& c) { c.out_dir.clear(); }), HasSubstr("no output directory"));
+  EXPECT_THAT(error([](RecordingCfg& c) { c.out_dir = c.out_dir / std::string(300, 'x'); }),
+              HasSubstr("x/house_0/.recording': File name too long"));
   EXPECT_THAT(error([](RecordingCfg& c) { c.episodes = 0; }), HasSubstr("episodes is 0"));
   EXPECT_THAT(error([](RecordingCfg& c) { c.num_worlds = -1; }), HasSubstr("num_worlds is -1"));
   EXPECT_THAT(error([](RecordingCfg& c) { c.fps = {0, 1}; }), HasSubstr("fps is 0/1"));

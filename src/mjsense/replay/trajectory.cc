@@ -5,9 +5,11 @@
 
 #include <algorithm>
 #include <cstdlib>
+#include <utility>
 
 #include "mjsense/core/error.h"
 #include "mjsense/core/plain_file.h"
+#include "mjsense/hdf5/chunks.h"
 #include "mjsense/record/house.h"
 #include "mjsense/replay/json_text.h"
 
@@ -153,6 +155,7 @@ std::int64_t RowDataset::rows_at_once(std::size_t element_bytes) const {
 }
 
 void RowDataset::read(std::int64_t first, std::int64_t count, hid_t memory, void* out) const {
+  if (!std::exchange(checked_, true)) h5::check_chunks(id_, path_);
   if (dims_.empty())
     return h5::check(H5Dread(id_, memory, H5S_ALL, H5S_ALL, H5P_DEFAULT, out), path_);
   std::vector<hsize_t> start(dims_.size(), 0), size = dims_;

@@ -60,6 +60,7 @@ class RowDataset {
   std::vector<hsize_t> dims_;
   std::uint64_t bytes_ = 0;  // of all rows
   bool json_ = false;
+  mutable bool checked_ = false;  // its chunks, before the first row is read
 };
 
 // The name of a video in obs/sensor_data. Throws RuntimeError unless it is a plain name.
