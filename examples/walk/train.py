@@ -69,7 +69,7 @@ def with_sb3(task, env):
     worlds = VecNormalize(SB3VecEnv(env, action_mean=task.stand, action_scale=SCALE), norm_reward=False)
     worlds.action_space = type(worlds.action_space)(-10, 10, worlds.action_space.shape, np.float32)  # servos have limits of their own
     steps = 24 * env.num_envs
-    trainer = PPO("MlpPolicy", worlds, n_steps=24, batch_size=steps // 4, n_epochs=5, learning_rate=1e-3, target_kl=0.02, seed=0, device="cpu",
+    trainer = PPO("MlpPolicy", worlds, n_steps=24, batch_size=steps // 4, n_epochs=5, learning_rate=5e-4, seed=0, device="cpu",
                   policy_kwargs={"net_arch": [256, 128, 64], "log_std_init": -0.7})  # fmt: skip
 
     def act(observation):

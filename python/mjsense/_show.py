@@ -4,7 +4,6 @@
 from __future__ import annotations
 
 import base64
-import html
 import struct
 import zlib
 from collections.abc import Mapping
@@ -47,6 +46,8 @@ def line(head: str, rows: list[Row]) -> str:
 
 def table(head: str, rows: list[Row], images: Mapping[str, np.ndarray]) -> str:
     """HTML of the same, with the images ``[H, W, C]`` that can be shown."""
+    import html  # slow to import, and notebooks alone want it
+
     columns = ("field", "dtype", "shape", "unit", "frame", "")
     body = "".join(
         "<tr>" + "".join(f"<td style='text-align:left'>{html.escape(cell)}</td>" for cell in _cells(row)) + "</tr>" for row in rows

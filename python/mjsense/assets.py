@@ -6,7 +6,6 @@ from __future__ import annotations
 import importlib.util
 import os
 import sys
-import tomllib
 from collections.abc import Iterable
 from pathlib import Path
 
@@ -15,6 +14,8 @@ _PACKAGE = "package:"
 
 def installed_meshes(robots: Iterable[str]) -> dict[str, Path]:
     """Folders of meshes by the environment variable that names them, of robots given by the texts of their files. Imports nothing."""
+    import tomllib  # slow to import
+
     found = {}
     for text in robots:
         meshes = tomllib.loads(text).get("meshes", {})

@@ -5,9 +5,8 @@ from __future__ import annotations
 
 import json
 from collections.abc import Iterable, Mapping, Sequence
-from fractions import Fraction
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -16,6 +15,9 @@ from mjsense._arguments import KnownAttributes, Seed, checked
 from mjsense.sensor import Sensor, as_sensor
 from mjsense.simulation import Simulation
 from mjsense.suite import SensorSuite
+
+if TYPE_CHECKING:
+    from fractions import Fraction
 
 
 @checked
@@ -199,6 +201,8 @@ class Recorder(KnownAttributes):
 
 
 def _rate(fps: float | Fraction | None, simulation: Simulation) -> Fraction:
+    from fractions import Fraction  # slow to import
+
     if fps is None:
         return Fraction(1) / Fraction(simulation.step_dt).limit_denominator(10**6)
     rate = Fraction(fps).limit_denominator(10**6)
