@@ -6,13 +6,15 @@
 #include <algorithm>
 
 #include "mjsense/core/error.h"
+#include "mjsense/scenes/generators/dining.h"
 #include "mjsense/scenes/generators/kitchen.h"
 #include "mjsense/scenes/generators/shelf.h"
 
 namespace mjsense {
 
 std::span<const Generator> generators() {
-  static const std::vector<Generator> all{kitchen_generator(), shelf_generator()};
+  static const std::vector<Generator> all{dining_generator(), kitchen_generator(),
+                                          shelf_generator()};
   return all;
 }
 

@@ -1,0 +1,80 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "mjsense/scenes/generators/dining.h"
+
+#include "mjsense/scenes/generators/finishes.h"
+#include "mjsense/scenes/generators/room_text.h"
+
+namespace mjsense {
+namespace {
+
+constexpr Colour kRugs[] = {{0.48, 0.30, 0.28}, {0.34, 0.40, 0.46}, {0.62, 0.56, 0.44}};
+constexpr Colour kPaintings[] = {{0.36, 0.50, 0.58}, {0.66, 0.52, 0.36}, {0.44, 0.54, 0.38}};
+
+// Faces -x or +x, its seat at x, y.
+void chair(RoomText& room, double x, double y, double back) {
+  for (int i = 0; i < 4; ++i) {
+    const double dx = i & 1 ? 0.18 : -0.18, dy = i & 2 ? 0.18 : -0.18;
+    room.box("", "chair", {x + dx, y + dy, 0.22}, {0.018, 0.018, 0.22});
+  }
+  room.box("", "chair", {x, y, 0.45}, {0.21, 0.21, 0.015});
+  for (int i = -1; i <= 1; i += 2)
+    room.box("", "chair", {x + 0.19 * back, y + 0.19 * i, 0.68}, {0.016, 0.016, 0.22});
+  for (int i = 0; i < 3; ++i)
+    room.box("", "chair", {x + 0.19 * back, y, 0.62 + 0.11 * i}, {0.010, 0.18, 0.028});
+}
+
+ModelSource make(House& house, SceneFileCfg& cfg) {
+  Rng& rng = house.rng;
+  RoomText room("dining");
+  write_shell_finishes(room, rng);
+  const Colour wood = wood_colour(rng);
+  const Gloss satin{.specular = 0.2, .shininess = 0.4};
+  room.tiled("table", planks_png(wood, 6, rng.next()), 1.0, satin);
+  room.wrapped("table_edge", wood_png(brighter(wood, 0.85), rng.next()), satin);
+  room.wrapped("chair", wood_png(wood_colour(rng), rng.next()), satin);
+  room.tiled("rug", cloth_png(pick(rng, kRugs), rng.next()), 0.5);
+  room.wrapped("picture", stone_png(pick(rng, kPaintings), rng.next()));
+  room.plain("frame", {0.16, 0.14, 0.13}, satin);
+
+  const double wide = rng.uniform(1.2, 1.5), deep = rng.uniform(0.80, 0.90),
+               high = rng.uniform(0.60, 0.70), front = 0.30, x = front + deep / 2;
+  const double wall = front + deep + rng.uniform(0.6, 0.9);
+  ShellCfg shell{.x0 = -rng.uniform(1.9, 2.4),
+                 .x1 = wall,
+                 .y0 = -rng.uniform(1.9, 2.3),
+                 .y1 = rng.uniform(1.9, 2.3)};
+  shell.window_x = rng.uniform(-0.6, 0.3);
+  write_shell(room, shell);
+  room.slab("rug", "rug", Facing::kUp, {x, 0, 0.006}, deep + 1.0, wide + 0.8, 0.006,
+            "contype=\"0\" conaffinity=\"0\"");
+  room.slab("table_top", "table", Facing::kUp, {x, 0, high}, deep, wide, 0.03,
+            "friction=\"0.9 0.005 0.0002\"");
+  room.box("", "table_edge", {x, 0, high - 0.055}, {deep / 2 - 0.05, wide / 2 - 0.05, 0.025});
+  for (int i = 0; i < 4; ++i) {
+    const double dx = (i & 1 ? 0.5 : -0.5) * deep, dy = (i & 2 ? 0.5 : -0.5) * wide;
+    room.box("", "table_edge",
+             {x + dx - (i & 1 ? 0.05 : -0.05), dy - (i & 2 ? 0.05 : -0.05), (high - 0.03) / 2},
+             {0.03, 0.03, (high - 0.03) / 2});
+  }
+  chair(room, front + deep + 0.22, rng.uniform(-0.5, -0.25), 1);
+  chair(room, front + deep + 0.26, rng.uniform(0.25, 0.5), 1);
+  const double py = rng.uniform(-0.6, 0.6);
+  room.box("", "frame", {wall - 0.012, py, 1.55}, {0.012, 0.42, 0.30});
+  room.box("", "picture", {wall - 0.026, py, 1.55}, {0.003, 0.38, 0.26});
+
+  SceneRegionCfg region;
+  region.name = "table";
+  region.on = "room/table_top";
+  region.area = {front + 0.08, front + deep - 0.12, -0.48, 0.48};
+  region.target_area = {front + 0.12, front + 0.36, -0.25, 0.25};
+  cfg.regions.push_back(region);
+  return room.model();
+}
+
+}  // namespace
+
+Generator dining_generator() {
+  return {"dining", "A table in a dining room with chairs, a rug and a window.", {}, make};
+}
+
+}  // namespace mjsense
