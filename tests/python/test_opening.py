@@ -50,3 +50,26 @@ def test_the_suite():
     env.reset()
     start, end = env.rows["obj_start"][0], env.rows["obj_end"][0]
     assert np.linalg.norm(start - end) > 0.01
+
+
+def test_starts_differ_and_the_camera_over_the_shoulder_sees_the_target():
+    seen, bases, targets, lights = 0, [], [], []
+    env = mjs.make_vec("open", "franka", num_envs=12, camera_system="droid", width=160, height=96, seed=5,
+                       observations=["exo_camera_1", "object_image_points", "obj_start", "robot_base_pose"])  # fmt: skip
+    env.reset()
+    points = {
+        name: array
+        for name, array in env.rows.items()
+        if "exo_camera_1" in name and "num_points" in name and "pickup_obj" in name
+    }
+    (count,) = points.values()
+    for w in range(12):
+        seen += bool(count[w] > 0)
+        bases.append(env.rows["robot_base_pose"][w][:2].copy())
+        targets.append(env.rows["obj_start"][w][:3].copy())
+        lights.append(env.rows["exo_camera_1"][w].mean())
+    env.close()
+    assert seen >= 11, f"the target is in {seen} of 12 pictures"
+    assert len(np.unique(np.round(targets, 3), axis=0)) >= 4
+    assert len(np.unique(np.round(bases, 4), axis=0)) == 12
+    assert np.std(lights) > 2
