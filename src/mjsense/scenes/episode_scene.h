@@ -45,6 +45,7 @@ class EpisodeScene {
   void bind(Simulation& simulation);
 
   std::span<const SceneObject> objects() const { return objects_; }
+  std::span<const Region> regions() const { return regions_; }
   // Whether an object takes part in the episode of this world; the others stand far away.
   bool present(int world, int object) const { return present_[world * objects_.size() + object]; }
 

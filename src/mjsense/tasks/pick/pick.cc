@@ -45,6 +45,7 @@ void PickTask::initialize_task() {
   for (Target& target : targets_) {
     target.object = {std::string(kRole), objects_[0].body, scene_.objects()[0].text};
   }
+  standing_ = Standing(model(), robot(), scene_);
   robot_root_ = model()->body_rootid[robot().base_body()];
 }
 
@@ -57,7 +58,7 @@ std::optional<Pose> PickTask::sample_scene(int world, Rng& rng, const StateRow& 
   const std::shared_ptr<Simulation> simulation = simulation_.lock();
   if (scene_.vary_look(world, cfg().seed, episode) && simulation)
     simulation->worlds().model_changed();
-  return scene_.sample(world, target, cfg().seed, episode, rng, state);
+  return standing_(scene_.sample(world, target, cfg().seed, episode, rng, state));
 }
 
 void PickTask::begin(const World& world) {

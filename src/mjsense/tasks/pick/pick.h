@@ -10,6 +10,7 @@
 #include "mjsense/episode/grasp_scene.h"
 #include "mjsense/episode/task.h"
 #include "mjsense/scenes/episode_scene.h"
+#include "mjsense/scenes/standing.h"
 
 namespace mjsense {
 
@@ -61,6 +62,7 @@ class PickTask final : public Task, public GraspScene {
   bool lifted(const World& world) const;
 
   EpisodeScene scene_;
+  Standing standing_;
   std::weak_ptr<Simulation> simulation_;
   std::vector<GraspObject> objects_;
   std::vector<int> things_;      // of objects_, what may be the target

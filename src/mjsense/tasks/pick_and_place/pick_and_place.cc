@@ -94,6 +94,7 @@ void PickAndPlaceTask::initialize_task() {
     episode.objects[1].role = kReceptacle;
     episode.supported.reserve(static_cast<std::size_t>(std::max(cfg().horizon, 0)) + 2);
   }
+  standing_ = Standing(model(), robot(), scene_);
   robot_root_ = model()->body_rootid[robot().base_body()];
 }
 
@@ -145,7 +146,7 @@ std::optional<Pose> PickAndPlaceTask::sample_scene(int world, Rng& rng, const St
   const std::shared_ptr<Simulation> simulation = simulation_.lock();
   if (scene_.vary_look(world, cfg().seed, number) && simulation)
     simulation->worlds().model_changed();
-  return scene_.sample(world, wanted, cfg().seed, number, rng, state);
+  return standing_(scene_.sample(world, wanted, cfg().seed, number, rng, state));
 }
 
 void PickAndPlaceTask::begin(const World& world) {

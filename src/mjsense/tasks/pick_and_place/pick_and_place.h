@@ -10,6 +10,7 @@
 #include "mjsense/episode/grasp_scene.h"
 #include "mjsense/episode/task.h"
 #include "mjsense/scenes/episode_scene.h"
+#include "mjsense/scenes/standing.h"
 
 namespace mjsense {
 
@@ -85,6 +86,7 @@ class PickAndPlaceTask final : public Task, public GraspScene, public PlaceScene
 
   PlaceKind kind_;
   EpisodeScene scene_;
+  Standing standing_;
   std::weak_ptr<Simulation> simulation_;
   std::vector<GraspObject> objects_;
   mutable std::vector<Episode> episodes_;  // [B]; a judgement is made once an observation
