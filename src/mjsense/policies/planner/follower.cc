@@ -4,12 +4,16 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <cmath>
 
 #include "mjsense/core/error.h"
 #include "mjsense/observe/frame.h"
 
 namespace mjsense {
 namespace {
+
+constexpr double kFade = 1.0;       // s, at least
+constexpr double kFadeSpeed = 0.5;  // rad/s or m/s, on average, of what fades faster otherwise
 
 int floating_base(const Robot& robot) {
   for (std::size_t g = 0; g < robot.groups().size(); ++g) {
@@ -74,6 +78,7 @@ void Follower::begin(const World& world) {
   state.start = world.time();
   state.finished = false;
   state.ik_failures = 0;
+  if (!state.plan.segments.empty()) enter(state, state.plan.segments[0]);
 }
 
 PlanFailure Follower::failure(const World& world) const {
@@ -109,7 +114,7 @@ void Follower::read_free_joints(const World& world, State& state) const {
 
 bool Follower::move_tool(const World& world, State& state, const ToolMove& move, double time) {
   const double s = move.seconds == 0 ? 1.0 : std::min(1.0, time / move.seconds);
-  const Pose pose = move.from * exp6(s * move.screw);
+  const Pose pose = move.from * exp6((move.eased ? s * s * (3 - 2 * s) : s) * move.screw);
   state.targets[move.tool] = {true, move.in_world, pose};
   if (robot_->groups()[move.tool].kind == GroupKind::kGripper) {  // the base carries it
     const Pose to = move.in_world ? pose : robot_->base_pose(world) * pose;
@@ -144,7 +149,30 @@ void Follower::move_group(State& state, const CommandPath& path, double time) {
     command.set({values.data(), n});
   }
   if (!joints_are_commanded(path.group)) return;
+  double most = 0;
+  for (std::size_t i = 0; i < n; ++i)
+    most = std::max(most, std::abs(state.offsets[path.group].values[i]));
+  const double fade = std::min(path.times.back(), std::max(kFade, most / kFadeSpeed));
+  if (state.offsets[path.group].given && time < fade) {
+    const double s = time / fade, left = 1 - s * s * (3 - 2 * s);
+    for (std::size_t i = 0; i < n; ++i)
+      command.values[i] += left * state.offsets[path.group].values[i];
+  }
   std::copy_n(command.values.begin(), n, state.joints[path.group].values.begin());
+}
+
+// Inverse kinematics along a line ends near, not at, the joints from which a path was planned: an arm with more joints than it
+// needs drifts. What is left fades away along the path.
+void Follower::enter(State& state, const Segment& segment) const {
+  for (const CommandPath& path : segment.paths) {
+    GroupValues& offset = state.offsets[path.group];
+    offset.given = state.commands[path.group].given && joints_are_commanded(path.group);
+    if (!offset.given) continue;
+    const std::size_t n = robot_->groups()[path.group].command_size;
+    for (std::size_t i = 0; i < n; ++i) {
+      offset.values[i] = state.joints[path.group].values[i] - path.points[i];
+    }
+  }
 }
 
 // A segment ends between two steps, or takes no time at all: what it was to reach is commanded,
@@ -177,8 +205,9 @@ void Follower::follow(const World& world, Action& action) {
   while (state.segment < n && world.time() - state.start >= segments[state.segment].duration) {
     state.start += segments[state.segment].duration;
     ++state.segment;
-    if (state.segment < n)
-      finish(world, state, segments[state.segment - 1], segments[state.segment]);
+    if (state.segment == n) break;
+    finish(world, state, segments[state.segment - 1], segments[state.segment]);
+    enter(state, segments[state.segment]);
   }
   state.finished = state.segment == n;
   if (n > 0) {

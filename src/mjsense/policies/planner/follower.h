@@ -75,11 +75,14 @@ class Follower {
     int phase = 0;
     int ik_failures = 0;
     RobotValues joints, commands;
+    RobotValues
+        offsets;  // of joints from the path that they are about to follow, `given` where there are
     std::array<Target, RobotValues::kMaxGroups> targets;  // per tool
   };
   void read_free_joints(const World& world, State& state) const;
   bool move_tool(const World& world, State& state, const ToolMove& move, double time);
   void move_group(State& state, const CommandPath& path, double time);
+  void enter(State& state, const Segment& segment) const;
   void finish(const World& world, State& state, const Segment& done, const Segment& next);
   bool joints_are_commanded(int group) const;
 

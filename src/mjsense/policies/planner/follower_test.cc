@@ -110,6 +110,34 @@ TEST(Follower, AGroupReachesTheEndOfItsPath) {
   EXPECT_EQ(action.commands[arm].values[6], path.points.back());
 }
 
+// The path begins 0.1 rad from where the arm is commanded to be: it goes over to it, and does not jump.
+TEST(Follower, AnArmThatIsBesideAPathGoesOverToIt) {
+  TableStage stage("franka");
+  const int arm = stage.robot().arm();
+  Follower follower;
+  follower.initialize(stage.robot(), stage.world.model, 1);
+  follower.restart(stage.world);
+  const auto now = follower.joints(0)[arm].view();
+  const std::vector<double> q(now.begin(), now.end());
+  CommandPath here{arm, {0, 0.1}, q}, beside{arm, {0, 1.5}, q};
+  here.points.insert(here.points.end(), q.begin(), q.end());
+  beside.points[3] += 0.1;
+  const std::vector<double> row = beside.points;
+  beside.points.insert(beside.points.end(), row.begin(), row.end());
+  follower.plan(0).move_groups(1, {here});
+  follower.plan(0).move_groups(2, {beside});
+  follower.begin(stage.world);
+  double last = q[3];
+  while (!follower.finished(0)) {
+    Action action;
+    follower.follow(stage.world, action);
+    EXPECT_LT(std::abs(action.commands[arm].values[3] - last), 0.012);
+    last = action.commands[arm].values[3];
+    stage.step(action);
+  }
+  EXPECT_EQ(last, row[3]);
+}
+
 TEST(Follower, AFloatingHandGoesWhereItsToolIsWanted) {
   TableStage stage("floating_rum");
   const Robot& robot = stage.robot();

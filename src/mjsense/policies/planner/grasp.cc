@@ -35,7 +35,16 @@ GripperShape::GripperShape(const mjModel* model, const Robot& robot, int gripper
   for (std::size_t i = 0; i < cfg.init.size(); ++i) data->qpos[group.qpos[i]] = cfg.init[i];
   mj_kinematics(model, data.get());
   const int site = group.leaf_site;
-  const Pose world_tool = pose_from_mat(data->site_xpos + 3 * site, data->site_xmat + 9 * site);
+  Pose world_tool = pose_from_mat(data->site_xpos + 3 * site, data->site_xmat + 9 * site);
+  if (group.pad_sites[0] >= 0 && group.pad_sites[1] >= 0) {
+    const Vec3 closing =
+        rotate(conjugate(world_tool.q), vec3(data->site_xpos + 3 * group.pad_sites[1]) -
+                                            vec3(data->site_xpos + 3 * group.pad_sites[0]));
+    if (std::abs(closing.x) > std::abs(closing.y)) {
+      turn = axis_angle({0, 0, 1}, 0.5 * pi);
+      world_tool.q = world_tool.q * turn;
+    }
+  }
   max_opening = group.max_opening;
   Vec3 low{1, 1, 1}, high{-1, -1, -1};
   for (int g = 0; g < model->ngeom; ++g) {

@@ -25,6 +25,8 @@ struct GripperShape {
   double tip = 0;  // m, how far the fingers reach below the origin, at any opening
   double pad_half_width = 0, pad_half_length = 0;  // m, of a pad, across and along the approach
   double max_opening = 0;                          // m
+  // The frame above in the robot's tool frame, whose z it has: another where pads close along another axis than y.
+  Quat turn;  // q_TG
 
   // From the gripper group's geoms that touch, at its start configuration.
   GripperShape(const mjModel* model, const Robot& robot, int gripper);

@@ -89,7 +89,7 @@ std::vector<Grasp> grasps_all_around(const GripperShape& gripper, const ObjectSh
           const Squeeze s =
               squeeze(points, center, close, across, approach, half_width, half_length);
           const double width = s.high - s.low;
-          if (!(width > kLeastWidth && width < gripper.max_opening - 2 * kSideGap) ||
+          if (!(width > kLeastWidth && width < gripper.max_opening - 2 * kLeastSideGap) ||
               s.face < kFaceWidth)
             continue;
           Grasp grasp;

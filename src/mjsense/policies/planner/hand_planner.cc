@@ -8,6 +8,7 @@
 namespace mjsense {
 namespace {
 
+constexpr double kJump = 0.15;    // rad in a step of a line: 1.5 rad/s at 0.2 m/s
 constexpr double kDetour = 0.25;  // m up, of a floating hand that cannot go straight
 
 // Free joints of the base, for a hand that floats.
@@ -72,7 +73,7 @@ bool HandPlanner::line_is_free(const World& world, CollisionQuery& query, const 
     // A joint that jumps would not go straight.
     if (!floats()) {
       for (std::size_t i = 0; i < joints(at).size(); ++i) {
-        if (std::abs(joints(end)[i] - joints(at)[i]) > 0.5) return false;
+        if (std::abs(joints(end)[i] - joints(at)[i]) > kJump) return false;
       }
     }
     at = end;
@@ -83,11 +84,14 @@ bool HandPlanner::line_is_free(const World& world, CollisionQuery& query, const 
 
 Segment& HandPlanner::add_line(const World& world, Plan& plan, int phase, const Pose& from,
                                const Pose& to, double speed, double settle) const {
-  if (floats())
-    return plan.move_tool_in_world(phase, hand_.tool, from, to, speed, settle, cfg_.turn_speed);
+  // At rest at both ends, and at its fastest in the middle; so it takes half as long again.
   const Pose to_base = inverse(robot_->base_pose(world));
-  return plan.move_tool(phase, hand_.tool, to_base * from, to_base * to, speed, settle,
-                        cfg_.turn_speed);
+  Segment& segment = floats() ? plan.move_tool_in_world(phase, hand_.tool, from, to, speed / 1.5,
+                                                        settle, cfg_.turn_speed / 1.5)
+                              : plan.move_tool(phase, hand_.tool, to_base * from, to_base * to,
+                                               speed / 1.5, settle, cfg_.turn_speed / 1.5);
+  segment.tools.back().eased = true;
+  return segment;
 }
 
 bool HandPlanner::add_way(const World& world, CollisionQuery& query, Plan& plan, int phase,

@@ -146,33 +146,40 @@ bool ManipulationPlanner::pick_with(const World& world, const PlanRequest& reque
     }
   }
   Rng way = rng(world, request, "planner/way");
-  int tried = 0, ways = 0;
-  for (const Grasp& grasp :
-       rank_grasps(grasps(scene_->target(world.id), h), object, start.tool, wanted)) {
-    if (grippers_[h].lowest(grasp.pose) < scene_->support_height(world.id) - kBelow) continue;
-    if (++tried > cfg_.max_ik_candidates || ways == cfg_.max_ways) break;
-    HandPose before, at;
-    if (!hand.reach(world, backed(grasp.pose, cfg_.pregrasp), start, before)) continue;
-    query.set_margin(kMargin);
-    if (!hand.is_free(query, before)) continue;
-    query.set_margin(kGraspMargin);
-    if (!hand.line_is_free(world, query, before, grasp.pose, at) || !hand.is_free(query, at))
-      continue;
-    Plan rest;
-    hand.add_line(world, rest, kGrasp, before.tool, at.tool, cfg_.slow, cfg_.settle);
-    hand.add_line(world, rest, kCloseGripper, at.tool, at.tool, cfg_.slow, cfg_.close_time)
-        .grip(gripper, group.closed_command);
-    if (!lift(world, hand, at, rest)) continue;
-    ++ways;
-    query.set_margin(kMargin);
-    if (!hand.add_way(world, query, plan, kPregrasp, start, before, way)) continue;
-    std::ranges::move(rest.segments, std::back_inserter(plan.segments));
-    plan.grasp = grasp.pose;
-    State& state = states_[world.id];
-    state.hand = h;
-    state.tool_object = inverse(grasp.pose) * object;
-    if (request.attempt == 0) state.home_tool = home;
-    return true;
+  // The tool as a gripper whose y axis is the closing direction; near the present joints, then farther away.
+  const GripperShape& shape = grippers_[h];
+  const std::vector<Grasp> ranked = rank_grasps(grasps(scene_->target(world.id), h), object,
+                                                start.tool * Pose{{}, shape.turn}, wanted);
+  int ways = 0;
+  for (const auto& [iterations, most] : {std::pair(Chain::kTracking, cfg_.max_ik_candidates),
+                                         std::pair(400, cfg_.max_far_candidates)}) {
+    int tried = 0;
+    for (const Grasp& grasp : ranked) {
+      if (shape.lowest(grasp.pose) < scene_->support_height(world.id) - kBelow) continue;
+      if (++tried > most || ways == cfg_.max_ways) break;
+      const Pose tool = grasp.pose * Pose{{}, conjugate(shape.turn)};
+      HandPose before, at;
+      if (!hand.reach(world, backed(tool, cfg_.pregrasp), start, before, iterations)) continue;
+      query.set_margin(kMargin);
+      if (!hand.is_free(query, before)) continue;
+      query.set_margin(kGraspMargin);
+      if (!hand.line_is_free(world, query, before, tool, at) || !hand.is_free(query, at)) continue;
+      Plan rest;
+      hand.add_line(world, rest, kGrasp, before.tool, at.tool, cfg_.slow, cfg_.settle);
+      hand.add_line(world, rest, kCloseGripper, at.tool, at.tool, cfg_.slow, cfg_.close_time)
+          .grip(gripper, group.closed_command);
+      if (!lift(world, hand, at, rest)) continue;
+      ++ways;
+      query.set_margin(kMargin);
+      if (!hand.add_way(world, query, plan, kPregrasp, start, before, way)) continue;
+      std::ranges::move(rest.segments, std::back_inserter(plan.segments));
+      plan.grasp = tool;
+      State& state = states_[world.id];
+      state.hand = h;
+      state.tool_object = inverse(tool) * object;
+      if (request.attempt == 0) state.home_tool = home;
+      return true;
+    }
   }
   return false;
 }

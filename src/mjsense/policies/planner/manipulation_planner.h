@@ -30,7 +30,9 @@ struct ManipulationPlannerCfg {
   double rest = 2.0;                            // s at the end
   double most_tilt = 90;        // degrees from above; the approach asked for is drawn up to here
   int max_ik_candidates = 256;  // grasps tried before giving up
-  int max_ways = 6;             // of them with a search for a way
+  int max_far_candidates =
+      60;            // of them with a search far from the present joints, if none is near
+  int max_ways = 6;  // of them with a search for a way
 };
 
 class ManipulationPlanner final : public TaskPlanner {

@@ -6,6 +6,7 @@
 
 #include <chrono>
 #include <cstdint>
+#include <functional>
 
 #include "mjsense/episode/policy.h"
 #include "mjsense/episode/task.h"
@@ -37,7 +38,8 @@ struct EpisodeResult {
 };
 
 inline EpisodeResult run_episode(Task& task, Policy& policy, mjData* data, int world_id,
-                                 std::int64_t episode) {
+                                 std::int64_t episode,
+                                 const std::function<void(const World&)>& each_step = {}) {
   const mjModel* model = task.model();
   mj_resetData(model, data);
   task.sample(world_id, episode, state_row(data));
@@ -57,6 +59,7 @@ inline EpisodeResult run_episode(Task& task, Policy& policy, mjData* data, int w
     physics_steps(task, world, data);
     world.first = false;
     ++result.steps;
+    if (each_step) each_step(world);
     const Evaluation e = task.evaluate(world);
     result.success = e.success;
     result.reward = e.reward;

@@ -18,6 +18,7 @@ struct ToolMove {
   Twist screw;            // log6(from^-1 to)
   double seconds = 0;     // of the way
   bool in_world = false;  // what the base does meanwhile is made up for
+  bool eased = false;     // from rest to rest, instead of at one speed
 };
 
 // Commands of a group along a path; they change linearly between its points, then stay.

@@ -11,10 +11,11 @@
 
 namespace mjsense {
 
-constexpr double kSideGap = 0.006;     // m, free on each side of the object before closing
-constexpr double kFaceDepth = 0.002;   // m, what counts as one face
-constexpr double kFaceWidth = 0.010;   // m, of the face that both pads touch
-constexpr double kLeastWidth = 0.004;  // m, of an object
+constexpr double kSideGap = 0.006;       // m, free on each side of the object before closing
+constexpr double kLeastSideGap = 0.004;  // m, the same where the gripper opens hardly wider
+constexpr double kFaceDepth = 0.002;     // m, what counts as one face
+constexpr double kFaceWidth = 0.010;     // m, of the face that both pads touch
+constexpr double kLeastWidth = 0.004;    // m, of an object
 
 // Extent of the surface between the pads, and of the faces that they would touch.
 struct Squeeze {

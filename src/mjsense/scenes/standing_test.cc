@@ -1,0 +1,41 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "mjsense/scenes/standing.h"
+
+#include <gtest/gtest.h>
+
+#include "mjsense/robots/load_robot.h"
+#include "mjsense/scenes/load_scene.h"
+#include "mjsense/tasks/pick/pick.h"
+
+namespace mjsense {
+namespace {
+
+Pose offset_of(const char* robot_name) {
+  EpisodeScene scene(load_scene("table"));
+  TaskCfg cfg;
+  cfg.robot = robot_cfg(robot_name);
+  PickTask task(cfg);
+  Scene compiled(task.whole_scene_cfg());
+  const Robot robot(cfg.robot, compiled.model(), 1);
+  scene.initialize(compiled.model(), 1, "robot_0/");
+  return Standing(compiled.model(), robot, scene).offset();
+}
+
+// The table was made for the Franka.
+TEST(Standing, WhoReachesStaysWhereTheSceneSays) {
+  for (const char* robot : {"franka", "mobile_franka"}) {
+    const Pose offset = offset_of(robot);
+    EXPECT_EQ(norm(offset.p), 0) << robot;
+    EXPECT_EQ(offset.q.w, 1) << robot;
+  }
+}
+
+TEST(Standing, AFloatingHandHangsAboveTheTargetsPointingDown) {
+  const Pose offset = offset_of("floating_rum");
+  EXPECT_NEAR(offset.p.x, 0.54 - 0.15, 1e-9);
+  EXPECT_NEAR(offset.p.z, 0.6 + 0.35 + 0.235, 1e-3);
+  EXPECT_LT(rotate(offset.q, {0, 0, 1}).z, -0.999);
+}
+
+}  // namespace
+}  // namespace mjsense
