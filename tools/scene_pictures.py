@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """Pictures of the scenes for the documentation: python tools/scene_pictures.py [SCENE ...], into docs/pictures.
 
-Scenes of packages that are not installed are left out.
+Views of scenes of installed packages may be added; where a package is missing its scene is left out.
 """
 
 from __future__ import annotations
@@ -24,8 +24,6 @@ VIEWS = {
     "kitchen:1": ("close", (-1.9, 0.9, 1.6), (0.3, 0.0, 0.95)),
     "shelf": ("pick", (-1.1, -1.1, 1.6), (0.6, 0.0, 0.85)),
     "clutter": ("pick", (-0.5, -1.1, 1.4), (0.7, 0.0, 0.6)),
-    "libero/kitchen": ("open", (0.9, -1.3, 1.6), (0.0, 0.0, 0.95)),
-    "gymnasium_robotics/kitchen": ("open", (0.3, -1.9, 2.7), (0.0, 0.6, 2.0)),
 }
 
 

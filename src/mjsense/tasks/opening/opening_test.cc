@@ -273,6 +273,12 @@ TEST(Opening, ARobotDoesNotStandInACupboard) {
   const auto at = [&](double x) { return search.placed(start, {{x, 0, 0}, {}}); };
   EXPECT_FALSE(stage.task.reach().stands_free(at(0.1)));  // the pedestal in the fronts
   EXPECT_TRUE(stage.task.reach().stands_free(at(-0.9)));
+  // The pedestal in a wall.
+  const int wall = resolve(stage.model, mjOBJ_GEOM, "room/wall_x0", "test");
+  const double inside =
+      stage.model->geom_pos[3 * wall] + stage.model->geom_size[3 * wall + 2];  // its face
+  EXPECT_FALSE(stage.task.reach().stands_free(at(inside + 0.2)));
+  EXPECT_TRUE(stage.task.reach().stands_free(at(inside + 0.3)));
 }
 
 TEST(Opening, ErrorsSayWhatIsMissing) {

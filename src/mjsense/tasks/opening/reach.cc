@@ -133,13 +133,8 @@ HandleReach::HandleReach(const mjModel* model, const Robot& robot, HandleReachCf
       if (is_below(model, b, robot.groups()[hand.gripper].root_body)) of_gripper_[b] = hand.gripper;
     }
   }
-  // MuJoCo looks for no contact between two bodies that do not move: a pedestal under a mocap body,
-  // a cupboard. In this model the robot's are said to move.
-  for (int b = 1; b < model->nbody; ++b) {
-    if (!of_robot_[b]) continue;
-    fixed_[b] = model->body_weldid[b] == 0 || b == robot.base_body();
-    if (model->body_weldid[b] == 0) own_->body_weldid[b] = b;
-  }
+  for (int b = 1; b < model->nbody; ++b)
+    fixed_[b] = of_robot_[b] && (model->body_weldid[b] == 0 || b == robot.base_body());
   for (int g = 0; g < model->ngeom; ++g) {
     if (of_robot_[model->geom_bodyid[g]]) own_->geom_margin[g] = cfg_.clearance;
   }
