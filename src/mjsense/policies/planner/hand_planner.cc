@@ -23,7 +23,7 @@ std::vector<int> planned_joints(const Robot& robot, const Hand& hand) {
 }  // namespace
 
 HandPlanner::HandPlanner(const mjModel* model, const Robot& robot, Hand hand, HandPlannerCfg cfg)
-    : model_(model), robot_(&robot), hand_(hand), cfg_(cfg) {
+    : robot_(&robot), hand_(hand), cfg_(cfg) {
   collisions_ = std::make_unique<CollisionModel>(model, robot, planned_joints(robot, hand));
   if (floats()) {
     RobotValues none;

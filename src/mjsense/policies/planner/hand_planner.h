@@ -55,7 +55,6 @@ class HandPlanner {
   std::span<const double> joints(const HandPose& at) const { return at.joints[hand_.tool].view(); }
   Pose base_of(const Pose& tool) const { return tool * tool_base_; }
 
-  const mjModel* model_;
   const Robot* robot_;
   Hand hand_;
   HandPlannerCfg cfg_;
