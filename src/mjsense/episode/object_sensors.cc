@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "mjsense/episode/object_sensors.h"
 
+#include <algorithm>
+
 #include "mjsense/core/error.h"
 #include "mjsense/observe/function_sensor.h"
 #include "mjsense/observe/pose_sensor.h"
@@ -41,6 +43,34 @@ std::shared_ptr<Sensor> grasp_state_sensor(const Task& task, const std::string& 
       "grasp_state_" + role,
       BodyRef([&task, i = index_of(task, role)](int world) { return task.objects(world)[i].body; }),
       std::move(grippers));
+}
+
+std::shared_ptr<Sensor> body_poses_sensor(const Task& task, const std::string& name,
+                                          std::vector<NamedBody> bodies) {
+  constexpr int kLength = 2000;
+  std::ranges::sort(bodies, {}, &NamedBody::name);
+  return std::make_shared<JsonFunctionSensor>(
+      name, kLength, "Poses of objects in the robot's base frame: 4x4 matrices by name.",
+      [&task, bodies = std::move(bodies)](const World& world, JsonWriter& json) {
+        const Pose to_base = inverse(task.robot().base_pose(world));
+        json.begin_object();
+        for (const NamedBody& one : bodies) {
+          const int body = one.body(world.id);
+          if (body < 0) continue;
+          const Pose pose =
+              to_base * Pose{vec3(world.data->xpos + 3 * body), quat(world.data->xquat + 4 * body)};
+          const Vec3 x = rotate(pose.q, {1, 0, 0}), y = rotate(pose.q, {0, 1, 0}),
+                     z = rotate(pose.q, {0, 0, 1});
+          json.key(one.name).begin_array();
+          for (int i = 0; i < 3; ++i) {
+            const double row[4] = {x[i], y[i], z[i], pose.p[i]};
+            json.values(row);
+          }
+          constexpr double kLast[4] = {0, 0, 0, 1};
+          json.values(kLast).end_array();
+        }
+        json.end_object();
+      });
 }
 
 }  // namespace mjsense

@@ -11,6 +11,7 @@
 #include "mjsense/observe/joint_state.h"
 #include "mjsense/observe/pose_sensor.h"
 #include "mjsense/observe/shared_field.h"
+#include "mjsense/robots/finger_grasp.h"
 #include "mjsense/rollout/action_sensors.h"
 
 namespace mjsense {
@@ -102,6 +103,11 @@ SensorSuite core_suite(const Task& task, const ActionLog& log,
   if (auto points = image_points(task, cameras)) suite.add(std::move(points), of_task);
   suite.extend(task.create_task_sensors(), of_task);
   suite.extend(robot.create_robot_sensors(), fmt::format("robot '{}'", robot.name()));
+  if (!task.objects(0).empty()) {
+    suite.extend(finger_grasp_sensors(
+                     robot, BodyRef([&task](int world) { return task.objects(world)[0].body; })),
+                 fmt::format("robot '{}'", robot.name()));
+  }
   if (const Policy* policy = task.policy()) {
     suite.extend(policy->create_policy_sensors(), fmt::format("policy '{}'", policy->name()));
   }

@@ -8,6 +8,8 @@
 #include <vector>
 
 #include "mjsense/core/error.h"
+#include "mjsense/policies/door/door_planner.h"
+#include "mjsense/policies/navigation/nav_planner.h"
 #include "mjsense/policies/planner/manipulation_planner.h"
 #include "mjsense/policies/planner/opening_planner.h"
 #include "mjsense/policies/planner/pick_planner.h"
@@ -34,6 +36,8 @@ struct Planners {
   std::vector<std::pair<std::string, PlannerFactory>> entries{
       {"open", [] { return std::make_unique<OpeningPlanner>(); }},
       {"close", [] { return std::make_unique<OpeningPlanner>(); }},
+      {"door_open", [] { return std::make_unique<DoorPlanner>(); }},
+      {"nav_to_obj", [] { return std::make_unique<NavPlanner>(); }},
       {"pick_and_place", make_manipulation},
       {"pick_and_place_next_to", make_manipulation},
       {"pick_and_place_color", make_manipulation},

@@ -7,6 +7,8 @@
 
 #include "mjsense/core/error.h"
 #include "mjsense/rollout/planners.h"
+#include "mjsense/tasks/door_opening/door_opening.h"
+#include "mjsense/tasks/nav_to_obj/nav_to_obj.h"
 #include "mjsense/tasks/opening/opening.h"
 #include "mjsense/tasks/pick/pick.h"
 #include "mjsense/tasks/pick_and_place/pick_and_place.h"
@@ -74,7 +76,9 @@ Registry<TaskFactory>& tasks() {
        {"pick_and_place", pick_and_place<PlaceKind::kInOrOn>},
        {"pick_and_place_next_to", pick_and_place<PlaceKind::kNextTo>},
        {"pick_and_place_color", pick_and_place<PlaceKind::kColor>},
-       {"packing", pick_and_place<PlaceKind::kPacking>}});
+       {"packing", pick_and_place<PlaceKind::kPacking>},
+       {"door_opening", [](TaskCfg c) { return std::make_unique<DoorOpeningTask>(std::move(c)); }},
+       {"nav_to_obj", [](TaskCfg c) { return std::make_unique<NavToObjTask>(std::move(c)); }}});
   return all;
 }
 

@@ -11,6 +11,7 @@
 #include "mjsense/core/row_error.h"
 #include "mjsense/rollout/action_sensors.h"
 #include "mjsense/rollout/episode_cameras.h"
+#include "mjsense/rollout/task_defaults.h"
 #include "mjsense/sensors/camera/camera_sensor_cfg.h"
 
 namespace mjsense {
@@ -43,6 +44,7 @@ TaskCfg task_cfg(const RolloutCfg& cfg) {
   out.action_noise = cfg.action_noise;
   out.perturb = cfg.perturb;
   out.terminate_upon_success = cfg.terminate_upon_success;
+  if (!cfg.make_task) set_task_defaults(cfg.task, out);
   if (cfg.horizon) out.horizon = *cfg.horizon;
   return out;
 }

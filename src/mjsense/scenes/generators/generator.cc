@@ -7,13 +7,16 @@
 
 #include "mjsense/core/error.h"
 #include "mjsense/scenes/generators/dining.h"
+#include "mjsense/scenes/generators/floor.h"
 #include "mjsense/scenes/generators/kitchen.h"
+#include "mjsense/scenes/generators/room_with_door.h"
 #include "mjsense/scenes/generators/shelf.h"
 
 namespace mjsense {
 
 std::span<const Generator> generators() {
-  static const std::vector<Generator> all{dining_generator(), kitchen_generator(),
+  static const std::vector<Generator> all{dining_generator(), floor_generator(),
+                                          kitchen_generator(), room_with_door_generator(),
                                           shelf_generator()};
   return all;
 }

@@ -137,6 +137,11 @@ void RoomText::open_body(std::string_view name, Vec3 pos, double yaw) {
 
 void RoomText::close_body() { world_ += "</body>\n"; }
 
+void RoomText::tail(std::string_view element) {
+  tail_ += element;
+  tail_ += '\n';
+}
+
 ModelSource RoomText::model() const {
   ModelSource source;
   source.xml = fmt::format(
@@ -145,8 +150,8 @@ ModelSource RoomText::model() const {
       "<default class=\"furniture\"><geom contype=\"0\" conaffinity=\"3\" "
       "condim=\"3\"/></default>\n"
       "<default class=\"shown\"><geom contype=\"0\" conaffinity=\"0\" group=\"2\" mass=\"0\"/>"
-      "</default></default>\n<asset>\n{}</asset>\n<worldbody>\n{}</worldbody>\n</mujoco>\n",
-      name_, assets_, world_);
+      "</default></default>\n<asset>\n{}</asset>\n<worldbody>\n{}</worldbody>\n{}</mujoco>\n",
+      name_, assets_, world_, tail_);
   source.assets = files_;
   return source;
 }

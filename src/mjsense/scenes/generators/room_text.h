@@ -54,6 +54,8 @@ class RoomText {
   void add(std::string_view element);
   void open_body(std::string_view name, Vec3 pos, double yaw = 0);
   void close_body();
+  // After the worldbody: equalities, excluded contacts.
+  void tail(std::string_view element);
   void asset(std::string_view element) { assets_ += element; }
   void file(std::string name, std::string bytes) { files_[std::move(name)] = std::move(bytes); }
 
@@ -61,7 +63,7 @@ class RoomText {
   const std::string& name() const { return name_; }
 
  private:
-  std::string name_, assets_, world_;
+  std::string name_, assets_, world_, tail_;
   std::map<std::string, std::string> files_;
 };
 

@@ -155,4 +155,27 @@ std::string brushed_png(Colour colour, std::uint32_t seed, int size) {
   });
 }
 
+std::string landscape_png(std::uint32_t seed, int size) {
+  const auto draw = [&](int i, double low, double high) {
+    return std::lerp(low, high, cell(i, 0, seed));
+  };
+  const Colour sky = brighter({0.66, 0.78, 0.88}, draw(0, 0.9, 1.1));
+  const Colour far = brighter({0.45, 0.56, 0.62}, draw(1, 0.8, 1.2));
+  const Colour near = brighter({0.42, 0.50, 0.30}, draw(2, 0.7, 1.3));
+  const Colour field = mix({0.80, 0.70, 0.42}, {0.58, 0.62, 0.38}, draw(3, 0, 1));
+  const double ridges = draw(4, 0.42, 0.52), hills = draw(5, 0.60, 0.70);
+  const double sun_u = draw(6, 0.2, 0.8), sun_v = draw(7, 0.15, 0.3);
+  return picture(size, [&](double u, double v) {
+    const double stroke = 0.96 + 0.08 * noise(u, v, 64, 64, seed);
+    const auto edge = [&](int n, std::uint32_t which) {
+      return noise(u, 0, n, 1, seed + which) - 0.5;
+    };
+    if (v > 0.86 + 0.05 * edge(4, 1)) return brighter(field, stroke);
+    if (v > hills + 0.14 * edge(3, 2)) return brighter(near, stroke * (1.1 - 0.4 * (v - hills)));
+    if (v > ridges + 0.16 * edge(6, 3)) return brighter(far, stroke);
+    if (std::hypot(u - sun_u, v - sun_v) < 0.06) return Colour{0.98, 0.93, 0.75};
+    return brighter(sky, stroke * (0.90 + 0.35 * v + 0.10 * cloud(u, v, 3, 8, 3, seed + 4)));
+  });
+}
+
 }  // namespace mjsense

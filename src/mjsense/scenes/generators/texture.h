@@ -25,5 +25,7 @@ std::string stone_png(Colour colour, std::uint32_t seed, int size = 256);
 std::string plaster_png(Colour colour, std::uint32_t seed, int size = 256);
 std::string cloth_png(Colour colour, std::uint32_t seed, int size = 256);
 std::string brushed_png(Colour colour, std::uint32_t seed, int size = 256);  // steel
+// Something to hang on a wall: hills under a sky. Its edges do not continue.
+std::string landscape_png(std::uint32_t seed, int size = 256);
 
 }  // namespace mjsense

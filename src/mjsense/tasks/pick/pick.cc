@@ -9,6 +9,7 @@
 
 #include "mjsense/core/error.h"
 #include "mjsense/scenes/load_scene.h"
+#include "mjsense/scenes/object_texts.h"
 
 namespace mjsense {
 namespace {
@@ -127,16 +128,7 @@ std::string PickTask::description(int world) const {
 }
 
 Task::Referrals PickTask::referrals(int world) const {
-  const SceneObject& object = scene_.objects()[targets_[world].index];
-  // The usual name half of the time, the others less and less often.
-  std::vector<Referral> texts{{object.text, object.others.empty() ? 1.0 : 0.5}};
-  double left = 0.5;
-  for (std::size_t i = 0; i < object.others.size(); ++i) {
-    const double share = i + 1 == object.others.size() ? left : 0.6 * left;
-    texts.push_back({object.others[i], share});
-    left -= share;
-  }
-  return {{std::string(kRole), texts}};
+  return {{std::string(kRole), referrals_of(scene_.objects()[targets_[world].index])}};
 }
 
 Pose PickTask::start_pose(int world, std::string_view role) const {

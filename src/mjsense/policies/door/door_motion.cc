@@ -1,0 +1,389 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "mjsense/policies/door/door_motion.h"
+
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+
+#include "mjsense/core/error.h"
+#include "mjsense/observe/frame.h"
+#include "mjsense/scenes/robot_floor.h"
+
+namespace mjsense {
+namespace {
+
+constexpr int kReachIterations = 300;  // of inverse kinematics, for the first configuration
+constexpr int kTries = 40;             // next places of the base that are looked at for collisions
+constexpr double kLeafHalf = 0.025;    // m, half the thickness of a leaf
+constexpr double kMaxJump = 0.5;       // rad, of a joint from one waypoint to the next
+// Costs: of a joint's motion, of leaving the posture of the grasp, of being near a limit, of the
+// base's motion and turn, and of being near something.
+constexpr double kMove = 1.0, kPosture = 0.12, kLimit = 6.0, kDrive = 6.0, kTurn = 1.5,
+                 kNear = 25.0;
+constexpr double kNearLimit = 0.25, kComfort = 0.12;  // rad, m
+constexpr double kReachCost = 0.15;                   // of a joint on the way to the handle
+constexpr double kGood = 6;                           // a motion that costs less is taken
+constexpr double kSwivel = 0.8, kMostSwivel = 0.9;    // cost of rad^2; rad
+
+Pose pose_of(const BasePose& base, double z) {
+  return {{base.x, base.y, z}, axis_angle({0, 0, 1}, base.yaw)};
+}
+
+double distance_to_segment(double px, double py, Vec3 a, Vec3 b) {
+  const double ex = b.x - a.x, ey = b.y - a.y, length = ex * ex + ey * ey;
+  const double t =
+      length > 0 ? std::clamp(((px - a.x) * ex + (py - a.y) * ey) / length, 0.0, 1.0) : 0.0;
+  return std::hypot(px - a.x - t * ex, py - a.y - t * ey);
+}
+
+// Positions, then contacts. Nothing with a destructor lives across it: a MuJoCo error leaves by
+// longjmp.
+void collide(const mjModel* m, mjData* d) {
+  mj_kinematics(m, d);
+  mj_comPos(m, d);
+  mj_collision(m, d);
+}
+
+}  // namespace
+
+// One hand, one way to take the handle, one place of the base at the grasp.
+class DoorMotions::Attempt {
+ public:
+  Attempt(const DoorMotions& motions, const World& world, const Door& door,
+          const DoorGeometry& geometry, Hand hand, mjData* scratch)
+      : motions_(motions),
+        world_(world),
+        door_(door),
+        geometry_(geometry),
+        hand_(hand),
+        scratch_(scratch),
+        arm_(motions.robot_.groups()[hand.tool]),
+        z_(motions.robot_.base_pose(world).p.z),
+        closing_(closing_direction(world.data, motions.robot_.groups()[hand.gripper])) {
+    motions_.robot_.read_qpos(world, start_);
+    const auto& groups = motions_.robot_.cfg().groups;
+    const auto& init = groups[hand.tool].init;
+    for (std::size_t i = 0; i < init.size(); ++i) start_[hand.tool].values[i] = init[i];
+  }
+
+  // The hand, turned by `swivel` about the direction in which it closes: a bar between flat pads
+  // lets it.
+  bool run(const Pose& straight, double swivel, const BasePose& base, double leaf,
+           DoorMotion& out) {
+    const Pose grasp = swivelled(straight, swivel);
+    const DoorMotionCfg& cfg = motions_.cfg_;
+    out = {};
+    out.hand = hand_;
+    out.grasp = grasp;
+    const Pose before = moved(grasp, -cfg.before * rotate(grasp.q, {0, 0, 1}));
+    RobotValues values = start_;
+    if (!solve(before, base, values, kReachIterations)) return false;
+    reference_ = values;
+    for (std::size_t i = 0; i < arm_.joints.size(); ++i) {
+      const double way = values[hand_.tool].values[i] - start_[hand_.tool].values[i];
+      out.cost += kReachCost * way * way;
+    }
+    if (!follow_line(before, grasp, base, values, out.approach)) return false;
+    if (limit_cost(values) > 0.6) return false;
+
+    const int presses =
+        geometry_.press == 0 ? 0 : 1 + static_cast<int>(std::abs(geometry_.press) / cfg.press_step);
+    for (int i = 1; i <= presses; ++i) {
+      const double lever = geometry_.press * i / presses;
+      if (!step(geometry_.carried(grasp, lever, 0), base, 0, lever, values, out.press, out.cost))
+        return false;
+    }
+    const int steps = 1 + static_cast<int>(std::abs(leaf) / cfg.leaf_step);
+    BasePose at = base;
+    swivel_ = swivel;
+    for (int i = 1; i <= steps; ++i) {
+      if (!open_step(straight, leaf * i / steps, leaf * (i - 1) / steps, at, values, out))
+        return false;
+    }
+    // Straight off the leaf as it stands then.
+    const Pose last = swivelled(geometry_.carried(straight, geometry_.press, leaf), swivel_);
+    const Pose off = moved(last, -0.08 * rotate(last.q, {0, 0, 1}));
+    if (!follow_line(last, off, at, values, out.leave)) out.leave.clear();
+    for (DoorWaypoint& waypoint : out.leave) waypoint.leaf = leaf;
+    return true;
+  }
+
+ private:
+  static Pose moved(Pose pose, Vec3 by) {
+    pose.p = pose.p + by;
+    return pose;
+  }
+
+  Pose swivelled(const Pose& tool, double angle) const {
+    return {tool.p, normalized(axis_angle(rotate(tool.q, closing_), angle) * tool.q)};
+  }
+
+  bool solve(const Pose& tool, const BasePose& base, RobotValues& values, int iterations) const {
+    return motions_.robot_.ik(hand_.tool, inverse(pose_of(base, z_)) * tool, values, iterations);
+  }
+
+  double limit_cost(const RobotValues& values) const {
+    const mjModel* m = motions_.model_;
+    double cost = 0;
+    for (std::size_t i = 0; i < arm_.joints.size(); ++i) {
+      const int j = arm_.joints[i];
+      if (!m->jnt_limited[j]) continue;
+      const double q = values[hand_.tool].values[i];
+      const double room = std::min(q - m->jnt_range[2 * j], m->jnt_range[2 * j + 1] - q);
+      const double lack = std::max(0.0, kNearLimit - room);
+      cost += kLimit * lack * lack;
+    }
+    return cost;
+  }
+
+  double motion_cost(const RobotValues& from, const RobotValues& to) const {
+    double cost = limit_cost(to);
+    for (std::size_t i = 0; i < arm_.joints.size(); ++i) {
+      const double q = to[hand_.tool].values[i];
+      const double step = q - from[hand_.tool].values[i],
+                   off = q - reference_[hand_.tool].values[i];
+      if (std::abs(step) > kMaxJump) return 1e9;
+      cost += kMove * step * step + kPosture * off * off;
+    }
+    return cost;
+  }
+
+  DoorWaypoint waypoint(const RobotValues& values, const BasePose& base, double leaf) const {
+    const auto view = values[hand_.tool].values;
+    return {
+        {view.begin(), view.begin() + static_cast<std::ptrdiff_t>(arm_.joints.size())}, base, leaf};
+  }
+
+  bool follow_line(const Pose& from, const Pose& to, const BasePose& base, RobotValues& values,
+                   std::vector<DoorWaypoint>& out) {
+    const int steps = 4;
+    for (int i = 0; i <= steps; ++i) {
+      Pose tool = from;
+      tool.p = from.p + (static_cast<double>(i) / steps) * (to.p - from.p);
+      const RobotValues before = values;
+      if (!solve(tool, base, values, i == 0 ? kReachIterations : Chain::kTracking)) return false;
+      if (i > 0 && motion_cost(before, values) > 1e8) return false;
+      if (out.empty() && collides(values, base, 0, 0)) return false;
+      out.push_back(waypoint(values, base, 0));
+    }
+    return true;
+  }
+
+  bool step(const Pose& tool, const BasePose& base, double leaf, double lever, RobotValues& values,
+            std::vector<DoorWaypoint>& out, double& cost) {
+    const RobotValues before = values;
+    if (!solve(tool, base, values, Chain::kTracking)) return false;
+    const double c = motion_cost(before, values);
+    if (c > 1e8 || collides(values, base, leaf, lever)) return false;
+    cost += c;
+    out.push_back(waypoint(values, base, leaf));
+    return true;
+  }
+
+  // The door a bit further: of small moves of the base - with the door, or not, aside, turned - the
+  // one with which the arm does best.
+  bool open_step(const Pose& grasp, double leaf, double last, BasePose& base, RobotValues& values,
+                 DoorMotion& out) {
+    struct Choice {
+      double cost, swivel;
+      BasePose base;
+      RobotValues values;
+    };
+    const Pose straight = geometry_.carried(grasp, geometry_.press, leaf);
+    // As if the base were a part of the door.
+    const Quat turn = axis_angle(geometry_.hinge_axis, leaf - last);
+    const Vec3 carried =
+        geometry_.hinge +
+        rotate(turn, Vec3{base.x, base.y, 0} - Vec3{geometry_.hinge.x, geometry_.hinge.y, 0});
+    const double yaw = geometry_.hinge_axis.z * (leaf - last);
+    std::vector<Choice> choices;
+    for (const double with : {0.0, 0.5, 1.0}) {
+      for (const auto& [dx, dy] :
+           {std::pair{0.0, 0.0}, {0.06, 0.0}, {-0.06, 0.0}, {0.0, 0.06}, {0.0, -0.06}}) {
+        for (const double spin : {0.0, 0.05, -0.05}) {
+          const BasePose b{base.x + with * (carried.x - base.x) + dx,
+                           base.y + with * (carried.y - base.y) + dy, base.yaw + with * yaw + spin};
+          const double room = motions_.clearance(geometry_, b, leaf);
+          if (room < motions_.cfg_.margin) continue;
+          const double drive = std::hypot(b.x - base.x, b.y - base.y),
+                       spun = wrapped(b.yaw - base.yaw);
+          const double tight = std::max(0.0, kComfort - room);
+          const double here = kDrive * drive * drive + kTurn * spun * spun + kNear * tight * tight;
+          for (const double by : {0.0, 1.0, -1.0}) {
+            const double swivel = swivel_ + by * std::abs(leaf - last);
+            if (std::abs(swivel) > kMostSwivel) continue;
+            Choice choice{here + kSwivel * (swivel * swivel - swivel_ * swivel_), swivel, b,
+                          values};
+            if (!solve(swivelled(straight, swivel), b, choice.values, Chain::kTracking / 4))
+              continue;
+            choice.cost += motion_cost(values, choice.values);
+            if (choice.cost < 1e8) choices.push_back(choice);
+          }
+        }
+      }
+    }
+    std::ranges::sort(choices, {}, &Choice::cost);
+    for (std::size_t i = 0; i < choices.size() && i < kTries; ++i) {
+      if (collides(choices[i].values, choices[i].base, leaf, geometry_.press)) continue;
+      values = choices[i].values;
+      base = choices[i].base;
+      swivel_ = choices[i].swivel;
+      out.cost += choices[i].cost;
+      out.open.push_back(waypoint(values, base, leaf));
+      return true;
+    }
+    return false;
+  }
+
+  // The robot in anything but the handle in its hand.
+  bool collides(const RobotValues& values, const BasePose& base, double leaf, double lever) {
+    const mjModel* m = motions_.model_;
+    mjData* d = scratch_;
+    mju_copy(d->qpos, world_.data->qpos, m->nq);
+    const MoveGroup& carrier = motions_.robot_.groups()[motions_.base_group_];
+    const double place[3] = {base.x, base.y, base.yaw};
+    for (int i = 0; i < 3; ++i) d->qpos[carrier.qpos[i]] = place[i];
+    for (std::size_t i = 0; i < arm_.qpos.size(); ++i)
+      d->qpos[arm_.qpos[i]] = values[hand_.tool].values[i];
+    for (const Hand& other : motions_.hands_) {
+      if (other.tool == hand_.tool) continue;
+      const MoveGroup& arm = motions_.robot_.groups()[other.tool];
+      const std::vector<double> q = motions_.tucked(other);
+      for (std::size_t i = 0; i < q.size(); ++i) d->qpos[arm.qpos[i]] = q[i];
+    }
+    d->qpos[m->jnt_qposadr[door_.joint]] += leaf;
+    if (door_.handle_joint >= 0) d->qpos[m->jnt_qposadr[door_.handle_joint]] += lever;
+    collide(m, d);
+    const int root = m->body_rootid[motions_.robot_.base_body()];
+    const int palm = motions_.robot_.groups()[hand_.gripper].root_body;
+    for (int c = 0; c < d->ncon; ++c) {
+      const mjContact& contact = d->contact[c];
+      if (contact.geom[0] < 0 || contact.geom[1] < 0 || contact.dist > -motions_.cfg_.depth)
+        continue;
+      const int a = m->geom_bodyid[contact.geom[0]], b = m->geom_bodyid[contact.geom[1]];
+      const bool first = m->body_rootid[a] == root;
+      if (first == (m->body_rootid[b] == root)) continue;
+      const int mine = first ? a : b, other = first ? b : a;
+      if (is_below(m, mine, palm) && is_below(m, other, door_.handle)) continue;
+      return true;
+    }
+    return false;
+  }
+
+  const DoorMotions& motions_;
+  const World& world_;
+  const Door& door_;
+  const DoorGeometry& geometry_;
+  Hand hand_;
+  mjData* scratch_;
+  const MoveGroup& arm_;
+  double z_;
+  Vec3 closing_;       // in the tool's frame
+  double swivel_ = 0;  // rad, of the hand about it
+  RobotValues start_, reference_;
+};
+
+DoorMotions::DoorMotions(const mjModel* model, const Robot& robot, DoorFloor floor,
+                         DoorMotionCfg cfg)
+    : base_group_(driving_base(robot)), model_(model), robot_(robot), floor_(floor), cfg_(cfg) {
+  for (const Hand& hand : hands_of(robot, model)) {
+    if (robot.groups()[hand.tool].kind == GroupKind::kArm &&
+        robot.groups()[hand.gripper].pad_sites[0] >= 0)
+      hands_.push_back(hand);
+  }
+}
+
+DoorMotions::~DoorMotions() {
+  for (mjData* data : unused_) mj_deleteData(data);
+}
+
+std::vector<double> DoorMotions::tucked(const Hand& hand) const {
+  std::vector<double> q;
+  for (int joint : robot_.groups()[hand.tool].joints) {
+    const double low = model_->jnt_range[2 * joint], high = model_->jnt_range[2 * joint + 1];
+    q.push_back(model_->jnt_limited[joint] ? std::clamp(0.0, low + 0.05, high - 0.05) : 0.0);
+  }
+  return q;
+}
+
+double DoorMotions::clearance(const DoorGeometry& geometry, const BasePose& base,
+                              double leaf) const {
+  double least = floor_.footprint->clearance(*floor_.floor, base.x, base.y, base.yaw);
+  const Vec3 edge = geometry.edge_at(leaf);
+  const double c = std::cos(base.yaw), s = std::sin(base.yaw);
+  for (const Disc& disc : floor_.footprint->discs()) {
+    const double x = base.x + c * disc.x - s * disc.y, y = base.y + s * disc.x + c * disc.y;
+    least =
+        std::min(least, distance_to_segment(x, y, geometry.hinge, edge) - kLeafHalf - disc.radius);
+  }
+  return least;
+}
+
+std::vector<BasePose> DoorMotions::places(const World& world, const Door& door) const {
+  const DoorGeometry geometry(model_, world.data, door, robot_.base_pose(world).p);
+  const Vec3 handle = vec3(world.data->xpos + 3 * door.handle);
+  const Vec3 hinge_side =
+      normalized(Vec3{geometry.hinge.x - handle.x, geometry.hinge.y - handle.y, 0});
+  // Who pushes goes through the doorway, who pulls keeps out of the leaf's way.
+  const double wanted =
+      dot(geometry.away, opening_direction(model_, world.data, door)) < 0 ? 0.3 : -0.2;
+  struct Place {
+    BasePose base;
+    double cost;
+  };
+  std::vector<Place> places;
+  for (const double far : {0.62, 0.70, 0.78, 0.86}) {
+    for (const double aside : {-0.45, -0.3, -0.15, 0.0, 0.15, 0.3, 0.45}) {
+      for (const double turned : {0.0, 0.35, -0.35}) {
+        const Vec3 p = handle + far * geometry.away + aside * hinge_side;
+        const BasePose base{p.x, p.y, std::atan2(-geometry.away.y, -geometry.away.x) + turned};
+        if (clearance(geometry, base, 0) < cfg_.margin) continue;
+        places.push_back(
+            {base, std::abs(far - 0.76) + 0.7 * std::abs(aside - wanted) + 0.3 * std::abs(turned)});
+      }
+    }
+  }
+  std::ranges::stable_sort(places, {}, &Place::cost);
+  std::vector<BasePose> out;
+  for (const Place& place : places) out.push_back(place.base);
+  return out;
+}
+
+std::optional<DoorMotion> DoorMotions::plan(const World& world, const Door& door,
+                                            const BasePose& base, double leaf, int tool) const {
+  mjData* scratch = nullptr;
+  {
+    const std::lock_guard lock(mutex_);
+    if (!unused_.empty()) {
+      scratch = unused_.back();
+      unused_.pop_back();
+    }
+  }
+  if (!scratch) scratch = mj_makeData(model_);
+  if (!scratch) throw RuntimeError("out of memory for the model's data");
+  mju_copy(scratch->mocap_pos, world.data->mocap_pos, 3 * model_->nmocap);
+  mju_copy(scratch->mocap_quat, world.data->mocap_quat, 4 * model_->nmocap);
+  const DoorGeometry geometry(model_, world.data, door, robot_.base_pose(world).p);
+  std::optional<DoorMotion> best;
+  for (const Hand& hand : hands_) {
+    if (tool >= 0 && hand.tool != tool) continue;
+    const Vec3 closing = closing_direction(world.data, robot_.groups()[hand.gripper]);
+    const std::optional<HandleGrasps> grasps =
+        handle_grasps(model_, world.data, door, geometry, closing);
+    if (!grasps) continue;
+    for (const Pose& grasp : grasps->poses) {
+      Attempt attempt(*this, world, door, geometry, hand, scratch);
+      for (const double swivel : {0.0, 0.3, -0.3}) {
+        if (best && best->cost < kGood) break;
+        DoorMotion motion;
+        if (attempt.run(grasp, swivel, base, leaf, motion) && (!best || motion.cost < best->cost))
+          best = std::move(motion);
+      }
+    }
+  }
+  const std::lock_guard lock(mutex_);
+  unused_.push_back(scratch);
+  return best;
+}
+
+}  // namespace mjsense

@@ -1,0 +1,273 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "mjsense/policies/door/door_planner.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+
+#include "mjsense/core/error.h"
+#include "mjsense/policies/navigation/nav_planner.h"
+#include "mjsense/scenes/robot_floor.h"
+#include "mjsense/tasks/door_opening/door_opening.h"
+
+namespace mjsense {
+namespace {
+
+constexpr Phase kPhases[] = {{"NAVIGATE_TO_DOOR", DoorPlanner::kNavigate},
+                             {"REACH_PRE_GRASP", DoorPlanner::kPregrasp},
+                             {"REACH_GRASP", DoorPlanner::kReach},
+                             {"GRASP_HANDLE", DoorPlanner::kGrasp},
+                             {"OPEN_DOOR", DoorPlanner::kOpen},
+                             {"RELEASE_HANDLE", DoorPlanner::kRelease},
+                             {"COMPLETE", DoorPlanner::kComplete},
+                             {"RECOVERY", DoorPlanner::kRecovery}};
+constexpr double kThere = 0.06, kThereYaw = 0.1;  // m and rad, from a place to stand at
+constexpr int kPlaces = 2;                        // tried anew before it begins again
+constexpr std::size_t kReachParts = 16;           // of the way to the pregrasp
+constexpr std::size_t kParts = 5;                 // of the opening, each looked at
+
+}  // namespace
+
+std::span<const Phase> DoorPlanner::phases() const { return kPhases; }
+
+void DoorPlanner::initialize_planner() {
+  door_ = dynamic_cast<const DoorOpeningTask*>(&task());
+  if (!door_)
+    throw ValueError(
+        fmt::format("the door planner opens doors; it cannot do task '{}'", task().name()));
+  group_ = driving_base(robot());
+  if (group_ < 0 || !door_->routes())
+    throw ValueError(fmt::format(
+        "the door planner needs a base that drives; that of robot '{}' does not", robot().name()));
+  motions_ = std::make_unique<DoorMotions>(task().model(), robot(),
+                                           DoorFloor{&door_->open_floor(), &door_->trunk()});
+  if (motions_->hands().empty())
+    throw ValueError(fmt::format(
+        "the door planner needs an arm with a gripper; robot '{}' lacks one", robot().name()));
+  expected_.assign(task().num_worlds(), {});
+  tool_.assign(task().num_worlds(), -1);
+}
+
+BasePose DoorPlanner::base(const World& world) const {
+  const Pose pose = robot().base_pose(world);
+  const Vec3 ahead = rotate(pose.q, {1, 0, 0});
+  return {pose.p.x, pose.p.y, std::atan2(ahead.y, ahead.x)};
+}
+
+double DoorPlanner::leaf_to_go(const World& world) const {
+  const Door& door = door_->door(world.id);
+  return door.shut + cfg_.open * (door.open - door.shut) -
+         world.data->qpos[world.model->jnt_qposadr[door.joint]];
+}
+
+void DoorPlanner::make_plan(const World& world, const PlanRequest& request, Plan& plan) {
+  expected_[world.id].clear();
+  if (door_->fraction(world) >= cfg_.open - 0.02) {
+    plan.wait(kComplete, 0.3);
+    return;
+  }
+  if (request.attempt > 0 && request.stage == 0) return recover(world, plan);
+  const int first = request.attempt > 0 ? 1 : 0;  // stage in which it drives to the door
+  if (request.stage > first) {
+    const std::optional<DoorMotion> motion = motions_->plan(
+        world, door_->door(world.id), base(world), leaf_to_go(world), tool_[world.id]);
+    if (motion) return open_door(world, *motion, plan);
+    // It does not stand quite where it wanted to: another place.
+    if (request.stage > first + kPlaces) return;
+  }
+  if (!approach(world, plan)) plan.clear();
+}
+
+// Lets go, backs off, and brings the arms to where they began.
+void DoorPlanner::recover(const World& world, Plan& plan) const {
+  plan.more = true;
+  const BasePose here = base(world);
+  const DoorGeometry geometry(world.model, world.data, door_->door(world.id),
+                              robot().base_pose(world).p);
+  Segment& open = plan.wait(kRecovery, 0.5);
+  std::vector<CommandPath> paths;
+  for (const Hand& hand : motions_->hands()) {
+    open.grip(hand.gripper, robot().groups()[hand.gripper].open_command);
+    const MoveGroup& arm = robot().groups()[hand.tool];
+    CommandPath path;
+    path.group = hand.tool;
+    path.times = {0, 2.5};
+    for (int address : arm.qpos) path.points.push_back(world.data->qpos[address]);
+    const auto& init = robot().cfg().groups[hand.tool].init;
+    path.points.insert(path.points.end(), init.begin(), init.end());
+    if (path.points.size() == 2 * arm.qpos.size()) paths.push_back(std::move(path));
+  }
+  for (const double back : {0.25, 0.12}) {
+    const BasePose off{here.x + back * geometry.away.x, here.y + back * geometry.away.y, here.yaw};
+    if (motions_->clearance(geometry, off, 0) < 0) continue;
+    const BasePose way[] = {here, off};
+    plan.move_groups(kRecovery, {base_path(group_, way, cfg_.speeds)});
+    break;
+  }
+  plan.move_groups(kRecovery, std::move(paths), 0.2);
+}
+
+// To the first place from which the door can be opened.
+bool DoorPlanner::approach(const World& world, Plan& plan) {
+  const BasePose here = base(world);
+  const Door& door = door_->door(world.id);
+  int tried = 0;
+  for (const BasePose& place : motions_->places(world, door)) {
+    if (tried++ >= cfg_.max_places) break;
+    const std::optional<DoorMotion> motion = motions_->plan(world, door, place, leaf_to_go(world));
+    if (!motion) continue;
+    plan.more = true;
+    std::vector<BasePose> way;
+    if (std::hypot(place.x - here.x, place.y - here.y) > kThere ||
+        std::abs(wrapped(place.yaw - here.yaw)) > kThereYaw) {
+      way = door_->routes()->find(here, place);
+      // Off its map - in the doorway, beside the open leaf - straight.
+      if (way.empty() && std::hypot(place.x - here.x, place.y - here.y) < 0.8) way = {here, place};
+      if (way.empty()) continue;
+    }
+    if (way.empty()) {
+      plan.wait(kNavigate, 0.1);
+    } else {
+      plan.move_groups(kNavigate, {base_path(group_, way, cfg_.speeds)}, 0.4);
+    }
+    tool_[world.id] = motion->hand.tool;
+    for (const Hand& hand : motions_->hands()) {
+      plan.segments.back().grip(hand.gripper, robot().groups()[hand.gripper].open_command);
+      if (hand.tool != motion->hand.tool) tuck(world, hand, plan.segments.back());
+    }
+    return true;
+  }
+  return false;
+}
+
+void DoorPlanner::tuck(const World& world, const Hand& hand, Segment& segment) const {
+  CommandPath path;
+  path.group = hand.tool;
+  path.times = {0, 2.0};
+  for (int address : robot().groups()[hand.tool].qpos)
+    path.points.push_back(world.data->qpos[address]);
+  const std::vector<double> q = motions_->tucked(hand);
+  path.points.insert(path.points.end(), q.begin(), q.end());
+  segment.paths.push_back(std::move(path));
+  segment.duration = std::max(segment.duration, 2.2);
+}
+
+// Seconds to each of the waypoints from the one before.
+std::vector<double> DoorPlanner::seconds(std::span<const DoorWaypoint> waypoints,
+                                         std::span<const double> from, const BasePose& at,
+                                         double joint_speed) const {
+  std::vector<double> out;
+  for (std::size_t k = 0; k < waypoints.size(); ++k) {
+    const BasePose& before = k == 0 ? at : waypoints[k - 1].base;
+    const BasePose& base = waypoints[k].base;
+    double t = std::max({0.05, std::hypot(base.x - before.x, base.y - before.y) / cfg_.base_speed,
+                         std::abs(wrapped(base.yaw - before.yaw)) / cfg_.base_turn});
+    if (k > 0)
+      t = std::max(t, std::abs(waypoints[k].leaf - waypoints[k - 1].leaf) / cfg_.leaf_speed);
+    for (std::size_t i = 0; i < waypoints[k].q.size(); ++i) {
+      const double last = k == 0 ? from[i] : waypoints[k - 1].q[i];
+      t = std::max(t, std::abs(waypoints[k].q[i] - last) / joint_speed);
+    }
+    out.push_back(t);
+  }
+  return out;
+}
+
+// Slow at the ends, and never much faster than a moment before or after: what hangs on the hand is heavy.
+void DoorPlanner::ease(std::vector<double>& seconds) {
+  constexpr double kChange = 0.75;
+  if (seconds.empty()) return;
+  seconds.front() *= 2.5;
+  seconds.back() *= 2.5;
+  for (std::size_t i = 1; i < seconds.size(); ++i)
+    seconds[i] = std::max(seconds[i], kChange * seconds[i - 1]);
+  for (std::size_t i = seconds.size(); i-- > 1;)
+    seconds[i - 1] = std::max(seconds[i - 1], kChange * seconds[i]);
+}
+
+// A segment along the waypoints, each after the one before.
+void DoorPlanner::add_path(Plan& plan, int phase, const DoorMotion& motion,
+                           std::span<const DoorWaypoint> waypoints, std::span<const double> seconds,
+                           std::vector<double>& from, BasePose& at) const {
+  CommandPath arm, base;
+  arm.group = motion.hand.tool;
+  base.group = group_;
+  double time = 0;
+  const auto add = [&] {
+    arm.times.push_back(time);
+    arm.points.insert(arm.points.end(), from.begin(), from.end());
+    base.times.push_back(time);
+    base.points.insert(base.points.end(), {at.x, at.y, at.yaw});
+  };
+  add();
+  for (std::size_t k = 0; k < waypoints.size(); ++k) {
+    const DoorWaypoint& next = waypoints[k];
+    from = next.q;
+    at = {next.base.x, next.base.y, at.yaw + wrapped(next.base.yaw - at.yaw)};
+    time += seconds[k];
+    add();
+  }
+  plan.move_groups(phase, {std::move(arm), std::move(base)});
+}
+
+void DoorPlanner::open_door(const World& world, const DoorMotion& motion, Plan& plan) {
+  const MoveGroup& gripper = robot().groups()[motion.hand.gripper];
+  plan.grasp = motion.grasp;
+  std::vector<double> q;
+  for (int address : robot().groups()[motion.hand.tool].qpos)
+    q.push_back(world.data->qpos[address]);
+  BasePose at = base(world);
+  const auto add = [&](int phase, std::span<const DoorWaypoint> waypoints,
+                       double speed) -> Segment& {
+    std::vector<double> times = seconds(waypoints, q, at, speed);
+    ease(times);
+    add_path(plan, phase, motion, waypoints, times, q, at);
+    return plan.segments.back();
+  };
+  const std::span<const DoorWaypoint> approach(motion.approach);
+  std::vector<DoorWaypoint> reach(kReachParts, approach[0]);
+  for (std::size_t k = 0; k < kReachParts; ++k) {
+    const double part = static_cast<double>(k + 1) / kReachParts;
+    for (std::size_t i = 0; i < q.size(); ++i)
+      reach[k].q[i] = std::lerp(q[i], approach[0].q[i], part);
+  }
+  add(kPregrasp, reach, cfg_.reach_speed).grip(motion.hand.gripper, gripper.open_command);
+  add(kReach, approach.subspan(1), cfg_.slow_speed);
+  plan.wait(kReach, 0.3);
+  plan.wait(kGrasp, cfg_.close_time).grip(motion.hand.gripper, gripper.closed_command);
+  if (!motion.press.empty()) {
+    add(kOpen, motion.press, cfg_.press_speed).holds(motion.hand.gripper);
+    plan.wait(kOpen, 0.2).holds(motion.hand.gripper);
+  }
+  const std::span<const DoorWaypoint> open(motion.open);
+  std::vector<double> times = seconds(open, q, at, cfg_.joint_speed);
+  ease(times);
+  const double begin = door_->fraction(world);
+  for (std::size_t part = 0; part < kParts; ++part) {
+    const std::size_t first = open.size() * part / kParts, last = open.size() * (part + 1) / kParts;
+    if (last == first) continue;
+    add_path(plan, kOpen, motion, open.subspan(first, last - first),
+             std::span(times).subspan(first, last - first), q, at);
+    const double done = static_cast<double>(last) / static_cast<double>(open.size());
+    expected_[world.id].push_back(
+        {static_cast<int>(plan.segments.size()), begin + done * (cfg_.open - begin)});
+  }
+  plan.wait(kOpen, 0.3);
+  plan.wait(kRelease, 0.4).grip(motion.hand.gripper, gripper.open_command);
+  if (!motion.leave.empty()) add(kRelease, motion.leave, cfg_.press_speed);
+  plan.wait(kComplete, 0.3);
+}
+
+bool DoorPlanner::gone_wrong(const World& world) const {
+  const int segment = follower().segment(world.id);
+  double wanted = 0;
+  for (const Expected& one : expected_[world.id]) {
+    if (segment >= one.segment) wanted = one.fraction;
+  }
+  // It is open: whatever else has gone wrong.
+  const double fraction = door_->fraction(world);
+  return fraction < DoorOpeningTask::kOpen + 0.02 && fraction < wanted - cfg_.lag;
+}
+
+}  // namespace mjsense

@@ -1,0 +1,68 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+// Opens a door: drives to it, takes the handle, presses it, and pulls or pushes the door along its
+// arc with arm and base together.
+
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "mjsense/policies/door/door_motion.h"
+#include "mjsense/policies/planner/task_planner.h"
+
+namespace mjsense {
+
+class DoorOpeningTask;
+
+struct DoorPlannerCfg {
+  double open = 0.76;  // fraction to which the door is led
+  double lag = 0.15;   // fraction by which it may stay behind: it begins again
+  // rad/s, of the arm's joints: on the way to the handle, at it, pressing, with the door
+  double reach_speed = 1.2, slow_speed = 0.6, press_speed = 0.5, joint_speed = 0.9;
+  double leaf_speed = 0.28;  // rad/s
+  double close_time = 0.7;   // s
+  BaseSpeeds speeds{0.4, 0.7, 0.4, 0.8};
+  double base_speed = 0.16, base_turn = 0.3;  // m/s, rad/s, with the door
+  int max_places = 40;                        // to stand at that are tried
+};
+
+class DoorPlanner final : public TaskPlanner {
+ public:
+  enum PhaseNumber { kNavigate, kPregrasp, kReach, kGrasp, kOpen, kRelease, kComplete, kRecovery };
+
+  explicit DoorPlanner(DoorPlannerCfg cfg = {}) : cfg_(cfg) {}
+  std::span<const Phase> phases() const override;
+
+ protected:
+  void initialize_planner() override;
+  void make_plan(const World& world, const PlanRequest& request, Plan& plan) override;
+  bool gone_wrong(const World& world) const override;
+
+ private:
+  struct Expected {
+    int segment;
+    double fraction;
+  };
+  BasePose base(const World& world) const;
+  double leaf_to_go(const World& world) const;
+  void recover(const World& world, Plan& plan) const;
+  bool approach(const World& world, Plan& plan);
+  void tuck(const World& world, const Hand& hand, Segment& segment) const;
+  void open_door(const World& world, const DoorMotion& motion, Plan& plan);
+  std::vector<double> seconds(std::span<const DoorWaypoint> waypoints, std::span<const double> from,
+                              const BasePose& at, double joint_speed) const;
+  static void ease(std::vector<double>& seconds);
+  void add_path(Plan& plan, int phase, const DoorMotion& motion,
+                std::span<const DoorWaypoint> waypoints, std::span<const double> seconds,
+                std::vector<double>& from, BasePose& at) const;
+
+  DoorPlannerCfg cfg_;
+  const DoorOpeningTask* door_ = nullptr;
+  int group_ = -1;  // of the base
+  std::unique_ptr<DoorMotions> motions_;
+  std::vector<int> tool_;  // [B] arm that is to take the handle
+  std::vector<std::vector<Expected>>
+      expected_;  // [B] how far the door is open when a segment begins
+};
+
+}  // namespace mjsense

@@ -1,0 +1,95 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "mjsense/policies/door/door_planner.h"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <set>
+
+#include "mjsense/policies/planner/pick_loop.h"
+#include "mjsense/robots/load_robot.h"
+#include "mjsense/tasks/door_opening/door_opening.h"
+
+namespace mjsense {
+namespace {
+
+struct DataDelete {
+  void operator()(mjData* data) const { mj_deleteData(data); }
+};
+
+TaskCfg rby1() {
+  TaskCfg cfg;
+  cfg.robot = robot_cfg("rby1");
+  cfg.policy_dt_ms = cfg.robot.policy_dt_ms;
+  cfg.ctrl_dt_ms = cfg.robot.ctrl_dt_ms;
+  cfg.sim_dt_ms = cfg.robot.sim_dt_ms;
+  cfg.horizon = 400;
+  return cfg;
+}
+
+struct DoorPlan : testing::Test {
+  void SetUp() override { task.initialize(model, 1); }
+  void start(std::int64_t episode) {
+    mj_resetData(model, data.get());
+    task.sample(0, episode, state_row(data.get()));
+    mj_forward(model, data.get());
+    world = {.id = 0, .model = model, .data = data.get()};
+    task.begin(world);
+  }
+  DoorOpeningTask task{rby1()};
+  Scene scene{task.whole_scene_cfg()};
+  const mjModel* model = scene.model();
+  std::unique_ptr<mjData, DataDelete> data{mj_makeData(model)};
+  World world;
+};
+
+// What DoorGeometry says of the handle is what MuJoCo makes of the joints.
+TEST_F(DoorPlan, TheHandleIsCarriedAsTheJointsCarryIt) {
+  start(0);
+  const Door& door = task.door(0);
+  const DoorGeometry geometry(model, data.get(), door, task.robot().base_pose(world).p);
+  const Pose handle{vec3(data->xpos + 3 * door.handle), quat(data->xquat + 4 * door.handle)};
+  const double leaf = 0.6 * (door.open - door.shut);
+  const Pose expected = geometry.carried(handle, geometry.press, leaf);
+  data->qpos[model->jnt_qposadr[door.joint]] += leaf;
+  data->qpos[model->jnt_qposadr[door.handle_joint]] += geometry.press;
+  mj_forward(model, data.get());
+  EXPECT_LT(norm(expected.p - vec3(data->xpos + 3 * door.handle)), 1e-9);
+  EXPECT_LT(angle_between(expected.q, quat(data->xquat + 4 * door.handle)), 1e-6);
+}
+
+TEST_F(DoorPlan, AHandClosesAcrossTheBarOnTheRobotsSide) {
+  std::set<bool> sides;
+  for (int episode = 0; episode < 8; ++episode) {
+    start(episode);
+    sides.insert(task.push(0));
+    const Door& door = task.door(0);
+    const DoorGeometry geometry(model, data.get(), door, task.robot().base_pose(world).p);
+    const MoveGroup& gripper = task.robot().group("right_gripper");
+    const Vec3 closing = closing_direction(data.get(), gripper);
+    const auto grasps = handle_grasps(model, data.get(), door, geometry, closing);
+    ASSERT_TRUE(grasps);
+    for (const Pose& pose : grasps->poses) {
+      EXPECT_GT(dot(pose.p - leaf_middle(model, data.get(), door), geometry.away), 0.04);
+      EXPECT_NEAR(dot(rotate(pose.q, {0, 0, 1}), geometry.away), -1, 1e-9) << "it comes straight";
+      EXPECT_NEAR(std::abs(rotate(pose.q, closing).z), 1, 1e-6)
+          << "the bar lies, the fingers close up and down";
+    }
+  }
+  EXPECT_EQ(sides.size(), 2u);
+}
+
+TEST_F(DoorPlan, OpensIt) {
+  DoorPlanner planner;
+  task.register_policy(planner);
+  int opened = 0;
+  for (int episode = 0; episode < 3; ++episode) {
+    const EpisodeResult result = run_episode(task, planner, data.get(), 0, episode);
+    opened += result.success ? 1 : 0;
+    EXPECT_EQ(result.reward, result.success ? 1 : 0);
+  }
+  EXPECT_GE(opened, 2);
+}
+
+}  // namespace
+}  // namespace mjsense

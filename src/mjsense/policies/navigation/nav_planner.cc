@@ -1,0 +1,111 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "mjsense/policies/navigation/nav_planner.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+
+#include "mjsense/core/error.h"
+#include "mjsense/scenes/robot_floor.h"
+#include "mjsense/tasks/nav_to_obj/nav_to_obj.h"
+
+namespace mjsense {
+namespace {
+
+constexpr Phase kPhases[] = {{"navigate", 0}};
+constexpr double kLook = 0.4;        // rad aside
+constexpr double kElsewhere = 0.35;  // m, from where nothing was seen
+constexpr int kLooks = 2;
+
+}  // namespace
+
+CommandPath base_path(int group, std::span<const BasePose> way, const BaseSpeeds& speeds) {
+  CommandPath path;
+  path.group = group;
+  for (const TimedBasePose& one : timed(way, speeds)) {
+    path.times.push_back(one.time);
+    path.points.insert(path.points.end(), {one.pose.x, one.pose.y, one.pose.yaw});
+  }
+  return path;
+}
+
+std::span<const Phase> NavPlanner::phases() const { return kPhases; }
+
+void NavPlanner::initialize_planner() {
+  nav_ = dynamic_cast<const NavToObjTask*>(&task());
+  if (!nav_)
+    throw ValueError(fmt::format("the navigation planner drives to objects; it cannot do task '{}'",
+                                 task().name()));
+  if (!nav_->routes())
+    throw ValueError(
+        fmt::format("the navigation planner needs a base that drives; that of robot '{}' does not",
+                    robot().name()));
+  group_ = driving_base(robot());
+  tried_.assign(task().num_worlds(), {});
+}
+
+BasePose NavPlanner::base(const World& world) const {
+  const Pose pose = robot().base_pose(world);
+  const Vec3 ahead = rotate(pose.q, {1, 0, 0});
+  return {pose.p.x, pose.p.y, std::atan2(ahead.y, ahead.x)};
+}
+
+bool NavPlanner::would_do(const World& world, const BasePose& there, const Pose& camera_in_base,
+                          double arrive) const {
+  const auto [index, distance] = nav_->nearest(world, there.x, there.y);
+  if (distance > arrive) return false;
+  const double* at = world.data->xpos + 3 * nav_->object(index).body;
+  if (std::abs(wrapped(std::atan2(at[1] - there.y, at[0] - there.x) - there.yaw)) > cfg_.facing)
+    return false;
+  for (const BasePose& tried : tried_[world.id]) {
+    if (std::hypot(tried.x - there.x, tried.y - there.y) < kElsewhere) return false;
+  }
+  const Pose base{{there.x, there.y, 0}, axis_angle({0, 0, 1}, there.yaw)};
+  return nav_->sees(world, base * camera_in_base, index);
+}
+
+void NavPlanner::make_plan(const World& world, const PlanRequest& request, Plan& plan) {
+  auto& tried = tried_[world.id];
+  if (request.stage == 0 && request.attempt == 0) tried.clear();
+  const BasePose here = base(world);
+  const Pose camera_in_base = inverse(robot().base_pose(world)) * nav_->camera_pose(world);
+  const auto [index, distance] = nav_->nearest(world, here.x, here.y);
+  if (distance < cfg_.arrive + 0.2 && nav_->sees(world, nav_->camera_pose(world), index)) {
+    plan.wait(0, 0.2);  // arrived
+    return;
+  }
+  plan.more = true;
+  if (request.stage > 0 && request.stage % (kLooks + 1) != 0) {
+    const BasePose aside{here.x, here.y, here.yaw + (request.stage % 2 == 1 ? kLook : -2 * kLook)};
+    if (nav_->routes()->free_between(here, aside)) {
+      const BasePose way[] = {here, aside};
+      plan.move_groups(0, {base_path(group_, way, cfg_.speeds)}, 0.2);
+      return;
+    }
+  }
+  if (request.stage > 0) tried.push_back(here);
+  std::vector<BasePose> way;
+  for (const double arrive : {cfg_.arrive, cfg_.reach}) {
+    if (way.size() > 1) break;
+    way = nav_->routes()->find(
+        here, [&](const BasePose& p) { return would_do(world, p, camera_in_base, arrive); },
+        [&](double x, double y) {
+          return std::max(0.0, nav_->nearest(world, x, y).second - arrive);
+        });
+  }
+  if (way.size() < 2) {
+    plan.more = false;
+    return;  // there is none
+  }
+  plan.move_groups(0, {base_path(group_, way, cfg_.speeds)}, 0.4);
+}
+
+bool NavPlanner::gone_wrong(const World& world) const {
+  const GroupValues& target = robot().targets(world.id)[group_];
+  if (!target.given || target.size < 2) return false;
+  const BasePose here = base(world);
+  return std::hypot(target.values[0] - here.x, target.values[1] - here.y) > cfg_.astray;
+}
+
+}  // namespace mjsense

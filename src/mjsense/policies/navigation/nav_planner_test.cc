@@ -1,0 +1,73 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "mjsense/policies/navigation/nav_planner.h"
+
+#include <gtest/gtest.h>
+
+#include "mjsense/core/error.h"
+#include "mjsense/policies/planner/pick_loop.h"
+#include "mjsense/robots/load_robot.h"
+#include "mjsense/tasks/nav_to_obj/nav_to_obj.h"
+#include "mjsense/tasks/pick/pick.h"
+
+namespace mjsense {
+namespace {
+
+struct DataDelete {
+  void operator()(mjData* data) const { mj_deleteData(data); }
+};
+
+TaskCfg of(const char* robot) {
+  TaskCfg cfg;
+  cfg.robot = robot_cfg(robot);
+  cfg.policy_dt_ms = 200;
+  return cfg;
+}
+
+struct Driven {
+  explicit Driven(const char* robot) : task(of(robot)), scene(task.whole_scene_cfg()) {
+    data.reset(mj_makeData(scene.model()));
+    task.initialize(scene.model(), 1);
+    task.register_policy(planner);
+  }
+  NavToObjTask task;
+  Scene scene;
+  NavPlanner planner;
+  std::unique_ptr<mjData, DataDelete> data;
+};
+
+TEST(NavPlanner, ArrivesWhereTheObjectIsSeenWithoutTouchingAnything) {
+  for (const char* robot : {"rby1", "mobile_franka"}) {
+    Driven d(robot);
+    for (int episode = 0; episode < 2; ++episode) {
+      const EpisodeResult result = run_episode(d.task, d.planner, d.data.get(), 0, episode);
+      EXPECT_TRUE(result.success) << robot << " " << episode;
+      EXPECT_FALSE(result.gave_up);
+      EXPECT_GT(result.reward, 0.04);
+      EXPECT_EQ(d.planner.phase(0), 0);
+      const mjModel* m = d.scene.model();
+      for (int c = 0; c < d.data->ncon; ++c) {
+        const mjContact& contact = d.data->contact[c];
+        const int a = m->body_rootid[m->geom_bodyid[contact.geom[0]]],
+                  b = m->body_rootid[m->geom_bodyid[contact.geom[1]]];
+        const int robot_root = m->body_rootid[d.task.robot().base_body()];
+        EXPECT_EQ(a == robot_root, b == robot_root) << "the robot touches something";
+      }
+    }
+  }
+}
+
+TEST(NavPlanner, SaysWhatItNeeds) {
+  PickTask pick(of("mobile_franka"));
+  Scene scene(pick.whole_scene_cfg());
+  pick.initialize(scene.model(), 1);
+  NavPlanner planner;
+  EXPECT_THROW(pick.register_policy(planner), ValueError);
+  NavToObjTask task(of("franka"));
+  Scene floor(task.whole_scene_cfg());
+  task.initialize(floor.model(), 1);
+  NavPlanner other;
+  EXPECT_THROW(task.register_policy(other), ValueError) << "a base that does not drive";
+}
+
+}  // namespace
+}  // namespace mjsense

@@ -1,0 +1,52 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "mjsense/robots/finger_grasp.h"
+
+#include <fmt/format.h>
+
+#include "mjsense/observe/function_sensor.h"
+
+namespace mjsense {
+
+bool fingers_touch(const World& world, const MoveGroup& gripper, int body) {
+  if (body < 0 || gripper.pad_sites[0] < 0 || gripper.pad_sites[1] < 0) return false;
+  const mjModel* m = world.model;
+  bool touches[2] = {false, false};
+  for (int c = 0; c < world.data->ncon; ++c) {
+    const mjContact& contact = world.data->contact[c];
+    if (contact.exclude != 0 || contact.geom[0] < 0 || contact.geom[1] < 0) continue;
+    const int a = m->geom_bodyid[contact.geom[0]], b = m->geom_bodyid[contact.geom[1]];
+    const bool first = is_below(m, a, body);
+    if (first == is_below(m, b, body)) continue;
+    for (int f = 0; f < 2; ++f) {
+      if (is_below(m, first ? b : a, m->site_bodyid[gripper.pad_sites[f]])) touches[f] = true;
+    }
+  }
+  return touches[0] && touches[1];
+}
+
+std::vector<std::shared_ptr<Sensor>> finger_grasp_sensors(const Robot& robot,
+                                                          const BodyRef& object) {
+  std::vector<const MoveGroup*> grippers;
+  for (const MoveGroup& group : robot.groups()) {
+    if (group.kind == GroupKind::kGripper) grippers.push_back(&group);
+  }
+  std::vector<std::shared_ptr<Sensor>> sensors;
+  if (grippers.size() < 2) return sensors;
+  for (const MoveGroup* gripper : grippers) {
+    SensorSpec spec;
+    spec.shape = {1};
+    spec.low = 0;
+    spec.high = 1;
+    spec.description =
+        fmt::format("Both fingers of '{}' touch the object that the task is about.", gripper->name);
+    sensors.push_back(std::make_shared<FunctionSensor<std::uint8_t>>(
+        fmt::format("{}_{}_grasp_state", robot.name(),
+                    gripper->name.substr(0, gripper->name.find('_'))),
+        spec, [gripper, object](const World& world, std::span<std::uint8_t> row) {
+          row[0] = fingers_touch(world, *gripper, object(world.id)) ? 1 : 0;
+        }));
+  }
+  return sensors;
+}
+
+}  // namespace mjsense

@@ -1,0 +1,156 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "mjsense/scenes/occupancy.h"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <numbers>
+
+#include "mjsense/scene/spec.h"
+#include "mjsense/scenes/base_route.h"
+
+namespace mjsense {
+namespace {
+
+using std::numbers::pi;
+
+struct DataDelete {
+  void operator()(mjData* data) const { mj_deleteData(data); }
+};
+
+// A room of 4 x 4 m with a wall in the middle that leaves a gap, a lamp above, a rug below.
+std::string room(double gap) {
+  const double half = (4 - gap) / 4;
+  return "<mujoco><worldbody><geom type='plane' size='5 5 .1'/>"
+         "<geom type='box' pos='0 2.05 1' size='2 .05 1'/><geom type='box' pos='0 -2.05 1' size='2 "
+         ".05 1'/>"
+         "<geom type='box' pos='2.05 0 1' size='.05 2 1'/><geom type='box' pos='-2.05 0 1' "
+         "size='.05 2 1'/>"
+         "<geom type='box' pos='0 " +
+         std::to_string(gap / 2 + half) + " 1' size='.05 " + std::to_string(half) +
+         " 1'/>"
+         "<geom type='box' pos='0 " +
+         std::to_string(-gap / 2 - half) + " 1' size='.05 " + std::to_string(half) +
+         " 1'/>"
+         "<geom type='box' pos='1 1 2.3' size='.3 .3 .1'/><geom type='box' pos='1 -1 .01' size='.3 "
+         ".3 .01'/>"
+         "<geom type='cylinder' pos='-1 1 .4' size='.2 .4'/><geom type='sphere' pos='-1 -1 .4' "
+         "size='.2' contype='0' conaffinity='0'/>"
+         "</worldbody></mujoco>";
+}
+
+struct Floor {
+  explicit Floor(double gap) : model(compile_text(room(gap))), data(mj_makeData(model.get())) {
+    mj_kinematics(model.get(), data.get());
+  }
+  static ModelPtr compile_text(const std::string& xml) {
+    ModelSource source;
+    source.xml = xml;
+    const SpecPtr spec = parse_model(source, "test");
+    return compile(spec.get(), Vfs());
+  }
+  Occupancy occupancy() const {
+    return {model.get(), data.get(), [](int) { return true; }, {}};
+  }
+  ModelPtr model;
+  std::unique_ptr<mjData, DataDelete> data;
+};
+
+TEST(Occupancy, TakesWhatIsInTheWayAndNothingElse) {
+  const Floor floor(1.0);
+  const Occupancy o = floor.occupancy();
+  const auto free = [&](double x, double y) { return o.clearance(x, y) > 0; };
+  EXPECT_FALSE(free(0, 1.5)) << "the wall";
+  EXPECT_TRUE(free(0, 0)) << "the gap";
+  EXPECT_FALSE(free(-1, 1)) << "the cylinder";
+  EXPECT_TRUE(free(1, 1)) << "under the lamp";
+  EXPECT_TRUE(free(1, -1)) << "on the rug";
+  EXPECT_TRUE(free(-1, -1)) << "what nobody touches";
+  EXPECT_EQ(o.clearance(50, 0), 0) << "off the grid";
+  // Analytic distances, to a cell.
+  EXPECT_NEAR(o.clearance(1, 0), 0.95, 0.06)
+      << "the middle wall's end is at (0.05, 0.5): " << std::hypot(0.95, 0.5);
+  EXPECT_NEAR(o.clearance(-1, 0.4), 0.4, 0.06) << "the cylinder's rim";
+}
+
+// A disc of 0.3 m.
+Footprint disc(const Floor& floor) {
+  return {floor.model.get(), floor.data.get(),
+          [&](int g) { return floor.model->geom_type[g] == mjGEOM_CYLINDER; }, Pose{{-1, 1, 0}, {}},
+          10};
+}
+
+TEST(Occupancy, AFootprintIsMadeOfTheRobotsGeoms) {
+  const Floor floor(1.0);
+  const Footprint print = disc(floor);
+  EXPECT_NEAR(print.radius(), 0.2, 0.005);
+  EXPECT_NEAR(print.height(), 0.8, 1e-9);
+  const Occupancy o = floor.occupancy();
+  EXPECT_TRUE(print.fits(o, 0, 0, 0, 0.1));
+  EXPECT_FALSE(print.fits(o, 0, 0, 0, 0.35));
+}
+
+TEST(BaseRoute, GoesThroughTheGapWithoutTouching) {
+  const Floor floor(1.0);
+  const Occupancy o = floor.occupancy();
+  const BaseRoutes routes(o, disc(floor));
+  const BasePose from{-1, 0.3, pi}, to{1.2, -1.2, 0};
+  const auto way = routes.find(from, to);
+  ASSERT_GE(way.size(), 2u);
+  EXPECT_EQ(way.front().x, from.x);
+  EXPECT_NEAR(way.back().x, to.x, 1e-12);
+  EXPECT_NEAR(way.back().yaw, to.yaw, 1e-12);
+  for (std::size_t i = 1; i < way.size(); ++i)
+    EXPECT_TRUE(routes.free_between(way[i - 1], way[i])) << i;
+  // Not much longer than it must be: by the gap.
+  double length = 0;
+  for (std::size_t i = 1; i < way.size(); ++i)
+    length += std::hypot(way[i].x - way[i - 1].x, way[i].y - way[i - 1].y);
+  EXPECT_LT(length, 1.3 * (std::hypot(1, 0.3) + std::hypot(1.2, 1.2)));
+}
+
+TEST(BaseRoute, ThereIsNoneWhereItIsTooNarrow) {
+  const Floor floor(0.45);  // 0.4 and twice the margin are needed
+  const BaseRoutes routes(floor.occupancy(), disc(floor));
+  EXPECT_TRUE(routes.find({-1, 0.3, 0}, {1.2, -1.2, 0}).empty());
+  EXPECT_FALSE(routes.find({-1, 0.3, 0}, {-1.2, -1.2, 0}).empty());
+}
+
+TEST(BaseRoute, ADifferentialBaseGoesAlongItsHeading) {
+  const Floor floor(1.0);
+  BaseRouteCfg cfg;
+  cfg.sideways = false;
+  const BaseRoutes routes(floor.occupancy(), disc(floor), cfg);
+  const auto way = routes.find(
+      {-1, 0.3, 0}, [](const BasePose& p) { return std::hypot(p.x - 1.2, p.y + 1.2) < 0.2; },
+      [](double, double) { return 0.0; });
+  ASSERT_GE(way.size(), 2u);
+  for (std::size_t i = 2; i < way.size(); ++i) {
+    const double dx = way[i].x - way[i - 1].x, dy = way[i].y - way[i - 1].y;
+    if (std::hypot(dx, dy) < 1e-9) continue;
+    EXPECT_NEAR(std::remainder(std::atan2(dy, dx) - way[i].yaw, pi), 0, 1e-6) << i;
+  }
+}
+
+TEST(BaseRoute, TimesKeepSpeedsAndAccelerations) {
+  const BasePose way[] = {{0, 0, 0}, {1.5, 0, 0}, {1.5, 0, 0.5 * pi}, {1.5, 0.1, 0.5 * pi}};
+  const BaseSpeeds speeds;
+  const auto points = timed(way, speeds, 0.02);
+  EXPECT_EQ(points.front().time, 0);
+  EXPECT_NEAR(points.back().pose.y, 0.1, 1e-12);
+  EXPECT_NEAR(points.back().pose.yaw, 0.5 * pi, 1e-12);
+  double last = 0;
+  for (std::size_t i = 1; i < points.size(); ++i) {
+    const double dt = points[i].time - points[i - 1].time;
+    const double v = std::hypot(points[i].pose.x - points[i - 1].pose.x,
+                                points[i].pose.y - points[i - 1].pose.y) /
+                     dt;
+    EXPECT_LE(v, speeds.speed + 1e-9);
+    EXPECT_LE(std::abs(points[i].pose.yaw - points[i - 1].pose.yaw) / dt, speeds.turn + 1e-9);
+    EXPECT_LE(std::abs(v - last) / dt, 1.05 * speeds.acceleration);
+    last = v;
+  }
+}
+
+}  // namespace
+}  // namespace mjsense

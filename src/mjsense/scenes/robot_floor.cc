@@ -1,0 +1,75 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "mjsense/scenes/robot_floor.h"
+
+#include <algorithm>
+
+#include "mjsense/core/error.h"
+#include "mjsense/observe/frame.h"
+#include "mjsense/scene/resolve.h"
+
+namespace mjsense {
+namespace {
+
+constexpr double kHeadroom = 0.05;  // m
+
+}  // namespace
+
+int driving_base(const Robot& robot) {
+  const auto is_one = [](const MoveGroup& group) {
+    return group.kind == GroupKind::kBase && group.command_size == 3 && group.target_size == 3;
+  };
+  const auto at = std::ranges::find_if(robot.groups(), is_one);
+  return at == robot.groups().end() ? -1 : static_cast<int>(at - robot.groups().begin());
+}
+
+RestingRobot::RestingRobot(const mjModel* model, const Robot& robot)
+    : model_(model), robot_(robot), data_(mj_makeData(model)) {
+  if (!data_) throw RuntimeError("out of memory for the model's data");
+  for (std::size_t g = 0; g < robot.groups().size(); ++g) {
+    const auto& init = robot.cfg().groups[g].init;
+    for (std::size_t i = 0; i < init.size(); ++i) data_->qpos[robot.groups()[g].qpos[i]] = init[i];
+  }
+  mj_kinematics(model, data_.get());
+}
+
+bool RestingRobot::of_robot(int geom) const {
+  const int body = model_->geom_bodyid[geom];
+  if (!robot_.prefix().empty() && name_of(model_, mjOBJ_BODY, body).starts_with(robot_.prefix()))
+    return true;
+  return robot_.base_body() > 0 && is_below(model_, body, robot_.base_body());
+}
+
+Footprint RestingRobot::footprint() const {
+  const int base = robot_.base_body();
+  return {model_, data_.get(), [this](int g) { return of_robot(g); },
+          pose_from_mat(data_->xpos + 3 * base, data_->xmat + 9 * base), 10.0};
+}
+
+Footprint RestingRobot::trunk() const {
+  const int base = robot_.base_body();
+  return {model_, data_.get(),
+          [this](int g) {
+            const auto holds = [&](const MoveGroup& group) {
+              const bool limb = group.kind == GroupKind::kArm || group.kind == GroupKind::kGripper;
+              return limb && group.root_body > 0 &&
+                     is_below(model_, model_->geom_bodyid[g], group.root_body);
+            };
+            return of_robot(g) && std::ranges::none_of(robot_.groups(), holds);
+          },
+          pose_from_mat(data_->xpos + 3 * base, data_->xmat + 9 * base), 10.0};
+}
+
+Occupancy RestingRobot::occupancy(double height, const std::function<bool(int)>& without) const {
+  OccupancyCfg cfg;
+  cfg.high = height + kHeadroom;
+  return {model_, data_.get(),
+          [&](int g) {
+            const int root = model_->body_rootid[model_->geom_bodyid[g]];
+            const bool loose = root > 0 && model_->body_jntnum[root] == 1 &&
+                               model_->jnt_type[model_->body_jntadr[root]] == mjJNT_FREE;
+            return !loose && !of_robot(g) && !(without && without(g));
+          },
+          cfg};
+}
+
+}  // namespace mjsense

@@ -1,0 +1,147 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "mjsense/tasks/door_opening/door_opening.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+
+#include "mjsense/core/error.h"
+#include "mjsense/observe/frame.h"
+#include "mjsense/robots/finger_grasp.h"
+#include "mjsense/scene/resolve.h"
+#include "mjsense/scenes/load_scene.h"
+#include "mjsense/scenes/robot_floor.h"
+
+namespace mjsense {
+namespace {
+
+using std::numbers::pi;
+
+constexpr std::string_view kScene = "room_with_door";
+constexpr double kNear = 1.15, kFar = 1.9;  // m, from the leaf, of the start
+constexpr double kAside = 0.5;              // m, half width
+constexpr double kTurned = 0.35;            // rad, half width
+constexpr int kStarts = 200;                // places to try
+
+}  // namespace
+
+DoorOpeningTask::DoorOpeningTask(TaskCfg cfg)
+    : Task(std::move(cfg)),
+      scene_(load_scene(this->cfg().scene.empty() ? kScene : std::string_view(this->cfg().scene))) {
+}
+
+SceneCfg DoorOpeningTask::scene_cfg() const { return scene_.scene_cfg(robot_entity()); }
+
+void DoorOpeningTask::bind(const std::shared_ptr<Simulation>& simulation) {
+  simulation_ = simulation;
+  scene_.bind(*simulation);
+}
+
+std::string DoorOpeningTask::start_fault(const World& world) const { return scene_.fault(world); }
+
+void DoorOpeningTask::initialize_task() {
+  scene_.initialize(model(), num_worlds(), robot().prefix());
+  doors_ = find_doors(model(), robot().prefix());
+  if (doors_.empty())
+    throw ValueError(fmt::format(
+        "task 'door_opening': scene '{}' has no door: no body higher than {} m on a hinge about "
+        "the vertical with a range",
+        scene_.cfg().name, Door::kLeastHeight));
+  const RestingRobot rest(model(), robot());
+  sides_.clear();
+  for (const Door& door : doors_)
+    sides_.push_back(
+        {leaf_middle(model(), rest.data(), door), opening_direction(model(), rest.data(), door)});
+  footprint_ = std::make_unique<Footprint>(rest.footprint());
+  trunk_ = std::make_unique<Footprint>(rest.trunk());
+  floor_ = std::make_unique<Occupancy>(rest.occupancy(footprint_->height()));
+  open_floor_ = std::make_unique<Occupancy>(rest.occupancy(footprint_->height(), [this](int geom) {
+    const int body = model()->geom_bodyid[geom];
+    return std::ranges::any_of(
+        doors_, [&](const Door& door) { return is_below(model(), body, door.body); });
+  }));
+  if (driving_base(robot()) >= 0) routes_ = std::make_unique<BaseRoutes>(*floor_, *footprint_);
+  episodes_.assign(num_worlds(), {});
+  for (Episode& episode : episodes_)
+    episode.handle = {std::string(kRole), doors_[0].handle, "door handle", true};
+}
+
+std::optional<Pose> DoorOpeningTask::sample_scene(int world, Rng& rng, const StateRow& state) {
+  Episode& episode = episodes_[world];
+  const auto number = static_cast<std::uint64_t>(this->episode(world));
+  episode.door = static_cast<int>(rng.below(static_cast<std::uint32_t>(doors_.size())));
+  const Door& door = doors_[episode.door];
+  episode.handle.body = door.handle;
+  const std::shared_ptr<Simulation> simulation = simulation_.lock();
+  if (scene_.vary_look(world, cfg().seed, number) && simulation)
+    simulation->worlds().model_changed();
+  const Pose placed = scene_.sample(world, -1, cfg().seed, number, rng, state);
+  state.qpos[model()->jnt_qposadr[door.joint]] = door.shut;
+
+  // Before the door, on one of its sides, facing it more or less.
+  const Side& side = sides_[episode.door];
+  const Vec3 along{-side.way.y, side.way.x, 0};
+  const bool push = rng.below(2) == 0;
+  for (int attempt = 0; attempt < kStarts; ++attempt) {
+    episode.push = attempt < kStarts / 2 ? push : !push;
+    const Vec3 away = episode.push ? -side.way : side.way;
+    const Vec3 at = side.middle + (rng.uniform(kNear, kFar) + footprint_->radius() - 0.5) * away +
+                    rng.uniform(-kAside, kAside) * along;
+    const double yaw = std::atan2(-away.y, -away.x) + rng.uniform(-kTurned, kTurned);
+    if (!footprint_->fits(*floor_, at.x, at.y, yaw, 0.08)) continue;
+    return Pose{{at.x, at.y, placed.p.z}, axis_angle({0, 0, 1}, yaw)};
+  }
+  episode.push = dot(placed.p - side.middle, side.way) < 0;
+  return placed;
+}
+
+void DoorOpeningTask::begin(const World& world) {
+  Task::begin(world);
+  Episode& episode = episodes_[world.id];
+  const int body = episode.handle.body;
+  const Side& side = sides_[episode.door];
+  episode.push = dot(robot().base_pose(world).p - side.middle, side.way) < 0;
+  episode.start = {vec3(world.data->xpos + 3 * body), quat(world.data->xquat + 4 * body)};
+}
+
+Evaluation DoorOpeningTask::evaluate(const World& world) const {
+  const bool success = fraction(world) >= kOpen;
+  return judge(world.id, success ? 1.0 : 0.0, success);
+}
+
+std::string DoorOpeningTask::description(int world) const {
+  return push(world) ? "Push the door open" : "Pull the door open";
+}
+
+Task::Referrals DoorOpeningTask::referrals(int /*world*/) const {
+  return {
+      {std::string(kRole), {{"door handle", 0.5}, {"handle of the door", 0.3}, {"handle", 0.2}}}};
+}
+
+Pose DoorOpeningTask::start_pose(int world, std::string_view role) const {
+  if (role != kRole) {
+    const std::vector<std::string> roles{std::string(kRole)};
+    throw_unknown("task 'door_opening'", "role", role, roles);
+  }
+  return episodes_[world].start;
+}
+
+void DoorOpeningTask::write_info(const World& world, JsonWriter& json) const {
+  bool grasped = false;
+  for (const MoveGroup& group : robot().groups()) {
+    if (group.kind == GroupKind::kGripper)
+      grasped = grasped || fingers_touch(world, group, door(world.id).handle);
+  }
+  const double open = fraction(world);
+  json.key("handle_grasped").value(grasped);
+  json.key("joint_position").value(open);
+  json.key("success").value(open >= kOpen);
+}
+
+std::vector<std::pair<std::string, std::string>> DoorOpeningTask::scene_info(int world) const {
+  return {{"text", description(world)}, {"object_name", "door"}};
+}
+
+}  // namespace mjsense

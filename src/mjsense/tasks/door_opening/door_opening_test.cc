@@ -1,0 +1,161 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "mjsense/tasks/door_opening/door_opening.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <nlohmann/json.hpp>
+
+#include "mjsense/core/error.h"
+#include "mjsense/robots/load_robot.h"
+#include "mjsense/scene/resolve.h"
+
+namespace mjsense {
+namespace {
+
+using testing::HasSubstr;
+
+struct DataDelete {
+  void operator()(mjData* data) const { mj_deleteData(data); }
+};
+
+TaskCfg rby1(const std::string& scene) {
+  TaskCfg cfg;
+  cfg.robot = robot_cfg("rby1");
+  cfg.policy_dt_ms = cfg.robot.policy_dt_ms;
+  cfg.ctrl_dt_ms = cfg.robot.ctrl_dt_ms;
+  cfg.sim_dt_ms = cfg.robot.sim_dt_ms;
+  cfg.scene = scene;
+  return cfg;
+}
+
+struct Played {
+  explicit Played(const std::string& scene = "room_with_door")
+      : task(rby1(scene)), scene_(task.whole_scene_cfg()) {
+    model = scene_.model();
+    data.reset(mj_makeData(model));
+    task.initialize(model, 2);
+  }
+  void start(std::int64_t episode) {
+    mj_resetData(model, data.get());
+    task.sample(0, episode, state_row(data.get()));
+    mj_forward(model, data.get());
+    world = {.id = 0, .model = model, .data = data.get()};
+    task.begin(world);
+  }
+  double& position() { return data->qpos[model->jnt_qposadr[task.door(0).joint]]; }
+  // Torques about hinge (towards open) and lever (down) for so long.
+  void turn(double hinge, double lever, double seconds) {
+    const Door& door = task.door(0);
+    const double sign = door.open > door.shut ? 1 : -1;
+    for (int i = 0; i < seconds / model->opt.timestep; ++i) {
+      data->qfrc_applied[model->jnt_dofadr[door.joint]] = sign * hinge;
+      data->qfrc_applied[model->jnt_dofadr[door.handle_joint]] = lever;
+      mj_step(model, data.get());
+    }
+    mj_forward(model, data.get());
+  }
+  DoorOpeningTask task;
+  Scene scene_;
+  const mjModel* model;
+  std::unique_ptr<mjData, DataDelete> data;
+  World world;
+};
+
+TEST(DoorOpening, ALatchHoldsUntilTheLeverIsPressed) {
+  for (const char* house : {"room_with_door:0", "room_with_door:2"}) {
+    Played p(house);
+    p.start(0);
+    p.turn(60, 0, 0.8);
+    EXPECT_LT(p.task.fraction(p.world), 0.01) << house;
+    p.turn(0, 0, 0.3);
+    p.turn(8, 3, 1.5);
+    EXPECT_GT(p.task.fraction(p.world), 0.3) << house;
+  }
+}
+
+TEST(DoorOpening, SuccessIsTheFractionNowWhicheverWayTheHingeTurns) {
+  int negative = 0;
+  for (const char* house : {"room_with_door:0", "room_with_door:2"}) {
+    Played p(house);
+    p.start(3);
+    const Door& door = p.task.door(0);
+    negative += door.open < door.shut ? 1 : 0;
+    EXPECT_FALSE(p.task.evaluate(p.world).success) << "shut, at the end of the range that is 0";
+    for (const auto& [part, success] :
+         {std::pair{0.66, false}, {0.68, true}, {1.0, true}, {0.3, false}}) {
+      p.position() = door.shut + part * (door.open - door.shut);
+      mj_forward(p.model, p.data.get());
+      EXPECT_NEAR(p.task.fraction(p.world), part, 1e-12);
+      const Evaluation e = p.task.evaluate(p.world);
+      EXPECT_EQ(e.success, success) << part << ": not latched";
+      EXPECT_EQ(e.reward, success ? 1 : 0);
+    }
+  }
+  EXPECT_EQ(negative, 1) << "one of the two houses has its hinge on the other side";
+}
+
+TEST(DoorOpening, TheRobotStartsFreeBeforeTheDoorOnEitherSide) {
+  Played p;
+  int pushes = 0;
+  for (int episode = 0; episode < 30; ++episode) {
+    p.start(episode);
+    EXPECT_EQ(p.task.start_fault(p.world), "");
+    const Pose base = p.task.robot().base_pose(p.world);
+    const Vec3 way = opening_direction(p.model, p.data.get(), p.task.door(0));
+    const double side = dot(base.p - leaf_middle(p.model, p.data.get(), p.task.door(0)), way);
+    EXPECT_EQ(p.task.push(0), side < 0) << episode;
+    EXPECT_EQ(p.task.description(0), side < 0 ? "Push the door open" : "Pull the door open");
+    EXPECT_GT(std::abs(side), 0.9);
+    EXPECT_LT(std::abs(side), 2.6);
+    pushes += side < 0 ? 1 : 0;
+    for (int c = 0; c < p.data->ncon; ++c) EXPECT_GT(p.data->contact[c].dist, -2e-3) << episode;
+  }
+  EXPECT_GT(pushes, 5);
+  EXPECT_LT(pushes, 25);
+}
+
+TEST(DoorOpening, TheStateOfTheDoorIsThatOfNow) {
+  Played p;
+  p.start(1);
+  const auto sensor = door_state_sensor(p.task);
+  SensorInit init;
+  init.model = p.model;
+  init.num_worlds = 2;
+  sensor->initialize(init);
+  const Door& door = p.task.door(0);
+  for (const double part : {0.0, 0.4, 0.9}) {
+    p.position() = door.shut + part * (door.open - door.shut);
+    mj_forward(p.model, p.data.get());
+    sensor->compute(p.world);
+    const auto row = sensor->fields()[0].data.row<std::uint8_t>(0);
+    const auto state =
+        nlohmann::json::parse(std::string(reinterpret_cast<const char*>(row.data())));
+    EXPECT_NEAR(state["opening_percentage"][0].get<double>(), part, 1e-9);
+    EXPECT_NEAR(state["joint_angle"][0].get<double>(), p.position(), 1e-9);
+    EXPECT_EQ(state["is_open"][0].get<bool>(), part > 0.67);
+    // The handle goes round the hinge: its distance from the axis is the same, its place is turned.
+    const Vec3 hinge{state["door_position"][0], state["door_position"][1],
+                     state["door_position"][2]};
+    const Vec3 handle{state["handle_position"][0], state["handle_position"][1],
+                      state["handle_position"][2]};
+    const int geom = p.model->body_geomadr[door.handle];
+    EXPECT_NEAR(norm(handle - vec3(p.data->geom_xpos + 3 * geom)), 0, 1e-9);
+    EXPECT_NEAR(std::hypot(handle.x - hinge.x, handle.y - hinge.y), std::hypot(0.9, 0.02), 0.15);
+  }
+}
+
+TEST(DoorOpening, ASceneWithoutADoorIsRefused) {
+  DoorOpeningTask task(rby1("table"));
+  Scene scene(task.whole_scene_cfg());
+  try {
+    task.initialize(scene.model(), 1);
+    FAIL();
+  } catch (const ValueError& e) {
+    EXPECT_THAT(e.what(), HasSubstr("scene 'table' has no door"));
+  }
+}
+
+}  // namespace
+}  // namespace mjsense

@@ -1,0 +1,90 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "mjsense/episode/object_sensors.h"
+#include "mjsense/observe/function_sensor.h"
+#include "mjsense/observe/pose_sensor.h"
+#include "mjsense/observe/suite.h"
+#include "mjsense/robots/finger_grasp.h"
+#include "mjsense/scene/resolve.h"
+#include "mjsense/tasks/door_opening/door_opening.h"
+
+namespace mjsense {
+namespace {
+
+constexpr int kStateLength = 1000;
+
+// The handle's first geom that is seen, of the first body at the end of its branch.
+int handle_geom(const mjModel* m, int handle) {
+  int fallback = -1;
+  for (int g = 0; g < m->ngeom; ++g) {
+    if (!is_below(m, m->geom_bodyid[g], handle)) continue;
+    if (m->geom_group[g] < 3) return g;
+    if (fallback < 0) fallback = g;
+  }
+  return fallback;
+}
+
+std::string side_of(const MoveGroup& gripper) {
+  return gripper.name.substr(0, gripper.name.find('_'));
+}
+
+}  // namespace
+
+std::shared_ptr<Sensor> door_state_sensor(const DoorOpeningTask& task) {
+  return std::make_shared<JsonFunctionSensor>(
+      "door_state", kStateLength,
+      "How far the door is open, and where its handle and its hinge are.",
+      [&task](const World& world, JsonWriter& json) {
+        const mjModel* m = world.model;
+        const mjData* d = world.data;
+        const Door& door = task.door(world.id);
+        const int geom = handle_geom(m, door.handle);
+        const double fraction = task.fraction(world), angle = d->qpos[m->jnt_qposadr[door.joint]];
+        double extents[3] = {0, 0, 0};
+        const double* handle = geom >= 0 ? d->geom_xpos + 3 * geom : d->xpos + 3 * door.handle;
+        for (int i = 0; geom >= 0 && i < 3; ++i) extents[i] = 2 * m->geom_aabb[6 * geom + 3 + i];
+        json.begin_object();
+        json.key("door_position").values({d->xanchor + 3 * door.joint, 3});
+        json.key("handle_extents").values(extents);
+        json.key("handle_position").values({handle, 3});
+        json.key("is_open").begin_array().value(fraction >= DoorOpeningTask::kOpen).end_array();
+        json.key("joint_angle").values({&angle, 1});
+        json.key("opening_percentage").values({&fraction, 1});
+        json.end_object();
+      });
+}
+
+std::vector<std::shared_ptr<Sensor>> DoorOpeningTask::create_task_sensors() const {
+  std::vector<std::shared_ptr<Sensor>> sensors{door_state_sensor(*this)};
+  int grippers = 0;
+  for (const MoveGroup& group : robot().groups())
+    grippers += group.kind == GroupKind::kGripper ? 1 : 0;
+  for (const MoveGroup& group : robot().groups()) {
+    if (group.kind != GroupKind::kGripper || grippers < 2) continue;
+    sensors.push_back(std::make_shared<PoseSensor>(
+        side_of(group) + "_tcp_pose",
+        PoseSensor::Ref{"site", mjsense::name_of(model(), mjOBJ_SITE, group.leaf_site)},
+        PoseSensor::Ref{"body", mjsense::name_of(model(), mjOBJ_BODY, robot().base_body())},
+        "Pose of the point between the finger tips in the robot's base frame, which stands on the "
+        "floor."));
+  }
+  if (auto grasped = grasp_state_sensor(*this, std::string(kRole)))
+    sensors.push_back(std::move(grasped));
+  sensors.push_back(
+      body_poses_sensor(*this, "object_poses",
+                        {{"door", [this](int world) { return door(world).body; }},
+                         {"door_handle", [this](int world) { return door(world).handle; }}}));
+  return sensors;
+}
+
+// The tools' poses are there under the names that door recordings have.
+void DoorOpeningTask::edit_suite(SensorSuite& suite) const {
+  std::vector<std::string> names = suite.names();
+  for (const MoveGroup& group : robot().groups()) {
+    const std::string side = side_of(group);
+    if (group.kind == GroupKind::kGripper && suite.find(side + "_tcp_pose"))
+      std::erase(names, "tcp_pose_" + side);
+  }
+  suite.select(names);
+}
+
+}  // namespace mjsense

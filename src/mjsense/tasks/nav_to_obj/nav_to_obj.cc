@@ -1,0 +1,225 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "mjsense/tasks/nav_to_obj/nav_to_obj.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+
+#include "mjsense/core/error.h"
+#include "mjsense/episode/object_sensors.h"
+#include "mjsense/scene/resolve.h"
+#include "mjsense/scenes/load_scene.h"
+#include "mjsense/scenes/object_texts.h"
+#include "mjsense/scenes/robot_floor.h"
+
+namespace mjsense {
+namespace {
+
+using std::numbers::pi;
+
+constexpr std::string_view kScene = "floor";
+constexpr const char* kCamera = "head_camera";
+constexpr int kPoints = 16;
+constexpr double kFarStart = 2.0;  // m, from every candidate, where there is such a place
+constexpr double kArrived = 1.35;  // m, of a way that shows that a start can be played
+constexpr int kStarts = 30;        // places to try
+
+}  // namespace
+
+NavToObjTask::NavToObjTask(TaskCfg cfg)
+    : Task(std::move(cfg)),
+      scene_(load_scene(this->cfg().scene.empty() ? kScene : std::string_view(this->cfg().scene))) {
+}
+
+SceneCfg NavToObjTask::scene_cfg() const { return scene_.scene_cfg(robot_entity()); }
+
+void NavToObjTask::bind(const std::shared_ptr<Simulation>& simulation) {
+  simulation_ = simulation;
+  scene_.bind(*simulation);
+}
+
+std::string NavToObjTask::start_fault(const World& world) const { return scene_.fault(world); }
+
+// The robot's head camera, else the first that it records.
+void NavToObjTask::find_camera() {
+  const RobotCfg& cfg = robot().cfg();
+  std::vector<std::string> names{kCamera};
+  for (const CameraMount& mount : cfg.cameras) names.push_back(mount.mjcf_camera);
+  for (const std::string& name : names) {
+    const int id = mj_name2id(model(), mjOBJ_CAMERA, (robot().prefix() + name).c_str());
+    if (id < 0) continue;
+    sight_ = Sight(model(), id, cfg.image_width, cfg.image_height);
+    return;
+  }
+  throw ValueError(
+      fmt::format("task 'nav_to_obj': robot '{}' has no camera, neither '{}' nor another",
+                  robot().name(), kCamera));
+}
+
+void NavToObjTask::initialize_task() {
+  scene_.initialize(model(), num_worlds(), robot().prefix());
+  if (scene_.objects().empty())
+    throw ValueError(
+        fmt::format("task 'nav_to_obj': scene '{}' has nothing to drive to: no body with a free "
+                    "joint that a hand can hold",
+                    scene_.cfg().name));
+  find_camera();
+  points_.clear();
+  for (const SceneObject& object : scene_.objects())
+    points_.push_back(sight_points(object.shape, kPoints));
+  places_.clear();
+  routes_.reset();
+  if (driving_base(robot()) >= 0) {
+    const RestingRobot rest(model(), robot());
+    const Footprint footprint = rest.footprint();
+    const Occupancy floor = rest.occupancy(footprint.height());
+    routes_ = std::make_unique<BaseRoutes>(floor, footprint);
+    for (int row = 0; row < floor.rows(); row += 2) {
+      for (int column = 0; column < floor.columns(); column += 2) {
+        if (floor.clearance(floor.x(column), floor.y(row)) > 0.3)
+          places_.emplace_back(floor.x(column), floor.y(row));
+      }
+    }
+  }
+  episodes_.assign(num_worlds(), {});
+  for (Episode& episode : episodes_) {
+    episode.candidates.assign(1, 0);
+    episode.candidates.reserve(scene_.objects().size());
+    episode.object = {std::string(kRole), scene_.objects()[0].body, scene_.objects()[0].text};
+  }
+}
+
+void NavToObjTask::set_goal(int world, int target) {
+  Episode& episode = episodes_[world];
+  const auto& all = scene_.objects();
+  episode.candidates.assign(1, target);
+  for (int i = 0; i < static_cast<int>(all.size()); ++i) {
+    if (i != target && scene_.present(world, i) && all[i].text == all[target].text)
+      episode.candidates.push_back(i);
+  }
+  episode.object = {std::string(kRole), all[target].body, all[target].text};
+}
+
+std::optional<Pose> NavToObjTask::sample_scene(int world, Rng& rng, const StateRow& state) {
+  const auto number = static_cast<std::uint64_t>(this->episode(world));
+  const int n = static_cast<int>(scene_.objects().size());
+  const std::shared_ptr<Simulation> simulation = simulation_.lock();
+  if (scene_.vary_look(world, cfg().seed, number) && simulation)
+    simulation->worlds().model_changed();
+  const int first = static_cast<int>(rng.below(static_cast<std::uint32_t>(n)));
+  Pose placed;
+  for (int k = 0; k < n; ++k) {  // another one, where the robot cannot come near the first
+    const int target = (first + k) % n;
+    placed = scene_.sample(world, target, cfg().seed, number, rng, state);
+    set_goal(world, target);
+    if (!routes_) return placed;
+    if (const std::optional<Pose> start = start_place(world, placed, state, rng)) return start;
+  }
+  return placed;
+}
+
+// Somewhere from where there is a way to a candidate, if there is such a place.
+std::optional<Pose> NavToObjTask::start_place(int world, const Pose& placed, const StateRow& state,
+                                              Rng& rng) const {
+  const auto distance = [&](double x, double y) {
+    double least = 1e10;
+    for (int i : candidates(world)) {
+      const double* at = state.qpos + model()->jnt_qposadr[model()->body_jntadr[object(i).body]];
+      least = std::min(least, std::hypot(x - at[0], y - at[1]));
+    }
+    return least;
+  };
+  for (int attempt = 0; attempt < kStarts && !places_.empty(); ++attempt) {
+    const auto [x, y] = places_[rng.below(static_cast<std::uint32_t>(places_.size()))];
+    const BasePose from{x, y, rng.uniform(-pi, pi)};
+    if (attempt < kStarts / 2 && distance(x, y) < kFarStart) continue;
+    if (!routes_->free(from)) continue;
+    const auto way = routes_->find(
+        from, [&](const BasePose& p) { return distance(p.x, p.y) < kArrived; },
+        [&](double px, double py) { return std::max(0.0, distance(px, py) - kArrived); });
+    if (!way.empty()) return Pose{{x, y, placed.p.z}, axis_angle({0, 0, 1}, from.yaw)};
+  }
+  return {};
+}
+
+void NavToObjTask::begin(const World& world) {
+  Task::begin(world);
+  Episode& episode = episodes_[world.id];
+  const int body = episode.object.body;
+  episode.start = {vec3(world.data->xpos + 3 * body), quat(world.data->xquat + 4 * body)};
+}
+
+std::pair<int, double> NavToObjTask::nearest(const World& world, double x, double y) const {
+  std::pair<int, double> best{-1, 1e10};
+  for (int i : candidates(world.id)) {
+    const double* at = world.data->xpos + 3 * object(i).body;
+    const double d = std::hypot(at[0] - x, at[1] - y);
+    if (d < best.second) best = {i, d};
+  }
+  return best;
+}
+
+bool NavToObjTask::sees(const World& world, const Pose& camera, int index) const {
+  return sight_.sees(world.model, world.data, camera, object(index).body, points_[index]);
+}
+
+NavToObjTask::Judgement NavToObjTask::judgement(const World& world) const {
+  const Vec3 base = robot().base_pose(world).p;
+  const auto [index, distance] = nearest(world, base.x, base.y);
+  Judgement out{distance, 0};
+  if (distance < kReach && sees(world, camera_pose(world), index))
+    out.reward = 1 - distance / kReach;
+  return out;
+}
+
+Evaluation NavToObjTask::evaluate(const World& world) const {
+  const Judgement now = judgement(world);
+  return judge(world.id, now.reward, now.reward > 0);
+}
+
+std::string NavToObjTask::description(int world) const {
+  const auto& candidates = episodes_[world].candidates;
+  const std::string& text = episodes_[world].object.name;
+  if (candidates.size() == 1) return "Navigate to the " + text;
+  return fmt::format("Navigate to any {} ({} available)", text, candidates.size());
+}
+
+Task::Referrals NavToObjTask::referrals(int world) const {
+  return {{"object_name", referrals_of(object(candidates(world)[0]))}};
+}
+
+Pose NavToObjTask::start_pose(int world, std::string_view role) const {
+  if (role != kRole) {
+    const std::vector<std::string> roles{std::string(kRole)};
+    throw_unknown("task 'nav_to_obj'", "role", role, roles);
+  }
+  return episodes_[world].start;
+}
+
+void NavToObjTask::write_info(const World& world, JsonWriter& json) const {
+  const Judgement now = judgement(world);
+  json.key("position_error").value(now.distance);
+  json.key("success").value(now.reward > 0);
+}
+
+std::vector<std::shared_ptr<Sensor>> NavToObjTask::create_task_sensors() const {
+  std::vector<NamedBody> bodies;
+  for (int i = 0; i < static_cast<int>(scene_.objects().size()); ++i) {
+    const int body = scene_.objects()[i].body;
+    bodies.push_back({mjsense::name_of(model(), mjOBJ_BODY, body), [this, i, body](int world) {
+                        return std::ranges::find(episodes_[world].candidates, i) !=
+                                       episodes_[world].candidates.end()
+                                   ? body
+                                   : -1;
+                      }});
+  }
+  return {body_poses_sensor(*this, "pickup_obj_pose", std::move(bodies))};
+}
+
+std::vector<std::pair<std::string, std::string>> NavToObjTask::scene_info(int world) const {
+  return {{"text", description(world)}, {"object_name", episodes_[world].object.name}};
+}
+
+}  // namespace mjsense
