@@ -21,12 +21,43 @@ std::unique_ptr<PlannerPolicy> make_manipulation() {
   return std::make_unique<ManipulationPlanner>();
 }
 
+// From above, or from wherever it can where nothing can be taken from above.
+class AbovePicker final : public PlannerPolicy {
+ public:
+  std::string_view name() const override { return "planner"; }
+  void initialize(Task& task) override {
+    above_.initialize(task);
+    anywhere_.initialize(task);
+    anywhere_plays_.assign(task.num_worlds(), 0);
+  }
+  void reset(const World& world) override {
+    above_.reset(world);
+    anywhere_plays_[world.id] = above_.last_failure(world.id) == PlanFailure::kUnplanned;
+    if (anywhere_plays_[world.id]) anywhere_.reset(world);
+  }
+  void act(const World& world, Action& action) override { player(world.id).act(world, action); }
+  std::span<const Phase> phases() const override { return above_.phases(); }
+  int phase(int world) const override { return player(world).phase(world); }
+  int num_retries(int world) const override { return player(world).num_retries(world); }
+  Pose grasp_pose(int world) const override { return player(world).grasp_pose(world); }
+
+ private:
+  TaskPlanner& player(int world) {
+    return anywhere_plays_[world] ? static_cast<TaskPlanner&>(anywhere_) : above_;
+  }
+  const TaskPlanner& player(int world) const { return const_cast<AbovePicker*>(this)->player(world); }
+
+  PickPlanner above_;
+  ManipulationPlanner anywhere_;
+  std::vector<char> anywhere_plays_;  // [B]
+};
+
 // On the plain tables an arm that moves its tool alone takes things from above, as it always did,
 // seed for seed; everywhere else, and with any other hand, from wherever it likes.
 std::unique_ptr<PlannerPolicy> make_picker(const Task& task) {
   const std::string& scene = task.cfg().scene;
   const bool plain = scene.empty() || scene == "table" || scene == "varied_table";
-  if (plain && PickPlanner::can_use(task.robot())) return std::make_unique<PickPlanner>();
+  if (plain && PickPlanner::can_use(task.robot())) return std::make_unique<AbovePicker>();
   return make_manipulation();
 }
 
