@@ -45,7 +45,9 @@ class AbovePicker final : public PlannerPolicy {
   TaskPlanner& player(int world) {
     return anywhere_plays_[world] ? static_cast<TaskPlanner&>(anywhere_) : above_;
   }
-  const TaskPlanner& player(int world) const { return const_cast<AbovePicker*>(this)->player(world); }
+  const TaskPlanner& player(int world) const {
+    return const_cast<AbovePicker*>(this)->player(world);
+  }
 
   PickPlanner above_;
   ManipulationPlanner anywhere_;
