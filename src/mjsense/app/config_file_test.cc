@@ -148,6 +148,19 @@ TEST(ConfigFile, LettersBeyondAscii) {
   }
 }
 
+// Of some of these toml++ 3.3 asserts that they cannot be.
+TEST(ConfigFile, HeadersThatAreNoKeys) {
+  for (const std::string header :
+       {"+a",   "[+a",    "=", "#",  ".",        ".a",  "a.", "a.+", "a..b",
+        ",",    "{",      "'", "\"", "''' a'''", " ",   "\n", "\r",  "\x01",
+        "\x7f", "\u00e9", "[", "[[", "a",        "a b", "[a]"}) {
+    RecordJobCfg job;
+    EXPECT_THROW(read_toml_text("seed = 1\n[" + header, "x", struct_of<RecordJobCfg>(), &job),
+                 ValueError)
+        << header;
+  }
+}
+
 TEST(Options, Sizes) {
   RolloutCfg rollout;
   read_size(struct_of<RolloutCfg>(), &rollout, "640x368");

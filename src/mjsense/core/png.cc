@@ -4,6 +4,8 @@
 #include <fmt/format.h>
 #include <zlib.h>
 
+#include <algorithm>
+
 #include "mjsense/core/error.h"
 #include "mjsense/core/plain_file.h"
 
@@ -44,8 +46,12 @@ std::vector<std::uint8_t> encode_png(std::span<const std::uint8_t> pixels, int w
     std::uint8_t* to = rows.data() + y * (stride + 1);
     const std::uint8_t* from = pixels.data() + y * stride;
     *to++ = y == 0 ? 0 : 2;
-    for (std::size_t i = 0; i < stride; ++i)
-      to[i] = static_cast<std::uint8_t>(from[i] - (y == 0 ? 0 : from[i - stride]));
+    if (y == 0) {
+      std::copy_n(from, stride, to);
+      continue;
+    }
+    const std::uint8_t* above = from - stride;
+    for (std::size_t i = 0; i < stride; ++i) to[i] = static_cast<std::uint8_t>(from[i] - above[i]);
   }
   uLongf packed_size = compressBound(rows.size());
   std::vector<std::uint8_t> packed(packed_size);
