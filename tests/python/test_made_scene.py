@@ -127,3 +127,11 @@ def test_a_policy_says_what_it_is(tmp_path):
     made = mjs.record("pick", policy=Still, out=tmp_path, episodes=1, keep_failures=True, cameras=[])
     with h5py.File(made.path / "trajectories_batch_1_of_1.h5") as file:
         assert json.loads(file["traj_0/obs_scene"][()])["checkpoint"] == "step 9000"
+
+
+@pytest.mark.parametrize("task", ["pick_and_place", "open", "door_opening", "nav_to_obj"])
+def test_every_task_of_ours_takes_it(task):
+    """What it lacks is said by the scene's own name: it is not another scene that is played."""
+    empty = mjs.SceneFileCfg(name="nothing_there", models=lambda: mjs.SceneCfg(entities={"bench": mjs.EntityCfg(model=BENCH)}))
+    with pytest.raises(Exception, match="nothing_there"):
+        mjs.make_vec(task, "rby1", scene=empty, cameras=[])

@@ -29,7 +29,7 @@ constexpr int kStarts = 200;                // places to try
 
 DoorOpeningTask::DoorOpeningTask(TaskCfg cfg)
     : Task(std::move(cfg)),
-      scene_(load_scene(this->cfg().scene.empty() ? kScene : std::string_view(this->cfg().scene))) {
+      scene_(task_scene(this->cfg(), kScene)) {
 }
 
 SceneCfg DoorOpeningTask::scene_cfg() const { return scene_.scene_cfg(robot_entity()); }

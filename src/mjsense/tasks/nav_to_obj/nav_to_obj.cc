@@ -30,7 +30,7 @@ constexpr int kStarts = 30;        // places to try
 
 NavToObjTask::NavToObjTask(TaskCfg cfg)
     : Task(std::move(cfg)),
-      scene_(load_scene(this->cfg().scene.empty() ? kScene : std::string_view(this->cfg().scene))) {
+      scene_(task_scene(this->cfg(), kScene)) {
 }
 
 SceneCfg NavToObjTask::scene_cfg() const { return scene_.scene_cfg(robot_entity()); }

@@ -26,7 +26,7 @@ constexpr int kTries = 12;                      // grasps tried from it
 OpeningTask::OpeningTask(TaskCfg cfg, OpeningKind kind)
     : Task(std::move(cfg)),
       kind_(kind),
-      scene_(load_scene(this->cfg().scene.empty() ? kScene : std::string_view(this->cfg().scene))) {
+      scene_(task_scene(this->cfg(), kScene)) {
 }
 
 SceneCfg OpeningTask::scene_cfg() const { return scene_.scene_cfg(robot_entity()); }

@@ -40,7 +40,7 @@ const std::string& noun(const SceneObject& object) {
 PickAndPlaceTask::PickAndPlaceTask(PlaceKind kind, TaskCfg cfg)
     : Task(std::move(cfg)),
       kind_(kind),
-      scene_(load_scene(this->cfg().scene.empty() ? kScene : std::string_view(this->cfg().scene))) {
+      scene_(task_scene(this->cfg(), kScene)) {
 }
 
 std::string_view PickAndPlaceTask::name() const {

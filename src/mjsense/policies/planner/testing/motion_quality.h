@@ -23,7 +23,7 @@ class MotionQuality {
   std::string deepest;        // between which
   int self_collisions = 0;    // control steps in which links of the robot met
 
-  MotionQuality(const mjModel* model, const Robot& robot) : robot_(&robot) {
+  MotionQuality(const mjModel* model, const Robot& robot) {
     std::vector<int> joints;
     for (const MoveGroup& group : robot.groups()) {
       if (group.kind != GroupKind::kArm) continue;
@@ -67,7 +67,6 @@ class MotionQuality {
   }
 
  private:
-  const Robot* robot_;
   std::unique_ptr<CollisionModel> model_;
   std::vector<int> dofs_;
   std::vector<double> last_;
