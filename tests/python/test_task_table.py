@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-import mjsense as mjs
+from mjsense import _core
 
 TOOL = Path(__file__).parents[2] / "tools" / "task_table.py"
 PLAYED = ("pick/floating_rum", "pick/franka/tableware", "pick_and_place/franka", "pick_and_place_next_to/franka", "pick_and_place_color/franka",
@@ -23,7 +23,7 @@ def table():
 
 
 def test_every_task_of_ours_has_a_row(table):
-    assert {task for task, _, _ in table.CASES} == set(mjs.task_names())
+    assert {task for task, _, _ in table.CASES} == set(_core.task_names())
 
 
 @pytest.mark.parametrize("case", PLAYED)
