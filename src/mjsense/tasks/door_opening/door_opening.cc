@@ -28,9 +28,7 @@ constexpr int kStarts = 200;                // places to try
 }  // namespace
 
 DoorOpeningTask::DoorOpeningTask(TaskCfg cfg)
-    : Task(std::move(cfg)),
-      scene_(task_scene(this->cfg(), kScene)) {
-}
+    : Task(std::move(cfg)), scene_(task_scene(this->cfg(), kScene)) {}
 
 SceneCfg DoorOpeningTask::scene_cfg() const { return scene_.scene_cfg(robot_entity()); }
 

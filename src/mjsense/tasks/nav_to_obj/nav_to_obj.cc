@@ -29,9 +29,7 @@ constexpr int kStarts = 30;        // places to try
 }  // namespace
 
 NavToObjTask::NavToObjTask(TaskCfg cfg)
-    : Task(std::move(cfg)),
-      scene_(task_scene(this->cfg(), kScene)) {
-}
+    : Task(std::move(cfg)), scene_(task_scene(this->cfg(), kScene)) {}
 
 SceneCfg NavToObjTask::scene_cfg() const { return scene_.scene_cfg(robot_entity()); }
 

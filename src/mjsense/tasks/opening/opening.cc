@@ -24,10 +24,7 @@ constexpr int kTries = 12;                      // grasps tried from it
 }  // namespace
 
 OpeningTask::OpeningTask(TaskCfg cfg, OpeningKind kind)
-    : Task(std::move(cfg)),
-      kind_(kind),
-      scene_(task_scene(this->cfg(), kScene)) {
-}
+    : Task(std::move(cfg)), kind_(kind), scene_(task_scene(this->cfg(), kScene)) {}
 
 SceneCfg OpeningTask::scene_cfg() const { return scene_.scene_cfg(robot_entity()); }
 

@@ -38,10 +38,7 @@ const std::string& noun(const SceneObject& object) {
 }  // namespace
 
 PickAndPlaceTask::PickAndPlaceTask(PlaceKind kind, TaskCfg cfg)
-    : Task(std::move(cfg)),
-      kind_(kind),
-      scene_(task_scene(this->cfg(), kScene)) {
-}
+    : Task(std::move(cfg)), kind_(kind), scene_(task_scene(this->cfg(), kScene)) {}
 
 std::string_view PickAndPlaceTask::name() const {
   switch (kind_) {
