@@ -14,8 +14,7 @@
 
 namespace mjsense {
 
-// 128 bits of everything added, in order: equal for equal content. Two multiplications and a
-// rotation for eight bytes: 1 M triangles in 6 ms.
+// 128 bits of everything added, in order: equal for equal content.
 class ContentKey {
  public:
   template <class T>

@@ -168,9 +168,8 @@ inline void sort_candidates(RayCandidate* c, int count) {
   sort_by(c, count, [](const RayCandidate& x) { return x.t; });
 }
 
-// gather() and focus() for blocks; apart, for what is rare must not make what is common slow (100
-// geoms: 86 instead of 102 M rays/s). Sorted by number first, so that what is equally near comes in
-// the same order with blocks and without: the same bits.
+// gather() and focus() for blocks, apart from what is common. Sorted by number first, so that what is
+// equally near comes in the same order with blocks and without: the same bits.
 [[gnu::noinline]] inline int gather_blocks(const KernelWorld& world, const KernelFilter& filter,
                                            const RayPacket& rays, RayCandidate* out) {
   int count = 0;

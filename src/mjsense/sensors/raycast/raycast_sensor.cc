@@ -162,7 +162,7 @@ void RayCastSensor::cast(const CastContext& context) {
   const int per_world = chunks * num_frames();
   const int worlds = static_cast<int>(context.ids.size());
   // A thread takes whole worlds where there are enough of them: parts of one on two threads fetch
-  // its geoms into both caches (64 worlds of a height scan, two threads: 29 against 39 M rays/s).
+  // its geoms into both caches.
   const int parts_of_item = worlds >= 4 * context.pool.size() ? per_world : 1;
   context.pool.run(worlds * per_world / parts_of_item, [&](int item, int thread) {
     for (int k = 0; k < parts_of_item; ++k) {
