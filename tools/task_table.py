@@ -41,7 +41,7 @@ CASES = (
     ("packing", "franka", ""),
     *((task, robot, "") for task in ("open", "close") for robot in ("franka", "mobile_franka", "i2rt_yam", "rby1")),
     ("door_opening", "rby1", ""),
-    *(("nav_to_obj", robot, "") for robot in ("rby1", "mobile_franka")),
+    *((task, robot, "") for task in ("nav_to_obj", "multi_task") for robot in ("rby1", "mobile_franka")),
 )
 
 

@@ -149,3 +149,29 @@ def test_a_recording_is_the_same_in_one_world_and_in_three(task, tmp_path):
         np.testing.assert_array_equal(value, streams[1][name], err_msg=name)
     phases = json.loads(streams[0]["traj_0/obs_scene"])["policy_phases"]
     assert phases["navigate" if task == "nav_to_obj" else "OPEN_DOOR"] == (0 if task == "nav_to_obj" else 4)
+
+
+def test_any_of_several_tasks():
+    env = mjs.make_vec(
+        "nav_to_obj+pick", "rby1", num_envs=2, cameras=[], horizon=2, observations=["task_info", "pickup_obj_pose", "obj_start"]
+    )
+    env.reset(seed=0)
+    info = rows(env.rows["task_info"][1])
+    assert set(info) == {"success", "tasks"} and set(info["tasks"]) == {"nav_to_obj", "pick"}
+    env.step(flat(env.action_space))
+    assert rows(env.rows["task_info"][1])["tasks"]["pick"]["episode_step"] == 1
+    env.close()
+    with pytest.raises(KeyError, match="did you mean 'pick'"):
+        mjs.make_vec("nav_to_obj+pik", "rby1", num_envs=1, cameras=[])
+
+
+@pytest.mark.parametrize("name", ["nav_to_obj+pick", "open+pick"])
+def test_a_recording_of_several_tasks(name, tmp_path):
+    robot = "rby1" if name.startswith("nav") else "franka"
+    mjs.record(name, robot, out=tmp_path, episodes=1, max_attempts=1, cameras=[], horizon=4, keep_failures=True)
+    with h5py.File(next(tmp_path.rglob("*.h5"))) as file:
+        scene = json.loads(file["traj_0/obs_scene"][()])
+    assert scene["task_type"] == "multi_task"
+    first, second = scene["task_description"].split(" OR ")
+    assert first.startswith("Navigate" if robot == "rby1" else "Open") and second.startswith("Pick up the ")
+    assert scene["policy_phases"]

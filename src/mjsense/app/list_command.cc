@@ -54,6 +54,8 @@ constexpr struct {
      "arm and gripper; something with a handle that opens"},
     {"door_opening", "Open a door by its handle.", "a base that drives, arm and gripper; a door"},
     {"nav_to_obj", "Drive to a thing.", "a base that drives, a head camera; things"},
+    {"multi_task", "Any of several tasks in one scene: nav_to_obj+pick, or others named so.",
+     "what each of them needs"},
 };
 
 // Packages that entities of a scene come from: "package:<package>/...".

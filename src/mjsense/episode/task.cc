@@ -64,7 +64,9 @@ void Task::initialize(const mjModel* model, int num_worlds) {
   model_ = model;
   num_worlds_ = num_worlds;
   const ControlPeriods periods{0.001 * cfg_.policy_dt_ms, 0.001 * cfg_.ctrl_dt_ms};
-  if (cfg_.robot.name.empty()) {
+  if (whole_) {
+    cfg_.robot = whole_->cfg().robot;
+  } else if (cfg_.robot.name.empty()) {
     const std::string entity = robot_entity();
     cfg_.robot = scene_robot(model, entity, robot_groups(), fmt::format("task '{}'", name()));
     robot_ = std::make_unique<Robot>(cfg_.robot, model, num_worlds,
@@ -77,7 +79,7 @@ void Task::initialize(const mjModel* model, int num_worlds) {
 }
 
 void Task::register_policy(Policy& policy) {
-  if (policy_) throw ValueError("Policy already registered");
+  if (this->policy()) throw ValueError("Policy already registered");
   if (!model_) throw ValueError("register_policy: initialize the task first");
   policy.initialize(*this);
   policy_ = &policy;
@@ -90,7 +92,15 @@ void Task::sample(int world, std::int64_t episode, const StateRow& state) {
   robot_->write_start(state, base, rng);
 }
 
+void Task::choose_goal(int /*world*/, Rng& /*rng*/, const StateRow& /*state*/) {
+  throw ValueError(
+      fmt::format("task '{}' cannot choose its goal in a scene that another task has sampled: of "
+                  "several tasks it must be the first",
+                  name()));
+}
+
 void Task::begin(const World& world) {
+  if (whole_) return;
   Episode& episode = episodes_[world.id];
   episode.step = 0;
   episode.done = false;
@@ -128,7 +138,7 @@ void Task::evaluate_all(ActiveWorlds& worlds, std::span<Evaluation> out) {
 }
 
 Evaluation Task::judge(int world, double reward, bool success, bool over) const {
-  const Episode& episode = episodes_[world];
+  const Episode& episode = now(world);
   return {.reward = reward,
           .success = success,
           .terminal = over || episode.done || (success && cfg_.terminate_upon_success),

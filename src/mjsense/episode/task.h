@@ -120,13 +120,13 @@ class Task {
   void reseed(std::uint64_t seed) { cfg_.seed = seed; }
   const mjModel* model() const { return model_; }
   int num_worlds() const { return num_worlds_; }
-  Robot& robot() { return *robot_; }
-  const Robot& robot() const { return *robot_; }
+  Robot& robot() { return whole_ ? whole_->robot() : *robot_; }
+  const Robot& robot() const { return whole_ ? whole_->robot() : *robot_; }
 
   // Throws ValueError "Policy already registered" on a second call. The policy must outlive the
   // task.
   void register_policy(Policy& policy);
-  Policy* policy() const { return policy_; }
+  Policy* policy() const { return whole_ ? whole_->policy() : policy_; }
 
   // --- one episode of one world
   // Writes the start state of episode number `episode`: a function of (cfg.seed, episode) alone,
@@ -152,14 +152,14 @@ class Task {
   // True: write_info() is made of what evaluate_all() found, and is asked after it.
   virtual bool info_follows_evaluation() const { return false; }
 
-  std::int64_t episode(int world) const { return episodes_[world].number; }
-  int episode_step(int world) const { return episodes_[world].step; }
-  bool done_received(int world) const { return episodes_[world].done; }
+  std::int64_t episode(int world) const { return now(world).number; }
+  int episode_step(int world) const { return now(world).step; }
+  bool done_received(int world) const { return now(world).done; }
   // What goes wrong on purpose in this world's episode.
-  const Perturbation& perturbation(int world) const { return episodes_[world].perturbation; }
+  const Perturbation& perturbation(int world) const { return now(world).perturbation; }
   // As the policy gave it, before clipping and noise; null before the first.
   const Action* last_action(int world) const {
-    return episodes_[world].step > 0 ? &episodes_[world].action : nullptr;
+    return now(world).step > 0 ? &now(world).action : nullptr;
   }
 
   // --- what observations and recordings say about it
@@ -193,6 +193,9 @@ class Task {
   // Writes everything except the joints of cfg()'s robot; returns where the robot's base stands,
   // nothing for where the model has it.
   virtual std::optional<Pose> sample_scene(int world, Rng& rng, const StateRow& state) = 0;
+  // In a state that another task has sampled: chooses what the episode is about, and moves nothing.
+  // Throws ValueError for a task that cannot.
+  virtual void choose_goal(int world, Rng& rng, const StateRow& state);
   // Further members of obs_scene with text values, in this order.
   virtual std::vector<std::pair<std::string, std::string>> scene_info(int world) const {
     (void)world;
@@ -203,6 +206,7 @@ class Task {
   Evaluation judge(int world, double reward, bool success, bool over = false) const;
 
  private:
+  friend class MultiTask;  // of which this one may be a part
   struct Episode {
     std::int64_t number = 0;
     int step = 0;
@@ -210,11 +214,14 @@ class Task {
     Action action;
     Perturbation perturbation;
   };
+  const Episode& now(int world) const { return whole_ ? whole_->now(world) : episodes_[world]; }
+
   TaskCfg cfg_;
   const mjModel* model_ = nullptr;
   int num_worlds_ = 0;
   std::unique_ptr<Robot> robot_;
   Policy* policy_ = nullptr;
+  Task* whole_ = nullptr;  // whose robot, policy and episodes are a part's
   std::vector<Episode> episodes_;
 };
 

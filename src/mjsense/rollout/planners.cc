@@ -3,6 +3,7 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <mutex>
 #include <utility>
 #include <vector>
@@ -13,6 +14,7 @@
 #include "mjsense/policies/planner/manipulation_planner.h"
 #include "mjsense/policies/planner/opening_planner.h"
 #include "mjsense/policies/planner/pick_planner.h"
+#include "mjsense/tasks/multi_task/multi_task.h"
 
 namespace mjsense {
 namespace {
@@ -82,16 +84,34 @@ Planners& planners() {
   return all;
 }
 
+bool has_planner(const Task& task) {
+  Planners& all = planners();
+  const std::lock_guard lock(all.mutex);
+  return task.grasp_scene() ||
+         std::ranges::any_of(all.entries, [&](const auto& e) { return e.first == task.type(); });
+}
+
+// Of several tasks of which any will do, the first that there is a planner for.
+Task& first_doable(Task& task) {
+  auto* several = dynamic_cast<MultiTask*>(&task);
+  if (!several) return task;
+  for (int i = 0; i < several->size(); ++i) {
+    if (has_planner(several->child(i))) return several->child(i);
+  }
+  return task;
+}
+
 class AnyPlanner final : public PlannerPolicy {
  public:
   explicit AnyPlanner(bool from_anywhere) : from_anywhere_(from_anywhere) {}
   std::string_view name() const override { return from_anywhere_ ? "free_planner" : "planner"; }
   void bind(const std::shared_ptr<Simulation>& simulation) override { simulation_ = simulation; }
   void initialize(Task& task) override {
-    planner_ = make_planner(task, from_anywhere_);
+    Task& doable = first_doable(task);
+    planner_ = make_planner(doable, from_anywhere_);
     if (simulation_) planner_->bind(simulation_);
     simulation_.reset();
-    planner_->initialize(task);
+    planner_->initialize(doable);
   }
   void reset(const World& world) override { planner_->reset(world); }
   void act(const World& world, Action& action) override { planner_->act(world, action); }

@@ -7,7 +7,9 @@
 
 #include "mjsense/core/error.h"
 #include "mjsense/rollout/planners.h"
+#include "mjsense/rollout/task_defaults.h"
 #include "mjsense/tasks/door_opening/door_opening.h"
+#include "mjsense/tasks/multi_task/multi_task.h"
 #include "mjsense/tasks/nav_to_obj/nav_to_obj.h"
 #include "mjsense/tasks/opening/opening.h"
 #include "mjsense/tasks/pick/pick.h"
@@ -65,6 +67,8 @@ std::unique_ptr<Task> pick_and_place(TaskCfg cfg) {
   return std::make_unique<PickAndPlaceTask>(kind, std::move(cfg));
 }
 
+std::unique_ptr<Task> any_of(std::string_view name, TaskCfg cfg);
+
 Registry<TaskFactory>& tasks() {
   static Registry<TaskFactory> all(
       "tasks", "task",
@@ -78,8 +82,22 @@ Registry<TaskFactory>& tasks() {
        {"pick_and_place_color", pick_and_place<PlaceKind::kColor>},
        {"packing", pick_and_place<PlaceKind::kPacking>},
        {"door_opening", [](TaskCfg c) { return std::make_unique<DoorOpeningTask>(std::move(c)); }},
-       {"nav_to_obj", [](TaskCfg c) { return std::make_unique<NavToObjTask>(std::move(c)); }}});
+       {"nav_to_obj", [](TaskCfg c) { return std::make_unique<NavToObjTask>(std::move(c)); }},
+       {"multi_task", [](TaskCfg c) { return any_of("multi_task", std::move(c)); }}});
   return all;
+}
+
+// Several tasks in the scene of the first.
+std::unique_ptr<Task> any_of(std::string_view name, TaskCfg cfg) {
+  const std::vector<std::string> parts = parts_of_task(name);
+  if (cfg.scene.empty()) cfg.scene = default_scene(parts[0]);
+  if (cfg.scene.empty() && !cfg.make_scene) {
+    throw ValueError(fmt::format(
+        "task '{}': '{}' has no scene of its own that the others know: name one", name, parts[0]));
+  }
+  std::vector<std::unique_ptr<Task>> children;
+  for (const std::string& part : parts) children.push_back(tasks().at(part)(cfg));
+  return std::make_unique<MultiTask>(std::string(name), std::move(cfg), std::move(children));
 }
 
 Registry<PolicyFactory>& policies() {
@@ -94,6 +112,7 @@ std::vector<std::string> task_names() { return tasks().names(); }
 std::vector<std::string> policy_names() { return policies().names(); }
 
 std::unique_ptr<Task> make_task(std::string_view name, TaskCfg cfg) {
+  if (name.find('+') != std::string_view::npos) return any_of(name, std::move(cfg));
   return tasks().at(name)(std::move(cfg));
 }
 

@@ -24,6 +24,7 @@ using std::numbers::pi;
 constexpr double kHand = 0.085;    // m, what the usual grippers open
 constexpr double kReach = 0.25;    // m, half of what is still an object to carry
 constexpr double kInside = 0.002;  // m
+constexpr double kAway = 100;      // m, where those stand that take no part
 
 Quat rest_of(std::string_view name) {
   if (name == "side") return axis_angle({0, 1, 0}, 0.5 * pi);
@@ -249,7 +250,7 @@ Pose EpisodeScene::sample(int world, std::span<const int> wanted, std::uint64_t 
     std::vector<int> region_of(n);
     for (int i = 0; i < n; ++i) {
       resting.push_back({&objects_[i].shape, objects_[i].rests});
-      poses[i].p = {100.0 + i, 100.0, 0.5};  // where nobody looks
+      poses[i].p = {kAway + i, kAway, 0.5};  // where nobody looks
     }
     lay_out(resting, wanted, {present, static_cast<std::size_t>(n)}, regions_,
             {cfg_.gap, cfg_.target_gap, cfg_.drop}, rng, poses, region_of);
@@ -263,12 +264,7 @@ Pose EpisodeScene::sample(int world, std::span<const int> wanted, std::uint64_t 
     }
     if (target >= 0) support_[world] = regions_[region_of[target]].height;
   } else if (n > 0 && target >= 0) {
-    const double* qpos =
-        state.qpos + model_->jnt_qposadr[model_->body_jntadr[objects_[target].body]];
-    const Pose pose{vec3(qpos), quat(qpos + 3)};
-    support_[world] = std::numeric_limits<double>::max();
-    for (Vec3 point : objects_[target].shape.points)
-      support_[world] = std::min(support_[world], (pose * point).z);
+    set_target(world, target, state);
   }
   const SceneRobotCfg& r = cfg_.robot;
   Rng draw(seed, 0, stream_of("scene/robot"), episode);
@@ -276,6 +272,25 @@ Pose EpisodeScene::sample(int world, std::span<const int> wanted, std::uint64_t 
   const double x = r.pos[0] + around(r.pos_spread[0]), y = r.pos[1] + around(r.pos_spread[1]);
   const double yaw = r.yaw + around(r.yaw_spread);
   return {{x, y, r.pos[2]}, yaw == 0 ? Quat{} : axis_angle({0, 0, 1}, yaw * pi / 180)};
+}
+
+std::vector<int> EpisodeScene::adopt(int world, const StateRow& state) {
+  std::vector<int> here;
+  for (std::size_t i = 0; i < objects_.size(); ++i) {
+    const double* qpos = state.qpos + model_->jnt_qposadr[model_->body_jntadr[objects_[i].body]];
+    char& present = present_[world * objects_.size() + i];
+    present = qpos[1] < kAway ? 1 : 0;
+    if (present) here.push_back(static_cast<int>(i));
+  }
+  return here;
+}
+
+void EpisodeScene::set_target(int world, int target, const StateRow& state) {
+  const double* qpos = state.qpos + model_->jnt_qposadr[model_->body_jntadr[objects_[target].body]];
+  const Pose pose{vec3(qpos), quat(qpos + 3)};
+  support_[world] = std::numeric_limits<double>::max();
+  for (Vec3 point : objects_[target].shape.points)
+    support_[world] = std::min(support_[world], (pose * point).z);
 }
 
 bool EpisodeScene::vary_look(int world, std::uint64_t seed, std::uint64_t episode) const {

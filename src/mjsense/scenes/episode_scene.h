@@ -59,6 +59,11 @@ class EpisodeScene {
   // The same, about several: they are there, and within reach; the first is the target.
   Pose sample(int world, std::span<const int> wanted, std::uint64_t seed, std::uint64_t episode,
               Rng& rng, const StateRow& state);
+  // For a state that another one of this scene has sampled: takes over which objects are there, and
+  // returns their indices.
+  std::vector<int> adopt(int world, const StateRow& state);
+  // The episode is about this object, where it lies in that state.
+  void set_target(int world, int target, const StateRow& state);
   // Indices of the objects to pick up, and of the receptacles.
   std::vector<int> things() const { return where(false); }
   std::vector<int> receptacles() const { return where(true); }

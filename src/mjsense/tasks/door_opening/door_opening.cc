@@ -95,6 +95,13 @@ std::optional<Pose> DoorOpeningTask::sample_scene(int world, Rng& rng, const Sta
   return placed;
 }
 
+void DoorOpeningTask::choose_goal(int world, Rng& rng, const StateRow& state) {
+  Episode& episode = episodes_[world];
+  scene_.adopt(world, state);
+  episode.door = static_cast<int>(rng.below(static_cast<std::uint32_t>(doors_.size())));
+  episode.handle.body = door(world).handle;
+}
+
 void DoorOpeningTask::begin(const World& world) {
   Task::begin(world);
   Episode& episode = episodes_[world.id];

@@ -100,6 +100,11 @@ void NavToObjTask::set_goal(int world, int target) {
   episode.object = {std::string(kRole), all[target].body, all[target].text};
 }
 
+void NavToObjTask::choose_goal(int world, Rng& rng, const StateRow& state) {
+  const std::vector<int> here = scene_.adopt(world, state);
+  if (!here.empty()) set_goal(world, here[rng.below(static_cast<std::uint32_t>(here.size()))]);
+}
+
 std::optional<Pose> NavToObjTask::sample_scene(int world, Rng& rng, const StateRow& state) {
   const auto number = static_cast<std::uint64_t>(this->episode(world));
   const int n = static_cast<int>(scene_.objects().size());

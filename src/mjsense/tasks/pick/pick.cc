@@ -62,6 +62,17 @@ std::optional<Pose> PickTask::sample_scene(int world, Rng& rng, const StateRow& 
   return standing_(scene_.sample(world, target, cfg().seed, episode, rng, state));
 }
 
+void PickTask::choose_goal(int world, Rng& rng, const StateRow& state) {
+  std::vector<int> here = scene_.adopt(world, state);
+  std::erase_if(here, [this](int i) { return scene_.objects()[i].receptacle; });
+  if (here.empty()) here = things_;
+  const int target = here[rng.below(static_cast<std::uint32_t>(here.size()))];
+  const SceneObject& object = scene_.objects()[target];
+  targets_[world].index = target;
+  targets_[world].object = {std::string(kRole), object.body, object.text};
+  scene_.set_target(world, target, state);
+}
+
 void PickTask::begin(const World& world) {
   Task::begin(world);
   Target& target = targets_[world.id];

@@ -50,6 +50,7 @@ class PickTask final : public Task, public GraspScene {
  protected:
   void initialize_task() override;
   std::optional<Pose> sample_scene(int world, Rng& rng, const StateRow& state) override;
+  void choose_goal(int world, Rng& rng, const StateRow& state) override;
   std::vector<std::pair<std::string, std::string>> scene_info(int world) const override;
 
  private:

@@ -1,0 +1,185 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "mjsense/tasks/multi_task/multi_task.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+
+#include "mjsense/core/error.h"
+
+namespace mjsense {
+
+MultiTask::MultiTask(std::string name, TaskCfg cfg, std::vector<std::unique_ptr<Task>> children)
+    : Task(std::move(cfg)), name_(std::move(name)), children_(std::move(children)) {
+  if (size() < 2)
+    throw ValueError(
+        fmt::format("task '{}' is made of {} task, at least two are needed", name_, size()));
+  for (int i = 0; i < size(); ++i) {
+    const TaskCfg& own = children_[i]->cfg();
+    if (own.scene != this->cfg().scene || own.robot.name != this->cfg().robot.name)
+      throw ValueError(fmt::format(
+          "task '{}': its task '{}' plays in scene '{}' with robot '{}', it itself in '{}' with "
+          "'{}'",
+          name_, children_[i]->name(), own.scene, own.robot.name, this->cfg().scene,
+          this->cfg().robot.name));
+    const std::string base(children_[i]->name());
+    std::string unique = base;
+    for (int n = 2; std::ranges::count(names_, unique, &std::pair<std::string, int>::first) > 0;
+         ++n)
+      unique = fmt::format("{}_{}", base, n);
+    names_.emplace_back(unique, i);
+    children_[i]->whole_ = this;
+  }
+  std::ranges::sort(names_);
+}
+
+void MultiTask::initialize_task() {
+  for (const auto& child : children_) child->initialize(model(), num_worlds());
+  success_.assign(num_worlds(), 0);
+  found_.assign(static_cast<std::size_t>(size()) * num_worlds(), {});
+  objects_.assign(num_worlds(), {});
+  for (int w = 0; w < num_worlds(); ++w) collect_objects(w);
+}
+
+void MultiTask::collect_objects(int world) {
+  std::vector<TaskObject>& all = objects_[world];
+  all.clear();
+  for (const auto& child : children_) {
+    for (const TaskObject& object : child->objects(world)) {
+      if (std::ranges::count(all, object.role, &TaskObject::role) == 0) all.push_back(object);
+    }
+  }
+}
+
+// The first plays the very episode that it would play alone.
+std::optional<Pose> MultiTask::sample_scene(int world, Rng& rng, const StateRow& state) {
+  for (const auto& child : children_) child->reseed(cfg().seed);
+  const std::optional<Pose> base = children_[0]->sample_scene(world, rng, state);
+  for (int i = 1; i < size(); ++i) {
+    Rng goal(cfg().seed, static_cast<std::uint32_t>(i), stream_of("task/goal"),
+             static_cast<std::uint64_t>(episode(world)));
+    children_[i]->choose_goal(world, goal, state);
+  }
+  collect_objects(world);
+  return base;
+}
+
+void MultiTask::begin(const World& world) {
+  Task::begin(world);
+  for (const auto& child : children_) child->begin(world);
+  success_[world.id] = 0;
+}
+
+void MultiTask::begin_all(ActiveWorlds& worlds) {
+  worlds.for_each([this](const World& world) {
+    Task::begin(world);
+    success_[world.id] = 0;
+  });
+  for (const auto& child : children_) child->begin_all(worlds);
+}
+
+void MultiTask::advance() {
+  for (const auto& child : children_) child->advance();
+}
+
+Evaluation MultiTask::any(int world, std::span<const Evaluation> of_children,
+                          std::size_t stride) const {
+  double reward = of_children[0].reward;
+  bool success = false, over = false;
+  for (std::size_t i = 0; i < of_children.size(); i += stride) {
+    reward = std::max(reward, of_children[i].reward);
+    success = success || of_children[i].success;
+    over = over || of_children[i].terminal;
+  }
+  success_[world] = success ? 1 : 0;
+  return judge(world, reward, success, over);
+}
+
+Evaluation MultiTask::evaluate(const World& world) const {
+  std::vector<Evaluation> found;
+  for (const auto& child : children_) found.push_back(child->evaluate(world));
+  return any(world.id, found, 1);
+}
+
+void MultiTask::evaluate_all(ActiveWorlds& worlds, std::span<Evaluation> out) {
+  const std::span<Evaluation> all(found_);
+  const auto B = static_cast<std::size_t>(num_worlds());
+  for (int i = 0; i < size(); ++i) children_[i]->evaluate_all(worlds, all.subspan(i * B, B));
+  for (int w : worlds.ids()) out[w] = any(w, all.subspan(w), B);
+}
+
+std::string MultiTask::description(int world) const {
+  std::string text;
+  for (const auto& child : children_)
+    text += (text.empty() ? "" : " OR ") + child->description(world);
+  return text;
+}
+
+Task::Referrals MultiTask::referrals(int world) const {
+  Referrals all;
+  for (const auto& child : children_) {
+    for (auto& [role, texts] : child->referrals(world)) {
+      const auto has = [&r = role](const auto& other) { return other.first == r; };
+      if (std::ranges::none_of(all, has)) all.emplace_back(role, std::move(texts));
+    }
+  }
+  return all;
+}
+
+// The child whose object has this role; the first for one that nobody has, which says so.
+const Task& MultiTask::with_role(std::string_view role) const {
+  for (const auto& child : children_) {
+    if (std::ranges::count(child->objects(0), role, &TaskObject::role) > 0) return *child;
+  }
+  std::vector<std::string> roles;
+  for (const TaskObject& object : objects_[0]) roles.push_back(object.role);
+  throw_unknown(fmt::format("task '{}'", name_), "role", role, roles);
+}
+
+Pose MultiTask::start_pose(int world, std::string_view role) const {
+  return with_role(role).start_pose(world, role);
+}
+
+std::optional<Pose> MultiTask::goal_pose(int world, std::string_view role) const {
+  return with_role(role).goal_pose(world, role);
+}
+
+void MultiTask::write_info(const World& world, JsonWriter& json) const {
+  json.key("success").value(success_[world.id] != 0);
+  json.key("tasks").begin_object();
+  for (const auto& [name, index] : names_) {
+    json.key(name).begin_object();
+    children_[index]->write_info(world, json);
+    json.end_object();
+  }
+  json.end_object();
+}
+
+std::vector<std::shared_ptr<Sensor>> MultiTask::create_task_sensors() const {
+  std::vector<std::shared_ptr<Sensor>> all;
+  for (const auto& child : children_) {
+    for (auto& sensor : child->create_task_sensors()) {
+      const auto same = [&](const auto& other) { return other->name() == sensor->name(); };
+      if (std::ranges::none_of(all, same)) all.push_back(std::move(sensor));
+    }
+  }
+  return all;
+}
+
+const GraspScene* MultiTask::grasp_scene() const {
+  for (const auto& child : children_) {
+    if (const GraspScene* scene = child->grasp_scene()) return scene;
+  }
+  return nullptr;
+}
+
+// The first's, but for the text.
+std::vector<std::pair<std::string, std::string>> MultiTask::scene_info(int world) const {
+  auto info = children_[0]->scene_info(world);
+  for (auto& [key, value] : info) {
+    if (key == "text") value = description(world);
+  }
+  return info;
+}
+
+}  // namespace mjsense

@@ -1,0 +1,75 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+// Several tasks in one scene, any of which will do: the reward is the greatest of theirs.
+
+#include <memory>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "mjsense/episode/task.h"
+
+namespace mjsense {
+
+class MultiTask final : public Task {
+ public:
+  // The first samples the scene and brings cameras; the others choose their goals in it. They play
+  // with the whole's robot, policy and episodes. Throws ValueError for fewer than two, and where
+  // their scenes or robots differ.
+  MultiTask(std::string name, TaskCfg cfg, std::vector<std::unique_ptr<Task>> children);
+  std::string_view name() const override { return name_; }
+  std::string_view type() const override { return "multi_task"; }
+  SceneCfg scene_cfg() const override { return children_[0]->scene_cfg(); }
+  std::string robot_entity() const override { return children_[0]->robot_entity(); }
+  ActuatorGroups robot_groups() const override { return children_[0]->robot_groups(); }
+  std::vector<CameraMount> cameras() const override { return children_[0]->cameras(); }
+  int start_key() const override { return children_[0]->start_key(); }
+  void bind(const std::shared_ptr<Simulation>& simulation) override {
+    children_[0]->bind(simulation);
+  }
+  std::string start_fault(const World& world) const override {
+    return children_[0]->start_fault(world);
+  }
+
+  void begin(const World& world) override;
+  Evaluation evaluate(const World& world) const override;
+  void begin_all(ActiveWorlds& worlds) override;
+  void advance() override;
+  void evaluate_all(ActiveWorlds& worlds, std::span<Evaluation> out) override;
+  bool info_follows_evaluation() const override { return true; }
+
+  // The first's, then those of the others whose roles nobody has yet; so are referrals and sensors.
+  std::span<const TaskObject> objects(int world) const override { return objects_[world]; }
+  std::string description(int world) const override;  // theirs, joined by " OR "
+  Referrals referrals(int world) const override;
+  Pose start_pose(int world, std::string_view role) const override;
+  std::optional<Pose> goal_pose(int world, std::string_view role) const override;
+  // success, tasks: {name: what that task says}; a name that comes again has a number: "pick_2".
+  void write_info(const World& world, JsonWriter& json) const override;
+  std::vector<std::shared_ptr<Sensor>> create_task_sensors() const override;
+  void edit_suite(SensorSuite& suite) const override { children_[0]->edit_suite(suite); }
+  const GraspScene* grasp_scene() const override;  // the first that there is
+
+  int size() const { return static_cast<int>(children_.size()); }
+  Task& child(int index) { return *children_[index]; }
+  const Task& child(int index) const { return *children_[index]; }
+
+ protected:
+  void initialize_task() override;
+  std::optional<Pose> sample_scene(int world, Rng& rng, const StateRow& state) override;
+  std::vector<std::pair<std::string, std::string>> scene_info(int world) const override;
+
+ private:
+  void collect_objects(int world);
+  const Task& with_role(std::string_view role) const;
+  Evaluation any(int world, std::span<const Evaluation> of_children, std::size_t stride) const;
+
+  std::string name_;
+  std::vector<std::unique_ptr<Task>> children_;
+  std::vector<std::pair<std::string, int>> names_;  // unique and sorted, with the child's index
+  std::vector<std::vector<TaskObject>> objects_;    // [B]
+  mutable std::vector<char> success_;               // [B], as last judged
+  std::vector<Evaluation> found_;                   // [children, B]
+};
+
+}  // namespace mjsense

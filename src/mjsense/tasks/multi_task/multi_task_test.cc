@@ -1,0 +1,230 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "mjsense/tasks/multi_task/multi_task.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <nlohmann/json.hpp>
+#include <set>
+
+#include "mjsense/core/error.h"
+#include "mjsense/core/json.h"
+#include "mjsense/episode/policy.h"
+#include "mjsense/robots/load_robot.h"
+#include "mjsense/tasks/door_opening/door_opening.h"
+#include "mjsense/tasks/nav_to_obj/nav_to_obj.h"
+#include "mjsense/tasks/opening/opening.h"
+#include "mjsense/tasks/pick/pick.h"
+
+namespace mjsense {
+namespace {
+
+using testing::HasSubstr;
+
+struct DataDelete {
+  void operator()(mjData* data) const { mj_deleteData(data); }
+};
+
+TaskCfg cfg(const std::string& scene) {
+  TaskCfg cfg;
+  cfg.robot = robot_cfg("rby1");
+  cfg.scene = scene;
+  return cfg;
+}
+
+std::unique_ptr<MultiTask> door_or_pick() {
+  std::vector<std::unique_ptr<Task>> children;
+  children.push_back(std::make_unique<DoorOpeningTask>(cfg("room_with_door")));
+  children.push_back(std::make_unique<PickTask>(cfg("room_with_door")));
+  children.push_back(std::make_unique<PickTask>(cfg("room_with_door")));
+  return std::make_unique<MultiTask>("door_or_pick", cfg("room_with_door"), std::move(children));
+}
+
+TEST(MultiTask, AnyOfThemIsSuccessAndTheGreatestRewardCounts) {
+  const auto task = door_or_pick();
+  Scene scene(task->whole_scene_cfg());
+  const mjModel* model = scene.model();
+  task->initialize(model, 2);
+  const std::unique_ptr<mjData, DataDelete> data(mj_makeData(model));
+  for (int world = 0; world < 2; ++world) {
+    mj_resetData(model, data.get());
+    task->sample(world, 4, state_row(data.get()));
+    mj_forward(model, data.get());
+    const World w{.id = world, .model = model, .data = data.get()};
+    task->begin(w);
+    const Evaluation none = task->evaluate(w);
+    EXPECT_FALSE(none.success);
+    EXPECT_EQ(none.reward, 0);
+    EXPECT_EQ(task->description(world), task->child(0).description(world) + " OR " +
+                                            task->child(1).description(world) + " OR " +
+                                            task->child(2).description(world));
+
+    // The second one's object in the air: its reward, but nobody holds it.
+    const int body = task->child(1).objects(world)[0].body;
+    data->qpos[model->jnt_qposadr[model->body_jntadr[body]] + 2] += 0.3;
+    mj_forward(model, data.get());
+    EXPECT_NEAR(task->evaluate(w).reward, 0.3, 1e-6);
+    EXPECT_FALSE(task->evaluate(w).success);
+
+    const auto& door = static_cast<DoorOpeningTask&>(task->child(0)).door(world);
+    data->qpos[model->jnt_qposadr[door.joint]] = door.open;
+    mj_forward(model, data.get());
+    EXPECT_TRUE(task->evaluate(w).success);
+    EXPECT_EQ(task->evaluate(w).reward, 1);
+
+    std::vector<std::uint8_t> row(2000);
+    JsonWriter json(row);
+    json.begin_object();
+    task->write_info(w, json);
+    json.end_object();
+    ASSERT_TRUE(json.finish());
+    const auto info = nlohmann::json::parse(reinterpret_cast<const char*>(row.data()));
+    EXPECT_TRUE(info["success"].get<bool>());
+    EXPECT_TRUE(info["tasks"]["door_opening"]["success"].get<bool>());
+    EXPECT_FALSE(info["tasks"]["pick"]["success"].get<bool>());
+    EXPECT_EQ(info["tasks"].size(), 3u) << "pick_2";
+  }
+}
+
+struct Counting final : Policy {
+  std::string_view name() const override { return "counting"; }
+  void initialize(Task& task) override {
+    ++count;
+    of = &task;
+  }
+  int count = 0;
+  const Task* of = nullptr;
+};
+
+TEST(MultiTask, PartsHaveTheRobotThePolicyAndTheEpisodeOfTheWhole) {
+  const auto task = door_or_pick();
+  Scene scene(task->whole_scene_cfg());
+  task->initialize(scene.model(), 1);
+  Counting policy, other;
+  task->register_policy(policy);
+  EXPECT_EQ(policy.count, 1);
+  EXPECT_EQ(policy.of, task.get());
+  EXPECT_THROW(task->child(1).register_policy(other), ValueError);
+
+  const std::unique_ptr<mjData, DataDelete> data(mj_makeData(scene.model()));
+  const StateRow state = state_row(data.get());
+  task->reseed(5);
+  task->sample(0, 7, state);
+  mj_forward(scene.model(), data.get());
+  const World w{.id = 0, .model = scene.model(), .data = data.get()};
+  task->begin(w);
+  Action action;
+  action.done = true;
+  task->apply(w, action, state);
+  for (int i = 0; i < task->size(); ++i) {
+    const Task& part = task->child(i);
+    EXPECT_EQ(part.policy(), &policy);
+    EXPECT_EQ(&part.robot(), &task->robot());
+    EXPECT_EQ(part.cfg().seed, 5u);
+    EXPECT_EQ(part.episode(0), 7);
+    EXPECT_EQ(part.episode_step(0), 1);
+    EXPECT_TRUE(part.evaluate(w).terminal);
+  }
+  EXPECT_TRUE(task->evaluate(w).terminal);
+}
+
+TEST(MultiTask, TheFirstsRolesAndSensorsAndWhatItLacks) {
+  const auto task = door_or_pick();
+  Scene scene(task->whole_scene_cfg());
+  task->initialize(scene.model(), 1);
+  std::vector<std::string> roles, sensors, expected;
+  for (const TaskObject& object : task->objects(0)) roles.push_back(object.role);
+  EXPECT_EQ(roles, (std::vector<std::string>{std::string(DoorOpeningTask::kRole),
+                                             std::string(PickTask::kRole)}));
+  for (int i = 0; i < 2; ++i) {
+    for (const auto& sensor : task->child(i).create_task_sensors())
+      expected.push_back(sensor->name());
+  }
+  for (const auto& sensor : task->create_task_sensors()) sensors.push_back(sensor->name());
+  EXPECT_EQ(sensors, expected);
+  EXPECT_EQ(task->grasp_scene(), task->child(1).grasp_scene());
+  const std::unique_ptr<mjData, DataDelete> data(mj_makeData(scene.model()));
+  task->sample(0, 1, state_row(data.get()));
+  mj_forward(scene.model(), data.get());
+  task->begin({.id = 0, .model = scene.model(), .data = data.get()});
+  EXPECT_EQ(task->objects(0)[1].body, task->child(1).objects(0)[0].body);
+  const int body = task->objects(0)[1].body;
+  EXPECT_EQ(task->start_pose(0, PickTask::kRole).p.z, data->xpos[3 * body + 2]);
+  EXPECT_THROW(task->start_pose(0, "nothing"), KeyError);
+}
+
+TEST(MultiTask, TheFirstPlaysTheEpisodeThatItPlaysAlone) {
+  std::vector<std::vector<double>> starts;
+  for (const bool alone : {true, false}) {
+    std::unique_ptr<Task> task = std::make_unique<PickTask>(cfg("table"));
+    if (!alone) {
+      std::vector<std::unique_ptr<Task>> children;
+      children.push_back(std::move(task));
+      children.push_back(std::make_unique<PickTask>(cfg("table")));
+      task = std::make_unique<MultiTask>("multi_task", cfg("table"), std::move(children));
+    }
+    Scene scene(task->whole_scene_cfg());
+    task->initialize(scene.model(), 1);
+    const std::unique_ptr<mjData, DataDelete> data(mj_makeData(scene.model()));
+    task->sample(0, 3, state_row(data.get()));
+    starts.emplace_back(data->qpos, data->qpos + scene.model()->nq);
+  }
+  EXPECT_EQ(starts[0], starts[1]);
+}
+
+TEST(MultiTask, TheOthersChooseGoalsWhereTheFirstHasPutThings) {
+  std::vector<std::unique_ptr<Task>> children;
+  children.push_back(std::make_unique<NavToObjTask>(cfg("floor")));
+  children.push_back(std::make_unique<PickTask>(cfg("floor")));
+  MultiTask task("multi_task", cfg("floor"), std::move(children));
+  Scene scene(task.whole_scene_cfg());
+  const mjModel* model = scene.model();
+  task.initialize(model, 1);
+  const std::unique_ptr<mjData, DataDelete> data(mj_makeData(model));
+  std::set<int> bodies;
+  for (int episode = 0; episode < 10; ++episode) {
+    mj_resetData(model, data.get());
+    task.sample(0, episode, state_row(data.get()));
+    mj_forward(model, data.get());
+    const int body = task.child(1).objects(0)[0].body;
+    EXPECT_LT(data->xpos[3 * body + 1], 50) << "it is there";
+    bodies.insert(body);
+  }
+  EXPECT_GT(bodies.size(), 2u);
+}
+
+TEST(MultiTask, SaysWhatCannotBe) {
+  const auto message = [](std::vector<std::unique_ptr<Task>> children) -> std::string {
+    try {
+      MultiTask task("multi_task", cfg("floor"), std::move(children));
+    } catch (const ValueError& e) {
+      return e.what();
+    }
+    return "";
+  };
+  std::vector<std::unique_ptr<Task>> one, two;
+  one.push_back(std::make_unique<PickTask>(cfg("floor")));
+  EXPECT_THAT(message(std::move(one)), HasSubstr("1 task, at least two"));
+  two.push_back(std::make_unique<PickTask>(cfg("floor")));
+  two.push_back(std::make_unique<PickTask>(cfg("table")));
+  EXPECT_THAT(message(std::move(two)), HasSubstr("in scene 'table'"));
+}
+
+TEST(MultiTask, ATaskThatMovesThingsMustBeTheFirst) {
+  std::vector<std::unique_ptr<Task>> children;
+  children.push_back(std::make_unique<PickTask>(cfg("kitchen")));
+  children.push_back(std::make_unique<OpeningTask>(cfg("kitchen"), OpeningKind::kOpen));
+  MultiTask task("pick+open", cfg("kitchen"), std::move(children));
+  Scene scene(task.whole_scene_cfg());
+  task.initialize(scene.model(), 1);
+  const std::unique_ptr<mjData, DataDelete> data(mj_makeData(scene.model()));
+  try {
+    task.sample(0, 0, state_row(data.get()));
+    FAIL();
+  } catch (const ValueError& e) {
+    EXPECT_THAT(e.what(), HasSubstr("task 'open' cannot choose its goal"));
+  }
+}
+
+}  // namespace
+}  // namespace mjsense
