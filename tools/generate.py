@@ -38,13 +38,14 @@ from __future__ import annotations
 
 import dataclasses
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, ClassVar, Literal
 
 import mujoco
 
 from mjsense import _config_methods
+from mjsense._dataclass import dataclass
 from mjsense._field_docs import show_field_docs
 
 if TYPE_CHECKING:
@@ -66,10 +67,11 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import field
 from typing import ClassVar, Literal
 
 from mjsense import _config_methods
+from mjsense._dataclass import dataclass
 from mjsense._field_docs import show_field_docs
 from mjsense.configs import SensorCfg
 ''',

@@ -11,13 +11,14 @@ from __future__ import annotations
 
 import dataclasses
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, ClassVar, Literal
 
 import mujoco
 
 from mjsense import _config_methods
+from mjsense._dataclass import dataclass
 from mjsense._field_docs import show_field_docs
 
 if TYPE_CHECKING:

@@ -14,10 +14,11 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import field
 from typing import ClassVar, Literal
 
 from mjsense import _config_methods
+from mjsense._dataclass import dataclass
 from mjsense._field_docs import show_field_docs
 from mjsense.configs import SensorCfg
 

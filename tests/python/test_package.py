@@ -1,8 +1,13 @@
 # SPDX-License-Identifier: Apache-2.0
+import dataclasses
+import inspect
 import pydoc
+import subprocess
+import sys
 import types
 
 import mujoco
+import pytest
 
 import mjsense as mjs
 from mjsense import _core
@@ -42,3 +47,46 @@ def test_help_shows_every_field():
     assert "Each ray leaves from where the frame was at its own moment of the sweep." in text  # its own
     assert "Hits farther away are misses. [m]" in text  # inherited
     assert "uint8 [B, H, W, 3]" in pydoc.plain(pydoc.render_doc(mjs.CameraData))
+
+
+def test_import_loads_nothing_heavy():
+    """What is slow to import, and often installed, is imported when it is wanted: names, for times depend on the machine."""
+    program = "import sys, mjsense; print(*sys.modules)"
+    loaded = set(subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, check=True).stdout.split())
+    heavy = {"h5py", "torch", "jax", "scipy", "matplotlib", "PIL", "pandas", "imageio_ffmpeg", "gymnasium_robotics", "rerun", "viser", "pyarrow",
+             "tomllib", "numpy.testing", "unittest", "mjsense.rl", "mjsense.compat"}  # fmt: skip
+    assert "mjsense.configs" in loaded and not heavy & loaded, heavy & loaded
+
+
+def test_methods_of_configurations_are_written_when_wanted():
+    program = """
+import mjsense as mjs
+from mjsense._dataclass import _Method
+classes = [c for m in (mjs.configs, mjs.effects) for c in vars(m).values() if isinstance(c, type) and issubclass(c, mjs.SensorCfg)]
+assert len(classes) > 5 and all(isinstance(vars(c)["__init__"], _Method) for c in classes), classes
+mjs.CameraSensorCfg(name="a")
+assert not any(isinstance(m, _Method) for m in vars(mjs.CameraSensorCfg).values())
+"""
+    subprocess.run([sys.executable, "-c", program], check=True)
+
+
+def test_configurations_are_dataclasses():
+    """As those of Python, whose methods are written at once."""
+    cfg = mjs.GridPatternCfg(size=(1.0, 2.0))
+    assert dataclasses.is_dataclass(cfg) and repr(cfg).startswith("GridPatternCfg(size=(1.0, 2.0), ")
+    assert cfg == mjs.GridPatternCfg(size=(1.0, 2.0)) != mjs.GridPatternCfg()
+    assert hash(cfg) == hash(mjs.GridPatternCfg(size=(1.0, 2.0))) and len({cfg, mjs.GridPatternCfg()}) == 2  # a frozen one
+    with pytest.raises(dataclasses.FrozenInstanceError):
+        cfg.size = (1.0, 1.0)  # pyright: ignore[reportAttributeAccessIssue]
+    with pytest.raises(TypeError, match="unhashable type: 'SceneCfg'"):
+        hash(mjs.SceneCfg())
+    assert list(inspect.signature(mjs.ObjRef).parameters) == [f.name for f in dataclasses.fields(mjs.ObjRef)]
+    with pytest.raises(TypeError, match=r"ObjRef.__init__\(\) got an unexpected keyword argument 'nam'"):
+        mjs.ObjRef(nam="x")  # pyright: ignore[reportCallIssue]
+
+    @dataclasses.dataclass
+    class Own(mjs.CameraSensorCfg):
+        gain: float = 1.0
+
+    own = Own(name="a", gain=2.0)
+    assert own.gain == 2 and own.name == "a" and own != Own(name="a") and dataclasses.replace(own, gain=1.0) == Own(name="a")

@@ -1,0 +1,59 @@
+# SPDX-License-Identifier: Apache-2.0
+"""``dataclasses.dataclass`` whose methods are written when one is first wanted.
+
+Python compiles the methods of a dataclass while its module is imported. There are sixty configurations, and a program uses five of them.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Callable
+from typing import Any, TypeVar, dataclass_transform, overload
+
+T = TypeVar("T", bound=type)
+
+
+@overload
+def dataclass(cls: T, /) -> T: ...
+@overload
+def dataclass(*, frozen: bool = False) -> Callable[[T], T]: ...
+@dataclass_transform(field_specifiers=(dataclasses.field,))
+def dataclass(cls: Any = None, /, *, frozen: bool = False) -> Any:
+    """As that of ``dataclasses``, to whose functions these classes are such."""
+    if cls is None:
+        return lambda cls: _declare(cls, frozen)
+    return _declare(cls, frozen)
+
+
+def _declare(cls: type, frozen: bool) -> type:
+    dataclasses.dataclass(init=False, repr=False, eq=False, frozen=frozen)(cls)
+    if not frozen:
+        cls.__hash__ = None  # type: ignore[assignment]
+    for name in ("__init__", "__repr__", "__eq__", "__hash__"):
+        if name not in vars(cls):
+            setattr(cls, name, _Method(cls, name, frozen))
+    return cls
+
+
+class _Method:
+    """Stands for a method; when it is looked up, all that are missing are written."""
+
+    def __init__(self, cls: type, name: str, frozen: bool) -> None:
+        self._cls, self._name, self._frozen = cls, name, frozen
+
+    def __get__(self, instance: Any, owner: Any = None) -> Any:
+        written = _write(self._cls, self._frozen)
+        for name, value in list(vars(self._cls).items()):
+            if isinstance(value, _Method):
+                setattr(self._cls, name, getattr(written, name))
+        return getattr(written, self._name) if instance is None else getattr(written, self._name).__get__(instance, owner)
+
+
+def _write(cls: type, frozen: bool) -> type:
+    """A dataclass with the same fields, those of bases included, in their order: its methods fit."""
+    fields = dataclasses.fields(cls)  # type: ignore[arg-type]
+    namespace: dict[str, Any] = {f.name: f for f in fields}
+    namespace.update(__annotations__={f.name: f.type for f in fields}, __module__=cls.__module__, __qualname__=cls.__qualname__, __doc__="-")
+    if hasattr(cls, "__post_init__"):
+        namespace["__post_init__"] = None  # __init__ calls it if there is one
+    return dataclasses.dataclass(frozen=frozen)(type(cls.__name__, (), namespace))
