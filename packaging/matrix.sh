@@ -16,7 +16,7 @@ for name in "$@"; do
   venv=build/matrix/${name// /-}
   rm -rf "$venv"
   "$python" -m venv "$venv"
-  mapfile -t others < <(cd packaging && "$python" -c 'import resolve, sys; print(*resolve.ENVIRONMENTS[sys.argv[1]], sep="\n")' "$name")
+  mapfile -t others < <(cd packaging && "$python" -c 'import resolve, sys; [print(r) for r in resolve.ENVIRONMENTS[sys.argv[1]]]' "$name")
   "$venv/bin/python" -m pip install -q --disable-pip-version-check "$wheel" pytest h5py "${others[@]}" || { failed=1; continue; }
   "$venv/bin/python" -m pip check || failed=1
   "$venv/bin/python" -m pip list --disable-pip-version-check --format freeze | grep -i -E '^(mujoco|torch|numpy|gymnasium|h5py|rsl|stable)' || true
