@@ -19,6 +19,7 @@ import crafted
 import h5py
 
 SECONDS, MEMORY = 20, 1 << 30  # what a look at a hostile file may take
+NO_END = 600  # seconds after which a program that should end by itself has no end, beside much other work
 
 
 @dataclass
@@ -49,7 +50,7 @@ class Lab:
     program: Path
     folder: Path
 
-    def run(self, *arguments, seconds=120, **kwargs):
+    def run(self, *arguments, seconds=NO_END, **kwargs):
         return subprocess.run(
             [self.program, *map(str, arguments)], capture_output=True, text=True, errors="replace", timeout=seconds, **kwargs
         )
@@ -92,8 +93,7 @@ def look(lab: Lab, row: Row, what: str, command: str, path: Path, *more):
     """One command on a hostile or damaged recording: it ends by itself, in time and in bounds. None if it did not."""
     before = resource.getrusage(resource.RUSAGE_CHILDREN)
     try:
-        # The limit is of processor time; beside other work that may take long.
-        done = lab.run(command, path, *more, seconds=10 * SECONDS, preexec_fn=limit_memory)
+        done = lab.run(command, path, *more, preexec_fn=limit_memory)
     except subprocess.TimeoutExpired:
         row.wrong("hung", f"{command} of {what}")
         return None
@@ -286,7 +286,7 @@ def full_disks(lab: Lab, trials: int) -> Row:
                  f"{lab.program} verify {disk}/out >&2; cp -r {disk}/out {disk}.kept 2>/dev/null; exit $rc"  # fmt: skip
         shutil.rmtree(f"{disk}.kept", ignore_errors=True)
         try:
-            done = subprocess.run(["unshare", "-m", "sh", "-c", script], capture_output=True, text=True, timeout=120)
+            done = subprocess.run(["unshare", "-m", "sh", "-c", script], capture_output=True, text=True, timeout=NO_END)
         except subprocess.TimeoutExpired:
             row.trials += 1
             row.wrong("hung", f"disk of {size}")
@@ -302,6 +302,34 @@ def full_disks(lab: Lab, trials: int) -> Row:
                 row.wrong("lost", f"disk of {size}: {resumed.stderr} {lab.run('verify', kept).stdout[-400:]}")
         elif finished:
             row.wrong("lost", f"disk of {size}: {finished}")
+    return row
+
+
+def file_limits(lab: Lab, trials: int) -> Row:
+    """Files may not grow beyond a limit, larger each time: one clear error, nothing half-written, and --resume without it ends the same."""
+    row = Row("limits on the size of files (ulimit -f)")
+    options = ["--episodes", "5", "--batches", "2", "--worlds", "2", "--steps", "8", "--width", "32", "--height", "24"]
+    whole = lab.fresh("whole_limit")
+    assert lab.run(whole, *options).returncode == 0
+    expected = contents(whole)
+    largest = max(map(len, expected.values())) * 3 // 2  # space is taken before it is needed
+    for n in range(trials):
+        limit, out = n * largest // trials, lab.fresh("limited")
+        row.trials += 1
+        try:
+            done = lab.run(out, *options, preexec_fn=functools.partial(resource.setrlimit, resource.RLIMIT_FSIZE, (limit, limit)))
+        except subprocess.TimeoutExpired:
+            row.wrong("hung", f"limit of {limit} bytes")
+            continue
+        clear = done.stderr.count("\n") == 1 and ("File too large" in done.stderr or "ulimit -f" in done.stderr)
+        if done.returncode != (2 if done.stderr else 0) or not (clear or done.returncode == 0):
+            row.wrong("crashed", f"limit of {limit} bytes: {done.returncode} {done.stderr[-300:]}")
+        left = {k: v for k, v in contents(out).items() if "/.recording/" not in k}
+        if any(expected.get(k) != v for k, v in left.items()) or list(out.rglob("*.part*")):
+            row.wrong("lost", f"limit of {limit} bytes: left {sorted(contents(out))}")
+        resumed = lab.run(out, *options, "--resume")
+        if resumed.returncode != 0 or contents(out) != expected:
+            row.wrong("lost", f"limit of {limit} bytes: {resumed.stderr}")
     return row
 
 
@@ -401,7 +429,7 @@ def encoders(lab: Lab, names=None) -> Row:
         row.trials += 1
         options = ["--episodes", 2, "--worlds", 1, "--steps", 400, "--no-depth", "--timeout", 2]
         try:
-            done = lab.run(out, *options, seconds=60, env={**os.environ, "MJSENSE_FFMPEG": str(script)})
+            done = lab.run(out, *options, env={**os.environ, "MJSENSE_FFMPEG": str(script)})
         except subprocess.TimeoutExpired:
             row.wrong("hung", name)
             continue
@@ -416,7 +444,7 @@ def encoders(lab: Lab, names=None) -> Row:
     script.chmod(0o755)
     row.trials += 1
     try:
-        done = lab.run(lab.fresh("encoded"), "--timeout", 2, seconds=60, env={**os.environ, "MJSENSE_FFMPEG": str(script)})
+        done = lab.run(lab.fresh("encoded"), "--timeout", 2, env={**os.environ, "MJSENSE_FFMPEG": str(script)})
         if done.returncode != 2 or "said nothing for" not in done.stderr:
             row.wrong("crashed", f"-encoders hangs: {done.returncode} {done.stderr}")
     except subprocess.TimeoutExpired:

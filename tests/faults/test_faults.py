@@ -68,3 +68,7 @@ def test_encoders_that_lie_or_hang(lab):
 @pytest.mark.skipif(not can_mount(), reason="a small disk needs the right to mount one")
 def test_full_disks(lab):
     check(faults.full_disks(lab, 6))
+
+
+def test_limits_on_the_size_of_files(lab):
+    check(faults.file_limits(lab, 12))

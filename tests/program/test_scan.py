@@ -1,6 +1,9 @@
 # SPDX-License-Identifier: Apache-2.0
 """mjsense scan: a lidar's view of a scene as a point cloud."""
 
+import resource
+import subprocess
+
 import numpy as np
 import pytest
 
@@ -42,6 +45,20 @@ def test_table_of_angles(mjsense, room):
     assert "1 of 1 rays returned" in done.stdout
     done = mjsense("scan", room, "--frame", "site:head", "--table", "ahead.npy", "--channels", "4", "--out", "cloud.ply", rc=2)
     assert "--table excludes --channels" in done.stderr
+
+
+def few_bytes():
+    resource.setrlimit(resource.RLIMIT_FSIZE, (2000, 2000))
+
+
+def test_limit_on_the_size_of_files(mjsense, room):
+    """ulimit -f: an error as of a full disk, and nothing is left; of what goes to stdout too."""
+    done = mjsense("scan", room, "--frame", "site:head", "--out", "cloud.ply", rc=2, preexec_fn=few_bytes)
+    assert done.stderr == "mjsense: cannot write 'cloud.ply': File too large\n"
+    assert [p.name for p in mjsense.folder.iterdir()] == ["room.xml"]
+    with open(mjsense.folder / "schema.json", "w") as out:
+        done = subprocess.run([mjsense.program, "schema"], stdout=out, stderr=subprocess.PIPE, text=True, preexec_fn=few_bytes)
+    assert (done.returncode, done.stderr) == (2, "mjsense: cannot write to stdout: File too large\n")
 
 
 def test_negative_steps(mjsense, room):

@@ -7,6 +7,7 @@
 
 #include <CLI/CLI.hpp>
 #include <cerrno>
+#include <csignal>
 #include <cstdio>
 #include <cstring>
 #include <exception>
@@ -14,6 +15,7 @@
 #include <mutex>
 #include <set>
 #include <string>
+#include <system_error>
 #include <vector>
 
 #include "mjsense/app/external.h"
@@ -210,6 +212,9 @@ int run(int argc, char** argv) {
   if (!word.empty() && word[0] != '-' && std::ranges::find(known, word) == known.end()) {
     run_external(word, argv + 1, known);
   }
+  // Writing beyond ulimit -f, on stdout too, is an error of that write. (Another program, above, gets
+  // its signals as we got them.)
+  std::signal(SIGXFSZ, SIG_IGN);
   if (word == "record") read_config_argument(argc, argv, record_options);
   try {
     program.parse(argc, argv);
@@ -261,8 +266,13 @@ int run_program(int argc, char** argv) {
       throw RuntimeError(fmt::format("cannot write to stdout: {}", std::strerror(errno)));
     return code;
   } catch (const std::exception& e) {
+    std::string why = e.what();
+    // fmt does not know which file it could not write to.
+    if (const auto* of_fmt = dynamic_cast<const std::system_error*>(&e);
+        of_fmt && std::ferror(stdout))
+      why = "cannot write to stdout: " + of_fmt->code().message();
     // It may quote a file of a stranger's.
-    fmt::print(stderr, "mjsense: {}\n", printable(one_line(e.what())));
+    fmt::print(stderr, "mjsense: {}\n", printable(one_line(why)));
     return kWrongInput;
   }
 }

@@ -11,6 +11,7 @@
 #include <cstring>
 
 #include "mjsense/core/error.h"
+#include "mjsense/core/file_limit.h"
 
 namespace mjsense {
 namespace {
@@ -89,6 +90,7 @@ std::int64_t size_of(const Fd& file) {
 
 void write_file(const std::filesystem::path& path,
                 std::initializer_list<std::span<const std::byte>> pieces) {
+  const FileLimitIsError limit;
   const std::string part = path.string() + ".part";
   const auto fail = [&] {
     const int error = errno;

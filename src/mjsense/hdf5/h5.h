@@ -14,6 +14,7 @@
 #include <vector>
 
 #include "mjsense/core/array.h"
+#include "mjsense/core/file_limit.h"
 
 namespace mjsense::h5 {
 
@@ -24,6 +25,7 @@ class H5Lock {
   static void alone();
 
  private:
+  FileLimitIsError limit_;  // the library writes whenever it likes
   std::unique_lock<std::recursive_mutex> lock_;
 };
 

@@ -122,11 +122,13 @@ struct EncoderPool::Impl {
   // The pool's thread: writes what producers queued, starts encoders on complete spool files,
   // collects what has ended.
   void run() {
-    sigset_t pipe;
-    sigemptyset(&pipe);
-    sigaddset(&pipe, SIGPIPE);
-    // An encoder that died is an EPIPE for us, not the end of the program.
-    pthread_sigmask(SIG_BLOCK, &pipe, nullptr);
+    sigset_t errors;
+    sigemptyset(&errors);
+    sigaddset(&errors, SIGPIPE);
+    sigaddset(&errors, SIGXFSZ);
+    // An encoder that died is an EPIPE for us, and a spool file that may not grow an EFBIG; not the
+    // end of the program.
+    pthread_sigmask(SIG_BLOCK, &errors, nullptr);
     std::vector<pollfd> polled;
     std::vector<Stream*> ready;
     Clock::time_point last = Clock::now();

@@ -19,6 +19,7 @@
 #include <optional>
 
 #include "mjsense/core/error.h"
+#include "mjsense/core/file_limit.h"
 #include "mjsense/core/plain_file.h"
 #include "mjsense/hdf5/guard.h"
 #include "mjsense/record/checksum.h"
@@ -54,6 +55,7 @@ void make_dir(const fs::path& path) {
 }
 
 void write_whole(const fs::path& path, std::string_view text) {
+  const FileLimitIsError limit;
   const fs::path part = path.string() + ".part";
   unlink(part.c_str());
   {
@@ -421,6 +423,11 @@ void House::publish(int batch, const std::vector<std::int64_t>& episodes) {
   const int batches = batches_.count;
   const fs::path part = staging_ / "batch.part";
   const std::string what = fmt::format("cannot write '{}'", part.string());
+  // What could not be written whole leaves its disk space to others; its episodes wait as before.
+  struct Removed {
+    const fs::path& path;
+    ~Removed() { unlink(path.c_str()); }
+  } const removed{part};
   Moves moves;
   {
     const h5::H5Lock lock;

@@ -100,6 +100,7 @@ bool wait_process(Child& child, bool block, Exit& result) {
   } else if (WIFSIGNALED(status)) {
     result.why =
         fmt::format("killed by signal {} ({})", WTERMSIG(status), strsignal(WTERMSIG(status)));
+    if (WTERMSIG(status) == SIGXFSZ) result.why += ": ulimit -f allows no larger file";
   } else if (WEXITSTATUS(status) != 0) {
     result.why = fmt::format("exit code {}", WEXITSTATUS(status));
   } else {
