@@ -5,7 +5,6 @@
 #include <fmt/format.h>
 #include <sys/stat.h>
 #include <unistd.h>
-#include <zlib.h>
 
 #include <algorithm>
 #include <cerrno>
@@ -14,6 +13,8 @@
 
 #include "mjsense/core/error.h"
 #include "mjsense/core/fd.h"
+#include "mjsense/core/file_limit.h"
+#include "mjsense/record/crc32.h"
 
 namespace mjsense {
 namespace {
@@ -47,15 +48,14 @@ std::int64_t file_size(int fd) {
 
 }  // namespace
 
-void Checksum::add(const void* bytes, std::size_t count) {
-  crc_ = static_cast<std::uint32_t>(crc32_z(crc_, static_cast<const Bytef*>(bytes), count));
-}
+void Checksum::add(const void* bytes, std::size_t count) { crc_ = crc32_of(crc_, bytes, count); }
 
 std::string Checksum::text() const { return fmt::format("{:08x}", crc_); }
 
 std::string checksum_of(int fd) { return checksum_of(fd, file_size(fd)); }
 
 void seal_file(const std::filesystem::path& path) {
+  const FileLimitIsError limit;
   const Fd file(open(path.c_str(), O_RDWR | O_CLOEXEC | O_NOFOLLOW));
   const auto fail = [&] {
     throw RuntimeError(fmt::format("cannot write '{}': {}", path.string(), std::strerror(errno)));

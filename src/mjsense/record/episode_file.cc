@@ -142,9 +142,6 @@ void EpisodeFile::write_chunk(int stream, std::int64_t rows, std::span<const std
   const auto index = static_cast<std::size_t>(stream);
   if (index < plan_.arrays.size() && plan_.arrays[index].text)
     chunk = texts_of(plan_.arrays[index], rows, chunk);
-  if (!chunk.empty())
-    datasets_[index].sum.add(chunk.data(),
-                             static_cast<std::size_t>(rows) * datasets_[index].row_bytes);
   std::span<const std::uint8_t> bytes = chunk;
   if (gzip_ > 0 && !chunk.empty()) {  // outside the library's lock: here the time goes
     packed_.resize(compressBound(chunk.size()));
@@ -155,6 +152,10 @@ void EpisodeFile::write_chunk(int stream, std::int64_t rows, std::span<const std
     }
     bytes = {packed_.data(), size};
   }
+  // Now that the compressor has brought it into this core's cache.
+  if (!chunk.empty())
+    datasets_[index].sum.add(chunk.data(),
+                             static_cast<std::size_t>(rows) * datasets_[index].row_bytes);
   const h5::H5Lock lock;
   Dataset& dataset = datasets_[stream];
   hsize_t offset[Shape::kMaxRank + 1] = {dataset.dims[0]};
