@@ -131,6 +131,12 @@ std::vector<std::pair<std::string, std::string>> PythonPolicy::info(int world) c
   });
 }
 
+std::string PythonPolicy::failure(int world) const {
+  return host_->call(place("failure"), [&] {
+    return nb::cast<std::string>(nb::str(policy_.get().attr("failure")(world)));
+  });
+}
+
 void PythonPolicy::reset_all(ActiveWorlds& worlds) {
   for (int w : worlds.ids()) chunk_.left[w] = 0;
   host_->call(place("reset"), [&] {

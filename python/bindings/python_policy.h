@@ -41,6 +41,7 @@ class PythonPolicy final : public PlannerPolicy {
   Pose grasp_pose(int /*world*/) const override { return {}; }
   bool has_grasp_pose() const override { return false; }
   std::vector<std::pair<std::string, std::string>> info(int world) const override;
+  std::string failure(int world) const override;
   std::vector<std::shared_ptr<Sensor>> create_policy_sensors() const override;
 
  private:

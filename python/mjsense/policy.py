@@ -78,6 +78,10 @@ class Policy:
         """Further texts for ``obs_scene``, such as which network this is."""
         return {}
 
+    def failure(self, world: int) -> str:
+        """Why it gave up, in a few words that are the same for the same reason: files have it in the episode's ``outcome``."""
+        return ""
+
     # --------------------------------------------------------------------------------------------------------- reading
 
     def rng(self, world: int) -> np.random.Generator:

@@ -123,8 +123,11 @@ def test_done_ends_an_episode(tmp_path):
             done = np.full(self.num_worlds, self.left == 0)
             return {"action": np.tile(HOLD, (self.num_worlds, 1)), "done": done, "success": ~done}
 
+        def failure(self, world):
+            return "tired"
+
     summary = mjs.record("pick", policy=Stop(), out=tmp_path, episodes=1, cameras=[], keep_failures=True)
-    assert summary.lengths == [6] and summary.failures == {"the policy gave up": 1}
+    assert summary.lengths == [6] and summary.failures == {"the policy gave up: tired": 1}
     rows = trajectories(summary)[0]
     assert rows["terminated"].tolist() == [False] * 5 + [True] and not rows["truncated"].any()
     commands = json_rows(rows["actions/commanded_action"])

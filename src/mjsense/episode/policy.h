@@ -50,6 +50,9 @@ class Policy {
   virtual std::span<const Phase> phases() const { return {}; }
   // Further members of obs_scene with text values, in this order: which network, of which step.
   virtual std::vector<std::pair<std::string, std::string>> info(int /*world*/) const { return {}; }
+  // Why it gave up, or began again last, in a few words that are the same for the same reason; "" if
+  // it never did, or does not say.
+  virtual std::string failure(int /*world*/) const { return ""; }
   // Sensors that this policy adds to the suite. They refer to this policy.
   virtual std::vector<std::shared_ptr<Sensor>> create_policy_sensors() const { return {}; }
 };

@@ -145,6 +145,12 @@ Evaluation Task::judge(int world, double reward, bool success, bool over) const 
           .truncated = episode.step >= cfg_.horizon};
 }
 
+Evaluation Task::judge_by(int world, double reward, std::string_view lacks) const {
+  Evaluation found = judge(world, reward, lacks.empty());
+  found.lacks = lacks;
+  return found;
+}
+
 std::string Task::obs_scene(int world) const {
   nlohmann::ordered_json scene;
   scene["task_type"] = type();

@@ -76,6 +76,9 @@ struct Evaluation {
   // terminate_upon_success.
   bool terminal = false;
   bool truncated = false;  // the horizon is reached
+  // What a success lacks, a few words that live as long as the program: "the object is not lifted".
+  // The same words for the same reason, so that they can be counted; "": the task does not say.
+  std::string_view lacks;
 };
 
 // Text with a weight, as obs_scene's referral_expressions have it.
@@ -204,6 +207,8 @@ class Task {
   // terminal and truncated of an observation with this success; `over`: the episode is, for a
   // reason of the task's.
   Evaluation judge(int world, double reward, bool success, bool over = false) const;
+  // The same of a success that lacks this; "": it is one.
+  Evaluation judge_by(int world, double reward, std::string_view lacks) const;
 
  private:
   friend class MultiTask;  // of which this one may be a part

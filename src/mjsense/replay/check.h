@@ -6,6 +6,7 @@
 
 #include <cstdint>
 #include <filesystem>
+#include <map>
 #include <string>
 #include <vector>
 
@@ -61,6 +62,7 @@ struct InspectResult {
     std::string path;
     std::int64_t bytes = 0;
     int episodes = 0, successes = 0, steps = 0;
+    std::map<std::string, std::vector<std::string>> outcomes;  // how episodes ended -> their names
   };
   std::vector<File> files;
   std::vector<std::string> videos;

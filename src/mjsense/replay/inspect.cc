@@ -1,11 +1,13 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 
 #include <algorithm>
 #include <cmath>
 #include <limits>
 #include <map>
 #include <nlohmann/json.hpp>
+#include <span>
 
 #include "mjsense/core/error.h"
 #include "mjsense/core/plain_file.h"
@@ -84,6 +86,8 @@ class Inspector {
     for (const std::string& name : trajectory_names(file)) {
       const h5::Id trajectory = h5::open_group(file, name);
       ++entry.episodes;
+      const std::string outcome = h5::text_attribute(trajectory, "outcome");
+      if (!outcome.empty()) entry.outcomes[outcome].push_back(name);
       add_trajectory(trajectory, entry);
       if (!h5::exists(trajectory, "obs/sensor_data")) continue;
       const h5::Id videos = h5::open_group(trajectory, "obs/sensor_data");
@@ -152,7 +156,7 @@ class Inspector {
 std::string to_json(const InspectResult& r) {
   nlohmann::json out{{"videos", r.videos}, {"settings", r.settings}};
   for (const InspectResult::File& f : r.files)
-    out["files"].push_back({f.path, f.bytes, f.episodes, f.successes, f.steps});
+    out["files"].push_back({f.path, f.bytes, f.episodes, f.successes, f.steps, f.outcomes});
   for (const StreamStats& s : r.streams)
     out["streams"].push_back({s.name, s.dtype, s.shape, s.unit, s.frame, s.description, s.count,
                               s.nan, s.infinite, s.mean, s.std, s.min, s.max});
@@ -166,7 +170,8 @@ InspectResult from_json(const std::string& text) {
   r.videos = in.at("videos");
   r.settings = in.at("settings");
   for (const auto& f : in.value("files", nlohmann::json::array()))
-    r.files.push_back({f.at(0), f.at(1), f.at(2), f.at(3), f.at(4)});
+    r.files.push_back({f.at(0), f.at(1), f.at(2), f.at(3), f.at(4),
+                       f.at(5).get<std::map<std::string, std::vector<std::string>>>()});
   // JSON has no infinity: a spread of numbers that overflow comes as null.
   const auto number = [](const nlohmann::json& j) {
     return j.is_number() ? j.get<double>() : std::numeric_limits<double>::quiet_NaN();
@@ -202,6 +207,14 @@ std::vector<std::string> split_path(const std::string& path) {
     start = end + 1;
   }
   return parts;
+}
+
+// "    3 x horizon reached: the object is not lifted (traj_1, traj_4, traj_6)"
+std::string outcome_line(const std::string& outcome, const std::vector<std::string>& names) {
+  constexpr std::size_t kNames = 6;
+  const auto shown = std::span(names).first(std::min(names.size(), kNames));
+  return fmt::format("    {} x {} ({}{})\n", names.size(), printable(outcome),
+                     fmt::join(shown, ", "), names.size() > kNames ? ", ..." : "");
 }
 
 // "    tcp_pose      float32  (T, 7)     0.3268 +- 0.3826   [-0.24, 1.041]   m, wxyz  in world"
@@ -241,6 +254,9 @@ std::string InspectResult::text() const {
   for (const File& f : files) {
     out += fmt::format("{}  {}, {} episodes, {} successes, {} steps\n", f.path, size_text(f.bytes),
                        f.episodes, f.successes, f.steps);
+    for (const auto& [outcome, names] : f.outcomes) {
+      if (outcome != "success") out += outcome_line(outcome, names);
+    }
   }
   out += fmt::format("{} videos\n\n", videos.size());
 
@@ -267,7 +283,8 @@ std::string InspectResult::json() const {
                           {"bytes", f.bytes},
                           {"episodes", f.episodes},
                           {"successes", f.successes},
-                          {"steps", f.steps}});
+                          {"steps", f.steps},
+                          {"outcomes", f.outcomes}});
   }
   for (const StreamStats& s : streams) {
     nlohmann::json one{{"name", s.name},   {"dtype", s.dtype}, {"shape", s.shape},

@@ -42,6 +42,7 @@ class AbovePicker final : public PlannerPolicy {
   int phase(int world) const override { return player(world).phase(world); }
   int num_retries(int world) const override { return player(world).num_retries(world); }
   Pose grasp_pose(int world) const override { return player(world).grasp_pose(world); }
+  std::string failure(int world) const override { return player(world).failure(world); }
 
  private:
   TaskPlanner& player(int world) {
@@ -125,6 +126,7 @@ class AnyPlanner final : public PlannerPolicy {
   int phase(int world) const override { return planner_->phase(world); }
   int num_retries(int world) const override { return planner_->num_retries(world); }
   Pose grasp_pose(int world) const override { return planner_->grasp_pose(world); }
+  std::string failure(int world) const override { return planner_->failure(world); }
   bool has_grasp_pose() const override { return planner_ && planner_->has_grasp_pose(); }
   std::vector<std::shared_ptr<Sensor>> create_policy_sensors() const override {
     return planner_->create_policy_sensors();

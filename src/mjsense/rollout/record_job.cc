@@ -239,11 +239,18 @@ class RecordJob {
     end(w, now.success, outcome(w, now));
   }
 
-  const char* outcome(int w, const Evaluation& now) {
+  // "horizon reached: the object is not lifted", "the policy gave up: found no way".
+  std::string outcome(int w, const Evaluation& now) {
     if (now.success) return "success";
-    if (!now.terminal) return "horizon reached";
     const Action* last = rollout_.task().last_action(w);
-    return last && last->success == false ? "the policy gave up" : "no success";
+    const bool gave_up = now.terminal && last && last->success == false;
+    const char* what = gave_up        ? "the policy gave up"
+                       : now.terminal ? "no success"
+                                      : "horizon reached";
+    const Policy* policy = rollout_.policy();
+    const std::string why =
+        gave_up && policy ? policy->failure(w) : std::string(now.lacks);
+    return why.empty() ? what : fmt::format("{}: {}", what, why);
   }
 
   void end(int w, bool success, const std::string& outcome) {

@@ -12,10 +12,10 @@
 
 namespace mjsense {
 
-enum class PlanFailure { kNone, kUnplanned, kToolAway, kToolTurned, kDropped, kUnreachable };
+enum class PlanFailure { kNone, kUnplanned, kToolAway, kToolTurned, kDropped, kUnreachable, kAstray };
 template <>
-inline constexpr std::array<std::string_view, 6> kWords<PlanFailure>{
-    "none", "unplanned", "tool_away", "tool_turned", "dropped", "unreachable"};
+inline constexpr std::array<std::string_view, 7> kWords<PlanFailure>{
+    "none", "unplanned", "tool_away", "tool_turned", "dropped", "unreachable", "astray"};
 
 struct FollowerCfg {
   double max_position_error = 0.1;     // m, tool against its target

@@ -214,6 +214,7 @@ TEST(TaskPlanner, AStageWithoutAWayBeginsAgainThenGivesUp) {
   EXPECT_EQ(action.success, std::optional<bool>(false));
   EXPECT_EQ(planner.num_retries(0), 3);
   EXPECT_EQ(planner.last_failure(0), PlanFailure::kUnplanned);
+  EXPECT_EQ(planner.failure(0), "found no way");
   EXPECT_EQ(planner.requests.size(), 8u);
 }
 

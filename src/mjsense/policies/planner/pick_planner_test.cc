@@ -172,6 +172,7 @@ TEST(PickPlanner, RetriesAfterClosingOnNothingThenGivesUp) {
     if (action.done) {
       EXPECT_EQ(action.success, std::optional<bool>(false));
       EXPECT_EQ(most_retries, 3);
+      EXPECT_EQ(planner.failure(0), "the hand held nothing");
       const std::vector<int> one{2, 3, 4, 5};
       EXPECT_EQ(std::vector<int>(phases.begin(), phases.begin() + 4), one);
       return;

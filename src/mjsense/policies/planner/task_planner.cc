@@ -2,6 +2,29 @@
 #include "mjsense/policies/planner/task_planner.h"
 
 namespace mjsense {
+namespace {
+
+const char* text_of(PlanFailure failure) {
+  switch (failure) {
+    case PlanFailure::kNone:
+      return "";
+    case PlanFailure::kUnplanned:
+      return "found no way";
+    case PlanFailure::kToolAway:
+      return "the tool was held off its way";
+    case PlanFailure::kToolTurned:
+      return "the tool was turned off its way";
+    case PlanFailure::kDropped:
+      return "the hand held nothing";
+    case PlanFailure::kUnreachable:
+      return "the arm did not reach along its way";
+    case PlanFailure::kAstray:
+      return "things did not move as planned";
+  }
+  return "";
+}
+
+}  // namespace
 
 void TaskPlanner::initialize(Task& task) {
   task_ = &task;
@@ -34,7 +57,16 @@ bool TaskPlanner::begin_again(const World& world) {
   ++state.retries;
   state.stage = 0;
   follower_.restart(world);
-  return plan(world);
+  state.no_other_way = !plan(world);
+  return !state.no_other_way;
+}
+
+std::string TaskPlanner::failure(int world) const {
+  const State& state = states_[world];
+  std::string text = text_of(state.failure);
+  if (state.no_other_way && state.failure != PlanFailure::kUnplanned)
+    text += ", then it found no way";
+  return text;
 }
 
 void TaskPlanner::give_up(Action& action) {
@@ -47,7 +79,7 @@ void TaskPlanner::act(const World& world, Action& action) {
   action = {};
   if (state.planned && !follower_.finished(world.id)) {
     PlanFailure failure = follower_.failure(world);
-    if (failure == PlanFailure::kNone && gone_wrong(world)) failure = PlanFailure::kUnplanned;
+    if (failure == PlanFailure::kNone && gone_wrong(world)) failure = PlanFailure::kAstray;
     if (failure != PlanFailure::kNone) {
       state.failure = failure;
       state.planned = begin_again(world);

@@ -41,6 +41,7 @@ class TaskPlanner : public PlannerPolicy {
 
   int phase(int world) const override { return follower_.phase(world); }
   int num_retries(int world) const override { return states_[world].retries; }
+  std::string failure(int world) const override;
   Pose grasp_pose(int world) const override { return follower_.plan(world).grasp; }
   // Why it last began again or gave up; kNone if it never did.
   PlanFailure last_failure(int world) const { return states_[world].failure; }
@@ -69,6 +70,7 @@ class TaskPlanner : public PlannerPolicy {
     bool planned = false;
     int retries = 0, stage = 0;
     PlanFailure failure = PlanFailure::kNone;
+    bool no_other_way = false;  // and to begin again there was no plan
   };
   bool plan(const World& world);
   bool begin_again(const World& world);

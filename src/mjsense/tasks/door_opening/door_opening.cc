@@ -113,7 +113,7 @@ void DoorOpeningTask::begin(const World& world) {
 
 Evaluation DoorOpeningTask::evaluate(const World& world) const {
   const bool success = fraction(world) >= kOpen;
-  return judge(world.id, success ? 1.0 : 0.0, success);
+  return judge_by(world.id, success ? 1.0 : 0.0, success ? "" : "the door is not open far enough");
 }
 
 std::string DoorOpeningTask::description(int world) const {

@@ -92,7 +92,9 @@ Evaluation MultiTask::any(int world, std::span<const Evaluation> of_children,
     over = over || of_children[i].terminal;
   }
   success_[world] = success ? 1 : 0;
-  return judge(world, reward, success, over);
+  Evaluation all = judge(world, reward, success, over);
+  if (!success) all.lacks = of_children[0].lacks;
+  return all;
 }
 
 Evaluation MultiTask::evaluate(const World& world) const {

@@ -179,7 +179,10 @@ NavToObjTask::Judgement NavToObjTask::judgement(const World& world) const {
 
 Evaluation NavToObjTask::evaluate(const World& world) const {
   const Judgement now = judgement(world);
-  return judge(world.id, now.reward, now.reward > 0);
+  return judge_by(world.id, now.reward,
+               now.reward > 0            ? ""
+               : now.distance < kReach ? "the camera does not see the object"
+                                       : "the object is too far away");
 }
 
 std::string NavToObjTask::description(int world) const {

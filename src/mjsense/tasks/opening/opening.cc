@@ -159,7 +159,10 @@ bool OpeningTask::succeeded(double reward) const {
 
 Evaluation OpeningTask::evaluate(const World& world) const {
   const double reward = this->reward(world);
-  return judge(world.id, reward, succeeded(reward));
+  return judge_by(world.id, reward,
+               succeeded(reward)               ? ""
+               : kind_ == OpeningKind::kOpen ? "it is not open far enough"
+                                             : "it is not closed far enough");
 }
 
 std::string OpeningTask::description(int world) const {

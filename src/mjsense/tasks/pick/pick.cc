@@ -108,10 +108,11 @@ bool PickTask::borne_by_others(const World& world, int body) const {
   return false;
 }
 
-bool PickTask::lifted(const World& world) const {
+// "" where the robot, and nothing else, holds the object in the air.
+std::string_view PickTask::lacks(const World& world) const {
   const Target& target = targets_[world.id];
   const int body = target.object.body;
-  if (world.data->xpos[3 * body + 2] - target.start.p.z < kLift) return false;
+  if (world.data->xpos[3 * body + 2] - target.start.p.z < kLift) return "the object is not lifted";
   bool held = false;
   for (int i = 0; i < world.data->ncon; ++i) {
     const mjContact& contact = world.data->contact[i];
@@ -120,10 +121,11 @@ bool PickTask::lifted(const World& world) const {
     const int root0 = m->body_rootid[m->geom_bodyid[contact.geom[0]]];
     const int root1 = m->body_rootid[m->geom_bodyid[contact.geom[1]]];
     if ((root0 == body) == (root1 == body)) continue;
-    if ((root0 == body ? root1 : root0) != robot_root_) return false;
+    if ((root0 == body ? root1 : root0) != robot_root_)
+      return "something besides the robot touches the object";
     held = true;
   }
-  return held;
+  return held ? "" : "the robot does not touch the object";
 }
 
 Evaluation PickTask::evaluate(const World& world) const {
@@ -131,7 +133,7 @@ Evaluation PickTask::evaluate(const World& world) const {
   const int body = target.object.body;
   const double height = world.data->xpos[3 * body + 2] - target.start.p.z;
   const double reward = borne_by_others(world, body) ? 0.0 : std::clamp(height, 0.0, 1000.0);
-  return judge(world.id, reward, lifted(world));
+  return judge_by(world.id, reward, lacks(world));
 }
 
 std::string PickTask::description(int world) const {
@@ -164,7 +166,7 @@ void PickTask::write_info(const World& world, JsonWriter& json) const {
   json.key("position_error").value(norm(vec3(world.data->xpos + 3 * body) - goal));
   json.key("rotation_error")
       .value(angle_between(target.start.q, quat(world.data->xquat + 4 * body)));
-  json.key("success").value(lifted(world));
+  json.key("success").value(lacks(world).empty());
 }
 
 std::vector<std::pair<std::string, std::string>> PickTask::scene_info(int world) const {

@@ -60,7 +60,7 @@ class PickTask final : public Task, public GraspScene {
     Pose start;
   };
   bool borne_by_others(const World& world, int body) const;
-  bool lifted(const World& world) const;
+  std::string_view lacks(const World& world) const;
 
   EpisodeScene scene_;
   Standing standing_;

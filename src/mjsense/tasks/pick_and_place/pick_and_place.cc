@@ -184,28 +184,34 @@ const PickAndPlaceTask::Judgement& PickAndPlaceTask::judge_now(const World& worl
   // Between its axis that was up and up: a turn about it is no tilt.
   const Vec3 up = rotate(conjugate(episode.receptacle_start.q), {0, 0, 1});
   now.tilted = std::acos(std::clamp(rotate(of_receptacle.q, up).z, -1.0, 1.0));
-  now.success = kind_ == PlaceKind::kNextTo
-                    ? is_next_to(world, now)
-                    : (now.supported || now.carried_forward) && !now.robot_contact &&
-                          norm(now.moved) <= kMoved && now.tilted <= kTurned;
+  now.lacks = kind_ == PlaceKind::kNextTo ? lacks_beside(world, now) : lacks_within(now);
   return now;
 }
 
-bool PickAndPlaceTask::is_next_to(const World& world, const Judgement& now) const {
+std::string_view PickAndPlaceTask::lacks_within(const Judgement& now) {
+  if (!now.supported && !now.carried_forward) return "the receptacle does not carry the object";
+  if (now.robot_contact) return "the robot touches the object";
+  if (norm(now.moved) > kMoved) return "the receptacle has moved";
+  return now.tilted > kTurned ? "the receptacle is tilted" : "";
+}
+
+std::string_view PickAndPlaceTask::lacks_beside(const World& world, const Judgement& now) const {
   const Episode& episode = episodes_[world.id];
   const int object = episode.objects[0].body, other = episode.objects[1].body;
   const WorldBox a = world_box(world, object), b = world_box(world, other);
   const double gap = gap_from_above(a, b);
-  if (gap < 0 || gap > kBeside || norm(now.moved) > kMovedBeside || now.turned > kTurned)
-    return false;
+  if (gap < 0 || gap > kBeside) return "the object is not beside the other";
+  if (norm(now.moved) > kMovedBeside || now.turned > kTurned) return "the other object has moved";
   const int under = bearer(world, object), under_other = bearer(world, other);
-  if (under >= 0 && under_other >= 0) return under == under_other;
-  return std::abs(a.low.z - b.low.z) <= kSameHeight;
+  const bool together = under >= 0 && under_other >= 0
+                            ? under == under_other
+                            : std::abs(a.low.z - b.low.z) <= kSameHeight;
+  return together ? "" : "the two do not stand on the same thing";
 }
 
 Evaluation PickAndPlaceTask::evaluate(const World& world) const {
   const Judgement& now = judge_now(world);
-  return judge(world.id, std::exp(-now.position_error), now.success);
+  return judge_by(world.id, std::exp(-now.position_error), now.lacks);
 }
 
 void PickAndPlaceTask::places(const World& world, std::vector<Vec3>& out) const {
@@ -312,7 +318,7 @@ void PickAndPlaceTask::write_info(const World& world, JsonWriter& json) const {
   json.key("receptacle_rot_displacement").value(now.turned);
   json.key("receptacle_tilt_displacement").value(now.tilted);
   json.key("robot_contact").value(now.robot_contact);
-  json.key("success").value(now.success);
+  json.key("success").value(now.lacks.empty());
   json.key("supported_by_carry_forward").value(now.carried_forward);
   json.key("supported_by_receptacle").value(now.supported);
 }

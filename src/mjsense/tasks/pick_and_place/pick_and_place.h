@@ -65,7 +65,8 @@ class PickAndPlaceTask final : public Task, public GraspScene, public PlaceScene
   // What an observation shows.
   struct Judgement {
     int step = -1;  // of the episode
-    bool supported = false, carried_forward = false, robot_contact = false, success = false;
+    bool supported = false, carried_forward = false, robot_contact = false;
+    std::string_view lacks;  // of a success
     double pos_diff = 0, rot_diff = 0;  // to the nearest earlier supported pose
     double position_error = 0;
     Vec3 moved;  // of the receptacle
@@ -79,7 +80,8 @@ class PickAndPlaceTask final : public Task, public GraspScene, public PlaceScene
     Judgement judgement;
   };
   const Judgement& judge_now(const World& world) const;
-  bool is_next_to(const World& world, const Judgement& now) const;
+  static std::string_view lacks_within(const Judgement& now);
+  std::string_view lacks_beside(const World& world, const Judgement& now) const;
   std::vector<int> choose(Rng& rng) const;
   std::string place_text(int world) const;
   Referrals::value_type referral(const char* key, int object) const;
