@@ -73,6 +73,7 @@ def record(
     width: int | None = None,
     height: int | None = None,
     depth: bool = False,
+    segmentation: bool = False,
     samples: int = 1,
     shadows: bool = True,
     meshes: Literal["auto", "shapes", "real"] = "auto",
@@ -117,6 +118,7 @@ def record(
         width: Of pictures; by default the robot's. [pixels]
         height: Of pictures; by default the robot's. [pixels]
         depth: Also the depth of every camera, losslessly.
+        segmentation: Also what each pixel of every camera shows, losslessly: (id, mjtObj), of geoms mostly.
         samples: Rays a pixel of rgb: smooth edges for time.
         shadows: Pictures have shadows.
         meshes: The robot is drawn with shapes of ours, its real meshes, or these where its environment variable

@@ -8,8 +8,11 @@ import subprocess
 import time
 
 import h5py
+import mujoco
 import numpy as np
 import pytest
+
+import mjsense as mjs
 
 # Small pictures, a few steps: enough for everything but success.
 QUICK = ["record", "pick", "--size", "64x48", "--horizon", "6", "--keep-failures", "-q"]
@@ -111,6 +114,30 @@ def test_depth_is_kept(mjsense):
     mjsense("verify", "data", "--decode")
 
 
+def test_segmentation_is_kept(mjsense):
+    mjsense(*QUICK, "--segmentation", "--cameras", "wrist_camera", "--out", "data")
+    mjsense("verify", "data")
+    with h5py.File(mjsense.folder / "data/house_0/trajectories_batch_1_of_1.h5") as file:
+        traj = file["traj_0"]
+        seen = traj["obs/extra/wrist_camera_segmentation"]
+        assert seen.shape == (len(traj["success"]), 48, 64, 2) and seen.dtype == np.int32
+        assert json.loads(file.attrs["recording"])["settings"]["cameras"][0]["segmentation"] is True
+        rows = seen[()]
+    assert set(np.unique(rows[..., 1])) <= {-1, int(mujoco.mjtObj.mjOBJ_GEOM)} and len(np.unique(rows[..., 0])) > 3
+    options = {"num_envs": 1, "cameras": ["wrist_camera"], "width": 64, "height": 48, "segmentation": True}
+    env = mjs.make_vec("pick", observations=["wrist_camera_segmentation"], **options)
+    observation, _ = env.reset(seed=0)
+    np.testing.assert_array_equal(observation["wrist_camera_segmentation"][0], rows[0])
+    env.close()
+    assert "wrist_camera_segmentation" in mjsense("sensors", "pick", "--segmentation").stdout
+    with_key = mjsense.folder / "job.toml"
+    with_key.write_text("segmentation = true\n")
+    mjsense(*QUICK, "--config", with_key, "--cameras", "wrist_camera", "--out", "again")
+    with h5py.File(mjsense.folder / "again/house_0/trajectories_batch_1_of_1.h5") as file:
+        np.testing.assert_array_equal(file["traj_0/obs/extra/wrist_camera_segmentation"], rows)
+    assert "settings/cameras" in mjsense(*QUICK, "--cameras", "wrist_camera", "--out", "data", "--resume", rc=2).stderr
+
+
 def test_without_cameras(mjsense):
     mjsense(*QUICK, "--cameras", "none", "--out", "data")
     assert [p.name for p in (mjsense.folder / "data/house_0").iterdir()] == ["trajectories_batch_1_of_1.h5"]
@@ -120,8 +147,29 @@ def test_failures_are_dropped_unless_asked_for(mjsense):
     done = mjsense("record", "pick", "--cameras", "none", "--horizon", 4, "--max-attempts", 3, "--out", "data", "-q",
                    "--json", rc=1)
     summary = json.loads(done.stdout)
-    assert summary["kept"] == 0 and summary["failures"] == {"horizon reached": 3}
+    assert summary["kept"] == 0 and summary["failures"] == {"horizon reached: the object is not lifted": 3}
     assert "gave up after 3 attempts" in done.stderr
+
+
+def test_why_an_episode_failed_is_in_the_recording(mjsense):
+    args = ("record", "pick", "--scene", "shelf", "--cameras", "none", "--episodes", 3, "--max-attempts", 3, "--keep-failures", "-q")
+    mjsense(*args, "--horizon", 60, "--out", "data")
+    with h5py.File(mjsense.folder / "data/house_0/trajectories_batch_1_of_1.h5") as file:
+        outcomes = {name: traj.attrs["outcome"] for name, traj in file.items()}
+        assert {name for name, outcome in outcomes.items() if outcome == "success"} == {
+            name for name, traj in file.items() if traj["success"][-1]}  # fmt: skip
+    failed = {name: outcome for name, outcome in outcomes.items() if outcome != "success"}
+    assert failed and set(failed.values()) <= {"horizon reached: the object is not lifted", "the policy gave up: found no way"}
+    file = json.loads(mjsense("inspect", "data", "--json").stdout)["files"][0]
+    assert {name: outcome for outcome, names in file["outcomes"].items() for name in names} == outcomes
+    shown = mjsense("inspect", "data").stdout
+    for outcome in set(failed.values()):
+        names = [name for name, other in outcomes.items() if other == outcome]
+        assert f"    {len(names)} x {outcome} ({', '.join(names)})\n" in shown
+    assert " x success" not in shown
+    mjsense(*args, "--horizon", 60, "--worlds", 1, "--out", "one")
+    name = "house_0/trajectories_batch_1_of_1.h5"
+    assert (mjsense.folder / "one" / name).read_bytes() == (mjsense.folder / "data" / name).read_bytes()
 
 
 def test_config_file_and_command_line(mjsense):

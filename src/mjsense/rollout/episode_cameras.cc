@@ -59,6 +59,7 @@ CameraSystem choose_cameras(const Task& task, const RolloutCfg& cfg) {
     if (cfg.width) camera.width = cfg.width;
     if (cfg.height) camera.height = cfg.height;
     camera.depth = camera.depth || cfg.depth;
+    camera.segmentation = camera.segmentation || cfg.segmentation;
   }
   return {std::move(system), std::string(Robot::kPrefix), robot.base_body};
 }

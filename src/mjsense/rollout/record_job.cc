@@ -68,6 +68,7 @@ std::string settings_of(const RecordJobCfg& job, Rollout& rollout) {
       json.key("depth").value(camera.depth);
       json.key("height").value(camera.height);
       json.key("name").value(camera.name);
+      if (camera.segmentation) json.key("segmentation").value(true);
       json.key("width").value(camera.width);
       json.end_object();
     }
@@ -248,8 +249,7 @@ class RecordJob {
                        : now.terminal ? "no success"
                                       : "horizon reached";
     const Policy* policy = rollout_.policy();
-    const std::string why =
-        gave_up && policy ? policy->failure(w) : std::string(now.lacks);
+    const std::string why = gave_up && policy ? policy->failure(w) : std::string(now.lacks);
     return why.empty() ? what : fmt::format("{}: {}", what, why);
   }
 

@@ -55,6 +55,7 @@ struct RolloutCfg {
   std::optional<std::vector<std::string>> cameras;
   std::optional<int> width, height;
   bool depth = false;
+  bool segmentation = false;
   int samples = 1;
   bool shadows = true;
   std::string meshes = "auto";  // one of kMeshes
@@ -100,6 +101,9 @@ void visit_fields(V& v, RolloutCfg& c) {
       .at_least(1)
       .decides_data_as("cameras");
   v("depth", c.depth, "Also the depth of every camera, losslessly.").decides_data_as("cameras");
+  v("segmentation", c.segmentation,
+    "Also what each pixel of every camera shows, losslessly: (id, mjtObj), of geoms mostly.")
+      .decides_data_as("cameras");
   v("samples", c.samples, "Rays a pixel of rgb: smooth edges for time.").at_least(1).decides_data();
   v("shadows", c.shadows, "Pictures have shadows.").decides_data();
   v("meshes", c.meshes,
