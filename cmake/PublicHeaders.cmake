@@ -84,7 +84,9 @@ set(MJSENSE_PUBLIC_HEADERS
   mjsense/scenes/layout.h
   mjsense/scenes/load_scene.h
   mjsense/scenes/look.h
+  mjsense/scenes/object_task.h
   mjsense/scenes/scene_file.h
+  mjsense/scenes/scene_task.h
   mjsense/sensors/builtin/builtin_sensor.h
   mjsense/sensors/camera/camera_sensor_cfg.h
   mjsense/sensors/contact/contact_match.h

@@ -6,41 +6,20 @@
 #include <cmath>
 #include <set>
 
+#include "mjsense/episode/testing/played_task.h"
 #include "mjsense/policies/planner/pick_loop.h"
-#include "mjsense/robots/load_robot.h"
 #include "mjsense/tasks/door_opening/door_opening.h"
 
 namespace mjsense {
 namespace {
 
-struct DataDelete {
-  void operator()(mjData* data) const { mj_deleteData(data); }
-};
-
-TaskCfg rby1() {
-  TaskCfg cfg;
-  cfg.robot = robot_cfg("rby1");
-  cfg.policy_dt_ms = cfg.robot.policy_dt_ms;
-  cfg.ctrl_dt_ms = cfg.robot.ctrl_dt_ms;
-  cfg.sim_dt_ms = cfg.robot.sim_dt_ms;
-  cfg.horizon = 400;
-  return cfg;
-}
-
-struct DoorPlan : testing::Test {
-  void SetUp() override { task.initialize(model, 1); }
-  void start(std::int64_t episode) {
-    mj_resetData(model, data.get());
-    task.sample(0, episode, state_row(data.get()));
-    mj_forward(model, data.get());
-    world = {.id = 0, .model = model, .data = data.get()};
-    task.begin(world);
+struct DoorPlan : testing::Test, PlayedTask<DoorOpeningTask> {
+  static TaskCfg cfg() {
+    TaskCfg cfg = task_cfg("rby1");
+    cfg.horizon = 400;
+    return cfg;
   }
-  DoorOpeningTask task{rby1()};
-  Scene scene{task.whole_scene_cfg()};
-  const mjModel* model = scene.model();
-  std::unique_ptr<mjData, DataDelete> data{mj_makeData(model)};
-  World world;
+  DoorPlan() : PlayedTask(cfg()) {}
 };
 
 // What DoorGeometry says of the handle is what MuJoCo makes of the joints.

@@ -55,7 +55,7 @@ bool NavPlanner::would_do(const World& world, const BasePose& there, const Pose&
                           double arrive) const {
   const auto [index, distance] = nav_->nearest(world, there.x, there.y);
   if (distance > arrive) return false;
-  const double* at = world.data->xpos + 3 * nav_->object(index).body;
+  const double* at = world.data->xpos + 3 * nav_->scene_object(index).body;
   if (std::abs(wrapped(std::atan2(at[1] - there.y, at[0] - there.x) - there.yaw)) > cfg_.facing)
     return false;
   for (const BasePose& tried : tried_[world.id]) {

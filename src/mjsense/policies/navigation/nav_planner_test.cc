@@ -4,17 +4,13 @@
 #include <gtest/gtest.h>
 
 #include "mjsense/core/error.h"
+#include "mjsense/episode/testing/played_task.h"
 #include "mjsense/policies/planner/pick_loop.h"
-#include "mjsense/robots/load_robot.h"
 #include "mjsense/tasks/nav_to_obj/nav_to_obj.h"
 #include "mjsense/tasks/pick/pick.h"
 
 namespace mjsense {
 namespace {
-
-struct DataDelete {
-  void operator()(mjData* data) const { mj_deleteData(data); }
-};
 
 TaskCfg of(const char* robot) {
   TaskCfg cfg;
@@ -23,16 +19,9 @@ TaskCfg of(const char* robot) {
   return cfg;
 }
 
-struct Driven {
-  explicit Driven(const char* robot) : task(of(robot)), scene(task.whole_scene_cfg()) {
-    data.reset(mj_makeData(scene.model()));
-    task.initialize(scene.model(), 1);
-    task.register_policy(planner);
-  }
-  NavToObjTask task;
-  Scene scene;
+struct Driven : PlayedTask<NavToObjTask> {
+  explicit Driven(const char* robot) : PlayedTask(of(robot)) { task.register_policy(planner); }
   NavPlanner planner;
-  std::unique_ptr<mjData, DataDelete> data;
 };
 
 TEST(NavPlanner, ArrivesWhereTheObjectIsSeenWithoutTouchingAnything) {

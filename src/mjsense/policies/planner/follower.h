@@ -12,7 +12,15 @@
 
 namespace mjsense {
 
-enum class PlanFailure { kNone, kUnplanned, kToolAway, kToolTurned, kDropped, kUnreachable, kAstray };
+enum class PlanFailure {
+  kNone,
+  kUnplanned,
+  kToolAway,
+  kToolTurned,
+  kDropped,
+  kUnreachable,
+  kAstray
+};
 template <>
 inline constexpr std::array<std::string_view, 7> kWords<PlanFailure>{
     "none", "unplanned", "tool_away", "tool_turned", "dropped", "unreachable", "astray"};

@@ -221,34 +221,24 @@ void write_fridge(RoomText& room, const KitchenStyle& style, double y0, double w
            {deep / 2 - 0.03, 0.004, (high - foot) / 2});
   room.box("", "plinth", {0.08, y, foot / 2}, {0.01, w / 2, foot / 2});
   const double length = 1.7 * style.bar_length;
-  room.open_body("fridge_0", {0, 0, 0});
-  leaf(room, style,
-       {.thing = "fridge_0",
-        .y0 = y0,
-        .wide = wide,
-        .z0 = split,
-        .z1 = high,
-        .hinge_at_y0 = hinge_at_y0,
-        .material = "fridge",
-        .handle_z = split + 0.08 + length / 2,
-        .handle_length = length,
-        .thick = thick});
-  room.close_body();
-  room.close_body();
-  room.open_body("freezer_0", {0, 0, 0});
-  leaf(room, style,
-       {.thing = "freezer_0",
-        .y0 = y0,
-        .wide = wide,
-        .z0 = foot,
-        .z1 = split,
-        .hinge_at_y0 = hinge_at_y0,
-        .material = "fridge",
-        .handle_z = split - 0.06 - style.bar_length / 2,
-        .handle_length = style.bar_length,
-        .thick = thick});
-  room.close_body();
-  room.close_body();
+  const auto door = [&](const char* thing, double z0, double z1, double handle_z, double bar) {
+    room.open_body(thing, {0, 0, 0});
+    leaf(room, style,
+         {.thing = thing,
+          .y0 = y0,
+          .wide = wide,
+          .z0 = z0,
+          .z1 = z1,
+          .hinge_at_y0 = hinge_at_y0,
+          .material = "fridge",
+          .handle_z = handle_z,
+          .handle_length = bar,
+          .thick = thick});
+    room.close_body();
+    room.close_body();
+  };
+  door("fridge_0", split, high, split + 0.08 + length / 2, length);
+  door("freezer_0", foot, split, split - 0.06 - style.bar_length / 2, style.bar_length);
 }
 
 void write_microwave(RoomText& room, const KitchenStyle& style, double middle) {

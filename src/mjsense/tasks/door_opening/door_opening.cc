@@ -11,7 +11,6 @@
 #include "mjsense/observe/frame.h"
 #include "mjsense/robots/finger_grasp.h"
 #include "mjsense/scene/resolve.h"
-#include "mjsense/scenes/load_scene.h"
 #include "mjsense/scenes/robot_floor.h"
 
 namespace mjsense {
@@ -20,6 +19,7 @@ namespace {
 using std::numbers::pi;
 
 constexpr std::string_view kScene = "room_with_door";
+constexpr const char* kHandle = "door handle";
 constexpr double kNear = 1.15, kFar = 1.9;  // m, from the leaf, of the start
 constexpr double kAside = 0.5;              // m, half width
 constexpr double kTurned = 0.35;            // rad, half width
@@ -27,26 +27,15 @@ constexpr int kStarts = 200;                // places to try
 
 }  // namespace
 
-DoorOpeningTask::DoorOpeningTask(TaskCfg cfg)
-    : Task(std::move(cfg)), scene_(task_scene(this->cfg(), kScene)) {}
-
-SceneCfg DoorOpeningTask::scene_cfg() const { return scene_.scene_cfg(robot_entity()); }
-
-void DoorOpeningTask::bind(const std::shared_ptr<Simulation>& simulation) {
-  simulation_ = simulation;
-  scene_.bind(*simulation);
-}
-
-std::string DoorOpeningTask::start_fault(const World& world) const { return scene_.fault(world); }
+DoorOpeningTask::DoorOpeningTask(TaskCfg cfg) : ObjectTask(std::move(cfg), kScene, kRole) {}
 
 void DoorOpeningTask::initialize_task() {
-  scene_.initialize(model(), num_worlds(), robot().prefix());
+  ObjectTask::initialize_task();
   doors_ = find_doors(model(), robot().prefix());
   if (doors_.empty())
     throw ValueError(fmt::format(
-        "task 'door_opening': scene '{}' has no door: no body higher than {} m on a hinge about "
-        "the vertical with a range",
-        scene_.cfg().name, Door::kLeastHeight));
+        "{} has no door: no body higher than {} m on a hinge about the vertical with a range",
+        place(), Door::kLeastHeight));
   const RestingRobot rest(model(), robot());
   sides_.clear();
   for (const Door& door : doors_)
@@ -62,8 +51,7 @@ void DoorOpeningTask::initialize_task() {
   }));
   if (driving_base(robot()) >= 0) routes_ = std::make_unique<BaseRoutes>(*floor_, *footprint_);
   episodes_.assign(num_worlds(), {});
-  for (Episode& episode : episodes_)
-    episode.handle = {std::string(kRole), doors_[0].handle, "door handle", true};
+  begin_with(doors_[0].handle, kHandle, true);
 }
 
 std::optional<Pose> DoorOpeningTask::sample_scene(int world, Rng& rng, const StateRow& state) {
@@ -71,11 +59,9 @@ std::optional<Pose> DoorOpeningTask::sample_scene(int world, Rng& rng, const Sta
   const auto number = static_cast<std::uint64_t>(this->episode(world));
   episode.door = static_cast<int>(rng.below(static_cast<std::uint32_t>(doors_.size())));
   const Door& door = doors_[episode.door];
-  episode.handle.body = door.handle;
-  const std::shared_ptr<Simulation> simulation = simulation_.lock();
-  if (scene_.vary_look(world, cfg().seed, number) && simulation)
-    simulation->worlds().model_changed();
-  const Pose placed = scene_.sample(world, -1, cfg().seed, number, rng, state);
+  set_object(world, door.handle, kHandle);
+  vary_look(world);
+  const Pose placed = scene().sample(world, -1, cfg().seed, number, rng, state);
   state.qpos[model()->jnt_qposadr[door.joint]] = door.shut;
 
   // Before the door, on one of its sides, facing it more or less.
@@ -97,18 +83,16 @@ std::optional<Pose> DoorOpeningTask::sample_scene(int world, Rng& rng, const Sta
 
 void DoorOpeningTask::choose_goal(int world, Rng& rng, const StateRow& state) {
   Episode& episode = episodes_[world];
-  scene_.adopt(world, state);
+  scene().adopt(world, state);
   episode.door = static_cast<int>(rng.below(static_cast<std::uint32_t>(doors_.size())));
-  episode.handle.body = door(world).handle;
+  set_object(world, door(world).handle, kHandle);
 }
 
 void DoorOpeningTask::begin(const World& world) {
-  Task::begin(world);
+  ObjectTask::begin(world);
   Episode& episode = episodes_[world.id];
-  const int body = episode.handle.body;
   const Side& side = sides_[episode.door];
   episode.push = dot(robot().base_pose(world).p - side.middle, side.way) < 0;
-  episode.start = {vec3(world.data->xpos + 3 * body), quat(world.data->xquat + 4 * body)};
 }
 
 Evaluation DoorOpeningTask::evaluate(const World& world) const {
@@ -123,14 +107,6 @@ std::string DoorOpeningTask::description(int world) const {
 Task::Referrals DoorOpeningTask::referrals(int /*world*/) const {
   return {
       {std::string(kRole), {{"door handle", 0.5}, {"handle of the door", 0.3}, {"handle", 0.2}}}};
-}
-
-Pose DoorOpeningTask::start_pose(int world, std::string_view role) const {
-  if (role != kRole) {
-    const std::vector<std::string> roles{std::string(kRole)};
-    throw_unknown("task 'door_opening'", "role", role, roles);
-  }
-  return episodes_[world].start;
 }
 
 void DoorOpeningTask::write_info(const World& world, JsonWriter& json) const {

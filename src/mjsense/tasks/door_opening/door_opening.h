@@ -5,14 +5,13 @@
 #include <string>
 #include <vector>
 
-#include "mjsense/episode/task.h"
 #include "mjsense/scenes/base_route.h"
 #include "mjsense/scenes/doors.h"
-#include "mjsense/scenes/episode_scene.h"
+#include "mjsense/scenes/object_task.h"
 
 namespace mjsense {
 
-class DoorOpeningTask final : public Task {
+class DoorOpeningTask final : public ObjectTask {
  public:
   static constexpr std::string_view kRole = "door_handle";
   static constexpr double kOpen = 0.67;  // fraction of the range
@@ -21,22 +20,12 @@ class DoorOpeningTask final : public Task {
   explicit DoorOpeningTask(TaskCfg cfg);
   std::string_view name() const override { return "door_opening"; }
   std::string_view type() const override { return "door_open"; }
-  SceneCfg scene_cfg() const override;
-  void bind(const std::shared_ptr<Simulation>& simulation) override;
-  std::string start_fault(const World& world) const override;
 
   void begin(const World& world) override;
   Evaluation evaluate(const World& world) const override;  // reward: 1 while it succeeds
 
-  std::span<const TaskObject> objects(int world) const override {
-    return {&episodes_[world].handle, 1};
-  }
   std::string description(int world) const override;  // "Push the door open"
   Referrals referrals(int world) const override;
-  Pose start_pose(int world, std::string_view role) const override;
-  std::optional<Pose> goal_pose(int /*world*/, std::string_view /*role*/) const override {
-    return {};
-  }
   // handle_grasped, joint_position (the fraction), success.
   void write_info(const World& world, JsonWriter& json) const override;
   std::vector<std::shared_ptr<Sensor>> create_task_sensors() const override;
@@ -69,11 +58,7 @@ class DoorOpeningTask final : public Task {
   struct Episode {
     int door = 0;
     bool push = true;
-    TaskObject handle;
-    Pose start;
   };
-  EpisodeScene scene_;
-  std::weak_ptr<Simulation> simulation_;
   std::vector<Door> doors_;
   std::vector<Side> sides_;  // of each door
   std::unique_ptr<Occupancy> floor_, open_floor_;

@@ -8,7 +8,7 @@
 #include <nlohmann/json.hpp>
 
 #include "mjsense/core/error.h"
-#include "mjsense/robots/load_robot.h"
+#include "mjsense/episode/testing/played_task.h"
 #include "mjsense/scene/resolve.h"
 
 namespace mjsense {
@@ -16,34 +16,9 @@ namespace {
 
 using testing::HasSubstr;
 
-struct DataDelete {
-  void operator()(mjData* data) const { mj_deleteData(data); }
-};
-
-TaskCfg rby1(const std::string& scene) {
-  TaskCfg cfg;
-  cfg.robot = robot_cfg("rby1");
-  cfg.policy_dt_ms = cfg.robot.policy_dt_ms;
-  cfg.ctrl_dt_ms = cfg.robot.ctrl_dt_ms;
-  cfg.sim_dt_ms = cfg.robot.sim_dt_ms;
-  cfg.scene = scene;
-  return cfg;
-}
-
-struct Played {
+struct Played : PlayedTask<DoorOpeningTask> {
   explicit Played(const std::string& scene = "room_with_door")
-      : task(rby1(scene)), scene_(task.whole_scene_cfg()) {
-    model = scene_.model();
-    data.reset(mj_makeData(model));
-    task.initialize(model, 2);
-  }
-  void start(std::int64_t episode) {
-    mj_resetData(model, data.get());
-    task.sample(0, episode, state_row(data.get()));
-    mj_forward(model, data.get());
-    world = {.id = 0, .model = model, .data = data.get()};
-    task.begin(world);
-  }
+      : PlayedTask(task_cfg("rby1", scene), 2) {}
   double& position() { return data->qpos[model->jnt_qposadr[task.door(0).joint]]; }
   // Torques about hinge (towards open) and lever (down) for so long.
   void turn(double hinge, double lever, double seconds) {
@@ -56,11 +31,6 @@ struct Played {
     }
     mj_forward(model, data.get());
   }
-  DoorOpeningTask task;
-  Scene scene_;
-  const mjModel* model;
-  std::unique_ptr<mjData, DataDelete> data;
-  World world;
 };
 
 TEST(DoorOpening, ALatchHoldsUntilTheLeverIsPressed) {
@@ -90,6 +60,7 @@ TEST(DoorOpening, SuccessIsTheFractionNowWhicheverWayTheHingeTurns) {
       EXPECT_NEAR(p.task.fraction(p.world), part, 1e-12);
       const Evaluation e = p.task.evaluate(p.world);
       EXPECT_EQ(e.success, success) << part << ": not latched";
+      EXPECT_EQ(e.lacks, success ? "" : "the door is not open far enough");
       EXPECT_EQ(e.reward, success ? 1 : 0);
     }
   }
@@ -147,7 +118,7 @@ TEST(DoorOpening, TheStateOfTheDoorIsThatOfNow) {
 }
 
 TEST(DoorOpening, ASceneWithoutADoorIsRefused) {
-  DoorOpeningTask task(rby1("table"));
+  DoorOpeningTask task(task_cfg("rby1", "table"));
   Scene scene(task.whole_scene_cfg());
   try {
     task.initialize(scene.model(), 1);

@@ -10,7 +10,6 @@
 #include "mjsense/core/error.h"
 #include "mjsense/episode/object_sensors.h"
 #include "mjsense/scene/resolve.h"
-#include "mjsense/scenes/load_scene.h"
 #include "mjsense/scenes/object_texts.h"
 #include "mjsense/scenes/robot_floor.h"
 
@@ -28,17 +27,7 @@ constexpr int kStarts = 30;        // places to try
 
 }  // namespace
 
-NavToObjTask::NavToObjTask(TaskCfg cfg)
-    : Task(std::move(cfg)), scene_(task_scene(this->cfg(), kScene)) {}
-
-SceneCfg NavToObjTask::scene_cfg() const { return scene_.scene_cfg(robot_entity()); }
-
-void NavToObjTask::bind(const std::shared_ptr<Simulation>& simulation) {
-  simulation_ = simulation;
-  scene_.bind(*simulation);
-}
-
-std::string NavToObjTask::start_fault(const World& world) const { return scene_.fault(world); }
+NavToObjTask::NavToObjTask(TaskCfg cfg) : ObjectTask(std::move(cfg), kScene, kRole) {}
 
 // The robot's head camera, else the first that it records.
 void NavToObjTask::find_camera() {
@@ -57,15 +46,13 @@ void NavToObjTask::find_camera() {
 }
 
 void NavToObjTask::initialize_task() {
-  scene_.initialize(model(), num_worlds(), robot().prefix());
-  if (scene_.objects().empty())
-    throw ValueError(
-        fmt::format("task 'nav_to_obj': scene '{}' has nothing to drive to: no body with a free "
-                    "joint that a hand can hold",
-                    scene_.cfg().name));
+  ObjectTask::initialize_task();
+  if (scene().objects().empty())
+    throw ValueError(fmt::format(
+        "{} has nothing to drive to: no body with a free joint that a hand can hold", place()));
   find_camera();
   points_.clear();
-  for (const SceneObject& object : scene_.objects())
+  for (const SceneObject& object : scene().objects())
     points_.push_back(sight_points(object.shape, kPoints));
   places_.clear();
   routes_.reset();
@@ -81,41 +68,35 @@ void NavToObjTask::initialize_task() {
       }
     }
   }
-  episodes_.assign(num_worlds(), {});
-  for (Episode& episode : episodes_) {
-    episode.candidates.assign(1, 0);
-    episode.candidates.reserve(scene_.objects().size());
-    episode.object = {std::string(kRole), scene_.objects()[0].body, scene_.objects()[0].text};
-  }
+  candidates_.assign(num_worlds(), {0});
+  for (std::vector<int>& candidates : candidates_) candidates.reserve(scene().objects().size());
+  begin_with(scene().objects()[0].body, scene().objects()[0].text);
 }
 
 void NavToObjTask::set_goal(int world, int target) {
-  Episode& episode = episodes_[world];
-  const auto& all = scene_.objects();
-  episode.candidates.assign(1, target);
+  const auto& all = scene().objects();
+  candidates_[world].assign(1, target);
   for (int i = 0; i < static_cast<int>(all.size()); ++i) {
-    if (i != target && scene_.present(world, i) && all[i].text == all[target].text)
-      episode.candidates.push_back(i);
+    if (i != target && scene().present(world, i) && all[i].text == all[target].text)
+      candidates_[world].push_back(i);
   }
-  episode.object = {std::string(kRole), all[target].body, all[target].text};
+  set_object(world, all[target].body, all[target].text);
 }
 
 void NavToObjTask::choose_goal(int world, Rng& rng, const StateRow& state) {
-  const std::vector<int> here = scene_.adopt(world, state);
+  const std::vector<int> here = scene().adopt(world, state);
   if (!here.empty()) set_goal(world, here[rng.below(static_cast<std::uint32_t>(here.size()))]);
 }
 
 std::optional<Pose> NavToObjTask::sample_scene(int world, Rng& rng, const StateRow& state) {
   const auto number = static_cast<std::uint64_t>(this->episode(world));
-  const int n = static_cast<int>(scene_.objects().size());
-  const std::shared_ptr<Simulation> simulation = simulation_.lock();
-  if (scene_.vary_look(world, cfg().seed, number) && simulation)
-    simulation->worlds().model_changed();
+  const int n = static_cast<int>(scene().objects().size());
+  vary_look(world);
   const int first = static_cast<int>(rng.below(static_cast<std::uint32_t>(n)));
   Pose placed;
   for (int k = 0; k < n; ++k) {  // another one, where the robot cannot come near the first
     const int target = (first + k) % n;
-    placed = scene_.sample(world, target, cfg().seed, number, rng, state);
+    placed = scene().sample(world, target, cfg().seed, number, rng, state);
     set_goal(world, target);
     if (!routes_) return placed;
     if (const std::optional<Pose> start = start_place(world, placed, state, rng)) return start;
@@ -129,7 +110,8 @@ std::optional<Pose> NavToObjTask::start_place(int world, const Pose& placed, con
   const auto distance = [&](double x, double y) {
     double least = 1e10;
     for (int i : candidates(world)) {
-      const double* at = state.qpos + model()->jnt_qposadr[model()->body_jntadr[object(i).body]];
+      const double* at =
+          state.qpos + model()->jnt_qposadr[model()->body_jntadr[scene_object(i).body]];
       least = std::min(least, std::hypot(x - at[0], y - at[1]));
     }
     return least;
@@ -147,17 +129,10 @@ std::optional<Pose> NavToObjTask::start_place(int world, const Pose& placed, con
   return {};
 }
 
-void NavToObjTask::begin(const World& world) {
-  Task::begin(world);
-  Episode& episode = episodes_[world.id];
-  const int body = episode.object.body;
-  episode.start = {vec3(world.data->xpos + 3 * body), quat(world.data->xquat + 4 * body)};
-}
-
 std::pair<int, double> NavToObjTask::nearest(const World& world, double x, double y) const {
   std::pair<int, double> best{-1, 1e10};
   for (int i : candidates(world.id)) {
-    const double* at = world.data->xpos + 3 * object(i).body;
+    const double* at = world.data->xpos + 3 * scene_object(i).body;
     const double d = std::hypot(at[0] - x, at[1] - y);
     if (d < best.second) best = {i, d};
   }
@@ -165,7 +140,7 @@ std::pair<int, double> NavToObjTask::nearest(const World& world, double x, doubl
 }
 
 bool NavToObjTask::sees(const World& world, const Pose& camera, int index) const {
-  return sight_.sees(world.model, world.data, camera, object(index).body, points_[index]);
+  return sight_.sees(world.model, world.data, camera, scene_object(index).body, points_[index]);
 }
 
 NavToObjTask::Judgement NavToObjTask::judgement(const World& world) const {
@@ -180,28 +155,20 @@ NavToObjTask::Judgement NavToObjTask::judgement(const World& world) const {
 Evaluation NavToObjTask::evaluate(const World& world) const {
   const Judgement now = judgement(world);
   return judge_by(world.id, now.reward,
-               now.reward > 0            ? ""
-               : now.distance < kReach ? "the camera does not see the object"
-                                       : "the object is too far away");
+                  now.reward > 0          ? ""
+                  : now.distance < kReach ? "the camera does not see the object"
+                                          : "the object is too far away");
 }
 
 std::string NavToObjTask::description(int world) const {
-  const auto& candidates = episodes_[world].candidates;
-  const std::string& text = episodes_[world].object.name;
+  const auto& candidates = candidates_[world];
+  const std::string& text = object(world).name;
   if (candidates.size() == 1) return "Navigate to the " + text;
   return fmt::format("Navigate to any {} ({} available)", text, candidates.size());
 }
 
 Task::Referrals NavToObjTask::referrals(int world) const {
-  return {{"object_name", referrals_of(object(candidates(world)[0]))}};
-}
-
-Pose NavToObjTask::start_pose(int world, std::string_view role) const {
-  if (role != kRole) {
-    const std::vector<std::string> roles{std::string(kRole)};
-    throw_unknown("task 'nav_to_obj'", "role", role, roles);
-  }
-  return episodes_[world].start;
+  return {{"object_name", referrals_of(scene_object(candidates(world)[0]))}};
 }
 
 void NavToObjTask::write_info(const World& world, JsonWriter& json) const {
@@ -212,20 +179,18 @@ void NavToObjTask::write_info(const World& world, JsonWriter& json) const {
 
 std::vector<std::shared_ptr<Sensor>> NavToObjTask::create_task_sensors() const {
   std::vector<NamedBody> bodies;
-  for (int i = 0; i < static_cast<int>(scene_.objects().size()); ++i) {
-    const int body = scene_.objects()[i].body;
+  for (int i = 0; i < static_cast<int>(scene().objects().size()); ++i) {
+    const int body = scene().objects()[i].body;
     bodies.push_back({mjsense::name_of(model(), mjOBJ_BODY, body), [this, i, body](int world) {
-                        return std::ranges::find(episodes_[world].candidates, i) !=
-                                       episodes_[world].candidates.end()
-                                   ? body
-                                   : -1;
+                        const auto& of = candidates_[world];
+                        return std::ranges::find(of, i) != of.end() ? body : -1;
                       }});
   }
   return {body_poses_sensor(*this, "pickup_obj_pose", std::move(bodies))};
 }
 
 std::vector<std::pair<std::string, std::string>> NavToObjTask::scene_info(int world) const {
-  return {{"text", description(world)}, {"object_name", episodes_[world].object.name}};
+  return {{"text", description(world)}, {"object_name", object(world).name}};
 }
 
 }  // namespace mjsense

@@ -6,14 +6,13 @@
 #include <string>
 #include <vector>
 
-#include "mjsense/episode/task.h"
 #include "mjsense/scenes/base_route.h"
-#include "mjsense/scenes/episode_scene.h"
+#include "mjsense/scenes/object_task.h"
 #include "mjsense/tasks/nav_to_obj/sight.h"
 
 namespace mjsense {
 
-class NavToObjTask final : public Task {
+class NavToObjTask final : public ObjectTask {
  public:
   static constexpr std::string_view kRole = "pickup_obj";
   static constexpr double kReach = 1.5;  // m, of reward
@@ -22,30 +21,19 @@ class NavToObjTask final : public Task {
   explicit NavToObjTask(TaskCfg cfg);
   std::string_view name() const override { return "nav_to_obj"; }
   std::string_view type() const override { return "nav_to_obj"; }
-  SceneCfg scene_cfg() const override;
-  void bind(const std::shared_ptr<Simulation>& simulation) override;
-  std::string start_fault(const World& world) const override;
 
-  void begin(const World& world) override;
   // Reward: 1 - d / 1.5 m of the nearest candidate if the camera sees it, else 0; success: reward > 0.
   Evaluation evaluate(const World& world) const override;
 
-  std::span<const TaskObject> objects(int world) const override {
-    return {&episodes_[world].object, 1};
-  }
   std::string description(int world) const override;
   Referrals referrals(int world) const override;
-  Pose start_pose(int world, std::string_view role) const override;
-  std::optional<Pose> goal_pose(int /*world*/, std::string_view /*role*/) const override {
-    return {};
-  }
   // position_error (m, on the floor, to the nearest candidate), success.
   void write_info(const World& world, JsonWriter& json) const override;
   std::vector<std::shared_ptr<Sensor>> create_task_sensors() const override;
 
   // For those who plan: indices of the objects of the kind in this world, and what they are.
-  std::span<const int> candidates(int world) const { return episodes_[world].candidates; }
-  const SceneObject& object(int index) const { return scene_.objects()[index]; }
+  std::span<const int> candidates(int world) const { return candidates_[world]; }
+  const SceneObject& scene_object(int index) const { return scene().objects()[index]; }
   // Index of the candidate nearest to a place on the floor, and how far (m) it is.
   std::pair<int, double> nearest(const World& world, double x, double y) const;
   // Whether the camera would see the object from there, X_WC.
@@ -60,11 +48,6 @@ class NavToObjTask final : public Task {
   std::vector<std::pair<std::string, std::string>> scene_info(int world) const override;
 
  private:
-  struct Episode {
-    std::vector<int> candidates;  // indices of objects; the target first
-    TaskObject object;
-    Pose start;
-  };
   struct Judgement {
     double distance = 0, reward = 0;
   };
@@ -74,13 +57,11 @@ class NavToObjTask final : public Task {
   std::optional<Pose> start_place(int world, const Pose& placed, const StateRow& state,
                                   Rng& rng) const;
 
-  EpisodeScene scene_;
-  std::weak_ptr<Simulation> simulation_;
   Sight sight_;
   std::vector<std::vector<Vec3>> points_;          // of each object, to look at
   std::unique_ptr<BaseRoutes> routes_;             // null: the base does not drive
   std::vector<std::pair<double, double>> places_;  // of the floor, where the robot may start
-  std::vector<Episode> episodes_;                  // [B]
+  std::vector<std::vector<int>> candidates_;       // [B]; the target first
 };
 
 }  // namespace mjsense

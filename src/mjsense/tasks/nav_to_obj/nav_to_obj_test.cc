@@ -7,29 +7,13 @@
 #include <cmath>
 #include <set>
 
-#include "mjsense/robots/load_robot.h"
+#include "mjsense/episode/testing/played_task.h"
 
 namespace mjsense {
 namespace {
 
-struct DataDelete {
-  void operator()(mjData* data) const { mj_deleteData(data); }
-};
-
-struct Nav : testing::Test {
-  static TaskCfg cfg() {
-    TaskCfg cfg;
-    cfg.robot = robot_cfg("rby1");
-    return cfg;
-  }
-  void SetUp() override { task.initialize(model, 2); }
-  void start(std::int64_t episode) {
-    mj_resetData(model, data.get());
-    task.sample(0, episode, state_row(data.get()));
-    mj_forward(model, data.get());
-    world = {.id = 0, .model = model, .data = data.get()};
-    task.begin(world);
-  }
+struct Nav : testing::Test, PlayedTask<NavToObjTask> {
+  Nav() : PlayedTask(task_cfg("rby1"), 2) {}
   // The robot at a distance from its target, facing it or away.
   void stand(double distance, double turned) {
     const double* at = data->xpos + 3 * task.objects(0)[0].body;
@@ -50,12 +34,6 @@ struct Nav : testing::Test {
     }
     FAIL() << "no place";
   }
-
-  NavToObjTask task{cfg()};
-  Scene scene{task.whole_scene_cfg()};
-  const mjModel* model = scene.model();
-  std::unique_ptr<mjData, DataDelete> data{mj_makeData(model)};
-  World world;
 };
 
 TEST_F(Nav, RewardFallsWithTheDistanceOfWhatIsSeen) {
@@ -63,14 +41,16 @@ TEST_F(Nav, RewardFallsWithTheDistanceOfWhatIsSeen) {
   for (int episode = 0; episode < 8 && tested < 3; ++episode) {
     start(episode);
     if (task.candidates(0).size() > 1) continue;
-    EXPECT_FALSE(task.evaluate(world).success) << "starts are far away";
+    EXPECT_EQ(task.evaluate(world).lacks, "the object is too far away");
     stand(1.25, 0);
     if (HasFatalFailure()) return;
     const Evaluation e = task.evaluate(world);
     EXPECT_NEAR(e.reward, 1 - 1.25 / 1.5, 1e-6);
     EXPECT_TRUE(e.success);
+    EXPECT_EQ(e.lacks, "");
     stand(1.25, 3.14159265);
     EXPECT_EQ(task.evaluate(world).reward, 0) << "behind its back";
+    EXPECT_EQ(task.evaluate(world).lacks, "the camera does not see the object");
     ++tested;
   }
   EXPECT_EQ(tested, 3);
@@ -80,7 +60,7 @@ TEST_F(Nav, WhatStandsBehindSomethingIsNotSeen) {
   start(0);
   stand(1.2, 0);
   const int index = task.candidates(0)[0];
-  const int body = task.object(index).body;
+  const int body = task.scene_object(index).body;
   double* qpos = data->qpos + model->jnt_qposadr[model->body_jntadr[body]];
   const Pose camera = task.camera_pose(world);
   ASSERT_TRUE(task.sees(world, camera, index));
@@ -101,10 +81,10 @@ TEST_F(Nav, CandidatesAreOfOneKindAndAllThatAreThere) {
   for (int episode = 0; episode < 40; ++episode) {
     start(episode);
     const auto candidates = task.candidates(0);
-    const std::string& text = task.object(candidates[0]).text;
+    const std::string& text = task.scene_object(candidates[0]).text;
     for (int i : candidates) {
-      EXPECT_EQ(task.object(i).text, text);
-      EXPECT_LT(std::abs(data->xpos[3 * task.object(i).body]), 50) << "is there";
+      EXPECT_EQ(task.scene_object(i).text, text);
+      EXPECT_LT(std::abs(data->xpos[3 * task.scene_object(i).body]), 50) << "is there";
     }
     counts.insert(candidates.size());
     EXPECT_EQ(task.description(0), candidates.size() == 1
@@ -115,7 +95,7 @@ TEST_F(Nav, CandidatesAreOfOneKindAndAllThatAreThere) {
     const auto [nearest, distance] = task.nearest(world, base.p.x, base.p.y);
     double least = 1e10;
     for (int i : candidates) {
-      const double* at = data->xpos + 3 * task.object(i).body;
+      const double* at = data->xpos + 3 * task.scene_object(i).body;
       least = std::min(least, std::hypot(at[0] - base.p.x, at[1] - base.p.y));
     }
     EXPECT_EQ(distance, least);

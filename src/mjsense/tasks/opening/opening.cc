@@ -8,7 +8,6 @@
 #include <numbers>
 
 #include "mjsense/core/error.h"
-#include "mjsense/scenes/load_scene.h"
 
 namespace mjsense {
 namespace {
@@ -24,27 +23,18 @@ constexpr int kTries = 12;                      // grasps tried from it
 }  // namespace
 
 OpeningTask::OpeningTask(TaskCfg cfg, OpeningKind kind)
-    : Task(std::move(cfg)), kind_(kind), scene_(task_scene(this->cfg(), kScene)) {}
-
-SceneCfg OpeningTask::scene_cfg() const { return scene_.scene_cfg(robot_entity()); }
-
-void OpeningTask::bind(const std::shared_ptr<Simulation>& simulation) {
-  simulation_ = simulation;
-  scene_.bind(*simulation);
-}
+    : ObjectTask(std::move(cfg), kScene, kRole), kind_(kind) {}
 
 void OpeningTask::initialize_task() {
-  scene_.initialize(model(), num_worlds(), robot_entity() + "/");
+  ObjectTask::initialize_task();
   articulations_ = find_articulations(model(), robot_entity() + "/");
   if (articulations_.empty())
     throw ValueError(fmt::format(
-        "task '{}': scene '{}' has nothing that opens: no hinge or slide with a range and a handle",
-        name(), scene_.cfg().name));
+        "{} has nothing that opens: no hinge or slide with a range and a handle", place()));
   reach_ = std::make_unique<HandleReach>(model(), robot());
   bases_ = std::make_unique<BaseSearch>(model(), robot(), *reach_);
   targets_.assign(num_worlds(), {});
-  for (Target& target : targets_)
-    target.object = {std::string(kRole), articulations_[0].body, articulations_[0].text};
+  begin_with(articulations_[0].body, articulations_[0].text);
 }
 
 double OpeningTask::aim(const Articulation& one) const {
@@ -75,10 +65,8 @@ std::optional<Pose> OpeningTask::find_base(const Articulation& one, double from,
 
 std::optional<Pose> OpeningTask::sample_scene(int world, Rng& rng, const StateRow& state) {
   const auto episode = static_cast<std::uint64_t>(this->episode(world));
-  const std::shared_ptr<Simulation> simulation = simulation_.lock();
-  if (scene_.vary_look(world, cfg().seed, episode) && simulation)
-    simulation->worlds().model_changed();
-  const Pose usual = scene_.sample(world, -1, cfg().seed, episode, rng, state);
+  vary_look(world);
+  const Pose usual = scene().sample(world, -1, cfg().seed, episode, rng, state);
   for (const Articulation& one : articulations_) state.qpos[one.qpos] = one.closed;
 
   // Categories are equally likely, and so are the things of one. A target that cannot be reached
@@ -112,7 +100,7 @@ std::optional<Pose> OpeningTask::sample_scene(int world, Rng& rng, const StateRo
     if (!base && index != order.back()) continue;
     target.index = index;
     target.reached = base.has_value();
-    target.object = {std::string(kRole), one.body, one.text};
+    set_object(world, one.body, one.text);
     state.qpos[one.qpos] = from;
     state.qvel[one.dof] = 0;
     break;
@@ -121,25 +109,24 @@ std::optional<Pose> OpeningTask::sample_scene(int world, Rng& rng, const StateRo
 }
 
 void OpeningTask::begin(const World& world) {
-  Task::begin(world);
+  ObjectTask::begin(world);
   Target& target = targets_[world.id];
   const Articulation& one = articulations_[target.index];
-  target.start = {vec3(world.data->xpos + 3 * one.body), quat(world.data->xquat + 4 * one.body)};
   const double wanted = kind_ == OpeningKind::kOpen ? one.at(kOpened) : one.at(1 - kClosed);
   target.goal =
       one.motion(world.data->qpos[one.qpos], wanted, vec3(world.data->xaxis + 3 * one.joint),
                  vec3(world.data->xanchor + 3 * one.joint)) *
-      target.start;
+      start(world.id);
 }
 
 std::string OpeningTask::start_fault(const World& world) const {
-  const std::string fault = scene_.fault(world);
+  const std::string fault = scene().fault(world);
   if (!fault.empty()) return fault;
   const Target& target = targets_[world.id];
   if (target.reached) return "";
   return fmt::format(
       "task '{}': robot '{}' reaches no handle in scene '{}' from anywhere; last tried '{}'",
-      name(), robot().name(), scene_.cfg().name, articulations_[target.index].name);
+      name(), robot().name(), scene().cfg().name, articulations_[target.index].name);
 }
 
 double OpeningTask::reward(const World& world) const {
@@ -160,26 +147,18 @@ bool OpeningTask::succeeded(double reward) const {
 Evaluation OpeningTask::evaluate(const World& world) const {
   const double reward = this->reward(world);
   return judge_by(world.id, reward,
-               succeeded(reward)               ? ""
-               : kind_ == OpeningKind::kOpen ? "it is not open far enough"
-                                             : "it is not closed far enough");
+                  succeeded(reward)             ? ""
+                  : kind_ == OpeningKind::kOpen ? "it is not open far enough"
+                                                : "it is not closed far enough");
 }
 
 std::string OpeningTask::description(int world) const {
   return fmt::format("{} the {}", kind_ == OpeningKind::kOpen ? "Open" : "Close",
-                     targets_[world].object.name);
+                     object(world).name);
 }
 
 Task::Referrals OpeningTask::referrals(int world) const {
-  return {{std::string(kRole), {{targets_[world].object.name, 1.0}}}};
-}
-
-Pose OpeningTask::start_pose(int world, std::string_view role) const {
-  if (role != kRole) {
-    const std::vector<std::string> roles{std::string(kRole)};
-    throw_unknown(fmt::format("task '{}'", name()), "role", role, roles);
-  }
-  return targets_[world].start;
+  return {{std::string(kRole), {{object(world).name, 1.0}}}};
 }
 
 std::optional<Pose> OpeningTask::goal_pose(int world, std::string_view role) const {

@@ -6,8 +6,7 @@
 #include <string>
 #include <vector>
 
-#include "mjsense/episode/task.h"
-#include "mjsense/scenes/episode_scene.h"
+#include "mjsense/scenes/object_task.h"
 #include "mjsense/tasks/opening/articulation.h"
 #include "mjsense/tasks/opening/base_search.h"
 #include "mjsense/tasks/opening/reach.h"
@@ -16,7 +15,7 @@ namespace mjsense {
 
 enum class OpeningKind { kOpen, kClose };
 
-class OpeningTask final : public Task {
+class OpeningTask final : public ObjectTask {
  public:
   static constexpr std::string_view kRole = "pickup_obj";
   // Fractions of the range; success, and where a close begins.
@@ -27,8 +26,6 @@ class OpeningTask final : public Task {
   OpeningTask(TaskCfg cfg, OpeningKind kind);
   std::string_view name() const override { return type(); }
   std::string_view type() const override { return kind_ == OpeningKind::kOpen ? "open" : "close"; }
-  SceneCfg scene_cfg() const override;
-  void bind(const std::shared_ptr<Simulation>& simulation) override;
   // An object inside something, or a target that the robot reaches from nowhere.
   std::string start_fault(const World& world) const override;
 
@@ -37,12 +34,8 @@ class OpeningTask final : public Task {
   // |q| / range of the target. Success: it is at least 0.15, 0.85.
   Evaluation evaluate(const World& world) const override;
 
-  std::span<const TaskObject> objects(int world) const override {
-    return {&targets_[world].object, 1};
-  }
   std::string description(int world) const override;  // "Open the drawer"
   Referrals referrals(int world) const override;
-  Pose start_pose(int world, std::string_view role) const override;
   // The body where the joint is as far as counts.
   std::optional<Pose> goal_pose(int world, std::string_view role) const override;
   // episode_step, joint_position (rad or m, of the first thing of the category), success.
@@ -65,8 +58,7 @@ class OpeningTask final : public Task {
   struct Target {
     int index = 0;
     bool reached = true;
-    TaskObject object;
-    Pose start, goal;
+    Pose goal;
   };
   double reward(const World& world) const;
   bool succeeded(double reward) const;
@@ -74,8 +66,6 @@ class OpeningTask final : public Task {
                                 const HandleReach::Start& start) const;
 
   OpeningKind kind_;
-  EpisodeScene scene_;
-  std::weak_ptr<Simulation> simulation_;
   std::vector<Articulation> articulations_;
   std::unique_ptr<HandleReach> reach_;
   std::unique_ptr<BaseSearch> bases_;

@@ -224,7 +224,7 @@ TEST(Opening, OpenCountsEveryThingOfTheKind) {
     stage.data->qpos[one.qpos] = one.at(0.149);
     const bool counts = one.category == target.category;
     EXPECT_NEAR(stage.task.evaluate(w).reward, counts ? 0.149 : 0, 1e-12) << one.name;
-    EXPECT_FALSE(stage.task.evaluate(w).success);
+    EXPECT_EQ(stage.task.evaluate(w).lacks, "it is not open far enough");
     stage.data->qpos[one.qpos] = one.at(0.1501);
     EXPECT_EQ(stage.task.evaluate(w).success, counts) << one.name;
     EXPECT_EQ(stage.info(w)["success"], counts);
@@ -250,7 +250,7 @@ TEST(Opening, CloseCountsTheTargetAlone) {
     EXPECT_NEAR(stage.task.evaluate(w).reward, 0.851, 1e-12);
     EXPECT_TRUE(stage.task.evaluate(w).success);
     stage.data->qpos[target.qpos] = target.at(0.151);
-    EXPECT_FALSE(stage.task.evaluate(w).success);
+    EXPECT_EQ(stage.task.evaluate(w).lacks, "it is not closed far enough");
     EXPECT_THAT(stage.task.description(1), HasSubstr("Close the " + target.text));
     // Where it counts as closed is where obj_end says.
     stage.data->qpos[target.qpos] = target.at(0.15);

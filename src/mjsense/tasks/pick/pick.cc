@@ -8,7 +8,6 @@
 #include <numbers>
 
 #include "mjsense/core/error.h"
-#include "mjsense/scenes/load_scene.h"
 #include "mjsense/scenes/object_texts.h"
 
 namespace mjsense {
@@ -22,62 +21,44 @@ constexpr double kGoal = 0.05;  // m, goal above the start
 
 }  // namespace
 
-PickTask::PickTask(TaskCfg cfg) : Task(std::move(cfg)), scene_(task_scene(this->cfg(), kScene)) {}
-
-SceneCfg PickTask::scene_cfg() const { return scene_.scene_cfg(robot_entity()); }
-
-void PickTask::bind(const std::shared_ptr<Simulation>& simulation) {
-  simulation_ = simulation;
-  scene_.bind(*simulation);
-}
+PickTask::PickTask(TaskCfg cfg) : ObjectTask(std::move(cfg), kScene, kRole) {}
 
 void PickTask::initialize_task() {
-  scene_.initialize(model(), num_worlds(), robot_entity() + "/");
-  things_ = scene_.things();
+  ObjectTask::initialize_task();
+  things_ = scene().things();
   if (things_.empty())
     throw ValueError(fmt::format(
-        "task 'pick': scene '{}' has nothing to pick up: no body with a free joint that a hand can "
-        "hold",
-        scene_.cfg().name));
+        "{} has nothing to pick up: no body with a free joint that a hand can hold", place()));
   objects_.clear();
-  for (const SceneObject& object : scene_.objects())
+  for (const SceneObject& object : scene().objects())
     objects_.push_back({object.body, object.kind, object.shape});
-  targets_.assign(num_worlds(), {});
-  for (Target& target : targets_) {
-    target.object = {std::string(kRole), objects_[0].body, scene_.objects()[0].text};
-  }
-  standing_ = Standing(model(), robot(), scene_);
+  targets_.assign(num_worlds(), 0);
+  begin_with(objects_[0].body, scene().objects()[0].text);
+  standing_ = Standing(model(), robot(), scene());
   robot_root_ = model()->body_rootid[robot().base_body()];
 }
 
 std::optional<Pose> PickTask::sample_scene(int world, Rng& rng, const StateRow& state) {
   const auto episode = static_cast<std::uint64_t>(this->episode(world));
   const int target = things_[rng.below(static_cast<std::uint32_t>(things_.size()))];
-  const SceneObject& object = scene_.objects()[target];
-  targets_[world].index = target;
-  targets_[world].object = {std::string(kRole), object.body, object.text};
-  const std::shared_ptr<Simulation> simulation = simulation_.lock();
-  if (scene_.vary_look(world, cfg().seed, episode) && simulation)
-    simulation->worlds().model_changed();
-  return standing_(scene_.sample(world, target, cfg().seed, episode, rng, state));
+  set_target(world, target);
+  vary_look(world);
+  return standing_(scene().sample(world, target, cfg().seed, episode, rng, state));
 }
 
 void PickTask::choose_goal(int world, Rng& rng, const StateRow& state) {
-  std::vector<int> here = scene_.adopt(world, state);
-  std::erase_if(here, [this](int i) { return scene_.objects()[i].receptacle; });
+  std::vector<int> here = scene().adopt(world, state);
+  std::erase_if(here, [this](int i) { return scene().objects()[i].receptacle; });
   if (here.empty()) here = things_;
   const int target = here[rng.below(static_cast<std::uint32_t>(here.size()))];
-  const SceneObject& object = scene_.objects()[target];
-  targets_[world].index = target;
-  targets_[world].object = {std::string(kRole), object.body, object.text};
-  scene_.set_target(world, target, state);
+  set_target(world, target);
+  scene().set_target(world, target, state);
 }
 
-void PickTask::begin(const World& world) {
-  Task::begin(world);
-  Target& target = targets_[world.id];
-  const int body = target.object.body;
-  target.start = {vec3(world.data->xpos + 3 * body), quat(world.data->xquat + 4 * body)};
+void PickTask::set_target(int world, int target) {
+  const SceneObject& object = scene().objects()[target];
+  targets_[world] = target;
+  set_object(world, object.body, object.text);
 }
 
 // True if the first contact that bears the object from below is not the robot's: its point below
@@ -110,9 +91,9 @@ bool PickTask::borne_by_others(const World& world, int body) const {
 
 // "" where the robot, and nothing else, holds the object in the air.
 std::string_view PickTask::lacks(const World& world) const {
-  const Target& target = targets_[world.id];
-  const int body = target.object.body;
-  if (world.data->xpos[3 * body + 2] - target.start.p.z < kLift) return "the object is not lifted";
+  const int body = object(world.id).body;
+  if (world.data->xpos[3 * body + 2] - start(world.id).p.z < kLift)
+    return "the object is not lifted";
   bool held = false;
   for (int i = 0; i < world.data->ncon; ++i) {
     const mjContact& contact = world.data->contact[i];
@@ -129,27 +110,16 @@ std::string_view PickTask::lacks(const World& world) const {
 }
 
 Evaluation PickTask::evaluate(const World& world) const {
-  const Target& target = targets_[world.id];
-  const int body = target.object.body;
-  const double height = world.data->xpos[3 * body + 2] - target.start.p.z;
+  const int body = object(world.id).body;
+  const double height = world.data->xpos[3 * body + 2] - start(world.id).p.z;
   const double reward = borne_by_others(world, body) ? 0.0 : std::clamp(height, 0.0, 1000.0);
   return judge_by(world.id, reward, lacks(world));
 }
 
-std::string PickTask::description(int world) const {
-  return "Pick up the " + targets_[world].object.name;
-}
+std::string PickTask::description(int world) const { return "Pick up the " + object(world).name; }
 
 Task::Referrals PickTask::referrals(int world) const {
-  return {{std::string(kRole), referrals_of(scene_.objects()[targets_[world].index])}};
-}
-
-Pose PickTask::start_pose(int world, std::string_view role) const {
-  if (role != kRole) {
-    const std::vector<std::string> roles{std::string(kRole)};
-    throw_unknown("task 'pick'", "role", role, roles);
-  }
-  return targets_[world].start;
+  return {{std::string(kRole), referrals_of(scene().objects()[targets_[world]])}};
 }
 
 std::optional<Pose> PickTask::goal_pose(int world, std::string_view role) const {
@@ -159,18 +129,17 @@ std::optional<Pose> PickTask::goal_pose(int world, std::string_view role) const 
 }
 
 void PickTask::write_info(const World& world, JsonWriter& json) const {
-  const Target& target = targets_[world.id];
-  const int body = target.object.body;
-  const Vec3 goal = target.start.p + Vec3{0, 0, kGoal};
+  const int body = object(world.id).body;
+  const Vec3 goal = start(world.id).p + Vec3{0, 0, kGoal};
   json.key("episode_step").value(episode_step(world.id));
   json.key("position_error").value(norm(vec3(world.data->xpos + 3 * body) - goal));
   json.key("rotation_error")
-      .value(angle_between(target.start.q, quat(world.data->xquat + 4 * body)));
+      .value(angle_between(start(world.id).q, quat(world.data->xquat + 4 * body)));
   json.key("success").value(lacks(world).empty());
 }
 
 std::vector<std::pair<std::string, std::string>> PickTask::scene_info(int world) const {
-  return {{"text", description(world)}, {"object_name", targets_[world].object.name}};
+  return {{"text", description(world)}, {"object_name", object(world).name}};
 }
 
 }  // namespace mjsense

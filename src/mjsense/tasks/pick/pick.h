@@ -8,13 +8,12 @@
 #include <vector>
 
 #include "mjsense/episode/grasp_scene.h"
-#include "mjsense/episode/task.h"
-#include "mjsense/scenes/episode_scene.h"
+#include "mjsense/scenes/object_task.h"
 #include "mjsense/scenes/standing.h"
 
 namespace mjsense {
 
-class PickTask final : public Task, public GraspScene {
+class PickTask final : public ObjectTask, public GraspScene {
  public:
   static constexpr std::string_view kRole = "pickup_obj";
 
@@ -22,20 +21,12 @@ class PickTask final : public Task, public GraspScene {
   explicit PickTask(TaskCfg cfg);
   std::string_view name() const override { return "pick"; }
   std::string_view type() const override { return "pick"; }
-  SceneCfg scene_cfg() const override;
-  void bind(const std::shared_ptr<Simulation>& simulation) override;
-  std::string start_fault(const World& world) const override { return scene_.fault(world); }
 
-  void begin(const World& world) override;
   // Reward: height above the start (m), where nothing but the robot bears the object.
   Evaluation evaluate(const World& world) const override;
 
-  std::span<const TaskObject> objects(int world) const override {
-    return {&targets_[world].object, 1};
-  }
   std::string description(int world) const override;
   Referrals referrals(int world) const override;
-  Pose start_pose(int world, std::string_view role) const override;
   std::optional<Pose> goal_pose(int world,
                                 std::string_view role) const override;  // 5 cm above the start
   // episode_step, position_error (m, to the goal), rotation_error (rad), success.
@@ -44,8 +35,8 @@ class PickTask final : public Task, public GraspScene {
 
   const GraspScene* grasp_scene() const override { return this; }
   std::span<const GraspObject> all_objects() const override { return objects_; }
-  int target(int world) const override { return targets_[world].index; }
-  double support_height(int world) const override { return scene_.support_height(world); }
+  int target(int world) const override { return targets_[world]; }
+  double support_height(int world) const override { return scene().support_height(world); }
 
  protected:
   void initialize_task() override;
@@ -54,20 +45,14 @@ class PickTask final : public Task, public GraspScene {
   std::vector<std::pair<std::string, std::string>> scene_info(int world) const override;
 
  private:
-  struct Target {
-    int index = 0;
-    TaskObject object;
-    Pose start;
-  };
+  void set_target(int world, int target);
   bool borne_by_others(const World& world, int body) const;
   std::string_view lacks(const World& world) const;
 
-  EpisodeScene scene_;
   Standing standing_;
-  std::weak_ptr<Simulation> simulation_;
   std::vector<GraspObject> objects_;
-  std::vector<int> things_;      // of objects_, what may be the target
-  std::vector<Target> targets_;  // [B]
+  std::vector<int> things_;   // of objects_, what may be the target
+  std::vector<int> targets_;  // [B], of objects_
   int robot_root_ = -1;
 };
 

@@ -156,6 +156,7 @@ TEST_F(Pick, SuccessNeedsTheRobotsTouchAlone) {
   }
   ASSERT_TRUE(touching);
   EXPECT_FALSE(task.evaluate(w).success);
+  EXPECT_EQ(task.evaluate(w).lacks, "something besides the robot touches the object");
   write_vec(before, q);
   mj_forward(model, data.get());
   EXPECT_TRUE(task.evaluate(w).success);
@@ -174,6 +175,7 @@ TEST_F(Pick, SuccessIsOneCentimetreUp) {
     object_qpos()[2] = z + up;
     mj_forward(model, data.get());
     EXPECT_EQ(task.evaluate(w).success, success) << up;
+    EXPECT_EQ(task.evaluate(w).lacks, success ? "" : "the object is not lifted");
   }
 }
 

@@ -9,7 +9,6 @@
 #include <numbers>
 
 #include "mjsense/core/error.h"
-#include "mjsense/scenes/load_scene.h"
 #include "mjsense/tasks/pick_and_place/support.h"
 
 namespace mjsense {
@@ -38,7 +37,7 @@ const std::string& noun(const SceneObject& object) {
 }  // namespace
 
 PickAndPlaceTask::PickAndPlaceTask(PlaceKind kind, TaskCfg cfg)
-    : Task(std::move(cfg)), kind_(kind), scene_(task_scene(this->cfg(), kScene)) {}
+    : SceneTask(std::move(cfg), kScene), kind_(kind) {}
 
 std::string_view PickAndPlaceTask::name() const {
   switch (kind_) {
@@ -53,28 +52,21 @@ std::string_view PickAndPlaceTask::name() const {
   }
 }
 
-SceneCfg PickAndPlaceTask::scene_cfg() const { return scene_.scene_cfg(robot_entity()); }
-
-void PickAndPlaceTask::bind(const std::shared_ptr<Simulation>& simulation) {
-  simulation_ = simulation;
-  scene_.bind(*simulation);
-}
-
 void PickAndPlaceTask::initialize_task() {
-  scene_.initialize(model(), num_worlds(), robot_entity() + "/");
-  const auto place = fmt::format("task '{}': scene '{}'", name(), scene_.cfg().name);
-  if (scene_.things().empty())
+  SceneTask::initialize_task();
+  const std::string place = this->place();
+  if (scene().things().empty())
     throw ValueError(fmt::format(
         "{} has nothing to pick up: no body with a free joint that a hand can hold", place));
   if (kind_ == PlaceKind::kNextTo) {
-    if (scene_.objects().size() < 2)
+    if (scene().objects().size() < 2)
       throw ValueError(fmt::format("{} has one object; there is nothing to put it next to", place));
-  } else if (scene_.receptacles().empty()) {
+  } else if (scene().receptacles().empty()) {
     throw ValueError(
         fmt::format("{} has no receptacle: none of its objects says receptacle = true", place));
   }
   objects_.clear();
-  for (const SceneObject& object : scene_.objects())
+  for (const SceneObject& object : scene().objects())
     objects_.push_back({object.body, object.kind, object.shape});
   if (kind_ == PlaceKind::kColor || kind_ == PlaceKind::kPacking) {
     Rng any(0, 0, 0, 0);
@@ -91,7 +83,7 @@ void PickAndPlaceTask::initialize_task() {
     episode.objects[1].role = kReceptacle;
     episode.supported.reserve(static_cast<std::size_t>(std::max(cfg().horizon, 0)) + 2);
   }
-  standing_ = Standing(model(), robot(), scene_);
+  standing_ = Standing(model(), robot(), scene());
   robot_root_ = model()->body_rootid[robot().base_body()];
 }
 
@@ -100,12 +92,12 @@ std::vector<int> PickAndPlaceTask::choose(Rng& rng) const {
   const auto any = [&](const std::vector<int>& of) {
     return of[rng.below(static_cast<std::uint32_t>(of.size()))];
   };
-  const auto objects = scene_.objects();
-  const int target = any(scene_.things());
+  const auto objects = scene().objects();
+  const int target = any(scene().things());
   std::vector<int> where;
   const auto rivals = [&](int r) {
     std::vector<int> found;
-    for (int other : scene_.receptacles()) {
+    for (int other : scene().receptacles()) {
       if (noun(objects[other]) == noun(objects[r]) && objects[other].color != objects[r].color)
         found.push_back(other);
     }
@@ -116,7 +108,7 @@ std::vector<int> PickAndPlaceTask::choose(Rng& rng) const {
       if (i != target) where.push_back(i);
     }
   }
-  for (int r : scene_.receptacles()) {
+  for (int r : scene().receptacles()) {
     if (kind_ == PlaceKind::kInOrOn ||
         (kind_ == PlaceKind::kColor && !objects[r].color.empty() && !rivals(r).empty()) ||
         (kind_ == PlaceKind::kPacking && objects[r].kind.find("box") != std::string::npos))
@@ -136,14 +128,12 @@ std::optional<Pose> PickAndPlaceTask::sample_scene(int world, Rng& rng, const St
   episode.target = wanted[0];
   episode.receptacle = wanted[1];
   for (int k = 0; k < 2; ++k) {
-    const SceneObject& object = scene_.objects()[wanted[k]];
+    const SceneObject& object = scene().objects()[wanted[k]];
     episode.objects[k].body = object.body;
     episode.objects[k].name = object.text;
   }
-  const std::shared_ptr<Simulation> simulation = simulation_.lock();
-  if (scene_.vary_look(world, cfg().seed, number) && simulation)
-    simulation->worlds().model_changed();
-  return standing_(scene_.sample(world, wanted, cfg().seed, number, rng, state));
+  vary_look(world);
+  return standing_(scene().sample(world, wanted, cfg().seed, number, rng, state));
 }
 
 void PickAndPlaceTask::begin(const World& world) {
@@ -203,9 +193,8 @@ std::string_view PickAndPlaceTask::lacks_beside(const World& world, const Judgem
   if (gap < 0 || gap > kBeside) return "the object is not beside the other";
   if (norm(now.moved) > kMovedBeside || now.turned > kTurned) return "the other object has moved";
   const int under = bearer(world, object), under_other = bearer(world, other);
-  const bool together = under >= 0 && under_other >= 0
-                            ? under == under_other
-                            : std::abs(a.low.z - b.low.z) <= kSameHeight;
+  const bool together = under >= 0 && under_other >= 0 ? under == under_other
+                                                       : std::abs(a.low.z - b.low.z) <= kSameHeight;
   return together ? "" : "the two do not stand on the same thing";
 }
 
@@ -258,7 +247,7 @@ void PickAndPlaceTask::places(const World& world, std::vector<Vec3>& out) const 
 
 std::string PickAndPlaceTask::place_text(int world) const {
   const Episode& episode = episodes_[world];
-  const SceneObject& object = scene_.objects()[episode.receptacle];
+  const SceneObject& object = scene().objects()[episode.receptacle];
   if (kind_ == PlaceKind::kColor) return object.color + " " + noun(object);
   return object.text;
 }
@@ -277,7 +266,7 @@ std::string PickAndPlaceTask::description(int world) const {
 }
 
 Task::Referrals::value_type PickAndPlaceTask::referral(const char* key, int index) const {
-  const SceneObject& object = scene_.objects()[index];
+  const SceneObject& object = scene().objects()[index];
   std::vector<Referral> texts{{object.text, object.others.empty() ? 1.0 : 0.5}};
   for (const std::string& other : object.others)
     texts.push_back({other, 0.5 / static_cast<double>(object.others.size())});

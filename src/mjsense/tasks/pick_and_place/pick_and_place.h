@@ -8,8 +8,7 @@
 #include <vector>
 
 #include "mjsense/episode/grasp_scene.h"
-#include "mjsense/episode/task.h"
-#include "mjsense/scenes/episode_scene.h"
+#include "mjsense/scenes/scene_task.h"
 #include "mjsense/scenes/standing.h"
 
 namespace mjsense {
@@ -17,7 +16,7 @@ namespace mjsense {
 // In or on any receptacle; next to any object; on the one of several alike that has a colour; into a box.
 enum class PlaceKind { kInOrOn, kNextTo, kColor, kPacking };
 
-class PickAndPlaceTask final : public Task, public GraspScene, public PlaceScene {
+class PickAndPlaceTask final : public SceneTask, public GraspScene, public PlaceScene {
  public:
   static constexpr std::string_view kObject = "pickup_obj", kReceptacle = "place_receptacle";
 
@@ -26,9 +25,6 @@ class PickAndPlaceTask final : public Task, public GraspScene, public PlaceScene
   // pick_and_place, pick_and_place_next_to, pick_and_place_color, packing.
   std::string_view name() const override;
   std::string_view type() const override { return name(); }
-  SceneCfg scene_cfg() const override;
-  void bind(const std::shared_ptr<Simulation>& simulation) override;
-  std::string start_fault(const World& world) const override { return scene_.fault(world); }
 
   void begin(const World& world) override;
   // Reward: exp(-d), d (m) from the object to the middle of the receptacle's box.
@@ -51,7 +47,7 @@ class PickAndPlaceTask final : public Task, public GraspScene, public PlaceScene
   const GraspScene* grasp_scene() const override { return this; }
   std::span<const GraspObject> all_objects() const override { return objects_; }
   int target(int world) const override { return episodes_[world].target; }
-  double support_height(int world) const override { return scene_.support_height(world); }
+  double support_height(int world) const override { return scene().support_height(world); }
   const PlaceScene* place_scene() const override { return this; }
   int receptacle(int world) const override { return episodes_[world].objects[1].body; }
   void places(const World& world, std::vector<Vec3>& out) const override;
@@ -66,7 +62,7 @@ class PickAndPlaceTask final : public Task, public GraspScene, public PlaceScene
   struct Judgement {
     int step = -1;  // of the episode
     bool supported = false, carried_forward = false, robot_contact = false;
-    std::string_view lacks;  // of a success
+    std::string_view lacks;             // of a success
     double pos_diff = 0, rot_diff = 0;  // to the nearest earlier supported pose
     double position_error = 0;
     Vec3 moved;  // of the receptacle
@@ -87,9 +83,7 @@ class PickAndPlaceTask final : public Task, public GraspScene, public PlaceScene
   Referrals::value_type referral(const char* key, int object) const;
 
   PlaceKind kind_;
-  EpisodeScene scene_;
   Standing standing_;
-  std::weak_ptr<Simulation> simulation_;
   std::vector<GraspObject> objects_;
   mutable std::vector<Episode> episodes_;  // [B]; a judgement is made once an observation
   int robot_root_ = -1;

@@ -3,7 +3,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 from typing import Any
 
 import mujoco
@@ -11,7 +11,6 @@ import mujoco
 from mjsense.compat.mjlab._names import matching, value_of
 
 _STRUCTURE = ("contype", "conaffinity", "condim", "priority")
-_TUNING = ("friction", "solref", "solimp", "margin", "gap", "solmix")
 _CONDIMS: tuple[Any, ...] = (1, 3, 4, 6)
 _ARRAYS = ("friction", "solref", "solimp")
 
@@ -27,8 +26,21 @@ def _set(geom: Any, name: str, value: Any) -> None:
         setattr(geom, name, value)
 
 
+@dataclass(kw_only=True)
+class _Tuning:
+    friction: Any = None
+    solref: Any = None
+    solimp: Any = None
+    margin: Any = None
+    gap: Any = None
+    solmix: Any = None
+
+
+_TUNING = tuple(field.name for field in fields(_Tuning))
+
+
 @dataclass
-class GeomCfg:
+class GeomCfg(_Tuning):
     """Changes what is given of the geoms that an expression matches; values may be mappings from expressions."""
 
     geom_names_expr: tuple[str, ...]
@@ -37,12 +49,6 @@ class GeomCfg:
     conaffinity: Any = None
     condim: Any = None
     priority: Any = None
-    friction: Any = None
-    solref: Any = None
-    solimp: Any = None
-    margin: Any = None
-    gap: Any = None
-    solmix: Any = None
 
     def edit_spec(self, spec: mujoco.MjSpec) -> None:
         """ValueError for a condim that MuJoCo lacks."""
@@ -53,7 +59,7 @@ class GeomCfg:
 
 
 @dataclass
-class CollisionCfg:
+class CollisionCfg(_Tuning):
     """What collides: says all of contype, conaffinity, condim and priority of the geoms that an expression matches.
 
     The others collide with nothing, unless ``disable_other_geoms`` is False.
@@ -64,12 +70,6 @@ class CollisionCfg:
     conaffinity: Any
     condim: Any
     priority: Any
-    friction: Any = None
-    solref: Any = None
-    solimp: Any = None
-    margin: Any = None
-    gap: Any = None
-    solmix: Any = None
     disable_other_geoms: bool = True
 
     def edit_spec(self, spec: mujoco.MjSpec) -> None:

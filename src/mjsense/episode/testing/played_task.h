@@ -1,0 +1,50 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+// A task in a scene with one set of data, for tests that look at starts and judgements.
+
+#include <memory>
+#include <string>
+#include <utility>
+
+#include "mjsense/episode/task.h"
+#include "mjsense/robots/load_robot.h"
+
+namespace mjsense {
+
+// In the robot's own periods.
+inline TaskCfg task_cfg(const std::string& robot, const std::string& scene = "") {
+  TaskCfg cfg;
+  cfg.robot = robot_cfg(robot);
+  cfg.policy_dt_ms = cfg.robot.policy_dt_ms;
+  cfg.ctrl_dt_ms = cfg.robot.ctrl_dt_ms;
+  cfg.sim_dt_ms = cfg.robot.sim_dt_ms;
+  cfg.scene = scene;
+  return cfg;
+}
+
+template <class SomeTask>
+struct PlayedTask {
+  explicit PlayedTask(TaskCfg cfg, int num_worlds = 1)
+      : task(std::move(cfg)), scene(task.whole_scene_cfg()) {
+    task.initialize(model, num_worlds);
+  }
+  // World 0 plays the episode from its start.
+  void start(std::int64_t episode) {
+    mj_resetData(model, data.get());
+    task.sample(0, episode, state_row(data.get()));
+    mj_forward(model, data.get());
+    world = {.id = 0, .model = model, .data = data.get()};
+    task.begin(world);
+  }
+
+  struct Delete {
+    void operator()(mjData* d) const { mj_deleteData(d); }
+  };
+  SomeTask task;
+  Scene scene;
+  const mjModel* model = scene.model();
+  std::unique_ptr<mjData, Delete> data{mj_makeData(model)};
+  World world;
+};
+
+}  // namespace mjsense

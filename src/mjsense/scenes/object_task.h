@@ -1,0 +1,46 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+// A task about one object of a scene.
+
+#include <optional>
+#include <span>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "mjsense/scenes/scene_task.h"
+
+namespace mjsense {
+
+class ObjectTask : public SceneTask {
+ public:
+  // `role` is that of the object, and lives as long as the task.
+  ObjectTask(TaskCfg cfg, std::string_view own_scene, std::string_view role)
+      : SceneTask(std::move(cfg), own_scene), role_(role) {}
+  void begin(const World& world) override;
+  std::span<const TaskObject> objects(int world) const override {
+    return {&subjects_[world].object, 1};
+  }
+  Pose start_pose(int world, std::string_view role) const override;
+  std::optional<Pose> goal_pose(int /*world*/, std::string_view /*role*/) const override {
+    return {};
+  }
+
+ protected:
+  // Each world's object, until an episode has another. Its name: what people call it.
+  void begin_with(int body, const std::string& name, bool thin = false);
+  void set_object(int world, int body, const std::string& name);
+  const TaskObject& object(int world) const { return subjects_[world].object; }
+  // Its pose at the first observation.
+  const Pose& start(int world) const { return subjects_[world].start; }
+
+ private:
+  struct Subject {
+    TaskObject object;
+    Pose start;
+  };
+  std::string_view role_;
+  std::vector<Subject> subjects_;  // [B]
+};
+
+}  // namespace mjsense

@@ -1,0 +1,31 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "mjsense/scenes/scene_task.h"
+
+#include <fmt/format.h>
+
+#include "mjsense/scenes/load_scene.h"
+#include "mjsense/sim/simulation.h"
+
+namespace mjsense {
+
+SceneTask::SceneTask(TaskCfg cfg, std::string_view own_scene)
+    : Task(std::move(cfg)), scene_(task_scene(this->cfg(), own_scene)) {}
+
+void SceneTask::bind(const std::shared_ptr<Simulation>& simulation) {
+  simulation_ = simulation;
+  scene_.bind(*simulation);
+}
+
+void SceneTask::initialize_task() { scene_.initialize(model(), num_worlds(), robot().prefix()); }
+
+void SceneTask::vary_look(int world) {
+  const std::shared_ptr<Simulation> simulation = simulation_.lock();
+  if (scene_.vary_look(world, cfg().seed, static_cast<std::uint64_t>(episode(world))) && simulation)
+    simulation->worlds().model_changed();
+}
+
+std::string SceneTask::place() const {
+  return fmt::format("task '{}': scene '{}'", name(), scene_.cfg().name);
+}
+
+}  // namespace mjsense
