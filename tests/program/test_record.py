@@ -12,8 +12,6 @@ import mujoco
 import numpy as np
 import pytest
 
-import mjsense as mjs
-
 # Small pictures, a few steps: enough for everything but success.
 QUICK = ["record", "pick", "--size", "64x48", "--horizon", "6", "--keep-failures", "-q"]
 
@@ -115,6 +113,8 @@ def test_depth_is_kept(mjsense):
 
 
 def test_segmentation_is_kept(mjsense):
+    import mjsense as mjs
+
     mjsense(*QUICK, "--segmentation", "--cameras", "wrist_camera", "--out", "data")
     mjsense("verify", "data")
     with h5py.File(mjsense.folder / "data/house_0/trajectories_batch_1_of_1.h5") as file:
