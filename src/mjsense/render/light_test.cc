@@ -137,6 +137,44 @@ TEST(Shadow, OfASlantedSunLiesWhereItShould) {
   }
 }
 
+//      |  \    directional light at 45 degrees: the upright part of one mesh, 0.5 m high, shades its
+//  ====|====   level part from x = .2 - .5 on
+TEST(Shadow, OfAMeshLiesOnItselfToo) {
+  std::string vertices, faces;
+  const auto add_box = [&](const std::array<double, 6>& limits, int first) {
+    for (int corner = 0; corner < 8; ++corner)
+      for (int i = 0; i < 3; ++i)
+        vertices += std::to_string(limits[2 * i + (corner >> i & 1)]) + " ";
+    for (const auto& [a, b, c] : std::array<std::array<int, 3>, 12>{{{0, 2, 1},
+                                                                     {1, 2, 3},
+                                                                     {4, 5, 6},
+                                                                     {5, 7, 6},
+                                                                     {0, 1, 4},
+                                                                     {1, 5, 4},
+                                                                     {2, 6, 3},
+                                                                     {3, 6, 7},
+                                                                     {0, 4, 2},
+                                                                     {2, 4, 6},
+                                                                     {1, 3, 5},
+                                                                     {3, 7, 5}}})
+      faces += std::to_string(first + a) + " " + std::to_string(first + b) + " " +
+               std::to_string(first + c) + " ";
+  };
+  add_box({-1, 1, -1, 1, -0.1, 0}, 0);
+  add_box({0.2, 0.3, -1, 1, 0, 0.5}, 8);
+  // Where its frame has its origin, MuJoCo decides: the geom stands where the vertices say.
+  Studio s(std::string(kDark) + kMatte + "<asset><mesh name='step' inertia='shell' vertex='" +
+           vertices + "' face='" + faces + R"('/></asset><worldbody>
+    <light type="directional" pos="3 0 3" dir="-1 0 -1" diffuse="1 1 1" specular="0 0 0"/>
+    <geom type="mesh" mesh="step" material="matte"/></worldbody>)");
+  s.options.shadows = true;
+  const auto lit = [&](double x) { return s.center({x, 0, 1}, {1, 0, 0}, {0, 1, 0}, 1)[0] > 100; };
+  EXPECT_TRUE(lit(-0.32));
+  EXPECT_FALSE(lit(-0.28));
+  EXPECT_FALSE(lit(0.18));
+  EXPECT_TRUE(lit(0.25));
+}
+
 // A shadow takes its own light only.
 TEST(Shadow, LeavesTheOtherLights) {
   Studio s(std::string(kDark) + kMatte + R"(<worldbody>

@@ -26,10 +26,15 @@ inline std::uint32_t fixed_lanes(const FixedTile& fixed, int packet, const Hits&
   return lanes;
 }
 
-// Box around what the tile shows, but for what its layer does if there is one; low > high: nothing.
-inline void tile_bounds(const View& view, const FixedTile* fixed, const Tile& tile, int packets,
-                        float* low, float* high) {
+// What the tile shows, but for what its layer does if there is one.
+struct Shown {
+  float low[3], high[3];  // box around it; low > high: nothing
+  int only;               // the geom that all of it belongs to, or -1
+};
+
+inline Shown shown_by(const View& view, const FixedTile* fixed, const Tile& tile, int packets) {
   Float least[3], most[3];
+  Shown out{{}, {}, -2};
   for (int c = 0; c < 3; ++c) {
     least[c] = splat(kInfinity);
     most[c] = splat(-kInfinity);
@@ -39,8 +44,12 @@ inline void tile_bounds(const View& view, const FixedTile* fixed, const Tile& ti
     std::uint32_t lanes = hit_lanes(hits);
     if (fixed) lanes &= ~fixed_lanes(*fixed, q, hits);
     if (!lanes) continue;
+    const int geom = hits.geom[__builtin_ctz(lanes)];
+    if (out.only == -2) out.only = geom;
     for (int k = 0; k < kLanes; k += kWidth) {
       const Mask m = mask_of(lanes >> k & kAllLanes);
+      const Int own = load(hits.geom + k);
+      if (any(m & (less(own, int_of(out.only)) | less(int_of(out.only), own)))) out.only = -1;
       const Vec3f at = hit_point(view, tile.pixels[q], hits, k);
       const Float p[3] = {at.x, at.y, at.z};
       for (int c = 0; c < 3; ++c) {
@@ -50,19 +59,22 @@ inline void tile_bounds(const View& view, const FixedTile* fixed, const Tile& ti
     }
   }
   for (int c = 0; c < 3; ++c) {
-    low[c] = lane_min(least[c]);
-    high[c] = lane_max(most[c]);
+    out.low[c] = lane_min(least[c]);
+    out.high[c] = lane_max(most[c]);
   }
+  return out;
 }
 
-// Casters among `part` of every light for points in the box; the lists begin at `used` in the scratch.
-inline void find_casters(const View& view, Part part, const float* low, const float* high,
-                         TileScratch& scratch, int& used, Casters* out) {
+// Casters among `part` of every light; the lists begin at `used` in the scratch.
+inline void find_casters(const View& view, Part part, const Shown& shown, TileScratch& scratch,
+                         int& used, int& spare, Casters* out) {
   for (int i = 0; i < view.num_lights; ++i) {
-    const Spheres& s = scratch.spheres;
-    out[i] = {scratch.casters + used, {s.x + used, s.y + used, s.z + used, s.radius + used}, 0, -1};
-    if (!view.lights[i].shadows || low[0] > high[0]) continue;
-    find_casters(view, view.lights[i], part, low, high, out[i]);
+    const LightWindows& w = scratch.windows;
+    out[i] = {};
+    out[i].list = scratch.casters + used;
+    out[i].windows = {w.u0 + used, w.u1 + used, w.v0 + used, w.v1 + used, w.w + used};
+    if (!view.lights[i].shadows || shown.low[0] > shown.high[0]) continue;
+    find_casters(view, i, part, shown.low, shown.high, shown.only, spare, out[i]);
     used += out[i].count;
   }
 }
@@ -70,16 +82,15 @@ inline void find_casters(const View& view, Part part, const float* low, const fl
 // `fixed`: the tile's layer, which knows what fixed geoms shade of each other; null: not layered.
 inline void find_all_casters(const View& view, const FixedTile* fixed, const Tile& tile,
                              int packets, TileScratch& scratch, Shadows& out) {
-  float low[3], high[3];
-  int used = 0;
+  int used = 0, spare = scratch.spare_casters;
   out.known = fixed;
   for (int i = 0; i < view.num_lights; ++i) out.fixed[i].count = 0;
   if (fixed) {
-    tile_bounds(view, fixed, tile, packets, low, high);
-    find_casters(view, Part::kFixed, low, high, scratch, used, out.fixed);
+    find_casters(view, Part::kFixed, shown_by(view, fixed, tile, packets), scratch, used, spare,
+                 out.fixed);
   }
-  tile_bounds(view, nullptr, tile, packets, low, high);
-  find_casters(view, fixed ? Part::kMoving : Part::kAll, low, high, scratch, used, out.moving);
+  find_casters(view, fixed ? Part::kMoving : Part::kAll, shown_by(view, nullptr, tile, packets),
+               scratch, used, spare, out.moving);
 }
 
 // What a layer keeps of the hits of packet `packet`, array by array: visit(of the hits, of the layer).
@@ -99,16 +110,14 @@ inline void copy_lanes(const T* from, T* to) {
   for (int k = 0; k < kLanes; k += kWidth) store(to + k, load(from + k));
 }
 
-// Draws the fixed geoms among `count` in scratch.opaque into the tile, and keeps what is known then;
-// colours only if they are wanted.
-inline void make_fixed(const View& view, int count, int packets, bool colors, Tile& tile,
-                       TileScratch& scratch, FixedTile& out) {
+// Draws the fixed geoms among `count` in scratch.opaque into the tile, and keeps what is known then.
+inline void make_fixed(const View& view, int count, int packets, Tile& tile, TileScratch& scratch,
+                       FixedTile& out) {
   trace_tile(view, Part::kFixed, scratch.opaque, count, tile);
-  float low[3], high[3];
-  tile_bounds(view, nullptr, tile, packets, low, high);
   Shadows shadows;
-  int used = 0;
-  find_casters(view, Part::kFixed, low, high, scratch, used, shadows.fixed);
+  int used = 0, spare = scratch.spare_casters;
+  find_casters(view, Part::kFixed, shown_by(view, nullptr, tile, packets), scratch, used, spare,
+               shadows.fixed);
   for (int i = 0; i < view.num_lights; ++i) shadows.moving[i].count = 0;
   for (int q = 0; q < packets; ++q) {
     const Hits& hits = tile.hits[q];
@@ -116,14 +125,13 @@ inline void make_fixed(const View& view, int count, int packets, bool colors, Ti
     const std::uint32_t lanes = hit_lanes(hits);
     if (!lanes) continue;
     Surfaces surfaces;
-    gather_surfaces(view, tile.pixels[q], hits, lanes, colors, surfaces);
+    gather_surfaces(view, tile.pixels[q], hits, lanes, true, surfaces);
     for (int i = 0; i < view.num_lights; ++i) {
       if (!view.lights[i].shadows) continue;
-      const Lit lit(view.lights[i], surfaces, false);
+      const Lit lit(view.lights[i], surfaces);
       const std::uint32_t dark = dark_lanes(view, i, lit, surfaces, hits, lanes, shadows);
       out.dark[i][q] = static_cast<std::uint16_t>(dark & lanes);
     }
-    if (!colors) continue;
     Shadows known = shadows;
     known.known = &out;
     known.fixed_lanes = lanes;

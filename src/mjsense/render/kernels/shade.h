@@ -19,72 +19,93 @@ struct alignas(64) Colors {
 
 // x^n for x in [0, 1]; error below 0.002 where it matters (what 8 bits show).
 inline Float power(Float x, Float n) {
-  const Float floor_x = max(x, splat(0.3f));
-  const Float s = (floor_x - splat(1.0f)) / (floor_x + splat(1.0f)), s2 = s * s;
-  const Float log =
-      splat(2.0f) * s *
-      fma(s2, fma(s2, fma(s2, splat(1.0f / 7), splat(0.2f)), splat(1.0f / 3)), splat(1.0f));
-  Float y =
-      max(fma(n * log, splat(1.0f / 256), splat(1.0f)), splat(0.0f));  // (1 + n log x / 256)^256
+  const Float zero = splat(0.0f), one = splat(1.0f), least = splat(0.3f);
+  const Float floor_x = max(x, least);
+  const Float s = (floor_x - one) / (floor_x + one), s2 = s * s;
+  const Float log = splat(2.0f) * s *
+                    fma(s2, fma(s2, fma(s2, splat(1.0f / 7), splat(0.2f)), splat(1.0f / 3)), one);
+  Float y = fma(n * log, splat(1.0f / 256), one);        // (1 + n log x / 256)^256
+  const Mask low = x < least, tiny = y < splat(0.874f);  // the result is below 1e-15
+  const Mask none = tiny | (low & (splat(4.0f) <= n));
+  if (!any(~none)) return zero;
   for (int i = 0; i < 8; ++i) y = y * y;
-  return select(splat(0.3f) <= x, y,
-                select(n < splat(4.0f), x * y * splat(1.0f / 0.3f), splat(0.0f)));
+  return select(none, zero, select(low, x * y * splat(1.0f / 0.3f), y));
 }
 
 struct LightTerm {
-  Float scale;     // attenuation * spot
-  Float diffuse;   // N L
-  Float specular;  // (N H)^exponent
-  Vec3f to_light;  // not normalised
+  Float scale;           // attenuation * spot
+  Float diffuse;         // N L
+  Float specular;        // (N H)^exponent
+  Vec3f to_light, unit;  // the same direction
 };
 
-inline LightTerm light_term(const ViewLight& light, Vec3f p, Vec3f n, Float exponent, bool shiny) {
+inline LightTerm light_term(const ViewLight& light, Vec3f p, Vec3f n) {
   const Float zero = splat(0.0f), one = splat(1.0f);
   LightTerm out;
-  Vec3f l;
   out.scale = one;
+  out.specular = zero;
   if (light.kind == LightKind::kDirectional) {
-    l = {splat(-light.dir[0]), splat(-light.dir[1]), splat(-light.dir[2])};
-    out.to_light = l;
+    out.to_light = out.unit = {splat(-light.dir[0]), splat(-light.dir[1]), splat(-light.dir[2])};
   } else {
     out.to_light = splat(light.pos) - p;
     const Float distance = sqrt(max(dot(out.to_light, out.to_light), splat(1e-20f)));
     const Float inverse = one / distance;
-    l = {out.to_light.x * inverse, out.to_light.y * inverse, out.to_light.z * inverse};
+    const Vec3f l{out.to_light.x * inverse, out.to_light.y * inverse, out.to_light.z * inverse};
+    out.unit = l;
     const float* a = light.attenuation;
     out.scale = one / max(fma(fma(splat(a[2]), distance, splat(a[1])), distance, splat(a[0])),
                           splat(1e-6f));
     if (light.kind == LightKind::kSpot) {
       const Float cosine = -dot(l, splat(light.dir));
+      const Mask outside = cosine < splat(light.cos_cutoff);
       Float spot = one;
-      if (light.exponent > 0) spot = power(max(cosine, zero), splat(light.exponent));
-      out.scale = out.scale * select(cosine < splat(light.cos_cutoff), zero, spot);
+      if (light.exponent > 0 && any(~outside))
+        spot = power(max(cosine, zero), splat(light.exponent));
+      out.scale = out.scale * select(outside, zero, spot);
     }
   }
-  const Float cosine = dot(n, l);
-  out.diffuse = max(cosine, zero);
-  out.specular = zero;
-  if (shiny) {
-    // The viewer is the camera's origin, of orthographic cameras too: so it is in OpenGL.
-    const Float inverse = -one / sqrt(max(dot(p, p), splat(1e-20f)));
-    const Vec3f h = l + Vec3f{p.x * inverse, p.y * inverse, p.z * inverse};
-    const Float nh = dot(n, h) / sqrt(max(dot(h, h), splat(1e-20f)));
-    out.specular = select(zero < cosine, power(min(max(nh, zero), one), exponent), zero);
-  }
+  out.diffuse = max(dot(n, out.unit), zero);
   return out;
 }
+
+// What makes points p directions to the viewer, which is the camera's origin, of orthographic cameras
+// too: so it is in OpenGL.
+struct alignas(64) ToEye {
+  float scale[kLanes];
+
+  explicit ToEye(const Surfaces& s) {
+    for (int k = 0; k < kLanes; k += kWidth) {
+      const Vec3f p{load(s.p[0] + k), load(s.p[1] + k), load(s.p[2] + k)};
+      store(scale + k, splat(-1.0f) / sqrt(max(dot(p, p), splat(1e-20f))));
+    }
+  }
+};
 
 // One light on all lanes of a packet.
 struct Lit {
   LightTerm terms[kLanes / kWidth];
 
   Lit() = default;
-  Lit(const ViewLight& light, const Surfaces& s, bool shiny) {
+  Lit(const ViewLight& light, const Surfaces& s) {
     for (int k = 0; k < kLanes; k += kWidth) {
       const Vec3f p{load(s.p[0] + k), load(s.p[1] + k), load(s.p[2] + k)};
       const Vec3f n{load(s.n[0] + k), load(s.n[1] + k), load(s.n[2] + k)};
-      terms[k / kWidth] =
-          light_term(light, p, n, shiny ? load(s.exponent + k) : splat(0.0f), shiny);
+      terms[k / kWidth] = light_term(light, p, n);
+    }
+  }
+
+  void add_specular(const Surfaces& s, const ToEye& eye, std::uint32_t lanes) {
+    const Float zero = splat(0.0f), one = splat(1.0f);
+    for (int k = 0; k < kLanes; k += kWidth) {
+      LightTerm& term = terms[k / kWidth];
+      const Mask glossy =
+          (zero < term.diffuse) & (zero < load(s.specular + k)) & mask_of(lanes >> k & kAllLanes);
+      if (!any(glossy)) continue;
+      const Vec3f n{load(s.n[0] + k), load(s.n[1] + k), load(s.n[2] + k)};
+      const Vec3f p{load(s.p[0] + k), load(s.p[1] + k), load(s.p[2] + k)};
+      const Vec3f h = along(term.unit, load(eye.scale + k), p);
+      const Float nh = dot(n, h) / sqrt(max(dot(h, h), splat(1e-20f)));
+      term.specular = select(glossy, power(min(max(nh, zero), one), load(s.exponent + k)), zero);
     }
   }
 };
@@ -141,20 +162,12 @@ inline std::uint32_t dark_lanes(const View& view, int index, const Lit& lit, con
   std::uint32_t dark = ~facing;
   if (shadows.known) dark |= shadows.known->dark[index][shadows.packet] & shadows.fixed_lanes;
   const std::uint32_t active = reachable & lanes & ~dark;
-  if (!active) return dark;
+  if (!active || shadows.fixed[index].count + shadows.moving[index].count == 0) return dark;
   __builtin_memcpy(rays.p, s.p, sizeof rays.p);
   __builtin_memcpy(rays.n, s.n, sizeof rays.n);
   __builtin_memcpy(rays.geom, hits.geom, sizeof rays.geom);
-  float low[3], high[3];
-  bounds(s.p, active, low, high);
-  Float longest = splat(0.0f);
-  for (int k = 0; k < kLanes; k += kWidth) {
-    const Mask m = mask_of(active >> k & kAllLanes);
-    longest = max(longest, select(m, load(rays.end + k), splat(0.0f)));
-  }
-  const Shaft shaft = shaft_to(light, low, high, lane_max(longest));
-  dark |= in_shadow(view, shadows.fixed[index], rays, shaft, active & ~shadows.fixed_lanes);
-  return dark | in_shadow(view, shadows.moving[index], rays, shaft, active & ~dark);
+  dark |= in_shadow(view, shadows.fixed[index], rays, active & ~shadows.fixed_lanes);
+  return dark | in_shadow(view, shadows.moving[index], rays, active & ~dark);
 }
 
 // Colours 0..1 of `lanes`. No shadows: no light casts any here.
@@ -166,16 +179,16 @@ inline void shade(const View& view, const Surfaces& s, const Hits& hits, std::ui
       const Float glow = load(s.emission + k) + splat(view.global_ambient);
       store(out.rgb[c] + k, glow * load(s.rgb[c] + k));
     }
+  const ToEye eye(s);
   for (int i = 0; i < view.num_lights; ++i) {
     const ViewLight& light = view.lights[i];
-    const bool shiny = light.specular[0] + light.specular[1] + light.specular[2] > 0;
-    const Lit lit(light, s, shiny);
-    if (shadows && light.shadows) {
-      const std::uint32_t dark = dark_lanes(view, i, lit, s, hits, lanes, *shadows);
-      if ((lanes & ~dark) != 0) add_light(light, lit, s, dark, true, separate);
-    } else {
-      add_light(light, lit, s, 0, false, out);
-    }
+    const bool barred = shadows && light.shadows;
+    Lit lit(light, s);
+    const std::uint32_t dark = barred ? dark_lanes(view, i, lit, s, hits, lanes, *shadows) : 0;
+    if (!(lanes & ~dark)) continue;
+    if (light.specular[0] + light.specular[1] + light.specular[2] > 0)
+      lit.add_specular(s, eye, lanes & ~dark);
+    add_light(light, lit, s, dark, barred, barred ? separate : out);
   }
   for (int c = 0; c < 3; ++c)
     for (int k = 0; k < kLanes; k += kWidth) {

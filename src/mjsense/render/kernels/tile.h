@@ -98,7 +98,7 @@ inline void shade_packet(const View& view, const FixedTile* fixed, int q, const 
   shadows.settled = false;
   if (fixed) shadows.fixed_lanes = fixed_lanes(*fixed, q, hits);
   const bool kept =
-      lanes && view.fixed && load_colors(view, *fixed, pixels, hits, lanes, shadows, colors);
+      lanes && fixed && load_colors(view, *fixed, pixels, hits, lanes, shadows, colors);
   if (lanes && !kept) {
     Surfaces surfaces;
     gather_surfaces(view, pixels, hits, lanes, true, surfaces);
@@ -146,19 +146,23 @@ inline void render_tile(const View& view, const ImageTargets& targets, int tx, i
     for (int q = packets; q < kTilePackets; ++q) tile.farthest[q] = -kInfinity;
     tile.depth = far;
     const TileLists lists = find_geoms(view, window, scratch);
-    const FixedTile* fixed = nullptr;
-    if (view.layered && samples == 1) {
+    const FixedTile* fixed = nullptr;  // what is kept of the tile
+    if (!view.layered || samples > 1) {
+      trace_tile(view, Part::kAll, scratch.opaque, lists.opaque, tile);
+    } else {
       const int at = ty * ((grid.width + kTileSize - 1) / kTileSize) + tx;
-      FixedTile* made = targets.fixed ? targets.fixed + at : scratch.fixed;
-      if (view.fixed) {
-        load_fixed(view, view.fixed[at], packets, tile);
-      } else {
-        make_fixed(view, lists.opaque, packets, targets.fixed != nullptr, tile, scratch, *made);
+      if (targets.fixed) {
+        make_fixed(view, lists.opaque, packets, tile, scratch, targets.fixed[at]);
+        return;
       }
-      if (targets.fixed) return;
-      fixed = view.fixed ? view.fixed + at : made;
+      if (view.fixed) {
+        fixed = view.fixed + at;
+        load_fixed(view, *fixed, packets, tile);
+      } else {  // in the order that a kept layer has, so that the same pixels come out
+        trace_tile(view, Part::kFixed, scratch.opaque, lists.opaque, tile);
+      }
+      trace_tile(view, Part::kMoving, scratch.opaque, lists.opaque, tile);
     }
-    trace_tile(view, fixed ? Part::kMoving : Part::kAll, scratch.opaque, lists.opaque, tile);
     if (targets.rgb && sample < samples) {
       Shadows shadows;
       if (view.shadows) find_all_casters(view, fixed, tile, packets, scratch, shadows);

@@ -3,20 +3,26 @@
 
 namespace mjsense {
 
+namespace {
+
+constexpr int kSpareCasters = 4096;  // blocks of triangles
+
+}  // namespace
+
 TileMemory::TileMemory(int max_geoms)
-    : lists_((3 + View::kMaxLights) * static_cast<std::size_t>(max_geoms)),
-      spheres_(4 * (View::kMaxLights * static_cast<std::size_t>(max_geoms) + kSpherePadding)),
-      tile_(DType::kUint8, Shape{static_cast<std::int64_t>(tile_bytes())}),
-      fixed_(1) {
-  scratch_.row = lists_.data();
+    : geoms_(3 * static_cast<std::size_t>(max_geoms)),
+      casters_(View::kMaxLights * static_cast<std::size_t>(max_geoms) + kSpareCasters),
+      windows_(5 * (casters_.size() + kWindowPadding)),
+      tile_(DType::kUint8, Shape{static_cast<std::int64_t>(tile_bytes())}) {
+  scratch_.row = geoms_.data();
   scratch_.opaque = scratch_.row + max_geoms;
   scratch_.transparent = scratch_.opaque + max_geoms;
-  scratch_.casters = scratch_.transparent + max_geoms;
-  const std::size_t stride = spheres_.size() / 4;
-  scratch_.spheres = {spheres_.data(), spheres_.data() + stride, spheres_.data() + 2 * stride,
-                      spheres_.data() + 3 * stride};
+  scratch_.casters = casters_.data();
+  scratch_.spare_casters = kSpareCasters;
+  const std::size_t stride = windows_.size() / 5;
+  float* w = windows_.data();
+  scratch_.windows = {w, w + stride, w + 2 * stride, w + 3 * stride, w + 4 * stride};
   scratch_.tile = tile_.data();
-  scratch_.fixed = fixed_.data();
 }
 
 }  // namespace mjsense

@@ -15,10 +15,9 @@ class TileMemory {
   TileScratch& scratch() { return scratch_; }
 
  private:
-  std::vector<int> lists_;
-  std::vector<float> spheres_;
+  std::vector<int> geoms_, casters_;
+  std::vector<float> windows_;  // of casters
   Array tile_;
-  std::vector<FixedTile> fixed_;
   TileScratch scratch_;
 };
 

@@ -71,11 +71,31 @@ struct ViewLight {
   float cos_cutoff, exponent;  // spot
 };
 
-// Bounding spheres in C, m. May be read kSpherePadding elements beyond the last.
-struct Spheres {
-  float *x, *y, *z, *radius;
+// Where boxes lie as a light sees them: u and v within [u0, u1] and [v0, v1], not nearer than w. May
+// be read kWindowPadding elements beyond the last.
+struct LightWindows {
+  float *u0, *u1, *v0, *v1, *w;
 };
-inline constexpr int kSpherePadding = 16;
+inline constexpr int kWindowPadding = 16;
+
+// Of positions, for their distance: so much rays and the tests of what they hit may round.
+inline constexpr float kLightError = 1e-5f;
+
+// The image of a light: of a point at q from its origin u, v and w are the components along its axes;
+// w leads away from the light. In perspective u and v are divided by w.
+struct LightFrame {
+  float origin[3], axes[3][3];  // C, m; the origin of a directional light is the camera's
+  bool perspective;
+  float limit;  // it shines on no point with larger |u| or |v|
+  LightWindows
+      windows;  // of the view's geoms; of planes, and of what reaches behind the light: endless
+};
+
+// One, or for a light that shines to all sides six, towards +x -x +y -y +z -z. None: no shadows.
+struct LightFrames {
+  const LightFrame* first = nullptr;
+  int count = 0;
+};
 
 struct FixedTile;
 
@@ -87,8 +107,8 @@ struct View {
   int num_geoms = 0;        // the first num_opaque are opaque and in sight, nearest first;
   int num_opaque = 0;       // then num_transparent in sight, by MuJoCo's order of blending;
   int num_transparent = 0;  // the rest only casts shadows
-  Spheres spheres{};        // of geoms
   ViewLight lights[kMaxLights];
+  LightFrames light_frames[kMaxLights];
   int num_lights = 0;
   bool shadows = false;
   // Fixed geoms are drawn first, for themselves. `fixed`: the image's tiles of them, row by row, if
@@ -134,7 +154,7 @@ struct alignas(64) FixedTile {
   static constexpr int kPixels = kTileSize * kTileSize;
   float t[kPixels], u[kPixels], v[kPixels], n[3][kPixels];
   int id[kPixels], prim[kPixels];
-  float rgb[3][kPixels];  // kept tiles only
+  float rgb[3][kPixels];
   std::uint16_t dark[View::kMaxLights][kPixels / 16];
 };
 
@@ -144,10 +164,10 @@ struct TileScratch {
   int row_count = 0;
   int* opaque = nullptr;  // geoms in sight of the tile
   int* transparent = nullptr;
-  int* casters = nullptr;  // of all lights: kMaxLights times as long
-  Spheres spheres{};       // of casters
+  int* casters = nullptr;  // of all lights: kMaxLights times as long, and what is spare
+  LightWindows windows{};  // of casters
+  int spare_casters = 0;   // for parts of geoms
   void* tile = nullptr;    // a Tile of the kernels
-  FixedTile* fixed = nullptr;
 };
 
 // Bytes of a Tile, 64-byte aligned.

@@ -57,7 +57,7 @@ ViewBuilder::ViewBuilder(const mjModel* model, const Look& look, const ViewOptio
       options_(options),
       unsorted_(max_geoms(model) + options.markers),
       sorted_(unsorted_.size()),
-      spheres_(4 * (unsorted_.size() + kSpherePadding)),
+      light_space_(options.shadows ? model->nlight : 0, unsorted_.size()),
       soft_looks_(look.num_flex_parts() + model->nskin) {
   order_.reserve(unsorted_.size());
   if (options.layered) {
@@ -141,16 +141,9 @@ const View& ViewBuilder::build(const RayWorld& world, const SharedGeometry& shap
     return a.index < b.index;
   });
   view_.num_opaque = view_.num_transparent = 0;
-  float* spheres = spheres_.data();  // here, because builders move
-  const std::size_t stride = spheres_.size() / 4;
-  view_.spheres = {spheres, spheres + stride, spheres + 2 * stride, spheres + 3 * stride};
   for (std::size_t i = 0; i < order_.size(); ++i) {
     const ViewGeom& g = sorted_[i] = unsorted_[order_[i].index];
     if (view_.layered) index_of_id_[g.id] = static_cast<int>(i);
-    view_.spheres.x[i] = g.center[0];
-    view_.spheres.y[i] = g.center[1];
-    view_.spheres.z[i] = g.center[2];
-    view_.spheres.radius[i] = g.radius;
     view_.num_opaque += order_[i].rank == 0;
     view_.num_transparent += order_[i].rank == 1;
   }
@@ -160,6 +153,7 @@ const View& ViewBuilder::build(const RayWorld& world, const SharedGeometry& shap
   view_.num_geoms = static_cast<int>(order_.size());
   for (int i = 0; i < 9; ++i) view_.r_wc[i] = static_cast<float>(rotation[i]);
   set_lights(world, appearance, position, rotation);
+  if (options_.shadows) light_space_.fill(view_);
   if (view_.skybox) set_sky(endless, appearance.sky(), position, rotation);
   if (mirrored_) set_mirror(world, shapes, appearance, markers, position, rotation);
   return view_;

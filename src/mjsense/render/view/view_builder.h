@@ -10,6 +10,7 @@
 #include <vector>
 
 #include "mjsense/render/view/appearance.h"
+#include "mjsense/render/view/light_space.h"
 #include "mjsense/render/view/look.h"
 #include "mjsense/render/view/markers.h"
 #include "mjsense/render/view/view.h"
@@ -74,8 +75,8 @@ class ViewBuilder {
   ViewOptions options_;
   View view_;
   std::vector<ViewGeom> unsorted_, sorted_;
-  std::vector<float> spheres_;  // View::spheres
   std::vector<Order> order_;
+  LightSpace light_space_;
   std::vector<std::uint8_t> fixed_;  // of geoms; none if not layered
   std::vector<int> index_of_id_;
   std::vector<MeshLook> soft_looks_;  // of parts of flexes, then skins, with the world's normals

@@ -15,6 +15,22 @@ constexpr float kNearest = 1e-4f;  // m; what is nearer than this counts as behi
 
 }  // namespace
 
+void box_corners(const ViewGeom& g, float (*corners)[3]) {
+  const float* h = g.box + 3;
+  for (int i = 0; i < 3; ++i) {
+    const float x = h[0] * g.rot[3 * i], y = h[1] * g.rot[3 * i + 1], z = h[2] * g.rot[3 * i + 2];
+    const float left = g.center[i] - x, right = g.center[i] + x;
+    corners[0][i] = left - y - z;
+    corners[1][i] = right - y - z;
+    corners[2][i] = left + y - z;
+    corners[3][i] = right + y - z;
+    corners[4][i] = left - y + z;
+    corners[5][i] = right - y + z;
+    corners[6][i] = left + y + z;
+    corners[7][i] = right + y + z;
+  }
+}
+
 bool find_window(const View& view, ViewGeom& g) {
   const PixelGrid& grid = view.grid;
   for (int i = 0; i < 3; ++i)
@@ -31,18 +47,7 @@ bool find_window(const View& view, ViewGeom& g) {
     return true;
   }
   float corners[8][3], nearest = kEndless, farthest = -kEndless;
-  for (int i = 0; i < 3; ++i) {
-    const float x = h[0] * g.rot[3 * i], y = h[1] * g.rot[3 * i + 1], z = h[2] * g.rot[3 * i + 2];
-    const float left = g.center[i] - x, right = g.center[i] + x;
-    corners[0][i] = left - y - z;
-    corners[1][i] = right - y - z;
-    corners[2][i] = left + y - z;
-    corners[3][i] = right + y - z;
-    corners[4][i] = left - y + z;
-    corners[5][i] = right - y + z;
-    corners[6][i] = left + y + z;
-    corners[7][i] = right + y + z;
-  }
+  box_corners(g, corners);
   for (const float* c : corners) {
     nearest = std::min(nearest, -c[2]);
     farthest = std::max(farthest, -c[2]);

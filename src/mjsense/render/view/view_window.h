@@ -10,4 +10,8 @@ namespace mjsense {
 // can be in the image of view.grid between view.near and view.far.
 bool find_window(const View& view, ViewGeom& g);
 
+// The corners [8, 3] of g.box, C, m; g.center is known. Two whose numbers differ in one bit share an
+// edge.
+void box_corners(const ViewGeom& g, float (*corners)[3]);
+
 }  // namespace mjsense

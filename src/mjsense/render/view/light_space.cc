@@ -1,0 +1,121 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "mjsense/render/view/light_space.h"
+
+#include <mujoco/mujoco.h>
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+#include "mjsense/render/view/view_window.h"
+
+namespace mjsense {
+namespace {
+
+constexpr int kFaces = 6;        // of a cube around a light that shines everywhere
+constexpr float kNarrow = 0.4f;  // cosine: a spot up to 66 degrees from its axis
+constexpr float kEndless = std::numeric_limits<float>::infinity();
+
+float length(const float* v) { return std::sqrt(v[0] * v[0] + v[1] * v[1] + v[2] * v[2]); }
+
+// Two directions square to w, and to each other.
+void complete(LightFrame& f) {
+  const float* w = f.axes[2];
+  const int least = std::abs(w[0]) < std::abs(w[1]) ? (std::abs(w[0]) < std::abs(w[2]) ? 0 : 2)
+                                                    : (std::abs(w[1]) < std::abs(w[2]) ? 1 : 2);
+  float* u = f.axes[0];
+  for (int i = 0; i < 3; ++i) u[i] = (i == least) - w[least] * w[i];
+  const float inverse = 1 / length(u);
+  for (int i = 0; i < 3; ++i) u[i] *= inverse;
+  for (int i = 0; i < 3; ++i)
+    f.axes[1][i] = w[(i + 1) % 3] * u[(i + 2) % 3] - w[(i + 2) % 3] * u[(i + 1) % 3];
+}
+
+// A ray from a surface of triangles begins a little above it; see shadow_of_triangles().
+float lift(const ViewGeom& g) {
+  return g.bvh ? 1e-4f * std::max(g.radius, std::abs(g.center[2]) + g.radius) : 0;
+}
+
+struct Window {
+  float low[2] = {-kEndless, -kEndless}, high[2] = {kEndless, kEndless};
+  float w = -kEndless;
+};
+
+Window window_of(const LightFrame& f, const ViewGeom& g) {
+  Window out;
+  if (g.type == mjGEOM_PLANE) return out;
+  const float error = kLightError * (length(f.origin) + length(g.center) + g.radius) + lift(g);
+  float corners[8][3], seen[3][8];
+  box_corners(g, corners);
+  for (int i = 0; i < 3; ++i) {
+    for (int k = 0; k < 8; ++k) {
+      seen[i][k] = f.axes[i][0] * (corners[k][0] - f.origin[0]) +
+                   f.axes[i][1] * (corners[k][1] - f.origin[1]) +
+                   f.axes[i][2] * (corners[k][2] - f.origin[2]);
+    }
+  }
+  float nearest = seen[2][0];
+  for (float w : seen[2]) nearest = std::min(nearest, w);
+  nearest -= error;
+  if (f.perspective && nearest <= error) return out;  // around the light, or behind it
+  out.w = nearest;
+  for (int i = 0; i < 2; ++i) {
+    if (f.perspective)
+      for (int k = 0; k < 8; ++k) seen[i][k] /= seen[2][k];
+    float low = seen[i][0], high = low;
+    for (float x : seen[i]) {
+      low = std::min(low, x);
+      high = std::max(high, x);
+    }
+    const float most = std::max(std::abs(low), std::abs(high));
+    const float slack = f.perspective ? error * (1 + most) / nearest : error;
+    out.low[i] = low - slack;
+    out.high[i] = high + slack;
+  }
+  return out;
+}
+
+}  // namespace
+
+LightSpace::LightSpace(int lights, std::size_t geoms)
+    : stride_(geoms + kWindowPadding),
+      frames_(static_cast<std::size_t>(kFaces) * std::min(lights, View::kMaxLights)),
+      windows_(kArrays * stride_ * frames_.size()) {}
+
+void LightSpace::fill(View& view) {
+  std::size_t used = 0;
+  for (int i = 0; i < view.num_lights; ++i) {
+    const ViewLight& light = view.lights[i];
+    view.light_frames[i] = {};
+    if (!light.shadows) continue;
+    const bool directional = light.kind == LightKind::kDirectional;
+    const float size = length(light.dir), cosine = light.cos_cutoff / size;
+    const bool narrow = directional || (light.kind == LightKind::kSpot && cosine > kNarrow);
+    const int count = narrow ? 1 : kFaces;
+    view.light_frames[i] = {&frames_[used], count};
+    for (int face = 0; face < count; ++face, ++used) {
+      LightFrame& f = frames_[used];
+      f.perspective = !directional;
+      f.limit = kEndless;
+      for (int k = 0; k < 3; ++k) {
+        f.origin[k] = directional ? 0 : light.pos[k];
+        f.axes[2][k] = narrow ? light.dir[k] / size : (face / 2 == k) * (face % 2 ? -1.0f : 1.0f);
+      }
+      if (narrow && !directional)
+        f.limit = 1.001f * std::sqrt(1 - cosine * cosine) / cosine + 1e-3f;
+      complete(f);
+      float* at = windows_.data() + kArrays * stride_ * used;
+      f.windows = {at, at + stride_, at + 2 * stride_, at + 3 * stride_, at + 4 * stride_};
+      for (int g = 0; g < view.num_geoms; ++g) {
+        const Window window = window_of(f, view.geoms[g]);
+        f.windows.u0[g] = window.low[0];
+        f.windows.u1[g] = window.high[0];
+        f.windows.v0[g] = window.low[1];
+        f.windows.v1[g] = window.high[1];
+        f.windows.w[g] = window.w;
+      }
+    }
+  }
+}
+
+}  // namespace mjsense
