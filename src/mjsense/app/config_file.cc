@@ -1,13 +1,11 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <fmt/format.h>
 
-#include <filesystem>
-#include <fstream>
 #include <map>
-#include <sstream>
 
 #include "mjsense/app/field_options.h"
 #include "mjsense/core/error.h"
+#include "mjsense/core/plain_file.h"
 #include "mjsense/core/toml_value.h"
 
 namespace mjsense {
@@ -51,12 +49,7 @@ void read_key(const Key& key, void* object, const toml::node& node, const std::s
 }  // namespace
 
 void read_toml(const std::string& path, const StructDecl& decl, void* object) {
-  if (!std::filesystem::is_regular_file(path)) {
-    throw ValueError(fmt::format("{}: no such file", path));
-  }
-  std::stringstream text;
-  text << std::ifstream(path).rdbuf();
-  read_toml_text(text.str(), path, decl, object);
+  read_toml_text(read_text_file(path), path, decl, object);
 }
 
 void read_toml_text(std::string_view text, const std::string& path, const StructDecl& decl,

@@ -272,6 +272,8 @@ int run_program(int argc, char** argv) {
         of_fmt && std::ferror(stdout))
       why = "cannot write to stdout: " + of_fmt->code().message();
     // It may quote a file of a stranger's.
+    constexpr std::size_t kMostBytes = 4000;
+    if (why.size() > kMostBytes) why = why.substr(0, kMostBytes) + " ...";
     fmt::print(stderr, "mjsense: {}\n", printable(one_line(why)));
     return kWrongInput;
   }

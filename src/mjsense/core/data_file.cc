@@ -5,11 +5,11 @@
 
 #include <algorithm>
 #include <filesystem>
-#include <fstream>
-#include <sstream>
+#include <utility>
 
 #include "mjsense/core/embedded.h"
 #include "mjsense/core/error.h"
+#include "mjsense/core/plain_file.h"
 
 namespace mjsense {
 namespace {
@@ -39,10 +39,8 @@ DataFile DataFolder::find(std::string_view name) const {
   }
   if (!name.ends_with(".toml")) throw_unknown(fmt::format("{}s", kind), kind, name, known);
   const std::string path(name);
-  if (!fs::is_regular_file(path)) throw ValueError(fmt::format("{}: no such file", path));
-  std::stringstream text;
-  text << std::ifstream(path).rdbuf();
-  return {fs::absolute(path).lexically_normal().string(), text.str()};
+  std::string text = read_text_file(path);
+  return {fs::absolute(path).lexically_normal().string(), std::move(text)};
 }
 
 std::string beside(std::string_view path, const std::string& name) {

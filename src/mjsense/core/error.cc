@@ -33,8 +33,11 @@ int distance(std::string_view a, std::string_view b) {
 
 std::vector<std::string> nearest_names(std::string_view name,
                                        std::span<const std::string> candidates, std::size_t most) {
+  // What is longer is no slip of the finger, and takes its square in time and memory.
+  constexpr std::size_t kMostBytes = 256;
   std::vector<std::pair<int, std::string>> scored;
   for (const std::string& c : candidates) {
+    if (name.size() > kMostBytes || c.size() > kMostBytes) continue;
     int d = distance(name, c);
     // The local part of a prefixed name, or a name given without its prefix, is near too.
     if (!name.empty() && c.size() > name.size() && c.ends_with(name)) d = 2;
@@ -72,7 +75,7 @@ std::string suggest(std::string_view name, std::span<const std::string> candidat
 void throw_unknown(std::string_view place, std::string_view kind, std::string_view name,
                    std::span<const std::string> candidates) {
   throw KeyError(
-      fmt::format("{}: no {} named '{}'{}", place, kind, name, suggest(name, candidates)));
+      fmt::format("{}: no {} named '{:.300}'{}", place, kind, name, suggest(name, candidates)));
 }
 
 }  // namespace mjsense

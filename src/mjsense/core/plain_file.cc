@@ -4,6 +4,7 @@
 #include <fcntl.h>
 #include <fmt/format.h>
 #include <sys/stat.h>
+#include <unistd.h>
 
 #include <algorithm>
 #include <cerrno>
@@ -27,6 +28,18 @@ const char* kind_of(mode_t mode) {
   return "a device";
 }
 
+// A hole of a file takes no space on a disk, and as long to read as if it did. A network's file
+// system that says that nothing is stored knows no holes either.
+constexpr std::int64_t kFreeBytes = std::int64_t{1} << 30, kMostOfHoles = 1000;
+
+bool is_mostly_holes(int fd, const struct stat& about) {
+  const std::int64_t size = about.st_size, stored = 512 * std::int64_t{about.st_blocks};
+  if (size <= kFreeBytes || size / kMostOfHoles <= stored) return false;
+  const bool holes = lseek(fd, 0, SEEK_HOLE) < size;
+  lseek(fd, 0, SEEK_SET);
+  return holes;
+}
+
 // Bytes of the UTF-8 character that begins here; 0 if there is none.
 std::size_t character(std::string_view text) {
   const auto byte = [&](std::size_t i) { return static_cast<unsigned char>(text[i]); };
@@ -41,6 +54,9 @@ std::size_t character(std::string_view text) {
     if ((byte(i) & 0xC0) != 0x80) return 0;
   }
   if (first == 0xC2 && byte(1) < 0xA0) return 0;  // C1 controls
+  // Other lines, and other directions of writing, in which a name looks like another one.
+  if (first == 0xE2 && byte(1) == 0x80 && byte(2) >= 0xA8 && byte(2) <= 0xAE) return 0;
+  if (first == 0xE2 && byte(1) == 0x81 && byte(2) >= 0xA6 && byte(2) <= 0xA9) return 0;
   if ((first == 0xE0 && byte(1) < 0xA0) || (first == 0xED && byte(1) >= 0xA0)) return 0;
   if ((first == 0xF0 && byte(1) < 0x90) || (first == 0xF4 && byte(1) >= 0x90)) return 0;
   return size;
@@ -70,6 +86,9 @@ Fd open_plain(const std::filesystem::path& folder, std::string_view name) {
   if (fstat(file.get(), &about) != 0)
     fail(fmt::format("cannot be opened: {}", std::strerror(errno)));
   if (!S_ISREG(about.st_mode)) fail(fmt::format("is {}, expected a file", kind_of(about.st_mode)));
+  if (is_mostly_holes(file.get(), about))
+    fail(fmt::format("claims {} bytes and stores {}: it is not read", about.st_size,
+                     512 * about.st_blocks));
   return file;
 }
 
@@ -81,6 +100,31 @@ bool is_plain_file(const std::filesystem::path& path) {
 bool is_plain_folder(const std::filesystem::path& path) {
   struct stat about = {};
   return lstat(path.c_str(), &about) == 0 && S_ISDIR(about.st_mode);
+}
+
+std::string read_text_file(const std::string& path) {
+  constexpr std::int64_t kMostBytes = 1 << 24;
+  const auto fail = [&](std::string_view why) {
+    throw ValueError(fmt::format("{}: {}", printable(path), why));
+  };
+  // A NUL would end the name for the system.
+  const bool name = path.find('\0') == path.npos;
+  const Fd file(name ? open(path.c_str(), O_RDONLY | O_NONBLOCK | O_CLOEXEC) : -1);
+  if (!name || (!file && (errno == ENOENT || errno == ENOTDIR))) fail("no such file");
+  struct stat about = {};
+  if (!file || fstat(file.get(), &about) != 0)
+    fail(fmt::format("cannot be opened: {}", std::strerror(errno)));
+  if (!S_ISREG(about.st_mode)) fail(fmt::format("is {}, expected a file", kind_of(about.st_mode)));
+  std::string text;
+  char piece[1 << 14];
+  while (const ssize_t n = read(file.get(), piece, sizeof piece)) {
+    if (n < 0 && errno == EINTR) continue;
+    if (n < 0) fail(fmt::format("cannot be read: {}", std::strerror(errno)));
+    text.append(piece, static_cast<std::size_t>(n));
+    if (static_cast<std::int64_t>(text.size()) > kMostBytes)
+      fail(fmt::format("has more than {} MiB", kMostBytes >> 20));
+  }
+  return text;
 }
 
 std::int64_t size_of(const Fd& file) {

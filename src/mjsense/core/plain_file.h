@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
-// Files whose names come from other files: only plain names inside one folder, no links, no pipes.
+// Files, with care. Of those whose names come from other files, only plain names inside one folder, no
+// links, no pipes.
 
 #include <cstddef>
 #include <cstdint>
@@ -19,7 +20,7 @@ namespace mjsense {
 [[nodiscard]] bool is_plain_name(std::string_view name);
 
 // Opens the regular file `name` of `folder` for reading. Throws RuntimeError that says what it is
-// instead: missing, a link, a pipe, no plain name.
+// instead: missing, a link, a pipe, no plain name, more than 1 GiB of nothing but holes.
 [[nodiscard]] Fd open_plain(const std::filesystem::path& folder, std::string_view name);
 
 // True for what open_plain() would open.
@@ -30,13 +31,18 @@ namespace mjsense {
 
 [[nodiscard]] std::int64_t size_of(const Fd& file);
 
+// The whole of a text that somebody wrote: an experiment, a robot, a scene. Links are followed, for
+// the name is the user's own. Throws ValueError when there is no such file, when it is a folder, a
+// pipe or a device, when it has more than 16 MiB, and when it cannot be read.
+[[nodiscard]] std::string read_text_file(const std::string& path);
+
 // Writes a file whole or not at all: under another name first. Throws RuntimeError that names it
 // and says why the system refuses.
 void write_file(const std::filesystem::path& path,
                 std::initializer_list<std::span<const std::byte>> pieces);
 
-// Text from a file as a terminal may see it: control characters, and bytes that are no UTF-8,
-// become '?'.
+// Text from a file as a terminal may see it: control characters, those that turn
+// the direction of writing, and bytes that are no UTF-8, become '?'.
 [[nodiscard]] std::string printable(std::string_view text);
 
 }  // namespace mjsense

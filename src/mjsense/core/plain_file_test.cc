@@ -17,6 +17,7 @@
 namespace mjsense {
 namespace {
 
+using ::testing::EndsWith;
 using ::testing::HasSubstr;
 using ::testing::StartsWith;
 
@@ -48,6 +49,42 @@ TEST(PlainFile, OnlyFilesOfTheFolder) {
   }
 }
 
+// A terabyte of nothing would be read for minutes, by who computes its checksum.
+TEST(PlainFile, HolesAreNotRead) {
+  testing::TempDir dir;
+  std::ofstream(dir.path / "video.mp4") << "x";
+  std::filesystem::resize_file(dir.path / "video.mp4", std::uintmax_t{1} << 40);
+  EXPECT_THAT(refused(dir.path, "video.mp4"), HasSubstr("claims 1099511627776 bytes and stores "));
+  std::filesystem::resize_file(dir.path / "video.mp4", std::uintmax_t{1} << 30);
+  EXPECT_EQ(refused(dir.path, "video.mp4"), "");
+}
+
+TEST(PlainFile, TextsThatSomebodyWrote) {
+  testing::TempDir dir;
+  const auto read = [](const std::string& path) -> std::string {
+    try {
+      return read_text_file(path);
+    } catch (const ValueError& e) {
+      return e.what();
+    }
+  };
+  std::ofstream(dir.file("a.toml")) << "a = 1";
+  std::filesystem::create_symlink("a.toml", dir.path / "link");
+  mkfifo(dir.file("pipe").c_str(), 0600);
+  std::ofstream(dir.file("large")) << "x";
+  std::filesystem::resize_file(dir.path / "large", (1 << 24) + 1);
+  EXPECT_EQ(read(dir.file("a.toml")), "a = 1");
+  EXPECT_EQ(read(dir.file("link")), "a = 1");
+  EXPECT_THAT(read(dir.file("none")), EndsWith("none: no such file"));
+  EXPECT_THAT(read(dir.file("a.toml") + '\0'), EndsWith("no such file"));
+  EXPECT_THAT(read(dir.file("pipe")), EndsWith("is a pipe, expected a file"));
+  EXPECT_THAT(read("/dev/zero"), EndsWith("is a device, expected a file"));
+  EXPECT_THAT(read(dir.path), EndsWith("is a folder, expected a file"));
+  EXPECT_THAT(read(dir.file("large")), EndsWith("has more than 16 MiB"));
+  // To say nothing would mean an empty experiment.
+  EXPECT_THAT(read("/proc/self/mem"), EndsWith("cannot be read: Input/output error"));
+}
+
 TEST(PlainFile, WrittenWholeOrNotAtAll) {
   testing::TempDir dir;
   const std::filesystem::path mine = dir.path / "mine", out = dir.path / "out";
@@ -75,6 +112,8 @@ TEST(PlainFile, PrintableText) {
             "??31m");                           // the one-byte form of escape and bracket
   EXPECT_EQ(printable("\xed\xa0\x80"), "???");  // half of a pair
   EXPECT_EQ(printable("cut \xe6\x97"), "cut ??");
+  EXPECT_EQ(printable("gpj\u202e.exe\u2066 \u2028"), "gpj???.exe??? ???");
+  EXPECT_EQ(printable("\u2027\u202f\u2065"), "\u2027\u202f\u2065");
 }
 
 // What the system does not give is an error, and nobody waits for what was started.

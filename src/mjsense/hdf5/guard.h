@@ -38,16 +38,19 @@ void each_dataset(hid_t group, const std::function<void(const std::string& path)
 // A dataset of single bytes [n], n <= most.
 [[nodiscard]] std::string read_bytes(hid_t parent, const std::string& path, std::size_t most);
 
-// Somebody ended the process that read a file, which says nothing about the file.
+// Somebody ended the process that read a file, or nobody let it run, which says nothing about the
+// file.
 struct Ended : RuntimeError {
   using RuntimeError::RuntimeError;
 };
 
 // Runs `read` in a child process, whose crash, hang or hunger becomes a RuntimeError "what: ...";
 // an exception there becomes one with its words here. `file_bytes` decides how much time it gets:
-// 20 s of the processor for small files. The child has 1 GiB beyond what this process holds, and
-// hears no signal that is sent to our process group.
+// 20 s of the processor for small files, and thirty times as much of the clock (or `patience_s`): when
+// only that is over it is Ended. The child has 1 GiB beyond what this process holds, and hears no
+// signal that is sent to our process group.
 [[nodiscard]] std::string in_child(std::string_view what, std::uint64_t file_bytes,
-                                   const std::function<std::string()>& read);
+                                   const std::function<std::string()>& read,
+                                   std::uint64_t patience_s = 0);
 
 }  // namespace mjsense::h5

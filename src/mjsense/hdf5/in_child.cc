@@ -34,6 +34,7 @@ constexpr bool kSanitised = false;
 #endif
 
 constexpr std::uint64_t kLeastSeconds = 20, kBytesPerSecond = 2'000'000;
+constexpr std::uint64_t kPatience = 30;  // seconds of the clock for one of the processor
 constexpr std::uint64_t kMemory = std::uint64_t{1} << 30;
 constexpr std::size_t kMostAnswer = std::size_t{1} << 28;
 // The last byte of an answer: without it the child did not come to its end.
@@ -146,8 +147,9 @@ bool listen(int fd, std::uint64_t seconds, std::string& answer) {
 }  // namespace
 
 std::string in_child(std::string_view what, std::uint64_t file_bytes,
-                     const std::function<std::string()>& read) {
+                     const std::function<std::string()>& read, std::uint64_t patience_s) {
   const std::uint64_t seconds = kLeastSeconds + file_bytes / kBytesPerSecond;
+  if (patience_s == 0) patience_s = kPatience * seconds;
   int ends[2];
   if (pipe2(ends, O_CLOEXEC) != 0)
     throw RuntimeError(fmt::format("{}: cannot create a pipe: {}", what, std::strerror(errno)));
@@ -167,12 +169,13 @@ std::string in_child(std::string_view what, std::uint64_t file_bytes,
     throw RuntimeError(fmt::format("{}: cannot start a process: {}", what, std::strerror(errno)));
   in.reset();
   std::string answer;
-  const bool heard = listen(out.get(), 6 * seconds, answer);
+  const bool heard = listen(out.get(), patience_s, answer);
   if (!heard) kill(pid, SIGKILL);
   int status = 0;
+  rusage used = {};
   pid_t got;
   do {
-    got = waitpid(pid, &status, 0);
+    got = wait4(pid, &status, 0, &used);
   } while (got < 0 && errno == EINTR);
   const bool ended = got < 0 || (WIFEXITED(status) && WEXITSTATUS(status) == 0);
   if (ended && !answer.empty() && (answer.back() == kDone || answer.back() == kThrown)) {
@@ -183,6 +186,12 @@ std::string in_child(std::string_view what, std::uint64_t file_bytes,
   }
   if (got >= 0 && WIFSIGNALED(status)) {
     const int signal = WTERMSIG(status);
+    const auto worked = static_cast<std::uint64_t>(used.ru_utime.tv_sec + used.ru_stime.tv_sec);
+    if (signal == SIGKILL && !heard && worked < seconds)
+      throw Ended(
+          fmt::format("{}: reading it was given up after {} s, of which it had the "
+                      "processor for {}: the machine or the disk is busy",
+                      what, patience_s, worked));
     if (signal == SIGXCPU || (signal == SIGKILL && !heard))
       throw RuntimeError(
           fmt::format("{}: reading it did not end within {} s: it is damaged", what, seconds));

@@ -47,6 +47,20 @@ TEST(InChild, WhoIsEndedFromOutsideSaysNothingOfTheFile) {
   }
 }
 
+// A good file is not called damaged, and set aside, because everybody else was quicker.
+TEST(InChild, WhoDoesNotGetTheProcessorSaysNothingOfTheFile) {
+  try {
+    static_cast<void>(in_child(
+        "x.h5", 0, [] { return pause() == 0 ? std::string() : std::string(); }, 1));
+    FAIL();
+  } catch (const Ended& e) {
+    EXPECT_STREQ(
+        e.what(),
+        "x.h5: reading it was given up after 1 s, of which it had the processor for 0: the "
+        "machine or the disk is busy");
+  }
+}
+
 // Ctrl-C for all programs of a terminal: ours hears it, and the reader goes on.
 int read_in_the_rain() {
   if (setpgid(0, 0) != 0) return 2;

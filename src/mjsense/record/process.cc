@@ -101,6 +101,7 @@ bool wait_process(Child& child, bool block, Exit& result) {
     result.why =
         fmt::format("killed by signal {} ({})", WTERMSIG(status), strsignal(WTERMSIG(status)));
     if (WTERMSIG(status) == SIGXFSZ) result.why += ": ulimit -f allows no larger file";
+    if (WTERMSIG(status) == SIGXCPU) result.why += ": it used more of the processor than it may";
   } else if (WEXITSTATUS(status) != 0) {
     result.why = fmt::format("exit code {}", WEXITSTATUS(status));
   } else {
@@ -120,6 +121,14 @@ void kill_process(Child& child) {
 std::string run_process(const std::vector<std::string>& argv, const Patience& patience,
                         std::string* words) {
   Child child = start_process(argv, false, true);
+  if (patience.cpu_s > 0) {
+    const rlimit limit{patience.cpu_s, patience.cpu_s + 1};
+    prlimit(child.pid, RLIMIT_CPU, &limit, nullptr);
+  }
+  if (patience.memory > 0) {
+    const rlimit limit{patience.memory, patience.memory};
+    prlimit(child.pid, RLIMIT_DATA, &limit, nullptr);
+  }
   std::string output;
   const auto give_up = [&](const std::string& why) {
     kill_process(child);

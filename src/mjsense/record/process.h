@@ -40,9 +40,10 @@ struct Exit {
 bool wait_process(Child& child, bool block, Exit& result);
 void kill_process(Child& child);  // SIGKILL, and waits
 
-// How long a program may say nothing, and how much it may say.
+// How long a program may say nothing, how much it may say, and what it may use.
 struct Patience {
   double silence_s = 60;
+  std::uint64_t cpu_s = 0, memory = 0;  // seconds of the processor, bytes; 0: as much as it likes
   std::size_t most_bytes = std::size_t{1} << 30;
 };
 

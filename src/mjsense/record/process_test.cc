@@ -59,6 +59,23 @@ TEST(Process, LeadsItsOwnGroupWithSignalsAsUsual) {
   EXPECT_THAT(out, HasSubstr("SigIgn:\t0000000000000000"));
 }
 
+std::string why_ended(const std::string& script, const Patience& patience) {
+  try {
+    run_process({"python3", "-c", script}, patience);
+    return "";
+  } catch (const RuntimeError& e) {
+    return e.what();
+  }
+}
+
+TEST(Process, LimitsOfProcessorAndMemory) {
+  const Patience patience{.silence_s = 100, .cpu_s = 1, .memory = std::size_t{1} << 28};
+  EXPECT_EQ(why_ended("print(len(bytearray(1 << 20)))", patience), "");
+  EXPECT_THAT(why_ended("while True: pass", patience), HasSubstr("more of the processor"));
+  EXPECT_THAT(why_ended("import time\ntime.sleep(.3)\nbytearray(1 << 29)", patience),
+              HasSubstr("MemoryError"));
+}
+
 // Signals rain on a group that starts programs: a handler of it hears them, the programs do not.
 // In a process of its own, which leads such a group.
 int start_programs_in_the_rain() {

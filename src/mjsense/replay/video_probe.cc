@@ -16,6 +16,15 @@ namespace {
 
 constexpr double kPatience = 60;  // s without a word
 constexpr std::size_t kLineBytes = 96;
+// A small file may claim pictures that take hours and all memory to unpack. Real ones take a tenth.
+constexpr std::uint64_t kLeastSeconds = 60, kBytesPerSecond = 50'000;
+constexpr std::uint64_t kMemory = std::uint64_t{4} << 30;
+
+Patience patience(const std::filesystem::path& path, double silence_s, std::size_t most_bytes) {
+  std::error_code ignored;
+  const auto bytes = std::filesystem::file_size(path, ignored);
+  return {silence_s, kLeastSeconds + (ignored ? 0 : bytes / kBytesPerSecond), kMemory, most_bytes};
+}
 
 // "-f mov -c:v h264 -i file:/data/x.mp4"
 std::vector<std::string> input_of(const std::filesystem::path& path) {
@@ -26,6 +35,8 @@ std::vector<std::string> input_of(const std::filesystem::path& path) {
           matroska ? "matroska" : "mov",
           "-codec_whitelist",
           "h264,ffv1",
+          "-threads",  // each takes memory, and many videos are read at a time
+          "1",
           "-an",
           "-sn",
           "-dn",
@@ -57,8 +68,7 @@ VideoProbe probe_video(const std::filesystem::path& path, bool decode, std::int6
   try {
     const auto most = static_cast<std::size_t>(2 * std::max<std::int64_t>(0, expected) + 100);
     std::string words;
-    listing =
-        run_process(command, {.silence_s = kPatience, .most_bytes = most * kLineBytes}, &words);
+    listing = run_process(command, patience(path, kPatience, most * kLineBytes), &words);
     // FFV1 says which of its slices are damaged, and ends as if all were well.
     if (decode && !words.empty()) probe.error = words;
   } catch (const Error& error) {
@@ -91,7 +101,7 @@ std::vector<std::uint8_t> grab_frames(const std::filesystem::path& path,
                  {"-vf", filters, "-frames:v", fmt::format("{}", frames.size()), "-f", "rawvideo",
                   "-pix_fmt", grey16 ? "gray16le" : "rgb24", "pipe:1"});
   const std::size_t most = frames.size() * width * height * 3 + 1;
-  const std::string raw = run_process(command, {.silence_s = 2 * kPatience, .most_bytes = most});
+  const std::string raw = run_process(command, patience(path, 2 * kPatience, most));
   return {raw.begin(), raw.end()};
 }
 

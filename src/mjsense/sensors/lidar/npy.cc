@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <cstdint>
 #include <cstring>
+#include <filesystem>
 #include <fstream>
 #include <string_view>
 
@@ -14,6 +15,8 @@
 
 namespace mjsense {
 namespace {
+
+constexpr long kMostRows = 10'000'000;
 
 // What is read, and for whom.
 struct Source {
@@ -38,6 +41,11 @@ std::string_view entry(std::string_view header, std::string_view key, const Sour
 
 std::vector<std::array<double, 2>> read_npy_pairs(const std::string& path, std::string_view place) {
   const Source source{path, place};
+  std::error_code ignored;
+  const auto status = std::filesystem::status(path, ignored);
+  // Who opens a pipe waits for its writer.
+  if (std::filesystem::exists(status) && !std::filesystem::is_regular_file(status))
+    fail(source, "is no file");
   std::ifstream in(path, std::ios::binary);
   if (!in) fail(source, "cannot be opened");
   char magic[8];
@@ -69,6 +77,7 @@ std::vector<std::array<double, 2>> read_npy_pairs(const std::string& path, std::
   if (begin < 0 || end < begin ||
       static_cast<std::size_t>(end - begin) / row_bytes < static_cast<std::size_t>(rows))
     fail(source, fmt::format("ends before its {} rows", rows));
+  if (rows > kMostRows) fail(source, fmt::format("has more than {} rows", kMostRows));
   std::vector<char> raw(static_cast<std::size_t>(rows) * row_bytes);
   if (!in.seekg(begin).read(raw.data(), static_cast<std::streamsize>(raw.size())))
     fail(source, fmt::format("cannot be read to its {} rows", rows));
