@@ -6,6 +6,8 @@ outside the folder, or be called whole.
 """
 
 import os
+import struct
+import subprocess
 import zlib
 from pathlib import Path
 
@@ -122,6 +124,39 @@ def _(house, create):
 def _(house, create):
     with change(house) as f:
         replace(f["traj_0/obs/agent"], "qpos", **create)
+
+
+# What no recorder writes, of as many rows as there are steps.
+OF_STEPS = {
+    "lists": lambda n: dict(shape=(n,), dtype=h5py.vlen_dtype(np.float64)),
+    "references": lambda n: dict(shape=(n,), dtype=h5py.ref_dtype),
+    "long_doubles": lambda n: dict(data=np.zeros((n, 3), np.longdouble)),
+    "packed_bits": lambda n: dict(data=np.zeros((n, 3), np.int32), scaleoffset=3, chunks=(1, 3)),
+    "two_packings": lambda n: dict(shape=(n, 7), dtype="f8", chunks=(1, 7), compression="gzip", shuffle=True, fletcher32=True),
+}
+
+
+@variants("rows_of", OF_STEPS)
+def _(house, create):
+    with change(house) as f:
+        replace(f["traj_0/obs/agent"], "qpos", **create(len(f["traj_0/success"])))
+        if f["traj_0/obs/agent/qpos"].shuffle:
+            f["traj_0/obs/agent/qpos"].id.write_direct_chunk((0, 0), b"\0\0")
+
+
+@variants("success_of", {"nan": np.nan, "two_columns": [0, 0], "many_words": 7})
+def _(house, value):
+    with change(house) as f:
+        rows = np.array([value] * len(f["traj_0/success"]))
+        words = h5py.enum_dtype({f"v{i}": i for i in range(256)}, basetype="u1")
+        replace(f["traj_0"], "success", data=rows, dtype=words if np.all(rows == 7) else rows.dtype)
+
+
+@variants("recording_is", {"deep": "[" * 100_000, "words": "pick", "number": "3", "escapes": "\x1b]0;x\x07"})
+def _(house, text):
+    with change(house) as f:
+        del f.attrs["recording"]
+        f.attrs.create("recording", text[:60_000])
 
 
 @case
@@ -344,6 +379,25 @@ def video_claims_more(house):
     at = data.index(b"stsz") + 12
     data[at : at + 4] = b"\xff\xff\xff\xff"
     path.write_bytes(data)
+
+
+def longer_by_holes(path, header):
+    with open(path, "ab") as f:
+        f.write(header)
+        f.truncate(f.tell() + 10**12)
+
+
+@variants("holes_behind", {"mp4": struct.pack(">I4sQ", 1, b"free", 10**12 + 16), "mkv": b"\xec\x01" + struct.pack(">Q", 10**12)[1:], "h5": b""})
+def _(house, header):
+    longer_by_holes(min(house.glob("*.h5" if not header else "*.mp4" if b"free" in header else "*.mkv")), header)
+
+
+@case
+def many_large_pictures(house):
+    """Kilobytes that unpack to minutes and gigabytes."""
+    path = min(house.glob("*.mp4"))
+    source = ["-f", "lavfi", "-i", "color=gray:size=8192x8192:rate=10", "-frames:v", "3"]
+    subprocess.run(["ffmpeg", "-y", "-loglevel", "error", *source, "-c:v", "libx264", "-preset", "ultrafast", path], check=True)
 
 
 @case

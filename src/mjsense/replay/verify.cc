@@ -10,6 +10,7 @@
 #include "mjsense/core/parallel.h"
 #include "mjsense/core/plain_file.h"
 #include "mjsense/record/checksum.h"
+#include "mjsense/record/description.h"
 #include "mjsense/record/house.h"
 #include "mjsense/record/video_file.h"
 #include "mjsense/replay/check.h"
@@ -71,7 +72,9 @@ class FileVerifier {
     haddr_t end = 0;
     if (!sealed_ && H5Fget_eoa(file, &end) >= 0 && end < bytes_)
       error(recorded_.name, fmt::format("has {} bytes behind its end", bytes_ - end));
-    const bool ours = h5::has_attribute(file, "recording");
+    ours_ = h5::has_attribute(file, "recording");
+    if (ours_ && !parse_description(h5::text_attribute(file, "recording")).is_object())
+      error(recorded_.name, "has a description of the recording that cannot be read");
     const std::vector<std::string> names = trajectory_names(file);
     if (names.empty()) error(recorded_.name, "holds no trajectory");
     for (std::size_t i = 0; i < names.size(); ++i) {
@@ -86,11 +89,12 @@ class FileVerifier {
         error(place, e.what());
       }
     }
-    if (ours && without_sum_ > 0) {
+    if (ours_ && without_sum_ > 0) {
       note(recorded_.name,
-           fmt::format("has no checksums of {} datasets and videos: recorded before there were any",
-                       without_sum_));
-    } else if (ours && !sealed_) {
+           fmt::format("has no checksums of {} datasets and videos: {}", without_sum_,
+                       with_sum_ > 0 ? "they were changed or added later"
+                                     : "recorded before there were any"));
+    } else if (ours_ && !sealed_) {
       note(recorded_.name,
            "was changed since it was recorded: it has no checksum of the whole file");
     }
@@ -101,7 +105,8 @@ class FileVerifier {
     if (!h5::exists(trajectory, "success"))
       return error(place, "has no 'success': its length is unknown");
     const RowDataset success(trajectory, "success");
-    if (!success.is_number()) return error(place, "has a 'success' that is no row of booleans");
+    if (!success.is_number() || success.row_size() != 1)
+      return error(place, "has a 'success' that is no row of booleans");
     const std::int64_t T = success.rows();
     if (T > kMostSteps) return error(place, fmt::format("claims {} steps", T));
     steps_ += T;
@@ -128,12 +133,10 @@ class FileVerifier {
   // What is compared with the checksum that stands beside the data.
   void compare(hid_t object, const std::string& place, const Checksum& sum) {
     const std::string stated = h5::text_attribute(object, kChecksumAttribute);
-    if (stated.empty()) {
-      ++without_sum_;
-    } else if (stated != sum.text()) {
+    ++(stated.empty() ? without_sum_ : with_sum_);
+    if (!stated.empty() && stated != sum.text())
       error(place, fmt::format("is not what was recorded: its checksum is {}, expected {}",
                                sum.text(), stated));
-    }
   }
 
   void check_dataset(hid_t trajectory, const std::string& name, std::int64_t T,
@@ -163,7 +166,10 @@ class FileVerifier {
       });
       if (bad > 1) error(place, fmt::format("{} rows are no JSON text", bad));
     }
-    if (!dataset.is_number()) return;
+    if (!dataset.is_number()) {
+      if (ours_) error(place, fmt::format("is {}, which is never recorded", dataset.dtype()));
+      return;
+    }
     dataset.each_bytes([&](std::string_view bytes) { sum.add(bytes.data(), bytes.size()); });
     compare(dataset.id(), place, sum);
   }
@@ -198,7 +204,7 @@ class FileVerifier {
         try {
           const h5::Id dataset = h5::open_dataset(group, key);
           const std::string crc = h5::text_attribute(dataset, kChecksumAttribute);
-          if (crc.empty()) ++without_sum_;
+          ++(crc.empty() ? without_sum_ : with_sum_);
           out_["videos"].push_back({{"place", printable(video_place)},
                                     {"name", read_file_name(group, key)},
                                     {"frames", T},
@@ -224,7 +230,8 @@ class FileVerifier {
   bool sealed_;
   Json out_{{"findings", Json::array()}, {"videos", Json::array()}};
   std::size_t findings_ = 0;
-  int episodes_ = 0, without_sum_ = 0;
+  bool ours_ = false;
+  int episodes_ = 0, without_sum_ = 0, with_sum_ = 0;
   std::int64_t steps_ = 0;
   std::uint64_t unpacked_ = 0;
 };
