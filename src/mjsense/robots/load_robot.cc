@@ -36,6 +36,10 @@ void validate(const MoveGroupCfg& cfg, std::string_view place) {
     throw ValueError(fmt::format("{}: '{}' has {} widths of start noise for {} start positions",
                                  place, cfg.name, cfg.spread.size(), cfg.init.size()));
   }
+  if (!cfg.stooped.empty() && cfg.stooped.size() != cfg.init.size()) {
+    throw ValueError(fmt::format("{}: '{}' has {} stooped positions for {} start positions", place,
+                                 cfg.name, cfg.stooped.size(), cfg.init.size()));
+  }
   if (cfg.kind == GroupKind::kBase && !cfg.init.empty()) {
     throw ValueError(
         fmt::format("{}: '{}' is a base and has start positions: where it stands is the task's",

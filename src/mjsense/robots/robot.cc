@@ -182,6 +182,16 @@ void Robot::write_start(const StateRow& state, const std::optional<Pose>& base, 
   }
 }
 
+bool Robot::stoop() {
+  bool any = false;
+  for (MoveGroupCfg& group : cfg_.groups) {
+    if (group.stooped.empty()) continue;
+    group.init = group.stooped;
+    any = true;
+  }
+  return any;
+}
+
 // The target of a group that has no command.
 std::span<double> Robot::holding(int world, int g) {
   GroupValues& target = targets_[world][g];

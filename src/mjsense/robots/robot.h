@@ -74,6 +74,9 @@ class Robot {
   // Start configuration with noise drawn from rng, robot standing at X_WB, or where it stands;
   // controls hold it. Throws ValueError where nothing can carry the base there.
   void write_start(const StateRow& state, const std::optional<Pose>& base, Rng& rng) const;
+  // From now on it starts stooped: cfg().groups[i].init is what `stooped` says, where it says
+  // something. Whether there is such a group.
+  bool stoop();
   // A new episode: the targets are what the controllers hold now (arm: its qpos; gripper: open or
   // closed as it is).
   void reset(const World& world);

@@ -34,6 +34,7 @@ struct MoveGroupCfg {
   std::string leaf_site;
   std::string root_body;
   std::vector<double> init;
+  std::vector<double> stooped;
   std::vector<double> spread;
   // Grippers only.
   double open_command = 0, closed_command = 0;
@@ -53,6 +54,8 @@ void visit_fields(V& v, MoveGroupCfg& c) {
   v("leaf_site", c.leaf_site, "Site of its tool frame; none: the robot's base frame.");
   v("root_body", c.root_body, "Body whose subtree is the group; a gripper's geoms are there.");
   v("init", c.init, "Start positions (qpos) of its joints: rad or m.");
+  v("stooped", c.stooped,
+    "Likewise, where what it is to take is too low for ``init``; none: it does not stoop.");
   v("spread", c.spread, "Half widths of the uniform noise of the start; none: no noise.")
       .at_least(0);
   v("open_command", c.open_command, "Of a gripper's actuators: open.");

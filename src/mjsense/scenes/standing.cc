@@ -18,7 +18,7 @@ constexpr double kHeights[] = {0.06, 0.15};  // m above it, of the tool
 constexpr double kTilts[] = {0, 45};         // degrees from above
 constexpr double kStep = 0.05;               // m between two places
 constexpr int kBack = 4, kAhead = 8;         // steps
-constexpr double kEnough = 0.75;             // of the points
+constexpr double kEnough = 0.95;             // of the points
 constexpr double kHang = 0.35;               // m, tool of a floating hand above the targets
 constexpr double kHangBack = 0.15;           // m, nearer to where the scene has the robot
 constexpr int kIterations = 250;
@@ -42,40 +42,146 @@ std::vector<Vec3> targets(const mjModel* m, const EpisodeScene& scene) {
   return points;
 }
 
-bool reaches(const Robot& robot, const RobotValues& start, const Pose& base, Vec3 point) {
+RobotValues start_of(const mjModel* model, const Robot& robot, bool stooped = false) {
+  RobotValues start;
+  for (std::size_t g = 0; g < robot.groups().size(); ++g) {
+    const MoveGroup& group = robot.groups()[g];
+    const MoveGroupCfg& cfg = robot.cfg().groups[g];
+    const auto& init = stooped && !cfg.stooped.empty() ? cfg.stooped : cfg.init;
+    start[g].size = static_cast<int>(group.qpos.size());
+    for (std::size_t i = 0; i < group.qpos.size(); ++i)
+      start[g].values[i] = i < init.size() ? init[i] : model->qpos0[group.qpos[i]];
+  }
+  return start;
+}
+
+// In how many of the ways to come down to a point a hand gets there, of all ways; the best hand counts.
+double ways_to(const Robot& robot, const RobotValues& start, const Pose& base, Vec3 point) {
+  double best = 0;
   for (std::size_t g = 0; g < robot.groups().size(); ++g) {
     if (robot.groups()[g].kind != GroupKind::kArm || robot.groups()[g].leaf_site < 0) continue;
+    int reached = 0, ways = 0;
     for (double tilt : kTilts) {
-      for (int quarter = 0; quarter < 2; ++quarter) {
+      for (int quarter = 0; quarter < 2; ++quarter, ++ways) {
         // Down, leaning outwards, the fingers along or across.
         const Quat q =
             axis_angle({0, 1, 0}, pi - tilt * pi / 180) * axis_angle({0, 0, 1}, 0.5 * pi * quarter);
         RobotValues values = start;
         const Pose tool{point, base.q * q};
-        if (robot.ik(static_cast<int>(g), inverse(base) * tool, values, kIterations)) return true;
+        reached += robot.ik(static_cast<int>(g), inverse(base) * tool, values, kIterations);
       }
     }
+    best = std::max(best, static_cast<double>(reached) / ways);
   }
-  return false;
+  return best;
 }
+
+// Of all points, 0 .. 1.
+struct Reached {
+  double points = 0, ways = 0;
+};
+
+// Tries places, upright or stooped.
+class Search {
+ public:
+  Search(const mjModel* model, const Robot& robot, const EpisodeScene& scene,
+         std::span<const Vec3> surface, bool stooped)
+      : model_(model), robot_(robot), scene_(scene), data_(mj_makeData(model), mj_deleteData) {
+    start_ = start_of(model, robot, stooped);
+    for (Vec3 p : surface) {
+      for (double height : kHeights) points_.push_back(p + Vec3{0, 0, height});
+    }
+  }
+
+  Reached reached(const Pose& base) const {
+    Reached out;
+    for (Vec3 p : points_) {
+      const double ways = ways_to(robot_, start_, base, p);
+      out.points += ways > 0;
+      out.ways += ways;
+    }
+    return {out.points / points_.size(), out.ways / points_.size()};
+  }
+
+  bool is_free(const Pose& base) const {
+    mj_resetData(model_, data_.get());
+    Rng none(0, 0, 0, 0);
+    robot_.write_start(state_row(data_.get()), base, none);
+    for (std::size_t g = 0; g < robot_.groups().size(); ++g) {
+      const auto& address = robot_.groups()[g].qpos;
+      if (robot_.cfg().groups[g].init.empty()) continue;
+      for (std::size_t i = 0; i < address.size(); ++i)
+        data_->qpos[address[i]] = start_[g].values[i];
+    }
+    for (const SceneObject& object : scene_.objects())  // they come later, and never so near
+      data_->qpos[model_->jnt_qposadr[model_->body_jntadr[object.body]]] += 100;
+    mj_kinematics(model_, data_.get());
+    mj_comPos(model_, data_.get());
+    mj_collision(model_, data_.get());
+    const int root = model_->body_rootid[robot_.base_body()];
+    for (int c = 0; c < data_->ncon; ++c) {
+      const mjContact& contact = data_->contact[c];
+      if (contact.geom[0] < 0 || contact.geom[1] < 0 || contact.dist > -kDeep) continue;
+      const int a = model_->body_rootid[model_->geom_bodyid[contact.geom[0]]];
+      const int b = model_->body_rootid[model_->geom_bodyid[contact.geom[1]]];
+      if ((a == root) != (b == root)) return false;
+    }
+    return !stands_in_something(root);
+  }
+
+  // The place ahead or behind from which more ways lead to the points than `best`; of equals the one that is
+  // nearer.
+  void improve(const Pose& base, double& best, Pose& offset) const {
+    for (int k = -kBack; k <= kAhead; ++k) {
+      const Pose moved{{kStep * k, 0, 0}, {}};
+      if (k == 0 || !is_free(base * moved)) continue;
+      const double ways = reached(base * moved).ways;
+      if (ways < best || (ways == best && std::abs(moved.p.x) >= std::abs(offset.p.x))) continue;
+      best = ways;
+      offset = moved;
+    }
+  }
+
+ private:
+  // Of what does not move MuJoCo makes no contacts: the foot of a robot against furniture.
+  bool stands_in_something(int root) const {
+    const auto stands = [&](int g) {
+      const int body = model_->geom_bodyid[g];
+      return model_->body_treeid[body] < 0 &&
+             (model_->geom_contype[g] || model_->geom_conaffinity[g]);
+    };
+    for (int a = 0; a < model_->ngeom; ++a) {
+      if (!stands(a) || model_->body_rootid[model_->geom_bodyid[a]] != root) continue;
+      for (int b = 0; b < model_->ngeom; ++b) {
+        const int type = model_->geom_type[b];
+        if (!stands(b) || model_->body_rootid[model_->geom_bodyid[b]] == root ||
+            type == mjGEOM_PLANE || type == mjGEOM_HFIELD || type == mjGEOM_SDF)
+          continue;
+        if (mj_geomDistance(model_, data_.get(), a, b, kDeep, nullptr) < -kDeep) return true;
+      }
+    }
+    return false;
+  }
+
+  const mjModel* model_;
+  const Robot& robot_;
+  const EpisodeScene& scene_;
+  std::unique_ptr<mjData, decltype(&mj_deleteData)> data_;
+  RobotValues start_;
+  std::vector<Vec3> points_;  // m, world
+};
 
 }  // namespace
 
-Standing::Standing(const mjModel* model, const Robot& robot, const EpisodeScene& scene) {
+Standing::Standing(const mjModel* model, Robot& robot, const EpisodeScene& scene) {
   const std::vector<Vec3> surface = targets(model, scene);
   if (surface.empty()) return;
   const SceneRobotCfg& cfg = scene.cfg().robot;
   const Pose base{{cfg.pos[0], cfg.pos[1], cfg.pos[2]}, axis_angle({0, 0, 1}, cfg.yaw * pi / 180)};
   bool has_arm = false, floats = false;
-  RobotValues start;
-  for (std::size_t g = 0; g < robot.groups().size(); ++g) {
-    const MoveGroup& group = robot.groups()[g];
-    const auto& init = robot.cfg().groups[g].init;
+  for (const MoveGroup& group : robot.groups()) {
     has_arm = has_arm || (group.kind == GroupKind::kArm && group.leaf_site >= 0);
     floats = floats || (group.kind == GroupKind::kBase && group.command_size == 7);
-    start[g].size = static_cast<int>(group.qpos.size());
-    for (std::size_t i = 0; i < group.qpos.size(); ++i)
-      start[g].values[i] = i < init.size() ? init[i] : model->qpos0[group.qpos[i]];
   }
   if (!has_arm) {
     if (!floats || robot.gripper() < 0) return;
@@ -85,7 +191,7 @@ Standing::Standing(const mjModel* model, const Robot& robot, const EpisodeScene&
       middle = middle + (1.0 / static_cast<double>(surface.size())) * p;
       top = std::max(top, p.z);
     }
-    const double reach = robot.fk(robot.gripper(), start).p.z;
+    const double reach = robot.fk(robot.gripper(), start_of(model, robot)).p.z;
     const Vec3 back = rotate(base.q, {-kHangBack, 0, 0});
     const Pose hang{{middle.x + back.x, middle.y + back.y, top + kHang + reach},
                     base.q * Quat{0, 1, 0, 0}};
@@ -93,47 +199,21 @@ Standing::Standing(const mjModel* model, const Robot& robot, const EpisodeScene&
     return;
   }
 
-  std::vector<Vec3> points;
-  for (Vec3 p : surface) {
-    for (double height : kHeights) points.push_back(p + Vec3{0, 0, height});
-  }
-  const auto share = [&](const Pose& at) {
-    int reached = 0;
-    for (Vec3 p : points) reached += reaches(robot, start, at, p);
-    return static_cast<double>(reached) / static_cast<double>(points.size());
-  };
-  double best = share(base);
-  if (best >= kEnough) return;
-  const std::unique_ptr<mjData, decltype(&mj_deleteData)> data(mj_makeData(model), mj_deleteData);
-  const int root = model->body_rootid[robot.base_body()];
-  const auto is_free = [&](const Pose& at) {
-    mj_resetData(model, data.get());
-    Rng none(0, 0, 0, 0);
-    robot.write_start(state_row(data.get()), at, none);
-    for (const SceneObject& object : scene.objects())  // they come later, and never so near
-      data->qpos[model->jnt_qposadr[model->body_jntadr[object.body]]] += 100;
-    mj_kinematics(model, data.get());
-    mj_comPos(model, data.get());
-    mj_collision(model, data.get());
-    for (int c = 0; c < data->ncon; ++c) {
-      const mjContact& contact = data->contact[c];
-      if (contact.geom[0] < 0 || contact.geom[1] < 0 || contact.dist > -kDeep) continue;
-      const int a = model->body_rootid[model->geom_bodyid[contact.geom[0]]];
-      const int b = model->body_rootid[model->geom_bodyid[contact.geom[1]]];
-      if ((a == root) != (b == root)) return false;
-    }
-    return true;
-  };
-  for (int k = -kBack; k <= kAhead; ++k) {
-    const Pose offset{{kStep * k, 0, 0}, {}};
-    if (k == 0 || !is_free(base * offset)) continue;
-    const double reached = share(base * offset);
-    // Of equals the one that is nearer.
-    if (reached < best || (reached == best && std::abs(offset.p.x) >= std::abs(offset_.p.x)))
-      continue;
-    best = reached;
-    offset_ = offset;
-  }
+  const Search upright(model, robot, scene, surface, false);
+  const Reached there = upright.reached(base);
+  if (there.points >= kEnough) return;
+  double best = there.ways;
+  upright.improve(base, best, offset_);
+  if (upright.reached(base * offset_).points >= kEnough) return;
+  const auto stoops = [](const MoveGroupCfg& group) { return !group.stooped.empty(); };
+  if (std::ranges::none_of(robot.cfg().groups, stoops)) return;
+  const Search stooped(model, robot, scene, surface, true);
+  Pose offset;
+  double lower = stooped.is_free(base) ? stooped.reached(base).ways : 0;
+  stooped.improve(base, lower, offset);
+  if (lower <= best) return;
+  offset_ = offset;
+  robot.stoop();
 }
 
 }  // namespace mjsense

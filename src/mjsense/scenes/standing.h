@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
-// Where a robot stands in a scene that was made for another: nearer or farther, so that its hands
-// reach where the targets are; a floating hand hangs above them.
+// Where a robot stands in a scene that was made for another: nearer or farther, stooped if it can, so
+// that its hands reach where the targets are; a floating hand hangs above them.
 
 #include "mjsense/robots/robot.h"
 #include "mjsense/scenes/episode_scene.h"
@@ -11,9 +11,10 @@ namespace mjsense {
 class Standing {
  public:
   Standing() = default;
-  // Where the scene says, if a hand reaches three quarters of the target areas from there; otherwise the place
-  // ahead or behind that is free of the scene and from which most are reached.
-  Standing(const mjModel* model, const Robot& robot, const EpisodeScene& scene);
+  // Where the scene says, if a hand reaches nearly all of the target areas from there; otherwise the place ahead
+  // or behind that is free of the scene and from which most ways lead to them. Where that is not nearly all
+  // either, the robot stoops (Robot::stoop), if more do then.
+  Standing(const mjModel* model, Robot& robot, const EpisodeScene& scene);
   // X_WB for an episode in which the scene says `scene_pose`.
   Pose operator()(const Pose& scene_pose) const { return scene_pose * offset_; }
   const Pose& offset() const { return offset_; }

@@ -16,7 +16,7 @@ Pose offset_of(const char* robot_name) {
   cfg.robot = robot_cfg(robot_name);
   PickTask task(cfg);
   Scene compiled(task.whole_scene_cfg());
-  const Robot robot(cfg.robot, compiled.model(), 1);
+  Robot robot(cfg.robot, compiled.model(), 1);
   scene.initialize(compiled.model(), 1, "robot_0/");
   return Standing(compiled.model(), robot, scene).offset();
 }
@@ -28,6 +28,23 @@ TEST(Standing, WhoReachesStaysWhereTheSceneSays) {
     EXPECT_EQ(norm(offset.p), 0) << robot;
     EXPECT_EQ(offset.q.w, 1) << robot;
   }
+}
+
+// The tops are 0.6 m high, RB-Y1's hands twice that.
+TEST(Standing, WhoCanStoopDoesWhereATableIsLow) {
+  EpisodeScene scene(load_scene("table"));
+  TaskCfg cfg;
+  cfg.robot = robot_cfg("rby1");
+  PickTask task(cfg);
+  Scene compiled(task.whole_scene_cfg());
+  Robot robot(cfg.robot, compiled.model(), 1);
+  const int torso = robot.group_index("torso");
+  const std::vector<double> upright = robot.cfg().groups[torso].init;
+  scene.initialize(compiled.model(), 1, "robot_0/");
+  const Standing standing(compiled.model(), robot, scene);
+  EXPECT_EQ(robot.cfg().groups[torso].init, cfg.robot.groups[torso].stooped);
+  EXPECT_NE(robot.cfg().groups[torso].init, upright);
+  EXPECT_LE(std::abs(standing.offset().p.x), 0.2);
 }
 
 TEST(Standing, AFloatingHandHangsAboveTheTargetsPointingDown) {

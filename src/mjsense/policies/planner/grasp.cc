@@ -22,6 +22,8 @@ constexpr double kTopGap = 0.012;      // m, of the tool's origin below the top 
 // Slides of the grasp along the object, across the closing direction.
 constexpr std::array<double, 5> kSlides{0.0, 0.012, -0.012, 0.024, -0.024};
 
+constexpr double kSameEnd = 0.0005;  // m
+
 struct DataDelete {
   void operator()(mjData* data) const { mj_deleteData(data); }
 };
@@ -71,6 +73,8 @@ GripperShape::GripperShape(const mjModel* model, const Robot& robot, int gripper
   tip = high.z + kSwing;
   pad_half_width = cfg.pad_half_width;
   pad_half_length = cfg.pad_half_length;
+  // Pads end where the fingers do.
+  if (high.z < pad_half_length - kSameEnd) pad_middle = high.z - pad_half_length;
 }
 
 bool GripperShape::hits(const Pose& tool, const Pose& object, const ObjectShape& shape,
@@ -124,7 +128,8 @@ std::vector<Grasp> propose_grasps(const GripperShape& gripper, const ObjectShape
       for (double slide : kSlides) {
         const Vec3 center = Vec3{object.p.x, object.p.y, z} + slide * across;
         const Squeeze s =
-            squeeze(points, center, close, across, {0, 0, 1}, half_width, half_length);
+            squeeze(points, center - Vec3{0, 0, gripper.pad_middle}, close, across, {0, 0, 1},
+                    half_width, half_length);
         const double width = s.high - s.low;
         if (!(width > kLeastWidth && width < gripper.max_opening - 2 * kSideGap) ||
             s.face < kFaceWidth)

@@ -24,7 +24,9 @@ struct GripperShape {
   double radius = 0;
   double tip = 0;  // m, how far the fingers reach below the origin, at any opening
   double pad_half_width = 0, pad_half_length = 0;  // m, of a pad, across and along the approach
-  double max_opening = 0;                          // m
+  double pad_middle =
+      0;  // m, of the pads along the approach: behind the origin where that is near their ends
+  double max_opening = 0;  // m
   // The frame above in the robot's tool frame, whose z it has: another where pads close along another axis than y.
   Quat turn;  // q_TG
 
@@ -50,7 +52,7 @@ std::vector<Grasp> propose_grasps(const GripperShape& gripper, const ObjectShape
 
 // Grasps of an object in its own frame, whatever it stands on: closing directions all over the
 // sphere, sixteen approaches about each; chosen by the same faces. The open gripper touches the object in none.
-// `cost` is 8 * distance to the object's origin (m).
+// `cost` is 8 * distance to the object's origin (m), + 2 * slope of the faces.
 std::vector<Grasp> grasps_all_around(const GripperShape& gripper, const ObjectShape& shape);
 
 // The grasps of an object at X_WO in the world, by rising cost = distance to the tool (m) + 0.01 * turn (deg) - 2

@@ -17,10 +17,11 @@ constexpr int kDirections = 40;  // closing directions all over half a sphere, b
 constexpr int kAroundAxis = 12;  // about each axis of the body
 constexpr int kApproaches = 16;  // about a closing direction
 constexpr std::array<double, 3> kSlides{0.0, 0.015, -0.015};  // m, across closing and approach
-// m, of the tool's origin behind the surface that comes first: what lies flat is taken with the ends of the pads, because
+// m, of the ends of the pads behind the surface that comes first: what lies flat is taken with them, because
 // the tips would meet what it lies on.
-constexpr std::array<double, 4> kDepths{-0.008, 0.002, 0.012, 0.030};
-constexpr std::size_t kPoints = 450;  // most that are looked at
+constexpr std::array<double, 4> kDepths{0.0091, 0.0191, 0.0291, 0.0471};
+constexpr double kSlope = 2.0, kMostSlope = 2.0;  // cost of a slope, and its most
+constexpr std::size_t kPoints = 450;              // most that are looked at
 
 std::vector<Vec3> closing_directions() {
   std::vector<Vec3> all;
@@ -82,12 +83,13 @@ std::vector<Grasp> grasps_all_around(const GripperShape& gripper, const ObjectSh
       }
       // No deeper than the middle.
       const double mid = 0.5 * (near + far);
-      for (double depth : kDepths) {
+      for (double end : kDepths) {
+        const double depth = end - half_length - gripper.pad_middle;
         if (near + depth > mid + 0.002) break;
         for (double slide : kSlides) {
           const Vec3 center = middle + (near + depth) * approach + slide * across;
-          const Squeeze s =
-              squeeze(points, center, close, across, approach, half_width, half_length);
+          const Squeeze s = squeeze(points, center + gripper.pad_middle * approach, close, across,
+                                    approach, half_width, half_length);
           const double width = s.high - s.low;
           if (!(width > kLeastWidth && width < gripper.max_opening - 2 * kLeastSideGap) ||
               s.face < kFaceWidth)
@@ -96,7 +98,7 @@ std::vector<Grasp> grasps_all_around(const GripperShape& gripper, const ObjectSh
           grasp.pose = {center + (0.5 * (s.low + s.high)) * close,
                         quat_from_columns(cross(close, approach), close, approach)};
           grasp.width = width;
-          grasp.cost = 8.0 * norm(grasp.pose.p);
+          grasp.cost = 8.0 * norm(grasp.pose.p) + std::min(kMostSlope, kSlope * std::abs(s.slope));
           if (!gripper.hits(grasp.pose, {}, shape, 0.0)) grasps.push_back(grasp);
         }
       }

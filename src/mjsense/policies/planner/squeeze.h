@@ -11,16 +11,17 @@
 
 namespace mjsense {
 
-constexpr double kSideGap = 0.006;       // m, free on each side of the object before closing
-constexpr double kLeastSideGap = 0.004;  // m, the same where the gripper opens hardly wider
-constexpr double kFaceDepth = 0.002;     // m, what counts as one face
-constexpr double kFaceWidth = 0.010;     // m, of the face that both pads touch
-constexpr double kLeastWidth = 0.004;    // m, of an object
+constexpr double kSideGap = 0.006;        // m, free on each side of the object before closing
+constexpr double kLeastSideGap = 0.0025;  // m, the same where the gripper opens hardly wider
+constexpr double kFaceDepth = 0.002;      // m, what counts as one face
+constexpr double kFaceWidth = 0.010;      // m, of the face that both pads touch
+constexpr double kLeastWidth = 0.004;     // m, of an object
 
 // Extent of the surface between the pads, and of the faces that they would touch.
 struct Squeeze {
   double low = std::numeric_limits<double>::infinity(), high = -low;
-  double face = 0;  // m, overlap of the two faces across the closing direction
+  double face = 0;   // m, overlap of the two faces across the closing direction
+  double slope = 0;  // how much wider it becomes along the approach: what slopes slips out
 };
 
 inline Squeeze squeeze(std::span<const Vec3> points, Vec3 center, Vec3 close, Vec3 across,
@@ -29,19 +30,27 @@ inline Squeeze squeeze(std::span<const Vec3> points, Vec3 center, Vec3 close, Ve
     return std::abs(dot(r, across)) <= half_width && std::abs(dot(r, approach)) <= half_length;
   };
   Squeeze s;
+  double near = half_length, far = -half_length;
   for (Vec3 p : points) {
     const Vec3 r = p - center;
     if (!inside(r)) continue;
-    const double c = dot(r, close);
+    const double c = dot(r, close), v = dot(r, approach);
     s.low = std::min(s.low, c);
     s.high = std::max(s.high, c);
+    near = std::min(near, v);
+    far = std::max(far, v);
   }
   if (!(s.low < s.high)) return s;
   double low0 = 1, low1 = -1, high0 = 1, high1 = -1;
+  double near_low = s.high, near_high = s.low, far_low = s.high, far_high = s.low;
   for (Vec3 p : points) {
     const Vec3 r = p - center;
     if (!inside(r)) continue;
-    const double c = dot(r, close), u = dot(r, across);
+    const double c = dot(r, close), u = dot(r, across), v = dot(r, approach);
+    const bool in_near = v < 0.5 * (near + far);
+    double &least = in_near ? near_low : far_low, &most = in_near ? near_high : far_high;
+    least = std::min(least, c);
+    most = std::max(most, c);
     if (c < s.low + kFaceDepth) {
       low0 = std::min(low0, u);
       low1 = std::max(low1, u);
@@ -52,6 +61,11 @@ inline Squeeze squeeze(std::span<const Vec3> points, Vec3 center, Vec3 close, Ve
     }
   }
   s.face = std::min(low1, high1) - std::max(low0, high0);
+  if (!(near_low < near_high && far_low < far_high)) {
+    s.slope = std::numeric_limits<double>::infinity();
+    return s;
+  }
+  s.slope = ((far_high - far_low) - (near_high - near_low)) / std::max(0.5 * (far - near), 0.001);
   return s;
 }
 
