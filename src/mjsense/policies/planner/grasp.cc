@@ -127,9 +127,8 @@ std::vector<Grasp> propose_grasps(const GripperShape& gripper, const ObjectShape
       const Vec3 close{std::cos(yaw), std::sin(yaw), 0}, across{-close.y, close.x, 0};
       for (double slide : kSlides) {
         const Vec3 center = Vec3{object.p.x, object.p.y, z} + slide * across;
-        const Squeeze s =
-            squeeze(points, center - Vec3{0, 0, gripper.pad_middle}, close, across, {0, 0, 1},
-                    half_width, half_length);
+        const Squeeze s = squeeze(points, center - Vec3{0, 0, gripper.pad_middle}, close, across,
+                                  {0, 0, 1}, half_width, half_length);
         const double width = s.high - s.low;
         if (!(width > kLeastWidth && width < gripper.max_opening - 2 * kSideGap) ||
             s.face < kFaceWidth)
