@@ -218,5 +218,33 @@ TEST(TaskPlanner, AStageWithoutAWayBeginsAgainThenGivesUp) {
   EXPECT_EQ(planner.requests.size(), 8u);
 }
 
+// Closes on nothing, then knows no way.
+class ClosesOnce final : public TaskPlanner {
+ protected:
+  void initialize_planner() override {}
+  void make_plan(const World&, const PlanRequest& request, Plan& plan) override {
+    const int hand = robot().gripper();
+    if (request.attempt == 0)
+      plan.wait(1, 5).grip(hand, robot().groups()[hand].closed_command).holds(hand);
+  }
+};
+
+TEST(TaskPlanner, SaysWhatWentWrongAndThatThereWasNoOtherWay) {
+  TableStage stage("franka");
+  ClosesOnce planner;
+  planner.initialize(*stage.task);
+  planner.reset(stage.world);
+  EXPECT_EQ(planner.failure(0), "");
+  Action action;
+  for (int i = 0; i < 60 && !action.done; ++i) {
+    planner.act(stage.world, action);
+    stage.step(action);
+  }
+  EXPECT_EQ(action.success, std::optional<bool>(false));
+  EXPECT_EQ(planner.failure(0), "the hand held nothing, then it found no way");
+  planner.reset(stage.world);
+  EXPECT_EQ(planner.failure(0), "") << "another episode";
+}
+
 }  // namespace
 }  // namespace mjsense
