@@ -2,7 +2,11 @@
 #pragma once
 // Values of TOML files as values of fields: what every reader of such files shares.
 
-#include <toml++/impl/preprocessor.h>
+#if __has_include(<toml++/impl/preprocessor.h>)
+#include <toml++/impl/preprocessor.h>  // 3.3
+#else
+#include <toml++/impl/preprocessor.hpp>  // 3.4: Ubuntu 24.04, Debian 13
+#endif
 // toml++ 3.3 asserts of a file what a file may break ("[+a]"), or lets clang assume it; its code answers
 // rightly where neither is done.
 #undef TOML_ASSERT_ASSUME

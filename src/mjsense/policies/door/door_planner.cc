@@ -38,8 +38,11 @@ void DoorPlanner::initialize_planner() {
         fmt::format("the door planner opens doors; it cannot do task '{}'", task().name()));
   group_ = driving_base(robot());
   if (group_ < 0 || !door_->routes())
-    throw ValueError(fmt::format(
-        "the door planner needs a base that drives; that of robot '{}' does not", robot().name()));
+    throw ValueError(
+        fmt::format("the door planner needs a base that drives; that of robot '{}' does not "
+                    "(`mjsense robots` says "
+                    "which drive)",
+                    robot().name()));
   motions_ = std::make_unique<DoorMotions>(task().model(), robot(),
                                            DoorFloor{&door_->open_floor(), &door_->trunk()});
   if (motions_->hands().empty())

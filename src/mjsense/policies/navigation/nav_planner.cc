@@ -39,7 +39,8 @@ void NavPlanner::initialize_planner() {
                                  task().name()));
   if (!nav_->routes())
     throw ValueError(
-        fmt::format("the navigation planner needs a base that drives; that of robot '{}' does not",
+        fmt::format("the navigation planner needs a base that drives; that of robot '{}' does not "
+                    "(`mjsense robots` says which drive)",
                     robot().name()));
   group_ = driving_base(robot());
   tried_.assign(task().num_worlds(), {});
