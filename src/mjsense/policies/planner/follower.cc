@@ -47,8 +47,14 @@ std::vector<Hand> hands_of(const Robot& robot, const mjModel* model) {
   return hands;
 }
 
-void Follower::initialize(const Robot& robot, const mjModel* model, int num_worlds) {
+void Follower::initialize(const Robot& robot, const mjModel* model, int num_worlds, double dt) {
   robot_ = &robot;
+  dt_ = dt;
+  slides_.clear();
+  for (const MoveGroup& group : robot.groups()) {
+    slides_.emplace_back();
+    for (int joint : group.joints) slides_.back().push_back(model->jnt_type[joint] == mjJNT_SLIDE);
+  }
   floating_base_ = floating_base(robot);
   for (const Hand& hand : hands_of(robot, model)) {
     if (hand.tool == hand.gripper || joints_are_commanded(hand.tool)) continue;
@@ -65,6 +71,24 @@ bool Follower::joints_are_commanded(int group) const {
   return g.targets_are_qpos() && g.command_size == g.target_size;
 }
 
+void Follower::reset(const World& world) {
+  State& state = states_[world.id];
+  restart(world);
+  for (std::size_t g = 0; g < robot_->groups().size(); ++g) {
+    Sent& sent = state.sent[g];
+    sent = {};
+    if (static_cast<int>(g) == floating_base_) {
+      write_pose(robot_->base_pose(world), sent.values.data());
+      sent.given = true;
+    } else if (robot_->groups()[g].kind == GroupKind::kArm &&
+               joints_are_commanded(static_cast<int>(g))) {
+      sent.values = state.joints[g].values;
+      sent.given = true;
+    }
+    sent.wanted = sent.values;
+  }
+}
+
 void Follower::restart(const World& world) {
   State& state = states_[world.id];
   state.commands = {};
@@ -78,7 +102,7 @@ void Follower::begin(const World& world) {
   state.start = world.time();
   state.finished = false;
   state.ik_failures = 0;
-  if (!state.plan.segments.empty()) enter(state, state.plan.segments[0]);
+  if (!state.plan.segments.empty()) enter(world, state, state.plan.segments[0]);
 }
 
 PlanFailure Follower::failure(const World& world) const {
@@ -161,9 +185,56 @@ void Follower::move_group(State& state, const CommandPath& path, double time) {
   std::copy_n(command.values.begin(), n, state.joints[path.group].values.begin());
 }
 
+// How much longer an eased screw takes so that joints keep to their limits. With s = 3u^2 - 2u^3,
+// u = t / T: dq/dt = q'(s) s' / T, d2q/dt2 = (q''(s) s'^2 + q'(s) s'') / T^2.
+double Follower::stretch(const World& world, const State& state, const ToolMove& move) const {
+  constexpr int kParts = 12;
+  const MoveGroup& arm = robot_->groups()[move.tool];
+  const std::size_t n = arm.qpos.size();
+  if (!move.eased || move.seconds <= 0 || arm.kind != GroupKind::kArm) return 1;
+  const Pose to_base = move.in_world ? inverse(robot_->base_pose(world)) : Pose{};
+  std::array<std::array<double, GroupValues::kMaxSize>, kParts + 1> q;
+  RobotValues at = state.joints;
+  for (int k = 0; k <= kParts; ++k) {
+    const Pose tool = to_base * move.from * exp6((static_cast<double>(k) / kParts) * move.screw);
+    if (!robot_->ik(move.tool, tool, at, Chain::kTracking)) return 1;
+    q[k] = at[move.tool].values;
+  }
+  double factor = 1;
+  const double ds = 1.0 / kParts;
+  for (int k = 0; k <= kParts; ++k) {
+    const int a = std::max(0, k - 1), b = std::min(kParts, k + 1),
+              middle = std::clamp(k, 1, kParts - 1);
+    // s' and s'' where the screw has done k parts of kParts.
+    const double s = k * ds;
+    const double u = 0.5 - std::sin(std::asin(1 - 2 * s) / 3);
+    const double rate = 6 * u * (1 - u), change = 6 - 12 * u;
+    for (std::size_t i = 0; i < n; ++i) {
+      const bool slide = slides_[move.tool][i];
+      const double slope = (q[b][i] - q[a][i]) / ((b - a) * ds);
+      const double bend = (q[middle + 1][i] - 2 * q[middle][i] + q[middle - 1][i]) / (ds * ds);
+      const double v = std::abs(slope * rate) / move.seconds;
+      const double acc =
+          std::abs(bend * rate * rate + slope * change) / (move.seconds * move.seconds);
+      factor = std::max(factor, v / (slide ? cfg_.slide_speed : cfg_.line_speed));
+      factor = std::max(
+          factor, std::sqrt(acc / (slide ? cfg_.slide_acceleration : cfg_.line_acceleration)));
+    }
+  }
+  return factor;
+}
+
 // Inverse kinematics along a line ends near, not at, the joints from which a path was planned: an arm with more joints than it
 // needs drifts. What is left fades away along the path.
-void Follower::enter(State& state, const Segment& segment) const {
+void Follower::enter(const World& world, State& state, Segment& segment) const {
+  double longer = 0;
+  for (ToolMove& move : segment.tools) {
+    const double factor = stretch(world, state, move);
+    if (factor <= 1) continue;
+    longer = std::max(longer, (factor - 1) * move.seconds);
+    move.seconds *= factor;
+  }
+  segment.duration += longer;
   for (const CommandPath& path : segment.paths) {
     GroupValues& offset = state.offsets[path.group];
     offset.given = state.commands[path.group].given && joints_are_commanded(path.group);
@@ -187,6 +258,101 @@ void Follower::finish(const World& world, State& state, const Segment& done, con
   }
 }
 
+namespace {
+
+// Speed at which what is `away` from where it is wanted gets there and stops, braking with `most`,
+// at steps of dt.
+double closing_speed(double away, double most, double dt) {
+  const double far = std::abs(away);
+  const double speed =
+      std::min(far / dt, most * (std::sqrt(0.25 * dt * dt + 2 * far / most) - 0.5 * dt));
+  return std::copysign(speed, away);
+}
+
+constexpr double kBraking = 0.7;  // of the limit, for closing in: the rest is for what is followed
+
+}  // namespace
+
+// A command that can be reached from the last one stands as it is, to the bit; otherwise its rate
+// changes as fast as it may, until it is caught up with.
+void Follower::limit(int group, Sent& sent, std::span<double> command) const {
+  sent.moved = true;
+  for (std::size_t i = 0; i < command.size(); ++i) {
+    const double most = slides_[group][i] ? cfg_.most_slide_acceleration : cfg_.most_acceleration;
+    const double wanted = command[i], follow = (wanted - sent.wanted[i]) / dt_;
+    const double behind = sent.wanted[i] - sent.values[i], rate = sent.rates[i];
+    double next = (wanted - sent.values[i]) / dt_;
+    if (behind != 0 || std::abs(next - rate) > most * dt_) {
+      next = follow + closing_speed(behind, kBraking * most, dt_);
+      next = std::clamp(next, rate - most * dt_, rate + most * dt_);
+      command[i] = sent.values[i] + next * dt_;
+      if (std::abs(command[i] - wanted) < 1e-9) command[i] = wanted;
+    }
+    sent.rates[i] = next;
+    sent.values[i] = command[i];
+    sent.wanted[i] = wanted;
+  }
+}
+
+void Follower::limit_pose(Sent& sent, std::span<double> command) const {
+  const auto pose = [](const double* v) { return Pose{vec3(v), quat(v + 3)}; };
+  const auto turn = [](const Quat& from, const Quat& to) {
+    return rotate(from, log3(conjugate(from) * to));
+  };
+  const Pose last = pose(sent.values.data()), before = pose(sent.wanted.data()),
+             wanted = pose(command.data());
+  bool as_wanted = true;
+  for (int part = 0; part < 2; ++part) {
+    const double most = part == 0 ? cfg_.most_base_acceleration : cfg_.most_base_turn_acceleration;
+    const auto way = [&](const Pose& from, const Pose& to) {
+      return part == 0 ? to.p - from.p : turn(from.q, to.q);
+    };
+    const Vec3 rate = vec3(sent.rates.data() + 3 * part), behind = way(last, before);
+    Vec3 next = (1 / dt_) * way(last, wanted);
+    const double far = norm(behind);
+    if (far > 1e-9 || norm(next - rate) > most * dt_) {
+      next = (1 / dt_) * way(before, wanted);
+      if (far > 0) next = next + (closing_speed(far, kBraking * most, dt_) / far) * behind;
+      const double change = norm(next - rate);
+      if (change > most * dt_) next = rate + (most * dt_ / change) * (next - rate);
+      as_wanted = false;
+    }
+    write_vec(next, sent.rates.data() + 3 * part);
+  }
+  std::copy_n(command.begin(), 7, sent.wanted.begin());
+  if (!as_wanted) {
+    const Pose at{last.p + dt_ * vec3(sent.rates.data()),
+                  normalized(exp3(dt_ * vec3(sent.rates.data() + 3)) * last.q)};
+    write_pose(at, command.data());
+  }
+  std::copy_n(command.begin(), 7, sent.values.begin());
+}
+
+bool Follower::brake(const World& world, Action& action) {
+  bool at_rest = true;
+  for (std::size_t g = 0; g < robot_->groups().size(); ++g)
+    at_rest = rest(world, static_cast<int>(g), action) && at_rest;
+  return at_rest;
+}
+
+// An arm that was commanded, and is not now, stops and stays.
+bool Follower::rest(const World& world, int group, Action& action) {
+  Sent& sent = states_[world.id].sent[group];
+  if (!sent.moved || group == floating_base_) return true;
+  const std::size_t n = robot_->groups()[group].qpos.size();
+  bool at_rest = true;
+  for (std::size_t i = 0; i < n; ++i) {
+    const double most =
+        dt_ * (slides_[group][i] ? cfg_.most_slide_acceleration : cfg_.most_acceleration);
+    sent.rates[i] -= std::clamp(sent.rates[i], -most, most);
+    sent.values[i] += sent.rates[i] * dt_;
+    sent.wanted[i] = sent.values[i];
+    at_rest = at_rest && sent.rates[i] == 0;
+  }
+  action.commands[group].set({sent.values.data(), n});
+  return at_rest;
+}
+
 Pose Follower::tool_target(const World& world, int tool) const {
   const State& state = states_[world.id];
   if (robot_->groups()[tool].kind != GroupKind::kArm) {
@@ -200,14 +366,14 @@ Pose Follower::tool_target(const World& world, int tool) const {
 
 void Follower::follow(const World& world, Action& action) {
   State& state = states_[world.id];
-  const auto& segments = state.plan.segments;
+  auto& segments = state.plan.segments;
   const auto n = static_cast<int>(segments.size());
   while (state.segment < n && world.time() - state.start >= segments[state.segment].duration) {
     state.start += segments[state.segment].duration;
     ++state.segment;
     if (state.segment == n) break;
     finish(world, state, segments[state.segment - 1], segments[state.segment]);
-    enter(state, segments[state.segment]);
+    enter(world, state, segments[state.segment]);
   }
   state.finished = state.segment == n;
   if (n > 0) {
@@ -236,8 +402,19 @@ void Follower::follow(const World& world, Action& action) {
     const GroupValues& command = state.commands[g];
     if (command.given) {
       action.commands[g].set(command.view());
+      GroupValues& sent = action.commands[g];
+      const std::span<double> values(sent.values.data(), static_cast<std::size_t>(sent.size));
+      if (dt_ > 0 && state.sent[g].given) {
+        if (static_cast<int>(g) == floating_base_) {
+          limit_pose(state.sent[g], values);
+        } else {
+          limit(static_cast<int>(g), state.sent[g], values);
+        }
+      }
     } else if (group.kind == GroupKind::kBase && !group.controlled()) {
       action.commands[g].set({});  // one that drives is left out: it holds
+    } else {
+      rest(world, static_cast<int>(g), action);
     }
   }
 }

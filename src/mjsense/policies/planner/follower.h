@@ -30,6 +30,14 @@ struct FollowerCfg {
   double max_rotation_error = 0.5236;  // rad (30 degrees)
   double min_held_opening = 0.002;     // m: less between the fingers means nothing is held
   int max_ik_failures = 8;             // in a row
+  // Of joints while a tool goes eased along a screw: it takes longer where inverse kinematics would
+  // exceed them. Slides: m/s, m/s^2.
+  double line_speed = 1.5, line_acceleration = 4.0;  // rad/s, rad/s^2
+  double slide_speed = 0.3, slide_acceleration = 1.0;
+  // Of commands from one control step to the next, whatever plans say: where a plan is given up in
+  // the midst of a motion, too. Of arms' joints, and of a base that floats.
+  double most_acceleration = 10, most_slide_acceleration = 2.5;           // rad/s^2, m/s^2
+  double most_base_acceleration = 3.0, most_base_turn_acceleration = 10;  // m/s^2, rad/s^2
 };
 
 // A gripper and what moves it.
@@ -45,11 +53,14 @@ std::vector<Hand> hands_of(const Robot& robot, const mjModel* model);
 class Follower {
  public:
   explicit Follower(FollowerCfg cfg = {}) : cfg_(cfg) {}
-  // Throws ValueError for an arm whose commands are no joint positions.
-  void initialize(const Robot& robot, const mjModel* model, int num_worlds);
+  // Throws ValueError for an arm whose commands are no joint positions. `dt`: seconds between two
+  // commands; 0: their accelerations are not limited.
+  void initialize(const Robot& robot, const mjModel* model, int num_worlds, double dt = 0);
 
   Plan& plan(int world) { return states_[world].plan; }
   const Plan& plan(int world) const { return states_[world].plan; }
+  // A new episode: the robot is at rest, then as restart().
+  void reset(const World& world);
   // The robot is taken as it stands; commands of an earlier plan are forgotten. Before planning, so
   // that tool_target() and joints() say where the plan begins.
   void restart(const World& world);
@@ -59,6 +70,8 @@ class Follower {
   PlanFailure failure(const World& world) const;
   // Commands for the next control step.
   void follow(const World& world, Action& action);
+  // Commands for a control step without a plan: arms that move come to rest. True once they are.
+  bool brake(const World& world, Action& action);
   bool finished(int world) const { return states_[world].finished; }
   int phase(int world) const { return states_[world].phase; }
   void set_phase(int world, int phase) { states_[world].phase = phase; }
@@ -75,6 +88,13 @@ class Follower {
     bool given = false, in_world = false;
     Pose pose;
   };
+  // What was commanded last, and how it moved: n values of an arm; X_WB of a floating base, of whose
+  // pose the rates are three of the position and three of the rotation, in the world.
+  struct Sent {
+    bool given = false;  // it is limited
+    bool moved = false;  // it was commanded in this episode
+    std::array<double, GroupValues::kMaxSize> values{}, wanted{}, rates{};
+  };
   struct State {
     Plan plan;
     int segment = 0;
@@ -86,18 +106,25 @@ class Follower {
     RobotValues
         offsets;  // of joints from the path that they are about to follow, `given` where there are
     std::array<Target, RobotValues::kMaxGroups> targets;  // per tool
+    std::array<Sent, RobotValues::kMaxGroups> sent;
   };
   void read_free_joints(const World& world, State& state) const;
   bool move_tool(const World& world, State& state, const ToolMove& move, double time);
   void move_group(State& state, const CommandPath& path, double time);
-  void enter(State& state, const Segment& segment) const;
+  void enter(const World& world, State& state, Segment& segment) const;
+  bool rest(const World& world, int group, Action& action);
+  double stretch(const World& world, const State& state, const ToolMove& move) const;
+  void limit(int group, Sent& sent, std::span<double> command) const;
+  void limit_pose(Sent& sent, std::span<double> command) const;
   void finish(const World& world, State& state, const Segment& done, const Segment& next);
   bool joints_are_commanded(int group) const;
 
   FollowerCfg cfg_;
   const Robot* robot_ = nullptr;
-  int floating_base_ = -1;     // group whose commands are poses of the base
-  std::vector<State> states_;  // [B]
+  int floating_base_ = -1;  // group whose commands are poses of the base
+  double dt_ = 0;
+  std::vector<std::vector<char>> slides_;  // per group, per joint
+  std::vector<State> states_;              // [B]
 };
 
 }  // namespace mjsense

@@ -9,6 +9,7 @@ namespace mjsense {
 namespace {
 
 constexpr double kJump = 0.15;    // rad in a step of a line: 1.5 rad/s at 0.2 m/s
+constexpr int kParts = 10;        // of the way of reach_along()
 constexpr double kDetour = 0.25;  // m up, of a floating hand that cannot go straight
 
 // Free joints of the base, for a hand that floats.
@@ -53,6 +54,20 @@ bool HandPlanner::reach(const World& world, const Pose& tool, const HandPose& ne
   out.tool = tool;
   if (floats()) return true;
   return robot_->ik(hand_.tool, inverse(robot_->base_pose(world)) * tool, out.joints, iterations);
+}
+
+bool HandPlanner::reach_along(const World& world, const Pose& tool, const HandPose& from,
+                              HandPose& out) const {
+  if (floats()) return reach(world, tool, from, out);
+  const Twist screw = log6(inverse(from.tool) * tool);
+  HandPose at = from;
+  for (int k = 1; k <= kParts; ++k) {
+    const Pose to =
+        k == kParts ? tool : from.tool * exp6((static_cast<double>(k) / kParts) * screw);
+    if (!reach(world, to, at, out)) return false;
+    at = out;
+  }
+  return true;
 }
 
 bool HandPlanner::is_free(CollisionQuery& query, const HandPose& at) const {

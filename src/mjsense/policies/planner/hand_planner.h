@@ -39,6 +39,9 @@ class HandPlanner {
   // The tool at X_WT, from joints near those of `near`; `iterations` above Chain::kTracking also looks farther away.
   bool reach(const World& world, const Pose& tool, const HandPose& near, HandPose& out,
              int iterations = Chain::kTracking) const;
+  // The joints at the end of a screw from `from` to X_WT, whatever is in the way: where reach() leaps, an
+  // arm with more joints than it needs may end up in a knot.
+  bool reach_along(const World& world, const Pose& tool, const HandPose& from, HandPose& out) const;
   bool is_free(CollisionQuery& query, const HandPose& at) const;
   // Whether the tool can go straight (on a screw) and touches nothing, ends excluded; `end` is where it arrives.
   bool line_is_free(const World& world, CollisionQuery& query, const HandPose& from, const Pose& to,

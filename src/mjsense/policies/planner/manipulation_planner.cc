@@ -159,7 +159,10 @@ bool ManipulationPlanner::pick_with(const World& world, const PlanRequest& reque
       if (++tried > most || ways == cfg_.max_ways) break;
       const Pose tool = grasp.pose * Pose{{}, conjugate(shape.turn)};
       HandPose before, at;
-      if (!hand.reach(world, backed(tool, cfg_.pregrasp), start, before, iterations)) continue;
+      const Pose pregrasp = backed(tool, cfg_.pregrasp);
+      if (!(iterations == Chain::kTracking && hand.reach_along(world, pregrasp, start, before)) &&
+          !hand.reach(world, pregrasp, start, before, iterations))
+        continue;
       query.set_margin(kMargin);
       if (!hand.is_free(query, before)) continue;
       query.set_margin(kGraspMargin);
@@ -245,11 +248,14 @@ bool ManipulationPlanner::place_at(const World& world, HandPlanner& hand, Collis
                                    const HandPose& start, const Pose& object,
                                    const Pose& tool_object, Rng& rng, Plan& plan) {
   const int gripper = hand.hand().gripper, body = target_body(world.id);
-  const Pose tool = object * inverse(tool_object);
+  const Pose tool = object * inverse(tool_object), over = raised(tool, cfg_.preplace);
   HandPose above, at, away;
-  if (!hand.reach(world, raised(tool, cfg_.preplace), start, above, 300)) return false;
   query.set_margin(kGraspMargin);
-  if (!hand.is_free(query, above) || !hand.line_is_free(world, query, above, tool, at))
+  const auto fits = [&] {
+    return hand.is_free(query, above) && hand.line_is_free(world, query, above, tool, at);
+  };
+  if (!(hand.reach_along(world, over, start, above) && fits()) &&
+      !(hand.reach(world, over, start, above, 300) && fits()))
     return false;
   query.set_margin(0);
   if (!hand.is_free(query, at)) return false;

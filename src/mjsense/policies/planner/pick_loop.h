@@ -39,7 +39,8 @@ struct EpisodeResult {
 
 inline EpisodeResult run_episode(Task& task, Policy& policy, mjData* data, int world_id,
                                  std::int64_t episode,
-                                 const std::function<void(const World&)>& each_step = {}) {
+                                 const std::function<void(const World&)>& each_step = {},
+                                 const std::function<void(const World&)>& at_start = {}) {
   const mjModel* model = task.model();
   mj_resetData(model, data);
   task.sample(world_id, episode, state_row(data));
@@ -47,6 +48,7 @@ inline EpisodeResult run_episode(Task& task, Policy& policy, mjData* data, int w
   World world{.id = world_id, .model = model, .data = data};
   world.first = true;
   task.begin(world);
+  if (at_start) at_start(world);
   EpisodeResult result;
   const auto before = std::chrono::steady_clock::now();
   policy.reset(world);

@@ -28,7 +28,8 @@ const char* text_of(PlanFailure failure) {
 
 void TaskPlanner::initialize(Task& task) {
   task_ = &task;
-  follower_.initialize(task.robot(), task.model(), task.num_worlds());
+  follower_.initialize(task.robot(), task.model(), task.num_worlds(),
+                       0.001 * task.cfg().policy_dt_ms);
   states_.assign(task.num_worlds(), {});
   initialize_planner();
 }
@@ -36,7 +37,7 @@ void TaskPlanner::initialize(Task& task) {
 void TaskPlanner::reset(const World& world) {
   states_[world.id] = {};
   follower_.plan(world.id).grasp = {{0, 0, 0}, {0, 0, 0, 0}};
-  follower_.restart(world);
+  follower_.reset(world);
   if (!plan(world)) states_[world.id].failure = PlanFailure::kUnplanned;
 }
 
@@ -51,14 +52,14 @@ bool TaskPlanner::plan(const World& world) {
   return state.planned;
 }
 
-bool TaskPlanner::begin_again(const World& world) {
+void TaskPlanner::begin_again(const World& world, Action& action) {
   State& state = states_[world.id];
-  if (state.retries >= planner_cfg_.max_retries) return false;
+  state.planned = false;
+  state.stops = state.retries < planner_cfg_.max_retries;
+  if (!state.stops) return give_up(action);
   ++state.retries;
   state.stage = 0;
-  follower_.restart(world);
-  state.no_other_way = !plan(world);
-  return !state.no_other_way;
+  follower_.brake(world, action);
 }
 
 std::string TaskPlanner::failure(int world) const {
@@ -77,13 +78,19 @@ void TaskPlanner::give_up(Action& action) {
 void TaskPlanner::act(const World& world, Action& action) {
   State& state = states_[world.id];
   action = {};
+  if (state.stops) {
+    if (!follower_.brake(world, action)) return;
+    state.stops = false;
+    action = {};
+    follower_.restart(world);
+    state.no_other_way = !plan(world);
+  }
   if (state.planned && !follower_.finished(world.id)) {
     PlanFailure failure = follower_.failure(world);
     if (failure == PlanFailure::kNone && gone_wrong(world)) failure = PlanFailure::kAstray;
     if (failure != PlanFailure::kNone) {
       state.failure = failure;
-      state.planned = begin_again(world);
-      if (state.planned) return;  // hold for this step
+      return begin_again(world, action);
     }
   }
   if (!state.planned) return give_up(action);
@@ -93,9 +100,7 @@ void TaskPlanner::act(const World& world, Action& action) {
     if (!plan(world)) {
       state.failure = PlanFailure::kUnplanned;
       action = {};
-      state.planned = begin_again(world);
-      if (!state.planned) give_up(action);
-      return;
+      return begin_again(world, action);
     }
     follower_.follow(world, action);
   }

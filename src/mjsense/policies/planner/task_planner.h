@@ -30,7 +30,7 @@ struct PlanRequest {
 };
 
 // Commands the groups that its plans name; the others hold. An action that gives up is {done,
-// success: false} without commands; a retry holds for one step.
+// success: false} without commands; before a retry it comes to rest, in a step at least.
 class TaskPlanner : public PlannerPolicy {
  public:
   explicit TaskPlanner(TaskPlannerCfg cfg = {}) : planner_cfg_(cfg), follower_(cfg.follower) {}
@@ -68,12 +68,13 @@ class TaskPlanner : public PlannerPolicy {
  private:
   struct State {
     bool planned = false;
+    bool stops = false;  // before it begins again
     int retries = 0, stage = 0;
     PlanFailure failure = PlanFailure::kNone;
     bool no_other_way = false;  // and to begin again there was no plan
   };
   bool plan(const World& world);
-  bool begin_again(const World& world);
+  void begin_again(const World& world, Action& action);
   static void give_up(Action& action);
 
   TaskPlannerCfg planner_cfg_;

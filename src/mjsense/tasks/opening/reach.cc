@@ -15,7 +15,9 @@ namespace {
 constexpr std::array<double, 5> kTilts{0, 0.35, -0.35, 0.7, -0.7};  // rad, about the handle
 constexpr std::array<double, 3> kTurns{0, 0.4, -0.4};               // rad, across the handle
 constexpr std::array<double, 3> kPlaces{0, 0.45, -0.45};            // of its half length
-constexpr double kSideGap = 0.004;                                  // m, pads to the handle
+constexpr int kOfRobot = 1 << 30;   // contact bit of the robot's geoms
+constexpr double kBuiltSo = 0.002;  // m between links at the start
+constexpr double kSideGap = 0.004;  // m, pads to the handle
 
 // Fingers close along any direction across the approach: where the pads are, in the tool's frame.
 Quat closing_turn(const MoveGroup& gripper, const mjModel* model) {
@@ -136,8 +138,31 @@ HandleReach::HandleReach(const mjModel* model, const Robot& robot, HandleReachCf
   for (int b = 1; b < model->nbody; ++b)
     fixed_[b] = of_robot_[b] && (model->body_weldid[b] == 0 || b == robot.base_body());
   for (int g = 0; g < model->ngeom; ++g) {
-    if (of_robot_[model->geom_bodyid[g]]) own_->geom_margin[g] = cfg_.clearance;
+    if (!of_robot_[model->geom_bodyid[g]]) continue;
+    own_->geom_margin[g] = cfg_.clearance;
+    if (!model->geom_contype[g] && !model->geom_conaffinity[g]) continue;
+    // Its links touch each other here, whatever they do in the simulation.
+    own_->geom_contype[g] |= kOfRobot;
+    own_->geom_conaffinity[g] |= kOfRobot;
+    own_->body_contype[model->geom_bodyid[g]] |= kOfRobot;
+    own_->body_conaffinity[model->geom_bodyid[g]] |= kOfRobot;
   }
+  // Links that meet at the start are built so.
+  mjData* data = scratch_.take();
+  for (std::size_t g = 0; g < robot.groups().size(); ++g) {
+    const auto& init = robot.cfg().groups[g].init;
+    for (std::size_t i = 0; i < init.size(); ++i) data->qpos[robot.groups()[g].qpos[i]] = init[i];
+  }
+  mj_kinematics(model_, data);
+  mj_collision(model_, data);
+  for (int i = 0; i < data->ncon; ++i) {
+    const mjContact& contact = data->contact[i];
+    if (contact.geom[0] < 0 || contact.geom[1] < 0 || contact.dist > kBuiltSo) continue;
+    if (of_robot_[model_->geom_bodyid[contact.geom[0]]] &&
+        of_robot_[model_->geom_bodyid[contact.geom[1]]])
+      built_so_.emplace_back(contact.geom[0], contact.geom[1]);
+  }
+  scratch_.give(data);
 }
 
 HandleReach::Start HandleReach::start_of(const mjData* d) const {
@@ -171,6 +196,12 @@ bool HandleReach::free(mjData* data, double clearance, const Articulation* held,
     const mjContact& contact = data->contact[i];
     if (contact.exclude || contact.geom[0] < 0 || contact.geom[1] < 0) continue;
     int mine = model_->geom_bodyid[contact.geom[0]], other = model_->geom_bodyid[contact.geom[1]];
+    if (of_robot_[mine] && of_robot_[other]) {
+      if (contact.dist > 0 || (of_gripper_[mine] >= 0 && of_gripper_[mine] == of_gripper_[other]))
+        continue;
+      const std::pair pair(contact.geom[0], contact.geom[1]);
+      if (std::ranges::find(built_so_, pair) == built_so_.end()) return false;
+    }
     if (of_robot_[mine] == of_robot_[other]) continue;
     if (!of_robot_[mine]) std::swap(mine, other);
     // What it stands on touches its base.

@@ -10,6 +10,7 @@
 #include <mutex>
 #include <optional>
 #include <span>
+#include <utility>
 #include <vector>
 
 #include "mjsense/core/rng.h"
@@ -93,7 +94,7 @@ class HandleReach {
                                  double to, const HandleWay& before) const;
   // X_WB of the articulation's body, its joint at `q`.
   Pose body_pose(const Start& start, const Articulation& one, double q) const;
-  // Whether the robot at the start is clear of everything.
+  // Whether the robot at the start is clear of everything, and of itself.
   bool stands_free(const Start& start) const;
 
  private:
@@ -116,6 +117,7 @@ class HandleReach {
   std::vector<char> of_robot_;   // [nbody]
   std::vector<char> fixed_;      // [nbody] of the robot, and no joint below the base moves it
   std::vector<int> of_gripper_;  // [nbody] group, -1
+  std::vector<std::pair<int, int>> built_so_;  // geoms of the robot that touch at the start
   mutable ScratchData scratch_;
 };
 

@@ -1,9 +1,13 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
-// How well a robot moved: looked at after every control step of an episode.
+// How well a robot moved, and what it was told: looked at after every control step of an episode.
+// Of commands c at control steps dt apart, (c' - c) / dt is a speed, and its change over dt an
+// acceleration: what a robot does that goes evenly from each command to the next.
 
 #include <algorithm>
+#include <array>
 #include <cmath>
+#include <memory>
 #include <string>
 #include <vector>
 
@@ -20,8 +24,19 @@ class MotionQuality {
   double acceleration = 0;    // rad/s^2, greatest between two control steps
   double accelerated_at = 0;  // s
   double depth = 0;           // m, deepest of a contact of the robot with anything
-  std::string deepest;        // between which
+  std::string deepest;        // between which, and when
   int self_collisions = 0;    // control steps in which links of the robot met
+  std::string met;            // the last of them
+  // Of commands: joints of arms, rad and s; a base that drives or floats, m and s, rad and s.
+  struct Greatest {
+    double value = 0, at = 0;  // s
+    int phase = 0;             // of the policy, then
+    void see(double v, double time, int now) {
+      if (v > value) *this = {v, time, now};
+    }
+  };
+  Greatest joint_speed, joint_acceleration, base_speed, base_acceleration, base_turn,
+      base_turn_acceleration;
 
   MotionQuality(const mjModel* model, const Robot& robot) {
     std::vector<int> joints;
@@ -30,11 +45,23 @@ class MotionQuality {
       joints.insert(joints.end(), group.joints.begin(), group.joints.end());
       dofs_.insert(dofs_.end(), group.dofs.begin(), group.dofs.end());
     }
+    robot_ = &robot;
     model_ = std::make_unique<CollisionModel>(model, robot, joints);
     root_ = model->body_rootid[robot.base_body()];
   }
 
-  void look(const World& world) {
+  // Before the first step: where the robot stands is what it was told last.
+  void begin(const World& world) {
+    RobotValues now;
+    robot_->read_qpos(world, now);
+    commands_.assign(1, now);
+    commands_.push_back(now);
+    time_ = world.time();
+  }
+
+  // `action`: as the policy gave it for the step that is over; null: commands are not looked at.
+  void look(const World& world, const Action* action = nullptr, int phase = 0) {
+    if (action) look_at_commands(world, *action, phase);
     const mjModel* m = world.model;
     const double time = world.time();
     for (std::size_t i = 0; i < dofs_.size(); ++i) {
@@ -56,17 +83,91 @@ class MotionQuality {
       if ((m->body_rootid[a] == root_) == (m->body_rootid[b] == root_)) continue;
       if (-contact.dist <= depth) continue;
       depth = -contact.dist;
-      deepest = name_of(m, mjOBJ_BODY, a) + " in " + name_of(m, mjOBJ_BODY, b);
+      deepest = name_of(m, mjOBJ_BODY, a) + " in " + name_of(m, mjOBJ_BODY, b) + " at " +
+                std::to_string(time) + " s in phase " + std::to_string(phase);
     }
     CollisionQuery query(*model_, world);
     for (int body = 1; body < m->nbody; ++body) {
       if (m->body_rootid[body] != root_ && m->body_parentid[body] == 0) query.ignore(body);
     }
     query.ignore(0);
-    self_collisions += !query.free_here();
+    if (query.free_here()) return;
+    const auto gripper = [&](int geom) {
+      for (std::size_t g = 0; g < robot_->groups().size(); ++g) {
+        const MoveGroup& group = robot_->groups()[g];
+        if (group.kind == GroupKind::kGripper && is_below(m, m->geom_bodyid[geom], group.root_body))
+          return static_cast<int>(g);
+      }
+      return -1;
+    };
+    const int one = gripper(query.touching().first);
+    if (one >= 0 && one == gripper(query.touching().second)) return;  // it is closed
+    ++self_collisions;
+    const auto link = [&](int geom) { return name_of(m, mjOBJ_BODY, m->geom_bodyid[geom]); };
+    met = link(query.touching().first) + " and " + link(query.touching().second);
   }
 
  private:
+  void look_at_commands(const World& world, const Action& action, int phase) {
+    const double dt = world.time() - time_;
+    time_ = world.time();
+    RobotValues next = commands_[1];
+    for (std::size_t g = 0; g < robot_->groups().size(); ++g) {
+      const MoveGroup& group = robot_->groups()[g];
+      const GroupValues& given = action.commands[g];
+      const bool free_base = group.kind == GroupKind::kBase && group.command_size == 7;
+      if (group.kind != GroupKind::kArm && group.kind != GroupKind::kBase) continue;
+      if (free_base) {
+        if (given.given) next[g].set(given.view());
+        look_at_pose(commands_[0][g], commands_[1][g], next[g], dt, phase);
+        continue;
+      }
+      if (!group.targets_are_qpos()) continue;
+      // What is not commanded is held where it is.
+      const GroupValues& target = robot_->targets(world.id)[g];
+      if (given.given) {
+        next[g].set(given.view());
+      } else if (commands_given_[g] && target.size == next[g].size) {
+        next[g].set(target.view());
+      }
+      commands_given_[g] = given.given;
+      for (int i = 0; i < next[g].size; ++i) {
+        const double a = commands_[0][g].values[i], b = commands_[1][g].values[i],
+                     c = next[g].values[i];
+        const double v = std::abs(c - b) / dt, acc = std::abs(c - 2 * b + a) / (dt * dt);
+        const bool turns = i == 2;
+        if (group.kind == GroupKind::kArm) {
+          joint_speed.see(v, time_, phase);
+          joint_acceleration.see(acc, time_, phase);
+        } else {
+          (turns ? base_turn : base_speed).see(v, time_, phase);
+          (turns ? base_turn_acceleration : base_acceleration).see(acc, time_, phase);
+        }
+      }
+    }
+    commands_[0] = commands_[1];
+    commands_[1] = next;
+  }
+  void look_at_pose(const GroupValues& a, const GroupValues& b, const GroupValues& c, double dt,
+                    int phase) {
+    const auto pose = [](const GroupValues& v) {
+      return Pose{vec3(v.values.data()), quat(v.values.data() + 3)};
+    };
+    const auto turn = [&](const GroupValues& from, const GroupValues& to) {
+      return (1 / dt) * rotate(pose(from).q, log3(conjugate(pose(from).q) * pose(to).q));
+    };
+    const Vec3 v = (1 / dt) * (pose(c).p - pose(b).p), before = (1 / dt) * (pose(b).p - pose(a).p);
+    base_speed.see(norm(v), time_, phase);
+    base_acceleration.see(norm(v - before) / dt, time_, phase);
+    const Vec3 w = turn(b, c), last = turn(a, b);
+    base_turn.see(norm(w), time_, phase);
+    base_turn_acceleration.see(norm(w - last) / dt, time_, phase);
+  }
+
+  const Robot* robot_ = nullptr;
+  std::vector<RobotValues> commands_;  // the last two
+  std::array<bool, RobotValues::kMaxGroups> commands_given_{};
+  double time_ = 0;
   std::unique_ptr<CollisionModel> model_;
   std::vector<int> dofs_;
   std::vector<double> last_;

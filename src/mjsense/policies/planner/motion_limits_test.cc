@@ -1,0 +1,124 @@
+// SPDX-License-Identifier: Apache-2.0
+// Every task with every kind of robot: what is commanded can be done by the robot, whatever goes
+// wrong on the way, and what was not to be touched is not.
+
+#include <gtest/gtest.h>
+
+#include <cstdlib>
+
+#include "mjsense/policies/planner/pick_loop.h"
+#include "mjsense/policies/planner/testing/motion_quality.h"
+#include "mjsense/robots/load_robot.h"
+#include "mjsense/rollout/registry.h"
+#include "mjsense/rollout/task_defaults.h"
+
+namespace mjsense {
+namespace {
+
+struct Case {
+  const char *task, *robot, *scene;
+  int episodes;
+  double depth = 0.001;  // m, of a contact of the robot, where nothing goes wrong
+};
+std::ostream& operator<<(std::ostream& out, const Case& c) {
+  return out << c.task << " " << c.robot << " " << c.scene;
+}
+
+// Of an FR3: 10 rad/s^2, 2.62 rad/s. What others publish is above that.
+constexpr double kAcceleration = 10, kSpeed = 2.62;
+// Of bases, which drive with things in their hands: m/s^2, rad/s^2.
+constexpr double kBase = 3.0, kBaseTurn = 10;
+
+int number(const char* name, int otherwise) {
+  const char* value = std::getenv(name);
+  return value ? std::atoi(value) : otherwise;
+}
+
+struct Stage {
+  explicit Stage(const Case& c, double perturb) {
+    TaskCfg cfg;
+    cfg.robot = robot_cfg(c.robot);
+    cfg.scene = c.scene;
+    cfg.policy_dt_ms = cfg.robot.policy_dt_ms;
+    cfg.ctrl_dt_ms = cfg.robot.ctrl_dt_ms;
+    cfg.sim_dt_ms = cfg.robot.sim_dt_ms;
+    set_task_defaults(c.task, cfg);
+    cfg.action_noise = false;
+    cfg.perturb = perturb;
+    task = make_task(c.task, cfg);
+    scene = std::make_unique<Scene>(task->whole_scene_cfg());
+    task->initialize(scene->model(), 1);
+    policy = make_policy("planner");
+    task->register_policy(*policy);
+    data.reset(mj_makeData(scene->model()));
+  }
+  EpisodeResult run(std::int64_t episode, MotionQuality& quality) {
+    return run_episode(
+        *task, *policy, data.get(), 0, episode,
+        [&](const World& world) { quality.look(world, task->last_action(0), planner().phase(0)); },
+        [&](const World& world) { quality.begin(world); });
+  }
+  const PlannerPolicy& planner() const { return dynamic_cast<const PlannerPolicy&>(*policy); }
+  int retries() const { return planner().num_retries(0); }
+  std::unique_ptr<Task> task;
+  std::unique_ptr<Scene> scene;
+  std::unique_ptr<Policy> policy;
+  std::unique_ptr<mjData, decltype(&mj_deleteData)> data{nullptr, mj_deleteData};
+};
+
+std::string said(const Case& c, std::int64_t episode, const MotionQuality::Greatest& g) {
+  std::ostringstream out;
+  out << c << ", episode " << episode << " at " << g.at << " s in phase " << g.phase;
+  return out.str();
+}
+
+class MotionLimits : public testing::TestWithParam<Case> {};
+
+// MJSENSE_FIRST, MJSENSE_EPISODES: other episodes.
+TEST_P(MotionLimits, CommandsKeepToThem) {
+  const Case& c = GetParam();
+  Stage stage(c, 0.5);
+  const int first = number("MJSENSE_FIRST", 0), many = number("MJSENSE_EPISODES", c.episodes);
+  for (int episode = first; episode < first + many; ++episode) {
+    MotionQuality q(stage.scene->model(), stage.task->robot());
+    const EpisodeResult result = stage.run(episode, q);
+    const auto below = [&](const MotionQuality::Greatest& g, double most, const char* what) {
+      EXPECT_LE(g.value, most * (1 + 1e-9)) << what << " of " << said(c, episode, g);
+    };
+    below(q.joint_speed, kSpeed, "speed of a joint");
+    below(q.joint_acceleration, kAcceleration, "acceleration of a joint");
+    below(q.base_acceleration, kBase, "acceleration of the base");
+    below(q.base_turn_acceleration, kBaseTurn, "angular acceleration of the base");
+    if (stage.task->perturbation(0).happened() || stage.retries() > 0) continue;
+    EXPECT_LT(q.speed, kSpeed) << c << ", episode " << episode;
+    EXPECT_LT(q.acceleration, kAcceleration)
+        << c << ", episode " << episode << " at " << q.accelerated_at << " s";
+    EXPECT_LT(q.depth, c.depth) << q.deepest << ", " << c << ", episode " << episode;
+    EXPECT_EQ(q.self_collisions, 0) << q.met << ", " << c << ", episode " << episode;
+    if (std::getenv("MJSENSE_EPISODES"))
+      printf("%s %d: %s %d steps; %.2f rad/s2 told, %.2f done; %.4f m\n",
+             testing::PrintToString(c).c_str(), episode, result.success ? "ok" : "FAIL",
+             result.steps, q.joint_acceleration.value, q.acceleration, q.depth);
+  }
+}
+
+INSTANTIATE_TEST_SUITE_P(
+    Tasks, MotionLimits,
+    testing::Values(Case{"pick", "franka", "", 2}, Case{"pick", "franka", "clutter", 3},
+                    Case{"pick", "mobile_franka", "", 1}, Case{"pick", "floating_rum", "", 3},
+                    Case{"pick", "i2rt_yam", "", 2}, Case{"pick_and_place", "franka", "", 4},
+                    Case{"pick_and_place", "floating_rum", "", 2},
+                    Case{"pick_and_place_next_to", "franka", "", 3},
+                    Case{"pick_and_place_color", "franka", "", 2}, Case{"packing", "franka", "", 3},
+                    Case{"open", "franka", "", 3}, Case{"open", "mobile_franka", "", 2},
+                    Case{"open", "rby1", "", 2, 0.002}, Case{"close", "franka", "", 2},
+                    Case{"close", "rby1", "", 2, 0.002}, Case{"door_opening", "rby1", "", 1, 0.004},
+                    Case{"nav_to_obj", "rby1", "", 1}, Case{"nav_to_obj", "mobile_franka", "", 1}),
+    [](const auto& info) {
+      std::string name = std::string(info.param.task) + "_" + info.param.robot;
+      if (*info.param.scene) name += std::string("_") + info.param.scene;
+      return name;
+    });
+
+}  // namespace
+}  // namespace mjsense
