@@ -362,6 +362,16 @@ def file_is_a_pipe(house):
 
 
 @case
+def folders_without_end(house):
+    inner = os.open(house, os.O_RDONLY)
+    for _ in range(30):
+        os.mkdir("d" * 200, dir_fd=inner)
+        outer, inner = inner, os.open("d" * 200, os.O_RDONLY, dir_fd=inner)
+        os.close(outer)
+    os.close(inner)
+
+
+@case
 def staging_is_a_link(house):
     (house / ".recording").symlink_to(house.parent.parent / SECRET)
 

@@ -344,6 +344,9 @@ def staged(lab: Lab) -> Row:
         "description removed": lambda s: (s / "recording.json").unlink(),
         "description emptied": lambda s: (s / "recording.json").write_text(""),
         "description broken": lambda s: (s / "recording.json").write_text("{nonsense"),
+        "description changed": lambda s: (s / "recording.json").write_text(
+            (s / "recording.json").read_text().replace('"episodes":4', '"episodes":5')
+        ),
         "file removed": lambda s: (s / "episode_00000001/traj.h5").unlink(),
         "file cut": lambda s: cut(s / "episode_00000001/traj.h5"),
         "file emptied": lambda s: (s / "episode_00000001/traj.h5").write_bytes(b""),

@@ -102,8 +102,8 @@ inline constexpr const char* kStagingDir = ".recording";
 inline constexpr const char* kEpisodeFile = "traj.h5";
 inline constexpr const char* kDamagedDir = "damaged";
 
-// recording.json of a house, or what its finished episodes say when that is lost: "" when it holds no unfinished
-// recording.
+// recording.json of a house, or what most of its finished episodes say where that is lost or none of
+// them agrees with it: "" when it holds no unfinished recording.
 std::string unfinished_recording(const std::filesystem::path& house);
 // Directories of finished, unpublished episodes, in order.
 std::vector<std::filesystem::path> finished_episodes(const std::filesystem::path& house);

@@ -121,7 +121,13 @@ RepairResult repair(const fs::path& path) {
         attempt(house, [&] { finish_house(house, result.actions); });
     }
   }
-  for (const RecordedFile& file : recorded_files(path)) {
+  std::vector<RecordedFile> files;
+  try {
+    files = recorded_files(path);
+  } catch (const ValueError&) {  // no recording; perhaps none is left after what was done
+    if (result.actions.empty() && result.failures.empty()) throw;
+  }
+  for (const RecordedFile& file : files) {
     if (!file.published) continue;
     attempt(file.path, [&] {
       if (const int added = name_videos(file.path); added > 0)

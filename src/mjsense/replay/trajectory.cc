@@ -32,6 +32,17 @@ void require_exists(const fs::path& path) {
   if (!fs::exists(path, error)) throw ValueError(fmt::format("'{}' does not exist", path.string()));
 }
 
+// What a walk through folders meets - one that may not be entered, names too long for the system - is
+// one error of ours, which a program tells.
+auto walk(const fs::path& path, auto&& steps) {
+  try {
+    return steps();
+  } catch (const fs::filesystem_error& e) {
+    throw RuntimeError(
+        fmt::format("cannot look through '{}': {}", path.string(), e.code().message()));
+  }
+}
+
 }  // namespace
 
 std::vector<RecordedFile> recorded_files(const fs::path& path) {
@@ -48,9 +59,11 @@ std::vector<RecordedFile> recorded_files(const fs::path& path) {
       files.push_back({file, name, published});
     };
     std::vector<fs::path> published;
-    for (const fs::directory_entry& entry : fs::directory_iterator(house)) {
-      if (is_trajectory_file(entry.path())) published.push_back(entry.path());
-    }
+    walk(house, [&] {
+      for (const fs::directory_entry& entry : fs::directory_iterator(house)) {
+        if (is_trajectory_file(entry.path())) published.push_back(entry.path());
+      }
+    });
     std::sort(published.begin(), published.end());
     for (const fs::path& file : published) add(file, true);
     for (const fs::path& episode : finished_episodes(house)) add(episode / kEpisodeFile, false);
@@ -67,16 +80,18 @@ std::vector<fs::path> recorded_houses(const fs::path& path) {
                        [](const fs::directory_entry& e) { return is_trajectory_file(e.path()); });
   };
   std::vector<fs::path> houses;
-  if (is_house(path)) houses.push_back(path);
-  for (auto it = fs::recursive_directory_iterator(path); it != fs::recursive_directory_iterator();
-       ++it) {
-    if (!it->is_directory()) continue;
-    if (it->path().filename() == kStagingDir) {
-      it.disable_recursion_pending();
-    } else if (is_house(it->path())) {
-      houses.push_back(it->path());
+  walk(path, [&] {
+    if (is_house(path)) houses.push_back(path);
+    for (auto it = fs::recursive_directory_iterator(path); it != fs::recursive_directory_iterator();
+         ++it) {
+      if (!it->is_directory()) continue;
+      if (it->path().filename() == kStagingDir) {
+        it.disable_recursion_pending();
+      } else if (is_house(it->path())) {
+        houses.push_back(it->path());
+      }
     }
-  }
+  });
   if (houses.empty()) {
     throw ValueError(fmt::format("'{}' holds no recording: no trajectories_batch_*.h5 was found",
                                  path.string()));
