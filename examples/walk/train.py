@@ -6,9 +6,12 @@
 """
 
 import argparse
+import json
 import time
+from pathlib import Path
 
 import numpy as np
+import torch
 from walk import Walk
 
 import mjsense as mjs
@@ -32,11 +35,9 @@ def judge(task, act, worlds=128, steps=500):
 
 def with_rsl(task, env):
     """(policy, what trains it for some iterations)"""
-    import torch
     from mjsense.rl.rsl import RslRlVecEnv
     from rsl_rl.runners import OnPolicyRunner
 
-    torch.set_num_threads(1)  # small nets: threads that wait for each other cost more than they bring
     torch.manual_seed(0)
     net = {"class_name": "MLPModel", "hidden_dims": (256, 128, 64), "activation": "elu", "obs_normalization": True}
     worlds = RslRlVecEnv(env, action_mean=task.stand, action_scale=SCALE)
@@ -83,22 +84,31 @@ def main():
     options.add_argument("--trainer", choices=("rsl", "sb3"), default="rsl")
     options.add_argument("--iterations", type=int, default=100)
     options.add_argument("--worlds", type=int, default=256)
+    options.add_argument("--curve", help="file that gets the curve, for curves.py")
     options.add_argument("--model", default="embedded:robots/quadruped.xml", help="MJCF of a quadruped with a Go1's names")
     options = options.parse_args()
+    torch.set_num_threads(1)  # small nets: threads that wait for each other cost more than they bring
     rng = np.random.default_rng(0)
     chance = judge(Walk(options.model), lambda observation: rng.normal(size=(len(observation), 12)))
     still = judge(Walk(options.model), lambda observation: np.zeros((len(observation), 12)))
     task = Walk(options.model)
     env = mjs.make_vec(task, num_envs=options.worlds, observations=["feeling"], cameras=[], autoreset_mode="same_step")
     act, learn = {"rsl": with_rsl, "sb3": with_sb3}[options.trainer](task, env)
-    start, cpu = time.perf_counter(), time.process_time()
+    start, cpu = time.perf_counter(), 0.0  # learning alone, without what judges it
+    curve = []
     for done in range(0, options.iterations, 10):
+        before = time.process_time()
         learn(min(10, options.iterations - done))
-        used = f"{time.perf_counter() - start:5.0f} s ({time.process_time() - cpu:4.0f} s CPU)"
-        print(f"iteration {done + 10:4} {used}: reward {judge(Walk(options.model), act, worlds=32)[0]:6.2f}", flush=True)
+        cpu += time.process_time() - before
+        curve.append({"iteration": min(done + 10, options.iterations), "cpu": cpu, "reward": judge(Walk(options.model), act, worlds=32)[0]})
+        print("iteration {iteration:4} ({cpu:4.0f} s CPU): reward {reward:6.2f}".format(**curve[-1]), flush=True)
     env.close()
-    for name, result in (("random", chance), ("standing", still), ("learned", judge(Walk(options.model), act))):
+    results = {"random": chance, "standing": still, "learned": judge(Walk(options.model), act)}
+    for name, result in results.items():
         print(f"{name:9} reward {result[0]:6.2f}  steps {result[1]:5.0f} of 500  error of velocity {result[2]:.2f} m/s")
+    print(f"{time.perf_counter() - start:.0f} s in all")
+    if options.curve:
+        Path(options.curve).write_text(json.dumps({"trainer": options.trainer, "worlds": options.worlds, "results": results, "curve": curve}))
 
 
 if __name__ == "__main__":

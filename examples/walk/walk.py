@@ -23,12 +23,14 @@ class Walk(mjs.Task):
         self.model, self.rough = model, rough
 
     def with_servos(self):
-        """Unitree's Go1 comes without actuators."""
+        """Unitree's Go1 comes without motors, and without what they do to its joints: legs without inertia of a rotor tremble at every command."""
         spec = mujoco.MjSpec.from_file(str(self.model))
         for joint in [j for j in spec.joints if j.type == mujoco.mjtJoint.mjJNT_HINGE]:
+            joint.armature, joint.damping[0], joint.frictionloss = 0.01, 0.5, 0.2
+            torque = 35.55 if "calf" in joint.name else 23.7
             motor = spec.add_actuator(name=joint.name, target=joint.name, trntype=mujoco.mjtTrn.mjTRN_JOINT)
             motor.set_to_position(kp=60, kv=1.5)
-            motor.ctrlrange, motor.forcerange = joint.range, (-23.7, 23.7)
+            motor.ctrlrange, motor.forcerange = joint.range, (-torque, torque)
         return spec
 
     def scene(self):

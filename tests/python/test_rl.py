@@ -8,6 +8,7 @@ import gymnasium
 import numpy as np
 import pytest
 from mjsense.rl._numbers import Actions, Numbers, checked_env
+from wheels import wheel
 
 import mjsense as mjs
 
@@ -95,6 +96,22 @@ def test_walk():
         assert not terminated.any()
     assert truncated.all() and infos["final_info"]["success"].all() and (reward > 0.04).all()  # of 0.045: it stands, as it was told
     assert np.isfinite(observation["feeling"]).all() and (observation["feeling"] != numbers).any()
+    env.close()
+
+
+def test_walk_with_a_go1():
+    """Unitree's, which comes without motors: with those of the example it stands, and its feet and scan are found."""
+    from walk import Walk
+
+    task = Walk(wheel("mjlab") / "mjlab/asset_zoo/robots/unitree_go1/xmls/go1.xml", rough=False)
+    env = same_step(task, observations=["feeling"], num_envs=2, horizon=20)
+    env.reset(seed=0)
+    assert (env.sim.model.dof_armature[6:] == 0.01).all() and (env.sim.model.dof_damping[6:] == 0.5).all()
+    for _ in range(20):
+        observation, _, terminated, truncated, _ = env.step(np.tile(task.stand, (2, 1)))
+        assert not terminated.any()
+    assert truncated.all() and np.isfinite(observation["feeling"]).all()
+    np.testing.assert_array_equal(env.sim.scene["feet"].data.found.shape, (2, 4))
     env.close()
 
 
