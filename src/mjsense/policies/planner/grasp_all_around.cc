@@ -20,7 +20,7 @@ constexpr std::array<double, 3> kSlides{0.0, 0.015, -0.015};  // m, across closi
 // m, of the ends of the pads behind the surface that comes first: what lies flat is taken with them, because
 // the tips would meet what it lies on.
 constexpr std::array<double, 4> kDepths{0.0091, 0.0191, 0.0291, 0.0471};
-constexpr double kSlope = 2.0, kMostSlope = 2.0;  // cost of a slope, and its most
+constexpr double kSlope = 4.0, kMostSlope = 4.0;  // cost of a slope, and its most
 constexpr std::size_t kPoints = 450;              // most that are looked at
 
 std::vector<Vec3> closing_directions() {
@@ -98,7 +98,7 @@ std::vector<Grasp> grasps_all_around(const GripperShape& gripper, const ObjectSh
           grasp.pose = {center + (0.5 * (s.low + s.high)) * close,
                         quat_from_columns(cross(close, approach), close, approach)};
           grasp.width = width;
-          grasp.cost = 8.0 * norm(grasp.pose.p) + std::min(kMostSlope, kSlope * std::abs(s.slope));
+          grasp.cost = 20.0 * norm(grasp.pose.p) + std::min(kMostSlope, kSlope * std::abs(s.slope));
           if (!gripper.hits(grasp.pose, {}, shape, 0.0)) grasps.push_back(grasp);
         }
       }

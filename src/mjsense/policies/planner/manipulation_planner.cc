@@ -20,7 +20,9 @@ constexpr double kMargin = 0.004;       // m, of everything to everything on the
 constexpr double kGraspMargin = 0.001;  // m, of the open gripper at the grasp
 constexpr double kBelow = 0.004;        // m that boxes around a slanting gripper reach below it
 constexpr double kSide = 100;           // degrees, most that the approach turns from the way out
+constexpr int kTurns = 16;              // about the vertical, of what is put down
 constexpr double kSlipped = 0.05;       // m, object in the hand against where it was taken
+constexpr double kSameGrasp = 0.012, kSameTurn = 0.4;  // m, rad: what failed is not tried again
 // Of a tool that must get away from what it touches.
 constexpr double kBack = 0.06, kUp = 0.10;  // m
 
@@ -80,6 +82,10 @@ bool ManipulationPlanner::gone_wrong(const World& world) const {
   if (!state.holding) return false;
   const int phase = follower().phase(world.id);
   if (phase != kLift && phase != kPreplace && phase != kPlace) return false;
+  // What has been let go may roll.
+  const auto& segments = follower().plan(world.id).segments;
+  const auto segment = static_cast<std::size_t>(follower().segment(world.id));
+  if (segment >= segments.size() || segments[segment].holding.empty()) return false;
   const Hand& hand = hands_[state.hand]->hand();
   const Pose object = inverse(robot().leaf_pose(world, hand.tool)) * object_pose(world);
   return norm(object.p - state.tool_object.p) > kSlipped;
@@ -88,17 +94,35 @@ bool ManipulationPlanner::gone_wrong(const World& world) const {
 void ManipulationPlanner::make_plan(const World& world, const PlanRequest& request, Plan& plan) {
   State& state = states_[world.id];
   const bool places = scene_->place_scene() != nullptr;
-  if (request.stage == 0) {
+  // After a failure the hands open and what they had comes to rest, before it is looked for.
+  const int stage = request.attempt == 0 ? request.stage : request.stage - 1;
+  if (stage < 0) {
     state.holding = false;
-    if (request.attempt == 0) state.home = follower().joints(world.id);
+    state.failed.push_back(inverse(state.tool_object));
+    let_go(plan);
+  } else if (stage == 0) {
+    state.holding = false;
+    if (request.attempt == 0) {
+      state.home = follower().joints(world.id);
+      state.failed.clear();
+    }
     plan_pick(world, request, plan);
     plan.more = !plan.segments.empty();
-  } else if (request.stage == 1 && places) {
+  } else if (stage == 1 && places) {
     plan_place(world, request, plan);
     plan.more = !plan.segments.empty();
   } else if (task().evaluate(world).success) {
     plan.wait(places ? kUnknownPhase : kLift, 0);
   }
+}
+
+void ManipulationPlanner::let_go(Plan& plan) const {
+  Segment& open = plan.wait(kOpenGripper, cfg_.close_time);
+  for (const auto& hand : hands_) {
+    const int gripper = hand->hand().gripper;
+    open.grip(gripper, robot().groups()[gripper].open_command);
+  }
+  plan.more = true;
 }
 
 void ManipulationPlanner::plan_pick(const World& world, const PlanRequest& request, Plan& plan) {
@@ -108,14 +132,18 @@ void ManipulationPlanner::plan_pick(const World& world, const PlanRequest& reque
   std::ranges::stable_sort(order, {}, [&](int h) {
     return norm(robot().leaf_pose(world, hands_[h]->hand().tool).p - object);
   });
-  for (int hand : order) {
-    if (pick_with(world, request, hand, plan)) return;
-    plan.segments.clear();
+  for (const bool to_place : {true, false}) {
+    // Of several hands one that also gets to the place.
+    if (to_place && (order.size() < 2 || !scene_->place_scene())) continue;
+    for (int hand : order) {
+      if (pick_with(world, request, hand, to_place, plan)) return;
+      plan.segments.clear();
+    }
   }
 }
 
 bool ManipulationPlanner::pick_with(const World& world, const PlanRequest& request, int h,
-                                    Plan& plan) {
+                                    bool to_place, Plan& plan) {
   HandPlanner& hand = *hands_[h];
   const int gripper = hand.hand().gripper;
   const MoveGroup& group = robot().groups()[gripper];
@@ -150,6 +178,16 @@ bool ManipulationPlanner::pick_with(const World& world, const PlanRequest& reque
   const GripperShape& shape = grippers_[h];
   const std::vector<Grasp> ranked = rank_grasps(grasps(scene_->target(world.id), h), object,
                                                 start.tool * Pose{{}, shape.turn}, wanted);
+  const auto has_failed = [&](const Pose& tool) {
+    const Pose in_object = inverse(object) * tool;
+    // With the fingers the other way round it is the same grasp.
+    const Quat flipped = in_object.q * Quat{0, 0, 0, 1};
+    return std::ranges::any_of(states_[world.id].failed, [&](const Pose& failed) {
+      return norm(failed.p - in_object.p) < kSameGrasp &&
+             std::min(angle_between(failed.q, in_object.q), angle_between(failed.q, flipped)) <
+                 kSameTurn;
+    });
+  };
   int ways = 0;
   for (const auto& [iterations, most] : {std::pair(Chain::kTracking, cfg_.max_ik_candidates),
                                          std::pair(400, cfg_.max_far_candidates)}) {
@@ -158,6 +196,7 @@ bool ManipulationPlanner::pick_with(const World& world, const PlanRequest& reque
       if (shape.lowest(grasp.pose) < scene_->support_height(world.id) - kBelow) continue;
       if (++tried > most || ways == cfg_.max_ways) break;
       const Pose tool = grasp.pose * Pose{{}, conjugate(shape.turn)};
+      if (iterations == Chain::kTracking && has_failed(tool)) continue;  // rather another one
       HandPose before, at;
       const Pose pregrasp = backed(tool, cfg_.pregrasp);
       if (!(iterations == Chain::kTracking && hand.reach_along(world, pregrasp, start, before)) &&
@@ -167,6 +206,7 @@ bool ManipulationPlanner::pick_with(const World& world, const PlanRequest& reque
       if (!hand.is_free(query, before)) continue;
       query.set_margin(kGraspMargin);
       if (!hand.line_is_free(world, query, before, tool, at) || !hand.is_free(query, at)) continue;
+      if (to_place && !can_place(world, hand, at)) continue;
       Plan rest;
       hand.add_line(world, rest, kGrasp, before.tool, at.tool, cfg_.slow, cfg_.settle);
       hand.add_line(world, rest, kCloseGripper, at.tool, at.tool, cfg_.slow, cfg_.close_time)
@@ -218,8 +258,24 @@ void ManipulationPlanner::plan_place(const World& world, const PlanRequest& requ
   CollisionQuery query(hand.collisions(), world);
   query.hold(hand.hand().tool, hand.hand().gripper, target_body(world.id), tool_object);
 
+  std::vector<Vec3> places;
+  scene_->place_scene()->places(world, places);
+  Rng draw = rng(world, request, "planner/place");
+  int ways = 0;
+  for (Vec3 place : places) {
+    for (int k = 0; k < kTurns; ++k) {  // as it hangs, then turned to both sides, then between
+      const Pose goal = placed(object, scene_->target(world.id), place, k);
+      const std::size_t before = plan.segments.size();
+      if (place_at(world, hand, query, start, goal, tool_object, draw, plan)) return;
+      if (plan.segments.size() > before) plan.segments.resize(before);
+      if (++ways > 200) return;
+    }
+  }
+}
+
+Pose ManipulationPlanner::placed(const Pose& object, int target, Vec3 place, int k) const {
   // The middle of its underside, from its origin, as it hangs.
-  const ObjectShape& shape = scene_->all_objects()[scene_->target(world.id)].shape;
+  const ObjectShape& shape = scene_->all_objects()[target].shape;
   Vec3 low{1e9, 1e9, 1e9}, high{-1e9, -1e9, -1e9};
   for (Vec3 point : shape.points) {
     const Vec3 p = rotate(object.q, point);
@@ -227,21 +283,25 @@ void ManipulationPlanner::plan_place(const World& world, const PlanRequest& requ
     high = {std::max(high.x, p.x), std::max(high.y, p.y), std::max(high.z, p.z)};
   }
   const Vec3 underside{0.5 * (low.x + high.x), 0.5 * (low.y + high.y), low.z};
+  const int turns = (k % 2 ? -1 : 1) * ((k % 8 + 1) / 2);
+  const Quat turn = axis_angle({0, 0, 1}, (turns + (k < 8 ? 0 : 0.5)) * 0.25 * pi);
+  return {place + Vec3{0, 0, cfg_.clearance} - rotate(turn, underside), turn * object.q};
+}
+
+bool ManipulationPlanner::can_place(const World& world, const HandPlanner& hand,
+                                    const HandPose& at) const {
+  const Pose object = object_pose(world), object_tool = inverse(object) * at.tool;
   std::vector<Vec3> places;
   scene_->place_scene()->places(world, places);
-  Rng draw = rng(world, request, "planner/place");
-  int ways = 0;
-  for (Vec3 place : places) {
-    for (int k = 0; k < 8; ++k) {  // as it hangs, then turned to both sides
-      const Quat turn = axis_angle({0, 0, 1}, (k % 2 ? -1 : 1) * ((k + 1) / 2) * 0.25 * pi);
-      const Pose goal{place + Vec3{0, 0, cfg_.clearance} - rotate(turn, underside),
-                      turn * object.q};
-      const std::size_t before = plan.segments.size();
-      if (place_at(world, hand, query, start, goal, tool_object, draw, plan)) return;
-      if (plan.segments.size() > before) plan.segments.resize(before);
-      if (++ways > 200) return;
-    }
+  if (places.empty()) return true;
+  for (int k = 0; k < kTurns; ++k) {
+    const Pose tool = placed(object, scene_->target(world.id), places[0], k) * object_tool;
+    HandPose above, there;
+    if (hand.reach(world, raised(tool, cfg_.preplace), at, above) &&
+        hand.reach(world, tool, above, there))
+      return true;
   }
+  return false;
 }
 
 bool ManipulationPlanner::place_at(const World& world, HandPlanner& hand, CollisionQuery& query,

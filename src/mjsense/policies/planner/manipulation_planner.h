@@ -51,12 +51,19 @@ class ManipulationPlanner final : public TaskPlanner {
   struct State {
     int hand = 0;
     bool holding = false;
-    Pose tool_object;  // X_TO in the hand
-    RobotValues home;  // joints at the start of the episode
-    Pose home_tool;    // X_WT
+    Pose tool_object;          // X_TO in the hand
+    RobotValues home;          // joints at the start of the episode
+    Pose home_tool;            // X_WT
+    std::vector<Pose> failed;  // X_OT, grasps of this episode that did not hold, or not to the end
   };
+  void let_go(Plan& plan) const;
   void plan_pick(const World& world, const PlanRequest& request, Plan& plan);
-  bool pick_with(const World& world, const PlanRequest& request, int hand, Plan& plan);
+  // With `to_place` only a grasp with which the object also gets to where it is wanted.
+  bool pick_with(const World& world, const PlanRequest& request, int hand, bool to_place,
+                 Plan& plan);
+  bool can_place(const World& world, const HandPlanner& hand, const HandPose& at) const;
+  // X_WO of the object at a place, turned the k-th way from how it hangs at X_WO.
+  Pose placed(const Pose& object, int target, Vec3 place, int k) const;
   bool lift(const World& world, HandPlanner& hand, const HandPose& at, Plan& plan) const;
   void plan_place(const World& world, const PlanRequest& request, Plan& plan);
   bool place_at(const World& world, HandPlanner& hand, CollisionQuery& query, const HandPose& start,
