@@ -75,8 +75,8 @@ void Follower::reset(const World& world) {
   State& state = states_[world.id];
   restart(world);
   for (std::size_t g = 0; g < robot_->groups().size(); ++g) {
-    Sent& sent = state.sent[g];
-    sent = {};
+    state.sent[g] = {};
+    Sent& sent = state.sent[g].now;
     if (static_cast<int>(g) == floating_base_) {
       write_pose(robot_->base_pose(world), sent.values.data());
       sent.given = true;
@@ -273,6 +273,12 @@ constexpr double kBraking = 0.7;  // of the limit, for closing in: the rest is f
 
 }  // namespace
 
+Follower::Sent& Follower::Sending::at(double step) {
+  if (step != time) last = now;
+  time = step;
+  return now = last;
+}
+
 // A command that can be reached from the last one stands as it is, to the bit; otherwise its rate
 // changes as fast as it may, until it is caught up with.
 void Follower::limit(int group, Sent& sent, std::span<double> command) const {
@@ -337,7 +343,7 @@ bool Follower::brake(const World& world, Action& action) {
 
 // An arm that was commanded, and is not now, stops and stays.
 bool Follower::rest(const World& world, int group, Action& action) {
-  Sent& sent = states_[world.id].sent[group];
+  Sent& sent = states_[world.id].sent[group].at(world.time());
   if (!sent.moved || group == floating_base_) return true;
   const std::size_t n = robot_->groups()[group].qpos.size();
   bool at_rest = true;
@@ -404,11 +410,12 @@ void Follower::follow(const World& world, Action& action) {
       action.commands[g].set(command.view());
       GroupValues& sent = action.commands[g];
       const std::span<double> values(sent.values.data(), static_cast<std::size_t>(sent.size));
-      if (dt_ > 0 && state.sent[g].given) {
+      if (dt_ > 0 && state.sent[g].now.given) {
+        Sent& last = state.sent[g].at(world.time());
         if (static_cast<int>(g) == floating_base_) {
-          limit_pose(state.sent[g], values);
+          limit_pose(last, values);
         } else {
-          limit(static_cast<int>(g), state.sent[g], values);
+          limit(static_cast<int>(g), last, values);
         }
       }
     } else if (group.kind == GroupKind::kBase && !group.controlled()) {

@@ -95,6 +95,12 @@ class Follower {
     bool moved = false;  // it was commanded in this episode
     std::array<double, GroupValues::kMaxSize> values{}, wanted{}, rates{};
   };
+  // A step may be planned, and commanded, more than once: each time from what the step before sent.
+  struct Sending {
+    double time = -1;  // s, of the step
+    Sent last, now;
+    Sent& at(double step);
+  };
   struct State {
     Plan plan;
     int segment = 0;
@@ -106,7 +112,7 @@ class Follower {
     RobotValues
         offsets;  // of joints from the path that they are about to follow, `given` where there are
     std::array<Target, RobotValues::kMaxGroups> targets;  // per tool
-    std::array<Sent, RobotValues::kMaxGroups> sent;
+    std::array<Sending, RobotValues::kMaxGroups> sent;
   };
   void read_free_joints(const World& world, State& state) const;
   bool move_tool(const World& world, State& state, const ToolMove& move, double time);

@@ -49,6 +49,7 @@ ModelSource make(House& house, SceneFileCfg& cfg) {
                step = rng.uniform(0.34, 0.40);
   constexpr int kBoards = 3;
   constexpr double kThick = 0.022;
+  constexpr double kClear = 0.075;  // m, half of the longest thing
   const double back = front + deep;
   ShellCfg shell{.x0 = -2.4, .x1 = back + 0.03, .y0 = -2.2, .y1 = 2.2, .window_x = -1.2};
   write_shell(room, shell);
@@ -93,12 +94,13 @@ ModelSource make(House& house, SceneFileCfg& cfg) {
   }
 
   for (int i = 0; i < kBoards; ++i) {
-    const double y1 = wide / 2 - 0.05 - (i == with_books ? taken : 0.0);
+    // The longest thing lies across, and touches neither sides, nor back, nor books.
+    const double y1 = wide / 2 - kClear - (i == with_books ? taken : 0.0);
     SceneRegionCfg region;
     region.name = fmt::format("board_{}", i);
     region.on = "room/" + region.name;
-    region.area = {front + 0.04, back - 0.06, -wide / 2 + 0.05, y1};
-    region.target_area = {front + 0.05, front + 0.11, -wide / 2 + 0.16, y1 - 0.11};
+    region.area = {front + 0.04, back - kClear, -wide / 2 + kClear, y1};
+    region.target_area = {front + 0.05, front + 0.11, -wide / 2 + 0.16, y1 - 0.085};
     cfg.regions.push_back(region);
   }
   return room.model();
