@@ -1,71 +1,91 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Pictures of the scenes for the documentation: python tools/scene_pictures.py [SCENE ...], into docs/pictures.
+"""Pictures of the scenes and tasks for the documentation: python tools/scene_pictures.py [NAME ...], into docs/pictures.
 
-Views of scenes of installed packages may be added; where a package is missing its scene is left out.
+Each is of two episodes, played by the planner up to the moment that is shown. A picture whose scene is of a package that is not
+installed is left out. Needs ffmpeg, which recordings need, too.
 """
 
 from __future__ import annotations
 
-import struct
+import subprocess
 import sys
 import tempfile
-import zlib
 from pathlib import Path
+from typing import NamedTuple
 
 import numpy as np
 
 import mjsense as mjs
 
 PICTURES = Path(__file__).parents[1] / "docs/pictures"
-WIDTH, HEIGHT = 480, 320
-# Scene: task, where the camera stands, what it looks at.
+WIDTH, HEIGHT = 400, 280
+
+
+class View(NamedTuple):
+    task: str
+    scene: str
+    robot: str = "franka"
+    steps: int = 45
+    pos: tuple[float, float, float] | None = (-0.5, -1.1, 1.4)  # None: the robot's own camera, behind it
+    target: tuple[float, float, float] = (0.7, 0.0, 0.6)
+    seed: int = 3
+
+
+KITCHEN = {"pos": (-2.0, -1.2, 1.7), "target": (0.3, 0.0, 0.95)}
 VIEWS = {
-    "kitchen": ("open", (-2.0, -1.2, 1.7), (0.3, 0.0, 0.95)),
-    "kitchen:1": ("close", (-1.9, 0.9, 1.6), (0.3, 0.0, 0.95)),
-    "shelf": ("pick", (-1.1, -1.1, 1.6), (0.6, 0.0, 0.85)),
-    "clutter": ("pick", (-0.5, -1.1, 1.4), (0.7, 0.0, 0.6)),
-}
+    "scene_table": View("pick", "table"),
+    "scene_varied_table": View("pick", "varied_table"),
+    "scene_tableware": View("pick", "tableware", steps=5),
+    "scene_clutter": View("pick", "clutter"),
+    "scene_shelf": View("pick", "shelf", pos=(-1.1, -1.1, 1.6), target=(0.6, 0.0, 0.85)),
+    "scene_kitchen": View("open", "kitchen", **KITCHEN),
+    "scene_kitchen_1": View("close", "kitchen:1", pos=(-1.9, 0.9, 1.6), target=(0.3, 0.0, 0.95)),
+    "task_pick_and_place": View("pick_and_place", "tableware", steps=125),
+    "task_pick_and_place_next_to": View("pick_and_place_next_to", "tableware", steps=125),
+    "task_pick_and_place_color": View("pick_and_place_color", "tableware", steps=125),
+    "task_packing": View("packing", "tableware", steps=125),
+    "task_open": View("open", "kitchen", steps=125, **KITCHEN),
+    "task_close": View("close", "kitchen", steps=75, **KITCHEN),
+    "task_door_opening": View("door_opening", "room_with_door", "rby1", steps=165, pos=None),
+    "task_nav_to_obj": View("nav_to_obj", "floor", "rby1", steps=40, pos=None),
+}  # fmt: skip
 
 
-def png(pixels: np.ndarray) -> bytes:
+def write_jpeg(path: Path, pixels: np.ndarray) -> None:
     height, width, _ = pixels.shape
-    rows = b"".join(b"\0" + row.tobytes() for row in pixels)
-
-    def chunk(kind: bytes, data: bytes) -> bytes:
-        return struct.pack(">I", len(data)) + kind + data + struct.pack(">I", zlib.crc32(kind + data))
-
-    head = struct.pack(">IIBBBBB", width, height, 8, 2, 0, 0, 0)
-    return b"\x89PNG\r\n\x1a\n" + chunk(b"IHDR", head) + chunk(b"IDAT", zlib.compress(rows, 9)) + chunk(b"IEND", b"")
+    subprocess.run(
+        ["ffmpeg", "-nostdin", "-hide_banner", "-loglevel", "error", "-y", "-f", "rawvideo", "-pixel_format", "rgb24",
+         "-video_size", f"{width}x{height}", "-i", "-", "-frames:v", "1", "-q:v", "5", str(path)],
+        input=np.ascontiguousarray(pixels).tobytes(), check=True)  # fmt: skip
 
 
-def picture(scene: str) -> np.ndarray:
+def picture(view: View) -> np.ndarray:
     """Two episodes beside each other, [H, 2 W, 3]."""
-    task, pos, target = VIEWS[scene]
+    where = 'mount = "mjcf"\ncamera = "camera_follower"\n'
+    if view.pos is not None:
+        where = f'mount = "fixed"\npos = {list(view.pos)}\ntarget = {list(view.target)}\nfovy = 62\n'
     with tempfile.TemporaryDirectory() as folder:
         cameras = Path(folder, "cameras.toml")
-        cameras.write_text(
-            f'width = {WIDTH}\nheight = {HEIGHT}\n[[cameras]]\nname = "view_camera"\nmount = "fixed"\n'
-            f"pos = {list(pos)}\ntarget = {list(target)}\nfovy = 62\n"
-        )
-        env = mjs.make_vec(task, "franka", scene=scene, num_envs=2, camera_system=str(cameras), observations=["view_camera"],
-                           samples=4, seed=3, policy="planner")  # fmt: skip
+        cameras.write_text(f'width = {WIDTH}\nheight = {HEIGHT}\n[[cameras]]\nname = "view_camera"\n{where}')
+        env = mjs.make_vec(view.task, view.robot, scene=view.scene, num_envs=2, camera_system=str(cameras),
+                           observations=["view_camera"], samples=4, seed=view.seed, policy="planner")  # fmt: skip
         env.reset()
-        for _ in range(45):
+        for _ in range(view.steps):
             observation = env.step(env.expert_action())[0]
         env.close()
     return np.concatenate(list(observation["view_camera"]), axis=1)
 
 
 def main() -> None:
-    for scene in sys.argv[1:] or VIEWS:
+    for name in sys.argv[1:] or VIEWS:
         try:
-            pixels = picture(scene)
+            pixels = picture(VIEWS[name])
         except ValueError as error:
-            print(f"{scene}: left out: {error}")
+            print(f"{name}: left out: {error}")
             continue
-        path = PICTURES / f"scene_{scene.replace('/', '_').replace(':', '_')}.png"
-        path.write_bytes(png(np.ascontiguousarray(pixels)))
-        print(f"{path}: {path.stat().st_size} B")
+        path = PICTURES / f"{name}.jpg"
+        write_jpeg(path, pixels)
+        print(f"{path}: {path.stat().st_size} B", flush=True)
 
 
 if __name__ == "__main__":

@@ -1,0 +1,148 @@
+# SPDX-License-Identifier: Apache-2.0
+"""What differs from episode to episode: writes the table of docs/tasks.md.
+
+    python tools/variety.py [--episodes 100] [--played 40] [--only SCENE]
+
+Begins episodes of one recording in each scene of CASES, as `mjsense record` would with the camera system `randomized_droid`, and plays
+some with `--perturb 0.5` for the share of retries. What was found is kept in .cache/variety.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import sys
+import tempfile
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+ROOT = Path(__file__).resolve().parents[1]
+for build in ("release", "dev"):
+    if (ROOT / "build" / build / "python").exists():
+        sys.path.insert(0, str(ROOT / "build" / build / "python"))
+        break
+sys.path.insert(0, str(ROOT / "tools"))
+
+import task_table
+
+import mjsense as mjs
+
+PAGE, RESULTS = ROOT / "docs" / "tasks.md", ROOT / ".cache" / "variety"
+BEGIN, END = "<!-- variety -->", "<!-- end of variety -->"
+CASES = (("pick", "table"), ("pick", "tableware"), ("pick", "clutter"), ("pick", "shelf"), ("open", "kitchen"))
+AWAY = 50.0  # m: objects that take no part stand beyond
+
+
+def size(model: Any, body: int) -> float:
+    """Longest edge (m) of the boxes about a body's geoms."""
+    geoms = [g for g in range(model.ngeom) if model.body_rootid[model.geom_bodyid[g]] == body]
+    return float(max((2 * model.geom_aabb[g, 3:].max() for g in geoms), default=0.0))
+
+
+def starts(task: str, scene: str, episodes: int) -> dict[str, list[Any]]:
+    """Of each episode's first moment, what varies."""
+    worlds = 10
+    found: dict[str, list[Any]] = {name: [] for name in ("x", "y", "turn", "count", "size", "light", "colour", "camera", "tilt")}
+    env = mjs.make_vec(task, "franka", scene=scene, num_envs=worlds, camera_system="randomized_droid", width=32, height=24,
+                       policy="free_planner" if task == "pick" else "planner", observations=["grasp_pose"])  # fmt: skip
+    model = env.sim.model
+    free = [int(b) for b in range(1, model.nbody)
+            if model.body_jntnum[b] == 1 and model.jnt_type[model.body_jntadr[b]] == 0]  # fmt: skip
+    sizes = {b: size(model, b) for b in free}
+    for first in range(0, episodes, worlds):
+        # The next episodes of the same recording: a reset without a seed.
+        env.reset(seed=0) if first == 0 else env.reset()
+        pos, quat = env.sim.data.xpos, env.sim.data.xquat
+        for w in range(min(worlds, episodes - first)):
+            here = [b for b in free if abs(pos[w, b, 1]) < AWAY]
+            grasp = env.rows["grasp_pose"][w]
+            found["count"].append(len(here))
+            for b in here:
+                found["x"].append(float(pos[w, b, 0]))
+                found["y"].append(float(pos[w, b, 1]))
+                qw, _, _, qz = quat[w, b]
+                found["turn"].append(float(np.degrees(2 * np.arctan2(qz, qw))))
+                found["size"].append(sizes[b])
+            light = env.sim.model_field("light_diffuse")
+            found["light"].append(float(np.broadcast_to(light, (worlds, *light.shape[-2:]))[w].sum()))
+            colour = env.sim.model_field("mat_rgba")
+            found["colour"].append(np.broadcast_to(colour, (worlds, *colour.shape[-2:]))[w, :, :3].ravel().tolist())
+            cameras = env.sim.data.cam_xpos
+            found["camera"].append(cameras[w].ravel().tolist())
+            qw, qx, qy, qz = grasp[3:]
+            if np.any(grasp[3:]):
+                approach = qw * qw - qx * qx - qy * qy + qz * qz
+                found["tilt"].append(float(np.degrees(np.arccos(np.clip(-approach, -1, 1)))))
+    env.close()
+    return found
+
+
+def spread(values: list[float], digits: int) -> str:
+    if not values:
+        return ""
+    return f"{min(values):.{digits}f} to {max(values):.{digits}f} ({np.std(values):.{digits}f})"
+
+
+def measure(task: str, scene: str, episodes: int, played: int) -> dict[str, Any]:
+    found = starts(task, scene, episodes)
+    with tempfile.TemporaryDirectory() as out:
+        made = mjs.record(task, "franka", out=out, scene=scene, episodes=played, max_attempts=played, keep_failures=True, worlds=8,
+                          cameras=[], perturb=0.5, policy="free_planner" if task == "pick" else "planner")  # fmt: skip
+        retried = [e["retries"] > 0 for e in task_table.episodes_of(made.path)]
+    colours, cameras = np.array(found["colour"]), np.array(found["camera"])
+    return {
+        "task": task, "scene": scene, "episodes": episodes, "played": len(retried),
+        "x": spread(found["x"], 2), "y": spread(found["y"], 2), "turn": float(np.std(found["turn"])) if found["turn"] else 0.0,
+        "count": f"{min(found['count'])} to {max(found['count'])}",
+        "size": spread([100 * s for s in found["size"]], 1),
+        "light": spread(found["light"], 2),
+        "colours": int((colours.std(0).reshape(-1, 3).max(1) > 0.01).sum()), "materials": colours.shape[1] // 3,
+        "camera": float(100 * cameras.std(0).max()),
+        "tilt": spread(found["tilt"], 0), "slanted": float(np.mean(np.array(found["tilt"]) > 30)) if found["tilt"] else 0.0,
+        "retried": float(np.mean(retried)) if retried else 0.0,
+    }  # fmt: skip
+
+
+def table(results: list[dict[str, Any]]) -> str:
+    rows = [
+        ("played", lambda r: f"`{r['task']}`, {r['episodes']}"),
+        ("objects, number", lambda r: r["count"]),
+        ("their x, m", lambda r: r["x"]),
+        ("their y, m", lambda r: r["y"]),
+        ("their turn, standard deviation, degrees", lambda r: f"{r['turn']:.0f}"),
+        ("their size, cm", lambda r: r["size"]),
+        ("light, sum of the lamps' colours", lambda r: r["light"]),
+        ("materials with other colours", lambda r: f"{r['colours']} of {r['materials']}"),
+        ("cameras, standard deviation, cm", lambda r: f"{r['camera']:.0f}"),
+        ("approach, degrees from vertical", lambda r: r["tilt"]),
+        ("approach more than 30 degrees", lambda r: f"{r['slanted']:.0%}"),
+        ("retried, `--perturb 0.5`", lambda r: f"{r['retried']:.0%} of {r['played']}"),
+    ]
+    head = ["| | " + " | ".join(f"`{r['scene']}`" for r in results) + " |", "| --- |" + " --- |" * len(results)]
+    return "\n".join(head + [f"| {name} | " + " | ".join(cell(r) for r in results) + " |" for name, cell in rows])
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--episodes", type=int, default=100)
+    parser.add_argument("--played", type=int, default=40)
+    parser.add_argument("--only", default="", help="SCENE")
+    arguments = parser.parse_args()
+    RESULTS.mkdir(parents=True, exist_ok=True)
+    results = []
+    for task, scene in CASES:
+        kept = RESULTS / f"{scene}.json"
+        if arguments.only in ("", scene):
+            kept.write_text(json.dumps(measure(task, scene, arguments.episodes, arguments.played)))
+        if kept.exists():
+            results.append(json.loads(kept.read_text()))
+            print(results[-1], flush=True)
+    text = PAGE.read_text()
+    before, rest = text.split(BEGIN, 1)
+    PAGE.write_text(f"{before}{BEGIN}\n{table(results)}\n{END}{rest.split(END, 1)[1]}")
+
+
+if __name__ == "__main__":
+    main()
