@@ -26,7 +26,12 @@ TOOLS = {
     "franka": {"tcp_pose": "gripper/grasp_site"},
     "mobile_franka": {"tcp_pose": "gripper/grasp_site"},
     "floating_rum": {"tcp_pose": "grasp_site"},
-    "rby1": {"left_tcp_pose": "ee_site_l", "tcp_pose_left": "ee_site_l", "right_tcp_pose": "ee_site_r", "tcp_pose_right": "ee_site_r"},
+    "rby1": {
+        "left_tcp_pose": "ee_site_l",
+        "tcp_pose_left": "ee_site_l",
+        "right_tcp_pose": "ee_site_r",
+        "tcp_pose_right": "ee_site_r",
+    },
 }
 GRIPPERS = {
     "franka": {"gripper": "gripper/base"},
@@ -150,7 +155,9 @@ def test_worlds_beside_it_change_nothing(task, robot):
 
 def test_door_state_is_of_this_step(tmp_path):
     """Joint angle, hinge, handle and poses, from the recorded state of the door's joints: not one step old."""
-    made = mjs.record("door_opening", "rby1", out=tmp_path / "door", episodes=1, max_attempts=1, keep_failures=True, cameras=[], horizon=230)
+    made = mjs.record(
+        "door_opening", "rby1", out=tmp_path / "door", episodes=1, max_attempts=1, keep_failures=True, cameras=[], horizon=230
+    )
     env = mjs.make_vec("door_opening", "rby1", cameras=[])
     model = env.sim.model
     data = mujoco.MjData(model)
