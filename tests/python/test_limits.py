@@ -85,8 +85,10 @@ def test_child_of_a_fork_ends():
     assert done.stdout.strip() == "3", done.stderr
 
 
-def test_interrupt(sim):
+def test_interrupt(sim, request):
     """Ctrl-C reaches a long call of step()."""
+    before = signal.signal(signal.SIGINT, signal.default_int_handler)  # a shell's background job begins without it
+    request.addfinalizer(lambda: signal.signal(signal.SIGINT, before))
     timer = threading.Timer(0.3, lambda: os.kill(os.getpid(), signal.SIGINT))
     begun = time.time()
     timer.start()
