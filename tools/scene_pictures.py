@@ -31,21 +31,24 @@ class View(NamedTuple):
     seed: int = 3
 
 
-KITCHEN = {"pos": (-2.0, -1.2, 1.7), "target": (0.3, 0.0, 0.95)}
+def in_kitchen(task: str, steps: int = 45) -> View:
+    return View(task, "kitchen", steps=steps, pos=(-2.0, -1.2, 1.7), target=(0.3, 0.0, 0.95))
+
+
 VIEWS = {
     "scene_table": View("pick", "table"),
     "scene_varied_table": View("pick", "varied_table"),
     "scene_tableware": View("pick", "tableware", steps=5),
     "scene_clutter": View("pick", "clutter"),
     "scene_shelf": View("pick", "shelf", pos=(-1.1, -1.1, 1.6), target=(0.6, 0.0, 0.85)),
-    "scene_kitchen": View("open", "kitchen", **KITCHEN),
+    "scene_kitchen": in_kitchen("open"),
     "scene_kitchen_1": View("close", "kitchen:1", pos=(-1.9, 0.9, 1.6), target=(0.3, 0.0, 0.95)),
     "task_pick_and_place": View("pick_and_place", "tableware", steps=125),
     "task_pick_and_place_next_to": View("pick_and_place_next_to", "tableware", steps=125),
     "task_pick_and_place_color": View("pick_and_place_color", "tableware", steps=125),
     "task_packing": View("packing", "tableware", steps=125),
-    "task_open": View("open", "kitchen", steps=125, **KITCHEN),
-    "task_close": View("close", "kitchen", steps=75, **KITCHEN),
+    "task_open": in_kitchen("open", steps=125),
+    "task_close": in_kitchen("close", steps=75),
     "task_door_opening": View("door_opening", "room_with_door", "rby1", steps=165, pos=None),
     "task_nav_to_obj": View("nav_to_obj", "floor", "rby1", steps=40, pos=None),
 }  # fmt: skip
