@@ -16,12 +16,13 @@ namespace {
 
 using std::numbers::pi;
 
-constexpr double kMargin = 0.004;       // m, of everything to everything on the way
-constexpr double kGraspMargin = 0.001;  // m, of the open gripper at the grasp
-constexpr double kBelow = 0.004;        // m that boxes around a slanting gripper reach below it
-constexpr double kSide = 100;           // degrees, most that the approach turns from the way out
-constexpr int kTurns = 16;              // about the vertical, of what is put down
-constexpr double kSlipped = 0.05;       // m, object in the hand against where it was taken
+constexpr double kMargin = 0.004;        // m, of everything to everything on the way
+constexpr double kGraspMargin = 0.001;   // m, of the open gripper at the grasp
+constexpr double kBelow = 0.004;         // m that boxes around a slanting gripper reach below it
+constexpr double kSide = 100;            // degrees, most that the approach turns from the way out
+constexpr int kTurns = 16;               // about the vertical, of what is put down
+constexpr int kMostGoals = 25 * kTurns;  // places and turns, before there is no way
+constexpr double kSlipped = 0.05;        // m, object in the hand against where it was taken
 constexpr double kSameGrasp = 0.012, kSameTurn = 0.4;  // m, rad: what failed is not tried again
 // Of a tool that must get away from what it touches.
 constexpr double kBack = 0.06, kUp = 0.10;  // m
@@ -268,7 +269,7 @@ void ManipulationPlanner::plan_place(const World& world, const PlanRequest& requ
       const std::size_t before = plan.segments.size();
       if (place_at(world, hand, query, start, goal, tool_object, draw, plan)) return;
       if (plan.segments.size() > before) plan.segments.resize(before);
-      if (++ways > 200) return;
+      if (++ways > kMostGoals) return;
     }
   }
 }
