@@ -6,5 +6,5 @@ add_library(mjsense_testing STATIC ${shared})
 target_link_libraries(mjsense_testing PRIVATE mjsense ${MJSENSE_PRIVATE_LIBS})
 
 # Writes recordings that the Python tests read, kill and resume, and that bench/record.py times.
-add_executable(record_fake ${PROJECT_SOURCE_DIR}/tests/record/fake_writer.cc)
-target_link_libraries(record_fake PRIVATE mjsense_testing mjsense ${MJSENSE_PRIVATE_LIBS})
+add_executable(record_fake ${PROJECT_SOURCE_DIR}/tests/record/fake_writer.cc ${PROJECT_SOURCE_DIR}/tests/record/kill_at.cc)
+target_link_libraries(record_fake PRIVATE mjsense_testing mjsense ${MJSENSE_PRIVATE_LIBS} ${CMAKE_DL_LIBS})

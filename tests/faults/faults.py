@@ -275,6 +275,28 @@ def kills(lab: Lab, trials: int, seed=3) -> Row:
     return row
 
 
+def killed_changes(lab: Lab, trials: int) -> Row:
+    """kill -9 before one change of the file system after the other (tests/record/kill_at.cc), then --resume: the same files."""
+    row = Row("kill -9 before each change of the file system, then --resume")
+    # Some episodes are played beyond the wanted number, and dropped.
+    options = ["--episodes", "5", "--batches", "2", "--worlds", "3", "--steps", "4", "--discard", "4", "--no-depth", "--cameras", "1"]
+    whole = lab.fresh("whole")
+    counted = lab.run(whole, *options, env=os.environ | {"MJSENSE_COUNT_CHANGES": "1"})
+    changes, expected = int(counted.stderr.split("changes ")[1]), contents(whole)
+    for trial in range(trials):
+        at, out = 1 + trial * changes // trials, lab.fresh("killed")
+        killed = lab.run(out, *options, env=os.environ | {"MJSENSE_KILL_AT": str(at)})
+        if killed.returncode == 0:
+            continue  # threads took another turn: there were fewer changes
+        row.trials += 1
+        done = lab.run(out, *options, "--resume")
+        if killed.returncode != -signal.SIGKILL or done.returncode != 0:
+            row.wrong("crashed", f"{killed.returncode} {killed.stderr} {done.stderr}")
+        if contents(out) != expected:
+            row.wrong("lost", f"before change {at}: {sorted(set(expected) ^ set(contents(out)))}")
+    return row
+
+
 def full_disks(lab: Lab, trials: int) -> Row:
     """A disk of a few hundred kilobytes more each time: a clear error, what was finished stays and is published on a larger one."""
     row = Row("full disks")

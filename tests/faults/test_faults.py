@@ -70,5 +70,9 @@ def test_full_disks(lab):
     check(faults.full_disks(lab, 6))
 
 
+def test_kills_before_changes_of_the_file_system(lab):
+    check(faults.killed_changes(lab, 24))
+
+
 def test_limits_on_the_size_of_files(lab):
     check(faults.file_limits(lab, 12))

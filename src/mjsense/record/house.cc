@@ -234,6 +234,8 @@ House::House(const fs::path& dir, const std::string& fingerprint, bool resume)
   const bool goes_on = fs::exists(staging_ / kLock) && !fs::exists(staging_ / kEndingFile);
   if (unfinished.empty() && any_published && !goes_on) {
     ended_ = true;
+    // What a process killed in its last step left.
+    if (unlink((staging_ / kEndingFile).c_str()) == 0) rmdir(staging_.c_str());
     return;
   }
   make_dir(staging_);
@@ -471,7 +473,12 @@ void House::end() {
   ended_ = true;
   for (const fs::path& path : entries(staging_)) {
     const fs::path name = path.filename();
-    if (name != kDescription && name != kLock && name != kEndingFile) remove_tree(path);
+    if (name == kDescription || name == kLock || name == kEndingFile) continue;
+    // An episode beyond the wanted number: half removed under its own name it would look damaged.
+    const fs::path dropped = path.string() + ".part";
+    std::error_code error;
+    fs::rename(path, dropped, error);
+    remove_tree(error ? path : dropped);
   }
   // The mark that says it has ended goes last.
   remove_tree(staging_ / kDescription);

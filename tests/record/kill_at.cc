@@ -1,0 +1,79 @@
+// SPDX-License-Identifier: Apache-2.0
+// A program linked with this file dies by SIGKILL before its N-th change of the file system, N from
+// the environment (MJSENSE_KILL_AT): every state that a kill may leave can be tried in turn.
+// MJSENSE_COUNT_CHANGES=1 makes it say at its end how many there were.
+
+#include <dlfcn.h>
+#include <fcntl.h>
+#include <sys/stat.h>
+#include <unistd.h>
+
+#include <atomic>
+#include <csignal>
+#include <cstdio>
+#include <cstdlib>
+
+namespace {
+
+const pid_t kProgram = getpid();  // its encoders and readers are not counted
+std::atomic<int> changes = 0;
+std::atomic<bool> wrote = false;
+
+// Writes one after the other count as one: they go to files that have no final name yet.
+void count(bool writes = false) {
+  static const char* at = std::getenv("MJSENSE_KILL_AT");
+  if (wrote.exchange(writes) && writes) return;
+  const int n = ++changes;
+  if (at != nullptr && n == std::atoi(at) && getpid() == kProgram) kill(getpid(), SIGKILL);
+}
+
+template <class F>
+F* next(const char* name) {
+  return reinterpret_cast<F*>(dlsym(RTLD_NEXT, name));
+}
+
+struct Said {
+  ~Said() {
+    if (std::getenv("MJSENSE_COUNT_CHANGES") != nullptr)
+      std::fprintf(stderr, "changes %d\n", changes.load());
+  }
+} const said;
+
+}  // namespace
+
+extern "C" {
+
+int rename(const char* from, const char* to) noexcept {
+  count();
+  return next<int(const char*, const char*)>("rename")(from, to);
+}
+int unlink(const char* path) noexcept {
+  count();
+  return next<int(const char*)>("unlink")(path);
+}
+int unlinkat(int dir, const char* path, int flags) noexcept {
+  count();
+  return next<int(int, const char*, int)>("unlinkat")(dir, path, flags);
+}
+int rmdir(const char* path) noexcept {
+  count();
+  return next<int(const char*)>("rmdir")(path);
+}
+int mkdir(const char* path, mode_t mode) noexcept {
+  count();
+  return next<int(const char*, mode_t)>("mkdir")(path, mode);
+}
+int fsync(int file) {
+  count();
+  return next<int(int)>("fsync")(file);
+}
+ssize_t write(int file, const void* bytes, size_t n) {
+  struct stat about;
+  if (fstat(file, &about) == 0 && S_ISREG(about.st_mode)) count(true);
+  return next<ssize_t(int, const void*, size_t)>("write")(file, bytes, n);
+}
+ssize_t pwrite(int file, const void* bytes, size_t n, off_t at) {
+  count(true);
+  return next<ssize_t(int, const void*, size_t, off_t)>("pwrite")(file, bytes, n, at);
+}
+}
