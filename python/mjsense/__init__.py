@@ -13,6 +13,7 @@ _core.leave_no_log_file()
 from mjsense import _gymnasium, assets, configs, effects, observations
 from mjsense._core import SensorSpec, embedded_models, robot_names
 from mjsense._core import __version__ as __version__  # pyright: ignore[reportAttributeAccessIssue]  # stubs leave it out
+from mjsense._user_code import SensorError
 from mjsense.configs import *  # noqa: F403
 from mjsense.contact import ContactSensor
 from mjsense.core_sensors import (
@@ -34,6 +35,7 @@ from mjsense.effects import EffectSensorCfg
 from mjsense.env import TaskEnv, make
 from mjsense.errors import UnknownNameError
 from mjsense.imu import ImuSensor
+from mjsense.native_sensor import BuiltinSensor, NativeSensor
 from mjsense.pipeline import ObservationPipeline
 from mjsense.policy import Policy, policy_names, register_policy
 from mjsense.raycast import CameraSensor, LidarSensor, RayCastSensor, TerrainHeightSensor
@@ -41,7 +43,7 @@ from mjsense.record import RecordProgress, RecordSummary, record
 from mjsense.recorder import Recorder
 from mjsense.robot import MoveGroup, Robot, RobotCamera
 from mjsense.scene import Entity, Scene
-from mjsense.sensor import BuiltinSensor, NativeSensor, Sensor, SensorError
+from mjsense.sensor import Sensor
 from mjsense.simulation import Simulation
 from mjsense.suite import SensorSuite
 from mjsense.task import Task, WorldState, register_task, task_names

@@ -6,7 +6,8 @@ from __future__ import annotations
 from collections.abc import Iterable
 from typing import TYPE_CHECKING, Any
 
-from mjsense.sensor import NativeSensor, Sensor, as_sensor
+from mjsense.native_sensor import NativeSensor
+from mjsense.sensor import Sensor, as_sensor
 
 if TYPE_CHECKING:
     from mjsense.simulation import Simulation

@@ -7,7 +7,7 @@ import numpy as np
 
 from mjsense import _core
 from mjsense._arguments import checked
-from mjsense.sensor import NativeSensor
+from mjsense.native_sensor import NativeSensor
 
 
 @checked

@@ -13,7 +13,8 @@ from mjsense import _core
 from mjsense._arguments import checked
 from mjsense._streams import nest
 from mjsense.errors import UnknownNameError
-from mjsense.sensor import NativeSensor, Sensor
+from mjsense.native_sensor import NativeSensor
+from mjsense.sensor import Sensor
 
 if TYPE_CHECKING:
     from mjsense.simulation import Simulation

@@ -3,7 +3,7 @@
 
 from mjsense.configs import ImuAxis, ImuModel, ImuSensorCfg
 from mjsense.data import ImuData
-from mjsense.sensor import NativeSensor
+from mjsense.native_sensor import NativeSensor
 
 
 class ImuSensor(NativeSensor):

@@ -9,7 +9,7 @@ from pathlib import Path
 from mjsense import _core
 from mjsense._arguments import checked
 from mjsense.data import CameraData
-from mjsense.sensor import NativeSensor
+from mjsense.native_sensor import NativeSensor
 
 
 class RayCastSensor(NativeSensor):

@@ -20,8 +20,9 @@ from mjsense.configs import SceneCfg, SensorCfg
 from mjsense.contact import ContactSensor
 from mjsense.errors import UnknownNameError
 from mjsense.imu import ImuSensor
+from mjsense.native_sensor import BuiltinSensor, NativeSensor
 from mjsense.raycast import CameraSensor, LidarSensor, RayCastSensor, TerrainHeightSensor
-from mjsense.sensor import BuiltinSensor, NativeSensor, Sensor, as_sensor
+from mjsense.sensor import Sensor, as_sensor
 
 _CLASSES = {
     "builtin": BuiltinSensor,

@@ -1,24 +1,22 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Sensors as Python sees them: those computed in C++, and the base class of your own."""
+"""The base class of your own sensors."""
 
 from __future__ import annotations
 
 import copy
-import functools
-import inspect
 import json
 import weakref
-from collections.abc import Mapping, Sequence
-from types import MappingProxyType
-from typing import TYPE_CHECKING, Any, ClassVar
+from collections.abc import Sequence
+from typing import TYPE_CHECKING, Any
 
 import gymnasium
 import numpy as np
 
-from mjsense import _core, _show, data
-from mjsense._arguments import KnownAttributes, checked
+from mjsense import _core, _show
 from mjsense._rows import Row, leaves, nested, rows_of_space, rows_of_value
+from mjsense._user_code import Dice, SensorError, named, observe, required, takes
 from mjsense.drawing import DebugShapes
+from mjsense.native_sensor import NativeSensor
 
 if TYPE_CHECKING:
     import mujoco
@@ -35,115 +33,6 @@ def _plain(value: Any) -> Any:
     if isinstance(value, (np.ndarray, np.generic)):
         return value.tolist()
     raise TypeError(f"{type(value).__name__} is no JSON value")
-
-
-@checked
-class NativeSensor(KnownAttributes):
-    """A sensor of the scene that C++ computes."""
-
-    def __init__(self, handle: _core.SensorHandle) -> None:
-        self._handle = handle
-        self._core: _core.Simulation | None = None
-        self._data: Any = None
-        self._fields: Mapping[str, np.ndarray] = {}
-        self.name: str = handle.name
-        """Key in the scene."""
-        self.kind: str = handle.kind
-        """builtin, contact, raycast, camera ..."""
-        self.cfg: Any = None
-        """Its configuration; None for a sensor that was found in the model."""
-        self._complete = True
-
-    def __repr__(self) -> str:
-        return _show.line(f"{self.kind} sensor '{self.name}'", self._shown())
-
-    def _repr_html_(self) -> str:
-        """For notebooks: its fields, and thumbnails of the first world's images."""
-        images = {}
-        if self.kind == "camera" and self._core is not None and not self._core.closed:
-            images = {name or self.name: rows[0] for name, rows in self.fields.items() if rows.ndim == 4}
-        return _show.table(f"{self.kind} sensor '{self.name}'", self._shown(), images)
-
-    def _shown(self) -> list[_show.Row]:
-        worlds = next((len(array) for array in self._fields.values()), None)
-        return _show.rows_of(self.specs, worlds) if self._fields else []
-
-    def _bind(self, core: _core.Simulation) -> None:
-        self._core = core
-        arrays = self._handle.arrays()
-        self._fields = MappingProxyType(arrays)
-        self._data = arrays[""] if "" in arrays else data.make_data(data.DATA_OF_KIND.get(self.kind, data.SensorData), arrays)
-
-    @property
-    def data(self) -> Any:
-        """The measurement of every world as it is now: an array ``[B, ...]``, or an object with one array a field.
-
-        Computed when it is read and not current. The arrays are the sensor's own memory, read-only: the next read after a step,
-        reset or forward writes them again, and step() itself may. Copy what you keep, or change.
-        """
-        if self._core is None:
-            raise RuntimeError(f"sensor '{self.name}' has no data yet: make a Simulation of its scene first")
-        self._core.refresh(self._handle)
-        return self._data
-
-    def _row(self, world: int) -> Any:
-        """The present value of one world, for the taker to keep."""
-        rows = {name: array[world].copy() for name, array in self.fields.items()}
-        return rows.get("", rows)
-
-    @property
-    def fields(self) -> Mapping[str, np.ndarray]:
-        """Every field as it is now, by name; the only or main one is ''."""
-        self.data  # makes them current
-        return self._fields
-
-    @property
-    def specs(self) -> dict[str, _core.SensorSpec]:
-        """What each field is: dtype, shape, unit, frame. A sensor with one field calls it ''."""
-        return self._handle.specs()
-
-    @property
-    def spec(self) -> _core.SensorSpec:
-        """The spec of a sensor with one field, or of its main one."""
-        specs = self.specs
-        if "" not in specs:
-            raise ValueError(f"sensor '{self.name}' has the fields {sorted(specs)}: use specs")
-        return specs[""]
-
-    @property
-    def uuid(self) -> str:
-        """Its name, as suites call it."""
-        return self.name
-
-    @property
-    def observation_space(self) -> gymnasium.Space:
-        """gymnasium space of one world's value: a Box, or a Dict of one Box a field."""
-        spaces: dict[str, gymnasium.Space] = {name: _box(spec) for name, spec in self.specs.items()}
-        return spaces[""] if "" in spaces else gymnasium.spaces.Dict(spaces)
-
-    def debug_shapes(self, world: int = 0) -> DebugShapes:
-        """What it measures in this world, as shapes to look at: see :meth:`mjsense.Simulation.draw`."""
-        if self._core is None:
-            raise RuntimeError(f"sensor '{self.name}' has no data yet: make a Simulation of its scene first")
-        shapes = DebugShapes(world, self._core.meansize)
-        shapes._extend(*self._core.draw(world, [self._handle]))
-        return shapes
-
-    @property
-    def bytes_per_world(self) -> int:
-        """Memory of one world's row."""
-        return self._handle.bytes_per_world
-
-
-def _box(spec: _core.SensorSpec) -> gymnasium.spaces.Box:
-    dtype = np.dtype(spec.dtype)
-    low, high = spec.low, spec.high
-    if dtype.kind in "iu":
-        info = np.iinfo(dtype)
-        low, high = max(low, info.min), min(high, info.max)
-    elif dtype.kind == "b":
-        low, high = 0, 1
-    return gymnasium.spaces.Box(low, high, spec.shape, dtype)
 
 
 class Sensor:
@@ -293,7 +182,7 @@ class Sensor:
 
     def _mjs_is_shared(self) -> bool:
         """One instance serves all worlds."""
-        return not self._mjs_by_world() or (_overrides(self, "reset") and _takes(self.reset, 1))
+        return not self._mjs_by_world() or (_overrides(self, "reset") and takes(self.reset, 1))
 
     def _mjs_edit_spec(self) -> None:
         scene = self._mjs_scene_ref() if self._mjs_scene_ref else None
@@ -316,7 +205,7 @@ class Sensor:
 
     def _mjs_make_instances(self, sim: Simulation) -> None:
         if not self._mjs_by_world():
-            if sim.num_worlds > 1 and _overrides(self, "reset") and not _takes(self.reset, 1):
+            if sim.num_worlds > 1 and _overrides(self, "reset") and not takes(self.reset, 1):
                 raise TypeError(f"sensor '{self.uuid}': one instance computes all worlds, so its reset() must take world_ids")
             return
         first = self._mjs_original()
@@ -352,8 +241,8 @@ class Sensor:
         function = getattr(instance, method, None)
         if function is None:
             return
-        wanted = len(_required(function))
-        with _named(self, method):
+        wanted = len(required(function))
+        with named(self, method):
             if method == "edit_spec" and wanted == 2:
                 function(first, owner._entities_of_spec())
             elif method == "initialize" and wanted == 4:
@@ -363,20 +252,20 @@ class Sensor:
 
     def _mjs_reset(self, world_ids: list[int], seeds: Sequence[int] = ()) -> None:
         if self._mjs_instances is not None and not self._mjs_is_shared():
-            with _Dice(seeds, world_ids, 1) as dice:
+            with Dice(seeds, world_ids, 1) as dice:
                 for world in world_ids:
                     reset = getattr(self._mjs_instances[world], "reset", None)
                     self._mjs_faults.pop(world, None)
                     dice.seed(world)
                     try:
-                        with _named(self, "reset", world):
+                        with named(self, "reset", world):
                             if reset is not None:
                                 reset()
                     except SensorError as error:
                         self._mjs_faults[world] = error
             return
-        with _named(self, "reset"):
-            if not _takes(self.reset, 1):
+        with named(self, "reset"):
+            if not takes(self.reset, 1):
                 self.reset()
             else:
                 self.reset(None if len(world_ids) == self.simulation.num_worlds else world_ids)
@@ -384,7 +273,7 @@ class Sensor:
     def _mjs_draw(self, shapes: DebugShapes) -> None:
         if not _overrides(self, "debug_vis"):
             raise ValueError(f"sensor '{self.uuid}' has nothing to draw: write debug_vis(visualizer)")
-        with _named(self, "debug_vis"):
+        with named(self, "debug_vis"):
             (self._mjs_instances[shapes.env_idx] if self._mjs_instances else self).debug_vis(shapes)
 
     def _mjs_updates(self) -> bool:
@@ -395,16 +284,16 @@ class Sensor:
         if self._mjs_sim_ref is None:
             return []
         if self._mjs_instances is None or self._mjs_is_shared():
-            with _named(self, "update"):
-                self._mjs_original().update(*((dt, world_ids) if _takes(self._mjs_original().update, 2) else (dt,)))
+            with named(self, "update"):
+                self._mjs_original().update(*((dt, world_ids) if takes(self._mjs_original().update, 2) else (dt,)))
             return []
         faults = []
-        with self.simulation.env._asked() as env, _Dice(seeds, world_ids, 2) as dice:
+        with self.simulation.env._asked() as env, Dice(seeds, world_ids, 2) as dice:
             for world in world_ids:
                 env.current_batch_index = world
                 dice.seed(world)
                 try:
-                    with _named(self, "update", world):
+                    with named(self, "update", world):
                         self._mjs_instances[world].update(dt)
                 except SensorError as error:
                     faults.append((world, error))
@@ -426,15 +315,15 @@ class Sensor:
 
     def _mjs_compute_worlds(self, world_ids: list[int], seeds: Sequence[int]) -> list[tuple[int, SensorError]]:
         faults = []
-        with self.simulation.env._asked() as env, _Dice(seeds, world_ids, 0) as dice:
+        with self.simulation.env._asked() as env, Dice(seeds, world_ids, 0) as dice:
             for world in world_ids:
                 env.current_batch_index = world
                 dice.seed(world)
                 try:
                     if world in self._mjs_faults:
                         raise self._mjs_faults.pop(world)
-                    with _named(self, "get_observation", world):
-                        value = _observe(self._mjs_instances[world], env, env.task, world)
+                    with named(self, "get_observation", world):
+                        value = observe(self._mjs_instances[world], env, env.task, world)
                         self._mjs_put(world, value)
                 except SensorError as error:
                     faults.append((world, error))
@@ -442,7 +331,7 @@ class Sensor:
 
     def _mjs_observe(self, env: Any, task: Any, world: int) -> Any:
         """Asks the instance of this world now."""
-        return _observe(self._mjs_instances[world] if self._mjs_instances else self._mjs_original(), env, task, world)
+        return observe(self._mjs_instances[world] if self._mjs_instances else self._mjs_original(), env, task, world)
 
     def _mjs_put(self, world: int, value: Any) -> None:
         """Keeps the value of one world."""
@@ -460,8 +349,8 @@ class Sensor:
 
     def _mjs_compute_batch(self, world_ids: list[int]) -> list[tuple[int, SensorError]]:
         sim = self.simulation
-        with _named(self, "compute"):
-            some = _takes(self.compute, 2)
+        with named(self, "compute"):
+            some = takes(self.compute, 2)
             compute: Any = self.compute
             value = compute(sim, list(world_ids)) if some else compute(sim)
             of = world_ids if some else list(range(sim.num_worlds))
@@ -486,7 +375,7 @@ class Sensor:
         faults = []
         for world in world_ids:
             try:
-                with _named(self, "compute", world):
+                with named(self, "compute", world):
                     self._mjs_write_json(world, values[of.index(world)])
             except SensorError as error:
                 faults.append((world, error))
@@ -517,7 +406,7 @@ class Sensor:
         try:
             with sim.env._asked() as env:
                 env.current_batch_index = 0
-                value = _observe(probe, env, env.task, 0)
+                value = observe(probe, env, env.task, 0)
         except Exception as error:
             raise SensorError(
                 f"sensor '{self.uuid}': its observation_space names no arrays, and it has no value yet to find them in "
@@ -572,7 +461,7 @@ class ForeignSensor(Sensor):
 
     def get_observation(self, env: Any, task: Any = None, batch_index: int = 0, *args: Any, **kwargs: Any) -> Any:
         instance = self._mjs_instances[batch_index] if self._mjs_instances else self.original
-        return _observe(instance, env, task, batch_index)
+        return observe(instance, env, task, batch_index)
 
     def _mjs_original(self) -> Any:
         return self.original
@@ -582,12 +471,12 @@ class ForeignSensor(Sensor):
 
     def _mjs_is_shared(self) -> bool:
         reset = getattr(self.original, "reset", None)
-        return reset is not None and bool(_required(reset))
+        return reset is not None and bool(required(reset))
 
     def _mjs_reset(self, world_ids: list[int], seeds: Sequence[int] = ()) -> None:
         if not self._mjs_is_shared():
             return super()._mjs_reset(world_ids, seeds)
-        with _named(self, "reset"):
+        with named(self, "reset"):
             self.original.reset(world_ids)
 
     def _mjs_call(self, instance: Any, method: str, first: Any, owner: Any) -> None:
@@ -595,7 +484,7 @@ class ForeignSensor(Sensor):
 
     def _mjs_updates(self) -> bool:
         update = getattr(self.original, "update", None)
-        return callable(update) and len(_required(update)) == 1
+        return callable(update) and len(required(update)) == 1
 
 
 def as_sensor(thing: Any) -> Any:
@@ -611,90 +500,3 @@ def as_sensor(thing: Any) -> Any:
 
 def _overrides(sensor: Sensor, method: str) -> bool:
     return getattr(type(sensor), method) is not getattr(Sensor, method)
-
-
-@functools.lru_cache(maxsize=1024)
-def _parameters_of(function: Any) -> tuple[inspect.Parameter, ...]:
-    try:
-        return tuple(inspect.signature(function).parameters.values())
-    except (TypeError, ValueError):
-        return ()
-
-
-def _parameters(function: Any) -> tuple[inspect.Parameter, ...]:
-    """Those that a call gives."""
-    return _parameters_of(function.__func__)[1:] if inspect.ismethod(function) else _parameters_of(function)
-
-
-def _required(function: Any) -> list[inspect.Parameter]:
-    """Positional parameters without a default."""
-    return [p for p in _parameters(function) if p.default is p.empty and p.kind < 2]
-
-
-def _takes(function: Any, count: int) -> bool:
-    """It has so many positional parameters."""
-    return len([p for p in _parameters(function) if p.kind < 2]) >= count
-
-
-def _observe(instance: Any, env: Any, task: Any, world: int) -> Any:
-    """Calls get_observation() as MolmoSpaces does."""
-    function = instance.get_observation
-    names = {p.name for p in _parameters(function)}
-    if "batch_index" in names or any(p.kind is p.VAR_KEYWORD for p in _parameters(function)):
-        return function(env, task, batch_index=world)
-    return function(env, task)
-
-
-_RANDOM: Any = np.random  # its stubs leave out get_bit_generator() and set_bit_generator()
-
-
-class _Dice:
-    """NumPy's global random numbers while sensors are asked: a stream of their own for each world and moment, the same in whatever world
-    and beside whatever others an episode runs; those of the program go on as if nothing had happened."""
-
-    _own: ClassVar[list[Any]] = []  # a generator for each level: a sensor may read another one while it is asked
-    _depth: ClassVar[int] = 0
-
-    def __init__(self, seeds: Sequence[int], world_ids: Sequence[int], occasion: int) -> None:
-        self._seeds = {world: (seed + occasion) % 2**32 for world, seed in zip(world_ids, seeds)}
-        self._before: Any = None
-
-    def __enter__(self) -> _Dice:
-        if self._seeds:
-            if _Dice._depth == len(self._own):
-                self._own.append(np.random.MT19937(0))
-            self._before = _RANDOM.get_bit_generator()
-            _RANDOM.set_bit_generator(self._own[_Dice._depth])
-            _Dice._depth += 1
-        return self
-
-    def seed(self, world: int) -> None:
-        if self._seeds:
-            np.random.seed(self._seeds[world])
-
-    def __exit__(self, *exception: object) -> None:
-        if self._seeds:
-            _Dice._depth -= 1
-            _RANDOM.set_bit_generator(self._before)
-
-
-class _named:
-    """Errors of user code say which sensor, world and method failed; the traceback stays."""
-
-    def __init__(self, sensor: Sensor, method: str, world: int | None = None) -> None:
-        place = "" if world is None else f", world {world}"
-        self.place = f"sensor '{sensor.uuid}'{place}: {method}()"
-
-    def __enter__(self) -> None: ...
-
-    def __exit__(self, kind: Any, error: BaseException | None, traceback: Any) -> None:
-        if isinstance(error, Exception):
-            raise SensorError(f"{self.place}: {kind.__name__}: {error}") from error
-
-
-class SensorError(RuntimeError):
-    """Code of a sensor written in Python failed, or its value is not what it declares; ``__cause__`` is its exception."""
-
-
-class BuiltinSensor(NativeSensor):
-    """One of MuJoCo's own sensors; data is float32 ``[B, dim]``."""

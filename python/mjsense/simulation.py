@@ -14,9 +14,10 @@ from mjsense import _core
 from mjsense._arguments import KnownAttributes, Seed, checked
 from mjsense.drawing import DebugShapes
 from mjsense.errors import UnknownNameError
-from mjsense.peer_env import PeerEnv
+from mjsense.native_sensor import NativeSensor
+from mjsense.peer import PeerEnv
 from mjsense.scene import Scene
-from mjsense.sensor import NativeSensor, Sensor, as_sensor
+from mjsense.sensor import Sensor, as_sensor
 
 _IDS = {"geom_matid": "nmat", "flex_matid": "nmat", "mat_texid": "ntex"}
 """Fields of ids that sensors follow, and how many there are."""

@@ -17,7 +17,7 @@ from mjsense._arguments import Seed, checked
 from mjsense._parts import Policies, Scenes, Tasks, parts_of
 from mjsense._streams import choose_streams, nest, stream_path
 from mjsense.assets import use_installed_meshes
-from mjsense.sensor import _box
+from mjsense.native_sensor import box_of
 from mjsense.simulation import Simulation
 from mjsense.task import group_slices
 
@@ -82,7 +82,7 @@ class TaskVectorEnv(VectorEnv):
         low, high = (np.concatenate([[], *(row[k] for row in layout)]).astype(np.float32) for k in (1, 2))
         self.single_action_space = gymnasium.spaces.Box(low, high, dtype=np.float32)
         self.action_space = batch_space(self.single_action_space, self.num_envs)
-        boxes = {name: _box(spec) for name, spec in self.specs.items()}
+        boxes = {name: box_of(spec) for name, spec in self.specs.items()}
         self.single_observation_space = _space(nest(self._paths, boxes))
         self.observation_space = batch_space(self.single_observation_space, self.num_envs)
         self.expert_done = np.zeros(self.num_envs, bool)

@@ -40,8 +40,7 @@ void DoorPlanner::initialize_planner() {
   if (group_ < 0 || !door_->routes())
     throw ValueError(
         fmt::format("the door planner needs a base that drives; that of robot '{}' does not "
-                    "(`mjsense robots` says "
-                    "which drive)",
+                    "(`mjsense robots` says which drive)",
                     robot().name()));
   motions_ = std::make_unique<DoorMotions>(task().model(), robot(),
                                            DoorFloor{&door_->open_floor(), &door_->trunk()});

@@ -9,9 +9,9 @@
 #include <cstring>
 
 #include "mjsense/core/parallel.h"
+#include "mjsense/episode/testing/played_task.h"
 #include "mjsense/policies/planner/pick_loop.h"
 #include "mjsense/policies/planner/testing/motion_quality.h"
-#include "mjsense/robots/load_robot.h"
 #include "mjsense/rollout/registry.h"
 #include "mjsense/rollout/rollout.h"
 
@@ -24,12 +24,7 @@ using DataPtr = std::unique_ptr<mjData, decltype(&mj_deleteData)>;
 struct Play {
   Play(const std::string& task_name, const std::string& robot, const std::string& scene_name,
        int num_worlds, bool noise = false, double perturb = 0) {
-    TaskCfg cfg;
-    cfg.robot = robot_cfg(robot);
-    cfg.scene = scene_name;
-    cfg.policy_dt_ms = cfg.robot.policy_dt_ms;
-    cfg.ctrl_dt_ms = cfg.robot.ctrl_dt_ms;
-    cfg.sim_dt_ms = cfg.robot.sim_dt_ms;
+    TaskCfg cfg = task_cfg(robot, scene_name);
     cfg.action_noise = noise;
     cfg.perturb = perturb;
     task = make_task(task_name, cfg);

@@ -6,9 +6,9 @@
 
 #include <cstdlib>
 
+#include "mjsense/episode/testing/played_task.h"
 #include "mjsense/policies/planner/pick_loop.h"
 #include "mjsense/policies/planner/testing/motion_quality.h"
-#include "mjsense/robots/load_robot.h"
 #include "mjsense/rollout/registry.h"
 #include "mjsense/rollout/task_defaults.h"
 
@@ -36,12 +36,7 @@ int number(const char* name, int otherwise) {
 
 struct Stage {
   explicit Stage(const Case& c, double perturb) {
-    TaskCfg cfg;
-    cfg.robot = robot_cfg(c.robot);
-    cfg.scene = c.scene;
-    cfg.policy_dt_ms = cfg.robot.policy_dt_ms;
-    cfg.ctrl_dt_ms = cfg.robot.ctrl_dt_ms;
-    cfg.sim_dt_ms = cfg.robot.sim_dt_ms;
+    TaskCfg cfg = task_cfg(c.robot, c.scene);
     set_task_defaults(c.task, cfg);
     cfg.action_noise = false;
     cfg.perturb = perturb;

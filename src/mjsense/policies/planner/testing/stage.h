@@ -4,8 +4,8 @@
 
 #include <memory>
 
+#include "mjsense/episode/testing/played_task.h"
 #include "mjsense/policies/planner/pick_loop.h"
-#include "mjsense/robots/load_robot.h"
 #include "mjsense/tasks/pick/pick.h"
 
 namespace mjsense {
@@ -13,11 +13,7 @@ namespace mjsense {
 // A robot at a table, and plain MuJoCo.
 struct TableStage {
   explicit TableStage(const char* robot_name) {
-    TaskCfg cfg;
-    cfg.robot = robot_cfg(robot_name);
-    cfg.policy_dt_ms = cfg.robot.policy_dt_ms;
-    cfg.ctrl_dt_ms = cfg.robot.ctrl_dt_ms;
-    cfg.sim_dt_ms = cfg.robot.sim_dt_ms;
+    TaskCfg cfg = task_cfg(robot_name);
     cfg.action_noise = false;
     task = std::make_unique<PickTask>(cfg);
     scene = std::make_unique<Scene>(task->whole_scene_cfg());

@@ -1,0 +1,97 @@
+# SPDX-License-Identifier: Apache-2.0
+"""How a sensor's code is called: with the arguments that it takes, random numbers of its own, and errors that name it."""
+
+from __future__ import annotations
+
+import functools
+import inspect
+from collections.abc import Sequence
+from typing import TYPE_CHECKING, Any, ClassVar
+
+import numpy as np
+
+if TYPE_CHECKING:
+    from mjsense.sensor import Sensor
+
+
+class SensorError(RuntimeError):
+    """Code of a sensor written in Python failed, or its value is not what it declares; ``__cause__`` is its exception."""
+
+
+@functools.lru_cache(maxsize=1024)
+def _parameters_of(function: Any) -> tuple[inspect.Parameter, ...]:
+    try:
+        return tuple(inspect.signature(function).parameters.values())
+    except (TypeError, ValueError):
+        return ()
+
+
+def _parameters(function: Any) -> tuple[inspect.Parameter, ...]:
+    """Those that a call gives."""
+    return _parameters_of(function.__func__)[1:] if inspect.ismethod(function) else _parameters_of(function)
+
+
+def required(function: Any) -> list[inspect.Parameter]:
+    """Positional parameters without a default."""
+    return [p for p in _parameters(function) if p.default is p.empty and p.kind < 2]
+
+
+def takes(function: Any, count: int) -> bool:
+    """It has so many positional parameters."""
+    return len([p for p in _parameters(function) if p.kind < 2]) >= count
+
+
+def observe(instance: Any, env: Any, task: Any, world: int) -> Any:
+    """Calls get_observation() as MolmoSpaces does."""
+    function = instance.get_observation
+    names = {p.name for p in _parameters(function)}
+    if "batch_index" in names or any(p.kind is p.VAR_KEYWORD for p in _parameters(function)):
+        return function(env, task, batch_index=world)
+    return function(env, task)
+
+
+_RANDOM: Any = np.random  # its stubs leave out get_bit_generator() and set_bit_generator()
+
+
+class Dice:
+    """NumPy's global random numbers while sensors are asked: a stream of their own for each world and moment, the same in whatever world
+    and beside whatever others an episode runs; those of the program go on as if nothing had happened."""
+
+    _own: ClassVar[list[Any]] = []  # a generator for each level: a sensor may read another one while it is asked
+    _depth: ClassVar[int] = 0
+
+    def __init__(self, seeds: Sequence[int], world_ids: Sequence[int], occasion: int) -> None:
+        self._seeds = {world: (seed + occasion) % 2**32 for world, seed in zip(world_ids, seeds)}
+        self._before: Any = None
+
+    def __enter__(self) -> Dice:
+        if self._seeds:
+            if Dice._depth == len(self._own):
+                self._own.append(np.random.MT19937(0))
+            self._before = _RANDOM.get_bit_generator()
+            _RANDOM.set_bit_generator(self._own[Dice._depth])
+            Dice._depth += 1
+        return self
+
+    def seed(self, world: int) -> None:
+        if self._seeds:
+            np.random.seed(self._seeds[world])
+
+    def __exit__(self, *exception: object) -> None:
+        if self._seeds:
+            Dice._depth -= 1
+            _RANDOM.set_bit_generator(self._before)
+
+
+class named:
+    """Errors of user code say which sensor, world and method failed; the traceback stays."""
+
+    def __init__(self, sensor: Sensor, method: str, world: int | None = None) -> None:
+        place = "" if world is None else f", world {world}"
+        self.place = f"sensor '{sensor.uuid}'{place}: {method}()"
+
+    def __enter__(self) -> None: ...
+
+    def __exit__(self, kind: Any, error: BaseException | None, traceback: Any) -> None:
+        if isinstance(error, Exception):
+            raise SensorError(f"{self.place}: {kind.__name__}: {error}") from error

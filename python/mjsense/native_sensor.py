@@ -1,0 +1,129 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Sensors that C++ computes, as Python sees them."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from types import MappingProxyType
+from typing import Any
+
+import gymnasium
+import numpy as np
+
+from mjsense import _core, _show, data
+from mjsense._arguments import KnownAttributes, checked
+from mjsense.drawing import DebugShapes
+
+
+@checked
+class NativeSensor(KnownAttributes):
+    """A sensor of the scene that C++ computes."""
+
+    def __init__(self, handle: _core.SensorHandle) -> None:
+        self._handle = handle
+        self._core: _core.Simulation | None = None
+        self._data: Any = None
+        self._fields: Mapping[str, np.ndarray] = {}
+        self.name: str = handle.name
+        """Key in the scene."""
+        self.kind: str = handle.kind
+        """builtin, contact, raycast, camera ..."""
+        self.cfg: Any = None
+        """Its configuration; None for a sensor that was found in the model."""
+        self._complete = True
+
+    def __repr__(self) -> str:
+        return _show.line(f"{self.kind} sensor '{self.name}'", self._shown())
+
+    def _repr_html_(self) -> str:
+        """For notebooks: its fields, and thumbnails of the first world's images."""
+        images = {}
+        if self.kind == "camera" and self._core is not None and not self._core.closed:
+            images = {name or self.name: rows[0] for name, rows in self.fields.items() if rows.ndim == 4}
+        return _show.table(f"{self.kind} sensor '{self.name}'", self._shown(), images)
+
+    def _shown(self) -> list[_show.Row]:
+        worlds = next((len(array) for array in self._fields.values()), None)
+        return _show.rows_of(self.specs, worlds) if self._fields else []
+
+    def _bind(self, core: _core.Simulation) -> None:
+        self._core = core
+        arrays = self._handle.arrays()
+        self._fields = MappingProxyType(arrays)
+        self._data = arrays[""] if "" in arrays else data.make_data(data.DATA_OF_KIND.get(self.kind, data.SensorData), arrays)
+
+    @property
+    def data(self) -> Any:
+        """The measurement of every world as it is now: an array ``[B, ...]``, or an object with one array a field.
+
+        Computed when it is read and not current. The arrays are the sensor's own memory, read-only: the next read after a step,
+        reset or forward writes them again, and step() itself may. Copy what you keep, or change.
+        """
+        if self._core is None:
+            raise RuntimeError(f"sensor '{self.name}' has no data yet: make a Simulation of its scene first")
+        self._core.refresh(self._handle)
+        return self._data
+
+    def _row(self, world: int) -> Any:
+        """The present value of one world, for the taker to keep."""
+        rows = {name: array[world].copy() for name, array in self.fields.items()}
+        return rows.get("", rows)
+
+    @property
+    def fields(self) -> Mapping[str, np.ndarray]:
+        """Every field as it is now, by name; the only or main one is ''."""
+        self.data  # makes them current
+        return self._fields
+
+    @property
+    def specs(self) -> dict[str, _core.SensorSpec]:
+        """What each field is: dtype, shape, unit, frame. A sensor with one field calls it ''."""
+        return self._handle.specs()
+
+    @property
+    def spec(self) -> _core.SensorSpec:
+        """The spec of a sensor with one field, or of its main one."""
+        specs = self.specs
+        if "" not in specs:
+            raise ValueError(f"sensor '{self.name}' has the fields {sorted(specs)}: use specs")
+        return specs[""]
+
+    @property
+    def uuid(self) -> str:
+        """Its name, as suites call it."""
+        return self.name
+
+    @property
+    def observation_space(self) -> gymnasium.Space:
+        """gymnasium space of one world's value: a Box, or a Dict of one Box a field."""
+        spaces: dict[str, gymnasium.Space] = {name: box_of(spec) for name, spec in self.specs.items()}
+        return spaces[""] if "" in spaces else gymnasium.spaces.Dict(spaces)
+
+    def debug_shapes(self, world: int = 0) -> DebugShapes:
+        """What it measures in this world, as shapes to look at: see :meth:`mjsense.Simulation.draw`."""
+        if self._core is None:
+            raise RuntimeError(f"sensor '{self.name}' has no data yet: make a Simulation of its scene first")
+        shapes = DebugShapes(world, self._core.meansize)
+        shapes._extend(*self._core.draw(world, [self._handle]))
+        return shapes
+
+    @property
+    def bytes_per_world(self) -> int:
+        """Memory of one world's row."""
+        return self._handle.bytes_per_world
+
+
+def box_of(spec: _core.SensorSpec) -> gymnasium.spaces.Box:
+    """The space of one world's row of a field."""
+    dtype = np.dtype(spec.dtype)
+    low, high = spec.low, spec.high
+    if dtype.kind in "iu":
+        info = np.iinfo(dtype)
+        low, high = max(low, info.min), min(high, info.max)
+    elif dtype.kind == "b":
+        low, high = 0, 1
+    return gymnasium.spaces.Box(low, high, spec.shape, dtype)
+
+
+class BuiltinSensor(NativeSensor):
+    """One of MuJoCo's own sensors; data is float32 ``[B, dim]``."""

@@ -1,0 +1,59 @@
+# SPDX-License-Identifier: Apache-2.0
+"""A planner that drives the robot."""
+
+from __future__ import annotations
+
+import sys
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from mjsense import _core
+from mjsense.peer.matrices import matrix_of_pose
+
+if TYPE_CHECKING:
+    from mjsense.peer.env import PeerEnv
+
+
+class PeerPolicy:
+    """A planner that drives the robot, in the world whose sensor is asked."""
+
+    def __init__(self, env: PeerEnv, view: _core.TaskView) -> None:
+        self._env = env
+        self._view: Any = view
+
+    def get_all_phases(self) -> dict[str, int]:
+        """Numbers of the phases."""
+        return self._view.phases
+
+    def get_phase(self) -> str:
+        """Name of the present one."""
+        number = self._view.plan(self._env.current_batch_index)[0]
+        return next((name for name, n in self._view.phases.items() if n == number), "unknown")
+
+    @property
+    def retry_count(self) -> int:
+        return self._view.plan(self._env.current_batch_index)[1]
+
+    @property
+    def target_poses(self) -> dict[str, np.ndarray]:
+        """4x4 where the gripper is to close, world: "grasp"."""
+        pose = self._view.plan(self._env.current_batch_index)[2]
+        return {"grasp": matrix_of_pose(pose) if np.any(pose[3:]) else np.eye(4)}
+
+
+# Classes of MolmoSpaces that its sensors ask a policy for.
+_PLANNERS = (
+    ("molmo_spaces.policy.base_policy", "PlannerPolicy"),
+    (
+        "molmo_spaces.policy.solvers.object_manipulation.base_object_manipulation_planner_policy",
+        "BaseObjectManipulationPlannerPolicy",
+    ),
+)
+
+
+def register() -> None:
+    """As a subclass of those classes that are imported by now."""
+    for module, name in _PLANNERS:
+        if module in sys.modules and not issubclass(PeerPolicy, getattr(sys.modules[module], name)):
+            getattr(sys.modules[module], name).register(PeerPolicy)
