@@ -97,9 +97,14 @@ def _check_of(place: str, name: str, annotation: Any) -> Callable[[Any], None] |
             if test(value):
                 return
         out_of_range = "an int" in words and isinstance(value, Integral) and not isinstance(value, bool)
-        raise (ValueError if out_of_range else TypeError)(f"{place}: {name} must be {words}, not {value!r}")
+        raise (ValueError if out_of_range else TypeError)(f"{place}: {name} must be {words}, not {_short(value)}")
 
     return check
+
+
+def _short(value: Any) -> str:
+    text = repr(value)
+    return text if len(text) <= 120 else f"{text[:117]}..."
 
 
 def checked(target: T, owner: str = "") -> T:

@@ -1,9 +1,10 @@
 # SPDX-License-Identifier: Apache-2.0
-"""How sensors show themselves: a line of text, and in notebooks a table with thumbnails of images."""
+"""How sensors show themselves: a line of text, in notebooks a table with thumbnails of images, and what help() says."""
 
 from __future__ import annotations
 
 import base64
+import inspect
 import struct
 import zlib
 from collections.abc import Mapping
@@ -42,6 +43,26 @@ def rows_of(specs: Mapping[str, Any], num_worlds: int | None) -> list[Row]:
 def line(head: str, rows: list[Row]) -> str:
     """``<contact sensor 'feet': found float32 [64, 4]; force float32 [64, 4, 3] N>``."""
     return f"<{head}: {'; '.join(row.text() for row in rows)}>" if rows else f"<{head}>"
+
+
+class HelpOfObject:
+    """``__doc__`` of a class whose objects have a text of their own, ``_help()``: so help(sensor) says what this one gives."""
+
+    def __init__(self, of_class: str | None) -> None:
+        self._of_class = of_class
+
+    def __get__(self, thing: Any, cls: type) -> str | None:
+        return self._of_class if thing is None else thing._help()
+
+
+def help_of_objects(cls: type) -> None:
+    cls.__doc__ = HelpOfObject(cls.__doc__)  # pyright: ignore[reportAttributeAccessIssue]  # a descriptor of a str
+
+
+def help_text(cls: type, rows: list[Row]) -> str:
+    """A line a field, then those of the class."""
+    fields = [f"{row.text()}: {row.sentence}" if row.sentence else row.text() for row in rows]
+    return "\n".join([*fields, "", f"help({cls.__name__}) says what it can do.", "", inspect.cleandoc(cls.__doc__ or "")]).strip()
 
 
 def table(head: str, rows: list[Row], images: Mapping[str, np.ndarray]) -> str:

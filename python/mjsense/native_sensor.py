@@ -32,6 +32,12 @@ class NativeSensor(KnownAttributes):
         """Its configuration; None for a sensor that was found in the model."""
         self._complete = True
 
+    def __init_subclass__(cls) -> None:
+        _show.help_of_objects(cls)
+
+    def _help(self) -> str:
+        return _show.help_text(type(self), self._shown())
+
     def __repr__(self) -> str:
         return _show.line(f"{self.kind} sensor '{self.name}'", self._shown())
 
@@ -111,6 +117,9 @@ class NativeSensor(KnownAttributes):
     def bytes_per_world(self) -> int:
         """Memory of one world's row."""
         return self._handle.bytes_per_world
+
+
+_show.help_of_objects(NativeSensor)
 
 
 def box_of(spec: _core.SensorSpec) -> gymnasium.spaces.Box:

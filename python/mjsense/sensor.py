@@ -82,6 +82,13 @@ class Sensor:
         if observation_space is not None:
             self.observation_space = observation_space
 
+    def __init_subclass__(cls, **kwargs: Any) -> None:
+        super().__init_subclass__(**kwargs)
+        _show.help_of_objects(cls)
+
+    def _help(self) -> str:
+        return _show.help_text(type(self), self._mjs_about())
+
     def __repr__(self) -> str:
         return _show.line(f"{type(self).__name__} '{self.uuid}'", self._mjs_about())
 

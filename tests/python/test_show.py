@@ -2,6 +2,7 @@
 """A sensor shows itself by shape, unit and frame, and an image in a notebook by a thumbnail."""
 
 import base64
+import pydoc
 import re
 import struct
 import zlib
@@ -52,6 +53,19 @@ def test_text():
     assert suite._repr_html_().count("<table>") == 2
     sim.close()
     assert "m/s^2" in repr(scene["ball/acc"])  # also when all is over
+
+
+def test_help():
+    scene = ball_scene(feet_cfg(fields=("found", "force")))
+    sim = mjs.Simulation(scene, num_worlds=3)
+    height = Height()
+    sim.add(height)
+    touch = pydoc.render_doc(scene["touch"], renderer=pydoc.plaintext)
+    assert "force float32 [3, 1, 3] N in " in touch and "help(ContactSensor)" in touch
+    assert "float32 [3, 1] m in world" in pydoc.render_doc(height, renderer=pydoc.plaintext)
+    of_class = pydoc.render_doc(type(height), renderer=pydoc.plaintext)  # as of any class
+    assert "get_observation" in of_class and "[3, 1]" not in of_class
+    assert mjs.ContactSensor.__doc__ and mjs.ContactSensor.__doc__.startswith("Contacts of its primaries")
 
 
 def test_html():
