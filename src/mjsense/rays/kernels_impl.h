@@ -172,7 +172,7 @@ std::uint32_t occluded_triangles(RTCScene scene, const RayGeom& g, bool cull,
   const Frame frame(g, rays.origin);
   MeshRays mesh;
   if (!mesh.prepare(g, frame, rays, rays.tmax)) return 0;
-  embree_occluded16(mesh.valid, scene, &mesh.rh.ray, cull);
+  embree_occluded16(mesh.valid, scene, &mesh.rh.ray, cull, false);
   std::uint32_t hit = 0;
   for (int k = 0; k < kPacket; k += kWidth)
     hit |= bits(less(load(mesh.valid + k), int_of(0)) & (load(mesh.rh.ray.tfar + k) < Float(0.0f)))

@@ -55,7 +55,7 @@ inline std::uint32_t shadow_of_triangles(const ViewGeom& g, int index, const Lig
     store(reinterpret_cast<int*>(ray.flags) + k, int_of(0));
   }
   if (!some) return 0;
-  embree_occluded16(valid, static_cast<RTCScene>(g.bvh), &ray, false);
+  embree_occluded16(valid, static_cast<RTCScene>(g.bvh), &ray, false, true);
   std::uint32_t dark = 0;
   for (int i = 0; i < kLanes; ++i)
     if (valid[i] && ray.tfar[i] < 0) dark |= 1u << i;
