@@ -9,29 +9,29 @@ namespace mjsense {
 std::vector<std::string> encoder_command(const VideoCfg& cfg, const Fps& fps,
                                          const VideoStream& video,
                                          const std::filesystem::path& output) {
-  const bool grey = video.kind == VideoKind::kDepth16;
+  // What the frames are when they reach it, so that it converts nothing.
+  constexpr const char* kPixels[] = {"yuv420p", "gray16le", "rgb24"};
+  const char* pixels = kPixels[static_cast<int>(video.kind)];
+  const int odd = video.kind == VideoKind::kRgb ? 1 : 0;  // 4:2:0 has even sizes
   std::vector<std::string> a = {ffmpeg_program(cfg.ffmpeg)};
   const auto add = [&a](std::initializer_list<std::string> more) { a.insert(a.end(), more); };
   add({"-nostdin", "-hide_banner", "-loglevel", "error", "-y"});
-  add({"-f", "rawvideo", "-pixel_format", grey ? "gray16le" : "rgb24"});
-  add({"-video_size", fmt::format("{}x{}", video.width, video.height)});
+  add({"-f", "rawvideo", "-pixel_format", pixels});
+  add({"-video_size", fmt::format("{}x{}", video.width + (video.width & odd),
+                                  video.height + (video.height & odd))});
   add({"-framerate", fmt::format("{}/{}", fps.num, fps.den)});
   add({"-protocol_whitelist", "pipe", "-i", "pipe:0"});
   add({"-an", "-threads", fmt::format("{}", cfg.threads)});
   switch (video.kind) {
     case VideoKind::kRgb:
-      // 4:2:0 needs even sizes. One grey column or row on the right or below moves no pixel, so
-      // intrinsics stay true.
-      if (video.width % 2 || video.height % 2)
-        add({"-vf", "pad=ceil(iw/2)*2:ceil(ih/2)*2:0:0:gray"});
-      add({"-c:v", "libx264", "-pix_fmt", "yuv420p", "-preset", cfg.preset, "-crf",
+      add({"-c:v", "libx264", "-pix_fmt", pixels, "-preset", cfg.preset, "-crf",
            fmt::format("{}", cfg.crf), "-g", fmt::format("{}", cfg.keyint)});
       break;
     case VideoKind::kDepth16:
-      add({"-c:v", "ffv1", "-level", "3", "-g", "1", "-slicecrc", "1", "-pix_fmt", "gray16le"});
+      add({"-c:v", "ffv1", "-level", "3", "-g", "1", "-slicecrc", "1", "-pix_fmt", pixels});
       break;
     case VideoKind::kDepthRedGreen:
-      add({"-c:v", "libx264rgb", "-pix_fmt", "rgb24", "-crf", "23"});
+      add({"-c:v", "libx264rgb", "-pix_fmt", pixels, "-crf", "23"});
       break;
   }
   add({"-fflags", "+bitexact", "-flags:v", "+bitexact", "-map_metadata", "-1", "-f",

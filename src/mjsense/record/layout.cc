@@ -12,6 +12,7 @@
 #include "mjsense/core/error.h"
 #include "mjsense/record/description.h"
 #include "mjsense/record/molmospaces.h"
+#include "mjsense/record/yuv.h"
 
 namespace mjsense {
 namespace {
@@ -132,6 +133,7 @@ std::string Fps::str() const {
 }
 
 std::size_t VideoStream::frame_bytes() const {
+  if (kind == VideoKind::kRgb) return yuv420_bytes(width, height);
   return static_cast<std::size_t>(width) * height * (kind == VideoKind::kDepth16 ? 2 : 3);
 }
 

@@ -6,6 +6,7 @@
 #include "mjsense/core/error.h"
 #include "mjsense/record/depth.h"
 #include "mjsense/record/recorder_impl.h"
+#include "mjsense/record/yuv.h"
 
 namespace mjsense {
 namespace {
@@ -81,7 +82,8 @@ void Recorder::Impl::copy_frame(const VideoStream& video, int world,
   const std::span<const float> metres(reinterpret_cast<const float*>(from), pixels);
   switch (video.kind) {
     case VideoKind::kRgb:
-      std::memcpy(frame.data(), from, frame.size());
+      encode_yuv420({reinterpret_cast<const std::uint8_t*>(from), 3 * pixels}, video.width,
+                    video.height, frame);
       break;
     case VideoKind::kDepth16:
       encode_depth16(metres, cfg.video.depth_unit,
