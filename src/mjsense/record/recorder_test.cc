@@ -278,7 +278,7 @@ TEST(RecorderFaults, FfmpegLies) {
       {"cat > /dev/null; echo garbage > $out", "is no whole video: it is neither MP4 nor Matroska"},
       {"cat > /dev/null", "does not exist"},
       {"cat > /dev/null; : > $out", "is no whole video: it is empty"},
-      {"head -c 1728 | ffmpeg \"$@\"", "has 3 frames, expected 6"},
+      {"head -c 864 | ffmpeg \"$@\"", "has 3 frames, expected 6"},
       {"ffmpeg \"$@\"; head -c 700 $out > $out.x; mv $out.x $out", "it was cut"}};
   for (const auto& [body, complaint] : lies) {
     TempDir dir, tools;
