@@ -1,14 +1,11 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The ffmpeg that writes videos: that of the package imageio-ffmpeg (extra ``video``) or, without it, that of ``PATH``.
-
-The package's program is one file. A distribution's loads two hundred libraries first: Debian's takes 80 ms of processor time to start, of
-every camera in every episode, the package's less than 15.
-"""
+"""The ffmpeg that writes videos: that of ``PATH`` or, where there is none, that of the package imageio-ffmpeg (extra ``video``)."""
 
 from __future__ import annotations
 
 import importlib.util
 import os
+import shutil
 from pathlib import Path
 
 _FFMPEG = "MJSENSE_FFMPEG"
@@ -25,6 +22,6 @@ def installed_ffmpeg() -> Path | None:
 
 
 def use_installed_ffmpeg() -> None:
-    """Writes videos with imageio-ffmpeg's program if it is installed. ``MJSENSE_FFMPEG`` has priority."""
-    if not os.environ.get(_FFMPEG) and (file := installed_ffmpeg()):
+    """Writes videos with imageio-ffmpeg's program if ``PATH`` has none. ``MJSENSE_FFMPEG`` has priority."""
+    if not os.environ.get(_FFMPEG) and shutil.which("ffmpeg") is None and (file := installed_ffmpeg()):
         os.environ[_FFMPEG] = str(file)

@@ -49,13 +49,16 @@ def imageio(tmp_path, monkeypatch):
     return program
 
 
-def test_an_installed_ffmpeg_comes_before_that_of_the_path(imageio, monkeypatch):
+def test_ffmpeg_of_the_path_comes_first(imageio, tmp_path, monkeypatch):
+    own = tmp_path / "bin/ffmpeg"
+    own.parent.mkdir()
+    monkeypatch.setenv("PATH", str(own.parent))
     ffmpeg.use_installed_ffmpeg()
     assert os.environ["MJSENSE_FFMPEG"] == str(imageio)
     ffmpeg.use_installed_ffmpeg()
-    assert os.environ["MJSENSE_FFMPEG"] == str(imageio)
     monkeypatch.setenv("MJSENSE_FFMPEG", "")
-    imageio.unlink()
+    own.touch()
+    own.chmod(0o755)
     ffmpeg.use_installed_ffmpeg()
     assert os.environ["MJSENSE_FFMPEG"] == ""
 
