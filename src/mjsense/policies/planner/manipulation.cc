@@ -1,0 +1,39 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "mjsense/policies/planner/manipulation.h"
+
+#include <fmt/format.h>
+
+#include "mjsense/core/error.h"
+
+namespace mjsense {
+namespace {
+
+const GraspScene& grasp_scene_of(const Task& task) {
+  if (const GraspScene* scene = task.grasp_scene()) return *scene;
+  throw ValueError(fmt::format("policy 'planner' picks; it cannot do task '{}'", task.name()));
+}
+
+}  // namespace
+
+Manipulation::Manipulation(const Task& task, const ManipulationPlannerCfg& cfg)
+    : task_(task), cfg_(cfg), scene_(grasp_scene_of(task)) {
+  for (const Hand& hand : hands_of(robot(), task.model())) {
+    hands_.push_back(std::make_unique<HandPlanner>(task.model(), robot(), hand, cfg.hand));
+    grippers_.emplace_back(task.model(), robot(), hand.gripper);
+  }
+  if (hands_.empty())
+    throw ValueError(fmt::format(
+        "policy 'planner' needs an arm and a gripper; robot '{}' lacks one", robot().name()));
+}
+
+Pose Manipulation::object_pose(const World& world) const {
+  const int body = target_body(world.id);
+  return {vec3(world.data->xpos + 3 * body), quat(world.data->xquat + 4 * body)};
+}
+
+Rng Manipulation::rng(const World& world, const PlanRequest& request, std::string_view what) const {
+  return {task_.cfg().seed, static_cast<std::uint32_t>(8 * request.attempt + request.stage),
+          stream_of(what), static_cast<std::uint64_t>(task_.episode(world.id))};
+}
+
+}  // namespace mjsense

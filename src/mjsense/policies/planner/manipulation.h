@@ -1,0 +1,74 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+// What picking (picking.h) and placing (placing.h) share: the hands of the robot, the object of the
+// episode, distances.
+
+#include <memory>
+#include <string_view>
+#include <vector>
+
+#include "mjsense/episode/grasp_scene.h"
+#include "mjsense/policies/planner/grasp.h"
+#include "mjsense/policies/planner/hand_planner.h"
+#include "mjsense/policies/planner/task_planner.h"
+
+namespace mjsense {
+
+struct ManipulationPlannerCfg {
+  TaskPlannerCfg planner;
+  HandPlannerCfg hand;
+  double fast = 0.20, slow = 0.08;              // m/s, of the tool on lines
+  double pregrasp = 0.04;                       // m before the grasp, against the approach
+  double lift = 0.08;                           // m above the grasp
+  double settle = 0.1, close_time = 0.5;        // s
+  double preplace = 0.07;                       // m above the place
+  double clearance = 0.005;                     // m between object and place when it is let go
+  double place_settle = 0.5, open_time = 0.25;  // s
+  double retreat = 0.05;                        // m, against the approach
+  double rest = 2.0;                            // s at the end
+  double most_tilt = 90;        // degrees from above; the approach asked for is drawn up to here
+  int max_ik_candidates = 256;  // grasps tried before giving up
+  int max_far_candidates =
+      60;            // of them with a search far from the present joints, if none is near
+  int max_ways = 6;  // of them with a search for a way
+};
+
+inline constexpr double kMargin = 0.004;       // m, of everything to everything on the way
+inline constexpr double kGraspMargin = 0.001;  // m, of the open gripper at the grasp
+
+inline Pose raised(Pose pose, double height) {
+  pose.p.z += height;
+  return pose;
+}
+inline Pose backed(const Pose& pose, double distance) { return pose * Pose{{0, 0, -distance}, {}}; }
+
+class Manipulation {
+ public:
+  // Throws ValueError for a task without a GraspScene and for a robot without a hand.
+  Manipulation(const Task& task, const ManipulationPlannerCfg& cfg);
+
+  const ManipulationPlannerCfg& cfg() const { return cfg_; }
+  const Robot& robot() const { return task_.robot(); }
+  const GraspScene& scene() const { return scene_; }
+  int num_hands() const { return static_cast<int>(hands_.size()); }
+  HandPlanner& hand(int hand) const { return *hands_[hand]; }
+  const GripperShape& gripper(int hand) const { return grippers_[hand]; }
+  const MoveGroup& gripper_group(const HandPlanner& hand) const {
+    return robot().groups()[hand.hand().gripper];
+  }
+
+  // The target, as it stands.
+  int target_body(int world) const { return scene_.all_objects()[scene_.target(world)].body; }
+  Pose object_pose(const World& world) const;  // X_WO
+  // A function of the episode alone, whatever the world and what was planned before.
+  Rng rng(const World& world, const PlanRequest& request, std::string_view what) const;
+
+ private:
+  const Task& task_;
+  const ManipulationPlannerCfg& cfg_;
+  const GraspScene& scene_;
+  std::vector<std::unique_ptr<HandPlanner>> hands_;
+  std::vector<GripperShape> grippers_;  // [hands]
+};
+
+}  // namespace mjsense

@@ -1,0 +1,162 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "mjsense/policies/planner/picking.h"
+
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+#include <numeric>
+
+#include "mjsense/policies/planner/phases.h"
+
+namespace mjsense {
+namespace {
+
+using std::numbers::pi;
+
+constexpr double kBelow = 0.004;  // m that boxes around a slanting gripper reach below it
+constexpr double kSide = 100;     // degrees, most that the approach turns from the way out
+// Of a tool that must get away from what it touches.
+constexpr double kBack = 0.06, kUp = 0.10;  // m
+
+}  // namespace
+
+struct Picking::Search {
+  const World& world;
+  const PlanRequest& request;
+  const Follower& follower;
+  const FailedGrasps& failed;
+};
+
+Picking::Picking(const Manipulation& shared, const Placing* placing)
+    : m_(shared), placing_(placing) {
+  for (std::size_t i = 0; i < m_.scene().all_objects().size() * m_.num_hands(); ++i)
+    grasps_.push_back(std::make_unique<Grasps>());
+}
+
+std::span<const Grasp> Picking::grasps(int object, int hand) {
+  Grasps& entry = *grasps_[object * m_.num_hands() + hand];
+  std::call_once(entry.once, [&] {
+    entry.of_object = grasps_all_around(m_.gripper(hand), m_.scene().all_objects()[object].shape);
+  });
+  return entry.of_object;
+}
+
+std::optional<Picking::Grip> Picking::plan(const World& world, const PlanRequest& request,
+                                           const Follower& follower, const FailedGrasps& failed,
+                                           Plan& plan) {
+  std::vector<int> order(m_.num_hands());
+  std::iota(order.begin(), order.end(), 0);
+  const Vec3 object = m_.object_pose(world).p;
+  std::ranges::stable_sort(order, {}, [&](int h) {
+    return norm(m_.robot().leaf_pose(world, m_.hand(h).hand().tool).p - object);
+  });
+  const Search search{world, request, follower, failed};
+  for (const bool to_place : {true, false}) {
+    if (to_place && (order.size() < 2 || !placing_)) continue;
+    for (int hand : order) {
+      if (const auto grip = pick_with(search, hand, to_place, plan)) return grip;
+      plan.segments.clear();
+    }
+  }
+  return {};
+}
+
+Vec3 Picking::wanted_approach(const World& world, const PlanRequest& request,
+                              const Pose& object) const {
+  Rng draw = m_.rng(world, request, "planner/approach");
+  const double tilt = m_.cfg().most_tilt * std::sqrt(draw.uniform()) * pi / 180;
+  const Vec3 out = object.p - m_.robot().base_pose(world).p;
+  const double turn = std::atan2(out.y, out.x) + draw.uniform(-kSide, kSide) * pi / 180;
+  return {std::sin(tilt) * std::cos(turn), std::sin(tilt) * std::sin(turn), -std::cos(tilt)};
+}
+
+// Away from what the hand touches; returns where it then is.
+HandPose Picking::draw_back(const World& world, HandPlanner& hand, CollisionQuery& query,
+                            const HandPose& start, Plan& plan) const {
+  if (hand.is_free(query, start)) return start;
+  for (const Pose& away : {backed(start.tool, kBack), raised(start.tool, kUp)}) {
+    HandPose end;
+    if (!hand.reach(world, away, start, end) || !hand.is_free(query, end)) continue;
+    hand.add_line(world, plan, kOpenGripper, start.tool, away, m_.cfg().fast);
+    return end;
+  }
+  return start;
+}
+
+std::optional<Picking::Grip> Picking::pick_with(const Search& search, int h, bool to_place,
+                                                Plan& plan) {
+  const World& world = search.world;
+  const ManipulationPlannerCfg& cfg = m_.cfg();
+  HandPlanner& hand = m_.hand(h);
+  const int gripper = hand.hand().gripper;
+  const MoveGroup& group = m_.gripper_group(hand);
+  const Pose object = m_.object_pose(world);
+  const HandPose now = hand.now(world, search.follower);
+
+  CollisionQuery query(hand.collisions(), world);
+  query.open(gripper);
+  query.set_margin(kMargin);
+  const bool is_open = m_.robot().is_open(world, gripper);
+  plan.wait(kOpenGripper, is_open ? 0 : cfg.close_time).grip(gripper, group.open_command);
+  const HandPose start = draw_back(world, hand, query, now, plan);
+  Rng way = m_.rng(world, search.request, "planner/way");
+  // The tool as a gripper whose y axis is the closing direction; near the present joints, then farther away.
+  const GripperShape& shape = m_.gripper(h);
+  const std::vector<Grasp> ranked =
+      rank_grasps(grasps(m_.scene().target(world.id), h), object, start.tool * Pose{{}, shape.turn},
+                  wanted_approach(world, search.request, object));
+  int ways = 0;
+  for (const auto& [iterations, most] : {std::pair(Chain::kTracking, cfg.max_ik_candidates),
+                                         std::pair(400, cfg.max_far_candidates)}) {
+    int tried = 0;
+    for (const Grasp& grasp : ranked) {
+      if (shape.lowest(grasp.pose) < m_.scene().support_height(world.id) - kBelow) continue;
+      if (++tried > most || ways == cfg.max_ways) break;
+      const Pose tool = grasp.pose * Pose{{}, conjugate(shape.turn)};
+      if (iterations == Chain::kTracking && search.failed.has(inverse(object) * tool)) continue;
+      HandPose before, at;
+      const Pose pregrasp = backed(tool, cfg.pregrasp);
+      if (!(iterations == Chain::kTracking && hand.reach_along(world, pregrasp, start, before)) &&
+          !hand.reach(world, pregrasp, start, before, iterations))
+        continue;
+      query.set_margin(kMargin);
+      if (!hand.is_free(query, before)) continue;
+      query.set_margin(kGraspMargin);
+      if (!hand.line_is_free(world, query, before, tool, at) || !hand.is_free(query, at)) continue;
+      if (to_place && !placing_->reaches(world, hand, at)) continue;
+      Plan rest;
+      hand.add_line(world, rest, kGrasp, before.tool, at.tool, cfg.slow, cfg.settle);
+      hand.add_line(world, rest, kCloseGripper, at.tool, at.tool, cfg.slow, cfg.close_time)
+          .grip(gripper, group.closed_command);
+      if (!lift(world, hand, at, rest)) continue;
+      ++ways;
+      query.set_margin(kMargin);
+      if (!hand.add_way(world, query, plan, kPregrasp, start, before, way)) continue;
+      std::ranges::move(rest.segments, std::back_inserter(plan.segments));
+      plan.grasp = tool;
+      return Grip{h, inverse(tool) * object, now.tool};
+    }
+  }
+  return {};
+}
+
+// Up with what is held, as far as there is room; else back, against the approach.
+bool Picking::lift(const World& world, HandPlanner& hand, const HandPose& at, Plan& plan) const {
+  const ManipulationPlannerCfg& cfg = m_.cfg();
+  const int gripper = hand.hand().gripper, body = m_.target_body(world.id);
+  CollisionQuery query(hand.collisions(), world);
+  query.hold(hand.hand().tool, gripper, body, inverse(at.tool) * m_.object_pose(world));
+  query.open(gripper);
+  query.set_margin(kGraspMargin);
+  const Pose up[] = {raised(at.tool, cfg.lift), raised(at.tool, 0.5 * cfg.lift),
+                     raised(backed(at.tool, cfg.lift), 0.25 * cfg.lift)};
+  for (const Pose& to : up) {
+    HandPose end;
+    if (!hand.line_is_free(world, query, at, to, end) || !hand.is_free(query, end)) continue;
+    hand.add_line(world, plan, kLift, at.tool, to, cfg.slow).holds(gripper);
+    return true;
+  }
+  return false;
+}
+
+}  // namespace mjsense

@@ -1,0 +1,125 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "mjsense/policies/planner/placing.h"
+
+#include <algorithm>
+#include <numbers>
+
+#include "mjsense/policies/planner/phases.h"
+
+namespace mjsense {
+namespace {
+
+using std::numbers::pi;
+
+constexpr int kTurns = 16;               // about the vertical, of what is put down
+constexpr int kMostGoals = 25 * kTurns;  // places and turns, before there is no way
+
+}  // namespace
+
+bool Placing::plan(const World& world, const PlanRequest& request, const Follower& follower,
+                   HandPlanner& hand, const Pose& tool_object, const Home& home, Plan& plan) const {
+  const Pose object = m_.object_pose(world);
+  const HandPose start = hand.now(world, follower);
+  CollisionQuery query(hand.collisions(), world);
+  query.hold(hand.hand().tool, hand.hand().gripper, m_.target_body(world.id), tool_object);
+
+  std::vector<Vec3> places;
+  m_.scene().place_scene()->places(world, places);
+  Rng draw = m_.rng(world, request, "planner/place");
+  int ways = 0;
+  for (Vec3 place : places) {
+    for (int k = 0; k < kTurns; ++k) {  // as it hangs, then turned to both sides, then between
+      const Pose goal = placed(object, m_.scene().target(world.id), place, k);
+      const std::size_t before = plan.segments.size();
+      if (place_at(world, hand, query, start, goal, tool_object, home, draw, plan)) return true;
+      if (plan.segments.size() > before) plan.segments.resize(before);
+      if (++ways > kMostGoals) return false;
+    }
+  }
+  return false;
+}
+
+Pose Placing::placed(const Pose& object, int target, Vec3 place, int k) const {
+  // The middle of its underside, from its origin, as it hangs.
+  const ObjectShape& shape = m_.scene().all_objects()[target].shape;
+  Vec3 low{1e9, 1e9, 1e9}, high{-1e9, -1e9, -1e9};
+  for (Vec3 point : shape.points) {
+    const Vec3 p = rotate(object.q, point);
+    low = {std::min(low.x, p.x), std::min(low.y, p.y), std::min(low.z, p.z)};
+    high = {std::max(high.x, p.x), std::max(high.y, p.y), std::max(high.z, p.z)};
+  }
+  const Vec3 underside{0.5 * (low.x + high.x), 0.5 * (low.y + high.y), low.z};
+  const int turns = (k % 2 ? -1 : 1) * ((k % 8 + 1) / 2);
+  const Quat turn = axis_angle({0, 0, 1}, (turns + (k < 8 ? 0 : 0.5)) * 0.25 * pi);
+  return {place + Vec3{0, 0, m_.cfg().clearance} - rotate(turn, underside), turn * object.q};
+}
+
+bool Placing::reaches(const World& world, const HandPlanner& hand, const HandPose& at) const {
+  const Pose object = m_.object_pose(world), object_tool = inverse(object) * at.tool;
+  std::vector<Vec3> places;
+  m_.scene().place_scene()->places(world, places);
+  if (places.empty()) return true;
+  for (int k = 0; k < kTurns; ++k) {
+    const Pose tool = placed(object, m_.scene().target(world.id), places[0], k) * object_tool;
+    HandPose above, there;
+    if (hand.reach(world, raised(tool, m_.cfg().preplace), at, above) &&
+        hand.reach(world, tool, above, there))
+      return true;
+  }
+  return false;
+}
+
+bool Placing::place_at(const World& world, HandPlanner& hand, CollisionQuery& query,
+                       const HandPose& start, const Pose& object, const Pose& tool_object,
+                       const Home& home, Rng& rng, Plan& plan) const {
+  const ManipulationPlannerCfg& cfg = m_.cfg();
+  const int gripper = hand.hand().gripper, body = m_.target_body(world.id);
+  const Pose tool = object * inverse(tool_object), over = raised(tool, cfg.preplace);
+  HandPose above, at, away;
+  query.set_margin(kGraspMargin);
+  const auto fits = [&] {
+    return hand.is_free(query, above) && hand.line_is_free(world, query, above, tool, at);
+  };
+  if (!(hand.reach_along(world, over, start, above) && fits()) &&
+      !(hand.reach(world, over, start, above, 300) && fits()))
+    return false;
+  query.set_margin(0);
+  if (!hand.is_free(query, at)) return false;
+
+  CollisionQuery empty(hand.collisions(), world);
+  empty.open(gripper);
+  empty.place(body, object);
+  empty.allow(gripper, body);
+  bool gets_away = false;
+  for (const Pose& to : {backed(tool, cfg.retreat), raised(tool, cfg.retreat)}) {
+    gets_away = hand.line_is_free(world, empty, at, to, away) && hand.is_free(empty, away);
+    if (gets_away) break;
+  }
+  if (!gets_away) return false;
+  query.set_margin(kMargin);
+  if (!hand.is_free(query, start) || !hand.is_free(query, above)) query.set_margin(0);
+  if (!hand.add_way(world, query, plan, kPreplace, start, above, rng)) return false;
+  for (Segment& segment : plan.segments) segment.holds(gripper);
+  const MoveGroup& group = m_.gripper_group(hand);
+  hand.add_line(world, plan, kPlace, above.tool, tool, cfg.slow, cfg.place_settle).holds(gripper);
+  hand.add_line(world, plan, kPlace, tool, tool, cfg.slow, cfg.open_time)
+      .grip(gripper, group.open_command);
+  hand.add_line(world, plan, kRetreat, tool, away.tool, cfg.fast);
+  go_home(world, hand, away, object, home, rng, plan);
+  plan.wait(kUnknownPhase, cfg.rest);
+  return true;
+}
+
+// Where there is a free way: otherwise it stays.
+void Placing::go_home(const World& world, HandPlanner& hand, const HandPose& from,
+                      const Pose& object, const Home& home, Rng& rng, Plan& plan) const {
+  CollisionQuery query(hand.collisions(), world);
+  query.open(hand.hand().gripper);
+  query.place(m_.target_body(world.id), object);
+  HandPose there{home.tool, from.joints};
+  there.joints[hand.hand().tool] = home.joints[hand.hand().tool];
+  if (!hand.is_free(query, there)) return;
+  hand.add_way(world, query, plan, kGoHome, from, there, rng);
+}
+
+}  // namespace mjsense
