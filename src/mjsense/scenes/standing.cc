@@ -23,6 +23,7 @@ constexpr double kHang = 0.35;               // m, tool of a floating hand above
 constexpr double kHangBack = 0.15;           // m, nearer to where the scene has the robot
 constexpr int kIterations = 250;
 constexpr double kDeep = 0.001;  // m
+constexpr double kRoom = 0.01;   // m, kept from what a robot must not stand in
 
 // m, world: where tools have to get, and the middle of that on the surface.
 std::vector<Vec3> targets(const mjModel* m, const EpisodeScene& scene) {
@@ -103,7 +104,35 @@ class Search {
     return {out.points / points_.size(), out.ways / points_.size()};
   }
 
-  bool is_free(const Pose& base) const {
+  // Wherever the scene puts the robot, and a bit farther.
+  bool is_free(const Pose& base, const Pose& offset) const {
+    if (!stands_free(base * offset)) return false;
+    const SceneRobotCfg& cfg = scene_.cfg().robot;
+    for (int corner = 0; corner < 8; ++corner) {
+      const double x = (cfg.pos_spread[0] + kRoom) * (corner & 1 ? 1 : -1);
+      const double y = (cfg.pos_spread[1] + kRoom) * (corner & 2 ? 1 : -1);
+      const double yaw = cfg.yaw_spread * (corner & 4 ? 1 : -1);
+      const Pose there{base.p + Vec3{x, y, 0}, axis_angle({0, 0, 1}, yaw * pi / 180) * base.q};
+      if (!stands_free(there * offset)) return false;
+    }
+    return true;
+  }
+
+  // The place ahead or behind from which more ways lead to the points than `best`; of equals the one that is
+  // nearer.
+  void improve(const Pose& base, double& best, Pose& offset) const {
+    for (int k = -kBack; k <= kAhead; ++k) {
+      const Pose moved{{kStep * k, 0, 0}, {}};
+      if (k == 0 || !is_free(base, moved)) continue;
+      const double ways = reached(base * moved).ways;
+      if (ways < best || (ways == best && std::abs(moved.p.x) >= std::abs(offset.p.x))) continue;
+      best = ways;
+      offset = moved;
+    }
+  }
+
+ private:
+  bool stands_free(const Pose& base) const {
     mj_resetData(model_, data_.get());
     Rng none(0, 0, 0, 0);
     robot_.write_start(state_row(data_.get()), base, none);
@@ -129,20 +158,6 @@ class Search {
     return !stands_in_something(root);
   }
 
-  // The place ahead or behind from which more ways lead to the points than `best`; of equals the one that is
-  // nearer.
-  void improve(const Pose& base, double& best, Pose& offset) const {
-    for (int k = -kBack; k <= kAhead; ++k) {
-      const Pose moved{{kStep * k, 0, 0}, {}};
-      if (k == 0 || !is_free(base * moved)) continue;
-      const double ways = reached(base * moved).ways;
-      if (ways < best || (ways == best && std::abs(moved.p.x) >= std::abs(offset.p.x))) continue;
-      best = ways;
-      offset = moved;
-    }
-  }
-
- private:
   // Of what does not move MuJoCo makes no contacts: the foot of a robot against furniture.
   bool stands_in_something(int root) const {
     const auto stands = [&](int g) {
@@ -209,7 +224,7 @@ Standing::Standing(const mjModel* model, Robot& robot, const EpisodeScene& scene
   if (std::ranges::none_of(robot.cfg().groups, stoops)) return;
   const Search stooped(model, robot, scene, surface, true);
   Pose offset;
-  double lower = stooped.is_free(base) ? stooped.reached(base).ways : 0;
+  double lower = stooped.is_free(base, {}) ? stooped.reached(base).ways : 0;
   stooped.improve(base, lower, offset);
   if (lower <= best) return;
   offset_ = offset;

@@ -3,6 +3,8 @@
 
 #include <gtest/gtest.h>
 
+#include <memory>
+
 #include "mjsense/robots/load_robot.h"
 #include "mjsense/scenes/load_scene.h"
 #include "mjsense/tasks/pick/pick.h"
@@ -45,6 +47,32 @@ TEST(Standing, WhoCanStoopDoesWhereATableIsLow) {
   EXPECT_EQ(robot.cfg().groups[torso].init, cfg.robot.groups[torso].stooped);
   EXPECT_NE(robot.cfg().groups[torso].init, upright);
   EXPECT_LE(std::abs(standing.offset().p.x), 0.2);
+}
+
+// Wherever the scene puts it: not in the table, from which it would be pushed off its place.
+TEST(Standing, WhoMovesNearerStandsInNothing) {
+  TaskCfg cfg;
+  cfg.robot = robot_cfg("rby1");
+  cfg.scene = "tableware";
+  PickTask task(cfg);
+  Scene scene(task.whole_scene_cfg());
+  task.initialize(scene.model(), 1);
+  const mjModel* model = scene.model();
+  const std::unique_ptr<mjData, decltype(&mj_deleteData)> data(mj_makeData(model), mj_deleteData);
+  const int root = model->body_rootid[task.robot().base_body()];
+  for (int episode = 0; episode < 16; ++episode) {
+    mj_resetData(model, data.get());
+    task.sample(0, episode, state_row(data.get()));
+    mj_forward(model, data.get());
+    for (int c = 0; c < data->ncon; ++c) {
+      const mjContact& contact = data->contact[c];
+      const int a = model->body_rootid[model->geom_bodyid[contact.geom[0]]];
+      const int b = model->body_rootid[model->geom_bodyid[contact.geom[1]]];
+      if ((a == root) != (b == root)) {
+        EXPECT_GT(contact.dist, -0.001) << episode;
+      }
+    }
+  }
 }
 
 TEST(Standing, AFloatingHandHangsAboveTheTargetsPointingDown) {
