@@ -107,6 +107,17 @@ void CollisionQuery::ignore(int body) {
   std::erase_if(scene_, [&](int g) { return is_below(m_, m_->geom_bodyid[g], body); });
 }
 
+void CollisionQuery::ignore_below(double height) {
+  mj_kinematics(m_, d_);
+  std::erase_if(scene_, [&](int g) {
+    const double *row = d_->geom_xmat + 9 * g + 6, *aabb = m_->geom_aabb + 6 * g;
+    double top = d_->geom_xpos[3 * g + 2];
+    if (m_->geom_type[g] == mjGEOM_PLANE) return row[2] > 1 - 1e-9 && top < height;
+    for (int i = 0; i < 3; ++i) top += row[i] * aabb[i] + std::abs(row[i]) * aabb[3 + i];
+    return top < height;
+  });
+}
+
 void CollisionQuery::allow(int gripper, int body) {
   allowed_gripper_.push_back(cm_.robot_->groups()[gripper].root_body);
   allowed_body_.push_back(body);

@@ -51,6 +51,8 @@ class CollisionQuery {
 
   // Nothing that is below this body is looked at.
   void ignore(int body);
+  // Nor what nowhere rises above this height (m): the floor, of a robot whose base drives.
+  void ignore_below(double height);
   // The group `gripper` may touch what is below this body, the rest of the robot may not.
   void allow(int gripper, int body);
   // What is below this body - one with a free joint - moves with the leaf of `tool` at X_TO and is looked at with the

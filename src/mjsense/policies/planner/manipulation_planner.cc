@@ -20,6 +20,8 @@ void ManipulationPlanner::initialize_planner() {
   shared_.emplace(task(), cfg_);
   if (shared_->scene().place_scene()) placing_.emplace(*shared_);
   picking_.emplace(*shared_, placing_ ? &*placing_ : nullptr);
+  shift_.reset();
+  if (driving_base(robot()) >= 0) shift_.emplace(task().model(), robot());
   states_.assign(task().num_worlds(), {});
 }
 
@@ -32,25 +34,29 @@ bool ManipulationPlanner::gone_wrong(const World& world) const {
   const auto& segments = follower().plan(world.id).segments;
   const auto segment = static_cast<std::size_t>(follower().segment(world.id));
   if (segment >= segments.size() || segments[segment].holding.empty()) return false;
-  const Hand& hand = shared_->hand(state.grip.hand).hand();
+  const Hand& hand = shared_->hand(state.grip->hand).hand();
   const Pose object = inverse(robot().leaf_pose(world, hand.tool)) * shared_->object_pose(world);
-  return norm(object.p - state.grip.tool_object.p) > kSlipped;
+  return norm(object.p - state.grip->tool_object.p) > kSlipped;
 }
 
 void ManipulationPlanner::make_plan(const World& world, const PlanRequest& request, Plan& plan) {
   State& state = states_[world.id];
+  if (request.stage == 0) {
+    if (request.attempt == 0) {
+      state = {};
+      state.home.joints = follower().joints(world.id);
+    }
+    state.inserted = 0;
+    state.went_home = state.drove_to_pick = state.drove_to_place = false;
+  }
   // After a failure the hands open and what they had comes to rest, before it is looked for.
-  const int stage = request.attempt == 0 ? request.stage : request.stage - 1;
+  const int stage = request.stage - state.inserted - (request.attempt == 0 ? 0 : 1);
   if (stage < 0) {
     state.holding = false;
-    state.failed.add(inverse(state.grip.tool_object));
+    if (state.grip) state.failed.add(inverse(state.grip->tool_object));
+    state.grip.reset();
     let_go(plan);
   } else if (stage == 0) {
-    state.holding = false;
-    if (request.attempt == 0) {
-      state.home.joints = follower().joints(world.id);
-      state.failed.clear();
-    }
     plan.more = plan_pick(world, request, plan);
   } else if (stage == 1 && placing_) {
     plan.more = plan_place(world, request, plan);
@@ -67,24 +73,52 @@ void ManipulationPlanner::let_go(Plan& plan) const {
   plan.more = true;
 }
 
+// This plan leads to where the next can be made, for the same stage.
+bool ManipulationPlanner::insert(State& state) {
+  ++state.inserted;
+  return true;
+}
+
 bool ManipulationPlanner::plan_pick(const World& world, const PlanRequest& request, Plan& plan) {
   State& state = states_[world.id];
-  const auto grip = picking_->plan(world, request, follower(), state.failed, plan);
-  if (!grip) return false;
-  state.grip = *grip;
-  if (request.attempt == 0) state.home.tool = grip->start;
-  return true;
+  state.grip = picking_->plan(world, request, follower(), state.failed, plan);
+  if (state.grip) {
+    if (request.attempt == 0) state.home.tool = state.grip->start;
+    return true;
+  }
+  if (request.attempt > 0 && !state.went_home) {
+    state.went_home = true;
+    picking_->go_home(world, request, follower(), state.home.joints, plan);
+    if (!plan.segments.empty()) return insert(state);
+  }
+  if (!shift_ || state.drove_to_pick) return false;
+  state.drove_to_pick = true;
+  const auto picks = [&](const World& there) {
+    return picking_->can(there, request, follower(), state.failed);
+  };
+  return shift_->plan(world, kPregrasp, {}, picks, plan) && insert(state);
 }
 
 bool ManipulationPlanner::plan_place(const World& world, const PlanRequest& request, Plan& plan) {
   State& state = states_[world.id];
-  HandPlanner& hand = shared_->hand(state.grip.hand);
+  HandPlanner& hand = shared_->hand(state.grip->hand);
   const Pose tool_object =
       inverse(robot().leaf_pose(world, hand.hand().tool)) * shared_->object_pose(world);
-  if (norm(tool_object.p - state.grip.tool_object.p) > kSlipped) return false;
-  state.grip.tool_object = tool_object;
+  if (norm(tool_object.p - state.grip->tool_object.p) > kSlipped) return false;
+  state.grip->tool_object = tool_object;
   state.holding = true;
-  return placing_->plan(world, request, follower(), hand, tool_object, state.home, plan);
+  if (placing_->plan(world, request, follower(), hand, tool_object, state.home, plan)) return true;
+  if (shift_ && !state.drove_to_place) {
+    state.drove_to_place = true;
+    const auto places = [&](const World& there) {
+      Plan unused;
+      return placing_->reaches(there, hand, hand.now(there, follower())) &&
+             placing_->plan(there, request, follower(), hand, tool_object, state.home, unused);
+    };
+    const BaseShift::Held held{hand.hand(), shared_->target_body(world.id), tool_object};
+    if (shift_->plan(world, kPreplace, held, places, plan)) return insert(state);
+  }
+  return placing_->put_back(world, follower(), hand, tool_object, plan);
 }
 
 }  // namespace mjsense

@@ -103,6 +103,7 @@ INSTANTIATE_TEST_SUITE_P(
                     Case{"pick", "mobile_franka", "", 1}, Case{"pick", "floating_rum", "", 3},
                     Case{"pick", "i2rt_yam", "", 2}, Case{"pick_and_place", "franka", "", 4},
                     Case{"pick_and_place", "floating_rum", "", 2},
+                    Case{"pick_and_place", "rby1", "", 2, 0.002},
                     Case{"pick_and_place_next_to", "franka", "", 3},
                     Case{"pick_and_place_color", "franka", "", 2}, Case{"packing", "franka", "", 3},
                     Case{"open", "franka", "", 3}, Case{"open", "mobile_franka", "", 2},

@@ -15,6 +15,10 @@ using std::numbers::pi;
 
 constexpr double kBelow = 0.004;  // m that boxes around a slanting gripper reach below it
 constexpr double kSide = 100;     // degrees, most that the approach turns from the way out
+constexpr int kFewGrasps = 64;
+constexpr int kMostMisplaced =
+    24;                          // grasps with which a hand does not get to the place: none will do
+constexpr double kAtHome = 0.1;  // rad
 // Of a tool that must get away from what it touches.
 constexpr double kBack = 0.06, kUp = 0.10;  // m
 
@@ -25,6 +29,7 @@ struct Picking::Search {
   const PlanRequest& request;
   const Follower& follower;
   const FailedGrasps& failed;
+  int most_near, most_far;  // grasps that are tried
 };
 
 Picking::Picking(const Manipulation& shared, const Placing* placing)
@@ -50,7 +55,8 @@ std::optional<Picking::Grip> Picking::plan(const World& world, const PlanRequest
   std::ranges::stable_sort(order, {}, [&](int h) {
     return norm(m_.robot().leaf_pose(world, m_.hand(h).hand().tool).p - object);
   });
-  const Search search{world, request, follower, failed};
+  const Search search{
+      world, request, follower, failed, m_.cfg().max_ik_candidates, m_.cfg().max_far_candidates};
   for (const bool to_place : {true, false}) {
     if (to_place && (order.size() < 2 || !placing_)) continue;
     for (int hand : order) {
@@ -59,6 +65,16 @@ std::optional<Picking::Grip> Picking::plan(const World& world, const PlanRequest
     }
   }
   return {};
+}
+
+bool Picking::can(const World& world, const PlanRequest& request, const Follower& follower,
+                  const FailedGrasps& failed) {
+  const Search search{world, request, follower, failed, kFewGrasps, 0};
+  for (int hand = 0; hand < m_.num_hands(); ++hand) {
+    Plan unused;
+    if (pick_with(search, hand, false, unused)) return true;
+  }
+  return false;
 }
 
 Vec3 Picking::wanted_approach(const World& world, const PlanRequest& request,
@@ -105,9 +121,9 @@ std::optional<Picking::Grip> Picking::pick_with(const Search& search, int h, boo
   const std::vector<Grasp> ranked =
       rank_grasps(grasps(m_.scene().target(world.id), h), object, start.tool * Pose{{}, shape.turn},
                   wanted_approach(world, search.request, object));
-  int ways = 0;
-  for (const auto& [iterations, most] : {std::pair(Chain::kTracking, cfg.max_ik_candidates),
-                                         std::pair(400, cfg.max_far_candidates)}) {
+  int ways = 0, misplaced = 0;
+  for (const auto& [iterations, most] :
+       {std::pair(Chain::kTracking, search.most_near), std::pair(400, search.most_far)}) {
     int tried = 0;
     for (const Grasp& grasp : ranked) {
       if (shape.lowest(grasp.pose) < m_.scene().support_height(world.id) - kBelow) continue;
@@ -123,7 +139,10 @@ std::optional<Picking::Grip> Picking::pick_with(const Search& search, int h, boo
       if (!hand.is_free(query, before)) continue;
       query.set_margin(kGraspMargin);
       if (!hand.line_is_free(world, query, before, tool, at) || !hand.is_free(query, at)) continue;
-      if (to_place && !placing_->reaches(world, hand, at)) continue;
+      if (to_place && !placing_->reaches(world, hand, at)) {
+        if (++misplaced == kMostMisplaced) return {};
+        continue;
+      }
       Plan rest;
       hand.add_line(world, rest, kGrasp, before.tool, at.tool, cfg.slow, cfg.settle);
       hand.add_line(world, rest, kCloseGripper, at.tool, at.tool, cfg.slow, cfg.close_time)
@@ -138,6 +157,31 @@ std::optional<Picking::Grip> Picking::pick_with(const Search& search, int h, boo
     }
   }
   return {};
+}
+
+void Picking::go_home(const World& world, const PlanRequest& request, const Follower& follower,
+                      const RobotValues& home, Plan& plan) const {
+  Rng way = m_.rng(world, request, "planner/home");
+  for (int h = 0; h < m_.num_hands(); ++h) {
+    HandPlanner& hand = m_.hand(h);
+    if (hand.floats()) continue;
+    const int arm = hand.hand().tool;
+    const HandPose now = hand.now(world, follower);
+    double away = 0;
+    for (int i = 0; i < home[arm].size; ++i)
+      away = std::max(away, std::abs(home[arm].values[i] - now.joints[arm].values[i]));
+    if (away < kAtHome) continue;
+    CollisionQuery query(hand.collisions(), world);
+    query.open(hand.hand().gripper);
+    query.set_margin(kMargin);
+    const std::size_t before = plan.segments.size();
+    const HandPose start = draw_back(world, hand, query, now, plan);
+    HandPose there = now;
+    there.joints[arm] = home[arm];
+    if (!hand.is_free(query, there) ||
+        !hand.add_way(world, query, plan, kOpenGripper, start, there, way))
+      plan.segments.resize(before);
+  }
 }
 
 // Up with what is held, as far as there is room; else back, against the approach.

@@ -27,6 +27,13 @@ class Picking {
   // Adds segments from where the hands are until the object is lifted. Nothing, and no segments, if there is no way.
   std::optional<Grip> plan(const World& world, const PlanRequest& request, const Follower& follower,
                            const FailedGrasps& failed, Plan& plan);
+  // Whether it could take one of the best grasps from where it is, without a long search.
+  bool can(const World& world, const PlanRequest& request, const Follower& follower,
+           const FailedGrasps& failed);
+  // Adds segments that bring the arms to the joints of `home`, as far as there are free ways: from elsewhere they may
+  // reach nothing, or be in each other's way.
+  void go_home(const World& world, const PlanRequest& request, const Follower& follower,
+               const RobotValues& home, Plan& plan) const;
 
  private:
   struct Search;

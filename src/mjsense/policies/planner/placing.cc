@@ -2,6 +2,8 @@
 #include "mjsense/policies/planner/placing.h"
 
 #include <algorithm>
+#include <array>
+#include <limits>
 #include <numbers>
 
 #include "mjsense/policies/planner/phases.h"
@@ -13,6 +15,13 @@ using std::numbers::pi;
 
 constexpr int kTurns = 16;               // about the vertical, of what is put down
 constexpr int kMostGoals = 25 * kTurns;  // places and turns, before there is no way
+constexpr double kMostLowered = 0.3;     // m, of what is put back
+
+// As it hangs, then turned to both sides, then between.
+Quat turned(int k) {
+  const int turns = (k % 2 ? -1 : 1) * ((k % 8 + 1) / 2);
+  return axis_angle({0, 0, 1}, (turns + (k < 8 ? 0 : 0.5)) * 0.25 * pi);
+}
 
 }  // namespace
 
@@ -23,13 +32,13 @@ bool Placing::plan(const World& world, const PlanRequest& request, const Followe
   CollisionQuery query(hand.collisions(), world);
   query.hold(hand.hand().tool, hand.hand().gripper, m_.target_body(world.id), tool_object);
 
-  std::vector<Vec3> places;
-  m_.scene().place_scene()->places(world, places);
+  std::array<std::vector<Vec3>, kTurns> places;
+  for (int k = 0; k < kTurns; ++k) m_.scene().place_scene()->places(world, turned(k), places[k]);
   Rng draw = m_.rng(world, request, "planner/place");
   int ways = 0;
-  for (Vec3 place : places) {
-    for (int k = 0; k < kTurns; ++k) {  // as it hangs, then turned to both sides, then between
-      const Pose goal = placed(object, m_.scene().target(world.id), place, k);
+  for (std::size_t i = 0; i < places[0].size(); ++i) {
+    for (int k = 0; k < kTurns; ++k) {
+      const Pose goal = placed(object, m_.scene().target(world.id), places[k][i], k);
       const std::size_t before = plan.segments.size();
       if (place_at(world, hand, query, start, goal, tool_object, home, draw, plan)) return true;
       if (plan.segments.size() > before) plan.segments.resize(before);
@@ -37,6 +46,13 @@ bool Placing::plan(const World& world, const PlanRequest& request, const Followe
     }
   }
   return false;
+}
+
+double Placing::underside(int target, const Quat& object) const {
+  double low = std::numeric_limits<double>::infinity();
+  for (Vec3 point : m_.scene().all_objects()[target].shape.points)
+    low = std::min(low, rotate(object, point).z);
+  return low;
 }
 
 Pose Placing::placed(const Pose& object, int target, Vec3 place, int k) const {
@@ -49,17 +65,17 @@ Pose Placing::placed(const Pose& object, int target, Vec3 place, int k) const {
     high = {std::max(high.x, p.x), std::max(high.y, p.y), std::max(high.z, p.z)};
   }
   const Vec3 underside{0.5 * (low.x + high.x), 0.5 * (low.y + high.y), low.z};
-  const int turns = (k % 2 ? -1 : 1) * ((k % 8 + 1) / 2);
-  const Quat turn = axis_angle({0, 0, 1}, (turns + (k < 8 ? 0 : 0.5)) * 0.25 * pi);
+  const Quat turn = turned(k);
   return {place + Vec3{0, 0, m_.cfg().clearance} - rotate(turn, underside), turn * object.q};
 }
 
 bool Placing::reaches(const World& world, const HandPlanner& hand, const HandPose& at) const {
   const Pose object = m_.object_pose(world), object_tool = inverse(object) * at.tool;
   std::vector<Vec3> places;
-  m_.scene().place_scene()->places(world, places);
-  if (places.empty()) return true;
   for (int k = 0; k < kTurns; ++k) {
+    places.clear();
+    m_.scene().place_scene()->places(world, turned(k), places);
+    if (places.empty()) return true;
     const Pose tool = placed(object, m_.scene().target(world.id), places[0], k) * object_tool;
     HandPose above, there;
     if (hand.reach(world, raised(tool, m_.cfg().preplace), at, above) &&
@@ -69,11 +85,25 @@ bool Placing::reaches(const World& world, const HandPlanner& hand, const HandPos
   return false;
 }
 
+bool Placing::gets_away(const World& world, HandPlanner& hand, const HandPose& at,
+                        const Pose& object, HandPose& away) const {
+  const int gripper = hand.hand().gripper, body = m_.target_body(world.id);
+  CollisionQuery empty(hand.collisions(), world);
+  empty.open(gripper);
+  empty.place(body, object);
+  empty.allow(gripper, body);
+  const double retreat = m_.cfg().retreat;
+  for (const Pose& to : {backed(at.tool, retreat), raised(at.tool, retreat)}) {
+    if (hand.line_is_free(world, empty, at, to, away) && hand.is_free(empty, away)) return true;
+  }
+  return false;
+}
+
 bool Placing::place_at(const World& world, HandPlanner& hand, CollisionQuery& query,
                        const HandPose& start, const Pose& object, const Pose& tool_object,
                        const Home& home, Rng& rng, Plan& plan) const {
   const ManipulationPlannerCfg& cfg = m_.cfg();
-  const int gripper = hand.hand().gripper, body = m_.target_body(world.id);
+  const int gripper = hand.hand().gripper;
   const Pose tool = object * inverse(tool_object), over = raised(tool, cfg.preplace);
   HandPose above, at, away;
   query.set_margin(kGraspMargin);
@@ -85,17 +115,7 @@ bool Placing::place_at(const World& world, HandPlanner& hand, CollisionQuery& qu
     return false;
   query.set_margin(0);
   if (!hand.is_free(query, at)) return false;
-
-  CollisionQuery empty(hand.collisions(), world);
-  empty.open(gripper);
-  empty.place(body, object);
-  empty.allow(gripper, body);
-  bool gets_away = false;
-  for (const Pose& to : {backed(tool, cfg.retreat), raised(tool, cfg.retreat)}) {
-    gets_away = hand.line_is_free(world, empty, at, to, away) && hand.is_free(empty, away);
-    if (gets_away) break;
-  }
-  if (!gets_away) return false;
+  if (!gets_away(world, hand, at, object, away)) return false;
   query.set_margin(kMargin);
   if (!hand.is_free(query, start) || !hand.is_free(query, above)) query.set_margin(0);
   if (!hand.add_way(world, query, plan, kPreplace, start, above, rng)) return false;
@@ -110,13 +130,38 @@ bool Placing::place_at(const World& world, HandPlanner& hand, CollisionQuery& qu
   return true;
 }
 
+bool Placing::put_back(const World& world, const Follower& follower, HandPlanner& hand,
+                       const Pose& tool_object, Plan& plan) const {
+  const ManipulationPlannerCfg& cfg = m_.cfg();
+  const int gripper = hand.hand().gripper, target = m_.scene().target(world.id);
+  const HandPose start = hand.now(world, follower);
+  const Pose object = start.tool * tool_object;
+  const double above =
+      object.p.z + underside(target, object.q) - m_.scene().support_height(world.id);
+  if (above < cfg.clearance || above > kMostLowered) return false;
+  const double down = cfg.clearance - above;
+  CollisionQuery query(hand.collisions(), world);
+  query.hold(hand.hand().tool, gripper, m_.target_body(world.id), tool_object);
+  HandPose at, away;
+  if (!hand.line_is_free(world, query, start, raised(start.tool, down), at) ||
+      !hand.is_free(query, at) || !gets_away(world, hand, at, raised(object, down), away))
+    return false;
+  hand.add_line(world, plan, kPlace, start.tool, at.tool, cfg.slow, cfg.place_settle)
+      .holds(gripper);
+  hand.add_line(world, plan, kPlace, at.tool, at.tool, cfg.slow, cfg.open_time)
+      .grip(gripper, m_.gripper_group(hand).open_command);
+  hand.add_line(world, plan, kRetreat, at.tool, away.tool, cfg.fast);
+  return true;
+}
+
 // Where there is a free way: otherwise it stays.
 void Placing::go_home(const World& world, HandPlanner& hand, const HandPose& from,
                       const Pose& object, const Home& home, Rng& rng, Plan& plan) const {
   CollisionQuery query(hand.collisions(), world);
   query.open(hand.hand().gripper);
   query.place(m_.target_body(world.id), object);
-  HandPose there{home.tool, from.joints};
+  HandPose there{home.tool,
+                 from.joints};  // the tool counts where the hand floats, the joints of an arm
   there.joints[hand.hand().tool] = home.joints[hand.hand().tool];
   if (!hand.is_free(query, there)) return;
   hand.add_way(world, query, plan, kGoHome, from, there, rng);

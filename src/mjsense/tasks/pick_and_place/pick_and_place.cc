@@ -203,17 +203,15 @@ Evaluation PickAndPlaceTask::evaluate(const World& world) const {
   return judge_by(world.id, std::exp(-now.position_error), now.lacks);
 }
 
-void PickAndPlaceTask::places(const World& world, std::vector<Vec3>& out) const {
+void PickAndPlaceTask::places(const World& world, const Quat& turn, std::vector<Vec3>& out) const {
   const Episode& episode = episodes_[world.id];
   const int body = episode.objects[1].body;
   const WorldBox box = world_box(world, body);
   const Vec3 c = box.center();
   if (kind_ == PlaceKind::kNextTo) {
-    const WorldBox object = world_box(world, episode.objects[0].body);
-    // However the object will be turned.
-    const double half = 0.5 * std::max(object.high.x - object.low.x, object.high.y - object.low.y);
-    const double x = 0.5 * (box.high.x - box.low.x) + kBesideGap + half;
-    const double y = 0.5 * (box.high.y - box.low.y) + kBesideGap + half;
+    const WorldBox object = turned_box(world, episode.objects[0].body, turn);
+    const double x = 0.5 * (box.high.x - box.low.x + object.high.x - object.low.x) + kBesideGap;
+    const double y = 0.5 * (box.high.y - box.low.y + object.high.y - object.low.y) + kBesideGap;
     for (double along : {0.0, 0.02, -0.02}) {
       for (int side = -1; side <= 1; side += 2) {
         out.push_back({c.x + along, c.y + side * y, box.low.z});
@@ -227,10 +225,11 @@ void PickAndPlaceTask::places(const World& world, std::vector<Vec3>& out) const 
   }
   // Low where it is open, else on the rim.
   const Pose pose = pose_of(world, body);
+  std::vector<Vec3> points;
+  for (Vec3 point : objects_[episode.receptacle].shape.points) points.push_back(pose * point);
   const auto surface = [&](double x, double y) {
     double top = -std::numeric_limits<double>::infinity();
-    for (Vec3 point : objects_[episode.receptacle].shape.points) {
-      const Vec3 p = pose * point;
+    for (Vec3 p : points) {
       if (std::hypot(p.x - x, p.y - y) < 0.012) top = std::max(top, p.z);
     }
     return top;

@@ -50,7 +50,7 @@ class PickAndPlaceTask final : public SceneTask, public GraspScene, public Place
   double support_height(int world) const override { return scene().support_height(world); }
   const PlaceScene* place_scene() const override { return this; }
   int receptacle(int world) const override { return episodes_[world].objects[1].body; }
-  void places(const World& world, std::vector<Vec3>& out) const override;
+  void places(const World& world, const Quat& turn, std::vector<Vec3>& out) const override;
 
  protected:
   void initialize_task() override;

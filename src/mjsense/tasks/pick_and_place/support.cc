@@ -67,6 +67,26 @@ WorldBox world_box(const World& world, int body) {
   return box;
 }
 
+WorldBox turned_box(const World& world, int body, const Quat& turn) {
+  const mjModel* m = world.model;
+  const Vec3 origin = vec3(world.data->xpos + 3 * body);
+  WorldBox box{{1e10, 1e10, 1e10}, {-1e10, -1e10, -1e10}};
+  for (int g = 0; g < m->ngeom; ++g) {
+    if (!is_below(m, m->geom_bodyid[g], body)) continue;
+    const Pose geom = pose_from_mat(world.data->geom_xpos + 3 * g, world.data->geom_xmat + 9 * g);
+    const Pose turned{origin + rotate(turn, geom.p - origin), turn * geom.q};
+    const double* aabb = m->geom_aabb + 6 * g;
+    for (int corner = 0; corner < 8; ++corner) {
+      const Vec3 p = turned * Vec3{aabb[0] + (corner & 1 ? aabb[3] : -aabb[3]),
+                                   aabb[1] + (corner & 2 ? aabb[4] : -aabb[4]),
+                                   aabb[2] + (corner & 4 ? aabb[5] : -aabb[5])};
+      box.low = {std::min(box.low.x, p.x), std::min(box.low.y, p.y), std::min(box.low.z, p.z)};
+      box.high = {std::max(box.high.x, p.x), std::max(box.high.y, p.y), std::max(box.high.z, p.z)};
+    }
+  }
+  return box;
+}
+
 Vec3 contact_force(const World& world, int carrier, int object) {
   Vec3 sum;
   each_touch(world, object, [&](const Touch& touch) {

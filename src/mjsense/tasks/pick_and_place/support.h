@@ -13,6 +13,8 @@ struct WorldBox {
 };
 // Around all geoms of `body` and of the bodies below it.
 WorldBox world_box(const World& world, int body);
+// The same, turned by `turn` about its origin.
+WorldBox turned_box(const World& world, int body, const Quat& turn);
 
 // N, world axes: the sum of the contact forces that geoms of `carrier` and below exert on `object` and below.
 Vec3 contact_force(const World& world, int carrier, int object);

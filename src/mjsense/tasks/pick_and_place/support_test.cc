@@ -3,6 +3,7 @@
 
 #include <gtest/gtest.h>
 
+#include <cmath>
 #include <memory>
 
 namespace mjsense {
@@ -43,6 +44,21 @@ struct Support : testing::Test {
   std::unique_ptr<mjData, decltype(&mj_deleteData)> data{nullptr, mj_deleteData};
   World world;
 };
+
+// A block of 2 x 3 x 4 cm half widths turned by a quarter, and by 30 degrees: |R| times the half widths.
+TEST_F(Support, ABoxAroundWhatIsTurned) {
+  put(0.5, 0, 0.2, 0, 0);
+  for (int i = 0; i < 3; ++i)
+    model->geom_aabb[6 * model->body_geomadr[kBlock] + 3 + i] = 0.02 + 0.01 * i;
+  for (const double degrees : {0.0, 90.0, 30.0}) {
+    const double a = degrees * M_PI / 180, c = std::abs(std::cos(a)), s = std::abs(std::sin(a));
+    const WorldBox box = turned_box(world, kBlock, axis_angle({0, 0, 1}, a));
+    EXPECT_NEAR(box.high.x - box.low.x, 2 * (0.02 * c + 0.03 * s), 1e-9) << degrees;
+    EXPECT_NEAR(box.high.y - box.low.y, 2 * (0.02 * s + 0.03 * c), 1e-9) << degrees;
+    EXPECT_NEAR(box.high.z - box.low.z, 0.08, 1e-9) << degrees;
+    EXPECT_NEAR(box.center().x, 0.5, 1e-9) << degrees;
+  }
+}
 
 TEST_F(Support, ATrayBearsTheWeightOfABlock) {
   put(0, 0, 0.05);
