@@ -45,13 +45,16 @@ class ThreadPool {
   void run_raw(int n, Fn fn, void* ctx);
   void work(int thread);
   void worker(int thread);
+  void await_workers();
 
   std::vector<std::thread> workers_;
+  bool spins_ = false;  // there is a CPU for every thread
   std::mutex mutex_;
   std::condition_variable wake_, done_;
-  std::uint64_t epoch_ = 0;
-  int active_ = 0;     // workers inside the present run
-  bool open_ = false;  // a worker may still join it
+  // Written under the mutex; read without it by those who look before they sleep.
+  std::atomic<std::uint64_t> epoch_{0};
+  std::atomic<int> active_{0};  // workers inside the present run
+  bool open_ = false;           // a worker may still join it
   bool stop_ = false;
   Fn fn_ = nullptr;
   void* ctx_ = nullptr;

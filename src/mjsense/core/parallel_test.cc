@@ -1,0 +1,66 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "mjsense/core/parallel.h"
+
+#include <gtest/gtest.h>
+
+#include <chrono>
+#include <ctime>
+#include <stdexcept>
+#include <string>
+#include <thread>
+#include <vector>
+
+namespace mjsense {
+namespace {
+
+using std::chrono::microseconds;
+
+// Threads wait awake for a while, then asleep: runs come within that time, at its end, and after.
+TEST(ThreadPool, RunsFollowEachOtherAtAnyDistance) {
+  for (const int threads : {2, 5}) {
+    ThreadPool pool(threads);
+    std::vector<int> sums(16);  // no atomics: what items wrote is there when run() returns
+    int wanted = 0;
+    for (int run = 0; run < 600; ++run) {
+      pool.run(16, [&](int i, int) { sums[i] += run; });
+      wanted += run;
+      for (const int sum : sums) ASSERT_EQ(sum, wanted) << "run " << run;
+      if (run % 3 == 1) std::this_thread::sleep_for(microseconds(run % 90));
+    }
+  }
+}
+
+TEST(ThreadPool, GoesOnAfterAnException) {
+  ThreadPool pool(3);
+  for (int run = 0; run < 200; ++run) {
+    std::string what;
+    try {
+      pool.run(8, [](int i, int) {
+        if (i >= 5) throw std::runtime_error(std::to_string(i));
+      });
+    } catch (const std::runtime_error& e) {
+      what = e.what();
+    }
+    ASSERT_EQ(what, "5");
+  }
+}
+
+TEST(ThreadPool, EndsWhileItsThreadsAreAwakeOrAsleep) {
+  for (int pools = 0; pools < 60; ++pools) {
+    ThreadPool pool(3);
+    if (pools % 4) pool.run(pools, [](int, int) {});
+    std::this_thread::sleep_for(microseconds(pools % 5 * 20));
+  }
+}
+
+TEST(ThreadPool, TakesNoProcessorTimeWhenNothingRuns) {
+  ThreadPool pool(2);
+  pool.run(64, [](int, int) {});
+  std::this_thread::sleep_for(std::chrono::milliseconds(5));
+  const std::clock_t before = std::clock();  // of the process
+  std::this_thread::sleep_for(std::chrono::milliseconds(200));
+  EXPECT_LT(static_cast<double>(std::clock() - before) / CLOCKS_PER_SEC, 0.02);
+}
+
+}  // namespace
+}  // namespace mjsense
