@@ -29,7 +29,7 @@ def parts_of(options: dict[str, Any], sensors: Iterable[Any]) -> Parts:
     options["policy"], policy = policy_of(options["policy"])
     robot = options["robot"]
     if robot is None:
-        robot = task.robot if task is not None else "franka"
+        robot = task.robot if task is not None else "auto"
         if not isinstance(robot, (str, Path, NoneType)):
             raise TypeError(f"{type(task).__name__}.robot is {robot!r}: must be the name of a robot, the path of its .toml, or None")
     options["robot"] = "" if robot is None else str(robot)

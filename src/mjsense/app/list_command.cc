@@ -10,6 +10,7 @@
 #include "mjsense/app/table.h"
 #include "mjsense/robots/load_robot.h"
 #include "mjsense/rollout/registry.h"
+#include "mjsense/rollout/task_defaults.h"
 #include "mjsense/scenes/load_scene.h"
 
 namespace mjsense {
@@ -83,6 +84,9 @@ std::string list_tasks(bool json) {
     for (const auto& one : kTasks) {
       if (name == one.name) line = {name, one.what, one.needs};
     }
+    if (!line.what.empty())
+      line.needs += fmt::format("; by default {} in {}", default_robot(name),
+                                default_scene(parts_of_task(name)[0]));
     lines.push_back(line);
   }
   return text_of("task", lines, json);

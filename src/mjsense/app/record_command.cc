@@ -12,6 +12,7 @@
 #include "mjsense/app/table.h"
 #include "mjsense/core/error.h"
 #include "mjsense/replay/check.h"
+#include "mjsense/rollout/task_defaults.h"
 
 namespace mjsense {
 namespace {
@@ -47,6 +48,20 @@ std::uint64_t bytes_below(const std::filesystem::path& folder) {
     if (entry.is_regular_file()) bytes += entry.file_size();
   }
   return bytes;
+}
+
+// "pick with NAME (the task's robot) in table: 8 episodes into data".
+std::string first_line(const RecordJobCfg& job) {
+  const RolloutCfg& cfg = job.rollout;
+  std::string text = cfg.task;
+  const std::string robot = resolved(cfg).robot;
+  if (!robot.empty())
+    text += fmt::format(" with {}{}", robot, cfg.robot == robot ? "" : " (the task's robot)");
+  const std::string scene =
+      cfg.scene.empty() ? std::string(default_scene(parts_of_task(cfg.task)[0])) : cfg.scene;
+  if (!scene.empty()) text += " in " + scene;
+  return text + fmt::format(": {} episode{} into {}", job.episodes, job.episodes == 1 ? "" : "s",
+                            job.out.string());
 }
 
 // Wall seconds by room, the largest share last being what is left.
@@ -129,6 +144,7 @@ std::string summary_json(const RecordSummary& s, const Sheet& sheet) {
 int run_record(const RecordOptions& options) {
   const RecordJobCfg& job = options.job;
   if (job.out.empty()) throw ValueError("record: where to? give --out DIR");
+  if (!options.quiet) fmt::print(stderr, "{}\n", first_line(job));
   RecordSummary summary;
   {
     const StopOnSignal signals;

@@ -182,7 +182,7 @@ class RecordJob {
   }
 
  private:
-  // No more worlds than episodes.
+  // No more worlds than episodes, and the robot's own name: recordings know each other by it.
   static RecordJobCfg checked(RecordJobCfg cfg) {
     check_fields(cfg, "");
     if (!cfg.rollout.use_sensors)
@@ -191,6 +191,7 @@ class RecordJob {
       throw ValueError(fmt::format("record needs a policy{}", suggest("", policy_names())));
     }
     cfg.rollout.num_worlds = std::min(cfg.rollout.num_worlds, cfg.episodes);
+    cfg.rollout = resolved(std::move(cfg.rollout));
     return cfg;
   }
 

@@ -51,6 +51,11 @@ TaskCfg task_cfg(const RolloutCfg& cfg) {
 
 }  // namespace
 
+RolloutCfg resolved(RolloutCfg cfg) {
+  if (cfg.robot == kTaskRobot) cfg.robot = default_robot(cfg.make_task ? "" : cfg.task);
+  return cfg;
+}
+
 // Runs a function on the fresh data of some worlds, in parallel.
 class Rollout::EachActive final : public WorldHooks {
  public:
@@ -77,7 +82,7 @@ class Rollout::Some final : public ActiveWorlds {
   std::span<const int> ids_;
 };
 
-Rollout::Rollout(const RolloutCfg& cfg) : cfg_(cfg) {
+Rollout::Rollout(const RolloutCfg& cfg) : cfg_(resolved(cfg)) {
   check_fields(cfg_, "");
   task_ = cfg_.make_task ? cfg_.make_task(task_cfg(cfg_)) : make_task(cfg_.task, task_cfg(cfg_));
   if (cfg_.make_policy) {

@@ -43,9 +43,12 @@ class Rollout;
 // are some.
 inline constexpr std::array<std::string_view, 3> kMeshes{"auto", "shapes", "real"};
 
+// For RolloutCfg::robot: that of the task.
+inline constexpr std::string_view kTaskRobot = "auto";
+
 struct RolloutCfg {
   std::string task = "pick";
-  std::string robot = "franka";
+  std::string robot{kTaskRobot};
   std::string scene;
   std::string policy = "planner";
   int num_worlds = 1;
@@ -79,7 +82,11 @@ template <class V>
 void visit_fields(V& v, RolloutCfg& c) {
   v.object("RolloutCfg", "Worlds that play episodes of a task.");
   v("task", c.task, "Which task.").decides_data();
-  v("robot", c.robot, "Which robot; none for a task whose scene has its own.").decides_data();
+  v("robot", c.robot,
+    "Which robot; auto: the usual one, or of a task that it cannot do the first that can; none for "
+    "a "
+    "task whose scene has its own.")
+      .decides_data();
   v("scene", c.scene, "Which scene, by its name or a file; by default the task's.")
       .decides_data_as("scene");
   v("policy", c.policy, "What drives it.").decides_data();
@@ -130,6 +137,9 @@ void visit_fields(V& v, RolloutCfg& c) {
       .decides_data_as("use_sensors")
       .hidden();
 }
+
+// With the robot by its name where it was left to the task.
+RolloutCfg resolved(RolloutCfg cfg);
 
 // Where the time of steps went, wall seconds.
 struct RolloutTimes {

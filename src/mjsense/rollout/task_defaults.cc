@@ -1,20 +1,28 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "mjsense/rollout/task_defaults.h"
 
+#include <algorithm>
+
 namespace mjsense {
 namespace {
 
 // MolmoSpaces' configurations; 0: the robot's.
 struct Defaults {
-  std::string_view task;
+  std::string_view task, robot;
   int horizon, policy_dt_ms, ctrl_dt_ms, sim_dt_ms;
 };
 constexpr Defaults kDefaults[] = {
-    {"door_opening", 400, 0, 0, 0},
-    {"nav_to_obj", 500, 200, 2, 2},
+    {"door_opening", "rby1", 400, 0, 0, 0},
+    {"nav_to_obj", "rby1", 500, 200, 2, 2},
 };
 
 constexpr std::string_view kAnyOf = "nav_to_obj+pick";
+
+const Defaults* defaults_of(std::string_view task) {
+  const std::string first = parts_of_task(task)[0];
+  const auto* found = std::ranges::find(kDefaults, first, &Defaults::task);
+  return found == std::end(kDefaults) ? nullptr : found;
+}
 
 }  // namespace
 
@@ -37,16 +45,18 @@ std::string_view default_scene(std::string_view task) {
   return task == "packing" || task.starts_with("pick_and_place") ? "tableware" : "";
 }
 
+std::string_view default_robot(std::string_view task) {
+  const Defaults* d = defaults_of(task);
+  return d ? d->robot : "franka";
+}
+
 void set_task_defaults(std::string_view task, TaskCfg& cfg) {
-  const std::string first = parts_of_task(task)[0];
-  for (const Defaults& d : kDefaults) {
-    if (d.task != first) continue;
-    cfg.horizon = d.horizon;
-    if (d.policy_dt_ms > 0) cfg.policy_dt_ms = d.policy_dt_ms;
-    if (d.ctrl_dt_ms > 0) cfg.ctrl_dt_ms = d.ctrl_dt_ms;
-    if (d.sim_dt_ms > 0) cfg.sim_dt_ms = d.sim_dt_ms;
-    return;
-  }
+  const Defaults* d = defaults_of(task);
+  if (!d) return;
+  cfg.horizon = d->horizon;
+  if (d->policy_dt_ms > 0) cfg.policy_dt_ms = d->policy_dt_ms;
+  if (d->ctrl_dt_ms > 0) cfg.ctrl_dt_ms = d->ctrl_dt_ms;
+  if (d->sim_dt_ms > 0) cfg.sim_dt_ms = d->sim_dt_ms;
 }
 
 }  // namespace mjsense

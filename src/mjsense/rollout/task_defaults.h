@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
-// The time that tasks are played in, where it is not the robot's and nobody says another.
+// What a task is played with where nobody says another: scene, robot, and the time where it is not the robot's.
 
 #include <string>
 #include <string_view>
@@ -15,6 +15,10 @@ namespace mjsense {
 std::vector<std::string> parts_of_task(std::string_view name);
 // The scene in which one of our tasks plays when nobody names another; "" for others.
 std::string_view default_scene(std::string_view task);
+
+// The robot that plays a task when nobody names another: the usual one if it can, else the first
+// that can.
+std::string_view default_robot(std::string_view task);
 
 // Sets the horizon, and the periods where the task has its own, of one of our tasks, of
 // the first of several; leaves those of others. `cfg.robot` is there, its periods are in `cfg`.
