@@ -84,6 +84,8 @@ set(MJSENSE_PUBLIC_HEADERS
   mjsense/scenes/layout.h
   mjsense/scenes/load_scene.h
   mjsense/scenes/look.h
+  mjsense/scenes/object_meshes.h
+  mjsense/scenes/object_sizes.h
   mjsense/scenes/object_task.h
   mjsense/scenes/scene_file.h
   mjsense/scenes/scene_task.h

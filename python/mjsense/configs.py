@@ -722,7 +722,7 @@ class SceneFileCfg(_config_methods.SceneFileCfg):
     robot: SceneRobotCfg = field(default_factory=SceneRobotCfg)
     """Where the robot stands."""
     vary: Sequence[SceneVaryCfg] = ()
-    """What looks different in every episode."""
+    """What is different in every episode."""
     sky: SceneSkyCfg | None = None
     """The colours around."""
     headlight: SceneHeadlightCfg | None = None
@@ -731,6 +731,8 @@ class SceneFileCfg(_config_methods.SceneFileCfg):
     """Of the physics."""
     extent: float | None = None
     """``stat.extent`` of the model. [m]"""
+    sizes: Sequence[float] = (1.0, 1.0)
+    """Of each object in an episode, as a factor on its model's, least and most: one of six, evenly apart."""
     gap: float = 0.02
     """Free between two objects. [m]"""
     target_gap: float = 0.07
@@ -783,6 +785,8 @@ class SceneObjectCfg(_config_methods.Config):
     """Things are put in or on it; it is not picked up itself."""
     color: str | None = None
     """Of a receptacle: what tells it from others of its kind."""
+    sizes: Sequence[float] | None = None
+    """Its own range of sizes, where the scene's does not suit it."""
 
 
 @dataclass
@@ -801,10 +805,10 @@ class SceneRegionCfg(_config_methods.Config):
 
 @dataclass
 class SceneVaryCfg(_config_methods.Config):
-    """What looks different in every episode; all draws are uniform."""
+    """What is different in every episode; all draws are uniform."""
 
-    what: Literal["light", "material", "geom"]
-    """Lights, materials or geoms (without a material)."""
+    what: Literal["light", "material", "geom", "body"]
+    """Lights, materials, geoms (without a material) or bodies that do not move."""
     pattern: str
     """Regular expression that matches the whole full name of each."""
     brightness: Sequence[float] = (1.0, 1.0)
@@ -814,9 +818,9 @@ class SceneVaryCfg(_config_methods.Config):
     saturation: float = 0.0
     """Half width of a shift of the saturation."""
     pos: Sequence[float] = (0.0, 0.0, 0.0)
-    """light: half widths of a move. [m]"""
+    """light, body: half widths of a move. [m]"""
     angle: float = 0.0
-    """light: most by which its direction turns, degrees."""
+    """light: most by which its direction turns, body: half width of a turn about the vertical, degrees."""
     textures: Sequence[str] = ()
     """material: full names of textures, one of which it has."""
 

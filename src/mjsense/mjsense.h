@@ -84,6 +84,8 @@
 #include "mjsense/scenes/layout.h"
 #include "mjsense/scenes/load_scene.h"
 #include "mjsense/scenes/look.h"
+#include "mjsense/scenes/object_meshes.h"
+#include "mjsense/scenes/object_sizes.h"
 #include "mjsense/scenes/object_task.h"
 #include "mjsense/scenes/scene_file.h"
 #include "mjsense/scenes/scene_task.h"

@@ -8,6 +8,7 @@ import h5py
 import mujoco
 import numpy as np
 import pytest
+from world_model import model_of
 
 import mjsense as mjs
 
@@ -55,11 +56,12 @@ def below(model, body, root):
 
 def world_of(env, w):
     """Plain MuJoCo's data for what a world stands at."""
-    data = mujoco.MjData(env.sim.model)
+    model = model_of(env.sim, w)
+    data = mujoco.MjData(model)
     data.qpos, data.qvel = env.sim.qpos[w], env.sim.qvel[w]
     if env.sim.model.nmocap:
         data.mocap_pos, data.mocap_quat = env.sim.mocap_pos[w], env.sim.mocap_quat[w]
-    mujoco.mj_forward(env.sim.model, data)
+    mujoco.mj_forward(model, data)
     return data
 
 

@@ -15,7 +15,7 @@ namespace mjsense {
 struct GraspObject {
   int body = -1;
   std::string kind;  // "mug": of models/objects
-  ObjectShape shape;
+  ObjectShape shape;  // in the size of its model
 };
 
 // Where a task wants its target put.
@@ -33,6 +33,11 @@ class GraspScene {
  public:
   virtual ~GraspScene() = default;
   virtual std::span<const GraspObject> all_objects() const = 0;  // target and distractors
+  // In the size that the object has in this world's episode. It lives as long as the task: what is known of a shape may
+  // be kept by its address.
+  virtual const ObjectShape& shape(int /*world*/, int object) const {
+    return all_objects()[object].shape;
+  }
   virtual int target(int world) const = 0;                       // index in all_objects()
   virtual double support_height(
       int world) const = 0;  // m, of what the target stands on at the start

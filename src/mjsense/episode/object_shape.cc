@@ -138,4 +138,15 @@ ObjectShape object_shape(const mjModel* model, int body, double spacing) {
   return shape;
 }
 
+ObjectShape scaled(const ObjectShape& shape, double size) {
+  ObjectShape out;
+  out.points.reserve(shape.points.size());
+  for (Vec3 p : shape.points) out.points.push_back(size * p);
+  out.low = size * shape.low;
+  out.high = size * shape.high;
+  out.radius = size * shape.radius;
+  out.reach = size * shape.reach;
+  return out;
+}
+
 }  // namespace mjsense

@@ -21,4 +21,7 @@ struct ObjectShape {
 // `spacing` m. Throws ValueError for a body without geoms that touch.
 ObjectShape object_shape(const mjModel* model, int body, double spacing = 0.004);
 
+// The same object, `size` times as large.
+ObjectShape scaled(const ObjectShape& shape, double size);
+
 }  // namespace mjsense

@@ -99,6 +99,33 @@ EpisodeScene::EpisodeScene(SceneFileCfg cfg) : cfg_(std::move(cfg)) {
   if (!cfg_.generator.empty()) generated_ = generate(cfg_);
   for (const SceneEntityCfg& entity : cfg_.entities)
     edited_.push_back(edited_model(entity, place()));
+  make_meshes();
+}
+
+// Objects that are found, and not named, are known once the scene is compiled: any of what can move may be one.
+void EpisodeScene::make_meshes() {
+  std::vector<ObjectMeshes::Object> objects;
+  for (const SceneObjectCfg& one : cfg_.objects) {
+    const std::vector<double> sizes = ObjectSizes::steps(one.sizes.value_or(cfg_.sizes));
+    if (sizes.size() > 1) objects.push_back({one.body, sizes});
+  }
+  const bool found = cfg_.objects.empty() && cfg_.sizes[0] < cfg_.sizes[1];
+  if (objects.empty() && !found) return;
+  SceneCfg things = scene_cfg("");
+  // Without what is made anew for it alone.
+  std::erase_if(things.entities, [&](const auto& entity) {
+    return entity.first.empty() || (entity.first == "room" && !generated_.empty());
+  });
+  things.spec_fn = {};
+  if (found) {
+    const Scene scene(things);
+    for (int body = 1; body < scene.model()->nbody; ++body) {
+      if (is_free(scene.model(), body))
+        objects.push_back(
+            {name_of(scene.model(), mjOBJ_BODY, body), ObjectSizes::steps(cfg_.sizes)});
+    }
+  }
+  meshes_ = std::make_shared<ObjectMeshes>(std::move(things), objects);
 }
 
 std::string EpisodeScene::place() const { return fmt::format("scene '{}'", cfg_.name); }
@@ -130,9 +157,10 @@ SceneCfg EpisodeScene::scene_cfg(const std::string& robot) const {
   if (scene.entities.empty()) scene.entities.emplace_back(robot, EntityCfg{});
   if (cfg_.extent) scene.extent = cfg_.extent;
   if (!cfg_.models) scene.options = cfg_.options;
-  scene.spec_fn = [cfg = cfg_, first = scene.spec_fn](mjSpec* spec) {
+  scene.spec_fn = [cfg = cfg_, first = scene.spec_fn, meshes = meshes_](mjSpec* spec) {
     apply_look(spec, cfg);
     let_robots_touch(spec);
+    if (meshes) meshes->add(spec);
     if (first) first(spec);
   };
   return scene;
@@ -143,21 +171,59 @@ void EpisodeScene::initialize(const mjModel* model, int num_worlds, std::string_
   find_objects(robot_prefix);
   find_regions();
   present_.assign(num_worlds * objects_.size(), 1);
+  steps_.assign(num_worlds * objects_.size(), -1);
   support_.assign(num_worlds, regions_.empty() ? 0.0 : regions_[0].height);
+  make_sizes();
 }
 
 void EpisodeScene::bind(Simulation& simulation) {
+  simulation_ = &simulation;
   if (!cfg_.vary.empty()) look_ = std::make_unique<Look>(cfg_.vary, simulation, place());
+  make_sizes();
+}
+
+// Needs both the worlds and the objects; which come first is not ours to say.
+void EpisodeScene::make_sizes() {
+  if (!meshes_ || !simulation_ || objects_.empty()) return;
+  std::vector<int> bodies;
+  std::vector<std::vector<double>> sizes;
+  for (const SceneObject& object : objects_) {
+    bodies.push_back(object.body);
+    sizes.push_back(object.sizes);
+  }
+  sizes_ = std::make_unique<ObjectSizes>(*simulation_, bodies, std::move(sizes), place());
+}
+
+const ObjectShape& EpisodeScene::shape(int world, int object) const {
+  const int step = steps_[world * objects_.size() + object];
+  return step < 0 ? objects_[object].shape : objects_[object].shapes[step];
+}
+
+double EpisodeScene::size(int world, int object) const {
+  const int step = steps_[world * objects_.size() + object];
+  return step < 0 ? 1.0 : objects_[object].sizes[step];
 }
 
 void EpisodeScene::find_objects(std::string_view robot_prefix) {
   objects_.clear();
+  const auto found = [&](int body, std::string kind, const std::array<double, 2>& sizes) {
+    SceneObject object;
+    object.body = body;
+    object.kind = std::move(kind);
+    object.shape = object_shape(model_, body);
+    object.sizes = ObjectSizes::steps(sizes);
+    if (meshes_) {
+      for (double size : object.sizes) object.shapes.push_back(scaled(object.shape, size));
+    }
+    return object;
+  };
   for (const SceneObjectCfg& one : cfg_.objects) {
     const int body = resolve(model_, mjOBJ_BODY, one.body, place());
     if (!is_free(model_, body))
       throw ValueError(fmt::format("{}: object '{}' has no free joint", place(), one.body));
-    SceneObject object{body, last_part(one.body),       one.text, one.other_texts,
-                       {},   object_shape(model_, body)};
+    SceneObject object = found(body, last_part(one.body), one.sizes.value_or(cfg_.sizes));
+    object.text = one.text;
+    object.others = one.other_texts;
     if (object.text.empty()) object.text = object.kind;
     object.receptacle = one.receptacle;
     object.color = one.color;
@@ -169,7 +235,8 @@ void EpisodeScene::find_objects(std::string_view robot_prefix) {
     const std::string name = name_of(model_, mjOBJ_BODY, body);
     if (!is_free(model_, body) || name.empty() || name.starts_with(robot_prefix)) continue;
     if (!touches(model_, body)) continue;
-    SceneObject object{body, last_part(name), "", {}, {Quat{}}, object_shape(model_, body)};
+    SceneObject object = found(body, last_part(name), cfg_.sizes);
+    object.rests = {Quat{}};
     if (!can_be_held(object.shape)) continue;
     object.text = object.kind;
     std::ranges::replace(object.text, '_', ' ');
@@ -179,6 +246,7 @@ void EpisodeScene::find_objects(std::string_view robot_prefix) {
 
 void EpisodeScene::find_regions() {
   regions_.clear();
+  region_bodies_.clear();
   for (const SceneRegionCfg& one : cfg_.regions) {
     const std::string who = fmt::format("{}, region '{}'", place(), one.name);
     const int g = resolve(model_, mjOBJ_GEOM, one.on, who);
@@ -207,7 +275,28 @@ void EpisodeScene::find_regions() {
     }
     region.target_area = one.target_area ? area(*one.target_area) : region.area;
     regions_.push_back(region);
+    region_bodies_.push_back(model_->geom_bodyid[g]);
   }
+}
+
+// As what carries them stands in this world.
+std::vector<Region> EpisodeScene::regions_of(int world) const {
+  std::vector<Region> regions = regions_;
+  const double* here = look_ ? look_->body_pos(world) : model_->body_pos;
+  if (here == model_->body_pos) return regions;
+  for (std::size_t i = 0; i < regions.size(); ++i) {
+    Vec3 move;
+    for (int body = region_bodies_[i]; body > 0; body = model_->body_parentid[body])
+      move = move + vec3(here + 3 * body) - vec3(model_->body_pos + 3 * body);
+    for (Area* area : {&regions[i].area, &regions[i].target_area}) {
+      area->x0 += move.x;
+      area->x1 += move.x;
+      area->y0 += move.y;
+      area->y1 += move.y;
+    }
+    regions[i].height += move.z;
+  }
+  return regions;
 }
 
 std::vector<int> EpisodeScene::where(bool receptacle) const {
@@ -245,14 +334,15 @@ Pose EpisodeScene::sample(int world, std::span<const int> wanted, std::uint64_t 
     }
   }
   if (!regions_.empty() && n > 0) {
+    const std::vector<Region> regions = regions_of(world);
     std::vector<Resting> resting;
     std::vector<Pose> poses(n);
     std::vector<int> region_of(n);
     for (int i = 0; i < n; ++i) {
-      resting.push_back({&objects_[i].shape, objects_[i].rests});
+      resting.push_back({&shape(world, i), objects_[i].rests});
       poses[i].p = {kAway + i, kAway, 0.5};  // where nobody looks
     }
-    lay_out(resting, wanted, {present, static_cast<std::size_t>(n)}, regions_,
+    lay_out(resting, wanted, {present, static_cast<std::size_t>(n)}, regions,
             {cfg_.gap, cfg_.target_gap, cfg_.drop}, rng, poses, region_of);
     for (int i = 0; i < n; ++i) {
       const int joint = model_->body_jntadr[objects_[i].body];
@@ -262,7 +352,7 @@ Pose EpisodeScene::sample(int world, std::span<const int> wanted, std::uint64_t 
       write_quat(poses[i].q, qpos + 3);
       std::fill(qvel, qvel + 6, 0.0);
     }
-    if (target >= 0) support_[world] = regions_[region_of[target]].height;
+    if (target >= 0) support_[world] = regions[region_of[target]].height;
   } else if (n > 0 && target >= 0) {
     set_target(world, target, state);
   }
@@ -274,7 +364,9 @@ Pose EpisodeScene::sample(int world, std::span<const int> wanted, std::uint64_t 
   return {{x, y, r.pos[2]}, yaw == 0 ? Quat{} : axis_angle({0, 0, 1}, yaw * pi / 180)};
 }
 
-std::vector<int> EpisodeScene::adopt(int world, const StateRow& state) {
+std::vector<int> EpisodeScene::adopt(int world, std::uint64_t seed, std::uint64_t episode,
+                                     const StateRow& state) {
+  draw_sizes(world, seed, episode);
   std::vector<int> here;
   for (std::size_t i = 0; i < objects_.size(); ++i) {
     const double* qpos = state.qpos + model_->jnt_qposadr[model_->body_jntadr[objects_[i].body]];
@@ -289,15 +381,27 @@ void EpisodeScene::set_target(int world, int target, const StateRow& state) {
   const double* qpos = state.qpos + model_->jnt_qposadr[model_->body_jntadr[objects_[target].body]];
   const Pose pose{vec3(qpos), quat(qpos + 3)};
   support_[world] = std::numeric_limits<double>::max();
-  for (Vec3 point : objects_[target].shape.points)
+  for (Vec3 point : shape(world, target).points)
     support_[world] = std::min(support_[world], (pose * point).z);
 }
 
-bool EpisodeScene::vary_look(int world, std::uint64_t seed, std::uint64_t episode) const {
-  if (!look_) return false;
-  Rng rng(seed, 0, stream_of("scene/look"), episode);
-  look_->vary(world, rng);
-  return true;
+bool EpisodeScene::vary(int world, std::uint64_t seed, std::uint64_t episode) {
+  if (look_) {
+    Rng rng(seed, 0, stream_of("scene/look"), episode);
+    look_->vary(world, rng);
+  }
+  draw_sizes(world, seed, episode);
+  const std::size_t n = objects_.size();
+  if (sizes_) sizes_->set(world, std::span(steps_).subspan(world * n, n));
+  return look_ || sizes_;
+}
+
+void EpisodeScene::draw_sizes(int world, std::uint64_t seed, std::uint64_t episode) {
+  if (!sizes_) return;
+  Rng rng(seed, 0, stream_of("scene/sizes"), episode);
+  for (std::size_t i = 0; i < objects_.size(); ++i)
+    steps_[world * objects_.size() + i] =
+        static_cast<int>(rng.below(static_cast<std::uint32_t>(objects_[i].sizes.size())));
 }
 
 std::string EpisodeScene::fault(const World& world) const {

@@ -14,6 +14,8 @@
 #include "mjsense/scene/scene.h"
 #include "mjsense/scenes/layout.h"
 #include "mjsense/scenes/look.h"
+#include "mjsense/scenes/object_meshes.h"
+#include "mjsense/scenes/object_sizes.h"
 #include "mjsense/scenes/scene_file.h"
 
 namespace mjsense {
@@ -25,9 +27,11 @@ struct SceneObject {
   std::string text;                 // what people call it
   std::vector<std::string> others;  // what else they call it
   std::vector<Quat> rests;
-  ObjectShape shape;
+  ObjectShape shape;        // in the size of its model
   bool receptacle = false;  // things are put in or on it
   std::string color;
+  std::vector<double> sizes;        // that it may have
+  std::vector<ObjectShape> shapes;  // in these
 };
 
 class EpisodeScene {
@@ -41,13 +45,17 @@ class EpisodeScene {
   // Finds objects and surfaces. Bodies of the robot, whose names start with `robot_prefix`, are no
   // objects. Throws KeyError, ValueError; in a scene without objects only object() does.
   void initialize(const mjModel* model, int num_worlds, std::string_view robot_prefix);
-  // For looks that vary, once there are worlds.
+  // For what varies, once there are worlds; they live as long as this. Throws KeyError, ValueError.
   void bind(Simulation& simulation);
 
   std::span<const SceneObject> objects() const { return objects_; }
   std::span<const Region> regions() const { return regions_; }
   // Whether an object takes part in the episode of this world; the others stand far away.
   bool present(int world, int object) const { return present_[world * objects_.size() + object]; }
+
+  // In the size that the object has in this world's episode; lives as long as the scene.
+  const ObjectShape& shape(int world, int object) const;
+  double size(int world, int object) const;
 
   // Height (m) of what the target stands on at the start of this world's episode.
   double support_height(int world) const { return support_[world]; }
@@ -59,16 +67,17 @@ class EpisodeScene {
   // The same, about several: they are there, and within reach; the first is the target.
   Pose sample(int world, std::span<const int> wanted, std::uint64_t seed, std::uint64_t episode,
               Rng& rng, const StateRow& state);
-  // For a state that another one of this scene has sampled: takes over which objects are there, and
+  // For a state that another one of this scene has sampled: takes over which objects are there, and in which size, and
   // returns their indices.
-  std::vector<int> adopt(int world, const StateRow& state);
+  std::vector<int> adopt(int world, std::uint64_t seed, std::uint64_t episode,
+                         const StateRow& state);
   // The episode is about this object, where it lies in that state.
   void set_target(int world, int target, const StateRow& state);
   // Indices of the objects to pick up, and of the receptacles.
   std::vector<int> things() const { return where(false); }
   std::vector<int> receptacles() const { return where(true); }
-  // The episode's lights and colours; false if there is nothing to vary.
-  bool vary_look(int world, std::uint64_t seed, std::uint64_t episode) const;
+  // The episode's lights, colours, furniture and sizes of objects, before it is sampled; false if nothing varies.
+  bool vary(int world, std::uint64_t seed, std::uint64_t episode);
   // What is wrong with the start that this fresh world shows: an object inside something by more
   // than 2 mm. "" if nothing is.
   std::string fault(const World& world) const;
@@ -76,6 +85,10 @@ class EpisodeScene {
  private:
   void find_objects(std::string_view robot_prefix);
   void find_regions();
+  std::vector<Region> regions_of(int world) const;
+  void make_meshes();
+  void make_sizes();
+  void draw_sizes(int world, std::uint64_t seed, std::uint64_t episode);
   std::vector<int> where(bool receptacle) const;
   std::string place() const;
 
@@ -83,11 +96,16 @@ class EpisodeScene {
   const mjModel* model_ = nullptr;
   ModelSource generated_;                        // empty: the scene has no generator
   std::vector<std::shared_ptr<mjSpec>> edited_;  // models of which the scene changes something
+  std::shared_ptr<const ObjectMeshes> meshes_;   // null: nothing has sizes
   std::vector<SceneObject> objects_;
   std::vector<Region> regions_;
+  std::vector<int> region_bodies_;  // what carries each
   std::vector<char> present_;    // [B, objects]
+  std::vector<int> steps_;       // [B, objects], of its sizes; -1: that of its model
   std::vector<double> support_;  // [B]
+  Simulation* simulation_ = nullptr;
   std::unique_ptr<Look> look_;
+  std::unique_ptr<ObjectSizes> sizes_;
 };
 
 }  // namespace mjsense

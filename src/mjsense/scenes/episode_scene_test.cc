@@ -76,8 +76,8 @@ struct Played {
   }
   Pose start(std::uint64_t episode, int target = 0, int world = 0) {
     Rng rng(3, 0, stream_of("places"), episode);
+    if (scene.vary(world, 3, episode)) sim->worlds().model_changed();
     const Pose base = scene.sample(world, target, 3, episode, rng, state_row(sim->worlds(), world));
-    if (scene.vary_look(world, 3, episode)) sim->worlds().model_changed();
     sim->forward();
     return base;
   }

@@ -22,6 +22,8 @@ mjtObj object_type(VaryKind what) {
       return mjOBJ_LIGHT;
     case VaryKind::kMaterial:
       return mjOBJ_MATERIAL;
+    case VaryKind::kBody:
+      return mjOBJ_BODY;
     case VaryKind::kGeom:
       break;
   }
@@ -90,8 +92,19 @@ Look::Look(std::vector<SceneVaryCfg> cfg, Simulation& simulation, std::string_vi
     if (colours && one.what == VaryKind::kMaterial)
       mat_rgba_ = expand(batch, "mat_rgba", mat_rgba_);
     if (colours && one.what == VaryKind::kGeom) geom_rgba_ = expand(batch, "geom_rgba", geom_rgba_);
-    if (one.pos != std::array<double, 3>{}) light_pos_ = expand(batch, "light_pos", light_pos_);
-    if (one.angle > 0) light_dir_ = expand(batch, "light_dir", light_dir_);
+    const bool light = one.what == VaryKind::kLight;
+    if (light && one.pos != std::array<double, 3>{})
+      light_pos_ = expand(batch, "light_pos", light_pos_);
+    if (light && one.angle > 0) light_dir_ = expand(batch, "light_dir", light_dir_);
+    if (one.what == VaryKind::kBody) {
+      for (int id : part.ids) {
+        // A mocap body stands where the state says.
+        if (model_->body_treeid[id] >= 0 || model_->body_mocapid[id] >= 0 || id == 0)
+          throw ValueError(fmt::format("{}: body '{}' moves by itself", who, names[id]));
+      }
+      body_pos_ = expand(batch, "body_pos", body_pos_);
+      body_quat_ = expand(batch, "body_quat", body_quat_);
+    }
     if (!part.textures.empty()) mat_texid_ = expand(batch, "mat_texid", mat_texid_);
     part.cfg = std::move(one);
     parts_.push_back(std::move(part));
@@ -111,16 +124,35 @@ float* Look::colour_of(VaryKind what, int world, int id) const {
       return row(light_diffuse_, static_cast<int>(model_->nlight), 3, model_->light_diffuse);
     case VaryKind::kMaterial:
       return row(mat_rgba_, static_cast<int>(model_->nmat), 4, model_->mat_rgba);
+    case VaryKind::kBody:
+      return nullptr;
     case VaryKind::kGeom:
       break;
   }
   return row(geom_rgba_, static_cast<int>(model_->ngeom), 4, model_->geom_rgba);
 }
 
+const double* Look::body_pos(int world) const {
+  return body_pos_ ? body_pos_ + 3 * static_cast<std::size_t>(world) * model_->nbody
+                   : model_->body_pos;
+}
+
+void Look::move_body(const SceneVaryCfg& cfg, int world, int id, Rng& rng) const {
+  const std::size_t at = static_cast<std::size_t>(world) * model_->nbody + id;
+  for (int i = 0; i < 3; ++i)
+    body_pos_[3 * at + i] = model_->body_pos[3 * id + i] + around(rng, cfg.pos[i]);
+  const double turn = around(rng, cfg.angle) * std::numbers::pi / 180;
+  write_quat(axis_angle({0, 0, 1}, turn) * quat(model_->body_quat + 4 * id), body_quat_ + 4 * at);
+}
+
 void Look::vary(int world, Rng& rng) const {
   for (const Part& part : parts_) {
     const SceneVaryCfg& c = part.cfg;
     for (int id : part.ids) {
+      if (c.what == VaryKind::kBody) {
+        move_body(c, world, id, rng);
+        continue;
+      }
       const double brightness = rng.uniform(c.brightness[0], c.brightness[1]);
       const double hue = around(rng, c.hue), saturation = around(rng, c.saturation);
       if (float* rgb = colour_of(c.what, world, id)) shift_colour(hue, saturation, brightness, rgb);

@@ -15,6 +15,11 @@ void check_area(const std::array<double, 4>& area, const std::string& who) {
                                  area[0], area[1], area[2], area[3]));
 }
 
+void check_sizes(const std::array<double, 2>& sizes, const std::string& who) {
+  if (sizes[0] > sizes[1])
+    throw ValueError(fmt::format("{}: sizes is {}, {}: least, most", who, sizes[0], sizes[1]));
+}
+
 }  // namespace
 
 void validate(const SceneFileCfg& cfg, std::string_view place) {
@@ -42,6 +47,10 @@ void validate(const SceneFileCfg& cfg, std::string_view place) {
   if (cfg.count[0] > cfg.count[1] || cfg.count[0] == 0 || cfg.count[0] < -1)
     throw ValueError(fmt::format("{}: count is {}, {}: least, most, from 1 on (or -1, -1)", who,
                                  cfg.count[0], cfg.count[1]));
+  check_sizes(cfg.sizes, who);
+  for (const SceneObjectCfg& object : cfg.objects) {
+    if (object.sizes) check_sizes(*object.sizes, fmt::format("{}, object '{}'", who, object.body));
+  }
   for (const SceneVaryCfg& vary : cfg.vary) {
     const std::string what = fmt::format("{}, vary {} '{}'", who, vary.what.text(), vary.pattern);
     if (vary.brightness[0] > vary.brightness[1])
@@ -49,8 +58,13 @@ void validate(const SceneFileCfg& cfg, std::string_view place) {
                                    vary.brightness[0], vary.brightness[1]));
     if (vary.what != VaryKind::kMaterial && !vary.textures.empty())
       throw ValueError(what + ": textures are for materials");
-    if (vary.what != VaryKind::kLight && (vary.pos != std::array<double, 3>{} || vary.angle > 0))
-      throw ValueError(what + ": pos and angle are for lights");
+    const bool stands = vary.what == VaryKind::kLight || vary.what == VaryKind::kBody;
+    if (!stands && (vary.pos != std::array<double, 3>{} || vary.angle > 0))
+      throw ValueError(what + ": pos and angle are for lights and bodies");
+    const bool colours =
+        vary.brightness != std::array<double, 2>{1, 1} || vary.hue > 0 || vary.saturation > 0;
+    if (vary.what == VaryKind::kBody && colours)
+      throw ValueError(what + ": brightness, hue and saturation are not for bodies");
   }
 }
 

@@ -61,6 +61,7 @@ struct SceneObjectCfg {
   std::vector<std::string> rests{"upright"};
   bool receptacle = false;
   std::string color;
+  std::optional<std::array<double, 2>> sizes;
 };
 template <class V>
 void visit_fields(V& v, SceneObjectCfg& c) {
@@ -71,6 +72,8 @@ void visit_fields(V& v, SceneObjectCfg& c) {
   v("rests", c.rests, "How it may rest.").one_of(kRests).not_empty();
   v("receptacle", c.receptacle, "Things are put in or on it; it is not picked up itself.");
   v("color", c.color, "Of a receptacle: what tells it from others of its kind.").or_none();
+  v("sizes", c.sizes, "Its own range of sizes, where the scene's does not suit it.")
+      .within(0.1, 10);
 }
 
 struct SceneRegionCfg {
@@ -106,9 +109,10 @@ void visit_fields(V& v, SceneRobotCfg& c) {
   v("yaw_spread", c.yaw_spread, "Half width of uniform noise, degrees.").at_least(0);
 }
 
-enum class VaryKind { kLight, kMaterial, kGeom };
+enum class VaryKind { kLight, kMaterial, kGeom, kBody };
 template <>
-inline constexpr std::array<std::string_view, 3> kWords<VaryKind>{"light", "material", "geom"};
+inline constexpr std::array<std::string_view, 4> kWords<VaryKind>{"light", "material", "geom",
+                                                                  "body"};
 
 struct SceneVaryCfg {
   Word<VaryKind> what;
@@ -122,15 +126,19 @@ struct SceneVaryCfg {
 };
 template <class V>
 void visit_fields(V& v, SceneVaryCfg& c) {
-  v.object("SceneVaryCfg", "What looks different in every episode; all draws are uniform.");
-  v("what", c.what, "Lights, materials or geoms (without a material).").required();
+  v.object("SceneVaryCfg", "What is different in every episode; all draws are uniform.");
+  v("what", c.what, "Lights, materials, geoms (without a material) or bodies that do not move.")
+      .required();
   v("pattern", c.pattern, "Regular expression that matches the whole full name of each.")
       .required();
   v("brightness", c.brightness, "Factor on the colour, least and most.").at_least(0);
   v("hue", c.hue, "Half width of a turn of the hue, degrees.").within(0, 180);
   v("saturation", c.saturation, "Half width of a shift of the saturation.").within(0, 1);
-  v("pos", c.pos, "light: half widths of a move.").unit("m").at_least(0);
-  v("angle", c.angle, "light: most by which its direction turns, degrees.").within(0, 90);
+  v("pos", c.pos, "light, body: half widths of a move.").unit("m").at_least(0);
+  v("angle", c.angle,
+    "light: most by which its direction turns, body: half width of a turn about the vertical, "
+    "degrees.")
+      .within(0, 90);
   v("textures", c.textures, "material: full names of textures, one of which it has.");
 }
 
@@ -172,6 +180,7 @@ struct SceneFileCfg {
   std::optional<SceneHeadlightCfg> headlight;
   OptionsCfg options;
   std::optional<double> extent;
+  std::array<double, 2> sizes{1, 1};
   double gap = 0.02, target_gap = 0.07;
   double drop = 0.0003;
   std::array<int, 2> count{-1, -1};
@@ -200,11 +209,16 @@ void visit_fields(V& v, SceneFileCfg& c) {
     "hold.");
   v("regions", c.regions, "Where they may stand; none: where their models have them.");
   v("robot", c.robot, "Where the robot stands.");
-  v("vary", c.vary, "What looks different in every episode.");
+  v("vary", c.vary, "What is different in every episode.");
   v("sky", c.sky, "The colours around.");
   v("headlight", c.headlight, "The light at the camera; without it MuJoCo's.");
   v("options", c.options, "Of the physics.");
   v("extent", c.extent, "``stat.extent`` of the model.").unit("m").positive();
+  v("sizes", c.sizes,
+    "Of each object in an episode, as a factor on its model's, least and most: one of six, "
+    "evenly "
+    "apart.")
+      .within(0.1, 10);
   v("gap", c.gap, "Free between two objects.").unit("m").at_least(0);
   v("target_gap", c.target_gap, "Free around the object that a task is about.")
       .unit("m")

@@ -18,10 +18,14 @@ void SceneTask::bind(const std::shared_ptr<Simulation>& simulation) {
 
 void SceneTask::initialize_task() { scene_.initialize(model(), num_worlds(), robot().prefix()); }
 
-void SceneTask::vary_look(int world) {
+void SceneTask::vary_scene(int world) {
   const std::shared_ptr<Simulation> simulation = simulation_.lock();
-  if (scene_.vary_look(world, cfg().seed, static_cast<std::uint64_t>(episode(world))) && simulation)
+  if (scene_.vary(world, cfg().seed, static_cast<std::uint64_t>(episode(world))) && simulation)
     simulation->worlds().model_changed();
+}
+
+std::vector<int> SceneTask::adopt_scene(int world, const StateRow& state) {
+  return scene_.adopt(world, cfg().seed, static_cast<std::uint64_t>(episode(world)), state);
 }
 
 std::string SceneTask::place() const {

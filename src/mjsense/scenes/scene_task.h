@@ -24,8 +24,10 @@ class SceneTask : public Task {
   const EpisodeScene& scene() const { return scene_; }
   // Those who override it call it first.
   void initialize_task() override;
-  // The lights and colours of the episode that this world begins.
-  void vary_look(int world);
+  // What differs in the episode that this world begins, before the scene is sampled.
+  void vary_scene(int world);
+  // EpisodeScene::adopt(), of this world's episode.
+  std::vector<int> adopt_scene(int world, const StateRow& state);
   // "task 'pick': scene 'table'", which errors begin with.
   std::string place() const;
 

@@ -58,6 +58,9 @@ class Manipulation {
   }
 
   // The target, as it stands.
+  const ObjectShape& target_shape(int world) const {
+    return scene_.shape(world, scene_.target(world));
+  }
   int target_body(int world) const { return scene_.all_objects()[scene_.target(world)].body; }
   Pose object_pose(const World& world) const;  // X_WO
   // A function of the episode alone, whatever the world and what was planned before.

@@ -84,18 +84,20 @@ bool PickPlanner::choose_grasp(const World& world, Grasp& chosen) const {
   const auto& target = objects[scene_->target(world.id)];
   const Pose tool = robot.leaf_pose(world, robot.arm()), base = robot.base_pose(world);
   const std::vector<Grasp> grasps =
-      propose_grasps(*gripper_shape_, target.shape, object_pose(world, target.body),
-                     scene_->support_height(world.id), tool);
+      propose_grasps(*gripper_shape_, scene_->shape(world.id, scene_->target(world.id)),
+                     object_pose(world, target.body), scene_->support_height(world.id), tool);
   std::array<double, Chain::kMaxJoints> q;
   read_arm(world, q);
   int tried = 0;
   const Grasp* second_best = nullptr;  // reachable, but something stands in the way
   for (const Grasp& grasp : grasps) {
     bool blocked = false;
-    for (const auto& other : objects) {
-      if (other.body == target.body) continue;
-      blocked = blocked || gripper_shape_->hits(grasp.pose, object_pose(world, other.body),
-                                                other.shape, kGraspMargin);
+    for (std::size_t i = 0; i < objects.size(); ++i) {
+      const int body = objects[i].body;
+      if (body == target.body) continue;
+      blocked = blocked ||
+                gripper_shape_->hits(grasp.pose, object_pose(world, body),
+                                     scene_->shape(world.id, static_cast<int>(i)), kGraspMargin);
     }
     if (blocked) continue;
     if (++tried > cfg_.max_ik_candidates) break;
@@ -130,8 +132,9 @@ bool PickPlanner::path_is_free(const World& world, const Pose& tool, const Pose&
   const auto objects = scene_->all_objects();
   for (int i = 1; i <= steps; ++i) {
     const Pose at = tool * exp6((static_cast<double>(i) / steps) * screw);
-    for (const auto& object : objects) {
-      if (gripper_shape_->hits(at, object_pose(world, object.body), object.shape, kPathMargin))
+    for (std::size_t k = 0; k < objects.size(); ++k) {
+      if (gripper_shape_->hits(at, object_pose(world, objects[k].body),
+                               scene_->shape(world.id, static_cast<int>(k)), kPathMargin))
         return false;
     }
   }

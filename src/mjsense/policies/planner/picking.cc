@@ -33,17 +33,17 @@ struct Picking::Search {
 };
 
 Picking::Picking(const Manipulation& shared, const Placing* placing)
-    : m_(shared), placing_(placing) {
-  for (std::size_t i = 0; i < m_.scene().all_objects().size() * m_.num_hands(); ++i)
-    grasps_.push_back(std::make_unique<Grasps>());
-}
+    : m_(shared), placing_(placing) {}
 
-std::span<const Grasp> Picking::grasps(int object, int hand) {
-  Grasps& entry = *grasps_[object * m_.num_hands() + hand];
-  std::call_once(entry.once, [&] {
-    entry.of_object = grasps_all_around(m_.gripper(hand), m_.scene().all_objects()[object].shape);
-  });
-  return entry.of_object;
+std::span<const Grasp> Picking::grasps(const ObjectShape& shape, int hand) {
+  Grasps* entry = nullptr;
+  {
+    const std::lock_guard lock(grasps_mutex_);
+    entry = &grasps_[{&shape, hand}];
+  }
+  std::call_once(entry->once,
+                 [&] { entry->of_object = grasps_all_around(m_.gripper(hand), shape); });
+  return entry->of_object;
 }
 
 std::optional<Picking::Grip> Picking::plan(const World& world, const PlanRequest& request,
@@ -119,7 +119,7 @@ std::optional<Picking::Grip> Picking::pick_with(const Search& search, int h, boo
   // The tool as a gripper whose y axis is the closing direction; near the present joints, then farther away.
   const GripperShape& shape = m_.gripper(h);
   const std::vector<Grasp> ranked =
-      rank_grasps(grasps(m_.scene().target(world.id), h), object, start.tool * Pose{{}, shape.turn},
+      rank_grasps(grasps(m_.target_shape(world.id), h), object, start.tool * Pose{{}, shape.turn},
                   wanted_approach(world, search.request, object));
   int ways = 0, misplaced = 0;
   for (const auto& [iterations, most] :

@@ -2,6 +2,7 @@
 #pragma once
 // Takes the object of an episode with one of the hands, from any direction, and lifts it.
 
+#include <map>
 #include <memory>
 #include <mutex>
 #include <optional>
@@ -44,7 +45,7 @@ class Picking {
   HandPose draw_back(const World& world, HandPlanner& hand, CollisionQuery& query,
                      const HandPose& start, Plan& plan) const;
   bool lift(const World& world, HandPlanner& hand, const HandPose& at, Plan& plan) const;
-  std::span<const Grasp> grasps(int object, int hand);
+  std::span<const Grasp> grasps(const ObjectShape& shape, int hand);
 
   const Manipulation& m_;
   const Placing* placing_;
@@ -52,7 +53,9 @@ class Picking {
     std::once_flag once;
     std::vector<Grasp> of_object;
   };
-  std::vector<std::unique_ptr<Grasps>> grasps_;  // [objects, hands], made when they are needed
+  // Of shapes, by their addresses, and hands; made when they are needed.
+  std::map<std::pair<const ObjectShape*, int>, Grasps> grasps_;
+  std::mutex grasps_mutex_;  // of the map, not of what is in it
 };
 
 }  // namespace mjsense

@@ -38,7 +38,7 @@ bool Placing::plan(const World& world, const PlanRequest& request, const Followe
   int ways = 0;
   for (std::size_t i = 0; i < places[0].size(); ++i) {
     for (int k = 0; k < kTurns; ++k) {
-      const Pose goal = placed(object, m_.scene().target(world.id), places[k][i], k);
+      const Pose goal = placed(object, m_.target_shape(world.id), places[k][i], k);
       const std::size_t before = plan.segments.size();
       if (place_at(world, hand, query, start, goal, tool_object, home, draw, plan)) return true;
       if (plan.segments.size() > before) plan.segments.resize(before);
@@ -48,16 +48,14 @@ bool Placing::plan(const World& world, const PlanRequest& request, const Followe
   return false;
 }
 
-double Placing::underside(int target, const Quat& object) const {
+double Placing::underside(const ObjectShape& shape, const Quat& object) const {
   double low = std::numeric_limits<double>::infinity();
-  for (Vec3 point : m_.scene().all_objects()[target].shape.points)
-    low = std::min(low, rotate(object, point).z);
+  for (Vec3 point : shape.points) low = std::min(low, rotate(object, point).z);
   return low;
 }
 
-Pose Placing::placed(const Pose& object, int target, Vec3 place, int k) const {
+Pose Placing::placed(const Pose& object, const ObjectShape& shape, Vec3 place, int k) const {
   // The middle of its underside, from its origin, as it hangs.
-  const ObjectShape& shape = m_.scene().all_objects()[target].shape;
   Vec3 low{1e9, 1e9, 1e9}, high{-1e9, -1e9, -1e9};
   for (Vec3 point : shape.points) {
     const Vec3 p = rotate(object.q, point);
@@ -76,7 +74,7 @@ bool Placing::reaches(const World& world, const HandPlanner& hand, const HandPos
     places.clear();
     m_.scene().place_scene()->places(world, turned(k), places);
     if (places.empty()) return true;
-    const Pose tool = placed(object, m_.scene().target(world.id), places[0], k) * object_tool;
+    const Pose tool = placed(object, m_.target_shape(world.id), places[0], k) * object_tool;
     HandPose above, there;
     if (hand.reach(world, raised(tool, m_.cfg().preplace), at, above) &&
         hand.reach(world, tool, above, there))
@@ -133,11 +131,11 @@ bool Placing::place_at(const World& world, HandPlanner& hand, CollisionQuery& qu
 bool Placing::put_back(const World& world, const Follower& follower, HandPlanner& hand,
                        const Pose& tool_object, Plan& plan) const {
   const ManipulationPlannerCfg& cfg = m_.cfg();
-  const int gripper = hand.hand().gripper, target = m_.scene().target(world.id);
+  const int gripper = hand.hand().gripper;
   const HandPose start = hand.now(world, follower);
   const Pose object = start.tool * tool_object;
-  const double above =
-      object.p.z + underside(target, object.q) - m_.scene().support_height(world.id);
+  const double above = object.p.z + underside(m_.target_shape(world.id), object.q) -
+                       m_.scene().support_height(world.id);
   if (above < cfg.clearance || above > kMostLowered) return false;
   const double down = cfg.clearance - above;
   CollisionQuery query(hand.collisions(), world);

@@ -28,9 +28,9 @@ class Placing {
 
  private:
   // X_WO of the object at a place, turned the k-th way from how it hangs at X_WO.
-  Pose placed(const Pose& object, int target, Vec3 place, int k) const;
+  Pose placed(const Pose& object, const ObjectShape& shape, Vec3 place, int k) const;
   // Height (m) of its lowest point above its origin, as it hangs.
-  double underside(int target, const Quat& object) const;
+  double underside(const ObjectShape& shape, const Quat& object) const;
   // Where the open hand gets away from the object that it has let go at X_WO.
   bool gets_away(const World& world, HandPlanner& hand, const HandPose& at, const Pose& object,
                  HandPose& away) const;

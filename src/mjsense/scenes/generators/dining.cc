@@ -10,17 +10,19 @@ namespace {
 constexpr Colour kRugs[] = {{0.48, 0.30, 0.28}, {0.34, 0.40, 0.46}, {0.62, 0.56, 0.44}};
 constexpr Colour kPaintings[] = {{0.36, 0.50, 0.58}, {0.66, 0.52, 0.36}, {0.44, 0.54, 0.38}};
 
-// Faces -x or +x, its seat at x, y.
-void chair(RoomText& room, double x, double y, double back) {
+// A body of this name: faces -x or +x, its seat at x, y.
+void chair(RoomText& room, const char* name, double x, double y, double back) {
+  room.open_body(name, {x, y, 0});
   for (int i = 0; i < 4; ++i) {
     const double dx = i & 1 ? 0.18 : -0.18, dy = i & 2 ? 0.18 : -0.18;
-    room.box("", "chair", {x + dx, y + dy, 0.22}, {0.018, 0.018, 0.22});
+    room.box("", "chair", {dx, dy, 0.22}, {0.018, 0.018, 0.22});
   }
-  room.box("", "chair", {x, y, 0.45}, {0.21, 0.21, 0.015});
+  room.box("", "chair", {0, 0, 0.45}, {0.21, 0.21, 0.015});
   for (int i = -1; i <= 1; i += 2)
-    room.box("", "chair", {x + 0.19 * back, y + 0.19 * i, 0.68}, {0.016, 0.016, 0.22});
+    room.box("", "chair", {0.19 * back, 0.19 * i, 0.68}, {0.016, 0.016, 0.22});
   for (int i = 0; i < 3; ++i)
-    room.box("", "chair", {x + 0.19 * back, y, 0.62 + 0.11 * i}, {0.010, 0.18, 0.028});
+    room.box("", "chair", {0.19 * back, 0, 0.62 + 0.11 * i}, {0.010, 0.18, 0.028});
+  room.close_body();
 }
 
 ModelSource make(House& house, SceneFileCfg& cfg) {
@@ -56,8 +58,8 @@ ModelSource make(House& house, SceneFileCfg& cfg) {
              {x + dx - (i & 1 ? 0.05 : -0.05), dy - (i & 2 ? 0.05 : -0.05), (high - 0.03) / 2},
              {0.03, 0.03, (high - 0.03) / 2});
   }
-  chair(room, front + deep + 0.22, rng.uniform(-0.5, -0.25), 1);
-  chair(room, front + deep + 0.26, rng.uniform(0.25, 0.5), 1);
+  chair(room, "chair_0", front + deep + 0.22, rng.uniform(-0.5, -0.25), 1);
+  chair(room, "chair_1", front + deep + 0.26, rng.uniform(0.25, 0.5), 1);
   const double py = rng.uniform(-0.6, 0.6);
   room.box("", "frame", {wall - 0.012, py, 1.55}, {0.012, 0.42, 0.30});
   room.box("", "picture", {wall - 0.026, py, 1.55}, {0.003, 0.38, 0.26});

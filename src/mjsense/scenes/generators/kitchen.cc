@@ -71,18 +71,19 @@ void materials(RoomText& room, Rng& rng) {
 void clutter(RoomText& room, Rng& rng, double z, double y0, double wide) {
   const double x = 0.52;
   const double jar = y0 + 0.08 + rng.uniform(0, 0.05);
-  room.cylinder("", "jar", {x, jar, z}, {x, jar, z + 0.15}, 0.05);
+  room.open_body("jar", {x, jar, z});
+  room.cylinder("", "jar", {0, 0, 0}, {0, 0, 0.15}, 0.05);
   for (int i = 0; i < 4; ++i) {
     const double a = 1.6 * i + rng.uniform(0, 1);
-    room.capsule("", "board", {x, jar, z + 0.1},
-                 {x + 0.035 * std::cos(a), jar + 0.05 * std::sin(a), z + rng.uniform(0.26, 0.32)},
-                 0.006);
+    room.capsule("", "board", {0, 0, 0.1},
+                 {0.035 * std::cos(a), 0.05 * std::sin(a), rng.uniform(0.26, 0.32)}, 0.006);
   }
-  const double board = y0 + wide - 0.17;  // leans against the wall
+  room.close_body();
+  room.open_body("chopping_board", {0.562, y0 + wide - 0.17, z});  // leans against the wall
   room.add(
-      fmt::format("<geom class=\"furniture\" type=\"box\" pos=\"{} {} {}\" euler=\"0 0.14 0\" "
-                  "size=\"0.009 0.10 0.15\" material=\"board\"/>",
-                  0.562, board, z + 0.15));
+      "<geom class=\"furniture\" type=\"box\" pos=\"0 0 0.15\" euler=\"0 0.14 0\" "
+      "size=\"0.009 0.10 0.15\" material=\"board\"/>");
+  room.close_body();
 }
 
 ModelSource make(House& house, SceneFileCfg& cfg) {

@@ -72,15 +72,21 @@ ModelSource make(House& house, SceneFileCfg& cfg) {
   }
   // Books below and above what the arm reaches, and at one end of a board.
   const double inside = front + 0.06;
-  books(room, rng, inside, -wide / 2 + 0.01, rng.uniform(0.5, 0.95) * wide, 0.1,
-        std::min(0.3, lowest - 0.14));
-  books(room, rng, inside, -wide / 2 + 0.05, rng.uniform(0.3, 0.6) * wide, top, 0.26);
+  const double low_row = rng.uniform(0.5, 0.93) * wide;
+  room.open_body("books_low", {});
+  books(room, rng, inside, -wide / 2 + 0.02, low_row, 0.1, std::min(0.3, lowest - 0.14));
+  room.close_body();
+  const double top_row = rng.uniform(0.3, 0.6) * wide;
+  room.open_body("books_top", {});
+  books(room, rng, inside, -wide / 2 + 0.10, top_row, top, 0.26);
+  room.close_body();
   const int with_books = static_cast<int>(rng.below(kBoards));
   const double taken = 0.2 * wide;
   books(room, rng, inside, wide / 2 - taken, taken - 0.01, lowest + with_books * step, step - 0.06);
   // A plant beside the case.
   const double side = rng.below(2) == 0 ? 1 : -1, px = back - 0.22, py = side * (wide / 2 + 0.4);
-  room.cylinder("plant", "pot", {px, py, 0}, {px, py, 0.28}, 0.14);
+  room.open_body("plant", {px, py, 0});
+  room.cylinder("plant", "pot", {0, 0, 0}, {0, 0, 0.28}, 0.14);
   constexpr int kLeaves = 16;
   for (int i = 0; i < kLeaves; ++i) {  // they lean away from the middle, not into the wall
     double turn = 2.4 * i;
@@ -89,9 +95,10 @@ ModelSource make(House& house, SceneFileCfg& cfg) {
     const double away = std::sin(lean) * (out.x > 0 ? 0.4 : 1.0);
     const Vec3 along = normalized(Vec3{away * out.x, std::sin(lean) * out.y, std::cos(lean)});
     const Vec3 flat = normalized(cross(along, Vec3{-out.y, out.x, 0}));
-    room.leaf("leaf", Vec3{px, py, 0.24} + 0.04 * out + half * along, along, flat,
+    room.leaf("leaf", Vec3{0, 0, 0.24} + 0.04 * out + half * along, along, flat,
               {0.035, 0.006, half});
   }
+  room.close_body();
 
   for (int i = 0; i < kBoards; ++i) {
     // The longest thing lies across, and touches neither sides, nor back, nor books.

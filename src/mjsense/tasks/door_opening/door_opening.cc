@@ -60,7 +60,7 @@ std::optional<Pose> DoorOpeningTask::sample_scene(int world, Rng& rng, const Sta
   episode.door = static_cast<int>(rng.below(static_cast<std::uint32_t>(doors_.size())));
   const Door& door = doors_[episode.door];
   set_object(world, door.handle, kHandle);
-  vary_look(world);
+  vary_scene(world);
   const Pose placed = scene().sample(world, -1, cfg().seed, number, rng, state);
   state.qpos[model()->jnt_qposadr[door.joint]] = door.shut;
 
@@ -83,7 +83,7 @@ std::optional<Pose> DoorOpeningTask::sample_scene(int world, Rng& rng, const Sta
 
 void DoorOpeningTask::choose_goal(int world, Rng& rng, const StateRow& state) {
   Episode& episode = episodes_[world];
-  scene().adopt(world, state);
+  adopt_scene(world, state);
   episode.door = static_cast<int>(rng.below(static_cast<std::uint32_t>(doors_.size())));
   set_object(world, door(world).handle, kHandle);
 }

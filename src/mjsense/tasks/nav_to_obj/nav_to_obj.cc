@@ -84,14 +84,14 @@ void NavToObjTask::set_goal(int world, int target) {
 }
 
 void NavToObjTask::choose_goal(int world, Rng& rng, const StateRow& state) {
-  const std::vector<int> here = scene().adopt(world, state);
+  const std::vector<int> here = adopt_scene(world, state);
   if (!here.empty()) set_goal(world, here[rng.below(static_cast<std::uint32_t>(here.size()))]);
 }
 
 std::optional<Pose> NavToObjTask::sample_scene(int world, Rng& rng, const StateRow& state) {
   const auto number = static_cast<std::uint64_t>(this->episode(world));
   const int n = static_cast<int>(scene().objects().size());
-  vary_look(world);
+  vary_scene(world);
   const int first = static_cast<int>(rng.below(static_cast<std::uint32_t>(n)));
   Pose placed;
   for (int k = 0; k < n; ++k) {  // another one, where the robot cannot come near the first
@@ -140,7 +140,14 @@ std::pair<int, double> NavToObjTask::nearest(const World& world, double x, doubl
 }
 
 bool NavToObjTask::sees(const World& world, const Pose& camera, int index) const {
-  return sight_.sees(world.model, world.data, camera, scene_object(index).body, points_[index]);
+  const auto with = [&](std::span<const Vec3> points) {
+    return sight_.sees(world.model, world.data, camera, scene_object(index).body, points);
+  };
+  const double size = scene().size(world.id, index);
+  if (size == 1) return with(points_[index]);
+  std::vector<Vec3> points;
+  for (Vec3 p : points_[index]) points.push_back(size * p);
+  return with(points);
 }
 
 NavToObjTask::Judgement NavToObjTask::judgement(const World& world) const {

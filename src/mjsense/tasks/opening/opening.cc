@@ -65,7 +65,7 @@ std::optional<Pose> OpeningTask::find_base(const Articulation& one, double from,
 
 std::optional<Pose> OpeningTask::sample_scene(int world, Rng& rng, const StateRow& state) {
   const auto episode = static_cast<std::uint64_t>(this->episode(world));
-  vary_look(world);
+  vary_scene(world);
   const Pose usual = scene().sample(world, -1, cfg().seed, episode, rng, state);
   for (const Articulation& one : articulations_) state.qpos[one.qpos] = one.closed;
 

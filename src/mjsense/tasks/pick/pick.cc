@@ -42,12 +42,12 @@ std::optional<Pose> PickTask::sample_scene(int world, Rng& rng, const StateRow& 
   const auto episode = static_cast<std::uint64_t>(this->episode(world));
   const int target = things_[rng.below(static_cast<std::uint32_t>(things_.size()))];
   set_target(world, target);
-  vary_look(world);
+  vary_scene(world);
   return standing_(scene().sample(world, target, cfg().seed, episode, rng, state));
 }
 
 void PickTask::choose_goal(int world, Rng& rng, const StateRow& state) {
-  std::vector<int> here = scene().adopt(world, state);
+  std::vector<int> here = adopt_scene(world, state);
   std::erase_if(here, [this](int i) { return scene().objects()[i].receptacle; });
   if (here.empty()) here = things_;
   const int target = here[rng.below(static_cast<std::uint32_t>(here.size()))];

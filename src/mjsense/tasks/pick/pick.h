@@ -35,6 +35,9 @@ class PickTask final : public ObjectTask, public GraspScene {
 
   const GraspScene* grasp_scene() const override { return this; }
   std::span<const GraspObject> all_objects() const override { return objects_; }
+  const ObjectShape& shape(int world, int object) const override {
+    return scene().shape(world, object);
+  }
   int target(int world) const override { return targets_[world]; }
   double support_height(int world) const override { return scene().support_height(world); }
 

@@ -132,7 +132,7 @@ std::optional<Pose> PickAndPlaceTask::sample_scene(int world, Rng& rng, const St
     episode.objects[k].body = object.body;
     episode.objects[k].name = object.text;
   }
-  vary_look(world);
+  vary_scene(world);
   return standing_(scene().sample(world, wanted, cfg().seed, number, rng, state));
 }
 
@@ -226,7 +226,7 @@ void PickAndPlaceTask::places(const World& world, const Quat& turn, std::vector<
   // Low where it is open, else on the rim.
   const Pose pose = pose_of(world, body);
   std::vector<Vec3> points;
-  for (Vec3 point : objects_[episode.receptacle].shape.points) points.push_back(pose * point);
+  for (Vec3 point : shape(world.id, episode.receptacle).points) points.push_back(pose * point);
   const auto surface = [&](double x, double y) {
     double top = -std::numeric_limits<double>::infinity();
     for (Vec3 p : points) {

@@ -46,6 +46,9 @@ class PickAndPlaceTask final : public SceneTask, public GraspScene, public Place
 
   const GraspScene* grasp_scene() const override { return this; }
   std::span<const GraspObject> all_objects() const override { return objects_; }
+  const ObjectShape& shape(int world, int object) const override {
+    return scene().shape(world, object);
+  }
   int target(int world) const override { return episodes_[world].target; }
   double support_height(int world) const override { return scene().support_height(world); }
   const PlaceScene* place_scene() const override { return this; }
