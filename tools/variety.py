@@ -31,30 +31,31 @@ import mjsense as mjs
 
 PAGE, RESULTS = ROOT / "docs" / "tasks.md", ROOT / ".cache" / "variety"
 BEGIN, END = "<!-- variety -->", "<!-- end of variety -->"
-CASES = (("pick", "table"), ("pick", "tableware"), ("pick", "clutter"), ("pick", "shelf"), ("open", "kitchen"))
+CASES = (("pick", "table"), ("pick", "varied_table"), ("pick", "tableware"), ("pick", "clutter"), ("pick", "shelf"), ("open", "kitchen"))
 AWAY = 50.0  # m: objects that take no part stand beyond
 
 
-def size(model: Any, body: int) -> float:
-    """Longest edge (m) of the boxes about a body's geoms."""
+def size(model: Any, aabb: Any, body: int) -> float:
+    """Longest edge (m) of the boxes about a body's geoms, of which `aabb` [ngeom, 6] are a world's."""
     geoms = [g for g in range(model.ngeom) if model.body_rootid[model.geom_bodyid[g]] == body]
-    return float(max((2 * model.geom_aabb[g, 3:].max() for g in geoms), default=0.0))
+    return float(max((2 * aabb[g, 3:].max() for g in geoms), default=0.0))
 
 
 def starts(task: str, scene: str, episodes: int) -> dict[str, list[Any]]:
     """Of each episode's first moment, what varies."""
     worlds = 10
-    found: dict[str, list[Any]] = {name: [] for name in ("x", "y", "turn", "count", "size", "light", "colour", "camera", "tilt")}
+    found: dict[str, list[Any]] = {name: [] for name in ("x", "y", "turn", "count", "size", "light", "colour", "camera", "tilt", "factor", "furniture")}
     env = mjs.make_vec(task, "franka", scene=scene, num_envs=worlds, camera_system="randomized_droid", width=32, height=24,
                        policy="free_planner" if task == "pick" else "planner", observations=["grasp_pose"])  # fmt: skip
     model = env.sim.model
     free = [int(b) for b in range(1, model.nbody)
             if model.body_jntnum[b] == 1 and model.jnt_type[model.body_jntadr[b]] == 0]  # fmt: skip
-    sizes = {b: size(model, b) for b in free}
+    sizes = {b: size(model, model.geom_aabb, b) for b in free}
+    still = [b for b in range(1, model.nbody) if model.body_treeid[b] < 0 and not model.body(b).name.startswith("robot_0/")]
     for first in range(0, episodes, worlds):
         # The next episodes of the same recording: a reset without a seed.
         env.reset(seed=0) if first == 0 else env.reset()
-        pos, quat = env.sim.data.xpos, env.sim.data.xquat
+        pos, quat, boxes = env.sim.data.xpos, env.sim.data.xquat, env.sim.model_field("geom_aabb")
         for w in range(min(worlds, episodes - first)):
             here = [b for b in free if abs(pos[w, b, 1]) < AWAY]
             grasp = env.rows["grasp_pose"][w]
@@ -64,7 +65,9 @@ def starts(task: str, scene: str, episodes: int) -> dict[str, list[Any]]:
                 found["y"].append(float(pos[w, b, 1]))
                 qw, _, _, qz = quat[w, b]
                 found["turn"].append(float(np.degrees(2 * np.arctan2(qz, qw))))
-                found["size"].append(sizes[b])
+                found["size"].append(size(model, boxes[w], b))
+                found["factor"].append(found["size"][-1] / sizes[b])
+            found["furniture"].append(pos[w, still].ravel().tolist())
             light = env.sim.model_field("light_diffuse")
             found["light"].append(float(np.broadcast_to(light, (worlds, *light.shape[-2:]))[w].sum()))
             colour = env.sim.model_field("mat_rgba")
@@ -92,11 +95,15 @@ def measure(task: str, scene: str, episodes: int, played: int) -> dict[str, Any]
                           cameras=[], perturb=0.5, policy="free_planner" if task == "pick" else "planner")  # fmt: skip
         retried = [e["retries"] > 0 for e in task_table.episodes_of(made.path)]
     colours, cameras = np.array(found["colour"]), np.array(found["camera"])
+    furniture = np.array(found["furniture"])
     return {
         "task": task, "scene": scene, "episodes": episodes, "played": len(retried),
         "x": spread(found["x"], 2), "y": spread(found["y"], 2), "turn": float(np.std(found["turn"])) if found["turn"] else 0.0,
         "count": f"{min(found['count'])} to {max(found['count'])}",
         "size": spread([100 * s for s in found["size"]], 1),
+        "factor": spread([100 * s for s in found["factor"]], 0),
+        "furniture": int((furniture.std(0).reshape(-1, 3).max(1) > 1e-3).sum()),
+        "moved": float(100 * furniture.std(0).max()) if furniture.size else 0.0,
         "light": spread(found["light"], 2),
         "colours": int((colours.std(0).reshape(-1, 3).max(1) > 0.01).sum()), "materials": colours.shape[1] // 3,
         "camera": float(100 * cameras.std(0).max()),
@@ -113,6 +120,8 @@ def table(results: list[dict[str, Any]]) -> str:
         ("their y, m", lambda r: r["y"]),
         ("their turn, standard deviation, degrees", lambda r: f"{r['turn']:.0f}"),
         ("their size, cm", lambda r: r["size"]),
+        ("against that of its model, %", lambda r: r["factor"]),
+        ("furniture that stands elsewhere; standard deviation, cm", lambda r: f"{r['furniture']}; {r['moved']:.1f}"),
         ("light, sum of the lamps' colours", lambda r: r["light"]),
         ("materials with other colours", lambda r: f"{r['colours']} of {r['materials']}"),
         ("cameras, standard deviation, cm", lambda r: f"{r['camera']:.0f}"),
