@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <array>
+#include <bit>
 #include <cmath>
 
 #include "mjsense/rays/flex_shapes.h"
@@ -10,6 +11,7 @@
 #include "mjsense/rays/shared_geometry.h"
 #include "mjsense/rays/skin_shapes.h"
 #include "mjsense/render/view/fixed_layer.h"
+#include "mjsense/render/view/frustum.h"
 #include "mjsense/render/view/view_window.h"
 
 namespace mjsense {
@@ -60,6 +62,7 @@ ViewBuilder::ViewBuilder(const mjModel* model, const Look& look, const ViewOptio
       light_space_(options.shadows ? model->nlight : 0, unsorted_.size()),
       soft_looks_(look.num_flex_parts() + model->nskin) {
   order_.reserve(unsorted_.size());
+  candidates_.resize((static_cast<std::size_t>(model->ngeom + model->nflex) + 63) / 64);
   if (options.layered) {
     view_.layered = true;
     index_of_id_.resize(unsorted_.size());
@@ -115,9 +118,21 @@ const View& ViewBuilder::build(const RayWorld& world, const SharedGeometry& shap
     add_shape(source, id, rgba, material < 0 ? nullptr : &appearance.materials()[material],
               [&](ViewGeom& g) { set_shape(world, shapes, source, g); });
   };
-  int id = 0;
-  for (; id < world.num_geoms(); ++id)
+  const auto add_geom = [&](int id) {
     add(world.geom(id), id, world.flags()[id], world.materials()[id]);
+  };
+  int id = world.num_geoms();
+  if (options_.shadows || grid.bent) {  // what is not in sight may cast shadows there
+    for (int i = 0; i < id; ++i) add_geom(i);
+  } else {
+    find_candidates(world.boxes(), Frustum(grid, position, rotation), candidates_);
+    for (std::size_t word = 0; word < candidates_.size(); ++word) {
+      for (std::uint64_t bits = candidates_[word]; bits != 0; bits &= bits - 1) {
+        const int i = static_cast<int>(64 * word) + std::countr_zero(bits);
+        if (i < id) add_geom(i);
+      }
+    }
+  }
   if (const FlexShapes* flexes = world.flexes()) {
     for (const FlexShapes::Part& part : flexes->parts()) {
       const int object = world.num_geoms() + part.flex;

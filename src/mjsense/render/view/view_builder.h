@@ -76,6 +76,7 @@ class ViewBuilder {
   View view_;
   std::vector<ViewGeom> unsorted_, sorted_;
   std::vector<Order> order_;
+  std::vector<std::uint64_t> candidates_;  // bits of objects that may be in sight
   LightSpace light_space_;
   std::vector<std::uint8_t> fixed_;  // of geoms; none if not layered
   std::vector<int> index_of_id_;

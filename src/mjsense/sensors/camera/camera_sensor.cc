@@ -35,8 +35,9 @@ ViewOptions view_options(const CameraSensorCfg& cfg, double near) {
   ViewOptions options;
   options.groups = bits_of(cfg.enabled_geom_groups);
   options.textures = cfg.use_textures;
-  options.shadows = cfg.use_shadows;
-  options.reflections = std::count(cfg.data_types.begin(), cfg.data_types.end(), "rgb") > 0;
+  const bool colors = std::count(cfg.data_types.begin(), cfg.data_types.end(), "rgb") > 0;
+  options.shadows = cfg.use_shadows && colors;
+  options.reflections = colors;
   options.near = static_cast<float>(near);
   options.far = static_cast<float>(cfg.far);
   return options;

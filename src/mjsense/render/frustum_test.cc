@@ -1,0 +1,139 @@
+// SPDX-License-Identifier: Apache-2.0
+// What is passed by unseen is never missed in a picture.
+
+#include "mjsense/render/view/frustum.h"
+
+#include <fmt/format.h>
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <string>
+
+#include "mjsense/core/rng.h"
+#include "mjsense/rays/box_list.h"
+#include "mjsense/render/testing/studio.h"
+
+namespace mjsense {
+namespace {
+
+using testing::kFlat;
+using testing::Picture;
+using testing::Studio;
+
+// `count` shapes about the origin, every tenth on a body that can move, on an endless plane.
+std::string crowd(int count) {
+  Rng rng(3, 0, 0, 0);
+  const char* types[] = {"box", "sphere", "capsule", "ellipsoid", "cylinder"};
+  std::string xml = std::string(kFlat) + "<worldbody><geom type='plane' size='0 0 1'/>";
+  for (int i = 0; i < count; ++i) {
+    const std::string geom =
+        fmt::format("<geom type='{}' size='{} {} {}' rgba='{} .5 .5 {}'/>", types[i % 5],
+                    rng.uniform(0.05, 0.4), rng.uniform(0.05, 0.4), rng.uniform(0.05, 0.4),
+                    rng.uniform(0, 1), i % 7 == 0 ? 0.5 : 1.0);
+    xml += fmt::format("<body pos='{} {} {}' euler='{} {} 0'>{}{}</body>", rng.uniform(-12, 12),
+                       rng.uniform(-12, 12), rng.uniform(0, 3), rng.uniform(0, 90),
+                       rng.uniform(0, 90), i % 10 == 0 ? "<freejoint/>" : "", geom);
+  }
+  return xml + "</worldbody>";
+}
+
+struct Eye {
+  std::array<double, 3> at, x, y;
+};
+
+// Level, turned by `yaw`, looking down by `pitch`.
+Eye eye(std::array<double, 3> at, double yaw, double pitch) {
+  const double c = std::cos(yaw), s = std::sin(yaw);
+  return {at, {c, s, 0}, {-s * std::sin(pitch), c * std::sin(pitch), std::cos(pitch)}};
+}
+
+// Shadows need all that could cast one, so with them nothing is passed by; there are no lights.
+void expect_nothing_missed(Studio& s, const Eye& e, const PixelGrid& grid) {
+  s.options.shadows = true;
+  const Picture all = s.take(e.at, e.x, e.y, grid);
+  s.options.shadows = false;
+  const Picture seen = s.take(e.at, e.x, e.y, grid);
+  EXPECT_EQ(all.rgb, seen.rgb);
+  EXPECT_EQ(all.depth, seen.depth);
+  EXPECT_EQ(all.ids, seen.ids);
+  EXPECT_EQ(all.normals, seen.normals);
+}
+
+int in_view(Studio& s, const Eye& e, const PixelGrid& grid) {
+  std::vector<std::uint64_t> candidates((s.model->ngeom + 63) / 64);
+  const std::array<double, 3>&x = e.x, &y = e.y;
+  double r[9];
+  for (int i = 0; i < 3; ++i) {
+    const int j = (i + 1) % 3, k = (i + 2) % 3;
+    r[3 * i] = x[i];
+    r[3 * i + 1] = y[i];
+    r[3 * i + 2] = x[j] * y[k] - x[k] * y[j];
+  }
+  find_candidates(s.rays->world(0).boxes(), Frustum(grid, e.at.data(), r), candidates);
+  int count = 0;
+  for (const std::uint64_t word : candidates) count += __builtin_popcountll(word);
+  return count;
+}
+
+TEST(Frustum, PicturesAreThoseOfAllGeoms) {
+  for (const int count : {60, 700}) {  // one by one, and in blocks
+    SCOPED_TRACE(count);
+    Studio s(crowd(count));
+    s.update();
+    const PixelGrid pyramid = grid_from_fovy(48, 32, 50, false);
+    PixelGrid slab = grid_from_fovy(48, 32, 8, true);
+    slab.orthographic = true;
+    int most = 0;
+    for (int k = 0; k < 12; ++k) {
+      SCOPED_TRACE(k);
+      const Eye e = eye({3.0 * (k % 3 - 1), 2.0 * (k % 5 - 2), 1.5}, 0.6 * k, -0.2 * (k % 3));
+      expect_nothing_missed(s, e, pyramid);
+      expect_nothing_missed(s, e, slab);
+      most = std::max(most, in_view(s, e, pyramid));
+    }
+    EXPECT_LT(most, s.model->ngeom / 2);  // else nothing would be saved
+    EXPECT_GT(most, 5);
+  }
+}
+
+// Nothing is remembered of the last picture: not where things were, nor how large.
+TEST(Frustum, WhatMovesIntoThePictureIsSeen) {
+  for (const int count : {60, 700}) {
+    Studio s(crowd(count));
+    s.update();
+    const Eye e = eye({0, -14, 1.5}, 0, 0);
+    const PixelGrid grid = grid_from_fovy(48, 32, 30, false);
+    const auto sees = [&](int geom) {
+      const Picture p = s.take(e.at, e.x, e.y, grid);
+      return std::find(p.ids.begin(), p.ids.end(), geom) != p.ids.end();
+    };
+    const int geom = 1, joint = s.model->body_jntadr[s.model->geom_bodyid[geom]];
+    double* q = s.data->qpos + s.model->jnt_qposadr[joint];
+    const auto place = [&](double x, double y) {
+      q[0] = x;
+      q[1] = y;
+      q[2] = 1.5;
+      s.update();
+    };
+    for (int again = 0; again < 2; ++again) {
+      place(0, -30);  // behind the camera
+      EXPECT_FALSE(sees(geom));
+      place(0, -12);
+      EXPECT_TRUE(sees(geom));
+      expect_nothing_missed(s, e, grid);
+      place(6, -6);  // beside the image
+      EXPECT_FALSE(sees(geom));
+      const double size = s.model->geom_size[3 * geom];
+      for (int k = 0; k < 3; ++k) s.model->geom_size[3 * geom + k] = 5;  // reaches into it
+      s.update();
+      EXPECT_TRUE(sees(geom));
+      for (int k = 0; k < 3; ++k) s.model->geom_size[3 * geom + k] = size;
+      mj_resetData(s.model.get(), s.data.get());
+      s.update();
+      expect_nothing_missed(s, e, grid);
+    }
+  }
+}
+
+}  // namespace
+}  // namespace mjsense

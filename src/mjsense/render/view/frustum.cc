@@ -1,0 +1,78 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "mjsense/render/view/frustum.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "mjsense/rays/box_list.h"
+
+namespace mjsense {
+namespace {
+
+// Relative, of lengths and positions: so much rays and the tests of what they hit may round.
+constexpr double kSlack = 1e-4;
+
+bool misses(const KernelBoxes& boxes, int k, const Frustum& frustum) {
+  const float low[3] = {boxes.low[0][k], boxes.low[1][k], boxes.low[2][k]};
+  const float high[3] = {boxes.high[0][k], boxes.high[1][k], boxes.high[2][k]};
+  return frustum.misses(low, high);
+}
+
+}  // namespace
+
+Frustum::Frustum(const PixelGrid& grid, const double position[3], const double rotation[9]) {
+  const double x[2] = {grid.left, grid.left + static_cast<double>(grid.dx) * grid.width};
+  const double y[2] = {grid.top, grid.top + static_cast<double>(grid.dy) * grid.height};
+  const auto [left, right] = std::minmax(x[0], x[1]);
+  const auto [low, high] = std::minmax(y[0], y[1]);
+  // In the camera, from whose origin z leads backwards: of an orthographic one X <= right, else
+  // X <= right (-Z), and so on.
+  const double bounds[4] = {right, -left, high, -low};
+  for (int s = 0; s < 5; ++s) {
+    double n[3] = {0, 0, 0}, offset = 0;
+    if (s == 4) {
+      n[2] = 1;  // behind the camera
+    } else {
+      n[s / 2] = s % 2 ? -1 : 1;
+      (grid.orthographic ? offset : n[2]) = bounds[s];
+    }
+    Side& side = sides_[s];
+    side.offset = offset;
+    for (int i = 0; i < 3; ++i) {
+      side.normal[i] =
+          rotation[3 * i] * n[0] + rotation[3 * i + 1] * n[1] + rotation[3 * i + 2] * n[2];
+      side.offset += side.normal[i] * position[i];
+    }
+  }
+}
+
+bool Frustum::misses(const float low[3], const float high[3]) const {
+  for (const Side& side : sides_) {
+    double least = -side.offset, scale = 1 + std::abs(side.offset);
+    for (int i = 0; i < 3; ++i) {
+      const double term = side.normal[i] * (side.normal[i] > 0 ? low[i] : high[i]);
+      least += term;
+      scale += std::abs(term);
+    }
+    if (least > kSlack * scale) return true;
+  }
+  return false;
+}
+
+void find_candidates(const BoxList& list, const Frustum& frustum,
+                     std::vector<std::uint64_t>& candidates) {
+  const KernelBoxes &all = list.all(), &blocks = list.blocks();
+  std::fill(candidates.begin(), candidates.end(), 0);
+  const auto look = [&](int first, int last) {
+    for (int k = first; k < last; ++k) {
+      const int id = all.ids ? all.ids[k] : k;
+      if (!misses(all, k, frustum)) candidates[id / 64] |= std::uint64_t{1} << id % 64;
+    }
+  };
+  if (blocks.count == 0) return look(0, all.count);
+  constexpr int kBlock = KernelWorld::kBlock;
+  for (int b = 0; b < blocks.count; ++b)
+    if (!misses(blocks, b, frustum)) look(b * kBlock, std::min((b + 1) * kBlock, all.count));
+}
+
+}  // namespace mjsense
