@@ -52,6 +52,13 @@ std::uint64_t multiply(std::uint64_t a, std::uint64_t b) {
                                                 : product;
 }
 
+// What H5Oget_info2() fills, which since 1.12 is no longer H5O_info_t.
+#if H5_VERSION_GE(1, 12, 0)
+using ObjectInfo = H5O_info1_t;
+#else
+using ObjectInfo = H5O_info_t;
+#endif
+
 struct Walk {
   const std::function<void(const std::string&)>& visit;
   std::set<haddr_t> above = {};  // groups that we are in or have been in
@@ -60,7 +67,7 @@ struct Walk {
   void group(hid_t at, const std::string& prefix, int depth) {
     if (depth > kMostDepth)
       refuse(prefix, fmt::format("lies too deep: more than {} groups", kMostDepth));
-    H5O_info_t info;
+    ObjectInfo info;
     check(H5Oget_info2(at, &info, H5O_INFO_BASIC), prefix);
     if (!above.insert(info.addr).second) refuse(prefix, "is a group that stands there twice");
     for (const std::string& name : children(at)) {
