@@ -100,9 +100,9 @@ class EpisodeScene {
   std::vector<SceneObject> objects_;
   std::vector<Region> regions_;
   std::vector<int> region_bodies_;  // what carries each
-  std::vector<char> present_;    // [B, objects]
-  std::vector<int> steps_;       // [B, objects], of its sizes; -1: that of its model
-  std::vector<double> support_;  // [B]
+  std::vector<char> present_;       // [B, objects]
+  std::vector<int> steps_;          // [B, objects], of its sizes; -1: that of its model
+  std::vector<double> support_;     // [B]
   Simulation* simulation_ = nullptr;
   std::unique_ptr<Look> look_;
   std::unique_ptr<ObjectSizes> sizes_;
