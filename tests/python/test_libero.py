@@ -97,6 +97,12 @@ def test_things_of_libero_stand_free(installed, scene):
     assert not truncated.any(), info
 
 
+def test_things_of_libero_are_picked(installed, tmp_path):
+    made = mjs.record("pick", "franka", scene="libero/kitchen", out=tmp_path / "data", episodes=4, max_attempts=4, keep_failures=True, worlds=4,
+                      cameras=[])  # fmt: skip
+    assert made.succeeded >= 3, made.failures
+
+
 def test_a_package_that_is_not_there_is_named(monkeypatch, tmp_path):
     monkeypatch.setenv("MJSENSE_PACKAGES", str(tmp_path))
     monkeypatch.delenv("VIRTUAL_ENV", raising=False)
