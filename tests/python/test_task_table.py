@@ -9,7 +9,7 @@ import pytest
 from mjsense import _core
 
 TOOL = Path(__file__).parents[2] / "tools" / "task_table.py"
-PLAYED = ("pick/floating_rum", "pick/franka/tableware", "pick_and_place/franka", "pick_and_place_next_to/franka", "pick_and_place_color/franka",
+PLAYED = ("pick/floating_rum", "pick/franka/tableware", "pick_and_place/franka", "pick_and_place/floating_rum", "pick_and_place_next_to/franka", "pick_and_place_color/franka",
           "packing/franka", "close/i2rt_yam", "nav_to_obj/mobile_franka")  # fmt: skip
 
 
