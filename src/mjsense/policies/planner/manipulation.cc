@@ -3,8 +3,6 @@
 
 #include <fmt/format.h>
 
-#include <algorithm>
-
 #include "mjsense/core/error.h"
 
 namespace mjsense {
@@ -15,26 +13,12 @@ const GraspScene& grasp_scene_of(const Task& task) {
   throw ValueError(fmt::format("policy 'planner' picks; it cannot do task '{}'", task.name()));
 }
 
-// Commands are steps to an arm's servos: the longer one lasts, the harder what is held is jerked. Rates hold for steps
-// of kStep.
-HandPlannerCfg gentle(HandPlannerCfg cfg, int policy_dt_ms) {
-  constexpr int kStep = 66;  // ms
-  const double rate = std::min(1.0, static_cast<double>(kStep) / policy_dt_ms);
-  cfg.joint_speed *= rate;
-  cfg.slide_speed *= rate;
-  cfg.tool_speed *= rate;
-  cfg.joint_acceleration *= rate * rate;
-  cfg.slide_acceleration *= rate * rate;
-  return cfg;
-}
-
 }  // namespace
 
 Manipulation::Manipulation(const Task& task, const ManipulationPlannerCfg& cfg)
     : task_(task), cfg_(cfg), scene_(grasp_scene_of(task)) {
-  const HandPlannerCfg hand_cfg = gentle(cfg.hand, task.cfg().policy_dt_ms);
   for (const Hand& hand : hands_of(robot(), task.model())) {
-    hands_.push_back(std::make_unique<HandPlanner>(task.model(), robot(), hand, hand_cfg));
+    hands_.push_back(std::make_unique<HandPlanner>(task.model(), robot(), hand, cfg.hand));
     grippers_.emplace_back(task.model(), robot(), hand.gripper);
   }
   if (hands_.empty())

@@ -11,11 +11,18 @@
 
 namespace mjsense {
 
-struct JointPositionCfg {};
+// Where commands are far apart a servo jumps with each of them, and what the robot holds slips.
+inline constexpr const char* kRampText =
+    "Controls go evenly from command to command, a piece every control step, instead of jumping.";
+
+struct JointPositionCfg {
+  bool ramp = false;
+};
 template <class V>
-void visit_fields(V& v, JointPositionCfg&) {
+void visit_fields(V& v, JointPositionCfg& c) {
   v.object("JointPositionCfg", "A command is what the actuators take: positions.",
            "joint_position");
+  v("ramp", c.ramp, kRampText);
 }
 
 struct JointPositionRelativeCfg {
@@ -49,6 +56,7 @@ void visit_fields(V& v, TorsoHeightCfg& c) {
 }
 
 struct HolonomicBaseCfg {
+  bool ramp = false;
   double noise = 0.1;
   double max_position_noise = 0.02;
   double max_rotation_noise = 0.05;
@@ -58,6 +66,7 @@ void visit_fields(V& v, HolonomicBaseCfg& c) {
   v.object("HolonomicBaseCfg",
            "A command is a place on the floor, x, y and yaw, of two slides and a hinge.",
            "holonomic_base");
+  v("ramp", c.ramp, kRampText);
   v("noise", c.noise, "Standard deviation per unit of the motion.").at_least(0);
   v("max_position_noise", c.max_position_noise, "Where it is cut.").unit("m").positive();
   v("max_rotation_noise", c.max_rotation_noise, "Where it is cut.").unit("rad").positive();

@@ -99,6 +99,21 @@ TEST(Controllers, PositionsAreTargets) {
   EXPECT_NEAR(r.data->qpos[0], 0.5, 1e-3);
 }
 
+// Ten control steps a command: each a tenth of the way.
+TEST(Controllers, PositionsMayBeRamped) {
+  OneGroup r(kPositions, group_of(JointPositionCfg{.ramp = true}));
+  EXPECT_TRUE(r.robot->controls_every_step());
+  r.play({0.5, -0.5}, 1);
+  EXPECT_EQ(r.target(0), 0.5);
+  EXPECT_EQ(r.data->ctrl[0], 0.5) << "there at the end of the step";
+  r.play({0.7, -0.5}, 1);
+  EXPECT_EQ(r.data->ctrl[0], 0.7);
+  r.play({0.0, -0.5}, 40);
+  for (int k = 1; k < 30; ++k) r.play({0.03 * k, -0.5}, 1);
+  EXPECT_NEAR(r.data->qvel[0], 0.03 / 0.06, 0.01) << "no jerks between commands";
+  EXPECT_EQ(r.data->ctrl[1], -0.5);
+}
+
 TEST(Controllers, RelativePositionsAreMotions) {
   OneGroup r(kPositions, group_of(JointPositionRelativeCfg{0.01}));
   r.play({0.2, 0.1});

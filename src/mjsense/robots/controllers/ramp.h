@@ -1,0 +1,48 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+// Controls that go evenly from where they are to a target, a piece every control step.
+
+#include <algorithm>
+#include <cmath>
+#include <span>
+#include <utility>
+#include <vector>
+
+#include "mjsense/robots/controllers/controller.h"
+
+namespace mjsense {
+
+class Ramp {
+ public:
+  Ramp(const ControlPeriods& periods, int num_worlds, std::vector<int> actuators)
+      : steps_(std::max(1L, std::lround(periods.policy_dt / periods.ctrl_dt))),
+        actuators_(std::move(actuators)),
+        from_(num_worlds * actuators_.size()),
+        to_(from_.size()) {}
+
+  // A policy step begins; the first control step's controls.
+  void begin(int world, std::span<const double> target, const StateRow& state) {
+    for (std::size_t i = 0; i < actuators_.size(); ++i) {
+      from_[world * actuators_.size() + i] = state.ctrl[actuators_[i]];
+      to_[world * actuators_.size() + i] = target[i];
+    }
+    write(world, 0, state);
+  }
+  // Those of control step `index`; the last is at the target.
+  mjtStage write(int world, int index, const StateRow& state) const {
+    const double s = std::min(1.0, (index + 1.0) / static_cast<double>(steps_));
+    for (std::size_t i = 0; i < actuators_.size(); ++i) {
+      const double from = from_[world * actuators_.size() + i];
+      const double to = to_[world * actuators_.size() + i];
+      state.ctrl[actuators_[i]] = s == 1 ? to : from + s * (to - from);
+    }
+    return mjSTAGE_VEL;
+  }
+
+ private:
+  long steps_;  // control steps of a policy step
+  std::vector<int> actuators_;
+  std::vector<double> from_, to_;  // [B, n]
+};
+
+}  // namespace mjsense
