@@ -49,6 +49,7 @@ void DoorPlanner::initialize_planner() {
         "the door planner needs an arm with a gripper; robot '{}' lacks one", robot().name()));
   expected_.assign(task().num_worlds(), {});
   tool_.assign(task().num_worlds(), -1);
+  goal_.assign(task().num_worlds(), cfg_.open);
 }
 
 BasePose DoorPlanner::base(const World& world) const {
@@ -57,28 +58,30 @@ BasePose DoorPlanner::base(const World& world) const {
   return {pose.p.x, pose.p.y, std::atan2(ahead.y, ahead.x)};
 }
 
-double DoorPlanner::leaf_to_go(const World& world) const {
+double DoorPlanner::leaf_to_go(const World& world, double goal) const {
   const Door& door = door_->door(world.id);
-  return door.shut + cfg_.open * (door.open - door.shut) -
+  return door.shut + goal * (door.open - door.shut) -
          world.data->qpos[world.model->jnt_qposadr[door.joint]];
 }
 
 void DoorPlanner::make_plan(const World& world, const PlanRequest& request, Plan& plan) {
   expected_[world.id].clear();
-  if (door_->fraction(world) >= cfg_.open - 0.02) {
+  if (request.attempt == 0 && request.stage == 0) goal_[world.id] = cfg_.open;
+  if (door_->fraction(world) >= goal_[world.id] - 0.02) {
     plan.wait(kComplete, 0.3);
     return;
   }
   if (request.attempt > 0 && request.stage == 0) return recover(world, plan);
   const int first = request.attempt > 0 ? 1 : 0;  // stage in which it drives to the door
   if (request.stage > first) {
-    const std::optional<DoorMotion> motion = motions_->plan(
-        world, door_->door(world.id), base(world), leaf_to_go(world), tool_[world.id]);
+    const std::optional<DoorMotion> motion =
+        motions_->plan(world, door_->door(world.id), base(world),
+                       leaf_to_go(world, goal_[world.id]), tool_[world.id]);
     if (motion) return open_door(world, *motion, plan);
     // It does not stand quite where it wanted to: another place.
     if (request.stage > first + kPlaces) return;
   }
-  if (!approach(world, plan)) plan.clear();
+  if (!approach(world, cfg_.open, plan) && !approach(world, cfg_.enough, plan)) plan.clear();
 }
 
 // Lets go, backs off, and brings the arms to where they began.
@@ -111,15 +114,15 @@ void DoorPlanner::recover(const World& world, Plan& plan) const {
 }
 
 // To the first place from which the door can be opened.
-bool DoorPlanner::approach(const World& world, Plan& plan) {
+bool DoorPlanner::approach(const World& world, double goal, Plan& plan) {
   const BasePose here = base(world);
   const Door& door = door_->door(world.id);
   int tried = 0;
   for (const BasePose& place : motions_->places(world, door)) {
     if (tried++ >= cfg_.max_places) break;
-    const std::optional<DoorMotion> motion = motions_->plan(world, door, place, leaf_to_go(world));
+    const std::optional<DoorMotion> motion =
+        motions_->plan(world, door, place, leaf_to_go(world, goal));
     if (!motion) continue;
-    plan.more = true;
     std::vector<BasePose> way;
     if (std::hypot(place.x - here.x, place.y - here.y) > kThere ||
         std::abs(wrapped(place.yaw - here.yaw)) > kThereYaw) {
@@ -133,6 +136,8 @@ bool DoorPlanner::approach(const World& world, Plan& plan) {
     } else {
       plan.move_groups(kNavigate, {base_path(group_, way, cfg_.speeds)}, 0.4);
     }
+    plan.more = true;
+    goal_[world.id] = goal;
     tool_[world.id] = motion->hand.tool;
     for (const Hand& hand : motions_->hands()) {
       plan.segments.back().grip(hand.gripper, robot().groups()[hand.gripper].open_command);
@@ -253,7 +258,7 @@ void DoorPlanner::open_door(const World& world, const DoorMotion& motion, Plan& 
              std::span(times).subspan(first, last - first), q, at);
     const double done = static_cast<double>(last) / static_cast<double>(open.size());
     expected_[world.id].push_back(
-        {static_cast<int>(plan.segments.size()), begin + done * (cfg_.open - begin)});
+        {static_cast<int>(plan.segments.size()), begin + done * (goal_[world.id] - begin)});
   }
   plan.wait(kOpen, 0.3);
   plan.wait(kRelease, 0.4).grip(motion.hand.gripper, gripper.open_command);

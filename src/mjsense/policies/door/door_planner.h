@@ -15,15 +15,16 @@ namespace mjsense {
 class DoorOpeningTask;
 
 struct DoorPlannerCfg {
-  double open = 0.76;  // fraction to which the door is led
-  double lag = 0.15;   // fraction by which it may stay behind: it begins again
+  double open = 0.76;    // fraction to which the door is led
+  double enough = 0.70;  // where it cannot be led there from anywhere
+  double lag = 0.15;     // fraction by which it may stay behind: it begins again
   // rad/s, of the arm's joints: on the way to the handle, at it, pressing, with the door
   double reach_speed = 1.2, slow_speed = 0.6, press_speed = 0.5, joint_speed = 0.9;
   double leaf_speed = 0.28;  // rad/s
   double close_time = 0.7;   // s
   BaseSpeeds speeds{0.4, 0.7, 0.4, 0.8};
   double base_speed = 0.16, base_turn = 0.3;  // m/s, rad/s, with the door
-  int max_places = 40;                        // to stand at that are tried
+  int max_places = 60;                        // to stand at that are tried
 };
 
 class DoorPlanner final : public TaskPlanner {
@@ -44,9 +45,9 @@ class DoorPlanner final : public TaskPlanner {
     double fraction;
   };
   BasePose base(const World& world) const;
-  double leaf_to_go(const World& world) const;
+  double leaf_to_go(const World& world, double goal) const;
   void recover(const World& world, Plan& plan) const;
-  bool approach(const World& world, Plan& plan);
+  bool approach(const World& world, double goal, Plan& plan);
   void tuck(const World& world, const Hand& hand, Segment& segment) const;
   void open_door(const World& world, const DoorMotion& motion, Plan& plan);
   std::vector<double> seconds(std::span<const DoorWaypoint> waypoints, std::span<const double> from,
@@ -60,7 +61,8 @@ class DoorPlanner final : public TaskPlanner {
   const DoorOpeningTask* door_ = nullptr;
   int group_ = -1;  // of the base
   std::unique_ptr<DoorMotions> motions_;
-  std::vector<int> tool_;  // [B] arm that is to take the handle
+  std::vector<int> tool_;     // [B] arm that is to take the handle
+  std::vector<double> goal_;  // [B] fraction to which the door is led
   std::vector<std::vector<Expected>>
       expected_;  // [B] how far the door is open when a segment begins
 };
