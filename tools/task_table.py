@@ -31,7 +31,8 @@ import mjsense as mjs
 
 PAGE, RESULTS = ROOT / "docs" / "tasks.md", ROOT / ".cache" / "tasks"
 BEGIN, END = "<!-- task table -->", "<!-- end -->"
-# task, robot, scene ("" is the task's own).
+HOUSES = 30
+# task, robot, scene ("" is the task's own; "name:*": HOUSES houses, some episodes in each).
 CASES = (
     *(("pick", robot, "") for robot in ("franka", "mobile_franka", "i2rt_yam", "bimanual_yam", "floating_rum", "rby1")),
     ("pick", "franka", "tableware"),
@@ -45,6 +46,7 @@ CASES = (
     ("open", "franka", "libero/kitchen"),
     ("close", "franka", "libero/kitchen"),
     ("door_opening", "rby1", ""),
+    ("door_opening", "rby1", "room_with_door:*"),
     *((task, robot, "") for task in ("nav_to_obj", "multi_task") for robot in ("rby1", "mobile_franka")),
 )
 
@@ -76,26 +78,40 @@ def episodes_of(path: Path) -> list[dict[str, Any]]:
 
 
 def play(task: str, robot: str, scene: str, episodes: int, **options: Any) -> dict[str, Any]:
-    with tempfile.TemporaryDirectory() as out:
-        made = mjs.record(task, robot, out=out, scene=scene, episodes=episodes, max_attempts=episodes, keep_failures=True,
-                          worlds=min(8, episodes), cameras=[], **options)  # fmt: skip
-        found = episodes_of(made.path)
+    scenes = [scene]
+    if scene.endswith(":*"):
+        scenes = [f"{scene[:-1]}{house}" for house in range(HOUSES)]
+        episodes = -(-episodes // HOUSES)
+    parts, found = [], []
+    for one in scenes:
+        with tempfile.TemporaryDirectory() as out:
+            made = mjs.record(task, robot, out=out, scene=one, episodes=episodes, max_attempts=episodes, keep_failures=True,
+                              worlds=min(8, episodes), cameras=[], **options)  # fmt: skip
+            found += episodes_of(made.path)
+            parts.append(made)
     angles = approach_angles(found)
+    lengths = [length for made in parts for length in made.lengths]
+    failures: collections.Counter[str] = collections.Counter()
+    for made in parts:
+        failures.update(made.failures)
+    played = max(1, sum(made.succeeded + made.failed for made in parts))
     return {
         "task": task, "robot": robot, "scene": scene,
-        "episodes": made.succeeded + made.failed,
-        "success": made.succeeded / max(1, made.succeeded + made.failed),
-        "length": float(np.median(made.lengths)) if made.lengths else 0.0,
+        "episodes": played,
+        "success": sum(made.succeeded for made in parts) / played,
+        "length": float(np.median(lengths)) if lengths else 0.0,
         "retried": sum(e["retries"] > 0 for e in found) / max(1, len(found)),
         "steep": sum(a < 30 for a in angles) / len(angles) if angles else None,
-        "steps_per_second": made.steps / made.seconds,
-        "first_action_ms": 1000 * made.times["reset"] / max(1, made.succeeded + made.failed),
-        "failures": collections.Counter(made.failures).most_common(3),
+        "steps_per_second": sum(made.steps for made in parts) / sum(made.seconds for made in parts),
+        "first_action_ms": 1000 * sum(made.times["reset"] for made in parts) / played,
+        "failures": failures.most_common(3),
     }  # fmt: skip
 
 
 def row(r: dict[str, Any]) -> str:
     scene = f" in `{r['scene']}`" if r["scene"] else ""
+    if r["scene"].endswith(":*"):
+        scene = f" over {HOUSES} houses"
     slanted = "" if r["steep"] is None else f"{1 - r['steep']:.0%}"
     why = "; ".join(f"{count} {what}" for what, count in r["failures"])
     return (f"| `{r['task']}`{scene} | {r['robot']} | {r['success']:.0%} of {r['episodes']} | {r['length']:.0f} | {r['retried']:.0%} | "
@@ -111,13 +127,13 @@ def table(results: list[dict[str, Any]]) -> str:
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--episodes", type=int, default=50)
-    parser.add_argument("--only", default="", help="TASK or TASK/ROBOT")
+    parser.add_argument("--only", default="", help="TASK, TASK/ROBOT or TASK/ROBOT/SCENE")
     arguments = parser.parse_args()
     RESULTS.mkdir(parents=True, exist_ok=True)
     results = []
     for task, robot, scene in CASES:
-        kept = RESULTS / f"{task}-{robot}-{scene.replace('/', '.') or 'own'}.json"
-        if arguments.only in ("", task, f"{task}/{robot}"):
+        kept = RESULTS / f"{task}-{robot}-{scene.replace('/', '.').replace(':*', '-houses') or 'own'}.json"
+        if arguments.only in ("", task, f"{task}/{robot}", f"{task}/{robot}/{scene}"):
             try:
                 kept.write_text(json.dumps(play(task, robot, scene, arguments.episodes)))
             except ValueError as error:
