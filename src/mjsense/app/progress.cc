@@ -7,6 +7,7 @@
 
 #include <cmath>
 #include <cstdio>
+#include <utility>
 
 namespace mjsense {
 
@@ -46,10 +47,12 @@ std::string progress_text(const RecordProgress& p) {
   return text;
 }
 
-ProgressLine::ProgressLine(bool quiet) : quiet_(quiet), terminal_(isatty(STDERR_FILENO) != 0) {}
+ProgressLine::ProgressLine(std::string title, bool quiet)
+    : title_(std::move(title)), quiet_(quiet), terminal_(isatty(STDERR_FILENO) != 0) {}
 
 void ProgressLine::show(const RecordProgress& progress, int stop_level) {
   if (quiet_) return;
+  if (!title_.empty()) fmt::print(stderr, "{}\n", std::exchange(title_, {}));
   text_ = progress_text(progress);
   if (stop_level > 0 && progress.running > 0) {
     text_ += fmt::format("  stopping: {} running; Ctrl-C discards them", progress.running);

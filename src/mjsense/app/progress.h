@@ -1,7 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 // The line that tells a person how a recording goes: on a terminal one line that changes, else a
-// line whenever an episode ends.
+// line whenever an episode ends. Its title comes once, when the recording has begun: what is wrong
+// with its configuration is said alone.
 
 #include <string>
 
@@ -11,13 +12,14 @@ namespace mjsense {
 
 class ProgressLine {
  public:
-  explicit ProgressLine(bool quiet);
+  ProgressLine(std::string title, bool quiet);
   void show(const RecordProgress& progress, int stop_level);
   void finish();  // leaves the last line as it stands
 
  private:
   void print();
 
+  std::string title_;  // until it is shown
   bool quiet_, terminal_;
   bool open_ = false;
   std::string text_, printed_;

@@ -51,7 +51,7 @@ std::uint64_t bytes_below(const std::filesystem::path& folder) {
 }
 
 // "pick with NAME (the task's robot) in table: 8 episodes into data".
-std::string first_line(const RecordJobCfg& job) {
+std::string title(const RecordJobCfg& job) {
   const RolloutCfg& cfg = job.rollout;
   std::string text = cfg.task;
   const std::string robot = resolved(cfg).robot;
@@ -144,11 +144,10 @@ std::string summary_json(const RecordSummary& s, const Sheet& sheet) {
 int run_record(const RecordOptions& options) {
   const RecordJobCfg& job = options.job;
   if (job.out.empty()) throw ValueError("record: where to? give --out DIR");
-  if (!options.quiet) fmt::print(stderr, "{}\n", first_line(job));
   RecordSummary summary;
   {
     const StopOnSignal signals;
-    ProgressLine line(options.quiet);
+    ProgressLine line(title(job), options.quiet);
     try {
       summary = record_episodes(
           job, [&](const RecordProgress& p) { line.show(p, stop_flag.load()); }, &stop_flag);
