@@ -40,7 +40,7 @@ class Ours:
             )
             for i, shot in enumerate(shots)
         ]  # fmt: skip
-        entity = mjs.EntityCfg(model=getattr(camera_scenes, view.scene)())
+        entity = mjs.EntityCfg(model=camera_scenes.spec_of(view.scene))
         self.view = view
         self.scene = mjs.Scene(mjs.SceneCfg(entities={"w": entity}, sensors=cameras))
         self.sim = mjs.Simulation(self.scene, num_worlds=worlds, threads=threads)

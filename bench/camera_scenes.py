@@ -18,8 +18,14 @@ CAMERAS = {"panda": "view", "kitchen": "view", "go1": "head"}  # of each scene, 
 SHOWN_GROUPS = (0, 1, 2)
 
 
-def compiled(name: str) -> mujoco.MjModel:
-    return globals()[name]().compile()
+def spec_of(scene: str) -> mujoco.MjSpec:
+    """A scene by the name of its function, with that function's arguments after colons: crowd:1000."""
+    name, *values = scene.split(":")
+    return globals()[name](*map(int, values))
+
+
+def compiled(scene: str) -> mujoco.MjModel:
+    return spec_of(scene).compile()
 
 
 def poses(qpos: np.ndarray, worlds: int, frame: int) -> np.ndarray:
@@ -48,6 +54,14 @@ VIEWS = {
     "kitchen_randomised": View("kitchen, camera, lights, materials randomised", "kitchen", "view", moves=True, randomised=True),
     "panda_fixed": View("Panda table, camera fixed", "panda", "view"),
     "kitchen_fixed": View("kitchen, camera fixed", "kitchen", "view"),
+}
+
+
+# What grows: geoms, triangles, lights.
+GROWTH = {
+    **{f"geoms_{n}": View(f"{n:,} geoms", f"crowd:{n}", "view", moves=True) for n in (100, 1000, 10000)},
+    **{f"triangles_{n}": View(f"{n:,} triangles", f"boulder:{n}", "view", moves=True) for n in (10000, 100000, 1000000)},
+    **{f"lights_{n}": View(f"100 geoms, {n} light{'s' * (n > 1)}", f"crowd:100:{n}", "view", moves=True) for n in (1, 4, 8)},
 }
 
 
@@ -100,6 +114,48 @@ def gallery() -> mujoco.MjSpec:
 def soft() -> mujoco.MjSpec:
     """Cloth on a ball, a rope on a post, a soft block, a skinned beam."""
     return mujoco.MjSpec.from_file(str(HERE / "soft.xml"))
+
+
+def crowd(count: int, lights: int = 1) -> mujoco.MjSpec:
+    """Boxes and balls, one a square metre, one of which moves; seen from the middle. The sun shines, other lights are lamps."""
+    rng = np.random.default_rng(0)
+    spec = mujoco.MjSpec()
+    spec.visual.headlight.active = 0
+    world = spec.worldbody
+    world.add_geom(type=mujoco.mjtGeom.mjGEOM_PLANE, size=[0, 0, 1], rgba=[0.6, 0.6, 0.55, 1])
+    half = 0.5 * np.sqrt(count)
+    for i in range(count - 1):
+        parent = world.add_body(pos=[0, 2, 1.5]) if i == 0 else world
+        if i == 0:
+            parent.add_freejoint()
+        kind = (mujoco.mjtGeom.mjGEOM_BOX, mujoco.mjtGeom.mjGEOM_SPHERE)[i % 2]
+        place = [0, 0, 0] if i == 0 else [*rng.uniform(-half, half, 2), 0.25]
+        parent.add_geom(type=kind, size=rng.uniform(0.1, 0.3, 3), pos=place, rgba=[*rng.uniform(0.2, 1, 3), 1])
+    sun = mujoco.mjtLightType.mjLIGHT_DIRECTIONAL
+    world.add_light(pos=[0, 0, 30], dir=[0.3, 0.2, -0.93], type=sun, castshadow=True, diffuse=[0.6] * 3)
+    for i in range(lights - 1):
+        angle = 2 * np.pi * i / (lights - 1)
+        world.add_light(pos=[3 * np.cos(angle), 3 * np.sin(angle), 4], dir=[0, 0, -1], castshadow=True, diffuse=[0.3] * 3)
+    world.add_camera(name="view", pos=[0, 0, 1.5], xyaxes=[1, 0, 0, 0, 0.3, 0.95], fovy=45)
+    return spec
+
+
+def boulder(triangles: int) -> mujoco.MjSpec:
+    """A rough ball of so many triangles that moves over a plane."""
+    spec = crowd(2)
+    n = round(np.sqrt(triangles / 2))
+    theta, phi = np.meshgrid(np.linspace(0.01, np.pi - 0.01, n + 1), np.linspace(0, 2 * np.pi, n, endpoint=False), indexing="ij")
+    radius = 0.8 + 0.03 * np.sin(9 * theta) * np.cos(11 * phi)
+    point = radius[..., None] * np.stack([np.sin(theta) * np.cos(phi), np.sin(theta) * np.sin(phi), np.cos(theta)], -1)
+    at = np.arange((n + 1) * n).reshape(n + 1, n)
+    a, b, c, d = at[:-1], at[1:], np.roll(at[1:], -1, 1), np.roll(at[:-1], -1, 1)
+    faces = np.concatenate([np.stack([a, b, c], -1).reshape(-1, 3), np.stack([a, c, d], -1).reshape(-1, 3)])
+    inertia = mujoco.mjtMeshInertia.mjMESH_INERTIA_SHELL
+    spec.add_mesh(name="boulder", uservert=point.ravel().tolist(), userface=faces.ravel().tolist(), inertia=inertia)
+    body = spec.worldbody.add_body(pos=[0, 3, 0.9])
+    body.add_joint(type=mujoco.mjtJoint.mjJNT_HINGE, axis=[0, 0, 1])
+    body.add_geom(type=mujoco.mjtGeom.mjGEOM_MESH, meshname="boulder", rgba=[0.5, 0.4, 0.3, 1])
+    return spec
 
 
 def pick() -> mujoco.MjSpec:

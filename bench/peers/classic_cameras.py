@@ -27,7 +27,7 @@ def measure(base: mujoco.MjModel, view: camera_scenes.View, width: int, height: 
         model.vis.quality.shadowsize = shadow_map
     model.vis.global_.offwidth, model.vis.global_.offheight = width, height
     data = mujoco.MjData(model)
-    renderer = mujoco.Renderer(model, height, width)
+    renderer = mujoco.Renderer(model, height, width, max_geom=model.ngeom + 1000)
     option = mujoco.MjvOption()
     option.sitegroup[:] = 0
     renderer.scene.flags[mujoco.mjtRndFlag.mjRND_SHADOW] = shadow_map > 0
@@ -49,7 +49,7 @@ def measure(base: mujoco.MjModel, view: camera_scenes.View, width: int, height: 
 
 
 def main() -> None:
-    view, width, height = camera_scenes.VIEWS[sys.argv[1]], int(sys.argv[2]), int(sys.argv[3])
+    view, width, height = (camera_scenes.VIEWS | camera_scenes.GROWTH)[sys.argv[1]], int(sys.argv[2]), int(sys.argv[3])
     settings = {"4096": ("rgb", 4096), "1024": ("rgb", 1024), "plain": ("rgb", 0), "depth": ("depth", 0)}
     base = camera_scenes.compiled(view.scene)
     print(json.dumps({name: measure(base, view, width, height, *setting) for name, setting in settings.items()}))

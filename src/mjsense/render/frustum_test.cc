@@ -21,10 +21,11 @@ using testing::Picture;
 using testing::Studio;
 
 // `count` shapes about the origin, every tenth on a body that can move, on an endless plane.
-std::string crowd(int count) {
+std::string crowd(int count, const std::string& lights = "") {
   Rng rng(3, 0, 0, 0);
   const char* types[] = {"box", "sphere", "capsule", "ellipsoid", "cylinder"};
-  std::string xml = std::string(kFlat) + "<worldbody><geom type='plane' size='0 0 1'/>";
+  std::string xml = (lights.empty() ? kFlat : "") + ("<worldbody>" + lights) +
+                    "<geom type='plane' size='0 0 1'/>";
   for (int i = 0; i < count; ++i) {
     const std::string geom =
         fmt::format("<geom type='{}' size='{} {} {}' rgba='{} .5 .5 {}'/>", types[i % 5],
@@ -47,11 +48,10 @@ Eye eye(std::array<double, 3> at, double yaw, double pitch) {
   return {at, {c, s, 0}, {-s * std::sin(pitch), c * std::sin(pitch), std::cos(pitch)}};
 }
 
-// Shadows need all that could cast one, so with them nothing is passed by; there are no lights.
 void expect_nothing_missed(Studio& s, const Eye& e, const PixelGrid& grid) {
-  s.options.shadows = true;
+  s.options.everything = true;
   const Picture all = s.take(e.at, e.x, e.y, grid);
-  s.options.shadows = false;
+  s.options.everything = false;
   const Picture seen = s.take(e.at, e.x, e.y, grid);
   EXPECT_EQ(all.rgb, seen.rgb);
   EXPECT_EQ(all.depth, seen.depth);
@@ -93,6 +93,70 @@ TEST(Frustum, PicturesAreThoseOfAllGeoms) {
     }
     EXPECT_LT(most, s.model->ngeom / 2);  // else nothing would be saved
     EXPECT_GT(most, 5);
+  }
+}
+
+// Lights of every kind from every side: near and far, in the image and behind the camera.
+TEST(Frustum, ShadowsAreThoseOfAllGeoms) {
+  const char* kinds[] = {"type='directional'", "type='spot' cutoff='60'", "type='point'"};
+  const PixelGrid pyramid = grid_from_fovy(48, 32, 50, false);
+  PixelGrid slab = grid_from_fovy(48, 32, 8, true);
+  slab.orthographic = true;
+  int passed_by = 0, shaded = 0;
+  for (const int count : {60, 700}) {
+    for (int k = 0; k < 18; ++k) {
+      SCOPED_TRACE(fmt::format("{} {}", count, k));
+      Rng rng(5, k, 0, 0);
+      std::string lights;
+      for (int i = 0; i < 1 + k % 3; ++i) {
+        const double x = rng.uniform(-9, 9), y = rng.uniform(-9, 9), z = rng.uniform(1, 7);
+        lights += fmt::format("<light {} castshadow='true' pos='{} {} {}' dir='{} {} {}'/>",
+                              kinds[(i + k) % 3], x, y, z, rng.uniform(-1, 1), rng.uniform(-1, 1),
+                              rng.uniform(-1, -0.1));
+      }
+      Studio s(testing::kDark + crowd(count, lights));
+      s.update();
+      s.options.shadows = true;
+      const Eye e = eye({3.0 * (k % 3 - 1), 2.0 * (k % 5 - 2), 1.5}, 0.6 * k, -0.2 * (k % 3));
+      expect_nothing_missed(s, e, pyramid);
+      expect_nothing_missed(s, e, slab);
+      ViewBuilder builder(s.model.get(), *s.look, s.options);
+      passed_by += s.view(builder, e.at, e.x, e.y, pyramid).num_geoms < s.model->ngeom;
+      const Picture dark = s.take(e.at, e.x, e.y, pyramid);
+      s.options.shadows = false;
+      shaded += dark.rgb != s.take(e.at, e.x, e.y, pyramid).rgb;
+    }
+  }
+  EXPECT_GT(passed_by, 24);  // else nothing would be saved
+  EXPECT_GT(shaded, 24);     // else nothing would be shown
+}
+
+// A small box stands 20 m from its shadow, out of the image, on a plane or on another box.
+TEST(Frustum, ShadowsOfALowSunAreLong) {
+  struct Case {
+    const char *what, *dir;
+    Eye eye;
+  };
+  const Case cases[] = {
+      {"<geom type='plane' size='0 0 1'/>", "1 0 -.1", {{20, 0, 3}, {1, 0, 0}, {0, 1, 0}}},
+      {"<geom type='box' size='.1 4 4' pos='20 0 0'/>",
+       "1 0 0",
+       {{17, 0, 2}, {0, -1, 0}, {0, 0, 1}}},
+  };
+  for (const Case& c : cases) {
+    SCOPED_TRACE(c.what);
+    Studio s(fmt::format(
+        "{}<worldbody><light type='directional' castshadow='true' diffuse='5 5 5' pos='-9 0 9' "
+        "dir='{}'/>{}<geom type='box' size='.3 .3 .3' pos='0 0 2'/></worldbody>",
+        testing::kDark, c.dir, c.what));
+    s.update();
+    const PixelGrid grid = grid_from_fovy(16, 16, 20, false);
+    const auto center = [&] { return s.take(c.eye.at, c.eye.x, c.eye.y, grid).at(8, 8); };
+    const testing::Pixel lit = center();
+    s.options.shadows = true;
+    EXPECT_GT(lit[0], 30);
+    EXPECT_LT(center()[0], 5);
+    expect_nothing_missed(s, c.eye, grid);
   }
 }
 

@@ -43,6 +43,7 @@ Frustum::Frustum(const PixelGrid& grid, const double position[3], const double r
           rotation[3 * i] * n[0] + rotation[3 * i + 1] * n[1] + rotation[3 * i + 2] * n[2];
       side.offset += side.normal[i] * position[i];
     }
+    side.image = side.offset;
   }
 }
 
@@ -57,6 +58,21 @@ bool Frustum::misses(const float low[3], const float high[3]) const {
     if (least > kSlack * scale) return true;
   }
   return false;
+}
+
+void Frustum::reach(const double light[3]) {
+  for (Side& side : sides_) side.offset = std::max(side.offset, side.along(light));
+}
+
+void Frustum::reach(const double to_light[3], double longest) {
+  for (Side& side : sides_) {
+    const double rise = side.along(to_light);
+    if (rise > 0) side.offset = std::max(side.offset, side.image + rise * longest);
+  }
+}
+
+void Frustum::widen(double by) {
+  for (Side& side : sides_) side.offset += by * std::sqrt(side.along(side.normal));
 }
 
 void find_candidates(const BoxList& list, const Frustum& frustum,

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 // What a camera cannot see for where it is: whole blocks of objects that stand beside the image or
-// behind it are passed by.
+// behind it are passed by (with shadows: those of which no shadow falls into it, shadow_reach.h).
 
 #include <cstdint>
 #include <vector>
@@ -22,9 +22,20 @@ class Frustum {
   // True: nothing of the box (corners in the world, m) can be in the image. False says nothing.
   bool misses(const float low[3], const float high[3]) const;
 
+  // What stands between a light and something inside is inside, too: a light at a place, or parallel
+  // light from direction `to_light` (unit) of which shadows are at most `longest` (m).
+  void reach(const double light[3]);
+  void reach(const double to_light[3], double longest);
+  void widen(double by);  // m
+
  private:
   struct Side {
     double normal[3], offset;  // inside: normal . x <= offset
+    double image;              // offset of what the image shows
+
+    double along(const double v[3]) const {
+      return normal[0] * v[0] + normal[1] * v[1] + normal[2] * v[2];
+    }
   };
   Side sides_[5];
 };

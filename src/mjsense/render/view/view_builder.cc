@@ -12,6 +12,7 @@
 #include "mjsense/rays/skin_shapes.h"
 #include "mjsense/render/view/fixed_layer.h"
 #include "mjsense/render/view/frustum.h"
+#include "mjsense/render/view/shadow_reach.h"
 #include "mjsense/render/view/view_window.h"
 
 namespace mjsense {
@@ -122,10 +123,14 @@ const View& ViewBuilder::build(const RayWorld& world, const SharedGeometry& shap
     add(world.geom(id), id, world.flags()[id], world.materials()[id]);
   };
   int id = world.num_geoms();
-  if (options_.shadows || grid.bent) {  // what is not in sight may cast shadows there
+  // Nobody knows boxes of skins and markers, on which shadows may fall.
+  const bool unbounded = options_.shadows && (world.skins() || !markers.empty());
+  if (grid.bent || unbounded || options_.everything) {
     for (int i = 0; i < id; ++i) add_geom(i);
   } else {
-    find_candidates(world.boxes(), Frustum(grid, position, rotation), candidates_);
+    Frustum frustum(grid, position, rotation);
+    if (options_.shadows) reach_lights(world, appearance, frustum);
+    find_candidates(world.boxes(), frustum, candidates_);
     for (std::size_t word = 0; word < candidates_.size(); ++word) {
       for (std::uint64_t bits = candidates_[word]; bits != 0; bits &= bits - 1) {
         const int i = static_cast<int>(64 * word) + std::countr_zero(bits);

@@ -29,6 +29,7 @@ struct ViewOptions {
   bool layered = false;  // View::layered
   float near = 0, far = 0;
   std::size_t markers = 0;  // at most so many
+  bool everything = false;  // nothing is passed by, for tests
 };
 
 // Owns the geoms of one view; build() fills it anew and allocates nothing.

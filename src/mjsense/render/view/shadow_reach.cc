@@ -1,0 +1,126 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "mjsense/render/view/shadow_reach.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+#include "mjsense/rays/box_list.h"
+#include "mjsense/rays/ray_world.h"
+#include "mjsense/render/view/appearance.h"
+#include "mjsense/render/view/frustum.h"
+
+namespace mjsense {
+namespace {
+
+constexpr double kEndless = std::numeric_limits<double>::infinity();
+constexpr float kPlane = 1e29f;  // m; the boxes of planes reach farther
+
+double dot(const double* a, const double* b) { return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]; }
+
+// A box around all objects but planes.
+struct Extent {
+  double low[3] = {kEndless, kEndless, kEndless}, high[3] = {-kEndless, -kEndless, -kEndless};
+
+  void add(const KernelBoxes& boxes, int k) {
+    for (int i = 0; i < 3; ++i) {
+      low[i] = std::min<double>(low[i], boxes.low[i][k]);
+      high[i] = std::max<double>(high[i], boxes.high[i][k]);
+    }
+  }
+  double least(const double* n) const {
+    double sum = 0;
+    for (int i = 0; i < 3; ++i) sum += n[i] * (n[i] > 0 ? low[i] : high[i]);
+    return sum;
+  }
+  double most(const double* n) const {
+    const double away[3] = {-n[0], -n[1], -n[2]};
+    return -least(away);
+  }
+  double size() const {
+    const double d[3] = {high[0] - low[0], high[1] - low[1], high[2] - low[2]};
+    return std::sqrt(dot(d, d));
+  }
+};
+
+bool is_plane(const KernelBoxes& boxes, int k) { return boxes.high[0][k] > kPlane; }
+
+// visit(box of a plane) for each; a few blocks have some.
+template <typename Visit>
+void each_plane(const BoxList& list, Visit visit) {
+  const KernelBoxes &all = list.all(), &blocks = list.blocks();
+  const auto look = [&](int first, int last) {
+    for (int k = first; k < last; ++k)
+      if (is_plane(all, k)) visit(k);
+  };
+  if (blocks.count == 0) return look(0, all.count);
+  constexpr int kBlock = KernelWorld::kBlock;
+  for (int b = 0; b < blocks.count; ++b)
+    if (is_plane(blocks, b)) look(b * kBlock, std::min((b + 1) * kBlock, all.count));
+}
+
+Extent extent_of(const BoxList& list) {
+  const KernelBoxes &all = list.all(), &blocks = list.blocks();
+  Extent out;
+  const auto add = [&](int first, int last) {
+    for (int k = first; k < last; ++k)
+      if (!is_plane(all, k)) out.add(all, k);
+  };
+  if (blocks.count == 0) {
+    add(0, all.count);
+    return out;
+  }
+  constexpr int kBlock = KernelWorld::kBlock;
+  for (int b = 0; b < blocks.count; ++b) {
+    if (is_plane(blocks, b)) {
+      add(b * kBlock, std::min((b + 1) * kBlock, all.count));
+    } else {
+      out.add(blocks, b);
+    }
+  }
+  return out;
+}
+
+// How far a shadow of parallel light is at most from what casts it, on objects and on planes.
+double longest_shadow(const RayWorld& world, const Extent& extent, const RayLight& light,
+                      const double* to_light) {
+  // Nothing behind the light casts one, see dark_lanes() of the kernels.
+  double longest = std::min(extent.most(to_light), dot(light.pos, to_light));
+  longest = std::max(longest - extent.least(to_light), 0.0);
+  const BoxList& boxes = world.boxes();
+  each_plane(boxes, [&](int k) {
+    const RayGeom& plane = world.geom(boxes.all().ids ? boxes.all().ids[k] : k);
+    const double n[3] = {plane.mat[2], plane.mat[5], plane.mat[8]};
+    const double height = dot(n, plane.pos), slope = std::abs(dot(n, to_light));
+    const double away = std::max(extent.most(n) - height, height - extent.least(n));
+    longest = std::max(longest, slope > 0 ? away / slope : kEndless);
+  });
+  return longest;
+}
+
+}  // namespace
+
+void reach_lights(const RayWorld& world, const Appearance& appearance, Frustum& frustum) {
+  const Extent extent = extent_of(world.boxes());
+  if (!(extent.low[0] <= extent.high[0])) return;  // nothing but planes
+  bool any = false;
+  for (std::size_t i = 0; i < appearance.lights().size(); ++i) {
+    const ViewLight& light = appearance.lights()[i];
+    const int id = appearance.light_ids()[i];
+    if (!light.shadows || id < 0) continue;
+    any = true;
+    const RayLight& source = world.lights()[id];
+    if (light.kind != LightKind::kDirectional) {
+      frustum.reach(source.pos);
+      continue;
+    }
+    const double length = std::sqrt(dot(source.dir, source.dir));
+    double to_light[3];
+    for (int k = 0; k < 3; ++k) to_light[k] = -source.dir[k] / length;
+    frustum.reach(to_light, longest_shadow(world, extent, source, to_light));
+  }
+  // Rays to lights begin a little above triangles: a ten thousandth of the size of the shape.
+  if (any) frustum.widen(1e-3 * extent.size());
+}
+
+}  // namespace mjsense
