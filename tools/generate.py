@@ -315,9 +315,11 @@ class Generator:
     def option_table(self, name: str) -> str:
         rows = []
         for f in self.structs[name]["fields"]:
-            option, default = f["option"].replace("_", "-"), f["default"]
+            option, default, text = f["option"].replace("_", "-"), f["default"], markdown(field_text(f))
             if f["type"]["kind"] == "bool":
-                shown, default = (f"--no-{option}" if default else f"--{option}"), ""
+                shown = f"--no-{option}" if default else f"--{option}"
+                text = f"Not: {text[0].lower()}{text[1:]}" if default and not f["hidden"] else text
+                default = ""
             else:
                 shown = f"--{option}"
             if f["name"] == "task":
@@ -325,7 +327,7 @@ class Generator:
             if f["hidden"]:
                 shown = f"--set {f['option']}="
             default = "" if default in (None, "") else f"`{default}`"
-            rows.append(f"| `{shown}` | {default} | {markdown(field_text(f))} |\n")
+            rows.append(f"| `{shown}` | {default} | {text} |\n")
         return "| option | default | |\n| --- | --- | --- |\n" + "".join(rows)
 
     def files(self) -> dict[Path, str]:

@@ -303,8 +303,8 @@ def make_vec(
         segmentation: Also what each pixel of every camera shows, losslessly: (id, mjtObj), of geoms mostly.
         samples: Rays a pixel of rgb: smooth edges for time.
         shadows: Pictures have shadows.
-        meshes: The robot is drawn with shapes of ours, its real meshes, or these where its environment variable
-            (``MJSENSE_FRANKA_MESHES``) names them; it moves the same.
+        meshes: What the robot is drawn with: ``shapes`` of ours, its ``real`` meshes, or ``auto``: these where its
+            environment variable (``MJSENSE_FRANKA_MESHES``) names them. It moves the same.
         horizon: Control steps after which an episode is cut; by default the task's.
         action_noise: Commands reach the arm with noise.
         perturb: Share of episodes in which something goes wrong on purpose: the object is shoved, or slips from the

@@ -114,8 +114,8 @@ void visit_fields(V& v, RolloutCfg& c) {
   v("samples", c.samples, "Rays a pixel of rgb: smooth edges for time.").at_least(1).decides_data();
   v("shadows", c.shadows, "Pictures have shadows.").decides_data();
   v("meshes", c.meshes,
-    "The robot is drawn with shapes of ours, its real meshes, or these where its environment "
-    "variable (``MJSENSE_FRANKA_MESHES``) names them; it moves the same.")
+    "What the robot is drawn with: ``shapes`` of ours, its ``real`` meshes, or ``auto``: these "
+    "where its environment variable (``MJSENSE_FRANKA_MESHES``) names them. It moves the same.")
       .one_of(kMeshes)
       .decides_data_as("meshes");
   v("horizon", c.horizon, "Control steps after which an episode is cut; by default the task's.")
