@@ -62,7 +62,8 @@ std::string help(const FieldDecl& field) {
   std::string text = field.sentence;
   std::erase(text, '`');
   text.pop_back();  // as a line of a list: no sentence
-  text[0] = static_cast<char>(std::tolower(static_cast<unsigned char>(text[0])));
+  const auto letter = [&](int i) { return static_cast<unsigned char>(text[i]); };
+  if (!std::isupper(letter(1))) text[0] = static_cast<char>(std::tolower(letter(0)));
   if (*field.unit_) text += fmt::format(" [{}]", field.unit_);
   return text;
 }
@@ -91,10 +92,13 @@ void add_field_options(CLI::App& app, const StructDecl& decl, void* object,
     if (field.is_hidden || !field.type || !has_text(*field.type)) continue;
     if (std::ranges::find(skip, name) != skip.end()) continue;
     if (is_flag(field)) {
-      const bool standard = flag_default(decl, field);
       bool& value = *static_cast<bool*>(at(object, field));
-      app.add_flag(standard ? "!--no-" + name : "--" + name, value,
-                   (standard ? "not: " : "") + help(field));
+      if (flag_default(decl, field)) {
+        app.add_flag_callback(
+            "--no-" + name, [&value] { value = false; }, "not: " + help(field));
+      } else {
+        app.add_flag("--" + name, value, help(field));
+      }
       continue;
     }
     app.add_option_function<std::string>(

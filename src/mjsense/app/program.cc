@@ -60,7 +60,8 @@ CLI::App& add_record(CLI::App& program, RecordOptions& options) {
   add_choices(app);
   app.add_option("--config", "TOML file with these options; the command line wins")
       ->type_name("FILE");
-  app.add_flag("!--no-sheet", options.sheet, "write no contact sheet");
+  app.add_flag_callback(
+      "--no-sheet", [&options] { options.sheet = false; }, "write no contact sheet");
   app.add_flag("--json", options.json, "summary as JSON");
   app.add_flag("-q,--quiet", options.quiet, "no progress");
   return app;
@@ -78,7 +79,7 @@ CLI::App& add_sensors(CLI::App& program, SensorsOptions& options) {
   add_choices(app);
   app.add_option("--steps", options.steps, "to measure the cost over; 0: do not measure")
       ->capture_default_str()
-      ->check(CLI::Range(0, kMostSteps));
+      ->check(CLI::Range(0, kMostSteps).description(""));
   app.add_flag("--json", options.json, "as JSON");
   return app;
 }
@@ -87,7 +88,7 @@ CLI::App& add_scan(CLI::App& program, ScanOptions& options) {
   CLI::App& app = *program.add_subcommand("scan", "what a lidar sees, as a point cloud");
   app.add_option("scene", options.scene, "an MJCF file")
       ->required()
-      ->check(CLI::ExistingFile)
+      ->check(CLI::Validator(CLI::ExistingFile).description(""))
       ->type_name("SCENE.xml");
   app.add_option("--frame", options.frame, "what carries the lidar: site:NAME, body:NAME, ...")
       ->required()
@@ -95,7 +96,9 @@ CLI::App& add_scan(CLI::App& program, ScanOptions& options) {
   app.add_option("--out", options.out, "the file, .ply or .pcd")->required()->type_name("FILE");
   // The scene stands still: the rate of a scan and the distortion by motion mean nothing.
   add_field_options(app, struct_of<TableScan>(), &options.table, {"rate-hz"});
-  CLI::Option* table = app.get_option("--table")->check(CLI::ExistingFile)->type_name("FILE.npy");
+  CLI::Option* table = app.get_option("--table")
+                           ->check(CLI::Validator(CLI::ExistingFile).description(""))
+                           ->type_name("FILE.npy");
   app.get_option("--rays")->needs(table);
   const std::size_t others = app.get_options().size();
   add_field_options(app, struct_of<SpinningScan>(), &options.spinning, {"rate-hz"});
@@ -105,7 +108,7 @@ CLI::App& add_scan(CLI::App& program, ScanOptions& options) {
                     {"name", "any-frame", "debug-vis", "hit-ids", "motion-distortion"});
   app.add_option("--steps", options.steps, "physics steps before the scan")
       ->capture_default_str()
-      ->check(CLI::Range(0, kMostSteps));
+      ->check(CLI::Range(0, kMostSteps).description(""));
   app.add_flag("--world", options.world, "points in the world, not in the lidar's frame");
   return app;
 }
@@ -168,7 +171,6 @@ int run(int argc, char** argv) {
   CLI::App program("Senses of MuJoCo worlds: measured, rendered, recorded.", "mjsense");
   program.set_version_flag("--version", "mjsense " MJSENSE_VERSION);
   program.require_subcommand(1);
-  program.footer("Any other word runs mjsense-<word> from PATH.");
 
   RecordOptions record_options;
   SensorsOptions sensors_options;
@@ -201,6 +203,7 @@ int run(int argc, char** argv) {
 
   CLI::App& schema =
       *program.add_subcommand("schema", "all configurations and their fields, as JSON");
+  program.footer("Any other word runs mjsense-<word> from PATH.");  // no subcommand inherits it
 
   std::vector<std::string> known;
   for (const CLI::App* app : program.get_subcommands({})) known.push_back(app->get_name());
