@@ -3,9 +3,7 @@
 // to a yaw the short way.
 #include <cmath>
 #include <numbers>
-#include <optional>
 
-#include "mjsense/robots/controllers/actuated.h"
 #include "mjsense/robots/controllers/kinds.h"
 #include "mjsense/robots/controllers/ramp.h"
 #include "mjsense/robots/noise.h"
@@ -13,15 +11,14 @@
 namespace mjsense {
 namespace {
 
-class HolonomicBase final : public ActuatedController {
+class HolonomicBase final : public RampedController {
  public:
   HolonomicBase(const HolonomicBaseCfg& cfg, const MoveGroup& group, const ControllerInit& init)
-      : ActuatedController(group, init), cfg_(cfg) {
+      : RampedController(cfg.ramp, group, init), cfg_(cfg) {
     need_position_servos(init, "holonomic_base", 3);
-    if (cfg.ramp) ramp_.emplace(init.periods, init.num_worlds, group.actuators);
   }
   void describe(MoveGroup& group) const override {
-    ActuatedController::describe(group);
+    RampedController::describe(group);
     group.command_unit = group.target_unit = "m, m, rad";
   }
   void command(const World& world, std::span<const double> command,
@@ -38,17 +35,8 @@ class HolonomicBase final : public ActuatedController {
       target[i] = clip(i, target[i] + truncated_normal(rng, deviation, limit));
     }
   }
-  void begin(const World& world, std::span<const double> target, const StateRow& state) override {
-    if (!ramp_) return ActuatedController::begin(world, target, state);
-    ramp_->begin(world.id, target, state);
-  }
-  bool every_step() const override { return ramp_.has_value(); }
-  mjtStage compute(const World& world, int index, const StateRow& state) override {
-    return ramp_->write(world.id, index, state);
-  }
 
  private:
-  std::optional<Ramp> ramp_;
   HolonomicBaseCfg cfg_;
 };
 

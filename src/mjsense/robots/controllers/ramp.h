@@ -4,11 +4,12 @@
 
 #include <algorithm>
 #include <cmath>
+#include <optional>
 #include <span>
 #include <utility>
 #include <vector>
 
-#include "mjsense/robots/controllers/controller.h"
+#include "mjsense/robots/controllers/actuated.h"
 
 namespace mjsense {
 
@@ -43,6 +44,26 @@ class Ramp {
   long steps_;  // control steps of a policy step
   std::vector<int> actuators_;
   std::vector<double> from_, to_;  // [B, n]
+};
+
+// Its controls are its targets, at once or on a ramp.
+class RampedController : public ActuatedController {
+ public:
+  RampedController(bool ramp, const MoveGroup& group, const ControllerInit& init)
+      : ActuatedController(group, init) {
+    if (ramp) ramp_.emplace(init.periods, init.num_worlds, group.actuators);
+  }
+  void begin(const World& world, std::span<const double> target, const StateRow& state) override {
+    if (!ramp_) return ActuatedController::begin(world, target, state);
+    ramp_->begin(world.id, target, state);
+  }
+  bool every_step() const override { return ramp_.has_value(); }
+  mjtStage compute(const World& world, int index, const StateRow& state) override {
+    return ramp_->write(world.id, index, state);
+  }
+
+ private:
+  std::optional<Ramp> ramp_;
 };
 
 }  // namespace mjsense
