@@ -123,12 +123,15 @@ class DerivedField final : public Sensor {
 }  // namespace
 
 std::shared_ptr<Sensor> make_derived_field(std::string_view name, const mjModel* model) {
-  std::vector<std::string> names;
-  for (DataField& field : data_fields(model)) {
+  for (DataField& field : data_fields(model))
     if (field.name == name) return std::make_shared<DerivedField>(std::move(field));
-    names.push_back(field.name);
-  }
-  throw_unknown("simulation", "mjData field", name, names);
+  throw_unknown("simulation", "mjData field", name, derived_field_names(model));
+}
+
+std::vector<std::string> derived_field_names(const mjModel* model) {
+  std::vector<std::string> names;
+  for (DataField& field : data_fields(model)) names.push_back(std::move(field.name));
+  return names;
 }
 
 }  // namespace mjsense::python

@@ -198,6 +198,9 @@ void bind_simulation(nb::module_& m) {
           },
           nb::arg("name"), "A field of mjData as a sensor.")
       .def(
+          "derived_fields", [](PySimulation& s) { return derived_field_names(s.open().model()); },
+          "What derived_field() takes.")
+      .def(
           "model_changed",
           [](PySimulation& s, const Ids& ids, bool set_const) {
             s.change("randomize", [&](Simulation& sim) {

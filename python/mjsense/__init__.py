@@ -1,5 +1,31 @@
 # SPDX-License-Identifier: Apache-2.0
-"""mjsense: batched sensors for MuJoCo, from the simulator to the policy to the disk."""
+"""Batched sensors for MuJoCo, from the simulator to the policy to the disk.
+
+    import mjsense as mjs
+
+    scene = mjs.Scene(mjs.SceneCfg(
+        entities={"robot": mjs.EntityCfg(model="embedded:robots/quadruped.xml")},  # or the path of your MJCF
+        terrain=mjs.TerrainCfg(),
+        sensors=(mjs.CameraSensorCfg(name="front", camera_name="robot/front", data_types=("rgb", "depth")),)))
+    sim = mjs.Simulation(scene, num_worlds=8, decimation=4)
+    sim.step()
+    scene["front"].data.rgb      # uint8 [8, 120, 160, 3]
+    scene["front"]               # shows what its fields are: shape, unit, frame
+
+Where to look (``help(mjs.Simulation)`` and so on):
+
+    what all worlds share        Scene, SceneCfg, EntityCfg, TerrainCfg
+    many worlds                  Simulation: step, reset, qpos, ctrl, randomize, draw
+    sensors of a scene           BuiltinSensorCfg, ContactSensorCfg, RayCastSensorCfg, TerrainHeightSensorCfg, LidarSensorCfg,
+                                 CameraSensorCfg, ImuSensorCfg; wrapped by noise, delay, dropout: effects
+    sensors of yours             Sensor; sets of sensors: SensorSuite
+    episodes of tasks            make (gymnasium.Env), make_vec (gymnasium.vector.VectorEnv), record, Recorder
+    names that these know        task_names(), robot_names(), policy_names(); of yours: Task, Policy, Robot
+    trainers                     mjsense.rl.sb3, mjsense.rl.rsl
+    configurations of mjlab      mjsense.compat.mjlab
+
+``python -m mjsense --help`` is the program.
+"""
 
 from mjsense import _libmujoco
 

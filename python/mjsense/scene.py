@@ -144,6 +144,13 @@ class Scene(KnownAttributes):
     def __contains__(self, key: object) -> bool:
         return key in self._sensors or key in self.entities
 
+    def _ipython_key_completions_(self) -> list[str]:
+        return [*self._sensors, *self.entities]
+
+    def _repr_html_(self) -> str:
+        """For notebooks: each sensor as it shows itself."""
+        return "".join(sensor._repr_html_() for sensor in self._sensors.values())
+
     @property
     def sensors(self) -> Mapping[str, Any]:
         """Configured sensors in their order, then those found in the entities' XML."""

@@ -56,6 +56,13 @@ class Simulation(KnownAttributes):
 
     After ``step()``, ``reset()`` and ``forward()`` every derived quantity and every sensor belongs to the present state. Worlds
     are independent, results are the same bit for bit at any number of threads.
+
+    Attributes:
+        scene: what all worlds share; ``sim.scene["name"].data`` is a sensor's measurement.
+        num_worlds: B.
+        decimation: substeps per control step.
+        physics_dt: s, one substep.
+        step_dt: s, one control step.
     """
 
     def __init__(self, scene: Scene, num_worlds: int | None = None, decimation: int = 1, threads: int = 0, seed: Seed = 0) -> None:
@@ -115,7 +122,7 @@ class Simulation(KnownAttributes):
     def __repr__(self) -> str:
         if self._core.closed:
             return "<simulation, closed>"
-        return f"<simulation: {self.num_worlds} worlds, {self.step_dt:g} s a step>"
+        return f"<simulation: {self.num_worlds} worlds of {self.scene!r}, {self.step_dt:g} s a step>"
 
     def __enter__(self) -> Simulation:
         return self
@@ -163,7 +170,8 @@ class Simulation(KnownAttributes):
     def set_state(self, world_ids: Sequence[int] | None = None, *, forward: bool = True, **components: Any) -> None:
         """Writes parts of the state, ``set_state(qpos=..., qvel=...)``, then calls forward().
 
-        Values are ``[n]`` (the same for every world) or ``[worlds, n]``.
+        The parts are qpos, qvel, act, ctrl ...: the arrays of the same name. Values are ``[n]`` (the same for every world) or
+        ``[worlds, n]``; with ``forward=False`` nothing is computed until it is read.
         """
         rows = self._rows(world_ids)
         checked = []
@@ -228,10 +236,12 @@ class Simulation(KnownAttributes):
 
     @property
     def threads(self) -> int:
+        """How many threads step the worlds and cast rays."""
         return self._core.threads
 
     @property
     def seed(self) -> int:
+        """Where random numbers (noise, delays) start; reset(seed=) gives another."""
         return self._core.seed
 
     def randomize(self, field: str, values: Any, world_ids: Sequence[int] | None = None) -> None:
@@ -341,7 +351,8 @@ class Simulation(KnownAttributes):
         sensor._mjs_bind(self, handle)
 
     def refresh(self, sensors: Sequence[Any]) -> None:
-        """Computes several sensors in one pass over the worlds; reading each ``.data`` then costs nothing."""
+        """Computes several sensors, as ``scene["name"]`` gives them, in one pass over the worlds; reading each ``.data`` then costs
+        nothing."""
         for sensor in sensors:
             if not isinstance(sensor, (NativeSensor, Sensor)):
                 raise TypeError(f"not a sensor: {sensor!r}")
@@ -428,6 +439,12 @@ class DerivedFields:
 
     def __init__(self, sim: Simulation) -> None:
         object.__setattr__(self, "_sim", sim)
+
+    def __repr__(self) -> str:
+        return f"<mjData of {self._sim.num_worlds} worlds: .xpos, .sensordata ..., computed when read>"
+
+    def __dir__(self) -> list[str]:
+        return sorted({*_STATE, *self._sim._core.derived_fields()})
 
     def __setattr__(self, name: str, value: Any) -> None:
         if name not in _STATE:

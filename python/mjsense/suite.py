@@ -56,6 +56,9 @@ class SensorSuite(KnownAttributes):
 
     __getitem__ = get
 
+    def _ipython_key_completions_(self) -> list[str]:
+        return list(self.sensors)
+
     def __contains__(self, uuid: object) -> bool:
         return uuid in self.sensors
 

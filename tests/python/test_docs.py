@@ -21,7 +21,9 @@ PROGRAM = Path(os.environ.get("MJSENSE_PROGRAM", ROOT / "build/dev/mjsense"))
 PAGES = [ROOT / "README.md", ROOT / "CONTRIBUTING.md", *sorted(ROOT.glob("docs/*.md")), *sorted(ROOT.glob("src/mjsense/**/page.md")),
          *sorted(ROOT.glob("models/**/page.md"))]
 FENCE = re.compile(r"^```(\w+)\n(.*?)^```$", re.MULTILINE | re.DOTALL)
-MISSING = [name for name in ("matplotlib", "rerun") if importlib.util.find_spec(name) is None]
+# What pages import of others -> what of it; what is not installed is imitated.
+OTHERS: dict[str, list[str]] = {"matplotlib": ["matplotlib.pyplot"], "rerun": [], "stable_baselines3": ["mjsense.rl.sb3"], "torch": []}
+MISSING = [name for name in OTHERS if importlib.util.find_spec(name) is None]
 SHORT = ["--episodes", "1", "--horizon", "2", "--keep-failures", "--size", "64x48", "-q", "--no-sheet"]  # of recordings
 
 
@@ -62,13 +64,14 @@ class Viewer:
 
 @pytest.mark.parametrize("page", pages("python"))
 def test_python(page, tmp_path, monkeypatch):
-    """All blocks of a page, one after the other, in an empty folder. Other people's viewers are not needed to run them."""
+    """All blocks of a page, one after the other, in an empty folder. Other people's viewers and trainers are not needed to run them."""
     monkeypatch.chdir(tmp_path)
     monkeypatch.setitem(sys.modules, "mujoco.viewer", SimpleNamespace(launch_passive=Viewer))
     monkeypatch.setattr(mujoco, "viewer", sys.modules["mujoco.viewer"], raising=False)
-    for name in ("matplotlib", "matplotlib.pyplot", "rerun"):
-        if name.split(".")[0] in MISSING:
-            monkeypatch.setitem(sys.modules, name, MagicMock())
+    for name in MISSING:
+        if re.search(rf"^\s*(import|from) {name}\b", page.read_text(), re.MULTILINE):
+            for module in (name, *OTHERS[name]):
+                monkeypatch.setitem(sys.modules, module, MagicMock())
     names = {"__name__": "page"}
     for line, code in blocks(page, "python"):
         exec(compile("\n" * (line - 1) + code, str(page), "exec"), names)  # errors show the page's line

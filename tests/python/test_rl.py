@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """Tasks as trainers and gymnasium's registry want them. Where a trainer is not installed, its tests are skipped."""
 
+import re
 import sys
 from pathlib import Path
 
@@ -156,6 +157,17 @@ def test_stable_baselines3_with_pictures():
         observation, _, done, infos = worlds.step(np.zeros((3, 8)))
     assert done.all() and infos[0]["terminal_observation"]["wrist_camera"].shape == (3, 48, 64)
     worlds.close()
+
+
+def test_the_page_s_policy_is_learned():
+    """docs/train.md: the one to copy does what it says."""
+    pytest.importorskip("stable_baselines3")
+    page = (Path(__file__).parents[2] / "docs/train.md").read_text()
+    code = next(block for block in re.findall(r"^```python\n(.*?)^```$", page, re.MULTILINE | re.DOTALL) if "SB3VecEnv(" in block)
+    names = {"__name__": "page"}
+    exec(compile(code, "docs/train.md", "exec"), names)
+    returns = [episode["r"] for episode in names["policy"].ep_info_buffer]
+    assert len(returns) == 100 and np.mean(returns) > -4  # chance: -13
 
 
 def test_rsl_rl():

@@ -2,6 +2,7 @@
 """A sensor shows itself by shape, unit and frame, and an image in a notebook by a thumbnail."""
 
 import base64
+import inspect
 import pydoc
 import re
 import struct
@@ -89,3 +90,26 @@ def test_html():
 
 class Named(Height):
     uuid = "<script>"
+
+
+def test_completion():
+    """What the tab key offers in IPython."""
+    scene = ball_scene(feet_cfg())
+    sim = mjs.Simulation(scene, num_worlds=2)
+    assert {"qpos", "xpos", "sensordata"} <= set(dir(sim.data))
+    assert len(sim.data.sensordata) == 2 and "2 worlds" in repr(sim.data)
+    assert {"touch", "ball/acc", "ball"} <= set(scene._ipython_key_completions_())
+    assert mjs.SensorSuite([scene["touch"]])._ipython_key_completions_() == ["touch"]
+    assert "contact sensor" in scene._repr_html_() and "sensors>" in repr(sim)
+
+
+def test_help_of_the_package():
+    """Its example runs, and what it names is there."""
+    text = mjs.__doc__
+    example, rest = text.split("Where to look")
+    names = {}
+    exec(inspect.cleandoc("\n".join(line for line in example.splitlines() if line.startswith("    "))), names)
+    assert names["scene"]["front"].data.rgb.shape == (8, 120, 160, 3)
+    named = set(re.findall(r"\b[A-Z]\w+|\b[a-z_]+(?=\(\))", re.sub(r"\([^)]+\)", "", rest))) - {"Where"}
+    assert {"Simulation", "CameraSensorCfg", "SensorSuite", "task_names"} <= named
+    assert not [name for name in named if not hasattr(mjs, name)]
