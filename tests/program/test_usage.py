@@ -3,6 +3,8 @@
 
 import json
 import os
+import shlex
+import subprocess
 
 import pytest
 
@@ -37,8 +39,63 @@ SCENE = """<mujoco><worldbody><body name="ball"><freejoint/><geom size=".1"/><si
     ("inspect missing", "missing: no such file or directory"),
     ("verify missing", "missing: no such file or directory"),
     ("repair missing", "missing: no such file or directory"),
+    ("--bogus", "no option '--bogus'"),
+    ("tasks extra", "extra"),
+    ("robots --bogus", "--bogus"),
+    ("scenes --jsn", "--jsn"),
+    ("schema extra", "extra"),
+    ("inspect broken.xml", "cannot open 'broken.xml'"),
+    ("inspect broken.xml --sheet x.png", "cannot open 'broken.xml'"),
+    ("inspect folder", "'folder' holds no recording"),
+    ("inspect pipe", "'pipe' is neither a file nor a folder"),
+    ("inspect link.h5", "'link.h5' is a link, which is not followed"),
+    ("inspect folder extra", "extra"),
+    ("verify", "path is required"),
+    ("verify folder", "'folder' holds no recording"),
+    ("verify /dev/null", "'/dev/null' is neither a file nor a folder"),
+    ("verify pipe", "'pipe' is neither a file nor a folder"),
+    ("repair folder", "'folder' holds no recording"),
+    ("repair pipe", "'pipe' is neither a file nor a folder"),
+    ("repair broken.xml", "'broken.xml' is no trajectories_batch_*_of_*.h5"),
+    ("sensors", "what is required"),
+    ("sensors folder", "folder: is no file: expected an MJCF file or the name of a task"),
+    ("sensors pipe", "pipe: is no file"),
+    ("sensors scene.xml --robot franka", "--robot is an option of tasks, and scene.xml is a scene"),
+    ("sensors scene.xml --steps -1", "--steps"),
+    ("sensors pick --scene tabel", "no scene named 'tabel'; did you mean 'table'?"),
+    ("sensors pick --set foo=1", "no field named 'foo'"),
+    ("scan scene.xml --frame site:s", "--out is required"),
+    ("scan missing.xml --frame site:s --out x.ply", "missing.xml"),
+    ("scan folder --frame site:s --out x.ply", "folder"),
+    ("scan pipe --frame site:s --out x.ply", "pipe"),
+    ("scan broken.xml --frame site:s --out x.ply", "broken.xml"),
+    ("scan scene.xml --frame here --out x.ply", "--frame here: expected a type and a name"),
+    ("scan scene.xml --frame site:t --out x.ply", "no site named 't'; did you mean 's'?"),
+    ("scan scene.xml --frame site:s --out x.txt", "the name must end in .ply or .pcd"),
+    ("scan scene.xml --frame site:s --out no/x.ply", "cannot write 'no/x.ply'"),
+    ("scan scene.xml --frame site:s --out x.ply --table broken.xml", "'broken.xml': is not a .npy file"),
+    ("scan scene.xml --frame site:s --out x.ply --steps 99999999999", "--steps"),
+    ("record pick --out file", "cannot create the directory 'file/house_0/.recording'"),
+    ("record pick --out x --seed -1", "--seed is '-1': must be an int from 0 on"),
+    ("record pick --out x --episodes 4294967297", "--episodes is '4294967297': must be an int"),
+    ("record pick --out x --worlds 4294967297", "--worlds is '4294967297': must be an int"),
+    ("record pick --out x --threads 5000", "threads is 5000: must be 0 (all) to 4096"),
+    ("record pick --out x --perturb nan", "perturb is nan"),
+    ("record pick --out x --scene tabel", "no scene named 'tabel'"),
+    ("record pick --out x --set foo", "--set foo: expected NAME=VALUE"),
+    ("record pick --out x --ffmpeg /bin/true", "'/bin/true' has no encoder"),
+    ("record pick --out x --config folder", "folder: is a folder, expected a file"),
+    ("record pick --out x --config pipe", "pipe: is a pipe, expected a file"),
+    ("record nav_to_obj --out x --robot franka", "needs a base that drives"),
+    ("record packing --out x --scene table", "scene 'table' has no receptacle"),
+    ("record pick --out x --cameras none extra", "extra"),
 ])
 def test_wrong_input_is_one_clear_line(mjsense, args, line):
+    (mjsense.folder / "scene.xml").write_text(SCENE)
+    (mjsense.folder / "file").write_text("mine")
+    (mjsense.folder / "folder").mkdir()
+    (mjsense.folder / "link.h5").symlink_to("file")
+    os.mkfifo(mjsense.folder / "pipe")
     (mjsense.folder / "typo.toml").write_text('task = "pick"\nepisods = 3\n')
     (mjsense.folder / "type.toml").write_text('episodes = "three"\n')
     (mjsense.folder / "broken.toml").write_text("episodes = = 3\n")
@@ -49,6 +106,28 @@ def test_wrong_input_is_one_clear_line(mjsense, args, line):
     assert done.stderr.startswith("mjsense: ") and done.stderr.count("\n") == 1, done.stderr
     assert done.stdout == ""
     assert sorted(mjsense.folder.iterdir()) == before
+
+
+@pytest.mark.parametrize("args", ("''", "inspect ''", "verify ''", "repair ''", "sensors ''", "scan '' --frame site:s --out x.ply",
+                                  "record '' --out x", "record pick --out ''", "record pick --out x --config ''"))  # fmt: skip
+def test_an_empty_word_is_one_clear_line(mjsense, args):
+    done = mjsense(*shlex.split(args), rc=2)
+    assert done.stderr.startswith("mjsense: ") and done.stderr.count("\n") == 1 and not done.stdout
+    assert not list(mjsense.folder.iterdir())
+
+
+WORDS = ("tasks", "robots", "scenes", "schema", "--help", "--version", "record --help", "inspect data", "verify data", "repair data",
+         "verify data --json", "inspect data --json", "sensors scene.xml", "scan scene.xml --frame site:s --out cloud.ply",
+         "record pick --out more --cameras none --horizon 2 --keep-failures -q")  # fmt: skip
+
+
+def test_stdout_that_cannot_be_written_is_an_error_of_every_word(mjsense):
+    (mjsense.folder / "scene.xml").write_text(SCENE)
+    mjsense("record", "pick", "--cameras", "none", "--horizon", 2, "--keep-failures", "-q", "--out", "data")
+    for word in WORDS:
+        with open("/dev/full", "w") as full:
+            done = subprocess.run([mjsense.program, *word.split()], cwd=mjsense.folder, stdout=full, stderr=subprocess.PIPE, text=True)
+        assert (done.returncode, done.stderr) == (2, "mjsense: cannot write to stdout: No space left on device\n"), word
 
 
 def test_no_word_at_all_shows_the_words(mjsense):
@@ -113,6 +192,11 @@ def test_verify_inspect_repair(mjsense):
     assert json.loads(mjsense("inspect", "data", "--json", "--sheet", "sheet.png").stdout)
     assert (mjsense.folder / "sheet.png").read_bytes().startswith(b"\x89PNG")
     mjsense("repair", "data")
+    for wrong in (["--sheet", "no/x.png"], ["--sheet", "data"], ["--sheet", ""], ["--sheet", "x.png", "--ffmpeg", "/no/ffmpeg"],
+                  ["--sheet", "x.png", "--ffmpeg", "/bin/true"]):  # fmt: skip
+        done = mjsense("inspect", "data", *wrong, rc=2)
+        assert done.stderr.startswith("mjsense: ") and done.stderr.count("\n") == 1 and not done.stdout
+    assert sorted(p.name for p in mjsense.folder.iterdir()) == ["data", "sheet.png"]
     video = next((mjsense.folder / "data/house_0").glob("*.mp4"))
     video.unlink()
     done = mjsense("verify", "data", rc=1)

@@ -148,7 +148,8 @@ void show_warnings() {
 }
 
 const std::string& existing(const std::string& path) {
-  if (!std::filesystem::exists(path)) throw ValueError(path + ": no such file or directory");
+  if (!std::filesystem::exists(path))
+    throw ValueError((path.empty() ? "''" : path) + ": no such file or directory");
   return path;
 }
 
@@ -212,7 +213,12 @@ int run(int argc, char** argv) {
     return kWrongInput;
   }
   const std::string word = argv[1];
-  if (!word.empty() && word[0] != '-' && std::ranges::find(known, word) == known.end()) {
+  if (word.starts_with('-')) {
+    // The library would ask for a command first.
+    const CLI::Option* option = program.get_option_no_throw(word);
+    if (option == nullptr)
+      throw ValueError(fmt::format("no option '{}' (mjsense --help shows how)", word));
+  } else if (std::ranges::find(known, word) == known.end()) {
     run_external(word, argv + 1, known);
   }
   // Writing beyond ulimit -f, on stdout too, is an error of that write. (Another program, above, gets
@@ -223,12 +229,16 @@ int run(int argc, char** argv) {
     program.parse(argc, argv);
   } catch (const CLI::ParseError& e) {
     if (e.get_exit_code() == 0) return program.exit(e);  // --help, --version
-    throw ValueError(
-        fmt::format("{} (mjsense{} --help shows how)", e.what(), word[0] == '-' ? "" : " " + word));
+    throw ValueError(fmt::format("{} (mjsense{} --help shows how)", e.what(),
+                                 word.starts_with('-') ? "" : " " + word));
   }
 
   if (record.parsed()) return run_record(record_options);
-  if (sensors.parsed()) return run_sensors(sensors_options);
+  if (sensors.parsed()) {
+    for (const CLI::Option* o : sensors.get_options())
+      if (o->count() > 0) sensors_options.given.push_back(o->get_name());
+    return run_sensors(sensors_options);
+  }
   if (scan.parsed()) return run_scan(scan_options);
   if (tasks.parsed() || robots.parsed() || scenes.parsed()) {
     print(tasks.parsed()    ? list_tasks(list_json)
@@ -242,10 +252,10 @@ int run(int argc, char** argv) {
   }
   if (inspect_app.parsed()) {
     const InspectResult result = inspect(existing(inspect_options.path));
-    print(inspect_options.json ? result.json() : result.text());
-    if (!inspect_options.sheet.empty()) {
+    // Before anything is printed: what cannot be drawn or written is one line.
+    if (inspect_app.get_option("--sheet")->count() > 0)
       contact_sheet(inspect_options.path, inspect_options.sheet, 4, 8, inspect_options.ffmpeg);
-    }
+    print(inspect_options.json ? result.json() : result.text());
     return 0;
   }
   if (verify_app.parsed()) {

@@ -113,7 +113,15 @@ int run_sensors(const SensorsOptions& options) {
   const std::filesystem::path path = options.what;
   if (path.has_extension() || std::filesystem::exists(path)) {
     if (!std::filesystem::is_regular_file(path)) {
-      throw ValueError(fmt::format("{}: no such file", options.what));
+      throw ValueError(fmt::format("{}: {}", options.what,
+                                   std::filesystem::exists(path)
+                                       ? "is no file: expected an MJCF file or the name of a task"
+                                       : "no such file"));
+    }
+    for (const std::string& option : options.given) {
+      if (option != "what" && option != "--steps" && option != "--json")
+        throw ValueError(
+            fmt::format("{} is an option of tasks, and {} is a scene", option, options.what));
     }
     SceneCfg cfg;
     cfg.base.path = options.what;

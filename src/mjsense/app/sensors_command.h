@@ -3,6 +3,7 @@
 // `mjsense sensors SCENE.xml|TASK`: every stream, what it means, and what it costs.
 
 #include <string>
+#include <vector>
 
 #include "mjsense/rollout/rollout.h"
 
@@ -13,6 +14,7 @@ struct SensorsOptions {
   RolloutCfg rollout;  // of a task
   int steps = 20;      // control steps over which the cost is taken; 0: do not measure
   bool json = false;
+  std::vector<std::string> given;  // names of the options of the command line
 };
 
 int run_sensors(const SensorsOptions& options);

@@ -211,8 +211,15 @@ std::string contact_sheet(const fs::path& path, const fs::path& png, int episode
   int tile_width = 0, width = text_width(title), height = kGap + kLine;
   for (std::size_t s = 0; s < strips.size(); ++s) {
     Strip& strip = strips[s];
-    pictures.push_back(grab_frames(strip.video, strip.moments(columns), strip.tile_width(),
-                                   kTileHeight, strip.depth16, ffmpeg));
+    const std::vector<int> moments = strip.moments(columns);
+    pictures.push_back(
+        grab_frames(strip.video, moments, strip.tile_width(), kTileHeight, strip.depth16, ffmpeg));
+    const std::size_t bytes =
+        std::size_t{strip.depth16 ? 2u : 3u} * strip.tile_width() * kTileHeight * moments.size();
+    if (pictures[s].size() < bytes)
+      throw RuntimeError(
+          fmt::format("contact sheet: '{}': ffmpeg gave {} bytes of pictures, expected {}",
+                      strip.video.string(), pictures[s].size(), bytes));
     if (strip.depth16) pictures[s] = colour_depth(pictures[s], strip.unit, strip.camera);
     tile_width = std::max(tile_width, strip.tile_width());
     width = std::max({width, text_width(strip.episode), text_width(strip.camera)});

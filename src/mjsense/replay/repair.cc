@@ -5,6 +5,8 @@
 #include <cstdio>
 #include <cstring>
 #include <nlohmann/json.hpp>
+#include <optional>
+#include <utility>
 
 #include "mjsense/core/error.h"
 #include "mjsense/core/plain_file.h"
@@ -79,17 +81,24 @@ std::string missing_names(const fs::path& path, int batch, int batches) {
   return missing.dump();
 }
 
-int name_videos(const fs::path& path) {
+// "trajectories_batch_2_of_3.h5": {2, 3}
+std::optional<std::pair<int, int>> batch_number(const fs::path& path) {
   int batch = 0, batches = 0;
   if (std::sscanf(path.filename().c_str(), "trajectories_batch_%d_of_%d.h5", &batch, &batches) != 2)
-    return 0;
+    return {};
+  return std::pair{batch, batches};
+}
+
+int name_videos(const fs::path& path) {
+  const auto number = batch_number(path);
+  if (!number) return 0;
   const Fd bytes = open_plain(path.parent_path(), path.filename().string());
   const Seal seal = check_seal(bytes.get());
   if (seal == Seal::kBroken)
     throw RuntimeError(fmt::format("'{}' is damaged: its checksum is wrong", path.string()));
-  const auto missing =
-      nlohmann::json::parse(h5::in_child(path.string(), static_cast<std::uint64_t>(size_of(bytes)),
-                                         [&] { return missing_names(path, batch, batches); }));
+  const auto missing = nlohmann::json::parse(
+      h5::in_child(path.string(), static_cast<std::uint64_t>(size_of(bytes)),
+                   [&] { return missing_names(path, number->first, number->second); }));
   if (missing.empty()) return 0;  // most files need nothing: they are not opened for writing
   const h5::H5Lock lock;
   h5::Id file = h5::open_file(path, true);
@@ -108,6 +117,9 @@ int name_videos(const fs::path& path) {
 // What cannot be repaired is named, and does not keep the rest from being repaired.
 RepairResult repair(const fs::path& path) {
   RepairResult result;
+  if (fs::is_regular_file(path) && !batch_number(path))
+    throw ValueError(fmt::format(
+        "'{}' is no trajectories_batch_*_of_*.h5: repair takes these, and folders", path.string()));
   const auto attempt = [&](const fs::path& what, auto&& deed) {
     try {
       deed();

@@ -29,7 +29,10 @@ bool is_trajectory_file(const fs::path& path) {
 
 void require_exists(const fs::path& path) {
   std::error_code error;
-  if (!fs::exists(path, error)) throw ValueError(fmt::format("'{}' does not exist", path.string()));
+  const fs::file_status found = fs::status(path, error);
+  if (!fs::exists(found)) throw ValueError(fmt::format("'{}' does not exist", path.string()));
+  if (!fs::is_regular_file(found) && !fs::is_directory(found))
+    throw ValueError(fmt::format("'{}' is neither a file nor a folder", path.string()));
 }
 
 // What a walk through folders meets - one that may not be entered, names too long for the system - is
