@@ -277,8 +277,10 @@ std::string read_text(hid_t parent, const std::string& path) {
 void set_attribute(hid_t object, const char* name, std::string_view value) {
   const std::string owned(value);
   const char* data = owned.c_str();
-  const Id type = text_type();
-  write_attribute(object, name, type, type, scalar(), &data);
+  // Made once, and never closed: a recording has a hundred texts, each shorter than its type.
+  static const Id& type = *new Id(text_type());
+  static const Id& space = *new Id(scalar());
+  write_attribute(object, name, type, type, space, &data);
 }
 
 void set_attribute(hid_t object, const char* name, double value) {
