@@ -141,6 +141,14 @@ def test_a_folder_that_cannot_be_written(mjsense):
     assert "file" in done.stderr and done.stderr.count("\n") == 1
 
 
+@pytest.mark.parametrize("name", ("file:a:b", "-y", "a b%d", "tcp://x"))
+def test_folders_are_folders_whatever_they_are_called(mjsense, name):
+    """Nothing of a name is an option or an address for ffmpeg."""
+    mjsense("record", "pick", "--size", "32x24", "--horizon", 2, "--keep-failures", "-q", f"--out={name}")
+    assert "whole: 1 files, 1 episodes" in mjsense("verify", "--", name).stdout
+    assert sorted(p.name for p in (mjsense.folder / name).iterdir()) == ["contact_sheet.png", "house_0"]
+
+
 def test_another_recording_is_not_written_over(mjsense):
     quick = ["record", "pick", "--cameras", "none", "--horizon", 3, "--keep-failures", "-q", "--out", "data"]
     mjsense(*quick)

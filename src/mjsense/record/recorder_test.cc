@@ -167,6 +167,28 @@ TEST(Recorder, ABatchWaitsForEarlierEpisodes) {
               ::testing::Contains(HasSubstr("trajectories_batch_1_of_2.h5")));
 }
 
+// What is said to be saved is on disk already, whatever happens to the program next.
+TEST(Recorder, SavedEpisodesAreOnDisk) {
+  TempDir dir;
+  FakeSuite suite(without_video(1));
+  constexpr int kEpisodes = 8;
+  RecordingCfg cfg = fake_recording(dir.path, suite, 1, kEpisodes);
+  cfg.batches = 1;
+  Recorder recorder(cfg);
+  for (int e = 0; e < kEpisodes - 1; ++e) {  // the batch stays open: nothing is published
+    recorder.begin_episode(0, {e, 7});
+    suite.fill(0, e, 0, 1);
+    recorder.append(0, {1, true, false, true});
+    recorder.finish_episode(0, "{}", "success");
+    for (int saved = e; saved == e && !HasFailure();) {
+      saved = recorder.saved();
+      const std::size_t found = finished_episodes(dir.path / "house_0").size();
+      EXPECT_GE(found, static_cast<std::size_t>(saved));
+    }
+  }
+  EXPECT_EQ(recorder.saved(), kEpisodes - 1);
+}
+
 TEST(Recorder, FewEncodersGiveTheSameVideos) {
   TempDir many, few;
   const Attempts attempts{.worlds = 4, .steps = 12};
@@ -439,6 +461,11 @@ TEST(RecorderFaults, WrongConfigurationsAreNamed) {
   EXPECT_THAT(error([](RecordingCfg& c) { c.out_dir.clear(); }), HasSubstr("no output directory"));
   EXPECT_THAT(error([](RecordingCfg& c) { c.out_dir = c.out_dir / std::string(300, 'x'); }),
               HasSubstr("x/house_0/.recording': File name too long"));
+  for (const char* name : {"a\nb", "\x1b[31m"})
+    EXPECT_THAT(error([&](RecordingCfg& c) { c.out_dir /= name; }),
+                HasSubstr("has control characters"));
+  EXPECT_THAT(error([](RecordingCfg& c) { c.out_dir /= std::string("a\0b", 3); }),
+              HasSubstr("has control characters"));
   EXPECT_THAT(error([](RecordingCfg& c) { c.episodes = 0; }), HasSubstr("episodes is 0"));
   EXPECT_THAT(error([](RecordingCfg& c) { c.num_worlds = -1; }), HasSubstr("num_worlds is -1"));
   EXPECT_THAT(error([](RecordingCfg& c) { c.fps = {0, 1}; }), HasSubstr("fps is 0/1"));
