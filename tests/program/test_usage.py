@@ -108,6 +108,31 @@ def test_wrong_input_is_one_clear_line(mjsense, args, line):
     assert sorted(mjsense.folder.iterdir()) == before
 
 
+def numbers_of_record(mjsense):
+    """(name, kind) of every option of record that takes a number."""
+    fields = json.loads(mjsense("schema").stdout)["structs"]["RecordJobCfg"]["fields"]
+    kinds = [(f["option"], f["type"].get("element", f["type"])["kind"]) for f in fields]
+    return [(name, kind) for name, kind in kinds if kind in ("int", "unsigned", "number")]
+
+
+def test_numbers_that_do_not_fit_are_refused_wherever_they_are_given(mjsense):
+    """No integer is cut to 32 bits (4294967297 would be 1), and no number is NaN: in experiments, as an option, by --set."""
+    wrong = {"int": (2**32 + 1, 1 - 2**32, 2**31, 2**64 + 1, -1, "2.0", '"2"'), "unsigned": (-1, 2**64 + 1, "1.5"), "number": ("nan", "-inf")}
+    numbers = numbers_of_record(mjsense)
+    assert len(numbers) > 15
+    for name, kind in numbers:
+        for value in wrong[kind]:
+            (mjsense.folder / "e.toml").write_text(f"{name} = {value}\n")
+            ways = [["--config", "e.toml"]]
+            if value in (wrong[kind][0], wrong[kind][1]):
+                ways += [[f"--{name.replace('_', '-')}={value}"], ["--set", f"{name}={value}"]]
+            for way in ways:
+                done = mjsense("record", "pick", "--out", "x", *way, rc=2)
+                assert done.stderr.startswith("mjsense: ") and done.stderr.count("\n") == 1 and not done.stdout, (name, value, way)
+                assert name.replace("_", "-") in done.stderr.replace("_", "-") or "64 bits" in done.stderr, (name, value, way, done.stderr)
+    assert [p.name for p in mjsense.folder.iterdir()] == ["e.toml"]
+
+
 @pytest.mark.parametrize("args", ("''", "inspect ''", "verify ''", "repair ''", "sensors ''", "scan '' --frame site:s --out x.ply",
                                   "record '' --out x", "record pick --out ''", "record pick --out x --config ''"))  # fmt: skip
 def test_an_empty_word_is_one_clear_line(mjsense, args):
