@@ -436,6 +436,30 @@ class DerivedFields:
     """
 
     _sim: Simulation
+    # What editors and type checkers know of; all others of MuJoCo's are there, too, and dir() has them.
+    xpos: np.ndarray
+    xquat: np.ndarray
+    xmat: np.ndarray
+    xipos: np.ndarray
+    geom_xpos: np.ndarray
+    geom_xmat: np.ndarray
+    site_xpos: np.ndarray
+    site_xmat: np.ndarray
+    cam_xpos: np.ndarray
+    cam_xmat: np.ndarray
+    subtree_com: np.ndarray
+    cvel: np.ndarray
+    qacc: np.ndarray
+    qfrc_bias: np.ndarray
+    qfrc_passive: np.ndarray
+    qfrc_actuator: np.ndarray
+    qfrc_constraint: np.ndarray
+    actuator_length: np.ndarray
+    actuator_velocity: np.ndarray
+    actuator_force: np.ndarray
+    ten_length: np.ndarray
+    sensordata: np.ndarray
+    cfrc_ext: np.ndarray
 
     def __init__(self, sim: Simulation) -> None:
         object.__setattr__(self, "_sim", sim)

@@ -97,6 +97,7 @@ def test_completion():
     scene = ball_scene(feet_cfg())
     sim = mjs.Simulation(scene, num_worlds=2)
     assert {"qpos", "xpos", "sensordata"} <= set(dir(sim.data))
+    assert set(type(sim.data).__annotations__) - {"_sim"} <= set(dir(sim.data))
     assert len(sim.data.sensordata) == 2 and "2 worlds" in repr(sim.data)
     assert {"touch", "ball/acc", "ball"} <= set(scene._ipython_key_completions_())
     assert mjs.SensorSuite([scene["touch"]])._ipython_key_completions_() == ["touch"]
