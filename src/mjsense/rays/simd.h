@@ -67,6 +67,7 @@ inline Mask mask_of(std::uint32_t b) { return {static_cast<__mmask16>(b)}; }
 inline Float select(Mask m, Float a, Float b) { return _mm512_mask_blend_ps(m.m, b.v, a.v); }
 inline Int select(Mask m, Int a, Int b) { return {_mm512_mask_blend_epi32(m.m, b.v, a.v)}; }
 inline Mask less(Int a, Int b) { return {_mm512_cmplt_epi32_mask(a.v, b.v)}; }
+inline Mask operator==(Int a, Int b) { return {_mm512_cmpeq_epi32_mask(a.v, b.v)}; }
 inline Int operator+(Int a, Int b) { return {_mm512_add_epi32(a.v, b.v)}; }
 inline Int operator*(Int a, Int b) { return {_mm512_mullo_epi32(a.v, b.v)}; }
 inline Int truncate(Float a) { return {_mm512_cvttps_epi32(a.v)}; }
@@ -137,6 +138,7 @@ inline Int select(Mask m, Int a, Int b) {
       _mm256_blendv_ps(_mm256_castsi256_ps(b.v), _mm256_castsi256_ps(a.v), m.m))};
 }
 inline Mask less(Int a, Int b) { return {_mm256_castsi256_ps(_mm256_cmpgt_epi32(b.v, a.v))}; }
+inline Mask operator==(Int a, Int b) { return {_mm256_castsi256_ps(_mm256_cmpeq_epi32(a.v, b.v))}; }
 inline Int operator+(Int a, Int b) { return {_mm256_add_epi32(a.v, b.v)}; }
 inline Int operator*(Int a, Int b) { return {_mm256_mullo_epi32(a.v, b.v)}; }
 inline Int truncate(Float a) { return {_mm256_cvttps_epi32(a.v)}; }
@@ -223,6 +225,7 @@ inline Mask mask_of(std::uint32_t b) {
 inline Float select(Mask m, Float a, Float b) { return m.m ? a.v : b.v; }
 inline Int select(Mask m, Int a, Int b) { return {m.m ? a.v : b.v}; }
 inline Mask less(Int a, Int b) { return {a.v < b.v}; }
+inline Mask operator==(Int a, Int b) { return {a.v == b.v}; }
 inline Int operator+(Int a, Int b) { return {a.v + b.v}; }
 inline Int operator*(Int a, Int b) { return {a.v * b.v}; }
 inline Int truncate(Float a) { return {__builtin_convertvector(a.v, Int4)}; }

@@ -10,13 +10,12 @@ namespace mjsense {
 namespace {
 
 struct Casters {
-  int* list = nullptr;  // geoms, one after another as often as parts of it are casters
-  LightWindows windows{};
-  int count = 0;
-  int hint =
-      -1;  // the geom that did for the packet before, or -1; asked first, which only saves time
-  const LightFrame* frame = nullptr;
-  float error = 0;  // of positions of the tile, m
+  int* list;  // geoms, one after another as often as parts of it are casters
+  LightWindows windows;
+  int count;
+  int hint;  // the geom that did for the packet before, or -1; asked first, which only saves time
+  const LightFrame* frame;
+  float error;  // of positions of the tile, m
 
   void add(int geom, const LightWindows& from, int k) {
     list[count] = geom;

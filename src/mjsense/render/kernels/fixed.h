@@ -21,7 +21,7 @@ inline std::uint32_t fixed_lanes(const FixedTile& fixed, int packet, const Hits&
   std::uint32_t lanes = 0;
   for (int k = 0; k < kLanes; k += kWidth) {
     const Int id = load(hits.id + k), kept = load(fixed.id + packet * kLanes + k);
-    lanes |= bits(~(less(id, kept) | less(kept, id)) & less(int_of(-1), id)) << k;
+    lanes |= bits((id == kept) & less(int_of(-1), id)) << k;
   }
   return lanes;
 }
@@ -49,7 +49,7 @@ inline Shown shown_by(const View& view, const FixedTile* fixed, const Tile& tile
     for (int k = 0; k < kLanes; k += kWidth) {
       const Mask m = mask_of(lanes >> k & kAllLanes);
       const Int own = load(hits.geom + k);
-      if (any(m & (less(own, int_of(out.only)) | less(int_of(out.only), own)))) out.only = -1;
+      if (any(m & ~(own == int_of(out.only)))) out.only = -1;
       const Vec3f at = hit_point(view, tile.pixels[q], hits, k);
       const Float p[3] = {at.x, at.y, at.z};
       for (int c = 0; c < 3; ++c) {
@@ -70,9 +70,12 @@ inline void find_casters(const View& view, Part part, const Shown& shown, TileSc
                          int& used, int& spare, Casters* out) {
   for (int i = 0; i < view.num_lights; ++i) {
     const LightWindows& w = scratch.windows;
-    out[i] = {};
-    out[i].list = scratch.casters + used;
-    out[i].windows = {w.u0 + used, w.u1 + used, w.v0 + used, w.v1 + used, w.w + used};
+    out[i] = {scratch.casters + used,
+              {w.u0 + used, w.u1 + used, w.v0 + used, w.v1 + used, w.w + used},
+              0,
+              -1,
+              nullptr,
+              0};
     if (!view.lights[i].shadows || shown.low[0] > shown.high[0]) continue;
     find_casters(view, i, part, shown.low, shown.high, shown.only, spare, out[i]);
     used += out[i].count;

@@ -63,6 +63,9 @@ inline void trace_opaque(const View& view, const Pixels& pixels, Hits& hits) {
 
 // What the mirror among `lanes` reflects, added to its colour. Of a box only the top is one.
 inline void add_reflection(const View& view, const Pixels& pixels, const Hits& hits, Colors& out) {
+  Mask some = mask_of(0);
+  for (int k = 0; k < kLanes; k += kWidth) some = some | (load(hits.id + k) == int_of(view.mirror));
+  if (!any(some)) return;
   const View& beyond = *view.reflection;
   Pixels through = pixels;
   std::uint32_t lanes = 0;

@@ -35,37 +35,38 @@ inline Float power(Float x, Float n) {
 struct LightTerm {
   Float scale;           // attenuation * spot
   Float diffuse;         // N L
-  Float specular;        // (N H)^exponent
   Vec3f to_light, unit;  // the same direction
 };
 
-inline LightTerm light_term(const ViewLight& light, Vec3f p, Vec3f n) {
+inline Float attenuation(const ViewLight& light, Float distance) {
+  const float* a = light.attenuation;
+  if (a[1] == 0 && a[2] == 0) return splat(1.0f / (a[0] > 1e-6f ? a[0] : 1e-6f));  // the default
+  const Float loss = fma(fma(splat(a[2]), distance, splat(a[1])), distance, splat(a[0]));
+  return splat(1.0f) / max(loss, splat(1e-6f));
+}
+
+// Of the lanes from k on.
+inline LightTerm light_term(const ViewLight& light, const Surfaces& s, int k) {
   const Float zero = splat(0.0f), one = splat(1.0f);
-  LightTerm out;
-  out.scale = one;
-  out.specular = zero;
+  const Vec3f n{load(s.n[0] + k), load(s.n[1] + k), load(s.n[2] + k)};
   if (light.kind == LightKind::kDirectional) {
-    out.to_light = out.unit = {splat(-light.dir[0]), splat(-light.dir[1]), splat(-light.dir[2])};
-  } else {
-    out.to_light = splat(light.pos) - p;
-    const Float distance = sqrt(max(dot(out.to_light, out.to_light), splat(1e-20f)));
-    const Float inverse = one / distance;
-    const Vec3f l{out.to_light.x * inverse, out.to_light.y * inverse, out.to_light.z * inverse};
-    out.unit = l;
-    const float* a = light.attenuation;
-    out.scale = one / max(fma(fma(splat(a[2]), distance, splat(a[1])), distance, splat(a[0])),
-                          splat(1e-6f));
-    if (light.kind == LightKind::kSpot) {
-      const Float cosine = -dot(l, splat(light.dir));
-      const Mask outside = cosine < splat(light.cos_cutoff);
-      Float spot = one;
-      if (light.exponent > 0 && any(~outside))
-        spot = power(max(cosine, zero), splat(light.exponent));
-      out.scale = out.scale * select(outside, zero, spot);
-    }
+    const Vec3f l{splat(-light.dir[0]), splat(-light.dir[1]), splat(-light.dir[2])};
+    return {one, max(dot(n, l), zero), l, l};
   }
-  out.diffuse = max(dot(n, out.unit), zero);
-  return out;
+  const Vec3f p{load(s.p[0] + k), load(s.p[1] + k), load(s.p[2] + k)};
+  const Vec3f way = splat(light.pos) - p;
+  const Float distance = sqrt(max(dot(way, way), splat(1e-20f)));
+  const Float inverse = one / distance;
+  const Vec3f l{way.x * inverse, way.y * inverse, way.z * inverse};
+  Float scale = attenuation(light, distance);
+  if (light.kind == LightKind::kSpot) {
+    const Float cosine = -dot(l, splat(light.dir));
+    const Mask outside = cosine < splat(light.cos_cutoff);
+    Float spot = one;
+    if (light.exponent > 0 && any(~outside)) spot = power(max(cosine, zero), splat(light.exponent));
+    scale = scale * select(outside, zero, spot);
+  }
+  return {scale, max(dot(n, l), zero), way, l};
 }
 
 // What makes points p directions to the viewer, which is the camera's origin, of orthographic cameras
@@ -87,43 +88,38 @@ struct Lit {
 
   Lit() = default;
   Lit(const ViewLight& light, const Surfaces& s) {
-    for (int k = 0; k < kLanes; k += kWidth) {
-      const Vec3f p{load(s.p[0] + k), load(s.p[1] + k), load(s.p[2] + k)};
-      const Vec3f n{load(s.n[0] + k), load(s.n[1] + k), load(s.n[2] + k)};
-      terms[k / kWidth] = light_term(light, p, n);
-    }
-  }
-
-  void add_specular(const Surfaces& s, const ToEye& eye, std::uint32_t lanes) {
-    const Float zero = splat(0.0f), one = splat(1.0f);
-    for (int k = 0; k < kLanes; k += kWidth) {
-      LightTerm& term = terms[k / kWidth];
-      const Mask glossy =
-          (zero < term.diffuse) & (zero < load(s.specular + k)) & mask_of(lanes >> k & kAllLanes);
-      if (!any(glossy)) continue;
-      const Vec3f n{load(s.n[0] + k), load(s.n[1] + k), load(s.n[2] + k)};
-      const Vec3f p{load(s.p[0] + k), load(s.p[1] + k), load(s.p[2] + k)};
-      const Vec3f h = along(term.unit, load(eye.scale + k), p);
-      const Float nh = dot(n, h) / sqrt(max(dot(h, h), splat(1e-20f)));
-      term.specular = select(glossy, power(min(max(nh, zero), one), load(s.exponent + k)), zero);
-    }
+    for (int k = 0; k < kLanes; k += kWidth) terms[k / kWidth] = light_term(light, s, k);
   }
 };
 
-// Adds the light's contribution to `sum`, for lanes that are not in `dark`; clamped to 1 by itself
-// if `separate`.
-inline void add_light(const ViewLight& light, const Lit& lit, const Surfaces& s, std::uint32_t dark,
+// (N H)^exponent of the lanes from k on that are in `lanes` and shine.
+inline Float highlight(const LightTerm& term, const Surfaces& s, const ToEye& eye, int k,
+                       std::uint32_t lanes) {
+  const Float zero = splat(0.0f), one = splat(1.0f);
+  const Mask glossy =
+      (zero < term.diffuse) & (zero < load(s.specular + k)) & mask_of(lanes >> k & kAllLanes);
+  if (!any(glossy)) return zero;
+  const Vec3f n{load(s.n[0] + k), load(s.n[1] + k), load(s.n[2] + k)};
+  const Vec3f p{load(s.p[0] + k), load(s.p[1] + k), load(s.p[2] + k)};
+  const Vec3f h = along(term.unit, load(eye.scale + k), p);
+  const Float nh = dot(n, h) / sqrt(max(dot(h, h), splat(1e-20f)));
+  return select(glossy, power(min(max(nh, zero), one), load(s.exponent + k)), zero);
+}
+
+// Adds the light's contribution to the lanes of `sum` from k on, for those that are not in `dark`;
+// clamped to 1 by itself if `separate`.
+inline void add_light(const ViewLight& light, const LightTerm& term, const Surfaces& s,
+                      const ToEye& eye, int k, std::uint32_t lanes, std::uint32_t dark,
                       bool separate, Colors& sum) {
-  for (int k = 0; k < kLanes; k += kWidth) {
-    const LightTerm& term = lit.terms[k / kWidth];
-    const Float gloss = term.specular * load(s.specular + k);
-    const Float scale = select(mask_of(dark >> k & kAllLanes), splat(0.0f), term.scale);
-    for (int c = 0; c < 3; ++c) {
-      const Float matte = fma(splat(light.diffuse[c]), term.diffuse, splat(light.ambient[c]));
-      Float add = scale * fma(matte, load(s.rgb[c] + k), splat(light.specular[c]) * gloss);
-      if (separate) add = min(add, splat(1.0f));
-      store(sum.rgb[c] + k, load(sum.rgb[c] + k) + add);
-    }
+  const bool shines = light.specular[0] + light.specular[1] + light.specular[2] > 0;
+  const Float gloss =
+      shines ? highlight(term, s, eye, k, lanes & ~dark) * load(s.specular + k) : splat(0.0f);
+  const Float scale = select(mask_of(dark >> k & kAllLanes), splat(0.0f), term.scale);
+  for (int c = 0; c < 3; ++c) {
+    const Float matte = fma(splat(light.diffuse[c]), term.diffuse, splat(light.ambient[c]));
+    Float add = scale * fma(matte, load(s.rgb[c] + k), splat(light.specular[c]) * gloss);
+    if (separate) add = min(add, splat(1.0f));
+    store(sum.rgb[c] + k, load(sum.rgb[c] + k) + add);
   }
 }
 
@@ -173,7 +169,8 @@ inline std::uint32_t dark_lanes(const View& view, int index, const Lit& lit, con
 // Colours 0..1 of `lanes`. No shadows: no light casts any here.
 inline void shade(const View& view, const Surfaces& s, const Hits& hits, std::uint32_t lanes,
                   Shadows* shadows, Colors& out) {
-  Colors separate = {};
+  Colors separate;
+  if (shadows) separate = {};
   for (int c = 0; c < 3; ++c)
     for (int k = 0; k < kLanes; k += kWidth) {
       const Float glow = load(s.emission + k) + splat(view.global_ambient);
@@ -183,16 +180,21 @@ inline void shade(const View& view, const Surfaces& s, const Hits& hits, std::ui
   for (int i = 0; i < view.num_lights; ++i) {
     const ViewLight& light = view.lights[i];
     const bool barred = shadows && light.shadows;
-    Lit lit(light, s);
-    const std::uint32_t dark = barred ? dark_lanes(view, i, lit, s, hits, lanes, *shadows) : 0;
+    if (!barred) {
+      for (int k = 0; k < kLanes; k += kWidth)
+        add_light(light, light_term(light, s, k), s, eye, k, lanes, 0, false, out);
+      continue;
+    }
+    const Lit lit(light, s);
+    const std::uint32_t dark = dark_lanes(view, i, lit, s, hits, lanes, *shadows);
     if (!(lanes & ~dark)) continue;
-    if (light.specular[0] + light.specular[1] + light.specular[2] > 0)
-      lit.add_specular(s, eye, lanes & ~dark);
-    add_light(light, lit, s, dark, barred, barred ? separate : out);
+    for (int k = 0; k < kLanes; k += kWidth)
+      add_light(light, lit.terms[k / kWidth], s, eye, k, lanes, dark, true, separate);
   }
   for (int c = 0; c < 3; ++c)
     for (int k = 0; k < kLanes; k += kWidth) {
-      const Float sum = min(load(out.rgb[c] + k), splat(1.0f)) + load(separate.rgb[c] + k);
+      Float sum = min(load(out.rgb[c] + k), splat(1.0f));
+      if (shadows) sum = sum + load(separate.rgb[c] + k);
       store(out.rgb[c] + k, min(sum * load(s.texture[c] + k), splat(1.0f)));
     }
 }

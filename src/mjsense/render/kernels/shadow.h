@@ -32,7 +32,7 @@ inline std::uint32_t shadow_of_triangles(const ViewGeom& g, int index, const Lig
     Vec3f o = to_geom(g.rot, p - splat(g.pos));
     // A surface must not lie in its own shadow by rounding: start a little above it.
     const Int same = load(rays.geom + k);
-    const Mask other = less(same, int_of(index)) | less(int_of(index), same);
+    const Mask other = ~(same == int_of(index));
     const Vec3f n = to_geom(g.rot, {load(rays.n[0] + k), load(rays.n[1] + k), load(rays.n[2] + k)});
     const Float lift = select(other, splat(0.0f), splat(1e-4f) * max(splat(g.radius), abs(p.z)));
     o = along(o, lift, n);
@@ -74,7 +74,7 @@ inline std::uint32_t shadow_of_geom(const View& view, int caster, const LightRay
     const Vec3f o = to_geom(g.rot, p - splat(g.pos));
     const Vec3f d = to_geom(g.rot, {load(rays.d[0] + k), load(rays.d[1] + k), load(rays.d[2] + k)});
     const Int at = load(rays.geom + k), self = int_of(caster);
-    const Mask other = less(at, self) | less(self, at);
+    const Mask other = ~(at == self);
     const Float end = load(rays.end + k);
     Mask barred;
     if (g.type == mjGEOM_PLANE) {

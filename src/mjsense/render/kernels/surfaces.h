@@ -180,7 +180,7 @@ inline void gather_surfaces(const View& view, const Pixels& pixels, const Hits& 
     const int geom = hits.geom[__builtin_ctz(todo)];
     const ViewGeom& g = view.geoms[geom];
     std::uint32_t mine = 0;
-    for (int i = 0; i < kLanes; ++i) mine |= static_cast<std::uint32_t>(hits.geom[i] == geom) << i;
+    for (int k = 0; k < kLanes; k += kWidth) mine |= bits(load(hits.geom + k) == int_of(geom)) << k;
     mine &= todo;
     todo &= ~mine;
     alignas(64) float local[3][kLanes], normal[3][kLanes];

@@ -11,33 +11,17 @@
 namespace mjsense {
 namespace {
 
-inline void fill_pixels(const View& view, int x0, int y0, float shift_x, float shift_y,
-                        Pixels& out) {
-  const PixelGrid& grid = view.grid;
-  for (int k = 0; k < kLanes; k += kWidth) store(out.near + k, splat(view.near));
-  // Lanes outside the image repeat its border: they cost nothing extra and disturb nobody.
-  float xs[4], ys[4];
-  int columns[4], rows[4];
-  for (int i = 0; i < 4; ++i) {
-    columns[i] = x0 + i < grid.width ? x0 + i : grid.width - 1;
-    rows[i] = y0 + i < grid.height ? y0 + i : grid.height - 1;
-    xs[i] = grid.left + grid.dx * (static_cast<float>(columns[i]) + (0.5f + shift_x));
-    ys[i] = grid.top + grid.dy * (static_cast<float>(rows[i]) + (0.5f + shift_y));
-  }
+// Of the lanes of a packet.
+alignas(64) constexpr int kColumn[kLanes] = {0, 1, 2, 3, 0, 1, 2, 3, 0, 1, 2, 3, 0, 1, 2, 3};
+alignas(64) constexpr int kRow[kLanes] = {0, 0, 0, 0, 1, 1, 1, 1, 2, 2, 2, 2, 3, 3, 3, 3};
+
+inline void fill_bent(const PixelGrid& grid, const int* columns, const int* rows, float shift_x,
+                      float shift_y, Pixels& out) {
   float* w = out.window;
-  if (!grid.bent) {
-    for (int i = 0; i < kLanes; ++i) out.x[i] = xs[i % 4];
-    for (int i = 0; i < kLanes; ++i) out.y[i] = ys[i / 4];
-    w[0] = xs[0];
-    w[1] = xs[3];
-    w[2] = ys[3];
-    w[3] = ys[0];
-    return;
-  }
   w[0] = w[2] = kInfinity;
   w[1] = w[3] = -kInfinity;
   for (int i = 0; i < kLanes; ++i) {
-    const float* ray = grid.bent + 2 * (rows[i / 4] * grid.width + columns[i % 4]);
+    const float* ray = grid.bent + 2 * (rows[i] * grid.width + columns[i]);
     const float px = out.x[i] = ray[0] + shift_x * grid.dx;
     const float py = out.y[i] = ray[1] + shift_y * grid.dy;
     w[0] = px < w[0] ? px : w[0];
@@ -45,6 +29,31 @@ inline void fill_pixels(const View& view, int x0, int y0, float shift_x, float s
     w[2] = py < w[2] ? py : w[2];
     w[3] = py > w[3] ? py : w[3];
   }
+}
+
+inline void fill_pixels(const View& view, int x0, int y0, float shift_x, float shift_y,
+                        Pixels& out) {
+  const PixelGrid& grid = view.grid;
+  alignas(64) int columns[kLanes], rows[kLanes];
+  for (int k = 0; k < kLanes; k += kWidth) {
+    // Lanes outside the image repeat its border: they cost nothing extra and disturb nobody.
+    const auto within = [](Int i, int size) {
+      return select(less(i, int_of(size)), i, int_of(size - 1));
+    };
+    const Int column = within(int_of(x0) + load(kColumn + k), grid.width);
+    const Int row = within(int_of(y0) + load(kRow + k), grid.height);
+    store(out.near + k, splat(view.near));
+    store(out.x + k,
+          splat(grid.left) + splat(grid.dx) * (to_float(column) + splat(0.5f + shift_x)));
+    store(out.y + k, splat(grid.top) + splat(grid.dy) * (to_float(row) + splat(0.5f + shift_y)));
+    store(columns + k, column);
+    store(rows + k, row);
+  }
+  if (grid.bent) return fill_bent(grid, columns, rows, shift_x, shift_y, out);
+  out.window[0] = out.x[0];
+  out.window[1] = out.x[3];
+  out.window[2] = out.y[kLanes - 1];
+  out.window[3] = out.y[0];
 }
 
 struct TileLists {
