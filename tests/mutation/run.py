@@ -39,9 +39,9 @@ ROOMS = [*re.findall(r"^\| `(\w+)/", (ROOT / "docs/architecture.md").read_text()
 PROGRAMS = [room for room in ROOMS if any((ROOT / "src/mjsense" / room).rglob("*_test.cc"))]
 PYTESTS = {
     "hdf5": ["tests/record"],
-    "record": ["tests/record", "tests/program"],
+    "record": ["tests/record", "tests/program", "tests/faults"],
     "rollout": ["tests/program", "tests/python"],
-    "replay": ["tests/record", "tests/program"],
+    "replay": ["tests/record", "tests/program", "tests/faults"],
     "app": ["tests/program"],
     "python": ["tests/python", "tests/conformance"],
 }
