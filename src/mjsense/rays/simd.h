@@ -85,6 +85,7 @@ inline void gather_pairs(const std::uint32_t* p, Int i, Int& first, Int& second)
   second = {_mm512_permutex2var_epi32(low, _mm512_add_epi32(even, _mm512_set1_epi32(1)), high)};
 }
 inline float lane_min(Float a) { return _mm512_reduce_min_ps(a.v); }
+inline float first_lane(Float a) { return _mm512_cvtss_f32(a.v); }
 
 #elif defined(__AVX2__)
 
@@ -162,6 +163,7 @@ inline float lane_min(Float a) {
   m = _mm_min_ps(m, _mm_movehl_ps(m, m));
   return _mm_cvtss_f32(_mm_min_ss(m, _mm_movehdup_ps(m)));
 }
+inline float first_lane(Float a) { return _mm256_cvtss_f32(a.v); }
 
 #else
 
@@ -246,6 +248,7 @@ inline float lane_min(Float a) {
   const float x = a.v[0] < a.v[1] ? a.v[0] : a.v[1], y = a.v[2] < a.v[3] ? a.v[2] : a.v[3];
   return x < y ? x : y;
 }
+inline float first_lane(Float a) { return a.v[0]; }
 
 #endif
 

@@ -63,7 +63,7 @@ inline Steps pixel_steps(const View& view, const ViewGeom& g, const Pixels& pixe
   const Float scale = ortho ? one : load(hits.t + k);
   const auto step = [&](Float along_n, Float ex, Float ey, float size) {
     const Float slope = along_n * inverse, s = scale * splat(size);
-    return to_geom(g.rot, {s * (ex - d.x * slope), s * (ey - d.y * slope), -(s * d.z * slope)});
+    return to_geom(g.rot, {s * (ex - d.x * slope), s * (ey - d.y * slope), s * slope});
   };
   return {step(n.x, one, zero, view.grid.dx), step(n.y, zero, one, view.grid.dy)};
 }
@@ -192,8 +192,10 @@ inline void gather_surfaces(const View& view, const Pixels& pixels, const Hits& 
       const Vec3f q = to_geom(g.rot, p - splat(g.pos));
       Vec3f n = g.bvh ? Vec3f{load(normal[0] + k), load(normal[1] + k), load(normal[2] + k)}
                       : primitive_normal(g, q);
-      const Float inverse = splat(1.0f) / sqrt(max(dot(n, n), splat(1e-30f)));
-      n = {n.x * inverse, n.y * inverse, n.z * inverse};
+      if (g.type != mjGEOM_PLANE) {
+        const Float inverse = splat(1.0f) / sqrt(max(dot(n, n), splat(1e-30f)));
+        n = {n.x * inverse, n.y * inverse, n.z * inverse};
+      }
       store(local[0] + k, q.x);
       store(local[1] + k, q.y);
       store(local[2] + k, q.z);

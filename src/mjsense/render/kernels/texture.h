@@ -43,8 +43,8 @@ struct Level {
   Int offset;
 
   Level(const Texture& texture, Float level) {
-    const float first = lane_min(level);
-    if (first == lane_max(level)) {  // most packets need one only
+    const float first = first_lane(level);
+    if (!any((level < splat(first)) | (splat(first) < level))) {  // most packets need one only
       const int i = static_cast<int>(first);
       width = splat(texture.width[i]);
       height = splat(texture.height[i]);
@@ -78,7 +78,8 @@ inline Rgb bilinear(const Texture& texture, const Level& level, Int face, Float 
     y1 = select(y1 < h, y1, y1 - h);
   }
   const Int stride = truncate(w) + int_of(1);
-  const Int base = level.offset + face * (stride * truncate(h)) + truncate(x0);
+  Int base = level.offset + truncate(x0);
+  if (texture.cube) base = base + face * (stride * truncate(h));
   const auto row = [&](Float y) {
     Int left, right;
     gather_pairs(texture.texels, base + truncate(y) * stride, left, right);
@@ -102,7 +103,7 @@ inline Rgb sample(const Texture& texture, Mask wanted, Int face, Float s, Float 
   const Float last = splat(static_cast<float>(texture.levels - 1));
   const Float size = min(max(footprint, splat(1.0f)), splat(65536.0f));
   Float lod = min(max(rough_log2(size), zero), last);
-  lod = select(wanted, lod, splat(lane_min(select(wanted, lod, last))));
+  if (any(~wanted)) lod = select(wanted, lod, splat(lane_min(select(wanted, lod, last))));
   // Two levels are mixed only around the middle between them, as Mesa and GPUs do.
   const Float moved = lod + splat(0.25f), level = floor(moved);
   const Float between = max(fma(splat(2.0f), moved - level, splat(-1.0f)), zero);
