@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """Tasks as trainers and gymnasium's registry want them. Where a trainer is not installed, its tests are skipped."""
 
+import importlib
 import re
 import sys
 from pathlib import Path
@@ -186,3 +187,12 @@ def test_rsl_rl():
     assert reward.shape == (3,) and reward.dtype == torch.float32 and worlds.episode_length_buf.tolist() == [0, 0, 0]
     assert extras["log"]["/success"] == 0 and worlds.get_observations() is observation
     worlds.close()
+
+
+@pytest.mark.parametrize("module, missing, package", [("sb3", "stable_baselines3.common.vec_env", "stable-baselines3"),
+                                                      ("rsl", "rsl_rl.env", "rsl-rl-lib")])  # fmt: skip
+def test_without_the_trainer(monkeypatch, module, missing, package):
+    monkeypatch.delitem(sys.modules, f"mjsense.rl.{module}", raising=False)
+    monkeypatch.setitem(sys.modules, missing, None)
+    with pytest.raises(ModuleNotFoundError, match=f"pip install {package} "):
+        importlib.import_module(f"mjsense.rl.{module}")

@@ -7,9 +7,13 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
-import torch  # pyright: ignore[reportMissingImports]
-from rsl_rl.env import VecEnv  # pyright: ignore[reportMissingImports]
-from tensordict import TensorDict  # pyright: ignore[reportMissingImports]
+
+try:
+    import torch  # pyright: ignore[reportMissingImports]
+    from rsl_rl.env import VecEnv  # pyright: ignore[reportMissingImports]
+    from tensordict import TensorDict  # pyright: ignore[reportMissingImports]
+except ModuleNotFoundError as error:
+    raise ModuleNotFoundError(f"mjsense.rl.rsl needs rsl-rl: pip install rsl-rl-lib ({error})", name=error.name) from error
 
 from mjsense.rl._numbers import Actions, Numbers, checked_env
 

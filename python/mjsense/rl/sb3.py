@@ -8,7 +8,11 @@ from typing import Any
 
 import gymnasium
 import numpy as np
-from stable_baselines3.common.vec_env import VecEnv  # pyright: ignore[reportMissingImports]
+
+try:
+    from stable_baselines3.common.vec_env import VecEnv  # pyright: ignore[reportMissingImports]
+except ModuleNotFoundError as error:
+    raise ModuleNotFoundError(f"mjsense.rl.sb3 needs Stable-Baselines3: pip install stable-baselines3 ({error})", name=error.name) from error
 
 from mjsense.rl._numbers import Actions, Numbers, checked_env, stream_of
 
