@@ -269,6 +269,7 @@ def test_physics_that_fails_prints_no_table(mjsense):
     (mjsense.folder / "ball.xml").write_text(stiff)
     done = mjsense("sensors", "ball.xml", rc=2)
     assert "ball.xml: the physics failed: " in done.stderr and not done.stdout
+    assert [p.name for p in mjsense.folder.iterdir()] == ["ball.xml"]  # MuJoCo would leave its log
 
 
 def test_a_recording_says_what_its_sheet_shows(mjsense):
