@@ -82,7 +82,8 @@ def limit_memory():
 def sanitisers_words(said: str) -> str:
     """What ASan or UBSan found in our code; the HDF5 library's own faults, in a process that is made for them, are not ours."""
     for report in re.split(r"^(?===\d+==ERROR: |\S+: runtime error: )", said, flags=re.MULTILINE)[1:]:
-        frames = re.findall(r"^\s+#\d+ \S+ in (\S+)", report, re.MULTILINE)
+        lines = [line for line in report.splitlines() if "libsanitizer" not in line]
+        frames = re.findall(r"^\s+#\d+ \S+ in (\S+)", "\n".join(lines), re.MULTILINE)
         own = [f for f in frames if not f.startswith(("__interceptor", "__asan", "__sanitizer", "mem", "str", "malloc", "calloc", "realloc"))]
         if "runtime error" in report.splitlines()[0] or not own or not own[0].startswith("H5"):
             return report[:1500]

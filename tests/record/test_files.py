@@ -252,6 +252,7 @@ def damage(path, name, change):
         ("traj_0/actions/joint_pos", lambda v: v[3].__setitem__(5, 0x7B), "joint_pos row 3 is no JSON text"),
         ("traj_1/fail", lambda v: v.__setitem__(2, False), "row 2 is not the opposite of success"),
         ("traj_1/obs/sensor_data/wrist_camera", lambda v: v.__setitem__(3, 0x58), "does not exist"),
+        ("traj_0/rewards", lambda v: v.__setitem__(1, 7.5), "traj_0/rewards is not what was recorded: its checksum is"),
     ],
 )
 def test_verify_finds_damage(record_fake, house, tmp_path, name, change, complaint):
