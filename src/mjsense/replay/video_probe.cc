@@ -92,10 +92,10 @@ std::vector<std::uint8_t> grab_frames(const std::filesystem::path& path,
                                       bool grey16, const std::string& ffmpeg) {
   std::string select;
   for (const int n : frames) select += fmt::format("{}eq(n\\,{})", select.empty() ? "" : "+", n);
-  // New time stamps, else a constant frame rate would fill the gaps with copies.
-  const std::string filters =
-      fmt::format("select='{}',setpts=N/(FRAME_RATE*TB),scale={}:{}:flags={}", select, width,
-                  height, grey16 ? "neighbor" : "area");
+  // New time stamps, a frame a second: else a constant frame rate would fill the gaps with copies.
+  // The rate is said, for FFmpeg 7 does not know FRAME_RATE behind select and repeats a frame.
+  const std::string filters = fmt::format("select='{}',setpts=N/TB,fps=1,scale={}:{}:flags={}",
+                                          select, width, height, grey16 ? "neighbor" : "area");
   std::vector<std::string> command = command_of(path, ffmpeg, {});
   command.insert(command.end(),
                  {"-vf", filters, "-frames:v", fmt::format("{}", frames.size()), "-f", "rawvideo",
