@@ -13,12 +13,16 @@ target_include_directories(mjsense_python PRIVATE ${PROJECT_SOURCE_DIR} ${MUJOCO
 target_compile_definitions(mjsense_python PRIVATE MJSENSE_VERSION="${PROJECT_VERSION}")
 target_compile_options(mjsense_python PRIVATE -Wall -Wextra -Wno-missing-field-initializers)
 
-# HDF5 in a shared object. Debian's libhdf5.a is compiled for executables (-fPIE): its symbols must stay inside (as they should,
-# h5py brings an HDF5 of its own into the same process), and the two variables of libc that it names get a copy of ours.
-set(MJSENSE_PY_HDF5 ${PROJECT_BINARY_DIR}/libhdf5_shared.a)
-add_custom_command(OUTPUT ${MJSENSE_PY_HDF5} DEPENDS ${HDF5_STATIC} COMMENT "Preparing libhdf5.a for a shared object"
-                   COMMAND ${CMAKE_OBJCOPY} --redefine-sym stderr=mjsense_stderr --redefine-sym stdout=mjsense_stdout
-                           ${HDF5_STATIC} ${MJSENSE_PY_HDF5})
+# HDF5 in a shared object. Debian's static libraries are compiled for executables (-fPIE): their symbols must stay inside (as they
+# should, h5py brings an HDF5 of its own into the same process), and the two variables of libc that they name get a copy of ours.
+foreach(archive ${HDF5_STATIC} ${SZ_STATIC} ${AEC_STATIC})
+  get_filename_component(name ${archive} NAME_WE)
+  set(shared ${PROJECT_BINARY_DIR}/${name}_shared.a)
+  add_custom_command(OUTPUT ${shared} DEPENDS ${archive} COMMENT "Preparing ${name}.a for a shared object"
+                     COMMAND ${CMAKE_OBJCOPY} --redefine-sym stderr=mjsense_stderr --redefine-sym stdout=mjsense_stdout
+                             ${archive} ${shared})
+  list(APPEND MJSENSE_PY_HDF5 ${shared})
+endforeach()
 add_custom_target(mjsense_python_hdf5 DEPENDS ${MJSENSE_PY_HDF5})
 add_dependencies(mjsense_python mjsense_python_hdf5)
 target_link_libraries(mjsense_python PRIVATE mjsense ${MJSENSE_PY_HDF5} ${MJSENSE_PRIVATE_LIBS})
