@@ -85,9 +85,10 @@ void Task::register_policy(Policy& policy) {
   policy_ = &policy;
 }
 
-void Task::sample(int world, std::int64_t episode, const StateRow& state) {
+void Task::sample(int world, std::int64_t episode, const StateRow& state, int draw) {
   episodes_[world] = {.number = episode};
-  Rng rng(cfg_.seed, 0, stream_of("task/sample"), static_cast<std::uint64_t>(episode));
+  Rng rng(cfg_.seed, static_cast<std::uint32_t>(draw), stream_of("task/sample"),
+          static_cast<std::uint64_t>(episode));
   const std::optional<Pose> base = sample_scene(world, rng, state);
   robot_->write_start(state, base, rng);
 }

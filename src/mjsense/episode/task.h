@@ -133,8 +133,8 @@ class Task {
 
   // --- one episode of one world
   // Writes the start state of episode number `episode`: a function of (cfg.seed, episode) alone,
-  // whatever the world.
-  void sample(int world, std::int64_t episode, const StateRow& state);
+  // whatever the world. `draw` > 0: another start of it, where those before cannot be played.
+  void sample(int world, std::int64_t episode, const StateRow& state, int draw = 0);
   // After forward(): what the episode is measured against (start poses), the controllers' targets.
   // Resets the step count.
   virtual void begin(const World& world);
@@ -143,7 +143,8 @@ class Task {
   void apply(const World& world, const Action& action, const StateRow& state);
   virtual Evaluation evaluate(const World& world) const = 0;
 
-  // Why the start that this fresh world shows cannot be played; "": it can.
+  // Why the start that this fresh world shows cannot be played; "": it can. The rollout draws others
+  // then, some times.
   virtual std::string start_fault(const World& /*world*/) const { return ""; }
 
   // --- all active worlds at once, on the caller's thread

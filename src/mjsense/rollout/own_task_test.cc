@@ -65,17 +65,22 @@ class CartTask final : public Task {
         "mark", SensorSpec{.unit = "m"},
         [this](const World& world, std::span<double> row) { row[0] = marks_[world.id]; })};
   }
+  std::string start_fault(const World& world) const override {
+    return world.data->qpos[0] < least_start ? "the cart starts on the left" : "";
+  }
   void edit_suite(SensorSuite& suite) const override {
     if (!keep.empty()) suite.select(keep);
   }
 
   double mark(int world) const { return marks_[world]; }
-  int evaluations = 0;
+  int evaluations = 0, samples = 0;
+  double least_start = -1;        // m, of starts that can be played
   std::vector<std::string> keep;  // of the suite; empty: all
 
  protected:
   void initialize_task() override { marks_.assign(num_worlds(), 0.0); }
   std::optional<Pose> sample_scene(int world, Rng& rng, const StateRow& state) override {
+    ++samples;
     state.qpos[0] = rng.uniform(-0.5, 0.5);
     marks_[world] = rng.uniform(-0.5, 0.5);
     return {};
@@ -125,6 +130,9 @@ struct OwnTask : testing::Test {
   }
   static double number(Rollout& rollout, const std::string& stream, int world) {
     return rollout.suite().stream(stream).data.row<double>(world)[0];
+  }
+  static double position(Rollout& rollout, int world) {
+    return rollout.suite().stream("qpos/joints").data.row<float>(world)[0];
   }
   static bool given(Rollout& rollout, const std::string& action, int world) {
     return rollout.suite().stream(action + "/given/joints").data.row<bool>(world)[0];
@@ -293,6 +301,33 @@ TEST_F(OwnTask, AChunkEndsWhereItsEpisodeEnds) {
   EXPECT_TRUE(rollout.evaluation(1).success);
   EXPECT_FALSE(rollout.evaluation(1).terminal);
   EXPECT_LT(task->episode_step(1), 200);
+}
+
+// A start that cannot be played is drawn again, the same in whichever world.
+TEST_F(OwnTask, StartsAreDrawnUntilTheyCanBePlayed) {
+  task->least_start = 0.2;
+  RolloutCfg cfg = two_worlds();
+  cfg.num_worlds = 8;
+  Rollout many(cfg, task, nullptr);
+  const int worlds[] = {7, 1, 2, 3, 4, 5, 6, 0};
+  const std::int64_t episodes[] = {0, 1, 2, 3, 4, 5, 6, 7};
+  many.start(worlds, episodes);
+  auto other = std::make_shared<CartTask>(TaskCfg{});
+  other->least_start = 0.2;
+  cfg.num_worlds = 1;
+  Rollout one(cfg, other, nullptr);
+  for (int k = 0; k < 8; ++k) {
+    one.start(std::span(worlds).subspan(7, 1), std::span(episodes).subspan(k, 1));
+    EXPECT_EQ(one.fault(0), "");
+    EXPECT_GE(position(one, 0), 0.2);
+    EXPECT_EQ(position(one, 0), position(many, worlds[k]));
+    EXPECT_EQ(other->mark(0), task->mark(worlds[k]));
+    EXPECT_EQ(many.simulation().worlds().time(worlds[k]), 0);
+  }
+  EXPECT_GT(other->samples, 8);
+  other->least_start = 0.6;  // never
+  one.start(std::span(worlds).subspan(7, 1), std::span(episodes).first(1));
+  EXPECT_EQ(one.fault(0), "the cart starts on the left");
 }
 
 TEST_F(OwnTask, AnotherSeedIsOtherEpisodes) {

@@ -19,6 +19,8 @@ namespace {
 
 using Clock = std::chrono::steady_clock;
 
+constexpr int kDraws = 10;  // of a start, until one can be played
+
 double since(Clock::time_point start) {
   return std::chrono::duration<double>(Clock::now() - start).count();
 }
@@ -196,15 +198,9 @@ void Rollout::start(std::span<const int> worlds, std::span<const std::int64_t> e
     faults_[w].clear();
     refused_[w] = false;
     actions_[w] = Action{};
-    simulation_->worlds().rekey(w, static_cast<std::uint32_t>(episodes[k]));
+    log_->begin(w);
   }
-  simulation_->reset(sorted, task_->start_key());
-  for (std::size_t k = 0; k < worlds.size(); ++k) {
-    task_->sample(worlds[k], episodes[k], rows_[worlds[k]]);
-    log_->begin(worlds[k]);
-  }
-  simulation_->forward(sorted);
-  take_failures();
+  sample(worlds, episodes);
   place_cameras(sorted);
   Some begins(*this, sorted);
   task_->begin_all(begins);
@@ -217,25 +213,41 @@ void Rollout::start(std::span<const int> worlds, std::span<const std::int64_t> e
   finish_rows();
 }
 
-// Cameras that differ from episode to episode find their places, and starts that cannot be played
-// are found out.
+// The starts, fresh; those that cannot be played are drawn again, and after the last draw are faults.
+void Rollout::sample(std::span<const int> worlds, std::span<const std::int64_t> episodes) {
+  std::vector<std::int64_t> of(num_worlds());
+  for (std::size_t k = 0; k < worlds.size(); ++k) of[worlds[k]] = episodes[k];
+  std::vector<int> left = simulation_->worlds().checked_ids(worlds);
+  std::vector<std::string> why(num_worlds());
+  for (int draw = 0; draw < kDraws && !left.empty(); ++draw) {
+    for (int w : left) simulation_->worlds().rekey(w, static_cast<std::uint32_t>(of[w]));
+    simulation_->reset(left, task_->start_key());
+    for (int w : left) task_->sample(w, of[w], rows_[w], draw);
+    simulation_->forward(left);
+    take_failures();
+    for_each(left, [&](const World& world) { why[world.id] = task_->start_fault(world); });
+    std::erase_if(left, [&](int w) { return why[w].empty() || !faults_[w].empty(); });
+  }
+  for (int w : left) set_fault(w, std::move(why[w]));
+}
+
+// Cameras that differ from episode to episode find their places.
 void Rollout::place_cameras(std::span<const int> worlds) {
+  if (!camera_system_->varies()) return;
   std::vector<std::string> why(num_worlds());
   for_each(worlds, [&](const World& world) {
-    std::string& text = why[world.id];
-    text = task_->start_fault(world);
-    if (!text.empty() || !camera_system_->varies()) return;
+    if (!faults_[world.id].empty()) return;
     std::vector<int> objects;
     for (const TaskObject& object : task_->objects(world.id)) {
       if (object.body >= 0) objects.push_back(object.body);
     }
-    text = camera_system_->place(world, cfg_.seed, static_cast<std::uint64_t>(episode(world.id)),
-                                 middle_of(*task_, world), objects);
+    why[world.id] =
+        camera_system_->place(world, cfg_.seed, static_cast<std::uint64_t>(episode(world.id)),
+                              middle_of(*task_, world), objects);
   });
   for (int w : worlds) {
     if (!why[w].empty()) set_fault(w, std::move(why[w]));
   }
-  if (!camera_system_->varies()) return;
   simulation_->worlds().model_changed();
   simulation_->forward(worlds);
   take_failures();

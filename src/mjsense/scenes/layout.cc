@@ -35,20 +35,16 @@ struct Spot {
   double x, y;
 };
 
-}  // namespace
-
-void lay_out(std::span<const Resting> objects, std::span<const int> wanted,
-             std::span<const char> present, std::span<const Region> regions, const LayoutCfg& cfg,
-             Rng& rng, std::span<Pose> poses, std::span<int> region_of) {
-  const int n = static_cast<int>(objects.size());
+// Objects in their order, each where there is room among those before it. Returns how far (m) the circles of two that
+// come too close are apart: negative where they cut each other.
+double lay_out_once(std::span<const Resting> objects, std::span<const int> order,
+                    std::span<const int> wanted, std::span<const Region> regions,
+                    const LayoutCfg& cfg, Rng& rng, std::span<Pose> poses,
+                    std::span<int> region_of) {
   std::vector<Placed> placed;
   const int target = wanted.empty() ? -1 : wanted[0];
-  std::vector<int> order(wanted.begin(), wanted.end());
-  for (int object = 0; object < n; ++object) {
-    if (std::ranges::count(wanted, object) == 0) order.push_back(object);
-  }
+  double apart = 1.0;
   for (int object : order) {
-    if (!present[object]) continue;
     const auto many = static_cast<std::uint32_t>(regions.size());
     const int region = many == 1 ? 0 : static_cast<int>(rng.below(many));
     const bool near = std::ranges::count(wanted, object) > 0;
@@ -60,31 +56,55 @@ void lay_out(std::span<const Resting> objects, std::span<const int> wanted,
       const double x = rng.uniform(area.x0, area.x1);
       return Spot{x, rng.uniform(area.y0, area.y1)};
     };
-    // Metres to spare at a spot: negative where objects would stand too close.
-    const auto clearance = [&](Spot s) {
+    // Metres to spare at a spot, beyond the gaps or without them.
+    const auto clearance = [&](Spot s, bool gaps) {
       double least = 1.0;
       for (const Placed& other : placed) {
         if (other.region != region) continue;
         const double gap = object == target || other.object == target ? cfg.target_gap : cfg.gap;
         const double distance = std::hypot(s.x - other.x, s.y - other.y);
-        least = std::min(least, distance - print.radius - other.radius - gap);
+        least = std::min(least, distance - print.radius - other.radius - (gaps ? gap : 0.0));
       }
       return least;
     };
     Spot best = draw();
-    double room = clearance(best);
+    double room = clearance(best, true);
     for (int attempt = 0; attempt < cfg.attempts && room < 0; ++attempt) {
       const Spot spot = draw();
-      const double r = clearance(spot);
+      const double r = clearance(spot, true);
       if (r > room) {
         room = r;
         best = spot;
       }
     }
+    apart = std::min(apart, clearance(best, false));
     placed.push_back({object, region, best.x, best.y, print.radius});
     const Vec3 position{best.x, best.y, regions[region].height - print.low + cfg.drop};
     region_of[object] = region;
     poses[object] = {position, axis_angle({0, 0, 1}, rng.uniform(-pi, pi)) * rest};
+  }
+  return apart;
+}
+
+}  // namespace
+
+void lay_out(std::span<const Resting> objects, std::span<const int> wanted,
+             std::span<const char> present, std::span<const Region> regions, const LayoutCfg& cfg,
+             Rng& rng, std::span<Pose> poses, std::span<int> region_of) {
+  std::vector<int> order(wanted.begin(), wanted.end());
+  for (int object = 0; object < static_cast<int>(objects.size()); ++object) {
+    if (std::ranges::count(wanted, object) == 0) order.push_back(object);
+  }
+  std::erase_if(order, [&](int object) { return !present[object]; });
+  double apart = lay_out_once(objects, order, wanted, regions, cfg, rng, poses, region_of);
+  std::vector<Pose> other(poses.begin(), poses.end());
+  std::vector<int> other_region(region_of.begin(), region_of.end());
+  for (int k = 1; k < cfg.layouts && apart < 0; ++k) {
+    const double now = lay_out_once(objects, order, wanted, regions, cfg, rng, other, other_region);
+    if (now <= apart) continue;
+    apart = now;
+    std::ranges::copy(other, poses.begin());
+    std::ranges::copy(other_region, region_of.begin());
   }
 }
 

@@ -27,6 +27,7 @@ struct LayoutCfg {
   double target_gap = 0.07;  // m, free around the target: room for an open gripper
   double drop = 0.0003;      // m above the surface
   int attempts = 200;        // places to try for an object, then the one with most room
+  int layouts = 20;          // tries of them all, while one stands in another's circle
 };
 
 // An object to be placed: its shape, and the ways in which it rests.
@@ -37,7 +38,8 @@ struct Resting {
 
 // Poses X_WO of `objects` and the regions on which they stand: those that are `wanted` first, in this order and in
 // the regions' target areas - the first of them, if any, is the target -, then the others in order; those that
-// are not `present` keep what is there. A function of the random numbers alone.
+// are not `present` keep what is there. Where what came first leaves one no room, all begin anew; after the last try
+// the layout in which they come least into each other. A function of the random numbers alone.
 void lay_out(std::span<const Resting> objects, std::span<const int> wanted,
              std::span<const char> present, std::span<const Region> regions, const LayoutCfg& cfg,
              Rng& rng, std::span<Pose> poses, std::span<int> region_of);

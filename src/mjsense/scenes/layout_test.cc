@@ -1,0 +1,65 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "mjsense/scenes/layout.h"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <numbers>
+
+namespace mjsense {
+namespace {
+
+// A disc from above.
+ObjectShape disc(double radius) {
+  ObjectShape shape;
+  for (int k = 0; k < 16; ++k) {
+    const double angle = k * std::numbers::pi / 8;
+    shape.points.push_back({radius * std::cos(angle), radius * std::sin(angle), 0});
+  }
+  shape.reach = radius;
+  return shape;
+}
+
+// Three discs on a strip, all of them wanted; returns how far the nearest two are apart.
+double nearest_of_three(double radius, std::uint64_t seed, const LayoutCfg& cfg) {
+  const ObjectShape shape = disc(radius);
+  const Quat upright{};
+  const std::vector<Resting> objects(3, Resting{&shape, {&upright, 1}});
+  const std::array<int, 3> wanted{0, 1, 2};
+  const std::array<char, 3> present{1, 1, 1};
+  // ---(o)----(o)----(o)---  origins from end to end
+  const Area strip{0, 0.6, 0, 0.01};
+  const std::array<Region, 1> regions{{{strip, strip, 0.8}}};
+  std::array<Pose, 3> poses;
+  std::array<int, 3> region_of{};
+  Rng rng(seed, 0, 0, 0);
+  lay_out(objects, wanted, present, regions, cfg, rng, poses, region_of);
+  double least = 1;
+  for (int a = 0; a < 3; ++a) {
+    EXPECT_NEAR(poses[a].p.z, 0.8 + cfg.drop, 1e-12);
+    for (int b = 0; b < a; ++b) least = std::min(least, norm(poses[a].p - poses[b].p) - 2 * radius);
+  }
+  return least;
+}
+
+TEST(Layout, BeginsAnewWhereTheFirstLeaveTheLastNoRoom) {
+  int crowded = 0;
+  for (std::uint64_t seed = 0; seed < 100; ++seed) {
+    EXPECT_GE(nearest_of_three(0.1, seed, {}), 0) << seed;
+    crowded += nearest_of_three(0.1, seed, {.layouts = 1}) < 0;
+  }
+  EXPECT_GT(crowded, 5);  // there was something to mend
+}
+
+TEST(Layout, TakesTheLeastCrowdedOfThoseThatAllAre) {
+  for (std::uint64_t seed = 0; seed < 20; ++seed) {
+    const double once = nearest_of_three(0.25, seed, {.layouts = 1});
+    EXPECT_LT(once, 0);
+    EXPECT_GE(nearest_of_three(0.25, seed, {}), once);
+  }
+}
+
+}  // namespace
+}  // namespace mjsense
