@@ -5,13 +5,44 @@
 
 #include <algorithm>
 #include <array>
+#include <bit>
 #include <cmath>
+#include <cstring>
 #include <limits>
 
 #include "mjsense/core/error.h"
 #include "mjsense/observe/frame.h"
 
 namespace mjsense {
+namespace {
+
+// Where the pixels end that show what the one at x shows. A picture is made of long runs: eight pixels are compared
+// at a time.
+int end_of_run(const std::int32_t* row, int x, int width) {
+  const auto pixel = [row](int i) {
+    std::uint64_t both;
+    std::memcpy(&both, row + 2 * i, sizeof both);
+    return both;
+  };
+  const std::uint64_t first = pixel(x);
+  int end = x + 1;
+  for (; end + 8 <= width; end += 8) {
+    std::uint64_t other = 0;
+    for (int i = 0; i < 8; ++i) other |= pixel(end + i) ^ first;
+    if (other != 0) break;
+  }
+  while (end < width && pixel(end) == first) ++end;
+  return end;
+}
+
+}  // namespace
+
+void ImagePointsSensor::Box::add(int from, int to, int y) {
+  left = std::min(left, from);
+  right = std::max(right, to);
+  top = std::min(top, y);
+  bottom = y + 1;  // rows come in order
+}
 
 ImagePointsSensor::ImagePointsSensor(std::string name, std::vector<Object> objects,
                                      std::vector<Camera> cameras)
@@ -83,27 +114,33 @@ void ImagePointsSensor::compute(const World& world) {
     Mask* once = mask + width * height;
     Mask* twice = once + width * height;
     const auto segments = field->data.row<std::int32_t>(world.id);
-    // All work after this is done on the rows that show an object.
-    int top = height, bottom = 0;
+    // All work after this is done where objects are seen.
+    Box all{width, height, 0, 0};
+    std::array<Box, kMaxObjects> boxes;
+    boxes.fill(all);
     for (int y = 0; y < height; ++y) {
-      Mask any = 0;
-      for (int i = y * width; i < (y + 1) * width; ++i) {
-        const std::int32_t id = segments[2 * i];
-        mask[i] = segments[2 * i + 1] == mjOBJ_GEOM && id >= 0 ? geom_objects[id] : Mask(0);
-        any |= mask[i];
+      const std::int32_t* row = segments.data() + 2 * y * width;
+      for (int x = 0, end; x < width; x = end) {
+        end = end_of_run(row, x, width);
+        const std::int32_t id = row[2 * x];
+        const Mask seen = row[2 * x + 1] == mjOBJ_GEOM && id >= 0 ? geom_objects[id] : Mask(0);
+        std::fill(mask + y * width + x, mask + y * width + end, seen);
+        if (!seen) continue;
+        all.add(x, end, y);
+        for (unsigned left = seen; left; left &= left - 1) {
+          boxes[std::countr_zero(left)].add(x, end, y);
+        }
       }
-      if (!any) continue;
-      top = std::min(top, y);
-      bottom = y + 1;
     }
-    if (top < bottom) {
-      // Rows outside are background, as what lies outside the picture is.
-      const int rows = bottom - top;
-      erode_cross(mask + top * width, width, rows, once + top * width);
-      erode_cross(once + top * width, width, rows, twice + top * width);
+    if (all.top < all.bottom) {
+      // Outside the box is background, as what lies outside the picture is.
+      const int from = all.top * width + all.left;
+      const int columns = all.right - all.left, rows = all.bottom - all.top;
+      erode_cross(mask + from, columns, rows, width, once + from);
+      erode_cross(once + from, columns, rows, width, twice + from);
     }
     for (std::size_t o = 0; o < objects_.size(); ++o) {
-      points_of(world, static_cast<int>(o), static_cast<int>(c), {mask, twice, top, bottom});
+      points_of(world, static_cast<int>(o), static_cast<int>(c), {mask, twice, boxes[o]});
     }
   }
 }
@@ -115,10 +152,12 @@ void ImagePointsSensor::points_of(const World& world, int object, int camera, co
   const auto num_points = fields()[index + 1].data.row<std::int32_t>(world.id);
   std::ranges::fill(points, std::numeric_limits<float>::quiet_NaN());
 
-  const int begin = masks.top * width, end = masks.bottom * width;
+  const Box& box = masks.box;
   const auto count_of = [&](const Mask* m) {
     int n = 0;
-    for (int i = begin; i < end; ++i) n += m[i] >> object & 1;
+    for (int y = box.top; y < box.bottom; ++y) {
+      for (int i = y * width + box.left; i < y * width + box.right; ++i) n += m[i] >> object & 1;
+    }
     return n;
   };
   const bool erode = !cameras_[camera].skip_erosion && objects_[object].erode;
@@ -146,25 +185,26 @@ void ImagePointsSensor::points_of(const World& world, int object, int camera, co
 
   const auto round4 = [](float x) { return std::nearbyint(x * 10000.0f) / 10000.0f; };
   int rank = 0, next = 0;
-  for (int i = begin; next < n; ++i) {
-    if (!(chosen[i] >> object & 1)) continue;
-    if (rank++ != ranks[order[next]]) continue;
-    points[2 * order[next]] = round4(static_cast<float>(i % width) / static_cast<float>(width));
-    points[2 * order[next] + 1] =
-        round4(static_cast<float>(i / width) / static_cast<float>(height));
-    ++next;
+  for (int y = box.top; next < n; ++y) {
+    for (int x = box.left; x < box.right && next < n; ++x) {
+      if (!(chosen[y * width + x] >> object & 1)) continue;
+      if (rank++ != ranks[order[next]]) continue;
+      points[2 * order[next]] = round4(static_cast<float>(x) / static_cast<float>(width));
+      points[2 * order[next] + 1] = round4(static_cast<float>(y) / static_cast<float>(height));
+      ++next;
+    }
   }
 }
 
-void erode_cross(const std::uint16_t* in, int width, int height, std::uint16_t* out) {
+void erode_cross(const std::uint16_t* in, int width, int height, int stride, std::uint16_t* out) {
   std::fill(out, out + width, std::uint16_t(0));
-  std::fill(out + (height - 1) * width, out + height * width, std::uint16_t(0));
+  std::fill(out + (height - 1) * stride, out + (height - 1) * stride + width, std::uint16_t(0));
   for (int y = 1; y + 1 < height; ++y) {
-    const std::uint16_t* row = in + y * width;
-    std::uint16_t* to = out + y * width;
+    const std::uint16_t* row = in + y * stride;
+    std::uint16_t* to = out + y * stride;
     to[0] = to[width - 1] = 0;
     for (int x = 1; x + 1 < width; ++x) {
-      to[x] = row[x] & row[x - 1] & row[x + 1] & row[x - width] & row[x + width];
+      to[x] = row[x] & row[x - 1] & row[x + 1] & row[x - stride] & row[x + stride];
     }
   }
 }

@@ -50,9 +50,14 @@ class ImagePointsSensor final : public Sensor {
     const Field* segmentation;
     int width, height;
   };
+  // Columns [left, right) of rows [top, bottom).
+  struct Box {
+    int left, top, right, bottom;
+    void add(int from, int to, int y);
+  };
   struct Masks {
-    const Mask *all, *eroded;  // [H, W], valid from row top to row bottom
-    int top, bottom;
+    const Mask *all, *eroded;  // [H, W], the second valid in the box
+    Box box;                   // around the object
   };
   void points_of(const World& world, int object, int camera, const Masks& masks);
 
@@ -68,7 +73,7 @@ class ImagePointsSensor final : public Sensor {
 };
 
 // The 3 x 3 cross erosion of up to 16 masks at once, bit by bit; outside counts as 0. `out` must
-// not be `in`. [H, W]
-void erode_cross(const std::uint16_t* in, int width, int height, std::uint16_t* out);
+// not be `in`. [H, W], rows `stride` apart.
+void erode_cross(const std::uint16_t* in, int width, int height, int stride, std::uint16_t* out);
 
 }  // namespace mjsense

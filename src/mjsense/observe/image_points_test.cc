@@ -184,6 +184,35 @@ TEST(ImagePoints, PointsLieInTheMaskOfTheDefinition) {
   }
 }
 
+// Objects are looked for together, each in its own part of the picture; what one gets is what it gets alone.
+TEST(ImagePoints, OtherObjectsChangeNothing) {
+  Rng rng(2, 0, 0, 0);
+  TestWorld world(kScene);
+  for (int picture = 0; picture < 100; ++picture) {
+    Painted camera(37, 23);  // no multiple of anything
+    camera.initialize(world.init(1));
+    for (int k = 0; k < 5; ++k) {
+      const int x = static_cast<int>(rng.below(37)), y = static_cast<int>(rng.below(23));
+      camera.paint(static_cast<int>(rng.below(2)), x, y, std::min(37 - x, 9), std::min(23 - y, 9));
+    }
+    const ImagePointsSensor::Object whole{"whole", BodyRef("a")}, part{"part", BodyRef("a2")};
+    ImagePointsSensor together("points", {whole, part}, {{"camera", &camera}});
+    together.initialize(world.init(1));
+    together.compute(world.world());
+    for (const auto& object : {whole, part}) {
+      ImagePointsSensor alone("points", {object}, {{"camera", &camera}});
+      alone.initialize(world.init(1));
+      alone.compute(world.world());
+      const std::string prefix = object.key + "/camera/";
+      const int n = values<std::int32_t>(alone, prefix + "num_points", 0)[0];
+      EXPECT_EQ(values<std::int32_t>(together, prefix + "num_points", 0)[0], n);
+      const auto a = values<float>(alone, prefix + "points", 0);
+      const auto b = values<float>(together, prefix + "points", 0);
+      for (int i = 0; i < 2 * n; ++i) EXPECT_EQ(a[i], b[i]) << picture;
+    }
+  }
+}
+
 TEST(ImagePoints, RefusesASegmentationItCannotRead) {
   TestWorld w(kScene);
   class Wrong : public Sensor {
