@@ -22,6 +22,7 @@ namespace {
 using std::numbers::pi;
 
 constexpr double kHand = 0.085;    // m, what the usual grippers open
+constexpr double kBeside = 0.005;  // m, free beside what an open hand goes around
 constexpr double kReach = 0.25;    // m, half of what is still an object to carry
 constexpr double kInside = 0.002;  // m
 constexpr double kAway = 100;      // m, where those stand that take no part
@@ -46,8 +47,8 @@ bool touches(const mjModel* m, int body) {
   return false;
 }
 
-// A hand goes around its narrowest horizontal or vertical extent.
-bool can_be_held(const ObjectShape& shape) {
+// m, of its narrowest horizontal or vertical extent.
+double least_extent(const ObjectShape& shape) {
   double low[3] = {1e10, 1e10, 1e10}, high[3] = {-1e10, -1e10, -1e10};
   for (Vec3 p : shape.points) {
     for (int i = 0; i < 3; ++i) {
@@ -57,7 +58,12 @@ bool can_be_held(const ObjectShape& shape) {
   }
   double least = 1e10;
   for (int i = 0; i < 3; ++i) least = std::min(least, high[i] - low[i]);
-  return least <= kHand && shape.reach <= kReach;
+  return least;
+}
+
+// A hand goes around its narrowest extent.
+bool can_be_held(const ObjectShape& shape) {
+  return least_extent(shape) <= kHand && shape.reach <= kReach;
 }
 
 // Robots of ours have contype 2 and conaffinity 1. Furniture that is touched and touches nothing by
@@ -297,6 +303,17 @@ std::vector<Region> EpisodeScene::regions_of(int world) const {
     regions[i].height += move.z;
   }
   return regions;
+}
+
+int EpisodeScene::draw(int world, std::span<const int> of, const Robot& robot, Rng& rng) const {
+  double opening = 0;
+  for (const MoveGroup& group : robot.groups()) opening = std::max(opening, group.max_opening);
+  const auto fits = [&](int i) { return least_extent(shape(world, i)) <= opening - kBeside; };
+  const bool some = std::ranges::any_of(of, fits);
+  for (;;) {
+    const int drawn = of[rng.below(static_cast<std::uint32_t>(of.size()))];
+    if (fits(drawn) || !some) return drawn;
+  }
 }
 
 std::vector<int> EpisodeScene::where(bool receptacle) const {

@@ -10,6 +10,7 @@
 #include <vector>
 
 #include "mjsense/episode/object_shape.h"
+#include "mjsense/robots/robot.h"
 #include "mjsense/robots/state_row.h"
 #include "mjsense/scene/scene.h"
 #include "mjsense/scenes/layout.h"
@@ -71,6 +72,9 @@ class EpisodeScene {
   // returns their indices.
   std::vector<int> adopt(int world, std::uint64_t seed, std::uint64_t episode,
                          const StateRow& state);
+  // One of these objects, any as likely; where no hand of the robot can go around what was drawn, in the size that it
+  // has in this world's episode, another, as long as there is one.
+  int draw(int world, std::span<const int> of, const Robot& robot, Rng& rng) const;
   // The episode is about this object, where it lies in that state.
   void set_target(int world, int target, const StateRow& state);
   // Indices of the objects to pick up, and of the receptacles.

@@ -40,9 +40,9 @@ void PickTask::initialize_task() {
 
 std::optional<Pose> PickTask::sample_scene(int world, Rng& rng, const StateRow& state) {
   const auto episode = static_cast<std::uint64_t>(this->episode(world));
-  const int target = things_[rng.below(static_cast<std::uint32_t>(things_.size()))];
-  set_target(world, target);
   vary_scene(world);
+  const int target = scene().draw(world, things_, robot(), rng);
+  set_target(world, target);
   return standing_(scene().sample(world, target, cfg().seed, episode, rng, state));
 }
 
@@ -50,7 +50,7 @@ void PickTask::choose_goal(int world, Rng& rng, const StateRow& state) {
   std::vector<int> here = adopt_scene(world, state);
   std::erase_if(here, [this](int i) { return scene().objects()[i].receptacle; });
   if (here.empty()) here = things_;
-  const int target = here[rng.below(static_cast<std::uint32_t>(here.size()))];
+  const int target = scene().draw(world, here, robot(), rng);
   set_target(world, target);
   scene().set_target(world, target, state);
 }

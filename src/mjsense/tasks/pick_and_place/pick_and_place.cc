@@ -70,7 +70,7 @@ void PickAndPlaceTask::initialize_task() {
     objects_.push_back({object.body, object.kind, object.shape});
   if (kind_ == PlaceKind::kColor || kind_ == PlaceKind::kPacking) {
     Rng any(0, 0, 0, 0);
-    if (choose(any).empty())
+    if (choose(0, any).empty())
       throw ValueError(
           fmt::format("{} {}", place,
                       kind_ == PlaceKind::kColor
@@ -88,12 +88,12 @@ void PickAndPlaceTask::initialize_task() {
 }
 
 // The object, where it goes, and what else must be there; empty if the scene lacks it.
-std::vector<int> PickAndPlaceTask::choose(Rng& rng) const {
+std::vector<int> PickAndPlaceTask::choose(int world, Rng& rng) const {
   const auto any = [&](const std::vector<int>& of) {
     return of[rng.below(static_cast<std::uint32_t>(of.size()))];
   };
   const auto objects = scene().objects();
-  const int target = any(scene().things());
+  const int target = scene().draw(world, scene().things(), robot(), rng);
   std::vector<int> where;
   const auto rivals = [&](int r) {
     std::vector<int> found;
@@ -123,7 +123,8 @@ std::vector<int> PickAndPlaceTask::choose(Rng& rng) const {
 
 std::optional<Pose> PickAndPlaceTask::sample_scene(int world, Rng& rng, const StateRow& state) {
   const auto number = static_cast<std::uint64_t>(this->episode(world));
-  const std::vector<int> wanted = choose(rng);
+  vary_scene(world);
+  const std::vector<int> wanted = choose(world, rng);
   Episode& episode = episodes_[world];
   episode.target = wanted[0];
   episode.receptacle = wanted[1];
@@ -132,7 +133,6 @@ std::optional<Pose> PickAndPlaceTask::sample_scene(int world, Rng& rng, const St
     episode.objects[k].body = object.body;
     episode.objects[k].name = object.text;
   }
-  vary_scene(world);
   return standing_(scene().sample(world, wanted, cfg().seed, number, rng, state));
 }
 

@@ -81,7 +81,7 @@ class PickAndPlaceTask final : public SceneTask, public GraspScene, public Place
   const Judgement& judge_now(const World& world) const;
   static std::string_view lacks_within(const Judgement& now);
   std::string_view lacks_beside(const World& world, const Judgement& now) const;
-  std::vector<int> choose(Rng& rng) const;
+  std::vector<int> choose(int world, Rng& rng) const;
   std::string place_text(int world) const;
   Referrals::value_type referral(const char* key, int object) const;
 
