@@ -112,7 +112,7 @@ def test_no_code_knows_a_robot_by_its_name():
         ("task_defaults.cc", 'return d ? d->robot : "franka";'),
         ("task_defaults.cc", '{"door_opening", "rby1", 400, 0, 0, 0},'),
         ("task_defaults.cc", '{"nav_to_obj", "rby1", 500, 200, 2, 2},'),
-        ("rollout.h", '"variable (``MJSENSE_FRANKA_MESHES``) names them; it moves the same.")'),
+        ("rollout.h", '"where its environment variable (``MJSENSE_FRANKA_MESHES``) names them. It moves the same.")'),
     }
     for path in (ROOT / "src/mjsense").rglob("*"):
         if path.suffix not in (".h", ".cc") or path.name.endswith(("_test.cc", "_bench.cc")) or "testing" in path.parts:
