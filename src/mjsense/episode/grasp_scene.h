@@ -14,7 +14,7 @@ namespace mjsense {
 
 struct GraspObject {
   int body = -1;
-  std::string kind;  // "mug": of models/objects
+  std::string kind;   // "mug": of models/objects
   ObjectShape shape;  // in the size of its model
 };
 
@@ -38,7 +38,7 @@ class GraspScene {
   virtual const ObjectShape& shape(int /*world*/, int object) const {
     return all_objects()[object].shape;
   }
-  virtual int target(int world) const = 0;                       // index in all_objects()
+  virtual int target(int world) const = 0;  // index in all_objects()
   virtual double support_height(
       int world) const = 0;  // m, of what the target stands on at the start
   // Null: it is only to be picked up.
