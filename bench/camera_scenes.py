@@ -61,7 +61,7 @@ VIEWS = {
 GROWTH = {
     **{f"geoms_{n}": View(f"{n:,} geoms", f"crowd:{n}", "view", moves=True) for n in (100, 1000, 10000)},
     **{f"triangles_{n}": View(f"{n:,} triangles", f"boulder:{n}", "view", moves=True) for n in (10000, 100000, 1000000)},
-    **{f"lights_{n}": View(f"100 geoms, {n} light{'s' * (n > 1)}", f"crowd:100:{n}", "view", moves=True) for n in (1, 4, 8)},
+    **{f"lights_{n}": View(f"100 geoms, {n} lights", f"crowd:100:{n}", "view", moves=True) for n in (4, 8)},
 }
 
 
@@ -124,13 +124,13 @@ def crowd(count: int, lights: int = 1) -> mujoco.MjSpec:
     world = spec.worldbody
     world.add_geom(type=mujoco.mjtGeom.mjGEOM_PLANE, size=[0, 0, 1], rgba=[0.6, 0.6, 0.55, 1])
     half = 0.5 * np.sqrt(count)
-    for i in range(count - 1):
-        parent = world.add_body(pos=[0, 2, 1.5]) if i == 0 else world
-        if i == 0:
-            parent.add_freejoint()
-        kind = (mujoco.mjtGeom.mjGEOM_BOX, mujoco.mjtGeom.mjGEOM_SPHERE)[i % 2]
-        place = [0, 0, 0] if i == 0 else [*rng.uniform(-half, half, 2), 0.25]
-        parent.add_geom(type=kind, size=rng.uniform(0.1, 0.3, 3), pos=place, rgba=[*rng.uniform(0.2, 1, 3), 1])
+    mover = world.add_body(pos=[0, 2, 1.5])
+    mover.add_freejoint()
+    mover.add_geom(type=mujoco.mjtGeom.mjGEOM_BOX, size=[0.26, 0.15, 0.11], rgba=[0.2, 0.65, 0.7, 1])
+    for i in range(count - 2):
+        kind = (mujoco.mjtGeom.mjGEOM_SPHERE, mujoco.mjtGeom.mjGEOM_BOX)[i % 2]
+        place = [*rng.uniform(-half, half, 2), 0.25]
+        world.add_geom(type=kind, size=rng.uniform(0.1, 0.3, 3), pos=place, rgba=[*rng.uniform(0.2, 1, 3), 1])
     sun = mujoco.mjtLightType.mjLIGHT_DIRECTIONAL
     world.add_light(pos=[0, 0, 30], dir=[0.3, 0.2, -0.93], type=sun, castshadow=True, diffuse=[0.6] * 3)
     for i in range(lights - 1):

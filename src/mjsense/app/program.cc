@@ -67,7 +67,9 @@ CLI::App& add_record(CLI::App& program, RecordOptions& options) {
   return app;
 }
 
-constexpr int kMostSteps = 1'000'000'000;
+// Checks that add nothing to the help: it shows the type's name and the default.
+CLI::Validator existing_file() { return CLI::Validator(CLI::ExistingFile).description(""); }
+CLI::Validator number_of_steps() { return CLI::Range(0, 1'000'000'000).description(""); }
 
 CLI::App& add_sensors(CLI::App& program, SensorsOptions& options) {
   CLI::App& app = *program.add_subcommand("sensors", "what is measured, and what it costs");
@@ -79,7 +81,7 @@ CLI::App& add_sensors(CLI::App& program, SensorsOptions& options) {
   add_choices(app);
   app.add_option("--steps", options.steps, "to measure the cost over; 0: do not measure")
       ->capture_default_str()
-      ->check(CLI::Range(0, kMostSteps).description(""));
+      ->check(number_of_steps());
   app.add_flag("--json", options.json, "as JSON");
   return app;
 }
@@ -88,7 +90,7 @@ CLI::App& add_scan(CLI::App& program, ScanOptions& options) {
   CLI::App& app = *program.add_subcommand("scan", "what a lidar sees, as a point cloud");
   app.add_option("scene", options.scene, "an MJCF file")
       ->required()
-      ->check(CLI::Validator(CLI::ExistingFile).description(""))
+      ->check(existing_file())
       ->type_name("SCENE.xml");
   app.add_option("--frame", options.frame, "what carries the lidar: site:NAME, body:NAME, ...")
       ->required()
@@ -96,9 +98,7 @@ CLI::App& add_scan(CLI::App& program, ScanOptions& options) {
   app.add_option("--out", options.out, "the file, .ply or .pcd")->required()->type_name("FILE");
   // The scene stands still: the rate of a scan and the distortion by motion mean nothing.
   add_field_options(app, struct_of<TableScan>(), &options.table, {"rate-hz"});
-  CLI::Option* table = app.get_option("--table")
-                           ->check(CLI::Validator(CLI::ExistingFile).description(""))
-                           ->type_name("FILE.npy");
+  CLI::Option* table = app.get_option("--table")->check(existing_file())->type_name("FILE.npy");
   app.get_option("--rays")->needs(table);
   const std::size_t others = app.get_options().size();
   add_field_options(app, struct_of<SpinningScan>(), &options.spinning, {"rate-hz"});
@@ -108,7 +108,7 @@ CLI::App& add_scan(CLI::App& program, ScanOptions& options) {
                     {"name", "any-frame", "debug-vis", "hit-ids", "motion-distortion"});
   app.add_option("--steps", options.steps, "physics steps before the scan")
       ->capture_default_str()
-      ->check(CLI::Range(0, kMostSteps).description(""));
+      ->check(number_of_steps());
   app.add_flag("--world", options.world, "points in the world, not in the lidar's frame");
   return app;
 }

@@ -5,6 +5,7 @@
 // most of them at once. Who is whose neighbour is found once, from the first poses: what moves far
 // from its neighbours makes their block large, never an answer wrong.
 
+#include <algorithm>
 #include <cstddef>
 #include <cstdint>
 #include <vector>
@@ -31,6 +32,16 @@ class BoxList {
 
   const KernelBoxes& all() const { return all_; }
   const KernelBoxes& blocks() const { return around_; }
+  // visit(k) for each box of all(), but for those of a block b for which enter(b) is false.
+  template <typename Enter, typename Visit>
+  void each(Enter enter, Visit visit) const {
+    constexpr int kBlock = KernelWorld::kBlock;
+    for (int first = 0; first < all_.count; first += kBlock) {
+      if (around_.count > 0 && !enter(first / kBlock)) continue;
+      for (int k = first; k < std::min(first + kBlock, all_.count); ++k) visit(k);
+    }
+  }
+  int object(int k) const { return all_.ids ? all_.ids[k] : k; }  // of box k
   const int* place() const { return place_.empty() ? nullptr : place_.data(); }
 
  private:

@@ -192,7 +192,7 @@ inline void gather_surfaces(const View& view, const Pixels& pixels, const Hits& 
       const Vec3f q = to_geom(g.rot, p - splat(g.pos));
       Vec3f n = g.bvh ? Vec3f{load(normal[0] + k), load(normal[1] + k), load(normal[2] + k)}
                       : primitive_normal(g, q);
-      if (g.type != mjGEOM_PLANE) {
+      if (g.type != mjGEOM_PLANE) {  // whose normal is a unit vector
         const Float inverse = splat(1.0f) / sqrt(max(dot(n, n), splat(1e-30f)));
         n = {n.x * inverse, n.y * inverse, n.z * inverse};
       }

@@ -15,13 +15,18 @@ namespace {
 alignas(64) constexpr int kColumn[kLanes] = {0, 1, 2, 3, 0, 1, 2, 3, 0, 1, 2, 3, 0, 1, 2, 3};
 alignas(64) constexpr int kRow[kLanes] = {0, 0, 0, 0, 1, 1, 1, 1, 2, 2, 2, 2, 3, 3, 3, 3};
 
-inline void fill_bent(const PixelGrid& grid, const int* columns, const int* rows, float shift_x,
-                      float shift_y, Pixels& out) {
+// Lanes outside the image repeat its border: they cost nothing extra and disturb nobody.
+inline Int within(Int i, int size) { return select(less(i, int_of(size)), i, int_of(size - 1)); }
+
+inline void fill_bent(const PixelGrid& grid, int x0, int y0, float shift_x, float shift_y,
+                      Pixels& out) {
   float* w = out.window;
   w[0] = w[2] = kInfinity;
   w[1] = w[3] = -kInfinity;
   for (int i = 0; i < kLanes; ++i) {
-    const float* ray = grid.bent + 2 * (rows[i] * grid.width + columns[i]);
+    const int column = x0 + kColumn[i] < grid.width ? x0 + kColumn[i] : grid.width - 1;
+    const int row = y0 + kRow[i] < grid.height ? y0 + kRow[i] : grid.height - 1;
+    const float* ray = grid.bent + 2 * (row * grid.width + column);
     const float px = out.x[i] = ray[0] + shift_x * grid.dx;
     const float py = out.y[i] = ray[1] + shift_y * grid.dy;
     w[0] = px < w[0] ? px : w[0];
@@ -34,22 +39,17 @@ inline void fill_bent(const PixelGrid& grid, const int* columns, const int* rows
 inline void fill_pixels(const View& view, int x0, int y0, float shift_x, float shift_y,
                         Pixels& out) {
   const PixelGrid& grid = view.grid;
-  alignas(64) int columns[kLanes], rows[kLanes];
+  for (int k = 0; k < kLanes; k += kWidth) store(out.near + k, splat(view.near));
+  if (grid.bent) return fill_bent(grid, x0, y0, shift_x, shift_y, out);
+  const auto place = [](float first, float step, Int i, float shift) {
+    return splat(first) + splat(step) * (to_float(i) + splat(0.5f + shift));
+  };
   for (int k = 0; k < kLanes; k += kWidth) {
-    // Lanes outside the image repeat its border: they cost nothing extra and disturb nobody.
-    const auto within = [](Int i, int size) {
-      return select(less(i, int_of(size)), i, int_of(size - 1));
-    };
     const Int column = within(int_of(x0) + load(kColumn + k), grid.width);
     const Int row = within(int_of(y0) + load(kRow + k), grid.height);
-    store(out.near + k, splat(view.near));
-    store(out.x + k,
-          splat(grid.left) + splat(grid.dx) * (to_float(column) + splat(0.5f + shift_x)));
-    store(out.y + k, splat(grid.top) + splat(grid.dy) * (to_float(row) + splat(0.5f + shift_y)));
-    store(columns + k, column);
-    store(rows + k, row);
+    store(out.x + k, place(grid.left, grid.dx, column, shift_x));
+    store(out.y + k, place(grid.top, grid.dy, row, shift_y));
   }
-  if (grid.bent) return fill_bent(grid, columns, rows, shift_x, shift_y, out);
   out.window[0] = out.x[0];
   out.window[1] = out.x[3];
   out.window[2] = out.y[kLanes - 1];

@@ -77,18 +77,13 @@ void Frustum::widen(double by) {
 
 void find_candidates(const BoxList& list, const Frustum& frustum,
                      std::vector<std::uint64_t>& candidates) {
-  const KernelBoxes &all = list.all(), &blocks = list.blocks();
   std::fill(candidates.begin(), candidates.end(), 0);
-  const auto look = [&](int first, int last) {
-    for (int k = first; k < last; ++k) {
-      const int id = all.ids ? all.ids[k] : k;
-      if (!misses(all, k, frustum)) candidates[id / 64] |= std::uint64_t{1} << id % 64;
-    }
-  };
-  if (blocks.count == 0) return look(0, all.count);
-  constexpr int kBlock = KernelWorld::kBlock;
-  for (int b = 0; b < blocks.count; ++b)
-    if (!misses(blocks, b, frustum)) look(b * kBlock, std::min((b + 1) * kBlock, all.count));
+  list.each([&](int block) { return !misses(list.blocks(), block, frustum); },
+            [&](int k) {
+              const int id = list.object(k);
+              if (!misses(list.all(), k, frustum))
+                candidates[id / 64] |= std::uint64_t{1} << id % 64;
+            });
 }
 
 }  // namespace mjsense

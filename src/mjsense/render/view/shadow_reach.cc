@@ -45,39 +45,17 @@ struct Extent {
 
 bool is_plane(const KernelBoxes& boxes, int k) { return boxes.high[0][k] > kPlane; }
 
-// visit(box of a plane) for each; a few blocks have some.
-template <typename Visit>
-void each_plane(const BoxList& list, Visit visit) {
-  const KernelBoxes &all = list.all(), &blocks = list.blocks();
-  const auto look = [&](int first, int last) {
-    for (int k = first; k < last; ++k)
-      if (is_plane(all, k)) visit(k);
-  };
-  if (blocks.count == 0) return look(0, all.count);
-  constexpr int kBlock = KernelWorld::kBlock;
-  for (int b = 0; b < blocks.count; ++b)
-    if (is_plane(blocks, b)) look(b * kBlock, std::min((b + 1) * kBlock, all.count));
-}
-
 Extent extent_of(const BoxList& list) {
-  const KernelBoxes &all = list.all(), &blocks = list.blocks();
   Extent out;
-  const auto add = [&](int first, int last) {
-    for (int k = first; k < last; ++k)
-      if (!is_plane(all, k)) out.add(all, k);
-  };
-  if (blocks.count == 0) {
-    add(0, all.count);
-    return out;
-  }
-  constexpr int kBlock = KernelWorld::kBlock;
-  for (int b = 0; b < blocks.count; ++b) {
-    if (is_plane(blocks, b)) {
-      add(b * kBlock, std::min((b + 1) * kBlock, all.count));
-    } else {
-      out.add(blocks, b);
-    }
-  }
+  list.each(
+      [&](int block) {
+        if (is_plane(list.blocks(), block)) return true;  // one of them at least
+        out.add(list.blocks(), block);
+        return false;
+      },
+      [&](int k) {
+        if (!is_plane(list.all(), k)) out.add(list.all(), k);
+      });
   return out;
 }
 
@@ -88,13 +66,15 @@ double longest_shadow(const RayWorld& world, const Extent& extent, const RayLigh
   double longest = std::min(extent.most(to_light), dot(light.pos, to_light));
   longest = std::max(longest - extent.least(to_light), 0.0);
   const BoxList& boxes = world.boxes();
-  each_plane(boxes, [&](int k) {
-    const RayGeom& plane = world.geom(boxes.all().ids ? boxes.all().ids[k] : k);
+  const auto add_plane = [&](int k) {
+    if (!is_plane(boxes.all(), k)) return;
+    const RayGeom& plane = world.geom(boxes.object(k));
     const double n[3] = {plane.mat[2], plane.mat[5], plane.mat[8]};
     const double height = dot(n, plane.pos), slope = std::abs(dot(n, to_light));
     const double away = std::max(extent.most(n) - height, height - extent.least(n));
     longest = std::max(longest, slope > 0 ? away / slope : kEndless);
-  });
+  };
+  boxes.each([&](int block) { return is_plane(boxes.blocks(), block); }, add_plane);
   return longest;
 }
 
