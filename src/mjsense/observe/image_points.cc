@@ -146,7 +146,9 @@ void ImagePointsSensor::compute(const World& world) {
 }
 
 void ImagePointsSensor::points_of(const World& world, int object, int camera, const Masks& masks) {
-  const auto [field, width, height] = pictures_[camera];
+  // Plain variables: clang 14 lets no lambda take a structured binding.
+  const int width = pictures_[camera].width;
+  const int height = pictures_[camera].height;
   const std::size_t index = 2 * (object * cameras_.size() + camera);
   const auto points = fields()[index].data.row<float>(world.id);
   const auto num_points = fields()[index + 1].data.row<std::int32_t>(world.id);
