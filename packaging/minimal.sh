@@ -12,7 +12,7 @@ root=$PWD/build/minimal
 try() { # VERSION PYTHON
   local wheels=$root/try/wheels-$1
   mkdir -p "$wheels"
-  python3 -m pip download -q --disable-pip-version-check --only-binary=:all: --python-version "$1" -d "$wheels" "$wheel[video]" h5py
+  .venv/bin/python -m pip download -q --disable-pip-version-check --only-binary=:all: --python-version "$1" -d "$wheels" "$wheel[video]" h5py
   unshare --mount bash -ec "mount -t proc proc '$root/proc'
     chroot '$root' $2 -m venv '/try/$1'
     chroot '$root' '/try/$1/bin/python' -m pip install -q --no-index --find-links '/try/wheels-$1' 'mjsense[video]' h5py
