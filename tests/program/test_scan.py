@@ -37,6 +37,16 @@ def test_cloud_of_a_wall_and_a_floor(mjsense, room):
     assert np.abs(shift - [0, 0, 1]).max() < 1e-4
 
 
+def test_a_model_that_the_program_brings(mjsense):
+    done = mjsense("scan", "embedded:scenes/table/room.xml", "--frame", "geom:table_top", "--out", "cloud.ply")
+    cloud = points(mjsense.folder / "cloud.ply")
+    assert f"{len(cloud)} of 5760 rays returned" in done.stdout
+    on_floor = np.abs(cloud[:, 2] + 0.585) < 1e-4  # the table's top is that high
+    on_wall = np.abs(cloud[:, 0] - 1.65) < 1e-4
+    assert on_floor.sum() > 100 and on_wall.sum() > 100
+    assert "imu" in mjsense("sensors", "embedded:robots/quadruped.xml").stdout
+
+
 def test_table_of_angles(mjsense, room):
     np.save(mjsense.folder / "ahead.npy", np.array([[0.0, 0.0], [np.pi, 0.0]], np.float32))
     done = mjsense("scan", room, "--frame", "site:head", "--table", "ahead.npy", "--out", "cloud.ply")

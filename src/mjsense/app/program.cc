@@ -73,7 +73,8 @@ CLI::Validator number_of_steps() { return CLI::Range(0, 1'000'000'000).descripti
 
 CLI::App& add_sensors(CLI::App& program, SensorsOptions& options) {
   CLI::App& app = *program.add_subcommand("sensors", "what is measured, and what it costs");
-  app.add_option("what", options.what, one_of("an MJCF file or the name of a task", task_names()))
+  app.add_option("what", options.what,
+                 one_of("an MJCF file, embedded:FILE, or the name of a task", task_names()))
       ->required()
       ->type_name("SCENE.xml|TASK");
   add_field_options(app, struct_of<RolloutCfg>(), &options.rollout, {"task", "worlds"});
@@ -88,9 +89,8 @@ CLI::App& add_sensors(CLI::App& program, SensorsOptions& options) {
 
 CLI::App& add_scan(CLI::App& program, ScanOptions& options) {
   CLI::App& app = *program.add_subcommand("scan", "what a lidar sees, as a point cloud");
-  app.add_option("scene", options.scene, "an MJCF file")
+  app.add_option("scene", options.scene, "an MJCF file, or embedded:FILE")
       ->required()
-      ->check(existing_file())
       ->type_name("SCENE.xml");
   app.add_option("--frame", options.frame, "what carries the lidar: site:NAME, body:NAME, ...")
       ->required()

@@ -27,6 +27,8 @@ int run_scan(const ScanOptions& options) {
   else
     lidar->scan = options.table;
 
+  if (!names_model(options.scene, "an MJCF file"))
+    throw ValueError(fmt::format("'{}': no such file", options.scene));
   SceneCfg cfg;
   cfg.base.path = options.scene;
   cfg.sensors.push_back(lidar);

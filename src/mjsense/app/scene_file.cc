@@ -4,10 +4,21 @@
 #include <fmt/format.h>
 
 #include <cstdio>
+#include <filesystem>
 
 #include "mjsense/core/error.h"
 
 namespace mjsense {
+
+bool names_model(const std::string& what, const std::string& expected) {
+  if (what.starts_with("embedded:")) return true;
+  const std::filesystem::path path = what;
+  if (std::filesystem::is_regular_file(path)) return true;
+  if (std::filesystem::exists(path))
+    throw ValueError(fmt::format("{}: is no file: expected {}", what, expected));
+  if (path.has_extension()) throw ValueError(fmt::format("{}: no such file", what));
+  return false;
+}
 
 void print_warnings(const Scene& scene) {
   for (const std::string& text : scene.warnings()) fmt::print(stderr, "mjsense: {}\n", text);

@@ -3,7 +3,6 @@
 
 #include <fmt/format.h>
 
-#include <filesystem>
 #include <nlohmann/json.hpp>
 #include <set>
 
@@ -110,14 +109,7 @@ std::vector<Line> scene_lines(Simulation& simulation, int steps, const std::stri
 }  // namespace
 
 int run_sensors(const SensorsOptions& options) {
-  const std::filesystem::path path = options.what;
-  if (path.has_extension() || std::filesystem::exists(path)) {
-    if (!std::filesystem::is_regular_file(path)) {
-      throw ValueError(fmt::format("{}: {}", options.what,
-                                   std::filesystem::exists(path)
-                                       ? "is no file: expected an MJCF file or the name of a task"
-                                       : "no such file"));
-    }
+  if (names_model(options.what, "an MJCF file or the name of a task")) {
     for (const std::string& option : options.given) {
       if (option != "what" && option != "--steps" && option != "--json")
         throw ValueError(
