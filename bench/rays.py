@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """Height scans and a lidar beside mj_ray, mj_multiRay, mujoco_warp (the engine under mjlab's ray sensors) and mujoco-lidar on the CPU, the
-update of a world's top level, and threads: lidar_bench.cc and height_scan_bench.cc, run as one program.
+update of a world's top level, scenes that grow, and threads: lidar_bench.cc, height_scan_bench.cc and ray_scene_bench.cc, run as one program.
 
 Before every scan the robot has another pose, joints included; only the rays and bringing what they see up to date are timed. The robots
 are mjlab's Go1 and G1. Peers of Python run in an environment of their own (fetch.py) in the scenes that our program saved. Rates
@@ -43,7 +43,7 @@ def peer(models: dict[str, str], benchmark: str, script: str, *kind: str) -> flo
 
 def main() -> None:
     models = robots()
-    m = google_benchmarks("height_scan|lidar|top_level", **models)
+    m = google_benchmarks("height_scan|lidar|top_level|among_boxes", **models)
     unit = "M rays per CPU second"
     rows = []
     room = f"lidar 16 x 360 on a humanoid in a room, {m['lidar/1']['geoms']:.0f} geoms, {m['lidar/1']['faces'] / 1000:.0f}k faces"
@@ -64,6 +64,11 @@ def main() -> None:
                         "one thread", higher_is_better=False, goal=1.9))
     many = "lidar in 16 worlds, a step of physics (not timed) between"
     rows.append(Row(many, rate(m["lidar_worlds"]), unit, rate(m["lidar_worlds_mj_multiRay"]), "mj_multiRay", goal=5))
+    for count in (100, 1000, 10000):
+        ours = rate(m[f"among_boxes/{count}"])
+        for name, column in (("mj_multiRay", "mj_multiRay"), ("of_one_mesh", "ours, the boxes one mesh")):
+            rows.append(Row(f"lidar among {count:,} boxes and one that moves", ours, unit, rate(m[f"among_boxes_{name}/{count}"]), column))
+        rows.append(Row(f"- bringing the {count:,} up to date", m[f"among_boxes_update/{count}"]["cpu"] * 1e-3, "us"))
     for pose in ("moving", "still"):
         top = m[f"top_level/{pose}"]
         rows.append(Row(f"top level of a world of {top['geoms']:.0f} geoms, the robot {pose}", top["cpu"] * 1e-3, "us"))

@@ -6,6 +6,7 @@
 
 #include "mjsense/rays/box_list.h"
 #include "mjsense/rays/flex_shapes.h"
+#include "mjsense/rays/seen.h"
 #include "mjsense/rays/shared_geometry.h"
 #include "mjsense/rays/skin_shapes.h"
 
@@ -16,13 +17,33 @@ constexpr float kEndless = 1e30f;
 
 }  // namespace
 
+// What update() saw.
+struct RayWorld::Last {
+  Seen<int> body, material, group, type, data;
+  Seen<float> rgba, material_rgba;
+  Seen<double> size, pos, mat;
+
+  explicit Last(const mjModel* m)
+      : body(m->ngeom),
+        material(m->ngeom),
+        group(m->ngeom),
+        type(m->ngeom),
+        data(m->ngeom),
+        rgba(4 * m->ngeom),
+        material_rgba(4 * m->nmat),
+        size(3 * m->ngeom),
+        pos(3 * m->ngeom),
+        mat(9 * m->ngeom) {}
+};
+
 RayWorld::RayWorld(RayWorld&&) noexcept = default;
 RayWorld::~RayWorld() = default;
 
 RayWorld::RayWorld(const mjModel* m, const SharedGeometry& shapes)
     : num_geoms_(static_cast<int>(m->ngeom)),
       shapes_(&shapes),
-      boxes_(std::make_unique<BoxList>(static_cast<int>(m->ngeom + m->nflex))) {
+      boxes_(std::make_unique<BoxList>(static_cast<int>(m->ngeom + m->nflex))),
+      last_(std::make_unique<Last>(m)) {
   const int count = static_cast<int>(m->ngeom + m->nflex);
   const int padded = boxes_->padded();
   geoms_.resize(count);
@@ -37,27 +58,8 @@ RayWorld::RayWorld(const mjModel* m, const SharedGeometry& shapes)
 }
 
 void RayWorld::update(const mjModel* m, const mjData* d) {
-  for (int i = 0; i < num_geoms_; ++i) {
-    bodies_[i] = m->geom_bodyid[i];
-    describe(m, i, m->geom_matid[i], m->geom_group[i], m->geom_rgba + 4 * i);
-    RayGeom& g = geoms_[i];
-    const double* size = m->geom_size + 3 * i;
-    const bool same = version_ > 0 && g.type == m->geom_type[i] && g.data == m->geom_dataid[i] &&
-                      g.size[0] == static_cast<float>(size[0]) &&
-                      g.size[1] == static_cast<float>(size[1]) &&
-                      g.size[2] == static_cast<float>(size[2]) &&
-                      std::equal(g.pos, g.pos + 3, d->geom_xpos + 3 * i) &&
-                      std::equal(g.mat, g.mat + 9, d->geom_xmat + 9 * i);
-    if (same) continue;
-    std::copy_n(d->geom_xpos + 3 * i, 3, g.pos);
-    std::copy_n(d->geom_xmat + 9 * i, 9, g.mat);
-    std::copy_n(g.mat, 9, g.rot);
-    std::copy_n(size, 3, g.size);
-    g.type = m->geom_type[i];
-    g.data = m->geom_dataid[i];
-    set_local_box(g);
-    set_world_box(i);
-  }
+  update_looks(m);
+  update_geoms(m, d);
   if (flexes_) update_flexes(m, d);
   boxes_->update();
   if (skins_) skins_->update(m, d);
@@ -70,6 +72,51 @@ void RayWorld::update(const mjModel* m, const mjData* d) {
     std::copy_n(d->cam_xmat + 9 * i, 9, cameras_[i].mat);
   }
   ++version_;
+}
+
+void RayWorld::update_looks(const mjModel* m) {
+  const bool same = !(last_->body.changed(m->geom_bodyid) | last_->material.changed(m->geom_matid) |
+                      last_->group.changed(m->geom_group) | last_->rgba.changed(m->geom_rgba) |
+                      last_->material_rgba.changed(m->mat_rgba));
+  if (same && version_ > 0) return;
+  for (int i = 0; i < num_geoms_; ++i) {
+    bodies_[i] = m->geom_bodyid[i];
+    describe(m, i, m->geom_matid[i], m->geom_group[i], m->geom_rgba + 4 * i);
+  }
+}
+
+void RayWorld::update_geoms(const mjModel* m, const mjData* d) {
+  const bool all = (last_->type.changed(m->geom_type) | last_->data.changed(m->geom_dataid) |
+                    last_->size.changed(m->geom_size)) ||
+                   version_ == 0;
+  constexpr int kBlock = 16;  // geoms compared at once
+  for (int first = 0; first < num_geoms_; first += kBlock) {
+    const int count = std::min(kBlock, num_geoms_ - first);
+    const bool moved = last_->pos.changed(d->geom_xpos, 3 * first, 3 * count) |
+                       last_->mat.changed(d->geom_xmat, 9 * first, 9 * count);
+    if (!moved && !all) continue;
+    for (int i = first; i < first + count; ++i) update_geom(m, d, i);
+  }
+}
+
+void RayWorld::update_geom(const mjModel* m, const mjData* d, int i) {
+  RayGeom& g = geoms_[i];
+  const double* size = m->geom_size + 3 * i;
+  const bool same = version_ > 0 && g.type == m->geom_type[i] && g.data == m->geom_dataid[i] &&
+                    g.size[0] == static_cast<float>(size[0]) &&
+                    g.size[1] == static_cast<float>(size[1]) &&
+                    g.size[2] == static_cast<float>(size[2]) &&
+                    std::equal(g.pos, g.pos + 3, d->geom_xpos + 3 * i) &&
+                    std::equal(g.mat, g.mat + 9, d->geom_xmat + 9 * i);
+  if (same) return;
+  std::copy_n(d->geom_xpos + 3 * i, 3, g.pos);
+  std::copy_n(d->geom_xmat + 9 * i, 9, g.mat);
+  std::copy_n(g.mat, 9, g.rot);
+  std::copy_n(size, 3, g.size);
+  g.type = m->geom_type[i];
+  g.data = m->geom_dataid[i];
+  set_local_box(g);
+  set_world_box(i);
 }
 
 void RayWorld::describe(const mjModel* m, int i, int material, int group, const float* own_rgba) {

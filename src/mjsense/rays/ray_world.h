@@ -58,6 +58,11 @@ class RayWorld {
   std::span<const RayCamera> cameras() const { return cameras_; }
 
  private:
+  struct Last;
+
+  void update_looks(const mjModel* model);  // groups, materials, colours of geoms
+  void update_geoms(const mjModel* model, const mjData* data);
+  void update_geom(const mjModel* model, const mjData* data, int id);
   void describe(const mjModel* model, int object, int material, int group, const float* own_rgba);
   void update_flexes(const mjModel* model, const mjData* data);
   void set_local_box(RayGeom& geom) const;
@@ -70,6 +75,7 @@ class RayWorld {
   std::unique_ptr<FlexShapes> flexes_;
   std::unique_ptr<SkinShapes> skins_;
   std::unique_ptr<BoxList> boxes_;
+  std::unique_ptr<Last> last_;
   std::vector<std::uint32_t> flags_;
   std::vector<int> bodies_, materials_;
   std::vector<float> rgba_;
