@@ -63,6 +63,7 @@ set(MJSENSE_PUBLIC_HEADERS
   mjsense/robots/controllers/controller.h
   mjsense/robots/controllers/controller_cfg.h
   mjsense/robots/kinematics.h
+  mjsense/robots/link.h
   mjsense/robots/load_robot.h
   mjsense/robots/move_group.h
   mjsense/robots/robot.h

@@ -63,6 +63,7 @@
 #include "mjsense/robots/controllers/controller.h"
 #include "mjsense/robots/controllers/controller_cfg.h"
 #include "mjsense/robots/kinematics.h"
+#include "mjsense/robots/link.h"
 #include "mjsense/robots/load_robot.h"
 #include "mjsense/robots/move_group.h"
 #include "mjsense/robots/robot.h"

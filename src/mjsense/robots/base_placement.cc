@@ -60,9 +60,8 @@ BasePlacement::BasePlacement(const mjModel* m, int base_body, std::span<const in
                              name_of(m, mjOBJ_JOINT, j));
         return;
       }
-      const int address = m->jnt_qposadr[j];
-      links_.push_back({fixed, address, type == mjJNT_SLIDE, vec3(m->jnt_axis + 3 * j),
-                        vec3(m->jnt_pos + 3 * j), m->qpos0[address]});
+      links_.emplace_back(m, j, fixed);
+      qpos_.push_back(m->jnt_qposadr[j]);
       dofs_.push_back(m->jnt_dofadr[j]);
       fixed = Pose{};
     }
@@ -72,15 +71,9 @@ BasePlacement::BasePlacement(const mjModel* m, int base_body, std::span<const in
 
 Pose BasePlacement::from_root(const StateRow& state) const {
   Pose pose;
-  for (const Link& link : links_) {
-    const double dq = state.qpos[link.qpos] - link.zero;
-    pose = pose * link.fixed;
-    if (link.slide) {
-      pose.p = pose * (dq * link.axis);
-    } else {
-      const Quat turn = axis_angle(link.axis, dq);
-      pose = pose * Pose{link.anchor - rotate(turn, link.anchor), turn};
-    }
+  for (std::size_t i = 0; i < links_.size(); ++i) {
+    pose = pose * links_[i].fixed;
+    links_[i].move(pose, state.qpos[qpos_[i]]);
   }
   return pose * tail_;
 }
@@ -107,22 +100,22 @@ void BasePlacement::write(const StateRow& state, const Pose& base) const {
     return;
   }
   for (std::size_t i = 0; i < links_.size(); ++i) {
-    state.qpos[links_[i].qpos] = links_[i].zero;
+    state.qpos[qpos_[i]] = links_[i].zero;
     state.qvel[dofs_[i]] = 0;
   }
   // Turns first: what they do not turn about, slides cannot change; then the way that is left.
   for (const bool slide : {false, true}) {
-    for (const Link& link : links_) {
-      if (link.slide != slide) continue;
+    for (std::size_t i = 0; i < links_.size(); ++i) {
+      if (links_[i].slide != slide) continue;
       // What is missing, in the axes of the frame in which the joint moves.
-      Pose before = root_;
-      for (const Link& each : links_) {
-        before = before * each.fixed;
-        if (&each == &link) break;
-        if (!each.slide)
-          before.q = before.q * axis_angle(each.axis, state.qpos[each.qpos] - each.zero);
+      Pose before = root_ * links_[0].fixed;
+      for (std::size_t k = 0; k < i; ++k) {
+        const Link& link = links_[k];
+        if (!link.slide)
+          before.q = before.q * axis_angle(link.axis, state.qpos[qpos_[k]] - link.zero);
+        before = before * links_[k + 1].fixed;
       }
-      const Vec3 axis = rotate(before.q, link.axis);
+      const Vec3 axis = rotate(before.q, links_[i].axis);
       const Pose now = root_ * from_root(state);
       double step = 0;
       if (slide) {
@@ -132,7 +125,7 @@ void BasePlacement::write(const StateRow& state, const Pose& base) const {
         const double along = missing.x * axis.x + missing.y * axis.y + missing.z * axis.z;
         step = std::remainder(2 * std::atan2(along, missing.w), 2 * 3.14159265358979323846);
       }
-      state.qpos[link.qpos] += step;
+      state.qpos[qpos_[i]] += step;
     }
   }
   const Pose root = base * inverse(from_root(state));

@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "mjsense/core/pose.h"
+#include "mjsense/robots/link.h"
 #include "mjsense/robots/state_row.h"
 
 namespace mjsense {
@@ -30,13 +31,6 @@ class BasePlacement {
   void write(const StateRow& state, const Pose& base) const;
 
  private:
-  struct Link {
-    Pose fixed;  // from the one before
-    int qpos = -1;
-    bool slide = false;
-    Vec3 axis, anchor;
-    double zero = 0;
-  };
   Pose from_root(const StateRow& state) const;  // X_RB
 
   std::string place_, base_name_;
@@ -47,7 +41,7 @@ class BasePlacement {
   Pose root_;              // X_WR of the model: of the mocap body, or of what stands in the world
   std::vector<Link> links_;
   Pose tail_;
-  std::vector<int> dofs_;  // of the links
+  std::vector<int> qpos_, dofs_;  // of the links
 };
 
 }  // namespace mjsense

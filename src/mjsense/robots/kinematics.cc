@@ -80,8 +80,7 @@ Chain::Chain(const mjModel* model, int base_body, int leaf_site, std::span<const
       }
       if (joints_.size() == kMaxJoints)
         throw ValueError(fmt::format("a kinematic chain has at most {} joints", kMaxJoints));
-      links_.push_back({fixed, vec3(model->jnt_axis + 3 * j), vec3(model->jnt_pos + 3 * j),
-                        type == mjJNT_SLIDE, model->qpos0[model->jnt_qposadr[j]]});
+      links_.emplace_back(model, j, fixed);
       joints_.push_back(j);
       const bool limited = model->jnt_limited[j];
       low_.push_back(limited ? model->jnt_range[2 * j] : -std::numeric_limits<double>::infinity());
@@ -97,15 +96,8 @@ Chain::Chain(const mjModel* model, int base_body, int leaf_site, std::span<const
 Pose Chain::fk(std::span<const double> q) const {
   Pose pose;
   for (std::size_t i = 0; i < links_.size(); ++i) {
-    const Link& link = links_[i];
-    const double dq = q[i] - link.zero;
-    pose = pose * link.fixed;
-    if (link.slide) {
-      pose.p = pose * (dq * link.axis);
-    } else {
-      const Quat turn = axis_angle(link.axis, dq);
-      pose = pose * Pose{link.anchor - rotate(turn, link.anchor), turn};
-    }
+    pose = pose * links_[i].fixed;
+    links_[i].move(pose, q[i]);
   }
   return pose * tail_;
 }
@@ -116,16 +108,10 @@ Pose Chain::jacobian(std::span<const double> q, std::span<double> jacobian) cons
   Pose pose;
   for (std::size_t i = 0; i < n; ++i) {
     const Link& link = links_[i];
-    const double dq = q[i] - link.zero;
     pose = pose * link.fixed;
     axes[i] = rotate(pose.q, link.axis);
     anchors[i] = pose * link.anchor;
-    if (link.slide) {
-      pose.p = pose * (dq * link.axis);
-    } else {
-      const Quat turn = axis_angle(link.axis, dq);
-      pose = pose * Pose{link.anchor - rotate(turn, link.anchor), turn};
-    }
+    link.move(pose, q[i]);
   }
   const Pose leaf = pose * tail_;
   for (std::size_t i = 0; i < n; ++i) {

@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "mjsense/core/pose.h"
+#include "mjsense/robots/link.h"
 
 namespace mjsense {
 
@@ -40,7 +41,8 @@ class Chain {
   // every iteration. True if |e| < tolerance within max_iterations; q is otherwise the last
   // iterate. The first kTracking iterations start at q, so that a solution near q is found where
   // there is one; if they end in a corner of the ranges, the others begin anew where, of
-  // configurations spread over them, the leaf is nearest to the target. `moves` [J]: which joints may move; all where it is empty.
+  // configurations spread over them, the leaf is nearest to the target. `moves` [J]: which joints may
+  // move; all where it is empty.
   bool ik(const Pose& target, std::span<double> q, int max_iterations = 1000,
           double tolerance = 1e-4, std::span<const bool> moves = {}) const;
 
@@ -49,12 +51,6 @@ class Chain {
   void restart(const Pose& target, int attempt, std::span<double> q,
                std::span<const bool> moves) const;
 
-  struct Link {
-    Pose fixed;         // from the previous link's moved frame
-    Vec3 axis, anchor;  // of the joint, in the frame after `fixed`
-    bool slide = false;
-    double zero = 0;  // qpos0
-  };
   std::vector<Link> links_;
   Pose tail_;  // from the last link to the leaf
   std::vector<int> joints_;
