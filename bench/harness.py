@@ -19,7 +19,7 @@ import time
 from collections.abc import Callable
 
 ROOT = pathlib.Path(__file__).resolve().parents[1]
-RELEASE = ROOT / "build" / "release"  # what ./dev bench builds
+RELEASE = pathlib.Path(os.environ.get("MJSENSE_BENCH_BUILD", ROOT / "build" / "release"))  # what ./dev bench builds, or another build
 RESULTS = ROOT / ".cache" / "bench" / "results"  # of the last runs, for page.py
 if not (RELEASE / "python").exists():
     sys.exit(f"{RELEASE} is missing: ./dev bench builds it")
