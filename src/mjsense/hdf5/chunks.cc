@@ -17,7 +17,8 @@ namespace mjsense::h5 {
 namespace {
 
 constexpr std::uint64_t kMostChunks = 1'000'000;
-constexpr std::size_t kSumBytes = 4;  // fletcher32 stands behind the bytes
+constexpr hsize_t kMostPlainChunks = 10'000;  // the library counts up to each from the first
+constexpr std::size_t kSumBytes = 4;          // fletcher32 stands behind the bytes
 
 using Bytes = std::vector<std::uint8_t>;
 
@@ -49,14 +50,15 @@ class Chunks {
         size_(dims(dataset)) {}
 
   void check() {
-    if (H5Pget_layout(properties_) != H5D_CHUNKED || !read_filters()) return;
+    if (H5Pget_layout(properties_) != H5D_CHUNKED) return;
     const Id type(H5Dget_type(dataset_), H5Tclose, name_);
     std::vector<hsize_t> chunk(size_.size());
     h5::check(H5Pget_chunk(properties_, static_cast<int>(chunk.size()), chunk.data()), name_);
     bytes_ = H5Tget_size(type);
+    for (const hsize_t n : chunk) bytes_ *= n;  // check_storage() has bounded both
+    if (!read_filters()) return check_plain();
     std::uint64_t count = 1;
     for (std::size_t i = 0; i < size_.size(); ++i) {
-      bytes_ *= chunk[i];  // check_storage() has bounded both
       if (__builtin_mul_overflow(count, (size_[i] + chunk[i] - 1) / chunk[i], &count) ||
           count > kMostChunks)
         refuse(name_, fmt::format("has more than {} chunks", kMostChunks));
@@ -87,6 +89,26 @@ class Chunks {
       filters_.push_back(filter);
     }
     return !filters_.empty();
+  }
+
+  // The index states a size for what is not packed, too; H5Dget_chunk_storage_size() does not tell.
+  void check_plain() const {
+    const Id space(H5Dget_space(dataset_), H5Sclose, name_);
+    hsize_t count = 0;
+    h5::check(H5Dget_num_chunks(dataset_, space, &count), name_);
+    if (count > kMostPlainChunks)
+      refuse(name_, fmt::format("has more than {} chunks that are not packed", kMostPlainChunks));
+    std::vector<hsize_t> at(size_.size());
+    for (hsize_t n = 0; n < count; ++n) {
+      unsigned without = 0;
+      haddr_t address = 0;
+      hsize_t stored = 0;
+      h5::check(H5Dget_chunk_info(dataset_, space, n, at.data(), &without, &address, &stored),
+                name_);
+      if (stored != bytes_)
+        refuse(name_,
+               fmt::format("is damaged: a chunk of it has {} bytes, not {}", stored, bytes_));
+    }
   }
 
   void check_chunk(const std::vector<hsize_t>& at) const {

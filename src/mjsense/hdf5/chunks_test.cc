@@ -21,13 +21,18 @@ using ::testing::IsEmpty;
 constexpr hsize_t kRows = 25, kChunk = 10, kColumns = 4;
 constexpr std::size_t kChunkBytes = kChunk * kColumns * sizeof(float);
 
-// float32 [25, 4] in chunks of ten rows, written through the filters of `properties`.
-Id dataset(hid_t file, const Id& properties) {
+// float32 [25, 4] in chunks of ten rows, none of them written.
+Id empty_dataset(hid_t file, const Id& properties) {
   const hsize_t size[] = {kRows, kColumns}, chunk[] = {kChunk, kColumns};
   const Id space(H5Screate_simple(2, size, nullptr), H5Sclose, "space");
   check(H5Pset_chunk(properties, 2, chunk), "chunk");
-  Id made(H5Dcreate2(file, "x", H5T_IEEE_F32LE, space, H5P_DEFAULT, properties, H5P_DEFAULT),
-          H5Dclose, "x");
+  return {H5Dcreate2(file, "x", H5T_IEEE_F32LE, space, H5P_DEFAULT, properties, H5P_DEFAULT),
+          H5Dclose, "x"};
+}
+
+// The same, written through the filters of `properties`.
+Id dataset(hid_t file, const Id& properties) {
+  Id made = empty_dataset(file, properties);
   std::vector<float> values(kRows * kColumns);
   std::iota(values.begin(), values.end(), 0.5f);
   check(H5Dwrite(made, H5T_NATIVE_FLOAT, H5S_ALL, H5S_ALL, H5P_DEFAULT, values.data()), "x");
@@ -60,12 +65,7 @@ TEST_F(Chunks, WhatTheLibraryPacksIsTaken) {
   EXPECT_THAT(complaint(dataset(file_, properties_)), IsEmpty());
   // Chunks that were never written are none.
   H5Ldelete(file_, "x", H5P_DEFAULT);
-  const hsize_t size[] = {kRows, kColumns};
-  const Id space(H5Screate_simple(2, size, nullptr), H5Sclose, "space");
-  const Id empty(
-      H5Dcreate2(file_, "x", H5T_IEEE_F32LE, space, H5P_DEFAULT, properties_, H5P_DEFAULT),
-      H5Dclose, "x");
-  EXPECT_THAT(complaint(empty), IsEmpty());
+  EXPECT_THAT(complaint(empty_dataset(file_, properties_)), IsEmpty());
 }
 
 // The library would read beyond the end of what is shorter than its shape says.
@@ -96,6 +96,22 @@ TEST_F(Chunks, WhatUnpacksToAnotherSizeIsRefused) {
   const hsize_t middle[] = {kChunk, 0};
   check(H5Dwrite_chunk(made, H5P_DEFAULT, 1, middle, 20, "short, and not packed"), "chunk");
   EXPECT_THAT(complaint(made), HasSubstr("does not unpack"));
+}
+
+// What is not packed has a size in the index all the same, and the library makes room for that much.
+TEST_F(Chunks, WhatIsNotPackedAndHasAnotherSizeIsRefused) {
+  for (const std::size_t bytes : {std::size_t{15}, kChunkBytes - 1, kChunkBytes, kChunkBytes + 1}) {
+    const Id made = empty_dataset(file_, properties_);
+    const hsize_t at[] = {kChunk, 0};
+    check(H5Dwrite_chunk(made, H5P_DEFAULT, 0, at, bytes, std::string(bytes, 'x').data()), "chunk");
+    if (bytes == kChunkBytes) {
+      EXPECT_THAT(complaint(made), IsEmpty());
+    } else {
+      EXPECT_EQ(complaint(made),
+                "'x' is damaged: a chunk of it has " + std::to_string(bytes) + " bytes, not 160");
+    }
+    H5Ldelete(file_, "x", H5P_DEFAULT);
+  }
 }
 
 TEST_F(Chunks, OtherFiltersAreRefused) {
