@@ -201,6 +201,14 @@ def chunk_that_is_no_gzip(house):
         f["traj_0/obs/agent/qpos"].id.write_direct_chunk((0, 0), b"not packed at all")
 
 
+@case
+def chunk_that_is_not_packed_and_short(house):
+    with change(house) as f:
+        rows = len(f["traj_0/success"])
+        dataset = replace(f["traj_0/obs/agent"], "qpos", shape=(rows, 100), dtype="f8", chunks=(rows, 100))
+        dataset.id.write_direct_chunk((0, 0), b"fifteen letters")
+
+
 # ---- links
 
 

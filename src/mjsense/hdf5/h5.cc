@@ -252,14 +252,15 @@ std::vector<hsize_t> dims(hid_t dataset) {
   return sizes;
 }
 
-void write_text(hid_t parent, const std::string& path, std::string_view text) {
+Id write_text(hid_t parent, const std::string& path, std::string_view text) {
   const std::string owned(text);
   const char* data = owned.c_str();
   const Id type = text_type();
-  const Id dataset(H5Dcreate2(parent, path.c_str(), type, scalar(), link_properties(),
-                              dataset_properties(), H5P_DEFAULT),
-                   H5Dclose, path);
+  Id dataset(H5Dcreate2(parent, path.c_str(), type, scalar(), link_properties(),
+                        dataset_properties(), H5P_DEFAULT),
+             H5Dclose, path);
   check(H5Dwrite(dataset, type, H5S_ALL, H5S_ALL, H5P_DEFAULT, &data), path);
+  return dataset;
 }
 
 std::string read_text(hid_t parent, const std::string& path) {
@@ -274,13 +275,30 @@ std::string read_text(hid_t parent, const std::string& path) {
   });
 }
 
+namespace {
+
+// Made once, and never closed: a recording has a hundred texts, each shorter than its type.
+hid_t type_of_texts() {
+  static const Id& type = *new Id(text_type());
+  return type;
+}
+
+}  // namespace
+
 void set_attribute(hid_t object, const char* name, std::string_view value) {
+  write_text_attribute(create_text_attribute(object, name), value);
+}
+
+Id create_text_attribute(hid_t object, const char* name) {
+  static const Id& space = *new Id(scalar());
+  return {H5Acreate2(object, name, type_of_texts(), space, H5P_DEFAULT, H5P_DEFAULT), H5Aclose,
+          name};
+}
+
+void write_text_attribute(hid_t attribute, std::string_view value) {
   const std::string owned(value);
   const char* data = owned.c_str();
-  // Made once, and never closed: a recording has a hundred texts, each shorter than its type.
-  static const Id& type = *new Id(text_type());
-  static const Id& space = *new Id(scalar());
-  write_attribute(object, name, type, type, space, &data);
+  check(H5Awrite(attribute, type_of_texts(), &data), "an attribute");
 }
 
 void set_attribute(hid_t object, const char* name, double value) {

@@ -3,6 +3,8 @@
 
 #include <zlib.h>
 
+#include <cstring>
+
 #include "mjsense/core/cpu.h"
 
 #if defined(__x86_64__)
@@ -29,6 +31,18 @@ constexpr std::int64_t power(int n) {
   std::uint32_t at = 1U << 31;  // x^0
   for (int i = 0; i < n; ++i) at = at >> 1 ^ (at & 1 ? kP : 0);
   return static_cast<std::int64_t>(std::uint64_t{at} << 32);
+}
+
+// In 33 bits: P, and x^64 / P without its remainder.
+constexpr std::int64_t kWholeP = (std::int64_t{kP} << 1) | 1;
+constexpr std::int64_t quotient() {
+  std::int64_t of = 1;      // x^32 is what x^64 / P begins with
+  std::uint32_t rest = kP;  // of x^32 / P, then of each power above it
+  for (int i = 1; i <= 32; ++i) {
+    if (rest & 1) of |= std::int64_t{1} << i;
+    rest = rest >> 1 ^ (rest & 1 ? kP : 0);
+  }
+  return of;
 }
 
 // What multiplies s = h x^64 + l by x^n, as h x^(64 + n) + l x^n, for each of four s. The product of
@@ -66,41 +80,103 @@ MJSENSE_WIDE inline __m512i shifted_wide(__m512i s, __m512i powers, __m512i ther
 // V. Gopal et al., Fast CRC Computation for Generic Polynomials Using PCLMULQDQ Instruction, Intel,
 // 2009: what was read is shifted over a block ahead and added to it, so that from there on the
 // remainder is the same without it.
+
+// Bytes that are left, and what stands for all before them.
+struct Rest {
+  const std::uint8_t* bytes;
+  std::size_t count;
+};
+
+// The first bytes, so many that a multiple of kNarrow is left; 2 * kNarrow is the least `count`.
+// Zeros before the first byte change nothing.
+MJSENSE_NARROW inline __m128i head(std::uint32_t crc, Rest& rest) {
+  const std::size_t odd = rest.count % kNarrow;
+  std::uint8_t aligned[2 * kNarrow] = {};
+  std::uint8_t* first = aligned + kNarrow - odd;
+  std::memcpy(first, rest.bytes, kNarrow);
+  std::memcpy(aligned + kNarrow, rest.bytes + odd, kNarrow);
+  std::uint32_t word;
+  std::memcpy(&word, first, sizeof(word));
+  word ^= ~crc;
+  std::memcpy(first, &word, sizeof(word));
+  rest.bytes += kNarrow + odd;
+  rest.count -= kNarrow + odd;
+  constexpr Powers kNext = powers(8 * kNarrow);
+  return shifted(load(aligned), load(kNext.bits), load(aligned + kNarrow));
+}
+
+// Through a multiple of kNarrow bytes, to the CRC.
+MJSENSE_NARROW inline std::uint32_t tail(__m128i s, Rest rest) {
+  constexpr Powers kNext = powers(8 * kNarrow);
+  const __m128i next = load(kNext.bits);
+  for (; rest.count > 0; rest.bytes += kNarrow, rest.count -= kNarrow)
+    s = shifted(s, next, load(rest.bytes));
+  // (h x^64 + l) x^32, below x^96 and then below x^64.
+  const __m128i fold = _mm_set_epi64x(power(64 - 1), power(96 - 1));
+  s = _mm_xor_si128(_mm_clmulepi64_si128(s, fold, 0x00), _mm_slli_si128(_mm_srli_si128(s, 8), 4));
+  s = _mm_srli_si128(_mm_xor_si128(s, _mm_clmulepi64_si128(s, fold, 0x10)), 8);
+  // P. Barrett's reduction: the quotient by P needs the upper half alone, and is subtracted.
+  const __m128i by = _mm_set_epi64x(quotient(), kWholeP), half = _mm_set_epi32(0, 0, 0, -1);
+  __m128i q = _mm_clmulepi64_si128(_mm_and_si128(s, half), by, 0x10);
+  q = _mm_clmulepi64_si128(_mm_and_si128(q, half), by, 0x00);
+  return ~static_cast<std::uint32_t>(_mm_extract_epi32(_mm_xor_si128(s, q), 1));
+}
+
 MJSENSE_NARROW std::uint32_t narrow(std::uint32_t crc, const std::uint8_t* bytes,
                                     std::size_t count) {
   constexpr std::size_t kBlock = kLanes * kNarrow;
-  constexpr Powers kOfBlock = powers(8 * kBlock), kOfNext = powers(8 * kNarrow);
-  if (count < 2 * kBlock) return crc32_portable(crc, bytes, count);
-  __m128i lane[kLanes];
-  for (int i = 0; i < kLanes; ++i) lane[i] = load(bytes + i * kNarrow);
-  lane[0] = _mm_xor_si128(lane[0], _mm_cvtsi32_si128(static_cast<int>(~crc)));
-  const __m128i block = load(kOfBlock.bits), next = load(kOfNext.bits);
-  for (bytes += kBlock, count -= kBlock; count >= kBlock; bytes += kBlock, count -= kBlock) {
-    for (int i = 0; i < kLanes; ++i) lane[i] = shifted(lane[i], block, load(bytes + i * kNarrow));
+  if (count < 2 * kNarrow) return crc32_portable(crc, bytes, count);
+  Rest rest{bytes, count};
+  __m128i s = head(crc, rest);
+  if (rest.count >= 2 * kBlock) {
+    constexpr Powers kOfBlock = powers(8 * kBlock), kNext = powers(8 * kNarrow);
+    const __m128i block = load(kOfBlock.bits), next = load(kNext.bits);
+    __m128i lane[kLanes];
+    for (int i = 0; i < kLanes; ++i) lane[i] = load(rest.bytes + i * kNarrow);
+    lane[0] = shifted(s, next, lane[0]);
+    const auto step = [&] {
+      rest.bytes += kBlock;
+      rest.count -= kBlock;
+    };
+    for (step(); rest.count >= kBlock; step()) {
+      for (int i = 0; i < kLanes; ++i)
+        lane[i] = shifted(lane[i], block, load(rest.bytes + i * kNarrow));
+    }
+    s = lane[0];
+    for (int i = 1; i < kLanes; ++i) s = shifted(s, next, lane[i]);
   }
-  for (int i = 1; i < kLanes; ++i) lane[i] = shifted(lane[i - 1], next, lane[i]);
-  // Sixteen bytes that stand for all until here, with nothing before them.
-  std::uint8_t same[kNarrow];
-  _mm_storeu_si128(reinterpret_cast<__m128i*>(same), lane[kLanes - 1]);
-  return crc32_portable(crc32_portable(~0U, same, kNarrow), bytes, count);
+  return tail(s, rest);
 }
 
 MJSENSE_WIDE std::uint32_t wide(std::uint32_t crc, const std::uint8_t* bytes, std::size_t count) {
   constexpr std::size_t kBlock = kLanes * kWide;
-  constexpr Powers kOfBlock = powers(8 * kBlock), kOfNext = powers(8 * kWide);
   if (count < 2 * kBlock) return narrow(crc, bytes, count);
+  Rest rest{bytes, count};
+  const __m128i first = head(crc, rest);
+  constexpr Powers kOfBlock = powers(8 * kBlock), kOfWide = powers(8 * kWide);
+  constexpr Powers kNext = powers(8 * kNarrow);
+  const __m512i block = load_wide(kOfBlock.bits), wide = load_wide(kOfWide.bits);
+  const __m128i next = load(kNext.bits);
   __m512i lane[kLanes];
-  for (int i = 0; i < kLanes; ++i) lane[i] = load_wide(bytes + i * kWide);
-  lane[0] = _mm512_xor_si512(lane[0], _mm512_set_epi64(0, 0, 0, 0, 0, 0, 0, std::int64_t{~crc}));
-  const __m512i block = load_wide(kOfBlock.bits), next = load_wide(kOfNext.bits);
-  for (bytes += kBlock, count -= kBlock; count >= kBlock; bytes += kBlock, count -= kBlock) {
+  for (int i = 0; i < kLanes; ++i) lane[i] = load_wide(rest.bytes + i * kWide);
+  const __m128i zero = _mm_setzero_si128();
+  lane[0] = _mm512_xor_si512(lane[0], _mm512_zextsi128_si512(shifted(first, next, zero)));
+  const auto step = [&](std::size_t n) {
+    rest.bytes += n;
+    rest.count -= n;
+  };
+  for (step(kBlock); rest.count >= kBlock; step(kBlock)) {
     for (int i = 0; i < kLanes; ++i)
-      lane[i] = shifted_wide(lane[i], block, load_wide(bytes + i * kWide));
+      lane[i] = shifted_wide(lane[i], block, load_wide(rest.bytes + i * kWide));
   }
-  for (int i = 1; i < kLanes; ++i) lane[i] = shifted_wide(lane[i - 1], next, lane[i]);
-  std::uint8_t same[kWide];
-  _mm512_storeu_si512(same, lane[kLanes - 1]);
-  return narrow(narrow(~0U, same, kWide), bytes, count);
+  for (int i = 1; i < kLanes; ++i) lane[i] = shifted_wide(lane[i - 1], wide, lane[i]);
+  __m512i all = lane[kLanes - 1];
+  for (; rest.count >= kWide; step(kWide)) all = shifted_wide(all, wide, load_wide(rest.bytes));
+  std::uint8_t quarters[kWide];
+  _mm512_storeu_si512(quarters, all);
+  __m128i s = load(quarters);
+  for (std::size_t i = kNarrow; i < kWide; i += kNarrow) s = shifted(s, next, load(quarters + i));
+  return tail(s, rest);
 }
 
 }  // namespace

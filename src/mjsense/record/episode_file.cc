@@ -126,6 +126,7 @@ void EpisodeFile::add_dataset(std::string_view place, DType dtype, const Shape& 
   dataset.id = h5::Id(H5Dcreate2(trajectory_, name.c_str(), h5::memory_type(dtype), space,
                                  h5::link_properties(), properties, H5P_DEFAULT),
                       H5Dclose, name);
+  dataset.crc = h5::create_text_attribute(dataset.id, kChecksumAttribute);
   datasets_.push_back(std::move(dataset));
 }
 
@@ -170,15 +171,15 @@ void EpisodeFile::write_scene(std::string_view obs_scene, std::string_view outco
   Checksum sum;
   sum.add(obs_scene.data(), obs_scene.size());
   const h5::H5Lock lock;
-  h5::write_text(trajectory_, "obs_scene", obs_scene);
-  h5::set_attribute(h5::open_dataset(trajectory_, "obs_scene"), kChecksumAttribute, sum.text());
+  h5::set_attribute(h5::write_text(trajectory_, "obs_scene", obs_scene), kChecksumAttribute,
+                    sum.text());
   h5::set_attribute(trajectory_, "outcome", outcome);
 }
 
 void EpisodeFile::finish(std::span<const VideoSum> videos) {
   const h5::H5Lock lock;
   for (const Dataset& dataset : datasets_)
-    h5::set_attribute(dataset.id, kChecksumAttribute, dataset.sum.text());
+    h5::write_text_attribute(dataset.crc, dataset.sum.text());
   for (std::size_t v = 0; v < videos.size(); ++v) {
     const h5::Id dataset = h5::open_dataset(trajectory_, "obs/sensor_data/" + plan_.videos[v].key);
     h5::set_attribute(dataset, kChecksumAttribute, videos[v].crc);

@@ -44,7 +44,7 @@ class EpisodeFile {
 
  private:
   struct Dataset {
-    h5::Id id;
+    h5::Id id, crc;  // the dataset, and its attribute of that name
     int rank = 0;
     std::size_t row_bytes = 0;
     Checksum sum;  // of all rows
