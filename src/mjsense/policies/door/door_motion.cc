@@ -5,7 +5,6 @@
 #include <cmath>
 #include <numbers>
 
-#include "mjsense/core/error.h"
 #include "mjsense/observe/frame.h"
 #include "mjsense/scenes/robot_floor.h"
 
@@ -237,7 +236,7 @@ class DoorMotions::Attempt {
 
   // The robot in anything but the handle in its hand.
   bool collides(const RobotValues& values, const BasePose& base, double leaf, double lever) {
-    const mjModel* m = motions_.model_;
+    const mjModel* m = world_.model;  // furniture where it stands in this world
     mjData* d = scratch_;
     mju_copy(d->qpos, world_.data->qpos, m->nq);
     const MoveGroup& carrier = motions_.robot_.groups()[motions_.base_group_];
@@ -285,16 +284,17 @@ class DoorMotions::Attempt {
 
 DoorMotions::DoorMotions(const mjModel* model, const Robot& robot, DoorFloor floor,
                          DoorMotionCfg cfg)
-    : base_group_(driving_base(robot)), model_(model), robot_(robot), floor_(floor), cfg_(cfg) {
+    : base_group_(driving_base(robot)),
+      model_(model),
+      robot_(robot),
+      floor_(floor),
+      cfg_(cfg),
+      scratch_(model) {
   for (const Hand& hand : hands_of(robot, model)) {
     if (robot.groups()[hand.tool].kind == GroupKind::kArm &&
         robot.groups()[hand.gripper].pad_sites[0] >= 0)
       hands_.push_back(hand);
   }
-}
-
-DoorMotions::~DoorMotions() {
-  for (mjData* data : unused_) mj_deleteData(data);
 }
 
 std::vector<double> DoorMotions::tucked(const Hand& hand) const {
@@ -351,16 +351,7 @@ std::vector<BasePose> DoorMotions::places(const World& world, const Door& door) 
 
 std::optional<DoorMotion> DoorMotions::plan(const World& world, const Door& door,
                                             const BasePose& base, double leaf, int tool) const {
-  mjData* scratch = nullptr;
-  {
-    const std::lock_guard lock(mutex_);
-    if (!unused_.empty()) {
-      scratch = unused_.back();
-      unused_.pop_back();
-    }
-  }
-  if (!scratch) scratch = mj_makeData(model_);
-  if (!scratch) throw RuntimeError("out of memory for the model's data");
+  const ScratchData::Loan scratch = scratch_.borrow();
   mju_copy(scratch->mocap_pos, world.data->mocap_pos, 3 * model_->nmocap);
   mju_copy(scratch->mocap_quat, world.data->mocap_quat, 4 * model_->nmocap);
   const DoorGeometry geometry(model_, world.data, door, robot_.base_pose(world).p);
@@ -372,7 +363,7 @@ std::optional<DoorMotion> DoorMotions::plan(const World& world, const Door& door
         handle_grasps(model_, world.data, door, geometry, closing);
     if (!grasps) continue;
     for (const Pose& grasp : grasps->poses) {
-      Attempt attempt(*this, world, door, geometry, hand, scratch);
+      Attempt attempt(*this, world, door, geometry, hand, scratch.get());
       for (const double swivel : {0.0, 0.3, -0.3}) {
         if (best && best->cost < kGood) break;
         DoorMotion motion;
@@ -381,8 +372,6 @@ std::optional<DoorMotion> DoorMotions::plan(const World& world, const Door& door
       }
     }
   }
-  const std::lock_guard lock(mutex_);
-  unused_.push_back(scratch);
   return best;
 }
 

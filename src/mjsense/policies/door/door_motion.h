@@ -6,14 +6,13 @@
 #include <mujoco/mujoco.h>
 
 #include <array>
-#include <memory>
-#include <mutex>
 #include <optional>
 #include <vector>
 
 #include "mjsense/policies/door/handle_grasp.h"
 #include "mjsense/policies/planner/follower.h"
 #include "mjsense/scenes/base_route.h"
+#include "mjsense/worlds/scratch_data.h"
 
 namespace mjsense {
 
@@ -49,9 +48,6 @@ struct DoorFloor {
 class DoorMotions {
  public:
   DoorMotions(const mjModel* model, const Robot& robot, DoorFloor floor, DoorMotionCfg cfg = {});
-  ~DoorMotions();
-  DoorMotions(const DoorMotions&) = delete;
-  DoorMotions& operator=(const DoorMotions&) = delete;
 
   std::span<const Hand> hands() const { return hands_; }
   // With the base here at the grasp, the door led to `leaf` rad from where it stands; the best of
@@ -67,7 +63,6 @@ class DoorMotions {
   double clearance(const DoorGeometry& geometry, const BasePose& base, double leaf) const;
 
  private:
-  struct Scratch;
   class Attempt;
   int base_group_;
   const mjModel* model_;
@@ -75,8 +70,7 @@ class DoorMotions {
   DoorFloor floor_;
   DoorMotionCfg cfg_;
   std::vector<Hand> hands_;
-  mutable std::mutex mutex_;
-  mutable std::vector<mjData*> unused_;
+  mutable ScratchData scratch_;
 };
 
 }  // namespace mjsense

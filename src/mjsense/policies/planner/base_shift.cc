@@ -4,9 +4,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <memory>
 
-#include "mjsense/core/error.h"
 #include "mjsense/observe/frame.h"
 #include "mjsense/policies/navigation/nav_planner.h"
 
@@ -47,7 +45,8 @@ BaseShift::BaseShift(const mjModel* model, const Robot& robot)
     : model_(model),
       robot_(robot),
       group_(driving_base(robot)),
-      collisions_(model, robot, robot.groups()[group_].joints) {}
+      collisions_(model, robot, robot.groups()[group_].joints),
+      scratch_(model) {}
 
 bool BaseShift::plan(const World& world, int phase, const std::optional<Held>& held,
                      const std::function<bool(const World&)>& works, Plan& plan) {
@@ -60,9 +59,7 @@ bool BaseShift::plan(const World& world, int phase, const std::optional<Held>& h
   if (held) query.hold(held->hand.tool, held->hand.gripper, held->body, held->tool_object);
   query.set_margin(kMargin);
   if (!query.free(from)) query.set_margin(0);
-  const std::unique_ptr<mjData, decltype(&mj_deleteData)> scratch(mj_makeData(model_),
-                                                                  mj_deleteData);
-  if (!scratch) throw RuntimeError("out of memory for the model's data");
+  const ScratchData::Loan scratch = scratch_.borrow();
   World there = world;
   there.data = scratch.get();
   scratch->time = world.data->time;

@@ -32,6 +32,7 @@ class BaseShift {
   const Robot& robot_;
   int group_;
   CollisionModel collisions_;
+  ScratchData scratch_;
 };
 
 }  // namespace mjsense

@@ -37,7 +37,7 @@ double distance(const mjModel* m, mjData* d, int a, int b, double most) {
 }  // namespace
 
 CollisionModel::CollisionModel(const mjModel* model, const Robot& robot, std::vector<int> joints)
-    : model_(model), robot_(&robot), joints_(std::move(joints)) {
+    : robot_(&robot), joints_(std::move(joints)), scratch_(model) {
   const int root = model->body_rootid[robot.base_body()];
   std::vector<char> moves(model->nbody, 0);
   for (int b = 1; b < model->nbody; ++b) {
@@ -55,7 +55,8 @@ CollisionModel::CollisionModel(const mjModel* model, const Robot& robot, std::ve
     if (!of_robot && !moves[body]) scene_.push_back(g);
   }
   // Links that meet at the start are built so.
-  mjData* d = take();
+  const ScratchData::Loan loan = scratch_.borrow();
+  mjData* d = loan.get();
   for (std::size_t g = 0; g < robot.groups().size(); ++g) {
     const auto& init = robot.cfg().groups[g].init;
     for (std::size_t i = 0; i < init.size(); ++i) d->qpos[robot.groups()[g].qpos[i]] = init[i];
@@ -69,39 +70,19 @@ CollisionModel::CollisionModel(const mjModel* model, const Robot& robot, std::ve
       self_.emplace_back(a, b);
     }
   }
-  give_back(d);
-}
-
-CollisionModel::~CollisionModel() {
-  for (mjData* d : unused_) mj_deleteData(d);
-}
-
-mjData* CollisionModel::take() {
-  {
-    const std::lock_guard lock(mutex_);
-    if (!unused_.empty()) {
-      mjData* d = unused_.back();
-      unused_.pop_back();
-      return d;
-    }
-  }
-  return mj_makeData(model_);
-}
-
-void CollisionModel::give_back(mjData* data) {
-  const std::lock_guard lock(mutex_);
-  unused_.push_back(data);
 }
 
 CollisionQuery::CollisionQuery(CollisionModel& model, const World& world)
-    : cm_(model), m_(world.model), d_(model.take()), scene_(model.scene_) {
+    : cm_(model),
+      m_(world.model),
+      loan_(model.scratch_.borrow()),
+      d_(loan_.get()),
+      scene_(model.scene_) {
   mju_copy(d_->qpos, world.data->qpos, m_->nq);
   mju_copy(d_->mocap_pos, world.data->mocap_pos, 3 * m_->nmocap);
   mju_copy(d_->mocap_quat, world.data->mocap_quat, 4 * m_->nmocap);
   between_.resize(cm_.joints_.size());
 }
-
-CollisionQuery::~CollisionQuery() { cm_.give_back(d_); }
 
 void CollisionQuery::ignore(int body) {
   std::erase_if(scene_, [&](int g) { return is_below(m_, m_->geom_bodyid[g], body); });

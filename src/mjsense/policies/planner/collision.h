@@ -5,13 +5,12 @@
 // themselves the robot's links are looked at whatever their contact bits say. Height fields and SDF
 // geoms are not seen: MuJoCo has no distance to them.
 
-#include <memory>
-#include <mutex>
 #include <span>
 #include <utility>
 #include <vector>
 
 #include "mjsense/robots/robot.h"
+#include "mjsense/worlds/scratch_data.h"
 
 namespace mjsense {
 
@@ -21,33 +20,23 @@ class CollisionModel {
   // `joints`: ids; configurations are their positions in this order. A free joint has none: it is
   // moved by CollisionQuery::place_base.
   CollisionModel(const mjModel* model, const Robot& robot, std::vector<int> joints);
-  ~CollisionModel();
-  CollisionModel(const CollisionModel&) = delete;
-  CollisionModel& operator=(const CollisionModel&) = delete;
 
   std::span<const int> joints() const { return joints_; }
 
  private:
   friend class CollisionQuery;
-  mjData* take();
-  void give_back(mjData* data);
 
-  const mjModel* model_;
   const Robot* robot_;
   std::vector<int> joints_;
   std::vector<int> moving_, scene_;        // geoms
   std::vector<std::pair<int, int>> self_;  // of links that do not touch at the start
-  std::mutex mutex_;
-  std::vector<mjData*> unused_;
+  ScratchData scratch_;
 };
 
 // Questions about one world as it stands now, for one thread.
 class CollisionQuery {
  public:
   CollisionQuery(CollisionModel& model, const World& world);
-  ~CollisionQuery();
-  CollisionQuery(const CollisionQuery&) = delete;
-  CollisionQuery& operator=(const CollisionQuery&) = delete;
 
   // Nothing that is below this body is looked at.
   void ignore(int body);
@@ -80,6 +69,7 @@ class CollisionQuery {
 
   CollisionModel& cm_;
   const mjModel* m_;
+  ScratchData::Loan loan_;
   mjData* d_;
   double margin_ = 0;
   std::vector<int> scene_;  // geoms that are looked at

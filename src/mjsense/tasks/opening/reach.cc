@@ -95,27 +95,6 @@ std::vector<HandleGrasp> propose_handle_grasps(const Handle& handle, const Pose&
   return grasps;
 }
 
-ScratchData::~ScratchData() {
-  for (mjData* data : free_) mj_deleteData(data);
-}
-
-mjData* ScratchData::take() {
-  {
-    const std::lock_guard lock(mutex_);
-    if (!free_.empty()) {
-      mjData* data = free_.back();
-      free_.pop_back();
-      return data;
-    }
-  }
-  return mj_makeData(model_);
-}
-
-void ScratchData::give(mjData* data) {
-  const std::lock_guard lock(mutex_);
-  free_.push_back(data);
-}
-
 HandleReach::HandleReach(const mjModel* model, const Robot& robot, HandleReachCfg cfg)
     : own_(mj_copyModel(nullptr, model), mj_deleteModel),
       model_(own_.get()),
@@ -148,7 +127,8 @@ HandleReach::HandleReach(const mjModel* model, const Robot& robot, HandleReachCf
     own_->body_conaffinity[model->geom_bodyid[g]] |= kOfRobot;
   }
   // Links that meet at the start are built so.
-  mjData* data = scratch_.take();
+  const ScratchData::Loan loan = scratch_.borrow();
+  mjData* data = loan.get();
   for (std::size_t g = 0; g < robot.groups().size(); ++g) {
     const auto& init = robot.cfg().groups[g].init;
     for (std::size_t i = 0; i < init.size(); ++i) data->qpos[robot.groups()[g].qpos[i]] = init[i];
@@ -162,7 +142,6 @@ HandleReach::HandleReach(const mjModel* model, const Robot& robot, HandleReachCf
         of_robot_[model_->geom_bodyid[contact.geom[1]]])
       built_so_.emplace_back(contact.geom[0], contact.geom[1]);
   }
-  scratch_.give(data);
 }
 
 HandleReach::Start HandleReach::start_of(const mjData* d) const {
@@ -213,24 +192,24 @@ bool HandleReach::free(mjData* data, double clearance, const Articulation* held,
 }
 
 bool HandleReach::stands_free(const Start& start) const {
-  mjData* data = scratch_.take();
+  const ScratchData::Loan loan = scratch_.borrow();
+  mjData* data = loan.get();
   std::ranges::copy(start.qpos, data->qpos);
   std::ranges::copy(start.mocap_pos, data->mocap_pos);
   std::ranges::copy(start.mocap_quat, data->mocap_quat);
   const bool ok = free(data, cfg_.clearance, nullptr, nullptr);
-  scratch_.give(data);
   return ok;
 }
 
 Pose HandleReach::body_pose(const Start& start, const Articulation& one, double q) const {
-  mjData* data = scratch_.take();
+  const ScratchData::Loan loan = scratch_.borrow();
+  mjData* data = loan.get();
   std::ranges::copy(start.qpos, data->qpos);
   std::ranges::copy(start.mocap_pos, data->mocap_pos);
   std::ranges::copy(start.mocap_quat, data->mocap_quat);
   data->qpos[one.qpos] = q;
   mj_kinematics(model_, data);
   const Pose pose{vec3(data->xpos + 3 * one.body), quat(data->xquat + 4 * one.body)};
-  scratch_.give(data);
   return pose;
 }
 
@@ -325,7 +304,8 @@ bool HandleReach::try_grasp(mjData* data, const Start& start, const Seen& seen,
 
 std::optional<HandleWay> HandleReach::find(const Start& start, const Articulation& one, double from,
                                            double to, int most_tries) const {
-  mjData* data = scratch_.take();
+  const ScratchData::Loan loan = scratch_.borrow();
+  mjData* data = loan.get();
   const Seen seen = see(data, start, one, from);
   std::optional<HandleWay> found;
   for (const ArmAndHand& hand : hands_) {
@@ -340,15 +320,14 @@ std::optional<HandleWay> HandleReach::find(const Start& start, const Articulatio
       if (try_grasp(data, start, seen, one, from, to, way)) found = std::move(way);
     }
   }
-  scratch_.give(data);
   return found;
 }
 
 std::optional<HandleWay> HandleReach::again(const Start& start, const Articulation& one,
                                             double from, double to, const HandleWay& before) const {
-  mjData* data = scratch_.take();
+  const ScratchData::Loan loan = scratch_.borrow();
+  mjData* data = loan.get();
   const Seen seen = see(data, start, one, from);
-  scratch_.give(data);
   HandleWay way;
   way.hand = before.hand;
   way.on_body = before.on_body;

@@ -7,7 +7,6 @@
 
 #include <array>
 #include <memory>
-#include <mutex>
 #include <optional>
 #include <span>
 #include <utility>
@@ -16,6 +15,7 @@
 #include "mjsense/core/rng.h"
 #include "mjsense/robots/robot.h"
 #include "mjsense/tasks/opening/articulation.h"
+#include "mjsense/worlds/scratch_data.h"
 
 namespace mjsense {
 
@@ -56,22 +56,6 @@ struct HandleReachCfg {
   double step = 0.10;        // rad, of any joint between two checks of the way
   // m before the pregrasp: by way of such points it goes where the straight way is barred.
   std::array<double, 2> detours{0.12, 0.22};
-};
-
-// Data to try configurations in, handed out to one caller at a time; safe for any thread.
-class ScratchData {
- public:
-  explicit ScratchData(const mjModel* model) : model_(model) {}
-  ~ScratchData();
-  ScratchData(const ScratchData&) = delete;
-  ScratchData& operator=(const ScratchData&) = delete;
-  mjData* take();
-  void give(mjData* data);
-
- private:
-  const mjModel* model_;
-  std::mutex mutex_;
-  std::vector<mjData*> free_;
 };
 
 class HandleReach {
