@@ -25,7 +25,7 @@ class PlaceScene {
   // Body on, in or beside which it is to come to rest.
   virtual int receptacle(int world) const = 0;
   // Where the middle of its underside may be (m, world), best first, as the world stands, with the object turned by
-  // `turn` from how it is now; `out` is empty. As many for every turn.
+  // `turn` from how it is now; `out` is empty. None where it has no place.
   virtual void places(const World& world, const Quat& turn, std::vector<Vec3>& out) const = 0;
 };
 

@@ -36,8 +36,11 @@ bool Placing::plan(const World& world, const PlanRequest& request, const Followe
   for (int k = 0; k < kTurns; ++k) m_.scene().place_scene()->places(world, turned(k), places[k]);
   Rng draw = m_.rng(world, request, "planner/place");
   int ways = 0;
-  for (std::size_t i = 0; i < places[0].size(); ++i) {
+  std::size_t most = 0;
+  for (const auto& of_turn : places) most = std::max(most, of_turn.size());
+  for (std::size_t i = 0; i < most; ++i) {
     for (int k = 0; k < kTurns; ++k) {
+      if (i >= places[k].size()) continue;
       const Pose goal = placed(object, m_.target_shape(world.id), places[k][i], k);
       const std::size_t before = plan.segments.size();
       if (place_at(world, hand, query, start, goal, tool_object, home, draw, plan)) return true;
@@ -73,7 +76,7 @@ bool Placing::reaches(const World& world, const HandPlanner& hand, const HandPos
   for (int k = 0; k < kTurns; ++k) {
     places.clear();
     m_.scene().place_scene()->places(world, turned(k), places);
-    if (places.empty()) return true;
+    if (places.empty()) continue;
     const Pose tool = placed(object, m_.target_shape(world.id), places[0], k) * object_tool;
     HandPose above, there;
     if (hand.reach(world, raised(tool, m_.cfg().preplace), at, above) &&

@@ -198,6 +198,17 @@ std::string_view PickAndPlaceTask::lacks_beside(const World& world, const Judgem
   return together ? "" : "the two do not stand on the same thing";
 }
 
+std::string PickAndPlaceTask::start_fault(const World& world) const {
+  const std::string fault = SceneTask::start_fault(world);
+  if (!fault.empty() || kind_ != PlaceKind::kNextTo) return fault;
+  const auto& objects = episodes_[world.id].objects;
+  const double gap =
+      gap_from_above(world_box(world, objects[0].body), world_box(world, objects[1].body));
+  if (gap < 0 || gap > kBeside) return "";
+  return fmt::format("{}: the {} already stands next to the {}", place(), objects[0].name,
+                     objects[1].name);
+}
+
 Evaluation PickAndPlaceTask::evaluate(const World& world) const {
   const Judgement& now = judge_now(world);
   return judge_by(world.id, std::exp(-now.position_error), now.lacks);
@@ -221,6 +232,12 @@ void PickAndPlaceTask::places(const World& world, const Quat& turn, std::vector<
     const Vec3 base = vec3(world.data->xpos + 3 * robot().base_body());
     std::ranges::stable_sort(out, {},
                              [&](Vec3 p) { return std::hypot(p.x - base.x, p.y - base.y); });
+    // Beyond an edge - of a table, onto the robot's pedestal - it would not stand on the same thing.
+    const int carrier = bearer(world, body);
+    const Vec3 half = 0.5 * (object.high - object.low);
+    std::erase_if(out, [&](Vec3 p) {
+      return carrier >= 0 && !is_carried_all_over(world, p, half, carrier, episode.objects[0].body);
+    });
     return;
   }
   // Low where it is open, else on the rim.

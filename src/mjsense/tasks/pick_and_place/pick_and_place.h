@@ -26,6 +26,8 @@ class PickAndPlaceTask final : public SceneTask, public GraspScene, public Place
   std::string_view name() const override;
   std::string_view type() const override { return name(); }
 
+  // An object inside something, or one that already stands next to what it is to be put next to.
+  std::string start_fault(const World& world) const override;
   void begin(const World& world) override;
   // Reward: exp(-d), d (m) from the object to the middle of the receptacle's box.
   Evaluation evaluate(const World& world) const override;

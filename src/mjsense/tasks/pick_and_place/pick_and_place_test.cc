@@ -211,6 +211,45 @@ TEST(PickAndPlace, NextToIsBesideOnTheSameTable) {
   EXPECT_FALSE(table.look().success);
 }
 
+// The robot's pedestal begins where the table ends, 2 cm lower.
+TEST(PickAndPlace, NextToHasNoPlaceBeyondTheTable) {
+  Table table(PlaceKind::kNextTo);
+  table.start(0, 1);
+  const int top = resolve(table.world.model, mjOBJ_GEOM, "room/table_top", "test");
+  const auto places = [&](double from_edge) {
+    const double* at = table.data->geom_xpos + 3 * top;
+    const double edge = at[0] - table.world.model->geom_size[3 * top];
+    const WorldBox other = world_box(table.world, table.body(1));
+    table.put(1, {table.pose(1).p + Vec3{edge + from_edge - other.low.x, -other.center().y, 0},
+                  table.pose(1).q});
+    table.settle(50);
+    std::vector<Vec3> found;
+    table.task.places(table.world, {}, found);
+    return std::pair(found, edge);
+  };
+  const WorldBox object = world_box(table.world, table.body(0));
+  const double half = 0.5 * (object.high.x - object.low.x);
+  const auto [near, edge] = places(0.02);
+  EXPECT_FALSE(near.empty());
+  for (Vec3 p : near) EXPECT_GT(p.x - 0.9 * half, edge - 1e-6);
+  const auto far = places(0.25).first;
+  EXPECT_GT(far.size(), near.size()) << "on the robot's side, too";
+}
+
+TEST(PickAndPlace, WhatStandsThereAlreadyIsNoStart) {
+  Table table(PlaceKind::kNextTo);
+  int there = 0;
+  for (int episode = 0; episode < 60; ++episode) {
+    table.start(0, episode);
+    const std::string fault = table.task.start_fault(table.world);
+    const bool success = table.task.evaluate(table.world).success;
+    there += success ? 1 : 0;
+    if (!success) continue;
+    EXPECT_THAT(fault, HasSubstr("already stands next to the")) << episode;
+  }
+  EXPECT_GT(there, 0) << "none to tell";
+}
+
 TEST(PickAndPlace, AColourTellsOneOfTwo) {
   Table table(PlaceKind::kColor);
   for (int episode = 0; episode < 20; ++episode) {

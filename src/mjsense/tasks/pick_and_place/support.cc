@@ -13,6 +13,9 @@ namespace {
 const double kSteep = std::cos(30 * std::numbers::pi / 180);
 constexpr double kShare = 0.5;    // of the weight; of the box from above
 constexpr double kClose = 0.010;  // m
+constexpr int kOutline = 8;       // points of it that are looked at
+constexpr double kRim = 0.9;      // of a half axis
+constexpr double kAbove = 0.05;   // m, from where it is looked down
 
 struct Touch {
   int other;  // body
@@ -132,6 +135,22 @@ int bearer(const World& world, int object) {
     best = root;
   });
   return best;
+}
+
+bool is_carried_all_over(const World& world, Vec3 middle, Vec3 half, int carrier, int object) {
+  const mjModel* m = world.model;
+  const double down[3] = {0, 0, -1};
+  for (int k = 0; k <= kOutline; ++k) {
+    const double a = 2 * std::numbers::pi * k / kOutline, r = k == kOutline ? 0 : kRim;
+    const double from[3] = {middle.x + r * half.x * std::cos(a),
+                            middle.y + r * half.y * std::sin(a), middle.z + kAbove};
+    int geom = -1;
+    const double far = mj_ray(m, world.data, from, down, nullptr, 1, object, &geom, nullptr);
+    if (geom < 0 || std::abs(far - kAbove) > kClose ||
+        m->body_rootid[m->geom_bodyid[geom]] != carrier)
+      return false;
+  }
+  return true;
 }
 
 double gap_from_above(const WorldBox& a, const WorldBox& b) {

@@ -34,6 +34,11 @@ inline bool carries(const World& world, int carrier, int object) {
 // Body without a parent (or the world, 0) that bears the object by contact forces; -1: none does.
 int bearer(const World& world, int object);
 
+// True if something with the half axes `half` (m, along x and y) that stands with the middle of its underside at
+// `middle` has a surface all under it, and that of `carrier`, a body without a parent (or the world, 0): rays down on
+// its outline meet nothing else. What is below `object` counts for nothing.
+bool is_carried_all_over(const World& world, Vec3 middle, Vec3 half, int carrier, int object);
+
 // m between two boxes seen from above; negative where they overlap.
 double gap_from_above(const WorldBox& a, const WorldBox& b);
 

@@ -117,5 +117,25 @@ TEST_F(Support, BoxesAndGaps) {
   EXPECT_NEAR(gap_from_above(a, over), -0.02, 1e-12);
 }
 
+// Things of 6 cm that stand on the table, over its edge at x = 1, on the tray, half on it.
+TEST_F(Support, ASurfaceAllUnderIt) {
+  put(0.5, 0, 0.03);
+  const Vec3 half{0.03, 0.03, 0.03};
+  const auto carried = [&](Vec3 at, int carrier) {
+    return is_carried_all_over(world, at, half, carrier, kBlock);
+  };
+  const double tray = data->xpos[3 * kTray + 2] + 0.01;
+  EXPECT_TRUE(carried({0.3, 0.2, 0}, kTable));
+  EXPECT_TRUE(carried({0.5, 0, 0}, kTable)) << "it stands there itself";
+  EXPECT_TRUE(carried({0.96, 0, 0}, kTable));
+  EXPECT_FALSE(carried({0.98, 0, 0}, kTable));
+  EXPECT_FALSE(carried({0.3, 0.2, 0.03}, kTable)) << "in the air";
+  EXPECT_FALSE(carried({0.3, 0.2, -0.03}, kTable)) << "in the table";
+  EXPECT_TRUE(carried({0, 0, tray}, kTray));
+  EXPECT_FALSE(carried({0, 0, tray}, kTable));
+  EXPECT_FALSE(carried({0.09, 0, tray}, kTray));
+  EXPECT_FALSE(carried({0.12, 0, 0}, kTable)) << "half on the tray";
+}
+
 }  // namespace
 }  // namespace mjsense
