@@ -21,6 +21,7 @@ constexpr int kAttempt = 25;
 // one iteration.
 constexpr int kCandidates = 16;
 constexpr double kFarthest = 0.4;  // rad or m
+constexpr double kSlack = 1e-3;    // m, more than a solution is off its target
 
 // Solves (J J^T + eps I) y = e for a [6, n] Jacobian, by Cholesky factorisation, and returns J^T y.
 void damped_step(std::span<const double> jacobian, int n, double eps, const double (&e)[6],
@@ -53,6 +54,84 @@ void damped_step(std::span<const double> jacobian, int n, double eps, const doub
     dq[k] = 0;
     for (int i = 0; i < 6; ++i) dq[k] += jacobian[i * n + k] * y[i];
   }
+}
+
+// The first links of a chain, whose joints stand still, and the frame that they carry.
+struct Still {
+  std::size_t links;
+  Pose frame;
+};
+
+// The frame after so many links.
+Pose carried(std::span<const Link> links, const Still& still, std::size_t many,
+             std::span<const double> q) {
+  Pose pose = still.frame;
+  for (std::size_t i = still.links; i < many; ++i) {
+    pose = pose * links[i].fixed;
+    links[i].move(pose, q[i]);
+  }
+  return pose;
+}
+
+Still still_part(std::span<const Link> links, std::span<const double> q,
+                 std::span<const bool> moves) {
+  std::size_t n = 0;
+  while (n < moves.size() && !moves[n]) ++n;
+  return {n, carried(links, {0, {}}, n, q)};
+}
+
+// Pose of the leaf, and the Jacobian [6, J] of the joints after those that stand still.
+Pose jacobian_of(std::span<const Link> links, const Still& still, const Pose& tail,
+                 std::span<const double> q, std::span<double> jacobian) {
+  const std::size_t n = links.size() - still.links;
+  std::array<Vec3, Chain::kMaxJoints> axes, anchors;
+  Pose pose = still.frame;
+  for (std::size_t i = 0; i < n; ++i) {
+    const Link& link = links[still.links + i];
+    pose = pose * link.fixed;
+    axes[i] = rotate(pose.q, link.axis);
+    anchors[i] = pose * link.anchor;
+    link.move(pose, q[still.links + i]);
+  }
+  const Pose leaf = pose * tail;
+  for (std::size_t i = 0; i < n; ++i) {
+    const bool slide = links[still.links + i].slide;
+    const Vec3 v = slide ? axes[i] : cross(axes[i], leaf.p - anchors[i]);
+    const Vec3 w = slide ? Vec3{} : axes[i];
+    for (int k = 0; k < 3; ++k) {
+      jacobian[k * n + i] = v[k];
+      jacobian[(3 + k) * n + i] = w[k];
+    }
+  }
+  return leaf;
+}
+
+// Farther from the first joint that moves than all lengths together the leaf cannot be.
+bool is_out_of_reach(std::span<const Link> links, const Still& still, const Pose& tail, Vec3 target,
+                     std::span<const double> low, std::span<const double> high) {
+  if (still.links == links.size()) return false;
+  double reach = 0;
+  for (std::size_t i = still.links; i < links.size(); ++i) {
+    const Link& link = links[i];
+    const Vec3 next = i + 1 < links.size() ? links[i + 1].fixed * links[i + 1].anchor : tail.p;
+    reach += norm(next - link.anchor);
+    if (link.slide) reach += std::max(std::abs(low[i] - link.zero), std::abs(high[i] - link.zero));
+  }
+  const Link& first = links[still.links];
+  return norm(target - still.frame * (first.fixed * first.anchor)) > reach + kSlack;
+}
+
+// The root of x^(n+1) = x + 1, the generalised golden ratio.
+double golden(int n) {
+  static const auto kAll = [] {
+    std::array<double, Chain::kMaxJoints + 1> all;
+    for (int i = 0; i <= Chain::kMaxJoints; ++i) {
+      all[i] = 1.5;
+      for (int k = 0; k < 30; ++k) all[i] = std::pow(1.0 + all[i], 1.0 / (i + 1));
+    }
+    return all;
+  }();
+  return kAll[n];
 }
 
 }  // namespace
@@ -94,35 +173,11 @@ Chain::Chain(const mjModel* model, int base_body, int leaf_site, std::span<const
 }
 
 Pose Chain::fk(std::span<const double> q) const {
-  Pose pose;
-  for (std::size_t i = 0; i < links_.size(); ++i) {
-    pose = pose * links_[i].fixed;
-    links_[i].move(pose, q[i]);
-  }
-  return pose * tail_;
+  return carried(links_, {0, {}}, links_.size(), q) * tail_;
 }
 
 Pose Chain::jacobian(std::span<const double> q, std::span<double> jacobian) const {
-  const std::size_t n = links_.size();
-  std::array<Vec3, kMaxJoints> axes, anchors;
-  Pose pose;
-  for (std::size_t i = 0; i < n; ++i) {
-    const Link& link = links_[i];
-    pose = pose * link.fixed;
-    axes[i] = rotate(pose.q, link.axis);
-    anchors[i] = pose * link.anchor;
-    link.move(pose, q[i]);
-  }
-  const Pose leaf = pose * tail_;
-  for (std::size_t i = 0; i < n; ++i) {
-    const Vec3 v = links_[i].slide ? axes[i] : cross(axes[i], leaf.p - anchors[i]);
-    const Vec3 w = links_[i].slide ? Vec3{} : axes[i];
-    for (int k = 0; k < 3; ++k) {
-      jacobian[k * n + i] = v[k];
-      jacobian[(3 + k) * n + i] = w[k];
-    }
-  }
-  return leaf;
+  return jacobian_of(links_, {0, {}}, tail_, q, jacobian);
 }
 
 void Chain::joint_motion(std::span<const double> q, const Twist& twist,
@@ -138,8 +193,7 @@ void Chain::joint_motion(std::span<const double> q, const Twist& twist,
 // golden ratio, fill the box of joint ranges evenly whatever their number.
 void Chain::spread(int k, std::span<double> q, std::span<const bool> moves) const {
   const int n = static_cast<int>(links_.size());
-  double phi = 1.5;  // the root of x^(n+1) = x + 1
-  for (int i = 0; i < 30; ++i) phi = std::pow(1.0 + phi, 1.0 / (n + 1));
+  const double phi = golden(n);
   double alpha = 1.0;
   for (int i = 0; i < n; ++i) {
     alpha /= phi;
@@ -156,10 +210,12 @@ void Chain::restart(const Pose& target, int attempt, std::span<double> q,
   std::array<double, kMaxJoints> storage;
   const std::span<double> other(storage.data(), q.size());
   std::ranges::copy(q, other.begin());
+  const Still still = still_part(links_, q, moves);
   double nearest = std::numeric_limits<double>::infinity();
   for (int k = 0; k < kCandidates; ++k) {
     spread(1 + attempt * kCandidates + k, other, moves);
-    const double distance = norm(log6(inverse(fk(other)) * target));
+    const double distance =
+        norm(log6(inverse(carried(links_, still, links_.size(), other) * tail_) * target));
     if (distance >= nearest) continue;
     nearest = distance;
     std::ranges::copy(other, q.begin());
@@ -168,32 +224,31 @@ void Chain::restart(const Pose& target, int attempt, std::span<double> q,
 
 bool Chain::ik(const Pose& target, std::span<double> q, int max_iterations, double tolerance,
                std::span<const bool> moves) const {
-  const int n = static_cast<int>(links_.size());
+  const Still still = still_part(links_, q, moves);
+  if (is_out_of_reach(links_, still, tail_, target.p, low_, high_)) return false;
+  const std::size_t first = still.links, n = links_.size() - first;
   std::array<double, 6 * kMaxJoints> jac;
   std::array<double, kMaxJoints> dq;
   int restarts = 0;
   for (int iteration = 0; iteration < max_iterations; ++iteration) {
     const bool tracking = iteration < kTracking;
     if (!tracking && (iteration - kTracking) % kAttempt == 0) restart(target, restarts++, q, moves);
-    const Pose leaf = jacobian(q, {jac.data(), static_cast<std::size_t>(6 * n)});
+    const Pose leaf = jacobian_of(links_, still, tail_, q, {jac.data(), 6 * n});
     const Twist body = log6(inverse(leaf) * target);
     if (norm(body) < tolerance) return true;
-    if (!moves.empty()) {
-      for (int k = 0; k < n; ++k) {
-        for (int i = 0; !moves[k] && i < 6; ++i) jac[i * n + k] = 0;
-      }
+    for (std::size_t k = first; k < moves.size(); ++k) {
+      for (std::size_t i = 0; !moves[k] && i < 6; ++i) jac[i * n + k - first] = 0;
     }
     const Vec3 v = rotate(leaf.q, body.v), w = rotate(leaf.q, body.w);
     const double e[6] = {v.x, v.y, v.z, w.x, w.y, w.z};
-    damped_step({jac.data(), static_cast<std::size_t>(6 * n)}, n, kDamping, e,
-                {dq.data(), static_cast<std::size_t>(n)});
+    damped_step({jac.data(), 6 * n}, static_cast<int>(n), kDamping, e, {dq.data(), n});
     if (!tracking) {
       double farthest = kFarthest;
-      for (int k = 0; k < n; ++k) farthest = std::max(farthest, std::abs(dq[k]));
-      for (int k = 0; k < n; ++k) dq[k] *= kFarthest / farthest;
+      for (std::size_t k = 0; k < n; ++k) farthest = std::max(farthest, std::abs(dq[k]));
+      for (std::size_t k = 0; k < n; ++k) dq[k] *= kFarthest / farthest;
     }
-    for (int k = 0; k < n; ++k) {
-      if (moves.empty() || moves[k]) q[k] = std::clamp(q[k] + dq[k], low_[k], high_[k]);
+    for (std::size_t k = first; k < first + n; ++k) {
+      if (moves.empty() || moves[k]) q[k] = std::clamp(q[k] + dq[k - first], low_[k], high_[k]);
     }
   }
   return false;

@@ -124,5 +124,35 @@ TEST_F(Fr3, InverseKinematicsGivesUpOutOfReach) {
   EXPECT_FALSE(chain->ik({{2.0, 0, 0.5}, {}}, q));
 }
 
+// Whatever the leaf can reach, from wherever: the test of lengths refuses none of it.
+TEST_F(Fr3, NothingThatIsReachedIsOutOfReach) {
+  Rng rng(5, 0, 0, 0);
+  for (int trial = 0; trial < 1000; ++trial) {
+    std::array<double, 7> q = random_configuration(rng);
+    if (trial % 3 == 0) {  // stretched out
+      for (int i = 1; i < 7; ++i) q[i] = std::clamp(0.0, chain->low()[i], chain->high()[i]);
+    }
+    bool moves[7] = {true, true, true, true, true, true, true};
+    for (int i = 0; i < trial % 5; ++i) moves[i] = false;
+    EXPECT_TRUE(chain->ik(chain->fk(q), q, 1, 1e-4, moves)) << "it is there";
+  }
+}
+
+TEST_F(Fr3, JointsThatMayNotMoveStandStill) {
+  Rng rng(6, 0, 0, 0);
+  int solved = 0;
+  for (int trial = 0; trial < 200; ++trial) {
+    const std::array<double, 7> goal = random_configuration(rng);
+    std::array<double, 7> q = goal;
+    for (int i = 1; i < 7; ++i) q[i] += rng.uniform(-0.3, 0.3);
+    const bool moves[7] = {false, true, true, true, true, true, true};
+    if (!chain->ik(chain->fk(goal), q, 1000, 1e-4, moves)) continue;
+    EXPECT_EQ(q[0], goal[0]);
+    EXPECT_LT(norm(log6(inverse(chain->fk(q)) * chain->fk(goal))), 1e-4);
+    ++solved;
+  }
+  EXPECT_GE(solved, 150);
+}
+
 }  // namespace
 }  // namespace mjsense
