@@ -3,7 +3,7 @@
 
     python tools/variety.py [--episodes 100] [--played 40] [--only SCENE]
 
-Begins episodes of one recording in each scene of CASES, as `mjsense record` would with the camera system `randomized_droid`, and plays
+Begins episodes of one recording in each scene of CASES, as `mjsense record` would with a camera system that varies, and plays
 some with `--perturb 0.5` for the share of retries. What was found is kept in .cache/variety.
 """
 
@@ -31,7 +31,10 @@ import mjsense as mjs
 
 PAGE, RESULTS = ROOT / "docs" / "tasks.md", ROOT / ".cache" / "variety"
 BEGIN, END = "<!-- variety -->", "<!-- end of variety -->"
-CASES = (("pick", "table"), ("pick", "varied_table"), ("pick", "tableware"), ("pick", "clutter"), ("pick", "shelf"), ("open", "kitchen"))
+# task, scene, robot, camera system, policy: "" where nothing is taken and what is done takes no approach.
+TABLES = tuple(("pick", scene, "franka", "randomized_droid", "free_planner") for scene in ("table", "varied_table", "tableware", "clutter", "shelf"))
+CASES = (*TABLES, ("open", "kitchen", "franka", "randomized_droid", "planner"),
+         ("door_opening", "room_with_door", "rby1", "gopro_d455", ""), ("nav_to_obj", "floor", "rby1", "gopro_d455", ""))  # fmt: skip
 AWAY = 50.0  # m: objects that take no part stand beyond
 
 
@@ -41,12 +44,12 @@ def size(model: Any, aabb: Any, body: int) -> float:
     return float(max((2 * aabb[g, 3:].max() for g in geoms), default=0.0))
 
 
-def starts(task: str, scene: str, episodes: int) -> dict[str, list[Any]]:
+def starts(task: str, scene: str, robot: str, system: str, policy: str, episodes: int) -> dict[str, list[Any]]:
     """Of each episode's first moment, what varies."""
     worlds = 10
     found: dict[str, list[Any]] = {name: [] for name in ("x", "y", "turn", "count", "size", "light", "colour", "camera", "tilt", "factor", "furniture")}
-    env = mjs.make_vec(task, "franka", scene=scene, num_envs=worlds, camera_system="randomized_droid", width=32, height=24,
-                       policy="free_planner" if task == "pick" else "planner", observations=["grasp_pose"])  # fmt: skip
+    env = mjs.make_vec(task, robot, scene=scene, num_envs=worlds, camera_system=system, width=32, height=24,
+                       policy=policy or None, observations=["grasp_pose"] if policy else ["qpos"])  # fmt: skip
     model = env.sim.model
     free = [int(b) for b in range(1, model.nbody)
             if model.body_jntnum[b] == 1 and model.jnt_type[model.body_jntadr[b]] == 0]  # fmt: skip
@@ -58,7 +61,6 @@ def starts(task: str, scene: str, episodes: int) -> dict[str, list[Any]]:
         pos, quat, boxes = env.sim.data.xpos, env.sim.data.xquat, env.sim.model_field("geom_aabb")
         for w in range(min(worlds, episodes - first)):
             here = [b for b in free if abs(pos[w, b, 1]) < AWAY]
-            grasp = env.rows["grasp_pose"][w]
             found["count"].append(len(here))
             for b in here:
                 found["x"].append(float(pos[w, b, 0]))
@@ -74,8 +76,8 @@ def starts(task: str, scene: str, episodes: int) -> dict[str, list[Any]]:
             found["colour"].append(np.broadcast_to(colour, (worlds, *colour.shape[-2:]))[w, :, :3].ravel().tolist())
             cameras = env.sim.data.cam_xpos
             found["camera"].append(cameras[w].ravel().tolist())
-            qw, qx, qy, qz = grasp[3:]
-            if np.any(grasp[3:]):
+            qw, qx, qy, qz = env.rows["grasp_pose"][w][3:] if policy else np.zeros(4)
+            if qw or qx or qy or qz:
                 approach = qw * qw - qx * qx - qy * qy + qz * qz
                 found["tilt"].append(float(np.degrees(np.arccos(np.clip(-approach, -1, 1)))))
     env.close()
@@ -88,12 +90,14 @@ def spread(values: list[float], digits: int) -> str:
     return f"{min(values):.{digits}f} to {max(values):.{digits}f} ({np.std(values):.{digits}f})"
 
 
-def measure(task: str, scene: str, episodes: int, played: int) -> dict[str, Any]:
-    found = starts(task, scene, episodes)
-    with tempfile.TemporaryDirectory() as out:
-        made = mjs.record(task, "franka", out=out, scene=scene, episodes=played, max_attempts=played, keep_failures=True, worlds=8,
-                          cameras=[], perturb=0.5, policy="free_planner" if task == "pick" else "planner")  # fmt: skip
-        retried = [e["retries"] > 0 for e in task_table.episodes_of(made.path)]
+def measure(task: str, scene: str, robot: str, system: str, policy: str, episodes: int, played: int) -> dict[str, Any]:
+    found = starts(task, scene, robot, system, policy, episodes)
+    retried: list[bool] = []
+    if policy:
+        with tempfile.TemporaryDirectory() as out:
+            made = mjs.record(task, robot, out=out, scene=scene, episodes=played, max_attempts=played, keep_failures=True, worlds=8,
+                              cameras=[], perturb=0.5, policy=policy)  # fmt: skip
+            retried = [e["retries"] > 0 for e in task_table.episodes_of(made.path)]
     colours, cameras = np.array(found["colour"]), np.array(found["camera"])
     furniture = np.array(found["furniture"])
     return {
@@ -107,7 +111,7 @@ def measure(task: str, scene: str, episodes: int, played: int) -> dict[str, Any]
         "light": spread(found["light"], 2),
         "colours": int((colours.std(0).reshape(-1, 3).max(1) > 0.01).sum()), "materials": colours.shape[1] // 3,
         "camera": float(100 * cameras.std(0).max()),
-        "tilt": spread(found["tilt"], 0), "slanted": float(np.mean(np.array(found["tilt"]) > 30)) if found["tilt"] else 0.0,
+        "tilt": spread(found["tilt"], 0), "slanted": float(np.mean(np.array(found["tilt"]) > 30)) if found["tilt"] else None,
         "retried": float(np.mean(retried)) if retried else 0.0,
     }  # fmt: skip
 
@@ -126,8 +130,8 @@ def table(results: list[dict[str, Any]]) -> str:
         ("materials with other colours", lambda r: f"{r['colours']} of {r['materials']}"),
         ("cameras, standard deviation, cm", lambda r: f"{r['camera']:.0f}"),
         ("approach, degrees from vertical", lambda r: r["tilt"]),
-        ("approach more than 30 degrees", lambda r: f"{r['slanted']:.0%}"),
-        ("retried, `--perturb 0.5`", lambda r: f"{r['retried']:.0%} of {r['played']}"),
+        ("approach more than 30 degrees", lambda r: "" if r["slanted"] is None else f"{r['slanted']:.0%}"),
+        ("retried, `--perturb 0.5`", lambda r: f"{r['retried']:.0%} of {r['played']}" if r["played"] else ""),
     ]
     head = ["| | " + " | ".join(f"`{r['scene']}`" for r in results) + " |", "| --- |" + " --- |" * len(results)]
     return "\n".join(head + [f"| {name} | " + " | ".join(cell(r) for r in results) + " |" for name, cell in rows])
@@ -141,10 +145,10 @@ def main() -> None:
     arguments = parser.parse_args()
     RESULTS.mkdir(parents=True, exist_ok=True)
     results = []
-    for task, scene in CASES:
+    for task, scene, robot, system, policy in CASES:
         kept = RESULTS / f"{scene}.json"
         if arguments.only in ("", scene):
-            kept.write_text(json.dumps(measure(task, scene, arguments.episodes, arguments.played)))
+            kept.write_text(json.dumps(measure(task, scene, robot, system, policy, arguments.episodes, arguments.played)))
         if kept.exists():
             results.append(json.loads(kept.read_text()))
             print(results[-1], flush=True)

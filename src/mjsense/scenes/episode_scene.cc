@@ -9,6 +9,7 @@
 #include <numbers>
 
 #include "mjsense/core/error.h"
+#include "mjsense/core/match.h"
 #include "mjsense/observe/frame.h"
 #include "mjsense/scene/parts.h"
 #include "mjsense/scene/resolve.h"
@@ -176,6 +177,7 @@ void EpisodeScene::initialize(const mjModel* model, int num_worlds, std::string_
   model_ = model;
   find_objects(robot_prefix);
   find_regions();
+  find_furniture();
   present_.assign(num_worlds * objects_.size(), 1);
   steps_.assign(num_worlds * objects_.size(), -1);
   support_.assign(num_worlds, regions_.empty() ? 0.0 : regions_[0].height);
@@ -303,6 +305,47 @@ std::vector<Region> EpisodeScene::regions_of(int world) const {
     regions[i].height += move.z;
   }
   return regions;
+}
+
+// As Look does: of two that name a body the second counts.
+void EpisodeScene::find_furniture() {
+  furniture_.clear();
+  for (const SceneVaryCfg& one : cfg_.vary) {
+    if (one.what != VaryKind::kBody) continue;
+    const Regex pattern(one.pattern, place());
+    for (int body = 1; body < model_->nbody; ++body) {
+      if (pattern.fullmatch(name_of(model_, mjOBJ_BODY, body)))
+        furniture_.insert_or_assign(body, one);
+    }
+  }
+}
+
+std::vector<Pose> EpisodeScene::elsewhere(int geom) const {
+  std::vector<Pose> moves;
+  for (int body = model_->geom_bodyid[geom]; body > 0; body = model_->body_parentid[body]) {
+    const auto one = furniture_.find(body);
+    if (one == furniture_.end()) continue;
+    const Pose here{vec3(model_->body_pos + 3 * body), quat(model_->body_quat + 4 * body)};
+    Pose parent;
+    for (int p = model_->body_parentid[body]; p > 0; p = model_->body_parentid[p])
+      parent = Pose{vec3(model_->body_pos + 3 * p), quat(model_->body_quat + 4 * p)} * parent;
+    if (moves.empty()) moves.emplace_back();
+    std::vector<Pose> all;
+    for (const double turn : {-1.0, -0.5, 0.0, 0.5, 1.0}) {
+      if (turn != 0 && one->second.angle == 0) continue;
+      for (int corner = 0; corner < 8; ++corner) {
+        const auto& by = one->second.pos;
+        const Vec3 move{corner & 1 ? by[0] : -by[0], corner & 2 ? by[1] : -by[1],
+                        corner & 4 ? by[2] : -by[2]};
+        const Pose there{here.p + move,
+                         axis_angle({0, 0, 1}, turn * one->second.angle * pi / 180) * here.q};
+        const Pose moved = parent * there * inverse(parent * here);
+        for (const Pose& before : moves) all.push_back(moved * before);
+      }
+    }
+    moves = std::move(all);
+  }
+  return moves;
 }
 
 int EpisodeScene::draw(int world, std::span<const int> of, const Robot& robot, Rng& rng) const {

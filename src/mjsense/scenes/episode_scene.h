@@ -4,6 +4,7 @@
 // objects in it, and their places at the start of an episode. Everything that differs is a function
 // of (seed, episode).
 
+#include <map>
 #include <memory>
 #include <span>
 #include <string>
@@ -82,6 +83,9 @@ class EpisodeScene {
   std::vector<int> receptacles() const { return where(true); }
   // The episode's lights, colours, furniture and sizes of objects, before it is sampled; false if nothing varies.
   bool vary(int world, std::uint64_t seed, std::uint64_t episode);
+  // Displacements in the world between which furniture takes this geom from episode to episode, itself or what carries it;
+  // empty where it stands still.
+  std::vector<Pose> elsewhere(int geom) const;
   // What is wrong with the start that this fresh world shows: an object inside something by more
   // than 2 mm. "" if nothing is.
   std::string fault(const World& world) const;
@@ -89,6 +93,7 @@ class EpisodeScene {
  private:
   void find_objects(std::string_view robot_prefix);
   void find_regions();
+  void find_furniture();
   std::vector<Region> regions_of(int world) const;
   void make_meshes();
   void make_sizes();
@@ -103,10 +108,11 @@ class EpisodeScene {
   std::shared_ptr<const ObjectMeshes> meshes_;   // null: nothing has sizes
   std::vector<SceneObject> objects_;
   std::vector<Region> regions_;
-  std::vector<int> region_bodies_;  // what carries each
-  std::vector<char> present_;       // [B, objects]
-  std::vector<int> steps_;          // [B, objects], of its sizes; -1: that of its model
-  std::vector<double> support_;     // [B]
+  std::vector<int> region_bodies_;         // what carries each
+  std::map<int, SceneVaryCfg> furniture_;  // by body, how it varies
+  std::vector<char> present_;              // [B, objects]
+  std::vector<int> steps_;                 // [B, objects], of its sizes; -1: that of its model
+  std::vector<double> support_;            // [B]
   Simulation* simulation_ = nullptr;
   std::unique_ptr<Look> look_;
   std::unique_ptr<ObjectSizes> sizes_;

@@ -138,24 +138,30 @@ Occupancy::Occupancy(const mjModel* m, const mjData* d, const std::function<bool
   double low[2] = {1e10, 1e10}, high[2] = {-1e10, -1e10};
   for (int g = 0; g < m->ngeom; ++g) {
     if (!solid(m, g) || m->geom_type[g] == mjGEOM_PLANE || !counts(g)) continue;
-    std::vector<Vec3> points = points_of(m, d, g);
-    double bottom = 1e10, top = -1e10;
-    for (Vec3 p : points) {
-      bottom = std::min(bottom, p.z);
-      top = std::max(top, p.z);
-    }
     const Vec3 at = vec3(d->geom_xpos + 3 * g);
     if (std::abs(at.x) > 0.5 * cfg.max_extent || std::abs(at.y) > 0.5 * cfg.max_extent) continue;
-    // What one walks on counts for the size of the grid.
-    for (Vec3 p : points) {
-      for (int i = 0; i < 2; ++i) {
-        low[i] = std::max(std::min(low[i], p[i]), -0.5 * cfg.max_extent);
-        high[i] = std::min(std::max(high[i], p[i]), 0.5 * cfg.max_extent);
+    const std::vector<Vec3> here = points_of(m, d, g);
+    std::vector<Pose> moves = cfg.elsewhere ? cfg.elsewhere(g) : std::vector<Pose>{};
+    if (moves.empty()) moves.emplace_back();
+    std::vector<Vec3> outline;
+    for (const Pose& move : moves) {
+      std::vector<Vec3> points;
+      double bottom = 1e10, top = -1e10;
+      for (Vec3 p : here) {
+        points.push_back(move * p);
+        bottom = std::min(bottom, points.back().z);
+        top = std::max(top, points.back().z);
+        // What one walks on counts for the size of the grid.
+        for (int i = 0; i < 2; ++i) {
+          low[i] = std::max(std::min(low[i], points.back()[i]), -0.5 * cfg.max_extent);
+          high[i] = std::min(std::max(high[i], points.back()[i]), 0.5 * cfg.max_extent);
+        }
       }
+      if (bottom > cfg.high || top < cfg.low) continue;
+      const std::vector<Vec3> part = between(points, cfg.low, cfg.high);
+      outline.insert(outline.end(), part.begin(), part.end());
     }
-    if (bottom > cfg.high || top < cfg.low) continue;
-    points = between(points, cfg.low, cfg.high);
-    if (!points.empty()) outlines.push_back(hull(std::move(points)));
+    if (!outline.empty()) outlines.push_back(hull(std::move(outline)));
   }
   if (low[0] > high[0]) throw ValueError("occupancy: the model has nothing that touches");
   x0_ = low[0] - cfg.margin;

@@ -18,6 +18,9 @@ struct OccupancyCfg {
   double low = 0.05, high = 1.6;  // m, world: what lies below or above is in nobody's way
   double margin = 0.5;            // m, of floor around what there is
   double max_extent = 60;         // m, a side; what is further out counts for nothing
+  // Displacements in the world after which a geom may stand where it stands in some episode: it takes the hull of all
+  // these places. Empty, or an empty list: it stands where it is.
+  std::function<std::vector<Pose>(int geom)> elsewhere;
 };
 
 class Occupancy {

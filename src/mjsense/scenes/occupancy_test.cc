@@ -73,6 +73,33 @@ TEST(Occupancy, TakesWhatIsInTheWayAndNothingElse) {
   EXPECT_NEAR(o.clearance(-1, 0.4), 0.4, 0.06) << "the cylinder's rim";
 }
 
+// The cylinder at x = -1, y = 1 of 0.2 m may stand half a metre on either side along x, and in between.
+TEST(Occupancy, TakesWhereFurnitureMayStand) {
+  const Floor floor(1.0);
+  const int cylinder = floor.model->ngeom - 2;
+  ASSERT_EQ(floor.model->geom_type[cylinder], mjGEOM_CYLINDER);
+  OccupancyCfg cfg;
+  cfg.elsewhere = [&](int geom) {
+    return geom == cylinder ? std::vector<Pose>{{{-0.5, 0, 0}, {}}, {{0.5, 0, 0}, {}}}
+                            : std::vector<Pose>{};
+  };
+  const Occupancy still = floor.occupancy();
+  const Occupancy moves(
+      floor.model.get(), floor.data.get(), [](int) { return true; }, cfg);
+  ASSERT_EQ(moves.columns(), still.columns());
+  for (int row = 0; row < still.rows(); ++row) {
+    for (int column = 0; column < still.columns(); ++column) {
+      const double x = moves.x(column), y = moves.y(row);
+      const double along = std::max(0.0, std::abs(x + 1) - 0.5), far = std::hypot(along, y - 1);
+      if (still.taken(column, row) || far < 0.2) {
+        EXPECT_TRUE(moves.taken(column, row)) << x << " " << y;
+      } else if (far > 0.25) {
+        EXPECT_FALSE(moves.taken(column, row)) << x << " " << y;
+      }
+    }
+  }
+}
+
 // A disc of 0.3 m.
 Footprint disc(const Floor& floor) {
   return {floor.model.get(), floor.data.get(),

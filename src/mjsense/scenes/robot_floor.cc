@@ -59,9 +59,12 @@ Footprint RestingRobot::trunk() const {
           pose_from_mat(data_->xpos + 3 * base, data_->xmat + 9 * base), 10.0};
 }
 
-Occupancy RestingRobot::occupancy(double height, const std::function<bool(int)>& without) const {
+Occupancy RestingRobot::occupancy(double height,
+                                  const std::function<std::vector<Pose>(int)>& elsewhere,
+                                  const std::function<bool(int)>& without) const {
   OccupancyCfg cfg;
   cfg.high = height + kHeadroom;
+  cfg.elsewhere = elsewhere;
   return {model_, data_.get(),
           [&](int g) {
             const int root = model_->body_rootid[model_->geom_bodyid[g]];

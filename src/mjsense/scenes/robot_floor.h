@@ -24,8 +24,11 @@ class RestingRobot {
   // Without its arms.
   Footprint trunk() const;
   // What is in the way of a robot so high (m): everything that touches but the robot and what lies
-  // about freely, and what `without` names. Doors stand as the model has them.
-  Occupancy occupancy(double height, const std::function<bool(int geom)>& without = {}) const;
+  // about freely, and what `without` names. Doors stand as the model has them, furniture wherever `elsewhere` says
+  // (OccupancyCfg).
+  Occupancy occupancy(double height,
+                      const std::function<std::vector<Pose>(int geom)>& elsewhere = {},
+                      const std::function<bool(int geom)>& without = {}) const;
 
  private:
   struct Delete {

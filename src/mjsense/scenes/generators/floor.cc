@@ -20,6 +20,8 @@ using std::numbers::pi;
 
 constexpr double kHeight = 2.6, kWall = 0.12;  // m
 constexpr int kAttempts = 60;                  // places to try for a piece
+// m, to each side, by which a piece stands elsewhere from episode to episode: the first for which there is room.
+constexpr std::array<double, 4> kMoves{0.20, 0.14, 0.09, 0.05};
 
 enum class RoomKind { kLiving, kBedroom, kDining, kStudy, kSecondBedroom, kReading };
 constexpr std::array<const char*, 6> kRoomNames{"living", "bedroom", "dining",
@@ -85,6 +87,24 @@ class Furnisher {
   Furnisher(Building& out, FloorPlan& plan, Rng& rng, SceneFileCfg& cfg)
       : out_(out), plan_(plan), rng_(rng), cfg_(cfg) {}
 
+  // Along the walls at which they stand, tables in the midst of a room both ways, as far as they leave ways through; what
+  // stands on them goes with them. When all is furnished.
+  void loosen() {
+    for (const Piece& piece : pieces_) {
+      const Rect& s = piece.space;
+      for (const double move : kMoves) {
+        const double x = piece.along_x ? move : 0, y = piece.along_y ? move : 0;
+        if (!plan_.widen(piece.room, s, {s.x0 - x, s.y0 - y, s.x1 + x, s.y1 + y})) continue;
+        SceneVaryCfg vary;
+        vary.what = VaryKind::kBody;
+        vary.pattern = "room/" + piece.name;
+        vary.pos = {x, y, 0};
+        cfg_.vary.push_back(std::move(vary));
+        break;
+      }
+    }
+  }
+
   void furnish(int room, RoomKind kind) {
     const Rect& r = plan_.rooms()[room];
     const std::string where = kRoomNames[static_cast<int>(kind)];
@@ -99,7 +119,9 @@ class Furnisher {
         const Stand stand = against_wall(r, side, rng_.uniform(low + half, high - half), size);
         if (!plan_.fits(room, stand.space)) continue;
         plan_.take(stand.space);
-        place(piece, where, stand);
+        place(piece, room, where, stand);
+        pieces_.back().along_x = side % 2 == 0;
+        pieces_.back().along_y = side % 2 != 0;
         if (piece == Furniture::kSofa) before_sofa(room, where, stand);
         break;
       }
@@ -111,8 +133,9 @@ class Furnisher {
     const int n = count_[name]++;
     return n == 0 ? name : fmt::format("{}_{}", name, n);
   }
-  void place(Furniture piece, const std::string& where, const Stand& stand) {
+  void place(Furniture piece, int room, const std::string& where, const Stand& stand) {
     const std::string name = unique(fmt::format("{}_{}", where, name_of(piece)));
+    pieces_.push_back({name, room, stand.space});
     Building::Local local(out_, name, stand.at, stand.yaw);
     write_furniture(out_, piece, name, rng_, cfg_.regions);
   }
@@ -128,6 +151,7 @@ class Furnisher {
       if (!plan_.fits(room, space)) continue;
       plan_.take(space);
       const std::string name = unique(where + "_table");
+      pieces_.push_back({name, room, space, true, true});
       Building::Local local(out_, name, {x, y, 0}, along_x ? 0 : 0.5 * pi);
       write_dining_table(out_, name, 4, rng_, cfg_.regions);
       return;
@@ -142,16 +166,25 @@ class Furnisher {
     if (!plan_.fits(room, space)) return;
     plan_.take(space);
     const std::string name = unique(where + "_coffee_table");
+    pieces_.push_back({name, room, space, true, true});
     Building::Local local(out_, name, middle, sofa.yaw);
     write_rug(out_, "cloth_3", 1.15, 0.70);
     write_coffee_table(out_, name, rng_, cfg_.regions);
   }
+
+  struct Piece {
+    std::string name;
+    int room;
+    Rect space;
+    bool along_x = false, along_y = false;  // it may stand elsewhere
+  };
 
   Building& out_;
   FloorPlan& plan_;
   Rng& rng_;
   SceneFileCfg& cfg_;
   std::map<std::string, int> count_;
+  std::vector<Piece> pieces_;
 };
 
 void write_walls(Building& out, const FloorPlan& plan, Rng& rng) {
@@ -221,6 +254,7 @@ ModelSource make(House& house, SceneFileCfg& cfg) {
     out.cylinder({x, y, kHeight - 0.03}, 0.16, 0.03, "shade", false);
     furnisher.furnish(order[k], static_cast<RoomKind>(k));
   }
+  furnisher.loosen();
   const Rect& living = rooms[order[0]];
   cfg.robot.pos = {0.5 * (living.x0 + living.x1), 0.5 * (living.y0 + living.y1), 0};
   return text.model();

@@ -91,6 +91,17 @@ bool FloorPlan::fits(int room, const Rect& space) const {
   return connected(&space);
 }
 
+bool FloorPlan::widen(int room, const Rect& space, const Rect& wider) {
+  const auto at = std::ranges::find(taken_, space);
+  if (at == taken_.end()) return false;
+  const Rect before = *at;
+  *at = taken_.back();
+  taken_.pop_back();
+  const bool fit = fits(room, wider);
+  taken_.push_back(fit ? wider : before);
+  return fit;
+}
+
 // A robot that is a disc can go from the first passage to every other, to the middle of every room's
 // free part, and beside `more`.
 bool FloorPlan::connected(const Rect* more) const {

@@ -14,6 +14,7 @@ struct Rect {
   double width() const { return x1 - x0; }
   double depth() const { return y1 - y0; }
   double area() const { return width() * depth(); }
+  bool operator==(const Rect&) const = default;
 };
 inline bool overlap(const Rect& a, const Rect& b, double margin = 0) {
   return a.x0 < b.x1 + margin && b.x0 < a.x1 + margin && a.y0 < b.y1 + margin &&
@@ -43,6 +44,8 @@ class FloorPlan {
   // with a way past it, kRobot m wide, between all openings and to the thing itself.
   bool fits(int room, const Rect& space) const;
   void take(const Rect& space) { taken_.push_back(space); }
+  // Something takes `wider` in the place of `space`, which it took: false, and as before, if that does not fit.
+  bool widen(int room, const Rect& space, const Rect& wider);
 
  private:
   void divide(const Rect& rect, int rooms, Rng& rng);

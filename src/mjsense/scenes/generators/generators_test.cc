@@ -3,12 +3,16 @@
 #include <gtest/gtest.h>
 
 #include <fstream>
+#include <map>
+#include <set>
 
 #include "mjsense/core/error.h"
 #include "mjsense/core/testing/temp_dir.h"
 #include "mjsense/scenes/episode_scene.h"
 #include "mjsense/scenes/generators/generator.h"
 #include "mjsense/scenes/load_scene.h"
+#include "mjsense/scenes/occupancy.h"
+#include "mjsense/sim/simulation.h"
 
 namespace mjsense {
 namespace {
@@ -79,6 +83,54 @@ TEST(Generators, NothingStartsInsideAnything) {
       for (std::uint64_t seed = 0; seed < 20; ++seed)
         EXPECT_EQ(built.start(seed), "") << name << ":" << house << ", seed " << seed;
     }
+  }
+}
+
+// Furniture stands elsewhere in every episode, and nowhere that a map of the house does not know.
+TEST(Generators, MapsHoldWhereverFurnitureStands) {
+  for (const std::string name : {"floor", "floor:3", "room_with_door", "room_with_door:5"}) {
+    EpisodeScene scene(load_scene(name));
+    SceneCfg whole = scene.scene_cfg("robot_0");
+    std::erase_if(whole.entities, [](const auto& e) { return e.second.model.empty(); });
+    Simulation sim(std::make_shared<Scene>(whole), SimulationCfg{.num_worlds = 1});
+    const mjModel* m = sim.model();
+    scene.initialize(m, 1, "robot_0/");
+    scene.bind(sim);
+    const auto stands = [&](int geom) { return m->body_treeid[m->geom_bodyid[geom]] < 0; };
+    const std::shared_ptr<mjData> data{mj_makeData(m), mj_deleteData};
+    const std::shared_ptr<mjModel> own{mj_copyModel(nullptr, m), mj_deleteModel};
+    mj_kinematics(m, data.get());
+    const auto map = [&](bool wherever) {
+      OccupancyCfg cfg;
+      if (wherever) cfg.elsewhere = [&](int geom) { return scene.elsewhere(geom); };
+      return Occupancy(m, data.get(), stands, cfg);
+    };
+    const Occupancy known = map(true), still = map(false);
+    std::map<int, std::set<double>> places;
+    int outside = 0, others = 0;
+    for (std::uint64_t episode = 0; episode < 12; ++episode) {
+      scene.vary(0, 3, episode);
+      sim.worlds().model_changed();
+      sim.forward();
+      mjb_getModel(sim.worlds().batch(), 0, own.get());
+      mj_kinematics(own.get(), data.get());
+      for (int g = 0; g < m->ngeom; ++g) {
+        if (!scene.elsewhere(g).empty())
+          places[m->geom_bodyid[g]].insert(data->geom_xpos[3 * g] + data->geom_xpos[3 * g + 1]);
+      }
+      const Occupancy now = map(false);
+      ASSERT_EQ(now.columns(), known.columns());
+      for (int row = 0; row < now.rows(); ++row) {
+        for (int column = 0; column < now.columns(); ++column) {
+          outside += now.taken(column, row) && !known.taken(column, row) ? 1 : 0;
+          others += now.taken(column, row) && !still.taken(column, row) ? 1 : 0;
+        }
+      }
+    }
+    EXPECT_EQ(outside, 0) << name;
+    EXPECT_GT(others, 100) << name << ": furniture stands where the model does not have it";
+    EXPECT_GE(places.size(), 5u) << name;
+    for (const auto& [body, where] : places) EXPECT_GE(where.size(), 12u) << name;
   }
 }
 

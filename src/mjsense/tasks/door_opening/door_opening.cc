@@ -43,12 +43,15 @@ void DoorOpeningTask::initialize_task() {
         {leaf_middle(model(), rest.data(), door), opening_direction(model(), rest.data(), door)});
   footprint_ = std::make_unique<Footprint>(rest.footprint());
   trunk_ = std::make_unique<Footprint>(rest.trunk());
-  floor_ = std::make_unique<Occupancy>(rest.occupancy(footprint_->height()));
-  open_floor_ = std::make_unique<Occupancy>(rest.occupancy(footprint_->height(), [this](int geom) {
+  const auto elsewhere = [this](int geom) { return scene().elsewhere(geom); };
+  const auto of_door = [this](int geom) {
     const int body = model()->geom_bodyid[geom];
     return std::ranges::any_of(
         doors_, [&](const Door& door) { return is_below(model(), body, door.body); });
-  }));
+  };
+  floor_ = std::make_unique<Occupancy>(rest.occupancy(footprint_->height(), elsewhere));
+  open_floor_ =
+      std::make_unique<Occupancy>(rest.occupancy(footprint_->height(), elsewhere, of_door));
   if (driving_base(robot()) >= 0) routes_ = std::make_unique<BaseRoutes>(*floor_, *footprint_);
   episodes_.assign(num_worlds(), {});
   begin_with(doors_[0].handle, kHandle, true);

@@ -59,7 +59,8 @@ void NavToObjTask::initialize_task() {
   if (driving_base(robot()) >= 0) {
     const RestingRobot rest(model(), robot());
     const Footprint footprint = rest.footprint();
-    const Occupancy floor = rest.occupancy(footprint.height());
+    const Occupancy floor =
+        rest.occupancy(footprint.height(), [this](int geom) { return scene().elsewhere(geom); });
     routes_ = std::make_unique<BaseRoutes>(floor, footprint);
     for (int row = 0; row < floor.rows(); row += 2) {
       for (int column = 0; column < floor.columns(); column += 2) {
