@@ -12,9 +12,13 @@ struct Defaults {
   int horizon, policy_dt_ms, ctrl_dt_ms, sim_dt_ms;
 };
 constexpr Defaults kDefaults[] = {
+    {"open", "franka", 200, 0, 0, 0},
+    {"close", "franka", 200, 0, 0, 0},
     {"door_opening", "rby1", 400, 0, 0, 0},
     {"nav_to_obj", "rby1", 500, 200, 2, 2},
 };
+// Of the other tasks where the robot is commanded so seldom: 40 s; TaskCfg's 500 steps of 66 ms are 33 s.
+constexpr int kSeldomMs = 100, kSeldomHorizon = 400;
 
 constexpr std::string_view kAnyOf = "nav_to_obj+pick";
 
@@ -52,7 +56,11 @@ std::string_view default_robot(std::string_view task) {
 
 void set_task_defaults(std::string_view task, TaskCfg& cfg) {
   const Defaults* d = defaults_of(task);
-  if (!d) return;
+  if (!d) {
+    const bool ours = !default_scene(parts_of_task(task)[0]).empty();
+    if (ours && cfg.policy_dt_ms >= kSeldomMs) cfg.horizon = kSeldomHorizon;
+    return;
+  }
   cfg.horizon = d->horizon;
   if (d->policy_dt_ms > 0) cfg.policy_dt_ms = d->policy_dt_ms;
   if (d->ctrl_dt_ms > 0) cfg.ctrl_dt_ms = d->ctrl_dt_ms;
