@@ -49,12 +49,13 @@ void collide(const mjModel* m, mjData* d) {
 class DoorMotions::Attempt {
  public:
   Attempt(const DoorMotions& motions, const World& world, const Door& door,
-          const DoorGeometry& geometry, Hand hand, mjData* scratch)
+          const DoorGeometry& geometry, Hand hand, double margin, mjData* scratch)
       : motions_(motions),
         world_(world),
         door_(door),
         geometry_(geometry),
         hand_(hand),
+        margin_(margin),
         scratch_(scratch),
         arm_(motions.robot_.groups()[hand.tool]),
         z_(motions.robot_.base_pose(world).p.z),
@@ -203,7 +204,7 @@ class DoorMotions::Attempt {
           const BasePose b{base.x + with * (carried.x - base.x) + dx,
                            base.y + with * (carried.y - base.y) + dy, base.yaw + with * yaw + spin};
           const double room = motions_.clearance(geometry_, b, leaf);
-          if (room < motions_.cfg_.margin) continue;
+          if (room < margin_) continue;
           const double drive = std::hypot(b.x - base.x, b.y - base.y),
                        spun = wrapped(b.yaw - base.yaw);
           const double tight = std::max(0.0, kComfort - room);
@@ -274,6 +275,7 @@ class DoorMotions::Attempt {
   const Door& door_;
   const DoorGeometry& geometry_;
   Hand hand_;
+  double margin_;
   mjData* scratch_;
   const MoveGroup& arm_;
   double z_;
@@ -350,7 +352,8 @@ std::vector<BasePose> DoorMotions::places(const World& world, const Door& door) 
 }
 
 std::optional<DoorMotion> DoorMotions::plan(const World& world, const Door& door,
-                                            const BasePose& base, double leaf, int tool) const {
+                                            const BasePose& base, double leaf, double margin,
+                                            int tool) const {
   const ScratchData::Loan scratch = scratch_.borrow();
   mju_copy(scratch->mocap_pos, world.data->mocap_pos, 3 * model_->nmocap);
   mju_copy(scratch->mocap_quat, world.data->mocap_quat, 4 * model_->nmocap);
@@ -363,7 +366,7 @@ std::optional<DoorMotion> DoorMotions::plan(const World& world, const Door& door
         handle_grasps(model_, world.data, door, geometry, closing);
     if (!grasps) continue;
     for (const Pose& grasp : grasps->poses) {
-      Attempt attempt(*this, world, door, geometry, hand, scratch.get());
+      Attempt attempt(*this, world, door, geometry, hand, margin, scratch.get());
       for (const double swivel : {0.0, 0.3, -0.3}) {
         if (best && best->cost < kGood) break;
         DoorMotion motion;

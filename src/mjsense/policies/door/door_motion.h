@@ -20,7 +20,7 @@ struct DoorMotionCfg {
   double before = 0.10;      // m, of the pregrasp from the handle
   double leaf_step = 0.07;   // rad, of the door between two waypoints
   double press_step = 0.15;  // rad, of a lever
-  double margin = 0.03;      // m, that the base keeps from walls and leaf
+  double margin = 0.03;      // m, that the base keeps from walls and leaf where it takes the handle
   double depth = 0.004;      // m, that counts as a collision
 };
 
@@ -50,11 +50,11 @@ class DoorMotions {
   DoorMotions(const mjModel* model, const Robot& robot, DoorFloor floor, DoorMotionCfg cfg = {});
 
   std::span<const Hand> hands() const { return hands_; }
-  // With the base here at the grasp, the door led to `leaf` rad from where it stands; the best of
-  // the hands (`tool` >= 0: of this arm) and of both ways to take the handle, the other arms tucked
-  // in. Nothing where it cannot be done.
+  // With the base here at the grasp, the door led to `leaf` rad from where it stands, the base `margin`
+  // m off walls and leaf on the way; the best of the hands (`tool` >= 0: of this arm) and of both
+  // ways to take the handle, the other arms tucked in. Nothing where it cannot be done.
   std::optional<DoorMotion> plan(const World& world, const Door& door, const BasePose& base,
-                                 double leaf, int tool = -1) const;
+                                 double leaf, double margin, int tool = -1) const;
   // Joint positions of an arm that is not needed: all at 0, as far as their ranges go.
   std::vector<double> tucked(const Hand& hand) const;
   // Places before the door from which to take the handle, those first that are likely to do.

@@ -50,6 +50,7 @@ void DoorPlanner::initialize_planner() {
   expected_.assign(task().num_worlds(), {});
   tool_.assign(task().num_worlds(), -1);
   goal_.assign(task().num_worlds(), cfg_.open);
+  margin_.assign(task().num_worlds(), cfg_.margin);
 }
 
 BasePose DoorPlanner::base(const World& world) const {
@@ -76,12 +77,15 @@ void DoorPlanner::make_plan(const World& world, const PlanRequest& request, Plan
   if (request.stage > first) {
     const std::optional<DoorMotion> motion =
         motions_->plan(world, door_->door(world.id), base(world),
-                       leaf_to_go(world, goal_[world.id]), tool_[world.id]);
+                       leaf_to_go(world, goal_[world.id]), margin_[world.id], tool_[world.id]);
     if (motion) return open_door(world, *motion, plan);
     // It does not stand quite where it wanted to: another place.
     if (request.stage > first + kPlaces) return;
   }
-  if (!approach(world, cfg_.open, plan) && !approach(world, cfg_.enough, plan)) plan.clear();
+  if (!approach(world, cfg_.open, cfg_.margin, plan) &&
+      !approach(world, cfg_.enough, cfg_.margin, plan) &&
+      !approach(world, cfg_.enough, cfg_.tight, plan))
+    plan.clear();
 }
 
 // Lets go, backs off, and brings the arms to where they began.
@@ -114,14 +118,14 @@ void DoorPlanner::recover(const World& world, Plan& plan) const {
 }
 
 // To the first place from which the door can be opened.
-bool DoorPlanner::approach(const World& world, double goal, Plan& plan) {
+bool DoorPlanner::approach(const World& world, double goal, double margin, Plan& plan) {
   const BasePose here = base(world);
   const Door& door = door_->door(world.id);
   int tried = 0;
   for (const BasePose& place : motions_->places(world, door)) {
     if (tried++ >= cfg_.max_places) break;
     const std::optional<DoorMotion> motion =
-        motions_->plan(world, door, place, leaf_to_go(world, goal));
+        motions_->plan(world, door, place, leaf_to_go(world, goal), margin);
     if (!motion) continue;
     std::vector<BasePose> way;
     if (std::hypot(place.x - here.x, place.y - here.y) > kThere ||
@@ -138,6 +142,7 @@ bool DoorPlanner::approach(const World& world, double goal, Plan& plan) {
     }
     plan.more = true;
     goal_[world.id] = goal;
+    margin_[world.id] = margin;
     tool_[world.id] = motion->hand.tool;
     for (const Hand& hand : motions_->hands()) {
       plan.segments.back().grip(hand.gripper, robot().groups()[hand.gripper].open_command);

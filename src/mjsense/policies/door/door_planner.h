@@ -17,6 +17,8 @@ class DoorOpeningTask;
 struct DoorPlannerCfg {
   double open = 0.76;    // fraction to which the door is led
   double enough = 0.70;  // where it cannot be led there from anywhere
+  double margin = 0.03;  // m, that the base keeps from walls and leaf while it leads the door
+  double tight = 0.01;   // where it does not get through the doorway with that
   double lag = 0.15;     // fraction by which it may stay behind: it begins again
   // rad/s, of the arm's joints: on the way to the handle, at it, pressing, with the door
   double reach_speed = 1.2, slow_speed = 0.6, press_speed = 0.5, joint_speed = 0.9;
@@ -47,7 +49,7 @@ class DoorPlanner final : public TaskPlanner {
   BasePose base(const World& world) const;
   double leaf_to_go(const World& world, double goal) const;
   void recover(const World& world, Plan& plan) const;
-  bool approach(const World& world, double goal, Plan& plan);
+  bool approach(const World& world, double goal, double margin, Plan& plan);
   void tuck(const World& world, const Hand& hand, Segment& segment) const;
   void open_door(const World& world, const DoorMotion& motion, Plan& plan);
   std::vector<double> seconds(std::span<const DoorWaypoint> waypoints, std::span<const double> from,
@@ -61,8 +63,9 @@ class DoorPlanner final : public TaskPlanner {
   const DoorOpeningTask* door_ = nullptr;
   int group_ = -1;  // of the base
   std::unique_ptr<DoorMotions> motions_;
-  std::vector<int> tool_;     // [B] arm that is to take the handle
-  std::vector<double> goal_;  // [B] fraction to which the door is led
+  std::vector<int> tool_;       // [B] arm that is to take the handle
+  std::vector<double> goal_;    // [B] fraction to which the door is led
+  std::vector<double> margin_;  // [B] m, of the base on the way with the door
   std::vector<std::vector<Expected>>
       expected_;  // [B] how far the door is open when a segment begins
 };
