@@ -24,6 +24,7 @@ constexpr double kBeside = 0.05 + 0.01;                          // m, most from
 constexpr double kSamePlace = 0.005, kSameTurn = 10 * pi / 180;  // of a pose carried forward
 constexpr double kSameHeight = 0.01;  // m, of undersides without contact forces
 constexpr double kBesideGap = 0.03;   // m that a planner aims at
+constexpr double kAround = 0.012;     // m, of a point of a receptacle that counts for a place
 
 Pose pose_of(const World& world, int body) {
   return {vec3(world.data->xpos + 3 * body), quat(world.data->xquat + 4 * body)};
@@ -247,7 +248,9 @@ void PickAndPlaceTask::places(const World& world, const Quat& turn, std::vector<
   const auto surface = [&](double x, double y) {
     double top = -std::numeric_limits<double>::infinity();
     for (Vec3 p : points) {
-      if (std::hypot(p.x - x, p.y - y) < 0.012) top = std::max(top, p.z);
+      // Most are far: asked for thousands of times in a plan.
+      const double dx = p.x - x, dy = p.y - y;
+      if (std::abs(dx) < kAround && dx * dx + dy * dy < kAround * kAround) top = std::max(top, p.z);
     }
     return top;
   };
