@@ -22,6 +22,8 @@ constexpr double kHeight = 2.6, kWall = 0.12;  // m
 constexpr int kAttempts = 60;                  // places to try for a piece
 // m, to each side, by which a piece stands elsewhere from episode to episode: the first for which there is room.
 constexpr std::array<double, 4> kMoves{0.20, 0.14, 0.09, 0.05};
+constexpr double kTableMove =
+    0.05;  // m: who drives up to what lies on it must not have to stop far from it
 
 enum class RoomKind { kLiving, kBedroom, kDining, kStudy, kSecondBedroom, kReading };
 constexpr std::array<const char*, 6> kRoomNames{"living", "bedroom", "dining",
@@ -92,7 +94,8 @@ class Furnisher {
   void loosen() {
     for (const Piece& piece : pieces_) {
       const Rect& s = piece.space;
-      for (const double move : kMoves) {
+      for (const double most : kMoves) {
+        const double move = piece.along_x && piece.along_y ? std::min(most, kTableMove) : most;
         const double x = piece.along_x ? move : 0, y = piece.along_y ? move : 0;
         if (!plan_.widen(piece.room, s, {s.x0 - x, s.y0 - y, s.x1 + x, s.y1 + y})) continue;
         SceneVaryCfg vary;
