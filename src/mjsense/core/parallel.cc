@@ -9,6 +9,7 @@
 #include <new>
 
 #include "mjsense/core/error.h"
+#include "mjsense/core/os.h"
 #include "mjsense/core/process_state.h"
 
 namespace mjsense {
@@ -37,9 +38,8 @@ void spin(const Ready& ready) {
 }  // namespace
 
 int available_cpus() {
-  cpu_set_t set;
-  if (sched_getaffinity(0, sizeof set, &set) == 0) return std::max(1, CPU_COUNT(&set));
-  return std::max(1, static_cast<int>(std::thread::hardware_concurrency()));
+  const int usable = os::usable_cpus();
+  return std::max(1, usable > 0 ? usable : static_cast<int>(std::thread::hardware_concurrency()));
 }
 
 ThreadPool::ThreadPool(int threads) {

@@ -4,13 +4,12 @@
 #include <fmt/format.h>
 #include <pthread.h>
 #include <sys/resource.h>
-#include <unistd.h>
 
-#include <algorithm>
-#include <fstream>
 #include <limits>
 #include <mutex>
 #include <set>
+
+#include "mjsense/core/os.h"
 
 namespace mjsense {
 namespace {
@@ -35,12 +34,6 @@ Owners& owners() {
   return all;
 }
 
-std::uint64_t number_in(const char* path) {
-  std::ifstream file(path);
-  std::uint64_t value = 0;
-  return file >> value ? value : kUnlimited;  // "max" is no number
-}
-
 }  // namespace
 
 void add_owner(const void* owner) {
@@ -59,27 +52,12 @@ bool forget_owner(const void* owner) {
   return owners().orphans.erase(owner) > 0;
 }
 
-std::uint64_t available_memory() {
-  std::uint64_t available = kUnlimited;
-  std::ifstream file("/proc/meminfo");
-  for (std::string word; file >> word;) {
-    std::uint64_t kilobytes = 0;
-    if (word == "MemAvailable:" && file >> kilobytes) available = kilobytes * 1024;
-  }
-  const std::uint64_t most = number_in("/sys/fs/cgroup/memory.max");
-  const std::uint64_t taken = number_in("/sys/fs/cgroup/memory.current");
-  if (most != kUnlimited && taken != kUnlimited)
-    available = std::min(available, most > taken ? most - taken : 0);
-  return available;
-}
+std::uint64_t available_memory() { return os::free_memory(); }
 
 std::uint64_t available_address_space() {
   rlimit limit{};
   if (getrlimit(RLIMIT_AS, &limit) != 0 || limit.rlim_cur == RLIM_INFINITY) return kUnlimited;
-  std::ifstream file("/proc/self/statm");
-  std::uint64_t pages = 0;
-  file >> pages;
-  const std::uint64_t taken = pages * static_cast<std::uint64_t>(sysconf(_SC_PAGESIZE));
+  const std::uint64_t taken = os::address_space();
   return limit.rlim_cur > taken ? limit.rlim_cur - taken : 0;
 }
 

@@ -3,7 +3,6 @@
 #include <fmt/format.h>
 #include <poll.h>
 #include <signal.h>
-#include <sys/prctl.h>
 #include <sys/resource.h>
 #include <sys/wait.h>
 #include <unistd.h>
@@ -16,6 +15,7 @@
 
 #include "mjsense/core/error.h"
 #include "mjsense/core/fd.h"
+#include "mjsense/core/os.h"
 #include "mjsense/hdf5/guard.h"
 
 namespace mjsense::h5 {
@@ -61,33 +61,18 @@ void set_limit(decltype(RLIMIT_CPU) what, std::uint64_t most, std::uint64_t beyo
   setrlimit(what, &limit);  // a lower one of the user's stays
 }
 
-// Bytes of address space that this process has.
-std::uint64_t address_space() {
-  unsigned long pages = 0;
-  if (FILE* file = std::fopen("/proc/self/statm", "re")) {
-    if (std::fscanf(file, "%lu", &pages) != 1) pages = 0;
-    std::fclose(file);
-  }
-  return pages * static_cast<std::uint64_t>(sysconf(_SC_PAGESIZE));
-}
-
-// By its number: glibc has a name for it since 2.34 only. Kernels before 5.9 leave them open.
-void close_files(unsigned first, unsigned last) {
-  constexpr long kCloseRange = 436;
-  if (first <= last) syscall(kCloseRange, first, last, 0U);
-}
-
 // No handlers of our program, no files written, no more processor and memory than a file deserves.
 void confine(int answer, std::uint64_t seconds) {
-  prctl(PR_SET_PDEATHSIG, SIGKILL);
+  os::end_with_parent();
   // Ctrl-C is for our parent: read as a crash of ours, it would speak of a file that is damaged.
   // What was sent to the group until now is discarded by being ignored.
   setpgid(0, 0);
   for (const int signal : {SIGINT, SIGTERM, SIGHUP, SIGQUIT, SIGTSTP, SIGALRM, SIGUSR1, SIGUSR2})
     ::signal(signal, SIG_IGN);
   // Locks that our program holds must not outlive it in us.
-  close_files(3, static_cast<unsigned>(answer) - 1);
-  close_files(static_cast<unsigned>(answer) + 1, ~0U);
+  // Kernels before 5.9 leave them open.
+  os::close_files(3, static_cast<unsigned>(answer) - 1);
+  os::close_files(static_cast<unsigned>(answer) + 1, ~0U);
   for (const int signal : {SIGTERM, SIGXCPU}) ::signal(signal, SIG_DFL);
   sigset_t none;
   sigemptyset(&none);
@@ -99,7 +84,7 @@ void confine(int answer, std::uint64_t seconds) {
   if (const Fd null(open("/dev/null", O_WRONLY | O_CLOEXEC)); null)
     dup2(null.get(), STDERR_FILENO);  // the C library's words when memory is found corrupt
   set_limit(RLIMIT_FSIZE, 0);
-  if (const std::uint64_t now = address_space(); now > 0) set_limit(RLIMIT_AS, now + kMemory);
+  if (const std::uint64_t now = os::address_space(); now > 0) set_limit(RLIMIT_AS, now + kMemory);
 }
 
 void send(int fd, const std::string& text) {
@@ -150,10 +135,9 @@ std::string in_child(std::string_view what, std::uint64_t file_bytes,
                      const std::function<std::string()>& read, std::uint64_t patience_s) {
   const std::uint64_t seconds = kLeastSeconds + file_bytes / kBytesPerSecond;
   if (patience_s == 0) patience_s = kPatience * seconds;
-  int ends[2];
-  if (pipe2(ends, O_CLOEXEC) != 0)
+  auto [out, in] = os::make_pipe();
+  if (!out)
     throw RuntimeError(fmt::format("{}: cannot create a pipe: {}", what, std::strerror(errno)));
-  Fd out(ends[0]), in(ends[1]);
   pid_t pid;
   {
     const H5Lock lock;  // so that no other thread is inside the library when it is copied

@@ -5,7 +5,6 @@
 #include <fmt/format.h>
 #include <poll.h>
 #include <signal.h>
-#include <sys/eventfd.h>
 #include <unistd.h>
 
 #include <algorithm>
@@ -19,6 +18,7 @@
 #include <thread>
 
 #include "mjsense/core/error.h"
+#include "mjsense/core/os.h"
 #include "mjsense/record/process.h"
 
 namespace mjsense {
@@ -89,7 +89,7 @@ struct EncoderPool::Impl {
     const bool enough = streams_at_once <= max_encoders;
     max_direct = enough ? max_encoders : max_encoders - std::max(1, max_encoders / 4);
     max_waiting = std::max(1, streams_at_once);
-    wake_fd = Fd(eventfd(0, EFD_CLOEXEC | EFD_NONBLOCK));
+    wake_fd = os::wake_up();
     if (!wake_fd) {
       throw RuntimeError(fmt::format("cannot create an event fd: {}", std::strerror(errno)));
     }

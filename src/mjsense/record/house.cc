@@ -20,6 +20,7 @@
 
 #include "mjsense/core/error.h"
 #include "mjsense/core/file_limit.h"
+#include "mjsense/core/os.h"
 #include "mjsense/core/plain_file.h"
 #include "mjsense/hdf5/guard.h"
 #include "mjsense/record/checksum.h"
@@ -181,7 +182,7 @@ void reserve(const fs::path& path, std::int64_t bytes) {
   rlimit limit{};
   if (getrlimit(RLIMIT_FSIZE, &limit) == 0 && limit.rlim_cur < static_cast<rlim_t>(bytes))
     throw_file("write", path, EFBIG);
-  if (fallocate(file.get(), FALLOC_FL_KEEP_SIZE, 0, bytes) == 0) return;
+  if (os::reserve(file.get(), bytes)) return;
   if (errno == ENOSPC || errno == EDQUOT || errno == EFBIG) throw_file("write", path, errno);
   // Where space cannot be reserved (some network file systems), at least ask how much there is.
   std::error_code error;

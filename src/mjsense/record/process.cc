@@ -5,7 +5,6 @@
 #include <fmt/format.h>
 #include <poll.h>
 #include <signal.h>
-#include <sys/mman.h>
 #include <sys/resource.h>
 #include <sys/wait.h>
 #include <unistd.h>
@@ -17,6 +16,7 @@
 #include <utility>
 
 #include "mjsense/core/error.h"
+#include "mjsense/core/os.h"
 #include "mjsense/record/spawn.h"
 
 namespace mjsense {
@@ -43,21 +43,20 @@ std::string last_words(int log) {
 // Both ends are closed on exec: a program started at the same time by another thread must not hold
 // our write end, or the reader would never see the end of its input.
 std::pair<Fd, Fd> make_pipe() {
-  int ends[2];
-  if (pipe2(ends, O_CLOEXEC) != 0) throw_system("cannot create a pipe");
-  return {Fd(ends[0]), Fd(ends[1])};
+  std::pair<Fd, Fd> ends = os::make_pipe();
+  if (!ends.first) throw_system("cannot create a pipe");
+  return ends;
 }
 
 Child start(const std::vector<std::string>& argv, bool pipe_in, bool pipe_out, int input) {
   Child child;
-  child.log = Fd(memfd_create("stderr", MFD_CLOEXEC));
+  child.log = os::memory_file("stderr");
   if (!child.log) throw_system("cannot create an anonymous file");
   Fd child_in, child_out;
   if (pipe_in) {
     std::tie(child_in, child.in) = make_pipe();
     fcntl(child.in.get(), F_SETFL, O_NONBLOCK);
-    fcntl(child.in.get(), F_SETPIPE_SZ,
-          1 << 20);  // fewer wake-ups a frame; refused quietly beyond the user's limit
+    os::widen_pipe(child.in.get(), 1 << 20);  // fewer wake-ups a frame
   } else if (input < 0) {
     child_in = Fd(open("/dev/null", O_RDONLY | O_CLOEXEC));
   }

@@ -4,23 +4,19 @@
 #include <fcntl.h>
 #include <fmt/format.h>
 #include <signal.h>
-#include <sys/syscall.h>
 #include <sys/wait.h>
 #include <unistd.h>
 
 #include <cerrno>
-#include <cstdlib>
 #include <cstring>
-#include <filesystem>
-#include <system_error>
 
 #include "mjsense/core/error.h"
+#include "mjsense/core/os.h"
 
 namespace mjsense {
 namespace {
 
-constexpr int kFirstOther = 3;     // the first descriptor that is no standard stream
-constexpr long kCloseRange = 436;  // by its number: glibc has a name for it since 2.34 only
+constexpr int kFirstOther = 3;  // the first descriptor that is no standard stream
 
 struct Plan {
   char* const* argv;
@@ -45,7 +41,7 @@ struct Plan {
   for (int i = 0; i < 3; ++i) {
     if (dup2(moved[i], i) < 0) fail();
   }
-  if (syscall(kCloseRange, kFirstOther, ~0U, 0U) != 0) {
+  if (!os::close_files(kFirstOther, ~0U)) {
     for (const int fd : *plan.open) close(fd);
     for (const int fd : moved) close(fd);
   }
@@ -65,23 +61,13 @@ struct Plan {
   __builtin_unreachable();
 }
 
-std::vector<int> open_descriptors() {
-  std::vector<int> open;
-  std::error_code ignored;  // one that is gone when the child closes it does no harm
-  for (const auto& entry : std::filesystem::directory_iterator("/proc/self/fd", ignored)) {
-    const int fd = std::atoi(entry.path().filename().c_str());
-    if (fd >= kFirstOther) open.push_back(fd);
-  }
-  return open;
-}
-
 }  // namespace
 
 pid_t spawn(const std::vector<std::string>& argv, int in, int out, int log) {
   std::vector<char*> args;
   for (const std::string& a : argv) args.push_back(const_cast<char*>(a.c_str()));
   args.push_back(nullptr);
-  const std::vector<int> open = open_descriptors();
+  const std::vector<int> open = os::open_files(kFirstOther);
   Plan plan{args.data(), {in, out, log}, &open};
 
   sigset_t all, before;
