@@ -7,6 +7,7 @@
 
 #include "mjsense/core/error.h"
 #include "mjsense/core/plain_file.h"
+#include "mjsense/hdf5/chunks.h"
 #include "mjsense/hdf5/guard.h"
 #include "mjsense/record/checksum.h"
 #include "mjsense/record/house.h"
@@ -34,7 +35,9 @@ std::string describe(const fs::path& path) {
   const h5::Id file = h5::open_file(path);
   const h5::Id trajectory = h5::open_group(file, "traj_0");
   h5::each_dataset(trajectory, [&](const std::string& name) {
-    h5::check_storage(h5::open_dataset(trajectory, name), name);
+    const h5::Id dataset = h5::open_dataset(trajectory, name);
+    h5::check_storage(dataset, name);
+    h5::check_chunks(dataset, name);  // the library copies what does not unpack, and frees it twice
   });
   try_copy(file);
   const std::vector<hsize_t> rows = h5::dims(h5::open_dataset(trajectory, "success"));
