@@ -109,7 +109,7 @@ def test_no_code_knows_a_robot_by_its_name():
     """Outside the robots' folders: but for the defaults of what is recorded, and an example in a sentence of help."""
     names = re.compile("|".join(mjs.robot_names()), re.IGNORECASE)
     known = {
-        ("task_defaults.cc", 'return d ? d->robot : "franka";'),
+        ("task_defaults.cc", 'constexpr std::string_view kUsualRobot = "franka";'),
         ("task_defaults.cc", '{"door_opening", "rby1", 400, 0, 0, 0},'),
         ("task_defaults.cc", '{"nav_to_obj", "rby1", 500, 200, 2, 2},'),
         ("rollout.h", '"where its environment variable (``MJSENSE_FRANKA_MESHES``) names them. It moves the same.")'),

@@ -6,6 +6,8 @@
 namespace mjsense {
 namespace {
 
+constexpr std::string_view kUsualRobot = "franka";
+
 // MolmoSpaces' configurations; 0: the robot's. Its 200 steps to close would cut one of seven episodes of MobileFranka,
 // whose second attempts succeed.
 struct Defaults {
@@ -13,7 +15,7 @@ struct Defaults {
   int horizon, policy_dt_ms, ctrl_dt_ms, sim_dt_ms;
 };
 constexpr Defaults kDefaults[] = {
-    {"open", "franka", 200, 0, 0, 0},
+    {"open", kUsualRobot, 200, 0, 0, 0},
     {"door_opening", "rby1", 400, 0, 0, 0},
     {"nav_to_obj", "rby1", 500, 200, 2, 2},
 };
@@ -51,7 +53,7 @@ std::string_view default_scene(std::string_view task) {
 
 std::string_view default_robot(std::string_view task) {
   const Defaults* d = defaults_of(task);
-  return d ? d->robot : "franka";
+  return d ? d->robot : kUsualRobot;
 }
 
 void set_task_defaults(std::string_view task, TaskCfg& cfg) {
