@@ -75,10 +75,13 @@ void RayWorld::update(const mjModel* m, const mjData* d) {
 }
 
 void RayWorld::update_looks(const mjModel* m) {
-  const bool same = !(last_->body.changed(m->geom_bodyid) | last_->material.changed(m->geom_matid) |
-                      last_->group.changed(m->geom_group) | last_->rgba.changed(m->geom_rgba) |
-                      last_->material_rgba.changed(m->mat_rgba));
-  if (same && version_ > 0) return;
+  bool changed = version_ == 0;
+  changed |= last_->body.changed(m->geom_bodyid);
+  changed |= last_->material.changed(m->geom_matid);
+  changed |= last_->group.changed(m->geom_group);
+  changed |= last_->rgba.changed(m->geom_rgba);
+  changed |= last_->material_rgba.changed(m->mat_rgba);
+  if (!changed) return;
   for (int i = 0; i < num_geoms_; ++i) {
     bodies_[i] = m->geom_bodyid[i];
     describe(m, i, m->geom_matid[i], m->geom_group[i], m->geom_rgba + 4 * i);
@@ -86,14 +89,15 @@ void RayWorld::update_looks(const mjModel* m) {
 }
 
 void RayWorld::update_geoms(const mjModel* m, const mjData* d) {
-  const bool all = (last_->type.changed(m->geom_type) | last_->data.changed(m->geom_dataid) |
-                    last_->size.changed(m->geom_size)) ||
-                   version_ == 0;
+  bool all = version_ == 0;
+  all |= last_->type.changed(m->geom_type);
+  all |= last_->data.changed(m->geom_dataid);
+  all |= last_->size.changed(m->geom_size);
   constexpr int kBlock = 16;  // geoms compared at once
   for (int first = 0; first < num_geoms_; first += kBlock) {
     const int count = std::min(kBlock, num_geoms_ - first);
-    const bool moved = last_->pos.changed(d->geom_xpos, 3 * first, 3 * count) |
-                       last_->mat.changed(d->geom_xmat, 9 * first, 9 * count);
+    bool moved = last_->pos.changed(d->geom_xpos, 3 * first, 3 * count);
+    moved |= last_->mat.changed(d->geom_xmat, 9 * first, 9 * count);
     if (!moved && !all) continue;
     for (int i = first; i < first + count; ++i) update_geom(m, d, i);
   }
