@@ -171,8 +171,12 @@ constexpr char kDog[] = R"(
 
 Hashes legged() {
   SceneCfg scene;
-  scene.terrain = TerrainCfg{
-      .terrain_type = "generator", .levels = 2, .tile_size = {4, 4}, .border = 1, .seed = 3};
+  scene.terrain = TerrainCfg{.terrain_type = "generator",
+                             .levels = 2,
+                             .tile_size = {4, 4},
+                             .border = 1,
+                             .seed = 3,
+                             .daylight = false};
   for (const SubTerrain kind :
        {SubTerrain::kRough, SubTerrain::kSlope, SubTerrain::kStairs, SubTerrain::kWaves}) {
     SubTerrainCfg sub{.kind = kind};

@@ -47,6 +47,7 @@ ThreadPool::ThreadPool(int threads) {
     throw ValueError(fmt::format("threads is {}: must be at most {}", threads, kMostThreads));
   const int count = threads > 0 ? threads : available_cpus();
   spins_ = count <= available_cpus();
+  parts_ = std::vector<Part>(count);
   try {
     workers_.reserve(count - 1);
     for (int t = 1; t < count; ++t) workers_.emplace_back([this, t] { worker(t); });
@@ -83,14 +84,18 @@ ThreadPool::~ThreadPool() {
   for (std::thread& w : workers_) w.join();
 }
 
-void ThreadPool::run_raw(int n, Fn fn, void* ctx) {
+void ThreadPool::run_raw(int n, int parts, Fn fn, void* ctx) {
   if (n <= 0) return;
   fn_ = fn;
   ctx_ = ctx;
-  n_ = n;
   failed_item_ = -1;
   failure_ = nullptr;
-  next_.store(0, std::memory_order_relaxed);
+  num_parts_ = parts;
+  const auto begin = [&](int p) { return static_cast<int>(std::int64_t{n} * p / parts); };
+  for (int p = 0; p < parts; ++p) {
+    parts_[p].next.store(begin(p), std::memory_order_relaxed);
+    parts_[p].end = begin(p + 1);
+  }
   const bool alone = workers_.empty() || n == 1;
   if (!alone) {
     {
@@ -122,15 +127,18 @@ void ThreadPool::await_workers() {
 }
 
 void ThreadPool::work(int thread) {
-  for (int i = next_.fetch_add(1, std::memory_order_relaxed); i < n_;
-       i = next_.fetch_add(1, std::memory_order_relaxed)) {
-    try {
-      fn_(ctx_, i, thread);
-    } catch (...) {
-      const std::lock_guard lock(mutex_);
-      if (failed_item_ < 0 || i < failed_item_) {
-        failed_item_ = i;
-        failure_ = std::current_exception();
+  for (int k = 0; k < num_parts_; ++k) {
+    Part& part = parts_[(thread + k) % num_parts_];
+    for (int i = part.next.fetch_add(1, std::memory_order_relaxed); i < part.end;
+         i = part.next.fetch_add(1, std::memory_order_relaxed)) {
+      try {
+        fn_(ctx_, i, thread);
+      } catch (...) {
+        const std::lock_guard lock(mutex_);
+        if (failed_item_ < 0 || i < failed_item_) {
+          failed_item_ = i;
+          failure_ = std::current_exception();
+        }
       }
     }
   }

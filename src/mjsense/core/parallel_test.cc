@@ -3,6 +3,7 @@
 
 #include <gtest/gtest.h>
 
+#include <atomic>
 #include <chrono>
 #include <ctime>
 #include <stdexcept>
@@ -42,6 +43,41 @@ TEST(ThreadPool, GoesOnAfterAnException) {
       what = e.what();
     }
     ASSERT_EQ(what, "5");
+  }
+}
+
+// All threads at once, an item each: none takes another's as long as its own waits.
+TEST(ThreadPool, NearItsThreadsItemsBeginWhereTheyDidBefore) {
+  ThreadPool pool(4);
+  for (int run = 0; run < 100; ++run) {
+    std::atomic<int> here{0};
+    int by[4] = {};
+    pool.run_near(4, [&](int i, int thread) {
+      by[i] = thread;
+      ++here;
+      while (here < 4) std::this_thread::yield();
+    });
+    for (int i = 0; i < 4; ++i) ASSERT_EQ(by[i], i);
+    if (run % 10 == 0) std::this_thread::sleep_for(microseconds(200));
+  }
+}
+
+TEST(ThreadPool, NearItsThreadsEveryItemRunsOnce) {
+  for (const int threads : {1, 2, 5}) {
+    ThreadPool pool(threads);
+    for (const int n : {1, 3, 37, 200}) {
+      std::vector<int> hits(n);  // an item is one thread's
+      pool.run_near(n, [&](int i, int) { ++hits[i]; });
+      EXPECT_EQ(hits, std::vector<int>(n, 1));
+    }
+    try {
+      pool.run_near(9, [](int i, int) {
+        if (i % 4 == 3) throw std::runtime_error(std::to_string(i));
+      });
+      ADD_FAILURE();
+    } catch (const std::runtime_error& e) {
+      EXPECT_STREQ(e.what(), "3");
+    }
   }
 }
 

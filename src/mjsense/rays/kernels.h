@@ -11,6 +11,8 @@ namespace mjsense {
 struct LocalPacket;
 struct RayPacket;
 struct HitPacket;
+struct HitRows;
+struct ReturnRows;
 struct RayGeom;
 struct RayCandidate;
 
@@ -72,6 +74,13 @@ struct RayKernels {
                 HitPacket&, const RayCandidate*, int count);
   std::uint32_t (*occluded)(const KernelScene&, const KernelWorld&, const KernelFilter&,
                             const RayPacket&, const RayCandidate*, int count);
+  // A hit before `nearest` becomes none; one behind `farthest` is there. Ids by geom; null: not asked
+  // for.
+  void (*rows)(const RayPacket&, float nearest, float farthest, const int* bodies,
+               const int* materials, HitPacket&, HitRows&);
+  // rgba: [4 * objects].
+  void (*returns)(const LocalPacket&, const RayPacket&, const HitPacket&, const float* rgba,
+                  ReturnRows&);
 };
 
 const RayKernels& portable_kernels();

@@ -15,6 +15,7 @@
 #include "mjsense/rays/kernels.h"
 #include "mjsense/rays/packet.h"
 #include "mjsense/rays/ray_geom.h"
+#include "mjsense/rays/rows.h"
 #include "mjsense/rays/simd.h"
 #include "mjsense/rays/solids.h"
 
@@ -318,7 +319,8 @@ void place(const LocalPacket& local, const float* r, float tmax, RayPacket& out)
   }
 }
 
-constexpr RayKernels kKernels = {&place, &focus, &gather, &gather_from, &trace, &occluded};
+constexpr RayKernels kKernels = {&place, &focus,    &gather, &gather_from,
+                                 &trace, &occluded, &rows,   &returns};
 
 }  // namespace
 }  // namespace mjsense

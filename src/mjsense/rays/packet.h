@@ -40,6 +40,20 @@ struct alignas(64) HitPacket {
   float u[kPacket], v[kPacket];
 };
 
+// The same as sensors report it, ray by ray: x, y, z of the first, then of the second...
+struct alignas(64) HitRows {
+  float distance[kPacket];  // m; -1: no hit
+  float pos[3 * kPacket];   // m, world; without a hit the ray's start
+  float normal[3 * kPacket];
+  int body[kPacket], material[kPacket];  // -1: none; if asked for
+};
+
+// And as a receiver beside the sender would.
+struct alignas(64) ReturnRows {
+  float point[3 * kPacket];  // m, sensor frame; 0: no return
+  float intensity[kPacket];  // mean of the surface's colour times the cosine of incidence, 0..1
+};
+
 // A geom that a packet may meet, not before t.
 struct RayCandidate {
   float t;  // m

@@ -97,6 +97,18 @@ void RayScene::trace_focused(int world, const RayFilter& filter, const RayPacket
   trace_candidates(world, filter, rays, hits, scratch.candidates());
 }
 
+void RayScene::rows(int world, const RayPacket& rays, float nearest, float farthest, bool ids,
+                    HitPacket& hits, HitRows& out) const {
+  const RayWorld& w = worlds_[world];
+  kernels_->rows(rays, nearest, farthest, ids ? w.bodies().data() : nullptr, w.materials().data(),
+                 hits, out);
+}
+
+void RayScene::returns(int world, const LocalPacket& local, const RayPacket& rays,
+                       const HitPacket& hits, ReturnRows& out) const {
+  kernels_->returns(local, rays, hits, worlds_[world].rgba().data(), out);
+}
+
 void RayScene::trace(int world, const RayFilter& filter, const RayPacket& rays, HitPacket& hits,
                      RayScratch& scratch) const {
   gather(world, filter, rays, scratch);

@@ -83,6 +83,12 @@ class RayScene {
              RayScratch& scratch) const;
   void trace_focused(int world, const RayFilter& filter, const RayPacket& rays, HitPacket& hits,
                      RayScratch& scratch) const;
+  // What was hit, as sensors report it. A hit before `nearest` becomes none; one behind `farthest`,
+  // by rounding, is there.
+  void rows(int world, const RayPacket& rays, float nearest, float farthest, bool ids,
+            HitPacket& hits, HitRows& out) const;
+  void returns(int world, const LocalPacket& local, const RayPacket& rays, const HitPacket& hits,
+               ReturnRows& out) const;
   // Bit i: something lies on ray i before its tmax.
   [[nodiscard]] std::uint32_t occluded(int world, const RayFilter& filter, const RayPacket& rays,
                                        RayScratch& scratch) const;

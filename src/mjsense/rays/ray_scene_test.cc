@@ -3,6 +3,7 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 #include <cstring>
 #include <string>
@@ -119,6 +120,65 @@ TEST_P(Kernels, FocusedAndPlainTracesAreTheSameBits) {
       EXPECT_EQ(std::memcmp(x.n, y.n, sizeof x.n), 0);
     }
   }
+}
+
+// The same bits whichever CPU it is: every product and sum rounded by itself.
+TEST_P(Kernels, RowsSayWhatWasHit) {
+  Rng rng(31, 0, 0, 0);
+  const TestModel m(testing::random_scene(rng, {"sphere", "capsule", "box", "mesh"}, 40, 4));
+  for (int g = 0; g < m.model->ngeom; ++g) {
+    for (int k = 0; k < 3; ++k)
+      m.model->geom_rgba[4 * g + k] = static_cast<float>(rng.uniform(0, 1));
+  }
+  RayScene scene(m.model, 1, isa());
+  scene.update(m.world());
+  RayScratch scratch(scene.num_objects());
+  const auto same = [](float a, float b) { return std::memcmp(&a, &b, sizeof a) == 0; };
+  int before = 0, behind = 0, there = 0;
+  for (int trial = 0; trial < 1500; ++trial) {
+    const RayPacket rays = random_packet(rng, 5, 1);
+    LocalPacket local{};
+    for (auto& row : local.d)
+      for (float& x : row) x = static_cast<float>(rng.uniform(-1, 1));
+    HitPacket found, hits;
+    scene.trace(0, {}, rays, found, scratch);
+    hits = found;
+    const float nearest = 1.0f, farthest = 4.0f;
+    HitRows rows;
+    scene.rows(0, rays, nearest, farthest, true, hits, rows);
+    ReturnRows back;
+    scene.returns(0, local, rays, hits, back);
+    for (int i = 0; i < kPacket; ++i) {
+      const bool hit = found.geom[i] >= 0 && found.t[i] >= nearest;
+      before += found.geom[i] >= 0 && !hit;
+      behind += hit && found.t[i] > farthest;
+      there += hit;
+      EXPECT_EQ(hits.geom[i], hit ? found.geom[i] : -1);
+      EXPECT_EQ(hits.t[i], std::min(found.t[i], farthest));
+      EXPECT_EQ(rows.distance[i], hit ? hits.t[i] : -1.0f);
+      EXPECT_EQ(rows.body[i], hit ? m.model->geom_bodyid[hits.geom[i]] : -1);
+      EXPECT_EQ(rows.material[i], hit ? m.model->geom_matid[hits.geom[i]] : -1);
+      const volatile float t = hit ? hits.t[i] : 0.0f;
+      float cosine = 0;
+      for (int k = 0; k < 3; ++k) {
+        const volatile float way = t * rays.d[k][i], from = rays.o[k][i] + way;
+        EXPECT_TRUE(same(rows.pos[3 * i + k], static_cast<float>(rays.origin[k] + from)));
+        EXPECT_TRUE(same(rows.normal[3 * i + k], hit ? found.n[k][i] : 0.0f));
+        EXPECT_TRUE(same(back.point[3 * i + k], t * local.d[k][i]));
+        const volatile float part = rays.d[k][i] * found.n[k][i];
+        cosine = k == 0 ? part : cosine + part;
+      }
+      float seen = 0;
+      if (hit) {
+        const float* c = scene.world(0).rgba().data() + 4 * std::ptrdiff_t{found.geom[i]};
+        seen = std::clamp((c[0] + c[1] + c[2]) / 3 * std::abs(cosine), 0.0f, 1.0f);
+      }
+      EXPECT_TRUE(same(back.intensity[i], seen));
+    }
+  }
+  EXPECT_GT(before, 20);
+  EXPECT_GT(behind, 20);
+  EXPECT_GT(there, 500);
 }
 
 TEST_P(Kernels, OccludedWhereSomethingIsHit) {

@@ -10,6 +10,7 @@
 #include <utility>
 
 #include "mjsense/core/error.h"
+#include "mjsense/core/say.h"
 #include "mjsense/scene/scene.h"
 #include "mjsense/sensors/contact/contact_data.h"
 #include "mjsense/sensors/contact/contact_field_sensor.h"
@@ -118,8 +119,8 @@ void ContactSensor::initialize(const SensorInit& init) {
   history_left_.assign(cfg_.history_length > 0 ? n * cfg_.num_slots : 0, 0);
   add_outputs(init);
   if (cfg_.debug) {
-    fmt::print(stderr, "sensor '{}': primaries {}; secondaries {}\n", name(),
-               fmt::join(primary_names_, ", "), fmt::join(secondary_names_, ", "));
+    say("sensor '{}': primaries {}; secondaries {}\n", name(), fmt::join(primary_names_, ", "),
+        fmt::join(secondary_names_, ", "));
   }
 }
 

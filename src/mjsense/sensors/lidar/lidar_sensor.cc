@@ -147,29 +147,21 @@ void LidarSensor::compute(const World& world) {
 void LidarSensor::traced(const RayScene& rays, int world, int frame, const RayBundle& bundle, int p,
                          const RayPacket& packet, const HitPacket& hits) {
   const int first = frame * num_rays_per_frame();
-  const LocalPacket& local = bundle.packet(p);
+  ReturnRows rows;
+  rays.returns(world, bundle.packet(p), packet, hits, rows);
   float* points = points_->data.row<float>(world).data() + 3 * first;
   float* intensity = intensity_->data.row<float>(world).data() + first;
-  const std::span<const float> rgba = rays.world(world).rgba();
-  float at[3][kPacket], cosine[kPacket];
-  for (int i = 0; i < kPacket; ++i) {
-    const float t = hits.geom[i] >= 0 ? hits.t[i] : 0.0f;
-    for (int k = 0; k < 3; ++k) at[k][i] = t * local.d[k][i];
-    cosine[i] = std::abs(packet.d[0][i] * hits.n[0][i] + packet.d[1][i] * hits.n[1][i] +
-                         packet.d[2][i] * hits.n[2][i]);
-  }
+  bundle.each_run(p, [&](auto n, int lane, int ray) {
+    copy_some<3 * n()>(rows.point + 3 * lane, points + 3 * ray);
+    copy_some<n()>(rows.intensity + lane, intensity + ray);
+  });
+  if (origins_.empty()) return;
+  float* origins = origins_.row<float>(world).data() + 3 * first;
   for (int i = 0; i < kPacket; ++i) {
     const int r = bundle.rays(p)[i];
     if (r < 0) continue;
-    for (int k = 0; k < 3; ++k) points[3 * r + k] = at[k][i];
-    if (!origins_.empty()) {
-      float* origin = origins_.row<float>(world).data() + 3 * (first + r);
-      for (int k = 0; k < 3; ++k) origin[k] = static_cast<float>(packet.origin[k] + packet.o[k][i]);
-    }
-    intensity[r] = 0;
-    if (hits.geom[i] < 0) continue;
-    const float* c = &rgba[4 * hits.geom[i]];
-    intensity[r] = std::clamp((c[0] + c[1] + c[2]) / 3 * cosine[i], 0.0f, 1.0f);
+    for (int k = 0; k < 3; ++k)
+      origins[3 * r + k] = static_cast<float>(packet.origin[k] + packet.o[k][i]);
   }
 }
 

@@ -54,7 +54,9 @@ RayBundle::RayBundle(const RayPattern& pattern, int first, int count, double dep
   packets_.resize(num_packets);
   order_.assign(num_packets * kPacket, -1);
   std::copy(rays.begin(), rays.end(), order_.begin());
-  for (int p = 0; p < num_packets; ++p)
+  first_run_.push_back(0);
+  for (int p = 0; p < num_packets; ++p) {
+    find_runs(p);
     for (int i = 0; i < kPacket; ++i) {
       const int ray = order_[p * kPacket + i];
       const int source = ray >= 0 ? ray : order_[p * kPacket];  // idle lanes repeat a neighbour
@@ -64,6 +66,23 @@ RayBundle::RayBundle(const RayPattern& pattern, int first, int count, double dep
         packets_[p].d[k][i] = static_cast<float>(pattern.directions[first + source][k]);
       }
     }
+  }
+}
+
+void RayBundle::find_runs(int p) {
+  const int* ray = rays(p);
+  for (int begin = 0, end; begin < kPacket && ray[begin] >= 0; begin = end) {
+    end = begin + 1;
+    while (end < kPacket && ray[end] == ray[begin] + end - begin) ++end;
+    const int count = std::min(4, end - begin);
+    // The last one begins early enough to be as long as the others.
+    for (int i = begin; i < end; i += count) {
+      const int lane = std::min(i, end - count);
+      runs_.push_back(
+          {static_cast<std::uint8_t>(lane), static_cast<std::uint8_t>(count), ray[lane]});
+    }
+  }
+  first_run_.push_back(static_cast<int>(runs_.size()));
 }
 
 }  // namespace mjsense

@@ -3,12 +3,21 @@
 // A pattern's rays sorted into packets of 16 neighbours, once. Coherent packets are what makes
 // casting fast: all rays of one meet the same few geoms.
 
+#include <cstdint>
+#include <cstring>
+#include <type_traits>
 #include <vector>
 
 #include "mjsense/rays/packet.h"
 #include "mjsense/sensors/raycast/pattern.h"
 
 namespace mjsense {
+
+// A constant number of numbers, in one piece.
+template <int count, class T>
+void copy_some(const T* from, T* to) {
+  std::memcpy(to, from, count * sizeof(T));
+}
 
 class RayBundle {
  public:
@@ -22,11 +31,40 @@ class RayBundle {
   const LocalPacket& packet(int p) const { return packets_[p]; }
   // Ray index of each lane of packet p, -1 for lanes without a ray.
   const int* rays(int p) const { return &order_[p * kPacket]; }
+  // put(n, lane, ray) for all rays of packet p: lanes lane .. lane + n - 1 are rays ray .. ray + n - 1;
+  // n is a constant, 1 to 4. A ray may come twice.
+  template <class Put>
+  void each_run(int p, const Put& put) const {
+    for (int i = first_run_[p]; i < first_run_[p + 1]; ++i) {
+      const Run run = runs_[i];
+      switch (run.count) {
+        case 1:
+          put(std::integral_constant<int, 1>(), run.lane, run.ray);
+          break;
+        case 2:
+          put(std::integral_constant<int, 2>(), run.lane, run.ray);
+          break;
+        case 3:
+          put(std::integral_constant<int, 3>(), run.lane, run.ray);
+          break;
+        default:
+          put(std::integral_constant<int, 4>(), run.lane, run.ray);
+      }
+    }
+  }
 
  private:
+  struct Run {
+    std::uint8_t lane, count;
+    int ray;
+  };
+  void find_runs(int p);
+
   int num_rays_ = 0;
   std::vector<LocalPacket> packets_;
   std::vector<int> order_;
+  std::vector<Run> runs_;
+  std::vector<int> first_run_;  // [packets + 1]
 };
 
 }  // namespace mjsense

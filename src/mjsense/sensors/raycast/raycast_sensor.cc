@@ -164,7 +164,7 @@ void RayCastSensor::cast(const CastContext& context) {
   // A thread takes whole worlds where there are enough of them: parts of one on two threads fetch
   // its geoms into both caches.
   const int parts_of_item = worlds >= 4 * context.pool.size() ? per_world : 1;
-  context.pool.run(worlds * per_world / parts_of_item, [&](int item, int thread) {
+  context.pool.run_near(worlds * per_world / parts_of_item, [&](int item, int thread) {
     for (int k = 0; k < parts_of_item; ++k) {
       const int at = item * parts_of_item + k, world = context.ids[at / per_world];
       const int part = at % per_world, begin = part % chunks * kChunk;
@@ -256,15 +256,14 @@ void RayCastSensor::trace_packets(const RayScene& rays, int world, int frame, in
   RayPacket packets[kChunk];
   for (int p = begin; p < end; ++p) place(rays, world, frame, p, packets[p - begin]);
   rays.focus(world, seen_by, {packets, static_cast<std::size_t>(end - begin)}, scratch);
+  const Outputs out = outputs(world, frame);
   HitPacket hits;
+  HitRows rows;
   for (int p = begin; p < end; ++p) {
     const RayPacket& packet = packets[p - begin];
     rays.trace_focused(world, seen_by, packet, hits, scratch);
-    for (int i = 0; i < kPacket; ++i) {
-      hits.geom[i] = hits.t[i] >= nearest ? hits.geom[i] : -1;
-      hits.t[i] = hits.t[i] < farthest ? hits.t[i] : farthest;
-    }
-    write(rays.world(world), world, frame, bundle.rays(p), packet, hits);
+    rays.rows(world, packet, nearest, farthest, out.geoms != nullptr, hits, rows);
+    write(bundle, p, hits, rows, out);
     traced(rays, world, frame, bundle, p, packet, hits);
   }
 }
@@ -273,41 +272,32 @@ void RayCastSensor::traced(const RayScene& /*rays*/, int /*world*/, int /*frame*
                            const RayBundle& /*bundle*/, int /*p*/, const RayPacket& /*packet*/,
                            const HitPacket& /*hits*/) {}
 
-void RayCastSensor::write(const RayWorld& seen, int world, int frame, const int* order,
-                          const RayPacket& packet, const HitPacket& hits) {
+RayCastSensor::Outputs RayCastSensor::outputs(int world, int frame) {
   const int first = frame * num_rays_per_frame();
-  float* distances = distances_->data.row<float>(world).data() + first;
-  float* hit_pos = hit_pos_->data.row<float>(world).data() + 3 * first;
-  float* normals = normals_->data.row<float>(world).data() + 3 * first;
-  // By component first: these loops become vector code.
-  float t[kPacket], at[3][kPacket], n[3][kPacket];
-  for (int i = 0; i < kPacket; ++i) t[i] = hits.geom[i] >= 0 ? hits.t[i] : 0.0f;
-  for (int k = 0; k < 3; ++k) {
-    for (int i = 0; i < kPacket; ++i) {
-      at[k][i] = static_cast<float>(packet.origin[k] + (packet.o[k][i] + t[i] * packet.d[k][i]));
-      n[k][i] = hits.geom[i] >= 0 ? hits.n[k][i] : 0.0f;
-    }
-  }
-  for (int i = 0; i < kPacket; ++i) {
-    const int r = order[i];
-    if (r < 0) continue;
-    distances[r] = hits.geom[i] >= 0 ? hits.t[i] : -1.0f;
-    for (int k = 0; k < 3; ++k) {
-      hit_pos[3 * r + k] = at[k][i];
-      normals[3 * r + k] = n[k][i];
-    }
-  }
-  if (geom_id_ == nullptr) return;
-  int* geoms = geom_id_->data.row<int>(world).data() + first;
-  int* bodies = body_id_->data.row<int>(world).data() + first;
-  int* materials = material_id_->data.row<int>(world).data() + first;
-  for (int i = 0; i < kPacket; ++i) {
-    const int r = order[i], geom = hits.geom[i];
-    if (r < 0) continue;
-    geoms[r] = geom;
-    bodies[r] = geom >= 0 ? seen.bodies()[geom] : -1;
-    materials[r] = geom >= 0 ? seen.materials()[geom] : -1;
-  }
+  const auto ids = [&](Field* field) {
+    return field == nullptr ? nullptr : field->data.row<int>(world).data() + first;
+  };
+  return {distances_->data.row<float>(world).data() + first,
+          hit_pos_->data.row<float>(world).data() + 3 * first,
+          normals_->data.row<float>(world).data() + 3 * first,
+          ids(geom_id_),
+          ids(body_id_),
+          ids(material_id_)};
+}
+
+void RayCastSensor::write(const RayBundle& bundle, int p, const HitPacket& hits,
+                          const HitRows& rows, const Outputs& out) {
+  bundle.each_run(p, [&](auto n, int lane, int ray) {
+    copy_some<n()>(rows.distance + lane, out.distances + ray);
+    copy_some<3 * n()>(rows.pos + 3 * lane, out.hit_pos + 3 * ray);
+    copy_some<3 * n()>(rows.normal + 3 * lane, out.normals + 3 * ray);
+  });
+  if (out.geoms == nullptr) return;
+  bundle.each_run(p, [&](auto n, int lane, int ray) {
+    copy_some<n()>(hits.geom + lane, out.geoms + ray);
+    copy_some<n()>(rows.body + lane, out.bodies + ray);
+    copy_some<n()>(rows.material + lane, out.materials + ray);
+  });
 }
 
 }  // namespace mjsense

@@ -168,8 +168,14 @@ class RayCastSensor : public Sensor {
         *body_id_ = nullptr, *material_id_ = nullptr;
 
  private:
-  void write(const RayWorld& seen, int world, int frame, const int* order, const RayPacket& packet,
-             const HitPacket& hits);
+  // Where a frame's rays stand; ids may be null.
+  struct Outputs {
+    float *distances, *hit_pos, *normals;
+    int *geoms, *bodies, *materials;
+  };
+  Outputs outputs(int world, int frame);
+  static void write(const RayBundle& bundle, int p, const HitPacket& hits, const HitRows& rows,
+                    const Outputs& out);
   void remember(const World& world);
   // As RayScene::place(), each ray with the frame's pose at its own time.
   void place(const RayScene& rays, int world, int frame, int p, RayPacket& out) const;

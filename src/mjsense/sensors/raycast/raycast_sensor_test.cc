@@ -472,5 +472,37 @@ TEST(Pattern, EveryRayIsInExactlyOnePacket) {
   }
 }
 
+// Rays side by side, which go in one piece, and rays strewn about.
+TEST(Pattern, WhatStandsByLaneGoesToItsRay) {
+  UserPattern strewn;
+  strewn.offsets.assign(187, {});
+  Rng rng(2, 0, 0, 0);
+  for (auto& o : strewn.offsets)
+    for (double& x : o) x = rng.uniform(-1, 1);
+  for (const PatternCfg& cfg : {PatternCfg(strewn), PatternCfg(GridPattern{{4.0, 0.2}, 0.1})}) {
+    const RayPattern pattern = make_pattern(cfg, nullptr, "test");
+    const int n = static_cast<int>(pattern.size());
+    const RayBundle bundle(pattern, 0, n);
+    std::vector<float> want;
+    for (int r = 0; r < n; ++r)
+      for (int k = 0; k < 3; ++k) want.push_back(10.0f * r + k);
+    want.push_back(-1);
+    // In either order, so that nothing wrong is written over.
+    for (bool back : {false, true}) {
+      std::vector<float> rows(3 * n + 1, -1);
+      for (int turn = 0; turn < bundle.num_packets(); ++turn) {
+        const int p = back ? bundle.num_packets() - 1 - turn : turn;
+        float lanes[3 * kPacket];
+        for (int i = 0; i < kPacket; ++i)
+          for (int k = 0; k < 3; ++k) lanes[3 * i + k] = 10.0f * bundle.rays(p)[i] + k;
+        bundle.each_run(p, [&](auto n, int lane, int ray) {
+          copy_some<3 * n()>(lanes + 3 * lane, rows.data() + 3 * ray);
+        });
+      }
+      EXPECT_EQ(rows, want);
+    }
+  }
+}
+
 }  // namespace
 }  // namespace mjsense
