@@ -76,6 +76,7 @@ set(MJSENSE_PUBLIC_HEADERS
   mjsense/rollout/record_job.h
   mjsense/rollout/registry.h
   mjsense/rollout/rollout.h
+  mjsense/scene/daylight.h
   mjsense/scene/entity.h
   mjsense/scene/model_sensors/model_sensor.h
   mjsense/scene/options.h

@@ -45,6 +45,11 @@ VIEWS = {
     "scene_kitchen_1": View("close", "kitchen:1", pos=(-1.9, 0.9, 1.6), target=(0.3, 0.0, 0.95)),
     "scene_room_with_door": View("door_opening", "room_with_door", "rby1", steps=3, pos=(-3.0, 1.2, 1.75), target=(0.0, -0.2, 0.9)),
     "scene_floor": View("nav_to_obj", "floor", "rby1", steps=3, pos=(0.4, 0.4, 2.4), target=(4.0, 3.5, 0.3)),
+    "scene_libero_kitchen": View("pick", "libero/kitchen", pos=(-1.1, -1.3, 1.7), target=(-0.2, 0.0, 0.9)),
+    "scene_libero_table": View("pick", "libero/table", pos=(-1.1, -1.3, 1.7), target=(-0.2, 0.0, 0.9)),
+    "scene_libero_coffee_table": View("pick", "libero/coffee_table", pos=(-1.0, -1.4, 1.3), target=(-0.2, 0.0, 0.5)),
+    "scene_gymnasium_robotics_kitchen": View("open", "gymnasium_robotics/kitchen", pos=(1.0, -1.3, 2.5), target=(-0.3, 0.3, 1.7)),
+    "task_pick": View("pick", "varied_table", steps=65),
     "task_pick_and_place": View("pick_and_place", "tableware", steps=125),
     "task_pick_and_place_next_to": View("pick_and_place_next_to", "tableware", steps=125),
     "task_pick_and_place_color": View("pick_and_place_color", "tableware", steps=125),
@@ -52,7 +57,8 @@ VIEWS = {
     "task_open": in_kitchen("open", steps=125),
     "task_close": in_kitchen("close", steps=75),
     "task_door_opening": View("door_opening", "room_with_door", "rby1", steps=165, pos=None),
-    "task_nav_to_obj": View("nav_to_obj", "floor", "rby1", steps=40, pos=None),
+    "task_multi_task": in_kitchen("open+pick", steps=60),
+    "task_nav_to_obj": View("nav_to_obj", "floor", "rby1", steps=40, pos=None, seed=4),
 }  # fmt: skip
 
 

@@ -117,6 +117,9 @@ class TerrainCfg(_config_methods.Config):
     """Highest level that a world starts on; -1: any."""
     seed: int = 0
     """Of the tiles and of where worlds start."""
+    daylight: bool = True
+    """Where models and ``spec_fn`` bring no lamp a sun, where no sky one, and squares on a plane that has no material.
+    False: MuJoCo's headlight alone."""
 
 
 @dataclass
@@ -724,7 +727,7 @@ class SceneFileCfg(_config_methods.SceneFileCfg):
     vary: Sequence[SceneVaryCfg] = ()
     """What is different in every episode."""
     sky: SceneSkyCfg | None = None
-    """The colours around."""
+    """The colours around; without it a generated scene has blue ones outside its windows."""
     headlight: SceneHeadlightCfg | None = None
     """The light at the camera; without it MuJoCo's."""
     options: MujocoCfg = field(default_factory=MujocoCfg)

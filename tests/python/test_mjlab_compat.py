@@ -236,6 +236,21 @@ def test_a_scene_of_ones_own():
         scene["tuch"]
 
 
+def test_light_and_colours_of_the_ground_are_those_given():
+    class Lamp:
+        def edit_spec(self, spec):
+            spec.worldbody.add_light(name="lamp")
+
+    def looks(**given):
+        model = Scene(SceneCfg(terrain=TerrainEntityCfg(**given), spec_fn=lambda spec: spec.worldbody.add_site(name="mark"))).compile()
+        assert model.site("mark").id >= 0
+        return model.nlight, model.ntex, model.nmat
+
+    assert looks() == (1, 2, 1)  # a sun, a sky and squares
+    assert looks(lights=(Lamp(),)) == (1, 0, 0)
+    assert looks(lights=(), textures=(), materials=()) == (0, 0, 0)
+
+
 @pytest.mark.skipif(not HAS_TORCH, reason="no torch")
 def test_tensors_share_memory():
     import torch

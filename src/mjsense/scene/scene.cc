@@ -11,6 +11,7 @@
 #include "mjsense/core/error.h"
 #include "mjsense/scene/attach.h"
 #include "mjsense/scene/compiler_settings.h"
+#include "mjsense/scene/daylight.h"
 #include "mjsense/scene/model_check.h"
 #include "mjsense/scene/model_sensors/model_sensor.h"
 #include "mjsense/scene/resolve.h"
@@ -93,6 +94,7 @@ void Scene::Impl::build() {
   add_sensors();
   mjs_setName(mjs_addKey(spec.get())->element, kInitState);
   if (cfg.spec_fn) cfg.spec_fn(spec.get());
+  if (cfg.terrain && cfg.terrain->daylight) add_daylight(spec.get());
   compile();
 
   if (cfg.terrain) entities.push_back(describe(model.get(), "terrain", true));

@@ -86,6 +86,7 @@ struct TerrainCfg {
   double border = 5.0;
   int max_init_level = -1;
   std::uint64_t seed = 0;
+  bool daylight = true;
 };
 template <class V>
 void visit_fields(V& v, TerrainCfg& c) {
@@ -103,6 +104,10 @@ void visit_fields(V& v, TerrainCfg& c) {
   v("max_init_level", c.max_init_level, "Highest level that a world starts on; -1: any.")
       .at_least(-1);
   v("seed", c.seed, "Of the tiles and of where worlds start.");
+  v("daylight", c.daylight,
+    "Where models and ``spec_fn`` bring no lamp a sun, where no sky one, and squares on a plane "
+    "that "
+    "has no material. False: MuJoCo's headlight alone.");
 }
 
 void validate(const TerrainCfg& cfg, std::string_view place);

@@ -4,6 +4,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 #include <memory>
 
@@ -172,6 +173,44 @@ TEST(Terrain, SaysWhatIsWrong) {
               HasSubstr("sub_terrains['x']: platform_width is 9"));
   EXPECT_THAT(fault({.terrain_type = "generator", .max_init_level = 5}),
               HasSubstr("max_init_level is 5"));
+}
+
+// Colours need a lamp, a sky and something to see; what a model brings stays as it is.
+TEST(Terrain, DaylightIsWhatIsMissing) {
+  const auto count = [](const mjModel* m, mjtTexture type) {
+    return std::count(m->tex_type, m->tex_type + m->ntex, type);
+  };
+  SceneCfg cfg;
+  cfg.terrain = TerrainCfg{};
+  {
+    const Scene scene(cfg);
+    const mjModel* m = scene.model();
+    EXPECT_EQ(m->nlight, 1);
+    EXPECT_EQ(count(m, mjTEXTURE_SKYBOX), 1);
+    const int ground = mj_name2id(m, mjOBJ_GEOM, "terrain");
+    ASSERT_GE(m->geom_matid[ground], 0);
+    EXPECT_GE(m->mat_texid[m->geom_matid[ground] * mjNTEXROLE + mjTEXROLE_RGB], 0);
+    EXPECT_EQ(m->mat_rgba[4 * m->geom_matid[ground]], 0.5f);
+  }
+  cfg.spec_fn = [](mjSpec* spec) {
+    mjs_addLight(mjs_findBody(spec, "world"), nullptr);
+    mjsTexture* sky = mjs_addTexture(spec, nullptr);
+    sky->type = mjTEXTURE_SKYBOX;
+    sky->builtin = mjBUILTIN_FLAT;
+    sky->width = 8;
+    sky->height = 48;
+    mjs_asGeom(mjs_findElement(spec, mjOBJ_GEOM, "terrain"))->rgba[0] = 0.4f;
+  };
+  {
+    const Scene scene(cfg);
+    EXPECT_EQ(scene.model()->nlight, 1);
+    EXPECT_EQ(scene.model()->ntex, 1);
+    EXPECT_EQ(scene.model()->nmat, 0);
+  }
+  cfg.spec_fn = {};
+  cfg.terrain->daylight = false;
+  const Scene scene(cfg);
+  EXPECT_EQ(scene.model()->nlight + scene.model()->ntex + scene.model()->nmat, 0);
 }
 
 }  // namespace

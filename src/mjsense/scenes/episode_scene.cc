@@ -11,6 +11,7 @@
 #include "mjsense/core/error.h"
 #include "mjsense/core/match.h"
 #include "mjsense/observe/frame.h"
+#include "mjsense/scene/daylight.h"
 #include "mjsense/scene/parts.h"
 #include "mjsense/scene/resolve.h"
 #include "mjsense/scene/spec.h"
@@ -88,14 +89,31 @@ void apply_look(mjSpec* spec, const SceneFileCfg& cfg) {
     }
   }
   spec->visual.quality.shadowsize = 4096;
-  if (cfg.sky) {
-    mjsTexture* sky = mjs_addTexture(spec, nullptr);
-    sky->type = mjTEXTURE_SKYBOX;
-    sky->builtin = mjBUILTIN_GRADIENT;
-    std::ranges::copy(cfg.sky->top, sky->rgb1);
-    std::ranges::copy(cfg.sky->bottom, sky->rgb2);
-    sky->width = 256;
-    sky->height = 256 * 6;
+  std::optional<SceneSkyCfg> sky = cfg.sky;
+  if (!sky && !cfg.generator.empty()) sky.emplace();  // there are windows
+  if (sky) set_sky(spec, "", sky->top, sky->bottom);
+}
+
+// Under a pedestal that a scene has put above its floor, as high (m) as that is: it does not float.
+void stand_on_plinth(mjSpec* spec, const std::string& robot, double high) {
+  if (high <= 0) return;
+  for (mjsElement* element : spec_elements(spec, mjOBJ_GEOM)) {
+    const mjsGeom* foot = mjs_asGeom(element);
+    mjsBody* base = mjs_getParent(element);
+    if (!base->mocap ||
+        !std::string_view(mjs_getString(mjs_getName(base->element))).starts_with(robot + "/"))
+      continue;
+    if (foot->type != mjGEOM_BOX || std::abs(foot->pos[2] - foot->size[2]) > 1e-9) continue;
+    mjsGeom* plinth = mjs_addGeom(base, nullptr);
+    plinth->type = mjGEOM_BOX;
+    const double pos[] = {foot->pos[0], foot->pos[1], -0.5 * high};
+    const double size[] = {foot->size[0], foot->size[1], 0.5 * high};
+    std::ranges::copy(pos, plinth->pos);
+    std::ranges::copy(size, plinth->size);
+    plinth->contype = foot->contype;
+    plinth->conaffinity = foot->conaffinity;
+    plinth->group = foot->group;
+    mjs_setString(plinth->material, mjs_getString(foot->material));
   }
 }
 
@@ -164,8 +182,9 @@ SceneCfg EpisodeScene::scene_cfg(const std::string& robot) const {
   if (scene.entities.empty()) scene.entities.emplace_back(robot, EntityCfg{});
   if (cfg_.extent) scene.extent = cfg_.extent;
   if (!cfg_.models) scene.options = cfg_.options;
-  scene.spec_fn = [cfg = cfg_, first = scene.spec_fn, meshes = meshes_](mjSpec* spec) {
+  scene.spec_fn = [cfg = cfg_, first = scene.spec_fn, meshes = meshes_, robot](mjSpec* spec) {
     apply_look(spec, cfg);
+    stand_on_plinth(spec, robot, cfg.robot.pos[2]);
     let_robots_touch(spec);
     if (meshes) meshes->add(spec);
     if (first) first(spec);

@@ -4,6 +4,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 #include <fstream>
 #include <functional>
@@ -158,6 +159,64 @@ TEST(EpisodeScene, AStartIsOfItsSeedAndEpisodeAlone) {
   EXPECT_LE(angle_between(base.q, {}), std::numbers::pi / 6);
   one.start(8);
   EXPECT_NE(one.at(1).x, three.at(1, 2).x);
+}
+
+// A pedestal above the floor: something stands below it, as wide, down to the floor.
+TEST(EpisodeScene, ARaisedPedestalStandsOnAPlinth) {
+  Files files;
+  files.write("robot.xml", R"(<mujoco><worldbody><body name="base" mocap="true">
+      <geom name="pedestal" type="box" size=".2 .1 .3" pos="0 .05 .3" contype="2" group="2"/>
+      <geom name="lid" type="box" size=".2 .2 .01" pos="0 0 .59"/>
+    </body></worldbody></mujoco>)");
+  const auto model = [&](double z) {
+    files.cfg.robot.pos = {0, 0, z};
+    SceneCfg whole = EpisodeScene(files.cfg).scene_cfg("robot_0");
+    for (auto& [name, entity] : whole.entities) {
+      if (name == "robot_0") entity.model.path = files.dir.file("robot.xml");
+    }
+    return Scene(whole);
+  };
+  const Scene on_floor = model(0), raised = model(.22);
+  const mjModel* m = raised.model();
+  ASSERT_EQ(m->ngeom, on_floor.model()->ngeom + 1);
+  const int base = mj_name2id(m, mjOBJ_BODY, "robot_0/base");
+  ASSERT_EQ(m->body_geomnum[base], 3);
+  const int plinth = m->body_geomadr[base] + 2;
+  EXPECT_NEAR(m->geom_pos[3 * plinth + 1], .05, 1e-12);
+  EXPECT_NEAR(m->geom_pos[3 * plinth + 2], -.11, 1e-12);
+  EXPECT_NEAR(m->geom_size[3 * plinth], .2, 1e-12);
+  EXPECT_NEAR(m->geom_size[3 * plinth + 1], .1, 1e-12);
+  EXPECT_NEAR(m->geom_size[3 * plinth + 2], .11, 1e-12);
+  EXPECT_EQ(m->geom_contype[plinth], 2);
+  EXPECT_EQ(m->geom_group[plinth], 2);
+}
+
+// The scene's sky, not that of a model in it.
+TEST(EpisodeScene, TheSkyIsTheScenes) {
+  Files files;
+  files.write("wardrobe.xml", R"(<mujoco>
+    <asset><texture type="skybox" builtin="flat" rgb1="1 0 0" rgb2="1 0 0" width="8" height="48"/></asset>
+    <worldbody><body name="wardrobe"><geom size=".1"/></body></worldbody></mujoco>)");
+  files.cfg.sky = SceneSkyCfg{.top = {0, 1, 0}, .bottom = {0, 1, 0}};
+  const Played played(files.cfg);
+  const mjModel* m = played.sim->model();
+  int skies = 0;
+  for (int i = 0; i < m->ntex; ++i) {
+    if (m->tex_type[i] != mjTEXTURE_SKYBOX) continue;
+    ++skies;
+    EXPECT_EQ(m->tex_data[m->tex_adr[i]], 0);
+    EXPECT_EQ(m->tex_data[m->tex_adr[i] + 1], 255);
+  }
+  EXPECT_EQ(skies, 1);
+}
+
+TEST(EpisodeScene, WhatIsGeneratedHasASkyOutsideItsWindows) {
+  SceneFileCfg cfg;
+  cfg.name = "street";
+  cfg.generator = "kitchen";
+  const Played played(cfg);
+  const mjModel* m = played.sim->model();
+  EXPECT_EQ(std::count(m->tex_type, m->tex_type + m->ntex, mjTEXTURE_SKYBOX), 1);
 }
 
 TEST(EpisodeScene, AsManyObjectsAsCounted) {

@@ -12,6 +12,7 @@
 #include <vector>
 
 #include "mjsense/core/fields.h"
+#include "mjsense/scene/daylight.h"
 #include "mjsense/scene/options.h"
 #include "mjsense/scene/scene.h"
 
@@ -143,7 +144,7 @@ void visit_fields(V& v, SceneVaryCfg& c) {
 }
 
 struct SceneSkyCfg {
-  std::array<double, 3> top{0.55, 0.67, 0.80}, bottom{0.86, 0.89, 0.92};
+  std::array<double, 3> top = kSkyTop, bottom = kSkyBottom;
 };
 template <class V>
 void visit_fields(V& v, SceneSkyCfg& c) {
@@ -210,7 +211,8 @@ void visit_fields(V& v, SceneFileCfg& c) {
   v("regions", c.regions, "Where they may stand; none: where their models have them.");
   v("robot", c.robot, "Where the robot stands.");
   v("vary", c.vary, "What is different in every episode.");
-  v("sky", c.sky, "The colours around.");
+  v("sky", c.sky,
+    "The colours around; without it a generated scene has blue ones outside its windows.");
   v("headlight", c.headlight, "The light at the camera; without it MuJoCo's.");
   v("options", c.options, "Of the physics.");
   v("extent", c.extent, "``stat.extent`` of the model.").unit("m").positive();

@@ -32,6 +32,12 @@ class SceneCfg:
     extent: float | None = None
     spec_fn: Callable[[mujoco.MjSpec], None] | None = None
 
+    def _edit(self, spec: mujoco.MjSpec) -> None:
+        if self.terrain is not None:
+            self.terrain.edit_scene(spec)
+        if self.spec_fn is not None:
+            self.spec_fn(spec)
+
     def native(self, options: configs.MujocoCfg | None = None) -> configs.SceneCfg:
         """What it means here, checked."""
         return configs.SceneCfg(
@@ -41,7 +47,7 @@ class SceneCfg:
             entities={name: entity.native() for name, entity in self.entities.items()},
             sensors=tuple(sensor.native() if isinstance(sensor, SensorCfg) else sensor for sensor in self.sensors),
             extent=self.extent,
-            spec_fn=self.spec_fn,
+            spec_fn=self._edit,
             options=configs.MujocoCfg() if options is None else options,
         )
 

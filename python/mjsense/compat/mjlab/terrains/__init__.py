@@ -9,6 +9,8 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 from typing import Any
 
+import mujoco
+
 from mjsense import configs
 from mjsense.compat.mjlab.entity import EntityCfg
 
@@ -129,18 +131,30 @@ class TerrainGeneratorCfg:
 
 @dataclass
 class TerrainEntityCfg(EntityCfg):
-    """The ground. It is matched as the body ``terrain``."""
+    """The ground. It is matched as the body ``terrain``.
+
+    ``lights``, ``textures`` and ``materials`` are given (anything with ``edit_spec(spec)``; ``()``: none), or there is daylight of ours.
+    """
 
     terrain_type: str = "plane"
     terrain_generator: TerrainGeneratorCfg | None = None
     env_spacing: float | None = 2.0
     max_init_terrain_level: int | None = None
     num_envs: int = 1
+    lights: tuple[Any, ...] | None = None  # type: ignore[assignment]
+    textures: tuple[Any, ...] | None = None  # type: ignore[assignment]
+    materials: tuple[Any, ...] | None = None  # type: ignore[assignment]
     debug_vis: bool = False
 
+    def edit_scene(self, spec: mujoco.MjSpec) -> None:
+        """Adds the lights, textures and materials that were given."""
+        for edit in (*(self.lights or ()), *(self.textures or ()), *(self.materials or ())):
+            edit.edit_spec(spec)
+
     def native(self) -> configs.TerrainCfg:  # type: ignore[override]
+        daylight = self.lights is None and self.textures is None and self.materials is None
         if self.terrain_type == "plane":
-            return configs.TerrainCfg()
+            return configs.TerrainCfg(daylight=daylight)
         tiles = self.terrain_generator
         if self.terrain_type != "generator" or tiles is None:
             raise ValueError(f"TerrainEntityCfg: terrain_type is {self.terrain_type!r}: 'plane', or 'generator' with a terrain_generator")
@@ -151,7 +165,7 @@ class TerrainEntityCfg(EntityCfg):
         return configs.TerrainCfg(
             terrain_type="generator", sub_terrains=kinds, levels=tiles.num_rows, types=0 if tiles.curriculum else tiles.num_cols,
             tile_size=tiles.size, difficulty=tiles.difficulty_range, border=tiles.border_width, seed=tiles.seed or 0,
-            max_init_level=-1 if top is None else min(top, tiles.num_rows - 1))  # fmt: skip
+            max_init_level=-1 if top is None else min(top, tiles.num_rows - 1), daylight=daylight)  # fmt: skip
 
 
 __all__ = [
