@@ -42,7 +42,11 @@ CASES = (
     ("pick_and_place_next_to", "franka", ""),
     ("pick_and_place_color", "franka", ""),
     ("packing", "franka", ""),
-    *((task, robot, "") for task in ("open", "close") for robot in ("franka", "mobile_franka", "i2rt_yam", "rby1")),
+    *(
+        (task, robot, "")
+        for task in ("open", "close")
+        for robot in ("franka", "mobile_franka", "i2rt_yam", "bimanual_yam", "rby1")
+    ),
     ("open", "franka", "libero/kitchen"),
     ("close", "franka", "libero/kitchen"),
     ("door_opening", "rby1", ""),

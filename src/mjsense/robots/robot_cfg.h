@@ -149,6 +149,7 @@ struct RobotCfg {
   int image_width = 640, image_height = 368;  // one resolution for all cameras
   ActionNoiseCfg noise;
   int policy_dt_ms = 66, ctrl_dt_ms = 2, sim_dt_ms = 2;
+  double opened = 0.15;        // fraction of its range that is open for the task `open`
   std::string env_state_name;  // of the row of env_states in MolmoSpaces' form; "": there is none
   int env_state_size = 0;      // its numbers; 0: what the groups need
 
@@ -179,6 +180,10 @@ void visit_fields(V& v, RobotCfg& c) {
   v("sim_dt_ms", c.sim_dt_ms, "One step of the physics; divides ``ctrl_dt_ms``.")
       .unit("ms")
       .at_least(1);
+  v("opened", c.opened,
+    "Fraction of its range at which what the robot opens counts as open (task ``open``).")
+      .positive()
+      .at_most(1);
   v("env_state_name", c.env_state_name,
     "Name of a further row of ``env_states`` in MolmoSpaces' form; none: there is no such row.");
   v("env_state_size", c.env_state_size, "Numbers of that row; 0: what the groups need.")

@@ -5,6 +5,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <numbers>
 
 #include "mjsense/core/error.h"
 #include "mjsense/scenes/robot_floor.h"
@@ -53,11 +54,11 @@ BasePose NavPlanner::base(const World& world) const {
 }
 
 bool NavPlanner::would_do(const World& world, const BasePose& there, const Pose& camera_in_base,
-                          double arrive) const {
+                          double arrive, double facing) const {
   const auto [index, distance] = nav_->nearest(world, there.x, there.y);
   if (distance > arrive) return false;
   const double* at = world.data->xpos + 3 * nav_->scene_object(index).body;
-  if (std::abs(wrapped(std::atan2(at[1] - there.y, at[0] - there.x) - there.yaw)) > cfg_.facing)
+  if (std::abs(wrapped(std::atan2(at[1] - there.y, at[0] - there.x) - there.yaw)) > facing)
     return false;
   for (const BasePose& tried : tried_[world.id]) {
     if (std::hypot(tried.x - there.x, tried.y - there.y) < kElsewhere) return false;
@@ -87,12 +88,20 @@ void NavPlanner::make_plan(const World& world, const PlanRequest& request, Plan&
   }
   if (request.stage > 0) tried.push_back(here);
   std::vector<BasePose> way;
-  for (const double arrive : {cfg_.arrive, cfg_.reach}) {
+  // At last whatever counts: from farther away, in a corner of the picture.
+  struct Wanted {
+    double arrive, facing;
+  };
+  for (const Wanted& wanted : {Wanted{cfg_.arrive, cfg_.facing}, Wanted{cfg_.reach, cfg_.facing},
+                               Wanted{NavToObjTask::kNearby, std::numbers::pi}}) {
     if (way.size() > 1) break;
     way = nav_->routes()->find(
-        here, [&](const BasePose& p) { return would_do(world, p, camera_in_base, arrive); },
+        here,
+        [&](const BasePose& p) {
+          return would_do(world, p, camera_in_base, wanted.arrive, wanted.facing);
+        },
         [&](double x, double y) {
-          return std::max(0.0, nav_->nearest(world, x, y).second - arrive);
+          return std::max(0.0, nav_->nearest(world, x, y).second - wanted.arrive);
         });
   }
   if (way.size() < 2) {

@@ -36,7 +36,7 @@ class NavPlanner final : public TaskPlanner {
  private:
   BasePose base(const World& world) const;
   bool would_do(const World& world, const BasePose& there, const Pose& camera_in_base,
-                double arrive) const;
+                double arrive, double facing) const;
 
   NavPlannerCfg cfg_;
   const NavToObjTask* nav_ = nullptr;

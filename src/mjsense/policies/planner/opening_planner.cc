@@ -11,6 +11,21 @@
 
 namespace mjsense {
 
+namespace {
+
+// Slow at the ends, and never much faster than a moment before or after.
+void ease(std::span<double> seconds) {
+  constexpr double kEnds = 2.5, kChange = 0.75;
+  seconds.front() *= kEnds;
+  seconds.back() *= kEnds;
+  for (std::size_t i = 1; i < seconds.size(); ++i)
+    seconds[i] = std::max(seconds[i], kChange * seconds[i - 1]);
+  for (std::size_t i = seconds.size(); i-- > 1;)
+    seconds[i - 1] = std::max(seconds[i - 1], kChange * seconds[i]);
+}
+
+}  // namespace
+
 std::span<const Phase> OpeningPlanner::phases() const { return kManipulationPhases; }
 int OpeningPlanner::first_phase() const { return kOpenGripper; }
 
@@ -40,22 +55,41 @@ void OpeningPlanner::back_off(const World& world, Plan& plan) const {
   plan.more = true;
 }
 
-// Joint positions at times, the tool at `speed` between them.
-CommandPath OpeningPlanner::path(int arm, std::span<const RobotValues> points, double speed) const {
+// Joint positions at times, and places of a base that drives, the tool at `speed` between them.
+std::vector<CommandPath> OpeningPlanner::paths(int arm, std::span<const RobotValues> points,
+                                               double speed, bool driving) const {
   const std::size_t n = robot().groups()[arm].qpos.size();
-  CommandPath out{.group = arm};
+  const int base = opening_->reach().base();
+  const auto pose = [&](const RobotValues& q) {
+    const auto& at = q[base].values;
+    return Pose{{at[0], at[1], 0}, axis_angle({0, 0, 1}, at[2])};
+  };
+  std::vector<double> seconds{0};
+  for (std::size_t k = 1; k < points.size(); ++k) {
+    Pose a = robot().fk(arm, points[k - 1]), b = robot().fk(arm, points[k]);
+    double most = 0, least = 1e-3;
+    for (std::size_t i = 0; i < n; ++i)
+      most = std::max(most, std::abs(points[k][arm].values[i] - points[k - 1][arm].values[i]));
+    if (driving) {
+      const Pose from = pose(points[k - 1]), to = pose(points[k]);
+      least = std::max(norm(to.p - from.p) / cfg_.base_speed,
+                       angle_between(from.q, to.q) / cfg_.base_turn);
+      a = from * a;
+      b = to * b;
+    }
+    seconds.push_back(std::max({norm(b.p - a.p) / speed, most / cfg_.fastest_joint, least}));
+  }
+  if (driving) ease(std::span(seconds).subspan(1));
+  std::vector<CommandPath> out(driving ? 2 : 1);
   double time = 0;
   for (std::size_t k = 0; k < points.size(); ++k) {
-    if (k > 0) {
-      const Pose a = robot().fk(arm, points[k - 1]), b = robot().fk(arm, points[k]);
-      double most = 0;
-      for (std::size_t i = 0; i < n; ++i)
-        most = std::max(most, std::abs(points[k][arm].values[i] - points[k - 1][arm].values[i]));
-      time += std::max({norm(b.p - a.p) / speed, most / cfg_.fastest_joint, 1e-3});
+    time += seconds[k];
+    for (CommandPath& path : out) {
+      path.group = &path == out.data() ? arm : base;
+      const auto view = points[k][path.group].view();
+      path.times.push_back(time);
+      path.points.insert(path.points.end(), view.begin(), view.end());
     }
-    out.times.push_back(time);
-    const auto& values = points[k][arm].values;
-    out.points.insert(out.points.end(), values.begin(), values.begin() + n);
   }
   return out;
 }
@@ -69,8 +103,15 @@ void OpeningPlanner::make_plan(const World& world, const PlanRequest& request, P
   const double from = world.data->qpos[one.qpos], to = opening_->aim(one);
   HandleWay& way = ways_[world.id];
   const auto start = reach.start_of(world.data);
-  auto found = request.stage == first ? reach.find(start, one, from, to, cfg_.grasps)
-                                      : reach.again(start, one, from, to, way);
+  std::optional<HandleWay> found;
+  if (request.stage > first) {
+    found = reach.again(start, one, from, to, way);
+  } else {
+    const bool driving = opening_->driving(world.id);
+    for (const bool drive : {driving, !driving}) {
+      if (!found) found = reach.find(start, one, from, to, cfg_.grasps, drive);
+    }
+  }
   if (!found) return;
   way = *std::move(found);
   plan.grasp = way.grasp;
@@ -78,7 +119,7 @@ void OpeningPlanner::make_plan(const World& world, const PlanRequest& request, P
   const MoveGroup& gripper = robot().groups()[hand];
   if (request.stage == first) {
     plan.wait(kOpenGripper, 0).grip(hand, gripper.open_command);
-    plan.move_groups(kPregrasp, {path(arm, way.go, cfg_.there)}, cfg_.settle);
+    plan.move_groups(kPregrasp, paths(arm, way.go, cfg_.there, false), cfg_.settle);
     plan.more = true;
     return;
   }
@@ -86,7 +127,10 @@ void OpeningPlanner::make_plan(const World& world, const PlanRequest& request, P
   plan.move_tool(kGrasp, arm, tool_target(world, arm), at, cfg_.slow, cfg_.settle);
   plan.move_tool(kCloseGripper, arm, at, at, cfg_.slow, cfg_.close_time)
       .grip(hand, gripper.closed_command);
-  plan.move_groups(kLift, {path(arm, way.along, cfg_.fast)}, cfg_.settle).holds(hand);
+  plan.move_groups(
+          kLift, paths(arm, way.along, way.drive ? cfg_.driving : cfg_.fast, way.drive.has_value()),
+          cfg_.settle)
+      .holds(hand);
 }
 
 }  // namespace mjsense

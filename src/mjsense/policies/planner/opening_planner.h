@@ -9,12 +9,13 @@
 namespace mjsense {
 
 struct OpeningPlannerCfg {
-  double there = 0.20, fast = 0.08, slow = 0.04;  // m/s, of the tool: to the pregrasp, with the
-                                                  // handle, to the handle
-  double fastest_joint = 0.8;                     // rad/s on the way there
-  double settle = 0.1, close_time = 0.5;          // s
-  double back = 0.08;                             // m, before another attempt
-  int grasps = 40;                                // tried before giving up
+  // m/s, of the tool: to the pregrasp, with the handle, with it while the base drives, to the handle
+  double there = 0.20, fast = 0.08, driving = 0.12, slow = 0.04;
+  double fastest_joint = 0.8;                  // rad/s on the way there
+  double base_speed = 0.20, base_turn = 0.35;  // m/s, rad/s, with the handle
+  double settle = 0.1, close_time = 0.5;       // s
+  double back = 0.08;                          // m, before another attempt
+  int grasps = 40;                             // tried before giving up
 };
 
 class OpeningPlanner final : public TaskPlanner {
@@ -29,7 +30,8 @@ class OpeningPlanner final : public TaskPlanner {
   int first_phase() const override;
 
  private:
-  CommandPath path(int arm, std::span<const RobotValues> points, double speed) const;
+  std::vector<CommandPath> paths(int arm, std::span<const RobotValues> points, double speed,
+                                 bool driving) const;
   void back_off(const World& world, Plan& plan) const;
 
   OpeningPlannerCfg cfg_;

@@ -130,6 +130,27 @@ std::optional<Pose> NavToObjTask::start_place(int world, const Pose& placed, con
   return {};
 }
 
+// Behind furniture, or at the back of it, a thing may be near a way and yet never in sight.
+std::string NavToObjTask::start_fault(const World& world) const {
+  const std::string fault = ObjectTask::start_fault(world);
+  if (!fault.empty() || !routes_) return fault;
+  const Pose base = robot().base_pose(world), camera = inverse(base) * camera_pose(world);
+  const Vec3 ahead = rotate(base.q, {1, 0, 0});
+  const auto seen = [&](const BasePose& p) {
+    const auto [index, distance] = nearest(world, p.x, p.y);
+    const Pose there{{p.x, p.y, base.p.z}, axis_angle({0, 0, 1}, p.yaw)};
+    return distance < kNearby && sees(world, there * camera, index);
+  };
+  const auto left = [&](double x, double y) {
+    return std::max(0.0, nearest(world, x, y).second - kNearby);
+  };
+  if (!routes_->find({base.p.x, base.p.y, std::atan2(ahead.y, ahead.x)}, seen, left).empty())
+    return "";
+  return fmt::format(
+      "task '{}': robot '{}' sees no {} in scene '{}' from anywhere that it can drive to", name(),
+      robot().name(), object(world.id).name, scene().cfg().name);
+}
+
 std::pair<int, double> NavToObjTask::nearest(const World& world, double x, double y) const {
   std::pair<int, double> best{-1, 1e10};
   for (int i : candidates(world.id)) {

@@ -15,13 +15,16 @@ namespace mjsense {
 class NavToObjTask final : public ObjectTask {
  public:
   static constexpr std::string_view kRole = "pickup_obj";
-  static constexpr double kReach = 1.5;  // m, of reward
+  static constexpr double kReach = 1.5;    // m, of reward
+  static constexpr double kNearby = 1.45;  // m, at most, of a place to drive to
 
   // In cfg.scene; by default on a floor of several rooms.
   explicit NavToObjTask(TaskCfg cfg);
   std::string_view name() const override { return "nav_to_obj"; }
   std::string_view type() const override { return "nav_to_obj"; }
 
+  // Also: the robot drives nowhere from where it sees a candidate.
+  std::string start_fault(const World& world) const override;
   // Reward: 1 - d / 1.5 m of the nearest candidate if the camera sees it, else 0; success: reward > 0.
   Evaluation evaluate(const World& world) const override;
 

@@ -55,6 +55,20 @@ TEST_F(Nav, RewardFallsWithTheDistanceOfWhatIsSeen) {
   EXPECT_EQ(tested, 3);
 }
 
+// Out of sight wherever the robot drives: such a start is drawn again.
+TEST_F(Nav, WhatIsSeenFromNowhereIsNoTarget) {
+  start(0);
+  EXPECT_EQ(task.start_fault(world), "");
+  for (int index : task.candidates(0)) {
+    const int body = task.scene_object(index).body;
+    data->qpos[model->jnt_qposadr[model->body_jntadr[body]] + 2] = 10;  // above the ceiling
+  }
+  mj_forward(model, data.get());
+  EXPECT_EQ(task.start_fault(world), "task 'nav_to_obj': robot 'rby1' sees no " +
+                                         task.objects(0)[0].name +
+                                         " in scene 'floor' from anywhere that it can drive to");
+}
+
 TEST_F(Nav, WhatStandsBehindSomethingIsNotSeen) {
   start(0);
   ASSERT_TRUE(stand(1.2, 0));

@@ -24,20 +24,23 @@ HandleReach::Start BaseSearch::placed(const HandleReach::Start& start, const Pos
   return out;
 }
 
-std::vector<Pose> BaseSearch::places(const HandleReach::Start& start, const Articulation& one,
-                                     double from, double to, const Pose& usual) const {
+BasePlaces BaseSearch::places(const HandleReach::Start& start, const Articulation& one, double from,
+                              double to, const Pose& usual) const {
   {
     const std::lock_guard lock(mutex_);
     const auto known = known_.find(one.joint);
     if (known != known_.end()) return known->second;
   }
-  std::vector<Pose> found = search(start, one, from, to, usual);
+  BasePlaces found{search(start, one, from, to, usual, false), false};
+  if (found.at.empty() && reach_.drives())
+    found = {search(start, one, from, to, usual, true), true};
   const std::lock_guard lock(mutex_);
   return known_.try_emplace(one.joint, std::move(found)).first->second;
 }
 
 std::vector<Pose> BaseSearch::search(const HandleReach::Start& start, const Articulation& one,
-                                     double from, double to, const Pose& usual) const {
+                                     double from, double to, const Pose& usual,
+                                     bool driving) const {
   // The handle as it is seen from above, and where it looks.
   const Pose body = reach_.body_pose(start, one, from);
   const Vec3 handle = body * one.handle.middle, out = rotate(body.q, one.handle.outward);
@@ -59,7 +62,7 @@ std::vector<Pose> BaseSearch::search(const HandleReach::Start& start, const Arti
     }
     const HandleReach::Start there = placed(start, base);
     if (!reach_.stands_free(there)) continue;
-    if (reach_.find(there, one, from, to, cfg_.grasps)) found.push_back(base);
+    if (reach_.find(there, one, from, to, cfg_.grasps, driving)) found.push_back(base);
   }
   return found;
 }

@@ -18,6 +18,12 @@ struct BaseSearchCfg {
   double nearest = 0.30, farthest = 0.90, aside = 0.55, turn = 0.35;
 };
 
+// Where a base can stand; `driving`: the arm alone does not do it from there.
+struct BasePlaces {
+  std::vector<Pose> at;  // X_WB
+  bool driving = false;
+};
+
 class BaseSearch {
  public:
   BaseSearch(const mjModel* model, const Robot& robot, const HandleReach& reach,
@@ -25,21 +31,22 @@ class BaseSearch {
 
   // The start with the robot's base there, in its start configuration without noise.
   HandleReach::Start placed(const HandleReach::Start& start, const Pose& base) const;
-  // Places X_WB from which `one` goes from `from` to `to`, at the height of `usual`, which is tried
-  // first. A function of the arguments of the first call for this articulation: found once, then kept.
-  std::vector<Pose> places(const HandleReach::Start& start, const Articulation& one, double from,
-                           double to, const Pose& usual) const;
+  // Places from which `one` goes from `from` to `to`, at the height of `usual`, which is tried first;
+  // those from which the base drives meanwhile where there are no others. A function of the arguments
+  // of the first call for this articulation: found once, then kept.
+  BasePlaces places(const HandleReach::Start& start, const Articulation& one, double from,
+                    double to, const Pose& usual) const;
 
  private:
   std::vector<Pose> search(const HandleReach::Start& start, const Articulation& one, double from,
-                           double to, const Pose& usual) const;
+                           double to, const Pose& usual, bool driving) const;
 
   const mjModel* model_;
   const Robot& robot_;
   const HandleReach& reach_;
   BaseSearchCfg cfg_;
   mutable std::mutex mutex_;
-  mutable std::map<int, std::vector<Pose>> known_;  // by joint
+  mutable std::map<int, BasePlaces> known_;  // by joint
 };
 
 }  // namespace mjsense

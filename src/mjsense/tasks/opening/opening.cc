@@ -16,6 +16,7 @@ constexpr std::string_view kScene = "kitchen";
 // Where planners stop: fractions of the range. A drawer is pulled well out, a door swung until it is
 // plainly open.
 constexpr double kAimSlide = 0.55, kAimHinge = 0.38;
+constexpr double kBeyond = 0.06;  // what counts, at least
 // A base stands a little different in every episode.
 constexpr double kSpread = 0.02, kTurn = 0.05;  // m, rad
 constexpr int kTries = 12;                      // grasps tried from it
@@ -38,26 +39,29 @@ void OpeningTask::initialize_task() {
 }
 
 double OpeningTask::aim(const Articulation& one) const {
-  return kind_ == OpeningKind::kClose ? one.closed : one.at(one.slide ? kAimSlide : kAimHinge);
+  if (kind_ == OpeningKind::kClose) return one.closed;
+  return one.at(std::max(one.slide ? kAimSlide : kAimHinge, opened() + kBeyond));
 }
 
-std::optional<Pose> OpeningTask::find_base(const Articulation& one, double from, const Pose& usual,
-                                           Rng& rng, const HandleReach::Start& start) const {
+std::optional<OpeningTask::Found> OpeningTask::find_base(const Articulation& one, double from,
+                                                         const Pose& usual, Rng& rng,
+                                                         const HandleReach::Start& start) const {
   const double to = aim(one);
   // Places are those of the middle of what episodes begin with.
   const double middle =
       kind_ == OpeningKind::kOpen ? one.closed : one.at(0.5 * (kLeastStart + kMostStart));
-  std::vector<Pose> places = bases_->places(start, one, middle, to, usual);
-  while (!places.empty()) {
-    const auto k = rng.below(static_cast<std::uint32_t>(places.size()));
-    const Pose place = places[k];
-    places.erase(places.begin() + k);
+  BasePlaces places = bases_->places(start, one, middle, to, usual);
+  while (!places.at.empty()) {
+    const auto k = rng.below(static_cast<std::uint32_t>(places.at.size()));
+    const Pose place = places.at[k];
+    places.at.erase(places.at.begin() + k);
     const Vec3 move{rng.uniform(-kSpread, kSpread), rng.uniform(-kSpread, kSpread), 0};
     const double turn = rng.uniform(-kTurn, kTurn);
     const Pose moved{place.p + move, normalized(axis_angle({0, 0, 1}, turn) * place.q)};
     for (const Pose& base : {moved, place}) {
       const HandleReach::Start there = bases_->placed(start, base);
-      if (reach_->stands_free(there) && reach_->find(there, one, from, to, kTries)) return base;
+      if (reach_->stands_free(there) && reach_->find(there, one, from, to, kTries, places.driving))
+        return Found{base, places.driving};
     }
   }
   return {};
@@ -91,7 +95,7 @@ std::optional<Pose> OpeningTask::sample_scene(int world, Rng& rng, const StateRo
   }
   Target& target = targets_[world];
   target.reached = false;
-  std::optional<Pose> base;
+  std::optional<Found> base;
   for (int index : order) {
     const Articulation& one = articulations_[index];
     const double from =
@@ -100,19 +104,20 @@ std::optional<Pose> OpeningTask::sample_scene(int world, Rng& rng, const StateRo
     if (!base && index != order.back()) continue;
     target.index = index;
     target.reached = base.has_value();
+    target.driving = base && base->driving;
     set_object(world, one.body, one.text);
     state.qpos[one.qpos] = from;
     state.qvel[one.dof] = 0;
     break;
   }
-  return base ? base : usual;
+  return base ? base->base : usual;
 }
 
 void OpeningTask::begin(const World& world) {
   ObjectTask::begin(world);
   Target& target = targets_[world.id];
   const Articulation& one = articulations_[target.index];
-  const double wanted = kind_ == OpeningKind::kOpen ? one.at(kOpened) : one.at(1 - kClosed);
+  const double wanted = kind_ == OpeningKind::kOpen ? one.at(opened()) : one.at(1 - kClosed);
   target.goal =
       one.motion(world.data->qpos[one.qpos], wanted, vec3(world.data->xaxis + 3 * one.joint),
                  vec3(world.data->xanchor + 3 * one.joint)) *
@@ -141,7 +146,7 @@ double OpeningTask::reward(const World& world) const {
 }
 
 bool OpeningTask::succeeded(double reward) const {
-  return reward >= (kind_ == OpeningKind::kOpen ? kOpened : kClosed);
+  return reward >= (kind_ == OpeningKind::kOpen ? opened() : kClosed);
 }
 
 Evaluation OpeningTask::evaluate(const World& world) const {

@@ -18,8 +18,9 @@ enum class OpeningKind { kOpen, kClose };
 class OpeningTask final : public ObjectTask {
  public:
   static constexpr std::string_view kRole = "pickup_obj";
-  // Fractions of the range; success, and where a close begins.
-  static constexpr double kOpened = 0.15, kClosed = 0.85;
+  // Fractions of the range; success, and where a close begins. What is open is the robot's matter
+  // (RobotCfg::opened).
+  static constexpr double kClosed = 0.85;
   static constexpr double kLeastStart = 0.35, kMostStart = 0.65;
 
   // In cfg.scene; by default in a kitchen.
@@ -31,7 +32,7 @@ class OpeningTask final : public ObjectTask {
 
   void begin(const World& world) override;
   // Reward of open: the most of |q| / range over all things of the target's category; of close: 1 -
-  // |q| / range of the target. Success: it is at least 0.15, 0.85.
+  // |q| / range of the target. Success: it is at least opened(), 0.85.
   Evaluation evaluate(const World& world) const override;
 
   std::string description(int world) const override;  // "Open the drawer"
@@ -44,9 +45,12 @@ class OpeningTask final : public ObjectTask {
 
   // --- for planners
   OpeningKind kind() const { return kind_; }
+  double opened() const { return robot().cfg().opened; }
   std::span<const Articulation> articulations() const { return articulations_; }
   const Articulation& target(int world) const { return articulations_[targets_[world].index]; }
   const HandleReach& reach() const { return *reach_; }
+  // Whether the robot stands where its arm alone does not do it.
+  bool driving(int world) const { return targets_[world].driving; }
   // Joint position that a planner brings the target to: well beyond what counts.
   double aim(const Articulation& one) const;
 
@@ -58,12 +62,17 @@ class OpeningTask final : public ObjectTask {
   struct Target {
     int index = 0;
     bool reached = true;
+    bool driving = false;  // the arm alone does not do it
     Pose goal;
   };
   double reward(const World& world) const;
   bool succeeded(double reward) const;
-  std::optional<Pose> find_base(const Articulation& one, double from, const Pose& usual, Rng& rng,
-                                const HandleReach::Start& start) const;
+  struct Found {
+    Pose base;
+    bool driving;
+  };
+  std::optional<Found> find_base(const Articulation& one, double from, const Pose& usual, Rng& rng,
+                                 const HandleReach::Start& start) const;
 
   OpeningKind kind_;
   std::vector<Articulation> articulations_;

@@ -2,104 +2,27 @@
 #include "mjsense/tasks/opening/reach.h"
 
 #include <algorithm>
-#include <array>
 #include <cmath>
-#include <numbers>
 
 #include "mjsense/observe/frame.h"
 #include "mjsense/scene/resolve.h"
+#include "mjsense/scenes/robot_floor.h"
 
 namespace mjsense {
 namespace {
 
-constexpr std::array<double, 5> kTilts{0, 0.35, -0.35, 0.7, -0.7};  // rad, about the handle
-constexpr std::array<double, 3> kTurns{0, 0.4, -0.4};               // rad, across the handle
-constexpr std::array<double, 3> kPlaces{0, 0.45, -0.45};            // of its half length
 constexpr int kOfRobot = 1 << 30;   // contact bit of the robot's geoms
 constexpr double kBuiltSo = 0.002;  // m between links at the start
-constexpr double kSideGap = 0.004;  // m, pads to the handle
-
-// Fingers close along any direction across the approach: where the pads are, in the tool's frame.
-Quat closing_turn(const MoveGroup& gripper, const mjModel* model) {
-  if (gripper.pad_sites[0] < 0 || gripper.leaf_site < 0) return {};
-  const std::unique_ptr<mjData, void (*)(mjData*)> data(mj_makeData(model), mj_deleteData);
-  for (std::size_t i = 0; i < gripper.qpos.size(); ++i) {  // open: the range's wider end
-    const int joint = gripper.joints[std::min(i, gripper.joints.size() - 1)];
-    const double low = model->jnt_range[2 * joint], high = model->jnt_range[2 * joint + 1];
-    if (model->jnt_type[joint] == mjJNT_SLIDE && model->jnt_limited[joint])
-      data->qpos[gripper.qpos[i]] = std::abs(low) > std::abs(high) ? low : high;
-  }
-  mj_kinematics(model, data.get());
-  const Pose tool = pose_from_mat(data->site_xpos + 3 * gripper.leaf_site,
-                                  data->site_xmat + 9 * gripper.leaf_site);
-  const Vec3 apart =
-      rotate(conjugate(tool.q), vec3(data->site_xpos + 3 * gripper.pad_sites[1]) -
-                                    vec3(data->site_xpos + 3 * gripper.pad_sites[0]));
-  if (std::hypot(apart.x, apart.y) < 1e-4) return {};
-  const double angle = 0.5 * std::numbers::pi - std::atan2(apart.y, apart.x);
-  // A right angle or none: pads that are a little off the middle turn nothing.
-  return axis_angle({0, 0, 1},
-                    0.5 * std::numbers::pi * std::round(angle / (0.5 * std::numbers::pi)));
-}
+constexpr double kUnder = 0.7;      // of a contact's normal upwards: what a base stands on
 
 }  // namespace
-
-std::vector<ArmAndHand> arms_with_hands(const Robot& robot, const mjModel* model) {
-  std::vector<ArmAndHand> hands;
-  const auto groups = robot.groups();
-  for (int g = 0; g < static_cast<int>(groups.size()); ++g) {
-    if (groups[g].kind != GroupKind::kGripper || groups[g].leaf_site < 0) continue;
-    for (int a = 0; a < static_cast<int>(groups.size()); ++a) {
-      if (groups[a].kind != GroupKind::kArm || groups[a].leaf_site < 0) continue;
-      const bool same = groups[a].leaf_site == groups[g].leaf_site ||
-                        is_below(model, groups[g].root_body, groups[a].root_body);
-      if (!same) continue;
-      hands.push_back({a, g, closing_turn(groups[g], model)});
-      break;
-    }
-  }
-  return hands;
-}
-
-std::vector<HandleGrasp> propose_handle_grasps(const Handle& handle, const Pose& body,
-                                               double max_opening) {
-  std::vector<HandleGrasp> grasps;
-  const Vec3 along = rotate(body.q, handle.along), outward = rotate(body.q, handle.outward);
-  const Vec3 middle = body * handle.middle;
-  const bool knob = handle.half_along < 0.03;
-  for (int side = 0; side < (knob ? 2 : 1); ++side) {
-    // The fingers close across the bar; a knob may be taken both ways.
-    const Vec3 bar = side == 0 ? along : normalized(cross(along, outward));
-    const double across = side == 0 ? handle.half_across : handle.half_along;
-    if (2 * across + 2 * kSideGap > max_opening) continue;
-    for (double turn : kTurns) {
-      for (double tilt : kTilts) {
-        for (double place : kPlaces) {
-          if (knob && place != 0) continue;
-          Vec3 approach = rotate(axis_angle(bar, tilt), -outward);
-          const Vec3 close = normalized(cross(bar, approach));
-          approach = rotate(axis_angle(close, turn), approach);
-          for (int flip = -1; flip <= 1; flip += 2) {
-            const Vec3 y = static_cast<double>(flip) * close;
-            const Vec3 position = middle + (place * handle.half_along) * bar;
-            const double cost =
-                std::abs(tilt) + 1.2 * std::abs(turn) + 0.3 * std::abs(place) + 0.1 * side;
-            grasps.push_back(
-                {{position, quat_from_columns(cross(y, approach), y, approach)}, cost});
-          }
-        }
-      }
-    }
-  }
-  std::ranges::stable_sort(grasps, {}, &HandleGrasp::cost);
-  return grasps;
-}
 
 HandleReach::HandleReach(const mjModel* model, const Robot& robot, HandleReachCfg cfg)
     : own_(mj_copyModel(nullptr, model), mj_deleteModel),
       model_(own_.get()),
       robot_(robot),
       cfg_(cfg),
+      base_(driving_base(robot)),
       hands_(arms_with_hands(robot, model)),
       of_robot_(model->nbody, 0),
       fixed_(model->nbody, 0),
@@ -118,7 +41,7 @@ HandleReach::HandleReach(const mjModel* model, const Robot& robot, HandleReachCf
     fixed_[b] = of_robot_[b] && (model->body_weldid[b] == 0 || b == robot.base_body());
   for (int g = 0; g < model->ngeom; ++g) {
     if (!of_robot_[model->geom_bodyid[g]]) continue;
-    own_->geom_margin[g] = cfg_.clearance;
+    own_->geom_margin[g] = base_ >= 0 && fixed_[model->geom_bodyid[g]] ? cfg_.room : cfg_.clearance;
     if (!model->geom_contype[g] && !model->geom_conaffinity[g]) continue;
     // Its links touch each other here, whatever they do in the simulation.
     own_->geom_contype[g] |= kOfRobot;
@@ -160,15 +83,18 @@ HandleReach::Start HandleReach::start_of(const StateRow& state) const {
 }
 
 void HandleReach::show(mjData* data, const RobotValues& values) const {
-  for (const ArmAndHand& hand : hands_) {
-    const auto& qpos = robot_.groups()[hand.arm].qpos;
-    for (std::size_t i = 0; i < qpos.size(); ++i) data->qpos[qpos[i]] = values[hand.arm].values[i];
-  }
+  const auto set = [&](int group) {
+    const auto& qpos = robot_.groups()[group].qpos;
+    for (std::size_t i = 0; i < qpos.size(); ++i) data->qpos[qpos[i]] = values[group].values[i];
+  };
+  for (const ArmAndHand& hand : hands_) set(hand.arm);
+  if (base_ >= 0) set(base_);
 }
 
-// Everything else is as far from the robot; `hand` may touch what it holds.
+// Everything else is as far from the robot; `hand` may touch what it holds. A base that drives keeps
+// off what it does not stand on.
 bool HandleReach::free(mjData* data, double clearance, const Articulation* held,
-                       const ArmAndHand* hand) const {
+                       const ArmAndHand* hand, bool driving) const {
   mj_kinematics(model_, data);
   mj_collision(model_, data);
   for (int i = 0; i < data->ncon; ++i) {
@@ -183,6 +109,8 @@ bool HandleReach::free(mjData* data, double clearance, const Articulation* held,
     }
     if (of_robot_[mine] == of_robot_[other]) continue;
     if (!of_robot_[mine]) std::swap(mine, other);
+    const bool beside = driving && fixed_[mine] && std::abs(contact.frame[2]) < kUnder;
+    if (beside) return false;
     // What it stands on touches its base.
     if (contact.dist > (fixed_[mine] ? cfg_.contact : clearance)) continue;
     if (held && of_gripper_[mine] == hand->gripper && is_below(model_, other, held->body)) continue;
@@ -238,6 +166,8 @@ struct HandleReach::Seen {
   Pose to_base;  // X_BW
   Pose body;     // X_W of the handle's body
   Vec3 axis, anchor;
+  BasePose base;  // of one that drives
+  double z = 0;   // m, of its frame
 };
 
 HandleReach::Seen HandleReach::see(mjData* data, const Start& start, const Articulation& one,
@@ -251,6 +181,11 @@ HandleReach::Seen HandleReach::see(mjData* data, const Start& start, const Artic
   seen.body = {vec3(data->xpos + 3 * one.body), quat(data->xquat + 4 * one.body)};
   seen.axis = vec3(data->xaxis + 3 * one.joint);
   seen.anchor = vec3(data->xanchor + 3 * one.joint);
+  if (base_ >= 0) {
+    const auto& at = seen.now[base_].values;
+    seen.base = {at[0], at[1], at[2]};
+    seen.z = robot_.base_pose(world).p.z;
+  }
   return seen;
 }
 
@@ -261,35 +196,67 @@ void HandleReach::set(mjData* data, const Start& start, const Articulation& one,
   data->qpos[one.qpos] = q;
 }
 
-// The arm's positions while it has the handle, from `q` at the handle on.
-bool HandleReach::go_along(const Seen& seen, const Articulation& one, double from, double to,
-                           RobotValues q, HandleWay& way) const {
-  for (int k = 0; k < cfg_.points; ++k) {
-    const double joint = std::lerp(from, to, static_cast<double>(k) / (cfg_.points - 1));
-    const Pose tool = seen.to_base * one.motion(from, joint, seen.axis, seen.anchor) * way.grasp;
-    if (!robot_.ik(way.hand.arm, tool, q, Chain::kTracking)) return false;
+// The arm's positions while it has the handle, from `q` at the handle on, and the base's.
+bool HandleReach::go_along(const Seen& seen, const HandleMotion& motion, RobotValues q,
+                           HandleWay& way) const {
+  const int points = way.drive ? cfg_.drive_points : cfg_.points, arm = way.hand.arm;
+  way.along.clear();
+  for (int k = 0; k < points; ++k) {
+    const double part = static_cast<double>(k) / (points - 1);
+    Pose to_base = seen.to_base;
+    if (way.drive) {
+      const BasePose at = driven(seen.base, *way.drive, motion, way.grasp.p, part);
+      to_base = inverse(Pose{{at.x, at.y, seen.z}, axis_angle({0, 0, 1}, at.yaw)});
+      const double place[] = {at.x, at.y, at.yaw};
+      q[base_].set(place);
+    }
+    const RobotValues last = q;
+    if (!robot_.ik(arm, to_base * motion.at(part) * way.grasp, q, Chain::kTracking)) return false;
+    for (int i = 0; way.drive && k > 0 && i < q[arm].size; ++i) {
+      if (std::abs(q[arm].values[i] - last[arm].values[i]) > cfg_.jump) return false;
+    }
     way.along.push_back(q);
   }
   return true;
 }
 
-bool HandleReach::try_grasp(mjData* data, const Start& start, const Seen& seen,
-                            const Articulation& one, double from, double to, HandleWay& way) const {
-  const int arm = way.hand.arm;
-  way.pregrasp = seen.to_base * way.grasp * Pose{{0, 0, -cfg_.pregrasp}, {}};
-  // From the posture that arms begin with, so that a little noise on it changes nothing.
-  RobotValues before = seen.now;
-  before[arm].set(robot_.cfg().groups[arm].init);
-  if (before[arm].size != seen.now[arm].size) before[arm] = seen.now[arm];
-  if (!robot_.ik(arm, way.pregrasp, before, 2 * Chain::kTracking)) return false;
-  if (!go_along(seen, one, from, to, before, way)) return false;
-  // It can reach all that; is anything in the way?
+bool HandleReach::along_is_free(mjData* data, const Start& start, const HandleMotion& motion,
+                                const HandleWay& way) const {
   for (std::size_t k = 0; k < way.along.size(); ++k) {
-    set(data, start, one, std::lerp(from, to, static_cast<double>(k) / (cfg_.points - 1)));
+    const double part = static_cast<double>(k) / static_cast<double>(way.along.size() - 1);
+    set(data, start, *motion.one, std::lerp(motion.from, motion.to, part));
     show(data, way.along[k]);
-    if (!free(data, cfg_.contact, &one, &way.hand)) return false;
+    if (!free(data, cfg_.contact, motion.one, &way.hand, way.drive.has_value())) return false;
   }
-  set(data, start, one, from);
+  return true;
+}
+
+// With the base on its way, too: where the arm reaches the end is tried first.
+bool HandleReach::try_drives(mjData* data, const Start& start, const Seen& seen,
+                             const HandleMotion& motion, const RobotValues& before,
+                             HandleWay& way) const {
+  RobotValues taken = before;
+  const int arm = way.hand.arm;
+  if (!robot_.ik(arm, seen.to_base * way.grasp, taken, Chain::kTracking)) return false;
+  set(data, start, *motion.one, motion.from);
+  show(data, taken);
+  if (!free(data, cfg_.contact, motion.one, &way.hand)) return false;
+  const Pose last = motion.at(1) * way.grasp;
+  for (const Drive& drive : mjsense::drives()) {
+    const BasePose end = driven(seen.base, drive, motion, way.grasp.p, 1);
+    RobotValues q = taken;
+    const Pose base{{end.x, end.y, seen.z}, axis_angle({0, 0, 1}, end.yaw)};
+    if (!robot_.ik(arm, inverse(base) * last, q, Chain::kTracking)) continue;
+    way.drive = drive;
+    if (go_along(seen, motion, before, way) && along_is_free(data, start, motion, way)) return true;
+  }
+  return false;
+}
+
+// Straight to the pregrasp, or by way of a point farther back.
+bool HandleReach::way_there(mjData* data, const Seen& seen, const RobotValues& before,
+                            HandleWay& way) const {
+  const int arm = way.hand.arm;
   way.go = {seen.now, before};
   bool ok = way_is_free(data, arm, way.go);
   for (std::size_t k = 0; k < cfg_.detours.size() && !ok; ++k) {
@@ -302,12 +269,31 @@ bool HandleReach::try_grasp(mjData* data, const Start& start, const Seen& seen,
   return ok;
 }
 
+bool HandleReach::try_grasp(mjData* data, const Start& start, const Seen& seen,
+                            const HandleMotion& motion, bool driving, HandleWay& way) const {
+  const int arm = way.hand.arm;
+  way.pregrasp = seen.to_base * way.grasp * Pose{{0, 0, -cfg_.pregrasp}, {}};
+  // From the posture that arms begin with, so that a little noise on it changes nothing.
+  RobotValues before = seen.now;
+  before[arm].set(robot_.cfg().groups[arm].init);
+  if (before[arm].size != seen.now[arm].size) before[arm] = seen.now[arm];
+  if (!robot_.ik(arm, way.pregrasp, before, 2 * Chain::kTracking)) return false;
+  // It can reach all that; is anything in the way?
+  if (driving ? !try_drives(data, start, seen, motion, before, way)
+              : !go_along(seen, motion, before, way) || !along_is_free(data, start, motion, way))
+    return false;
+  set(data, start, *motion.one, motion.from);
+  return way_there(data, seen, before, way);
+}
+
 std::optional<HandleWay> HandleReach::find(const Start& start, const Articulation& one, double from,
-                                           double to, int most_tries) const {
+                                           double to, int most_tries, bool driving) const {
   const ScratchData::Loan loan = scratch_.borrow();
   mjData* data = loan.get();
   const Seen seen = see(data, start, one, from);
+  const HandleMotion motion{&one, from, to, seen.axis, seen.anchor};
   std::optional<HandleWay> found;
+  if (driving && base_ < 0) return found;
   for (const ArmAndHand& hand : hands_) {
     int tries = 0;
     const double opening = robot_.groups()[hand.gripper].max_opening;
@@ -317,7 +303,7 @@ std::optional<HandleWay> HandleReach::find(const Start& start, const Articulatio
       way.hand = hand;
       way.grasp = grasp.pose * Pose{{}, hand.turn};
       way.on_body = inverse(seen.body) * way.grasp;
-      if (try_grasp(data, start, seen, one, from, to, way)) found = std::move(way);
+      if (try_grasp(data, start, seen, motion, driving, way)) found = std::move(way);
     }
   }
   return found;
@@ -330,12 +316,13 @@ std::optional<HandleWay> HandleReach::again(const Start& start, const Articulati
   const Seen seen = see(data, start, one, from);
   HandleWay way;
   way.hand = before.hand;
+  way.drive = before.drive;
   way.on_body = before.on_body;
   way.grasp = seen.body * before.on_body;
   way.pregrasp = seen.to_base * way.grasp * Pose{{0, 0, -cfg_.pregrasp}, {}};
   RobotValues q = seen.now;
   if (!robot_.ik(way.hand.arm, way.pregrasp, q, Chain::kTracking)) return {};
-  if (!go_along(seen, one, from, to, q, way)) return {};
+  if (!go_along(seen, {&one, from, to, seen.axis, seen.anchor}, q, way)) return {};
   return way;
 }
 

@@ -15,28 +15,11 @@
 #include "mjsense/core/rng.h"
 #include "mjsense/robots/robot.h"
 #include "mjsense/tasks/opening/articulation.h"
+#include "mjsense/tasks/opening/drive.h"
+#include "mjsense/tasks/opening/handle_grasps.h"
 #include "mjsense/worlds/scratch_data.h"
 
 namespace mjsense {
-
-// An arm and its gripper: move groups of a robot.
-struct ArmAndHand {
-  int arm = -1, gripper = -1;
-  Quat turn;  // from a tool frame whose fingers close along y to the hand's own
-};
-// Those whose gripper is an arm's leaf, in the robot's order.
-std::vector<ArmAndHand> arms_with_hands(const Robot& robot, const mjModel* model);
-
-// Where the tool takes a handle: z the approach, y the closing direction, the origin between the
-// finger tips.
-struct HandleGrasp {
-  Pose pose;  // X_WT
-  double cost = 0;
-};
-// By rising cost: straight on in the middle first, then from other sides and places. `body` is the
-// pose of the handle's body.
-std::vector<HandleGrasp> propose_handle_grasps(const Handle& handle, const Pose& body,
-                                               double max_opening);
 
 // One way to do it, of one arm.
 struct HandleWay {
@@ -45,12 +28,16 @@ struct HandleWay {
   Pose on_body;                    // the same in the frame of the handle's body
   std::vector<RobotValues> go;     // joint positions from the start to the pregrasp, at least two
   std::vector<RobotValues> along;  // with the handle; the first is where it is now
+  std::optional<Drive> drive;      // of the base meanwhile, whose places are in `along`
   Pose pregrasp;                   // X_BT
 };
 
 struct HandleReachCfg {
   double pregrasp = 0.04;    // m before the grasp, against the approach
   int points = 11;           // of the arc, ends included
+  int drive_points = 17;     // likewise, where the base drives
+  double room = 0.02;        // m, that a base keeps from everything while it drives
+  double jump = 0.5;         // rad, of a joint from one point to the next while it drives
   double clearance = 0.010;  // m, of the robot to everything on the way there
   double contact = -0.001;   // m, what counts as touching while it has the handle
   double step = 0.10;        // rad, of any joint between two checks of the way
@@ -69,10 +56,13 @@ class HandleReach {
   };
   Start start_of(const mjData* data) const;
   Start start_of(const StateRow& state) const;
-  // The articulation goes from `from` to `to`, the robot standing as `start` says. Nothing: it
-  // cannot, or stands in something. At most `most_tries` grasps are tried an arm.
+  bool drives() const { return base_ >= 0; }
+  int base() const { return base_; }  // group, -1: it stands where it is put
+  // The articulation goes from `from` to `to`, the robot standing as `start` says; with `driving` its
+  // base drives meanwhile. Nothing: it cannot, or stands in something. At most `most_tries` grasps are
+  // tried an arm.
   std::optional<HandleWay> find(const Start& start, const Articulation& one, double from, double to,
-                                int most_tries) const;
+                                int most_tries, bool driving) const;
   // The rest of a way for an arm that has gone to its pregrasp, the handle being where it is now.
   std::optional<HandleWay> again(const Start& start, const Articulation& one, double from,
                                  double to, const HandleWay& before) const;
@@ -85,11 +75,16 @@ class HandleReach {
   struct Seen;
   Seen see(mjData* data, const Start& start, const Articulation& one, double q) const;
   void set(mjData* data, const Start& start, const Articulation& one, double q) const;
-  bool go_along(const Seen& seen, const Articulation& one, double from, double to, RobotValues q,
-                HandleWay& way) const;
-  bool try_grasp(mjData* data, const Start& start, const Seen& seen, const Articulation& one,
-                 double from, double to, HandleWay& way) const;
-  bool free(mjData* data, double clearance, const Articulation* held, const ArmAndHand* hand) const;
+  bool go_along(const Seen& seen, const HandleMotion& motion, RobotValues q, HandleWay& way) const;
+  bool along_is_free(mjData* data, const Start& start, const HandleMotion& motion,
+                     const HandleWay& way) const;
+  bool try_grasp(mjData* data, const Start& start, const Seen& seen, const HandleMotion& motion,
+                 bool driving, HandleWay& way) const;
+  bool try_drives(mjData* data, const Start& start, const Seen& seen, const HandleMotion& motion,
+                  const RobotValues& before, HandleWay& way) const;
+  bool way_there(mjData* data, const Seen& seen, const RobotValues& before, HandleWay& way) const;
+  bool free(mjData* data, double clearance, const Articulation* held, const ArmAndHand* hand,
+            bool driving = false) const;
   void show(mjData* data, const RobotValues& values) const;
   bool way_is_free(mjData* data, int arm, std::span<const RobotValues> way) const;
 
@@ -97,6 +92,7 @@ class HandleReach {
   const mjModel* model_;          // that
   const Robot& robot_;
   HandleReachCfg cfg_;
+  int base_;
   std::vector<ArmAndHand> hands_;
   std::vector<char> of_robot_;   // [nbody]
   std::vector<char> fixed_;      // [nbody] of the robot, and no joint below the base moves it

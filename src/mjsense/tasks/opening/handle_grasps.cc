@@ -1,0 +1,97 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "mjsense/tasks/opening/handle_grasps.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <memory>
+#include <numbers>
+
+#include "mjsense/observe/frame.h"
+#include "mjsense/scene/resolve.h"
+
+namespace mjsense {
+namespace {
+
+constexpr std::array<double, 5> kTilts{0, 0.35, -0.35, 0.7, -0.7};  // rad, about the handle
+constexpr std::array<double, 3> kTurns{0, 0.4, -0.4};               // rad, across the handle
+constexpr std::array<double, 3> kPlaces{0, 0.45, -0.45};            // of its half length
+constexpr double kSideGap = 0.004;                                  // m, pads to the handle
+
+// Fingers close along any direction across the approach: where the pads are, in the tool's frame.
+Quat closing_turn(const MoveGroup& gripper, const mjModel* model) {
+  if (gripper.pad_sites[0] < 0 || gripper.leaf_site < 0) return {};
+  const std::unique_ptr<mjData, void (*)(mjData*)> data(mj_makeData(model), mj_deleteData);
+  for (std::size_t i = 0; i < gripper.qpos.size(); ++i) {  // open: the range's wider end
+    const int joint = gripper.joints[std::min(i, gripper.joints.size() - 1)];
+    const double low = model->jnt_range[2 * joint], high = model->jnt_range[2 * joint + 1];
+    if (model->jnt_type[joint] == mjJNT_SLIDE && model->jnt_limited[joint])
+      data->qpos[gripper.qpos[i]] = std::abs(low) > std::abs(high) ? low : high;
+  }
+  mj_kinematics(model, data.get());
+  const Pose tool = pose_from_mat(data->site_xpos + 3 * gripper.leaf_site,
+                                  data->site_xmat + 9 * gripper.leaf_site);
+  const Vec3 apart =
+      rotate(conjugate(tool.q), vec3(data->site_xpos + 3 * gripper.pad_sites[1]) -
+                                    vec3(data->site_xpos + 3 * gripper.pad_sites[0]));
+  if (std::hypot(apart.x, apart.y) < 1e-4) return {};
+  const double angle = 0.5 * std::numbers::pi - std::atan2(apart.y, apart.x);
+  // A right angle or none: pads that are a little off the middle turn nothing.
+  return axis_angle({0, 0, 1},
+                    0.5 * std::numbers::pi * std::round(angle / (0.5 * std::numbers::pi)));
+}
+
+}  // namespace
+
+std::vector<ArmAndHand> arms_with_hands(const Robot& robot, const mjModel* model) {
+  std::vector<ArmAndHand> hands;
+  const auto groups = robot.groups();
+  for (int g = 0; g < static_cast<int>(groups.size()); ++g) {
+    if (groups[g].kind != GroupKind::kGripper || groups[g].leaf_site < 0) continue;
+    for (int a = 0; a < static_cast<int>(groups.size()); ++a) {
+      if (groups[a].kind != GroupKind::kArm || groups[a].leaf_site < 0) continue;
+      const bool same = groups[a].leaf_site == groups[g].leaf_site ||
+                        is_below(model, groups[g].root_body, groups[a].root_body);
+      if (!same) continue;
+      hands.push_back({a, g, closing_turn(groups[g], model)});
+      break;
+    }
+  }
+  return hands;
+}
+
+std::vector<HandleGrasp> propose_handle_grasps(const Handle& handle, const Pose& body,
+                                               double max_opening) {
+  std::vector<HandleGrasp> grasps;
+  const Vec3 along = rotate(body.q, handle.along), outward = rotate(body.q, handle.outward);
+  const Vec3 middle = body * handle.middle;
+  const bool knob = handle.half_along < 0.03;
+  for (int side = 0; side < (knob ? 2 : 1); ++side) {
+    // The fingers close across the bar; a knob may be taken both ways.
+    const Vec3 bar = side == 0 ? along : normalized(cross(along, outward));
+    const double across = side == 0 ? handle.half_across : handle.half_along;
+    if (2 * across + 2 * kSideGap > max_opening) continue;
+    for (double turn : kTurns) {
+      for (double tilt : kTilts) {
+        for (double place : kPlaces) {
+          if (knob && place != 0) continue;
+          Vec3 approach = rotate(axis_angle(bar, tilt), -outward);
+          const Vec3 close = normalized(cross(bar, approach));
+          approach = rotate(axis_angle(close, turn), approach);
+          for (int flip = -1; flip <= 1; flip += 2) {
+            const Vec3 y = static_cast<double>(flip) * close;
+            const Vec3 position = middle + (place * handle.half_along) * bar;
+            const double cost =
+                std::abs(tilt) + 1.2 * std::abs(turn) + 0.3 * std::abs(place) + 0.1 * side;
+            grasps.push_back(
+                {{position, quat_from_columns(cross(y, approach), y, approach)}, cost});
+          }
+        }
+      }
+    }
+  }
+  std::ranges::stable_sort(grasps, {}, &HandleGrasp::cost);
+  return grasps;
+}
+
+}  // namespace mjsense
