@@ -72,7 +72,7 @@ def headlines(before: str) -> str:
         beside = " / ".join(r["peer_name"] for r in rows).replace("classic, shadow maps 4096 / classic, shadow maps", "MuJoCo's classic renderer, shadow maps 4096 /")
         what = rows[0]["case"] + {"cameras_warp": ", 84x84", "physics": ": a step with fresh sensors"}.get(name, "")
         lines.append(f"| {what} | {times} | {beside} |")
-    return "\n".join(lines) + (f"\n\nCPU time, both sides in one run, on an otherwise idle {used[0]['machine']}." if used else "")
+    return "\n".join(lines) + (f"\n\nCPU time, both sides in one run, {used[0]['machine']}; how busy the machine was is said under each table of Performance." if used else "")
 
 
 def main() -> None:

@@ -27,6 +27,7 @@
 #include "mjsense/app/sensors_command.h"
 #include "mjsense/core/error.h"
 #include "mjsense/core/plain_file.h"
+#include "mjsense/core/say.h"
 #include "mjsense/replay/check.h"
 #include "mjsense/rollout/registry.h"
 #include "mjsense/scene/mujoco_log.h"
@@ -142,8 +143,7 @@ void show_warnings() {
     const std::string warning = text;
     if (warning.find("simulation is unstable") != std::string::npos) return;
     const std::lock_guard lock(mutex);
-    if (shown.insert(warning).second)
-      fmt::print(stderr, "mjsense: MuJoCo: {}\n", one_line(warning));
+    if (shown.insert(warning).second) say("mjsense: MuJoCo: {}\n", one_line(warning));
   };
 }
 
@@ -209,7 +209,7 @@ int run(int argc, char** argv) {
   std::vector<std::string> known;
   for (const CLI::App* app : program.get_subcommands({})) known.push_back(app->get_name());
   if (argc < 2) {
-    fmt::print(stderr, "{}", program.help());
+    say("{}", program.help());
     return kWrongInput;
   }
   const std::string word = argv[1];
@@ -287,7 +287,7 @@ int run_program(int argc, char** argv) {
     // It may quote a file of a stranger's.
     constexpr std::size_t kMostBytes = 4000;
     if (why.size() > kMostBytes) why = why.substr(0, kMostBytes) + " ...";
-    fmt::print(stderr, "mjsense: {}\n", printable(one_line(why)));
+    say("mjsense: {}\n", printable(one_line(why)));
     return kWrongInput;
   }
 }

@@ -9,6 +9,8 @@
 #include <cstdio>
 #include <utility>
 
+#include "mjsense/core/say.h"
+
 namespace mjsense {
 
 namespace {
@@ -52,13 +54,13 @@ ProgressLine::ProgressLine(std::string title, bool quiet)
 
 void ProgressLine::show(const RecordProgress& progress, int stop_level) {
   if (quiet_) return;
-  if (!title_.empty()) fmt::print(stderr, "{}\n", std::exchange(title_, {}));
+  if (!title_.empty()) say("{}\n", std::exchange(title_, {}));
   text_ = progress_text(progress);
   if (stop_level > 0 && progress.running > 0) {
     text_ += fmt::format("  stopping: {} running; Ctrl-C discards them", progress.running);
   }
   if (terminal_) {
-    fmt::print(stderr, "\r\033[K{}", text_.substr(0, terminal_width() - 1));
+    say("\r\033[K{}", text_.substr(0, terminal_width() - 1));
     std::fflush(stderr);
     open_ = true;
     return;
@@ -72,12 +74,12 @@ void ProgressLine::show(const RecordProgress& progress, int stop_level) {
 }
 
 void ProgressLine::print() {
-  fmt::print(stderr, "{}\n", text_);
+  say("{}\n", text_);
   printed_ = text_;
 }
 
 void ProgressLine::finish() {
-  if (open_) fmt::print(stderr, "\n");
+  if (open_) say("\n");
   if (!terminal_ && text_ != printed_) print();
   open_ = false;
 }

@@ -11,6 +11,7 @@
 #include "mjsense/app/progress.h"
 #include "mjsense/app/table.h"
 #include "mjsense/core/error.h"
+#include "mjsense/core/say.h"
 #include "mjsense/replay/check.h"
 #include "mjsense/rollout/task_defaults.h"
 
@@ -168,15 +169,14 @@ int run_record(const RecordOptions& options) {
   } else {
     fmt::print("{}", summary_text(summary, sheet));
   }
-  for (const std::string& damage : summary.damage) fmt::print(stderr, "mjsense: {}\n", damage);
+  for (const std::string& damage : summary.damage) say("mjsense: {}\n", damage);
   if (summary.interrupted) {
-    fmt::print(stderr,
-               "interrupted: the finished episodes are safe; go on with --resume, or end it with "
-               "`mjsense repair {}`\n",
-               summary.house_dir.string());
+    say("interrupted: the finished episodes are safe; go on with --resume, or end it with "
+        "`mjsense repair {}`\n",
+        summary.house_dir.string());
   } else if (!summary.enough) {
-    fmt::print(stderr, "gave up after {} attempts; --max-attempts allows more\n",
-               summary.progress.succeeded + summary.progress.failed);
+    say("gave up after {} attempts; --max-attempts allows more\n",
+        summary.progress.succeeded + summary.progress.failed);
   }
   return summary.enough ? 0 : 1;
 }

@@ -7,6 +7,7 @@
 #include <filesystem>
 
 #include "mjsense/core/error.h"
+#include "mjsense/core/say.h"
 
 namespace mjsense {
 
@@ -21,7 +22,7 @@ bool names_model(const std::string& what, const std::string& expected) {
 }
 
 void print_warnings(const Scene& scene) {
-  for (const std::string& text : scene.warnings()) fmt::print(stderr, "mjsense: {}\n", text);
+  for (const std::string& text : scene.warnings()) say("mjsense: {}\n", text);
 }
 
 void check_physics(const Simulation& simulation, const std::string& place) {

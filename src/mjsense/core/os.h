@@ -16,6 +16,9 @@ int usable_cpus();  // by this process; 0: not known
 std::uint64_t free_memory();  // bytes, of the machine or its cgroup; the largest number: not known
 std::uint64_t address_space();  // bytes that this process has; 0: not known
 
+// Descriptors from `first` on that are open; for kernels on which close_files() fails.
+std::vector<int> open_files(int first);
+
 // Files that no program we start inherits. An empty one: errno says why.
 std::pair<Fd, Fd> make_pipe();  // to read from, to write to
 Fd memory_file(const char* name);
@@ -25,8 +28,6 @@ bool reserve(int file, std::int64_t bytes);  // disk space, without a change of 
 
 // Calls that a child may make between fork() and exec().
 void end_with_parent();                           // it is killed when its parent's thread ends
-bool close_files(unsigned first, unsigned last);  // false: not with this kernel
-// Descriptors from `first` on that are open, for kernels that cannot close them all at once.
-std::vector<int> open_files(int first);
+bool close_files(unsigned first, unsigned last);  // false: not with this kernel (before 5.9)
 
 }  // namespace mjsense::os

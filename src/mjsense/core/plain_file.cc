@@ -132,6 +132,36 @@ std::int64_t size_of(const Fd& file) {
   return fstat(file.get(), &about) == 0 ? static_cast<std::int64_t>(about.st_size) : 0;
 }
 
+namespace {
+
+FileState state_of(bool known, const struct stat& about) {
+  if (!known) return {};
+  return {about.st_dev, about.st_ino, about.st_size, about.st_mtim.tv_sec, about.st_mtim.tv_nsec};
+}
+
+}  // namespace
+
+FileState state_of(const Fd& file) {
+  struct stat about = {};
+  return state_of(fstat(file.get(), &about) == 0, about);
+}
+
+FileState state_of(const std::filesystem::path& path) {
+  struct stat about = {};
+  return state_of(lstat(path.c_str(), &about) == 0, about);
+}
+
+bool write_all(const Fd& file, std::span<const std::byte> bytes) {
+  while (!bytes.empty()) {
+    const ssize_t n = write(file.get(), bytes.data(), bytes.size());
+    if (n < 0 && errno == EINTR) continue;
+    if (n == 0) errno = ENOSPC;
+    if (n <= 0) return false;
+    bytes = bytes.subspan(static_cast<std::size_t>(n));
+  }
+  return true;
+}
+
 void write_file(const std::filesystem::path& path,
                 std::initializer_list<std::span<const std::byte>> pieces) {
   const FileLimitIsError limit;
@@ -144,13 +174,8 @@ void write_file(const std::filesystem::path& path,
   unlink(part.c_str());  // of an earlier attempt, or a link that leads elsewhere
   Fd file(open(part.c_str(), O_WRONLY | O_CREAT | O_EXCL | O_NOFOLLOW | O_CLOEXEC, 0644));
   if (!file) fail();
-  for (std::span<const std::byte> left : pieces) {
-    while (!left.empty()) {
-      const ssize_t n = write(file.get(), left.data(), left.size());
-      if (n < 0 && errno == EINTR) continue;
-      if (n <= 0) fail();
-      left = left.subspan(static_cast<std::size_t>(n));
-    }
+  for (const std::span<const std::byte> piece : pieces) {
+    if (!write_all(file, piece)) fail();
   }
   if (close(file.release()) != 0 || rename(part.c_str(), path.c_str()) != 0) fail();
 }

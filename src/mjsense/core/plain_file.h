@@ -31,10 +31,22 @@ namespace mjsense {
 
 [[nodiscard]] std::int64_t size_of(const Fd& file);
 
+// Which file it is, and in what state: another one when it was replaced or written to.
+struct FileState {
+  std::uint64_t device = 0, inode = 0;
+  std::int64_t bytes = -1, written_s = 0, written_ns = 0;
+  bool operator==(const FileState&) const = default;
+};
+[[nodiscard]] FileState state_of(const Fd& file);
+[[nodiscard]] FileState state_of(const std::filesystem::path& path);
+
 // The whole of a text that somebody wrote: an experiment, a robot, a scene. Links are followed, for
 // the name is the user's own. Throws ValueError when there is no such file, when it is a folder, a
 // pipe or a device, when it has more than 16 MiB, and when it cannot be read.
 [[nodiscard]] std::string read_text_file(const std::string& path);
+
+// Writes all of it, in as many pieces as the system takes. False: errno says why.
+[[nodiscard]] bool write_all(const Fd& file, std::span<const std::byte> bytes);
 
 // Writes a file whole or not at all: under another name first. Throws RuntimeError that names it
 // and says why the system refuses.

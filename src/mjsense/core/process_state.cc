@@ -52,8 +52,6 @@ bool forget_owner(const void* owner) {
   return owners().orphans.erase(owner) > 0;
 }
 
-std::uint64_t available_memory() { return os::free_memory(); }
-
 std::uint64_t available_address_space() {
   rlimit limit{};
   if (getrlimit(RLIMIT_AS, &limit) != 0 || limit.rlim_cur == RLIM_INFINITY) return kUnlimited;

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
-// What this process is and has: whether it was forked, how much memory it may still take.
+// What this process is and has: whether it was forked, how much address space it may still take.
 
 #include <cstdint>
 #include <string>
@@ -16,8 +16,6 @@ void add_owner(const void* owner);
 // At its end; true if it is an orphan.
 [[nodiscard]] bool forget_owner(const void* owner);
 
-// Bytes that this process may still take: free memory, limits of its cgroup.
-[[nodiscard]] std::uint64_t available_memory();
 // Bytes of address space left below RLIMIT_AS; the largest number if there is none.
 [[nodiscard]] std::uint64_t available_address_space();
 

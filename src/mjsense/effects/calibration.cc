@@ -8,6 +8,7 @@
 #include <cstdio>
 
 #include "mjsense/core/error.h"
+#include "mjsense/core/say.h"
 
 namespace mjsense {
 
@@ -117,8 +118,7 @@ void NanPolicy::apply(const EffectMoment& moment, const EffectRow& row) {
   }
   if (action == Action::kWarn && !warned_[moment.world]) {
     warned_[moment.world] = 1;
-    fmt::print(stderr, "{}: {} of {} values are not finite in world {}\n", place_, bad, row.size,
-               moment.world);
+    say("{}: {} of {} values are not finite in world {}\n", place_, bad, row.size, moment.world);
   }
 }
 

@@ -7,10 +7,12 @@
 #include <sys/wait.h>
 #include <unistd.h>
 
+#include <algorithm>
 #include <cerrno>
 #include <chrono>
 #include <cstdio>
 #include <cstring>
+#include <limits>
 #include <vector>
 
 #include "mjsense/core/error.h"
@@ -118,8 +120,11 @@ bool listen(int fd, std::uint64_t seconds, std::string& answer) {
   while (answer.size() < kMostAnswer) {
     const auto left = std::chrono::duration_cast<std::chrono::milliseconds>(end - Clock::now());
     pollfd polled{fd, POLLIN, 0};
-    const int ready = poll(&polled, 1, static_cast<int>(std::max<std::int64_t>(0, left.count())));
+    const std::int64_t most = std::numeric_limits<int>::max();  // ms: 24 days
+    const int ready =
+        poll(&polled, 1, static_cast<int>(std::clamp<std::int64_t>(left.count(), 0, most)));
     if (ready < 0 && errno == EINTR) continue;
+    if (ready == 0 && left.count() > most) continue;
     if (ready <= 0) return false;
     const ssize_t n = read(fd, piece.data(), piece.size());
     if (n < 0 && errno == EINTR) continue;
@@ -146,7 +151,8 @@ std::string in_child(std::string_view what, std::uint64_t file_bytes,
     if (pid == 0) {
       out.reset();
       H5Lock::alone();
-      child(in.get(), seconds, read);
+      // Not stderr, which confine() opens anew: it was closed if the pipe has its number.
+      child(fcntl(in.get(), F_DUPFD_CLOEXEC, STDERR_FILENO + 1), seconds, read);
     }
   }
   if (pid < 0)

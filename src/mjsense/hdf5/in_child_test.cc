@@ -61,6 +61,23 @@ TEST(InChild, WhoDoesNotGetTheProcessorSaysNothingOfTheFile) {
   }
 }
 
+// A daemon's: the pipe of the answer takes the numbers of the streams that are closed.
+TEST(InChild, AnswersWithoutStandardStreams) {
+  const auto without = [](std::initializer_list<int> closed) {
+    const pid_t pid = fork();
+    if (pid == 0) {
+      for (const int fd : closed) close(fd);
+      _exit(complaint([] { return std::string("said"); }).empty() ? 0 : 1);
+    }
+    int status = 0;
+    return waitpid(pid, &status, 0) == pid && WIFEXITED(status) && WEXITSTATUS(status) == 0;
+  };
+  EXPECT_TRUE(without({STDERR_FILENO}));
+  EXPECT_TRUE(without({STDOUT_FILENO, STDERR_FILENO}));
+  EXPECT_TRUE(without({STDIN_FILENO, STDERR_FILENO}));
+  EXPECT_TRUE(without({STDIN_FILENO, STDOUT_FILENO, STDERR_FILENO}));
+}
+
 // Ctrl-C for all programs of a terminal: ours hears it, and the reader goes on.
 int read_in_the_rain() {
   if (setpgid(0, 0) != 0) return 2;

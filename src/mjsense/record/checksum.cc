@@ -10,10 +10,12 @@
 #include <array>
 #include <cerrno>
 #include <cstring>
+#include <span>
 
 #include "mjsense/core/error.h"
 #include "mjsense/core/fd.h"
 #include "mjsense/core/file_limit.h"
+#include "mjsense/core/plain_file.h"
 #include "mjsense/record/crc32.h"
 
 namespace mjsense {
@@ -63,9 +65,8 @@ void seal_file(const std::filesystem::path& path) {
   if (!file) fail();
   const std::int64_t size = file_size(file.get());
   const std::string seal = seal_text(checksum_of(file.get(), size), size);
-  const ssize_t written = pwrite(file.get(), seal.data(), seal.size(), size);
-  if (written >= 0 && written != static_cast<ssize_t>(seal.size())) errno = ENOSPC;
-  if (written != static_cast<ssize_t>(seal.size())) fail();
+  if (lseek(file.get(), size, SEEK_SET) != size || !write_all(file, std::as_bytes(std::span(seal))))
+    fail();
 }
 
 Seal check_seal(int fd) {

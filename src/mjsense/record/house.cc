@@ -3,8 +3,6 @@
 
 #include <fcntl.h>
 #include <fmt/format.h>
-#include <sys/file.h>
-#include <sys/resource.h>
 #include <sys/stat.h>
 #include <unistd.h>
 
@@ -19,12 +17,12 @@
 #include <optional>
 
 #include "mjsense/core/error.h"
-#include "mjsense/core/file_limit.h"
-#include "mjsense/core/os.h"
 #include "mjsense/core/plain_file.h"
 #include "mjsense/hdf5/guard.h"
 #include "mjsense/record/checksum.h"
 #include "mjsense/record/description.h"
+#include "mjsense/record/durable.h"
+#include "mjsense/record/house_lock.h"
 #include "mjsense/record/layout.h"
 
 namespace fs = std::filesystem;
@@ -34,41 +32,11 @@ namespace {
 
 constexpr const char* kEndingFile = "ending";  // publish_all() has begun
 constexpr const char* kDescription = "recording.json";
-constexpr const char* kLock = "lock";
-
-[[noreturn]] void throw_file(const char* deed, const fs::path& path, int error) {
-  throw RuntimeError(fmt::format("cannot {} '{}': {}", deed, path.string(), std::strerror(error)));
-}
-
-void sync(const fs::path& path) {
-  const Fd fd(open(path.c_str(), O_RDONLY | O_CLOEXEC));
-  if (!fd || fsync(fd.get()) != 0) throw_file("sync", path, errno);
-}
-
-void move(const fs::path& from, const fs::path& to) {
-  if (std::rename(from.c_str(), to.c_str()) != 0) throw_file("write", to, errno);
-}
 
 void make_dir(const fs::path& path) {
   std::error_code error;
   fs::create_directories(path, error);
   if (error) throw_file("create the directory", path, error.value());
-}
-
-void write_whole(const fs::path& path, std::string_view text) {
-  const FileLimitIsError limit;
-  const fs::path part = path.string() + ".part";
-  unlink(part.c_str());
-  {
-    const Fd fd(open(part.c_str(), O_WRONLY | O_CREAT | O_EXCL | O_NOFOLLOW | O_CLOEXEC, 0644));
-    if (!fd || write(fd.get(), text.data(), text.size()) != static_cast<ssize_t>(text.size()) ||
-        fsync(fd.get()) != 0) {
-      const int error = errno;
-      unlink(part.c_str());
-      throw_file("write", path, error);
-    }
-  }
-  move(part, path);
 }
 
 // A file of ours, which is short; "" if it is none.
@@ -136,6 +104,15 @@ std::vector<fs::path> entries(const fs::path& dir) {
   return paths;
 }
 
+std::vector<fs::path> published_files(const fs::path& house) {
+  std::vector<fs::path> files = entries(house);
+  std::erase_if(files, [](const fs::path& path) {
+    return !path.filename().string().starts_with("trajectories_batch_") ||
+           path.extension() != ".h5";
+  });
+  return files;
+}
+
 using Moves = std::vector<std::pair<fs::path, fs::path>>;
 
 // {"recording": text, "episodes": [0, 1 ...]} of a published file.
@@ -174,23 +151,6 @@ void name_videos(hid_t trajectory, const fs::path& staged, const fs::path& house
   }
 }
 
-// Takes the disk space of a file before it is written: on a full disk that is a plain error, while
-// the HDF5 library may crash where it cannot write in the middle of a copy.
-void reserve(const fs::path& path, std::int64_t bytes) {
-  const Fd file(open(path.c_str(), O_WRONLY | O_NOFOLLOW | O_CLOEXEC));
-  if (!file) throw_file("write", path, errno);
-  rlimit limit{};
-  if (getrlimit(RLIMIT_FSIZE, &limit) == 0 && limit.rlim_cur < static_cast<rlim_t>(bytes))
-    throw_file("write", path, EFBIG);
-  if (os::reserve(file.get(), bytes)) return;
-  if (errno == ENOSPC || errno == EDQUOT || errno == EFBIG) throw_file("write", path, errno);
-  // Where space cannot be reserved (some network file systems), at least ask how much there is.
-  std::error_code error;
-  const fs::space_info space = fs::space(path, error);
-  if (!error && space.available < static_cast<std::uintmax_t>(bytes))
-    throw_file("write", path, ENOSPC);
-}
-
 }  // namespace
 
 void Decisions::add(std::int64_t episode, bool kept) {
@@ -219,7 +179,10 @@ House::House(const fs::path& dir, const std::string& fingerprint, bool resume)
   batches_ = batches_of(description.at("episodes"), description.at("batches"));
 
   require_no_link(staging_);
-  const bool any_published = load_published(fingerprint);
+  lock_ = lock_house(dir, false);  // first: who holds it still publishes
+  const std::vector<fs::path> published = published_files(dir);
+  const bool any_published = !published.empty();
+  load_published(published, fingerprint);
   const std::string unfinished = unfinished_recording(dir);
   if (!resume && (any_published || !unfinished.empty())) {
     throw ValueError(
@@ -232,20 +195,21 @@ House::House(const fs::path& dir, const std::string& fingerprint, bool resume)
     throw ValueError(fmt::format("'{}' holds a different recording: {}", dir.string(), difference));
   }
   // A lock without the mark of the end: it goes on, though recording.json was lost.
-  const bool goes_on = fs::exists(staging_ / kLock) && !fs::exists(staging_ / kEndingFile);
+  const bool goes_on = lock_ && !fs::exists(staging_ / kEndingFile);
   if (unfinished.empty() && any_published && !goes_on) {
     ended_ = true;
     // What a process killed in its last step left.
+    if (lock_) remove_tree(staging_ / kLockFile);
     if (unlink((staging_ / kEndingFile).c_str()) == 0) rmdir(staging_.c_str());
+    lock_.reset();
     return;
   }
   make_dir(staging_);
-  const fs::path lock = staging_ / kLock;
-  lock_ = Fd(open(lock.c_str(), O_RDWR | O_CREAT | O_NOFOLLOW | O_CLOEXEC, 0644));
-  if (!lock_) throw_file("write", lock, errno);
-  // The second question: whether it came to its end between our reading and our lock.
-  if (flock(lock_.get(), LOCK_EX | LOCK_NB) != 0 || unfinished != unfinished_recording(dir)) {
-    throw ValueError(fmt::format("another process records into '{}'", dir.string()));
+  if (!lock_) {
+    lock_ = lock_house(dir, true);
+    // Whether somebody came and went between our reading and our lock.
+    if (unfinished != unfinished_recording(dir) || published != published_files(dir))
+      throw ValueError(fmt::format("another process records into '{}'", dir.string()));
   }
   if (read_whole(staging_, kDescription) != fingerprint)
     write_whole(staging_ / kDescription, unfinished.empty() ? fingerprint : unfinished);
@@ -255,20 +219,16 @@ House::House(const fs::path& dir, const std::string& fingerprint, bool resume)
 }
 
 House::~House() {
-  const bool published = std::ranges::any_of(published_, [](bool p) { return p; });
   const bool decided = decisions_.kept() + decisions_.discarded() > 0;
-  if (ended_ || published || decided) return;
+  if (ended_ || !published_.empty() || decided) return;
   end();
   std::error_code not_empty;
   fs::remove(dir_, not_empty);
 }
 
-bool House::load_published(const std::string& fingerprint) {
-  bool any = false;
-  for (const fs::path& path : entries(dir_)) {
+void House::load_published(const std::vector<fs::path>& files, const std::string& fingerprint) {
+  for (const fs::path& path : files) {
     const std::string name = path.filename().string();
-    if (!name.starts_with("trajectories_batch_") || path.extension() != ".h5") continue;
-    any = true;
     const auto bytes = static_cast<std::uint64_t>(size_of(open_plain(dir_, name)));
     const auto found = nlohmann::json::parse(
         h5::in_child(path.string(), bytes, [&] { return describe_published(path); }), nullptr,
@@ -286,7 +246,6 @@ bool House::load_published(const std::string& fingerprint) {
       published_.insert(batch - 1);
     for (const std::int64_t episode : found.at("episodes")) decisions_.add(episode, true);
   }
-  return any;
 }
 
 // Moves videos back that an interrupted publication had moved already: then every episode is whole
@@ -305,7 +264,8 @@ void House::bring_back(const std::map<std::int64_t, StagedEpisode>& staged, bool
     for (const StagedVideo& video : found->second.videos) {
       const fs::path home = staging_ / episode_name(found->first) / video.name,
                      away = dir_ / final_name_of(video, index, batch, batches_.count);
-      if (!published_.contains(batch) && !fs::exists(home) && is_plain_file(away)) move(away, home);
+      if (!published_.contains(batch) && !fs::exists(home) && is_plain_file(away))
+        rename_file(away, home);
     }
   }
 }
@@ -317,8 +277,8 @@ void House::set_aside(const fs::path& folder, const std::string& why) {
   fs::path to = damaged / folder.filename();
   for (int n = 2; fs::exists(fs::symlink_status(to)); ++n)
     to = damaged / fmt::format("{}.{}", folder.filename().string(), n);
-  move(folder, to);
-  sync(damaged);
+  rename_file(folder, to);
+  sync_file(damaged);
   damage_.push_back(
       fmt::format("{} {}; it was set aside as '{}'", folder.filename().string(), why, to.string()));
 }
@@ -328,10 +288,12 @@ void House::load_staged() {
   const bool ending = fs::exists(staging_ / kEndingFile);
   for (const fs::path& path : entries(staging_)) {
     const std::string name = path.filename().string();
-    if (name == kLock || name == kDescription || name == kEndingFile) continue;
+    if (name == kLockFile || name == kDescription || name == kEndingFile) continue;
     const auto finished = episode_number(name, ""), discarded = episode_number(name, ".discarded");
     if (finished && !decisions_.contains(*finished)) {
       try {
+        if (name != episode_name(*finished))
+          throw RuntimeError("is not how an episode's folder is named");
         StagedEpisode episode = read_staged(path);
         const std::string difference = fingerprint_difference(episode.recording, fingerprint_);
         if (!difference.empty())
@@ -375,16 +337,16 @@ void House::begin(std::int64_t episode) {
 
 void House::keep(std::int64_t episode) {
   const fs::path part = part_dir(episode);
-  for (const fs::path& file : entries(part)) sync(file);
-  sync(part);
-  move(part, staging_ / episode_name(episode));
-  sync(staging_);
+  for (const fs::path& file : entries(part)) sync_file(file);
+  sync_file(part);
+  rename_file(part, staging_ / episode_name(episode));
+  sync_file(staging_);
   decisions_.add(episode, true);
 }
 
 void House::discard(std::int64_t episode, const std::string& why) {
   write_whole(staging_ / (episode_name(episode) + ".discarded"), why);
-  sync(staging_);
+  sync_file(staging_);
   remove_tree(part_dir(episode));
   decisions_.add(episode, false);
 }
@@ -412,7 +374,7 @@ void House::publish_all() {
   publish_ready();
   // From here on the order of episodes is settled, also for a process that finds us interrupted.
   write_whole(staging_ / kEndingFile, "");
-  sync(staging_);
+  sync_file(staging_);
   const std::vector<std::int64_t> kept = decisions_.all_kept();
   for (int b = next_batch_; b < batches_.count; ++b) {
     const std::vector<std::int64_t> episodes = batch_of(b, kept);
@@ -439,7 +401,7 @@ void House::publish(int batch, const std::vector<std::int64_t>& episodes) {
     for (const std::int64_t episode : episodes)
       most += static_cast<std::int64_t>(
           fs::file_size(staging_ / episode_name(episode) / kEpisodeFile) * 9 / 8);
-    reserve(part, most);
+    reserve_space(part, most);
     h5::set_attribute(file, "format", "mjsense 1");
     h5::set_attribute(file, "recording", fingerprint_);
     for (std::size_t i = 0; i < episodes.size(); ++i) {
@@ -454,17 +416,17 @@ void House::publish(int batch, const std::vector<std::int64_t>& episodes) {
     file.close(what);
   }
   seal_file(part);
-  sync(part);
+  sync_file(part);
   for (const auto& [from, to] : moves) {
     // A missing one was moved before an earlier attempt to publish was interrupted.
     if (std::rename(from.c_str(), to.c_str()) != 0 && (errno != ENOENT || !fs::exists(to)))
       throw_file("write", to, errno);
     published_bytes_ += static_cast<std::int64_t>(fs::file_size(to));
   }
-  sync(dir_);
+  sync_file(dir_);
   const fs::path final_path = dir_ / batch_file(batch, batches);
-  move(part, final_path);
-  sync(dir_);
+  rename_file(part, final_path);
+  sync_file(dir_);
   published_.insert(batch);
   published_bytes_ += static_cast<std::int64_t>(fs::file_size(final_path));
   for (const std::int64_t episode : episodes) remove_tree(staging_ / episode_name(episode));
@@ -474,7 +436,7 @@ void House::end() {
   ended_ = true;
   for (const fs::path& path : entries(staging_)) {
     const fs::path name = path.filename();
-    if (name == kDescription || name == kLock || name == kEndingFile) continue;
+    if (name == kDescription || name == kLockFile || name == kEndingFile) continue;
     // An episode beyond the wanted number: half removed under its own name it would look damaged.
     const fs::path dropped = path.string() + ".part";
     std::error_code error;
@@ -483,7 +445,7 @@ void House::end() {
   }
   // The mark that says it has ended goes last.
   remove_tree(staging_ / kDescription);
-  remove_tree(staging_ / kLock);
+  remove_tree(staging_ / kLockFile);
   lock_.reset();
   remove_tree(staging_);
 }

@@ -77,7 +77,8 @@ class House {
   const std::vector<std::string>& damage() const { return damage_; }
 
  private:
-  bool load_published(const std::string& fingerprint);
+  void load_published(const std::vector<std::filesystem::path>& files,
+                      const std::string& fingerprint);
   void load_staged();
   void bring_back(const std::map<std::int64_t, StagedEpisode>& staged, bool ending);
   void set_aside(const std::filesystem::path& folder, const std::string& why);

@@ -136,7 +136,9 @@ std::string run_process(const std::vector<std::string>& argv, const Patience& pa
   char buffer[1 << 14];
   while (true) {
     pollfd polled{child.out.get(), POLLIN, 0};
-    const int ready = poll(&polled, 1, static_cast<int>(1000 * patience.silence_s));
+    constexpr double kMostMs = 1e9;  // eleven days
+    const int ready =
+        poll(&polled, 1, static_cast<int>(std::min(kMostMs, 1000 * patience.silence_s)));
     if (ready < 0 && errno == EINTR) continue;
     if (ready == 0) give_up(fmt::format("it said nothing for {:g} s", patience.silence_s));
     const ssize_t n = read(child.out.get(), buffer, sizeof buffer);

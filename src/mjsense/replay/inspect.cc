@@ -13,6 +13,7 @@
 #include "mjsense/core/plain_file.h"
 #include "mjsense/hdf5/guard.h"
 #include "mjsense/record/description.h"
+#include "mjsense/record/house_lock.h"
 #include "mjsense/replay/check.h"
 #include "mjsense/replay/json_text.h"
 #include "mjsense/replay/trajectory.h"
@@ -64,8 +65,8 @@ struct Stream {
 
 class Inspector {
  public:
-  InspectResult run(const fs::path& path) {
-    for (const RecordedFile& file : recorded_files(path)) {
+  InspectResult run(const std::vector<RecordedFile>& files) {
+    for (const RecordedFile& file : files) {
       bytes_ += fs::file_size(file.path);
       add_file(file);
     }
@@ -118,7 +119,9 @@ class Inspector {
           if (!values.empty()) last = values.back();
         });
         if (name != "success") return;
-        entry.steps += static_cast<int>(dataset.rows());
+        constexpr std::int64_t kMost = std::numeric_limits<int>::max();
+        entry.steps =
+            static_cast<int>(std::min(kMost, entry.steps + std::min(kMost, dataset.rows())));
         entry.successes += last != 0;
       }
     });
@@ -242,11 +245,15 @@ std::string line_of(const StreamStats& s, const std::string& name, int indent) {
 
 InspectResult inspect(const fs::path& path) {
   std::uint64_t bytes = 0;
-  for (const RecordedFile& file : recorded_files(path))
+  const std::vector<RecordedFile> files = recorded_files(path);
+  if (files.empty() && std::ranges::any_of(recorded_houses(path), is_locked))
+    throw ValueError(
+        fmt::format("'{}' is being recorded: no file of it is published yet", path.string()));
+  for (const RecordedFile& file : files)
     bytes += static_cast<std::uint64_t>(
         size_of(open_plain(file.path.parent_path(), file.path.filename().string())));
   return from_json(
-      h5::in_child(path.string(), bytes, [&] { return to_json(Inspector().run(path)); }));
+      h5::in_child(path.string(), bytes, [&] { return to_json(Inspector().run(files)); }));
 }
 
 std::string InspectResult::text() const {

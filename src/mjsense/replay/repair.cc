@@ -1,5 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <fmt/format.h>
+#include <sys/file.h>
+#include <unistd.h>
 
 #include <algorithm>
 #include <cstdio>
@@ -12,7 +14,9 @@
 #include "mjsense/core/plain_file.h"
 #include "mjsense/hdf5/guard.h"
 #include "mjsense/record/checksum.h"
+#include "mjsense/record/durable.h"
 #include "mjsense/record/house.h"
+#include "mjsense/record/house_lock.h"
 #include "mjsense/record/layout.h"
 #include "mjsense/replay/check.h"
 #include "mjsense/replay/trajectory.h"
@@ -22,21 +26,33 @@ namespace fs = std::filesystem;
 namespace mjsense {
 namespace {
 
+constexpr std::int64_t kNameBytes = 1 << 12;  // on disk, of a name with its dataset and groups
+
+// What is left of a recording that never finished an episode.
+void remove_remains(const fs::path& house, std::vector<std::string>& actions) {
+  const fs::path staging = house / kStagingDir;
+  if (const std::size_t episodes = finished_episodes(house).size(); episodes > 0)
+    throw RuntimeError(fmt::format(
+        "'{}' holds {} finished episodes, and none of them says what recording they belong to; "
+        "nothing was removed",
+        staging.string(), episodes));
+  std::error_code error;
+  fs::remove_all(staging, error);
+  if (error)
+    throw RuntimeError(fmt::format("cannot remove '{}': {}", staging.string(), error.message()));
+  actions.push_back(fmt::format("{}: removed the remains of '{}'", house.string(), kStagingDir));
+}
+
 void finish_house(const fs::path& house, std::vector<std::string>& actions) {
   const fs::path staging = house / kStagingDir;
   if (!is_plain_folder(staging))
     throw ValueError(
         fmt::format("'{}' is a link, which is not followed: remove it", staging.string()));
-  const std::string fingerprint = unfinished_recording(house);
-  if (fingerprint.empty()) {
-    if (const std::size_t episodes = finished_episodes(house).size(); episodes > 0)
-      throw RuntimeError(fmt::format(
-          "'{}' holds {} finished episodes, and none of them says what recording they belong to; "
-          "nothing was removed",
-          staging.string(), episodes));
-    fs::remove_all(staging);
-    actions.push_back(fmt::format("{}: removed the remains of '{}'", house.string(), kStagingDir));
-    return;
+  std::string fingerprint;
+  {
+    const Fd lock = lock_house(house, true);  // a recording that begins has not said what it is
+    fingerprint = unfinished_recording(house);
+    if (fingerprint.empty()) return remove_remains(house, actions);
   }
   const std::size_t waiting = finished_episodes(house).size();
   House store(house, fingerprint, true);
@@ -83,8 +99,10 @@ std::string missing_names(const fs::path& path, int batch, int batches) {
 
 // "trajectories_batch_2_of_3.h5": {2, 3}
 std::optional<std::pair<int, int>> batch_number(const fs::path& path) {
+  const std::string name = path.filename().string();
   int batch = 0, batches = 0;
-  if (std::sscanf(path.filename().c_str(), "trajectories_batch_%d_of_%d.h5", &batch, &batches) != 2)
+  if (std::sscanf(name.c_str(), "trajectories_batch_%9d_of_%9d.h5", &batch, &batches) != 2 ||
+      batch < 1 || name != batch_file(batch - 1, batches))
     return {};
   return std::pair{batch, batches};
 }
@@ -100,15 +118,30 @@ int name_videos(const fs::path& path) {
       h5::in_child(path.string(), static_cast<std::uint64_t>(size_of(bytes)),
                    [&] { return missing_names(path, number->first, number->second); }));
   if (missing.empty()) return 0;  // most files need nothing: they are not opened for writing
-  const h5::H5Lock lock;
-  h5::Id file = h5::open_file(path, true);
-  for (const auto& m : missing) {
-    const std::string place = m.at(0);
-    if (!h5::exists(file, place)) h5::create_group(file, place);
-    add_file_name(h5::open_group(file, place), m.at(1), m.at(2));
+  if (flock(bytes.get(), LOCK_EX | LOCK_NB) != 0)
+    throw RuntimeError(fmt::format("another process repairs '{}'", path.string()));
+  // In a copy: who is killed, or finds the disk full, leaves the file as it was.
+  const fs::path part = path.string() + ".part";
+  struct Removed {
+    const fs::path& path;
+    ~Removed() { unlink(path.c_str()); }
+  } const removed{part};
+  copy_file(bytes, part);
+  reserve_space(part, size_of(bytes) + kNameBytes * static_cast<std::int64_t>(missing.size() + 1));
+  {
+    const h5::H5Lock lock;
+    h5::Id file = h5::open_file(part, true);
+    for (const auto& m : missing) {
+      const std::string place = m.at(0);
+      if (!h5::exists(file, place)) h5::create_group(file, place);
+      add_file_name(h5::open_group(file, place), m.at(1), m.at(2));
+    }
+    file.close(fmt::format("cannot write '{}'", part.string()));
   }
-  file.close(fmt::format("cannot write '{}'", path.string()));
-  if (seal == Seal::kWhole) seal_file(path);
+  if (seal == Seal::kWhole) seal_file(part);
+  sync_file(part);
+  rename_file(part, path);
+  sync_file(path.has_parent_path() ? path.parent_path() : ".");
   return static_cast<int>(missing.size());
 }
 
@@ -123,7 +156,7 @@ RepairResult repair(const fs::path& path) {
   const auto attempt = [&](const fs::path& what, auto&& deed) {
     try {
       deed();
-    } catch (const Error& e) {
+    } catch (const std::runtime_error& e) {  // an Error, or one of the file system
       result.failures.push_back(fmt::format("{}: {}", what.string(), e.what()));
     }
   };

@@ -1,15 +1,21 @@
 // SPDX-License-Identifier: Apache-2.0
 // Recordings read back: what the recorder wrote, what an interruption left.
 
+#include <fcntl.h>
 #include <fmt/format.h>
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
+#include <sys/file.h>
+#include <sys/resource.h>
+#include <sys/wait.h>
+#include <unistd.h>
 
 #include <algorithm>
 #include <filesystem>
 #include <fstream>
 
 #include "mjsense/core/error.h"
+#include "mjsense/core/fd.h"
 #include "mjsense/hdf5/h5.h"
 #include "mjsense/record/testing/tools.h"
 #include "mjsense/replay/check.h"
@@ -142,12 +148,17 @@ TEST(Verify, FailIsTheOppositeOfSuccess) {
   }
 }
 
-// Files without the names of their videos, as MolmoSpaces leaves them: of the same batch and number.
-TEST(Repair, NamesTheVideosOfTheirOwnBatch) {
-  TempDir dir;
-  record(dir.path, 6, {.worlds = 1}, true);
-  const fs::path path = dir.path / "house_0/trajectories_batch_2_of_2.h5";
-  const auto in_videos = [&](bool write, auto&& act) {
+// Files without the names of their videos, as MolmoSpaces leaves them.
+class RepairNames : public ::testing::Test {
+ protected:
+  RepairNames() {
+    record(dir.path, 6, {.worlds = 1}, true);
+    in_videos(true, [&](hid_t videos) {
+      was = read_file_name(videos, "wrist_camera");
+      h5::check(H5Ldelete(videos, "wrist_camera", H5P_DEFAULT), "delete");
+    });
+  }
+  void in_videos(bool write, auto&& act) const {
     const h5::H5Lock lock;
     h5::Id file = h5::open_file(path, write);
     {
@@ -156,18 +167,68 @@ TEST(Repair, NamesTheVideosOfTheirOwnBatch) {
       act(videos);
     }
     file.close("close");
-  };
-  std::string was, is;
-  in_videos(true, [&](hid_t videos) {
-    was = read_file_name(videos, "wrist_camera");
-    h5::check(H5Ldelete(videos, "wrist_camera", H5P_DEFAULT), "delete");
-  });
+  }
+
+  TempDir dir;
+  fs::path path = dir.path / "house_0/trajectories_batch_2_of_2.h5";
+  std::string was;
+};
+
+TEST_F(RepairNames, AreThoseOfTheirOwnBatch) {
+  std::string is;
   EXPECT_EQ(was, "episode_00000001_wrist_camera_batch_2_of_2.mp4");
   EXPECT_THAT(repair(dir.path).text(), HasSubstr("added 1 names of videos"));
   in_videos(false, [&](hid_t videos) { is = read_file_name(videos, "wrist_camera"); });
   EXPECT_EQ(is, was);
   EXPECT_TRUE(verify(dir.path).ok()) << verify(dir.path).text();
   EXPECT_THAT(repair(dir.path).text(), HasSubstr("nothing to repair"));
+}
+
+// Killed, or on a full disk, repair leaves the file as it was: here a limit on the size of files.
+TEST_F(RepairNames, AreAddedWhollyOrNotAtAll) {
+  const std::string bytes = read_file(path);
+  const std::vector<std::string> names = tree(dir.path);
+  for (const int more : {-1000, 10, 1000, 3000}) {
+    const pid_t pid = fork();
+    if (pid == 0) {
+      const auto most = static_cast<rlim_t>(static_cast<int>(bytes.size()) + more);
+      const rlimit limit{most, most};
+      setrlimit(RLIMIT_FSIZE, &limit);
+      const RepairResult result = repair(dir.path);
+      _exit(result.text().find("File too large") != std::string::npos ? 0 : 1);
+    }
+    int status = 0;
+    ASSERT_EQ(waitpid(pid, &status, 0), pid);
+    EXPECT_EQ(status, 0) << more;
+    EXPECT_TRUE(read_file(path) == bytes) << more;
+    EXPECT_EQ(tree(dir.path), names) << more;
+  }
+}
+
+// Both would write into the same copy.
+TEST_F(RepairNames, ByOneProcessAtATime) {
+  const std::string bytes = read_file(path);
+  {
+    const Fd other(open(path.c_str(), O_RDONLY | O_CLOEXEC));
+    ASSERT_EQ(flock(other.get(), LOCK_EX | LOCK_NB), 0);
+    EXPECT_THAT(repair(dir.path).text(), HasSubstr("another process repairs"));
+    EXPECT_TRUE(read_file(path) == bytes);
+  }
+  EXPECT_THAT(repair(dir.path).text(), HasSubstr("added 1 names of videos"));
+}
+
+// "trajectories_batch_1_of_2.h5.bak" is somebody's copy.
+TEST_F(RepairNames, OnlyInFilesOfThatName) {
+  for (const char* name : {"trajectories_batch_2_of_2.h5.bak", "trajectories_batch_02_of_2.h5",
+                           "trajectories_batch_-2147483648_of_3.h5"}) {
+    const fs::path other = path.parent_path() / name;
+    fs::copy_file(path, other);
+    const std::string bytes = read_file(other);
+    EXPECT_THAT(error_of([&] { static_cast<void>(repair(other)); }),
+                HasSubstr("is no trajectories_batch_*_of_*.h5"));
+    EXPECT_TRUE(read_file(other) == bytes) << name;
+    fs::remove(other);
+  }
 }
 
 TEST(Replay, OddPicturesArePadded) {

@@ -11,6 +11,7 @@
 #include "mjsense/core/plain_file.h"
 #include "mjsense/hdf5/chunks.h"
 #include "mjsense/record/house.h"
+#include "mjsense/record/house_lock.h"
 #include "mjsense/replay/json_text.h"
 
 namespace fs = std::filesystem;
@@ -69,6 +70,7 @@ std::vector<RecordedFile> recorded_files(const fs::path& path) {
     });
     std::sort(published.begin(), published.end());
     for (const fs::path& file : published) add(file, true);
+    if (is_locked(house)) continue;
     for (const fs::path& episode : finished_episodes(house)) add(episode / kEpisodeFile, false);
   }
   return files;
@@ -127,6 +129,7 @@ RowDataset::RowDataset(hid_t parent, const std::string& path)
 }
 
 std::int64_t RowDataset::row_size() const {
+  if (std::find(dims_.begin(), dims_.end(), 0) != dims_.end()) return 0;  // others may be any size
   std::int64_t size = 1;
   for (std::size_t i = 1; i < dims_.size(); ++i) size *= static_cast<std::int64_t>(dims_[i]);
   return size;

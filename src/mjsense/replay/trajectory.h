@@ -20,7 +20,8 @@ struct RecordedFile {
   bool published = true;  // false: a finished episode that waits for its batch
 };
 
-// The trajectory files at or below `path`, sorted. Throws ValueError when there is no such path or
+// The trajectory files at or below `path`, sorted; of a house that is being recorded, or repaired,
+// only what is published, for the rest moves at any moment. Throws ValueError when there is no such path or
 // nothing recorded in it.
 std::vector<RecordedFile> recorded_files(const std::filesystem::path& path);
 // The houses at or below `path` (or around it, when it is a file).

@@ -12,6 +12,7 @@
 #include "mjsense/record/checksum.h"
 #include "mjsense/record/description.h"
 #include "mjsense/record/house.h"
+#include "mjsense/record/house_lock.h"
 #include "mjsense/record/video_file.h"
 #include "mjsense/replay/check.h"
 #include "mjsense/replay/json_text.h"
@@ -29,6 +30,8 @@ constexpr std::int64_t kMostSteps = 10'000'000;  // of one episode: a week at 15
 constexpr std::size_t kMostFindings = 200;       // of one file
 // Rows of a file may be so much larger than the file before they are a bomb.
 constexpr std::uint64_t kMostUnpacked = 200, kFreeBytes = std::uint64_t{1} << 30;
+
+constexpr const char* kChanged = "was changed while it was read: verify it again";
 
 struct VideoCheck {
   std::string place;
@@ -241,7 +244,8 @@ class Verifier {
   explicit Verifier(const VerifyOptions& options) : options_(options) {}
 
   VerifyResult run(const fs::path& path) {
-    for (const RecordedFile& file : recorded_files(path)) check_file(file);
+    listed_ = recorded_files(path);
+    for (const RecordedFile& file : listed_) check_file(file);
     check_videos();
     for (const fs::path& house : recorded_houses(path)) {
       if (fs::is_directory(path)) check_leftovers(house);
@@ -264,12 +268,21 @@ class Verifier {
       if (!recorded.published && !is_plain_folder(folder))
         return error(recorded.name, "stands in a link, which is not followed");
       const Fd file = open_plain(folder, recorded.path.filename().string());
+      const FileState before = state_of(file);
       const auto bytes = static_cast<std::uint64_t>(size_of(file));
       const Seal seal = check_seal(file.get());
+      std::string answer, failure;
+      try {
+        answer = h5::in_child(recorded.name, bytes, [&] {
+          return FileVerifier(recorded, bytes, seal != Seal::kNone).run();
+        });
+      } catch (const Error& e) {
+        failure = e.what();
+      }
+      if (state_of(recorded.path) != before) return error(recorded.name, kChanged);
       if (seal == Seal::kBroken) error(recorded.name, "is damaged: its checksum is wrong");
-      take(recorded, Json::parse(h5::in_child(recorded.name, bytes, [&] {
-             return FileVerifier(recorded, bytes, seal != Seal::kNone).run();
-           })));
+      if (!failure.empty()) return error(recorded.name, failure);
+      take(recorded, Json::parse(answer));
     } catch (const Json::exception&) {
       error(recorded.name, "is damaged: reading it gave no answer");
     } catch (const Error& e) {
@@ -311,32 +324,66 @@ class Verifier {
     Fd file;
     try {
       file = open_plain(video.folder, video.name);
-      VideoFacts facts = read_video_facts(file.get());
-      // Containers of others may be of a form that only ffmpeg knows.
-      if (!facts.error.empty() || options_.decode) {
-        const VideoProbe probe =
-            probe_video(video.folder / video.name, options_.decode, video.frames, options_.ffmpeg);
-        if (!probe.error.empty())
-          return fmt::format("'{}' cannot be read: {}", video.name, probe.error);
-        facts = {probe.frames, probe.width, probe.height, ""};
-      }
-      if (facts.frames != video.frames)
-        return fmt::format("'{}' has {} frames, expected {}", video.name, facts.frames,
-                           video.frames);
-      // 4:2:0 videos of odd pictures have one more column or row.
-      const auto fits = [](int got, std::int64_t stated) {
-        return stated == 0 || got == stated || got == (stated + 1) / 2 * 2;
-      };
-      if (!fits(facts.width, video.width) || !fits(facts.height, video.height))
-        return fmt::format("'{}' is {} x {} pixels, expected {} x {}", video.name, facts.width,
-                           facts.height, video.width, video.height);
-      if (video.crc.empty()) return "";
-      if (const std::string crc = checksum_of(file.get()); crc != video.crc)
-        return fmt::format("'{}' is damaged: its checksum is {}, expected {}", video.name, crc,
-                           video.crc);
-      return "";
+      const FileState before = state_of(file);
+      std::string wrong = check_video(video, file);
+      if (!wrong.empty() && state_of(video.folder / video.name) != before)
+        wrong = fmt::format("'{}' {}", video.name, kChanged);
+      return wrong;
     } catch (const Error& e) {
       return e.what();
+    }
+  }
+
+  std::string check_video(const VideoCheck& video, const Fd& file) const {
+    VideoFacts facts = read_video_facts(file.get());
+    // Containers of others may be of a form that only ffmpeg knows.
+    if (!facts.error.empty() || options_.decode) {
+      const VideoProbe probe =
+          probe_video(video.folder / video.name, options_.decode, video.frames, options_.ffmpeg);
+      if (!probe.error.empty())
+        return fmt::format("'{}' cannot be read: {}", video.name, probe.error);
+      facts = {probe.frames, probe.width, probe.height, ""};
+    }
+    if (facts.frames != video.frames)
+      return fmt::format("'{}' has {} frames, expected {}", video.name, facts.frames, video.frames);
+    // 4:2:0 videos of odd pictures have one more column or row.
+    const auto fits = [](int got, std::int64_t stated) {
+      return stated == 0 || got == stated || got == (stated + 1) / 2 * 2;
+    };
+    if (!fits(facts.width, video.width) || !fits(facts.height, video.height))
+      return fmt::format("'{}' is {} x {} pixels, expected {} x {}", video.name, facts.width,
+                         facts.height, video.width, video.height);
+    if (video.crc.empty()) return "";
+    if (const std::string crc = checksum_of(file.get()); crc != video.crc)
+      return fmt::format("'{}' is damaged: its checksum is {}, expected {}", video.name, crc,
+                         video.crc);
+    return "";
+  }
+
+  // Whether this house has other files than those that were read.
+  bool has_moved(const fs::path& house) const {
+    const auto of_house = [&](const std::vector<RecordedFile>& files) {
+      std::vector<fs::path> paths;
+      for (const RecordedFile& file : files) {
+        const fs::path folder = file.path.parent_path();
+        if (folder / "" == house / "" || folder.parent_path() == house / kStagingDir)
+          paths.push_back(file.path);
+      }
+      return paths;
+    };
+    try {
+      return of_house(listed_) != of_house(recorded_files(house));
+    } catch (const Error&) {  // it is gone
+      return true;
+    }
+  }
+
+  // Findings of episodes that wait, or waited: where they are now, nobody has looked.
+  void forget_waiting(const fs::path& house) {
+    for (const RecordedFile& file : listed_) {
+      if (file.published || file.path.parent_path().parent_path() != house / kStagingDir) continue;
+      std::erase_if(result_.findings,
+                    [&](const Finding& f) { return f.place.starts_with(printable(file.name)); });
     }
   }
 
@@ -344,6 +391,11 @@ class Verifier {
     const std::string place = house.filename().string();
     if (fs::is_symlink(house / kStagingDir))
       return error(place, fmt::format("'{}' is a link, which is not followed", kStagingDir));
+    if (const bool locked = is_locked(house); locked || has_moved(house)) {
+      forget_waiting(house);
+      return error(place,
+                   locked ? "is being recorded: verify it again when that has ended" : kChanged);
+    }
     if (fs::exists(house / kStagingDir)) {
       const std::size_t waiting = finished_episodes(house).size();
       error(place, fmt::format("is unfinished: {} finished episodes wait to be published; resume "
@@ -363,6 +415,7 @@ class Verifier {
 
   VerifyOptions options_;
   VerifyResult result_;
+  std::vector<RecordedFile> listed_;
   std::vector<VideoCheck> videos_;
   std::set<fs::path> used_;
 };

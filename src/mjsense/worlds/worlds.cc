@@ -9,6 +9,7 @@
 #include <numeric>
 
 #include "mjsense/core/error.h"
+#include "mjsense/core/os.h"
 #include "mjsense/core/parallel.h"
 #include "mjsense/core/process_state.h"
 
@@ -149,7 +150,7 @@ void check_memory(const mjModel* m, int num_worlds) {
       throw ValueError(fmt::format("num_worlds is {}: they need {} of {}, and {} are left",
                                    num_worlds, gigabytes(needed), what, gigabytes(available)));
   };
-  require(each * num_worlds, available_memory(), "memory");
+  require(each * num_worlds, os::free_memory(), "memory");
   require(space * num_worlds, available_address_space(), "address space");
 }
 

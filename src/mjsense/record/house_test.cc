@@ -1,0 +1,145 @@
+// SPDX-License-Identifier: Apache-2.0
+// A house that others look at, write into, or left in the middle of something.
+
+#include "mjsense/record/house.h"
+
+#include <fcntl.h>
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+#include <sys/file.h>
+#include <sys/resource.h>
+#include <sys/wait.h>
+#include <unistd.h>
+
+#include <csignal>
+#include <thread>
+
+#include "mjsense/record/house_lock.h"
+#include "mjsense/record/testing/tools.h"
+#include "mjsense/replay/check.h"
+
+namespace mjsense {
+namespace {
+
+using namespace testing;
+using ::testing::AllOf;
+using ::testing::HasSubstr;
+
+// Six episodes in three batches, of which `decided` are there.
+void begin(const fs::path& out, int decided) {
+  record(out, 6, {.worlds = 1, .stop_after = decided}, false, [](auto& c) { c.batches = 3; });
+}
+std::string go_on(const fs::path& out) {
+  return record(out, 6, {.worlds = 1}, false, [](auto& c) { c.batches = 3, c.resume = true; });
+}
+
+// Nothing is read before: what the other publishes meanwhile would be missed, and published over.
+TEST(House, WhoRecordsIntoItIsAskedFirst) {
+  TempDir dir;
+  begin(dir.path, 3);
+  const fs::path house = dir.path / "house_0";
+  std::ofstream(house / "trajectories_batch_2_of_3.h5") << "half a file";
+  EXPECT_FALSE(is_locked(house));
+  {
+    const Fd other = lock_house(house, false);
+    EXPECT_TRUE(is_locked(house));
+    EXPECT_THAT(error_of([&] { go_on(dir.path); }), HasSubstr("another process records into"));
+    EXPECT_THAT(repair(dir.path).text(), HasSubstr("another process records into"));
+  }
+  EXPECT_FALSE(is_locked(house));
+  EXPECT_THAT(error_of([&] { go_on(dir.path); }), HasSubstr("trajectories_batch_2_of_3.h5"));
+}
+
+// A recording that begins has not said yet what it is.
+TEST(House, RepairLeavesAloneWhatBegins) {
+  TempDir dir;
+  const fs::path house = dir.path / "house_0";
+  fs::create_directories(house / kStagingDir);
+  {
+    const Fd other = lock_house(house, true);
+    EXPECT_THAT(repair(dir.path).text(), HasSubstr("another process records into"));
+    EXPECT_TRUE(is_locked(house));
+  }
+  EXPECT_THAT(repair(dir.path).text(), HasSubstr("removed the remains"));
+  EXPECT_FALSE(fs::exists(house / kStagingDir));
+}
+
+// Whoever looks at a house holds its lock for a moment: that is no reason not to record.
+TEST(House, ALookIsNoRecording) {
+  TempDir whole, dir;
+  const std::string bytes = go_on(whole.path);
+  begin(dir.path, 1);
+  Fd look(open((dir.path / "house_0/.recording/lock").c_str(), O_RDONLY | O_CLOEXEC));
+  ASSERT_EQ(flock(look.get(), LOCK_SH | LOCK_NB), 0);
+  std::thread end([&] {
+    usleep(30'000);
+    look.reset();
+  });
+  EXPECT_EQ(go_on(dir.path), bytes);
+  end.join();
+}
+
+// Killed before the last files of a recording that has ended were removed.
+TEST(House, WhatTheLastStepLeftIsRemoved) {
+  for (const bool locked : {false, true}) {
+    TempDir dir;
+    const std::string bytes = go_on(dir.path);
+    const fs::path staging = dir.path / "house_0/.recording";
+    fs::create_directory(staging);
+    std::ofstream(staging / "ending").flush();
+    if (locked) std::ofstream(staging / "lock").flush();
+    EXPECT_EQ(go_on(dir.path), bytes);
+    EXPECT_FALSE(fs::exists(staging)) << locked;
+  }
+}
+
+// An episode's folder under another name is not removed, and keeps nobody from going on.
+TEST(House, FoldersOfOtherNamesAreSetAside) {
+  TempDir whole, dir;
+  const std::string bytes = go_on(whole.path);
+  begin(dir.path, 1);
+  const fs::path house = dir.path / "house_0", staging = house / ".recording";
+  fs::rename(staging / "episode_00000000", staging / "episode_0");
+  FakeSuite suite({1, 16, 12, false, false});
+  RecordingCfg cfg = fake_recording(dir.path, suite, 1, 6);
+  cfg.batches = 3;
+  cfg.resume = true;
+  {
+    Recorder recorder(cfg);
+    ASSERT_EQ(recorder.damage().size(), 1u);
+    EXPECT_THAT(recorder.damage()[0],
+                AllOf(HasSubstr("episode_0 is not how"), HasSubstr("set aside")));
+    EXPECT_TRUE(fs::exists(house / "damaged/episode_0/traj.h5"));
+    record_all(recorder, suite, {.worlds = 1});
+  }
+  fs::remove_all(house / "damaged");
+  std::string again;
+  for (const std::string& name : tree(dir.path)) again += read_file(dir.path / name);
+  EXPECT_EQ(again, bytes);
+}
+
+// The system may write a part and say why only when asked for the rest.
+TEST(House, ADescriptionThatDoesNotFitTellsWhy) {
+  TempDir dir;
+  const fs::path report = dir.path / "report";
+  const pid_t pid = fork();
+  if (pid == 0) {
+    signal(SIGXFSZ, SIG_IGN);
+    FakeSuite suite({1, 16, 12, false, false});
+    RecordingCfg cfg = fake_recording(dir.path / "out", suite, 1, 1);
+    cfg.settings = "{\"seed\":\"" + std::string(9000, '7') + "\"}";
+    std::ofstream out(report);
+    rlimit limit{5000, RLIM_INFINITY};
+    setrlimit(RLIMIT_FSIZE, &limit);
+    errno = 0;
+    out << error_of([&] { Recorder recorder(cfg); }) << std::flush;
+    _exit(0);
+  }
+  int status = 0;
+  ASSERT_EQ(waitpid(pid, &status, 0), pid);
+  EXPECT_EQ(status, 0);
+  EXPECT_THAT(read_file(report), AllOf(HasSubstr("recording.json"), HasSubstr("File too large")));
+}
+
+}  // namespace
+}  // namespace mjsense
