@@ -28,6 +28,8 @@ constexpr double kBeside = 0.005;  // m, free beside what an open hand goes arou
 constexpr double kReach = 0.25;    // m, half of what is still an object to carry
 constexpr double kInside = 0.002;  // m
 constexpr double kAway = 100;      // m, where those stand that take no part
+// Where nobody looks.
+Pose away(int object) { return {{kAway + object, kAway, 0.5}, {}}; }
 
 Quat rest_of(std::string_view name) {
   if (name == "side") return axis_angle({0, 1, 0}, 0.5 * pi);
@@ -386,6 +388,23 @@ std::vector<int> EpisodeScene::where(bool receptacle) const {
   return found;
 }
 
+// At rest there.
+void EpisodeScene::put(int object, const Pose& pose, const StateRow& state) const {
+  const int joint = model_->body_jntadr[objects_[object].body];
+  double* qpos = state.qpos + model_->jnt_qposadr[joint];
+  double* qvel = state.qvel + model_->jnt_dofadr[joint];
+  write_vec(pose.p, qpos);
+  write_quat(pose.q, qpos + 3);
+  std::fill(qvel, qvel + 6, 0.0);
+}
+
+Pose EpisodeScene::clear(const StateRow& state) const {
+  for (std::size_t i = 0; i < objects_.size() && !regions_.empty(); ++i)
+    put(static_cast<int>(i), away(static_cast<int>(i)), state);
+  const SceneRobotCfg& r = cfg_.robot;
+  return {vec3(r.pos.data()), r.yaw == 0 ? Quat{} : axis_angle({0, 0, 1}, r.yaw * pi / 180)};
+}
+
 Pose EpisodeScene::sample(int world, int target, std::uint64_t seed, std::uint64_t episode,
                           Rng& rng, const StateRow& state) {
   return sample(world, std::span(&target, target >= 0 ? 1u : 0u), seed, episode, rng, state);
@@ -419,18 +438,11 @@ Pose EpisodeScene::sample(int world, std::span<const int> wanted, std::uint64_t 
     std::vector<int> region_of(n);
     for (int i = 0; i < n; ++i) {
       resting.push_back({&shape(world, i), objects_[i].rests});
-      poses[i].p = {kAway + i, kAway, 0.5};  // where nobody looks
+      poses[i] = away(i);
     }
     lay_out(resting, wanted, {present, static_cast<std::size_t>(n)}, regions,
             {cfg_.gap, cfg_.target_gap, cfg_.drop}, rng, poses, region_of);
-    for (int i = 0; i < n; ++i) {
-      const int joint = model_->body_jntadr[objects_[i].body];
-      double* qpos = state.qpos + model_->jnt_qposadr[joint];
-      double* qvel = state.qvel + model_->jnt_dofadr[joint];
-      write_vec(poses[i].p, qpos);
-      write_quat(poses[i].q, qpos + 3);
-      std::fill(qvel, qvel + 6, 0.0);
-    }
+    for (int i = 0; i < n; ++i) put(i, poses[i], state);
     if (target >= 0) support_[world] = regions[region_of[target]].height;
   } else if (n > 0 && target >= 0) {
     set_target(world, target, state);

@@ -69,6 +69,9 @@ class EpisodeScene {
   // The same, about several: they are there, and within reach; the first is the target.
   Pose sample(int world, std::span<const int> wanted, std::uint64_t seed, std::uint64_t episode,
               Rng& rng, const StateRow& state);
+  // A start without what differs from episode to episode: no object that is laid out is there; returns where the
+  // robot's base stands.
+  Pose clear(const StateRow& state) const;
   // For a state that another one of this scene has sampled: takes over which objects are there, and in which size, and
   // returns their indices.
   std::vector<int> adopt(int world, std::uint64_t seed, std::uint64_t episode,
@@ -93,6 +96,7 @@ class EpisodeScene {
  private:
   void find_objects(std::string_view robot_prefix);
   void find_regions();
+  void put(int object, const Pose& pose, const StateRow& state) const;
   void find_furniture();
   std::vector<Region> regions_of(int world) const;
   void make_meshes();

@@ -24,6 +24,11 @@ void SceneTask::vary_scene(int world) {
     simulation->worlds().model_changed();
 }
 
+mjModel SceneTask::world_model(int world) const {
+  const std::shared_ptr<Simulation> simulation = simulation_.lock();
+  return simulation ? simulation->worlds().model_of(world) : *model();
+}
+
 std::vector<int> SceneTask::adopt_scene(int world, const StateRow& state) {
   return scene_.adopt(world, cfg().seed, static_cast<std::uint64_t>(episode(world)), state);
 }

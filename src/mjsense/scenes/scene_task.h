@@ -26,6 +26,8 @@ class SceneTask : public Task {
   void initialize_task() override;
   // What differs in the episode that this world begins, before the scene is sampled.
   void vary_scene(int world);
+  // Worlds::model_of(); the model where there are no worlds.
+  mjModel world_model(int world) const;
   // EpisodeScene::adopt(), of this world's episode.
   std::vector<int> adopt_scene(int world, const StateRow& state);
   // "task 'pick': scene 'table'", which errors begin with.

@@ -2,6 +2,7 @@
 #include "mjsense/worlds/worlds.h"
 
 #include <fmt/format.h>
+#include <mujoco/mjxmacro.h>
 
 #include <algorithm>
 #include <cmath>
@@ -221,6 +222,17 @@ Worlds::~Worlds() {
 
 int Worlds::threads() const { return mjb_nthread(batch_); }
 const mjModel* Worlds::model() const { return mjb_model(batch_); }
+
+mjModel Worlds::model_of(int world) const {
+  mjModel mine = *model();
+  int size = 0;
+#define X(type, name, nr, nc)                                                     \
+  if (const void* rows = mjb_expanded(batch_, #name, &size, nullptr))             \
+    mine.name = static_cast<type*>(const_cast<void*>(rows)) + std::ptrdiff_t{size} * world;
+  MJMODEL_POINTERS
+#undef X
+  return mine;
+}
 
 void Worlds::seed(std::uint64_t seed) {
   seed_ = seed;

@@ -63,6 +63,9 @@ class Worlds {
   int size() const { return num_worlds_; }
   int threads() const;
   const mjModel* model() const;
+  // As this world has it: the model, with the world's own values in the place of arrays that differ between worlds
+  // (options stay the model's). It holds no memory of its own (no mj_deleteModel), and is valid as long as the worlds are.
+  mjModel model_of(int world) const;
   mjBatch* batch() { return batch_; }
 
   // A new seed starts ticks and episodes again at 0 (of all worlds).

@@ -525,6 +525,18 @@ TEST(Worlds, AModelFieldMayChangeBetweenSteps) {
   EXPECT_NE(std::memcmp(qpos.data, d->qpos, m->nq * sizeof(double)), 0);
 }
 
+TEST(Worlds, AModelOfAWorldHasItsOwnValues) {
+  const ModelPtr m = load("Euler");
+  Worlds worlds(m.get(), 3, 1);
+  int size = 0;
+  auto* mass = static_cast<mjtNum*>(mjb_expand(worlds.batch(), "body_mass", &size, nullptr));
+  mass[2 * size + 1] = 7;
+  const mjModel second = worlds.model_of(1), third = worlds.model_of(2);
+  EXPECT_EQ(second.body_mass[1], worlds.model()->body_mass[1]);
+  EXPECT_EQ(third.body_mass[1], 7);
+  EXPECT_EQ(third.body_pos, worlds.model()->body_pos) << "not copied";
+}
+
 TEST(Worlds, ViewsHaveARowAnElement) {
   const ModelPtr m = load("Euler");
   Worlds worlds(m.get(), 2, 1);

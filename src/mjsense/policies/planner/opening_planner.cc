@@ -102,7 +102,7 @@ void OpeningPlanner::make_plan(const World& world, const PlanRequest& request, P
   const Articulation& one = opening_->target(world.id);
   const double from = world.data->qpos[one.qpos], to = opening_->aim(one);
   HandleWay& way = ways_[world.id];
-  const auto start = reach.start_of(world.data);
+  const auto start = reach.start_of(world);
   std::optional<HandleWay> found;
   if (request.stage > first) {
     found = reach.again(start, one, from, to, way);

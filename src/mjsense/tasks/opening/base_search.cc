@@ -2,19 +2,21 @@
 #include "mjsense/tasks/opening/base_search.h"
 
 #include <cmath>
+#include <utility>
 
 namespace mjsense {
 
-BaseSearch::BaseSearch(const mjModel* model, const Robot& robot, const HandleReach& reach,
-                       BaseSearchCfg cfg)
-    : model_(model), robot_(robot), reach_(reach), cfg_(cfg) {}
+BaseSearch::BaseSearch(const Robot& robot, const HandleReach& reach, HandleReach::Start empty,
+                       const Pose& usual, BaseSearchCfg cfg)
+    : robot_(robot), reach_(reach), empty_(std::move(empty)), usual_(usual), cfg_(cfg) {}
 
 HandleReach::Start BaseSearch::placed(const HandleReach::Start& start, const Pose& base) const {
   HandleReach::Start out = start;
-  std::vector<double> qvel(model_->nv), ctrl(model_->nu);
+  std::vector<double> qvel(start.model.nv), ctrl(start.model.nu);
+  const bool mocap = start.model.nmocap > 0;
   const StateRow row{out.qpos.data(), qvel.data(), ctrl.data(),
-                     model_->nmocap > 0 ? out.mocap_pos.data() : nullptr,
-                     model_->nmocap > 0 ? out.mocap_quat.data() : nullptr};
+                     mocap ? out.mocap_pos.data() : nullptr,
+                     mocap ? out.mocap_quat.data() : nullptr};
   Rng none(0, 0, 0, 0);
   robot_.write_start(row, base, none);
   for (std::size_t g = 0; g < robot_.groups().size(); ++g) {
@@ -24,25 +26,22 @@ HandleReach::Start BaseSearch::placed(const HandleReach::Start& start, const Pos
   return out;
 }
 
-BasePlaces BaseSearch::places(const HandleReach::Start& start, const Articulation& one, double from,
-                              double to, const Pose& usual) const {
+BasePlaces BaseSearch::places(const Articulation& one, double from, double to) const {
   {
     const std::lock_guard lock(mutex_);
     const auto known = known_.find(one.joint);
     if (known != known_.end()) return known->second;
   }
-  BasePlaces found{search(start, one, from, to, usual, false), false};
-  if (found.at.empty() && reach_.drives())
-    found = {search(start, one, from, to, usual, true), true};
+  BasePlaces found{search(one, from, to, false), false};
+  if (found.at.empty() && reach_.drives()) found = {search(one, from, to, true), true};
   const std::lock_guard lock(mutex_);
   return known_.try_emplace(one.joint, std::move(found)).first->second;
 }
 
-std::vector<Pose> BaseSearch::search(const HandleReach::Start& start, const Articulation& one,
-                                     double from, double to, const Pose& usual,
+std::vector<Pose> BaseSearch::search(const Articulation& one, double from, double to,
                                      bool driving) const {
   // The handle as it is seen from above, and where it looks.
-  const Pose body = reach_.body_pose(start, one, from);
+  const Pose body = reach_.body_pose(empty_, one, from);
   const Vec3 handle = body * one.handle.middle, out = rotate(body.q, one.handle.outward);
   const double flat = std::hypot(out.x, out.y);
   const Vec3 away = flat > 0.3 ? Vec3{out.x / flat, out.y / flat, 0} : Vec3{-1, 0, 0};
@@ -50,17 +49,17 @@ std::vector<Pose> BaseSearch::search(const HandleReach::Start& start, const Arti
   Rng rng(0, 0, stream_of("opening/base"), static_cast<std::uint64_t>(one.joint));
   std::vector<Pose> found;
   for (int i = 0; i < cfg_.candidates && static_cast<int>(found.size()) < cfg_.wanted; ++i) {
-    Pose base = usual;
+    Pose base = usual_;
     if (i > 0) {
       const double distance = rng.uniform(cfg_.nearest, cfg_.farthest),
                    aside = rng.uniform(-cfg_.aside, cfg_.aside),
                    turn = rng.uniform(-cfg_.turn, cfg_.turn);
       const Vec3 at = handle + distance * away + aside * side;
-      base.p = {at.x, at.y, usual.p.z};
+      base.p = {at.x, at.y, usual_.p.z};
       const Vec3 look = handle + -0.3 * away - at;
       base.q = axis_angle({0, 0, 1}, std::atan2(look.y, look.x) + turn);
     }
-    const HandleReach::Start there = placed(start, base);
+    const HandleReach::Start there = placed(empty_, base);
     if (!reach_.stands_free(there)) continue;
     if (reach_.find(there, one, from, to, cfg_.grasps, driving)) found.push_back(base);
   }

@@ -26,24 +26,24 @@ struct BasePlaces {
 
 class BaseSearch {
  public:
-  BaseSearch(const mjModel* model, const Robot& robot, const HandleReach& reach,
-             BaseSearchCfg cfg = {});
+  // `empty`: a start without what differs from episode to episode; `usual`: where the base stands then.
+  BaseSearch(const Robot& robot, const HandleReach& reach, HandleReach::Start empty,
+             const Pose& usual, BaseSearchCfg cfg = {});
 
   // The start with the robot's base there, in its start configuration without noise.
   HandleReach::Start placed(const HandleReach::Start& start, const Pose& base) const;
-  // Places from which `one` goes from `from` to `to`, at the height of `usual`, which is tried first;
-  // those from which the base drives meanwhile where there are no others. A function of the arguments
-  // of the first call for this articulation: found once, then kept.
-  BasePlaces places(const HandleReach::Start& start, const Articulation& one, double from,
-                    double to, const Pose& usual) const;
+  // Places from which `one` goes from `from` to `to` in the empty scene, at the height of the usual one,
+  // which is tried first; those from which the base drives meanwhile where there are no others. Found
+  // once for this articulation, then kept.
+  BasePlaces places(const Articulation& one, double from, double to) const;
 
  private:
-  std::vector<Pose> search(const HandleReach::Start& start, const Articulation& one, double from,
-                           double to, const Pose& usual, bool driving) const;
+  std::vector<Pose> search(const Articulation& one, double from, double to, bool driving) const;
 
-  const mjModel* model_;
   const Robot& robot_;
   const HandleReach& reach_;
+  HandleReach::Start empty_;
+  Pose usual_;
   BaseSearchCfg cfg_;
   mutable std::mutex mutex_;
   mutable std::map<int, BasePlaces> known_;  // by joint

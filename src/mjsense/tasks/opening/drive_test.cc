@@ -74,10 +74,9 @@ TEST(Drive, BaseAndArmKeepTheHandOnItsWay) {
   ASSERT_NE(fridge, task.articulations().end());
   const double to = task.aim(*fridge);
   EXPECT_GT(fridge->fraction(to), 0.67);
-  const BaseSearch search(scene.model(), robot, reach);
-  const auto start = reach.start_of(data.get());
-  const BasePlaces places =
-      search.places(start, *fridge, fridge->closed, to, robot.base_pose(world));
+  const auto start = reach.start_of(world);
+  const BaseSearch search(robot, reach, start, robot.base_pose(world));
+  const BasePlaces places = search.places(*fridge, fridge->closed, to);
   ASSERT_FALSE(places.at.empty());
   EXPECT_TRUE(places.driving);
   const auto there = search.placed(start, places.at[0]);

@@ -33,7 +33,13 @@ void OpeningTask::initialize_task() {
     throw ValueError(fmt::format(
         "{} has nothing that opens: no hinge or slide with a range and a handle", place()));
   reach_ = std::make_unique<HandleReach>(model(), robot());
-  bases_ = std::make_unique<BaseSearch>(model(), robot(), *reach_);
+  const std::unique_ptr<mjData, decltype(&mj_deleteData)> data(mj_makeData(model()), mj_deleteData);
+  if (!data) throw RuntimeError(fmt::format("{}: no memory for MuJoCo's data", place()));
+  if (start_key() >= 0) mj_resetDataKeyframe(model(), data.get(), start_key());
+  const StateRow empty = state_row(data.get());
+  const Pose usual = scene().clear(empty);
+  for (const Articulation& one : articulations_) empty.qpos[one.qpos] = one.closed;
+  bases_ = std::make_unique<BaseSearch>(robot(), *reach_, reach_->start_of(*model(), empty), usual);
   targets_.assign(num_worlds(), {});
   begin_with(articulations_[0].body, articulations_[0].text);
 }
@@ -44,13 +50,13 @@ double OpeningTask::aim(const Articulation& one) const {
 }
 
 std::optional<OpeningTask::Found> OpeningTask::find_base(const Articulation& one, double from,
-                                                         const Pose& usual, Rng& rng,
-                                                         const HandleReach::Start& start) const {
+                                                         const HandleReach::Start& start,
+                                                         Rng& rng) const {
   const double to = aim(one);
   // Places are those of the middle of what episodes begin with.
   const double middle =
       kind_ == OpeningKind::kOpen ? one.closed : one.at(0.5 * (kLeastStart + kMostStart));
-  BasePlaces places = bases_->places(start, one, middle, to, usual);
+  BasePlaces places = bases_->places(one, middle, to);
   while (!places.at.empty()) {
     const auto k = rng.below(static_cast<std::uint32_t>(places.at.size()));
     const Pose place = places.at[k];
@@ -93,6 +99,7 @@ std::optional<Pose> OpeningTask::sample_scene(int world, Rng& rng, const StateRo
     left[c].erase(left[c].begin() + k);
     if (left[c].empty()) left.erase(left.begin() + c);
   }
+  const mjModel here = world_model(world);
   Target& target = targets_[world];
   target.reached = false;
   std::optional<Found> base;
@@ -100,7 +107,7 @@ std::optional<Pose> OpeningTask::sample_scene(int world, Rng& rng, const StateRo
     const Articulation& one = articulations_[index];
     const double from =
         kind_ == OpeningKind::kOpen ? one.closed : one.at(rng.uniform(kLeastStart, kMostStart));
-    base = find_base(one, from, usual, rng, reach_->start_of(state));
+    base = find_base(one, from, reach_->start_of(here, state), rng);
     if (!base && index != order.back()) continue;
     target.index = index;
     target.reached = base.has_value();

@@ -71,8 +71,8 @@ class OpeningTask final : public ObjectTask {
     Pose base;
     bool driving;
   };
-  std::optional<Found> find_base(const Articulation& one, double from, const Pose& usual, Rng& rng,
-                                 const HandleReach::Start& start) const;
+  std::optional<Found> find_base(const Articulation& one, double from,
+                                 const HandleReach::Start& start, Rng& rng) const;
 
   OpeningKind kind_;
   std::vector<Articulation> articulations_;

@@ -266,9 +266,10 @@ TEST(Opening, CloseCountsTheTargetAlone) {
 
 TEST(Opening, ARobotDoesNotStandInACupboard) {
   Stage stage(franka(), OpeningKind::kOpen);
-  const BaseSearch search(stage.model, stage.task.robot(), stage.task.reach());
-  stage.start(0, 0);
-  const auto start = stage.task.reach().start_of(stage.data.get());
+  const World w = stage.start(0, 0);
+  const auto start = stage.task.reach().start_of(w);
+  const BaseSearch search(stage.task.robot(), stage.task.reach(), start,
+                          stage.task.robot().base_pose(w));
   EXPECT_TRUE(stage.task.reach().stands_free(start));
   const auto at = [&](double x) { return search.placed(start, {{x, 0, 0}, {}}); };
   EXPECT_FALSE(stage.task.reach().stands_free(at(0.1)));  // the pedestal in the fronts
@@ -279,6 +280,60 @@ TEST(Opening, ARobotDoesNotStandInACupboard) {
       stage.model->geom_pos[3 * wall] + stage.model->geom_size[3 * wall + 2];  // its face
   EXPECT_FALSE(stage.task.reach().stands_free(at(inside + 0.2)));
   EXPECT_TRUE(stage.task.reach().stands_free(at(inside + 0.3)));
+}
+
+// Things as near as 5 mm to an arm are in its way, where they stand in their world.
+TEST(Opening, WhatAnArmComesNearIsThatOfItsWorld) {
+  Stage stage(franka(), OpeningKind::kOpen);
+  const World w = stage.start(0, 0);
+  const mjModel* m = stage.model;
+  mjData* d = w.data;
+  const HandleReach& reach = stage.task.reach();
+  EXPECT_TRUE(reach.stands_free(reach.start_of(w)));
+  const int hand = stage.task.robot().groups()[reach.hands()[0].gripper].root_body;
+  const auto touches = [&](int g) { return m->geom_contype[g] || m->geom_conaffinity[g]; };
+  int moved = 0, pad = -1;
+  for (int g = 0; g < m->ngeom; ++g) {
+    if (is_below(m, m->geom_bodyid[g], hand) && touches(g)) pad = g;
+  }
+  for (const Articulation& one : stage.task.articulations()) {
+    const int top = m->body_parentid[one.body];
+    if (top == 0 || one.category == "drawer") continue;  // drawers share theirs with others
+    mjModel other = *m;
+    std::vector<double> pos(m->body_pos, m->body_pos + 3 * m->nbody);
+    other.body_pos = pos.data();
+    const auto nearest = [&] {
+      double least = 1;
+      for (int a = 0; a < m->ngeom; ++a) {
+        if (m->body_rootid[m->geom_bodyid[a]] != m->body_rootid[hand] || !touches(a)) continue;
+        for (int b = 0; b < m->ngeom; ++b) {
+          if (is_below(m, m->geom_bodyid[b], top) && touches(b))
+            least = std::min(least, mj_geomDistance(m, d, a, b, 1, nullptr));
+        }
+      }
+      return least;
+    };
+    mj_kinematics(m, d);
+    // Its handle goes to a pad.
+    const Pose body{vec3(d->xpos + 3 * one.body), quat(d->xquat + 4 * one.body)};
+    const Vec3 by = vec3(d->geom_xpos + 3 * pad) - body * one.handle.middle;
+    const auto gap = [&](double part) {
+      for (int i = 0; i < 3; ++i)
+        pos[3 * top + i] = m->body_pos[3 * top + i] + part * (i == 0 ? by.x : i == 1 ? by.y : by.z);
+      mj_kinematics(&other, d);
+      return nearest();
+    };
+    double low = 0, high = 1;  // the last part of the way there at which 5 mm are between
+    for (int k = 0; k < 30; ++k)
+      (gap(0.5 * (low + high)) > 0.005 ? low : high) = 0.5 * (low + high);
+    if (std::abs(gap(low) - 0.005) > 1e-3) continue;  // in something else's way
+    const auto near = reach.start_of(World{.id = 0, .model = &other, .data = d});
+    EXPECT_FALSE(reach.stands_free(near)) << one.name;
+    EXPECT_NEAR(norm(reach.body_pose(near, one, one.closed).p - vec3(d->xpos + 3 * one.body)), 0,
+                1e-9);
+    ++moved;
+  }
+  EXPECT_GE(moved, 5);
 }
 
 TEST(Opening, ErrorsSayWhatIsMissing) {

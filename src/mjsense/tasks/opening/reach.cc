@@ -19,7 +19,6 @@ constexpr double kUnder = 0.7;      // of a contact's normal upwards: what a bas
 
 HandleReach::HandleReach(const mjModel* model, const Robot& robot, HandleReachCfg cfg)
     : own_(mj_copyModel(nullptr, model), mj_deleteModel),
-      model_(own_.get()),
       robot_(robot),
       cfg_(cfg),
       base_(driving_base(robot)),
@@ -41,13 +40,17 @@ HandleReach::HandleReach(const mjModel* model, const Robot& robot, HandleReachCf
     fixed_[b] = of_robot_[b] && (model->body_weldid[b] == 0 || b == robot.base_body());
   for (int g = 0; g < model->ngeom; ++g) {
     if (!of_robot_[model->geom_bodyid[g]]) continue;
-    own_->geom_margin[g] = base_ >= 0 && fixed_[model->geom_bodyid[g]] ? cfg_.room : cfg_.clearance;
+    const int body = model->geom_bodyid[g];
+    own_->geom_margin[g] = base_ >= 0 && fixed_[body] ? cfg_.room : cfg_.clearance;
+    // What the broad phase looks at.
+    own_->body_margin[body] =
+        std::max(own_->body_margin[body], own_->geom_margin[g] + model->geom_gap[g]);
     if (!model->geom_contype[g] && !model->geom_conaffinity[g]) continue;
     // Its links touch each other here, whatever they do in the simulation.
     own_->geom_contype[g] |= kOfRobot;
     own_->geom_conaffinity[g] |= kOfRobot;
-    own_->body_contype[model->geom_bodyid[g]] |= kOfRobot;
-    own_->body_conaffinity[model->geom_bodyid[g]] |= kOfRobot;
+    own_->body_contype[body] |= kOfRobot;
+    own_->body_conaffinity[body] |= kOfRobot;
   }
   // Links that meet at the start are built so.
   const ScratchData::Loan loan = scratch_.borrow();
@@ -56,28 +59,37 @@ HandleReach::HandleReach(const mjModel* model, const Robot& robot, HandleReachCf
     const auto& init = robot.cfg().groups[g].init;
     for (std::size_t i = 0; i < init.size(); ++i) data->qpos[robot.groups()[g].qpos[i]] = init[i];
   }
-  mj_kinematics(model_, data);
-  mj_collision(model_, data);
+  mj_kinematics(own_.get(), data);
+  mj_collision(own_.get(), data);
   for (int i = 0; i < data->ncon; ++i) {
     const mjContact& contact = data->contact[i];
     if (contact.geom[0] < 0 || contact.geom[1] < 0 || contact.dist > kBuiltSo) continue;
-    if (of_robot_[model_->geom_bodyid[contact.geom[0]]] &&
-        of_robot_[model_->geom_bodyid[contact.geom[1]]])
+    if (of_robot_[model->geom_bodyid[contact.geom[0]]] &&
+        of_robot_[model->geom_bodyid[contact.geom[1]]])
       built_so_.emplace_back(contact.geom[0], contact.geom[1]);
   }
 }
 
-HandleReach::Start HandleReach::start_of(const mjData* d) const {
-  return {{d->qpos, d->qpos + model_->nq},
-          {d->mocap_pos, d->mocap_pos + 3 * model_->nmocap},
-          {d->mocap_quat, d->mocap_quat + 4 * model_->nmocap}};
+mjModel HandleReach::with_margins(const mjModel& model) const {
+  mjModel mine = model;
+  mine.geom_margin = own_->geom_margin;
+  mine.geom_contype = own_->geom_contype;
+  mine.geom_conaffinity = own_->geom_conaffinity;
+  mine.body_margin = own_->body_margin;
+  mine.body_contype = own_->body_contype;
+  mine.body_conaffinity = own_->body_conaffinity;
+  return mine;
 }
 
-HandleReach::Start HandleReach::start_of(const StateRow& state) const {
-  Start start{{state.qpos, state.qpos + model_->nq}, {}, {}};
-  if (model_->nmocap > 0) {
-    start.mocap_pos.assign(state.mocap_pos, state.mocap_pos + 3 * model_->nmocap);
-    start.mocap_quat.assign(state.mocap_quat, state.mocap_quat + 4 * model_->nmocap);
+HandleReach::Start HandleReach::start_of(const World& world) const {
+  return start_of(*world.model, state_row(world.data));
+}
+
+HandleReach::Start HandleReach::start_of(const mjModel& model, const StateRow& state) const {
+  Start start{with_margins(model), {state.qpos, state.qpos + model.nq}, {}, {}};
+  if (model.nmocap > 0) {
+    start.mocap_pos.assign(state.mocap_pos, state.mocap_pos + 3 * model.nmocap);
+    start.mocap_quat.assign(state.mocap_quat, state.mocap_quat + 4 * model.nmocap);
   }
   return start;
 }
@@ -93,14 +105,15 @@ void HandleReach::show(mjData* data, const RobotValues& values) const {
 
 // Everything else is as far from the robot; `hand` may touch what it holds. A base that drives keeps
 // off what it does not stand on.
-bool HandleReach::free(mjData* data, double clearance, const Articulation* held,
+bool HandleReach::free(mjData* data, const Start& start, double clearance, const Articulation* held,
                        const ArmAndHand* hand, bool driving) const {
-  mj_kinematics(model_, data);
-  mj_collision(model_, data);
+  const mjModel* m = &start.model;
+  mj_kinematics(m, data);
+  mj_collision(m, data);
   for (int i = 0; i < data->ncon; ++i) {
     const mjContact& contact = data->contact[i];
     if (contact.exclude || contact.geom[0] < 0 || contact.geom[1] < 0) continue;
-    int mine = model_->geom_bodyid[contact.geom[0]], other = model_->geom_bodyid[contact.geom[1]];
+    int mine = m->geom_bodyid[contact.geom[0]], other = m->geom_bodyid[contact.geom[1]];
     if (of_robot_[mine] && of_robot_[other]) {
       if (contact.dist > 0 || (of_gripper_[mine] >= 0 && of_gripper_[mine] == of_gripper_[other]))
         continue;
@@ -113,7 +126,7 @@ bool HandleReach::free(mjData* data, double clearance, const Articulation* held,
     if (beside) return false;
     // What it stands on touches its base.
     if (contact.dist > (fixed_[mine] ? cfg_.contact : clearance)) continue;
-    if (held && of_gripper_[mine] == hand->gripper && is_below(model_, other, held->body)) continue;
+    if (held && of_gripper_[mine] == hand->gripper && is_below(m, other, held->body)) continue;
     return false;
   }
   return true;
@@ -125,24 +138,20 @@ bool HandleReach::stands_free(const Start& start) const {
   std::ranges::copy(start.qpos, data->qpos);
   std::ranges::copy(start.mocap_pos, data->mocap_pos);
   std::ranges::copy(start.mocap_quat, data->mocap_quat);
-  const bool ok = free(data, cfg_.clearance, nullptr, nullptr);
-  return ok;
+  return free(data, start, cfg_.clearance, nullptr, nullptr);
 }
 
 Pose HandleReach::body_pose(const Start& start, const Articulation& one, double q) const {
   const ScratchData::Loan loan = scratch_.borrow();
   mjData* data = loan.get();
-  std::ranges::copy(start.qpos, data->qpos);
-  std::ranges::copy(start.mocap_pos, data->mocap_pos);
-  std::ranges::copy(start.mocap_quat, data->mocap_quat);
-  data->qpos[one.qpos] = q;
-  mj_kinematics(model_, data);
-  const Pose pose{vec3(data->xpos + 3 * one.body), quat(data->xquat + 4 * one.body)};
-  return pose;
+  set(data, start, one, q);
+  mj_kinematics(&start.model, data);
+  return {vec3(data->xpos + 3 * one.body), quat(data->xquat + 4 * one.body)};
 }
 
 // The arm goes straight from one configuration to the next; the first may be anywhere.
-bool HandleReach::way_is_free(mjData* data, int arm, std::span<const RobotValues> way) const {
+bool HandleReach::way_is_free(mjData* data, const Start& start, int arm,
+                              std::span<const RobotValues> way) const {
   const std::size_t n = robot_.groups()[arm].qpos.size();
   for (std::size_t k = way.size() - 1; k > 0; --k) {  // the end is the likeliest to be barred
     const auto &a = way[k - 1][arm].values, &b = way[k][arm].values;
@@ -154,7 +163,7 @@ bool HandleReach::way_is_free(mjData* data, int arm, std::span<const RobotValues
       for (std::size_t i = 0; i < n; ++i)
         between[arm].values[i] = std::lerp(a[i], b[i], static_cast<double>(s) / steps);
       show(data, between);
-      if (!free(data, cfg_.clearance, nullptr, nullptr)) return false;
+      if (!free(data, start, cfg_.clearance, nullptr, nullptr)) return false;
     }
   }
   return true;
@@ -173,8 +182,8 @@ struct HandleReach::Seen {
 HandleReach::Seen HandleReach::see(mjData* data, const Start& start, const Articulation& one,
                                    double q) const {
   set(data, start, one, q);
-  mj_kinematics(model_, data);
-  const World world{.id = 0, .model = model_, .data = data};
+  mj_kinematics(&start.model, data);
+  const World world{.id = 0, .model = &start.model, .data = data};
   Seen seen;
   robot_.read_qpos(world, seen.now);
   seen.to_base = inverse(robot_.base_pose(world));
@@ -226,7 +235,7 @@ bool HandleReach::along_is_free(mjData* data, const Start& start, const HandleMo
     const double part = static_cast<double>(k) / static_cast<double>(way.along.size() - 1);
     set(data, start, *motion.one, std::lerp(motion.from, motion.to, part));
     show(data, way.along[k]);
-    if (!free(data, cfg_.contact, motion.one, &way.hand, way.drive.has_value())) return false;
+    if (!free(data, start, cfg_.contact, motion.one, &way.hand, way.drive.has_value())) return false;
   }
   return true;
 }
@@ -240,7 +249,7 @@ bool HandleReach::try_drives(mjData* data, const Start& start, const Seen& seen,
   if (!robot_.ik(arm, seen.to_base * way.grasp, taken, Chain::kTracking)) return false;
   set(data, start, *motion.one, motion.from);
   show(data, taken);
-  if (!free(data, cfg_.contact, motion.one, &way.hand)) return false;
+  if (!free(data, start, cfg_.contact, motion.one, &way.hand)) return false;
   const Pose last = motion.at(1) * way.grasp;
   for (const Drive& drive : mjsense::drives()) {
     const BasePose end = driven(seen.base, drive, motion, way.grasp.p, 1);
@@ -254,17 +263,17 @@ bool HandleReach::try_drives(mjData* data, const Start& start, const Seen& seen,
 }
 
 // Straight to the pregrasp, or by way of a point farther back.
-bool HandleReach::way_there(mjData* data, const Seen& seen, const RobotValues& before,
-                            HandleWay& way) const {
+bool HandleReach::way_there(mjData* data, const Start& start, const Seen& seen,
+                            const RobotValues& before, HandleWay& way) const {
   const int arm = way.hand.arm;
   way.go = {seen.now, before};
-  bool ok = way_is_free(data, arm, way.go);
+  bool ok = way_is_free(data, start, arm, way.go);
   for (std::size_t k = 0; k < cfg_.detours.size() && !ok; ++k) {
     RobotValues by = before;
     const Pose back = way.pregrasp * Pose{{0, 0, -cfg_.detours[k]}, {}};
     if (!robot_.ik(arm, back, by, Chain::kTracking)) continue;
     way.go = {seen.now, by, before};
-    ok = way_is_free(data, arm, way.go);
+    ok = way_is_free(data, start, arm, way.go);
   }
   return ok;
 }
@@ -283,7 +292,7 @@ bool HandleReach::try_grasp(mjData* data, const Start& start, const Seen& seen,
               : !go_along(seen, motion, before, way) || !along_is_free(data, start, motion, way))
     return false;
   set(data, start, *motion.one, motion.from);
-  return way_there(data, seen, before, way);
+  return way_there(data, start, seen, before, way);
 }
 
 std::optional<HandleWay> HandleReach::find(const Start& start, const Articulation& one, double from,

@@ -50,12 +50,15 @@ class HandleReach {
   HandleReach(const mjModel* model, const Robot& robot, HandleReachCfg cfg = {});
 
   std::span<const ArmAndHand> hands() const { return hands_; }
-  // Positions and mocap poses of a world from which ways are sought.
+  // A world from which ways are sought: its model, which differs from those of other worlds in where
+  // furniture stands and how large things are, with margins about the robot; positions and mocap poses.
+  // Valid as long as this and what the model was taken from.
   struct Start {
+    mjModel model;
     std::vector<double> qpos, mocap_pos, mocap_quat;
   };
-  Start start_of(const mjData* data) const;
-  Start start_of(const StateRow& state) const;
+  Start start_of(const World& world) const;
+  Start start_of(const mjModel& model, const StateRow& state) const;
   bool drives() const { return base_ >= 0; }
   int base() const { return base_; }  // group, -1: it stands where it is put
   // The articulation goes from `from` to `to`, the robot standing as `start` says; with `driving` its
@@ -82,14 +85,16 @@ class HandleReach {
                  bool driving, HandleWay& way) const;
   bool try_drives(mjData* data, const Start& start, const Seen& seen, const HandleMotion& motion,
                   const RobotValues& before, HandleWay& way) const;
-  bool way_there(mjData* data, const Seen& seen, const RobotValues& before, HandleWay& way) const;
-  bool free(mjData* data, double clearance, const Articulation* held, const ArmAndHand* hand,
-            bool driving = false) const;
+  bool way_there(mjData* data, const Start& start, const Seen& seen, const RobotValues& before,
+                 HandleWay& way) const;
+  bool free(mjData* data, const Start& start, double clearance, const Articulation* held,
+            const ArmAndHand* hand, bool driving = false) const;
   void show(mjData* data, const RobotValues& values) const;
-  bool way_is_free(mjData* data, int arm, std::span<const RobotValues> way) const;
+  bool way_is_free(mjData* data, const Start& start, int arm,
+                   std::span<const RobotValues> way) const;
+  mjModel with_margins(const mjModel& model) const;
 
-  std::shared_ptr<mjModel> own_;  // the model, with margins about the robot
-  const mjModel* model_;          // that
+  std::unique_ptr<mjModel, decltype(&mj_deleteModel)> own_;  // with margins about the robot
   const Robot& robot_;
   HandleReachCfg cfg_;
   int base_;
