@@ -9,6 +9,7 @@ if(benches)
   if(OMPL_FOUND)
     target_compile_definitions(mjsense_bench PRIVATE MJSENSE_BENCH_OMPL)
     target_include_directories(mjsense_bench SYSTEM PRIVATE ${OMPL_INCLUDE_DIRS})
-    target_link_libraries(mjsense_bench PRIVATE ${OMPL_LIBRARIES})
+    list(GET OMPL_LIBRARIES 0 ompl)  # the others' headers are not installed with it
+    target_link_libraries(mjsense_bench PRIVATE ${ompl})
   endif()
 endif()

@@ -21,7 +21,7 @@ struct DoorMotionCfg {
   double leaf_step = 0.07;   // rad, of the door between two waypoints
   double press_step = 0.15;  // rad, of a lever
   double margin = 0.03;      // m, that the base keeps from walls and leaf where it takes the handle
-  double depth = 0.004;      // m, that counts as a collision
+  double depth = 0.0005;     // m, that counts as a collision
 };
 
 struct DoorWaypoint {

@@ -80,7 +80,7 @@ void Follower::reset(const World& world) {
     if (static_cast<int>(g) == floating_base_) {
       write_pose(robot_->base_pose(world), sent.values.data());
       sent.given = true;
-    } else if (robot_->groups()[g].kind == GroupKind::kArm &&
+    } else if (robot_->groups()[g].kind != GroupKind::kGripper &&
                joints_are_commanded(static_cast<int>(g))) {
       sent.values = state.joints[g].values;
       sent.given = true;
@@ -279,12 +279,19 @@ Follower::Sent& Follower::Sending::at(double step) {
   return now = last;
 }
 
+double Follower::most_acceleration(int group, std::size_t joint) const {
+  const bool slide = slides_[group][joint];
+  if (robot_->groups()[group].kind == GroupKind::kBase)
+    return slide ? cfg_.most_base_acceleration : cfg_.most_base_turn_acceleration;
+  return slide ? cfg_.most_slide_acceleration : cfg_.most_acceleration;
+}
+
 // A command that can be reached from the last one stands as it is, to the bit; otherwise its rate
 // changes as fast as it may, until it is caught up with.
 void Follower::limit(int group, Sent& sent, std::span<double> command) const {
   sent.moved = true;
   for (std::size_t i = 0; i < command.size(); ++i) {
-    const double most = slides_[group][i] ? cfg_.most_slide_acceleration : cfg_.most_acceleration;
+    const double most = most_acceleration(group, i);
     const double wanted = command[i], follow = (wanted - sent.wanted[i]) / dt_;
     const double behind = sent.wanted[i] - sent.values[i], rate = sent.rates[i];
     double next = (wanted - sent.values[i]) / dt_;
@@ -341,15 +348,17 @@ bool Follower::brake(const World& world, Action& action) {
   return at_rest;
 }
 
-// An arm that was commanded, and is not now, stops and stays.
+// What was commanded, and is not now, stops; an arm then stays by command, a base without.
 bool Follower::rest(const World& world, int group, Action& action) {
   Sent& sent = states_[world.id].sent[group].at(world.time());
   if (!sent.moved || group == floating_base_) return true;
   const std::size_t n = robot_->groups()[group].qpos.size();
+  if (robot_->groups()[group].kind == GroupKind::kBase &&
+      std::ranges::all_of(sent.rates, [](double rate) { return rate == 0; }))
+    return true;
   bool at_rest = true;
   for (std::size_t i = 0; i < n; ++i) {
-    const double most =
-        dt_ * (slides_[group][i] ? cfg_.most_slide_acceleration : cfg_.most_acceleration);
+    const double most = dt_ * most_acceleration(group, i);
     sent.rates[i] -= std::clamp(sent.rates[i], -most, most);
     sent.values[i] += sent.rates[i] * dt_;
     sent.wanted[i] = sent.values[i];

@@ -35,7 +35,7 @@ struct FollowerCfg {
   double line_speed = 1.5, line_acceleration = 4.0;  // rad/s, rad/s^2
   double slide_speed = 0.3, slide_acceleration = 1.0;
   // Of commands from one control step to the next, whatever plans say: where a plan is given up in
-  // the midst of a motion, too. Of arms' joints, and of a base that floats.
+  // the midst of a motion, too. Of arms' joints, and of bases.
   double most_acceleration = 10, most_slide_acceleration = 2.5;           // rad/s^2, m/s^2
   double most_base_acceleration = 3.0, most_base_turn_acceleration = 10;  // m/s^2, rad/s^2
 };
@@ -88,7 +88,7 @@ class Follower {
     bool given = false, in_world = false;
     Pose pose;
   };
-  // What was commanded last, and how it moved: n values of an arm; X_WB of a floating base, of whose
+  // What was commanded last, and how it moved: n values of an arm or a base that drives; X_WB of a floating base, of whose
   // pose the rates are three of the position and three of the rotation, in the world.
   struct Sent {
     bool given = false;  // it is limited
@@ -120,6 +120,7 @@ class Follower {
   void enter(const World& world, State& state, Segment& segment) const;
   bool rest(const World& world, int group, Action& action);
   double stretch(const World& world, const State& state, const ToolMove& move) const;
+  double most_acceleration(int group, std::size_t joint) const;
   void limit(int group, Sent& sent, std::span<double> command) const;
   void limit_pose(Sent& sent, std::span<double> command) const;
   void finish(const World& world, State& state, const Segment& done, const Segment& next);

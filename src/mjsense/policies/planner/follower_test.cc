@@ -85,6 +85,57 @@ TEST(Follower, ABaseDrivesAlongAPathWhileTheToolStaysInTheWorld) {
   EXPECT_LT(norm(robot.leaf_pose(stage.world, arm).p - tool.p), 0.01);
 }
 
+// A path that begins where the base is not, and a plan that is given up while it drives: what it is told
+// changes its speed by no more than it may, and stops.
+TEST(Follower, ABaseIsNeverToldToJump) {
+  constexpr double kDt = 0.066;
+  TableStage stage("mobile_franka");
+  const Robot& robot = stage.robot();
+  const int base = robot.group_index("base");
+  Follower follower;
+  follower.initialize(robot, stage.world.model, 1, kDt);
+  follower.reset(stage.world);
+  RobotValues now;
+  robot.read_qpos(stage.world, now);
+  const auto at = [&](int i) { return now[base].values[i]; };
+  CommandPath path{base, {0, 4}, {at(0) - 0.1, at(1), at(2) + 0.3, at(0) - 1.3, at(1), at(2) + 0.3}};
+  follower.plan(0).move_groups(1, {path}, 1.0);
+  follower.begin(stage.world);
+  std::array<double, 3> told{at(0), at(1), at(2)}, rate{};
+  double most = 0, most_turn = 0;
+  const auto look = [&](const Action& action) {
+    const GroupValues& command = action.commands[base];
+    for (int i = 0; i < 3; ++i) {
+      const double next = command.given ? command.values[i] : told[i], v = (next - told[i]) / kDt;
+      (i == 2 ? most_turn : most) = std::max(i == 2 ? most_turn : most, std::abs(v - rate[i]) / kDt);
+      rate[i] = v;
+      told[i] = next;
+    }
+  };
+  for (int k = 0; k < 45; ++k) {
+    Action action;
+    follower.follow(stage.world, action);
+    look(action);
+    stage.step(action);
+  }
+  EXPECT_NEAR(rate[0], -0.3, 1e-6) << "it has caught up";
+  EXPECT_NEAR(told[2], at(2) + 0.3, 1e-9);
+  for (bool stopped = false; !stopped;) {
+    Action action;
+    stopped = follower.brake(stage.world, action);
+    look(action);
+    stage.step(action);
+  }
+  EXPECT_EQ(rate[0], 0);
+  Action held;
+  EXPECT_TRUE(follower.brake(stage.world, held));
+  EXPECT_FALSE(held.commands[base].given) << "it stays without being told";
+  const FollowerCfg cfg;
+  EXPECT_LE(most, cfg.most_base_acceleration * (1 + 1e-9));
+  EXPECT_LE(most_turn, cfg.most_base_turn_acceleration * (1 + 1e-9));
+  EXPECT_GT(most, 0.5 * cfg.most_base_acceleration);
+}
+
 // What a segment was to reach is commanded where it ends between two steps.
 TEST(Follower, AGroupReachesTheEndOfItsPath) {
   TableStage stage("franka");

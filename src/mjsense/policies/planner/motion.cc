@@ -88,7 +88,7 @@ void shorten(std::vector<double>& path, std::size_t n, const FreeSpace& is_free,
     const auto row = [&](std::uint32_t r) { return Config(path).subspan(r * n, n); };
     mix(row(i), row(i + 1), swapped ? sj : si, a);
     mix(row(j), row(j + 1), swapped ? si : sj, b);
-    if (!is_free.at(a) || !is_free.at(b) || !is_free.between(a, b)) continue;
+    if (!is_free.between(a, b)) continue;
     std::vector<double> shorter(path.begin(), path.begin() + (i + 1) * n);
     shorter.insert(shorter.end(), a.begin(), a.end());
     shorter.insert(shorter.end(), b.begin(), b.end());

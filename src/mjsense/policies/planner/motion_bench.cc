@@ -20,6 +20,7 @@
 #include <cmath>
 
 #include "mjsense/policies/planner/hand_planner.h"
+#include "mjsense/robots/load_robot.h"
 #include "mjsense/rollout/registry.h"
 #include "mjsense/rollout/task_defaults.h"
 #include "mjsense/scene/scene.h"
@@ -44,7 +45,9 @@ struct Clutter {
   JointSpace joints;
 
   Clutter() {
-    TaskCfg cfg = task_cfg("franka", "clutter");
+    TaskCfg cfg;
+    cfg.robot = robot_cfg("franka");
+    cfg.scene = "clutter";
     set_task_defaults("pick", cfg);
     task = make_task("pick", cfg);
     scene = std::make_unique<Scene>(task->whole_scene_cfg());

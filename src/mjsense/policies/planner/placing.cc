@@ -164,6 +164,8 @@ void Placing::go_home(const World& world, HandPlanner& hand, const HandPose& fro
   HandPose there{home.tool,
                  from.joints};  // the tool counts where the hand floats, the joints of an arm
   there.joints[hand.hand().tool] = home.joints[hand.hand().tool];
+  query.set_margin(kMargin);
+  if (!hand.is_free(query, from) || !hand.is_free(query, there)) query.set_margin(0);
   if (!hand.is_free(query, there)) return;
   hand.add_way(world, query, plan, kGoHome, from, there, rng);
 }

@@ -104,7 +104,8 @@ class MotionQuality {
     if (one >= 0 && one == gripper(query.touching().second)) return;  // it is closed
     ++self_collisions;
     const auto link = [&](int geom) { return name_of(m, mjOBJ_BODY, m->geom_bodyid[geom]); };
-    met = link(query.touching().first) + " and " + link(query.touching().second);
+    met = link(query.touching().first) + " and " + link(query.touching().second) + " at " +
+          std::to_string(time) + " s in phase " + std::to_string(phase);
   }
 
  private:
