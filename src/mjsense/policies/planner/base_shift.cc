@@ -73,11 +73,11 @@ bool BaseShift::plan(const World& world, int phase, const std::optional<Held>& h
     if (!query.free(to) || !query.free_between(from, to)) continue;
     mju_copy(scratch->qpos, world.data->qpos, model_->nq);
     for (int i = 0; i < 3; ++i) scratch->qpos[address[i]] = to[i];
-    mj_kinematics(model_, scratch.get());
+    mj_kinematics(world.model, scratch.get());
     if (held) {
       const Pose object = robot_.leaf_pose(there, held->hand.tool) * held->tool_object;
       write_pose(object, scratch->qpos + model_->jnt_qposadr[model_->body_jntadr[held->body]]);
-      mj_kinematics(model_, scratch.get());
+      mj_kinematics(world.model, scratch.get());
     }
     if (works(there)) {
       const BasePose way[] = {{from[0], from[1], from[2]}, {to[0], to[1], to[2]}};

@@ -8,6 +8,7 @@
 
 #include "mjsense/core/error.h"
 #include "mjsense/observe/frame.h"
+#include "mjsense/scenes/base_route.h"
 
 namespace mjsense {
 namespace {
@@ -242,6 +243,7 @@ void Follower::enter(const World& world, State& state, Segment& segment) const {
     const std::size_t n = robot_->groups()[path.group].command_size;
     for (std::size_t i = 0; i < n; ++i) {
       offset.values[i] = state.joints[path.group].values[i] - path.points[i];
+      if (is_yaw(path.group, i)) offset.values[i] = wrapped(offset.values[i]);
     }
   }
 }
@@ -279,6 +281,11 @@ Follower::Sent& Follower::Sending::at(double step) {
   return now = last;
 }
 
+// Of a base that drives: plans begin with an angle between -pi and pi, whichever turn it is in.
+bool Follower::is_yaw(int group, std::size_t joint) const {
+  return robot_->groups()[group].kind == GroupKind::kBase && !slides_[group][joint];
+}
+
 double Follower::most_acceleration(int group, std::size_t joint) const {
   const bool slide = slides_[group][joint];
   if (robot_->groups()[group].kind == GroupKind::kBase)
@@ -292,6 +299,9 @@ void Follower::limit(int group, Sent& sent, std::span<double> command) const {
   sent.moved = true;
   for (std::size_t i = 0; i < command.size(); ++i) {
     const double most = most_acceleration(group, i);
+    if (const double away = command[i] - sent.values[i];
+        is_yaw(group, i) && wrapped(away) != away)
+      command[i] = sent.values[i] + wrapped(away);
     const double wanted = command[i], follow = (wanted - sent.wanted[i]) / dt_;
     const double behind = sent.wanted[i] - sent.values[i], rate = sent.rates[i];
     double next = (wanted - sent.values[i]) / dt_;

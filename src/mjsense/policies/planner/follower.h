@@ -120,6 +120,7 @@ class Follower {
   void enter(const World& world, State& state, Segment& segment) const;
   bool rest(const World& world, int group, Action& action);
   double stretch(const World& world, const State& state, const ToolMove& move) const;
+  bool is_yaw(int group, std::size_t joint) const;
   double most_acceleration(int group, std::size_t joint) const;
   void limit(int group, Sent& sent, std::span<double> command) const;
   void limit_pose(Sent& sent, std::span<double> command) const;

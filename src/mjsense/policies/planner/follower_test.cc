@@ -4,6 +4,7 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <numbers>
 
 #include "mjsense/core/testing/allocations.h"
 #include "mjsense/policies/planner/task_planner.h"
@@ -98,7 +99,9 @@ TEST(Follower, ABaseIsNeverToldToJump) {
   RobotValues now;
   robot.read_qpos(stage.world, now);
   const auto at = [&](int i) { return now[base].values[i]; };
-  CommandPath path{base, {0, 4}, {at(0) - 0.1, at(1), at(2) + 0.3, at(0) - 1.3, at(1), at(2) + 0.3}};
+  // A turn more is the same way to look.
+  const double yaw = at(2) + 0.3 - 2 * std::numbers::pi;
+  CommandPath path{base, {0, 4}, {at(0) - 0.1, at(1), yaw, at(0) - 1.3, at(1), yaw}};
   follower.plan(0).move_groups(1, {path}, 1.0);
   follower.begin(stage.world);
   std::array<double, 3> told{at(0), at(1), at(2)}, rate{};
@@ -134,6 +137,32 @@ TEST(Follower, ABaseIsNeverToldToJump) {
   EXPECT_LE(most, cfg.most_base_acceleration * (1 + 1e-9));
   EXPECT_LE(most_turn, cfg.most_base_turn_acceleration * (1 + 1e-9));
   EXPECT_GT(most, 0.5 * cfg.most_base_acceleration);
+}
+
+// The next path names the same place by an angle of another turn.
+TEST(Follower, ABaseDoesNotSpinFromOnePathToTheNext) {
+  constexpr double kTurn = 2 * std::numbers::pi;
+  TableStage stage("mobile_franka");
+  const int base = stage.robot().group_index("base");
+  Follower follower;
+  follower.initialize(stage.robot(), stage.world.model, 1, 0.066);
+  follower.reset(stage.world);
+  RobotValues now;
+  stage.robot().read_qpos(stage.world, now);
+  const auto at = now[base].values;
+  const auto stay = [&](double yaw) {
+    return CommandPath{base, {0, 1}, {at[0], at[1], yaw, at[0], at[1], yaw}};
+  };
+  Plan& plan = follower.plan(0);
+  plan.move_groups(1, {stay(at[2])});
+  plan.move_groups(1, {stay(at[2] - kTurn)});
+  follower.begin(stage.world);
+  while (!follower.finished(0)) {
+    Action action;
+    follower.follow(stage.world, action);
+    EXPECT_NEAR(action.commands[base].values[2], at[2], 1e-9);
+    stage.step(action);
+  }
 }
 
 // What a segment was to reach is commanded where it ends between two steps.

@@ -28,6 +28,7 @@ std::ostream& operator<<(std::ostream& out, const Case& c) {
 constexpr double kAcceleration = 10, kSpeed = 2.62;
 // Of bases, which drive with things in their hands: m/s^2, rad/s^2.
 constexpr double kBase = 3.0, kBaseTurn = 10;
+constexpr double kBaseSpeed = 0.6, kBaseTurnSpeed = 1.2;  // m/s, rad/s
 
 int number(const char* name, int otherwise) {
   const char* value = std::getenv(name);
@@ -82,6 +83,8 @@ TEST_P(MotionLimits, CommandsKeepToThem) {
     };
     below(q.joint_speed, kSpeed, "speed of a joint");
     below(q.joint_acceleration, kAcceleration, "acceleration of a joint");
+    below(q.base_speed, kBaseSpeed, "speed of the base");
+    below(q.base_turn, kBaseTurnSpeed, "angular speed of the base");
     below(q.base_acceleration, kBase, "acceleration of the base");
     below(q.base_turn_acceleration, kBaseTurn, "angular acceleration of the base");
     if (stage.task->perturbation(0).happened() || stage.retries() > 0) continue;
@@ -91,9 +94,9 @@ TEST_P(MotionLimits, CommandsKeepToThem) {
     EXPECT_LT(q.depth, c.depth) << q.deepest << ", " << c << ", episode " << episode;
     EXPECT_EQ(q.self_collisions, 0) << q.met << ", " << c << ", episode " << episode;
     if (std::getenv("MJSENSE_EPISODES"))
-      printf("%s %d: %s %d steps; %.2f rad/s2 told, %.2f done; %.2f mm, %s\n",
+      printf("%s %d: %s %d steps; %.2f rad/s2 told, %.2f done; base %.2f m/s, %.2f rad/s; %.2f mm, %s\n",
              testing::PrintToString(c).c_str(), episode, result.success ? "ok" : "FAIL",
-             result.steps, q.joint_acceleration.value, q.acceleration, 1000 * q.depth, q.deepest.c_str());
+             result.steps, q.joint_acceleration.value, q.acceleration, q.base_speed.value, q.base_turn.value, 1000 * q.depth, q.deepest.c_str());
   }
 }
 
@@ -109,10 +112,14 @@ INSTANTIATE_TEST_SUITE_P(
                     Case{"open", "franka", "", 3}, Case{"open", "mobile_franka", "", 2},
                     Case{"open", "rby1", "", 2}, Case{"close", "franka", "", 2},
                     Case{"close", "rby1", "", 2}, Case{"door_opening", "rby1", "", 2},
+                    Case{"door_opening", "rby1", "room_with_door:2", 2},
                     Case{"nav_to_obj", "rby1", "", 1}, Case{"nav_to_obj", "mobile_franka", "", 1}),
     [](const auto& info) {
       std::string name = std::string(info.param.task) + "_" + info.param.robot;
-      if (*info.param.scene) name += std::string("_") + info.param.scene;
+      for (const char* c = info.param.scene; *c; ++c) {
+        if (c == info.param.scene) name += "_";
+        name += std::isalnum(*c) ? *c : char{'_'};
+      }
       return name;
     });
 
