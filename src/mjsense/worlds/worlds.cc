@@ -226,8 +226,8 @@ const mjModel* Worlds::model() const { return mjb_model(batch_); }
 mjModel Worlds::model_of(int world) const {
   mjModel mine = *model();
   int size = 0;
-#define X(type, name, nr, nc)                                                     \
-  if (const void* rows = mjb_expanded(batch_, #name, &size, nullptr))             \
+#define X(type, name, nr, nc)                                         \
+  if (const void* rows = mjb_expanded(batch_, #name, &size, nullptr)) \
     mine.name = static_cast<type*>(const_cast<void*>(rows)) + std::ptrdiff_t{size} * world;
   MJMODEL_POINTERS
 #undef X

@@ -299,8 +299,7 @@ void Follower::limit(int group, Sent& sent, std::span<double> command) const {
   sent.moved = true;
   for (std::size_t i = 0; i < command.size(); ++i) {
     const double most = most_acceleration(group, i);
-    if (const double away = command[i] - sent.values[i];
-        is_yaw(group, i) && wrapped(away) != away)
+    if (const double away = command[i] - sent.values[i]; is_yaw(group, i) && wrapped(away) != away)
       command[i] = sent.values[i] + wrapped(away);
     const double wanted = command[i], follow = (wanted - sent.wanted[i]) / dt_;
     const double behind = sent.wanted[i] - sent.values[i], rate = sent.rates[i];

@@ -110,7 +110,8 @@ TEST(Follower, ABaseIsNeverToldToJump) {
     const GroupValues& command = action.commands[base];
     for (int i = 0; i < 3; ++i) {
       const double next = command.given ? command.values[i] : told[i], v = (next - told[i]) / kDt;
-      (i == 2 ? most_turn : most) = std::max(i == 2 ? most_turn : most, std::abs(v - rate[i]) / kDt);
+      (i == 2 ? most_turn : most) =
+          std::max(i == 2 ? most_turn : most, std::abs(v - rate[i]) / kDt);
       rate[i] = v;
       told[i] = next;
     }

@@ -68,7 +68,8 @@ struct Clutter {
     const auto free_place = [&] {
       std::vector<double> q(joints.size());
       do {
-        for (std::size_t i = 0; i < q.size(); ++i) q[i] = rng.uniform(joints.low[i], joints.high[i]);
+        for (std::size_t i = 0; i < q.size(); ++i)
+          q[i] = rng.uniform(joints.low[i], joints.high[i]);
       } while (!query.free(q));
       return q;
     };
@@ -100,7 +101,8 @@ double length_of(std::span<const double> path, std::size_t n) {
 
 using Finder = std::vector<double> (*)(const JointSpace&, const Problem&, const FreeSpace&, Rng&);
 
-std::vector<double> ours(const JointSpace& joints, const Problem& p, const FreeSpace& free, Rng& rng) {
+std::vector<double> ours(const JointSpace& joints, const Problem& p, const FreeSpace& free,
+                         Rng& rng) {
   return find_path(joints, p.start, p.goal, free, rng);
 }
 
@@ -178,8 +180,8 @@ std::vector<double> ompls(const JointSpace& joints, const Problem& p, const Free
   planner.setProblemDefinition(task);
   planner.setup();
   int samples = 0;
-  const ob::PlannerStatus status = planner.solve(
-      ob::PlannerTerminationCondition([&] { return ++samples > cfg.max_samples; }));
+  const ob::PlannerStatus status =
+      planner.solve(ob::PlannerTerminationCondition([&] { return ++samples > cfg.max_samples; }));
   if (status != ob::PlannerStatus::EXACT_SOLUTION) return {};
   auto& way = *task->getSolutionPath()->as<og::PathGeometric>();
   Shortcuts shortcuts(si, rng);
@@ -207,12 +209,14 @@ void ways(benchmark::State& state, Finder find) {
     for (int k = 0; k < kProblems; ++k) {
       CollisionQuery query = clutter.ask();
       Found found;
-      const FreeSpace free{[&](Config q) { return ++found.asked, query.free(q); },
-                           [&](Config a, Config b) { return ++found.asked, query.free_between(a, b); }};
+      const FreeSpace free{
+          [&](Config q) { return ++found.asked, query.free(q); },
+          [&](Config a, Config b) { return ++found.asked, query.free_between(a, b); }};
       Rng rng(k, 0, 0, 0);
       const auto begin = std::chrono::steady_clock::now();
       const std::vector<double> path = find(clutter.joints, clutter.problems[k], free, rng);
-      found.ms = std::chrono::duration<double, std::milli>(std::chrono::steady_clock::now() - begin).count();
+      found.ms = std::chrono::duration<double, std::milli>(std::chrono::steady_clock::now() - begin)
+                     .count();
       found.solved = !path.empty();
       found.length = length_of(path, clutter.joints.size());
       all.push_back(found);
@@ -224,13 +228,17 @@ void ways(benchmark::State& state, Finder find) {
     asked.push_back(static_cast<double>(one.asked));
     if (one.solved) length.push_back(one.length);
   }
-  state.counters["solved_%"] = 100.0 * static_cast<double>(length.size()) / static_cast<double>(all.size());
+  state.counters["solved_%"] =
+      100.0 * static_cast<double>(length.size()) / static_cast<double>(all.size());
   state.counters["median_ms"] = median(ms);
   state.counters["median_asked"] = median(asked);
   state.counters["median_rad"] = median(length);
 }
 
-BENCHMARK_CAPTURE(ways, ours, ours)->Name("Ways/ours")->Iterations(3)->Unit(benchmark::kMillisecond);
+BENCHMARK_CAPTURE(ways, ours, ours)
+    ->Name("Ways/ours")
+    ->Iterations(3)
+    ->Unit(benchmark::kMillisecond);
 #ifdef MJSENSE_BENCH_OMPL
 BENCHMARK_CAPTURE(ways, ompl, ompls)
     ->Name("Ways/ompl")

@@ -94,9 +94,12 @@ TEST_P(MotionLimits, CommandsKeepToThem) {
     EXPECT_LT(q.depth, c.depth) << q.deepest << ", " << c << ", episode " << episode;
     EXPECT_EQ(q.self_collisions, 0) << q.met << ", " << c << ", episode " << episode;
     if (std::getenv("MJSENSE_EPISODES"))
-      printf("%s %d: %s %d steps; %.2f rad/s2 told, %.2f done; base %.2f m/s, %.2f rad/s; %.2f mm, %s\n",
-             testing::PrintToString(c).c_str(), episode, result.success ? "ok" : "FAIL",
-             result.steps, q.joint_acceleration.value, q.acceleration, q.base_speed.value, q.base_turn.value, 1000 * q.depth, q.deepest.c_str());
+      printf(
+          "%s %d: %s %d steps; %.2f rad/s2 told, %.2f done; base %.2f m/s, %.2f rad/s; %.2f mm, "
+          "%s\n",
+          testing::PrintToString(c).c_str(), episode, result.success ? "ok" : "FAIL", result.steps,
+          q.joint_acceleration.value, q.acceleration, q.base_speed.value, q.base_turn.value,
+          1000 * q.depth, q.deepest.c_str());
   }
 }
 

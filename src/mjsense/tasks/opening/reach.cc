@@ -235,7 +235,8 @@ bool HandleReach::along_is_free(mjData* data, const Start& start, const HandleMo
     const double part = static_cast<double>(k) / static_cast<double>(way.along.size() - 1);
     set(data, start, *motion.one, std::lerp(motion.from, motion.to, part));
     show(data, way.along[k]);
-    if (!free(data, start, cfg_.contact, motion.one, &way.hand, way.drive.has_value())) return false;
+    if (!free(data, start, cfg_.contact, motion.one, &way.hand, way.drive.has_value()))
+      return false;
   }
   return true;
 }
