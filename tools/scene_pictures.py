@@ -31,8 +31,8 @@ class View(NamedTuple):
     seed: int = 3
 
 
-def in_kitchen(task: str, steps: int = 45) -> View:
-    return View(task, "kitchen", steps=steps, pos=(-2.0, -1.2, 1.7), target=(0.3, 0.0, 0.95))
+def in_kitchen(task: str, steps: int = 45, seed: int = 3) -> View:
+    return View(task, "kitchen", steps=steps, seed=seed, pos=(-2.0, -1.2, 1.7), target=(0.3, 0.0, 0.95))
 
 
 VIEWS = {
@@ -54,7 +54,7 @@ VIEWS = {
     "task_pick_and_place_next_to": View("pick_and_place_next_to", "tableware", steps=125),
     "task_pick_and_place_color": View("pick_and_place_color", "tableware", steps=125),
     "task_packing": View("packing", "tableware", steps=125),
-    "task_open": in_kitchen("open", steps=125),
+    "task_open": in_kitchen("open", steps=125, seed=4),
     "task_close": in_kitchen("close", steps=75),
     "task_door_opening": View("door_opening", "room_with_door", "rby1", steps=165, pos=None),
     "task_multi_task": in_kitchen("open+pick", steps=60),
