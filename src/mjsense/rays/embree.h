@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
-// Embree 4 or 3 behind one face: a device, and packets of 16 rays against a scene of triangles.
+// Embree 4 or 3 behind one face: a device, and packets of 16 rays against a scene of triangles. Every lane
+// of a packet, valid or not, holds finite numbers: Debian's Embree has assertions, and looks at them all
+// where the CPU has no AVX-512.
 // Unnamed namespace: each instruction set keeps its own copy.
 
 #if __has_include(<embree4/rtcore.h>)
@@ -72,7 +74,6 @@ inline void embree_intersect16(const int* valid, RTCScene scene, RTCRayHit16* ra
   rtcIntersect16(valid, scene, &context, rays);
 }
 
-// Never coherent: rtcOccluded16 of Debian's 3.13.5 does not return with that flag.
 inline void embree_occluded16(const int* valid, RTCScene scene, RTCRay16* rays, bool cull,
                               bool coherent) {
   RTCIntersectContext context;

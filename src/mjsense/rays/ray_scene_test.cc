@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <cmath>
 #include <cstring>
+#include <limits>
 #include <string>
 #include <vector>
 
@@ -325,6 +326,30 @@ TEST_P(Kernels, BackFacesAreCulledIfAsked) {
   EXPECT_EQ(inside("cube", B::kCull), s.id("floor"));
   EXPECT_EQ(inside("first", B::kCull), s.id("floor"));
   EXPECT_EQ(inside("drum", B::kCull), s.id("floor"));
+}
+
+// Straight down on and beside a mesh: a ray along the faces of its box enters it nowhere.
+TEST_P(Kernels, RaysBesideAMeshDisturbNobody) {
+  const Layers s(isa());
+  std::vector<std::uint8_t> hidden(s.scene.num_objects(), 1);
+  hidden[s.id("cube")] = 0;
+  RayScratch scratch(s.scene.num_objects());
+  RayPacket rays{};
+  for (int i = 0; i < kPacket; ++i) {
+    rays.o[0][i] = 0.4f * static_cast<float>(i) - 3.1f;
+    rays.o[2][i] = 9;
+    rays.d[2][i] = -1;
+    rays.tmax[i] = i % 2 ? 100.0f : std::numeric_limits<float>::infinity();
+  }
+  const RayFilter filter{.hidden = hidden};
+  HitPacket hits;
+  s.scene.trace(0, filter, rays, hits, scratch);
+  const std::uint32_t dark = s.scene.occluded(0, filter, rays, scratch);
+  for (int i = 0; i < kPacket; ++i) {
+    const bool on = std::abs(rays.o[0][i]) < 1;
+    EXPECT_EQ(hits.geom[i], on ? s.id("cube") : -1) << i;
+    EXPECT_EQ(dark >> i & 1, on) << i;
+  }
 }
 
 TEST_P(Kernels, EndlessPlanesAreEndless) {

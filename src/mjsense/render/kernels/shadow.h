@@ -42,14 +42,16 @@ inline std::uint32_t shadow_of_triangles(const ViewGeom& g, int index, const Lig
     if (g.height_field) hit = hit & ~leaves_ground(*g.height_field, o, d, ~other);
     some |= bits(hit);
     store(valid + k, select(hit, int_of(-1), int_of(0)));
-    store(ray.org_x + k, o.x);
-    store(ray.org_y + k, o.y);
-    store(ray.org_z + k, o.z);
-    store(ray.dir_x + k, d.x);
-    store(ray.dir_y + k, d.y);
-    store(ray.dir_z + k, d.z);
-    store(ray.tnear + k, splat(0.0f));
-    store(ray.tfar + k, load(rays.end + k));
+    // What was not hit, the sky, lies at infinity, which Embree must not be given.
+    const Float zero = splat(0.0f);
+    store(ray.org_x + k, select(hit, o.x, zero));
+    store(ray.org_y + k, select(hit, o.y, zero));
+    store(ray.org_z + k, select(hit, o.z, zero));
+    store(ray.dir_x + k, select(hit, d.x, zero));
+    store(ray.dir_y + k, select(hit, d.y, zero));
+    store(ray.dir_z + k, select(hit, d.z, zero));
+    store(ray.tnear + k, zero);
+    store(ray.tfar + k, select(hit, load(rays.end + k), zero));
     store(ray.time + k, splat(0.0f));
     store(reinterpret_cast<int*>(ray.mask) + k, int_of(-1));
     store(reinterpret_cast<int*>(ray.flags) + k, int_of(0));
