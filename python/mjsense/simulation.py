@@ -248,7 +248,8 @@ class Simulation(KnownAttributes):
         """Gives worlds their own values of a field of the model: ``randomize("geom_friction", values)``.
 
         Values are ``[worlds, ...]`` or broadcast to it. Quantities that MuJoCo derives from the field follow, and so do rays and
-        images. Meshes, height fields and the pixels of textures cannot differ between worlds: ValueError.
+        images. Meshes, height fields and the pixels of textures cannot differ between worlds: ValueError, as for values of another
+        shape, and for such as are not finite.
         """
         self._check_randomizable(field)
         target = self.model_field(field)
@@ -257,6 +258,10 @@ class Simulation(KnownAttributes):
             values = np.broadcast_to(np.asarray(values, target.dtype), target[rows].shape)
         except (TypeError, ValueError) as error:
             raise ValueError(f"{field}: values must be of shape {target[rows].shape} or broadcast to it: {error}") from None
+        if values.dtype.kind == "f" and not np.isfinite(values).all():
+            world, *element = np.argwhere(~np.isfinite(values))[0].tolist()
+            place = f"that of world {np.arange(self.num_worlds)[rows][world]}, element {element}"
+            raise ValueError(f"{field}: values must be finite numbers; {place} is {values[(world, *element)]}")
         if field.endswith("_condim") and not np.isin(values, (1, 3, 4, 6)).all():
             raise ValueError(f"{field}: values must be 1, 3, 4 or 6")
         if field in ("geom_type", "light_type", "cam_projection"):

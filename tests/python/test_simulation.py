@@ -124,6 +124,8 @@ def test_randomize_says_what_is_wrong(sim):
         (lambda: sim.randomize("bodymass", 1), AttributeError, "did you mean 'body_mass'"),
         (lambda: sim.randomize("body_mass", np.ones((4, 99))), ValueError, r"body_mass: values must be of shape \(4, "),
         (lambda: sim.randomize("body_mass", "heavy"), ValueError, "body_mass: values must be"),
+        (lambda: sim.randomize("body_mass", np.inf), ValueError, r"finite numbers; that of world 0, element \[0\] is inf"),
+        (lambda: sim.randomize("body_pos", [[0, 0, 1], [0, np.nan, 1], [0, 0, 1]], [3]), ValueError, r"that of world 3, element \[1, 1\] is nan"),
         (lambda: sim.randomize("geom_matid", sim.model.nmat), ValueError, "geom_matid: ids from"),
         (lambda: sim.randomize("mesh_vert", 1), ValueError, "cannot have a value per world"),
     ]:
