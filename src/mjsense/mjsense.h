@@ -76,6 +76,7 @@
 #include "mjsense/rollout/record_job.h"
 #include "mjsense/rollout/registry.h"
 #include "mjsense/rollout/rollout.h"
+#include "mjsense/scene/daylight.h"
 #include "mjsense/scene/entity.h"
 #include "mjsense/scene/model_sensors/model_sensor.h"
 #include "mjsense/scene/options.h"

@@ -28,7 +28,7 @@ std::ostream& operator<<(std::ostream& out, const Case& c) {
 constexpr double kAcceleration = 10, kSpeed = 2.62;
 // Of bases, which drive with things in their hands: m/s^2, rad/s^2.
 constexpr double kBase = 3.0, kBaseTurn = 10;
-constexpr double kBaseSpeed = 0.6, kBaseTurnSpeed = 1.2;  // m/s, rad/s
+constexpr double kBaseSpeed = 0.6, kBaseTurnSpeed = 1.5;  // m/s, rad/s
 
 int number(const char* name, int otherwise) {
   const char* value = std::getenv(name);
