@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
-// Embree 4 or 3 behind one face: a device, and packets of 16 rays against a scene of triangles. Every lane
-// of a packet, valid or not, holds finite numbers: Debian's Embree has assertions, and looks at them all
-// where the CPU has no AVX-512.
+// Embree 4 or 3 behind one face: a device, and packets of 16 rays against a scene of triangles. Origins and
+// directions are finite in every lane of a packet, valid or not: Debian's Embree has assertions, and
+// looks at them all where the CPU has no AVX-512.
 // Unnamed namespace: each instruction set keeps its own copy.
 
 #if __has_include(<embree4/rtcore.h>)

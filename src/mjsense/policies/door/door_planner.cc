@@ -186,18 +186,6 @@ std::vector<double> DoorPlanner::seconds(std::span<const DoorWaypoint> waypoints
   return out;
 }
 
-// Slow at the ends, and never much faster than a moment before or after: what hangs on the hand is heavy.
-void DoorPlanner::ease(std::vector<double>& seconds) {
-  constexpr double kChange = 0.75;
-  if (seconds.empty()) return;
-  seconds.front() *= 2.5;
-  seconds.back() *= 2.5;
-  for (std::size_t i = 1; i < seconds.size(); ++i)
-    seconds[i] = std::max(seconds[i], kChange * seconds[i - 1]);
-  for (std::size_t i = seconds.size(); i-- > 1;)
-    seconds[i - 1] = std::max(seconds[i - 1], kChange * seconds[i]);
-}
-
 // A segment along the waypoints, each after the one before.
 void DoorPlanner::add_path(Plan& plan, int phase, const DoorMotion& motion,
                            std::span<const DoorWaypoint> waypoints, std::span<const double> seconds,

@@ -54,7 +54,6 @@ class DoorPlanner final : public TaskPlanner {
   void open_door(const World& world, const DoorMotion& motion, Plan& plan);
   std::vector<double> seconds(std::span<const DoorWaypoint> waypoints, std::span<const double> from,
                               const BasePose& at, double joint_speed) const;
-  static void ease(std::vector<double>& seconds);
   void add_path(Plan& plan, int phase, const DoorMotion& motion,
                 std::span<const DoorWaypoint> waypoints, std::span<const double> seconds,
                 std::vector<double>& from, BasePose& at) const;

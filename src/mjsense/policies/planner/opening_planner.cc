@@ -11,21 +11,6 @@
 
 namespace mjsense {
 
-namespace {
-
-// Slow at the ends, and never much faster than a moment before or after.
-void ease(std::span<double> seconds) {
-  constexpr double kEnds = 2.5, kChange = 0.75;
-  seconds.front() *= kEnds;
-  seconds.back() *= kEnds;
-  for (std::size_t i = 1; i < seconds.size(); ++i)
-    seconds[i] = std::max(seconds[i], kChange * seconds[i - 1]);
-  for (std::size_t i = seconds.size(); i-- > 1;)
-    seconds[i - 1] = std::max(seconds[i - 1], kChange * seconds[i]);
-}
-
-}  // namespace
-
 std::span<const Phase> OpeningPlanner::phases() const { return kManipulationPhases; }
 int OpeningPlanner::first_phase() const { return kOpenGripper; }
 

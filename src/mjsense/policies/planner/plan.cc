@@ -37,4 +37,15 @@ Segment& Plan::wait(int phase, double seconds) {
   return segment;
 }
 
+void ease(std::span<double> seconds) {
+  constexpr double kEnds = 2.5, kChange = 0.75;
+  if (seconds.empty()) return;
+  seconds.front() *= kEnds;
+  seconds.back() *= kEnds;
+  for (std::size_t i = 1; i < seconds.size(); ++i)
+    seconds[i] = std::max(seconds[i], kChange * seconds[i - 1]);
+  for (std::size_t i = seconds.size(); i-- > 1;)
+    seconds[i - 1] = std::max(seconds[i - 1], kChange * seconds[i]);
+}
+
 }  // namespace mjsense

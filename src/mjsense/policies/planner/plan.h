@@ -77,4 +77,8 @@ struct Plan {
   Segment& wait(int phase, double seconds);
 };
 
+// Of the seconds to each point of a path from the one before: slow at its ends, and never much faster than a
+// moment before or after. What hangs on the hand is heavy.
+void ease(std::span<double> seconds);
+
 }  // namespace mjsense
