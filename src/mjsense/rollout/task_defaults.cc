@@ -8,14 +8,14 @@ namespace {
 
 constexpr std::string_view kUsualRobot = "franka";
 
-// MolmoSpaces' configurations; 0: the robot's. Its 200 steps to close would cut one of seven episodes of MobileFranka,
-// whose second attempts succeed.
+// MolmoSpaces' configurations; 0: the robot's.
 struct Defaults {
   std::string_view task, robot;
   int horizon, policy_dt_ms, ctrl_dt_ms, sim_dt_ms;
 };
 constexpr Defaults kDefaults[] = {
     {"open", kUsualRobot, 200, 0, 0, 0},
+    {"close", kUsualRobot, 200, 0, 0, 0},
     {"door_opening", "rby1", 400, 0, 0, 0},
     {"nav_to_obj", "rby1", 500, 200, 2, 2},
 };

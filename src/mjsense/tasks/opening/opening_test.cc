@@ -282,6 +282,41 @@ TEST(Opening, ARobotDoesNotStandInACupboard) {
   EXPECT_TRUE(stage.task.reach().stands_free(at(inside + 0.3)));
 }
 
+// The arm goes straight in its joints from each point of the way to the next: it stays with the handle
+// there, too. What is found at first is found again from where a slack arm stands.
+TEST(Opening, OnAWayTheHandStaysWithTheHandle) {
+  Stage stage(franka(), OpeningKind::kClose);
+  const HandleReach& reach = stage.task.reach();
+  const Robot& robot = stage.task.robot();
+  Rng rng(1, 0, 0, 0);
+  int found = 0;
+  for (int episode = 0; episode < 50; ++episode) {
+    const World w = stage.start(0, episode);
+    const Articulation& one = stage.task.target(0);
+    const double from = stage.data->qpos[one.qpos], to = stage.task.aim(one);
+    HandleReach::Start start = reach.start_of(w);
+    const auto way = reach.find(start, one, from, to, 12, false);
+    if (!way) continue;  // such a start is drawn again
+    ++found;
+    const int arm = way->hand.arm;
+    const Pose base = robot.base_pose(w);
+    for (std::size_t k = 1; k < way->along.size(); ++k) {
+      RobotValues between = way->along[k];
+      for (int i = 0; i < between[arm].size; ++i)
+        between[arm].values[i] = 0.5 * (between[arm].values[i] + way->along[k - 1][arm].values[i]);
+      const double part =
+          (static_cast<double>(k) - 0.5) / (static_cast<double>(way->along.size()) - 1);
+      const Pose handle = reach.body_pose(start, one, std::lerp(from, to, part)) * way->on_body;
+      EXPECT_LT(norm((base * robot.fk(arm, between)).p - handle.p), 0.01) << episode << ", " << k;
+    }
+    const auto& qpos = robot.groups()[arm].qpos;
+    for (std::size_t i = 0; i < qpos.size(); ++i)
+      start.qpos[qpos[i]] = way->go.back()[arm].values[i] + rng.uniform(-0.02, 0.02);
+    EXPECT_TRUE(reach.again(start, one, from, to, *way)) << episode;
+  }
+  EXPECT_GE(found, 45);
+}
+
 // Things as near as 5 mm to an arm are in its way, where they stand in their world.
 TEST(Opening, WhatAnArmComesNearIsThatOfItsWorld) {
   Stage stage(franka(), OpeningKind::kOpen);

@@ -221,7 +221,8 @@ bool HandleReach::go_along(const Seen& seen, const HandleMotion& motion, RobotVa
     }
     const RobotValues last = q;
     if (!robot_.ik(arm, to_base * motion.at(part) * way.grasp, q, Chain::kTracking)) return false;
-    for (int i = 0; way.drive && k > 0 && i < q[arm].size; ++i) {
+    // Between points joints go straight: after a leap the hand would leave the handle.
+    for (int i = 0; k > 0 && i < q[arm].size; ++i) {
       if (std::abs(q[arm].values[i] - last[arm].values[i]) > cfg_.jump) return false;
     }
     way.along.push_back(q);

@@ -37,7 +37,7 @@ struct HandleReachCfg {
   int points = 11;           // of the arc, ends included
   int drive_points = 17;     // likewise, where the base drives
   double room = 0.02;        // m, that a base keeps from everything while it drives
-  double jump = 0.5;         // rad, of a joint from one point to the next while it drives
+  double jump = 0.5;         // rad, of a joint from one point to the next
   double clearance = 0.010;  // m, of the robot to everything on the way there
   double contact = -0.001;   // m, what counts as touching while it has the handle
   double step = 0.10;        // rad, of any joint between two checks of the way
