@@ -93,6 +93,7 @@ bool Placing::gets_away(const World& world, HandPlanner& hand, const HandPose& a
   empty.open(gripper);
   empty.place(body, object);
   empty.allow(gripper, body);
+  if (!hand.is_free(empty, at)) return false;  // the fingers open into the bowl's wall
   const double retreat = m_.cfg().retreat;
   for (const Pose& to : {backed(at.tool, retreat), raised(at.tool, retreat)}) {
     if (hand.line_is_free(world, empty, at, to, away) && hand.is_free(empty, away)) return true;
