@@ -12,6 +12,7 @@ constexpr double kSlow = 0.5, kFast = 0.8;        // m/s of a shove
 constexpr int kSlipSteps = 12;                    // after it was lifted
 constexpr int kOpenSteps = 6;                     // that the hand is open
 constexpr double kLifted = 0.01;                  // m
+constexpr double kAjar = 0.03;                    // of the range of what opens
 
 }  // namespace
 
@@ -27,26 +28,53 @@ void Perturbation::begin(double share, std::uint64_t seed, std::int64_t episode)
   speed_ = rng.uniform(kSlow, kFast);
 }
 
+// What moves when a hand moves the object: its own joint; of a lever, that of the leaf that carries it.
+int Perturbation::joint_of(const mjModel* m, int object) {
+  int joint = -1;
+  for (int body = object; body > 0; body = m->body_parentid[body]) {
+    if (m->body_jntnum[body] == 0 && joint >= 0) break;
+    if (m->body_jntnum[body] == 0) continue;
+    const bool is_free = m->jnt_type[m->body_jntadr[body]] == mjJNT_FREE;
+    if (joint < 0 || !is_free) joint = m->body_jntadr[body];
+    if (is_free) break;
+  }
+  return joint;
+}
+
+// How far a hand has brought it: m upwards, of what is free; otherwise a share of its range.
+double Perturbation::progress(const World& world, int joint) {
+  const mjModel* m = world.model;
+  if (m->jnt_type[joint] == mjJNT_FREE) return world.data->xpos[3 * m->jnt_bodyid[joint] + 2];
+  const double* range = m->jnt_range + 2 * joint;
+  const bool limited = m->jnt_limited[joint] && range[1] > range[0];
+  return world.data->qpos[m->jnt_qposadr[joint]] / (limited ? range[1] - range[0] : 1);
+}
+
+void Perturbation::shove(const World& world, int joint, const StateRow& state) const {
+  double* v = state.qvel + world.model->jnt_dofadr[joint];
+  v[0] += speed_ * std::cos(direction_);
+  v[1] += speed_ * std::sin(direction_);
+}
+
 void Perturbation::apply(const World& world, const Robot& robot, int object, int step,
                          Action& action, const StateRow& state) {
   if (kind_ == Kind::kNone || object < 0) return;
   const mjModel* m = world.model;
-  const int joint = m->body_jntadr[object];
-  if (joint < 0 || m->jnt_type[joint] != mjJNT_FREE) return;
-  const double height = world.data->xpos[3 * object + 2];
-  if (!rest_height_) rest_height_ = height;
-  const bool lifted = height > *rest_height_ + kLifted;
-  if (kind_ == Kind::kShove) {
+  const int joint = joint_of(m, object);
+  if (joint < 0 || m->jnt_type[joint] == mjJNT_BALL) return;
+  const bool is_free = m->jnt_type[joint] == mjJNT_FREE;
+  const double now = progress(world, joint);
+  if (!rest_) rest_ = now;
+  const bool held = is_free ? now > *rest_ + kLifted : std::abs(now - *rest_) > kAjar;
+  if (is_free && kind_ == Kind::kShove) {
     // One that is held by now stays.
-    if (happened() || lifted || step != wait_) return;
-    double* v = state.qvel + m->jnt_dofadr[joint];
-    v[0] += speed_ * std::cos(direction_);
-    v[1] += speed_ * std::sin(direction_);
+    if (happened() || held || step != wait_) return;
+    shove(world, joint, state);
     happened_at_ = step;
     return;
   }
   if (!happened()) {
-    if (!lifted || held_++ < wait_) return;
+    if (!held || held_++ < wait_) return;
     happened_at_ = step;
   }
   if (step >= happened_at_ + kOpenSteps) return;

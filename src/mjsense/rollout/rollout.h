@@ -126,8 +126,7 @@ void visit_fields(V& v, RolloutCfg& c) {
       .decides_data();
   v("perturb", c.perturb,
     "Share of episodes in which something goes wrong on purpose: the object is shoved, or slips "
-    "from "
-    "the hand.")
+    "from the hand.")
       .within(0, 1)
       .decides_data_as("perturb");
   v("terminate_upon_success", c.terminate_upon_success, "An episode ends at its first success.")
