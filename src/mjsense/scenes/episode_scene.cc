@@ -205,6 +205,21 @@ void EpisodeScene::initialize(const mjModel* model, int num_worlds, std::string_
   make_sizes();
 }
 
+void EpisodeScene::put_robot_on_ground() {
+  for (int g = 0; g < model_->ngeom; ++g) {
+    const bool touches = model_->geom_contype[g] || model_->geom_conaffinity[g];
+    const int body = model_->geom_bodyid[g];
+    if (model_->geom_type[g] != mjGEOM_PLANE || !touches || model_->body_treeid[body] >= 0)
+      continue;
+    Pose plane{vec3(model_->geom_pos + 3 * g), quat(model_->geom_quat + 4 * g)};
+    for (int b = body; b > 0; b = model_->body_parentid[b])
+      plane = Pose{vec3(model_->body_pos + 3 * b), quat(model_->body_quat + 4 * b)} * plane;
+    if (rotate(plane.q, {0, 0, 1}).z < 1 - 1e-9) continue;
+    cfg_.robot.pos[2] = plane.p.z;
+    return;
+  }
+}
+
 void EpisodeScene::bind(Simulation& simulation) {
   simulation_ = &simulation;
   if (!cfg_.vary.empty()) look_ = std::make_unique<Look>(cfg_.vary, simulation, place());

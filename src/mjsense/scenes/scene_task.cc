@@ -4,6 +4,7 @@
 #include <fmt/format.h>
 
 #include "mjsense/scenes/load_scene.h"
+#include "mjsense/scenes/robot_floor.h"
 #include "mjsense/sim/simulation.h"
 
 namespace mjsense {
@@ -16,7 +17,10 @@ void SceneTask::bind(const std::shared_ptr<Simulation>& simulation) {
   scene_.bind(*simulation);
 }
 
-void SceneTask::initialize_task() { scene_.initialize(model(), num_worlds(), robot().prefix()); }
+void SceneTask::initialize_task() {
+  scene_.initialize(model(), num_worlds(), robot().prefix());
+  if (driving_base(robot()) >= 0) scene_.put_robot_on_ground();
+}
 
 void SceneTask::vary_scene(int world) {
   const std::shared_ptr<Simulation> simulation = simulation_.lock();

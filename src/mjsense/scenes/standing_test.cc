@@ -3,8 +3,10 @@
 
 #include <gtest/gtest.h>
 
+#include <fstream>
 #include <memory>
 
+#include "mjsense/core/testing/temp_dir.h"
 #include "mjsense/robots/load_robot.h"
 #include "mjsense/scenes/load_scene.h"
 #include "mjsense/tasks/pick/pick.h"
@@ -72,6 +74,43 @@ TEST(Standing, WhoMovesNearerStandsInNothing) {
         EXPECT_GT(contact.dist, -0.001) << episode;
       }
     }
+  }
+}
+
+// A scene whose robot has a pedestal above the ground, which is not at z = 0: wheels stand on the ground.
+TEST(Standing, WhoDrivesStandsOnTheGround) {
+  const testing::TempDir dir;
+  std::ofstream(dir.file("room.xml")) << R"(<mujoco><worldbody>
+      <geom type="plane" size="3 3 .1" pos="0 0 .5" contype="0" conaffinity="0"/>
+      <geom type="plane" size="3 3 .1" pos="-3 0 0" euler="0 90 0"/>
+      <body name="floor" pos="0 0 -.05"><geom type="plane" size="3 3 .1" pos="0 0 -.1"/></body>
+      <geom name="top" type="box" size=".3 .3 .02" pos=".7 0 .68"/>
+    </worldbody></mujoco>)";
+  std::ofstream(dir.file("cube.xml")) << R"(<mujoco><worldbody><body name="cube"><freejoint/>
+      <geom type="box" size=".02 .02 .02"/></body></worldbody></mujoco>)";
+  std::ofstream(dir.file("scene.toml")) << R"(name = "raised"
+robot = {pos = [0, 0, 0.1]}
+regions = [{name = "table", on = "room/top"}]
+[[entities]]
+name = "room"
+model = "room.xml"
+[[entities]]
+name = "cube"
+model = "cube.xml"
+)";
+  for (const auto& [robot, z] : {std::pair{"franka", 0.1}, {"mobile_franka", -0.15}}) {
+    TaskCfg cfg;
+    cfg.robot = robot_cfg(robot);
+    cfg.scene = dir.file("scene.toml");
+    PickTask task(cfg);
+    Scene scene(task.whole_scene_cfg());
+    const mjModel* model = scene.model();
+    task.initialize(model, 1);
+    const std::unique_ptr<mjData, decltype(&mj_deleteData)> data(mj_makeData(model), mj_deleteData);
+    task.sample(0, 0, state_row(data.get()));
+    mj_kinematics(model, data.get());
+    EXPECT_NEAR(task.robot().base_pose({.id = 0, .model = model, .data = data.get()}).p.z, z, 1e-9)
+        << robot;
   }
 }
 
