@@ -11,11 +11,10 @@
 #include "mjsense/core/error.h"
 #include "mjsense/core/match.h"
 #include "mjsense/observe/frame.h"
-#include "mjsense/scene/daylight.h"
 #include "mjsense/scene/parts.h"
 #include "mjsense/scene/resolve.h"
-#include "mjsense/scene/spec.h"
 #include "mjsense/scenes/entity_model.h"
+#include "mjsense/scenes/finish_spec.h"
 #include "mjsense/scenes/generators/generator.h"
 
 namespace mjsense {
@@ -70,54 +69,7 @@ bool can_be_held(const ObjectShape& shape) {
   return least_extent(shape) <= kHand && shape.reach <= kReach;
 }
 
-// Robots of ours have contype 2 and conaffinity 1. Furniture that is touched and touches nothing by
-// itself (contype 0, conaffinity 1), as scenes of others have it, is touched by them, too.
-void let_robots_touch(mjSpec* spec) {
-  for (mjsElement* element : spec_elements(spec, mjOBJ_GEOM)) {
-    mjsGeom* geom = mjs_asGeom(element);
-    if (geom->contype == 0 && (geom->conaffinity & 1) != 0) geom->conaffinity |= 2;
-  }
-}
-
 bool upright(const double* quat) { return std::abs(quat[1]) + std::abs(quat[2]) < 1e-9; }
-
-void apply_look(mjSpec* spec, const SceneFileCfg& cfg) {
-  if (cfg.headlight) {
-    auto& light = spec->visual.headlight;
-    for (int i = 0; i < 3; ++i) {
-      light.ambient[i] = static_cast<float>(cfg.headlight->ambient);
-      light.diffuse[i] = static_cast<float>(cfg.headlight->diffuse);
-      light.specular[i] = static_cast<float>(cfg.headlight->specular);
-    }
-  }
-  spec->visual.quality.shadowsize = 4096;
-  std::optional<SceneSkyCfg> sky = cfg.sky;
-  if (!sky && !cfg.generator.empty()) sky.emplace();  // there are windows
-  if (sky) set_sky(spec, "", sky->top, sky->bottom);
-}
-
-// Under a pedestal that a scene has put above its floor, as high (m) as that is: it does not float.
-void stand_on_plinth(mjSpec* spec, const std::string& robot, double high) {
-  if (high <= 0) return;
-  for (mjsElement* element : spec_elements(spec, mjOBJ_GEOM)) {
-    const mjsGeom* foot = mjs_asGeom(element);
-    mjsBody* base = mjs_getParent(element);
-    if (!base->mocap ||
-        !std::string_view(mjs_getString(mjs_getName(base->element))).starts_with(robot + "/"))
-      continue;
-    if (foot->type != mjGEOM_BOX || std::abs(foot->pos[2] - foot->size[2]) > 1e-9) continue;
-    mjsGeom* plinth = mjs_addGeom(base, nullptr);
-    plinth->type = mjGEOM_BOX;
-    const double pos[] = {foot->pos[0], foot->pos[1], -0.5 * high};
-    const double size[] = {foot->size[0], foot->size[1], 0.5 * high};
-    std::ranges::copy(pos, plinth->pos);
-    std::ranges::copy(size, plinth->size);
-    plinth->contype = foot->contype;
-    plinth->conaffinity = foot->conaffinity;
-    plinth->group = foot->group;
-    mjs_setString(plinth->material, mjs_getString(foot->material));
-  }
-}
 
 }  // namespace
 
@@ -185,9 +137,7 @@ SceneCfg EpisodeScene::scene_cfg(const std::string& robot) const {
   if (cfg_.extent) scene.extent = cfg_.extent;
   if (!cfg_.models) scene.options = cfg_.options;
   scene.spec_fn = [cfg = cfg_, first = scene.spec_fn, meshes = meshes_, robot](mjSpec* spec) {
-    apply_look(spec, cfg);
-    stand_on_plinth(spec, robot, cfg.robot.pos[2]);
-    let_robots_touch(spec);
+    finish_spec(spec, cfg, robot);
     if (meshes) meshes->add(spec);
     if (first) first(spec);
   };
@@ -203,21 +153,6 @@ void EpisodeScene::initialize(const mjModel* model, int num_worlds, std::string_
   steps_.assign(num_worlds * objects_.size(), -1);
   support_.assign(num_worlds, regions_.empty() ? 0.0 : regions_[0].height);
   make_sizes();
-}
-
-void EpisodeScene::put_robot_on_ground() {
-  for (int g = 0; g < model_->ngeom; ++g) {
-    const bool touches = model_->geom_contype[g] || model_->geom_conaffinity[g];
-    const int body = model_->geom_bodyid[g];
-    if (model_->geom_type[g] != mjGEOM_PLANE || !touches || model_->body_treeid[body] >= 0)
-      continue;
-    Pose plane{vec3(model_->geom_pos + 3 * g), quat(model_->geom_quat + 4 * g)};
-    for (int b = body; b > 0; b = model_->body_parentid[b])
-      plane = Pose{vec3(model_->body_pos + 3 * b), quat(model_->body_quat + 4 * b)} * plane;
-    if (rotate(plane.q, {0, 0, 1}).z < 1 - 1e-9) continue;
-    cfg_.robot.pos[2] = plane.p.z;
-    return;
-  }
 }
 
 void EpisodeScene::bind(Simulation& simulation) {

@@ -49,8 +49,8 @@ class EpisodeScene {
   void initialize(const mjModel* model, int num_worlds, std::string_view robot_prefix);
   // For what varies, once there are worlds; they live as long as this. Throws KeyError, ValueError.
   void bind(Simulation& simulation);
-  // For a robot that drives: it stands on the ground plane, if there is one, not where arms have a pedestal.
-  void put_robot_on_ground();
+  // Instead of the height that the scene's file says, m.
+  void put_robot_at(double height) { cfg_.robot.pos[2] = height; }
 
   std::span<const SceneObject> objects() const { return objects_; }
   std::span<const Region> regions() const { return regions_; }

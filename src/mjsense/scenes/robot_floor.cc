@@ -22,6 +22,19 @@ int driving_base(const Robot& robot) {
   return at == robot.groups().end() ? -1 : static_cast<int>(at - robot.groups().begin());
 }
 
+std::optional<double> ground_height(const mjModel* m) {
+  for (int g = 0; g < m->ngeom; ++g) {
+    const bool touches = m->geom_contype[g] || m->geom_conaffinity[g];
+    const int body = m->geom_bodyid[g];
+    if (m->geom_type[g] != mjGEOM_PLANE || !touches || m->body_treeid[body] >= 0) continue;
+    Pose plane{vec3(m->geom_pos + 3 * g), quat(m->geom_quat + 4 * g)};
+    for (int b = body; b > 0; b = m->body_parentid[b])
+      plane = Pose{vec3(m->body_pos + 3 * b), quat(m->body_quat + 4 * b)} * plane;
+    if (rotate(plane.q, {0, 0, 1}).z > 1 - 1e-9) return plane.p.z;
+  }
+  return {};
+}
+
 RestingRobot::RestingRobot(const mjModel* model, const Robot& robot)
     : model_(model), robot_(robot), data_(mj_makeData(model)) {
   if (!data_) throw RuntimeError("out of memory for the model's data");

@@ -6,6 +6,7 @@
 
 #include <functional>
 #include <memory>
+#include <optional>
 
 #include "mjsense/robots/robot.h"
 #include "mjsense/scenes/occupancy.h"
@@ -14,6 +15,9 @@ namespace mjsense {
 
 // Index of the group whose commands are x, y (m) and yaw (rad) of a base on the floor; -1: there is none.
 int driving_base(const Robot& robot);
+
+// Of the level plane on which wheels stand, m; nothing where there is none.
+std::optional<double> ground_height(const mjModel* model);
 
 // The model as it is compiled, the robot's groups at their start positions, on data of its own.
 class RestingRobot {

@@ -19,7 +19,9 @@ void SceneTask::bind(const std::shared_ptr<Simulation>& simulation) {
 
 void SceneTask::initialize_task() {
   scene_.initialize(model(), num_worlds(), robot().prefix());
-  if (driving_base(robot()) >= 0) scene_.put_robot_on_ground();
+  // Wheels stand on the ground, not where the scene has a pedestal for arms.
+  const std::optional<double> ground = ground_height(model());
+  if (ground && driving_base(robot()) >= 0) scene_.put_robot_at(*ground);
 }
 
 void SceneTask::vary_scene(int world) {

@@ -327,6 +327,12 @@ TEST(Opening, WhatAnArmComesNearIsThatOfItsWorld) {
   EXPECT_TRUE(reach.stands_free(reach.start_of(w)));
   const int hand = stage.task.robot().groups()[reach.hands()[0].gripper].root_body;
   const auto touches = [&](int g) { return m->geom_contype[g] || m->geom_conaffinity[g]; };
+  const int base = m->body_weldid[stage.task.robot().base_body()];
+  const auto of_arm = [&](int g) {
+    const int body = m->geom_bodyid[g];
+    return m->body_rootid[body] == m->body_rootid[hand] && m->body_weldid[body] != base &&
+           touches(g);
+  };
   int moved = 0, pad = -1;
   for (int g = 0; g < m->ngeom; ++g) {
     if (is_below(m, m->geom_bodyid[g], hand) && touches(g)) pad = g;
@@ -340,8 +346,7 @@ TEST(Opening, WhatAnArmComesNearIsThatOfItsWorld) {
     const auto nearest = [&] {
       double least = 1;
       for (int a = 0; a < m->ngeom; ++a) {
-        if (m->body_rootid[m->geom_bodyid[a]] != m->body_rootid[hand] || !touches(a)) continue;
-        for (int b = 0; b < m->ngeom; ++b) {
+        for (int b = 0; b < m->ngeom && of_arm(a); ++b) {
           if (is_below(m, m->geom_bodyid[b], top) && touches(b))
             least = std::min(least, mj_geomDistance(m, d, a, b, 1, nullptr));
         }
