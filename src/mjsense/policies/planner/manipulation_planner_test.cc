@@ -7,6 +7,7 @@
 #include <cmath>
 #include <cstdlib>
 #include <cstring>
+#include <set>
 
 #include "mjsense/core/parallel.h"
 #include "mjsense/episode/testing/played_task.h"
@@ -154,6 +155,31 @@ TEST(ManipulationPlanner, AnEpisodeIsTheSameBesideOthers) {
   // Episode 3 is that of the last of five worlds.
   const auto many = play(5, 2);
   EXPECT_EQ(many, play(5, 1));
+}
+
+// Left is +y; the episodes are some in which the object is well aside.
+TEST(ManipulationPlanner, OfTwoArmsTheNearerPicks) {
+  Play play("pick", "bimanual_yam", "", 1);
+  std::set<std::string> used;
+  for (int episode : {5, 12, 14, 18}) {
+    std::string hand;
+    const EpisodeResult result = play.run(0, episode, [&](const World&) {
+      const Action* action = play.task->last_action(0);
+      for (std::size_t g = 0; action && g < play.task->robot().groups().size(); ++g) {
+        const MoveGroup& group = play.task->robot().groups()[g];
+        const GroupValues& command = action->commands[g];
+        if (group.kind == GroupKind::kGripper && command.given &&
+            command.values[0] == group.closed_command)
+          hand = group.name;
+      }
+    });
+    EXPECT_TRUE(result.success) << episode;
+    const double y = play.planner->grasp_pose(0).p.y;
+    EXPECT_GT(std::abs(y), 0.1) << episode;
+    EXPECT_EQ(hand, y > 0 ? "left_gripper" : "right_gripper") << episode;
+    used.insert(hand);
+  }
+  EXPECT_EQ(used.size(), 2u);
 }
 
 // Shoved or slipped, the object is picked up after all, and what opens is opened; which episodes, is a function of their numbers.
