@@ -79,10 +79,15 @@ std::vector<CommandPath> OpeningPlanner::paths(int arm, std::span<const RobotVal
   return out;
 }
 
-// To the pregrasp; there it looks again where the handle is, takes it and goes along.
+// To the pregrasp; there it looks again where the handle is, takes it and goes along. At the end it looks
+// whether that was enough.
 void OpeningPlanner::make_plan(const World& world, const PlanRequest& request, Plan& plan) {
   const int first = request.attempt > 0 ? 1 : 0;  // stage
   if (request.stage < first) return back_off(world, plan);
+  if (request.stage > first + 1) {
+    if (task().evaluate(world).success) plan.wait(kLift, 0);
+    return;
+  }
   const HandleReach& reach = opening_->reach();
   const Articulation& one = opening_->target(world.id);
   const double from = world.data->qpos[one.qpos], to = opening_->aim(one);
@@ -116,6 +121,7 @@ void OpeningPlanner::make_plan(const World& world, const PlanRequest& request, P
           kLift, paths(arm, way.along, way.drive ? cfg_.driving : cfg_.fast, way.drive.has_value()),
           cfg_.settle)
       .holds(hand);
+  plan.more = true;
 }
 
 }  // namespace mjsense
