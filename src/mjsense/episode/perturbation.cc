@@ -9,7 +9,7 @@ namespace {
 
 constexpr int kShoveFirst = 5, kShoveSteps = 20;  // control steps
 constexpr double kSlow = 0.5, kFast = 0.8;        // m/s of a shove
-constexpr int kSlipSteps = 12;                    // after it was lifted
+constexpr int kSlipSteps = 12;                    // after the hand has moved it
 constexpr int kOpenSteps = 6;                     // that the hand is open
 constexpr double kLifted = 0.01;                  // m
 constexpr double kAjar = 0.03;                    // of the range of what opens

@@ -27,11 +27,11 @@ class Perturbation {
   bool happened() const { return happened_at_ >= 0; }
 
  private:
-  Kind kind_ = Kind::kNone;
   static int joint_of(const mjModel* model, int object);
   static double progress(const World& world, int joint);
   void shove(const World& world, int joint, const StateRow& state) const;
 
+  Kind kind_ = Kind::kNone;
   int wait_ = 0;  // steps: a shove's from the start, a slip's since the hand moves the object
   int held_ = 0;
   double direction_ = 0, speed_ = 0;
