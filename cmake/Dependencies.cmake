@@ -55,6 +55,19 @@ if(NOT embree_FOUND)
   mjsense_find(embree 3)
 endif()
 
+# OMPL, which plans ways. Its own package files name headers and libraries that Debian does not install with it.
+find_library(OMPL_LIBRARY ompl)
+find_path(OMPL_INCLUDE ompl/config.h PATH_SUFFIXES ompl-1.5 ompl-1.6)
+find_path(EIGEN_INCLUDE Eigen/Core PATH_SUFFIXES eigen3)
+if(NOT OMPL_LIBRARY OR NOT OMPL_INCLUDE OR NOT EIGEN_INCLUDE)
+  mjsense_missing("libompl not found: apt-get install libompl-dev")
+endif()
+if(NOT TARGET ompl::ompl)
+  add_library(ompl::ompl SHARED IMPORTED GLOBAL)
+  set_target_properties(ompl::ompl PROPERTIES IMPORTED_LOCATION ${OMPL_LIBRARY}
+                                              INTERFACE_INCLUDE_DIRECTORIES "${OMPL_INCLUDE};${EIGEN_INCLUDE}")
+endif()
+
 # The serial HDF5 C library, static, so that a file written here never depends on a user's libhdf5.
 find_library(HDF5_STATIC NAMES libhdf5.a PATHS /usr/lib/x86_64-linux-gnu/hdf5/serial /usr/lib/aarch64-linux-gnu/hdf5/serial)
 find_path(HDF5_INCLUDE hdf5.h PATHS /usr/include/hdf5/serial)
@@ -97,7 +110,7 @@ if(NOT MJSENSE_LINKED STREQUAL MJSENSE_LOADED AND EXISTS "${MJSENSE_LOADED}" AND
   string(APPEND CMAKE_CXX_STANDARD_LIBRARIES " ${MJSENSE_LOADED}")
 endif()
 
-set(MJSENSE_PRIVATE_LIBS fmt::fmt nlohmann_json::nlohmann_json PkgConfig::PCRE2 embree mjsense_hdf5 Threads::Threads)
+set(MJSENSE_PRIVATE_LIBS fmt::fmt nlohmann_json::nlohmann_json PkgConfig::PCRE2 embree ompl::ompl mjsense_hdf5 Threads::Threads)
 if(MJSENSE_STATIC)
   include(StaticLibraries)
 endif()

@@ -3,41 +3,11 @@
 
 #include <algorithm>
 #include <cmath>
-#include <utility>
 
 namespace mjsense {
 namespace {
 
 using Config = std::span<const double>;
-
-// Nodes are rows; parents come first.
-struct Tree {
-  std::size_t n;
-  std::vector<double> nodes;
-  std::vector<int> parents;
-
-  int size() const { return static_cast<int>(parents.size()); }
-  Config node(int i) const { return Config(nodes).subspan(i * n, n); }
-  int add(Config q, int parent) {
-    nodes.insert(nodes.end(), q.begin(), q.end());
-    parents.push_back(parent);
-    return size() - 1;
-  }
-  int nearest(Config q) const {
-    int best = 0;
-    double least = 1e300;
-    for (int i = 0; i < size(); ++i) {
-      double d = 0;
-      for (std::size_t k = 0; k < n; ++k)
-        d += (nodes[i * n + k] - q[k]) * (nodes[i * n + k] - q[k]);
-      if (d < least) {
-        least = d;
-        best = i;
-      }
-    }
-    return best;
-  }
-};
 
 double farthest(Config a, Config b) {
   double d = 0;
@@ -48,62 +18,6 @@ double farthest(Config a, Config b) {
 void mix(Config a, Config b, double s, std::vector<double>& out) {
   out.resize(a.size());
   for (std::size_t k = 0; k < a.size(); ++k) out[k] = a[k] + s * (b[k] - a[k]);
-}
-
-// The node after one step from the tree towards q; -1: something is in the way.
-int extend(Tree& tree, Config q, double step, const FreeSpace& is_free, std::vector<double>& next) {
-  const int near = tree.nearest(q);
-  const double far = farthest(tree.node(near), q);
-  mix(tree.node(near), q, std::min(1.0, step / std::max(far, 1e-12)), next);
-  if (!is_free.at(next) || !is_free.between(tree.node(near), next)) return -1;
-  return tree.add(next, near);
-}
-
-void append(const Tree& tree, int node, std::vector<double>& path) {
-  for (; node >= 0; node = tree.parents[node]) {
-    const Config q = tree.node(node);
-    path.insert(path.end(), q.begin(), q.end());
-  }
-}
-
-// Rows in the opposite order.
-std::vector<double> reversed(std::span<const double> path, std::size_t n) {
-  std::vector<double> out;
-  for (std::size_t i = path.size() / n; i-- > 0;)
-    out.insert(out.end(), path.begin() + i * n, path.begin() + (i + 1) * n);
-  return out;
-}
-
-// Straight lines between two random points of the path, where they are free.
-void shorten(std::vector<double>& path, std::size_t n, const FreeSpace& is_free, Rng& rng,
-             int attempts) {
-  std::vector<double> a, b;
-  for (int k = 0; k < attempts && path.size() > 2 * n; ++k) {
-    const auto legs = static_cast<std::uint32_t>(path.size() / n - 1);
-    std::uint32_t i = rng.below(legs), j = rng.below(legs);
-    const double si = rng.uniform(), sj = rng.uniform();
-    if (i == j) continue;
-    const bool swapped = i > j;
-    if (swapped) std::swap(i, j);
-    const auto row = [&](std::uint32_t r) { return Config(path).subspan(r * n, n); };
-    mix(row(i), row(i + 1), swapped ? sj : si, a);
-    mix(row(j), row(j + 1), swapped ? si : sj, b);
-    if (!is_free.between(a, b)) continue;
-    std::vector<double> shorter(path.begin(), path.begin() + (i + 1) * n);
-    shorter.insert(shorter.end(), a.begin(), a.end());
-    shorter.insert(shorter.end(), b.begin(), b.end());
-    shorter.insert(shorter.end(), path.begin() + (j + 1) * n, path.end());
-    path = std::move(shorter);
-  }
-  // Waypoints that are not needed.
-  for (std::size_t i = 1; i + 1 < path.size() / n;) {
-    const auto row = [&](std::size_t r) { return Config(path).subspan(r * n, n); };
-    if (is_free.between(row(i - 1), row(i + 1))) {
-      path.erase(path.begin() + i * n, path.begin() + (i + 1) * n);
-    } else {
-      ++i;
-    }
-  }
 }
 
 // (1-s)^2 a + 2 s (1-s) c + s^2 b: from a to b, beginning and ending in the direction of c.
@@ -184,42 +98,6 @@ double excess(const JointSpace& space, const CommandPath& path) {
 }
 
 }  // namespace
-
-std::vector<double> find_path(const JointSpace& space, std::span<const double> start,
-                              std::span<const double> goal, const FreeSpace& is_free, Rng& rng,
-                              const MotionCfg& cfg) {
-  const std::size_t n = space.size();
-  std::vector<double> path(start.begin(), start.end());
-  if (is_free.between(start, goal)) {
-    path.insert(path.end(), goal.begin(), goal.end());
-    return path;
-  }
-  Tree trees[2] = {{n, {}, {}}, {n, {}, {}}};
-  trees[0].add(start, -1);
-  trees[1].add(goal, -1);
-  std::vector<double> sample(n), next;
-  int grow = 0;
-  for (int k = 0; k < cfg.max_samples && trees[0].size() + trees[1].size() < cfg.max_nodes;
-       ++k, grow = 1 - grow) {
-    for (std::size_t i = 0; i < n; ++i) sample[i] = rng.uniform(space.low[i], space.high[i]);
-    const int a = extend(trees[grow], sample, cfg.step, is_free, next);
-    if (a < 0) continue;
-    const std::vector<double> wanted = next;
-    int b = 0;
-    do {
-      b = extend(trees[1 - grow], wanted, cfg.step, is_free, next);
-    } while (b >= 0 && farthest(next, wanted) > 1e-9);
-    if (b < 0) continue;
-    path.clear();
-    append(trees[0], grow == 0 ? a : b, path);
-    path = reversed(path, n);
-    path.resize(path.size() - n);  // the place where they meet is in both
-    append(trees[1], grow == 0 ? b : a, path);
-    shorten(path, n, is_free, rng, cfg.shortcuts);
-    return path;
-  }
-  return {};
-}
 
 CommandPath time_path(const JointSpace& space, int group, std::span<const double> waypoints,
                       const FreeSpace& is_free,

@@ -1,9 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 // Ways through joint space: found by growing two trees towards each other (RRT-Connect: Kuffner and LaValle, ICRA
-// 2000), shortened, rounded, and given times within the limits of the joints. All is a function of the Rng. OMPL has
-// the same planner, and is no slower (motion_bench.cc); its shared library, with ODE and two of Boost, would ask more
-// of a machine than the Python wheel may.
+// 2000; OMPL's), shortened, rounded, and given times within the limits of the joints. All is a function of the Rng.
 
 #include <functional>
 #include <span>
@@ -22,9 +20,8 @@ struct JointSpace {
 };
 
 struct MotionCfg {
-  int max_nodes = 1500;  // of both trees
   int max_samples = 3000;
-  double step = 0.35;  // rad or m, longest edge of a tree in one joint
+  double step = 0.6;  // rad or m, longest edge of a tree, of all joints together
   int shortcuts = 40;
   double rounding = 0.25;  // share of a leg that a corner takes at most
 };

@@ -1,19 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
-// Ways of a Franka among clutter that are not straight: ours, and OMPL's RRT-Connect (libompl-dev, where it is
-// installed) with the same questions about collisions, the same longest edge, and samples from the same generator.
+// Ways of a Franka among clutter that are not straight: how long they take to find, how often collisions are asked
+// about, how long they are and how long the arm takes.
 //   mjsense_bench --benchmark_filter=Ways
 
 #include <benchmark/benchmark.h>
-
-#ifdef MJSENSE_BENCH_OMPL
-#include <ompl/base/ScopedState.h>
-#include <ompl/base/goals/GoalState.h>
-#include <ompl/base/spaces/RealVectorStateSpace.h>
-#include <ompl/datastructures/NearestNeighborsLinear.h>
-#include <ompl/geometric/PathSimplifier.h>
-#include <ompl/geometric/planners/rrt/RRTConnect.h>
-#include <ompl/util/Console.h>
-#endif
 
 #include <algorithm>
 #include <chrono>
@@ -84,8 +74,9 @@ struct Clutter {
 // What a way has cost, and how good it is.
 struct Found {
   bool solved = false;
-  double ms = 0, length = 0;  // length in rad
-  long asked = 0;             // configurations and pieces between two
+  double ms = 0;
+  double length = 0, seconds = 0;  // rad; of the motion
+  long asked = 0;                  // configurations and pieces between two
 };
 
 double length_of(std::span<const double> path, std::size_t n) {
@@ -99,102 +90,6 @@ double length_of(std::span<const double> path, std::size_t n) {
   return sum;
 }
 
-using Finder = std::vector<double> (*)(const JointSpace&, const Problem&, const FreeSpace&, Rng&);
-
-std::vector<double> ours(const JointSpace& joints, const Problem& p, const FreeSpace& free,
-                         Rng& rng) {
-  return find_path(joints, p.start, p.goal, free, rng);
-}
-
-#ifdef MJSENSE_BENCH_OMPL
-namespace ob = ompl::base;
-namespace og = ompl::geometric;
-
-Config view(const ob::State* state, std::size_t n) {
-  return {state->as<ob::RealVectorStateSpace::StateType>()->values, n};
-}
-
-struct Samples : ob::StateSampler {
-  Samples(const ob::StateSpace* space, const JointSpace& joints, Rng& rng)
-      : StateSampler(space), joints(joints), rng(rng) {}
-  void sampleUniform(ob::State* state) override {
-    double* q = state->as<ob::RealVectorStateSpace::StateType>()->values;
-    for (std::size_t i = 0; i < joints.size(); ++i)
-      q[i] = rng.uniform(joints.low[i], joints.high[i]);
-  }
-  void sampleUniformNear(ob::State* state, const ob::State*, double) override {
-    sampleUniform(state);
-  }
-  void sampleGaussian(ob::State* state, const ob::State*, double) override { sampleUniform(state); }
-  const JointSpace& joints;
-  Rng& rng;
-};
-
-struct Motions : ob::MotionValidator {
-  Motions(const ob::SpaceInformationPtr& si, const FreeSpace& free, std::size_t n)
-      : MotionValidator(si), free(free), n(n) {}
-  // As OMPL's own: the beginning is known to be free.
-  bool checkMotion(const ob::State* a, const ob::State* b) const override {
-    return free.at(view(b, n)) && free.between(view(a, n), view(b, n));
-  }
-  bool checkMotion(const ob::State* a, const ob::State* b,
-                   std::pair<ob::State*, double>&) const override {
-    return checkMotion(a, b);
-  }
-  const FreeSpace& free;
-  std::size_t n;
-};
-
-struct Shortcuts : og::PathSimplifier {
-  Shortcuts(const ob::SpaceInformationPtr& si, Rng& rng) : PathSimplifier(si) {
-    rng_.setLocalSeed(rng.below(1u << 30));
-  }
-};
-
-std::vector<double> ompls(const JointSpace& joints, const Problem& p, const FreeSpace& free,
-                          Rng& rng) {
-  const std::size_t n = joints.size();
-  const MotionCfg cfg;
-  auto space = std::make_shared<ob::RealVectorStateSpace>(n);
-  ob::RealVectorBounds bounds(n);
-  bounds.low = joints.low;
-  bounds.high = joints.high;
-  space->setBounds(bounds);
-  space->setStateSamplerAllocator([&](const ob::StateSpace* s) -> ob::StateSamplerPtr {
-    return std::make_shared<Samples>(s, joints, rng);
-  });
-  auto si = std::make_shared<ob::SpaceInformation>(space);
-  si->setStateValidityChecker([&](const ob::State* s) { return free.at(view(s, n)); });
-  si->setMotionValidator(std::make_shared<Motions>(si, free, n));
-  si->setup();
-  auto task = std::make_shared<ob::ProblemDefinition>(si);
-  ob::ScopedState<ob::RealVectorStateSpace> start(space), goal(space);
-  std::ranges::copy(p.start, start->values);
-  std::ranges::copy(p.goal, goal->values);
-  task->setStartAndGoalStates(start, goal);
-  if (free.between(p.start, p.goal)) return {};  // asked by both
-  og::RRTConnect planner(si);
-  // Its distances are Euclidean; ours are the greatest of a joint.
-  planner.setRange(cfg.step * std::sqrt(static_cast<double>(n)) / 1.5);
-  planner.setNearestNeighbors<ompl::NearestNeighborsLinear>();
-  planner.setProblemDefinition(task);
-  planner.setup();
-  int samples = 0;
-  const ob::PlannerStatus status =
-      planner.solve(ob::PlannerTerminationCondition([&] { return ++samples > cfg.max_samples; }));
-  if (status != ob::PlannerStatus::EXACT_SOLUTION) return {};
-  auto& way = *task->getSolutionPath()->as<og::PathGeometric>();
-  Shortcuts shortcuts(si, rng);
-  shortcuts.shortcutPath(way, cfg.shortcuts, cfg.shortcuts, 0.33, 0);
-  std::vector<double> path;
-  for (const ob::State* state : way.getStates()) {
-    const Config q = view(state, n);
-    path.insert(path.end(), q.begin(), q.end());
-  }
-  return path;
-}
-#endif
-
 double median(std::vector<double> values) {
   if (values.empty()) return 0;
   std::ranges::nth_element(values, values.begin() + values.size() / 2);
@@ -202,11 +97,12 @@ double median(std::vector<double> values) {
 }
 
 // All problems an iteration.
-void ways(benchmark::State& state, Finder find) {
+void ways(benchmark::State& state) {
   static Clutter clutter;
   std::vector<Found> all;
   for (auto _ : state) {
     for (int k = 0; k < kProblems; ++k) {
+      const Problem& problem = clutter.problems[k];
       CollisionQuery query = clutter.ask();
       Found found;
       const FreeSpace free{
@@ -214,38 +110,33 @@ void ways(benchmark::State& state, Finder find) {
           [&](Config a, Config b) { return ++found.asked, query.free_between(a, b); }};
       Rng rng(k, 0, 0, 0);
       const auto begin = std::chrono::steady_clock::now();
-      const std::vector<double> path = find(clutter.joints, clutter.problems[k], free, rng);
+      const std::vector<double> path =
+          find_path(clutter.joints, problem.start, problem.goal, free, rng);
       found.ms = std::chrono::duration<double, std::milli>(std::chrono::steady_clock::now() - begin)
                      .count();
       found.solved = !path.empty();
       found.length = length_of(path, clutter.joints.size());
+      if (found.solved) found.seconds = time_path(clutter.joints, 0, path, free).times.back();
       all.push_back(found);
     }
   }
-  std::vector<double> ms, asked, length;
+  std::vector<double> ms, asked, length, seconds;
   for (const Found& one : all) {
     ms.push_back(one.ms);
     asked.push_back(static_cast<double>(one.asked));
-    if (one.solved) length.push_back(one.length);
+    if (!one.solved) continue;
+    length.push_back(one.length);
+    seconds.push_back(one.seconds);
   }
   state.counters["solved_%"] =
       100.0 * static_cast<double>(length.size()) / static_cast<double>(all.size());
   state.counters["median_ms"] = median(ms);
   state.counters["median_asked"] = median(asked);
   state.counters["median_rad"] = median(length);
+  state.counters["median_s"] = median(seconds);
 }
 
-BENCHMARK_CAPTURE(ways, ours, ours)
-    ->Name("Ways/ours")
-    ->Iterations(3)
-    ->Unit(benchmark::kMillisecond);
-#ifdef MJSENSE_BENCH_OMPL
-BENCHMARK_CAPTURE(ways, ompl, ompls)
-    ->Name("Ways/ompl")
-    ->Iterations(3)
-    ->Unit(benchmark::kMillisecond)
-    ->Setup([](const benchmark::State&) { ompl::msg::noOutputHandler(); });
-#endif
+BENCHMARK(ways)->Name("Ways")->Iterations(3)->Unit(benchmark::kMillisecond);
 
 }  // namespace
 }  // namespace mjsense

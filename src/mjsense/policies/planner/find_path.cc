@@ -1,0 +1,157 @@
+// SPDX-License-Identifier: Apache-2.0
+// OMPL's RRT-Connect and its shortcuts, with our questions about collisions and every random number from ours.
+#include <ompl/base/ProblemDefinition.h>
+#include <ompl/base/ScopedState.h>
+#include <ompl/base/SpaceInformation.h>
+#include <ompl/base/spaces/RealVectorStateSpace.h>
+#include <ompl/datastructures/NearestNeighborsLinear.h>
+#include <ompl/geometric/PathGeometric.h>
+#include <ompl/geometric/PathSimplifier.h>
+#include <ompl/geometric/planners/rrt/RRTConnect.h>
+#include <ompl/util/Console.h>
+
+#include <algorithm>
+#include <memory>
+
+#include "mjsense/policies/planner/motion.h"
+
+namespace mjsense {
+namespace {
+
+namespace ob = ompl::base;
+namespace og = ompl::geometric;
+using Config = std::span<const double>;
+using Joints = ob::RealVectorStateSpace;
+
+Config view(const ob::SpaceInformation& info, const ob::State* state) {
+  return {state->as<Joints::StateType>()->values, info.getStateDimension()};
+}
+
+// Uniform within the limits. RRT-Connect asks for nothing else.
+class Samples : public ob::StateSampler {
+ public:
+  Samples(const ob::StateSpace* space, const JointSpace& joints, Rng& rng)
+      : StateSampler(space), joints_(joints), rng_(rng) {}
+  void sampleUniform(ob::State* state) override {
+    double* q = state->as<Joints::StateType>()->values;
+    for (std::size_t i = 0; i < joints_.size(); ++i)
+      q[i] = rng_.uniform(joints_.low[i], joints_.high[i]);
+  }
+  void sampleUniformNear(ob::State* state, const ob::State*, double) override {
+    sampleUniform(state);
+  }
+  void sampleGaussian(ob::State* state, const ob::State*, double) override { sampleUniform(state); }
+
+ private:
+  const JointSpace& joints_;
+  Rng& rng_;
+};
+
+// Motions between two places, of which the first is known to be free.
+class Motions : public ob::MotionValidator {
+ public:
+  Motions(const ob::SpaceInformationPtr& info, const FreeSpace& free)
+      : MotionValidator(info), free_(free) {}
+  bool checkMotion(const ob::State* a, const ob::State* b) const override {
+    return si_->isValid(b) && free_.between(view(*si_, a), view(*si_, b));
+  }
+  bool checkMotion(const ob::State* a, const ob::State* b,
+                   std::pair<ob::State*, double>&) const override {
+    return checkMotion(a, b);
+  }
+
+ private:
+  const FreeSpace& free_;
+};
+
+class Shortcuts : public og::PathSimplifier {
+ public:
+  Shortcuts(const ob::SpaceInformationPtr& info, Rng& rng) : PathSimplifier(info) {
+    rng_.setLocalSeed(rng.next());
+  }
+};
+
+// Shares of the way's length: how far a shortcut may lead, and how near a point its ends are that point.
+constexpr double kReach = 1.0, kSnap = 0.2;
+
+// Points whose neighbours see each other.
+void drop_needless(const ob::SpaceInformation& info, const FreeSpace& is_free,
+                   std::vector<ob::State*>& way) {
+  for (std::size_t i = 1; i + 1 < way.size();) {
+    if (is_free.between(view(info, way[i - 1]), view(info, way[i + 1]))) {
+      info.freeState(way[i]);
+      way.erase(way.begin() + static_cast<std::ptrdiff_t>(i));
+    } else {
+      ++i;
+    }
+  }
+}
+
+// The planner says at every call that it begins and what it has built: for who looks for a fault.
+void keep_quiet() {
+  static const bool once = [] {
+    ompl::msg::setLogLevel(std::max(ompl::msg::getLogLevel(), ompl::msg::LOG_WARN));
+    return true;
+  }();
+  static_cast<void>(once);
+}
+
+}  // namespace
+
+std::vector<double> find_path(const JointSpace& space, std::span<const double> start,
+                              std::span<const double> goal, const FreeSpace& is_free, Rng& rng,
+                              const MotionCfg& cfg) {
+  std::vector<double> path(start.begin(), start.end());
+  if (is_free.between(start, goal)) {
+    path.insert(path.end(), goal.begin(), goal.end());
+    return path;
+  }
+  keep_quiet();
+  const auto joints = std::make_shared<Joints>(space.size());
+  // A joint may stand a hair beyond its limit; OMPL would not begin there.
+  ob::RealVectorBounds bounds(space.size());
+  for (std::size_t i = 0; i < space.size(); ++i) {
+    bounds.low[i] = std::min({space.low[i], start[i], goal[i]});
+    bounds.high[i] = std::max({space.high[i], start[i], goal[i]});
+  }
+  joints->setBounds(bounds);
+  joints->setStateSamplerAllocator(
+      [&](const ob::StateSpace* s) { return std::make_shared<Samples>(s, space, rng); });
+  const auto info = std::make_shared<ob::SpaceInformation>(joints);
+  // Both ends are given, whatever they touch.
+  info->setStateValidityChecker([&](const ob::State* state) {
+    const Config q = view(*info, state);
+    return std::ranges::equal(q, start) || std::ranges::equal(q, goal) || is_free.at(q);
+  });
+  info->setMotionValidator(std::make_shared<Motions>(info, is_free));
+  info->setup();
+
+  ob::ScopedState<Joints> from(joints), to(joints);
+  std::ranges::copy(start, from->values);
+  std::ranges::copy(goal, to->values);
+  const auto problem = std::make_shared<ob::ProblemDefinition>(info);
+  problem->setStartAndGoalStates(from, to);
+  og::RRTConnect planner(info);
+  planner.setRange(cfg.step);
+  // The others, for larger trees, draw random numbers of their own.
+  planner.setNearestNeighbors<ompl::NearestNeighborsLinear>();
+  planner.setProblemDefinition(problem);
+  int samples = 0;
+  const ob::PlannerTerminationCondition enough([&] { return ++samples > cfg.max_samples; });
+  if (planner.solve(enough) != ob::PlannerStatus::EXACT_SOLUTION) return {};
+
+  auto& way = *problem->getSolutionPath()->as<og::PathGeometric>();
+  // Of a hundred ways among clutter (motion_bench.cc) the least time, theirs and the arm's, was with these numbers.
+  Shortcuts shortcuts(info, rng);
+  shortcuts.reduceVertices(way);
+  shortcuts.shortcutPath(way, cfg.shortcuts, cfg.shortcuts, kReach, kSnap);
+  drop_needless(*info, is_free, way.getStates());
+  path.clear();
+  for (const ob::State* state : way.getStates()) {
+    const Config q = view(*info, state);
+    path.insert(path.end(), q.begin(), q.end());
+  }
+  return path;
+}
+
+}  // namespace mjsense
