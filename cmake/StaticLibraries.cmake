@@ -22,10 +22,18 @@ endfunction()
 mjsense_static(mjsense_static_fmt fmt::fmt ${MJSENSE_STATIC_DIR}/libfmt.a)
 mjsense_static(mjsense_static_pcre2 PkgConfig::PCRE2 ${PCRE2_STATIC})
 mjsense_static(mjsense_static_embree embree ${MJSENSE_STATIC_DIR}/libembree.a)
+mjsense_static(mjsense_static_ompl ompl::ompl ${MJSENSE_STATIC_DIR}/libompl.a)
 mjsense_static(mjsense_static_hdf5 mjsense_hdf5 ${HDF5_STATIC} ${SZ_STATIC} ${AEC_STATIC} ${ZLIB_STATIC} ${CMAKE_DL_LIBS} m)
 set(MJSENSE_PRIVATE_LIBS mjsense_static_fmt nlohmann_json::nlohmann_json mjsense_static_pcre2 mjsense_static_embree
-                         mjsense_static_hdf5 Threads::Threads)
+                         mjsense_static_ompl mjsense_static_hdf5 Threads::Threads)
 
 # libstdc++ inside as well, and glibc's names as they were in the version that packaging/libraries.sh chose.
 set(MJSENSE_STATIC_LINK -static-libstdc++ -L${MJSENSE_STATIC_DIR}/glibc -Wl,-rpath-link,${MJSENSE_STATIC_DIR}/glibc
-                        -Wl,--version-script=${PROJECT_SOURCE_DIR}/packaging/exports.map -pthread)
+                        -Wl,--version-script=${PROJECT_SOURCE_DIR}/packaging/exports.map -Wl,--gc-sections -pthread)
+
+# Their licences go with them, into the wheel.
+foreach(package fmt nlohmann-json3 cli11 tomlplusplus pcre2 embree ompl eigen3 boost hdf5 aec zlib1g)
+  find_file(MJSENSE_LICENCE_${package} copyright PATHS /usr/share/doc/lib${package}-dev /usr/share/doc/${package}-dev
+            NO_DEFAULT_PATH REQUIRED)
+  install(FILES ${MJSENSE_LICENCE_${package}} DESTINATION ${SKBUILD_METADATA_DIR}/licenses RENAME ${package} COMPONENT python)
+endforeach()

@@ -1,6 +1,6 @@
 #!/usr/bin/env bash
 # What the wheel is linked with, into build/wheel/lib; fast when it is there:
-#   Embree and fmt, static, from Debian's sources of the very versions whose headers apt.txt installs;
+#   Embree, fmt and OMPL, static, from Debian's sources of the very versions whose headers apt.txt installs;
 #   glibc 2.28 as a linker sees it (names and versions, no code), from ziglang, so that the wheel runs wherever that is.
 # Every other static library comes with Debian's -dev packages. usage: packaging/libraries.sh PYTHON_WITH_ZIGLANG
 set -euo pipefail
@@ -71,6 +71,22 @@ build_fmt() {
   ar rcs "$lib/libfmt.a" "$work/src/fmt.o"
 }
 
+build_ompl() {
+  local src includes
+  src=$(fetch ompl libompl-dev)/src/ompl
+  includes=$(echo /usr/include/ompl-1.*)
+  # RRT-Connect and what it names; the linker drops from that what is not called (other planners, spaces).
+  (cd "$src" && ls base/src/*.cpp {base/goals,base/samplers,base/samplers/informed,base/spaces,util}/src/*.cpp \
+    base/objectives/src/PathLength*.cpp base/spaces/constraint/src/ConstrainedStateSpace.cpp \
+    geometric/src/Path{Geometric,Simplifier}.cpp geometric/planners/rrt/src/RRTConnect.cpp tools/config/src/SelfConfig.cpp |
+    grep -v -E 'PlannerData|StateStorage|PrecomputedStateSampler' && echo "$OLDPWD/packaging/ompl_without_boost.cc") > "$work/ompl.files"
+  rm -rf "$work/ompl" "$lib/libompl.a"
+  mkdir "$work/ompl"
+  (cd "$src" && xargs -P "$jobs" -I FILE sh -c 'ccache g++ -std=c++17 -O2 -fPIC -ffunction-sections -fdata-sections -w \
+    -isystem "$0" -isystem /usr/include/eigen3 -c FILE -o "$1/$(basename FILE).o"' "$includes" "$work/ompl" < "$work/ompl.files")
+  ar rcs "$lib/libompl.a" "$work"/ompl/*.o
+}
+
 build_glibc() {
   local cache=$work/zig stubs=$lib/glibc name
   rm -rf "$stubs" "$cache"
@@ -95,4 +111,5 @@ once() {
 }
 once "$lib/libembree.a" "building Embree" build_embree
 once "$lib/libfmt.a" "building fmt" build_fmt
+once "$lib/libompl.a" "building OMPL" build_ompl
 once "$lib/glibc/libc.so" "preparing glibc $glibc" build_glibc
