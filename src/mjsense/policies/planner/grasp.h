@@ -52,7 +52,8 @@ std::vector<Grasp> propose_grasps(const GripperShape& gripper, const ObjectShape
 
 // Grasps of an object in its own frame, whatever it stands on: closing directions all over the
 // sphere, sixteen approaches about each; chosen by the same faces. The open gripper touches the object in none.
-// `cost` is 20 * distance to the object's origin (m) + 4 * slope of the faces.
+// `cost` is 8 * distance to the object's origin (m) + 4 * slope of the faces (without it RB-Y1 began 6 of
+// 50 picks again instead of 1).
 std::vector<Grasp> grasps_all_around(const GripperShape& gripper, const ObjectShape& shape);
 
 // The grasps of an object at X_WO in the world, by rising cost = distance to the tool (m) + 0.01 * turn (deg) - 2

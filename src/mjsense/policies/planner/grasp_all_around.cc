@@ -98,7 +98,7 @@ std::vector<Grasp> grasps_all_around(const GripperShape& gripper, const ObjectSh
           grasp.pose = {center + (0.5 * (s.low + s.high)) * close,
                         quat_from_columns(cross(close, approach), close, approach)};
           grasp.width = width;
-          grasp.cost = 20.0 * norm(grasp.pose.p) + std::min(kMostSlope, kSlope * std::abs(s.slope));
+          grasp.cost = 8.0 * norm(grasp.pose.p) + std::min(kMostSlope, kSlope * std::abs(s.slope));
           if (!gripper.hits(grasp.pose, {}, shape, 0.0)) grasps.push_back(grasp);
         }
       }
