@@ -7,6 +7,7 @@
 #include <unistd.h>
 
 #include <algorithm>
+#include <atomic>
 #include <cerrno>
 #include <cstdio>
 #include <cstring>
@@ -165,13 +166,15 @@ bool write_all(const Fd& file, std::span<const std::byte> bytes) {
 void write_file(const std::filesystem::path& path,
                 std::initializer_list<std::span<const std::byte>> pieces) {
   const FileLimitIsError limit;
-  const std::string part = path.string() + ".part";
+  // A name of its own: others, in this process or elsewhere, may be writing the same file.
+  static std::atomic<unsigned> calls = 0;
+  const std::string part = fmt::format("{}.{}-{}.part", path.string(), getpid(), ++calls);
   const auto fail = [&] {
     const int error = errno;
     unlink(part.c_str());
     throw RuntimeError(fmt::format("cannot write '{}': {}", path.string(), std::strerror(error)));
   };
-  unlink(part.c_str());  // of an earlier attempt, or a link that leads elsewhere
+  unlink(part.c_str());  // of a process of that number, or a link that leads elsewhere
   Fd file(open(part.c_str(), O_WRONLY | O_CREAT | O_EXCL | O_NOFOLLOW | O_CLOEXEC, 0644));
   if (!file) fail();
   for (const std::span<const std::byte> piece : pieces) {

@@ -7,8 +7,10 @@
 #include <sys/resource.h>
 #include <sys/stat.h>
 #include <sys/wait.h>
+#include <unistd.h>
 
 #include <fstream>
+#include <thread>
 
 #include "mjsense/core/error.h"
 #include "mjsense/core/parallel.h"
@@ -89,7 +91,8 @@ TEST(PlainFile, WrittenWholeOrNotAtAll) {
   testing::TempDir dir;
   const std::filesystem::path mine = dir.path / "mine", out = dir.path / "out";
   std::ofstream(mine) << "mine";
-  std::filesystem::create_symlink(mine, dir.path / "out.part");  // planted
+  for (int i = 1; i < 50; ++i)  // planted
+    std::filesystem::create_symlink(mine, fmt::format("{}.{}-{}.part", out.string(), getpid(), i));
   const std::string text = "text";
   write_file(out, {std::as_bytes(std::span(text)), std::as_bytes(std::span(text))});
   EXPECT_EQ(std::filesystem::file_size(out), 8u);
@@ -101,6 +104,23 @@ TEST(PlainFile, WrittenWholeOrNotAtAll) {
   } catch (const RuntimeError& e) {
     EXPECT_THAT(e.what(), StartsWith("cannot write '"));
   }
+}
+
+TEST(PlainFile, WrittenByTwoAtOnce) {
+  testing::TempDir dir;
+  const std::filesystem::path out = dir.path / "out";
+  const auto write = [&](char letter) {
+    const std::string text(100'000, letter);
+    for (int i = 0; i < 200; ++i) {
+      write_file(out, {std::as_bytes(std::span(text))});
+      const std::string found = read_text_file(out);
+      EXPECT_EQ(found, std::string(found.size(), found[0]));
+      EXPECT_EQ(found.size(), text.size());
+    }
+  };
+  std::thread other(write, 'a');
+  write('b');
+  other.join();
 }
 
 TEST(PlainFile, PrintableText) {
