@@ -35,5 +35,7 @@ set(MJSENSE_STATIC_LINK -static-libstdc++ -L${MJSENSE_STATIC_DIR}/glibc -Wl,-rpa
 foreach(package fmt nlohmann-json3 cli11 tomlplusplus pcre2 embree ompl eigen3 boost hdf5 aec zlib1g)
   find_file(MJSENSE_LICENCE_${package} copyright PATHS /usr/share/doc/lib${package}-dev /usr/share/doc/${package}-dev
             NO_DEFAULT_PATH REQUIRED)
-  install(FILES ${MJSENSE_LICENCE_${package}} DESTINATION ${SKBUILD_METADATA_DIR}/licenses RENAME ${package} COMPONENT python)
+  if(SKBUILD)
+    install(FILES ${MJSENSE_LICENCE_${package}} DESTINATION ${SKBUILD_METADATA_DIR}/licenses RENAME ${package} COMPONENT python)
+  endif()
 endforeach()
