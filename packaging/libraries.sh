@@ -48,9 +48,11 @@ build_embree() {
   src=$(fetch embree libembree-dev)
   # Rays meet triangles and thick lines; other curves take most of the time that it compiles.
   sed -i -E '/vtbl\[Geometry::GTY_/{/GTY_ROUND_LINEAR_CURVE/!d}' "$src"/kernels/geometry/curve_intersector_virtual_*.cpp
-  # What is compiled for AVX alone is wanted by AVX2, too.
+  # What is compiled for AVX alone is compiled for AVX2 instead, and chosen there.
   sed -i 's/SET(ISA_LOWEST_AVX 2)/SET(ISA_LOWEST_AVX 3)/' "$src/CMakeLists.txt"
   sed -i 's/^  IF (${ISA} EQUAL ${AVX})$/  IF (${ISA} EQUAL ${ISA_LOWEST_AVX})/' "$src/kernels/CMakeLists.txt"
+  sed -i 's/^#define SELECT_SYMBOL_AVX(features,intersector)$/& if ((features \& AVX2) == AVX2) intersector = avx2::intersector;/' \
+    "$src/kernels/common/isa.h"
   local unused=() name
   for name in QUAD GRID SUBDIVISION INSTANCE USER POINT; do unused+=("-DEMBREE_GEOMETRY_$name=OFF"); done
   cmake -S "$src" -B "$work/embree" -G Ninja -Wno-dev -DCMAKE_BUILD_TYPE=Release -DCMAKE_POSITION_INDEPENDENT_CODE=ON \

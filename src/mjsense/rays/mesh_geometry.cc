@@ -4,6 +4,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <cstdlib>
 #include <limits>
 #include <mutex>
 
@@ -27,6 +28,12 @@ std::array<float, 6> box_around(std::span<const float> vertices) {
   return box;
 }
 
+// In Embree's words, of this thread.
+std::string& last_error() {
+  thread_local std::string text;
+  return text;
+}
+
 }  // namespace
 
 std::shared_ptr<RTCDeviceTy> ray_device() {
@@ -35,18 +42,31 @@ std::shared_ptr<RTCDeviceTy> ray_device() {
   const std::lock_guard lock(mutex);
   if (auto device = kept.lock()) return device;
   // One thread: a BVH, and with it every answer, is the same on every machine.
-  std::shared_ptr<RTCDeviceTy> device(rtcNewDevice("threads=1"), [](RTCDevice d) {
+  std::string settings = "threads=1";
+  if (const char* more = std::getenv("MJSENSE_EMBREE")) settings += fmt::format(",{}", more);
+  std::shared_ptr<RTCDeviceTy> device(rtcNewDevice(settings.c_str()), [](RTCDevice d) {
     if (d) rtcReleaseDevice(d);
   });
   if (!device)
     throw RuntimeError(fmt::format("ray scene: Embree gave no device (error {})",
                                    static_cast<int>(rtcGetDeviceError(nullptr))));
+  rtcSetDeviceErrorFunction(
+      device.get(), [](void*, RTCError, const char* text) { last_error() = text ? text : ""; },
+      nullptr);
   kept = device;
   return device;
 }
 
+void check_built(RTCDevice device, const std::string& what) {
+  if (const RTCError error = rtcGetDeviceError(device))
+    throw RuntimeError(fmt::format("ray scene: Embree could not build {}: {} (error {})", what,
+                                   last_error(), static_cast<int>(error)));
+}
+
 SceneHandle build_triangles(RTCDevice device, std::span<const float> vertices,
                             std::span<const int> faces) {
+  const std::string what =
+      fmt::format("a mesh of {} vertices and {} faces", vertices.size() / 3, faces.size() / 3);
   SceneHandle scene(rtcNewScene(device));
   rtcSetSceneFlags(scene.get(), kSceneFlags);
   rtcSetSceneBuildQuality(scene.get(), RTC_BUILD_QUALITY_HIGH);
@@ -55,16 +75,17 @@ SceneHandle build_triangles(RTCDevice device, std::span<const float> vertices,
                                     3 * sizeof(float), vertices.size() / 3);
   void* f = rtcSetNewGeometryBuffer(geometry, RTC_BUFFER_TYPE_INDEX, 0, RTC_FORMAT_UINT3,
                                     3 * sizeof(int), faces.size() / 3);
-  if (v == nullptr || f == nullptr)
-    throw RuntimeError(
-        fmt::format("ray scene: Embree could not allocate a mesh of {} vertices and {} faces",
-                    vertices.size() / 3, faces.size() / 3));
+  if (v == nullptr || f == nullptr) {
+    rtcReleaseGeometry(geometry);
+    check_built(device, what);
+  }
   std::ranges::copy(vertices, static_cast<float*>(v));
   std::ranges::copy(faces, static_cast<int*>(f));
   rtcCommitGeometry(geometry);
   rtcAttachGeometry(scene.get(), geometry);
   rtcReleaseGeometry(geometry);
   rtcCommitScene(scene.get());
+  check_built(device, what);
   return scene;
 }
 

@@ -6,6 +6,7 @@
 #include <array>
 #include <memory>
 #include <span>
+#include <string>
 
 #include "mjsense/rays/clusters.h"
 #include "mjsense/rays/embree.h"
@@ -21,10 +22,15 @@ struct SceneRelease {
 using DeviceHandle = std::unique_ptr<RTCDeviceTy, DeviceRelease>;
 using SceneHandle = std::unique_ptr<RTCSceneTy, SceneRelease>;
 
-// That of the process, which ends with the last that holds it. Throws RuntimeError.
+// That of the process, which ends with the last that holds it. The environment variable MJSENSE_EMBREE adds to
+// its settings (max_isa=avx2). Throws RuntimeError.
 std::shared_ptr<RTCDeviceTy> ray_device();
 
-// A scene of one triangle mesh; positions [n, 3] and indices [m, 3] are copied.
+// Embree only notes what went wrong, and rays would meet nothing: throws RuntimeError if it did in this thread
+// since the last check. `what` was to be built.
+void check_built(RTCDevice device, const std::string& what);
+
+// A scene of one triangle mesh; positions [n, 3] and indices [m, 3] are copied. Throws RuntimeError.
 SceneHandle build_triangles(RTCDevice device, std::span<const float> vertices,
                             std::span<const int> faces);
 

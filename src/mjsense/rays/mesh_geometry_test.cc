@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "mjsense/core/by_content.h"
+#include "mjsense/core/error.h"
 
 namespace mjsense {
 namespace {
@@ -34,6 +35,32 @@ TEST(MeshGeometry, OtherContentIsAnother) {
   std::vector<int> turned = kFaces;
   std::swap(turned[0], turned[1]);
   EXPECT_NE(a, mesh_geometry(kVertices, turned, true));
+}
+
+// Embree itself says nothing, and rays would meet nothing. Memory ends at one allocation after the other.
+TEST(MeshGeometry, WhatEmbreeCannotBuildIsAnError) {
+  const auto device = ray_device();
+  int allowed = 0, left = 0;
+  rtcSetDeviceMemoryMonitorFunction(
+      device.get(),
+      [](void* count, ssize_t bytes, bool) {
+        return bytes <= 0 || --*static_cast<int*>(count) >= 0;
+      },
+      &left);
+  for (bool built = false; !built; ++allowed) {
+    ASSERT_LT(allowed, 100);
+    left = allowed;
+    try {
+      built = build_triangles(device.get(), kVertices, kFaces) != nullptr;
+      EXPECT_GE(left, 0);
+    } catch (const RuntimeError& error) {
+      EXPECT_STREQ(error.what(),
+                   "ray scene: Embree could not build a mesh of 4 vertices and 4 faces: memory "
+                   "monitor forced termination (error 4)");
+    }
+  }
+  EXPECT_GT(allowed, 3);  // the buffers', and the tree's
+  rtcSetDeviceMemoryMonitorFunction(device.get(), nullptr, nullptr);
 }
 
 TEST(MeshGeometry, EndsWithWhoHoldsIt) {

@@ -1,12 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "mjsense/rays/soft_mesh.h"
 
-#include <fmt/format.h>
-
 #include <algorithm>
 #include <limits>
 
-#include "mjsense/core/error.h"
+#include "mjsense/rays/mesh_geometry.h"
 
 namespace mjsense {
 
@@ -20,9 +18,7 @@ SceneHandle moving_scene(RTCDevice device, RTCGeometry geometry) {
   rtcAttachGeometryByID(scene.get(), geometry, 0);
   rtcReleaseGeometry(geometry);
   rtcCommitScene(scene.get());
-  if (const RTCError error = rtcGetDeviceError(device))
-    throw RuntimeError(fmt::format("ray scene: Embree could not build a flex or skin (error {})",
-                                   static_cast<int>(error)));
+  check_built(device, "a flex or skin");
   return scene;
 }
 
