@@ -3,7 +3,8 @@
 """Fails where an include runs against the order of the rooms, which the table in docs/architecture.md gives.
 
 A file may include its own room and the rooms above it in that table. Tests, benchmarks and folders testing/ may include
-anything: they judge from outside. Nothing in src/ may include python/.
+anything: they judge from outside. Nothing in src/ may include python/. x.cc includes x.h before all else, which shows that
+the header compiles by itself.
 """
 
 from __future__ import annotations
@@ -15,6 +16,7 @@ from pathlib import Path
 ROOT = Path(__file__).resolve().parent.parent
 SOURCES = ROOT / "src" / "mjsense"
 INCLUDE = re.compile(r'^\s*#\s*include\s+"([^"]+)"', re.MULTILINE)
+FIRST = re.compile(r'^\s*#\s*include\s+[<"]([^">]+)[">]', re.MULTILINE)
 JUDGES = re.compile(r"_(test|bench)\.cc$|/testing/")
 
 
@@ -37,6 +39,10 @@ def wrong_includes(path: Path, text: str, order: dict[str, int]) -> list[str]:
             found.append(f"{path}: includes {include}: room '{target}' is not in docs/architecture.md")
         elif order[target] > order[room]:
             found.append(f"{path}: includes {include}: {room}/ stands below {target}/")
+    header = (SOURCES / path).with_suffix(".h")
+    first = FIRST.search(text)
+    if path.suffix == ".cc" and header.exists() and (first is None or first[1] != f"mjsense/{path.with_suffix('.h')}"):
+        found.append(f"{path}: includes {first and first[1]} before {header.name}")
     return found
 
 

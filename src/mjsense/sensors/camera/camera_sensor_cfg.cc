@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // What a camera's configuration may say.
+#include "mjsense/sensors/camera/camera_sensor_cfg.h"
 
 #include <fmt/format.h>
 #include <fmt/ranges.h>
