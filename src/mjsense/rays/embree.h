@@ -1,8 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
-// Embree 4 or 3 behind one face: a device, and packets of 16 rays against a scene of triangles. Origins and
-// directions are finite in every lane of a packet, valid or not: Debian's Embree has assertions, and
-// looks at them all where the CPU has no AVX-512.
+// Embree 4 or 3 behind one face: packets of kWidth rays against a scene of triangles. Packets of another
+// width than the CPU's vectors Embree copies a ray at a time, and casts the rays that are not valid, too.
+// Origins and directions are finite in every lane of a packet, valid or not: Debian's Embree has
+// assertions.
 // Unnamed namespace: each instruction set keeps its own copy.
 
 #if __has_include(<embree4/rtcore.h>)
@@ -11,8 +12,36 @@
 #include <embree3/rtcore.h>
 #endif
 
+#include "mjsense/rays/simd.h"
+
 namespace mjsense {
 namespace {
+
+template <int kLanesOfPacket>
+struct EmbreePacket;
+template <>
+struct EmbreePacket<4> {
+  using Rays = RTCRay4;
+  using RayHits = RTCRayHit4;
+  static constexpr auto intersect = rtcIntersect4;
+  static constexpr auto occluded = rtcOccluded4;
+};
+template <>
+struct EmbreePacket<8> {
+  using Rays = RTCRay8;
+  using RayHits = RTCRayHit8;
+  static constexpr auto intersect = rtcIntersect8;
+  static constexpr auto occluded = rtcOccluded8;
+};
+template <>
+struct EmbreePacket<16> {
+  using Rays = RTCRay16;
+  using RayHits = RTCRayHit16;
+  static constexpr auto intersect = rtcIntersect16;
+  static constexpr auto occluded = rtcOccluded16;
+};
+using EmbreeRays = EmbreePacket<kWidth>::Rays;
+using EmbreeRayHits = EmbreePacket<kWidth>::RayHits;
 
 // Rejects hits on the back of triangles, for queries that cull them.
 inline void reject_backfaces(const RTCFilterFunctionNArguments* args) {
@@ -33,8 +62,8 @@ constexpr auto kSceneFlags =
 
 // `coherent`: rays of neighbouring pixels, which begin or end in one place, go through the tree
 // together: shadow rays of a packet take 4 to 9 % off whole images with meshes; the same hits.
-inline void embree_intersect16(const int* valid, RTCScene scene, RTCRayHit16* rays, bool cull,
-                               bool coherent) {
+inline void embree_intersect(const int* valid, RTCScene scene, EmbreeRayHits* rays, bool cull,
+                             bool coherent) {
   RTCIntersectArguments args;
   rtcInitIntersectArguments(&args);
   if (coherent) args.flags = RTC_RAY_QUERY_FLAG_COHERENT;
@@ -43,11 +72,11 @@ inline void embree_intersect16(const int* valid, RTCScene scene, RTCRayHit16* ra
         static_cast<RTCRayQueryFlags>(args.flags | RTC_RAY_QUERY_FLAG_INVOKE_ARGUMENT_FILTER);
     args.filter = reject_backfaces;
   }
-  rtcIntersect16(valid, scene, rays, &args);
+  EmbreePacket<kWidth>::intersect(valid, scene, rays, &args);
 }
 
-inline void embree_occluded16(const int* valid, RTCScene scene, RTCRay16* rays, bool cull,
-                              bool coherent) {
+inline void embree_occluded(const int* valid, RTCScene scene, EmbreeRays* rays, bool cull,
+                            bool coherent) {
   RTCOccludedArguments args;
   rtcInitOccludedArguments(&args);
   if (coherent) args.flags = RTC_RAY_QUERY_FLAG_COHERENT;
@@ -56,7 +85,7 @@ inline void embree_occluded16(const int* valid, RTCScene scene, RTCRay16* rays, 
         static_cast<RTCRayQueryFlags>(args.flags | RTC_RAY_QUERY_FLAG_INVOKE_ARGUMENT_FILTER);
     args.filter = reject_backfaces;
   }
-  rtcOccluded16(valid, scene, rays, &args);
+  EmbreePacket<kWidth>::occluded(valid, scene, rays, &args);
 }
 
 #else
@@ -65,22 +94,22 @@ constexpr auto kSceneFlags =
     static_cast<RTCSceneFlags>(static_cast<int>(RTC_SCENE_FLAG_ROBUST) |
                                static_cast<int>(RTC_SCENE_FLAG_CONTEXT_FILTER_FUNCTION));
 
-inline void embree_intersect16(const int* valid, RTCScene scene, RTCRayHit16* rays, bool cull,
-                               bool coherent) {
+inline void embree_intersect(const int* valid, RTCScene scene, EmbreeRayHits* rays, bool cull,
+                             bool coherent) {
   RTCIntersectContext context;
   rtcInitIntersectContext(&context);
   if (coherent) context.flags = RTC_INTERSECT_CONTEXT_FLAG_COHERENT;
   if (cull) context.filter = reject_backfaces;
-  rtcIntersect16(valid, scene, &context, rays);
+  EmbreePacket<kWidth>::intersect(valid, scene, &context, rays);
 }
 
-inline void embree_occluded16(const int* valid, RTCScene scene, RTCRay16* rays, bool cull,
-                              bool coherent) {
+inline void embree_occluded(const int* valid, RTCScene scene, EmbreeRays* rays, bool cull,
+                            bool coherent) {
   RTCIntersectContext context;
   rtcInitIntersectContext(&context);
   if (coherent) context.flags = RTC_INTERSECT_CONTEXT_FLAG_COHERENT;
   if (cull) context.filter = reject_backfaces;
-  rtcOccluded16(valid, scene, &context, rays);
+  EmbreePacket<kWidth>::occluded(valid, scene, &context, rays);
 }
 
 #endif

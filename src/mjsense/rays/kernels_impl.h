@@ -99,72 +99,63 @@ std::uint32_t occluded_solid(const RayGeom& g, bool cull, const RayPacket& rays)
   return hit;
 }
 
-// Rays in a mesh's frame, each started shortly before it enters the mesh's box; `start` is where
-// that is.
+// kWidth rays in a mesh's frame, each started shortly before it enters the mesh's box; `start` is
+// where that is.
 struct MeshRays {
-  alignas(64) RTCRayHit16 rh;
-  alignas(64) int valid[kPacket];
-  alignas(64) float start[kPacket];
+  EmbreeRayHits rh;
+  alignas(64) int valid[kWidth];
+  Float start;
 
-  // Returns whether any ray meets the box before `limit` [16].
-  bool prepare(const RayGeom& g, const Frame& frame, const RayPacket& rays, const float* limit) {
-    bool some = false;
+  // Those of the packet from k on, unless they meet the box beyond `limit`. Returns whether there
+  // are any.
+  bool prepare(const RayGeom& g, const Frame& frame, const RayPacket& rays, int k, Float limit) {
     const float pad = 1e-5f + 1e-4f * (g.half[0] + g.half[1] + g.half[2]);
-    for (int k = 0; k < kPacket; k += kWidth) {
-      const Vec3f o = frame.point(rays.o, k), d = frame.direction(rays.d, k);
-      const float size[3] = {g.half[0] + pad, g.half[1] + pad, g.half[2] + pad};
-      const Vec3f c = {o.x - g.center[0], o.y - g.center[1], o.z - g.center[2]};
-      const Interval in = Box::interval(size, c, d);
-      const Float t = max(in.enter, 0.0f), cut = load(limit + k);
-      const Mask m = (in.enter <= in.leave) & (in.leave >= Float(0.0f)) & (t <= cut);
-      some |= any(m);
-      const Vec3f p = along(o, t, d);
-      store(valid + k, select(m, int_of(-1), int_of(0)));
-      store(start + k, t);
-      store(rh.ray.org_x + k, p.x);
-      store(rh.ray.org_y + k, p.y);
-      store(rh.ray.org_z + k, p.z);
-      store(rh.ray.dir_x + k, d.x);
-      store(rh.ray.dir_y + k, d.y);
-      store(rh.ray.dir_z + k, d.z);
-      store(rh.ray.tnear + k, Float(0.0f));
-      store(rh.ray.tfar + k, fma(cut, 1.000001f, 1e-6f) - t);
-      store(rh.ray.time + k, Float(0.0f));
-      store(reinterpret_cast<int*>(rh.ray.mask) + k, int_of(-1));
-      store(reinterpret_cast<int*>(rh.ray.id) + k, int_of(0));
-      store(reinterpret_cast<int*>(rh.ray.flags) + k, int_of(0));
-      store(reinterpret_cast<int*>(rh.hit.geomID) + k, int_of(-1));
-      store(reinterpret_cast<int*>(rh.hit.instID[0]) + k, int_of(-1));
-    }
-    return some;
+    const Vec3f o = frame.point(rays.o, k), d = frame.direction(rays.d, k);
+    const float size[3] = {g.half[0] + pad, g.half[1] + pad, g.half[2] + pad};
+    const Vec3f c = {o.x - g.center[0], o.y - g.center[1], o.z - g.center[2]};
+    const Interval in = Box::interval(size, c, d);
+    const Float t = max(in.enter, 0.0f);
+    const Mask m = (in.enter <= in.leave) & (in.leave >= Float(0.0f)) & (t <= limit);
+    if (!any(m)) return false;
+    const Vec3f p = along(o, t, d);
+    start = t;
+    store(valid, select(m, int_of(-1), int_of(0)));
+    store(rh.ray.org_x, p.x);
+    store(rh.ray.org_y, p.y);
+    store(rh.ray.org_z, p.z);
+    store(rh.ray.dir_x, d.x);
+    store(rh.ray.dir_y, d.y);
+    store(rh.ray.dir_z, d.z);
+    store(rh.ray.tnear, Float(0.0f));
+    store(rh.ray.tfar, fma(limit, 1.000001f, 1e-6f) - t);
+    store(rh.ray.time, Float(0.0f));
+    store(reinterpret_cast<int*>(rh.ray.mask), int_of(-1));
+    store(reinterpret_cast<int*>(rh.ray.id), int_of(0));
+    store(reinterpret_cast<int*>(rh.ray.flags), int_of(0));
+    store(reinterpret_cast<int*>(rh.hit.geomID), int_of(-1));
+    store(reinterpret_cast<int*>(rh.hit.instID[0]), int_of(-1));
+    return true;
   }
 };
-
-void limits(const RayPacket& rays, const HitPacket& hits, float* limit) {
-  for (int k = 0; k < kPacket; k += kWidth)
-    store(limit + k, min(load(hits.t + k), load(rays.tmax + k)));
-}
 
 void trace_triangles(RTCScene scene, const RayGeom& g, int id, bool cull, const RayPacket& rays,
                      HitPacket& hits) {
   const Frame frame(g, rays.origin);
-  alignas(64) float limit[kPacket];
-  limits(rays, hits, limit);
   MeshRays mesh;
-  if (!mesh.prepare(g, frame, rays, limit)) return;
-  embree_intersect16(mesh.valid, scene, &mesh.rh, cull, false);
   for (int k = 0; k < kPacket; k += kWidth) {
-    const Mask found = less(load(mesh.valid + k), int_of(0)) &
-                       ~less(load(reinterpret_cast<int*>(mesh.rh.hit.geomID) + k), int_of(0));
+    const Float limit = min(load(hits.t + k), load(rays.tmax + k));
+    if (!mesh.prepare(g, frame, rays, k, limit)) continue;
+    embree_intersect(mesh.valid, scene, &mesh.rh, cull, false);
+    const Mask found = less(load(mesh.valid), int_of(0)) &
+                       ~less(load(reinterpret_cast<int*>(mesh.rh.hit.geomID)), int_of(0));
     if (!any(found)) continue;
-    const Float t = select(found, load(mesh.start + k) + load(mesh.rh.ray.tfar + k), Float(kNoHit));
+    const Float t = select(found, mesh.start + load(mesh.rh.ray.tfar), Float(kNoHit));
     const Mask m = nearer(hits, rays, k, t, id);
     if (!any(m)) continue;
-    const Vec3f n =
-        unit({load(mesh.rh.hit.Ng_x + k), load(mesh.rh.hit.Ng_y + k), load(mesh.rh.hit.Ng_z + k)});
-    put(hits, k, m, t, id, load(reinterpret_cast<int*>(mesh.rh.hit.primID) + k), frame.to_world(n));
-    store(hits.u + k, select(m, load(mesh.rh.hit.u + k), load(hits.u + k)));
-    store(hits.v + k, select(m, load(mesh.rh.hit.v + k), load(hits.v + k)));
+    const Vec3f n = unit({load(mesh.rh.hit.Ng_x), load(mesh.rh.hit.Ng_y), load(mesh.rh.hit.Ng_z)});
+    put(hits, k, m, t, id, load(reinterpret_cast<int*>(mesh.rh.hit.primID)), frame.to_world(n));
+    store(hits.u + k, select(m, load(mesh.rh.hit.u), load(hits.u + k)));
+    store(hits.v + k, select(m, load(mesh.rh.hit.v), load(hits.v + k)));
   }
 }
 
@@ -172,12 +163,12 @@ std::uint32_t occluded_triangles(RTCScene scene, const RayGeom& g, bool cull,
                                  const RayPacket& rays) {
   const Frame frame(g, rays.origin);
   MeshRays mesh;
-  if (!mesh.prepare(g, frame, rays, rays.tmax)) return 0;
-  embree_occluded16(mesh.valid, scene, &mesh.rh.ray, cull, false);
   std::uint32_t hit = 0;
-  for (int k = 0; k < kPacket; k += kWidth)
-    hit |= bits(less(load(mesh.valid + k), int_of(0)) & (load(mesh.rh.ray.tfar + k) < Float(0.0f)))
-           << k;
+  for (int k = 0; k < kPacket; k += kWidth) {
+    if (!mesh.prepare(g, frame, rays, k, load(rays.tmax + k))) continue;
+    embree_occluded(mesh.valid, scene, &mesh.rh.ray, cull, false);
+    hit |= bits(less(load(mesh.valid), int_of(0)) & (load(mesh.rh.ray.tfar) < Float(0.0f))) << k;
+  }
   return hit;
 }
 

@@ -23,9 +23,9 @@ inline Mask leaves_ground(const HeightField& field, Vec3f o, Vec3f d, Mask on_gr
 
 inline std::uint32_t shadow_of_triangles(const ViewGeom& g, int index, const LightRays& rays,
                                          std::uint32_t active) {
-  RTCRay16 ray;
-  alignas(64) int valid[kLanes];
-  std::uint32_t some = 0;
+  EmbreeRays ray;
+  alignas(64) int valid[kWidth];
+  std::uint32_t dark = 0;
   for (int k = 0; k < kLanes; k += kWidth) {
     const Vec3f p{load(rays.p[0] + k), load(rays.p[1] + k), load(rays.p[2] + k)};
     const Vec3f d = to_geom(g.rot, {load(rays.d[0] + k), load(rays.d[1] + k), load(rays.d[2] + k)});
@@ -37,30 +37,28 @@ inline std::uint32_t shadow_of_triangles(const ViewGeom& g, int index, const Lig
     const Float lift = select(other, splat(0.0f), splat(1e-4f) * max(splat(g.radius), abs(p.z)));
     o = along(o, lift, n);
     const Interval inside = box(o, d, g.box, g.box + 3);
-    Mask hit = mask_of(active >> k & kAllLanes) & (inside.enter < load(rays.end + k)) &
-               (inside.exit > splat(0.0f));
+    const Float end = load(rays.end + k);
+    Mask hit =
+        mask_of(active >> k & kAllLanes) & (inside.enter < end) & (inside.exit > splat(0.0f));
     if (g.height_field) hit = hit & ~leaves_ground(*g.height_field, o, d, ~other);
-    some |= bits(hit);
-    store(valid + k, select(hit, int_of(-1), int_of(0)));
+    if (!any(hit)) continue;
+    store(valid, select(hit, int_of(-1), int_of(0)));
     // What was not hit, the sky, lies at infinity, which Embree must not be given.
     const Float zero = splat(0.0f);
-    store(ray.org_x + k, select(hit, o.x, zero));
-    store(ray.org_y + k, select(hit, o.y, zero));
-    store(ray.org_z + k, select(hit, o.z, zero));
-    store(ray.dir_x + k, select(hit, d.x, zero));
-    store(ray.dir_y + k, select(hit, d.y, zero));
-    store(ray.dir_z + k, select(hit, d.z, zero));
-    store(ray.tnear + k, zero);
-    store(ray.tfar + k, select(hit, load(rays.end + k), zero));
-    store(ray.time + k, splat(0.0f));
-    store(reinterpret_cast<int*>(ray.mask) + k, int_of(-1));
-    store(reinterpret_cast<int*>(ray.flags) + k, int_of(0));
+    store(ray.org_x, select(hit, o.x, zero));
+    store(ray.org_y, select(hit, o.y, zero));
+    store(ray.org_z, select(hit, o.z, zero));
+    store(ray.dir_x, select(hit, d.x, zero));
+    store(ray.dir_y, select(hit, d.y, zero));
+    store(ray.dir_z, select(hit, d.z, zero));
+    store(ray.tnear, zero);
+    store(ray.tfar, select(hit, end, zero));
+    store(ray.time, zero);
+    store(reinterpret_cast<int*>(ray.mask), int_of(-1));
+    store(reinterpret_cast<int*>(ray.flags), int_of(0));
+    embree_occluded(valid, static_cast<RTCScene>(g.bvh), &ray, false, true);
+    dark |= bits(hit & (load(ray.tfar) < zero)) << k;
   }
-  if (!some) return 0;
-  embree_occluded16(valid, static_cast<RTCScene>(g.bvh), &ray, false, true);
-  std::uint32_t dark = 0;
-  for (int i = 0; i < kLanes; ++i)
-    if (valid[i] && ray.tfar[i] < 0) dark |= 1u << i;
   return dark;
 }
 

@@ -76,76 +76,64 @@ struct Tracing {
   }
 };
 
-// Lanes whose ray meets the geom's bounding box before t, as Embree takes them; false if there are
-// none.
-inline bool fill_rays(const Tracing& at, const Pixels& pixels, const float* t, RTCRayHit16& rays,
-                      int* valid) {
+// Of kWidth pixels from k on those whose ray meets the geom's bounding box before `limit`, as
+// Embree takes them; false if there are none.
+inline bool fill_rays(const Tracing& at, const Pixels& pixels, int k, Float limit,
+                      EmbreeRayHits& rays, int* valid) {
   const ViewGeom& g = at.geom;
-  std::uint32_t some = 0;
-  for (int k = 0; k < kLanes; k += kWidth) {
-    const LocalRay ray = at.ray(pixels, k);
-    const Interval inside = box(ray.o, ray.d, g.box, g.box + 3);
-    const Float near = load(pixels.near + k), limit = load(t + k) * splat(1.0f + kSame);
-    const Mask hit = (inside.enter < limit) & (inside.exit > near);
-    some |= bits(hit);
-    store(valid + k, select(hit, int_of(-1), int_of(0)));
-    store(rays.ray.org_x + k, ray.o.x);
-    store(rays.ray.org_y + k, ray.o.y);
-    store(rays.ray.org_z + k, ray.o.z);
-    store(rays.ray.dir_x + k, ray.d.x);
-    store(rays.ray.dir_y + k, ray.d.y);
-    store(rays.ray.dir_z + k, ray.d.z);
-    store(rays.ray.tnear + k, near);
-    store(rays.ray.tfar + k, limit);
-    store(reinterpret_cast<int*>(rays.hit.geomID) + k, int_of(-1));
-  }
-  return some != 0;
+  const LocalRay ray = at.ray(pixels, k);
+  const Interval inside = box(ray.o, ray.d, g.box, g.box + 3);
+  const Float near = load(pixels.near + k);
+  const Mask hit = (inside.enter < limit) & (inside.exit > near);
+  if (!any(hit)) return false;
+  store(valid, select(hit, int_of(-1), int_of(0)));
+  store(rays.ray.org_x, ray.o.x);
+  store(rays.ray.org_y, ray.o.y);
+  store(rays.ray.org_z, ray.o.z);
+  store(rays.ray.dir_x, ray.d.x);
+  store(rays.ray.dir_y, ray.d.y);
+  store(rays.ray.dir_z, ray.d.z);
+  store(rays.ray.tnear, near);
+  store(rays.ray.tfar, limit);
+  store(reinterpret_cast<int*>(rays.hit.geomID), int_of(-1));
+  return true;
 }
 
 // A closed surface shows its front first. Only where a back came first is it worth to ask Embree
 // about every triangle's side.
-inline void look_behind_backs(const ViewGeom& g, const float* t, RTCRayHit16& rays, int* valid) {
-  std::uint32_t backs = 0;
-  for (int k = 0; k < kLanes; k += kWidth) {
-    const Vec3f n{load(rays.hit.Ng_x + k), load(rays.hit.Ng_y + k), load(rays.hit.Ng_z + k)};
-    const Vec3f d{load(rays.ray.dir_x + k), load(rays.ray.dir_y + k), load(rays.ray.dir_z + k)};
-    int* ids = reinterpret_cast<int*>(rays.hit.geomID) + k;
-    const Mask back = less(int_of(-1), load(ids)) & (dot(n, d) > splat(0.0f));
-    if (!any(back)) {
-      store(valid + k, int_of(0));
-      continue;
-    }
-    backs |= bits(back) << k;
-    store(valid + k, select(back, int_of(-1), int_of(0)));
-    store(ids, select(back, int_of(-1), load(ids)));
-    const Float limit = load(t + k) * splat(1.0f + kSame);
-    store(rays.ray.tfar + k, select(back, limit, load(rays.ray.tfar + k)));
-  }
-  if (backs) embree_intersect16(valid, static_cast<RTCScene>(g.bvh), &rays, true, true);
+inline void look_behind_backs(const ViewGeom& g, Float limit, EmbreeRayHits& rays, int* valid) {
+  const Vec3f n{load(rays.hit.Ng_x), load(rays.hit.Ng_y), load(rays.hit.Ng_z)};
+  const Vec3f d{load(rays.ray.dir_x), load(rays.ray.dir_y), load(rays.ray.dir_z)};
+  int* ids = reinterpret_cast<int*>(rays.hit.geomID);
+  const Mask back = less(int_of(-1), load(ids)) & (dot(n, d) > splat(0.0f));
+  if (!any(back)) return;
+  store(valid, select(back, int_of(-1), int_of(0)));
+  store(ids, select(back, int_of(-1), load(ids)));
+  store(rays.ray.tfar, select(back, limit, load(rays.ray.tfar)));
+  embree_intersect(valid, static_cast<RTCScene>(g.bvh), &rays, true, true);
 }
 
 inline PacketMask trace_triangles(const Tracing& at, const Pixels* pixels, Hits* hits,
                                   PacketMask packets) {
   const ViewGeom& g = at.geom;
-  RTCRayHit16 rays;
-  alignas(64) int valid[kLanes];
-  for (int k = 0; k < kLanes; k += kWidth) {  // what Embree leaves as it is
-    store(rays.ray.time + k, splat(0.0f));
-    store(reinterpret_cast<int*>(rays.ray.mask) + k, int_of(-1));
-    store(reinterpret_cast<int*>(rays.ray.flags) + k, int_of(0));
-    store(reinterpret_cast<int*>(rays.hit.instID[0]) + k, int_of(-1));
-  }
+  EmbreeRayHits rays;
+  alignas(64) int valid[kWidth];
+  // What Embree leaves as it is.
+  store(rays.ray.time, splat(0.0f));
+  store(reinterpret_cast<int*>(rays.ray.mask), int_of(-1));
+  store(reinterpret_cast<int*>(rays.ray.flags), int_of(0));
+  store(reinterpret_cast<int*>(rays.hit.instID[0]), int_of(-1));
   PacketMask changed = 0;
   for (; packets; packets &= packets - 1) {
     const int q = __builtin_ctz(packets);
     Hits& h = hits[q];
-    if (!fill_rays(at, pixels[q], h.t, rays, valid)) continue;
-    embree_intersect16(valid, static_cast<RTCScene>(g.bvh), &rays, false, true);
-    look_behind_backs(g, h.t, rays, valid);
     for (int k = 0; k < kLanes; k += kWidth) {
-      const Float t = load(rays.ray.tfar + k);
-      const Float before = load(h.t + k);
-      const Int found = load(reinterpret_cast<int*>(rays.hit.geomID) + k);
+      const Float before = load(h.t + k), limit = before * splat(1.0f + kSame);
+      if (!fill_rays(at, pixels[q], k, limit, rays, valid)) continue;
+      embree_intersect(valid, static_cast<RTCScene>(g.bvh), &rays, false, true);
+      look_behind_backs(g, limit, rays, valid);
+      const Float t = load(rays.ray.tfar);
+      const Int found = load(reinterpret_cast<int*>(rays.hit.geomID));
       const Mask hit = less(int_of(-1), found) & shows(t, int_of(g.id), before, load(h.id + k));
       if (!any(hit)) continue;
       changed |= 1u << q;
@@ -153,12 +141,12 @@ inline PacketMask trace_triangles(const Tracing& at, const Pixels* pixels, Hits*
       store(h.t + k, select(hit, t, before));
       store(h.geom + k, select(hit, int_of(at.index), load(h.geom + k)));
       store(h.prim + k,
-            select(hit, load(reinterpret_cast<int*>(rays.hit.primID) + k), load(h.prim + k)));
-      store(h.u + k, select(hit, load(rays.hit.u + k), load(h.u + k)));
-      store(h.v + k, select(hit, load(rays.hit.v + k), load(h.v + k)));
-      store(h.n[0] + k, select(hit, load(rays.hit.Ng_x + k), load(h.n[0] + k)));
-      store(h.n[1] + k, select(hit, load(rays.hit.Ng_y + k), load(h.n[1] + k)));
-      store(h.n[2] + k, select(hit, load(rays.hit.Ng_z + k), load(h.n[2] + k)));
+            select(hit, load(reinterpret_cast<int*>(rays.hit.primID)), load(h.prim + k)));
+      store(h.u + k, select(hit, load(rays.hit.u), load(h.u + k)));
+      store(h.v + k, select(hit, load(rays.hit.v), load(h.v + k)));
+      store(h.n[0] + k, select(hit, load(rays.hit.Ng_x), load(h.n[0] + k)));
+      store(h.n[1] + k, select(hit, load(rays.hit.Ng_y), load(h.n[1] + k)));
+      store(h.n[2] + k, select(hit, load(rays.hit.Ng_z), load(h.n[2] + k)));
     }
   }
   return changed;
