@@ -145,6 +145,28 @@ TEST(Json, WritesPaddedSortedAsciiRows) {
   EXPECT_EQ(row.back(), 0);
 }
 
+TEST(Json, WritesWholeNumbersOfEitherSign) {
+  std::vector<std::uint8_t> row(64);
+  JsonWriter json(row);
+  json.begin_array().value(std::uint64_t{1} << 63).value(std::int64_t{-5}).end_array();
+  ASSERT_TRUE(json.finish());
+  EXPECT_STREQ(reinterpret_cast<char*>(row.data()), "[9223372036854775808,-5]");
+}
+
+// What is longer than it need be, half a surrogate pair, or beyond U+10FFFF.
+TEST(Json, WhatIsNoUtf8IsReplaced) {
+  for (const char* text :
+       {"\xC0\x80", "\xE0\x80\x80", "\xED\xA0\x80", "\xF4\x90\x80\x80", "\xC3", "\xFF"}) {
+    std::vector<std::uint8_t> row(64);
+    JsonWriter json(row);
+    json.value(text);
+    ASSERT_TRUE(json.finish());
+    std::string expected = "\"";
+    for (std::size_t i = 0; i < std::string_view(text).size(); ++i) expected += "\\ufffd";
+    EXPECT_EQ(reinterpret_cast<char*>(row.data()), expected + "\"");
+  }
+}
+
 TEST(Json, SaysWhenTheTextDoesNotFit) {
   std::vector<std::uint8_t> row(8);
   JsonWriter json(row);

@@ -362,7 +362,9 @@ void write_json(JsonWriter& json, const FieldDecl& field, const void* object) {
   const void* value = at(object, field);
   if (type.kind == Kind::kBool) {
     json.value(*static_cast<const bool*>(value));
-  } else if (type.kind == Kind::kInt || type.kind == Kind::kUnsigned) {
+  } else if (type.kind == Kind::kUnsigned) {
+    json.value(*static_cast<const std::uint64_t*>(value));
+  } else if (type.kind == Kind::kInt) {
     json.value(get_integer(type, value));
   } else if (type.kind == Kind::kNumber) {
     json.value(get_number(type, value));

@@ -7,6 +7,8 @@
 #include <stdexcept>
 #include <string>
 
+#include "mjsense/core/utf8.h"
+
 namespace mjsense {
 
 void JsonWriter::put(char c) {
@@ -79,7 +81,10 @@ JsonWriter& JsonWriter::value(double x) {
   return *this;
 }
 
-JsonWriter& JsonWriter::value(std::int64_t x) {
+JsonWriter& JsonWriter::value(std::int64_t x) { return integer(x); }
+JsonWriter& JsonWriter::value(std::uint64_t x) { return integer(x); }
+
+JsonWriter& JsonWriter::integer(auto x) {
   char text[24];
   const auto end = std::to_chars(text, text + sizeof text, x).ptr;
   separate();
@@ -150,20 +155,16 @@ void JsonWriter::string(std::string_view text) {
       }
       continue;
     }
-    const int extra = c >= 0xF0 && c < 0xF8 ? 3 : c >= 0xE0 ? 2 : c >= 0xC0 ? 1 : 0;
-    unsigned code = extra == 3 ? c & 0x07u : extra == 2 ? c & 0x0Fu : c & 0x1Fu;
-    bool valid = extra > 0 && c < 0xF8 && i + extra < text.size();
-    for (int k = 1; valid && k <= extra; ++k) {
-      const auto next = static_cast<unsigned char>(text[i + k]);
-      valid = (next & 0xC0) == 0x80;
-      code = code << 6 | (next & 0x3Fu);
-    }
-    if (!valid) {
+    const std::size_t size = utf8_size(text.substr(i));
+    if (size == 0) {
       escape(0xFFFD);
       ++i;
       continue;
     }
-    i += extra + 1;
+    unsigned code = c & (0x7Fu >> size);
+    for (std::size_t k = 1; k < size; ++k)
+      code = code << 6 | (static_cast<unsigned char>(text[i + k]) & 0x3Fu);
+    i += size;
     if (code >= 0x10000) {
       escape(0xD800 + ((code - 0x10000) >> 10));
       escape(0xDC00 + ((code - 0x10000) & 0x3FF));

@@ -26,6 +26,7 @@ class JsonWriter {
 
   JsonWriter& value(double x);
   JsonWriter& value(std::int64_t x);
+  JsonWriter& value(std::uint64_t x);
   JsonWriter& value(int x) { return value(static_cast<std::int64_t>(x)); }
   JsonWriter& value(bool x);
   JsonWriter& value(std::string_view text);
@@ -46,6 +47,7 @@ class JsonWriter {
   void put(char c);
   void put(std::string_view text);
   void string(std::string_view text);
+  JsonWriter& integer(auto x);
   void separate();
 
   std::span<std::uint8_t> row_;

@@ -14,6 +14,7 @@
 
 #include "mjsense/core/error.h"
 #include "mjsense/core/file_limit.h"
+#include "mjsense/core/utf8.h"
 
 namespace mjsense {
 namespace {
@@ -41,25 +42,15 @@ bool is_mostly_holes(int fd, const struct stat& about) {
   return holes;
 }
 
-// Bytes of the UTF-8 character that begins here; 0 if there is none.
+// Bytes of the character that begins here and can be shown; 0 if there is none.
 std::size_t character(std::string_view text) {
   const auto byte = [&](std::size_t i) { return static_cast<unsigned char>(text[i]); };
-  const unsigned char first = byte(0);
-  if (first < 0x80) return is_control(text[0]) ? 0 : 1;
-  const std::size_t size = first >= 0xF0 && first < 0xF5   ? 4
-                           : first >= 0xE0 && first < 0xF0 ? 3
-                           : first >= 0xC2 && first < 0xE0 ? 2
-                                                           : 0;
-  if (size == 0 || size > text.size()) return 0;
-  for (std::size_t i = 1; i < size; ++i) {
-    if ((byte(i) & 0xC0) != 0x80) return 0;
-  }
-  if (first == 0xC2 && byte(1) < 0xA0) return 0;  // C1 controls
+  const std::size_t size = utf8_size(text);
+  if (size <= 1) return is_control(text[0]) ? 0 : size;
+  if (byte(0) == 0xC2 && byte(1) < 0xA0) return 0;  // C1 controls
   // Other lines, and other directions of writing, in which a name looks like another one.
-  if (first == 0xE2 && byte(1) == 0x80 && byte(2) >= 0xA8 && byte(2) <= 0xAE) return 0;
-  if (first == 0xE2 && byte(1) == 0x81 && byte(2) >= 0xA6 && byte(2) <= 0xA9) return 0;
-  if ((first == 0xE0 && byte(1) < 0xA0) || (first == 0xED && byte(1) >= 0xA0)) return 0;
-  if ((first == 0xF0 && byte(1) < 0x90) || (first == 0xF4 && byte(1) >= 0x90)) return 0;
+  if (byte(0) == 0xE2 && byte(1) == 0x80 && byte(2) >= 0xA8 && byte(2) <= 0xAE) return 0;
+  if (byte(0) == 0xE2 && byte(1) == 0x81 && byte(2) >= 0xA6 && byte(2) <= 0xA9) return 0;
   return size;
 }
 

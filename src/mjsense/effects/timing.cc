@@ -13,7 +13,8 @@
 namespace mjsense {
 namespace {
 
-constexpr double kTimeEps = 1e-9;  // s, against the rounding of tick * period
+constexpr double kTimeEps = 1e-9;   // s, against the rounding of tick * period
+constexpr int kMostRows = 100'000;  // that a ring keeps of a world
 
 }  // namespace
 
@@ -53,9 +54,13 @@ double FrameRing::time(int world, int age) const {
 void Delay::initialize(const EffectInit& init) {
   if (interpolate) check_numeric(init);
   if (!(init.period > 0)) throw ValueError(fmt::format("{}: needs a period > 0", init.place));
-  const double longest = std::max(delay_s, delay_max_s) + jitter_s;
+  const double rows = (std::max(delay_s, delay_max_s) + jitter_s) / init.period;
+  if (!(rows <= kMostRows)) {
+    throw ValueError(fmt::format("{}: a delay of {:.3g} rows of {:.3g} s: at most {}", init.place,
+                                 rows, init.period, kMostRows));
+  }
   ring_.initialize(init.num_worlds, init.size * dtype_size(init.dtype),
-                   static_cast<int>(std::ceil(longest / init.period)) + 2);
+                   static_cast<int>(std::ceil(rows)) + 2);
   lag_.assign(init.num_worlds, 0.0);
   output_time_.assign(init.num_worlds, 0.0);
   stream_ = init.stream;
@@ -94,6 +99,8 @@ void Delay::apply(const EffectMoment& moment, const EffectRow& row) {
 }
 
 void StepDelay::validate(std::string_view place) const {
+  if (max_lag > kMostRows)
+    throw ValueError(fmt::format("{}: max_lag is {}: at most {}", place, max_lag, kMostRows));
   if (max_lag < min_lag) {
     throw ValueError(
         fmt::format("{}: lags [{}, {}]: need 0 <= min_lag <= max_lag", place, min_lag, max_lag));

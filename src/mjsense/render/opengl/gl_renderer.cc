@@ -7,6 +7,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <memory>
 #include <vector>
 
 #include "mjsense/core/error.h"
@@ -109,7 +110,7 @@ class MujocoGl final : public GlRenderer {
         place_(place),
         egl_(place),
         model_(mj_copyModel(nullptr, model)),
-        data_(mj_makeData(model_)),
+        data_(mj_makeData(model_.get())),
         worlds_(cfg.num_worlds, VisualFields(model)) {
     model_->vis.global.offwidth = cfg.width;
     model_->vis.global.offheight = cfg.height;
@@ -118,10 +119,10 @@ class MujocoGl final : public GlRenderer {
     take();
     mjv_defaultScene(&scene_);
     mjv_makeScene(
-        model_, &scene_,
+        model_.get(), &scene_,
         static_cast<int>(model_->ngeom + model_->nflexelem + model_->nskin + cfg.markers) + 100);
     mjr_defaultContext(&context_);
-    mjr_makeContext(model_, &context_, mjFONTSCALE_100);
+    mjr_makeContext(model_.get(), &context_, mjFONTSCALE_100);
     mjr_setBuffer(mjFB_OFFSCREEN, &context_);
     context_.readDepthMap = mjDEPTH_ZERONEAR;
     egl_.release();
@@ -138,8 +139,6 @@ class MujocoGl final : public GlRenderer {
   ~MujocoGl() override {
     if (egl_.take()) mjr_freeContext(&context_);
     mjv_freeScene(&scene_);
-    mj_deleteData(data_);
-    mj_deleteModel(model_);
   }
 
   void remember(int world, const mjModel* model) override { worlds_[world].copy_from(model); }
@@ -148,8 +147,8 @@ class MujocoGl final : public GlRenderer {
               const ImageTargets& targets) override {
     show(worlds_[world]);
     pose(state);
-    mjv_updateScene(model_, data_, &options_, nullptr, &camera_, mjCAT_STATIC | mjCAT_DYNAMIC,
-                    &scene_);
+    mjv_updateScene(model_.get(), data_.get(), &options_, nullptr, &camera_,
+                    mjCAT_STATIC | mjCAT_DYNAMIC, &scene_);
     for (const mjvGeom& marker : markers) {
       scene_.geoms[scene_.ngeom] = marker;
       scene_.geoms[scene_.ngeom].segid = scene_.ngeom;
@@ -189,7 +188,7 @@ class MujocoGl final : public GlRenderer {
 
   // The context has tables of its own for materials.
   void show(const VisualFields& world) {
-    world.copy_to(model_);
+    world.copy_to(model_.get());
     if (cfg_.orthographic) model_->cam_projection[cfg_.camera] = mjPROJ_ORTHOGRAPHIC;
     if (cfg_.fovy) {
       model_->cam_fovy[cfg_.camera] = *cfg_.fovy;
@@ -261,8 +260,13 @@ class MujocoGl final : public GlRenderer {
   GlRendererCfg cfg_;
   std::string place_;
   EglContext egl_;
-  mjModel* model_;  // a copy: it has the offscreen buffer's size, and shows one world after another
-  mjData* data_;    // poses only
+  struct Delete {
+    void operator()(mjModel* m) const { mj_deleteModel(m); }
+    void operator()(mjData* d) const { mj_deleteData(d); }
+  };
+  // A copy: it has the offscreen buffer's size, and shows one world after another.
+  std::unique_ptr<mjModel, Delete> model_;
+  std::unique_ptr<mjData, Delete> data_;  // poses only
   std::vector<VisualFields> worlds_;
   mjvScene scene_;
   mjvOption options_;
