@@ -31,4 +31,12 @@ void SharedField::initialize(const SensorInit& /*init*/) {
                 names);
 }
 
+std::shared_ptr<Sensor> field_of_camera(std::string name, Sensor& camera, std::string field) {
+  // [H, W, 1], and [H, W] in a video.
+  const auto flat = [](SensorSpec& spec) {
+    if (spec.storage == Storage::kDepthVideo) spec.shape = {spec.shape[0], spec.shape[1]};
+  };
+  return std::make_shared<SharedField>(std::move(name), camera, std::move(field), flat);
+}
+
 }  // namespace mjsense

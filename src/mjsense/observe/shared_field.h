@@ -4,6 +4,7 @@
 // camera of the scene is `wrist_camera` and `wrist_camera_depth` in a suite.
 
 #include <functional>
+#include <memory>
 #include <string>
 
 #include "mjsense/core/sensor.h"
@@ -27,5 +28,8 @@ class SharedField final : public Sensor {
   std::string field_;
   std::function<void(SensorSpec&)> adapt_;
 };
+
+// A field of a camera as recordings have it: rgb and depth are videos.
+std::shared_ptr<Sensor> field_of_camera(std::string name, Sensor& camera, std::string field);
 
 }  // namespace mjsense

@@ -541,64 +541,68 @@ void Worlds::apply(WorldIds ids, Call call, bool save) {
     if (bench.taken.exchange(false)) mj_resetData(model(), bench.data);
   }
 
-  // Worlds that failed are reset alone, with the keyframe of their last reset; the others went on.
-  std::vector<int> failed;
-  for (int w : ids_) {
-    if (mjb_status(batch_)[w]) {
-      std::string message = fmt::format("MuJoCo: {}", mjb_error(batch_, w));
-      if (call.op == Op::kVisit) {  // nothing happened that could be undone: the reader is told
-        message = fmt::format("world {}: {}", w, message);
-        exceptions_[w] = std::make_exception_ptr(RuntimeError(message));
-      } else {
-        failures_.push_back({w, std::move(message)});
-      }
-    } else if (diverged_[w]) {
-      const int warning = diverged_[w] - 1;
-      if (warning == kBadState) {
-        failures_.push_back({w, fmt::format("the state that was written holds NaN or infinity ({})",
-                                            bad_component(batch_, w))});
-        diverged_[w] = 0;
-        derived_[w] = {};
-        failed.push_back(w);
-        continue;
-      }
-      const auto& stat = mjb_warning(batch_)[w * mjNWARNING + warning];
-      failures_.push_back({w, fmt::format("MuJoCo: {} (at {:.4f} s)",
-                                          mju_warningText(warning, stat.lastinfo), time(w))});
-    } else {
-      continue;
-    }
-    diverged_[w] = 0;
-    derived_[w] = {};
-    failed.push_back(w);
-  }
-  if (!failed.empty() && call.op != Op::kVisit && call.op != Op::kStepRaw) {
-    std::stable_sort(failed.begin(), failed.end(),
-                     [this](int a, int b) { return reset_key_[a] < reset_key_[b]; });
-    for (auto first = failed.begin(); first != failed.end();) {
-      const auto last = std::find_if(first, failed.end(),
-                                     [&](int w) { return reset_key_[w] != reset_key_[*first]; });
-      std::vector<int> same(first, last);
-      std::sort(same.begin(), same.end());
-      Call reset = call;
-      reset.op = Op::kReset;
-      reset.key = reset_key_[*first];
-      apply_ordered(batch_, same.data(), static_cast<int>(same.size()), run, &reset, 1);
-      for (int w : same) {
-        if (mjb_status(batch_)[w]) {
-          throw RuntimeError(
-              fmt::format("world {} fails even when reset: MuJoCo: {}", w, mjb_error(batch_, w)));
-        }
-      }
-      first = last;
-    }
-  }
+  std::vector<int> failed = take_failures(call.op);
+  std::string helpless;
+  if (call.op != Op::kVisit && call.op != Op::kStepRaw)
+    helpless = reset_failed(std::move(failed), call);
   std::exception_ptr first;
   for (std::exception_ptr& e : exceptions_) {
     if (e && !first) first = e;
     e = nullptr;
   }
+  if (!helpless.empty()) throw RuntimeError(helpless);
   if (first) std::rethrow_exception(first);
+}
+
+// Worlds that failed in this call, of which failures_ tells why.
+std::vector<int> Worlds::take_failures(Op op) {
+  std::vector<int> failed;
+  for (int w : ids_) {
+    std::string why;
+    if (mjb_status(batch_)[w]) {
+      why = fmt::format("MuJoCo: {}", mjb_error(batch_, w));
+    } else if (!diverged_[w]) {
+      continue;
+    } else if (const int warning = diverged_[w] - 1; warning == kBadState) {
+      why = fmt::format("the state that was written holds NaN or infinity ({})",
+                        bad_component(batch_, w));
+    } else {
+      const auto& stat = mjb_warning(batch_)[w * mjNWARNING + warning];
+      why =
+          fmt::format("MuJoCo: {} (at {:.4f} s)", mju_warningText(warning, stat.lastinfo), time(w));
+    }
+    if (op == Op::kVisit && mjb_status(batch_)[w]) {
+      // Nothing happened that could be undone: the reader is told.
+      exceptions_[w] = std::make_exception_ptr(RuntimeError(fmt::format("world {}: {}", w, why)));
+    } else {
+      failures_.push_back({w, std::move(why)});
+    }
+    diverged_[w] = 0;
+    derived_[w] = {};
+    failed.push_back(w);
+  }
+  return failed;
+}
+
+// They are reset alone, each with the keyframe of its last reset; the others went on. Returns what
+// is to be said of one that fails even so.
+std::string Worlds::reset_failed(std::vector<int> failed, Call call) {
+  std::string helpless;
+  std::ranges::stable_sort(failed, {}, [this](int w) { return reset_key_[w]; });
+  call.op = Op::kReset;
+  for (auto first = failed.begin(); first != failed.end();) {
+    call.key = reset_key_[*first];
+    const auto last =
+        std::find_if(first, failed.end(), [&](int w) { return reset_key_[w] != call.key; });
+    apply_ordered(batch_, &*first, static_cast<int>(last - first), run, &call, 1);
+    for (; first != last; ++first) {
+      if (mjb_status(batch_)[*first] && helpless.empty()) {
+        helpless = fmt::format("world {} fails even when reset: MuJoCo: {}", *first,
+                               mjb_error(batch_, *first));
+      }
+    }
+  }
+  return helpless;
 }
 
 }  // namespace mjsense

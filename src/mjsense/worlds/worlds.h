@@ -89,7 +89,8 @@ class Worlds {
   // computed from the old ones.
   void model_changed() { model_version_++; }
 
-  // Worlds that failed in the last call, by index. Their state is the reset state.
+  // Worlds that failed in the last call, by index. Their state is the reset state; after step_raw(),
+  // which lets MuJoCo do with a world that diverges what it always does, it is as that left it.
   const std::vector<Failure>& failures() const { return failures_; }
 
   // Live views of the state rows, [B, n] float64, strided. Call forward() after writing.
@@ -132,6 +133,8 @@ class Worlds {
   bool step_whole(const mjModel* m, mjData* d, int w, const Call& call);
   bool healthy(int w, const Warnings& warnings);
   void apply(WorldIds ids, Call call, bool save);
+  std::vector<int> take_failures(Op op);
+  std::string reset_failed(std::vector<int> failed, Call call);
   World view(const mjModel* m, mjData* d, int w) const;
   bool same_state(int w) const;
   bool same_controls(int w) const;

@@ -230,7 +230,7 @@ void CameraSensor::reset(const World& world) {
 
 void CameraSensor::compute(const World& world) {
   PerWorld& w = worlds_[world.id];
-  w.due = is_due(world, w.image);
+  w.due |= is_due(world, w.image);  // one that was due and not drawn still is
   if (!w.due) return;
   const mjModel* m = world.model;
   if (!w.grid.bent) w.grid = grid_in(m);

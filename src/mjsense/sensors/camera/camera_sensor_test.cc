@@ -8,8 +8,11 @@
 #include <limits>
 #include <memory>
 #include <numeric>
+#include <utility>
 
+#include "mjsense/core/control_step.h"
 #include "mjsense/core/error.h"
+#include "mjsense/core/row_error.h"
 #include "mjsense/core/testing/allocations.h"
 #include "mjsense/rays/ray_scene.h"
 #include "mjsense/scene/scene.h"
@@ -355,6 +358,35 @@ TEST(Camera, OwnRateHoldsTheImageBetweenTicks) {
   EXPECT_GT(seen[5], seen[4]);
   for (int i = 5; i < 10; ++i) EXPECT_EQ(seen[i], seen[5]);
   EXPECT_GT(seen[10], seen[9]);
+}
+
+// An image that was due when something else failed, before it was drawn, is drawn at the next chance.
+TEST(Camera, AnErrorElsewhereLosesNoImage) {
+  struct Failing final : Sensor, ControlStepListener {
+    Failing() : Sensor("failing") {}
+    std::string_view kind() const override { return "test"; }
+    void initialize(const SensorInit&) override {}
+    void compute(const World&) override {}
+    void control_step(std::span<const int> ids) override {
+      if (std::exchange(fails, false)) throw RowError({{ids[0], "failed"}});
+    }
+    bool fails = false;
+  };
+  CameraSensorCfg cfg = camera(9, 9, {"depth"});
+  cfg.pos = {0, 0, 10};
+  cfg.update_period = 0.01;  // 5 steps of 2 ms
+  Lab lab(R"(<worldbody><body><freejoint/><geom size=".2"/></body></worldbody>)", {cfg});
+  const auto failing = std::make_shared<Failing>();
+  lab.sim->add(failing);
+  const float first = lab.read<float>("depth")[40];
+  for (int i = 0; i < 4; ++i) {
+    lab.sim->step();
+    lab.read<float>("depth");
+  }
+  failing->fails = true;
+  EXPECT_THROW(lab.sim->step(), RowError);
+  lab.sim->step();
+  EXPECT_GT(lab.read<float>("depth")[40], first);
 }
 
 TEST(Camera, NoAllocationPerFrame) {
