@@ -90,7 +90,8 @@ void Task::sample(int world, std::int64_t episode, const StateRow& state, int dr
   Rng rng(cfg_.seed, static_cast<std::uint32_t>(draw), stream_of("task/sample"),
           static_cast<std::uint64_t>(episode));
   const std::optional<Pose> base = sample_scene(world, rng, state);
-  robot_->write_start(state, base, rng);
+  if (!samples_robot()) robot_->write_joints(state, rng);
+  robot_->stand(state, base);
 }
 
 void Task::choose_goal(int /*world*/, Rng& /*rng*/, const StateRow& /*state*/) {

@@ -194,9 +194,10 @@ class Task {
 
  protected:
   virtual void initialize_task() = 0;  // model() and robot() are there
-  // Writes everything except the joints of cfg()'s robot; returns where the robot's base stands,
-  // nothing for where the model has it.
+  // Writes everything except the joints of cfg()'s robot, unless samples_robot() is true; returns
+  // where the robot's base stands, nothing for where the model has it.
   virtual std::optional<Pose> sample_scene(int world, Rng& rng, const StateRow& state) = 0;
+  virtual bool samples_robot() const { return false; }
   // In a state that another task has sampled: chooses what the episode is about, and moves nothing.
   // Throws ValueError for a task that cannot.
   virtual void choose_goal(int world, Rng& rng, const StateRow& state);

@@ -161,7 +161,16 @@ Pose Robot::target_pose(const World& world, int group) const {
 }
 
 void Robot::write_start(const StateRow& state, const std::optional<Pose>& base, Rng& rng) const {
+  write_joints(state, rng);
+  stand(state, base);
+}
+
+void Robot::stand(const StateRow& state, const std::optional<Pose>& base) const {
   if (base) placement_.write(state, *base);
+  for (const auto& controller : controllers_) controller->start(state);
+}
+
+void Robot::write_joints(const StateRow& state, Rng& rng) const {
   for (std::size_t g = 0; g < groups_.size(); ++g) {
     const MoveGroup& group = groups_[g];
     const MoveGroupCfg& cfg = cfg_.groups[g];
@@ -178,7 +187,6 @@ void Robot::write_start(const StateRow& state, const std::optional<Pose>& base, 
         q = std::clamp(q, model_->jnt_range[2 * joint], model_->jnt_range[2 * joint + 1]);
       }
     }
-    controllers_[g]->start(state);
   }
 }
 
@@ -230,6 +238,23 @@ void Robot::command(const World& world, const Action& action) {
     controllers_[g]->command(world, wanted.view(),
                              {target.values.data(), static_cast<std::size_t>(target.size)});
   }
+}
+
+std::vector<double> Robot::commands(const World& world, const Action& action) const {
+  std::vector<double> row;
+  for (std::size_t g = 0; g < groups_.size(); ++g) {
+    const auto n = static_cast<std::size_t>(groups_[g].command_size);
+    if (n == 0) continue;
+    row.resize(row.size() + n);
+    const std::span<double> command = std::span(row).last(n);
+    const GroupValues& wanted = action.commands[g];
+    if (wanted.given) {
+      std::ranges::copy(wanted.view(), command.begin());
+      continue;
+    }
+    controllers_[g]->keep(world, targets_[world.id][g].view(), command);
+  }
+  return row;
 }
 
 void Robot::write_ctrl(const World& world, const StateRow& state, Rng* noise) const {

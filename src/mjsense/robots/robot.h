@@ -74,6 +74,9 @@ class Robot {
   // Start configuration with noise drawn from rng, robot standing at X_WB, or where it stands;
   // controls hold it. Throws ValueError where nothing can carry the base there.
   void write_start(const StateRow& state, const std::optional<Pose>& base, Rng& rng) const;
+  // Its two parts: where the joints are, and all else.
+  void write_joints(const StateRow& state, Rng& rng) const;
+  void stand(const StateRow& state, const std::optional<Pose>& base) const;
   // From now on it starts stooped: cfg().groups[i].init is what `stooped` says, where it says
   // something. Whether there is such a group.
   bool stoop();
@@ -83,6 +86,9 @@ class Robot {
   // New targets: what the controllers make of the action; groups that it leaves out hold. Throws
   // ValueError when a group has the wrong number of values.
   void command(const World& world, const Action& action);
+  // Commands of all controlled groups in a row: what the action has and, of a group that it leaves
+  // out, what leaves that as it is. In a fresh world.
+  std::vector<double> commands(const World& world, const Action& action) const;
   // Controls of the first control step, with noise on the targets if rng is not null.
   void write_ctrl(const World& world, const StateRow& state, Rng* noise) const;
   // Control step `index` (from 1) after that, in the pass over the worlds; only where a controller

@@ -20,6 +20,9 @@ class ActuatedController : public Controller {
   void describe(MoveGroup& group) const override;
   void start(const StateRow& state) const override;
   void hold(const World& world, std::span<double> target) override;
+  // The target; 0 where there is none.
+  void keep(const World& world, std::span<const double> target,
+            std::span<double> command) const override;
   void begin(const World& world, std::span<const double> target, const StateRow& state) override;
 
  protected:

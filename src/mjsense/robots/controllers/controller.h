@@ -51,6 +51,9 @@ class Controller {
   // No command: from here on the group stays as it is in this fresh world. `target`: what it aims
   // at then, as for command().
   virtual void hold(const World& world, std::span<double> target) = 0;
+  // The command that leaves the group as it is, or where `target` sends it.
+  virtual void keep(const World& world, std::span<const double> target,
+                    std::span<double> command) const = 0;
   // A command: as many finite numbers as describe() says. `target` [target_size] (in: the last one)
   // becomes the positions that it aims at, without noise: what actions/joint_pos records.
   virtual void command(const World& world, std::span<const double> command,

@@ -159,6 +159,26 @@ TEST(Controllers, OneHeightBendsTheTorso) {
   EXPECT_EQ(r.target(0), 0.7);
 }
 
+// What a controller says would keep a group as it is does, also as float32.
+void expect_kept(OneGroup& r) {
+  const std::vector<double> before(r.data->qpos, r.data->qpos + r.model->nq);
+  std::vector<double> command = r.robot->commands(r.world, {});
+  for (double& x : command) x = static_cast<float>(x);
+  r.play(command, 20);
+  for (int i = 0; i < r.model->nq; ++i) EXPECT_NEAR(r.data->qpos[i], before[i], 1e-4) << i;
+}
+
+TEST(Controllers, SayWhatKeepsAGroupAsItIs) {
+  for (const ControllerCfg& kind :
+       {ControllerCfg(JointPositionCfg{}), ControllerCfg(JointPositionRelativeCfg{}),
+        ControllerCfg(JointVelocityCfg{}), ControllerCfg(TorsoHeightCfg{{0, 0.7}, {1, -2}})}) {
+    MoveGroupCfg group = group_of(kind);
+    group.init = {0.5, -0.3};  // no height bends a torso so
+    OneGroup r(kPositions, group);
+    expect_kept(r);
+  }
+}
+
 const std::string kPlanar = R"(<mujoco><worldbody><body name="base">
     <joint name="x" type="slide" axis="1 0 0"/><joint name="y" type="slide" axis="0 1 0"/><joint name="t" axis="0 0 1"/>
     <geom type="box" size=".2 .2 .1" mass="10" pos="0 0 .1"/></body></worldbody><actuator>

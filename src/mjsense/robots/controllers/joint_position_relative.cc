@@ -24,6 +24,10 @@ class JointPositionRelative final : public ActuatedController {
       group.command_high[i] = span;
     }
   }
+  void keep(const World& /*world*/, std::span<const double> /*target*/,
+            std::span<double> command) const override {
+    std::ranges::fill(command, 0.0);
+  }
   void command(const World& world, std::span<const double> command,
                std::span<double> target) override {
     for (int i = 0; i < size(); ++i) {

@@ -26,6 +26,10 @@ class VelocityServos final : public ActuatedController {
     group.target_size = 0;  // it aims at no position
     group.target_unit = "";
   }
+  void keep(const World& /*world*/, std::span<const double> /*target*/,
+            std::span<double> command) const override {
+    std::ranges::fill(command, 0.0);
+  }
   void hold(const World& world, std::span<double> /*target*/) override {
     std::fill_n(speed_.begin() + world.id * size(), size(), 0.0);
   }
@@ -66,6 +70,10 @@ class MovingTargets final : public ActuatedController {
     hold(world, target);
   }
   // Where the targets are: servos lag behind, and would swing back.
+  void keep(const World& /*world*/, std::span<const double> /*target*/,
+            std::span<double> command) const override {
+    std::ranges::fill(command, 0.0);
+  }
   void hold(const World& world, std::span<double> target) override {
     std::copy_n(target.begin(), size(), from_.begin() + world.id * size());
   }

@@ -30,6 +30,16 @@ void PoseTarget::hold(const World& world, std::span<double> /*target*/) {
   goals_[world.id].given = false;
 }
 
+Pose PoseTarget::base_at(const mjtNum* mocap_pos, const mjtNum* mocap_quat) const {
+  return Pose{vec3(mocap_pos + 3 * mocap_), quat(mocap_quat + 4 * mocap_)} *
+         inverse(base_to_mocap_);
+}
+
+void PoseTarget::keep(const World& world, std::span<const double> /*target*/,
+                      std::span<double> command) const {
+  write_pose(base_at(world.data->mocap_pos, world.data->mocap_quat), command.data());
+}
+
 void PoseTarget::command(const World& world, std::span<const double> command,
                          std::span<double> /*target*/) {
   const Quat q = quat(command.data() + 3);
@@ -51,8 +61,7 @@ void PoseTarget::begin(const World& world, std::span<const double> /*target*/,
 mjtStage PoseTarget::compute(const World& world, int /*index*/, const StateRow& state) {
   const Goal& goal = goals_[world.id];
   if (!goal.given) return mjSTAGE_ACC;
-  const Pose now = Pose{vec3(state.mocap_pos + 3 * mocap_), quat(state.mocap_quat + 4 * mocap_)} *
-                   inverse(base_to_mocap_);
+  const Pose now = base_at(state.mocap_pos, state.mocap_quat);
   const Vec3 way = goal.base.p - now.p;
   const Vec3 turn = log3(conjugate(now.q) * goal.base.q);
   // Both arrive at once where neither is held back.

@@ -19,6 +19,8 @@ class PoseTarget : public Controller {
   void describe(MoveGroup& group) const override;
   void start(const StateRow& /*state*/) const override {}
   void hold(const World& world, std::span<double> target) override;
+  void keep(const World& world, std::span<const double> target,
+            std::span<double> command) const override;
   void command(const World& world, std::span<const double> command,
                std::span<double> target) override;
   void begin(const World& world, std::span<const double> target, const StateRow& state) override;
@@ -29,6 +31,8 @@ class PoseTarget : public Controller {
   void write(const Pose& base, const StateRow& state) const;
 
  private:
+  Pose base_at(const mjtNum* mocap_pos, const mjtNum* mocap_quat) const;
+
   int mocap_;
   Pose base_to_mocap_;
   double max_step_, max_turn_;  // m and rad a control step

@@ -4,6 +4,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <cmath>
 
 #include "mjsense/core/error.h"
 #include "mjsense/robots/controllers/actuated.h"
@@ -28,13 +29,31 @@ class TorsoHeight final : public ActuatedController {
     group.command_low = {cfg_.range[0]};
     group.command_high = {cfg_.range[1]};
   }
+  void keep(const World& /*world*/, std::span<const double> target,
+            std::span<double> command) const override {
+    command[0] = height_of(target);
+  }
+  // The height that it has leaves it as it is, joints between which the ratio is another one, too.
   void command(const World& /*world*/, std::span<const double> command,
                std::span<double> target) override {
     const double height = std::clamp(command[0], cfg_.range[0], cfg_.range[1]);
+    if (std::abs(height - height_of(target)) < kSame) return;
     for (int i = 0; i < size(); ++i) target[i] = clip(i, cfg_.ratio[i] * height);
   }
 
  private:
+  static constexpr double kSame = 1e-6;  // rad; commands may come as float32
+
+  // Nearest to where the joints aim.
+  double height_of(std::span<const double> target) const {
+    double along = 0, square = 0;
+    for (int i = 0; i < size(); ++i) {
+      along += cfg_.ratio[i] * target[i];
+      square += cfg_.ratio[i] * cfg_.ratio[i];
+    }
+    return std::clamp(square > 0 ? along / square : 0.0, cfg_.range[0], cfg_.range[1]);
+  }
+
   TorsoHeightCfg cfg_;
 };
 
