@@ -90,13 +90,7 @@ SensorHandle image_points(const std::string& name,
 
 SensorHandle shared_field(const std::string& name, const SensorHandle& source,
                           const std::string& field) {
-  return {std::make_shared<SharedField>(name, *source.sensor, field, [field](SensorSpec& spec) {
-    if (field == "rgb") spec.storage = Storage::kRgbVideo;
-    if (field == "depth") {
-      spec.storage = Storage::kDepthVideo;
-      spec.shape = {spec.shape[0], spec.shape[1]};
-    }
-  })};
+  return {field_of_camera(name, *source.sensor, field)};
 }
 
 }  // namespace

@@ -27,7 +27,7 @@ nb::object PythonHost::simulation(const std::shared_ptr<Simulation>& sim) {
   if (!simulation_) {
     core_ = new PySimulation(sim, turns_);
     nb::object core = nb::cast(core_, nb::rv_policy::take_ownership);
-    nb::object view = nb::cast(TaskView(cell_));
+    nb::object view = nb::cast(TaskView(cell_, turns_));
     simulation_ = Held(make_.get()(core, scene_ ? scene_.get() : nb::none(), view));
   }
   return nb::borrow(simulation_.get());

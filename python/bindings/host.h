@@ -2,10 +2,13 @@
 #pragma once
 // What a rollout has of Python's: its worlds there, and code of users that runs for it.
 
+#include <fmt/format.h>
 #include <nanobind/nanobind.h>
 
 #include <memory>
 #include <string>
+#include <type_traits>
+#include <typeinfo>
 #include <vector>
 
 #include "mjsense/sim/simulation.h"
@@ -35,6 +38,8 @@ class PythonHost : public std::enable_shared_from_this<PythonHost> {
       } catch (nb::python_error& error) {
         add_note(error, place);
         throw;
+      } catch (const std::bad_cast&) {
+        throw ValueError(place + ": what it returned is of another type than expected");
       }
     });
   }
@@ -66,7 +71,11 @@ class PythonHost : public std::enable_shared_from_this<PythonHost> {
 template <class T>
 T item_or(nb::handle dict, const char* key, T otherwise) {
   nb::object value = dict.attr("get")(key);
-  return value.is_none() ? otherwise : nb::cast<T>(value);
+  if (value.is_none()) return otherwise;
+  T number{};
+  if (nb::try_cast(value, number)) return number;
+  throw ValueError(fmt::format("{} is {}: must be {}", key, nb::repr(value).c_str(),
+                               std::is_integral_v<T> ? "an int" : "a number"));
 }
 
 }  // namespace mjsense::python

@@ -20,7 +20,9 @@ namespace nb = nanobind;
 void bind_program(nb::module_& m) {
   m.def(
       "run_program",
-      [](std::vector<std::string> words) {
+      [](const std::vector<nb::bytes>& given) {
+        std::vector<std::string> words;  // names of files need not be UTF-8
+        for (const nb::bytes& word : given) words.emplace_back(word.c_str(), word.size());
         std::vector<char*> argv;
         for (std::string& word : words) argv.push_back(word.data());
         argv.push_back(nullptr);

@@ -96,7 +96,11 @@ class PySimulation {
   // `what` names the call in the message when a sensor's own code makes it.
   template <class Body>
   void change(const char* what, Body&& body) {
-    turns_->change(what, [&] { body(open()); });
+    turns_->change(what, [&] {
+      body(open());
+      // By number: one that hears of it may add others.
+      for (std::size_t i = 0; i < python_.size(); ++i) python_[i]->tell_resets();
+    });
   }
   template <class Body>
   void read(Body&& body) {
@@ -111,16 +115,14 @@ class PySimulation {
     open();
     return owner_of(sim_);
   }
-  // Python sensors learn of the resets of their worlds (also of worlds that failed), computed or
-  // not.
-  void flush_resets() {
-    for (auto& sensor : python_) sensor->flush_resets();
-  }
+  // In its turn: from the body of a change or read.
   void add_python(std::shared_ptr<PythonSensor> sensor) { python_.push_back(std::move(sensor)); }
+  const std::vector<std::shared_ptr<PythonSensor>>& python() const { return python_; }
 
  private:
   std::shared_ptr<Simulation> sim_;
   std::shared_ptr<Turns> turns_ = std::make_shared<Turns>();
+  // Learn of the resets of their worlds (also of worlds that failed), computed or not.
   std::vector<std::shared_ptr<PythonSensor>> python_;
 };
 

@@ -93,7 +93,7 @@ void PythonPolicy::initialize(Task& task) {
   }
   phase_.assign(B, 0);
   retries_.assign(B, 0);
-  chunk_ = {.given = std::vector<std::uint8_t>(group_.size()),
+  chunk_ = {.given = std::vector<std::uint8_t>(B * group_.size()),
             .done = std::vector<std::uint8_t>(B),
             .success = std::vector<std::int8_t>(B),
             .left = std::vector<std::size_t>(B)};
@@ -190,19 +190,22 @@ void PythonPolicy::call_act() {
 void PythonPolicy::read(nb::handle value) {
   const auto B = static_cast<std::size_t>(task_->num_worlds());
   chunk_.steps = 0;
-  if (!nb::isinstance<nb::dict>(value)) {
-    std::ranges::fill(chunk_.given, 1);
-    std::ranges::fill(chunk_.done, 0);
-    std::ranges::fill(chunk_.success, -1);
-    return read_group(value, 0, n_, "");
-  }
-  std::ranges::fill(chunk_.given, 0);
-  // Flags of worlds in the middle of a chunk stay.
+  // What was given and said for worlds in the middle of a chunk stays.
+  const auto give = [&](std::size_t first, std::size_t count, bool given) {
+    for (std::size_t w = 0; w < B; ++w) {
+      if (wanted_rows_[w]) std::fill_n(&chunk_.given[w * group_.size()] + first, count, given);
+    }
+  };
   for (std::size_t w = 0; w < B; ++w) {
     if (!wanted_rows_[w]) continue;
     chunk_.done[w] = 0;
     chunk_.success[w] = -1;
   }
+  if (!nb::isinstance<nb::dict>(value)) {
+    give(0, group_.size(), true);
+    return read_group(value, 0, n_, "");
+  }
+  give(0, group_.size(), false);
   for (auto [key, item] : nb::cast<nb::dict>(value)) {
     const auto name = nb::cast<std::string>(key);
     if (name == "done") {
@@ -214,7 +217,7 @@ void PythonPolicy::read(nb::handle value) {
       continue;
     }
     if (name == "action") {
-      std::ranges::fill(chunk_.given, 1);
+      give(0, group_.size(), true);
       read_group(item, 0, n_, "");
       continue;
     }
@@ -227,7 +230,7 @@ void PythonPolicy::read(nb::handle value) {
       first += width_[i];
     }
     if (i == group_.size()) throw_unknown(place("act"), "move group", name, names);
-    chunk_.given[i] = 1;
+    give(i, 1, true);
     read_group(item, first, width_[i], name);
   }
   if (chunk_.steps == 0) {  // nothing but flags: everything holds
@@ -297,7 +300,7 @@ void PythonPolicy::fill(int world, Action& action) {
   const std::size_t at = chunk_.steps - chunk_.left[world];
   const double* values = chunk_.values.data() + (world * chunk_.steps + at) * n_;
   for (std::size_t i = 0; i < group_.size(); ++i) {
-    if (chunk_.given[i])
+    if (chunk_.given[world * group_.size() + i])
       action.commands[group_[i]].set({values, static_cast<std::size_t>(width_[i])});
     values += width_[i];
   }

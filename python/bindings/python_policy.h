@@ -49,7 +49,7 @@ class PythonPolicy final : public PlannerPolicy {
   struct Chunk {
     std::size_t steps = 0;
     std::vector<double> values;        // [B, steps, n]
-    std::vector<std::uint8_t> given;   // by move group
+    std::vector<std::uint8_t> given;   // [B, move groups]
     std::vector<std::uint8_t> done;    // [B], of the last step
     std::vector<std::int8_t> success;  // [B], -1: nothing is said
     std::vector<std::size_t> left;     // [B]

@@ -61,6 +61,8 @@ void PythonSensor::initialize(const SensorInit& init) {
   for (const auto& [name, spec] : spec_.fields) add_field(name, spec, init.num_worlds);
   step_dt_ = init.decimation * init.model->opt.timestep;
   seeds_.assign(init.num_worlds, 0);
+  begun_.assign(init.num_worlds, 0);
+  updates_.assign(init.num_worlds, 0);
   reset_.assign(init.num_worlds, 0);
   if (on_initialized) {
     nb::gil_scoped_acquire lock;
@@ -74,11 +76,14 @@ void PythonSensor::cast(const CastContext& context) {
   throw_faults(self().attr("_mjs_compute_rows")(list_of(context.ids), seeds_of(context.ids)));
 }
 
-void PythonSensor::control_step(std::span<const int> ids) {
+// Its random numbers are those of the n-th update since the reset, read or not in between.
+void PythonSensor::update(std::span<const int> ids, double dt) {
   if (!spec_.updates) return;
   nb::gil_scoped_acquire lock;
   flush_resets();
-  throw_faults(self().attr("_mjs_control_step")(list_of(ids), step_dt_, seeds_of(ids)));
+  nb::list seeds;
+  for (int w : ids) seeds.append(Rng(begun_[w], 0, stream_of(name()), ++updates_[w]).next());
+  throw_faults(self().attr("_mjs_control_step")(list_of(ids), dt, seeds));
 }
 
 // The same for the same moment of an episode, whatever its world.
@@ -94,8 +99,16 @@ nb::list PythonSensor::seeds_of(std::span<const int> ids) const {
 
 void PythonSensor::reset(const World& world) {
   draw_seed(world);
+  begun_[world.id] = seeds_[world.id];
+  updates_[world.id] = 0;
   reset_[world.id] = 1;
   any_reset_ = true;
+}
+
+void PythonSensor::tell_resets() {
+  if (!any_reset_) return;
+  nb::gil_scoped_acquire lock;
+  flush_resets();
 }
 
 void PythonSensor::flush_resets() {

@@ -67,25 +67,30 @@ class PythonSensor final : public Sensor, public ControlStepListener {
   void compute(const World& world) override { draw_seed(world); }
   // Throws PythonRowError for the worlds whose rows could not be filled; the others are.
   void cast(const CastContext& context) override;
-  void control_step(std::span<const int> ids) override;
+  void control_step(std::span<const int> ids) override { update(ids, step_dt_); }
+  // The same for `dt` seconds.
+  void update(std::span<const int> ids, double dt);
   void reset(const World& world) override;
 
   // Called with the interpreter's lock when the rows exist.
   std::function<void()> on_initialized;
-  // Tells Python which worlds were reset since the last call. Needs the interpreter's lock, as does
-  // self().
-  void flush_resets();
-  nb::object self() const { return self_.get(); }
+  // Tells Python which worlds were reset since the last call. Without the interpreter's lock, which
+  // it takes if there is something to tell.
+  void tell_resets();
+  nb::object self() const { return self_.get(); }  // needs the lock
 
  private:
   void draw_seed(const World& world);
   nb::list seeds_of(std::span<const int> ids) const;
+  void flush_resets();  // needs the lock
 
   WeakObject self_;
   PythonSensorSpec spec_;
-  double step_dt_ = 0;                // s, one control step
-  std::vector<std::uint32_t> seeds_;  // [B] of the moment of the last compute() or reset()
-  std::vector<std::uint8_t> reset_;   // [B] worlds reset since the last call into Python
+  double step_dt_ = 0;                  // s, one control step
+  std::vector<std::uint32_t> seeds_;    // [B] of the moment of the last compute() or reset()
+  std::vector<std::uint32_t> begun_;    // [B] seeds of the last reset()
+  std::vector<std::uint64_t> updates_;  // [B] since then
+  std::vector<std::uint8_t> reset_;     // [B] worlds reset since the last call into Python
   std::atomic<bool> any_reset_{false};
 };
 

@@ -129,7 +129,8 @@ void PythonTask::set_objects(int world, nb::handle roles) {
   target_[world] = static_cast<int>(at - graspable_.begin());
 }
 
-std::optional<Pose> PythonTask::sample_scene(int world, Rng& /*rng*/, const StateRow& /*state*/) {
+std::optional<Pose> PythonTask::sample_scene(int world, Rng& rng, const StateRow& state) {
+  robot().write_joints(state, rng);  // which sample() may move
   return call("sample", [&]() -> std::optional<Pose> {
     nb::object base = task_.get().attr("_mjs_sample")(world, episode(world), cfg().seed);
     set_objects(world, task_.get().attr("_mjs_roles")(world));

@@ -55,6 +55,7 @@ class PythonTask final : public Task, public GraspScene {
  protected:
   void initialize_task() override;
   std::optional<Pose> sample_scene(int world, Rng& rng, const StateRow& state) override;
+  bool samples_robot() const override { return true; }
   std::vector<std::pair<std::string, std::string>> scene_info(int world) const override;
 
  private:

@@ -10,6 +10,8 @@
 #include <nanobind/stl/string_view.h>
 #include <nanobind/stl/vector.h>
 
+#include <algorithm>
+
 #include "mjsense/core/error.h"
 #include "mjsense/observe/shared_field.h"
 #include "python/bindings/bindings.h"
@@ -19,14 +21,6 @@
 
 namespace mjsense::python {
 namespace {
-
-// Fields of a camera that are films.
-struct Film {
-  const char *field, *suffix;
-  Storage storage;
-};
-constexpr Film kFilms[] = {{"rgb", "", Storage::kRgbVideo},
-                           {"depth", "_depth", Storage::kDepthVideo}};
 
 // `episodes` and so on: fields of RecordJobCfg, of which a recorder takes what concerns files.
 class PyRecorder {
@@ -117,25 +111,21 @@ class PyRecorder {
     if (world < 0 || world >= B)
       throw ValueError(fmt::format("world {}: must be in [0, {})", world, B));
   }
-  // A camera becomes films, as in the recordings of tasks.
+  // A camera with colours or depth becomes films and what else it has, as in the recordings of tasks.
   void add(const std::shared_ptr<Sensor>& sensor) {
     sources_.push_back(sensor);
-    bool films = false;
-    for (const Film& film : kFilms) {
-      for (const Field& field : sensor->fields()) {
-        if (sensor->kind() != "camera" || field.name != film.field) continue;
-        films = true;
-        auto shown = std::make_shared<SharedField>(
-            sensor->name() + film.suffix, *sensor, film.field, [&film](SensorSpec& spec) {
-              spec.storage = film.storage;
-              if (film.storage == Storage::kDepthVideo)
-                spec.shape = {spec.shape.dims()[0], spec.shape.dims()[1]};
-            });
-        shown->initialize({.model = nullptr, .num_worlds = sim_.open().num_worlds()});
-        sensors_.push_back(std::move(shown));
-      }
+    const auto has = [&](std::string_view field) {
+      return std::ranges::find(sensor->fields(), field, &Field::name) != sensor->fields().end();
+    };
+    if (sensor->kind() != "camera" || !(has("rgb") || has("depth"))) {
+      sensors_.push_back(sensor);
+      return;
     }
-    if (!films) sensors_.push_back(sensor);
+    for (const Field& field : sensor->fields()) {
+      const std::string suffix = field.name == "rgb" ? "" : "_" + field.name;
+      sensors_.push_back(field_of_camera(sensor->name() + suffix, *sensor, field.name));
+      sensors_.back()->initialize({.model = nullptr, .num_worlds = sim_.open().num_worlds()});
+    }
   }
 
   PySimulation& sim_;

@@ -11,6 +11,8 @@
 #include <nanobind/stl/string.h>
 #include <nanobind/stl/vector.h>
 
+#include <numeric>
+
 #include "mjsense/rollout/record_job.h"
 #include "mjsense/rollout/registry.h"
 #include "mjsense/scenes/scene_file.h"
@@ -229,20 +231,14 @@ class PyRollout {
   }
   // What act() chose, [B, n], and which worlds it said to be done in.
   nb::tuple actions() {
-    const auto& groups = rollout_->task().robot().groups();
     std::vector<std::vector<double>> rows(rollout_->num_worlds());
-    std::vector<int> done(rollout_->num_worlds());
+    std::vector<int> done(rollout_->num_worlds()), all(rollout_->num_worlds());
+    std::iota(all.begin(), all.end(), 0);
     turns_->read([&] {
-      for (int w = 0; w < rollout_->num_worlds(); ++w) {
-        done[w] = rollout_->action(w).done;
-        for (std::size_t g = 0; g < groups.size(); ++g) {
-          const GroupValues& given = rollout_->action(w).commands[g];
-          const GroupValues& held = rollout_->task().robot().targets(w)[g];
-          const bool command = given.given || groups[g].target_size != groups[g].command_size;
-          for (int k = 0; k < groups[g].command_size; ++k)
-            rows[w].push_back((command ? given : held).values[k]);
-        }
-      }
+      rollout_->for_each(all, [&](const World& world) {
+        rows[world.id] = rollout_->task().robot().commands(world, rollout_->action(world.id));
+        done[world.id] = rollout_->action(world.id).done;
+      });
     });
     return nb::make_tuple(rows, done);
   }

@@ -29,7 +29,6 @@ WorldIds worlds_of(const Ids& ids) { return ids ? WorldIds(*ids) : WorldIds(all_
 
 void step(PySimulation& self, int control_steps) {
   self.change("step", [&](Simulation& sim) { sim.step(control_steps); });
-  self.flush_resets();
 }
 
 void reset(PySimulation& self, const Ids& ids, int key, std::optional<std::uint64_t> seed) {
@@ -38,28 +37,47 @@ void reset(PySimulation& self, const Ids& ids, int key, std::optional<std::uint6
     if (seed) sim.seed(*seed);
     sim.reset(checked, key);
   });
-  self.flush_resets();
+}
+
+// mjlab's order of calls: first MuJoCo's steps, then every sensor's update, whatever rows of others
+// cannot be filled; then the first error is thrown.
+void update_sensors(PySimulation& self, double dt) {
+  self.change("update", [&](Simulation& sim) {
+    sim.update_sensors(dt);
+    const std::vector<int> ids = sim.worlds().checked_ids(all_worlds);
+    const double seconds = dt > 0 ? dt : sim.model()->opt.timestep;
+    std::exception_ptr fault;
+    for (const auto& sensor : self.python()) {
+      try {
+        sensor->update(ids, seconds);
+      } catch (const RowError&) {
+        if (!fault) fault = std::current_exception();
+      }
+    }
+    if (fault) std::rethrow_exception(fault);
+  });
 }
 
 void reset_sensors(PySimulation& self, const Ids& ids) {
   self.change("reset_sensors", [&](Simulation& sim) { sim.reset_sensors(worlds_of(ids)); });
-  self.flush_resets();
 }
 
 void forward(PySimulation& self, const Ids& ids) {
   self.change("forward", [&](Simulation& sim) { sim.forward(worlds_of(ids)); });
-  self.flush_resets();
 }
 
 // Rows [B, bytes] of a field of the model: Python knows its type and shape from MuJoCo's own
 // bindings.
 NumpyArray model_field(PySimulation& self, const std::string& name) {
-  Simulation& sim = self.open();
-  int size = 0, element = 0;
-  void* data = mjb_expand(sim.worlds().batch(), name.c_str(), &size, &element);
+  int size = 0, element = 0, worlds = 0;
+  void* data = nullptr;
+  self.read([&](Simulation& sim) {
+    data = mjb_expand(sim.worlds().batch(), name.c_str(), &size, &element);
+    worlds = sim.num_worlds();
+  });
   if (!data) throw ValueError("mjModel field '" + name + "' cannot have a value per world");
   const std::int64_t bytes = static_cast<std::int64_t>(size) * element;
-  return to_numpy(ArrayView::dense(data, DType::kUint8, {sim.num_worlds(), bytes}), self.owner());
+  return to_numpy(ArrayView::dense(data, DType::kUint8, {worlds, bytes}), self.owner());
 }
 
 std::string_view kind_name(mjtGeom kind) {
@@ -122,12 +140,7 @@ void bind_simulation(nb::module_& m) {
             s.change("step_raw", [&](Simulation& sim) { sim.step_raw(n); });
           },
           nb::arg("substeps"))
-      .def(
-          "update_sensors",
-          [](PySimulation& s, double dt) {
-            s.change("update", [dt](Simulation& sim) { sim.update_sensors(dt); });
-          },
-          nb::arg("dt") = 0.0)
+      .def("update_sensors", &update_sensors, nb::arg("dt") = 0.0)
       .def(
           "refresh",
           [](PySimulation& s, const SensorHandle& h) {
@@ -155,8 +168,10 @@ void bind_simulation(nb::module_& m) {
             auto sensor =
                 std::make_shared<PythonSensor>(nb::cast<std::string>(object.attr("uuid")),
                                                WeakObject(object), read_python_spec(object));
-            s.change("add", [&](Simulation& sim) { sim.add(sensor); });
-            s.add_python(sensor);
+            s.change("add", [&](Simulation& sim) {
+              sim.add(sensor);
+              s.add_python(sensor);
+            });
             return SensorHandle{sensor};
           },
           nb::arg("sensor"), "Adds a mjsense.Sensor that is not part of the scene.")
@@ -178,7 +193,7 @@ void bind_simulation(nb::module_& m) {
           "own_sensor",
           [](PySimulation& s, const SensorHandle& h) {
             if (auto sensor = std::dynamic_pointer_cast<PythonSensor>(h.sensor))
-              s.add_python(sensor);
+              s.read([&](Simulation&) { s.add_python(sensor); });
           },
           nb::arg("sensor"), "Tells a Python sensor of the scene about resets from now on.")
       .def(
@@ -215,15 +230,17 @@ void bind_simulation(nb::module_& m) {
           nb::arg("world_ids"), nb::arg("set_const"))
       .def("times",
            [](PySimulation& s) {
-             nb::list times;
-             for (int w = 0; w < s.open().num_worlds(); ++w)
-               times.append(s.open().worlds().time(w));
+             std::vector<double> times;
+             s.read([&](Simulation& sim) {
+               for (int w = 0; w < sim.num_worlds(); ++w) times.push_back(sim.worlds().time(w));
+             });
              return times;
            })
       .def("failures", [](PySimulation& s) {
+        std::vector<Failure> now;
+        s.read([&](Simulation& sim) { now = sim.failures(); });
         nb::list failures;
-        for (const Failure& f : s.open().failures())
-          failures.append(nb::make_tuple(f.world, f.message));
+        for (const Failure& f : now) failures.append(nb::make_tuple(f.world, f.message));
         return failures;
       });
 }

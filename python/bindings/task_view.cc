@@ -13,30 +13,16 @@
 #include "mjsense/scene/resolve.h"
 #include "python/bindings/bindings.h"
 #include "python/bindings/numpy.h"
+#include "python/bindings/py_simulation.h"
 #include "python/bindings/python_task.h"
 #include "python/bindings/sensor_handle.h"
 
 namespace mjsense::python {
 namespace {
 
-// Runs a function on one fresh world.
-class Once final : public WorldHooks {
- public:
-  explicit Once(std::function<void(const World&)> body) : body_(std::move(body)) {}
-  void substep(const World&) override {}
-  void reset(const World&) override {}
-  void refreshed(const World& world) override { body_(world); }
-
- private:
-  std::function<void(const World&)> body_;
-};
-
 void visit(const TaskView& view, int world, std::function<void(const World&)> body) {
   const int id = view.checked(world);
-  Rollout& rollout = view.rollout();
-  nb::gil_scoped_release unlock;
-  Once once(std::move(body));
-  rollout.simulation().worlds().visit(std::span(&id, 1), once);
+  view.turns().read([&] { view.rollout().for_each(std::span(&id, 1), std::move(body)); });
 }
 
 nb::object array_of(std::span<const double> values) {

@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import os
 import signal
 import sys
 from itertools import pairwise
@@ -20,7 +21,7 @@ def main() -> int:
     if "--meshes=real" in words or ("--meshes", "real") in pairwise(words):
         use_installed_meshes()
     use_installed_ffmpeg()
-    return _core.run_program(["mjsense", *words])
+    return _core.run_program([b"mjsense", *map(os.fsencode, words)])
 
 
 if __name__ == "__main__":

@@ -226,7 +226,8 @@ class Simulation(KnownAttributes):
 
     @property
     def failures(self) -> list[tuple[int, str]]:
-        """Worlds that failed in the last call, with MuJoCo's words; each was reset alone."""
+        """Worlds that failed in the last call, with MuJoCo's words; each was reset alone. After :meth:`step_raw` only those in which MuJoCo
+        gave up: what diverges there MuJoCo resets by itself, without a word."""
         return self._core.failures()
 
     @property
@@ -305,7 +306,8 @@ class Simulation(KnownAttributes):
         if key not in self._views or self._core.closed:
             like = getattr(self.model, name, None)
             if not isinstance(like, np.ndarray):
-                near = difflib.get_close_matches(name, dir(self.model), 3)
+                arrays = [field for field in dir(self.model) if isinstance(getattr(self.model, field, None), np.ndarray)]
+                near = difflib.get_close_matches(name, arrays, 3)
                 hint = f"; did you mean {' or '.join(map(repr, near))}?" if near else ""
                 raise AttributeError(f"mjModel has no array '{name}'{hint}")
             self._views[key] = self._core.model_field(name).view(like.dtype).reshape(self.num_worlds, *like.shape)
@@ -347,6 +349,8 @@ class Simulation(KnownAttributes):
             return sensor
         if sensor._mjs_core is not None:
             raise RuntimeError(f"sensor '{sensor.uuid}' belongs to a simulation already")
+        if sensor.uuid in self.scene.sensors or any(sensor.uuid == own.uuid for own in self._python):
+            raise ValueError(f"sensor '{sensor.uuid}': there is one of that name already")
         sensor._mjs_probe(self)
         self._own(sensor, self._core.add_sensor(sensor))
         return sensor
@@ -423,10 +427,6 @@ class Simulation(KnownAttributes):
 
     def update_sensors(self, dt: float = 0.0) -> None:
         """One update of the sensors' per-substep state (air time, history), after step_raw(1). dt 0: the timestep."""
-        for sensor in self._python:
-            if sensor._mjs_updates():
-                for _, error in sensor._mjs_control_step(list(range(self.num_worlds)), dt or self.physics_dt):
-                    raise error
         self._core.update_sensors(dt)
 
     def reset_sensors(self, world_ids: Sequence[int] | None = None) -> None:

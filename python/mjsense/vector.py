@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import Any, Literal
 
 import gymnasium
+import mujoco
 import numpy as np
 from gymnasium.vector import AutoresetMode, VectorEnv
 from gymnasium.vector.utils import batch_space
@@ -80,6 +81,7 @@ class TaskVectorEnv(VectorEnv):
         self.action_groups: dict[str, slice] = group_slices(layout)
         """Columns of the action by move group."""
         low, high = (np.concatenate([[], *(row[k] for row in layout)]).astype(np.float32) for k in (1, 2))
+        low[low <= -mujoco.mjMAXVAL], high[high >= mujoco.mjMAXVAL] = -np.inf, np.inf  # nothing limits them
         self.single_action_space = gymnasium.spaces.Box(low, high, dtype=np.float32)
         self.action_space = batch_space(self.single_action_space, self.num_envs)
         boxes = {name: box_of(spec) for name, spec in self.specs.items()}

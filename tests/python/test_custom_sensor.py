@@ -401,3 +401,61 @@ def test_names_of_users_are_free():
     sim.reset()
     sim.step()
     assert sim.scene["mine"].data.tolist() == [15, 15]
+
+
+class Walk(mjs.Sensor):
+    """A bias that walks at random, a step a control step."""
+
+    uuid = "walk"
+    observation_space = BOX
+
+    def __init__(self):
+        super().__init__()
+        self.steps = []
+
+    def reset(self):
+        self.steps = []
+
+    def update(self, dt):
+        self.steps.append(np.random.uniform())
+
+    def get_observation(self, env, task, batch_index=0):
+        return np.array([sum(self.steps)], np.float32)
+
+
+def test_random_numbers_of_update_are_those_of_the_step_read_or_not():
+    walks = []
+    for read in (False, True):
+        sim = mjs.Simulation(ball_scene(), num_worlds=2, seed=3)
+        walk = sim.add(Walk())
+        sim.reset()
+        for _ in range(4):
+            sim.step()
+            if read:
+                walk.data
+        walks.append([instance.steps for instance in walk._mjs_instances])
+    assert walks[0] == walks[1]
+    assert len(set(walks[0][0] + walks[0][1])) == 8, "every step and world its own"
+
+
+def test_a_reset_hook_may_not_move_the_worlds():
+    class Restless(mjs.Sensor):
+        uuid, observation_space = "restless", BOX
+
+        def reset(self, world_ids):
+            self.simulation.step()
+
+        def compute(self, sim):
+            return sim.qpos[:, 2:3].astype(np.float32)
+
+    sim = mjs.Simulation(ball_scene(), num_worlds=2)
+    sim.add(Restless())
+    with pytest.raises(mjs.SensorError, match="while the simulation is at work"):
+        sim.reset()
+
+
+def test_two_of_one_name_are_an_error():
+    sim = mjs.Simulation(ball_scene(), num_worlds=1)
+    sim.add(Height())
+    with pytest.raises(ValueError, match="'height': there is one of that name already"):
+        sim.add(Height())

@@ -6,7 +6,7 @@ import h5py
 import numpy as np
 import pytest
 from mjsense.policy import FunctionPolicy
-from tasks import Cart, Driver
+from tasks import CART, Cart, Driver
 from test_own_task import json_rows, record, trajectories
 
 import mjsense as mjs
@@ -287,3 +287,39 @@ def test_a_constant_costs_little():
         times.append(time.perf_counter() - start)
     env.close()
     assert np.median(times) < 200e-6  # 50 on an idle machine
+
+
+def test_chunks_of_worlds_that_do_not_begin_together_do_not_mix(tmp_path):
+    """What a chunk gives, and what it leaves out, is that of its own world."""
+
+    class Chunks(mjs.Policy):
+        calls = 0
+
+        def act(self, obs):
+            Chunks.calls += 1
+            rows = {"arm": np.zeros((self.num_worlds, 4, 1))}
+            if Chunks.calls > 1:
+                rows["joints"] = rows.pop("arm")
+            return rows
+
+    class TwoGroups(Cart):
+        move_groups = {"arm": "drive", "joints": "turner"}
+        horizon = 8
+
+        def scene(self):
+            turn = '<joint name="turn" axis="0 0 1" range="-1 1" damping="1"/>'
+            drive = '<position name="turner" joint="turn" kp="1" ctrlrange="-1 1"/>'
+            xml = CART.replace('range="-1 1" damping="20"/>', 'range="-1 1" damping="20"/>' + turn)
+            return mjs.SceneCfg(entities={"cart": mjs.EntityCfg(model=xml.replace("</actuator>", drive + "</actuator>"))})
+
+        def evaluate(self, sim):
+            # World 1 begins anew in the middle of world 0's chunk.
+            over = (np.arange(sim.num_worlds) == 1) & (sim.time > 0.03)
+            return {"reward": np.zeros(sim.num_worlds), "success": np.ones(sim.num_worlds, bool), "terminated": over}
+
+    summary = mjs.record(TwoGroups(), policy=Chunks(), out=tmp_path, episodes=4, worlds=2, cameras=[], keep_failures=True)
+    for rows in trajectories(summary):
+        commands = json_rows(rows["actions/commanded_action"])[1:]
+        for first in range(0, len(commands), 4):
+            groups = {tuple(command) for command in commands[first : first + 4] if command}
+            assert len(groups) <= 1, commands

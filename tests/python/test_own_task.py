@@ -87,6 +87,33 @@ def test_terminated_is_what_the_task_says():
     env.close()
 
 
+class OverAtOnce(Cart):
+    """Episodes whose cart starts on the left are over before they begin."""
+
+    def evaluate(self, sim):
+        left = sim.qpos[:, 0] < 0
+        return {"reward": -np.abs(sim.qpos[:, 0]), "success": np.zeros(len(left), bool), "terminated": left & (sim.time == 0)}
+
+
+@pytest.mark.parametrize("worlds", [1, 4])
+def test_episodes_that_are_over_at_once_end_no_recording(tmp_path, worlds):
+    summary = record(tmp_path, OverAtOnce(), episodes=4, worlds=worlds, max_attempts=40)
+    assert summary.kept == 4 and summary.enough and not summary.interrupted
+    assert summary.failures["no success"] >= 1, "the case that this is about"
+
+
+def test_a_reward_that_is_no_number_ends_the_episode_and_says_so(tmp_path):
+    class Lost(Cart):
+        def evaluate(self, sim):
+            found = super().evaluate(sim)
+            found["reward"] = np.where(sim.qpos[:, 0] > 0, np.nan, found["reward"])
+            return found
+
+    summary = record(tmp_path, Lost(), episodes=2, max_attempts=12)
+    assert any("task 'lost': the reward is nan" in why for why in summary.failures)
+    assert all(np.isfinite(rows["rewards"]).all() for rows in trajectories(summary))
+
+
 def test_success_terminates_if_asked():
     for asked in (False, True):
         task = Cart()

@@ -59,6 +59,24 @@ def test_a_loop_of_ones_own(tmp_path):
     assert recorder.stats["rows"] == 12
 
 
+def test_nothing_that_a_camera_has_is_missing(tmp_path):
+    camera = mjs.CameraSensorCfg(
+        name="eye", pos=(0, -2, 0.5), quat=(0.7, 0.7, 0, 0), width=16, height=8, data_types=("rgb", "segmentation", "normals")
+    )
+    sim = mjs.Simulation(ball_scene(camera), num_worlds=1)
+    with mjs.Recorder(tmp_path, sim, episodes=1) as recorder:
+        recorder.begin_episode(0, episode=0)
+        recorder.append()
+        seen = {field: getattr(sim.scene["eye"].data, field)[0].copy() for field in ("segmentation", "normals", "intrinsics", "pose")}
+        recorder.finish_episode(0)
+    with pytest.raises(RuntimeError, match="complete"):
+        recorder.append()
+    with h5py.File(next(recorder.path.glob("*.h5"))) as file:
+        assert "eye" in file["traj_0/obs/sensor_data"]
+        for field, value in seen.items():
+            np.testing.assert_array_equal(file[f"traj_0/obs/extra/eye_{field}"][0], value)
+
+
 def test_what_is_unfinished_can_be_resumed(tmp_path):
     sim = simulation()
     sensors = [Height()]
@@ -96,7 +114,7 @@ def test_errors(tmp_path):
         (lambda: mjs.Recorder(tmp_path, sim, episodes=0), ValueError, "episodes"),
         (lambda: mjs.Recorder(tmp_path, sim, fps=0), ValueError, "fps is 0"),
         (lambda: recorder.begin_episode(2, 0), ValueError, r"world 2: must be in \[0, 2\)"),
-        (lambda: recorder.append([0], reward=[1, 2]), ValueError, r"reward has shape \(2,\), expected one value or \(1,\)"),
+        (lambda: recorder.append([0], reward=[1, 2]), ValueError, r"reward has shape \(2,\), expected one value, or \(1,\) for the worlds \[0\]"),
         (lambda: recorder.append([1]), Exception, "1"),
     ]:
         recorder = mjs.Recorder(tmp_path / str(len(list(tmp_path.iterdir()))), sim, [sim.scene["eye"]], episodes=1)

@@ -23,23 +23,12 @@ void add_camera(SensorSuite& suite, const RecordedCamera& camera, const std::str
   suite.add(std::make_shared<CameraParameterSensor>(
                 "sensor_param_" + camera.name, camera.mjcf_camera, camera.width, camera.height),
             owner);
-  suite.add(
-      std::make_shared<SharedField>(camera.name, *camera.sensor, "rgb",
-                                    [](SensorSpec& spec) { spec.storage = Storage::kRgbVideo; }),
-      owner);
-  if (camera.depth) {
-    suite.add(std::make_shared<SharedField>(camera.name + "_depth", *camera.sensor, "depth",
-                                            [&camera](SensorSpec& spec) {
-                                              spec.storage = Storage::kDepthVideo;
-                                              spec.shape = {camera.height, camera.width};
-                                            }),
-              owner);
-  }
-  if (camera.segmentation) {
-    suite.add(std::make_shared<SharedField>(camera.name + "_segmentation", *camera.sensor,
-                                            "segmentation"),
-              owner);
-  }
+  const auto add = [&](const char* suffix, const char* field) {
+    suite.add(field_of_camera(camera.name + suffix, *camera.sensor, field), owner);
+  };
+  add("", "rgb");
+  if (camera.depth) add("_depth", "depth");
+  if (camera.segmentation) add("_segmentation", "segmentation");
 }
 
 // Parts of the robot, then what plays a role in the task. Null where there is nothing to be seen, or

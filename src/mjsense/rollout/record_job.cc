@@ -108,14 +108,17 @@ std::string settings_of(const RecordJobCfg& job, Rollout& rollout) {
     json.end_object();
   };
   std::vector<std::uint8_t> text(1 << 16);
-  JsonWriter json(text);
-  json.begin_object();
-  for (const auto& [key, write] : entries) {
-    json.key(key);
-    write(json);
+  for (;;) {
+    JsonWriter json(text);
+    json.begin_object();
+    for (const auto& [key, write] : entries) {
+      json.key(key);
+      write(json);
+    }
+    json.end_object();
+    if (json.fits()) return {text.begin(), text.begin() + static_cast<std::ptrdiff_t>(json.size())};
+    text.resize(json.size());
   }
-  json.end_object();
-  return {text.begin(), text.begin() + static_cast<std::ptrdiff_t>(json.size())};
 }
 
 RecordingCfg recording_cfg(const RecordJobCfg& job, Rollout& rollout, const StopFlag* stop) {
@@ -153,7 +156,8 @@ class RecordJob {
     while (true) {
       const int level = stop ? stop->load() : 0;
       if (level >= 2) abandon();
-      if (level == 0) start_episodes();
+      const bool started = level == 0 && start_episodes();
+      if (running_ == 0 && started) continue;  // all of them ended where they began
       if (running_ == 0) break;
       rollout_.act();
       rollout_.step();
@@ -202,8 +206,9 @@ class RecordJob {
     summary_.recording_s += since(begun);
   }
 
-  // Free worlds take the next attempts, as many as are still needed if all that run succeed.
-  void start_episodes() {
+  // Free worlds take the next attempts, as many as are still needed if all that run succeed. Whether
+  // there were any.
+  bool start_episodes() {
     worlds_.clear();
     episodes_.clear();
     for (int w = 0; w < rollout_.num_worlds(); ++w) {
@@ -214,7 +219,7 @@ class RecordJob {
       episodes_.push_back(next_++);
       ++running_;
     }
-    if (worlds_.empty()) return;
+    if (worlds_.empty()) return false;
     rollout_.start(worlds_, episodes_);
     for (std::size_t k = 0; k < worlds_.size(); ++k) {
       timed([&] {
@@ -223,6 +228,7 @@ class RecordJob {
       lengths_[worlds_[k]] = 0;
       observe(worlds_[k]);
     }
+    return true;
   }
 
   // Records the observation that world w shows, and ends its episode where it ends.

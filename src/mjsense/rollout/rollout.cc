@@ -5,6 +5,7 @@
 
 #include <algorithm>
 #include <chrono>
+#include <cmath>
 #include <functional>
 
 #include "mjsense/core/error.h"
@@ -55,6 +56,8 @@ TaskCfg task_cfg(const RolloutCfg& cfg) {
 
 RolloutCfg resolved(RolloutCfg cfg) {
   if (cfg.robot == kTaskRobot) cfg.robot = default_robot(cfg.make_task ? "" : cfg.task);
+  if (cfg.scene.empty() && !cfg.make_scene && !cfg.make_task)
+    cfg.scene = default_scene(parts_of_task(cfg.task)[0]);
   return cfg;
 }
 
@@ -96,7 +99,7 @@ Rollout::Rollout(const RolloutCfg& cfg) : cfg_(resolved(cfg)) {
 }
 
 Rollout::Rollout(RolloutCfg cfg, std::shared_ptr<Task> task, std::shared_ptr<Policy> policy)
-    : cfg_(std::move(cfg)), task_(std::move(task)), policy_(std::move(policy)) {
+    : cfg_(std::move(cfg)), policy_(std::move(policy)), task_(std::move(task)) {
   const TaskCfg& own = task_->cfg();
   cfg_.task = task_->name();
   cfg_.robot = own.robot.name;
@@ -170,7 +173,9 @@ void Rollout::for_each(std::span<const int> worlds, std::function<void(const Wor
 }
 
 void Rollout::set_fault(int world, std::string text) {
-  if (active_[world] && faults_[world].empty()) faults_[world] = std::move(text);
+  if (!active_[world] || !faults_[world].empty()) return;
+  faults_[world] = std::move(text);
+  evaluations_[world] = {};  // what was judged before is not this step's
 }
 
 void Rollout::take_failures() {
@@ -196,6 +201,7 @@ void Rollout::start(std::span<const int> worlds, std::span<const std::int64_t> e
     const int w = worlds[k];
     active_[w] = true;
     faults_[w].clear();
+    evaluations_[w] = {};
     refused_[w] = false;
     actions_[w] = Action{};
     log_->begin(w);
@@ -368,6 +374,11 @@ void Rollout::evaluate(std::span<const int> worlds) {
   const auto begun = Clock::now();
   Some some(*this, worlds);
   task_->evaluate_all(some, evaluations_);
+  for (int w : worlds) {
+    const double reward = evaluations_[w].reward;
+    if (!std::isfinite(reward))
+      set_fault(w, fmt::format("task '{}': the reward is {}", task_->name(), reward));
+  }
   times_.sensing += since(begun);
 }
 

@@ -137,7 +137,7 @@ void visit_fields(V& v, RolloutCfg& c) {
       .hidden();
 }
 
-// With the robot by its name where it was left to the task.
+// With robot and scene by their names where they were left to the task.
 RolloutCfg resolved(RolloutCfg cfg);
 
 // Where the time of steps went, wall seconds.
@@ -166,6 +166,8 @@ class Rollout {
   Simulation& simulation() { return *simulation_; }
   const std::shared_ptr<Simulation>& simulation_ptr() const { return simulation_; }
   SensorSuite& suite() { return suite_; }
+  // Runs a function on the fresh data of some worlds, in parallel.
+  void for_each(std::span<const int> worlds, std::function<void(const World&)> body);
   const std::vector<RecordedCamera>& cameras() const { return cameras_; }
 
   // What a recording says of this world's episode: the task's, and where a named camera system has
@@ -205,7 +207,6 @@ class Rollout {
   class Some;
   void make();
   std::span<const int> active_worlds();
-  void for_each(std::span<const int> worlds, std::function<void(const World&)> body);
   void move(std::span<const int> worlds, bool answers);
   void evaluate(std::span<const int> worlds);
   void finish_rows();
@@ -220,8 +221,8 @@ class Rollout {
   int threads() const;
 
   RolloutCfg cfg_;
+  std::shared_ptr<Policy> policy_;  // outlives the task
   std::shared_ptr<Task> task_;
-  std::shared_ptr<Policy> policy_;
   std::unique_ptr<CameraSystem> camera_system_;
   std::vector<RecordedCamera> cameras_;
   std::unique_ptr<ActionLog> log_;
