@@ -48,6 +48,8 @@ VIEWS = {
     "scene_libero_kitchen": View("pick", "libero/kitchen", pos=(-1.1, -1.3, 1.7), target=(-0.2, 0.0, 0.9)),
     "scene_libero_table": View("pick", "libero/table", pos=(-1.1, -1.3, 1.7), target=(-0.2, 0.0, 0.9)),
     "scene_libero_coffee_table": View("pick", "libero/coffee_table", pos=(-1.0, -1.4, 1.3), target=(-0.2, 0.0, 0.5)),
+    "scene_libero_study": View("pick", "libero/study", pos=(0.55, 0.95, 1.7), target=(-0.65, -0.1, 0.95)),
+    "scene_libero_living_room": View("pick", "libero/living_room", pos=(0.6, -1.3, 1.4), target=(-0.7, 0.1, 0.6)),
     "scene_gymnasium_robotics_kitchen": View("open", "gymnasium_robotics/kitchen", pos=(1.0, -1.3, 2.5), target=(-0.3, 0.3, 1.7)),
     "task_pick": View("pick", "varied_table", steps=65),
     "task_pick_and_place": View("pick_and_place", "tableware", steps=125),

@@ -12,7 +12,7 @@ import mjsense as mjs
 
 PROGRAM = os.environ.get("MJSENSE_PROGRAM", Path(__file__).parents[2] / "build/dev/mjsense")
 THINGS = ("stable_hope_objects/butter", "stable_hope_objects/orange_juice", "stable_hope_objects/popcorn",
-          "stable_hope_objects/red_alphabet_soup", "stable_scanned_objects/red_bowl", "turbosquid_objects/red_coffee_mug")  # fmt: skip
+          "stable_hope_objects/red_alphabet_soup", "stable_scanned_objects/red_bowl", "turbosquid_objects/wine_bottle")  # fmt: skip
 SCENE = """
 name = "libero_table"
 

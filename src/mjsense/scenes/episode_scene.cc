@@ -69,7 +69,63 @@ bool can_be_held(const ObjectShape& shape) {
   return least_extent(shape) <= kHand && shape.reach <= kReach;
 }
 
-bool upright(const double* quat) { return std::abs(quat[1]) + std::abs(quat[2]) < 1e-9; }
+// A box that does not move and lies level, whichever of its axes is up.
+struct LevelBox {
+  int geom = -1;
+  double x = 0, y = 0, top = 0;  // middle and height of its top
+  double wide = 0, deep = 0;     // half of it, along x and y
+};
+
+std::optional<LevelBox> level_box(const mjModel* m, int g) {
+  if (m->geom_type[g] != mjGEOM_BOX) return {};
+  Pose pose{vec3(m->geom_pos + 3 * g), quat(m->geom_quat + 4 * g)};
+  for (int body = m->geom_bodyid[g]; body > 0; body = m->body_parentid[body]) {
+    if (m->body_jntnum[body] > 0) return {};
+    pose = Pose{vec3(m->body_pos + 3 * body), quat(m->body_quat + 4 * body)} * pose;
+  }
+  const double* half = m->geom_size + 3 * g;
+  LevelBox box{.geom = g, .x = pose.p.x, .y = pose.p.y, .top = pose.p.z};
+  bool level = false;
+  for (const Vec3 axis : {Vec3{half[0], 0, 0}, Vec3{0, half[1], 0}, Vec3{0, 0, half[2]}}) {
+    const Vec3 edge = rotate(pose.q, axis);
+    if (std::abs(edge.x) + std::abs(edge.y) < 1e-9) {
+      level = true;
+      box.top += std::abs(edge.z);
+    } else {
+      box.wide += std::abs(edge.x);
+      box.deep += std::abs(edge.y);
+    }
+  }
+  return level ? std::optional(box) : std::nullopt;
+}
+
+// The highest of a body and of what hangs on it; the largest of several as high.
+std::optional<LevelBox> highest_box(const mjModel* m, int body) {
+  std::optional<LevelBox> best;
+  const auto larger = [](const LevelBox& a, const LevelBox& b) {
+    return std::abs(a.top - b.top) > 1e-6 ? a.top > b.top : a.wide * a.deep > b.wide * b.deep;
+  };
+  for (int g = 0; g < m->ngeom; ++g) {
+    int at = m->geom_bodyid[g];
+    while (at > body) at = m->body_parentid[at];
+    if (at != body) continue;
+    const std::optional<LevelBox> box = level_box(m, g);
+    if (box && (!best || larger(*box, *best))) best = box;
+  }
+  return best;
+}
+
+// What a region is said to be on: a geom, or a body.
+LevelBox surface_named(const mjModel* m, const std::string& name, const std::string& who) {
+  const int body = mj_name2id(m, mjOBJ_BODY, name.c_str());
+  const bool of_body = body > 0 && mj_name2id(m, mjOBJ_GEOM, name.c_str()) < 0;
+  const std::optional<LevelBox> box =
+      of_body ? highest_box(m, body) : level_box(m, resolve(m, mjOBJ_GEOM, name, who));
+  if (box) return *box;
+  throw ValueError(
+      of_body ? fmt::format("{}: body '{}' has no level box that does not move", who, name)
+              : fmt::format("{}: geom '{}' must be a level box that does not move", who, name));
+}
 
 }  // namespace
 
@@ -130,6 +186,11 @@ SceneCfg EpisodeScene::scene_cfg(const std::string& robot) const {
     }
     entity.pos = one.pos;
     entity.quat = one.quat;
+    // Many things at one place are thousands of contacts before the first episode begins.
+    if (is_placed(one)) {
+      const Vec3 p = away(static_cast<int>(i)).p;
+      entity.pos = {p.x, p.y, p.z};
+    }
     scene.entities.emplace_back(one.name, entity);
     if (scene.entities.size() == 1) scene.entities.emplace_back(robot, EntityCfg{});
   }
@@ -183,7 +244,26 @@ double EpisodeScene::size(int world, int object) const {
   return step < 0 ? 1.0 : objects_[object].sizes[step];
 }
 
+bool EpisodeScene::is_placed(const SceneEntityCfg& entity) const {
+  return entity.free && !cfg_.regions.empty() && entity.pos == std::array<double, 3>{};
+}
+
 void EpisodeScene::find_objects(std::string_view robot_prefix) {
+  collect_objects(robot_prefix);
+  for (const SceneEntityCfg& entity : cfg_.entities) {
+    const auto of_entity = [&](const SceneObject& object) {
+      return name_of(model_, mjOBJ_BODY, object.body).starts_with(entity.name + "/");
+    };
+    if (is_placed(entity) && std::ranges::none_of(objects_, of_entity)) {
+      throw ValueError(fmt::format(
+          "{}: entity '{}' is {}, so that nothing places it: give its pos, or leave it out",
+          place(), entity.name,
+          cfg_.objects.empty() ? "nothing that a hand can hold" : "none of the objects"));
+    }
+  }
+}
+
+void EpisodeScene::collect_objects(std::string_view robot_prefix) {
   objects_.clear();
   const auto found = [&](int body, std::string kind, const std::array<double, 2>& sizes) {
     SceneObject object;
@@ -227,34 +307,17 @@ void EpisodeScene::find_regions() {
   regions_.clear();
   region_bodies_.clear();
   for (const SceneRegionCfg& one : cfg_.regions) {
-    const std::string who = fmt::format("{}, region '{}'", place(), one.name);
-    const int g = resolve(model_, mjOBJ_GEOM, one.on, who);
-    const double* half = model_->geom_size + 3 * g;
-    bool level = model_->geom_type[g] == mjGEOM_BOX && upright(model_->geom_quat + 4 * g);
-    Pose pose{vec3(model_->geom_pos + 3 * g), quat(model_->geom_quat + 4 * g)};
-    Region region{};
-    region.height = pose.p.z;
-    for (int body = model_->geom_bodyid[g]; body > 0; body = model_->body_parentid[body]) {
-      const Pose of_body{vec3(model_->body_pos + 3 * body), quat(model_->body_quat + 4 * body)};
-      level = level && model_->body_jntnum[body] == 0 && upright(model_->body_quat + 4 * body);
-      pose = of_body * pose;
-      region.height = of_body.p.z + region.height;
-    }
-    region.height += half[2];
-    if (!level)
-      throw ValueError(
-          fmt::format("{}: geom '{}' must be a level box that does not move", who, one.on));
+    const LevelBox on =
+        surface_named(model_, one.on, fmt::format("{}, region '{}'", place(), one.name));
     const auto area = [](const std::array<double, 4>& a) { return Area{a[0], a[1], a[2], a[3]}; };
-    if (one.area == std::array<double, 4>{}) {
-      const Vec3 x = rotate(pose.q, {half[0], 0, 0}), y = rotate(pose.q, {0, half[1], 0});
-      const double wide = std::abs(x.x) + std::abs(y.x), deep = std::abs(x.y) + std::abs(y.y);
-      region.area = {pose.p.x - wide, pose.p.x + wide, pose.p.y - deep, pose.p.y + deep};
-    } else {
-      region.area = area(one.area);
-    }
+    Region region{};
+    region.height = on.top;
+    region.area = one.area == std::array<double, 4>{}
+                      ? Area{on.x - on.wide, on.x + on.wide, on.y - on.deep, on.y + on.deep}
+                      : area(one.area);
     region.target_area = one.target_area ? area(*one.target_area) : region.area;
     regions_.push_back(region);
-    region_bodies_.push_back(model_->geom_bodyid[g]);
+    region_bodies_.push_back(model_->geom_bodyid[on.geom]);
   }
 }
 

@@ -96,7 +96,10 @@ class EpisodeScene {
   std::string fault(const World& world) const;
 
  private:
+  // Whether an entity is an object that every episode places.
+  bool is_placed(const SceneEntityCfg& entity) const;
   void find_objects(std::string_view robot_prefix);
+  void collect_objects(std::string_view robot_prefix);
   void find_regions();
   void put(int object, const Pose& pose, const StateRow& state) const;
   void find_furniture();

@@ -254,6 +254,44 @@ TEST(EpisodeScene, SeveralSurfacesAreAllUsed) {
   EXPECT_THAT(heights, ::testing::ElementsAre(53, 103));
 }
 
+// A table whose boxes are turned, so that none has its z axis up, and which nobody gave names.
+TEST(EpisodeScene, ARegionMayBeABody) {
+  Files files;
+  files.write(
+      "desk.xml",
+      R"(<mujoco><worldbody><body name="desk" pos="0 -1 0"><body name="frame" euler="0 0 90">
+    <geom type="box" size=".02 .2 .4" pos="0 0 .7" euler="0 90 0"/>
+    <geom type="box" size=".02 .2 .1" pos=".5 0 .7" euler="0 90 0"/>
+    <geom type="box" size=".02 .3 .02" pos="0 0 .35"/></body></body></worldbody></mujoco>)");
+  files.cfg.entities.push_back({"work", files.dir.file("desk.xml")});
+  files.cfg.regions = {{"desk", "work/desk"}};
+  Played played(files.cfg);
+  for (std::uint64_t episode = 0; episode < 20; ++episode) {
+    played.start(episode);
+    EXPECT_EQ(played.fault(), "");
+    EXPECT_NEAR(played.at(0).z, .72 + .0203, 1e-9);
+    EXPECT_LT(std::abs(played.at(0).x), .2) << "the larger of two as high";
+    EXPECT_LT(std::abs(played.at(0).y + 1), .4);
+  }
+}
+
+TEST(EpisodeScene, AThingThatNothingPlacesIsAnError) {
+  Files files;
+  files.write(
+      "sofa.xml",
+      R"(<mujoco><worldbody><body name="sofa"><geom type="box" size=".5 .9 .4"/></body></worldbody></mujoco>)");
+  files.cfg.entities.push_back({.name = "sofa", .model = files.dir.file("sofa.xml"), .free = true});
+  try {
+    Played played(files.cfg);
+    ADD_FAILURE() << "nothing said";
+  } catch (const ValueError& e) {
+    EXPECT_THAT(e.what(),
+                HasSubstr("scene 'two_tables': entity 'sofa' is nothing that a hand can hold"));
+  }
+  files.cfg.entities.back().pos = {-2, -2, .4};
+  EXPECT_NO_THROW(Played played(files.cfg));
+}
+
 TEST(EpisodeScene, AStartInsideSomethingIsNamed) {
   Files files;
   Played played(files.cfg);
@@ -345,6 +383,8 @@ TEST(EpisodeScene, FaultsNameWhatIsWrong) {
   EXPECT_THAT(fault([](auto& c) { c.regions[0].on = "room/tap"; }),
               HasSubstr("scene 'two_tables', region 'table': no geom named 'room/tap'; did you "
                         "mean 'room/top'?"));
+  EXPECT_THAT(fault([](auto& c) { c.regions[0].on = "a/cube"; }),
+              HasSubstr("body 'a/cube' has no level box that does not move"));
   EXPECT_THAT(fault([](auto& c) { c.objects = {{"room/table"}}; }), HasSubstr("has no free joint"));
   EXPECT_THAT(fault([](auto& c) { c.count = {3, 1}; }), HasSubstr("count is 3, 1"));
   EXPECT_THAT(fault([](auto& c) {

@@ -63,21 +63,40 @@ bool solid(const mjModel* m, int g) {
   return m->geom_contype[g] != 0 || m->geom_conaffinity[g] != 0;
 }
 
+// Triangles of a mesh's hull, by its points; of the mesh itself if it has none. Empty: no mesh.
+std::span<const int> triangles_of(const mjModel* m, int g) {
+  if (m->geom_type[g] != mjGEOM_MESH) return {};
+  const int mesh = m->geom_dataid[g];
+  if (m->mesh_graphadr[mesh] < 0) {
+    return {m->mesh_face + 3 * static_cast<std::ptrdiff_t>(m->mesh_faceadr[mesh]),
+            3 * static_cast<std::size_t>(m->mesh_facenum[mesh])};
+  }
+  // mjModel.mesh_graph: numvert, numface, 2 of each vertex, its edges, the faces' vertices.
+  const int* graph = m->mesh_graph + m->mesh_graphadr[mesh];
+  const std::size_t points = graph[0], faces = graph[1];
+  return {graph + 2 + 2 * points + (points + 3 * faces), 3 * faces};
+}
+
 // The part of the hull of `points` between two heights has its corners among the points in between
-// and the crossings of the edges; of all pairs, those that cross are enough.
-std::vector<Vec3> between(const std::vector<Vec3>& points, double low, double high) {
+// and the crossings of the hull's edges; without triangles any pair counts as one.
+std::vector<Vec3> between(const std::vector<Vec3>& points, std::span<const int> triangles,
+                          double low, double high) {
   std::vector<Vec3> out;
-  const bool many = points.size() > 200;  // of a mesh: its points are dense
-  for (std::size_t i = 0; i < points.size(); ++i) {
-    const Vec3 a = points[i];
-    if (a.z >= low && a.z <= high) out.push_back(a);
-    if (many) continue;
-    for (std::size_t k = i + 1; k < points.size(); ++k) {
-      const Vec3 b = points[k];
-      for (const double z : {low, high}) {
-        if ((a.z < z) != (b.z < z)) out.push_back(a + ((z - a.z) / (b.z - a.z)) * (b - a));
-      }
+  const auto cross = [&](Vec3 a, Vec3 b) {
+    for (const double z : {low, high}) {
+      if ((a.z < z) != (b.z < z)) out.push_back(a + ((z - a.z) / (b.z - a.z)) * (b - a));
     }
+  };
+  for (Vec3 p : points) {
+    if (p.z >= low && p.z <= high) out.push_back(p);
+  }
+  for (std::size_t i = 0; i < triangles.size(); i += 3) {
+    for (std::size_t k = 0; k < 3; ++k)
+      cross(points[triangles[i + k]], points[triangles[i + (k + 1) % 3]]);
+  }
+  if (!triangles.empty()) return out;
+  for (std::size_t i = 0; i < points.size(); ++i) {
+    for (std::size_t k = i + 1; k < points.size(); ++k) cross(points[i], points[k]);
   }
   return out;
 }
@@ -158,7 +177,7 @@ Occupancy::Occupancy(const mjModel* m, const mjData* d, const std::function<bool
         }
       }
       if (bottom > cfg.high || top < cfg.low) continue;
-      const std::vector<Vec3> part = between(points, cfg.low, cfg.high);
+      const std::vector<Vec3> part = between(points, triangles_of(m, g), cfg.low, cfg.high);
       outline.insert(outline.end(), part.begin(), part.end());
     }
     if (!outline.empty()) outlines.push_back(hull(std::move(outline)));

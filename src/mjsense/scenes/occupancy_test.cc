@@ -73,6 +73,26 @@ TEST(Occupancy, TakesWhatIsInTheWayAndNothingElse) {
   EXPECT_NEAR(o.clearance(-1, 0.4), 0.4, 0.06) << "the cylinder's rim";
 }
 
+// A pillar that has points at its ends alone, more than anybody would compare in pairs, is there in between.
+TEST(Occupancy, TakesMeshesBetweenTheirPoints) {
+  std::string points;
+  for (int i = 0; i < 128; ++i) {
+    const double a = 2 * std::numbers::pi * i / 128;
+    for (const double z : {0.0, 2.5})
+      points += std::to_string(0.3 * std::cos(a)) + " " + std::to_string(0.3 * std::sin(a)) + " " +
+                std::to_string(z) + " ";
+  }
+  const ModelPtr model =
+      Floor::compile_text("<mujoco><asset><mesh name='pillar' vertex='" + points +
+                          "'/></asset><worldbody><geom type='plane' size='2 2 .1'/>"
+                          "<geom type='mesh' mesh='pillar' pos='0 0 1.25'/></worldbody></mujoco>");
+  const std::unique_ptr<mjData, DataDelete> data(mj_makeData(model.get()));
+  mj_kinematics(model.get(), data.get());
+  const Occupancy o(model.get(), data.get(), [](int) { return true; }, {});
+  EXPECT_EQ(o.clearance(0, 0), 0);
+  EXPECT_NEAR(o.clearance(0.6, 0), 0.3, 0.06);
+}
+
 // The cylinder at x = -1, y = 1 of 0.2 m may stand half a metre on either side along x, and in between.
 TEST(Occupancy, TakesWhereFurnitureMayStand) {
   const Floor floor(1.0);

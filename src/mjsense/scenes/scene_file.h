@@ -87,7 +87,8 @@ template <class V>
 void visit_fields(V& v, SceneRegionCfg& c) {
   v.object("SceneRegionCfg", "A level surface on which objects may stand.");
   v("name", c.name, "Of the region.").required();
-  v("on", c.on, "Full name of the box geom whose top it is.").required();
+  v("on", c.on, "Full name of the box geom whose top it is, or of a body: then its highest.")
+      .required();
   v("area", c.area,
     "Where origins of objects may be: least x, most x, least y, most y in the world; all 0: the "
     "whole top.")

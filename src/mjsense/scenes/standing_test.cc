@@ -18,6 +18,7 @@ Pose offset_of(const char* robot_name) {
   EpisodeScene scene(load_scene("table"));
   TaskCfg cfg;
   cfg.robot = robot_cfg(robot_name);
+  cfg.scene = "table";
   PickTask task(cfg);
   Scene compiled(task.whole_scene_cfg());
   Robot robot(cfg.robot, compiled.model(), 1);
@@ -39,6 +40,7 @@ TEST(Standing, WhoCanStoopDoesWhereATableIsLow) {
   EpisodeScene scene(load_scene("table"));
   TaskCfg cfg;
   cfg.robot = robot_cfg("rby1");
+  cfg.scene = "table";
   PickTask task(cfg);
   Scene compiled(task.whole_scene_cfg());
   Robot robot(cfg.robot, compiled.model(), 1);
