@@ -1,7 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
 """Record picks, train a network to do what the planner did, and count how often it picks in episodes that it has not seen.
 
-Minutes on two cores, without a picture: it sees the joints, and where its object is in the frame of its tool.
+Minutes on two cores, without a picture: it sees the joints, and where its object is in the frame of its tool. The scene is the plain
+table, and grasps come from above: what is easiest to learn.
 
     pip install "mjsense[torch]" h5py
     python examples/06_clone_the_planner.py [recorded episodes] [episodes to judge] [passes over the data]
@@ -139,7 +140,7 @@ class ClonePolicy(mjs.Policy):
 def success(policy, episodes):
     """Share of unseen episodes in which the object was lifted at the last step or before."""
     with tempfile.TemporaryDirectory() as out:
-        made = mjs.record("pick", policy=policy, out=out, episodes=episodes, max_attempts=episodes, worlds=50, seed=10_000, horizon=STEPS,
+        made = mjs.record("pick", scene="table", policy=policy, out=out, episodes=episodes, max_attempts=episodes, worlds=50, seed=10_000, horizon=STEPS,
                           cameras=[], action_noise=False, terminate_upon_success=True)  # fmt: skip
         return made.succeeded / (made.succeeded + made.failed)
 
@@ -147,7 +148,7 @@ def success(policy, episodes):
 def main(recorded=200, judged=200, passes=120):
     with tempfile.TemporaryDirectory() as out:
         begun = time.perf_counter()
-        made = mjs.record("pick", out=out, episodes=recorded, worlds=16, cameras=[])
+        made = mjs.record("pick", scene="table", policy="top_down_planner", out=out, episodes=recorded, worlds=16, cameras=[])
         print(f"{made.kept} picks recorded in {time.perf_counter() - begun:.0f} s")
         x, moves, closed = demonstrations(sorted(made.path.glob("*.h5")))
     begun = time.perf_counter()

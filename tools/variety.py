@@ -32,7 +32,7 @@ import mjsense as mjs
 PAGE, RESULTS = ROOT / "docs" / "tasks.md", ROOT / ".cache" / "variety"
 BEGIN, END = "<!-- variety -->", "<!-- end of variety -->"
 # task, scene, robot, camera system, policy: "" where nothing is taken and what is done takes no approach.
-TABLES = tuple(("pick", scene, "franka", "randomized_droid", "free_planner") for scene in ("table", "varied_table", "tableware", "clutter", "shelf"))
+TABLES = tuple(("pick", scene, "franka", "randomized_droid", "planner") for scene in ("table", "varied_table", "tableware", "clutter", "shelf"))
 CASES = (*TABLES, ("open", "kitchen", "franka", "randomized_droid", "planner"),
          ("door_opening", "room_with_door", "rby1", "gopro_d455", ""), ("nav_to_obj", "floor", "rby1", "gopro_d455", ""))  # fmt: skip
 AWAY = 50.0  # m: objects that take no part stand beyond

@@ -117,6 +117,8 @@ Hashes play(SceneCfg cfg, int steps) {
 Hashes pick() {
   unsetenv("MJSENSE_FRANKA_MESHES");
   RolloutCfg cfg;
+  cfg.scene = "table";
+  cfg.policy = "top_down_planner";
   cfg.num_worlds = 2;
   cfg.threads = 2;
   cfg.seed = 5;

@@ -84,7 +84,7 @@ SHORT = ["--episodes", "1", "--max-attempts", "2", "--keep-failures", "--horizon
 
 def test_without_a_robot_the_task_has_its_own(tmp_path):
     tasks = json.loads(run("tasks", "--json").stdout)
-    for task, robot, scene in (("door_opening", "rby1", "room_with_door"), ("nav_to_obj", "rby1", "floor"), ("pick", "franka", "table")):
+    for task, robot, scene in (("door_opening", "rby1", "room_with_door"), ("nav_to_obj", "rby1", "floor"), ("pick", "franka", "varied_table")):
         made = run("record", task, *SHORT, "--out", tmp_path / task)
         assert made.stderr.startswith(f"{task} with {robot} (the task's robot) in {scene}: 1 episode into "), made.stderr
         assert f"by default {robot} in {scene}" in next(line["needs"] for line in tasks if line["name"] == task)

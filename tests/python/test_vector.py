@@ -3,6 +3,7 @@ import gymnasium
 import numpy as np
 import pytest
 from gymnasium.vector import AutoresetMode
+from tasks import Cart
 
 import mjsense as mjs
 
@@ -99,6 +100,44 @@ def test_expert_solves_the_task():
         if won.all():
             break
     assert won.all()
+    env.close()
+
+
+@pytest.mark.parametrize("robot", ["rby1", "floating_rum", "mobile_franka"])
+def test_what_an_expert_leaves_out_stays_as_it_is(robot):
+    """RB-Y1 stoops as no height of its torso would make it."""
+    env = mjs.make_vec("pick", robot=robot, policy="planner", num_envs=1, cameras=[])
+    env.reset(seed=1)
+    torso = [j for j in range(env.sim.model.njnt) if "torso" in env.sim.model.joint(j).name]
+    at = [env.sim.model.jnt_qposadr[j] for j in torso]
+    before = env.sim.qpos[0, at].copy()
+    for _ in range(10):
+        *_, info = env.step(env.expert_action())
+        assert "fault" not in info
+    assert bool(torso) == (robot == "rby1")
+    np.testing.assert_allclose(env.sim.qpos[0, at], before, atol=0.02)
+    env.close()
+
+
+def test_a_world_that_fails_has_no_reward():
+    class Failing(mjs.Sensor):
+        uuid, observation_space = "failing", gymnasium.spaces.Box(-1, 1, (1,))
+
+        def get_observation(self, env, task, batch_index=0):
+            if batch_index == 1 and env.mj_datas[1].time > 0.05:
+                raise ValueError("lost")
+            return np.zeros(1, np.float32)
+
+    class Counting(Cart):
+        def evaluate(self, sim):
+            return {"reward": 1.0 + sim.time, "success": np.ones(sim.num_worlds, bool)}
+
+    env = mjs.make_vec(Counting, num_envs=2, cameras=[], sensors=[Failing()])
+    env.reset(seed=0)
+    for step in range(1, 4):
+        _, reward, _, truncated, info = env.step(np.zeros(env.action_space.shape, np.float32))
+    assert truncated.tolist() == [False, True] and "lost" in info["fault"][1]
+    assert reward[0] > 0 and reward[1] == 0 and info["success"].tolist() == [True, False]
     env.close()
 
 

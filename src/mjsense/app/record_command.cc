@@ -13,7 +13,6 @@
 #include "mjsense/core/error.h"
 #include "mjsense/core/say.h"
 #include "mjsense/replay/check.h"
-#include "mjsense/rollout/task_defaults.h"
 
 namespace mjsense {
 namespace {
@@ -53,14 +52,13 @@ std::uint64_t bytes_below(const std::filesystem::path& folder) {
 
 // "pick with NAME (the task's robot) in table: 8 episodes into data".
 std::string title(const RecordJobCfg& job) {
-  const RolloutCfg& cfg = job.rollout;
+  const RolloutCfg cfg = resolved(job.rollout);
   std::string text = cfg.task;
-  const std::string robot = resolved(cfg).robot;
-  if (!robot.empty())
-    text += fmt::format(" with {}{}", robot, cfg.robot == robot ? "" : " (the task's robot)");
-  const std::string scene =
-      cfg.scene.empty() ? std::string(default_scene(parts_of_task(cfg.task)[0])) : cfg.scene;
-  if (!scene.empty()) text += " in " + scene;
+  if (!cfg.robot.empty()) {
+    const bool named = cfg.robot == job.rollout.robot;
+    text += fmt::format(" with {}{}", cfg.robot, named ? "" : " (the task's robot)");
+  }
+  if (!cfg.scene.empty()) text += " in " + cfg.scene;
   return text + fmt::format(": {} episode{} into {}", job.episodes, job.episodes == 1 ? "" : "s",
                             job.out.string());
 }

@@ -23,11 +23,52 @@ std::unique_ptr<PlannerPolicy> make_manipulation() {
   return std::make_unique<ManipulationPlanner>();
 }
 
+struct Planners {
+  std::mutex mutex;
+  // By task type; ours, then others in the order in which they came.
+  std::vector<std::pair<std::string, PlannerFactory>> entries{
+      {"open", [] { return std::make_unique<OpeningPlanner>(); }},
+      {"close", [] { return std::make_unique<OpeningPlanner>(); }},
+      {"door_open", [] { return std::make_unique<DoorPlanner>(); }},
+      {"nav_to_obj", [] { return std::make_unique<NavPlanner>(); }},
+      {"pick_and_place", make_manipulation},
+      {"pick_and_place_next_to", make_manipulation},
+      {"pick_and_place_color", make_manipulation},
+      {"packing", make_manipulation}};
+};
+
+Planners& planners() {
+  static Planners all;
+  return all;
+}
+
+bool has_its_own(const Task& task) {
+  Planners& all = planners();
+  const std::lock_guard lock(all.mutex);
+  return std::ranges::any_of(all.entries, [&](const auto& e) { return e.first == task.type(); });
+}
+
+// A task that no planner is for but that has things to grasp.
+bool picks(const Task& task) { return task.grasp_scene() && !has_its_own(task); }
+bool has_planner(const Task& task) { return task.grasp_scene() || has_its_own(task); }
+
 // From above, or from wherever it can where nothing can be taken from above.
-class AbovePicker final : public PlannerPolicy {
+class TopDownPlanner final : public PlannerPolicy {
  public:
-  std::string_view name() const override { return "planner"; }
+  std::string_view name() const override { return "top_down_planner"; }
   void initialize(Task& task) override {
+    if (!picks(task)) {
+      throw ValueError(
+          fmt::format("policy '{}' picks, and does nothing else: task '{}' is of type '{}'; "
+                      "'planner' chooses the planner by the task",
+                      name(), task.name(), task.type()));
+    }
+    if (!PickPlanner::can_use(task.robot())) {
+      throw ValueError(fmt::format(
+          "policy '{}' wants a gripper on an arm whose joints alone move it; robot '{}' "
+          "has none: 'planner' picks with any",
+          name(), task.robot().name()));
+    }
     above_.initialize(task);
     anywhere_.initialize(task);
     anywhere_plays_.assign(task.num_worlds(), 0);
@@ -49,48 +90,13 @@ class AbovePicker final : public PlannerPolicy {
     return anywhere_plays_[world] ? static_cast<TaskPlanner&>(anywhere_) : above_;
   }
   const TaskPlanner& player(int world) const {
-    return const_cast<AbovePicker*>(this)->player(world);
+    return const_cast<TopDownPlanner*>(this)->player(world);
   }
 
   PickPlanner above_;
   ManipulationPlanner anywhere_;
   std::vector<char> anywhere_plays_;  // [B]
 };
-
-// On the plain tables an arm that moves its tool alone takes things from above, as it always did,
-// seed for seed; everywhere else, and with any other hand, from wherever it likes.
-std::unique_ptr<PlannerPolicy> make_picker(const Task& task) {
-  const std::string& scene = task.cfg().scene;
-  const bool plain = scene.empty() || scene == "table" || scene == "varied_table";
-  if (plain && PickPlanner::can_use(task.robot())) return std::make_unique<AbovePicker>();
-  return make_manipulation();
-}
-
-struct Planners {
-  std::mutex mutex;
-  // By task type; ours, then others in the order in which they came.
-  std::vector<std::pair<std::string, PlannerFactory>> entries{
-      {"open", [] { return std::make_unique<OpeningPlanner>(); }},
-      {"close", [] { return std::make_unique<OpeningPlanner>(); }},
-      {"door_open", [] { return std::make_unique<DoorPlanner>(); }},
-      {"nav_to_obj", [] { return std::make_unique<NavPlanner>(); }},
-      {"pick_and_place", make_manipulation},
-      {"pick_and_place_next_to", make_manipulation},
-      {"pick_and_place_color", make_manipulation},
-      {"packing", make_manipulation}};
-};
-
-Planners& planners() {
-  static Planners all;
-  return all;
-}
-
-bool has_planner(const Task& task) {
-  Planners& all = planners();
-  const std::lock_guard lock(all.mutex);
-  return task.grasp_scene() ||
-         std::ranges::any_of(all.entries, [&](const auto& e) { return e.first == task.type(); });
-}
 
 // Of several tasks of which any will do, the first that there is a planner for.
 Task& first_doable(Task& task) {
@@ -104,12 +110,11 @@ Task& first_doable(Task& task) {
 
 class AnyPlanner final : public PlannerPolicy {
  public:
-  explicit AnyPlanner(bool from_anywhere) : from_anywhere_(from_anywhere) {}
-  std::string_view name() const override { return from_anywhere_ ? "free_planner" : "planner"; }
+  std::string_view name() const override { return "planner"; }
   void bind(const std::shared_ptr<Simulation>& simulation) override { simulation_ = simulation; }
   void initialize(Task& task) override {
     Task& doable = first_doable(task);
-    planner_ = make_planner(doable, from_anywhere_);
+    planner_ = make_planner(doable);
     if (simulation_) planner_->bind(simulation_);
     simulation_.reset();
     planner_->initialize(doable);
@@ -127,13 +132,15 @@ class AnyPlanner final : public PlannerPolicy {
   int num_retries(int world) const override { return planner_->num_retries(world); }
   Pose grasp_pose(int world) const override { return planner_->grasp_pose(world); }
   std::string failure(int world) const override { return planner_->failure(world); }
+  std::vector<std::pair<std::string, std::string>> info(int world) const override {
+    return planner_->info(world);
+  }
   bool has_grasp_pose() const override { return planner_ && planner_->has_grasp_pose(); }
   std::vector<std::shared_ptr<Sensor>> create_policy_sensors() const override {
     return planner_->create_policy_sensors();
   }
 
  private:
-  bool from_anywhere_;
   std::unique_ptr<PlannerPolicy> planner_;
   std::shared_ptr<Simulation> simulation_;  // until there is a planner to be bound to it
 };
@@ -151,7 +158,7 @@ void register_planner(std::string task_type, PlannerFactory make) {
   all.entries.emplace_back(std::move(task_type), std::move(make));
 }
 
-std::unique_ptr<PlannerPolicy> make_planner(const Task& task, bool from_anywhere) {
+std::unique_ptr<PlannerPolicy> make_planner(const Task& task) {
   Planners& all = planners();
   PlannerFactory make;
   std::string types;
@@ -163,14 +170,14 @@ std::unique_ptr<PlannerPolicy> make_planner(const Task& task, bool from_anywhere
     }
   }
   if (make) return make();
-  if (task.grasp_scene()) return from_anywhere ? make_manipulation() : make_picker(task);
+  if (task.grasp_scene()) return make_manipulation();
   throw ValueError(fmt::format(
       "policy 'planner' cannot do task '{}': it knows tasks of type {}, and picks where "
       "a task has a GraspScene",
       task.name(), types));
 }
 
-std::unique_ptr<Policy> make_any_planner() { return std::make_unique<AnyPlanner>(false); }
-std::unique_ptr<Policy> make_free_planner() { return std::make_unique<AnyPlanner>(true); }
+std::unique_ptr<Policy> make_any_planner() { return std::make_unique<AnyPlanner>(); }
+std::unique_ptr<Policy> make_top_down_planner() { return std::make_unique<TopDownPlanner>(); }
 
 }  // namespace mjsense

@@ -18,11 +18,12 @@ using PlannerFactory = std::function<std::unique_ptr<PlannerPolicy>()>;
 void register_planner(std::string task_type, PlannerFactory make);
 // For the task's type; for any other task with a GraspScene the planner that picks. Throws
 // ValueError for a task that none can do.
-std::unique_ptr<PlannerPolicy> make_planner(const Task& task, bool from_anywhere = false);
+std::unique_ptr<PlannerPolicy> make_planner(const Task& task);
 
 // Becomes, at initialize(), what make_planner() makes for the task.
 std::unique_ptr<Policy> make_any_planner();
-// The same by the name "free_planner": it picks from any direction on the plain tables, too.
-std::unique_ptr<Policy> make_free_planner();
+// Picks from above in five legs that are the same in every episode, where something can be taken so: what is easiest to
+// learn from.
+std::unique_ptr<Policy> make_top_down_planner();
 
 }  // namespace mjsense

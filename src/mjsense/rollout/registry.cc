@@ -90,6 +90,7 @@ Registry<TaskFactory>& tasks() {
 // Several tasks in the scene of the first.
 std::unique_ptr<Task> any_of(std::string_view name, TaskCfg cfg) {
   const std::vector<std::string> parts = parts_of_task(name);
+  for (const std::string& part : parts) tasks().at(part);  // or its error
   if (cfg.scene.empty()) cfg.scene = default_scene(parts[0]);
   if (cfg.scene.empty() && !cfg.make_scene) {
     throw ValueError(fmt::format(
@@ -102,7 +103,8 @@ std::unique_ptr<Task> any_of(std::string_view name, TaskCfg cfg) {
 
 Registry<PolicyFactory>& policies() {
   static Registry<PolicyFactory> all(
-      "policies", "policy", {{"planner", make_any_planner}, {"free_planner", make_free_planner}});
+      "policies", "policy",
+      {{"planner", make_any_planner}, {"top_down_planner", make_top_down_planner}});
   return all;
 }
 

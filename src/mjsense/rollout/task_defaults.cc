@@ -2,6 +2,7 @@
 #include "mjsense/rollout/task_defaults.h"
 
 #include <algorithm>
+#include <utility>
 
 namespace mjsense {
 namespace {
@@ -44,11 +45,18 @@ std::vector<std::string> parts_of_task(std::string_view name) {
 }
 
 std::string_view default_scene(std::string_view task) {
-  if (task == "pick") return "table";
-  if (task == "open" || task == "close") return "kitchen";
-  if (task == "door_opening") return "room_with_door";
-  if (task == "nav_to_obj") return "floor";
-  return task == "packing" || task.starts_with("pick_and_place") ? "tableware" : "";
+  static constexpr std::pair<std::string_view, std::string_view> kScenes[] = {
+      {"pick", "varied_table"},
+      {"pick_and_place", "tableware"},
+      {"pick_and_place_next_to", "tableware"},
+      {"pick_and_place_color", "tableware"},
+      {"packing", "tableware"},
+      {"open", "kitchen"},
+      {"close", "kitchen"},
+      {"door_opening", "room_with_door"},
+      {"nav_to_obj", "floor"}};
+  const auto* found = std::ranges::find(kScenes, task, [](const auto& s) { return s.first; });
+  return found == std::end(kScenes) ? "" : found->second;
 }
 
 std::string_view default_robot(std::string_view task) {

@@ -18,6 +18,7 @@ struct Stage {
   explicit Stage(bool noise) {
     TaskCfg cfg;
     cfg.robot = robot_cfg("franka");
+    cfg.scene = "table";
     cfg.action_noise = noise;
     task = std::make_unique<PickTask>(cfg);
     scene = std::make_unique<Scene>(task->whole_scene_cfg());

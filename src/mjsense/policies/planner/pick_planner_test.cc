@@ -25,6 +25,7 @@ struct Stage {
   explicit Stage(int num_worlds, bool noise = false) {
     TaskCfg cfg;
     cfg.robot = robot_cfg("franka");
+    cfg.scene = "table";
     cfg.action_noise = noise;
     task = std::make_unique<PickTask>(cfg);
     scene = std::make_unique<Scene>(task->whole_scene_cfg());

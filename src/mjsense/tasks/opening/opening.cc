@@ -170,7 +170,7 @@ std::string OpeningTask::description(int world) const {
 }
 
 Task::Referrals OpeningTask::referrals(int world) const {
-  return {{std::string(kRole), {{object(world).name, 1.0}}}};
+  return {{"pickup_obj_name", {{object(world).name, 1.0}}}};
 }
 
 std::optional<Pose> OpeningTask::goal_pose(int world, std::string_view role) const {

@@ -9,13 +9,14 @@
 
 #include "mjsense/core/error.h"
 #include "mjsense/scenes/object_texts.h"
+#include "mjsense/tasks/pick_and_place/support.h"
 
 namespace mjsense {
 namespace {
 
 using std::numbers::pi;
 
-constexpr std::string_view kScene = "table";
+constexpr std::string_view kScene = "varied_table";
 constexpr double kLift = 0.01;  // m of success
 constexpr double kGoal = 0.05;  // m, goal above the start
 
@@ -65,16 +66,7 @@ void PickTask::set_target(int world, int target) {
 // the middle of the object, its normal within 80 degrees of up.
 bool PickTask::borne_by_others(const World& world, int body) const {
   const mjModel* m = world.model;
-  double low = 1e10, high = -1e10;
-  for (int g = m->body_geomadr[body]; g < m->body_geomadr[body] + m->body_geomnum[body]; ++g) {
-    const double *r = world.data->geom_xmat + 9 * g, *aabb = m->geom_aabb + 6 * g;
-    const double center =
-        world.data->geom_xpos[3 * g + 2] + r[6] * aabb[0] + r[7] * aabb[1] + r[8] * aabb[2];
-    const double half =
-        std::abs(r[6]) * aabb[3] + std::abs(r[7]) * aabb[4] + std::abs(r[8]) * aabb[5];
-    low = std::min(low, center - half);
-    high = std::max(high, center + half);
-  }
+  const double middle = world_box(world, body).center().z;
   const double steep = std::cos(80.0 / 180.0 * pi);
   for (int i = 0; i < world.data->ncon; ++i) {
     const mjContact& contact = world.data->contact[i];
@@ -83,7 +75,7 @@ bool PickTask::borne_by_others(const World& world, int body) const {
     const int root1 = m->body_rootid[m->geom_bodyid[contact.geom[1]]];
     if ((root0 == body) == (root1 == body)) continue;
     const double up = root1 == body ? contact.frame[2] : -contact.frame[2];
-    if (contact.pos[2] < 0.5 * (low + high) && up >= steep)
+    if (contact.pos[2] < middle && up >= steep)
       return (root1 == body ? root0 : root1) != robot_root_;
   }
   return false;
@@ -119,7 +111,7 @@ Evaluation PickTask::evaluate(const World& world) const {
 std::string PickTask::description(int world) const { return "Pick up the " + object(world).name; }
 
 Task::Referrals PickTask::referrals(int world) const {
-  return {{std::string(kRole), referrals_of(scene().objects()[targets_[world]])}};
+  return {{"pickup_obj_name", referrals_of(scene().objects()[targets_[world]])}};
 }
 
 std::optional<Pose> PickTask::goal_pose(int world, std::string_view role) const {

@@ -25,6 +25,7 @@ struct DataDelete {
 TaskCfg franka() {
   TaskCfg cfg;
   cfg.robot = robot_cfg("franka");
+  cfg.scene = "table";
   return cfg;
 }
 
@@ -284,7 +285,7 @@ TEST_F(Pick, TellsWhatItIs) {
   EXPECT_EQ(obs["task_description"], task.description(1));
   EXPECT_EQ("Pick up the " + obs["object_name"].get<std::string>(), task.description(1));
   double probability = 0;
-  for (const auto& pair : obs["referral_expressions"]["pickup_obj"])
+  for (const auto& pair : obs["referral_expressions"]["pickup_obj_name"])
     probability += pair[1].get<double>();
   EXPECT_NEAR(probability, 1, 1e-12);
 

@@ -13,7 +13,7 @@ namespace mjsense {
 // A robot at a table, and plain MuJoCo.
 struct TableStage {
   explicit TableStage(const char* robot_name) {
-    TaskCfg cfg = task_cfg(robot_name);
+    TaskCfg cfg = task_cfg(robot_name, "table");
     cfg.action_noise = false;
     task = std::make_unique<PickTask>(cfg);
     scene = std::make_unique<Scene>(task->whole_scene_cfg());
