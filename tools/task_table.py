@@ -35,9 +35,9 @@ HOUSES = 30
 # task, robot, scene ("" is the task's own; "name:*": HOUSES houses, some episodes in each).
 CASES = (
     *(("pick", robot, "") for robot in ("franka", "mobile_franka", "i2rt_yam", "bimanual_yam", "floating_rum", "rby1")),
-    ("pick", "franka", "tableware"),
-    ("pick", "franka", "shelf"),
-    ("pick", "franka", "libero/kitchen"),
+    *(("pick", "franka", scene) for scene in ("table", "tableware", "clutter", "shelf", "kitchen:*", "libero/kitchen", "libero/study", "libero/living_room")),
+    ("pick", "i2rt_yam", "clutter"),
+    ("pick", "rby1", "clutter"),
     *(("pick_and_place", robot, "") for robot in ("franka", "mobile_franka", "i2rt_yam", "bimanual_yam", "floating_rum", "rby1")),
     ("pick_and_place_next_to", "franka", ""),
     ("pick_and_place_color", "franka", ""),
@@ -47,10 +47,10 @@ CASES = (
         for task in ("open", "close")
         for robot in ("franka", "mobile_franka", "i2rt_yam", "bimanual_yam", "rby1")
     ),
-    ("open", "franka", "libero/kitchen"),
-    ("close", "franka", "libero/kitchen"),
+    *((task, "franka", scene) for task in ("open", "close") for scene in ("kitchen:*", "libero/kitchen", "libero/study")),
     ("door_opening", "rby1", ""),
-    ("door_opening", "rby1", "room_with_door:*"),
+    ("door_opening", "mobile_franka", ""),
+    *(("door_opening", robot, "room_with_door:*") for robot in ("rby1", "mobile_franka")),
     *((task, robot, "") for task in ("nav_to_obj", "multi_task") for robot in ("rby1", "mobile_franka")),
 )
 
@@ -115,7 +115,7 @@ def play(task: str, robot: str, scene: str, episodes: int, **options: Any) -> di
 def row(r: dict[str, Any]) -> str:
     scene = f" in `{r['scene']}`" if r["scene"] else ""
     if r["scene"].endswith(":*"):
-        scene = f" over {HOUSES} houses"
+        scene = f" in {HOUSES} of `{r['scene'][:-2]}`"
     slanted = "" if r["steep"] is None else f"{1 - r['steep']:.0%}"
     why = "; ".join(f"{count} {what}" for what, count in r["failures"])
     return (f"| `{r['task']}`{scene} | {r['robot']} | {r['success']:.0%} of {r['episodes']} | {r['length']:.0f} | {r['retried']:.0%} | "

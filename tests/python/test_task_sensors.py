@@ -115,25 +115,28 @@ def at_start(env, targets, worlds):
 @pytest.mark.parametrize("num_envs", [1, 8])
 @pytest.mark.parametrize("task,robot,steps", TASKS)
 def test_against_plain_mujoco(task, robot, steps, num_envs):
-    env = mjs.make_vec(task, robot, num_envs=num_envs, policy="planner", cameras=[], seed=2, autoreset_mode="disabled")
+    env = mjs.make_vec(task, robot, num_envs=num_envs, policy="planner", cameras=[], seed=2, horizon=steps, autoreset_mode="disabled")
     targets = np.zeros(num_envs, int)
     env.reset()
     at_start(env, targets, range(num_envs))
-    moved = False
+    moved, over = False, np.zeros(num_envs, bool)
     for step in range(steps + 1):
         if step in (0, steps // 2, steps):
             for w in range(num_envs):
                 check(env, robot, targets, w)
+        if step == steps:
+            break
         if step == 10:  # from here on half of the worlds are ten steps behind
             mask = np.arange(num_envs) % 2 == 1
             if mask.any():
                 env.reset(options={"reset_mask": mask})
                 at_start(env, targets, np.flatnonzero(mask))
         before = env.sim.qpos.copy()
-        env.step(env.expert_action(), done=env.expert_done.copy())
+        _, _, terminated, truncated, _ = env.step(env.expert_action(), done=env.expert_done.copy())
+        over = terminated | truncated
         moved |= bool(np.abs(env.sim.qpos - before).max() > 1e-4)
     env.close()
-    assert moved
+    assert moved and over.tolist() == [w % 2 == 0 for w in range(num_envs)], "the last step is terminal where nothing began anew"
 
 
 @pytest.mark.parametrize("task,robot", [(task, robot) for task, robot, _ in TASKS if task not in ("pick", "open")])

@@ -23,7 +23,8 @@ void OpeningPlanner::initialize_planner() {
                     task().name()));
   if (opening_->reach().hands().empty())
     throw ValueError(fmt::format(
-        "policy 'planner' needs an arm with a gripper; robot '{}' has none", robot().name()));
+        "policy 'planner' needs a gripper on an arm or one that floats; robot '{}' has none",
+        robot().name()));
   ways_.assign(task().num_worlds(), {});
 }
 
@@ -35,9 +36,42 @@ void OpeningPlanner::back_off(const World& world, Plan& plan) const {
   for (const ArmAndHand& hand : opening_->reach().hands()) {
     const Pose from = robot().tcp_pose(world, hand.arm);
     const Pose to = from * Pose{{0, 0, -cfg_.back}, {}};
-    plan.move_tool(kRetreat, hand.arm, from, to, cfg_.fast, cfg_.settle);
+    if (hand.floats()) {
+      const Pose base = robot().base_pose(world);
+      go(plan, kRetreat, hand, base * from, base * to, cfg_.fast);
+    } else {
+      plan.move_tool(kRetreat, hand.arm, from, to, cfg_.fast, cfg_.settle);
+    }
   }
   plan.more = true;
+}
+
+// At rest at both ends, and at its fastest in the middle; so it takes half as long again.
+Segment& OpeningPlanner::go(Plan& plan, int phase, const ArmAndHand& hand, const Pose& from,
+                            const Pose& to, double speed, double settle) const {
+  Segment& segment = plan.move_tool_in_world(phase, hand.arm, from, to, speed / 1.5,
+                                             std::max(settle, cfg_.settle), cfg_.turn / 1.5);
+  segment.tools.back().eased = true;
+  return segment;
+}
+
+void OpeningPlanner::float_along(const World& world, const HandleWay& way, bool there,
+                                 Plan& plan) const {
+  const MoveGroup& gripper = robot().groups()[way.hand.gripper];
+  Pose at = robot().base_pose(world) * tool_target(world, way.hand.arm);
+  if (there) {
+    plan.wait(kOpenGripper, 0).grip(way.hand.gripper, gripper.open_command);
+    for (const Pose& next : std::span(way.there).subspan(1)) {
+      go(plan, kPregrasp, way.hand, at, next, cfg_.there);
+      at = next;
+    }
+    return;
+  }
+  go(plan, kGrasp, way.hand, at, way.grasp, cfg_.slow);
+  go(plan, kCloseGripper, way.hand, way.grasp, way.grasp, cfg_.slow, cfg_.close_time)
+      .grip(way.hand.gripper, gripper.closed_command);
+  // About a hinge or along a slide: both are screws.
+  go(plan, kLift, way.hand, way.grasp, way.end, cfg_.fast).holds(way.hand.gripper);
 }
 
 // Joint positions at times, and places of a base that drives, the tool at `speed` between them.
@@ -105,6 +139,11 @@ void OpeningPlanner::make_plan(const World& world, const PlanRequest& request, P
   if (!found) return;
   way = *std::move(found);
   plan.grasp = way.grasp;
+  if (way.hand.floats()) {
+    float_along(world, way, request.stage == first, plan);
+    plan.more = true;
+    return;
+  }
   const int arm = way.hand.arm, hand = way.hand.gripper;
   const MoveGroup& gripper = robot().groups()[hand];
   if (request.stage == first) {

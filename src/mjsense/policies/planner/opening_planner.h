@@ -13,6 +13,7 @@ struct OpeningPlannerCfg {
   double there = 0.20, fast = 0.08, driving = 0.12, slow = 0.04;
   double fastest_joint = 0.8;                  // rad/s on the way there
   double base_speed = 0.20, base_turn = 0.35;  // m/s, rad/s, with the handle
+  double turn = 1.0;                           // rad/s, of a hand that floats
   double settle = 0.1, close_time = 0.5;       // s
   double back = 0.08;                          // m, before another attempt
   int grasps = 40;                             // tried before giving up
@@ -32,6 +33,10 @@ class OpeningPlanner final : public TaskPlanner {
  private:
   std::vector<CommandPath> paths(int arm, std::span<const RobotValues> points, double speed,
                                  bool driving) const;
+  // A screw of a hand that floats, X_WT.
+  Segment& go(Plan& plan, int phase, const ArmAndHand& hand, const Pose& from, const Pose& to,
+              double speed, double settle = 0) const;
+  void float_along(const World& world, const HandleWay& way, bool there, Plan& plan) const;
   void back_off(const World& world, Plan& plan) const;
 
   OpeningPlannerCfg cfg_;

@@ -26,6 +26,18 @@ HandleReach::Start BaseSearch::placed(const HandleReach::Start& start, const Pos
   return out;
 }
 
+// Of a hand that floats: before the handle, as it would take it.
+Pose BaseSearch::before(const Pose& body, const Articulation& one, double distance, double aside,
+                        double turn) const {
+  const ArmAndHand& hand = reach_.hands()[0];
+  const double opening = robot_.groups()[hand.gripper].max_opening;
+  const std::vector<HandleGrasp> grasps = propose_handle_grasps(one.handle, body, opening);
+  if (grasps.empty()) return usual_;
+  const Vec3 back{0.5 * aside, 0, -distance};
+  return reach_.base_with(
+      hand, grasps[0].pose * Pose{back, axis_angle({0, 1, 0}, turn)} * Pose{{}, hand.turn});
+}
+
 BasePlaces BaseSearch::places(const Articulation& one, double from, double to) const {
   {
     const std::lock_guard lock(mutex_);
@@ -50,7 +62,8 @@ std::vector<Pose> BaseSearch::search(const Articulation& one, double from, doubl
   std::vector<Pose> found;
   for (int i = 0; i < cfg_.candidates && static_cast<int>(found.size()) < cfg_.wanted; ++i) {
     Pose base = usual_;
-    if (i > 0) {
+    const bool floats = !reach_.hands().empty() && reach_.hands()[0].floats();
+    if (i > 0 || floats) {
       const double distance = rng.uniform(cfg_.nearest, cfg_.farthest),
                    aside = rng.uniform(-cfg_.aside, cfg_.aside),
                    turn = rng.uniform(-cfg_.turn, cfg_.turn);
@@ -58,6 +71,7 @@ std::vector<Pose> BaseSearch::search(const Articulation& one, double from, doubl
       base.p = {at.x, at.y, usual_.p.z};
       const Vec3 look = handle + -0.3 * away - at;
       base.q = axis_angle({0, 0, 1}, std::atan2(look.y, look.x) + turn);
+      if (floats) base = before(body, one, distance, aside, turn);
     }
     const HandleReach::Start there = placed(empty_, base);
     if (!reach_.stands_free(there)) continue;

@@ -38,6 +38,8 @@ class BaseSearch {
   BasePlaces places(const Articulation& one, double from, double to) const;
 
  private:
+  Pose before(const Pose& body, const Articulation& one, double distance, double aside,
+              double turn) const;
   std::vector<Pose> search(const Articulation& one, double from, double to, bool driving) const;
 
   const Robot& robot_;

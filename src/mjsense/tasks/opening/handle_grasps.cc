@@ -46,16 +46,19 @@ Quat closing_turn(const MoveGroup& gripper, const mjModel* model) {
 std::vector<ArmAndHand> arms_with_hands(const Robot& robot, const mjModel* model) {
   std::vector<ArmAndHand> hands;
   const auto groups = robot.groups();
+  const bool floats = std::ranges::any_of(groups, [](const MoveGroup& group) {
+    return group.kind == GroupKind::kBase && group.command_size == 7;
+  });
   for (int g = 0; g < static_cast<int>(groups.size()); ++g) {
     if (groups[g].kind != GroupKind::kGripper || groups[g].leaf_site < 0) continue;
-    for (int a = 0; a < static_cast<int>(groups.size()); ++a) {
+    bool on_arm = false;
+    for (int a = 0; a < static_cast<int>(groups.size()) && !on_arm; ++a) {
       if (groups[a].kind != GroupKind::kArm || groups[a].leaf_site < 0) continue;
-      const bool same = groups[a].leaf_site == groups[g].leaf_site ||
-                        is_below(model, groups[g].root_body, groups[a].root_body);
-      if (!same) continue;
-      hands.push_back({a, g, closing_turn(groups[g], model)});
-      break;
+      on_arm = groups[a].leaf_site == groups[g].leaf_site ||
+               is_below(model, groups[g].root_body, groups[a].root_body);
+      if (on_arm) hands.push_back({a, g, closing_turn(groups[g], model)});
     }
+    if (!on_arm && floats) hands.push_back({g, g, closing_turn(groups[g], model)});
   }
   return hands;
 }

@@ -11,12 +11,13 @@
 
 namespace mjsense {
 
-// An arm and its gripper: move groups of a robot.
+// An arm and its gripper: move groups of a robot. A hand that floats is both.
 struct ArmAndHand {
   int arm = -1, gripper = -1;
   Quat turn;  // from a tool frame whose fingers close along y to the hand's own
+  bool floats() const { return arm == gripper; }
 };
-// Those whose gripper is an arm's leaf, in the robot's order.
+// Those whose gripper is an arm's leaf, or hangs on a base that floats, in the robot's order.
 std::vector<ArmAndHand> arms_with_hands(const Robot& robot, const mjModel* model);
 
 // Where the tool takes a handle: z the approach, y the closing direction, the origin between the

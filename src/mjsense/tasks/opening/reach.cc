@@ -36,8 +36,11 @@ HandleReach::HandleReach(const mjModel* model, const Robot& robot, HandleReachCf
       if (is_below(model, b, robot.groups()[hand.gripper].root_body)) of_gripper_[b] = hand.gripper;
     }
   }
-  for (int b = 1; b < model->nbody; ++b)
-    fixed_[b] = of_robot_[b] && (model->body_weldid[b] == 0 || b == robot.base_body());
+  const bool floats = std::ranges::any_of(hands_, &ArmAndHand::floats);
+  for (int b = 1; b < model->nbody; ++b) {
+    const bool stands = !floats && b == robot.base_body();
+    fixed_[b] = of_robot_[b] && (model->body_weldid[b] == 0 || stands);
+  }
   for (int g = 0; g < model->ngeom; ++g) {
     if (!of_robot_[model->geom_bodyid[g]]) continue;
     const int body = model->geom_bodyid[g];
@@ -314,7 +317,11 @@ std::optional<HandleWay> HandleReach::find(const Start& start, const Articulatio
       way.hand = hand;
       way.grasp = grasp.pose * Pose{{}, hand.turn};
       way.on_body = inverse(seen.body) * way.grasp;
-      if (try_grasp(data, start, seen, motion, driving, way)) found = std::move(way);
+      way.end = motion.at(1) * way.grasp;
+      if (hand.floats()) {
+        if (try_floating(data, start, inverse(seen.to_base), motion, way)) found = std::move(way);
+      } else if (try_grasp(data, start, seen, motion, driving, way))
+        found = std::move(way);
     }
   }
   return found;
@@ -330,10 +337,13 @@ std::optional<HandleWay> HandleReach::again(const Start& start, const Articulati
   way.drive = before.drive;
   way.on_body = before.on_body;
   way.grasp = seen.body * before.on_body;
+  const HandleMotion motion{&one, from, to, seen.axis, seen.anchor};
+  way.end = motion.at(1) * way.grasp;
+  if (way.hand.floats()) return way;
   way.pregrasp = seen.to_base * way.grasp * Pose{{0, 0, -cfg_.pregrasp}, {}};
   RobotValues q = seen.now;
   if (!robot_.ik(way.hand.arm, way.pregrasp, q, Chain::kTracking)) return {};
-  if (!go_along(seen, {&one, from, to, seen.axis, seen.anchor}, q, way)) return {};
+  if (!go_along(seen, motion, q, way)) return {};
   return way;
 }
 

@@ -21,11 +21,13 @@
 
 namespace mjsense {
 
-// One way to do it, of one arm.
+// One way to do it, of one arm or of a hand that floats, which goes on screws.
 struct HandleWay {
   ArmAndHand hand;
   Pose grasp;                      // X_WT
   Pose on_body;                    // the same in the frame of the handle's body
+  std::vector<Pose> there;         // X_WT of a hand that floats, from the start to the pregrasp
+  Pose end;                        // X_WT with the handle at the end of its way
   std::vector<RobotValues> go;     // joint positions from the start to the pregrasp, at least two
   std::vector<RobotValues> along;  // with the handle; the first is where it is now
   std::optional<Drive> drive;      // of the base meanwhile, whose places are in `along`
@@ -41,6 +43,7 @@ struct HandleReachCfg {
   double clearance = 0.010;  // m, of the robot to everything on the way there
   double contact = -0.001;   // m, what counts as touching while it has the handle
   double step = 0.10;        // rad, of any joint between two checks of the way
+  double line_step = 0.02;   // m, of a hand that floats; a turn counts as on a radius of 0.2 m
   // m before the pregrasp: by way of such points it goes where the straight way is barred.
   std::array<double, 2> detours{0.12, 0.22};
 };
@@ -61,6 +64,8 @@ class HandleReach {
   Start start_of(const mjModel& model, const StateRow& state) const;
   bool drives() const { return base_ >= 0; }
   int base() const { return base_; }  // group, -1: it stands where it is put
+  // X_WB with the tool of a hand that floats at X_WT.
+  Pose base_with(const ArmAndHand& hand, const Pose& tool) const;
   // The articulation goes from `from` to `to`, the robot standing as `start` says; with `driving` its
   // base drives meanwhile. Nothing: it cannot, or stands in something. At most `most_tries` grasps are
   // tried an arm.
@@ -89,6 +94,11 @@ class HandleReach {
                  HandleWay& way) const;
   bool free(mjData* data, const Start& start, double clearance, const Articulation* held,
             const ArmAndHand* hand, bool driving = false) const;
+  bool try_floating(mjData* data, const Start& start, const Pose& base, const HandleMotion& motion,
+                    HandleWay& way) const;
+  bool screw_is_free(mjData* data, const Start& start, const ArmAndHand& hand, const Pose& from,
+                     const Pose& to) const;
+  void float_to(mjData* data, const ArmAndHand& hand, const Pose& tool) const;
   void show(mjData* data, const RobotValues& values) const;
   bool way_is_free(mjData* data, const Start& start, int arm,
                    std::span<const RobotValues> way) const;
