@@ -159,11 +159,13 @@ def boulder(triangles: int) -> mujoco.MjSpec:
 
 
 def pick() -> mujoco.MjSpec:
-    """Our pick scene: the FR3 with its primitive visuals at the table."""
+    """Our plain table: the FR3 on its station, with its primitive visuals."""
     models = HERE.parent / "models"
-    spec = mujoco.MjSpec.from_file(str(models / "tasks" / "pick.xml"))
-    robot = mujoco.MjSpec.from_file(str(models / "franka" / "fr3.xml"))
-    spec.attach(robot, prefix="robot/", frame=spec.worldbody.add_frame())
+    spec = mujoco.MjSpec.from_file(str(models / "scenes" / "table" / "room.xml"))
+    for name in ("station", "fr3"):
+        part = mujoco.MjSpec.from_file(str(models / "robots" / "franka" / f"{name}.xml"))
+        height = 0.58 if name == "fr3" else 0  # of the station's top
+        spec.attach(part, prefix=f"{name}/", frame=spec.worldbody.add_frame(pos=[0, 0, height]))
     for i, name in enumerate(("red_block", "soup_can", "mug", "pear")):
         item = mujoco.MjSpec.from_file(str(models / "objects" / f"{name}.xml"))
         spec.attach(item, prefix=f"{name}/", frame=spec.worldbody.add_frame(pos=[0.5 + 0.12 * i, -0.35 + 0.2 * i, 0.64]))

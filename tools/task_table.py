@@ -45,7 +45,7 @@ CASES = (
     *(
         (task, robot, "")
         for task in ("open", "close")
-        for robot in ("franka", "mobile_franka", "i2rt_yam", "bimanual_yam", "rby1")
+        for robot in ("franka", "mobile_franka", "i2rt_yam", "bimanual_yam", "floating_rum", "rby1")
     ),
     *((task, "franka", scene) for task in ("open", "close") for scene in ("kitchen:*", "libero/kitchen", "libero/study")),
     ("door_opening", "rby1", ""),

@@ -318,6 +318,39 @@ TEST(Opening, OnAWayTheHandStaysWithTheHandle) {
 }
 
 // Things as near as 5 mm to an arm are in its way, where they stand in their world.
+// Its tool goes with the handle as a door goes about its hinge; at the start it hangs in front of it, clear of everything.
+TEST(Opening, AHandThatFloatsGoesOnAScrew) {
+  TaskCfg cfg;
+  cfg.robot = robot_cfg("floating_rum");
+  Stage stage(cfg, OpeningKind::kOpen, 1);
+  const HandleReach& reach = stage.task.reach();
+  ASSERT_EQ(reach.hands().size(), 1u);
+  EXPECT_TRUE(reach.hands()[0].floats());
+  EXPECT_FALSE(reach.drives());
+  for (int episode = 0; episode < 6; ++episode) {
+    const World w = stage.start(0, episode);
+    ASSERT_EQ(stage.task.start_fault(w), "");
+    const Articulation& one = stage.task.target(0);
+    const double from = w.data->qpos[one.qpos], to = stage.task.aim(one);
+    const auto start = reach.start_of(w);
+    EXPECT_TRUE(reach.stands_free(start));
+    const auto way = reach.find(start, one, from, to, 40, false);
+    ASSERT_TRUE(way) << episode;
+    const Pose tool =
+        stage.task.robot().base_pose(w) * stage.task.robot().tcp_pose(w, reach.hands()[0].arm);
+    EXPECT_NEAR(norm(way->there.front().p - tool.p), 0, 1e-9);
+    EXPECT_NEAR(norm(way->grasp.p - way->there.back().p), 0.04, 1e-9) << "of the pregrasp";
+    const Pose body = reach.body_pose(start, one, from), later = reach.body_pose(start, one, to);
+    const Pose in_it = inverse(body) * way->grasp, then = inverse(later) * way->end;
+    EXPECT_NEAR(norm(in_it.p - then.p), 0, 1e-9);
+    // A screw from the one to the other keeps it there all the way.
+    const Pose half = way->grasp * exp6(0.5 * log6(inverse(way->grasp) * way->end));
+    const Pose between = inverse(reach.body_pose(start, one, 0.5 * (from + to))) * half;
+    EXPECT_NEAR(norm(in_it.p - between.p), 0, 1e-9);
+    EXPECT_NEAR(angle_between(in_it.q, between.q), 0, 1e-6);
+  }
+}
+
 TEST(Opening, WhatAnArmComesNearIsThatOfItsWorld) {
   Stage stage(franka(), OpeningKind::kOpen);
   const World w = stage.start(0, 0);
