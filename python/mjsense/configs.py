@@ -799,7 +799,7 @@ class SceneRegionCfg(_config_methods.Config):
     name: str
     """Of the region."""
     on: str
-    """Full name of the box geom whose top it is."""
+    """Full name of the box geom whose top it is, or of a body: then its highest."""
     area: Sequence[float] = (0.0, 0.0, 0.0, 0.0)
     """Where origins of objects may be: least x, most x, least y, most y in the world; all 0: the whole top. [m]"""
     target_area: Sequence[float] | None = None

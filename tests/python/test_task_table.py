@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-import mjsense as mjs
+from mjsense import _core
 
 
 def load(path):
@@ -22,8 +22,8 @@ PLAYED = [case for case in TABLE.CASES if not case[2].startswith("libero/") and 
 
 
 def test_every_task_and_robot_of_ours_has_a_row():
-    assert {task for task, _, _ in TABLE.CASES} == set(mjs.task_names())
-    assert {robot for _, robot, _ in TABLE.CASES} == set(mjs.robot_names()) - {"franka_hand"}
+    assert {task for task, _, _ in TABLE.CASES} == set(_core.task_names())
+    assert {robot for _, robot, _ in TABLE.CASES} == set(_core.robot_names()) - {"franka_hand"}
 
 
 @pytest.mark.parametrize("task,robot,scene", PLAYED)

@@ -28,7 +28,10 @@ constexpr char kScene[] = R"(
 </mujoco>)";
 
 struct Fingers : testing::Test {
-  Fingers() { gripper.pad_sites = {site("left_pad"), site("right_pad")}; }
+  Fingers() {
+    gripper.pad_sites[0] = site("left_pad");
+    gripper.pad_sites[1] = site("right_pad");
+  }
   int site(const char* name) const { return mj_name2id(w.model, mjOBJ_SITE, name); }
   int body(const char* name) const { return mj_name2id(w.model, mjOBJ_BODY, name); }
   // Whether they have it between them, the box standing there.

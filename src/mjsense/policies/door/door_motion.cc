@@ -83,7 +83,7 @@ class DoorMotions::Attempt {
       const double way = values[hand_.tool].values[i] - start_[hand_.tool].values[i];
       out.cost += kReachCost * way * way;
     }
-    if (!follow_line(before, grasp, base, values, out.approach)) return false;
+    if (!follow_line(before, grasp, base, 0, 0, values, out.approach)) return false;
     if (limit_cost(values) > 0.6) return false;
 
     const int presses =
@@ -103,8 +103,7 @@ class DoorMotions::Attempt {
     // Straight off the leaf as it stands then.
     const Pose last = swivelled(geometry_.carried(straight, geometry_.press, leaf), swivel_);
     const Pose off = moved(last, -0.08 * rotate(last.q, {0, 0, 1}));
-    if (!follow_line(last, off, at, values, out.leave)) out.leave.clear();
-    for (DoorWaypoint& waypoint : out.leave) waypoint.leaf = leaf;
+    if (!follow_line(last, off, at, leaf, geometry_.press, values, out.leave)) out.leave.clear();
     return true;
   }
 
@@ -154,8 +153,8 @@ class DoorMotions::Attempt {
         {view.begin(), view.begin() + static_cast<std::ptrdiff_t>(arm_.joints.size())}, base, leaf};
   }
 
-  bool follow_line(const Pose& from, const Pose& to, const BasePose& base, RobotValues& values,
-                   std::vector<DoorWaypoint>& out) {
+  bool follow_line(const Pose& from, const Pose& to, const BasePose& base, double leaf,
+                   double lever, RobotValues& values, std::vector<DoorWaypoint>& out) {
     const int steps = 4;
     for (int i = 0; i <= steps; ++i) {
       Pose tool = from;
@@ -163,8 +162,8 @@ class DoorMotions::Attempt {
       const RobotValues before = values;
       if (!solve(tool, base, values, i == 0 ? kReachIterations : Chain::kTracking)) return false;
       if (i > 0 && motion_cost(before, values) > 1e8) return false;
-      if (out.empty() && collides(values, base, 0, 0)) return false;
-      out.push_back(waypoint(values, base, 0));
+      if (out.empty() && collides(values, base, leaf, lever)) return false;
+      out.push_back(waypoint(values, base, leaf));
     }
     return true;
   }

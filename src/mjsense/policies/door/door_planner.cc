@@ -5,6 +5,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <numeric>
 
 #include "mjsense/core/error.h"
 #include "mjsense/policies/navigation/nav_planner.h"
@@ -254,7 +255,9 @@ void DoorPlanner::open_door(const World& world, const DoorMotion& motion, Plan& 
         {static_cast<int>(plan.segments.size()), begin + done * (goal_[world.id] - begin)});
   }
   plan.wait(kOpen, 0.3);
-  plan.wait(kRelease, 0.4).grip(motion.hand.gripper, gripper.open_command);
+  // As far as the handle needs: fingers that open wide reach the leaf.
+  plan.wait(kRelease, 0.4)
+      .grip(motion.hand.gripper, std::midpoint(gripper.closed_command, gripper.open_command));
   if (!motion.leave.empty()) add(kRelease, motion.leave, cfg_.press_speed);
   plan.wait(kComplete, 0.3);
 }

@@ -19,6 +19,7 @@ namespace {
 struct Case {
   const char *task, *robot, *scene;
   int episodes, first = 0;
+  double depth = 0.001;  // m, of a contact of the robot, where nothing goes wrong
 };
 std::ostream& operator<<(std::ostream& out, const Case& c) {
   return out << c.task << " " << c.robot << " " << c.scene;
@@ -29,7 +30,6 @@ constexpr double kAcceleration = 10, kSpeed = 2.62;
 // Of bases, which drive with things in their hands: m/s^2, rad/s^2.
 constexpr double kBase = 3.0, kBaseTurn = 10;
 constexpr double kBaseSpeed = 0.6, kBaseTurnSpeed = 1.5;  // m/s, rad/s
-constexpr double kDepth = 0.001;  // m, of a contact of the robot, where nothing goes wrong
 // Hands that float come back onto their way a little faster.
 constexpr double kHandSpeed = 0.7, kHandTurnSpeed = 1.8;
 
@@ -95,7 +95,7 @@ TEST_P(MotionLimits, CommandsKeepToThem) {
     EXPECT_LT(q.speed, kSpeed) << c << ", episode " << episode;
     EXPECT_LT(q.acceleration, kAcceleration)
         << c << ", episode " << episode << " at " << q.accelerated_at << " s";
-    EXPECT_LT(q.depth, kDepth) << q.deepest << ", " << c << ", episode " << episode;
+    EXPECT_LT(q.depth, c.depth) << q.deepest << ", " << c << ", episode " << episode;
     EXPECT_EQ(q.self_collisions, 0) << q.met << ", " << c << ", episode " << episode;
     if (std::getenv("MJSENSE_EPISODES"))
       printf(
@@ -127,7 +127,8 @@ INSTANTIATE_TEST_SUITE_P(
         Case{"close", "i2rt_yam", "", 1}, Case{"close", "bimanual_yam", "", 1},
         Case{"close", "floating_rum", "", 2}, Case{"close", "rby1", "", 2},
         Case{"door_opening", "rby1", "", 2}, Case{"door_opening", "rby1", "room_with_door:2", 2},
-        Case{"door_opening", "mobile_franka", "", 1}, Case{"nav_to_obj", "rby1", "", 1},
+        // The closer swings the door onto the fingers that let go of it.
+        Case{"door_opening", "mobile_franka", "", 1, 0, 0.0015}, Case{"nav_to_obj", "rby1", "", 1},
         Case{"nav_to_obj", "mobile_franka", "", 1}),
     [](const auto& info) {
       std::string name = std::string(info.param.task) + "_" + info.param.robot;
