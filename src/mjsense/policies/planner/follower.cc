@@ -5,6 +5,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 
 #include "mjsense/core/error.h"
 #include "mjsense/observe/frame.h"
@@ -304,8 +305,11 @@ void Follower::limit(int group, Sent& sent, std::span<double> command) const {
     const double wanted = command[i], follow = (wanted - sent.wanted[i]) / dt_;
     const double behind = sent.wanted[i] - sent.values[i], rate = sent.rates[i];
     double next = (wanted - sent.values[i]) / dt_;
-    if (behind != 0 || std::abs(next - rate) > most * dt_) {
+    const bool turns = robot_->groups()[group].kind == GroupKind::kArm && !slides_[group][i];
+    const double fastest = turns ? cfg_.most_speed : std::numeric_limits<double>::infinity();
+    if (behind != 0 || std::abs(next) > fastest || std::abs(next - rate) > most * dt_) {
       next = follow + closing_speed(behind, kBraking * most, dt_);
+      next = std::clamp(next, -fastest, fastest);
       next = std::clamp(next, rate - most * dt_, rate + most * dt_);
       command[i] = sent.values[i] + next * dt_;
       if (std::abs(command[i] - wanted) < 1e-9) command[i] = wanted;

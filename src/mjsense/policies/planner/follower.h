@@ -37,6 +37,7 @@ struct FollowerCfg {
   // Of commands from one control step to the next, whatever plans say: where a plan is given up in
   // the midst of a motion, too. Of arms' joints, and of bases.
   double most_acceleration = 10, most_slide_acceleration = 2.5;           // rad/s^2, m/s^2
+  double most_speed = 2.62;                                               // rad/s, of arms
   double most_base_acceleration = 3.0, most_base_turn_acceleration = 10;  // m/s^2, rad/s^2
 };
 

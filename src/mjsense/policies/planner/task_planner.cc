@@ -55,10 +55,12 @@ bool TaskPlanner::plan(const World& world) {
 void TaskPlanner::begin_again(const World& world, Action& action) {
   State& state = states_[world.id];
   state.planned = false;
-  state.stops = state.retries < planner_cfg_.max_retries;
-  if (!state.stops) return give_up(action);
-  ++state.retries;
-  state.stage = 0;
+  state.stops = true;
+  state.gives_up = state.retries == planner_cfg_.max_retries;
+  if (!state.gives_up) {
+    ++state.retries;
+    state.stage = 0;
+  }
   follower_.brake(world, action);
 }
 
@@ -81,6 +83,7 @@ void TaskPlanner::act(const World& world, Action& action) {
   if (state.stops) {
     if (!follower_.brake(world, action)) return;
     state.stops = false;
+    if (state.gives_up) return give_up(action);
     action = {};
     follower_.restart(world);
     state.no_other_way = !plan(world);

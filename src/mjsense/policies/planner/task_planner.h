@@ -68,7 +68,8 @@ class TaskPlanner : public PlannerPolicy {
  private:
   struct State {
     bool planned = false;
-    bool stops = false;  // before it begins again
+    bool stops = false;     // before it begins again
+    bool gives_up = false;  // instead, once it is at rest
     int retries = 0, stage = 0;
     PlanFailure failure = PlanFailure::kNone;
     bool no_other_way = false;  // and to begin again there was no plan
