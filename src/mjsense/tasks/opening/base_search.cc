@@ -33,7 +33,7 @@ Pose BaseSearch::before(const Pose& body, const Articulation& one, double distan
   const double opening = robot_.groups()[hand.gripper].max_opening;
   const std::vector<HandleGrasp> grasps = propose_handle_grasps(one.handle, body, opening);
   if (grasps.empty()) return usual_;
-  const Vec3 back{0.5 * aside, 0, -distance};
+  const Vec3 back{0.5 * aside, 0, -(0.1 + 0.5 * distance)};  // an arm is not in between
   return reach_.base_with(
       hand, grasps[0].pose * Pose{back, axis_angle({0, 1, 0}, turn)} * Pose{{}, hand.turn});
 }
