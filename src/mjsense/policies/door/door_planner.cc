@@ -258,7 +258,9 @@ void DoorPlanner::open_door(const World& world, const DoorMotion& motion, Plan& 
   // As far as the handle needs: fingers that open wide reach the leaf.
   plan.wait(kRelease, 0.4)
       .grip(motion.hand.gripper, std::midpoint(gripper.closed_command, gripper.open_command));
-  if (!motion.leave.empty()) add(kRelease, motion.leave, cfg_.press_speed);
+  // What was pushed open its closer would shut again.
+  if (!motion.leave.empty() && !door_->push(world.id))
+    add(kRelease, motion.leave, cfg_.press_speed);
   plan.wait(kComplete, 0.3);
 }
 

@@ -127,7 +127,7 @@ INSTANTIATE_TEST_SUITE_P(
         Case{"close", "i2rt_yam", "", 1}, Case{"close", "bimanual_yam", "", 1},
         Case{"close", "floating_rum", "", 2}, Case{"close", "rby1", "", 2},
         Case{"door_opening", "rby1", "", 2}, Case{"door_opening", "rby1", "room_with_door:2", 2},
-        // The closer swings the door onto the fingers that let go of it.
+        // Fingers that lead a heavy door by its handle.
         Case{"door_opening", "mobile_franka", "", 1, 0, 0.0015}, Case{"nav_to_obj", "rby1", "", 1},
         Case{"nav_to_obj", "mobile_franka", "", 1}),
     [](const auto& info) {
