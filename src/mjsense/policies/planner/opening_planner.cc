@@ -71,7 +71,7 @@ void OpeningPlanner::float_along(const World& world, const HandleWay& way, bool 
   go(plan, kCloseGripper, way.hand, way.grasp, way.grasp, cfg_.slow, cfg_.close_time)
       .grip(way.hand.gripper, gripper.closed_command);
   // About a hinge or along a slide: both are screws.
-  go(plan, kLift, way.hand, way.grasp, way.end, cfg_.driving).holds(way.hand.gripper);
+  go(plan, kLift, way.hand, way.grasp, way.end, cfg_.fast).holds(way.hand.gripper);
 }
 
 // Joint positions at times, and places of a base that drives, the tool at `speed` between them.

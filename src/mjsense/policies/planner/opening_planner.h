@@ -9,7 +9,7 @@
 namespace mjsense {
 
 struct OpeningPlannerCfg {
-  // m/s, of the tool: to the pregrasp, with the handle, with it while the base drives or the hand floats, to it
+  // m/s, of the tool: to the pregrasp, with the handle, with it while the base drives, to the handle
   double there = 0.20, fast = 0.08, driving = 0.12, slow = 0.04;
   double fastest_joint = 0.8;                  // rad/s on the way there
   double base_speed = 0.20, base_turn = 0.35;  // m/s, rad/s, with the handle
