@@ -195,3 +195,22 @@ def test_a_step_and_the_simulation_take_turns():
     env.step(hold(env))
     assert len(said) == 2 and all("reset() is called while the simulation is at work" in text for text in said)
     env.close()
+
+
+@pytest.mark.parametrize(
+    "task,robot,text",
+    [("open", "franka", "picks, and does nothing else: task 'open' is of type 'open'"),
+     ("pick", "rby1", "wants a gripper on an arm whose joints alone move it; robot 'rby1' has none"),
+     ("pick", "floating_rum", "robot 'floating_rum' has none")],
+)  # fmt: skip
+def test_the_planner_from_above_says_what_it_cannot(task, robot, text):
+    with pytest.raises(ValueError, match=text):
+        mjs.make_vec(task, robot=robot, policy="top_down_planner", num_envs=1, cameras=[])
+
+
+def test_the_planner_from_above_comes_from_above():
+    env = mjs.make_vec("pick", policy="top_down_planner", num_envs=4, cameras=[], observations=["grasp_pose"], seed=1)
+    env.reset()
+    w, x, y, z = env.rows["grasp_pose"][:, 3:].T
+    np.testing.assert_allclose(w * w - x * x - y * y + z * z, -1, atol=1e-3)
+    env.close()
