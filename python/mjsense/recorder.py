@@ -60,7 +60,8 @@ class Recorder(KnownAttributes):
             out: folder; files are in ``out/house_<house>/``.
             simulation: its worlds are recorded.
             sensors: a :class:`SensorSuite` or sensors, in the order of the files; None: all of the scene. A camera becomes videos of
-                its ``rgb`` and ``depth``; whatever else it has are arrays, ``<camera>_<field>``. Sensors of your own need an ``observation_space``, or ``is_dict``.
+                its ``rgb`` and ``depth``; whatever else it has are arrays, ``<camera>_<field>``. Sensors of your own need an
+                ``observation_space``, or ``is_dict``.
             episodes: how many to keep.
             fps: rows a second; by default one row a control step.
             resume: go on with an interrupted recording of the same settings.
@@ -94,7 +95,7 @@ class Recorder(KnownAttributes):
         self._num_worlds = simulation.num_worlds
         self.sensors: tuple[Any, ...] = tuple(chosen)
         """What is stored."""
-        self._completed = False
+        self._published = False
         self._complete = True
 
     def __enter__(self) -> Recorder:
@@ -129,7 +130,7 @@ class Recorder(KnownAttributes):
             world_ids: None: all that have an episode.
             reward, terminated, truncated, success: one value, or one for each of these worlds.
         """
-        if self._completed:
+        if self._published:
             raise RuntimeError("append: the recorder is complete; it takes no more rows")
         ids = [w for w in range(self._num_worlds) if self.recording(w)] if world_ids is None else [int(w) for w in world_ids]
 
@@ -172,7 +173,7 @@ class Recorder(KnownAttributes):
 
     def complete(self) -> None:
         """Publishes everything under its final name. No more episodes after that."""
-        self._completed = True
+        self._published = True
         self._core.complete()
 
     def recording(self, world: int) -> bool:

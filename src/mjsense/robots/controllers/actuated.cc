@@ -87,6 +87,11 @@ void ActuatedController::keep(const World& /*world*/, std::span<const double> ta
   std::copy_n(target.begin(), std::min(target.size(), command.size()), command.begin());
 }
 
+void ChangeController::keep(const World& /*world*/, std::span<const double> /*target*/,
+                            std::span<double> command) const {
+  std::ranges::fill(command, 0.0);
+}
+
 void ActuatedController::begin(const World& /*world*/, std::span<const double> target,
                                const StateRow& state) {
   for (int i = 0; i < size(); ++i) state.ctrl[group_.actuators[i]] = target[i];

@@ -41,4 +41,12 @@ class ActuatedController : public Controller {
   std::vector<int> qpos_;  // by actuator: where its joint stands; -1: it has none
 };
 
+// Commands are changes or speeds: 0 leaves the group as it is.
+class ChangeController : public ActuatedController {
+ public:
+  using ActuatedController::ActuatedController;
+  void keep(const World& world, std::span<const double> target,
+            std::span<double> command) const override;
+};
+
 }  // namespace mjsense

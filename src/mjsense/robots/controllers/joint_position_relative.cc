@@ -9,11 +9,11 @@
 namespace mjsense {
 namespace {
 
-class JointPositionRelative final : public ActuatedController {
+class JointPositionRelative final : public ChangeController {
  public:
   JointPositionRelative(const JointPositionRelativeCfg& cfg, const MoveGroup& group,
                         const ControllerInit& init)
-      : ActuatedController(group, init), cfg_(cfg) {
+      : ChangeController(group, init), cfg_(cfg) {
     need_position_servos(init, "joint_position_relative");
   }
   void describe(MoveGroup& group) const override {
@@ -23,10 +23,6 @@ class JointPositionRelative final : public ActuatedController {
       group.command_low[i] = -span;
       group.command_high[i] = span;
     }
-  }
-  void keep(const World& /*world*/, std::span<const double> /*target*/,
-            std::span<double> command) const override {
-    std::ranges::fill(command, 0.0);
   }
   void command(const World& world, std::span<const double> command,
                std::span<double> target) override {

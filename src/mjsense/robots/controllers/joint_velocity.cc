@@ -13,10 +13,10 @@
 namespace mjsense {
 namespace {
 
-class VelocityServos final : public ActuatedController {
+class VelocityServos final : public ChangeController {
  public:
   VelocityServos(const MoveGroup& group, const ControllerInit& init)
-      : ActuatedController(group, init), speed_(init.num_worlds * size()) {}
+      : ChangeController(group, init), speed_(init.num_worlds * size()) {}
   void describe(MoveGroup& group) const override {
     ActuatedController::describe(group);
     bool slides = false, turns = false;
@@ -25,10 +25,6 @@ class VelocityServos final : public ActuatedController {
     group.command_unit = slides && turns ? "m/s or rad/s" : slides ? "m/s" : "rad/s";
     group.target_size = 0;  // it aims at no position
     group.target_unit = "";
-  }
-  void keep(const World& /*world*/, std::span<const double> /*target*/,
-            std::span<double> command) const override {
-    std::ranges::fill(command, 0.0);
   }
   void hold(const World& world, std::span<double> /*target*/) override {
     std::fill_n(speed_.begin() + world.id * size(), size(), 0.0);
@@ -47,10 +43,10 @@ class VelocityServos final : public ActuatedController {
   std::vector<double> speed_;  // [B, size]
 };
 
-class MovingTargets final : public ActuatedController {
+class MovingTargets final : public ChangeController {
  public:
   MovingTargets(const MoveGroup& group, const ControllerInit& init)
-      : ActuatedController(group, init),
+      : ChangeController(group, init),
         periods_(init.periods),
         from_(init.num_worlds * size()),
         to_(init.num_worlds * size()) {
@@ -70,10 +66,6 @@ class MovingTargets final : public ActuatedController {
     hold(world, target);
   }
   // Where the targets are: servos lag behind, and would swing back.
-  void keep(const World& /*world*/, std::span<const double> /*target*/,
-            std::span<double> command) const override {
-    std::ranges::fill(command, 0.0);
-  }
   void hold(const World& world, std::span<double> target) override {
     std::copy_n(target.begin(), size(), from_.begin() + world.id * size());
   }
