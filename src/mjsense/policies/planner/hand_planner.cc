@@ -99,14 +99,11 @@ bool HandPlanner::line_is_free(const World& world, CollisionQuery& query, const 
 
 Segment& HandPlanner::add_line(const World& world, Plan& plan, int phase, const Pose& from,
                                const Pose& to, double speed, double settle) const {
-  // At rest at both ends, and at its fastest in the middle; so it takes half as long again.
+  if (floats())
+    return plan.ease_tool(phase, hand_.tool, from, to, speed, settle, cfg_.turn_speed, true);
   const Pose to_base = inverse(robot_->base_pose(world));
-  Segment& segment = floats() ? plan.move_tool_in_world(phase, hand_.tool, from, to, speed / 1.5,
-                                                        settle, cfg_.turn_speed / 1.5)
-                              : plan.move_tool(phase, hand_.tool, to_base * from, to_base * to,
-                                               speed / 1.5, settle, cfg_.turn_speed / 1.5);
-  segment.tools.back().eased = true;
-  return segment;
+  return plan.ease_tool(phase, hand_.tool, to_base * from, to_base * to, speed, settle,
+                        cfg_.turn_speed, false);
 }
 
 bool HandPlanner::add_way(const World& world, CollisionQuery& query, Plan& plan, int phase,

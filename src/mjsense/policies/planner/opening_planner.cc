@@ -46,13 +46,10 @@ void OpeningPlanner::back_off(const World& world, Plan& plan) const {
   plan.more = true;
 }
 
-// At rest at both ends, and at its fastest in the middle; so it takes half as long again.
 Segment& OpeningPlanner::go(Plan& plan, int phase, const ArmAndHand& hand, const Pose& from,
                             const Pose& to, double speed, double settle) const {
-  Segment& segment = plan.move_tool_in_world(phase, hand.arm, from, to, speed / 1.5,
-                                             std::max(settle, cfg_.settle), cfg_.turn / 1.5);
-  segment.tools.back().eased = true;
-  return segment;
+  return plan.ease_tool(phase, hand.arm, from, to, speed, std::max(settle, cfg_.settle), cfg_.turn,
+                        true);
 }
 
 void OpeningPlanner::float_along(const World& world, const HandleWay& way, bool there,

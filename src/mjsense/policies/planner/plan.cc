@@ -22,6 +22,15 @@ Segment& Plan::move_tool_in_world(int phase, int tool, const Pose& from, const P
   return segment;
 }
 
+Segment& Plan::ease_tool(int phase, int tool, const Pose& from, const Pose& to, double speed,
+                         double settle, double turn, bool in_world) {
+  Segment& segment =
+      in_world ? move_tool_in_world(phase, tool, from, to, speed / 1.5, settle, turn / 1.5)
+               : move_tool(phase, tool, from, to, speed / 1.5, settle, turn / 1.5);
+  segment.tools.back().eased = true;
+  return segment;
+}
+
 Segment& Plan::move_groups(int phase, std::vector<CommandPath> paths, double settle) {
   double seconds = 0;
   for (const CommandPath& path : paths) seconds = std::max(seconds, path.times.back());

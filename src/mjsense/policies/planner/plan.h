@@ -72,6 +72,10 @@ struct Plan {
   Segment& move_tool_in_world(int phase, int tool, const Pose& from, const Pose& to, double speed,
                               double settle = 0,
                               double turn = std::numeric_limits<double>::infinity());
+  // From rest to rest, at `speed` and `turn` in the middle; so it takes half as long again. In the world
+  // or, like move_tool(), relative to the base.
+  Segment& ease_tool(int phase, int tool, const Pose& from, const Pose& to, double speed,
+                     double settle, double turn, bool in_world);
   // One or more groups follow their paths at the same time: seconds of the longest and `settle`.
   Segment& move_groups(int phase, std::vector<CommandPath> paths, double settle = 0);
   Segment& wait(int phase, double seconds);
