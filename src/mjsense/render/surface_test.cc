@@ -384,14 +384,51 @@ TEST(FixedLayer, IsUsedWhereNothingOfItHasChanged) {
       changes([&] { s.model->light_diffuse[0] = 0.5f; }, [&] { s.model->light_diffuse[0] = 1; }));
 }
 
+// The first worlds have layers of their own, as many as memory is given; one is for all.
+TEST(FixedLayer, WorldsShareOneUntilTheyLookDifferent) {
+  Studio s(std::string(kDark) + kMatte + R"(<worldbody><light pos="0 0 3" dir="0 0 -1"/>
+    <geom type="plane" size="5 5 1" material="matte"/><camera pos="0 0 4"/></worldbody>)");
+  s.options.shadows = s.options.layered = true;
+  s.update();
+  constexpr int kSize = 64;
+  const PixelGrid grid = grid_from_fovy(kSize, kSize, 50, false);
+  ViewBuilder builder(s.model.get(), *s.look, s.options);
+  const auto view_of = [&](float red) -> const View& {
+    s.model->geom_rgba[0] = red;
+    s.update();
+    return s.view(builder, {0, -2, 2}, {1, 0, 0}, {0, 1, 1}, grid);
+  };
+  FixedLayers layers(s.model.get(), kSize, kSize, 8, 2 * FixedLayer::bytes(kSize, kSize));
+  // Of worlds that look the same: one is made for all.
+  EXPECT_EQ(layers.settle_common(0, view_of(1)), nullptr);
+  EXPECT_EQ(layers.find(5, view_of(1)), nullptr);
+  const FixedTile* common = layers.settle_common(0, view_of(1));
+  ASSERT_NE(common, nullptr);
+  for (int world : {0, 1, 5}) EXPECT_EQ(layers.find(world, view_of(1)), common);
+  // World 1 becomes another, and world 5, which has no place for its own.
+  EXPECT_EQ(layers.find(1, view_of(0.5f)), nullptr);
+  EXPECT_EQ(layers.settle(1, view_of(0.5f)), nullptr);
+  const FixedTile* own = layers.settle(1, view_of(0.5f));
+  ASSERT_NE(own, nullptr);
+  EXPECT_NE(own, common);
+  EXPECT_EQ(layers.find(1, view_of(0.5f)), own);
+  for (int i = 0; i < 3; ++i) EXPECT_EQ(layers.settle(5, view_of(0.5f)), nullptr);
+  EXPECT_EQ(layers.find(5, view_of(0.5f)), nullptr);
+  // Who has its own leaves the common one to the others.
+  EXPECT_EQ(layers.settle_common(1, view_of(0.5f)), nullptr);
+  EXPECT_EQ(layers.find(0, view_of(1)), common);
+}
+
 TEST(FixedLayer, NeedsACameraAndLampsThatStandStill) {
   const auto possible = [](const char* world) {
     Studio s(std::string("<worldbody><geom type='plane' size='1 1 1'/>") + world + "</worldbody>");
     return FixedLayer::possible(s.model.get(), 0);
   };
   EXPECT_TRUE(possible("<light pos='0 0 2'/><camera/>"));
-  EXPECT_FALSE(possible("<camera/>"));
-  EXPECT_FALSE(possible("<light pos='0 0 2' castshadow='false'/><camera/>"));
+  EXPECT_TRUE(possible("<camera/>"));
+  EXPECT_TRUE(possible("<light pos='0 0 2' castshadow='false'/><camera/>"));
+  EXPECT_FALSE(
+      possible("<camera/><body><joint/><geom size='.1'/><light castshadow='false'/></body>"));
   EXPECT_FALSE(possible("<light pos='0 0 2'/><body><joint/><geom size='.1'/><camera/></body>"));
   EXPECT_FALSE(possible("<camera/><body><joint/><geom size='.1'/><light/></body>"));
   EXPECT_FALSE(

@@ -96,12 +96,11 @@ inline void find_all_casters(const View& view, const FixedTile* fixed, const Til
                scratch, used, spare, out.moving);
 }
 
-// What a layer keeps of the hits of packet `packet`, array by array: visit(of the hits, of the layer).
+// What a layer keeps of the hits of packet `packet` beside depth and ids, array by array: visit(of the
+// hits, of the layer).
 template <class HitsOrConst, class TileOrConst, class Visit>
 inline void each_kept(HitsOrConst& hits, int packet, TileOrConst& kept, Visit visit) {
   const int at = packet * kLanes;
-  visit(hits.t, kept.t + at);
-  visit(hits.id, kept.id + at);
   visit(hits.prim, kept.prim + at);
   visit(hits.u, kept.u + at);
   visit(hits.v, kept.v + at);
@@ -118,18 +117,22 @@ inline void make_fixed(const View& view, int count, int packets, Tile& tile, Til
                        FixedTile& out) {
   trace_tile(view, Part::kFixed, scratch.opaque, count, tile);
   Shadows shadows;
-  int used = 0, spare = scratch.spare_casters;
-  find_casters(view, Part::kFixed, shown_by(view, nullptr, tile, packets), scratch, used, spare,
-               shadows.fixed);
-  for (int i = 0; i < view.num_lights; ++i) shadows.moving[i].count = 0;
+  if (view.shadows) {
+    int used = 0, spare = scratch.spare_casters;
+    find_casters(view, Part::kFixed, shown_by(view, nullptr, tile, packets), scratch, used, spare,
+                 shadows.fixed);
+    for (int i = 0; i < view.num_lights; ++i) shadows.moving[i].count = 0;
+  }
   for (int q = 0; q < packets; ++q) {
     const Hits& hits = tile.hits[q];
+    copy_lanes(hits.t, out.t + q * kLanes);
+    copy_lanes(hits.id, out.id + q * kLanes);
     each_kept(hits, q, out, [](const auto* from, auto* to) { copy_lanes(from, to); });
     const std::uint32_t lanes = hit_lanes(hits);
     if (!lanes) continue;
     Surfaces surfaces;
     gather_surfaces(view, tile.pixels[q], hits, lanes, true, surfaces);
-    for (int i = 0; i < view.num_lights; ++i) {
+    for (int i = 0; i < view.num_lights && view.shadows; ++i) {
       if (!view.lights[i].shadows) continue;
       const Lit lit(view.lights[i], surfaces);
       const std::uint32_t dark = dark_lanes(view, i, lit, surfaces, hits, lanes, shadows);
@@ -140,7 +143,7 @@ inline void make_fixed(const View& view, int count, int packets, Tile& tile, Til
     known.fixed_lanes = lanes;
     known.packet = q;
     Colors shaded;
-    shade(view, surfaces, hits, lanes, &known, shaded);
+    shade(view, surfaces, hits, lanes, view.shadows ? &known : nullptr, shaded);
     for (int c = 0; c < 3; ++c)
       for (int k = 0; k < kLanes; k += kWidth)
         store(out.rgb[c] + q * kLanes + k, load(shaded.rgb[c] + k));
@@ -184,19 +187,21 @@ inline bool settle(const View& view, const Pixels& pixels, const Hits& hits, std
 // The colours of packet `packet`, if they are what is kept; false: they are not.
 inline bool load_colors(const View& view, const FixedTile& kept, const Pixels& pixels,
                         const Hits& hits, std::uint32_t lanes, Shadows& shadows, Colors& out) {
-  if (lanes != shadows.fixed_lanes || settle(view, pixels, hits, lanes, shadows)) return false;
+  if (lanes != shadows.fixed_lanes) return false;
+  if (view.shadows && settle(view, pixels, hits, lanes, shadows)) return false;
   for (int c = 0; c < 3; ++c)
     for (int k = 0; k < kLanes; k += kWidth)
       store(out.rgb[c] + k, load(kept.rgb[c] + shadows.packet * kLanes + k));
   return true;
 }
 
-// The tile as make_fixed() leaves it, from what is kept.
+// Depth and ids of the tile as make_fixed() leaves it, from what is kept.
 inline void load_fixed(const View& view, const FixedTile& from, int packets, Tile& tile) {
   PacketMask shown = 0;
   for (int q = 0; q < packets; ++q) {
     Hits& hits = tile.hits[q];
-    each_kept(hits, q, from, [](auto* to, const auto* kept) { copy_lanes(kept, to); });
+    copy_lanes(from.t + q * kLanes, hits.t);
+    copy_lanes(from.id + q * kLanes, hits.id);
     int last = -1, index = -1;
     for (int i = 0; i < kLanes; ++i) {
       if (hits.id[i] != last) {  // most packets see few
@@ -208,6 +213,15 @@ inline void load_fixed(const View& view, const FixedTile& from, int packets, Til
     if (hit_lanes(hits)) shown |= 1u << q;
   }
   if (shown) update_farthest(tile, shown);
+}
+
+// The rest of it, of the lanes of packet `q` that show it still. Most packets need it never: what is
+// not read need not come from memory.
+inline void load_rest(const FixedTile& from, int q, std::uint32_t lanes, Hits& hits) {
+  each_kept(hits, q, from, [&](auto* to, const auto* kept) {
+    for (int k = 0; k < kLanes; k += kWidth)
+      store(to + k, select(mask_of(lanes >> k & kAllLanes), load(kept + k), load(to + k)));
+  });
 }
 
 }  // namespace

@@ -101,7 +101,7 @@ inline void sample_shift(int index, int samples, float& x, float& y) {
 
 // The colours of packet `q` before transparent geoms: what it sees, the sky, reflections, haze.
 inline void shade_packet(const View& view, const FixedTile* fixed, int q, const Pixels& pixels,
-                         const Hits& hits, Shadows& shadows, Colors& colors) {
+                         Hits& hits, Shadows& shadows, Colors& colors) {
   const std::uint32_t lanes = hit_lanes(hits);
   shadows.packet = q;
   shadows.settled = false;
@@ -109,6 +109,7 @@ inline void shade_packet(const View& view, const FixedTile* fixed, int q, const 
   const bool kept =
       lanes && fixed && load_colors(view, *fixed, pixels, hits, lanes, shadows, colors);
   if (lanes && !kept) {
+    if (fixed) load_rest(*fixed, q, shadows.fixed_lanes, hits);
     Surfaces surfaces;
     gather_surfaces(view, pixels, hits, lanes, true, surfaces);
     shade(view, surfaces, hits, lanes, view.shadows ? &shadows : nullptr, colors);
@@ -167,6 +168,8 @@ inline void render_tile(const View& view, const ImageTargets& targets, int tx, i
       if (view.fixed) {
         fixed = view.fixed + at;
         load_fixed(view, *fixed, packets, tile);
+        if (targets.normals)
+          for (int q = 0; q < packets; ++q) load_rest(*fixed, q, 0xffffu, tile.hits[q]);
       } else {  // in the order that a kept layer has, so that the same pixels come out
         trace_tile(view, Part::kFixed, scratch.opaque, lists.opaque, tile);
       }

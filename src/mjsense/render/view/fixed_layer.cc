@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "mjsense/render/view/fixed_layer.h"
 
+#include <algorithm>
 #include <cstring>
 #include <utility>
 
@@ -12,6 +13,11 @@ namespace {
 bool equal(const PixelGrid& a, const PixelGrid& b) {
   return a.width == b.width && a.height == b.height && a.left == b.left && a.top == b.top &&
          a.dx == b.dx && a.dy == b.dy && a.orthographic == b.orthographic && a.bent == b.bent;
+}
+
+std::size_t count_tiles(int width, int height) {
+  return static_cast<std::size_t>((width + kTileSize - 1) / kTileSize) *
+         ((height + kTileSize - 1) / kTileSize);
 }
 
 // Byte by byte: what differs in padding alone is drawn anew, which is right too.
@@ -34,18 +40,17 @@ bool is_fixed_body(const mjModel* m, int body) {
 bool FixedLayer::possible(const mjModel* m, int camera) {
   if (m->cam_mode[camera] != mjCAMLIGHT_FIXED || !is_fixed_body(m, m->cam_bodyid[camera]))
     return false;
-  int lights = 0;
-  for (int i = 0; i < m->nlight; ++i) {
-    if (!m->light_castshadow[i]) continue;
-    ++lights;
+  for (int i = 0; i < m->nlight; ++i)
     if (m->light_mode[i] != mjCAMLIGHT_FIXED || !is_fixed_body(m, m->light_bodyid[i])) return false;
-  }
-  return lights > 0;
+  return true;
+}
+
+std::size_t FixedLayer::bytes(int width, int height) {
+  return sizeof(FixedTile) * count_tiles(width, height);
 }
 
 FixedLayer::FixedLayer(const mjModel* m, int width, int height)
-    : tiles_(static_cast<std::size_t>((width + kTileSize - 1) / kTileSize) *
-             ((height + kTileSize - 1) / kTileSize)) {
+    : tiles_(std::make_unique_for_overwrite<FixedTile[]>(count_tiles(width, height))) {
   geoms_.reserve(ViewBuilder::max_geoms(m));
   lights_.reserve(View::kMaxLights);
 }
@@ -73,6 +78,33 @@ bool FixedLayer::same(const View& view) const {
     ++next;
   }
   return next == geoms_.size();
+}
+
+FixedLayers::FixedLayers(const mjModel* m, int width, int height, int num_worlds,
+                         std::size_t most_bytes)
+    : common_(m, width, height) {
+  const std::size_t most = most_bytes / FixedLayer::bytes(width, height);
+  const std::size_t count = num_worlds > 1 ? std::min<std::size_t>(num_worlds, most) : 0;
+  own_.reserve(count);
+  for (std::size_t i = 0; i < count; ++i) own_.emplace_back(m, width, height);
+}
+
+const FixedTile* FixedLayers::find(int world, const View& view) {
+  FixedLayer* layer = own(world);
+  if (layer && layer->shows(view)) return layer->tiles();
+  return common_.shows(view) ? common_.tiles() : nullptr;
+}
+
+// Worlds that look different would take it from each other: one that has its own leaves it alone.
+FixedTile* FixedLayers::settle_common(int world, const View& view) {
+  FixedLayer* layer = own(world);
+  if (layer && layer->shows(view)) return nullptr;
+  return common_.settles(view) ? common_.tiles() : nullptr;
+}
+
+FixedTile* FixedLayers::settle(int world, const View& view) {
+  FixedLayer* layer = own(world);
+  return layer && layer->settles(view) ? layer->tiles() : nullptr;
 }
 
 }  // namespace mjsense

@@ -45,14 +45,14 @@ std::string room(Rng& rng) {
 
 struct Camera {
   std::unique_ptr<Sensor> sensor;
-  explicit Camera(const mjModel* model, int num_worlds = 1, int threads = 1) {
+  explicit Camera(const mjModel* model, int num_worlds = 1, int threads = 1, bool shadows = true) {
     CameraSensorCfg cfg;
     cfg.name = "cam";
     cfg.camera_name = "c";
     cfg.width = 75;
     cfg.height = 50;
-    cfg.data_types = {"rgb", "depth", "segmentation"};
-    cfg.use_shadows = true;
+    cfg.data_types = {"rgb", "depth", "segmentation", "normals"};
+    cfg.use_shadows = shadows;
     sensor = cfg.build();
     SensorInit init;
     init.model = model;
@@ -62,7 +62,18 @@ struct Camera {
   }
 };
 
-// All bytes of the image of world 0.
+// All bytes of a world's image.
+std::vector<std::uint8_t> bytes_of(Camera& camera, int world) {
+  std::vector<std::uint8_t> bytes;
+  for (const char* field : {"rgb", "depth", "segmentation", "normals"}) {
+    const Array& data = camera.sensor->field(field).data;
+    const auto* p = reinterpret_cast<const std::uint8_t*>(data.row_data(world));
+    bytes.insert(bytes.end(), p, p + data.row_bytes());
+  }
+  return bytes;
+}
+
+// Of world 0.
 std::vector<std::uint8_t> image(Camera& camera, const testing::TestModel& m, RayScene& rays,
                                 ThreadPool& pool) {
   mj_forward(m.model, m.data);
@@ -70,13 +81,7 @@ std::vector<std::uint8_t> image(Camera& camera, const testing::TestModel& m, Ray
   camera.sensor->compute(m.world());
   const int id = 0;
   camera.sensor->cast({&rays, {&id, 1}, pool});
-  std::vector<std::uint8_t> bytes;
-  for (const char* field : {"rgb", "depth", "segmentation"}) {
-    const Array& data = camera.sensor->field(field).data;
-    const auto* p = reinterpret_cast<const std::uint8_t*>(data.row_data(0));
-    bytes.insert(bytes.end(), p, p + data.row_bytes());
-  }
-  return bytes;
+  return bytes_of(camera, id);
 }
 
 TEST(FixedLayer, ChangesNoBitOfAnyImage) {
@@ -85,7 +90,8 @@ TEST(FixedLayer, ChangesNoBitOfAnyImage) {
     testing::TestModel m(room(rng));
     RayScene rays(m.model, 1);
     ThreadPool pool(1 + scene % 3);
-    Camera keeps(m.model, 1, 1 + scene % 3);
+    const bool shadows = scene != 3;
+    Camera keeps(m.model, 1, 1 + scene % 3, shadows);
     const int box = m.model->ngeom - 3, light = 1;
     const std::vector<std::function<void()>> changes = {
         [] {},
@@ -114,9 +120,48 @@ TEST(FixedLayer, ChangesNoBitOfAnyImage) {
     };
     for (std::size_t i = 0; i < changes.size(); ++i) {
       changes[i]();
-      Camera fresh(m.model, 1, 1 + scene % 3);
+      Camera fresh(m.model, 1, 1 + scene % 3, shadows);
       EXPECT_EQ(image(keeps, m, rays, pool), image(fresh, m, rays, pool))
           << "scene " << scene << " image " << i;
+    }
+  }
+}
+
+// Worlds that look different (their lamps, floors and cameras are their own) keep a layer each, on one
+// thread and on several, whichever of them are asked for an image.
+TEST(FixedLayer, WorldsThatLookDifferentHaveTheirOwn) {
+  constexpr int kWorlds = 6;
+  const std::vector<std::vector<int>> casts = {
+      {0, 1, 2, 3, 4, 5}, {0, 1, 2, 3, 4, 5}, {0, 1, 2, 3, 4, 5}, {4}, {0, 1, 2, 3, 4, 5}, {1, 4},
+      {0, 1, 2, 3, 4, 5}};
+  for (int threads : {1, 3}) {
+    std::vector<std::unique_ptr<testing::TestModel>> worlds;
+    for (int i = 0; i < kWorlds; ++i) {
+      Rng rng(5, 0, 1, 0);
+      worlds.push_back(std::make_unique<testing::TestModel>(room(rng)));
+      mjModel* m = worlds.back()->model;
+      m->light_pos[3] += 0.2 * i;
+      m->cam_pos[0] += 0.1 * i;
+      m->geom_rgba[0] = 0.1f * i;
+    }
+    RayScene rays(worlds[0]->model, kWorlds);
+    ThreadPool pool(threads);
+    Camera keeps(worlds[0]->model, kWorlds, threads);
+    for (std::size_t i = 0; i < casts.size(); ++i) {
+      Camera fresh(worlds[0]->model, kWorlds, threads);
+      for (int id : casts[i]) {
+        testing::TestModel& m = *worlds[id];
+        m.data->qpos[0] += 0.05;
+        if (i == 3) m.model->light_pos[4] += 0.3;  // an episode begins
+        mj_forward(m.model, m.data);
+        rays.update(m.world(id));
+        keeps.sensor->compute(m.world(id));
+        fresh.sensor->compute(m.world(id));
+      }
+      keeps.sensor->cast({&rays, casts[i], pool});
+      fresh.sensor->cast({&rays, casts[i], pool});
+      for (int id : casts[i])
+        EXPECT_EQ(bytes_of(keeps, id), bytes_of(fresh, id)) << "cast " << i << " world " << id;
     }
   }
 }

@@ -56,6 +56,7 @@ std::shared_ptr<const Look> look_of(const SensorInit& init, bool meshes, bool te
 // tiles are divided among the threads. Many small ones: a view a thread.
 struct CameraSensor::Workspace {
   std::vector<ViewBuilder> builders;
+  std::vector<FixedTile*> making;  // by builder: what is made of its view before the image
   std::vector<TileMemory> memory;  // by thread
   RenderTiles render = best_render_tiles();
 };
@@ -144,12 +145,13 @@ void CameraSensor::initialize(const SensorInit& init) {
       std::max(init.threads, std::min(init.num_worlds, kImagesPerThread * init.threads));
   workspace_ = std::make_unique<Workspace>();
   workspace_->builders.reserve(slots);
-  fixed_layer_.reset();
-  if (rgb_ && cfg_.use_shadows && cfg_.samples == 1 && FixedLayer::possible(model_, camera_))
-    fixed_layer_ = std::make_unique<FixedLayer>(model_, cfg_.width, cfg_.height);
+  workspace_->making.resize(slots);
+  fixed_layers_.reset();
+  if (rgb_ && cfg_.samples == 1 && FixedLayer::possible(model_, camera_))
+    fixed_layers_ = std::make_unique<FixedLayers>(model_, cfg_.width, cfg_.height, init.num_worlds);
   ViewOptions options = view_options(cfg_, near_);
   options.markers = markers;
-  options.layered = fixed_layer_ != nullptr;
+  options.layered = fixed_layers_ != nullptr;
   for (int i = 0; i < slots; ++i) workspace_->builders.emplace_back(model_, *look_, options);
   const int geoms = static_cast<int>(ViewBuilder::max_geoms(model_) + markers);
   for (int i = 0; i < init.threads; ++i) workspace_->memory.emplace_back(geoms);
@@ -275,19 +277,27 @@ const View& CameraSensor::build_view(const RayScene& rays, int world, ViewBuilde
   const PerWorld& w = worlds_[world];
   const View& view = builder.build(state, rays.shared(), w.appearance, w.markers.all(), camera.pos,
                                    camera.mat, w.grid);
-  if (fixed_layer_ && fixed_layer_->shows(view)) builder.use_fixed(fixed_layer_->tiles());
+  if (fixed_layers_) builder.use_fixed(fixed_layers_->find(world, view));
   return view;
 }
 
-// One world is asked for all: those that look different are drawn without the layer.
-void CameraSensor::update_fixed_layer(const CastContext& context, int tile_rows) {
-  const View& view = build_view(*context.rays, due_[0], workspace_->builders[0]);
-  if (!fixed_layer_->settles(view)) return;
-  ImageTargets tiles;
-  tiles.fixed = fixed_layer_->tiles();
-  context.pool.run(tile_rows, [&](int row, int thread) {
-    workspace_->render(view, tiles, row, row + 1, workspace_->memory[thread].scratch());
-  });
+void CameraSensor::make_fixed(const View& view, FixedTile* tiles, int first, int last, int thread) {
+  ImageTargets targets;
+  targets.fixed = tiles;
+  workspace_->render(view, targets, first, last, workspace_->memory[thread].scratch());
+}
+
+void CameraSensor::settle_common_layer(const CastContext& context, int tile_rows) {
+  const int world = due_[0];
+  const View& view = build_view(*context.rays, world, workspace_->builders[0]);
+  FixedTile* tiles = fixed_layers_->settle_common(world, view);
+  if (!tiles) return;
+  context.pool.run(tile_rows,
+                   [&](int row, int thread) { make_fixed(view, tiles, row, row + 1, thread); });
+}
+
+FixedTile* CameraSensor::settle_layer(int world, const View& view) {
+  return fixed_layers_ && !view.fixed ? fixed_layers_->settle(world, view) : nullptr;
 }
 
 void CameraSensor::cast(const CastContext& context) {
@@ -340,22 +350,42 @@ void CameraSensor::render_due(const CastContext& context) {
   const int tile_rows = (cfg_.height + kTileSize - 1) / kTileSize;
   const int threads = context.pool.size();
   Workspace& work = *workspace_;
-  if (fixed_layer_ && count > 0) update_fixed_layer(context, tile_rows);
+  if (fixed_layers_ && count > 0) settle_common_layer(context, tile_rows);
   if (threads == 1 || count >= kImagesPerThread * threads) {
     context.pool.run(count, [&](int item, int thread) {
-      const View& view = build_view(rays, due_[item], work.builders[thread]);
+      ViewBuilder& builder = work.builders[thread];
+      const View& view = build_view(rays, due_[item], builder);
+      if (FixedTile* tiles = settle_layer(due_[item], view)) {
+        make_fixed(view, tiles, 0, tile_rows, thread);
+        builder.use_fixed(tiles);
+      }
       render_rows(view, due_[item], 0, tile_rows, thread);
     });
-  } else {
-    const int bands = std::clamp(kBandsPerThread * threads / std::max(count, 1), 1, tile_rows);
-    context.pool.run(count,
-                     [&](int item, int) { build_view(rays, due_[item], work.builders[item]); });
+    return;
+  }
+  const int bands = std::clamp(kBandsPerThread * threads / std::max(count, 1), 1, tile_rows);
+  // body(image, first row of tiles, one beyond the last, thread)
+  const auto run_bands = [&](auto body) {
     context.pool.run(count * bands, [&](int item, int thread) {
       const int image = item / bands, band = item % bands;
-      render_rows(work.builders[image].view(), due_[image], band * tile_rows / bands,
-                  (band + 1) * tile_rows / bands, thread);
+      body(image, band * tile_rows / bands, (band + 1) * tile_rows / bands, thread);
     });
+  };
+  context.pool.run(count, [&](int item, int) {
+    work.making[item] = settle_layer(due_[item], build_view(rays, due_[item], work.builders[item]));
+  });
+  const auto making = std::span(work.making).first(count);
+  if (std::ranges::any_of(making, [](FixedTile* tiles) { return tiles != nullptr; })) {
+    run_bands([&](int image, int first, int last, int thread) {
+      if (making[image])
+        make_fixed(work.builders[image].view(), making[image], first, last, thread);
+    });
+    for (int i = 0; i < count; ++i)
+      if (making[i]) work.builders[i].use_fixed(making[i]);
   }
+  run_bands([&](int image, int first, int last, int thread) {
+    render_rows(work.builders[image].view(), due_[image], first, last, thread);
+  });
 }
 
 }  // namespace mjsense

@@ -65,7 +65,11 @@ class CameraSensor final : public Sensor {
   void derive(int world, const ImageTargets& image, int first, int last);
   // Rows of tiles [first, last) of an image and what is computed from them.
   void render_rows(const View& view, int world, int first, int last, int thread);
-  void update_fixed_layer(const CastContext& context, int tile_rows);
+  // Draws rows of tiles [first, last) of what of a view stands still.
+  void make_fixed(const View& view, FixedTile* tiles, int first, int last, int thread);
+  void settle_common_layer(const CastContext& context, int tile_rows);
+  // Tiles of the world's own that are to be made first; null: none.
+  FixedTile* settle_layer(int world, const View& view);
   const View& build_view(const RayScene& rays, int world, ViewBuilder& builder) const;
 
   CameraSensorCfg cfg_;
@@ -79,7 +83,7 @@ class CameraSensor final : public Sensor {
   std::shared_ptr<const Look> look_;
   std::unique_ptr<GlRenderer> gl_;  // renderer "opengl"
   std::unique_ptr<Workspace> workspace_;
-  std::unique_ptr<FixedLayer> fixed_layer_;    // null: it would not pay, or the camera moves
+  std::unique_ptr<FixedLayers> fixed_layers_;  // null: it would not pay, or the camera moves
   std::unique_ptr<OpticalFlow> optical_flow_;  // null: not wanted
   std::unique_ptr<PixelOwners> owners_;        // the same
   Field *rgb_ = nullptr, *depth_ = nullptr, *segmentation_ = nullptr, *bodies_ = nullptr,
