@@ -99,9 +99,11 @@ std::shared_ptr<const MeshGeometry> mesh_geometry(std::span<const float> vertice
     if (faces.empty()) return made;
     made->device = ray_device();
     made->scene = build_triangles(made->device.get(), vertices, faces);
-    if (clusters)
+    if (clusters) {
       made->clusters =
           build_clusters(vertices.data(), faces.data(), static_cast<int>(faces.size() / 3));
+      made->horizons = std::make_unique<Horizons>(made->clusters);
+    }
     return made;
   });
 }

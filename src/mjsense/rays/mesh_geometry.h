@@ -10,6 +10,7 @@
 
 #include "mjsense/rays/clusters.h"
 #include "mjsense/rays/embree.h"
+#include "mjsense/rays/horizons.h"
 
 namespace mjsense {
 
@@ -36,9 +37,10 @@ SceneHandle build_triangles(RTCDevice device, std::span<const float> vertices,
 
 struct MeshGeometry {
   std::shared_ptr<RTCDeviceTy> device;
-  SceneHandle scene;           // null without faces
-  Clusters clusters;           // empty unless wanted
-  std::array<float, 6> box{};  // around all vertices: center, half
+  SceneHandle scene;                   // null without faces
+  Clusters clusters;                   // empty unless wanted
+  std::unique_ptr<Horizons> horizons;  // null: the same
+  std::array<float, 6> box{};          // around all vertices: center, half
 };
 
 // Of these vertices [n, 3] (m) and faces [m, 3]; `clusters`: for images, too.

@@ -36,6 +36,10 @@ struct SharedGeometry {
   // For images; null if the model has no camera.
   const Clusters* clusters_of_mesh(int id) const { return clusters(meshes, id); }
   const Clusters* clusters_of_height_field(int id) const { return clusters(surfaces, id); }
+  const Horizons* horizons_of_mesh(int id) const { return meshes[id]->horizons.get(); }
+  const Horizons* horizons_of_height_field(int id) const {
+    return clusters_of_height_field(id) ? surfaces[id]->horizons.get() : nullptr;
+  }
 
  private:
   static const Clusters* clusters(const std::vector<std::shared_ptr<const MeshGeometry>>& all,

@@ -21,10 +21,6 @@ struct alignas(64) Drawn {
   float nearest[kClusterSize], farthest[kClusterSize];  // planar depth of the corners
 };
 
-inline Vec3f cross(Vec3f a, Vec3f b) {
-  return {fma(a.y, b.z, -(a.z * b.y)), fma(a.z, b.x, -(a.x * b.z)), fma(a.x, b.y, -(a.y * b.x))};
-}
-
 inline void store(float (*p)[kClusterSize], int k, Vec3f v) {
   store(p[0] + k, v.x);
   store(p[1] + k, v.y);

@@ -46,6 +46,10 @@ inline Float splat(float x) { return Float(x); }
 
 inline Vec3f splat(const float* p) { return {splat(p[0]), splat(p[1]), splat(p[2])}; }
 
+inline Vec3f cross(Vec3f a, Vec3f b) {
+  return {fma(a.y, b.z, -(a.z * b.y)), fma(a.z, b.x, -(a.x * b.z)), fma(a.x, b.y, -(a.y * b.x))};
+}
+
 // Where the pixels of a packet hit, camera frame; of lanes without a hit any number.
 inline Vec3f hit_point(const View& view, const Pixels& pixels, const Hits& hits, int k) {
   const Float t = load(hits.t + k), x = load(pixels.x + k), y = load(pixels.y + k);

@@ -159,9 +159,10 @@ inline std::uint32_t dark_lanes(const View& view, int index, const Lit& lit, con
   if (shadows.known) dark |= shadows.known->dark[index][shadows.packet] & shadows.fixed_lanes;
   const std::uint32_t active = reachable & lanes & ~dark;
   if (!active || shadows.fixed[index].count + shadows.moving[index].count == 0) return dark;
-  __builtin_memcpy(rays.p, s.p, sizeof rays.p);
-  __builtin_memcpy(rays.n, s.n, sizeof rays.n);
-  __builtin_memcpy(rays.geom, hits.geom, sizeof rays.geom);
+  rays.p = s.p;
+  rays.n = s.n;
+  rays.geom = hits.geom;
+  rays.face = hits.prim;
   dark |= in_shadow(view, shadows.fixed[index], rays, active & ~shadows.fixed_lanes);
   return dark | in_shadow(view, shadows.moving[index], rays, active & ~dark);
 }

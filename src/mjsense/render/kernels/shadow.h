@@ -3,15 +3,18 @@
 // What lies between a point and a light. Part of the tile kernels.
 
 #include "mjsense/render/kernels/casters.h"
+#include "mjsense/render/kernels/horizon.h"
 
 namespace mjsense {
 namespace {
 
 // Points to be lit, camera frame, and the way to the light: q = p + s d, s in (0, end).
 struct alignas(64) LightRays {
-  float p[3][kLanes], d[3][kLanes], n[3][kLanes];
+  const float (*p)[kLanes];
+  const float (*n)[kLanes];  // the surface's normals
+  const int *geom, *face;    // of Hits
+  float d[3][kLanes];
   float end[kLanes];  // 1 for a light at a place; how far it is for a direction
-  int geom[kLanes];
 };
 
 // Rays from on or above a height field that climb more steeply than it does anywhere: they do not
@@ -21,26 +24,30 @@ inline Mask leaves_ground(const HeightField& field, Vec3f o, Vec3f d, Mask on_gr
   return (on_ground | (splat(field.top) <= o.z)) & (level * splat(1.01f * field.steepest) < d.z);
 }
 
-inline std::uint32_t shadow_of_triangles(const ViewGeom& g, int index, const LightRays& rays,
+inline std::uint32_t shadow_of_triangles(const View& view, int index, const LightRays& rays,
                                          std::uint32_t active) {
+  const ViewGeom& g = view.geoms[index];
+  const bool has_horizons = g.horizons && !view.grid.orthographic;
   EmbreeRays ray;
   alignas(64) int valid[kWidth];
   std::uint32_t dark = 0;
   for (int k = 0; k < kLanes; k += kWidth) {
     const Vec3f p{load(rays.p[0] + k), load(rays.p[1] + k), load(rays.p[2] + k)};
     const Vec3f d = to_geom(g.rot, {load(rays.d[0] + k), load(rays.d[1] + k), load(rays.d[2] + k)});
-    Vec3f o = to_geom(g.rot, p - splat(g.pos));
+    const Vec3f foot = to_geom(g.rot, p - splat(g.pos));
     // A surface must not lie in its own shadow by rounding: start a little above it.
     const Int same = load(rays.geom + k);
     const Mask other = ~(same == int_of(index));
     const Vec3f n = to_geom(g.rot, {load(rays.n[0] + k), load(rays.n[1] + k), load(rays.n[2] + k)});
     const Float lift = select(other, splat(0.0f), splat(1e-4f) * max(splat(g.radius), abs(p.z)));
-    o = along(o, lift, n);
+    const Vec3f o = along(foot, lift, n);
     const Interval inside = box(o, d, g.box, g.box + 3);
     const Float end = load(rays.end + k);
     Mask hit =
         mask_of(active >> k & kAllLanes) & (inside.enter < end) & (inside.exit > splat(0.0f));
     if (g.height_field) hit = hit & ~leaves_ground(*g.height_field, o, d, ~other);
+    if (has_horizons && any(hit & ~other))
+      hit = hit & ~leaves_mesh(g, rays.face + k, foot, n, d, lift, hit & ~other);
     if (!any(hit)) continue;
     store(valid, select(hit, int_of(-1), int_of(0)));
     // What was not hit, the sky, lies at infinity, which Embree must not be given.
@@ -65,7 +72,7 @@ inline std::uint32_t shadow_of_triangles(const ViewGeom& g, int index, const Lig
 inline std::uint32_t shadow_of_geom(const View& view, int caster, const LightRays& rays,
                                     std::uint32_t active) {
   const ViewGeom& g = view.geoms[caster];
-  if (g.bvh) return shadow_of_triangles(g, caster, rays, active);
+  if (g.bvh) return shadow_of_triangles(view, caster, rays, active);
   std::uint32_t dark = 0;
   for (int k = 0; k < kLanes; k += kWidth) {
     const std::uint32_t lanes = active >> k & kAllLanes;

@@ -13,6 +13,7 @@ namespace mjsense {
 
 struct Clusters;
 struct HeightField;
+class Horizons;
 
 // Rays of pixels. Pixel (x, y), row 0 at the top, sees along (X, Y, -1) from the origin, with X =
 // left + dx (x + 0.5) and Y = top + dy (y + 0.5); an orthographic one along (0, 0, -1) from (X, Y,
@@ -55,6 +56,7 @@ struct alignas(64) ViewGeom {
                 // segmentation
   void* bvh;    // RTCScene of a mesh, a height field's surface, a flex, a skin; else null
   const Clusters* clusters;  // the same triangles to be drawn; null: rays only
+  const Horizons* horizons;  // of its faces; null without clusters
   const MeshLook* mesh;
   const HeightField* height_field;
   Surface surface;

@@ -34,6 +34,7 @@ void set_primitive(int type, int object, int object_id, ViewGeom& g) {
   g.object_id = object_id;
   g.bvh = nullptr;
   g.clusters = nullptr;
+  g.horizons = nullptr;
   g.mesh = nullptr;
   g.height_field = nullptr;
 }
@@ -249,10 +250,12 @@ void ViewBuilder::set_shape(const RayWorld& world, const SharedGeometry& shapes,
     g.bvh = shapes.mesh_scenes[source.data];
     g.mesh = look_->mesh(source.data);
     g.clusters = shapes.clusters_of_mesh(source.data);
+    g.horizons = shapes.horizons_of_mesh(source.data);
   } else if (g.type == mjGEOM_HFIELD) {
     g.height_field = &shapes.height_fields[source.data];
     g.bvh = g.height_field->scene;
     g.clusters = shapes.clusters_of_height_field(source.data);
+    g.horizons = shapes.horizons_of_height_field(source.data);
   } else if (g.type == kFlexType) {
     const int part = g.id - world.num_geoms();
     const FlexShapes::Part& shape = world.flexes()->parts()[part];

@@ -1,0 +1,165 @@
+// SPDX-License-Identifier: Apache-2.0
+// Rays that are said to leave a mesh for good meet none of its triangles.
+
+#include "mjsense/render/kernels/horizon.h"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <vector>
+
+#include "mjsense/core/rng.h"
+#include "mjsense/rays/mesh_geometry.h"
+
+namespace mjsense {
+namespace {
+
+struct Mesh {
+  std::vector<float> vertices;
+  std::vector<int> faces;
+
+  void add(std::initializer_list<float> corners) {
+    for (int i = 0; i < 3; ++i) faces.push_back(static_cast<int>(vertices.size() / 3) + i);
+    vertices.insert(vertices.end(), corners);
+  }
+  const float* corner(int face, int i) const { return vertices.data() + 3 * faces[3 * face + i]; }
+  int size() const { return static_cast<int>(faces.size() / 3); }
+};
+
+struct Found {
+  double sine = 2, normal[3] = {};  // 2: no ray is known to be clear
+};
+
+Found horizon(const Mesh& mesh, int face) {
+  const auto geometry = mesh_geometry(mesh.vertices, mesh.faces, true);
+  const float* h = geometry->box.data() + 3;
+  const FaceHorizon found = find_horizon(geometry->clusters, geometry->horizons->place(face),
+                                         std::hypot(h[0], h[1], h[2]));
+  const double size = std::hypot(found.clear[0], found.clear[1], found.clear[2]);
+  Found out;
+  if (size < 1e-20) return out;
+  out.sine = 1 / size;
+  for (int k = 0; k < 3; ++k) out.normal[k] = found.clear[k] / size;
+  return out;
+}
+
+// A floor triangle, and a wall 2 m away that rises 1 m: seen from where the floor is nearest, a slope
+// of one half.
+TEST(Horizon, OfAWallIsItsHeightOverItsDistance) {
+  Mesh mesh;
+  mesh.add({0, 0, 0, 1, 0, 0, 0, 1, 0});
+  EXPECT_NEAR(horizon(mesh, 0).sine, 2e-3, 1e-6);  // nothing rises
+  mesh.add({3, -5, 0, 3, 5, 0, 3, 5, 1});
+  mesh.add({3, -5, 0, 3, 5, 1, 3, -5, 1});
+  EXPECT_NEAR(horizon(mesh, 0).sine, 0.5 / std::hypot(1, 0.5) + 2e-3, 1e-5);
+  mesh.add({3, -5, -9, 3, 5, -9, 3, 5, -7});  // below the floor
+  EXPECT_NEAR(horizon(mesh, 0).sine, 0.5 / std::hypot(1, 0.5) + 2e-3, 1e-5);
+  mesh.add({0.3f, 0.2f, 1, 0.5f, 0.2f, 1, 0.3f, 0.4f, 1});  // above it
+  EXPECT_EQ(horizon(mesh, 0).sine, 2);
+}
+
+// Two faces that share an edge, and a third that touches their common corner only.
+TEST(Horizon, OfANeighbourIsTheAngleBetweenThem) {
+  for (double angle : {-0.7, 0.0, 0.2, 0.6}) {
+    const float c = static_cast<float>(std::cos(angle)), s = static_cast<float>(std::sin(angle));
+    Mesh mesh;
+    mesh.add({0, 0, 0, 1, 0, 0, 0, 1, 0});
+    mesh.add({0, 1, 0, -c, 0.5f, s, 0, 0, 0});
+    EXPECT_NEAR(horizon(mesh, 0).sine, std::max(0.0, std::sin(angle)) + 2e-3, 1e-5) << angle;
+    mesh.add({0, 0, 0, -c, -1, s, -1e-3f * c, -1, 1e-3f * s});
+    EXPECT_LE(horizon(mesh, 0).sine, std::max(0.0, std::sin(angle)) + 2.1e-3) << angle;
+  }
+}
+
+bool meets(const float* const corners[3], const double o[3], const double d[3]) {
+  double a[3], b[3], p[3], s[3], q[3];
+  for (int k = 0; k < 3; ++k) {
+    a[k] = corners[1][k] - corners[0][k];
+    b[k] = corners[2][k] - corners[0][k];
+    s[k] = o[k] - corners[0][k];
+  }
+  const auto cross = [](const double* x, const double* y, double* z) {
+    for (int k = 0; k < 3; ++k)
+      z[k] = x[(k + 1) % 3] * y[(k + 2) % 3] - x[(k + 2) % 3] * y[(k + 1) % 3];
+  };
+  const auto dot = [](const double* x, const double* y) {
+    return x[0] * y[0] + x[1] * y[1] + x[2] * y[2];
+  };
+  cross(d, b, p);
+  const double det = dot(a, p);
+  if (det == 0) return false;
+  const double u = dot(s, p) / det;
+  cross(s, a, q);
+  const double v = dot(d, q) / det;
+  return u >= 0 && v >= 0 && u + v <= 1 && dot(b, q) / det > 0;
+}
+
+// Rough balls with dents, and loose triangles around them: rays begin a little above a point of a face
+// and are as low as they may be.
+TEST(Horizon, RaysAboveItAreClear) {
+  int clear = 0, low = 0;
+  for (int scene = 0; scene < 6; ++scene) {
+    Rng rng(3, 0, 1, scene);
+    constexpr int n = 14;
+    Mesh mesh;
+    std::vector<float> radius;
+    for (int i = 0; i < n * n; ++i)
+      radius.push_back(static_cast<float>(1 + rng.uniform(-0.08, 0.08) * (scene % 3)));
+    const auto point = [&](int i, int j, float out[3]) {
+      const double theta = M_PI * (i + 0.5) / n, phi = 2 * M_PI * (j % n) / n;
+      const float r = radius[i * n + j % n] * (scene == 5 && j % n < 3 ? 0.5f : 1.0f);
+      out[0] = r * static_cast<float>(std::sin(theta) * std::cos(phi));
+      out[1] = r * static_cast<float>(std::sin(theta) * std::sin(phi));
+      out[2] = r * static_cast<float>(std::cos(theta));
+    };
+    for (int i = 0; i + 1 < n; ++i)
+      for (int j = 0; j < n; ++j) {
+        float a[3], b[3], c[3], d[3];
+        point(i, j, a), point(i + 1, j, b), point(i + 1, j + 1, c), point(i, j + 1, d);
+        mesh.add({a[0], a[1], a[2], b[0], b[1], b[2], c[0], c[1], c[2]});
+        mesh.add({a[0], a[1], a[2], c[0], c[1], c[2], d[0], d[1], d[2]});
+      }
+    for (int i = 0; i < 10 * (scene % 2); ++i) {
+      std::vector<float> x;
+      for (int k = 0; k < 9; ++k) x.push_back(static_cast<float>(rng.uniform(-1.5, 1.5)));
+      mesh.add({x[0], x[1], x[2], x[3], x[4], x[5], x[6], x[7], x[8]});
+    }
+    for (int face = 0; face < mesh.size(); face += 5) {
+      const Found found = horizon(mesh, face);
+      if (found.sine > 1) continue;
+      for (int ray = 0; ray < 40; ++ray) {
+        double u = rng.uniform(), v = rng.uniform();
+        if (u + v > 1) u = 1 - u, v = 1 - v;
+        double o[3], d[3], along = 0;
+        for (int k = 0; k < 3; ++k) {
+          const float* const c[3] = {mesh.corner(face, 0), mesh.corner(face, 1),
+                                     mesh.corner(face, 2)};
+          o[k] = c[0][k] + u * (c[1][k] - c[0][k]) + v * (c[2][k] - c[0][k]) +
+                 1.5e-4 * found.normal[k];
+          d[k] = rng.normal();
+          along += d[k] * found.normal[k];
+        }
+        for (int k = 0; k < 3; ++k) d[k] -= along * found.normal[k];
+        const double level = std::hypot(d[0], d[1], d[2]);
+        const auto look = [&](double sine) {
+          double up[3];
+          for (int k = 0; k < 3; ++k)
+            up[k] = std::sqrt(1 - sine * sine) * d[k] / level + sine * found.normal[k];
+          for (int f = 0; f < mesh.size(); ++f) {
+            const float* const c[3] = {mesh.corner(f, 0), mesh.corner(f, 1), mesh.corner(f, 2)};
+            if (meets(c, o, up)) return true;
+          }
+          return false;
+        };
+        EXPECT_FALSE(look(found.sine)) << "scene " << scene << " face " << face;
+        ++clear;
+        low += look(0.8 * found.sine - 0.05);
+      }
+    }
+  }
+  EXPECT_GT(clear, 9000);
+  EXPECT_GT(low, 100);  // and it is not much too high
+}
+
+}  // namespace
+}  // namespace mjsense

@@ -1,0 +1,233 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+// Which rays to a light leave the mesh that they begin on for good. Part of the tile kernels.
+//
+// Over a face with unit normal N, h(x) is the height of a point over its plane and e(x) how far it
+// lies beyond a line in that plane which the face is on one side of: along an edge, or through a
+// corner. For another triangle that is beyond the line, as far as it rises, h / e is largest at one
+// of its corners, for it is a quotient of linear functions; the least over the lines bounds how
+// steeply the triangle rises as the face sees it. The largest such slope of all triangles is the
+// face's horizon.
+
+#include "mjsense/rays/horizons.h"
+#include "mjsense/render/kernels/rays.h"
+
+namespace mjsense {
+namespace {
+
+// Slopes beyond count as walls: see leaves_mesh().
+constexpr float kSteepest = 1.2f;
+// Of the mesh's size: lower is no rise, and a corner that far on the wrong side of an edge is on it.
+constexpr float kFlat = 1e-6f;
+
+// A face as its neighbours are looked at: all relative to its first corner.
+struct Outlook {
+  static constexpr int kLines = 6;  // three along edges, three through corners
+  float origin[3], normal[3];
+  float sides[2][3];                   // to the other corners
+  float out[kLines][3], line[kLines];  // e(x) = out . x - line
+  float flat;                          // m
+  bool valid;
+
+  Outlook(const TriangleBlock& block, int lane, float size) : flat(kFlat * size) {
+    float c[3][3];
+    for (int i = 0; i < 3; ++i)
+      for (int k = 0; k < 3; ++k) c[i][k] = block.corners[i][k][lane];
+    const auto cross = [](const float* a, const float* b, float* out) {
+      for (int k = 0; k < 3; ++k) {
+        const int i = (k + 1) % 3, j = (k + 2) % 3;
+        out[k] = a[i] * b[j] - a[j] * b[i];
+      }
+    };
+    const auto make_unit = [](float* v) {
+      const float length = __builtin_sqrtf(v[0] * v[0] + v[1] * v[1] + v[2] * v[2]);
+      for (int k = 0; k < 3; ++k) v[k] /= length;
+      return length > 0;
+    };
+    float side[3][3];
+    for (int i = 0; i < 3; ++i)
+      for (int k = 0; k < 3; ++k) side[i][k] = c[(i + 1) % 3][k] - c[i][k];
+    cross(side[0], side[1], normal);
+    valid = make_unit(normal);
+    for (int i = 0; i < 3; ++i) {
+      cross(side[i], normal, out[i]);
+      valid = make_unit(out[i]) && valid;
+    }
+    for (int i = 0; i < 3; ++i) {  // through the corner from which edge i leads on
+      for (int k = 0; k < 3; ++k) out[3 + i][k] = out[i][k] + out[(i + 2) % 3][k];
+      valid = make_unit(out[3 + i]) && valid;
+    }
+    for (int i = 0; i < kLines; ++i) {
+      line[i] = 0;
+      for (int k = 0; k < 3; ++k) line[i] += out[i][k] * (c[i % 3][k] - c[0][k]);
+    }
+    for (int k = 0; k < 3; ++k) {
+      origin[k] = c[0][k];
+      for (int i = 0; i < 2; ++i) sides[i][k] = c[i + 1][k] - c[0][k];
+    }
+  }
+};
+
+// Children of a node in which something may rise more steeply than `slope`.
+inline std::uint32_t rising(const Outlook& from, const ClusterNode& node, float slope) {
+  std::uint32_t out = 0;
+  for (int k = 0; k < kClusterSize; k += kWidth) {
+    const Vec3f half{load(node.half[0] + k), load(node.half[1] + k), load(node.half[2] + k)};
+    const Vec3f center =
+        Vec3f{load(node.center[0] + k), load(node.center[1] + k), load(node.center[2] + k)} -
+        splat(from.origin);
+    const auto reach = [&](const float* n) {
+      return fma(abs(splat(n[0])), half.x,
+                 fma(abs(splat(n[1])), half.y, abs(splat(n[2])) * half.z));
+    };
+    const Float top = dot(splat(from.normal), center) + reach(from.normal);
+    Float away = splat(0.0f);
+    for (int i = 0; i < Outlook::kLines; ++i)
+      away = max(away, dot(splat(from.out[i]), center) - reach(from.out[i]) - splat(from.line[i]));
+    out |= bits((splat(from.flat) < top) & (splat(slope) * away < top)) << k;
+  }
+  return out & ((1u << node.count) - 1);
+}
+
+// The line that a block is beyond farthest, by its first corner.
+inline int farthest_line(const Outlook& from, const TriangleBlock& block) {
+  int best = 0;
+  float most = -kInfinity;
+  for (int i = 0; i < Outlook::kLines; ++i) {
+    float e = -from.line[i];
+    for (int k = 0; k < 3; ++k) e += from.out[i][k] * (block.corners[0][k][0] - from.origin[k]);
+    if (e > most) best = i;
+    most = e > most ? e : most;
+  }
+  return best;
+}
+
+// The steepest rise among the triangles of a block, or `slope` if that is steeper; infinity where one is
+// not beyond any line.
+inline float steepest_of(const Outlook& from, const TriangleBlock& block, float slope) {
+  const Float zero = splat(0.0f), flat = splat(from.flat), endless = splat(kInfinity);
+  const int first = farthest_line(from, block);
+  Float most = splat(slope);
+  for (int k = 0; k < kClusterSize; k += kWidth) {
+    Vec3f x[3];
+    Float h[3];
+    Mask tall[3];
+    for (int j = 0; j < 3; ++j) {
+      x[j] = Vec3f{load(block.corners[j][0] + k), load(block.corners[j][1] + k),
+                   load(block.corners[j][2] + k)} -
+             splat(from.origin);
+      h[j] = dot(splat(from.normal), x[j]);
+      tall[j] = flat < h[j];
+    }
+    const Mask rises = tall[0] | tall[1] | tall[2];
+    if (!any(rises)) continue;
+    Mask crosses[3];  // does the side to the next corner pass the height at which rising begins?
+    Float at[3];      // where
+    for (int j = 0; j < 3; ++j) {
+      const int n = (j + 1) % 3;
+      crosses[j] = (tall[j] & ~tall[n]) | (tall[n] & ~tall[j]);
+      at[j] = (flat - h[j]) / (h[n] - h[j]);
+    }
+    Float least = endless;
+    const auto look_beyond = [&](Vec3f out, Float line) {
+      Float e[3], rise = zero;
+      for (int j = 0; j < 3; ++j) e[j] = dot(out, x[j]) - line;
+      for (int j = 0; j < 3; ++j) {
+        const Float here = select(zero < e[j], h[j] / e[j], endless);
+        rise = max(rise, select(tall[j], here, zero));
+        const Float begins = fma(at[j], e[(j + 1) % 3] - e[j], e[j]);
+        rise = select(crosses[j] & (begins < -flat), endless, rise);
+      }
+      least = min(least, rise);
+    };
+    for (int n = 0; n < Outlook::kLines && any(rises & (most < least)); ++n) {
+      const int i = (first + n) % Outlook::kLines;
+      look_beyond(splat(from.out[i]), splat(from.line[i]));
+    }
+    if (any(rises & (most < least))) {  // along the triangle's own foot
+      const Vec3f n = cross(x[1] - x[0], x[2] - x[0]), up = splat(from.normal);
+      Vec3f out = along(n, -dot(n, up), up);
+      const Float away = dot(out, x[0]) + dot(out, x[1]) + dot(out, x[2]);
+      const Float size = dot(out, out);
+      const Mask known = splat(1e-6f) * dot(n, n) < size;  // not as good as parallel to the face
+      const Float sign =
+          select(known, select(away < zero, splat(-1.0f), splat(1.0f)) / sqrt(size), zero);
+      out = {sign * out.x, sign * out.y, sign * out.z};
+      const Float line =
+          max(zero, max(dot(out, splat(from.sides[0])), dot(out, splat(from.sides[1]))));
+      look_beyond(out, line);
+    }
+    most = max(most, select(rises, least, zero));
+  }
+  return lane_max(most);
+}
+
+inline FaceHorizon find_horizon(const Clusters& clusters, int place, float size) {
+  const Outlook from(clusters.blocks[place / kClusterSize], place % kClusterSize, size);
+  if (!from.valid) return kNoHorizon;
+  int waiting[Clusters::kMaxWaiting];
+  int left = 1;
+  waiting[0] = 0;
+  // Its neighbours first: what they hide need not be looked at.
+  float slope = steepest_of(from, clusters.blocks[place / kClusterSize], 0);
+  if (slope > kSteepest) return kNoHorizon;
+  while (left) {
+    const ClusterNode& node = clusters.nodes[waiting[--left]];
+    for (std::uint32_t near = rising(from, node, slope); near; near &= near - 1) {
+      const int child = node.child[__builtin_ctz(near)];
+      if (child >= 0) {
+        waiting[left++] = child;
+        continue;
+      }
+      slope = steepest_of(from, clusters.blocks[~child], slope);
+      if (slope > kSteepest) return kNoHorizon;
+    }
+  }
+  FaceHorizon out = {};
+  const float sine = slope / __builtin_sqrtf(1 + slope * slope) + 2e-3f;
+  for (int k = 0; k < 3; ++k) {
+    out.clear[k] = from.normal[k] / sine;
+    out.offset += out.clear[k] * from.origin[k];
+  }
+  return out;
+}
+
+inline FaceHorizon horizon_of(const ViewGeom& g, int face) {
+  FaceHorizon horizon;
+  if (g.horizons->get(face, horizon)) return horizon;
+  horizon = find_horizon(*g.clusters, g.horizons->place(face), g.radius);
+  g.horizons->set(face, horizon);
+  return horizon;
+}
+
+// Lanes of `own` whose rays never meet the mesh of `g`, on whose faces they begin: at `foot` lifted by
+// `lift` (m) along `normal`, towards d; geom frame.
+//
+// Let the point be at most q from the face, L the lift, c and s cosine and sine of the angle between
+// the two normals. The ray begins at a height of at least L c - q and at most L s + q / facing
+// sideways from the face (which is seen under an angle with the cosine `facing`), so it is over what
+// rises with a slope of (L c - q) / (L s + q / facing) and less: 1.3 for what is asked for below.
+inline Mask leaves_mesh(const ViewGeom& g, const int* faces, Vec3f foot, Vec3f normal, Vec3f d,
+                        Float lift, Mask own) {
+  alignas(64) float clear[3][kWidth] = {}, offset[kWidth] = {};
+  for (std::uint32_t lanes = bits(own); lanes; lanes &= lanes - 1) {
+    const int i = __builtin_ctz(lanes);
+    if (faces[i] < 0) continue;  // a wall of a height field
+    const FaceHorizon horizon = horizon_of(g, faces[i]);
+    for (int k = 0; k < 3; ++k) clear[k][i] = horizon.clear[k];
+    offset[i] = horizon.offset;
+  }
+  const Vec3f n{load(clear[0]), load(clear[1]), load(clear[2])};
+  const Float rise = dot(d, n);
+  const Mask steep = (splat(0.0f) < rise) & (dot(d, d) < rise * rise);
+  if (!any(own & steep)) return mask_of(0);
+  const Vec3f from = splat(g.eye) - foot;
+  const Float size = sqrt(dot(n, n));
+  const Float facing = dot(from, n) / (size * sqrt(dot(from, from)));
+  const Float away = abs(dot(foot, n) - load(offset)) / size, allowed = lift * splat(0.05f);
+  return own & steep & (splat(0.9f) * size < dot(normal, n)) &
+         (away < allowed * min(splat(1.0f), splat(4.0f) * facing));
+}
+
+}  // namespace
+}  // namespace mjsense
