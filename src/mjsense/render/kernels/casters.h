@@ -42,24 +42,19 @@ inline bool divides(const ViewGeom& plane, const ViewLight& light, const float* 
   return !((least > error && lit > 0) || (most < -error && lit < 0));
 }
 
-// Does one side of the geom's bounding box face both the light and all points in the box? Then it
-// is not between them.
-inline bool turned_to(const ViewGeom& g, const ViewLight& light, const float* low,
-                      const float* high, float error) {
-  const bool directional = light.kind == LightKind::kDirectional;
+// Of kWidth geoms from `first` on those of which a side of the bounding box faces the light and all
+// points in the box around `middle`: they are not between them.
+inline std::uint32_t turned_to(const LightSides& sides, int first, Vec3f middle, Vec3f half,
+                               Float error) {
+  Mask turned = mask_of(0);
   for (int i = 0; i < 3; ++i) {
-    float middle = 0, half = 0, from = 0;
-    for (int j = 0; j < 3; ++j) {
-      const float axis = g.rot[3 * j + i];
-      middle += axis * (0.5f * (low[j] + high[j]) - g.center[j]);
-      half += (axis < 0 ? -axis : axis) * 0.5f * (high[j] - low[j]);
-      from += axis * (directional ? -light.dir[j] : light.pos[j] - g.center[j]);
-    }
-    const float side = g.box[3 + i], lit = directional ? 0 : side;
-    if (middle - half > side + error && from > lit) return true;
-    if (middle + half < -side - error && from < -lit) return true;
+    const float* const* n = sides.normal[i];
+    const Vec3f normal{loadu(n[0] + first), loadu(n[1] + first), loadu(n[2] + first)};
+    const Float nearest =
+        dot(normal, middle) - dot({abs(normal.x), abs(normal.y), abs(normal.z)}, half);
+    turned = turned | (loadu(sides.offset[i] + first) + error < nearest);
   }
-  return false;
+  return bits(turned);
 }
 
 // The light's frame that looks to the middle of the box.
@@ -127,16 +122,22 @@ inline void find_casters(const View& view, int light, Part part, const float* lo
   out.error = kLightError * (__builtin_sqrtf(reach) + __builtin_sqrtf(away));
   const LitWindow points = window_of(f, corners, 0xffu, out.error);
   if (points.empty()) return;
+  float middle[3], half[3];
+  for (int c = 0; c < 3; ++c) {
+    middle[c] = 0.5f * (low[c] + high[c]);
+    half[c] = 0.5f * (high[c] - low[c]);
+  }
   for (int i = 0; i < view.num_geoms; i += kWidth) {
-    for (std::uint32_t near = overlaps(f.windows, i, points); near; near &= near - 1) {
+    std::uint32_t near = overlaps(f.windows, i, points);
+    if (near)
+      near &= ~turned_to(view.light_sides[light], i, splat(middle), splat(half), splat(out.error));
+    for (; near; near &= near - 1) {
       const int g = i + __builtin_ctz(near);
       if (g >= view.num_geoms) break;
       const ViewGeom& geom = view.geoms[g];
       if (!belongs(geom, part)) continue;
       if (g == only && !geom.bvh) continue;  // convex
-      if (geom.type == mjGEOM_PLANE ? !divides(geom, view.lights[light], low, high, out.error)
-                                    : turned_to(geom, view.lights[light], low, high,
-                                                out.error + kLightError * geom.radius))
+      if (geom.type == mjGEOM_PLANE && !divides(geom, view.lights[light], low, high, out.error))
         continue;
       // Rays that leave a height field are asked about as a whole.
       if (geom.clusters && !geom.height_field) {

@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <utility>
 
 #include "mjsense/render/view/view_window.h"
 
@@ -75,15 +76,33 @@ Window window_of(const LightFrame& f, const ViewGeom& g) {
   return out;
 }
 
+// The side of the geom's box along its axis i.
+void set_side(const ViewLight& light, const ViewGeom& g, int i, int at, LightSides& out) {
+  float from = 0, along = 0;
+  for (int k = 0; k < 3; ++k) {
+    const float axis = g.rot[3 * k + i];
+    from +=
+        axis * (light.kind == LightKind::kDirectional ? -light.dir[k] : light.pos[k] - g.center[k]);
+    along += axis * g.center[k];
+  }
+  const float side = g.box[3 + i], lit = light.kind == LightKind::kDirectional ? 0 : side;
+  const float sign = from > lit ? 1.0f : from < -lit ? -1.0f : 0.0f;
+  for (int k = 0; k < 3; ++k) out.normal[i][k][at] = sign * g.rot[3 * k + i];
+  const bool faces = sign != 0 && g.type != mjGEOM_PLANE;
+  out.offset[i][at] = faces ? sign * along + side + kLightError * g.radius : kEndless;
+}
+
 }  // namespace
 
 LightSpace::LightSpace(int lights, std::size_t geoms)
     : stride_(geoms + kWindowPadding),
       frames_(static_cast<std::size_t>(kFaces) * std::min(lights, View::kMaxLights)),
-      windows_(kArrays * stride_ * frames_.size()) {}
+      windows_(kArrays * stride_ * frames_.size()),
+      sides_(kSideArrays * stride_ * std::min(lights, View::kMaxLights)) {}
 
 void LightSpace::fill(View& view) {
   std::size_t used = 0;
+  float* side = sides_.data();
   for (int i = 0; i < view.num_lights; ++i) {
     const ViewLight& light = view.lights[i];
     view.light_frames[i] = {};
@@ -93,6 +112,12 @@ void LightSpace::fill(View& view) {
     const bool narrow = directional || (light.kind == LightKind::kSpot && cosine > kNarrow);
     const int count = narrow ? 1 : kFaces;
     view.light_frames[i] = {&frames_[used], count};
+    LightSides& sides = view.light_sides[i];
+    for (int k = 0; k < 3; ++k) {
+      for (float*& component : sides.normal[k]) component = std::exchange(side, side + stride_);
+      sides.offset[k] = std::exchange(side, side + stride_);
+      for (int g = 0; g < view.num_geoms; ++g) set_side(light, view.geoms[g], k, g, sides);
+    }
     for (int face = 0; face < count; ++face, ++used) {
       LightFrame& f = frames_[used];
       f.perspective = !directional;

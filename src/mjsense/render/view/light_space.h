@@ -9,7 +9,7 @@
 
 namespace mjsense {
 
-// Owns View::light_frames of one view; fill() allocates nothing.
+// Owns View::light_frames and light_sides of one view; fill() allocates nothing.
 class LightSpace {
  public:
   // At most so many lights that cast shadows, and geoms.
@@ -19,11 +19,11 @@ class LightSpace {
   void fill(View& view);
 
  private:
-  static constexpr int kArrays = 5;  // of LightWindows
+  static constexpr int kArrays = 5, kSideArrays = 12;  // of LightWindows, LightSides
 
   std::size_t stride_;
   std::vector<LightFrame> frames_;
-  std::vector<float> windows_;
+  std::vector<float> windows_, sides_;
 };
 
 }  // namespace mjsense

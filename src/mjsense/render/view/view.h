@@ -99,6 +99,14 @@ struct LightFrames {
   int count = 0;
 };
 
+// The sides of geoms' bounding boxes that face a light, at most one of each opposite pair: what lies
+// beyond, normal . x > offset (m, with room for rounding), the geom leaves to the light. Others, and planes,
+// have an endless offset. May be read as LightWindows.
+struct LightSides {
+  float* normal[3][3];
+  float* offset[3];
+};
+
 struct FixedTile;
 
 struct View {
@@ -111,6 +119,7 @@ struct View {
   int num_transparent = 0;  // the rest only casts shadows
   ViewLight lights[kMaxLights];
   LightFrames light_frames[kMaxLights];
+  LightSides light_sides[kMaxLights];  // of those that have frames
   int num_lights = 0;
   bool shadows = false;
   // Fixed geoms are drawn first, for themselves. `fixed`: the image's tiles of them, row by row, if
