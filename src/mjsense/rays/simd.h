@@ -175,17 +175,18 @@ inline Float to_float(Int a) { return _mm256_cvtepi32_ps(a.v); }
 inline Float floor(Float a) { return _mm256_floor_ps(a.v); }
 inline Float gather(const float* p, Int i) { return _mm256_i32gather_ps(p, i.v, 4); }
 inline Int gather(const int* p, Int i) { return {_mm256_i32gather_epi32(p, i.v, 4)}; }
+// One at a time: images with textures take 0.94 of the time that gathers of pairs take on a Zen 3.
 inline void gather_pairs(const std::uint32_t* p, Int i, Int& first, Int& second) {
-  const auto* pairs = reinterpret_cast<const long long*>(p);
-  const __m256 low =
-      _mm256_castsi256_ps(_mm256_i32gather_epi64(pairs, _mm256_castsi256_si128(i.v), 4));
-  const __m256 high =
-      _mm256_castsi256_ps(_mm256_i32gather_epi64(pairs, _mm256_extracti128_si256(i.v, 1), 4));
-  const auto in_order = [](__m256 x) {  // lanes 0 1 4 5 2 3 6 7
-    return _mm256_permute4x64_epi64(_mm256_castps_si256(x), _MM_SHUFFLE(3, 1, 2, 0));
+  alignas(32) int at[kWidth];
+  store(at, i);
+  const auto two = [&](int k) {
+    const __m128 one =
+        _mm_castsi128_ps(_mm_loadl_epi64(reinterpret_cast<const __m128i*>(p + at[k])));
+    return _mm_loadh_pi(one, reinterpret_cast<const __m64*>(p + at[k + 1]));
   };
-  first = {in_order(_mm256_shuffle_ps(low, high, _MM_SHUFFLE(2, 0, 2, 0)))};
-  second = {in_order(_mm256_shuffle_ps(low, high, _MM_SHUFFLE(3, 1, 3, 1)))};
+  const __m256 even = _mm256_set_m128(two(4), two(0)), odd = _mm256_set_m128(two(6), two(2));
+  first = {_mm256_castps_si256(_mm256_shuffle_ps(even, odd, _MM_SHUFFLE(2, 0, 2, 0)))};
+  second = {_mm256_castps_si256(_mm256_shuffle_ps(even, odd, _MM_SHUFFLE(3, 1, 3, 1)))};
 }
 inline Float rounded(Float a) {
   __asm__("" : "+x"(a.v));
