@@ -42,6 +42,7 @@ class View:
     camera: str
     moves: bool = False  # the camera's own place in the model; one that a body carries moves with the state
     randomised: bool = False  # lights and materials
+    episode: bool = False  # `moves` and `randomised` are of a world's episode, of which all frames are: what differs from frame to frame is the state
 
 
 # What people train with first; a camera that stands still over one scene is the case that a cache of what stands still helps most.
@@ -52,6 +53,8 @@ VIEWS = {
     "go1_head": View("Go1's head camera", "go1", "head"),
     "panda_randomised": View("Panda table, camera, lights, materials randomised", "panda", "view", moves=True, randomised=True),
     "kitchen_randomised": View("kitchen, camera, lights, materials randomised", "kitchen", "view", moves=True, randomised=True),
+    "panda_episode": View("Panda table, randomised an episode", "panda", "view", moves=True, randomised=True, episode=True),
+    "kitchen_episode": View("kitchen, randomised an episode", "kitchen", "view", moves=True, randomised=True, episode=True),
     "panda_fixed": View("Panda table, camera fixed", "panda", "view"),
     "kitchen_fixed": View("kitchen, camera fixed", "kitchen", "view"),
 }
@@ -68,6 +71,7 @@ GROWTH = {
 def model_fields(model: mujoco.MjModel, view: View, worlds: int, frame: int, prefix: str = "") -> dict[str, np.ndarray]:
     """Fields of the model, [worlds, ...], that this frame's images have of their own."""
     fields = {}
+    frame = 0 if view.episode else frame
     phase = frame + np.arange(worlds) / worlds
     if view.moves:
         camera = model.cam(prefix + view.camera).id

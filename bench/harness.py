@@ -88,13 +88,16 @@ def median_seconds(*bodies: Callable[[], object], runs: int = 5, warmup: int = 1
 
 
 def machine() -> str:
-    model = "unknown CPU"
+    model, vectors = "unknown CPU", "vectors unknown"
     try:
         with open("/proc/cpuinfo") as f:
-            model = next((line.split(":", 1)[1].strip() for line in f if line.startswith("model name")), model)
+            said = {key.strip(): value.strip() for key, _, value in (line.partition(":") for line in f)}
+        model = said.get("model name", model)
+        flags = said.get("flags", "").split()
+        vectors = next((text for flag, text in (("avx512f", "AVX-512"), ("avx2", "AVX2")) if flag in flags), "SSE2")
     except OSError:
         pass
-    return f"{model}, {len(os.sched_getaffinity(0))} CPUs"
+    return f"{model}, {len(os.sched_getaffinity(0))} CPUs, {vectors}"
 
 
 LOAD_BEFORE = os.getloadavg()[0]  # a benchmark imports this module before it measures

@@ -21,10 +21,11 @@ struct FaceHorizon {
 };
 
 // No ray from the face is known to be clear.
-inline constexpr FaceHorizon kNoHorizon = {{0, 1e-30f, 0}, 1e-30f};
+inline constexpr FaceHorizon kNoHorizon = {{0, 1e-30f, 0}, 0};
 
-// Of a mesh in clusters. Kernels find out about a face when they first ask (render/kernels/horizon.h),
-// so that nobody waits for those that nobody sees; whoever does finds the same.
+// Of a mesh in clusters. Kernels find out about a face (render/kernels/horizon.h) when they have asked so
+// often that rays would have cost as much, so that nobody waits for faces that hardly anybody sees;
+// whoever does finds the same.
 class Horizons {
  public:
   explicit Horizons(const Clusters& clusters) {
@@ -39,20 +40,28 @@ class Horizons {
   // Where a face stands: kClusterSize * block + lane.
   int place(int face) const { return places_[face]; }
 
-  // False: nobody knows yet.
-  bool get(int face, FaceHorizon& out) const {
-    const std::array<std::uint64_t, 2> words = {faces_[face][0].load(std::memory_order_relaxed),
-                                                faces_[face][1].load(std::memory_order_relaxed)};
-    out = std::bit_cast<FaceHorizon>(words);
-    return words[0] != 0 && words[1] != 0;
-  }
-  void set(int face, const FaceHorizon& horizon) const {
-    const auto words = std::bit_cast<std::array<std::uint64_t, 2>>(horizon);
-    for (int i = 0; i < 2; ++i) faces_[face][i].store(words[i], std::memory_order_relaxed);
+  // Of a ray that begins on the face. Until it has asked `patience` times: kNoHorizon; then `find()`.
+  template <class Find>
+  FaceHorizon ask(int face, std::uint64_t patience, Find find) const {
+    Words& words = faces_[face];
+    const std::uint64_t first = words[0].load(std::memory_order_acquire);
+    std::uint64_t second = words[1].load(std::memory_order_relaxed);
+    if (first != 0) return std::bit_cast<FaceHorizon>(std::array{first, second});
+    if (second < patience) {  // a count of questions; that of another thread may be lost
+      words[1].compare_exchange_strong(second, second + 1, std::memory_order_relaxed);
+      return kNoHorizon;
+    }
+    FaceHorizon found = find();
+    if (found.clear[0] == 0) found.clear[0] = -0.0f;  // whose bits are not all zero
+    const auto made = std::bit_cast<std::array<std::uint64_t, 2>>(found);
+    words[1].store(made[1], std::memory_order_relaxed);
+    words[0].store(made[0], std::memory_order_release);
+    return found;
   }
 
  private:
-  // A FaceHorizon in two parts, each of which is written at once; 0: not yet.
+  // A FaceHorizon in two parts, the second written before the first. While the first is 0, the second
+  // counts.
   using Words = std::array<std::atomic<std::uint64_t>, 2>;
 
   std::vector<int> places_;  // by face

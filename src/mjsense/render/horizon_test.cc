@@ -6,6 +6,7 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <utility>
 #include <vector>
 
 #include "mjsense/core/rng.h"
@@ -68,6 +69,32 @@ TEST(Horizon, OfANeighbourIsTheAngleBetweenThem) {
     EXPECT_NEAR(horizon(mesh, 0).sine, std::max(0.0, std::sin(angle)) + 2e-3, 1e-5) << angle;
     mesh.add({0, 0, 0, -c, -1, s, -1e-3f * c, -1, 1e-3f * s});
     EXPECT_LE(horizon(mesh, 0).sine, std::max(0.0, std::sin(angle)) + 2.1e-3) << angle;
+  }
+}
+
+// A face is looked at once, when enough rays began on it; also one whose normal has zeros.
+TEST(Horizon, IsFoundOnceAndNotForTheFirstRays) {
+  Mesh mesh;
+  mesh.add({0, 0, 0, 1, 0, 0, 0, 1, 0});
+  mesh.add({0, 0, 0, 0, 1, 0, 0, 0, 1});
+  const Horizons horizons(build_clusters(mesh.vertices.data(), mesh.faces.data(), mesh.size()));
+  int found = 0;
+  const auto ask = [&](int face, FaceHorizon horizon) {
+    return horizons.ask(face, 3, [&] {
+      ++found;
+      return horizon;
+    });
+  };
+  const FaceHorizon up = {{0, 0, 5}, 0}, ahead = {{5, 0, 0}, 0};
+  for (const auto& [face, horizon] : {std::pair{0, up}, std::pair{1, ahead}}) {
+    for (int i = 0; i < 3; ++i) EXPECT_EQ(ask(face, horizon).clear[1], kNoHorizon.clear[1]);
+    EXPECT_EQ(found, face);
+    for (int i = 0; i < 5; ++i) {
+      const FaceHorizon known = ask(face, horizon);
+      for (int k = 0; k < 3; ++k) EXPECT_EQ(known.clear[k], horizon.clear[k]);
+      EXPECT_EQ(known.offset, horizon.offset);
+    }
+    EXPECT_EQ(found, face + 1);
   }
 }
 
