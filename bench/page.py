@@ -22,6 +22,8 @@ HEADLINES = (
     ("cameras", "Go1's head camera, 640x480, rgb with shadows"),
     ("cameras", "Panda table, camera, lights, materials randomised, 640x480, rgb with shadows"),
     ("cameras", "Panda table, camera, lights, materials randomised, 84x84, rgb with shadows"),
+    ("cameras", "Panda table, randomised an episode, 640x480, rgb with shadows"),
+    ("cameras", "kitchen, randomised an episode, 640x480, rgb with shadows"),
     ("cameras_warp", "Panda table, camera, lights, materials randomised, with shadows"),
     ("rays", "187 rays, 64 worlds, height field 128 x 128"),
     ("rays", "lidar 16 x 360 on a humanoid in a room"),
@@ -59,12 +61,13 @@ def block(name: str, before: str) -> str:
 def headlines(before: str) -> str:
     """A line of what was not run stays as it is."""
     lines = ["| | times | beside |", "| --- | ---: | --- |"]
-    used = []
+    used, older = [], {}
     for name, case in HEADLINES:
         found = runs(name)
         rows = [r for run in found for r in run["rows"] if r["case"].startswith(case) and "air time" not in r["case"] and r["peer"]]
         if not rows:
             print(f"page: no results of {name}: {case}", file=sys.stderr)
+            older[name] = None
             lines += [line for line in before.splitlines() if line.startswith(f"| {case}")]
             continue
         used += found
@@ -72,7 +75,11 @@ def headlines(before: str) -> str:
         beside = " / ".join(r["peer_name"] for r in rows).replace("classic, shadow maps 4096 / classic, shadow maps", "MuJoCo's classic renderer, shadow maps 4096 /")
         what = rows[0]["case"] + {"cameras_warp": ", 84x84", "physics": ": a step with fresh sensors"}.get(name, "")
         lines.append(f"| {what} | {times} | {beside} |")
-    return "\n".join(lines) + (f"\n\nCPU time, both sides in one run, {used[0]['machine']}; how busy the machine was is said under each table of Performance." if used else "")
+    if not used:
+        return before.strip()
+    earlier = f" (rows of {', '.join(older)} are of older runs: Performance)" if older else ""
+    said = f"CPU time, both sides in one run, {used[0]['machine']}{earlier}; how busy the machine was is said under each table of Performance."
+    return "\n".join([*lines, "", said])
 
 
 def main() -> None:
