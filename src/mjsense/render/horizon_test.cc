@@ -129,9 +129,8 @@ TEST(Horizon, RaysAboveItAreClear) {
     Rng rng(3, 0, 1, scene);
     constexpr int n = 14;
     Mesh mesh;
-    std::vector<float> radius;
-    for (int i = 0; i < n * n; ++i)
-      radius.push_back(static_cast<float>(1 + rng.uniform(-0.08, 0.08) * (scene % 3)));
+    float radius[n * n];
+    for (float& r : radius) r = static_cast<float>(1 + rng.uniform(-0.08, 0.08) * (scene % 3));
     const auto point = [&](int i, int j, float out[3]) {
       const double theta = M_PI * (i + 0.5) / n, phi = 2 * M_PI * (j % n) / n;
       const float r = radius[i * n + j % n] * (scene == 5 && j % n < 3 ? 0.5f : 1.0f);
@@ -147,8 +146,8 @@ TEST(Horizon, RaysAboveItAreClear) {
         mesh.add({a[0], a[1], a[2], c[0], c[1], c[2], d[0], d[1], d[2]});
       }
     for (int i = 0; i < 10 * (scene % 2); ++i) {
-      std::vector<float> x;
-      for (int k = 0; k < 9; ++k) x.push_back(static_cast<float>(rng.uniform(-1.5, 1.5)));
+      float x[9];
+      for (float& coordinate : x) coordinate = static_cast<float>(rng.uniform(-1.5, 1.5));
       mesh.add({x[0], x[1], x[2], x[3], x[4], x[5], x[6], x[7], x[8]});
     }
     for (int face = 0; face < mesh.size(); face += 5) {
