@@ -16,6 +16,7 @@ from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
 ROOT = Path(__file__).resolve().parent.parent
+GCC_ALONE = ("-mmove-max=", "-mstore-max=")  # cmake/Isa.cmake
 
 
 def command_of(entry: dict[str, str]) -> list[str]:
@@ -30,7 +31,7 @@ def command_of(entry: dict[str, str]) -> list[str]:
             skip = False
         elif word in ("-o", "-MF", "-MT"):
             skip = True
-        elif word != "-MD":
+        elif word != "-MD" and not word.startswith(GCC_ALONE):
             flags.append(word)
     return ["clang++", *flags, "-fsyntax-only", "-Werror", "-Wno-unknown-warning-option"]
 
