@@ -31,7 +31,7 @@ OTHERS = {
 
 
 def ffmpeg(*options: str) -> str:
-    """What it says; no image of an encoder's own is printed."""
+    """What it says."""
     return subprocess.run(["ffmpeg", "-hide_banner", "-y", *options], check=True, capture_output=True, text=True).stderr
 
 
