@@ -16,6 +16,20 @@
 namespace mjsense {
 namespace {
 
+// Four floats for what goes lane by lane.
+typedef float Float4 __attribute__((vector_size(16)));
+
+inline Float4 load4(const float* p) {
+  Float4 x;
+  std::memcpy(&x, p, sizeof x);
+  return x;
+}
+// p[1], p[2], p[3], and anything.
+inline Float4 last3(const float* p) {
+  const Float4 x = load4(p);
+  return __builtin_shufflevector(x, x, 1, 2, 3, 3);
+}
+
 #if defined(__AVX512F__)
 
 constexpr int kWidth = 16;
@@ -220,7 +234,6 @@ inline float first_lane(Float a) { return _mm256_cvtss_f32(a.v); }
 #else
 
 constexpr int kWidth = 4;
-typedef float Float4 __attribute__((vector_size(16)));
 typedef int Int4 __attribute__((vector_size(16)));
 
 struct Mask {
@@ -236,12 +249,8 @@ struct Float {
   Float(float x) : v(Float4{x, x, x, x}) {}
 };
 
-inline Float loadu(const float* p) {
-  Float4 x;
-  std::memcpy(&x, p, sizeof x);
-  return x;
-}
-inline Float load(const float* p) { return loadu(p); }
+inline Float loadu(const float* p) { return load4(p); }
+inline Float load(const float* p) { return load4(p); }
 inline void store(float* p, Float x) { std::memcpy(p, &x.v, sizeof x.v); }
 inline void store(int* p, Int x) { std::memcpy(p, &x.v, sizeof x.v); }
 inline Int load(const int* p) {
@@ -331,6 +340,43 @@ constexpr std::uint32_t kAllLanes = (1u << kWidth) - 1;
 struct Vec3f {
   Float x, y, z;
 };
+
+// Lane i is rows[i][0], rows[i][1], rows[i][2].
+inline Vec3f columns(const Float4* rows) {
+#if defined(__AVX512F__) || defined(__AVX2__)
+#if defined(__AVX512F__)
+  using Vector = __m512;
+  const auto row = [&](int i) {
+    Vector r = _mm512_castps128_ps512(rows[i]);
+    r = _mm512_insertf32x4(r, rows[i + 4], 1);
+    r = _mm512_insertf32x4(r, rows[i + 8], 2);
+    return _mm512_insertf32x4(r, rows[i + 12], 3);
+  };
+  const auto low = [](Vector a, Vector b) { return _mm512_unpacklo_ps(a, b); };
+  const auto high = [](Vector a, Vector b) { return _mm512_unpackhi_ps(a, b); };
+  const auto first = [](Vector a, Vector b) { return _mm512_shuffle_ps(a, b, 0x44); };
+  const auto last = [](Vector a, Vector b) { return _mm512_shuffle_ps(a, b, 0xee); };
+#else
+  using Vector = __m256;
+  const auto row = [&](int i) { return _mm256_set_m128(rows[i + 4], rows[i]); };
+  const auto low = [](Vector a, Vector b) { return _mm256_unpacklo_ps(a, b); };
+  const auto high = [](Vector a, Vector b) { return _mm256_unpackhi_ps(a, b); };
+  const auto first = [](Vector a, Vector b) { return _mm256_shuffle_ps(a, b, 0x44); };
+  const auto last = [](Vector a, Vector b) { return _mm256_shuffle_ps(a, b, 0xee); };
+#endif
+  const Vector r0 = row(0), r1 = row(1), r2 = row(2), r3 = row(3);
+  const Vector xy01 = low(r0, r1), xy23 = low(r2, r3), z01 = high(r0, r1), z23 = high(r2, r3);
+  return {first(xy01, xy23), last(xy01, xy23), first(z01, z23)};
+#else
+  Vec3f out;
+  for (int k = 0; k < kWidth; ++k) {
+    out.x.v[k] = rows[k][0];
+    out.y.v[k] = rows[k][1];
+    out.z.v[k] = rows[k][2];
+  }
+  return out;
+#endif
+}
 inline Vec3f operator+(Vec3f a, Vec3f b) { return {a.x + b.x, a.y + b.y, a.z + b.z}; }
 inline Vec3f operator-(Vec3f a, Vec3f b) { return {a.x - b.x, a.y - b.y, a.z - b.z}; }
 inline Float dot(Vec3f a, Vec3f b) { return fma(a.x, b.x, fma(a.y, b.y, a.z * b.z)); }

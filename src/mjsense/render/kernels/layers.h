@@ -5,7 +5,7 @@
 
 #include "mjsense/render/kernels/fixed.h"
 #include "mjsense/render/kernels/shade.h"
-#include "mjsense/render/kernels/trace.h"
+#include "mjsense/render/kernels/visible.h"
 
 namespace mjsense {
 namespace {
@@ -50,53 +50,76 @@ inline void shade_transparent(const View& view, const int* list, int count, cons
   for (int i = used - 1; i >= 0; --i) blend(layers[i], out);
 }
 
-// The nearest of all opaque geoms in sight, for one packet.
-inline void trace_opaque(const View& view, const Pixels& pixels, Hits& hits) {
-  for (int i = 0; i < view.num_opaque; ++i) {
-    const ViewGeom& g = view.geoms[i];
-    bool beyond = false;
-    for (int k = 0; k < kLanes; k += kWidth) beyond |= any(splat(g.nearest) < load(hits.t + k));
-    if (!beyond) return;
-    if (overlap(g.window, pixels.window)) trace_geom(view, i, &pixels, &hits, 1u);
+// What a tile shows of the mirror, and what is seen through it there.
+struct Mirrored {
+  std::uint32_t lanes[kTilePackets];  // of each packet that show it
+  Tile tile;                          // of packets that have some: of the view behind the mirror
+};
+
+// Lanes of a packet that show the mirror. Of a box only the top is one.
+inline std::uint32_t mirror_lanes(const View& view, const Pixels& pixels, const Hits& hits) {
+  std::uint32_t lanes = 0;
+  for (int k = 0; k < kLanes; k += kWidth)
+    lanes |= bits(load(hits.id + k) == int_of(view.mirror)) << k;
+  if (!lanes) return 0;
+  const ViewGeom& g = view.geoms[hits.geom[__builtin_ctz(lanes)]];
+  if (g.type != mjGEOM_BOX) return lanes;
+  std::uint32_t top = 0;
+  for (int k = 0; k < kLanes; k += kWidth) {
+    const Vec3f q = hit_point(view, pixels, hits, k) - splat(g.pos);
+    const Vec3f up{splat(g.rot[2]), splat(g.rot[5]), splat(g.rot[8])};
+    top |= bits(splat(g.size[2] * 0.999f) < dot(q, up)) << k;
+  }
+  return lanes & top;
+}
+
+// What the mirror shows in the tile, of which everything opaque is traced.
+inline void look_through_mirror(const View& view, int packets, const Tile& tile, Mirrored& out) {
+  PacketMask through = 0;
+  for (int q = 0; q < packets; ++q) {
+    const std::uint32_t lanes = out.lanes[q] = mirror_lanes(view, tile.pixels[q], tile.hits[q]);
+    out.tile.farthest[q] = lanes ? kInfinity : -kInfinity;
+    if (!lanes) continue;
+    through |= 1u << q;
+    Pixels& pixels = out.tile.pixels[q];
+    pixels = tile.pixels[q];
+    for (int k = 0; k < kLanes; k += kWidth)
+      store(pixels.near + k, select(mask_of(lanes >> k & kAllLanes),
+                                    load(tile.hits[q].t + k) * splat(1.00001f), splat(kInfinity)));
+    clear(out.tile.hits[q], kInfinity);
+  }
+  if (!through) return;
+  for (int q = packets; q < kTilePackets; ++q) out.tile.farthest[q] = -kInfinity;
+  __builtin_memcpy(out.tile.window, tile.window, sizeof tile.window);
+  const View& beyond = *view.reflection;
+  for (int i = 0; i < beyond.num_opaque; ++i) {
+    const ViewGeom& g = beyond.geoms[i];
+    if (!overlap(g.window, tile.around)) continue;
+    const PacketMask some = packets_in_reach(g.window, g.nearest, out.tile);
+    if (!some) continue;
+    const PacketMask changed = trace_geom(beyond, i, out.tile.pixels, out.tile.hits, some);
+    if (changed) update_farthest(out.tile, changed);
   }
 }
 
-// What the mirror among `lanes` reflects, added to its colour. Of a box only the top is one.
-inline void add_reflection(const View& view, const Pixels& pixels, const Hits& hits, Colors& out) {
-  Mask some = mask_of(0);
-  for (int k = 0; k < kLanes; k += kWidth) some = some | (load(hits.id + k) == int_of(view.mirror));
-  if (!any(some)) return;
-  const View& beyond = *view.reflection;
-  Pixels through = pixels;
-  std::uint32_t lanes = 0;
-  for (int i = 0; i < kLanes; ++i) {
-    bool mirror = hits.id[i] == view.mirror;
-    if (mirror && view.geoms[hits.geom[i]].type == mjGEOM_BOX) {
-      const ViewGeom& g = view.geoms[hits.geom[i]];
-      const bool ortho = view.grid.orthographic;
-      const float s = ortho ? 1.0f : hits.t[i];
-      const float q[3] = {s * pixels.x[i] - g.pos[0], s * pixels.y[i] - g.pos[1],
-                          -hits.t[i] - g.pos[2]};
-      const float height = g.rot[2] * q[0] + g.rot[5] * q[1] + g.rot[8] * q[2];
-      mirror = height > g.size[2] * 0.999f;
-    }
-    through.near[i] = mirror ? hits.t[i] * 1.00001f : kInfinity;
-    lanes |= static_cast<std::uint32_t>(mirror) << i;
-  }
+// Adds what the mirror shows in packet `q` to its colour.
+inline void add_reflection(const View& view, const Mirrored& mirrored, int q, Colors& out) {
+  const std::uint32_t lanes = mirrored.lanes[q];
   if (!lanes) return;
-  Hits found;
-  clear(found, kInfinity);
-  trace_opaque(beyond, through, found);
+  const View& beyond = *view.reflection;
+  const Pixels& through = mirrored.tile.pixels[q];
+  const Hits& found = mirrored.tile.hits[q];
   const std::uint32_t seen = hit_lanes(found);
+  if (!seen && beyond.num_transparent == 0) return;
   Colors color = {};
   if (seen) {
     Surfaces surfaces;
     gather_surfaces(beyond, through, found, seen, true, surfaces);
     shade(beyond, surfaces, found, seen, nullptr, color);
+    for (int k = 0; k < kLanes; k += kWidth)  // what lanes without a hit hold is no colour
+      for (auto& c : color.rgb)
+        store(c + k, select(mask_of(seen >> k & kAllLanes), load(c + k), splat(0.0f)));
   }
-  for (int k = 0; k < kLanes; k += kWidth)  // what lanes without a hit hold is no colour
-    for (auto& c : color.rgb)
-      store(c + k, select(mask_of(seen >> k & kAllLanes), load(c + k), splat(0.0f)));
   int list[kMaxMirrored];
   int count = 0;
   while (count < beyond.num_transparent && count < kMaxMirrored) {

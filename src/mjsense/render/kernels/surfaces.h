@@ -150,74 +150,88 @@ inline void texture_lanes(const View& view, const ViewGeom& g, const Pixels& pix
   }
 }
 
-// Normals of triangles: interpolated where the mesh has them, else the face's own.
-inline void triangle_normals(const ViewGeom& g, const Hits& hits, std::uint32_t lanes,
-                             float (*n)[kLanes]) {
-  for (int i = 0; i < kLanes; ++i) {
-    if (!(lanes >> i & 1u)) continue;
-    float local[3] = {hits.n[0][i], hits.n[1][i], hits.n[2][i]};
-    if (g.mesh && g.mesh->normals && hits.prim[i] >= 0) {
-      const float* c = g.mesh->normals + 9 * hits.prim[i];
-      const float b1 = hits.u[i], b2 = hits.v[i], b0 = 1 - b1 - b2;
-      for (int k = 0; k < 3; ++k) local[k] = b0 * c[k] + b1 * c[3 + k] + b2 * c[6 + k];
-    }
-    for (int k = 0; k < 3; ++k) n[k][i] = local[k];
+// Normals of triangles: interpolated where the mesh has them, else the face's own. Zero in lanes that
+// are not in `lanes`.
+inline Vec3f triangle_normals(const ViewGeom& g, const Hits& hits, std::uint32_t lanes, int k) {
+  if (!(g.mesh && g.mesh->normals))
+    return {load(hits.n[0] + k), load(hits.n[1] + k), load(hits.n[2] + k)};
+  alignas(64) float b0[kWidth];
+  store(b0, splat(1.0f) - load(hits.u + k) - load(hits.v + k));
+  Float4 rows[kWidth];
+  for (int i = 0; i < kWidth; ++i) {
+    rows[i] = Float4{};
+    if (!(lanes >> (k + i) & 1u)) continue;
+    const float* c = g.mesh->normals + 9 * hits.prim[k + i];
+    rows[i] = b0[i] * load4(c) + hits.u[k + i] * load4(c + 3) + hits.v[k + i] * last3(c + 5);
   }
+  return columns(rows);
+}
+
+// Of one geom's lanes `mine`: normals, materials, textures. `first`: of a packet's geoms, whose values
+// all lanes take that no other geom overwrites.
+template <bool first>
+void gather_geom(const View& view, const Pixels& pixels, const Hits& hits, const ViewGeom& g,
+                 std::uint32_t mine, bool color, Surfaces& out) {
+  const Surface& s = g.surface;
+  alignas(64) float local[3][kLanes], normal[3][kLanes];
+  for (int k = 0; k < kLanes; k += kWidth) {
+    const Mask m = mask_of(mine >> k & kAllLanes);
+    if (!first && !any(m)) continue;
+    const auto put = [&](float* to, Float x) {
+      store(to + k, first ? x : select(m, x, load(to + k)));
+    };
+    const Vec3f p{load(out.p[0] + k), load(out.p[1] + k), load(out.p[2] + k)};
+    const Vec3f q = to_geom(g.rot, p - splat(g.pos));
+    Vec3f n = g.bvh ? triangle_normals(g, hits, mine, k) : primitive_normal(g, q);
+    if (g.type != mjGEOM_PLANE) {  // whose normal is a unit vector
+      const Float inverse = splat(1.0f) / sqrt(max(dot(n, n), splat(1e-30f)));
+      n = {n.x * inverse, n.y * inverse, n.z * inverse};
+    }
+    const Vec3f c = from_geom(g.rot, n);
+    put(out.n[0], c.x);
+    put(out.n[1], c.y);
+    put(out.n[2], c.z);
+    if (!color) continue;
+    for (int i = 0; i < 3; ++i) {
+      put(out.rgb[i], splat(s.rgba[i]));
+      put(out.texture[i], splat(1.0f));
+    }
+    put(out.alpha, splat(s.rgba[3]));
+    put(out.specular, splat(s.specular));
+    put(out.exponent, splat(s.exponent));
+    put(out.emission, splat(s.emission));
+    if (!s.texture) continue;
+    store(local[0] + k, q.x);
+    store(local[1] + k, q.y);
+    store(local[2] + k, q.z);
+    store(normal[0] + k, n.x);
+    store(normal[1] + k, n.y);
+    store(normal[2] + k, n.z);
+  }
+  if (color && s.texture) texture_lanes(view, g, pixels, hits, mine, local, normal, out);
 }
 
 // Points, normals (unit, camera frame) and materials of `lanes`. `color`: also what only rgb needs.
 inline void gather_surfaces(const View& view, const Pixels& pixels, const Hits& hits,
                             std::uint32_t lanes, bool color, Surfaces& out) {
-  if (lanes != 0xffffu) __builtin_memset(&out, 0, sizeof out);  // other lanes hold numbers too
   for (int k = 0; k < kLanes; k += kWidth) {
     const Vec3f p = hit_point(view, pixels, hits, k);
     store(out.p[0] + k, p.x);
     store(out.p[1] + k, p.y);
     store(out.p[2] + k, p.z);
   }
-  std::uint32_t todo = lanes;
-  while (todo) {
+  for (std::uint32_t todo = lanes; todo;) {
     const int geom = hits.geom[__builtin_ctz(todo)];
     const ViewGeom& g = view.geoms[geom];
     std::uint32_t mine = 0;
     for (int k = 0; k < kLanes; k += kWidth) mine |= bits(load(hits.geom + k) == int_of(geom)) << k;
     mine &= todo;
-    todo &= ~mine;
-    alignas(64) float local[3][kLanes], normal[3][kLanes];
-    if (g.bvh) triangle_normals(g, hits, mine, normal);
-    for (int k = 0; k < kLanes; k += kWidth) {
-      const Mask m = mask_of(mine >> k & kAllLanes);
-      if (!any(m)) continue;
-      const Vec3f p{load(out.p[0] + k), load(out.p[1] + k), load(out.p[2] + k)};
-      const Vec3f q = to_geom(g.rot, p - splat(g.pos));
-      Vec3f n = g.bvh ? Vec3f{load(normal[0] + k), load(normal[1] + k), load(normal[2] + k)}
-                      : primitive_normal(g, q);
-      if (g.type != mjGEOM_PLANE) {  // whose normal is a unit vector
-        const Float inverse = splat(1.0f) / sqrt(max(dot(n, n), splat(1e-30f)));
-        n = {n.x * inverse, n.y * inverse, n.z * inverse};
-      }
-      store(local[0] + k, q.x);
-      store(local[1] + k, q.y);
-      store(local[2] + k, q.z);
-      store(normal[0] + k, n.x);
-      store(normal[1] + k, n.y);
-      store(normal[2] + k, n.z);
-      const Vec3f c = from_geom(g.rot, n);
-      store(out.n[0] + k, select(m, c.x, load(out.n[0] + k)));
-      store(out.n[1] + k, select(m, c.y, load(out.n[1] + k)));
-      store(out.n[2] + k, select(m, c.z, load(out.n[2] + k)));
-      if (!color) continue;
-      const Surface& s = g.surface;
-      for (int c3 = 0; c3 < 3; ++c3) {
-        store(out.rgb[c3] + k, select(m, splat(s.rgba[c3]), load(out.rgb[c3] + k)));
-        store(out.texture[c3] + k, select(m, splat(1.0f), load(out.texture[c3] + k)));
-      }
-      store(out.alpha + k, select(m, splat(s.rgba[3]), load(out.alpha + k)));
-      store(out.specular + k, select(m, splat(s.specular), load(out.specular + k)));
-      store(out.exponent + k, select(m, splat(s.exponent), load(out.exponent + k)));
-      store(out.emission + k, select(m, splat(s.emission), load(out.emission + k)));
+    if (todo == lanes) {
+      gather_geom<true>(view, pixels, hits, g, mine, color, out);
+    } else {
+      gather_geom<false>(view, pixels, hits, g, mine, color, out);
     }
-    if (color && g.surface.texture) texture_lanes(view, g, pixels, hits, mine, local, normal, out);
+    todo &= ~mine;
   }
 }
 

@@ -100,8 +100,8 @@ inline void sample_shift(int index, int samples, float& x, float& y) {
 }
 
 // The colours of packet `q` before transparent geoms: what it sees, the sky, reflections, haze.
-inline void shade_packet(const View& view, const FixedTile* fixed, int q, const Pixels& pixels,
-                         Hits& hits, Shadows& shadows, Colors& colors) {
+inline void shade_packet(const View& view, const FixedTile* fixed, const Mirrored& mirrored, int q,
+                         const Pixels& pixels, Hits& hits, Shadows& shadows, Colors& colors) {
   const std::uint32_t lanes = hit_lanes(hits);
   shadows.packet = q;
   shadows.settled = false;
@@ -115,13 +115,19 @@ inline void shade_packet(const View& view, const FixedTile* fixed, int q, const 
     shade(view, surfaces, hits, lanes, view.shadows ? &shadows : nullptr, colors);
   }
   if (lanes != 0xffffu) shade_background(view, pixels, ~lanes & 0xffffu, colors);
-  if (view.reflection) add_reflection(view, pixels, hits, colors);
+  if (view.reflection) add_reflection(view, mirrored, q, colors);
   if (view.sky_distance > 0) add_haze(view, pixels, hits, colors);
 }
 
+// What a thread works on: TileScratch::tile.
+struct TileSpace {
+  Tile tile;
+  Mirrored mirrored;
+};
+
 inline void render_tile(const View& view, const ImageTargets& targets, int tx, int ty,
                         TileScratch& scratch) {
-  Tile& tile = *static_cast<Tile*>(scratch.tile);
+  auto& [tile, mirrored] = *static_cast<TileSpace*>(scratch.tile);
   const PixelGrid& grid = view.grid;
   const int x0 = tx * kTileSize, y0 = ty * kTileSize;
   const int across = (grid.width - x0 + 3) / 4 < kPackets ? (grid.width - x0 + 3) / 4 : kPackets;
@@ -178,9 +184,10 @@ inline void render_tile(const View& view, const ImageTargets& targets, int tx, i
     if (targets.rgb && sample < samples) {
       Shadows shadows;
       if (view.shadows) find_all_casters(view, fixed, tile, packets, scratch, shadows);
+      if (view.reflection) look_through_mirror(view, packets, tile, mirrored);
       for (int q = 0; q < packets; ++q) {
         Colors colors;
-        shade_packet(view, fixed, q, tile.pixels[q], tile.hits[q], shadows, colors);
+        shade_packet(view, fixed, mirrored, q, tile.pixels[q], tile.hits[q], shadows, colors);
         if (lists.transparent)
           shade_transparent(view, scratch.transparent, lists.transparent, tile.pixels[q],
                             tile.hits[q], colors);

@@ -8,6 +8,6 @@ void render_tiles_portable(const View& view, const ImageTargets& targets, int fi
   render_tiles(view, targets, first, last, scratch);
 }
 
-std::size_t tile_bytes() { return sizeof(Tile); }
+std::size_t tile_bytes() { return sizeof(TileSpace); }
 
 }  // namespace mjsense

@@ -178,10 +178,10 @@ struct TileScratch {
   int* casters = nullptr;  // of all lights: kMaxLights times as long, and what is spare
   LightWindows windows{};  // of casters
   int spare_casters = 0;   // for parts of geoms
-  void* tile = nullptr;    // a Tile of the kernels
+  void* tile = nullptr;    // a TileSpace of the kernels
 };
 
-// Bytes of a Tile, 64-byte aligned.
+// Bytes of a TileSpace, 64-byte aligned.
 std::size_t tile_bytes();
 
 // Renders rows of tiles [first, last) of the image. Every pixel is a function of the view alone.
