@@ -341,8 +341,11 @@ struct Vec3f {
   Float x, y, z;
 };
 
-// Lane i is rows[i][0], rows[i][1], rows[i][2].
-inline Vec3f columns(const Float4* rows) {
+struct Vec4f {
+  Float x, y, z, w;
+};
+// Lane i is rows[i].
+inline Vec4f columns(const Float4* rows) {
 #if defined(__AVX512F__) || defined(__AVX2__)
 #if defined(__AVX512F__)
   using Vector = __m512;
@@ -365,14 +368,15 @@ inline Vec3f columns(const Float4* rows) {
   const auto last = [](Vector a, Vector b) { return _mm256_shuffle_ps(a, b, 0xee); };
 #endif
   const Vector r0 = row(0), r1 = row(1), r2 = row(2), r3 = row(3);
-  const Vector xy01 = low(r0, r1), xy23 = low(r2, r3), z01 = high(r0, r1), z23 = high(r2, r3);
-  return {first(xy01, xy23), last(xy01, xy23), first(z01, z23)};
+  const Vector xy01 = low(r0, r1), xy23 = low(r2, r3), zw01 = high(r0, r1), zw23 = high(r2, r3);
+  return {first(xy01, xy23), last(xy01, xy23), first(zw01, zw23), last(zw01, zw23)};
 #else
-  Vec3f out;
+  Vec4f out;
   for (int k = 0; k < kWidth; ++k) {
     out.x.v[k] = rows[k][0];
     out.y.v[k] = rows[k][1];
     out.z.v[k] = rows[k][2];
+    out.w.v[k] = rows[k][3];
   }
   return out;
 #endif

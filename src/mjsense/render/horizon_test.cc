@@ -27,36 +27,39 @@ struct Mesh {
   int size() const { return static_cast<int>(faces.size() / 3); }
 };
 
-struct Found {
-  double sine = 2, normal[3] = {};  // 2: no ray is known to be clear
-};
-
-Found horizon(const Mesh& mesh, int face) {
+// Horizons::kNever: no ray is known to be clear.
+float sine(const Mesh& mesh, int face, int octant) {
   const auto geometry = mesh_geometry(mesh.vertices, mesh.faces, true);
   const float* h = geometry->box.data() + 3;
-  const FaceHorizon found = find_horizon(geometry->clusters, geometry->horizons->place(face),
-                                         std::hypot(h[0], h[1], h[2]));
-  const double size = std::hypot(found.clear[0], found.clear[1], found.clear[2]);
-  Found out;
-  if (size < 1e-20) return out;
-  out.sine = 1 / size;
-  for (int k = 0; k < 3; ++k) out.normal[k] = found.clear[k] / size;
-  return out;
+  return find_horizon(geometry->clusters, geometry->horizons->place(face), octant,
+                      std::hypot(h[0], h[1], h[2]));
 }
+
+constexpr int kPlusX = 0, kMinusX = 1;  // octants: y and z positive
 
 // A floor triangle, and a wall 2 m away that rises 1 m: seen from where the floor is nearest, a slope
 // of one half.
 TEST(Horizon, OfAWallIsItsHeightOverItsDistance) {
   Mesh mesh;
   mesh.add({0, 0, 0, 1, 0, 0, 0, 1, 0});
-  EXPECT_NEAR(horizon(mesh, 0).sine, 2e-3, 1e-6);  // nothing rises
+  EXPECT_NEAR(sine(mesh, 0, kPlusX), 2e-3, 1e-6);  // nothing rises
   mesh.add({3, -5, 0, 3, 5, 0, 3, 5, 1});
   mesh.add({3, -5, 0, 3, 5, 1, 3, -5, 1});
-  EXPECT_NEAR(horizon(mesh, 0).sine, 0.5 / std::hypot(1, 0.5) + 2e-3, 1e-5);
+  const double half = 0.5 / std::hypot(1, 0.5) + 2e-3;
+  EXPECT_NEAR(sine(mesh, 0, kPlusX), half, 1e-5);
   mesh.add({3, -5, -9, 3, 5, -9, 3, 5, -7});  // below the floor
-  EXPECT_NEAR(horizon(mesh, 0).sine, 0.5 / std::hypot(1, 0.5) + 2e-3, 1e-5);
+  EXPECT_NEAR(sine(mesh, 0, kPlusX), half, 1e-5);
+  EXPECT_NEAR(sine(mesh, 0, kMinusX), 2e-3, 1e-6);  // the wall is behind
+  mesh.add({-0.01f, -9, 0, -0.01f, 9, 0, -0.01f, 9, 1});
+  mesh.add({-0.01f, -9, 0, -0.01f, 9, 1, -0.01f, -9, 1});
+  // What ends just behind the face is not behind: rays begin a little beside it.
+  EXPECT_EQ(sine(mesh, 0, kPlusX), Horizons::kNever);
+  for (std::size_t i = mesh.vertices.size() - 18; i < mesh.vertices.size(); i += 3)
+    mesh.vertices[i] = -0.1f;
+  EXPECT_NEAR(sine(mesh, 0, kPlusX), half, 1e-5);
+  EXPECT_EQ(sine(mesh, 0, kMinusX), Horizons::kNever);
   mesh.add({0.3f, 0.2f, 1, 0.5f, 0.2f, 1, 0.3f, 0.4f, 1});  // above it
-  EXPECT_EQ(horizon(mesh, 0).sine, 2);
+  EXPECT_EQ(sine(mesh, 0, kPlusX), Horizons::kNever);
 }
 
 // Two faces that share an edge, and a third that touches their common corner only.
@@ -66,36 +69,43 @@ TEST(Horizon, OfANeighbourIsTheAngleBetweenThem) {
     Mesh mesh;
     mesh.add({0, 0, 0, 1, 0, 0, 0, 1, 0});
     mesh.add({0, 1, 0, -c, 0.5f, s, 0, 0, 0});
-    EXPECT_NEAR(horizon(mesh, 0).sine, std::max(0.0, std::sin(angle)) + 2e-3, 1e-5) << angle;
+    const double expected = std::max(0.0, std::sin(angle)) + 2e-3;
+    EXPECT_NEAR(sine(mesh, 0, kMinusX), expected, 1e-5) << angle;
     mesh.add({0, 0, 0, -c, -1, s, -1e-3f * c, -1, 1e-3f * s});
-    EXPECT_LE(horizon(mesh, 0).sine, std::max(0.0, std::sin(angle)) + 2.1e-3) << angle;
+    for (int octant = 0; octant < Horizons::kOctants; ++octant)
+      EXPECT_LE(sine(mesh, 0, octant), expected + 1e-4) << angle << ", octant " << octant;
   }
 }
 
-// A face is looked at once, when enough rays began on it; also one whose normal has zeros.
+// A face is looked at once for each octant, when enough rays began on it.
 TEST(Horizon, IsFoundOnceAndNotForTheFirstRays) {
   Mesh mesh;
   mesh.add({0, 0, 0, 1, 0, 0, 0, 1, 0});
-  mesh.add({0, 0, 0, 0, 1, 0, 0, 0, 1});
+  mesh.add({0, 0, 2, 0, 1, 2, 0, 0, 3});
   const Horizons horizons(build_clusters(mesh.vertices.data(), mesh.faces.data(), mesh.size()));
   int found = 0;
-  const auto ask = [&](int face, FaceHorizon horizon) {
-    return horizons.ask(face, 3, [&] {
-      ++found;
-      return horizon;
-    });
-  };
-  const FaceHorizon up = {{0, 0, 5}, 0}, ahead = {{5, 0, 0}, 0};
-  for (const auto& [face, horizon] : {std::pair{0, up}, std::pair{1, ahead}}) {
-    for (int i = 0; i < 3; ++i) EXPECT_EQ(ask(face, horizon).clear[1], kNoHorizon.clear[1]);
-    EXPECT_EQ(found, face);
+  for (const float sine : {0.0f, 0.3f, 1.0f, Horizons::kNever}) {
+    const int face = found % 2, octant = found;
+    const auto ask = [&] {
+      return horizons.ask(face, octant, [&] {
+        ++found;
+        return sine;
+      });
+    };
+    const int before = found;
+    for (int i = 0; i < Horizons::kPatience; ++i) EXPECT_EQ(ask(), Horizons::kNever);
+    EXPECT_EQ(found, before);
     for (int i = 0; i < 5; ++i) {
-      const FaceHorizon known = ask(face, horizon);
-      for (int k = 0; k < 3; ++k) EXPECT_EQ(known.clear[k], horizon.clear[k]);
-      EXPECT_EQ(known.offset, horizon.offset);
+      const float known = ask();
+      EXPECT_LE(sine, known + 1e-6f);
+      EXPECT_LT(known, sine + 6e-3f);
     }
-    EXPECT_EQ(found, face + 1);
+    EXPECT_EQ(found, before + 1);
   }
+  const float *floor = horizons.plane(0), *wall = horizons.plane(1);
+  EXPECT_EQ(floor[2], 1);
+  EXPECT_EQ(floor[3], 0);
+  EXPECT_EQ(wall[0], 1);
 }
 
 bool meets(const float* const corners[3], const double o[3], const double d[3]) {
@@ -151,8 +161,10 @@ TEST(Horizon, RaysAboveItAreClear) {
       mesh.add({x[0], x[1], x[2], x[3], x[4], x[5], x[6], x[7], x[8]});
     }
     for (int face = 0; face < mesh.size(); face += 5) {
-      const Found found = horizon(mesh, face);
-      if (found.sine > 1) continue;
+      const auto geometry = mesh_geometry(mesh.vertices, mesh.faces, true);
+      const float* normal = geometry->horizons->plane(face);
+      float sines[Horizons::kOctants];
+      for (int i = 0; i < Horizons::kOctants; ++i) sines[i] = sine(mesh, face, i);
       for (int ray = 0; ray < 40; ++ray) {
         double u = rng.uniform(), v = rng.uniform();
         if (u + v > 1) u = 1 - u, v = 1 - v;
@@ -160,26 +172,33 @@ TEST(Horizon, RaysAboveItAreClear) {
         for (int k = 0; k < 3; ++k) {
           const float* const c[3] = {mesh.corner(face, 0), mesh.corner(face, 1),
                                      mesh.corner(face, 2)};
-          o[k] = c[0][k] + u * (c[1][k] - c[0][k]) + v * (c[2][k] - c[0][k]) +
-                 1.5e-4 * found.normal[k];
+          o[k] = c[0][k] + u * (c[1][k] - c[0][k]) + v * (c[2][k] - c[0][k]) + 1.5e-4 * normal[k];
           d[k] = rng.normal();
-          along += d[k] * found.normal[k];
+          along += d[k] * normal[k];
         }
-        for (int k = 0; k < 3; ++k) d[k] -= along * found.normal[k];
+        for (int k = 0; k < 3; ++k) d[k] -= along * normal[k];
         const double level = std::hypot(d[0], d[1], d[2]);
-        const auto look = [&](double sine) {
-          double up[3];
+        const auto direction = [&](double sine, double up[3]) {
           for (int k = 0; k < 3; ++k)
-            up[k] = std::sqrt(1 - sine * sine) * d[k] / level + sine * found.normal[k];
+            up[k] = std::sqrt(1 - sine * sine) * d[k] / level + sine * normal[k];
+        };
+        const auto hits = [&](const double up[3]) {
           for (int f = 0; f < mesh.size(); ++f) {
             const float* const c[3] = {mesh.corner(f, 0), mesh.corner(f, 1), mesh.corner(f, 2)};
             if (meets(c, o, up)) return true;
           }
           return false;
         };
-        EXPECT_FALSE(look(found.sine)) << "scene " << scene << " face " << face;
-        ++clear;
-        low += look(0.8 * found.sine - 0.05);
+        for (int octant = 0; octant < Horizons::kOctants; ++octant) {  // as low as it lets rays be
+          if (sines[octant] > 1) continue;
+          double up[3];
+          direction(sines[octant], up);
+          if (octant != (up[0] < 0) + 2 * (up[1] < 0) + 4 * (up[2] < 0)) continue;
+          EXPECT_FALSE(hits(up)) << "scene " << scene << " face " << face << " octant " << octant;
+          ++clear;
+          direction(0.8 * sines[octant] - 0.05, up);
+          low += hits(up);
+        }
       }
     }
   }

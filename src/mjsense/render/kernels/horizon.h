@@ -7,7 +7,10 @@
 // corner. For another triangle that is beyond the line, as far as it rises, h / e is largest at one
 // of its corners, for it is a quotient of linear functions; the least over the lines bounds how
 // steeply the triangle rises as the face sees it. The largest such slope of all triangles is the
-// face's horizon.
+// face's horizon: for directions of one octant of those that are not wholly behind one of the three
+// planes, each square to an axis, at which the face ends.
+
+#include <utility>
 
 #include "mjsense/rays/horizons.h"
 #include "mjsense/render/kernels/rays.h"
@@ -19,6 +22,8 @@ namespace {
 constexpr float kSteepest = 1.2f;
 // Of the mesh's size: lower is no rise, and a corner that far on the wrong side of an edge is on it.
 constexpr float kFlat = 1e-6f;
+// Of the mesh's size: rays that begin higher above their face are not spared.
+constexpr float kMostLift = 3e-3f;
 
 // A face as its neighbours are looked at: all relative to its first corner.
 struct Outlook {
@@ -26,10 +31,11 @@ struct Outlook {
   float origin[3], normal[3];
   float sides[2][3];                   // to the other corners
   float out[kLines][3], line[kLines];  // e(x) = out . x - line
+  float sign[3], end[3];               // ahead is sign x >= end, by axis
   float flat;                          // m
   bool valid;
 
-  Outlook(const TriangleBlock& block, int lane, float size) : flat(kFlat * size) {
+  Outlook(const TriangleBlock& block, int lane, int octant, float size) : flat(kFlat * size) {
     float c[3][3];
     for (int i = 0; i < 3; ++i)
       for (int k = 0; k < 3; ++k) c[i][k] = block.corners[i][k][lane];
@@ -64,7 +70,18 @@ struct Outlook {
     for (int k = 0; k < 3; ++k) {
       origin[k] = c[0][k];
       for (int i = 0; i < 2; ++i) sides[i][k] = c[i + 1][k] - c[0][k];
+      sign[k] = octant >> k & 1 ? -1.0f : 1.0f;
+      end[k] = 0;
+      for (auto& to : sides) end[k] = sign[k] * to[k] < end[k] ? sign[k] * to[k] : end[k];
+      end[k] -= 1.5f * kMostLift * size;
     }
+  }
+
+  // Lanes where something within `half` of x may be ahead, or the farthest of points.
+  Mask ahead(Vec3f x, Vec3f half) const {
+    return (splat(end[0]) <= fma(splat(sign[0]), x.x, half.x)) &
+           (splat(end[1]) <= fma(splat(sign[1]), x.y, half.y)) &
+           (splat(end[2]) <= fma(splat(sign[2]), x.z, half.z));
   }
 };
 
@@ -84,7 +101,8 @@ inline std::uint32_t rising(const Outlook& from, const ClusterNode& node, float 
     Float away = splat(0.0f);
     for (int i = 0; i < Outlook::kLines; ++i)
       away = max(away, dot(splat(from.out[i]), center) - reach(from.out[i]) - splat(from.line[i]));
-    out |= bits((splat(from.flat) < top) & (splat(slope) * away < top)) << k;
+    out |= bits((splat(from.flat) < top) & (splat(slope) * away < top) & from.ahead(center, half))
+           << k;
   }
   return out & ((1u << node.count) - 1);
 }
@@ -119,7 +137,14 @@ inline float steepest_of(const Outlook& from, const TriangleBlock& block, float 
       h[j] = dot(splat(from.normal), x[j]);
       tall[j] = flat < h[j];
     }
-    const Mask rises = tall[0] | tall[1] | tall[2];
+    const auto box = [](Float a, Float b, Float c) {
+      const Float least = min(a, min(b, c)), most = max(a, max(b, c));
+      return std::pair{splat(0.5f) * (least + most), splat(0.5f) * (most - least)};
+    };
+    const auto [mx, hx] = box(x[0].x, x[1].x, x[2].x);
+    const auto [my, hy] = box(x[0].y, x[1].y, x[2].y);
+    const auto [mz, hz] = box(x[0].z, x[1].z, x[2].z);
+    const Mask rises = (tall[0] | tall[1] | tall[2]) & from.ahead({mx, my, mz}, {hx, hy, hz});
     if (!any(rises)) continue;
     Mask crosses[3];  // does the side to the next corner pass the height at which rising begins?
     Float at[3];      // where
@@ -162,15 +187,16 @@ inline float steepest_of(const Outlook& from, const TriangleBlock& block, float 
   return lane_max(most);
 }
 
-inline FaceHorizon find_horizon(const Clusters& clusters, int place, float size) {
-  const Outlook from(clusters.blocks[place / kClusterSize], place % kClusterSize, size);
-  if (!from.valid) return kNoHorizon;
+// Of Horizons::ask().
+inline float find_horizon(const Clusters& clusters, int place, int octant, float size) {
+  const Outlook from(clusters.blocks[place / kClusterSize], place % kClusterSize, octant, size);
+  if (!from.valid) return Horizons::kNever;
   int waiting[Clusters::kMaxWaiting];
   int left = 1;
   waiting[0] = 0;
   // Its neighbours first: what they hide need not be looked at.
   float slope = steepest_of(from, clusters.blocks[place / kClusterSize], 0);
-  if (slope > kSteepest) return kNoHorizon;
+  if (slope > kSteepest) return Horizons::kNever;
   while (left) {
     const ClusterNode& node = clusters.nodes[waiting[--left]];
     for (std::uint32_t near = rising(from, node, slope); near; near &= near - 1) {
@@ -180,24 +206,10 @@ inline FaceHorizon find_horizon(const Clusters& clusters, int place, float size)
         continue;
       }
       slope = steepest_of(from, clusters.blocks[~child], slope);
-      if (slope > kSteepest) return kNoHorizon;
+      if (slope > kSteepest) return Horizons::kNever;
     }
   }
-  FaceHorizon out = {};
-  const float sine = slope / __builtin_sqrtf(1 + slope * slope) + 2e-3f;
-  for (int k = 0; k < 3; ++k) {
-    out.clear[k] = from.normal[k] / sine;
-    out.offset += out.clear[k] * from.origin[k];
-  }
-  return out;
-}
-
-inline FaceHorizon horizon_of(const ViewGeom& g, int face) {
-  // To find it costs 5 us; a lane of a packet that Embree looks at, 0.1.
-  constexpr std::uint64_t kPatience = 50;
-  return g.horizons->ask(face, kPatience, [&] {
-    return find_horizon(*g.clusters, g.horizons->place(face), g.radius);
-  });
+  return slope / __builtin_sqrtf(1 + slope * slope) + 2e-3f;
 }
 
 // Lanes of `own` whose rays never meet the mesh of `g`, on whose faces they begin: at `foot` lifted by
@@ -206,26 +218,37 @@ inline FaceHorizon horizon_of(const ViewGeom& g, int face) {
 // Let the point be at most q from the face, L the lift, c and s cosine and sine of the angle between
 // the two normals. The ray begins at a height of at least L c - q and at most L s + q / facing
 // sideways from the face (which is seen under an angle with the cosine `facing`), so it is over what
-// rises with a slope of (L c - q) / (L s + q / facing) and less: 1.3 for what is asked for below.
+// rises with a slope of (L c - q) / (L s + q / facing) and less: 1.3 for what is asked for below. In all
+// it begins at most 1.5 L from the face, so that what is not ahead of its octant stays behind it.
 inline Mask leaves_mesh(const ViewGeom& g, const int* faces, Vec3f foot, Vec3f normal, Vec3f d,
                         Float lift, Mask own) {
-  alignas(64) float clear[3][kWidth] = {}, offset[kWidth] = {};
-  for (std::uint32_t lanes = bits(own); lanes; lanes &= lanes - 1) {
-    const int i = __builtin_ctz(lanes);
-    if (faces[i] < 0) continue;  // a wall of a height field
-    const FaceHorizon horizon = horizon_of(g, faces[i]);
-    for (int k = 0; k < 3; ++k) clear[k][i] = horizon.clear[k];
-    offset[i] = horizon.offset;
+  own = own & (lift <= splat(kMostLift * g.radius));
+  const std::uint32_t asked = bits(own);
+  if (!asked) return own;
+  alignas(64) int octants[kWidth];
+  const auto bit = [](Float x, int i) {
+    return select(x < splat(0.0f), int_of(1 << i), int_of(0));
+  };
+  store(octants, bit(d.x, 0) + bit(d.y, 1) + bit(d.z, 2));
+  Float4 planes[kWidth], sines[kWidth];
+  for (int i = 0; i < kWidth; ++i) {
+    planes[i] = Float4{};
+    sines[i] = Float4{Horizons::kNever};
+    if (!(asked >> i & 1u) || faces[i] < 0) continue;  // or a wall of a height field
+    planes[i] = load4(g.horizons->plane(faces[i]));
+    sines[i] = Float4{g.horizons->ask(faces[i], octants[i], [&] {
+      return find_horizon(*g.clusters, g.horizons->place(faces[i]), octants[i], g.radius);
+    })};
   }
-  const Vec3f n{load(clear[0]), load(clear[1]), load(clear[2])};
-  const Float rise = dot(d, n);
-  const Mask steep = (splat(0.0f) < rise) & (dot(d, d) < rise * rise);
+  const Vec4f plane = columns(planes);
+  const Vec3f n{plane.x, plane.y, plane.z};
+  const Float sine = columns(sines).x, rise = dot(d, n);
+  const Mask steep = (splat(0.0f) < rise) & (dot(d, d) * (sine * sine) < rise * rise);
   if (!any(own & steep)) return mask_of(0);
   const Vec3f from = splat(g.eye) - foot;
-  const Float size = sqrt(dot(n, n));
-  const Float facing = dot(from, n) / (size * sqrt(dot(from, from)));
-  const Float away = abs(dot(foot, n) - load(offset)) / size, allowed = lift * splat(0.05f);
-  return own & steep & (splat(0.9f) * size < dot(normal, n)) &
+  const Float facing = dot(from, n) / sqrt(dot(from, from));
+  const Float away = abs(dot(foot, n) - plane.w), allowed = lift * splat(0.05f);
+  return own & steep & (splat(0.9f) < dot(normal, n)) &
          (away < allowed * min(splat(1.0f), splat(4.0f) * facing));
 }
 

@@ -164,7 +164,8 @@ inline Vec3f triangle_normals(const ViewGeom& g, const Hits& hits, std::uint32_t
     const float* c = g.mesh->normals + 9 * hits.prim[k + i];
     rows[i] = b0[i] * load4(c) + hits.u[k + i] * load4(c + 3) + hits.v[k + i] * last3(c + 5);
   }
-  return columns(rows);
+  const Vec4f n = columns(rows);
+  return {n.x, n.y, n.z};
 }
 
 // Of one geom's lanes `mine`: normals, materials, textures. `first`: of a packet's geoms, whose values
