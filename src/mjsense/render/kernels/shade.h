@@ -96,13 +96,17 @@ struct Lit {
 inline Float highlight(const LightTerm& term, const Surfaces& s, const ToEye& eye, int k,
                        std::uint32_t lanes) {
   const Float zero = splat(0.0f), one = splat(1.0f);
-  const Mask glossy =
+  Mask glossy =
       (zero < term.diffuse) & (zero < load(s.specular + k)) & mask_of(lanes >> k & kAllLanes);
   if (!any(glossy)) return zero;
   const Vec3f n{load(s.n[0] + k), load(s.n[1] + k), load(s.n[2] + k)};
   const Vec3f p{load(s.p[0] + k), load(s.p[1] + k), load(s.p[2] + k)};
   const Vec3f h = along(term.unit, load(eye.scale + k), p);
-  const Float nh = dot(n, h) / sqrt(max(dot(h, h), splat(1e-20f)));
+  const Float near = dot(n, h), ahead = max(near, zero), size = dot(h, h);
+  // Most packets are far from it: neither root nor power is asked for.
+  glossy = glossy & ~(ahead * ahead < load(s.dull + k) * size);
+  if (!any(glossy)) return zero;
+  const Float nh = near / sqrt(max(size, splat(1e-20f)));
   return select(glossy, power(min(max(nh, zero), one), load(s.exponent + k)), zero);
 }
 

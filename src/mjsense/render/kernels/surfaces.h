@@ -13,7 +13,7 @@ struct alignas(64) Surfaces {
   float p[3][kLanes], n[3][kLanes];
   float rgb[3][kLanes], alpha[kLanes];
   float texture[3][kLanes];  // 0..1
-  float specular[kLanes], exponent[kLanes], emission[kLanes];
+  float specular[kLanes], exponent[kLanes], dull[kLanes], emission[kLanes];
 };
 
 // Unit normal in the geom's frame of a primitive at p.
@@ -200,6 +200,7 @@ void gather_geom(const View& view, const Pixels& pixels, const Hits& hits, const
     put(out.alpha, splat(s.rgba[3]));
     put(out.specular, splat(s.specular));
     put(out.exponent, splat(s.exponent));
+    put(out.dull, splat(s.dull));
     put(out.emission, splat(s.emission));
     if (!s.texture) continue;
     store(local[0] + k, q.x);

@@ -30,6 +30,7 @@ struct PixelGrid {
 struct Surface {
   float rgba[4];
   float specular, exponent, emission;  // exponent: 128 * shininess
+  float dull;                          // (N H)^2 below which highlights are 0, or -1
   const Texture* texture;              // null: none
   float repeat[2], shift[2];           // 2D: texture coordinates times repeat plus shift
   float stretch[3];                    // cube: times the direction

@@ -54,6 +54,14 @@ std::array<float, 3> drawn_extent(const ViewGeom& g) {
   }
 }
 
+// Of Surface: where power() of the kernels gives 0, with room for its rounding. It gives 0 below 0.3 for
+// exponents of at least 4, and where x^exponent is below e^-32.3.
+float dull_below(float exponent) {
+  if (!(exponent >= 4)) return -1;
+  const float x = 0.9999f * std::max(0.3f, std::exp(-33 / exponent));
+  return x * x;
+}
+
 }  // namespace
 
 ViewBuilder::ViewBuilder(const mjModel* model, const Look& look, const ViewOptions& options)
@@ -291,10 +299,10 @@ void ViewBuilder::set_surface(const RayGeom& source, const float* rgba, const Ma
   if (g.behind) s.rgba[3] *= kFromBehind;
   g.transparent = s.rgba[3] < kOpaque || g.behind;
   s.specular = 0.5f;
-  s.exponent = 64.0f;
+  s.exponent = 128.0f * (material ? material->shininess : 0.5f);
+  s.dull = dull_below(s.exponent);
   if (!material) return;
   s.specular = material->specular;
-  s.exponent = 128.0f * material->shininess;
   s.emission = material->emission;
   if (!options_.textures) return;
   s.texture = look_->texture(material->texture);
