@@ -32,6 +32,7 @@ class Horizons {
       if (places_.size() <= static_cast<std::size_t>(face)) places_.resize(face + 1);
       places_[face] = static_cast<int>(i);  // unused lanes repeat the first of their block
     }
+    planes_.reserve(places_.size());
     for (const int place : places_)
       planes_.push_back(plane_of(clusters.blocks[place / kClusterSize], place % kClusterSize));
     sines_ = std::make_unique<std::atomic<std::uint8_t>[]>(kOctants * places_.size());
