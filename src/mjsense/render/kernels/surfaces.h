@@ -8,7 +8,7 @@
 namespace mjsense {
 namespace {
 
-// A packet's surface points, camera frame.
+// A packet's surface points, camera frame. Lanes that show nothing hold anything.
 struct alignas(64) Surfaces {
   float p[3][kLanes], n[3][kLanes];
   float rgb[3][kLanes], alpha[kLanes];
@@ -150,8 +150,8 @@ inline void texture_lanes(const View& view, const ViewGeom& g, const Pixels& pix
   }
 }
 
-// Normals of triangles: interpolated where the mesh has them, else the face's own. Zero in lanes that
-// are not in `lanes`.
+// Normals of triangles: interpolated where the mesh has them, else the face's own. Other lanes hold
+// anything.
 inline Vec3f triangle_normals(const ViewGeom& g, const Hits& hits, std::uint32_t lanes, int k) {
   if (!(g.mesh && g.mesh->normals))
     return {load(hits.n[0] + k), load(hits.n[1] + k), load(hits.n[2] + k)};
