@@ -230,6 +230,7 @@ inline Mask leaves_mesh(const ViewGeom& g, const int* faces, Vec3f foot, Vec3f n
     return select(x < splat(0.0f), int_of(1 << i), int_of(0));
   };
   store(octants, bit(d.x, 0) + bit(d.y, 1) + bit(d.z, 2));
+  // Sines as columns, too: a vector read back from single floats would wait for the store buffer.
   Float4 planes[kWidth], sines[kWidth];
   for (int i = 0; i < kWidth; ++i) {
     planes[i] = Float4{};

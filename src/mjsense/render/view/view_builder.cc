@@ -54,15 +54,13 @@ std::array<float, 3> drawn_extent(const ViewGeom& g) {
   }
 }
 
-// Of Surface: where power() of the kernels gives 0, with room for its rounding. It gives 0 below 0.3 for
-// exponents of at least 4, and where x^exponent is below e^-32.3.
+}  // namespace
+
 float dull_below(float exponent) {
   if (!(exponent >= 4)) return -1;
   const float x = 0.9999f * std::max(0.3f, std::exp(-33 / exponent));
   return x * x;
 }
-
-}  // namespace
 
 ViewBuilder::ViewBuilder(const mjModel* model, const Look& look, const ViewOptions& options)
     : look_(&look),

@@ -32,6 +32,10 @@ struct ViewOptions {
   bool everything = false;  // nothing is passed by, for tests
 };
 
+// Surface::dull: where power() of the kernels gives 0, with room for its rounding. It gives 0 below 0.3
+// for exponents of at least 4, and where x^exponent is below e^-32.3.
+float dull_below(float exponent);
+
 // Owns the geoms of one view; build() fills it anew and allocates nothing.
 class ViewBuilder {
  public:

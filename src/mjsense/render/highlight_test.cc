@@ -1,0 +1,30 @@
+// SPDX-License-Identifier: Apache-2.0
+// No highlight is lost where a surface is said to be dull.
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+
+#include "mjsense/render/kernels/shade.h"
+#include "mjsense/render/view/view_builder.h"
+
+namespace mjsense {
+namespace {
+
+TEST(Highlight, IsNothingWhereASurfaceIsDull) {
+  for (float exponent : {0.0f, 1.0f, 3.9f, 4.0f, 13.0f, 27.5f, 64.0f, 128.0f, 1000.0f, 1e5f}) {
+    const float dull = dull_below(exponent);
+    const auto of = [&](float x) { return first_lane(power(splat(x), splat(exponent))); };
+    if (exponent < 4) {
+      EXPECT_LT(dull, 0) << exponent;
+      continue;
+    }
+    const float x = std::sqrt(dull);
+    for (float part : {0.0f, 0.5f, 0.99f, 1.0f}) EXPECT_EQ(of(part * x), 0) << exponent;
+    EXPECT_GT(of(std::min(1.0f, std::pow(1.1f * x, 0.8f))), 0) << exponent;
+  }
+}
+
+}  // namespace
+}  // namespace mjsense
