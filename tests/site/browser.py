@@ -4,6 +4,7 @@
     python tests/site/browser.py site 1280    prints what does not fit, page by page
 """
 
+import contextlib
 import functools
 import http.server
 import json
@@ -70,19 +71,31 @@ def measure(site, width, timeout=120):
 
         def log_message(self, *args): ...
 
-    with (http.server.ThreadingHTTPServer(("127.0.0.1", 0), functools.partial(Handler, directory=site)) as server,
-          tempfile.TemporaryDirectory(ignore_cleanup_errors=True) as profile):  # fmt: skip
+    with http.server.ThreadingHTTPServer(("127.0.0.1", 0), functools.partial(Handler, directory=site)) as server:
         threading.Thread(target=server.serve_forever, daemon=True).start()
+        with running(f"http://127.0.0.1:{server.server_port}/harness", f"--window-size={width + 20},2100"):
+            found = answer.get(timeout=timeout)
+        server.shutdown()
+    return found
+
+
+@contextlib.contextmanager
+def running(url, *options):
+    """Headless Chromium without a network, at this page."""
+    with tempfile.TemporaryDirectory(ignore_cleanup_errors=True) as profile:
         command = [chromium(), "--headless=new", "--no-sandbox", "--disable-gpu", f"--user-data-dir={profile}",
-                   f"--window-size={width + 20},2100", "--host-resolver-rules=MAP * ~NOTFOUND, EXCLUDE 127.0.0.1",
-                   f"http://127.0.0.1:{server.server_port}/harness"]  # fmt: skip
-        browser = subprocess.Popen(command, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
-        try:
-            return answer.get(timeout=timeout)
-        finally:
-            browser.kill()
-            browser.wait()
-            server.shutdown()
+                   "--host-resolver-rules=MAP * ~NOTFOUND, EXCLUDE 127.0.0.1", *options, url]  # fmt: skip
+        with subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL, text=True) as process:
+            try:
+                yield process
+            finally:
+                process.kill()
+
+
+def search_from_disk(site, word, timeout=60):
+    """What the page shows that is opened as a file with a search for this word: HTML."""
+    with running(f"{(Path(site) / 'frames.html').as_uri()}?q={word}", "--dump-dom", "--virtual-time-budget=10000") as process:
+        return process.communicate(timeout=timeout)[0].split("md-search-result__list", 1)[-1].split("</ol>", 1)[0]
 
 
 if __name__ == "__main__":
