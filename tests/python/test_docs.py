@@ -126,14 +126,6 @@ def test_command_lines(page, tmp_path):
             run(line, tmp_path)
 
 
-@pytest.mark.parametrize("index", ["README.md", "docs/index.md"])
-def test_every_page_is_named_where_readers_begin(index):
-    text = (ROOT / index).read_text()
-    linked = {(ROOT / index).parent / link for link in re.findall(r"\]\(([\w/]+\.md)\)", text)}
-    pages = {page for page in ROOT.glob("docs/*.md") if page.name != "index.md"}
-    assert pages <= linked, sorted(str(page.relative_to(ROOT)) for page in pages - linked)
-
-
 def test_figures_are_those_of_the_performance_notes(monkeypatch):
     monkeypatch.syspath_prepend(ROOT / "bench")
     import figures
