@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """MkDocs hook: adds the pages that live outside docs/ and expands `folder/*` in the navigation.
 
-Sensors, tasks, policies and robots have their page beside their code (src/mjsense/sensors/*/page.md and so on). CHANGELOG.md and
+The page of a sensor, task, policy or robot lies next to its code (src/mjsense/sensors/*/page.md and so on). CHANGELOG.md and
 CONTRIBUTING.md are read from the root of the repository.
 """
 

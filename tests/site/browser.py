@@ -20,7 +20,7 @@ HARNESS = """<!doctype html>
 <iframe id="frame" style="border: 0; width: WIDTHpx; height: 2000px"></iframe>
 <script>
 const frame = document.getElementById("frame"), found = {};
-// Tables in their column: what does not fit is cut off or has to be scrolled. Resources of other servers.
+// Finds tables that do not fit in their column and so are cut off or must be scrolled, and resources of other servers.
 function look() {
   const inside = frame.contentDocument;
   const column = inside.querySelector("article").getBoundingClientRect();
