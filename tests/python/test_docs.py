@@ -18,7 +18,7 @@ import mjsense as mjs
 
 ROOT = Path(__file__).parents[2]
 PROGRAM = Path(os.environ.get("MJSENSE_PROGRAM", ROOT / "build/dev/mjsense"))
-PAGES = [ROOT / "README.md", ROOT / "CONTRIBUTING.md", *sorted(ROOT.glob("docs/*.md")), *sorted(ROOT.glob("src/mjsense/**/page.md")),
+PAGES = [ROOT / "README.md", ROOT / "CONTRIBUTING.md", *sorted(ROOT.glob("docs/**/*.md")), *sorted(ROOT.glob("src/mjsense/**/page.md")),
          *sorted(ROOT.glob("models/**/page.md"))]
 FENCE = re.compile(r"^```(\w+)\n(.*?)^```$", re.MULTILINE | re.DOTALL)
 # What pages import of others -> what of it; what is not installed is imitated.

@@ -106,3 +106,13 @@ def test_readme_for_pypi_has_no_relative_links(tmp_path):
     assert "<!--" not in text
     for field in ("Author:", "Keywords:", "Classifier: Typing :: Typed", "Project-URL: Documentation"):
         assert field in text
+
+
+def test_messages_of_the_troubleshooting_page_exist():
+    """Each heading in backticks quotes a message: every part between dots is in the sources."""
+    files = [p for folder, kinds in (("src", ("*.cc", "*.h")), ("python", ("*.cc", "*.py"))) for kind in kinds for p in (ROOT / folder).rglob(kind)]
+    text = "".join(p.read_text() for p in files if not p.stem.endswith("_test"))
+    text = re.sub(r'"\s*\n\s*f?"', "", text)  # literals that continue on the next line
+    headings = re.findall(r"^### `(.+)`$", (ROOT / "docs/troubleshooting.md").read_text(), re.MULTILINE)
+    missing = [(heading, part) for heading in headings for part in heading.split("...") if (words := part.strip(" ;,:()")) and words not in text]
+    assert len(headings) > 20 and not missing
