@@ -14,7 +14,7 @@ WARP = "mujoco_warp on the CPU"
 OPENGL = "MuJoCo's OpenGL renderer in software"
 SENSORS = "MuJoCo's contact sensors"
 
-SHORT_UNITS = {"M rays per CPU second": "M rays/CPU s", "us a world-substep": "us"}
+SHORT_UNITS = {"M rays per CPU second": "M rays/CPU s", "us per world and substep": "us"}
 
 
 @dataclass(frozen=True)
@@ -41,7 +41,7 @@ TABLES = {
     "headlines": (TRAINING, BATCH, SCAN, STEP),
     "summary": (
         TRAINING,
-        Figure("cameras", "Panda table, randomised an episode, 640x480, rgb with shadows", "classic, shadow maps 1024",
+        Figure("cameras", "Panda table, randomised once an episode, 640x480, rgb with shadows", "classic, shadow maps 1024",
                "RGB with shadows, 640x480, Panda at a table, randomised once an episode", OPENGL),
         Figure("cameras", "Panda's wrist camera, 640x480, rgb with shadows", "classic, shadow maps 1024",
                "RGB with shadows, 640x480, Panda's wrist camera", OPENGL),
@@ -58,7 +58,7 @@ TABLES = {
         Figure("rays", "lidar 16 x 360 on a humanoid in a room, 127 geoms, 393k faces", "mujoco-lidar on the CPU",
                "Lidar, 16 x 360 rays, a room with 393,000 triangles", "mujoco-lidar on the CPU"),
         Figure("rays", "lidar in 16 worlds, a step of physics (not timed) between", "mj_multiRay", "Lidar in 16 worlds", "mj_multiRay"),
-        Figure("rays", "lidar among 10,000 boxes and one that moves", "ours, the boxes one mesh", "Lidar among 10,000 boxes",
+        Figure("rays", "lidar among 10,000 boxes and one that moves", "ours, the boxes as one mesh", "Lidar among 10,000 boxes",
                "mjsense, the boxes as one mesh"),
         STEP,
         Figure("physics", "Go1, contact forces, decimation 4", "mj_batch", "Physics of Go1 with fresh contact forces, time of a substep",
@@ -66,9 +66,9 @@ TABLES = {
         Figure("physics", "G1, contact forces, decimation 1", "mj_batch", "Physics of G1 with fresh contact forces, decimation 1, time of a substep",
                "MuJoCo's batch, values one substep old"),
         Figure("contact", "one world, primaries: 32, contacts: 32", SENSORS, "Contact sensor, 32 primaries, 32 contacts, 7 fields, time of a reading", SENSORS),
-        Figure("memory", "a world more: Panda at its table, wrist camera", "mjData alone", "Memory of a world, Panda at a table, wrist camera",
+        Figure("memory", "one more world: Panda at its table, wrist camera", "mjData alone", "Memory of a world, Panda at a table, wrist camera",
                "MuJoCo's mjData"),
-        Figure("record", "1 x 100 steps, 2 RGB, 640x368", "h5py + ffmpeg in turn", "Recording of two RGB cameras, 640x368, wall time",
+        Figure("record", "1 x 100 steps, 2 RGB, 640x368", "h5py and ffmpeg in sequence", "Recording of two RGB cameras, 640x368, wall time",
                "h5py and ffmpeg, one after the other"),
     ),
 }  # fmt: skip
