@@ -21,12 +21,14 @@ class Docstrings(griffe.Extension):
     def on_package(self, *, pkg: griffe.Module, loader: Any, **kwargs: Any) -> None:
         for module in pkg.modules.values():
             for cls in module.classes.values() if not module.is_alias else ():
-                if not cls.is_alias and any("_dataclass.dataclass" in d.callable_path for d in cls.decorators):
+                if cls.is_alias:
+                    continue
+                cls.bases = [base for base in cls.bases if "._" not in getattr(base, "canonical_path", "")]  # private ones
+                if any("_dataclass.dataclass" in d.callable_path for d in cls.decorators):
                     parameters = [griffe.Parameter(f.name, annotation=f.annotation, kind=griffe.ParameterKind.positional_or_keyword,
                                                    default=default(f)) for f in fields(cls)]  # fmt: skip
                     for name in [n for n, a in cls.attributes.items() if not a.is_alias and "ClassVar" in str(a.annotation)]:
                         cls.del_member(name)
-                    cls.bases = [base for base in cls.bases if "_config_methods" not in str(base)]
                     own = griffe.Parameter("self", kind=griffe.ParameterKind.positional_or_keyword)
                     cls.set_member("__init__", griffe.Function("__init__", parameters=griffe.Parameters(own, *parameters)))
 
