@@ -28,6 +28,13 @@ def title(page):
     return re.search(r"^# (.+)$", page.read_text(), re.MULTILINE)[1]
 
 
+def description(page):
+    """The first sentence."""
+    text = re.sub(r"<!--.*?-->|```.*?```", "", page.read_text(), flags=re.DOTALL)
+    paragraph = next(p for p in text.split("\n\n")[1:] if re.match(r"\w", p))
+    return re.split(r"(?<=[.])\s", " ".join(paragraph.split()))[0]
+
+
 def with_site_links(text):
     """Links of a file in the root: those into docs/ lead to the site's pages, those to other files become plain text."""
     text = re.sub(r"\]\(docs/", "](", text)
@@ -54,8 +61,8 @@ def on_files(files, config):
             add(f"{folder}/{page.parent.name}.md", page.read_text().replace("../../../../docs/", "../"))
             for picture in sorted([*page.parent.glob("*.svg"), *page.parent.glob("*.png")]):
                 add(f"{folder}/{picture.name}", picture.read_bytes())
-        entries = "".join(f"- [{title(page)}]({page.parent.name}.md)\n" for page in pages)
-        add(f"{folder}/index.md", f"# {folder.capitalize()}\n\n{INTRODUCTIONS[folder]}\n\n{entries}")
+        rows = "".join(f"| [{title(page).split(':')[0]}]({page.parent.name}.md) | {description(page)} |\n" for page in pages)
+        add(f"{folder}/index.md", f"# {folder.capitalize()}\n\n{INTRODUCTIONS[folder]}\n\n| page | summary |\n| --- | --- |\n{rows}")
         folders[folder] = [f"{folder}/index.md", *(f"{folder}/{page.parent.name}.md" for page in pages)]
     for folder in SINGLE:
         add(f"{folder}.md", (SOURCE / folder / "page.md").read_text())
