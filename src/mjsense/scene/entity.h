@@ -46,7 +46,8 @@ void visit_fields(V& v, EntityCfg& c) {
            "Files that XML text refers to, by name.");
   v("pos", c.pos,
     "Of the entity's root in the world: of its free body, else of the mocap body that a fixed base "
-    "hangs under.")
+    "hangs under. A keyframe of the model moves with it: it keeps its pose relative to the root's "
+    "pose in the XML.")
       .unit("m");
   v("quat", c.quat, "Of the same, wxyz; the identity keeps what the XML says.");
   v("joint_pos", c.joint_pos,
