@@ -287,7 +287,7 @@ int run_program(int argc, char** argv) {
     // It may quote a file of a stranger's.
     constexpr std::size_t kMostBytes = 4000;
     if (why.size() > kMostBytes) why = why.substr(0, kMostBytes) + " ...";
-    say("mjsense: {}\n", printable(one_line(why)));
+    say("mjsense: {}\n", one_line(why));
     return kWrongInput;
   }
 }

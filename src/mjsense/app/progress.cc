@@ -60,7 +60,7 @@ void ProgressLine::show(const RecordProgress& progress, int stop_level) {
     text_ += fmt::format("  stopping: {} running; Ctrl-C discards them", progress.running);
   }
   if (terminal_) {
-    say("\r\033[K{}", text_.substr(0, terminal_width() - 1));
+    say_raw("\r\033[K" + text_.substr(0, terminal_width() - 1));
     std::fflush(stderr);
     open_ = true;
     return;

@@ -7,6 +7,7 @@
 #include <filesystem>
 
 #include "mjsense/app/progress.h"
+#include "mjsense/core/plain_file.h"
 
 namespace mjsense {
 namespace {
@@ -43,7 +44,9 @@ void add_tree(const std::filesystem::path& folder, const std::string& indent, st
 std::string Table::text() const {
   std::vector<std::size_t> widths;
   for (const std::string& cell : header) widths.push_back(width(cell));
-  for (const auto& row : rows) {
+  std::vector<std::vector<std::string>> shown = rows;
+  for (auto& row : shown) {
+    for (std::string& cell : row) cell = printable(cell);  // names from files of others
     for (std::size_t i = 0; i < row.size(); ++i) widths[i] = std::max(widths[i], width(row[i]));
   }
   std::string out;
@@ -59,7 +62,7 @@ std::string Table::text() const {
     out += line + "\n";
   };
   add(header);
-  for (const auto& row : rows) add(row);
+  for (const auto& row : shown) add(row);
   return out;
 }
 
