@@ -22,16 +22,17 @@ void translate(const std::exception_ptr& error, void*) {
     const nb::handle exception = e.exception.get();
     PyErr_SetObject(reinterpret_cast<PyObject*>(Py_TYPE(exception.ptr())), exception.ptr());
   } catch (const Error& e) {
+    const std::string what = printable_lines(e.what());  // names from files of others
     switch (e.kind()) {
       case ErrorKind::kValue:
-        PyErr_SetString(PyExc_ValueError, e.what());
+        PyErr_SetString(PyExc_ValueError, what.c_str());
         break;
       case ErrorKind::kRuntime:
-        PyErr_SetString(PyExc_RuntimeError, e.what());
+        PyErr_SetString(PyExc_RuntimeError, what.c_str());
         break;
       case ErrorKind::kKey:
         PyErr_SetString(nb::module_::import_("mjsense.errors").attr("UnknownNameError").ptr(),
-                        e.what());
+                        what.c_str());
         break;
     }
   }

@@ -20,6 +20,7 @@
 #include "mjsense/core/error.h"
 #include "mjsense/sim/simulation.h"
 #include "python/bindings/birthplace.h"
+#include "python/bindings/callbacks.h"
 #include "python/bindings/numpy.h"
 #include "python/bindings/python_sensor.h"
 
@@ -34,6 +35,7 @@ class Turns {
   template <class Body>
   void change(std::string_view what, Body&& body) {
     place_.check("simulation");
+    refuse_python_callbacks();
     nb::gil_scoped_release unlock;
     std::lock_guard lock(mutex_);
     if (depth_ > 0) {
@@ -48,6 +50,7 @@ class Turns {
   template <class Body>
   void read(Body&& body) {
     place_.check("simulation");
+    refuse_python_callbacks();
     nb::gil_scoped_release unlock;
     std::lock_guard lock(mutex_);
     const Depth in(depth_);
@@ -57,6 +60,7 @@ class Turns {
   template <class Body>
   auto work(Body&& body) {
     place_.check("simulation");
+    refuse_python_callbacks();
     std::lock_guard lock(mutex_);
     const Depth in(depth_);
     return body();

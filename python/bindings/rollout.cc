@@ -17,6 +17,7 @@
 #include "mjsense/rollout/registry.h"
 #include "mjsense/scenes/scene_file.h"
 #include "python/bindings/bindings.h"
+#include "python/bindings/callbacks.h"
 #include "python/bindings/fields.h"
 #include "python/bindings/host.h"
 #include "python/bindings/numpy.h"
@@ -126,6 +127,7 @@ nb::dict record(nb::dict options, nb::object progress, nb::object objects,
     }
   };
   RecordSummary s;
+  refuse_python_callbacks();
   try {
     nb::gil_scoped_release unlock;
     // Code of users that runs for it may read the worlds, not move them.
@@ -164,6 +166,7 @@ class PyRollout {
  public:
   PyRollout(nb::dict options, nb::object objects, nb::object make_simulation)
       : parts_(objects, make_simulation), turns_(parts_.host()->turns()) {
+    refuse_python_callbacks();
     RolloutCfg cfg;
     read_options(options, struct_of<RolloutCfg>(), &cfg);
     parts_.join(cfg);

@@ -13,7 +13,9 @@
 #include "mjsense/app/schema.h"
 #include "mjsense/core/embedded.h"
 #include "mjsense/core/error.h"
+#include "mjsense/core/plain_file.h"
 #include "python/bindings/bindings.h"
+#include "python/bindings/callbacks.h"
 #include "python/bindings/fields.h"
 #include "python/bindings/numpy.h"
 #include "python/bindings/python_sensor.h"
@@ -69,6 +71,7 @@ std::shared_ptr<const SensorCfg> read_sensor(nb::handle item) {
 
 std::shared_ptr<Scene> make_scene(nb::handle config, nb::handle spec, nb::list sensors,
                                   nb::object edit) {
+  refuse_python_callbacks();  // compilation calls them too
   nb::list alive;
   SceneCfg cfg = read_scene(config, spec, sensors, edit, alive);
   nb::gil_scoped_release unlock;
@@ -200,7 +203,12 @@ void bind_scene(nb::module_& m) {
                assets[name.c_str()] = nb::bytes(bytes.data(), bytes.size());
              return assets;
            })
-      .def("warnings", &Scene::warnings)
+      .def("warnings",
+           [](const Scene& s) {
+             std::vector<std::string> texts;
+             for (const std::string& text : s.warnings()) texts.push_back(printable_lines(text));
+             return texts;
+           })
       .def(
           "copy_model",
           [](const Scene& s) {

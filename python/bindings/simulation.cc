@@ -228,6 +228,43 @@ void bind_simulation(nb::module_& m) {
             });
           },
           nb::arg("world_ids"), nb::arg("set_const"))
+      .def(
+          "copy_model",
+          [](PySimulation& s) {
+            std::uintptr_t copy = 0;
+            s.read([&](Simulation& sim) {
+              copy = reinterpret_cast<std::uintptr_t>(mj_copyModel(nullptr, sim.model()));
+            });
+            return copy;
+          },
+          "Address of a copy of the model that is simulated, which the caller owns.")
+      .def(
+          "write_model",
+          [](PySimulation& s, int world, std::uintptr_t address) {
+            s.read([&](Simulation& sim) {
+              sim.worlds().write_model(world, reinterpret_cast<mjModel*>(address));
+            });
+          },
+          nb::arg("world"), nb::arg("address"), "Writes a world's own values into such a copy.")
+      .def("model_version",
+           [](PySimulation& s) {
+             std::int64_t version = 0;
+             s.read([&](Simulation& sim) { version = sim.worlds().model_version(); });
+             return version;
+           })
+      .def(
+          "warning_counts",
+          [](PySimulation& s) {
+            std::vector<std::vector<std::int64_t>> counts(mjNWARNING);
+            s.read([&](Simulation& sim) {
+              for (int i = 0; i < mjNWARNING; ++i) {
+                for (int w = 0; w < sim.num_worlds(); ++w)
+                  counts[i].push_back(sim.worlds().warning_counts(w)[i]);
+              }
+            });
+            return counts;
+          },
+          "By mjtWarning and world.")
       .def("times",
            [](PySimulation& s) {
              std::vector<double> times;

@@ -40,9 +40,14 @@ def rows_of(specs: Mapping[str, Any], num_worlds: int | None) -> list[Row]:
     return [Row(name, s.dtype, (*worlds, *s.shape), s.unit, s.frame, s.description) for name, s in specs.items()]
 
 
+def printable(text: str) -> str:
+    """Names come from files of others: control characters, and those that turn the direction of writing, become '?'."""
+    return "".join(c if c.isprintable() or c == "\n" else "?" for c in text)
+
+
 def line(head: str, rows: list[Row]) -> str:
     """``<contact sensor 'feet': found float32 [64, 4]; force float32 [64, 4, 3] N>``."""
-    return f"<{head}: {'; '.join(row.text() for row in rows)}>" if rows else f"<{head}>"
+    return printable(f"<{head}: {'; '.join(row.text() for row in rows)}>" if rows else f"<{head}>")
 
 
 class HelpOfObject:
@@ -62,7 +67,8 @@ def help_of_objects(cls: type) -> None:
 def help_text(cls: type, rows: list[Row]) -> str:
     """A line a field, then those of the class."""
     fields = [f"{row.text()}: {row.sentence}" if row.sentence else row.text() for row in rows]
-    return "\n".join([*fields, "", f"help({cls.__name__}) says what it can do.", "", inspect.cleandoc(cls.__doc__ or "")]).strip()
+    text = "\n".join([*fields, "", f"help({cls.__name__}) says what it can do.", "", inspect.cleandoc(cls.__doc__ or "")])
+    return printable(text).strip()
 
 
 def table(head: str, rows: list[Row], images: Mapping[str, np.ndarray]) -> str:

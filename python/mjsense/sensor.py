@@ -228,6 +228,7 @@ class Sensor:
         kept.append(getattr(first, "observation_space", None))
         if "model" in vars(sim.scene):
             kept.append(sim.scene.model)
+        kept += [model for model in (sim._model, *sim._models.values()) if model is not None]
         memo = {id(thing): thing for thing in kept if thing is not first}
         try:
             return copy.deepcopy(first, memo)

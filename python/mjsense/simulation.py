@@ -111,6 +111,9 @@ class Simulation(KnownAttributes):
         self._views: dict[str, np.ndarray] = {}
         self._python: list[Sensor] = []
         self._derived: dict[str, tuple[Any, np.ndarray]] = {}
+        self._model: mujoco.MjModel | None = None
+        self._models: dict[int, mujoco.MjModel] = {}
+        self._models_version = 0
         for sensor in scene.sensors.values():
             if isinstance(sensor, Sensor):
                 self._core.own_sensor(sensor._mjs_handle)
@@ -153,12 +156,12 @@ class Simulation(KnownAttributes):
             world_ids: which worlds; all if not given.
             seed: random numbers start again from this seed, in all worlds.
             key: keyframe (name or index) to start from, the model's own pose if not given. ``"init_state"`` joins the entities'
-                first keyframes.
+                first keyframes; those of a scene's base have their own names and numbers.
         """
         if isinstance(key, str):
-            found = mujoco.mj_name2id(self.scene.model, mujoco.mjtObj.mjOBJ_KEY, key)
+            found = mujoco.mj_name2id(self.model, mujoco.mjtObj.mjOBJ_KEY, key)
             if found < 0:
-                names = [self.scene.model.key(i).name for i in range(self.scene.model.nkey)]
+                names = [self.model.key(i).name for i in range(self.model.nkey)]
                 raise ValueError(f"no keyframe '{key}'; there are {names}")
             key = int(found)
         self._core.reset(_ids(world_ids), -1 if key is None else key, seed)
@@ -231,9 +234,42 @@ class Simulation(KnownAttributes):
         return self._core.failures()
 
     @property
+    def warning_counts(self) -> dict[str, np.ndarray]:
+        """How often MuJoCo has warned since the simulation was made, int ``[B]`` by the warning's name, ``"mjWARN_CONTACTFULL"``.
+
+        Warnings that were never raised are absent. The first of each name is also printed by MuJoCo, with its world.
+        """
+        counts = {mujoco.mjtWarning(i).name: np.array(row) for i, row in enumerate(self._core.warning_counts())}
+        return {name: row for name, row in counts.items() if row.any()}
+
+    @property
     def model(self) -> mujoco.MjModel:
-        """A copy of the model, for looking things up."""
-        return self.scene.model
+        """A copy of the model that is simulated, for looking things up. It has none of the values that differ between worlds:
+        :meth:`model_of` has."""
+        if self._model is None:
+            self._model = mujoco.MjModel._from_model_ptr(self._core.copy_model())
+        return self._model
+
+    def model_of(self, world: int) -> mujoco.MjModel:
+        """A copy of the model with the values of one world: those that :meth:`randomize` gave it, and the sizes, furniture, lights
+        and colours of its episode.
+
+        A world has one copy, made when it is first asked for, with all memory of a model. It follows :meth:`randomize`; what a new
+        episode or a write to :meth:`model_field` has changed is copied by the next call. Changing it changes no simulation.
+        """
+        (world,) = self._rows([world]).tolist()
+        if world not in self._models:
+            self._models[world] = mujoco.MjModel._from_model_ptr(self._core.copy_model())
+        self._core.write_model(world, self._models[world]._address)
+        return self._models[world]
+
+    def _follow_models(self) -> None:
+        """Brings the copies that model_of() has made up to date."""
+        version = self._core.model_version()
+        if version != self._models_version:
+            for world in self._models:
+                self.model_of(world)
+            self._models_version = version
 
     @property
     def threads(self) -> int:
@@ -276,8 +312,13 @@ class Simulation(KnownAttributes):
             count = getattr(self.model, _IDS[field])
             if (values < -1).any() or (values >= count).any():
                 raise ValueError(f"{field}: ids from {values.min()} to {values.max()}; the model's are 0 to {count - 1}, -1 is none")
+        if field.endswith("quat") and values.size and (norms := np.linalg.norm(values, axis=-1)).min() < 1e-12:
+            world, *element = np.argwhere(norms < 1e-12)[0].tolist()
+            world = np.arange(self.num_worlds)[rows][world]
+            raise ValueError(f"{field}: values must be quaternions; that of world {world}, element {element}, has length 0")
         target[rows] = values
         self._core.model_changed(_ids(world_ids), field in mujoco.MjModel._setconst_inputs)
+        self._follow_models()
         self.forward(world_ids)
 
     def _check_types(self, field: str, values: np.ndarray) -> None:

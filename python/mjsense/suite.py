@@ -9,6 +9,7 @@ from typing import Any
 import gymnasium
 
 from mjsense._arguments import KnownAttributes, checked
+from mjsense._show import printable
 from mjsense.errors import UnknownNameError
 from mjsense.sensor import Sensor, as_sensor
 
@@ -42,7 +43,7 @@ class SensorSuite(KnownAttributes):
             self.add(sensor)
 
     def __repr__(self) -> str:
-        return f"<suite of {len(self.sensors)} sensors: {', '.join(self.sensors)}>"
+        return printable(f"<suite of {len(self.sensors)} sensors: {', '.join(self.sensors)}>")
 
     def _repr_html_(self) -> str:
         """For notebooks: each sensor as it shows itself."""

@@ -1,4 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
+import ctypes
 import gc
 import threading
 
@@ -251,3 +252,84 @@ def test_contact_data_and_air_time():
     assert scene["touch"].primary_names == ("ball",)
     assert scene["touch"].compute_first_contact(sim.step_dt).tolist() == [[False], [False]]
     assert "found=float32[2, 1]" in repr(data)
+
+
+CROWD = (
+    "<mujoco><size memory='12K'/><worldbody><geom type='plane' size='5 5 .1'/>"
+    + "".join(f"<body pos='{0.05 * i} 0 .1'><freejoint/><geom type='box' size='.1 .1 .1'/></body>" for i in range(6))
+    + "</worldbody></mujoco>"
+)
+
+
+def test_warnings_are_counted_and_reported_once(capfd):
+    """Six boxes in memory for few contacts: MuJoCo warns in every world after every reset."""
+    sim = mjs.Simulation(mjs.Scene(mjs.SceneCfg(base=CROWD)), num_worlds=4)
+    for _ in range(3):
+        sim.step(3)
+        sim.reset()
+    assert set(sim.warning_counts) == {"mjWARN_CONTACTFULL"}
+    assert sim.warning_counts["mjWARN_CONTACTFULL"].shape == (4,) and (sim.warning_counts["mjWARN_CONTACTFULL"] >= 12).all()
+    err = capfd.readouterr().err
+    assert err.count("WARNING") == err.count("Too many contacts") == 1 and "world 0" in err
+    data = mujoco.MjData(sim.model)
+    mujoco.mj_forward(sim.model, data)  # MuJoCo of one's own warns as ever
+    assert capfd.readouterr().err.count("Too many contacts") == 1
+
+
+@pytest.mark.parametrize("field", ["geom_quat", "body_quat", "site_quat"])
+def test_a_quaternion_of_length_zero_is_refused(field):
+    sim = mjs.Simulation(ball_scene(), num_worlds=3)
+    values = np.array(sim.model_field(field))
+    values[1, -1] = 0
+    with pytest.raises(ValueError, match=rf"{field}: values must be quaternions; that of world 1, element \[\d\], has length 0"):
+        sim.randomize(field, values)
+    assert np.linalg.norm(sim.model_field(field), axis=-1).min() > 0.9
+    sim.step()
+    assert sim.failures == []
+
+
+def test_python_callbacks_are_refused_by_name(sim):
+    """MuJoCo's Python callbacks know objects of Python alone; function pointers work."""
+    try:
+        mujoco.set_mjcb_sensor(lambda model, data, stage: None)
+        with pytest.raises(RuntimeError, match=r"mjcb_sensor is a Python function.*mujoco.set_mjcb_sensor\(None\)"):
+            sim.step()
+        with pytest.raises(RuntimeError, match="mjcb_sensor is a Python function"):
+            ball_scene()
+        with pytest.raises(RuntimeError, match="mjcb_sensor is a Python function"):
+            mjs.make_vec("pick", 1, cameras=[])
+        mujoco.set_mjcb_sensor(None)
+        calls = []
+        kind = ctypes.CFUNCTYPE(None, ctypes.c_void_p, ctypes.c_void_p, ctypes.c_int)
+        pointer = kind(lambda model, data, stage: calls.append(stage))
+        mujoco.set_mjcb_control(ctypes.CFUNCTYPE(None, ctypes.c_void_p, ctypes.c_void_p)(lambda model, data: calls.append(-1)))
+        mujoco.set_mjcb_passive(None)
+        sim.step()
+        assert sim.failures == [] and -1 in calls
+        assert pointer
+    finally:
+        for name in ("sensor", "control"):
+            getattr(mujoco, f"set_mjcb_{name}")(None)
+    sim.step()
+
+
+def test_names_do_not_control_the_terminal():
+    """A name with ESC in it, as errors, warnings and a sensor's text show it."""
+    model = "<mujoco><worldbody><body name='a&#27;[31m'><geom size='.1'/><site name='s'/></body></worldbody><sensor>{}</sensor></mujoco>"
+    scene = mjs.Scene(mjs.SceneCfg(base=model.format("<gyro name='g&#27;[2J' site='s'/>")))
+    sim = mjs.Simulation(scene, num_worlds=1)
+    texts = [repr(scene["g\x1b[2J"]), repr(scene)]
+    with pytest.raises(KeyError) as error:
+        scene["nothing"]
+    texts.append(str(error.value))
+    match = mjs.ContactMatch(mode="body", pattern="a..31", entity="e")
+    with pytest.raises(KeyError) as error:
+        mjs.Scene(
+            mjs.SceneCfg(
+                entities={"e": mjs.EntityCfg(model=model.format(""))}, sensors=[mjs.ContactSensorCfg(name="c", primary=match)]
+            )
+        )
+    texts.append(str(error.value))
+    assert any("?[31m" in text for text in texts) and any("?[2J" in text for text in texts)
+    assert not any("\x1b" in text for text in texts), texts
+    sim.close()

@@ -20,6 +20,21 @@ if TYPE_CHECKING:
     from mjsense.simulation import Simulation
 
 
+class _Models(Sequence):
+    """The model of each world, made when it is asked for."""
+
+    def __init__(self, sim: Simulation) -> None:
+        self._sim = sim
+
+    def __len__(self) -> int:
+        return self._sim.num_worlds
+
+    def __getitem__(self, world: Any) -> Any:
+        if isinstance(world, slice):
+            return [self._sim.model_of(w) for w in range(*world.indices(len(self)))]
+        return self._sim.model_of(range(len(self))[world])
+
+
 class PeerEnv:
     """The worlds of a simulation. Whatever is not here is the simulation's: ``env.qpos[batch_index]``, ``env.scene["imu"]``."""
 
@@ -66,9 +81,14 @@ class PeerEnv:
         self._world = world
 
     @property
+    def mj_models(self) -> Sequence[mujoco.MjModel]:
+        """A mujoco.MjModel of each world with the world's own values: :meth:`mjsense.Simulation.model_of`."""
+        return _Models(self.sim)
+
+    @property
     def mj_model(self) -> mujoco.MjModel:
-        """The model of all worlds; what was randomized by world is not in it."""
-        return self.sim.model
+        """That of the world whose sensor is asked."""
+        return self.sim.model_of(self._world)
 
     current_model = mj_model
 
@@ -76,7 +96,7 @@ class PeerEnv:
     def mj_datas(self) -> Sequence[mujoco.MjData]:
         """A mujoco.MjData of each world as it is now, derived quantities and contacts included: copies, which nobody reads back."""
         if self._copies is None:
-            self._datas = [mujoco.MjData(self.mj_model) for _ in range(self.n_batch)]
+            self._datas = [mujoco.MjData(model) for model in self.mj_models]
             self._copies = self.sim._core.data_copies(self._datas)
         self._make_current()
         return self._datas
@@ -87,12 +107,13 @@ class PeerEnv:
         return self.mj_datas[self._world]
 
     def _make_current(self) -> None:
+        self.sim._follow_models()
         if self._copies is not None:
             self.sim._core.refresh(self._copies)
 
     @contextmanager
     def _asked(self) -> Iterator[PeerEnv]:
-        """While sensors are asked: MjData objects that they keep show the present state, and one may ask another."""
+        """While sensors are asked: MjModel and MjData objects that they keep are current, and one may ask another."""
         self._make_current()
         before = self._world
         try:

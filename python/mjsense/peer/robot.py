@@ -169,7 +169,7 @@ class RobotView:
 
     @property
     def mj_model(self) -> mujoco.MjModel:
-        return self._env.mj_model
+        return self._env.mj_models[self._world]
 
     @property
     def mj_data(self) -> mujoco.MjData:

@@ -365,7 +365,7 @@ int run_program(int argc, char** argv) {
     // The message may quote a file of any size.
     constexpr std::size_t kMostBytes = 4000;
     if (why.size() > kMostBytes) why = why.substr(0, kMostBytes) + " ...";
-    say("mjsense: {}\n", printable(one_line(why)));
+    say("mjsense: {}\n", one_line(why));
     return kWrongInput;
   }
 }

@@ -51,7 +51,7 @@ void ProgressLine::show(const RecordProgress& progress, int stop_level) {
   }
   if (terminal_) {
     // A longer line would wrap, and "\r" would not return to its beginning.
-    say("\r\033[K{}", text_.substr(0, terminal_width(STDERR_FILENO) - 1));
+    say_raw("\r\033[K" + text_.substr(0, terminal_width(STDERR_FILENO) - 1));
     std::fflush(stderr);
     open_ = true;
     return;

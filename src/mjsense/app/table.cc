@@ -8,6 +8,7 @@
 
 #include "mjsense/app/progress.h"
 #include "mjsense/app/terminal.h"
+#include "mjsense/core/plain_file.h"
 
 namespace mjsense {
 namespace {
@@ -38,7 +39,9 @@ void add_tree(const std::filesystem::path& folder, const std::string& indent, st
 std::string Table::text() const {
   std::vector<std::size_t> widths;
   for (const std::string& cell : header) widths.push_back(text_width(cell));
-  for (const auto& row : rows) {
+  std::vector<std::vector<std::string>> shown = rows;
+  for (auto& row : shown) {
+    for (std::string& cell : row) cell = printable(cell);  // names from files of others
     for (std::size_t i = 0; i < row.size(); ++i)
       widths[i] = std::max(widths[i], text_width(row[i]));
   }
@@ -55,7 +58,7 @@ std::string Table::text() const {
     out += line + "\n";
   };
   add(header);
-  for (const auto& row : rows) add(row);
+  for (const auto& row : shown) add(row);
   return out;
 }
 

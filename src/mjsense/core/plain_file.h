@@ -56,5 +56,7 @@ void write_file(const std::filesystem::path& path,
 // Text from a file as a terminal may see it: control characters, those that turn
 // the direction of writing, and bytes that are no UTF-8, become '?'.
 [[nodiscard]] std::string printable(std::string_view text);
+// The same, but for line breaks, which stay.
+[[nodiscard]] std::string printable_lines(std::string_view text);
 
 }  // namespace mjsense

@@ -1,20 +1,28 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
-// What a person may read on stderr. One that cannot be written, because its terminal is gone or its
-// disk is full, is no reason to end: fmt::print() would throw.
+// Messages on stderr. A message that cannot be written, because the terminal is gone or the disk is
+// full, is dropped: fmt::print() would throw.
 
 #include <fmt/format.h>
 
 #include <cstdio>
 #include <string>
+#include <string_view>
 #include <utility>
+
+#include "mjsense/core/plain_file.h"
 
 namespace mjsense {
 
+// As it is, terminal controls included.
+inline void say_raw(std::string_view text) {
+  static_cast<void>(std::fwrite(text.data(), 1, text.size(), stderr));
+}
+
+// Names in the text may come from files of others: see printable().
 template <class... Args>
 void say(fmt::format_string<Args...> form, Args&&... args) {
-  const std::string text = fmt::format(form, std::forward<Args>(args)...);
-  static_cast<void>(std::fwrite(text.data(), 1, text.size(), stderr));
+  say_raw(printable_lines(fmt::format(form, std::forward<Args>(args)...)));
 }
 
 }  // namespace mjsense

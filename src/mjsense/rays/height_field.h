@@ -248,8 +248,9 @@ inline FieldHit intersect_height_field(const HeightField& field, Vec3f o, Vec3f 
   const float top[3] = {field.size[0], field.size[1], 0.5f * field.size[2]};
   const Vec3f ot = {o.x, o.y, o.z - top[2]};
   const Interval in = Box::interval(top, ot, d), level = slab(top[2], ot.z, d.z);
-  const Float start = max(in.enter, 0.0f), stop = min(in.leave, limit);
-  Mask active = (in.enter <= in.leave) & (in.leave >= Float(0.0f)) & (start <= stop);
+  // A ray through an edge of the box enters and leaves at once, which rounding must not turn around.
+  const Float start = max(in.enter, 0.0f), stop = max(min(in.leave, limit), start);
+  Mask active = (in.enter <= tied(in.leave)) & (in.leave >= Float(0.0f)) & (start <= limit);
   if (!any(active)) return hit;
 
   // A wall: where the ray enters through a side, below the surface's rim.

@@ -177,7 +177,7 @@ void trace_height_field(const HeightField& field, const RayGeom& g, int id, bool
   const Frame frame(g, rays.origin);
   for (int k = 0; k < kPacket; k += kWidth) {
     const Vec3f o = frame.point(rays.o, k), d = frame.direction(rays.d, k);
-    const Float limit = min(load(hits.t + k), load(rays.tmax + k));
+    const Float limit = min(tied(load(hits.t + k)), load(rays.tmax + k));
     const FieldHit hit = intersect_height_field(field, o, d, limit, cull);
     const Mask m = nearer(hits, rays, k, hit.t, id);
     if (any(m)) put(hits, k, m, hit.t, id, hit.prim, frame.to_world(hit.normal));

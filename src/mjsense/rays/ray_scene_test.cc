@@ -311,6 +311,59 @@ TEST_P(Kernels, TiesGoToTheLowerGeom) {
   EXPECT_EQ(s.down({.groups = 1, .hidden = hidden}).geom, s.id("cube"));  // not the drum
 }
 
+// Two geoms side by side; half of the rays meet the one with the higher id first:
+//
+//        \  |  /
+//   ______\_|_/______
+//  |   1   |   0    |      rays to the border between them
+TEST_P(Kernels, NeighboursThatTieGoToTheLowerGeom) {
+  Rng rng(21, 0, 0, 0);
+  std::string hills, mirrored;
+  for (int r = 0; r < 9; ++r) {
+    std::vector<double> row;
+    for (int c = 0; c < 9; ++c) row.push_back(r == 4 && c < 2 ? c : rng.uniform(0, 1));
+    for (int c = 0; c < 9; ++c) hills += testing::vec({row[c]});
+    for (int c = 0; c < 9; ++c) mirrored += testing::vec({row[8 - c]});
+  }
+  const std::string assets =
+      "<mujoco><asset><mesh name='cube' vertex='-1 -1 -1 1 -1 -1 1 1 -1 -1 1 -1 -1 -1 1 1 -1 1 1 1 "
+      "1 "
+      "-1 1 1'/><hfield name='right' nrow='9' ncol='9' size='1 1 .5 .1' elevation='" +
+      hills + "'/><hfield name='left' nrow='9' ncol='9' size='1 1 .5 .1' elevation='" + mirrored +
+      "'/></asset><worldbody>";
+  const char* pairs[][2] = {{"type='hfield' hfield='right'", "type='hfield' hfield='left'"},
+                            {"type='box' size='1 1 1'", "type='box' size='1 1 1'"},
+                            {"type='mesh' mesh='cube'", "type='mesh' mesh='cube'"},
+                            {"type='box' size='1 1 1'", "type='mesh' mesh='cube'"}};
+  for (const auto& [right, left] : pairs) {
+    const TestModel m(assets + "<geom " + right + " pos='1 0 0'/><geom " + left +
+                      " pos='-1 0 0'/></worldbody></mujoco>");
+    RayScene scene(m.model, 1, isa());
+    scene.update(m.world());
+    int ties = 0, wrong = 0;
+    for (int i = 0; i < 4000; ++i) {
+      const double y = rng.uniform(-0.99, 0.99), top[3] = {1e-9, y, 3}, down[3] = {0, 0, -1};
+      double o[3] = {rng.uniform(-1, 1), rng.uniform(-1, 1), 3}, d[3] = {-o[0], y - o[1], 0};
+      d[2] = -mujoco_ray(m, top, down).t;  // the surface at the border
+      mju_normalize3(d);
+      double t[2];
+      for (int g = 0; g < 2; ++g) {
+        t[g] = m.model->geom_type[g] == mjGEOM_HFIELD
+                   ? mj_rayHfield(m.model, m.data, g, o, d, nullptr)
+               : m.model->geom_type[g] == mjGEOM_MESH
+                   ? mj_rayMesh(m.model, m.data, g, o, d, nullptr)
+                   : mju_rayGeom(m.data->geom_xpos + 3 * g, m.data->geom_xmat + 9 * g,
+                                 m.model->geom_size + 3 * g, o, d, m.model->geom_type[g], nullptr);
+      }
+      if (t[0] < 0 || t[1] < 0 || std::abs(t[0] - t[1]) > 1e-9) continue;
+      ++ties;
+      wrong += scene.trace(0, {}, o, d).geom != 0;
+    }
+    EXPECT_GT(ties, 500) << right;
+    EXPECT_EQ(wrong, 0) << "of " << ties << ": " << right << ", " << left;
+  }
+}
+
 TEST_P(Kernels, BackFacesAreCulledIfAsked) {
   const Layers s(isa());
   const auto inside = [&](const char* only, RayFilter::Backfaces backfaces) {

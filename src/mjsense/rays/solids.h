@@ -14,6 +14,10 @@ struct Interval {
   Float enter, leave;  // of the whole line; empty if enter > leave
 };
 
+// The largest t that is a tie with t: distances differ by rounding when a ray meets the border of two
+// geoms.
+inline Float tied(Float t) { return t + fma(abs(t), 4e-7f, 1e-7f); }
+
 inline Float first_ahead(Interval in, Mask hit, bool cull) {
   const Mask ahead = in.enter >= Float(0.0f);
   const Float exit =
@@ -49,7 +53,8 @@ struct Box {
   }
   static Float intersect(const float* size, Vec3f o, Vec3f d, bool cull) {
     const Interval in = interval(size, o, d);
-    return first_ahead(in, in.enter <= in.leave, cull);
+    // A ray through an edge hits: rounding must not leave it to a neighbour with a higher id.
+    return first_ahead(in, in.enter <= tied(in.leave), cull);
   }
   static Vec3f normal(const float* size, Vec3f p) {
     const Float x = abs(abs(p.x) - size[0]), y = abs(abs(p.y) - size[1]),

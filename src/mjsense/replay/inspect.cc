@@ -192,16 +192,6 @@ std::string size_text(std::int64_t bytes) {
   return fmt::format("{:.1f} MiB", static_cast<double>(bytes) / (1 << 20));
 }
 
-std::string printable_lines(const std::string& text) {
-  std::string out;
-  for (std::size_t start = 0; start < text.size();) {
-    const std::size_t end = std::min(text.find('\n', start), text.size());
-    out += printable(std::string_view(text).substr(start, end - start)) + "\n";
-    start = end + 1;
-  }
-  return out;
-}
-
 std::vector<std::string> split_path(const std::string& path) {
   std::vector<std::string> parts;
   for (std::size_t start = 0; start <= path.size();) {

@@ -132,17 +132,33 @@ std::array<double, 4> unit_quat(const EntityCfg& cfg, const std::string& place) 
   return unit;
 }
 
-void set_pose(mjsBody* body, const EntityCfg& cfg, const std::string& place) {
-  const std::array<double, 4> quat = unit_quat(cfg, place);
-  if (is_identity(cfg)) return;
-  if (mjs_getFrame(body->element)) {
-    throw ValueError(
-        fmt::format("{}: its root '{}' stands in a <frame>, so pos and quat must be given there",
-                    place, element_name(body->element)));
+// The pose of a body or frame in what surrounds it.
+template <class Element>
+Pose pose_of(const Element* element, const mjSpec* spec, const std::string& place) {
+  double q[4];
+  std::copy(element->quat, element->quat + 4, q);
+  if (element->alt.type != mjORIENTATION_QUAT) {
+    const char* fault =
+        mjs_resolveOrientation(q, spec->compiler.degree, spec->compiler.eulerseq, &element->alt);
+    if (fault) throw ValueError(fmt::format("{}: {}", place, fault));
   }
-  std::copy(cfg.pos.begin(), cfg.pos.end(), body->pos);
-  std::copy(quat.begin(), quat.end(), body->quat);
+  return {vec3(element->pos), normalized(quat(q))};
+}
+
+// Puts a root where the configuration says. Returns the motion from where it stood in the world.
+Pose set_pose(mjsBody* body, const EntityCfg& cfg, const mjSpec* spec, const std::string& place) {
+  const std::array<double, 4> q = unit_quat(cfg, place);
+  if (is_identity(cfg)) return {};
+  Pose frames;  // that the body stands in
+  for (mjsFrame* f = mjs_getFrame(body->element); f; f = mjs_getFrame(f->element))
+    frames = pose_of(f, spec, place) * frames;
+  const Pose before = frames * pose_of(body, spec, place);
+  const Pose wanted{vec3(cfg.pos.data()), quat(q.data())};
+  const Pose local = mjs_getFrame(body->element) ? inverse(frames) * wanted : wanted;
+  write_vec(local.p, body->pos);
+  write_quat(local.q, body->quat);
   mjs_defaultOrientation(&body->alt);
+  return wanted * inverse(before);
 }
 
 }  // namespace
@@ -164,7 +180,12 @@ Attached attach_entity(mjSpec* scene, const std::string& name, const EntityCfg& 
   name_unnamed(child.get());
 
   Attached attached{name, cfg};
-  attached.init = take_keyframes(child.get(), place, warnings);
+  attached.keys = take_keyframes(child.get());
+  if (attached.keys.size() > 1) {
+    warnings.push_back(fmt::format("{}: {} keyframes; only the first, '{}', goes into init_state",
+                                   place, attached.keys.size(), attached.keys.front().name));
+    attached.keys.resize(1);
+  }
   if (!whole_model_settings(child.get()).empty()) {
     child = apply_whole_model_settings(std::move(child), vfs, place);
   }
@@ -196,11 +217,11 @@ Attached attach_entity(mjSpec* scene, const std::string& name, const EntityCfg& 
     parent = mjs_addBody(world, nullptr);
     mjs_setName(parent->element, (name + "/mocap_base").c_str());
     parent->mocap = 1;
-    set_pose(parent, cfg, place);
+    set_pose(parent, cfg, scene, place);
   } else if (!attached.fixed_base) {
-    set_pose(mjs_getParent(free_joints[0]), cfg, place);
+    attached.moved = set_pose(mjs_getParent(free_joints[0]), cfg, child.get(), place);
   } else if (is_mocap) {
-    set_pose(mjs_asBody(root), cfg, place);
+    attached.moved = set_pose(mjs_asBody(root), cfg, child.get(), place);
   }
   mjsFrame* frame = mjs_addFrame(parent, nullptr);
   if (attached.fixed_base && !attached.wrapped && !is_mocap) {
@@ -217,12 +238,11 @@ Attached attach_entity(mjSpec* scene, const std::string& name, const EntityCfg& 
   return attached;
 }
 
-Attached adopt_base(mjSpec* base, const ModelSource& source, Vfs& vfs,
-                    std::vector<std::string>& warnings) {
+Attached adopt_base(mjSpec* base, const ModelSource& source, Vfs& vfs) {
   adopt_assets(base, source, "", vfs);
   name_unnamed(base);
   Attached attached;
-  attached.init = take_keyframes(base, "scene base", warnings);
+  attached.keys = take_keyframes(base);
   return attached;
 }
 

@@ -20,7 +20,6 @@ Attached attach_entity(mjSpec* scene, const std::string& name, const EntityCfg& 
 
 // Makes a whole model the ground that entities are attached to, in place: names what is unnamed,
 // takes its keyframes out.
-Attached adopt_base(mjSpec* base, const ModelSource& source, Vfs& vfs,
-                    std::vector<std::string>& warnings);
+Attached adopt_base(mjSpec* base, const ModelSource& source, Vfs& vfs);
 
 }  // namespace mjsense

@@ -46,7 +46,8 @@ void visit_fields(V& v, EntityCfg& c) {
            "Contents of the files that the XML text refers to, by file name.");
   v("pos", c.pos,
     "Position of the entity's root in the world: of its free body or, for a fixed base, of the "
-    "mocap body that carries it.")
+    "mocap body that carries it. A keyframe of the model moves with it: its pose relative to the "
+    "root's pose in the XML stays the same.")
       .unit("m");
   v("quat", c.quat,
     "Orientation (wxyz) of the entity's root; the identity keeps the orientation of the XML.");

@@ -30,17 +30,30 @@ struct Run {
 
 class Merger {
  public:
-  Merger(const std::vector<Attached>& all, const Attached& entity, mjModel* model)
-      : all_(all), entity_(entity), m_(model), place_(fmt::format("entity '{}'", entity.name)) {
+  // `key`: the number of the scene's keyframe.
+  Merger(const std::vector<Attached>& all, const Attached& entity, mjModel* model, int key)
+      : all_(all),
+        entity_(entity),
+        m_(model),
+        place_(fmt::format("entity '{}'", entity.name)),
+        qpos_(m_->key_qpos + key * m_->nq),
+        qvel_(m_->key_qvel + key * m_->nv),
+        act_(m_->key_act + key * m_->na),
+        ctrl_(m_->key_ctrl + key * m_->nu),
+        mpos_(m_->key_mpos + 3 * key * m_->nmocap),
+        mquat_(m_->key_mquat + 4 * key * m_->nmocap) {
     if (entity.name.empty()) place_ = "scene base";
   }
 
-  void merge() {
+  // Null: the entity has no keyframe.
+  void merge(const Keyframe* init) {
     Run qpos, qvel, ctrl, act, mocap;
+    int free_joint = -1, mocap_root = -1;
     for (int j = 0; j < m_->njnt; ++j) {
       const std::string name = name_of(m_, mjOBJ_JOINT, j);
       if (!owns(name)) continue;
       const int type = m_->jnt_type[j];
+      if (type == mjJNT_FREE) free_joint = j;
       qpos.add(m_->jnt_qposadr[j], type == mjJNT_FREE ? 7 : type == mjJNT_BALL ? 4 : 1);
       qvel.add(m_->jnt_dofadr[j], type == mjJNT_FREE ? 6 : type == mjJNT_BALL ? 3 : 1);
     }
@@ -52,16 +65,26 @@ class Merger {
     for (int b = 0; b < m_->nbody; ++b) {
       const std::string name = name_of(m_, mjOBJ_BODY, b);
       const bool ours = entity_.wrapped && name == entity_.name + "/mocap_base";
-      if (m_->body_mocapid[b] >= 0 && owns(name) && !ours) mocap.add(m_->body_mocapid[b], 1);
+      if (m_->body_mocapid[b] < 0 || !owns(name) || ours) continue;
+      if (mocap_root < 0) mocap_root = m_->body_mocapid[b];
+      mocap.add(m_->body_mocapid[b], 1);
     }
-    const InitialState& init = entity_.init;
-    if (init.from_xml) {
-      put(init.qpos, m_->key_qpos, qpos, 1, "qpos");
-      put(init.qvel, m_->key_qvel, qvel, 1, "qvel");
-      put(init.ctrl, m_->key_ctrl, ctrl, 1, "ctrl");
-      put(init.act, m_->key_act, act, 1, "act");
-      put(init.mpos, m_->key_mpos, mocap, 3, "mpos");
-      put(init.mquat, m_->key_mquat, mocap, 4, "mquat");
+    if (init) {
+      put(init->qpos, qpos_, qpos, 1, "qpos");
+      put(init->qvel, qvel_, qvel, 1, "qvel");
+      put(init->ctrl, ctrl_, ctrl, 1, "ctrl");
+      put(init->act, act_, act, 1, "act");
+      put(init->mpos, mpos_, mocap, 3, "mpos");
+      put(init->mquat, mquat_, mocap, 4, "mquat");
+      if (entity_.name.empty()) return;
+      if (free_joint >= 0) {
+        mjtNum* q = qpos_ + m_->jnt_qposadr[free_joint];
+        mjtNum* v = qvel_ + m_->jnt_dofadr[free_joint];  // linear: world axes, angular: the body's
+        if (!init->qpos.empty()) move(q, q + 3);
+        write_vec(rotate(entity_.moved.q, vec3(v)), v);
+      } else if (mocap_root >= 0 && !init->mpos.empty() && !init->mquat.empty()) {
+        move(mpos_ + 3 * mocap_root, mquat_ + 4 * mocap_root);
+      }
     } else if (!entity_.name.empty()) {
       make();
     }
@@ -73,6 +96,12 @@ class Merger {
     return std::none_of(all_.begin(), all_.end(), [&](const Attached& other) {
       return !other.name.empty() && name.starts_with(other.name + "/");
     });
+  }
+
+  void move(mjtNum* pos, mjtNum* quaternion) const {
+    const Pose& moved = entity_.moved;
+    write_vec(moved * vec3(pos), pos);
+    write_quat(moved.q * quat(quaternion), quaternion);
   }
 
   void put(const std::vector<double>& values, mjtNum* target, Run run, int width,
@@ -96,7 +125,7 @@ class Merger {
       const std::string name = name_of(m_, mjOBJ_JOINT, j);
       if (!owns(name)) continue;
       const int type = m_->jnt_type[j];
-      mjtNum* q = m_->key_qpos + m_->jnt_qposadr[j];
+      mjtNum* q = qpos_ + m_->jnt_qposadr[j];
       if (type == mjJNT_FREE) {
         std::copy(cfg.pos.begin(), cfg.pos.end(), q);
         std::copy(cfg.quat.begin(), cfg.quat.end(), q + 3);
@@ -124,34 +153,51 @@ class Merger {
   const Attached& entity_;
   mjModel* m_;
   std::string place_;
+  mjtNum *qpos_, *qvel_, *act_, *ctrl_, *mpos_, *mquat_;
 };
 
 }  // namespace
 
-InitialState take_keyframes(mjSpec* spec, const std::string& place,
-                            std::vector<std::string>& warnings) {
-  InitialState init;
-  const std::vector<mjsElement*> keys = spec_elements(spec, mjOBJ_KEY);
-  if (keys.size() > 1) {
-    warnings.push_back(fmt::format("{}: {} keyframes; only the first, '{}', goes into init_state",
-                                   place, keys.size(), element_name(keys[0])));
+std::vector<Keyframe> take_keyframes(mjSpec* spec) {
+  std::vector<Keyframe> keys;
+  for (mjsElement* element : spec_elements(spec, mjOBJ_KEY)) {
+    const mjsKey* key = mjs_asKey(element);
+    keys.push_back({element_name(element), key->time, values_of(key->qpos), values_of(key->qvel),
+                    values_of(key->act), values_of(key->ctrl), values_of(key->mpos),
+                    values_of(key->mquat)});
+    mjs_delete(spec, element);
   }
-  if (!keys.empty()) {
-    const mjsKey* key = mjs_asKey(keys[0]);
-    init = {true,
-            values_of(key->qpos),
-            values_of(key->qvel),
-            values_of(key->act),
-            values_of(key->ctrl),
-            values_of(key->mpos),
-            values_of(key->mquat)};
+  return keys;
+}
+
+void add_keyframes(mjSpec* spec, const std::vector<Keyframe>& base) {
+  const auto add = [&](std::string_view name, double time) {
+    mjsKey* key = mjs_addKey(spec);
+    if (!name.empty()) mjs_setName(key->element, std::string(name).c_str());
+    key->time = time;
+  };
+  for (const Keyframe& key : base) {
+    if (key.name != kInitState) add(key.name, key.time);
   }
-  for (mjsElement* key : keys) mjs_delete(spec, key);
-  return init;
+  add(kInitState, base.empty() ? 0.0 : base.front().time);
 }
 
 void merge_initial_states(const std::vector<Attached>& entities, mjModel* model) {
-  for (const Attached& entity : entities) Merger(entities, entity, model).merge();
+  const int init_state = mj_name2id(model, mjOBJ_KEY, kInitState.data());
+  const auto merge = [&](int key, const Keyframe* of_base) {
+    for (const Attached& entity : entities) {
+      const Keyframe* first = entity.keys.empty() ? nullptr : &entity.keys.front();
+      Merger(entities, entity, model, key).merge(entity.name.empty() ? of_base : first);
+    }
+  };
+  for (const Attached& entity : entities) {
+    if (!entity.name.empty()) continue;
+    int number = 0;  // as add_keyframes() counts
+    for (const Keyframe& key : entity.keys) {
+      if (key.name != kInitState && number < init_state) merge(number++, &key);
+    }
+    if (init_state >= 0) merge(init_state, entity.keys.empty() ? nullptr : &entity.keys.front());
+  }
 }
 
 }  // namespace mjsense

@@ -1,11 +1,42 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "mjsense/scene/mujoco_log.h"
 
-#include <mujoco/mujoco.h>
+#include <fmt/format.h>
 
+#include <atomic>
+#include <mutex>
 #include <string_view>
+#include <utility>
 
 namespace mjsense {
+namespace {
+
+std::mutex capture_mutex;
+std::atomic<mjfLogHandler> chained = nullptr;
+thread_local std::vector<std::string>* captured = nullptr;
+thread_local bool dropping = false;
+
+void on_message(const mjLogMessage* message) {
+  const bool warning = message->level == mjLOG_WARNING;
+  if (warning && captured) {
+    std::string text = message->subject;
+    if (message->body) text += fmt::format(": {}", message->body);
+    captured->push_back(std::move(text));
+  } else if (warning && dropping) {
+    return;
+  } else if (const mjfLogHandler next = chained) {
+    next(message);
+  }
+}
+
+// With the mutex locked. Returns the handler that was there.
+mjfLogHandler install() {
+  const mjfLogHandler previous = mju_setLogHandler(on_message);
+  if (previous != on_message) chained = previous;
+  return previous;
+}
+
+}  // namespace
 
 void leave_no_log_file() {
   mjLogConfig config = mju_getLogConfig();
@@ -13,5 +44,28 @@ void leave_no_log_file() {
   config.logto_file = 0;
   mju_setLogConfig(config);
 }
+
+WarningCapture::WarningCapture(std::vector<std::string>& messages) {
+  capture_mutex.lock();
+  captured = &messages;
+  previous_ = install();
+}
+
+WarningCapture::~WarningCapture() {
+  mju_setLogHandler(previous_);
+  captured = nullptr;
+  capture_mutex.unlock();
+}
+
+void install_warning_filter() {
+  static const bool once = [] {
+    const std::lock_guard lock(capture_mutex);
+    install();
+    return true;
+  }();
+  static_cast<void>(once);
+}
+
+void drop_warnings(bool on) { dropping = on; }
 
 }  // namespace mjsense

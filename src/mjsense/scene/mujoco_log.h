@@ -1,11 +1,35 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
+// Where MuJoCo's messages go.
+
+#include <mujoco/mujoco.h>
+
+#include <string>
+#include <vector>
 
 namespace mjsense {
 
-// MuJoCo writes what it warns of also to MUJOCO_LOG.TXT in the current folder, which is somebody's.
-// From here on it does not; a file that was chosen by mju_setLogConfig() stays. For programs: it
-// changes the process.
+// MuJoCo also writes its warnings to MUJOCO_LOG.TXT in the current folder. After this call it does
+// not; a file that was chosen by mju_setLogConfig() stays. For programs: it changes the process.
 void leave_no_log_file();
+
+// While one exists, MuJoCo's warnings on this thread are appended to `messages` instead of printed.
+// One at a time in the process; the messages of other threads are unaffected.
+class WarningCapture {
+ public:
+  explicit WarningCapture(std::vector<std::string>& messages);
+  ~WarningCapture();
+  WarningCapture(const WarningCapture&) = delete;
+  WarningCapture& operator=(const WarningCapture&) = delete;
+
+ private:
+  mjfLogHandler previous_;
+};
+
+// Installs a log handler, once in the process, that drops the warnings of threads for which
+// drop_warnings(true) was called and passes every other message to the handler that was there.
+void install_warning_filter();
+// A function and not an object, because MuJoCo's errors jump over destructors.
+void drop_warnings(bool on);
 
 }  // namespace mjsense

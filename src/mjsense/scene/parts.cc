@@ -9,6 +9,7 @@
 #include "mjsense/scene/assets.h"
 #include "mjsense/scene/compiler_settings.h"
 #include "mjsense/scene/initial_state.h"
+#include "mjsense/scene/mujoco_log.h"
 
 namespace mjsense {
 namespace {
@@ -37,11 +38,10 @@ mjsFrame* mount(mjSpec* model, const std::string& name, const std::string& place
 void attach_part(mjSpec* model, const ModelPart& part, std::string_view of) {
   const std::string place = fmt::format("{}: part '{}'", of, part.path);
   Vfs vfs;
-  std::vector<std::string> unheard;
   const ModelSource source{.path = part.path};
   SpecPtr child = parse_model(source, place);
   adopt_assets(child.get(), source, "", vfs);
-  take_keyframes(child.get(), place, unheard);
+  take_keyframes(child.get());
   if (!whole_model_settings(child.get()).empty())
     child = apply_whole_model_settings(std::move(child), vfs, place);
   mj_defaultOption(&child->option);
@@ -63,12 +63,11 @@ SpecPtr compose_model(const ModelSource& model, std::span<const ModelPart> parts
                       std::string_view place) {
   SpecPtr spec = parse_model(model, place);
   Vfs vfs;
-  std::vector<std::string> unheard;
   adopt_assets(spec.get(), model, "", vfs);
   // MuJoCo warns that a part without a prefix may be saved wrongly; save_xml() knows.
   std::vector<std::string> warnings;
   const WarningCapture capture(warnings);
-  if (!parts.empty()) take_keyframes(spec.get(), std::string(place), unheard);
+  if (!parts.empty()) take_keyframes(spec.get());
   for (const ModelPart& part : parts) attach_part(spec.get(), part, place);
   return spec;
 }

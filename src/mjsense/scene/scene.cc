@@ -14,13 +14,12 @@
 #include "mjsense/scene/daylight.h"
 #include "mjsense/scene/model_check.h"
 #include "mjsense/scene/model_sensors/model_sensor.h"
+#include "mjsense/scene/mujoco_log.h"
 #include "mjsense/scene/resolve.h"
 #include "mjsense/scene/spec.h"
 
 namespace mjsense {
 namespace {
-
-constexpr const char* kInitState = "init_state";
 
 void check_name(const std::string& name, bool has_terrain, const std::vector<Attached>& before) {
   if (name.empty()) throw ValueError("scene: an entity needs a name");
@@ -92,7 +91,7 @@ void Scene::Impl::build() {
     if (!text.starts_with("Attach conflict")) warnings.push_back(std::move(text));
   }
   add_sensors();
-  mjs_setName(mjs_addKey(spec.get())->element, kInitState);
+  add_keyframes(spec.get(), attached.front().keys);  // the base stands first
   if (cfg.spec_fn) cfg.spec_fn(spec.get());
   if (cfg.terrain && cfg.terrain->daylight) add_daylight(spec.get());
   compile();
@@ -133,7 +132,7 @@ void Scene::Impl::attach() {
   spec = cfg.spec           ? SpecPtr(cfg.spec, SpecDelete{false})
          : cfg.base.empty() ? SpecPtr(mj_makeSpec())
                             : parse_model(cfg.base, "scene base");
-  attached.push_back(adopt_base(spec.get(), cfg.base, vfs, warnings));
+  attached.push_back(adopt_base(spec.get(), cfg.base, vfs));
   set_options();
   if (std::isnan(spec->stat.meansize)) spec->stat.meansize = 0.03;
   if (cfg.extent) spec->stat.extent = *cfg.extent;

@@ -83,7 +83,8 @@ class Scene {
   Scene(const Scene&) = delete;
   Scene& operator=(const Scene&) = delete;
 
-  // One keyframe, "init_state": the first keyframes of the entities joined. A world starts at
+  // Its keyframes: those of the base, with their names and times, and "init_state". In each the
+  // entities stand as in their first keyframe; init_state has the base's first. A world starts at
   // qpos0, not there.
   const mjModel* model() const;
   // With assets() as files beside it compiles to the same model again. Files on disk are named by
@@ -111,7 +112,7 @@ class Scene {
   const Terrain* terrain() const;  // null if there is none
 
   // What was found odd but not wrong: options of entities that are not carried over, further
-  // keyframes, MuJoCo's own.
+  // keyframes of entities, MuJoCo's own.
   const std::vector<std::string>& warnings() const;
 
  private:

@@ -327,6 +327,88 @@ TEST(Scene, JoinsKeyframes) {
   EXPECT_THAT(scene.warnings(), ::testing::Contains(HasSubstr("entity 'one': 2 keyframes")));
 }
 
+// The base's keyframes by name and number, with the first keyframe of the entity in each.
+TEST(Scene, ABaseKeepsItsKeyframes) {
+  SceneCfg cfg;
+  cfg.base.xml =
+      "<mujoco><worldbody><body name='a'><joint name='x' type='slide'/><geom size='.1'/></body>"
+      "</worldbody><keyframe><key name='home' time='.5' qpos='1'/><key time='1.5' qpos='2'/>"
+      "<key name='away' qpos='3'/></keyframe></mujoco>";
+  cfg.entities = {{"table", xml(kTable)}};
+  const Scene scene(std::move(cfg));
+  const auto check = [](const mjModel* m) {
+    ASSERT_EQ(m->nkey, 4);
+    EXPECT_EQ(mj_name2id(m, mjOBJ_KEY, "home"), 0);
+    EXPECT_EQ(mj_name2id(m, mjOBJ_KEY, "away"), 2);
+    EXPECT_EQ(mj_name2id(m, mjOBJ_KEY, "init_state"), 3);
+    EXPECT_THAT(std::vector<double>(m->key_time, m->key_time + 4), ElementsAre(.5, 1.5, 0, .5));
+    EXPECT_THAT(std::vector<double>(m->key_qpos, m->key_qpos + 4 * m->nq),
+                ElementsAre(1, .25, 2, .25, 3, .25, 1, .25));
+  };
+  check(scene.model());
+  EXPECT_THAT(scene.warnings(), ::testing::IsEmpty());
+  SceneCfg saved;  // whose init_state is the scene's
+  saved.base.xml = scene.to_xml();
+  check(Scene(std::move(saved)).model());
+}
+
+// Two instances of a model stand where they were put, in their keyframe too.
+TEST(Scene, AKeyframeMovesWithItsEntity) {
+  const char* legged =
+      "<mujoco><worldbody><body pos='0 0 .3'><freejoint/><geom size='.1'/></body></worldbody>"
+      "<keyframe><key qpos='.1 0 .25 1 0 0 0' qvel='1 0 0 0 0 2'/></keyframe></mujoco>";
+  const double half = std::sqrt(.5);
+  EntityCfg moved = xml(legged), turned = xml(legged);
+  moved.pos = {1, 2, .3};
+  turned.pos = {0, 5, .3};
+  turned.quat = {half, 0, 0, half};
+  SceneCfg cfg;
+  cfg.entities = {{"as_it_is", xml(legged)}, {"moved", moved}, {"turned", turned}};
+  const Scene scene(std::move(cfg));
+  const mjModel* m = scene.model();
+  const double qpos[] = {.1, 0, .25, 1, 0, 0, 0, 1.1, 2, .25, 1,
+                         0,  0, 0,   0, 5.1, .25, half, 0, 0, half};
+  const double qvel[] = {1, 0, 0, 0, 0, 2, 1, 0, 0, 0, 0, 2, 0, 1, 0, 0, 0, 2};
+  ASSERT_EQ(m->nq, 21);
+  for (int i = 0; i < m->nq; ++i) EXPECT_NEAR(m->key_qpos[i], qpos[i], 1e-15) << i;
+  for (int i = 0; i < m->nv; ++i) EXPECT_NEAR(m->key_qvel[i], qvel[i], 1e-15) << i;
+}
+
+TEST(Scene, AMocapKeyframeMovesWithItsEntity) {
+  EntityCfg hand = xml(
+      "<mujoco><worldbody><body name='hand' mocap='true' pos='0 0 1'><geom size='.1'/></body>"
+      "</worldbody><keyframe><key mpos='0 0 1.5' mquat='1 0 0 0'/></keyframe></mujoco>");
+  hand.pos = {3, 0, 1};
+  SceneCfg cfg;
+  cfg.entities = {{"hand", hand}};
+  const Scene scene(std::move(cfg));
+  EXPECT_THAT(std::vector<double>(scene.model()->key_mpos, scene.model()->key_mpos + 3),
+              ElementsAre(3, 0, 1.5));
+}
+
+// Frames about the root, by quaternion and by Euler angles: pos and quat are of the root in the world.
+TEST(Scene, ARootInAFrameStandsWhereItIsPut) {
+  const char* framed =
+      "<mujoco><worldbody><frame pos='1 0 0' euler='0 0 90'><frame pos='0 0 2'>"
+      "<body name='root' pos='.5 0 0' euler='90 0 0'><freejoint/><geom size='.1'/></body>"
+      "</frame></frame></worldbody><keyframe><key qpos='1 .5 2.5 1 0 0 0'/></keyframe></mujoco>";
+  EntityCfg put = xml(framed);
+  put.pos = {4, 5, 6};
+  put.quat = {0, 1, 0, 0};
+  SceneCfg cfg;
+  cfg.entities = {{"r", put}};
+  const Scene scene(std::move(cfg));
+  const mjModel* m = scene.model();
+  const double wanted[] = {4, 5, 6, 0, 1, 0, 0};
+  for (int i = 0; i < 7; ++i) EXPECT_NEAR(m->qpos0[i], wanted[i], 1e-15) << i;
+  // In its own model the root stands at (1, .5, 2), turned by 90 degrees about z, then about x; the
+  // keyframe, half a metre above it, is not turned.
+  const Pose own{{1, .5, 2}, quat_from_columns({0, 1, 0}, {0, 0, 1}, {1, 0, 0})};
+  const Pose key = Pose{{4, 5, 6}, {0, 1, 0, 0}} * (inverse(own) * Pose{{1, .5, 2.5}, {}});
+  EXPECT_LT(norm(vec3(m->key_qpos) - key.p), 1e-14);
+  EXPECT_LT(angle_between(quat(m->key_qpos + 3), key.q), 1e-7);
+}
+
 TEST(Scene, SpecFnComesLast) {
   SceneCfg cfg;
   cfg.entities = {{"robot", xml(kRobot)}};

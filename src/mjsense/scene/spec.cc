@@ -3,9 +3,7 @@
 
 #include <fmt/format.h>
 
-#include <atomic>
 #include <filesystem>
-#include <mutex>
 #include <optional>
 #include <set>
 #include <utility>
@@ -22,20 +20,6 @@ namespace mjsense {
 namespace {
 
 constexpr std::string_view kEmbedded = "embedded:";
-
-std::mutex capture_mutex;
-std::atomic<mjfLogHandler> chained = nullptr;
-thread_local std::vector<std::string>* captured = nullptr;
-
-void on_message(const mjLogMessage* message) {
-  if (captured && message->level == mjLOG_WARNING) {
-    std::string text = message->subject;
-    if (message->body) text += fmt::format(": {}", message->body);
-    captured->push_back(std::move(text));
-  } else if (const mjfLogHandler next = chained) {
-    next(message);
-  }
-}
 
 SpecPtr checked(mjSpec* spec, const char* error, std::string_view place) {
   if (!spec) throw ValueError(fmt::format("{}: {}", place, one_line(error)));
@@ -94,19 +78,6 @@ void Vfs::add(const std::string& name, std::string_view bytes, std::string_view 
   if (failed)
     throw ValueError(fmt::format("{}: MuJoCo did not take the asset '{}' ({} bytes)", place, name,
                                  bytes.size()));
-}
-
-WarningCapture::WarningCapture(std::vector<std::string>& messages) {
-  capture_mutex.lock();
-  captured = &messages;
-  previous_ = mju_setLogHandler(on_message);
-  chained = previous_;
-}
-
-WarningCapture::~WarningCapture() {
-  mju_setLogHandler(previous_);
-  captured = nullptr;
-  capture_mutex.unlock();
 }
 
 SpecPtr parse_model(const ModelSource& source, std::string_view place) {

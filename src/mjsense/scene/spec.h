@@ -46,19 +46,6 @@ class Vfs {
   std::map<std::string, std::string> files_;
 };
 
-// While it lives, MuJoCo's warnings on this thread are kept here instead of printed and written to
-// MUJOCO_LOG.TXT. One at a time in the process; other threads' messages go where they went before.
-class WarningCapture {
- public:
-  explicit WarningCapture(std::vector<std::string>& messages);
-  ~WarningCapture();
-  WarningCapture(const WarningCapture&) = delete;
-  WarningCapture& operator=(const WarningCapture&) = delete;
-
- private:
-  mjfLogHandler previous_;
-};
-
 // Parses a model. Throws ValueError with MuJoCo's text; `place` names the entity.
 SpecPtr parse_model(const ModelSource& source, std::string_view place);
 

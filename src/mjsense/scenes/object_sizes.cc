@@ -39,7 +39,7 @@ ObjectSizes::Own<T> ObjectSizes::own(mjBatch* batch, const char* field, const T*
 
 ObjectSizes::ObjectSizes(Simulation& simulation, std::span<const int> bodies,
                          std::vector<std::vector<double>> sizes, std::string_view place)
-    : m_(simulation.model()), sizes_(std::move(sizes)) {
+    : m_(simulation.scene().model()), sizes_(std::move(sizes)) {
   mjBatch* batch = simulation.worlds().batch();
   geom_size_ = own(batch, "geom_size", m_->geom_size);
   geom_pos_ = own(batch, "geom_pos", m_->geom_pos);
@@ -91,7 +91,7 @@ ObjectSizes::ObjectSizes(Simulation& simulation, std::span<const int> bodies,
 // Collisions are looked for in a tree of boxes about a body's geoms, which worlds do not have their own rows of: it gets
 // boxes for all sizes. They are in the frame of the body's inertia, which scales with it.
 void ObjectSizes::widen(mjBatch* batch, int body, const std::vector<double>& sizes) const {
-  // The batch's own copy, which is nobody else's yet.
+  // The batch's own copy, Simulation::model(), before anything else has read it.
   double* boxes = const_cast<double*>(mjb_model(batch)->bvh_aabb);
   const double *from = m_->bvh_aabb, least = sizes.front(), most = sizes.back();
   for (int n = m_->body_bvhadr[body]; n < m_->body_bvhadr[body] + m_->body_bvhnum[body]; ++n) {

@@ -41,7 +41,10 @@ class Simulation {
   const std::shared_ptr<Scene>& scene_ptr() const { return scene_; }
   Worlds& worlds() { return *worlds_; }
   ThreadPool& pool() { return *pool_; }
-  const mjModel* model() const { return scene_->model(); }
+  // The model that is simulated; it has none of the values that differ between worlds.
+  const mjModel* model() const { return worlds_->model(); }
+  // The model of one world: see Worlds::model_of().
+  mjModel model_of(int world) const { return worlds_->model_of(world); }
   int num_worlds() const { return cfg_.num_worlds; }
   int decimation() const { return cfg_.decimation; }
   double step_dt() const { return cfg_.decimation * model()->opt.timestep; }  // s, one control step

@@ -13,6 +13,7 @@
 #include "mjsense/core/os.h"
 #include "mjsense/core/parallel.h"
 #include "mjsense/core/process_state.h"
+#include "mjsense/scene/mujoco_log.h"
 
 #ifdef __SANITIZE_THREAD__
 #include <sanitizer/tsan_interface.h>
@@ -76,21 +77,18 @@ bool can_split_step(const mjModel* m) {
          m->nhistory == 0 && m->nplugin == 0;
 }
 
-// mj_forward up to velocities; without `sensors` MuJoCo's own sensors keep their old values.
+// mj_forward up to velocities; without `sensors` MuJoCo's own sensors keep their old values. Unlike
+// in mj_forward, energies come before the sensors that report them: with <flag energy="enable"/>
+// MuJoCo's e_kinetic reports the energy of the forward before.
 void position_and_velocity(const mjModel* m, mjData* d, bool sensors) {
-  mj_fwdPosition(m, d);
-  if (sensors) mj_sensorPos(m, d);
   const bool energy = m->opt.enableflags & mjENBL_ENERGY;
-  if (!d->flg_energypos) {
-    if (energy) {
-      mj_energyPos(m, d);
-    } else {
-      d->energy[0] = d->energy[1] = 0;
-    }
-  }
+  mj_fwdPosition(m, d);
+  if (energy) mj_energyPos(m, d);
+  if (sensors) mj_sensorPos(m, d);
+  if (!energy && !d->flg_energypos) d->energy[0] = d->energy[1] = 0;
   mj_fwdVelocity(m, d);
+  if (energy) mj_energyVel(m, d);
   if (sensors) mj_sensorVel(m, d);
-  if (energy && !d->flg_energyvel) mj_energyVel(m, d);
 }
 
 // The state, and what MuJoCo counts.
@@ -183,6 +181,7 @@ Worlds::Worlds(const mjModel* model, int num_worlds, int threads) : num_worlds_(
   if (threads < 0 || threads > kMostThreads)
     throw ValueError(fmt::format("threads is {}: must be 0 (all) to {}", threads, kMostThreads));
   check_memory(model, num_worlds);
+  install_warning_filter();
   mjBatchConfig config;
   mjb_defaultConfig(&config);
   config.nthread = threads > 0 ? threads : available_cpus();
@@ -205,6 +204,7 @@ Worlds::Worlds(const mjModel* model, int num_worlds, int threads) : num_worlds_(
   derived_.resize(num_worlds);
   exceptions_.resize(num_worlds);
   diverged_.assign(num_worlds, 0);
+  warning_counts_.resize(num_worlds);
   ids_.reserve(num_worlds);
   failures_.reserve(num_worlds);
   int size = 0;
@@ -232,6 +232,17 @@ mjModel Worlds::model_of(int world) const {
   MJMODEL_POINTERS
 #undef X
   return mine;
+}
+
+void Worlds::write_model(int world, mjModel* copy) const {
+  int size = 0, element = 0;
+#define X(type, name, nr, nc)                                                       \
+  if (const void* rows = mjb_expanded(batch_, #name, &size, &element)) {            \
+    const std::size_t bytes = static_cast<std::size_t>(size) * element;             \
+    std::memcpy(copy->name, static_cast<const char*>(rows) + bytes * world, bytes); \
+  }
+  MJMODEL_POINTERS
+#undef X
 }
 
 void Worlds::seed(std::uint64_t seed) {
@@ -520,12 +531,42 @@ void Worlds::run_world(const mjModel* m, mjData* d, int w, const Call& call) {
 void Worlds::run(const mjModel* m, mjData* d, int w, void* arg) {
   ordered_after(arg);
   const Call& call = *static_cast<const Call*>(arg);
+  int before[mjNWARNING];
+  for (int i = 0; i < mjNWARNING; ++i)
+    before[i] = call.op == Op::kReset ? 0 : d->warning[i].number;  // a reset begins with zeros
+  drop_warnings(true);
   try {
     call.self->run_world(m, d, w, call);
   } catch (...) {
     call.self->exceptions_[w] = std::current_exception();
   }
+  drop_warnings(false);
+  call.self->count_warnings(d, w, before);
   orders_before(arg);
+}
+
+void Worlds::count_warnings(const mjData* d, int w, const int* before) {
+  for (int i = 0; i < mjNWARNING; ++i) {
+    const int now = d->warning[i].number;
+    const int more =
+        now < before[i] ? now : now - before[i];  // MuJoCo's own reset begins with zeros
+    if (more == 0) continue;
+    warning_counts_[w][i] += more;
+    if (!reported_[i]) warned_ = true;
+  }
+}
+
+// The first warning of each kind, as a message of MuJoCo's.
+void Worlds::report_warnings() {
+  if (!warned_.exchange(false)) return;
+  for (int i = 0; i < mjNWARNING; ++i) {
+    for (int w = 0; w < num_worlds_ && !reported_[i]; ++w) {
+      if (warning_counts_[w][i] == 0) continue;
+      reported_[i] = true;
+      mju_warning("%s (world %d, %.4f s; further warnings of this kind are only counted)",
+                  mju_warningText(i, mjb_warning(batch_)[w * mjNWARNING + i].lastinfo), w, time(w));
+    }
+  }
 }
 
 void Worlds::apply(WorldIds ids, Call call, bool save) {
@@ -537,6 +578,8 @@ void Worlds::apply(WorldIds ids, Call call, bool save) {
   if (call.op != Op::kVisit) failures_.clear();
   if (ids_.empty()) return;  // MuJoCo would take it for all
   apply_ordered(batch_, ids_.data(), static_cast<int>(ids_.size()), run, &call, save ? 1 : 0);
+  drop_warnings(false);  // an error leaves it on
+  report_warnings();
   for (Workbench& bench : workbenches_) {  // left behind by an error
     if (bench.taken.exchange(false)) mj_resetData(model(), bench.data);
   }
@@ -595,6 +638,7 @@ std::string Worlds::reset_failed(std::vector<int> failed, Call call) {
     const auto last =
         std::find_if(first, failed.end(), [&](int w) { return reset_key_[w] != call.key; });
     apply_ordered(batch_, &*first, static_cast<int>(last - first), run, &call, 1);
+    drop_warnings(false);
     for (; first != last; ++first) {
       if (mjb_status(batch_)[*first] && helpless.empty()) {
         helpless = fmt::format("world {} fails even when reset: MuJoCo: {}", *first,

@@ -11,6 +11,7 @@
 #include <mujoco/mjbatch.h>
 #include <mujoco/mujoco.h>
 
+#include <array>
 #include <atomic>
 #include <cstdint>
 #include <exception>
@@ -66,6 +67,8 @@ class Worlds {
   // As this world has it: the model, with the world's own values in the place of arrays that differ between worlds
   // (options stay the model's). It holds no memory of its own (no mj_deleteModel), and is valid as long as the worlds are.
   mjModel model_of(int world) const;
+  // Writes this world's own values into `copy`, which is a copy of model().
+  void write_model(int world, mjModel* copy) const;
   mjBatch* batch() { return batch_; }
 
   // A new seed starts ticks and episodes again at 0 (of all worlds).
@@ -88,10 +91,17 @@ class Worlds {
   // Model fields of the batch (mjb_expand) were written: the next step must not reuse what was
   // computed from the old ones.
   void model_changed() { model_version_++; }
+  std::int64_t model_version() const { return model_version_; }  // how often it was called
 
   // Worlds that failed in the last call, by index. Their state is the reset state; after step_raw(),
   // which lets MuJoCo do with a world that diverges what it always does, it is as that left it.
   const std::vector<Failure>& failures() const { return failures_; }
+
+  // How often each of MuJoCo's warnings (mjtWarning) was raised in this world since the worlds were
+  // made. The first of each kind is also a message of MuJoCo's that names the world; the others are
+  // only counted.
+  using WarningCounts = std::array<std::int64_t, mjNWARNING>;
+  const WarningCounts& warning_counts(int world) const { return warning_counts_[world]; }
 
   // Live views of the state rows, [B, n] float64, strided. Call forward() after writing.
   // Names: time qpos qvel act ctrl qfrc_applied xfrc_applied mocap_pos mocap_quat qacc_warmstart
@@ -133,6 +143,8 @@ class Worlds {
   bool step_whole(const mjModel* m, mjData* d, int w, const Call& call);
   bool healthy(int w, const Warnings& warnings);
   void apply(WorldIds ids, Call call, bool save);
+  void count_warnings(const mjData* d, int w, const int* before);
+  void report_warnings();
   std::vector<int> take_failures(Op op);
   std::string reset_failed(std::vector<int> failed, Call call);
   World view(const mjModel* m, mjData* d, int w) const;
@@ -155,7 +167,10 @@ class Worlds {
   std::vector<std::exception_ptr> exceptions_;  // of hooks, by world
   std::vector<std::uint8_t> diverged_;          // by world: mjtWarning + 1 in this call
   std::vector<Failure> failures_;
-  std::vector<int> ids_;  // scratch: the sorted selection
+  std::vector<WarningCounts> warning_counts_;  // by world
+  std::array<bool, mjNWARNING> reported_{};    // by warning
+  std::atomic<bool> warned_ = false;           // a count has risen in this call
+  std::vector<int> ids_;                       // scratch: the sorted selection
   // One mjData a thread, in which worlds are stepped that nobody looks at.
   struct Workbench {
     mjData* data = nullptr;

@@ -535,6 +535,91 @@ TEST(Worlds, AModelOfAWorldHasItsOwnValues) {
   EXPECT_EQ(second.body_mass[1], worlds.model()->body_mass[1]);
   EXPECT_EQ(third.body_mass[1], 7);
   EXPECT_EQ(third.body_pos, worlds.model()->body_pos) << "not copied";
+
+  const ModelPtr copy(mj_copyModel(nullptr, worlds.model()), mj_deleteModel);
+  worlds.write_model(2, copy.get());
+  EXPECT_EQ(copy->body_mass[1], 7);
+  worlds.write_model(1, copy.get());
+  EXPECT_EQ(copy->body_mass[1], worlds.model()->body_mass[1]);
+  EXPECT_EQ(copy->body_mass[2], worlds.model()->body_mass[2]);
+}
+
+// With <flag energy="enable"/> mj_forward fills e_kinetic before it computes the energy.
+TEST(Worlds, EnergiesAreFresh) {
+  const char* xml = R"(<mujoco><option><flag energy="enable"/></option><worldbody>
+    <body pos="0 0 1"><joint axis="1 0 0"/><geom size=".1" pos="0 .3 0"/></body></worldbody>
+    <sensor><e_kinetic/><e_potential/></sensor></mujoco>)";
+  char error[512] = "";
+  mjSpec* spec = mj_parseXMLString(xml, nullptr, error, sizeof error);
+  ASSERT_NE(spec, nullptr) << error;
+  const ModelPtr m(mj_compile(spec, nullptr), mj_deleteModel);
+  mj_deleteSpec(spec);
+  Worlds worlds(m.get(), 2, 1);
+  Recording hooks(2);
+  worlds.reset(all_worlds, -1, hooks);
+  const DataPtr d = make_data(m.get());
+  const auto expect = [&](const char* when) {
+    d->qpos[0] = state_row(worlds, "qpos", 1)[0];
+    d->qvel[0] = state_row(worlds, "qvel", 1)[0];
+    mj_forward(m.get(), d.get());
+    mj_energyPos(m.get(), d.get());
+    mj_energyVel(m.get(), d.get());
+    ASSERT_GT(d->energy[1], 1.0);
+    EXPECT_EQ(hooks.sensordata[1][0], d->energy[1]) << when;
+    EXPECT_EQ(hooks.sensordata[1][1], d->energy[0]) << when;
+  };
+  state_row(worlds, "qvel", 1)[0] = 3;
+  worlds.forward(all_worlds, hooks);
+  expect("after forward");
+  worlds.step(1, hooks);
+  expect("after a step");
+  worlds.step(3, hooks);
+  expect("after three");
+  state_row(worlds, "qvel", 1)[0] = 4;
+  worlds.visit(all_worlds, hooks);
+  expect("at a visit");
+}
+
+// Six boxes in an arena for few contacts warn at every substep; MuJoCo's handler hears it once.
+TEST(Worlds, WarningsAreCountedByWorldAndReportedOnce) {
+  std::string xml = "<mujoco><size memory='12K'/><worldbody><geom type='plane' size='5 5 .1'/>";
+  for (int i = 0; i < 6; ++i)
+    xml += "<body pos='" + std::to_string(.05 * i) +
+           " 0 .1'><freejoint/><geom type='box' size='.1 .1 .1'/></body>";
+  char error[512] = "";
+  mjSpec* spec =
+      mj_parseXMLString((xml + "</worldbody></mujoco>").c_str(), nullptr, error, sizeof error);
+  ASSERT_NE(spec, nullptr) << error;
+  const ModelPtr m(mj_compile(spec, nullptr), mj_deleteModel);
+  mj_deleteSpec(spec);
+  Worlds worlds(m.get(), 3, 2);
+  Recording hooks(3);
+  static std::vector<std::string>* heard = nullptr;
+  std::vector<std::string> messages;
+  heard = &messages;
+  const auto before = mju_user_warning;
+  mju_user_warning = [](const char* text) { heard->emplace_back(text); };
+  // Apart from world 1 they are far from each other.
+  for (int w = 0; w < 3; w += 2) {
+    for (int i = 0; i < 6; ++i) state_row(worlds, "qpos", w)[7 * i] = 3 * i;
+    for (int i = 0; i < 6; ++i) state_row(worlds, "qpos", w)[7 * i + 2] = 9;
+  }
+  worlds.step(4, hooks);
+  const auto full = [&](int w) { return worlds.warning_counts(w)[mjWARN_CONTACTFULL]; };
+  EXPECT_EQ(full(0), 0);
+  EXPECT_GE(full(1), 4);
+  const std::int64_t first = full(1);
+  const int one[] = {1};
+  for (int i = 0; i < 3; ++i) {
+    worlds.reset(one, -1, hooks);
+    worlds.step(1, hooks);
+  }
+  mju_user_warning = before;
+  EXPECT_GE(full(1), first + 6);
+  EXPECT_EQ(full(2), 0);
+  ASSERT_EQ(messages.size(), 1u);
+  EXPECT_THAT(messages[0], ::testing::HasSubstr("Too many contacts"));
+  EXPECT_THAT(messages[0], ::testing::HasSubstr("world 1"));
 }
 
 TEST(Worlds, ViewsHaveARowAnElement) {

@@ -72,7 +72,7 @@ class Simulation:
     @property
     def mj_model(self) -> mujoco.MjModel:
         """A copy of the model, for looking things up."""
-        return self.native.model
+        return self.scene.native.model  # the object by which scene_of() knows the scene
 
     @property
     def data(self) -> Data:

@@ -1,0 +1,176 @@
+# SPDX-License-Identifier: Apache-2.0
+"""A world's own model: what plain MuJoCo computes with it is what the world has."""
+
+import mujoco
+import numpy as np
+import pytest
+
+import mjsense as mjs
+
+ROOM = """
+<mujoco>
+  <worldbody>
+    <geom name="floor" type="plane" size="5 5 .1"/>
+    <geom name="shelf" type="box" size=".3 .1 .2" pos="1 0 .2"/>
+    <light name="lamp" pos="0 0 3"/>
+    <body name="box" pos="0 0 .05"><freejoint/><geom name="box" type="box" size=".05 .05 .05"/></body>
+    <body name="ball" pos="0 .13 .05"><freejoint/><geom name="ball" size=".05"/></body>
+    <body name="eye" pos="0 0 2"><site name="eye"/><geom size=".01" contype="0" conaffinity="0"/></body>
+  </worldbody>
+</mujoco>
+"""
+RAYS = mjs.RayCastSensorCfg(
+    name="rays",
+    frame=mjs.ObjRef("site", "eye"),
+    pattern=mjs.GridPatternCfg(size=(2.4, 1.0), resolution=0.1, direction=(0.1, 0.2, -1)),
+)
+
+
+def contacts(data):
+    return sorted((int(c.geom1), int(c.geom2), round(float(c.dist), 9)) for c in data.contact[: data.ncon])
+
+
+class Peer:
+    """Written for MolmoSpaces: a distance and the contacts by plain MuJoCo, on the model and data that it is given."""
+
+    def __init__(self):
+        self.uuid = "peer"
+        self.observation_space = None
+        self.models = {}
+
+    def measure(self, env, world):
+        model, data = env.current_model, env.mj_datas[world]
+        self.models.setdefault(world, model)
+        own = mujoco.MjData(model)
+        own.qpos[:] = data.qpos
+        mujoco.mj_forward(model, own)
+        return own.ncon, mujoco.mj_ray(
+            model, data, np.array([0, 0, 2.0]), np.array([0, 0, -1.0]), None, 1, -1, np.zeros(1, np.int32)
+        )
+
+
+@pytest.fixture
+def sim():
+    sim = mjs.Simulation(mjs.Scene(mjs.SceneCfg(base=ROOM, sensors=(RAYS,))), num_worlds=3)
+    sizes = np.repeat(sim.model.geom_size[None], 3, 0)
+    sizes[1, 2] = 0.09, 0.09, 0.09  # touches the ball
+    sizes[2, 1] = 0.4, 0.2, 0.3
+    sim.randomize("geom_size", sizes)
+    places = np.repeat(sim.model.geom_pos[None], 3, 0)
+    places[2, 1] = 0.8, 0.1, 0.3
+    sim.randomize("geom_pos", places)
+    sim.randomize("light_pos", np.array([[[0, 0, 3]], [[1, 0, 3]], [[0, 1, 2]]]))
+    return sim
+
+
+def test_plain_rays_are_the_sensors(sim):
+    env = sim.env
+    distances = sim.scene["rays"].data.distances
+    hits = sim.scene["rays"].data.hit_pos_w
+    direction = np.array([0.1, 0.2, -1]) / np.linalg.norm([0.1, 0.2, -1])
+    different = set()
+    for world in range(3):
+        model, data = env.mj_models[world], env.mj_datas[world]
+        eye = model.body("eye").id
+        for distance, hit in zip(distances[world], hits[world], strict=True):
+            origin = hit - distance * direction
+            geom = np.zeros(1, np.int32)
+            found = mujoco.mj_ray(model, data, origin.astype(float), direction, None, 1, eye, geom)
+            assert found == pytest.approx(distance, abs=2e-6)
+        different.add(distances[world].tobytes())
+    assert len(different) == 3
+
+
+def test_contacts_and_lights(sim):
+    counts = []
+    for world, model in enumerate(sim.env.mj_models):
+        data = mujoco.MjData(model)
+        mujoco.mj_setState(model, data, sim.state[world], mujoco.mjtState.mjSTATE_INTEGRATION)
+        mujoco.mj_forward(model, data)
+        assert contacts(data) == contacts(sim.env.mj_datas[world])
+        np.testing.assert_array_equal(data.light_xpos, sim.data.light_xpos[world])
+        counts.append(data.ncon)
+    assert counts[1] > counts[0]
+
+
+def test_copies_stay_in_step(sim):
+    models = [sim.model_of(world) for world in range(3)]
+    assert sim.env.mj_models[1] is models[1] and len(sim.env.mj_models) == 3
+    assert sim.env.mj_models[-1] is models[2] and sim.env.mj_models[:2] == models[:2]
+    assert models[1].geom_size[2, 0] == 0.09 and sim.model.geom_size[2, 0] == models[0].geom_size[2, 0] == 0.05
+    sim.randomize("body_mass", np.full(sim.model.nbody, 3.0), world_ids=[1])
+    assert models[1].body_mass[2] == 3 and models[0].body_mass[2] != 3
+    sim.model_field("geom_rgba")[2, 1] = 0.25
+    assert sim.model_of(2) is models[2] and models[2].geom_rgba[1, 0] == 0.25
+    sim.reset()
+    assert models[1].geom_size[2, 0] == 0.09
+    models[0].geom_size[2, 0] = 9  # changes no simulation
+    assert sim.model_field("geom_size")[0, 2, 0] == 0.05
+    with pytest.raises(ValueError, match=r"world id 3: must be in \[0, 3\)"):
+        sim.model_of(3)
+    with pytest.raises(IndexError):
+        sim.env.mj_models[3]
+
+
+def test_peer_sensors_receive_their_worlds_model(sim):
+    peer = Peer()
+    found = []
+    for world in range(3):
+        sim.env.current_batch_index = world
+        assert sim.env.mj_model is sim.env.current_model is sim.model_of(world)
+        found.append(peer.measure(sim.env, world))
+    assert [count for count, _ in found] == [sim.env.mj_datas[world].ncon for world in range(3)]
+    np.testing.assert_allclose([distance for _, distance in found], [1.9, 1.86, 1.9])
+
+
+@pytest.mark.parametrize("task", ["pick", "open"])
+def test_an_episodes_model_is_the_one_that_is_simulated(task):
+    """Sizes, furniture and lights of a task's worlds, midphase on: plain MuJoCo finds the world's contacts and accelerations."""
+    env = mjs.make_vec(task, 3, cameras=[], seed=5)
+    env.reset()
+    sim = env.sim
+    held = [sim.model_of(world) for world in range(3)]
+    sizes = []
+    for _ in range(2):
+        for world in range(3):
+            model = sim.env.mj_models[world]
+            assert model is held[world]
+            data = mujoco.MjData(model)
+            mujoco.mj_setState(model, data, sim.state[world], mujoco.mjtState.mjSTATE_INTEGRATION)
+            mujoco.mj_forward(model, data)
+            shown = sim.env.mj_datas[world]
+            assert data.ncon > 0 and contacts(data) == contacts(shown)
+            np.testing.assert_array_equal(data.geom_xpos, shown.geom_xpos)
+            sizes.append(
+                (model.geom_size.tobytes(), model.geom_pos.tobytes(), model.light_pos.tobytes(), model.cam_pos.tobytes())
+            )
+        env.reset(seed=6)
+    assert len(set(sizes)) > 3
+    env.close()
+
+
+def test_the_simulated_model_knows_every_size():
+    """Collisions are looked for in boxes that hold an object in all of its sizes; sim.model has them too."""
+    env = mjs.make_vec("pick", 2, cameras=[], seed=5)
+    env.reset()
+    model = env.sim.model
+    data = mujoco.MjData(model)
+    checked = 0
+    for world in range(2):
+        fields = {
+            name: env.sim.model_field(name)[world] for name in ("geom_size", "geom_pos", "geom_rbound", "geom_aabb", "body_ipos")
+        }
+        for name, values in fields.items():
+            getattr(model, name)[...] = values
+        mujoco.mj_setState(model, data, env.sim.state[world], mujoco.mjtState.mjSTATE_INTEGRATION)
+        mujoco.mj_forward(model, data)
+        with_midphase = contacts(data)
+        model.opt.disableflags |= mujoco.mjtDisableBit.mjDSBL_MIDPHASE
+        mujoco.mj_forward(model, data)
+        assert with_midphase == contacts(data)
+        model.opt.disableflags &= ~mujoco.mjtDisableBit.mjDSBL_MIDPHASE
+        checked += len(with_midphase)
+    assert checked
+    boxes = np.abs(model.bvh_aabb - env.sim.scene.model.bvh_aabb).max()
+    assert boxes > 1e-3
+    env.close()
