@@ -37,6 +37,7 @@ CASES = (
     *(("pick", robot, "") for robot in ("franka", "mobile_franka", "i2rt_yam", "bimanual_yam", "floating_rum", "rby1")),
     *(("pick", "franka", scene) for scene in ("table", "tableware", "clutter", "shelf", "kitchen:*", "libero/kitchen", "libero/study", "libero/living_room")),
     ("pick", "i2rt_yam", "clutter"),
+    ("pick", "i2rt_yam", "shelf"),
     ("pick", "rby1", "clutter"),
     *(("pick_and_place", robot, "") for robot in ("franka", "mobile_franka", "i2rt_yam", "bimanual_yam", "floating_rum", "rby1")),
     ("pick_and_place_next_to", "franka", ""),
@@ -74,8 +75,8 @@ def episodes_of(path: Path) -> list[dict[str, Any]]:
                 retries = int(extra["policy_num_retries"][-1]) if "policy_num_retries" in extra else 0
                 approach = None
                 if "grasp_pose" in extra:
-                    w, x, y, z = extra["grasp_pose"][-1][3:]
-                    if w or x or y or z:
+                    position, (w, x, y, z) = extra["grasp_pose"][-1][:3], extra["grasp_pose"][-1][3:]
+                    if any(position):  # the identity stands for no grasp
                         approach = float(w * w - x * x - y * y + z * z)
                 found.append({"retries": retries, "approach": approach, "success": bool(episode["success"][-1])})
     return found

@@ -76,8 +76,9 @@ def starts(task: str, scene: str, robot: str, system: str, policy: str, episodes
             found["colour"].append(np.broadcast_to(colour, (worlds, *colour.shape[-2:]))[w, :, :3].ravel().tolist())
             cameras = env.sim.data.cam_xpos
             found["camera"].append(cameras[w].ravel().tolist())
-            qw, qx, qy, qz = env.rows["grasp_pose"][w][3:] if policy else np.zeros(4)
-            if qw or qx or qy or qz:
+            grasp = env.rows["grasp_pose"][w] if policy else np.zeros(7)
+            if any(grasp[:3]):  # the identity stands for no grasp
+                qw, qx, qy, qz = grasp[3:]
                 approach = qw * qw - qx * qx - qy * qy + qz * qz
                 found["tilt"].append(float(np.degrees(np.arccos(np.clip(-approach, -1, 1)))))
     env.close()

@@ -21,7 +21,10 @@ std::vector<std::shared_ptr<Sensor>> PlannerPolicy::create_policy_sensors() cons
       [this](const World& world, std::span<std::int64_t> row) { row[0] = num_retries(world.id); }));
   if (has_grasp_pose()) {
     sensors.push_back(std::make_shared<FunctionSensor<float>>(
-        "grasp_pose", pose_spec("world", "Pose at which the planner means to close the gripper."),
+        "grasp_pose",
+        pose_spec("world",
+                  "Pose at which the planner closes the gripper; the identity before the first "
+                  "plan with a grasp."),
         [this](const World& world, std::span<float> row) {
           write_pose(grasp_pose(world.id), row.data());
         }));

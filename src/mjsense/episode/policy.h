@@ -63,8 +63,8 @@ class PlannerPolicy : public Policy {
  public:
   virtual int phase(int world) const = 0;  // number of the present one
   virtual int num_retries(int world) const = 0;
-  virtual Pose grasp_pose(
-      int world) const = 0;  // world frame, target of the tool; zeros before the first plan
+  // X_WT, target of the tool; the identity before the first plan with a grasp.
+  virtual Pose grasp_pose(int world) const = 0;
   virtual bool has_grasp_pose() const { return true; }
 
   std::vector<std::shared_ptr<Sensor>> create_policy_sensors() const override;

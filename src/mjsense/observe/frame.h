@@ -40,9 +40,12 @@ struct BodyRef {
   int id_ = -1;
 };
 
-// True if `body` is `root` or below it.
+// True if `body` is `root` or a descendant of it. Nothing is below a negative id, which means "no
+// body".
 inline bool is_below(const mjModel* model, int body, int root) {
-  while (body > root) body = model->body_parentid[body];  // parents come first
+  if (root < 0) return false;
+  // A parent has a smaller id than its children; the world, body 0, is its own parent.
+  while (body > root) body = model->body_parentid[body];
   return body == root;
 }
 

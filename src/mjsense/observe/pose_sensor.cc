@@ -40,7 +40,16 @@ void PoseSensor::initialize(const SensorInit& init) {
 void PoseSensor::compute(const World& world) {
   Pose pose = frame_.pose(world.data);
   if (reference_.id >= 0) pose = inverse(reference_.pose(world.data)) * pose;
-  write_pose(pose, fields()[0].data.row<float>(world.id).data());
+  const std::span<float> row = fields()[0].data.row<float>(world.id);
+  const double cosine =
+      pose.q.w * row[3] + pose.q.x * row[4] + pose.q.y * row[5] + pose.q.z * row[6];
+  if (cosine < 0) pose.q = {-pose.q.w, -pose.q.x, -pose.q.y, -pose.q.z};
+  write_pose(pose, row.data());
+}
+
+// The identity, to which every rotation with w >= 0 is nearer than its negative.
+void PoseSensor::reset(const World& world) {
+  write_pose(Pose{}, fields()[0].data.row<float>(world.id).data());
 }
 
 }  // namespace mjsense

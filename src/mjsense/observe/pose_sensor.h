@@ -12,8 +12,9 @@
 namespace mjsense {
 
 // `robot_base_pose`: X_WB. `tcp_pose`: X_BT, the tool in the robot's base frame, which stands on
-// the floor. The sign of the quaternion is MuJoCo's for the frame; it is not made continuous over
-// time.
+// the floor. Of the two quaternions of a rotation, an episode begins with the one whose w is not
+// negative; then each is the one nearer to the last that was computed, so that the sign does not
+// flip between steps.
 class PoseSensor final : public Sensor {
  public:
   struct Ref {
@@ -26,6 +27,7 @@ class PoseSensor final : public Sensor {
   mjtStage needs() const override { return mjSTAGE_POS; }
   void initialize(const SensorInit& init) override;
   void compute(const World& world) override;
+  void reset(const World& world) override;
 
  private:
   Ref frame_ref_, reference_ref_;

@@ -105,6 +105,34 @@ TEST(Pose, OfASiteInTheBaseFrame) {
   EXPECT_EQ(tcp.fields()[0].spec.frame, "body robot/base");
 }
 
+// A quaternion and its negative are the same rotation: which of them it is does not change between
+// steps, over two turns.
+TEST(Pose, QuaternionIsContinuousWithinAnEpisode) {
+  TestWorld w(kScene);
+  PoseSensor tcp("tcp_pose", {"site", "robot/tool"}, {"body", "robot/base"});
+  tcp.initialize(w.init());
+  const auto at = [&](double angle) {
+    w.data->qpos[0] = angle;
+    mj_forward(w.model, w.data);
+    tcp.compute(w.world());
+    return values<float>(tcp);
+  };
+  tcp.reset(w.world());
+  std::vector<float> last = at(0);
+  for (int step = 1; step <= 80; ++step) {
+    const std::vector<float> now = at(step * 0.05 * std::numbers::pi);
+    double cosine = 0;
+    for (int i = 3; i < 7; ++i) cosine += now[i] * last[i];
+    EXPECT_GT(cosine, 0.99) << "step " << step;
+    EXPECT_EQ(at(step * 0.05 * std::numbers::pi), now) << "computed again it is the same";
+    last = now;
+    if (step == 40) EXPECT_NEAR(now[3], -1, 1e-6) << "after one turn";
+  }
+  at(1.5 * std::numbers::pi);
+  tcp.reset(w.world());
+  EXPECT_GT(at(1.5 * std::numbers::pi)[3], 0) << "an episode begins with w >= 0";
+}
+
 TEST(Pose, NamesTheNearestWhenThereIsNone) {
   TestWorld w(kScene);
   PoseSensor tcp("tcp_pose", {"site", "robot/tol"});

@@ -88,7 +88,8 @@ class Inspector {
       const h5::Id trajectory = h5::open_group(file, name);
       ++entry.episodes;
       const std::string outcome = h5::text_attribute(trajectory, "outcome");
-      if (!outcome.empty()) entry.outcomes[outcome].push_back(name);
+      // The details of the episode, in parentheses, are left out.
+      if (!outcome.empty()) entry.outcomes[outcome.substr(0, outcome.find(" ("))].push_back(name);
       add_trajectory(trajectory, entry);
       if (!h5::exists(trajectory, "obs/sensor_data")) continue;
       const h5::Id videos = h5::open_group(trajectory, "obs/sensor_data");

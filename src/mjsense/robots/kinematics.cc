@@ -22,6 +22,9 @@ constexpr int kAttempt = 25;
 constexpr int kCandidates = 16;
 constexpr double kFarthest = 0.4;  // rad or m
 constexpr double kSlack = 1e-3;    // m, more than a solution is off its target
+// Of joint_motion(), in m or rad per unit of q: damping begins where the leaf moves by less than
+// kSingular per unit of joint motion and rises to kMaxDamping at a singular configuration.
+constexpr double kSingular = 0.1, kMaxDamping = 0.05;
 
 // Solves (J J^T + eps I) y = e for a [6, n] Jacobian, by Cholesky factorisation, and returns J^T y.
 void damped_step(std::span<const double> jacobian, int n, double eps, const double (&e)[6],
@@ -186,7 +189,14 @@ void Chain::joint_motion(std::span<const double> q, const Twist& twist,
   const std::span<double> jac(storage.data(), 6 * links_.size());
   jacobian(q, jac);
   const double e[6] = {twist.v.x, twist.v.y, twist.v.z, twist.w.x, twist.w.y, twist.w.z};
-  damped_step(jac, static_cast<int>(links_.size()), kDamping, e, dq);
+  const int n = static_cast<int>(links_.size());
+  damped_step(jac, n, kDamping, e, dq);
+  double motion = 0;
+  for (double d : dq.first(n)) motion += d * d;
+  // The gain of J along this twist: at least J's smallest singular value.
+  const double gain = norm(twist) / std::sqrt(motion), part = gain / kSingular;
+  if (!(part < 1)) return;  // also for a twist of 0
+  damped_step(jac, n, kMaxDamping * kMaxDamping * (1 - part * part), e, dq);
 }
 
 // Additive recurrence: the fractional parts of k * alpha_i, alpha_i powers of the generalised

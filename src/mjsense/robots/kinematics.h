@@ -33,7 +33,9 @@ class Chain {
   Pose jacobian(std::span<const double> q, std::span<double> jacobian) const;
 
   // The smallest joint motion dq that moves the leaf by `twist` (base axes, at the leaf): J^+
-  // twist.
+  // twist. Near a singular configuration it is damped, dq = J^T (J J^T + d^2 I)^-1 twist, and moves
+  // the leaf by less: d^2 = d_max^2 (1 - (s / s_0)^2) where the gain s = |twist| / |J^+ twist| is
+  // below s_0 (numerical filtering after Maciejewski and Klein). So |dq| stays below 15 |twist|.
   void joint_motion(std::span<const double> q, const Twist& twist, std::span<double> dq) const;
 
   // Moves q (in: the start, out: the solution) until the leaf is at `target` (base frame): dq = J^T

@@ -99,6 +99,40 @@ TEST(Chain, OfOffsetJointsIsMuJoCos) {
   mj_deleteSpec(spec);
 }
 
+// The joint motion is exact where the leaf follows the joints well, and bounded where it does not:
+// stretched out, with the wrist aligned, wherever else.
+TEST_F(Fr3, JointMotionIsDampedNearSingularConfigurations) {
+  Rng rng(3, 0, 0, 0);
+  std::array<double, 6 * 7> jac;
+  std::array<double, 7> dq;
+  int exact = 0;
+  double largest = 0;
+  for (int trial = 0; trial < 20000; ++trial) {
+    std::array<double, 7> q = random_configuration(rng);
+    if (trial % 4 == 0) {
+      for (int i = 1; i < 7; ++i)
+        q[i] = std::clamp(trial % 8 ? 0.0 : 1e-3 * rng.normal(), chain->low()[i], chain->high()[i]);
+    }
+    double e[6], square = 0;
+    for (double& x : e) x = 0.01 * rng.normal();
+    chain->joint_motion(q, {{e[0], e[1], e[2]}, {e[3], e[4], e[5]}}, dq);
+    chain->jacobian(q, jac);
+    double error = 0, twist = 0;
+    for (int i = 0; i < 6; ++i) {
+      double moved = 0;
+      for (int k = 0; k < 7; ++k) moved += jac[7 * i + k] * dq[k];
+      error += (moved - e[i]) * (moved - e[i]);
+      twist += e[i] * e[i];
+    }
+    for (double d : dq) square += d * d;
+    largest = std::max(largest, std::sqrt(square / twist));
+    exact += std::sqrt(error / twist) < 1e-6;
+  }
+  EXPECT_LT(largest, 15);
+  EXPECT_GT(largest, 10) << "the bound is reached";
+  EXPECT_GT(exact, 10000);
+}
+
 TEST_F(Fr3, InverseKinematicsConvergesOnReachablePoses) {
   Rng rng(2, 0, 0, 0);
   int solved = 0;

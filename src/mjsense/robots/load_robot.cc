@@ -5,12 +5,14 @@
 
 #include <filesystem>
 #include <set>
+#include <variant>
 
 #include "mjsense/core/data_file.h"
 #include "mjsense/core/error.h"
 #include "mjsense/core/toml_fields.h"
 #include "mjsense/robots/meshes.h"
 #include "mjsense/scene/parts.h"
+#include "mjsense/scene/spec.h"
 
 namespace mjsense {
 namespace {
@@ -29,6 +31,27 @@ void check_unique(std::string_view place, const char* what, const std::string& n
     throw ValueError(fmt::format("{}: there are two {}s '{}'", place, what, name));
 }
 
+// Throws KeyError unless the model has every element that `cfg` names.
+void check_references(const RobotCfg& cfg, const mjSpec* spec, const std::string& path) {
+  const auto check = [&](mjtObj type, const std::string& name, const std::string& place) {
+    find_in_spec(spec, type, name, place);
+  };
+  check(mjOBJ_BODY, cfg.base_body, path + ": base");
+  for (const MoveGroupCfg& group : cfg.groups) {
+    const std::string place = fmt::format("{}: move group '{}': ", path, group.name);
+    for (const std::string& name : group.joints) check(mjOBJ_JOINT, name, place + "joints");
+    for (const std::string& name : group.actuators)
+      check(mjOBJ_ACTUATOR, name, place + "actuators");
+    for (const std::string& name : group.pad_sites) check(mjOBJ_SITE, name, place + "pad_sites");
+    if (!group.leaf_site.empty()) check(mjOBJ_SITE, group.leaf_site, place + "leaf_site");
+    if (!group.root_body.empty()) check(mjOBJ_BODY, group.root_body, place + "root_body");
+    if (const auto* base = std::get_if<FreeBaseCfg>(&group.controller))
+      check(mjOBJ_BODY, base->target, place + "controller.target");
+  }
+  for (const CameraMount& camera : cfg.cameras)
+    check(mjOBJ_CAMERA, camera.mjcf_camera, fmt::format("{}: camera '{}'", path, camera.name));
+}
+
 }  // namespace
 
 void validate(const MoveGroupCfg& cfg, std::string_view place) {
@@ -45,9 +68,19 @@ void validate(const MoveGroupCfg& cfg, std::string_view place) {
         fmt::format("{}: '{}' is a base and has start positions: where it stands is the task's",
                     place, cfg.name));
   }
-  if (cfg.kind == GroupKind::kGripper && cfg.pad_sites.size() != 2) {
+  if (cfg.kind != GroupKind::kGripper) return;
+  if (cfg.pad_sites.size() != 2) {
     throw ValueError(fmt::format("{}: the gripper '{}' needs 2 pad_sites, has {}", place, cfg.name,
                                  cfg.pad_sites.size()));
+  }
+  if (cfg.root_body.empty()) {
+    throw ValueError(
+        fmt::format("{}: the gripper '{}' needs root_body, the body whose subtree is the gripper",
+                    place, cfg.name));
+  }
+  if (cfg.leaf_site.empty()) {
+    throw ValueError(fmt::format("{}: the gripper '{}' needs leaf_site, the site of its tool frame",
+                                 place, cfg.name));
   }
 }
 
@@ -76,12 +109,15 @@ RobotCfg parse_robot(std::string_view text, const std::string& path) {
   read_toml_fields(text, path, cfg);
   if (cfg.name.empty()) throw ValueError(fmt::format("{}: 'name' is empty", path));
   cfg.model.path = beside(path, cfg.mjcf);
-  if (!cfg.parts.empty()) {
+  const std::string place = fmt::format("robot '{}'", cfg.name);
+  if (cfg.parts.empty()) {
+    check_references(cfg, parse_model(cfg.model, place).get(), path);
+  } else {
     std::vector<ModelPart> parts;
     for (const PartCfg& part : cfg.parts)
       parts.push_back({beside(path, part.model), part.to, part.prefix, part.pos, part.quat});
-    const std::shared_ptr<mjSpec> spec =
-        compose_model(cfg.model, parts, fmt::format("robot '{}'", cfg.name));
+    const std::shared_ptr<mjSpec> spec = compose_model(cfg.model, parts, place);
+    check_references(cfg, spec.get(), path);
     cfg.model = {.spec = spec.get(), .owner = spec};
   }
   if (cfg.meshes) cfg.edit_spec = use_meshes(*cfg.meshes, path);

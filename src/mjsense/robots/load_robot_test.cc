@@ -137,6 +137,37 @@ TEST_F(RobotFile, ErrorsNameFileLineAndKey) {
   EXPECT_THAT(fault("base = \"base\"\n"), HasSubstr("'model' is missing"));
 }
 
+// Also what is referred to by default, by a key that is not there.
+TEST_F(RobotFile, EveryReferenceIsResolvedWhenItIsLoaded) {
+  const std::string place = path() + ": move group 'arm': ";
+  EXPECT_EQ(fault(with("base = \"base\"", "base = \"bas\"")),
+            path() + ": base: no body named 'bas'; did you mean 'base'?");
+  EXPECT_EQ(fault(with("joints = [\"lift\"]", "joints = [\"left\"]")),
+            place + "joints: no joint named 'left'; did you mean 'lift'?");
+  EXPECT_EQ(fault(with("actuators = [\"lift\"]", "actuators = [\"lit\"]")),
+            place + "actuators: no actuator named 'lit'; did you mean 'lift'?");
+  EXPECT_EQ(fault(with("tool/tip", "tool/tp")),
+            place + "leaf_site: no site named 'tool/tp'; did you mean 'tool/tip'?");
+  EXPECT_EQ(fault(std::string(kToml) + "root_body = \"link2\"\n"),
+            place + "root_body: no body named 'link2'; did you mean 'link'?");
+  EXPECT_THAT(fault(with("{ kind = \"joint_position_relative\", threshold = 0.001 }",
+                         "{ kind = \"free_base\", target = \"goal\" }")),
+              HasSubstr("controller.target: no body named 'goal'"));
+  EXPECT_THAT(fault(std::string(kToml) + "[[cameras]]\nname = \"wrist\"\ncamera = \"eye\"\n"),
+              HasSubstr("camera 'wrist': no camera named 'eye'"));
+  const std::string gripper = std::string(kToml) + R"([[groups]]
+name = "gripper"
+kind = "gripper"
+pad_sites = ["flange", "tool/tip"]
+)";
+  EXPECT_THAT(fault(gripper + "leaf_site = \"flange\"\n"),
+              HasSubstr("the gripper 'gripper' needs root_body"));
+  EXPECT_THAT(fault(gripper + "root_body = \"link\"\n"),
+              HasSubstr("the gripper 'gripper' needs leaf_site"));
+  EXPECT_EQ(fault(gripper + "leaf_site = \"flange\"\nroot_body = \"link\"\n"), "no error");
+  EXPECT_THAT(fault(with("arm.xml", "amr.xml")), HasSubstr("amr.xml"));
+}
+
 TEST(RobotNames, AreKnownOrTheNearestIsSaid) {
   for (const std::string& name : robot_names()) EXPECT_EQ(robot_cfg(name).name, name);
   try {

@@ -30,6 +30,7 @@ void check_size(const std::string& place, const char* what, std::size_t found) {
 
 MoveGroup resolve_group(const MoveGroupCfg& cfg, const mjModel* model, const std::string& prefix,
                         const std::string& place) {
+  validate(cfg, place);
   const auto find = [&](mjtObj type, const std::string& name) {
     return resolve(model, type, prefix + name, place);
   };
@@ -61,8 +62,6 @@ MoveGroup resolve_group(const MoveGroupCfg& cfg, const mjModel* model, const std
   group.closed_command = cfg.closed_command;
   group.max_opening = cfg.max_opening;
   if (group.kind == GroupKind::kGripper) {
-    if (cfg.pad_sites.size() != 2)
-      throw ValueError(fmt::format("{}: needs 2 pad sites, has {}", place, cfg.pad_sites.size()));
     for (int i = 0; i < 2; ++i) group.pad_sites[i] = find(mjOBJ_SITE, cfg.pad_sites[i]);
   }
   return group;

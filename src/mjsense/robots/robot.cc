@@ -303,9 +303,15 @@ void Robot::add_arm_noise(const World& world, int g, Rng& rng, std::span<double>
   for (int i = 0; i < 3; ++i) e[i] = truncated_normal(rng, deviation, cfg.max_position);
   for (int i = 3; i < 6; ++i) e[i] = truncated_normal(rng, rotation, cfg.max_rotation);
   chain.joint_motion({q, n}, {{e[0], e[1], e[2]}, {e[3], e[4], e[5]}}, {dq, n});
+  double largest = cfg.max_joint;
+  for (std::size_t i = 0; i < n; ++i) {
+    if (source_[g][i].first == g) largest = std::max(largest, std::abs(dq[i]));
+  }
   for (std::size_t i = 0; i < n; ++i) {
     const auto [from, k] = source_[g][i];
-    if (from == g) target[k] = std::clamp(target[k] + dq[i], group.ctrl_low[k], group.ctrl_high[k]);
+    if (from != g) continue;
+    const double noisy = target[k] + cfg.max_joint / largest * dq[i];
+    target[k] = std::clamp(noisy, group.ctrl_low[k], group.ctrl_high[k]);
   }
 }
 

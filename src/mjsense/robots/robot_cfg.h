@@ -96,6 +96,7 @@ struct ActionNoiseCfg {
   double rotation_ratio = 0.1;
   double max_position = 0.02;
   double max_rotation = 0.1;
+  double max_joint = 0.05;
 };
 template <class V>
 void visit_fields(V& v, ActionNoiseCfg& c) {
@@ -104,6 +105,10 @@ void visit_fields(V& v, ActionNoiseCfg& c) {
   v("rotation_ratio", c.rotation_ratio, "Rotation (rad) per displacement (m).").at_least(0);
   v("max_position", c.max_position, "Limit of the displacement.").unit("m").positive();
   v("max_rotation", c.max_rotation, "Limit of the rotation.").unit("rad").positive();
+  v("max_joint", c.max_joint,
+    "Limit of the displacement of each joint (rad or m). Near singular postures it reduces the "
+    "displacement of the tool.")
+      .positive();
 }
 
 // A model that hangs on the robot's: a gripper on the flange of an arm.

@@ -287,6 +287,28 @@ TEST_F(Franka, ActionNoiseIsTruncated) {
   EXPECT_GT(farthest, 0.025);
 }
 
+// Stretched out, a displacement of the tool by millimetres would turn joints by radians.
+TEST_F(Franka, ActionNoiseIsBoundedAtSingularPostures) {
+  const StateRow state = state_row(data[0].get());
+  const int arm = robot.arm();
+  const double stretched[] = {0, 0, 0, -0.1169, 0, 0.44, 0};
+  for (int i = 0; i < 7; ++i) state.qpos[robot.groups()[arm].qpos[i]] = stretched[i];
+  mj_forward(model, data[0].get());
+  Action action;
+  std::vector<double> target(stretched, stretched + 7);
+  target[1] += 0.1;
+  action.commands[arm].set(target);
+  robot.command(worlds[0], action);
+  Rng rng(1, 0, 0, 0);
+  double farthest = 0;
+  for (int k = 0; k < 500; ++k) {
+    robot.write_ctrl(worlds[0], state, &rng);
+    for (int i = 0; i < 7; ++i) farthest = std::max(farthest, std::abs(state.ctrl[i] - target[i]));
+  }
+  EXPECT_LE(farthest, robot.cfg().noise.max_joint + 1e-12);
+  EXPECT_GT(farthest, 0.01);
+}
+
 TEST_F(Franka, UnknownNamesAreErrorsWithTheNearest) {
   try {
     robot.group_index("griper");

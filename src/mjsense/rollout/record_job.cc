@@ -247,7 +247,8 @@ class RecordJob {
     end(w, now.success, outcome(w, now));
   }
 
-  // "horizon reached: the object is not lifted", "the policy gave up: found no way".
+  // "horizon reached: the object is not lifted", "the policy gave up: found no way (256 grasps:
+  // 200 out of reach; ...)".
   std::string outcome(int w, const Evaluation& now) {
     if (now.success) return "success";
     const Action* last = rollout_.task().last_action(w);
@@ -274,7 +275,8 @@ class RecordJob {
     progress_.mean_length = static_cast<double>(ended_steps_) /
                             std::max(1, cfg_.keep_failures ? progress_.succeeded + progress_.failed
                                                            : progress_.succeeded);
-    if (!success) ++summary_.failures[outcome];
+    // Counted without the details of the episode, which planners write in parentheses.
+    if (!success) ++summary_.failures[outcome.substr(0, outcome.find(" ("))];
     summary_.lengths.push_back(lengths_[w]);
     rollout_.stop(w);
     --running_;

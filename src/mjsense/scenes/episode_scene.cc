@@ -321,6 +321,10 @@ void EpisodeScene::find_regions() {
   }
 }
 
+void EpisodeScene::set_target_regions(std::span<const char> flags) {
+  for (std::size_t i = 0; i < regions_.size(); ++i) regions_[i].for_targets = flags[i] != 0;
+}
+
 // As what carries them stands in this world.
 std::vector<Region> EpisodeScene::regions_of(int world) const {
   std::vector<Region> regions = regions_;

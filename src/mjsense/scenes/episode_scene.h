@@ -54,6 +54,8 @@ class EpisodeScene {
 
   std::span<const SceneObject> objects() const { return objects_; }
   std::span<const Region> regions() const { return regions_; }
+  // Targets stand in these alone, one flag a region; at least one is true.
+  void set_target_regions(std::span<const char> flags);
   // Whether an object takes part in the episode of this world; the others stand far away.
   bool present(int world, int object) const { return present_[world * objects_.size() + object]; }
 

@@ -3,7 +3,10 @@
 
 #include <algorithm>
 #include <cmath>
+#include <iterator>
 #include <numbers>
+#include <numeric>
+#include <vector>
 
 namespace mjsense {
 namespace {
@@ -42,12 +45,17 @@ double lay_out_once(std::span<const Resting> objects, std::span<const int> order
                     const LayoutCfg& cfg, Rng& rng, std::span<Pose> poses,
                     std::span<int> region_of) {
   std::vector<Placed> placed;
+  std::vector<int> all(regions.size()), for_targets;
+  std::iota(all.begin(), all.end(), 0);
+  std::ranges::copy_if(all, std::back_inserter(for_targets),
+                       [&](int region) { return regions[region].for_targets; });
   const int target = wanted.empty() ? -1 : wanted[0];
   double apart = 1.0;
   for (int object : order) {
-    const auto many = static_cast<std::uint32_t>(regions.size());
-    const int region = many == 1 ? 0 : static_cast<int>(rng.below(many));
     const bool near = std::ranges::count(wanted, object) > 0;
+    const std::vector<int>& choice = near ? for_targets : all;
+    const auto many = static_cast<std::uint32_t>(choice.size());
+    const int region = choice[many == 1 ? 0 : rng.below(many)];
     const Area& area = near ? regions[region].target_area : regions[region].area;
     const Quat rest =
         objects[object].rests[rng.below(static_cast<std::uint32_t>(objects[object].rests.size()))];

@@ -20,6 +20,7 @@ struct Area {
 struct Region {
   Area area, target_area;
   double height;  // m
+  bool for_targets = true;
 };
 
 struct LayoutCfg {
@@ -37,7 +38,7 @@ struct Resting {
 };
 
 // Poses X_WO of `objects` and the regions on which they stand: those that are `wanted` first, in this order and in
-// the regions' target areas - the first of them, if any, is the target -, then the others in order; those that
+// the target areas of regions for targets - the first of them, if any, is the target -, then the others in order; those that
 // are not `present` keep what is there. Where what came first leaves one no room, all begin anew; after the last try
 // the layout in which they come least into each other. A function of the random numbers alone.
 void lay_out(std::span<const Resting> objects, std::span<const int> wanted,

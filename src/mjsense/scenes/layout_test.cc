@@ -53,6 +53,27 @@ TEST(Layout, BeginsAnewWhereTheFirstLeaveTheLastNoRoom) {
   EXPECT_GT(crowded, 5);  // there was something to mend
 }
 
+TEST(Layout, WhatIsWantedStandsInRegionsForTargets) {
+  const ObjectShape shape = disc(0.02);
+  const Quat upright{};
+  const std::vector<Resting> objects(3, Resting{&shape, {&upright, 1}});
+  const std::array<int, 1> wanted{1};
+  const std::array<char, 3> present{1, 1, 1};
+  const Area area{0, 1, 0, 1};
+  const std::array<Region, 3> regions{
+      {{area, area, 0.5, false}, {area, area, 0.9, true}, {area, area, 1.3, false}}};
+  std::array<int, 3> others{};
+  for (std::uint64_t seed = 0; seed < 40; ++seed) {
+    std::array<Pose, 3> poses;
+    std::array<int, 3> region_of{};
+    Rng rng(seed, 0, 0, 0);
+    lay_out(objects, wanted, present, regions, {}, rng, poses, region_of);
+    EXPECT_EQ(region_of[1], 1);
+    ++others[region_of[0]];
+  }
+  for (int count : others) EXPECT_GT(count, 0) << "the others stand anywhere";
+}
+
 TEST(Layout, TakesTheLeastCrowdedOfThoseThatAllAre) {
   for (std::uint64_t seed = 0; seed < 20; ++seed) {
     const double once = nearest_of_three(0.25, seed, {.layouts = 1});

@@ -5,6 +5,8 @@
 #include <cmath>
 #include <memory>
 #include <numbers>
+#include <span>
+#include <vector>
 
 #include "mjsense/observe/frame.h"
 
@@ -80,6 +82,7 @@ double ways_to(const Robot& robot, const RobotValues& start, const Pose& base, V
 // Of all points, 0 .. 1.
 struct Reached {
   double points = 0, ways = 0;
+  std::vector<char> point;  // whether there is a way to it
 };
 
 // Tries places, upright or stooped.
@@ -100,8 +103,11 @@ class Search {
       const double ways = ways_to(robot_, start_, base, p);
       out.points += ways > 0;
       out.ways += ways;
+      out.point.push_back(ways > 0);
     }
-    return {out.points / points_.size(), out.ways / points_.size()};
+    out.points /= static_cast<double>(points_.size());
+    out.ways /= static_cast<double>(points_.size());
+    return out;
   }
 
   // Wherever the scene puts the robot, and a bit farther.
@@ -186,9 +192,22 @@ class Search {
   std::vector<Vec3> points_;  // m, world
 };
 
+// The points of a region follow each other.
+void limit_targets(const Reached& reached, EpisodeScene& scene) {
+  const std::size_t regions = scene.regions().size();
+  if (regions < 2) return;
+  const std::size_t points = reached.point.size() / regions;
+  std::vector<char> flags;
+  for (std::size_t i = 0; i < regions; ++i) {
+    const auto of_region = std::span(reached.point).subspan(i * points, points);
+    flags.push_back(2 * std::ranges::count(of_region, 1) >= static_cast<long>(points));
+  }
+  if (std::ranges::count(flags, 1) > 0) scene.set_target_regions(flags);
+}
+
 }  // namespace
 
-Standing::Standing(const mjModel* model, Robot& robot, const EpisodeScene& scene) {
+Standing::Standing(const mjModel* model, Robot& robot, EpisodeScene& scene) {
   const std::vector<Vec3> surface = targets(model, scene);
   if (surface.empty()) return;
   const SceneRobotCfg& cfg = scene.cfg().robot;
@@ -219,16 +238,22 @@ Standing::Standing(const mjModel* model, Robot& robot, const EpisodeScene& scene
   if (there.points >= kEnough) return;
   double best = there.ways;
   upright.improve(base, best, offset_);
-  if (upright.reached(base * offset_).points >= kEnough) return;
+  const Reached here = upright.reached(base * offset_);
+  if (here.points >= kEnough) return;
   const auto stoops = [](const MoveGroupCfg& group) { return !group.stooped.empty(); };
-  if (std::ranges::none_of(robot.cfg().groups, stoops)) return;
-  const Search stooped(model, robot, scene, surface, true);
-  Pose offset;
-  double lower = stooped.is_free(base, {}) ? stooped.reached(base).ways : 0;
-  stooped.improve(base, lower, offset);
-  if (lower <= best) return;
-  offset_ = offset;
-  robot.stoop();
+  if (std::ranges::any_of(robot.cfg().groups, stoops)) {
+    const Search stooped(model, robot, scene, surface, true);
+    Pose offset;
+    double lower = stooped.is_free(base, {}) ? stooped.reached(base).ways : 0;
+    stooped.improve(base, lower, offset);
+    if (lower > best) {
+      offset_ = offset;
+      robot.stoop();
+      limit_targets(stooped.reached(base * offset_), scene);
+      return;
+    }
+  }
+  limit_targets(here, scene);
 }
 
 }  // namespace mjsense

@@ -13,8 +13,9 @@ class Standing {
   Standing() = default;
   // Where the scene says, if a hand reaches nearly all of the target areas from there; otherwise the place ahead
   // or behind that is free of the scene and from which most ways lead to them. Where that is not nearly all
-  // either, the robot stoops (Robot::stoop), if more do then.
-  Standing(const mjModel* model, Robot& robot, const EpisodeScene& scene);
+  // either, the robot stoops (Robot::stoop), if more do then. If that is still not enough, targets are limited to
+  // the regions of which a hand reaches at least half, unless there is none.
+  Standing(const mjModel* model, Robot& robot, EpisodeScene& scene);
   // X_WB for an episode in which the scene says `scene_pose`.
   Pose operator()(const Pose& scene_pose) const { return scene_pose * offset_; }
   const Pose& offset() const { return offset_; }

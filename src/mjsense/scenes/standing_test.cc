@@ -116,6 +116,24 @@ model = "cube.xml"
   }
 }
 
+// The YAM is short: the upper board of the shelf is out of its reach, the others are not.
+TEST(Standing, TargetsAreLimitedToRegionsThatAHandReaches) {
+  for (const auto& [robot_name, upper] : {std::pair{"franka", true}, {"i2rt_yam", false}}) {
+    EpisodeScene scene(load_scene("shelf"));
+    TaskCfg cfg;
+    cfg.robot = robot_cfg(robot_name);
+    cfg.scene = "shelf";
+    PickTask task(cfg);
+    const Scene compiled(task.whole_scene_cfg());
+    Robot robot(cfg.robot, compiled.model(), 1);
+    scene.initialize(compiled.model(), 1, "robot_0/");
+    const Standing standing(compiled.model(), robot, scene);
+    ASSERT_EQ(scene.regions().size(), 3u);
+    EXPECT_TRUE(scene.regions()[1].for_targets) << robot_name;
+    EXPECT_EQ(scene.regions()[2].for_targets, upper) << robot_name;
+  }
+}
+
 TEST(Standing, AFloatingHandHangsAboveTheTargetsPointingDown) {
   const Pose offset = offset_of("floating_rum");
   EXPECT_NEAR(offset.p.x, 0.54 - 0.15, 1e-9);

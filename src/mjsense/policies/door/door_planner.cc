@@ -81,12 +81,18 @@ void DoorPlanner::make_plan(const World& world, const PlanRequest& request, Plan
                        leaf_to_go(world, goal_[world.id]), margin_[world.id], tool_[world.id]);
     if (motion) return open_door(world, *motion, plan);
     // It does not stand quite where it wanted to: another place.
-    if (request.stage > first + kPlaces) return;
+    if (request.stage > first + kPlaces) {
+      plan.refusal = "no arm can open the door free of collisions from where the base stands";
+      return;
+    }
   }
   if (!approach(world, cfg_.open, cfg_.margin, plan) &&
       !approach(world, cfg_.enough, cfg_.margin, plan) &&
-      !approach(world, cfg_.enough, cfg_.tight, plan))
+      !approach(world, cfg_.enough, cfg_.tight, plan)) {
     plan.clear();
+    plan.refusal =
+        "no base placement that it can drive to lets an arm open the door free of collisions";
+  }
 }
 
 // Lets go, backs off, and brings the arms to where they began.

@@ -106,7 +106,9 @@ void NavPlanner::make_plan(const World& world, const PlanRequest& request, Plan&
   }
   if (way.size() < 2) {
     plan.more = false;
-    return;  // there is none
+    plan.refusal =
+        "no path of the base leads to where the camera sees the object and that was not tried";
+    return;
   }
   plan.move_groups(0, {base_path(group_, way, cfg_.speeds)}, 0.4);
 }

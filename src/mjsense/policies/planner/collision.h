@@ -58,8 +58,9 @@ class CollisionQuery {
   // Also between the two, both ends excluded.
   bool free_between(std::span<const double> from, std::span<const double> to);
   bool free_here();  // as it has been placed
-  // The two geoms that touched when the last answer was no.
+  // The two geoms that touched when the last answer was no; -1 since forget_touching().
   std::pair<int, int> touching() const { return touching_; }
+  void forget_touching() { touching_ = {-1, -1}; }
 
  private:
   void move_held();

@@ -307,6 +307,7 @@ class ClosesOnce final : public TaskPlanner {
     const int hand = robot().gripper();
     if (request.attempt == 0)
       plan.wait(1, 5).grip(hand, robot().groups()[hand].closed_command).holds(hand);
+    plan.refusal = "nothing to close on";
   }
 };
 
@@ -316,13 +317,15 @@ TEST(TaskPlanner, SaysWhatWentWrongAndThatThereWasNoOtherWay) {
   planner.initialize(*stage.task);
   planner.reset(stage.world);
   EXPECT_EQ(planner.failure(0), "");
+  EXPECT_EQ(planner.grasp_pose(0).q.w, 1) << "the identity before there is a grasp";
   Action action;
   for (int i = 0; i < 60 && !action.done; ++i) {
     planner.act(stage.world, action);
     stage.step(action);
   }
   EXPECT_EQ(action.success, std::optional<bool>(false));
-  EXPECT_EQ(planner.failure(0), "the hand held nothing, then it found no way");
+  EXPECT_EQ(planner.failure(0),
+            "the hand held nothing, then it found no way (nothing to close on)");
   planner.reset(stage.world);
   EXPECT_EQ(planner.failure(0), "") << "another episode";
 }

@@ -25,7 +25,7 @@ struct ManipulationPlannerCfg {
   double clearance = 0.005;                     // m between object and place when it is let go
   double place_settle = 0.5, open_time = 0.25;  // s
   double retreat = 0.05;                        // m, against the approach
-  double rest = 2.0;                            // s at the end
+  double rest = 0.5;                            // s at the end
   double most_tilt = 90;        // degrees from above; the approach asked for is drawn up to here
   int max_ik_candidates = 256;  // grasps tried before giving up
   int max_far_candidates =

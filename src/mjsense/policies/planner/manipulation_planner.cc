@@ -104,7 +104,10 @@ bool ManipulationPlanner::plan_place(const World& world, const PlanRequest& requ
   HandPlanner& hand = shared_->hand(state.grip->hand);
   const Pose tool_object =
       inverse(robot().leaf_pose(world, hand.hand().tool)) * shared_->object_pose(world);
-  if (norm(tool_object.p - state.grip->tool_object.p) > kSlipped) return false;
+  if (norm(tool_object.p - state.grip->tool_object.p) > kSlipped) {
+    plan.refusal = "the object moved in the hand while it was lifted";
+    return false;
+  }
   state.grip->tool_object = tool_object;
   state.holding = true;
   if (placing_->plan(world, request, follower(), hand, tool_object, state.home, plan)) return true;

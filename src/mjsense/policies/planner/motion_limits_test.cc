@@ -4,7 +4,11 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
+#include <cstdio>
 #include <cstdlib>
+#include <string_view>
+#include <vector>
 
 #include "mjsense/episode/testing/played_task.h"
 #include "mjsense/policies/planner/pick_loop.h"
@@ -20,6 +24,7 @@ struct Case {
   const char *task, *robot, *scene;
   int episodes, first = 0;
   double depth = 0.001;  // m, of a contact of the robot, where nothing goes wrong
+  std::uint64_t seed = 0;
 };
 std::ostream& operator<<(std::ostream& out, const Case& c) {
   return out << c.task << " " << c.robot << " " << c.scene;
@@ -39,11 +44,12 @@ int number(const char* name, int otherwise) {
 }
 
 struct Stage {
-  explicit Stage(const Case& c, double perturb) {
+  Stage(const Case& c, double perturb, bool noise) {
     TaskCfg cfg = task_cfg(c.robot, c.scene);
     set_task_defaults(c.task, cfg);
-    cfg.action_noise = false;
+    cfg.action_noise = noise;
     cfg.perturb = perturb;
+    cfg.seed = c.seed;
     task = make_task(c.task, cfg);
     scene = std::make_unique<Scene>(task->whole_scene_cfg());
     task->initialize(scene->model(), 1);
@@ -56,6 +62,18 @@ struct Stage {
         *task, *policy, data.get(), 0, episode,
         [&](const World& world) { quality.look(world, task->last_action(0), planner().phase(0)); },
         [&](const World& world) { quality.begin(world); });
+  }
+  // The greatest speed of a joint of an arm (rad/s) after any physics step, and when.
+  MotionQuality::Greatest executed_speed(std::int64_t episode) {
+    MotionQuality::Greatest speed;
+    run_episode(*task, *policy, data.get(), 0, episode, {}, {}, [&](const World& world) {
+      for (const MoveGroup& group : task->robot().groups()) {
+        if (group.kind != GroupKind::kArm) continue;
+        for (int dof : group.dofs)
+          speed.see(std::abs(world.data->qvel[dof]), world.time(), planner().phase(0));
+      }
+    });
+    return speed;
   }
   const PlannerPolicy& planner() const { return dynamic_cast<const PlannerPolicy&>(*policy); }
   int retries() const { return planner().num_retries(0); }
@@ -76,7 +94,7 @@ class MotionLimits : public testing::TestWithParam<Case> {};
 // MJSENSE_FIRST, MJSENSE_EPISODES: other episodes.
 TEST_P(MotionLimits, CommandsKeepToThem) {
   const Case& c = GetParam();
-  Stage stage(c, 0.5);
+  Stage stage(c, 0.5, /*noise=*/false);
   const int first = number("MJSENSE_FIRST", c.first), many = number("MJSENSE_EPISODES", c.episodes);
   for (int episode = first; episode < first + many; ++episode) {
     MotionQuality q(stage.scene->model(), stage.task->robot());
@@ -107,37 +125,79 @@ TEST_P(MotionLimits, CommandsKeepToThem) {
   }
 }
 
-INSTANTIATE_TEST_SUITE_P(
-    Tasks, MotionLimits,
-    testing::Values(
-        // Of those that are alike one episode, unless they were found to differ.
-        Case{"pick", "franka", "", 2}, Case{"pick", "franka", "table", 1},
-        Case{"pick", "franka", "clutter", 3}, Case{"pick", "mobile_franka", "", 1},
-        Case{"pick", "i2rt_yam", "", 2}, Case{"pick", "bimanual_yam", "", 1},
-        Case{"pick", "floating_rum", "", 3}, Case{"pick", "rby1", "", 1},
-        Case{"pick_and_place", "franka", "", 4}, Case{"pick_and_place", "mobile_franka", "", 1},
-        Case{"pick_and_place", "i2rt_yam", "", 1}, Case{"pick_and_place", "bimanual_yam", "", 1},
-        Case{"pick_and_place", "floating_rum", "", 2}, Case{"pick_and_place", "rby1", "", 2},
-        Case{"pick_and_place_next_to", "franka", "", 3},
-        Case{"pick_and_place_color", "franka", "", 2, 7}, Case{"packing", "franka", "", 3},
-        Case{"open", "franka", "", 3}, Case{"open", "mobile_franka", "", 2},
-        Case{"open", "i2rt_yam", "", 1}, Case{"open", "bimanual_yam", "", 1},
-        Case{"open", "floating_rum", "", 3}, Case{"open", "rby1", "", 2},
-        Case{"close", "franka", "", 2}, Case{"close", "mobile_franka", "", 1},
-        Case{"close", "i2rt_yam", "", 1}, Case{"close", "bimanual_yam", "", 1},
-        Case{"close", "floating_rum", "", 2}, Case{"close", "rby1", "", 2},
-        Case{"door_opening", "rby1", "", 2}, Case{"door_opening", "rby1", "room_with_door:2", 2},
-        // Fingers that lead a heavy door by its handle.
-        Case{"door_opening", "mobile_franka", "", 1, 0, 0.0015}, Case{"nav_to_obj", "rby1", "", 1},
-        Case{"nav_to_obj", "mobile_franka", "", 1}),
-    [](const auto& info) {
-      std::string name = std::string(info.param.task) + "_" + info.param.robot;
-      for (const char* c = info.param.scene; *c; ++c) {
-        if (c == info.param.scene) name += "_";
-        name += std::isalnum(*c) ? *c : char{'_'};
-      }
-      return name;
+const std::vector<Case> kCases{
+    // Of those that are alike one episode, unless they were found to differ.
+    Case{"pick", "franka", "", 2}, Case{"pick", "franka", "table", 1},
+    Case{"pick", "franka", "clutter", 3}, Case{"pick", "mobile_franka", "", 1},
+    Case{"pick", "i2rt_yam", "", 2}, Case{"pick", "bimanual_yam", "", 1},
+    Case{"pick", "floating_rum", "", 3}, Case{"pick", "rby1", "", 1},
+    Case{"pick_and_place", "franka", "", 4}, Case{"pick_and_place", "mobile_franka", "", 1},
+    Case{"pick_and_place", "i2rt_yam", "", 1}, Case{"pick_and_place", "bimanual_yam", "", 1},
+    Case{"pick_and_place", "floating_rum", "", 2}, Case{"pick_and_place", "rby1", "", 2},
+    Case{"pick_and_place_next_to", "franka", "", 3},
+    Case{"pick_and_place_color", "franka", "", 2, 7}, Case{"packing", "franka", "", 3},
+    Case{"open", "franka", "", 3}, Case{"open", "mobile_franka", "", 2},
+    Case{"open", "i2rt_yam", "", 1}, Case{"open", "bimanual_yam", "", 1},
+    Case{"open", "floating_rum", "", 3}, Case{"open", "rby1", "", 2},
+    Case{"close", "franka", "", 2}, Case{"close", "mobile_franka", "", 1},
+    Case{"close", "i2rt_yam", "", 1}, Case{"close", "bimanual_yam", "", 1},
+    Case{"close", "floating_rum", "", 2}, Case{"close", "rby1", "", 2},
+    Case{"door_opening", "rby1", "", 2}, Case{"door_opening", "rby1", "room_with_door:2", 2},
+    // Fingers that lead a heavy door by its handle.
+    Case{"door_opening", "mobile_franka", "", 1, 0, 0.0015}, Case{"nav_to_obj", "rby1", "", 1},
+    Case{"nav_to_obj", "mobile_franka", "", 1}};
+
+std::string name_of_case(const testing::TestParamInfo<Case>& info) {
+  std::string name = std::string(info.param.task) + "_" + info.param.robot;
+  for (const char* c = info.param.scene; *c; ++c) {
+    if (c == info.param.scene) name += "_";
+    name += std::isalnum(*c) ? *c : char{'_'};
+  }
+  return name;
+}
+
+INSTANTIATE_TEST_SUITE_P(Tasks, MotionLimits, testing::ValuesIn(kCases), name_of_case);
+
+class NoisyMotion : public testing::TestWithParam<Case> {};
+
+// With action noise the executed motion keeps to the speed, near singular postures too.
+// MJSENSE_EPISODES=65: so many episodes of each task and robot, from MJSENSE_FIRST on.
+TEST_P(NoisyMotion, KeepsToTheSpeedOfJoints) {
+  const Case& c = GetParam();
+  const int first = number("MJSENSE_FIRST", c.first), many = number("MJSENSE_EPISODES", c.episodes);
+  Stage stage(c, 0, /*noise=*/true);
+  for (int episode = first; episode < first + many; ++episode) {
+    const MotionQuality::Greatest speed = stage.executed_speed(episode);
+    EXPECT_LE(speed.value, kSpeed) << said(c, episode, speed);
+    if (std::getenv("MJSENSE_EPISODES")) {
+      std::printf("noise %s %d: %.3f of the limit\n", testing::PrintToString(c).c_str(), episode,
+                  speed.value / kSpeed);
+      std::fflush(stdout);
+    }
+  }
+}
+
+// Each task and robot once, if MJSENSE_EPISODES is set.
+std::vector<Case> noisy_cases() {
+  std::vector<Case> cases;
+  for (const Case& c : kCases) {
+    const bool known = std::ranges::any_of(cases, [&](const Case& other) {
+      return std::string_view(other.task) == c.task && std::string_view(other.robot) == c.robot;
     });
+    if (!known && std::getenv("MJSENSE_EPISODES")) cases.push_back({c.task, c.robot, "", 0});
+  }
+  return cases;
+}
+
+INSTANTIATE_TEST_SUITE_P(Singular, NoisyMotion,
+                         testing::Values(Case{.task = "pick_and_place",
+                                              .robot = "bimanual_yam",
+                                              .scene = "",
+                                              .episodes = 1,
+                                              .first = 7,
+                                              .seed = 771000}),
+                         name_of_case);
+INSTANTIATE_TEST_SUITE_P(Tasks, NoisyMotion, testing::ValuesIn(noisy_cases()), name_of_case);
 
 }  // namespace
 }  // namespace mjsense

@@ -133,7 +133,10 @@ void OpeningPlanner::make_plan(const World& world, const PlanRequest& request, P
       if (!found) found = reach.find(start, one, from, to, cfg_.grasps, drive);
     }
   }
-  if (!found) return;
+  if (!found) {
+    plan.refusal = "no grasp of the handle leads free of collisions along its whole path";
+    return;
+  }
   way = *std::move(found);
   plan.grasp = way.grasp;
   if (way.hand.floats()) {

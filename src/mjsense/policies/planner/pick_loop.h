@@ -15,7 +15,8 @@ namespace mjsense {
 
 // The physics of one control step, with the controllers that go on in it; then derived fields are
 // fresh.
-inline void physics_steps(Task& task, World& world, mjData* data) {
+inline void physics_steps(Task& task, World& world, mjData* data,
+                          const std::function<void(const World&)>& each_physics_step = {}) {
   const bool controlled = task.robot().controls_every_step();
   for (int i = 0; i < task.decimation(); ++i) {
     if (controlled && i > 0 && i % task.control_decimation() == 0) {
@@ -23,6 +24,7 @@ inline void physics_steps(Task& task, World& world, mjData* data) {
       task.robot().control(world, i / task.control_decimation());
     }
     mj_step(world.model, data);
+    if (each_physics_step) each_physics_step(world);
   }
   mj_forward(world.model, data);
   world.substep += task.decimation();
@@ -40,7 +42,8 @@ struct EpisodeResult {
 inline EpisodeResult run_episode(Task& task, Policy& policy, mjData* data, int world_id,
                                  std::int64_t episode,
                                  const std::function<void(const World&)>& each_step = {},
-                                 const std::function<void(const World&)>& at_start = {}) {
+                                 const std::function<void(const World&)>& at_start = {},
+                                 const std::function<void(const World&)>& each_physics_step = {}) {
   const mjModel* model = task.model();
   mj_resetData(model, data);
   task.sample(world_id, episode, state_row(data));
@@ -58,7 +61,7 @@ inline EpisodeResult run_episode(Task& task, Policy& policy, mjData* data, int w
   for (;;) {
     policy.act(world, action);
     task.apply(world, action, state_row(data));
-    physics_steps(task, world, data);
+    physics_steps(task, world, data, each_physics_step);
     world.first = false;
     ++result.steps;
     if (each_step) each_step(world);

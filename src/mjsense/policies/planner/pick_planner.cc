@@ -33,7 +33,7 @@ std::span<const Phase> PickPlanner::phases() const { return kManipulationPhases;
 int PickPlanner::first_phase() const { return kOpenGripper; }
 
 bool PickPlanner::can_use(const Robot& robot) {
-  return robot.arm() >= 0 && robot.gripper() >= 0 &&
+  return robot.arm() >= 0 && robot.gripper() >= 0 && robot.groups()[robot.arm()].leaf_site >= 0 &&
          std::ranges::equal(robot.chain(robot.arm()).joints(), robot.groups()[robot.arm()].joints);
 }
 

@@ -1,12 +1,16 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "mjsense/policies/planner/picking.h"
 
+#include <fmt/format.h>
+#include <fmt/ranges.h>
+
 #include <algorithm>
 #include <cmath>
 #include <numbers>
 #include <numeric>
 
 #include "mjsense/policies/planner/phases.h"
+#include "mjsense/policies/planner/refusals.h"
 
 namespace mjsense {
 namespace {
@@ -57,13 +61,19 @@ std::optional<Picking::Grip> Picking::plan(const World& world, const PlanRequest
   });
   const Search search{
       world, request, follower, failed, m_.cfg().max_ik_candidates, m_.cfg().max_far_candidates};
+  std::vector<std::string> refusals;  // of the hands, as tried last
   for (const bool to_place : {true, false}) {
     if (to_place && (order.size() < 2 || !placing_)) continue;
+    refusals.clear();
     for (int hand : order) {
       if (const auto grip = pick_with(search, hand, to_place, plan)) return grip;
       plan.segments.clear();
+      const std::string of_hand =
+          order.size() < 2 ? "" : m_.gripper_group(m_.hand(hand)).name + ", ";
+      refusals.push_back(of_hand + plan.refusal);
     }
   }
+  plan.refusal = fmt::format("{}", fmt::join(refusals, "; "));
   return {};
 }
 
@@ -122,33 +132,54 @@ std::optional<Picking::Grip> Picking::pick_with(const Search& search, int h, boo
       rank_grasps(grasps(m_.target_shape(world.id), h), object, start.tool * Pose{{}, shape.turn},
                   wanted_approach(world, search.request, object));
   int ways = 0, misplaced = 0;
+  std::vector<Refusal> refusals(ranked.size());
+  const auto say_why = [&] { plan.refusal = text_of("grasps", refusals, world.model); };
   for (const auto& [iterations, most] :
        {std::pair(Chain::kTracking, search.most_near), std::pair(400, search.most_far)}) {
     int tried = 0;
-    for (const Grasp& grasp : ranked) {
-      if (shape.lowest(grasp.pose) < m_.scene().support_height(world.id) - kBelow) continue;
+    for (std::size_t i = 0; i < ranked.size(); ++i) {
+      const Grasp& grasp = ranked[i];
+      Refusal& refusal = refusals[i];
+      if (shape.lowest(grasp.pose) < m_.scene().support_height(world.id) - kBelow) {
+        refusal = {"in the support"};
+        continue;
+      }
       if (++tried > most || ways == cfg.max_ways) break;
       const Pose tool = grasp.pose * Pose{{}, conjugate(shape.turn)};
-      if (iterations == Chain::kTracking && search.failed.has(inverse(object) * tool)) continue;
+      if (iterations == Chain::kTracking && search.failed.has(inverse(object) * tool)) {
+        refusal = {"failed before"};
+        continue;
+      }
       HandPose before, at;
       const Pose pregrasp = backed(tool, cfg.pregrasp);
+      refusal = {"out of reach"};
       if (!(iterations == Chain::kTracking && hand.reach_along(world, pregrasp, start, before)) &&
           !hand.reach(world, pregrasp, start, before, iterations))
         continue;
       query.set_margin(kMargin);
-      if (!hand.is_free(query, before)) continue;
+      query.forget_touching();
+      if (!hand.is_free(query, before)) {
+        refusal = Refusal::collision(query.touching());
+        continue;
+      }
       query.set_margin(kGraspMargin);
-      if (!hand.line_is_free(world, query, before, tool, at) || !hand.is_free(query, at)) continue;
+      if (!hand.line_is_free(world, query, before, tool, at) || !hand.is_free(query, at)) {
+        if (query.touching().first >= 0) refusal = Refusal::collision(query.touching());
+        continue;
+      }
       if (to_place && !placing_->reaches(world, hand, at)) {
-        if (++misplaced == kMostMisplaced) return {};
+        refusal = {"with the place out of reach"};
+        if (++misplaced == kMostMisplaced) return say_why(), std::nullopt;
         continue;
       }
       Plan rest;
       hand.add_line(world, rest, kGrasp, before.tool, at.tool, cfg.slow, cfg.settle);
       hand.add_line(world, rest, kCloseGripper, at.tool, at.tool, cfg.slow, cfg.close_time)
           .grip(gripper, group.closed_command);
+      refusal = {"without room to lift"};
       if (!lift(world, hand, at, rest)) continue;
       ++ways;
+      refusal = {"without a free path to them"};
       query.set_margin(kMargin);
       if (!hand.add_way(world, query, plan, kPregrasp, start, before, way)) continue;
       std::ranges::move(rest.segments, std::back_inserter(plan.segments));
@@ -156,6 +187,7 @@ std::optional<Picking::Grip> Picking::pick_with(const Search& search, int h, boo
       return Grip{h, inverse(tool) * object, now.tool};
     }
   }
+  say_why();
   return {};
 }
 

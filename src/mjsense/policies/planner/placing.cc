@@ -13,9 +13,9 @@ namespace {
 
 using std::numbers::pi;
 
-constexpr int kTurns = 16;               // about the vertical, of what is put down
-constexpr int kMostGoals = 25 * kTurns;  // places and turns, before there is no way
-constexpr double kMostLowered = 0.3;     // m, of what is put back
+constexpr int kTurns = 16;                       // about the vertical, of what is put down
+constexpr std::size_t kMostGoals = 25 * kTurns;  // places and turns, before there is no way
+constexpr double kMostLowered = 0.3;             // m, of what is put back
 
 // As it hangs, then turned to both sides, then between.
 Quat turned(int k) {
@@ -35,7 +35,7 @@ bool Placing::plan(const World& world, const PlanRequest& request, const Followe
   std::array<std::vector<Vec3>, kTurns> places;
   for (int k = 0; k < kTurns; ++k) m_.scene().place_scene()->places(world, turned(k), places[k]);
   Rng draw = m_.rng(world, request, "planner/place");
-  int ways = 0;
+  std::vector<Refusal> refusals;
   std::size_t most = 0;
   for (const auto& of_turn : places) most = std::max(most, of_turn.size());
   for (std::size_t i = 0; i < most; ++i) {
@@ -43,11 +43,15 @@ bool Placing::plan(const World& world, const PlanRequest& request, const Followe
       if (i >= places[k].size()) continue;
       const Pose goal = placed(object, m_.target_shape(world.id), places[k][i], k);
       const std::size_t before = plan.segments.size();
-      if (place_at(world, hand, query, start, goal, tool_object, home, draw, plan)) return true;
+      Refusal& refusal = refusals.emplace_back();
+      if (place_at(world, hand, query, start, goal, tool_object, home, draw, plan, refusal))
+        return true;
       if (plan.segments.size() > before) plan.segments.resize(before);
-      if (++ways > kMostGoals) return false;
+      if (refusals.size() > kMostGoals) break;
     }
+    if (refusals.size() > kMostGoals) break;
   }
+  plan.refusal = text_of("poses of the object at its place", refusals, world.model);
   return false;
 }
 
@@ -103,7 +107,7 @@ bool Placing::gets_away(const World& world, HandPlanner& hand, const HandPose& a
 
 bool Placing::place_at(const World& world, HandPlanner& hand, CollisionQuery& query,
                        const HandPose& start, const Pose& object, const Pose& tool_object,
-                       const Home& home, Rng& rng, Plan& plan) const {
+                       const Home& home, Rng& rng, Plan& plan, Refusal& refusal) const {
   const ManipulationPlannerCfg& cfg = m_.cfg();
   const int gripper = hand.hand().gripper;
   const Pose tool = object * inverse(tool_object), over = raised(tool, cfg.preplace);
@@ -112,12 +116,21 @@ bool Placing::place_at(const World& world, HandPlanner& hand, CollisionQuery& qu
   const auto fits = [&] {
     return hand.is_free(query, above) && hand.line_is_free(world, query, above, tool, at);
   };
+  query.forget_touching();
   if (!(hand.reach_along(world, over, start, above) && fits()) &&
-      !(hand.reach(world, over, start, above, 300) && fits()))
+      !(hand.reach(world, over, start, above, 300) && fits())) {
+    refusal = {"out of reach"};
+    if (query.touching().first >= 0) refusal = Refusal::collision(query.touching());
     return false;
+  }
   query.set_margin(0);
-  if (!hand.is_free(query, at)) return false;
+  if (!hand.is_free(query, at)) {
+    refusal = Refusal::collision(query.touching());
+    return false;
+  }
+  refusal = {"without room for the fingers to open and draw back"};
   if (!gets_away(world, hand, at, object, away)) return false;
+  refusal = {"without a free path to them"};
   query.set_margin(kMargin);
   if (!hand.is_free(query, start) || !hand.is_free(query, above)) query.set_margin(0);
   if (!hand.add_way(world, query, plan, kPreplace, start, above, rng)) return false;

@@ -3,6 +3,7 @@
 // Puts down what a hand holds, where the task's PlaceScene says, lets it go and draws back.
 
 #include "mjsense/policies/planner/manipulation.h"
+#include "mjsense/policies/planner/refusals.h"
 
 namespace mjsense {
 
@@ -35,8 +36,8 @@ class Placing {
   bool gets_away(const World& world, HandPlanner& hand, const HandPose& at, const Pose& object,
                  HandPose& away) const;
   bool place_at(const World& world, HandPlanner& hand, CollisionQuery& query, const HandPose& start,
-                const Pose& object, const Pose& tool_object, const Home& home, Rng& rng,
-                Plan& plan) const;
+                const Pose& object, const Pose& tool_object, const Home& home, Rng& rng, Plan& plan,
+                Refusal& refusal) const;
   void go_home(const World& world, HandPlanner& hand, const HandPose& from, const Pose& object,
                const Home& home, Rng& rng, Plan& plan) const;
 

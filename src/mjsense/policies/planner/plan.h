@@ -5,6 +5,7 @@
 
 #include <limits>
 #include <span>
+#include <string>
 #include <vector>
 
 #include "mjsense/core/pose.h"
@@ -54,14 +55,16 @@ struct Segment {
 };
 
 struct Plan {
-  std::vector<Segment> segments;        // none: there is no way
-  Pose grasp{{0, 0, 0}, {0, 0, 0, 0}};  // X_WT that policies record; kept from plan to plan
+  std::vector<Segment> segments;  // none: there is no way
+  std::string refusal;            // then why, for people; "" is allowed
+  Pose grasp;                     // X_WT that policies record; kept from plan to plan
   // There is more to do than can be planned yet: when these segments are done, the planner is asked
   // for the next stage.
   bool more = false;
 
   void clear() {
     segments.clear();
+    refusal.clear();
     more = false;
   }
   // The tool goes at `speed` (m/s, and where given `turn` rad/s) and waits for `settle` s. References

@@ -36,7 +36,7 @@ void TaskPlanner::initialize(Task& task) {
 
 void TaskPlanner::reset(const World& world) {
   states_[world.id] = {};
-  follower_.plan(world.id).grasp = {{0, 0, 0}, {0, 0, 0, 0}};
+  follower_.plan(world.id).grasp = {};
   follower_.reset(world);
   if (!plan(world)) states_[world.id].failure = PlanFailure::kUnplanned;
 }
@@ -49,6 +49,7 @@ bool TaskPlanner::plan(const World& world) {
   make_plan(world, {state.retries, state.stage}, plan);
   follower_.begin(world);
   state.planned = !plan.segments.empty();
+  if (!state.planned) state.refusal = plan.refusal;
   return state.planned;
 }
 
@@ -67,8 +68,10 @@ void TaskPlanner::begin_again(const World& world, Action& action) {
 std::string TaskPlanner::failure(int world) const {
   const State& state = states_[world];
   std::string text = text_of(state.failure);
-  if (state.no_other_way && state.failure != PlanFailure::kUnplanned)
-    text += ", then it found no way";
+  const bool unplanned = state.failure == PlanFailure::kUnplanned;
+  if (state.no_other_way && !unplanned) text += ", then it found no way";
+  if ((state.no_other_way || unplanned) && !state.refusal.empty())
+    text += " (" + state.refusal + ")";
   return text;
 }
 

@@ -50,7 +50,8 @@ class TaskPlanner : public PlannerPolicy {
   // Throws ValueError for a task or a robot with which it can do nothing.
   virtual void initialize_planner() = 0;
   // Fills an empty plan for the world as it stands; no segments: there is no way, it gives up, or
-  // begins again where that was not the first stage. Worlds plan in parallel.
+  // begins again where that was not the first stage, and plan.refusal says why. Worlds plan in
+  // parallel.
   virtual void make_plan(const World& world, const PlanRequest& request, Plan& plan) = 0;
   // Phase while the first plan is made.
   virtual int first_phase() const { return 0; }
@@ -73,6 +74,7 @@ class TaskPlanner : public PlannerPolicy {
     int retries = 0, stage = 0;
     PlanFailure failure = PlanFailure::kNone;
     bool no_other_way = false;  // and to begin again there was no plan
+    std::string refusal;        // why there was no plan, the last time that there was none
   };
   bool plan(const World& world);
   void begin_again(const World& world, Action& action);
