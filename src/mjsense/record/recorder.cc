@@ -47,8 +47,8 @@ Recorder::Impl::Impl(const RecordingCfg& cfg_) : cfg(cfg_) {
   plan = plan_recording(cfg);
   check_names();
   check_ffmpeg(cfg.video, plan.videos);
-  house = std::make_unique<House>(cfg.out_dir / fmt::format("house_{}", cfg.house),
-                                  plan.fingerprint, cfg.resume);
+  house = std::make_unique<RecordingFolder>(cfg.out_dir / fmt::format("house_{}", cfg.house),
+                                            plan.fingerprint, cfg.resume);
   if (!house->ended()) house->publish_ready();
   decisions = house->decisions();
   saved = decisions.kept();

@@ -17,9 +17,9 @@
 
 #include "mjsense/record/encoder.h"
 #include "mjsense/record/episode_file.h"
-#include "mjsense/record/house.h"
 #include "mjsense/record/layout.h"
 #include "mjsense/record/recorder.h"
+#include "mjsense/record/recording_folder.h"
 
 namespace mjsense {
 
@@ -68,7 +68,8 @@ struct Recorder::Impl {
   std::vector<std::size_t> row_bytes;  // of a stream in a chunk that is filled
   std::vector<std::int64_t> chunk_rows_of;
 
-  std::unique_ptr<House> house;  // changed by the writer thread, or while it has nothing to do
+  std::unique_ptr<RecordingFolder>
+      house;  // changed by the writer thread, or while it has nothing to do
   std::unique_ptr<EncoderPool> pool;
 
   mutable std::mutex mutex;

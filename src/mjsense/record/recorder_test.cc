@@ -13,7 +13,7 @@
 
 #include "mjsense/core/error.h"
 #include "mjsense/core/plain_file.h"
-#include "mjsense/record/house.h"
+#include "mjsense/record/recording_folder.h"
 #include "mjsense/record/testing/tools.h"
 #include "mjsense/record/video_file.h"
 #include "mjsense/replay/check.h"

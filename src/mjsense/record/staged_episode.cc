@@ -10,8 +10,8 @@
 #include "mjsense/hdf5/chunks.h"
 #include "mjsense/hdf5/guard.h"
 #include "mjsense/record/checksum.h"
-#include "mjsense/record/house.h"
 #include "mjsense/record/layout.h"
+#include "mjsense/record/recording_folder.h"
 #include "mjsense/record/video_file.h"
 
 namespace fs = std::filesystem;

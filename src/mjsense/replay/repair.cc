@@ -15,9 +15,9 @@
 #include "mjsense/hdf5/guard.h"
 #include "mjsense/record/checksum.h"
 #include "mjsense/record/durable.h"
-#include "mjsense/record/house.h"
-#include "mjsense/record/house_lock.h"
 #include "mjsense/record/layout.h"
+#include "mjsense/record/recording_folder.h"
+#include "mjsense/record/recording_lock.h"
 #include "mjsense/replay/check.h"
 #include "mjsense/replay/trajectory.h"
 
@@ -50,12 +50,12 @@ void finish_house(const fs::path& house, std::vector<std::string>& actions) {
         fmt::format("'{}' is a link, which is not followed: remove it", staging.string()));
   std::string fingerprint;
   {
-    const Fd lock = lock_house(house, true);  // a recording that begins has not said what it is
+    const Fd lock = lock_recording(house, true);  // a recording that begins has not said what it is
     fingerprint = unfinished_recording(house);
     if (fingerprint.empty()) return remove_remains(house, actions);
   }
   const std::size_t waiting = finished_episodes(house).size();
-  House store(house, fingerprint, true);
+  RecordingFolder store(house, fingerprint, true);
   store.publish_all();
   for (const std::string& damage : store.damage())
     actions.push_back(fmt::format("{}: {}", house.string(), damage));

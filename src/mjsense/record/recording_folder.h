@@ -48,17 +48,17 @@ class Decisions {
   int kept_ = 0;
 };
 
-class House {
+class RecordingFolder {
  public:
   // Opens or begins a recording. Throws ValueError when there is one and `resume` is false, or it
   // is a different one, or another process records into it; RuntimeError when the directory cannot
   // be written.
-  House(const std::filesystem::path& dir, const std::string& fingerprint, bool resume);
+  RecordingFolder(const std::filesystem::path& dir, const std::string& fingerprint, bool resume);
   // A recording in which nothing was decided leaves nothing behind: what failed at its first step
   // blocks nobody.
-  ~House();
-  House(const House&) = delete;
-  House& operator=(const House&) = delete;
+  ~RecordingFolder();
+  RecordingFolder(const RecordingFolder&) = delete;
+  RecordingFolder& operator=(const RecordingFolder&) = delete;
 
   const std::filesystem::path& dir() const { return dir_; }
   std::filesystem::path part_dir(std::int64_t episode) const;

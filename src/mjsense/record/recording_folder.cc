@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "mjsense/record/house.h"
+#include "mjsense/record/recording_folder.h"
 
 #include <fcntl.h>
 #include <fmt/format.h>
@@ -22,8 +22,8 @@
 #include "mjsense/record/checksum.h"
 #include "mjsense/record/description.h"
 #include "mjsense/record/durable.h"
-#include "mjsense/record/house_lock.h"
 #include "mjsense/record/layout.h"
+#include "mjsense/record/recording_lock.h"
 
 namespace fs = std::filesystem;
 
@@ -170,7 +170,7 @@ std::vector<std::int64_t> Decisions::all_kept() const {
   return episodes;
 }
 
-House::House(const fs::path& dir, const std::string& fingerprint, bool resume)
+RecordingFolder::RecordingFolder(const fs::path& dir, const std::string& fingerprint, bool resume)
     : dir_(dir), staging_(dir / kStagingDir), fingerprint_(fingerprint) {
   if (!is_description(fingerprint))
     throw RuntimeError(fmt::format("'{}': its description of a recording cannot be read",
@@ -179,7 +179,7 @@ House::House(const fs::path& dir, const std::string& fingerprint, bool resume)
   batches_ = batches_of(description.at("episodes"), description.at("batches"));
 
   require_no_link(staging_);
-  lock_ = lock_house(dir, false);  // first: who holds it still publishes
+  lock_ = lock_recording(dir, false);  // first: who holds it still publishes
   const std::vector<fs::path> published = published_files(dir);
   const bool any_published = !published.empty();
   load_published(published, fingerprint);
@@ -206,7 +206,7 @@ House::House(const fs::path& dir, const std::string& fingerprint, bool resume)
   }
   make_dir(staging_);
   if (!lock_) {
-    lock_ = lock_house(dir, true);
+    lock_ = lock_recording(dir, true);
     // Whether somebody came and went between our reading and our lock.
     if (unfinished != unfinished_recording(dir) || published != published_files(dir))
       throw ValueError(fmt::format("another process records into '{}'", dir.string()));
@@ -218,7 +218,7 @@ House::House(const fs::path& dir, const std::string& fingerprint, bool resume)
   if (!ended_ && static_cast<int>(published_.size()) == batches_.count) end();
 }
 
-House::~House() {
+RecordingFolder::~RecordingFolder() {
   const bool decided = decisions_.kept() + decisions_.discarded() > 0;
   if (ended_ || !published_.empty() || decided) return;
   end();
@@ -226,7 +226,8 @@ House::~House() {
   fs::remove(dir_, not_empty);
 }
 
-void House::load_published(const std::vector<fs::path>& files, const std::string& fingerprint) {
+void RecordingFolder::load_published(const std::vector<fs::path>& files,
+                                     const std::string& fingerprint) {
   for (const fs::path& path : files) {
     const std::string name = path.filename().string();
     const auto bytes = static_cast<std::uint64_t>(size_of(open_plain(dir_, name)));
@@ -250,7 +251,7 @@ void House::load_published(const std::vector<fs::path>& files, const std::string
 
 // Moves videos back that an interrupted publication had moved already: then every episode is whole
 // in its folder or it is not, and one that is not takes nothing from the others.
-void House::bring_back(const std::map<std::int64_t, StagedEpisode>& staged, bool ending) {
+void RecordingFolder::bring_back(const std::map<std::int64_t, StagedEpisode>& staged, bool ending) {
   Decisions then = decisions_;
   for (const auto& [episode, found] : staged) then.add(episode, true);
   const std::vector<std::int64_t> order = ending ? then.all_kept() : then.settled();
@@ -270,7 +271,7 @@ void House::bring_back(const std::map<std::int64_t, StagedEpisode>& staged, bool
   }
 }
 
-void House::set_aside(const fs::path& folder, const std::string& why) {
+void RecordingFolder::set_aside(const fs::path& folder, const std::string& why) {
   const fs::path damaged = dir_ / kDamagedDir;
   require_no_link(damaged);
   make_dir(damaged);
@@ -283,7 +284,7 @@ void House::set_aside(const fs::path& folder, const std::string& why) {
       fmt::format("{} {}; it was set aside as '{}'", folder.filename().string(), why, to.string()));
 }
 
-void House::load_staged() {
+void RecordingFolder::load_staged() {
   std::map<std::int64_t, StagedEpisode> staged;
   const bool ending = fs::exists(staging_ / kEndingFile);
   for (const fs::path& path : entries(staging_)) {
@@ -322,20 +323,20 @@ void House::load_staged() {
   }
 }
 
-fs::path House::part_dir(std::int64_t episode) const {
+fs::path RecordingFolder::part_dir(std::int64_t episode) const {
   // The process number keeps us from the files of an encoder that outlives a killed recording by a
   // moment.
   return staging_ / fmt::format("{}.part.{}", episode_name(episode), getpid());
 }
 
-void House::begin(std::int64_t episode) {
+void RecordingFolder::begin(std::int64_t episode) {
   remove_tree(part_dir(episode));
   // It must be new: a folder that somebody else put there may hold links.
   if (mkdir(part_dir(episode).c_str(), 0755) != 0)
     throw_file("create the directory", part_dir(episode), errno);
 }
 
-void House::keep(std::int64_t episode) {
+void RecordingFolder::keep(std::int64_t episode) {
   const fs::path part = part_dir(episode);
   for (const fs::path& file : entries(part)) sync_file(file);
   sync_file(part);
@@ -344,23 +345,24 @@ void House::keep(std::int64_t episode) {
   decisions_.add(episode, true);
 }
 
-void House::discard(std::int64_t episode, const std::string& why) {
+void RecordingFolder::discard(std::int64_t episode, const std::string& why) {
   write_whole(staging_ / (episode_name(episode) + ".discarded"), why);
   sync_file(staging_);
   remove_tree(part_dir(episode));
   decisions_.add(episode, false);
 }
 
-void House::abandon(std::int64_t episode) { remove_tree(part_dir(episode)); }
+void RecordingFolder::abandon(std::int64_t episode) { remove_tree(part_dir(episode)); }
 
-std::vector<std::int64_t> House::batch_of(int batch, const std::vector<std::int64_t>& kept) const {
+std::vector<std::int64_t> RecordingFolder::batch_of(int batch,
+                                                    const std::vector<std::int64_t>& kept) const {
   const auto most = static_cast<std::int64_t>(kept.size());
   const std::int64_t first = std::min(batches_.first(batch), most),
                      last = std::min(batches_.first(batch + 1), most);
   return {kept.begin() + first, kept.begin() + last};
 }
 
-void House::publish_ready() {
+void RecordingFolder::publish_ready() {
   const std::vector<std::int64_t>& kept = decisions_.settled();
   for (; next_batch_ < batches_.count &&
          batches_.first(next_batch_ + 1) <= static_cast<std::int64_t>(kept.size());
@@ -369,7 +371,7 @@ void House::publish_ready() {
   }
 }
 
-void House::publish_all() {
+void RecordingFolder::publish_all() {
   if (ended_) return;
   publish_ready();
   // From here on the order of episodes is settled, also for a process that finds us interrupted.
@@ -384,7 +386,7 @@ void House::publish_all() {
   end();
 }
 
-void House::publish(int batch, const std::vector<std::int64_t>& episodes) {
+void RecordingFolder::publish(int batch, const std::vector<std::int64_t>& episodes) {
   const int batches = batches_.count;
   const fs::path part = staging_ / "batch.part";
   const std::string what = fmt::format("cannot write '{}'", part.string());
@@ -432,7 +434,7 @@ void House::publish(int batch, const std::vector<std::int64_t>& episodes) {
   for (const std::int64_t episode : episodes) remove_tree(staging_ / episode_name(episode));
 }
 
-void House::end() {
+void RecordingFolder::end() {
   ended_ = true;
   for (const fs::path& path : entries(staging_)) {
     const fs::path name = path.filename();

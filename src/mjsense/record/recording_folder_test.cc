@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // A house that others look at, write into, or left in the middle of something.
 
-#include "mjsense/record/house.h"
+#include "mjsense/record/recording_folder.h"
 
 #include <fcntl.h>
 #include <gmock/gmock.h>
@@ -14,7 +14,7 @@
 #include <csignal>
 #include <thread>
 
-#include "mjsense/record/house_lock.h"
+#include "mjsense/record/recording_lock.h"
 #include "mjsense/record/testing/tools.h"
 #include "mjsense/replay/check.h"
 
@@ -34,14 +34,14 @@ std::string go_on(const fs::path& out) {
 }
 
 // Nothing is read before: what the other publishes meanwhile would be missed, and published over.
-TEST(House, WhoRecordsIntoItIsAskedFirst) {
+TEST(RecordingFolder, WhoRecordsIntoItIsAskedFirst) {
   TempDir dir;
   begin(dir.path, 3);
   const fs::path house = dir.path / "house_0";
   std::ofstream(house / "trajectories_batch_2_of_3.h5") << "half a file";
   EXPECT_FALSE(is_locked(house));
   {
-    const Fd other = lock_house(house, false);
+    const Fd other = lock_recording(house, false);
     EXPECT_TRUE(is_locked(house));
     EXPECT_THAT(error_of([&] { go_on(dir.path); }), HasSubstr("another process records into"));
     EXPECT_THAT(repair(dir.path).text(), HasSubstr("another process records into"));
@@ -51,12 +51,12 @@ TEST(House, WhoRecordsIntoItIsAskedFirst) {
 }
 
 // A recording that begins has not said yet what it is.
-TEST(House, RepairLeavesAloneWhatBegins) {
+TEST(RecordingFolder, RepairLeavesAloneWhatBegins) {
   TempDir dir;
   const fs::path house = dir.path / "house_0";
   fs::create_directories(house / kStagingDir);
   {
-    const Fd other = lock_house(house, true);
+    const Fd other = lock_recording(house, true);
     EXPECT_THAT(repair(dir.path).text(), HasSubstr("another process records into"));
     EXPECT_TRUE(is_locked(house));
   }
@@ -65,7 +65,7 @@ TEST(House, RepairLeavesAloneWhatBegins) {
 }
 
 // Whoever looks at a house holds its lock for a moment: that is no reason not to record.
-TEST(House, ALookIsNoRecording) {
+TEST(RecordingFolder, ALookIsNoRecording) {
   TempDir whole, dir;
   const std::string bytes = go_on(whole.path);
   begin(dir.path, 1);
@@ -80,7 +80,7 @@ TEST(House, ALookIsNoRecording) {
 }
 
 // Killed before the last files of a recording that has ended were removed.
-TEST(House, WhatTheLastStepLeftIsRemoved) {
+TEST(RecordingFolder, WhatTheLastStepLeftIsRemoved) {
   for (const bool locked : {false, true}) {
     TempDir dir;
     const std::string bytes = go_on(dir.path);
@@ -94,7 +94,7 @@ TEST(House, WhatTheLastStepLeftIsRemoved) {
 }
 
 // An episode's folder under another name is not removed, and keeps nobody from going on.
-TEST(House, FoldersOfOtherNamesAreSetAside) {
+TEST(RecordingFolder, FoldersOfOtherNamesAreSetAside) {
   TempDir whole, dir;
   const std::string bytes = go_on(whole.path);
   begin(dir.path, 1);
@@ -119,7 +119,7 @@ TEST(House, FoldersOfOtherNamesAreSetAside) {
 }
 
 // The system may write a part and say why only when asked for the rest.
-TEST(House, ADescriptionThatDoesNotFitTellsWhy) {
+TEST(RecordingFolder, ADescriptionThatDoesNotFitTellsWhy) {
   TempDir dir;
   const fs::path report = dir.path / "report";
   const pid_t pid = fork();

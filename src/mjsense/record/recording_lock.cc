@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "mjsense/record/house_lock.h"
+#include "mjsense/record/recording_lock.h"
 
 #include <fcntl.h>
 #include <fmt/format.h>
@@ -11,7 +11,7 @@
 #include <cstring>
 
 #include "mjsense/core/error.h"
-#include "mjsense/record/house.h"
+#include "mjsense/record/recording_folder.h"
 
 namespace fs = std::filesystem;
 
@@ -30,7 +30,7 @@ bool is_named(const Fd& lock, const fs::path& path) {
 
 }  // namespace
 
-Fd lock_house(const fs::path& house, bool make) {
+Fd lock_recording(const fs::path& house, bool make) {
   const fs::path path = house / kStagingDir / kLockFile;
   const int flags = O_RDWR | O_NOFOLLOW | O_NONBLOCK | O_CLOEXEC | (make ? O_CREAT : 0);
   for (int n = 0; n < kTries; ++n) {
