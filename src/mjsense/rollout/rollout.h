@@ -18,6 +18,7 @@
 #include <array>
 #include <cstdint>
 #include <functional>
+#include <map>
 #include <memory>
 #include <optional>
 #include <span>
@@ -72,6 +73,9 @@ struct RolloutCfg {
   TaskFactory make_task;
   PolicyFactory make_policy;
   std::function<SceneFileCfg()> make_scene;
+  // What these functions and `more_sensors` depend on: checksums of code and of the values that it
+  // uses, by name, for "task", "policy", "sensor 'x'" ... A recording is resumed only with the same.
+  std::map<std::string, std::map<std::string, std::string>> code;
   // Makes further sensors for the suite, recorded like the others. The rollout is being made: task,
   // policy, simulation, cameras and the suite so far are there.
   std::function<std::vector<std::shared_ptr<Sensor>>(Rollout&)> more_sensors;
@@ -87,15 +91,14 @@ void visit_fields(V& v, RolloutCfg& c) {
     "a "
     "task whose scene has its own.")
       .decides_data();
-  v("scene", c.scene, "Which scene, by its name or a file; by default the task's.")
-      .decides_data_as("scene");
+  v("scene", c.scene, "Which scene, by its name or a file; by default the task's.").decides_data();
   v("policy", c.policy, "What drives it.").decides_data();
   v("num_worlds", c.num_worlds, "How many run at one time.").option("worlds").at_least(1);
   v("threads", c.threads, "Of the simulation; 0: every CPU this process may use.").at_least(0);
   v("seed", c.seed, "Same seed, same episodes.").decides_data();
   v("camera_system", c.camera_system,
     "Cameras of the robot's, by the system's name or a file; by default those of its model.")
-      .decides_data_as("camera_system");
+      .decides_data();
   v("cameras", c.cameras,
     "Names of the cameras, in this order; by default all, none for an empty list.")
       .decides_data_as("cameras");
@@ -128,12 +131,12 @@ void visit_fields(V& v, RolloutCfg& c) {
     "Share of episodes in which something goes wrong on purpose: the object is shoved, or slips "
     "from the hand.")
       .within(0, 1)
-      .decides_data_as("perturb");
+      .decides_data();
   v("terminate_upon_success", c.terminate_upon_success, "An episode ends at its first success.")
-      .decides_data_as("terminate_upon_success");
+      .decides_data();
   v("use_sensors", c.use_sensors,
     "Task, robot and policy bring their sensors; without them only those that are given.")
-      .decides_data_as("use_sensors")
+      .decides_data()
       .hidden();
 }
 
