@@ -67,6 +67,10 @@ Fd wake_up() { return Fd(eventfd(0, EFD_CLOEXEC | EFD_NONBLOCK)); }
 
 void widen_pipe(int pipe, int bytes) { fcntl(pipe, F_SETPIPE_SZ, bytes); }
 
+std::filesystem::path path_of(int file) {
+  return std::filesystem::path("/proc/self/fd") / std::to_string(file);
+}
+
 bool reserve(int file, std::int64_t bytes) {
   return fallocate(file, FALLOC_FL_KEEP_SIZE, 0, bytes) == 0;
 }

@@ -4,6 +4,7 @@
 // os.cc.
 
 #include <cstdint>
+#include <filesystem>
 #include <utility>
 #include <vector>
 
@@ -25,6 +26,7 @@ Fd memory_file(const char* name);
 Fd wake_up();                                // eventfd: readable after a write of 8 bytes
 void widen_pipe(int pipe, int bytes);        // a wish
 bool reserve(int file, std::int64_t bytes);  // disk space, without a change of size; false: errno
+std::filesystem::path path_of(int file);  // that leads to this open file or folder, wherever it is
 
 // Calls that a child may make between fork() and exec().
 void end_with_parent();                           // it is killed when its parent's thread ends

@@ -7,8 +7,7 @@
 
 namespace mjsense {
 std::vector<std::string> encoder_command(const VideoCfg& cfg, const Fps& fps,
-                                         const VideoStream& video,
-                                         const std::filesystem::path& output) {
+                                         const VideoStream& video, const std::string& output) {
   // What the frames are when they reach it, so that it converts nothing.
   constexpr const char* kPixels[] = {"yuv420p", "gray16le", "rgb24"};
   const char* pixels = kPixels[static_cast<int>(video.kind)];
@@ -35,7 +34,7 @@ std::vector<std::string> encoder_command(const VideoCfg& cfg, const Fps& fps,
       break;
   }
   add({"-fflags", "+bitexact", "-flags:v", "+bitexact", "-map_metadata", "-1", "-f",
-       video.extension == ".mkv" ? "matroska" : "mp4", "file:" + output.string()});
+       video.extension == ".mkv" ? "matroska" : "mp4", "file:" + output});
   return a;
 }
 

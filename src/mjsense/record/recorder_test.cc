@@ -460,7 +460,7 @@ TEST(RecorderFaults, WrongConfigurationsAreNamed) {
   };
   EXPECT_THAT(error([](RecordingCfg& c) { c.out_dir.clear(); }), HasSubstr("no output directory"));
   EXPECT_THAT(error([](RecordingCfg& c) { c.out_dir = c.out_dir / std::string(300, 'x'); }),
-              HasSubstr("x/house_0/.recording': File name too long"));
+              HasSubstr("x/house_0': File name too long"));
   for (const char* name : {"a\nb", "\x1b[31m"})
     EXPECT_THAT(error([&](RecordingCfg& c) { c.out_dir /= name; }),
                 HasSubstr("has control characters"));

@@ -11,7 +11,10 @@
 #include <sys/wait.h>
 #include <unistd.h>
 
+#include <atomic>
+#include <chrono>
 #include <csignal>
+#include <random>
 #include <thread>
 
 #include "mjsense/record/recording_lock.h"
@@ -41,7 +44,7 @@ TEST(RecordingFolder, WhoRecordsIntoItIsAskedFirst) {
   std::ofstream(house / "trajectories_batch_2_of_3.h5") << "half a file";
   EXPECT_FALSE(is_locked(house));
   {
-    const Fd other = lock_recording(house, false);
+    const Fd other = lock_recording(Folder::open(house), false);
     EXPECT_TRUE(is_locked(house));
     EXPECT_THAT(error_of([&] { go_on(dir.path); }), HasSubstr("another process records into"));
     EXPECT_THAT(repair(dir.path).text(), HasSubstr("another process records into"));
@@ -56,7 +59,7 @@ TEST(RecordingFolder, RepairLeavesAloneWhatBegins) {
   const fs::path house = dir.path / "house_0";
   fs::create_directories(house / kStagingDir);
   {
-    const Fd other = lock_recording(house, true);
+    const Fd other = lock_recording(Folder::open(house), true);
     EXPECT_THAT(repair(dir.path).text(), HasSubstr("another process records into"));
     EXPECT_TRUE(is_locked(house));
   }
@@ -116,6 +119,72 @@ TEST(RecordingFolder, FoldersOfOtherNamesAreSetAside) {
   std::string again;
   for (const std::string& name : tree(dir.path)) again += read_file(dir.path / name);
   EXPECT_EQ(again, bytes);
+}
+
+std::string contents(const fs::path& dir) {
+  std::string text;
+  for (const std::string& name : tree(dir)) text += name + "\n" + read_file(dir / name);
+  return text;
+}
+
+// While an episode is recorded, .recording is moved away and a link to another folder takes its place:
+// nothing in the other folder changes, and the recording reports an error.
+TEST(RecordingFolder, AFolderThatIsSwappedForALinkIsNotFollowed) {
+  constexpr int kSwaps = 100;
+  TempDir foreign, other;
+  fs::create_directories(foreign.path / "target/deep/er");
+  for (const char* name : {"thesis.txt", "lock", "recording.json", "deep/er/episode_00000000"})
+    std::ofstream(foreign.path / "target" / name) << "years of work";
+  begin(other.path, 2);
+  const fs::path targets[] = {foreign.path / "target", other.path / "house_0/.recording"};
+  const std::string before[] = {contents(targets[0]), contents(targets[1])};
+  std::mt19937 random(7);
+  int swapped_runs = 0;
+  for (int n = 0; swapped_runs < kSwaps && n < 20 * kSwaps; ++n) {
+    TempDir dir;
+    const fs::path staging = dir.path / "house_0/.recording";
+    std::atomic<bool> ended = false, swapped = false;
+    const auto delay = std::chrono::microseconds(random() % 30'000);
+    std::thread swap([&] {
+      while (!ended && !fs::is_directory(staging)) std::this_thread::yield();
+      const auto until = std::chrono::steady_clock::now() + delay;
+      while (!ended && std::chrono::steady_clock::now() < until) std::this_thread::yield();
+      std::error_code error;
+      fs::rename(staging, dir.path / "moved", error);
+      if (error) return;
+      fs::create_directory_symlink(targets[n % 2], staging);
+      swapped = true;
+    });
+    const std::string error = error_of([&] { go_on(dir.path); });
+    ended = true;
+    swap.join();
+    if (!swapped) continue;  // the recording had ended
+    ++swapped_runs;
+    EXPECT_THAT(error, ::testing::AnyOf(HasSubstr("was moved, removed or replaced"),
+                                        HasSubstr("is a link, which is not followed")));
+    for (int t : {0, 1}) ASSERT_EQ(contents(targets[t]), before[t]) << n << ": " << error;
+    EXPECT_TRUE(fs::is_symlink(staging));
+  }
+  EXPECT_EQ(swapped_runs, kSwaps);
+}
+
+// Put back, it goes on where it was.
+TEST(RecordingFolder, AFolderThatIsPutBackIsResumed) {
+  TempDir whole, dir;
+  const std::string bytes = go_on(whole.path);
+  const fs::path staging = dir.path / "house_0/.recording";
+  FakeSuite suite({1, 16, 12, false, false});
+  RecordingCfg cfg = fake_recording(dir.path, suite, 1, 6);
+  cfg.batches = 3;
+  {
+    Recorder recorder(cfg);
+    record_all(recorder, suite, {.worlds = 1, .stop_after = 1});
+    fs::rename(staging, dir.path / "moved");
+    EXPECT_THAT(error_of([&] { record_all(recorder, suite, {.worlds = 1}); }),
+                HasSubstr(".recording' was moved, removed or replaced during the recording"));
+  }
+  fs::rename(dir.path / "moved", staging);
+  EXPECT_EQ(go_on(dir.path), bytes);
 }
 
 // The system may write a part and say why only when asked for the rest.

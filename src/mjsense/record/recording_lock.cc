@@ -21,27 +21,21 @@ namespace {
 // Who only looks holds it for a moment, and a program that is being started for another.
 constexpr int kTries = 20, kPauseMicroseconds = 10'000;
 
-// Whose lock it was may have removed it while we waited: then that name is somebody else's.
-bool is_named(const Fd& lock, const fs::path& path) {
-  struct stat ours = {}, named = {};
-  return fstat(lock.get(), &ours) == 0 && lstat(path.c_str(), &named) == 0 &&
-         ours.st_dev == named.st_dev && ours.st_ino == named.st_ino;
-}
-
 }  // namespace
 
-Fd lock_recording(const fs::path& house, bool make) {
-  const fs::path path = house / kStagingDir / kLockFile;
+Fd lock_recording(const Folder& house, bool make) {
   const int flags = O_RDWR | O_NOFOLLOW | O_NONBLOCK | O_CLOEXEC | (make ? O_CREAT : 0);
   for (int n = 0; n < kTries; ++n) {
     if (n > 0) usleep(kPauseMicroseconds);
-    Fd lock(open(path.c_str(), flags, 0644));
-    if (!lock && !make && (errno == ENOENT || errno == ENOTDIR)) return {};
-    if (!lock)
-      throw RuntimeError(fmt::format("cannot write '{}': {}", path.string(), std::strerror(errno)));
-    if (flock(lock.get(), LOCK_EX | LOCK_NB) == 0 && is_named(lock, path)) return lock;
+    const Folder staging = make ? house.at(kStagingDir) : house.find(kStagingDir);
+    if (!staging) return {};
+    Fd lock(openat(staging.fd(), kLockFile, flags, 0644));
+    if (!lock && !make && errno == ENOENT) return {};
+    if (!lock) throw_file("write", staging.shown(kLockFile), errno);
+    // The process that held it may have removed it meanwhile: then that name is another one's.
+    if (flock(lock.get(), LOCK_EX | LOCK_NB) == 0 && staging.contains(kLockFile, lock)) return lock;
   }
-  throw ValueError(fmt::format("another process records into '{}'", house.string()));
+  throw ValueError(fmt::format("another process records into '{}'", house.path().string()));
 }
 
 bool is_locked(const fs::path& house) {

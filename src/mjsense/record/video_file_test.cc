@@ -10,6 +10,7 @@
 
 #include "mjsense/core/fd.h"
 #include "mjsense/record/checksum.h"
+#include "mjsense/record/folder.h"
 #include "mjsense/record/testing/tools.h"
 
 namespace mjsense {
@@ -93,7 +94,7 @@ TEST(Checksum, OfAFileIsBehindItsEnd) {
   const auto seal = [&] { return check_seal(Fd(open(path.c_str(), O_RDONLY | O_CLOEXEC)).get()); };
   write(path, "some bytes");
   EXPECT_EQ(seal(), Seal::kNone);
-  seal_file(path);
+  seal_file(Folder::open(path.parent_path()), path.filename());
   EXPECT_EQ(seal(), Seal::kWhole);
   const std::string whole = read_file(path);
   for (std::size_t i = 0; i < whole.size(); ++i) {
