@@ -15,7 +15,8 @@ namespace mjsense::os {
 int usable_cpus();  // by this process; 0: not known
 
 std::uint64_t free_memory();  // bytes, of the machine or its cgroup; the largest number: not known
-std::uint64_t address_space();  // bytes that this process has; 0: not known
+double waited_for_processor(int process);  // seconds in which it could have run; 0: not known
+std::uint64_t address_space();             // bytes that this process has; 0: not known
 
 // Descriptors from `first` on that are open; for kernels on which close_files() fails.
 std::vector<int> open_files(int first);

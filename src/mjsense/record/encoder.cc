@@ -12,7 +12,6 @@
 #include <chrono>
 #include <condition_variable>
 #include <cstring>
-#include <ctime>
 #include <deque>
 #include <mutex>
 #include <thread>
@@ -49,10 +48,10 @@ class EncoderPool::Stream {
   bool closed = false;  // the producer is done
   bool aborted = false;
   std::string failure;
-  // Since its ffmpeg has last taken or written something: seconds in which it did nothing, and
-  // processor seconds that it used.
-  double idle_s = 0, busy_s = 0;
-  double cpu_seen = 0;
+  // Wall seconds since its ffmpeg has last taken or written something, less those in which it waited
+  // for a processor.
+  double idle_s = 0;
+  double waited_s = 0;       // for a processor, in all
   std::int64_t written = 0;  // bytes that went into its ffmpeg
   std::int64_t seen = 0;     // of its input or output, when it last did
 
@@ -172,35 +171,21 @@ struct EncoderPool::Impl {
     for (const auto& stream : streams) {
       const bool ending = stream->child.pid >= 0 && !stream->child.in;
       if (stream->failed() || !(ending || (stream->direct && stream->has_frames()))) {
-        stream->idle_s = stream->busy_s = 0;
+        stream->idle_s = 0;
         continue;
       }
       const std::int64_t now = ending ? moved(*stream) : stream->written;
-      const double cpu = cpu_of(stream->child.pid), worked = cpu - stream->cpu_seen;
-      // On a machine with too much to do it gets little time, and uses it: that is no hang. One that
-      // uses all it gets and never moves is.
-      if (now != stream->seen) {
-        stream->idle_s = stream->busy_s = 0;
-      } else if (worked > 0) {
-        stream->idle_s = 0;
-        stream->busy_s += worked;
-      } else {
-        stream->idle_s += elapsed;
-      }
+      // On a machine with too much to do it may get no processor: that is no hang.
+      const double waited = os::waited_for_processor(stream->child.pid);
+      const double without = std::clamp(waited - stream->waited_s, 0.0, elapsed);
+      stream->idle_s = now != stream->seen ? 0 : stream->idle_s + elapsed - without;
       stream->seen = now;
-      stream->cpu_seen = cpu;
-      if (std::max(stream->idle_s, stream->busy_s) < most) continue;
+      stream->waited_s = waited;
+      if (stream->idle_s < most) continue;
       stream->failure = fmt::format("ffmpeg {} for {:g} s and was ended (ffmpeg_timeout)",
                                     ending ? "did not come to its end" : "took no picture", most);
       changed.notify_all();
     }
-  }
-
-  static double cpu_of(pid_t pid) {
-    clockid_t clock;
-    timespec time = {};
-    if (clock_getcpuclockid(pid, &clock) != 0 || clock_gettime(clock, &time) != 0) return 0;
-    return static_cast<double>(time.tv_sec) + 1e-9 * static_cast<double>(time.tv_nsec);
   }
 
   // How far an ffmpeg has come that gets no more from us: in the file that it reads, or in the one

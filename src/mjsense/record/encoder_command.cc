@@ -4,6 +4,7 @@
 #include "mjsense/core/error.h"
 #include "mjsense/record/encoder.h"
 #include "mjsense/record/process.h"
+#include "mjsense/record/spawn.h"
 
 namespace mjsense {
 std::vector<std::string> encoder_command(const VideoCfg& cfg, const Fps& fps,
@@ -45,12 +46,17 @@ void check_ffmpeg(const VideoCfg& cfg, std::span<const VideoStream> videos) {
   try {
     listing = run_process({program, "-hide_banner", "-loglevel", "error", "-encoders"},
                           {.silence_s = cfg.ffmpeg_timeout});
-  } catch (const Error& error) {
+  } catch (const CannotStart& error) {
     throw RuntimeError(
         fmt::format("recording {} video streams needs ffmpeg: {}; install it (apt-get install "
                     "ffmpeg, or for Python pip install 'mjsense[video]') or name it in "
                     "$MJSENSE_FFMPEG",
                     videos.size(), error.what()));
+  } catch (const Error& error) {
+    throw RuntimeError(
+        fmt::format("recording {} video streams needs ffmpeg, and '{}' did not list its encoders: "
+                    "{}",
+                    videos.size(), program, error.what()));
   }
   constexpr const char* kEncoders[] = {"libx264", "ffv1", "libx264rgb"};
   for (const VideoStream& video : videos) {

@@ -31,18 +31,18 @@ void describe_video(hid_t dataset, const RecordingCfg& cfg, const VideoStream& v
   switch (video.kind) {
     case VideoKind::kRgb:
       h5::set_attribute(dataset, "encoding", "rgb");
-      h5::set_attribute(dataset, "codec", "h264");
+      h5::set_attribute(dataset, "codec", video.codec());
       break;
     case VideoKind::kDepth16:
       h5::set_attribute(dataset, "encoding", "depth16");
-      h5::set_attribute(dataset, "codec", "ffv1");
+      h5::set_attribute(dataset, "codec", video.codec());
       h5::set_attribute(dataset, "metres_per_unit", cfg.video.depth_unit);
       h5::set_attribute(dataset, "invalid_value", std::int64_t{kDepthInvalid});
       h5::set_attribute(dataset, "far_value", std::int64_t{kDepthFar});
       break;
     case VideoKind::kDepthRedGreen:
       h5::set_attribute(dataset, "encoding", "molmospaces_red_green");
-      h5::set_attribute(dataset, "codec", "h264");
+      h5::set_attribute(dataset, "codec", video.codec());
       break;
   }
 }

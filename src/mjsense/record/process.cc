@@ -97,7 +97,10 @@ bool wait_process(Child& child, bool block, Exit& result) {
   result.cpu_s = seconds(usage.ru_utime) + seconds(usage.ru_stime);
   const std::string words = last_words(child.log.get());
   if (got < 0) {
-    result.why = fmt::format("its exit status was lost ({})", std::strerror(errno));
+    result.ok = words.empty();
+    result.why =
+        "its exit status is not known, because this process ignores SIGCHLD or collects all of its "
+        "children (set SIGCHLD to SIG_DFL)";
   } else if (WIFSIGNALED(status)) {
     result.why =
         fmt::format("killed by signal {} ({})", WTERMSIG(status), strsignal(WTERMSIG(status)));

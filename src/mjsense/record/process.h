@@ -38,7 +38,9 @@ struct Exit {
   double cpu_s = 0;
 };
 
-// Waits for the end (or, if `block` is false, returns false when it still runs).
+// Waits for the end (or, if `block` is false, returns false when it still runs). In a process that
+// ignores SIGCHLD the system keeps no exit status: a program then counts as failed if it wrote to its
+// stderr, and what it has made must be checked, as it is with a status.
 bool wait_process(Child& child, bool block, Exit& result);
 void kill_process(Child& child);  // SIGKILL, and waits
 

@@ -99,6 +99,9 @@ std::vector<EpisodeFile::VideoSum> Recorder::Impl::check_videos(const Episode& e
       const auto fits = [](int got, int asked) { return got == asked || got == asked + asked % 2; };
       if (!facts.error.empty())
         refuse(fmt::format("'{}' is no whole video: {}", name, facts.error));
+      if (facts.codec != video.codec() || facts.container != video.container())
+        refuse(fmt::format("'{}' holds {} in {}, expected {} in {}", name, printable(facts.codec),
+                           facts.container, video.codec(), video.container()));
       if (facts.frames != episode.rows)
         refuse(fmt::format("'{}' has {} frames, expected {}", name, facts.frames, episode.rows));
       if (!fits(facts.width, video.width) || !fits(facts.height, video.height))

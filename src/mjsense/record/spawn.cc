@@ -91,7 +91,7 @@ pid_t spawn(const std::vector<std::string>& argv, int in, int out, int log, int 
     }
   }
   if (error != 0)
-    throw RuntimeError(
+    throw CannotStart(
         fmt::format("cannot start the program '{}': {}", argv[0], std::strerror(error)));
   return pid;
 }

@@ -47,6 +47,8 @@ TEST_F(Containers, AreCounted) {
     EXPECT_EQ(facts.frames, 6);
     EXPECT_EQ(facts.width, 16);
     EXPECT_EQ(facts.height, 12);
+    EXPECT_EQ(facts.codec, video.extension() == ".mkv" ? "ffv1" : "h264");
+    EXPECT_EQ(facts.container, video.extension() == ".mkv" ? "Matroska" : "MP4");
   }
 }
 
