@@ -33,6 +33,7 @@ class PyRecorder {
     cfg.num_worlds = sim.open().num_worlds();
     cfg.fps = {fps_num, fps_den};
     cfg.settings = settings;
+    cfg.model = sim.open().model();
     for (const char* name : {"house", "episodes", "batches", "gzip"}) {
       int& value = std::string_view(name) == "house"      ? cfg.house
                    : std::string_view(name) == "episodes" ? cfg.episodes

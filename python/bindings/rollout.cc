@@ -6,6 +6,7 @@
 #include <fmt/format.h>
 #include <nanobind/nanobind.h>
 #include <nanobind/ndarray.h>
+#include <nanobind/stl/map.h>
 #include <nanobind/stl/optional.h>
 #include <nanobind/stl/shared_ptr.h>
 #include <nanobind/stl/string.h>
@@ -29,7 +30,7 @@ namespace mjsense::python {
 namespace {
 
 // Objects of Python's that play in a rollout: `parts` has a task or None, a policy or None, sensors,
-// and a scene or None. C++ copies and destroys its configuration without the interpreter's lock.
+// a scene or None, and what their code depends on (RolloutCfg::code). C++ copies and destroys its configuration without the interpreter's lock.
 class Parts {
  public:
   Parts(nb::object parts, nb::object make_simulation)
@@ -37,11 +38,13 @@ class Parts {
         task_(nb::object(parts[0])),
         policy_(nb::object(parts[1])),
         sensors_(nb::object(parts[2])),
-        scene_(nb::object(parts[3])) {}
+        scene_(nb::object(parts[3])),
+        code_(nb::cast<decltype(code_)>(parts[4])) {}
 
   const std::shared_ptr<PythonHost>& host() const { return host_; }
 
   void join(RolloutCfg& cfg) const {
+    cfg.code = code_;
     if (!task_.get().is_none()) {
       const bool own_horizon = !cfg.horizon;
       cfg.make_task = [task = task_, host = host_, own_horizon](TaskCfg wanted) {
@@ -90,6 +93,7 @@ class Parts {
   }
 
   Held task_, policy_, sensors_, scene_;
+  decltype(RolloutCfg::code) code_;
 };
 
 nb::dict progress_dict(const RecordProgress& p) {

@@ -8,6 +8,7 @@ from pathlib import Path
 from types import NoneType
 from typing import Any
 
+from mjsense._code_checksums import checksums
 from mjsense._members import member
 from mjsense.configs import SceneCfg, SceneFileCfg
 from mjsense.policy import Policy, policy_of
@@ -20,11 +21,12 @@ Policies = str | Policy | type[Policy] | Callable[[dict[str, Any]], Any] | None
 Scenes = str | Path | SceneFileCfg | Callable[[], SceneCfg]
 """A scene: its name, its file, what such a file would say, or a function that makes its models."""
 
-Parts = tuple[Task | None, Policy | None, list[Any], SceneFileCfg | None]
+Parts = tuple[Task | None, Policy | None, list[Any], SceneFileCfg | None, dict[str, dict[str, str]]]
 
 
 def parts_of(options: dict[str, Any], sensors: Iterable[Any]) -> Parts:
-    """(task, policy, sensors, scene) written in Python; the options get the names of all."""
+    """(task, policy, sensors, scene) written in Python, and what a recording compares of their code when it is resumed; the options
+    get the names of all."""
     options["task"], task = task_of(options["task"])
     options["policy"], policy = policy_of(options["policy"])
     robot = options["robot"]
@@ -37,7 +39,12 @@ def parts_of(options: dict[str, Any], sensors: Iterable[Any]) -> Parts:
     for part in (task, policy):
         for sensor in part._mjs_make_sensors() if part else ():
             member(sensor)
-    return task, policy, [member(sensor) for sensor in sensors], scene
+    members = [member(sensor) for sensor in sensors]
+    code: dict[str, dict[str, str]] = {}
+    if "resume" in options:
+        owners = {"task": task, "policy": policy, **{f"sensor '{sensor.uuid}'": sensor for sensor in members}}
+        code = {place: checksums(owner, place, options["resume"]) for place, owner in owners.items() if owner is not None}
+    return task, policy, members, scene, code
 
 
 def scene_of(scene: Scenes) -> tuple[str, SceneFileCfg | None]:

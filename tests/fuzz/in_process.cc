@@ -8,7 +8,7 @@
 namespace mjsense::h5 {
 
 std::string in_child(std::string_view, std::uint64_t, const std::function<std::string()>& read,
-                     std::uint64_t) {
+                     std::uint64_t, int) {
   try {
     return read();
   } catch (const std::exception& e) {

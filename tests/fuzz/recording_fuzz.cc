@@ -343,7 +343,7 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
   }
   try {
     if (staged) {
-      static_cast<void>(read_staged(file.parent_path()));
+      static_cast<void>(read_staged(Folder::open(file.parent_path())));
     } else {
       const VerifyResult found = verify(path, {.decode = false, .ffmpeg = "/bin/false"});
       if (found.text().find('\x1b') != std::string::npos)

@@ -222,7 +222,7 @@ def test_a_scene_that_was_changed_is_another_recording(mjsense):
     args = ["record", "pick", "--scene", scene, "--cameras", "none", "--horizon", 3, "--keep-failures", "--episodes", 2, "--out", "data", "-q"]
     mjsense(*args, "--max-attempts", 1, rc=1)
     scene.write_text('name = "mine"\nextends = "table"\ngap = 0.03\n')
-    assert "'settings/files/scene' was" in mjsense(*args, "--resume", rc=2).stderr
+    assert "'settings/scene_file/gap' was" in mjsense(*args, "--resume", rc=2).stderr
     scene.write_text('name = "mine"\nextends = "table"\ngap = 0.02\n')
     assert "is complete" in mjsense(*args, "--resume", rc=2).stderr  # the same again: nothing else is wrong
 

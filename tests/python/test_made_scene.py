@@ -83,7 +83,7 @@ def test_a_recording_resumes_only_with_the_same_scene(tmp_path):
     options = dict(out=tmp_path, episodes=1, cameras=[])
     mjs.record("pick", scene=scene(), **options)
     other = mjs.SceneFileCfg(name="bench", models=lambda: bench(BENCH.replace("0.3 0.5 0.02", "0.3 0.5 0.03")), regions=[TOP])
-    with pytest.raises(ValueError, match="files"):
+    with pytest.raises(ValueError, match="'model/geom' was"):
         mjs.record("pick", scene=other, resume=True, **{**options, "episodes": 1})
     assert mjs.record("pick", scene=scene(), resume=True, **options).kept == 1
 

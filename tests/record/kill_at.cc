@@ -47,6 +47,10 @@ int rename(const char* from, const char* to) noexcept {
   count();
   return next<int(const char*, const char*)>("rename")(from, to);
 }
+int renameat(int from_dir, const char* from, int to_dir, const char* to) noexcept {
+  count();
+  return next<int(int, const char*, int, const char*)>("renameat")(from_dir, from, to_dir, to);
+}
 int unlink(const char* path) noexcept {
   count();
   return next<int(const char*)>("unlink")(path);
@@ -62,6 +66,10 @@ int rmdir(const char* path) noexcept {
 int mkdir(const char* path, mode_t mode) noexcept {
   count();
   return next<int(const char*, mode_t)>("mkdir")(path, mode);
+}
+int mkdirat(int dir, const char* path, mode_t mode) noexcept {
+  count();
+  return next<int(int, const char*, mode_t)>("mkdirat")(dir, path, mode);
 }
 int fsync(int file) {
   count();

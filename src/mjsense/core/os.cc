@@ -50,6 +50,19 @@ std::uint64_t free_memory() {
   return available;
 }
 
+double waited_for_processor(int process) {
+  const auto tasks = std::filesystem::path("/proc") / std::to_string(process) / "task";
+  double seconds = 0;
+  std::error_code ignored;  // it has ended
+  for (std::filesystem::directory_iterator it(tasks, ignored), end; !ignored && it != end;
+       it.increment(ignored)) {
+    std::uint64_t ran_ns = 0, waited_ns = 0;
+    if (std::ifstream(it->path() / "schedstat") >> ran_ns >> waited_ns)
+      seconds += 1e-9 * static_cast<double>(waited_ns);
+  }
+  return seconds;
+}
+
 std::uint64_t address_space() {
   const std::uint64_t pages = number_in("/proc/self/statm");
   return pages == kUnknown ? 0 : pages * static_cast<std::uint64_t>(sysconf(_SC_PAGESIZE));
@@ -66,6 +79,10 @@ Fd memory_file(const char* name) { return Fd(memfd_create(name, MFD_CLOEXEC)); }
 Fd wake_up() { return Fd(eventfd(0, EFD_CLOEXEC | EFD_NONBLOCK)); }
 
 void widen_pipe(int pipe, int bytes) { fcntl(pipe, F_SETPIPE_SZ, bytes); }
+
+std::filesystem::path path_of(int file) {
+  return std::filesystem::path("/proc/self/fd") / std::to_string(file);
+}
 
 bool reserve(int file, std::int64_t bytes) {
   return fallocate(file, FALLOC_FL_KEEP_SIZE, 0, bytes) == 0;

@@ -4,6 +4,7 @@
 // os.cc.
 
 #include <cstdint>
+#include <filesystem>
 #include <utility>
 #include <vector>
 
@@ -14,7 +15,8 @@ namespace mjsense::os {
 int usable_cpus();  // by this process; 0: not known
 
 std::uint64_t free_memory();  // bytes, of the machine or its cgroup; the largest number: not known
-std::uint64_t address_space();  // bytes that this process has; 0: not known
+double waited_for_processor(int process);  // seconds in which it could have run; 0: not known
+std::uint64_t address_space();             // bytes that this process has; 0: not known
 
 // Descriptors from `first` on that are open; for kernels on which close_files() fails.
 std::vector<int> open_files(int first);
@@ -25,6 +27,7 @@ Fd memory_file(const char* name);
 Fd wake_up();                                // eventfd: readable after a write of 8 bytes
 void widen_pipe(int pipe, int bytes);        // a wish
 bool reserve(int file, std::int64_t bytes);  // disk space, without a change of size; false: errno
+std::filesystem::path path_of(int file);  // that leads to this open file or folder, wherever it is
 
 // Calls that a child may make between fork() and exec().
 void end_with_parent();                           // it is killed when its parent's thread ends

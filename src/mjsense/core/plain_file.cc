@@ -62,15 +62,21 @@ bool is_plain_name(std::string_view name) {
 }
 
 Fd open_plain(const std::filesystem::path& folder, std::string_view name) {
+  const Fd dir(open(folder.empty() ? "." : folder.c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC));
+  if (!dir && is_plain_name(name))
+    throw RuntimeError(
+        fmt::format("'{}' cannot be opened: {}", printable(name), std::strerror(errno)));
+  return open_plain(dir.get(), name);
+}
+
+Fd open_plain(int folder, std::string_view name) {
   const auto fail = [&](std::string_view why) {
     throw RuntimeError(fmt::format("'{}' {}", printable(name), why));
   };
   if (!is_plain_name(name)) fail("is no plain file name, which stays in its folder");
-  const Fd dir(open(folder.empty() ? "." : folder.c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC));
-  if (!dir) fail(fmt::format("cannot be opened: {}", std::strerror(errno)));
   // Without O_NONBLOCK a pipe would make us wait for its writer.
   Fd file(
-      openat(dir.get(), std::string(name).c_str(), O_RDONLY | O_NOFOLLOW | O_NONBLOCK | O_CLOEXEC));
+      openat(folder, std::string(name).c_str(), O_RDONLY | O_NOFOLLOW | O_NONBLOCK | O_CLOEXEC));
   if (!file && errno == ELOOP) fail("is a link, which is not followed");
   if (!file && errno == ENOENT) fail("does not exist");
   if (!file) fail(fmt::format("cannot be opened: {}", std::strerror(errno)));

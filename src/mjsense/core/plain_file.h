@@ -22,6 +22,7 @@ namespace mjsense {
 // Opens the regular file `name` of `folder` for reading. Throws RuntimeError that says what it is
 // instead: missing, a link, a pipe, no plain name, more than 1 GiB of nothing but holes.
 [[nodiscard]] Fd open_plain(const std::filesystem::path& folder, std::string_view name);
+[[nodiscard]] Fd open_plain(int folder, std::string_view name);  // an open one
 
 // True for what open_plain() would open.
 [[nodiscard]] bool is_plain_file(const std::filesystem::path& path);

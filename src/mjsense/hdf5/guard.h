@@ -48,9 +48,9 @@ struct Ended : RuntimeError {
 // an exception there becomes one with its words here. `file_bytes` decides how much time it gets:
 // 20 s of the processor for small files, and thirty times as much of the clock (or `patience_s`): when
 // only that is over it is Ended. The child has 1 GiB beyond what this process holds, and hears no
-// signal that is sent to our process group.
+// signal that is sent to our process group. Of our open files it has `file` alone.
 [[nodiscard]] std::string in_child(std::string_view what, std::uint64_t file_bytes,
                                    const std::function<std::string()>& read,
-                                   std::uint64_t patience_s = 0);
+                                   std::uint64_t patience_s = 0, int file = -1);
 
 }  // namespace mjsense::h5

@@ -135,7 +135,7 @@ Id file_access() {
 
 }  // namespace
 
-Id create_file(const std::filesystem::path& path) {
+Id create_file(const std::filesystem::path& path, std::string_view shown) {
   const Id creation = plist(H5P_FILE_CREATE);
   H5Pset_obj_track_times(creation, false);
   H5Pset_istore_k(creation, 8);  // small chunk indices: an episode has many datasets of few chunks
@@ -143,13 +143,13 @@ Id create_file(const std::filesystem::path& path) {
   std::error_code ignored;  // what cannot be removed is an error of the next line
   std::filesystem::remove(path, ignored);
   return {H5Fcreate(path.c_str(), H5F_ACC_EXCL, creation, access), H5Fclose,
-          fmt::format("cannot create '{}'", path.string())};
+          fmt::format("cannot create '{}'", shown.empty() ? path.string() : shown)};
 }
 
-Id open_file(const std::filesystem::path& path, bool writable) {
+Id open_file(const std::filesystem::path& path, bool writable, std::string_view shown) {
   const Id access = file_access();
   return {H5Fopen(path.c_str(), writable ? H5F_ACC_RDWR : H5F_ACC_RDONLY, access), H5Fclose,
-          fmt::format("cannot open '{}'", path.string())};
+          fmt::format("cannot open '{}'", shown.empty() ? path.string() : shown)};
 }
 
 Id group_properties() {

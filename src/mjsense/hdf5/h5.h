@@ -55,9 +55,10 @@ class Id {
 // Throws RuntimeError "what: <what HDF5 says>" if `status` is negative.
 void check(herr_t status, std::string_view what);
 
-// In the place of a file that is there; a link is replaced, not followed.
-Id create_file(const std::filesystem::path& path);
-Id open_file(const std::filesystem::path& path, bool writable = false);
+// In the place of a file that is there; a link is replaced, not followed. `shown`: what messages call
+// it, where that is not its path.
+Id create_file(const std::filesystem::path& path, std::string_view shown = "");
+Id open_file(const std::filesystem::path& path, bool writable = false, std::string_view shown = "");
 Id create_group(hid_t parent,
                 const std::string& path);  // and the groups above it; an existing one is opened
 Id group_properties();                     // creation properties: no time stamps

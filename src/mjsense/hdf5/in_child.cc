@@ -64,7 +64,7 @@ void set_limit(decltype(RLIMIT_CPU) what, std::uint64_t most, std::uint64_t beyo
 }
 
 // No handlers of our program, no files written, no more processor and memory than a file deserves.
-void confine(int answer, std::uint64_t seconds) {
+void confine(int answer, std::uint64_t seconds, int file) {
   os::end_with_parent();
   // Ctrl-C is for our parent: read as a crash of ours, it would speak of a file that is damaged.
   // What was sent to the group until now is discarded by being ignored.
@@ -73,8 +73,13 @@ void confine(int answer, std::uint64_t seconds) {
     ::signal(signal, SIG_IGN);
   // Locks that our program holds must not outlive it in us.
   // Kernels before 5.9 leave them open.
-  os::close_files(3, static_cast<unsigned>(answer) - 1);
-  os::close_files(static_cast<unsigned>(answer) + 1, ~0U);
+  unsigned first = STDERR_FILENO + 1;
+  for (const int kept : {std::min(answer, file), std::max(answer, file)}) {
+    if (kept < static_cast<int>(first)) continue;
+    os::close_files(first, static_cast<unsigned>(kept) - 1);
+    first = static_cast<unsigned>(kept) + 1;
+  }
+  os::close_files(first, ~0U);
   for (const int signal : {SIGTERM, SIGXCPU}) ::signal(signal, SIG_DFL);
   sigset_t none;
   sigemptyset(&none);
@@ -98,8 +103,9 @@ void send(int fd, const std::string& text) {
   }
 }
 
-[[noreturn]] void child(int fd, std::uint64_t seconds, const std::function<std::string()>& read) {
-  confine(fd, seconds);
+[[noreturn]] void child(int fd, std::uint64_t seconds, const std::function<std::string()>& read,
+                        int file) {
+  confine(fd, seconds, file);
   std::string answer;
   try {
     answer = read() + kDone;
@@ -137,7 +143,7 @@ bool listen(int fd, std::uint64_t seconds, std::string& answer) {
 }  // namespace
 
 std::string in_child(std::string_view what, std::uint64_t file_bytes,
-                     const std::function<std::string()>& read, std::uint64_t patience_s) {
+                     const std::function<std::string()>& read, std::uint64_t patience_s, int file) {
   const std::uint64_t seconds = kLeastSeconds + file_bytes / kBytesPerSecond;
   if (patience_s == 0) patience_s = kPatience * seconds;
   auto [out, in] = os::make_pipe();
@@ -152,7 +158,7 @@ std::string in_child(std::string_view what, std::uint64_t file_bytes,
       out.reset();
       H5Lock::alone();
       // Not stderr, which confine() opens anew: it was closed if the pipe has its number.
-      child(fcntl(in.get(), F_DUPFD_CLOEXEC, STDERR_FILENO + 1), seconds, read);
+      child(fcntl(in.get(), F_DUPFD_CLOEXEC, STDERR_FILENO + 1), seconds, read, file);
     }
   }
   if (pid < 0)

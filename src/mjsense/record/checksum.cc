@@ -17,6 +17,7 @@
 #include "mjsense/core/file_limit.h"
 #include "mjsense/core/plain_file.h"
 #include "mjsense/record/crc32.h"
+#include "mjsense/record/folder.h"
 
 namespace mjsense {
 namespace {
@@ -56,12 +57,10 @@ std::string Checksum::text() const { return fmt::format("{:08x}", crc_); }
 
 std::string checksum_of(int fd) { return checksum_of(fd, file_size(fd)); }
 
-void seal_file(const std::filesystem::path& path) {
+void seal_file(const Folder& folder, const std::string& name) {
   const FileLimitIsError limit;
-  const Fd file(open(path.c_str(), O_RDWR | O_CLOEXEC | O_NOFOLLOW));
-  const auto fail = [&] {
-    throw RuntimeError(fmt::format("cannot write '{}': {}", path.string(), std::strerror(errno)));
-  };
+  const Fd file(openat(folder.fd(), name.c_str(), O_RDWR | O_CLOEXEC | O_NOFOLLOW));
+  const auto fail = [&] { throw_file("write", folder.shown(name), errno); };
   if (!file) fail();
   const std::int64_t size = file_size(file.get());
   const std::string seal = seal_text(checksum_of(file.get(), size), size);

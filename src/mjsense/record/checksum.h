@@ -6,11 +6,12 @@
 
 #include <cstddef>
 #include <cstdint>
-#include <filesystem>
 #include <span>
 #include <string>
 
 namespace mjsense {
+
+class Folder;
 
 class Checksum {
  public:
@@ -31,7 +32,7 @@ inline constexpr const char* kBytesAttribute = "bytes";
 enum class Seal { kWhole, kBroken, kNone };
 
 // Appends the line to a closed file. Throws RuntimeError when the disk refuses.
-void seal_file(const std::filesystem::path& path);
+void seal_file(const Folder& folder, const std::string& name);
 // kNone: no such line, as in files of others.
 [[nodiscard]] Seal check_seal(int fd);
 

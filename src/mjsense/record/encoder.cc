@@ -12,7 +12,6 @@
 #include <chrono>
 #include <condition_variable>
 #include <cstring>
-#include <ctime>
 #include <deque>
 #include <mutex>
 #include <thread>
@@ -40,7 +39,8 @@ constexpr int kReapPeriodMs = 4;     // how often ending encoders are looked aft
 class EncoderPool::Stream {
  public:
   const VideoStream* video = nullptr;
-  std::filesystem::path output, spool;
+  std::shared_ptr<const Folder> folder;
+  std::string output, spool;  // files in it
   OnDone on_done;
   Child child;
   Fd spool_file;
@@ -48,10 +48,10 @@ class EncoderPool::Stream {
   bool closed = false;  // the producer is done
   bool aborted = false;
   std::string failure;
-  // Since its ffmpeg has last taken or written something: seconds in which it did nothing, and
-  // processor seconds that it used.
-  double idle_s = 0, busy_s = 0;
-  double cpu_seen = 0;
+  // Wall seconds since its ffmpeg has last taken or written something, less those in which it waited
+  // for a processor.
+  double idle_s = 0;
+  double waited_s = 0;       // for a processor, in all
   std::int64_t written = 0;  // bytes that went into its ffmpeg
   std::int64_t seen = 0;     // of its input or output, when it last did
 
@@ -171,35 +171,21 @@ struct EncoderPool::Impl {
     for (const auto& stream : streams) {
       const bool ending = stream->child.pid >= 0 && !stream->child.in;
       if (stream->failed() || !(ending || (stream->direct && stream->has_frames()))) {
-        stream->idle_s = stream->busy_s = 0;
+        stream->idle_s = 0;
         continue;
       }
       const std::int64_t now = ending ? moved(*stream) : stream->written;
-      const double cpu = cpu_of(stream->child.pid), worked = cpu - stream->cpu_seen;
-      // On a machine with too much to do it gets little time, and uses it: that is no hang. One that
-      // uses all it gets and never moves is.
-      if (now != stream->seen) {
-        stream->idle_s = stream->busy_s = 0;
-      } else if (worked > 0) {
-        stream->idle_s = 0;
-        stream->busy_s += worked;
-      } else {
-        stream->idle_s += elapsed;
-      }
+      // On a machine with too much to do it may get no processor: that is no hang.
+      const double waited = os::waited_for_processor(stream->child.pid);
+      const double without = std::clamp(waited - stream->waited_s, 0.0, elapsed);
+      stream->idle_s = now != stream->seen ? 0 : stream->idle_s + elapsed - without;
       stream->seen = now;
-      stream->cpu_seen = cpu;
-      if (std::max(stream->idle_s, stream->busy_s) < most) continue;
+      stream->waited_s = waited;
+      if (stream->idle_s < most) continue;
       stream->failure = fmt::format("ffmpeg {} for {:g} s and was ended (ffmpeg_timeout)",
                                     ending ? "did not come to its end" : "took no picture", most);
       changed.notify_all();
     }
-  }
-
-  static double cpu_of(pid_t pid) {
-    clockid_t clock;
-    timespec time = {};
-    if (clock_getcpuclockid(pid, &clock) != 0 || clock_gettime(clock, &time) != 0) return 0;
-    return static_cast<double>(time.tv_sec) + 1e-9 * static_cast<double>(time.tv_nsec);
   }
 
   // How far an ffmpeg has come that gets no more from us: in the file that it reads, or in the one
@@ -207,9 +193,7 @@ struct EncoderPool::Impl {
   static std::int64_t moved(const Stream& stream) {
     const std::int64_t read =
         stream.spool_file ? lseek(stream.spool_file.get(), 0, SEEK_CUR) : stream.written;
-    std::error_code ignored;
-    const auto size = std::filesystem::file_size(stream.output, ignored);
-    return read + (ignored ? 0 : static_cast<std::int64_t>(size));
+    return read + stream.folder->size_of(stream.output);
   }
 
   // Writes as much as the sink takes now.
@@ -227,9 +211,10 @@ struct EncoderPool::Impl {
       if (n < 0 && errno == EAGAIN) return;
       const std::lock_guard lock(mutex);
       if (n < 0) {
-        stream.failure = stream.direct ? "ffmpeg stopped reading"
-                                       : fmt::format("cannot write '{}': {}", stream.spool.string(),
-                                                     std::strerror(errno));
+        stream.failure =
+            stream.direct ? "ffmpeg stopped reading"
+                          : fmt::format("cannot write '{}': {}", stream.folder->shown(stream.spool),
+                                        std::strerror(errno));
       } else {
         stream.offset += static_cast<std::size_t>(n);
         stream.written += n;
@@ -270,13 +255,12 @@ struct EncoderPool::Impl {
     if (stream.direct) {
       stream.child.in.reset();  // the end of its input
     } else if (stream.child.pid < 0 && running < max_encoders) {
-      stream.spool_file = Fd(::open(stream.spool.c_str(), O_RDONLY | O_NOFOLLOW | O_CLOEXEC));
+      stream.spool_file =
+          Fd(openat(stream.folder->fd(), stream.spool.c_str(), O_RDONLY | O_NOFOLLOW | O_CLOEXEC));
       try {
-        if (!stream.spool_file)
-          throw RuntimeError(
-              fmt::format("cannot read '{}': {}", stream.spool.string(), std::strerror(errno)));
+        if (!stream.spool_file) throw_file("read", stream.folder->shown(stream.spool), errno);
         stream.child = start_process(encoder_command(cfg, fps, *stream.video, stream.output),
-                                     stream.spool_file);
+                                     stream.spool_file, stream.folder->fd());
         ++running;
       } catch (const Error& error) {
         stream.failure = error.what();
@@ -312,7 +296,7 @@ struct EncoderPool::Impl {
     } else if (!stream.closed && !stream.aborted) {
       return false;  // the producer still holds it; reserve() tells it
     }
-    if (!stream.spool.empty()) unlink(stream.spool.c_str());
+    if (!stream.spool.empty()) stream.folder->remove(stream.spool);
     result = {!stream.failed(), stream.aborted,
               stream.failure.empty()
                   ? ""
@@ -327,9 +311,11 @@ EncoderPool::EncoderPool(const VideoCfg& cfg, const Fps& fps, int streams_at_onc
 EncoderPool::~EncoderPool() = default;
 
 EncoderPool::Stream* EncoderPool::open(const VideoStream& video,
-                                       const std::filesystem::path& output, OnDone on_done) {
+                                       std::shared_ptr<const Folder> folder,
+                                       const std::string& output, OnDone on_done) {
   auto stream = std::make_unique<Stream>();
   stream->video = &video;
+  stream->folder = std::move(folder);
   stream->output = output;
   stream->on_done = std::move(on_done);
   stream->ring.assign(std::max(1, impl_->cfg.queue_frames),
@@ -348,17 +334,14 @@ EncoderPool::Stream* EncoderPool::open(const VideoStream& video,
   }
   stream->direct = slot_free();
   if (stream->direct) {
-    stream->child =
-        start_process(encoder_command(impl_->cfg, impl_->fps, video, output), true, false);
+    stream->child = start_process(encoder_command(impl_->cfg, impl_->fps, video, output), true,
+                                  false, stream->folder->fd());
     ++impl_->running;
   } else {
-    stream->spool = output.string() + ".raw";
-    stream->spool_file = Fd(
-        ::open(stream->spool.c_str(), O_WRONLY | O_CREAT | O_EXCL | O_NOFOLLOW | O_CLOEXEC, 0644));
-    if (!stream->spool_file) {
-      throw RuntimeError(
-          fmt::format("cannot write '{}': {}", stream->spool.string(), std::strerror(errno)));
-    }
+    stream->spool = output + ".raw";
+    stream->spool_file = Fd(openat(stream->folder->fd(), stream->spool.c_str(),
+                                   O_WRONLY | O_CREAT | O_EXCL | O_NOFOLLOW | O_CLOEXEC, 0644));
+    if (!stream->spool_file) throw_file("write", stream->folder->shown(stream->spool), errno);
   }
   return impl_->streams.emplace_back(std::move(stream)).get();
 }

@@ -12,22 +12,21 @@
 #include <atomic>
 #include <cstddef>
 #include <cstdint>
-#include <filesystem>
 #include <functional>
 #include <memory>
 #include <span>
 #include <string>
 #include <vector>
 
+#include "mjsense/record/folder.h"
 #include "mjsense/record/layout.h"
 #include "mjsense/record/recording.h"
 
 namespace mjsense {
 
-// What ffmpeg is told: raw frames from its stdin to `output`.
+// What ffmpeg is told: raw frames from its stdin to the file `output` of the folder it runs in.
 std::vector<std::string> encoder_command(const VideoCfg& cfg, const Fps& fps,
-                                         const VideoStream& video,
-                                         const std::filesystem::path& output);
+                                         const VideoStream& video, const std::string& output);
 
 // Throws RuntimeError unless the ffmpeg program runs and has the encoders that the videos need.
 void check_ffmpeg(const VideoCfg& cfg, std::span<const VideoStream> videos);
@@ -48,9 +47,10 @@ class EncoderPool {
               const std::atomic<int>* stop = nullptr);
   ~EncoderPool();  // kills what still runs
 
-  // Waits for a free encoder, or for disk space to be drained. `video` outlives the stream. Throws
-  // RuntimeError when ffmpeg cannot be started.
-  Stream* open(const VideoStream& video, const std::filesystem::path& output, OnDone on_done);
+  // Waits for a free encoder, or for disk space to be drained. `video` outlives the stream, which
+  // writes the file `output` of `folder`. Throws RuntimeError when ffmpeg cannot be started.
+  Stream* open(const VideoStream& video, std::shared_ptr<const Folder> folder,
+               const std::string& output, OnDone on_done);
   // The place of the next frame; waits while the queue is full. Empty when the stream has failed:
   // on_done tells why.
   [[nodiscard]] std::span<std::uint8_t> reserve(Stream* stream);

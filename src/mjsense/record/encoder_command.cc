@@ -4,11 +4,11 @@
 #include "mjsense/core/error.h"
 #include "mjsense/record/encoder.h"
 #include "mjsense/record/process.h"
+#include "mjsense/record/spawn.h"
 
 namespace mjsense {
 std::vector<std::string> encoder_command(const VideoCfg& cfg, const Fps& fps,
-                                         const VideoStream& video,
-                                         const std::filesystem::path& output) {
+                                         const VideoStream& video, const std::string& output) {
   // What the frames are when they reach it, so that it converts nothing.
   constexpr const char* kPixels[] = {"yuv420p", "gray16le", "rgb24"};
   const char* pixels = kPixels[static_cast<int>(video.kind)];
@@ -35,7 +35,7 @@ std::vector<std::string> encoder_command(const VideoCfg& cfg, const Fps& fps,
       break;
   }
   add({"-fflags", "+bitexact", "-flags:v", "+bitexact", "-map_metadata", "-1", "-f",
-       video.extension == ".mkv" ? "matroska" : "mp4", "file:" + output.string()});
+       video.extension == ".mkv" ? "matroska" : "mp4", "file:" + output});
   return a;
 }
 
@@ -46,12 +46,17 @@ void check_ffmpeg(const VideoCfg& cfg, std::span<const VideoStream> videos) {
   try {
     listing = run_process({program, "-hide_banner", "-loglevel", "error", "-encoders"},
                           {.silence_s = cfg.ffmpeg_timeout});
-  } catch (const Error& error) {
+  } catch (const CannotStart& error) {
     throw RuntimeError(
         fmt::format("recording {} video streams needs ffmpeg: {}; install it (apt-get install "
                     "ffmpeg, or for Python pip install 'mjsense[video]') or name it in "
                     "$MJSENSE_FFMPEG",
                     videos.size(), error.what()));
+  } catch (const Error& error) {
+    throw RuntimeError(
+        fmt::format("recording {} video streams needs ffmpeg, and '{}' did not list its encoders: "
+                    "{}",
+                    videos.size(), program, error.what()));
   }
   constexpr const char* kEncoders[] = {"libx264", "ffv1", "libx264rgb"};
   for (const VideoStream& video : videos) {

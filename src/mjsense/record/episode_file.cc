@@ -31,18 +31,18 @@ void describe_video(hid_t dataset, const RecordingCfg& cfg, const VideoStream& v
   switch (video.kind) {
     case VideoKind::kRgb:
       h5::set_attribute(dataset, "encoding", "rgb");
-      h5::set_attribute(dataset, "codec", "h264");
+      h5::set_attribute(dataset, "codec", video.codec());
       break;
     case VideoKind::kDepth16:
       h5::set_attribute(dataset, "encoding", "depth16");
-      h5::set_attribute(dataset, "codec", "ffv1");
+      h5::set_attribute(dataset, "codec", video.codec());
       h5::set_attribute(dataset, "metres_per_unit", cfg.video.depth_unit);
       h5::set_attribute(dataset, "invalid_value", std::int64_t{kDepthInvalid});
       h5::set_attribute(dataset, "far_value", std::int64_t{kDepthFar});
       break;
     case VideoKind::kDepthRedGreen:
       h5::set_attribute(dataset, "encoding", "molmospaces_red_green");
-      h5::set_attribute(dataset, "codec", "h264");
+      h5::set_attribute(dataset, "codec", video.codec());
       break;
   }
 }
@@ -71,11 +71,12 @@ std::string_view own_place(int stream) {
 
 DType own_dtype(int stream) { return stream == kRewards ? DType::kFloat32 : DType::kBool; }
 
-EpisodeFile::EpisodeFile(const std::filesystem::path& path, const RecordingCfg& cfg,
-                         const RecordingPlan& plan, const EpisodeMeta& meta)
-    : path_(path), gzip_(cfg.gzip), plan_(plan) {
+EpisodeFile::EpisodeFile(std::shared_ptr<const Folder> folder, const std::string& name,
+                         const RecordingCfg& cfg, const RecordingPlan& plan,
+                         const EpisodeMeta& meta)
+    : folder_(std::move(folder)), name_(name), gzip_(cfg.gzip), plan_(plan) {
   const h5::H5Lock lock;
-  file_ = h5::create_file(path);
+  file_ = h5::create_file(folder_->reachable(name), folder_->shown(name));
   h5::set_attribute(file_, "format", "mjsense 1");
   h5::set_attribute(file_, "recording", plan.fingerprint);
   trajectory_ = h5::create_group(file_, "traj_0");
@@ -148,8 +149,8 @@ void EpisodeFile::write_chunk(int stream, std::int64_t rows, std::span<const std
     packed_.resize(compressBound(chunk.size()));
     uLongf size = packed_.size();
     if (compress2(packed_.data(), &size, chunk.data(), chunk.size(), gzip_) != Z_OK) {
-      throw RuntimeError(
-          fmt::format("zlib failed to compress {} bytes for '{}'", chunk.size(), path_.string()));
+      throw RuntimeError(fmt::format("zlib failed to compress {} bytes for '{}'", chunk.size(),
+                                     folder_->shown(name_)));
     }
     bytes = {packed_.data(), size};
   }
@@ -161,7 +162,7 @@ void EpisodeFile::write_chunk(int stream, std::int64_t rows, std::span<const std
   Dataset& dataset = datasets_[stream];
   hsize_t offset[Shape::kMaxRank + 1] = {dataset.dims[0]};
   dataset.dims[0] += static_cast<hsize_t>(rows);
-  const std::string what = fmt::format("cannot write '{}'", path_.string());
+  const std::string what = fmt::format("cannot write '{}'", folder_->shown(name_));
   h5::check(H5Dset_extent(dataset.id, dataset.dims), what);
   if (chunk.empty()) return;
   h5::check(H5Dwrite_chunk(dataset.id, H5P_DEFAULT, 0, offset, bytes.size(), bytes.data()), what);
@@ -187,8 +188,8 @@ void EpisodeFile::finish(std::span<const VideoSum> videos) {
   }
   datasets_.clear();
   trajectory_.reset();
-  file_.close(fmt::format("cannot write '{}'", path_.string()));
-  seal_file(path_);
+  file_.close(fmt::format("cannot write '{}'", folder_->shown(name_)));
+  seal_file(*folder_, name_);
 }
 
 }  // namespace mjsense

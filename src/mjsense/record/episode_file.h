@@ -4,7 +4,7 @@
 // thread; the plan outlives it.
 
 #include <cstdint>
-#include <filesystem>
+#include <memory>
 #include <span>
 #include <string>
 #include <string_view>
@@ -12,6 +12,7 @@
 
 #include "mjsense/hdf5/h5.h"
 #include "mjsense/record/checksum.h"
+#include "mjsense/record/folder.h"
 #include "mjsense/record/layout.h"
 
 namespace mjsense {
@@ -23,8 +24,9 @@ DType own_dtype(int stream);
 
 class EpisodeFile {
  public:
-  EpisodeFile(const std::filesystem::path& path, const RecordingCfg& cfg, const RecordingPlan& plan,
-              const EpisodeMeta& meta);
+  // The file `name` of a folder.
+  EpisodeFile(std::shared_ptr<const Folder> folder, const std::string& name,
+              const RecordingCfg& cfg, const RecordingPlan& plan, const EpisodeMeta& meta);
   ~EpisodeFile();
   EpisodeFile(const EpisodeFile&) = delete;
   EpisodeFile& operator=(const EpisodeFile&) = delete;
@@ -55,7 +57,8 @@ class EpisodeFile {
                                          std::span<const std::uint8_t> kept);
   void add_dataset(std::string_view place, DType dtype, const Shape& row, std::int64_t chunk_rows);
 
-  std::filesystem::path path_;
+  std::shared_ptr<const Folder> folder_;
+  std::string name_;
   int gzip_;
   const RecordingPlan& plan_;
   h5::Id file_, trajectory_;

@@ -11,6 +11,7 @@
 
 #include "mjsense/core/error.h"
 #include "mjsense/record/description.h"
+#include "mjsense/record/model_checksums.h"
 #include "mjsense/record/molmospaces.h"
 #include "mjsense/record/yuv.h"
 
@@ -107,6 +108,7 @@ std::string fingerprint(const RecordingCfg& cfg, const RecordingPlan& plan,
                    {"gzip", cfg.gzip},
                    {"streams", streams},
                    {"settings", settings}};
+  if (cfg.model) j["model"] = model_checksums(*cfg.model);
   if (!plan.videos.empty()) {
     const VideoCfg& v = cfg.video;
     j["video"] = {{"crf", v.crf},
@@ -271,7 +273,15 @@ std::string fingerprint_difference(const std::string& was, const std::string& no
   if (!a.is_object() || !b.is_object()) return "its description cannot be read";
   const nlohmann::json difference = nlohmann::json::diff(a, b);
   if (difference.empty()) return "";
-  const nlohmann::json::json_pointer at(difference[0]["path"].get<std::string>());
+  // A setting that was changed may have changed the model and the streams, too: it is named first.
+  constexpr std::string_view kConsequences[] = {"/model", "/streams"};
+  const auto is_consequence = [&](const nlohmann::json& change) {
+    const auto& path = change["path"].get_ref<const std::string&>();
+    return std::ranges::any_of(kConsequences, [&](auto start) { return path.starts_with(start); });
+  };
+  const auto named = std::ranges::find_if_not(difference, is_consequence);
+  const nlohmann::json::json_pointer at(
+      (named == difference.end() ? difference.front() : *named)["path"].get<std::string>());
   const auto text = [&](const nlohmann::json& j) {
     return j.contains(at) ? j[at].dump() : std::string("absent");
   };

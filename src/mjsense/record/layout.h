@@ -43,6 +43,8 @@ struct VideoStream {
   std::string extension;  // ".mp4", ".mkv"
   int width = 0, height = 0;
   std::size_t frame_bytes() const;  // as the encoder reads it
+  std::string_view codec() const { return kind == VideoKind::kDepth16 ? "ffv1" : "h264"; }
+  std::string_view container() const { return extension == ".mkv" ? "Matroska" : "MP4"; }
 };
 
 struct RecordingPlan {

@@ -48,7 +48,8 @@ std::pair<Fd, Fd> make_pipe() {
   return ends;
 }
 
-Child start(const std::vector<std::string>& argv, bool pipe_in, bool pipe_out, int input) {
+Child start(const std::vector<std::string>& argv, bool pipe_in, bool pipe_out, int input,
+            int folder) {
   Child child;
   child.log = os::memory_file("stderr");
   if (!child.log) throw_system("cannot create an anonymous file");
@@ -66,18 +67,19 @@ Child start(const std::vector<std::string>& argv, bool pipe_in, bool pipe_out, i
     child_out = Fd(open("/dev/null", O_WRONLY | O_CLOEXEC));
   }
 
-  child.pid = spawn(argv, input >= 0 ? input : child_in.get(), child_out.get(), child.log.get());
+  child.pid =
+      spawn(argv, input >= 0 ? input : child_in.get(), child_out.get(), child.log.get(), folder);
   return child;
 }
 
 }  // namespace
 
-Child start_process(const std::vector<std::string>& argv, bool pipe_in, bool pipe_out) {
-  return start(argv, pipe_in, pipe_out, -1);
+Child start_process(const std::vector<std::string>& argv, bool pipe_in, bool pipe_out, int folder) {
+  return start(argv, pipe_in, pipe_out, -1, folder);
 }
 
-Child start_process(const std::vector<std::string>& argv, const Fd& input) {
-  return start(argv, false, false, input.get());
+Child start_process(const std::vector<std::string>& argv, const Fd& input, int folder) {
+  return start(argv, false, false, input.get(), folder);
 }
 
 bool wait_process(Child& child, bool block, Exit& result) {
@@ -95,7 +97,10 @@ bool wait_process(Child& child, bool block, Exit& result) {
   result.cpu_s = seconds(usage.ru_utime) + seconds(usage.ru_stime);
   const std::string words = last_words(child.log.get());
   if (got < 0) {
-    result.why = fmt::format("its exit status was lost ({})", std::strerror(errno));
+    result.ok = words.empty();
+    result.why =
+        "its exit status is not known, because this process ignores SIGCHLD or collects all of its "
+        "children (set SIGCHLD to SIG_DFL)";
   } else if (WIFSIGNALED(status)) {
     result.why =
         fmt::format("killed by signal {} ({})", WTERMSIG(status), strsignal(WTERMSIG(status)));

@@ -25,10 +25,12 @@ struct Child {
 
 // Starts argv[0] (found on PATH). The child leads its own process group, so that Ctrl-C in the
 // terminal reaches only us and we decide what becomes of it; if we are killed it sees the end of
-// its input and ends. Throws RuntimeError when it cannot start.
-Child start_process(const std::vector<std::string>& argv, bool pipe_in, bool pipe_out);
+// its input and ends. `folder`: an open directory in which it runs; -1: ours. Throws RuntimeError when
+// it cannot start.
+Child start_process(const std::vector<std::string>& argv, bool pipe_in, bool pipe_out,
+                    int folder = -1);
 // The same with an open file as its stdin: where it stands in it tells how far it has come.
-Child start_process(const std::vector<std::string>& argv, const Fd& input);
+Child start_process(const std::vector<std::string>& argv, const Fd& input, int folder = -1);
 
 struct Exit {
   bool ok = false;
@@ -36,7 +38,9 @@ struct Exit {
   double cpu_s = 0;
 };
 
-// Waits for the end (or, if `block` is false, returns false when it still runs).
+// Waits for the end (or, if `block` is false, returns false when it still runs). In a process that
+// ignores SIGCHLD the system keeps no exit status: a program then counts as failed if it wrote to its
+// stderr, and what it has made must be checked, as it is with a status.
 bool wait_process(Child& child, bool block, Exit& result);
 void kill_process(Child& child);  // SIGKILL, and waits
 

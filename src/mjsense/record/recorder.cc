@@ -47,8 +47,8 @@ Recorder::Impl::Impl(const RecordingCfg& cfg_) : cfg(cfg_) {
   plan = plan_recording(cfg);
   check_names();
   check_ffmpeg(cfg.video, plan.videos);
-  house = std::make_unique<House>(cfg.out_dir / fmt::format("house_{}", cfg.house),
-                                  plan.fingerprint, cfg.resume);
+  house = std::make_unique<RecordingFolder>(cfg.out_dir / fmt::format("house_{}", cfg.house),
+                                            plan.fingerprint, cfg.resume);
   if (!house->ended()) house->publish_ready();
   decisions = house->decisions();
   saved = decisions.kept();
@@ -128,7 +128,7 @@ void Recorder::Impl::begin(int world, const EpisodeMeta& meta) {
     const std::lock_guard lock(mutex);
     if (failure) std::rethrow_exception(failure);
     check_begin(world, meta.episode);
-    house->begin(meta.episode);
+    episode->folder = house->begin(meta.episode);
     worlds[world] = episode;
     ++unsettled;
   }
@@ -164,16 +164,12 @@ void Recorder::Impl::open_video(const EpisodePtr& episode, const VideoStream& vi
   ++episode->parts;
   try {
     episode->videos.push_back(pool->open(
-        video, part_dir(*episode) / (video.stem + video.extension),
+        video, episode->folder, video.stem + video.extension,
         [this, episode](const EncoderPool::Result& result) { video_done(episode, result); }));
   } catch (...) {
     --episode->parts;
     throw;
   }
-}
-
-std::filesystem::path Recorder::Impl::part_dir(const Episode& episode) const {
-  return house->part_dir(episode.meta.episode);
 }
 
 void Recorder::Impl::finish(int world, std::string_view obs_scene, std::string_view outcome) {

@@ -17,9 +17,9 @@
 
 #include "mjsense/record/encoder.h"
 #include "mjsense/record/episode_file.h"
-#include "mjsense/record/house.h"
 #include "mjsense/record/layout.h"
 #include "mjsense/record/recorder.h"
+#include "mjsense/record/recording_folder.h"
 
 namespace mjsense {
 
@@ -40,6 +40,7 @@ struct Recorder::Impl {
   // One attempt, from begin_episode() until its directory is renamed or removed.
   struct Episode {
     EpisodeMeta meta;
+    std::shared_ptr<const Folder> folder;  // its files, until they are kept
     Fate fate = Fate::kRunning;
     std::int64_t rows = 0;
     bool refused = false;  // a row held cut text
@@ -68,7 +69,8 @@ struct Recorder::Impl {
   std::vector<std::size_t> row_bytes;  // of a stream in a chunk that is filled
   std::vector<std::int64_t> chunk_rows_of;
 
-  std::unique_ptr<House> house;  // changed by the writer thread, or while it has nothing to do
+  std::unique_ptr<RecordingFolder>
+      house;  // changed by the writer thread, or while it has nothing to do
   std::unique_ptr<EncoderPool> pool;
 
   mutable std::mutex mutex;
@@ -97,7 +99,6 @@ struct Recorder::Impl {
   void begin(int world, const EpisodeMeta& meta);
   void check_begin(int world, std::int64_t number) const;
   void open_video(const EpisodePtr& episode, const VideoStream& video);
-  std::filesystem::path part_dir(const Episode& episode) const;
   void append(int world, const StepRow& row);
   // Text that was cut is no JSON any more. Nothing of the step is stored then.
   void check_texts(int world, Episode& episode) const;

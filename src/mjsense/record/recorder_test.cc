@@ -13,7 +13,7 @@
 
 #include "mjsense/core/error.h"
 #include "mjsense/core/plain_file.h"
-#include "mjsense/record/house.h"
+#include "mjsense/record/recording_folder.h"
 #include "mjsense/record/testing/tools.h"
 #include "mjsense/record/video_file.h"
 #include "mjsense/replay/check.h"
@@ -301,7 +301,13 @@ TEST(RecorderFaults, FfmpegLies) {
       {"cat > /dev/null", "does not exist"},
       {"cat > /dev/null; : > $out", "is no whole video: it is empty"},
       {"head -c 864 | ffmpeg \"$@\"", "has 3 frames, expected 6"},
-      {"ffmpeg \"$@\"; head -c 700 $out > $out.x; mv $out.x $out", "it was cut"}};
+      {"ffmpeg \"$@\"; head -c 700 $out > $out.x; mv $out.x $out", "it was cut"},
+      {"ffmpeg -loglevel error -f rawvideo -pixel_format yuv420p -video_size 16x12 -i pipe:0 -c:v "
+       "mpeg4 -y -f mp4 file:$out",
+       "holds mp4v in MP4, expected h264 in MP4"},
+      {"ffmpeg -loglevel error -f rawvideo -pixel_format yuv420p -video_size 16x12 -i pipe:0 -c:v "
+       "libx264 -y -f matroska file:$out",
+       "holds h264 in Matroska, expected h264 in MP4"}};
   for (const auto& [body, complaint] : lies) {
     TempDir dir, tools;
     FakeSuite suite({1, 16, 12, true, false});
@@ -320,8 +326,9 @@ TEST(RecorderFaults, FfmpegLies) {
 
 // A hung encoder is ended, with a word.
 TEST(RecorderFaults, FfmpegHangs) {
-  for (const char* body :
-       {"kill -STOP $$", "exec sleep 1000", "cat > /dev/null; exec sleep 1000"}) {
+  for (const char* body : {"kill -STOP $$", "exec sleep 1000", "cat > /dev/null; exec sleep 1000",
+                           // It uses the processor now and then.
+                           "cat > /dev/null; while :; do sleep 0.05; done"}) {
     TempDir dir, tools;
     FakeSuite suite({1, 320, 240, true, false});
     RecordingCfg cfg = fake_recording(dir.path, suite, 1, 1);
@@ -335,6 +342,34 @@ TEST(RecorderFaults, FfmpegHangs) {
                 HasSubstr(std::string(body).starts_with("cat") ? "did not come to its end for 0.6 s"
                                                                : "took no picture for 0.6 s"));
     expect_nothing_published(dir.path);
+  }
+}
+
+// In a process that ignores SIGCHLD the system keeps no exit status of its programs.
+TEST(RecorderFaults, SigchldIsIgnored) {
+  for (const bool fails : {false, true}) {
+    TempDir dir, tools;
+    const fs::path report = tools.path / "report";
+    const pid_t pid = fork();
+    if (pid == 0) {
+      signal(SIGCHLD, SIG_IGN);
+      const std::string error = error_of([&] {
+        record(dir.path, 2, {.worlds = 1}, true, [&](RecordingCfg& c) {
+          if (fails) c.video.ffmpeg = fake_ffmpeg(tools.path, "cat >/dev/null; echo lost >&2");
+        });
+      });
+      std::ofstream(report) << error << std::flush;
+      _exit(0);
+    }
+    int status = 0;
+    ASSERT_EQ(waitpid(pid, &status, 0), pid);
+    if (fails) {
+      EXPECT_THAT(read_file(report), AllOf(HasSubstr("ignores SIGCHLD"), HasSubstr(": lost"),
+                                           ::testing::Not(HasSubstr("install"))));
+    } else {
+      EXPECT_EQ(read_file(report), "");
+      EXPECT_THAT(tree(dir.path), ::testing::Contains(HasSubstr("batch_1_of_1.h5")));
+    }
   }
 }
 
@@ -460,7 +495,7 @@ TEST(RecorderFaults, WrongConfigurationsAreNamed) {
   };
   EXPECT_THAT(error([](RecordingCfg& c) { c.out_dir.clear(); }), HasSubstr("no output directory"));
   EXPECT_THAT(error([](RecordingCfg& c) { c.out_dir = c.out_dir / std::string(300, 'x'); }),
-              HasSubstr("x/house_0/.recording': File name too long"));
+              HasSubstr("x/house_0': File name too long"));
   for (const char* name : {"a\nb", "\x1b[31m"})
     EXPECT_THAT(error([&](RecordingCfg& c) { c.out_dir /= name; }),
                 HasSubstr("has control characters"));

@@ -56,8 +56,8 @@ void Recorder::Impl::run(Job& job, bool failed) {
   switch (job.kind) {
     case Job::kOpen:
       if (!failed)
-        episode.file = std::make_unique<EpisodeFile>(part_dir(episode) / kEpisodeFile, cfg, plan,
-                                                     episode.meta);
+        episode.file =
+            std::make_unique<EpisodeFile>(episode.folder, kEpisodeFile, cfg, plan, episode.meta);
       break;
     case Job::kChunk:
       if (!failed && episode.file) episode.file->write_chunk(job.stream, job.rows, job.chunk);
@@ -94,11 +94,14 @@ std::vector<EpisodeFile::VideoSum> Recorder::Impl::check_videos(const Episode& e
           episode.meta.episode, video.key, why));
     };
     try {
-      const Fd file = open_plain(part_dir(episode), name);
+      const Fd file = open_plain(episode.folder->fd(), name);
       const VideoFacts facts = read_video_facts(file.get());
       const auto fits = [](int got, int asked) { return got == asked || got == asked + asked % 2; };
       if (!facts.error.empty())
         refuse(fmt::format("'{}' is no whole video: {}", name, facts.error));
+      if (facts.codec != video.codec() || facts.container != video.container())
+        refuse(fmt::format("'{}' holds {} in {}, expected {} in {}", name, printable(facts.codec),
+                           facts.container, video.codec(), video.container()));
       if (facts.frames != episode.rows)
         refuse(fmt::format("'{}' has {} frames, expected {}", name, facts.frames, episode.rows));
       if (!fits(facts.width, video.width) || !fits(facts.height, video.height))
@@ -130,7 +133,7 @@ void Recorder::Impl::settle(Episode& episode, bool failed) {
       house->abandon(number);
       throw;
     }
-    house->keep(number);
+    house->keep(number, *episode.folder);
     saved = house->decisions().kept();
     house->publish_ready();
   }

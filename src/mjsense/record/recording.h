@@ -3,6 +3,8 @@
 // What a recording is: which sensors, how many episodes, where and how they are kept.
 // docs/formats.md shows the files.
 
+#include <mujoco/mujoco.h>
+
 #include <atomic>
 #include <cstdint>
 #include <filesystem>
@@ -93,6 +95,9 @@ struct RecordingCfg {
   // JSON text of what made the data (task, robot, seed ...): kept in every file; a recording can
   // only be resumed with the same.
   std::string settings = "{}";
+  // The compiled model. Its checksums are kept in every file, too: a recording is not resumed with
+  // another one. Null: there is none.
+  const mjModel* model = nullptr;
   bool resume = false;  // go on with what is there; else existing output is an error
   int gzip = 4;         // 0: no compression .. 9
   VideoCfg video;

@@ -9,6 +9,7 @@
 
 #include <cerrno>
 #include <cstring>
+#include <filesystem>
 
 #include "mjsense/core/error.h"
 #include "mjsense/core/os.h"
@@ -21,6 +22,7 @@ constexpr int kFirstOther = 3;  // the first descriptor that is no standard stre
 struct Plan {
   char* const* argv;
   int streams[3];
+  int folder;
   const std::vector<int>* open;  // our descriptors, for kernels before 5.9
   volatile int error = 0;        // written by the child, in our memory
 };
@@ -33,6 +35,7 @@ struct Plan {
   };
   // From here on what is sent to the group of our parent is not for us...
   if (setpgid(0, 0) != 0) fail();
+  if (plan.folder >= 0 && fchdir(plan.folder) != 0) fail();
   int moved[3];  // out of the way of each other
   for (int i = 0; i < 3; ++i) {
     moved[i] = fcntl(plan.streams[i], F_DUPFD_CLOEXEC, kFirstOther);
@@ -63,12 +66,18 @@ struct Plan {
 
 }  // namespace
 
-pid_t spawn(const std::vector<std::string>& argv, int in, int out, int log) {
+pid_t spawn(const std::vector<std::string>& argv, int in, int out, int log, int folder) {
   std::vector<char*> args;
   for (const std::string& a : argv) args.push_back(const_cast<char*>(a.c_str()));
+  std::string program = argv[0];
+  if (folder >= 0 && program.find('/') != std::string::npos) {  // "./ffmpeg" is one of our folder
+    std::error_code ignored;
+    program = std::filesystem::absolute(program, ignored).string();
+    args[0] = program.data();
+  }
   args.push_back(nullptr);
   const std::vector<int> open = os::open_files(kFirstOther);
-  Plan plan{args.data(), {in, out, log}, &open};
+  Plan plan{args.data(), {in, out, log}, folder, &open};
 
   sigset_t all, before;
   sigfillset(&all);
@@ -82,7 +91,7 @@ pid_t spawn(const std::vector<std::string>& argv, int in, int out, int log) {
     }
   }
   if (error != 0)
-    throw RuntimeError(
+    throw CannotStart(
         fmt::format("cannot start the program '{}': {}", argv[0], std::strerror(error)));
   return pid;
 }

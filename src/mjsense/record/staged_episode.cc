@@ -6,15 +6,14 @@
 #include <nlohmann/json.hpp>
 
 #include "mjsense/core/error.h"
+#include "mjsense/core/os.h"
 #include "mjsense/core/plain_file.h"
 #include "mjsense/hdf5/chunks.h"
 #include "mjsense/hdf5/guard.h"
 #include "mjsense/record/checksum.h"
-#include "mjsense/record/house.h"
 #include "mjsense/record/layout.h"
+#include "mjsense/record/recording_folder.h"
 #include "mjsense/record/video_file.h"
-
-namespace fs = std::filesystem;
 
 namespace mjsense {
 namespace {
@@ -30,9 +29,9 @@ void try_copy(hid_t file) {
   h5::check(H5Ocopy(file, "traj_0", copy, "traj_0", H5P_DEFAULT, H5P_DEFAULT), "cannot be copied");
 }
 
-std::string describe(const fs::path& path) {
+std::string describe(const Fd& traj) {
   const h5::H5Lock lock;
-  const h5::Id file = h5::open_file(path);
+  const h5::Id file = h5::open_file(os::path_of(traj.get()), false, kEpisodeFile);
   const h5::Id trajectory = h5::open_group(file, "traj_0");
   h5::each_dataset(trajectory, [&](const std::string& name) {
     const h5::Id dataset = h5::open_dataset(trajectory, name);
@@ -66,16 +65,15 @@ std::vector<StagedVideo> staged_videos(hid_t trajectory) {
   return videos;
 }
 
-StagedEpisode read_staged(const fs::path& folder) {
-  if (!is_plain_folder(folder)) throw RuntimeError("is no folder");
-  const Fd file = open_plain(folder, kEpisodeFile);
+StagedEpisode read_staged(const Folder& folder) {
+  const Fd file = open_plain(folder.fd(), kEpisodeFile);
   if (check_seal(file.get()) == Seal::kBroken)
     throw RuntimeError(fmt::format("'{}' is damaged: its checksum is wrong", kEpisodeFile));
   StagedEpisode episode;
   try {
-    const Json found =
-        Json::parse(h5::in_child(kEpisodeFile, static_cast<std::uint64_t>(size_of(file)),
-                                 [&] { return describe(folder / kEpisodeFile); }));
+    const Json found = Json::parse(h5::in_child(
+        kEpisodeFile, static_cast<std::uint64_t>(size_of(file)), [&] { return describe(file); }, 0,
+        file.get()));
     episode.recording = found.at("recording");
     episode.steps = found.at("steps");
     for (const Json& v : found.at("videos")) episode.videos.push_back({v.at(0), v.at(1), v.at(2)});
@@ -85,8 +83,8 @@ StagedEpisode read_staged(const fs::path& folder) {
   return episode;
 }
 
-void check_staged_video(const fs::path& folder, const StagedVideo& video, std::int64_t steps) {
-  const Fd file = open_plain(folder, video.name);
+void check_staged_video(const Folder& folder, const StagedVideo& video, std::int64_t steps) {
+  const Fd file = open_plain(folder.fd(), video.name);
   const VideoFacts facts = read_video_facts(file.get());
   if (!facts.error.empty())
     throw RuntimeError(fmt::format("'{}' is no whole video: {}", video.name, facts.error));
@@ -97,7 +95,7 @@ void check_staged_video(const fs::path& folder, const StagedVideo& video, std::i
     throw RuntimeError(fmt::format("'{}' is damaged: its checksum is wrong", video.name));
 }
 
-void check_staged_videos(const fs::path& folder, const StagedEpisode& episode) {
+void check_staged_videos(const Folder& folder, const StagedEpisode& episode) {
   for (const StagedVideo& video : episode.videos) check_staged_video(folder, video, episode.steps);
 }
 

@@ -4,11 +4,11 @@
 // been left by a killed process, by a broken disk or by a stranger.
 
 #include <cstdint>
-#include <filesystem>
 #include <string>
 #include <vector>
 
 #include "mjsense/hdf5/h5.h"
+#include "mjsense/record/folder.h"
 
 namespace mjsense {
 
@@ -26,13 +26,12 @@ struct StagedEpisode {
 
 // What traj.h5 of this folder says, read in a process of its own. Throws RuntimeError that says
 // what is wrong with it.
-StagedEpisode read_staged(const std::filesystem::path& folder);
+StagedEpisode read_staged(const Folder& folder);
 
 // Throws RuntimeError unless every video is there, whole, with a picture for each step.
-void check_staged_videos(const std::filesystem::path& folder, const StagedEpisode& episode);
+void check_staged_videos(const Folder& folder, const StagedEpisode& episode);
 // Of one of them.
-void check_staged_video(const std::filesystem::path& folder, const StagedVideo& video,
-                        std::int64_t steps);
+void check_staged_video(const Folder& folder, const StagedVideo& video, std::int64_t steps);
 
 // The names in traj/obs/sensor_data, which are plain. Throws RuntimeError if one is not.
 std::vector<StagedVideo> staged_videos(hid_t trajectory);

@@ -41,7 +41,7 @@ TEST(StagedEpisode, AChunkThatDoesNotUnpackIsNamed) {
   const testing::TempDir dir;
   write_episode(dir.file("traj.h5"), "no stream");
   try {
-    static_cast<void>(read_staged(dir.path));
+    static_cast<void>(read_staged(Folder::open(dir.path)));
     FAIL() << "a damaged episode was read";
   } catch (const RuntimeError& e) {
     EXPECT_THAT(e.what(), HasSubstr("'x' is damaged: a chunk of it does not unpack"));

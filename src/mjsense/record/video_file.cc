@@ -145,6 +145,9 @@ VideoFacts read_mp4(const File& file) {
                forms = find_box(track, "mdia/minf/stbl/stsd");
     if (!samples || !forms) throw Unreadable{"its video has no tables"};
     found = true;
+    const Bytes letters = part(*forms, 8 + 4, 4);
+    facts.codec.assign(letters.begin(), letters.end());
+    if (facts.codec == "avc1" || facts.codec == "avc3") facts.codec = "h264";
     facts.width = static_cast<int>(number(*forms, 8 + 32, 2));
     facts.height = static_cast<int>(number(*forms, 8 + 34, 2));
     read_samples(*samples, media_bytes, facts);
@@ -157,8 +160,9 @@ VideoFacts read_mp4(const File& file) {
 
 constexpr std::uint64_t kHeader = 0x1A45DFA3, kSegment = 0x18538067, kTracks = 0x1654AE6B,
                         kTrack = 0xAE, kTrackNumber = 0xD7, kTrackType = 0x83, kVideo = 0xE0,
-                        kWidth = 0xB0, kHeight = 0xBA, kCluster = 0x1F43B675, kSimpleBlock = 0xA3,
-                        kBlockGroup = 0xA0, kBlock = 0xA1;
+                        kCodec = 0x86, kCodecPrivate = 0x63A2, kWidth = 0xB0, kHeight = 0xBA,
+                        kCluster = 0x1F43B675, kSimpleBlock = 0xA3, kBlockGroup = 0xA0,
+                        kBlock = 0xA1;
 
 class Matroska {
  public:
@@ -222,13 +226,35 @@ class Matroska {
     return big_endian({bytes, count});
   }
 
+  // The first bytes of an element.
+  std::string text(const Element& e) const {
+    constexpr std::uint64_t kMostBytes = 64;
+    std::string bytes(static_cast<std::size_t>(std::min(e.end - e.begin, kMostBytes)), '\0');
+    bytes.resize(
+        file_.read(e.begin, {reinterpret_cast<std::uint8_t*>(bytes.data()), bytes.size()}));
+    return bytes;
+  }
+
+  // "V_MS/VFW/FOURCC" has four letters in a BITMAPINFOHEADER.
+  static std::string codec_of(std::string id, const std::string& description) {
+    constexpr std::size_t kLetters = 16;
+    id.resize(std::min(id.size(), id.find('\0')));
+    if (id == "V_MS/VFW/FOURCC" && description.size() >= kLetters + 4)
+      id = description.substr(kLetters, 4);
+    if (id == "V_FFV1" || id == "FFV1") return "ffv1";
+    return id == "V_MPEG4/ISO/AVC" ? "h264" : id;
+  }
+
   void read_tracks(const Element& tracks) {
     each(tracks.begin, tracks.end, [&](const Element& track) {
       if (track.id != kTrack || track_ != 0) return;
       std::uint64_t number = 0, type = 0, width = 0, height = 0;
+      std::string codec, description;
       each(track.begin, track.end, [&](const Element& e) {
         if (e.id == kTrackNumber) number = integer(e);
         if (e.id == kTrackType) type = integer(e);
+        if (e.id == kCodec) codec = text(e);
+        if (e.id == kCodecPrivate) description = text(e);
         if (e.id != kVideo) return;
         each(e.begin, e.end, [&](const Element& v) {
           if (v.id == kWidth) width = integer(v);
@@ -240,6 +266,7 @@ class Matroska {
       if (number == 0 || width > kMostPixels || height > kMostPixels)
         throw Unreadable{"its video has no tables"};
       track_ = number;
+      facts_.codec = codec_of(codec, description);
       facts_.width = static_cast<int>(width);
       facts_.height = static_cast<int>(height);
     });
@@ -278,8 +305,13 @@ VideoFacts read_video_facts(int fd) {
   const std::size_t got = file.read(0, head);
   try {
     if (got == 0) throw Unreadable{"it is empty"};
-    if (got >= 4 && big_endian({head, 4}) == kHeader) return Matroska(file).read();
-    if (got == 8 && big_endian({head + 4, 4}) == 0x66747970) return read_mp4(file);  // "ftyp"
+    const auto in = [](const char* container, VideoFacts facts) {
+      facts.container = container;
+      return facts;
+    };
+    if (got >= 4 && big_endian({head, 4}) == kHeader) return in("Matroska", Matroska(file).read());
+    if (got == 8 && big_endian({head + 4, 4}) == 0x66747970)  // "ftyp"
+      return in("MP4", read_mp4(file));
     throw Unreadable{"it is neither MP4 nor Matroska"};
   } catch (const Unreadable& e) {
     VideoFacts facts;

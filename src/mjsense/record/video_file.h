@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
-// How many pictures a video file holds and how large they are, from its container alone: what an
+// How many pictures a video file holds, how large they are and how they are coded, from its container
+// alone: what an
 // encoder left is counted without starting another program. MP4 and Matroska as ffmpeg writes them.
 
 #include <cstdint>
@@ -11,7 +12,9 @@ namespace mjsense {
 struct VideoFacts {
   std::int64_t frames = 0;
   int width = 0, height = 0;
-  std::string error;  // "" if the file could be understood to its end
+  std::string container;  // "MP4", "Matroska"
+  std::string codec;      // "h264", "ffv1"; another one as the container names it: "mp4v"
+  std::string error;      // "" if the file could be understood to its end
 };
 
 // Reads only the tables of the file, never more than 64 MiB, and trusts none of their sizes.

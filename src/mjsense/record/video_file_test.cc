@@ -10,6 +10,7 @@
 
 #include "mjsense/core/fd.h"
 #include "mjsense/record/checksum.h"
+#include "mjsense/record/folder.h"
 #include "mjsense/record/testing/tools.h"
 
 namespace mjsense {
@@ -46,6 +47,8 @@ TEST_F(Containers, AreCounted) {
     EXPECT_EQ(facts.frames, 6);
     EXPECT_EQ(facts.width, 16);
     EXPECT_EQ(facts.height, 12);
+    EXPECT_EQ(facts.codec, video.extension() == ".mkv" ? "ffv1" : "h264");
+    EXPECT_EQ(facts.container, video.extension() == ".mkv" ? "Matroska" : "MP4");
   }
 }
 
@@ -93,7 +96,7 @@ TEST(Checksum, OfAFileIsBehindItsEnd) {
   const auto seal = [&] { return check_seal(Fd(open(path.c_str(), O_RDONLY | O_CLOEXEC)).get()); };
   write(path, "some bytes");
   EXPECT_EQ(seal(), Seal::kNone);
-  seal_file(path);
+  seal_file(Folder::open(path.parent_path()), path.filename());
   EXPECT_EQ(seal(), Seal::kWhole);
   const std::string whole = read_file(path);
   for (std::size_t i = 0; i < whole.size(); ++i) {

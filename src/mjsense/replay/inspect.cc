@@ -13,7 +13,7 @@
 #include "mjsense/core/plain_file.h"
 #include "mjsense/hdf5/guard.h"
 #include "mjsense/record/description.h"
-#include "mjsense/record/house_lock.h"
+#include "mjsense/record/recording_lock.h"
 #include "mjsense/replay/check.h"
 #include "mjsense/replay/json_text.h"
 #include "mjsense/replay/trajectory.h"

@@ -1,23 +1,30 @@
 // SPDX-License-Identifier: Apache-2.0
+#include <fcntl.h>
 #include <fmt/format.h>
 #include <sys/file.h>
+#include <sys/stat.h>
 #include <unistd.h>
 
 #include <algorithm>
+#include <cerrno>
+#include <cstddef>
 #include <cstdio>
 #include <cstring>
 #include <nlohmann/json.hpp>
 #include <optional>
+#include <span>
 #include <utility>
+#include <vector>
 
 #include "mjsense/core/error.h"
+#include "mjsense/core/file_limit.h"
 #include "mjsense/core/plain_file.h"
 #include "mjsense/hdf5/guard.h"
 #include "mjsense/record/checksum.h"
-#include "mjsense/record/durable.h"
-#include "mjsense/record/house.h"
-#include "mjsense/record/house_lock.h"
+#include "mjsense/record/folder.h"
 #include "mjsense/record/layout.h"
+#include "mjsense/record/recording_folder.h"
+#include "mjsense/record/recording_lock.h"
 #include "mjsense/replay/check.h"
 #include "mjsense/replay/trajectory.h"
 
@@ -29,38 +36,58 @@ namespace {
 constexpr std::int64_t kNameBytes = 1 << 12;  // on disk, of a name with its dataset and groups
 
 // What is left of a recording that never finished an episode.
-void remove_remains(const fs::path& house, std::vector<std::string>& actions) {
+void remove_remains(const fs::path& house, const Folder& folder,
+                    std::vector<std::string>& actions) {
   const fs::path staging = house / kStagingDir;
   if (const std::size_t episodes = finished_episodes(house).size(); episodes > 0)
     throw RuntimeError(fmt::format(
         "'{}' holds {} finished episodes, and none of them says what recording they belong to; "
         "nothing was removed",
         staging.string(), episodes));
-  std::error_code error;
-  fs::remove_all(staging, error);
-  if (error)
-    throw RuntimeError(fmt::format("cannot remove '{}': {}", staging.string(), error.message()));
+  if (!folder.remove(kStagingDir, folder.at(kStagingDir)))
+    throw RuntimeError(fmt::format("cannot remove '{}'", staging.string()));
   actions.push_back(fmt::format("{}: removed the remains of '{}'", house.string(), kStagingDir));
 }
 
 void finish_house(const fs::path& house, std::vector<std::string>& actions) {
-  const fs::path staging = house / kStagingDir;
-  if (!is_plain_folder(staging))
-    throw ValueError(
-        fmt::format("'{}' is a link, which is not followed: remove it", staging.string()));
+  const Folder folder = Folder::open(house);
   std::string fingerprint;
   {
-    const Fd lock = lock_house(house, true);  // a recording that begins has not said what it is
-    fingerprint = unfinished_recording(house);
-    if (fingerprint.empty()) return remove_remains(house, actions);
+    // A recording that begins has not said what it is.
+    const Fd lock = lock_recording(folder, true);
+    fingerprint = unfinished_recording(folder.at(kStagingDir));
+    if (fingerprint.empty()) return remove_remains(house, folder, actions);
   }
   const std::size_t waiting = finished_episodes(house).size();
-  House store(house, fingerprint, true);
+  RecordingFolder store(house, fingerprint, true);
   store.publish_all();
   for (const std::string& damage : store.damage())
     actions.push_back(fmt::format("{}: {}", house.string(), damage));
   actions.push_back(fmt::format("{}: published {} finished episodes and ended the recording",
                                 house.string(), waiting - store.damage().size()));
+}
+
+// A new file with the bytes and the rights of `from`.
+void copy_file(const Fd& from, const Folder& folder, const std::string& name) {
+  const FileLimitIsError limit;
+  folder.remove(name);
+  struct stat about = {};
+  if (fstat(from.get(), &about) != 0)
+    throw_file("read what is copied to", folder.shown(name), errno);
+  const Fd file(openat(folder.fd(), name.c_str(),
+                       O_WRONLY | O_CREAT | O_EXCL | O_NOFOLLOW | O_CLOEXEC, 0600));
+  if (!file || fchmod(file.get(), about.st_mode & 0777) != 0)
+    throw_file("write", folder.shown(name), errno);
+  std::vector<std::byte> piece(1 << 20);
+  for (off_t at = 0;;) {
+    const ssize_t n = pread(from.get(), piece.data(), piece.size(), at);
+    if (n < 0 && errno == EINTR) continue;
+    if (n < 0) throw_file("read what is copied to", folder.shown(name), errno);
+    if (n == 0) break;
+    if (!write_all(file, std::span(piece).first(static_cast<std::size_t>(n))))
+      throw_file("write", folder.shown(name), errno);
+    at += n;
+  }
 }
 
 void add_file_name(hid_t sensor_data, const std::string& key, const std::string& name) {
@@ -121,27 +148,30 @@ int name_videos(const fs::path& path) {
   if (flock(bytes.get(), LOCK_EX | LOCK_NB) != 0)
     throw RuntimeError(fmt::format("another process repairs '{}'", path.string()));
   // In a copy: who is killed, or finds the disk full, leaves the file as it was.
-  const fs::path part = path.string() + ".part";
+  const Folder folder = Folder::open(path.parent_path());
+  const std::string name = path.filename(), part = name + ".part";
   struct Removed {
-    const fs::path& path;
-    ~Removed() { unlink(path.c_str()); }
-  } const removed{part};
-  copy_file(bytes, part);
-  reserve_space(part, size_of(bytes) + kNameBytes * static_cast<std::int64_t>(missing.size() + 1));
+    const Folder& folder;
+    const std::string& name;
+    ~Removed() { folder.remove(name); }
+  } const removed{folder, part};
+  copy_file(bytes, folder, part);
+  folder.reserve_space(part,
+                       size_of(bytes) + kNameBytes * static_cast<std::int64_t>(missing.size() + 1));
   {
     const h5::H5Lock lock;
-    h5::Id file = h5::open_file(part, true);
+    h5::Id file = h5::open_file(folder.reachable(part), true, folder.shown(part));
     for (const auto& m : missing) {
       const std::string place = m.at(0);
       if (!h5::exists(file, place)) h5::create_group(file, place);
       add_file_name(h5::open_group(file, place), m.at(1), m.at(2));
     }
-    file.close(fmt::format("cannot write '{}'", part.string()));
+    file.close(fmt::format("cannot write '{}'", folder.shown(part)));
   }
-  if (seal == Seal::kWhole) seal_file(part);
-  sync_file(part);
-  rename_file(part, path);
-  sync_file(path.has_parent_path() ? path.parent_path() : ".");
+  if (seal == Seal::kWhole) seal_file(folder, part);
+  folder.sync(part);
+  folder.rename(part, folder, name);
+  folder.sync();
   return static_cast<int>(missing.size());
 }
 

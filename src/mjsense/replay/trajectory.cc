@@ -10,8 +10,8 @@
 #include "mjsense/core/error.h"
 #include "mjsense/core/plain_file.h"
 #include "mjsense/hdf5/chunks.h"
-#include "mjsense/record/house.h"
-#include "mjsense/record/house_lock.h"
+#include "mjsense/record/recording_folder.h"
+#include "mjsense/record/recording_lock.h"
 #include "mjsense/replay/json_text.h"
 
 namespace fs = std::filesystem;

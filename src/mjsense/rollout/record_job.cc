@@ -6,14 +6,10 @@
 #include <algorithm>
 #include <chrono>
 #include <cmath>
-#include <fstream>
-#include <functional>
 #include <limits>
-#include <map>
-#include <sstream>
 
 #include "mjsense/core/error.h"
-#include "mjsense/record/checksum.h"
+#include "mjsense/rollout/recording_settings.h"
 #include "mjsense/rollout/registry.h"
 
 namespace mjsense {
@@ -25,102 +21,6 @@ double since(Clock::time_point start) {
   return std::chrono::duration<double>(Clock::now() - start).count();
 }
 
-// What stands in the files that a job names, so that one which was changed since is found out.
-// Models beside them are not read: what they become shows in the sizes of the model.
-std::map<std::string, std::string> checksums_of_files(const RolloutCfg& cfg) {
-  std::map<std::string, std::string> sums;
-  for (const auto& [key, path] : {std::pair{"camera_system", cfg.camera_system},
-                                  std::pair{"robot", cfg.robot}, std::pair{"scene", cfg.scene}}) {
-    if (!path.ends_with(".toml") && !path.ends_with(".xml") && !path.ends_with(".json")) continue;
-    std::stringstream text;
-    text << std::ifstream(path).rdbuf();
-    const std::string bytes = text.str();
-    Checksum sum;
-    sum.add(bytes.data(), bytes.size());
-    sums[key] = sum.text();
-  }
-  return sums;
-}
-
-// Of the whole compiled model: for a scene that code makes, there is no file to compare.
-std::string checksum_of_model(const mjModel* model) {
-  std::vector<char> bytes(mj_sizeModel(model));
-  mj_saveModel(model, nullptr, bytes.data(), static_cast<mjtSize>(bytes.size()));
-  Checksum sum;
-  sum.add(bytes.data(), bytes.size());
-  return sum.text();
-}
-
-// What the data depend on: not the number of worlds or threads. A recording resumes only with equal
-// settings.
-std::string settings_of(const RecordJobCfg& job, Rollout& rollout) {
-  const TaskCfg& task = rollout.task().cfg();
-  std::map<std::string, std::function<void(JsonWriter&)>> entries;
-  for (const FieldDecl& field : struct_of<RecordJobCfg>().fields) {
-    if (field.fingerprint && !field.is_resolved)
-      entries[field.fingerprint] = [&](JsonWriter& json) { write_json(json, field, &job); };
-  }
-  // What fields become that leave it to the robot or the task.
-  entries["cameras"] = [&](JsonWriter& json) {
-    json.begin_array();
-    for (const RecordedCamera& camera : rollout.cameras()) {
-      json.begin_object();
-      json.key("depth").value(camera.depth);
-      json.key("height").value(camera.height);
-      json.key("name").value(camera.name);
-      if (camera.segmentation) json.key("segmentation").value(true);
-      json.key("width").value(camera.width);
-      json.end_object();
-    }
-    json.end_array();
-  };
-  entries["horizon"] = [&](JsonWriter& json) { json.value(task.horizon); };
-  entries["policy_dt_ms"] = [&](JsonWriter& json) { json.value(task.policy_dt_ms); };
-  // Only where they are not what they always were: files of before stay what they are.
-  entries.erase("terminate_upon_success");
-  entries.erase("use_sensors");
-  for (const auto& [key, value] : {std::pair{"scene", job.rollout.scene},
-                                   std::pair{"camera_system", job.rollout.camera_system}}) {
-    entries.erase(key);
-    if (!value.empty()) entries[key] = [value = value](JsonWriter& json) { json.value(value); };
-  }
-  std::map<std::string, std::string> sums = checksums_of_files(job.rollout);
-  if (job.rollout.make_scene) sums["scene"] = checksum_of_model(rollout.task().model());
-  if (!sums.empty()) {
-    entries["files"] = [&sums](JsonWriter& json) {
-      json.begin_object();
-      for (const auto& [key, sum] : sums) json.key(key).value(sum);
-      json.end_object();
-    };
-  }
-  entries.erase("meshes");
-  if (task.robot.edit_spec) entries["meshes"] = [](JsonWriter& json) { json.value("real"); };
-  if (job.rollout.terminate_upon_success)
-    entries["terminate_upon_success"] = [](JsonWriter& json) { json.value(true); };
-  // Sizes that change with the scene and with what robots are drawn with.
-  entries["model"] = [&](JsonWriter& json) {
-    const mjModel* m = rollout.task().model();
-    json.begin_object();
-    json.key("nbody").value(static_cast<std::int64_t>(m->nbody));
-    json.key("ngeom").value(static_cast<std::int64_t>(m->ngeom));
-    json.key("nmeshvert").value(static_cast<std::int64_t>(m->nmeshvert));
-    json.key("ntexdata").value(static_cast<std::int64_t>(m->ntexdata));
-    json.end_object();
-  };
-  std::vector<std::uint8_t> text(1 << 16);
-  for (;;) {
-    JsonWriter json(text);
-    json.begin_object();
-    for (const auto& [key, write] : entries) {
-      json.key(key);
-      write(json);
-    }
-    json.end_object();
-    if (json.fits()) return {text.begin(), text.begin() + static_cast<std::ptrdiff_t>(json.size())};
-    text.resize(json.size());
-  }
-}
-
 RecordingCfg recording_cfg(const RecordJobCfg& job, Rollout& rollout, const StopFlag* stop) {
   RecordingCfg cfg;
   cfg.out_dir = job.out;
@@ -130,7 +30,8 @@ RecordingCfg recording_cfg(const RecordJobCfg& job, Rollout& rollout, const Stop
   cfg.num_worlds = rollout.num_worlds();
   cfg.fps = Fps::from_period_ms(rollout.task().cfg().policy_dt_ms);
   for (const auto& sensor : rollout.suite().sensors()) cfg.sensors.push_back(sensor.get());
-  cfg.settings = settings_of(job, rollout);
+  cfg.settings = recording_settings(job, rollout);
+  cfg.model = rollout.task().model();
   cfg.resume = job.resume;
   cfg.gzip = job.gzip;
   cfg.video = job.video;

@@ -18,6 +18,7 @@
 #include <array>
 #include <cstdint>
 #include <functional>
+#include <map>
 #include <memory>
 #include <optional>
 #include <span>
@@ -72,6 +73,9 @@ struct RolloutCfg {
   TaskFactory make_task;
   PolicyFactory make_policy;
   std::function<SceneFileCfg()> make_scene;
+  // What these functions and `more_sensors` depend on: checksums of code and of the values that it
+  // uses, by name, for "task", "policy", "sensor 'x'" ... A recording is resumed only with the same.
+  std::map<std::string, std::map<std::string, std::string>> code;
   // Makes further sensors for the suite, recorded like the others. The rollout is being made: task,
   // policy, simulation, cameras and the suite so far are there.
   std::function<std::vector<std::shared_ptr<Sensor>>(Rollout&)> more_sensors;
@@ -86,7 +90,7 @@ void visit_fields(V& v, RolloutCfg& c) {
     "Name or file of the robot. ``auto``: the task's default robot, or the first that can do the "
     "task; no robot for a task whose scene includes one.")
       .decides_data();
-  v("scene", c.scene, "Name or file of the scene; by default the task's.").decides_data_as("scene");
+  v("scene", c.scene, "Name or file of the scene; by default the task's.").decides_data();
   v("policy", c.policy, "Name of the policy.").decides_data();
   v("num_worlds", c.num_worlds, "Number of worlds that run in parallel.")
       .option("worlds")
@@ -95,7 +99,7 @@ void visit_fields(V& v, RolloutCfg& c) {
   v("seed", c.seed, "Random seed; the same seed gives the same episodes.").decides_data();
   v("camera_system", c.camera_system,
     "Name or file of the camera system; by default the cameras of the robot's model.")
-      .decides_data_as("camera_system");
+      .decides_data();
   v("cameras", c.cameras,
     "Names of the cameras to render, in this order; by default all, an empty list renders none.")
       .decides_data_as("cameras");
@@ -132,13 +136,13 @@ void visit_fields(V& v, RolloutCfg& c) {
     "Fraction of episodes that are disturbed on purpose: the object is pushed, or slips from the "
     "gripper.")
       .within(0, 1)
-      .decides_data_as("perturb");
+      .decides_data();
   v("terminate_upon_success", c.terminate_upon_success, "End an episode at its first success.")
-      .decides_data_as("terminate_upon_success");
+      .decides_data();
   v("use_sensors", c.use_sensors,
     "Add the sensors of the task, of the robot and of the policy. False: only the sensors that are "
     "passed in.")
-      .decides_data_as("use_sensors")
+      .decides_data()
       .hidden();
 }
 

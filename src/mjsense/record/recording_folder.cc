@@ -1,9 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "mjsense/record/house.h"
+#include "mjsense/record/recording_folder.h"
 
-#include <fcntl.h>
 #include <fmt/format.h>
-#include <sys/stat.h>
 #include <unistd.h>
 
 #include <algorithm>
@@ -17,13 +15,13 @@
 #include <optional>
 
 #include "mjsense/core/error.h"
+#include "mjsense/core/os.h"
 #include "mjsense/core/plain_file.h"
 #include "mjsense/hdf5/guard.h"
 #include "mjsense/record/checksum.h"
 #include "mjsense/record/description.h"
-#include "mjsense/record/durable.h"
-#include "mjsense/record/house_lock.h"
 #include "mjsense/record/layout.h"
+#include "mjsense/record/recording_lock.h"
 
 namespace fs = std::filesystem;
 
@@ -40,10 +38,10 @@ void make_dir(const fs::path& path) {
 }
 
 // A file of ours, which is short; "" if it is none.
-std::string read_whole(const fs::path& folder, const char* name) {
+std::string read_whole(const Folder& folder, const char* name) {
   constexpr std::int64_t kMostBytes = 1 << 24;
   try {
-    const Fd file = open_plain(folder, name);
+    const Fd file = open_plain(folder.fd(), name);
     std::string text(static_cast<std::size_t>(std::min(size_of(file), kMostBytes)), '\0');
     const ssize_t n = pread(file.get(), text.data(), text.size(), 0);
     text.resize(std::max<ssize_t>(0, n));
@@ -51,18 +49,6 @@ std::string read_whole(const fs::path& folder, const char* name) {
   } catch (const Error&) {
     return "";
   }
-}
-
-// Throws where a name of ours is a link to a place that we would write to.
-void require_no_link(const fs::path& path) {
-  struct stat about = {};
-  if (lstat(path.c_str(), &about) != 0) {
-    if (errno != ENOENT && errno != ENOTDIR) throw_file("write", path, errno);
-    return;
-  }
-  if (S_ISLNK(about.st_mode))
-    throw ValueError(
-        fmt::format("'{}' is a link, which is not followed: remove it", path.string()));
 }
 
 // What the recording of this house must be if it is to be published: JSON text of our own making.
@@ -74,11 +60,6 @@ bool is_description(const std::string& text) {
   };
   return json.is_object() && number("episodes") && number("batches") &&
          json["batches"] <= json["episodes"];
-}
-
-void remove_tree(const fs::path& path) {
-  std::error_code ignored;  // a leftover under a temporary name harms nobody
-  fs::remove_all(path, ignored);
 }
 
 std::string episode_name(std::int64_t episode) { return fmt::format("episode_{:08d}", episode); }
@@ -95,30 +76,29 @@ std::optional<std::int64_t> episode_number(const std::string& name, std::string_
   return number;
 }
 
-std::vector<fs::path> entries(const fs::path& dir) {
-  std::vector<fs::path> paths;
-  std::error_code error;
-  for (fs::directory_iterator it(dir, error), end; !error && it != end; it.increment(error))
-    paths.push_back(it->path());
-  std::sort(paths.begin(), paths.end());
-  return paths;
+std::string part_name(std::int64_t episode) {
+  // The process number keeps us from the files of an encoder that outlives a killed recording by a
+  // moment.
+  return fmt::format("{}.part.{}", episode_name(episode), getpid());
 }
 
-std::vector<fs::path> published_files(const fs::path& house) {
-  std::vector<fs::path> files = entries(house);
-  std::erase_if(files, [](const fs::path& path) {
-    return !path.filename().string().starts_with("trajectories_batch_") ||
-           path.extension() != ".h5";
+std::vector<std::string> published_files(const Folder& house) {
+  std::vector<std::string> files = house.names();
+  std::erase_if(files, [](const std::string& name) {
+    return !name.starts_with("trajectories_batch_") || !name.ends_with(".h5");
   });
   return files;
 }
 
-using Moves = std::vector<std::pair<fs::path, fs::path>>;
+// A video on its way from an episode's folder to the house.
+struct Move {
+  std::string episode, name, final_name;
+};
 
 // {"recording": text, "episodes": [0, 1 ...]} of a published file.
-std::string describe_published(const fs::path& path) {
+std::string describe_published(const Fd& published, const std::string& shown) {
   const h5::H5Lock lock;
-  const h5::Id file = h5::open_file(path);
+  const h5::Id file = h5::open_file(os::path_of(published.get()), false, shown);
   nlohmann::json out{{"recording", h5::text_attribute(file, "recording")},
                      {"episodes", nlohmann::json::array()}};
   for (const std::string& trajectory : h5::children(file)) {
@@ -135,8 +115,8 @@ std::string final_name_of(const StagedVideo& video, int index, int batch, int ba
 
 // Writes the final names of the videos of traj_{index} into the file, and notes what has to be
 // moved where.
-void name_videos(hid_t trajectory, const fs::path& staged, const fs::path& house, int index,
-                 int batch, int batches, Moves& moves) {
+void name_videos(hid_t trajectory, const std::string& episode, int index, int batch, int batches,
+                 std::vector<Move>& moves) {
   const h5::Id names = h5::open_group(trajectory, "obs/sensor_data");
   for (const StagedVideo& video : staged_videos(trajectory)) {
     const std::string final_name = final_name_of(video, index, batch, batches);
@@ -147,7 +127,7 @@ void name_videos(hid_t trajectory, const fs::path& staged, const fs::path& house
       throw RuntimeError(fmt::format("'{}' is no row of {} bytes", video.key, kFileNameBytes));
     h5::check(H5Dwrite(dataset, H5T_NATIVE_UINT8, H5S_ALL, H5S_ALL, H5P_DEFAULT, bytes.data()),
               video.key);
-    moves.emplace_back(staged / video.name, house / final_name);
+    moves.push_back({episode, video.name, final_name});
   }
 }
 
@@ -170,20 +150,22 @@ std::vector<std::int64_t> Decisions::all_kept() const {
   return episodes;
 }
 
-House::House(const fs::path& dir, const std::string& fingerprint, bool resume)
-    : dir_(dir), staging_(dir / kStagingDir), fingerprint_(fingerprint) {
+RecordingFolder::RecordingFolder(const fs::path& dir, const std::string& fingerprint, bool resume)
+    : fingerprint_(fingerprint) {
   if (!is_description(fingerprint))
     throw RuntimeError(fmt::format("'{}': its description of a recording cannot be read",
-                                   (staging_ / kDescription).string()));
+                                   (dir / kStagingDir / kDescription).string()));
   const nlohmann::json description = parse_description(fingerprint);
   batches_ = batches_of(description.at("episodes"), description.at("batches"));
 
-  require_no_link(staging_);
-  lock_ = lock_house(dir, false);  // first: who holds it still publishes
-  const std::vector<fs::path> published = published_files(dir);
+  make_dir(dir);
+  dir_ = Folder::open(dir);
+  lock_ = lock_recording(dir_, false);  // first: a process that holds it may still publish
+  staging_ = dir_.find(kStagingDir);
+  const std::vector<std::string> published = published_files(dir_);
   const bool any_published = !published.empty();
   load_published(published, fingerprint);
-  const std::string unfinished = unfinished_recording(dir);
+  const std::string unfinished = staging_ ? unfinished_recording(staging_) : "";
   if (!resume && (any_published || !unfinished.empty())) {
     throw ValueError(
         fmt::format("'{}' already holds {}; resume it, or choose another directory", dir.string(),
@@ -195,50 +177,64 @@ House::House(const fs::path& dir, const std::string& fingerprint, bool resume)
     throw ValueError(fmt::format("'{}' holds a different recording: {}", dir.string(), difference));
   }
   // A lock without the mark of the end: it goes on, though recording.json was lost.
-  const bool goes_on = lock_ && !fs::exists(staging_ / kEndingFile);
+  const bool goes_on = lock_ && !staging_.contains(kEndingFile);
   if (unfinished.empty() && any_published && !goes_on) {
     ended_ = true;
     // What a process killed in its last step left.
-    if (lock_) remove_tree(staging_ / kLockFile);
-    if (unlink((staging_ / kEndingFile).c_str()) == 0) rmdir(staging_.c_str());
+    if (lock_) staging_.remove(kLockFile);
+    if (staging_ && staging_.contains(kEndingFile)) dir_.remove(kStagingDir, staging_);
     lock_.reset();
     return;
   }
-  make_dir(staging_);
+  if (!staging_) staging_ = dir_.make(kStagingDir);
   if (!lock_) {
-    lock_ = lock_house(dir, true);
+    lock_ = lock_recording(dir_, true);
     // Whether somebody came and went between our reading and our lock.
-    if (unfinished != unfinished_recording(dir) || published != published_files(dir))
+    if (unfinished != unfinished_recording(staging_) || published != published_files(dir_))
       throw ValueError(fmt::format("another process records into '{}'", dir.string()));
   }
+  if (!staging_.contains(kLockFile, lock_)) throw_moved(staging_.path());
   if (read_whole(staging_, kDescription) != fingerprint)
-    write_whole(staging_ / kDescription, unfinished.empty() ? fingerprint : unfinished);
+    staging_.write(kDescription, unfinished.empty() ? fingerprint : unfinished);
   load_staged();
-  if (fs::exists(staging_ / kEndingFile)) publish_all();
-  if (!ended_ && static_cast<int>(published_.size()) == batches_.count) end();
+  if (staging_.contains(kEndingFile)) publish_all();
+  if (!ended_ && static_cast<int>(published_.size()) == batches_.count) end_or_throw();
 }
 
-House::~House() {
+RecordingFolder::~RecordingFolder() {
   const bool decided = decisions_.kept() + decisions_.discarded() > 0;
   if (ended_ || !published_.empty() || decided) return;
   end();
-  std::error_code not_empty;
-  fs::remove(dir_, not_empty);
+  if (dir_.is_at_its_path()) rmdir(dir_.path().c_str());  // unless something is in it
 }
 
-void House::load_published(const std::vector<fs::path>& files, const std::string& fingerprint) {
-  for (const fs::path& path : files) {
-    const std::string name = path.filename().string();
-    const auto bytes = static_cast<std::uint64_t>(size_of(open_plain(dir_, name)));
-    const auto found = nlohmann::json::parse(
-        h5::in_child(path.string(), bytes, [&] { return describe_published(path); }), nullptr,
-        false);
+void RecordingFolder::require_in_place() const {
+  if (!dir_.is_at_its_path()) throw_moved(dir_.path());
+  if (!dir_.contains(kStagingDir, staging_)) throw_moved(staging_.path());
+}
+
+void RecordingFolder::throw_moved(const fs::path& path) const {
+  throw RuntimeError(fmt::format(
+      "'{}' was moved, removed or replaced during the recording; its finished episodes are in the "
+      "folder that had this name: put it back and resume",
+      path.string()));
+}
+
+void RecordingFolder::load_published(const std::vector<std::string>& files,
+                                     const std::string& fingerprint) {
+  for (const std::string& name : files) {
+    const Fd file = open_plain(dir_.fd(), name);
+    const std::string shown = dir_.shown(name);
+    const auto found =
+        nlohmann::json::parse(h5::in_child(
+                                  shown, static_cast<std::uint64_t>(size_of(file)),
+                                  [&] { return describe_published(file, shown); }, 0, file.get()),
+                              nullptr, false);
     const std::string was = found.is_object() ? found.at("recording").get<std::string>() : "";
     const auto difference =
         was.empty() ? "it was not recorded by mjsense" : fingerprint_difference(was, fingerprint);
     if (!difference.empty()) {
-      throw ValueError(
-          fmt::format("'{}' belongs to a different recording: {}", path.string(), difference));
+      throw ValueError(fmt::format("'{}' belongs to a different recording: {}", shown, difference));
     }
     int batch = 0, batches = 0;
     if (std::sscanf(name.c_str(), "trajectories_batch_%d_of_%d.h5", &batch, &batches) == 2 &&
@@ -250,7 +246,7 @@ void House::load_published(const std::vector<fs::path>& files, const std::string
 
 // Moves videos back that an interrupted publication had moved already: then every episode is whole
 // in its folder or it is not, and one that is not takes nothing from the others.
-void House::bring_back(const std::map<std::int64_t, StagedEpisode>& staged, bool ending) {
+void RecordingFolder::bring_back(const std::map<std::int64_t, StagedEpisode>& staged, bool ending) {
   Decisions then = decisions_;
   for (const auto& [episode, found] : staged) then.add(episode, true);
   const std::vector<std::int64_t> order = ending ? then.all_kept() : then.settled();
@@ -262,39 +258,35 @@ void House::bring_back(const std::map<std::int64_t, StagedEpisode>& staged, bool
       ++batch;
     const int index = static_cast<int>(static_cast<std::int64_t>(at) - batches_.first(batch));
     for (const StagedVideo& video : found->second.videos) {
-      const fs::path home = staging_ / episode_name(found->first) / video.name,
-                     away = dir_ / final_name_of(video, index, batch, batches_.count);
-      if (!published_.contains(batch) && !fs::exists(home) && is_plain_file(away))
-        rename_file(away, home);
+      const Folder home = staging_.at(episode_name(found->first));
+      const std::string away = final_name_of(video, index, batch, batches_.count);
+      if (!published_.contains(batch) && !home.contains(video.name) && dir_.is_plain_file(away))
+        dir_.rename(away, home, video.name);
     }
   }
 }
 
-void House::set_aside(const fs::path& folder, const std::string& why) {
-  const fs::path damaged = dir_ / kDamagedDir;
-  require_no_link(damaged);
-  make_dir(damaged);
-  fs::path to = damaged / folder.filename();
-  for (int n = 2; fs::exists(fs::symlink_status(to)); ++n)
-    to = damaged / fmt::format("{}.{}", folder.filename().string(), n);
-  rename_file(folder, to);
-  sync_file(damaged);
-  damage_.push_back(
-      fmt::format("{} {}; it was set aside as '{}'", folder.filename().string(), why, to.string()));
+void RecordingFolder::set_aside(const std::string& name, const std::string& why) {
+  Folder damaged = dir_.find(kDamagedDir);
+  if (!damaged) damaged = dir_.make(kDamagedDir);
+  std::string to = name;
+  for (int n = 2; damaged.contains(to); ++n) to = fmt::format("{}.{}", name, n);
+  staging_.rename(name, damaged, to);
+  damaged.sync();
+  damage_.push_back(fmt::format("{} {}; it was set aside as '{}'", name, why, damaged.shown(to)));
 }
 
-void House::load_staged() {
+void RecordingFolder::load_staged() {
   std::map<std::int64_t, StagedEpisode> staged;
-  const bool ending = fs::exists(staging_ / kEndingFile);
-  for (const fs::path& path : entries(staging_)) {
-    const std::string name = path.filename().string();
+  const bool ending = staging_.contains(kEndingFile);
+  for (const std::string& name : staging_.names()) {
     if (name == kLockFile || name == kDescription || name == kEndingFile) continue;
     const auto finished = episode_number(name, ""), discarded = episode_number(name, ".discarded");
     if (finished && !decisions_.contains(*finished)) {
       try {
         if (name != episode_name(*finished))
           throw RuntimeError("is not how an episode's folder is named");
-        StagedEpisode episode = read_staged(path);
+        StagedEpisode episode = read_staged(staging_.at(name));
         const std::string difference = fingerprint_difference(episode.recording, fingerprint_);
         if (!difference.empty())
           throw RuntimeError("belongs to a different recording: " + difference);
@@ -302,65 +294,64 @@ void House::load_staged() {
       } catch (const h5::Ended&) {
         throw;
       } catch (const Error& e) {
-        set_aside(path, e.what());
+        set_aside(name, e.what());
       }
     } else if (discarded) {
       decisions_.add(*discarded, false);
     } else {
-      remove_tree(path);
+      staging_.remove(name);
     }
   }
   bring_back(staged, ending);
   for (const auto& [number, episode] : staged) {
-    const fs::path folder = staging_ / episode_name(number);
+    const std::string name = episode_name(number);
     try {
-      check_staged_videos(folder, episode);
+      check_staged_videos(staging_.at(name), episode);
       decisions_.add(number, true);
     } catch (const Error& e) {
-      set_aside(folder, e.what());
+      set_aside(name, e.what());
     }
   }
 }
 
-fs::path House::part_dir(std::int64_t episode) const {
-  // The process number keeps us from the files of an encoder that outlives a killed recording by a
-  // moment.
-  return staging_ / fmt::format("{}.part.{}", episode_name(episode), getpid());
+std::shared_ptr<const Folder> RecordingFolder::begin(std::int64_t episode) {
+  require_in_place();
+  const std::string part = part_name(episode);
+  staging_.remove(part);
+  // It must be new: a folder that another process put there may hold links.
+  return std::make_shared<const Folder>(staging_.make(part));
 }
 
-void House::begin(std::int64_t episode) {
-  remove_tree(part_dir(episode));
-  // It must be new: a folder that somebody else put there may hold links.
-  if (mkdir(part_dir(episode).c_str(), 0755) != 0)
-    throw_file("create the directory", part_dir(episode), errno);
-}
-
-void House::keep(std::int64_t episode) {
-  const fs::path part = part_dir(episode);
-  for (const fs::path& file : entries(part)) sync_file(file);
-  sync_file(part);
-  rename_file(part, staging_ / episode_name(episode));
-  sync_file(staging_);
+void RecordingFolder::keep(std::int64_t episode, const Folder& part) {
+  require_in_place();
+  for (const std::string& file : part.names()) part.sync(file);
+  part.sync();
+  const std::string name = part_name(episode);
+  if (!staging_.contains(name, part)) throw_moved(part.path());
+  staging_.rename(name, staging_, episode_name(episode));
+  staging_.sync();
   decisions_.add(episode, true);
 }
 
-void House::discard(std::int64_t episode, const std::string& why) {
-  write_whole(staging_ / (episode_name(episode) + ".discarded"), why);
-  sync_file(staging_);
-  remove_tree(part_dir(episode));
+void RecordingFolder::discard(std::int64_t episode, const std::string& why) {
+  require_in_place();
+  staging_.write(episode_name(episode) + ".discarded", why);
+  staging_.sync();
+  staging_.remove(part_name(episode));
   decisions_.add(episode, false);
 }
 
-void House::abandon(std::int64_t episode) { remove_tree(part_dir(episode)); }
+void RecordingFolder::abandon(std::int64_t episode) { staging_.remove(part_name(episode)); }
 
-std::vector<std::int64_t> House::batch_of(int batch, const std::vector<std::int64_t>& kept) const {
+std::vector<std::int64_t> RecordingFolder::batch_of(int batch,
+                                                    const std::vector<std::int64_t>& kept) const {
   const auto most = static_cast<std::int64_t>(kept.size());
   const std::int64_t first = std::min(batches_.first(batch), most),
                      last = std::min(batches_.first(batch + 1), most);
   return {kept.begin() + first, kept.begin() + last};
 }
 
-void House::publish_ready() {
+void RecordingFolder::publish_ready() {
   const std::vector<std::int64_t>& kept = decisions_.settled();
   for (; next_batch_ < batches_.count &&
          batches_.first(next_batch_ + 1) <= static_cast<std::int64_t>(kept.size());
@@ -369,98 +360,114 @@ void House::publish_ready() {
   }
 }
 
-void House::publish_all() {
+void RecordingFolder::publish_all() {
   if (ended_) return;
   publish_ready();
   // From here on the order of episodes is settled, also for a process that finds us interrupted.
-  write_whole(staging_ / kEndingFile, "");
-  sync_file(staging_);
+  require_in_place();
+  staging_.write(kEndingFile, "");
+  staging_.sync();
   const std::vector<std::int64_t> kept = decisions_.all_kept();
   for (int b = next_batch_; b < batches_.count; ++b) {
     const std::vector<std::int64_t> episodes = batch_of(b, kept);
     if (episodes.empty()) break;
     if (!published_.contains(b)) publish(b, episodes);
   }
-  end();
+  end_or_throw();
 }
 
-void House::publish(int batch, const std::vector<std::int64_t>& episodes) {
+void RecordingFolder::publish(int batch, const std::vector<std::int64_t>& episodes) {
+  require_in_place();
   const int batches = batches_.count;
-  const fs::path part = staging_ / "batch.part";
-  const std::string what = fmt::format("cannot write '{}'", part.string());
+  const std::string part = "batch.part";
+  const std::string what = fmt::format("cannot write '{}'", staging_.shown(part));
   // What could not be written whole leaves its disk space to others; its episodes wait as before.
   struct Removed {
-    const fs::path& path;
-    ~Removed() { unlink(path.c_str()); }
-  } const removed{part};
-  Moves moves;
+    const Folder& folder;
+    const std::string& name;
+    ~Removed() { folder.remove(name); }
+  } const removed{staging_, part};
+  std::vector<Move> moves;
   {
     const h5::H5Lock lock;
-    h5::Id file = h5::create_file(part);
+    h5::Id file = h5::create_file(staging_.reachable(part), staging_.shown(part));
     std::int64_t most = 1 << 17;  // what a file has beside its episodes, and then some
     for (const std::int64_t episode : episodes)
-      most += static_cast<std::int64_t>(
-          fs::file_size(staging_ / episode_name(episode) / kEpisodeFile) * 9 / 8);
-    reserve_space(part, most);
+      most += staging_.at(episode_name(episode)).size_of(kEpisodeFile) * 9 / 8;
+    staging_.reserve_space(part, most);
     h5::set_attribute(file, "format", "mjsense 1");
     h5::set_attribute(file, "recording", fingerprint_);
     for (std::size_t i = 0; i < episodes.size(); ++i) {
-      const fs::path staged = staging_ / episode_name(episodes[i]);
       const std::string name = fmt::format("traj_{}", i);
-      h5::Id source = h5::open_file(staged / kEpisodeFile);
+      const Folder staged = staging_.at(episode_name(episodes[i]));
+      const Fd bytes = open_plain(staged.fd(), kEpisodeFile);
+      h5::Id source = h5::open_file(os::path_of(bytes.get()), false, staged.shown(kEpisodeFile));
       h5::check(H5Ocopy(source, "traj_0", file, name.c_str(), H5P_DEFAULT, h5::link_properties()),
                 what);
       const h5::Id trajectory = h5::open_group(file, name);
-      name_videos(trajectory, staged, dir_, static_cast<int>(i), batch, batches, moves);
+      name_videos(trajectory, episode_name(episodes[i]), static_cast<int>(i), batch, batches,
+                  moves);
     }
     file.close(what);
   }
-  seal_file(part);
-  sync_file(part);
-  for (const auto& [from, to] : moves) {
+  seal_file(staging_, part);
+  staging_.sync(part);
+  for (const Move& move : moves) {
     // A missing one was moved before an earlier attempt to publish was interrupted.
-    if (std::rename(from.c_str(), to.c_str()) != 0 && (errno != ENOENT || !fs::exists(to)))
-      throw_file("write", to, errno);
-    published_bytes_ += static_cast<std::int64_t>(fs::file_size(to));
+    const Folder staged = staging_.at(move.episode);
+    if (staged.contains(move.name) || !dir_.contains(move.final_name))
+      staged.rename(move.name, dir_, move.final_name);
+    published_bytes_ += dir_.size_of(move.final_name);
   }
-  sync_file(dir_);
-  const fs::path final_path = dir_ / batch_file(batch, batches);
-  rename_file(part, final_path);
-  sync_file(dir_);
+  dir_.sync();
+  const std::string final_name = batch_file(batch, batches);
+  staging_.rename(part, dir_, final_name);
+  dir_.sync();
   published_.insert(batch);
-  published_bytes_ += static_cast<std::int64_t>(fs::file_size(final_path));
-  for (const std::int64_t episode : episodes) remove_tree(staging_ / episode_name(episode));
+  published_bytes_ += dir_.size_of(final_name);
+  for (const std::int64_t episode : episodes) staging_.remove(episode_name(episode));
 }
 
-void House::end() {
+bool RecordingFolder::end() {
   ended_ = true;
-  for (const fs::path& path : entries(staging_)) {
-    const fs::path name = path.filename();
+  if (!staging_) return true;
+  for (const std::string& name : staging_.names()) {
     if (name == kDescription || name == kLockFile || name == kEndingFile) continue;
     // An episode beyond the wanted number: half removed under its own name it would look damaged.
-    const fs::path dropped = path.string() + ".part";
-    std::error_code error;
-    fs::rename(path, dropped, error);
-    remove_tree(error ? path : dropped);
+    const std::string dropped = name + ".part";
+    const bool renamed = renameat(staging_.fd(), name.c_str(), staging_.fd(), dropped.c_str()) == 0;
+    staging_.remove(renamed ? dropped : name);
   }
   // The mark that says it has ended goes last.
-  remove_tree(staging_ / kDescription);
-  remove_tree(staging_ / kLockFile);
+  staging_.remove(kDescription);
+  staging_.remove(kLockFile);
   lock_.reset();
-  remove_tree(staging_);
+  return dir_.remove(kStagingDir, staging_) && dir_.is_at_its_path();
 }
 
-std::string unfinished_recording(const fs::path& house) {
-  const fs::path staging = house / kStagingDir;
-  if (!is_plain_folder(staging)) return "";
+void RecordingFolder::end_or_throw() {
+  if (!end()) throw_moved(dir_.is_at_its_path() ? staging_.path() : dir_.path());
+}
+
+namespace {
+
+std::vector<std::string> finished_names(const Folder& staging) {
+  std::vector<std::string> names = staging.names();
+  std::erase_if(names, [](const std::string& name) { return !episode_number(name, ""); });
+  return names;
+}
+
+}  // namespace
+
+std::string unfinished_recording(const Folder& staging) {
   const std::string text = read_whole(staging, kDescription);
   const bool sound = is_description(text);
   // Every finished episode carries the same text, with a checksum: where none agrees with
   // recording.json, it is that which was lost or changed.
   std::map<std::string, int> said;
-  for (const fs::path& episode : finished_episodes(house)) {
+  for (const std::string& episode : finished_names(staging)) {
     try {
-      const std::string recording = read_staged(episode).recording;
+      const std::string recording = read_staged(staging.at(episode)).recording;
       if (!is_description(recording)) continue;
       if (sound && fingerprint_difference(recording, text).empty()) return text;
       ++said[recording];
@@ -475,9 +482,8 @@ std::string unfinished_recording(const fs::path& house) {
 std::vector<fs::path> finished_episodes(const fs::path& house) {
   std::vector<fs::path> found;
   if (!is_plain_folder(house / kStagingDir)) return found;
-  for (const fs::path& path : entries(house / kStagingDir)) {
-    if (episode_number(path.filename().string(), "")) found.push_back(path);
-  }
+  const Folder staging = Folder::open(house / kStagingDir);
+  for (const std::string& name : finished_names(staging)) found.push_back(staging.path() / name);
   return found;
 }
 

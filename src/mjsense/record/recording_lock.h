@@ -5,6 +5,7 @@
 #include <filesystem>
 
 #include "mjsense/core/fd.h"
+#include "mjsense/record/folder.h"
 
 namespace mjsense {
 
@@ -12,7 +13,7 @@ inline constexpr const char* kLockFile = "lock";
 
 // The lock of a house, held. An empty one where there is none and `make` is false. Throws ValueError
 // when another process holds it, RuntimeError when it cannot be written.
-[[nodiscard]] Fd lock_house(const std::filesystem::path& house, bool make);
+[[nodiscard]] Fd lock_recording(const Folder& house, bool make);
 
 // True while a process records into this house, or repairs it.
 [[nodiscard]] bool is_locked(const std::filesystem::path& house);

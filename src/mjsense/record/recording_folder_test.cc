@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // A house that others look at, write into, or left in the middle of something.
 
-#include "mjsense/record/house.h"
+#include "mjsense/record/recording_folder.h"
 
 #include <fcntl.h>
 #include <gmock/gmock.h>
@@ -11,10 +11,13 @@
 #include <sys/wait.h>
 #include <unistd.h>
 
+#include <atomic>
+#include <chrono>
 #include <csignal>
+#include <random>
 #include <thread>
 
-#include "mjsense/record/house_lock.h"
+#include "mjsense/record/recording_lock.h"
 #include "mjsense/record/testing/tools.h"
 #include "mjsense/replay/check.h"
 
@@ -34,14 +37,14 @@ std::string go_on(const fs::path& out) {
 }
 
 // Nothing is read before: what the other publishes meanwhile would be missed, and published over.
-TEST(House, WhoRecordsIntoItIsAskedFirst) {
+TEST(RecordingFolder, WhoRecordsIntoItIsAskedFirst) {
   TempDir dir;
   begin(dir.path, 3);
   const fs::path house = dir.path / "house_0";
   std::ofstream(house / "trajectories_batch_2_of_3.h5") << "half a file";
   EXPECT_FALSE(is_locked(house));
   {
-    const Fd other = lock_house(house, false);
+    const Fd other = lock_recording(Folder::open(house), false);
     EXPECT_TRUE(is_locked(house));
     EXPECT_THAT(error_of([&] { go_on(dir.path); }), HasSubstr("another process records into"));
     EXPECT_THAT(repair(dir.path).text(), HasSubstr("another process records into"));
@@ -51,12 +54,12 @@ TEST(House, WhoRecordsIntoItIsAskedFirst) {
 }
 
 // A recording that begins has not said yet what it is.
-TEST(House, RepairLeavesAloneWhatBegins) {
+TEST(RecordingFolder, RepairLeavesAloneWhatBegins) {
   TempDir dir;
   const fs::path house = dir.path / "house_0";
   fs::create_directories(house / kStagingDir);
   {
-    const Fd other = lock_house(house, true);
+    const Fd other = lock_recording(Folder::open(house), true);
     EXPECT_THAT(repair(dir.path).text(), HasSubstr("another process records into"));
     EXPECT_TRUE(is_locked(house));
   }
@@ -65,7 +68,7 @@ TEST(House, RepairLeavesAloneWhatBegins) {
 }
 
 // Whoever looks at a house holds its lock for a moment: that is no reason not to record.
-TEST(House, ALookIsNoRecording) {
+TEST(RecordingFolder, ALookIsNoRecording) {
   TempDir whole, dir;
   const std::string bytes = go_on(whole.path);
   begin(dir.path, 1);
@@ -80,7 +83,7 @@ TEST(House, ALookIsNoRecording) {
 }
 
 // Killed before the last files of a recording that has ended were removed.
-TEST(House, WhatTheLastStepLeftIsRemoved) {
+TEST(RecordingFolder, WhatTheLastStepLeftIsRemoved) {
   for (const bool locked : {false, true}) {
     TempDir dir;
     const std::string bytes = go_on(dir.path);
@@ -94,7 +97,7 @@ TEST(House, WhatTheLastStepLeftIsRemoved) {
 }
 
 // An episode's folder under another name is not removed, and keeps nobody from going on.
-TEST(House, FoldersOfOtherNamesAreSetAside) {
+TEST(RecordingFolder, FoldersOfOtherNamesAreSetAside) {
   TempDir whole, dir;
   const std::string bytes = go_on(whole.path);
   begin(dir.path, 1);
@@ -118,8 +121,74 @@ TEST(House, FoldersOfOtherNamesAreSetAside) {
   EXPECT_EQ(again, bytes);
 }
 
+std::string contents(const fs::path& dir) {
+  std::string text;
+  for (const std::string& name : tree(dir)) text += name + "\n" + read_file(dir / name);
+  return text;
+}
+
+// While an episode is recorded, .recording is moved away and a link to another folder takes its place:
+// nothing in the other folder changes, and the recording reports an error.
+TEST(RecordingFolder, AFolderThatIsSwappedForALinkIsNotFollowed) {
+  constexpr int kSwaps = 100;
+  TempDir foreign, other;
+  fs::create_directories(foreign.path / "target/deep/er");
+  for (const char* name : {"thesis.txt", "lock", "recording.json", "deep/er/episode_00000000"})
+    std::ofstream(foreign.path / "target" / name) << "years of work";
+  begin(other.path, 2);
+  const fs::path targets[] = {foreign.path / "target", other.path / "house_0/.recording"};
+  const std::string before[] = {contents(targets[0]), contents(targets[1])};
+  std::mt19937 random(7);
+  int swapped_runs = 0;
+  for (int n = 0; swapped_runs < kSwaps && n < 20 * kSwaps; ++n) {
+    TempDir dir;
+    const fs::path staging = dir.path / "house_0/.recording";
+    std::atomic<bool> ended = false, swapped = false;
+    const auto delay = std::chrono::microseconds(random() % 30'000);
+    std::thread swap([&] {
+      while (!ended && !fs::is_directory(staging)) std::this_thread::yield();
+      const auto until = std::chrono::steady_clock::now() + delay;
+      while (!ended && std::chrono::steady_clock::now() < until) std::this_thread::yield();
+      std::error_code error;
+      fs::rename(staging, dir.path / "moved", error);
+      if (error) return;
+      fs::create_directory_symlink(targets[n % 2], staging);
+      swapped = true;
+    });
+    const std::string error = error_of([&] { go_on(dir.path); });
+    ended = true;
+    swap.join();
+    if (!swapped) continue;  // the recording had ended
+    ++swapped_runs;
+    EXPECT_THAT(error, ::testing::AnyOf(HasSubstr("was moved, removed or replaced"),
+                                        HasSubstr("is a link, which is not followed")));
+    for (int t : {0, 1}) ASSERT_EQ(contents(targets[t]), before[t]) << n << ": " << error;
+    EXPECT_TRUE(fs::is_symlink(staging));
+  }
+  EXPECT_EQ(swapped_runs, kSwaps);
+}
+
+// Put back, it goes on where it was.
+TEST(RecordingFolder, AFolderThatIsPutBackIsResumed) {
+  TempDir whole, dir;
+  const std::string bytes = go_on(whole.path);
+  const fs::path staging = dir.path / "house_0/.recording";
+  FakeSuite suite({1, 16, 12, false, false});
+  RecordingCfg cfg = fake_recording(dir.path, suite, 1, 6);
+  cfg.batches = 3;
+  {
+    Recorder recorder(cfg);
+    record_all(recorder, suite, {.worlds = 1, .stop_after = 1});
+    fs::rename(staging, dir.path / "moved");
+    EXPECT_THAT(error_of([&] { record_all(recorder, suite, {.worlds = 1}); }),
+                HasSubstr(".recording' was moved, removed or replaced during the recording"));
+  }
+  fs::rename(dir.path / "moved", staging);
+  EXPECT_EQ(go_on(dir.path), bytes);
+}
+
 // The system may write a part and say why only when asked for the rest.
-TEST(House, ADescriptionThatDoesNotFitTellsWhy) {
+TEST(RecordingFolder, ADescriptionThatDoesNotFitTellsWhy) {
   TempDir dir;
   const fs::path report = dir.path / "report";
   const pid_t pid = fork();

@@ -12,17 +12,21 @@
 //
 // Every change of state is one rename. A batch is published by moving videos first and the HDF5
 // file last; when that is interrupted, doing it again ends in the same state, because the order of
-// episodes is that of their numbers. What an earlier process left is checked before it is published,
+// episodes is that of their numbers. All of them go through open directories (folder.h): when .recording
+// is moved away or replaced by a link, the recording fails and nothing in the other folder changes. What an
+// earlier process left is checked before it is published,
 // and no name that stands in a file leads out of its folder.
 
 #include <cstdint>
 #include <filesystem>
 #include <map>
+#include <memory>
 #include <set>
 #include <string>
 #include <vector>
 
 #include "mjsense/core/fd.h"
+#include "mjsense/record/folder.h"
 #include "mjsense/record/layout.h"
 #include "mjsense/record/staged_episode.h"
 
@@ -48,22 +52,23 @@ class Decisions {
   int kept_ = 0;
 };
 
-class House {
+class RecordingFolder {
  public:
   // Opens or begins a recording. Throws ValueError when there is one and `resume` is false, or it
   // is a different one, or another process records into it; RuntimeError when the directory cannot
   // be written.
-  House(const std::filesystem::path& dir, const std::string& fingerprint, bool resume);
+  RecordingFolder(const std::filesystem::path& dir, const std::string& fingerprint, bool resume);
   // A recording in which nothing was decided leaves nothing behind: what failed at its first step
   // blocks nobody.
-  ~House();
-  House(const House&) = delete;
-  House& operator=(const House&) = delete;
+  ~RecordingFolder();
+  RecordingFolder(const RecordingFolder&) = delete;
+  RecordingFolder& operator=(const RecordingFolder&) = delete;
 
-  const std::filesystem::path& dir() const { return dir_; }
-  std::filesystem::path part_dir(std::int64_t episode) const;
-  void begin(std::int64_t episode);  // makes an empty part_dir
-  void keep(std::int64_t episode);   // syncs part_dir and makes it a finished episode
+  const std::filesystem::path& dir() const { return dir_.path(); }
+  // An empty folder for the files of an episode.
+  std::shared_ptr<const Folder> begin(std::int64_t episode);
+  // Syncs that folder and makes it a finished episode.
+  void keep(std::int64_t episode, const Folder& part);
   void discard(std::int64_t episode, const std::string& why);
   void abandon(std::int64_t episode);
 
@@ -77,16 +82,19 @@ class House {
   const std::vector<std::string>& damage() const { return damage_; }
 
  private:
-  void load_published(const std::vector<std::filesystem::path>& files,
-                      const std::string& fingerprint);
+  void load_published(const std::vector<std::string>& files, const std::string& fingerprint);
   void load_staged();
   void bring_back(const std::map<std::int64_t, StagedEpisode>& staged, bool ending);
-  void set_aside(const std::filesystem::path& folder, const std::string& why);
+  void set_aside(const std::string& name, const std::string& why);
   void publish(int batch, const std::vector<std::int64_t>& episodes);
   std::vector<std::int64_t> batch_of(int batch, const std::vector<std::int64_t>& kept) const;
-  void end();
+  bool end();  // false: the folder that it recorded into is elsewhere now, and empty
+  void end_or_throw();
+  // Throws RuntimeError when the folders were moved or replaced since they were opened.
+  void require_in_place() const;
+  [[noreturn]] void throw_moved(const std::filesystem::path& path) const;
 
-  std::filesystem::path dir_, staging_;
+  Folder dir_, staging_;
   std::string fingerprint_;
   Batches batches_;
   std::set<int> published_;
@@ -103,9 +111,9 @@ inline constexpr const char* kStagingDir = ".recording";
 inline constexpr const char* kEpisodeFile = "traj.h5";
 inline constexpr const char* kDamagedDir = "damaged";
 
-// recording.json of a house, or what most of its finished episodes say where that is lost or none of
-// them agrees with it: "" when it holds no unfinished recording.
-std::string unfinished_recording(const std::filesystem::path& house);
+// recording.json of a recording's folder (kStagingDir), or what most of its finished episodes say where
+// that is lost or none of them agrees with it: "" when it holds no unfinished recording.
+std::string unfinished_recording(const Folder& staging);
 // Directories of finished, unpublished episodes, in order.
 std::vector<std::filesystem::path> finished_episodes(const std::filesystem::path& house);
 
