@@ -16,7 +16,7 @@ import numpy as np
 
 from mjsense import _core
 from mjsense._arguments import KnownAttributes, checked
-from mjsense.configs import SceneCfg, SensorCfg
+from mjsense.configs import MujocoCfg, SceneCfg, SensorCfg
 from mjsense.contact import ContactSensor
 from mjsense.errors import UnknownNameError
 from mjsense.imu import ImuSensor
@@ -89,6 +89,11 @@ class Scene(KnownAttributes):
             warnings.warn(text, stacklevel=3)
         self._register()
 
+    def _set_options(self, options: MujocoCfg) -> None:
+        """Replaces the physics options, also those of ``model``. No simulation may exist yet."""
+        self._core.set_options(options, self.model._address)
+        self.cfg.options = options
+
     @classmethod
     def _of(cls, core: Any, prepared: Scene | None = None) -> Scene:
         """Of a C++ scene that something else made, of what ``prepared`` said."""
@@ -109,14 +114,14 @@ class Scene(KnownAttributes):
             if own is not None:
                 own._mjs_handle = handle
         for sensor_cfg in self.cfg.sensors:
-            if isinstance(sensor_cfg, SensorCfg):
+            if isinstance(sensor_cfg, SensorCfg) and not hasattr(sensor_cfg, "build"):
                 self._sensors[sensor_cfg.prefixed_name].cfg = sensor_cfg
         self._complete = True
 
     @staticmethod
     def _item(sensor: Any) -> Any:
         """What C++ takes: a configuration it knows, or a Sensor."""
-        if isinstance(sensor, (SensorCfg, Sensor)):
+        if isinstance(sensor, Sensor):
             return sensor
         if hasattr(sensor, "build"):
             built = sensor.build()
@@ -124,6 +129,8 @@ class Scene(KnownAttributes):
                 raise TypeError(f"{type(sensor).__name__}.build() must return a mjsense.Sensor, not {built!r}")
             built.uuid = getattr(sensor, "prefixed_name", "") or built.uuid or sensor.name
             return built
+        if isinstance(sensor, SensorCfg):
+            return sensor
         if hasattr(sensor, "get_observation") and not isinstance(sensor, NativeSensor):
             return as_sensor(sensor)
         raise TypeError(f"sensors: neither a sensor configuration nor a mjsense.Sensor: {sensor!r}")
