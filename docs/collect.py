@@ -22,4 +22,5 @@ def on_files(files, config):
         files.append(File.generated(config, f"{room}/index.md", content=index))
     for room in ALONE:
         files.append(File.generated(config, f"{room}.md", content=(SOURCE / room / "page.md").read_text()))
+    files.append(File.generated(config, "changelog.md", content=(ROOT / "CHANGELOG.md").read_text().replace("](docs/", "](")))
     return files

@@ -134,5 +134,16 @@ def test_every_page_is_named_where_readers_begin(index):
     assert pages <= linked, sorted(str(page.relative_to(ROOT)) for page in pages - linked)
 
 
+def test_figures_are_those_of_the_performance_notes(monkeypatch):
+    monkeypatch.syspath_prepend(ROOT / "bench")
+    import figures
+
+    notes = (ROOT / "docs/performance_notes.md").read_text()
+    for page in (ROOT / "README.md", ROOT / "docs/performance.md"):
+        text = page.read_text()
+        assert "<!-- bench " in text
+        assert text == figures.rewritten(text, lambda name, _: figures.table(name, notes)), "python bench/page.py renews it"
+
+
 def test_models_of_the_pages_are_there():
     assert "robots/quadruped.xml" in mjs.embedded_models()
