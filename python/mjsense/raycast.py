@@ -5,15 +5,21 @@ from __future__ import annotations
 
 from dataclasses import replace
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from mjsense import _core
 from mjsense._arguments import checked
-from mjsense.data import CameraData
+from mjsense.data import CameraData, RayCastData
 from mjsense.native_sensor import NativeSensor
 
 
 class RayCastSensor(NativeSensor):
     """Rays from frames; ``data`` is a :class:`mjsense.RayCastData`."""
+
+    if TYPE_CHECKING:
+
+        @property
+        def data(self) -> RayCastData: ...
 
     @property
     def num_frames(self) -> int:

@@ -148,6 +148,49 @@ class Scene(KnownAttributes):
         hint = f"Did you mean {' or '.join(map(repr, near))}?" if near else f"Available: {', '.join(names)}"
         raise UnknownNameError(f"Scene element '{key}' not found. {hint}")
 
+    def builtin(self, name: str) -> BuiltinSensor:
+        """``self[name]``, which is one of MuJoCo's own sensors; TypeError for another kind, as for all of these."""
+        return self._of_class(name, BuiltinSensor)
+
+    def contact(self, name: str) -> ContactSensor:
+        """``self[name]``, which is a contact sensor."""
+        return self._of_class(name, ContactSensor)
+
+    def raycast(self, name: str) -> RayCastSensor:
+        """``self[name]``, which casts rays."""
+        return self._of_class(name, RayCastSensor)
+
+    def terrain_height(self, name: str) -> TerrainHeightSensor:
+        """``self[name]``, which is a terrain height sensor."""
+        return self._of_class(name, TerrainHeightSensor)
+
+    def lidar(self, name: str) -> LidarSensor:
+        """``self[name]``, which is a lidar."""
+        return self._of_class(name, LidarSensor)
+
+    def camera(self, name: str) -> CameraSensor:
+        """``self[name]``, which is a camera."""
+        return self._of_class(name, CameraSensor)
+
+    def imu(self, name: str) -> ImuSensor:
+        """``self[name]``, which is an IMU."""
+        return self._of_class(name, ImuSensor)
+
+    def entity(self, name: str) -> Entity:
+        """``self[name]``, which is an entity."""
+        if name not in self._sensors:
+            return self[name]
+        if name not in self.entities:
+            raise TypeError(f"'{name}' is a sensor, not an entity")
+        return self.entities[name]
+
+    def _of_class(self, name: str, wanted: type[Any]) -> Any:
+        found = self[name]
+        if not isinstance(found, wanted):
+            what = "an entity" if isinstance(found, Entity) else f"a {type(found).__name__}"
+            raise TypeError(f"'{name}' is {what}, not a {wanted.__name__}")
+        return found
+
     def __contains__(self, key: object) -> bool:
         return key in self._sensors or key in self.entities
 

@@ -27,17 +27,17 @@ class Words(mjs.Sensor):
 def test_a_default_view_without_cameras(name):
     env = gymnasium.make(name, **SMALL)
     observation, _ = env.reset(seed=1)
-    assert not any(rows.dtype == np.uint8 for rows in observation.values() if isinstance(rows, np.ndarray))
+    assert not any(rows.ndim == 3 for rows in observation.values() if isinstance(rows, np.ndarray))
     picture = env.render()
     assert picture.shape == (40, 64, 3) and picture.std() > 10
     env.close()
 
 
 def test_the_default_view_of_a_scene_with_its_own_robot():
-    env = mjs.make_vec(Cart(), num_envs=2, **SMALL)
+    env = mjs.make_vec(Cart(), num_envs=2, **{**SMALL, "width": 320, "height": 200})
     env.reset(seed=1)
     first = env.render()
-    assert len(first) == 2 and first[0].std() > 10
+    assert len(first) == 2 and (first[0].max(2) > 20).sum() > 100  # a small cart on a rail, without a light
     for _ in range(15):
         env.step(np.ones((2, 1)))
     assert (env.render()[0] != first[0]).any()
