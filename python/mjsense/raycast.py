@@ -5,7 +5,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from mjsense import _core
 from mjsense._arguments import checked
@@ -47,7 +47,7 @@ class LidarSensor(RayCastSensor):
 
     def write_point_cloud(self, path: str | Path, world: int = 0) -> None:
         """The returns of one world, in the sensor's frame, as .ply or .pcd."""
-        data = self.data
+        data: Any = self.data
         if not 0 <= world < len(data.points):
             raise ValueError(f"world {world}: must be in [0, {len(data.points)})")
         _core.write_point_cloud(str(path), data.points[world], data.intensity[world], data.distances[world])
