@@ -115,6 +115,16 @@ void bind_robot(nb::module_& m) {
         return std::string(embedded_file("robots/" + name + "/robot.toml"));
       },
       "The robot.toml of one of ours.");
+  m.def(
+      "robot_python_sensors",
+      [](const std::string& name_or_path) {
+        nb::list out;
+        for (const PythonSensorRef& sensor : robot_cfg(name_or_path).python_sensors)
+          out.append(nb::make_tuple(sensor.name, sensor.class_name, sensor.args));
+        return out;
+      },
+      "(name, 'module:Class', arguments as JSON) of the sensors of a robot that are written in "
+      "Python.");
   nb::class_<PyRobot>(m, "Robot", "A robot, as C++ sees it.")
       .def(nb::init<const std::string&>(), nb::arg("name_or_path"))
       .def_prop_ro("name", [](const PyRobot& r) { return r.cfg().name; })

@@ -29,8 +29,10 @@ namespace mjsense::python {
 
 namespace {
 
-// Objects of Python's that play in a rollout: `parts` has a task or None, a policy or None, sensors,
-// a scene or None, and what their code depends on (RolloutCfg::code). C++ copies and destroys its configuration without the interpreter's lock.
+// The Python objects of a rollout. `parts` is a tuple: a task or None, a policy or None, sensors, a
+// scene or None, what their code depends on (RolloutCfg::code), sensors of the robot, and None or a
+// function that selects among [(sensor, owner)]. Sensors are a list, or a function that makes it for
+// the simulation. C++ copies and destroys its configuration without the interpreter's lock.
 class Parts {
  public:
   Parts(nb::object parts, nb::object make_simulation)
@@ -39,7 +41,9 @@ class Parts {
         policy_(nb::object(parts[1])),
         sensors_(nb::object(parts[2])),
         scene_(nb::object(parts[3])),
-        code_(nb::cast<decltype(code_)>(parts[4])) {}
+        code_(nb::cast<decltype(code_)>(parts[4])),
+        robot_sensors_(nb::object(parts[5])),
+        select_(nb::object(parts[6])) {}
 
   const std::shared_ptr<PythonHost>& host() const { return host_; }
 
@@ -64,10 +68,24 @@ class Parts {
         return read_scene_file(nb::borrow(scene.get()), host);
       };
     }
-    if (nb::len(sensors_.get()) > 0) {
-      cfg.more_sensors = [sensors = sensors_, host = host_](Rollout& rollout) {
+    const auto members = [host = host_](const Held& sensors) {
+      return [sensors, host](Rollout& rollout) {
         nb::gil_scoped_acquire lock;
         return host->members(sensors.get(), rollout.simulation_ptr());
+      };
+    };
+    const auto are_there = [](const Held& sensors) {
+      return PyCallable_Check(sensors.get().ptr()) || nb::len(sensors.get()) > 0;
+    };
+    if (are_there(sensors_)) cfg.more_sensors = members(sensors_);
+    if (are_there(robot_sensors_)) cfg.robot_sensors = members(robot_sensors_);
+    if (!select_.get().is_none()) {
+      cfg.edit_suite = [select = select_](SensorSuite& suite) {
+        nb::gil_scoped_acquire lock;
+        nb::list known;
+        for (const std::string& name : suite.names())
+          known.append(nb::make_tuple(name, suite.owner(name)));
+        suite.select(nb::cast<std::vector<std::string>>(nb::borrow(select.get())(known)));
       };
     }
     cfg.making = [host = host_](Rollout& rollout) { host->set_rollout(rollout); };
@@ -94,6 +112,7 @@ class Parts {
 
   Held task_, policy_, sensors_, scene_;
   decltype(RolloutCfg::code) code_;
+  Held robot_sensors_, select_;
 };
 
 nb::dict progress_dict(const RecordProgress& p) {
@@ -172,6 +191,7 @@ class PyRollout {
       : parts_(objects, make_simulation), turns_(parts_.host()->turns()) {
     refuse_python_callbacks();
     RolloutCfg cfg;
+    cfg.default_view = nb::cast<bool>(options.attr("pop")("default_view", false));
     read_options(options, struct_of<RolloutCfg>(), &cfg);
     parts_.join(cfg);
     nb::gil_scoped_release unlock;

@@ -195,6 +195,16 @@ void bind_scene(nb::module_& m) {
   nb::class_<Scene>(m, "Scene", "The C++ scene.")
       .def_static("make", &make_scene, nb::arg("config"), nb::arg("spec"), nb::arg("sensors"),
                   nb::arg("edit"))
+      .def(
+          "set_options",
+          [](Scene& s, nb::handle config, std::uintptr_t copy) {
+            OptionsCfg options;
+            read_struct(config, options);
+            s.set_options(options);
+            reinterpret_cast<mjModel*>(copy)->opt = s.model()->opt;
+          },
+          nb::arg("config"), nb::arg("copy"),
+          "Replaces the physics options, also of a copy of the model at this address.")
       .def("to_xml", &Scene::to_xml)
       .def("assets",
            [](const Scene& s) {

@@ -54,14 +54,18 @@ _KINDS: dict[str, tuple[Callable[[Any], bool], str]] = {
     "Sequence[str]": (lambda value: _is_list(value) and all(isinstance(v, str) for v in value), "a sequence of str"),
     "Sequence": (_is_list, "a sequence"),
     "Iterable": (_is_list, "a sequence"),
-    "Tasks": (lambda value: isinstance(value, str) or callable(value) or _is_a(value, "Task"), "a mjsense.Task or the name of one"),
+    "Tasks": (lambda value: isinstance(value, str) or callable(value) or _is_a(value, "Task") or hasattr(value, "_mjs_compose"), "a mjsense.Task or the name of one"),
     "Policies": (
-        lambda value: value is None or isinstance(value, str) or callable(value) or _is_a(value, "Policy"),
+        lambda value: value is None or isinstance(value, str) or callable(value) or _is_a(value, "Policy") or hasattr(value, "_mjs_policy"),
         "a mjsense.Policy, a function, or the name of one",
     ),
     "Scenes": (
         lambda value: isinstance(value, (str, PurePath)) or callable(value) or _is_a(value, "SceneFileCfg"),
         "the name or file of a scene, a mjsense.SceneFileCfg, or a function that makes a mjsense.SceneCfg",
+    ),
+    "Robots": (
+        lambda value: isinstance(value, (str, PurePath)) or _is_a(value, "Robot"),
+        "the name of a robot, the path of its .toml, or a mjsense.Robot",
     ),
     "Mapping": (lambda value: hasattr(value, "keys"), "a mapping"),
     "dict": (lambda value: isinstance(value, dict), "a dict"),
@@ -120,6 +124,7 @@ def checked(target: T, owner: str = "") -> T:
     checks = {name: _check_of(place, name, p.annotation) for name, p in parameters.items() if p.kind is not p.VAR_KEYWORD}
     if not any(checks.values()):
         return target
+    closed = all(p.kind is not p.VAR_KEYWORD for p in parameters.values())
     positional = [checks.get(name) for name, p in parameters.items() if p.kind is p.POSITIONAL_OR_KEYWORD]
 
     @functools.wraps(function)
@@ -128,6 +133,10 @@ def checked(target: T, owner: str = "") -> T:
             if check is not None:
                 check(value)
         for name, value in kwargs.items():
+            if closed and name not in checks:
+                near = difflib.get_close_matches(name, checks, 3)
+                hint = f"; did you mean {' or '.join(map(repr, near))}?" if near else ""
+                raise TypeError(f"{place} got an unexpected keyword argument '{name}'{hint}")
             check = checks.get(name)
             if check is not None:
                 check(value)

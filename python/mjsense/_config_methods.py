@@ -113,10 +113,18 @@ class SceneCfg(Config):
 
 
 class SensorCfg(Config):
+    name: str
+
+    def __post_init__(self) -> None:
+        if not hasattr(self, "build"):
+            super().__post_init__()
+        elif not isinstance(self.name, str) or not self.name:
+            raise TypeError(f"{type(self).__name__}: name must be a str that is not empty, not {self.name!r}")
+
     @property
     def prefixed_name(self) -> str:
         """Key in the scene's registry."""
-        return _core.cfg_key(self)
+        return self.name if hasattr(self, "build") else _core.cfg_key(self)
 
 
 class RayPattern(Config):

@@ -17,9 +17,9 @@ def env_id(task: str, robot: str | None = None) -> str:
 
 
 def register(task: str, robot: str | None = None) -> None:
-    """Registers a task, if gymnasium can have its name and has not got it; its options are those of :func:`mjsense.make` and :func:`mjsense.make_vec`."""
-    if not re.fullmatch(r"\w+", task) or env_id(task, robot) in gymnasium.registry:
-        return  # a name that gymnasium has no place for
+    """Registers a task, unless its name is outside gymnasium's grammar or registered already; its options are those of :func:`mjsense.make` and :func:`mjsense.make_vec`."""
+    if not re.fullmatch(r"[\w.-]+", task) or env_id(task, robot) in gymnasium.registry:
+        return
     kwargs = {"task": task} if robot is None else {"task": task, "robot": robot}
     gymnasium.register(
         env_id(task, robot), entry_point="mjsense.env:make", vector_entry_point="mjsense.vector:make_vec", kwargs=kwargs, order_enforce=False)

@@ -3,7 +3,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 from typing import TYPE_CHECKING, Any
 
 from mjsense.native_sensor import NativeSensor
@@ -21,10 +21,10 @@ def member(thing: Any) -> Any:
     return sensor
 
 
-def prepare(sim: Simulation, sensors: Iterable[Any]) -> list[Any]:
+def prepare(sim: Simulation, sensors: Iterable[Any] | Callable[[Simulation], Iterable[Any]]) -> list[Any]:
     """What C++ adds to the suite: a Sensor, or the handle of one that it computes itself. The simulation keeps them alive."""
     members = []
-    for sensor in map(member, sensors):
+    for sensor in map(member, sensors(sim) if callable(sensors) else sensors):
         if not isinstance(sensor, Sensor):
             members.append(sensor._make(sim))
             continue

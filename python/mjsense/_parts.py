@@ -3,15 +3,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Iterator
 from pathlib import Path
-from types import NoneType
 from typing import Any
 
 from mjsense._code_checksums import checksums
 from mjsense._members import member
 from mjsense.configs import SceneCfg, SceneFileCfg
 from mjsense.policy import Policy, policy_of
+from mjsense.robot import Robot, robot_of
 from mjsense.task import Task, task_of
 
 Tasks = str | Task | type[Task] | Callable[[], Task]
@@ -21,30 +21,70 @@ Policies = str | Policy | type[Policy] | Callable[[dict[str, Any]], Any] | None
 Scenes = str | Path | SceneFileCfg | Callable[[], SceneCfg]
 """A scene: its name, its file, what such a file would say, or a function that makes its models."""
 
-Parts = tuple[Task | None, Policy | None, list[Any], SceneFileCfg | None, dict[str, dict[str, str]]]
+Robots = str | Path | Robot
+"""A robot: its registered name, the path of its .toml, or an object that may have sensors."""
+
+Code = dict[str, dict[str, str]]
+"""Owner -> what a recording compares of its code when it is resumed."""
+Select = Callable[[list[tuple[str, str]]], list[str]]
+Parts = tuple[Task | None, Policy | None, Any, SceneFileCfg | None, Code, list[Any], Select | None]
 
 
 def parts_of(options: dict[str, Any], sensors: Iterable[Any]) -> Parts:
-    """(task, policy, sensors, scene) written in Python, and what a recording compares of their code when it is resumed; the options
-    get the names of all."""
+    """(task, policy, sensors, scene, code, the robot's sensors, selection of the suite) made in Python; the options get the names of
+    all."""
+    composed = _composed(options)
     options["task"], task = task_of(options["task"])
     options["policy"], policy = policy_of(options["policy"])
     robot = options["robot"]
-    if robot is None:
+    if robot is None and composed is not None:
+        robot = composed.robot or "auto"
+    elif robot is None:
         robot = task.robot if task is not None else "auto"
-        if not isinstance(robot, (str, Path, NoneType)):
-            raise TypeError(f"{type(task).__name__}.robot is {robot!r}: must be the name of a robot, the path of its .toml, or None")
-    options["robot"] = "" if robot is None else str(robot)
+    place = f"{type(task).__name__}.robot" if options["robot"] is None else "robot"
+    options["robot"], robot_sensors = robot_of(robot, place)
     options["scene"], scene = scene_of(options["scene"])
     for part in (task, policy):
         for sensor in part._mjs_make_sensors() if part else ():
             member(sensor)
-    members = [member(sensor) for sensor in sensors]
-    code: dict[str, dict[str, str]] = {}
+    given = [member(sensor) for sensor in sensors]
+    of_robot = [member(sensor) for sensor in robot_sensors]
+    code: Code = {}
     if "resume" in options:
-        owners = {"task": task, "policy": policy, **{f"sensor '{sensor.uuid}'": sensor for sensor in members}}
+        owners = {"task": composed or task, "policy": policy, **{f"sensor '{sensor.uuid}'": sensor for sensor in (*given, *of_robot)}}
         code = {place: checksums(owner, place, options["resume"]) for place, owner in owners.items() if owner is not None}
-    return task, policy, members, scene, code
+    if composed is None or not options.get("use_sensors", True):
+        return task, policy, given, scene, code, of_robot, None
+    return task, policy, Composition(composed, given), scene, code, of_robot, composed._mjs_select
+
+
+class Composition:
+    """The sensors that a task composes once its simulation exists, and those of the call."""
+
+    def __init__(self, task: Any, given: list[Any]) -> None:
+        self._task, self._given = task, given
+        self.made: list[Any] = []
+
+    def __call__(self, sim: Any) -> list[Any]:
+        self.made = [*self._task._mjs_compose(sim), *self._given]
+        return self.made
+
+    def __iter__(self) -> Iterator[Any]:
+        return iter(self.made)
+
+
+def _composed(options: dict[str, Any]) -> Any:
+    """The task of ``mjsense.compat.molmospaces``, if it is one; the options then name the task that is played, and its policy."""
+    task = options["task"]
+    if not hasattr(task, "_mjs_compose"):
+        return None
+    task = task() if isinstance(task, type) else task
+    options["task"] = task._mjs_name()
+    if task._registered is not None and options["policy"] in (None, "planner"):
+        options["policy"] = task._registered
+    if not task._mjs_uses_sensors():
+        options["use_sensors"] = False
+    return task
 
 
 def scene_of(scene: Scenes) -> tuple[str, SceneFileCfg | None]:

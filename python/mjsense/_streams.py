@@ -11,10 +11,10 @@ Streams = Mapping[str, tuple[str, Any, Any]]
 """stream -> (sensor, spec, rows)"""
 
 
-def choose_streams(wanted: Sequence[str] | None, streams: Streams) -> list[str]:
-    """Names of the streams to observe: those wanted, by their own names or their sensors'; else all that are numbers."""
+def choose_streams(wanted: Sequence[str] | None, streams: Streams, texts: Sequence[str] = ()) -> list[str]:
+    """Names of the streams to observe: those wanted, by their own names or their sensors'; else all that are numbers, and ``texts``."""
     if wanted is None:
-        plain = [name for name, (_, spec, array) in streams.items() if not spec.is_dict and array.size > 0]
+        plain = [name for name, (_, spec, array) in streams.items() if array.size > 0 and (not spec.is_dict or name in texts)]
         return [name for name in plain if not name.startswith(("sensor_param_", "object_image_points"))]
     names: list[str] = []
     for one in wanted:

@@ -3,16 +3,24 @@
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING
+
 import numpy as np
 
 from mjsense import _core
 from mjsense._arguments import checked
+from mjsense.data import ContactData
 from mjsense.native_sensor import NativeSensor
 
 
 @checked
 class ContactSensor(NativeSensor):
     """Contacts of its primaries; ``data`` is a :class:`mjsense.ContactData`."""
+
+    if TYPE_CHECKING:
+
+        @property
+        def data(self) -> ContactData: ...
 
     @property
     def primary_names(self) -> tuple[str, ...]:

@@ -3,14 +3,14 @@
 
 from __future__ import annotations
 
-from pathlib import Path
 from typing import Any
 
 import gymnasium
 import numpy as np
 
 from mjsense._arguments import Seed, checked
-from mjsense._parts import Tasks
+from mjsense._parts import Robots, Tasks
+from mjsense.scene import Scene
 from mjsense.vector import TaskVectorEnv, _row, make_vec
 
 
@@ -18,11 +18,12 @@ from mjsense.vector import TaskVectorEnv, _row, make_vec
 class TaskEnv(gymnasium.Env):
     """One world that plays episodes of a task; made by :func:`make`. It is a :class:`TaskVectorEnv` of one, without the batch axis."""
 
-    metadata = {"render_modes": ["rgb_array"]}
+    metadata = {"render_modes": ["rgb_array"], "render_fps": 15.15}
 
     def __init__(self, worlds: TaskVectorEnv) -> None:
         self.worlds = worlds
         """The vector environment behind it."""
+        self.metadata = {key: value for key, value in worlds.metadata.items() if key != "autoreset_mode"}
         self.render_mode = worlds.render_mode
         self.observation_space = worlds.single_observation_space
         self.action_space = worlds.single_action_space
@@ -54,8 +55,22 @@ class TaskEnv(gymnasium.Env):
             info["fault"] = infos["fault"][0]
         return _row(observation, 0), float(reward[0]), bool(terminated[0]), bool(truncated[0]), info
 
+    def expert_action(self) -> np.ndarray:
+        """What the policy of ``make(..., policy="planner")`` would do now, ``[n]``; ``expert_done`` is its word."""
+        return self.worlds.expert_action()[0]
+
+    @property
+    def expert_done(self) -> bool:
+        """Whether the policy said to be done, with the last :meth:`expert_action`."""
+        return bool(self.worlds.expert_done[0])
+
+    @property
+    def scene(self) -> Scene:
+        """``env.scene["name"]``: sensors and entities of the world."""
+        return self.sim.scene
+
     def render(self) -> Any:
-        """The first camera's picture."""
+        """The picture of the first camera in the observation; without one that of a default view."""
         pictures = self.worlds.render()
         return None if pictures is None else pictures[0]
 
@@ -65,7 +80,7 @@ class TaskEnv(gymnasium.Env):
 
 
 @checked
-def make(task: Tasks = "pick", robot: str | Path | None = None, **options: Any) -> TaskEnv:
+def make(task: Tasks = "pick", robot: Robots | None = None, **options: Any) -> TaskEnv:
     """A task as a gymnasium environment of one world. The options are those of :func:`make_vec`, but ``num_envs`` and
     ``autoreset_mode``: after the end of an episode call ``reset()``."""
     for word in ("num_envs", "autoreset_mode"):

@@ -1,6 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
 """Inertial measurement units."""
 
+from typing import TYPE_CHECKING
+
 from mjsense.configs import ImuAxis, ImuModel, ImuSensorCfg
 from mjsense.data import ImuData
 from mjsense.native_sensor import NativeSensor
@@ -8,6 +10,11 @@ from mjsense.native_sensor import NativeSensor
 
 class ImuSensor(NativeSensor):
     """An IMU; ``data`` is an :class:`mjsense.ImuData`."""
+
+    if TYPE_CHECKING:
+
+        @property
+        def data(self) -> ImuData: ...
 
 
 __all__ = ["ImuAxis", "ImuData", "ImuModel", "ImuSensor", "ImuSensorCfg"]

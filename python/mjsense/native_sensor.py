@@ -5,10 +5,11 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from types import MappingProxyType
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import gymnasium
 import numpy as np
+from numpy.typing import NDArray
 
 from mjsense import _core, _show, data
 from mjsense._arguments import KnownAttributes, checked
@@ -136,3 +137,8 @@ def box_of(spec: _core.SensorSpec) -> gymnasium.spaces.Box:
 
 class BuiltinSensor(NativeSensor):
     """One of MuJoCo's own sensors; data is float32 ``[B, dim]``."""
+
+    if TYPE_CHECKING:
+
+        @property
+        def data(self) -> NDArray[np.float32]: ...

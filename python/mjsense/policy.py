@@ -170,8 +170,10 @@ def policy_of(policy: Any) -> tuple[str, Policy | None]:
         if policy not in _POLICIES:
             return policy, None
         policy = _POLICIES[policy]()
-    if isinstance(policy, type) and issubclass(policy, Policy):
+    if isinstance(policy, type) and (issubclass(policy, Policy) or hasattr(policy, "_mjs_policy")):
         policy = policy()
+    if hasattr(policy, "_mjs_policy"):  # of mjsense.compat.molmospaces
+        policy = policy._mjs_policy()
     if not isinstance(policy, Policy):
         if not callable(policy):
             names = ", ".join(policy_names())

@@ -5,15 +5,21 @@ from __future__ import annotations
 
 from dataclasses import replace
 from pathlib import Path
+from typing import TYPE_CHECKING, Any
 
 from mjsense import _core
 from mjsense._arguments import checked
-from mjsense.data import CameraData
+from mjsense.data import CameraData, RayCastData
 from mjsense.native_sensor import NativeSensor
 
 
 class RayCastSensor(NativeSensor):
     """Rays from frames; ``data`` is a :class:`mjsense.RayCastData`."""
+
+    if TYPE_CHECKING:
+
+        @property
+        def data(self) -> RayCastData: ...
 
     @property
     def num_frames(self) -> int:
@@ -41,7 +47,7 @@ class LidarSensor(RayCastSensor):
 
     def write_point_cloud(self, path: str | Path, world: int = 0) -> None:
         """The returns of one world, in the sensor's frame, as .ply or .pcd."""
-        data = self.data
+        data: Any = self.data
         if not 0 <= world < len(data.points):
             raise ValueError(f"world {world}: must be in [0, {len(data.points)})")
         _core.write_point_cloud(str(path), data.points[world], data.intensity[world], data.distances[world])

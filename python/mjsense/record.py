@@ -10,7 +10,7 @@ from typing import Any, Literal
 
 from mjsense import _core
 from mjsense._arguments import Seed, checked
-from mjsense._parts import Policies, Scenes, Tasks, parts_of
+from mjsense._parts import Policies, Robots, Scenes, Tasks, parts_of
 from mjsense.assets import use_installed_meshes
 from mjsense.ffmpeg import use_installed_ffmpeg
 from mjsense.simulation import Simulation
@@ -59,7 +59,7 @@ class RecordSummary(RecordProgress):
 @checked
 def record(
     task: Tasks = "pick",
-    robot: str | Path | None = None,
+    robot: Robots | None = None,
     policy: Policies = "planner",
     *,
     out: str | Path,
@@ -104,7 +104,7 @@ def record(
 
     Args:
         task: a :class:`Task`, its class, or a registered name (:func:`task_names`).
-        robot: a registered name (:func:`robot_names`) or the path of a ``.toml``; None is the task's own.
+        robot: a registered name (:func:`robot_names`), the path of a ``.toml``, or a :class:`Robot`; None is the task's own.
         policy: a :class:`Policy`, a function ``obs -> actions``, or a registered name (:func:`policy_names`).
         out: folder.
         scene: a name, a file, a :class:`SceneFileCfg`, or a function that makes a :class:`SceneCfg`; by default the task's own.

@@ -3,8 +3,10 @@
 
 from __future__ import annotations
 
+import importlib
+import json
 import os
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -61,12 +63,21 @@ class RobotCamera:
 class Robot(KnownAttributes):
     """A robot: one of ours by its name (:func:`mjsense.robot_names`), or any by the path of its ``robot.toml``.
 
-    ``record`` and ``make_vec`` take the same name or path. Names of its elements are without the prefix ``robot_0/`` that they
+    ``record`` and ``make_vec`` take the same name or path, or this object. ``sensors`` are observed and recorded in every episode with
+    it; a subclass may override :meth:`create_robot_sensors` instead. Names of its elements are without the prefix ``robot_0/`` that they
     have in a task's scene. Poses are x, y, z (m) and a quaternion wxyz, in the robot's base frame.
     """
 
-    def __init__(self, name_or_path: str | Path) -> None:
-        self._core: Any = _core.Robot(os.fspath(name_or_path))
+    def __init__(self, name_or_path: str | Path, sensors: Iterable[Any] = ()) -> None:
+        """
+        Args:
+            name_or_path: one of ours, or the path of a ``robot.toml``.
+            sensors: that are written in Python, or of the core suite; those of the file are added.
+        """
+        self._given = os.fspath(name_or_path)
+        self._core: Any = _core.Robot(self._given)
+        self.sensors: list[Any] = list(sensors)
+        """Sensors of this robot besides those of its file."""
         self.name: str = self._core.name
         """What messages and recordings call it."""
         self.description: str = self._core.description
@@ -94,6 +105,10 @@ class Robot(KnownAttributes):
     def __repr__(self) -> str:
         groups = ", ".join(f"{g.name} {g.num_commands}" for g in self.groups.values())
         return f"<robot '{self.name}': {groups}>"
+
+    def create_robot_sensors(self) -> list[Any]:
+        """The robot's sensors that are made in Python: those of its file, then ``sensors``."""
+        return [*_sensors_of_file(self._given), *self.sensors]
 
     @property
     def joints(self) -> tuple[str, ...]:
@@ -154,3 +169,34 @@ class Robot(KnownAttributes):
                 )
             values.append(given.tolist())
         return values
+
+
+def robot_of(robot: Any, place: str = "robot") -> tuple[str, list[Any]]:
+    """(name or path for C++, the robot's sensors that are made in Python); "" for None."""
+    if robot is None:
+        return "", []
+    if isinstance(robot, Robot):
+        return robot._given, list(robot.create_robot_sensors())
+    if not isinstance(robot, (str, Path)):
+        raise TypeError(f"{place} is {robot!r}: must be the name of a robot, the path of its .toml, a mjsense.Robot, or None")
+    name = str(robot)
+    return name, _sensors_of_file(name) if name.endswith(".toml") else []
+
+
+def _sensors_of_file(name_or_path: str) -> list[Any]:
+    """Makes the sensors that a robot.toml names by ``class = "module:Class"``."""
+    sensors = []
+    for name, reference, args in _core.robot_python_sensors(name_or_path):
+        place = f"{name_or_path}: sensor '{name}': class '{reference}'"
+        module, attribute = reference.split(":")
+        try:
+            made: Any = getattr(importlib.import_module(module), attribute)
+        except (ImportError, AttributeError) as error:
+            raise ValueError(f"{place} is not found: {error}") from error
+        try:
+            sensor = made(**json.loads(args))
+        except TypeError as error:
+            raise TypeError(f"{place} cannot be made: {error}") from error
+        sensor.uuid = name
+        sensors.append(sensor)
+    return sensors

@@ -16,7 +16,7 @@ import numpy as np
 
 from mjsense import _core
 from mjsense._arguments import KnownAttributes, checked
-from mjsense.configs import SceneCfg, SensorCfg
+from mjsense.configs import MujocoCfg, SceneCfg, SensorCfg
 from mjsense.contact import ContactSensor
 from mjsense.errors import UnknownNameError
 from mjsense.imu import ImuSensor
@@ -89,6 +89,11 @@ class Scene(KnownAttributes):
             warnings.warn(text, stacklevel=3)
         self._register()
 
+    def _set_options(self, options: MujocoCfg) -> None:
+        """Replaces the physics options, also those of ``model``. No simulation may exist yet."""
+        self._core.set_options(options, self.model._address)
+        self.cfg.options = options
+
     @classmethod
     def _of(cls, core: Any, prepared: Scene | None = None) -> Scene:
         """Of a C++ scene that something else made, of what ``prepared`` said."""
@@ -109,14 +114,14 @@ class Scene(KnownAttributes):
             if own is not None:
                 own._mjs_handle = handle
         for sensor_cfg in self.cfg.sensors:
-            if isinstance(sensor_cfg, SensorCfg):
+            if isinstance(sensor_cfg, SensorCfg) and not hasattr(sensor_cfg, "build"):
                 self._sensors[sensor_cfg.prefixed_name].cfg = sensor_cfg
         self._complete = True
 
     @staticmethod
     def _item(sensor: Any) -> Any:
         """What C++ takes: a configuration it knows, or a Sensor."""
-        if isinstance(sensor, (SensorCfg, Sensor)):
+        if isinstance(sensor, Sensor):
             return sensor
         if hasattr(sensor, "build"):
             built = sensor.build()
@@ -124,6 +129,8 @@ class Scene(KnownAttributes):
                 raise TypeError(f"{type(sensor).__name__}.build() must return a mjsense.Sensor, not {built!r}")
             built.uuid = getattr(sensor, "prefixed_name", "") or built.uuid or sensor.name
             return built
+        if isinstance(sensor, SensorCfg):
+            return sensor
         if hasattr(sensor, "get_observation") and not isinstance(sensor, NativeSensor):
             return as_sensor(sensor)
         raise TypeError(f"sensors: neither a sensor configuration nor a mjsense.Sensor: {sensor!r}")
@@ -140,6 +147,49 @@ class Scene(KnownAttributes):
         near = difflib.get_close_matches(str(key), names, 3)
         hint = f"Did you mean {' or '.join(map(repr, near))}?" if near else f"Available: {', '.join(names)}"
         raise UnknownNameError(f"Scene element '{key}' not found. {hint}")
+
+    def builtin(self, name: str) -> BuiltinSensor:
+        """``self[name]``, which is one of MuJoCo's own sensors; TypeError for another kind, as for all of these."""
+        return self._of_class(name, BuiltinSensor)
+
+    def contact(self, name: str) -> ContactSensor:
+        """``self[name]``, which is a contact sensor."""
+        return self._of_class(name, ContactSensor)
+
+    def raycast(self, name: str) -> RayCastSensor:
+        """``self[name]``, which casts rays."""
+        return self._of_class(name, RayCastSensor)
+
+    def terrain_height(self, name: str) -> TerrainHeightSensor:
+        """``self[name]``, which is a terrain height sensor."""
+        return self._of_class(name, TerrainHeightSensor)
+
+    def lidar(self, name: str) -> LidarSensor:
+        """``self[name]``, which is a lidar."""
+        return self._of_class(name, LidarSensor)
+
+    def camera(self, name: str) -> CameraSensor:
+        """``self[name]``, which is a camera."""
+        return self._of_class(name, CameraSensor)
+
+    def imu(self, name: str) -> ImuSensor:
+        """``self[name]``, which is an IMU."""
+        return self._of_class(name, ImuSensor)
+
+    def entity(self, name: str) -> Entity:
+        """``self[name]``, which is an entity."""
+        if name not in self._sensors:
+            return self[name]
+        if name not in self.entities:
+            raise TypeError(f"'{name}' is a sensor, not an entity")
+        return self.entities[name]
+
+    def _of_class(self, name: str, wanted: type[Any]) -> Any:
+        found = self[name]
+        if not isinstance(found, wanted):
+            what = "an entity" if isinstance(found, Entity) else f"a {type(found).__name__}"
+            raise TypeError(f"'{name}' is {what}, not a {wanted.__name__}")
+        return found
 
     def __contains__(self, key: object) -> bool:
         return key in self._sensors or key in self.entities

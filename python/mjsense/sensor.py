@@ -7,7 +7,7 @@ import copy
 import json
 import weakref
 from collections.abc import Sequence
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Generic, TypeVar
 
 import gymnasium
 import numpy as np
@@ -24,6 +24,9 @@ if TYPE_CHECKING:
     from mjsense.simulation import Simulation
 
 
+T = TypeVar("T")
+
+
 def encode_json(value: Any) -> bytes:
     """JSON text as it stands in files: sorted keys, no blanks, ASCII; NumPy values as Python numbers and lists."""
     return json.dumps(value, sort_keys=True, separators=(",", ":"), default=_plain).encode("ascii")
@@ -35,8 +38,8 @@ def _plain(value: Any) -> Any:
     raise TypeError(f"{type(value).__name__} is no JSON value")
 
 
-class Sensor:
-    """Base class of sensors written in Python. Write one of these methods, whichever suits:
+class Sensor(Generic[T]):
+    """Base class of sensors written in Python; ``Sensor[T]`` says of which type ``data`` is. Write one of these methods, whichever suits:
 
     - ``compute(sim)`` returns the values of all worlds, ``[B, ...]``; ``compute(sim, world_ids)`` those of these worlds, in their order;
     - ``_compute_data()`` the same as ``compute(sim)``, without an argument (as in mjlab);
@@ -158,7 +161,7 @@ class Sensor:
         return sim
 
     @property
-    def data(self) -> Any:
+    def data(self) -> T:
         """The present value, of all worlds: an array ``[B, ...]``, a nested dict of such, a list of dicts by world (is_dict)."""
         if self._mjs_core is None:
             raise RuntimeError(f"sensor '{self.uuid}' has no data yet: it belongs to no simulation")

@@ -5,10 +5,11 @@ from __future__ import annotations
 
 import difflib
 from collections.abc import Sequence
-from typing import Any
+from typing import Any, overload
 
 import mujoco
 import numpy as np
+from numpy.typing import NDArray
 
 from mjsense import _core
 from mjsense._arguments import KnownAttributes, Seed, checked
@@ -40,14 +41,24 @@ _FIXED = {
 _STATE = ("qpos", "qvel", "act", "ctrl", "qfrc_applied", "xfrc_applied", "mocap_pos", "mocap_quat", "eq_active", "userdata")
 
 
-def _state_property(name: str, text: str) -> property:
-    def get(self: Simulation) -> np.ndarray:
-        return self._component(name)
+class _State:
+    """A part of the state as an attribute of a simulation: the live array ``[B, n]``; assigning writes into it."""
 
-    def put(self: Simulation, value: Any) -> None:
-        self._component(name)[...] = value
+    def __init__(self, text: str) -> None:
+        self.__doc__ = text + " Live, float64; call forward() after writing."
 
-    return property(get, put, doc=text + " Live, float64; call forward() after writing.")
+    def __set_name__(self, owner: type, name: str) -> None:
+        self._name = name
+
+    @overload
+    def __get__(self, sim: None, owner: type) -> _State: ...
+    @overload
+    def __get__(self, sim: Simulation, owner: type) -> NDArray[np.float64]: ...
+    def __get__(self, sim: Simulation | None, owner: type) -> _State | NDArray[np.float64]:
+        return self if sim is None else sim._component(self._name)
+
+    def __set__(self, sim: Simulation, value: Any) -> None:
+        sim._component(self._name)[...] = value
 
 
 @checked
@@ -193,22 +204,22 @@ class Simulation(KnownAttributes):
             self._core.invalidate(_ids(world_ids))
 
     @property
-    def state(self) -> np.ndarray:
+    def state(self) -> NDArray[np.float64]:
         """The whole integration state, one row a world (mjSTATE_INTEGRATION). Live, float64; copy it to keep it."""
         if "state" not in self._views or self._core.closed:
             self._views["state"] = self._core.state()
         return self._views["state"]
 
-    qpos = _state_property("qpos", "Joint positions [B, nq] (m, rad).")
-    qvel = _state_property("qvel", "Joint velocities [B, nv] (m/s, rad/s).")
-    act = _state_property("act", "Actuator activations [B, na].")
-    ctrl = _state_property("ctrl", "Controls [B, nu].")
-    qfrc_applied = _state_property("qfrc_applied", "Applied generalized forces [B, nv].")
-    xfrc_applied = _state_property("xfrc_applied", "Applied forces (N) and torques (N m) [B, nbody, 6], world frame.")
-    mocap_pos = _state_property("mocap_pos", "Mocap positions [B, nmocap, 3] (m).")
-    mocap_quat = _state_property("mocap_quat", "Mocap orientations [B, nmocap, 4].")
-    eq_active = _state_property("eq_active", "Which equality constraints are active [B, neq].")
-    userdata = _state_property("userdata", "User data [B, nuserdata].")
+    qpos = _State("Joint positions [B, nq] (m, rad).")
+    qvel = _State("Joint velocities [B, nv] (m/s, rad/s).")
+    act = _State("Actuator activations [B, na].")
+    ctrl = _State("Controls [B, nu].")
+    qfrc_applied = _State("Applied generalized forces [B, nv].")
+    xfrc_applied = _State("Applied forces (N) and torques (N m) [B, nbody, 6], world frame.")
+    mocap_pos = _State("Mocap positions [B, nmocap, 3] (m).")
+    mocap_quat = _State("Mocap orientations [B, nmocap, 4].")
+    eq_active = _State("Which equality constraints are active [B, neq].")
+    userdata = _State("User data [B, nuserdata].")
 
     @property
     def env(self) -> PeerEnv:
@@ -223,7 +234,7 @@ class Simulation(KnownAttributes):
         return DerivedFields(self)
 
     @property
-    def time(self) -> np.ndarray:
+    def time(self) -> NDArray[np.float64]:
         """Simulation time of each world since its reset, s ``[B]``; counted in whole substeps."""
         return np.array(self._core.times())
 
@@ -364,7 +375,7 @@ class Simulation(KnownAttributes):
                 raise ValueError(f"world id {world}: must be in [0, {self.num_worlds})")
         return np.array(ids, dtype=int)
 
-    def _component(self, name: str) -> np.ndarray:
+    def _component(self, name: str) -> NDArray[np.float64]:
         view = self._views.get(name)
         if view is None or self._core.closed:
             view = self._views[name] = self._core.component(name)

@@ -4,7 +4,6 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
-from pathlib import Path
 from typing import Any, Literal
 
 import gymnasium
@@ -15,12 +14,16 @@ from gymnasium.vector.utils import batch_space
 
 from mjsense import _core
 from mjsense._arguments import Seed, checked
-from mjsense._parts import Policies, Scenes, Tasks, parts_of
+from mjsense._parts import Policies, Robots, Scenes, Tasks, parts_of
 from mjsense._streams import choose_streams, nest, stream_path
 from mjsense.assets import use_installed_meshes
 from mjsense.native_sensor import box_of
+from mjsense.scene import Scene
 from mjsense.simulation import Simulation
 from mjsense.task import group_slices
+
+_VIEW = "default_view"
+"""Sensor of the scene that is there where a render_mode is."""
 
 
 @checked
@@ -42,7 +45,7 @@ class TaskVectorEnv(VectorEnv):
     ``infos["success"]`` is bool ``[num_envs]``; ``infos["_success"]`` says for which worlds, as gymnasium's masks do.
     """
 
-    metadata = {"render_modes": ["rgb_array"], "autoreset_mode": AutoresetMode.NEXT_STEP}
+    metadata = {"render_modes": ["rgb_array"], "render_fps": 15.15, "autoreset_mode": AutoresetMode.NEXT_STEP}
 
     def __init__(
         self,
@@ -55,16 +58,17 @@ class TaskVectorEnv(VectorEnv):
         if render_mode not in (None, "rgb_array"):
             raise ValueError(f"render_mode must be None or 'rgb_array', not {render_mode!r}")
         self.autoreset_mode = _autoreset_mode(autoreset_mode)
-        self.metadata = {**self.metadata, "autoreset_mode": self.autoreset_mode}
         self.render_mode = render_mode
         self.num_envs = options["num_worlds"]
         self._closed = False
         self._seed = options["seed"]
         if options["meshes"] == "real":
             use_installed_meshes()
+        options["default_view"] = render_mode is not None
         self._rollout: Any = _core.Rollout(options, objects, Simulation._of)
+        self.metadata = {**self.metadata, "autoreset_mode": self.autoreset_mode, "render_fps": self._rollout.fps}
         streams = {spec.name: (sensor, spec, array) for sensor, spec, array in self._rollout.streams()}
-        names = choose_streams(observations, streams)
+        names = choose_streams(observations, streams, [sensor.uuid for sensor in objects[2]])
         self.rows: dict[str, np.ndarray] = {name: streams[name][2] for name in names}
         """The streams' own arrays [B, ...], as they are now."""
         self.specs: dict[str, _core.SensorSpec] = {name: streams[name][1] for name in names}
@@ -72,6 +76,8 @@ class TaskVectorEnv(VectorEnv):
         self._paths = {name: stream_path(streams[name][0], name) for name in names}
         self.sim: Simulation = self._rollout.simulation()
         """The worlds. Read them as you like; the task writes them."""
+        if render_mode is not None and self.sim.model.cam_bodyid[self.sim.model.camera(_VIEW).id] == 0:
+            self._place_view()
         self.horizon: int = self._rollout.horizon
         """Control steps after which an episode is truncated."""
         self._next_episode = 0
@@ -214,13 +220,31 @@ class TaskVectorEnv(VectorEnv):
         return nest(self._paths, {name: rows.copy() for name, rows in self.rows.items()})
 
     def render(self) -> tuple[np.ndarray, ...] | None:
-        """The first camera's picture of every world."""
+        """The picture of the first camera in the observation, of every world; without one that of a default view."""
         if self.render_mode is None:
             return None
-        pictures = [rows for name, rows in self.rows.items() if rows.ndim == 4 and rows.dtype == np.uint8]
-        if not pictures:
-            raise RuntimeError("this environment observes no camera")
-        return tuple(pictures[0].copy())
+        self._check_open()
+        pictures = [rows for rows in self.rows.values() if rows.ndim == 4 and rows.dtype == np.uint8]
+        return tuple((pictures[0] if pictures else self.sim.scene[_VIEW].data.rgb).copy())
+
+    def _place_view(self) -> None:
+        """In a scene with its own robot the default view is that of MuJoCo's free camera."""
+        model = self.sim.model
+        azimuth, elevation = np.radians([model.vis.global_.azimuth, model.vis.global_.elevation])
+        forward = np.array([np.cos(elevation) * np.cos(azimuth), np.cos(elevation) * np.sin(azimuth), np.sin(elevation)])
+        right = np.array([np.sin(azimuth), -np.cos(azimuth), 0])
+        quat = np.zeros(4)
+        mujoco.mju_mat2Quat(quat, np.stack([right, np.cross(right, forward), -forward], axis=1).ravel())
+        camera = model.camera(_VIEW).id
+        for field, value in (("cam_pos", model.stat.center - 1.5 * model.stat.extent * forward), ("cam_quat", quat)):
+            values = self.sim.model_field(field).copy()
+            values[:, camera] = value
+            self.sim.randomize(field, values)
+
+    @property
+    def scene(self) -> Scene:
+        """``env.scene["name"]``: sensors and entities of the worlds."""
+        return self.sim.scene
 
     def _check_open(self) -> None:
         if self._closed:
@@ -254,7 +278,7 @@ def _space(boxes: dict[str, Any]) -> gymnasium.spaces.Dict:
 @checked
 def make_vec(
     task: Tasks = "pick",
-    robot: str | Path | None = None,
+    robot: Robots | None = None,
     *,
     scene: Scenes = "",
     policy: Policies = None,
@@ -286,11 +310,11 @@ def make_vec(
 
     Args:
         task: a :class:`Task`, its class, or a registered name (:func:`task_names`).
-        robot: a registered name (:func:`robot_names`) or the path of a ``.toml``; None is the task's own.
+        robot: a registered name (:func:`robot_names`), the path of a ``.toml``, or a :class:`Robot`; None is the task's own.
         scene: a name, a file, a :class:`SceneFileCfg`, or a function that makes a :class:`SceneCfg`; by default the task's own.
         policy: what :meth:`TaskVectorEnv.expert_action` asks: a :class:`Policy`, a function or a registered name.
         observations: names of sensors ("qpos") or of single streams ("qpos/arm") to observe; if not given, all that are numbers.
-        sensors: of your own, as in :func:`record`: observed with the suite. An error of one in a world ends that world's episode:
+        sensors: of your own, as in :func:`record`: observed with the suite, dict sensors as JSON text (uint8). An error of one in a world ends that world's episode:
             ``truncated``, and ``info["fault"]`` says why.
 
         Options:

@@ -19,3 +19,10 @@ def matrix_of(pos: np.ndarray, mat: np.ndarray) -> np.ndarray:
     out = np.eye(4)
     out[:3, :3], out[:3, 3] = mat.reshape(3, 3), pos
     return out
+
+
+def pose_of_matrix(matrix: np.ndarray) -> list[float]:
+    """Position and quaternion (wxyz) of a 4x4."""
+    quat = np.empty(4)
+    mujoco.mju_mat2Quat(quat, np.ascontiguousarray(matrix[:3, :3]).ravel())
+    return [*matrix[:3, 3].tolist(), *quat.tolist()]

@@ -49,6 +49,8 @@ class PeerTask:
         self.config = PeerConfig(self)
         """Of the experiment, as far as sensors read it."""
         self._policy: PeerPolicy | None = None
+        self._policies: Sequence[Any] = ()
+        """Of a policy with an instance for each world: these."""
 
     def __getattr__(self, name: str) -> Any:
         if name.startswith("_") or self._view.own is None:
@@ -65,7 +67,9 @@ class PeerTask:
         return self._view.last_action(self._world)
 
     @property
-    def _registered_policy(self) -> PeerPolicy | None:
+    def _registered_policy(self) -> Any:
+        if self._policies:
+            return self._policies[self._world]
         if not self._view.has_policy or self._view.plan(0) is None:
             return None
         policy.register()

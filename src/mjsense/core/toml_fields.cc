@@ -119,9 +119,14 @@ class Reader {
 
 }  // namespace
 
+void read_toml_table(const toml::table& table, const std::string& path, const StructDecl& decl,
+                     void* object, const std::string& inside) {
+  Reader(path).table(decl, object, table, inside);
+}
+
 void read_toml_fields(std::string_view text, const std::string& path, const StructDecl& decl,
                       void* object) {
-  Reader(path).table(decl, object, parse_toml(text, path), "");
+  read_toml_table(parse_toml(text, path), path, decl, object, "");
 }
 
 }  // namespace mjsense

@@ -26,6 +26,11 @@ toml::table parse_toml(std::string_view text, const std::string& path);
 // "x.toml:3": where a node stands.
 std::string toml_place(const std::string& path, const toml::node& node);
 
+// As read_toml_fields() of a whole file (core/toml_fields.h), of one table; `inside` is what messages
+// call it: "sensors[1]", "" at the top.
+void read_toml_table(const toml::table& table, const std::string& path, const StructDecl& decl,
+                     void* object, const std::string& inside);
+
 // A bool, number, text, path or word, or lists, arrays and optionals of them. False if the value is
 // of another type, or does not fit. ValueError, beginning with `place`, for a word that there is not.
 bool read_toml_value(const FieldType& type, void* out, const toml::node& node,

@@ -49,6 +49,7 @@ SceneCfg Task::whole_scene_cfg() const {
   } else {
     scene.entities.emplace_back(name, robot);
   }
+  scene.sensors.insert(scene.sensors.end(), cfg_.robot.sensors.begin(), cfg_.robot.sensors.end());
   if (cfg_.robot.edit_spec) {
     scene.spec_fn = [first = scene.spec_fn, edit = cfg_.robot.edit_spec](mjSpec* spec) {
       if (first) first(spec);

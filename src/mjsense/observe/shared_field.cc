@@ -4,6 +4,13 @@
 #include "mjsense/core/error.h"
 
 namespace mjsense {
+namespace {
+
+Stage stage_after(const Sensor& source) {
+  return source.stage() == Stage::kRow ? Stage::kRow : Stage::kPostCast;
+}
+
+}  // namespace
 
 SharedField::SharedField(std::string name, Sensor& source, std::string field,
                          std::function<void(SensorSpec&)> adapt)
@@ -12,8 +19,12 @@ SharedField::SharedField(std::string name, Sensor& source, std::string field,
       field_(std::move(field)),
       adapt_(std::move(adapt)) {}
 
-Stage SharedField::stage() const {
-  return source_->stage() == Stage::kRow ? Stage::kRow : Stage::kPostCast;
+Stage SharedField::stage() const { return stage_after(*source_); }
+Stage SharedSensor::stage() const { return stage_after(*source_); }
+
+void SharedSensor::initialize(const SensorInit& /*init*/) {
+  clear_fields();
+  for (Field& field : source_->fields()) share_field(field.name, field.spec, field);
 }
 
 void SharedField::initialize(const SensorInit& /*init*/) {

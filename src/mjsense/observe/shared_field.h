@@ -6,6 +6,7 @@
 #include <functional>
 #include <memory>
 #include <string>
+#include <utility>
 
 #include "mjsense/core/sensor.h"
 
@@ -27,6 +28,21 @@ class SharedField final : public Sensor {
   Sensor* source_;
   std::string field_;
   std::function<void(SensorSpec&)> adapt_;
+};
+
+// All fields of another sensor under another name; the rows are shared.
+class SharedSensor final : public Sensor {
+ public:
+  SharedSensor(std::string name, Sensor& source) : Sensor(std::move(name)), source_(&source) {}
+  std::string_view kind() const override { return "shared"; }
+  Stage stage() const override;
+  mjtStage needs() const override { return mjSTAGE_NONE; }
+  std::span<Sensor* const> inputs() const override { return {&source_, 1}; }
+  void initialize(const SensorInit& init) override;
+  void compute(const World& /*world*/) override {}
+
+ private:
+  Sensor* source_;
 };
 
 // A field of a camera as recordings have it: rgb and depth are videos.

@@ -9,8 +9,9 @@
 
 #include "mjsense/core/data_file.h"
 #include "mjsense/core/error.h"
-#include "mjsense/core/toml_fields.h"
+#include "mjsense/core/toml_value.h"
 #include "mjsense/robots/meshes.h"
+#include "mjsense/robots/sensor_tables.h"
 #include "mjsense/scene/parts.h"
 #include "mjsense/scene/spec.h"
 
@@ -106,7 +107,9 @@ RobotCfg parse_robot(std::string_view text, const std::string& path) {
   cfg.file = path;
   const std::string file = path.starts_with(kEmbedded) ? path.substr(kEmbedded.size()) : path;
   cfg.name = fs::path(file).parent_path().filename().string();
-  read_toml_fields(text, path, cfg);
+  toml::table table = parse_toml(text, path);
+  take_robot_sensors(table, path, cfg);
+  read_toml_table(table, path, struct_of<RobotCfg>(), &cfg, "");
   if (cfg.name.empty()) throw ValueError(fmt::format("{}: 'name' is empty", path));
   cfg.model.path = beside(path, cfg.mjcf);
   const std::string place = fmt::format("robot '{}'", cfg.name);

@@ -8,12 +8,14 @@
 
 #include <array>
 #include <functional>
+#include <memory>
 #include <optional>
 #include <string>
 #include <string_view>
 #include <vector>
 
 #include "mjsense/core/fields.h"
+#include "mjsense/core/sensor.h"
 #include "mjsense/robots/controllers/controller_cfg.h"
 #include "mjsense/scene/entity.h"
 
@@ -150,6 +152,13 @@ void visit_fields(V& v, MeshesCfg& c) {
   v("files", c.files, "Mesh file of each body.");
 }
 
+// A sensor that is a class of Python's.
+struct PythonSensorRef {
+  std::string name;
+  std::string class_name;  // "package.module:Class"
+  std::string args;        // keyword arguments of the class, a JSON object
+};
+
 struct RobotCfg {
   std::string name;
   std::string description;
@@ -166,6 +175,10 @@ struct RobotCfg {
   double opened = 0.15;        // fraction of its range that is open for the task `open`
   std::string env_state_name;  // of the row of env_states in MolmoSpaces' form; "": there is none
   int env_state_size = 0;      // its numbers; 0: what the groups need
+
+  // Sensors that episodes with this robot observe and record. Elements have their full names.
+  std::vector<std::shared_ptr<const SensorCfg>> sensors;
+  std::vector<PythonSensorRef> python_sensors;
 
   // What the file says where its model comes from; load_robot() makes `model` and `edit_spec` of it.
   std::string mjcf;

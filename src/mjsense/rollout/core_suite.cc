@@ -55,7 +55,8 @@ std::shared_ptr<Sensor> image_points(const Task& task, const std::vector<Recorde
 }  // namespace
 
 SensorSuite core_suite(const Task& task, const ActionLog& log,
-                       const std::vector<RecordedCamera>& cameras) {
+                       const std::vector<RecordedCamera>& cameras,
+                       std::span<const std::shared_ptr<Sensor>> robot_sensors) {
   const Robot& robot = task.robot();
   const RobotCfg& cfg = robot.cfg();
   const std::string of_task = fmt::format("task '{}'", task.name());
@@ -92,6 +93,7 @@ SensorSuite core_suite(const Task& task, const ActionLog& log,
   if (auto points = image_points(task, cameras)) suite.add(std::move(points), of_task);
   suite.extend(task.create_task_sensors(), of_task);
   suite.extend(robot.create_robot_sensors(), fmt::format("robot '{}'", robot.name()));
+  suite.extend(robot_sensors, fmt::format("robot '{}'", robot.name()));
   if (!task.objects(0).empty()) {
     suite.extend(finger_grasp_sensors(
                      robot, BodyRef([&task](int world) { return task.objects(world)[0].body; })),

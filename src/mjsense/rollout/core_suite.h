@@ -2,6 +2,8 @@
 #pragma once
 // The suite of an episode: what a policy observes and a recording holds, in its published order.
 
+#include <memory>
+#include <span>
 #include <string>
 #include <vector>
 
@@ -27,7 +29,9 @@ struct RecordedCamera {
 // task_info, actions/*, object_image_points, then the task's, the robot's and the policy's own
 // sensors. Names are unique; a clash names both owners. The sensors refer to task, log and cameras,
 // which live longer.
+// `robot_sensors` are those that the robot has besides its own model's.
 SensorSuite core_suite(const Task& task, const ActionLog& log,
-                       const std::vector<RecordedCamera>& cameras);
+                       const std::vector<RecordedCamera>& cameras,
+                       std::span<const std::shared_ptr<Sensor>> robot_sensors = {});
 
 }  // namespace mjsense

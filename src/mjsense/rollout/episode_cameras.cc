@@ -4,6 +4,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <cmath>
 
 #include "mjsense/cameras/load_cameras.h"
 #include "mjsense/core/error.h"
@@ -21,6 +22,11 @@ CameraMountCfg of_model(const CameraMount& mount, bool of_scene) {
   out.depth = mount.record_depth;
   out.image_points = mount.image_points;
   return out;
+}
+
+// The other side of a picture that keeps its aspect ratio: the nearest even number, as videos need.
+int scaled(int side, int other, int of) {
+  return std::max(2, 2 * static_cast<int>(std::lround(0.5 * side * other / of)));
 }
 
 }  // namespace
@@ -56,8 +62,14 @@ CameraSystem choose_cameras(const Task& task, const RolloutCfg& cfg) {
     system.cameras = std::move(chosen);
   }
   for (CameraMountCfg& camera : system.cameras) {
-    if (cfg.width) camera.width = cfg.width;
-    if (cfg.height) camera.height = cfg.height;
+    const int width = camera.width.value_or(system.width);
+    const int height = camera.height.value_or(system.height);
+    if (cfg.width || cfg.height) {
+      camera.width = cfg.width.value_or(0);
+      camera.height = cfg.height.value_or(0);
+      if (!cfg.width) camera.width = scaled(*cfg.height, width, height);
+      if (!cfg.height) camera.height = scaled(*cfg.width, height, width);
+    }
     camera.depth = camera.depth || cfg.depth;
     camera.segmentation = camera.segmentation || cfg.segmentation;
   }
@@ -100,6 +112,27 @@ CameraSensorCfg camera_sensor_cfg(const CameraSystem& system, int camera,
   if (recorded.depth) out.data_types.push_back("depth");
   out.use_shadows = cfg.shadows;
   out.samples = cfg.samples;
+  return out;
+}
+
+CameraSensorCfg default_view(const Task& task, const RolloutCfg& cfg) {
+  const RobotCfg& robot = task.cfg().robot;
+  CameraSensorCfg out;
+  out.name = kDefaultView;
+  out.width = cfg.width.value_or(robot.image_width);
+  out.height = cfg.height.value_or(robot.image_height);
+  out.use_shadows = cfg.shadows;
+  out.samples = cfg.samples;
+  if (robot.name.empty()) return out;
+  // m, in the robot's base frame: x ahead, z up.
+  const Vec3 eye{1.5, -1.2, 1.5}, target{0.4, 0, 0.6};
+  const Vec3 back = normalized(eye - target);
+  const Vec3 right = normalized(cross(Vec3{0, 0, 1}, back));
+  const Vec3 up = cross(back, right);
+  const double axes[9] = {right.x, up.x, back.x, right.y, up.y, back.y, right.z, up.z, back.z};
+  out.parent_body = std::string(Robot::kPrefix) + robot.base_body;
+  write_vec(eye, out.pos.data());
+  mju_mat2Quat(out.quat.data(), axes);
   return out;
 }
 

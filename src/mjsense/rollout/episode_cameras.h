@@ -27,4 +27,7 @@ CameraSensorCfg camera_sensor_cfg(const CameraSystem& system, int camera,
 // What orbiting cameras go round: the middle of the task's objects and of the robot's grippers.
 Vec3 middle_of(const Task& task, const World& world);
 
+// The camera of RolloutCfg::default_view.
+CameraSensorCfg default_view(const Task& task, const RolloutCfg& cfg);
+
 }  // namespace mjsense

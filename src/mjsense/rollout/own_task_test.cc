@@ -165,6 +165,17 @@ TEST_F(OwnTask, ItsSceneHasTheRobot) {
   EXPECT_NE(task->mark(0), task->mark(1));
 }
 
+TEST_F(OwnTask, TheRobotOfItsSceneIsTheDefault) {
+  RolloutCfg cfg = two_worlds();
+  cfg.policy = "";
+  cfg.make_task = [](TaskCfg wanted) { return std::make_unique<CartTask>(std::move(wanted)); };
+  ASSERT_EQ(cfg.robot, kTaskRobot);
+  Rollout rollout(cfg);
+  EXPECT_EQ(rollout.cfg().robot, "");
+  EXPECT_EQ(rollout.simulation().worlds().model()->nu, 1);
+  EXPECT_EQ(rollout.task().robot().group("joints").actuators.size(), 1u);
+}
+
 TEST_F(OwnTask, AllWorldsAreJudgedAtOnceAndActAtOnce) {
   Rollout rollout(two_worlds(), task, policy);
   start(rollout);

@@ -10,6 +10,7 @@
 
 #include "mjsense/core/error.h"
 #include "mjsense/core/row_error.h"
+#include "mjsense/observe/shared_field.h"
 #include "mjsense/rollout/action_sensors.h"
 #include "mjsense/rollout/episode_cameras.h"
 #include "mjsense/rollout/task_defaults.h"
@@ -34,6 +35,13 @@ TaskCfg task_cfg(const RolloutCfg& cfg) {
     out.ctrl_dt_ms = out.robot.ctrl_dt_ms;
     out.sim_dt_ms = out.robot.sim_dt_ms;
   }
+  if (!out.robot.python_sensors.empty() && !cfg.robot_sensors) {
+    const PythonSensorRef& sensor = out.robot.python_sensors.front();
+    throw ValueError(
+        fmt::format("robot '{}': sensor '{}' is the Python class '{}', which this program cannot "
+                    "run: call mjsense.record() or mjsense.make_vec() from Python",
+                    cfg.robot, sensor.name, sensor.class_name));
+  }
   out.scene = cfg.scene;
   out.make_scene = cfg.make_scene;
   if (cfg.meshes == "shapes") out.robot.edit_spec = {};
@@ -52,10 +60,22 @@ TaskCfg task_cfg(const RolloutCfg& cfg) {
   return out;
 }
 
+// Whoever composes the suite may bring sensors of their own under the names of the task's.
+void drop_of_task(SensorSuite& suite, std::span<const std::shared_ptr<Sensor>> others) {
+  std::vector<std::string> kept;
+  for (const std::string& name : suite.names()) {
+    const bool replaced = suite.owner(name).starts_with("task ") &&
+                          std::ranges::any_of(others, [&](auto& o) { return o->name() == name; });
+    if (!replaced) kept.push_back(name);
+  }
+  suite.select(kept);
+}
+
 }  // namespace
 
 RolloutCfg resolved(RolloutCfg cfg) {
-  if (cfg.robot == kTaskRobot) cfg.robot = default_robot(cfg.make_task ? "" : cfg.task);
+  // A task of the user's brings its robot in its scene.
+  if (cfg.robot == kTaskRobot) cfg.robot = cfg.make_task ? "" : default_robot(cfg.task);
   if (cfg.scene.empty() && !cfg.make_scene && !cfg.make_task)
     cfg.scene = default_scene(parts_of_task(cfg.task)[0]);
   return cfg;
@@ -123,6 +143,8 @@ void Rollout::make() {
     scene_cfg.sensors.push_back(std::make_shared<CameraSensorCfg>(
         camera_sensor_cfg(*camera_system_, static_cast<int>(i), cameras_[i], cfg_)));
   }
+  if (cfg_.default_view)
+    scene_cfg.sensors.push_back(std::make_shared<CameraSensorCfg>(default_view(*task_, cfg_)));
   auto scene = std::make_shared<Scene>(std::move(scene_cfg));
   simulation_ = std::make_shared<Simulation>(scene, SimulationCfg{.num_worlds = cfg_.num_worlds,
                                                                   .decimation = task_->decimation(),
@@ -141,9 +163,14 @@ void Rollout::make() {
   }
   if (policy_) task_->register_policy(*policy_);
   log_ = std::make_unique<ActionLog>(cfg_.num_worlds);
-  if (cfg_.use_sensors) suite_ = core_suite(*task_, *log_, cameras_);
-  if (cfg_.more_sensors) suite_.extend(cfg_.more_sensors(*this), "the caller");
+  if (cfg_.use_sensors) suite_ = core_suite(*task_, *log_, cameras_, robot_sensors());
+  if (cfg_.more_sensors) {
+    const auto sensors = cfg_.more_sensors(*this);
+    if (cfg_.edit_suite) drop_of_task(suite_, sensors);
+    suite_.extend(sensors, "the caller");
+  }
   if (cfg_.use_sensors) task_->edit_suite(suite_);
+  if (cfg_.edit_suite) cfg_.edit_suite(suite_);
   suite_.bind(*simulation_);
 
   actions_.resize(cfg_.num_worlds);
@@ -155,6 +182,19 @@ void Rollout::make() {
   ids_.reserve(cfg_.num_worlds);
   moving_.reserve(cfg_.num_worlds);
   if (cfg_.made) cfg_.made(*this);
+}
+
+// Those of its file, then those that Python makes.
+std::vector<std::shared_ptr<Sensor>> Rollout::robot_sensors() {
+  std::vector<std::shared_ptr<Sensor>> sensors;
+  for (const auto& cfg : task_->cfg().robot.sensors) {
+    sensors.push_back(
+        std::make_shared<SharedSensor>(cfg->name, simulation_->scene().sensor(cfg->key())));
+  }
+  if (cfg_.robot_sensors) {
+    for (auto& sensor : cfg_.robot_sensors(*this)) sensors.push_back(std::move(sensor));
+  }
+  return sensors;
 }
 
 Rollout::~Rollout() = default;

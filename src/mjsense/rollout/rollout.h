@@ -44,6 +44,10 @@ class Rollout;
 // are some.
 inline constexpr std::array<std::string_view, 3> kMeshes{"auto", "shapes", "real"};
 
+// A camera beside the robot that looks at what is in front of it. In a scene with its own robot it
+// stands at the origin until somebody places it.
+inline constexpr std::string_view kDefaultView = "default_view";
+
 // For RolloutCfg::robot: that of the task.
 inline constexpr std::string_view kTaskRobot = "auto";
 
@@ -76,9 +80,15 @@ struct RolloutCfg {
   // What these functions and `more_sensors` depend on: checksums of code and of the values that it
   // uses, by name, for "task", "policy", "sensor 'x'" ... A recording is resumed only with the same.
   std::map<std::string, std::map<std::string, std::string>> code;
+  // The scene has a further camera sensor, kDefaultView, which the suite does not contain.
+  bool default_view = false;
   // Makes further sensors for the suite, recorded like the others. The rollout is being made: task,
   // policy, simulation, cameras and the suite so far are there.
   std::function<std::vector<std::shared_ptr<Sensor>>(Rollout&)> more_sensors;
+  // Likewise the robot's sensors that are written in Python; they come before the policy's.
+  std::function<std::vector<std::shared_ptr<Sensor>>(Rollout&)> robot_sensors;
+  // Edits the suite last.
+  std::function<void(SensorSuite&)> edit_suite;
   // Called when there is nothing but task and policy, and once everything is there.
   std::function<void(Rollout&)> making, made;
 };
@@ -215,6 +225,7 @@ class Rollout {
   class EachActive;
   class Some;
   void make();
+  std::vector<std::shared_ptr<Sensor>> robot_sensors();
   std::span<const int> active_worlds();
   void move(std::span<const int> worlds, bool answers);
   void evaluate(std::span<const int> worlds);

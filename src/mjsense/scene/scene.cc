@@ -209,6 +209,16 @@ const std::vector<std::unique_ptr<Sensor>>& Scene::sensors() const { return impl
 const std::vector<Entity>& Scene::entities() const { return impl_->entities; }
 const std::vector<std::string>& Scene::warnings() const { return impl_->warnings; }
 
+void Scene::set_options(const OptionsCfg& options) {
+  if (!impl_->claim.expired())
+    throw RuntimeError("scene: its options cannot change once it belongs to a simulation");
+  mjOption option;
+  mj_defaultOption(&option);
+  apply_options(options, option);
+  impl_->cfg.options = options;
+  impl_->spec->option = impl_->model->opt = option;
+}
+
 std::shared_ptr<void> Scene::claim() {
   if (!impl_->claim.expired()) {
     throw RuntimeError(

@@ -92,6 +92,9 @@ class Scene {
   std::string to_xml() const;
   const std::map<std::string, std::string>& assets() const;
   const SceneCfg& cfg() const;
+  // Replaces the physics options of the compiled model; no simulation may exist yet. Compilation
+  // itself reads none of them. Throws ValueError for a wrong option.
+  void set_options(const OptionsCfg& options);
 
   // Configured sensors in order, then those discovered in the entities' XML. Not initialized:
   // Simulation does that.

@@ -14,8 +14,8 @@ import mjsense
 from mjsense import configs
 from mjsense.compat.mjlab._tensors import ids, tensor
 from mjsense.compat.mjlab.entity import Entity, EntityCfg
-from mjsense.compat.mjlab.sensor import SENSOR_CLASSES, BuiltinSensor, CameraSensor, RayCastSensor, Sensor, SensorContext
-from mjsense.compat.mjlab.sensor_cfg import SensorCfg
+from mjsense.compat.mjlab.sensor import BuiltinSensor, CameraSensor, RayCastSensor, Sensor, SensorCfg, SensorContext
+from mjsense.compat.mjlab.sensor.sensor import GivenSensor, OwnSensor, native_sensor
 from mjsense.compat.mjlab.terrains import TerrainEntityCfg
 from mjsense.errors import UnknownNameError
 
@@ -28,7 +28,8 @@ class SceneCfg:
     env_spacing: float = 2.0
     terrain: TerrainEntityCfg | None = None
     entities: dict[str, EntityCfg] = field(default_factory=dict)
-    sensors: tuple[SensorCfg, ...] = ()
+    sensors: tuple[SensorCfg | Sensor[Any] | mjsense.Sensor, ...] = ()
+    """Configurations, or sensors of your own."""
     extent: float | None = None
     spec_fn: Callable[[mujoco.MjSpec], None] | None = None
 
@@ -38,17 +39,17 @@ class SceneCfg:
         if self.spec_fn is not None:
             self.spec_fn(spec)
 
-    def native(self, options: configs.MujocoCfg | None = None) -> configs.SceneCfg:
-        """What it means here, checked."""
+    def native(self) -> configs.SceneCfg:
+        """What it means here, checked. Sensors of the user's are built."""
         return configs.SceneCfg(
             num_envs=self.num_envs,
             env_spacing=self.env_spacing,
             terrain=None if self.terrain is None else self.terrain.native(),
             entities={name: entity.native() for name, entity in self.entities.items()},
-            sensors=tuple(sensor.native() if isinstance(sensor, SensorCfg) else sensor for sensor in self.sensors),
+            sensors=tuple(native_sensor(sensor, self.entities) for sensor in self.sensors),
             extent=self.extent,
             spec_fn=self._edit,
-            options=configs.MujocoCfg() if options is None else options,
+            options=configs.MujocoCfg(),
         )
 
 
@@ -64,36 +65,34 @@ def scene_of(given: Any) -> Scene:
     return scene
 
 
+def _wrapped(native: Any, cfg: Any) -> Sensor[Any]:
+    """The sensor that the user sees for one of the native scene."""
+    if isinstance(native, OwnSensor):
+        return native.original
+    if isinstance(native, mjsense.Sensor):
+        return GivenSensor(native)
+    sensor = BuiltinSensor(cfg, native.name) if cfg is None else cfg.build()
+    sensor.native = native
+    return sensor
+
+
 class Scene:
-    """``scene[name]`` is a sensor or an entity. ``native`` is ours; with the simulation it is made again with its options."""
+    """``scene[name]`` is a sensor or an entity. ``native`` is the :class:`mjsense.Scene` that does the work."""
 
     def __init__(self, scene_cfg: SceneCfg, device: str = "cpu") -> None:
         if str(device) != "cpu":
             raise ValueError(f"Scene: device is '{device}': everything is on the 'cpu'")
         self._cfg = scene_cfg
-        self._wrapped: dict[str, Sensor] = {}
         self._simulation: Any = None
-        self._make(None)
-
-    def _make(self, options: configs.MujocoCfg | None) -> None:
-        self.native = mjsense.Scene(self._cfg.native(options))
-        by_name = {cfg.prefixed_name: cfg for cfg in self._cfg.sensors if isinstance(cfg, SensorCfg)}
-        cameras, rays = [], []
-        for name, sensor in self.native.sensors.items():
-            if isinstance(sensor, mjsense.Sensor):  # one of the user's, as it is
-                continue
-            known = self._wrapped.get(name)
-            if known is None:
-                wrapper = SENSOR_CLASSES.get(sensor.kind, BuiltinSensor)
-                known = self._wrapped[name] = wrapper(sensor, by_name.get(name), name)
-            known.native = sensor
-            if isinstance(known, CameraSensor):
-                known.camera_idx = mujoco.mj_name2id(self.native.model, mujoco.mjtObj.mjOBJ_CAMERA, known.camera_name)
-                cameras.append(known)
-            elif isinstance(known, RayCastSensor):
-                rays.append(known)
+        self.native = mjsense.Scene(scene_cfg.native())
+        by_name = {cfg.prefixed_name: cfg for cfg in scene_cfg.sensors if isinstance(cfg, SensorCfg)}
+        self._sensors = {name: _wrapped(sensor, by_name.get(name)) for name, sensor in self.native.sensors.items()}
+        cameras = [sensor for sensor in self._sensors.values() if isinstance(sensor, CameraSensor)]
+        for camera in cameras:
+            camera.camera_idx = mujoco.mj_name2id(self.native.model, mujoco.mjtObj.mjOBJ_CAMERA, camera.camera_name)
+        rays = [sensor for sensor in self._sensors.values() if isinstance(sensor, RayCastSensor)]
         self._context = SensorContext(cameras, rays) if cameras or rays else None
-        self._entities = {name: Entity(e, self._cfg.entities.get(name, self._cfg.terrain)) for name, e in self.native.entities.items()}
+        self._entities = {name: Entity(e, scene_cfg.entities.get(name, scene_cfg.terrain)) for name, e in self.native.entities.items()}
         _SCENES[id(self.native.model)] = _SCENES[id(self.native.spec)] = self
 
     def __getitem__(self, key: str) -> Any:
@@ -106,7 +105,7 @@ class Scene:
     @property
     def sensors(self) -> dict[str, Any]:
         """Configured sensors, then those of the entities' XML."""
-        return {name: self._wrapped.get(name, sensor) for name, sensor in self.native.sensors.items()}
+        return self._sensors
 
     @property
     def entities(self) -> dict[str, Entity]:

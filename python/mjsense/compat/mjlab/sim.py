@@ -10,7 +10,8 @@ import mujoco
 
 import mjsense
 from mjsense import configs
-from mjsense.compat.mjlab._tensors import Cache, ids
+from mjsense.compat.mjlab._data import Data
+from mjsense.compat.mjlab._tensors import ids
 from mjsense.compat.mjlab.scene import scene_of
 
 
@@ -64,10 +65,10 @@ class Simulation:
         self.scene = scene_of(spec if model is None else model)
         self.cfg, self.num_envs, self.device = cfg, num_envs, "cpu"
         self.scene._cfg.num_envs = num_envs
-        self.scene._make(cfg.mujoco.native())
+        self.scene.native._set_options(cfg.mujoco.native())
         self.native = mjsense.Simulation(self.scene.native, num_envs, threads=threads)
         self.scene._simulation = self.native
-        self._tensors = Cache()
+        self._data = Data(self.native)
 
     @property
     def mj_model(self) -> mujoco.MjModel:
@@ -77,7 +78,7 @@ class Simulation:
     @property
     def data(self) -> Data:
         """Fields of mjData as tensors."""
-        return Data(self)
+        return self._data
 
     def step(self) -> None:
         """One physics step."""
@@ -97,16 +98,6 @@ class Simulation:
     def close(self) -> None:
         """Frees the worlds."""
         self.native.close()
-
-
-class Data:
-    """``sim.data.qpos``: ``[B, nq]`` float64 on the worlds' own memory. Write the state (qpos, qvel, ctrl ...), then call ``forward()``."""
-
-    def __init__(self, sim: Simulation) -> None:
-        self._sim = sim
-
-    def __getattr__(self, name: str) -> Any:
-        return self._sim._tensors(name, getattr(self._sim.native.data, name))
 
 
 __all__ = ["Data", "MujocoCfg", "Simulation", "SimulationCfg"]

@@ -1,99 +1,15 @@
 # SPDX-License-Identifier: Apache-2.0
-"""mjlab's sensor configurations: plain and mutable; ``native()`` is what they mean here, checked."""
+"""``mjlab.sensor.raycast_sensor``: rays from frames."""
 
 from __future__ import annotations
 
-import dataclasses
 import math
 from dataclasses import dataclass, field
 from typing import Any
 
 from mjsense import configs
-
-
-@dataclass
-class ObjRef:
-    """One MuJoCo element."""
-
-    type: str
-    name: str
-    entity: str | None = None
-
-    def prefixed_name(self) -> str:
-        """``entity/name``, or the name alone."""
-        return f"{self.entity}/{self.name}" if self.entity else self.name
-
-    def native(self) -> configs.ObjRef:
-        return configs.ObjRef(type=self.type, name=self.name, entity=self.entity)
-
-
-@dataclass
-class ContactMatch:
-    """One side of a contact."""
-
-    mode: str
-    pattern: str | tuple[str, ...]
-    entity: str | None = None
-    exclude: tuple[str, ...] = ()
-
-    def native(self) -> configs.ContactMatch:
-        return configs.ContactMatch(**vars(self))  # type: ignore[arg-type]
-
-
-@dataclass
-class SensorCfg:
-    """Base of all."""
-
-    name: str
-
-    @property
-    def prefixed_name(self) -> str:
-        """Key in the scene."""
-        return self.name
-
-    def native(self) -> Any:
-        """What the scene is made of; ValueError or TypeError where the configuration makes no sense."""
-        raise NotImplementedError(f"{type(self).__name__} has no counterpart: derive from mjsense.Sensor instead")
-
-
-@dataclass
-class BuiltinSensorCfg(SensorCfg):
-    """One of MuJoCo's sensors."""
-
-    sensor_type: str
-    obj: ObjRef | None = None
-    ref: ObjRef | None = None
-    cutoff: float = 0.0
-
-    @property
-    def prefixed_name(self) -> str:
-        """``entity/name`` for an entity's."""
-        return f"{self.obj.entity}/{self.name}" if self.obj is not None and self.obj.entity is not None else self.name
-
-    def native(self) -> configs.BuiltinSensorCfg:
-        obj, ref = (None if r is None else r.native() for r in (self.obj, self.ref))
-        return configs.BuiltinSensorCfg(name=self.name, sensor_type=self.sensor_type, obj=obj, ref=ref, cutoff=self.cutoff)
-
-
-@dataclass
-class ContactSensorCfg(SensorCfg):
-    """Contacts of primaries."""
-
-    primary: ContactMatch
-    secondary: ContactMatch | None = None
-    fields: tuple[str, ...] = ("found", "force")
-    reduce: str = "maxforce"
-    num_slots: int = 1
-    secondary_policy: str = "first"
-    track_air_time: bool = False
-    global_frame: bool = False
-    history_length: int = 0
-    debug: bool = False
-
-    def native(self) -> configs.ContactSensorCfg:
-        values = {**vars(self), "primary": self.primary.native()}
-        values["secondary"] = None if self.secondary is None else self.secondary.native()
-        return configs.ContactSensorCfg(**values)
+from mjsense.compat.mjlab.sensor.builtin_sensor import ObjRef
+from mjsense.compat.mjlab.sensor.sensor import NativeSensor, SensorCfg
 
 
 @dataclass
@@ -159,6 +75,9 @@ class RingPatternCfg:
         return configs.RingPatternCfg(rings=rings, include_center=self.include_center, direction=self.direction)
 
 
+PatternCfg = GridPatternCfg | PinholeCameraPatternCfg | RingPatternCfg
+
+
 @dataclass
 class RayCastSensorCfg(SensorCfg):
     """Rays from frames."""
@@ -200,37 +119,34 @@ class RayCastSensorCfg(SensorCfg):
 
     _native_class = configs.RayCastSensorCfg
 
-
-@dataclass
-class TerrainHeightSensorCfg(RayCastSensorCfg):
-    """Heights above the ground."""
-
-    reduction: str = "min"
-
-    _native_class = configs.TerrainHeightSensorCfg
+    def build(self) -> RayCastSensor:
+        return RayCastSensor(self)
 
 
 @dataclass
-class CameraSensorCfg(SensorCfg):
-    """A camera of the model, or a new one."""
+class RayCastData:
+    """As :class:`mjsense.RayCastData`."""
 
-    camera_name: str | None = None
-    parent_body: str | None = None
-    pos: tuple[float, float, float] = (0.0, 0.0, 1.0)
-    quat: tuple[float, float, float, float] = (1.0, 0.0, 0.0, 0.0)
-    fovy: float | None = None
-    width: int = 160
-    height: int = 120
-    data_types: tuple[str, ...] = ("rgb",)
-    use_textures: bool = True
-    use_shadows: bool = False
-    enabled_geom_groups: tuple[int, ...] = (0, 1, 2)
-    orthographic: bool = False
-    clone_data: bool = False
+    distances: Any
+    normals_w: Any
+    hit_pos_w: Any
+    pos_w: Any
+    quat_w: Any
+    frame_pos_w: Any
+    frame_quat_w: Any
 
-    def __post_init__(self) -> None:
-        if not self.data_types:
-            raise ValueError(f"sensor '{self.name}': data_types is empty: 'rgb', 'depth' and 'segmentation' can be had")
 
-    def native(self) -> configs.CameraSensorCfg:
-        return configs.CameraSensorCfg(**{f.name: getattr(self, f.name) for f in dataclasses.fields(self)})
+class RayCastSensor(NativeSensor[RayCastData]):
+    """``data`` is a :class:`RayCastData`."""
+
+    _data_class = RayCastData
+
+    @property
+    def num_frames(self) -> int:
+        """F."""
+        return self.native.num_frames
+
+    @property
+    def num_rays_per_frame(self) -> int:
+        """n."""
+        return self.native.num_rays_per_frame

@@ -1,0 +1,199 @@
+# SPDX-License-Identifier: Apache-2.0
+"""``mjlab.sensor.sensor``: the base classes of sensors and of their configurations."""
+
+from __future__ import annotations
+
+import dataclasses
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any, Generic, TypeVar
+
+import numpy as np
+
+import mjsense
+from mjsense.compat.mjlab._data import Data
+from mjsense.compat.mjlab._tensors import HAS_TORCH, Cache, tensor
+from mjsense.compat.mjlab.entity import Entity
+
+if TYPE_CHECKING:
+    import mujoco
+
+T = TypeVar("T")
+
+
+@dataclass
+class SensorCfg:
+    """Base of all sensor configurations. A subclass of your own has a ``build()`` that returns its :class:`Sensor`."""
+
+    name: str
+
+    @property
+    def prefixed_name(self) -> str:
+        """Key in the scene."""
+        return self.name
+
+    def build(self) -> Sensor[Any]:
+        """The sensor of this configuration."""
+        raise NotImplementedError(f"{type(self).__name__}: write build(), which returns a Sensor")
+
+
+class Sensor(Generic[T]):
+    """Base of the sensors of a :class:`mjsense.compat.mjlab.scene.Scene`; ``T`` is the type of ``data``.
+
+    A subclass of your own writes ``_compute_data()`` and what it needs of ``edit_spec``, ``initialize``, ``update`` and ``reset``. Its
+    value is computed when it is read for the first time after a step, a ``forward()`` or a reset.
+    """
+
+    requires_sensor_context: bool = False
+    """Has no effect: cameras and rays need no preparation."""
+    native: Any = None
+    """The sensor of the native scene that computes this one."""
+    _invalid = False
+
+    def __init__(self) -> None:
+        """A subclass may leave out the call of this one."""
+
+    def __repr__(self) -> str:
+        return f"<{type(self).__name__} of mjlab: {self.native!r}>"
+
+    def edit_spec(self, scene_spec: mujoco.MjSpec, entities: dict[str, Entity]) -> None:
+        """Adds MuJoCo elements before compilation. The entities have names only."""
+
+    def initialize(self, mj_model: mujoco.MjModel, model: Any, data: Any, device: str) -> None:
+        """Called once the simulation exists: resolve names, allocate.
+
+        Args:
+            mj_model, model: the compiled model, twice.
+            data: fields of mjData as tensors ``[B, ...]``: ``data.qpos``.
+            device: "cpu".
+        """
+
+    def update(self, dt: float) -> None:
+        """Called for every ``scene.update(dt)``."""
+
+    def reset(self, env_ids: Any = None) -> None:
+        """These environments begin a new episode: a tensor of ids; None: all."""
+
+    def debug_vis(self, visualizer: mjsense.DebugShapes) -> None:
+        """Draws the environment ``visualizer.env_idx``."""
+
+    @property
+    def data(self) -> T:
+        """The value of all environments."""
+        if self.native is None:
+            raise RuntimeError(f"{type(self).__name__} has no data yet: it belongs to no scene")
+        value = self.native.data
+        if self._invalid:
+            value = self.native.recompute()
+        return value
+
+    def _compute_data(self) -> T:
+        raise NotImplementedError(f"{type(self).__name__}: write _compute_data()")
+
+    def _invalidate_cache(self) -> None:
+        """The next read computes the value again."""
+        self._invalid = True
+
+
+class NativeSensor(Sensor[T]):
+    """Base of the sensors that mjsense computes: ``native`` has the arrays, ``data`` shows them as tensors on the same memory."""
+
+    _data_class: type | None = None
+
+    def __init__(self, cfg: Any = None, name: str | None = None) -> None:
+        self.cfg = cfg
+        self.name = name or (cfg.prefixed_name if cfg is not None else "")
+        self._tensors = Cache()
+
+    @property
+    def data(self) -> T:
+        """Tensors on the sensor's memory: the next read after a change writes them again."""
+        if self.native is None:
+            raise RuntimeError(f"sensor '{self.name}' has no data yet: it belongs to no scene")
+        return self._compute_data()
+
+    def _compute_data(self) -> Any:
+        data = self.native.data
+        if self._data_class is None:
+            return self._tensors("", data)
+        names = [field.name for field in dataclasses.fields(self._data_class)]
+        return self._data_class(**{name: self._tensors(name, getattr(data, name)) for name in names})
+
+
+class GivenSensor(Sensor[Any]):
+    """A :class:`mjsense.Sensor` that was given to the scene; its arrays are tensors here, everything else is its own."""
+
+    def __init__(self, native: mjsense.Sensor) -> None:
+        self.native = native
+        self._tensors = Cache()
+
+    def __getattr__(self, name: str) -> Any:
+        return getattr(self.native, name)
+
+    @property
+    def data(self) -> Any:
+        """The sensor's value with tensors in the place of arrays."""
+        return self._converted("", self.native.data)
+
+    def _converted(self, name: str, value: Any) -> Any:
+        if isinstance(value, dict):
+            return {key: self._converted(f"{name}/{key}", item) for key, item in value.items()}
+        return self._tensors(name, value) if isinstance(value, np.ndarray) else value
+
+
+class OwnSensor(mjsense.Sensor):
+    """Runs a user's :class:`Sensor` in the native scene."""
+
+    def __init__(self, original: Sensor[Any], name: str, entity_cfgs: dict[str, Any]) -> None:
+        super().__init__(uuid=name)
+        self.original = original
+        self._entity_cfgs = entity_cfgs
+
+    def edit_spec(self, spec: Any, entities: dict[str, Any]) -> None:  # pyright: ignore[reportIncompatibleMethodOverride]
+        self.original.edit_spec(spec, {name: Entity(e, self._entity_cfgs.get(name)) for name, e in entities.items()})
+
+    def initialize(self, sim: mjsense.Simulation) -> None:
+        self.original.initialize(sim.model, sim.model, Data(sim), "cpu")
+
+    def compute(self, sim: mjsense.Simulation) -> Any:
+        self.original._invalid = False
+        value = self.original._compute_data()
+        if value is None:
+            raise ValueError("_compute_data() returned None")
+        return tensor(value) if isinstance(value, np.ndarray) else value
+
+    def recompute(self) -> Any:
+        self._mjs_compute_rows(list(range(self.simulation.num_worlds)))
+        return self._mjs_value
+
+    def update(self, dt: float) -> None:
+        self.original.update(dt)
+
+    def reset(self, world_ids: Any = None) -> None:
+        self.original.reset(world_ids if world_ids is None or not HAS_TORCH else tensor(np.array(world_ids)))
+
+    def debug_vis(self, visualizer: mjsense.DebugShapes) -> None:
+        self.original.debug_vis(visualizer)
+
+    def _mjs_updates(self) -> bool:
+        return type(self.original).update is not Sensor.update
+
+
+def native_sensor(item: Any, entity_cfgs: dict[str, Any]) -> Any:
+    """What the native scene takes for an element of ``SceneCfg.sensors``: a configuration or a sensor of ours."""
+    built: Any = item.build() if isinstance(item, SensorCfg) else item
+    if isinstance(built, NativeSensor) and isinstance(item, SensorCfg):
+        return item.native()  # pyright: ignore[reportAttributeAccessIssue]
+    name = item.prefixed_name if isinstance(item, SensorCfg) else getattr(item, "name", "")
+    if isinstance(built, mjsense.Sensor):
+        built.uuid = name or built.uuid
+        return built
+    if not isinstance(built, Sensor):
+        if isinstance(item, SensorCfg):
+            raise TypeError(f"{type(item).__name__}.build() must return a Sensor, not {built!r}")
+        return built  # a configuration of mjsense's own, or what the scene refuses
+    if not name:
+        raise ValueError(f"{type(built).__name__}: a sensor in SceneCfg.sensors needs a name; set its attribute 'name'")
+    if built.native is not None:
+        raise RuntimeError(f"sensor '{name}' belongs to another scene: make one for each")
+    built.native = OwnSensor(built, name, entity_cfgs)
+    return built.native

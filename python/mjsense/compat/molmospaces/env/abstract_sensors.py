@@ -1,0 +1,27 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The base class of sensors, and sets of them."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import gymnasium
+import numpy as np
+
+from mjsense.sensor import Sensor
+from mjsense.suite import SensorSuite
+
+
+class CoreSensor(Sensor):
+    """A sensor of mjsense's core suite, which C++ computes: it stands for the one of this uuid when a task composes its suite."""
+
+    def __init__(self, uuid: str, optional: bool = False) -> None:
+        super().__init__(uuid, gymnasium.spaces.Box(-np.inf, np.inf, (1,), np.float64))
+        self.optional = optional
+        """It is left out where the task has none."""
+
+    def get_observation(self, env: Any, task: Any = None, batch_index: int = 0, *args: Any, **kwargs: Any) -> Any:
+        raise RuntimeError(f"sensor '{self.uuid}' is computed by the environment of a task: read it there, or with task.get_observations()")
+
+
+__all__ = ["Sensor", "SensorSuite"]

@@ -1,0 +1,6 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Robots."""
+
+from mjsense.robot import Robot
+
+__all__ = ["Robot"]

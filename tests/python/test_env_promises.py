@@ -1,0 +1,107 @@
+# SPDX-License-Identifier: Apache-2.0
+"""What environments promise beyond stepping: pictures without cameras, rates, names, the expert, sensors of text, sizes."""
+
+import json
+
+import gymnasium
+import numpy as np
+import pytest
+from tasks import Cart
+
+import mjsense as mjs
+
+SMALL = dict(cameras=[], width=64, height=40, render_mode="rgb_array")
+
+
+class Words(mjs.Sensor):
+    uuid = "words"
+    is_dict = True
+    str_max_len = 50
+    observation_space = gymnasium.spaces.Box(0, 255, (50,), np.uint8)
+
+    def get_observation(self, env, task, batch_index=0):
+        return {"world": batch_index}
+
+
+@pytest.mark.parametrize("name", ["mjsense/Pick-v0", "mjsense/DoorOpening-v0"])
+def test_a_default_view_without_cameras(name):
+    env = gymnasium.make(name, **SMALL)
+    observation, _ = env.reset(seed=1)
+    assert not any(rows.ndim == 3 for rows in observation.values() if isinstance(rows, np.ndarray))
+    picture = env.render()
+    assert picture.shape == (40, 64, 3) and picture.std() > 10
+    env.close()
+
+
+def test_the_default_view_of_a_scene_with_its_own_robot():
+    env = mjs.make_vec(Cart(), num_envs=2, **{**SMALL, "width": 320, "height": 200})
+    env.reset(seed=1)
+    first = env.render()
+    assert len(first) == 2 and (first[0].max(2) > 20).sum() > 100  # a small cart on a rail, without a light
+    for _ in range(15):
+        env.step(np.ones((2, 1)))
+    assert (env.render()[0] != first[0]).any()
+    env.close()
+
+
+def test_a_view_changes_no_episode():
+    rows = []
+    for mode in (None, "rgb_array"):
+        env = mjs.make_vec("pick", policy="planner", num_envs=2, seed=4, threads=2, **{**SMALL, "render_mode": mode})
+        env.reset()
+        for _ in range(10):
+            observation, *_ = env.step(env.expert_action())
+            env.render()
+        rows.append(observation["qpos"]["arm"])
+        env.close()
+    np.testing.assert_array_equal(*rows)
+
+
+def test_rates():
+    env = mjs.make(Cart(), **SMALL)
+    assert env.metadata["render_fps"] == 50 and env.worlds.metadata["render_fps"] == 50
+    env.close()
+    assert mjs.make("pick", cameras=[]).metadata["render_fps"] == pytest.approx(1000 / 66)
+
+
+def test_the_expert_of_a_single_environment():
+    env = mjs.make("pick", policy="planner", cameras=[])
+    env.reset(seed=3)
+    action = env.expert_action()
+    assert env.action_space.contains(action) and env.expert_done is False
+    assert env.scene is env.sim.scene and env.worlds.scene is env.sim.scene
+    env.close()
+
+
+def test_names_of_gymnasium():
+    for name, env_id in (("my-cart.v2", "mjsense/My-cart.v2-v0"), ("_cart", "mjsense/Cart-v0")):
+        mjs.register_task(name, Cart)
+        env = gymnasium.make(env_id, cameras=[])
+        assert env.spec.id == env_id
+        env.close()
+    mjs.register_task("lab:cart", Cart)  # outside of the grammar: make_vec finds it, gymnasium does not
+    mjs.make_vec("lab:cart", cameras=[]).close()
+    assert not any("lab:cart" in known.lower() for known in gymnasium.registry)
+
+
+def test_sensors_of_text_are_observed_where_they_are_given():
+    env = mjs.make_vec(Cart(), num_envs=2, cameras=[], sensors=[Words()])
+    observation, _ = env.reset()
+    assert env.observation_space.contains(observation)
+    assert [json.loads(row.tobytes().rstrip(b"\0")) for row in observation["words"]] == [{"world": 0}, {"world": 1}]
+    assert "task_info" not in observation
+    env.close()
+
+
+@pytest.mark.parametrize(("given", "shape"), [(dict(width=64), (36, 64)), (dict(height=92), (92, 160)), (dict(width=64, height=64), (64, 64))])
+def test_one_side_of_a_picture_keeps_the_ratio(given, shape):
+    env = mjs.make("pick", cameras=["wrist_camera"], **given)  # 640 x 368
+    assert env.observation_space["wrist_camera"].shape == (*shape, 3)
+    env.close()
+
+
+def test_misspelt_options():
+    with pytest.raises(TypeError, match=r"make_vec\(\) got an unexpected keyword argument 'camera'; did you mean 'cameras'"):
+        mjs.make("pick", camera=[])
+    with pytest.raises(TypeError, match=r"record\(\) got an unexpected keyword argument 'episode'; did you mean 'episodes'"):
+        mjs.record("pick", out="x", episode=3)

@@ -1,0 +1,155 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Tasks and policies as MolmoSpaces' page on sensors writes them, with the imports changed."""
+
+import json
+
+import h5py
+import numpy as np
+import pytest
+from mjsense.compat import molmospaces
+from mjsense.compat.molmospaces.env.abstract_sensors import SensorSuite
+from mjsense.compat.molmospaces.env.sensors import GraspStateSensor, ObjectStartPoseSensor, get_core_sensors
+from mjsense.compat.molmospaces.policy.base_policy import PlannerPolicy
+from mjsense.compat.molmospaces.tasks.task import BaseMujocoTask
+from mjsense.compat.molmospaces.utils.save_utils import byte_array_to_dict, dict_to_byte_array, is_camera_sensor
+
+import mjsense as mjs
+
+
+class MyTask(BaseMujocoTask):
+    def _create_sensor_suite_from_config(self, config):
+        sensors = get_core_sensors(config)
+        sensors.extend([
+            ObjectStartPoseSensor(object_name=config.task_config.pickup_obj_name,
+                                  uuid="obj_start_pose"),
+            GraspStateSensor(object_name=config.task_config.pickup_obj_name,
+                             uuid="grasp_state_pickup_obj"),
+        ])
+        return SensorSuite(sensors)  # fmt: skip
+
+
+CORE = ["qpos", "qvel", "robot_base_pose", "env_states", "task_info", "actions/commanded_action", "actions/joint_pos",
+        "actions/joint_pos_rel", "actions/ee_twist", "actions/ee_pose"]  # fmt: skip
+OWN = ["obj_start_pose", "grasp_state_pickup_obj"]
+
+
+def test_the_names_of_the_page():
+    assert set(molmospaces.__all__) >= {
+        "BaseMujocoTask", "BasePolicy", "CameraParameterSensor", "CameraSensor", "DepthSensor", "DoorStateSensor", "EnvStateSensor",
+        "GraspPoseSensor", "GraspStateSensor", "LastActionSensor", "LastCommandedEEPoseSensor", "LastCommandedEETwistSensor",
+        "LastCommandedJointPosSensor", "LastCommandedRelativeJointPosSensor", "ObjectImagePointsSensor", "ObjectPoseSensor",
+        "ObjectStartPoseSensor", "PickupObjGoalPoseSensor", "PlannerPolicy", "PolicyNumRetriesSensor", "PolicyPhaseSensor", "Robot",
+        "RobotBasePoseSensor", "RobotJointPositionSensor", "RobotJointVelocitySensor", "Sensor", "SensorSuite", "TCPPoseSensor",
+        "TaskInfoSensor", "get_core_sensors", "is_camera_sensor"}  # fmt: skip
+    assert all(hasattr(molmospaces, name) for name in molmospaces.__all__)
+
+
+def test_the_task_of_the_page_on_its_own():
+    task = MyTask(cameras=[], threads=2)
+    task.register_policy("planner")
+    with pytest.raises(ValueError, match="Policy already registered"):
+        task.register_policy("planner")
+    (observation,), _ = task.reset(seed=3)
+    assert list(observation) == [*CORE, *OWN, "tcp_pose", "policy_phase", "policy_num_retries", "grasp_pose"]
+    assert observation["grasp_state_pickup_obj"] == {"gripper": {"touching": False, "held": False}}
+    held = False
+    start = observation["obj_start_pose"]
+    for _ in range(300):
+        (observation,), _, terminated, truncated, _ = task.step(task.worlds.expert_action())
+        np.testing.assert_array_equal(observation["obj_start_pose"], start)
+        held |= observation["grasp_state_pickup_obj"]["gripper"]["held"]
+        if terminated[0] or truncated[0] or task.worlds.expert_done[0]:
+            break
+    assert held and task.judge_success()
+    with pytest.raises(ValueError, match="no move group named 'amr'; there are arm, gripper"):
+        task.step({"amr": np.zeros(7)})
+    with pytest.raises(ValueError, match="commands of gripper are missing"):
+        task.step({"arm": np.zeros(7)})
+    task.close()
+
+
+def test_start_pose_and_grasp_are_those_of_the_core_suite(tmp_path):
+    """The same episodes, with mjsense's own sensors and with those of the page."""
+    options = dict(out=tmp_path, cameras=[], episodes=2, worlds=2, keep_failures=True, seed=3, horizon=120)
+    ours, theirs = (mjs.record(task, **{**options, "out": tmp_path / name}) for task, name in (("pick", "ours"), (MyTask, "theirs")))
+    for one, other in zip(sorted(ours.path.glob("*.h5")), sorted(theirs.path.glob("*.h5"))):
+        with h5py.File(one) as a, h5py.File(other) as b:
+            assert sorted(a) == sorted(b)
+            for name in a:
+                mine, yours = a[f"{name}/obs/extra"], b[f"{name}/obs/extra"]
+                np.testing.assert_allclose(yours["obj_start_pose"], mine["obj_start"], atol=1e-6)
+                np.testing.assert_array_equal(b[f"{name}/obs/agent/qpos"], a[f"{name}/obs/agent/qpos"])
+                assert "obj_start" not in yours and "tcp_pose" in yours and "policy_phase" in yours
+                for x, y in zip(yours["grasp_state_pickup_obj"], mine["grasp_state_pickup_obj"]):
+                    assert byte_array_to_dict(x) == byte_array_to_dict(y)
+
+
+def test_cameras_of_the_suite():
+    task = MyTask(width=64, threads=2)
+    suite = task.sensor_suite
+    cameras = [name for name in suite.sensors if is_camera_sensor(name, suite)]
+    assert cameras == ["wrist_camera", "exo_camera_1"] and not is_camera_sensor("qpos", suite) and not is_camera_sensor("x", suite)
+    (observation,), _ = task.reset()
+    assert observation["wrist_camera"].shape == (36, 64, 3) and "object_image_points" in observation
+    assert is_camera_sensor("rgb", SensorSuite([mjs.CameraImageSensor("wrist_camera", uuid="rgb")]))
+    task.close()
+
+
+def test_without_sensors():
+    class Config:
+        class task_config:
+            use_sensors = False
+
+    task = MyTask(Config, cameras=[])
+    assert task.reset()[0] == [{}] and task.sensor_suite is None
+    task.close()
+
+
+class Reach(PlannerPolicy):
+    """Opens and closes the gripper, and counts its calls."""
+
+    def __init__(self):
+        self.calls = 0
+
+    def reset(self):
+        self.calls = 0
+
+    def get_all_phases(self):
+        return {"open": 3, "close": 5}
+
+    def get_phase(self):
+        return "open" if self.calls < 3 else "close"
+
+    def get_action(self, observation):
+        self.calls += 1
+        assert observation["qpos"]["arm"].shape == (7,)
+        return {"arm": observation["qpos"]["arm"], "gripper": [0.0 if self.calls < 3 else 255.0], "done": self.calls == 6}
+
+
+def test_a_policy_of_one_world_plays_many(tmp_path):
+    task = MyTask()
+    task.register_policy(Reach())
+    summary = mjs.record(task, out=tmp_path, cameras=[], episodes=3, worlds=3, keep_failures=True)
+    with h5py.File(next(summary.path.glob("*.h5"))) as file:
+        trajectory = file["traj_0"]
+        assert trajectory["obs/extra/policy_phase"][:].ravel().tolist() == [3, 3, 3, 5, 5, 5, 5]
+        assert json.loads(trajectory["obs_scene"][()])["policy_phases"] == {"open": 3, "close": 5}
+        assert len(trajectory["success"]) == 7
+
+
+def test_rows_of_text():
+    row = dict_to_byte_array({"b": np.float32(1), "a": [1, 2]}, 30)
+    assert row.shape == (30,) and byte_array_to_dict(row) == {"a": [1, 2], "b": 1.0}
+    with pytest.raises(ValueError, match="JSON text of 9 bytes, str_max_len is 4"):
+        dict_to_byte_array({"a": 123}, 4)
+
+
+def test_a_suite_that_is_none():
+    class Wrong(BaseMujocoTask):
+        def _create_sensor_suite_from_config(self, config):
+            return get_core_sensors(config)
+
+    with pytest.raises(TypeError, match=r"Wrong\._create_sensor_suite_from_config\(\) must return a SensorSuite"):
+        mjs.make_vec(Wrong, cameras=[])
+    with pytest.raises(NotImplementedError, match="BaseMujocoTask: write _create_sensor_suite_from_config"):
+        mjs.make_vec(BaseMujocoTask, cameras=[])
