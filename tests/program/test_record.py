@@ -210,7 +210,7 @@ def test_interrupted_then_resumed_is_as_if_nothing_had_happened(mjsense, signals
     if signals == [signal.SIGKILL]:
         assert code == -signal.SIGKILL
     else:
-        assert code == 1 and "go on with --resume" in err
+        assert code == 1 and "Continue with --resume" in err
     mjsense(*args, "--worlds", 1, "--out", "data", "--resume", "-q")
     mjsense(*args, "--worlds", 4, "--out", "whole", "-q")
     assert contents(mjsense.folder / "data") == contents(mjsense.folder / "whole")
