@@ -37,7 +37,8 @@ TEST(MeshGeometry, OtherContentIsAnother) {
   EXPECT_NE(a, mesh_geometry(kVertices, turned, true));
 }
 
-// Embree itself says nothing, and rays would meet nothing. Memory ends at one allocation after the other.
+// Embree reports no error by itself; rays would hit nothing. Memory runs out at each allocation in
+// turn.
 TEST(MeshGeometry, WhatEmbreeCannotBuildIsAnError) {
   const auto device = ray_device();
   int allowed = 0, left = 0;
@@ -59,7 +60,7 @@ TEST(MeshGeometry, WhatEmbreeCannotBuildIsAnError) {
                    "monitor forced termination (error 4)");
     }
   }
-  EXPECT_GT(allowed, 3);  // the buffers', and the tree's
+  EXPECT_GT(allowed, 3);  // allocations of the buffers and of the tree
   rtcSetDeviceMemoryMonitorFunction(device.get(), nullptr, nullptr);
 }
 
@@ -83,7 +84,7 @@ TEST(MeshGeometry, ManyThreadsMayAskForIt) {
   for (const auto& one : made) EXPECT_EQ(one, made[0]);
 }
 
-// Two arrays are not their concatenation, and order counts.
+// Two arrays differ from their concatenation, and their order matters.
 TEST(ContentKey, TellsArraysApart) {
   const std::vector<int> a{1, 2, 3}, b{4, 5}, ab{1, 2, 3, 4, 5};
   const auto key = [](auto... parts) {

@@ -16,7 +16,7 @@
 namespace mjsense {
 namespace {
 
-constexpr int kGeoms = 40;  // more than two blocks, and not a multiple of one
+constexpr int kGeoms = 40;  // more than two of update()'s blocks, and not a multiple of their size
 
 std::string field() {
   std::string xml =

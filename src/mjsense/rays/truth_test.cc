@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Who judges the judge: what testing/truth.h lets pass, and what it does not.
+// Tests of testing/truth.h: which hits it accepts and which it rejects.
 
 #include "mjsense/rays/testing/truth.h"
 
@@ -38,7 +38,7 @@ const TestModel& step() {
 TEST(Truth, AHitIsWhereMjRayIs) {
   const double o[3] = {0.3, 0.2, 4}, down[3] = {0, 0, -1};
   EXPECT_TRUE(agree(step(), o, down, at(3)));
-  EXPECT_TRUE(agree(step(), o, down, at(3.0000005)));  // a rounding or two
+  EXPECT_TRUE(agree(step(), o, down, at(3.0000005)));  // off by one or two roundings
   EXPECT_FALSE(agree(step(), o, down, at(3.00001)));
   EXPECT_FALSE(agree(step(), o, down, at(2.99999)));
   EXPECT_FALSE(agree(step(), o, down, at(4)));
@@ -48,8 +48,8 @@ TEST(Truth, AHitIsWhereMjRayIs) {
   EXPECT_FALSE(agree(step(), o, up, at(3)));
 }
 
-// At the edge of a plate mj_ray changes its mind between two values: both are right where a rounding
-// decides, and nothing between them is.
+// At the edge of a plate mj_ray's distance jumps between two values. Both are accepted where
+// rounding decides, but no value between them.
 TEST(Truth, AtAnEdgeBothSidesAreRightAndNothingBetween) {
   const TestModel shelf(
       "<mujoco><worldbody><geom type='plane' size='0 0 1'/>"
@@ -69,7 +69,7 @@ TEST(Truth, AtAnEdgeBothSidesAreRightAndNothingBetween) {
   }
 }
 
-// Where a ray nearly runs along the floor, a turn by a rounding is metres on it.
+// For a ray nearly parallel to the floor, a turn by one rounding moves the hit by metres.
 TEST(Truth, WhatIsGrazedIsMetWhereATurnedRayMeetsIt) {
   const double slope = 1e-5, d[3] = {std::sqrt(1 - slope * slope), 0, -slope};
   const double o[3] = {5, 0, 1e-3};
@@ -83,7 +83,7 @@ TEST(Truth, WhatIsGrazedIsMetWhereATurnedRayMeetsIt) {
   EXPECT_FALSE(agree(step(), o, d, kNothing));
 }
 
-// Along a wall, in its plane: in, out, or in somewhere on the way.
+// A ray in the plane of a wall may hit its near edge, miss it, or hit it anywhere between.
 TEST(Truth, InTheBordersPlaneItIsMetAnywhereOrNotAtAll) {
   const double along[3] = {0, 1, 0};
   const double in_it[3] = {1, -3, 0.5}, beside[3] = {1 + 1e-5, -3, 0.5};
@@ -101,7 +101,7 @@ TEST(Truth, InTheBordersPlaneItIsMetAnywhereOrNotAtAll) {
   EXPECT_FALSE(agree(step(), in_it, along, wall(4.1)));
 }
 
-// It is no excuse that there is a surface, if every ray is stopped before it.
+// A hit on a surface is rejected if every neighbouring ray is stopped before it.
 TEST(Truth, ASurfaceBehindASurfaceIsNotMet) {
   const double o[3] = {0.3, 0.2, 4}, down[3] = {0, 0, -1};
   EXPECT_FALSE(agree(step(), o, down, at(4)));
