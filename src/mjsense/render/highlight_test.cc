@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// No highlight is lost where a surface is said to be dull.
+// The threshold below which highlights are skipped must not remove a visible highlight.
 
 #include <gtest/gtest.h>
 
