@@ -27,7 +27,7 @@ std::string complaint(const std::function<void()>& deed) {
 
 class Guard : public ::testing::Test {
  protected:
-  // A dataset of bytes.
+  // Creates a dataset of bytes.
   Id bytes(const std::string& name, const std::vector<hsize_t>& size, const Id& properties) {
     const Id space(H5Screate_simple(static_cast<int>(size.size()), size.data(), nullptr), H5Sclose,
                    "space");
@@ -57,7 +57,7 @@ TEST_F(Guard, DatasetsAreFoundInTheirOrder) {
   EXPECT_THAT(found, ElementsAre("a/c", "a/d", "b"));
 }
 
-// Whole and within reach: it is refused for being a link alone.
+// The targets are valid and in the same file: the link is refused because it is a soft link.
 TEST_F(Guard, LinksAreNotFollowed) {
   bytes("real/x");
   ASSERT_GE(H5Lcreate_soft("/real/x", file_, "soft", H5P_DEFAULT, H5P_DEFAULT), 0);
@@ -116,7 +116,7 @@ TEST_F(Guard, SizesAreThoseOfWhatIsStored) {
   constexpr hsize_t kMiB = 1 << 20;
   EXPECT_EQ(storage(bytes("plain")), "");
   EXPECT_EQ(storage(bytes("empty", {0, 5}, chunked({1, 5}))), "");
-  // Nothing is written yet: what is small may be so.
+  // No data has been written; a small size is accepted nevertheless.
   EXPECT_EQ(storage(bytes("small", {60 * kMiB}, chunked({kMiB}))), "");
   EXPECT_THAT(storage(bytes("endless", {10'000'000 * kMiB}, chunked({kMiB}))),
               HasSubstr("claims 10485760000000 bytes and stores 0"));

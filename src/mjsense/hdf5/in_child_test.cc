@@ -47,7 +47,7 @@ TEST(InChild, WhoIsEndedFromOutsideSaysNothingOfTheFile) {
   }
 }
 
-// A good file is not called damaged, and set aside, because everybody else was quicker.
+// An intact file must not be reported as damaged because the machine was busy.
 TEST(InChild, WhoDoesNotGetTheProcessorSaysNothingOfTheFile) {
   try {
     static_cast<void>(in_child(
@@ -61,7 +61,7 @@ TEST(InChild, WhoDoesNotGetTheProcessorSaysNothingOfTheFile) {
   }
 }
 
-// A daemon's: the pipe of the answer takes the numbers of the streams that are closed.
+// As in a daemon: the pipe of the answer gets the numbers of closed standard streams.
 TEST(InChild, AnswersWithoutStandardStreams) {
   const auto without = [](std::initializer_list<int> closed) {
     const pid_t pid = fork();
@@ -78,7 +78,7 @@ TEST(InChild, AnswersWithoutStandardStreams) {
   EXPECT_TRUE(without({STDIN_FILENO, STDOUT_FILENO, STDERR_FILENO}));
 }
 
-// Ctrl-C for all programs of a terminal: ours hears it, and the reader goes on.
+// Ctrl-C signals the whole process group: the parent handles it and the child continues to read.
 int read_in_the_rain() {
   if (setpgid(0, 0) != 0) return 2;
   struct sigaction action = {};
