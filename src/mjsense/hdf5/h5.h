@@ -60,9 +60,8 @@ void check(herr_t status, std::string_view what);
 // Replaces an existing file. A symbolic link is replaced, not followed.
 Id create_file(const std::filesystem::path& path);
 Id open_file(const std::filesystem::path& path, bool writable = false);
-Id create_group(hid_t parent,
-                // Creates the group and its missing parents, or opens an existing group.
-                const std::string& path);
+// Creates the group and its missing parents, or opens an existing group.
+Id create_group(hid_t parent, const std::string& path);
 Id group_properties();  // creation properties without time stamps
 Id dataset_properties();
 Id link_properties();  // create missing groups, names in UTF-8
