@@ -56,7 +56,7 @@ class Chunks : public ::testing::Test {
   Id properties_ = dataset_properties();
 };
 
-TEST_F(Chunks, WhatTheLibraryPacksIsTaken) {
+TEST_F(Chunks, ChunksOfTheLibraryAreAccepted) {
   EXPECT_THAT(complaint(dataset(file_, properties_)), IsEmpty());  // no filter
   H5Ldelete(file_, "x", H5P_DEFAULT);
   H5Pset_shuffle(properties_);
@@ -69,7 +69,7 @@ TEST_F(Chunks, WhatTheLibraryPacksIsTaken) {
 }
 
 // The library would read beyond the end of a chunk that is shorter than its shape says.
-TEST_F(Chunks, WhatUnpacksToAnotherSizeIsRefused) {
+TEST_F(Chunks, ChunksThatUnpackToAnotherSizeAreRefused) {
   H5Pset_deflate(properties_, 4);
   const Id made = dataset(file_, properties_);
   for (const std::size_t bytes : {std::size_t{0}, std::size_t{8}, kChunkBytes - 1, kChunkBytes,
@@ -100,7 +100,7 @@ TEST_F(Chunks, WhatUnpacksToAnotherSizeIsRefused) {
 }
 
 // The index stores a size for a chunk without filters too, and the library allocates that much.
-TEST_F(Chunks, WhatIsNotPackedAndHasAnotherSizeIsRefused) {
+TEST_F(Chunks, UnfilteredChunksOfAnotherSizeAreRefused) {
   for (const std::size_t bytes : {std::size_t{15}, kChunkBytes - 1, kChunkBytes, kChunkBytes + 1}) {
     const Id made = empty_dataset(file_, properties_);
     const hsize_t at[] = {kChunk, 0};

@@ -55,7 +55,7 @@ RayPacket fan(Rng& rng) {
   return rays;
 }
 
-TEST_P(ManyGeoms, AnswersAreThoseOfAllBoxes) {
+TEST_P(ManyGeoms, BlocksDoNotChangeHits) {
   Rng rng(3, 0, 0, 0);
   const TestModel m(hall(rng));
   ASSERT_GE(m.model->ngeom, BoxList::kMany);
@@ -136,7 +136,7 @@ TEST(BoxList, BlocksSurroundTheirBoxes) {
   }
 }
 
-TEST(BoxList, AFewStandOneAfterTheOther) {
+TEST(BoxList, FewObjectsHaveNoBlocks) {
   BoxList list(100);
   EXPECT_EQ(list.blocks().count, 0);
   EXPECT_EQ(list.all().ids, nullptr);

@@ -180,7 +180,7 @@ TEST_P(HeightFields, NoRayPassesThrough) {
 //   | \_|__        and runs up, down or along it. Rounding decides on which side of the border it
 //  -|-->|          is, but it must not leave the field where there is no surface.
 //   |___|
-TEST_P(HeightFields, InTheBordersPlaneNoRayPassesEither) {
+TEST_P(HeightFields, NoRayInTheBorderPlanePassesThrough) {
   Rng rng(13, 0, 0, 0);
   int wrong = 0, hits = 0, rays = 0;
   for (int i = 0; i < 180; ++i) {
@@ -220,7 +220,7 @@ TEST_P(HeightFields, InTheBordersPlaneNoRayPassesEither) {
 
 // Other queries of the same march: a hit of a ray from outside is always on a front face, and
 // occluded() is true where trace() hits.
-TEST_P(HeightFields, CulledAndOccludedAlike) {
+TEST_P(HeightFields, CullingAndOcclusionAgreeWithTrace) {
   Rng rng(12, 0, 0, 0);
   int lanes = 0, hits = 0;
   for (int i = 0; i < 600; ++i) {
@@ -257,7 +257,7 @@ TEST_P(HeightFields, CulledAndOccludedAlike) {
 }
 
 // A ray that leaves the ground hits the surface from below; the normal points up.
-TEST_P(HeightFields, FromInsideThroughAFlatTop) {
+TEST_P(HeightFields, RayFromInsideHitsAFlatTop) {
   const TestModel m(
       "<mujoco><asset><hfield name='h' nrow='3' ncol='3' size='1 1 .7 .1' elevation='1 1 1  1 1 1 "
       " 1 1 0'/></asset><worldbody><geom type='hfield' hfield='h' pos='.1 .2 .3'/></worldbody>"

@@ -100,7 +100,7 @@ RayPacket random_packet(Rng& rng, double origin, double spread) {
   return rays;
 }
 
-TEST_P(Kernels, FocusedAndPlainTracesAreTheSameBits) {
+TEST_P(Kernels, FocusedAndPlainTracesAreIdentical) {
   Rng rng(3, 0, 0, 0);
   const TestModel m(
       testing::random_scene(rng, {"plane", "sphere", "capsule", "box", "mesh", "hfield"}, 60, 4));
@@ -124,7 +124,7 @@ TEST_P(Kernels, FocusedAndPlainTracesAreTheSameBits) {
 }
 
 // Results must not depend on the CPU: every product and sum is rounded separately.
-TEST_P(Kernels, RowsSayWhatWasHit) {
+TEST_P(Kernels, RowsEqualTheHits) {
   Rng rng(31, 0, 0, 0);
   const TestModel m(testing::random_scene(rng, {"sphere", "capsule", "box", "mesh"}, 40, 4));
   for (int g = 0; g < m.model->ngeom; ++g) {
@@ -205,7 +205,7 @@ TEST_P(Kernels, OccludedWhereSomethingIsHit) {
   EXPECT_LE(wrong, 2);  // a surface exactly at tmax
 }
 
-TEST_P(Kernels, PreciseFarFromTheWorldsOrigin) {
+TEST_P(Kernels, PreciseFarFromTheWorldOrigin) {
   // Everything is 1000 m from the origin, seen from 10 m.
   Rng rng(5, 0, 0, 0);
   for (const char* type :
@@ -287,7 +287,7 @@ struct Layers {
   }
 };
 
-TEST_P(Kernels, FiltersSeeWhatTheyName) {
+TEST_P(Kernels, FiltersSelectGeoms) {
   const Layers s(isa());
   EXPECT_EQ(s.down({}).geom, s.id("ghost"));
   EXPECT_EQ(s.down({.groups = 0x1f}).geom, s.id("lid"));
@@ -312,7 +312,7 @@ TEST_P(Kernels, TiesGoToTheLowerGeom) {
   EXPECT_EQ(s.down({.groups = 1, .hidden = hidden}).geom, s.id("cube"));
 }
 
-TEST_P(Kernels, BackFacesAreCulledIfAsked) {
+TEST_P(Kernels, BackFacesAreCulledOnRequest) {
   const Layers s(isa());
   const auto inside = [&](const char* only, RayFilter::Backfaces backfaces) {
     std::vector<std::uint8_t> hidden(s.scene.num_objects(), 1);
@@ -331,7 +331,7 @@ TEST_P(Kernels, BackFacesAreCulledIfAsked) {
 
 // Vertical rays onto and past a mesh. Those in the plane of a side of its bounding box must not
 // enter it.
-TEST_P(Kernels, RaysBesideAMeshDisturbNobody) {
+TEST_P(Kernels, RaysInThePlaneOfABoxSideMissTheMesh) {
   const Layers s(isa());
   std::vector<std::uint8_t> hidden(s.scene.num_objects(), 1);
   hidden[s.id("cube")] = 0;
@@ -354,7 +354,7 @@ TEST_P(Kernels, RaysBesideAMeshDisturbNobody) {
   }
 }
 
-TEST_P(Kernels, EndlessPlanesAreEndless) {
+TEST_P(Kernels, InfinitePlanesAreInfinite) {
   const Layers s(isa());
   for (double x : {1e3, 1e5, -1e7}) {
     const double o[3] = {x, 2 * x, 20}, d[3] = {0, 0, -1};
@@ -385,7 +385,7 @@ TEST(RayScene, PerWorldSizesAndVisibility) {
   mj_deleteModel(own);
 }
 
-TEST(RayScene, ClothIsHitItsRadiusBeforeItsTriangles) {
+TEST(RayScene, ClothIsHitAtItsRadius) {
   const TestModel m(R"(<mujoco><worldbody>
     <flexcomp name="cloth" type="grid" dim="2" count="5 5 1" spacing=".2 .2 .2" radius=".01" pos="0 0 1"><edge equality="true"/></flexcomp>
     <geom type="plane" size="0 0 1"/></worldbody></mujoco>)");
@@ -441,7 +441,7 @@ TEST(RayScene, RopeIsHitAtItsRadius) {
   }
 }
 
-TEST(RayScene, SoftSolidIsItsShellAndItsRadius) {
+TEST(RayScene, SoftSolidIsHitAtItsRadius) {
   const TestModel m(R"(<mujoco><worldbody>
     <flexcomp name="jelly" type="grid" dim="3" count="5 5 5" spacing=".1 .1 .1" radius=".01" pos="0 0 1"><edge equality="true"/></flexcomp>
     </worldbody></mujoco>)");
@@ -461,7 +461,7 @@ TEST(RayScene, SoftSolidIsItsShellAndItsRadius) {
 }
 
 // The only allocation is a name that Embree creates for its own log at every refit.
-TEST(RayScene, AFlexThatMovesAllocatesOnceInsideEmbree) {
+TEST(RayScene, MovingFlexAllocatesOnlyInsideEmbree) {
   const TestModel m(R"(<mujoco><worldbody>
     <flexcomp name="cloth" type="grid" dim="2" count="9 9 1" spacing=".2 .2 .2" radius=".01"/>
     <flexcomp name="rope" type="grid" dim="1" count="5 1 1" spacing=".2 .2 .2" radius=".01"/>

@@ -50,7 +50,7 @@ void expect_same(const RayWorld& a, const RayWorld& b, const std::string& after)
   }
 }
 
-TEST(RayWorld, WhateverChangesIsSeen) {
+TEST(RayWorld, UpdateDetectsEveryChange) {
   const testing::TestModel model(field());
   mjModel* m = model.model;
   mjData* d = model.data;

@@ -53,7 +53,7 @@ constexpr char kFlexes[] = R"(<mujoco><worldbody>
   <flexcomp name="jelly" type="grid" dim="3" count="4 3 3" spacing=".1 .1 .1" radius=".01"/>
   <camera/></worldbody></mujoco>)";
 
-TEST(FlexShapes, FacesAndNormalsAreMuJoCos) {
+TEST(FlexShapes, FacesAndNormalsEqualMuJoCo) {
   const TestModel m(kFlexes);
   const SharedGeometry shared(m.model);
   FlexShapes shapes(shared.device.get(), shared.flexes, m.model);
@@ -83,7 +83,7 @@ TEST(FlexShapes, FacesAndNormalsAreMuJoCos) {
 }
 
 // Three materials: one part per material, equal to what MuJoCo draws in that material.
-TEST(FlexShapes, EveryMaterialHasItsPart) {
+TEST(FlexShapes, EveryMaterialHasAPart) {
   const TestModel m(
       R"(<mujoco><asset><material name="a" rgba="1 0 0 1"/><material name="b" rgba="0 1 0 1"/>
     <material name="c" rgba="0 0 1 1"/></asset><worldbody><camera/></worldbody>
@@ -118,7 +118,7 @@ constexpr char kSkin[] = R"(<mujoco><worldbody>
     <bone body="b" bindpos=".3 0 0" bindquat=".9 .1 .3 .2" vertid="4 5 6 7 8 9 10 11" vertweight=".3 .3 .7 .7 1 1 1 1"/>
   </skin></deformable></mujoco>)";
 
-TEST(SkinShapes, VerticesAndNormalsAreMuJoCos) {
+TEST(SkinShapes, VerticesAndNormalsEqualMuJoCo) {
   const TestModel m(kSkin);
   const SharedGeometry shared(m.model);
   SkinShapes shapes(shared.device.get(), m.model);
@@ -139,7 +139,7 @@ TEST(SkinShapes, VerticesAndNormalsAreMuJoCos) {
   }
 }
 
-TEST(SkinShapes, BendsOnlyWhatIsAskedForAndMoved) {
+TEST(SkinShapes, BendsOnlyRequestedGroupsThatMoved) {
   const TestModel m(kSkin);
   const SharedGeometry shared(m.model);
   SkinShapes shapes(shared.device.get(), m.model);

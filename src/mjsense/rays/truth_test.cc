@@ -35,7 +35,7 @@ const TestModel& step() {
   return model;
 }
 
-TEST(Truth, AHitIsWhereMjRayIs) {
+TEST(Truth, HitMustEqualMjRay) {
   const double o[3] = {0.3, 0.2, 4}, down[3] = {0, 0, -1};
   EXPECT_TRUE(agree(step(), o, down, at(3)));
   EXPECT_TRUE(agree(step(), o, down, at(3.0000005)));  // off by one or two roundings
@@ -50,7 +50,7 @@ TEST(Truth, AHitIsWhereMjRayIs) {
 
 // At the edge of a plate mj_ray's distance jumps between two values. Both are accepted where
 // rounding decides, but no value between them.
-TEST(Truth, AtAnEdgeBothSidesAreRightAndNothingBetween) {
+TEST(Truth, AtAnEdgeBothDistancesAreAccepted) {
   const TestModel shelf(
       "<mujoco><worldbody><geom type='plane' size='0 0 1'/>"
       "<geom type='box' size='1 1 .001' pos='0 0 .999'/></worldbody></mujoco>");
@@ -70,7 +70,7 @@ TEST(Truth, AtAnEdgeBothSidesAreRightAndNothingBetween) {
 }
 
 // For a ray nearly parallel to the floor, a turn by one rounding moves the hit by metres.
-TEST(Truth, WhatIsGrazedIsMetWhereATurnedRayMeetsIt) {
+TEST(Truth, GrazingHitsOfTurnedRaysAreAccepted) {
   const double slope = 1e-5, d[3] = {std::sqrt(1 - slope * slope), 0, -slope};
   const double o[3] = {5, 0, 1e-3};
   const double t = o[2] / slope;  // 100 m
@@ -84,7 +84,7 @@ TEST(Truth, WhatIsGrazedIsMetWhereATurnedRayMeetsIt) {
 }
 
 // A ray in the plane of a wall may hit its near edge, miss it, or hit it anywhere between.
-TEST(Truth, InTheBordersPlaneItIsMetAnywhereOrNotAtAll) {
+TEST(Truth, RayInAWallMayHitItAnywhereOrMiss) {
   const double along[3] = {0, 1, 0};
   const double in_it[3] = {1, -3, 0.5}, beside[3] = {1 + 1e-5, -3, 0.5};
   const double within[3] = {1 - 1e-5, -3, 0.5};
@@ -102,7 +102,7 @@ TEST(Truth, InTheBordersPlaneItIsMetAnywhereOrNotAtAll) {
 }
 
 // A hit on a surface is rejected if every neighbouring ray is stopped before it.
-TEST(Truth, ASurfaceBehindASurfaceIsNotMet) {
+TEST(Truth, HitBehindASurfaceIsRejected) {
   const double o[3] = {0.3, 0.2, 4}, down[3] = {0, 0, -1};
   EXPECT_FALSE(agree(step(), o, down, at(4)));
   EXPECT_FALSE(agree(step(), o, down, at(4, {0, 0, -1})));

@@ -75,7 +75,7 @@ int in_view(Studio& s, const Eye& e, const PixelGrid& grid) {
   return count;
 }
 
-TEST(Frustum, PicturesAreThoseOfAllGeoms) {
+TEST(Frustum, CullingDoesNotChangeImages) {
   for (const int count : {60, 700}) {  // tested one by one, and in blocks
     SCOPED_TRACE(count);
     Studio s(crowd(count));
@@ -97,7 +97,7 @@ TEST(Frustum, PicturesAreThoseOfAllGeoms) {
 }
 
 // Lights of every kind at random poses: near and far, in the image and behind the camera.
-TEST(Frustum, ShadowsAreThoseOfAllGeoms) {
+TEST(Frustum, CullingDoesNotChangeShadows) {
   const char* kinds[] = {"type='directional'", "type='spot' cutoff='60'", "type='point'"};
   const PixelGrid pyramid = grid_from_fovy(48, 32, 50, false);
   PixelGrid slab = grid_from_fovy(48, 32, 8, true);
@@ -132,7 +132,7 @@ TEST(Frustum, ShadowsAreThoseOfAllGeoms) {
 }
 
 // A small box outside the image casts a shadow 20 m away, on a plane or on another box.
-TEST(Frustum, ShadowsOfALowSunAreLong) {
+TEST(Frustum, KeepsCastersOfLongShadows) {
   struct Case {
     const char *what, *dir;
     Eye eye;
@@ -161,7 +161,7 @@ TEST(Frustum, ShadowsOfALowSunAreLong) {
 }
 
 // Culling depends neither on earlier poses nor on earlier sizes.
-TEST(Frustum, WhatMovesIntoThePictureIsSeen) {
+TEST(Frustum, GeomsThatMoveIntoTheImageAreVisible) {
   for (const int count : {60, 700}) {
     Studio s(crowd(count));
     s.update();

@@ -12,7 +12,7 @@
 namespace mjsense {
 namespace {
 
-TEST(Highlight, IsNothingWhereASurfaceIsDull) {
+TEST(Highlight, IsZeroBelowTheThreshold) {
   for (float exponent : {0.0f, 1.0f, 3.9f, 4.0f, 13.0f, 27.5f, 64.0f, 128.0f, 1000.0f, 1e5f}) {
     const float dull = dull_below(exponent);
     const auto of = [&](float x) { return first_lane(power(splat(x), splat(exponent))); };

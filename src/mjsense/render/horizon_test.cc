@@ -63,7 +63,7 @@ TEST(Horizon, OfAWallIsItsHeightOverItsDistance) {
 }
 
 // Two faces that share an edge, and a third that touches only their common corner.
-TEST(Horizon, OfANeighbourIsTheAngleBetweenThem) {
+TEST(Horizon, OfANeighbourIsTheAngleBetweenTheFaces) {
   for (double angle : {-0.7, 0.0, 0.2, 0.6}) {
     const float c = static_cast<float>(std::cos(angle)), s = static_cast<float>(std::sin(angle));
     Mesh mesh;
@@ -78,7 +78,7 @@ TEST(Horizon, OfANeighbourIsTheAngleBetweenThem) {
 }
 
 // A horizon is computed once per face and octant, after enough rays have started on the face.
-TEST(Horizon, IsFoundOnceAndNotForTheFirstRays) {
+TEST(Horizon, IsComputedOnceAndNotForTheFirstRays) {
   Mesh mesh;
   mesh.add({0, 0, 0, 1, 0, 0, 0, 1, 0});
   mesh.add({0, 0, 2, 0, 1, 2, 0, 0, 3});

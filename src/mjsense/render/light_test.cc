@@ -45,7 +45,7 @@ TEST(Light, AMatteSphereHasLambertsCosine) {
 }
 
 // A surface that faces away from the light has no highlight, wherever the viewer is.
-TEST(Light, ASurfaceTurnedAwayDoesNotShine) {
+TEST(Light, SurfaceFacingAwayHasNoHighlight) {
   const auto seen = [](double degrees) {
     const double a = degrees * M_PI / 180;
     Studio s(
@@ -62,7 +62,7 @@ TEST(Light, ASurfaceTurnedAwayDoesNotShine) {
   EXPECT_EQ(seen(100), 0);  // without that rule it would be cos(50 degrees)
 }
 
-TEST(Light, AGlowingSurfaceNeedsNoLight) {
+TEST(Light, EmissionNeedsNoLight) {
   Studio s(
       std::string(kDark) +
       R"(<asset><material name="m" rgba="1 .5 .2 1" emission=".6" specular="0"/></asset><worldbody>
@@ -72,7 +72,7 @@ TEST(Light, AGlowingSurfaceNeedsNoLight) {
 }
 
 // MuJoCo's rule: a scene without any light gets an ambient light of 0.3.
-TEST(Light, WithoutAnyLightThereIsAnAmbientOne) {
+TEST(Light, SceneWithoutLightsGetsAmbientLight) {
   Studio s(std::string(kDark) +
            R"(<worldbody><geom type="plane" size="5 5 1" rgba="1 .5 .2 1"/></worldbody>)");
   expect_pixel(s.from_above(0, 0), {byte(.3), byte(.15), byte(.06)});
@@ -92,7 +92,7 @@ TEST(Light, TwoLightsAddUp) {
 //        |         A box above the light casts no shadow,
 //        |         a box between it and the floor does.
 //   -----------
-TEST(Shadow, IsOfWhatStandsBetween) {
+TEST(Shadow, IsCastByGeomsBetweenLightAndPoint) {
   for (const char* kind : {"spot", "directional"}) {
     Studio s(std::string(kDark) + kMatte + R"(<worldbody><light pos="0 0 2" dir="0 0 -1" type=")" +
              kind + R"(" cutoff="85"
@@ -115,7 +115,7 @@ TEST(Shadow, IsOfWhatStandsBetween) {
 //   \    \      Directional light at 45 degrees: a box with x in [-.1, .1] and z in [.4, .6]
 //    \ [] \     shadows the floor from x = -.1 + .4 to .1 + .6.
 //   ---====---
-TEST(Shadow, OfASlantedSunLiesWhereItShould) {
+TEST(Shadow, OfSlantedDirectionalLight) {
   for (const char* shape : {"type='box' size='.1 .3 .1'", "type='mesh' mesh='block'"}) {
     Studio s(std::string(kDark) + kMatte +
              R"(<asset><mesh name="block" vertex="-.1 -.3 -.1 .1 -.3 -.1 -.1 .3 -.1 .1 .3 -.1
@@ -139,7 +139,7 @@ TEST(Shadow, OfASlantedSunLiesWhereItShould) {
 
 //      |  \    Directional light at 45 degrees: the upright part of a mesh, 0.5 m high, shadows the
 //  ====|====   level part of the same mesh from x = .2 - .5 on.
-TEST(Shadow, OfAMeshLiesOnItselfToo) {
+TEST(Shadow, OfAMeshOnItself) {
   std::string vertices, faces;
   const auto add_box = [&](const std::array<double, 6>& limits, int first) {
     for (int corner = 0; corner < 8; ++corner)
@@ -177,7 +177,7 @@ TEST(Shadow, OfAMeshLiesOnItselfToo) {
 }
 
 // A shadow removes only the light that casts it.
-TEST(Shadow, LeavesTheOtherLights) {
+TEST(Shadow, DoesNotAffectOtherLights) {
   Studio s(std::string(kDark) + kMatte + R"(<worldbody>
     <light type="directional" pos="0 0 3" dir="0 0 -1" diffuse=".5 .5 .5" specular="0 0 0"/>
     <light type="directional" pos="3 0 3" dir="-1 0 -1" diffuse=".5 .5 .5" specular="0 0 0"/>

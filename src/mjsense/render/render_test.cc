@@ -47,7 +47,7 @@ TEST(Shading, SpotHasAConeAnExponentAndAttenuation) {
   expect_pixel(s.from_above(1.3, 0, 5), {0, 0, 0});  // 33 degrees: outside the cone
 }
 
-TEST(Shading, SpecularHighlightIsWhereHalfwayMeetsTheNormal) {
+TEST(Shading, SpecularHighlightFollowsTheHalfVector) {
   Studio s(
       std::string(kDark) +
       R"(<asset><material name="m" rgba="0 0 0 1" specular=".5" shininess=".25"/></asset><worldbody>
@@ -61,7 +61,7 @@ TEST(Shading, SpecularHighlightIsWhereHalfwayMeetsTheNormal) {
                {int(v + .5), int(v + .5), int(v + .5)});
 }
 
-TEST(Shading, ShadowsHaveSharpKnownEdges) {
+TEST(Shading, ShadowsHaveSharpEdges) {
   // A box of half size 0.2 at height 1, light at height 3: its shadow reaches to 0.2 * 3 / 1.8 =
   // 1/3.
   Studio s(std::string(kDark) + kMatte + R"(<worldbody>
@@ -114,7 +114,7 @@ TEST(Texture, CubeFacesAndSkyFollowOpenGL) {
 
 // The sky is a cylinder of radius 0.7 * 50 * 1 m and the camera is 7 m above the floor, so a ray
 // that falls by 0.2 s per metre meets the floor at 1 / s of that radius.
-TEST(Shading, HazeLiesWhereTheFloorMeetsTheSky) {
+TEST(Shading, HazeIsWhereTheFloorMeetsTheSky) {
   Studio s(
       std::string(R"(<statistic extent="1"/><visual><map haze=".3"/><rgba haze="0 0 1 1"/>
     <headlight ambient="1 1 1" diffuse="0 0 0" specular="0 0 0"/></visual>)") +
@@ -145,7 +145,7 @@ TEST(Shading, TransparentGeomsAreDrawnTwice) {
   expect_pixel(s.from_above(0, 0), {64, 64, 64});  // 1 * (1 - .5)^2
 }
 
-TEST(Shading, FloorMirrorsWithItsReflectance) {
+TEST(Shading, FloorReflectsByItsReflectance) {
   Studio s(std::string(kFlat) +
            R"(<asset><material name="mirror" rgba="0 0 .2 1" reflectance=".5"/></asset><worldbody>
     <geom type="plane" size="5 5 1" material="mirror"/><geom type="box" size=".5 .1 .5" pos="0 1 1" rgba="1 0 0 1"/>
@@ -160,7 +160,7 @@ TEST(Shading, FloorMirrorsWithItsReflectance) {
   expect_pixel(s.center({0, -1, 1}, {1, 0, 0}, {0, h, h}, 1), {0, 0, 51});
 }
 
-TEST(Kernels, EveryInstructionSetPaintsTheSamePicture) {
+TEST(Kernels, EveryInstructionSetRendersTheSameImage) {
   Studio s(
       R"(<asset><texture name="t" type="2d" builtin="checker" rgb1="1 0 0" rgb2="0 0 1" width="64" height="64"/>
     <texture name="q" type="cube" builtin="gradient" rgb1="1 1 0" rgb2="0 1 1" width="16" height="16"/>
@@ -204,7 +204,7 @@ TEST(Shading, SamplesSoftenEdges) {
   EXPECT_GT(partly(s.shoot({0, 0, 3}, {1, 0, 0}, {0, 1, 0}, 40, 45, 4)), 100);
 }
 
-TEST(CameraModel, GridsAreThosePublished) {
+TEST(CameraModel, GridsFollowTheirFormulas) {
   const PixelGrid g = grid_from_fovy(8, 6, 90, false);
   EXPECT_FLOAT_EQ(g.left, -8.0f / 6);
   EXPECT_FLOAT_EQ(g.top, 1);
@@ -251,7 +251,7 @@ TEST(CameraModel, DistortionIsUndone) {
 
 // An image whose aspect ratio differs from the sensor's shows a part of the sensor, with square
 // pixels if the sensor has square pixels.
-TEST(Grid, APictureIsCutOutOfTheSensor) {
+TEST(Grid, ImageIsACropOfTheSensor) {
   const float focal[4] = {0.004f, 0.004f, 0, 0}, size[2] = {0.004f, 0.003f};
   const PixelGrid wide = grid_from_sensor(8, 4, focal, size);
   EXPECT_NEAR(8 * wide.dx, 1.0, 1e-6);

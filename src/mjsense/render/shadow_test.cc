@@ -101,7 +101,7 @@ int reached(const Studio& s, const double* p, const double* n) {
   return lit == rays ? 1 : lit == 0 ? 0 : -1;
 }
 
-TEST(Shadow, IsWhereMuJoCosRaysMeetSomething) {
+TEST(Shadow, AgreesWithMuJoCosRays) {
   constexpr int kSize = 40;
   int compared[2] = {};
   std::vector<RenderTiles> kernels{render_tiles_portable};

@@ -38,7 +38,7 @@ void paint(Studio& s, const Pixel* fields = kFields, int size = 32) {
 }
 
 // Seen from the side, the first row of a texture is at the top of every closed shape.
-TEST(Texture, StandsUprightOnEveryShape) {
+TEST(Texture, IsUprightOnEveryShape) {
   for (const char* shape :
        {"type='box' size='.5 .5 .5'", "type='sphere' size='.5'", "type='ellipsoid' size='.4 .5 .6'",
         "type='cylinder' size='.4 .5'", "type='capsule' size='.3 .5'"}) {
@@ -71,7 +71,7 @@ TEST(Texture, GoesAroundASphereFromXToY) {
 
 // The texture covers a capsule from pole to pole: its first row is at the upper pole, its last at
 // the lower.
-TEST(Texture, EndsAtThePolesOfACapsule) {
+TEST(Texture, CoversACapsuleFromPoleToPole) {
   Studio s(painted("<geom type='capsule' size='.5 .3' material='m'/>"));
   constexpr Pixel kRows[] = {kRed, kRed, kBlue, kBlue};
   paint(s, kRows);
@@ -80,7 +80,7 @@ TEST(Texture, EndsAtThePolesOfACapsule) {
 }
 
 // Each end of a cylinder shows the whole texture, projected along the axis.
-TEST(Texture, LiesFlatOnTheEndsOfACylinder) {
+TEST(Texture, IsProjectedOntoTheEndsOfACylinder) {
   Studio s(painted("<geom type='cylinder' size='.5 .3' material='m'/>"));
   paint(s);
   expect_pixel(s.from_above(-0.25, -0.25), kRed);
@@ -89,7 +89,7 @@ TEST(Texture, LiesFlatOnTheEndsOfACylinder) {
   expect_pixel(s.from_above(0.25, 0.25), kWhite);
 }
 
-TEST(Texture, LiesOnTopOfABoxWithItsFirstRowAtY) {
+TEST(Texture, FirstRowIsAtPlusYOnTopOfABox) {
   Studio s(painted("<geom type='box' size='.5 .4 .3' material='m'/>"));
   paint(s);
   expect_pixel(s.from_above(-0.25, 0.2), kRed);
@@ -100,7 +100,7 @@ TEST(Texture, LiesOnTopOfABoxWithItsFirstRowAtY) {
 
 // A mesh uses the texture coordinates of its corners. u points right; the direction of v is
 // MuJoCo's choice.
-TEST(Texture, FollowsTheCornersOfAMesh) {
+TEST(Texture, UsesTheTexcoordsOfAMesh) {
   Studio s(std::string(kFlat) +
            R"(<asset><texture name="t" type="2d" builtin="flat" width="2" height="2"/>
     <material name="m" texture="t"/><mesh name="sheet" inertia="shell" vertex="-1 -1 0 1 -1 0 1 1 0 -1 1 0"
@@ -123,7 +123,7 @@ TEST(Texture, FollowsTheCornersOfAMesh) {
 }
 
 // A pixel shows the mean of a texture that is finer than the pixels.
-TEST(Texture, IsFilteredWhereItIsFinerThanPixels) {
+TEST(Texture, IsFilteredIfFinerThanPixels) {
   Studio s(std::string(kFlat) +
            R"(<asset><texture name="t" type="2d" builtin="flat" width="64" height="64"/>
     <material name="m" texture="t" texrepeat="40 40"/></asset><worldbody><geom type="plane" size="5 5 1" material="m"/></worldbody>)");
@@ -133,7 +133,7 @@ TEST(Texture, IsFilteredWhereItIsFinerThanPixels) {
 }
 
 // With texuniform a texture has the same size in metres on shapes of any size.
-TEST(Texture, UniformOnesAreCountedByTheMetre) {
+TEST(Texture, UniformRepeatIsPerMetre) {
   const auto borders_per_metre = [](const char* size, const char* material) {
     Studio s(painted((std::string("<geom type='plane' material='m' size='") + size + "'/>").c_str(),
                      material));
@@ -154,7 +154,7 @@ TEST(Texture, UniformOnesAreCountedByTheMetre) {
 
 // A mesh of twelve triangles looks like the box with the same corners: same pixels, depth and
 // normals.
-TEST(Triangles, DrawTheBoxThatTheyBound) {
+TEST(Triangles, OfABoxRenderLikeTheBox) {
   const std::string mesh =
       R"(<asset><mesh name="block" vertex="-.3 -.2 -.1 .3 -.2 -.1 -.3 .2 -.1 .3 .2 -.1
     -.3 -.2 .1 .3 -.2 .1 -.3 .2 .1 .3 .2 .1"/></asset>)";
@@ -193,7 +193,7 @@ TEST(Triangles, DrawTheBoxThatTheyBound) {
 
 // The front of an open sheet is where its corners are counterclockwise. From behind it is
 // invisible.
-TEST(Triangles, ShowTheirFrontsOnly) {
+TEST(Triangles, AreVisibleFromTheFrontOnly) {
   Studio s(std::string(kFlat) +
            R"(<asset><mesh name="sheet" inertia="shell" vertex="-1 -1 0 1 -1 0 1 1 0 -1 1 0"
     face="0 1 2 0 2 3"/></asset><worldbody><geom type="mesh" mesh="sheet" rgba="1 1 1 1" contype="0" conaffinity="0"/></worldbody>)");
@@ -215,7 +215,7 @@ TEST(Triangles, ShowTheirFrontsOnly) {
   }
 }
 
-TEST(Surface, OfTwoInOnePlaceTheLaterShows) {
+TEST(Surface, HigherIdWinsIfSurfacesCoincide) {
   for (const char* shape : {"type='box' size='.3 .3 .3'", "type='mesh' mesh='block'"}) {
     Studio s(std::string(kFlat) +
              R"(<asset><mesh name="block" vertex="-.3 -.3 -.3 .3 -.3 -.3 -.3 .3 -.3 .3 .3 -.3
@@ -226,7 +226,7 @@ TEST(Surface, OfTwoInOnePlaceTheLaterShows) {
 }
 
 // A geom's own colour, unless it is the default, takes precedence over its material's.
-TEST(Surface, AGeomsOwnColourComesBeforeItsMaterials) {
+TEST(Surface, OwnColourOverridesTheMaterials) {
   Studio s(std::string(kFlat) + R"(<asset><material name="m" rgba="0 0 1 1"/></asset><worldbody>
     <geom type="box" size=".1 .1 .1" pos="-1 0 0" material="m"/><geom type="box" size=".1 .1 .1" pos="0 0 0" material="m" rgba="1 0 0 1"/>
     <geom type="box" size=".1 .1 .1" pos="1 0 0" rgba="0 1 0 1"/></worldbody>)");
@@ -282,7 +282,7 @@ TEST(Surface, SamplesSoftenEdgesInBothDirections) {
 }
 
 // =======[camera]==========> A beam from behind the camera to far ahead.
-TEST(Window, WhatReachesBehindTheCameraIsSeenWhole) {
+TEST(Window, GeomReachingBehindTheCameraIsFullyVisible) {
   for (const char* shape :
        {"type='box' size='.1 20 .1'", "type='capsule' size='.1 20' euler='90 0 0'",
         "type='mesh' mesh='beam'"}) {
@@ -300,7 +300,7 @@ TEST(Window, WhatReachesBehindTheCameraIsSeenWhole) {
 }
 
 // An orthographic camera shows an object at the same position and size at any distance.
-TEST(Window, OfParallelRaysDoesNotShrink) {
+TEST(Window, OrthographicSizeIsIndependentOfDistance) {
   for (const double distance : {2.0, 8.0, 200.0}) {
     Studio s(
         std::string(kFlat) +
@@ -321,7 +321,7 @@ TEST(Window, OfParallelRaysDoesNotShrink) {
 
 // The layer of fixed geoms is reused. Moving geoms and their shadows are drawn over it; if any
 // fixed geom or light changes, the layer is no longer used.
-TEST(FixedLayer, IsUsedWhereNothingOfItHasChanged) {
+TEST(FixedLayer, IsUsedWhileItsInputsAreUnchanged) {
   Studio s(std::string(kDark) + kMatte + R"(<worldbody>
     <light pos="0 0 3" dir="0 0 -1" cutoff="80" exponent="0" diffuse="1 1 1" specular="0 0 0"/>
     <geom type="plane" size="5 5 1" material="matte"/><geom name="fixed" type="box" size=".2 .2 .1" pos=".6 0 .1" material="matte"/>
@@ -391,7 +391,7 @@ TEST(FixedLayer, IsUsedWhereNothingOfItHasChanged) {
 
 // One common layer serves all worlds that look the same. The first worlds also have layers of their
 // own, up to the memory limit.
-TEST(FixedLayer, WorldsShareOneUntilTheyLookDifferent) {
+TEST(FixedLayer, WorldsThatLookTheSameShareALayer) {
   Studio s(std::string(kDark) + kMatte + R"(<worldbody><light pos="0 0 3" dir="0 0 -1"/>
     <geom type="plane" size="5 5 1" material="matte"/><camera pos="0 0 4"/></worldbody>)");
   s.options.shadows = s.options.layered = true;
@@ -425,7 +425,7 @@ TEST(FixedLayer, WorldsShareOneUntilTheyLookDifferent) {
   EXPECT_EQ(layers.find(0, view_of(1)), common);
 }
 
-TEST(FixedLayer, NeedsACameraAndLampsThatStandStill) {
+TEST(FixedLayer, NeedsAFixedCameraAndFixedLights) {
   const auto possible = [](const char* world) {
     Studio s(std::string("<worldbody><geom type='plane' size='1 1 1'/>") + world + "</worldbody>");
     return FixedLayer::possible(s.model.get(), 0);
