@@ -19,7 +19,7 @@ namespace mjsense::h5 {
 inline constexpr int kMostDepth = 32;               // maximum depth of nested groups
 inline constexpr std::size_t kMostNames = 100'000;  // maximum number of names in a group or file
 inline constexpr std::size_t kMostTextBytes = std::size_t{1} << 24;  // maximum size of a text
-// maximum size of a row or a chunk
+// Maximum size of a row or a chunk.
 inline constexpr std::uint64_t kMostRowBytes = std::uint64_t{1} << 26;
 
 // Opens `path` link by link. Only hard links are followed. Throws RuntimeError for a soft or

@@ -18,8 +18,8 @@ struct FlexSurface {
   int num_vertices = 0;  // of the flex; surface vertex v + num_vertices is v in the second sheet
   bool flat = false;     // flat shading: one normal per face
   // [F, 3] surface vertices. Dimension 2: element e has faces 2 e and 2 e + 1; the border's faces
-  // follow. Dimension 3: the shells one after another. Dimension 1: empty. If elements differ in
-  // material, the faces of each material are contiguous.
+  // follow. Dimension 3: the triangles of mjModel's flex_shell, in order. Dimension 1: empty. If
+  // elements differ in material, the faces of each material are contiguous.
   std::vector<int> faces;
   std::vector<int> texcoords;  // [F, 3] indices into the flex's texture coordinates, or empty
   std::vector<int> edges;      // [E, 2] vertices, for dimension 1 only

@@ -308,7 +308,7 @@ TEST_P(Kernels, TiesGoToTheLowerGeom) {
   for (double x : {0.0, 0.1, 0.3, 0.7}) EXPECT_EQ(s.down(low, 9, x).geom, s.id("first"));
   std::vector<std::uint8_t> hidden(s.scene.num_objects(), 0);
   hidden[s.id("first")] = hidden[s.id("again")] = 1;
-  // not "drum", whose id is higher
+  // The other candidate, "drum", has a higher id.
   EXPECT_EQ(s.down({.groups = 1, .hidden = hidden}).geom, s.id("cube"));
 }
 

@@ -188,7 +188,7 @@ TEST(Frustum, GeomsThatMoveIntoTheImageAreVisible) {
       place(6, -6);  // beside the image
       EXPECT_FALSE(sees(geom));
       const double size = s.model->geom_size[3 * geom];
-      // now it reaches into the image
+      // Now it reaches into the image.
       for (int k = 0; k < 3; ++k) s.model->geom_size[3 * geom + k] = 5;
       s.update();
       EXPECT_TRUE(sees(geom));

@@ -189,7 +189,7 @@ TEST(Horizon, RaysAboveItAreClear) {
           }
           return false;
         };
-        // at the lowest elevation that counts as clear
+        // Rays at the lowest elevation that counts as clear.
         for (int octant = 0; octant < Horizons::kOctants; ++octant) {
           if (sines[octant] > 1) continue;
           double up[3];

@@ -37,7 +37,7 @@ TEST(Light, AMatteSphereHasLambertsCosine) {
                              {0.8, 0.0},
                              {0.95, 0.0}}) {
     const double z = std::sqrt(1 - x * x - y * y);
-    // negative where the surface faces away
+    // Negative where the surface faces away from the light.
     const double cosine = -0.766044443 * x + 0.642787610 * z;
     expect_pixel(s.center({x, y, 3}, {1, 0, 0}, {0, 1, 0}, 0.01),
                  {byte(cosine), byte(0.5 * cosine), byte(0.2 * cosine)});

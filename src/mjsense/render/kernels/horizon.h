@@ -178,7 +178,7 @@ inline float steepest_of(const Outlook& from, const TriangleBlock& block, float 
       Vec3f out = along(n, -dot(n, up), up);
       const Float away = dot(out, x[0]) + dot(out, x[1]) + dot(out, x[2]);
       const Float size = dot(out, out);
-      // the triangle is not nearly parallel to the face
+      // False if the triangle is nearly parallel to the face.
       const Mask known = splat(1e-6f) * dot(n, n) < size;
       const Float sign =
           select(known, select(away < zero, splat(-1.0f), splat(1.0f)) / sqrt(size), zero);

@@ -132,7 +132,7 @@ inline void add_light(const ViewLight& light, const LightTerm& term, const Surfa
 // Shadow casters of a tile, per light. In a layered view, the fixed lanes of a packet already store
 // which of them are shadowed by fixed geoms.
 struct Shadows {
-  // if the view is not layered, all casters are in `moving`
+  // If the view is not layered, all casters are in `moving`.
   Casters fixed[View::kMaxLights], moving[View::kMaxLights];
   const FixedTile* known = nullptr;
   // State of the current packet:

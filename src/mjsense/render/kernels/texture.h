@@ -44,7 +44,7 @@ struct Level {
 
   Level(const Texture& texture, Float level) {
     const float first = first_lane(level);
-    // most packets need only one level
+    // Most packets need only one level.
     if (!any((level < splat(first)) | (splat(first) < level))) {
       const int i = static_cast<int>(first);
       width = splat(texture.width[i]);

@@ -60,7 +60,7 @@ bool undo_brown_conrady(Point target, std::span<const double> k, Point& out) {
   return std::hypot(target.x - f.x, target.y - f.y) < 1e-9;
 }
 
-// maximum angle of a fisheye from its axis
+// Maximum angle of a fisheye from its axis.
 constexpr double kWidest = 89.0 * std::numbers::pi / 180;
 
 double fisheye(double theta, std::span<const double> k) {

@@ -68,7 +68,7 @@ class Look {
   std::vector<Texture> textures_;
   std::vector<MeshLook> meshes_, flex_parts_, skins_;
   std::vector<std::vector<std::uint32_t>> texels_;
-  // tables of meshes are shared in the process, by content
+  // Tables of meshes are shared by all models of the process that have equal meshes.
   std::vector<std::shared_ptr<const MeshTables>> tables_;
   const Texture* skybox_ = nullptr;
 };

@@ -53,7 +53,7 @@ struct alignas(64) ViewGeom {
   int object_id, object;  // for segmentation: id and mjtObj
   bool fixed;             // belongs to the layer View::fixed
   bool transparent;       // blended over what is behind it; casts shadows and receives none
-  // a plane seen from below: drawn as a faint veil, absent in depth and segmentation
+  // A plane seen from below: drawn as a faint veil, absent in depth and segmentation.
   bool behind;
   void* bvh;  // RTCScene of a mesh, a height field's surface, a flex or a skin; else null
   const Clusters* clusters;  // the same triangles, for rasterising; null: use rays only
@@ -115,10 +115,12 @@ struct View {
   static constexpr int kMaxLights = 32;
   PixelGrid grid;
   float near = 0, far = 0;  // planar depth, m
+  // Order: num_opaque visible opaque geoms, nearest first; then num_transparent visible transparent
+  // ones, in MuJoCo's blending order; then geoms that only cast shadows.
   const ViewGeom* geoms = nullptr;
-  int num_geoms = 0;        // first num_opaque visible opaque geoms, nearest first;
-  int num_opaque = 0;       // then num_transparent visible ones, in MuJoCo's blending order;
-  int num_transparent = 0;  // the rest only casts shadows
+  int num_geoms = 0;
+  int num_opaque = 0;
+  int num_transparent = 0;
   ViewLight lights[kMaxLights];
   LightFrames light_frames[kMaxLights];
   LightSides light_sides[kMaxLights];  // for lights with frames

@@ -371,7 +371,7 @@ void ViewBuilder::set_sky(const RayGeom* plane, const Sky& sky, const double pos
 void ViewBuilder::set_lights(const RayWorld& world, const Appearance& appearance,
                              const double position[3], const double rotation[9]) {
   view_.num_lights = static_cast<int>(appearance.lights().size());
-  // as in MuJoCo, so that the image is not black
+  // As in MuJoCo, so that the image is not black.
   view_.global_ambient = view_.num_lights == 0 ? 0.3f : 0.0f;
   for (int i = 0; i < view_.num_lights; ++i) {
     ViewLight& light = view_.lights[i];
