@@ -27,133 +27,135 @@ if TYPE_CHECKING:
 
 @dataclass
 class MujocoCfg(_config_methods.Config):
-    """Physics options of a scene. Entities' own ``<option>`` values are not carried over: one scene, one physics."""
+    """Physics options of a scene. The ``<option>`` values of entities are not used, because a scene has one set of
+    physics options."""
 
     timestep: float = 0.002
-    """Of one substep. [s]"""
+    """Duration of one physics step. [s]"""
     integrator: Literal["euler", "rk4", "implicit", "implicitfast", "discrete"] = "implicitfast"
-    """How a state becomes the next one."""
+    """Numerical integrator."""
     cone: Literal["pyramidal", "elliptic"] = "pyramidal"
-    """Of friction."""
+    """Type of the friction cone."""
     solver: Literal["pgs", "cg", "newton"] = "newton"
-    """Of the constraints."""
+    """Constraint solver."""
     jacobian: Literal["dense", "sparse", "auto"] = "auto"
-    """How the constraints' Jacobian is kept."""
+    """Storage of the constraint Jacobian."""
     impratio: float = 1.0
-    """Stiffness of friction over that of normal forces."""
+    """Ratio of frictional to normal constraint impedance."""
     iterations: int = 100
-    """Of the solver, at most."""
+    """Maximum number of solver iterations."""
     tolerance: float = 1e-08
-    """At which the solver stops."""
+    """Termination tolerance of the solver."""
     ls_iterations: int = 50
-    """Of the solver's line search, at most."""
+    """Maximum number of line search iterations of the solver."""
     ls_tolerance: float = 0.01
-    """At which the line search stops."""
+    """Termination tolerance of the line search."""
     ccd_iterations: int = 50
-    """Of convex collision detection, at most."""
+    """Maximum number of iterations of convex collision detection."""
     gravity: Sequence[float] = (0.0, 0.0, -9.81)
-    """In the world frame. [m/s^2]"""
+    """Gravitational acceleration in the world frame. [m/s^2]"""
     magnetic: Sequence[float] = (0.0, -0.5, 0.0)
-    """What magnetometers read, in the world frame."""
+    """Magnetic flux that magnetometers measure, in the world frame."""
     wind: Sequence[float] = (0.0, 0.0, 0.0)
-    """Velocity of the medium. [m/s]"""
+    """Velocity of the medium in the world frame. [m/s]"""
     density: float = 0.0
-    """Of the medium. [kg/m^3]"""
+    """Density of the medium. [kg/m^3]"""
     viscosity: float = 0.0
-    """Of the medium. [Pa s]"""
+    """Viscosity of the medium. [Pa s]"""
     disableflags: Sequence[str] = ()
-    """Lower-case names of MJCF flags: ``("contact", "gravity")``."""
+    """Flags to disable, by their lower-case MJCF names: ``("contact", "gravity")``."""
     enableflags: Sequence[str] = ()
-    """Likewise, of those that are off."""
+    """Flags to enable that are off by default, by their lower-case MJCF names."""
 
 
 @dataclass
 class SceneCfg(_config_methods.SceneCfg):
-    """What all worlds share."""
+    """The configuration shared by all worlds."""
 
     num_envs: int = 1
-    """B, unless ``Simulation(num_worlds=...)`` says otherwise."""
+    """Number of worlds B; ``Simulation(num_worlds=...)`` overrides it."""
     env_spacing: float = 2.0
-    """Between the origins of neighbouring worlds on a plane. [m]"""
+    """Distance between the origins of neighbouring worlds on a plane. [m]"""
     terrain: TerrainCfg | None = None
-    """The ground."""
+    """The ground; None adds no ground."""
     entities: Mapping[str, EntityCfg] = field(default_factory=dict)
-    """Attached in this order."""
+    """Models by name; they are attached in this order."""
     sensors: Sequence[Any] = ()
-    """Sensor configurations, configurations of your own with ``build()``, or :class:`mjsense.Sensor` objects."""
+    """Sensor configurations, user-defined configurations with ``build()``, or :class:`mjsense.Sensor` objects."""
     extent: float | None = None
-    """Overrides ``stat.extent`` of the model. [m]"""
+    """Value that replaces ``stat.extent`` of the model. [m]"""
     spec_fn: Callable[[mujoco.MjSpec], None] | None = None
-    """Edits the spec last, before compilation."""
+    """Function that edits the MjSpec last, before compilation."""
     options: MujocoCfg = field(default_factory=MujocoCfg)
-    """Of the physics."""
+    """Physics options."""
     base: str | Path | None = None
-    """A whole model to start from, as it is (path or XML text): names without a prefix, any number of free joints, its
-    own ``<option>`` unless ``options`` are set. Its sensors are found; it is no entity."""
+    """A complete model (path or XML text) that the scene starts from, used unchanged: its names get no prefix, it may
+    have any number of free joints, and its ``<option>`` is kept unless ``options`` are set. Its sensors become
+    sensors of the scene; it is not an entity."""
 
 
 @dataclass
 class TerrainCfg(_config_methods.Config):
-    """The ground, registered as entity ``terrain``: a plane, or tiles of rising difficulty (levels along x, types along
-    y)."""
+    """The ground, registered as entity ``terrain``: a plane, or a grid of tiles of increasing difficulty (levels along
+    x, types along y)."""
 
     terrain_type: Literal["plane", "generator"] = "plane"
-    """An infinite plane, or tiles."""
+    """An infinite plane, or generated tiles."""
     sub_terrains: Mapping[str, SubTerrainCfg] = field(default_factory=dict)
-    """Kinds of tiles by name; empty: one of every kind."""
+    """Tile kinds by name; empty: one of each kind."""
     levels: int = 5
-    """Tiles along x."""
+    """Number of tiles along x."""
     types: int = 0
-    """Columns; 0: one for each sub-terrain."""
+    """Number of columns along y; 0: one per sub-terrain."""
     tile_size: Sequence[float] = (8.0, 8.0)
-    """In x and y. [m]"""
+    """Size of a tile in x and y. [m]"""
     difficulty: Sequence[float] = (0.0, 1.0)
-    """Of the first and the last level."""
+    """Difficulty of the first and of the last level."""
     resolution: float = 0.1
-    """Of height fields. [m]"""
+    """Grid spacing of height fields. [m]"""
     border: float = 5.0
-    """Flat, around all tiles; 0: none. [m]"""
+    """Width of the flat border around all tiles; 0: no border. [m]"""
     max_init_level: int = -1
-    """Highest level that a world starts on; -1: any."""
+    """Highest level on which a world may start; -1: any level."""
     seed: int = 0
-    """Of the tiles and of where worlds start."""
+    """Seed of the tile shapes and of the worlds' start tiles."""
     daylight: bool = True
-    """Where models and ``spec_fn`` bring no lamp a sun, where no sky one, and squares on a plane that has no material.
-    False: MuJoCo's headlight alone."""
+    """Add a sun, a sky and a checkered ground where the models and ``spec_fn`` define none. False: MuJoCo's headlight is
+    the only light."""
 
 
 @dataclass
 class SubTerrainCfg(_config_methods.Config):
-    """One kind of tile. Pairs are (value at difficulty 0, value at difficulty 1)."""
+    """One kind of tile. Pairs hold the value at difficulty 0 and the value at difficulty 1."""
 
     kind: Literal["flat", "rough", "waves", "slope", "stairs", "stepping_stones"] = "flat"
-    """What it looks like."""
+    """The shape of the tile."""
     proportion: float = 1.0
-    """Share of the columns."""
+    """Share of the columns that have this kind."""
     inverted: bool = False
-    """slope, stairs: down into a pit."""
+    """slope, stairs: descend into a pit instead of rising to a platform."""
     platform_width: float = 2.0
-    """The flat square at the centre. [m]"""
+    """Width of the flat square at the centre. [m]"""
     amplitude: Sequence[float] = (0.01, 0.08)
-    """rough and waves: half the height. [m]"""
+    """rough, waves: half of the height difference. [m]"""
     spacing: float = 0.2
-    """rough: between the knots. [m]"""
+    """rough: distance between the random heights. [m]"""
     waves: int = 2
-    """waves: periods a tile."""
+    """waves: number of periods per tile."""
     slope: Sequence[float] = (0.0, 0.6)
-    """slope: rise over run; inverted for a pit."""
+    """slope: rise over run."""
     step_height: Sequence[float] = (0.03, 0.2)
-    """stairs: of a step. [m]"""
+    """stairs: height of a step. [m]"""
     step_width: float = 0.3
-    """stairs: of a step. [m]"""
+    """stairs: depth of a step. [m]"""
     stone_width: Sequence[float] = (1.0, 0.35)
-    """stepping_stones: of a stone. [m]"""
+    """stepping_stones: width of a stone. [m]"""
     gap: Sequence[float] = (0.05, 0.35)
-    """stepping_stones: between stones. [m]"""
+    """stepping_stones: distance between stones. [m]"""
     stone_height: Sequence[float] = (0.0, 0.05)
-    """stepping_stones: by which stones stand higher or lower. [m]"""
+    """stepping_stones: maximum deviation of a stone's height. [m]"""
     pit_depth: float = 1.0
-    """stepping_stones: below them. [m]"""
+    """stepping_stones: depth of the pit below the stones. [m]"""
 
 
 @dataclass
@@ -162,19 +164,20 @@ class EntityCfg(_config_methods.EntityCfg):
 
     model: str | Path | mujoco.MjSpec | Callable[[], mujoco.MjSpec]
     """Path of an MJCF file, XML text, ``embedded:<file>`` (see :func:`mjsense.embedded_models`), an MjSpec, or a
-    function that makes one."""
+    function that returns one."""
     assets: Mapping[str, bytes] = field(default_factory=dict)
-    """Files that XML text refers to, by name."""
+    """Contents of the files that the XML text refers to, by file name."""
     pos: Sequence[float] = (0.0, 0.0, 0.0)
-    """Of the entity's root in the world: of its free body, else of the mocap body that a fixed base hangs under. [m]"""
+    """Position of the entity's root in the world: of its free body or, for a fixed base, of the mocap body that carries
+    it. [m]"""
     quat: Sequence[float] = (1.0, 0.0, 0.0, 0.0)
-    """Of the same, wxyz; the identity keeps what the XML says."""
+    """Orientation (wxyz) of the entity's root; the identity keeps the orientation of the XML."""
     joint_pos: Mapping[str, float] = field(default_factory=dict)
-    """Joint positions (rad, m) of the keyframe ``init_state`` by regular expression that matches the whole local name,
-    the first match counts; unless the model has a keyframe."""
+    """Joint positions (rad, m) of the keyframe ``init_state``, by regular expressions that must match the whole local
+    joint name; the first match counts. Ignored if the model has a keyframe."""
     mocap_base: bool = True
-    """Hang a model without a free joint under the mocap body ``<entity>/mocap_base``, so that each world can place it;
-    False: attach it to the world as it is."""
+    """Attach a model without a free joint to a mocap body ``<entity>/mocap_base``, so that its pose can differ between
+    worlds. False: attach it to the world body."""
 
 
 @dataclass
@@ -183,19 +186,20 @@ class SensorCfg(_config_methods.SensorCfg):
 
     kind: ClassVar[str] = ""
     name: str
-    """Key in the scene: ``scene[name]``."""
+    """Name of the sensor in the scene: ``scene[name]``."""
 
 
 @dataclass(frozen=True)
 class ObjRef(_config_methods.ObjRef):
-    """One MuJoCo element. Its full name is ``entity/name``, or ``name`` without an entity."""
+    """A reference to one MuJoCo element. Its full name is ``entity/name``, or ``name`` without an entity."""
 
     type: str = ""
-    """body (inertial frame), xbody (body frame), joint, geom, site, actuator, tendon, camera, and so on."""
+    """Type of the element: body (inertial frame), xbody (body frame), joint, geom, site, actuator, tendon, camera and so
+    on."""
     name: str = ""
-    """Its name in the entity."""
+    """Name of the element within the entity."""
     entity: str | None = None
-    """Whose name it is."""
+    """Entity that contains the element."""
 
 
 @dataclass
@@ -204,41 +208,41 @@ class BuiltinSensorCfg(SensorCfg):
 
     kind: ClassVar[str] = "builtin"
     sensor_type: str = ""
-    """accelerometer, gyro, framepos, jointpos, rangefinder and so on: the MJCF name."""
+    """MJCF name of the sensor type: accelerometer, gyro, framepos, jointpos, rangefinder and so on."""
     obj: ObjRef | None = None
-    """What is measured."""
+    """The element that is measured."""
     ref: ObjRef | None = None
-    """Frame in which a frame sensor's value is expressed, the world without one; the second object of camprojection,
-    insidesite, distance, normal, fromto, tactile."""
+    """Reference frame of a frame sensor, the world by default; the second object of camprojection, insidesite, distance,
+    normal, fromto and tactile."""
     cutoff: float = 0.0
-    """Positive: every component is limited to [-cutoff, cutoff] (a rangefinder's -1 too). Distance, normal and fromto:
-    the largest distance that is looked for, m."""
+    """If positive, every component is clipped to [-cutoff, cutoff] (the -1 of a rangefinder too). For distance, normal
+    and fromto: the maximum distance that is searched, m."""
     delay: float = 0.0
-    """Between a reading and its showing. Needs nsample. [s]"""
+    """Delay of the readings. Requires nsample. [s]"""
     interval: float = 0.0
-    """Between readings; 0: every physics step. Needs nsample. [s]"""
+    """Time between readings; 0: one reading per physics step. Requires nsample. [s]"""
     phase: float = 0.0
-    """When readings are taken, in (-interval, 0]. [s]"""
+    """Time offset of the readings, in (-interval, 0]. [s]"""
     nsample: int = 0
-    """Readings kept, newest first, in the field ``history``."""
+    """Number of readings kept in the field ``history``, newest first."""
     interp: Literal["zoh", "linear", "cubic"] = "zoh"
-    """What is read between readings."""
+    """Interpolation between readings."""
     noise: float = 0.0
-    """Standard deviation; stored in the model, never applied by MuJoCo."""
+    """Standard deviation of the noise; it is stored in the model, but MuJoCo does not apply it."""
     data: Sequence[Literal["dist", "dir", "origin", "point", "normal", "depth"]] = ("dist",)
-    """Rangefinder: what of each ray, in this order."""
+    """Rangefinder: the quantities reported for each ray, in this order."""
     enclosed: bool = False
-    """insidesite: by how much the whole object juts out, m."""
+    """insidesite: report by how much the whole object protrudes, m."""
     dim: int = 0
-    """User sensors: numbers in a row."""
+    """User sensors: number of values in a row."""
     datatype: Literal["real", "positive", "axis", "quaternion"] = "real"
-    """User sensors: what the numbers are."""
+    """User sensors: type of the values."""
     needstage: Literal["pos", "vel", "acc"] = "acc"
-    """User sensors: what must be computed before."""
+    """User sensors: the last stage of the computation that they require."""
     plugin: str = ""
-    """Plugin sensors: identifier."""
+    """Plugin sensors: identifier of the plugin."""
     instance: str = ""
-    """Plugin sensors: full name of an instance in an entity's XML."""
+    """Plugin sensors: full name of a plugin instance in an entity's XML."""
 
 
 @dataclass(frozen=True)
@@ -252,149 +256,152 @@ class LensDistortion(_config_methods.Config):
     """
 
     model: Literal["none", "brown_conrady", "fisheye"] = "none"
-    """Which of them."""
+    """The distortion model."""
     coefficients: Sequence[float] = ()
     """brown_conrady: k1 k2 p1 p2 k3; fisheye: k1 k2 k3 k4."""
 
 
 @dataclass
 class CameraVizCfg(_config_methods.Config):
-    """What a viewer draws of a camera: the pyramid of what it sees, from ``near`` (or its own place) on, and its axes
-    (it looks along -z, the blue one)."""
+    """The debug drawing of a camera: its view frustum, starting at ``near`` (or at the camera), and its axes (it looks
+    along -z, the blue axis is +z)."""
 
     show_frustum: bool = True
-    """The pyramid."""
+    """Draw the view frustum."""
     show_frame: bool = True
-    """The axes."""
+    """Draw the axes."""
     frustum_depth: float = 0.0
-    """From the camera plane (through a lens: along the rays); 0: ``far``, or without one 10 ``stat.meansize``. [m]"""
+    """Length of the frustum from the camera plane (with a lens model: along the rays); 0: ``far``, or 10
+    ``stat.meansize`` without one. [m]"""
     frustum_color: Sequence[float] = (1.0, 0.6, 0.0, 1.0)
-    """Of the pyramid, rgba."""
+    """Colour of the frustum, rgba."""
     line_width: float = 2.0
-    """Of the pyramid. [pixels]"""
+    """Line width of the frustum. [pixels]"""
     axis_length: float = 5.0
-    """Of the axes, in units of ``stat.meansize``."""
+    """Length of the axes, in units of ``stat.meansize``."""
 
 
 @dataclass
 class CameraSensorCfg(SensorCfg):
-    """A camera of the model (``camera_name``), or a new one. ``data`` is a :class:`mjsense.CameraData`."""
+    """A camera of the model (``camera_name``) or a new camera. ``data`` is a :class:`mjsense.CameraData`."""
 
     kind: ClassVar[str] = "camera"
     camera_name: str | None = None
-    """Full name of an existing camera, ``robot/wrist``; without one: a new camera called as the sensor."""
+    """Full name of an existing camera, such as ``robot/wrist``; empty: a new camera with the sensor's name is added."""
     parent_body: str | None = None
-    """Full name of the body that carries a new camera; the world without one."""
+    """Full name of the body that carries a new camera; empty: the world."""
     pos: Sequence[float] = (0.0, 0.0, 1.0)
-    """Of a new camera in the parent body. [m]"""
+    """Position of a new camera in the frame of its parent body. [m]"""
     quat: Sequence[float] = (1.0, 0.0, 0.0, 0.0)
-    """wxyz, of a new camera in the parent body: x right, y up, looking along -z."""
+    """Orientation (wxyz) of a new camera in the frame of its parent body: x right, y up, looking along -z."""
     fovy: float | None = None
-    """Vertical, degrees; orthographic: height of the image, m. None: the camera's own, 45 for a new one. Beside
-    ``camera_name`` it is this sensor's alone."""
+    """Vertical field of view in degrees; with orthographic: height of the image in m. None: that of the camera, 45 for a
+    new one. With ``camera_name`` only this sensor is affected."""
     width: int = 160
-    """The resolution in the MJCF plays no part. [pixels]"""
+    """Width of the image; the resolution in the MJCF is not used. [pixels]"""
     height: int = 120
-    """Likewise. [pixels]"""
+    """Height of the image; the resolution in the MJCF is not used. [pixels]"""
     data_types: Sequence[Literal[
             "rgb", "depth", "segmentation", "body_segmentation", "entity_segmentation", "normals", "point_cloud", "flow"
         ]] = ("rgb",)
-    """Which fields there are."""
+    """The image types to compute."""
     use_textures: bool = True
-    """Textures of materials, and the skybox."""
+    """Draw the textures of materials and the skybox."""
     use_shadows: bool = False
-    """Of lights that cast them."""
+    """Draw the shadows of lights that cast shadows."""
     enabled_geom_groups: Sequence[int] = (0, 1, 2)
-    """Groups (0 to 5) that are seen."""
+    """Geom groups (0 to 5) that are visible."""
     orthographic: bool = False
-    """Parallel rays. Beside ``camera_name`` it is this sensor's alone."""
+    """Use an orthographic projection. With ``camera_name`` only this sensor is affected."""
     clone_data: bool = False
-    """``data`` is a copy at every read."""
+    """Return a copy of ``data`` at every read."""
     enabled_site_groups: Sequence[int] = ()
     """Groups (0 to 5) of sites that are drawn, as MuJoCo draws them."""
     enabled_tendon_groups: Sequence[int] = ()
     """Groups (0 to 5) of tendons that are drawn, as MuJoCo draws them."""
     max_lights: int = 8
-    """Of the lights that are on, the headlight first, so many shine. MuJoCo's OpenGL has 8."""
+    """Maximum number of active lights, the headlight first. MuJoCo's OpenGL renderer has 8."""
     near: float = 0.0
-    """From the camera plane; what is nearer is not seen. [m]"""
+    """Distance of the near plane from the camera plane; nearer surfaces are invisible. [m]"""
     far: float = 0.0
-    """From the camera plane; what is farther is not seen; 0: no limit. [m]"""
+    """Distance of the far plane from the camera plane; 0: no limit. [m]"""
     clip_near: Literal["none", "model"] = "none"
-    """model: ``near`` is where MuJoCo's renderers clip, ``visual/map/znear`` times the model's extent."""
+    """model: clip at the near plane of MuJoCo's renderers, ``visual/map/znear`` times the model's extent."""
     update_period: float = 0.0
-    """Between images; 0: at every read. [s]"""
+    """Time between images; 0: a new image at every read. [s]"""
     phase: float = 0.0
     """Images are taken at the first control step at or after phase + k * update_period, and at a reset. [s]"""
     samples: int = 1
-    """Per pixel of rgb, for smooth edges."""
+    """Rays per pixel of rgb; more samples give smoother edges."""
     depth_kind: Literal["planar", "ray"] = "planar"
-    """planar: distance to the camera plane; ray: along the pixel's ray."""
+    """planar: distance to the camera plane; ray: distance along the pixel's ray."""
     intrinsics: CameraIntrinsics | None = None
-    """Instead of fovy and of what the MJCF says."""
+    """Intrinsic parameters; they replace fovy and the parameters of the MJCF."""
     distortion: LensDistortion = field(default_factory=LensDistortion)
-    """Of the lens; the image is as distorted as the lens leaves it."""
+    """Lens distortion; the image is not rectified."""
     depth_noise: Literal["none", "d405", "d435"] = "none"
-    """What these stereo cameras make of ``depth``; the other fields stay exact."""
+    """Error model of a stereo camera, applied to ``depth``; the other fields stay exact."""
     renderer: Literal["rays", "opengl"] = "rays"
-    """opengl: MuJoCo's own renderer, where it was built in."""
+    """opengl: MuJoCo's own renderer, if it was built in."""
     debug_vis: bool = False
-    """Drawn by ``Simulation.draw(scene)`` unasked."""
+    """Include this sensor when ``Simulation.draw(scene)`` is called without a list of sensors."""
     viz: CameraVizCfg = field(default_factory=CameraVizCfg)
-    """How it is drawn."""
+    """Appearance of the debug drawing."""
 
 
 @dataclass(frozen=True)
 class CameraIntrinsics(_config_methods.Config):
-    """Focal lengths and principal point in pixels of the image; replaces fovy and what the model says."""
+    """Focal lengths and principal point in pixels of the image; they replace fovy and the parameters of the model."""
 
     fx: float
-    """Focal length in u. [pixels]"""
+    """Horizontal focal length. [pixels]"""
     fy: float
-    """Focal length in v. [pixels]"""
+    """Vertical focal length. [pixels]"""
     cx: float
-    """Principal point, to the right. [pixels]"""
+    """Principal point, from the left border. [pixels]"""
     cy: float
-    """Principal point, down. [pixels]"""
+    """Principal point, from the top border. [pixels]"""
 
 
 @dataclass(frozen=True)
 class ContactMatch(_config_methods.Config):
-    """Which geoms or bodies take part in a contact."""
+    """Selects the geoms or bodies that take part in a contact."""
 
     mode: Literal["geom", "body", "subtree"]
-    """A subtree is a body and all its descendants."""
+    """Type of the matched elements. A subtree is a body and all its descendants."""
     pattern: str | Sequence[str]
-    """With an entity: regular expressions that must match a whole local name. Without: full MuJoCo names, literally.
-    Each must match something, and no name two of them."""
+    """With an entity: regular expressions that must match a whole local name. Without: full MuJoCo names, taken
+    literally. Each pattern must match something, and no element may be matched twice."""
     entity: str | None = None
-    """Whose names these are."""
+    """Entity that contains the elements."""
     exclude: Sequence[str] = ()
-    """With an entity: names to leave out; one with any of ``.*+?[]{}()\\|^$`` is a regular expression that is searched."""
+    """With an entity: names to leave out; an entry with any of ``.*+?[]{}()\\|^$`` is a regular expression that is
+    searched for."""
 
 
 @dataclass
 class ContactVizCfg(_config_methods.Config):
-    """What a viewer draws of every contact in a slot. Colours are rgba, sizes in units of the model's ``stat.meansize``."""
+    """The debug drawing of every contact in a slot. Colours are rgba, sizes are in units of the model's
+    ``stat.meansize``."""
 
     show_points: bool = True
-    """A ball at the contact point."""
+    """Draw a sphere at the contact point."""
     show_frames: bool = True
-    """Axes of the contact: x (red) is the normal, from the primary to the secondary."""
+    """Draw the axes of the contact frame: x (red) is the normal, from the primary to the secondary."""
     show_forces: bool = True
-    """The force that the primary exerts on the secondary, as an arrow that ends at the contact point."""
+    """Draw the force that the primary exerts on the secondary, as an arrow that ends at the contact point."""
     force_scale: float = 0.0
-    """Length of that arrow; 0: the model's ``vis.map.force``, as MuJoCo's own arrows. [m/N]"""
+    """Length of the arrow per newton; 0: the model's ``vis.map.force``, as for MuJoCo's own arrows. [m/N]"""
     point_color: Sequence[float] = (1.0, 0.5, 0.0, 1.0)
-    """Of the balls."""
+    """Colour of the spheres."""
     force_color: Sequence[float] = (0.9, 0.1, 0.9, 1.0)
-    """Of the arrows."""
+    """Colour of the arrows."""
     point_radius: float = 0.3
-    """Of the balls."""
+    """Radius of the spheres."""
     axis_length: float = 2.0
-    """Of the axes."""
+    """Length of the axes."""
     force_width: float = 0.3
-    """Of the arrows."""
+    """Width of the arrows."""
 
 
 @dataclass
@@ -407,71 +414,74 @@ class ContactSensorCfg(SensorCfg):
 
     kind: ClassVar[str] = "contact"
     primary: ContactMatch
-    """Whose contacts these are."""
+    """The geoms or bodies whose contacts are measured."""
     secondary: ContactMatch | None = None
-    """What they are with; without one: with anything."""
+    """The other side of the contacts; None: anything."""
     fields: Sequence[Literal["found", "force", "torque", "dist", "pos", "normal", "tangent"]] = ("found", "force")
-    """What is measured of each contact."""
+    """The quantities measured for each contact."""
     reduce: Literal["none", "mindist", "maxforce", "netforce"] = "maxforce"
-    """Which contacts come first: none: in MuJoCo's order; mindist: the deepest; maxforce: the strongest; netforce: one
-    synthetic contact at the force-weighted centroid, with the net wrench in the world frame."""
+    """Order in which contacts fill the slots. none: MuJoCo's order; mindist: deepest first; maxforce: strongest first;
+    netforce: one synthetic contact at the force-weighted centroid, with the net wrench in the world frame."""
     num_slots: int = 1
-    """S, contacts kept for each primary."""
+    """S, number of contacts kept for each primary."""
     secondary_policy: Literal["first", "error", "any", "each"] = "first"
-    """When several elements match the secondary: first: the first in model order; error: an error; any: no filter, the
-    secondary is not looked at; each: every match, and who touches whom is reported."""
+    """What to do if several elements match the secondary. first: use the first in model order; error: raise an error;
+    any: no filter, the secondary is ignored; each: use every match, and report which pairs touch."""
     track_air_time: bool = False
-    """Timers of flight and contact; without found among the fields they stay 0, as in mjlab."""
+    """Measure the durations of flight and contact; they stay 0 unless found is among the fields, as in mjlab."""
     global_frame: bool = False
-    """Forces and torques in the world frame instead of the contact frame (x = normal); needs normal and tangent."""
+    """Report forces and torques in the world frame instead of the contact frame (x = normal); requires normal and
+    tangent."""
     history_length: int = 0
-    """H, substeps kept of every field, newest first; 0 or less: none."""
+    """H, number of substeps kept of every field, newest first; 0 or less: none."""
     track_events: bool = False
-    """touchdown and liftoff: exact, also when both happened within one control step."""
+    """Report touchdown and liftoff, exactly, also if both happened within one control step."""
     latch: bool = False
-    """What happened at any time in the control step: found_any, force_peak, dist_at_peak, pos_at_peak, first_touch_time."""
+    """Report what happened at any time in the control step: found_any, force_peak, dist_at_peak, pos_at_peak,
+    first_touch_time."""
     friction_split: bool = False
-    """The fields normal_force and friction_force."""
+    """Add the fields normal_force and friction_force."""
     other_ids: bool = False
-    """The fields other_geom and other_body."""
+    """Add the fields other_geom and other_body."""
     debug: bool = False
-    """Print what was matched."""
+    """Print the matched names."""
     debug_vis: bool = False
-    """Drawn by ``Simulation.draw(scene)`` unasked."""
+    """Include this sensor when ``Simulation.draw(scene)`` is called without a list of sensors."""
     viz: ContactVizCfg = field(default_factory=ContactVizCfg)
-    """How it is drawn."""
+    """Appearance of the debug drawing."""
 
 
 @dataclass(frozen=True)
 class ImuAxis(_config_methods.Config):
-    """Half of a device, in m/s^2 or rad/s. Tolerances are three standard deviations, drawn anew for each episode."""
+    """Error model of the accelerometer or of the gyroscope, in m/s^2 or rad/s. Tolerances are three standard deviations,
+    drawn anew for each episode."""
 
     noise_density: float = 0.0
-    """White noise. [unit/sqrt(Hz)]"""
+    """Density of the white noise. [unit/sqrt(Hz)]"""
     bias_tolerance: Sequence[float] = (0.0, 0.0, 0.0)
     """Turn-on bias of x, y, z. [unit]"""
     scale_tolerance: float = 0.0
-    """Error of scale."""
+    """Scale error."""
     cross_axis_tolerance: float = 0.0
-    """What an axis sees of the others."""
+    """Cross-axis sensitivity."""
     range: float = 0.0
-    """Values are limited to +-range; 0: unlimited. [unit]"""
+    """Values are clipped to +-range; 0: no limit. [unit]"""
     resolution: float = 0.0
-    """Of one count; 0: continuous. [unit]"""
+    """Size of one count; 0: continuous. [unit]"""
     bias_drift: float = 0.0
     """Standard deviation of a Gauss-Markov bias. [unit]"""
     bias_drift_time_s: float = 0.0
-    """Its time constant."""
+    """Correlation time of the bias drift."""
 
 
 @dataclass(frozen=True)
 class ImuModel(_config_methods.Config):
-    """What a data sheet says of a device; what it does not say is 0."""
+    """Error model of a device, from its data sheet; values that the data sheet omits are 0."""
 
     accelerometer: ImuAxis = field(default_factory=ImuAxis)
-    """In m/s^2."""
+    """Error model of the accelerometer, in m/s^2."""
     gyroscope: ImuAxis = field(default_factory=ImuAxis)
-    """In rad/s."""
+    """Error model of the gyroscope, in rad/s."""
 
 
 @dataclass
@@ -483,15 +493,15 @@ class ImuSensorCfg(SensorCfg):
 
     kind: ClassVar[str] = "imu"
     site: ObjRef | None = None
-    """Where it is mounted."""
+    """The site on which the IMU is mounted."""
     preset: Literal["ideal", "mpu6050", "icm42688p", ""] = "ideal"
-    """ideal, mpu6050 (InvenSense PS-MPU-6000A-00 rev. 3.4), icm42688p (TDK DS-000347 rev. 1.7); "": model."""
+    """ideal, mpu6050 (InvenSense PS-MPU-6000A-00 rev. 3.4) or icm42688p (TDK DS-000347 rev. 1.7); "": use model."""
     model: ImuModel = field(default_factory=ImuModel)
-    """Used if preset is ""."""
+    """Error model, used if preset is ""."""
     orientation: bool = False
-    """Also the site's orientation, without errors."""
+    """Report the orientation of the site too, without errors."""
     effects: Sequence[Effect] = ()
-    """After those of the device, on acc and gyro alike: delay, rate, dropout."""
+    """Effects applied to acc and gyro after the error model: delay, rate, dropout."""
 
 
 @dataclass(frozen=True)
@@ -500,111 +510,111 @@ class GridPatternCfg(_config_methods.GridPatternCfg):
 
     kind: ClassVar[str] = "grid"
     size: Sequence[float] = (1.0, 1.0)
-    """In x and y, around the frame. [m]"""
+    """Size of the grid in x and y, centred on the frame. [m]"""
     resolution: float = 0.1
-    """Between rays. [m]"""
+    """Distance between rays. [m]"""
     direction: Sequence[float] = (0.0, 0.0, -1.0)
-    """Of all rays; any length but 0."""
+    """Direction of all rays; any non-zero length."""
 
 
 @dataclass
 class RayCastVizCfg(_config_methods.Config):
-    """What a viewer draws of a ray sensor. Colours are rgba, sizes in units of the model's ``stat.meansize``."""
+    """The debug drawing of a ray sensor. Colours are rgba, sizes are in units of the model's ``stat.meansize``."""
 
     show_rays: bool = False
-    """Arrows from origin to hit."""
+    """Draw arrows from the origins to the hits."""
     show_normals: bool = False
-    """Arrows along the normals of what is hit."""
+    """Draw arrows along the surface normals at the hits."""
     hit_color: Sequence[float] = (0.0, 1.0, 1.0, 1.0)
-    """Of balls at the hits."""
+    """Colour of the spheres at the hits."""
     ray_color: Sequence[float] = (0.0, 1.0, 0.0, 0.8)
-    """Of rays that hit."""
+    """Colour of rays that hit."""
     miss_color: Sequence[float] = (1.0, 0.0, 0.0, 0.4)
-    """Of rays that miss."""
+    """Colour of rays that miss."""
     normal_color: Sequence[float] = (1.0, 1.0, 0.0, 1.0)
-    """Of normals."""
+    """Colour of the normals."""
     hit_radius: float = 0.5
-    """Of the balls."""
+    """Radius of the spheres."""
     ray_width: float = 0.1
-    """Of the arrows."""
+    """Width of the arrows."""
     normal_length: float = 5.0
-    """Of the normals."""
+    """Length of the normals."""
 
 
 @dataclass
 class RayCastSensorCfg(SensorCfg):
-    """Rays from frames against everything visible. ``data`` is a :class:`mjsense.RayCastData`."""
+    """Casts rays from frames against all visible geoms. ``data`` is a :class:`mjsense.RayCastData`."""
 
     kind: ClassVar[str] = "raycast"
     frame: ObjRef | Sequence[ObjRef] = ()
-    """Bodies (their own frame, not the inertial one), sites or geoms that the rays start from."""
+    """Bodies (their own frame, not the inertial one), sites or geoms from which the rays start."""
     pattern: RayPatternCfg = field(default_factory=GridPatternCfg)
     """The rays of one frame."""
     ray_alignment: Literal["base", "yaw", "world"] = "base"
-    """base: offsets and directions turn with the frame; yaw: only with its heading; world: not at all."""
+    """base: offsets and directions rotate with the frame; yaw: only with its heading; world: not at all."""
     max_distance: float = 10.0
-    """Hits farther away are misses. [m]"""
+    """Maximum distance; more distant hits are misses. [m]"""
     exclude_parent_body: bool = True
-    """Rays pass through the body they start from (not through its children)."""
+    """Ignore the body from which a ray starts (but not its children)."""
     include_geom_groups: Sequence[int] | None = (0, 1, 2)
-    """Groups that rays see; None: all."""
+    """Geom groups that rays can hit; None: all."""
     debug_vis: bool = False
-    """Drawn by ``Simulation.draw(scene)`` unasked."""
+    """Include this sensor when ``Simulation.draw(scene)`` is called without a list of sensors."""
     viz: RayCastVizCfg = field(default_factory=RayCastVizCfg)
-    """How it is drawn."""
+    """Appearance of the debug drawing."""
     min_distance: float = 0.0
-    """Nearer hits are misses, and hide what is behind them. [m]"""
+    """Minimum distance; nearer hits are misses, and they hide what is behind them. [m]"""
     hit_ids: bool = True
-    """The fields geom_id, body_id and material_id of what was hit."""
+    """Add the fields geom_id, body_id and material_id of what was hit."""
     any_frame: bool = False
-    """Take xbody and camera frames too, which mjlab refuses."""
+    """Allow xbody and camera frames too, which mjlab refuses."""
 
 
 @dataclass(frozen=True)
 class SpinningScanCfg(_config_methods.Config):
-    """Lasers over each other that turn about the frame's z axis; rays are ``[channels, samples]``."""
+    """Stacked lasers that rotate about the frame's z axis; rays are ``[channels, samples]``."""
 
     kind: ClassVar[str] = "spinning"
     channels: int = 16
-    """Lasers."""
+    """Number of lasers."""
     elevation_min_deg: float = -15.0
-    """Of channel 0, above the xy plane."""
+    """Elevation of channel 0 above the xy plane."""
     elevation_max_deg: float = 15.0
-    """Of the last channel; the others lie evenly between."""
+    """Elevation of the last channel; the others are evenly spaced in between."""
     elevations_deg: Sequence[float] = ()
-    """One a channel instead of evenly spaced ones."""
+    """Elevation of each channel, instead of evenly spaced ones."""
     samples: int = 360
-    """Firings of each channel in a sweep."""
+    """Number of firings of each channel in a sweep."""
     azimuth_start_deg: float = 0.0
-    """Of the first firing; 0: along +x; counter-clockwise."""
+    """Azimuth of the first firing, counter-clockwise; 0: along +x."""
     azimuth_span_deg: float = 360.0
-    """Of a sweep."""
+    """Angle that a sweep covers."""
     rate_hz: float = 10.0
-    """Turns a second; matters with motion distortion only."""
+    """Sweeps per second; used only with motion distortion."""
 
 
 @dataclass
 class LidarSensorCfg(RayCastSensorCfg):
-    """A spinning or table lidar. ``data`` is a :class:`mjsense.RayCastData` with points and intensity; ``pattern`` is
-    not for lidars, and hit ids are always there."""
+    """A lidar with a spinning scan or a table of rays. ``data`` is a :class:`mjsense.RayCastData` with points and
+    intensity. ``pattern`` does not apply, and hit ids are always reported."""
 
     kind: ClassVar[str] = "lidar"
     max_distance: float = 100.0
-    """Hits farther away are misses. [m]"""
+    """Maximum distance; more distant hits are misses. [m]"""
     min_distance: float = 0.1
-    """Nearer hits are misses, and hide what is behind them. [m]"""
+    """Minimum distance; nearer hits are misses, and they hide what is behind them. [m]"""
     any_frame: bool = True
-    """Take xbody and camera frames too, which mjlab refuses."""
+    """Allow xbody and camera frames too, which mjlab refuses."""
     scan: LidarScanCfg = field(default_factory=SpinningScanCfg)
-    """Where its rays point."""
+    """The scan pattern."""
     motion_distortion: bool = False
-    """Each ray leaves from where the frame was at its own moment of the sweep."""
+    """Emit each ray from the pose that the frame had at that ray's moment of the sweep."""
     range_noise_std: float = 0.0
-    """Standard deviation of distances. [m]"""
+    """Standard deviation of the distances. [m]"""
     range_noise_relative: float = 0.0
-    """Standard deviation in parts of the range, added in squares."""
+    """Standard deviation as a fraction of the distance; the two variances are added."""
     range_resolution: float = 0.0
-    """Distances are rounded to multiples of it; 0: exact. [m]"""
+    """Distances are rounded to multiples of this value; 0: no rounding. [m]"""
     dropout: float = 0.0
     """Probability that a return is lost."""
 
@@ -615,48 +625,48 @@ class PinholeCameraPatternCfg(_config_methods.PinholeCameraPatternCfg):
 
     kind: ClassVar[str] = "pinhole"
     width: int = 16
-    """Rays in a row."""
+    """Number of rays in a row."""
     height: int = 12
-    """Rows."""
+    """Number of rows."""
     fovy: float = 45.0
     """Vertical field of view. [degrees]"""
     camera_name: str | None = None
-    """Take resolution and angles from this camera of the model instead; not its pose."""
+    """Camera of the model whose resolution and angles are used instead; its pose is not used."""
 
 
 @dataclass(frozen=True)
 class RingPatternCfg(_config_methods.RingPatternCfg):
-    """Parallel rays from the points of circles in the XY plane, after the centre."""
+    """Parallel rays from points on circles in the XY plane, after the ray from the centre."""
 
     @dataclass(frozen=True)
     class Ring(_config_methods.Config):
         """One circle of rays."""
 
         radius: float = 0.1
-        """Around the frame's z axis. [m]"""
+        """Radius around the frame's z axis. [m]"""
         num_samples: int = 8
-        """Rays on it."""
+        """Number of rays on the circle."""
 
     kind: ClassVar[str] = "ring"
     rings: Sequence[RingPatternCfg.Ring] = ()
-    """From the inside out, or in any order."""
+    """The circles."""
     include_center: bool = True
-    """Also a ray from the centre."""
+    """Add a ray from the centre."""
     direction: Sequence[float] = (0.0, 0.0, -1.0)
-    """Of all rays; any length but 0."""
+    """Direction of all rays; any non-zero length."""
 
 
 @dataclass(frozen=True)
 class UserPatternCfg(_config_methods.UserPatternCfg):
-    """Your own rays. One direction for all offsets, or one offset for all directions, will do."""
+    """User-defined rays. A single direction or a single offset applies to all rays."""
 
     kind: ClassVar[str] = "user"
     offsets: Sequence[Sequence[float]] = ((0.0, 0.0, 0.0),)
-    """Where they start, [n, 3]. [m]"""
+    """Start points, [n, 3]. [m]"""
     directions: Sequence[Sequence[float]] = ((0.0, 0.0, -1.0),)
-    """Where they point, [n, 3], of any length but 0."""
+    """Directions, [n, 3], of any non-zero length."""
     times: Sequence[float] = ()
-    """[n] or none: each ray leaves from where the frame was then. [s]"""
+    """Times, [n] or empty: each ray starts from the pose that the frame had at its time. [s]"""
 
 
 @dataclass(frozen=True)
@@ -669,83 +679,84 @@ class TableScanCfg(_config_methods.Config):
     angles: Sequence[Sequence[float]] = ()
     """The table itself, [M, 2]. [rad]"""
     rays_per_scan: int = 0
-    """Rows that a scan takes, the next ones at the next scan; 0: all. Rows left over at the end are not used."""
+    """Rows used by one scan; the next scan uses the following rows. 0: all rows. Rows left over at the end are not used."""
     rate_hz: float = 10.0
-    """Scans a second."""
+    """Scans per second."""
 
 
 @dataclass
 class TerrainHeightSensorCfg(RayCastSensorCfg):
-    """Height of frames above what lies below them. ``data.heights`` is float32 ``[B, F]``, ``[B, F, n]`` without
+    """Height of frames above the surface below them. ``data.heights`` is float32 ``[B, F]``, or ``[B, F, n]`` without
     reduction."""
 
     kind: ClassVar[str] = "terrain_height"
     reduction: Literal["min", "max", "mean", "none"] = "min"
-    """Over a frame's rays."""
+    """Reduction over the rays of a frame."""
 
 
 @dataclass
 class SceneRobotCfg(_config_methods.Config):
-    """Where the robot's base stands at the start of an episode."""
+    """Placement of the robot's base at the start of an episode."""
 
     pos: Sequence[float] = (0.0, 0.0, 0.0)
-    """On the floor. [m]"""
+    """Position on the floor. [m]"""
     yaw: float = 0.0
-    """About the vertical, degrees."""
+    """Rotation about the vertical, degrees."""
     pos_spread: Sequence[float] = (0.0, 0.0)
-    """Half width of uniform noise in x and y. [m]"""
+    """Half width of the uniform noise of x and y. [m]"""
     yaw_spread: float = 0.0
-    """Half width of uniform noise, degrees."""
+    """Half width of the uniform noise of the yaw, degrees."""
 
 
 @dataclass
 class SceneFileCfg(_config_methods.SceneFileCfg):
-    """What an episode plays in: models, objects, where they may stand, and what differs."""
+    """The scene of an episode: its models, its objects, where the objects may be placed, and what is randomised."""
 
     name: str
-    """Of the scene."""
+    """Name of the scene."""
     description: str = ""
-    """A sentence for people."""
+    """Description in one sentence."""
     extends: str | None = None
-    """A scene, by name or file, whose values it has where it does not say another."""
+    """A scene, by name or file, that provides the values that this file does not set."""
     base: str | None = None
-    """An MJCF to start from, as it is, beside the file: names without a prefix."""
+    """An MJCF file, next to this file, that the scene starts from unchanged: its names get no prefix."""
     generator: str | None = None
-    """What makes its first entity, ``room``, and what belongs to it: one house of a street."""
+    """Generator of the first entity, ``room``, and of what belongs to it."""
     house: int = 0
-    """Which of the generator's; ``<scene>:7`` is house 7 of a scene."""
+    """Number of the generated house; ``<scene>:7`` is house 7 of a scene."""
     parameters: Mapping[str, float] = field(default_factory=dict)
-    """Numbers for the generator, by its names."""
+    """Parameters of the generator, by name."""
     entities: Sequence[SceneEntityCfg] = ()
-    """Its models, in this order."""
+    """The models, in this order."""
     objects: Sequence[SceneObjectCfg] = ()
-    """Bodies that a task may be about; none named: all that have a free joint and that a hand can hold."""
+    """Bodies that a task may use; empty: all graspable bodies with a free joint."""
     regions: Sequence[SceneRegionCfg] = ()
-    """Where they may stand; none: where their models have them."""
+    """Where objects may be placed; empty: objects stay where their models put them."""
     robot: SceneRobotCfg = field(default_factory=SceneRobotCfg)
-    """Where the robot stands."""
+    """Placement of the robot."""
     vary: Sequence[SceneVaryCfg] = ()
-    """What is different in every episode."""
+    """What is randomised in every episode."""
     sky: SceneSkyCfg | None = None
-    """The colours around; without it a generated scene has blue ones outside its windows."""
+    """Colours of the sky; by default a generated scene has a blue sky outside its windows."""
     headlight: SceneHeadlightCfg | None = None
-    """The light at the camera; without it MuJoCo's."""
+    """The light at the camera; by default MuJoCo's."""
     options: MujocoCfg = field(default_factory=MujocoCfg)
-    """Of the physics."""
+    """Physics options."""
     extent: float | None = None
-    """``stat.extent`` of the model. [m]"""
+    """Value that replaces ``stat.extent`` of the model. [m]"""
     sizes: Sequence[float] = (1.0, 1.0)
-    """Of each object in an episode, as a factor on its model's, least and most: one of six, evenly apart."""
+    """Minimum and maximum scale of the objects; an episode uses one of six evenly spaced scales."""
     gap: float = 0.02
-    """Free between two objects. [m]"""
+    """Minimum distance between two objects. [m]"""
     target_gap: float = 0.07
-    """Free around the object that a task is about. [m]"""
+    """Minimum distance between the object that the task is about and the others. [m]"""
     drop: float = 0.0003
-    """Above the surface at the start. [m]"""
+    """Height above the surface at which objects start. [m]"""
     count: Sequence[int] = (-1, -1)
-    """Objects that are there, the target among them, least and most; -1: all. The others stand far away."""
+    """Minimum and maximum number of objects that are present, the target included; -1: all. The others are parked far
+    away."""
     models: Callable[[], SceneCfg] | None = None
-    """Makes the models, in the place of ``base`` and ``entities``."""
+    """Function that makes the models, instead of ``base`` and ``entities``."""
 
 
 @dataclass
@@ -753,101 +764,101 @@ class SceneEntityCfg(_config_methods.Config):
     """A model of a scene; its names get the prefix ``<name>/``."""
 
     name: str
-    """Of the entity."""
+    """Name of the entity."""
     model: str
-    """An MJCF: a path, beside the scene's file, ``embedded:<file>``, or ``package:<package>/<file>`` of an installed
-    Python package."""
+    """An MJCF file: a path relative to the scene's file, ``embedded:<file>``, or ``package:<package>/<file>`` of an
+    installed Python package."""
     pos: Sequence[float] = (0.0, 0.0, 0.0)
-    """Where it stands. [m]"""
+    """Position of the model. [m]"""
     quat: Sequence[float] = (1.0, 0.0, 0.0, 0.0)
-    """How it is turned, wxyz."""
+    """Orientation of the model, wxyz."""
     free: bool = False
-    """Its body gets a free joint, which models of single objects often lack; a body without a name is called as the
+    """Give its body a free joint, which models of single objects often lack; a body without a name is named after the
     entity."""
     without: Sequence[str] = ()
-    """Bodies that are left out, each with the whole tree in which it is: the robot of a model that has one."""
+    """Bodies whose whole kinematic tree is removed, such as the robot of a model that includes one."""
     inertia_groups: Sequence[int] | None = None
-    """Groups of the geoms whose masses count, first and last, instead of what the model says."""
+    """First and last group of the geoms whose masses count, instead of the model's setting."""
     hidden_group: int = -1
-    """Geoms of this group are there to be touched and are not seen; -1: those of group 3 and up."""
+    """Group of geoms that take part in contacts but are invisible; -1: groups 3 and up."""
 
 
 @dataclass
 class SceneObjectCfg(_config_methods.Config):
-    """A body with a free joint that a task may be about."""
+    """A body with a free joint that a task may use."""
 
     body: str
-    """Full name in the scene, ``mug/mug``."""
+    """Full name in the scene, such as ``mug/mug``."""
     text: str | None = None
-    """What people call it; without it the last part of its name."""
+    """Word for the object in instructions; by default the last part of its name."""
     other_texts: Sequence[str] = ()
-    """What else they call it."""
+    """Other words for the object."""
     rests: Sequence[Literal["upright", "side", "end"]] = ("upright",)
-    """How it may rest."""
+    """Poses in which it may rest."""
     receptacle: bool = False
-    """Things are put in or on it; it is not picked up itself."""
+    """Objects are placed in or on it; it is not picked up."""
     color: str | None = None
-    """Of a receptacle: what tells it from others of its kind."""
+    """Colour of a receptacle, which distinguishes it from others of its kind."""
     sizes: Sequence[float] | None = None
-    """Its own range of sizes, where the scene's does not suit it."""
+    """Minimum and maximum scale of this object, instead of the scene's."""
 
 
 @dataclass
 class SceneRegionCfg(_config_methods.Config):
-    """A level surface on which objects may stand."""
+    """A level surface on which objects may be placed."""
 
     name: str
-    """Of the region."""
+    """Name of the region."""
     on: str
-    """Full name of the box geom whose top it is, or of a body: then its highest."""
+    """Full name of the box geom whose top is the surface, or of a body: then its highest box."""
     area: Sequence[float] = (0.0, 0.0, 0.0, 0.0)
-    """Where origins of objects may be: least x, most x, least y, most y in the world; all 0: the whole top. [m]"""
+    """Area for the origins of objects: min x, max x, min y, max y in the world; all 0: the whole surface. [m]"""
     target_area: Sequence[float] | None = None
-    """The same for the object that a task is about. [m]"""
+    """The same for the object that the task is about. [m]"""
 
 
 @dataclass
 class SceneVaryCfg(_config_methods.Config):
-    """What is different in every episode; all draws are uniform."""
+    """What is randomised in every episode; all draws are uniform."""
 
     what: Literal["light", "material", "geom", "body"]
-    """Lights, materials, geoms (without a material) or bodies that do not move."""
+    """Type of the elements: lights, materials, geoms (without a material) or bodies that do not move."""
     pattern: str
-    """Regular expression that matches the whole full name of each."""
+    """Regular expression that must match the whole full name of an element."""
     brightness: Sequence[float] = (1.0, 1.0)
-    """Factor on the colour, least and most."""
+    """Minimum and maximum factor of the colour."""
     hue: float = 0.0
-    """Half width of a turn of the hue, degrees."""
+    """Half width of the change of the hue, degrees."""
     saturation: float = 0.0
-    """Half width of a shift of the saturation."""
+    """Half width of the change of the saturation."""
     pos: Sequence[float] = (0.0, 0.0, 0.0)
-    """light, body: half widths of a move. [m]"""
+    """light, body: half widths of the displacement. [m]"""
     angle: float = 0.0
-    """light: most by which its direction turns, body: half width of a turn about the vertical, degrees."""
+    """light: maximum change of its direction; body: half width of the rotation about the vertical, degrees."""
     textures: Sequence[str] = ()
-    """material: full names of textures, one of which it has."""
+    """material: full names of the textures to choose from."""
 
 
 @dataclass
 class SceneSkyCfg(_config_methods.Config):
-    """The colours around."""
+    """The colours of the sky."""
 
     top: Sequence[float] = (0.55, 0.67, 0.8)
-    """Of the zenith, rgb."""
+    """Colour at the zenith, rgb."""
     bottom: Sequence[float] = (0.86, 0.89, 0.92)
-    """Of the nadir, rgb."""
+    """Colour at the nadir, rgb."""
 
 
 @dataclass
 class SceneHeadlightCfg(_config_methods.Config):
-    """The light at the camera, grey."""
+    """The grey light at the camera."""
 
     ambient: float = 0.1
-    """From everywhere."""
+    """Ambient intensity."""
     diffuse: float = 0.4
-    """Scattered."""
+    """Diffuse intensity."""
     specular: float = 0.5
-    """Mirrored."""
+    """Specular intensity."""
 
 
 LidarScanCfg = SpinningScanCfg | TableScanCfg

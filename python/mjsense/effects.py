@@ -25,19 +25,19 @@ from mjsense.configs import SensorCfg
 
 @dataclass
 class EffectSensorCfg(SensorCfg):
-    """A sensor of the scene seen through effects; it has the same fields."""
+    """A sensor of the scene with effects (noise, delay and so on) applied; it has the same fields."""
 
     kind: ClassVar[str] = "effect"
     sensor: str = ""
-    """Key of the clean sensor: ``robot/imu_acc``."""
+    """Name of the clean sensor, such as ``robot/imu_acc``."""
     effects: Sequence[Effect] = ()
-    """In this order; each may be limited to some fields."""
+    """The effects, applied in this order; each may be limited to some fields."""
     fields: Sequence[str] = ()
-    """Of the clean sensor; empty: all."""
+    """Fields of the clean sensor that are reported; empty: all."""
     history_length: int = 0
-    """Rows of every field, oldest first; the first of an episode fills all. 0: no history."""
+    """Number of rows kept of every field, oldest first; the first row of an episode fills all of them. 0: no history."""
     flatten_history: bool = True
-    """[h d] instead of [h, *shape]."""
+    """Return the history as [h d] instead of [h, *shape]."""
 
 
 @dataclass(frozen=True)
@@ -48,57 +48,57 @@ class Gaussian(_config_methods.Config):
     std: float | Sequence[float] = 0.0
     """Standard deviation."""
     mean: float | Sequence[float] = 0.0
-    """Its centre."""
+    """Mean."""
 
 
 @dataclass(frozen=True)
 class Noise(_config_methods.Noise):
-    """A new error for every row and component."""
+    """Independent noise for every row and component."""
 
     kind: ClassVar[str] = "noise"
     draw: Draw | float = field(default_factory=Gaussian)
-    """Gaussian, Uniform or Constant; a number: Constant."""
+    """Distribution: Gaussian, Uniform or Constant; a number means Constant."""
     operation: Literal["add", "scale", "abs"] = "add"
-    """What the error does to the value; abs: it replaces it."""
+    """How the noise changes the value; abs: it replaces the value."""
     density: float | Sequence[float] = 0.0
-    """The noise density of a data sheet: std = density / sqrt(period), on top of draw. [unit/sqrt(Hz)]"""
+    """Noise density as on a data sheet: std = density / sqrt(period) is added to draw. [unit/sqrt(Hz)]"""
     fields: Sequence[str] = ()
-    """Of the sensor; empty: all."""
+    """Fields of the sensor that are affected; empty: all."""
 
 
 @dataclass(frozen=True)
 class Uniform(_config_methods.Config):
-    """Evenly in [low, high)."""
+    """Uniform distribution on [low, high)."""
 
     kind: ClassVar[str] = "uniform"
     low: float | Sequence[float] = 0.0
-    """The smallest value."""
+    """Lower bound, included."""
     high: float | Sequence[float] = 0.0
-    """Above the largest one."""
+    """Upper bound, excluded."""
 
 
 @dataclass(frozen=True)
 class Constant(_config_methods.Config):
-    """Always the same."""
+    """A constant value."""
 
     kind: ClassVar[str] = "constant"
     value: float | Sequence[float] = 0.0
-    """The number."""
+    """The value."""
 
 
 @dataclass(frozen=True)
 class EpisodeBias(_config_methods.Config):
-    """A constant error within an episode (turn-on bias)."""
+    """A bias that is constant within an episode (turn-on bias)."""
 
     kind: ClassVar[str] = "episode_bias"
     draw: Draw | float = field(default_factory=Gaussian)
-    """Gaussian, Uniform or Constant; a number: Constant."""
+    """Distribution: Gaussian, Uniform or Constant; a number means Constant."""
     operation: Literal["add", "scale", "abs"] = "abs"
-    """At every reset: abs draws the bias anew, add lets it walk from episode to episode."""
+    """What happens at a reset. abs: the bias is drawn anew; add: the draw is added to the previous bias."""
     per_component: bool = True
-    """False: one number for the whole row."""
+    """Draw each component separately. False: one number for the whole row."""
     fields: Sequence[str] = ()
-    """Of the sensor; empty: all."""
+    """Fields of the sensor that are affected; empty: all."""
 
 
 @dataclass(frozen=True)
@@ -107,95 +107,95 @@ class BiasDrift(_config_methods.Config):
 
     kind: ClassVar[str] = "bias_drift"
     std: float | Sequence[float] = 0.0
-    """Of the stationary process."""
+    """Standard deviation of the stationary process."""
     time_constant_s: float = math.inf
-    """In which it forgets."""
+    """Correlation time."""
     density: float | Sequence[float] = 0.0
-    """Of the random walk. [unit/sqrt(s)]"""
+    """Density of the random walk. [unit/sqrt(s)]"""
     start_at_zero: bool = False
-    """An episode begins without bias, not with a random one."""
+    """Start an episode without bias instead of with a random one."""
     fields: Sequence[str] = ()
-    """Of the sensor; empty: all."""
+    """Fields of the sensor that are affected; empty: all."""
 
 
 @dataclass(frozen=True)
 class Scale(_config_methods.Config):
-    """x <- factor x."""
+    """Multiplies values by a factor."""
 
     kind: ClassVar[str] = "scale"
     factor: float | Sequence[float] = 1.0
-    """By which values are multiplied."""
+    """The factor."""
     fields: Sequence[str] = ()
-    """Of the sensor; empty: all."""
+    """Fields of the sensor that are affected; empty: all."""
 
 
 @dataclass(frozen=True)
 class Misalignment(_config_methods.Config):
-    """Scale errors and small rotations of every three components, fixed plus drawn at every reset."""
+    """Scale errors and small rotations of each group of three components: a fixed part, and a part drawn at every reset."""
 
     kind: ClassVar[str] = "misalignment"
     scale_error: Sequence[float] = (0.0, 0.0, 0.0)
-    """Of x, y, z."""
+    """Fixed scale errors of x, y, z."""
     angle: Sequence[float] = (0.0, 0.0, 0.0)
-    """About x, y, z. [rad]"""
+    """Fixed rotation about x, y, z. [rad]"""
     scale_error_std: float = 0.0
-    """Of what is drawn."""
+    """Standard deviation of the drawn scale errors."""
     angle_std: float = 0.0
-    """Of what is drawn. [rad]"""
+    """Standard deviation of the drawn rotation. [rad]"""
     fields: Sequence[str] = ()
-    """Of the sensor; empty: all."""
+    """Fields of the sensor that are affected; empty: all."""
 
 
 @dataclass(frozen=True)
 class Clip(_config_methods.Clip):
-    """Limits of a device, or of an observation."""
+    """Clips values to the limits of a device or of an observation."""
 
     kind: ClassVar[str] = "clip"
     low: float | Sequence[float] = -math.inf
-    """Values are at least this."""
+    """Lower limit."""
     high: float | Sequence[float] = math.inf
-    """Values are at most this."""
+    """Upper limit."""
     fields: Sequence[str] = ()
-    """Of the sensor; empty: all."""
+    """Fields of the sensor that are affected; empty: all."""
 
 
 @dataclass(frozen=True)
 class Quantize(_config_methods.Config):
-    """Rounds to multiples of step."""
+    """Rounds values to multiples of a step."""
 
     kind: ClassVar[str] = "quantize"
     step: float | Sequence[float] = 0.0
-    """One count; 0: none."""
+    """Resolution; 0: no rounding."""
     fields: Sequence[str] = ()
-    """Of the sensor; empty: all."""
+    """Fields of the sensor that are affected; empty: all."""
 
 
 @dataclass(frozen=True)
 class NanPolicy(_config_methods.Config):
-    """What becomes of NaN and infinite values."""
+    """Handles NaN and infinite values."""
 
     kind: ClassVar[str] = "nan_policy"
     action: Literal["disabled", "warn", "sanitize", "error"] = "sanitize"
-    """disabled: nothing; warn: said once on stderr; sanitize: 0; error: RuntimeError."""
+    """disabled: keep them; warn: print one warning on stderr; sanitize: replace them by 0; error: raise RuntimeError."""
     fields: Sequence[str] = ()
-    """Of the sensor; empty: all."""
+    """Fields of the sensor that are affected; empty: all."""
 
 
 @dataclass(frozen=True)
 class Delay(_config_methods.Config):
-    """The row of delay_s ago."""
+    """Delays the rows by a time."""
 
     kind: ClassVar[str] = "delay"
     delay_s: float = 0.0
-    """By which rows are late."""
+    """The delay."""
     delay_max_s: float = 0.0
-    """Larger than delay_s: drawn between them for each world and episode."""
+    """If larger than delay_s, the delay is drawn between the two for each world and episode."""
     jitter_s: float = 0.0
-    """Uniform in +-jitter_s, fresh for every row."""
+    """Jitter, uniform in +-jitter_s and drawn anew for every row."""
     interpolate: bool = False
-    """Linear between rows; floats only."""
+    """Interpolate linearly between rows; floating-point fields only."""
     fields: Sequence[str] = ()
-    """Of the sensor; empty: all."""
+    """Fields of the sensor that are affected; empty: all."""
 
 
 @dataclass(frozen=True)
@@ -204,47 +204,47 @@ class StepDelay(_config_methods.Config):
 
     kind: ClassVar[str] = "step_delay"
     min_lag: int = 0
-    """The least."""
+    """Minimum lag."""
     max_lag: int = 0
-    """The most; drawn between them."""
+    """Maximum lag; the lag is drawn between the two."""
     per_world: bool = True
-    """False: all worlds have the same lag."""
+    """Draw a lag for each world. False: all worlds have the same lag."""
     hold_probability: float = 0.0
-    """That a drawn lag is not taken."""
+    """Probability that a drawn lag is discarded and the previous one is kept."""
     update_period: int = 0
-    """Steps between draws; 0: every step."""
+    """Number of steps between draws; 0: every step."""
     per_world_phase: bool = True
-    """Worlds draw at steps of their own."""
+    """Give each world its own phase for the draws."""
     fields: Sequence[str] = ()
-    """Of the sensor; empty: all."""
+    """Fields of the sensor that are affected; empty: all."""
 
 
 @dataclass(frozen=True)
 class Rate(_config_methods.Config):
-    """A device slower than the control loop: rows are held in between."""
+    """A device that is slower than the control loop: rows are held in between."""
 
     kind: ClassVar[str] = "rate"
     rate_hz: float = 0.0
-    """New rows a second."""
+    """Number of new rows per second."""
     phase_s: float = 0.0
-    """Of the first one."""
+    """Time of the first row."""
     random_phase: bool = False
-    """Uniform over a period, for each world and episode."""
+    """Draw the phase uniformly over one period, for each world and episode."""
     fields: Sequence[str] = ()
-    """Of the sensor; empty: all."""
+    """Fields of the sensor that are affected; empty: all."""
 
 
 @dataclass(frozen=True)
 class Dropout(_config_methods.Config):
-    """A row is lost with this probability."""
+    """Loses rows with a given probability."""
 
     kind: ClassVar[str] = "dropout"
     probability: float = 0.0
-    """That a row is lost; the first of an episode never is."""
+    """Probability that a row is lost; the first row of an episode is never lost."""
     mode: Literal["hold", "nan", "zero"] = "hold"
-    """What is given instead; hold: the last row."""
+    """The value reported instead; hold: the last row."""
     fields: Sequence[str] = ()
-    """Of the sensor; empty: all."""
+    """Fields of the sensor that are affected; empty: all."""
 
 
 Draw = Gaussian | Uniform | Constant
