@@ -30,7 +30,7 @@ std::string fault(Body&& body) {
   return "";
 }
 
-// Ours are whole: every file of every robot can be read.
+// Every embedded file of every robot is valid.
 TEST(LoadCameras, EveryEmbeddedSystemIsReadable) {
   int count = 0;
   for (const std::string& robot : DataFolder{"robot", "robots/", "/robot.toml"}.names()) {
