@@ -21,7 +21,7 @@ ModelPtr compile(const std::string& geoms) {
   return ModelPtr(mj_compile(spec.get(), nullptr));
 }
 
-// Greatest distance of a point from the surface that `distance` measures.
+// Maximum distance of a point from the surface; `distance` returns the distance of one point.
 template <class F>
 double worst(const ObjectShape& shape, F distance) {
   double most = 0;
