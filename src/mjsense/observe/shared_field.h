@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
-// One field of another sensor as a sensor of its own: the rows are shared, nothing is copied. So a
-// camera of the scene is `wrist_camera` and `wrist_camera_depth` in a suite.
+// One field of another sensor as a separate sensor. The rows are shared and not copied. For
+// example, a camera of the scene appears in a suite as `wrist_camera` and `wrist_camera_depth`.
 
 #include <functional>
 #include <memory>
@@ -13,7 +13,8 @@ namespace mjsense {
 
 class SharedField final : public Sensor {
  public:
-  // `adapt` may change the field's spec: its storage, or its shape to one of as many bytes.
+  // `adapt` may change the field's spec: its storage, or its shape to one with the same number of
+  // bytes.
   SharedField(std::string name, Sensor& source, std::string field,
               std::function<void(SensorSpec&)> adapt = {});
   std::string_view kind() const override { return "shared"; }
@@ -29,7 +30,7 @@ class SharedField final : public Sensor {
   std::function<void(SensorSpec&)> adapt_;
 };
 
-// A field of a camera as recordings have it: rgb and depth are videos.
+// A field of a camera in the form in which it is recorded: rgb and depth are videos.
 std::shared_ptr<Sensor> field_of_camera(std::string name, Sensor& camera, std::string field);
 
 }  // namespace mjsense
