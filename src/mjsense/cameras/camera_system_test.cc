@@ -113,7 +113,7 @@ void expect_near(Vec3 a, Vec3 b, double tolerance) {
   EXPECT_NEAR(norm(a - b), 0, tolerance) << a.x << " " << a.y << " " << a.z;
 }
 
-TEST(LookAt, LooksAtTheTargetWithUpUp) {
+TEST(LookAt, LooksAtTheTarget) {
   const Pose pose = look_at({1, 2, 3}, {1, 5, 3}, {0, 0, 1});
   expect_near(forward(pose), {0, 1, 0}, 1e-12);
   expect_near(up(pose), {0, 0, 1}, 1e-12);
@@ -122,7 +122,7 @@ TEST(LookAt, LooksAtTheTargetWithUpUp) {
   expect_near(up(look_at({0, 0, 0}, {1, 0, 0}, {1, 0, 0})), {0, 1, 0}, 1e-12);
 }
 
-TEST(CameraSystem, MountsStandWhereTheyAreSaidTo) {
+TEST(CameraSystem, MountsHaveTheConfiguredPoses) {
   CameraSystemCfg cfg;
   cfg.cameras = {mount("wrist", MountKind::kMjcf), mount("shoulder", MountKind::kBody),
                  mount("above", MountKind::kLookAt), mount("corner", MountKind::kFixed)};
@@ -140,7 +140,7 @@ TEST(CameraSystem, MountsStandWhereTheyAreSaidTo) {
   expect_near(forward(bench.pose("corner")), {0, 1, 0}, 1e-12);
 }
 
-TEST(CameraSystem, NoiseIsBoundedAndOfTheEpisodeAlone) {
+TEST(CameraSystem, NoiseIsBoundedAndDependsOnTheEpisodeOnly) {
   CameraSystemCfg cfg;
   cfg.cameras = {mount("wrist", MountKind::kMjcf), mount("corner", MountKind::kFixed)};
   cfg.cameras[0].pos_noise = {.01, 0, 0};  // along the camera's x axis
@@ -178,7 +178,7 @@ TEST(CameraSystem, NoiseIsBoundedAndOfTheEpisodeAlone) {
   EXPECT_GT(most, 3 * kDeg);
 }
 
-TEST(CameraSystem, ACameraDrawsTheSameBesideOthers) {
+TEST(CameraSystem, DrawsDoNotDependOnOtherCameras) {
   CameraSystemCfg one, two;
   CameraMountCfg orbit = mount("exo", MountKind::kOrbit);
   orbit.distance_range = {.5, .8};
@@ -195,7 +195,7 @@ TEST(CameraSystem, ACameraDrawsTheSameBesideOthers) {
 
 // A ball of radius r at distance d on the axis covers a disc with a radius of f tan(asin(r / d))
 // pixels.
-TEST(Visibility, ABallCoversItsDisc) {
+TEST(Visibility, BallCoversItsDisc) {
   Bench bench(CameraSystemCfg{});
   std::vector<double> shares;
   const int bodies[] = {bench.body("ball"), bench.body("wall")};
@@ -216,7 +216,7 @@ TEST(Visibility, ABallCoversItsDisc) {
   }
 }
 
-TEST(CameraSystem, AnOrbitFindsAPlaceThatSeesTheObject) {
+TEST(CameraSystem, OrbitCamerasSeeTheObject) {
   CameraSystemCfg cfg;
   cfg.cameras = {mount("exo", MountKind::kOrbit)};
   CameraMountCfg& c = cfg.cameras[0];
@@ -236,7 +236,7 @@ TEST(CameraSystem, AnOrbitFindsAPlaceThatSeesTheObject) {
   }
 }
 
-TEST(CameraSystem, WithoutAPlaceTheEpisodeFailsOrTakesTheBest) {
+TEST(CameraSystem, WithoutAVisiblePoseItFailsOrUsesTheBest) {
   CameraSystemCfg cfg;
   cfg.cameras = {mount("exo", MountKind::kOrbit)};
   CameraMountCfg& c = cfg.cameras[0];
@@ -250,7 +250,7 @@ TEST(CameraSystem, WithoutAPlaceTheEpisodeFailsOrTakesTheBest) {
   EXPECT_EQ(Bench(cfg).place(0, {0}), "");
 }
 
-TEST(CameraSystem, FaultsOfAConfigurationNameTheCamera) {
+TEST(CameraSystem, ErrorsNameTheCamera) {
   const auto fault = [](const std::function<void(CameraMountCfg&)>& change, MountKind kind) {
     CameraSystemCfg cfg;
     cfg.cameras = {mount("eye_1", kind)};

@@ -46,7 +46,7 @@ TEST(LoadCameras, EveryEmbeddedSystemIsReadable) {
   EXPECT_GE(count, 12);
 }
 
-TEST(LoadCameras, OfARobotOnDisk) {
+TEST(LoadCameras, LoadsSystemsOfARobotOnDisk) {
   const testing::TempDir dir;
   std::filesystem::create_directory(dir.path / "cameras");
   std::ofstream(dir.path / "cameras" / "corner.toml") << kCamera;

@@ -52,7 +52,7 @@ EffectSensorCfg noisy() {
   return cfg;
 }
 
-TEST(EffectSensor, CleanValueStaysReadableAndDelayIsInSeconds) {
+TEST(EffectSensor, CleanSensorIsUnchangedAndDelayIsInSeconds) {
   EffectSensorCfg cfg;
   cfg.name = "late";
   cfg.sensor = "robot/gyro";
@@ -114,7 +114,7 @@ TEST(EffectSensor, BitEqualAtAnyBatchAndThreadCount) {
   }
 }
 
-TEST(EffectSensor, ErrorsNameWhatThereIs) {
+TEST(EffectSensor, ErrorsNameSensorsAndFields) {
   const auto message = [](EffectSensorCfg cfg) -> std::string {
     try {
       Simulation sim(make_scene(std::move(cfg)), {});

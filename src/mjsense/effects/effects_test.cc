@@ -149,7 +149,7 @@ TEST(Noise, IsWhiteAcrossTimeComponentsAndWorlds) {
   EXPECT_LT(std::abs(correlation(a, c, 0)), bound);
 }
 
-TEST(Noise, SameTickSameNumberInAnyOrder) {
+TEST(Noise, NumbersDependOnTheTickOnly) {
   Bench forward(one(Noise(Draw::gaussian({1.0}))), 3),
       backward(one(Noise(Draw::gaussian({1.0}))), 3);
   Bench other(one(Noise(Draw::gaussian({1.0}))), 3, 1, 2);
@@ -168,7 +168,7 @@ TEST(Noise, Operations) {
   EXPECT_THAT(abs.feed_row({1, 2}, 0), ElementsAre(0.25f, 0.25f));
 }
 
-TEST(EpisodeBias, IsConstantInAnEpisodeAndWalksIfAsked) {
+TEST(EpisodeBias, IsConstantInAnEpisodeAndCanWalk) {
   Bench bench(one(EpisodeBias(Draw::gaussian({1.0}))), 1);
   std::vector<double> biases;
   for (int episode = 1; episode <= 4000; ++episode) {
@@ -253,7 +253,7 @@ TEST(Calibration, NanPolicies) {
   }
 }
 
-TEST(Calibration, InfinitiesAreNoNumbersEither) {
+TEST(Calibration, InfinitiesAreHandledLikeNan) {
   const float inf = std::numeric_limits<float>::infinity(), nan = std::nanf("");
   Bench sanitize(one(NanPolicy(NanPolicy::Action::kSanitize)), 4);
   EXPECT_THAT(sanitize.feed_row({inf, 1, -inf, nan}, 0), ElementsAre(0, 1, 0, 0));
@@ -317,7 +317,7 @@ TEST(Delay, IsDrawnAnewInEveryEpisode) {
 }
 
 // The first row of an episode is never lost, because there would be no earlier row to hold.
-TEST(Dropout, SparesTheFirstRowOfAnEpisode) {
+TEST(Dropout, NeverLosesTheFirstRowOfAnEpisode) {
   Bench bench(one(Dropout(0.9)), 1);
   std::int64_t tick = 0;
   for (int episode = 1; episode <= 50; ++episode) {
@@ -328,7 +328,7 @@ TEST(Dropout, SparesTheFirstRowOfAnEpisode) {
   }
 }
 
-TEST(Delay, IsSecondsAndClampsToTheEpisode) {
+TEST(Delay, IsInSecondsAndLimitedToTheEpisode) {
   Bench bench(one(Delay(0.03)), 1);
   std::vector<float> out;
   for (int t = 0; t < 7; ++t) out.push_back(bench.feed(static_cast<float>(t), t));
@@ -367,7 +367,7 @@ TEST(Delay, RandomDelayIsDrawnPerWorldAndJitterNeverGoesBack) {
   EXPECT_GT(moments(lags).variance, 0.5);
 }
 
-TEST(Delay, TheSameTickAgainRefreshesAndDoesNotAdvance) {
+TEST(Delay, RepeatedTickReplacesTheNewestRow) {
   Delay d(0.02);
   BiasDrift drift;
   drift.std = {1.0};
@@ -469,7 +469,7 @@ TEST(Chain, HistoryIsOldestFirstAndBackfilled) {
               ElementsAre(9, 9, 9, 9, 9, 9));  // state written after the reset
 }
 
-TEST(Chain, PeersPipelineInItsOrder) {
+TEST(Chain, MjlabsPipelineHasItsOrder) {
   PipelineCfg cfg;
   cfg.noise = Constant{{0.5}};
   cfg.bias = {0.25};
@@ -514,7 +514,7 @@ TEST(Chain, ErrorsNameSensorEffectAndValue) {
               HasSubstr("max_lag is 2147483647: at most 100000"));
 }
 
-TEST(EffectSensor, RefusesAWrongEffectBeforeThereIsARow) {
+TEST(EffectSensor, InvalidEffectsAreRefusedAtBuild) {
   const auto message = [](Effects effects) -> std::string {
     EffectSensorCfg cfg;
     cfg.name = "noisy";
@@ -546,7 +546,7 @@ TEST(EffectSensor, RefusesAWrongEffectBeforeThereIsARow) {
   }
 }
 
-TEST(Chain, AllocatesNothing) {
+TEST(Chain, DoesNotAllocate) {
   Delay d(0.03);
   d.jitter_s = 0.01;
   BiasDrift drift;

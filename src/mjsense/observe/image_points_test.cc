@@ -66,7 +66,7 @@ struct Fixture {
   std::string prefix;
 };
 
-TEST(ImagePoints, NothingSeenIsNaN) {
+TEST(ImagePoints, InvisibleObjectsGiveNaN) {
   Fixture f;
   f.points.compute(f.world.world());
   EXPECT_EQ(f.count(), 0);
@@ -85,7 +85,7 @@ TEST(ImagePoints, ErodesTwiceAndListsRowByRow) {
   for (int i = 12; i < 20; ++i) EXPECT_TRUE(std::isnan(xy[i]));
 }
 
-TEST(ImagePoints, WhatErosionRemovesKeepsAllItsPixels) {
+TEST(ImagePoints, ObjectsRemovedByErosionKeepAllPixels) {
   Fixture f;
   f.camera.paint(0, 10, 20, 5, 2);
   f.points.compute(f.world.world());
@@ -95,7 +95,7 @@ TEST(ImagePoints, WhatErosionRemovesKeepsAllItsPixels) {
   EXPECT_FLOAT_EQ(f.xy()[18], .14f);
 }
 
-TEST(ImagePoints, WhatIsThinIsNotEroded) {
+TEST(ImagePoints, ThinObjectsAreNotEroded) {
   Fixture f("handle", "a", false);
   f.camera.paint(0, 10, 20, 3, 3);
   f.points.compute(f.world.world());
@@ -109,7 +109,7 @@ TEST(ImagePoints, InvisibleGroupsDoNotCount) {
   EXPECT_EQ(f.count(), 0);
 }
 
-TEST(ImagePoints, DrawsTenDifferentOnesThatTheKeyDecides) {
+TEST(ImagePoints, DrawsTenDifferentPixelsByKey) {
   Fixture f;
   f.camera.paint(0, 10, 10, 40, 30);
   f.points.compute(f.world.world());
@@ -131,7 +131,7 @@ TEST(ImagePoints, DrawsTenDifferentOnesThatTheKeyDecides) {
   EXPECT_NE(f.xy(), first);
 }
 
-TEST(ImagePoints, PicturesEndIsBackground) {
+TEST(ImagePoints, OutsideOfTheImageIsBackground) {
   Fixture f;
   f.camera.paint(0, 0, 0, 100, 50);
   f.points.compute(f.world.world());
@@ -143,7 +143,7 @@ TEST(ImagePoints, PicturesEndIsBackground) {
 
 // In random images every point is in the mask that follows from the definition, computed pixel by
 // pixel.
-TEST(ImagePoints, PointsLieInTheMaskOfTheDefinition) {
+TEST(ImagePoints, PointsAreInTheMaskOfTheDefinition) {
   constexpr int kWidth = 100, kHeight = 50;
   Rng rng(1, 0, 0, 0);
   for (int picture = 0; picture < 200; ++picture) {
@@ -187,7 +187,7 @@ TEST(ImagePoints, PointsLieInTheMaskOfTheDefinition) {
 
 // All objects are processed together, each within its bounding box. The points of an object must be
 // the same as without other objects.
-TEST(ImagePoints, OtherObjectsChangeNothing) {
+TEST(ImagePoints, PointsDoNotDependOnOtherObjects) {
   Rng rng(2, 0, 0, 0);
   TestWorld world(kScene);
   for (int picture = 0; picture < 100; ++picture) {
@@ -215,7 +215,7 @@ TEST(ImagePoints, OtherObjectsChangeNothing) {
   }
 }
 
-TEST(ImagePoints, RefusesASegmentationItCannotRead) {
+TEST(ImagePoints, RefusesAnInvalidSegmentation) {
   TestWorld w(kScene);
   class Wrong : public Sensor {
    public:

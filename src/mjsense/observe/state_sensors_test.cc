@@ -43,7 +43,7 @@ constexpr char kScene[] = R"(
 
 std::vector<JointGroup> groups() { return {{"base", {}, {}}, {"arm", {0}, {0}}}; }
 
-TEST(JointState, IsOneStreamAGroup) {
+TEST(JointState, HasOneStreamPerGroup) {
   TestWorld w(kScene);
   w.data->qpos[0] = 0.05;
   w.data->qvel[0] = -1e-5;
@@ -72,7 +72,7 @@ TEST(JointState, UnitsAreThoseOfTheJoints) {
   EXPECT_EQ(joint_unit(w.model, {}), "");
 }
 
-TEST(JsonFunction, RefusesTextThatIsTooLongAtTheMomentItIs) {
+TEST(JsonFunction, RefusesTextLongerThanTheRow) {
   TestWorld w(kScene);
   std::string word = "short";
   JsonFunctionSensor info("task_info", 16, "", [&](const World&, JsonWriter& json) {
@@ -105,7 +105,7 @@ TEST(Pose, OfASiteInTheBaseFrame) {
   EXPECT_EQ(tcp.fields()[0].spec.frame, "body robot/base");
 }
 
-TEST(Pose, NamesTheNearestWhenThereIsNone) {
+TEST(Pose, ErrorNamesTheNearest) {
   TestWorld w(kScene);
   PoseSensor tcp("tcp_pose", {"site", "robot/tol"});
   try {
@@ -118,7 +118,7 @@ TEST(Pose, NamesTheNearestWhenThereIsNone) {
   }
 }
 
-TEST(EnvStates, HoldsEveryFreeBodyAndTheRobot) {
+TEST(EnvStates, ContainsEveryFreeBodyAndTheRobot) {
   TestWorld w(kScene);
   w.data->qpos[0] = 0.25;
   w.data->qvel[0] = -2;
@@ -138,7 +138,7 @@ TEST(EnvStates, HoldsEveryFreeBodyAndTheRobot) {
 }
 
 // Actors whose bodies have the same local name are distinguished by the names of their entities.
-TEST(EnvStates, ActorsOfOneNameKeepTheirEntities) {
+TEST(EnvStates, ActorsWithTheSameNameKeepTheirEntities) {
   TestWorld w(R"(<mujoco><worldbody><body name="left/cup"><freejoint/><geom size=".1"/></body>
     <body name="right/cup" pos="1 0 0"><freejoint/><geom size=".1"/></body>
     <body name="right/mug" pos="2 0 0"><freejoint/><geom size=".1"/></body></worldbody></mujoco>)");

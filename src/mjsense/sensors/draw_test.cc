@@ -91,7 +91,7 @@ std::vector<DebugShape> lines(const DebugShapes& shapes) {
   return found;
 }
 
-TEST(Draw, AFrustumReachesFromTheCameraToFar) {
+TEST(Draw, FrustumReachesFromTheCameraToFar) {
   auto cfg = top_camera();
   cfg->far = 0.5;
   Lab lab({cfg});
@@ -112,7 +112,7 @@ TEST(Draw, AFrustumReachesFromTheCameraToFar) {
   EXPECT_EQ(l[4].width, 2);
 }
 
-TEST(Draw, AFrustumHasTheDepthAskedForAndTheNearPlane) {
+TEST(Draw, FrustumHasTheGivenDepthAndTheNearPlane) {
   auto cfg = top_camera();
   cfg->near = 0.1;
   cfg->viz.show_frame = false;
@@ -126,7 +126,7 @@ TEST(Draw, AFrustumHasTheDepthAskedForAndTheNearPlane) {
   expect_at(l[8].vector, -1.8, 0.9, -0.9);
 }
 
-TEST(Draw, AnOrthographicFrustumIsABox) {
+TEST(Draw, OrthographicFrustumIsABox) {
   auto cfg = top_camera();
   cfg->orthographic = true;
   cfg->fovy = 1.0;
@@ -138,7 +138,7 @@ TEST(Draw, AnOrthographicFrustumIsABox) {
   expect_at(l[8].vector, 0, 0, -1);
 }
 
-TEST(Draw, ThroughALensTheFrustumIsBentAndItsRimEquallyFar) {
+TEST(Draw, FrustumOfALensIsBentWithItsRimAtOneDistance) {
   auto cfg = top_camera();
   cfg->intrinsics = CameraIntrinsics{15, 15, 20, 10};
   cfg->distortion = {"fisheye", {0, 0, 0, 0}};
@@ -150,7 +150,7 @@ TEST(Draw, ThroughALensTheFrustumIsBentAndItsRimEquallyFar) {
   EXPECT_NEAR(l[0].pos.z, 2 - std::cos(std::hypot(19.5, 9.5) / 15), 1e-5);
 }
 
-TEST(Draw, AFrustumIsWhereTheImageWasTaken) {
+TEST(Draw, FrustumIsAtThePoseOfTheImage) {
   auto moving = sensor<CameraSensorCfg>("cam");
   moving->parent_body = "w/box";
   moving->update_period = 0.1;
@@ -192,7 +192,7 @@ TEST(Draw, ContactsInTheSlotsAndTheirForces) {
   EXPECT_NEAR(force, -9.81 * 1.001 * 3 / 4, 1e-2);
 }
 
-TEST(Draw, TheNetForceIsOneArrowOfItsOwnScale) {
+TEST(Draw, NetForceIsOneArrowWithItsOwnScale) {
   auto cfg = sensor<ContactSensorCfg>("touch");
   cfg->primary = {"geom", {"box"}, "w", {}};
   cfg->reduce = "netforce";
@@ -206,7 +206,7 @@ TEST(Draw, TheNetForceIsOneArrowOfItsOwnScale) {
   EXPECT_NEAR(norm(shapes.list()[0].pos - Vec3{0, 0, 0.9819}), 0, 1e-3);
 }
 
-TEST(Draw, ABuiltinSensorIsTheFrameItIsAttachedTo) {
+TEST(Draw, BuiltinSensorIsDrawnAsItsFrame) {
   auto site = sensor<BuiltinSensorCfg>("gyro");
   site->sensor_type = "gyro";
   site->obj = {"site", "tilted", "w"};
@@ -233,7 +233,7 @@ TEST(Draw, ABuiltinSensorIsTheFrameItIsAttachedTo) {
   }
 }
 
-TEST(Draw, OnlyOneWorldIsLookedAtAndDrawingIsNoReading) {
+TEST(Draw, DrawingComputesOneWorldAndIsNotARead) {
   auto cfg = top_camera();
   Lab lab({cfg}, 2);
   (void)lab.sim->draw(1);
@@ -245,7 +245,7 @@ TEST(Draw, OnlyOneWorldIsLookedAtAndDrawingIsNoReading) {
   EXPECT_THROW((void)lab.sim->draw(2), ValueError);
 }
 
-TEST(Draw, EverySensorDrawsOrSaysThatItHasNothing) {
+TEST(Draw, EverySensorDrawsOrThrows) {
   Simulation sim(std::make_shared<Scene>(every_sensor_scene()), {.num_worlds = 2, .decimation = 3});
   sim.step(3);
   for (const auto& s : sim.scene().sensors()) {

@@ -65,7 +65,7 @@ std::vector<std::string> play(int first, int worlds, int threads) {
   return rows;
 }
 
-TEST(Lockstep, ARowAmongManyIsTheRowAloneAtAnyNumberOfThreads) {
+TEST(Lockstep, RowsDoNotDependOnBatchSizeOrThreads) {
   const std::vector<std::string> reference = play(0, kWorlds, 1);
   EXPECT_NE(reference[0], reference[1]);
   for (int threads : {2, 5})
@@ -74,7 +74,7 @@ TEST(Lockstep, ARowAmongManyIsTheRowAloneAtAnyNumberOfThreads) {
     EXPECT_EQ(play(w, 1, 2)[0], reference[w]) << "world " << w << " alone";
 }
 
-TEST(Lockstep, APartialResetTouchesItsWorldsOnly) {
+TEST(Lockstep, PartialResetAffectsItsWorldsOnly) {
   Simulation sim(std::make_shared<Scene>(every_sensor_scene()),
                  {.num_worlds = 3, .decimation = 3, .threads = 2});
   const std::vector<Sensor*> all = sensors(sim);
@@ -98,7 +98,7 @@ TEST(Lockstep, APartialResetTouchesItsWorldsOnly) {
   EXPECT_NE(row(1), one);
 }
 
-TEST(Lockstep, AStepAllocatesNothing) {
+TEST(Lockstep, StepDoesNotAllocate) {
   Simulation sim(std::make_shared<Scene>(every_sensor_scene()),
                  {.num_worlds = 4, .decimation = 3, .threads = 2});
   const std::vector<Sensor*> all = sensors(sim);
@@ -117,7 +117,7 @@ TEST(Lockstep, AStepAllocatesNothing) {
   }
 }
 
-TEST(EverySensor, HasAnExampleAndReturnsWhatItDeclares) {
+TEST(EverySensor, HasAnExampleAndTheDeclaredFields) {
   Simulation sim(std::make_shared<Scene>(every_sensor_scene()), {.num_worlds = 2});
   for (const SensorKind& kind : sensor_kinds()) {
     int examples = 0;

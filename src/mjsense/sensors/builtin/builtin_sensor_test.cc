@@ -231,7 +231,7 @@ SceneCfg with(std::vector<BuiltinSensorCfg> sensors, const std::string& xml = ""
   return cfg;
 }
 
-TEST(BuiltinSensor, ErrorsOfTheSceneNameTheSensor) {
+TEST(BuiltinSensor, SceneErrorsNameTheSensor) {
   const auto fault = [](std::vector<BuiltinSensorCfg> sensors, const std::string& xml = "") {
     return message_of([&] { Scene scene(with(std::move(sensors), xml)); });
   };
@@ -247,7 +247,7 @@ TEST(BuiltinSensor, ErrorsOfTheSceneNameTheSensor) {
               HasSubstr("sensor 's': already exists in the scene"));
 }
 
-TEST(BuiltinSensor, SaysUnitAndFrame) {
+TEST(BuiltinSensor, DeclaresUnitAndFrame) {
   std::vector<BuiltinSensorCfg> sensors;
   const auto add = [&](const std::string& type, ObjRef obj, ObjRef ref = {}) {
     sensors.push_back(make(type, std::move(obj), std::move(ref)));
@@ -299,7 +299,7 @@ TEST(BuiltinSensor, HistoryIsNewestFirst) {
 
 // In a simulation, after each control step, the rows are those of a plain mj_step loop followed by
 // mj_forward. This includes delays and intervals, which use MuJoCo's history buffer.
-TEST(BuiltinSensor, SimulationShowsTheFreshState) {
+TEST(BuiltinSensor, SimulationRowsAreCurrent) {
   const std::vector<Case> cases = all_cases();
   std::string sensors;
   for (const Case& c : cases) sensors += c.xml;

@@ -41,7 +41,7 @@ CameraSensorCfg wide(std::vector<std::string> types) {
   return cfg;
 }
 
-TEST(CameraClip, AtTheModelsNearPlaneAsOpenGLDoes) {
+TEST(CameraClip, ClipsAtTheModelsNearPlaneLikeOpenGL) {
   const testing::TestModel m(kHousing);
   // With shadows, fixed geoms are drawn from a stored layer.
   for (const bool shadows : {false, true}) {
@@ -57,7 +57,7 @@ TEST(CameraClip, AtTheModelsNearPlaneAsOpenGLDoes) {
 
 // Every field shows what is beyond the near plane: nothing is nearer. Without the near plane,
 // nearer surfaces are visible.
-TEST(CameraClip, HoldsForEveryField) {
+TEST(CameraClip, ClipsEveryField) {
   const testing::TestModel m(kHousing);
   RayScene rays(m.model, 1);
   rays.update(m.world());
@@ -84,7 +84,7 @@ TEST(CameraClip, HoldsForEveryField) {
   }
 }
 
-TEST(CameraClip, FaultsAreNamed) {
+TEST(CameraClip, ErrorsNameTheLimits) {
   const auto message = [](const CameraSensorCfg& cfg) -> std::string {
     try {
       const testing::TestModel m(kHousing);

@@ -85,7 +85,7 @@ std::vector<std::uint8_t> image(Camera& camera, const testing::TestModel& m, Ray
   return bytes_of(camera, id);
 }
 
-TEST(FixedLayer, ChangesNoBitOfAnyImage) {
+TEST(FixedLayer, DoesNotChangeImages) {
   for (int scene = 0; scene < 4; ++scene) {
     Rng rng(5, 0, 1, scene);
     testing::TestModel m(room(rng));
@@ -131,7 +131,7 @@ TEST(FixedLayer, ChangesNoBitOfAnyImage) {
 
 // Worlds with different lights, floors and cameras store a layer each, with one and with several
 // threads, whichever worlds are rendered.
-TEST(FixedLayer, WorldsThatLookDifferentHaveTheirOwn) {
+TEST(FixedLayer, DifferentWorldsHaveTheirOwnLayers) {
   constexpr int kWorlds = 6;
   const std::vector<std::vector<int>> casts = {
       {0, 1, 2, 3, 4, 5}, {0, 1, 2, 3, 4, 5}, {0, 1, 2, 3, 4, 5}, {4}, {0, 1, 2, 3, 4, 5}, {1, 4},

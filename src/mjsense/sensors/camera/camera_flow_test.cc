@@ -100,7 +100,7 @@ TEST(Flow, IsZeroInTheFirstImageAndWhileNothingMoves) {
 //   before -> now      wall
 //    o     o        |
 //    \ dx /         |  z
-TEST(Flow, OfACameraThatMovesSidewaysIsFocalTimesWayOverDepth) {
+TEST(Flow, OfATranslatingCameraIsFocalTimesDistanceOverDepth) {
   Lab lab(flow_camera());
   lab.read();
   lab.qpos()[kX] = 0.1;
@@ -118,7 +118,7 @@ TEST(Flow, OfACameraThatMovesSidewaysIsFocalTimesWayOverDepth) {
   EXPECT_NEAR(flow[middle + 1], kFocal * 0.04 / 1.0, 1e-4);
 }
 
-TEST(Flow, OfAMovingObjectIsItsOwn) {
+TEST(Flow, OfAMovingObjectFollowsItsMotion) {
   Lab lab(flow_camera());
   lab.read();
   lab.qpos()[kPlate] = 0.05;
@@ -133,7 +133,7 @@ TEST(Flow, OfAMovingObjectIsItsOwn) {
   EXPECT_EQ(moving, 6 * 6);  // 0.4 m at 1 m are 6 pixels
 }
 
-TEST(Flow, ATeleportIsSeenWhole) {
+TEST(Flow, IncludesTeleports) {
   Lab lab(flow_camera());
   lab.sim->step();
   lab.read();
@@ -227,7 +227,7 @@ TEST(Flow, AgreesWithThePointCloudInEveryKindOfCamera) {
   expect_flow_of_point_cloud(cfg, kHeight / 2.0);
 }
 
-TEST(Flow, IsNotANumberWhereNothingIsSeenOrWasBehindTheCamera) {
+TEST(Flow, IsNanWhereNothingIsSeenOrWasBehindTheCamera) {
   Lab lab(flow_camera());
   lab.qpos()[kZ] = -1.5;  // 0.5 m above the wall, below the plate's top at 1 m
   lab.sim->forward();
@@ -242,7 +242,7 @@ TEST(Flow, IsNotANumberWhereNothingIsSeenOrWasBehindTheCamera) {
   for (float f : lab.read()) EXPECT_TRUE(std::isnan(f));
 }
 
-TEST(Flow, APartialResetForgetsThePreviousImageOfItsWorlds) {
+TEST(Flow, PartialResetClearsThePreviousImageOfItsWorlds) {
   Lab lab(flow_camera(), {.num_worlds = 2});
   lab.read();
   const auto move = [&](double x) {
@@ -261,7 +261,7 @@ TEST(Flow, APartialResetForgetsThePreviousImageOfItsWorlds) {
   EXPECT_NEAR(lab.read("flow", 0)[0], kFocal * 0.2 / 2, 1e-4);
 }
 
-TEST(Flow, AnImageTakenAgainAtTheSameTimeReplacesTheLast) {
+TEST(Flow, ImageAtTheSameTimeReplacesTheLast) {
   Lab lab(flow_camera());
   lab.sim->step();
   lab.read();
@@ -290,7 +290,7 @@ TEST(Flow, IsBetweenImagesOfTheCamerasOwnRate) {
   }
 }
 
-TEST(Flow, IsThatOfTrueDepth) {
+TEST(Flow, UsesTrueDepth) {
   auto plain = flow_camera({"flow", "depth"}), noisy = flow_camera({"flow", "depth"});
   noisy->depth_noise = "d435";
   std::vector<float> flows[2], depths[2];
@@ -306,7 +306,7 @@ TEST(Flow, IsThatOfTrueDepth) {
   EXPECT_NE(depths[0], depths[1]);
 }
 
-TEST(Flow, IsTheSameFromMuJoCosRenderer) {
+TEST(Flow, IsTheSameWithMuJoCosRenderer) {
   auto cfg = flow_camera();
   cfg->renderer = "opengl";
   try {

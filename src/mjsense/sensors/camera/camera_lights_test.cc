@@ -36,7 +36,7 @@ int brightness(int max_lights, const std::string& head, const std::string& first
   return testing::shoot(one_pixel(max_lights), m, rays)->field("rgb").data.row<std::uint8_t>(0)[0];
 }
 
-TEST(CameraLights, TheFirstEightShineAsInMujoco) {
+TEST(CameraLights, FirstEightAreActiveAsInMujoco) {
   const auto share = [](int lights) { return 255 * 0.05 * lights; };
   EXPECT_NEAR(brightness(8, "0"), share(8), 1);
   EXPECT_NEAR(brightness(8, "1"), share(8), 1);  // the headlight counts too
@@ -46,7 +46,7 @@ TEST(CameraLights, TheFirstEightShineAsInMujoco) {
   EXPECT_NEAR(brightness(8, "0", "<light active='false'/>"), share(8), 1);
 }
 
-TEST(CameraLights, TwelveLookAsWithOpenGL) {
+TEST(CameraLights, TwelveLightsLookAsWithOpenGL) {
   const char* colors[] = {"1 0 0",  "0 1 0",  "0 0 1", "1 1 0",   "1 0 1", "0 1 1",
                           "1 .5 0", "0 .5 1", "1 1 1", ".5 1 .5", "1 1 1", "1 .5 .5"};
   for (const char* shadows : {"false", "true"}) {

@@ -60,7 +60,7 @@ void run(const testing::TestModel& m, int steps) {
   mj_forward(m.model, m.data);
 }
 
-TEST(CameraMarkers, AreThoseOfMujocosScene) {
+TEST(CameraMarkers, EqualThoseOfMujocosScene) {
   const testing::TestModel m(kScene);
   Markers markers(m.model, {0x7, 0xf, true});
   mjvScene scene;
@@ -125,7 +125,7 @@ TEST(CameraMarkers, LookAsWithOpenGL) {
   }
 }
 
-TEST(CameraMarkers, AreNotThereUnlessTheirGroupsAre) {
+TEST(CameraMarkers, AreVisibleOnlyIfTheirGroupsAre) {
   const testing::TestModel m(kScene);
   RayScene rays(m.model, 1);
   rays.update(m.world());

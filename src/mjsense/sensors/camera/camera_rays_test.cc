@@ -45,7 +45,7 @@ void each_pixel(const testing::TestModel& m, int width, int height, double fovy,
   }
 }
 
-TEST(CameraAgainstRays, EveryPixelSeesWhatItsRayMeets) {
+TEST(CameraAgainstRays, EveryPixelEqualsItsRay) {
   constexpr int kWidth = 61, kHeight = 47, kScenes = 24;
   long pixels = 0, other_geom = 0, hits = 0, off = 0;
   for (int scene = 0; scene < kScenes; ++scene) {

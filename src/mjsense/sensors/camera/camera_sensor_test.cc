@@ -92,7 +92,7 @@ TEST(Camera, DepthIsPlanarAndIdsAreGeoms) {
     }
 }
 
-TEST(Camera, PixelsKnowTheirBodiesAndEntities) {
+TEST(Camera, PixelsHaveBodyAndEntityIds) {
   SceneCfg cfg;
   cfg.terrain.emplace();
   for (const char* name : {"a", "b"}) {
@@ -133,7 +133,7 @@ TEST(Camera, PixelsKnowTheirBodiesAndEntities) {
 }
 
 // A cloth above a floor, each of them an entity.
-TEST(Camera, PixelsOfAFlexKnowItsEntity) {
+TEST(Camera, PixelsOfAFlexHaveItsEntityId) {
   SceneCfg cfg;
   cfg.terrain.emplace();
   EntityCfg cloth;
@@ -255,7 +255,7 @@ TEST(Camera, SeesWhatMuJoCoDraws) {
   for (std::size_t i = 0; i < 9; ++i) EXPECT_EQ(lab.read<std::int32_t>("segmentation")[2 * i], 0);
 }
 
-TEST(Camera, NothingSeenIsZeroAndMinusOne) {
+TEST(Camera, BackgroundIsZeroOrMinusOne) {
   CameraSensorCfg cfg = camera(5, 5, {"rgb", "depth", "segmentation", "normals"});
   cfg.quat = {0, 1, 0, 0};  // looks up
   Lab lab(R"(<worldbody><geom size=".1"/></worldbody>)", {cfg});
@@ -364,7 +364,7 @@ TEST(Camera, OwnRateHoldsTheImageBetweenTicks) {
 
 // An image that was due when something else failed, before it was rendered, is rendered at the next
 // opportunity.
-TEST(Camera, AnErrorElsewhereLosesNoImage) {
+TEST(Camera, ErrorElsewhereDoesNotLoseAnImage) {
   struct Failing final : Sensor, ControlStepListener {
     Failing() : Sensor("failing") {}
     std::string_view kind() const override { return "test"; }
@@ -502,7 +502,7 @@ TEST(Camera, StereoLosesHalfOfThePixelsAtEdges) {
   EXPECT_EQ(lost_elsewhere, 0);
 }
 
-TEST(Camera, OwnRateNeedNotDivideIntoSteps) {
+TEST(Camera, OwnRateNeedNotBeAMultipleOfSteps) {
   CameraSensorCfg cfg = camera(9, 9, {"depth"});
   cfg.pos = {0, 0, 10};
   cfg.update_period = 1.0 / 30;  // 16.67 steps of 2 ms
@@ -521,7 +521,7 @@ TEST(Camera, OwnRateNeedNotDivideIntoSteps) {
     EXPECT_EQ(taken[k], std::ceil((0.01 + k / 30.0) / 0.002 - 1e-6)) << k;
 }
 
-TEST(Camera, OwnFieldOfViewIsNoOtherSensors) {
+TEST(Camera, OwnFieldOfViewDoesNotAffectOtherSensors) {
   CameraSensorCfg plain = camera(8, 6, {"depth"}, "w/phys"), wide = plain, map = plain;
   wide.name = "wide";
   wide.fovy = 90;
@@ -536,7 +536,7 @@ TEST(Camera, OwnFieldOfViewIsNoOtherSensors) {
   EXPECT_NEAR(lab.read<float>("intrinsics", "map")[4], 2, 1e-4);
 }
 
-TEST(Camera, FaultsAreNamed) {
+TEST(Camera, ErrorsNameTheSetting) {
   const auto message = [](auto&& make) -> std::string {
     try {
       make();

@@ -41,7 +41,7 @@ std::string hills(Rng& rng, double elevation, bool spot) {
          "<camera name='c' pos='0 -1 4' euler='15 0 0' fovy='50'/></worldbody></mujoco>";
 }
 
-TEST(CameraShadows, FallWhereTheWayToTheLightIsBarred) {
+TEST(CameraShadows, FallWhereTheRayToTheLightIsBlocked) {
   long pixels = 0, dark = 0, wrong = 0;
   for (int scene = 0; scene < 12; ++scene) {
     Rng rng(11, 0, 1, scene);

@@ -67,7 +67,7 @@ INSTANTIATE_TEST_SUITE_P(Shapes, CameraTextures,
                                            Shape{"height_field", "type='hfield' hfield='h'"}),
                          [](const auto& shape) { return shape.param.name; });
 
-TEST_P(CameraTextures, LieWhereMujocoPutsThem) {
+TEST_P(CameraTextures, ArePlacedAsInMujoco) {
   constexpr int kWidth = 200, kHeight = 200;
   const testing::TestModel m(wall(GetParam()));
   CameraSensorCfg cfg;
@@ -98,7 +98,7 @@ TEST_P(CameraTextures, LieWhereMujocoPutsThem) {
 }
 
 // On an infinite plane the pattern begins at the plane's position, along both axes.
-TEST(CameraTextures, OfEndlessPlanesBeginAtTheirPlace) {
+TEST(CameraTextures, OfInfinitePlanesBeginAtTheirPosition) {
   for (const char* size : {"0 0 .1", ".4 0 .1", "0 .4 .1"}) {
     for (const char* uniform : kUniform) {
       const testing::TestModel m(

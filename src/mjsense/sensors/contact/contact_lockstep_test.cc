@@ -119,7 +119,7 @@ TEST(ContactLockstep, AnyBatchAndThreadCountIsBitEqual) {
   }
 }
 
-TEST(ContactLockstep, StepAllocatesNothing) {
+TEST(ContactLockstep, StepDoesNotAllocate) {
   SimulationCfg cfg;
   cfg.num_worlds = 4;
   cfg.decimation = 3;

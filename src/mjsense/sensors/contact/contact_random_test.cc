@@ -159,7 +159,7 @@ void expect_equal_to_mujoco(ContactSensor& sensor, const Model& model) {
   }
 }
 
-TEST(ContactRandom, EveryFieldModeAndReductionIsMuJoCos) {
+TEST(ContactRandom, EveryFieldModeAndReductionEqualsMuJoCos) {
   int contacts = 0;
   for (int seed = 0; seed < 150; ++seed) {
     Random r(seed);

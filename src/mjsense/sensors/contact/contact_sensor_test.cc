@@ -205,7 +205,7 @@ TEST(Contact, MiddleOfAStackPushesBothWays) {
 }
 
 // The terrain's names have no prefix "terrain/".
-TEST(Contact, TheTerrainIsAnEntity) {
+TEST(Contact, TerrainIsAnEntity) {
   SceneCfg cfg;
   cfg.terrain = TerrainCfg{};
   EntityCfg box;
@@ -255,7 +255,7 @@ ContactSensorCfg feet_cfg(std::string name, Word<ContactMode> mode,
   return c;
 }
 
-TEST(Contact, AContactThatMatchesBothWaysIsInBothPairs) {
+TEST(Contact, ContactInBothDirectionsIsInBothPairs) {
   ContactSensorCfg net = feet_cfg("net", "subtree", {"trunk", "L", "R"});
   net.reduce = "netforce";
   Lab lab("bot", kFeet,
@@ -278,7 +278,7 @@ TEST(Contact, AContactThatMatchesBothWaysIsInBothPairs) {
   EXPECT_EQ(force[0], lab.read("force", "net")[0]);
 }
 
-TEST(Contact, ExcludeLeavesSecondariesOut) {
+TEST(Contact, ExcludeRemovesSecondaries) {
   ContactSensorCfg each = feet_cfg("each", "geom", {".*"}),
                    first = feet_cfg("first", "geom", {".*"});
   ContactSensorCfg literal = feet_cfg("literal", "subtree", {"L"});
@@ -363,7 +363,7 @@ TEST(Contact, PartsAreMuJoCosPerFieldSensors) {
 }
 
 // Errors that do not depend on the model are found by build().
-TEST(Contact, RefusesAWrongConfigurationWhenItIsBuilt) {
+TEST(Contact, InvalidConfigurationsAreRefusedAtBuild) {
   const auto message = [](auto change) -> std::string {
     ContactSensorCfg cfg = box_cfg();
     change(cfg);

@@ -172,7 +172,7 @@ TEST(ContactTime, ExactReplayOf100000Substeps) {
   mj_deleteModel(m);
 }
 
-TEST(ContactTime, StartingInContactIsNoTouchdownAndResetForgets) {
+TEST(ContactTime, StartInContactIsNotATouchdownAndResetClears) {
   char error[500] = "";
   mjSpec* spec = mj_parseXMLString(kBalls, nullptr, error, sizeof error);
   mjModel* m = mj_compile(spec, nullptr);
@@ -198,7 +198,7 @@ TEST(ContactTime, StartingInContactIsNoTouchdownAndResetForgets) {
 
 // Phases begin with the first substep of an episode, whatever the state at the reset, because a
 // pose is often written after it. mjlab's timers do the same.
-TEST(ContactTime, TheFirstSubstepAfterAResetIsNoEvent) {
+TEST(ContactTime, FirstSubstepAfterAResetIsNotAnEvent) {
   char error[500] = "";
   mjSpec* spec = mj_parseXMLString(kBalls, nullptr, error, sizeof error);
   mjModel* m = mj_compile(spec, nullptr);

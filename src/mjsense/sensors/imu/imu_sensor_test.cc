@@ -53,7 +53,7 @@ TEST(Imu, IdealReadsSpecificForceInSiteAxes) {
   EXPECT_TRUE(scene->find_sensor("imu_acc"));  // the clean sensor
 }
 
-TEST(Imu, DataSheetNumbersComeOut) {
+TEST(Imu, ErrorsHaveTheStatisticsOfTheDataSheet) {
   auto scene = make_scene(imu("mpu6050"));
   SimulationCfg cfg;
   cfg.num_worlds = 256;
@@ -87,7 +87,7 @@ TEST(Imu, DataSheetNumbersComeOut) {
 }
 
 // In a new episode the filters contain nothing of the last one. Other worlds are not affected.
-TEST(Imu, AResetForgetsTheFiltersOfItsWorlds) {
+TEST(Imu, ResetClearsTheFiltersOfItsWorldsOnly) {
   constexpr char kTop[] = R"(<mujoco><option gravity="0 0 0"/><worldbody><body><joint axis="0 0 1"/>
     <geom size=".1"/><site name="imu"/></body></worldbody></mujoco>)";
   ImuSensorCfg cfg = imu("");

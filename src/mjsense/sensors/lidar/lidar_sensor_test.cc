@@ -65,7 +65,7 @@ struct Lab {
   }
 };
 
-TEST(Lidar, RoundRoomIsAsFarEverywhere) {
+TEST(Lidar, RoundRoomIsEquallyFarEverywhere) {
   Lab lab;
   lab.start();
   EXPECT_THAT(lab.read("distances"), Each(FloatNear(5, 1e-5f)));
@@ -80,7 +80,7 @@ TEST(Lidar, RoundRoomIsAsFarEverywhere) {
 
 //   [red, own colour]   lidar at the origin   [material over own colour]
 // Intensity is the mean of red, green and blue times the cosine of incidence.
-TEST(Lidar, IntensityIsTheColourOfWhatReturned) {
+TEST(Lidar, IntensityIsAlbedoTimesCosine) {
   Lab lab;
   constexpr char kWalls[] =
       R"(<mujoco><asset><material name="m" rgba=".2 .4 .9 1"/></asset><worldbody>
@@ -141,7 +141,7 @@ TEST(Lidar, NoiseLeavesNoReturnBeyondTheRange) {
   EXPECT_NEAR(lost / n, 0.345, 4 * std::sqrt(0.345 * 0.655 / n));
 }
 
-TEST(Lidar, ElevationsAreThoseGiven) {
+TEST(Lidar, UsesTheGivenElevations) {
   Lab lab;
   lab.cfg->scan = SpinningScan{.channels = 3, .elevations_deg = {-40, 3, 60}, .samples = 1};
   lab.start();
@@ -152,7 +152,7 @@ TEST(Lidar, ElevationsAreThoseGiven) {
   }
 }
 
-TEST(Lidar, StandingInTheWorldItSeesTheWorld) {
+TEST(Lidar, FrameOnTheWorldBodySeesTheWorld) {
   Lab lab;
   lab.cfg->frame = {{"body", "world", ""}};
   lab.start();
@@ -230,7 +230,7 @@ TEST(Lidar, NoiseMovesDistortedReturnsAlongTheirOwnRays) {
     }
 }
 
-TEST(Lidar, BeforeTheFirstMomentTheFrameStoodStill) {
+TEST(Lidar, BeforeTheFirstPoseTheFrameIsAtRest) {
   Lab lab;
   lab.cfg->include_geom_groups = {{1}};
   lab.cfg->motion_distortion = true;
@@ -243,7 +243,7 @@ TEST(Lidar, BeforeTheFirstMomentTheFrameStoodStill) {
 }
 
 // A frame that is moved when an episode begins was not moving during the sweep before.
-TEST(Lidar, AResetForgetsWhereTheFrameWas) {
+TEST(Lidar, ResetClearsThePoseHistory) {
   Lab lab;
   lab.cfg->include_geom_groups = {{1}};  // the wall at x = 4
   lab.cfg->motion_distortion = true;
@@ -270,7 +270,7 @@ TEST(Lidar, TableAdvancesWithEveryScan) {
   }
 }
 
-TEST(Lidar, ErrorsSayWhatIsWrong) {
+TEST(Lidar, ErrorsNameTheSetting) {
   const auto with = [](auto change) -> std::string {
     Lab lab;
     change(*lab.cfg);
@@ -340,7 +340,7 @@ TEST(Npy, ReadsFloatPairsAndRefusesOthers) {
   EXPECT_THROW(read_npy_pairs(path, "here"), RuntimeError);
 }
 
-TEST(PointCloud, LeavesOutWhatDidNotReturn) {
+TEST(PointCloud, OmitsPointsWithoutAReturn) {
   const testing::TempDir dir;
   const std::string path = dir.file("cloud.ply");
   const float points[] = {1, 2, 3, 0, 0, 0, 4, 5, 6}, intensity[] = {0.5f, 0, 1},

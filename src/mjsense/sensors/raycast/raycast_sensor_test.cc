@@ -91,7 +91,7 @@ std::string error_of(const std::shared_ptr<RayCastSensorCfg>& cfg) {
 }
 
 // Errors that do not depend on the model are found by build().
-TEST(RayCast, RefusesAWrongConfigurationWhenItIsBuilt) {
+TEST(RayCast, InvalidConfigurationsAreRefusedAtBuild) {
   const auto message = [](auto change) -> std::string {
     const auto cfg = sensor_cfg<RayCastSensorCfg>();
     change(*cfg);
@@ -127,7 +127,7 @@ TEST(RayCast, SeesItsChildButNotItself) {
   EXPECT_EQ(lab.read<int>("material_id")[0], -1);
 }
 
-TEST(RayCast, SeesItselfFromInsideIfAsked) {
+TEST(RayCast, CanSeeItselfFromInside) {
   auto cfg = sensor_cfg<RayCastSensorCfg>();
   cfg->exclude_parent_body = false;
   Lab lab({cfg});
@@ -135,7 +135,7 @@ TEST(RayCast, SeesItselfFromInsideIfAsked) {
   EXPECT_THAT(lab.read("normals_w"), Pointwise(FloatNear(1e-6f), {0.0f, 0.0f, -1.0f}));
 }
 
-TEST(RayCast, AMissKeepsTheOrigin) {
+TEST(RayCast, MissReportsTheOrigin) {
   auto cfg = sensor_cfg<RayCastSensorCfg>();
   cfg->pattern = GridPattern{.size = {0, 0}, .direction = {0, 0, 1}};
   Lab lab({cfg});
@@ -186,7 +186,7 @@ TEST(RayCast, AlignmentTurnsRaysButNotTheFrame) {
 
 // A frame that points up still has a heading. The heading does not flip where the frame's x axis
 // passes the vertical.
-TEST(RayCast, AHeadingGoesOnOverTheTop) {
+TEST(RayCast, HeadingDoesNotFlipAtTheVertical) {
   const double heading = 0.7;
   for (double pitch : {-1.3, -M_PI / 2 + 0.05, -M_PI / 2, -M_PI / 2 - 0.05, M_PI / 2 + 0.05}) {
     double yaw[4], nose[4], q[4], mat[9];
@@ -207,7 +207,7 @@ TEST(RayCast, AHeadingGoesOnOverTheTop) {
 
 // Of the two quaternions of an orientation, the one whose largest component is positive is
 // returned.
-TEST(RayCast, TheLargestComponentOfAQuaternionIsPositive) {
+TEST(RayCast, LargestComponentOfAQuaternionIsPositive) {
   auto cfg = sensor_cfg<RayCastSensorCfg>();
   cfg->frame = {{"body", "base", "r"}, {"body", "belly", "r"}};
   Lab lab({cfg});
@@ -253,7 +253,7 @@ TEST(RayCast, GroupsAndTransparencyBelongToTheQuery) {
   EXPECT_FLOAT_EQ(lab.read("distances", "third")[0], -1.0f);
 }
 
-TEST(RayCast, FramesMayBeCamerasAndSeveral) {
+TEST(RayCast, AcceptsCamerasAndSeveralFrames) {
   auto cfg = sensor_cfg<RayCastSensorCfg>();
   cfg->any_frame = true;
   cfg->frame = {{"camera", "eye", "r"}, {"xbody", "belly", "r"}};
@@ -271,7 +271,7 @@ TEST(RayCast, FramesMayBeCamerasAndSeveral) {
               Pointwise(FloatNear(1e-6f), {0.0f, 0.0f, 2.0f, -10.0f, 0.0f, 4.5f}));
 }
 
-TEST(RayCast, ATeleportIsInTheNextReadingAndOnlyThatWorldChanges) {
+TEST(RayCast, TeleportChangesTheNextReadingOfItsWorldOnly) {
   Lab lab({sensor_cfg<RayCastSensorCfg>()}, {.num_worlds = 3});
   const std::vector<float> before = lab.read("hit_pos_w");
   lab.pose({-7, 1, 9, 1, 0, 0, 0}, 1);
@@ -435,7 +435,7 @@ TEST(RayCast, DrawsHitsRaysAndNormals) {
   EXPECT_EQ(shapes.list()[3].rgba, cfg->viz.miss_color);
 }
 
-TEST(Pattern, GridStopsShortWhereTheResolutionDoesNotDivide) {
+TEST(Pattern, GridEndsEarlyIfTheResolutionDoesNotDivide) {
   const RayPattern p =
       make_pattern(GridPattern{.size = {0.5, 0}, .resolution = 0.2}, nullptr, "test");
   ASSERT_EQ(p.size(), 3u);
@@ -443,7 +443,7 @@ TEST(Pattern, GridStopsShortWhereTheResolutionDoesNotDivide) {
   EXPECT_NEAR(p.offsets[2][0], 0.15, 1e-12);
 }
 
-TEST(Pattern, RingsHaveACentreIfAsked) {
+TEST(Pattern, RingsCanHaveACentre) {
   const auto offsets = [](bool center) {
     const RingPattern ring{.rings = {{.radius = 0.5, .num_samples = 4}}, .include_center = center};
     std::vector<double> xy;
@@ -476,7 +476,7 @@ TEST(Pattern, EveryRayIsInExactlyOnePacket) {
 }
 
 // Adjacent rays, which are copied in one piece, and scattered rays.
-TEST(Pattern, WhatStandsByLaneGoesToItsRay) {
+TEST(Pattern, LanesAreCopiedToTheirRays) {
   UserPattern strewn;
   strewn.offsets.assign(187, {});
   Rng rng(2, 0, 0, 0);

@@ -90,14 +90,14 @@ TEST(TerrainHeight, ReducesTheRaysOfAFrame) {
               Pointwise(FloatNear(1e-6f), {0.7f, 0.7f, 0.2f}));
 }
 
-TEST(TerrainHeight, OneFarRayOfManyIsTheLimit) {
+TEST(TerrainHeight, RaysThatMissGiveTheLimit) {
   auto cfg = height(HeightReduction::kNone);
   cfg->pattern = GridPattern{.size = {0.2, 0}, .resolution = 0.1};
   // Two rays would hit the floor, which is more than max_distance below; the third hits the step.
   EXPECT_THAT(Lab(cfg).at(0.49, 1.2), Pointwise(FloatNear(1e-6f), {1.0f, 1.0f, 0.7f}));
 }
 
-TEST(TerrainHeight, WhereAllRaysMissTheGroundStraightBelowDecides) {
+TEST(TerrainHeight, IfAllRaysMissTheGroundBelowIsUsed) {
   Lab lab(height());
   EXPECT_THAT(lab.at(-2, 50), ElementsAre(1.0f)) << "far above";
   EXPECT_THAT(lab.at(-2, -0.3), ElementsAre(0.0f)) << "inside the floor";
@@ -107,7 +107,7 @@ TEST(TerrainHeight, WhereAllRaysMissTheGroundStraightBelowDecides) {
   EXPECT_THAT(lab.at(-10, 0.4), ElementsAre(FloatNear(0.4f, 1e-6f))) << "no ground: above z = 0";
 }
 
-TEST(TerrainHeight, EveryFrameFromItsOwnHeight) {
+TEST(TerrainHeight, EveryFrameHasItsOwnHeight) {
   auto cfg = height();
   cfg->frame = {{"body", "foot", "r"}, {"site", "toe", "r"}};
   // The toe is 0.1 m below the foot in the foot's axes. With the foot on its side it is beside it,
