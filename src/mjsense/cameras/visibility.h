@@ -18,9 +18,10 @@ struct Lookout {
 };
 
 // Share in [0, 1] of the pixels that show each object. An object is a body with all its
-// descendants. As in a camera image, only opaque geoms of groups 0 to 2 are visible, and only from
-// outside. At most about 16,000 pixels on a regular grid are sampled. The ray scene must be up to
-// date for this world.
+// descendants. As in a camera image, geoms are visible only if they are in groups 0 to 2, and only
+// from outside; those with alpha 0 are invisible, and all others are treated as opaque. At most
+// about 16,000 pixels on a regular grid are sampled. The ray scene must be up to date for this
+// world.
 std::vector<double> visible_shares(const RayScene& rays, int world, const Lookout& from,
                                    std::span<const int> bodies);
 

@@ -21,7 +21,8 @@ namespace mjsense {
 //                                     (m/s in world axes, rad/s in body axes): MuJoCo's qpos and
 //                                     qvel of the free joint. Writing them back restores the body.
 //                                     One stream for each free body outside the robot.
-//   env_states/articulations/<peer>   float32 [N]: qpos of all groups in order, then their qvel,
+//   env_states/articulations/<articulation>
+//                                     float32 [N]: qpos of all groups in order, then their qvel,
 //                                     then zeros: MolmoSpaces' row, if it is requested
 // An actor has the name of its body without the entity's prefix ("mug" for "mug/mug") if that is
 // unique. Otherwise it has the full name with '_' for '/', which would create a group in a file.
