@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
-// A camera of an episode, as data: where it is mounted, and how that differs from episode to
-// episode.
+// Configuration of a camera of an episode: its mount, and its random variation between episodes.
 
 #include <array>
 #include <optional>
@@ -17,8 +16,8 @@ template <>
 inline constexpr std::array<std::string_view, 5> kWords<MountKind>{"mjcf", "body", "look_at",
                                                                    "fixed", "orbit"};
 
-// C: MuJoCo's camera frame, x right, y up, looking along -z. Noise is uniform in [-x, x], drawn
-// once an episode.
+// Poses are those of MuJoCo's camera frame: x right, y up, looking along -z. Noise is uniform in
+// [-x, x] and drawn once per episode.
 struct CameraMountCfg {
   std::string name;
   Word<MountKind> mount;
@@ -42,7 +41,8 @@ struct CameraMountCfg {
   bool image_points = true;
   bool erosion = true;
 
-  // Its pose or its lens is another in every episode, or its lens not that of the model.
+  // True if the pose or the field of view differs between episodes, or if the field of view is not
+  // that of the model.
   bool varies() const;
 };
 template <class V>
@@ -114,7 +114,8 @@ void visit_fields(V& v, CameraMountCfg& c) {
   v("erosion", c.erosion, "Keep image points away from the rim of an object.");
 }
 
-// What its fields say of each other. Throws ValueError.
+// Checks fields that depend on each other. Throws ValueError; `place`, if not empty, starts its
+// message.
 void validate(const CameraMountCfg& cfg, std::string_view place);
 
 }  // namespace mjsense

@@ -16,7 +16,7 @@
 namespace mjsense {
 namespace {
 
-constexpr double kDefaultFovy = 45;  // degrees, MuJoCo's
+constexpr double kDefaultFovy = 45;  // degrees, MuJoCo's default
 constexpr double kRad = std::numbers::pi / 180;
 
 Vec3 vec(const std::array<double, 3>& v) { return {v[0], v[1], v[2]}; }
@@ -27,7 +27,7 @@ Vec3 around(Rng& rng, const std::array<double, 3>& half) {
   return {x, y, around(rng, half[2])};
 }
 
-// About x, then y, then z, these axes standing still.
+// Rotation by the three angles (degrees) about the fixed axes x, then y, then z.
 Quat turned(Vec3 degrees) {
   return axis_angle({0, 0, 1}, kRad * degrees.z) * axis_angle({0, 1, 0}, kRad * degrees.y) *
          axis_angle({1, 0, 0}, kRad * degrees.x);
@@ -76,7 +76,7 @@ CameraSystem::CameraSystem(CameraSystemCfg cfg, const std::string& prefix, const
       case MountKind::kFixed:
         m.pose = look_at(vec(c.pos), vec(c.target), vec(c.up));
         break;
-      case MountKind::kOrbit:  // until the first episode
+      case MountKind::kOrbit:  // pose before the first episode
         m.pose = look_at({c.distance_range[1], 0, c.height_range[1]}, vec(c.target), {0, 0, 1});
         break;
     }
@@ -182,7 +182,7 @@ std::string CameraSystem::place(const World& world, std::uint64_t seed, std::uin
     const CameraMountCfg& c = cfg_.cameras[i];
     if (!c.varies()) continue;
     const int camera = static_cast<int>(i);
-    // A camera draws the same whatever other cameras there are.
+    // The stream is that of the camera's name: its draws do not depend on the other cameras.
     Rng rng(seed, 0, stream_of("camera/" + c.name), episode);
     Lens lens = rest_[i];
     if (c.mount == MountKind::kOrbit) {

@@ -1,13 +1,14 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
-// The cameras of an episode: made for all worlds, placed anew in each at the start of an episode.
+// The cameras of an episode. They are created with the scene for all worlds, and placed anew in
+// each world at the start of an episode.
 //
 //   CameraSystem cameras(cfg, "robot_0/", "base");
-//   scene_cfg.sensors gets cameras.sensor_cfgs()
-//   cameras.initialize(simulation)                 after compilation
-//   an episode of a world: state sampled, forward, then
-//   cameras.place(world, rng, centre, objects)     in the parallel pass; forward again where
-//                                                  varies()
+//   add a CameraSensorCfg to the scene for every camera, at mounted(i) if it is new
+//   cameras.initialize(simulation)                      after compilation
+//   start of an episode of a world, after its state is sampled and forward() has run:
+//   cameras.place(world, seed, episode, centre, objects)   in the parallel pass
+//   forward() again if varies()
 
 #include <memory>
 #include <span>
@@ -36,47 +37,50 @@ void visit_fields(V& v, CameraSystemCfg& c) {
   v("height", c.height, "Default height of the images.").unit("pixels").at_least(1);
 }
 
-// Two cameras of one name, and each camera's own. Throws ValueError.
+// Throws ValueError if two cameras have the same name or if a camera is invalid.
 void validate(const CameraSystemCfg& cfg, std::string_view place);
 
 class CameraSystem {
  public:
-  // `prefix`: of the robot's names in the model; `base`: the robot's base body, without it.
+  // `prefix`: prefix of the robot's names in the model. `base`: the robot's base body, without the
+  // prefix.
   CameraSystem(CameraSystemCfg cfg, const std::string& prefix, const std::string& base);
 
   const CameraSystemCfg& cfg() const { return cfg_; }
-  // Full MuJoCo name of a camera; and for what is no camera of the robot's MJCF, where a new one of
-  // that name stands before an episode moves it: body "" is the world.
+  // A camera in the model. `camera` is its full MuJoCo name. If the camera is not in the robot's
+  // MJCF, `is_new` is true and the other members say where to add it; episodes move it later. An
+  // empty body is the world.
   struct Mounted {
     std::string camera;
     bool is_new = false;
     std::string body;
-    Pose pose;  // in the body
+    Pose pose;  // in the frame of the body
     double fovy = 45;
   };
   const Mounted& mounted(int camera) const { return mounted_[camera]; }
   int width(int camera) const { return cfg_.cameras[camera].width.value_or(cfg_.width); }
   int height(int camera) const { return cfg_.cameras[camera].height.value_or(cfg_.height); }
 
-  // Throws KeyError for a camera that the model does not have.
+  // Throws KeyError if the model lacks a camera.
   void initialize(Simulation& simulation);
-  // Some camera must be placed at the start of an episode.
+  // True if some camera must be placed at the start of an episode.
   bool varies() const { return varies_; }
 
-  // Poses and lenses for an episode, written to the world's own model. `world` is fresh; `centre`
-  // (m, world frame) and `objects` (bodies) are what orbiting cameras go round and must see. ""; or
-  // why there is no place for a camera. Touches this world's alone.
+  // Draws poses and fields of view for an episode and writes them to the world's own model. The
+  // world's data must be current. Orbiting cameras are placed around `centre` (m, world frame) and
+  // must see `objects` (bodies). Returns "", or why there is no pose for a camera. Accesses this
+  // world only, so that worlds can be placed in parallel.
   std::string place(const World& world, std::uint64_t seed, std::uint64_t episode, Vec3 centre,
                     std::span<const int> objects);
 
-  // This world's cameras as JSON text, an object by camera: those on a body have `body`, `pos` (m)
-  // and `quat` (wxyz) in it, those in the world `pos`, `forward`, `up`; all `fovy` (degrees). With
-  // it an episode can be pictured again.
+  // This world's cameras as JSON text, one object per camera. Cameras on a body have `body` and, in
+  // its frame, `pos` (m) and `quat` (wxyz); cameras in the world have `pos`, `forward` and `up`;
+  // all have `fovy` (degrees). It allows the images of an episode to be rendered again.
   std::string frozen(int world) const;
 
  private:
   struct Lens {
-    Pose pose;  // in the camera's body
+    Pose pose;  // in the frame of the camera's body
     double fovy;
   };
   Lens with_noise(int camera, Rng& rng) const;
@@ -85,16 +89,16 @@ class CameraSystem {
 
   CameraSystemCfg cfg_;
   std::vector<Mounted> mounted_;
-  std::vector<int> ids_;    // of the model
-  std::vector<Lens> rest_;  // without noise
-  std::vector<Lens> now_;   // [B, cameras]
+  std::vector<int> ids_;    // camera ids in the model
+  std::vector<Lens> rest_;  // [cameras], without noise
+  std::vector<Lens> now_;   // [B, cameras], of the current episode
   bool varies_ = false;
   Simulation* simulation_ = nullptr;
   double *pos_ = nullptr, *quat_ = nullptr, *fovy_ = nullptr;  // [B, ncam, ...] of MuJoCo's batch
 };
 
-// Looks from `eye` at `target`; `up` is up in the image. Where that is nearly the direction itself,
-// x is, or y where it looks along x.
+// Pose of a camera at `eye` that looks at `target`; `up` is up in the image. If `up` is nearly
+// parallel to the viewing direction, x is used instead, or y if the camera looks along x.
 Pose look_at(Vec3 eye, Vec3 target, Vec3 up);
 
 }  // namespace mjsense

@@ -21,7 +21,7 @@ using ::testing::HasSubstr;
 
 constexpr double kDeg = std::numbers::pi / 180;
 
-// A robot with a camera on a turned body, a ball, and a wall east of it.
+// A robot with a camera on a rotated body, a ball, and a wall at x = 0.4 m.
 constexpr char kXml[] = R"(
 <mujoco>
   <worldbody>
@@ -71,7 +71,7 @@ struct Bench {
     cameras.initialize(*sim);
   }
   int body(const char* name) const { return mj_name2id(sim->model(), mjOBJ_BODY, name); }
-  // The first reason why a camera of some world has no place.
+  // Places the cameras of all worlds. Returns the first reason why a camera has no pose, or "".
   std::string place(std::uint64_t seed, const std::vector<std::uint64_t>& episodes) {
     std::vector<std::string> why(sim->num_worlds());
     const int objects[] = {body("ball")};
@@ -113,16 +113,16 @@ void expect_near(Vec3 a, Vec3 b, double tolerance) {
   EXPECT_NEAR(norm(a - b), 0, tolerance) << a.x << " " << a.y << " " << a.z;
 }
 
-TEST(LookAt, LooksAtTheTargetWithUpUp) {
+TEST(LookAt, LooksAtTheTarget) {
   const Pose pose = look_at({1, 2, 3}, {1, 5, 3}, {0, 0, 1});
   expect_near(forward(pose), {0, 1, 0}, 1e-12);
   expect_near(up(pose), {0, 0, 1}, 1e-12);
-  // Straight down "up" says nothing: x does.
+  // If `up` is parallel to the viewing direction, x is up; looking along x, y is.
   expect_near(up(look_at({0, 0, 1}, {0, 0, 0}, {0, 0, 1})), {1, 0, 0}, 1e-12);
   expect_near(up(look_at({0, 0, 0}, {1, 0, 0}, {1, 0, 0})), {0, 1, 0}, 1e-12);
 }
 
-TEST(CameraSystem, MountsStandWhereTheyAreSaidTo) {
+TEST(CameraSystem, MountsHaveTheConfiguredPoses) {
   CameraSystemCfg cfg;
   cfg.cameras = {mount("wrist", MountKind::kMjcf), mount("shoulder", MountKind::kBody),
                  mount("above", MountKind::kLookAt), mount("corner", MountKind::kFixed)};
@@ -133,21 +133,21 @@ TEST(CameraSystem, MountsStandWhereTheyAreSaidTo) {
   Bench bench(cfg);
   EXPECT_FALSE(bench.cameras.varies());
   EXPECT_EQ(bench.cameras.mounted(0).camera, "robot_0/eye");
-  expect_near(bench.pose("shoulder").p, {0, 1, .3}, 1e-12);  // the base is turned by 90 degrees
+  expect_near(bench.pose("shoulder").p, {0, 1, .3}, 1e-12);  // the base is rotated by 90 degrees
   expect_near(forward(bench.pose("shoulder")), {0, 0, -1}, 1e-12);
   expect_near(bench.pose("above").p, {0, 0, 1.3}, 1e-12);
   expect_near(forward(bench.pose("above")), {0, 1, 0}, 1e-12);
   expect_near(forward(bench.pose("corner")), {0, 1, 0}, 1e-12);
 }
 
-TEST(CameraSystem, NoiseIsBoundedAndOfTheEpisodeAlone) {
+TEST(CameraSystem, NoiseIsBoundedAndDependsOnTheEpisodeOnly) {
   CameraSystemCfg cfg;
   cfg.cameras = {mount("wrist", MountKind::kMjcf), mount("corner", MountKind::kFixed)};
-  cfg.cameras[0].pos_noise = {.01, 0, 0};  // along its own x
+  cfg.cameras[0].pos_noise = {.01, 0, 0};  // along the camera's x axis
   cfg.cameras[0].rot_noise = {0, 0, 5};
   cfg.cameras[0].fovy_noise = 4;
   cfg.cameras[1].pos = {0, -2, 0};
-  cfg.cameras[1].pos_noise = {0, 0, .5};  // towards what it looks at
+  cfg.cameras[1].pos_noise = {0, 0, .5};  // along the viewing direction
   Bench bench(cfg, 3), other(cfg, 1);
   const Pose rest = bench.pose("robot_0/eye");
   double most = 0;
@@ -162,7 +162,7 @@ TEST(CameraSystem, NoiseIsBoundedAndOfTheEpisodeAlone) {
     EXPECT_LE(std::abs(moved.x), .01 + 1e-9);
     EXPECT_NEAR(moved.y, 0, 1e-9);
     EXPECT_NEAR(moved.z, 0, 1e-9);
-    expect_near(forward(now), forward(rest), 1e-6);  // it turned about its own axis
+    expect_near(forward(now), forward(rest), 1e-6);  // the rotation is about the viewing axis
     EXPECT_LE(angle_between(rest.q, now.q), 5 * kDeg + 1e-9);
     most = std::max(most, angle_between(rest.q, now.q));
     const Pose corner = bench.pose("corner");
@@ -178,7 +178,7 @@ TEST(CameraSystem, NoiseIsBoundedAndOfTheEpisodeAlone) {
   EXPECT_GT(most, 3 * kDeg);
 }
 
-TEST(CameraSystem, ACameraDrawsTheSameBesideOthers) {
+TEST(CameraSystem, DrawsDoNotDependOnOtherCameras) {
   CameraSystemCfg one, two;
   CameraMountCfg orbit = mount("exo", MountKind::kOrbit);
   orbit.distance_range = {.5, .8};
@@ -193,8 +193,9 @@ TEST(CameraSystem, ACameraDrawsTheSameBesideOthers) {
   EXPECT_EQ(pa.q.w, pb.q.w);
 }
 
-// A ball of radius r at distance d on the axis covers a disc of f tan(asin(r / d)) pixels.
-TEST(Visibility, ABallCoversItsDisc) {
+// A ball of radius r at distance d on the axis covers a disc with a radius of f tan(asin(r / d))
+// pixels.
+TEST(Visibility, BallCoversItsDisc) {
   Bench bench(CameraSystemCfg{});
   std::vector<double> shares;
   const int bodies[] = {bench.body("ball"), bench.body("wall")};
@@ -215,7 +216,7 @@ TEST(Visibility, ABallCoversItsDisc) {
   }
 }
 
-TEST(CameraSystem, AnOrbitFindsAPlaceThatSeesTheObject) {
+TEST(CameraSystem, OrbitCamerasSeeTheObject) {
   CameraSystemCfg cfg;
   cfg.cameras = {mount("exo", MountKind::kOrbit)};
   CameraMountCfg& c = cfg.cameras[0];
@@ -235,7 +236,7 @@ TEST(CameraSystem, AnOrbitFindsAPlaceThatSeesTheObject) {
   }
 }
 
-TEST(CameraSystem, WithoutAPlaceTheEpisodeFailsOrTakesTheBest) {
+TEST(CameraSystem, WithoutAVisiblePoseItFailsOrUsesTheBest) {
   CameraSystemCfg cfg;
   cfg.cameras = {mount("exo", MountKind::kOrbit)};
   CameraMountCfg& c = cfg.cameras[0];
@@ -249,7 +250,7 @@ TEST(CameraSystem, WithoutAPlaceTheEpisodeFailsOrTakesTheBest) {
   EXPECT_EQ(Bench(cfg).place(0, {0}), "");
 }
 
-TEST(CameraSystem, FaultsOfAConfigurationNameTheCamera) {
+TEST(CameraSystem, ErrorsNameTheCamera) {
   const auto fault = [](const std::function<void(CameraMountCfg&)>& change, MountKind kind) {
     CameraSystemCfg cfg;
     cfg.cameras = {mount("eye_1", kind)};

@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
-// The cameras of an episode that was recorded, where they stood: for pictures of it that are made
-// again.
+// Reads the cameras of a recorded episode, so that its images can be rendered again.
 
 #include <string_view>
 
@@ -9,9 +8,9 @@
 
 namespace mjsense {
 
-// What CameraSystem::frozen() wrote, and obs_scene has under `cameras`: a system without noise.
-// Bodies are the robot's, whose names there begin with `prefix`; `place`: for messages, where the
-// text is from. Throws ValueError.
+// Reads the text of CameraSystem::frozen(), which obs_scene contains under `cameras`, as a camera
+// system without noise. Bodies must be the robot's: their names in the text begin with `prefix`.
+// `place` names the source of the text in messages. Throws ValueError.
 CameraSystemCfg read_frozen(std::string_view json, std::string_view prefix, std::string_view place);
 
 }  // namespace mjsense

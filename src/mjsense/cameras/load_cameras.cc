@@ -22,7 +22,7 @@ constexpr std::string_view kEmbedded = "embedded:", kTail = ".toml", kFrozen = "
 
 bool is_file(std::string_view name) { return name.ends_with(kTail) || name.ends_with(kFrozen); }
 
-// "embedded:robots/franka/cameras/", or a folder on disk.
+// Returns "embedded:robots/franka/cameras/", or a folder on disk.
 std::string folder_of(std::string_view robot_file) { return beside(robot_file, "cameras/"); }
 
 DataFolder embedded(const std::string& folder) {
@@ -53,7 +53,7 @@ std::vector<std::string> camera_system_names(std::string_view robot_file) {
 
 CameraSystemCfg load_camera_system(std::string_view name, std::string_view robot_file,
                                    std::string_view prefix) {
-  // Another robot's: "franka/droid".
+  // A camera system of another robot: "franka/droid".
   if (const auto slash = name.find('/'); slash != name.npos && !is_file(name)) {
     const std::string other =
         fmt::format("{}robots/{}/robot.toml", kEmbedded, name.substr(0, slash));

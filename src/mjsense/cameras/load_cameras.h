@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
-// Camera systems from files. A robot has those of its folder: cameras/<name>.toml beside its
-// robot.toml.
+// Loads camera systems from files. The systems of a robot are cameras/<name>.toml in the folder of
+// its robot.toml.
 
 #include <string>
 #include <string_view>
@@ -11,13 +11,14 @@
 
 namespace mjsense {
 
-// Of the robot whose file this is ("embedded:robots/franka/robot.toml", or a path).
+// Names of the camera systems of the robot with this file ("embedded:robots/franka/robot.toml", or
+// a path).
 std::vector<std::string> camera_system_names(std::string_view robot_file);
 
-// One of the robot's by its name, another robot's of ours ("franka/droid"), or any by its path, which
-// ends in .toml; or the cameras of an episode, frozen in a .json (frozen_cameras.h), for a robot
-// whose names begin with `prefix`. Throws KeyError with the nearest names; ValueError that says file,
-// line and key of what is wrong.
+// Loads a camera system of this robot by its name, one of another built-in robot ("franka/droid"),
+// or one by its path, which ends in .toml. A path that ends in .json contains the cameras of a
+// recorded episode (frozen_cameras.h), for a robot whose names begin with `prefix`. Throws KeyError
+// with the nearest names, or ValueError with the file, line and key of the error.
 CameraSystemCfg load_camera_system(std::string_view name_or_path, std::string_view robot_file,
                                    std::string_view prefix = "");
 

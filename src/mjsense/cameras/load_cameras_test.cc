@@ -30,7 +30,7 @@ std::string fault(Body&& body) {
   return "";
 }
 
-// Ours are whole: every file of every robot can be read.
+// Every embedded file of every robot is valid.
 TEST(LoadCameras, EveryEmbeddedSystemIsReadable) {
   int count = 0;
   for (const std::string& robot : DataFolder{"robot", "robots/", "/robot.toml"}.names()) {
@@ -46,7 +46,7 @@ TEST(LoadCameras, EveryEmbeddedSystemIsReadable) {
   EXPECT_GE(count, 12);
 }
 
-TEST(LoadCameras, OfARobotOnDisk) {
+TEST(LoadCameras, LoadsSystemsOfARobotOnDisk) {
   const testing::TempDir dir;
   std::filesystem::create_directory(dir.path / "cameras");
   std::ofstream(dir.path / "cameras" / "corner.toml") << kCamera;

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
-// How much of an image objects would cover, found by rays through some of its pixels, before there
-// is an image.
+// Estimates how much of an image objects would cover, by rays through some of its pixels, before an
+// image is rendered.
 
 #include <span>
 #include <vector>
@@ -17,9 +17,11 @@ struct Lookout {
   int width, height;  // pixels
 };
 
-// Share in [0, 1] of the pixels that show a geom of each object: bodies and what hangs on them.
-// Sees what a camera sees: geoms of groups 0 to 2, opaque, from outside. At most about 16,000
-// pixels are looked at, evenly spread. The ray scene must be up to date in this world.
+// Share in [0, 1] of the pixels that show each object. An object is a body with all its
+// descendants. As in a camera image, geoms are visible only if they are in groups 0 to 2, and only
+// from outside; those with alpha 0 are invisible, and all others are treated as opaque. At most
+// about 16,000 pixels on a regular grid are sampled. The ray scene must be up to date for this
+// world.
 std::vector<double> visible_shares(const RayScene& rays, int world, const Lookout& from,
                                    std::span<const int> bodies);
 

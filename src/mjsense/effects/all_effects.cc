@@ -23,7 +23,8 @@ const std::vector<Alternative>& all() {
   return kAll;
 }
 
-// Fields are counted from the whole object, wherever its base stands in it.
+// Address of the complete object. Field offsets are relative to it, and not to its base class
+// Effect.
 void* whole(const Shared& effect) {
   return const_cast<void*>(dynamic_cast<const void*>(effect.get()));
 }

@@ -13,7 +13,7 @@ namespace mjsense {
 
 template <class... E>
 struct EffectTypes {};
-// One word an effect.
+// To add an effect, add its class here.
 using AllEffects = EffectTypes<Noise, EpisodeBias, BiasDrift, Scale, Misalignment, Clip, Quantize,
                                NanPolicy, Delay, StepDelay, Rate, Dropout>;
 
@@ -22,7 +22,8 @@ struct CustomFieldType<std::shared_ptr<const Effect>> {
   static FieldType make();
 };
 
-// Its fields, and what they say of each other. ValueError.
+// Checks the fields of an effect, also against each other. Throws ValueError; `place` starts its
+// message.
 void check_effect(const std::shared_ptr<const Effect>& effect, std::string_view place);
 
 }  // namespace mjsense

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
-// Deterministic errors of a measuring device: scale, misalignment, range, resolution, invalid
-// numbers.
+// Errors of a measuring device that do not vary within an episode: scale, misalignment, range,
+// resolution, and non-finite values.
 
 #include <array>
 #include <limits>
@@ -31,8 +31,9 @@ void visit_fields(V& v, Scale& c) {
   v.include(static_cast<Effect&>(c));
 }
 
-// v <- M v for every three components, M = (I + diag(s)) R(a): scale errors s (1) and misalignment
-// angles a (rad) about x, y, z, each fixed plus a Gaussian drawn at every reset.
+// v <- M v for every three components, M = (I + diag(s)) R(a): relative scale errors s and
+// misalignment angles a (rad) about x, y, z. Each is the sum of a fixed value and a Gaussian drawn
+// at every reset.
 struct Misalignment : Effect {
   std::array<double, 3> scale_error{0, 0, 0}, angle{0, 0, 0};
   double scale_error_std = 0.0, angle_std = 0.0;
@@ -46,7 +47,7 @@ struct Misalignment : Effect {
  private:
   std::uint32_t stream_ = 0;
   std::vector<double> matrix_;       // [B, 3, 3]
-  std::vector<std::uint8_t> drawn_;  // by world
+  std::vector<std::uint8_t> drawn_;  // [B]
 };
 template <class V>
 void visit_fields(V& v, Misalignment& c) {
@@ -64,7 +65,8 @@ void visit_fields(V& v, Misalignment& c) {
   v.include(static_cast<Effect&>(c));
 }
 
-// x <- min(max(x, low), high): the range of a device (saturation), or a clip of an observation.
+// x <- min(max(x, low), high): the range of a device (saturation), or the clipping of an
+// observation.
 struct Clip : Effect {
   PerComponent low = {-std::numeric_limits<double>::infinity()};
   PerComponent high = {std::numeric_limits<double>::infinity()};
@@ -88,9 +90,10 @@ void visit_fields(V& v, Clip& c) {
   v.include(static_cast<Effect&>(c));
 }
 
-// x <- step round(x / step), halves away from zero: one count of an analog-digital converter.
+// x <- step round(x / step), halves away from zero: the resolution of an analog-to-digital
+// converter.
 struct Quantize : Effect {
-  PerComponent step = {0.0};  // unit; 0: none
+  PerComponent step = {0.0};  // unit of the row; 0: no rounding
 
   Quantize() = default;
   explicit Quantize(PerComponent step) : step(std::move(step)) {}
@@ -108,7 +111,7 @@ void visit_fields(V& v, Quantize& c) {
   v.include(static_cast<Effect&>(c));
 }
 
-// What becomes of NaN and infinite values.
+// What happens to NaN and infinite values.
 enum class NanAction { kDisabled, kWarn, kSanitize, kError };
 template <>
 inline constexpr std::array<std::string_view, 4> kWords<NanAction>{"disabled", "warn", "sanitize",
@@ -126,7 +129,7 @@ struct NanPolicy : Effect {
 
  private:
   std::string place_;
-  std::vector<std::uint8_t> warned_;  // by world
+  std::vector<std::uint8_t> warned_;  // [B]
 };
 template <class V>
 void visit_fields(V& v, NanPolicy& c) {

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
-// Effects one after the other on the rows of B worlds, then history. Needs no simulation: an
-// EffectSensor drives one for each field, a test or a script may drive one by hand.
+// A chain of effects on the rows of B worlds, followed by a history. It needs no simulation: an
+// EffectSensor has one for each field, and a test or a script can use one directly.
 
 #include <cstdint>
 #include <memory>
@@ -17,28 +17,28 @@ namespace mjsense {
 
 using Effects = std::vector<std::shared_ptr<const Effect>>;
 
-// Throws ValueError for an effect that is null or wrong whatever row it meets: "<place>, effect 1
+// Throws ValueError for an effect that is null or that is invalid for every row: "<place>, effect 1
 // (dropout): ...".
 void validate(const Effects& effects, std::string_view place);
 
 struct EffectChainCfg {
   Effects effects;  // applied in this order
-  int history_length =
-      0;  // h last outputs, oldest first; the first of an episode fills all. 0: none
-  bool flatten_history = true;  // [h d], else [h, *shape]
+  // Number of last outputs, oldest first; the first output of an episode fills all. 0: no history.
+  int history_length = 0;
+  bool flatten_history = true;  // [h d] instead of [h, *shape]
 };
 
-// Row number `tick` of a world, at time tick * tick_s.
+// Describes row number `tick` of a world, at time tick * tick_s.
 struct ChainTick {
-  int world = 0;          // row
-  std::uint32_t key = 0;  // whose random numbers these are
+  int world = 0;          // index of the row
+  std::uint32_t key = 0;  // key of the random numbers
   std::uint64_t seed = 0;
   std::int64_t tick = 0, episode = 1;
 };
 
 class EffectChain {
  public:
-  // period: s between rows as they usually come (noise densities, lengths of delays). Throws
+  // `period`: usual time between rows, s, for noise densities and the lengths of delays. Throws
   // ValueError.
   EffectChain(std::string name, const SensorSpec& input, const EffectChainCfg& cfg, int num_worlds,
               double tick_s, double period);
@@ -46,10 +46,10 @@ class EffectChain {
   const SensorSpec& spec() const { return spec_; }  // of the output
   bool eager() const { return eager_; }
 
-  // A new episode of this world; the next apply() is its first row.
+  // Starts an episode of this world; the next apply() gets its first row.
   void reset(const ChainTick& tick);
-  // in: a row of the input; out: the row of the output of the same world, left alone in between.
-  // The same tick again measures the newest row again.
+  // `in`: a row of the input. `out`: the output row of the same world, which must not be modified
+  // between calls. A repeated call with the same tick replaces the newest row.
   void apply(const ChainTick& tick, std::span<const std::byte> in, std::span<std::byte> out);
 
  private:

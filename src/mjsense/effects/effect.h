@@ -1,8 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
-// One imperfection of a sensor: noise, bias, delay, dropout ... An effect changes a row in place,
-// in the row's own unit; times are seconds. Random numbers depend on (seed, world, stream, tick)
-// alone, so results are the same at any number of threads and worlds.
+// Base class of effects. An effect is an imperfection of a sensor, such as noise, bias, delay or
+// dropout. It changes a row in place, in the row's own unit; times are in seconds. Random numbers
+// depend only on (seed, world, stream, tick), so that results are the same for any number of
+// threads and worlds.
 
 #include <cstdint>
 #include <memory>
@@ -18,18 +19,18 @@
 
 namespace mjsense {
 
-// When a row was measured.
+// The time at which a row is measured.
 struct EffectMoment {
-  int world = 0;          // row
-  std::uint32_t key = 0;  // whose random numbers these are: usually the world
+  int world = 0;          // index of the row
+  std::uint32_t key = 0;  // key of the random numbers, usually the world
   std::uint64_t seed = 0;
   std::int64_t tick = 0;
-  std::int64_t episode = 0;  // 1 is the first since the seeding
-  double time = 0.0;         // s, tick as a time
-  double elapsed = 0.0;  // s since the last new row of this world; 0 for the first of an episode
-  bool first = false;    // first row of an episode
-  // False when this tick's row is measured again (after a state write): state must not advance, but
-  // the newest value must follow.
+  std::int64_t episode = 0;  // 1 is the first one after seeding
+  double time = 0.0;         // s, time of the tick
+  double elapsed = 0.0;  // s since the previous row of this world; 0 for the first of an episode
+  bool first = false;    // true for the first row of an episode
+  // False if this tick's row is measured again (after a state write). The state of the effect must
+  // not advance then, but the newest value must be replaced.
   bool advance = true;
 
   Rng rng(std::uint32_t stream) const {
@@ -47,11 +48,11 @@ struct EffectRow {
   int size;
 
   std::size_t bytes() const { return size * dtype_size(dtype); }
-  double at(int i) const {  // numeric rows
+  double at(int i) const {  // numeric rows only
     return dtype == DType::kFloat32 ? reinterpret_cast<const float*>(data)[i]
                                     : reinterpret_cast<const double*>(data)[i];
   }
-  // x_i <- f(x_i, i), numeric rows
+  // x_i <- f(x_i, i), numeric rows only
   template <class F>
   void transform(F&& f) const {
     if (dtype == DType::kFloat32) {
@@ -64,33 +65,35 @@ struct EffectRow {
   }
 };
 
-// What an effect is set up for.
+// Properties of the rows that an effect is applied to.
 struct EffectInit {
   std::string place;  // starts every message: "sensor 'imu', effect 0 (noise)"
   int num_worlds = 1;
   DType dtype = DType::kFloat32;
-  int size = 1;              // elements of a row
+  int size = 1;              // number of elements of a row
   double period = 0.0;       // s between rows
-  std::uint32_t stream = 0;  // its own random numbers
+  std::uint32_t stream = 0;  // stream of the effect's random numbers
 };
 
-// Configuration (public members) and, in a copy made by clone(), the state of B worlds.
+// An effect: its configuration (public members) and, in a copy made by clone(), its state in B
+// worlds.
 class Effect {
  public:
   virtual ~Effect() = default;
   [[nodiscard]] virtual std::unique_ptr<Effect> clone() const = 0;
   virtual std::string kind() const = 0;
 
-  // Throws ValueError for what its fields say of each other, whatever row it will meet:
-  // check_fields() calls it after the ranges, when a configuration is made and before initialize().
-  // `place` starts the message.
+  // Throws ValueError if the fields contradict each other, whatever the row. check_fields() calls
+  // it after checking ranges, when a configuration is built and before initialize(). `place` starts
+  // the message.
   virtual void validate(std::string_view /*place*/) const {}
-  // Throws ValueError for what does not suit the row; allocates. Nothing allocates afterwards.
+  // Throws ValueError if the effect does not suit the row. Allocates memory; other functions do
+  // not.
   virtual void initialize(const EffectInit& init) = 0;
   virtual void apply(const EffectMoment& moment, const EffectRow& row) = 0;
-  // A new episode of this world; apply() with first follows.
+  // Starts an episode of this world; a call of apply() with moment.first follows.
   virtual void reset(const EffectMoment& /*moment*/) {}
-  // True if it must see every row, read or not.
+  // True if the effect must process every row, even if it is not read.
   virtual bool eager() const { return false; }
 
   std::vector<std::string> fields;
@@ -101,31 +104,31 @@ void visit_fields(V& v, Effect& c) {
   v("fields", c.fields, "Fields of the sensor that are affected; empty: all.");
 }
 
-// One value for all components or one for each.
+// One value for all components, or one for each.
 using PerComponent = std::vector<double>;
 inline double component(const PerComponent& values, int i) {
   return values.size() == 1 ? values[0] : values[i];
 }
-// No component of `low` above that of `high`.
+// Throws ValueError if a component of `low` is above that of `high`, or if their sizes differ.
 void check_order(const PerComponent& low, const PerComponent& high, std::string_view place);
-// One value, or as many as the row has.
+// Throws ValueError unless there is one value, or as many as the row has.
 void check_components(const PerComponent& values, const char* name, const EffectInit& init);
-void check_numeric(const EffectInit& init);  // float32 or float64, else ValueError
+void check_numeric(const EffectInit& init);  // throws ValueError unless float32 or float64
 
-// The laws of random numbers. Each takes one value for all components or one for each.
+// Distributions. Each parameter is one value for all components, or one for each.
 struct Gaussian {
   PerComponent std = {0.0}, mean = {0.0};
 };
 struct Uniform {
   PerComponent low = {0.0}, high = {0.0};
 
-  void validate(std::string_view place) const;  // low <= high
+  void validate(std::string_view place) const;  // throws unless low <= high
 };
 struct Constant {
   PerComponent value = {0.0};
 };
 
-// A random number.
+// A random number with a given distribution.
 struct Draw {
   using Law = std::variant<Gaussian, Uniform, Constant>;
   Law law;
@@ -134,7 +137,7 @@ struct Draw {
   static Draw uniform(PerComponent low, PerComponent high);
   static Draw constant(PerComponent value);
 
-  void check(const EffectInit& init) const;  // that it suits the row
+  void check(const EffectInit& init) const;  // throws if it does not suit the row
   double sample(Rng& rng, int i) const;
 };
 template <>
@@ -160,7 +163,7 @@ void visit_fields(V& v, Constant& c) {
   v("value", c.value, "The value.").or_one().not_empty();
 }
 
-// How a random number e meets a value x: x + e, x e, or e alone.
+// How a random number e changes a value x: x + e, x e, or e instead of x.
 enum class Operation { kAdd, kScale, kAbs };
 template <>
 inline constexpr std::array<std::string_view, 3> kWords<Operation>{"add", "scale", "abs"};

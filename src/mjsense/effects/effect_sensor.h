@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
-// A sensor seen through effects. It reads another sensor and has the same fields; the other one
-// keeps the clean value.
+// A sensor with effects applied. It reads another sensor and has the same fields; the other sensor
+// keeps the clean values.
 
 #include <memory>
 #include <string>
@@ -43,8 +43,8 @@ void visit_fields(V& v, EffectSensorCfg& c) {
 
 class EffectSensor : public Sensor {
  public:
-  // `inner` must be initialized before and live as long; null: the sensor `cfg.sensor` of the
-  // scene.
+  // `inner` must be initialized before this sensor and must outlive it. Null: the sensor
+  // `cfg.sensor` of the scene.
   explicit EffectSensor(EffectSensorCfg cfg, Sensor* inner = nullptr);
 
   std::string_view kind() const override { return "effect"; }
@@ -52,9 +52,9 @@ class EffectSensor : public Sensor {
   void initialize(const SensorInit& init) override;
   void compute(const World& world) override;
   void reset(const World& world) override;
-  // Delays, drifts and histories must see every control step.
+  // Delays, drifts and histories must process every control step.
   bool eager() const override { return eager_; }
-  mjtStage needs() const override { return mjSTAGE_NONE; }  // rows of another sensor
+  mjtStage needs() const override { return mjSTAGE_NONE; }  // only rows of another sensor
   std::span<Sensor* const> inputs() const override { return {&inner_, 1}; }
 
   const Sensor& clean() const { return *inner_; }

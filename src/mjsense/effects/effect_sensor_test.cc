@@ -34,7 +34,8 @@ std::shared_ptr<Scene> make_scene(EffectSensorCfg cfg) {
   return std::make_shared<Scene>(std::move(scene));
 }
 
-// Reads a sensor that the scene discovers in the XML, hence after it.
+// Reads a sensor that the scene finds in the XML. Those follow the configured sensors, so this
+// sensor must be computed after a later one.
 EffectSensorCfg noisy() {
   EffectSensorCfg cfg;
   cfg.name = "noisy";
@@ -51,19 +52,19 @@ EffectSensorCfg noisy() {
   return cfg;
 }
 
-TEST(EffectSensor, CleanValueStaysReadableAndDelayIsInSeconds) {
+TEST(EffectSensor, CleanSensorIsUnchangedAndDelayIsInSeconds) {
   EffectSensorCfg cfg;
   cfg.name = "late";
   cfg.sensor = "robot/gyro";
   cfg.effects = {std::make_shared<Delay>(0.016)};
   auto scene = make_scene(cfg);
   SimulationCfg sim_cfg;
-  sim_cfg.decimation = 4;  // 8 ms a step
+  sim_cfg.decimation = 4;  // 8 ms per step
   Simulation sim(scene, sim_cfg);
   std::vector<float> clean;
   for (int k = 0; k < 20; ++k) {
     sim.step();
-    if (k == 7) sim.forward();  // measures the same moment again
+    if (k == 7) sim.forward();  // measures the same tick again
     Sensor* both[] = {&scene->sensor("late"), &scene->sensor("robot/gyro")};
     sim.refresh(both);
     clean.push_back(both[1]->field().data.row<float>(0)[1]);
@@ -113,7 +114,7 @@ TEST(EffectSensor, BitEqualAtAnyBatchAndThreadCount) {
   }
 }
 
-TEST(EffectSensor, ErrorsNameWhatThereIs) {
+TEST(EffectSensor, ErrorsNameSensorsAndFields) {
   const auto message = [](EffectSensorCfg cfg) -> std::string {
     try {
       Simulation sim(make_scene(std::move(cfg)), {});

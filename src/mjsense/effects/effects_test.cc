@@ -26,7 +26,7 @@ using ::testing::HasSubstr;
 
 constexpr double kPeriod = 0.01;  // s
 
-// A chain on rows of floats, fed by hand.
+// An effect chain on rows of floats, which the test supplies.
 class Bench {
  public:
   Bench(const EffectChainCfg& cfg, int size, int num_worlds = 1, std::uint64_t seed = 1)
@@ -149,7 +149,7 @@ TEST(Noise, IsWhiteAcrossTimeComponentsAndWorlds) {
   EXPECT_LT(std::abs(correlation(a, c, 0)), bound);
 }
 
-TEST(Noise, SameTickSameNumberInAnyOrder) {
+TEST(Noise, NumbersDependOnTheTickOnly) {
   Bench forward(one(Noise(Draw::gaussian({1.0}))), 3),
       backward(one(Noise(Draw::gaussian({1.0}))), 3);
   Bench other(one(Noise(Draw::gaussian({1.0}))), 3, 1, 2);
@@ -168,7 +168,7 @@ TEST(Noise, Operations) {
   EXPECT_THAT(abs.feed_row({1, 2}, 0), ElementsAre(0.25f, 0.25f));
 }
 
-TEST(EpisodeBias, IsConstantInAnEpisodeAndWalksIfAsked) {
+TEST(EpisodeBias, IsConstantInAnEpisodeAndCanWalk) {
   Bench bench(one(EpisodeBias(Draw::gaussian({1.0}))), 1);
   std::vector<double> biases;
   for (int episode = 1; episode <= 4000; ++episode) {
@@ -253,7 +253,7 @@ TEST(Calibration, NanPolicies) {
   }
 }
 
-TEST(Calibration, InfinitiesAreNoNumbersEither) {
+TEST(Calibration, InfinitiesAreHandledLikeNan) {
   const float inf = std::numeric_limits<float>::infinity(), nan = std::nanf("");
   Bench sanitize(one(NanPolicy(NanPolicy::Action::kSanitize)), 4);
   EXPECT_THAT(sanitize.feed_row({inf, 1, -inf, nan}, 0), ElementsAre(0, 1, 0, 0));
@@ -265,17 +265,17 @@ TEST(Calibration, InfinitiesAreNoNumbersEither) {
   }
   Bench warn(one(NanPolicy(NanPolicy::Action::kWarn)), 2);
   ::testing::internal::CaptureStderr();
-  EXPECT_THAT(warn.feed_row({-inf, 2}, 0), ElementsAre(-inf, 2));  // said, and left as it is
+  EXPECT_THAT(warn.feed_row({-inf, 2}, 0), ElementsAre(-inf, 2));  // warned about, but not changed
   warn.feed_row({-inf, 2}, 1);
   EXPECT_EQ(::testing::internal::GetCapturedStderr(),
             "sensor 'test', effect 0 (nan_policy): 1 of 2 values are not finite in world 0\n");
 }
 
-// Scale errors belong to the axis of the device, after the rotation: M = diag(s) R.
+// Scale errors apply to the axes of the device, after the rotation: M = diag(s) R.
 TEST(Calibration, MisalignmentScalesTheDevicesAxes) {
   Misalignment m;
   m.scale_error = {0.1, 0.0, -0.2};
-  m.angle = {0, 0, std::numbers::pi / 2};  // x of the body reads on y of the device
+  m.angle = {0, 0, std::numbers::pi / 2};  // the body's x is measured on the device's y
   Bench bench(one(m), 3);
   const std::vector<float> x = bench.feed_row({1, 0, 0}, 0);
   EXPECT_NEAR(x[0], 0, 1e-6);
@@ -296,7 +296,7 @@ TEST(Calibration, ClipsAtBothEnds) {
 
 // ---- time
 
-// One delay an episode and a world, from the whole of its range.
+// There is one delay per episode and world, drawn from the whole range.
 TEST(Delay, IsDrawnAnewInEveryEpisode) {
   Delay d(0.01);
   d.delay_max_s = 0.05;
@@ -312,11 +312,12 @@ TEST(Delay, IsDrawnAnewInEveryEpisode) {
   const auto [least, most] = std::minmax_element(lags.begin(), lags.end());
   EXPECT_GE(*least, 1.0);
   EXPECT_LE(*most, 5.0);
-  EXPECT_EQ(std::set<double>(lags.begin(), lags.end()).size(), 4u);  // 2 to 5 rows: rounded up
+  // 2 to 5 rows, because delays are rounded up.
+  EXPECT_EQ(std::set<double>(lags.begin(), lags.end()).size(), 4u);
 }
 
-// The first row of an episode is never lost: there would be nothing to hold.
-TEST(Dropout, SparesTheFirstRowOfAnEpisode) {
+// The first row of an episode is never lost, because there would be no earlier row to hold.
+TEST(Dropout, NeverLosesTheFirstRowOfAnEpisode) {
   Bench bench(one(Dropout(0.9)), 1);
   std::int64_t tick = 0;
   for (int episode = 1; episode <= 50; ++episode) {
@@ -327,7 +328,7 @@ TEST(Dropout, SparesTheFirstRowOfAnEpisode) {
   }
 }
 
-TEST(Delay, IsSecondsAndClampsToTheEpisode) {
+TEST(Delay, IsInSecondsAndLimitedToTheEpisode) {
   Bench bench(one(Delay(0.03)), 1);
   std::vector<float> out;
   for (int t = 0; t < 7; ++t) out.push_back(bench.feed(static_cast<float>(t), t));
@@ -366,7 +367,7 @@ TEST(Delay, RandomDelayIsDrawnPerWorldAndJitterNeverGoesBack) {
   EXPECT_GT(moments(lags).variance, 0.5);
 }
 
-TEST(Delay, TheSameTickAgainRefreshesAndDoesNotAdvance) {
+TEST(Delay, RepeatedTickReplacesTheNewestRow) {
   Delay d(0.02);
   BiasDrift drift;
   drift.std = {1.0};
@@ -416,11 +417,11 @@ TEST(StepDelay, LagsAreUniformHeldAndShared) {
 }
 
 TEST(Rate, HoldsBetweenSamples) {
-  Bench bench(one(Rate(25)), 1);  // every fourth row of 100 Hz
+  Bench bench(one(Rate(25)), 1);  // every fourth row at 100 Hz
   std::vector<float> out;
   for (int t = 0; t < 9; ++t) out.push_back(bench.feed(static_cast<float>(t), t));
   EXPECT_THAT(out, ElementsAre(0, 0, 0, 0, 4, 4, 4, 4, 8));
-  Bench odd(one(Rate(30)), 1);  // 1 / 30 s is 3.33 rows: 3, 3 and 4 rows in turn, no drift
+  Bench odd(one(Rate(30)), 1);  // 1 / 30 s is 3.33 rows: 3, 3 and 4 rows in turn, without drift
   int samples = 0;
   float last = -1;
   for (int t = 0; t < 100000; ++t) {
@@ -468,7 +469,7 @@ TEST(Chain, HistoryIsOldestFirstAndBackfilled) {
               ElementsAre(9, 9, 9, 9, 9, 9));  // state written after the reset
 }
 
-TEST(Chain, PeersPipelineInItsOrder) {
+TEST(Chain, MjlabsPipelineHasItsOrder) {
   PipelineCfg cfg;
   cfg.noise = Constant{{0.5}};
   cfg.bias = {0.25};
@@ -513,7 +514,7 @@ TEST(Chain, ErrorsNameSensorEffectAndValue) {
               HasSubstr("max_lag is 2147483647: at most 100000"));
 }
 
-TEST(EffectSensor, RefusesAWrongEffectBeforeThereIsARow) {
+TEST(EffectSensor, InvalidEffectsAreRefusedAtBuild) {
   const auto message = [](Effects effects) -> std::string {
     EffectSensorCfg cfg;
     cfg.name = "noisy";
@@ -545,7 +546,7 @@ TEST(EffectSensor, RefusesAWrongEffectBeforeThereIsARow) {
   }
 }
 
-TEST(Chain, AllocatesNothing) {
+TEST(Chain, DoesNotAllocate) {
   Delay d(0.03);
   d.jitter_s = 0.01;
   BiasDrift drift;

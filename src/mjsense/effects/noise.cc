@@ -87,7 +87,7 @@ void BiasDrift::initialize(const EffectInit& init) {
 void BiasDrift::apply(const EffectMoment& moment, const EffectRow& row) {
   double* bias = bias_.data() + static_cast<std::size_t>(moment.world) * size_;
   if (moment.first && moment.advance) {
-    Rng rng = moment.episode_rng(stream_ ^ 0x5bd1e995u);  // not the numbers of a tick
+    Rng rng = moment.episode_rng(stream_ ^ 0x5bd1e995u);  // another stream than that of ticks
     for (int i = 0; i < size_; ++i) {
       bias[i] = start_at_zero ? 0.0 : component(std, i) * rng.normal();
     }

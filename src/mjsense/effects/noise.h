@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
-// Random errors: white noise, a bias per episode, a bias that drifts.
+// Random errors: white noise, a bias per episode, and a bias that drifts.
 
 #include <limits>
 #include <memory>
@@ -11,12 +11,12 @@
 
 namespace mjsense {
 
-// x <- x + e (or x e, or e), e fresh for every row and component.
+// x <- x + e (or x e, or e), with e drawn for every row and component.
 struct Noise : Effect {
   Draw draw;
   Word<Operation> operation = Operation::kAdd;
-  // unit / sqrt(Hz); adds a Gaussian of std = density / sqrt(period), whose Allan deviation is
-  // density / sqrt(tau): the "noise density" of a data sheet. Comes on top of `draw`.
+  // unit / sqrt(Hz). Adds a Gaussian of std = density / sqrt(period), whose Allan deviation is
+  // density / sqrt(tau): the "noise density" of a data sheet. It is added to `draw`.
   PerComponent density = {0.0};
 
   Noise() = default;
@@ -49,9 +49,9 @@ void visit_fields(V& v, Noise& c) {
   v.include(static_cast<Effect&>(c));
 }
 
-// x <- x + b, b constant over an episode (turn-on bias). At every reset b <- operation(b, e), from
-// 0: kAbs draws it anew, kAdd walks from episode to episode (mjlab's additive-bias model with
-// "add").
+// x <- x + b, where b is constant over an episode (turn-on bias). At every reset b <- operation(b,
+// e), starting from 0: kAbs draws it anew, and kAdd makes it a random walk over episodes (mjlab's
+// additive-bias model with "add").
 struct EpisodeBias : Effect {
   Draw draw;
   Word<Operation> operation = Operation::kAbs;
@@ -70,7 +70,7 @@ struct EpisodeBias : Effect {
   std::uint32_t stream_ = 0;
   int size_ = 0;
   std::vector<double> bias_;         // [B, size]
-  std::vector<std::uint8_t> drawn_;  // by world
+  std::vector<std::uint8_t> drawn_;  // [B]
 };
 template <class V>
 void visit_fields(V& v, EpisodeBias& c) {
@@ -89,7 +89,7 @@ void visit_fields(V& v, EpisodeBias& c) {
 
 // x <- x + b with db = -b / tau dt + sigma sqrt(2 / tau) dW: a first-order Gauss-Markov process
 // with standard deviation sigma and autocorrelation exp(-|t| / tau). It starts from its stationary
-// distribution at every reset. With tau infinite: a random walk db = density dW from 0.
+// distribution at every reset. If tau is infinite, it is a random walk db = density dW from 0.
 struct BiasDrift : Effect {
   PerComponent std = {0.0};  // unit
   double time_constant_s = std::numeric_limits<double>::infinity();

@@ -54,7 +54,7 @@ void visit_fields(V& v, PipelineCfg& c) {
   v("flatten_history_dim", c.flatten_history, "Return the history as [h d] instead of [h, d].");
 }
 
-// Throws ValueError for a wrong configuration.
+// Throws ValueError for an invalid configuration.
 EffectChainCfg pipeline(const PipelineCfg& cfg);
 
 }  // namespace mjsense

@@ -13,8 +13,8 @@
 namespace mjsense {
 namespace {
 
-constexpr double kTimeEps = 1e-9;   // s, against the rounding of tick * period
-constexpr int kMostRows = 100'000;  // that a ring keeps of a world
+constexpr double kTimeEps = 1e-9;   // s, tolerance for the rounding of tick * period
+constexpr int kMostRows = 100'000;  // maximum number of rows that a ring keeps of a world
 
 }  // namespace
 

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
-// When a value arrives: delay, jitter, lower rate, lost frames. All take rows of any element type
-// unless said.
+// Errors in time: delay, jitter, a lower rate, and lost rows. Rows can have any element type unless
+// noted.
 
 #include <memory>
 #include <string>
@@ -11,7 +11,7 @@
 
 namespace mjsense {
 
-// The last rows of every world, with their times.
+// Ring buffer of the last rows of every world, with their times.
 class FrameRing {
  public:
   void initialize(int num_worlds, std::size_t row_bytes, int capacity);
@@ -19,7 +19,7 @@ class FrameRing {
   void push(int world, const std::byte* row, double time);
   void replace_newest(int world, const std::byte* row);
   int count(int world) const { return count_[world]; }
-  // age 0: the newest. Ages beyond the oldest give the oldest.
+  // Age 0 is the newest row. Ages beyond the oldest row give the oldest.
   const std::byte* frame(int world, int age) const;
   double time(int world, int age) const;
 
@@ -33,13 +33,13 @@ class FrameRing {
   std::vector<int> newest_, count_;
 };
 
-// Output at time t: the row measured at t - lag, lag = delay + jitter.
-// clang-format off: a table
-//   delay   drawn for each world and episode from [delay_s, delay_max_s] (delay_max_s < delay_s: fixed)
-//   jitter  uniform in [-jitter_s, jitter_s], fresh for every row; the output never goes back in time
-// clang-format on
-// Without interpolation: the newest row not younger than that. Before there is one: the first row
-// of the episode.
+// The output at time t is the row measured at t - lag, lag = delay + jitter.
+//   delay   drawn for each world and episode from [delay_s, delay_max_s]; fixed if
+//           delay_max_s < delay_s
+//   jitter  uniform in [-jitter_s, jitter_s], drawn for every row; the output never goes back in
+//           time
+// Without interpolation it is the newest row that is not younger than t - lag. If there is none, it
+// is the first row of the episode.
 struct Delay : Effect {
   double delay_s = 0.0, delay_max_s = 0.0, jitter_s = 0.0;
   bool interpolate = false;  // linear between rows; float rows only
@@ -55,7 +55,7 @@ struct Delay : Effect {
  private:
   std::uint32_t stream_ = 0;
   FrameRing ring_;
-  std::vector<double> lag_, output_time_;  // s, by world
+  std::vector<double> lag_, output_time_;  // [B], s
 };
 template <class V>
 void visit_fields(V& v, Delay& c) {
@@ -70,15 +70,15 @@ void visit_fields(V& v, Delay& c) {
   v.include(static_cast<Effect&>(c));
 }
 
-// mjlab's delay, in rows: output = the row `lag` rows ago, at most as many as there are since the
-// reset. lag is uniform in [min_lag, max_lag], drawn every update_period rows (0: every row) but
-// kept with hold_probability.
+// mjlab's delay, in rows. The output is the row `lag` rows ago, or the first row since the reset if
+// there are fewer. lag is uniform in [min_lag, max_lag] and drawn every update_period rows (0:
+// every row); with hold_probability the previous lag is kept.
 struct StepDelay : Effect {
   int min_lag = 0, max_lag = 0;
   bool per_world = true;  // false: all worlds have the same lag
   double hold_probability = 0.0;
   int update_period = 0;
-  bool per_world_phase = true;  // when worlds draw, if update_period > 0
+  bool per_world_phase = true;  // each world draws at its own phase, if update_period > 0
 
   StepDelay() = default;
   StepDelay(int min_lag, int max_lag) : min_lag(min_lag), max_lag(max_lag) {}
@@ -94,7 +94,7 @@ struct StepDelay : Effect {
 
   std::uint32_t stream_ = 0;
   FrameRing ring_;
-  std::vector<int> lag_, rows_, phase_;  // by world
+  std::vector<int> lag_, rows_, phase_;  // [B]
 };
 template <class V>
 void visit_fields(V& v, StepDelay& c) {
@@ -112,11 +112,12 @@ void visit_fields(V& v, StepDelay& c) {
   v.include(static_cast<Effect&>(c));
 }
 
-// A device slower than the control loop: a new row at phase + k / rate_hz, held in between.
+// A device that is slower than the control loop: it measures at phase + k / rate_hz, and the row is
+// held in between.
 struct Rate : Effect {
   double rate_hz = 0.0;
   double phase_s = 0.0;
-  bool random_phase = false;  // uniform over a period, for each world and episode
+  bool random_phase = false;  // drawn uniformly over a period, for each world and episode
 
   Rate() = default;
   explicit Rate(double rate_hz, double phase_s = 0.0) : rate_hz(rate_hz), phase_s(phase_s) {}
@@ -130,9 +131,9 @@ struct Rate : Effect {
   std::uint32_t stream_ = 0;
   std::size_t row_bytes_ = 0;
   std::vector<std::byte> held_;       // [B, row]
-  std::vector<double> phase_;         // s, by world
-  std::vector<std::int64_t> number_;  // of the row held
-  std::vector<std::uint8_t> is_new_;  // the row of the present tick was taken
+  std::vector<double> phase_;         // [B], s
+  std::vector<std::int64_t> number_;  // [B], number of the held row
+  std::vector<std::uint8_t> is_new_;  // [B], whether the row of the current tick was measured
 };
 template <class V>
 void visit_fields(V& v, Rate& c) {
@@ -147,8 +148,8 @@ void visit_fields(V& v, Rate& c) {
   v.include(static_cast<Effect&>(c));
 }
 
-// A row is lost with this probability: the last one that arrived is held, or NaN or 0 is given. The
-// first of an episode always arrives.
+// A row is lost with the given probability; the last row that arrived, NaN or 0 is reported
+// instead. The first row of an episode always arrives.
 enum class DropoutMode { kHold, kNan, kZero };
 template <>
 inline constexpr std::array<std::string_view, 3> kWords<DropoutMode>{"hold", "nan", "zero"};

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
-// The worlds that a call about many of them is for.
+// The set of worlds that a call for many worlds is about.
 
 #include <functional>
 #include <span>
@@ -13,8 +13,8 @@ class ActiveWorlds {
  public:
   virtual ~ActiveWorlds() = default;
   virtual std::span<const int> ids() const = 0;  // in order
-  // `body` of each of them, in parallel, on fresh data. What it captures should fit two pointers:
-  // more is allocated.
+  // Calls `body` for each of them, in parallel, with current data. Captures should fit into two
+  // pointers; larger ones are allocated.
   virtual void for_each(std::function<void(const World&)> body) = 0;
 };
 

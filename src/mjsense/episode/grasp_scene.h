@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
-// What a planner of grasps asks of a task, whichever it is: the objects within reach, which of them
-// is meant, and what they stand on.
+// Interface between tasks and grasp planners: the objects within reach, the target among them, and
+// the surface that supports it.
 
 #include <span>
 #include <string>
@@ -14,18 +14,19 @@ namespace mjsense {
 
 struct GraspObject {
   int body = -1;
-  std::string kind;   // "mug": of models/objects
-  ObjectShape shape;  // in the size of its model
+  std::string kind;   // kind in models/objects, such as "mug"
+  ObjectShape shape;  // at the size of its model
 };
 
-// Where a task wants its target put.
+// Where a task wants its target to be placed.
 class PlaceScene {
  public:
   virtual ~PlaceScene() = default;
-  // Body on, in or beside which it is to come to rest.
+  // The body on, in or beside which the target must come to rest.
   virtual int receptacle(int world) const = 0;
-  // Where the middle of its underside may be (m, world), best first, as the world stands, with the object turned by
-  // `turn` from how it is now; `out` is empty. None where it has no place.
+  // Possible positions (m, world frame) of the centre of the target's underside in the current
+  // state, best first, if the object is rotated by `turn` from its current orientation. `out` is
+  // empty when called, and stays empty if there is no such position.
   virtual void places(const World& world, const Quat& turn, std::vector<Vec3>& out) const = 0;
 };
 
@@ -33,15 +34,15 @@ class GraspScene {
  public:
   virtual ~GraspScene() = default;
   virtual std::span<const GraspObject> all_objects() const = 0;  // target and distractors
-  // In the size that the object has in this world's episode. It lives as long as the task: what is known of a shape may
-  // be kept by its address.
+  // Shape of the object at its size in this world's episode. The reference is valid as long as the
+  // task, so that its address can be the key of a cache.
   virtual const ObjectShape& shape(int /*world*/, int object) const {
     return all_objects()[object].shape;
   }
   virtual int target(int world) const = 0;  // index in all_objects()
-  virtual double support_height(
-      int world) const = 0;  // m, of what the target stands on at the start
-  // Null: it is only to be picked up.
+  // Height of the surface that supports the target at the start, m.
+  virtual double support_height(int world) const = 0;
+  // Null if the target only has to be picked up.
   virtual const PlaceScene* place_scene() const { return nullptr; }
 };
 

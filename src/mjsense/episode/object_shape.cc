@@ -47,7 +47,8 @@ void sample_ring(double radius, double z, double spacing, std::vector<Vec3>& out
   }
 }
 
-// A cylinder of half height h between two half ellipsoids of polar radius `cap` (0: flat discs).
+// Samples a cylinder of half height h between two half ellipsoids of polar radius `cap` (0: flat
+// discs).
 void sample_round(Vec3 radius, double h, double cap, double spacing, std::vector<Vec3>& out) {
   std::vector<Vec3> unit;
   const double r = std::max(radius.x, radius.y);

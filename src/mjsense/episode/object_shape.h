@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
-// The surface of a rigid object as points: what placing and grasping look at.
+// The surface of a rigid object as points, for placing and grasping it.
 
 #include <mujoco/mujoco.h>
 
@@ -11,17 +11,17 @@
 namespace mjsense {
 
 struct ObjectShape {
-  std::vector<Vec3> points;  // on the surface of the geoms that touch, body frame, m
-  double low = 0, high = 0;  // least and greatest z of a point
-  double radius = 0;         // greatest distance of a point from the body's z axis
-  double reach = 0;          // greatest distance of a point from the body's origin
+  std::vector<Vec3> points;  // on the surface of the collision geoms, body frame, m
+  double low = 0, high = 0;  // minimum and maximum z of a point
+  double radius = 0;         // maximum distance of a point from the body's z axis
+  double reach = 0;          // maximum distance of a point from the body's origin
 };
 
-// Geoms of `body` and of the bodies below it, which must not move against it, sampled about every
-// `spacing` m. Throws ValueError for a body without geoms that touch.
+// Samples the collision geoms of `body` and of its descendants about every `spacing` m. The
+// descendants must not move relative to the body. Throws ValueError if there is no collision geom.
 ObjectShape object_shape(const mjModel* model, int body, double spacing = 0.004);
 
-// The same object, `size` times as large.
+// The same object, scaled by `size`.
 ObjectShape scaled(const ObjectShape& shape, double size);
 
 }  // namespace mjsense

@@ -21,7 +21,7 @@ ModelPtr compile(const std::string& geoms) {
   return ModelPtr(mj_compile(spec.get(), nullptr));
 }
 
-// Greatest distance of a point from the surface that `distance` measures.
+// Maximum distance of a point from the surface; `distance` returns the distance of one point.
 template <class F>
 double worst(const ObjectShape& shape, F distance) {
   double most = 0;
@@ -29,7 +29,7 @@ double worst(const ObjectShape& shape, F distance) {
   return most;
 }
 
-TEST(ObjectShape, PointsLieOnTheSurfaces) {
+TEST(ObjectShape, PointsAreOnTheSurfaces) {
   const auto sphere = object_shape(compile("<geom size='.03' pos='0 0 .1'/>").get(), 1);
   EXPECT_LT(worst(sphere, [](Vec3 p) { return norm(p - Vec3{0, 0, 0.1}) - 0.03; }), 1e-9);
   EXPECT_NEAR(sphere.low, 0.07, 1e-9);
@@ -65,7 +65,7 @@ TEST(ObjectShape, PointsLieOnTheSurfaces) {
   EXPECT_NEAR(box.radius, std::hypot(0.01, 0.02), 1e-9);
 }
 
-TEST(ObjectShape, PartsBelowTheBodyStandWhereTheyAreWelded) {
+TEST(ObjectShape, DescendantsAreIncludedAtTheirPoses) {
   const auto model = compile(
       "<geom size='.01'/><body pos='0 0 .1' euler='90 0 0'><body pos='0 .2 0'><geom "
       "size='.02'/></body></body>");
@@ -78,7 +78,7 @@ TEST(ObjectShape, PartsBelowTheBodyStandWhereTheyAreWelded) {
   EXPECT_NEAR(shape.high, 0.32, 1e-9);
 }
 
-TEST(ObjectShape, SeenButNotTouchedGeomsDoNotCount) {
+TEST(ObjectShape, VisualGeomsAreIgnored) {
   const auto model = compile("<geom size='.01'/><geom size='.5' contype='0' conaffinity='0'/>");
   EXPECT_NEAR(object_shape(model.get(), 1).reach, 0.01, 1e-9);
   EXPECT_THROW(object_shape(compile("<geom size='.1' contype='0' conaffinity='0'/>").get(), 1),

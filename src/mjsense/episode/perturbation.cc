@@ -7,12 +7,15 @@
 namespace mjsense {
 namespace {
 
-constexpr int kShoveFirst = 5, kShoveSteps = 20;  // control steps
-constexpr double kSlow = 0.5, kFast = 0.8;        // m/s of a shove
-constexpr int kSlipSteps = 12;                    // after the hand has moved it
-constexpr int kOpenSteps = 6;                     // that the hand is open
-constexpr double kLifted = 0.01;                  // m
-constexpr double kAjar = 0.03;                    // of the range of what opens
+// Control steps: the first one in which the object can be shoved, and the number of such steps.
+constexpr int kShoveFirst = 5, kShoveSteps = 20;
+constexpr double kSlow = 0.5, kFast = 0.8;  // m/s, speed of a shove
+// Control steps: upper bound of the wait of a slip, after the gripper has moved the object.
+constexpr int kSlipSteps = 12;
+constexpr int kOpenSteps = 6;     // control steps in which the gripper is open
+constexpr double kLifted = 0.01;  // m; a free object that is lifted higher is held
+// Share of the joint's range; an articulated object that is moved further is held.
+constexpr double kAjar = 0.03;
 
 }  // namespace
 
@@ -28,7 +31,8 @@ void Perturbation::begin(double share, std::uint64_t seed, std::int64_t episode)
   speed_ = rng.uniform(kSlow, kFast);
 }
 
-// What moves when a hand moves the object: its own joint; of a lever, that of the leaf that carries it.
+// The joint that moves when the gripper moves the object. It is the object's own joint or, for a
+// lever, that of the leaf that carries it.
 int Perturbation::joint_of(const mjModel* m, int object) {
   int joint = -1;
   for (int body = object; body > 0; body = m->body_parentid[body]) {
@@ -41,7 +45,8 @@ int Perturbation::joint_of(const mjModel* m, int object) {
   return joint;
 }
 
-// How far a hand has brought it: m upwards, of what is free; otherwise a share of its range.
+// How far the object has been moved: the height of a free object in m, otherwise the joint position
+// as a share of its range.
 double Perturbation::progress(const World& world, int joint) {
   const mjModel* m = world.model;
   if (m->jnt_type[joint] == mjJNT_FREE) return world.data->xpos[3 * m->jnt_bodyid[joint] + 2];
@@ -67,7 +72,7 @@ void Perturbation::apply(const World& world, const Robot& robot, int object, int
   if (!rest_) rest_ = now;
   const bool held = is_free ? now > *rest_ + kLifted : std::abs(now - *rest_) > kAjar;
   if (is_free && kind_ == Kind::kShove) {
-    // One that is held by now stays.
+    // An object that is already held is not shoved.
     if (happened() || held || step != wait_) return;
     shove(world, joint, state);
     happened_at_ = step;

@@ -1,8 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
-// What goes wrong on purpose in some episodes, so that recordings show how it is mended: the object is shoved aside
-// while the hand comes, or the hand opens for a moment while it holds it. From what opens - a drawer, a
-// door by its handle - the hand always slips.
+// Deliberate perturbations of some episodes, so that recordings show how a policy recovers. The
+// object is shoved aside while the gripper approaches, or the gripper opens for a moment while it
+// holds the object. With an articulated object (a drawer, or a door with a handle) the gripper
+// always slips.
 
 #include <cstdint>
 #include <optional>
@@ -12,15 +13,17 @@
 
 namespace mjsense {
 
-// Of one world.
+// The perturbation of one world.
 class Perturbation {
  public:
   enum class Kind { kNone, kShove, kSlip };
 
-  // A new episode: `share` of them are perturbed, which and how is a function of (seed, episode).
+  // Starts an episode. A share `share` of them is perturbed; which ones and how is a function of
+  // (seed, episode).
   void begin(double share, std::uint64_t seed, std::int64_t episode);
-  // Before control step `step` (from 0): may write the velocity of body `object`, if it has a free joint,
-  // and the commands of grippers. Once an episode; never with an object that nothing moves.
+  // Call before control step `step` (from 0). May write the velocity of body `object`, if it has a
+  // free joint, and the commands of grippers. Perturbs once per episode, and never if no joint
+  // moves the object.
   void apply(const World& world, const Robot& robot, int object, int step, Action& action,
              const StateRow& state);
   Kind kind() const { return kind_; }
@@ -32,10 +35,11 @@ class Perturbation {
   void shove(const World& world, int joint, const StateRow& state) const;
 
   Kind kind_ = Kind::kNone;
-  int wait_ = 0;  // steps: a shove's from the start, a slip's since the hand moves the object
+  // Control steps: of a shove from the start, of a slip from when the gripper has moved the object.
+  int wait_ = 0;
   int held_ = 0;
   double direction_ = 0, speed_ = 0;
-  std::optional<double> rest_;  // progress() when the episode began
+  std::optional<double> rest_;  // progress() at the start of the episode
   int happened_at_ = -1;
 };
 

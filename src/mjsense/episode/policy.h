@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
-// A policy: what to command next. Write reset() and act() for one world, which run in parallel, or
-// reset_all() and act_all() for all of them at once; whoever plays episodes calls the latter alone,
-// once a step.
+// Interface of policies, which choose the robot's next command. Implement reset() and act() for one
+// world, which run in parallel, or reset_all() and act_all() for all worlds at once. Code that runs
+// episodes calls only the latter, once per step.
 
 #include <memory>
 #include <span>
@@ -31,37 +31,39 @@ class Policy {
   virtual ~Policy() = default;
   virtual std::string_view name() const = 0;
 
-  // The worlds in which it acts. Called before initialize(), by those who have a simulation.
+  // The simulation in which the policy acts. Called before initialize(), if there is a simulation.
   virtual void bind(const std::shared_ptr<Simulation>& /*simulation*/) {}
-  // Called once by Task::register_policy: allocates for the task's worlds.
+  // Called once, by Task::register_policy(). Allocates memory for the task's worlds.
   virtual void initialize(Task& task) = 0;
-  // A new episode of a fresh world. Throws nothing for a task that it cannot solve: the first
-  // action gives up.
+  // Starts an episode; the world's data is current. Must not throw for a task that the policy
+  // cannot solve: the first action gives up instead.
   virtual void reset(const World& /*world*/) {}
-  // The action for the next control step. Touches this world's state alone: worlds act in parallel.
+  // The action for the next control step. Must access this world's state only, because worlds act
+  // in parallel.
   virtual void act(const World& world, Action& action);
 
-  // All worlds at once, on the caller's thread. `actions` has a row for every world there is; those
-  // of the active ones are empty and wait to be filled.
+  // For all active worlds at once, on the caller's thread. `actions` has a row for every world of
+  // the simulation; the rows of the active worlds are empty and must be filled.
   virtual void reset_all(ActiveWorlds& worlds);
   virtual void act_all(ActiveWorlds& worlds, std::span<Action> actions);
 
-  // Every phase there is: obs_scene's policy_phases. Empty: it knows none.
+  // All phases, for policy_phases of obs_scene; empty if the policy has none.
   virtual std::span<const Phase> phases() const { return {}; }
-  // Further members of obs_scene with text values, in this order: which network, of which step.
+  // Further members of obs_scene with text values, in this order, such as the network and its
+  // training step.
   virtual std::vector<std::pair<std::string, std::string>> info(int /*world*/) const { return {}; }
-  // Why it gave up, or began again last, in a few words that are the same for the same reason; "" if
-  // it never did, or does not say.
+  // Why the policy gave up, or why it last started again, in a few words. The same reason always
+  // has the same words. "" if it did neither, or if the reason is unknown.
   virtual std::string failure(int /*world*/) const { return ""; }
   // Sensors that this policy adds to the suite. They refer to this policy.
   virtual std::vector<std::shared_ptr<Sensor>> create_policy_sensors() const { return {}; }
 };
 
-// A policy that follows phases: its state is what policy_phase, policy_num_retries and grasp_pose
-// record.
+// A policy with phases. The sensors policy_phase, policy_num_retries and grasp_pose record its
+// state.
 class PlannerPolicy : public Policy {
  public:
-  virtual int phase(int world) const = 0;  // number of the present one
+  virtual int phase(int world) const = 0;  // number of the current phase
   virtual int num_retries(int world) const = 0;
   // X_WT, target of the tool; the identity before the first plan with a grasp.
   virtual Pose grasp_pose(int world) const = 0;

@@ -122,7 +122,7 @@ void Task::apply(const World& world, const Action& action, const StateRow& state
                                disturbed, state);
     robot_->command(world, disturbed);
   }
-  // The world's index is no part of the key: an episode is the same wherever it runs.
+  // The world's index is not part of the key: an episode is the same in every world.
   Rng noise(cfg_.seed, static_cast<std::uint32_t>(episode.step), stream_of("task/action_noise"),
             static_cast<std::uint64_t>(episode.number));
   robot_->write_ctrl(world, state, cfg_.action_noise ? &noise : nullptr);

@@ -1,20 +1,20 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
-// A task: its scene, its episodes, and what counts as done. Life:
+// Interface of tasks: the scene, the episodes and the success criterion. Order of the calls:
 //
-//   whole_scene_cfg()        before compilation: scene_cfg() - furniture, objects, lights - and the
+//   whole_scene_cfg()        before compilation: scene_cfg() (furniture, objects, lights) and the
 //                            robot
-//   bind(simulation)         its worlds, where there is a simulation
-//   initialize(model, B)     after compilation: resolves names; the robot exists from here on
+//   bind(simulation)         if there is a simulation
+//   initialize(model, B)     after compilation: resolves names; robot() is valid from here on
 //   register_policy(policy)  once
-//   episodes of worlds:      sample(w, episode, state), forward, begin_all, policy.reset_all,
+//   start of an episode:     sample(w, episode, state), forward, begin_all, policy.reset_all,
 //                            observe
-//   a control step:          policy.act_all, apply(world, action, state), advance, step, observe,
+//   control step:            policy.act_all, apply(world, action, state), advance, step, observe,
 //                            evaluate_all
 //
-// State is per world; functions that take a world touch that world's alone and may run in parallel
-// with the others. A task that judges all worlds at once overrides the *_all functions, whose
-// defaults call those of one world.
+// State is stored per world. Functions that take a world access that world only, and may run in
+// parallel for different worlds. A task that evaluates all worlds at once overrides the *_all
+// functions, whose defaults call those of one world.
 
 #include <mujoco/mujoco.h>
 
@@ -45,43 +45,44 @@ class Simulation;
 struct SceneFileCfg;
 
 struct TaskCfg {
-  RobotCfg robot;     // without a name: the task's scene has its own, if any
-  std::string scene;  // name or file; "": the task's own
-  // Makes a scene in the place of a named one, which `scene` then is only for people.
+  RobotCfg robot;     // without a name: the robot in the task's scene, if any
+  std::string scene;  // name or file; "": the task's own scene
+  // Creates a scene that replaces a named one; `scene` is then only a label for people.
   std::function<SceneFileCfg()> make_scene;
   std::uint64_t seed = 0;
   int horizon = 500;      // policy steps after which an episode is truncated
-  int policy_dt_ms = 66;  // one action of the policy
-  int ctrl_dt_ms = 0;     // one step of the robot's controllers; 0: as the physics
-  int sim_dt_ms = 2;      // one physics step
+  int policy_dt_ms = 66;  // ms, period of the policy's actions
+  int ctrl_dt_ms = 0;     // ms, period of the robot's controllers; 0: as sim_dt_ms
+  int sim_dt_ms = 2;      // ms, period of the physics
   bool action_noise = true;
   bool terminate_upon_success = false;
-  double perturb =
-      0;  // share of episodes in which something goes wrong on purpose (perturbation.h)
+  // Share of episodes that are perturbed on purpose (perturbation.h).
+  double perturb = 0;
 };
 
-// An object that plays a role in an episode: "pickup_obj" -> a body.
+// An object with a role in an episode, such as "pickup_obj".
 struct TaskObject {
   std::string role;
   int body = -1;
-  std::string name;   // of the body, for people: "mug"
-  bool thin = false;  // a handle, a wire: its image points may lie on its rim
+  std::string name;   // short name of the body, for people: "mug"
+  bool thin = false;  // a handle, a wire: its image points may be on its rim
 };
 
-// One observation's judgement.
+// The task's evaluation of one observation.
 struct Evaluation {
   double reward = 0;
-  bool success = false;  // momentary, not latched
-  // The task says that the episode is over, the policy has said done, or success with
+  bool success = false;  // of this observation, not latched
+  // The task has ended the episode, the policy has reported done, or it is a success with
   // terminate_upon_success.
   bool terminal = false;
   bool truncated = false;  // the horizon is reached
-  // What a success lacks, a few words that live as long as the program: "the object is not lifted".
-  // The same words for the same reason, so that they can be counted; "": the task does not say.
+  // What is missing for a success, in a few words with static lifetime: "the object is not lifted".
+  // The same reason always has the same words, so that they can be counted. "" if the task does not
+  // give a reason.
   std::string_view lacks;
 };
 
-// Text with a weight, as obs_scene's referral_expressions have it.
+// A referring expression with a weight, as in referral_expressions of obs_scene.
 struct Referral {
   std::string text;
   double probability = 1;
@@ -89,37 +90,38 @@ struct Referral {
 
 class Task {
  public:
-  explicit Task(TaskCfg cfg);  // throws ValueError for bad timing
+  explicit Task(TaskCfg cfg);  // throws ValueError for invalid periods or horizon
   virtual ~Task() = default;
   Task(const Task&) = delete;
   Task& operator=(const Task&) = delete;
 
   const TaskCfg& cfg() const { return cfg_; }
-  virtual std::string_view name() const = 0;  // registry name
+  virtual std::string_view name() const = 0;  // name in the registry
   virtual std::string_view type() const = 0;  // task_type of obs_scene: "pick"
-  // Physics steps per policy step, and per step of the controllers.
+  // Physics steps per policy step, and per controller step.
   int decimation() const { return cfg_.policy_dt_ms / cfg_.sim_dt_ms; }
   int control_decimation() const { return cfg_.ctrl_dt_ms / cfg_.sim_dt_ms; }
   double fps() const { return 1000.0 / cfg_.policy_dt_ms; }
 
-  // Everything but the robot of cfg(); the caller appends sensors. The robot stands where an entity
-  // "robot_0" without a model keeps its place among the others, else last.
+  // The scene without the robot of cfg(); the caller adds sensors. If the scene has an entity
+  // "robot_0" without a model, the robot takes its place among the entities; else it is added last.
   virtual SceneCfg scene_cfg() const = 0;
-  // With the robot, and the timestep of cfg().
+  // The scene with the robot and the timestep of cfg().
   SceneCfg whole_scene_cfg() const;
-  // The entity of scene_cfg() that is the robot where cfg() names none; "": whatever has actuators.
+  // The entity of scene_cfg() that is the robot if cfg() names none; "": everything that has
+  // actuators.
   virtual std::string robot_entity() const { return "robot_0"; }
-  // Patterns of the names of its actuators by move group, for such a robot; none: one group of all.
+  // Name patterns of that robot's actuators for each move group; empty: one group of all actuators.
   virtual ActuatorGroups robot_groups() const { return {}; }
-  // Cameras of the scene that an episode records, besides the robot's; full names.
+  // Full names of the scene's cameras that an episode records, in addition to the robot's.
   virtual std::vector<CameraMount> cameras() const { return {}; }
-  // Keyframe from which episodes start before sample(); -1: the model's defaults.
+  // Keyframe from which episodes start, before sample(); -1: the model's defaults.
   virtual int start_key() const { return -1; }
 
-  // The worlds in which it is played. Called before initialize(), by those who have a simulation.
+  // The simulation in which the task runs. Called before initialize(), if there is a simulation.
   virtual void bind(const std::shared_ptr<Simulation>& /*simulation*/) {}
   void initialize(const mjModel* model, int num_worlds);
-  // From here on episodes are those of this seed.
+  // Sets the seed of all further episodes.
   void reseed(std::uint64_t seed) { cfg_.seed = seed; }
   const mjModel* model() const { return model_; }
   int num_worlds() const { return num_worlds_; }
@@ -132,88 +134,90 @@ class Task {
   Policy* policy() const { return whole_ ? whole_->policy() : policy_; }
 
   // --- one episode of one world
-  // Writes the start state of episode number `episode`: a function of (cfg.seed, episode) alone,
-  // whatever the world. `draw` > 0: another start of it, where those before cannot be played.
+  // Writes the start state of episode number `episode`. It is a function of (cfg.seed, episode) and
+  // does not depend on the world. `draw` > 0 gives another start state, if the ones before cannot
+  // be played.
   void sample(int world, std::int64_t episode, const StateRow& state, int draw = 0);
-  // After forward(): what the episode is measured against (start poses), the controllers' targets.
-  // Resets the step count.
+  // Called after forward(). Stores what the episode is evaluated against (start poses), sets the
+  // controllers' targets and resets the step count.
   virtual void begin(const World& world);
-  // Counts the step, remembers the action, sets targets and writes ctrl (noise keyed by seed,
-  // episode, step).
+  // Counts the step, stores the action, sets targets and writes ctrl (with noise keyed by seed,
+  // episode and step).
   void apply(const World& world, const Action& action, const StateRow& state);
   virtual Evaluation evaluate(const World& world) const = 0;
 
-  // Why the start that this fresh world shows cannot be played; "": it can. The rollout draws others
-  // then, some times.
+  // Why the start state in this world, whose data is current, cannot be played; "" if it can. The
+  // rollout then draws another one, a limited number of times.
   virtual std::string start_fault(const World& /*world*/) const { return ""; }
 
   // --- all active worlds at once, on the caller's thread
   virtual void begin_all(ActiveWorlds& worlds);
-  // The actions are applied; the worlds are about to move.
+  // Called when the actions are applied, before the worlds are stepped.
   virtual void advance() {}
-  // Fills the evaluations of the active worlds; `out` has one for every world there is.
+  // Fills the evaluations of the active worlds; `out` has an element for every world of the
+  // simulation.
   virtual void evaluate_all(ActiveWorlds& worlds, std::span<Evaluation> out);
-  // True: write_info() is made of what evaluate_all() found, and is asked after it.
+  // True if write_info() uses results of evaluate_all() and must be called after it.
   virtual bool info_follows_evaluation() const { return false; }
 
   std::int64_t episode(int world) const { return now(world).number; }
   int episode_step(int world) const { return now(world).step; }
   bool done_received(int world) const { return now(world).done; }
-  // What goes wrong on purpose in this world's episode.
+  // The perturbation of this world's episode.
   const Perturbation& perturbation(int world) const { return now(world).perturbation; }
-  // As the policy gave it, before clipping and noise; null before the first.
+  // The action from the policy, before clipping and noise; null before the first action.
   const Action* last_action(int world) const {
     return now(world).step > 0 ? &now(world).action : nullptr;
   }
 
-  // --- what observations and recordings say about it
-  // The main one first. Roles are the same in every episode, and known after initialize(); bodies
+  // --- contents of observations and recordings
+  // The main object first. Roles are the same in every episode and known after initialize(); bodies
   // may change.
   virtual std::span<const TaskObject> objects(int world) const = 0;
   virtual std::string description(int world) const = 0;  // "Pick up the mug"
   using Referrals = std::vector<std::pair<std::string, std::vector<Referral>>>;  // by role
   virtual Referrals referrals(int world) const = 0;
-  // Pose of the object with this role: at the first observation, and where the task wants it.
-  // Throws KeyError.
+  // Pose of the object with this role at the first observation, and its goal pose. Both throw
+  // KeyError.
   virtual Pose start_pose(int world, std::string_view role) const = 0;
   virtual std::optional<Pose> goal_pose(int world, std::string_view role) const = 0;
-  // Members of task_info, keys sorted; the caller opens and closes the object.
+  // Writes the members of task_info, sorted by key; the caller opens and closes the object.
   virtual void write_info(const World& world, JsonWriter& json) const = 0;
   // obs_scene: JSON text with task_type, task_description, policy_dt_ms, referral_expressions,
-  // policy_phases, the task's own keys.
+  // policy_phases and the task's own keys.
   std::string obs_scene(int world) const;
 
-  // For planners of grasps; null where nothing is to be grasped.
+  // For grasp planners; null if nothing has to be grasped.
   virtual const GraspScene* grasp_scene() const { return nullptr; }
 
-  // Sensors beyond the core that this task records (obj_start, grasp_state_*, obj_end). They refer
-  // to this task.
+  // Sensors beyond the core ones that this task records (obj_start, grasp_state_*, obj_end). They
+  // refer to this task.
   virtual std::vector<std::shared_ptr<Sensor>> create_task_sensors() const = 0;
-  // The whole suite before it is bound: a task may take sensors out, or put them in another order.
+  // Edits the complete suite before it is bound: a task may remove sensors or change their order.
   virtual void edit_suite(SensorSuite& /*suite*/) const {}
 
  protected:
-  virtual void initialize_task() = 0;  // model() and robot() are there
-  // Writes everything except the joints of cfg()'s robot, unless samples_robot() is true; returns
-  // where the robot's base stands, nothing for where the model has it.
+  virtual void initialize_task() = 0;  // model() and robot() are valid
+  // Writes the start state of everything except the joints of cfg()'s robot, and of these too if
+  // samples_robot() is true. Returns the pose of the robot's base, or nothing to use the model's.
   virtual std::optional<Pose> sample_scene(int world, Rng& rng, const StateRow& state) = 0;
   virtual bool samples_robot() const { return false; }
-  // In a state that another task has sampled: chooses what the episode is about, and moves nothing.
-  // Throws ValueError for a task that cannot.
+  // In a state that another task has sampled: chooses the goal of the episode without moving
+  // anything. Throws ValueError if the task does not support it.
   virtual void choose_goal(int world, Rng& rng, const StateRow& state);
   // Further members of obs_scene with text values, in this order.
   virtual std::vector<std::pair<std::string, std::string>> scene_info(int world) const {
     (void)world;
     return {};
   }
-  // terminal and truncated of an observation with this success; `over`: the episode is, for a
-  // reason of the task's.
+  // Returns an evaluation, with terminal and truncated set. `over`: the task ends the episode for a
+  // reason of its own.
   Evaluation judge(int world, double reward, bool success, bool over = false) const;
-  // The same of a success that lacks this; "": it is one.
+  // The same, where `lacks` says what is missing for a success; "": it is a success.
   Evaluation judge_by(int world, double reward, std::string_view lacks) const;
 
  private:
-  friend class MultiTask;  // of which this one may be a part
+  friend class MultiTask;  // this task may be a part of one
   struct Episode {
     std::int64_t number = 0;
     int step = 0;
@@ -228,7 +232,8 @@ class Task {
   int num_worlds_ = 0;
   std::unique_ptr<Robot> robot_;
   Policy* policy_ = nullptr;
-  Task* whole_ = nullptr;  // whose robot, policy and episodes are a part's
+  // If this task is a part of another one: that task. Its robot, policy and episodes are used.
+  Task* whole_ = nullptr;
   std::vector<Episode> episodes_;
 };
 

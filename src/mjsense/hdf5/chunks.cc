@@ -17,8 +17,9 @@ namespace mjsense::h5 {
 namespace {
 
 constexpr std::uint64_t kMostChunks = 1'000'000;
-constexpr hsize_t kMostPlainChunks = 10'000;  // the library counts up to each from the first
-constexpr std::size_t kSumBytes = 4;          // fletcher32 stands behind the bytes
+// The library counts chunks from the first one for each query, so the cost is quadratic.
+constexpr hsize_t kMostPlainChunks = 10'000;
+constexpr std::size_t kSumBytes = 4;  // fletcher32's checksum follows the data
 
 using Bytes = std::vector<std::uint8_t>;
 
@@ -26,7 +27,8 @@ using Bytes = std::vector<std::uint8_t>;
   throw RuntimeError(fmt::format("'{}' {}", printable(name), why));
 }
 
-// At most `most` bytes; more, or what is no zlib stream to its end, gives none.
+// Returns at most `most` bytes. Returns none if there would be more, or if `packed` is not a
+// complete zlib stream.
 Bytes inflated(const Bytes& packed, std::size_t most) {
   Bytes out(most);
   uLongf size = most;
@@ -55,7 +57,7 @@ class Chunks {
     std::vector<hsize_t> chunk(size_.size());
     h5::check(H5Pget_chunk(properties_, static_cast<int>(chunk.size()), chunk.data()), name_);
     bytes_ = H5Tget_size(type);
-    for (const hsize_t n : chunk) bytes_ *= n;  // check_storage() has bounded both
+    for (const hsize_t n : chunk) bytes_ *= n;  // check_storage() has limited both factors
     if (!read_filters()) return check_plain();
     std::uint64_t count = 1;
     for (std::size_t i = 0; i < size_.size(); ++i) {
@@ -75,7 +77,7 @@ class Chunks {
   }
 
  private:
-  // False if there is none.
+  // Returns false if there are no filters.
   bool read_filters() {
     for (int i = 0; i < H5Pget_nfilters(properties_); ++i) {
       unsigned flags = 0, config = 0;
@@ -91,7 +93,8 @@ class Chunks {
     return !filters_.empty();
   }
 
-  // The index states a size for what is not packed, too; H5Dget_chunk_storage_size() does not tell.
+  // The index stores a size for chunks without filters too, but H5Dget_chunk_storage_size() does
+  // not return it.
   void check_plain() const {
     const Id space(H5Dget_space(dataset_), H5Sclose, name_);
     hsize_t count = 0;
@@ -118,7 +121,7 @@ class Chunks {
     if (stored > kMostRowBytes + (kMostRowBytes >> 4))
       refuse(name_, fmt::format("has a packed chunk of {} bytes", stored));
     Bytes bytes(stored);
-    std::uint32_t without = 0;  // a bit for each filter that was left out
+    std::uint32_t without = 0;  // a bit for each filter that was skipped
     h5::check(H5Dread_chunk(dataset_, H5P_DEFAULT, at.data(), &without, bytes.data()), name_);
     for (std::size_t i = filters_.size(); i-- > 0;) {
       if (without >> i & 1) continue;
@@ -136,8 +139,8 @@ class Chunks {
   const std::string& name_;
   Id properties_;
   std::vector<hsize_t> size_;
-  std::vector<H5Z_filter_t> filters_;  // in the order of writing
-  std::size_t bytes_ = 0;              // of a chunk, unpacked
+  std::vector<H5Z_filter_t> filters_;  // in the order in which they were applied
+  std::size_t bytes_ = 0;              // size of an unpacked chunk
 };
 
 }  // namespace

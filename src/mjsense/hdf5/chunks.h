@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
-// The HDF5 library believes that a chunk is, once unpacked, as long as its shape says, and reads
-// beyond the end of one that is not. So chunks are unpacked here first.
+// Checks of HDF5 chunks. The HDF5 library assumes that an unpacked chunk is as long as its shape
+// says, and reads beyond the end of one that is not. Chunks are therefore unpacked here first.
 
 #include <string>
 
@@ -9,8 +9,8 @@
 
 namespace mjsense::h5 {
 
-// Throws RuntimeError unless every stored chunk of `dataset` unpacks to its size. Packed means by
-// gzip or lzf, with shuffle and fletcher32 or without; other filters are refused.
+// Throws RuntimeError unless every stored chunk of `dataset` unpacks to its size. Supported filters
+// are gzip and lzf, with or without shuffle and fletcher32; others are refused.
 void check_chunks(hid_t dataset, const std::string& name);
 
 }  // namespace mjsense::h5

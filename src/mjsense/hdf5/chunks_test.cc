@@ -21,7 +21,7 @@ using ::testing::IsEmpty;
 constexpr hsize_t kRows = 25, kChunk = 10, kColumns = 4;
 constexpr std::size_t kChunkBytes = kChunk * kColumns * sizeof(float);
 
-// float32 [25, 4] in chunks of ten rows, none of them written.
+// float32 [25, 4] in chunks of ten rows, without data.
 Id empty_dataset(hid_t file, const Id& properties) {
   const hsize_t size[] = {kRows, kColumns}, chunk[] = {kChunk, kColumns};
   const Id space(H5Screate_simple(2, size, nullptr), H5Sclose, "space");
@@ -30,7 +30,7 @@ Id empty_dataset(hid_t file, const Id& properties) {
           H5Dclose, "x"};
 }
 
-// The same, written through the filters of `properties`.
+// The same, with data written through the filters of `properties`.
 Id dataset(hid_t file, const Id& properties) {
   Id made = empty_dataset(file, properties);
   std::vector<float> values(kRows * kColumns);
@@ -56,20 +56,20 @@ class Chunks : public ::testing::Test {
   Id properties_ = dataset_properties();
 };
 
-TEST_F(Chunks, WhatTheLibraryPacksIsTaken) {
+TEST_F(Chunks, ChunksOfTheLibraryAreAccepted) {
   EXPECT_THAT(complaint(dataset(file_, properties_)), IsEmpty());  // no filter
   H5Ldelete(file_, "x", H5P_DEFAULT);
   H5Pset_shuffle(properties_);
   H5Pset_deflate(properties_, 4);
   H5Pset_fletcher32(properties_);
   EXPECT_THAT(complaint(dataset(file_, properties_)), IsEmpty());
-  // Chunks that were never written are none.
+  // Chunks that were never written are not checked.
   H5Ldelete(file_, "x", H5P_DEFAULT);
   EXPECT_THAT(complaint(empty_dataset(file_, properties_)), IsEmpty());
 }
 
-// The library would read beyond the end of what is shorter than its shape says.
-TEST_F(Chunks, WhatUnpacksToAnotherSizeIsRefused) {
+// The library would read beyond the end of a chunk that is shorter than its shape says.
+TEST_F(Chunks, ChunksThatUnpackToAnotherSizeAreRefused) {
   H5Pset_deflate(properties_, 4);
   const Id made = dataset(file_, properties_);
   for (const std::size_t bytes : {std::size_t{0}, std::size_t{8}, kChunkBytes - 1, kChunkBytes,
@@ -90,7 +90,8 @@ TEST_F(Chunks, WhatUnpacksToAnotherSizeIsRefused) {
   const hsize_t at[] = {2 * kChunk, 0};
   check(H5Dwrite_chunk(made, H5P_DEFAULT, 0, at, 9, "no stream"), "chunk");
   EXPECT_THAT(complaint(made), HasSubstr("does not unpack"));
-  // Not packed, as a bit of the chunk says: then it has its size as it stands.
+  // A bit of the chunk says that the filter was skipped; then the stored size must be that of the
+  // chunk.
   check(H5Dwrite_chunk(made, H5P_DEFAULT, 1, at, kChunkBytes, std::string(kChunkBytes, 'x').data()),
         "chunk");
   const hsize_t middle[] = {kChunk, 0};
@@ -98,8 +99,8 @@ TEST_F(Chunks, WhatUnpacksToAnotherSizeIsRefused) {
   EXPECT_THAT(complaint(made), HasSubstr("does not unpack"));
 }
 
-// What is not packed has a size in the index all the same, and the library makes room for that much.
-TEST_F(Chunks, WhatIsNotPackedAndHasAnotherSizeIsRefused) {
+// The index stores a size for a chunk without filters too, and the library allocates that much.
+TEST_F(Chunks, UnfilteredChunksOfAnotherSizeAreRefused) {
   for (const std::size_t bytes : {std::size_t{15}, kChunkBytes - 1, kChunkBytes, kChunkBytes + 1}) {
     const Id made = empty_dataset(file_, properties_);
     const hsize_t at[] = {kChunk, 0};

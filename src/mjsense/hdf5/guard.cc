@@ -14,7 +14,7 @@
 namespace mjsense::h5 {
 namespace {
 
-// Deflate cannot shrink data more than 1032 times.
+// Deflate's maximum compression ratio is 1032.
 constexpr std::uint64_t kMostRatio = 1100;
 constexpr std::uint64_t kFreeBytes = std::uint64_t{1} << 26;
 
@@ -22,7 +22,7 @@ constexpr std::uint64_t kFreeBytes = std::uint64_t{1} << 26;
   throw RuntimeError(fmt::format("'{}' {}", printable(name), why));
 }
 
-// One link, which must lead to an object of this file by itself.
+// Opens one link, which must be a hard link to an object of this file.
 Id open_link(hid_t parent, const std::string& name) {
   if (name.empty() || name == "." || name.find('/') != std::string::npos)
     refuse(name, "is no name of an object");
@@ -52,7 +52,7 @@ std::uint64_t multiply(std::uint64_t a, std::uint64_t b) {
                                                 : product;
 }
 
-// What H5Oget_info2() fills, which since 1.12 is no longer H5O_info_t.
+// Type of H5Oget_info2()'s result, which since 1.12 is no longer H5O_info_t.
 #if H5_VERSION_GE(1, 12, 0)
 using ObjectInfo = H5O_info1_t;
 #else
@@ -61,7 +61,7 @@ using ObjectInfo = H5O_info_t;
 
 struct Walk {
   const std::function<void(const std::string&)>& visit;
-  std::set<haddr_t> above = {};  // groups that we are in or have been in
+  std::set<haddr_t> above = {};  // addresses of the groups visited so far
   std::size_t names = 0;
 
   void group(hid_t at, const std::string& prefix, int depth) {

@@ -27,7 +27,7 @@ std::string complaint(const std::function<void()>& deed) {
 
 class Guard : public ::testing::Test {
  protected:
-  // A dataset of bytes.
+  // Creates a dataset of bytes.
   Id bytes(const std::string& name, const std::vector<hsize_t>& size, const Id& properties) {
     const Id space(H5Screate_simple(static_cast<int>(size.size()), size.data(), nullptr), H5Sclose,
                    "space");
@@ -48,7 +48,7 @@ class Guard : public ::testing::Test {
   Id file_ = create_file(dir_.file("x.h5"));
 };
 
-TEST_F(Guard, DatasetsAreFoundInTheirOrder) {
+TEST_F(Guard, DatasetsAreVisitedInOrder) {
   bytes("b");
   bytes("a/d");
   bytes("a/c");
@@ -57,7 +57,7 @@ TEST_F(Guard, DatasetsAreFoundInTheirOrder) {
   EXPECT_THAT(found, ElementsAre("a/c", "a/d", "b"));
 }
 
-// Whole and within reach: it is refused for being a link alone.
+// The targets are valid and in the same file: the link is refused because it is a soft link.
 TEST_F(Guard, LinksAreNotFollowed) {
   bytes("real/x");
   ASSERT_GE(H5Lcreate_soft("/real/x", file_, "soft", H5P_DEFAULT, H5P_DEFAULT), 0);
@@ -77,7 +77,7 @@ TEST_F(Guard, LinksAreNotFollowed) {
               HasSubstr("'outside' is a link to another file"));
 }
 
-TEST_F(Guard, GroupsThatStandTwiceOrTooDeep) {
+TEST_F(Guard, CyclesAndDeepGroupsAreRefused) {
   create_group(file_, "a/b");
   ASSERT_GE(H5Lcreate_hard(file_, "a", file_, "a/b/again", H5P_DEFAULT, H5P_DEFAULT), 0);
   EXPECT_THAT(walk(), HasSubstr("is a group that stands there twice"));
@@ -91,7 +91,7 @@ TEST_F(Guard, GroupsThatStandTwiceOrTooDeep) {
   EXPECT_THAT(walk(), HasSubstr("lies too deep: more than 32 groups"));
 }
 
-TEST_F(Guard, DataInOtherFilesAreNotRead) {
+TEST_F(Guard, DataInOtherFilesIsNotRead) {
   std::FILE* outside = std::fopen(dir_.file("outside").c_str(), "w");
   ASSERT_NE(outside, nullptr);
   std::fputs("secret", outside);
@@ -107,7 +107,7 @@ TEST_F(Guard, DataInOtherFilesAreNotRead) {
   EXPECT_THAT(storage(bytes("y", {3}, composed)), HasSubstr("is put together from other datasets"));
 }
 
-TEST_F(Guard, SizesAreThoseOfWhatIsStored) {
+TEST_F(Guard, SizesAreBoundedByTheStoredData) {
   const auto chunked = [](std::vector<hsize_t> chunk) {
     Id properties = dataset_properties();
     H5Pset_chunk(properties, static_cast<int>(chunk.size()), chunk.data());
@@ -116,7 +116,7 @@ TEST_F(Guard, SizesAreThoseOfWhatIsStored) {
   constexpr hsize_t kMiB = 1 << 20;
   EXPECT_EQ(storage(bytes("plain")), "");
   EXPECT_EQ(storage(bytes("empty", {0, 5}, chunked({1, 5}))), "");
-  // Nothing is written yet: what is small may be so.
+  // No data has been written; a small size is accepted nevertheless.
   EXPECT_EQ(storage(bytes("small", {60 * kMiB}, chunked({kMiB}))), "");
   EXPECT_THAT(storage(bytes("endless", {10'000'000 * kMiB}, chunked({kMiB}))),
               HasSubstr("claims 10485760000000 bytes and stores 0"));
@@ -126,7 +126,7 @@ TEST_F(Guard, SizesAreThoseOfWhatIsStored) {
               HasSubstr("has chunks of 68157440 bytes"));
 }
 
-TEST_F(Guard, RowsOfBytes) {
+TEST_F(Guard, ReadsRowsOfBytes) {
   const Id written = bytes("x");
   ASSERT_GE(H5Dwrite(written, H5T_NATIVE_UINT8, H5S_ALL, H5S_ALL, H5P_DEFAULT, "abc"), 0);
   EXPECT_EQ(read_bytes(file_, "x", 3), "abc");

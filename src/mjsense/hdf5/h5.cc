@@ -22,7 +22,8 @@ std::recursive_mutex& library() {
 
 bool nobody_else = false;
 
-// The innermost message is the reason ("No space left on device"), the outermost the deed.
+// The innermost message is the cause ("No space left on device"), the outermost names the
+// operation.
 std::string library_error() {
   std::string first, last;
   std::pair<std::string*, std::string*> texts{&first, &last};
@@ -83,8 +84,8 @@ std::string read_string(hid_t type, auto&& read) {
 H5Lock::H5Lock() {
   if (!nobody_else) lock_ = std::unique_lock(library());
   static const bool once = [] {
-    // Errors are our exceptions, not text on stderr. And after a full disk the library must not
-    // try, at exit, to write once more what could not be written.
+    // Errors are reported by our exceptions, not as text on stderr. Without H5dont_atexit(), the
+    // library would try at exit to write again what failed on a full disk.
     H5dont_atexit();
     H5open();
     register_lzf();
@@ -125,10 +126,10 @@ namespace {
 
 Id file_access() {
   Id access = plist(H5P_FILE_ACCESS);
-  // A file is closed whole, whatever an error left open in it.
+  // Closing a file also closes every object in it that an error left open.
   H5Pset_fclose_degree(access, H5F_CLOSE_STRONG);
-  // The library would lock the file, and a program started meanwhile could hold the lock after us.
-  // Houses have their own.
+  // Disables the library's file locking: a child process that inherits the file could keep the lock
+  // after this process ends. Recordings have a lock of their own (record/house.h).
   H5Pset_file_locking(access, false, true);
   return access;
 }
@@ -138,9 +139,10 @@ Id file_access() {
 Id create_file(const std::filesystem::path& path, std::string_view shown) {
   const Id creation = plist(H5P_FILE_CREATE);
   H5Pset_obj_track_times(creation, false);
-  H5Pset_istore_k(creation, 8);  // small chunk indices: an episode has many datasets of few chunks
+  // Small chunk indices, because an episode has many datasets with few chunks.
+  H5Pset_istore_k(creation, 8);
   const Id access = file_access();
-  std::error_code ignored;  // what cannot be removed is an error of the next line
+  std::error_code ignored;  // if removal fails, H5Fcreate reports the error
   std::filesystem::remove(path, ignored);
   return {H5Fcreate(path.c_str(), H5F_ACC_EXCL, creation, access), H5Fclose,
           fmt::format("cannot create '{}'", shown.empty() ? path.string() : shown)};
@@ -173,8 +175,8 @@ Id link_properties() {
 
 Id create_group(hid_t parent, const std::string& path) {
   std::size_t end = 0;
-  while (end != std::string::npos) {  // one by one: intermediate groups made by HDF5 would have
-                                      // default properties
+  // One by one, because groups that HDF5 creates implicitly have default properties.
+  while (end != std::string::npos) {
     end = path.find('/', end + 1);
     const std::string part = path.substr(0, end);
     if (H5Lexists(parent, part.c_str(), H5P_DEFAULT) > 0) continue;
@@ -277,7 +279,7 @@ std::string read_text(hid_t parent, const std::string& path) {
 
 namespace {
 
-// Made once, and never closed: a recording has a hundred texts, each shorter than its type.
+// Created once and never closed: a recording has about a hundred texts, each smaller than the type.
 hid_t type_of_texts() {
   static const Id& type = *new Id(text_type());
   return type;

@@ -23,7 +23,7 @@
 namespace mjsense::h5 {
 namespace {
 
-// A sanitiser needs its handlers, its address space and stderr for what it has to say.
+// Sanitisers need their signal handlers, their address space, and stderr for their reports.
 #ifdef __has_feature
 #define MJSENSE_HAS_FEATURE(x) __has_feature(x)
 #else
@@ -36,13 +36,13 @@ constexpr bool kSanitised = false;
 #endif
 
 constexpr std::uint64_t kLeastSeconds = 20, kBytesPerSecond = 2'000'000;
-constexpr std::uint64_t kPatience = 30;  // seconds of the clock for one of the processor
+constexpr std::uint64_t kPatience = 30;  // seconds of elapsed time per second of processor time
 constexpr std::uint64_t kMemory = std::uint64_t{1} << 30;
 constexpr std::size_t kMostAnswer = std::size_t{1} << 28;
-// The last byte of an answer: without it the child did not come to its end.
+// The last byte of an answer. Without it the child did not finish.
 constexpr char kDone = 'D', kThrown = 'T';
 
-// No signal reaches this thread while it lives, nor the child that is forked then.
+// Blocks all signals in this thread during its lifetime, and in children forked meanwhile.
 class SignalsBlocked {
  public:
   SignalsBlocked() {
@@ -60,19 +60,20 @@ class SignalsBlocked {
 
 void set_limit(decltype(RLIMIT_CPU) what, std::uint64_t most, std::uint64_t beyond = 0) {
   const rlimit limit{most, most + beyond};
-  setrlimit(what, &limit);  // a lower one of the user's stays
+  setrlimit(what, &limit);  // a lower hard limit set by the user stays in force
 }
 
-// No handlers of our program, no files written, no more processor and memory than a file deserves.
+// Limits the child: no signal handlers of the parent, no writing to files, bounded processor time
+// and memory.
 void confine(int answer, std::uint64_t seconds, int file) {
   os::end_with_parent();
-  // Ctrl-C is for our parent: read as a crash of ours, it would speak of a file that is damaged.
-  // What was sent to the group until now is discarded by being ignored.
+  // Ctrl-C is meant for the parent. If it ended the child, the file would be reported as damaged.
+  // Signals that were sent to the group so far are discarded by ignoring them.
   setpgid(0, 0);
   for (const int signal : {SIGINT, SIGTERM, SIGHUP, SIGQUIT, SIGTSTP, SIGALRM, SIGUSR1, SIGUSR2})
     ::signal(signal, SIG_IGN);
-  // Locks that our program holds must not outlive it in us.
-  // Kernels before 5.9 leave them open.
+  // Close inherited files, so that the child does not keep locks of the parent after the parent has
+  // ended. Kernels before 5.9 leave the files open.
   unsigned first = STDERR_FILENO + 1;
   for (const int kept : {std::min(answer, file), std::max(answer, file)}) {
     if (kept < static_cast<int>(first)) continue;
@@ -84,12 +85,13 @@ void confine(int answer, std::uint64_t seconds, int file) {
   sigset_t none;
   sigemptyset(&none);
   pthread_sigmask(SIG_SETMASK, &none, nullptr);
-  set_limit(RLIMIT_CPU, seconds, 1);  // SIGXCPU first: who is killed was killed by somebody else
+  // The soft limit sends SIGXCPU first; a SIGKILL then comes from outside.
+  set_limit(RLIMIT_CPU, seconds, 1);
   set_limit(RLIMIT_CORE, 0);
   if (kSanitised) return;
   for (const int signal : {SIGSEGV, SIGBUS, SIGILL, SIGFPE, SIGABRT}) ::signal(signal, SIG_DFL);
   if (const Fd null(open("/dev/null", O_WRONLY | O_CLOEXEC)); null)
-    dup2(null.get(), STDERR_FILENO);  // the C library's words when memory is found corrupt
+    dup2(null.get(), STDERR_FILENO);  // glibc's messages about corrupted memory
   set_limit(RLIMIT_FSIZE, 0);
   if (const std::uint64_t now = os::address_space(); now > 0) set_limit(RLIMIT_AS, now + kMemory);
 }
@@ -118,7 +120,7 @@ void send(int fd, const std::string& text) {
   _exit(0);
 }
 
-// What the child says. False unless it came to its end within `seconds`.
+// Reads the child's answer. Returns false unless the child finished within `seconds`.
 bool listen(int fd, std::uint64_t seconds, std::string& answer) {
   using Clock = std::chrono::steady_clock;
   const auto end = Clock::now() + std::chrono::seconds(seconds);
@@ -151,13 +153,14 @@ std::string in_child(std::string_view what, std::uint64_t file_bytes,
     throw RuntimeError(fmt::format("{}: cannot create a pipe: {}", what, std::strerror(errno)));
   pid_t pid;
   {
-    const H5Lock lock;  // so that no other thread is inside the library when it is copied
+    const H5Lock lock;  // so that no other thread is inside the library during the fork
     const SignalsBlocked blocked;
     pid = fork();
     if (pid == 0) {
       out.reset();
       H5Lock::alone();
-      // Not stderr, which confine() opens anew: it was closed if the pipe has its number.
+      // Move the pipe above the standard streams: if stderr was closed, the pipe may have its
+      // number, which confine() redirects.
       child(fcntl(in.get(), F_DUPFD_CLOEXEC, STDERR_FILENO + 1), seconds, read, file);
     }
   }

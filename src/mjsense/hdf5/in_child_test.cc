@@ -26,18 +26,18 @@ std::string complaint(const std::function<std::string()>& read) {
   return "";
 }
 
-TEST(InChild, AnswersAndErrorsComeHome) {
+TEST(InChild, ReturnsAnswersAndErrors) {
   EXPECT_EQ(in_child("x.h5", 0, [] { return std::string("said"); }), "said");
   EXPECT_EQ(complaint([]() -> std::string { throw RuntimeError("so it is"); }), "so it is");
 }
 
-TEST(InChild, ACrashIsAFinding) {
+TEST(InChild, CrashIsReportedAsDamage) {
   EXPECT_THAT(complaint([]() -> std::string { std::abort(); }),
               HasSubstr("x.h5: the HDF5 library crashed on it (Aborted): it is damaged"));
   EXPECT_THAT(complaint([]() -> std::string { _exit(0); }), HasSubstr("did not come to an end"));
 }
 
-TEST(InChild, WhoIsEndedFromOutsideSaysNothingOfTheFile) {
+TEST(InChild, KilledChildIsNotReportedAsDamage) {
   for (const int signal : {SIGKILL, SIGTERM}) {
     EXPECT_THAT(complaint([signal]() -> std::string {
                   kill(getpid(), signal);
@@ -47,8 +47,8 @@ TEST(InChild, WhoIsEndedFromOutsideSaysNothingOfTheFile) {
   }
 }
 
-// A good file is not called damaged, and set aside, because everybody else was quicker.
-TEST(InChild, WhoDoesNotGetTheProcessorSaysNothingOfTheFile) {
+// An intact file must not be reported as damaged because the machine was busy.
+TEST(InChild, BusyMachineIsNotReportedAsDamage) {
   try {
     static_cast<void>(in_child(
         "x.h5", 0, [] { return pause() == 0 ? std::string() : std::string(); }, 1));
@@ -61,8 +61,8 @@ TEST(InChild, WhoDoesNotGetTheProcessorSaysNothingOfTheFile) {
   }
 }
 
-// A daemon's: the pipe of the answer takes the numbers of the streams that are closed.
-TEST(InChild, AnswersWithoutStandardStreams) {
+// As in a daemon: the pipe of the answer gets the numbers of closed standard streams.
+TEST(InChild, WorksWithoutStandardStreams) {
   const auto without = [](std::initializer_list<int> closed) {
     const pid_t pid = fork();
     if (pid == 0) {
@@ -78,7 +78,7 @@ TEST(InChild, AnswersWithoutStandardStreams) {
   EXPECT_TRUE(without({STDIN_FILENO, STDOUT_FILENO, STDERR_FILENO}));
 }
 
-// Ctrl-C for all programs of a terminal: ours hears it, and the reader goes on.
+// Ctrl-C signals the whole process group: the parent handles it and the child continues to read.
 int read_in_the_rain() {
   if (setpgid(0, 0) != 0) return 2;
   struct sigaction action = {};
@@ -101,7 +101,7 @@ int read_in_the_rain() {
   return wrong == 0 ? 0 : 1;
 }
 
-TEST(InChild, SignalsToOurGroupAreNoDamage) {
+TEST(InChild, SignalsToTheGroupDoNotReachTheChild) {
   const pid_t pid = fork();
   if (pid == 0) _exit(read_in_the_rain());
   int status = 0;

@@ -13,7 +13,7 @@ std::size_t filter(unsigned flags, std::size_t count, const unsigned* values, st
                    std::size_t* capacity, void** buffer) {
   if (!(flags & H5Z_FLAG_REVERSE)) return 0;  // reading only
   std::size_t size =
-      count >= 3 && values[2] > 0 ? values[2] : *capacity;  // h5py notes the chunk's size
+      count >= 3 && values[2] > 0 ? values[2] : *capacity;  // h5py stores the chunk's size
   for (int tries = 0; tries < 8; ++tries, size *= 2) {
     void* out = H5allocate_memory(size, false);
     if (out == nullptr) return 0;
@@ -36,7 +36,7 @@ std::size_t lzf_unpack(std::span<const std::uint8_t> packed, std::span<std::uint
   std::size_t in = 0, at = 0;
   while (in < packed.size()) {
     const unsigned control = packed[in++];
-    if (control < 32) {  // a run of control + 1 bytes as they are
+    if (control < 32) {  // a literal run of control + 1 bytes
       const std::size_t run = control + 1;
       if (in + run > packed.size() || at + run > out.size()) return 0;
       std::memcpy(&out[at], &packed[in], run);
@@ -44,7 +44,7 @@ std::size_t lzf_unpack(std::span<const std::uint8_t> packed, std::span<std::uint
       at += run;
       continue;
     }
-    // Bytes that were seen before: 3 bits of length, 13 bits of distance.
+    // A back reference: 3 bits of length, 13 bits of distance.
     std::size_t length = control >> 5;
     if (length == 7) {
       if (in >= packed.size()) return 0;
@@ -55,7 +55,7 @@ std::size_t lzf_unpack(std::span<const std::uint8_t> packed, std::span<std::uint
     length += 2;
     if (distance > at || at + length > out.size()) return 0;
     for (std::size_t i = 0; i < length; ++i, ++at)
-      out[at] = out[at - distance];  // may overlap itself
+      out[at] = out[at - distance];  // source and destination may overlap
   }
   return at;
 }

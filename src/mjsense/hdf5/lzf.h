@@ -1,7 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
-// Reading what h5py wrote with compression="lzf", as MolmoSpaces does: the filter is h5py's and not
-// part of the HDF5 library. liblzf would save 40 of these 86 lines and cost a dependency.
+// Decoder for HDF5 data compressed by h5py with compression="lzf", as in MolmoSpaces' files. The
+// filter is part of h5py and not of the HDF5 library. liblzf would save 40 of these 86 lines at the
+// cost of a dependency.
 
 #include <cstddef>
 #include <cstdint>
@@ -11,9 +12,9 @@ namespace mjsense {
 
 inline constexpr int kLzfFilter = 32000;  // registered with the HDF Group
 
-// Bytes written to `out`; 0 if `packed` is damaged or needs more room.
+// Returns the number of bytes written to `out`, or 0 if `packed` is damaged or needs more space.
 std::size_t lzf_unpack(std::span<const std::uint8_t> packed, std::span<std::uint8_t> out);
 
-void register_lzf();  // with the HDF5 library; hold an H5Lock
+void register_lzf();  // registers the filter with the HDF5 library; hold an H5Lock
 
 }  // namespace mjsense

@@ -47,7 +47,7 @@ void CameraParameterSensor::initialize(const SensorInit& init) {
 }
 
 void CameraParameterSensor::compute(const World& world) {
-  const double* R = world.data->cam_xmat + 9 * id_;  // columns right, up, backward
+  const double* R = world.data->cam_xmat + 9 * id_;  // columns: right, up, backward
   const double* p = world.data->cam_xpos + 3 * id_;
   const auto pose = fields()[0].data.row<double>(world.id);
   const auto extrinsic = fields()[1].data.row<double>(world.id);

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
-// `sensor_param_<camera>`: where a camera is and how it projects, in OpenCV's conventions.
+// `sensor_param_<camera>`: extrinsic and intrinsic parameters of a camera, in OpenCV's conventions.
 
 #include <string>
 
@@ -8,18 +8,19 @@
 
 namespace mjsense {
 
-// A point p_W (m) lands on pixel (u, v) = (k0 / k2, k1 / k2) with
-// k = intrinsic_cv * extrinsic_cv * [p_W, 1]; u to the right, v down, (0, 0) the outer corner of
-// the top left pixel. Streams, all float64:
+// A point p_W (m) is projected to pixel (u, v) = (k0 / k2, k1 / k2) with k = intrinsic_cv *
+// extrinsic_cv * [p_W, 1]. u points to the right and v down; (0, 0) is the outer corner of the top
+// left pixel. Streams, all float64:
 //   <name>/cam2world_gl [4, 4]  X_WC, columns right, down, forward, position. Despite its published
 //                               name its axes are OpenCV's (x right, y down, z forward).
-//   <name>/extrinsic_cv [3, 4]  top rows of its inverse: world to camera
+//   <name>/extrinsic_cv [3, 4]  world to camera: top rows of the inverse of cam2world_gl
 //   <name>/intrinsic_cv [3, 3]  [[f, 0, W/2], [0, f, H/2], [0, 0, 1]], pixels;
-//                               f = (H/2) / tan(fovy/2), rounded to float32. Of a camera with
-//                               sensorsize, focal and principal in its MJCF: fx, fy, cx, cy of these
+//                               f = (H/2) / tan(fovy/2), rounded to float32. If the camera has
+//                               sensorsize, focal and principal in its MJCF, fx, fy, cx, cy follow
+//                               from these.
 class CameraParameterSensor final : public Sensor {
  public:
-  // `camera`: full MuJoCo name. width, height: pixels, of the recorded picture.
+  // `camera`: full MuJoCo name. `width`, `height`: size of the recorded image, pixels.
   CameraParameterSensor(std::string name, std::string camera, int width, int height);
   std::string_view kind() const override { return "camera_parameters"; }
   mjtStage needs() const override { return mjSTAGE_POS; }

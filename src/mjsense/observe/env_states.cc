@@ -29,7 +29,7 @@ EnvStatesSensor::EnvStatesSensor(std::string name, std::string articulation,
   }
 }
 
-// Bodies that hang on the world and have joints other than a free one of their own.
+// Kinematic trees with a joint that is not free, and the robot's tree.
 std::vector<EnvStatesSensor::Articulation> EnvStatesSensor::find_articulations(
     const mjModel* m, int robot_body) const {
   std::vector<Articulation> found;

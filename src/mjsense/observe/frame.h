@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
-// A named MuJoCo frame - body or site - and its pose.
+// A named MuJoCo frame (body or site) and its pose.
 
 #include <mujoco/mujoco.h>
 
@@ -17,22 +17,22 @@ struct Frame {
   mjtObj type = mjOBJ_UNKNOWN;  // mjOBJ_BODY (the body frame) or mjOBJ_SITE
   int id = -1;
 
-  // `type` is "body" or "site". Throws KeyError naming `place` and the nearest names.
+  // `type` is "body" or "site". Throws KeyError with `place` and the nearest names.
   static Frame find(const mjModel* model, std::string_view place, std::string_view type,
                     std::string_view name);
-  // X_WF: its pose in the world (m).
+  // X_WF, pose in the world (m).
   Pose pose(const mjData* data) const;
 };
 
-// A body by its full name, or one that may be another in every world and episode.
+// A body given by its full name, or by a function if it can differ between worlds and episodes.
 struct BodyRef {
   std::string name;
-  std::function<int(int world)> of;  // id, -1: there is none now; used where `name` is empty
+  std::function<int(int world)> of;  // body id, -1: there is none; used if `name` is empty
 
   BodyRef(std::string name) : name(std::move(name)) {}
   BodyRef(const char* name) : name(name) {}
   BodyRef(std::function<int(int)> of) : of(std::move(of)) {}
-  // Turns a name into an id for all worlds; throws KeyError naming `place`.
+  // Resolves a name to the id for all worlds. Throws KeyError with `place`.
   void resolve(const mjModel* model, std::string_view place);
   int operator()(int world) const { return id_ >= 0 ? id_ : of ? of(world) : -1; }
 
@@ -49,8 +49,8 @@ inline bool is_below(const mjModel* model, int body, int root) {
   return body == root;
 }
 
-// Names of all objects of a type, "" where one has none.
+// Names of all objects of a type, "" for those without a name.
 std::vector<std::string> object_names(const mjModel* model, mjtObj type);
-// Id of the named object; throws KeyError naming `place` and the nearest names.
+// Id of the named object. Throws KeyError with `place` and the nearest names.
 int object_id(const mjModel* model, mjtObj type, std::string_view place, std::string_view name);
 }  // namespace mjsense

@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
-// A sensor that is one function of a world: what a task, a robot or a policy knows and nobody else
-// computes.
+// Sensors that are one function of a world, for values that only a task, a robot or a policy has.
 
 #include <functional>
 #include <span>
@@ -13,7 +12,7 @@
 
 namespace mjsense {
 
-// Row of T's. spec.dtype is set from T; the function fills the whole row.
+// A row of T values. spec.dtype is set from T. The function must fill the whole row.
 template <class T>
 class FunctionSensor final : public Sensor {
  public:
@@ -36,7 +35,7 @@ class FunctionSensor final : public Sensor {
   Fn fn_;
 };
 
-// Row of JSON text.
+// A row of JSON text.
 class JsonFunctionSensor final : public JsonSensor {
  public:
   using Fn = std::function<void(const World&, JsonWriter&)>;

@@ -16,8 +16,8 @@
 namespace mjsense {
 namespace {
 
-// Where the pixels end that show what the one at x shows. A picture is made of long runs: eight pixels are compared
-// at a time.
+// End of the run of pixels that are equal to the one at x. Images consist of long runs, so eight
+// pixels are compared at a time.
 int end_of_run(const std::int32_t* row, int x, int width) {
   const auto pixel = [row](int i) {
     std::uint64_t both;
@@ -41,7 +41,7 @@ void ImagePointsSensor::Box::add(int from, int to, int y) {
   left = std::min(left, from);
   right = std::max(right, to);
   top = std::min(top, y);
-  bottom = y + 1;  // rows come in order
+  bottom = y + 1;  // rows are visited in order
 }
 
 ImagePointsSensor::ImagePointsSensor(std::string name, std::vector<Object> objects,
@@ -114,7 +114,7 @@ void ImagePointsSensor::compute(const World& world) {
     Mask* once = mask + width * height;
     Mask* twice = once + width * height;
     const auto segments = field->data.row<std::int32_t>(world.id);
-    // All work after this is done where objects are seen.
+    // All work after this is limited to the bounding boxes of the objects.
     Box all{width, height, 0, 0};
     std::array<Box, kMaxObjects> boxes;
     boxes.fill(all);
@@ -133,7 +133,8 @@ void ImagePointsSensor::compute(const World& world) {
       }
     }
     if (all.top < all.bottom) {
-      // Outside the box is background, as what lies outside the picture is.
+      // Eroding only the box gives the same result: all pixels outside it are background, as is
+      // everything outside the image.
       const int from = all.top * width + all.left;
       const int columns = all.right - all.left, rows = all.bottom - all.top;
       erode_cross(mask + from, columns, rows, width, once + from);
@@ -146,7 +147,7 @@ void ImagePointsSensor::compute(const World& world) {
 }
 
 void ImagePointsSensor::points_of(const World& world, int object, int camera, const Masks& masks) {
-  // Plain variables: clang 14 lets no lambda take a structured binding.
+  // Not a structured binding, because clang 14 cannot capture one in a lambda.
   const int width = pictures_[camera].width;
   const int height = pictures_[camera].height;
   const std::size_t index = 2 * (object * cameras_.size() + camera);
@@ -170,7 +171,7 @@ void ImagePointsSensor::points_of(const World& world, int object, int camera, co
   num_points[0] = n;
   if (n == 0) return;
 
-  // Which of the object's pixels, counted row by row, goes to which place.
+  // ranks[i]: index, counted row by row, of the object's pixel that becomes point i.
   std::array<int, kPoints> ranks;
   for (int i = 0; i < n; ++i) ranks[i] = i;
   if (count > kPoints) {

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
-// `object_image_points`: for each object and camera, up to ten pixels that show it.
+// `object_image_points`: for each object and camera, up to ten pixels that show the object.
 
 #include <cstdint>
 #include <string>
@@ -13,26 +13,28 @@ namespace mjsense {
 
 // Streams, for each object and camera
 //   <name>/<object>/<camera>/points      float32 [10, 2]: (column / W, row / H), rounded to 4
-//                                        decimals; NaN where there is none
+//                                        decimals; NaN for unused points
 //   <name>/<object>/<camera>/num_points  int32 [1]
-// The pixels of an object are those whose segment is a geom of its body or below, of a visible
-// group (< 3). They are eroded twice with the 3 x 3 cross (outside the picture counts as
-// background) so that points lie well inside; an object that vanishes under it keeps all its
-// pixels. At most ten: row by row; more: ten different ones drawn at random, in random order.
+// The pixels of an object are those whose segmentation is a geom of a visible group (< 3) of its
+// body or of a descendant. They are eroded twice with the 3 x 3 cross (outside the image counts as
+// background), so that points are well inside the object. If erosion removes all pixels of an
+// object, all of them are used. Up to ten pixels are listed row by row; of more, ten different ones
+// are drawn at random, in random order.
 //
-// Reads the cameras' segmentation, so it is computed after they are cast.
+// The sensor reads the cameras' segmentation, so it is computed after the cameras are rendered.
 class ImagePointsSensor final : public Sensor {
  public:
   static constexpr int kPoints = 10;
   static constexpr int kMaxObjects = 16;
   struct Object {
-    std::string key;    // its name in the streams
-    BodyRef body;       // its root
-    bool erode = true;  // false for what is thin
+    std::string key;    // name in the streams
+    BodyRef body;       // root body
+    bool erode = true;  // false for thin objects
   };
   struct Camera {
     std::string name;
-    Sensor* sensor;  // its segmentation: int32 [H, W, 2] = (object id, object type), -1 background
+    // Has the segmentation: int32 [H, W, 2] = (object id, object type), -1 for background.
+    Sensor* sensor;
     std::string field = "segmentation";
     bool skip_erosion = false;
   };
@@ -56,8 +58,8 @@ class ImagePointsSensor final : public Sensor {
     void add(int from, int to, int y);
   };
   struct Masks {
-    const Mask *all, *eroded;  // [H, W], the second valid in the box
-    Box box;                   // around the object
+    const Mask *all, *eroded;  // [H, W], `eroded` is valid in the box only
+    Box box;                   // bounding box of the object
   };
   void points_of(const World& world, int object, int camera, const Masks& masks);
 
@@ -67,13 +69,13 @@ class ImagePointsSensor final : public Sensor {
   std::vector<Picture> pictures_;
   struct Scratch {
     std::vector<Mask> geom_objects;  // [ngeom]
-    std::vector<Mask> pictures;      // [3, H, W]
+    std::vector<Mask> pictures;      // [3, H, W]: the masks, eroded once, eroded twice
   };
   std::vector<Scratch> scratch_;  // [B]
 };
 
-// The 3 x 3 cross erosion of up to 16 masks at once, bit by bit; outside counts as 0. `out` must
-// not be `in`. [H, W], rows `stride` apart.
+// Erodes up to 16 masks [H, W] at once, one per bit, with the 3 x 3 cross; outside counts as 0.
+// Rows are `stride` elements apart. `out` must not be `in`.
 void erode_cross(const std::uint16_t* in, int width, int height, int stride, std::uint16_t* out);
 
 }  // namespace mjsense

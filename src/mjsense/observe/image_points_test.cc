@@ -13,14 +13,14 @@
 namespace mjsense {
 namespace {
 
-// Bodies a (geoms 0, 1) and b (geom 2, invisible).
+// Body a has geoms 0 and 1, body b has geom 2, which is invisible.
 constexpr char kScene[] = R"(
 <mujoco><worldbody>
   <body name="a"><geom size="1"/><body name="a2"><geom size="1"/></body></body>
   <body name="b"><geom size="1" group="3"/></body>
 </worldbody></mujoco>)";
 
-// A segmentation that a test paints.
+// A camera whose segmentation the test paints.
 class Painted : public Sensor {
  public:
   Painted(int width, int height) : Sensor("camera"), width_(width), height_(height) {}
@@ -66,7 +66,7 @@ struct Fixture {
   std::string prefix;
 };
 
-TEST(ImagePoints, NothingSeenIsNaN) {
+TEST(ImagePoints, InvisibleObjectsGiveNaN) {
   Fixture f;
   f.points.compute(f.world.world());
   EXPECT_EQ(f.count(), 0);
@@ -76,7 +76,7 @@ TEST(ImagePoints, NothingSeenIsNaN) {
 // Published example: a 6 x 7 mask leaves 2 x 3 = 6 points after two erosions, row by row.
 TEST(ImagePoints, ErodesTwiceAndListsRowByRow) {
   Fixture f;
-  f.camera.paint(1, 10, 20, 6, 7);  // a2 belongs to a
+  f.camera.paint(1, 10, 20, 6, 7);  // geom 1 belongs to a2, which belongs to a
   f.points.compute(f.world.world());
   EXPECT_EQ(f.count(), 6);
   const auto xy = f.xy();
@@ -85,7 +85,7 @@ TEST(ImagePoints, ErodesTwiceAndListsRowByRow) {
   for (int i = 12; i < 20; ++i) EXPECT_TRUE(std::isnan(xy[i]));
 }
 
-TEST(ImagePoints, WhatErosionRemovesKeepsAllItsPixels) {
+TEST(ImagePoints, ObjectsRemovedByErosionKeepAllPixels) {
   Fixture f;
   f.camera.paint(0, 10, 20, 5, 2);
   f.points.compute(f.world.world());
@@ -95,7 +95,7 @@ TEST(ImagePoints, WhatErosionRemovesKeepsAllItsPixels) {
   EXPECT_FLOAT_EQ(f.xy()[18], .14f);
 }
 
-TEST(ImagePoints, WhatIsThinIsNotEroded) {
+TEST(ImagePoints, ThinObjectsAreNotEroded) {
   Fixture f("handle", "a", false);
   f.camera.paint(0, 10, 20, 3, 3);
   f.points.compute(f.world.world());
@@ -109,7 +109,7 @@ TEST(ImagePoints, InvisibleGroupsDoNotCount) {
   EXPECT_EQ(f.count(), 0);
 }
 
-TEST(ImagePoints, DrawsTenDifferentOnesThatTheKeyDecides) {
+TEST(ImagePoints, DrawsTenDifferentPixelsByKey) {
   Fixture f;
   f.camera.paint(0, 10, 10, 40, 30);
   f.points.compute(f.world.world());
@@ -131,7 +131,7 @@ TEST(ImagePoints, DrawsTenDifferentOnesThatTheKeyDecides) {
   EXPECT_NE(f.xy(), first);
 }
 
-TEST(ImagePoints, PicturesEndIsBackground) {
+TEST(ImagePoints, OutsideOfTheImageIsBackground) {
   Fixture f;
   f.camera.paint(0, 0, 0, 100, 50);
   f.points.compute(f.world.world());
@@ -141,8 +141,9 @@ TEST(ImagePoints, PicturesEndIsBackground) {
   }
 }
 
-// Random pictures: every point lies in the mask that the definition gives, computed pixel by pixel.
-TEST(ImagePoints, PointsLieInTheMaskOfTheDefinition) {
+// In random images every point is in the mask that follows from the definition, computed pixel by
+// pixel.
+TEST(ImagePoints, PointsAreInTheMaskOfTheDefinition) {
   constexpr int kWidth = 100, kHeight = 50;
   Rng rng(1, 0, 0, 0);
   for (int picture = 0; picture < 200; ++picture) {
@@ -184,12 +185,13 @@ TEST(ImagePoints, PointsLieInTheMaskOfTheDefinition) {
   }
 }
 
-// Objects are looked for together, each in its own part of the picture; what one gets is what it gets alone.
-TEST(ImagePoints, OtherObjectsChangeNothing) {
+// All objects are processed together, each within its bounding box. The points of an object must be
+// the same as without other objects.
+TEST(ImagePoints, PointsDoNotDependOnOtherObjects) {
   Rng rng(2, 0, 0, 0);
   TestWorld world(kScene);
   for (int picture = 0; picture < 100; ++picture) {
-    Painted camera(37, 23);  // no multiple of anything
+    Painted camera(37, 23);  // not multiples of 8, the number of pixels compared at a time
     camera.initialize(world.init(1));
     for (int k = 0; k < 5; ++k) {
       const int x = static_cast<int>(rng.below(37)), y = static_cast<int>(rng.below(23));
@@ -213,7 +215,7 @@ TEST(ImagePoints, OtherObjectsChangeNothing) {
   }
 }
 
-TEST(ImagePoints, RefusesASegmentationItCannotRead) {
+TEST(ImagePoints, RefusesAnInvalidSegmentation) {
   TestWorld w(kScene);
   class Wrong : public Sensor {
    public:

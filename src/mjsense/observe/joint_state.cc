@@ -35,7 +35,7 @@ std::string joint_unit(const mjModel* model, const JointGroup& group, std::strin
   bool turns = false, slides = false;
   for (int dof : group.dof) {
     const int joint = model->dof_jntid[dof], type = model->jnt_type[joint];
-    // The first three of a free joint are a position.
+    // The first three degrees of freedom of a free joint are linear.
     const bool linear =
         type == mjJNT_SLIDE || (type == mjJNT_FREE && dof < model->jnt_dofadr[joint] + 3);
     (linear ? slides : turns) = true;

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
-// `qpos` and `qvel`: the joints of a robot, one stream a move group.
+// `qpos` and `qvel`: joint positions and velocities of a robot, one stream per move group.
 
 #include <string>
 #include <vector>
@@ -9,7 +9,7 @@
 
 namespace mjsense {
 
-// Joints that move together, as addresses into MuJoCo's vectors. A fixed base is a group without
+// The joints of a move group, as addresses into MuJoCo's vectors. A fixed base is a group without
 // joints.
 struct JointGroup {
   std::string name;
@@ -17,8 +17,8 @@ struct JointGroup {
   std::vector<int> dof;   // addresses into mjData.qvel
 };
 
-// Streams <name>/<group>: float32 [n], a group without joints has none of them: [0]. Without
-// bounds: MuJoCo's limits of joints are soft.
+// Streams <name>/<group>: float32 [n]; [0] for a group without joints. They have no bounds, because
+// MuJoCo's joint limits are soft.
 class JointStateSensor final : public Sensor {
  public:
   enum class What { kPosition, kVelocity };
@@ -37,7 +37,8 @@ class JointStateSensor final : public Sensor {
   std::vector<JointGroup> groups_;  // field i belongs to group i
 };
 
-// "rad", "m" or both for joints that turn and slide, "" for none. `per`: "/s" for velocities.
+// Unit of the group's joints: "rad" for rotations, "m" for translations, both if it has both, "" if
+// it has no joints. `per`: "/s" for velocities.
 std::string joint_unit(const mjModel* model, const JointGroup& group, std::string_view per = "");
 
 }  // namespace mjsense

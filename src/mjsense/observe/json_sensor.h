@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
-// Sensors whose row is JSON text, for what is no number: uint8[str_max_len], sorted keys, no blanks,
-// padded with 0. The text is written at the moment of sensing, so that what a policy reads and what
-// a file holds are the same bytes.
+// Base class of sensors whose row is JSON text, for values that are not numbers:
+// uint8[str_max_len], sorted keys, no blanks, padded with 0. The text is written when the sensor is
+// computed, so that a policy and a file get the same bytes.
 
 #include <string>
 
@@ -18,8 +18,8 @@ class JsonSensor : public Sensor {
   std::string_view kind() const override { return "json"; }
 
   void initialize(const SensorInit& init) override;
-  // Throws RowError with the sensor, the size and the limit where the text is longer than its row: it
-  // is never cut.
+  // Throws RowError with the sensor, the size and the limit if the text is longer than its row. The
+  // text is never truncated.
   void compute(const World& world) final;
 
  protected:

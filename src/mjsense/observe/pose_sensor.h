@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
-// The pose of a body or site, float32 [7] = position (m), quaternion (wxyz), in the world or in
-// another frame.
+// Pose of a body or site, float32 [7] = position (m), quaternion (wxyz), in the world or in another
+// frame.
 
 #include <string>
 #include <string_view>
@@ -11,17 +11,16 @@
 
 namespace mjsense {
 
-// `robot_base_pose`: X_WB. `tcp_pose`: X_BT, the tool in the robot's base frame, which stands on
-// the floor. Of the two quaternions of a rotation, an episode begins with the one whose w is not
-// negative; then each is the one nearer to the last that was computed, so that the sign does not
-// flip between steps.
+// `robot_base_pose` is X_WB. `tcp_pose` is X_BT, the tool in the robot's base frame, which is at
+// floor level. Each rotation has two quaternions. The first of an episode has w >= 0; each later one
+// is the one closer to the previous quaternion, so the sign does not flip between steps.
 class PoseSensor final : public Sensor {
  public:
   struct Ref {
     std::string type;  // "body" (body frame) or "site"
     std::string name;  // full MuJoCo name
   };
-  // `reference` with an empty name: the world.
+  // A `reference` with an empty name is the world.
   PoseSensor(std::string name, Ref frame, Ref reference = {}, std::string description = "");
   std::string_view kind() const override { return "pose"; }
   mjtStage needs() const override { return mjSTAGE_POS; }
@@ -35,7 +34,7 @@ class PoseSensor final : public Sensor {
   Frame frame_, reference_;
 };
 
-// Unit, shape and bounds of a row of 7.
+// Spec of a pose's row of 7 values.
 SensorSpec pose_spec(std::string frame, std::string description);
 
 }  // namespace mjsense

@@ -43,7 +43,7 @@ void SharedField::initialize(const SensorInit& /*init*/) {
 }
 
 std::shared_ptr<Sensor> field_of_camera(std::string name, Sensor& camera, std::string field) {
-  // [H, W, 1], and [H, W] in a video.
+  // Depth is [H, W, 1] in a camera and [H, W] in a video.
   const auto flat = [](SensorSpec& spec) {
     if (spec.storage == Storage::kDepthVideo) spec.shape = {spec.shape[0], spec.shape[1]};
   };

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
-// One field of another sensor as a sensor of its own: the rows are shared, nothing is copied. So a
-// camera of the scene is `wrist_camera` and `wrist_camera_depth` in a suite.
+// One field of another sensor as a separate sensor. The rows are shared and not copied. For
+// example, a camera of the scene appears in a suite as `wrist_camera` and `wrist_camera_depth`.
 
 #include <functional>
 #include <memory>
@@ -14,7 +14,8 @@ namespace mjsense {
 
 class SharedField final : public Sensor {
  public:
-  // `adapt` may change the field's spec: its storage, or its shape to one of as many bytes.
+  // `adapt` may change the field's spec: its storage, or its shape to one with the same number of
+  // bytes.
   SharedField(std::string name, Sensor& source, std::string field,
               std::function<void(SensorSpec&)> adapt = {});
   std::string_view kind() const override { return "shared"; }

@@ -20,7 +20,7 @@ using testing::FloatNear;
 using testing::HasSubstr;
 using testing::Pointwise;
 
-// A base 0.58 m above the floor with one hinge and a tool site; a cube; a camera that looks down
+// A base with one hinge 0.58 m above the floor and a tool site; a cube; a camera that looks along
 // +x.
 constexpr char kScene[] = R"(
 <mujoco>
@@ -43,7 +43,7 @@ constexpr char kScene[] = R"(
 
 std::vector<JointGroup> groups() { return {{"base", {}, {}}, {"arm", {0}, {0}}}; }
 
-TEST(JointState, IsOneStreamAGroup) {
+TEST(JointState, HasOneStreamPerGroup) {
   TestWorld w(kScene);
   w.data->qpos[0] = 0.05;
   w.data->qvel[0] = -1e-5;
@@ -72,7 +72,7 @@ TEST(JointState, UnitsAreThoseOfTheJoints) {
   EXPECT_EQ(joint_unit(w.model, {}), "");
 }
 
-TEST(JsonFunction, RefusesTextThatIsTooLongAtTheMomentItIs) {
+TEST(JsonFunction, RefusesTextLongerThanTheRow) {
   TestWorld w(kScene);
   std::string word = "short";
   JsonFunctionSensor info("task_info", 16, "", [&](const World&, JsonWriter& json) {
@@ -99,7 +99,7 @@ TEST(Pose, OfASiteInTheBaseFrame) {
   w.compute(base);
   w.compute(tcp);
   EXPECT_THAT(values<float>(base), ElementsAre(1, 0, 0, 0, 0, 0, 1));
-  // The base is turned by half a turn about z: in its own frame the tool is still in front of it.
+  // The base is rotated by 180 degrees about z, but in the base's frame the tool is in front of it.
   EXPECT_THAT(values<float>(tcp),
               Pointwise(FloatNear(1e-6f), {.3f, 0.f, .58f, 1.f, 0.f, 0.f, 0.f}));
   EXPECT_EQ(tcp.fields()[0].spec.frame, "body robot/base");
@@ -146,7 +146,7 @@ TEST(Pose, NamesTheNearestWhenThereIsNone) {
   }
 }
 
-TEST(EnvStates, HoldsEveryFreeBodyAndTheRobot) {
+TEST(EnvStates, ContainsEveryFreeBodyAndTheRobot) {
   TestWorld w(kScene);
   w.data->qpos[0] = 0.25;
   w.data->qvel[0] = -2;
@@ -165,8 +165,8 @@ TEST(EnvStates, HoldsEveryFreeBodyAndTheRobot) {
   EXPECT_THAT(values<float>(least, "articulations/arm"), ElementsAre(.25f, -2));
 }
 
-// Bodies that end in one name are told apart by the names of their entities.
-TEST(EnvStates, ActorsOfOneNameKeepTheirEntities) {
+// Actors whose bodies have the same local name are distinguished by the names of their entities.
+TEST(EnvStates, ActorsWithTheSameNameKeepTheirEntities) {
   TestWorld w(R"(<mujoco><worldbody><body name="left/cup"><freejoint/><geom size=".1"/></body>
     <body name="right/cup" pos="1 0 0"><freejoint/><geom size=".1"/></body>
     <body name="right/mug" pos="2 0 0"><freejoint/><geom size=".1"/></body></worldbody></mujoco>)");
@@ -186,7 +186,7 @@ TEST(CameraParameters, ProjectKnownPoints) {
   const auto X = values<double>(camera, "cam2world_gl");
   const auto E = values<double>(camera, "extrinsic_cv");
   const auto K = values<double>(camera, "intrinsic_cv");
-  // It looks along +x from (0, 0, 1): right is -y, down is -z.
+  // The camera looks along +x from (0, 0, 1): right is -y, down is -z.
   EXPECT_THAT(
       X, Pointwise(testing::DoubleNear(1e-12), {0, 0, 1, 0, -1, 0, 0, 0, 0, -1, 0, 1, 0, 0, 0, 1}));
   const double f = static_cast<float>(184 / std::tan(std::numbers::pi / 6));
@@ -203,7 +203,7 @@ TEST(CameraParameters, ProjectKnownPoints) {
   EXPECT_NEAR(u0, 320, 1e-9);
   EXPECT_NEAR(v0, 184, 1e-9);
   const auto [u1, v1] =
-      project(2, -.5, 1 + 2 * std::tan(std::numbers::pi / 6));  // right, upper edge
+      project(2, -.5, 1 + 2 * std::tan(std::numbers::pi / 6));  // at the right, on the upper edge
   EXPECT_NEAR(u1, 320 + f / 4, 1e-4);
   EXPECT_NEAR(v1, 0, 1e-4);
 }
@@ -212,7 +212,7 @@ TEST(CameraParameters, MatrixOfACameraWithASensor) {
   TestWorld w(kScene);
   CameraParameterSensor camera("sensor_param_chip", "chip", 640, 480);
   w.compute(camera);
-  // 640 pixels on 4 mm; MuJoCo's principal point is that of the sensor in the lens's frame.
+  // 640 pixels on 4 mm. MuJoCo's principal point is that of the sensor in the frame of the lens.
   const auto K = values<double>(camera, "intrinsic_cv");
   const double pixel = 640 / .004;
   const std::vector<double> expected = {

@@ -1,9 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
-// An ordered set of sensors with unique names: what a policy observes and what a recording stores.
+// An ordered set of sensors with unique names: the observations of a policy and the contents of a
+// recording.
 //
-// Built in layers: the task's sensors, then the robot's, then the policy's. Each layer is named, so
-// that a clash of names can say who brought both.
+// A suite is built in layers: the task's sensors, then the robot's, then the policy's. Each layer
+// has a name, so that the error for a duplicate sensor can name both layers.
 
 #include <memory>
 #include <span>
@@ -23,11 +24,11 @@ class SensorSuite {
   // Throws ValueError if the name is taken: "'qpos' is duplicated sensor uuid: from task 'pick' and
   // from robot 'franka'".
   void add(std::shared_ptr<Sensor> sensor, std::string_view owner = "");
-  // In order; the first clash throws, those before it stay added.
+  // Adds the sensors in order. The first duplicate throws; the sensors before it stay added.
   void extend(std::span<const std::shared_ptr<Sensor>> sensors, std::string_view owner = "");
 
-  // Keeps these alone, in this order. Throws KeyError for an unknown name, ValueError for one given
-  // twice or once the suite is bound.
+  // Keeps only these sensors, in this order. Throws KeyError for an unknown name, and ValueError
+  // for a repeated name or if the suite is bound.
   void select(std::span<const std::string> names);
 
   std::span<const std::shared_ptr<Sensor>> sensors() const { return sensors_; }
@@ -37,12 +38,12 @@ class SensorSuite {
   Sensor& get(std::string_view name) const;               // throws KeyError with the nearest names
   const std::string& owner(std::string_view name) const;  // throws KeyError with the nearest names
 
-  // Adds the sensors to the simulation, each once; those added later need another call. The
-  // simulation lives longer.
+  // Adds the sensors to the simulation, each once. Sensors that are added later need another call.
+  // The simulation must outlive the suite.
   void bind(Simulation& simulation);
-  // Makes every row current, in the worlds `ids`.
+  // Updates every row in the worlds `ids`.
   void refresh(WorldIds ids = all_worlds);
-  // Fields of all sensors in order: a sensor with several has several streams. Valid after bind().
+  // Fields of all sensors, in order; a sensor can have several. Valid after bind().
   std::vector<const Field*> streams() const;
   const Field& stream(std::string_view name) const;  // throws KeyError with the nearest names
 
@@ -50,8 +51,8 @@ class SensorSuite {
   int index(std::string_view name) const;  // -1 if there is none
 
   std::vector<std::shared_ptr<Sensor>> sensors_;
-  std::vector<std::string> owners_;  // of each sensor: "task 'pick'"
-  std::vector<Sensor*> bound_;       // a prefix of sensors_
+  std::vector<std::string> owners_;  // name of each sensor's layer: "task 'pick'"
+  std::vector<Sensor*> bound_;       // sensors that are in the simulation, a prefix of sensors_
   Simulation* simulation_ = nullptr;
 };
 

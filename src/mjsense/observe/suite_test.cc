@@ -33,7 +33,7 @@ std::string error_of(const std::function<void()>& f) {
   return "";
 }
 
-TEST(Suite, KeepsOrderAndNamesBothOwnersOfAClash) {
+TEST(Suite, KeepsOrderAndNamesBothOwnersOfADuplicate) {
   SensorSuite suite;
   suite.add(std::make_shared<Picture>("qpos"), "task 'pick'");
   suite.add(std::make_shared<Picture>("exo"), "task 'pick'");
@@ -49,7 +49,7 @@ TEST(Suite, KeepsOrderAndNamesBothOwnersOfAClash) {
   EXPECT_THAT(error_of([&] { suite.refresh(); }), testing::HasSubstr("bind()"));
 }
 
-TEST(Suite, SelectedAreThoseAloneInThatOrder) {
+TEST(Suite, SelectKeepsTheGivenSensorsInOrder) {
   SensorSuite suite;
   for (const char* name : {"a", "b", "c"}) suite.add(std::make_shared<Picture>(name), name);
   const std::vector<std::string> wanted{"c", "a"}, twice{"c", "c"}, unknown{"d"};
@@ -61,7 +61,7 @@ TEST(Suite, SelectedAreThoseAloneInThatOrder) {
   EXPECT_EQ(suite.size(), 2u) << "as it was";
 }
 
-TEST(Suite, ExtendKeepsWhatCameBeforeTheClash) {
+TEST(Suite, ExtendKeepsSensorsBeforeADuplicate) {
   SensorSuite suite;
   const std::shared_ptr<Sensor> more[] = {std::make_shared<Picture>("a"),
                                           std::make_shared<Picture>("a"),
@@ -70,7 +70,7 @@ TEST(Suite, ExtendKeepsWhatCameBeforeTheClash) {
   EXPECT_THAT(suite.names(), testing::ElementsAre("a"));
 }
 
-TEST(SharedField, ShowsTheSameMemoryUnderAnotherNameAndShape) {
+TEST(SharedField, SharesMemoryUnderAnotherNameAndShape) {
   TestWorld w("<mujoco/>");
   Picture camera("wrist");
   camera.initialize(w.init(2));

@@ -1,8 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
-// Which geoms a packet can meet: the rays lie in a beam, a box of origins swept along a range of
-// slopes over the axis that all directions agree on. Its cross-section over each geom's box
-// decides, 4 to 16 geoms at a time.
+// Culls geoms against a packet of rays. The rays of the packet lie in a beam: a box of origins,
+// swept along a range of slopes over an axis on which all directions have the same sign. The beam's
+// cross-section at each geom's box decides whether the packet can hit it; 4 to 16 geoms are tested
+// at a time.
 
 #include "mjsense/rays/kernels.h"
 #include "mjsense/rays/packet.h"
@@ -16,7 +17,7 @@ struct Range {
   float low, high;
 };
 
-// Grows over lanes and packets.
+// Minimum and maximum over the active lanes of several packets.
 struct Bound {
   Float low = kNoHit, negated_high = kNoHit;
   void add(Mask active, Float x) {
@@ -27,15 +28,15 @@ struct Bound {
 };
 
 struct Beam {
-  bool empty = false;       // no active lane
-  bool everywhere = false;  // directions agree on no axis
+  bool empty = false;       // no lane is active
+  bool everywhere = false;  // the directions share no axis; every box is a candidate
   int axis = 0;
   float sign = 1.0f;
-  Range origin[3];  // m, world
+  Range origin[3];  // m, world frame
   Range slope[3];   // d[i] / |d[axis]|
   float tmax = 0.0f;
 
-  // Of packets with one origin.
+  // All packets must have the same `origin`.
   Beam(const RayPacket* packets, int count) {
     Bound o[3], d[3];
     Float farthest = -1.0f;
@@ -82,14 +83,14 @@ struct Beam {
     slope[c] = slope_c.range();
   }
 
-  // Lanes of boxes i .. i + kWidth - 1 that the beam touches, and a distance before which it
-  // does not.
+  // Returns the lanes of boxes i .. i + kWidth - 1 that the beam touches. `nearest` is a lower
+  // bound of the distance at which it does.
   Mask touches(const KernelBoxes& boxes, int i, Float& nearest) const {
     const int a = axis, b = (axis + 1) % 3, c = (axis + 2) % 3;
     const Float lo = loadu(boxes.low[a] + i), hi = loadu(boxes.high[a] + i);
     const bool up = sign > 0;
-    // How far along the axis the box begins and ends, seen from the nearest and the farthest
-    // origin.
+    // Distances along the axis at which the box begins and ends: from the origin nearest to the box
+    // and from the one farthest from it.
     const Float begin = max(up ? lo - origin[a].high : Float(origin[a].low) - hi, 0.0f);
     const Float end = up ? hi - origin[a].low : Float(origin[a].high) - lo;
     nearest = begin;
@@ -132,8 +133,8 @@ inline bool passes(const KernelWorld& world, const KernelFilter& filter, int geo
   return filter.hidden == nullptr || filter.hidden[geom] == 0;
 }
 
-// Calls take(geom, nearest) for each geom that the beam touches and that passes the filter, where
-// geoms stand in blocks; in no order.
+// Calls take(geom, nearest) for each geom that the beam touches and that passes the filter. For
+// worlds with blocks of geoms; the order of the calls is undefined.
 template <class Take>
 void for_each_in_blocks(const Beam& beam, const KernelWorld& world, const KernelFilter& filter,
                         Take&& take) {
@@ -150,7 +151,7 @@ void for_each_in_blocks(const Beam& beam, const KernelWorld& world, const Kernel
   });
 }
 
-// By rising key. Shell's sort: counts are small, and nearly in order.
+// Sorts by ascending key. Shellsort, because the counts are small and the input is nearly sorted.
 template <class T, class Key>
 void sort_by(T* c, int count, Key key) {
   for (int gap = count > 64 ? 31 : count > 12 ? 5 : 1; gap > 0; gap = gap > 5 ? 5 : gap / 5) {
@@ -163,13 +164,13 @@ void sort_by(T* c, int count, Key key) {
   }
 }
 
-// Nearest first.
 inline void sort_candidates(RayCandidate* c, int count) {
   sort_by(c, count, [](const RayCandidate& x) { return x.t; });
 }
 
-// gather() and focus() for blocks, apart from what is common. Sorted by number first, so that what is
-// equally near comes in the same order with blocks and without: the same bits.
+// gather() and focus() for worlds with blocks. Results are sorted by geom id first, so that geoms
+// at equal distance come in the same order with and without blocks and the results are equal bit
+// for bit.
 [[gnu::noinline]] inline int gather_blocks(const KernelWorld& world, const KernelFilter& filter,
                                            const RayPacket& rays, RayCandidate* out) {
   int count = 0;

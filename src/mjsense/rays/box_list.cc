@@ -11,7 +11,7 @@ namespace {
 
 constexpr int kPad = 16, kBlock = KernelWorld::kBlock;
 constexpr float kInf = std::numeric_limits<float>::infinity();
-constexpr float kLarge = 1e3f;  // m: such a box has no neighbours
+constexpr float kLarge = 1e3f;  // m; boxes of this size or larger are not grouped by position
 
 int pad(int count) { return (count + kPad - 1) / kPad * kPad; }
 
@@ -25,7 +25,7 @@ KernelBoxes view(const std::vector<float>& boxes, const int* ids, int count) {
   return out;
 }
 
-// Every third bit of the result is one of the lower 10 of x.
+// Moves the lower 10 bits of x to every third bit of the result.
 std::uint32_t spread(std::uint32_t x) {
   x = (x | x << 16) & 0x030000FFu;
   x = (x | x << 8) & 0x0300F00Fu;
@@ -66,8 +66,8 @@ void BoxList::update() {
   }
 }
 
-// Along a curve through space that leaves each part of it only when it has been everywhere there
-// (Morton's); what is endless stands before all.
+// Sorts the boxes along a Morton curve, which visits all of a region before it leaves it. Large and
+// infinite boxes come first.
 void BoxList::sort() {
   std::array<float, 3> least{kInf, kInf, kInf}, most{-kInf, -kInf, -kInf};
   const auto is_large = [&](int i) {

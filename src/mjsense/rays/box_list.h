@@ -1,9 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
-// The boxes around the objects of one world, as the kernels test them. A few are tested one after
-// the other; many stand in blocks of neighbours with a box around each, so that a packet passes by
-// most of them at once. Who is whose neighbour is found once, from the first poses: what moves far
-// from its neighbours makes their block large, never an answer wrong.
+// World-space bounding boxes of the objects of one world, in the layout of the ray kernels. Few
+// boxes are tested one after the other. Many boxes are grouped into blocks of neighbours with a box
+// around each block, so that a packet skips most of them at once. The grouping is computed once,
+// from the first poses. An object that later moves far from its neighbours makes its block's box
+// large, but does not change any result.
 
 #include <algorithm>
 #include <cstddef>
@@ -16,23 +17,23 @@ namespace mjsense {
 
 class BoxList {
  public:
-  // Objects from which on there are blocks. M rays/s of ray_scene_bench without them (before there
-  // were any) and with them: 1,000 boxes 29 and 39, 10,000 3.8 and 13.
+  // Minimum number of objects for blocks. M rays/s of ray_scene_bench before blocks were added and
+  // with them: 1,000 boxes 29 and 39, 10,000 boxes 3.8 and 13.
   static constexpr int kMany = 512;
 
   explicit BoxList(int count);
   BoxList(BoxList&&) = default;
   BoxList(const BoxList&) = delete;
 
-  int padded() const { return padded_; }  // count, a multiple of 16
-  // Of object i: corners in the world, m; planes reach to +-1e30.
+  int padded() const { return padded_; }  // number of objects, rounded up to a multiple of 16
+  // Sets the box of object i: its corners in the world frame, m. Planes reach to +-1e30.
   void set(int i, const float low[3], const float high[3]);
-  // After boxes were set.
+  // Call after set() and before all() or blocks() are read.
   void update();
 
   const KernelBoxes& all() const { return all_; }
   const KernelBoxes& blocks() const { return around_; }
-  // visit(k) for each box of all(), but for those of a block b for which enter(b) is false.
+  // Calls visit(k) for each box of all(), except for the boxes of a block b with enter(b) == false.
   template <typename Enter, typename Visit>
   void each(Enter enter, Visit visit) const {
     constexpr int kBlock = KernelWorld::kBlock;
@@ -41,7 +42,7 @@ class BoxList {
       for (int k = first; k < std::min(first + kBlock, all_.count); ++k) visit(k);
     }
   }
-  int object(int k) const { return all_.ids ? all_.ids[k] : k; }  // of box k
+  int object(int k) const { return all_.ids ? all_.ids[k] : k; }  // object of box k
   const int* place() const { return place_.empty() ? nullptr : place_.data(); }
 
  private:
@@ -51,13 +52,14 @@ class BoxList {
   void surround(int block);
 
   int count_, padded_;
-  std::vector<float> boxes_;  // [6, padded]: least x, y, z, greatest x, y, z
+  std::vector<float> boxes_;  // [6, padded]: minimum x, y, z, maximum x, y, z
   bool sorted_ = false;
-  std::vector<int> ids_, place_;  // object of a box, box of an object; empty: each its own
+  // Object of each box, and box of each object. Empty: box i is object i.
+  std::vector<int> ids_, place_;
   int num_blocks_ = 0;
   std::vector<float> blocks_;        // [6, padded]
-  std::vector<std::uint8_t> stale_;  // blocks of which a box was set
-  KernelBoxes all_{}, around_{};     // of boxes_ and blocks_, whose memory stays where it is
+  std::vector<std::uint8_t> stale_;  // blocks with a box that set() changed
+  KernelBoxes all_{}, around_{};     // views of boxes_ and blocks_, whose memory never moves
 };
 
 }  // namespace mjsense

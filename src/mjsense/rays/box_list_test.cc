@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Worlds with many geoms: blocks of boxes leave nothing out.
+// Worlds with many geoms: grouping boxes into blocks must not change any hit.
 #include "mjsense/rays/box_list.h"
 
 #include <gtest/gtest.h>
@@ -20,7 +20,7 @@ using testing::TestModel;
 class ManyGeoms : public testing::EveryKernel {};
 INSTANTIATE_TEST_SUITE_P(Isas, ManyGeoms, testing::every_isa(), testing::isa_of);
 
-// A floor and 900 solids in a hall of 20 m, a third of them on bodies that move.
+// A floor and 900 solids in a hall of 20 m; a third of them are on moving bodies.
 std::string hall(Rng& rng) {
   std::string xml = "<mujoco><worldbody><geom type='plane' size='0 0 1'/>";
   const char* const kinds[] = {"sphere", "box", "capsule"};
@@ -37,7 +37,7 @@ std::string hall(Rng& rng) {
   return xml + "</worldbody></mujoco>";
 }
 
-// Rays of one origin, lane 0 to 15, in a narrow or a wide fan.
+// 16 rays of one origin, in a narrow or a wide fan.
 RayPacket fan(Rng& rng) {
   RayPacket rays{};
   double middle[3];
@@ -55,7 +55,7 @@ RayPacket fan(Rng& rng) {
   return rays;
 }
 
-TEST_P(ManyGeoms, AnswersAreThoseOfAllBoxes) {
+TEST_P(ManyGeoms, BlocksDoNotChangeHits) {
   Rng rng(3, 0, 0, 0);
   const TestModel m(hall(rng));
   ASSERT_GE(m.model->ngeom, BoxList::kMany);
@@ -85,7 +85,7 @@ TEST_P(ManyGeoms, AnswersAreThoseOfAllBoxes) {
       ASSERT_EQ(scene.occluded(0, filter, rays, scratch) != 0,
                 std::ranges::any_of(std::span(expected.geom), [](int g) { return g >= 0; }));
     }
-    // Far from where the blocks were found.
+    // Move the bodies far from where the blocks were computed.
     for (int j = 0; j < m.model->njnt; ++j) {
       for (int k = 0; k < 3; ++k)
         m.data->qpos[m.model->jnt_qposadr[j] + k] =
@@ -129,14 +129,14 @@ TEST(BoxList, BlocksSurroundTheirBoxes) {
     for (int b = 1; b < blocks.count; ++b)
       size += (blocks.high[1][b] - blocks.low[1][b]) / blocks.count;
     if (round == 0) {
-      EXPECT_LT(size, 60);  // m, the mean of neighbours; of any 64 nearly 100
+      EXPECT_LT(size, 60);  // m, mean over the blocks; for 64 random boxes it would be nearly 100
     }
     for (int n = 0; n < 20; ++n) place(static_cast<int>(rng.below(count)));
     list.update();
   }
 }
 
-TEST(BoxList, AFewStandOneAfterTheOther) {
+TEST(BoxList, FewObjectsHaveNoBlocks) {
   BoxList list(100);
   EXPECT_EQ(list.blocks().count, 0);
   EXPECT_EQ(list.all().ids, nullptr);

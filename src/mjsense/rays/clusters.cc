@@ -20,7 +20,7 @@ struct Cone {
   float spread;  // sine of the angle
 };
 
-// Length 1, or 0 of what has none.
+// Normalised vector; 0 if it has no length.
 std::array<float, 3> unit(const std::array<float, 3>& v) {
   const float length = std::hypot(v[0], v[1], v[2]);
   if (!(length > 0)) return {};
@@ -58,8 +58,8 @@ class Builder {
       if (finer.size() == parts.size()) break;
       parts = std::move(finer);
     }
-    // Halves differ by a block at most, so that leaves come in one round: no node has more
-    // children.
+    // Halves differ by at most one block, so all leaves appear in the same round and no node has
+    // more than kClusterSize children.
     assert(parts.size() <= kClusterSize);
     for (std::size_t i = 0; i < parts.size(); ++i) {
       const bool leaf = parts[i].size() <= kClusterSize;
@@ -79,7 +79,8 @@ class Builder {
     return index;
   }
 
-  // In the middle of the longest side, so that all blocks but the last are full.
+  // Splits near the middle of the longest side, at a multiple of kClusterSize, so that all blocks
+  // but the last are full.
   void halve(Range faces, std::vector<Range>& out) {
     if (faces.size() <= kClusterSize) {
       out.push_back(faces);
@@ -141,7 +142,7 @@ class Builder {
     float cosine = 1;
     for (int f : faces) {
       const std::array<float, 3> n = normal(f);
-      if (n[0] == 0 && n[1] == 0 && n[2] == 0) continue;  // shows from nowhere
+      if (n[0] == 0 && n[1] == 0 && n[2] == 0) continue;  // degenerate triangles are never visible
       cosine = std::min(cosine, n[0] * cone.axis[0] + n[1] * cone.axis[1] + n[2] * cone.axis[2]);
     }
     if (cosine > 0) cone.spread = std::min(1.0f, std::sqrt(1 - cosine * cosine) + 1e-3f);

@@ -42,7 +42,7 @@ void each_triangle(const Clusters& clusters, const ClusterNode& node, int i, Use
   for (int k = 0; k < below.count; ++k) each_triangle(clusters, below, k, use);
 }
 
-TEST(Clusters, HoldEveryFaceOnceInsideItsBoxesAndCones) {
+TEST(Clusters, ContainEveryFaceOnceWithinBoxesAndCones) {
   for (int n : {1, 2, 3, 5, 7, 11, 13, 17, 20, 23, 31, 47, 61}) {
     Rng rng(3, 0, 1, n);
     const Sheet sheet(n, rng);
@@ -80,7 +80,7 @@ TEST(Clusters, HoldEveryFaceOnceInsideItsBoxesAndCones) {
   }
 }
 
-TEST(Clusters, OfNothingAreEmpty) {
+TEST(Clusters, OfNoFacesAreEmpty) {
   EXPECT_TRUE(build_clusters(nullptr, nullptr, 0).nodes.empty());
 }
 

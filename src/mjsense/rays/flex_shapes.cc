@@ -138,8 +138,9 @@ void FlexShapes::move_sheets(Flex& flex) {
   if (!flex.normals.empty()) shade(flex);
 }
 
-// Smooth faces have their vertices' normals, the second sheet the opposite ones. Flat ones have the
-// normal of the face before it was displaced, the border that of its own.
+// Faces with smooth shading have their vertices' normals, negated in the second sheet. Flat faces
+// have the normal of the face before it was displaced by the radius; faces of the border have their
+// own.
 void FlexShapes::shade(Flex& flex) {
   const FlexSurface& s = *flex.surface;
   const std::span<const float> surface = flex.mesh.vertices();

@@ -1,7 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
-// The flexes of one world: their surfaces (flex_surface.h) where the world's vertices are now, in
-// the frame of the flex's first vertex (world axes), so that single precision is enough anywhere.
+// Flexes of one world: their surfaces (flex_surface.h) at the current vertex positions. Coordinates
+// are relative to the flex's first vertex (world axes), so that single precision is sufficient
+// anywhere in the world.
 
 #include <mujoco/mujoco.h>
 
@@ -15,25 +16,28 @@ namespace mjsense {
 
 class FlexShapes {
  public:
-  // `surfaces` by flex id; they must outlive this.
+  // `surfaces` is indexed by flex id and must outlive this object.
   FlexShapes(RTCDevice device, std::span<const FlexSurface> surfaces, const mjModel* model);
 
-  // Takes the world's vertices and radii. A flex that did not move costs a comparison.
+  // Copies the world's vertices and radii. A flex that did not move costs only a comparison.
   void update(const mjModel* model, const mjData* data);
 
-  std::span<const double> vertices(int flex) const { return flexes_[flex].vertices; }  // m, world
-  const double* position(int flex) const { return flexes_[flex].vertices.data(); }     // m, world
-  // [6] centre and half sizes of its box, m.
+  // m, world frame
+  std::span<const double> vertices(int flex) const { return flexes_[flex].vertices; }
+  // m, world frame
+  const double* position(int flex) const { return flexes_[flex].vertices.data(); }
+  // [6] centre and half sizes of the flex's bounding box, m.
   const float* box(int flex) const { return flexes_[flex].box; }
-  // RTCScene by flex id, for rays; null where there is nothing to meet.
+  // RTCScene by flex id, for rays; null if the flex has no surface.
   void* const* scenes() const { return scenes_.data(); }
 
-  // What cameras draw, in the order of flex_parts().
+  // Parts of flexes that cameras draw, in the order of flex_parts().
   struct Part {
-    int flex, element;     // `element`: whose material it has
-    int material;          // id or -1
-    void* scene;           // RTCScene; null: nothing
-    const float* normals;  // [faces, 3 corners, 3] unit; null for lines, and without cameras
+    int flex, element;  // `element`: the element whose material the part has
+    int material;       // id or -1
+    void* scene;        // RTCScene; null: nothing to draw
+    // [faces, 3 corners, 3] unit; null for dimension 1, and if the model has no cameras.
+    const float* normals;
   };
   std::span<const Part> parts() const { return parts_; }
 
@@ -41,11 +45,11 @@ class FlexShapes {
   struct Flex {
     const FlexSurface* surface;
     double radius;                 // m
-    std::vector<double> vertices;  // [V, 3] m, world
+    std::vector<double> vertices;  // [V, 3] m, world frame
     std::vector<double> smooth;    // [V, 3] unit normals of the vertices
-    std::vector<float> normals;    // [F, 3, 3]
-    SoftMesh mesh;                 // dimensions 2 and 3
-    std::vector<float> ends;       // [E, 2, 4] m, positions and radii: dimension 1
+    std::vector<float> normals;    // [F, 3 corners, 3] unit
+    SoftMesh mesh;                 // for dimensions 2 and 3
+    std::vector<float> ends;       // [E, 2, 4] m, end positions and radii, for dimension 1
     SceneHandle capsules;
     float box[6];
   };

@@ -6,8 +6,8 @@
 namespace mjsense {
 namespace {
 
-// The first element of each material that the elements of flex f have. MuJoCo draws all of a line
-// flex in that of its first element.
+// The first element of each material among the elements of flex f. MuJoCo draws all of a flex of
+// dimension 1 in the material of its first element.
 std::vector<int> first_elements(const mjModel* m, int f) {
   std::vector<int> firsts;
   const int begin = m->flex_elemadr[f];
@@ -20,7 +20,7 @@ std::vector<int> first_elements(const mjModel* m, int f) {
   return firsts;
 }
 
-// Which element of flex f has all of these vertices.
+// Returns the element of flex f that contains all of these vertices.
 int element_with(const mjModel* m, int f, const int* vertices, int count) {
   const int corners = m->flex_dim[f] + 1;
   const int* v = m->flex_elem + m->flex_elemdataadr[f];
@@ -31,7 +31,7 @@ int element_with(const mjModel* m, int f, const int* vertices, int count) {
   return m->flex_elemadr[f];
 }
 
-// Rows of three values in a new order.
+// Reorders rows of three values.
 void reorder(std::vector<int>& values, const std::vector<int>& order) {
   if (values.empty()) return;
   std::vector<int> sorted;
@@ -39,7 +39,7 @@ void reorder(std::vector<int>& values, const std::vector<int>& order) {
   values = std::move(sorted);
 }
 
-// Brings the faces of each of `firsts`' materials together. `elements`: of each face.
+// Makes the faces of each material in `firsts` contiguous. `elements`: the element of each face.
 void divide(const mjModel* m, const std::vector<int>& firsts, const std::vector<int>& elements,
             FlexSurface& s) {
   std::vector<int> order;

@@ -1,14 +1,17 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
-// A packet against a height field in its own frame, for kernels_impl.h. The surface z = h(x, y) is
-// two triangles a cell, split along (row, col) - (row + 1, col + 1); below it stands a base box.
-// Each lane walks the cells under its ray, leaps over blocks that it passes above, and looks for a
-// change of sign of z - h: neighbouring cells share their borders' values, so no ray slips through
-// a seam. On which side of the surface a ray is follows from how it came there; z - h is asked only
-// where nothing else says it, because at a flat top, in the very plane through which rays enter and
-// leave, its sign is that of a rounding error. So is on which side of the field's border a ray is
-// that runs in its plane: when a ray leaves the field is known from the box around it alone, and
-// until then it stays in the cells along the border.
+// Intersects a packet of rays with a height field, in the height field's frame; used by
+// kernels_impl.h. The surface z = h(x, y) has two triangles per cell, split along (row, col) - (row
+// + 1, col + 1); below it is a base box. Each lane walks over the cells under its ray, skips blocks
+// of cells that the ray passes above, and looks for a change of sign of z - h. Neighbouring cells
+// share the values at their border, so no ray slips through a seam.
+//
+// The side of the surface on which a ray is follows from its path so far. The sign of z - h is used
+// only if nothing else decides, because where the surface is flat and coincides with the top face
+// of the bounding box, through which rays enter and leave, that sign is a rounding error. For the
+// same reason the border is never tested against cell coordinates, which would be ambiguous for a
+// ray in the border's plane: only the bounding box decides when a ray leaves the field, and until
+// then the ray stays in the cells along the border.
 
 #include <mujoco/mujoco.h>
 
@@ -35,7 +38,7 @@ inline void take(FieldHit& hit, Mask m, Float t, Int prim, Vec3f n) {
                 select(m, n.z, hit.normal.z)};
 }
 
-// Height above the cell (x0, y0) with corners h_yx at grid coordinates (x, y).
+// Height above the cell (x0, y0) at grid coordinates (x, y); h_yx are the heights of its corners.
 struct Cell {
   Float h00, h01, h10, h11, x0, y0;
 
@@ -51,7 +54,8 @@ struct Cell {
     return (truncate(y0) * int_of(field.cols - 1) + truncate(x0)) * int_of(2) +
            select(first, int_of(0), int_of(1));
   }
-  // Slopes per cell of the triangle that (x, y) lies in: `first` holds (0, 1), the other (1, 0).
+  // Slope per cell of the triangle that contains (x, y): the `first` one has the corner (0, 1), the
+  // other has (1, 0).
   Float slope_x(Mask first) const { return select(first, h01 - h00, h11 - h10); }
   Float slope_y(Mask first) const { return select(first, h11 - h01, h10 - h00); }
   Float height(Float x, Float y) const {
@@ -61,7 +65,7 @@ struct Cell {
   }
 };
 
-// The cell that holds a point, or the nearest one.
+// The cell that contains a point, or the nearest cell if the point is outside the grid.
 struct FieldPoint {
   Float x, y;  // grid coordinates
   Cell cell;
@@ -80,15 +84,15 @@ struct FieldPoint {
   }
 };
 
-// A ray over the grid, in grid coordinates (columns, rows) and local heights; t counts from
-// `start`.
+// A ray over the grid: x and y in grid coordinates (columns, rows), z in local height. t counts
+// from `start`.
 struct GridRay {
-  Float x, y, z;     // at t = 0
-  Float dx, dy, dz;  // per metre
+  Float x, y, z;     // values at t = 0
+  Float dx, dy, dz;  // change per metre
   Float length;      // m
   Mask right, up, still_x, still_y;
   Float inv_x, inv_y;
-  Float columns, rows;  // of the far border
+  Float columns, rows;  // column and row of the far borders
 
   GridRay(const HeightField& field, Vec3f o, Vec3f d, Float start, Float stop) {
     const float per_x = (field.cols - 1) / (2 * field.size[0]);
@@ -113,7 +117,8 @@ struct GridRay {
   Float x_at(Float t) const { return fma(t, dx, x); }
   Float y_at(Float t) const { return fma(t, dy, y); }
   Float z_at(Float t) const { return fma(t, dz, z); }
-  // When it crosses the line at this column or row, of which there are cells on both sides.
+  // Distance at which the ray crosses the line at this column or row; kNoHit for the grid's
+  // borders.
   Float reaches_x(Float column) const {
     const Mask border = (column <= Float(0.0f)) | (column >= columns);
     return select(still_x | border, kNoHit, (column - x) * inv_x);
@@ -124,20 +129,20 @@ struct GridRay {
   }
 };
 
-// Where each lane is: its cell, and when it came there.
+// State of the walk in each lane: the current cell, and the distance at which the ray entered it.
 struct Walk {
   Float cx, cy, t;
-  Float side;  // of the surface: 1 above, -1 below, 0 not known yet
+  Float side;  // side of the surface: 1 above, -1 below, 0 not known yet
   Mask active;
-  Mask fresh;  // came by a leap: the height above the surface at t is not known
+  Mask fresh;  // entered by a leap: the height above the surface at t is not known
 
-  // Lanes that are done must not read outside.
+  // Keeps finished lanes from reading outside the grid.
   void stay_inside(const HeightField& field) {
     cx = min(max(cx, 0.0f), static_cast<float>(field.cols - 2));
     cy = min(max(cy, 0.0f), static_cast<float>(field.rows - 2));
   }
 
-  // Lanes that pass above all of their block leap to its border. Returns them.
+  // Lanes whose ray passes above all of its block leap to the block's border. Returns these lanes.
   Mask leap(const HeightField& field, const GridRay& ray) {
     constexpr float kBlock = HeightField::kBlock;
     const Float bx = floor(cx * (1 / kBlock)), by = floor(cy * (1 / kBlock));
@@ -151,7 +156,7 @@ struct Walk {
     const Mask above = active & (min(ray.z_at(t), ray.z_at(out)) > top);
     if (!any(above)) return above;
     const Mask sideways = out_x <= out_y;
-    // Along the far border of the grid too, a cell of the block that there is.
+    // The last block along each axis may have fewer cells; clamp to those that exist.
     const Float high_x = min(low_x + (kBlock - 1), static_cast<float>(field.cols - 2));
     const Float high_y = min(low_y + (kBlock - 1), static_cast<float>(field.rows - 2));
     const Float within_x = min(max(floor(ray.x_at(out)), low_x), high_x);
@@ -169,8 +174,8 @@ struct Walk {
   }
 };
 
-// The surface between `start` and `stop` on each active lane, from this `side` of it. Returns the
-// side on which the ray ends.
+// Finds the surface between `start` and `stop` in each active lane; the rays start on this `side`
+// of it. Returns the side on which each ray ends.
 inline Float march(const HeightField& field, Vec3f o, Vec3f d, Float start, Float stop, Float side,
                    Mask active, bool cull, FieldHit& hit) {
   const GridRay ray(field, o, d, start, stop);
@@ -180,10 +185,10 @@ inline Float march(const HeightField& field, Vec3f o, Vec3f d, Float start, Floa
   const Mask still_diagonal = abs(diagonal) < Float(1e-20f);
   Walk walk{floor(ray.x), floor(ray.y), 0.0f, side, active, mask_of(kAllLanes)};
   walk.stay_inside(field);
-  // Leaps pay where rays cross many cells.
+  // Leaps are worth their cost only if rays cross many cells.
   const bool far =
       any(active & (ray.length * (abs(ray.dx) + abs(ray.dy)) > Float(HeightField::kBlock)));
-  Float fa = 0.0f;  // height above the surface at walk.t; its sign is that of the side, or it is 0
+  Float fa = 0.0f;  // height above the surface at walk.t; 0 or of the same sign as walk.side
   while (any(walk.active)) {
     const Mask leapt = far ? walk.leap(field, ray) : mask_of(0);
     const Mask here = walk.active & ~leapt;
@@ -202,7 +207,7 @@ inline Float march(const HeightField& field, Vec3f o, Vec3f d, Float start, Floa
     const Float next_x = ray.reaches_x(walk.cx + select(ray.right, 1.0f, 0.0f));
     const Float next_y = ray.reaches_y(walk.cy + select(ray.up, 1.0f, 0.0f));
     const Float tb = max(ta, min(ray.length, min(next_x, next_y)));
-    // The ray may change triangles inside the cell, where x - x0 = y - y0.
+    // Inside the cell the ray may change triangles, where x - x0 = y - y0.
     const Float td = ((ray.x - walk.cx) - (ray.y - walk.cy)) * inv_diagonal;
     const Float tm = select(still_diagonal | ~(td > ta) | ~(td < tb), tb, td);
     Mask open = here;
@@ -253,7 +258,7 @@ inline FieldHit intersect_height_field(const HeightField& field, Vec3f o, Vec3f 
   Mask active = (in.enter <= tied(in.leave)) & (in.leave >= Float(0.0f)) & (start <= limit);
   if (!any(active)) return hit;
 
-  // A wall: where the ray enters through a side, below the surface's rim.
+  // A ray that enters through a side face, at or below the surface, hits the side wall there.
   const Mask entering = active & (in.enter >= Float(0.0f));
   const Mask from_base = (d.z > Float(0.0f)) & (level.enter >= in.enter);
   const Mask through_side = entering & (level.enter < in.enter);
@@ -267,7 +272,8 @@ inline FieldHit intersect_height_field(const HeightField& field, Vec3f o, Vec3f 
   const Float side = select(entering, select(from_base, -1.0f, 1.0f), 0.0f);
   const Float end = march(field, o, d, start, min(stop, hit.t), side, active, cull, hit);
 
-  // Who leaves from below the surface comes out: through a wall, or where the surface is the top.
+  // A ray that is still below the surface at the end exits the field: through a side wall, or
+  // through the top face where the surface touches it.
   const Mask into_base = (d.z < Float(0.0f)) & (level.leave <= in.leave);
   const Mask out = active & (end < Float(0.0f)) & (in.leave <= limit) & ~into_base;
   if (!cull && any(out)) {

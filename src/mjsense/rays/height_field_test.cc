@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Height fields whose surface lies where rays are hard to judge: flat tops in the plane where a ray
-// enters the field, steps, heights of few values, rays through grid points, edges and corners.
+// Height fields with difficult surfaces: flat tops in the plane in which rays enter the field,
+// steps, heights of few distinct values, and rays through grid points, edges and corners.
 
 #include <gtest/gtest.h>
 
@@ -24,13 +24,13 @@ using testing::TestModel;
 
 //  kPlateaus  --__/--\_   noise, clipped at both ends
 //  kSteps     __|--|_     0 or 1
-//  kEightBit  -_=-_=      noise of a few values of 255
+//  kEightBit  -_=-_=      noise with few distinct values of 255
 //  kBowl      --\__/--    the rim is clipped
 //  kPyramid   __/--\__    a slope tile
-//  kFlat      ______      nothing but the base
+//  kFlat      ______      only the base
 enum Ground { kPlateaus, kSteps, kEightBit, kBowl, kPyramid, kFlat, kNumGrounds };
 
-double height(Rng& rng, Ground ground, double x, double y) {  // at x, y in -1..1
+double height(Rng& rng, Ground ground, double x, double y) {  // x, y in -1..1
   switch (ground) {
     case kPlateaus:
       return std::clamp(rng.uniform(-0.5, 1.5), 0.0, 1.0);
@@ -47,12 +47,11 @@ double height(Rng& rng, Ground ground, double x, double y) {  // at x, y in -1..
   }
 }
 
-// A ray in the world: its origin and direction.
 struct Ray {
   double o[3], d[3];
 };
 
-// One height field somewhere, and rays in its frame.
+// A height field at a random pose, and rays in its frame.
 class Field {
  public:
   Field(Rng& rng, Ground ground) : model_(xml(rng, ground)) {}
@@ -61,13 +60,14 @@ class Field {
   double half(int axis) const { return size()[axis]; }
   double top() const { return size()[2]; }
 
-  // Where a ray comes from and goes to, in the field's frame.
+  // Random target of a ray, in the field's frame.
   std::array<double, 3> point(Rng& rng) const {
     const mjModel* m = model_.model;
     std::array<double, 3> p{};
     const int n[2] = {m->hfield_ncol[0], m->hfield_nrow[0]};
     for (int k = 0; k < 2; ++k) {
-      // In a cell, or on a grid line, so that two in line are an edge, a corner, the border.
+      // Per axis either within a cell or on a grid line. Two grid lines are a grid point, possibly
+      // at the border or at a corner of the field.
       const double at = rng.below(2) ? rng.uniform(0, n[k] - 1) : rng.below(n[k]);
       p[k] = half(k) * (2 * at / (n[k] - 1) - 1);
     }
@@ -78,7 +78,7 @@ class Field {
     mju_mulMatVec3(world, model_.data->geom_xmat, local);
     for (int k = 0; k < 3; ++k) world[k] += model_.data->geom_xpos[k];
   }
-  // Clear of the box around the field and its base.
+  // Whether the point is outside the bounding box of the field and its base.
   bool outside(const double world[3]) const {
     double from[3], p[3];
     mju_sub3(from, world, model_.data->geom_xpos);
@@ -87,7 +87,7 @@ class Field {
     return std::abs(p[0]) > half(0) + clear || std::abs(p[1]) > half(1) + clear ||
            p[2] > top() + clear || p[2] < -size()[3] - clear;
   }
-  // For a person: the ray in the field's frame, and the field's size.
+  // For failure messages: the ray in the field's frame, and the field's size.
   std::string local(const Ray& ray) const {
     double from[3], o[3], d[3];
     mju_sub3(from, ray.o, model_.data->geom_xpos);
@@ -132,11 +132,12 @@ Ray random_ray(Rng& rng, const Field& field) {
   const int kind = rng.below(6);
   if (kind >= 2) testing::random_direction(rng, d);
   if (kind >= 2 && kind < 5) d[2] = -std::abs(d[2]);
-  if (kind == 1) d[2] = 1;             // out of the ground
+  if (kind == 1) d[2] = 1;             // from below the surface
   if (kind == 4) d[2] *= 0.01;         // grazing
   if (kind == 3) d[rng.below(2)] = 0;  // along the grid
   mju_normalize3(d);
-  // Far before the target, close before it, or behind it: above, inside.
+  // Starts far before the target, close before it, or behind it, i.e. above the surface or inside
+  // the field.
   const double away = rng.below(8) == 0   ? 1e-4
                       : rng.below(8) == 0 ? rng.uniform(-1, 0)
                                           : rng.uniform(0, 10);
@@ -151,7 +152,7 @@ Ray random_ray(Rng& rng, const Field& field) {
 class HeightFields : public testing::EveryKernel {};
 INSTANTIATE_TEST_SUITE_P(Isas, HeightFields, testing::every_isa(), testing::isa_of);
 
-// MJSENSE_TEST_RAYS=10000000 for the long run.
+// For the long run: MJSENSE_TEST_RAYS=10000000.
 TEST_P(HeightFields, NoRayPassesThrough) {
   Rng rng(11, 0, 0, 0);
   const long total = ray_count(120000), per_field = 400;
@@ -175,11 +176,11 @@ TEST_P(HeightFields, NoRayPassesThrough) {
   EXPECT_GT(hits, total / 2) << "too few hits to mean anything";
 }
 
-//   |\  |          a ray in the plane in which the field ends: from below the surface, from above it,
-//   | \_|__        up, down and along. A rounding decides on which side of the border it is, but
-//  -|-->|          not whether it comes out where there is nothing.
+//   |\  |          A ray in the plane of the field's border: it starts below or above the surface
+//   | \_|__        and runs up, down or along it. Rounding decides on which side of the border it
+//  -|-->|          is, but it must not leave the field where there is no surface.
 //   |___|
-TEST_P(HeightFields, InTheBordersPlaneNoRayPassesEither) {
+TEST_P(HeightFields, NoRayInTheBorderPlanePassesThrough) {
   Rng rng(13, 0, 0, 0);
   int wrong = 0, hits = 0, rays = 0;
   for (int i = 0; i < 180; ++i) {
@@ -196,7 +197,8 @@ TEST_P(HeightFields, InTheBordersPlaneNoRayPassesEither) {
       if (rng.below(2)) d[0] = d[1] = 0;
       d[across] = 0;
       mju_normalize3(d);
-      // Out of the plane by nothing, or by what is left where sines and cosines should cancel.
+      // The direction deviates from the plane by 0, or by the residue of sines and cosines that
+      // should cancel.
       if (rng.below(2)) d[across] = (rng.below(2) ? 1 : -1) * std::pow(10, -rng.uniform(12, 19));
       const double away = rng.below(2) ? 0 : rng.uniform(0, 3);
       for (int j = 0; j < 3; ++j) o[j] = p[j] - away * d[j];
@@ -216,9 +218,9 @@ TEST_P(HeightFields, InTheBordersPlaneNoRayPassesEither) {
   EXPECT_GT(hits, rays / 3);
 }
 
-// The other questions that the same march answers: what a ray from outside meets is a front face,
-// and it is hidden where it meets something.
-TEST_P(HeightFields, CulledAndOccludedAlike) {
+// Other queries of the same march: a hit of a ray from outside is always on a front face, and
+// occluded() is true where trace() hits.
+TEST_P(HeightFields, CullingAndOcclusionAgreeWithTrace) {
   Rng rng(12, 0, 0, 0);
   int lanes = 0, hits = 0;
   for (int i = 0; i < 600; ++i) {
@@ -254,8 +256,8 @@ TEST_P(HeightFields, CulledAndOccludedAlike) {
   EXPECT_GT(hits, lanes / 3);
 }
 
-// A ray that comes out of the ground sees the surface from below, and its normal is up.
-TEST_P(HeightFields, FromInsideThroughAFlatTop) {
+// A ray that leaves the ground hits the surface from below; the normal points up.
+TEST_P(HeightFields, RayFromInsideHitsAFlatTop) {
   const TestModel m(
       "<mujoco><asset><hfield name='h' nrow='3' ncol='3' size='1 1 .7 .1' elevation='1 1 1  1 1 1 "
       " 1 1 0'/></asset><worldbody><geom type='hfield' hfield='h' pos='.1 .2 .3'/></worldbody>"

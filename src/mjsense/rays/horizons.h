@@ -1,7 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
-// How far a mesh rises around each of its faces: rays that leave a face more steeply do not come back to
-// the mesh. Most rays to lights are such, and need not be cast against the mesh that they begin on.
+// Horizons of a mesh: how high the mesh rises around each of its faces. Rays that leave a face more
+// steeply than its horizon do not hit the mesh again. Most shadow rays do, so they need not be cast
+// against the mesh on which they start.
 
 #include <array>
 #include <atomic>
@@ -14,23 +15,27 @@
 
 namespace mjsense {
 
-// Of a mesh in clusters. What hides the sky on one side of a face need not do so on another: there is a
-// horizon for each octant of directions in the mesh's frame (bit i: component i is negative). Kernels
-// find out about one (render/kernels/horizon.h) when they have asked so often that rays would have cost
-// as much, so that nobody waits for faces that hardly anybody sees; whoever does finds the same.
+// Horizons of a mesh in clusters. The mesh may occlude the sky on one side of a face and not on
+// another, so each face has a horizon for every octant of directions in the mesh's frame (bit i of
+// the octant: component i is negative). A horizon is computed by the kernels
+// (render/kernels/horizon.h) only after it was queried so often that casting the rays would have
+// cost as much; faces that are rarely visible cost nothing. The computed value does not depend on
+// which thread computes it or when.
 class Horizons {
  public:
   static constexpr int kOctants = 8;
-  // The sine of no direction: no ray is known to be clear.
+  // Larger than any sine: no ray is known to be clear of the mesh.
   static constexpr float kNever = 2;
-  // Questions before one is found: it costs 4 us; a lane of a packet that Embree looks at, 0.1.
+  // Number of queries before a horizon is computed. Computing one costs 4 us; a packet's lane that
+  // Embree casts costs 0.1 us.
   static constexpr int kPatience = 50;
 
   explicit Horizons(const Clusters& clusters) {
     for (std::size_t i = kClusterSize * clusters.blocks.size(); i-- > 0;) {
       const int face = clusters.blocks[i / kClusterSize].face[i % kClusterSize];
       if (places_.size() <= static_cast<std::size_t>(face)) places_.resize(face + 1);
-      places_[face] = static_cast<int>(i);  // unused lanes repeat the first of their block
+      // Unused lanes repeat the first lane of their block; the lowest index wins.
+      places_[face] = static_cast<int>(i);
     }
     planes_.reserve(places_.size());
     for (const int place : places_)
@@ -38,20 +43,22 @@ class Horizons {
     sines_ = std::make_unique<std::atomic<std::uint8_t>[]>(kOctants * places_.size());
   }
 
-  // Where a face stands: kClusterSize * block + lane.
+  // Index of a face in the clusters: kClusterSize * block + lane.
   int place(int face) const { return places_[face]; }
 
-  // The face's plane: its unit normal n, and the offset n . x, m. Zeros, if it has no area.
+  // The face's plane: its unit normal n, and the offset n . x, m. All zeros if the face has no
+  // area.
   const float* plane(int face) const { return planes_[face].data(); }
 
-  // The sine of the elevation over the face's plane from which on rays in the octant are clear. Until it
-  // was asked for kPatience times: kNever; then `find()`, rounded up.
+  // Returns the sine of the elevation above the face's plane from which all rays in the octant are
+  // clear of the mesh: kNever for the first kPatience queries, then the result of `find()`, rounded
+  // up.
   template <class Find>
   float ask(int face, int octant, Find find) const {
     std::atomic<std::uint8_t>& known = sines_[kOctants * face + octant];
     std::uint8_t code = known.load(std::memory_order_relaxed);
     if (code <= kPatience) {
-      // A count of questions; that of another thread may be lost.
+      // Number of queries. Concurrent increments may be lost, which is harmless.
       if (code < kPatience) {
         known.store(code + 1, std::memory_order_relaxed);
         return kNever;
@@ -64,7 +71,8 @@ class Horizons {
   }
 
  private:
-  // A byte counts up to kPatience; beyond it is kLeast and a sine in steps, or kUnclear.
+  // Values of a byte: up to kPatience a count of queries, then kLeast plus the sine in steps, and
+  // kUnclear.
   static constexpr int kLeast = kPatience + 1, kUnclear = 255;
   static constexpr float kStep = 1.0f / (kUnclear - 1 - kLeast);
 
@@ -88,7 +96,7 @@ class Horizons {
     return out;
   }
 
-  std::vector<int> places_;  // by face, as the rest
+  std::vector<int> places_;  // this and the following arrays are indexed by face
   std::vector<std::array<float, 4>> planes_;
   std::unique_ptr<std::atomic<std::uint8_t>[]> sines_;
 };

@@ -1,8 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
-// The functions that exist once per instruction set (kernels_portable.cc, kernels_avx2.cc,
-// kernels_avx512.cc, all made of kernels_impl.h). Structures only: nothing here may be compiled
-// into an inline function that another CPU would meet.
+// The ray kernels, compiled once per instruction set (kernels_portable.cc, kernels_avx2.cc,
+// kernels_avx512.cc; all include kernels_impl.h). This header contains declarations only. An inline
+// function here could be compiled with instructions that another CPU lacks, and the linker might
+// keep that copy.
 
 #include <cstdint>
 
@@ -17,37 +18,37 @@ struct RayGeom;
 struct RayCandidate;
 
 struct HeightField {
-  static constexpr int kBlock = 8;  // cells along a block's side
-  const float* data;                // [rows, cols] 0..1
+  static constexpr int kBlock = 8;  // cells per side of a block
+  const float* data;                // [rows, cols], 0..1
   int rows, cols;
-  float size[4];  // m: half x, half y, height of 1, thickness of the base
-  void* scene;    // RTCScene of its surface (z up): face 2 * cell + triangle; null without cameras
-  const float*
-      block_tops;  // [ceil((rows - 1) / kBlock), block_cols] m, highest point of each block
+  float size[4];  // m: half x, half y, height of the value 1, thickness of the base
+  void* scene;  // RTCScene of the surface (z up), face = 2 * cell + triangle; null without cameras
+  // [ceil((rows - 1) / kBlock), block_cols] m, maximum height of each block.
+  const float* block_tops;
   int block_cols;
-  float top;       // m, the highest point
-  float steepest;  // the largest slope
+  float top;       // m, maximum height
+  float steepest;  // maximum slope
 };
 
 struct KernelScene {
   void* const* mesh_scenes;          // RTCScene by mesh id
-  const HeightField* height_fields;  // by height-field id
+  const HeightField* height_fields;  // by height field id
 };
 
-// Boxes in the world, by coordinate; padded to a multiple of 16 with boxes that nothing meets.
+// Boxes in the world frame, by coordinate. Padded to a multiple of 16 with boxes that no ray hits.
 struct KernelBoxes {
   const float* low[3];
   const float* high[3];
-  const int* ids;  // of the geoms; null: box i is geom i
+  const int* ids;  // geom id of each box; null: box i is geom i
   int count;
 };
 
 struct KernelWorld {
   static constexpr int kBlock = 64;
   const RayGeom* geoms;
-  const KernelBoxes& boxes;    // of all geoms and flexes
-  const int* place;            // which of the boxes is a geom's; null: its own number
-  const KernelBoxes& blocks;   // around each kBlock boxes that follow each other; none: count is 0
+  const KernelBoxes& boxes;    // boxes of all geoms and flexes
+  const int* place;            // box index of each geom; null: geom i has box i
+  const KernelBoxes& blocks;   // boxes around each kBlock consecutive boxes; may be empty
   const std::uint32_t* flags;  // [padded]
   const int* bodies;           // [padded]
   void* const* flex_scenes;    // RTCScene by flex id
@@ -57,28 +58,28 @@ struct KernelFilter {
   std::uint32_t groups;
   int exclude_body;
   bool transparent, cull_mesh, cull_solid;
-  const std::uint8_t* hidden;  // null: none
+  const std::uint8_t* hidden;  // nonzero: geom is skipped; null: no geom is
 };
 
 struct RayKernels {
   void (*place)(const LocalPacket&, const float* rotation, float tmax, RayPacket&);
-  // Writes the boxes that any of `count` packets of one origin can meet into `low`, `high`, `ids`;
-  // returns their number.
+  // Writes the boxes that any of `count` packets with the same origin can hit into `low`, `high`
+  // and `ids`. Returns their number.
   int (*focus)(const KernelWorld&, const KernelFilter&, const RayPacket*, int count,
                float* const* low, float* const* high, int* ids);
-  // Writes what one packet can meet, nearest first: of all geoms that pass the filter, or of
-  // `boxes`; returns how many.
+  // Writes the candidates of one packet, nearest first, and returns their number. gather()
+  // considers all geoms that pass the filter, gather_from() the given boxes.
   int (*gather)(const KernelWorld&, const KernelFilter&, const RayPacket&, RayCandidate* out);
   int (*gather_from)(const KernelBoxes&, const RayPacket&, RayCandidate* out);
   void (*trace)(const KernelScene&, const KernelWorld&, const KernelFilter&, const RayPacket&,
                 HitPacket&, const RayCandidate*, int count);
   std::uint32_t (*occluded)(const KernelScene&, const KernelWorld&, const KernelFilter&,
                             const RayPacket&, const RayCandidate*, int count);
-  // A hit before `nearest` becomes none; one behind `farthest` is there. Ids by geom; null: not asked
-  // for.
+  // Discards hits nearer than `nearest` and clamps the distance of others to `farthest`. `bodies`
+  // and `materials` are indexed by geom; null if those ids were not requested.
   void (*rows)(const RayPacket&, float nearest, float farthest, const int* bodies,
                const int* materials, HitPacket&, HitRows&);
-  // rgba: [4 * objects].
+  // `rgba`: [objects, 4].
   void (*returns)(const LocalPacket&, const RayPacket&, const HitPacket&, const float* rgba,
                   ReturnRows&);
 };

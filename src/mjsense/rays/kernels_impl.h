@@ -1,11 +1,11 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
-// The kernels: a packet of 16 rays against candidate geoms, kWidth lanes at a time. Included by one
-// .cc file per instruction set.
+// Implementation of the ray kernels: packets of 16 rays against candidate geoms, kWidth lanes at a
+// time. Included by one .cc file per instruction set.
 //
-// Precision in float32: a packet's origin is brought into a geom's frame in double; solids are
-// solved from the point of the ray nearest to their centre, meshes from where the ray enters their
-// box. So numbers are small where digits count.
+// Precision in float32: a packet's origin is transformed into a geom's frame in double. Solids are
+// solved from the ray's point nearest to their centre, meshes from the point where the ray enters
+// their bounding box. Thus the numbers are small where precision matters.
 
 #include <mujoco/mujoco.h>
 
@@ -54,8 +54,8 @@ Vec3f unit(Vec3f n) {
   return {n.x * s, n.y * s, n.z * s};
 }
 
-// Lanes whose hit at t is nearer than what is known, or equally near (to rounding) with a lower
-// geom id.
+// Lanes whose hit at t is nearer than the best hit so far, or equally near (within rounding) and of
+// a lower geom id.
 Mask nearer(const HitPacket& hits, const RayPacket& rays, int k, Float t, int geom) {
   const Float best = load(hits.t + k);
   const Float tolerance = fma(t, 4e-7f, 1e-7f);
@@ -99,15 +99,15 @@ std::uint32_t occluded_solid(const RayGeom& g, bool cull, const RayPacket& rays)
   return hit;
 }
 
-// kWidth rays in a mesh's frame, each started shortly before it enters the mesh's box; `start` is
-// where that is.
+// kWidth rays in a mesh's frame. Each starts shortly before it enters the mesh's bounding box;
+// `start` is the distance of that point along the original ray.
 struct MeshRays {
   EmbreeRayHits rh;
   alignas(64) int valid[kWidth];
   Float start;
 
-  // Those of the packet from k on, unless they meet the box beyond `limit`. Returns whether there
-  // are any.
+  // Loads rays k .. k + kWidth - 1 of the packet, except those that reach the box beyond `limit`.
+  // Returns whether any ray is left.
   bool prepare(const RayGeom& g, const Frame& frame, const RayPacket& rays, int k, Float limit) {
     const float pad = 1e-5f + 1e-4f * (g.half[0] + g.half[1] + g.half[2]);
     const Vec3f o = frame.point(rays.o, k), d = frame.direction(rays.d, k);
@@ -197,7 +197,7 @@ std::uint32_t occluded_height_field(const HeightField& field, const RayGeom& g, 
   return hit;
 }
 
-// The BVH of a mesh, SDF or flex; null where it has no triangles.
+// The BVH of a mesh, SDF or flex; null if it has no triangles.
 RTCScene triangles_of(const KernelScene& scene, const KernelWorld& world, const RayGeom& g) {
   if (g.type == kFlexType) return static_cast<RTCScene>(world.flex_scenes[g.data]);
   return static_cast<RTCScene>(scene.mesh_scenes[g.data]);
@@ -213,7 +213,7 @@ void trace(const KernelScene& scene, const KernelWorld& world, const KernelFilte
   }
   const bool cull = filter.cull_solid, cull_mesh = filter.cull_mesh;
   for (int c = 0; c < count; ++c) {
-    bool reachable = false;  // candidates come nearest first
+    bool reachable = false;  // candidates are sorted by distance
     for (int k = 0; k < kPacket; k += kWidth)
       reachable |= any(Float(candidates[c].t) <= min(load(hits.t + k), load(rays.tmax + k)));
     if (!reachable) break;

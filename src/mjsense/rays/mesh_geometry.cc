@@ -28,7 +28,7 @@ std::array<float, 6> box_around(std::span<const float> vertices) {
   return box;
 }
 
-// In Embree's words, of this thread.
+// Message of Embree's last error in this thread.
 std::string& last_error() {
   thread_local std::string text;
   return text;
@@ -41,7 +41,7 @@ std::shared_ptr<RTCDeviceTy> ray_device() {
   static std::weak_ptr<RTCDeviceTy> kept;
   const std::lock_guard lock(mutex);
   if (auto device = kept.lock()) return device;
-  // One thread: a BVH, and with it every answer, is the same on every machine.
+  // With one thread a BVH, and thus every result, is the same on every machine.
   std::string settings = "threads=1";
   if (const char* more = std::getenv("MJSENSE_EMBREE")) settings += fmt::format(",{}", more);
   std::shared_ptr<RTCDeviceTy> device(rtcNewDevice(settings.c_str()), [](RTCDevice d) {

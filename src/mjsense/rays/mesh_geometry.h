@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
-// A triangle mesh as rays and images meet it, once in a process: simulations of the same robot share
-// it.
+// A triangle mesh in the form that rays and cameras use. Simulations of the same model in one
+// process share it.
 
 #include <array>
 #include <memory>
@@ -23,27 +23,30 @@ struct SceneRelease {
 using DeviceHandle = std::unique_ptr<RTCDeviceTy, DeviceRelease>;
 using SceneHandle = std::unique_ptr<RTCSceneTy, SceneRelease>;
 
-// That of the process, which ends with the last that holds it. The environment variable MJSENSE_EMBREE adds to
-// its settings (max_isa=avx2). Throws RuntimeError.
+// Embree's device, shared by the whole process and released with the last handle. The environment
+// variable MJSENSE_EMBREE adds to its settings (e.g. max_isa=avx2). Throws RuntimeError.
 std::shared_ptr<RTCDeviceTy> ray_device();
 
-// Embree only notes what went wrong, and rays would meet nothing: throws RuntimeError if it did in this thread
-// since the last check. `what` was to be built.
+// Throws RuntimeError if Embree reported an error in this thread since the last check. Embree only
+// records errors; without this check rays would hit nothing. `what` names the object that was
+// built.
 void check_built(RTCDevice device, const std::string& what);
 
-// A scene of one triangle mesh; positions [n, 3] and indices [m, 3] are copied. Throws RuntimeError.
+// Builds a scene of one triangle mesh; positions [n, 3] and indices [m, 3] are copied. Throws
+// RuntimeError.
 SceneHandle build_triangles(RTCDevice device, std::span<const float> vertices,
                             std::span<const int> faces);
 
 struct MeshGeometry {
   std::shared_ptr<RTCDeviceTy> device;
-  SceneHandle scene;                   // null without faces
-  Clusters clusters;                   // empty unless wanted
-  std::unique_ptr<Horizons> horizons;  // null: the same
-  std::array<float, 6> box{};          // around all vertices: center, half
+  SceneHandle scene;                   // null if the mesh has no faces
+  Clusters clusters;                   // empty unless requested
+  std::unique_ptr<Horizons> horizons;  // null unless clusters were requested
+  std::array<float, 6> box{};          // bounding box of all vertices: centre, half sizes, m
 };
 
-// Of these vertices [n, 3] (m) and faces [m, 3]; `clusters`: for images, too.
+// Returns the geometry of these vertices [n, 3] (m) and faces [m, 3]. `clusters`: also build what
+// cameras need.
 std::shared_ptr<const MeshGeometry> mesh_geometry(std::span<const float> vertices,
                                                   std::span<const int> faces, bool clusters);
 

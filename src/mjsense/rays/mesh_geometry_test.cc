@@ -15,7 +15,7 @@ namespace {
 const std::vector<float> kVertices{0, 0, 0, 1, 0, 0, 0, 1, 0, 0, 0, 1};
 const std::vector<int> kFaces{0, 1, 2, 0, 1, 3, 0, 2, 3, 1, 2, 3};
 
-TEST(MeshGeometry, EqualContentIsOneThing) {
+TEST(MeshGeometry, EqualContentIsShared) {
   const auto a = mesh_geometry(kVertices, kFaces, true);
   const auto b = mesh_geometry(std::vector(kVertices), std::vector(kFaces), true);
   EXPECT_EQ(a.get(), b.get());
@@ -24,7 +24,7 @@ TEST(MeshGeometry, EqualContentIsOneThing) {
   EXPECT_EQ(a->device.get(), ray_device().get());
 }
 
-TEST(MeshGeometry, OtherContentIsAnother) {
+TEST(MeshGeometry, DifferentContentIsNotShared) {
   const auto a = mesh_geometry(kVertices, kFaces, true);
   EXPECT_NE(a, mesh_geometry(kVertices, kFaces, false));
   for (std::size_t i = 0; i < kVertices.size(); ++i) {
@@ -37,8 +37,9 @@ TEST(MeshGeometry, OtherContentIsAnother) {
   EXPECT_NE(a, mesh_geometry(kVertices, turned, true));
 }
 
-// Embree itself says nothing, and rays would meet nothing. Memory ends at one allocation after the other.
-TEST(MeshGeometry, WhatEmbreeCannotBuildIsAnError) {
+// Embree reports no error by itself; rays would hit nothing. Memory runs out at each allocation in
+// turn.
+TEST(MeshGeometry, FailedBuildThrows) {
   const auto device = ray_device();
   int allowed = 0, left = 0;
   rtcSetDeviceMemoryMonitorFunction(
@@ -59,11 +60,11 @@ TEST(MeshGeometry, WhatEmbreeCannotBuildIsAnError) {
                    "monitor forced termination (error 4)");
     }
   }
-  EXPECT_GT(allowed, 3);  // the buffers', and the tree's
+  EXPECT_GT(allowed, 3);  // allocations of the buffers and of the tree
   rtcSetDeviceMemoryMonitorFunction(device.get(), nullptr, nullptr);
 }
 
-TEST(MeshGeometry, EndsWithWhoHoldsIt) {
+TEST(MeshGeometry, IsReleasedWithItsLastOwner) {
   std::weak_ptr<const MeshGeometry> seen;
   {
     const auto a = mesh_geometry(kVertices, kFaces, false);
@@ -73,7 +74,7 @@ TEST(MeshGeometry, EndsWithWhoHoldsIt) {
   EXPECT_NE(mesh_geometry(kVertices, kFaces, false), nullptr);
 }
 
-TEST(MeshGeometry, ManyThreadsMayAskForIt) {
+TEST(MeshGeometry, IsThreadSafe) {
   std::vector<std::shared_ptr<const MeshGeometry>> made(8);
   {
     std::vector<std::jthread> threads;
@@ -83,8 +84,8 @@ TEST(MeshGeometry, ManyThreadsMayAskForIt) {
   for (const auto& one : made) EXPECT_EQ(one, made[0]);
 }
 
-// Two arrays are not their concatenation, and order counts.
-TEST(ContentKey, TellsArraysApart) {
+// Two arrays differ from their concatenation, and their order matters.
+TEST(ContentKey, DistinguishesArrays) {
   const std::vector<int> a{1, 2, 3}, b{4, 5}, ab{1, 2, 3, 4, 5};
   const auto key = [](auto... parts) {
     ContentKey k;

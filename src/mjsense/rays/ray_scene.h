@@ -1,18 +1,19 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
-// Everything that rays and cameras of B worlds can hit. Geometry (a BVH per mesh) exists once; a
-// world adds its geoms' poses. Answers are those of mj_ray, to 1e-5 m at 10 m:
-//   plane   from the front only; endless where size is 0, at any distance
-//   sphere, capsule, ellipsoid, cylinder, box   from outside and inside, normal outward
+// Ray casting against B worlds. Geometry (one BVH per mesh) is shared; each world adds its geoms'
+// poses. Results equal those of mj_ray to 1e-5 m at 10 m:
+//   plane   hit from the front only; infinite where size is 0, at any distance
+//   sphere, capsule, ellipsoid, cylinder, box   hit from outside and inside, normal outward
 //   mesh    both sides, normal by winding
 //   hfield  both sides of the surface, side walls, base box
-//   sdf     its mesh, as MuJoCo draws it: mj_ray marches the field, they differ by its resolution
-//   flex    the surface that MuJoCo draws, `radius` around its elements (mj_ray does not see flexes):
-//           both sides, normal by winding; flex_surface.h says which triangles
-//   skin    not seen, as by mj_ray; cameras see them (skin_shapes.h)
-// Hits nearer to each other than rounding are a tie: the lower geom id wins.
+//   sdf     its mesh, as MuJoCo draws it. mj_ray marches through the field; the two differ by the
+//           mesh's resolution
+//   flex    the surface that MuJoCo draws, at `radius` around the elements (mj_ray ignores flexes):
+//           both sides, normal by winding. flex_surface.h describes the triangles
+//   skin    ignored, as by mj_ray; cameras draw skins (skin_shapes.h)
+// Hits whose distances differ by less than rounding are a tie: the lower geom id wins.
 //
-// update() runs in the parallel pass over worlds; tracing reads only and may run on any number of
+// update() runs in the parallel pass over worlds. Tracing only reads and may run on any number of
 // threads at once.
 
 #include <mujoco/mujoco.h>
@@ -32,7 +33,7 @@ namespace mjsense {
 struct RayKernels;
 struct SharedGeometry;
 
-// Geoms that a packet of rays may meet. One a thread, made once, reused by every query.
+// Candidate geoms of a packet of rays. Create one per thread and reuse it for every query.
 class RayScratch {
  public:
   explicit RayScratch(int num_objects);  // RayScene::num_objects()
@@ -44,13 +45,13 @@ class RayScratch {
   friend class RayScene;
   int stride_, num_boxes_ = 0;
   std::vector<RayCandidate> candidates_;
-  std::vector<float> boxes_;  // [6, stride]: what focus() found
+  std::vector<float> boxes_;  // [6, stride]: boxes found by focus()
   std::vector<int> ids_;
 };
 
 class RayScene {
  public:
-  // `isa`: which kernels; not more than cpu_isa() finds.
+  // `isa` selects the kernels; it must not exceed cpu_isa().
   RayScene(const mjModel* model, int num_worlds, Isa isa = cpu_isa());
   ~RayScene();
   RayScene(const RayScene&) = delete;
@@ -63,38 +64,39 @@ class RayScene {
   // Copies poses and per-world properties of world.id from world.data and world.model.
   void update(const World& world);
   const RayWorld& world(int id) const { return worlds_[id]; }
-  const SharedGeometry& shared() const { return *shared_; }  // for the kernels of cameras
+  const SharedGeometry& shared() const { return *shared_; }  // used by the cameras' kernels
 
-  // Rays of a sensor whose rotation is `rotation` (row-major R_WS); origin is the caller's to set.
+  // Transforms rays of a sensor to the world. `rotation` is its row-major R_WS; the caller sets the
+  // packet's origin.
   void place(const LocalPacket& local, const float rotation[9], float tmax, RayPacket& rays) const;
 
-  // Nearest hits of 16 rays.
+  // Finds the nearest hits of 16 rays.
   void trace(int world, const RayFilter& filter, const RayPacket& rays, HitPacket& hits,
              RayScratch& scratch) const;
-  // The same in two steps, for callers that know more about which geoms are in sight (the tiles of
-  // an image): gather() fills scratch with what the packet can meet; trace_candidates() traces
-  // these and nothing else.
+  // The same in two steps, for callers that know more about which geoms are visible (the tiles of
+  // an image). gather() fills `scratch` with the geoms that the packet can hit; trace_candidates()
+  // traces only the given candidates.
   void gather(int world, const RayFilter& filter, const RayPacket& rays, RayScratch& scratch) const;
   void trace_candidates(int world, const RayFilter& filter, const RayPacket& rays, HitPacket& hits,
                         std::span<const RayCandidate> candidates) const;
-  // For many packets of one origin: focus() narrows the world to what any of them can meet,
-  // trace_focused() then traces each.
+  // For many packets with the same origin: focus() reduces the world to the geoms that any of them
+  // can hit, then trace_focused() traces each packet.
   void focus(int world, const RayFilter& filter, std::span<const RayPacket> packets,
              RayScratch& scratch) const;
   void trace_focused(int world, const RayFilter& filter, const RayPacket& rays, HitPacket& hits,
                      RayScratch& scratch) const;
-  // What was hit, as sensors report it. A hit before `nearest` becomes none; one behind `farthest`,
-  // by rounding, is there.
+  // Converts hits to sensor outputs. Hits nearer than `nearest` are discarded; distances beyond
+  // `farthest` (by rounding) are clamped to it.
   void rows(int world, const RayPacket& rays, float nearest, float farthest, bool ids,
             HitPacket& hits, HitRows& out) const;
   void returns(int world, const LocalPacket& local, const RayPacket& rays, const HitPacket& hits,
                ReturnRows& out) const;
-  // Bit i: something lies on ray i before its tmax.
+  // Bit i is set if a geom blocks ray i before its tmax.
   [[nodiscard]] std::uint32_t occluded(int world, const RayFilter& filter, const RayPacket& rays,
                                        RayScratch& scratch) const;
 
-  // One ray, for tests and tools. `direction` need not have length 1: t is in metres along it all
-  // the same.
+  // Casts one ray, for tests and tools. `direction` need not have length 1; t is in metres in any
+  // case.
   [[nodiscard]] Hit trace(int world, const RayFilter& filter, const double origin[3],
                           const double direction[3]) const;
 

@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
-// What many geoms cost: a lidar of 5,760 rays among boxes that stand on a floor, as many to a square
-// metre whatever their number, while one more moves; bringing the scene up to date is timed too.
-// Beside it all the standing boxes as one mesh, whose tree is built once, and MuJoCo.
-// items_per_second are rays.
+// Cost of many geoms: a lidar of 5,760 rays among boxes on a floor. The number of boxes per square
+// metre is constant, and one more box moves. Updating the scene is also timed. For comparison: all
+// fixed boxes as one mesh, whose BVH is built once, and MuJoCo's rays. items_per_second is rays per
+// second.
 #include <benchmark/benchmark.h>
 #include <fmt/format.h>
 #include <mujoco/mujoco.h>
@@ -20,7 +20,7 @@
 namespace mjsense {
 namespace {
 
-constexpr double kHalf[] = {0.1, 0.1, 0.2};  // of a box, m
+constexpr double kHalf[] = {0.1, 0.1, 0.2};  // half sizes of a box, m
 
 void add_box(double x, double y, int index, std::string& vertices, std::string& faces) {
   for (int i = 0; i < 8; ++i) {
@@ -35,7 +35,7 @@ void add_box(double x, double y, int index, std::string& vertices, std::string& 
 
 std::string field(int count, bool one_mesh) {
   Rng rng(1, 0, 0, 0);
-  const double side = 0.5 * std::sqrt(count);  // half of the floor's, m
+  const double side = 0.5 * std::sqrt(count);  // half size of the floor, m
   std::string boxes, vertices, faces;
   for (int i = 0; i < count; ++i) {
     const double x = rng.uniform(-side, side), y = rng.uniform(-side, side);
@@ -76,7 +76,8 @@ struct Field {
     mj_deleteModel(model);
   }
   int num_rays() const { return static_cast<int>(directions.size() / 3); }
-  // Poses after another move of what moves; not timed, as MuJoCo needs them itself.
+  // Moves the moving box and computes the poses. Not timed, since a simulation computes them
+  // anyway.
   void move(benchmark::State& state) {
     state.PauseTiming();
     data->qpos[1] = data->qpos[1] == 0 ? 0.1 : 0;

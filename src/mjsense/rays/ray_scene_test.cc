@@ -41,7 +41,7 @@ TEST_P(RandomRays, AgreeWithMjRay) {
                                                         40, 4)
                                 : testing::random_scene(rng, {GetParam()}, 6, 1.5);
     const TestModel m(xml);
-    // Each of the CPU's instruction sets in turn.
+    // Use each of the CPU's instruction sets in turn.
     RayScene scene(m.model, 1, static_cast<Isa>(s % (static_cast<int>(cpu_isa()) + 1)));
     scene.update(m.world());
     for (long i = 0; i < total / scenes; ++i) {
@@ -49,7 +49,7 @@ TEST_P(RandomRays, AgreeWithMjRay) {
       for (double& x : o) x = rng.uniform(-5, 5);
       testing::random_direction(rng, d);
       if (rng.below(2)) testing::aim(rng, 1.5, o, d);
-      if (rng.below(4) == 0) {  // straight along an axis
+      if (rng.below(4) == 0) {  // along an axis
         const int axis = rng.below(3);
         for (int k = 0; k < 3; ++k) d[k] = k == axis ? (d[k] < 0 ? -1 : 1) : 0;
       }
@@ -100,7 +100,7 @@ RayPacket random_packet(Rng& rng, double origin, double spread) {
   return rays;
 }
 
-TEST_P(Kernels, FocusedAndPlainTracesAreTheSameBits) {
+TEST_P(Kernels, FocusedAndPlainTracesAreIdentical) {
   Rng rng(3, 0, 0, 0);
   const TestModel m(
       testing::random_scene(rng, {"plane", "sphere", "capsule", "box", "mesh", "hfield"}, 60, 4));
@@ -123,8 +123,8 @@ TEST_P(Kernels, FocusedAndPlainTracesAreTheSameBits) {
   }
 }
 
-// The same bits whichever CPU it is: every product and sum rounded by itself.
-TEST_P(Kernels, RowsSayWhatWasHit) {
+// Results must not depend on the CPU: every product and sum is rounded separately.
+TEST_P(Kernels, RowsEqualTheHits) {
   Rng rng(31, 0, 0, 0);
   const TestModel m(testing::random_scene(rng, {"sphere", "capsule", "box", "mesh"}, 40, 4));
   for (int g = 0; g < m.model->ngeom; ++g) {
@@ -202,11 +202,11 @@ TEST_P(Kernels, OccludedWhereSomethingIsHit) {
     }
   }
   EXPECT_GT(hit_lanes, 500);
-  EXPECT_LE(wrong, 2);  // a surface at tmax itself
+  EXPECT_LE(wrong, 2);  // a surface exactly at tmax
 }
 
-TEST_P(Kernels, PreciseFarFromTheWorldsOrigin) {
-  // Everything 1000 m away from the origin, seen from 10 m.
+TEST_P(Kernels, PreciseFarFromTheWorldOrigin) {
+  // Everything is 1000 m from the origin, seen from 10 m.
   Rng rng(5, 0, 0, 0);
   for (const char* type :
        {"plane", "sphere", "capsule", "ellipsoid", "cylinder", "box", "mesh", "hfield"}) {
@@ -226,7 +226,7 @@ TEST_P(Kernels, PreciseFarFromTheWorldsOrigin) {
       const Hit hit = scene.trace(0, {}, o, d);
       if (truth.t < 0 || !hit) continue;
       const double cosine = std::abs(mju_dot3(truth.normal, d));
-      if (cosine < 0.2) continue;  // grazing: a hair's breadth to the side is far along the ray
+      if (cosine < 0.2) continue;  // grazing: a small sideways error is a large error along the ray
       ++hits;
       worst = std::max(worst, std::abs(hit.t - truth.t));
     }
@@ -287,7 +287,7 @@ struct Layers {
   }
 };
 
-TEST_P(Kernels, FiltersSeeWhatTheyName) {
+TEST_P(Kernels, FiltersSelectGeoms) {
   const Layers s(isa());
   EXPECT_EQ(s.down({}).geom, s.id("ghost"));
   EXPECT_EQ(s.down({.groups = 0x1f}).geom, s.id("lid"));
@@ -308,7 +308,8 @@ TEST_P(Kernels, TiesGoToTheLowerGeom) {
   for (double x : {0.0, 0.1, 0.3, 0.7}) EXPECT_EQ(s.down(low, 9, x).geom, s.id("first"));
   std::vector<std::uint8_t> hidden(s.scene.num_objects(), 0);
   hidden[s.id("first")] = hidden[s.id("again")] = 1;
-  EXPECT_EQ(s.down({.groups = 1, .hidden = hidden}).geom, s.id("cube"));  // not the drum
+  // The other candidate, "drum", has a higher id.
+  EXPECT_EQ(s.down({.groups = 1, .hidden = hidden}).geom, s.id("cube"));
 }
 
 // Two geoms side by side; half of the rays meet the one with the higher id first:
@@ -381,8 +382,9 @@ TEST_P(Kernels, BackFacesAreCulledIfAsked) {
   EXPECT_EQ(inside("drum", B::kCull), s.id("floor"));
 }
 
-// Straight down on and beside a mesh: a ray along the faces of its box enters it nowhere.
-TEST_P(Kernels, RaysBesideAMeshDisturbNobody) {
+// Vertical rays onto and past a mesh. Those in the plane of a side of its bounding box must not
+// enter it.
+TEST_P(Kernels, RaysInThePlaneOfABoxSideMissTheMesh) {
   const Layers s(isa());
   std::vector<std::uint8_t> hidden(s.scene.num_objects(), 1);
   hidden[s.id("cube")] = 0;
@@ -405,7 +407,7 @@ TEST_P(Kernels, RaysBesideAMeshDisturbNobody) {
   }
 }
 
-TEST_P(Kernels, EndlessPlanesAreEndless) {
+TEST_P(Kernels, InfinitePlanesAreInfinite) {
   const Layers s(isa());
   for (double x : {1e3, 1e5, -1e7}) {
     const double o[3] = {x, 2 * x, 20}, d[3] = {0, 0, -1};
@@ -430,13 +432,13 @@ TEST(RayScene, PerWorldSizesAndVisibility) {
   EXPECT_EQ(scene.trace(0, {}, o, d).geom, ghost);
   EXPECT_EQ(scene.trace(1, {}, o, d).geom, lid);
   EXPECT_NEAR(scene.trace(1, {}, o, d).t, 9 - 2.4, 1e-6);
-  own->geom_size[3 * lid + 2] = 0.2;  // changed again, nothing moved
+  own->geom_size[3 * lid + 2] = 0.2;  // changed again, without motion
   scene.update(second);
   EXPECT_NEAR(scene.trace(1, {}, o, d).t, 9 - 2.2, 1e-6);
   mj_deleteModel(own);
 }
 
-TEST(RayScene, ClothIsHitItsRadiusBeforeItsTriangles) {
+TEST(RayScene, ClothIsHitAtItsRadius) {
   const TestModel m(R"(<mujoco><worldbody>
     <flexcomp name="cloth" type="grid" dim="2" count="5 5 1" spacing=".2 .2 .2" radius=".01" pos="0 0 1"><edge equality="true"/></flexcomp>
     <geom type="plane" size="0 0 1"/></worldbody></mujoco>)");
@@ -463,14 +465,13 @@ TEST(RayScene, ClothIsHitItsRadiusBeforeItsTriangles) {
   EXPECT_EQ(scene.trace(0, {}, past, down).geom, 0);
 }
 
-// A rope is a chain of capsules.
 TEST(RayScene, RopeIsHitAtItsRadius) {
   const TestModel m(R"(<mujoco><worldbody>
     <flexcomp name="rope" type="grid" dim="1" count="6 1 1" spacing=".1 .1 .1" radius=".02" pos="0 0 1"><edge equality="true"/></flexcomp>
     </worldbody></mujoco>)");
   RayScene scene(m.model, 1);
   double* x = m.data->flexvert_xpos;
-  for (double far : {0.0, 300.0}) {  // single precision does not suffer from distance
+  for (double far : {0.0, 300.0}) {  // precision must not depend on the distance from the origin
     for (int i = 0; i < 6; ++i) {
       x[3 * i] = far + 0.1 * i;
       x[3 * i + 1] = x[3 * i + 2] = 0;
@@ -493,12 +494,12 @@ TEST(RayScene, RopeIsHitAtItsRadius) {
   }
 }
 
-TEST(RayScene, SoftSolidIsItsShellAndItsRadius) {
+TEST(RayScene, SoftSolidIsHitAtItsRadius) {
   const TestModel m(R"(<mujoco><worldbody>
     <flexcomp name="jelly" type="grid" dim="3" count="5 5 5" spacing=".1 .1 .1" radius=".01" pos="0 0 1"><edge equality="true"/></flexcomp>
     </worldbody></mujoco>)");
   RayScene scene(m.model, 2);
-  for (int w : {0, 1}) {  // each world has its own
+  for (int w : {0, 1}) {  // each world has its own shape
     for (int i = 0; i < m.model->nflexvert; ++i) m.data->flexvert_xpos[3 * i + 2] += 0.5 * w;
     scene.update(m.world(w));
   }
@@ -512,8 +513,8 @@ TEST(RayScene, SoftSolidIsItsShellAndItsRadius) {
   }
 }
 
-// The one allocation that is left is a name that Embree makes for its own log, at every refit.
-TEST(RayScene, AFlexThatMovesAllocatesOnceInsideEmbree) {
+// The only allocation is a name that Embree creates for its own log at every refit.
+TEST(RayScene, MovingFlexAllocatesOnlyInsideEmbree) {
   const TestModel m(R"(<mujoco><worldbody>
     <flexcomp name="cloth" type="grid" dim="2" count="9 9 1" spacing=".2 .2 .2" radius=".01"/>
     <flexcomp name="rope" type="grid" dim="1" count="5 1 1" spacing=".2 .2 .2" radius=".01"/>

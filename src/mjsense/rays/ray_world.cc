@@ -17,7 +17,7 @@ constexpr float kEndless = 1e30f;
 
 }  // namespace
 
-// What update() saw.
+// Copies of what the last update() read.
 struct RayWorld::Last {
   Seen<int> body, material, group, type, data;
   Seen<float> rgba, material_rgba;
@@ -93,7 +93,7 @@ void RayWorld::update_geoms(const mjModel* m, const mjData* d) {
   all |= last_->type.changed(m->geom_type);
   all |= last_->data.changed(m->geom_dataid);
   all |= last_->size.changed(m->geom_size);
-  constexpr int kBlock = 16;  // geoms compared at once
+  constexpr int kBlock = 16;  // number of geoms per comparison
   for (int first = 0; first < num_geoms_; first += kBlock) {
     const int count = std::min(kBlock, num_geoms_ - first);
     bool moved = last_->pos.changed(d->geom_xpos, 3 * first, 3 * count);
@@ -134,7 +134,8 @@ void RayWorld::update_flexes(const mjModel* m, const mjData* d) {
   flexes_->update(m, d);
   for (int f = 0; f < m->nflex; ++f) {
     const int i = num_geoms_ + f;
-    const int element = m->flex_elemadr[f];  // rays know one material a flex: the first element's
+    // Rays know one material per flex: that of its first element.
+    const int element = m->flex_elemadr[f];
     describe(m, i, m->flex_elemnum[f] > 0 ? m->flex_matid[element] : -1, m->flex_group[f],
              m->flex_rgba + 4 * f);
     RayGeom& g = geoms_[i];
@@ -189,11 +190,11 @@ void RayWorld::set_local_box(RayGeom& g) const {
       shape(shapes_->bounds.height_fields[g.data]);
       break;
     default:
-      break;  // flexes have theirs already
+      break;  // the boxes of flexes are already set
   }
 }
 
-// Around the local box, wider by what float32 may lose.
+// Bounding box of the local box, enlarged by the rounding error of float32.
 void RayWorld::set_world_box(int i) {
   const RayGeom& g = geoms_[i];
   const float *c = g.center, *h = g.half;

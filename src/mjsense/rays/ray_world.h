@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
-// What rays see of one world: poses and visual properties of its geoms, copied out of MuJoCo in the
-// parallel pass over worlds, so that casting needs no mjData.
+// State of one world for ray casting: poses and visual properties of its geoms. It is copied out of
+// MuJoCo in the parallel pass over worlds, so that casting needs no mjData.
 
 #include <mujoco/mujoco.h>
 
@@ -14,7 +14,7 @@
 
 namespace mjsense {
 
-// Lights and cameras for rendering (mjData's light_xpos ... cam_xmat).
+// Poses of lights and cameras for rendering (mjData's light_xpos ... cam_xmat), world frame.
 struct RayLight {
   double pos[3], dir[3];
 };
@@ -33,26 +33,28 @@ class RayWorld {
   RayWorld(RayWorld&&) noexcept;
   ~RayWorld();
 
-  // Copies the world's present values; what did not move costs a comparison. No allocation but
-  // Embree's own for a flex that moved. Called by one thread a world.
+  // Copies the world's current values; a geom that did not move costs only a comparison. Allocates
+  // nothing, except that Embree allocates when a flex has moved. Only one thread per world may call
+  // it.
   void update(const mjModel* model, const mjData* data);
 
-  int num_geoms() const { return num_geoms_; }  // of the model, without flexes
+  int num_geoms() const { return num_geoms_; }  // geoms of the model, without flexes
   int num_objects() const { return static_cast<int>(geoms_.size()); }  // geoms, then flexes
-  std::uint64_t version() const { return version_; }  // grows with every update; 0: never updated
+  // Incremented by every update; 0: never updated.
+  std::uint64_t version() const { return version_; }
 
   const RayGeom& geom(int id) const { return geoms_[id]; }
   std::span<const RayGeom> geoms() const { return geoms_; }
-  const BoxList& boxes() const { return *boxes_; }  // in the world
-  // Bit g of group g; kTransparent if its alpha is 0; 0 for padding.
+  const BoxList& boxes() const { return *boxes_; }  // in the world frame
+  // Bit g for group g, plus kTransparent if alpha is 0. 0 for padding.
   static constexpr std::uint32_t kTransparent = 0x100;
   std::span<const std::uint32_t> flags() const { return flags_; }
   std::span<const int> bodies() const { return bodies_; }  // body id, -1 for flexes and padding
   std::span<const int> materials() const { return materials_; }  // material id or -1
-  // [num_objects, 4], resolved: the material's if it has one
+  // [num_objects, 4]: the material's colour, or the geom's own if it has no material
   std::span<const float> rgba() const { return rgba_; }
-  const FlexShapes* flexes() const { return flexes_.get(); }  // null: the model has none
-  // What cameras may bend when they need it; null: there are no skins, or no cameras.
+  const FlexShapes* flexes() const { return flexes_.get(); }  // null if the model has no flexes
+  // Cameras bend skins when they need them. Null if the model has no skins or no cameras.
   SkinShapes* skins() const { return skins_.get(); }
   std::span<const RayLight> lights() const { return lights_; }
   std::span<const RayCamera> cameras() const { return cameras_; }
@@ -60,7 +62,7 @@ class RayWorld {
  private:
   struct Last;
 
-  void update_looks(const mjModel* model);  // groups, materials, colours of geoms
+  void update_looks(const mjModel* model);  // groups, materials and colours of geoms
   void update_geoms(const mjModel* model, const mjData* data);
   void update_geom(const mjModel* model, const mjData* data, int id);
   void describe(const mjModel* model, int object, int material, int group, const float* own_rgba);

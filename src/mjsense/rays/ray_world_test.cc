@@ -16,7 +16,7 @@
 namespace mjsense {
 namespace {
 
-constexpr int kGeoms = 40;  // more than two blocks, and not a multiple of one
+constexpr int kGeoms = 40;  // more than two of update()'s blocks, and not a multiple of their size
 
 std::string field() {
   std::string xml =
@@ -50,7 +50,7 @@ void expect_same(const RayWorld& a, const RayWorld& b, const std::string& after)
   }
 }
 
-TEST(RayWorld, WhateverChangesIsSeen) {
+TEST(RayWorld, UpdateDetectsEveryChange) {
   const testing::TestModel model(field());
   mjModel* m = model.model;
   mjData* d = model.data;

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
-// What a packet has hit, as sensors report it. Part of the kernels (kernels_impl.h): in scalar code
-// it was half of a lidar's time.
+// Converts a packet's hits to sensor outputs. Part of the kernels (kernels_impl.h), because as
+// scalar code it took half of a lidar's time.
 
 #include "mjsense/rays/packet.h"
 #include "mjsense/rays/simd.h"

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
-// What was last seen of an array of MuJoCo's, so that what stays the same costs a comparison of
-// bytes.
+// Detects changes in MuJoCo's arrays by comparing bytes with a copy, so that unchanged values cost
+// only the comparison.
 
 #include <algorithm>
 #include <cstddef>
@@ -15,8 +15,8 @@ class Seen {
  public:
   explicit Seen(std::size_t size) : last_(size) {}
 
-  // Are these `count` values from `first` on other than when they were last seen (at first: zeros)?
-  // They are now.
+  // Returns whether the `count` values from `first` on differ from the copy (initially zeros), and
+  // updates the copy.
   bool changed(const T* values, std::size_t first, std::size_t count) {
     if (count == 0 || std::memcmp(&last_[first], values + first, count * sizeof(T)) == 0)
       return false;

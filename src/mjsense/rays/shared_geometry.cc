@@ -53,7 +53,7 @@ std::vector<float> highest_points(const HeightField& field) {
   std::vector<float> tops;
   for (int by = 0; by < blocks(field.rows); ++by) {
     for (int bx = 0; bx < blocks(field.cols); ++bx) {
-      // A block's cells have points on its far border too.
+      // A block includes the grid points on its far border.
       float top = 0.0f;
       for (int r = by * HeightField::kBlock;
            r <= std::min((by + 1) * HeightField::kBlock, field.rows - 1); ++r) {
@@ -72,7 +72,8 @@ std::vector<float> highest_points(const HeightField& field) {
 
 SharedGeometry::SharedGeometry(const mjModel* m) {
   device = ray_device();
-  // All meshes, shown or not: a world may give a geom another one.
+  // All meshes, including those that no geom uses, because a world may assign another mesh to a
+  // geom.
   const bool images = m->ncam > 0;
   for (int i = 0; i < m->nmesh; ++i) {
     const auto count = [](int n) { return 3 * static_cast<std::size_t>(n); };

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
-// The shapes that all worlds share: a BVH for each mesh; height fields, which rays march over; for
-// cameras the triangles of both in blocks; the triangles of flexes.
+// Shapes shared by all worlds: a BVH per mesh, height fields (which rays march over), the triangles
+// of both in clusters (for cameras), and the triangles of flexes.
 
 #include <mujoco/mujoco.h>
 
@@ -15,7 +15,7 @@
 
 namespace mjsense {
 
-// Local boxes (center, half) of the shared shapes, by mesh and height-field id.
+// Local bounding boxes (centre, half sizes) of the shared shapes, by mesh id and height field id.
 struct ShapeBounds {
   std::vector<std::array<float, 6>> meshes, height_fields;
 };
@@ -25,15 +25,16 @@ struct SharedGeometry {
 
   std::shared_ptr<RTCDeviceTy> device;
   std::vector<std::shared_ptr<const MeshGeometry>> meshes;
-  std::vector<void*> mesh_scenes;              // theirs, for the kernels; null without faces
-  std::vector<HeightField> height_fields;      // data: the model's
+  std::vector<void*> mesh_scenes;  // scenes of `meshes`, for the kernels; null without faces
+  std::vector<HeightField> height_fields;      // `data` points into the model
   std::vector<std::vector<float>> block_tops;  // of each height field
-  // Of height fields, if the model has cameras: rays march.
+  // Triangle meshes of the height fields; empty if the model has no cameras, because rays march
+  // over the height field itself.
   std::vector<std::shared_ptr<const MeshGeometry>> surfaces;
   ShapeBounds bounds;
-  std::vector<FlexSurface> flexes;  // what does not move of them
+  std::vector<FlexSurface> flexes;  // the parts of flexes that do not depend on the world
 
-  // For images; null if the model has no camera.
+  // For images; null if the model has no cameras.
   const Clusters* clusters_of_mesh(int id) const { return clusters(meshes, id); }
   const Clusters* clusters_of_height_field(int id) const { return clusters(surfaces, id); }
   const Horizons* horizons_of_mesh(int id) const { return meshes[id]->horizons.get(); }

@@ -45,7 +45,8 @@ void SkinShapes::bend(std::uint32_t groups) {
     if (skins_[i].stale && (skins_[i].group & groups)) bend(i);
 }
 
-// Vertex normals are those of the faces around, by area, before the skin is inflated along them.
+// A vertex normal is the area-weighted mean of the normals of its faces, taken before the skin is
+// inflated along it.
 void SkinShapes::bend(int id) {
   Skin& skin = skins_[id];
   carry(id);
@@ -84,7 +85,7 @@ void SkinShapes::bend(int id) {
   skin.stale = false;
 }
 
-// Each vertex follows its bones by their weights, from where they were bound.
+// Linear blend skinning: each vertex moves with its bones, by their weights, from the bind pose.
 void SkinShapes::carry(int id) {
   const mjModel* m = model_;
   Skin& skin = skins_[id];

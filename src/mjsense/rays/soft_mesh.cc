@@ -11,8 +11,8 @@ namespace mjsense {
 SceneHandle moving_scene(RTCDevice device, RTCGeometry geometry) {
   SceneHandle scene(rtcNewScene(device));
   rtcSetSceneFlags(scene.get(), static_cast<RTCSceneFlags>(kSceneFlags | RTC_SCENE_FLAG_DYNAMIC));
-  // Only at this quality does Embree refit: at any other it builds the BVH anew, which takes 20 to
-  // 40 times as long.
+  // Embree refits only at this quality. At any other it rebuilds the BVH, which takes 20 to 40
+  // times as long.
   rtcSetSceneBuildQuality(scene.get(), RTC_BUILD_QUALITY_LOW);
   rtcCommitGeometry(geometry);
   rtcAttachGeometryByID(scene.get(), geometry, 0);

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
-// Triangles whose vertices move: a BVH of their own in every world, refitted when they have moved.
+// Triangle mesh with moving vertices. Every world has its own BVH, which is refitted when the
+// vertices have moved.
 
 #include <span>
 #include <vector>
@@ -12,33 +13,33 @@ namespace mjsense {
 class SoftMesh {
  public:
   SoftMesh() = default;
-  // `faces` [F, 3]; `rest` [V, 3]: a shape that suits the BVH, which is built for it once.
+  // `faces` [F, 3]; `rest` [V, 3]: the shape for which the BVH is built, once.
   SoftMesh(RTCDevice device, std::span<const int> faces, std::span<const float> rest);
 
-  // A scene of its own for some of the faces.
+  // Adds a separate scene for a subset of the faces and returns its RTCScene.
   void* add_part(RTCDevice device, std::span<const int> faces);
 
   std::span<float> vertices() { return {vertices_.data(), vertices_.size() - 1}; }  // [V, 3]
-  // The vertices have been written. Refits are linear in the number of faces (0.02 ms for 3400) and
-  // make one small allocation inside Embree.
+  // Call after writing vertices(). The cost is linear in the number of faces (0.02 ms for 3400),
+  // and Embree makes one small allocation.
   void refit();
   void* scene() const { return scene_.get(); }  // RTCScene; null without faces
 
  private:
   SceneHandle build(RTCDevice device, std::span<const int> faces);
 
-  std::vector<float> vertices_;  // and one more: Embree loads four coordinates of the last
+  std::vector<float> vertices_;  // one extra: Embree loads four floats for the last vertex
   SceneHandle scene_;
   std::vector<SceneHandle> parts_;
 };
 
-// Embree's scene for one geometry that moves; `geometry` is taken over.
+// Creates an Embree scene for one moving geometry. Takes ownership of `geometry`.
 SceneHandle moving_scene(RTCDevice device, RTCGeometry geometry);
 
-// The geometry's vertices have moved.
+// Call after the geometry's vertices have moved.
 void refit_scene(RTCScene scene);
 
-// Centre and half sizes of the box around points [N, 3].
+// Centre and half sizes of the bounding box of points [N, 3].
 void box_around(std::span<const float> points, float box[6]);
 
 }  // namespace mjsense

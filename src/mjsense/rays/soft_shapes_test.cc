@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Flexes and skins against MuJoCo's own visualiser, for vertices and bones anywhere.
+// Compares flexes and skins with MuJoCo's visualiser, for random poses of vertices and bones.
 
 #include <gtest/gtest.h>
 
@@ -16,7 +16,7 @@ namespace {
 
 using testing::TestModel;
 
-// What MuJoCo would draw.
+// MuJoCo's abstract scene of the model.
 struct Drawn {
   mjvScene scene;
   mjvOption option;
@@ -34,7 +34,7 @@ struct Drawn {
   Drawn& operator=(const Drawn&) = delete;
 };
 
-// Box [6] around points [count, 3], relative to `origin`.
+// Compares box [6] with the bounding box of points [count, 3] relative to `origin`.
 void expect_box(const float* box, const float* points, int count, const double* origin) {
   for (int k = 0; k < 3; ++k) {
     double low = 1e30, high = -1e30;
@@ -53,7 +53,7 @@ constexpr char kFlexes[] = R"(<mujoco><worldbody>
   <flexcomp name="jelly" type="grid" dim="3" count="4 3 3" spacing=".1 .1 .1" radius=".01"/>
   <camera/></worldbody></mujoco>)";
 
-TEST(FlexShapes, FacesAndNormalsAreMuJoCos) {
+TEST(FlexShapes, FacesAndNormalsEqualMuJoCo) {
   const TestModel m(kFlexes);
   const SharedGeometry shared(m.model);
   FlexShapes shapes(shared.device.get(), shared.flexes, m.model);
@@ -82,8 +82,8 @@ TEST(FlexShapes, FacesAndNormalsAreMuJoCos) {
   }
 }
 
-// Three materials: a part for each, with what MuJoCo draws in that material.
-TEST(FlexShapes, EveryMaterialHasItsPart) {
+// Three materials: one part per material, equal to what MuJoCo draws in that material.
+TEST(FlexShapes, EveryMaterialHasAPart) {
   const TestModel m(
       R"(<mujoco><asset><material name="a" rgba="1 0 0 1"/><material name="b" rgba="0 1 0 1"/>
     <material name="c" rgba="0 0 1 1"/></asset><worldbody><camera/></worldbody>
@@ -96,7 +96,7 @@ TEST(FlexShapes, EveryMaterialHasItsPart) {
   ASSERT_EQ(drawn.scene.ngeom, 3);
   ASSERT_EQ(shapes.parts().size(), 3u);
   for (int i = 0; i < 3; ++i) {
-    const mjvGeom& g = drawn.scene.geoms[i];  // size: radius, first face, faces
+    const mjvGeom& g = drawn.scene.geoms[i];  // size: radius, first face, number of faces
     const FlexSurface::Part& part = shared.flexes[0].parts[i];
     EXPECT_EQ(part.first, g.size[1]);
     EXPECT_EQ(part.count, g.size[2]);
@@ -106,7 +106,7 @@ TEST(FlexShapes, EveryMaterialHasItsPart) {
   }
 }
 
-// A strip of 12 vertices along x that two bones share, the second bound at an angle.
+// A strip of 12 vertices along x with two bones; the second is bound at an angle.
 constexpr char kSkin[] = R"(<mujoco><worldbody>
   <body name="a" pos=".1 .2 .3" euler="10 20 30"><joint type="ball"/><geom size=".01"/>
     <body name="b" pos=".3 0 0" euler="0 0 20"><joint type="ball"/><geom size=".01"/></body></body>
@@ -118,7 +118,7 @@ constexpr char kSkin[] = R"(<mujoco><worldbody>
     <bone body="b" bindpos=".3 0 0" bindquat=".9 .1 .3 .2" vertid="4 5 6 7 8 9 10 11" vertweight=".3 .3 .7 .7 1 1 1 1"/>
   </skin></deformable></mujoco>)";
 
-TEST(SkinShapes, VerticesAndNormalsAreMuJoCos) {
+TEST(SkinShapes, VerticesAndNormalsEqualMuJoCo) {
   const TestModel m(kSkin);
   const SharedGeometry shared(m.model);
   SkinShapes shapes(shared.device.get(), m.model);
@@ -139,7 +139,7 @@ TEST(SkinShapes, VerticesAndNormalsAreMuJoCos) {
   }
 }
 
-TEST(SkinShapes, BendsOnlyWhatIsAskedForAndMoved) {
+TEST(SkinShapes, BendsOnlyRequestedGroupsThatMoved) {
   const TestModel m(kSkin);
   const SharedGeometry shared(m.model);
   SkinShapes shapes(shared.device.get(), m.model);
@@ -154,7 +154,7 @@ TEST(SkinShapes, BendsOnlyWhatIsAskedForAndMoved) {
   const AllocationCount count;
   shapes.bend(1u << 1);
   EXPECT_NE(shapes.normals(0)[0], before);
-  EXPECT_LE(count.since(), 1);  // Embree's
+  EXPECT_LE(count.since(), 1);  // inside Embree
   const AllocationCount at_rest;
   shapes.update(m.model, m.data);
   shapes.bend(~0u);

@@ -1,8 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
-// Analytic shapes in their own frame, for kernels_impl.h. intersect() gives the distance along unit
-// directions, kNoHit where there is none: a solid's entry if it lies ahead, else its exit (never
-// with `cull`). normal() is outward, at a point of the surface.
+// Ray intersection with analytic shapes in their own frame, for kernels_impl.h. intersect() returns
+// the distance along unit directions, or kNoHit: the entry into the solid if it is ahead of the
+// origin, else the exit (never with `cull`). normal() returns the outward normal at a point of the
+// surface.
 
 #include "mjsense/rays/packet.h"
 #include "mjsense/rays/simd.h"
@@ -11,7 +12,7 @@ namespace mjsense {
 namespace {
 
 struct Interval {
-  Float enter, leave;  // of the whole line; empty if enter > leave
+  Float enter, leave;  // interval on the whole line; empty if enter > leave
 };
 
 // The largest t that is a tie with t: distances differ by rounding when a ray meets the border of two
@@ -25,7 +26,8 @@ inline Float first_ahead(Interval in, Mask hit, bool cull) {
   return select(hit, select(ahead, in.enter, exit), Float(kNoHit));
 }
 
-// Where a line with |d| > 0 is between -s and s; all or nothing where it runs parallel.
+// The part of a line (|d| > 0) between -s and s. If the line is parallel to the slab, it is
+// everything or nothing.
 inline Interval slab(Float s, Float o, Float d) {
   const Float inverse = Float(1.0f) / d;
   const Float a = (-s - o) * inverse, b = (s - o) * inverse;
@@ -97,8 +99,8 @@ struct Ellipsoid {
   }
 };
 
-// The endless tube x^2 + y^2 = r^2; `misses` are lines outside it. A line along it is inside
-// everywhere.
+// The infinite tube x^2 + y^2 = r^2. `hit`: lanes whose line meets it. A line parallel to the axis
+// and inside the tube stays inside everywhere.
 struct Tube {
   Interval in;
   Mask hit;
@@ -132,8 +134,8 @@ struct Cylinder {
 };
 
 struct Capsule {
-  // The end of the tube's interval at t, moved to the ball at that end if it lies beyond the
-  // straight part. `side`: -1 entry, 1 exit.
+  // Moves the end of the tube's interval at t to the ball at that end of the capsule, if it is
+  // beyond the straight part. `side`: -1 for the entry, 1 for the exit.
   static Float end(Float t, float side, float r, float h, Vec3f p, Vec3f d, Mask& hit) {
     const Float z = fma(t, d.z, p.z);
     const Mask beyond = abs(z) > Float(h);

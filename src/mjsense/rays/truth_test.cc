@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Who judges the judge: what testing/truth.h lets pass, and what it does not.
+// Tests of testing/truth.h: which hits it accepts and which it rejects.
 
 #include "mjsense/rays/testing/truth.h"
 
@@ -35,10 +35,10 @@ const TestModel& step() {
   return model;
 }
 
-TEST(Truth, AHitIsWhereMjRayIs) {
+TEST(Truth, HitMustEqualMjRay) {
   const double o[3] = {0.3, 0.2, 4}, down[3] = {0, 0, -1};
   EXPECT_TRUE(agree(step(), o, down, at(3)));
-  EXPECT_TRUE(agree(step(), o, down, at(3.0000005)));  // a rounding or two
+  EXPECT_TRUE(agree(step(), o, down, at(3.0000005)));  // off by one or two roundings
   EXPECT_FALSE(agree(step(), o, down, at(3.00001)));
   EXPECT_FALSE(agree(step(), o, down, at(2.99999)));
   EXPECT_FALSE(agree(step(), o, down, at(4)));
@@ -48,9 +48,9 @@ TEST(Truth, AHitIsWhereMjRayIs) {
   EXPECT_FALSE(agree(step(), o, up, at(3)));
 }
 
-// At the edge of a plate mj_ray changes its mind between two values: both are right where a rounding
-// decides, and nothing between them is.
-TEST(Truth, AtAnEdgeBothSidesAreRightAndNothingBetween) {
+// At the edge of a plate mj_ray's distance jumps between two values. Both are accepted where
+// rounding decides, but no value between them.
+TEST(Truth, AtAnEdgeBothDistancesAreAccepted) {
   const TestModel shelf(
       "<mujoco><worldbody><geom type='plane' size='0 0 1'/>"
       "<geom type='box' size='1 1 .001' pos='0 0 .999'/></worldbody></mujoco>");
@@ -69,8 +69,8 @@ TEST(Truth, AtAnEdgeBothSidesAreRightAndNothingBetween) {
   }
 }
 
-// Where a ray nearly runs along the floor, a turn by a rounding is metres on it.
-TEST(Truth, WhatIsGrazedIsMetWhereATurnedRayMeetsIt) {
+// For a ray nearly parallel to the floor, a turn by one rounding moves the hit by metres.
+TEST(Truth, GrazingHitsOfTurnedRaysAreAccepted) {
   const double slope = 1e-5, d[3] = {std::sqrt(1 - slope * slope), 0, -slope};
   const double o[3] = {5, 0, 1e-3};
   const double t = o[2] / slope;  // 100 m
@@ -83,8 +83,8 @@ TEST(Truth, WhatIsGrazedIsMetWhereATurnedRayMeetsIt) {
   EXPECT_FALSE(agree(step(), o, d, kNothing));
 }
 
-// Along a wall, in its plane: in, out, or in somewhere on the way.
-TEST(Truth, InTheBordersPlaneItIsMetAnywhereOrNotAtAll) {
+// A ray in the plane of a wall may hit its near edge, miss it, or hit it anywhere between.
+TEST(Truth, RayInAWallMayHitItAnywhereOrMiss) {
   const double along[3] = {0, 1, 0};
   const double in_it[3] = {1, -3, 0.5}, beside[3] = {1 + 1e-5, -3, 0.5};
   const double within[3] = {1 - 1e-5, -3, 0.5};
@@ -101,8 +101,8 @@ TEST(Truth, InTheBordersPlaneItIsMetAnywhereOrNotAtAll) {
   EXPECT_FALSE(agree(step(), in_it, along, wall(4.1)));
 }
 
-// It is no excuse that there is a surface, if every ray is stopped before it.
-TEST(Truth, ASurfaceBehindASurfaceIsNotMet) {
+// A hit on a surface is rejected if every neighbouring ray is stopped before it.
+TEST(Truth, HitBehindASurfaceIsRejected) {
   const double o[3] = {0.3, 0.2, 4}, down[3] = {0, 0, -1};
   EXPECT_FALSE(agree(step(), o, down, at(4)));
   EXPECT_FALSE(agree(step(), o, down, at(4, {0, 0, -1})));

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// What is passed by unseen is never missed in a picture.
+// Frustum culling must not change any pixel.
 
 #include "mjsense/render/view/frustum.h"
 
@@ -20,7 +20,7 @@ using testing::kFlat;
 using testing::Picture;
 using testing::Studio;
 
-// `count` shapes about the origin, every tenth on a body that can move, on an endless plane.
+// `count` shapes around the origin, every tenth on a moving body, on an infinite plane.
 std::string crowd(int count, const std::string& lights = "") {
   Rng rng(3, 0, 0, 0);
   const char* types[] = {"box", "sphere", "capsule", "ellipsoid", "cylinder"};
@@ -42,7 +42,7 @@ struct Eye {
   std::array<double, 3> at, x, y;
 };
 
-// Level, turned by `yaw`, looking down by `pitch`.
+// Horizontal camera, rotated by `yaw` and looking down by `pitch`.
 Eye eye(std::array<double, 3> at, double yaw, double pitch) {
   const double c = std::cos(yaw), s = std::sin(yaw);
   return {at, {c, s, 0}, {-s * std::sin(pitch), c * std::sin(pitch), std::cos(pitch)}};
@@ -75,8 +75,8 @@ int in_view(Studio& s, const Eye& e, const PixelGrid& grid) {
   return count;
 }
 
-TEST(Frustum, PicturesAreThoseOfAllGeoms) {
-  for (const int count : {60, 700}) {  // one by one, and in blocks
+TEST(Frustum, CullingDoesNotChangeImages) {
+  for (const int count : {60, 700}) {  // tested one by one, and in blocks
     SCOPED_TRACE(count);
     Studio s(crowd(count));
     s.update();
@@ -91,13 +91,13 @@ TEST(Frustum, PicturesAreThoseOfAllGeoms) {
       expect_nothing_missed(s, e, slab);
       most = std::max(most, in_view(s, e, pyramid));
     }
-    EXPECT_LT(most, s.model->ngeom / 2);  // else nothing would be saved
+    EXPECT_LT(most, s.model->ngeom / 2);  // otherwise culling saves nothing
     EXPECT_GT(most, 5);
   }
 }
 
-// Lights of every kind from every side: near and far, in the image and behind the camera.
-TEST(Frustum, ShadowsAreThoseOfAllGeoms) {
+// Lights of every kind at random poses: near and far, in the image and behind the camera.
+TEST(Frustum, CullingDoesNotChangeShadows) {
   const char* kinds[] = {"type='directional'", "type='spot' cutoff='60'", "type='point'"};
   const PixelGrid pyramid = grid_from_fovy(48, 32, 50, false);
   PixelGrid slab = grid_from_fovy(48, 32, 8, true);
@@ -127,12 +127,12 @@ TEST(Frustum, ShadowsAreThoseOfAllGeoms) {
       shaded += dark.rgb != s.take(e.at, e.x, e.y, pyramid).rgb;
     }
   }
-  EXPECT_GT(passed_by, 24);  // else nothing would be saved
-  EXPECT_GT(shaded, 24);     // else nothing would be shown
+  EXPECT_GT(passed_by, 24);  // otherwise culling saves nothing
+  EXPECT_GT(shaded, 24);     // otherwise no shadow is tested
 }
 
-// A small box stands 20 m from its shadow, out of the image, on a plane or on another box.
-TEST(Frustum, ShadowsOfALowSunAreLong) {
+// A small box outside the image casts a shadow 20 m away, on a plane or on another box.
+TEST(Frustum, KeepsCastersOfLongShadows) {
   struct Case {
     const char *what, *dir;
     Eye eye;
@@ -160,8 +160,8 @@ TEST(Frustum, ShadowsOfALowSunAreLong) {
   }
 }
 
-// Nothing is remembered of the last picture: not where things were, nor how large.
-TEST(Frustum, WhatMovesIntoThePictureIsSeen) {
+// Culling depends neither on earlier poses nor on earlier sizes.
+TEST(Frustum, GeomsThatMoveIntoTheImageAreVisible) {
   for (const int count : {60, 700}) {
     Studio s(crowd(count));
     s.update();
@@ -188,7 +188,8 @@ TEST(Frustum, WhatMovesIntoThePictureIsSeen) {
       place(6, -6);  // beside the image
       EXPECT_FALSE(sees(geom));
       const double size = s.model->geom_size[3 * geom];
-      for (int k = 0; k < 3; ++k) s.model->geom_size[3 * geom + k] = 5;  // reaches into it
+      // Now it reaches into the image.
+      for (int k = 0; k < 3; ++k) s.model->geom_size[3 * geom + k] = 5;
       s.update();
       EXPECT_TRUE(sees(geom));
       for (int k = 0; k < 3; ++k) s.model->geom_size[3 * geom + k] = size;

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// No highlight is lost where a surface is said to be dull.
+// The threshold below which highlights are skipped must not remove a visible highlight.
 
 #include <gtest/gtest.h>
 
@@ -12,7 +12,7 @@
 namespace mjsense {
 namespace {
 
-TEST(Highlight, IsNothingWhereASurfaceIsDull) {
+TEST(Highlight, IsZeroBelowTheThreshold) {
   for (float exponent : {0.0f, 1.0f, 3.9f, 4.0f, 13.0f, 27.5f, 64.0f, 128.0f, 1000.0f, 1e5f}) {
     const float dull = dull_below(exponent);
     const auto of = [&](float x) { return first_lane(power(splat(x), splat(exponent))); };

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Rays that are said to leave a mesh for good meet none of its triangles.
+// Rays above a mesh's horizon must not hit any of its triangles.
 
 #include "mjsense/render/kernels/horizon.h"
 
@@ -27,7 +27,7 @@ struct Mesh {
   int size() const { return static_cast<int>(faces.size() / 3); }
 };
 
-// Horizons::kNever: no ray is known to be clear.
+// Sine of the horizon of a face; Horizons::kNever if no ray is known to be clear.
 float sine(const Mesh& mesh, int face, int octant) {
   const auto geometry = mesh_geometry(mesh.vertices, mesh.faces, true);
   const float* h = geometry->box.data() + 3;
@@ -35,35 +35,35 @@ float sine(const Mesh& mesh, int face, int octant) {
                       std::hypot(h[0], h[1], h[2]));
 }
 
-constexpr int kPlusX = 0, kMinusX = 1;  // octants: y and z positive
+constexpr int kPlusX = 0, kMinusX = 1;  // octants; y and z are positive
 
-// A floor triangle, and a wall 2 m away that rises 1 m: seen from where the floor is nearest, a slope
-// of one half.
+// A floor triangle, and a wall that is 2 m away and 1 m high: seen from the nearest point of the
+// floor, its slope is 1/2.
 TEST(Horizon, OfAWallIsItsHeightOverItsDistance) {
   Mesh mesh;
   mesh.add({0, 0, 0, 1, 0, 0, 0, 1, 0});
-  EXPECT_NEAR(sine(mesh, 0, kPlusX), 2e-3, 1e-6);  // nothing rises
+  EXPECT_NEAR(sine(mesh, 0, kPlusX), 2e-3, 1e-6);  // no geometry rises above the face
   mesh.add({3, -5, 0, 3, 5, 0, 3, 5, 1});
   mesh.add({3, -5, 0, 3, 5, 1, 3, -5, 1});
   const double half = 0.5 / std::hypot(1, 0.5) + 2e-3;
   EXPECT_NEAR(sine(mesh, 0, kPlusX), half, 1e-5);
   mesh.add({3, -5, -9, 3, 5, -9, 3, 5, -7});  // below the floor
   EXPECT_NEAR(sine(mesh, 0, kPlusX), half, 1e-5);
-  EXPECT_NEAR(sine(mesh, 0, kMinusX), 2e-3, 1e-6);  // the wall is behind
+  EXPECT_NEAR(sine(mesh, 0, kMinusX), 2e-3, 1e-6);  // the wall is behind the face
   mesh.add({-0.01f, -9, 0, -0.01f, 9, 0, -0.01f, 9, 1});
   mesh.add({-0.01f, -9, 0, -0.01f, 9, 1, -0.01f, -9, 1});
-  // What ends just behind the face is not behind: rays begin a little beside it.
+  // Geometry just behind the face still counts, because rays start slightly beside the face.
   EXPECT_EQ(sine(mesh, 0, kPlusX), Horizons::kNever);
   for (std::size_t i = mesh.vertices.size() - 18; i < mesh.vertices.size(); i += 3)
     mesh.vertices[i] = -0.1f;
   EXPECT_NEAR(sine(mesh, 0, kPlusX), half, 1e-5);
   EXPECT_EQ(sine(mesh, 0, kMinusX), Horizons::kNever);
-  mesh.add({0.3f, 0.2f, 1, 0.5f, 0.2f, 1, 0.3f, 0.4f, 1});  // above it
+  mesh.add({0.3f, 0.2f, 1, 0.5f, 0.2f, 1, 0.3f, 0.4f, 1});  // above the face
   EXPECT_EQ(sine(mesh, 0, kPlusX), Horizons::kNever);
 }
 
-// Two faces that share an edge, and a third that touches their common corner only.
-TEST(Horizon, OfANeighbourIsTheAngleBetweenThem) {
+// Two faces that share an edge, and a third that touches only their common corner.
+TEST(Horizon, OfANeighbourIsTheAngleBetweenTheFaces) {
   for (double angle : {-0.7, 0.0, 0.2, 0.6}) {
     const float c = static_cast<float>(std::cos(angle)), s = static_cast<float>(std::sin(angle));
     Mesh mesh;
@@ -77,8 +77,8 @@ TEST(Horizon, OfANeighbourIsTheAngleBetweenThem) {
   }
 }
 
-// A face is looked at once for each octant, when enough rays began on it.
-TEST(Horizon, IsFoundOnceAndNotForTheFirstRays) {
+// A horizon is computed once per face and octant, after enough rays have started on the face.
+TEST(Horizon, IsComputedOnceAndNotForTheFirstRays) {
   Mesh mesh;
   mesh.add({0, 0, 0, 1, 0, 0, 0, 1, 0});
   mesh.add({0, 0, 2, 0, 1, 2, 0, 0, 3});
@@ -131,8 +131,8 @@ bool meets(const float* const corners[3], const double o[3], const double d[3]) 
   return u >= 0 && v >= 0 && u + v <= 1 && dot(b, q) / det > 0;
 }
 
-// Rough balls with dents, and loose triangles around them: rays begin a little above a point of a face
-// and are as low as they may be.
+// Rough balls with dents, and loose triangles around them. The rays start slightly above a point of
+// a face, at the elevation of its horizon.
 TEST(Horizon, RaysAboveItAreClear) {
   int clear = 0, low = 0;
   for (int scene = 0; scene < 6; ++scene) {
@@ -189,7 +189,8 @@ TEST(Horizon, RaysAboveItAreClear) {
           }
           return false;
         };
-        for (int octant = 0; octant < Horizons::kOctants; ++octant) {  // as low as it lets rays be
+        // Rays at the lowest elevation that counts as clear.
+        for (int octant = 0; octant < Horizons::kOctants; ++octant) {
           if (sines[octant] > 1) continue;
           double up[3];
           direction(sines[octant], up);
@@ -203,7 +204,7 @@ TEST(Horizon, RaysAboveItAreClear) {
     }
   }
   EXPECT_GT(clear, 9000);
-  EXPECT_GT(low, 100);  // and it is not much too high
+  EXPECT_GT(low, 100);  // the horizon is not far too high
 }
 
 }  // namespace

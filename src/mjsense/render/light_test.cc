@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Brightness by formula: Lambert's cosine, lights that are turned away, glowing surfaces, shadows
-// whose edges geometry gives.
+// Brightness by formula: Lambert's cosine, surfaces that face away from the light, emission, and
+// shadows with known edges.
 
 #include <gtest/gtest.h>
 
@@ -20,8 +20,8 @@ int byte(double value) { return static_cast<int>(255 * std::clamp(value, 0.0, 1.
 
 //      \ light, 50 degrees from the vertical
 //       \   _
-//         /   \      seen from straight above: at (x, y) the unit sphere's normal is
-//        |     |     (x, y, sqrt(1 - x^2 - y^2)), its brightness the cosine to the light
+//         /   \      Seen from straight above: at (x, y) the unit sphere's normal is
+//        |     |     (x, y, sqrt(1 - x^2 - y^2)); the brightness is the cosine to the light.
 //         \ _ /
 TEST(Light, AMatteSphereHasLambertsCosine) {
   Studio s(std::string(kDark) +
@@ -37,15 +37,15 @@ TEST(Light, AMatteSphereHasLambertsCosine) {
                              {0.8, 0.0},
                              {0.95, 0.0}}) {
     const double z = std::sqrt(1 - x * x - y * y);
-    const double cosine = -0.766044443 * x + 0.642787610 * z;  // negative where it is turned away
+    // Negative where the surface faces away from the light.
+    const double cosine = -0.766044443 * x + 0.642787610 * z;
     expect_pixel(s.center({x, y, 3}, {1, 0, 0}, {0, 1, 0}, 0.01),
                  {byte(cosine), byte(0.5 * cosine), byte(0.2 * cosine)});
   }
 }
 
-// A highlight needs light: where the surface is turned away there is none, however the viewer
-// stands.
-TEST(Light, ASurfaceTurnedAwayDoesNotShine) {
+// A surface that faces away from the light has no highlight, wherever the viewer is.
+TEST(Light, SurfaceFacingAwayHasNoHighlight) {
   const auto seen = [](double degrees) {
     const double a = degrees * M_PI / 180;
     Studio s(
@@ -58,11 +58,11 @@ TEST(Light, ASurfaceTurnedAwayDoesNotShine) {
     return s.from_above(0, 0, 4)[0];
   };
   EXPECT_NEAR(seen(60), byte(std::cos(30 * M_PI / 180)),
-              2);           // halfway is 30 degrees off: exponent 1
-  EXPECT_EQ(seen(100), 0);  // here it would be cos(50 degrees)
+              2);           // the half vector is 30 degrees off the normal; exponent 1
+  EXPECT_EQ(seen(100), 0);  // without that rule it would be cos(50 degrees)
 }
 
-TEST(Light, AGlowingSurfaceNeedsNoLight) {
+TEST(Light, EmissionNeedsNoLight) {
   Studio s(
       std::string(kDark) +
       R"(<asset><material name="m" rgba="1 .5 .2 1" emission=".6" specular="0"/></asset><worldbody>
@@ -71,14 +71,14 @@ TEST(Light, AGlowingSurfaceNeedsNoLight) {
   expect_pixel(s.from_above(0, 0), {byte(.6), byte(.3), byte(.12)});
 }
 
-// MuJoCo's rule: where there is no light at all, 0.3 from everywhere.
-TEST(Light, WithoutAnyLightThereIsAnAmbientOne) {
+// MuJoCo's rule: a scene without any light gets an ambient light of 0.3.
+TEST(Light, SceneWithoutLightsGetsAmbientLight) {
   Studio s(std::string(kDark) +
            R"(<worldbody><geom type="plane" size="5 5 1" rgba="1 .5 .2 1"/></worldbody>)");
   expect_pixel(s.from_above(0, 0), {byte(.3), byte(.15), byte(.06)});
 }
 
-// Lights that cast shadows are added up apart and cannot dim each other; the sum ends at white.
+// Contributions of several lights add up; the sum is clamped to white.
 TEST(Light, TwoLightsAddUp) {
   Studio s(std::string(kDark) +
            R"(<asset><material name="m" specular="0" rgba="1 .5 .2 1"/></asset><worldbody>
@@ -89,10 +89,10 @@ TEST(Light, TwoLightsAddUp) {
 }
 
 //   light at z = 2 m
-//        |         a box above the light casts no shadow,
-//        |         one between it and the floor does
+//        |         A box above the light casts no shadow,
+//        |         a box between it and the floor does.
 //   -----------
-TEST(Shadow, IsOfWhatStandsBetween) {
+TEST(Shadow, IsCastByGeomsBetweenLightAndPoint) {
   for (const char* kind : {"spot", "directional"}) {
     Studio s(std::string(kDark) + kMatte + R"(<worldbody><light pos="0 0 2" dir="0 0 -1" type=")" +
              kind + R"(" cutoff="85"
@@ -101,21 +101,21 @@ TEST(Shadow, IsOfWhatStandsBetween) {
       <geom type="box" size=".2 .2 .1" pos="1 0 .5" material="matte"/></worldbody>)");
     s.options.shadows = true;
     EXPECT_GT(s.from_above(0, 0, 1)[0], 200) << kind << ": the box above the light";
-    // In an image of 2 m of floor too: there the box is near what lies between the light and the
-    // tile.
+    // The same in an image that covers 2 m of floor, where the box is close to the region between
+    // the light and the tile.
     const auto wide = s.shoot({0, 0, 1}, {1, 0, 0}, {0, 1, 0}, 16, 90);
     EXPECT_GT(wide[3 * (8 * 16 + 8)], 200) << kind;
-    // The spot at height 2 throws the box's shadow to 1 + (0.4 .. 0.6) / (2 - z) outwards.
+    // The spot at height 2 projects the box's shadow to 1 + (0.4 .. 0.6) / (2 - z).
     const double x = std::string(kind) == "spot" ? 1.35 : 1.0;
     const Pixel below = s.center({x, 0, 0.3}, {1, 0, 0}, {0, 1, 0}, 1);
     EXPECT_EQ(below[0], 0) << kind << ": the box below the light";
   }
 }
 
-//   \    \      directional light at 45 degrees: a box of x in [-.1, .1], z in [.4, .6]
-//    \ [] \     shades the floor from x = -.1 + .4 to .1 + .6
+//   \    \      Directional light at 45 degrees: a box with x in [-.1, .1] and z in [.4, .6]
+//    \ [] \     shadows the floor from x = -.1 + .4 to .1 + .6.
 //   ---====---
-TEST(Shadow, OfASlantedSunLiesWhereItShould) {
+TEST(Shadow, OfSlantedDirectionalLight) {
   for (const char* shape : {"type='box' size='.1 .3 .1'", "type='mesh' mesh='block'"}) {
     Studio s(std::string(kDark) + kMatte +
              R"(<asset><mesh name="block" vertex="-.1 -.3 -.1 .1 -.3 -.1 -.1 .3 -.1 .1 .3 -.1
@@ -137,9 +137,9 @@ TEST(Shadow, OfASlantedSunLiesWhereItShould) {
   }
 }
 
-//      |  \    directional light at 45 degrees: the upright part of one mesh, 0.5 m high, shades its
-//  ====|====   level part from x = .2 - .5 on
-TEST(Shadow, OfAMeshLiesOnItselfToo) {
+//      |  \    Directional light at 45 degrees: the upright part of a mesh, 0.5 m high, shadows the
+//  ====|====   level part of the same mesh from x = .2 - .5 on.
+TEST(Shadow, OfAMeshOnItself) {
   std::string vertices, faces;
   const auto add_box = [&](const std::array<double, 6>& limits, int first) {
     for (int corner = 0; corner < 8; ++corner)
@@ -162,7 +162,8 @@ TEST(Shadow, OfAMeshLiesOnItselfToo) {
   };
   add_box({-1, 1, -1, 1, -0.1, 0}, 0);
   add_box({0.2, 0.3, -1, 1, 0, 0.5}, 8);
-  // Where its frame has its origin, MuJoCo decides: the geom stands where the vertices say.
+  // MuJoCo chooses the origin of the mesh's frame; the geom is placed so that the vertices keep
+  // their positions.
   Studio s(std::string(kDark) + kMatte + "<asset><mesh name='step' inertia='shell' vertex='" +
            vertices + "' face='" + faces + R"('/></asset><worldbody>
     <light type="directional" pos="3 0 3" dir="-1 0 -1" diffuse="1 1 1" specular="0 0 0"/>
@@ -175,8 +176,8 @@ TEST(Shadow, OfAMeshLiesOnItselfToo) {
   EXPECT_TRUE(lit(0.25));
 }
 
-// A shadow takes its own light only.
-TEST(Shadow, LeavesTheOtherLights) {
+// A shadow removes only the light that casts it.
+TEST(Shadow, DoesNotAffectOtherLights) {
   Studio s(std::string(kDark) + kMatte + R"(<worldbody>
     <light type="directional" pos="0 0 3" dir="0 0 -1" diffuse=".5 .5 .5" specular="0 0 0"/>
     <light type="directional" pos="3 0 3" dir="-1 0 -1" diffuse=".5 .5 .5" specular="0 0 0"/>
@@ -185,9 +186,9 @@ TEST(Shadow, LeavesTheOtherLights) {
   s.options.shadows = true;
   const double slanted = 0.5 * std::sqrt(0.5);
   const auto floor = [&](double x) { return s.center({x, 0, 0.3}, {1, 0, 0}, {0, 1, 0}, 1)[0]; };
-  EXPECT_NEAR(floor(0), byte(slanted), 1);        // below the box: the second
-  EXPECT_NEAR(floor(-1), byte(0.5), 1);           // where the second's shadow lies: the first
-  EXPECT_NEAR(floor(1), byte(0.5 + slanted), 1);  // both
+  EXPECT_NEAR(floor(0), byte(slanted), 1);  // below the box: only the second light
+  EXPECT_NEAR(floor(-1), byte(0.5), 1);     // in the second light's shadow: only the first light
+  EXPECT_NEAR(floor(1), byte(0.5 + slanted), 1);  // both lights
 }
 
 }  // namespace

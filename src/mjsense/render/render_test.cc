@@ -40,28 +40,28 @@ TEST(Shading, SpotHasAConeAnExponentAndAttenuation) {
            castshadow="false"/>
     <geom type="plane" size="5 5 1" material="matte"/></worldbody>)");
   expect_pixel(s.from_above(0, 0, 5), {128, 64, 26});  // attenuation 1 / (.5 * 2 + .25 * 4)
-  const double d = std::sqrt(5.0), cosine = 2 / d;     // one metre aside
+  const double d = std::sqrt(5.0), cosine = 2 / d;     // one metre to the side
   const double value = cosine * cosine * cosine / (0.5 * d + 0.25 * d * d);
   expect_pixel(s.from_above(1, 0, 5),
                {int(255 * value + .5), int(127.5 * value + .5), int(51 * value + .5)});
-  expect_pixel(s.from_above(1.3, 0, 5), {0, 0, 0});  // 33 degrees: outside
+  expect_pixel(s.from_above(1.3, 0, 5), {0, 0, 0});  // 33 degrees: outside the cone
 }
 
-TEST(Shading, SpecularHighlightIsWhereHalfwayMeetsTheNormal) {
+TEST(Shading, SpecularHighlightFollowsTheHalfVector) {
   Studio s(
       std::string(kDark) +
       R"(<asset><material name="m" rgba="0 0 0 1" specular=".5" shininess=".25"/></asset><worldbody>
     <light pos="1 0 2" dir="0 0 -1" type="directional" diffuse="1 1 1" specular="1 1 1" castshadow="false"/>
     <geom type="plane" size="5 5 1" material="m"/></worldbody>)");
   expect_pixel(s.from_above(0, 0), {128, 128, 128});
-  // Seen from 60 degrees, halfway is 30 degrees off the normal: cos^32.
+  // Seen from 60 degrees, the half vector is 30 degrees off the normal: cos^32.
   const double v = 0.5 * std::pow(std::cos(M_PI / 6), 32) * 255;
   const double c = 0.5, sn = std::sqrt(0.75);
   expect_pixel(s.center({0, -2 * sn, 2 * c}, {1, 0, 0}, {0, c, sn}, 1),
                {int(v + .5), int(v + .5), int(v + .5)});
 }
 
-TEST(Shading, ShadowsHaveSharpKnownEdges) {
+TEST(Shading, ShadowsHaveSharpEdges) {
   // A box of half size 0.2 at height 1, light at height 3: its shadow reaches to 0.2 * 3 / 1.8 =
   // 1/3.
   Studio s(std::string(kDark) + kMatte + R"(<worldbody>
@@ -72,7 +72,7 @@ TEST(Shading, ShadowsHaveSharpKnownEdges) {
   s.options.shadows = true;
   EXPECT_EQ(s.center({0.32, 0, 0.5}, x, y, 1)[0], 0);
   EXPECT_GT(s.center({0.35, 0, 0.5}, x, y, 1)[0], 200);
-  EXPECT_GT(s.center({0, 0, 2}, x, y, 1)[0], 200);  // the box itself
+  EXPECT_GT(s.center({0, 0, 2}, x, y, 1)[0], 200);  // on the box itself
   s.options.shadows = false;
   EXPECT_GT(s.center({0.32, 0, 0.5}, x, y, 1)[0], 200);
 }
@@ -84,8 +84,7 @@ TEST(Texture, PlaneStartsAtTheCornerAndRepeats) {
     <geom type="plane" size="1 1 1" material="m"/></worldbody>)");
   const std::array<Pixel, 4> texels{{{255, 0, 0}, {0, 255, 0}, {0, 0, 255}, {255, 255, 255}}};
   s.paint(0, [&](int i) { return texels[i]; });
-  // Across: two repeats of two texels, centres at x = -.75 -.25 .25 .75. Row 0 of the image is at
-  // +y.
+  // In x: two repeats of two texels, centred at x = -.75 -.25 .25 .75. Row 0 of the image is at +y.
   expect_pixel(s.from_above(-0.75, 0.5), texels[0]);
   expect_pixel(s.from_above(-0.25, 0.5), texels[1]);
   expect_pixel(s.from_above(0.25, 0.5), texels[0]);
@@ -108,14 +107,14 @@ TEST(Texture, CubeFacesAndSkyFollowOpenGL) {
   expect_pixel(s.center({0, -2, 0}, {1, 0, 0}, {0, 0, 1}), faces[3]);
   expect_pixel(s.center({0, 0, 2}, {1, 0, 0}, {0, 1, 0}), faces[4]);
   expect_pixel(s.center({0, 0, -2}, {1, 0, 0}, {0, -1, 0}), faces[5]);
-  // The sky is turned a quarter around x: its +y face is overhead.
+  // The skybox is rotated by 90 degrees about x: its +y face is overhead.
   expect_pixel(s.center({9, 0, 9}, {1, 0, 0}, {0, -1, 0}), faces[2]);
   expect_pixel(s.center({9, 0, 9}, {0, -1, 0}, {0, 0, 1}), faces[0]);
 }
 
-// The sky is a cylinder of radius 0.7 * 50 * 1 m; the camera is 7 m over the floor, so that a ray
-// that falls by 0.2 s a metre meets the floor at 1 / s of that radius.
-TEST(Shading, HazeLiesWhereTheFloorMeetsTheSky) {
+// The sky is a cylinder of radius 0.7 * 50 * 1 m and the camera is 7 m above the floor, so a ray
+// that falls by 0.2 s per metre meets the floor at 1 / s of that radius.
+TEST(Shading, HazeIsWhereTheFloorMeetsTheSky) {
   Studio s(
       std::string(R"(<statistic extent="1"/><visual><map haze=".3"/><rgba haze="0 0 1 1"/>
     <headlight ambient="1 1 1" diffuse="0 0 0" specular="0 0 0"/></visual>)") +
@@ -135,8 +134,8 @@ TEST(Shading, HazeLiesWhereTheFloorMeetsTheSky) {
   const double outside = 255 * (0.5 / 1.15) / (1 - 0.3 / 1.3);
   expect_pixel(falling(0.5, 0, -1), {0, int(255.5 - outside), int(outside + .5)});
   expect_pixel(falling(-0.1, 0, -1), {0, 255, 0});
-  expect_pixel(falling(1, 0, 1), {255, 255, 255});   // a ball before the haze
-  expect_pixel(falling(1, -1, 0), {255, 255, 255});  // another shortly before where it begins
+  expect_pixel(falling(1, 0, 1), {255, 255, 255});   // a ball in front of the haze
+  expect_pixel(falling(1, -1, 0), {255, 255, 255});  // another one, just nearer than the haze
   expect_pixel(falling(-0.1, 1, 0), {0, 255, 0});    // a box behind the sky
 }
 
@@ -146,14 +145,14 @@ TEST(Shading, TransparentGeomsAreDrawnTwice) {
   expect_pixel(s.from_above(0, 0), {64, 64, 64});  // 1 * (1 - .5)^2
 }
 
-TEST(Shading, FloorMirrorsWithItsReflectance) {
+TEST(Shading, FloorReflectsByItsReflectance) {
   Studio s(std::string(kFlat) +
            R"(<asset><material name="mirror" rgba="0 0 .2 1" reflectance=".5"/></asset><worldbody>
     <geom type="plane" size="5 5 1" material="mirror"/><geom type="box" size=".5 .1 .5" pos="0 1 1" rgba="1 0 0 1"/>
     </worldbody>)");
   s.options.reflections = true;
-  // From (0, -1, 1) down at 45 degrees: the floor at the origin, in it the box's front at height
-  // 0.9.
+  // The ray from (0, -1, 1) goes down at 45 degrees. It meets the floor at the origin, where the
+  // box's front is reflected at height 0.9.
   const double h = std::sqrt(0.5);
   expect_pixel(s.center({0, -1, 1}, {1, 0, 0}, {0, h, h}, 1), {128, 0, 51});
   expect_pixel(s.center({3, -1, 1}, {1, 0, 0}, {0, h, h}, 1), {0, 0, 51});
@@ -161,7 +160,7 @@ TEST(Shading, FloorMirrorsWithItsReflectance) {
   expect_pixel(s.center({0, -1, 1}, {1, 0, 0}, {0, h, h}, 1), {0, 0, 51});
 }
 
-TEST(Kernels, EveryInstructionSetPaintsTheSamePicture) {
+TEST(Kernels, EveryInstructionSetRendersTheSameImage) {
   Studio s(
       R"(<asset><texture name="t" type="2d" builtin="checker" rgb1="1 0 0" rgb2="0 0 1" width="64" height="64"/>
     <texture name="q" type="cube" builtin="gradient" rgb1="1 1 0" rgb2="0 1 1" width="16" height="16"/>
@@ -188,7 +187,7 @@ TEST(Kernels, EveryInstructionSetPaintsTheSamePicture) {
     int different = 0;
     for (std::size_t i = 0; i < image.size(); ++i)
       different += std::abs(image[i] - portable[i]) > 1;
-    EXPECT_LT(different, 30);  // of 6075 values: edges that rounding moves
+    EXPECT_LT(different, 30);  // of 6075 values: edges that move by rounding
   }
 }
 
@@ -205,7 +204,7 @@ TEST(Shading, SamplesSoftenEdges) {
   EXPECT_GT(partly(s.shoot({0, 0, 3}, {1, 0, 0}, {0, 1, 0}, 40, 45, 4)), 100);
 }
 
-TEST(CameraModel, GridsAreThosePublished) {
+TEST(CameraModel, GridsFollowTheirFormulas) {
   const PixelGrid g = grid_from_fovy(8, 6, 90, false);
   EXPECT_FLOAT_EQ(g.left, -8.0f / 6);
   EXPECT_FLOAT_EQ(g.top, 1);
@@ -237,7 +236,8 @@ TEST(CameraModel, DistortionIsUndone) {
       EXPECT_NEAR(60 * u + 32, x + 0.5, 1e-4);
       EXPECT_NEAR(60 * v + 24, y + 0.5, 1e-4);
     }
-  // An equidistant fisheye of 139 degrees across: the border pixel sees 69.5 degrees aside.
+  // An equidistant fisheye with a field of view of 139 degrees: the border pixel looks 69.5 degrees
+  // off the axis.
   const double none[4] = {};
   const double f = 32 / (69.5 * M_PI / 180);
   const auto wide =
@@ -249,9 +249,9 @@ TEST(CameraModel, DistortionIsUndone) {
       ValueError);
 }
 
-// What is wider or narrower than the sensor is a part of it, with square pixels if the sensor has
-// them.
-TEST(Grid, APictureIsCutOutOfTheSensor) {
+// An image whose aspect ratio differs from the sensor's shows a part of the sensor, with square
+// pixels if the sensor has square pixels.
+TEST(Grid, ImageIsACropOfTheSensor) {
   const float focal[4] = {0.004f, 0.004f, 0, 0}, size[2] = {0.004f, 0.003f};
   const PixelGrid wide = grid_from_sensor(8, 4, focal, size);
   EXPECT_NEAR(8 * wide.dx, 1.0, 1e-6);

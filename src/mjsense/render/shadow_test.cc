@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Shadows against MuJoCo's own rays, in scenes that are drawn by lot: whatever is spared by knowing what
-// cannot stand in the way must not show.
+// Compares shadows with MuJoCo's rays in random scenes: skipping casters that cannot occlude a
+// point must not change the image.
 #include <gtest/gtest.h>
 
 #include <cmath>
@@ -30,8 +30,8 @@ struct Lot {
   }
 };
 
-// Things about the origin over a floor, a wall that faces where `yaw` looks from, and a light in or
-// above them.
+// Objects around the origin above a floor, a wall that faces the camera, which looks along `yaw`,
+// and a light among or above them.
 std::string scene(Lot& lot, const std::string& light, double yaw) {
   std::string xml = std::string(kDark) + kMatte;
   xml += R"(<asset><mesh name="ball" builtin="sphere" params="3"/>
@@ -58,8 +58,8 @@ std::string scene(Lot& lot, const std::string& light, double yaw) {
   return xml + "</worldbody>";
 }
 
-// Whether the light reaches p, a little above a surface with normal n; -1: MuJoCo's rays from around p
-// do not agree, or the light grazes.
+// Whether the light reaches p, slightly above a surface with normal n. -1 if undecided: MuJoCo's
+// rays from around p disagree, or the light grazes the surface.
 int reached(const Studio& s, const double* p, const double* n) {
   const mjModel* m = s.model.get();
   const double *pos = s.data->light_xpos, *dir = s.data->light_xdir;
@@ -84,7 +84,7 @@ int reached(const Studio& s, const double* p, const double* n) {
     const double angle = std::acos(axis) * 180 / mjPI - m->light_cutoff[0];
     if (angle > -0.1) return angle > 0.1 ? 0 : -1;
   }
-  // MuJoCo's rays pass planes from behind, light does not.
+  // MuJoCo's rays pass through planes from behind, light does not.
   const int wall = mj_name2id(m, mjOBJ_GEOM, "wall");
   double before = 0;
   for (int i = 0; i < 3; ++i)
@@ -101,7 +101,7 @@ int reached(const Studio& s, const double* p, const double* n) {
   return lit == rays ? 1 : lit == 0 ? 0 : -1;
 }
 
-TEST(Shadow, IsWhereMuJoCosRaysMeetSomething) {
+TEST(Shadow, AgreesWithMuJoCosRays) {
   constexpr int kSize = 40;
   int compared[2] = {};
   std::vector<RenderTiles> kernels{render_tiles_portable};

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
-// What a pixel shows: texels by the place on a shape, triangles drawn as shapes of the same
-// outline, what is transparent, mirrored or out of the image.
+// The appearance of surfaces: texels by position on a shape, triangle meshes compared with
+// primitives of the same outline, transparency, reflections, and geoms that are partly outside the
+// image.
 
 #include <gtest/gtest.h>
 
@@ -22,7 +23,7 @@ using testing::Studio;
 
 constexpr Pixel kRed{255, 0, 0}, kGreen{0, 255, 0}, kBlue{0, 0, 255}, kWhite{255, 255, 255};
 
-// A texture of four fields: red green above, blue white below.
+// A texture with four quadrants: red and green above, blue and white below.
 std::string painted(const char* geoms, const char* material = "") {
   return std::string(kFlat) +
          R"(<asset><texture name="t" type="2d" builtin="flat" width="32" height="32"/>
@@ -36,8 +37,8 @@ void paint(Studio& s, const Pixel* fields = kFields, int size = 32) {
   s.paint(0, [&](int i) { return fields[2 * (i / size >= size / 2) + (i % size >= size / 2)]; });
 }
 
-// Seen from the side the first row of a texture is up, on every shape that goes around.
-TEST(Texture, StandsUprightOnEveryShape) {
+// Seen from the side, the first row of a texture is at the top of every closed shape.
+TEST(Texture, IsUprightOnEveryShape) {
   for (const char* shape :
        {"type='box' size='.5 .5 .5'", "type='sphere' size='.5'", "type='ellipsoid' size='.4 .5 .6'",
         "type='cylinder' size='.4 .5'", "type='capsule' size='.3 .5'"}) {
@@ -55,7 +56,7 @@ TEST(Texture, StandsUprightOnEveryShape) {
   }
 }
 
-// Around a sphere the texture begins on the +x axis and goes to +y: its left half is at y > 0.
+// On a sphere the texture starts at the +x axis and runs towards +y: its left half is at y > 0.
 TEST(Texture, GoesAroundASphereFromXToY) {
   Studio s(painted("<geom size='.5' material='m'/>"));
   paint(s);
@@ -68,9 +69,9 @@ TEST(Texture, GoesAroundASphereFromXToY) {
   }
 }
 
-// The caps of a capsule end where the texture ends: its first row at the upper pole, its last at
+// The texture covers a capsule from pole to pole: its first row is at the upper pole, its last at
 // the lower.
-TEST(Texture, EndsAtThePolesOfACapsule) {
+TEST(Texture, CoversACapsuleFromPoleToPole) {
   Studio s(painted("<geom type='capsule' size='.5 .3' material='m'/>"));
   constexpr Pixel kRows[] = {kRed, kRed, kBlue, kBlue};
   paint(s, kRows);
@@ -78,8 +79,8 @@ TEST(Texture, EndsAtThePolesOfACapsule) {
   expect_pixel(s.center({0.05, 0.05, -2}, {1, 0, 0}, {0, -1, 0}, 0.1), kBlue);
 }
 
-// The end of a cylinder shows the whole texture as seen along its axis.
-TEST(Texture, LiesFlatOnTheEndsOfACylinder) {
+// Each end of a cylinder shows the whole texture, projected along the axis.
+TEST(Texture, IsProjectedOntoTheEndsOfACylinder) {
   Studio s(painted("<geom type='cylinder' size='.5 .3' material='m'/>"));
   paint(s);
   expect_pixel(s.from_above(-0.25, -0.25), kRed);
@@ -88,7 +89,7 @@ TEST(Texture, LiesFlatOnTheEndsOfACylinder) {
   expect_pixel(s.from_above(0.25, 0.25), kWhite);
 }
 
-TEST(Texture, LiesOnTopOfABoxWithItsFirstRowAtY) {
+TEST(Texture, FirstRowIsAtPlusYOnTopOfABox) {
   Studio s(painted("<geom type='box' size='.5 .4 .3' material='m'/>"));
   paint(s);
   expect_pixel(s.from_above(-0.25, 0.2), kRed);
@@ -97,14 +98,15 @@ TEST(Texture, LiesOnTopOfABoxWithItsFirstRowAtY) {
   expect_pixel(s.from_above(0.25, -0.2), kWhite);
 }
 
-// A mesh has the coordinates of its corners: u to the right; v up or down is MuJoCo's choice.
-TEST(Texture, FollowsTheCornersOfAMesh) {
+// A mesh uses the texture coordinates of its corners. u points right; the direction of v is
+// MuJoCo's choice.
+TEST(Texture, UsesTheTexcoordsOfAMesh) {
   Studio s(std::string(kFlat) +
            R"(<asset><texture name="t" type="2d" builtin="flat" width="2" height="2"/>
     <material name="m" texture="t"/><mesh name="sheet" inertia="shell" vertex="-1 -1 0 1 -1 0 1 1 0 -1 1 0"
     texcoord="0 1 1 1 1 0 0 0" face="0 1 2 0 2 3"/></asset><worldbody><geom type="mesh" mesh="sheet" material="m" contype="0" conaffinity="0"/></worldbody>)");
   paint(s, kFields, 2);
-  // Large in the image, and small: drawn triangle by triangle, and met by rays.
+  // Large in the image and small in it: rasterised and ray cast.
   for (const double height : {0.9, 30.0}) {
     const double fovy = height < 1 ? 60 : 0.5;
     const auto texel = [&](double x, double y) {
@@ -114,14 +116,14 @@ TEST(Texture, FollowsTheCornersOfAMesh) {
     expect_pixel(texel(0.5, 0.5), kGreen);
     expect_pixel(texel(-0.5, -0.5), kBlue);
     expect_pixel(texel(0.5, -0.5), kWhite);
-    // A quarter of the way from the middle of one texel to the next.
+    // A quarter of the distance from one texel's centre to the next.
     expect_pixel(texel(-0.25, 0.5), {191, 64, 0}, 2);
     expect_pixel(texel(-0.5, 0.25), {191, 0, 64}, 2);
   }
 }
 
-// Of a texture finer than the pixels a pixel shows the mean.
-TEST(Texture, IsFilteredWhereItIsFinerThanPixels) {
+// A pixel shows the mean of a texture that is finer than the pixels.
+TEST(Texture, IsFilteredIfFinerThanPixels) {
   Studio s(std::string(kFlat) +
            R"(<asset><texture name="t" type="2d" builtin="flat" width="64" height="64"/>
     <material name="m" texture="t" texrepeat="40 40"/></asset><worldbody><geom type="plane" size="5 5 1" material="m"/></worldbody>)");
@@ -131,13 +133,13 @@ TEST(Texture, IsFilteredWhereItIsFinerThanPixels) {
 }
 
 // With texuniform a texture has the same size in metres on shapes of any size.
-TEST(Texture, UniformOnesAreCountedByTheMetre) {
+TEST(Texture, UniformRepeatIsPerMetre) {
   const auto borders_per_metre = [](const char* size, const char* material) {
     Studio s(painted((std::string("<geom type='plane' material='m' size='") + size + "'/>").c_str(),
                      material));
     constexpr Pixel kColumns[] = {kWhite, {0, 0, 0}, kWhite, {0, 0, 0}};
     paint(s, kColumns);
-    // 4 m of a row of pixels, one each 1 cm, near the middle of both planes.
+    // A row of 400 pixels over 4 m, i.e. 1 cm each, near the middle of both planes.
     const Picture p =
         s.take({0.003, 0.003, 10}, {1, 0, 0}, {0, 1, 0}, grid_from_fovy(400, 1, 0.01, true));
     int borders = 0;
@@ -150,16 +152,16 @@ TEST(Texture, UniformOnesAreCountedByTheMetre) {
               2 * borders_per_metre("4 4 1", "texrepeat='3 3'"), 0.3);
 }
 
-// A mesh of twelve triangles is the box of the same corners: in what is seen, how far it is and
-// where it faces.
-TEST(Triangles, DrawTheBoxThatTheyBound) {
+// A mesh of twelve triangles looks like the box with the same corners: same pixels, depth and
+// normals.
+TEST(Triangles, OfABoxRenderLikeTheBox) {
   const std::string mesh =
       R"(<asset><mesh name="block" vertex="-.3 -.2 -.1 .3 -.2 -.1 -.3 .2 -.1 .3 .2 -.1
     -.3 -.2 .1 .3 -.2 .1 -.3 .2 .1 .3 .2 .1"/></asset>)";
   for (const char* pose :
        {"euler='0 0 0'", "euler='20 35 50'", "euler='-70 15 5' pos='.2 .1 .3'"}) {
     for (const double distance :
-         {0.7, 1.5, 9.0}) {  // over the image's border, within, and a few pixels
+         {0.7, 1.5, 9.0}) {  // larger than the image, inside it, and a few pixels
       const auto see = [&](const char* shape) {
         Studio s(std::string(kFlat) + mesh + "<worldbody><geom rgba='1 .5 .2 1' " + shape + " " +
                  pose + "/></worldbody>");
@@ -189,8 +191,9 @@ TEST(Triangles, DrawTheBoxThatTheyBound) {
   }
 }
 
-// An open sheet has a front: corners counterclockwise. From behind it is not there.
-TEST(Triangles, ShowTheirFrontsOnly) {
+// The front of an open sheet is where its corners are counterclockwise. From behind it is
+// invisible.
+TEST(Triangles, AreVisibleFromTheFrontOnly) {
   Studio s(std::string(kFlat) +
            R"(<asset><mesh name="sheet" inertia="shell" vertex="-1 -1 0 1 -1 0 1 1 0 -1 1 0"
     face="0 1 2 0 2 3"/></asset><worldbody><geom type="mesh" mesh="sheet" rgba="1 1 1 1" contype="0" conaffinity="0"/></worldbody>)");
@@ -202,7 +205,7 @@ TEST(Triangles, ShowTheirFrontsOnly) {
         s.take({0, 0, -height}, {1, 0, 0}, {0, -1, 0}, grid_from_fovy(32, 32, fovy, false));
     EXPECT_EQ(above.id(16, 16), 0) << height;
     EXPECT_EQ(below.id(16, 16), -1) << height;
-    // The sheet's outline: half its width over the distance.
+    // Half size of the sheet's outline: half its width over the distance.
     const int reach = static_cast<int>(16 * (1 / height) / std::tan(fovy * M_PI / 360));
     if (reach < 14) {
       EXPECT_EQ(above.id(16 + reach - 1, 16), 0);
@@ -212,7 +215,7 @@ TEST(Triangles, ShowTheirFrontsOnly) {
   }
 }
 
-TEST(Surface, OfTwoInOnePlaceTheLaterShows) {
+TEST(Surface, HigherIdWinsIfSurfacesCoincide) {
   for (const char* shape : {"type='box' size='.3 .3 .3'", "type='mesh' mesh='block'"}) {
     Studio s(std::string(kFlat) +
              R"(<asset><mesh name="block" vertex="-.3 -.3 -.3 .3 -.3 -.3 -.3 .3 -.3 .3 .3 -.3
@@ -222,8 +225,8 @@ TEST(Surface, OfTwoInOnePlaceTheLaterShows) {
   }
 }
 
-// A material's colour counts unless the geom has one of its own.
-TEST(Surface, AGeomsOwnColourComesBeforeItsMaterials) {
+// A geom's own colour, unless it is the default, takes precedence over its material's.
+TEST(Surface, OwnColourOverridesTheMaterials) {
   Studio s(std::string(kFlat) + R"(<asset><material name="m" rgba="0 0 1 1"/></asset><worldbody>
     <geom type="box" size=".1 .1 .1" pos="-1 0 0" material="m"/><geom type="box" size=".1 .1 .1" pos="0 0 0" material="m" rgba="1 0 0 1"/>
     <geom type="box" size=".1 .1 .1" pos="1 0 0" rgba="0 1 0 1"/></worldbody>)");
@@ -232,17 +235,17 @@ TEST(Surface, AGeomsOwnColourComesBeforeItsMaterials) {
   expect_pixel(s.from_above(1, 0), kGreen);
 }
 
-// From below a plane is a veil of 0.3, drawn twice: 1 - 0.7^2 of it is seen.
+// From below a plane is drawn as a veil of alpha 0.3, blended twice: its weight is 1 - 0.7^2.
 TEST(Surface, APlaneFromBelowIsAVeil) {
   Studio s(std::string(kFlat) + R"(<worldbody><geom type="plane" size="5 5 1" rgba="1 1 1 1"/>
     <geom size=".5" pos="2 0 2" rgba="0 0 1 1"/></worldbody>)");
   const int veil = static_cast<int>(255 * (1 - 0.7 * 0.7) + 0.5);
   const auto up = [&](double x) { return s.center({x, 0, -2}, {1, 0, 0}, {0, -1, 0}, 1); };
   expect_pixel(up(0), {veil, veil, veil});
-  expect_pixel(up(2), {veil, veil, 255}, 2);  // what is behind shines through
+  expect_pixel(up(2), {veil, veil, 255}, 2);  // the ball behind it is visible through the veil
 }
 
-// Of a box the top is a mirror, the sides are not.
+// Only the top of a box reflects, not its sides.
 TEST(Surface, OnlyTheTopOfABoxReflects) {
   Studio s(std::string(kFlat) +
            R"(<asset><material name="mirror" rgba="0 0 .2 1" reflectance=".5"/></asset><worldbody>
@@ -252,17 +255,17 @@ TEST(Surface, OnlyTheTopOfABoxReflects) {
   s.options.reflections = true;
   const double h = std::sqrt(0.5);
   expect_pixel(s.center({0, -1.5, 1.5}, {1, 0, 0}, {0, h, h}, 1),
-               {128, 0, 51});  // the red wall in the top
+               {128, 0, 51});  // the red wall, reflected in the top
   const double n = std::hypot(2, 0.7);
   expect_pixel(s.center({0, -3, 0.5}, {1, 0, 0}, {0, 0.7 / n, 2 / n}, 1), {0, 0, 51});  // the front
 }
 
-// Four rays of a pixel lie on four heights: an edge that runs along the rows is softened too.
+// The four rays of a pixel have four different heights, so an edge along the rows is softened too.
 TEST(Surface, SamplesSoftenEdgesInBothDirections) {
   Studio s(std::string(kFlat) +
            R"(<worldbody><geom type="box" size=".5 .5 .5" rgba="1 1 1 1"/></worldbody>)");
-  // 8 pixels over 2 m from 10 m above, by parallel rays: pixels of 0.25 m, the box's edge at 0.5 m.
-  // Moved by a quarter of a pixel, a quarter of the pixels along the edge is covered.
+  // 8 pixels over 2 m, orthographic, from 10 m above: pixels of 0.25 m, the box's edge at 0.5 m.
+  // After a shift by a quarter of a pixel, the pixels along the edge are covered by a quarter.
   for (const bool rows : {false, true}) {
     const double shift = 0.0625;
     const Picture p = s.take({rows ? 0 : shift, rows ? shift : 0, 10}, {1, 0, 0}, {0, 1, 0},
@@ -278,8 +281,8 @@ TEST(Surface, SamplesSoftenEdgesInBothDirections) {
   }
 }
 
-//   =======[camera]==========>  a beam from behind the camera to far ahead
-TEST(Window, WhatReachesBehindTheCameraIsSeenWhole) {
+// =======[camera]==========> A beam from behind the camera to far ahead.
+TEST(Window, GeomReachingBehindTheCameraIsFullyVisible) {
   for (const char* shape :
        {"type='box' size='.1 20 .1'", "type='capsule' size='.1 20' euler='90 0 0'",
         "type='mesh' mesh='beam'"}) {
@@ -296,8 +299,8 @@ TEST(Window, WhatReachesBehindTheCameraIsSeenWhole) {
   }
 }
 
-// Parallel rays show a thing in the same place and size at any distance.
-TEST(Window, OfParallelRaysDoesNotShrink) {
+// An orthographic camera shows an object at the same position and size at any distance.
+TEST(Window, OrthographicSizeIsIndependentOfDistance) {
   for (const double distance : {2.0, 8.0, 200.0}) {
     Studio s(
         std::string(kFlat) +
@@ -316,9 +319,9 @@ TEST(Window, OfParallelRaysDoesNotShrink) {
   }
 }
 
-// What stands still is kept; what moves over it, its shadow, and anything that is not as it was are
-// drawn.
-TEST(FixedLayer, IsUsedWhereNothingOfItHasChanged) {
+// The layer of fixed geoms is reused. Moving geoms and their shadows are drawn over it; if any
+// fixed geom or light changes, the layer is no longer used.
+TEST(FixedLayer, IsUsedWhileItsInputsAreUnchanged) {
   Studio s(std::string(kDark) + kMatte + R"(<worldbody>
     <light pos="0 0 3" dir="0 0 -1" cutoff="80" exponent="0" diffuse="1 1 1" specular="0 0 0"/>
     <geom type="plane" size="5 5 1" material="matte"/><geom name="fixed" type="box" size=".2 .2 .1" pos=".6 0 .1" material="matte"/>
@@ -333,7 +336,7 @@ TEST(FixedLayer, IsUsedWhereNothingOfItHasChanged) {
   ViewBuilder builder(s.model.get(), *s.look, s.options);
   FixedLayer layer(s.model.get(), kSize, kSize);
   const double h = std::sqrt(0.5);
-  const auto build = [&]() -> const View& {  // at 45 degrees to the middle of the floor
+  const auto build = [&]() -> const View& {  // at 45 degrees, looking at the middle of the floor
     return s.view(builder, {0, -2, 2}, {1, 0, 0}, {0, h, h}, grid);
   };
   const auto image = [&](bool kept) {
@@ -343,15 +346,15 @@ TEST(FixedLayer, IsUsedWhereNothingOfItHasChanged) {
     s.draw(view, p.targets());
     return p;
   };
-  EXPECT_FALSE(layer.settles(build()));  // seen once
-  EXPECT_TRUE(layer.settles(build()));   // and again the same
+  EXPECT_FALSE(layer.settles(build()));  // seen for the first time
+  EXPECT_TRUE(layer.settles(build()));   // seen again, unchanged
   ImageTargets tiles;
   tiles.fixed = layer.tiles();
   s.draw(build(), tiles);
   EXPECT_TRUE(layer.shows(build()));
   EXPECT_EQ(image(true).rgb, image(false).rgb);
 
-  // A ball comes between the lamp and the floor: in the image, its shadow around it.
+  // A ball between the light and the floor: visible in the image, with its shadow around it.
   const Picture empty = image(true);
   s.data->qpos[0] = 0;
   s.data->qpos[2] = 1.5;
@@ -359,12 +362,14 @@ TEST(FixedLayer, IsUsedWhereNothingOfItHasChanged) {
   ASSERT_TRUE(layer.shows(build()));
   const Picture with_ball = image(true);
   EXPECT_EQ(with_ball.rgb, image(false).rgb);
-  // Its shadow reaches 0.2 / sqrt(1.5^2 - 0.2^2) * 3 = 0.40 m around the middle of the floor.
+  // Its shadow has a radius of 0.2 / sqrt(1.5^2 - 0.2^2) * 3 = 0.40 m around the middle of the
+  // floor.
   EXPECT_EQ(with_ball.id(32, 32), 0);
   EXPECT_EQ(with_ball.at(32, 32)[0], 0);
   EXPECT_GT(empty.at(32, 32)[0], 100);
 
-  // Anything fixed that is elsewhere, of another size or colour, or another light: not this layer.
+  // If a fixed geom moves or changes its size or colour, or a light changes, the layer does not
+  // apply.
   const auto changes = [&](auto&& change, auto&& back) {
     change();
     s.update();
@@ -384,8 +389,9 @@ TEST(FixedLayer, IsUsedWhereNothingOfItHasChanged) {
       changes([&] { s.model->light_diffuse[0] = 0.5f; }, [&] { s.model->light_diffuse[0] = 1; }));
 }
 
-// The first worlds have layers of their own, as many as memory is given; one is for all.
-TEST(FixedLayer, WorldsShareOneUntilTheyLookDifferent) {
+// One common layer serves all worlds that look the same. The first worlds also have layers of their
+// own, up to the memory limit.
+TEST(FixedLayer, WorldsThatLookTheSameShareALayer) {
   Studio s(std::string(kDark) + kMatte + R"(<worldbody><light pos="0 0 3" dir="0 0 -1"/>
     <geom type="plane" size="5 5 1" material="matte"/><camera pos="0 0 4"/></worldbody>)");
   s.options.shadows = s.options.layered = true;
@@ -399,13 +405,13 @@ TEST(FixedLayer, WorldsShareOneUntilTheyLookDifferent) {
     return s.view(builder, {0, -2, 2}, {1, 0, 0}, {0, 1, 1}, grid);
   };
   FixedLayers layers(s.model.get(), kSize, kSize, 8, 2 * FixedLayer::bytes(kSize, kSize));
-  // Of worlds that look the same: one is made for all.
+  // If worlds look the same, one layer is rendered for all.
   EXPECT_EQ(layers.settle_common(0, view_of(1)), nullptr);
   EXPECT_EQ(layers.find(5, view_of(1)), nullptr);
   const FixedTile* common = layers.settle_common(0, view_of(1));
   ASSERT_NE(common, nullptr);
   for (int world : {0, 1, 5}) EXPECT_EQ(layers.find(world, view_of(1)), common);
-  // World 1 becomes another, and world 5, which has no place for its own.
+  // World 1 and world 5 change; world 5 has no layer of its own.
   EXPECT_EQ(layers.find(1, view_of(0.5f)), nullptr);
   EXPECT_EQ(layers.settle(1, view_of(0.5f)), nullptr);
   const FixedTile* own = layers.settle(1, view_of(0.5f));
@@ -414,12 +420,12 @@ TEST(FixedLayer, WorldsShareOneUntilTheyLookDifferent) {
   EXPECT_EQ(layers.find(1, view_of(0.5f)), own);
   for (int i = 0; i < 3; ++i) EXPECT_EQ(layers.settle(5, view_of(0.5f)), nullptr);
   EXPECT_EQ(layers.find(5, view_of(0.5f)), nullptr);
-  // Who has its own leaves the common one to the others.
+  // A world with its own layer does not replace the common one.
   EXPECT_EQ(layers.settle_common(1, view_of(0.5f)), nullptr);
   EXPECT_EQ(layers.find(0, view_of(1)), common);
 }
 
-TEST(FixedLayer, NeedsACameraAndLampsThatStandStill) {
+TEST(FixedLayer, NeedsAFixedCameraAndFixedLights) {
   const auto possible = [](const char* world) {
     Studio s(std::string("<worldbody><geom type='plane' size='1 1 1'/>") + world + "</worldbody>");
     return FixedLayer::possible(s.model.get(), 0);

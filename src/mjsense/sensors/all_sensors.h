@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
-// The sensors there are. What stands here is known to Python, to the documentation, and to the
-// tests that hold for every sensor.
+// The list of scene sensors. Python, the documentation and the tests for all sensors know the
+// sensors in it.
 
 #include <span>
 
@@ -9,8 +9,8 @@
 
 namespace mjsense {
 
-// One line a sensor: its folder defines `SensorKind <name>_kind()`, and for tests
-// `SensorCfgs <name>_examples()` in testing/example.cc.
+// One line per sensor. Its folder defines `SensorKind <name>_kind()` and, for tests, `SensorCfgs
+// <name>_examples()` in testing/example.cc.
 #define MJSENSE_SENSORS(SENSOR) \
   SENSOR(builtin)               \
   SENSOR(camera)                \

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// What sensors show to a human (Simulation::draw). Ray sensors: raycast_sensor_test.cc.
+// Debug drawings of sensors (Simulation::draw). For ray sensors see raycast_sensor_test.cc.
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -23,8 +23,8 @@ namespace {
 
 using ::testing::HasSubstr;
 
-// A box of 1 kg on the floor, a camera 2 m above the origin that looks down, x to the right, and a
-// tilted site.
+// A box of 1 kg on the floor, a camera 2 m above the origin that looks down with x to the right,
+// and a tilted site.
 constexpr char kWorld[] = R"(
 <mujoco>
   <worldbody>
@@ -72,7 +72,7 @@ std::shared_ptr<CameraSensorCfg> top_camera() {
   auto cfg = sensor<CameraSensorCfg>("cam");
   cfg->camera_name = "w/top";
   cfg->width = 40;
-  cfg->height = 20;  // 90 degrees high: at depth d the image is 2 d high and 4 d wide
+  cfg->height = 20;  // fovy is 90 degrees: at depth d the image is 2 d high and 4 d wide
   cfg->debug_vis = true;
   return cfg;
 }
@@ -83,7 +83,7 @@ void expect_at(Vec3 p, double x, double y, double z) {
   EXPECT_NEAR(p.z, z, 1e-5);
 }
 
-// Lines of the frustum: far rim, near rim if there is one, then the four edges.
+// Lines of the frustum: the far rim, the near rim if there is one, then the four edges.
 std::vector<DebugShape> lines(const DebugShapes& shapes) {
   std::vector<DebugShape> found;
   for (const DebugShape& s : shapes.list())
@@ -91,7 +91,7 @@ std::vector<DebugShape> lines(const DebugShapes& shapes) {
   return found;
 }
 
-TEST(Draw, AFrustumReachesFromTheCameraToFar) {
+TEST(Draw, FrustumReachesFromTheCameraToFar) {
   auto cfg = top_camera();
   cfg->far = 0.5;
   Lab lab({cfg});
@@ -100,7 +100,7 @@ TEST(Draw, AFrustumReachesFromTheCameraToFar) {
   EXPECT_EQ(shapes.list()[0].label, "cam_x");
   expect_at(shapes.list()[0].pos, 0, 0, 2);
   expect_at(shapes.list()[0].vector, 0.5, 0, 0);  // 5 meansize
-  expect_at(shapes.list()[2].vector, 0, 0, 0.5);  // it looks along its -z
+  expect_at(shapes.list()[2].vector, 0, 0, 0.5);  // the camera looks along -z
   const auto l = lines(shapes);
   ASSERT_EQ(l.size(), 8u);
   expect_at(l[0].pos, -1, 0.5, 1.5);  // top left
@@ -112,7 +112,7 @@ TEST(Draw, AFrustumReachesFromTheCameraToFar) {
   EXPECT_EQ(l[4].width, 2);
 }
 
-TEST(Draw, AFrustumHasTheDepthAskedForAndTheNearPlane) {
+TEST(Draw, FrustumHasTheGivenDepthAndTheNearPlane) {
   auto cfg = top_camera();
   cfg->near = 0.1;
   cfg->viz.show_frame = false;
@@ -126,19 +126,19 @@ TEST(Draw, AFrustumHasTheDepthAskedForAndTheNearPlane) {
   expect_at(l[8].vector, -1.8, 0.9, -0.9);
 }
 
-TEST(Draw, AnOrthographicFrustumIsABox) {
+TEST(Draw, OrthographicFrustumIsABox) {
   auto cfg = top_camera();
   cfg->orthographic = true;
   cfg->fovy = 1.0;
   Lab lab({cfg});
   const auto l = lines(lab.draw("cam"));
   ASSERT_EQ(l.size(), 12u);
-  expect_at(l[0].pos, -1, 0.5, 1);  // 10 meansize away
+  expect_at(l[0].pos, -1, 0.5, 1);  // 10 meansize below the camera
   expect_at(l[8].pos, -1, 0.5, 2);
   expect_at(l[8].vector, 0, 0, -1);
 }
 
-TEST(Draw, ThroughALensTheFrustumIsBentAndItsRimEquallyFar) {
+TEST(Draw, FrustumOfALensIsBentWithItsRimAtOneDistance) {
   auto cfg = top_camera();
   cfg->intrinsics = CameraIntrinsics{15, 15, 20, 10};
   cfg->distortion = {"fisheye", {0, 0, 0, 0}};
@@ -150,7 +150,7 @@ TEST(Draw, ThroughALensTheFrustumIsBentAndItsRimEquallyFar) {
   EXPECT_NEAR(l[0].pos.z, 2 - std::cos(std::hypot(19.5, 9.5) / 15), 1e-5);
 }
 
-TEST(Draw, AFrustumIsWhereTheImageWasTaken) {
+TEST(Draw, FrustumIsAtThePoseOfTheImage) {
   auto moving = sensor<CameraSensorCfg>("cam");
   moving->parent_body = "w/box";
   moving->update_period = 0.1;
@@ -165,7 +165,7 @@ TEST(Draw, AFrustumIsWhereTheImageWasTaken) {
 TEST(Draw, ContactsInTheSlotsAndTheirForces) {
   auto cfg = sensor<ContactSensorCfg>("touch");
   cfg->primary = {"geom", {"box"}, "w", {}};
-  cfg->fields = {"found"};  // what is drawn does not depend on the fields
+  cfg->fields = {"found"};  // the drawing does not depend on the fields
   cfg->num_slots = 3;
   cfg->debug_vis = true;
   Lab lab({cfg}, 2);
@@ -181,17 +181,18 @@ TEST(Draw, ContactsInTheSlotsAndTheirForces) {
     EXPECT_NEAR(std::abs(s[0].pos.y), 0.1, 1e-3);
     EXPECT_NEAR(s[0].pos.z, 0, 1e-3);
     EXPECT_EQ(s[1].label, "touch_box_" + std::to_string(k) + "_x");
-    expect_at(s[1].vector, 0, 0, -0.2);  // the normal, away from the box
+    expect_at(s[1].vector, 0, 0, -0.2);  // the normal, pointing away from the box
     EXPECT_NEAR(dot(s[1].vector, s[2].vector), 0, 1e-9);
     EXPECT_NEAR(norm(cross(s[1].vector, s[2].vector) - 0.2 * s[3].vector), 0, 1e-9);
     EXPECT_EQ(s[4].label, "touch_box_" + std::to_string(k) + "_force");
-    EXPECT_NEAR(norm(s[4].pos + s[4].vector - s[0].pos), 0, 1e-9);  // it ends at the point
-    force += s[4].vector.z / 0.01;                                  // vis.map.force
+    // The arrow ends at the contact point.
+    EXPECT_NEAR(norm(s[4].pos + s[4].vector - s[0].pos), 0, 1e-9);
+    force += s[4].vector.z / 0.01;  // vis.map.force
   }
   EXPECT_NEAR(force, -9.81 * 1.001 * 3 / 4, 1e-2);
 }
 
-TEST(Draw, TheNetForceIsOneArrowOfItsOwnScale) {
+TEST(Draw, NetForceIsOneArrowWithItsOwnScale) {
   auto cfg = sensor<ContactSensorCfg>("touch");
   cfg->primary = {"geom", {"box"}, "w", {}};
   cfg->reduce = "netforce";
@@ -205,7 +206,7 @@ TEST(Draw, TheNetForceIsOneArrowOfItsOwnScale) {
   EXPECT_NEAR(norm(shapes.list()[0].pos - Vec3{0, 0, 0.9819}), 0, 1e-3);
 }
 
-TEST(Draw, ABuiltinSensorIsTheFrameItIsAttachedTo) {
+TEST(Draw, BuiltinSensorIsDrawnAsItsFrame) {
   auto site = sensor<BuiltinSensorCfg>("gyro");
   site->sensor_type = "gyro";
   site->obj = {"site", "tilted", "w"};
@@ -232,7 +233,7 @@ TEST(Draw, ABuiltinSensorIsTheFrameItIsAttachedTo) {
   }
 }
 
-TEST(Draw, OnlyOneWorldIsLookedAtAndDrawingIsNoReading) {
+TEST(Draw, DrawingComputesOneWorldAndIsNotARead) {
   auto cfg = top_camera();
   Lab lab({cfg}, 2);
   (void)lab.sim->draw(1);
@@ -244,7 +245,7 @@ TEST(Draw, OnlyOneWorldIsLookedAtAndDrawingIsNoReading) {
   EXPECT_THROW((void)lab.sim->draw(2), ValueError);
 }
 
-TEST(Draw, EverySensorDrawsOrSaysThatItHasNothing) {
+TEST(Draw, EverySensorDrawsOrThrows) {
   Simulation sim(std::make_shared<Scene>(every_sensor_scene()), {.num_worlds = 2, .decimation = 3});
   sim.step(3);
   for (const auto& s : sim.scene().sensors()) {

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// What must hold for every kind of sensor: row w among B worlds is row w alone, bit for bit, at any
-// number of threads; a partial reset touches its worlds only; a step allocates nothing.
+// Properties of every kind of sensor: row w of B worlds is the row of world w alone, bit for bit,
+// for any number of threads; a partial reset affects its worlds only; a step does not allocate.
 
 #include <gtest/gtest.h>
 
@@ -19,8 +19,8 @@ namespace {
 
 constexpr int kWorlds = 16, kSteps = 12;
 
-// Row `row` plays world `w`: its random numbers (those of a reset, too), its start and its
-// controls.
+// Row `row` simulates world `w`, with its random numbers (those of a reset too) and its start
+// state.
 void begin(Simulation& sim, int row, int w) {
   sim.worlds().rekey(row, static_cast<std::uint32_t>(w));
   const int ids[] = {row};
@@ -42,8 +42,7 @@ std::vector<Sensor*> sensors(Simulation& sim) {
   return list;
 }
 
-// Bytes of every field of every sensor in every step: rows[w] of the worlds `first` .. `first +
-// worlds - 1`.
+// Bytes of every field of every sensor in every step; rows[i] is that of world `first` + i.
 std::vector<std::string> play(int first, int worlds, int threads) {
   Simulation sim(std::make_shared<Scene>(every_sensor_scene()),
                  {.num_worlds = worlds, .decimation = 3, .threads = threads});
@@ -66,7 +65,7 @@ std::vector<std::string> play(int first, int worlds, int threads) {
   return rows;
 }
 
-TEST(Lockstep, ARowAmongManyIsTheRowAloneAtAnyNumberOfThreads) {
+TEST(Lockstep, RowsDoNotDependOnBatchSizeOrThreads) {
   const std::vector<std::string> reference = play(0, kWorlds, 1);
   EXPECT_NE(reference[0], reference[1]);
   for (int threads : {2, 5})
@@ -75,7 +74,7 @@ TEST(Lockstep, ARowAmongManyIsTheRowAloneAtAnyNumberOfThreads) {
     EXPECT_EQ(play(w, 1, 2)[0], reference[w]) << "world " << w << " alone";
 }
 
-TEST(Lockstep, APartialResetTouchesItsWorldsOnly) {
+TEST(Lockstep, PartialResetAffectsItsWorldsOnly) {
   Simulation sim(std::make_shared<Scene>(every_sensor_scene()),
                  {.num_worlds = 3, .decimation = 3, .threads = 2});
   const std::vector<Sensor*> all = sensors(sim);
@@ -99,7 +98,7 @@ TEST(Lockstep, APartialResetTouchesItsWorldsOnly) {
   EXPECT_NE(row(1), one);
 }
 
-TEST(Lockstep, AStepAllocatesNothing) {
+TEST(Lockstep, StepDoesNotAllocate) {
   Simulation sim(std::make_shared<Scene>(every_sensor_scene()),
                  {.num_worlds = 4, .decimation = 3, .threads = 2});
   const std::vector<Sensor*> all = sensors(sim);
@@ -118,7 +117,7 @@ TEST(Lockstep, AStepAllocatesNothing) {
   }
 }
 
-TEST(EverySensor, HasAnExampleAndReturnsWhatItDeclares) {
+TEST(EverySensor, HasAnExampleAndTheDeclaredFields) {
   Simulation sim(std::make_shared<Scene>(every_sensor_scene()), {.num_worlds = 2});
   for (const SensorKind& kind : sensor_kinds()) {
     int examples = 0;

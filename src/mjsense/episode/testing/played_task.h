@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
-// A task in a scene with one set of data, for tests that look at starts and judgements.
+// A task with its scene and one mjData, for tests of start states and evaluations.
 
 #include <memory>
 #include <string>
@@ -11,7 +11,7 @@
 
 namespace mjsense {
 
-// In the robot's own periods.
+// With the robot's own periods.
 inline TaskCfg task_cfg(const std::string& robot, const std::string& scene = "") {
   TaskCfg cfg;
   cfg.robot = robot_cfg(robot);
@@ -28,7 +28,7 @@ struct PlayedTask {
       : task(std::move(cfg)), scene(task.whole_scene_cfg()) {
     task.initialize(model, num_worlds);
   }
-  // World 0 plays the episode from its start.
+  // Starts the episode in world 0.
   void start(std::int64_t episode) {
     mj_resetData(model, data.get());
     task.sample(0, episode, state_row(data.get()));

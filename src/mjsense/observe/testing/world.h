@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
-// For tests of this room: one MuJoCo world from an XML text, and a sensor computed on it.
+// For the tests of observe/: one MuJoCo world from an XML text, and a sensor computed in it.
 
 #include <gtest/gtest.h>
 #include <mujoco/mujoco.h>

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
-// For what holds of the kernels of every instruction set:
+// Fixture for tests that must hold for the kernels of every instruction set:
 //   class Mine : public testing::EveryKernel {};
 //   INSTANTIATE_TEST_SUITE_P(Isas, Mine, testing::every_isa(), testing::isa_of);
 

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
-// Scenes for the tests of rays: random geoms of every type, compiled by MuJoCo, with one mjData.
+// Scenes for ray tests: random geoms of every type, compiled by MuJoCo, with one mjData.
 
 #include <gtest/gtest.h>
 #include <mujoco/mujoco.h>
@@ -48,8 +48,8 @@ inline std::string vec(std::initializer_list<double> xs) {
   return s;
 }
 
-// `count` geoms of `types` (space-separated names are chosen from in turn) in a ball of `radius`
-// metres.
+// MJCF of `count` geoms in a cube of half size `radius` (m) around the origin. The types are taken
+// from `types` in turn.
 inline std::string random_geoms(Rng& rng, std::initializer_list<const char*> types, int count,
                                 double radius) {
   std::string xml;
@@ -98,7 +98,7 @@ inline void random_direction(Rng& rng, double d[3]) {
   for (int k = 0; k < 3; ++k) d[k] /= n;
 }
 
-// From o towards a point of the cube of half size `radius` around the world's origin.
+// Direction from o to a random point of the cube of half size `radius` around the world's origin.
 inline void aim(Rng& rng, double radius, const double o[3], double d[3]) {
   for (int k = 0; k < 3; ++k) d[k] = rng.uniform(-radius, radius) - o[k];
   mju_normalize3(d);

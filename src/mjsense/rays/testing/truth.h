@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
-// MuJoCo's own rays as the truth for ours. They count in double, ours in float32: so what ours say is
-// right if mj_ray says it, of the ray itself or of one that float32 can hardly tell from it. A ray that
-// slips through a seam comes farther than any of these.
+// Reference results from mj_ray. It computes in double, the kernels in float32. A result is
+// therefore accepted if mj_ray returns it for the ray itself or for a ray within float32 rounding
+// of it. A ray that slips through a seam travels farther than all of these, so the test detects it.
 
 #include <mujoco/mujoco.h>
 
@@ -29,9 +29,10 @@ inline Truth mujoco_ray(const TestModel& m, const double o[3], const double d[3]
   return r;
 }
 
-// A ray and its neighbours: all that are moved along the axes by `move` metres and turned towards them
-// by kRoundings radians at most, as float32 does with a ray that it brings into a geom's frame: a
-// few roundings of numbers as large as the way to the far side of the farthest geom.
+// A ray and its neighbours: all rays whose origin is moved along the axes by at most `move_` metres
+// and whose direction is turned by at most kRoundings radians. These are the errors that float32
+// makes when it transforms a ray into a geom's frame: a few roundings of numbers as large as the
+// distance to the far side of the farthest geom.
 class Neighbours {
  public:
   static constexpr double kRoundings = 4 * 0x1p-24;
@@ -46,9 +47,9 @@ class Neighbours {
     move_ = kRoundings * reach;
   }
 
-  // How far mj_ray says that the ray comes; kMiss if it meets nothing.
+  // The distance of mj_ray's hit; kMiss if there is none.
   double distance() const { return distance(o_, d_); }
-  // One of its neighbours.
+  // The same for a random neighbour.
   double distance(Rng& rng) const {
     double by[6], o[3], d[3];
     any(rng, by);
@@ -60,14 +61,15 @@ class Neighbours {
     return distance(o, d);
   }
 
-  // What the roundings are at t metres.
+  // Tolerance of a hit at t metres.
   double rounding(double t) const { return move_ + kRoundings * t; }
   bool same(double t, const Hit& hit) const {
     if (t == kMiss || !hit) return (t == kMiss) == !hit;
     return std::abs(hit.t - t) <= rounding(t);
   }
 
-  // Whether the ray's point at the hit lies on a surface, looking down at it from beside the point.
+  // Whether the ray's point at the hit lies on a surface. Rays are cast down at it from random
+  // points nearby.
   bool on_surface(const Hit& hit, Rng& rng) const {
     constexpr double kAbove = 1e-4;
     double up[3], from[3], by[6];
@@ -91,8 +93,8 @@ class Neighbours {
     return t < 0 ? kMiss : t;
   }
 
-  // Numbers from -1 to 1: a corner, or large ones and small ones, since on the tip of a roof only a
-  // small step aside is left.
+  // Numbers from -1 to 1: either the corner of a cube, or a mixture of large and small ones, since
+  // at the tip of a roof only small offsets still hit it.
   static void any(Rng& rng, double by[6]) {
     const bool corner = rng.below(2) != 0;
     for (int k = 0; k < 6; ++k) {
@@ -105,9 +107,10 @@ class Neighbours {
   double o_[3], d_[3], move_;
 };
 
-// Whether mj_ray says so, of the ray or of a neighbour. Where it is grazed a surface is met anywhere
-// on a long way, by roundings that differ from point to point: there it is enough that a neighbour
-// comes that far, and that the ray is at a surface then.
+// Whether mj_ray returns the same hit for the ray or for one of its neighbours. A ray that grazes a
+// surface may meet it anywhere along a long stretch, because of roundings that differ from point to
+// point. For such a ray it is sufficient that some neighbour travels farther than the hit, and that
+// the ray's point at the hit lies on a surface.
 inline bool agree(const TestModel& m, const double o[3], const double d[3], const Hit& hit) {
   const Neighbours ray(m, o, d);
   if (ray.same(ray.distance(), hit)) return true;
@@ -120,7 +123,7 @@ inline bool agree(const TestModel& m, const double o[3], const double d[3], cons
   return false;
 }
 
-// For a person: what both said, and where; "" if they agree.
+// Message for a failed test: both results, and the ray. "" if they agree.
 inline std::string disagreement(const TestModel& m, const double o[3], const double d[3],
                                 const Hit& hit) {
   if (agree(m, o, d, hit)) return "";
@@ -131,7 +134,7 @@ inline std::string disagreement(const TestModel& m, const double o[3], const dou
          vec({d[0], d[1], d[2]});
 }
 
-// Rays of a test: as many as its author meant, or MJSENSE_TEST_RAYS.
+// Number of rays in a test: `routine`, or the environment variable MJSENSE_TEST_RAYS.
 inline long ray_count(long routine) {
   const char* n = std::getenv("MJSENSE_TEST_RAYS");
   return n != nullptr ? std::atol(n) : routine;

@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
-// What may stand between a light and the points of a tile: geoms, and of shapes of many triangles
-// the parts, whose windows in the light's image overlap that of the points. None of it is more than
-// a reason not to cast a ray. Part of the tile kernels.
+// Shadow casters of a tile: geoms whose windows in the light's image overlap the window of the
+// tile's points and, for geoms of many triangles, the parts of them that do. This culling is
+// conservative: it saves shadow rays and never changes a result. Part of the tile kernels.
 
 #include "mjsense/render/kernels/light_window.h"
 
@@ -10,12 +10,12 @@ namespace mjsense {
 namespace {
 
 struct Casters {
-  int* list;  // geoms, one after another as often as parts of it are casters
+  int* list;  // geom of each caster; a geom with several parts has consecutive entries
   LightWindows windows;
   int count;
-  int hint;  // the geom that did for the packet before, or -1; asked first, which only saves time
+  int hint;  // geom that shadowed the last lit lanes of the previous packet, or -1; tested first
   const LightFrame* frame;
-  float error;  // of positions of the tile, m
+  float error;  // position error in the tile, m
 
   void add(int geom, const LightWindows& from, int k) {
     list[count] = geom;
@@ -27,7 +27,8 @@ struct Casters {
   }
 };
 
-// Can the plane lie between the light and any point in the box? It can if they touch it.
+// Whether the plane may lie between the light and a point in the box. True if the plane touches
+// either.
 inline bool divides(const ViewGeom& plane, const ViewLight& light, const float* low,
                     const float* high, float error) {
   const float n[3] = {plane.rot[2], plane.rot[5], plane.rot[8]};
@@ -42,8 +43,8 @@ inline bool divides(const ViewGeom& plane, const ViewLight& light, const float* 
   return !((least > error && lit > 0) || (most < -error && lit < 0));
 }
 
-// Of kWidth geoms from `first` on those of which a side of the bounding box faces the light and all
-// points in the box around `middle`: they are not between them.
+// Returns those of kWidth geoms from `first` on whose bounding box has a side that faces both the
+// light and all points in the box around `middle`. Such geoms are not between them.
 inline std::uint32_t turned_to(const LightSides& sides, int first, Vec3f middle, Vec3f half,
                                Float error) {
   Mask turned = mask_of(0);
@@ -57,7 +58,7 @@ inline std::uint32_t turned_to(const LightSides& sides, int first, Vec3f middle,
   return bits(turned);
 }
 
-// The light's frame that looks to the middle of the box.
+// The light's frame that contains the middle of the box.
 inline const LightFrame& frame_towards(const LightFrames& frames, const float* low,
                                        const float* high) {
   if (frames.count == 1) return *frames.first;
@@ -73,10 +74,12 @@ inline const LightFrame& frame_towards(const LightFrames& frames, const float* l
   return frames.first[face];
 }
 
-constexpr int kMostParts = 48;  // of one geom for one tile; more are one caster
+// Maximum number of parts of one geom in one tile; a geom with more parts is one caster.
+constexpr int kMostParts = 48;
 
-// Adds the parts of geom `index` that may stand before the points, at most `most`; false: there are
-// more. Parts are not smaller in the light's image than the points are all together.
+// Adds the parts of geom `index` that may shadow the points. If there are more than `most` parts,
+// adds none and returns false. A node is not divided further once its window is no larger than that
+// of all points together.
 inline bool add_parts(const View& view, int index, const LitWindow& points, int most,
                       Casters& out) {
   const ViewGeom& g = view.geoms[index];
@@ -105,8 +108,8 @@ inline bool add_parts(const View& view, int index, const LitWindow& points, int 
   return true;
 }
 
-// All casters of one light among `part` for points in a box: geoms, and at most `spare` parts of
-// them. `only`: the geom on which all points lie, or -1.
+// Finds all casters of one light among `part` for points in a box: geoms, and at most `spare` parts
+// of geoms. `only`: the geom to which all points belong, or -1.
 inline void find_casters(const View& view, int light, Part part, const float* low,
                          const float* high, int only, int& spare, Casters& out) {
   const LightFrame& f = frame_towards(view.light_frames[light], low, high);
@@ -136,10 +139,11 @@ inline void find_casters(const View& view, int light, Part part, const float* lo
       if (g >= view.num_geoms) break;
       const ViewGeom& geom = view.geoms[g];
       if (!belongs(geom, part)) continue;
-      if (g == only && !geom.bvh) continue;  // convex
+      if (g == only && !geom.bvh) continue;  // a convex geom casts no shadow on itself
       if (geom.type == mjGEOM_PLANE && !divides(geom, view.lights[light], low, high, out.error))
         continue;
-      // Rays that leave a height field are asked about as a whole.
+      // A height field is always one caster: its own shadow rays are tested as a whole
+      // (leaves_ground()).
       if (geom.clusters && !geom.height_field) {
         const int before = out.count;
         if (add_parts(view, g, points, spare < kMostParts ? spare : kMostParts, out)) {

@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
-// The layer of fixed geoms of a tile, and who casts shadows on what the tile shows. Part of the tile
-// kernels.
+// Cached layer of a tile's fixed geoms, and the shadow casters of a tile. Part of the tile kernels.
 
 #include "mjsense/render/kernels/shade.h"
 #include "mjsense/render/kernels/visible.h"
@@ -16,7 +15,7 @@ inline std::uint32_t hit_lanes(const Hits& hits) {
   return lanes;
 }
 
-// Lanes of a packet that still show what the layer does.
+// Lanes of a packet that show the same geom as the layer.
 inline std::uint32_t fixed_lanes(const FixedTile& fixed, int packet, const Hits& hits) {
   std::uint32_t lanes = 0;
   for (int k = 0; k < kLanes; k += kWidth) {
@@ -26,10 +25,10 @@ inline std::uint32_t fixed_lanes(const FixedTile& fixed, int packet, const Hits&
   return lanes;
 }
 
-// What the tile shows, but for what its layer does if there is one.
+// Bounds of what the tile shows. If a layer is given, pixels that show the layer are left out.
 struct Shown {
-  float low[3], high[3];  // box around it; low > high: nothing
-  int only;               // the geom that all of it belongs to, or -1
+  float low[3], high[3];  // bounding box, camera frame; low > high: empty
+  int only;               // the geom to which everything belongs, or -1
 };
 
 inline Shown shown_by(const View& view, const FixedTile* fixed, const Tile& tile, int packets) {
@@ -65,7 +64,8 @@ inline Shown shown_by(const View& view, const FixedTile* fixed, const Tile& tile
   return out;
 }
 
-// Casters among `part` of every light; the lists begin at `used` in the scratch.
+// Finds the casters among `part` for every light. The lists start at index `used` of the scratch
+// arrays.
 inline void find_casters(const View& view, Part part, const Shown& shown, TileScratch& scratch,
                          int& used, int& spare, Casters* out) {
   for (int i = 0; i < view.num_lights; ++i) {
@@ -82,7 +82,8 @@ inline void find_casters(const View& view, Part part, const Shown& shown, TileSc
   }
 }
 
-// `fixed`: the tile's layer, which knows what fixed geoms shade of each other; null: not layered.
+// `fixed`: the tile's layer, which stores the shadows that fixed geoms cast on fixed geoms; null if
+// the view is not layered.
 inline void find_all_casters(const View& view, const FixedTile* fixed, const Tile& tile,
                              int packets, TileScratch& scratch, Shadows& out) {
   int used = 0, spare = scratch.spare_casters;
@@ -96,8 +97,8 @@ inline void find_all_casters(const View& view, const FixedTile* fixed, const Til
                scratch, used, spare, out.moving);
 }
 
-// What a layer keeps of the hits of packet `packet` beside depth and ids, array by array: visit(of the
-// hits, of the layer).
+// Visits the arrays that a layer stores for packet `packet`, except depth and ids: visit(array of
+// the hits, array of the layer).
 template <class HitsOrConst, class TileOrConst, class Visit>
 inline void each_kept(HitsOrConst& hits, int packet, TileOrConst& kept, Visit visit) {
   const int at = packet * kLanes;
@@ -112,7 +113,8 @@ inline void copy_lanes(const T* from, T* to) {
   for (int k = 0; k < kLanes; k += kWidth) store(to + k, load(from + k));
 }
 
-// Draws the fixed geoms among `count` in scratch.opaque into the tile, and keeps what is known then.
+// Renders the fixed geoms among the first `count` of scratch.opaque into the tile and stores the
+// result in `out`.
 inline void make_fixed(const View& view, int count, int packets, Tile& tile, TileScratch& scratch,
                        FixedTile& out) {
   trace_tile(view, Part::kFixed, scratch.opaque, count, tile);
@@ -150,8 +152,8 @@ inline void make_fixed(const View& view, int count, int packets, Tile& tile, Til
   }
 }
 
-// Settles what is dark of a packet that shows nothing but fixed geoms. True: anything that moves casts a
-// shadow on it.
+// Determines the dark lanes of a packet that shows only fixed geoms. Returns whether a moving geom
+// casts a shadow on it.
 inline bool settle(const View& view, const Pixels& pixels, const Hits& hits, std::uint32_t lanes,
                    Shadows& shadows) {
   Surfaces s;
@@ -160,7 +162,8 @@ inline bool settle(const View& view, const Pixels& pixels, const Hits& hits, std
     store(s.p[0] + k, p.x);
     store(s.p[1] + k, p.y);
     store(s.p[2] + k, p.z);
-    for (auto& n : s.n) store(n + k, splat(0.0f));  // for shadows of a geom on itself
+    // Normals are used only for self-shadows, which are already known.
+    for (auto& n : s.n) store(n + k, splat(0.0f));
   }
   bool darker = false;
   for (int i = 0; i < view.num_lights; ++i) {
@@ -171,7 +174,7 @@ inline bool settle(const View& view, const Pixels& pixels, const Hits& hits, std
     Lit lit;
     for (int k = 0; k < kLanes; k += kWidth) {
       LightTerm& term = lit.terms[k / kWidth];
-      term.scale = term.diffuse = splat(1.0f);  // lanes turned away are known to be dark
+      term.scale = term.diffuse = splat(1.0f);  // lanes that face away are already known to be dark
       term.to_light =
           light.kind == LightKind::kDirectional
               ? Vec3f{splat(-light.dir[0]), splat(-light.dir[1]), splat(-light.dir[2])}
@@ -184,7 +187,7 @@ inline bool settle(const View& view, const Pixels& pixels, const Hits& hits, std
   return darker;
 }
 
-// The colours of packet `packet`, if they are what is kept; false: they are not.
+// Loads the colours of packet `packet` from the layer. Returns false if they no longer apply.
 inline bool load_colors(const View& view, const FixedTile& kept, const Pixels& pixels,
                         const Hits& hits, std::uint32_t lanes, Shadows& shadows, Colors& out) {
   if (lanes != shadows.fixed_lanes) return false;
@@ -195,7 +198,7 @@ inline bool load_colors(const View& view, const FixedTile& kept, const Pixels& p
   return true;
 }
 
-// Depth and ids of the tile as make_fixed() leaves it, from what is kept.
+// Restores the tile's depth and ids to the state after make_fixed().
 inline void load_fixed(const View& view, const FixedTile& from, int packets, Tile& tile) {
   PacketMask shown = 0;
   for (int q = 0; q < packets; ++q) {
@@ -204,7 +207,7 @@ inline void load_fixed(const View& view, const FixedTile& from, int packets, Til
     copy_lanes(from.id + q * kLanes, hits.id);
     int last = -1, index = -1;
     for (int i = 0; i < kLanes; ++i) {
-      if (hits.id[i] != last) {  // most packets see few
+      if (hits.id[i] != last) {  // cache: most packets show few geoms
         last = hits.id[i];
         index = last < 0 ? -1 : view.index_of_id[last];
       }
@@ -215,8 +218,8 @@ inline void load_fixed(const View& view, const FixedTile& from, int packets, Til
   if (shown) update_farthest(tile, shown);
 }
 
-// The rest of it, of the lanes of packet `q` that show it still. Most packets need it never: what is
-// not read need not come from memory.
+// Restores the remaining arrays for those `lanes` of packet `q` that still show the layer. Most
+// packets never need them, so they are loaded only on demand.
 inline void load_rest(const FixedTile& from, int q, std::uint32_t lanes, Hits& hits) {
   each_kept(hits, q, from, [&](auto* to, const auto* kept) {
     for (int k = 0; k < kLanes; k += kWidth)

@@ -1,14 +1,16 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
-// Which rays to a light leave the mesh that they begin on for good. Part of the tile kernels.
+// Computes horizons: which shadow rays leave the mesh on which they start for good. Part of the
+// tile kernels.
 //
-// Over a face with unit normal N, h(x) is the height of a point over its plane and e(x) how far it
-// lies beyond a line in that plane which the face is on one side of: along an edge, or through a
-// corner. For another triangle that is beyond the line, as far as it rises, h / e is largest at one
-// of its corners, for it is a quotient of linear functions; the least over the lines bounds how
-// steeply the triangle rises as the face sees it. The largest such slope of all triangles is the
-// face's horizon: for directions of one octant of those that are not wholly behind one of the three
-// planes, each square to an axis, at which the face ends.
+// Consider a face with unit normal N. Let h(x) be the height of a point above the face's plane, and
+// e(x) its distance beyond a line in that plane that has the whole face on one side: a line along
+// an edge or through a corner. For another triangle, if the part of it that rises is beyond the
+// line, h / e is largest at one of its corners, because it is a quotient of linear functions. The
+// minimum over the lines bounds the slope at which the triangle rises as seen from the face. The
+// maximum over all triangles is the face's horizon. It is computed per octant of directions.
+// Triangles that lie entirely behind the face along one of the octant's axes are left out: each
+// octant has three planes, perpendicular to the axes, where the face ends.
 
 #include <utility>
 
@@ -18,21 +20,22 @@
 namespace mjsense {
 namespace {
 
-// Slopes beyond count as walls: see leaves_mesh().
+// Maximum slope of a horizon; steeper ones are treated as walls. See leaves_mesh().
 constexpr float kSteepest = 1.2f;
-// Of the mesh's size: lower is no rise, and a corner that far on the wrong side of an edge is on it.
+// Relative to the mesh's size. Smaller heights do not count as a rise, and a corner that is beyond
+// an edge by less counts as on it.
 constexpr float kFlat = 1e-6f;
-// Of the mesh's size: rays that begin higher above their face are not spared.
+// Relative to the mesh's size. Rays that start higher above their face are always cast.
 constexpr float kMostLift = 3e-3f;
 
-// A face as its neighbours are looked at: all relative to its first corner.
+// A face as the origin of a horizon; all coordinates are relative to its first corner.
 struct Outlook {
-  static constexpr int kLines = 6;  // three along edges, three through corners
+  static constexpr int kLines = 6;  // three along the edges, three through the corners
   float origin[3], normal[3];
-  float sides[2][3];                   // to the other corners
+  float sides[2][3];                   // vectors to the other corners
   float out[kLines][3], line[kLines];  // e(x) = out . x - line
-  float sign[3], end[3];               // ahead is sign x >= end, by axis
-  float flat;                          // m
+  float sign[3], end[3];               // a point is ahead if sign * x >= end on every axis
+  float flat;                          // m, minimum height of a rise
   bool valid;
 
   Outlook(const TriangleBlock& block, int lane, int octant, float size) : flat(kFlat * size) {
@@ -59,7 +62,7 @@ struct Outlook {
       cross(side[i], normal, out[i]);
       valid = make_unit(out[i]) && valid;
     }
-    for (int i = 0; i < 3; ++i) {  // through the corner from which edge i leads on
+    for (int i = 0; i < 3; ++i) {  // line through the corner where edge i starts
       for (int k = 0; k < 3; ++k) out[3 + i][k] = out[i][k] + out[(i + 2) % 3][k];
       valid = make_unit(out[3 + i]) && valid;
     }
@@ -77,7 +80,7 @@ struct Outlook {
     }
   }
 
-  // Lanes where something within `half` of x may be ahead, or the farthest of points.
+  // Lanes whose box (center x, half sizes `half`) is at least partly ahead.
   Mask ahead(Vec3f x, Vec3f half) const {
     return (splat(end[0]) <= fma(splat(sign[0]), x.x, half.x)) &
            (splat(end[1]) <= fma(splat(sign[1]), x.y, half.y)) &
@@ -85,7 +88,7 @@ struct Outlook {
   }
 };
 
-// Children of a node in which something may rise more steeply than `slope`.
+// Children of a node that may contain a rise steeper than `slope`.
 inline std::uint32_t rising(const Outlook& from, const ClusterNode& node, float slope) {
   std::uint32_t out = 0;
   for (int k = 0; k < kClusterSize; k += kWidth) {
@@ -107,7 +110,7 @@ inline std::uint32_t rising(const Outlook& from, const ClusterNode& node, float 
   return out & ((1u << node.count) - 1);
 }
 
-// The line that a block is beyond farthest, by its first corner.
+// The line that the block is farthest beyond, judged by the block's first corner.
 inline int farthest_line(const Outlook& from, const TriangleBlock& block) {
   int best = 0;
   float most = -kInfinity;
@@ -120,8 +123,8 @@ inline int farthest_line(const Outlook& from, const TriangleBlock& block) {
   return best;
 }
 
-// The steepest rise among the triangles of a block, or `slope` if that is steeper; infinity where one is
-// not beyond any line.
+// The steepest slope among the triangles of a block, but at least `slope`. Infinity if a triangle
+// is not beyond any line.
 inline float steepest_of(const Outlook& from, const TriangleBlock& block, float slope) {
   const Float zero = splat(0.0f), flat = splat(from.flat), endless = splat(kInfinity);
   const int first = farthest_line(from, block);
@@ -146,8 +149,8 @@ inline float steepest_of(const Outlook& from, const TriangleBlock& block, float 
     const auto [mz, hz] = box(x[0].z, x[1].z, x[2].z);
     const Mask rises = (tall[0] | tall[1] | tall[2]) & from.ahead({mx, my, mz}, {hx, hy, hz});
     if (!any(rises)) continue;
-    Mask crosses[3];  // does the side to the next corner pass the height at which rising begins?
-    Float at[3];      // where
+    Mask crosses[3];  // whether the side to the next corner passes the height `flat`
+    Float at[3];      // position along the side, 0..1
     for (int j = 0; j < 3; ++j) {
       const int n = (j + 1) % 3;
       crosses[j] = (tall[j] & ~tall[n]) | (tall[n] & ~tall[j]);
@@ -169,12 +172,14 @@ inline float steepest_of(const Outlook& from, const TriangleBlock& block, float 
       const int i = (first + n) % Outlook::kLines;
       look_beyond(splat(from.out[i]), splat(from.line[i]));
     }
-    if (any(rises & (most < least))) {  // along the triangle's own foot
+    // Try a line parallel to the triangle's intersection with the face's plane.
+    if (any(rises & (most < least))) {
       const Vec3f n = cross(x[1] - x[0], x[2] - x[0]), up = splat(from.normal);
       Vec3f out = along(n, -dot(n, up), up);
       const Float away = dot(out, x[0]) + dot(out, x[1]) + dot(out, x[2]);
       const Float size = dot(out, out);
-      const Mask known = splat(1e-6f) * dot(n, n) < size;  // not as good as parallel to the face
+      // False if the triangle is nearly parallel to the face.
+      const Mask known = splat(1e-6f) * dot(n, n) < size;
       const Float sign =
           select(known, select(away < zero, splat(-1.0f), splat(1.0f)) / sqrt(size), zero);
       out = {sign * out.x, sign * out.y, sign * out.z};
@@ -187,14 +192,14 @@ inline float steepest_of(const Outlook& from, const TriangleBlock& block, float 
   return lane_max(most);
 }
 
-// Of Horizons::ask().
+// Computes the value for Horizons::ask().
 inline float find_horizon(const Clusters& clusters, int place, int octant, float size) {
   const Outlook from(clusters.blocks[place / kClusterSize], place % kClusterSize, octant, size);
   if (!from.valid) return Horizons::kNever;
   int waiting[Clusters::kMaxWaiting];
   int left = 1;
   waiting[0] = 0;
-  // Its neighbours first: what they hide need not be looked at.
+  // The face's own block first: steep neighbours exclude much of the tree.
   float slope = steepest_of(from, clusters.blocks[place / kClusterSize], 0);
   if (slope > kSteepest) return Horizons::kNever;
   while (left) {
@@ -212,14 +217,15 @@ inline float find_horizon(const Clusters& clusters, int place, int octant, float
   return slope / __builtin_sqrtf(1 + slope * slope) + 2e-3f;
 }
 
-// Lanes of `own` whose rays never meet the mesh of `g`, on whose faces they begin: at `foot` lifted by
-// `lift` (m) along `normal`, towards d; geom frame.
+// Lanes of `own` whose rays do not hit the mesh of `g` again. The rays start on the mesh's faces,
+// at `foot`, lifted by `lift` (m) along `normal`, and go in direction d; geom frame.
 //
-// Let the point be at most q from the face, L the lift, c and s cosine and sine of the angle between
-// the two normals. The ray begins at a height of at least L c - q and at most L s + q / facing
-// sideways from the face (which is seen under an angle with the cosine `facing`), so it is over what
-// rises with a slope of (L c - q) / (L s + q / facing) and less: 1.3 for what is asked for below. In all
-// it begins at most 1.5 L from the face, so that what is not ahead of its octant stays behind it.
+// Let q be the maximum distance of the point from the face, L the lift, and c and s the cosine and
+// sine of the angle between the two normals. The ray starts at a height of at least L c - q, and at
+// most L s + q / facing beside the face, where `facing` is the cosine of the angle under which the
+// camera sees the face. So it starts above everything that rises with a slope of at most (L c - q)
+// / (L s + q / facing), which is 1.3 for the limits used below. In total it starts at most 1.5 L
+// from the face, so geometry that is not ahead in the ray's octant stays behind it.
 inline Mask leaves_mesh(const ViewGeom& g, const int* faces, Vec3f foot, Vec3f normal, Vec3f d,
                         Float lift, Mask own) {
   own = own & (lift <= splat(kMostLift * g.radius));
@@ -230,7 +236,8 @@ inline Mask leaves_mesh(const ViewGeom& g, const int* faces, Vec3f foot, Vec3f n
     return select(x < splat(0.0f), int_of(1 << i), int_of(0));
   };
   store(octants, bit(d.x, 0) + bit(d.y, 1) + bit(d.z, 2));
-  // Sines as columns, too: a vector read back from single floats would wait for the store buffer.
+  // The sines also go through columns(): loading a vector right after storing its elements would
+  // stall on store forwarding.
   Float4 planes[kWidth], sines[kWidth];
   for (int i = 0; i < kWidth; ++i) {
     planes[i] = Float4{};

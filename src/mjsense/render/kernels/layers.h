@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
-// What lies before and inside the opaque surfaces of a packet: transparent geoms, reflections. Part
-// of the tile kernels.
+// Transparent geoms and planar reflections over the opaque surfaces of a packet. Part of the tile
+// kernels.
 
 #include "mjsense/render/kernels/fixed.h"
 #include "mjsense/render/kernels/shade.h"
@@ -10,12 +10,12 @@
 namespace mjsense {
 namespace {
 
-constexpr int kMaxMirrored = 32;  // transparent geoms in a reflection
-constexpr int kMaxLayers = 8;     // of transparent geoms over one packet
+constexpr int kMaxMirrored = 32;  // maximum number of transparent geoms in a reflection
+constexpr int kMaxLayers = 8;     // maximum number of transparent geoms over one packet
 
 struct Layer {
   Colors color;
-  alignas(64) float alpha[kLanes];  // 0: does not cover the lane
+  alignas(64) float alpha[kLanes];  // 0: the layer does not cover the lane
 };
 
 inline void blend(const Layer& layer, Colors& out) {
@@ -28,7 +28,8 @@ inline void blend(const Layer& layer, Colors& out) {
   }
 }
 
-// MuJoCo draws transparent geoms twice, near to far and back, each time over what is there.
+// MuJoCo blends transparent geoms twice over the image: from near to far, and then from far to
+// near.
 inline void shade_transparent(const View& view, const int* list, int count, const Pixels& pixels,
                               const Hits& opaque, Colors& out) {
   Layer layers[kMaxLayers];
@@ -50,13 +51,13 @@ inline void shade_transparent(const View& view, const int* list, int count, cons
   for (int i = used - 1; i >= 0; --i) blend(layers[i], out);
 }
 
-// What a tile shows of the mirror, and what is seen through it there.
+// The part of a tile that shows the mirror, and what is reflected there.
 struct Mirrored {
-  std::uint32_t lanes[kTilePackets];  // of each packet that show it
-  Tile tile;                          // of packets that have some: of the view behind the mirror
+  std::uint32_t lanes[kTilePackets];  // lanes of each packet that show the mirror
+  Tile tile;                          // the reflected view, for packets with such lanes
 };
 
-// Lanes of a packet that show the mirror. Of a box only the top is one.
+// Lanes of a packet that show the mirror. A box reflects only on its top.
 inline std::uint32_t mirror_lanes(const View& view, const Pixels& pixels, const Hits& hits) {
   std::uint32_t lanes = 0;
   for (int k = 0; k < kLanes; k += kWidth)
@@ -73,7 +74,7 @@ inline std::uint32_t mirror_lanes(const View& view, const Pixels& pixels, const 
   return lanes & top;
 }
 
-// What the mirror shows in the tile, of which everything opaque is traced.
+// Traces the reflected view in the tile. The tile's opaque geoms must already be traced.
 inline void look_through_mirror(const View& view, int packets, const Tile& tile, Mirrored& out) {
   PacketMask through = 0;
   for (int q = 0; q < packets; ++q) {
@@ -102,7 +103,7 @@ inline void look_through_mirror(const View& view, int packets, const Tile& tile,
   }
 }
 
-// Adds what the mirror shows in packet `q` to its colour.
+// Adds the reflection to the colour of packet `q`.
 inline void add_reflection(const View& view, const Mirrored& mirrored, int q, Colors& out) {
   const std::uint32_t lanes = mirrored.lanes[q];
   if (!lanes) return;
@@ -116,7 +117,7 @@ inline void add_reflection(const View& view, const Mirrored& mirrored, int q, Co
     Surfaces surfaces;
     gather_surfaces(beyond, through, found, seen, true, surfaces);
     shade(beyond, surfaces, found, seen, nullptr, color);
-    for (int k = 0; k < kLanes; k += kWidth)  // what lanes without a hit hold is no colour
+    for (int k = 0; k < kLanes; k += kWidth)  // lanes without a hit hold undefined values
       for (auto& c : color.rgb)
         store(c + k, select(mask_of(seen >> k & kAllLanes), load(c + k), splat(0.0f)));
   }

@@ -1,19 +1,19 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
-// Points and boxes as a light sees them. Part of the tile kernels.
+// Windows of points and boxes in a light's image. Part of the tile kernels.
 
 #include "mjsense/render/kernels/rays.h"
 
 namespace mjsense {
 namespace {
 
-// Points as a light sees them: none has w above `farthest`.
+// Window of a set of points; all of them have w <= farthest.
 struct LitWindow {
   float u0, u1, v0, v1, farthest;
   bool empty() const { return !(u0 <= u1 && v0 <= v1); }
 };
 
-// Window of the points of `lanes`, of which there are some.
+// Window of the points of `lanes`, which must not be empty.
 inline LitWindow window_of(const LightFrame& f, const float (*p)[kLanes], std::uint32_t lanes,
                            float error) {
   const Float endless = splat(kInfinity);
@@ -51,7 +51,7 @@ inline LitWindow window_of(const LightFrame& f, const float (*p)[kLanes], std::u
   return out;
 }
 
-// Which of kWidth windows from `first` on overlap.
+// Returns which of kWidth windows from `first` on overlap b.
 inline std::uint32_t overlaps(const LightWindows& a, int first, const LitWindow& b) {
   return bits((loadu(a.u0 + first) <= splat(b.u1)) & (splat(b.u0) <= loadu(a.u1 + first)) &
               (loadu(a.v0 + first) <= splat(b.v1)) & (splat(b.v0) <= loadu(a.v1 + first)) &
@@ -63,7 +63,7 @@ struct alignas(64) ChildWindows {
   float u0[kClusterSize], u1[kClusterSize], v0[kClusterSize], v1[kClusterSize], w[kClusterSize];
 };
 
-// A geom of triangles in a light's frame.
+// Transform of a triangle geom into a light's frame.
 struct SeenByLight {
   Vec3f rows[3], sizes[3];
   Float at[3];
@@ -83,12 +83,12 @@ struct SeenByLight {
       sizes[i] = {abs(rows[i].x), abs(rows[i].y), abs(rows[i].z)};
       at[i] = splat(offset);
     }
-    // Rays from the shape's own surface begin a little above it.
+    // Shadow rays from the geom's own surface start slightly above it.
     const float depth = g.center[2] < 0 ? -g.center[2] : g.center[2];
     error = splat(tile_error + kLightError * g.radius + 1e-4f * (depth + g.radius));
   }
 
-  // The children whose boxes overlap the window.
+  // Returns the children whose boxes overlap the window, and writes the windows of all children.
   std::uint32_t children(const ClusterNode& node, const LitWindow& points,
                          ChildWindows& out) const {
     const Float zero = splat(0.0f), one = splat(1.0f);

@@ -1,13 +1,13 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
-// From what a packet of pixels sees to the images. Part of the tile kernels.
+// Writes the results of a packet of pixels to the output images. Part of the tile kernels.
 
 #include "mjsense/render/kernels/layers.h"
 
 namespace mjsense {
 namespace {
 
-// `values` [16, n] of a packet into the image [H, W, n].
+// Copies `values` [16, n] of a packet into the image [H, W, n].
 template <int n, typename T>
 void write_pixels(const PixelGrid& grid, int x0, int y0, const T* values, T* image) {
   const int columns = grid.width - x0 < 4 ? grid.width - x0 : 4;
@@ -42,7 +42,7 @@ inline void write_segmentation(const View& view, std::int32_t* image, int x0, in
   int last = -1;
   std::int32_t id = -1, object = -1;
   for (int i = 0; i < kLanes; ++i) {
-    if (hits.geom[i] != last) {  // most packets see few
+    if (hits.geom[i] != last) {  // cache: most packets show few geoms
       last = hits.geom[i];
       id = last < 0 ? -1 : view.geoms[last].object_id;
       object = last < 0 ? -1 : view.geoms[last].object;
@@ -86,14 +86,14 @@ inline void write_geometry(const View& view, const ImageTargets& targets, int x0
   if (targets.points) write_points(view, targets.points, x0, y0, pixels, hits);
 }
 
-// Two pixels of 24 bits each, without the gap between them.
+// Packs two 24-bit pixels into 48 bits.
 inline std::uint64_t close_up(const std::uint32_t* p) {
   constexpr std::uint64_t kLow = 0xffffff;
   const std::uint64_t both = p[0] | static_cast<std::uint64_t>(p[1]) << 32;
   return (both & kLow) | (both >> 8 & kLow << 24);
 }
 
-// Colours 0..1 of a packet.
+// Writes a packet's colours (0..1).
 inline void write_rgb(const ImageTargets& targets, const PixelGrid& grid, int x0, int y0,
                       const float (*rgb)[kLanes], float scale) {
   alignas(64) std::uint32_t packed[kLanes];  // 0xbbggrr
@@ -109,7 +109,7 @@ inline void write_rgb(const ImageTargets& targets, const PixelGrid& grid, int x0
   for (int r = 0; r < rows; ++r) {
     std::uint8_t* out = targets.rgb + 3 * (static_cast<std::size_t>(y0 + r) * grid.width + x0);
     const std::uint32_t* p = packed + 4 * r;
-    if (columns == 4) {  // twelve bytes, the lowest first
+    if (columns == 4) {  // twelve bytes, lowest first
       const std::uint64_t left = close_up(p), right = close_up(p + 2);
       const std::uint64_t words[2] = {left | right << 48, right >> 16};
       __builtin_memcpy(out, words, 12);

@@ -1,19 +1,21 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
-// Triangles drawn into a tile, where it has more pixels than the shape has triangles: each is set
-// up once for the tile instead of being met by every packet of rays. Part of the tile kernels.
+// Rasterises triangles into a tile. Used if the tile has more pixels than the geom has triangles:
+// each triangle is set up once per tile instead of being intersected by every packet of rays. Part
+// of the tile kernels.
 //
-// With corners c0 c1 c2 in the camera's frame, the ray d = (x, y, -1) of a pixel passes inside the
-// edge from c1 to c2 where d . (c2 - c1) x (c2 + c1) >= 0 (Pluecker's test): a linear function of x
-// and y, exactly opposite for the neighbour across the edge, so that nothing shows between them. 1
-// / t is linear too: d . N / (c0 . N) with N = (c1 - c0) x (c2 - c0).
+// Let c0 c1 c2 be the corners in the camera's frame. The ray d = (x, y, -1) of a pixel passes
+// inside the edge from c1 to c2 if d . (c2 - c1) x (c2 + c1) >= 0 (Pluecker's test). This is a
+// linear function of x and y and exactly the negative of that of the neighbour across the edge, so
+// there are no gaps between triangles. 1 / t is linear too: d . N / (c0 . N) with N = (c1 - c0) x
+// (c2 - c0).
 
 #include "mjsense/render/kernels/trace.h"
 
 namespace mjsense {
 namespace {
 
-// A block of triangles as functions of x and y: f(x, y) = f[0] x + f[1] y - f[2].
+// A block of triangles as linear functions of x and y: f(x, y) = f[0] x + f[1] y - f[2].
 struct alignas(64) Drawn {
   float edges[3][3][kClusterSize];
   float inverse_t[3][kClusterSize];
@@ -27,7 +29,7 @@ inline void store(float (*p)[kClusterSize], int k, Vec3f v) {
   store(p[2] + k, v.z);
 }
 
-// Lanes where the interval [low, high] contains a pixel's centre first + i * step.
+// Lanes where the interval [low, high] contains a pixel centre first + i * step.
 inline Mask holds_center(Float low, Float high, float first, float step) {
   constexpr float kSlack = 1e-3f;  // pixels
   const Float inverse = splat(1.0f / step);
@@ -35,7 +37,8 @@ inline Mask holds_center(Float low, Float high, float first, float step) {
   return -floor(-(min(a, b) - splat(kSlack))) <= floor(max(a, b) + splat(kSlack));
 }
 
-// The triangles that may show in the tile: they face the camera and lie over a pixel's centre.
+// Sets up the triangles that may be visible in the tile: they face the camera and cover a pixel
+// centre.
 inline std::uint32_t set_up(const View& view, const ViewGeom& g, const TriangleBlock& block,
                             const Tile& tile, Drawn& out) {
   const PixelGrid& grid = view.grid;
@@ -94,8 +97,8 @@ inline Float linear(const float (*f)[kClusterSize], int lane, Float x, Float y) 
   return fma(splat(f[0][lane]), x, fma(splat(f[1][lane]), y, splat(-f[2][lane])));
 }
 
-// Lanes of a packet that see triangle `lane` of the block as the nearest so far, written to its
-// hits.
+// Writes triangle `lane` of the block to the hits of those lanes of a packet where it is the
+// nearest so far. Returns whether there are any.
 inline bool draw(const ViewGeom& g, int index, const Drawn& drawn, int lane, int face, bool shaded,
                  const Pixels& pixels, Hits& h) {
   bool changed = false;
@@ -105,7 +108,7 @@ inline bool draw(const ViewGeom& g, int index, const Drawn& drawn, int lane, int
                 e2 = linear(drawn.edges[2], lane, x, y);
     const Mask inside = (zero <= e0) & (zero <= e1) & (zero <= e2);
     if (!any(inside)) continue;
-    // Seen almost edge-on, t may leave the triangle by rounding.
+    // If the triangle is seen almost edge-on, rounding may move t outside of it.
     const Float t =
         min(max(splat(1.0f) / linear(drawn.inverse_t, lane, x, y), splat(drawn.nearest[lane])),
             splat(drawn.farthest[lane]));
@@ -123,7 +126,7 @@ inline bool draw(const ViewGeom& g, int index, const Drawn& drawn, int lane, int
     store(h.prim + k, select(hit, int_of(face), load(h.prim + k)));
     store(h.u + k, select(hit, e1 * inverse, load(h.u + k)));
     store(h.v + k, select(hit, e2 * inverse, load(h.v + k)));
-    if (g.mesh) continue;  // it has normals of its own
+    if (g.mesh) continue;  // the mesh has vertex normals
     const Vec3f n =
         to_geom(g.rot, {splat(-drawn.inverse_t[0][lane]), splat(-drawn.inverse_t[1][lane]),
                         splat(-drawn.inverse_t[2][lane])});
@@ -134,7 +137,8 @@ inline bool draw(const ViewGeom& g, int index, const Drawn& drawn, int lane, int
   return changed;
 }
 
-// Half-spaces in the geom's frame, a . q + b >= 0, whose intersection holds all that the tile sees.
+// Half-spaces a . q + b >= 0 in the geom's frame; their intersection contains everything the tile
+// can see.
 struct TileFrustum {
   static constexpr int kPlanes = 5;
   float a[kPlanes][3], size[kPlanes][3], b[kPlanes];
@@ -154,7 +158,7 @@ struct TileFrustum {
       const float reach = g.pos[0] * g.pos[0] + g.pos[1] * g.pos[1] + g.pos[2] * g.pos[2];
       b[p] += 1e-6f * (g.radius + __builtin_sqrtf(reach));  // rounding
     }
-    b[4] += tile.depth;  // nothing behind what is seen already
+    b[4] += tile.depth;  // excludes what is behind the hits so far
   }
 
   std::uint32_t children(const ClusterNode& node) const {
@@ -175,9 +179,10 @@ struct TileFrustum {
   }
 };
 
-constexpr int kMaxBlocks = 640;  // more in one tile are never worth drawing
+constexpr int kMaxBlocks = 640;  // in one tile; more are never worth rasterising
 
-// The blocks of triangles that the tile may see; -1: more than `most`.
+// Writes the blocks of triangles that the tile may see and returns their number, or -1 if it
+// exceeds `most`.
 inline int find_blocks(const Clusters& clusters, const TileFrustum& frustum, int most,
                        int* blocks) {
   int waiting[Clusters::kMaxWaiting];
@@ -204,7 +209,8 @@ inline void prefetch(const TriangleBlock& block) {
   for (std::size_t line = 0; line < sizeof block; line += 64) __builtin_prefetch(p + line);
 }
 
-// Draws geom `index` into `packets` of the tile, if that is cheaper than rays; false: it is not.
+// Rasterises geom `index` into `packets` of the tile if that is cheaper than casting rays. Returns
+// false if it is not.
 inline bool rasterize(const View& view, int index, PacketMask packets, Tile& tile,
                       PacketMask& changed) {
   const ViewGeom& g = view.geoms[index];
@@ -223,7 +229,7 @@ inline bool rasterize(const View& view, int index, PacketMask packets, Tile& til
       const int lane = __builtin_ctz(lanes);
       const float window[4] = {drawn.window[0][lane], drawn.window[1][lane], drawn.window[2][lane],
                                drawn.window[3][lane]};
-      // What coincides with what is seen already is in reach too: shows() decides.
+      // Triangles that coincide with earlier hits are in reach too; shows() decides.
       const float nearest = drawn.nearest[lane] * (1 - 2 * kSame);
       PacketMask over = packets & packets_in_reach(window, nearest, tile);
       for (; over; over &= over - 1) {

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
-// Packets of 16 pixels against one geom. Part of the tile kernels: compiled once per instruction
-// set.
+// Intersects packets of 16 pixels with one geom. Part of the tile kernels, which are compiled once
+// per instruction set.
 
 #include <mujoco/mujoco.h>
 
@@ -18,24 +18,24 @@ constexpr int kLanes = 16;
 constexpr float kInfinity = __builtin_inff();
 constexpr float kTiny = 1e-20f;
 
-// Rays of 4 x 4 pixels: X and Y of PixelGrid, lane = 4 * row + column.
+// Rays of 4 x 4 pixels: X and Y of PixelGrid; lane = 4 * row + column.
 struct alignas(64) Pixels {
   float x[kLanes], y[kLanes];
-  float near[kLanes];  // planar depth from which on something is seen
+  float near[kLanes];  // minimum planar depth of a hit
   float window[4];     // X min, X max, Y min, Y max
 };
 
 struct alignas(64) Hits {
-  float t[kLanes];   // planar depth; infinity: nothing
-  int id[kLanes];    // geom id; -1: nothing
-  int geom[kLanes];  // index into View::geoms; -1: nothing
-  // What follows is there for triangles only.
-  int prim[kLanes];  // face of a mesh; side of a height field: -1
+  float t[kLanes];   // planar depth; infinity: no hit
+  int id[kLanes];    // geom id; -1: no hit
+  int geom[kLanes];  // index into View::geoms; -1: no hit
+  // The remaining fields are valid for triangles only.
+  int prim[kLanes];  // face of a mesh; -1 for the walls of a height field
   float u[kLanes], v[kLanes];
   float n[3][kLanes];  // geom frame, any length
 };
 
-// Which of a layered view's geoms.
+// Selects geoms of a layered view.
 enum class Part { kAll, kFixed, kMoving };
 
 inline bool belongs(const ViewGeom& g, Part part) {
@@ -50,14 +50,14 @@ inline Vec3f cross(Vec3f a, Vec3f b) {
   return {fma(a.y, b.z, -(a.z * b.y)), fma(a.z, b.x, -(a.x * b.z)), fma(a.x, b.y, -(a.y * b.x))};
 }
 
-// Where the pixels of a packet hit, camera frame; of lanes without a hit any number.
+// Hit points of a packet's pixels, camera frame. Undefined in lanes without a hit.
 inline Vec3f hit_point(const View& view, const Pixels& pixels, const Hits& hits, int k) {
   const Float t = load(hits.t + k), x = load(pixels.x + k), y = load(pixels.y + k);
   if (view.grid.orthographic) return {x, y, -t};
   return {t * x, t * y, -t};
 }
 
-// Box around the points of `lanes`; low > high if there are none.
+// Bounding box of the points of `lanes`; low > high if there are none.
 inline void bounds(const float (*p)[kLanes], std::uint32_t lanes, float* low, float* high) {
   for (int c = 0; c < 3; ++c) {
     Float least = splat(kInfinity), most = splat(-kInfinity);
@@ -90,7 +90,8 @@ struct LocalRay {
   Vec3f o, d;
 };
 
-// Where a line is inside a convex solid: enter <= exit, or infinity and minus infinity.
+// Interval of a line inside a convex solid: enter <= exit, or (infinity, minus infinity) if it
+// misses.
 struct Interval {
   Float enter, exit;
 };
@@ -100,8 +101,8 @@ inline Interval where(Mask m, Interval a) {
   return {select(m, a.enter, splat(kInfinity)), select(m, a.exit, splat(-kInfinity))};
 }
 
-// The distance of the line from the centre decides, not a difference of large squares: silhouettes
-// of small far spheres stay round in single precision.
+// Uses the distance of the line from the centre instead of a difference of large squares, so that
+// silhouettes of small distant spheres stay round in single precision.
 inline Interval sphere(Vec3f o, Vec3f d, float radius) {
   const Float a = dot(d, d);
   const Float middle = -dot(o, d) / a;
@@ -136,7 +137,7 @@ inline Interval box(Vec3f o, Vec3f d, const float* center, const float* half) {
   return where(all.enter <= all.exit, all);
 }
 
-// The endless cylinder around z.
+// The infinite cylinder around the z axis.
 inline Interval tube(Vec3f o, Vec3f d, float radius) {
   const Float a = max(fma(d.x, d.x, d.y * d.y), splat(kTiny));
   const Float middle = -fma(o.x, d.x, o.y * d.y) / a;
@@ -179,7 +180,7 @@ inline Interval solid(const ViewGeom& g, Vec3f o, Vec3f d) {
   }
 }
 
-// Crossing of a plane inside its size, from the front or from both sides.
+// Intersection with a plane within its size: from the front only, or from both sides.
 inline Float plane(const ViewGeom& g, Vec3f o, Vec3f d, bool both_sides) {
   const Float t = -o.z * safe_inverse(d.z);
   const Vec3f p = along(o, t, d);
@@ -190,7 +191,7 @@ inline Float plane(const ViewGeom& g, Vec3f o, Vec3f d, bool both_sides) {
   return select(hit, t, splat(kInfinity));
 }
 
-// Elevation at column and row position (fractions allowed) along the border of a height field, m.
+// Elevation (m) at a fractional column and row on the border of a height field.
 inline float border_height(const HeightField& f, float column, float row) {
   const int c = column < 0 ? 0 : column >= f.cols - 1 ? f.cols - 2 : static_cast<int>(column);
   const int r = row < 0 ? 0 : row >= f.rows - 1 ? f.rows - 2 : static_cast<int>(row);

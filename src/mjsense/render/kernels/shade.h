@@ -1,11 +1,11 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
-// From surfaces to colours: MuJoCo's classic light model (OpenGL's fixed function, evaluated at
-// every pixel). Part of the tile kernels.
+// Shading of surfaces: MuJoCo's classic light model (OpenGL's fixed-function lighting, evaluated
+// per pixel). Part of the tile kernels.
 //
 //   base    clamp(emission + sum over lights without shadows)
 //   light   attenuation * spot * (ambient + diffuse + specular)
-//   colour  clamp(texture * (base + sum over lights with shadows, where not barred, of clamp(light)))
+//   colour  clamp(texture * (base + sum over lights with shadows, where lit, of clamp(light)))
 
 #include "mjsense/render/kernels/shadow.h"
 #include "mjsense/render/kernels/surfaces.h"
@@ -17,7 +17,7 @@ struct alignas(64) Colors {
   float rgb[3][kLanes];
 };
 
-// x^n for x in [0, 1]; error below 0.002 where it matters (what 8 bits show).
+// x^n for x in [0, 1]; the error is below 0.002 in the range that is visible in 8 bits.
 inline Float power(Float x, Float n) {
   const Float zero = splat(0.0f), one = splat(1.0f), least = splat(0.3f);
   const Float floor_x = max(x, least);
@@ -34,18 +34,19 @@ inline Float power(Float x, Float n) {
 
 struct LightTerm {
   Float scale;           // attenuation * spot
-  Float diffuse;         // N L
-  Vec3f to_light, unit;  // the same direction
+  Float diffuse;         // N . L
+  Vec3f to_light, unit;  // the same direction: not normalised, normalised
 };
 
 inline Float attenuation(const ViewLight& light, Float distance) {
   const float* a = light.attenuation;
-  if (a[1] == 0 && a[2] == 0) return splat(1.0f / (a[0] > 1e-6f ? a[0] : 1e-6f));  // the default
+  // MuJoCo's default
+  if (a[1] == 0 && a[2] == 0) return splat(1.0f / (a[0] > 1e-6f ? a[0] : 1e-6f));
   const Float loss = fma(fma(splat(a[2]), distance, splat(a[1])), distance, splat(a[0]));
   return splat(1.0f) / max(loss, splat(1e-6f));
 }
 
-// Of the lanes from k on.
+// For lanes k .. k + kWidth - 1.
 inline LightTerm light_term(const ViewLight& light, const Surfaces& s, int k) {
   const Float zero = splat(0.0f), one = splat(1.0f);
   const Vec3f n{load(s.n[0] + k), load(s.n[1] + k), load(s.n[2] + k)};
@@ -69,8 +70,8 @@ inline LightTerm light_term(const ViewLight& light, const Surfaces& s, int k) {
   return {scale, max(dot(n, l), zero), way, l};
 }
 
-// What makes points p directions to the viewer, which is the camera's origin, of orthographic cameras
-// too: so it is in OpenGL.
+// Factor that scales a point p to the unit direction to the viewer. As in OpenGL, the viewer is at
+// the camera's origin, for orthographic cameras too.
 struct alignas(64) ToEye {
   float scale[kLanes];
 
@@ -82,7 +83,7 @@ struct alignas(64) ToEye {
   }
 };
 
-// One light on all lanes of a packet.
+// One light's terms for all lanes of a packet.
 struct Lit {
   LightTerm terms[kLanes / kWidth];
 
@@ -92,7 +93,8 @@ struct Lit {
   }
 };
 
-// (N H)^exponent of the lanes from k on that are in `lanes` and shine.
+// (N . H)^exponent for lanes k .. k + kWidth - 1; 0 for lanes outside `lanes` and for surfaces
+// without specular reflection.
 inline Float highlight(const LightTerm& term, const Surfaces& s, const ToEye& eye, int k,
                        std::uint32_t lanes) {
   const Float zero = splat(0.0f), one = splat(1.0f);
@@ -103,15 +105,15 @@ inline Float highlight(const LightTerm& term, const Surfaces& s, const ToEye& ey
   const Vec3f p{load(s.p[0] + k), load(s.p[1] + k), load(s.p[2] + k)};
   const Vec3f h = along(term.unit, load(eye.scale + k), p);
   const Float near = dot(n, h), ahead = max(near, zero), size = dot(h, h);
-  // Most packets are far from it: neither root nor power is asked for.
+  // Most packets are far from the highlight; skip the square root and the power.
   glossy = glossy & ~(ahead * ahead < load(s.dull + k) * size);
   if (!any(glossy)) return zero;
   const Float nh = near / sqrt(max(size, splat(1e-20f)));
   return select(glossy, power(min(max(nh, zero), one), load(s.exponent + k)), zero);
 }
 
-// Adds the light's contribution to the lanes of `sum` from k on, for those that are not in `dark`;
-// clamped to 1 by itself if `separate`.
+// Adds the light's contribution to `sum` for lanes k .. k + kWidth - 1, except for lanes in `dark`.
+// `separate`: clamp the contribution to 1 first.
 inline void add_light(const ViewLight& light, const LightTerm& term, const Surfaces& s,
                       const ToEye& eye, int k, std::uint32_t lanes, std::uint32_t dark,
                       bool separate, Colors& sum) {
@@ -127,19 +129,20 @@ inline void add_light(const ViewLight& light, const LightTerm& term, const Surfa
   }
 }
 
-// What casts shadows on a tile, by light. In a layered view fixed lanes of a packet know already
-// where fixed geoms leave them in the dark.
+// Shadow casters of a tile, per light. In a layered view, the fixed lanes of a packet already store
+// which of them are shadowed by fixed geoms.
 struct Shadows {
-  Casters fixed[View::kMaxLights], moving[View::kMaxLights];  // not layered: all are moving
+  // If the view is not layered, all casters are in `moving`.
+  Casters fixed[View::kMaxLights], moving[View::kMaxLights];
   const FixedTile* known = nullptr;
-  // Of the packet at hand:
+  // State of the current packet:
   int packet = 0;
   std::uint32_t fixed_lanes = 0;
-  bool settled = false;                          // all lanes are fixed, and it is known
-  std::uint32_t settled_dark[View::kMaxLights];  // by light, which of them are dark
+  bool settled = false;  // all lanes show fixed geoms and settled_dark is valid
+  std::uint32_t settled_dark[View::kMaxLights];  // dark lanes, per light
 };
 
-// Lanes that do not get light `index`: barred by a geom, or turned away.
+// Lanes that light `index` does not reach: in shadow, or facing away.
 inline std::uint32_t dark_lanes(const View& view, int index, const Lit& lit, const Surfaces& s,
                                 const Hits& hits, std::uint32_t lanes, Shadows& shadows) {
   if (shadows.settled) return shadows.settled_dark[index];
@@ -154,7 +157,7 @@ inline std::uint32_t dark_lanes(const View& view, int index, const Lit& lit, con
     store(rays.d[0] + k, term.to_light.x);
     store(rays.d[1] + k, term.to_light.y);
     store(rays.d[2] + k, term.to_light.z);
-    // MuJoCo's directional lights have a place after all: nothing behind it casts a shadow.
+    // MuJoCo's directional lights have a position: geoms behind it cast no shadow.
     const Float end = directional ? dot(p - splat(light.pos), splat(light.dir)) : splat(1.0f);
     reachable |= bits(splat(0.0f) < end) << k;
     store(rays.end + k, end);
@@ -171,7 +174,7 @@ inline std::uint32_t dark_lanes(const View& view, int index, const Lit& lit, con
   return dark | in_shadow(view, shadows.moving[index], rays, active & ~dark);
 }
 
-// Colours 0..1 of `lanes`. No shadows: no light casts any here.
+// Computes the colours (0..1) of `lanes`. `shadows`: null to ignore shadows.
 inline void shade(const View& view, const Surfaces& s, const Hits& hits, std::uint32_t lanes,
                   Shadows* shadows, Colors& out) {
   Colors separate;

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
-// What lies between a point and a light. Part of the tile kernels.
+// Shadow rays: tests whether a geom lies between a point and a light. Part of the tile kernels.
 
 #include "mjsense/render/kernels/casters.h"
 #include "mjsense/render/kernels/horizon.h"
@@ -8,17 +8,17 @@
 namespace mjsense {
 namespace {
 
-// Points to be lit, camera frame, and the way to the light: q = p + s d, s in (0, end).
+// Points to be lit and their rays to the light, camera frame: q = p + s d, s in (0, end).
 struct alignas(64) LightRays {
   const float (*p)[kLanes];
-  const float (*n)[kLanes];  // the surface's normals
-  const int *geom, *face;    // of Hits
+  const float (*n)[kLanes];  // surface normals
+  const int *geom, *face;    // as in Hits
   float d[3][kLanes];
-  float end[kLanes];  // 1 for a light at a place; how far it is for a direction
+  float end[kLanes];  // 1 for a light with a position; the distance in m for a directional light
 };
 
-// Rays from on or above a height field that climb more steeply than it does anywhere: they do not
-// come back to it.
+// Rays from on or above a height field that rise more steeply than its steepest slope; they do not
+// hit it again.
 inline Mask leaves_ground(const HeightField& field, Vec3f o, Vec3f d, Mask on_ground) {
   const Float level = sqrt(fma(d.x, d.x, d.y * d.y));
   return (on_ground | (splat(field.top) <= o.z)) & (level * splat(1.01f * field.steepest) < d.z);
@@ -35,7 +35,7 @@ inline std::uint32_t shadow_of_triangles(const View& view, int index, const Ligh
     const Vec3f p{load(rays.p[0] + k), load(rays.p[1] + k), load(rays.p[2] + k)};
     const Vec3f d = to_geom(g.rot, {load(rays.d[0] + k), load(rays.d[1] + k), load(rays.d[2] + k)});
     const Vec3f foot = to_geom(g.rot, p - splat(g.pos));
-    // A surface must not lie in its own shadow by rounding: start a little above it.
+    // Start slightly above the surface, so that rounding does not put it in its own shadow.
     const Int same = load(rays.geom + k);
     const Mask other = ~(same == int_of(index));
     const Vec3f n = to_geom(g.rot, {load(rays.n[0] + k), load(rays.n[1] + k), load(rays.n[2] + k)});
@@ -50,7 +50,7 @@ inline std::uint32_t shadow_of_triangles(const View& view, int index, const Ligh
       hit = hit & ~leaves_mesh(g, rays.face + k, foot, n, d, lift, hit & ~other);
     if (!any(hit)) continue;
     store(valid, select(hit, int_of(-1), int_of(0)));
-    // What was not hit, the sky, lies at infinity, which Embree must not be given.
+    // Lanes without a hit (the sky) have infinite coordinates, which must not be passed to Embree.
     const Float zero = splat(0.0f);
     store(ray.org_x, select(hit, o.x, zero));
     store(ray.org_y, select(hit, o.y, zero));
@@ -95,7 +95,7 @@ inline std::uint32_t shadow_of_geom(const View& view, int caster, const LightRay
   return dark;
 }
 
-// Lanes of `active` whose way to the light is barred by one of `casters`.
+// Lanes of `active` whose ray to the light is blocked by one of `casters`.
 inline std::uint32_t in_shadow(const View& view, Casters& casters, const LightRays& rays,
                                std::uint32_t active) {
   if (casters.count == 0 || !active) return 0;

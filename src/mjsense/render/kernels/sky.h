@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
-// What lies behind the opaque surfaces of a packet: the sky, and the haze before it. Part of the
-// tile kernels.
+// Background of a packet: the skybox, and the haze in front of it. Part of the tile kernels.
 
 #include "mjsense/render/kernels/shade.h"
 
@@ -20,7 +19,7 @@ inline void shade_background(const View& view, const Pixels& pixels, std::uint32
     const Vec3f d{ortho ? zero : load(pixels.x + k), ortho ? zero : load(pixels.y + k),
                   splat(-1.0f)};
     const Vec3f w = from_geom(r, d);
-    // MuJoCo turns the sky a quarter around x.
+    // MuJoCo rotates the skybox by 90 degrees about x.
     Rgb color{zero, zero, zero};
     if (view.skybox)
       color = sample_cube(*view.skybox, m, {w.x, w.z, -w.y},
@@ -32,9 +31,10 @@ inline void shade_background(const View& view, const Pixels& pixels, std::uint32
   }
 }
 
-// MuJoCo's sky hangs on a cylinder around the camera, and on what it hides haze lies: the inside of
-// a cone that rises from the plane at 1 - width of the cylinder's radius to its rim at the height
-// of the camera. Densest where the plane meets the cylinder, it fades towards both borders.
+// MuJoCo's sky is a cylinder around the camera that hides everything beyond it. The haze is the
+// inside of a cone that rises from the plane, at 1 - width of the cylinder's radius, to its rim at
+// the height of the camera. It is densest where the plane meets the cylinder and fades towards both
+// of its borders.
 inline void add_haze(const View& view, const Pixels& pixels, const Hits& hits, Colors& out) {
   const View::Haze& haze = view.haze;
   const Float zero = splat(0.0f), one = splat(1.0f), distance = splat(view.sky_distance);

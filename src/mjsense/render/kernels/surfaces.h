@@ -1,14 +1,14 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
-// The surfaces that the pixels of a packet show: points, normals, materials, textures. Part of the
-// tile kernels.
+// Gathers the surfaces that a packet's pixels show: points, normals, materials, texture colours.
+// Part of the tile kernels.
 
 #include "mjsense/render/kernels/texture.h"
 
 namespace mjsense {
 namespace {
 
-// A packet's surface points, camera frame. Lanes that show nothing hold anything.
+// Surface data of a packet, camera frame. Undefined in lanes without a hit.
 struct alignas(64) Surfaces {
   float p[3][kLanes], n[3][kLanes];
   float rgb[3][kLanes], alpha[kLanes];
@@ -16,7 +16,7 @@ struct alignas(64) Surfaces {
   float specular[kLanes], exponent[kLanes], dull[kLanes], emission[kLanes];
 };
 
-// Unit normal in the geom's frame of a primitive at p.
+// Normal of a primitive at the surface point p, geom frame, any length.
 inline Vec3f primitive_normal(const ViewGeom& g, Vec3f p) {
   const Float zero = splat(0.0f), one = splat(1.0f);
   switch (g.type) {
@@ -48,8 +48,8 @@ inline Vec3f primitive_normal(const ViewGeom& g, Vec3f p) {
   }
 }
 
-// How far the hit point moves from one pixel to the next, across and down, on its tangent plane:
-// geom frame, m.
+// Displacement of the hit point on its tangent plane from one pixel to the next, horizontally and
+// vertically; geom frame, m.
 struct Steps {
   Vec3f x, y;
 };
@@ -68,10 +68,10 @@ inline Steps pixel_steps(const View& view, const ViewGeom& g, const Pixels& pixe
   return {step(n.x, one, zero, view.grid.dx), step(n.y, zero, one, view.grid.dy)};
 }
 
-// Texture coordinates that only scalar code knows: a mesh's own, and those of curved primitives.
+// Texture coordinates that are computed by scalar code: those of meshes and of curved primitives.
 struct alignas(64) Mapped {
   float u[kLanes], v[kLanes];
-  float rate_u[kLanes], rate_v[kLanes];  // per metre
+  float rate_u[kLanes], rate_v[kLanes];  // rates of change, per metre
 };
 
 inline void map_lanes(const ViewGeom& g, const Hits& hits, std::uint32_t lanes,
@@ -93,7 +93,7 @@ inline void map_lanes(const ViewGeom& g, const Hits& hits, std::uint32_t lanes,
   }
 }
 
-// Texture colours of `lanes`, all of geom g.
+// Samples the texture for `lanes`, which all show geom g.
 inline void texture_lanes(const View& view, const ViewGeom& g, const Pixels& pixels,
                           const Hits& hits, std::uint32_t lanes, const float (*local)[kLanes],
                           const float (*normal)[kLanes], Surfaces& out) {
@@ -126,7 +126,7 @@ inline void texture_lanes(const View& view, const ViewGeom& g, const Pixels& pix
         u = fma(q.x, splat(sx), splat(plane && g.size[0] > 0 ? 0.5f : 0.0f));
         v = fma(q.y, splat(-sy), splat(plane && g.size[1] > 0 ? 0.5f : 0.0f));
         const Float ku = splat(sx * s.repeat[0] * width), kv = splat(sy * s.repeat[1] * height);
-        // The largest component, as Mesa takes it: sharper than the length of the vector.
+        // Maximum component, as in Mesa; it gives a sharper image than the length of the vector.
         const auto texels = [&](Vec3f w) { return max(abs(ku * w.x), abs(kv * w.y)); };
         footprint = max(texels(steps.x), texels(steps.y));
       } else {
@@ -150,8 +150,8 @@ inline void texture_lanes(const View& view, const ViewGeom& g, const Pixels& pix
   }
 }
 
-// Normals of triangles: interpolated where the mesh has them, else the face's own. Other lanes hold
-// anything.
+// Normals of triangles: interpolated if the mesh has vertex normals, else the face's own. Undefined
+// in other lanes.
 inline Vec3f triangle_normals(const ViewGeom& g, const Hits& hits, std::uint32_t lanes, int k) {
   if (!(g.mesh && g.mesh->normals))
     return {load(hits.n[0] + k), load(hits.n[1] + k), load(hits.n[2] + k)};
@@ -168,8 +168,8 @@ inline Vec3f triangle_normals(const ViewGeom& g, const Hits& hits, std::uint32_t
   return {n.x, n.y, n.z};
 }
 
-// Of one geom's lanes `mine`: normals, materials, textures. `first`: of a packet's geoms, whose values
-// all lanes take that no other geom overwrites.
+// Gathers normals, materials and textures of the lanes `mine`, which all show g. `first`: g is the
+// first geom of the packet; its values are written to all lanes, and other geoms overwrite theirs.
 template <bool first>
 void gather_geom(const View& view, const Pixels& pixels, const Hits& hits, const ViewGeom& g,
                  std::uint32_t mine, bool color, Surfaces& out) {
@@ -184,7 +184,7 @@ void gather_geom(const View& view, const Pixels& pixels, const Hits& hits, const
     const Vec3f p{load(out.p[0] + k), load(out.p[1] + k), load(out.p[2] + k)};
     const Vec3f q = to_geom(g.rot, p - splat(g.pos));
     Vec3f n = g.bvh ? triangle_normals(g, hits, mine, k) : primitive_normal(g, q);
-    if (g.type != mjGEOM_PLANE) {  // whose normal is a unit vector
+    if (g.type != mjGEOM_PLANE) {  // a plane's normal already has length 1
       const Float inverse = splat(1.0f) / sqrt(max(dot(n, n), splat(1e-30f)));
       n = {n.x * inverse, n.y * inverse, n.z * inverse};
     }
@@ -213,7 +213,8 @@ void gather_geom(const View& view, const Pixels& pixels, const Hits& hits, const
   if (color && s.texture) texture_lanes(view, g, pixels, hits, mine, local, normal, out);
 }
 
-// Points, normals (unit, camera frame) and materials of `lanes`. `color`: also what only rgb needs.
+// Gathers points, normals (unit, camera frame) and materials of `lanes`. `color`: also what only
+// the rgb image needs.
 inline void gather_surfaces(const View& view, const Pixels& pixels, const Hits& hits,
                             std::uint32_t lanes, bool color, Surfaces& out) {
   for (int k = 0; k < kLanes; k += kWidth) {

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
-// Texture coordinates and filtering as OpenGL does them: bilinear, between two levels of the
-// pyramid. Part of the tile kernels.
+// Texture coordinates and filtering as in OpenGL: bilinear within a mip level, linear between two
+// levels. Part of the tile kernels.
 
 #include "mjsense/render/kernels/rays.h"
 
@@ -30,21 +30,22 @@ inline Rgb mix(Rgb a, Rgb b, Float f) {
   return {fma(f, b.r - a.r, a.r), fma(f, b.g - a.g, a.g), fma(f, b.b - a.b, a.b)};
 }
 
-// log2 of x >= 1 to about 1%: enough to choose between levels.
+// log2 of x >= 1 with an error of about 1%, which is sufficient to choose mip levels.
 inline Float rough_log2(Float x) {
   const Int b = bits_of(x);
   const Float m = to_float(bits_and(b, 0x7fffff)) * splat(1.0f / 0x800000);
   return to_float(shift_right(b, 23)) + fma(splat(0.34f) * m, splat(1.0f) - m, m - splat(127.0f));
 }
 
-// The size of a level and where it begins, lane by lane.
+// Size and offset of a mip level, per lane.
 struct Level {
   Float width, height;
   Int offset;
 
   Level(const Texture& texture, Float level) {
     const float first = first_lane(level);
-    if (!any((level < splat(first)) | (splat(first) < level))) {  // most packets need one only
+    // Most packets need only one level.
+    if (!any((level < splat(first)) | (splat(first) < level))) {
       const int i = static_cast<int>(first);
       width = splat(texture.width[i]);
       height = splat(texture.height[i]);
@@ -58,7 +59,7 @@ struct Level {
   }
 };
 
-// One level of the pyramid at (s, t) in [0, 1].
+// Samples one mip level at (s, t) in [0, 1].
 inline Rgb bilinear(const Texture& texture, const Level& level, Int face, Float s, Float t) {
   const Float zero = splat(0.0f), one = splat(1.0f), half = splat(0.5f);
   const Float w = level.width, h = level.height;
@@ -88,12 +89,12 @@ inline Rgb bilinear(const Texture& texture, const Level& level, Int face, Float 
   return mix(row(y0), row(y1), fy);
 }
 
-// 0..255 of the lanes in `wanted`. (s, t): once around in [0, 1); `footprint`: size of a pixel in
-// texels of level 0.
+// Colour (0..255) in the lanes of `wanted`. (s, t): [0, 1) covers the texture once. `footprint`:
+// size of a pixel in texels of level 0.
 inline Rgb sample(const Texture& texture, Mask wanted, Int face, Float s, Float t,
                   Float footprint) {
   const Float zero = splat(0.0f);
-  // What is no number, or endlessly far, must still be an index.
+  // NaN and huge values must still give a valid index.
   s = select(abs(s) < splat(1e6f), s, zero);
   t = select(abs(t) < splat(1e6f), t, zero);
   if (!texture.cube) {
@@ -104,7 +105,7 @@ inline Rgb sample(const Texture& texture, Mask wanted, Int face, Float s, Float 
   const Float size = min(max(footprint, splat(1.0f)), splat(65536.0f));
   Float lod = min(max(rough_log2(size), zero), last);
   if (any(~wanted)) lod = select(wanted, lod, splat(lane_min(select(wanted, lod, last))));
-  // Two levels are mixed only around the middle between them, as Mesa and GPUs do.
+  // Two levels are blended only near the middle between them, as in Mesa and on GPUs.
   const Float moved = lod + splat(0.25f), level = floor(moved);
   const Float between = max(fma(splat(2.0f), moved - level, splat(-1.0f)), zero);
   const Rgb near = bilinear(texture, Level(texture, min(level, last)), face, s, t);
@@ -113,7 +114,7 @@ inline Rgb sample(const Texture& texture, Mask wanted, Int face, Float s, Float 
   return mix(near, bilinear(texture, coarser, face, s, t), between);
 }
 
-// OpenGL's cube map: which face a direction meets, and where on it.
+// Samples a cube map as OpenGL does: selects the face by the direction's largest component.
 inline Rgb sample_cube(const Texture& texture, Mask wanted, Vec3f d, Float footprint) {
   const Float zero = splat(0.0f), half = splat(0.5f);
   const Float ax = abs(d.x), ay = abs(d.y), az = abs(d.z);
@@ -130,12 +131,12 @@ inline Rgb sample_cube(const Texture& texture, Mask wanted, Vec3f d, Float footp
 
 constexpr float kPi = 3.14159265358979f;
 
-// Texture coordinates of a packet. `rate_u`, `rate_v`: how fast they change at most, per metre.
+// Texture coordinates of a packet. `rate_u`, `rate_v`: their maximum rate of change, per metre.
 struct Coordinates {
   Float u, v, rate_u, rate_v;
 };
 
-// Of a box: p on the surface, n its normal; geom frame.
+// Coordinates on a box; p: point on the surface, n: its normal; geom frame.
 inline Coordinates box_uv(const ViewGeom& g, Vec3f p, Vec3f n) {
   const float* s = g.size;
   const Float half = splat(0.5f);
@@ -147,8 +148,8 @@ inline Coordinates box_uv(const ViewGeom& g, Vec3f p, Vec3f n) {
           ky};
 }
 
-// Coordinates of MuJoCo's curved primitives: p on the surface, geom frame. `per_meter`: how fast
-// they change, at most.
+// Coordinates on MuJoCo's curved primitives; p: point on the surface, geom frame. `per_meter_*`:
+// maximum rate of change.
 inline void curved_uv(const ViewGeom& g, const float* p, const float* n, float& u, float& v,
                       float& per_meter_u, float& per_meter_v) {
   const float* s = g.size;

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
-// A tile of 16 x 16 pixels: which geoms it can see, what each pixel sees, what colour that is. Part
-// of the tile kernels.
+// Renders a tile of 16 x 16 pixels: finds the geoms it can see, the hit of each pixel, and its
+// colour. Part of the tile kernels.
 
 #include "mjsense/render/kernels/fixed.h"
 #include "mjsense/render/kernels/layers.h"
@@ -11,11 +11,11 @@
 namespace mjsense {
 namespace {
 
-// Of the lanes of a packet.
+// Pixel offsets of a packet's lanes.
 alignas(64) constexpr int kColumn[kLanes] = {0, 1, 2, 3, 0, 1, 2, 3, 0, 1, 2, 3, 0, 1, 2, 3};
 alignas(64) constexpr int kRow[kLanes] = {0, 0, 0, 0, 1, 1, 1, 1, 2, 2, 2, 2, 3, 3, 3, 3};
 
-// Lanes outside the image repeat its border: they cost nothing extra and disturb nobody.
+// Lanes outside the image repeat its border; they cost no extra work and are not written.
 inline Int within(Int i, int size) { return select(less(i, int_of(size)), i, int_of(size - 1)); }
 
 inline void fill_bent(const PixelGrid& grid, int x0, int y0, float shift_x, float shift_y,
@@ -60,7 +60,8 @@ struct TileLists {
   int opaque = 0, transparent = 0;
 };
 
-// What a row of tiles may show. A lens with distortion bends rows: there it is everything in sight.
+// Finds the geoms that a row of tiles may show. With lens distortion, rows are curved; then all
+// visible geoms are listed.
 inline void find_row(const View& view, int ty, TileScratch& scratch) {
   const PixelGrid& grid = view.grid;
   const float high = grid.top + grid.dy * static_cast<float>(ty * kTileSize);
@@ -86,7 +87,7 @@ inline TileLists find_geoms(const View& view, const float* window, TileScratch& 
   return lists;
 }
 
-// Offsets in a pixel, far from each other in both directions: Hammersley points.
+// Sample offsets within a pixel: Hammersley points, which are well spread in both directions.
 inline void sample_shift(int index, int samples, float& x, float& y) {
   if (samples == 1) {
     x = y = 0;
@@ -99,7 +100,7 @@ inline void sample_shift(int index, int samples, float& x, float& y) {
   y = radical + 0.5f / samples - 0.5f;
 }
 
-// The colours of packet `q` before transparent geoms: what it sees, the sky, reflections, haze.
+// Computes the colours of packet `q` before transparent geoms: surfaces, sky, reflections, haze.
 inline void shade_packet(const View& view, const FixedTile* fixed, const Mirrored& mirrored, int q,
                          const Pixels& pixels, Hits& hits, Shadows& shadows, Colors& colors) {
   const std::uint32_t lanes = hit_lanes(hits);
@@ -119,7 +120,7 @@ inline void shade_packet(const View& view, const FixedTile* fixed, const Mirrore
   if (view.sky_distance > 0) add_haze(view, pixels, hits, colors);
 }
 
-// What a thread works on: TileScratch::tile.
+// Work space of a thread; TileScratch::tile points to it.
 struct TileSpace {
   Tile tile;
   Mirrored mirrored;
@@ -140,7 +141,8 @@ inline void render_tile(const View& view, const ImageTargets& targets, int tx, i
   alignas(64) float sum[kTilePackets][3][kLanes];
   for (int sample = 0; sample < samples || (sample == samples && samples > 1 && geometry);
        ++sample) {
-    // The last round, if there is one, is for depth and segmentation: through pixel centres.
+    // The last round, if present, is for depth and segmentation: its rays pass through the pixel
+    // centres.
     const bool centered = sample == samples || samples == 1;
     float shift_x = 0, shift_y = 0;
     if (!centered) sample_shift(sample, samples, shift_x, shift_y);
@@ -162,7 +164,7 @@ inline void render_tile(const View& view, const ImageTargets& targets, int tx, i
     for (int q = packets; q < kTilePackets; ++q) tile.farthest[q] = -kInfinity;
     tile.depth = far;
     const TileLists lists = find_geoms(view, window, scratch);
-    const FixedTile* fixed = nullptr;  // what is kept of the tile
+    const FixedTile* fixed = nullptr;  // the tile's cached layer
     if (!view.layered || samples > 1) {
       trace_tile(view, Part::kAll, scratch.opaque, lists.opaque, tile);
     } else {
@@ -176,7 +178,7 @@ inline void render_tile(const View& view, const ImageTargets& targets, int tx, i
         load_fixed(view, *fixed, packets, tile);
         if (targets.normals)
           for (int q = 0; q < packets; ++q) load_rest(*fixed, q, 0xffffu, tile.hits[q]);
-      } else {  // in the order that a kept layer has, so that the same pixels come out
+      } else {  // same order as with a cached layer, so that the pixels are identical
         trace_tile(view, Part::kFixed, scratch.opaque, lists.opaque, tile);
       }
       trace_tile(view, Part::kMoving, scratch.opaque, lists.opaque, tile);

@@ -5,7 +5,7 @@ namespace mjsense {
 
 namespace {
 
-constexpr int kSpareCasters = 4096;  // blocks of triangles
+constexpr int kSpareCasters = 4096;  // parts (nodes or blocks of triangles)
 
 }  // namespace
 

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
-// Owns what TileScratch points to: the work space of one thread.
+// Owns the memory that TileScratch points to: the work space of one thread.
 
 #include <vector>
 

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
-// Which geom the pixels of packets see first. Part of the tile kernels.
+// Finds the nearest geom for the pixels of packets by casting rays. Part of the tile kernels.
 
 #include "mjsense/render/kernels/rays.h"
 
@@ -11,11 +11,11 @@ inline bool overlap(const float* a, const float* b) {
   return a[0] <= b[1] && b[0] <= a[1] && a[2] <= b[3] && b[2] <= a[3];
 }
 
-// Surfaces nearer to each other than this (times t) coincide: the geom with the higher id shows, as
-// MuJoCo draws it later. (Rays, like mj_ray, take the lower one.)
+// Two hits coincide if their distance is less than this times t. The geom with the higher id is
+// shown, as MuJoCo draws it later. (Rays, like mj_ray, take the lower id.)
 constexpr float kSame = 3e-7f;
 
-// Lanes where a hit at t on geom `id` replaces what was there before.
+// Lanes where a hit at t on geom `id` replaces the earlier hit.
 inline Mask shows(Float t, Int id, Float before, Int id_before) {
   const Float slack = t * splat(kSame);
   return (t < splat(kInfinity)) &
@@ -25,22 +25,22 @@ inline Mask shows(Float t, Int id, Float before, Int id_before) {
 // Bit q: packet q of a tile.
 using PacketMask = std::uint32_t;
 
-constexpr int kPackets = kTileSize / 4;  // along a side
+constexpr int kPackets = kTileSize / 4;  // along one side of a tile
 constexpr int kTilePackets = kPackets * kPackets;
 static_assert(kTilePackets == kLanes, "a vector has a lane for each packet");
 
 struct alignas(64) Tile {
   Pixels pixels[kTilePackets];
   Hits hits[kTilePackets];
-  // By packet: Pixels::window, and the largest t of its hits (minus infinity: no packet).
+  // Per packet: Pixels::window, and the largest t of its hits (minus infinity: unused packet).
   float window[4][kTilePackets];
   float farthest[kTilePackets];
-  float around[4];  // all windows together
-  float depth;      // the largest of `farthest`
-  bool shaded;      // more than depth and ids is wanted
+  float around[4];  // union of all windows
+  float depth;      // maximum of `farthest`
+  bool shaded;      // outputs other than depth and ids are requested
 };
 
-// The packets that may see something in `window`, at `nearest` or beyond, before what they have.
+// Packets that may see something in `window`, at `nearest` or farther, in front of their hits.
 inline PacketMask packets_in_reach(const float* window, float nearest, const Tile& tile) {
   PacketMask packets = 0;
   for (int k = 0; k < kTilePackets; k += kWidth) {
@@ -54,8 +54,8 @@ inline PacketMask packets_in_reach(const float* window, float nearest, const Til
   return packets;
 }
 
-// What stays the same from packet to packet while one geom is traced. Packets are independent of
-// each other, so that the CPU works on several at once.
+// Constants for tracing one geom. Packets are independent of each other, so the CPU can overlap
+// work on several.
 struct Tracing {
   const ViewGeom& geom;
   int index;  // of the geom in the view
@@ -76,8 +76,8 @@ struct Tracing {
   }
 };
 
-// Of kWidth pixels from k on those whose ray meets the geom's bounding box before `limit`, as
-// Embree takes them; false if there are none.
+// Writes the rays of kWidth pixels from k on for Embree. Only rays that meet the geom's bounding
+// box before `limit` are valid; returns false if there are none.
 inline bool fill_rays(const Tracing& at, const Pixels& pixels, int k, Float limit,
                       EmbreeRayHits& rays, int* valid) {
   const ViewGeom& g = at.geom;
@@ -99,8 +99,8 @@ inline bool fill_rays(const Tracing& at, const Pixels& pixels, int k, Float limi
   return true;
 }
 
-// A closed surface shows its front first. Only where a back came first is it worth to ask Embree
-// about every triangle's side.
+// The first hit on a closed surface is a front face. Only lanes whose first hit is a back face are
+// traced again with Embree's filter that tests the side of every triangle.
 inline void look_behind_backs(const ViewGeom& g, Float limit, EmbreeRayHits& rays, int* valid) {
   const Vec3f n{load(rays.hit.Ng_x), load(rays.hit.Ng_y), load(rays.hit.Ng_z)};
   const Vec3f d{load(rays.ray.dir_x), load(rays.ray.dir_y), load(rays.ray.dir_z)};
@@ -118,7 +118,7 @@ inline PacketMask trace_triangles(const Tracing& at, const Pixels* pixels, Hits*
   const ViewGeom& g = at.geom;
   EmbreeRayHits rays;
   alignas(64) int valid[kWidth];
-  // What Embree leaves as it is.
+  // Embree does not change these fields.
   store(rays.ray.time, splat(0.0f));
   store(reinterpret_cast<int*>(rays.ray.mask), int_of(-1));
   store(reinterpret_cast<int*>(rays.ray.flags), int_of(0));
@@ -152,7 +152,8 @@ inline PacketMask trace_triangles(const Tracing& at, const Pixels* pixels, Hits*
   return changed;
 }
 
-// Side walls and base of a height field, from outside. Few rays meet them: one lane at a time.
+// Side walls and base of a height field, seen from outside. Few rays hit them, so they are
+// processed one lane at a time.
 inline bool trace_walls_of_packet(const Tracing& at, const Pixels& pixels, Hits& hits) {
   const ViewGeom& g = at.geom;
   const HeightField& f = *g.height_field;
@@ -200,7 +201,8 @@ inline PacketMask trace_walls(const Tracing& at, const Pixels* pixels, Hits* hit
   const float *size = g.height_field->size, *eye = g.eye;
   const bool above = -size[0] < eye[0] && eye[0] < size[0] && -size[1] < eye[1] &&
                      eye[1] < size[1] && -size[3] < eye[2];
-  if (above && !at.orthographic) return 0;  // all walls turn their backs
+  // From inside the field's sides and above its base, the camera sees no wall from outside.
+  if (above && !at.orthographic) return 0;
   PacketMask changed = 0;
   for (; packets; packets &= packets - 1) {
     const int q = __builtin_ctz(packets);
@@ -209,7 +211,7 @@ inline PacketMask trace_walls(const Tracing& at, const Pixels* pixels, Hits* hit
   return changed;
 }
 
-// Where pixels enter a solid or meet a plane.
+// Traces a solid or a plane; enter(o, d) returns the distance of the hit.
 template <typename Enter>
 PacketMask trace_surface(const Tracing& at, const Pixels* pixels, Hits* hits, PacketMask packets,
                          Enter enter) {
@@ -232,7 +234,8 @@ PacketMask trace_surface(const Tracing& at, const Pixels* pixels, Hits* hits, Pa
   return changed;
 }
 
-// Nearer hits of `packets` on geom `index` replace those in `hits`: which did. Front faces only.
+// Traces geom `index`, front faces only, and stores hits that are nearer than those in `hits`.
+// Returns the packets that changed.
 inline PacketMask trace_geom(const View& view, int index, const Pixels* pixels, Hits* hits,
                              PacketMask packets) {
   static constexpr float kOrigin[3] = {0, 0, 0};

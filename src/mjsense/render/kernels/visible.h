@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
-// What the pixels of a tile see first: by rays, or drawn where that is cheaper. Part of the tile
-// kernels.
+// Visibility of a tile's pixels: by casting rays, or by rasterising where that is cheaper. Part of
+// the tile kernels.
 
 #include "mjsense/render/kernels/raster.h"
 #include "mjsense/render/kernels/trace.h"
@@ -21,7 +21,8 @@ inline void update_farthest(Tile& tile, PacketMask packets) {
   tile.depth = lane_max(depth);
 }
 
-// Nearer hits of `packets` on geom `index` replace those of the tile: which did.
+// Rasterises or traces geom `index` and stores hits that are nearer than the tile's. Returns the
+// packets that changed.
 inline PacketMask draw_or_trace(const View& view, int index, PacketMask packets, Tile& tile) {
   const ViewGeom& g = view.geoms[index];
   PacketMask changed = 0;
@@ -33,8 +34,8 @@ inline PacketMask draw_or_trace(const View& view, int index, PacketMask packets,
   return trace_geom(view, index, tile.pixels, tile.hits, packets);
 }
 
-// The nearest hits of all packets among those geoms of `list` that are `part`; it is sorted by
-// ViewGeom::nearest.
+// Finds the nearest hits of all packets among the geoms of `list` that belong to `part`. `list`
+// must be sorted by ViewGeom::nearest.
 inline void trace_tile(const View& view, Part part, const int* list, int count, Tile& tile) {
   for (int i = 0; i < count; ++i) {
     const ViewGeom& g = view.geoms[list[i]];
@@ -46,8 +47,8 @@ inline void trace_tile(const View& view, Part part, const int* list, int count, 
   }
 }
 
-// Adds transparent geoms to the hits: depth and segmentation see them too. A plane seen from behind
-// is not there.
+// Adds transparent geoms to the hits, because depth and segmentation include them. A plane seen
+// from behind is skipped.
 inline void trace_transparent(const View& view, const int* list, int count, Tile& tile) {
   for (int i = 0; i < count; ++i) {
     const ViewGeom& g = view.geoms[list[i]];

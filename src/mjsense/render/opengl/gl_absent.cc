@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Stands in for render/opengl/ in builds without it.
+// Replaces render/opengl/ in builds without it.
 #include <fmt/format.h>
 
 #include "mjsense/core/error.h"

@@ -19,7 +19,7 @@
 namespace mjsense {
 namespace {
 
-// libEGL, loaded when first asked for: without it everything else still runs.
+// libEGL, loaded on first use, so that it is not required otherwise.
 struct Egl {
   decltype(&eglGetError) get_error;
   decltype(&eglGetDisplay) get_display;
@@ -51,7 +51,7 @@ struct Egl {
   }
 };
 
-// A context without a window, on Mesa's surfaceless platform or whatever display there is.
+// A context without a window, on Mesa's surfaceless platform or else the default display.
 class EglContext {
  public:
   explicit EglContext(const std::string& place) : egl_(place) {
@@ -84,7 +84,8 @@ class EglContext {
   EglContext(const EglContext&) = delete;
   EglContext& operator=(const EglContext&) = delete;
 
-  // A context belongs to one thread at a time: take it for a picture, then give it back.
+  // A context belongs to one thread at a time: take() before rendering an image, release()
+  // afterwards.
   bool take() {
     return egl_.bind_api(EGL_OPENGL_API) &&
            egl_.make_current(display_, EGL_NO_SURFACE, EGL_NO_SURFACE, context_);
@@ -164,8 +165,8 @@ class MujocoGl final : public GlRenderer {
       mjr_render(all, &scene_, &context_);
       mjr_readPixels(targets.rgb, nullptr, all, &context_);
     }
-    // Apart, because the sky would be part of depth; and by ids, which MuJoCo draws without
-    // averaging samples: both are those of pixel centres.
+    // A separate pass, because the sky would write depth. It draws ids, for which MuJoCo disables
+    // multisampling, so depth and ids are those of the pixel centres.
     if (targets.depth || targets.segmentation) {
       scene_.flags[mjRND_SHADOW] = scene_.flags[mjRND_SKYBOX] = 0;
       scene_.flags[mjRND_SEGMENT] = scene_.flags[mjRND_IDCOLOR] = 1;
@@ -186,7 +187,7 @@ class MujocoGl final : public GlRenderer {
       throw RuntimeError(fmt::format("{}: OpenGL: another thread holds the context", place_));
   }
 
-  // The context has tables of its own for materials.
+  // mjrContext keeps its own copies of the materials' texture fields.
   void show(const VisualFields& world) {
     world.copy_to(model_.get());
     if (cfg_.orthographic) model_->cam_projection[cfg_.camera] = mjPROJ_ORTHOGRAPHIC;
@@ -227,7 +228,7 @@ class MujocoGl final : public GlRenderer {
     }
   }
 
-  // From the depth buffer (0 near, 1 far) to planar metres, 0 for the far plane.
+  // Converts the depth buffer (0 near, 1 far) to planar depth in metres, 0 for the far plane.
   void convert_depth(float* depth) const {
     const double near = model_->vis.map.znear * model_->stat.extent,
                  far = model_->vis.map.zfar * model_->stat.extent;
@@ -264,7 +265,7 @@ class MujocoGl final : public GlRenderer {
     void operator()(mjModel* m) const { mj_deleteModel(m); }
     void operator()(mjData* d) const { mj_deleteData(d); }
   };
-  // A copy: it has the offscreen buffer's size, and shows one world after another.
+  // A copy with the offscreen buffer's size; it takes the values of one world after another.
   std::unique_ptr<mjModel, Delete> model_;
   std::unique_ptr<mjData, Delete> data_;  // poses only
   std::vector<VisualFields> worlds_;

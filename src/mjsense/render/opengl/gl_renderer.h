@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
-// MuJoCo's own OpenGL renderer, offscreen, as a reference: for comparing pictures, and for those
-// who want exactly its look. Present when the library was built with MJSENSE_OPENGL; needs libEGL
-// and a driver (Mesa's llvmpipe does) at run time.
+// MuJoCo's own OpenGL renderer, offscreen. It serves as a reference for comparing images, and for
+// users who need exactly its look. Requires a build with MJSENSE_OPENGL and, at run time, libEGL
+// and a driver (e.g. Mesa's llvmpipe).
 
 #include <mujoco/mujoco.h>
 
@@ -26,8 +26,8 @@ struct GlRendererCfg {
   bool textures = true, shadows = true;
   int samples = 1;
   int max_lights = 8;
-  std::size_t markers = 0;  // at most so many
-  // Instead of what the model says of the camera.
+  std::size_t markers = 0;  // maximum number of markers
+  // Override the model's camera.
   std::optional<double> fovy;  // degrees; orthographic: m
   bool orthographic = false;
 };
@@ -35,15 +35,16 @@ struct GlRendererCfg {
 class GlRenderer {
  public:
   virtual ~GlRenderer() = default;
-  // Takes the world's own colours, materials, sizes, lights and field of view. Worlds in parallel.
+  // Copies the world's colours, materials, sizes, lights and field of view. May be called for
+  // several worlds in parallel.
   virtual void remember(int world, const mjModel* model) = 0;
-  // Fills rgb, depth (planar) and segmentation of `targets`; poses as `state` has them, markers as
-  // given, the rest as remembered.
+  // Writes rgb, depth (planar) and segmentation of `targets`, with the poses of `state`, these
+  // markers, and the fields from remember().
   virtual void render(int world, const RayWorld& state, std::span<const mjvGeom> markers,
                       const ImageTargets& targets) = 0;
 };
 
-// Throws RuntimeError, beginning with `place`, if there is no OpenGL to be had.
+// Throws RuntimeError, with a message that starts with `place`, if OpenGL is not available.
 std::unique_ptr<GlRenderer> make_gl_renderer(const mjModel* model, const GlRendererCfg& cfg,
                                              const std::string& place);
 

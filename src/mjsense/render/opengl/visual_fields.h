@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
-// One world's own values of every field of the model that a picture depends on.
+// One world's values of all model fields that affect an image.
 
 #include <mujoco/mujoco.h>
 
@@ -26,7 +26,7 @@ class VisualFields {
       at += size;
     });
   }
-  // `model` has the sizes of the first one.
+  // `model` must have the same sizes as the constructor's.
   void copy_to(mjModel* model) const {
     const char* at = values_.data();
     for_each(model, [&](void* field, std::size_t size) {
@@ -36,7 +36,7 @@ class VisualFields {
   }
 
  private:
-  // use(field, bytes) of every such field; Model is mjModel or const mjModel.
+  // Calls use(field, bytes) for every such field; Model is mjModel or const mjModel.
   template <class Model, class Use>
   static void for_each(Model* m, Use&& use) {
     const auto fields = [&](std::size_t count, auto*... field) {

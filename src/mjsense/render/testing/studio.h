@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
-// Scenes of a few geoms, and pictures of them whose pixels can be computed by hand.
+// Small scenes and images of them, whose pixels can be computed by hand.
 
 #include <gtest/gtest.h>
 
@@ -24,7 +24,7 @@ struct Picture {
   int width, height;
   std::vector<std::uint8_t> rgb;
   std::vector<float> depth, normals, points;
-  std::vector<std::int32_t> ids;  // (id, mjtObj) of each pixel
+  std::vector<std::int32_t> ids;  // (id, mjtObj) per pixel
 
   Picture(int w, int h)
       : width(w),
@@ -50,7 +50,7 @@ struct Picture {
   int id(int x, int y) const { return ids[2 * (y * width + x)]; }
 };
 
-// A model, its ray scene, and images of it from any place.
+// A model, its ray scene, and images of it from any camera pose.
 struct Studio {
   std::unique_ptr<mjModel, void (*)(mjModel*)> model{nullptr, mj_deleteModel};
   std::unique_ptr<mjData, void (*)(mjData*)> data{nullptr, mj_deleteData};
@@ -60,7 +60,7 @@ struct Studio {
   RenderTiles render = best_render_tiles();
 
   explicit Studio(std::string xml) {
-    // A model with a camera gets what only images need: blocks of triangles.
+    // A camera in the model enables what only images need: clusters of triangles.
     if (xml.find("<camera") == std::string::npos)
       xml += "<worldbody><camera pos='0 0 90'/></worldbody>";
     char error[500] = "";
@@ -73,7 +73,7 @@ struct Studio {
     data.reset(mj_makeData(model.get()));
     mj_forward(model.get(), data.get());
   }
-  // Overwrites texture `id`: texel i of the image in memory.
+  // Overwrites texture `id`; color(i) is texel i of the image in memory.
   void paint(int id, auto&& color) {
     const int n = model->tex_width[id] * model->tex_height[id];
     for (int i = 0; i < n; ++i) {
@@ -82,7 +82,7 @@ struct Studio {
         model->tex_data[model->tex_adr[id] + 3 * i + k] = static_cast<mjtByte>(c[k]);
     }
   }
-  // After data or the model were changed.
+  // Call after data or the model have changed.
   void update() {
     mj_forward(model.get(), data.get());
     if (!rays) {
@@ -94,7 +94,7 @@ struct Studio {
     world.data = data.get();
     rays->update(world);
   }
-  // The view from `at`, camera axes given by x and y (unit, world).
+  // The view from `at`; x and y are the camera's axes (unit, world frame).
   const View& view(ViewBuilder& builder, std::array<double, 3> at, std::array<double, 3> x,
                    std::array<double, 3> y, const PixelGrid& grid) {
     const double z[3] = {x[1] * y[2] - x[2] * y[1], x[2] * y[0] - x[0] * y[2],
@@ -122,7 +122,7 @@ struct Studio {
     draw(view(builder, at, x, y, grid), targets);
     return out;
   }
-  // size x size pixels.
+  // Returns rgb [size, size, 3].
   std::vector<std::uint8_t> shoot(std::array<double, 3> at, std::array<double, 3> x,
                                   std::array<double, 3> y, int size, double fovy = 45,
                                   int samples = 1) {
@@ -145,7 +145,7 @@ inline void expect_pixel(Pixel got, Pixel want, int tolerance = 1) {
                                             << want[0] << " " << want[1] << " " << want[2];
 }
 
-// Ambient light alone: what is seen is colour times texture.
+// Ambient light only: a pixel shows colour times texture.
 inline constexpr char kFlat[] =
     R"(<visual><headlight ambient="1 1 1" diffuse="0 0 0" specular="0 0 0"/></visual>)";
 inline constexpr char kDark[] = R"(<visual><headlight active="0"/></visual>)";

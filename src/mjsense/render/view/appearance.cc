@@ -8,7 +8,7 @@
 namespace mjsense {
 namespace {
 
-// The visualiser's rule: a geom's own colour, unless it is the default grey and there is a
+// MuJoCo's visualiser uses a geom's own colour, unless that is the default grey and the geom has a
 // material.
 void resolve_rgba(const mjModel* m, int material, const float* own, float* out) {
   const bool is_default = own[0] == 0.5f && own[1] == 0.5f && own[2] == 0.5f && own[3] == 1.0f;
@@ -51,8 +51,8 @@ void Appearance::copy(const mjModel* m) {
   copy_lights(m);
 }
 
-// MuJoCo gives each light that is on a place, the headlight the first, and OpenGL has so many;
-// image lights take one and show nothing.
+// MuJoCo assigns each active light one of OpenGL's light slots, the headlight first. Image lights
+// take a slot but have no effect.
 void Appearance::copy_lights(const mjModel* m) {
   num_lights_ = 0;
   int places = 0;

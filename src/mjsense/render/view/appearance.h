@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
-// What an image depends on besides poses: colours, materials and lights, as one world has them.
+// Colours, materials and lights of one world: everything an image depends on besides poses.
 
 #include <mujoco/mujoco.h>
 
@@ -16,29 +16,31 @@ struct Material {
   float specular, shininess, emission, reflectance;
   int texture;      // id; -1: none
   float repeat[2];  // of a 2D texture
-  bool uniform;     // repeat is per metre, not per geom
+  bool uniform;     // `repeat` is per metre instead of per geom
 };
 
-// mjModel's vis.map and vis.rgba, as far as the sky is concerned.
+// The fields of mjModel's vis.map and vis.rgba that affect the sky.
 struct Sky {
-  float distance;  // m, of the cylinder that MuJoCo paints it on
+  float distance;  // m, radius of the cylinder on which MuJoCo draws it
   float haze_width;
   float haze_rgb[3];
 };
 
-inline constexpr int kClassicLights = 8;  // OpenGL's, and so those of MuJoCo's classic renderer
+// Number of lights in OpenGL, and thus in MuJoCo's classic renderer.
+inline constexpr int kClassicLights = 8;
 
 class Appearance {
  public:
-  // max_lights: of those that are on, the headlight first, so many shine; up to View::kMaxLights.
+  // max_lights: maximum number of active lights that are used, counting the headlight first; at
+  // most View::kMaxLights.
   explicit Appearance(const mjModel* model, int max_lights = kClassicLights);
   void copy(const mjModel* model);  // no allocation
 
-  // [geoms, then parts of flexes, then skins; 4] as MuJoCo's visualiser resolves it
+  // [geoms, then parts of flexes, then skins; 4], resolved as by MuJoCo's visualiser
   std::span<const float> rgba() const { return rgba_; }
   std::span<const Material> materials() const { return materials_; }  // [nmat]
   const Sky& sky() const { return sky_; }
-  // Active ones; no poses yet.
+  // Active lights, without poses.
   std::span<const ViewLight> lights() const { return {lights_.data(), num_lights_}; }
   std::span<const int> light_ids() const { return light_ids_; }  // -1: the headlight
 

@@ -35,7 +35,7 @@ Point brown_conrady(Point p, std::span<const double> k) {
           p.y * radial + k[2] * (r2 + 2 * p.y * p.y) + 2 * k[3] * p.x * p.y};
 }
 
-// Newton's method with numeric derivatives; false if it does not converge.
+// Newton's method with numeric derivatives. Returns false if it does not converge.
 bool undo_brown_conrady(Point target, std::span<const double> k, Point& out) {
   Point p = target;
   for (int i = 0; i < 50; ++i) {
@@ -50,7 +50,8 @@ bool undo_brown_conrady(Point target, std::span<const double> k, Point& out) {
     const double a = (fx.x - f.x) / h, b = (fy.x - f.x) / h, c = (fx.y - f.y) / h,
                  d = (fy.y - f.y) / h;
     const double det = a * d - b * c;
-    if (!(det > 1e-9)) return false;  // folded over: beyond the lens's own image
+    // The distortion folds over here: no direction has this image point.
+    if (!(det > 1e-9)) return false;
     p.x += (d * ex - b * ey) / det;
     p.y += (a * ey - c * ex) / det;
   }
@@ -59,14 +60,16 @@ bool undo_brown_conrady(Point target, std::span<const double> k, Point& out) {
   return std::hypot(target.x - f.x, target.y - f.y) < 1e-9;
 }
 
-constexpr double kWidest = 89.0 * std::numbers::pi / 180;  // of a fisheye, off its axis
+// Maximum angle of a fisheye from its axis.
+constexpr double kWidest = 89.0 * std::numbers::pi / 180;
 
 double fisheye(double theta, std::span<const double> k) {
   const double t2 = theta * theta;
   return theta * (1 + t2 * (k[0] + t2 * (k[1] + t2 * (k[2] + t2 * k[3]))));
 }
 
-// The angle that the lens puts at `r`; negative if there is none below 89 degrees.
+// Returns the angle that the lens images at radius `r`, or a negative number if there is none below
+// 89 degrees.
 double undo_fisheye(double r, std::span<const double> k) {
   double low = 0, high = kWidest;
   if (fisheye(high, k) < r) return -1;
@@ -77,7 +80,7 @@ double undo_fisheye(double r, std::span<const double> k) {
   return 0.5 * (low + high);
 }
 
-// Pixel (x, y) shows nothing that the lens could bring there.
+// Throws ValueError: the lens images no direction at pixel (x, y).
 [[noreturn]] void throw_out_of_reach(const PixelGrid& grid, Lens lens, std::span<const double> k,
                                      const char* place, int x, int y) {
   if (lens == Lens::kBrownConrady)

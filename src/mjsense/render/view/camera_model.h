@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
-// From a camera's parameters to the rays of its pixels.
+// Pixel rays from camera parameters.
 
 #include <mujoco/mujoco.h>
 
@@ -12,35 +12,34 @@
 
 namespace mjsense {
 
-// fovy of the image's height, square pixels. fovy_deg: degrees; orthographic: metres.
+// Square pixels; fovy is that of the image's height: degrees, or metres if orthographic.
 PixelGrid grid_from_fovy(int width, int height, double fovy_deg, bool orthographic);
 
-// MuJoCo's physical camera: focal lengths, principal point and sensor size in one unit of length.
-// If the image has another aspect than the sensor, the sensor is shortened or narrowed around its
-// centre.
+// MuJoCo's physical camera: focal lengths, principal point and sensor size in the same unit of
+// length. If the aspect ratios of image and sensor differ, the sensor is cropped about its centre.
 PixelGrid grid_from_sensor(int width, int height, const float focal_principal[4],
                            const float sensor_size[2]);
 
-// Pixels: image point (u, v), v down, u = 0 the left border, sees along ((u - cx) / fx, (v - cy) /
-// fy, 1), z forward.
+// All parameters in pixels. The image point (u, v), v down, u = 0 at the left border, has the
+// direction ((u - cx) / fx, (v - cy) / fy, 1), z forward.
 PixelGrid grid_from_intrinsics(int width, int height, double fx, double fy, double cx, double cy);
 
-// The model's camera as MuJoCo renders it at width x height.
+// The model's camera, as MuJoCo renders it at width x height.
 PixelGrid grid_of_camera(const mjModel* model, int camera, int width, int height);
 
-// K, row-major, for the grid without distortion.
+// The intrinsic matrix K, row-major, of the grid without distortion.
 std::array<float, 9> intrinsic_matrix(const PixelGrid& grid);
 
 enum class Lens { kBrownConrady, kFisheye };
 
-// Where such a lens puts the image of the direction (x, y, 1), x right, y down, z forward: (x', y')
-// of CameraSensorCfg's formulas.
+// The image (x', y'), in CameraSensorCfg's notation, of the direction (x, y, 1) through such a
+// lens; x right, y down, z forward.
 std::array<double, 2> through_lens(Lens lens, std::span<const double> coefficients, double x,
                                    double y);
 
-// [H, W, 2] for PixelGrid::bent: where each pixel looks through a lens with these coefficients
-// (CameraSensorCfg says how they are meant). Throws ValueError, beginning with `place`, if the lens
-// cannot be inverted over the image or sees 180 degrees.
+// Rays [H, W, 2] for PixelGrid::bent: the direction of each pixel through a lens with these
+// coefficients (defined in CameraSensorCfg). Throws ValueError, with a message that starts with
+// `place`, if the lens cannot be inverted over the image or would see 180 degrees.
 std::vector<float> bent_rays(const PixelGrid& grid, Lens lens, std::span<const double> coefficients,
                              const char* place);
 

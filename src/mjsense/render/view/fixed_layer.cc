@@ -20,7 +20,7 @@ std::size_t count_tiles(int width, int height) {
          ((height + kTileSize - 1) / kTileSize);
 }
 
-// Byte by byte: what differs in padding alone is drawn anew, which is right too.
+// Compares bytes. A difference in padding only causes a redundant update.
 template <typename T>
 bool equal_bytes(const T& a, const T& b) {
   return std::memcmp(&a, &b, sizeof(T)) == 0;
@@ -95,7 +95,8 @@ const FixedTile* FixedLayers::find(int world, const View& view) {
   return common_.shows(view) ? common_.tiles() : nullptr;
 }
 
-// Worlds that look different would take it from each other: one that has its own leaves it alone.
+// Worlds that look different would evict each other from the common layer, so a world that has its
+// own layer does not use it.
 FixedTile* FixedLayers::settle_common(int world, const View& view) {
   FixedLayer* layer = own(world);
   if (layer && layer->shows(view)) return nullptr;

@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
-// What a camera that stands still sees of geoms that stand still, which of it lies in their shadow,
-// and its colours where nothing that moves casts one: found once, kept, and used for every image
-// and world in which none of it has changed. Images are the same with and without it, bit for bit:
-// kernels always draw the fixed part first.
+// Cached layer of fixed geoms as seen by a fixed camera: their hits, the shadows they cast on each
+// other, and their colours where no moving geom casts a shadow. It is rendered once and reused for
+// every image and world in which none of its inputs has changed. Images are identical bit for bit
+// with and without it, because the kernels always draw the fixed geoms first.
 
 #include <mujoco/mujoco.h>
 
@@ -15,24 +15,24 @@
 
 namespace mjsense {
 
-// Bodies that stand still between resets: without a joint up to the world. A mocap body with
-// children is the base of something and counts as such; one without is a target or marker, and
-// moves.
+// Whether a body stays in place between resets: there is no joint between it and the world. A mocap
+// body with children is the base of something and counts as fixed; one without children is a target
+// or marker and counts as moving.
 bool is_fixed_body(const mjModel* model, int body);
 
 class FixedLayer {
  public:
-  // Whether the camera and all lights stand still.
+  // Whether the camera and all lights are fixed.
   static bool possible(const mjModel* model, int camera);
-  // Of the tiles: 48 a pixel. They are memory from when they are made on.
+  // Size of the tiles: 48 bytes per pixel. The memory is only committed once the tiles are written.
   static std::size_t bytes(int width, int height);
 
   FixedLayer(const mjModel* model, int width, int height);
 
-  // To be asked with one view of every cast: true if its fixed part has become the same as the time
-  // before, and tiles() are to be made of it now.
+  // Call once per cast, with one of its views. Returns true if the view's fixed part has become
+  // equal to that of the previous call; then the caller must render tiles() now.
   bool settles(const View& view);
-  // Whether tiles() are the fixed part of this view.
+  // Whether tiles() show the fixed part of this view.
   bool shows(const View& view) const { return made_ && same(view); }
   FixedTile* tiles() { return tiles_.get(); }
 
@@ -41,26 +41,28 @@ class FixedLayer {
 
   std::unique_ptr<FixedTile[]> tiles_;
   bool made_ = false;
-  // What it is of.
+  // Inputs of the tiles.
   PixelGrid grid_;
   std::vector<ViewGeom> geoms_;
   std::vector<ViewLight> lights_;
 };
 
-// The layers of a camera: one for all worlds that look the same, and one each for those that do not,
-// because their lights, materials or camera poses are randomised.
+// The layers of one camera: a common one for all worlds that look the same, and one for each world
+// that differs because its lights, materials or camera poses are randomised.
 class FixedLayers {
  public:
-  // Of all worlds' own layers; worlds beyond have none, and are drawn anew.
+  // Maximum memory for the worlds' own layers. Further worlds have none and are always rendered in
+  // full.
   static constexpr std::size_t kMostBytes = std::size_t{256} << 20;
 
   FixedLayers(const mjModel* model, int width, int height, int num_worlds,
               std::size_t most_bytes = kMostBytes);
 
-  // Tiles that show the fixed part of the world's view; null: none do.
+  // Tiles that show the fixed part of the world's view, or null.
   const FixedTile* find(int world, const View& view);
-  // To be asked once before a cast, with the view of one of its worlds, then of every world that
-  // find() has nothing for: the tiles that are to be made of the view's fixed part now; null: none.
+  // settle_common() is called once before a cast, with the view of one of its worlds; settle() is
+  // then called for every world for which find() returns null. Both return the tiles that the
+  // caller must render from the view's fixed part now, or null.
   FixedTile* settle_common(int world, const View& view);
   FixedTile* settle(int world, const View& view);
 
@@ -70,7 +72,7 @@ class FixedLayers {
   }
 
   FixedLayer common_;
-  std::vector<FixedLayer> own_;  // of the first worlds
+  std::vector<FixedLayer> own_;  // of the first own_.size() worlds
 };
 
 }  // namespace mjsense

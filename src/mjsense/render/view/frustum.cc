@@ -9,7 +9,7 @@
 namespace mjsense {
 namespace {
 
-// Relative, of lengths and positions: so much rays and the tests of what they hit may round.
+// Tolerance relative to lengths and positions, for the rounding of rays and intersection tests.
 constexpr double kSlack = 1e-4;
 
 bool misses(const KernelBoxes& boxes, int k, const Frustum& frustum) {
@@ -25,8 +25,8 @@ Frustum::Frustum(const PixelGrid& grid, const double position[3], const double r
   const double y[2] = {grid.top, grid.top + static_cast<double>(grid.dy) * grid.height};
   const auto [left, right] = std::minmax(x[0], x[1]);
   const auto [low, high] = std::minmax(y[0], y[1]);
-  // In the camera, from whose origin z leads backwards: of an orthographic one X <= right, else
-  // X <= right (-Z), and so on.
+  // Planes in the camera's frame, where z points backwards: X <= right for an orthographic camera,
+  // else X <= right (-Z); likewise for the other sides.
   const double bounds[4] = {right, -left, high, -low};
   for (int s = 0; s < 5; ++s) {
     double n[3] = {0, 0, 0}, offset = 0;

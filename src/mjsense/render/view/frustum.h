@@ -1,7 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
-// What a camera cannot see for where it is: whole blocks of objects that stand beside the image or
-// behind it are passed by (with shadows: those of which no shadow falls into it, shadow_reach.h).
+// Frustum culling: skips objects, and whole blocks of objects, that are outside the image or behind
+// the camera. With shadows, shadow_reach.h first extends the frustum by the objects whose shadow
+// may fall into the image.
 
 #include <cstdint>
 #include <vector>
@@ -12,18 +13,19 @@ namespace mjsense {
 
 class BoxList;
 
-// The part of the world in which an image can show something: a pyramid, a slab of an orthographic
-// camera.
+// The part of the world that an image can show: a pyramid, or a box for an orthographic camera.
 class Frustum {
  public:
   // position, rotation: X_WC, row-major; grid.bent must be null.
   Frustum(const PixelGrid& grid, const double position[3], const double rotation[9]);
 
-  // True: nothing of the box (corners in the world, m) can be in the image. False says nothing.
+  // True if no point of the box (corners in the world frame, m) can be in the image. False is not a
+  // guarantee that it is visible.
   bool misses(const float low[3], const float high[3]) const;
 
-  // What stands between a light and something inside is inside, too: a light at a place, or parallel
-  // light from direction `to_light` (unit) of which shadows are at most `longest` (m).
+  // Extends the region by everything that may lie between a light and a point inside. The first is
+  // for a light with a position; the second for parallel light from direction `to_light` (unit)
+  // whose shadows are at most `longest` (m) long.
   void reach(const double light[3]);
   void reach(const double to_light[3], double longest);
   void widen(double by);  // m
@@ -31,7 +33,7 @@ class Frustum {
  private:
   struct Side {
     double normal[3], offset;  // inside: normal . x <= offset
-    double image;              // offset of what the image shows
+    double image;              // offset without shadows and margins
 
     double along(const double v[3]) const {
       return normal[0] * v[0] + normal[1] * v[1] + normal[2] * v[2];
@@ -40,7 +42,8 @@ class Frustum {
   Side sides_[5];
 };
 
-// Bit i of word i / 64 is set if object i of the list may be in the image.
+// Sets bit i % 64 of word i / 64 if object i of the list may be in the image, and clears the other
+// bits.
 void find_candidates(const BoxList& boxes, const Frustum& frustum,
                      std::vector<std::uint64_t>& candidates);
 

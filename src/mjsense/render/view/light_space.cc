@@ -13,13 +13,14 @@
 namespace mjsense {
 namespace {
 
-constexpr int kFaces = 6;        // of a cube around a light that shines everywhere
-constexpr float kNarrow = 0.4f;  // cosine: a spot up to 66 degrees from its axis
+constexpr int kFaces = 6;  // faces of a cube around a light that shines in all directions
+// Cosine: one frame serves a spot with a cutoff of up to 66 degrees.
+constexpr float kNarrow = 0.4f;
 constexpr float kEndless = std::numeric_limits<float>::infinity();
 
 float length(const float* v) { return std::sqrt(v[0] * v[0] + v[1] * v[1] + v[2] * v[2]); }
 
-// Two directions square to w, and to each other.
+// Completes axes[2] to an orthonormal frame.
 void complete(LightFrame& f) {
   const float* w = f.axes[2];
   const int least = std::abs(w[0]) < std::abs(w[1]) ? (std::abs(w[0]) < std::abs(w[2]) ? 0 : 2)
@@ -32,7 +33,7 @@ void complete(LightFrame& f) {
     f.axes[1][i] = w[(i + 1) % 3] * u[(i + 2) % 3] - w[(i + 2) % 3] * u[(i + 1) % 3];
 }
 
-// A ray from a surface of triangles begins a little above it; see shadow_of_triangles().
+// A shadow ray from a surface of triangles starts slightly above it; see shadow_of_triangles().
 float lift(const ViewGeom& g) {
   return g.bvh ? 1e-4f * std::max(g.radius, std::abs(g.center[2]) + g.radius) : 0;
 }
@@ -76,7 +77,7 @@ Window window_of(const LightFrame& f, const ViewGeom& g) {
   return out;
 }
 
-// The side of the geom's box along its axis i.
+// Sets the side of the geom's box that faces the light along the box's axis i.
 void set_side(const ViewLight& light, const ViewGeom& g, int i, int at, LightSides& out) {
   float from = 0, along = 0;
   for (int k = 0; k < 3; ++k) {

@@ -1,7 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
-// Geoms as the lights of a view see them: what can stand between a light and a point lies in the
-// same place of the light's image, and nearer. Kernels ask that before they cast a ray.
+// Geoms in the image spaces of a view's lights. A geom can only shadow a point if it covers the
+// same position in the light's image and is nearer to the light. The kernels test that before they
+// cast a shadow ray.
 
 #include <vector>
 
@@ -9,17 +10,17 @@
 
 namespace mjsense {
 
-// Owns View::light_frames and light_sides of one view; fill() allocates nothing.
+// Owns View::light_frames and light_sides of one view. fill() allocates nothing.
 class LightSpace {
  public:
-  // At most so many lights that cast shadows, and geoms.
+  // Maximum numbers of lights that cast shadows, and of geoms.
   LightSpace(int lights, std::size_t geoms);
 
-  // Of the view's lights that cast shadows, and its geoms.
+  // Computes the frames of the view's lights that cast shadows, with the windows of its geoms.
   void fill(View& view);
 
  private:
-  static constexpr int kArrays = 5, kSideArrays = 12;  // of LightWindows, LightSides
+  static constexpr int kArrays = 5, kSideArrays = 12;  // arrays in LightWindows and LightSides
 
   std::size_t stride_;
   std::vector<LightFrame> frames_;

@@ -11,11 +11,11 @@
 namespace mjsense {
 namespace {
 
-// Vertex normals that turn away from their face by more than this cosine belong to a crease: MuJoCo
-// shades it flat.
+// If the cosine between a vertex normal and the face's normal is below this, the corner is on a
+// crease and MuJoCo shades it flat.
 constexpr float kCrease = 0.8f;
 
-// By sRGB value.
+// Table of linear values by sRGB value.
 std::array<std::uint8_t, 256> linear_values() {
   std::array<std::uint8_t, 256> table;
   for (int i = 0; i < 256; ++i) {
@@ -26,7 +26,7 @@ std::array<std::uint8_t, 256> linear_values() {
   return table;
 }
 
-// (b - a) x (c - a), and its length.
+// Writes (b - a) x (c - a) and returns its length.
 float cross(const float* a, const float* b, const float* c, float* out) {
   const float e1[3] = {b[0] - a[0], b[1] - a[1], b[2] - a[2]};
   const float e2[3] = {c[0] - a[0], c[1] - a[1], c[2] - a[2]};
@@ -35,7 +35,7 @@ float cross(const float* a, const float* b, const float* c, float* out) {
   return std::sqrt(out[0] * out[0] + out[1] * out[1] + out[2] * out[2]);
 }
 
-// Which two texels of a row of `size` the texel i of the next level's row of `half` lies between.
+// The two texels of a row of `size` between which texel i of the next level's row of `half` lies.
 struct Between {
   int first, second;
   float weight;  // of the second
@@ -47,8 +47,9 @@ Between between(int i, int size, int half) {
   return {first, std::min(first + 1, size - 1), x - static_cast<float>(first)};
 }
 
-// The next level of one image, interpolated at its texels' centres as OpenGL drivers do: the mean
-// of 2 x 2 where sizes are even; where they are odd nothing drifts and no border is lost.
+// Computes the next mip level of one image by interpolation at its texels' centres, as OpenGL
+// drivers do. For even sizes this is the mean of 2 x 2 texels; for odd sizes it neither shifts the
+// image nor drops its border.
 void halve(const std::uint32_t* src, int width, int height, std::uint32_t* dst, int w2, int h2) {
   for (int y = 0; y < h2; ++y) {
     const Between v = between(y, height, h2);
@@ -69,7 +70,7 @@ void halve(const std::uint32_t* src, int width, int height, std::uint32_t* dst, 
   }
 }
 
-// Corner k of face f: where it is, m, and its texture coordinates.
+// position(f, k), m, and texcoord(f, k) return the data of corner k of face f.
 template <class Position, class Texcoord>
 void add_coordinates(MeshTables& tables, int faces, Position position, Texcoord texcoord) {
   tables.uvs.resize(static_cast<std::size_t>(faces) * 6);
@@ -88,7 +89,7 @@ void add_coordinates(MeshTables& tables, int faces, Position position, Texcoord 
 std::shared_ptr<const MeshTables> mesh_tables(const mjModel* m, int id) {
   const int faces = m->mesh_facenum[id], first = m->mesh_faceadr[id];
   const bool has_uv = m->mesh_texcoordadr[id] >= 0;
-  // The mesh's own part of an array with `width` numbers a row.
+  // The mesh's range of an array with `width` numbers per row.
   const auto part = [](auto* all, int begin, int count, int width) {
     return std::span(all + static_cast<std::size_t>(begin) * width,
                      static_cast<std::size_t>(count) * width);
@@ -158,10 +159,10 @@ void Look::add_texture(const mjModel* model, int id) {
   Texture& texture = textures_[id];
   const int channels = model->tex_nchannel[id];
   if (channels != 3 && channels != 4)
-    return;  // encoded for another renderer: drawn without a texture
+    return;  // encoded for another renderer; the texture is ignored
   texture.cube = model->tex_type[id] != mjTEXTURE_2D;
   const int width = model->tex_width[id];
-  // A square "cube" has one image for all faces.
+  // A cube texture with a square image repeats that image on all faces.
   const bool repeated = texture.cube && model->tex_width[id] == model->tex_height[id];
   const int height = texture.cube ? width : model->tex_height[id];
   const int faces = texture.cube ? 6 : 1;

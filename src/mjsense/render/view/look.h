@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
-// What surfaces look like, taken from the model once and shared by all cameras and worlds: textures
-// with their mipmaps, and the normals and texture coordinates of mesh faces as MuJoCo's classic
-// renderer uses them.
+// Appearance data that all cameras and worlds share, prepared once per model: textures with their
+// mip levels, and the normals and texture coordinates of mesh faces as MuJoCo's classic renderer
+// uses them.
 
 #include <mujoco/mujoco.h>
 
@@ -13,27 +13,28 @@
 
 namespace mjsense {
 
-// A pyramid of images, RGBA8, in one array: level 0 first, row 0 first; a cube map has its six
-// faces (+x -x +y -y +z -z) one after another in each level. Each row ends with a texel more, what
-// lies right of its last (the first of a 2D texture, which repeats; the last of a cube's face):
-// kernels read neighbours in pairs. Tables by level, for gathering.
+// Mip pyramid of RGBA8 images in one array: level 0 first, row 0 first. A cube map has its six
+// faces (+x -x +y -y +z -z) one after another in each level. Each row has one extra texel at its
+// end, because kernels read neighbours in pairs: the row's first texel in a 2D texture, which
+// repeats, and its last texel in a cube's face. Sizes and offsets are arrays by level, for gather
+// instructions.
 struct Texture {
   static constexpr int kMaxLevels = 15;
   bool cube = false;
-  int levels = 0;  // 0: cannot be drawn
+  int levels = 0;  // 0: the texture cannot be drawn
   const std::uint32_t* texels = nullptr;
   float width[kMaxLevels] = {}, height[kMaxLevels] = {};
-  int offset[kMaxLevels] = {};  // of the level's first texel
+  int offset[kMaxLevels] = {};  // index of the level's first texel
 };
 
-// Per face of a mesh, flex or skin, by face index. Null where there is none.
+// Tables of a mesh, flex or skin by face index. Null if it has none.
 struct MeshLook {
   const float* normals = nullptr;  // [F, 3 corners, 3]
   const float* uvs = nullptr;      // [F, 3 corners, 2]
   const float* density = nullptr;  // [F] texture units per metre
 };
 
-// What a mesh's faces look like; what there is none of is empty.
+// Storage of MeshLook; a table that does not exist is empty.
 struct MeshTables {
   std::vector<float> normals;  // [F, 3 corners, 3]
   std::vector<float> uvs;      // [F, 3 corners, 2]
@@ -43,16 +44,17 @@ struct MeshTables {
 
 class Look {
  public:
-  // `meshes`: prepare all of them, shown or not, as a world may give a geom another one or another
-  // group; false for views that need no normals.
+  // `meshes`: prepare all meshes, including those that no geom uses, because a world may change a
+  // geom's mesh or group. False for views that need no normals.
   Look(const mjModel* model, bool meshes, bool textures);
   Look(const Look&) = delete;
   Look& operator=(const Look&) = delete;
 
   const Texture* texture(int id) const { return id < 0 ? nullptr : &textures_[id]; }
   const MeshLook* mesh(int id) const { return &meshes_[id]; }
-  // Without normals, which move.
-  const MeshLook* flex_part(int index) const { return &flex_parts_[index]; }  // of flex_parts()
+  // Without normals, which change with the shape.
+  // index as in flex_parts()
+  const MeshLook* flex_part(int index) const { return &flex_parts_[index]; }
   int num_flex_parts() const { return static_cast<int>(flex_parts_.size()); }
   const MeshLook* skin(int id) const { return &skins_[id]; }
   const Texture* skybox() const { return skybox_; }  // null if the model has none
@@ -66,7 +68,8 @@ class Look {
   std::vector<Texture> textures_;
   std::vector<MeshLook> meshes_, flex_parts_, skins_;
   std::vector<std::vector<std::uint32_t>> texels_;
-  std::vector<std::shared_ptr<const MeshTables>> tables_;  // of meshes the process's, by content
+  // Tables of meshes are shared by all models of the process that have equal meshes.
+  std::vector<std::shared_ptr<const MeshTables>> tables_;
   const Texture* skybox_ = nullptr;
 };
 

@@ -6,10 +6,10 @@
 namespace mjsense {
 namespace {
 
-constexpr int kCatenaryPoints = 100;  // MuJoCo draws no more
+constexpr int kCatenaryPoints = 100;  // MuJoCo's limit
 
-// What mjv_addGeoms() can make, at most, of all sites and tendons, and of slider-cranks, which come
-// along.
+// Maximum number of geoms that mjv_addGeoms() creates for all sites and tendons, and for
+// slider-cranks, which it adds as well.
 std::size_t most_geoms(const mjModel* m, const MarkerOptions& options) {
   std::size_t most = options.site_groups ? m->nsite : 0;
   for (int i = 0; options.tendon_groups && i < m->ntendon; ++i) {

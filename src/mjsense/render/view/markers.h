@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
-// Sites and tendons of one world as MuJoCo's visualiser makes them: a site is the shape that it
-// has, a tendon a chain of capsules along its path, hanging through where it is a slack string.
+// Sites and tendons of one world, as MuJoCo's visualiser creates them. A site has its own shape. A
+// tendon is a chain of capsules along its path, or along a catenary where it is slack.
 
 #include <mujoco/mujoco.h>
 
@@ -16,7 +16,7 @@ namespace mjsense {
 
 struct Marker {
   RayGeom shape;
-  Material material;  // MuJoCo's defaults if it has none
+  Material material;  // MuJoCo's defaults if there is none
   float rgba[4];
   int id, object;  // for segmentation: id and mjtObj
 };
@@ -28,16 +28,16 @@ struct MarkerOptions {
 
 class Markers {
  public:
-  // Without groups there are none, and nothing costs memory or time.
+  // If no group is enabled, there are no markers and no cost in memory or time.
   Markers(const mjModel* model, const MarkerOptions& options);
-  // Takes those of the world as they are now; its kinematics and tendons are up to date. No
-  // allocation.
+  // Copies the world's current sites and tendons. Kinematics and tendons must be up to date.
+  // Allocates nothing.
   void copy(const mjModel* model, mjData* data);
 
   std::span<const Marker> all() const { return {markers_.data(), count_}; }
   std::span<const mjvGeom> geoms() const {
     return {geoms_.data(), count_};
-  }  // the same, for OpenGL
+  }  // the same markers, for OpenGL
   std::size_t capacity() const { return markers_.size(); }
 
  private:

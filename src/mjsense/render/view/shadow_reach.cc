@@ -14,11 +14,11 @@ namespace mjsense {
 namespace {
 
 constexpr double kEndless = std::numeric_limits<double>::infinity();
-constexpr float kPlane = 1e29f;  // m; the boxes of planes reach farther
+constexpr float kPlane = 1e29f;  // m; boxes of planes are larger, others are not
 
 double dot(const double* a, const double* b) { return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]; }
 
-// A box around all objects but planes.
+// Bounding box of all objects except planes.
 struct Extent {
   double low[3] = {kEndless, kEndless, kEndless}, high[3] = {-kEndless, -kEndless, -kEndless};
 
@@ -49,7 +49,7 @@ Extent extent_of(const BoxList& list) {
   Extent out;
   list.each(
       [&](int block) {
-        if (is_plane(list.blocks(), block)) return true;  // one of them at least
+        if (is_plane(list.blocks(), block)) return true;  // at least one plane is in the block
         out.add(list.blocks(), block);
         return false;
       },
@@ -59,10 +59,10 @@ Extent extent_of(const BoxList& list) {
   return out;
 }
 
-// How far a shadow of parallel light is at most from what casts it, on objects and on planes.
+// Maximum distance between a caster and its shadow in parallel light, on objects and on planes.
 double longest_shadow(const RayWorld& world, const Extent& extent, const RayLight& light,
                       const double* to_light) {
-  // Nothing behind the light casts one, see dark_lanes() of the kernels.
+  // Objects behind the light cast no shadow; see dark_lanes() of the kernels.
   double longest = std::min(extent.most(to_light), dot(light.pos, to_light));
   longest = std::max(longest - extent.least(to_light), 0.0);
   const BoxList& boxes = world.boxes();
@@ -82,7 +82,7 @@ double longest_shadow(const RayWorld& world, const Extent& extent, const RayLigh
 
 void reach_lights(const RayWorld& world, const Appearance& appearance, Frustum& frustum) {
   const Extent extent = extent_of(world.boxes());
-  if (!(extent.low[0] <= extent.high[0])) return;  // nothing but planes
+  if (!(extent.low[0] <= extent.high[0])) return;  // only planes
   bool any = false;
   for (std::size_t i = 0; i < appearance.lights().size(); ++i) {
     const ViewLight& light = appearance.lights()[i];
@@ -99,7 +99,7 @@ void reach_lights(const RayWorld& world, const Appearance& appearance, Frustum& 
     for (int k = 0; k < 3; ++k) to_light[k] = -source.dir[k] / length;
     frustum.reach(to_light, longest_shadow(world, extent, source, to_light));
   }
-  // Rays to lights begin a little above triangles: a ten thousandth of the size of the shape.
+  // Shadow rays start slightly above triangles: 1e-4 of the size of the shape.
   if (any) frustum.widen(1e-3 * extent.size());
 }
 

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
-// What may cast a shadow into an image stands between a light and what the image shows: the rest of
-// a large scene is passed by there, too.
+// Extends a camera's frustum by shadow casters. Only objects between a light and the visible region
+// can cast a shadow into the image; the rest of a large scene is skipped.
 
 namespace mjsense {
 
@@ -9,8 +9,8 @@ class Appearance;
 class Frustum;
 class RayWorld;
 
-// Widens the frustum until all that may cast a shadow into it is inside. The world must have no
-// skins, whose boxes nobody keeps.
+// Extends the frustum until everything that may cast a shadow into it is inside. The world must
+// have no skins, because their bounding boxes are not stored.
 void reach_lights(const RayWorld& world, const Appearance& appearance, Frustum& frustum);
 
 }  // namespace mjsense

@@ -18,7 +18,7 @@
 namespace mjsense {
 namespace {
 
-constexpr float kOpaque = 0.995f;    // MuJoCo blends what has less
+constexpr float kOpaque = 0.995f;    // MuJoCo blends geoms with a lower alpha
 constexpr float kFromBehind = 0.3f;  // MuJoCo's factor for the alpha of planes seen from below
 
 // out = R^T v.
@@ -26,7 +26,7 @@ void rotate_back(const double r[9], const double v[3], double out[3]) {
   for (int i = 0; i < 3; ++i) out[i] = r[i] * v[0] + r[3 + i] * v[1] + r[6 + i] * v[2];
 }
 
-// What shapes have that need no more than their sizes.
+// Sets the fields of shapes that are defined by their sizes alone.
 void set_primitive(int type, int object, int object_id, ViewGeom& g) {
   g.type = type;
   g.behind = type == mjGEOM_PLANE && g.eye[2] < 0;
@@ -39,7 +39,7 @@ void set_primitive(int type, int object, int object_id, ViewGeom& g) {
   g.height_field = nullptr;
 }
 
-// The size by which MuJoCo's visualiser scales a shape along its axes, and with texuniform its
+// The factors by which MuJoCo's visualiser scales a shape along its axes and, with texuniform, its
 // texture.
 std::array<float, 3> drawn_extent(const ViewGeom& g) {
   const float* s = g.size;
@@ -81,7 +81,7 @@ ViewBuilder::ViewBuilder(const mjModel* model, const Look& look, const ViewOptio
   view_.far = options.far;
   view_.shadows = options.shadows;
   view_.skybox = options.textures ? look.skybox() : nullptr;
-  if (options.reflections && model->nmat > 0) {  // any world may make a material reflect
+  if (options.reflections && model->nmat > 0) {  // any world may set a material's reflectance
     ViewOptions flat = options;
     flat.reflections = flat.shadows = flat.layered = false;
     mirrored_ = std::make_unique<ViewBuilder>(model, look, flat);
@@ -94,8 +94,8 @@ const View& ViewBuilder::build(const RayWorld& world, const SharedGeometry& shap
                                const PixelGrid& grid) {
   view_.grid = grid;
   order_.clear();
-  const RayGeom* endless = nullptr;  // the first endless plane
-  // shape(g): what only this kind of object knows of its shape.
+  const RayGeom* endless = nullptr;  // the first infinite plane
+  // shape(g) sets the fields that depend on the kind of object.
   const auto add_shape = [&](const RayGeom& source, int id, const float* rgba,
                              const Material* material, auto shape) {
     const int index = static_cast<int>(order_.size());
@@ -111,7 +111,7 @@ const View& ViewBuilder::build(const RayWorld& world, const SharedGeometry& shap
     if (order.rank == 1) {
       const float* p = g.pos;
       const bool soft = g.object == mjOBJ_FLEX || g.object == mjOBJ_SKIN;
-      const float reach = soft ? 0 : g.radius;  // MuJoCo's
+      const float reach = soft ? 0 : g.radius;  // as in MuJoCo
       order.key = g.type == mjGEOM_PLANE
                       ? 1e10f
                       : std::sqrt(p[0] * p[0] + p[1] * p[1] + p[2] * p[2]) - reach;
@@ -130,7 +130,7 @@ const View& ViewBuilder::build(const RayWorld& world, const SharedGeometry& shap
     add(world.geom(id), id, world.flags()[id], world.materials()[id]);
   };
   int id = world.num_geoms();
-  // Nobody knows boxes of skins and markers, on which shadows may fall.
+  // Bounding boxes of skins and markers, which may receive shadows, are not stored.
   const bool unbounded = options_.shadows && (world.skins() || !markers.empty());
   if (grid.bent || unbounded || options_.everything) {
     for (int i = 0; i < id; ++i) add_geom(i);
@@ -186,14 +186,14 @@ const View& ViewBuilder::build(const RayWorld& world, const SharedGeometry& shap
   return view_;
 }
 
-// The camera is mirrored in the plane: the same pixel rays then meet the mirror in the same points
-// and go on to what is reflected. Its rotation is a reflection too, which disturbs nobody.
+// Mirrors the camera in the plane. Its pixel rays then meet the mirror at the same points and
+// continue to what is reflected. The camera's rotation becomes a reflection, which does no harm.
 void ViewBuilder::set_mirror(const RayWorld& world, const SharedGeometry& shapes,
                              const Appearance& appearance, std::span<const Marker> markers,
                              const double position[3], const double rotation[9]) {
   view_.mirror = -1;
   view_.reflection = nullptr;
-  // True: the search is over. There is one mirror, as in MuJoCo.
+  // Returns true if the search is over. As in MuJoCo, there is at most one mirror.
   const auto settles = [&](const RayGeom& g, int id, float alpha, float reflectance) {
     if (g.type != mjGEOM_PLANE && g.type != mjGEOM_BOX) return false;
     if (reflectance <= 0 || alpha < kOpaque) return false;
@@ -201,7 +201,8 @@ void ViewBuilder::set_mirror(const RayWorld& world, const SharedGeometry& shapes
     const double top = g.type == mjGEOM_BOX ? g.size[2] : 0;
     double above = -top;
     for (int k = 0; k < 3; ++k) above += (position[k] - g.pos[k]) * normal[k];
-    if (above < 0) return g.type == mjGEOM_BOX;  // a plane seen from below is a veil, not a mirror
+    // Below a mirror: a box ends the search; a plane, which is drawn as a veil, is skipped.
+    if (above < 0) return g.type == mjGEOM_BOX;
     double p[3], r[9];
     for (int k = 0; k < 3; ++k) p[k] = position[k] - 2 * above * normal[k];
     for (int j = 0; j < 3; ++j) {
@@ -280,7 +281,7 @@ void ViewBuilder::set_shape(const RayWorld& world, const SharedGeometry& shapes,
   }
 }
 
-// The world's normals with the texture coordinates that all share.
+// Combines the world's normals with the shared texture coordinates.
 const MeshLook* ViewBuilder::soft_look(int index, const MeshLook& shared, const float* normals) {
   MeshLook& look = soft_looks_[index];
   look = shared;
@@ -308,7 +309,8 @@ void ViewBuilder::set_surface(const RayGeom& source, const float* rgba, const Ma
   if (!s.texture) return;
   const bool uniform = material->uniform;
   s.mapped = g.mesh && g.mesh->uvs && !s.texture->cube;
-  if (g.object == mjOBJ_FLEX && !s.mapped) {  // MuJoCo: by its own coordinates only
+  // MuJoCo textures flexes by their own coordinates only.
+  if (g.object == mjOBJ_FLEX && !s.mapped) {
     s.texture = nullptr;
     return;
   }
@@ -320,11 +322,11 @@ void ViewBuilder::set_surface(const RayGeom& source, const float* rgba, const Ma
     if (s.repeat[i] <= 0 && !s.from_above) s.repeat[i] = 1;
     if (uniform && extent[i] > 0) s.repeat[i] *= extent[i];
     if (s.from_above || endless) s.shift[i] = -0.5f;
-    if (s.from_above && g.object == mjOBJ_SKIN)  // the texture stays where it is in the world
+    if (s.from_above && g.object == mjOBJ_SKIN)  // the texture stays fixed in the world
       s.shift[i] += (i ? -0.5f : 0.5f) * s.repeat[i] * static_cast<float>(source.pos[i]);
   }
-  // Cube maps: MuJoCo takes directions in the unit shape that it scales (meshes and planes: in
-  // metres).
+  // Cube maps: MuJoCo uses directions in the unit shape that it scales; for meshes and planes, in
+  // metres.
   const bool in_meters = g.mesh || g.height_field || g.type == mjGEOM_PLANE;
   for (int i = 0; i < 3; ++i) {
     if (in_meters) {
@@ -335,8 +337,8 @@ void ViewBuilder::set_surface(const RayGeom& source, const float* rgba, const Ma
   }
 }
 
-// The sky's cylinder and the haze are nowhere nearer to the camera than 1 - width of the cylinder's
-// radius; the longest rays go to the corners.
+// The sky's cylinder and the haze are at least (1 - width) times the cylinder's radius away; the
+// longest rays go through the image's corners.
 float ViewBuilder::sky_from(const Sky& sky) const {
   const PixelGrid& grid = view_.grid;
   if (grid.bent) return 0;
@@ -345,7 +347,8 @@ float ViewBuilder::sky_from(const Sky& sky) const {
   return std::max(1 - sky.haze_width, 0.0f) * sky.distance / std::sqrt(1 + x * x + y * y);
 }
 
-// Seen by parallel rays the sky has no place: it hides nothing, and there is no haze.
+// An orthographic view has no position relative to the sky: the sky hides nothing and there is no
+// haze.
 void ViewBuilder::set_sky(const RayGeom* plane, const Sky& sky, const double position[3],
                           const double rotation[9]) {
   view_.sky_distance = view_.grid.orthographic ? 0 : sky.distance;
@@ -368,12 +371,13 @@ void ViewBuilder::set_sky(const RayGeom* plane, const Sky& sky, const double pos
 void ViewBuilder::set_lights(const RayWorld& world, const Appearance& appearance,
                              const double position[3], const double rotation[9]) {
   view_.num_lights = static_cast<int>(appearance.lights().size());
-  view_.global_ambient = view_.num_lights == 0 ? 0.3f : 0.0f;  // MuJoCo's, so that something shows
+  // As in MuJoCo, so that the image is not black.
+  view_.global_ambient = view_.num_lights == 0 ? 0.3f : 0.0f;
   for (int i = 0; i < view_.num_lights; ++i) {
     ViewLight& light = view_.lights[i];
     light = appearance.lights()[i];
     const int id = appearance.light_ids()[i];
-    if (id < 0) {  // the headlight shines where the camera looks
+    if (id < 0) {  // the headlight shines in the camera's viewing direction
       double d[3] = {0, 0, -1};
       if (!own_headlight_) rotate_back(rotation, headlight_, d);
       for (int k = 0; k < 3; ++k) light.dir[k] = static_cast<float>(d[k]);

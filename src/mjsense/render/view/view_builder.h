@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
-// Brings a world into a camera's frame: what is in sight, nearest first, with its materials and
+// Converts a world to a camera's frame: visible geoms, nearest first, with their materials and
 // lights.
 
 #include <mujoco/mujoco.h>
@@ -28,15 +28,16 @@ struct ViewOptions {
   bool reflections = false;
   bool layered = false;  // View::layered
   float near = 0, far = 0;
-  std::size_t markers = 0;  // at most so many
-  bool everything = false;  // nothing is passed by, for tests
+  std::size_t markers = 0;  // maximum number of markers
+  bool everything = false;  // disables culling, for tests
 };
 
-// Surface::dull: where power() of the kernels gives 0, with room for its rounding. It gives 0 below 0.3
-// for exponents of at least 4, and where x^exponent is below e^-32.3.
+// Computes Surface::dull: the value below which the kernels' power() returns 0, with a margin for
+// rounding. power() returns 0 for x below 0.3 if the exponent is at least 4, and where x^exponent
+// is below e^-32.3.
 float dull_below(float exponent);
 
-// Owns the geoms of one view; build() fills it anew and allocates nothing.
+// Owns the geoms of one view. build() updates it and allocates nothing.
 class ViewBuilder {
  public:
   ViewBuilder(const mjModel* model, const Look& look, const ViewOptions& options);
@@ -46,7 +47,7 @@ class ViewBuilder {
                     const Appearance& appearance, std::span<const Marker> markers,
                     const double position[3], const double rotation[9], const PixelGrid& grid);
   const View& view() const { return view_; }
-  void use_fixed(const FixedTile* tiles) { view_.fixed = tiles; }  // of the view just built
+  void use_fixed(const FixedTile* tiles) { view_.fixed = tiles; }  // tiles of the last view built
   // Without markers.
   static std::size_t max_geoms(const mjModel* model) {
     return static_cast<std::size_t>(model->ngeom + model->nskin) + flex_parts(model).size();
@@ -62,7 +63,7 @@ class ViewBuilder {
              ViewGeom& g) const;
   void set_shape(const RayWorld& world, const SharedGeometry& shapes, const RayGeom& source,
                  ViewGeom& g);
-  // Ids of markers follow those of all else.
+  // Ids of markers follow those of all other objects.
   int first_marker() const { return static_cast<int>(unsorted_.size() - options_.markers); }
   const MeshLook* soft_look(int index, const MeshLook& shared, const float* normals);
   void set_surface(const RayGeom& source, const float* rgba, const Material* material,
@@ -81,16 +82,16 @@ class ViewBuilder {
   View view_;
   std::vector<ViewGeom> unsorted_, sorted_;
   std::vector<Order> order_;
-  std::vector<std::uint64_t> candidates_;  // bits of objects that may be in sight
+  std::vector<std::uint64_t> candidates_;  // bit per object that may be visible
   LightSpace light_space_;
-  std::vector<std::uint8_t> fixed_;  // of geoms; none if not layered
+  std::vector<std::uint8_t> fixed_;  // per geom; empty if not layered
   std::vector<int> index_of_id_;
-  std::vector<MeshLook> soft_looks_;  // of parts of flexes, then skins, with the world's normals
+  std::vector<MeshLook> soft_looks_;       // by flex part, then by skin, with the world's normals
   std::unique_ptr<ViewBuilder> mirrored_;  // null: nothing can reflect
-  int left_out_ = -1;                      // geom that this view does not show: the mirror itself
-  bool own_headlight_ = true;              // else headlight_: where the mirrored camera looks
+  int left_out_ = -1;                      // geom that is not shown: the mirror itself
+  bool own_headlight_ = true;  // otherwise headlight_, the viewing direction of the real camera
   double headlight_[3] = {};
-  float tint_ = 1;  // of every colour: the mirror's reflectance
+  float tint_ = 1;  // factor of every colour: the mirror's reflectance
 };
 
 }  // namespace mjsense

@@ -11,7 +11,7 @@ namespace mjsense {
 namespace {
 
 constexpr float kEndless = std::numeric_limits<float>::infinity();
-constexpr float kNearest = 1e-4f;  // m; what is nearer than this counts as behind the camera
+constexpr float kNearest = 1e-4f;  // m; nearer points count as behind the camera
 
 }  // namespace
 
@@ -68,8 +68,8 @@ bool find_window(const View& view, ViewGeom& g) {
       show(c[0], c[1], grid.orthographic ? 1.0f : depth, 0.0f);
       continue;
     }
-    // Beside or behind the camera: what is in front of it ends where edges cross the plane of depth
-    // kNearest.
+    // For a corner beside or behind the camera, use the points where its edges cross the plane of
+    // depth kNearest.
     for (int k = 0; k < 3; ++k) {
       const float *d = corners[corner ^ (1 << k)], beyond = -d[2];
       if (beyond <= kNearest) continue;
@@ -81,7 +81,7 @@ bool find_window(const View& view, ViewGeom& g) {
     const float slack = 1e-5f * (1 + std::abs(window[i]));
     g.window[i] = window[i] + (i % 2 ? slack : -slack);
   }
-  if (grid.bent) return true;  // the corners of the image do not bound it
+  if (grid.bent) return true;  // the image's corners do not bound it
   const float right = grid.left + grid.dx * grid.width, bottom = grid.top + grid.dy * grid.height;
   return g.window[0] <= right && g.window[1] >= grid.left && g.window[2] <= grid.top &&
          g.window[3] >= bottom;

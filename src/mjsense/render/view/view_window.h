@@ -1,17 +1,17 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
-// Where in an image a geom can be.
+// The part of an image that a geom may cover.
 
 #include "mjsense/render/view/view.h"
 
 namespace mjsense {
 
-// Fills center, radius, window and nearest of `g`, whose pose and box are known. False: none of it
-// can be in the image of view.grid between view.near and view.far.
+// Sets center, radius, window and nearest of `g` from its pose and box. Returns false if no point
+// of it can be in the image of view.grid between view.near and view.far.
 bool find_window(const View& view, ViewGeom& g);
 
-// The corners [8, 3] of g.box, C, m; g.center is known. Two whose numbers differ in one bit share an
-// edge.
+// Corners [8, 3] of g.box, camera frame, m; g.center must be set. Two corners whose indices differ
+// in one bit share an edge.
 void box_corners(const ViewGeom& g, float (*corners)[3]);
 
 }  // namespace mjsense

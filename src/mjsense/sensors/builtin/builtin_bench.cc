@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// What a built-in sensor costs beyond MuJoCo's own computation: the copy of its row, beside a
-// physics step of the same model.
+// Cost of a built-in sensor in addition to MuJoCo's own computation: copying its row, compared with
+// a physics step of the same model.
 
 #include <benchmark/benchmark.h>
 

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
-// For tests: one built-in sensor of every type, as XML and as configuration, on a robot that has
-// one of everything.
+// For tests: built-in sensors of every type, as XML and as configuration, on a robot that has
+// elements of every kind.
 
 #include <fmt/format.h>
 
@@ -13,7 +13,8 @@
 
 namespace mjsense {
 
-// A robot with one of everything a sensor can be attached to. `sensors` are its XML's.
+// A robot with elements of every kind that a sensor can be attached to. `sensors`: XML of its
+// sensors.
 inline std::string robot(const std::string& sensors) {
   return R"(<mujoco>
   <asset><mesh name="plate" builtin="plate" params="3 3" scale=".2 .2 .02"/></asset>
@@ -99,7 +100,7 @@ inline std::vector<Case> all_cases() {
                            "framelinvel", "frameangvel", "framelinacc", "frameangacc"}) {
     for (const auto& [obj, name] : objects) {
       add(type, fmt::format("objtype='{}' objname='{}'", obj, name), in_robot(obj, name));
-      // The accelerations accept a ref and ignore it; MJCF does not accept it.
+      // In a configuration the accelerations accept a ref and ignore it; MJCF does not accept it.
       const bool ignored = std::string(type).ends_with("acc");
       add(type,
           fmt::format("objtype='{}' objname='{}' {}", obj, name,

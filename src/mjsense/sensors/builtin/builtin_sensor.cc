@@ -31,7 +31,7 @@ void check_object(const ObjRef& ref, const std::vector<std::string>& allowed,
     throw ValueError(fmt::format("{}: {} requires {}.name", place, type, field));
 }
 
-// Bits of the wanted fields; their order is MuJoCo's.
+// Bit mask of the requested fields, which must be in MuJoCo's order.
 int range_mask(const std::vector<std::string>& data, std::string_view place) {
   std::vector<std::string> names;
   for (const RangeField& field : range_fields()) names.emplace_back(field.name);

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
-// MuJoCo's own sensors. The row is the sensor's slice of mjData.sensordata as float32 [B, dim];
-// what the numbers mean is in the table of builtin_types.h and in the field's SensorSpec.
+// MuJoCo's own sensors. A row is the sensor's slice of mjData.sensordata as float32 [B, dim]. The
+// meaning of the values is in the table of builtin_types.h and in the field's SensorSpec.
 
 #include <array>
 #include <memory>
@@ -41,7 +41,7 @@ struct BuiltinSensorCfg : SensorCfg {
   Word<BuiltinStage> needstage = BuiltinStage::kAcc;
   std::string plugin, instance;
 
-  // Throws ValueError for everything that can be known without a model.
+  // Throws ValueError for errors that can be found without a model.
   void validate() const;
   std::unique_ptr<Sensor> build() const override;
   std::string key() const override;  // "entity/name" if obj has an entity
@@ -91,8 +91,10 @@ void visit_fields(V& v, BuiltinSensorCfg& c) {
 }
 
 // Fields: "" float32 [dim]; with a history (nsample > 0) also "history" float32 [nsample, dim], the
-// samples taken so far, undelayed, newest first (0 before the first).
-// Writes one of MuJoCo's own sensors into the spec; its rows are a ModelSensor's.
+// samples taken so far, without delay, newest first (0 before the first).
+//
+// The class adds one of MuJoCo's own sensors to the spec; its base class ModelSensor fills the
+// rows.
 class BuiltinSensor : public ModelSensor {
  public:
   explicit BuiltinSensor(const BuiltinSensorCfg& cfg);

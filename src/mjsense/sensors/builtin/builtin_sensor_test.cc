@@ -39,7 +39,7 @@ class Bench {
   mjData* data() { return data_.get(); }
   Scene& scene() { return scene_; }
 
-  // Row 1 of 2 (row 0 must stay zero).
+  // Returns row 1 of 2; row 0 must stay zero.
   std::vector<float> read(const std::string& key, const std::string& field = "") {
     Sensor& sensor = scene_.sensor(key);
     sensor.compute({.id = 1, .model = model(), .data = data()});
@@ -60,7 +60,7 @@ void randomize(const mjModel* m, mjData* d, Rng& rng) {
   for (int i = 0; i < m->nu; ++i) d->ctrl[i] = rng.uniform(-1, 1);
 }
 
-// Another robot of the same names: every pose, axis, size and mass moved at random.
+// Makes another robot with the same names: every pose, axis, size and mass changes at random.
 void disturb(mjSpec* spec, int seed) {
   Rng rng(seed, 7, 0, 0);
   const auto move = [&](double* pos, double* quat) {
@@ -87,8 +87,8 @@ void disturb(mjSpec* spec, int seed) {
   }
 }
 
-// Configured sensors, discovered ones, and MuJoCo alone on the same XML: the same numbers, on
-// random robots in random states.
+// Configured sensors, sensors found in the XML, and MuJoCo alone on the same XML give the same
+// numbers, on random robots in random states.
 TEST(BuiltinSensor, EveryTypeAgreesWithMujoco) {
   const std::vector<Case> cases = all_cases();
   std::string sensors;
@@ -101,7 +101,7 @@ TEST(BuiltinSensor, EveryTypeAgreesWithMujoco) {
     if (model > 0) cfg.spec_fn = [&](mjSpec* spec) { disturb(spec, model); };
     Bench bench(std::move(cfg));
 
-    // The same physics, without mjsense: prefixes are the only difference.
+    // The same model without mjsense: only the prefixes of names differ.
     char error[1000] = "";
     SpecPtr spec(mj_parseXMLString(robot(sensors).c_str(), nullptr, error, sizeof error));
     ASSERT_TRUE(spec) << error;
@@ -231,7 +231,7 @@ SceneCfg with(std::vector<BuiltinSensorCfg> sensors, const std::string& xml = ""
   return cfg;
 }
 
-TEST(BuiltinSensor, ErrorsOfTheSceneNameTheSensor) {
+TEST(BuiltinSensor, SceneErrorsNameTheSensor) {
   const auto fault = [](std::vector<BuiltinSensorCfg> sensors, const std::string& xml = "") {
     return message_of([&] { Scene scene(with(std::move(sensors), xml)); });
   };
@@ -247,7 +247,7 @@ TEST(BuiltinSensor, ErrorsOfTheSceneNameTheSensor) {
               HasSubstr("sensor 's': already exists in the scene"));
 }
 
-TEST(BuiltinSensor, SaysUnitAndFrame) {
+TEST(BuiltinSensor, DeclaresUnitAndFrame) {
   std::vector<BuiltinSensorCfg> sensors;
   const auto add = [&](const std::string& type, ObjRef obj, ObjRef ref = {}) {
     sensors.push_back(make(type, std::move(obj), std::move(ref)));
@@ -271,7 +271,8 @@ TEST(BuiltinSensor, SaysUnitAndFrame) {
   EXPECT_EQ(spec(5).frame, "world");
 }
 
-// The history field against MuJoCo's own reader of its buffer, before and after it wraps around.
+// The history field is that of MuJoCo's own reader of the buffer, before and after the buffer wraps
+// around.
 TEST(BuiltinSensor, HistoryIsNewestFirst) {
   BuiltinSensorCfg cfg = make("jointpos", in_robot("joint", "hinge"));
   cfg.nsample = 3;
@@ -286,7 +287,7 @@ TEST(BuiltinSensor, HistoryIsNewestFirst) {
     EXPECT_THAT(bench.read("robot/s", "history"),
                 ::testing::ElementsAre(taken[0], taken[1], taken[2]))
         << k;
-    EXPECT_EQ(bench.read("robot/s")[0], taken[1]) << k;  // 0.004 s = 2 steps ago
+    EXPECT_EQ(bench.read("robot/s")[0], taken[1]) << k;  // 0.004 s are 2 steps
     const int id = mj_name2id(m, mjOBJ_SENSOR, "robot/s");
     const mjtNum* newest =
         mj_readSensor(m, d, id, d->time + .004 - .5 * m->opt.timestep, nullptr, 0);
@@ -296,9 +297,9 @@ TEST(BuiltinSensor, HistoryIsNewestFirst) {
   }
 }
 
-// Through a simulation: after each control step the rows are those of a plain mj_step loop, made
-// current by mj_forward. Delays and intervals too, which live in MuJoCo's history buffer.
-TEST(BuiltinSensor, SimulationShowsTheFreshState) {
+// In a simulation, after each control step, the rows are those of a plain mj_step loop followed by
+// mj_forward. This includes delays and intervals, which use MuJoCo's history buffer.
+TEST(BuiltinSensor, SimulationRowsAreCurrent) {
   const std::vector<Case> cases = all_cases();
   std::string sensors;
   for (const Case& c : cases) sensors += c.xml;

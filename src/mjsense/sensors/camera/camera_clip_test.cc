@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Cameras that stand inside a housing: with clip_near "model" they see out of it as MuJoCo's
-// renderer does.
+// Cameras inside a housing: with clip_near "model" the housing is clipped as in MuJoCo's renderer.
 
 #include <gtest/gtest.h>
 
@@ -15,8 +14,8 @@
 namespace mjsense {
 namespace {
 
-// A lens of 3 cm and a shell around it, of a mesh and of shapes that cut through the near plane, 4
-// cm away; things outside, some of which move.
+// A camera with a lens of 3 cm and a shell around it, made of a mesh and of shapes that intersect
+// the near plane at 4 cm; other objects outside, some of which can move.
 constexpr char kHousing[] = R"(<mujoco><statistic extent="2" center="0 0 0"/>
   <visual><map znear="0.02"/><quality numslices="60" numstacks="60" shadowsize="1024"/></visual>
   <asset><mesh name="shell" vertex="-.05 -.05 .02  .05 -.05 .02  0 .06 .02  -.05 -.05 -.03  .05 -.05 -.03  0 .06 -.03"/>
@@ -42,21 +41,23 @@ CameraSensorCfg wide(std::vector<std::string> types) {
   return cfg;
 }
 
-TEST(CameraClip, AtTheModelsNearPlaneAsOpenGLDoes) {
+TEST(CameraClip, ClipsAtTheModelsNearPlaneLikeOpenGL) {
   const testing::TestModel m(kHousing);
-  for (const bool shadows : {false, true}) {  // with shadows what stands still is kept
+  // With shadows, fixed geoms are drawn from a stored layer.
+  for (const bool shadows : {false, true}) {
     CameraSensorCfg cfg = wide({"rgb", "depth", "segmentation"});
     cfg.use_shadows = shadows;
     const testing::Pair pair(cfg, m);
     if (!pair.opengl) GTEST_SKIP() << pair.missing;
     EXPECT_LT(pair.other_ids(), 0.006);
     EXPECT_LT(pair.other_depths(0.002), 0.006);
-    EXPECT_GT(pair.psnr(), 27);  // MuJoCo lights the coarse field at its corners
+    EXPECT_GT(pair.psnr(), 27);  // MuJoCo shades the coarse height field at its vertices
   }
 }
 
-// Every field shows what lies beyond: nothing is nearer than the plane, and without it all is.
-TEST(CameraClip, HoldsForEveryField) {
+// Every field shows what is beyond the near plane: nothing is nearer. Without the near plane,
+// nearer surfaces are visible.
+TEST(CameraClip, ClipsEveryField) {
   const testing::TestModel m(kHousing);
   RayScene rays(m.model, 1);
   rays.update(m.world());
@@ -74,7 +75,8 @@ TEST(CameraClip, HoldsForEveryField) {
     EXPECT_EQ(points[3 * i + 2], -depth[i]);
     nearer += all->field("depth").data.row<float>(0)[i] < 0.04f;
   }
-  EXPECT_GT(nearer, 100);  // the little things; of the shell only backs are seen
+  // These are the small geoms. The shell shows only its back faces, which are invisible.
+  EXPECT_GT(nearer, 100);
   for (const Field& field : clipped->fields()) {
     const Array& other = by_hand->field(field.name).data;
     ASSERT_EQ(field.data.bytes(), other.bytes());
@@ -82,7 +84,7 @@ TEST(CameraClip, HoldsForEveryField) {
   }
 }
 
-TEST(CameraClip, FaultsAreNamed) {
+TEST(CameraClip, ErrorsNameTheLimits) {
   const auto message = [](const CameraSensorCfg& cfg) -> std::string {
     try {
       const testing::TestModel m(kHousing);

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
-// What a camera returns.
+// Declares the fields of a camera.
 
 #include "mjsense/core/data_class.h"
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// What a camera shows of itself: its frustum and its frame, where they were when the image was
+// Debug drawing of a camera: its frustum and its axes, at the pose that they had when the image was
 // taken.
 
 #include <cmath>
@@ -10,16 +10,16 @@
 namespace mjsense {
 namespace {
 
-// Parts in which a side of the image is drawn through a lens, which bends it.
+// Number of line segments for a side of the image if a lens bends it.
 constexpr int kBentParts = 8;
 
-// A camera's rays in the world.
+// A camera's rays in the world frame.
 class Optics {
  public:
   Optics(const PixelGrid& grid, std::span<const float> pose) : grid_(grid), pose_(pose) {}
 
   Vec3 origin() const { return {pose_[3], pose_[7], pose_[11]}; }
-  // The point at `depth` that shows at image point (u, v) in 0..1, v down.
+  // The point at `depth` that is visible at image point (u, v) in 0..1, v down.
   Vec3 point(double u, double v, double depth) const {
     double x = grid_.left + u * grid_.width * grid_.dx;
     double y = grid_.top + v * grid_.height * grid_.dy;

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// A camera that has kept what stands still makes the same image as one that has not, bit for bit.
+// A camera that has stored a layer of the fixed geoms makes the same image as one that has not, bit
+// for bit.
 
 #include <gtest/gtest.h>
 
@@ -73,7 +74,7 @@ std::vector<std::uint8_t> bytes_of(Camera& camera, int world) {
   return bytes;
 }
 
-// Of world 0.
+// Renders world 0 and returns its image.
 std::vector<std::uint8_t> image(Camera& camera, const testing::TestModel& m, RayScene& rays,
                                 ThreadPool& pool) {
   mj_forward(m.model, m.data);
@@ -84,7 +85,7 @@ std::vector<std::uint8_t> image(Camera& camera, const testing::TestModel& m, Ray
   return bytes_of(camera, id);
 }
 
-TEST(FixedLayer, ChangesNoBitOfAnyImage) {
+TEST(FixedLayer, DoesNotChangeImages) {
   for (int scene = 0; scene < 4; ++scene) {
     Rng rng(5, 0, 1, scene);
     testing::TestModel m(room(rng));
@@ -102,7 +103,8 @@ TEST(FixedLayer, ChangesNoBitOfAnyImage) {
         [&] { m.data->mocap_pos[3] += 0.1; },
         [] {},
         [] {},
-        [&] { m.model->geom_pos[3 * 2] += 0.2; },  // of a fixed geom: what is kept is worth nothing
+        // A fixed geom changes, so that the stored layer is invalid.
+        [&] { m.model->geom_pos[3 * 2] += 0.2; },
         [] {},
         [] {},
         [] {},
@@ -127,9 +129,9 @@ TEST(FixedLayer, ChangesNoBitOfAnyImage) {
   }
 }
 
-// Worlds that look different (their lamps, floors and cameras are their own) keep a layer each, on one
-// thread and on several, whichever of them are asked for an image.
-TEST(FixedLayer, WorldsThatLookDifferentHaveTheirOwn) {
+// Worlds with different lights, floors and cameras store a layer each, with one and with several
+// threads, whichever worlds are rendered.
+TEST(FixedLayer, DifferentWorldsHaveTheirOwnLayers) {
   constexpr int kWorlds = 6;
   const std::vector<std::vector<int>> casts = {
       {0, 1, 2, 3, 4, 5}, {0, 1, 2, 3, 4, 5}, {0, 1, 2, 3, 4, 5}, {4}, {0, 1, 2, 3, 4, 5}, {1, 4},

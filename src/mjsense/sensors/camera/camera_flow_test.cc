@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// CameraSensor's optical flow: where each pixel's surface point was in the previous image.
+// Optical flow of CameraSensor: where each pixel's surface point was in the previous image.
 
 #include <gtest/gtest.h>
 
@@ -17,10 +17,10 @@ namespace mjsense {
 namespace {
 
 constexpr int kWidth = 40, kHeight = 30;
-constexpr double kFocal = 15;  // pixels: 90 degrees high
+constexpr double kFocal = 15;  // pixels; fovy is 90 degrees
 
-// A camera 2 m before a wall, on three slides and a ball joint, looking along -z at a plate 1 m
-// away on a slide of its own. There is no gravity: nothing moves unless its pose is written.
+// A camera on three slides and a ball joint, 2 m in front of a wall, looks along -z at a plate 1 m
+// away, which is on a slide. There is no gravity: nothing moves unless its pose is written.
 constexpr char kWorld[] = R"(
 <mujoco>
   <worldbody>
@@ -37,7 +37,7 @@ constexpr char kWorld[] = R"(
     </body>
   </worldbody>
 </mujoco>)";
-enum { kX, kY, kZ, kTurn, kPlate = 7 };  // in qpos
+enum { kX, kY, kZ, kTurn, kPlate = 7 };  // addresses in qpos
 
 std::shared_ptr<CameraSensorCfg> flow_camera(std::vector<std::string> types = {"flow"}) {
   auto cfg = std::make_shared<CameraSensorCfg>();
@@ -97,10 +97,10 @@ TEST(Flow, IsZeroInTheFirstImageAndWhileNothingMoves) {
   for (float f : lab.read()) EXPECT_EQ(f, 0);
 }
 
-//   was -> is        wall
+//   before -> now      wall
 //    o     o        |
 //    \ dx /         |  z
-TEST(Flow, OfACameraThatMovesSidewaysIsFocalTimesWayOverDepth) {
+TEST(Flow, OfATranslatingCameraIsFocalTimesDistanceOverDepth) {
   Lab lab(flow_camera());
   lab.read();
   lab.qpos()[kX] = 0.1;
@@ -109,7 +109,7 @@ TEST(Flow, OfACameraThatMovesSidewaysIsFocalTimesWayOverDepth) {
   const auto flow = lab.read();
   for_pixels(flow, [](int x, int y, float u, float v) {
     if (std::abs(x - kWidth / 2) < 8 && std::abs(y - kHeight / 2) < 8) return;
-    // A still point was to the right by f dx / z in the image before; v points down.
+    // In the image before, a static point was to the right by f dx / z; v points down.
     EXPECT_NEAR(u, kFocal * 0.1 / 2, 1e-4) << x << ", " << y;
     EXPECT_NEAR(v, kFocal * 0.04 / 2, 1e-4) << x << ", " << y;
   });
@@ -118,7 +118,7 @@ TEST(Flow, OfACameraThatMovesSidewaysIsFocalTimesWayOverDepth) {
   EXPECT_NEAR(flow[middle + 1], kFocal * 0.04 / 1.0, 1e-4);
 }
 
-TEST(Flow, OfAMovingObjectIsItsOwn) {
+TEST(Flow, OfAMovingObjectFollowsItsMotion) {
   Lab lab(flow_camera());
   lab.read();
   lab.qpos()[kPlate] = 0.05;
@@ -128,12 +128,12 @@ TEST(Flow, OfAMovingObjectIsItsOwn) {
     EXPECT_EQ(v, 0) << x << ", " << y;
     if (u == 0) return;
     ++moving;
-    EXPECT_NEAR(u, -kFocal * 0.05 / 1.0, 1e-4);  // it was to the left
+    EXPECT_NEAR(u, -kFocal * 0.05 / 1.0, 1e-4);  // the plate was to the left
   });
   EXPECT_EQ(moving, 6 * 6);  // 0.4 m at 1 m are 6 pixels
 }
 
-TEST(Flow, ATeleportIsSeenWhole) {
+TEST(Flow, IncludesTeleports) {
   Lab lab(flow_camera());
   lab.sim->step();
   lab.read();
@@ -145,8 +145,9 @@ TEST(Flow, ATeleportIsSeenWhole) {
   EXPECT_TRUE(seen);
 }
 
-// Every pixel by another way: its point of the point cloud, into the world, back by the plate's own
-// motion, and into the previous image by the formulas of CameraSensorCfg.
+// Computes every pixel in another way: the pixel's point of the point cloud is transformed to the
+// world, moved back by the plate's motion, and projected into the previous image by the formulas of
+// CameraSensorCfg.
 void expect_flow_of_point_cloud(const std::shared_ptr<CameraSensorCfg>& cfg, double focal) {
   Lab lab(cfg);
   lab.qpos()[kX] = 0.2;
@@ -196,7 +197,7 @@ void expect_flow_of_point_cloud(const std::shared_ptr<CameraSensorCfg>& cfg, dou
       right *= scale;
       down *= scale;
     }
-    if (std::isnan(u)) {  // only far out of the previous image
+    if (std::isnan(u)) {  // only far outside the previous image
       EXPECT_NE(cfg->distortion.model.text(), "none");
       EXPECT_GT(std::hypot(right * focal / kWidth, down * focal / kHeight), 0.6);
       ++far_out;
@@ -226,9 +227,9 @@ TEST(Flow, AgreesWithThePointCloudInEveryKindOfCamera) {
   expect_flow_of_point_cloud(cfg, kHeight / 2.0);
 }
 
-TEST(Flow, IsNotANumberWhereNothingIsSeenOrWasBehindTheCamera) {
+TEST(Flow, IsNanWhereNothingIsSeenOrWasBehindTheCamera) {
   Lab lab(flow_camera());
-  lab.qpos()[kZ] = -1.5;  // 0.5 m above the wall, under the plate's top at 1 m
+  lab.qpos()[kZ] = -1.5;  // 0.5 m above the wall, below the plate's top at 1 m
   lab.sim->forward();
   lab.read();
   lab.qpos()[kZ] = 0;
@@ -236,12 +237,12 @@ TEST(Flow, IsNotANumberWhereNothingIsSeenOrWasBehindTheCamera) {
   int behind = 0;
   for (float f : lab.read()) behind += std::isnan(f);
   EXPECT_EQ(behind, 2 * 6 * 6);
-  lab.turn(3.14159, 1, 0, 0);  // up
+  lab.turn(3.14159, 1, 0, 0);  // the camera looks up
   lab.sim->forward();
   for (float f : lab.read()) EXPECT_TRUE(std::isnan(f));
 }
 
-TEST(Flow, APartialResetForgetsThePreviousImageOfItsWorlds) {
+TEST(Flow, PartialResetClearsThePreviousImageOfItsWorlds) {
   Lab lab(flow_camera(), {.num_worlds = 2});
   lab.read();
   const auto move = [&](double x) {
@@ -260,12 +261,12 @@ TEST(Flow, APartialResetForgetsThePreviousImageOfItsWorlds) {
   EXPECT_NEAR(lab.read("flow", 0)[0], kFocal * 0.2 / 2, 1e-4);
 }
 
-TEST(Flow, AnImageTakenAgainAtTheSameTimeReplacesTheLast) {
+TEST(Flow, ImageAtTheSameTimeReplacesTheLast) {
   Lab lab(flow_camera());
   lab.sim->step();
   lab.read();
   lab.qpos()[kX] = 0.1;
-  lab.sim->step();  // an image, for the sensor was read before
+  lab.sim->step();  // an image is taken, because the sensor was read before
   lab.qpos()[kX] = 0.3;
   lab.sim->forward();
   EXPECT_NEAR(lab.read()[0], kFocal * 0.3 / 2, 1e-4);
@@ -278,7 +279,7 @@ TEST(Flow, IsBetweenImagesOfTheCamerasOwnRate) {
   auto cfg = flow_camera();
   cfg->update_period = 0.006;  // three steps
   Lab lab(cfg);
-  lab.qpos()[kX] = 5;  // after the reset: still the first image
+  lab.qpos()[kX] = 5;  // after the reset, this is still the first image
   lab.sim->forward();
   for (float f : lab.read()) EXPECT_EQ(f, 0);
   const float whole = static_cast<float>(kFocal * 0.3 / 2);
@@ -289,7 +290,7 @@ TEST(Flow, IsBetweenImagesOfTheCamerasOwnRate) {
   }
 }
 
-TEST(Flow, IsThatOfTrueDepth) {
+TEST(Flow, UsesTrueDepth) {
   auto plain = flow_camera({"flow", "depth"}), noisy = flow_camera({"flow", "depth"});
   noisy->depth_noise = "d435";
   std::vector<float> flows[2], depths[2];
@@ -305,7 +306,7 @@ TEST(Flow, IsThatOfTrueDepth) {
   EXPECT_NE(depths[0], depths[1]);
 }
 
-TEST(Flow, IsTheSameFromMuJoCosRenderer) {
+TEST(Flow, IsTheSameWithMuJoCosRenderer) {
   auto cfg = flow_camera();
   cfg->renderer = "opengl";
   try {

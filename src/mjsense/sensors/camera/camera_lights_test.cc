@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Which lights shine, where there are more than MuJoCo's OpenGL has.
+// Which lights are active, if there are more than MuJoCo's OpenGL renderer supports.
 
 #include <gtest/gtest.h>
 
@@ -20,8 +20,8 @@ CameraSensorCfg one_pixel(int max_lights) {
   return cfg;
 }
 
-// Red of a white floor under twelve lights, each of which adds 5 % of full white; so does the
-// headlight.
+// Red value of a white floor under twelve lights. Each light adds 5 % of full white, and so does
+// the headlight.
 int brightness(int max_lights, const std::string& head, const std::string& first = "") {
   std::string lights = first;
   for (int i = 0; i < 12; ++i)
@@ -36,17 +36,17 @@ int brightness(int max_lights, const std::string& head, const std::string& first
   return testing::shoot(one_pixel(max_lights), m, rays)->field("rgb").data.row<std::uint8_t>(0)[0];
 }
 
-TEST(CameraLights, TheFirstEightShineAsInMujoco) {
+TEST(CameraLights, FirstEightAreActiveAsInMujoco) {
   const auto share = [](int lights) { return 255 * 0.05 * lights; };
   EXPECT_NEAR(brightness(8, "0"), share(8), 1);
-  EXPECT_NEAR(brightness(8, "1"), share(8), 1);  // the headlight is one of them
+  EXPECT_NEAR(brightness(8, "1"), share(8), 1);  // the headlight counts too
   EXPECT_NEAR(brightness(3, "1"), share(3), 1);
   EXPECT_NEAR(brightness(32, "1"), share(13), 1);
-  // One that is off takes no place.
+  // A light that is off does not count.
   EXPECT_NEAR(brightness(8, "0", "<light active='false'/>"), share(8), 1);
 }
 
-TEST(CameraLights, TwelveLookAsWithOpenGL) {
+TEST(CameraLights, TwelveLightsLookAsWithOpenGL) {
   const char* colors[] = {"1 0 0",  "0 1 0",  "0 0 1", "1 1 0",   "1 0 1", "0 1 1",
                           "1 .5 0", "0 .5 1", "1 1 1", ".5 1 .5", "1 1 1", "1 .5 .5"};
   for (const char* shadows : {"false", "true"}) {

@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Sites and tendons in images: what MuJoCo's visualiser makes of them, and nothing unless asked
-// for.
+// Sites and tendons in images: as in MuJoCo's visualiser, and absent unless requested.
 
 #include <gtest/gtest.h>
 
@@ -17,7 +16,7 @@ namespace mjsense {
 namespace {
 
 // Sites of every shape on bodies that move; tendons over a sphere, through a cylinder, over a
-// pulley, at their limit, and a slack string.
+// pulley and at their limit, and a slack one.
 constexpr char kScene[] = R"(<mujoco>
   <visual><quality numslices="60" numstacks="60" shadowsize="1024"/></visual><statistic extent="2" center="0 0 0"/>
   <asset><texture name="t" type="2d" builtin="checker" rgb1=".8 .2 .2" rgb2=".2 .2 .8" width="64" height="64"/>
@@ -61,7 +60,7 @@ void run(const testing::TestModel& m, int steps) {
   mj_forward(m.model, m.data);
 }
 
-TEST(CameraMarkers, AreThoseOfMujocosScene) {
+TEST(CameraMarkers, EqualThoseOfMujocosScene) {
   const testing::TestModel m(kScene);
   Markers markers(m.model, {0x7, 0xf, true});
   mjvScene scene;
@@ -89,7 +88,7 @@ TEST(CameraMarkers, AreThoseOfMujocosScene) {
       EXPECT_TRUE(std::equal(theirs.pos, theirs.pos + 3, ours.shape.pos));
       EXPECT_TRUE(std::equal(theirs.mat, theirs.mat + 9, ours.shape.mat));
       EXPECT_TRUE(std::equal(theirs.rgba, theirs.rgba + 4, ours.rgba));
-      // Theirs: half sizes along the axes; ours: what a geom of that type has.
+      // MuJoCo's sizes are half sizes along the axes; ours are those of a geom of that type.
       const bool round = theirs.type == mjGEOM_CAPSULE || theirs.type == mjGEOM_CYLINDER;
       EXPECT_EQ(ours.shape.size[0], theirs.size[0]);
       EXPECT_EQ(ours.shape.size[1], theirs.size[round ? 2 : 1]) << theirs.type;
@@ -126,7 +125,7 @@ TEST(CameraMarkers, LookAsWithOpenGL) {
   }
 }
 
-TEST(CameraMarkers, AreNotThereUnlessTheirGroupsAre) {
+TEST(CameraMarkers, AreVisibleOnlyIfTheirGroupsAre) {
   const testing::TestModel m(kScene);
   RayScene rays(m.model, 1);
   rays.update(m.world());
@@ -178,7 +177,7 @@ TEST(CameraMarkers, BelongToTheirBodies) {
   EXPECT_GT(tendons, 50);
 }
 
-// A box that reflects is a mirror as a site too, and shows sites.
+// A reflective box is a mirror also if it is a site, and it reflects sites.
 TEST(CameraMarkers, ReflectAndAreReflected) {
   const testing::TestModel m(R"(<mujoco><statistic extent="2" center="0 0 0"/>
     <asset><material name="mirror" reflectance=".8" rgba=".2 .2 .2 1"/></asset>
@@ -190,7 +189,7 @@ TEST(CameraMarkers, ReflectAndAreReflected) {
   if (!pair.opengl) GTEST_SKIP() << pair.missing;
   EXPECT_LT(pair.other_ids(), 0.01);
   EXPECT_GT(pair.psnr(), 28);
-  int green = 0;  // in what the table shows
+  int green = 0;  // in the mirror image on the table
   const auto rgb = pair.by_rays<std::uint8_t>("rgb");
   const auto ids = pair.by_rays<std::int32_t>("segmentation");
   for (std::size_t i = 0; i < ids.size() / 2; ++i)

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// The same scene by rays and by MuJoCo's own renderer.
+// The same scene, rendered by rays and by MuJoCo's own renderer.
 
 #include <gtest/gtest.h>
 
@@ -31,7 +31,7 @@ constexpr char kScene[] = R"(<mujoco>
     <geom type="cylinder" size=".1 .3" pos="-.3 -.6 .3" material="m"/>
     <camera name="c" pos="0 -2.5 1.5" xyaxes="1 0 0 0 .5 1"/></worldbody></mujoco>)";
 
-// Cloth, a rope, a soft solid and a skin, all bent.
+// Cloth, a rope, a soft solid and a skin, all of them bent.
 constexpr char kSoftScene[] = R"(<mujoco>
   <asset><texture name="sky" type="skybox" builtin="gradient" rgb1=".4 .6 .8" rgb2="0 0 0" width="64" height="64"/>
     <texture name="t" type="2d" builtin="checker" rgb1=".8 .2 .2" rgb2=".9 .8 .7" width="64" height="64"/>
@@ -101,12 +101,12 @@ TEST_P(CameraAgainstOpenGL, DepthIdsAndColoursAgree) {
   }
   std::nth_element(errors.begin(), errors.begin() + kCount / 2, errors.end());
   EXPECT_LT(errors[kCount / 2], 1e-4);  // m, median
-  EXPECT_LT(far_off, kCount / 200);     // silhouettes, and MuJoCo's facets
+  EXPECT_LT(far_off, kCount / 200);     // silhouettes, and the facets of MuJoCo's shapes
   EXPECT_LT(other_id, kCount / 200);
   const double psnr = 10 * std::log10(255.0 * 255.0 * 3 * kCount / square);
   EXPECT_GT(psnr, 28);
   RecordProperty("psnr", std::to_string(psnr));
-  // Several samples smooth colours, and leave depth and ids those of pixel centres.
+  // Several samples smooth the colours, but depth and ids remain those of the pixel centres.
   Sensor& smooth = scene->sensor("opengl smooth");
   sim->refresh(smooth);
   EXPECT_FALSE(std::ranges::equal(gl_rgb, smooth.field("rgb").data.row<std::uint8_t>(0)));

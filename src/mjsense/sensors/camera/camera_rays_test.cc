@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Images against single rays of the ray scene: every pixel of random scenes of every geom type.
+// Images compared with single rays of the ray scene: every pixel of random scenes with every geom
+// type.
 
 #include <gtest/gtest.h>
 
@@ -17,7 +18,7 @@
 namespace mjsense {
 namespace {
 
-// The camera "c" of a scene.
+// Configuration of the scene's camera "c".
 CameraSensorCfg camera_c(int width, int height, std::vector<std::string> data_types) {
   CameraSensorCfg cfg;
   cfg.name = "cam";
@@ -28,8 +29,8 @@ CameraSensorCfg camera_c(int width, int height, std::vector<std::string> data_ty
   return cfg;
 }
 
-// Calls visit(pixel, d, length) with each pixel's direction in the world; its depth is the distance
-// along the ray divided by `length`.
+// Calls visit(pixel, d, length) with each pixel's direction in the world. The pixel's depth is the
+// distance along the ray divided by `length`.
 template <class Visit>
 void each_pixel(const testing::TestModel& m, int width, int height, double fovy, Visit visit) {
   const double top = std::tan(0.5 * fovy * M_PI / 180), right = top * width / height;
@@ -44,7 +45,7 @@ void each_pixel(const testing::TestModel& m, int width, int height, double fovy,
   }
 }
 
-TEST(CameraAgainstRays, EveryPixelSeesWhatItsRayMeets) {
+TEST(CameraAgainstRays, EveryPixelEqualsItsRay) {
   constexpr int kWidth = 61, kHeight = 47, kScenes = 24;
   long pixels = 0, other_geom = 0, hits = 0, off = 0;
   for (int scene = 0; scene < kScenes; ++scene) {
@@ -53,7 +54,7 @@ TEST(CameraAgainstRays, EveryPixelSeesWhatItsRayMeets) {
         rng, {"plane", "sphere", "capsule", "ellipsoid", "cylinder", "box", "mesh", "hfield"}, 40,
         2.5);
     const std::string end = "</worldbody>";
-    // Every second camera is among the geoms: triangles pass beside and behind it.
+    // Every second camera is among the geoms, with triangles beside and behind it.
     const double far = scene % 2 == 0 ? 4 : 1;
     const std::string eye = testing::vec(
         {rng.uniform(-far, far), rng.uniform(-far, far), far / 4 + rng.uniform(0, 0.75 * far)});
@@ -80,19 +81,19 @@ TEST(CameraAgainstRays, EveryPixelSeesWhatItsRayMeets) {
       if (ids[2 * i] != hit.geom) {
         ++other_geom;
       } else if (hit.geom >= 0) {
-        // Far away on a plane a rounded direction moves the hit by the distance squared.
+        // On a plane far away, rounding of the direction moves the hit by the distance squared.
         const double rounding = 1e-5 * (1 + planar) + 1e-7 * planar * planar;
         off += std::abs(depth[i] - planar) > rounding;
       }
     });
   }
   EXPECT_GT(hits, pixels / 4);
-  EXPECT_LT(other_geom, pixels / 5000);  // edges, by rounding
+  EXPECT_LT(other_geom, pixels / 5000);  // edges, because of rounding
   EXPECT_LT(off, pixels / 5000);
 }
 
-// Depth over ground that is flat at its highest elevation, by mj_ray: in an image, too, such a top
-// is the plane in which the field's box ends.
+// Depth compared with mj_ray, over ground that is flat at its highest elevation. Such a top is in
+// the plane in which the height field's box ends, and must be visible in images too.
 TEST(CameraAgainstRays, FlatTopsOfHeightFields) {
   constexpr int kWidth = 64, kHeight = 48;
   long pixels = 0, off = 0, ground = 0;
@@ -123,7 +124,7 @@ TEST(CameraAgainstRays, FlatTopsOfHeightFields) {
     });
   }
   EXPECT_GT(ground, pixels / 3);
-  EXPECT_LT(off, pixels / 5000);  // edges of steps, by rounding
+  EXPECT_LT(off, pixels / 5000);  // edges of steps, because of rounding
 }
 
 }  // namespace

@@ -17,8 +17,8 @@
 namespace mjsense {
 namespace {
 
-// Fewer images than this for each thread are divided into bands, so many that all threads finish at
-// about the same time.
+// If there are fewer images per thread than this, images are divided into bands. There are enough
+// bands for all threads to finish at about the same time.
 constexpr int kImagesPerThread = 4, kBandsPerThread = 16;
 
 unsigned bits_of(const std::vector<int>& groups) {
@@ -52,11 +52,12 @@ std::shared_ptr<const Look> look_of(const SensorInit& init, bool meshes, bool te
 
 }  // namespace
 
-// Made at the first cast(), which knows the shared shapes. Few large images: a view each, and their
-// tiles are divided among the threads. Many small ones: a view a thread.
+// Working memory of cast(). With few large images, each has a view, whose tiles are divided among
+// the threads. With many small ones, each thread has a view.
 struct CameraSensor::Workspace {
   std::vector<ViewBuilder> builders;
-  std::vector<FixedTile*> making;  // by builder: what is made of its view before the image
+  // By builder: tiles of the fixed layer that must be rendered before the image; null: none.
+  std::vector<FixedTile*> making;
   std::vector<TileMemory> memory;  // by thread
   RenderTiles render = best_render_tiles();
 };
@@ -140,7 +141,7 @@ void CameraSensor::initialize(const SensorInit& init) {
     gl_ = make_gl_renderer(model_, gl, place);
     return;
   }
-  // Everything that cast() needs, but for the ray scene's shapes.
+  // Allocates all that cast() needs, except the shapes of the ray scene.
   const int slots =
       std::max(init.threads, std::min(init.num_worlds, kImagesPerThread * init.threads));
   workspace_ = std::make_unique<Workspace>();
@@ -157,8 +158,8 @@ void CameraSensor::initialize(const SensorInit& init) {
   for (int i = 0; i < init.threads; ++i) workspace_->memory.emplace_back(geoms);
 }
 
-// As the world of `model` has the camera, but for what the configuration says about one that others
-// may look through too.
+// The camera of the world's `model`, with this configuration's changes, which do not affect other
+// sensors of the same camera.
 PixelGrid CameraSensor::grid_in(const mjModel* model) const {
   const int w = cfg_.width, h = cfg_.height;
   if (cfg_.intrinsics) {
@@ -172,7 +173,7 @@ PixelGrid CameraSensor::grid_in(const mjModel* model) const {
   return grid_from_fovy(w, h, cfg_.fovy.value_or(model->cam_fovy[camera_]), orthographic);
 }
 
-// What validate() cannot know of a camera of the model.
+// Checks that need the camera of the model, in addition to validate().
 void CameraSensor::check_grid(const PixelGrid& grid) const {
   const std::string place = fmt::format("camera '{}'", name());
   const bool orthographic = model_->cam_projection[camera_] == mjPROJ_ORTHOGRAPHIC;
@@ -215,10 +216,10 @@ void CameraSensor::declare_fields(int num_worlds) {
   pose_->spec.frame = "world";
 }
 
-// Image n is due from phase + n * period on; before that, and at a reset, the first one.
+// Image n is due from phase + n * period on; the first one is also due before that, and at a reset.
 bool CameraSensor::is_due(const World& world, std::int64_t& image) const {
   if (cfg_.update_period <= 0) return true;
-  // Rounding makes no image late that is due exactly now.
+  // The tolerance avoids that rounding delays an image that is due exactly now.
   const double passed = (world.time() - cfg_.phase) / cfg_.update_period + 1e-6;
   const auto n = std::max<std::int64_t>(-1, static_cast<std::int64_t>(std::floor(passed)));
   const bool due = world.first || n != image;
@@ -232,7 +233,7 @@ void CameraSensor::reset(const World& world) {
 
 void CameraSensor::compute(const World& world) {
   PerWorld& w = worlds_[world.id];
-  w.due |= is_due(world, w.image);  // one that was due and not drawn still is
+  w.due |= is_due(world, w.image);  // an image that was due but not rendered is still due
   if (!w.due) return;
   const mjModel* m = world.model;
   if (!w.grid.bent) w.grid = grid_in(m);
@@ -256,7 +257,7 @@ void CameraSensor::compute(const World& world) {
   pose[15] = 1;
 }
 
-// The fields of this world, and this thread's buffers for what only derive() needs.
+// Targets in the fields of this world; buffers of this thread for those that only derive() needs.
 ImageTargets CameraSensor::targets(int world, int thread) {
   ImageTargets t;
   if (rgb_) t.rgb = rgb_->data.row<std::uint8_t>(world).data();
@@ -324,7 +325,7 @@ void CameraSensor::render_rows(const View& view, int world, int first, int last,
   derive(world, image, first * kTileSize, std::min(last * kTileSize, cfg_.height));
 }
 
-// What follows from depth and ids of the pixel rows [first, last).
+// Computes the fields that follow from depth and ids, for pixel rows [first, last).
 void CameraSensor::derive(int world, const ImageTargets& image, int first, int last) {
   if (optical_flow_)
     optical_flow_->write(world, image, first, last, flow_->data.row<float>(world).data());
@@ -364,7 +365,7 @@ void CameraSensor::render_due(const CastContext& context) {
     return;
   }
   const int bands = std::clamp(kBandsPerThread * threads / std::max(count, 1), 1, tile_rows);
-  // body(image, first row of tiles, one beyond the last, thread)
+  // body(image, first row of tiles, row after the last, thread)
   const auto run_bands = [&](auto body) {
     context.pool.run(count * bands, [&](int item, int thread) {
       const int image = item / bands, band = item % bands;

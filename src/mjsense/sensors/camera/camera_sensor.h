@@ -18,9 +18,9 @@
 
 namespace mjsense {
 
-// Throws ValueError for anything that can be wrong before there is a model.
+// Throws ValueError for errors that can be found without a model.
 void validate(const CameraSensorCfg& cfg);
-// Throws ValueError from 180 degrees on.
+// Throws ValueError for 180 degrees or more.
 void check_fovy(double degrees, std::string_view place);
 
 class CameraSensor final : public Sensor {
@@ -31,8 +31,8 @@ class CameraSensor final : public Sensor {
   std::string_view kind() const override { return "camera"; }
   Stage stage() const override { return Stage::kCast; }
   mjtStage needs() const override { return mjSTAGE_POS; }
-  // A camera with its own rate must see every control step: what it shows between two images is the
-  // older one.
+  // A camera with its own rate must process every control step, because between two images it shows
+  // the older one.
   bool eager() const override { return cfg_.update_period > 0; }
   void edit_spec(mjSpec* spec) override;
   void initialize(const SensorInit& init) override;
@@ -50,9 +50,9 @@ class CameraSensor final : public Sensor {
     PixelGrid grid;
     Appearance appearance;
     Markers markers;
-    std::int64_t image = -1;  // number of the image shown, with an update period
+    std::int64_t image = -1;  // number of the current image, if there is an update period
     bool due = false;
-    Rng rng{0, 0, 0, 0};  // of the moment of the image
+    Rng rng{0, 0, 0, 0};  // at the time of the image
   };
   bool wants(std::string_view type) const;
   void declare_fields(int num_worlds);
@@ -63,29 +63,29 @@ class CameraSensor final : public Sensor {
   bool is_due(const World& world, std::int64_t& image) const;
   ImageTargets targets(int world, int thread);
   void derive(int world, const ImageTargets& image, int first, int last);
-  // Rows of tiles [first, last) of an image and what is computed from them.
+  // Renders rows of tiles [first, last) of an image, and computes the fields that follow from it.
   void render_rows(const View& view, int world, int first, int last, int thread);
-  // Draws rows of tiles [first, last) of what of a view stands still.
+  // Renders rows of tiles [first, last) of the fixed geoms of a view.
   void make_fixed(const View& view, FixedTile* tiles, int first, int last, int thread);
   void settle_common_layer(const CastContext& context, int tile_rows);
-  // Tiles of the world's own that are to be made first; null: none.
+  // Tiles of the world's own layer that must be rendered first; null: none.
   FixedTile* settle_layer(int world, const View& view);
   const View& build_view(const RayScene& rays, int world, ViewBuilder& builder) const;
 
   CameraSensorCfg cfg_;
   const mjModel* model_ = nullptr;
   int camera_ = -1;
-  double near_ = 0;  // m
+  double near_ = 0;  // m, near plane
   std::vector<PerWorld> worlds_;
   std::vector<float> bent_;
   std::vector<int> due_;
-  std::vector<std::vector<float>> clean_;  // true depth of one image, by thread; with noise only
+  std::vector<std::vector<float>> clean_;  // by thread: true depth of one image; only with noise
   std::shared_ptr<const Look> look_;
-  std::unique_ptr<GlRenderer> gl_;  // renderer "opengl"
+  std::unique_ptr<GlRenderer> gl_;  // only with renderer "opengl"
   std::unique_ptr<Workspace> workspace_;
-  std::unique_ptr<FixedLayers> fixed_layers_;  // null: it would not pay, or the camera moves
-  std::unique_ptr<OpticalFlow> optical_flow_;  // null: not wanted
-  std::unique_ptr<PixelOwners> owners_;        // the same
+  std::unique_ptr<FixedLayers> fixed_layers_;  // null: not useful, or the camera moves
+  std::unique_ptr<OpticalFlow> optical_flow_;  // null: not requested
+  std::unique_ptr<PixelOwners> owners_;        // null: not requested
   Field *rgb_ = nullptr, *depth_ = nullptr, *segmentation_ = nullptr, *bodies_ = nullptr,
         *entities_ = nullptr, *normals_ = nullptr, *points_ = nullptr, *flow_ = nullptr;
   Field *intrinsics_ = nullptr, *pose_ = nullptr;

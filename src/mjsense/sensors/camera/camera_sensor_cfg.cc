@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// What a camera's configuration may say.
+// Checks of camera configurations, and the changes that a camera makes to the spec.
 #include "mjsense/sensors/camera/camera_sensor_cfg.h"
 
 #include <fmt/format.h>
@@ -115,7 +115,7 @@ void CameraSensor::edit_spec(mjSpec* spec) {
   if (!cfg_.camera_name.empty()) {
     mjsElement* element = mjs_findElement(spec, mjOBJ_CAMERA, cfg_.camera_name.c_str());
     if (!element) throw_unknown(place, "camera", cfg_.camera_name, names_of(spec, mjOBJ_CAMERA));
-    return;  // what this sensor changes about it, others do not see
+    return;  // this sensor's changes to the camera do not affect other sensors
   }
   mjsBody* body = mjs_findBody(spec, cfg_.parent_body.empty() ? "world" : cfg_.parent_body.c_str());
   if (!body) throw_unknown(place, "body", cfg_.parent_body, names_of(spec, mjOBJ_BODY));

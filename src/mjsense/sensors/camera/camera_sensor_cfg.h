@@ -1,29 +1,29 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
-// CameraSensor: images of every world from one camera, by ray casting on the CPU. No OpenGL, no
-// display, no GPU.
+// CameraSensor: images of every world from one camera, by ray casting on the CPU. It needs no
+// OpenGL, display or GPU.
 //
-// Fields, only those asked for in data_types; row 0 is the top of the image:
+// Fields, only those in data_types; row 0 is the top of the image:
 //
 //   rgb           uint8   [B, H, W, 3]  MuJoCo's classic look
 //   depth         float32 [B, H, W, 1]  m; planar: distance to the camera plane; ray: along the
-//                                       pixel's ray; 0 where nothing is
-//   segmentation  int32   [B, H, W, 2]  (id, type): mjOBJ_GEOM, _FLEX, _SKIN, _SITE, _TENDON; (-1, -1)
-//                                       where nothing is
+//                                       pixel's ray; 0 where nothing is seen
+//   segmentation  int32   [B, H, W, 2]  (id, type): mjOBJ_GEOM, _FLEX, _SKIN, _SITE, _TENDON;
+//                                       (-1, -1) where nothing is seen
 //   body_segmentation, entity_segmentation
 //                 int32   [B, H, W, 1]  body id; index in Scene::entities(); -1 where there is none
-//   normals       float32 [B, H, W, 3]  unit, outward, camera frame; 0 where nothing is
-//   point_cloud   float32 [B, H, W, 3]  m, camera frame; NaN where nothing is
-//   flow          float32 [B, H, W, 2]  pixels, u right, v down: where the point that a pixel sees was
-//                                       in the previous image, minus where it is (optical_flow.h); NaN
-//                                       where nothing is
+//   normals       float32 [B, H, W, 3]  unit, outward, camera frame; 0 where nothing is seen
+//   point_cloud   float32 [B, H, W, 3]  m, camera frame; NaN where nothing is seen
+//   flow          float32 [B, H, W, 2]  pixels, u right, v down: image point in the previous image
+//                                       of the surface point that a pixel sees, minus the pixel's
+//                                       own (optical_flow.h); NaN where nothing is seen
 //
 // and always
 //
 //   intrinsics    float32 [B, 3, 3]     K in pixels, OpenCV's: x right, y down, z forward; pixel
 //                                       centres at +0.5
-//   pose          float32 [B, 4, 4]     X_WC of the image; C is MuJoCo's camera frame: x right, y up,
-//                                       looking along -z
+//   pose          float32 [B, 4, 4]     X_WC of the image; C is MuJoCo's camera frame: x right,
+//                                       y up, looking along -z
 
 #include <array>
 #include <cstdint>
@@ -76,7 +76,7 @@ void visit_fields(V& v, LensDistortion& c) {
   v("coefficients", c.coefficients, "brown_conrady: k1 k2 p1 p2 k3; fisheye: k1 k2 k3 k4.");
 }
 
-// That it has as many coefficients as its model takes.
+// Throws ValueError unless there are as many coefficients as the model needs.
 void validate(const LensDistortion& lens, std::string_view place);
 
 struct CameraVizCfg {
@@ -132,9 +132,9 @@ struct CameraSensorCfg : SensorCfg {
   bool use_shadows = false;
   std::vector<int> enabled_geom_groups{0, 1, 2};
   bool orthographic = false;
-  bool clone_data = false;  // read by Python
+  bool clone_data = false;  // used by the Python package
 
-  // Beyond mjlab's.
+  // Beyond mjlab.
   std::vector<int> enabled_site_groups, enabled_tendon_groups;
   int max_lights = 8;
   double near = 0, far = 0;
@@ -210,7 +210,7 @@ void visit_fields(V& v, CameraSensorCfg& c) {
     "extent.");
   v("update_period", c.update_period, "Time between images; 0: a new image at every read.")
       .unit("s")
-      .within(0, 1e6);  // more would be a mistake, and physics steps are counted in whole numbers
+      .within(0, 1e6);  // larger values are mistakes, and steps are counted as integers
   v("phase", c.phase,
     "Images are taken at the first control step at or after phase + k * update_period, and at a "
     "reset.")

@@ -23,7 +23,7 @@ namespace {
 
 using ::testing::HasSubstr;
 
-// A scene of one entity "w" and cameras in it.
+// A scene with one entity "w" and cameras.
 struct Lab {
   std::shared_ptr<Scene> scene;
   std::unique_ptr<Simulation> sim;
@@ -66,7 +66,7 @@ CameraSensorCfg camera(int width, int height, std::vector<std::string> types,
   return cfg;
 }
 
-// The scene of the published cases: an overhead camera at 4 m over a floor, a box and a ball.
+// The scene of the published cases: an overhead camera at 4 m above a floor, a box and a ball.
 constexpr char kCases[] = R"(<worldbody><light pos="0 0 3" dir="0 0 -1"/>
   <geom name="floor" type="plane" size="10 10 .1" rgba=".5 .5 .5 1"/>
   <geom name="box" type="box" size=".5 .5 .5" pos="0 0 .5" rgba="1 0 0 1"/>
@@ -92,7 +92,7 @@ TEST(Camera, DepthIsPlanarAndIdsAreGeoms) {
     }
 }
 
-TEST(Camera, PixelsKnowTheirBodiesAndEntities) {
+TEST(Camera, PixelsHaveBodyAndEntityIds) {
   SceneCfg cfg;
   cfg.terrain.emplace();
   for (const char* name : {"a", "b"}) {
@@ -121,18 +121,19 @@ TEST(Camera, PixelsKnowTheirBodiesAndEntities) {
     EXPECT_EQ(owners, lab.read<std::int32_t>("entity_segmentation", "entities", world));
     for (std::size_t i = 0; i < bodies.size(); ++i) {
       ASSERT_EQ(bodies[i], m->geom_bodyid[ids[2 * i]]);
-      const int body = bodies[i];  // terrain, a/ball, b/ball, each with one geom
+      const int body = bodies[i];  // terrain, a/ball and b/ball have one geom each
       ASSERT_EQ(owners[i], ids[2 * i]) << body;
       ++seen[owners[i]];
     }
-    EXPECT_EQ(std::count(owners.begin(), owners.end(), 2) > 0, world == 0);  // b rolled away
+    // In world 1, b is out of sight.
+    EXPECT_EQ(std::count(owners.begin(), owners.end(), 2) > 0, world == 0);
   }
   EXPECT_GT(seen[0], seen[1]);
   EXPECT_GT(seen[1], seen[2]);
 }
 
-// A cloth above a floor, each an entity.
-TEST(Camera, PixelsOfAFlexKnowItsEntity) {
+// A cloth above a floor, each of them an entity.
+TEST(Camera, PixelsOfAFlexHaveItsEntityId) {
   SceneCfg cfg;
   cfg.terrain.emplace();
   EntityCfg cloth;
@@ -179,7 +180,7 @@ TEST(Camera, SphereAtTwoMetresReadsTwoMetres) {
   EXPECT_NEAR(n[3 * center + 2], 1.0, 1e-6);
   const auto p = lab.read<float>("point_cloud");
   EXPECT_NEAR(p[3 * center + 2], -2.0, 1e-6);
-  // Every point of the cloud lies on the sphere, every normal points away from its centre.
+  // Every point of the cloud is on the sphere, and every normal points away from its centre.
   int hits = 0;
   for (std::size_t i = 0; i < p.size() / 3; ++i) {
     if (std::isnan(p[3 * i])) continue;
@@ -201,7 +202,7 @@ TEST(Camera, KnownPointsProjectToTheRightPixels) {
   for (int i = 0; i < 3; ++i)
     for (int j = 0; j < 3; ++j) c[i] += pose[4 * j + i] * (ball[j] - pose[4 * j + 3]);
   const double u = k[0] * c[0] / -c[2] + k[2], v = k[4] * -c[1] / -c[2] + k[5];
-  // The outline of a small sphere is centred on its centre's image to a fraction of a pixel.
+  // The centre of a small sphere's outline is the image of its centre, to a fraction of a pixel.
   double x = 0, y = 0, n = 0;
   for (int i = 0; i < 64 * 48; ++i) {
     if (ids[2 * i] != 2) continue;
@@ -226,7 +227,7 @@ TEST(Camera, RayDepthIsThePointsDistance) {
 TEST(Camera, OrthographicRaysAreParallel) {
   CameraSensorCfg cfg = camera(4, 4, {"depth", "point_cloud"});
   cfg.pos = {0.03, 0.02, 4.0};
-  cfg.fovy = 3.0;  // metres
+  cfg.fovy = 3.0;  // m
   cfg.orthographic = true;
   Lab lab(kCases, {cfg});
   const auto d = lab.read<float>("depth");
@@ -242,7 +243,8 @@ TEST(Camera, OrthographicRaysAreParallel) {
 }
 
 TEST(Camera, SeesWhatMuJoCoDraws) {
-  // A ghost of alpha 0 is not there; a shell is seen through from inside; a plane has one side.
+  // A geom with alpha 0 is invisible; a shell is transparent from inside; a plane is visible from
+  // one side.
   CameraSensorCfg cfg = camera(3, 3, {"depth", "segmentation"}, "w/c");
   Lab lab(R"(<worldbody><geom name="floor" type="plane" size="10 10 .1"/>
     <geom name="ghost" size=".3" pos="0 0 1" rgba="1 1 1 0"/><geom name="shell" size=".5" pos="0 0 3"/>
@@ -253,9 +255,9 @@ TEST(Camera, SeesWhatMuJoCoDraws) {
   for (std::size_t i = 0; i < 9; ++i) EXPECT_EQ(lab.read<std::int32_t>("segmentation")[2 * i], 0);
 }
 
-TEST(Camera, NothingSeenIsZeroAndMinusOne) {
+TEST(Camera, BackgroundIsZeroOrMinusOne) {
   CameraSensorCfg cfg = camera(5, 5, {"rgb", "depth", "segmentation", "normals"});
-  cfg.quat = {0, 1, 0, 0};  // up
+  cfg.quat = {0, 1, 0, 0};  // looks up
   Lab lab(R"(<worldbody><geom size=".1"/></worldbody>)", {cfg});
   for (auto v : lab.read<std::uint8_t>("rgb")) EXPECT_EQ(v, 0);
   for (auto v : lab.read<float>("depth")) EXPECT_EQ(v, 0);
@@ -263,11 +265,11 @@ TEST(Camera, NothingSeenIsZeroAndMinusOne) {
   for (auto v : lab.read<float>("normals")) EXPECT_EQ(v, 0);
 }
 
-// Far away a tile is as bright as the mean of its texture, also where the texture's size is odd.
+// From far away, a tile is as bright as the mean of its texture, also if the texture's size is odd.
 TEST(Camera, DistantTexturesKeepTheirBorders) {
   CameraSensorCfg cfg = camera(40, 40, {"rgb"});
   cfg.pos = {0, 0, 4};
-  // 15 x 15 texels, the outermost white, and two on a pixel.
+  // 15 x 15 texels, the outermost ones white, and two texels per pixel.
   Lab lab(R"(<asset><texture name="t" type="2d" builtin="flat" mark="edge" rgb1="0 0 0"
                      markrgb="1 1 1" width="15" height="15"/>
                <material name="m" texture="t" texrepeat="6.4 6.4" emission="1" specular="0"/></asset>
@@ -287,10 +289,10 @@ TEST(Camera, ClipRangeHidesWhatIsNearerOrFarther) {
   const auto ids = lab.read<std::int32_t>("segmentation");
   EXPECT_EQ(ids[2 * (8 * 2 + 3)], 1);
   EXPECT_EQ(ids[0], -1);               // the floor is too far
-  EXPECT_NE(ids[2 * (8 * 1 + 6)], 2);  // the ball's top is too near
+  EXPECT_NE(ids[2 * (8 * 1 + 6)], 2);  // the top of the ball is too near
 }
 
-// Falling spheres and a turning box, everything that pictures are made of.
+// A body that falls and turns, and everything else that images can contain.
 constexpr char kShow[] = R"(
   <asset><texture name="sky" type="skybox" builtin="gradient" rgb1=".4 .6 .8" rgb2="0 0 0" width="32" height="32"/>
     <texture name="t" type="2d" builtin="checker" rgb1="1 0 0" rgb2="0 0 1" width="64" height="64"/>
@@ -360,8 +362,9 @@ TEST(Camera, OwnRateHoldsTheImageBetweenTicks) {
   EXPECT_GT(seen[10], seen[9]);
 }
 
-// An image that was due when something else failed, before it was drawn, is drawn at the next chance.
-TEST(Camera, AnErrorElsewhereLosesNoImage) {
+// An image that was due when something else failed, before it was rendered, is rendered at the next
+// opportunity.
+TEST(Camera, ErrorElsewhereDoesNotLoseAnImage) {
   struct Failing final : Sensor, ControlStepListener {
     Failing() : Sensor("failing") {}
     std::string_view kind() const override { return "test"; }
@@ -421,11 +424,11 @@ TEST(Camera, StereoNoiseGrowsWithTheSquareOfDepth) {
     }
     EXPECT_NEAR(sum / 4096, 0, 0.002 * z * z);
     spread[i] = std::sqrt(square / 4096);
-    // f = 848 / (2 tan 30), b = 0.05, 0.08 pixels and rounding to 1/32 of one.
+    // f = 848 / (2 tan 30), b = 0.05, noise of 0.08 pixels and rounding to 1/32 pixel.
     const double f = 848 / (2 * std::tan(M_PI / 6)),
                  sigma = std::hypot(0.08, 1 / 32.0 / std::sqrt(12.0));
     EXPECT_NEAR(spread[i], z * z * sigma / (f * 0.05), 0.05 * spread[i]);
-    // The same moment gives the same noise, another moment other noise.
+    // The same time gives the same noise; another time gives other noise.
     lab.sim->invalidate();
     EXPECT_EQ(depth, lab.read<float>("depth"));
     lab.sim->step();
@@ -434,7 +437,7 @@ TEST(Camera, StereoNoiseGrowsWithTheSquareOfDepth) {
   EXPECT_NEAR(spread[1] / spread[0], 4, 0.2);
 }
 
-// The depth image of a floor whose normal is `tilt_deg` off the axis of a camera 1 m away.
+// Depth image of a floor whose normal is at `tilt_deg` to the axis of a camera 1 m away.
 std::vector<float> depth_of_tilted_floor(double tilt_deg, int size, DepthNoise noise) {
   CameraSensorCfg cfg = camera(size, size, {"depth"});
   const double half = tilt_deg * M_PI / 360;
@@ -461,7 +464,7 @@ TEST(Camera, StereoLosesSurfacesSeenEdgeOnAtAnyResolution) {
 TEST(Camera, StereoMeasuresNothingOutOfItsRange) {
   CameraSensorCfg cfg = camera(32, 32, {"depth"});
   cfg.fovy = 60;
-  cfg.depth_noise = "d405";  // 0.07 to 2 m
+  cfg.depth_noise = "d405";  // range 0.07 to 2 m
   const auto depth_at = [&](double z) {
     cfg.pos = {0, 0, z};
     Lab lab(R"(<worldbody><geom type="plane" size="9 9 1"/></worldbody>)", {cfg});
@@ -470,7 +473,7 @@ TEST(Camera, StereoMeasuresNothingOutOfItsRange) {
   EXPECT_THAT(depth_at(0.06), testing::Each(0.0f));
   EXPECT_THAT(depth_at(2.3), testing::Each(0.0f));
   EXPECT_THAT(depth_at(1.0), testing::Each(testing::Gt(0.0f)));
-  // Near the end of the range noise decides.
+  // Near the end of the range, noise decides which pixels are lost.
   const auto border = depth_at(2.0);
   EXPECT_THAT(border, testing::Each(testing::Le(2.0f)));
   EXPECT_NEAR(std::count(border.begin(), border.end(), 0.0f), 512, 120);
@@ -499,7 +502,7 @@ TEST(Camera, StereoLosesHalfOfThePixelsAtEdges) {
   EXPECT_EQ(lost_elsewhere, 0);
 }
 
-TEST(Camera, OwnRateNeedNotDivideIntoSteps) {
+TEST(Camera, OwnRateNeedNotBeAMultipleOfSteps) {
   CameraSensorCfg cfg = camera(9, 9, {"depth"});
   cfg.pos = {0, 0, 10};
   cfg.update_period = 1.0 / 30;  // 16.67 steps of 2 ms
@@ -518,7 +521,7 @@ TEST(Camera, OwnRateNeedNotDivideIntoSteps) {
     EXPECT_EQ(taken[k], std::ceil((0.01 + k / 30.0) / 0.002 - 1e-6)) << k;
 }
 
-TEST(Camera, OwnFieldOfViewIsNoOtherSensors) {
+TEST(Camera, OwnFieldOfViewDoesNotAffectOtherSensors) {
   CameraSensorCfg plain = camera(8, 6, {"depth"}, "w/phys"), wide = plain, map = plain;
   wide.name = "wide";
   wide.fovy = 90;
@@ -526,13 +529,14 @@ TEST(Camera, OwnFieldOfViewIsNoOtherSensors) {
   map.fovy = 3;
   map.orthographic = true;
   Lab lab(kCases, {wide, plain, map});
-  // Pixels per unit of X/Z: from the sensor 6 / .006 * .006, from 90 degrees 3, 6 pixels on 3 m.
+  // Pixels per unit of X/Z: 6 / .006 * .006 from the sensor, 3 from 90 degrees, and 6 pixels on 3
+  // m.
   EXPECT_NEAR(lab.read<float>("intrinsics", "cam")[4], 6, 1e-4);
   EXPECT_NEAR(lab.read<float>("intrinsics", "wide")[4], 3, 1e-4);
   EXPECT_NEAR(lab.read<float>("intrinsics", "map")[4], 2, 1e-4);
 }
 
-TEST(Camera, FaultsAreNamed) {
+TEST(Camera, ErrorsNameTheSetting) {
   const auto message = [](auto&& make) -> std::string {
     try {
       make();
@@ -583,7 +587,7 @@ TEST(Camera, FaultsAreNamed) {
   EXPECT_THAT(with([&](Cfg& c) { c.distortion = {"fisheye", {kNan, 0, 0, 0}}; }), HasSubstr("nan"));
   EXPECT_THAT(with([](Cfg& c) { c.pos = {1, 2, 3}; }, "w/top"), HasSubstr("stays where it is"));
   EXPECT_THAT(with([](Cfg& c) { c.fovy = 200; }, "w/top"), HasSubstr("less than 180"));
-  // What an ideal fisheye of this focal length would put in the corners lies behind the camera.
+  // An ideal fisheye of this focal length would see directions behind the camera in the corners.
   EXPECT_THAT(with([](Cfg& c) {
                 c.intrinsics = {1, 1, 2, 1.5};
                 c.distortion = {"fisheye", {0, 0, 0, 0}};

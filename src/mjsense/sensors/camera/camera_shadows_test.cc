@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// What is lit and what is not, against single rays to the light.
+// Lit and shadowed pixels, compared with single rays to the light.
 
 #include <gtest/gtest.h>
 
@@ -15,7 +15,7 @@ namespace {
 constexpr int kSize = 64;
 constexpr double kLightHeight = 6;
 
-// Rolling hills with things on them, and one light `elevation` degrees above the horizon.
+// Hills with objects on them, and one light at `elevation` degrees above the horizon.
 std::string hills(Rng& rng, double elevation, bool spot) {
   constexpr int n = 40;
   std::string heights;
@@ -41,7 +41,7 @@ std::string hills(Rng& rng, double elevation, bool spot) {
          "<camera name='c' pos='0 -1 4' euler='15 0 0' fovy='50'/></worldbody></mujoco>";
 }
 
-TEST(CameraShadows, FallWhereTheWayToTheLightIsBarred) {
+TEST(CameraShadows, FallWhereTheRayToTheLightIsBlocked) {
   long pixels = 0, dark = 0, wrong = 0;
   for (int scene = 0; scene < 12; ++scene) {
     Rng rng(11, 0, 1, scene);
@@ -73,7 +73,7 @@ TEST(CameraShadows, FallWhereTheWayToTheLightIsBarred) {
         to_light[k] = scene >= 6 ? m.data->light_xpos[k] - p[k] : -m.data->light_xdir[k];
       mju_normalize3(to_light);
       const double facing = mju_dot3(n, to_light);
-      if (std::abs(facing) < 0.03) continue;  // too faint to tell
+      if (std::abs(facing) < 0.03) continue;  // too dark to distinguish
       RayFilter filter;
       const bool barred = rays.trace(0, filter, p, to_light).geom >= 0;
       const bool lit = facing > 0 && !barred;
@@ -84,7 +84,7 @@ TEST(CameraShadows, FallWhereTheWayToTheLightIsBarred) {
   }
   EXPECT_GT(pixels, 30000);
   EXPECT_GT(dark, pixels / 20);
-  EXPECT_LT(wrong, pixels / 500);  // shadows' edges
+  EXPECT_LT(wrong, pixels / 500);  // edges of shadows
 }
 
 }  // namespace

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// What bends: flexes and skins in images.
+// Deformable objects in images: flexes and skins.
 
 #include <gtest/gtest.h>
 
@@ -30,7 +30,7 @@ CameraSensorCfg camera(int width, int height) {
   return cfg;
 }
 
-// One camera over the worlds of one model; the test moves what it likes in `m.data` and shoots.
+// One camera for the worlds of one model. The test changes `m.data` and renders.
 struct Studio {
   RayScene rays;
   std::unique_ptr<Sensor> sensor;
@@ -56,7 +56,7 @@ struct Studio {
 
 int pixel(int x, int y, int width) { return y * width + x; }
 
-// A camera looks down on 1 x 1 m of cloth, rope or jelly from 3 m above the world's origin.
+// A camera 3 m above the world's origin looks down on a flex of 1 x 1 m.
 std::string scene(const std::string& flex, const std::string& more = "") {
   return "<mujoco><worldbody>" + more + flex +
          "<camera name='eye' pos='0 0 3' fovy='40'/></worldbody></mujoco>";
@@ -79,7 +79,8 @@ TEST(CameraFlex, FlatClothAtTwoMetresReadsTwoMetresLessItsRadius) {
     for (int x = 0; x < 64; ++x) {
       const int i = pixel(x, y, 64);
       const bool on = std::abs(x - 31.5) < 22 && std::abs(y - 31.5) < 22;
-      if (!on && std::abs(x - 31.5) < 23 && std::abs(y - 31.5) < 23) continue;  // the border
+      // Pixels at the border.
+      if (!on && std::abs(x - 31.5) < 23 && std::abs(y - 31.5) < 23) continue;
       EXPECT_NEAR(depth[i], on ? 1.99 : 0, 1e-6) << x << ' ' << y;
       EXPECT_EQ(ids[2 * i], on ? 0 : -1);
       EXPECT_EQ(ids[2 * i + 1], on ? static_cast<int>(mjOBJ_FLEX) : -1);
@@ -123,7 +124,7 @@ TEST(CameraFlex, RopeIsRound) {
   const auto normals = studio.image<float>("normals");
   const double slope = 2 * std::tan(20 * M_PI / 180) / 65;
   for (int y = 31; y <= 33; ++y) {
-    // A ray at height s z meets the cylinder y^2 + (z - 2)^2 = 0.04^2 of the camera's frame.
+    // A ray with slope s hits the cylinder y^2 + (z - 2)^2 = 0.04^2 of the camera's frame.
     const double s = slope * (32 - y), a = 1 + s * s, b = -2, c = 4 - 0.0016;
     const double t = (-b - std::sqrt(b * b - a * c)) / a;
     const int i = pixel(32, y, 65);
@@ -148,8 +149,8 @@ TEST(CameraFlex, GroupsAndAlphaHideIt) {
   EXPECT_EQ(studio.image<std::int32_t>("segmentation")[2 * pixel(4, 4, 8)], 0);
 }
 
-// Light comes from the upper left: the cloth's shadow lies on the floor to its right, a ball's on
-// the cloth.
+// Light comes from the upper left: the shadow of the cloth is on the floor to its right, and that
+// of the ball is on the cloth.
 TEST(CameraFlex, ClothCastsAndReceivesShadows) {
   const TestModel m(scene(
       kCloth,
@@ -167,10 +168,10 @@ TEST(CameraFlex, ClothCastsAndReceivesShadows) {
   };
   EXPECT_LT(red(0.9, 0, 3), 0.7 * red(-0.9, 0, 3));
   EXPECT_LT(red(0.19, 0, 1.99), 0.7 * red(0.19, 0.3, 1.99));
-  EXPECT_NEAR(red(0.19, 0.3, 1.99), red(0.19, -0.3, 1.99), 3);  // no shadow of its own
+  EXPECT_NEAR(red(0.19, 0.3, 1.99), red(0.19, -0.3, 1.99), 3);  // the cloth has no shadow on itself
 }
 
-// A square metre of skin that one body carries.
+// A skin of one square metre, carried by one body.
 constexpr char kSkin[] = R"(<mujoco><worldbody>
   <camera name="eye" pos="0 0 3" fovy="40"/>
   <body name="bone" pos="0 0 1"><joint type="slide" axis="0 0 1"/><geom size=".01" group="4"/></body></worldbody>
@@ -209,14 +210,14 @@ TEST(CameraSkin, IsOneSidedAndObeysItsGroup) {
     EXPECT_EQ(studio.image<std::int32_t>("segmentation")[2 * pixel(4, 4, 8)], -1);
   }
   const TestModel m(skin_in_group('0'));
-  m.data->qpos[0] = 4;  // over the camera
+  m.data->qpos[0] = 4;  // above the camera
   mj_forward(m.model, m.data);
   Studio studio(m, camera(8, 8));
   studio.shoot(m.world());
   EXPECT_EQ(studio.image<std::int32_t>("segmentation")[2 * pixel(4, 4, 8)], -1);
 }
 
-// The scene of the pictures: images depend on nothing but their world.
+// A scene to test that an image depends only on its own world.
 constexpr char kSoft[] = R"(<mujoco><worldbody>
   <light pos="1 -1 3" dir="-.3 .3 -1" castshadow="true" cutoff="60"/><geom type="plane" size="5 5 .1"/>
   <camera name="eye" pos="0 -2 1.5" xyaxes="1 0 0 0 .6 .8"/>

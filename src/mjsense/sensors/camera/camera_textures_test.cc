@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Where a texture lies on every shape, against MuJoCo's own renderer: 2D and cube, per object and
-// per metre, repeated and not.
+// Position of a texture on every shape, compared with MuJoCo's own renderer: 2D and cube, per
+// object and per metre, repeated and not.
 
 #include <gtest/gtest.h>
 
@@ -17,10 +17,11 @@ namespace {
 
 struct Shape {
   const char *name, *geom;
-  bool cubes = true;  // MuJoCo has a place for cube textures on it
+  bool cubes = true;  // MuJoCo can map cube textures onto it
 };
 
-// Copies of `shape`, four in a row, one of each kind of material; fine facets, ambient light only.
+// Copies of `shape`, four in a row, one for each kind of material, with fine facets and ambient
+// light only.
 constexpr std::array kTextures{"flat", "cube"};
 constexpr std::array kUniform{"false", "true"};
 constexpr std::array kRepeats{"1 1", "3 2", ".5 4", "0 0"};
@@ -66,7 +67,7 @@ INSTANTIATE_TEST_SUITE_P(Shapes, CameraTextures,
                                            Shape{"height_field", "type='hfield' hfield='h'"}),
                          [](const auto& shape) { return shape.param.name; });
 
-TEST_P(CameraTextures, LieWhereMujocoPutsThem) {
+TEST_P(CameraTextures, ArePlacedAsInMujoco) {
   constexpr int kWidth = 200, kHeight = 200;
   const testing::TestModel m(wall(GetParam()));
   CameraSensorCfg cfg;
@@ -96,8 +97,8 @@ TEST_P(CameraTextures, LieWhereMujocoPutsThem) {
   }
 }
 
-// One that ends nowhere begins its pattern at its own place, along both axes.
-TEST(CameraTextures, OfEndlessPlanesBeginAtTheirPlace) {
+// On an infinite plane the pattern begins at the plane's position, along both axes.
+TEST(CameraTextures, OfInfinitePlanesBeginAtTheirPosition) {
   for (const char* size : {"0 0 .1", ".4 0 .1", "0 .4 .1"}) {
     for (const char* uniform : kUniform) {
       const testing::TestModel m(

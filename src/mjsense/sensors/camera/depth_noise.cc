@@ -7,17 +7,17 @@
 namespace mjsense {
 namespace {
 
-constexpr double kSubpixels = 32;  // Intel's matcher: 5 fractional bits
-constexpr double kJump = 0.04;     // relative change of depth that no plane explains
+constexpr double kSubpixels = 32;  // Intel's matcher has 5 fractional bits
+constexpr double kJump = 0.04;  // relative deviation of depth from a plane that counts as an edge
 
-// How depth runs along one axis: `before` and `after` are the neighbours' true depths, negative
-// beyond the image, 0 where nothing is.
+// Change of depth along one axis. `before` and `after` are the neighbours' true depths, negative
+// outside the image, and 0 where nothing is seen.
 struct Run {
   bool jump;
   double change;  // of depth from pixel to pixel, on this side of a jump
 };
 
-// 1 / z is linear along a plane, however steep: what is not is an edge.
+// 1 / z is linear along a plane, however steep it is. Any deviation from that is an edge.
 Run run_of(double before, double z, double after) {
   const auto far = [](double depth) { return depth > 0 ? 1 / depth : 0; };
   if (before < 0 && after < 0) return {false, 0};
@@ -47,7 +47,8 @@ void add_stereo_noise(const StereoCamera& camera, std::span<float> depth, int wi
     for (int x = 0; x < width; ++x) {
       const std::size_t i = static_cast<std::size_t>(y) * width + x;
       const double z = scratch[i];
-      // The same draws whatever is seen: a pixel's noise does not depend on its neighbours' fate.
+      // Every pixel draws its numbers, whatever it sees, so that its noise does not depend on other
+      // pixels.
       const double noise = rng.normal(), luck = rng.uniform();
       if (!(z > 0)) {
         depth[i] = 0;

@@ -74,7 +74,7 @@ void OpticalFlow::complete(ImageTargets& targets, int thread) {
   if (!targets.segmentation) targets.segmentation = scratch_[thread].segmentation.data();
 }
 
-// False if the image has no such point.
+// Pixel coordinates of p (camera frame). Returns false if the image has no such point.
 bool OpticalFlow::project(const PixelGrid& grid, const double p[3], double uv[2]) const {
   double x = p[0], y = p[1];
   if (!grid.orthographic) {
@@ -93,12 +93,12 @@ bool OpticalFlow::project(const PixelGrid& grid, const double p[3], double uv[2]
   return true;
 }
 
-// One row's pixels [begin, end) of a body, by what the general way below comes to for a pinhole:
-// all is linear in depth and in x.
+// Pixels [begin, end) of one row that show one body. This is the general computation of follow()
+// for a pinhole, where everything is linear in depth and in x.
 void OpticalFlow::follow_pinhole(const PerWorld& w, const Move& move, int y, int begin, int end,
                                  const float* depth, float* flow) const {
   const PixelGrid &now = w.now.grid, &before = w.before.grid;
-  // Rows of K R and K t for the image point times depth, then depth.
+  // Rows of K R and K t: image point times depth, then depth.
   double r[3][3], t[3];
   const double* last = move.r + 6;
   for (int k = 0; k < 2; ++k) {

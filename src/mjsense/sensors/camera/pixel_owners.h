@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
-// To which body and which entity the object that a pixel sees belongs.
+// The body and the entity of the object that a pixel shows.
 
 #include <mujoco/mujoco.h>
 
@@ -12,7 +12,7 @@
 
 namespace mjsense {
 
-// The body that carries an object of segmentation; -1: nothing is there, or many carry it (flexes,
+// The body of an object in the segmentation; -1: there is no object, or it has many bodies (flexes,
 // skins, tendons).
 int body_of(const mjModel* model, int object, int id);
 
@@ -20,10 +20,10 @@ class PixelOwners {
  public:
   PixelOwners(const SensorInit& init, int width, int height);
 
-  // A buffer of this thread for ids, if `targets` lacks them.
+  // Adds a buffer of this thread for ids, if `targets` lacks one.
   void complete(ImageTargets& targets, int thread);
-  // Pixels [begin, end) of the images [H, W]; null: not wanted. -1 where body_of()
-  // is, and for what no entity brought in.
+  // Writes pixels [begin, end) of the images [H, W]; a null image is not written. A body is -1
+  // where body_of() is -1; an entity is -1 for objects that belong to no entity.
   void write(const ImageTargets& image, int begin, int end, std::int32_t* bodies,
              std::int32_t* entities) const;
 

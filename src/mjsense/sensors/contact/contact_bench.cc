@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // Cost of contact sensing in one world: ours (one pass for all sensors), and MuJoCo's own contact
-// sensors for the same content (one a primary, all fields packed). Report CPU time a world-step.
+// sensors for the same content (one per primary, all fields packed). Report CPU time per step of a
+// world.
 
 #include <benchmark/benchmark.h>
 #include <fmt/format.h>
@@ -36,7 +37,7 @@ struct Model {
   }
 };
 
-// `legs` two-link legs around a torso; the feet stand on a plane. Feet are geoms foot_0, foot_1 ...
+// `legs` two-link legs around a torso, with the feet on a plane. Feet are geoms foot_0, foot_1 ...
 std::string walker(int legs, const std::string& sensors) {
   std::string xml =
       R"(<mujoco><option timestep=".002" integrator="implicitfast"/><size memory="50M"/><worldbody><geom name="floor" type="plane" size="0 0 1"/>
@@ -90,12 +91,12 @@ void physics(benchmark::State& state) {
 }
 BENCHMARK(physics)->Name("contact/physics_4_legs");
 
-// Primaries, and how many of them touch: few, and all.
+// Number of primaries, and number of contacts: few, and all.
 void few_and_all(benchmark::internal::Benchmark* b) {
   b->Args({4, 4})->Args({32, 4})->Args({32, 32})->Args({256, 4})->Args({256, 256});
 }
 
-// Every pass is of a new moment.
+// Every iteration has a new moment, so that no pass is skipped.
 void ours(benchmark::State& state, bool memory) {
   const int primaries = static_cast<int>(state.range(0)),
             touching = static_cast<int>(state.range(1));

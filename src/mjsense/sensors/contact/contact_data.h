@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
-// What a contact sensor returns.
+// Declares the fields of a contact sensor.
 
 #include "mjsense/core/data_class.h"
 

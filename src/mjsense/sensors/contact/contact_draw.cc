@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// What a contact sensor shows of itself: the contacts in its slots.
+// Debug drawing of a contact sensor: the contacts in its slots.
 
 #include <fmt/format.h>
 
@@ -13,7 +13,7 @@
 namespace mjsense {
 
 void ContactSensor::draw(const World& world, DebugShapes& shapes) {
-  pass_->run(world);  // the slots refer to the contacts of this moment
+  pass_->run(world);  // slots refer to the contacts of the current moment
   const ContactVizCfg& viz = cfg_.viz;
   const double unit = shapes.meansize();
   const double scale = viz.force_scale > 0 ? viz.force_scale : world.model->vis.map.force;
@@ -32,7 +32,8 @@ void ContactSensor::draw(const World& world, DebugShapes& shapes) {
         const double mat[9] = {x.x, y.x, z.x, x.y, y.y, z.y, x.z, y.z, z.z};
         shapes.add_frame(at, mat, viz.axis_length * unit, 0.1 * unit, label);
       }
-      // It pushes at the point: an arrow from there would lie inside the other side.
+      // The arrow ends at the contact point. If it started there, it would be inside the other
+      // object.
       if (viz.show_forces && norm(force) > 0)
         shapes.add_arrow(at - scale * force, at, viz.force_width * unit, viz.force_color,
                          label + "_force");

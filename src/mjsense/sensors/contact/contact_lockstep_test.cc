@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Row w among B worlds is row w alone, bit for bit, at any number of threads; and a step allocates
-// nothing.
+// Row w of B worlds is the row of world w alone, bit for bit, for any number of threads; a step
+// does not allocate.
 
 #include <gtest/gtest.h>
 
@@ -58,7 +58,7 @@ std::shared_ptr<Scene> make_scene() {
   return std::make_shared<Scene>(std::move(cfg));
 }
 
-// Every world thrown differently; world w depends on w alone.
+// Gives a world random velocities, which depend on w only.
 void throw_world(Simulation& sim, int row, int w) {
   std::mt19937 random(100 + w);
   std::uniform_real_distribution<double> u(-1, 1);
@@ -119,7 +119,7 @@ TEST(ContactLockstep, AnyBatchAndThreadCountIsBitEqual) {
   }
 }
 
-TEST(ContactLockstep, StepAllocatesNothing) {
+TEST(ContactLockstep, StepDoesNotAllocate) {
   SimulationCfg cfg;
   cfg.num_worlds = 4;
   cfg.decimation = 3;

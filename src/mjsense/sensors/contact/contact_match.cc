@@ -39,7 +39,7 @@ void validate(const ContactMatch& match, std::string_view place) {
   if (match.pattern.empty()) throw ValueError(fmt::format("{}: no pattern is given", place));
   for (const std::string& pattern : match.pattern) {
     if (pattern.empty()) throw ValueError(fmt::format("{}: a pattern is empty", place));
-    // The subtree of a secondary has a literal name.
+    // The subtree of a secondary has a literal name, not a pattern.
     if (!match.entity.empty() && match.mode != ContactMode::kSubtree) Regex(pattern, place);
   }
   Exclude(match.exclude, place);
@@ -98,7 +98,7 @@ bool ContactNames::in_terrain(int body) const {
   return body > 0;
 }
 
-// Every named element of the entity, in model order.
+// All named elements of the entity, in model order.
 std::vector<ContactObject> ContactNames::of_entity(std::string_view place,
                                                    const ContactMatch& match) const {
   const std::string prefix = match.entity + "/";
@@ -182,7 +182,7 @@ std::vector<ContactObject> ContactNames::secondaries(std::string_view sensor,
     return match.entity.empty() ? literal(place, match) : by_regex(place, match);
   }
   if (match.entity.empty()) return literal(place, match);
-  if (match.mode == ContactMode::kSubtree) {  // a literal name in the peer, and so here
+  if (match.mode == ContactMode::kSubtree) {  // a literal name, as in mjlab
     const std::vector<ContactObject> all = of_entity(place, match);
     std::vector<ContactObject> result;
     for (const ContactObject& o : all) {

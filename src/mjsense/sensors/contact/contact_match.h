@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
-// Which geoms, bodies or subtrees a contact sensor watches: rules over names, resolved to ids.
+// Selects the geoms, bodies or subtrees whose contacts a sensor measures: rules for names, resolved
+// to ids.
 
 #include <mujoco/mujoco.h>
 
@@ -21,8 +22,9 @@ template <>
 inline constexpr std::array<std::string_view, 4> kWords<ContactPolicy>{"first", "error", "any",
                                                                        "each"};
 
-// With an entity, each pattern is a regular expression (Python's meaning) for the whole local name;
-// the result is in model order. Without one, patterns are full MuJoCo names, in the given order.
+// With an entity, each pattern is a regular expression (Python's syntax) for the whole local name,
+// and the result is in model order. Without one, patterns are full MuJoCo names, in the given
+// order.
 struct ContactMatch {
   Word<ContactMode> mode;
   std::vector<std::string> pattern;
@@ -46,8 +48,8 @@ void visit_fields(V& v, ContactMatch& c) {
     "expression that is searched for.");
 }
 
-// Throw ValueError for what is wrong in any model. `place` starts the message: "sensor 'feet':
-// primary".
+// Throw ValueError for errors that do not depend on the model. `place` starts the message: "sensor
+// 'feet': primary".
 void validate(const ContactMatch& match, std::string_view place);
 void validate_primary(const ContactMatch& match, std::string_view place);
 void validate_secondary(const ContactMatch& match, ContactPolicy policy, std::string_view place);
@@ -56,16 +58,16 @@ void validate_secondary(const ContactMatch& match, ContactPolicy policy, std::st
 struct ContactObject {
   int id = -1;        // geom id in mode geom, else body id
   std::string name;   // full MuJoCo name
-  std::string label;  // local name in its entity; the full name without one
+  std::string label;  // local name in its entity; the full name if there is none
 };
 
-// Names of a model, or of a spec that is not compiled yet (ids are then positions in the spec).
+// Names of a model, or of a spec that is not compiled yet (ids are then indices in the spec).
 class ContactNames {
  public:
   explicit ContactNames(const mjModel* model);
   explicit ContactNames(mjSpec* spec);
 
-  // Both throw ValueError or KeyError that names the sensor, the pattern and the nearest names.
+  // Both functions throw ValueError or KeyError with the sensor, the pattern and the nearest names.
   std::vector<ContactObject> primaries(std::string_view sensor, const ContactMatch& match) const;
   // policy: first, error, or each (several patterns, every match).
   std::vector<ContactObject> secondaries(std::string_view sensor, const ContactMatch& match,
@@ -74,8 +76,8 @@ class ContactNames {
  private:
   struct Element {
     std::string name;
-    int body;    // body id: itself, or the geom's
-    int parent;  // of a body
+    int body;    // id of the body, or of the geom's body
+    int parent;  // of a body; -1 for a geom
   };
   std::vector<ContactObject> of_entity(std::string_view place, const ContactMatch& match) const;
   std::vector<ContactObject> literal(std::string_view place, const ContactMatch& match) const;

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
-// What a contact sensor remembers from substep to substep: air and contact times, touchdown and
+// State that a contact sensor keeps from substep to substep: air and contact times, touchdown and
 // lift-off, and the latch over a control step.
 
 #include <algorithm>
@@ -13,7 +13,7 @@
 
 namespace mjsense {
 
-// The rows of a field, without the arithmetic of Array.
+// The rows of a field, without the index computations of Array.
 template <class T>
 class Rows {
  public:
@@ -31,7 +31,7 @@ class Rows {
 
 class ContactMemory {
  public:
-  // Where it writes; empty: not asked for.
+  // Output fields; empty if not requested.
   struct Fields {
     Rows<float> current_air, last_air, current_contact, last_contact;
     Rows<bool> touchdown, liftoff;
@@ -41,18 +41,18 @@ class ContactMemory {
   ContactMemory() = default;
   ContactMemory(int num_worlds, int num_primaries, int decimation, const Fields& fields);
 
-  // One substep. First next_substep(), then strike() for every primary in contact.
+  // Call for every substep: first next_substep(), then strike() for every primary in contact.
   void next_substep(const World& world, const ContactReducer& contacts);
   bool wants_strikes() const { return static_cast<bool>(fields_.found_any); }
-  // True if it is the strongest of the control step so far: set_peak() must follow.
+  // Returns true if this is the strongest force of the control step so far; then call set_peak().
   bool strike(int world, int primary, double force_norm);
   void set_peak(int world, int primary, const ContactReading& reading);
 
   void reset(int world);
 
  private:
-  // An episode's first substep is where its phases begin: what is there then neither touched down
-  // nor lifted off, whatever state was written after the reset.
+  // Phases begin with the first substep of an episode. A contact that exists then is not a
+  // touchdown, and a missing one is not a lift-off, whatever state was written after the reset.
   enum class Touch : std::uint8_t { kUnknown, kAir, kContact };
 
   void clear_step(int world);
@@ -61,10 +61,10 @@ class ContactMemory {
 
   Fields fields_;
   int num_primaries_ = 0, decimation_ = 1;
-  std::vector<int> substep_;       // of the control step, by world
+  std::vector<int> substep_;       // [B] index in the control step
   std::vector<double> since_;      // [B, P] s in contact if > 0, in the air if < 0
   std::vector<double> step_time_;  // [B] s since the control step began
-  std::vector<double> peak_;       // [B, P] greatest force norm of the step, -1 without contact
+  std::vector<double> peak_;       // [B, P] maximum force norm of the step, -1 without contact
   std::vector<Touch> touch_;       // [B, P] at the last substep
 };
 

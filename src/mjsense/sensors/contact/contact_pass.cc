@@ -38,7 +38,8 @@ void ContactPass::run(const World& world) {
     for (const Entry& e : second) {
       ContactReducer& r = *reducers_[e.reducer];
       if (!r.accepts_other(g1)) continue;
-      // A primary on both sides (a subtree that touches itself) has this contact once, as geom 1.
+      // If a primary is on both sides (a subtree in contact with itself), the contact counts once,
+      // as geom 1.
       const bool counted =
           r.accepts_other(g2) && std::any_of(first.begin(), first.end(), [&](const Entry& other) {
             return other.reducer == e.reducer && other.primary == e.primary;

@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
-// One walk over mjData.contact per world and moment, for all contact sensors that want it at the
-// same time: a table from each geom to the primaries it belongs to makes the cost grow with the
-// contacts, not with primaries or fields.
+// One pass over mjData.contact per world and moment, for all contact sensors that need it at the
+// same time. A table from each geom to its primaries makes the cost proportional to the number of
+// contacts, independent of the number of primaries and fields.
 
 #include <cstdint>
 #include <span>
@@ -17,10 +17,11 @@ class ContactPass {
  public:
   ContactPass(const mjModel* model, int num_worlds);
 
-  // The reducer must outlive the pass's last run().
+  // The reducer must remain valid until the last run() of the pass.
   void join(ContactReducer* reducer);
 
-  // Fills every reducer's results for this world. Does nothing if it did so at this moment.
+  // Computes the results of all reducers for this world, unless that was done for the current
+  // moment.
   void run(const World& world);
 
  private:
@@ -36,7 +37,7 @@ class ContactPass {
   std::vector<ContactReducer*> reducers_;
   std::vector<int> begin_;  // entries of geom g: begin_[g] .. begin_[g + 1]
   std::vector<Entry> entries_;
-  std::vector<std::uint64_t> moment_;  // of the last run, by world
+  std::vector<std::uint64_t> moment_;  // [B] of the last run
 };
 
 }  // namespace mjsense

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Random heaps of bodies: every field, mode and reduction against MuJoCo's own contact sensors, and
-// what MuJoCo does not have against a brute-force search of mjData.contact.
+// Random heaps of bodies. Every field, mode and reduction is compared with MuJoCo's own contact
+// sensors, and what MuJoCo does not have is compared with a brute-force search of mjData.contact.
 
 #include <fmt/format.h>
 #include <gtest/gtest.h>
@@ -31,7 +31,7 @@ constexpr ContactReduce kReduces[] = {ContactReduce::kNone, ContactReduce::kMinD
 struct Heap {
   std::string xml;
   std::vector<std::string> geoms, bodies;
-  std::string prefix;  // of the names of bodies and their geoms
+  std::string prefix;  // prefix of the names of bodies and their geoms
 };
 
 std::string random_geom(Random& r, Heap& heap) {
@@ -95,7 +95,7 @@ ContactSensorCfg random_cfg(Random& r, const Heap& heap, int index) {
   return cfg;
 }
 
-// MuJoCo's sensors for the same content: one a primary.
+// MuJoCo's sensors for the same content, one per primary.
 std::string mujoco_sensors(const ContactSensorCfg& cfg) {
   std::string xml;
   for (std::size_t p = 0; p < cfg.primary.pattern.size(); ++p) {
@@ -159,7 +159,7 @@ void expect_equal_to_mujoco(ContactSensor& sensor, const Model& model) {
   }
 }
 
-TEST(ContactRandom, EveryFieldModeAndReductionIsMuJoCos) {
+TEST(ContactRandom, EveryFieldModeAndReductionEqualsMuJoCos) {
   int contacts = 0;
   for (int seed = 0; seed < 150; ++seed) {
     Random r(seed);
@@ -186,7 +186,7 @@ TEST(ContactRandom, EveryFieldModeAndReductionIsMuJoCos) {
       mj_step(model.m, model.d);
     }
   }
-  EXPECT_GT(contacts, 5000);  // the heaps are not empty
+  EXPECT_GT(contacts, 5000);  // the bodies were in contact
 }
 
 // ---- what MuJoCo does not have
@@ -201,8 +201,8 @@ bool belongs(const mjModel* m, int geom, ContactMode mode, const std::string& na
   }
 }
 
-// One element of the matrix by its definition: +1 if the contact is the primary's with the
-// secondary as geom 2, -1 as geom 1, the first where it is both; 0 if it is none of theirs.
+// One element of the pair matrix, by its definition: +1 if the primary has geom 1 and the secondary
+// geom 2, -1 the other way round, +1 if both are true, 0 if none is.
 int direction(const mjModel* m, const mjContact& c, ContactMode primary_mode,
               const std::string& primary, ContactMode secondary_mode,
               const std::string& secondary) {
@@ -216,10 +216,11 @@ int direction(const mjModel* m, const mjContact& c, ContactMode primary_mode,
 }
 
 struct PairCounts {
-  int pairs = 0, both_ways = 0;  // both_ways: contacts of a primary that two secondaries share
+  // both_ways: contacts of a primary that count for secondaries on both sides.
+  int pairs = 0, both_ways = 0;
 };
 
-// pair_found and pair_force against a search of mjData.contact; names are full ones.
+// Compares pair_found and pair_force with a search of mjData.contact. Names are full names.
 void expect_pairs_of_brute_force(ContactSensor& sensor, const Model& model,
                                  const std::vector<std::string>& primaries,
                                  const std::vector<std::string>& secondaries, PairCounts& counts) {
@@ -312,7 +313,7 @@ TEST(ContactRandom, PairsOthersAndFrictionSplitMatchBruteForce) {
             ASSERT_NEAR(normal[i] + friction[i], whole[i], tol);
             along += friction[i] * axis[i];
           }
-          if (cfg.reduce == "netforce") continue;  // has no single normal
+          if (cfg.reduce == "netforce") continue;  // a sum has no single normal
           ASSERT_NEAR(along, 0, tol);
         }
       }
@@ -323,7 +324,7 @@ TEST(ContactRandom, PairsOthersAndFrictionSplitMatchBruteForce) {
   EXPECT_GT(counts.both_ways, 100);
 }
 
-// Primaries and secondaries of an entity, by regular expressions and with names left out.
+// Primaries and secondaries of an entity, given by regular expressions and with excludes.
 TEST(ContactRandom, SecondariesWithExcludesMatchBruteForce) {
   PairCounts counts;
   int excluded = 0;
@@ -337,7 +338,7 @@ TEST(ContactRandom, SecondariesWithExcludesMatchBruteForce) {
     cfg.secondary = ContactMatch{kModes[below(r, 3)], {".*"}, "e", {}};
     cfg.secondary_policy = "each";
     const bool geoms = cfg.secondary->mode == "geom";
-    // One name as it is, and every name that ends in a random digit.
+    // One literal name, and every name that ends in a random digit.
     const std::string one = geoms ? "g1" : "b1", digit = std::to_string(below(r, 10));
     cfg.secondary->exclude = {one, digit + "$"};
     const auto names = [&](ContactMode mode, bool with_excludes) {
@@ -370,7 +371,7 @@ TEST(ContactRandom, SecondariesWithExcludesMatchBruteForce) {
   EXPECT_GT(excluded, 100);
 }
 
-// A plate of 80 balls: more matches than any fixed buffer, every one counted and summed.
+// A plate of 80 balls: all matches are counted and summed, however many there are.
 TEST(ContactRandom, EightyContactsOfOneBody) {
   std::string xml = R"(<mujoco><worldbody><geom type="plane" size="5 5 .1"/>
       <body name="b" pos="0 0 .0195"><freejoint/>)";

@@ -40,7 +40,8 @@ ContactReading read_contact(const World& world, const ContactRef& ref, bool wren
     to_world(r.normal_force, c, s, f[0], 0, 0);
     to_world(r.friction_force, c, s, 0, f[1], f[2]);
   } else {
-    // The flipped frame is (-n, -t, n x t): of the opposite wrench only the third component flips.
+    // The flipped frame is (-n, -t, n x t): in it, only the third component of the opposite wrench
+    // is flipped.
     for (int i = 0; i < 3; ++i) {
       r.force[i] = i == 2 ? s * f[i] : f[i];
       r.torque[i] = i == 2 ? s * f[3 + i] : f[3 + i];
@@ -54,8 +55,8 @@ ContactReading read_contact(const World& world, const ContactRef& ref, bool wren
 ContactReading read_net_contact(const World& world, const ContactSum& sum) {
   ContactReading r;
   double arm[3], moment[3];
-  const bool loaded =
-      sum.weight > 0;  // contacts in the gap have no centroid: the origin, as MuJoCo
+  // Contacts in the gap have no centroid; the position is then the origin, as in MuJoCo.
+  const bool loaded = sum.weight > 0;
   for (int i = 0; i < 3; ++i) {
     arm[i] = loaded ? sum.weighted_pos[i] / sum.weight : 0.0;
     r.pos[i] = loaded ? sum.origin[i] + arm[i] : 0.0;

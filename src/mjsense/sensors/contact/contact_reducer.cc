@@ -104,7 +104,7 @@ void ContactReducer::add_other_way(int world, int primary, PassContact& contact)
   add_to_pairs(world, primary, contact, -1, list(secondary_of_geom_, contact.contact.geom[1]));
 }
 
-// Keeps slots sorted by key; equal keys stay in the order of the contact list.
+// Keeps slots sorted by key; contacts with equal keys stay in the order of the contact list.
 void ContactReducer::insert(ContactRef* slots, int filled, const ContactRef& ref) const {
   int k = std::min(filled, num_slots_);
   if (k == num_slots_ && !(ref.key < slots[k - 1].key)) return;

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
-// What one contact sensor keeps of the contacts of a pass: per primary a count, the K best contacts
-// or their net wrench. Nothing is limited but K; nothing allocates after the constructor.
+// Results of a pass for one contact sensor: for each primary a count, and the K best contacts or
+// their net wrench. There is no limit except K, and nothing is allocated after construction.
 
 #include <mujoco/mujoco.h>
 
@@ -21,8 +21,9 @@ template <>
 inline constexpr std::array<std::string_view, 4> kWords<ContactReduce>{"none", "mindist",
                                                                        "maxforce", "netforce"};
 
-// mj_contactForce, without the call for contacts that are plain constraints: force and torque in
-// the contact frame. A pyramid's edges come in pairs, one pair for each friction direction.
+// Force and torque in the contact frame. Equal to mj_contactForce, which is called only for
+// contacts that are not plain constraints. The edges of a pyramidal cone come in pairs, one pair
+// for each friction direction.
 inline void contact_wrench(const mjModel* m, const mjData* d, int id, mjtNum wrench[6]) {
   const mjContact& c = d->contact[id];
   const bool plain =
@@ -35,14 +36,13 @@ inline void contact_wrench(const mjModel* m, const mjData* d, int id, mjtNum wre
     return;
   }
   for (int i = 1; i < c.dim; ++i, force += 2) {
-    wrench[0] += force[0];  // one by one, as MuJoCo: equal forces stay equal
+    wrench[0] += force[0];  // one by one as in MuJoCo, so that equal forces stay equal
     wrench[0] += force[1];
     wrench[i] = (force[0] - force[1]) * c.friction[i - 1];
   }
 }
 
-// One contact while a pass looks at it. Its wrench is computed when first asked for, once for all
-// sensors.
+// A contact during a pass. Its wrench is computed when it is first needed, once for all sensors.
 class PassContact {
  public:
   PassContact(const World& world, int id)
@@ -71,13 +71,13 @@ class PassContact {
 
 // A contact as seen from a primary: sign +1 if the primary is geom 1, -1 if it is geom 2.
 struct ContactRef {
-  double key = 0.0;  // what it was selected by: smaller is better
+  double key = 0.0;  // selection criterion; smaller is better
   int contact = -1;  // index in mjData.contact
   int sign = 1;
 };
 
-// Sums over the contacts of a primary, world axes. Positions and moments are about `origin`, the
-// first contact, so that nothing cancels far from the world's origin.
+// Sums over the contacts of a primary, world axes. Positions and moments are relative to `origin`,
+// the first contact, to avoid cancellation far from the world's origin.
 struct ContactSum {
   double origin[3], weight, weighted_pos[3], force[3], normal_force[3], moment[3];
   ContactRef strongest;
@@ -86,24 +86,26 @@ struct ContactSum {
 class ContactReducer {
  public:
   struct Config {
-    std::vector<ContactObject> primaries, secondaries;  // no secondaries: contacts with anything
+    // Without secondaries, contacts with anything count.
+    std::vector<ContactObject> primaries, secondaries;
     ContactMode primary_mode{}, secondary_mode{};
     ContactReduce reduce = ContactReduce::kMaxForce;
     int num_slots = 1;
-    bool keep_peak = false;   // also the strongest of all contacts, whatever `reduce` selects
-    bool keep_pairs = false;  // also counts and net forces by secondary
+    // Also keep the strongest of all contacts, whatever `reduce` selects.
+    bool keep_peak = false;
+    bool keep_pairs = false;  // also keep counts and net forces for each secondary
   };
   ContactReducer() = default;
   ContactReducer(const mjModel* model, int num_worlds, const Config& config);
 
-  // Primaries that a geom belongs to.
+  // The primaries that a geom belongs to.
   std::span<const int> primaries_of(int geom) const { return list(primary_of_geom_, geom); }
   bool accepts_other(int geom) const { return any_other_ || (geom >= 0 && other_[geom]); }
 
   void begin(int world);
   void add(int world, int primary, PassContact& contact, int sign);
-  // A contact that was added with the primary as geom 1 and matches as geom 2 too: it is not
-  // counted again, but secondaries on the side of geom 1 have it as well.
+  // For a contact that was added with the primary as geom 1 and that also matches as geom 2. It is
+  // not counted again, but it is added to the pairs with secondaries on the side of geom 1.
   void add_other_way(int world, int primary, PassContact& contact);
 
   int num_primaries() const { return num_primaries_; }
@@ -111,8 +113,8 @@ class ContactReducer {
   int num_secondaries() const { return num_secondaries_; }
   bool is_net() const { return reduce_ == ContactReduce::kNetForce; }
 
-  // Results of the last pass over this world. touched: primaries with a contact, in the order
-  // found.
+  // Results of the last pass over this world. touched(): primaries with a contact, in the order in
+  // which they were found.
   std::span<const int> touched(int world) const {
     return {touched_.data() + world * num_primaries_,
             static_cast<std::size_t>(num_touched_[world])};
@@ -124,12 +126,12 @@ class ContactReducer {
   const ContactSum& sum(int world, int primary) const {
     return sums_[world * num_primaries_ + primary];
   }
-  const ContactRef& peak(int world, int primary) const;  // needs keep_peak, not netforce
+  const ContactRef& peak(int world, int primary) const;  // requires keep_peak; not for netforce
   std::span<const std::int32_t> pair_count(int world) const;
   std::span<const double> pair_force(int world) const;  // [P, S, 3]
 
  private:
-  // Values by geom, packed: those of geom g are values[begin[g] .. begin[g + 1]).
+  // Lists of values by geom, in one vector: those of geom g are values[begin[g] .. begin[g + 1]).
   struct Lists {
     std::vector<int> begin, values;
   };
@@ -141,7 +143,7 @@ class ContactReducer {
                         ContactMode mode);
   void insert(ContactRef* slots, int filled, const ContactRef& ref) const;
   void add_to_sum(ContactSum& sum, bool is_first, PassContact& contact, int sign) const;
-  // had: secondaries that this contact is not new to.
+  // `had`: secondaries to which this contact was added before.
   void add_to_pairs(int world, int primary, PassContact& contact, int sign,
                     std::span<const int> had);
 
@@ -149,7 +151,7 @@ class ContactReducer {
   int num_primaries_ = 0, num_slots_ = 1, num_secondaries_ = 0;
   bool any_other_ = true, keep_pairs_ = false;
   Lists primary_of_geom_, secondary_of_geom_;
-  std::vector<std::uint8_t> other_;  // by geom: belongs to a secondary
+  std::vector<std::uint8_t> other_;  // [ngeom] the geom belongs to a secondary
   std::vector<int> touched_, num_touched_;
   std::vector<std::int32_t> count_;
   std::vector<ContactRef> slots_, peaks_;

@@ -33,9 +33,9 @@ std::vector<std::string> labels_of(const std::vector<ContactObject>& objects) {
 }  // namespace
 
 struct ContactSensor::Output {
-  int offset;  // of its values in a reading; -1: found
+  int offset;  // of the field's values in a reading; -1: found
   int dim;
-  Rows<float> rows, history;  // empty history: none
+  Rows<float> rows, history;  // `history` is empty if there is none
 };
 
 ContactSensor::ContactSensor(ContactSensorCfg cfg) : Sensor(cfg.name), cfg_(std::move(cfg)) {}
@@ -86,7 +86,7 @@ void ContactSensor::initialize(const SensorInit& init) {
   }
   config.reduce = cfg_.reduce;
   if (config.reduce == ContactReduce::kMaxForce && needs() < mjSTAGE_ACC) {
-    config.reduce = ContactReduce::kNone;  // nobody sees which contacts the slots hold
+    config.reduce = ContactReduce::kNone;  // no output depends on which contacts the slots hold
   }
   config.num_slots = cfg_.num_slots;
   config.keep_peak = cfg_.latch;
@@ -95,7 +95,8 @@ void ContactSensor::initialize(const SensorInit& init) {
   secondary_names_ = labels_of(config.secondaries);
   reducer_ = ContactReducer(init.model, init.num_worlds, config);
 
-  // The first contact sensor of the scene that is read at the same times and stages owns the pass.
+  // The pass belongs to the first contact sensor of the scene that is read at the same times and
+  // stages.
   pass_ = nullptr;
   if (init.scene) {
     ContactSensor* first = nullptr;
@@ -277,7 +278,7 @@ void ContactSensor::write_rows(const World& world) {
   written_moment_[w] = world.moment;
 }
 
-// Empties the slots of a primary from `first_slot` on, and its pairs if that is all of them.
+// Clears the slots of a primary from `first_slot` on, and its pairs if that is all slots.
 void ContactSensor::clear_rows(int w, int primary, int first_slot) {
   const std::size_t slot = static_cast<std::size_t>(primary) * cfg_.num_slots + first_slot;
   const std::size_t n = cfg_.num_slots - first_slot, S = reducer_.num_secondaries();
@@ -311,12 +312,12 @@ void ContactSensor::write_slot(int w, int slot, int found, const ContactReading&
   }
 }
 
-// Moves every slot's history on by one substep. A slot that has been empty for H substeps is all
-// zero and left alone; neighbours that are not move together.
+// Shifts the history of every slot by one substep. A slot that has been empty for H substeps is all
+// zero and is skipped. Other slots are shifted together if they are adjacent.
 void ContactSensor::write_history(int w) {
   const int K = cfg_.num_slots, P = reducer_.num_primaries();
   std::uint16_t* left = history_left_.data() + static_cast<std::size_t>(w) * P * K;
-  int begin = -1;  // of the run of slots to move, -1: none
+  int begin = -1;  // of the run of slots to shift, -1: none
   for (int p = 0, n = 0; p < P; ++p) {
     const int count = reducer_.count(w, p);
     const int filled = reducer_.is_net() ? std::min(count, 1) : count;
@@ -337,7 +338,8 @@ void ContactSensor::write_history(int w) {
   if (begin >= 0) shift_history(w, begin, P * K);
 }
 
-// One move for all slots [begin, end): what it carries over a slot's border is then overwritten.
+// Shifts all slots [begin, end) in one move. Values that cross a slot's border are overwritten
+// afterwards.
 void ContactSensor::shift_history(int w, int begin, int end) {
   const std::size_t H = cfg_.history_length;
   for (const Output& o : outputs_) {

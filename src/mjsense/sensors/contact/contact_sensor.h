@@ -1,13 +1,13 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
-// Contacts of chosen geoms, bodies or subtrees (primaries), with everything or with chosen others
-// (secondaries).
+// Contacts of chosen geoms, bodies or subtrees (primaries), with anything or only with chosen
+// others (secondaries).
 //
 // Sign and frame. The normal points from the primary to the other side. The force is what the
 // PRIMARY EXERTS ON THE OTHER: a box on the floor reads (0, 0, -m g) in the world frame; make the
-// floor the primary to read the ground reaction. Components are in the contact frame
-// (x = normal, y = tangent, z = normal x tangent), hence force[0] >= 0 without adhesion; with
-// global_frame, and always with reduce = netforce, they are in the world frame.
+// floor the primary to read the ground reaction. Components are in the contact frame (x = normal, y
+// = tangent, z = normal x tangent), hence force[0] >= 0 without adhesion; with global_frame, and
+// always with reduce = netforce, they are in the world frame.
 //
 // All contact sensors of a scene share one pass over mjData.contact (contact_pass.h).
 
@@ -67,8 +67,8 @@ struct ContactSensorCfg : SensorCfg {
   bool global_frame = false;
   int history_length = 0;
 
-  // Beyond mjlab. All are exact: they look at every substep, and at every contact, not at the
-  // slots.
+  // Beyond mjlab. All of these are exact: they use every substep, and every contact instead of only
+  // those in the slots.
   bool track_events = false;
   bool latch = false;
   bool friction_split = false;
@@ -129,22 +129,21 @@ void visit_fields(V& v, ContactSensorCfg& c) {
   v("viz", c.viz, "Appearance of the debug drawing.");
 }
 
-// Fields (float32 unless said; B worlds, P primaries, K slots, N = P K with index p K + k, S
+// Fields (float32 unless noted; B worlds, P primaries, K slots, N = P K with index p K + k, S
 // secondaries, H history). A slot without a contact is all zero.
 //   found      [B, N]     number of matching contacts, the same in every filled slot of a primary;
 //                         contacts in the gap count, with zero force
 //   force      [B, N, 3]  N, see above          torque  [B, N, 3]  N m, same axes
 //   dist       [B, N]     m, negative in penetration; 0 with netforce
 //   pos        [B, N, 3]  m, world              normal, tangent  [B, N, 3]  unit, world
-//   X_history  [B, N, H(, 3)]  of every field X above, newest first, one entry a substep
+//   X_history  [B, N, H(, 3)]  of every field X above, newest first, one entry per substep
 //   current_air_time, last_air_time, current_contact_time, last_contact_time  [B, P]  s
-//   touchdown, liftoff  bool [B, P]  a contact began (ended) in this control step; what is there at
-//                         the first substep after a reset has not begun then
+//   touchdown, liftoff  bool [B, P]  a contact began (ended) in this control step; a contact that
+//                         exists at the first substep after a reset has not begun then
 //   found_any  bool [B, P]  any contact in this control step
 //   force_peak [B, P, 3], dist_at_peak [B, P], pos_at_peak [B, P, 3]  the strongest of the step
 //   first_touch_time [B, P]  s from the start of the control step to its first substep with
-//   contact;
-//                         -1 if none
+//                         contact; -1 if none
 //   normal_force, friction_force  [B, N, 3]  N, axes of force, which is their sum
 //   other_geom, other_body  int32 [B, N]  MuJoCo ids of the other side; -1: empty slot or a flex;
 //                         with netforce those of the strongest contact
@@ -159,8 +158,8 @@ class ContactSensor : public Sensor {
   std::vector<std::unique_ptr<Sensor>> parts() override;
   void initialize(const SensorInit& init) override;
   bool wants_substep() const override;
-  // Whether there is a contact, where and how deep follows from positions; forces, and an order or
-  // a sum by force, from the solve.
+  // Existence, position and depth of contacts follow from positions. Forces, and an order or a sum
+  // by force, need the solver.
   mjtStage needs() const override;
   void substep(const World& world) override;
   void compute(const World& world) override;
@@ -169,19 +168,19 @@ class ContactSensor : public Sensor {
   void draw(const World& world, DebugShapes& shapes) override;
 
   const ContactSensorCfg& cfg() const { return cfg_; }
-  // Local names of the primaries (secondaries), in the order of P (S). Known after edit_spec() or
+  // Local names of the primaries (secondaries), in the order of P (S). Valid after edit_spec() or
   // initialize().
   const std::vector<std::string>& primary_names() const { return primary_names_; }
   const std::vector<std::string>& secondary_names() const { return secondary_names_; }
 
-  // bool [B, P]: the present contact (air) phase began less than dt + abs_tol ago. A touch that
-  // began and ended inside a control step is invisible to these; `touchdown` sees it. RuntimeError
-  // without track_air_time.
+  // bool [B, P]: the current contact (air) phase began less than dt + abs_tol ago. A contact that
+  // begins and ends within a control step is not reported; `touchdown` reports it. Throws
+  // RuntimeError without track_air_time.
   [[nodiscard]] Array compute_first_contact(double dt, double abs_tol = 1e-6) const;
   [[nodiscard]] Array compute_first_air(double dt, double abs_tol = 1e-6) const;
 
-  // One slot as MuJoCo's own sensor has it: in the contact frame whatever cfg says. Valid after
-  // compute(). Returns the number of matching contacts, 0 if the slot is empty.
+  // One slot as in MuJoCo's own sensor: in the contact frame, whatever the configuration. Valid
+  // after compute(). Returns the number of matching contacts, 0 if the slot is empty.
   [[nodiscard]] int read_slot(const World& world, int primary, int slot,
                               ContactReading& reading) const;
 
@@ -205,9 +204,9 @@ class ContactSensor : public Sensor {
   Rows<std::int32_t> other_geom_, other_body_;
   Rows<float> pair_found_, pair_force_;
   bool needs_wrench_ = false;
-  std::vector<std::uint64_t> written_moment_;  // of the rows, by world
-  std::vector<int> written_;                   // [B, P] primaries whose rows are not zero ...
-  std::vector<int> num_written_;               // ... and how many
+  std::vector<std::uint64_t> written_moment_;  // [B] of the rows
+  std::vector<int> written_;                   // [B, P] primaries whose rows are not zero
+  std::vector<int> num_written_;               // [B] number of those primaries
   std::vector<std::uint16_t> history_left_;    // [B, N] substeps until a slot's history is all zero
 };
 

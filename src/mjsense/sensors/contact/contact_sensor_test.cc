@@ -31,7 +31,7 @@ ContactSensorCfg box_cfg(std::string pattern = "box_geom") {
   return cfg;
 }
 
-// A scene of one entity with these contact sensors.
+// A scene with one entity and these contact sensors.
 struct Lab {
   std::shared_ptr<Scene> scene;
   std::unique_ptr<Simulation> sim;
@@ -82,8 +82,8 @@ TEST(Contact, BoxOnTheFloorPushesDownWithItsWeight) {
   EXPECT_THAT(lab.sensor().primary_names(), ElementsAre("box_geom"));
 }
 
-// A box at rest that is pushed along the floor by less than friction holds: what it pushes on the
-// floor is what pushes it, in both tangents. In the contact's own frame the third axis is normal x
+// A box at rest is pushed along the floor with less force than friction can hold. Its force on the
+// floor equals the push, along both tangents. In the contact frame the third axis is normal x
 // tangent.
 TEST(Contact, FrictionHoldsAlongBothTangents) {
   std::vector<ContactSensorCfg> sensors;
@@ -138,8 +138,8 @@ TEST(Contact, FrictionHoldsAlongBothTangents) {
     for (int i = 0; i < 12; i += 3) {
       const double b[3] = {n[i + 1] * t[i + 2] - n[i + 2] * t[i + 1],
                            n[i + 2] * t[i] - n[i] * t[i + 2], n[i] * t[i + 1] - n[i + 1] * t[i]};
-      EXPECT_NEAR(n[i + 2], -sign, 1e-6);  // from the primary outwards
-      EXPECT_GT(local[i], 0);              // it presses
+      EXPECT_NEAR(n[i + 2], -sign, 1e-6);  // away from the primary
+      EXPECT_GT(local[i], 0);              // a pressing force
       for (int k = 0; k < 3; ++k)
         EXPECT_NEAR(local[i] * n[i + k] + local[i + 1] * t[i + k] + local[i + 2] * b[k],
                     global[i + k], 1e-5)
@@ -204,8 +204,8 @@ TEST(Contact, MiddleOfAStackPushesBothWays) {
   }
 }
 
-// The ground has names of its own, with no "terrain/" before them.
-TEST(Contact, TheTerrainIsAnEntity) {
+// The terrain's names have no prefix "terrain/".
+TEST(Contact, TerrainIsAnEntity) {
   SceneCfg cfg;
   cfg.terrain = TerrainCfg{};
   EntityCfg box;
@@ -233,8 +233,8 @@ TEST(Contact, TheTerrainIsAnEntity) {
   }
 }
 
-// Two feet of one trunk press against each other along x, L from the left: the contact is the
-// trunk's with R and, turned round, the trunk's with L.
+// Two feet of one trunk press against each other along x, L from the left. The contact matches the
+// trunk and R and, in the other direction, the trunk and L.
 //
 //          trunk
 //        L --><-- R
@@ -255,7 +255,7 @@ ContactSensorCfg feet_cfg(std::string name, Word<ContactMode> mode,
   return c;
 }
 
-TEST(Contact, AContactThatMatchesBothWaysIsInBothPairs) {
+TEST(Contact, ContactInBothDirectionsIsInBothPairs) {
   ContactSensorCfg net = feet_cfg("net", "subtree", {"trunk", "L", "R"});
   net.reduce = "netforce";
   Lab lab("bot", kFeet,
@@ -264,21 +264,21 @@ TEST(Contact, AContactThatMatchesBothWaysIsInBothPairs) {
   lab.sim->forward();
   for (const char* name : {"bodies", "subtrees", "geoms"}) {
     EXPECT_THAT(lab.read("found", name), ElementsAre(1))
-        << name;  // one contact, whatever the pairs
+        << name;  // one contact, also if it is in two pairs
     EXPECT_THAT(lab.read("pair_found", name), ElementsAre(1, 1)) << name;
     const std::vector<float> force = lab.read("pair_force", name);
-    EXPECT_GT(force[3], 1) << name;  // on R, to the right
+    EXPECT_GT(force[3], 1) << name;  // force on R, to the right
     EXPECT_EQ(force[0], -force[3]) << name;
     for (int i : {1, 2, 4, 5}) EXPECT_NEAR(force[i], 0, 1e-6) << name;
   }
-  // The trunk with itself counts once, as geom 1.
+  // The contact of the trunk with itself counts once, as geom 1.
   EXPECT_THAT(lab.read("pair_found", "net"), ElementsAre(1, 1, 1));
   const std::vector<float> force = lab.read("pair_force", "net");
   EXPECT_EQ(force[0], force[6]);
   EXPECT_EQ(force[0], lab.read("force", "net")[0]);
 }
 
-TEST(Contact, ExcludeLeavesSecondariesOut) {
+TEST(Contact, ExcludeRemovesSecondaries) {
   ContactSensorCfg each = feet_cfg("each", "geom", {".*"}),
                    first = feet_cfg("first", "geom", {".*"});
   ContactSensorCfg literal = feet_cfg("literal", "subtree", {"L"});
@@ -288,7 +288,8 @@ TEST(Contact, ExcludeLeavesSecondariesOut) {
   first.secondary_policy = literal.secondary_policy = "first";
   Lab lab("bot", kFeet, {each, first, literal});
   lab.sim->forward();
-  EXPECT_THAT(lab.sensor("each").secondary_names(), ElementsAre("geom_0", "R"));  // "geom_": exact
+  // "geom_" has no special character: it excludes an exact name.
+  EXPECT_THAT(lab.sensor("each").secondary_names(), ElementsAre("geom_0", "R"));
   EXPECT_THAT(lab.sensor("first").secondary_names(), ElementsAre("R"));
   EXPECT_THAT(lab.sensor("literal").secondary_names(), ElementsAre("L"));
   EXPECT_THAT(lab.read("found", "first"), ElementsAre(1));
@@ -305,8 +306,8 @@ TEST(Contact, ExcludeLeavesSecondariesOut) {
   }
 }
 
-// Whether and where there is contact is known without the solve; whoever asks for that alone does
-// not pay for it, and leaves nothing half done for who asks for forces afterwards.
+// Existence and position of contacts are known without the solver. A sensor that needs only these
+// must not run it, and must leave a state from which forces can be read afterwards.
 TEST(Contact, WithoutForcesNeedsPositionsOnly) {
   const auto needs = [](auto&& change) {
     ContactSensorCfg cfg = box_cfg();
@@ -321,7 +322,8 @@ TEST(Contact, WithoutForcesNeedsPositionsOnly) {
               c.fields = {"found", "dist", "normal"}, c.reduce = "mindist";
             }),
             mjSTAGE_POS);
-  EXPECT_EQ(needs([](Cfg& c) { c.fields = {"found", "dist"}; }), mjSTAGE_ACC);  // of the strongest
+  // dist is that of the strongest contact.
+  EXPECT_EQ(needs([](Cfg& c) { c.fields = {"found", "dist"}; }), mjSTAGE_ACC);
   EXPECT_EQ(needs([](Cfg& c) { c.fields = {"torque"}, c.reduce = "none"; }), mjSTAGE_ACC);
   EXPECT_EQ(needs([](Cfg& c) { c.reduce = "netforce"; }), mjSTAGE_ACC);
   EXPECT_EQ(needs([](Cfg& c) { c.latch = true; }), mjSTAGE_ACC);
@@ -344,7 +346,7 @@ TEST(Contact, WithoutForcesNeedsPositionsOnly) {
     first.sim->step();
     const std::vector<float> force = first.read("force");
     ASSERT_EQ(late.read("found", "found"), first.read("found"));
-    if (i % 3) continue;  // the other steps go on without a solve at their end
+    if (i % 3) continue;  // the other steps end without a solve
     ASSERT_EQ(late.read("force"), force) << i;
     ASSERT_EQ(late.read("pos"), first.read("pos")) << i;
     touched |= force[2] < 0;
@@ -360,8 +362,8 @@ TEST(Contact, PartsAreMuJoCosPerFieldSensors) {
   EXPECT_THAT(lab.read("", "c_box_geom_found"), ElementsAre(4.0f));
 }
 
-// What is wrong in any model is refused before there is one.
-TEST(Contact, RefusesAWrongConfigurationWhenItIsBuilt) {
+// Errors that do not depend on the model are found by build().
+TEST(Contact, InvalidConfigurationsAreRefusedAtBuild) {
   const auto message = [](auto change) -> std::string {
     ContactSensorCfg cfg = box_cfg();
     change(cfg);

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Air time, events, latch and history against an exact replay: what the sensor says at the end of
-// every control step is recomputed from the list of all substeps.
+// Air time, events, latch and history compared with an exact replay: the outputs at the end of
+// every control step are recomputed from the list of all substeps.
 
 #include <gtest/gtest.h>
 
@@ -14,7 +14,7 @@
 namespace mjsense {
 namespace {
 
-// Two elastic balls on vertical rails, kicked at random: touches of one to a few hundred substeps.
+// Two elastic balls on vertical rails, pushed at random: contacts of one to a few hundred substeps.
 constexpr char kBalls[] = R"(
 <mujoco><option timestep="0.002"/>
   <default><geom solref="-250000 -60"/></default>
@@ -52,8 +52,7 @@ std::unique_ptr<ContactSensor> make_sensor(const mjModel* m, int decimation) {
   return std::unique_ptr<ContactSensor>(static_cast<ContactSensor*>(s.release()));
 }
 
-// The phase that lasts at the end of samples[0 .. end), and the completed ones of both kinds before
-// it.
+// The phase at the end of samples[0 .. end), and the last completed phase of each kind before it.
 struct Phases {
   bool touch = false;
   int current = 0, last_contact = 0, last_air = 0;
@@ -63,7 +62,7 @@ void advance(Phases& p, bool touch, bool is_first) {
   if (is_first || touch == p.touch) {
     ++p.current;
   } else {
-    (p.touch ? p.last_contact : p.last_air) = p.current + 1;  // includes the substep of transition
+    (p.touch ? p.last_contact : p.last_air) = p.current + 1;  // includes the transition's substep
     p.current = 1;
   }
   p.touch = touch;
@@ -166,14 +165,14 @@ TEST(ContactTime, ExactReplayOf100000Substeps) {
       if (HasFatalFailure()) FAIL() << "substep " << k << ", decimation " << sensors[i].decimation;
     }
   }
-  // The test means something: many touches, some of a single substep, all seen at every decimation.
+  // The test covers enough: many contacts, some of a single substep, compared at every decimation.
   EXPECT_GT(touchdowns[0][0] + touchdowns[0][1], 1000);
   EXPECT_GT(single, 0);
   mj_deleteData(d);
   mj_deleteModel(m);
 }
 
-TEST(ContactTime, StartingInContactIsNoTouchdownAndResetForgets) {
+TEST(ContactTime, StartInContactIsNotATouchdownAndResetClears) {
   char error[500] = "";
   mjSpec* spec = mj_parseXMLString(kBalls, nullptr, error, sizeof error);
   mjModel* m = mj_compile(spec, nullptr);
@@ -197,9 +196,9 @@ TEST(ContactTime, StartingInContactIsNoTouchdownAndResetForgets) {
   mj_deleteModel(m);
 }
 
-// Phases begin with an episode's first substep, whatever was there at the reset: a pose is often
-// written after it. mjlab's timers do the same.
-TEST(ContactTime, TheFirstSubstepAfterAResetIsNoEvent) {
+// Phases begin with the first substep of an episode, whatever the state at the reset, because a
+// pose is often written after it. mjlab's timers do the same.
+TEST(ContactTime, FirstSubstepAfterAResetIsNotAnEvent) {
   char error[500] = "";
   mjSpec* spec = mj_parseXMLString(kBalls, nullptr, error, sizeof error);
   mjModel* m = mj_compile(spec, nullptr);

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
-// What an IMU returns.
+// Declares the fields of an IMU.
 
 #include "mjsense/core/data_class.h"
 

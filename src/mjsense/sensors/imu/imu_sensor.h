@@ -15,8 +15,8 @@
 
 namespace mjsense {
 
-// What a data sheet says of a device, in SI units. Tolerances are taken as three standard
-// deviations of devices, drawn anew for each episode; what a sheet does not give is 0.
+// Values of a device's data sheet, in SI units. Tolerances are three standard deviations over
+// devices; a device is drawn for each episode. Values that a sheet does not give are 0.
 struct ImuModel {
   struct Axis {
     double noise_density = 0.0;
@@ -60,20 +60,20 @@ void visit_fields(V& v, ImuModel& c) {
 
 // Presets:
 //   ideal       no errors
-//   mpu6050     InvenSense PS-MPU-6000A-00 rev. 3.4, tables 6.1 and 6.2, at +-2000 deg/s and +-16 g:
-//               gyroscope 0.005 deg/s/sqrt(Hz), zero rate +-20 deg/s, scale +-3 %, cross-axis +-2 %,
-//               16.4 LSB/(deg/s); accelerometer 400 ug/sqrt(Hz), zero g +-50 mg (x, y), +-80 mg (z),
-//               scale +-3 %, cross-axis +-2 %, 2048 LSB/g
-//   icm42688p   TDK DS-000347 rev. 1.7, page 1, at +-2000 deg/s and +-16 g, 16 bit:
-//               gyroscope 2.8 mdeg/s/sqrt(Hz), accelerometer 70 ug/sqrt(Hz); offsets are not in the preset
-// Throws KeyError with the names there are.
+//   mpu6050     InvenSense PS-MPU-6000A-00 rev. 3.4, tables 6.1 and 6.2, at +-2000 deg/s and
+//               +-16 g: gyroscope 0.005 deg/s/sqrt(Hz), zero rate +-20 deg/s, scale +-3 %,
+//               cross-axis +-2 %, 16.4 LSB/(deg/s); accelerometer 400 ug/sqrt(Hz), zero g +-50 mg
+//               (x, y), +-80 mg (z), scale +-3 %, cross-axis +-2 %, 2048 LSB/g
+//   icm42688p   TDK DS-000347 rev. 1.7, page 1, at +-2000 deg/s and +-16 g, 16 bit: gyroscope
+//               2.8 mdeg/s/sqrt(Hz), accelerometer 70 ug/sqrt(Hz); offsets are not in the preset
+// Throws KeyError with the available names.
 ImuModel imu_preset(const std::string& name);
 
-// Throw ValueError.
+// Checks fields that depend on each other. Throws ValueError.
 void validate(const ImuModel::Axis& axis, std::string_view place);
 
-// The effects of one half of a device, in the order of its signal path: axes, bias, noise, range,
-// counts.
+// The effects of the accelerometer or of the gyroscope, in the order of the signal path: scale and
+// axes, bias, noise, range, resolution.
 Effects imu_effects(const ImuModel::Axis& axis);
 
 inline constexpr std::array<std::string_view, 4> kImuPresets{"ideal", "mpu6050", "icm42688p", ""};
@@ -112,7 +112,7 @@ void visit_fields(V& v, ImuSensorCfg& c) {
 //   gyro  [B, 3]  rad/s, R^T omega
 //   quat  [B, 4]  wxyz, of the site in the world
 // The clean values are MuJoCo's sensors "<name>_acc", "<name>_gyro" (and "<name>_quat"), which the
-// scene registers too.
+// scene also registers.
 class ImuSensor : public Sensor {
  public:
   explicit ImuSensor(ImuSensorCfg cfg);
@@ -122,13 +122,13 @@ class ImuSensor : public Sensor {
   void initialize(const SensorInit& init) override;
   void compute(const World& world) override;
   void reset(const World& world) override;
-  void draw(const World& world, DebugShapes& shapes) override;  // the axes of its site
+  void draw(const World& world, DebugShapes& shapes) override;  // draws the axes of the site
   bool eager() const override { return eager_; }
 
  private:
   struct Part {
     Field* field;
-    int address;  // in sensordata
+    int address;  // in mjData.sensordata
     EffectChain chain;
     std::vector<float> clean;  // [B, size]
   };
@@ -137,7 +137,7 @@ class ImuSensor : public Sensor {
   ImuSensorCfg cfg_;
   ImuModel model_;
   std::vector<Part> parts_;
-  int accelerometer_ = -1;  // MuJoCo's sensor
+  int accelerometer_ = -1;  // id of MuJoCo's sensor
   bool eager_ = false;
 };
 

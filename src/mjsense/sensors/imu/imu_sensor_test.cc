@@ -19,7 +19,7 @@ namespace {
 
 using ::testing::HasSubstr;
 
-// A body at rest, its site rolled by 90 degrees: up is the site's +y.
+// A body at rest whose site is rolled by 90 degrees: up is the site's +y.
 constexpr char kRest[] = R"(
 <mujoco><worldbody><body name="b" pos="0 0 1"><geom size=".1"/><site name="imu" euler="90 0 0"/></body>
 </worldbody></mujoco>)";
@@ -50,14 +50,14 @@ TEST(Imu, IdealReadsSpecificForceInSiteAxes) {
   EXPECT_NEAR(acc[0], 0, 1e-5);
   EXPECT_NEAR(acc[1], 9.81, 1e-5);
   EXPECT_NEAR(acc[2], 0, 1e-5);
-  EXPECT_TRUE(scene->find_sensor("imu_acc"));  // the clean value
+  EXPECT_TRUE(scene->find_sensor("imu_acc"));  // the clean sensor
 }
 
-TEST(Imu, DataSheetNumbersComeOut) {
+TEST(Imu, ErrorsHaveTheStatisticsOfTheDataSheet) {
   auto scene = make_scene(imu("mpu6050"));
   SimulationCfg cfg;
   cfg.num_worlds = 256;
-  cfg.decimation = 5;  // 10 ms
+  cfg.decimation = 5;  // 10 ms per step
   Simulation sim(scene, cfg);
   const double deg = std::numbers::pi / 180;
   double bias2 = 0, noise2 = 0;
@@ -69,7 +69,7 @@ TEST(Imu, DataSheetNumbersComeOut) {
     sim.refresh(scene->sensor("imu"));
     for (int w = 0; w < cfg.num_worlds; ++w) {
       const double x = scene->sensor("imu").field("gyro").data.row<float>(w)[0];
-      EXPECT_NEAR(x * 16.4 / deg, std::round(x * 16.4 / deg), 0.01);  // whole counts
+      EXPECT_NEAR(x * 16.4 / deg, std::round(x * 16.4 / deg), 0.01);  // multiples of the resolution
       sum[w] += x;
       sum2[w] += x * x;
     }
@@ -81,13 +81,13 @@ TEST(Imu, DataSheetNumbersComeOut) {
     ++n;
   }
   EXPECT_NEAR(std::sqrt(bias2 / n) / deg, 20.0 / 3, 1.3);
-  // 0.005 deg/s/sqrt(Hz) at 100 Hz and the rounding to counts: step^2 / 12.
+  // 0.005 deg/s/sqrt(Hz) at 100 Hz, and the rounding to counts with variance step^2 / 12.
   const double expected = std::hypot(0.005 / std::sqrt(0.01), 1 / 16.4 / std::sqrt(12));
   EXPECT_NEAR(std::sqrt(noise2 / n) / deg, expected, 0.05 * expected);
 }
 
-// A new episode: its filters know nothing of the last one. Other worlds go on.
-TEST(Imu, AResetForgetsTheFiltersOfItsWorlds) {
+// In a new episode the filters contain nothing of the last one. Other worlds are not affected.
+TEST(Imu, ResetClearsTheFiltersOfItsWorldsOnly) {
   constexpr char kTop[] = R"(<mujoco><option gravity="0 0 0"/><worldbody><body><joint axis="0 0 1"/>
     <geom size=".1"/><site name="imu"/></body></worldbody></mujoco>)";
   ImuSensorCfg cfg = imu("");
@@ -98,7 +98,7 @@ TEST(Imu, AResetForgetsTheFiltersOfItsWorlds) {
   scene_cfg.entities.emplace_back("robot", EntityCfg{.model = {.xml = kTop}});
   scene_cfg.sensors.push_back(std::make_shared<ImuSensorCfg>(cfg));
   auto scene = std::make_shared<Scene>(std::move(scene_cfg));
-  Simulation sim(scene, {.num_worlds = 2, .decimation = 5});  // 10 ms
+  Simulation sim(scene, {.num_worlds = 2, .decimation = 5});  // 10 ms per step
   const auto spin = [&](int world, double speed) {
     const ArrayView v = sim.worlds().state_component("qvel");
     *reinterpret_cast<double*>(v.data + world * v.strides[0]) = speed;
@@ -118,16 +118,17 @@ TEST(Imu, AResetForgetsTheFiltersOfItsWorlds) {
   sim.reset(ids);
   sim.step(1);
   const auto fresh = gyro(0), other = gyro(1);
-  EXPECT_NEAR(fresh[2], 0, 4 * 0.3);  // the top stands still: no row of the last episode comes late
+  // The body is at rest: no row of the last episode arrives late.
+  EXPECT_NEAR(fresh[2], 0, 4 * 0.3);
   for (int k = 0; k < 3; ++k) {
     EXPECT_NE(fresh[k], zero[k]);  // another device
-    EXPECT_EQ(other[k], one[k]);   // nothing happened there
+    EXPECT_EQ(other[k], one[k]);   // world 1 was not reset
   }
   sim.step(3);
-  EXPECT_EQ(gyro(0), fresh);  // the same device within an episode
+  EXPECT_EQ(gyro(0), fresh);  // still the same device
 }
 
-// Each axis has the tolerance that its data sheet gives.
+// Each axis has the tolerance given by its data sheet.
 TEST(Imu, EveryAxisHasItsOwnTolerance) {
   ImuSensorCfg cfg = imu("");
   cfg.model.accelerometer.bias_tolerance = {0.3, 1.5, 6.0};

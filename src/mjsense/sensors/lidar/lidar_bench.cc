@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
-// Spinning lidar, 16 x 360 rays from the head of a humanoid, on one thread; mjsense, mj_multiRay
-// and mj_ray in one run, the robot in another pose before every scan; and in many worlds with a
-// step of physics between. items_per_second are rays. MJSENSE_BENCH_HUMANOID names an MJCF (a G1's)
-// to stand in for the stand-in; it needs a body at whose height rays make sense:
-// MJSENSE_BENCH_HUMANOID_BODY, default torso_link.
+// Spinning lidar, 16 x 360 rays from the head of a humanoid, on one thread. One run measures
+// mjsense, mj_multiRay and mj_ray; the robot has another pose in every scan. Other benchmarks scan
+// many worlds, with a physics step between scans. items_per_second counts rays.
+// MJSENSE_BENCH_HUMANOID names an MJCF (such as a G1's) to use instead of the built-in stand-in. It
+// needs a body that can carry the lidar: MJSENSE_BENCH_HUMANOID_BODY, default torso_link.
 
 #include <benchmark/benchmark.h>
 #include <mujoco/mujoco.h>
@@ -25,7 +25,7 @@ namespace {
 
 std::string number(double x) { return std::to_string(x) + " "; }
 
-// A knobbly ball of about 9,000 faces, for each of 43 meshes.
+// 43 meshes, each a bumpy ball of about 9,000 faces.
 std::string meshes() {
   std::string xml;
   for (int i = 0; i < 43; ++i) {
@@ -60,7 +60,7 @@ std::string stand_in() {
   return xml + "</body>";
 }
 
-// A room of 59 boxes, capsules and cylinders.
+// A room: a floor and 58 boxes, capsules and cylinders.
 std::string room() {
   Rng rng(5, 0, 0, 0);
   std::string xml = "<geom type='plane' size='0 0 .1'/>";
@@ -96,13 +96,13 @@ mjModel* load() {
 
 struct Fixture {
   mjModel* m = load();
-  mjData* d;                 // this scan's pose
-  std::vector<mjData*> all;  // of every world in turns: poses in which the joints differ too
+  mjData* d;                 // pose in this scan
+  std::vector<mjData*> all;  // one per world, at least two; their joint positions differ too
   std::unique_ptr<LidarSensor> sensor;
   std::unique_ptr<RayScene> rays;
 
   explicit Fixture(int threads = 1, int worlds = 1) {
-    // For peers in Python (bench/peers): the same scene.
+    // Saves the scene for the benchmarks of other libraries in Python (bench/peers).
     if (const char* path = std::getenv("MJSENSE_BENCH_SAVE")) mj_saveModel(m, path, nullptr, 0);
     Rng rng(6, 0, 0, 0);
     for (int i = 0; i < std::max(2, worlds); ++i) {
@@ -178,7 +178,8 @@ void lidar_mj_ray(benchmark::State& state) {
   state.SetItemsProcessed(state.iterations() * p.size());
 }
 
-// Physics between the scans, which is not timed, takes the caches.
+// There is physics between the scans. It is not timed, but it evicts the scan's data from the
+// caches.
 constexpr int kWorlds = 16;
 
 void lidar_worlds(benchmark::State& state) {

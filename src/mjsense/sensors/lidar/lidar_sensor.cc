@@ -75,7 +75,7 @@ void validate(const TableScan& t, std::string_view place) {
 void LidarSensor::read_table(const TableScan& t) {
   angles_ = t.file.empty() ? t.angles : read_npy_pairs(t.file, place());
   if (angles_.empty()) throw ValueError(place() + ": the scan's table has no rows");
-  TableScan read = t;  // numbers of a file as those of a table
+  TableScan read = t;  // values of a file are checked like those of a table
   read.file.clear();
   read.angles = angles_;
   check_fields(read, place());
@@ -104,7 +104,7 @@ RayPattern LidarSensor::spinning(const SpinningScan& s) const {
     for (int i = 0; i < s.samples; ++i) {
       const double azimuth = s.azimuth_start_deg + s.azimuth_span_deg * i / s.samples;
       pattern.directions.push_back(direction(azimuth * kRadians, elevation * kRadians));
-      // A full turn takes 1 / rate; a part of it is passed in that part of the time.
+      // A full turn takes 1 / rate, and a part of a turn takes that part of the time.
       pattern.times.push_back((i - (s.samples - 1)) * s.azimuth_span_deg /
                               (360 * s.samples * s.rate_hz));
     }
@@ -122,7 +122,7 @@ RayPattern LidarSensor::table(const TableScan& t) const {
   return pattern;
 }
 
-// The scan that was finished last: it is cast as a whole.
+// The last finished scan, which is cast as a whole.
 int LidarSensor::part(const World& world) const {
   const auto scan = static_cast<std::int64_t>(std::floor(world.time() * rate_hz_ + 1e-6));
   return static_cast<int>(scan % num_parts_);
@@ -165,14 +165,15 @@ void LidarSensor::traced(const RayScene& rays, int world, int frame, const RayBu
   }
 }
 
-// Lost and inexact returns.
+// Applies dropout, noise and rounding.
 void LidarSensor::finish(const RayScene& /*rays*/, int world, RayScratch& /*scratch*/) {
   Rng& rng = noise_[world];
   float* distance = distances_->data.row<float>(world).data();
   float* hit = hit_pos_->data.row<float>(world).data();
   float* point = points_->data.row<float>(world).data();
   for (int r = 0; r < num_rays(); ++r) {
-    // Every ray draws its numbers, hit or not: what one ray meets does not change another's noise.
+    // Every ray draws its numbers, whether it hits or not, so that its noise does not depend on the
+    // other rays.
     const bool lost = lidar_.dropout > 0 && rng.uniform() < lidar_.dropout;
     const bool noisy = lidar_.range_noise_std > 0 || lidar_.range_noise_relative > 0;
     const double draw = noisy ? rng.normal() : 0.0;

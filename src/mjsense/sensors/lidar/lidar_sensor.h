@@ -1,13 +1,13 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
-// LidarSensor: a RayCastSensor whose rays are a lidar's, with its noise, its returns' intensity and
-// its point cloud.
+// LidarSensor: a RayCastSensor with the rays of a lidar, its noise, the intensity of its returns,
+// and its point cloud.
 //
-// All fields of RayCastSensor (geom_id and its kin always), and
+// It has all fields of RayCastSensor (geom_id, body_id and material_id always), and
 //   points      float32 [B, N, 3]  m, sensor frame, as the device reports them; 0: no return
 //   intensity   float32 [B, N]     0..1: the surface's albedo times the cosine of incidence
-// Noise is in distances, points and hit_pos_w alike. Ray order: a spinning lidar's is
-// [channels, samples], row-major, the first channel first; a table's is its own.
+// The same noise is in distances, points and hit_pos_w. The ray order of a spinning lidar is
+// [channels, samples], row-major, the first channel first. A table has its own order.
 
 #include <array>
 #include <memory>
@@ -19,7 +19,7 @@
 
 namespace mjsense {
 
-// One reading is one sweep, the last firing now.
+// One reading is one sweep; the last firing is at the current time.
 struct SpinningScan {
   int channels = 16;
   double elevation_min_deg = -15.0, elevation_max_deg = 15.0;
@@ -78,7 +78,7 @@ using ScanCfg = std::variant<SpinningScan, TableScan>;
 template <>
 inline constexpr const char* kChoiceName<ScanCfg> = "LidarScanCfg";
 
-// What their fields say of each other; what a table's file holds is read by the sensor.
+// Check fields that depend on each other. Throw ValueError. The sensor itself reads a table's file.
 void validate(const SpinningScan& scan, std::string_view place);
 void validate(const TableScan& scan, std::string_view place);
 
@@ -144,12 +144,13 @@ class LidarSensor : public RayCastSensor {
   void origin(int world, int r, float out[3]) const;  // of ray r, m, world
 
   LidarSensorCfg lidar_;
-  std::vector<std::array<double, 2>> angles_;  // of a table
+  std::vector<std::array<double, 2>> angles_;  // of a table scan
   int num_parts_ = 1;
-  bool disturbed_;  // by noise, rounding or loss
+  bool disturbed_;  // there is noise, rounding or dropout
   double rate_hz_;
   std::vector<Rng> noise_;  // [B]
-  Array origins_;  // [B, N, 3] m, world: of rays that noise moves and that left at different times
+  // [B, N, 3] m, world: origins of the rays, if there is noise and rays start at different times.
+  Array origins_;
   Field *points_ = nullptr, *intensity_ = nullptr;
 };
 

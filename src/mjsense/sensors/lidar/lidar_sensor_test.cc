@@ -25,7 +25,7 @@ using ::testing::Each;
 using ::testing::FloatNear;
 using ::testing::HasSubstr;
 
-// Inside a ball of radius 5 m and grey 0.5, a puck that slides along x without friction.
+// A puck that slides along x without friction, inside a ball of radius 5 m and grey 0.5.
 constexpr char kRoom[] = R"(
 <mujoco><option gravity="0 0 0"/><worldbody>
   <geom name="room" type="sphere" size="5" rgba=".5 .5 .5 1" contype="0" conaffinity="0"/>
@@ -65,7 +65,7 @@ struct Lab {
   }
 };
 
-TEST(Lidar, RoundRoomIsAsFarEverywhere) {
+TEST(Lidar, RoundRoomIsEquallyFarEverywhere) {
   Lab lab;
   lab.start();
   EXPECT_THAT(lab.read("distances"), Each(FloatNear(5, 1e-5f)));
@@ -80,7 +80,7 @@ TEST(Lidar, RoundRoomIsAsFarEverywhere) {
 
 //   [red, own colour]   lidar at the origin   [material over own colour]
 // Intensity is the mean of red, green and blue times the cosine of incidence.
-TEST(Lidar, IntensityIsTheColourOfWhatReturned) {
+TEST(Lidar, IntensityIsAlbedoTimesCosine) {
   Lab lab;
   constexpr char kWalls[] =
       R"(<mujoco><asset><material name="m" rgba=".2 .4 .9 1"/></asset><worldbody>
@@ -99,23 +99,23 @@ TEST(Lidar, IntensityIsTheColourOfWhatReturned) {
                            points = lab.read("points");
   const double h = std::sqrt(0.5);
   const double material = (.2 + .4 + .9) / 3, own = (.9 + .1 + .2) / 3;
-  // Rays at 0, 45, 90 ... 315 degrees; those at 90 and 270 meet nothing.
+  // Rays at 0, 45, 90 ... 315 degrees; those at 90 and 270 hit nothing.
   const double expected[8] = {material, material * h, 0, own * h, own, own * h, 0, material * h};
   for (int i = 0; i < 8; ++i) EXPECT_NEAR(intensity[i], expected[i], 1e-6) << i;
   for (int i : {2, 6}) {
     EXPECT_EQ(distance[i], -1);
-    for (int k = 0; k < 3; ++k) EXPECT_EQ(points[3 * i + k], 0) << i;  // no point at the range
+    for (int k = 0; k < 3; ++k) EXPECT_EQ(points[3 * i + k], 0) << i;  // no point at max_distance
   }
   EXPECT_NEAR(points[0], 3, 1e-6);
   EXPECT_NEAR(points[3 * 4], -2, 1e-6);
 }
 
-// What noise carries beyond the range, or below the least distance, did not return.
+// A return that noise moves above max_distance or below min_distance is lost.
 TEST(Lidar, NoiseLeavesNoReturnBeyondTheRange) {
   Lab lab;
   lab.cfg->range_noise_std = 0.05;
   lab.cfg->min_distance = 0.5;
-  lab.cfg->max_distance = 5.02;  // the room: 5 m
+  lab.cfg->max_distance = 5.02;  // the room is at 5 m
   lab.start();
   lab.sim->step();
   const std::vector<float> d = lab.read("distances"), p = lab.read("points"),
@@ -134,14 +134,14 @@ TEST(Lidar, NoiseLeavesNoReturnBeyondTheRange) {
     EXPECT_EQ(d[i], -1);
     EXPECT_EQ(length, 0);
     EXPECT_EQ(intensity[i], 0);
-    EXPECT_EQ(hit[3 * i], 0);  // its origin
+    EXPECT_EQ(hit[3 * i], 0);  // the ray's origin
   }
   // P(noise > 0.02 m) = P(z > 0.4) = 0.345
   const double n = static_cast<double>(d.size());
   EXPECT_NEAR(lost / n, 0.345, 4 * std::sqrt(0.345 * 0.655 / n));
 }
 
-TEST(Lidar, ElevationsAreThoseGiven) {
+TEST(Lidar, UsesTheGivenElevations) {
   Lab lab;
   lab.cfg->scan = SpinningScan{.channels = 3, .elevations_deg = {-40, 3, 60}, .samples = 1};
   lab.start();
@@ -152,7 +152,7 @@ TEST(Lidar, ElevationsAreThoseGiven) {
   }
 }
 
-TEST(Lidar, StandingInTheWorldItSeesTheWorld) {
+TEST(Lidar, FrameOnTheWorldBodySeesTheWorld) {
   Lab lab;
   lab.cfg->frame = {{"body", "world", ""}};
   lab.start();
@@ -163,7 +163,7 @@ TEST(Lidar, NoiseHasItsDeviationAndDependsOnTheSeedOnly) {
   const auto run = [](int threads, int worlds, std::uint64_t seed) {
     Lab lab;
     lab.cfg->range_noise_std = 0.03;
-    lab.cfg->range_noise_relative = 0.008;  // 0.04 m at 5 m: 0.05 m together
+    lab.cfg->range_noise_relative = 0.008;  // 0.04 m at 5 m: 0.05 m in total
     lab.cfg->dropout = 0.1;
     lab.start({.num_worlds = worlds, .threads = threads, .seed = seed});
     lab.sim->step(2);
@@ -191,8 +191,8 @@ TEST(Lidar, MotionDistortsTheSweep) {
   Lab lab;
   lab.cfg->include_geom_groups = {{1}};  // the wall at x = 4
   lab.cfg->motion_distortion = true;
-  // One laser that looks along +x all the time: azimuth span of nearly nothing would pass in no
-  // time, so a table it is.
+  // One laser that always points along +x. In a spinning scan an azimuth span of nearly 0 would
+  // take no time, so this is a table.
   lab.cfg->scan =
       TableScan{.angles = std::vector<std::array<double, 2>>(101, {0.0, 0.0}), .rate_hz = 10};
   lab.start();
@@ -230,7 +230,7 @@ TEST(Lidar, NoiseMovesDistortedReturnsAlongTheirOwnRays) {
     }
 }
 
-TEST(Lidar, BeforeTheFirstMomentTheFrameStoodStill) {
+TEST(Lidar, BeforeTheFirstPoseTheFrameIsAtRest) {
   Lab lab;
   lab.cfg->include_geom_groups = {{1}};
   lab.cfg->motion_distortion = true;
@@ -242,8 +242,8 @@ TEST(Lidar, BeforeTheFirstMomentTheFrameStoodStill) {
   EXPECT_NEAR(d[2 * 90 + 45], -1, 0);
 }
 
-// Put elsewhere as a new episode begins, it did not fly there during the sweep.
-TEST(Lidar, AResetForgetsWhereTheFrameWas) {
+// A frame that is moved when an episode begins was not moving during the sweep before.
+TEST(Lidar, ResetClearsThePoseHistory) {
   Lab lab;
   lab.cfg->include_geom_groups = {{1}};  // the wall at x = 4
   lab.cfg->motion_distortion = true;
@@ -253,7 +253,7 @@ TEST(Lidar, AResetForgetsWhereTheFrameWas) {
   for (int i = 0; i < 100; ++i) lab.sim->step();
   EXPECT_THAT(lab.read("distances"), Each(FloatNear(4, 1e-4f)));
   lab.set("qpos", 0, 1.0);
-  lab.sim->reset_sensors();  // time goes on
+  lab.sim->reset_sensors();  // the time is not reset
   EXPECT_THAT(lab.read("distances"), Each(FloatNear(3, 1e-4f)));
 }
 
@@ -262,7 +262,7 @@ TEST(Lidar, TableAdvancesWithEveryScan) {
   std::vector<std::array<double, 2>> angles;
   for (int i = 0; i < 30; ++i) angles.push_back({0.01 * i, 0.0});
   lab.cfg->scan = TableScan{.angles = angles, .rays_per_scan = 10, .rate_hz = 100};
-  lab.start({.decimation = 5});  // 0.01 s a step: a scan a step
+  lab.start({.decimation = 5});  // 0.01 s per step: one scan per step
   for (int step = 0; step < 5; ++step) {
     const std::vector<float> p = lab.read("points");
     EXPECT_NEAR(std::atan2(p[1], p[0]), 0.1 * (step % 3), 1e-5) << step;
@@ -270,7 +270,7 @@ TEST(Lidar, TableAdvancesWithEveryScan) {
   }
 }
 
-TEST(Lidar, ErrorsSayWhatIsWrong) {
+TEST(Lidar, ErrorsNameTheSetting) {
   const auto with = [](auto change) -> std::string {
     Lab lab;
     change(*lab.cfg);
@@ -331,7 +331,7 @@ TEST(Npy, ReadsFloatPairsAndRefusesOthers) {
   EXPECT_THROW(read_npy_pairs(path, "here"), RuntimeError);
   write("{'descr': '<f4', 'fortran_order': False, 'shape': (2, 3), }", {1, 2, 3, 4, 5, 6});
   EXPECT_THROW(read_npy_pairs(path, "here"), RuntimeError);
-  // Headers that claim more than any memory holds, and one that ends where a value begins.
+  // Headers that claim more than fits into memory, and one that ends where a value should begin.
   for (const char* rows : {"400000000000", "4611686018427387904", "9223372036854775807"}) {
     write(fmt::format("{{'descr': '<f8', 'fortran_order': False, 'shape': ({}, 2), }}", rows), {});
     EXPECT_THROW(read_npy_pairs(path, "here"), RuntimeError) << rows;
@@ -340,7 +340,7 @@ TEST(Npy, ReadsFloatPairsAndRefusesOthers) {
   EXPECT_THROW(read_npy_pairs(path, "here"), RuntimeError);
 }
 
-TEST(PointCloud, LeavesOutWhatDidNotReturn) {
+TEST(PointCloud, OmitsPointsWithoutAReturn) {
   const testing::TempDir dir;
   const std::string path = dir.file("cloud.ply");
   const float points[] = {1, 2, 3, 0, 0, 0, 4, 5, 6}, intensity[] = {0.5f, 0, 1},

@@ -18,7 +18,7 @@ namespace {
 
 constexpr long kMostRows = 10'000'000;
 
-// What is read, and for whom.
+// The file, and the place for messages.
 struct Source {
   const std::string& path;
   std::string_view place;
@@ -28,7 +28,7 @@ struct Source {
   throw RuntimeError(fmt::format("{}: scan table '{}': {}", source.place, source.path, what));
 }
 
-// The text after 'key': in the header's Python dict, up to the next comma at this level.
+// The text after 'key': in the header's Python dict, up to the next comma at the same level.
 std::string_view entry(std::string_view header, std::string_view key, const Source& source) {
   const std::size_t at = header.find(fmt::format("'{}':", key));
   if (at == std::string_view::npos) fail(source, fmt::format("its header has no '{}'", key));
@@ -43,7 +43,7 @@ std::vector<std::array<double, 2>> read_npy_pairs(const std::string& path, std::
   const Source source{path, place};
   std::error_code ignored;
   const auto status = std::filesystem::status(path, ignored);
-  // Who opens a pipe waits for its writer.
+  // Opening a pipe would block until there is a writer.
   if (std::filesystem::exists(status) && !std::filesystem::is_regular_file(status))
     fail(source, "is no file");
   std::ifstream in(path, std::ios::binary);
@@ -70,7 +70,7 @@ std::vector<std::array<double, 2>> read_npy_pairs(const std::string& path, std::
     fail(source, fmt::format("holds {:.40} of shape {:.40}, fortran_order {:.40}: expected '<f4' "
                              "or '<f8' of shape (M, 2) in C order",
                              printable(type), printable(shape), printable(order)));
-  // What the header claims is no reason to take memory: what is there is.
+  // Memory is allocated for the bytes in the file, not for those that the header claims.
   const std::streamoff begin = in.tellg();
   const std::streamoff end = in.seekg(0, std::ios::end).tellg();
   const std::size_t row_bytes = single ? 8 : 16;

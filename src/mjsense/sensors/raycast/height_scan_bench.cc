@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 // Height scan: 187 rays (1.6 x 1 m, 0.1 m apart) under the trunk of a quadruped, 64 worlds, on one
-// thread; mjsense and mj_ray in one run. Before every scan the robot has another pose, its joints
-// too. items_per_second are rays. MJSENSE_BENCH_QUADRUPED names an MJCF (a Go1's) to stand in for
-// the stick figure.
+// thread; mjsense and mj_ray in one run. The robot has another pose in every scan, with other joint
+// positions. items_per_second counts rays. MJSENSE_BENCH_QUADRUPED names an MJCF (such as a Go1's)
+// to use instead of the stick figure.
 
 #include <benchmark/benchmark.h>
 #include <mujoco/mujoco.h>
@@ -20,11 +20,11 @@ namespace mjsense {
 namespace {
 
 constexpr int kWorlds = 64;
-constexpr int kPoses = 2;  // of every world, in turns
+constexpr int kPoses = 2;  // of every world, in turn
 
 std::string number(double x) { return std::to_string(x) + " "; }
 
-// 128 x 128 points of rolling ground, 12.8 x 12.8 m.
+// 128 x 128 points of hilly ground, 12.8 x 12.8 m.
 std::string height_field() {
   std::string points;
   for (int r = 0; r < 128; ++r)
@@ -35,7 +35,7 @@ std::string height_field() {
          "'/>";
 }
 
-// 93 boxes of different heights, and a plate under them.
+// 93 boxes of different heights on a plate.
 std::string boxes() {
   Rng rng(3, 0, 0, 0);
   std::string geoms = "<geom type='box' size='8 8 .1' pos='0 0 -.1'/>";
@@ -77,7 +77,7 @@ mjModel* load(bool field) {
   }
   mjModel* m = mj_compile(spec, nullptr);
   if (m == nullptr) std::fprintf(stderr, "%s\n", mjs_getError(spec));
-  // For peers in Python (bench/peers): the same scene.
+  // Saves the scene for the benchmarks of other libraries in Python (bench/peers).
   if (const char* path = std::getenv("MJSENSE_BENCH_SAVE")) mj_saveModel(m, path, nullptr, 0);
   return m;
 }
@@ -119,7 +119,7 @@ struct Fixture {
     for (mjData* x : d) mj_deleteData(x);
     mj_deleteModel(m);
   }
-  // Its pose in this scan.
+  // A world with its pose in this scan.
   World world(int w, int scan) {
     World world;
     world.id = w;
@@ -165,7 +165,8 @@ void height_scan_mj_ray(benchmark::State& state, bool field) {
   state.SetItemsProcessed(state.iterations() * pattern.size());
 }
 
-// What a robot that moves, or one that stands still, costs rays before the first is cast.
+// Cost of updating the ray scene before the first ray is cast, for a robot that moves and for one
+// that does not.
 void top_level(benchmark::State& state, bool moving) {
   Fixture f(false);
   int w = 0, scan = 0;

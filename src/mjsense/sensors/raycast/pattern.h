@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
-// Ray patterns: where a sensor's rays start and where they point, in the sensor's frame.
+// Ray patterns: start points and directions of a sensor's rays, in the sensor's frame.
 
 #include <mujoco/mujoco.h>
 
@@ -14,16 +14,16 @@
 
 namespace mjsense {
 
-// N rays; offsets in m, directions of length 1.
+// N rays; offsets in m, unit directions.
 struct RayPattern {
   std::vector<std::array<double, 3>> offsets;     // [N]
   std::vector<std::array<double, 3>> directions;  // [N]
-  std::vector<double> times;  // [N] s, when the ray is cast: 0 now, < 0 before; empty: all now
+  std::vector<double> times;  // [N] s, time of the ray: 0 now, < 0 before; empty: all now
   std::size_t size() const { return directions.size(); }
 };
 
-// Along each axis at -size/2 + k * resolution: both ends where resolution divides size, else it
-// stops short. x varies fastest. Size 0 is one ray.
+// Points along each axis are at -size/2 + k * resolution. They reach both ends if resolution
+// divides size; otherwise they stop before the upper end. x varies fastest. Size 0 gives one ray.
 struct GridPattern {
   bool operator==(const GridPattern&) const = default;
   std::array<double, 2> size{1.0, 1.0};
@@ -47,7 +47,7 @@ struct PinholePattern {
   double fovy = 45.0;
   std::string camera;
 
-  // K row-major, 3x3: fovy = 2 atan(height / (2 fy)); fx, cx and cy play no part.
+  // K row-major, 3x3: fovy = 2 atan(height / (2 fy)); fx, cx and cy are not used.
   static PinholePattern from_intrinsic_matrix(const std::array<double, 9>& k, int width,
                                               int height);
   static PinholePattern from_mujoco_camera(std::string camera_name);
@@ -67,7 +67,7 @@ void visit_fields(V& v, PinholePattern& c) {
       .or_none();
 }
 
-// The centre first, then ring after ring, counter-clockwise from +x.
+// The centre first, then the rings in order, each counter-clockwise from +x.
 struct RingPattern {
   bool operator==(const RingPattern&) const = default;
   struct Ring {
@@ -121,18 +121,18 @@ using PatternCfg = std::variant<GridPattern, PinholePattern, RingPattern, UserPa
 template <>
 inline constexpr const char* kChoiceName<PatternCfg> = "RayPatternCfg";
 
-// Throws ValueError for more rays than a sensor may have.
+// Throws ValueError if there are more rays than a sensor may have.
 void check_ray_count(double rays, std::string_view place);
 
-// What their fields say of each other: that they give rays, and not too many. `place` starts every
-// message: "sensor 'scan'".
+// Check fields that depend on each other: there must be rays, and not too many. Throw ValueError;
+// `place` starts every message: "sensor 'scan'".
 void validate(const GridPattern& grid, std::string_view place);
 void validate(const PinholePattern& pinhole, std::string_view place);
 void validate(const RingPattern& rings, std::string_view place);
 void validate(const UserPattern& user, std::string_view place);
 
-// ValueError for what check_fields() refuses, KeyError for an unknown camera. `model` may be null
-// unless a pattern names a camera.
+// Throws ValueError for errors found by check_fields(), and KeyError for an unknown camera. `model`
+// may be null unless the pattern names a camera.
 RayPattern make_pattern(const PatternCfg& cfg, const mjModel* model, std::string_view place);
 
 }  // namespace mjsense

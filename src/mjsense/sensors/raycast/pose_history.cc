@@ -19,7 +19,7 @@ const PoseHistory::Moment& PoseHistory::back(int frame, int age) const {
 }
 
 void PoseHistory::push(int frame, double time, const FramePose& pose) {
-  // Moments grow; an older or equal time means that the newest moment is being looked at again.
+  // Times increase. A time that is equal or earlier means that the newest pose is measured again.
   while (used_[frame] > 0 && back(frame, 0).time >= time) {
     newest_[frame] = (newest_[frame] + capacity_ - 1) % capacity_;
     --used_[frame];

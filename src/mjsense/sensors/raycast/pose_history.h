@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
-// Where frames were during the last moments: for rays that are cast at different times of one
-// reading (a lidar's sweep).
+// Poses of frames at the last times, for rays that are cast at different times of one reading (a
+// lidar's sweep).
 
 #include <vector>
 
@@ -13,15 +13,15 @@ namespace mjsense {
 class PoseHistory {
  public:
   PoseHistory() = default;
-  // Keeps `capacity` moments of each of `count` frames.
+  // Keeps `capacity` poses of each of `count` frames.
   PoseHistory(int count, int capacity);
 
   bool empty() const { return capacity_ == 0; }
   void clear(int frame);
-  // A pose at `time` (s); one at the time of the newest replaces it.
+  // Adds the pose at `time` (s). It replaces poses at the same time or later.
   void push(int frame, double time, const FramePose& pose);
-  // Interpolated (the turn along the shortest arc); before the first or after the last moment
-  // known, that one.
+  // Interpolated pose, with the rotation along the shortest arc. Before the first and after the
+  // last known time it is the first or the last pose.
   Pose at(int frame, double time) const;
 
  private:

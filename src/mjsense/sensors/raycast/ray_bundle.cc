@@ -9,7 +9,8 @@
 namespace mjsense {
 namespace {
 
-// Start and a point at `depth` of each ray: what is close in these six numbers travels together.
+// Start of each ray and its point at `depth`. Rays that are close in these six numbers are put into
+// the same packet.
 using Key = std::array<double, 6>;
 
 void split(std::span<int> rays, std::span<const Key> keys) {
@@ -59,7 +60,8 @@ RayBundle::RayBundle(const RayPattern& pattern, int first, int count, double dep
     find_runs(p);
     for (int i = 0; i < kPacket; ++i) {
       const int ray = order_[p * kPacket + i];
-      const int source = ray >= 0 ? ray : order_[p * kPacket];  // idle lanes repeat a neighbour
+      // Lanes without a ray repeat the first lane.
+      const int source = ray >= 0 ? ray : order_[p * kPacket];
       packets_[p].active[i] = ray >= 0 ? 1.0f : -1.0f;
       for (int k = 0; k < 3; ++k) {
         packets_[p].o[k][i] = static_cast<float>(pattern.offsets[first + source][k]);
@@ -75,7 +77,7 @@ void RayBundle::find_runs(int p) {
     end = begin + 1;
     while (end < kPacket && ray[end] == ray[begin] + end - begin) ++end;
     const int count = std::min(4, end - begin);
-    // The last one begins early enough to be as long as the others.
+    // The last part overlaps the one before, so that it is as long as the others.
     for (int i = begin; i < end; i += count) {
       const int lane = std::min(i, end - count);
       runs_.push_back(

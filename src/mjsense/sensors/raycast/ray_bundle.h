@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
-// A pattern's rays sorted into packets of 16 neighbours, once. Coherent packets are what makes
-// casting fast: all rays of one meet the same few geoms.
+// A pattern's rays, sorted once into packets of 16 neighbours. Packets must be coherent for casting
+// to be fast: all rays of a packet hit the same few geoms.
 
 #include <cstdint>
 #include <cstring>
@@ -13,7 +13,7 @@
 
 namespace mjsense {
 
-// A constant number of numbers, in one piece.
+// Copies `count` values in one piece; the count is a compile-time constant.
 template <int count, class T>
 void copy_some(const T* from, T* to) {
   std::memcpy(to, from, count * sizeof(T));
@@ -22,17 +22,17 @@ void copy_some(const T* from, T* to) {
 class RayBundle {
  public:
   RayBundle() = default;
-  // Rays [first, first + count) of the pattern, numbered from 0 here. They are neighbours if they
-  // are close at `depth` metres.
+  // Rays [first, first + count) of the pattern, numbered from 0 here. Rays are neighbours if they
+  // are close to each other at a distance of `depth` m.
   RayBundle(const RayPattern& pattern, int first, int count, double depth = 3.0);
 
   int num_rays() const { return num_rays_; }
   int num_packets() const { return static_cast<int>(packets_.size()); }
   const LocalPacket& packet(int p) const { return packets_[p]; }
-  // Ray index of each lane of packet p, -1 for lanes without a ray.
+  // Ray index of each lane of packet p; -1 for lanes without a ray.
   const int* rays(int p) const { return &order_[p * kPacket]; }
-  // put(n, lane, ray) for all rays of packet p: lanes lane .. lane + n - 1 are rays ray .. ray + n - 1;
-  // n is a constant, 1 to 4. A ray may come twice.
+  // Calls put(n, lane, ray) until all rays of packet p are covered: lanes lane .. lane + n - 1 are
+  // rays ray .. ray + n - 1. n is a compile-time constant, 1 to 4. A ray may be covered twice.
   template <class Put>
   void each_run(int p, const Put& put) const {
     for (int i = first_run_[p]; i < first_run_[p + 1]; ++i) {

@@ -13,28 +13,28 @@ namespace mjsense {
 class Scene;
 
 enum class RayAlignment {
-  kBase,   // rays turn with the frame
-  kYaw,    // with its heading only
-  kWorld,  // not at all
+  kBase,   // rays rotate with the frame
+  kYaw,    // rays rotate with the frame's heading only
+  kWorld,  // rays do not rotate
 };
 
 template <>
 inline constexpr std::array<std::string_view, 3> kWords<RayAlignment>{"base", "yaw", "world"};
 
-// Pose of a frame F and the rotation that its rays get.
+// Pose of a frame F, and the rotation of its rays.
 struct FramePose {
   double pos[3];   // m, p_WF
   double mat[9];   // row-major R_WF
   float align[9];  // row-major A: origin = pos + A offset, direction = A direction
 };
 
-// Throws ValueError unless `ref` is of a type that may carry rays, and has a name.
+// Throws ValueError unless `ref` has a name and a type that can carry rays.
 void validate_frame(const ObjRef& ref, std::string_view place);
 
 class RayFrame {
  public:
-  // `ref` may name a body, xbody (both the body's own frame, not its inertial one), site, geom or
-  // camera.
+  // `ref` may name a body or xbody (both are the body's own frame, not its inertial one), a site, a
+  // geom or a camera.
   RayFrame(const mjModel* model, const Scene* scene, const ObjRef& ref, std::string_view place);
 
   int body() const { return body_; }
@@ -46,9 +46,9 @@ class RayFrame {
   int body_;
 };
 
-// R for base, identity for world; for yaw the rotation about z that takes x to R's x axis in the xy
-// plane (where that is too short, its y axis decides), so that a body on its back keeps rays that
-// point down.
+// R for base, identity for world. For yaw it is the rotation about z that takes x to the direction
+// of R's x axis in the xy plane; if that is too short, R's y axis is used. The rays of a body on
+// its back therefore still point down.
 void align_rays(RayAlignment alignment, const double mat[9], float out[9]);
 
 }  // namespace mjsense

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
-// What ray sensors, lidars and terrain height sensors return.
+// Declares the fields of ray sensors, lidars and terrain height sensors.
 
 #include "mjsense/core/data_class.h"
 

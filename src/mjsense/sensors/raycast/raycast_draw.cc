@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// What a ray sensor shows of itself.
+// Debug drawing of a ray sensor.
 
 #include <fmt/format.h>
 
@@ -9,7 +9,8 @@
 
 namespace mjsense {
 
-// A ball at each hit and, as cfg().viz asks, an arrow along each ray and the surface's normal.
+// A sphere at each hit; if cfg().viz enables them, arrows along each ray and along the surface
+// normal.
 void RayCastSensor::draw(const World& world, DebugShapes& shapes) {
   const RayCastVizCfg& viz = cfg_.viz;
   const double unit = shapes.meansize(), width = viz.ray_width * unit;

@@ -15,12 +15,13 @@
 namespace mjsense {
 namespace {
 
-// Packets that one thread takes at a time.
+// Number of packets that a thread takes at a time.
 constexpr int kChunk = 12;
-constexpr int kMostMoments = 100'000;  // of a frame's past
+constexpr int kMostMoments = 100'000;  // maximum number of stored poses of a frame
 constexpr double kInf = std::numeric_limits<double>::infinity();
 
-// Of the two quaternions of a rotation the one whose largest component is positive, as mjlab's.
+// Of the two quaternions of a rotation, takes the one whose largest component is positive, as mjlab
+// does.
 void make_largest_positive(double q[4]) {
   const double largest =
       *std::max_element(q, q + 4, [](double a, double b) { return std::abs(a) < std::abs(b); });
@@ -161,8 +162,8 @@ void RayCastSensor::cast(const CastContext& context) {
   const int packets = bundles_.front().num_packets(), chunks = (packets + kChunk - 1) / kChunk;
   const int per_world = chunks * num_frames();
   const int worlds = static_cast<int>(context.ids.size());
-  // A thread takes whole worlds where there are enough of them: parts of one on two threads fetch
-  // its geoms into both caches.
+  // If there are enough worlds, a thread takes whole worlds: two threads with parts of one world
+  // would both load its geoms into their caches.
   const int parts_of_item = worlds >= 4 * context.pool.size() ? per_world : 1;
   context.pool.run_near(worlds * per_world / parts_of_item, [&](int item, int thread) {
     for (int k = 0; k < parts_of_item; ++k) {
@@ -199,7 +200,7 @@ void RayCastSensor::place_timed(int world, int frame, int packet, float reach,
   const RayBundle& bundle = bundles_[parts_[world]];
   const LocalPacket& local = bundle.packet(packet);
   const double* times = pattern_.times.data() + parts_[world] * num_rays_per_frame();
-  double last = 1.0;  // no ray's time
+  double last = 1.0;  // not the time of any ray
   float shift[3] = {}, align[9] = {};
   for (int i = 0; i < kPacket; ++i) {
     const int r = bundle.rays(packet)[i];
@@ -239,7 +240,7 @@ RayCastSensor::WorldRay RayCastSensor::world_ray(int world, int r) const {
 void RayCastSensor::place(const RayScene& rays, int world, int frame, int p, RayPacket& out) const {
   const FramePose& pose = frame_pose(world, frame);
   std::copy_n(pose.pos, 3, out.origin);
-  // Rounding makes no miss of a hit at max_distance.
+  // The tolerance avoids that rounding turns a hit at max_distance into a miss.
   const float reach = static_cast<float>(cfg_.max_distance) * (1 + 4e-7f);
   if (history_.empty())
     rays.place(bundles_[parts_[world]].packet(p), pose.align, reach, out);

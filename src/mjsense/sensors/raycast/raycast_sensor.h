@@ -1,13 +1,14 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
-// RayCastSensor: distances, hit points and normals of rays that travel with one or more frames.
+// RayCastSensor: distances, hit points and normals of rays that are attached to one or more frames.
 //
-// B worlds, F frames, n rays a frame, N = F * n rays (frame-major: ray f * n + i). Fields:
+// B worlds, F frames, n rays per frame, N = F * n rays (frame-major: ray f * n + i). Fields:
 //   distances     float32 [B, N]     m along the ray; -1: nothing in [min_distance, max_distance]
-//   hit_pos_w     float32 [B, N, 3]  m, world; the ray's origin where it hits nothing
+//   hit_pos_w     float32 [B, N, 3]  m, world; the ray's origin if it hits nothing
 //   normals_w     float32 [B, N, 3]  unit, world: outward, or by the triangle's winding; 0: no hit
 //   frame_pos_w   float32 [B, F, 3]  m, world
-//   frame_quat_w  float32 [B, F, 4]  wxyz, the frame's own (not of the alignment), largest one > 0
+//   frame_quat_w  float32 [B, F, 4]  wxyz, of the frame itself (not of the alignment); the largest
+//                                    component is positive
 //   pos_w         float32 [B, 3]     m, world, of frame 0
 //   quat_w        float32 [B, 4]     wxyz, of frame 0
 // and with hit_ids
@@ -68,7 +69,7 @@ struct RayCastSensorCfg : SensorCfg {
   bool debug_vis = false;
   RayCastVizCfg viz;
 
-  // Beyond mjlab's.
+  // Beyond mjlab.
   double min_distance = 0.0;
   bool hit_ids = true;
   bool any_frame = false;
@@ -129,49 +130,51 @@ class RayCastSensor : public Sensor {
   int num_frames() const { return static_cast<int>(frames_.size()); }
   int num_rays_per_frame() const { return bundles_.front().num_rays(); }
   int num_rays() const { return num_frames() * num_rays_per_frame(); }
-  // Local rays of one frame, [n]; of a sensor that casts a different part of its pattern each time,
-  // all of them.
+  // Local rays of one frame, [n]; all of them if the sensor casts its pattern in parts.
   const RayPattern& pattern() const { return pattern_; }
-  // Ray r of a world as it is now, for drawing (rays with times of their own: as if cast now).
+  // Ray r of a world in its current state, for drawing. Rays with different times are treated as if
+  // they were cast now.
   struct WorldRay {
     std::array<double, 3> origin, direction;  // m, world; unit
   };
   WorldRay world_ray(int world, int r) const;
-  // As the last compute() left it: the frame's pose and the alignment of its rays.
+  // The frame's pose and the alignment of its rays, as of the last compute().
   const FramePose& frame_pose(int world, int frame) const {
     return poses_[world * num_frames() + frame];
   }
 
  protected:
-  // A pattern may be cast in parts of equal size, one after the other; part() says whose turn it
-  // is.
+  // A pattern may be cast in parts of equal size, one after the other; part() is the index of the
+  // one to cast.
   virtual int num_parts() const { return 1; }
   virtual int part(const World& /*world*/) const { return 0; }
-  // The rays of one frame, for the pattern given.
+  // The rays of one frame, for the configured pattern.
   virtual RayPattern build_pattern(const mjModel* model) const;
-  // One packet of this world and frame is traced: lane i is ray bundle.rays(p)[i] of the frame, or
-  // none if that is < 0. Lanes whose hit does not count have geom -1. Runs on any thread.
+  // Called when one packet of this world and frame has been traced. Lane i is ray bundle.rays(p)[i]
+  // of the frame, or no ray if that is < 0. Lanes whose hit does not count have geom -1. Runs on
+  // any thread.
   virtual void traced(const RayScene& rays, int world, int frame, const RayBundle& bundle, int p,
                       const RayPacket& packet, const HitPacket& hits);
-  // After all rays of a world are traced; worlds in parallel, each on one thread.
+  // Called when all rays of a world have been traced. Worlds run in parallel, each on one thread.
   virtual void finish(const RayScene& rays, int world, RayScratch& scratch);
   virtual bool wants_finish() const { return false; }
   std::string place() const;
   Field& add(std::string_view name, Shape shape, std::string frame, double low, double high,
              int num_worlds);
-  // Makes ray r of this world one that hits nothing. hit_pos_w is the caller's.
+  // Makes ray r of this world a miss. The caller sets hit_pos_w.
   void forget(int world, int r);
-  // What rays of this frame see.
+  // The geoms that rays of this frame can hit.
   RayFilter filter(int frame) const;
 
   RayCastSensorCfg cfg_;
-  bool exclude_world_ = true;  // exclude_parent_body also where the frame's body is the world
+  // True if exclude_parent_body also applies to a frame on the world body.
+  bool exclude_world_ = true;
   Field *distances_ = nullptr, *hit_pos_ = nullptr, *normals_ = nullptr, *frame_pos_ = nullptr,
         *frame_quat_ = nullptr, *pos_ = nullptr, *quat_ = nullptr, *geom_id_ = nullptr,
         *body_id_ = nullptr, *material_id_ = nullptr;
 
  private:
-  // Where a frame's rays stand; ids may be null.
+  // Outputs of a frame's rays; ids may be null.
   struct Outputs {
     float *distances, *hit_pos, *normals;
     int *geoms, *bodies, *materials;
@@ -180,7 +183,7 @@ class RayCastSensor : public Sensor {
   static void write(const RayBundle& bundle, int p, const HitPacket& hits, const HitRows& rows,
                     const Outputs& out);
   void remember(const World& world);
-  // As RayScene::place(), each ray with the frame's pose at its own time.
+  // Like RayScene::place(), but each ray has the frame's pose at its own time.
   void place(const RayScene& rays, int world, int frame, int p, RayPacket& out) const;
   void place_timed(int world, int frame, int p, float reach, RayPacket& out) const;
   void trace_packets(const RayScene& rays, int world, int frame, int begin, int end,
@@ -188,13 +191,14 @@ class RayCastSensor : public Sensor {
   RayAlignment alignment_ = RayAlignment::kBase;
   RayFilter filter_;
   RayPattern pattern_;
-  std::vector<RayBundle> bundles_;  // one a part
-  std::vector<int> parts_;          // [B] the part to cast now
-  std::vector<double> moments_;     // [B] s, time of the world at the last compute()
-  PoseHistory history_;             // of frames [B, F]; empty unless rays have times of their own
+  std::vector<RayBundle> bundles_;  // one per part
+  std::vector<int> parts_;          // [B] part to cast now
+  std::vector<double> moments_;     // [B] s, time of the last compute()
+  // Of frames [B, F]; empty unless rays have different times.
+  PoseHistory history_;
   std::vector<RayFrame> frames_;
   std::vector<FramePose> poses_;     // [B, F]
-  std::vector<RayScratch> scratch_;  // one a thread
+  std::vector<RayScratch> scratch_;  // one per thread
 };
 
 }  // namespace mjsense

@@ -22,8 +22,8 @@ using ::testing::FloatNear;
 using ::testing::HasSubstr;
 using ::testing::Pointwise;
 
-// A floor, a step 0.5 m high for x > 0.5, and a floating base with a child body under it and geoms
-// in other groups.
+// A floor, a step 0.5 m high for x > 0.5, a floating base with a child body below it, and geoms in
+// other groups.
 constexpr char kRobot[] = R"(
 <mujoco>
   <asset><material name="rock" rgba=".5 .5 .5 1"/><material name="glass" rgba="1 1 1 0"/></asset>
@@ -43,7 +43,7 @@ constexpr char kRobot[] = R"(
   </worldbody>
 </mujoco>)";
 
-constexpr double kOnItsSide = 0.70710678118654752;  // w and x of a quarter turn about x
+constexpr double kOnItsSide = 0.70710678118654752;  // w and x of a rotation by 90 degrees about x
 
 template <class Cfg>
 std::shared_ptr<Cfg> sensor_cfg(std::string name = "ray") {
@@ -72,7 +72,7 @@ struct Lab {
     const auto all = sensor.field(field).data.all<T>();
     return {all.begin(), all.end()};
   }
-  // Position and wxyz of the base.
+  // Sets the position and the quaternion (wxyz) of the base.
   void pose(std::initializer_list<double> qpos, int world = 0) {
     const ArrayView v = sim->worlds().state_component("qpos");
     std::copy(qpos.begin(), qpos.end(), reinterpret_cast<double*>(v.data + world * v.strides[0]));
@@ -90,8 +90,8 @@ std::string error_of(const std::shared_ptr<RayCastSensorCfg>& cfg) {
   return "";
 }
 
-// What is wrong in any model is refused before there is one.
-TEST(RayCast, RefusesAWrongConfigurationWhenItIsBuilt) {
+// Errors that do not depend on the model are found by build().
+TEST(RayCast, InvalidConfigurationsAreRefusedAtBuild) {
   const auto message = [](auto change) -> std::string {
     const auto cfg = sensor_cfg<RayCastSensorCfg>();
     change(*cfg);
@@ -127,7 +127,7 @@ TEST(RayCast, SeesItsChildButNotItself) {
   EXPECT_EQ(lab.read<int>("material_id")[0], -1);
 }
 
-TEST(RayCast, SeesItselfFromInsideIfAsked) {
+TEST(RayCast, CanSeeItselfFromInside) {
   auto cfg = sensor_cfg<RayCastSensorCfg>();
   cfg->exclude_parent_body = false;
   Lab lab({cfg});
@@ -135,7 +135,7 @@ TEST(RayCast, SeesItselfFromInsideIfAsked) {
   EXPECT_THAT(lab.read("normals_w"), Pointwise(FloatNear(1e-6f), {0.0f, 0.0f, -1.0f}));
 }
 
-TEST(RayCast, AMissKeepsTheOrigin) {
+TEST(RayCast, MissReportsTheOrigin) {
   auto cfg = sensor_cfg<RayCastSensorCfg>();
   cfg->pattern = GridPattern{.size = {0, 0}, .direction = {0, 0, 1}};
   Lab lab({cfg});
@@ -153,7 +153,8 @@ TEST(RayCast, DistancesAtBothLimitsCount) {
   cfg->min_distance = 1.9;
   Lab lab({cfg});
   const auto distance = [&](double z) {
-    lab.pose({-10, 0, z, kOnItsSide, kOnItsSide, 0, 0});  // the child is out of the way
+    // The base is on its side, so that its child is not below it.
+    lab.pose({-10, 0, z, kOnItsSide, kOnItsSide, 0, 0});
     return lab.read("distances")[0];
   };
   EXPECT_FLOAT_EQ(distance(2.1), 2.1f);
@@ -166,7 +167,7 @@ TEST(RayCast, AlignmentTurnsRaysButNotTheFrame) {
   std::vector<std::shared_ptr<const SensorCfg>> cfgs;
   for (RayAlignment alignment : {RayAlignment::kBase, RayAlignment::kYaw, RayAlignment::kWorld}) {
     auto cfg = sensor_cfg<RayCastSensorCfg>(std::string(word(alignment)).c_str());
-    cfg->frame = {{"site", "scan", "r"}};  // turned by 90 degrees about z
+    cfg->frame = {{"site", "scan", "r"}};  // rotated by 90 degrees about z
     cfg->pattern = UserPattern{{{0.3, 0, 0}}, {{0, 0, -2}}};
     cfg->ray_alignment = alignment;
     cfgs.push_back(cfg);
@@ -183,8 +184,9 @@ TEST(RayCast, AlignmentTurnsRaysButNotTheFrame) {
   EXPECT_EQ(lab.read("quat_w", "world"), lab.read("quat_w", "base"));
 }
 
-// A frame that points up has a heading still: where its x axis comes over the top it does not turn.
-TEST(RayCast, AHeadingGoesOnOverTheTop) {
+// A frame that points up still has a heading. The heading does not flip where the frame's x axis
+// passes the vertical.
+TEST(RayCast, HeadingDoesNotFlipAtTheVertical) {
   const double heading = 0.7;
   for (double pitch : {-1.3, -M_PI / 2 + 0.05, -M_PI / 2, -M_PI / 2 - 0.05, M_PI / 2 + 0.05}) {
     double yaw[4], nose[4], q[4], mat[9];
@@ -203,8 +205,9 @@ TEST(RayCast, AHeadingGoesOnOverTheTop) {
   }
 }
 
-// Of the two quaternions of an orientation: the one whose largest component is positive.
-TEST(RayCast, TheLargestComponentOfAQuaternionIsPositive) {
+// Of the two quaternions of an orientation, the one whose largest component is positive is
+// returned.
+TEST(RayCast, LargestComponentOfAQuaternionIsPositive) {
   auto cfg = sensor_cfg<RayCastSensorCfg>();
   cfg->frame = {{"body", "base", "r"}, {"body", "belly", "r"}};
   Lab lab({cfg});
@@ -225,11 +228,11 @@ TEST(RayCast, TheLargestComponentOfAQuaternionIsPositive) {
   };
   expect({1, 0, 0, 0});
   expect({-1, 0, 0, 0});
-  expect({.6, -.7, .3, .2});  // w above 1/2, yet not the largest
+  expect({.6, -.7, .3, .2});  // w is above 1/2, but it is not the largest
   expect({.6, .1, -.75, .2});
   expect({.55, .1, .2, -.8});
   expect({-.1, .2, .3, -.9});
-  for (int k = 0; k < 200; ++k) {  // quaternions of all directions
+  for (int k = 0; k < 200; ++k) {  // quaternions in all directions
     const double a = 0.7 * k, b = 1.3 * k, c = 0.05 * k;
     expect({std::cos(a) * std::cos(c), std::sin(a) * std::cos(c), std::cos(b) * std::sin(c),
             std::sin(b) * std::sin(c)});
@@ -250,12 +253,12 @@ TEST(RayCast, GroupsAndTransparencyBelongToTheQuery) {
   EXPECT_FLOAT_EQ(lab.read("distances", "third")[0], -1.0f);
 }
 
-TEST(RayCast, FramesMayBeCamerasAndSeveral) {
+TEST(RayCast, AcceptsCamerasAndSeveralFrames) {
   auto cfg = sensor_cfg<RayCastSensorCfg>();
   cfg->any_frame = true;
   cfg->frame = {{"camera", "eye", "r"}, {"xbody", "belly", "r"}};
   cfg->pattern = PinholePattern::from_mujoco_camera("r/eye");
-  cfg->exclude_parent_body = false;  // the camera belongs to the world body, and so does the floor
+  cfg->exclude_parent_body = false;  // the camera and the floor both belong to the world body
   Lab lab({cfg});
   lab.pose({-10, 0, 5, 1, 0, 0, 0});
   const std::vector<float> d = lab.read("distances");
@@ -263,12 +266,12 @@ TEST(RayCast, FramesMayBeCamerasAndSeveral) {
   // Corner ray of the camera: (-tan_h, -tan_v, -1) from 2 m above the floor.
   const double tan_v = std::tan(30 * mjPI / 180), tan_h = tan_v * 4 / 3;
   EXPECT_NEAR(d[0], 2 * std::sqrt(1 + tan_v * tan_v + tan_h * tan_h), 1e-5);
-  EXPECT_NEAR(d[12], 0.05, 1e-6);  // from inside its own ball
+  EXPECT_NEAR(d[12], 0.05, 1e-6);  // from inside the body's own ball
   EXPECT_THAT(lab.read("frame_pos_w"),
               Pointwise(FloatNear(1e-6f), {0.0f, 0.0f, 2.0f, -10.0f, 0.0f, 4.5f}));
 }
 
-TEST(RayCast, ATeleportIsInTheNextReadingAndOnlyThatWorldChanges) {
+TEST(RayCast, TeleportChangesTheNextReadingOfItsWorldOnly) {
   Lab lab({sensor_cfg<RayCastSensorCfg>()}, {.num_worlds = 3});
   const std::vector<float> before = lab.read("hit_pos_w");
   lab.pose({-7, 1, 9, 1, 0, 0, 0}, 1);
@@ -284,7 +287,7 @@ TEST(RayCast, ATeleportIsInTheNextReadingAndOnlyThatWorldChanges) {
   EXPECT_EQ(lab.read("hit_pos_w"), before);
 }
 
-// Height scans of robots that stand where they are spawned, and all over the tiles, seams included.
+// Height scans of robots at their spawn points, and at random places on the tiles, including seams.
 TEST(RayCast, HeightScansOnGeneratedTerrain) {
   constexpr int kWorlds = 96;
   SceneCfg s;
@@ -326,7 +329,7 @@ TEST(RayCast, HeightScansOnGeneratedTerrain) {
       for (std::size_t i = 0; i < distances.size(); ++i, ++rays) {
         const auto& at = sensor.pattern().offsets[i];
         const double down[3] = {0, 0, -1};
-        // On a seam, and on the border of a tile, either neighbour may be the truth.
+        // On a seam or the border of a tile, the result of either neighbour is correct.
         bool right = false;
         for (double dx : {0.0, -1e-6, 1e-6})
           for (double dy : {0.0, -1e-6, 1e-6}) {
@@ -410,7 +413,7 @@ TEST(RayCast, DrawsHitsRaysAndNormals) {
   cfg->pattern = UserPattern{{{0, 0, 0}}, {{0, 0, -1}, {0, 0, 1}}};
   cfg->viz.show_rays = cfg->viz.show_normals = true;
   Lab lab({cfg});
-  EXPECT_TRUE(lab.sim->draw(0).list().empty());  // no debug_vis
+  EXPECT_TRUE(lab.sim->draw(0).list().empty());  // without debug_vis
   Sensor* sensor[] = {&lab.scene->sensor("ray")};
   const DebugShapes shapes = lab.sim->draw(0, sensor);
   const double unit = lab.sim->model()->stat.meansize;
@@ -424,7 +427,7 @@ TEST(RayCast, DrawsHitsRaysAndNormals) {
     EXPECT_NEAR(norm(s.vector), std::abs(dz), 1e-5);
     EXPECT_DOUBLE_EQ(s.width, width * unit);
   };
-  ASSERT_EQ(shapes.list().size(), 4u);  // from the base at 2 m, a ball at 1.5 m under it
+  ASSERT_EQ(shapes.list().size(), 4u);  // the base is at 2 m, with a ball below it at 1.5 m
   expect(0, mjGEOM_SPHERE, "ray_hit_0", 1.55, 0, 0.5);
   expect(1, mjGEOM_ARROW, "ray_ray_0", 2, -0.45, 0.1);
   expect(2, mjGEOM_ARROW, "ray_normal_0", 1.55, 5 * unit, 0.1);
@@ -432,7 +435,7 @@ TEST(RayCast, DrawsHitsRaysAndNormals) {
   EXPECT_EQ(shapes.list()[3].rgba, cfg->viz.miss_color);
 }
 
-TEST(Pattern, GridStopsShortWhereTheResolutionDoesNotDivide) {
+TEST(Pattern, GridEndsEarlyIfTheResolutionDoesNotDivide) {
   const RayPattern p =
       make_pattern(GridPattern{.size = {0.5, 0}, .resolution = 0.2}, nullptr, "test");
   ASSERT_EQ(p.size(), 3u);
@@ -440,7 +443,7 @@ TEST(Pattern, GridStopsShortWhereTheResolutionDoesNotDivide) {
   EXPECT_NEAR(p.offsets[2][0], 0.15, 1e-12);
 }
 
-TEST(Pattern, RingsHaveACentreIfAsked) {
+TEST(Pattern, RingsCanHaveACentre) {
   const auto offsets = [](bool center) {
     const RingPattern ring{.rings = {{.radius = 0.5, .num_samples = 4}}, .include_center = center};
     std::vector<double> xy;
@@ -472,8 +475,8 @@ TEST(Pattern, EveryRayIsInExactlyOnePacket) {
   }
 }
 
-// Rays side by side, which go in one piece, and rays strewn about.
-TEST(Pattern, WhatStandsByLaneGoesToItsRay) {
+// Adjacent rays, which are copied in one piece, and scattered rays.
+TEST(Pattern, LanesAreCopiedToTheirRays) {
   UserPattern strewn;
   strewn.offsets.assign(187, {});
   Rng rng(2, 0, 0, 0);
@@ -487,7 +490,7 @@ TEST(Pattern, WhatStandsByLaneGoesToItsRay) {
     for (int r = 0; r < n; ++r)
       for (int k = 0; k < 3; ++k) want.push_back(10.0f * r + k);
     want.push_back(-1);
-    // In either order, so that nothing wrong is written over.
+    // In both orders, so that a wrong value cannot be overwritten by a right one.
     for (bool back : {false, true}) {
       std::vector<float> rows(3 * n + 1, -1);
       for (int turn = 0; turn < bundle.num_packets(); ++turn) {

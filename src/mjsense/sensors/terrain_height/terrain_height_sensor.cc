@@ -59,7 +59,8 @@ void TerrainHeightSensor::finish(const RayScene& rays, int world, RayScratch& sc
   }
 }
 
-// Straight down from the frame, however far; then from max_distance above it.
+// Casts two rays straight down without a limit: from the frame, and from max_distance above it. The
+// first one is used if it hits, otherwise the second one.
 float TerrainHeightSensor::height_without_hits(const RayScene& rays, int world, int frame,
                                                RayScratch& scratch) const {
   const FramePose& pose = frame_pose(world, frame);

@@ -1,14 +1,14 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
-// TerrainHeightSensor: how high frames (feet, a base) are above what lies below them. A
+// TerrainHeightSensor: height of frames (feet, a base) above the surface below them. It is a
 // RayCastSensor with one more field:
 //   heights  float32 [B, F] m (reduction min, max, mean) or [B, F, n] m (none)
 //
-// A ray that hits gives frame z - hit z; on a surface's underside (the frame is inside something)
-// 0; a ray that misses gives max_distance. Where all rays of a frame miss, the ground straight
-// below decides, however far, else the one above (the frame lies under it: 0): the difference of
-// heights, within [0, max_distance]. Only where there is no ground at all, the world's z = 0 stands
-// for it.
+// A ray that hits gives frame z - hit z, or 0 if it hits the underside of a surface (the frame is
+// inside something). A ray that misses gives max_distance. If all rays of a frame miss, the height
+// is measured to the ground straight below, at any distance. If there is none below, it is measured
+// to the ground above, which gives 0. The result is limited to [0, max_distance]. If there is no
+// ground at all, the world's z = 0 is used.
 
 #include <memory>
 #include <string>

@@ -19,8 +19,8 @@ using ::testing::FloatNear;
 using ::testing::HasSubstr;
 using ::testing::Pointwise;
 
-//        foot            A floor at z = 0, a step 0.5 m high for 0.5 < x < 2.5; 20 m away, at x = 20,
-//   ______|_____         a pit whose ground lies at -3 m.
+//        foot            A floor at z = 0, a step 0.5 m high for 0.5 < x < 2.5; 20 m away, at
+//   ______|_____         x = 20, a pit whose ground is at -3 m.
 //   floor |step |_
 constexpr char kField[] = R"(
 <mujoco><worldbody>
@@ -34,7 +34,7 @@ constexpr char kField[] = R"(
   </body>
 </worldbody></mujoco>)";
 
-constexpr double kOnItsSide = 0.70710678118654752;  // w and x of a quarter turn about x
+constexpr double kOnItsSide = 0.70710678118654752;  // w and x of a rotation by 90 degrees about x
 
 std::shared_ptr<TerrainHeightSensorCfg> height(HeightReduction reduction = HeightReduction::kMin) {
   auto cfg = std::make_shared<TerrainHeightSensorCfg>();
@@ -58,7 +58,7 @@ struct Lab {
     scene = std::make_shared<Scene>(std::move(s));
     sim = std::make_unique<Simulation>(scene, SimulationCfg{});
   }
-  // With the foot there, lying on its side.
+  // Heights when the foot is at (x, 0, z), on its side.
   std::vector<float> at(double x, double z) {
     const double qpos[] = {x, 0, z, kOnItsSide, kOnItsSide, 0, 0};
     std::ranges::copy(qpos, reinterpret_cast<double*>(sim->worlds().state_component("qpos").data));
@@ -76,7 +76,7 @@ TEST(TerrainHeight, IsFromTheFrameToTheGroundBelow) {
   EXPECT_THAT(lab.at(1.5, 0.7), ElementsAre(FloatNear(0.2f, 1e-6f)));
 }
 
-// Three rays, 0.1 m apart along x, the middle one 1 cm before the step: 0.7, 0.7, 0.2 m.
+// Three rays, 0.1 m apart along x, the middle one 1 cm before the step: 0.7, 0.7 and 0.2 m.
 TEST(TerrainHeight, ReducesTheRaysOfAFrame) {
   const auto over_the_edge = [](HeightReduction reduction) {
     auto cfg = height(reduction);
@@ -90,14 +90,14 @@ TEST(TerrainHeight, ReducesTheRaysOfAFrame) {
               Pointwise(FloatNear(1e-6f), {0.7f, 0.7f, 0.2f}));
 }
 
-TEST(TerrainHeight, OneFarRayOfManyIsTheLimit) {
+TEST(TerrainHeight, RaysThatMissGiveTheLimit) {
   auto cfg = height(HeightReduction::kNone);
   cfg->pattern = GridPattern{.size = {0.2, 0}, .resolution = 0.1};
-  // Two rays end on the floor, more than max_distance below; the third hits the step.
+  // Two rays would hit the floor, which is more than max_distance below; the third hits the step.
   EXPECT_THAT(Lab(cfg).at(0.49, 1.2), Pointwise(FloatNear(1e-6f), {1.0f, 1.0f, 0.7f}));
 }
 
-TEST(TerrainHeight, WhereAllRaysMissTheGroundStraightBelowDecides) {
+TEST(TerrainHeight, IfAllRaysMissTheGroundBelowIsUsed) {
   Lab lab(height());
   EXPECT_THAT(lab.at(-2, 50), ElementsAre(1.0f)) << "far above";
   EXPECT_THAT(lab.at(-2, -0.3), ElementsAre(0.0f)) << "inside the floor";
@@ -107,10 +107,11 @@ TEST(TerrainHeight, WhereAllRaysMissTheGroundStraightBelowDecides) {
   EXPECT_THAT(lab.at(-10, 0.4), ElementsAre(FloatNear(0.4f, 1e-6f))) << "no ground: above z = 0";
 }
 
-TEST(TerrainHeight, EveryFrameFromItsOwnHeight) {
+TEST(TerrainHeight, EveryFrameHasItsOwnHeight) {
   auto cfg = height();
   cfg->frame = {{"body", "foot", "r"}, {"site", "toe", "r"}};
-  // On its side the toe, 0.1 m below the foot in its axes, is beside it: as high.
+  // The toe is 0.1 m below the foot in the foot's axes. With the foot on its side it is beside it,
+  // at the same height.
   EXPECT_THAT(Lab(cfg).at(-2, 0.5), Pointwise(FloatNear(1e-6f), {0.5f, 0.5f}));
 }
 

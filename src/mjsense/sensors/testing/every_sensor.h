@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
-// Every kind of scene sensor, in a scene where all of them have something to measure: for tests
-// that hold for all sensors.
+// Every kind of scene sensor, in a scene where each of them has something to measure. For tests
+// that apply to all sensors.
 
 #include <algorithm>
 #include <iterator>
@@ -58,7 +58,7 @@ inline constexpr char kWedge[] = R"(
 
 }  // namespace every_sensor_detail
 
-// What the folders of the sensors give as examples.
+// The examples from the folders of all sensors.
 inline SensorCfgs every_sensor() {
   SensorCfgs all;
 #define MJSENSE_ADD(name) std::ranges::copy(name##_examples(), std::back_inserter(all));
@@ -67,8 +67,8 @@ inline SensorCfgs every_sensor() {
   return all;
 }
 
-// A two-wheeled robot with a mast and an arm that swings; a box, a ball and a mesh to see and to
-// touch; textures and a light.
+// A two-wheeled robot with an arm that swings; a box, a ball and a mesh that can be seen and
+// touched; textures and a light.
 inline SceneCfg every_sensor_scene() {
   using namespace every_sensor_detail;
   SceneCfg cfg;

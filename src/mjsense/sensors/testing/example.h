@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
-// Examples of a kind of sensor in the scene of every_sensor.h, for tests that hold for all sensors.
-// Each sensor's folder gives its own in testing/example.cc.
+// Examples of a kind of sensor in the scene of every_sensor.h, for tests that apply to all sensors.
+// Each sensor's folder defines its examples in testing/example.cc.
 
 #include <memory>
 #include <vector>

@@ -16,7 +16,7 @@
 
 namespace mjsense::testing {
 
-// A camera with the image of `m` as it is now; `rays` is up to date.
+// Returns a camera with the image of the current state of `m`; `rays` must be up to date.
 inline std::unique_ptr<Sensor> shoot(const CameraSensorCfg& cfg, const TestModel& m,
                                      RayScene& rays) {
   std::unique_ptr<Sensor> camera = cfg.build();
@@ -30,9 +30,10 @@ inline std::unique_ptr<Sensor> shoot(const CameraSensorCfg& cfg, const TestModel
   return camera;
 }
 
-// The same picture by rays and by MuJoCo's own renderer.
+// The same image by rays and by MuJoCo's own renderer.
 struct Pair {
-  std::unique_ptr<Sensor> rays, opengl;  // opengl null: there is none to be had, as `missing` says
+  // `opengl` is null if that renderer is not available; `missing` says why.
+  std::unique_ptr<Sensor> rays, opengl;
   std::string missing;
 
   Pair(CameraSensorCfg cfg, const TestModel& m) {
@@ -60,7 +61,7 @@ struct Pair {
     for (std::size_t i = 0; i < a.size(); ++i) sum += (a[i] - b[i]) * (a[i] - b[i]);
     return 10 * std::log10(255.0 * 255.0 * static_cast<double>(a.size()) / sum);
   }
-  // Pixels that show another object than OpenGL's, of all.
+  // Share of the pixels that show another object than OpenGL's.
   double other_ids() const {
     const auto a = by_rays<std::int32_t>("segmentation"),
                b = by_opengl<std::int32_t>("segmentation");
@@ -68,7 +69,7 @@ struct Pair {
     for (std::size_t i = 0; i < a.size(); i += 2) other += a[i] != b[i] || a[i + 1] != b[i + 1];
     return 2.0 * other / static_cast<double>(a.size());
   }
-  // Pixels whose depth differs by more than `tolerance` m, of all.
+  // Share of the pixels whose depth differs by more than `tolerance` m.
   double other_depths(double tolerance) const {
     const auto a = by_rays<float>("depth"), b = by_opengl<float>("depth");
     int other = 0;
