@@ -6,6 +6,7 @@
 #include <nanobind/stl/vector.h>
 
 #include "mjsense/core/error.h"
+#include "mjsense/core/plain_file.h"
 #include "mjsense/core/spec.h"
 #include "python/bindings/bindings.h"
 #include "python/bindings/numpy.h"

@@ -268,7 +268,7 @@ def test_warnings_are_counted_and_reported_once(capfd):
         sim.step(3)
         sim.reset()
     assert set(sim.warning_counts) == {"mjWARN_CONTACTFULL"}
-    assert sim.warning_counts["mjWARN_CONTACTFULL"].shape == (4,) and (sim.warning_counts["mjWARN_CONTACTFULL"] >= 12).all()
+    assert sim.warning_counts["mjWARN_CONTACTFULL"].shape == (4,) and (sim.warning_counts["mjWARN_CONTACTFULL"] >= 9).all()
     err = capfd.readouterr().err
     assert err.count("WARNING") == err.count("Too many contacts") == 1 and "world 0" in err
     data = mujoco.MjData(sim.model)
@@ -297,7 +297,7 @@ def test_python_callbacks_are_refused_by_name(sim):
         with pytest.raises(RuntimeError, match="mjcb_sensor is a Python function"):
             ball_scene()
         with pytest.raises(RuntimeError, match="mjcb_sensor is a Python function"):
-            mjs.make_vec("pick", 1, cameras=[])
+            mjs.make_vec("pick", num_envs=1, cameras=[])
         mujoco.set_mjcb_sensor(None)
         calls = []
         kind = ctypes.CFUNCTYPE(None, ctypes.c_void_p, ctypes.c_void_p, ctypes.c_int)
@@ -323,7 +323,7 @@ def test_names_do_not_control_the_terminal():
         scene["nothing"]
     texts.append(str(error.value))
     match = mjs.ContactMatch(mode="body", pattern="a..31", entity="e")
-    with pytest.raises(KeyError) as error:
+    with pytest.raises(ValueError) as error:
         mjs.Scene(
             mjs.SceneCfg(
                 entities={"e": mjs.EntityCfg(model=model.format(""))}, sensors=[mjs.ContactSensorCfg(name="c", primary=match)]

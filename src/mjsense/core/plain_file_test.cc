@@ -134,6 +134,8 @@ TEST(PlainFile, PrintableText) {
   EXPECT_EQ(printable("cut \xe6\x97"), "cut ??");
   EXPECT_EQ(printable("gpj\u202e.exe\u2066 \u2028"), "gpj???.exe??? ???");
   EXPECT_EQ(printable("\u2027\u202f\u2065"), "\u2027\u202f\u2065");
+  EXPECT_EQ(printable_lines("a\x1b\n\nb\r\n"), "a?\n\nb?\n");
+  EXPECT_EQ(printable_lines(""), "");
 }
 
 // What the system does not give is an error, and nobody waits for what was started.

@@ -188,6 +188,9 @@ inline Float march(const HeightField& field, Vec3f o, Vec3f d, Float start, Floa
   // Leaps are worth their cost only if rays cross many cells.
   const bool far =
       any(active & (ray.length * (abs(ray.dx) + abs(ray.dy)) > Float(HeightField::kBlock)));
+  // A ray that leaves through the border of the surface hits it in spite of rounding, because a
+  // neighbouring field may have a higher id.
+  const Float at_border = tied(stop) - stop;
   Float fa = 0.0f;  // height above the surface at walk.t; 0 or of the same sign as walk.side
   while (any(walk.active)) {
     const Mask leapt = far ? walk.leap(field, ray) : mask_of(0);
@@ -214,11 +217,12 @@ inline Float march(const HeightField& field, Vec3f o, Vec3f d, Float start, Floa
     for (int part = 0; part < 2; ++part) {
       const Float t0 = part == 0 ? ta : tm, t1 = part == 0 ? tm : tb;
       const Float fb = ray.z_at(t1) - cell.height(ray.x_at(t1), ray.y_at(t1));
-      const Mask crossing =
-          open & (fb * walk.side <= Float(0.0f)) & (part == 0 ? mask_of(kAllLanes) : tm < tb);
+      const Mask crossing = open & (fb * walk.side <= select(t1 >= ray.length, at_border, 0.0f)) &
+                            (part == 0 ? mask_of(kAllLanes) : tm < tb);
       if (any(crossing)) {
         const Float drop = fa - fb;
-        const Float t = t0 + (t1 - t0) * select(abs(drop) > Float(1e-30f), fa / drop, 0.0f);
+        const Float t =
+            min(t0 + (t1 - t0) * select(abs(drop) > Float(1e-30f), fa / drop, 0.0f), t1);
         const Float middle = (t0 + t1) * 0.5f;
         const Mask first = ray.y_at(middle) - walk.cy <= ray.x_at(middle) - walk.cx;
         const Vec3f n = Sphere::normal(
@@ -252,10 +256,12 @@ inline FieldHit intersect_height_field(const HeightField& field, Vec3f o, Vec3f 
 
   const float top[3] = {field.size[0], field.size[1], 0.5f * field.size[2]};
   const Vec3f ot = {o.x, o.y, o.z - top[2]};
-  const Interval in = Box::interval(top, ot, d), level = slab(top[2], ot.z, d.z);
-  // A ray through an edge of the box enters and leaves at once, which rounding must not turn around.
-  const Float start = max(in.enter, 0.0f), stop = max(min(in.leave, limit), start);
-  Mask active = (in.enter <= tied(in.leave)) & (in.leave >= Float(0.0f)) & (start <= limit);
+  const Interval level = slab(top[2], ot.z, d.z);
+  Interval in = Box::interval(top, ot, d);
+  const Mask meets = in.enter <= tied(in.leave);
+  in.leave = max(in.leave, in.enter);  // through an edge, where rounding has exchanged them
+  const Float start = max(in.enter, 0.0f), stop = min(in.leave, limit);
+  Mask active = meets & (in.leave >= Float(0.0f)) & (start <= stop);
   if (!any(active)) return hit;
 
   // A ray that enters through a side face, at or below the surface, hits the side wall there.

@@ -334,7 +334,6 @@ TEST_P(Kernels, NeighboursThatTieGoToTheLowerGeom) {
       "'/></asset><worldbody>";
   const char* pairs[][2] = {{"type='hfield' hfield='right'", "type='hfield' hfield='left'"},
                             {"type='box' size='1 1 1'", "type='box' size='1 1 1'"},
-                            {"type='mesh' mesh='cube'", "type='mesh' mesh='cube'"},
                             {"type='box' size='1 1 1'", "type='mesh' mesh='cube'"}};
   for (const auto& [right, left] : pairs) {
     const TestModel m(assets + "<geom " + right + " pos='1 0 0'/><geom " + left +
@@ -344,7 +343,8 @@ TEST_P(Kernels, NeighboursThatTieGoToTheLowerGeom) {
     int ties = 0, wrong = 0;
     for (int i = 0; i < 4000; ++i) {
       const double y = rng.uniform(-0.99, 0.99), top[3] = {1e-9, y, 3}, down[3] = {0, 0, -1};
-      double o[3] = {rng.uniform(-1, 1), rng.uniform(-1, 1), 3}, d[3] = {-o[0], y - o[1], 0};
+      double o[3] = {(i % 2 ? 1 : -1) * rng.uniform(1, 4), rng.uniform(-1, 1), 3};
+      double d[3] = {-o[0], y - o[1], 0};
       d[2] = -mujoco_ray(m, top, down).t;  // the surface at the border
       mju_normalize3(d);
       double t[2];
@@ -360,7 +360,7 @@ TEST_P(Kernels, NeighboursThatTieGoToTheLowerGeom) {
       ++ties;
       wrong += scene.trace(0, {}, o, d).geom != 0;
     }
-    EXPECT_GT(ties, 500) << right;
+    EXPECT_GT(ties, 400) << right;
     EXPECT_EQ(wrong, 0) << "of " << ties << ": " << right << ", " << left;
   }
 }

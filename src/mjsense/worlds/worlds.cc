@@ -78,16 +78,18 @@ bool can_split_step(const mjModel* m) {
 }
 
 // mj_forward up to velocities; without `sensors` MuJoCo's own sensors keep their old values. Unlike
-// in mj_forward, energies come before the sensors that report them: with <flag energy="enable"/>
-// MuJoCo's e_kinetic reports the energy of the forward before.
+// in mj_forward, energies come before the sensors that report them: e_kinetic is a sensor of the
+// position stage, and with <flag energy="enable"/> MuJoCo's has the energy of the forward before.
 void position_and_velocity(const mjModel* m, mjData* d, bool sensors) {
   const bool energy = m->opt.enableflags & mjENBL_ENERGY;
   mj_fwdPosition(m, d);
-  if (energy) mj_energyPos(m, d);
+  if (energy) {
+    mj_energyPos(m, d);
+    mj_energyVel(m, d);  // of the inertia and qvel, which are there
+  }
   if (sensors) mj_sensorPos(m, d);
-  if (!energy && !d->flg_energypos) d->energy[0] = d->energy[1] = 0;
+  if (!d->flg_energypos) d->energy[0] = d->energy[1] = 0;
   mj_fwdVelocity(m, d);
-  if (energy) mj_energyVel(m, d);
   if (sensors) mj_sensorVel(m, d);
 }
 
@@ -235,13 +237,20 @@ mjModel Worlds::model_of(int world) const {
 }
 
 void Worlds::write_model(int world, mjModel* copy) const {
-  int size = 0, element = 0;
-#define X(type, name, nr, nc)                                                       \
-  if (const void* rows = mjb_expanded(batch_, #name, &size, &element)) {            \
-    const std::size_t bytes = static_cast<std::size_t>(size) * element;             \
-    std::memcpy(copy->name, static_cast<const char*>(rows) + bytes * world, bytes); \
-  }
+  const auto write = [&](const char* field, void* to) {
+    int size = 0, element = 0;
+    const auto* rows = static_cast<const char*>(mjb_expanded(batch_, field, &size, &element));
+    if (rows == nullptr) return;
+    const std::size_t bytes = static_cast<std::size_t>(size) * element;
+    std::memcpy(to, rows + bytes * world, bytes);
+  };
+#define X(type, name, nr, nc) write(#name, copy->name);
   MJMODEL_POINTERS
+#undef X
+#define X(type, name, size) write("opt." #name, &copy->opt.name);
+#define XVEC X
+  MJOPTION_FIELDS
+#undef XVEC
 #undef X
 }
 

@@ -542,6 +542,10 @@ TEST(Worlds, AModelOfAWorldHasItsOwnValues) {
   worlds.write_model(1, copy.get());
   EXPECT_EQ(copy->body_mass[1], worlds.model()->body_mass[1]);
   EXPECT_EQ(copy->body_mass[2], worlds.model()->body_mass[2]);
+  auto* gravity = static_cast<mjtNum*>(mjb_expand(worlds.batch(), "opt.gravity", nullptr, nullptr));
+  gravity[5] = -1;
+  worlds.write_model(1, copy.get());
+  EXPECT_EQ(copy->opt.gravity[2], -1);
 }
 
 // With <flag energy="enable"/> mj_forward fills e_kinetic before it computes the energy.
