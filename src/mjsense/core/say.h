@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
-// What a person may read on stderr. One that cannot be written, because its terminal is gone or its
-// disk is full, is no reason to end: fmt::print() would throw.
+// Prints a message for users on stderr. If it cannot be written, because the terminal is gone or
+// the disk is full, the program must continue; fmt::print() would throw.
 
 #include <fmt/format.h>
 
