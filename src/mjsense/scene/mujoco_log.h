@@ -3,9 +3,9 @@
 
 namespace mjsense {
 
-// MuJoCo writes what it warns of also to MUJOCO_LOG.TXT in the current folder, which is somebody's.
-// From here on it does not; a file that was chosen by mju_setLogConfig() stays. For programs: it
-// changes the process.
+// Stops MuJoCo from also writing its warnings to MUJOCO_LOG.TXT in the user's current folder. A log
+// file chosen by mju_setLogConfig() is kept. For programs only, because it changes a setting of the
+// process.
 void leave_no_log_file();
 
 }  // namespace mjsense
