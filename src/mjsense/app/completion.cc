@@ -63,7 +63,7 @@ std::vector<std::string> values(const Choices& choices, const std::string& name)
   return found == choices.end() ? std::vector<std::string>{} : found->second;
 }
 
-// Values of the positional at which the last word stands.
+// Values of the positional argument at the position of the last word.
 std::vector<std::string> positional_values(const CLI::App& app, const Choices& choices) {
   for (const CLI::Option* option : app.get_options({})) {
     if (option->get_positional()) return values(choices, option->get_name(true));

@@ -15,10 +15,12 @@ namespace mjsense {
 // anything: the shell completes file names.
 using Choices = std::map<std::string, std::vector<std::string>>;
 
-// The script that a shell sources. Throws ValueError for another shell than bash, zsh and fish.
+// Returns the script that a shell sources. Throws ValueError for shells other than bash, zsh and
+// fish.
 std::string completion_script(const std::string& shell);
 
-// What the last of `words` (those after "mjsense", the last one possibly empty) can become.
+// Returns the completions of the last of `words` (those after "mjsense"; the last one may be
+// empty).
 std::vector<std::string> complete(const CLI::App& program, const Choices& choices,
                                   std::span<const std::string> words);
 

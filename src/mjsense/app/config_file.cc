@@ -13,7 +13,7 @@ namespace {
 
 using Kind = FieldType::Kind;
 
-// For what is read as on the command line: its errors get the place.
+// Adds the place to the errors of `read`, which parses a value as on the command line.
 template <class Read>
 void at_place(const std::string& place, Read&& read) {
   try {
@@ -23,7 +23,7 @@ void at_place(const std::string& place, Read&& read) {
   }
 }
 
-// A key of the file: a field's option, or its opposite.
+// A key of the file: a field's option, or its negation.
 struct Key {
   const FieldDecl* field;
   bool opposite;

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Every key of an experiment file reaches the option of its name, and no other.
+// Every key of an experiment file sets the option of its name and no other.
 
 #include <fmt/format.h>
 #include <gmock/gmock.h>
@@ -148,7 +148,7 @@ TEST(ConfigFile, LettersBeyondAscii) {
   }
 }
 
-// Of some of these toml++ 3.3 asserts that they cannot be.
+// toml++ 3.3 asserts that some of these cannot occur.
 TEST(ConfigFile, HeadersThatAreNoKeys) {
   for (const std::string header :
        {"+a",   "[+a",    "=", "#",  ".",        ".a",  "a.", "a.+", "a..b",

@@ -7,8 +7,8 @@
 
 namespace mjsense {
 
-// Replaces this process; throws KeyError with the nearest of `known` and of the programs in PATH if
-// there is none.
+// Replaces this process. If there is no such program, throws KeyError with the nearest names among
+// `known` and the programs in PATH.
 [[noreturn]] void run_external(const std::string& word, char** arguments,
                                std::span<const std::string> known);
 

@@ -25,7 +25,7 @@ bool has_text(const FieldType& type) {
     case Kind::kOptional:
       return has_text(type.element());
     case Kind::kArray:
-    case Kind::kList:  // of what has no commas of its own
+    case Kind::kList:  // of elements whose text contains no commas
       return has_text(type.element()) && !type.element().element;
     default:
       return true;

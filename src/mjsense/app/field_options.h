@@ -16,18 +16,18 @@ namespace mjsense {
 // that are arguments of the command or do not apply to it.
 void add_field_options(CLI::App& app, const StructDecl& decl, void* object,
                        std::initializer_list<std::string_view> skip);
-// Adds the words that fields accept.
+// Adds the words that fields accept to `choices`.
 void add_choices(const StructDecl& decl, Choices& choices);
 // --size WxH, and --set name=value for every field.
 void add_set_options(CLI::App& app, const StructDecl& decl, void* object);
 
-// "640x368" -> the fields width and height. ValueError.
+// Parses "640x368" into the fields width and height. Throws ValueError.
 void read_size(const StructDecl& decl, void* object, std::string_view text);
 
-// A TOML file whose keys are the options, with '_' for '-'. ValueError "x.toml:3: no key named
-// 'episods'; did you mean 'episodes'?"
+// Reads a TOML file whose keys are the option names, with '_' for '-'. Throws ValueError "x.toml:3:
+// no key named 'episods'; did you mean 'episodes'?"
 void read_toml(const std::string& path, const StructDecl& decl, void* object);
-// The same of its text; `path` is its name in errors.
+// Like read_toml(), for the text of a file; `path` is its name in error messages.
 void read_toml_text(std::string_view text, const std::string& path, const StructDecl& decl,
                     void* object);
 

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
-// `mjsense tasks | robots | scenes`: what there is by name, a line each, with what it needs.
+// `mjsense tasks | robots | scenes`: lists the available names, one per line, with their
+// requirements.
 
 #include <string>
 

@@ -14,12 +14,12 @@ class ProgressLine {
  public:
   ProgressLine(std::string title, bool quiet);
   void show(const RecordProgress& progress, int stop_level);
-  void finish();  // leaves the last line as it stands
+  void finish();  // ends the line and keeps its text
 
  private:
   void print();
 
-  std::string title_;  // until it is shown
+  std::string title_;  // cleared once it is shown
   bool quiet_, terminal_;
   bool open_ = false;
   std::string text_, printed_;

@@ -19,7 +19,8 @@ namespace {
 
 StopFlag stop_flag{0};
 
-// Ctrl-C and SIGTERM while it lives: first finish what runs, then discard it, then leave at once.
+// Handles Ctrl-C and SIGTERM during its lifetime. The first signal finishes the running episodes,
+// the second discards them, the third exits immediately.
 class StopOnSignal {
  public:
   StopOnSignal() {
@@ -63,7 +64,7 @@ std::string title(const RecordJobCfg& job) {
                             job.out.string());
 }
 
-// Wall seconds by room, the largest share last being what is left.
+// Wall time (s) per stage; the last entry is the remainder.
 std::vector<std::pair<std::string, double>> time_split(const RecordSummary& s) {
   std::vector<std::pair<std::string, double>> split = {{"policy", s.times.policy + s.times.reset},
                                                        {"physics", s.times.physics},
@@ -76,7 +77,7 @@ std::vector<std::pair<std::string, double>> time_split(const RecordSummary& s) {
   return split;
 }
 
-// A picture of the recording, and what it shows.
+// A contact sheet of the recording, and the text that says what it shows.
 struct Sheet {
   std::string path, shows;
 };

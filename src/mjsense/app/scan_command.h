@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
-// `mjsense scan SCENE.xml --frame site:head --out cloud.ply`: what a lidar sees, as a point cloud.
+// `mjsense scan SCENE.xml --frame site:head --out cloud.ply`: writes a lidar scan as a point cloud.
 
 #include <string>
 
@@ -10,13 +10,14 @@ namespace mjsense {
 
 struct ScanOptions {
   std::string scene;  // an MJCF file
-  std::string frame;  // "site:head": what carries the lidar, and its name in the file
-  std::string out;    // .ply or .pcd
+  // "site:head": type and name of the element in the MJCF file that carries the lidar
+  std::string frame;
+  std::string out;  // .ply or .pcd
   SpinningScan spinning;
-  TableScan table;       // if it names a file
-  LidarSensorCfg lidar;  // but for its frame and scan
+  TableScan table;       // used if it names a file
+  LidarSensorCfg lidar;  // its frame and scan are replaced by the options above
   int steps = 0;         // physics steps before the scan
-  bool world = false;    // points in the world instead of the lidar's frame
+  bool world = false;    // points in the world frame instead of the lidar's frame
 };
 
 int run_scan(const ScanOptions& options);

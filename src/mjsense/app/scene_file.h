@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
-// What commands that measure in an MJCF file share.
+// Helpers of the commands that read sensors in an MJCF file.
 
 #include <string>
 
@@ -8,14 +8,14 @@
 
 namespace mjsense {
 
-// Whether `what` names a model: an MJCF file, or one that the program brings
-// ("embedded:robots/quadruped.xml"; who loads it says which there are). Throws ValueError, with what
-// was expected, if it is the name of a file and there is none.
+// Whether `what` names a model: an MJCF file, or any name that begins with "embedded:"
+// ("embedded:robots/quadruped.xml"; loading it reports the valid names). Throws ValueError, with
+// what was expected, if it looks like the name of a file and there is no such file.
 bool names_model(const std::string& what, const std::string& expected);
-// What was found odd in the scene, on stderr.
+// Prints the scene's warnings on stderr.
 void print_warnings(const Scene& scene);
-// Throws RuntimeError if a world failed in the last call: a table of a scene that flew apart says
-// nothing.
+// Throws RuntimeError if a world failed in the last call, because measurements of a diverged
+// simulation are meaningless.
 void check_physics(const Simulation& simulation, const std::string& place);
 
 }  // namespace mjsense

@@ -22,7 +22,7 @@ constexpr const char* kKindNames[] = {"bool", "int",    "unsigned", "number", "t
                                       "path", "word",   "array",    "list",   "optional",
                                       "map",  "object", "choice"};
 
-// JSON knows no infinity; single precision shows its shortest text.
+// JSON has no infinity. Single-precision numbers are written with their shortest text.
 Json number(double x, std::size_t bytes) {
   if (std::isinf(x)) return x > 0 ? "inf" : "-inf";
   return bytes == sizeof(float) ? std::stod(fmt::format("{}", static_cast<float>(x))) : x;
@@ -33,7 +33,8 @@ class Schema {
   void add(const StructDecl& decl) {
     if (structs_.contains(decl.name)) return;
     decls_[decl.name] = &decl;
-    structs_[decl.name] = {};  // its place in the order, before what it holds
+    // reserves its place in the order, before the structs that it contains
+    structs_[decl.name] = {};
     Json out;
     out["kind"] = decl.kind;
     out["module"] = decl.module;

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
-// Everything that can be configured and everything that sensors return, as JSON: what generators of
-// code and documentation read (tools/generate.py).
+// All configurations and all sensor outputs as JSON, for the generators of code and documentation
+// (tools/generate.py).
 
 #include <string>
 #include <string_view>
@@ -11,7 +11,7 @@
 namespace mjsense {
 
 std::string schema_json();
-// By its name in Python; null if there is none.
+// Finds a struct by its name in Python; null if there is none.
 const StructDecl* find_struct(std::string_view name);
 
 }  // namespace mjsense

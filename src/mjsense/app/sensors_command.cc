@@ -15,11 +15,12 @@ namespace {
 
 struct Line {
   const SensorSpec* spec;
-  double microseconds;  // a step and world; negative: counted with the sensor's first stream
+  double microseconds;  // per step and world; negative: included in the sensor's first stream
 };
 
-// Streams of some sensors, the cost of each at its first stream. What sensors share (a camera of
-// the scene shown as colour and as depth) is counted with the first that reads it.
+// Streams of some sensors. The cost of a sensor is given at its first stream. Cost that sensors
+// share (one camera of the scene shown as colour and as depth) is included in the first sensor that
+// reads it.
 std::vector<Line> lines_of(Simulation& simulation, std::span<Sensor* const> sensors, int steps) {
   std::vector<Line> lines;
   std::set<const Sensor*> counted;

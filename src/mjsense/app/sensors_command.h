@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
-// `mjsense sensors SCENE.xml|TASK`: every stream, what it means, and what it costs.
+// `mjsense sensors SCENE.xml|TASK`: lists every stream, its meaning and its cost.
 
 #include <string>
 #include <vector>
@@ -11,10 +11,10 @@ namespace mjsense {
 
 struct SensorsOptions {
   std::string what;    // an MJCF file, or the name of a task
-  RolloutCfg rollout;  // of a task
-  int steps = 20;      // control steps over which the cost is taken; 0: do not measure
+  RolloutCfg rollout;  // options of a task
+  int steps = 20;      // control steps over which the cost is measured; 0: do not measure
   bool json = false;
-  std::vector<std::string> given;  // names of the options of the command line
+  std::vector<std::string> given;  // names of the options given on the command line
 };
 
 int run_sensors(const SensorsOptions& options);

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
-// Typed n-dimensional arrays: what a sensor owns, a suite observes, a recording stores and Python
-// sees without a copy.
+// Typed n-dimensional arrays. Sensors own them, suites return them as observations, recordings
+// store them, and Python accesses them without a copy.
 
 #include <array>
 #include <cassert>
@@ -52,7 +52,7 @@ constexpr DType dtype_of<bool>() {
   return DType::kBool;
 }
 
-// Up to 6 dimensions, without allocation.
+// Up to 6 dimensions, stored without heap allocation.
 class Shape {
  public:
   static constexpr int kMaxRank = 6;
@@ -76,8 +76,8 @@ class Shape {
   int rank_ = 0;
 };
 
-// An array somebody else owns. Strides are in bytes; row-major and dense unless the owner says
-// otherwise.
+// A view of an array owned elsewhere. Strides are in bytes. The layout is row-major and dense
+// unless the owner sets other strides.
 struct ArrayView {
   std::byte* data = nullptr;
   DType dtype = DType::kFloat32;
@@ -93,7 +93,8 @@ class Array {
  public:
   Array() = default;
   Array(DType dtype, const Shape& shape);
-  // The memory of another array, which must live longer, under a shape of as many bytes a row.
+  // Shares the memory of `owner`, which must outlive the result. `shape` must have the same number
+  // of rows and of bytes per row.
   [[nodiscard]] static Array shared(Array& owner, DType dtype, const Shape& shape);
 
   [[nodiscard]] bool empty() const { return data_ == nullptr; }
@@ -103,12 +104,11 @@ class Array {
   std::size_t row_bytes() const { return row_elements_ * dtype_size(dtype_); }
   std::byte* data() { return data_.get(); }
   const std::byte* data() const { return data_.get(); }
-  // Of world w, which must be one of the B: development builds stop at another.
+  // Row of world w, 0 <= w < B. Builds with assertions abort if there is no such world.
   std::byte* row_data(int w) { return data_.get() + row_begin(w); }
   const std::byte* row_data(int w) const { return data_.get() + row_begin(w); }
 
-  // Row w as a flat span. T must be the array's element type: RuntimeError if it is another, whose
-  // rows would not end where these do.
+  // Row w as a flat span. Throws RuntimeError if T is not the element type of the array.
   template <class T>
   std::span<T> row(int w) {
     check_type<T>();

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
-// Things that are made of large arrays and of nothing else: who makes one of the same numbers again
-// gets the one that exists, in any simulation of the process.
+// Process-wide cache of immutable objects built from large arrays. Equal arrays share one object,
+// even across simulations.
 
 #include <bit>
 #include <cstdint>
@@ -14,7 +14,7 @@
 
 namespace mjsense {
 
-// 128 bits of everything added, in order: equal for equal content.
+// 128-bit hash of all added values, in order. Equal content has equal keys.
 class ContentKey {
  public:
   template <class T>
@@ -42,8 +42,9 @@ class ContentKey {
   std::uint64_t a_ = 0x243F6A8885A308D3u, b_ = 0x13198A2E03707344u;
 };
 
-// Of one kind of thing, as long as anybody holds it. Any thread may call get(); two that make the
-// same one at the same time both make it, and the first is kept.
+// Cache of objects of one type. It holds weak references only, so an object is released with its
+// last owner. Thread-safe; if two threads build the same object at the same time, the first result
+// is kept.
 template <class T>
 class ByContent {
  public:

@@ -5,14 +5,14 @@
 
 namespace mjsense {
 
-// A sensor that is one of these hears of every control step, read or not: for clocks and filters
-// whose state goes on at the control rate.
+// A sensor that derives from this class is notified of every control step, whether or not it is
+// read. Used for clocks and filters whose state advances at the control rate.
 class ControlStepListener {
  public:
   virtual ~ControlStepListener() = default;
-  // The worlds `ids` (sorted) have made a control step. On the caller's thread, before any cast() of
-  // that step; reset() of those whose physics failed in it came before. Throws RowError for a world
-  // whose row it makes impossible.
+  // Called after the worlds `ids` (sorted) have made a control step, on the caller's thread, before
+  // any cast() of that step and after reset() of the worlds whose physics failed in it. Throws
+  // RowError for a world whose row cannot be computed.
   virtual void control_step(std::span<const int> ids) = 0;
 };
 

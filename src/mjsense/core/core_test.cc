@@ -40,7 +40,7 @@ TEST(Array, SharesMemoryWithRowsOfTheSameSizeOnly) {
   const Array same = Array::shared(owner, DType::kInt32, {2, 3, 2});
   EXPECT_EQ(same.data(), owner.data());
   EXPECT_THROW(static_cast<void>(Array::shared(owner, DType::kFloat32, {3, 4})),
-               ValueError);  // as many bytes
+               ValueError);  // as many bytes in total, but other rows
   EXPECT_THROW(static_cast<void>(Array::shared(owner, DType::kFloat64, {2, 6})), ValueError);
 }
 
@@ -101,7 +101,7 @@ TEST(Rng, SameNumbersInAnyOrderAndUniform) {
   EXPECT_NEAR(sum2 / kN, 1.0, 5 * std::sqrt(2.0 / kN));
 }
 
-// The reference vector of Random123's kat_vectors: philox4x32-10, zero key and counter.
+// Reference vector of Random123's kat_vectors: philox4x32-10, zero key and counter.
 TEST(Rng, IsPhilox) {
   Rng rng(0, 0, 0, 0);
   EXPECT_EQ(rng.next(), 0x6627e8d5u);
@@ -153,7 +153,7 @@ TEST(Json, WritesWholeNumbersOfEitherSign) {
   EXPECT_STREQ(reinterpret_cast<char*>(row.data()), "[9223372036854775808,-5]");
 }
 
-// What is longer than it need be, half a surrogate pair, or beyond U+10FFFF.
+// Overlong forms, half a surrogate pair, code points beyond U+10FFFF, and incomplete characters.
 TEST(Json, WhatIsNoUtf8IsReplaced) {
   for (const char* text :
        {"\xC0\x80", "\xE0\x80\x80", "\xED\xA0\x80", "\xF4\x90\x80\x80", "\xC3", "\xFF"}) {

@@ -16,8 +16,7 @@ constexpr std::array<std::string_view, 3> kNames = {"portable", "avx2", "avx512"
 Isa detect() {
 #if defined(__x86_64__)
   __builtin_cpu_init();
-  // What tells the levels x86-64-v4 and v3 apart from what went before, in names that every
-  // compiler knows.
+  // Tests the features that define x86-64-v4 and x86-64-v3, under names that every compiler knows.
   const bool v3 = __builtin_cpu_supports("avx2") && __builtin_cpu_supports("fma") &&
                   __builtin_cpu_supports("bmi") && __builtin_cpu_supports("bmi2");
   const bool v4 = v3 && __builtin_cpu_supports("avx512f") && __builtin_cpu_supports("avx512bw") &&

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
-// Which of the kernels compiled for several instruction sets (files *_avx2.cc, *_avx512.cc) this
-// CPU can run.
+// Instruction set of the CPU, for choosing among kernels that are compiled several times (files
+// *_avx2.cc, *_avx512.cc).
 
 #include <string_view>
 
@@ -9,9 +9,9 @@ namespace mjsense {
 
 enum class Isa { kPortable, kAvx2, kAvx512 };  // x86-64 (or anything else), x86-64-v3, x86-64-v4
 
-// The best one, decided once. The environment variable MJSENSE_ISA (portable, avx2, avx512) can
-// lower it, for tests and for comparing machines; asking for more than the CPU has is a
-// RuntimeError.
+// The best instruction set of this CPU, determined once. The environment variable MJSENSE_ISA
+// (portable, avx2, avx512) can lower it, for tests and for comparing machines. Requesting one that
+// the CPU lacks is a RuntimeError.
 Isa cpu_isa();
 std::string_view isa_name(Isa isa);
 

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
-// Data that people name or write themselves: robots, scenes, camera systems. Ours are files of
-// models/, compiled into the library; users' are files on disk.
+// Data files of robots, scenes and camera systems. Built-in ones are the files of models/, compiled
+// into the library; user-defined ones are files on disk.
 
 #include <string>
 #include <string_view>
@@ -10,24 +10,25 @@
 namespace mjsense {
 
 struct DataFile {
-  std::string path;  // on disk, or "embedded:<file>": what errors call it
+  std::string path;  // on disk, or "embedded:<file>"; used in error messages
   std::string text;
 };
 
-// A kind of them: "models/<folder>/<name><tail>" is called <name>.
+// A kind of data file: "models/<folder>/<name><tail>" has the name <name>.
 struct DataFolder {
-  std::string_view kind;    // for messages: "scene"
+  std::string_view kind;    // used in error messages: "scene"
   std::string_view folder;  // "scenes/"
   std::string_view tail;    // "/scene.toml"
-  bool nested = false;      // names may have folders: "libero/kitchen"
+  bool nested = false;      // names may contain folders: "libero/kitchen"
 
   std::vector<std::string> names() const;
-  // One of ours by its name, or any by its path, which ends in .toml. Throws KeyError with the
-  // nearest names, ValueError for a file that there is not.
+  // Finds a built-in file by its name, or any file by its path, which must end in .toml. Throws
+  // KeyError with the nearest names, or ValueError if the file does not exist.
   DataFile find(std::string_view name_or_path) const;
 };
 
-// `name` as the file at `path` means it: from its own folder, unless it is absolute, embedded or in a package.
+// Resolves `name` relative to the folder of the file at `path`, unless it is absolute, embedded or
+// in a package.
 std::string beside(std::string_view path, const std::string& name);
 
 }  // namespace mjsense

@@ -30,8 +30,8 @@ TEST(DebugShapes, AreMuJoCosConnectors) {
   EXPECT_EQ(g[0].type, mjGEOM_ARROW);
   EXPECT_EQ(g[0].category, mjCAT_DECOR);
   EXPECT_FLOAT_EQ(g[0].pos[2], 3);
-  EXPECT_FLOAT_EQ(g[0].mat[8], 1);   // its z axis points along it
-  EXPECT_FLOAT_EQ(g[0].size[2], 2);  // its length
+  EXPECT_FLOAT_EQ(g[0].mat[8], 1);   // the z axis points along the arrow
+  EXPECT_FLOAT_EQ(g[0].size[2], 2);  // length of the arrow
   EXPECT_STREQ(g[0].label, "up");
   EXPECT_EQ(g[1].type, mjGEOM_LINE);
   EXPECT_FLOAT_EQ(g[1].size[2], 5);
@@ -58,7 +58,7 @@ TEST(DebugShapes, AFullSceneTellsHowManyFoundNoRoom) {
   DebugShapes shapes(0.03);
   for (int i = 0; i < 5; ++i) shapes.add_sphere({}, 1, {}, "hidden");
   SceneOf s(3);
-  s.scene.ngeom = 1;  // somebody else's
+  s.scene.ngeom = 1;  // a geom that was in the scene before
   EXPECT_EQ(shapes.append_to(&s.scene), 3);
   EXPECT_EQ(s.scene.ngeom, 3);
   EXPECT_STREQ(s.scene.geoms[1].label, "");

@@ -8,13 +8,13 @@
 namespace mjsense {
 
 struct EmbeddedFile {
-  std::string_view name;  // path below models/: "robots/quadruped.xml"
+  std::string_view name;  // path relative to models/: "robots/quadruped.xml"
   std::string_view text;
 };
 
 std::span<const EmbeddedFile> embedded_files();
 
-// Contents of one; throws KeyError with the nearest names.
+// Contents of one file. Throws KeyError with the nearest names.
 std::string_view embedded_file(std::string_view name);
 
 }  // namespace mjsense

@@ -8,7 +8,7 @@
 namespace mjsense {
 namespace {
 
-// Edit distance in which a transposition counts once, case is cheap.
+// Edit distance in which a transposition counts as one edit and a change of case costs less.
 int distance(std::string_view a, std::string_view b) {
   std::vector<std::vector<int>> d(a.size() + 1, std::vector<int>(b.size() + 1));
   for (std::size_t i = 0; i <= a.size(); ++i) d[i][0] = 2 * static_cast<int>(i);
@@ -33,13 +33,13 @@ int distance(std::string_view a, std::string_view b) {
 
 std::vector<std::string> nearest_names(std::string_view name,
                                        std::span<const std::string> candidates, std::size_t most) {
-  // What is longer is no slip of the finger, and takes its square in time and memory.
+  // Longer names are not misspelt names, and time and memory grow with the square of the length.
   constexpr std::size_t kMostBytes = 256;
   std::vector<std::pair<int, std::string>> scored;
   for (const std::string& c : candidates) {
     if (name.size() > kMostBytes || c.size() > kMostBytes) continue;
     int d = distance(name, c);
-    // The local part of a prefixed name, or a name given without its prefix, is near too.
+    // A name with an additional prefix, or one without its prefix, also counts as near.
     if (!name.empty() && c.size() > name.size() && c.ends_with(name)) d = 2;
     if (!c.empty() && name.size() > c.size() && name.ends_with(c)) d = 2;
     if (d <= static_cast<int>(std::max<std::size_t>(2, 2 * std::max(name.size(), c.size()) / 3))) {

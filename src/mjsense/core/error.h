@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
-// Errors that name the place, the value, the expectation and the nearest valid names.
+// Errors whose messages name the place, the value, the expectation and the nearest valid names.
 
 #include <span>
 #include <stdexcept>
@@ -10,7 +10,7 @@
 
 namespace mjsense {
 
-// What Python sees: ValueError, KeyError, RuntimeError.
+// Exception type in Python: ValueError, KeyError, RuntimeError.
 enum class ErrorKind { kValue, kKey, kRuntime };
 
 class Error : public std::runtime_error {
@@ -22,32 +22,32 @@ class Error : public std::runtime_error {
   ErrorKind kind_;
 };
 
-// A wrong argument or configuration.
+// An invalid argument or configuration.
 struct ValueError : Error {
   explicit ValueError(const std::string& message) : Error(ErrorKind::kValue, message) {}
 };
 
-// A name that does not exist.
+// An unknown name.
 struct KeyError : Error {
   explicit KeyError(const std::string& message) : Error(ErrorKind::kKey, message) {}
 };
 
-// Something outside our control failed: a file, a program, the physics.
+// A failure outside the library's control: a file, a program, the physics.
 struct RuntimeError : Error {
   explicit RuntimeError(const std::string& message) : Error(ErrorKind::kRuntime, message) {}
 };
 
-// The (at most `most`) candidates nearest to `name` by edit distance, best first; none that share
-// too little.
+// Returns up to `most` candidates nearest to `name` by edit distance, nearest first. Candidates
+// that differ too much are left out.
 [[nodiscard]] std::vector<std::string> nearest_names(std::string_view name,
                                                      std::span<const std::string> candidates,
                                                      std::size_t most = 3);
 
-// "; did you mean 'a' or 'b'?" or, when nothing is near, "; available: a, b, c" (the first 12). ""
-// if there are none.
+// "; did you mean 'a' or 'b'?" or, if no candidate is near, "; available: a, b, c" (the first 12).
+// "" if there are no candidates.
 [[nodiscard]] std::string suggest(std::string_view name, std::span<const std::string> candidates);
 
-// KeyError "sensor 'feet': no geom named 'FR_fot'; did you mean 'FR_foot'?"
+// Throws KeyError "sensor 'feet': no geom named 'FR_fot'; did you mean 'FR_foot'?"
 [[noreturn]] void throw_unknown(std::string_view place, std::string_view kind,
                                 std::string_view name, std::span<const std::string> candidates);
 

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
-// A file descriptor with an owner.
+// Owning wrapper of a file descriptor (RAII).
 
 #include <unistd.h>
 

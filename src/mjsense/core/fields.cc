@@ -74,7 +74,7 @@ void check_number(const FieldDecl& field, double x, const std::string& shown,
   throw ValueError(fmt::format("{}: {}", found(place, name, shown), range_text(field)));
 }
 
-// Long lists are of numbers: whether they are right is told without naming each.
+// Quick check of lists of numbers, which can be long: no element names are formatted.
 bool right_numbers(const FieldDecl& field, const FieldType& type, const void* value) {
   if (type.kind == Kind::kNumber) return in_range(field, get_number(type, value));
   if (type.kind == Kind::kInt)
@@ -125,7 +125,7 @@ void check_value(const FieldDecl& field, const FieldType& type, const void* valu
       const int which = type.which(value);
       if (!type.get(const_cast<void*>(value)))
         throw ValueError(fmt::format("{}{}{} is null", place, place.empty() ? "" : ": ", name));
-      if (which < 0) return;  // made outside of the list, checks itself
+      if (which < 0) return;  // unknown alternative, defined elsewhere: it checks itself
       const StructDecl& decl = *type.alternatives()[which];
       const std::string inside = fmt::format("{}{}{}", place, place.empty() ? "" : ": ", name);
       return check_fields(decl, type.get(const_cast<void*>(value)), inside);
@@ -135,7 +135,8 @@ void check_value(const FieldDecl& field, const FieldType& type, const void* valu
 
 void check_list(const FieldDecl& field, const FieldType& type, const void* value,
                 std::string_view place, const std::string& name) {
-  void* list = const_cast<void*>(value);  // the functions of a type serve reading and writing
+  // the accessors of a type are shared by reading and writing
+  void* list = const_cast<void*>(value);
   const std::size_t n = type.count(list);
   if (n == 0 && field.is_not_empty) {
     throw ValueError(fmt::format(
@@ -168,7 +169,7 @@ bool parse_number(std::string_view text, T& out) {
   return error == std::errc() && end == text.data() + text.size() && !text.empty();
 }
 
-// Sets `value` to what the text says; false if it says nothing of this type.
+// Parses `text` into `value`. Returns false if it is not text of this type.
 bool read_value(const FieldDecl& field, const FieldType& type, void* value, std::string_view text) {
   switch (type.kind) {
     case Kind::kBool:
@@ -285,7 +286,7 @@ const StructDecl& field_detail::make_struct(const StructOf& of) {
   of.visit(visitor, instance.get());
   decl.defaults = instance;
   static std::mutex mutex;
-  static std::deque<StructDecl> all;  // where they stay
+  static std::deque<StructDecl> all;  // a deque, so that references stay valid
   const std::lock_guard lock(mutex);
   return all.emplace_back(std::move(decl));
 }

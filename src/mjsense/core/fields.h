@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
-// One declaration of a field. Beside a configuration stands
+// Reflection of configuration structs. Each struct declares its fields once, next to its
+// definition:
 //
 //   template <class V>
 //   void visit_fields(V& v, ContactSensorCfg& c) {
@@ -9,10 +10,10 @@
 //     v("max_distance", c.max_distance, "Hits farther away are misses.").unit("m").positive();
 //   }
 //
-// and everything else reads it: the checks below, Python, the program's options, experiment files,
-// the fingerprint of a recording, the documentation. The sentence is no option: without one the
-// code does not compile. A reader is written once, over the table that struct_of<T>() makes of the
-// visit, and not once for each struct.
+// The checks below, the Python bindings, the program's options, experiment files, the fingerprint
+// of a recording and the documentation all use this declaration. The sentence is mandatory: without
+// it the code does not compile. Consumers are written once, for the table that struct_of<T>()
+// builds from visit_fields(), instead of once per struct.
 
 #include <array>
 #include <cstddef>
@@ -30,10 +31,11 @@
 
 namespace mjsense {
 
-// Text that says something, known at compile time.
+// A sentence of documentation, checked at compile time.
 class Sentence {
  public:
-  consteval Sentence(const char* text) : text_(text) {  // NOLINT: a literal is one
+  // NOLINT: implicit conversion from a literal is intended
+  consteval Sentence(const char* text) : text_(text) {
     const std::size_t length = __builtin_strlen(text);
     if (length < 2 || text[length - 1] != '.') throw "needs a sentence that ends with a full stop";
   }
@@ -43,8 +45,8 @@ class Sentence {
   const char* text_;
 };
 
-// The words of an enumeration whose values count from 0. Beside the enumeration:
-//   template <> inline constexpr std::array<std::string_view, 2> kWords<Side>{"left", "right"};
+// Words for the values of an enumeration that counts from 0. Specialise next to the enumeration:
+//  template <> inline constexpr std::array<std::string_view, 2> kWords<Side>{"left", "right"};
 template <class E>
 inline constexpr std::nullptr_t kWords = nullptr;
 
@@ -56,21 +58,22 @@ std::string_view word(E value) {
   return kWords<E>[static_cast<std::size_t>(value)];
 }
 
-// Number of `text` among `words`, whatever its case. ValueError "sensor 'feet': reduce is 'max':
+// Index of `text` in `words`, ignoring case. Throws ValueError "sensor 'feet': reduce is 'max':
 // must be one of none, mindist, maxforce, netforce; did you mean 'maxforce'?"
 int word_index(std::string_view text, std::span<const std::string_view> words,
                std::string_view place, std::string_view field);
 
-// A member that is one of the words: `cfg.reduce = ContactReduce::kNone` or `cfg.reduce = "none"`.
-// A word that there is not does not compile.
+// A member that holds one of the words: `cfg.reduce = ContactReduce::kNone` or `cfg.reduce =
+// "none"`. An unknown word does not compile.
 template <Worded E>
 class Word {
  public:
   using Enum = E;
   constexpr Word() = default;
-  constexpr Word(E value) : value_(value) {}                // NOLINT: it is one
-  consteval Word(const char* text) : value_(find(text)) {}  // NOLINT: a literal names one
-  constexpr operator E() const { return value_; }           // NOLINT
+  constexpr Word(E value) : value_(value) {}  // NOLINT: implicit conversion is intended
+  // NOLINT: implicit conversion is intended
+  consteval Word(const char* text) : value_(find(text)) {}
+  constexpr operator E() const { return value_; }  // NOLINT
   std::string_view text() const { return word(value_); }
   friend constexpr bool operator==(Word a, Word b) { return a.value_ == b.value_; }
   friend constexpr bool operator==(Word a, E b) { return a.value_ == b; }
@@ -93,7 +96,7 @@ E from_word(std::string_view text, std::string_view place, std::string_view fiel
 class JsonWriter;
 struct StructDecl;
 
-// What a value is, and how to reach into it.
+// Type of a value, with type-erased access to it.
 struct FieldType {
   enum class Kind {
     kBool,
@@ -103,15 +106,15 @@ struct FieldType {
     kText,
     kPath,
     kWord,      // an enumeration
-    kArray,     // of a fixed length
+    kArray,     // of fixed length
     kList,      // std::vector
-    kOptional,  // as a list of 0 or 1
-    kMap,       // std::vector of (name, value), in order
-    kObject,    // a struct with fields of its own
-    kChoice,    // one of several structs, told apart by their kinds
+    kOptional,  // accessed as a list of 0 or 1 elements
+    kMap,       // std::vector of (name, value), in insertion order
+    kObject,    // a struct with visit_fields()
+    kChoice,    // std::variant of structs, distinguished by StructDecl::kind
   };
   Kind kind;
-  std::size_t bytes = 0;                      // of a number
+  std::size_t bytes = 0;                      // of numbers
   std::span<const std::string_view> words{};  // kWord
   // kArray, kList, kOptional, kMap
   const FieldType& (*element)() = nullptr;
@@ -122,37 +125,41 @@ struct FieldType {
   void* (*append)(void* list) = nullptr;
   // kObject
   const StructDecl& (*object)() = nullptr;
-  // kChoice: its Python name, what there is, which one it is, and making it another
+  // kChoice: name in Python, the alternatives, index of the current one, pointer to it, and a
+  // function that replaces it
   const char* choice = nullptr;
   std::span<const StructDecl* const> (*alternatives)() = nullptr;
   int (*which)(const void* value) = nullptr;
   void* (*get)(void* value) = nullptr;
   void* (*emplace)(void* value, int alternative) = nullptr;
-  int plain = -1;  // the alternative that a plain number stands for: it is its first field
+  // index of the alternative that a plain number constructs, as its first field; -1: none
+  int plain = -1;
 };
 
-// One field. The functions below add what is to be known of it, in a chain.
+// One field. The member functions below add further properties and can be chained.
 struct FieldDecl {
   const char* name;
   const char* sentence;
-  const FieldType* type;  // null: only Python knows what it is
+  const FieldType* type;  // null: the field exists in Python only
   std::size_t offset;
-  const char* owner;  // the struct that declares it: a base, for what is inherited
+  // name of the struct that declares the field; a base class for inherited fields
+  const char* owner;
 
   const char* unit_ = "";
   double low = -std::numeric_limits<double>::max(), high = std::numeric_limits<double>::max();
-  bool above_low = false;  // low itself is out
+  bool above_low = false;  // `low` itself is excluded
   bool is_required = false, is_or_none = false, is_or_one = false, is_not_empty = false;
-  std::span<const std::string_view> words{};  // of a text or a list of texts
-  const char* option_ = nullptr;              // its name for people who record
-  const char* flag_ = nullptr;                // its name on the command line alone
+  std::span<const std::string_view> words{};  // accepted words of a text or of a list of texts
+  const char* option_ = nullptr;  // name as an option of recordings, if it differs from `name`
+  const char* flag_ = nullptr;    // name on the command line, if it differs from the option
   const char* fingerprint = nullptr;
   bool is_hidden = false, is_resolved = false;
   const char* python_type = "";
   const char* python_default = "";
 
   FieldDecl& unit(const char* u) { return unit_ = u, *this; }
-  // What it, or each of its components, may be. NaN never is, infinity only where said.
+  // Valid range of the field or of each of its components. NaN is never valid, infinity only if
+  // allowed explicitly.
   FieldDecl& at_least(double x) { return low = x, *this; }
   FieldDecl& at_most(double x) { return high = x, *this; }
   FieldDecl& within(double a, double b) { return low = a, high = b, *this; }
@@ -166,18 +173,17 @@ struct FieldDecl {
   }
   FieldDecl& one_of(std::span<const std::string_view> w) { return words = w, *this; }
   FieldDecl& not_empty() { return is_not_empty = true, *this; }
-  // How Python writes it: without a default; None for what is empty here; one value for a list of
-  // it.
+  // Signature in Python: no default; None for an empty value; a single value instead of a list.
   FieldDecl& required() { return is_required = true, *this; }
   FieldDecl& or_none() { return is_or_none = true, *this; }
   FieldDecl& or_one() { return is_or_one = true, *this; }
-  // Recordings: its name as an option, where that is another; not an option of its own; whether a
-  // recording resumes only with an equal value, and under which key its settings keep that.
+  // Recordings: a different option name; no option at all; whether a recording can be resumed only
+  // if the value is equal, and the key under which the recording's settings store it.
   FieldDecl& option(const char* o) { return option_ = o, *this; }
   FieldDecl& flag(const char* f) { return flag_ = f, *this; }
   FieldDecl& hidden() { return is_hidden = true, *this; }
   FieldDecl& decides_data() { return fingerprint = name, *this; }
-  FieldDecl& decides_data_as(const char* key) {  // what becomes of it stands under this key
+  FieldDecl& decides_data_as(const char* key) {  // `key` stores the resolved value
     return fingerprint = key, is_resolved = true, *this;
   }
   const char* option_name() const { return option_ ? option_ : name; }
@@ -189,21 +195,22 @@ struct StructDecl {
     const char *name, *sentence;
     bool frozen;
   };
-  const char* name = "";  // in Python
+  const char* name = "";  // name in Python
   const char* sentence = "";
-  const char* kind = "";    // "contact", "grid" ...: what tells alternatives apart
-  const char* module = "";  // of Python, where that is not configs
+  const char* kind = "";    // "contact", "grid" ...: distinguishes the alternatives of a choice
+  const char* module = "";  // Python module, if not configs
   bool frozen = false;
-  std::vector<Base> bases;  // the direct one first
+  std::vector<Base> bases;  // the direct base first
   std::vector<FieldDecl> fields;
   std::shared_ptr<const void> defaults;
-  // What its fields say of each other: validate(cfg, place) beside the struct, or its member.
+  // Checks relations between fields: validate(cfg, place) next to the struct, or its member
+  // function.
   void (*validate)(const void* object, std::string_view place) = nullptr;
   void* (*create)() = nullptr;
   void (*destroy)(void* object) = nullptr;
 
   const FieldDecl* find(std::string_view field) const;
-  std::shared_ptr<void> make() const;  // one with the defaults
+  std::shared_ptr<void> make() const;  // a new object with the defaults
 };
 
 inline void* at(void* object, const FieldDecl& field) {
@@ -216,14 +223,14 @@ inline const void* at(const void* object, const FieldDecl& field) {
 template <class T>
 const FieldType& field_type();
 
-// The only visitor: makes the table.
+// The visitor passed to visit_fields(); it fills a StructDecl.
 class FieldVisitor {
  public:
   FieldVisitor(StructDecl& decl, const void* instance) : decl_(decl), instance_(instance) {}
 
-  // First of all: the struct itself.
+  // Must be the first call: describes the struct itself.
   FieldVisitor& object(const char* name, Sentence sentence, const char* kind = "");
-  FieldVisitor& frozen();  // in Python
+  FieldVisitor& frozen();  // the Python dataclass is frozen
   FieldVisitor& module(const char* name) {
     return depth_ == 0 ? decl_.module = name, *this : *this;
   }
@@ -232,10 +239,10 @@ class FieldVisitor {
   FieldDecl& operator()(const char* name, T& member, Sentence sentence) {
     return add(name, &member, &field_type<T>(), sentence);
   }
-  // A field that only Python has.
+  // A field that exists in Python only.
   FieldDecl& python(const char* name, const char* type, const char* default_value,
                     Sentence sentence);
-  // The fields of a base, which is one in Python, too.
+  // Fields of a base class, which is also a base class in Python.
   template <class B>
   void extends(B& base) {
     const char* owner = owner_;
@@ -244,7 +251,7 @@ class FieldVisitor {
     --depth_;
     owner_ = owner;
   }
-  // The fields of a part, as if they were our own.
+  // Fields of a member, declared as fields of this struct.
   template <class B>
   void include(B& part) {
     ++included_;
@@ -267,7 +274,7 @@ concept Described = requires(FieldVisitor& v, T& t) {
 
 namespace field_detail {
 
-// What a table needs to know of a type: functions, so that the rest is compiled once.
+// Type-erased functions of a struct, so that the code that uses them is compiled once.
 struct StructOf {
   void* (*create)();
   void (*destroy)(void* object);
@@ -302,11 +309,11 @@ const StructDecl& struct_of() {
   return kDecl;
 }
 
-// ValueError for the first field that is out of its range, not a number, or no known word:
-// "sensor 'feet': num_slots is 0: must be at least 1".
+// Throws ValueError for the first field that is out of range, NaN, or not a known word: "sensor
+// 'feet': num_slots is 0: must be at least 1".
 void check_fields(const StructDecl& decl, const void* object, std::string_view place);
 
-// Of one field alone.
+// Checks one field only.
 void check_field(const FieldDecl& field, const void* object, std::string_view place);
 
 template <Described T>
@@ -314,14 +321,14 @@ void check_fields(const T& object, std::string_view place) {
   check_fields(struct_of<T>(), &object, place);
 }
 
-// A value as people write it: "3", "true", "maxforce", "0,0,1", "wrist,exo", "none" for an empty
-// list. ValueError names the field (by its option) and what was expected.
+// Parses a value as written on the command line: "3", "true", "maxforce", "0,0,1", "wrist,exo",
+// "none" for an empty list. The ValueError names the field (by its option) and what was expected.
 void read_text(const FieldDecl& field, void* object, std::string_view text);
-// The other way; "" for an optional without a value.
+// Inverse of read_text(); "" for an optional without a value.
 std::string write_text(const FieldDecl& field, const void* object);
-// Of a bool, a number or a text.
+// Writes a bool, a number or a text.
 void write_json(JsonWriter& json, const FieldDecl& field, const void* object);
-// Numbers of any width. False if it does not fit.
+// Access to numbers of any width. set_integer() returns false if the value does not fit.
 bool set_integer(const FieldType& type, void* value, std::int64_t x);
 std::int64_t get_integer(const FieldType& type, const void* value);
 void set_number(const FieldType& type, void* value, double x);
@@ -329,15 +336,16 @@ double get_number(const FieldType& type, const void* value);
 // "an int", "a number", "3 numbers" ...
 std::string expected(const FieldType& type);
 
-// ------------------------------------------------------------------------------- types of values
+// ------------------------------------------------------------------------------ types of values
 
-// The name of a choice in Python, beside the variant: template <> ... kChoiceName<PatternCfg>.
+// Name of a choice in Python. Specialise next to the variant: template <> ...
+// kChoiceName<PatternCfg>.
 template <class V>
 inline constexpr const char* kChoiceName = "";
 template <class V>
 inline constexpr int kPlainAlternative = -1;
 
-// Another type of value specialises this: see effects/all_effects.h, core/path_field.h.
+// Specialise for other types of values; see effects/all_effects.h, core/path_field.h.
 template <class T>
 struct CustomFieldType;
 
@@ -370,7 +378,7 @@ inline constexpr bool kIsVariant = false;
 template <class... T>
 inline constexpr bool kIsVariant<std::variant<T...>> = true;
 
-// Lists, optionals, arrays and maps by the same functions.
+// Containers share one set of accessor functions.
 template <class L>
 constexpr FieldType array() {
   return {.kind = Kind::kArray,
@@ -484,7 +492,7 @@ const FieldType& field_type() {
   }
 }
 
-// What most structs are made of is compiled once.
+// Common types are instantiated once, in fields.cc.
 extern template const FieldType& field_type<bool>();
 extern template const FieldType& field_type<int>();
 extern template const FieldType& field_type<float>();

@@ -24,10 +24,10 @@ FileLimitIsError::FileLimitIsError() {
 
 FileLimitIsError::~FileLimitIsError() {
   if (!ours_) return;
-  const int error = errno;  // somebody may be about to report it
+  const int error = errno;  // a caller may still report errno
   const sigset_t limit = only_the_limit();
   const timespec now = {};
-  // What waits was sent by a write of ours: it was the error.
+  // A pending signal was caused by a write of this thread, which has already failed with EFBIG.
   while (sigtimedwait(&limit, nullptr, &now) > 0) {
   }
   pthread_sigmask(SIG_SETMASK, &before_, nullptr);

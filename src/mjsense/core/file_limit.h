@@ -1,15 +1,15 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
-// The limit on the size of files (ulimit -f). Who writes beyond it gets a signal that ends the
-// program in the middle of a file, unless the signal is ignored or blocked: then the write fails
-// with EFBIG, as on a full disk.
+// Handling of the limit on file sizes (ulimit -f). By default a write beyond it raises SIGXFSZ,
+// which kills the program in the middle of a file. If the signal is ignored or blocked, the write
+// fails with EFBIG instead, as on a full disk.
 
 #include <csignal>
 
 namespace mjsense {
 
-// While it lives, a write of this thread beyond the limit is an error and no signal; what the
-// process does with signals stays as it is. May be nested.
+// RAII guard: during its lifetime, a write of this thread beyond the limit is an error instead of a
+// signal. The signal handlers of the process are unchanged. Guards may be nested.
 class FileLimitIsError {
  public:
   FileLimitIsError();
@@ -19,7 +19,7 @@ class FileLimitIsError {
 
  private:
   sigset_t before_;
-  bool ours_;  // it was not blocked before
+  bool ours_;  // the signal was not blocked before
 };
 
 }  // namespace mjsense

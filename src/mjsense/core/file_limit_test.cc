@@ -20,7 +20,7 @@
 namespace mjsense {
 namespace {
 
-// What the child of a death test does under a limit of a thousand bytes.
+// Runs `deed` in the child process of a death test, with a file size limit of 1000 bytes.
 void write_with_a_limit(const testing::TempDir& folder, auto&& deed) {
   const rlimit limit{1000, 1000};
   setrlimit(RLIMIT_FSIZE, &limit);
@@ -43,7 +43,7 @@ TEST(FileLimit, WritingBeyondItIsAnError) {
   EXPECT_TRUE(std::filesystem::is_empty(folder.path));
 }
 
-// The guard takes its own signal back and no more: what others write is theirs.
+// The guard removes only its own signal. Writes outside of it raise SIGXFSZ as before.
 TEST(FileLimit, OutsideTheSignalIsAsItWas) {
   const testing::TempDir folder;
   const auto write_much = [](const std::filesystem::path& path) {

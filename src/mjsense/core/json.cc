@@ -110,8 +110,8 @@ JsonWriter& JsonWriter::values(std::span<const double> xs) {
   return end_array();
 }
 
-// Python's ensure_ascii: UTF-8 is decoded and written as \uXXXX, as a surrogate pair beyond the
-// basic plane; a byte that is not UTF-8 becomes U+FFFD.
+// As Python's ensure_ascii: UTF-8 is decoded and written as \uXXXX, with a surrogate pair beyond
+// the basic multilingual plane. A byte that is not UTF-8 becomes U+FFFD.
 void JsonWriter::string(std::string_view text) {
   auto escape = [this](unsigned code) {
     constexpr char kHex[] = "0123456789abcdef";
@@ -189,8 +189,8 @@ int format_python_float(double x, char* out) {
   if (std::isnan(x)) return copy("NaN");
   if (std::isinf(x)) return copy(x > 0 ? "Infinity" : "-Infinity");
   if (x == 0.0) return copy(std::signbit(x) ? "-0.0" : "0.0");
-  // Shortest digits in scientific form, then laid out as repr() does: an exponent below -4 or from
-  // 16 on is written as one.
+  // Shortest digits in scientific form, then formatted as repr() does: the exponent is written if
+  // it is below -4 or at least 16.
   char sci[32];
   const char* end = std::to_chars(sci, sci + sizeof sci, x, std::chars_format::scientific).ptr;
   const char* p = sci;

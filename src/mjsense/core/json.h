@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
-// JSON text of dict sensors, byte for byte what Python's
-// json.dumps(x, sort_keys=True, separators=(",", ":")) gives (spec: floats as their shortest round
-// trip, NaN and Infinity as Python writes them, ASCII only), written straight into a fixed row.
-// Nothing allocates.
+// Writer for the JSON text of dict sensors, byte for byte equal to Python's json.dumps(x,
+// sort_keys=True, separators=(",", ":")): floats in their shortest round-trip form, NaN and
+// Infinity as Python writes them, ASCII only. Writes directly into a fixed-size row and allocates
+// nothing.
 
 #include <cstdint>
 #include <span>
@@ -13,11 +13,11 @@ namespace mjsense {
 
 class JsonWriter {
  public:
-  // Writes into `row`; what is not used is filled with 0 by finish().
+  // Writes into `row`; finish() fills the unused bytes with 0.
   explicit JsonWriter(std::span<std::uint8_t> row) : row_(row) {}
 
-  // Members of an object must be written in sorted order of their keys; a key that is not raises
-  // std::logic_error.
+  // Members of an object must be written in sorted order of their keys; otherwise std::logic_error
+  // is thrown.
   JsonWriter& begin_object();
   JsonWriter& end_object();
   JsonWriter& begin_array();
@@ -35,12 +35,12 @@ class JsonWriter {
   // A list of numbers.
   JsonWriter& values(std::span<const double> xs);
 
-  // Bytes that the whole text needs, also when it did not fit.
+  // Number of bytes of the whole text, even if it does not fit.
   std::size_t size() const { return size_; }
   [[nodiscard]] bool fits() const { return size_ <= row_.size(); }
 
-  // Pads with 0. Returns fits(): a text that does not fit is the caller's error to report, never
-  // cut silently.
+  // Pads with 0 and returns fits(). The caller must report a text that does not fit; it must not be
+  // truncated silently.
   [[nodiscard]] bool finish();
 
  private:
@@ -62,8 +62,8 @@ class JsonWriter {
   } levels_[kMaxDepth];
 };
 
-// Python's repr(float): the shortest text that reads back as x ("1.0", "1e-05", "-0.0", "NaN",
-// "Infinity"). Writes at most 32 bytes; returns their number.
+// Python's repr(float): the shortest text that parses to x ("1.0", "1e-05", "-0.0", "NaN",
+// "Infinity"). Writes at most 32 bytes and returns their number.
 int format_python_float(double x, char* out);
 
 }  // namespace mjsense

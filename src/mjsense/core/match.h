@@ -1,8 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
-// Regular expressions with the meaning of Python's `re`: case-sensitive, Unicode. Names of elements
-// are matched by them. PCRE2 does the work; pattern_subset.h says which patterns are taken: all 52
-// of mjlab 1.6 are. (A translator of all of Python's syntax stood here: three times the code.)
+// Regular expressions with the semantics of Python's `re` (case-sensitive, Unicode), for matching
+// names of MuJoCo elements. PCRE2 does the matching. pattern_subset.h defines the accepted
+// patterns, which include all 52 of mjlab 1.6. (Translating all of Python's syntax took three times
+// as much code.)
 
 #include <memory>
 #include <span>
@@ -14,7 +15,8 @@ namespace mjsense {
 
 class Regex {
  public:
-  // Throws ValueError that shows where a pattern is wrong; `place` starts its message.
+  // Throws ValueError that shows the position of a syntax error; `place` is the prefix of the
+  // message.
   explicit Regex(std::string_view pattern, std::string_view place = "regular expression");
   ~Regex();
   Regex(Regex&&) noexcept;
@@ -30,14 +32,14 @@ class Regex {
   std::unique_ptr<Code> code_;
 };
 
-// Indices, ascending, of the names that a pattern matches whole. Every pattern must match a name
-// and no name may match two patterns, else ValueError with the patterns, the names, and the nearest
-// names.
+// Returns the ascending indices of the names that fully match a pattern. Every pattern must match a
+// name and no name may match two patterns; otherwise throws ValueError with the patterns, the names
+// and the nearest names.
 std::vector<int> match_names(std::span<const std::string> patterns,
                              std::span<const std::string> names, std::string_view place);
 
-// Does an `exclude` entry drop the name? An entry with one of . * + ? [ ] { } ( ) \ | ^ $ in it is
-// a regular expression searched anywhere in the name, another one an exact name.
+// Whether an `exclude` entry drops a name. An entry that contains one of . * + ? [ ] { } ( ) \ | ^
+// $ is a regular expression searched anywhere in the name; any other entry is an exact name.
 class Exclude {
  public:
   Exclude(std::span<const std::string> entries, std::string_view place);

@@ -70,7 +70,7 @@ std::string refusal(const std::string& pattern) {
   return "";
 }
 
-// Where PCRE2 by itself would differ from Python: refused, not read otherwise.
+// Syntax that PCRE2 interprets differently from Python must be rejected.
 TEST(Match, RefusesWhatTheTwoReadDifferently) {
   for (const char* pattern :
        {"[[:a]",  "a{,2}b",         "a{}",     "\\u00e9", "\\N{DIGIT ONE}", "a\\Z",    "(?x) a b",
@@ -93,14 +93,15 @@ TEST(Match, PythonsMeaning) {
   EXPECT_TRUE(full("é+", "éé"));
   EXPECT_TRUE(full("\\w+", "bras_été_3"));
   EXPECT_TRUE(full("a$\\n", "a\n"));
-  EXPECT_TRUE(full("a|ab", "ab"));  // fullmatch goes on after the first alternative
+  EXPECT_TRUE(full("a|ab", "ab"));  // fullmatch tries further alternatives after the first
   EXPECT_TRUE(full("(?i)foot", "FOOT"));
   EXPECT_TRUE(full("(?i:f)oot", "Foot"));
   EXPECT_FALSE(full("foot", "Foot"));
   EXPECT_TRUE(full("[]a\\[-]+", "]a[-"));
 }
 
-// 10,000 random pattern lists against Python's re: which names are matched, which lists are errors.
+// 10,000 random lists of patterns, compared with Python's `re`: the matched names, and which lists
+// are errors.
 constexpr const char* kOracle = R"py(
 import random, re, sys, warnings
 warnings.simplefilter("ignore")

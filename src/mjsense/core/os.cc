@@ -26,7 +26,7 @@ constexpr std::uint64_t kUnknown = std::numeric_limits<std::uint64_t>::max();
 std::uint64_t number_in(const char* path) {
   std::ifstream file(path);
   std::uint64_t value = 0;
-  return file >> value ? value : kUnknown;  // "max" is no number
+  return file >> value ? value : kUnknown;  // "max" is not a number
 }
 
 }  // namespace
@@ -91,13 +91,13 @@ bool reserve(int file, std::int64_t bytes) {
 void end_with_parent() { prctl(PR_SET_PDEATHSIG, SIGKILL); }
 
 bool close_files(unsigned first, unsigned last) {
-  constexpr long kCloseRange = 436;  // by its number: glibc has a name for it since 2.34 only
+  constexpr long kCloseRange = 436;  // as a number, because glibc has a name for it only since 2.34
   return first > last || syscall(kCloseRange, first, last, 0U) == 0;
 }
 
 std::vector<int> open_files(int first) {
   std::vector<int> open;
-  std::error_code ignored;  // one that is gone when the child closes it does no harm
+  std::error_code ignored;  // a descriptor that is closed meanwhile does no harm
   for (const auto& entry : std::filesystem::directory_iterator("/proc/self/fd", ignored)) {
     const int fd = std::atoi(entry.path().filename().c_str());
     if (fd >= first) open.push_back(fd);

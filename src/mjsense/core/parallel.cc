@@ -15,12 +15,13 @@
 namespace mjsense {
 namespace {
 
-// The runs of one pass over sensors follow each other within microseconds, and to wake a thread that
-// sleeps takes 30 to 50: so whoever has just worked looks that long for more before it sleeps. It
-// yields, so that it takes no CPU from who has work. A pool that is not used sleeps.
+// The runs of one pass over the sensors follow each other within microseconds, and waking a
+// sleeping thread takes 30 to 50 us. A thread that has just worked therefore spins for this time
+// before it sleeps. It yields while spinning, so that it takes no CPU from working threads. A pool
+// that is not in use sleeps.
 constexpr std::chrono::microseconds kSpin{50};
 
-// Until `ready`, or the time is over.
+// Spins until `ready` or until the time is over.
 template <class Ready>
 void spin(const Ready& ready) {
   const auto end = std::chrono::steady_clock::now() + kSpin;
@@ -52,7 +53,7 @@ ThreadPool::ThreadPool(int threads) {
     workers_.reserve(count - 1);
     for (int t = 1; t < count; ++t) workers_.emplace_back([this, t] { worker(t); });
   } catch (const std::exception& e) {
-    // Those that run wait on what would be destroyed under them.
+    // The threads that did start wait on members that are about to be destroyed.
     const std::size_t started = workers_.size();
     {
       const std::lock_guard lock(mutex_);
@@ -68,8 +69,9 @@ ThreadPool::ThreadPool(int threads) {
 
 ThreadPool::~ThreadPool() {
   if (forget_owner(this)) {
-    // The threads stayed in the parent of a fork. Fresh ones in their place, for what waits on a
-    // condition cannot be destroyed, nor a thread that was not joined.
+    // After a fork, the threads exist in the parent only. The members are replaced by new ones
+    // without destroying the old, because a condition variable with waiters cannot be destroyed,
+    // nor a thread that was not joined.
     new (&workers_) std::vector<std::thread>();
     new (&mutex_) std::mutex();
     new (&wake_) std::condition_variable();
@@ -107,8 +109,8 @@ void ThreadPool::run_raw(int n, int parts, Fn fn, void* ctx) {
   }
   work(0);
   if (!alone) {
-    // Whoever has not woken up by now is not waited for: of 64 empty items that is 0.3 us instead
-    // of 47.
+    // Workers that have not woken up by now are not waited for. For 64 empty items this takes 0.3
+    // us instead of 47 us.
     await_workers();
   }
   if (failure_) std::rethrow_exception(std::exchange(failure_, nullptr));
@@ -147,7 +149,8 @@ void ThreadPool::work(int thread) {
 void ThreadPool::worker(int thread) {
   std::uint64_t seen = 0;
   while (true) {
-    // A run that is over before the mutex is ours has the same number as the one that we wait for.
+    // A run that ends before this thread gets the mutex leaves the same epoch as the one waited
+    // for.
     if (spins_ && seen > 0) spin([&] { return epoch_.load(std::memory_order_relaxed) != seen; });
     {
       std::unique_lock lock(mutex_);

@@ -1,9 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
-// A pool for casting rays and shading tiles. Ours, because a run allocates nothing, hands out items
-// in order and names the lowest that failed; as fast as TBB's parallel_for (64 items on two
-// threads: 0.3 against 1.2 us empty, 89 against 89 us of 1.4 us each). Physics runs on MuJoCo's own
-// pool; the two never run at the same time, so together they never use more threads than asked for.
+// Thread pool for casting rays and shading tiles. It is used instead of TBB's parallel_for because
+// a run allocates nothing, hands out items in order and reports the lowest failing item. It is as
+// fast: 64 items on two threads take 0.3 us (TBB: 1.2 us) if they are empty and 89 us (TBB: 89 us)
+// if each takes 1.4 us. Physics runs on MuJoCo's own pool. The two never run at the same time, so
+// together they never use more threads than requested.
 
 #include <atomic>
 #include <condition_variable>
@@ -19,7 +20,7 @@ namespace mjsense {
 
 class ThreadPool {
  public:
-  // `threads` includes the caller's; <= 0: one per CPU that this process may use.
+  // `threads` includes the caller's thread; <= 0: one per CPU that this process may use.
   explicit ThreadPool(int threads);
   ~ThreadPool();
   ThreadPool(const ThreadPool&) = delete;
@@ -27,16 +28,16 @@ class ThreadPool {
 
   int size() const { return static_cast<int>(workers_.size()) + 1; }
 
-  // Runs body(item, thread) for item in [0, n), thread in [0, size()); returns when all are done.
-  // Items are handed out in order. The exception of the lowest failing item is rethrown here; the
-  // other items still run. Allocates nothing.
+  // Runs body(item, thread) for item in [0, n), thread in [0, size()), and returns when all are
+  // done. Items are handed out in order. If items throw, the exception of the lowest one is
+  // rethrown; the other items still run. Allocates nothing.
   template <class Body>
   void run(int n, Body&& body) {
     run_parts(n, 1, body);
   }
-  // The same, but each thread begins with a part of the items that is its own in every run, and
-  // then helps the others: what it reads and writes again is in its cache. A lidar of 5,760 rays on
-  // two threads: 66 us instead of 118.
+  // Like run(), but each thread starts with the same part of the items in every run and then helps
+  // the others, so that the data of its items stays in its cache. A lidar of 5,760 rays on two
+  // threads takes 66 us instead of 118 us.
   template <class Body>
   void run_near(int n, Body&& body) {
     run_parts(n, size(), body);
@@ -53,7 +54,7 @@ class ThreadPool {
         const_cast<void*>(static_cast<const void*>(&body)));
   }
 
-  // Items [begin, end) from which whoever is free takes the next.
+  // Items [begin, end). Any idle thread takes the next one.
   struct alignas(64) Part {
     std::atomic<int> next{0};
     int end = 0;
@@ -68,20 +69,20 @@ class ThreadPool {
   bool spins_ = false;  // there is a CPU for every thread
   std::mutex mutex_;
   std::condition_variable wake_, done_;
-  // Written under the mutex; read without it by those who look before they sleep.
+  // Written under the mutex. Spinning threads read it without the mutex.
   std::atomic<std::uint64_t> epoch_{0};
-  std::atomic<int> active_{0};  // workers inside the present run
-  bool open_ = false;           // a worker may still join it
+  std::atomic<int> active_{0};  // workers in the current run
+  bool open_ = false;           // workers may still join the current run
   bool stop_ = false;
   Fn fn_ = nullptr;
   void* ctx_ = nullptr;
   std::vector<Part> parts_;  // [size()]
-  int num_parts_ = 1;        // of the present run
+  int num_parts_ = 1;        // parts of the current run
   int failed_item_ = -1;
   std::exception_ptr failure_;
 };
 
-// CPUs that this process may run on (its affinity mask, not the machine's count).
+// Number of CPUs that this process may run on (its affinity mask, not the machine's count).
 int available_cpus();
 
 }  // namespace mjsense

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Runs of 16 items that follow each other after a pause: pool/<us of work>/<us of pause>/<threads>.
-// Only the runs are timed.
+// Benchmark of ThreadPool: runs of 16 items in quick succession, after a pause. Only the runs are
+// timed. Name: pool/<us of work>/<us of pause>/<threads>.
 
 #include <benchmark/benchmark.h>
 
@@ -19,7 +19,7 @@ void compute(long loops) {
   for (long i = 0; i < loops; ++i) benchmark::DoNotOptimize(x = x * 1664525u + 1013904223u);
 }
 
-// Of compute(), on this machine.
+// Loop iterations of compute() per microsecond on this machine.
 double loops_a_microsecond() {
   double best = 0;
   for (int k = 0; k < 20; ++k) {

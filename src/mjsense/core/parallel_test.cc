@@ -16,11 +16,12 @@ namespace {
 
 using std::chrono::microseconds;
 
-// Threads wait awake for a while, then asleep: runs come within that time, at its end, and after.
+// Threads first spin and then sleep. The runs begin while they spin, when they stop spinning, and
+// while they sleep.
 TEST(ThreadPool, RunsFollowEachOtherAtAnyDistance) {
   for (const int threads : {2, 5}) {
     ThreadPool pool(threads);
-    std::vector<int> sums(16);  // no atomics: what items wrote is there when run() returns
+    std::vector<int> sums(16);  // no atomics: what items wrote is visible when run() returns
     int wanted = 0;
     for (int run = 0; run < 600; ++run) {
       pool.run(16, [&](int i, int) { sums[i] += run; });
@@ -46,7 +47,7 @@ TEST(ThreadPool, GoesOnAfterAnException) {
   }
 }
 
-// All threads at once, an item each: none takes another's as long as its own waits.
+// All threads run at once, one item each. No thread takes another's item while its own is pending.
 TEST(ThreadPool, NearItsThreadsItemsBeginWhereTheyDidBefore) {
   ThreadPool pool(4);
   for (int run = 0; run < 100; ++run) {
@@ -66,7 +67,7 @@ TEST(ThreadPool, NearItsThreadsEveryItemRunsOnce) {
   for (const int threads : {1, 2, 5}) {
     ThreadPool pool(threads);
     for (const int n : {1, 3, 37, 200}) {
-      std::vector<int> hits(n);  // an item is one thread's
+      std::vector<int> hits(n);  // each item is run by one thread only
       pool.run_near(n, [&](int i, int) { ++hits[i]; });
       EXPECT_EQ(hits, std::vector<int>(n, 1));
     }
@@ -93,7 +94,7 @@ TEST(ThreadPool, TakesNoProcessorTimeWhenNothingRuns) {
   ThreadPool pool(2);
   pool.run(64, [](int, int) {});
   std::this_thread::sleep_for(std::chrono::milliseconds(5));
-  const std::clock_t before = std::clock();  // of the process
+  const std::clock_t before = std::clock();  // of the whole process
   std::this_thread::sleep_for(std::chrono::milliseconds(200));
   EXPECT_LT(static_cast<double>(std::clock() - before) / CLOCKS_PER_SEC, 0.02);
 }

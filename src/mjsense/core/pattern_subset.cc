@@ -17,8 +17,8 @@ class Scanner {
   explicit Scanner(std::string_view pattern) : in_(pattern) {}
 
   void run() {
-    // What stands before decides whether a quantifier may follow: nothing, an anchor and another
-    // quantifier are errors in Python, not in PCRE2.
+    // Whether a quantifier may follow depends on what precedes it. At the start, after an anchor
+    // and after another quantifier it is an error in Python, but not in PCRE2.
     bool repeatable = false;
     while (!end()) {
       const char c = peek();
@@ -68,7 +68,7 @@ class Scanner {
     if (peek() == '?' || peek() == '+') ++pos_;
   }
 
-  // False for an anchor.
+  // Returns false for an anchor.
   bool escape() {
     const std::size_t start = pos_++;
     const char c = peek();
@@ -78,7 +78,7 @@ class Scanner {
     return true;
   }
 
-  // After a backslash and `c`: what means the same in and outside of a set.
+  // Escapes (a backslash and `c`) that have the same meaning inside and outside of a set.
   bool character_escape(char c) {
     if (c == 'x') {
       if (!is_hex(peek()) || !is_hex(peek(1))) return false;
@@ -94,7 +94,7 @@ class Scanner {
   void set() {
     const std::size_t start = pos_++;
     take("^");
-    bool class_before = false;  // \d and the like cannot begin a range
+    bool class_before = false;  // \d and the like cannot start a range
     for (bool first = true; first || peek() != ']'; first = false) {
       if (end()) refuse("a set without its ]", start);
       const std::size_t at = pos_;
@@ -117,8 +117,8 @@ class Scanner {
     ++pos_;
   }
 
-  // The head of a group; always false, for nothing repeats it. A ')' is a character like others
-  // here: whether groups are closed is for the compiler.
+  // Reads the start of a group. Always returns false, because no quantifier may follow it. A ')' is
+  // treated as any other character here; the compiler checks whether groups are closed.
   bool group() {
     const std::size_t start = pos_++;
     if (peek() == '*') refuse("(*", start);

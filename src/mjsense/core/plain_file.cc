@@ -30,8 +30,8 @@ const char* kind_of(mode_t mode) {
   return "a device";
 }
 
-// A hole of a file takes no space on a disk, and as long to read as if it did. A network's file
-// system that says that nothing is stored knows no holes either.
+// A hole in a sparse file takes no space on the disk, but takes as long to read as data. Some
+// network file systems report that no blocks are allocated; they do not report holes either.
 constexpr std::int64_t kFreeBytes = std::int64_t{1} << 30, kMostOfHoles = 1000;
 
 bool is_mostly_holes(int fd, const struct stat& about) {
@@ -42,13 +42,14 @@ bool is_mostly_holes(int fd, const struct stat& about) {
   return holes;
 }
 
-// Bytes of the character that begins here and can be shown; 0 if there is none.
+// Number of bytes of the first character if it can be displayed, otherwise 0.
 std::size_t character(std::string_view text) {
   const auto byte = [&](std::size_t i) { return static_cast<unsigned char>(text[i]); };
   const std::size_t size = utf8_size(text);
   if (size <= 1) return is_control(text[0]) ? 0 : size;
   if (byte(0) == 0xC2 && byte(1) < 0xA0) return 0;  // C1 controls
-  // Other lines, and other directions of writing, in which a name looks like another one.
+  // Line separators, and marks that change the direction of writing and can make a name look like
+  // another one.
   if (byte(0) == 0xE2 && byte(1) == 0x80 && byte(2) >= 0xA8 && byte(2) <= 0xAE) return 0;
   if (byte(0) == 0xE2 && byte(1) == 0x81 && byte(2) >= 0xA6 && byte(2) <= 0xA9) return 0;
   return size;
@@ -74,7 +75,7 @@ Fd open_plain(int folder, std::string_view name) {
     throw RuntimeError(fmt::format("'{}' {}", printable(name), why));
   };
   if (!is_plain_name(name)) fail("is no plain file name, which stays in its folder");
-  // Without O_NONBLOCK a pipe would make us wait for its writer.
+  // Without O_NONBLOCK, opening a pipe would wait for a writer.
   Fd file(
       openat(folder, std::string(name).c_str(), O_RDONLY | O_NOFOLLOW | O_NONBLOCK | O_CLOEXEC));
   if (!file && errno == ELOOP) fail("is a link, which is not followed");
@@ -105,7 +106,7 @@ std::string read_text_file(const std::string& path) {
   const auto fail = [&](std::string_view why) {
     throw ValueError(fmt::format("{}: {}", printable(path), why));
   };
-  // A NUL would end the name for the system.
+  // The system would end the name at a NUL.
   const bool name = path.find('\0') == path.npos;
   const Fd file(name ? open(path.c_str(), O_RDONLY | O_NONBLOCK | O_CLOEXEC) : -1);
   if (!name || (!file && (errno == ENOENT || errno == ENOTDIR))) fail("no such file");
@@ -163,7 +164,7 @@ bool write_all(const Fd& file, std::span<const std::byte> bytes) {
 void write_file(const std::filesystem::path& path,
                 std::initializer_list<std::span<const std::byte>> pieces) {
   const FileLimitIsError limit;
-  // A name of its own: others, in this process or elsewhere, may be writing the same file.
+  // A unique temporary name, because other threads or processes may be writing the same file.
   static std::atomic<unsigned> calls = 0;
   const std::string part = fmt::format("{}.{}-{}.part", path.string(), getpid(), ++calls);
   const auto fail = [&] {
@@ -171,7 +172,8 @@ void write_file(const std::filesystem::path& path,
     unlink(part.c_str());
     throw RuntimeError(fmt::format("cannot write '{}': {}", path.string(), std::strerror(error)));
   };
-  unlink(part.c_str());  // of a process of that number, or a link that leads elsewhere
+  // left by an earlier process with the same id, or a link planted by someone else
+  unlink(part.c_str());
   Fd file(open(part.c_str(), O_WRONLY | O_CREAT | O_EXCL | O_NOFOLLOW | O_CLOEXEC, 0644));
   if (!file) fail();
   for (const std::span<const std::byte> piece : pieces) {

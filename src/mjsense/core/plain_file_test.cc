@@ -51,7 +51,7 @@ TEST(PlainFile, OnlyFilesOfTheFolder) {
   }
 }
 
-// A terabyte of nothing would be read for minutes, by who computes its checksum.
+// A checksum of a terabyte of holes would take minutes.
 TEST(PlainFile, HolesAreNotRead) {
   testing::TempDir dir;
   std::ofstream(dir.path / "video.mp4") << "x";
@@ -83,7 +83,7 @@ TEST(PlainFile, TextsThatSomebodyWrote) {
   EXPECT_THAT(read("/dev/zero"), EndsWith("is a device, expected a file"));
   EXPECT_THAT(read(dir.path), EndsWith("is a folder, expected a file"));
   EXPECT_THAT(read(dir.file("large")), EndsWith("has more than 16 MiB"));
-  // To say nothing would mean an empty experiment.
+  // An empty text instead of an error would be taken for an empty experiment.
   EXPECT_THAT(read("/proc/self/mem"), EndsWith("cannot be read: Input/output error"));
 }
 
@@ -91,7 +91,7 @@ TEST(PlainFile, WrittenWholeOrNotAtAll) {
   testing::TempDir dir;
   const std::filesystem::path mine = dir.path / "mine", out = dir.path / "out";
   std::ofstream(mine) << "mine";
-  for (int i = 1; i < 50; ++i)  // planted
+  for (int i = 1; i < 50; ++i)  // planted by an attacker
     std::filesystem::create_symlink(mine, fmt::format("{}.{}-{}.part", out.string(), getpid(), i));
   const std::string text = "text";
   write_file(out, {std::as_bytes(std::span(text)), std::as_bytes(std::span(text))});
@@ -129,8 +129,8 @@ TEST(PlainFile, PrintableText) {
   EXPECT_EQ(printable("\xff\xfe.mp4"), "??.mp4");
   EXPECT_EQ(printable("\xc2\x9b"
                       "31m"),
-            "??31m");                           // the one-byte form of escape and bracket
-  EXPECT_EQ(printable("\xed\xa0\x80"), "???");  // half of a pair
+            "??31m");                           // the one-byte form (CSI) of escape and bracket
+  EXPECT_EQ(printable("\xed\xa0\x80"), "???");  // half of a surrogate pair
   EXPECT_EQ(printable("cut \xe6\x97"), "cut ??");
   EXPECT_EQ(printable("gpj\u202e.exe\u2066 \u2028"), "gpj???.exe??? ???");
   EXPECT_EQ(printable("\u2027\u202f\u2065"), "\u2027\u202f\u2065");
@@ -138,7 +138,7 @@ TEST(PlainFile, PrintableText) {
   EXPECT_EQ(printable_lines(""), "");
 }
 
-// What the system does not give is an error, and nobody waits for what was started.
+// If the system refuses to start threads, that is an error. Threads that were started are ended.
 TEST(ThreadPool, ThreadsThatCannotBeStarted) {
   EXPECT_THROW(ThreadPool(1'000'000), ValueError);
 #if !defined(__SANITIZE_ADDRESS__) && !defined(__SANITIZE_THREAD__)
@@ -146,7 +146,7 @@ TEST(ThreadPool, ThreadsThatCannotBeStarted) {
   if (pid == 0) {
     alarm(20);
     const rlimit limit{std::uint64_t{3} << 30, std::uint64_t{3} << 30};
-    setrlimit(RLIMIT_AS, &limit);  // a thread takes 8 MiB of it
+    setrlimit(RLIMIT_AS, &limit);  // each thread reserves 8 MiB of it
     try {
       const ThreadPool pool(4000);
       _exit(2);
@@ -160,7 +160,7 @@ TEST(ThreadPool, ThreadsThatCannotBeStarted) {
 #endif
 }
 
-// In the child of a fork the threads are not there: its end does not wait for them.
+// In the child of a fork the threads do not exist. The destructor must not wait for them.
 TEST(ThreadPool, EndsInTheChildOfAFork) {
   auto pool = std::make_unique<ThreadPool>(3);
   pool->run(8, [](int, int) {});

@@ -39,8 +39,8 @@ std::vector<std::uint8_t> encode_png(std::span<const std::uint8_t> pixels, int w
   }
   const std::size_t stride = static_cast<std::size_t>(width) * channels;
 
-  // Each row is stored as its difference to the row above (filter 2): rendered pictures shrink well
-  // under it.
+  // Filter 2: each row is stored as its difference from the row above, which compresses rendered
+  // images well.
   std::vector<std::uint8_t> rows((stride + 1) * height);
   for (int y = 0; y < height; ++y) {
     std::uint8_t* to = rows.data() + y * (stride + 1);

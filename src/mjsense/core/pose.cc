@@ -47,8 +47,8 @@ Twist log6(const Pose& pose) {
   const Vec3 w = log3(pose.q);
   const double a = norm(w);
   if (a < kSmallAngle) return {pose.p, w};
-  // V^-1 = I - [w]/2 + c [w]^2, c = 1/a^2 - (1 + cos a)/(2 a sin a), written with half angles to
-  // stay exact near pi.
+  // V^-1 = I - [w]/2 + c [w]^2, c = 1/a^2 - (1 + cos a)/(2 a sin a). Written with half angles, it
+  // stays accurate near pi.
   const double half = 0.5 * a;
   const double c = (1.0 - half * std::cos(half) / std::sin(half)) / (a * a);
   const Vec3 wp = cross(w, pose.p);

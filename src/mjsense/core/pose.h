@@ -62,10 +62,10 @@ inline Quat axis_angle(Vec3 axis, double angle) {
   const double s = std::sin(0.5 * angle);
   return {std::cos(0.5 * angle), s * axis.x, s * axis.y, s * axis.z};
 }
-// The rotation whose matrix has these columns (orthonormal, right-handed).
+// Rotation whose matrix has these columns (orthonormal, right-handed).
 Quat quat_from_columns(Vec3 x, Vec3 y, Vec3 z);
 
-// The rotation vector of q (axis times angle in [0, pi]).
+// Rotation vector of q (axis times angle in [0, pi]).
 inline Vec3 log3(Quat q) {
   if (q.w < 0) q = {-q.w, -q.x, -q.y, -q.z};
   const Vec3 u{q.x, q.y, q.z};
@@ -81,7 +81,7 @@ inline Quat exp3(Vec3 w) {
 // Angle of the rotation from a to b, rad in [0, pi].
 inline double angle_between(Quat a, Quat b) { return norm(log3(conjugate(a) * b)); }
 
-// X_AB: pose of frame B in frame A. X_AB * X_BC = X_AC; X_AB * p_B = p_A.
+// X_AB is the pose of frame B in frame A: X_AB * X_BC = X_AC; X_AB * p_B = p_A.
 struct Pose {
   Vec3 p;
   Quat q;
@@ -105,7 +105,7 @@ void write_pose(const Pose& pose, T* out) {
   for (int i = 0; i < 7; ++i) out[i] = static_cast<T>(values[i]);
 }
 
-// A body-frame twist: linear part first (m), then angular (rad), as for exp6/log6.
+// A body-frame twist: linear part first (m), then angular (rad), as used by exp6/log6.
 struct Twist {
   Vec3 v, w;
 };
@@ -113,9 +113,9 @@ struct Twist {
 inline Twist operator*(double s, const Twist& t) { return {s * t.v, s * t.w}; }
 inline double norm(const Twist& t) { return std::sqrt(dot(t.v, t.v) + dot(t.w, t.w)); }
 
-// The screw motion for unit time, and its inverse: exp6(log6(X)) = X for rotations below pi.
-// log6: w = rotvec; v = V^-1 p, V = I + (1-cos a)/a^2 [w] + (a - sin a)/a^3 [w]^2, a = |w|; for a <
-// 1e-6, v = p.
+// Screw motion for unit time, and its inverse: exp6(log6(X)) = X for rotations below pi. log6: w is
+// the rotation vector; v = V^-1 p, V = I + (1-cos a)/a^2 [w] + (a - sin a)/a^3 [w]^2, a = |w|; for
+// a < 1e-6, v = p.
 Pose exp6(const Twist& twist);
 Twist log6(const Pose& pose);
 

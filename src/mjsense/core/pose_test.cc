@@ -16,20 +16,20 @@ TEST(Pose, LogIsTheInverseOfExp) {
   Rng rng(3, 0, 0, 0);
   for (int i = 0; i < 1000; ++i) {
     Vec3 w = random_vector(rng, 1.0);
-    // Rotations from none to just below a half turn.
+    // Rotations from zero to just below half a turn.
     w = (3.14 * rng.uniform() / norm(w)) * w;
     if (i % 10 == 0) w = 1e-7 * w;
     const Twist twist{random_vector(rng, 0.5), w};
     const Twist back = log6(exp6(twist));
-    // Below 1e-6 rad the linear part is the translation itself, off by at most half the angle times
-    // its length.
+    // Below 1e-6 rad the linear part is the translation itself; its error is at most half the angle
+    // times its length.
     EXPECT_LT(norm(back.v - twist.v), 1e-6) << i;
     EXPECT_LT(norm(back.w - twist.w), 1e-9) << i;
   }
 }
 
 TEST(Pose, ScrewAboutAnOffsetAxis) {
-  // A quarter turn about z through (1, 0, 0) takes the origin to (1, -1, 0).
+  // A quarter turn about the z axis through (1, 0, 0) moves the origin to (1, -1, 0).
   const double a = M_PI / 2;
   const Twist twist{{0, -a, 0}, {0, 0, a}};
   const Pose pose = exp6(twist);

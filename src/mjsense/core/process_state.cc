@@ -21,7 +21,7 @@ struct Owners {
   std::set<const void*> alive, orphans;
 };
 
-// Never destroyed: owners may end after it would be.
+// Never destroyed, because owners may be destroyed after static objects.
 Owners& owners() {
   static Owners& all = *[] {
     pthread_atfork([] { owners().mutex.lock(); }, [] { owners().mutex.unlock(); },

@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
-// Random numbers that are a pure function of (seed, world, stream, step, draw): the same at any
-// thread count and any order. Philox4x32-10: Salmon et al., "Parallel random numbers: as easy as 1,
-// 2, 3", SC 2011.
+// Random numbers that are a pure function of (seed, world, stream, step, draw), so they do not
+// depend on the number of threads or the order of evaluation. Philox4x32-10: Salmon et al.,
+// "Parallel random numbers: as easy as 1, 2, 3", SC 2011.
 
 #include <array>
 #include <cmath>
@@ -12,7 +12,7 @@
 
 namespace mjsense {
 
-// Stable hash of a sensor's or effect's name: its stream (FNV-1a).
+// Stream of a sensor or an effect: a stable hash (FNV-1a) of its name.
 constexpr std::uint32_t stream_of(std::string_view name) {
   std::uint32_t h = 2166136261u;
   for (char c : name) h = (h ^ static_cast<std::uint8_t>(c)) * 16777619u;
@@ -21,7 +21,7 @@ constexpr std::uint32_t stream_of(std::string_view name) {
 
 class Rng {
  public:
-  // `step` identifies the moment (a world's step counter, or its episode number for draws made at
+  // `step` identifies the time (a world's step counter, or its episode number for draws made at
   // reset).
   Rng(std::uint64_t seed, std::uint32_t world, std::uint32_t stream, std::uint64_t step)
       : key_{static_cast<std::uint32_t>(seed) ^ (stream * 0x9E3779B9u),
@@ -35,11 +35,11 @@ class Rng {
   }
   std::uint64_t next64() { return (static_cast<std::uint64_t>(next()) << 32) | next(); }
 
-  // [0, 1) with 53 random bits.
+  // Uniform in [0, 1), with 53 random bits.
   double uniform() { return static_cast<double>(next64() >> 11) * 0x1.0p-53; }
   double uniform(double low, double high) { return low + (high - low) * uniform(); }
 
-  // Uniform integer in [0, n), n > 0; without modulo bias (Lemire's multiply-shift with rejection).
+  // Uniform integer in [0, n), n > 0, without modulo bias (Lemire's multiply-shift with rejection).
   std::uint32_t below(std::uint32_t n) {
     std::uint64_t product = static_cast<std::uint64_t>(next()) * n;
     if (static_cast<std::uint32_t>(product) < n) {
@@ -50,7 +50,7 @@ class Rng {
     return static_cast<std::uint32_t>(product >> 32);
   }
 
-  // Standard normal (Box-Muller; the second value is kept).
+  // Standard normal (Box-Muller; the second value is used by the next call).
   double normal() {
     if (has_spare_) {
       has_spare_ = false;

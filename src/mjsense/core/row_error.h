@@ -9,12 +9,12 @@
 
 namespace mjsense {
 
-// Rows that could not be filled, one fault a world. The episodes of these worlds cannot go on; all
-// other rows of the call are there, and other worlds' episodes go on.
+// Rows that could not be computed, at most one fault per world. The episodes of these worlds cannot
+// continue. All other rows of the call are valid, and the episodes of other worlds continue.
 struct RowError : ValueError {
   struct Fault {
     int world;
-    std::string text;  // names sensor and world
+    std::string text;  // names the sensor and the world
   };
   RowError(int world, const std::string& text) : RowError(std::vector<Fault>{{world, text}}) {}
   explicit RowError(std::vector<Fault> faults)

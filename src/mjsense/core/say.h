@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
-// Messages on stderr. A message that cannot be written, because the terminal is gone or the disk is
-// full, is dropped: fmt::print() would throw.
+// Prints a message for users on stderr. If it cannot be written, because the terminal is gone or
+// the disk is full, the program must continue; fmt::print() would throw.
 
 #include <fmt/format.h>
 

@@ -1,15 +1,15 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
-// The one idea of mjsense: a named, typed, batched measurement. Given B worlds a sensor owns
+// The central concept of mjsense: a named, typed, batched measurement. For B worlds a sensor owns
 // preallocated rows [B, ...] and fills row w from world w. Scene sensors, observation sensors and
-// users' own are this class and have this life:
+// user-defined sensors derive from this class. Their life cycle:
 //
 //   edit_spec(spec)   before compilation: add the MuJoCo elements it needs
-//   initialize(init)  after compilation: resolve names to ids, declare fields; no allocation later
-//   substep(world)    after each physics step, if wants_substep(): air time, history
-//   compute(world)    fill row w; a pure function of (model, data, its own state, its RNG key)
-//   cast(context)     stages kCast and kBatch: the work that is done for many worlds at once
-//   reset(world)      forget the episode of this world; compute() follows before anybody reads
+// initialize(init)  after compilation: resolve names to ids, declare fields; no later allocation
+// substep(world)    after each physics step, if wants_substep(): air time, history
+// compute(world)    fill row w; a pure function of (model, data, sensor state, RNG key)
+// cast(context)     stages kCast and kBatch: work that is done for many worlds at once
+// reset(world)      a new episode of this world begins; compute() follows before rows are read
 
 #include <mujoco/mujoco.h>
 
@@ -33,11 +33,11 @@ class Scene;
 class Shared;
 class ThreadPool;
 
-// One world as a sensor sees it. In compute() and substep() the derived fields of `data` belong to
-// its present state: positions and contacts, velocities, accelerations and forces, as far as the
-// sensor needs() them; in reset() all of them. `model` holds the world's own values of randomised fields and is valid during the call only. MuJoCo
-// errors leave a call by longjmp: hold no object with a destructor across a MuJoCo function that
-// can fail.
+// One world as passed to a sensor. In compute() and substep() the derived fields of `data`
+// (positions and contacts, velocities, accelerations and forces) are up to date as far as the
+// sensor's needs() requires; in reset() all of them are. `model` holds the world's own values of
+// randomised fields and is valid during the call only. MuJoCo errors leave a call by longjmp, so do
+// not hold an object with a destructor across a MuJoCo function that can fail.
 struct World {
   int id = 0;  // row, 0 .. B-1
   const mjModel* model = nullptr;
@@ -45,26 +45,27 @@ struct World {
   std::int64_t substep =
       0;  // physics steps since this world's last reset; time = substep * model->opt.timestep
   std::int64_t tick =
-      0;  // physics steps since the last seeding; never goes back at a reset: the RNG's step
+      0;  // physics steps since the last seeding, not reset with the episode; the step of the RNG
   std::int64_t episode = 0;  // resets of this world since the last seeding
   std::uint64_t seed = 0;
-  bool first = false;     // no step was taken since the reset
-  std::uint32_t key = 0;  // whose random numbers these are: the world's id, or its episode's number
-  // Changes whenever the derived fields of `data` may have: a physics step, forward, reset. What
-  // was taken from them at an equal moment of the same world may be reused. 0: not known.
+  bool first = false;     // no step since the reset
+  std::uint32_t key = 0;  // RNG key of the world: its id, or the number of its episode
+  // Changes whenever the derived fields of `data` may have changed: at a physics step, forward or
+  // reset. Results computed from them may be reused while the world's `moment` is equal. 0:
+  // unknown.
   std::uint64_t moment = 0;
-  double elapsed = 0.0;  // s that one substep() stands for; 0: the model's timestep
+  double elapsed = 0.0;  // s, duration that one substep() represents; 0: the model's timestep
 
   double dt() const { return elapsed > 0.0 ? elapsed : model->opt.timestep; }
   double time() const { return static_cast<double>(substep) * model->opt.timestep; }
-  // Numbers for this moment: the same at any thread count and any B.
+  // Random numbers for the current step; independent of the number of threads and of B.
   Rng rng(std::uint32_t stream) const {
     return {seed, key, stream, static_cast<std::uint64_t>(tick)};
   }
 };
 
-// One typed buffer of a sensor and what it means. A sensor with one field names it ""; its stream
-// is the sensor's own name. Another field's stream is "sensor/field".
+// One typed buffer of a sensor and its description. A sensor with a single field names it "", and
+// the stream has the sensor's name. The stream of any other field is "sensor/field".
 struct Field {
   std::string name;
   SensorSpec spec;
@@ -73,16 +74,16 @@ struct Field {
 
 struct SensorInit {
   const mjModel* model = nullptr;
-  const Scene* scene = nullptr;  // null where a sensor is used without a scene
+  const Scene* scene = nullptr;  // null if the sensor is used without a scene
   int num_worlds = 1;
   int decimation = 1;  // substeps per control step
   int threads = 1;
-  Shared* shared = nullptr;  // null where a sensor is used alone
+  Shared* shared = nullptr;  // null if the sensor is used outside of a simulation
 };
 
-// What cast() traces: the ray scene as compute() of the worlds `ids` left it.
+// Input of cast(): the ray scene after compute() of the worlds `ids`.
 struct CastContext {
-  RayScene* rays;            // null for stage kBatch in a scene that casts nothing
+  RayScene* rays;            // null for stage kBatch in a scene without ray casting
   std::span<const int> ids;  // sorted
   ThreadPool& pool;
 };
@@ -90,8 +91,9 @@ struct CastContext {
 enum class Stage {
   kRow,       // compute() alone fills the row
   kCast,      // compute() prepares poses, cast() traces
-  kPostCast,  // compute() reads rows of kCast sensors: runs after them
-  kBatch,     // cast() alone, on the caller's thread, after all others: sensors written in Python
+  kPostCast,  // compute() reads rows of kCast sensors, so it runs after them
+  // only cast() is called, on the caller's thread, after all others: sensors written in Python
+  kBatch,
 };
 
 class Sensor {
@@ -105,7 +107,7 @@ class Sensor {
   virtual std::string_view kind() const = 0;         // "builtin", "contact", "camera", ...
 
   virtual void edit_spec(mjSpec* spec);
-  // Further sensors that it brings into its scene's registry, after the discovered ones; asked
+  // Further sensors that this one adds to its scene's registry, after the discovered ones. Called
   // once, after edit_spec().
   virtual std::vector<std::unique_ptr<Sensor>> parts();
   virtual void initialize(const SensorInit& init) = 0;
@@ -115,35 +117,37 @@ class Sensor {
   virtual void cast(const CastContext& context);
   virtual void reset(const World& world);
 
-  // Debug drawing. draw() adds what a human should see of the row of this world, which is current;
-  // ValueError if that is never anything. debug_vis(): wherever the scene is drawn, unasked.
+  // Debug visualisation. draw() adds shapes for the current row of this world; it throws ValueError
+  // if the sensor has nothing to draw. If debug_vis() is true, the shapes are drawn wherever the
+  // scene is.
   virtual bool debug_vis() const { return false; }
   virtual void draw(const World& world, DebugShapes& shapes);
 
   virtual Stage stage() const { return Stage::kRow; }
-  // The last stage of MuJoCo's computation whose results compute() and substep() read:
-  // mjSTAGE_NONE the state alone, mjSTAGE_POS poses and contacts, mjSTAGE_VEL, mjSTAGE_ACC
-  // accelerations and forces. A stage that nobody needs is not computed, and the last costs a
-  // constraint solve a control step. Asked once, after initialize().
+  // The last stage of MuJoCo's pipeline whose results compute() and substep() read: mjSTAGE_NONE
+  // the state only, mjSTAGE_POS poses and contacts, mjSTAGE_VEL velocities, mjSTAGE_ACC
+  // accelerations and forces. Stages that no sensor needs are skipped; the last one costs a
+  // constraint solve per control step. Called once, after initialize().
   virtual mjtStage needs() const { return mjSTAGE_ACC; }
-  // True if compute() must run exactly once a control step, read or not (delays, rates, filters).
+  // True if compute() must run exactly once per control step even if the sensor is not read
+  // (delays, rates, filters).
   virtual bool eager() const { return false; }
-  // Keys of the sensors of its scene that initialize() looks at: they are initialized first.
+  // Keys of the scene's sensors that initialize() accesses; they are initialized first.
   virtual std::vector<std::string> reads() const { return {}; }
-  // Sensors whose rows compute() reads: they are computed first.
+  // Sensors whose rows compute() reads; they are computed first.
   virtual std::span<Sensor* const> inputs() const { return {}; }
 
-  // Fields, valid after initialize(). Their addresses do not change.
+  // Fields, valid after initialize(). Their addresses are stable.
   std::deque<Field>& fields() { return fields_; }
   const std::deque<Field>& fields() const { return fields_; }
   const Field& field(
-      std::string_view name = "") const;  // throws KeyError naming the fields there are
+      std::string_view name = "") const;  // throws KeyError with the names of the fields
   std::size_t bytes_per_world() const;
 
  protected:
-  // Declares a field: allocates [B, *shape]. `spec.name` is filled in. Call from initialize() only.
+  // Declares a field and allocates [B, *shape]. Sets `spec.name`. Call it from initialize() only.
   Field& add_field(std::string_view name, SensorSpec spec, int num_worlds);
-  // A field whose rows are those of another sensor's field, which must live longer.
+  // Declares a field that shares the rows of another sensor's field, which must outlive it.
   Field& share_field(std::string_view name, SensorSpec spec, Field& source);
   void clear_fields() { fields_.clear(); }
 
@@ -152,12 +156,12 @@ class Sensor {
   std::deque<Field> fields_;
 };
 
-// The configuration of a scene sensor; build() makes the sensor.
+// Configuration of a scene sensor; build() creates the sensor.
 struct SensorCfg {
   std::string name;
   virtual ~SensorCfg() = default;
   [[nodiscard]] virtual std::unique_ptr<Sensor> build() const = 0;
-  // Key in the scene's registry: "robot/imu" for a built-in sensor on an entity, else the plain
+  // Key in the scene's registry: "robot/imu" for a built-in sensor of an entity, otherwise the
   // name.
   virtual std::string key() const { return name; }
 

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
-// Sensor configurations as tables of fields: a kind of sensor is what readers know of all of them.
+// Sensor configurations as tables of fields (core/fields.h). SensorKind gives generic code access
+// to any kind of sensor.
 
 #include <memory>
 
@@ -17,11 +18,11 @@ void visit_fields(V& v, SensorCfg& c) {
 }
 
 struct SensorKind {
-  const StructDecl* cfg;  // its kind is the sensor's kind()
-  const DataClass* data;  // null: a plain array
+  const StructDecl* cfg;  // its `kind` equals the sensor's kind()
+  const DataClass* data;  // null: the sensor returns a plain array
   SensorCfg* (*base)(void* fields);
 
-  // A default configuration, and where its fields are.
+  // Creates a default configuration and sets `fields` to the object that its StructDecl describes.
   std::shared_ptr<SensorCfg> make(void** fields) const;
 };
 

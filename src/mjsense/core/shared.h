@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
-// Things that several sensors of a simulation need and one of them makes: textures, tables.
+// Cache of objects that several sensors of a simulation share, such as textures and tables.
 
 #include <map>
 #include <memory>
@@ -10,7 +10,8 @@ namespace mjsense {
 
 class Shared {
  public:
-  // What make() returned for this key, as long as anybody holds it. A key belongs to one type T.
+  // The object for this key: the existing one while anyone holds it, otherwise the result of
+  // make(). A key always belongs to one type T.
   template <class T, class Make>
   std::shared_ptr<const T> get(const std::string& key, Make&& make) {
     std::weak_ptr<const void>& kept = kept_[key];

@@ -18,7 +18,7 @@ class Reader {
  public:
   explicit Reader(const std::string& path) : path_(path) {}
 
-  // `inside` is the way to this table: "groups[1].controller", "" at the top.
+  // `inside` is the key path of this table: "groups[1].controller"; "" at the top level.
   void table(const StructDecl& decl, void* object, const toml::table& table,
              const std::string& inside) const {
     std::vector<std::string> names;
@@ -27,7 +27,8 @@ class Reader {
     }
     for (const auto& [key, node] : table) {
       const std::string name(key.str());
-      if (name == "kind" && *decl.kind && !decl.find(name)) continue;  // says that it is this one
+      // the key that selected this alternative
+      if (name == "kind" && *decl.kind && !decl.find(name)) continue;
       const FieldDecl* field = decl.find(name);
       const std::string place = toml_place(path_, node);
       if (!field || !field->type) {
@@ -96,7 +97,7 @@ class Reader {
     if (!read_toml_value(type, out, node, toml_place(path_, node), name)) wrong(type, node, name);
   }
 
-  // A table with a `kind`, or the word alone where the rest is as by default.
+  // A choice is a table with a `kind`, or only that word if all other fields have their defaults.
   void choice(const FieldType& type, void* out, const toml::node& node,
               const std::string& name) const {
     const toml::table* table = node.as_table();

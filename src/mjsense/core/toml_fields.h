@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
-// A TOML file that says what a struct with fields is: keys are the names of its fields, objects are
-// tables, lists of objects arrays of tables, choices tables whose `kind` says which.
+// Reads a struct with fields (core/fields.h) from a TOML file. Keys are the names of its fields,
+// objects are tables, lists of objects are arrays of tables, and choices are tables with a `kind`.
 
 #include <string>
 #include <string_view>
@@ -10,9 +10,9 @@
 
 namespace mjsense {
 
-// Sets what the text says; what it does not say stays. Errors name file, line and key:
-// "robot.toml:12: no key of 'groups[1]' named 'jonts'; did you mean 'joints'?". `path` is what they
-// call the file.
+// Sets the fields that the text contains; other fields keep their values. Errors name file, line
+// and key: "robot.toml:12: no key of 'groups[1]' named 'jonts'; did you mean 'joints'?". `path` is
+// the file's name in error messages.
 void read_toml_fields(std::string_view text, const std::string& path, const StructDecl& decl,
                       void* object);
 

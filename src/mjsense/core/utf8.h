@@ -1,14 +1,14 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
-// What is UTF-8 and what is not (RFC 3629).
+// Validation of UTF-8 (RFC 3629).
 
 #include <cstddef>
 #include <string_view>
 
 namespace mjsense {
 
-// Bytes of the character that begins the text, which is not empty; 0: it is none. Longer forms than
-// needed, halves of surrogate pairs and what lies beyond U+10FFFF are none.
+// Number of bytes of the first character of `text`, which must not be empty; 0 if it is not valid
+// UTF-8. Overlong forms, surrogates and code points beyond U+10FFFF are invalid.
 constexpr std::size_t utf8_size(std::string_view text) {
   const auto byte = [&](std::size_t i) { return static_cast<unsigned char>(text[i]); };
   const unsigned char first = byte(0);

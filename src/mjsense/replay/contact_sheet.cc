@@ -25,11 +25,11 @@ namespace {
 
 constexpr int kTileHeight = 132, kGap = 4, kLine = kTextHeight + kGap, kApart = 14;
 constexpr std::uint8_t kBackground = 24;
-// Beyond these it is no sheet to look at, whatever a file asks for.
+// Limits of a sheet that is still useful, whatever the file claims.
 constexpr int kMostTileWidth = 8 * kTileHeight, kMostFrames = 10'000'000;
 constexpr std::size_t kMostStrips = 128, kMostText = 200;
 
-// What the episode's task was in words, and how it ended: "Pick up the red block: success".
+// The episode's task description and its outcome: "Pick up the red block: success".
 std::string story(hid_t trajectory) {
   std::string text;
   if (h5::exists(trajectory, "obs_scene")) {
@@ -46,16 +46,16 @@ std::string story(hid_t trajectory) {
 
 // One camera of one episode.
 struct Strip {
-  std::string episode, camera;  // what the sheet says
+  std::string episode, camera;  // labels on the sheet
   fs::path video;
   int width = 0, height = 0, frames = 0;  // of the video
   bool depth16 = false;
-  double unit = 0;  // m, of depth
+  double unit = 0;  // m per depth value
   int tile_width() const {
     return std::clamp(kTileHeight * width / std::max(1, height), 8, kMostTileWidth);
   }
 
-  // Which frames `columns` tiles show: first to last, evenly.
+  // Indices of the frames that `columns` tiles show, evenly spaced from first to last.
   std::vector<int> moments(int columns) const {
     std::vector<int> shown;
     for (int c = 0; c < columns; ++c) {
@@ -71,7 +71,8 @@ struct Strip {
 
 using Json = nlohmann::json;
 
-// What one file names: {"episodes": 4, "strips": [[trajectory, story, key, video, encoding, unit] ...]}.
+// Content of one file: {"episodes": 4, "strips": [[trajectory, story, key, video, encoding, unit]
+// ...]}.
 std::string describe(const fs::path& path, int shown) {
   Json out{{"episodes", 0}, {"strips", Json::array()}};
   const h5::H5Lock lock;
@@ -96,7 +97,7 @@ std::string describe(const fs::path& path, int shown) {
 VideoFacts facts_of(const fs::path& folder, const std::string& video, const std::string& ffmpeg) {
   const Fd file = open_plain(folder, video);
   VideoFacts facts = read_video_facts(file.get());
-  if (!facts.error.empty()) {  // of a form that perhaps ffmpeg knows
+  if (!facts.error.empty()) {  // a format that only ffmpeg may be able to read
     const VideoProbe probe = probe_video(folder / video, false, kMostFrames, ffmpeg);
     facts = {probe.frames, probe.width, probe.height, probe.error};
   }
@@ -106,7 +107,7 @@ VideoFacts facts_of(const fs::path& folder, const std::string& video, const std:
   return facts;
 }
 
-// Those of the first `shown` episodes, of which there are `episodes`.
+// Returns the strips of the first `shown` episodes and sets `episodes` to the number of all.
 std::vector<Strip> find_strips(const fs::path& path, int shown, const std::string& ffmpeg,
                                int& episodes) {
   std::vector<Strip> strips;
@@ -122,7 +123,8 @@ std::vector<Strip> find_strips(const fs::path& path, int shown, const std::strin
     if (found.is_discarded()) throw RuntimeError(recorded.name + ": reading it gave no answer");
     episodes += found.at("episodes").get<int>();
     for (const Json& s : found.at("strips")) {
-      if (strips.size() == kMostStrips) break;  // each takes an ffmpeg; the first ones are shown
+      // each strip starts an ffmpeg process, so only the first ones are shown
+      if (strips.size() == kMostStrips) break;
       const std::string trajectory = s.at(0), told = s.at(1), key = s.at(2), video = s.at(3);
       const VideoFacts facts = facts_of(folder, video, ffmpeg);
       Strip strip;
@@ -140,7 +142,8 @@ std::vector<Strip> find_strips(const fs::path& path, int shown, const std::strin
   return strips;
 }
 
-// Near is warm, far is cold, none is black: a short walk through five colours.
+// Colour map of depth: from yellow (near) through five colours to dark blue (far). Pixels without
+// depth are black.
 void colour(double x, std::uint8_t* rgb) {
   constexpr int kStops[5][3] = {
       {250, 220, 90}, {240, 120, 60}, {180, 50, 110}, {80, 40, 140}, {20, 20, 60}};
@@ -150,8 +153,8 @@ void colour(double x, std::uint8_t* rgb) {
     rgb[c] = static_cast<std::uint8_t>(kStops[i][c] + (at - i) * (kStops[i + 1][c] - kStops[i][c]));
 }
 
-// Pictures of depth values, the nearest and the farthest of all of them at the ends of the colours;
-// the label comes to say which these are.
+// Maps depth values to colours. The range of the colour map is the smallest to the largest value in
+// all images; it is appended to the label.
 std::vector<std::uint8_t> colour_depth(const std::vector<std::uint8_t>& raw, double unit,
                                        std::string& label) {
   std::vector<std::uint16_t> depth(raw.size() / 2);
@@ -205,7 +208,7 @@ std::string contact_sheet(const fs::path& path, const fs::path& png, int episode
   if (strips.empty())
     throw ValueError(fmt::format("contact sheet: '{}' holds no videos", path.string()));
 
-  // Pictures first: what is written above depth is known from them.
+  // The images are read first, because the label above a depth strip depends on their values.
   std::vector<std::vector<std::uint8_t>> pictures;
   const std::string title = fmt::format("{} of {} episodes", std::min(episodes, all), all);
   int tile_width = 0, width = text_width(title), height = kGap + kLine;
@@ -245,7 +248,7 @@ std::string contact_sheet(const fs::path& path, const fs::path& png, int episode
     for (std::size_t c = 0; c < std::min(moments.size(), pictures[s].size() / bytes); ++c) {
       const int x = kGap + static_cast<int>(c) * (tile_width + kGap);
       sheet.picture(x, y, strip.tile_width(), kTileHeight, &pictures[s][c * bytes]);
-      // The frame's number above its right edge, where the line is free.
+      // The frame number, right-aligned above the tile if the text of the line leaves room.
       const std::string number = std::to_string(moments[c]);
       const int left = x + strip.tile_width() - text_width(number);
       if (left >= said) sheet.text(left, y - kLine, number);

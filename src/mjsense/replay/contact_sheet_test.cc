@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// A contact sheet as a person sees it: tiles are found by their place, lines are read.
+// Checks contact sheets by their pixels: tiles are located by their positions, and text lines are
+// read.
 
 #include <fmt/format.h>
 #include <gmock/gmock.h>
@@ -26,18 +27,18 @@ using ::testing::ElementsAre;
 using ::testing::SizeIs;
 using Rgb = std::array<int, 3>;
 
-constexpr int kEdge = 4, kLine = kTextHeight + 4;  // pixels, of the layout
+constexpr int kEdge = 4, kLine = kTextHeight + 4;  // pixels, of the sheet's layout
 constexpr Rgb kGround = {24, 24, 24};
 
-// A recording of `episodes` with pictures of 32 x 24 pixels: a red ball, 2 pixels to the right a
-// frame, and depth.
+// Records `episodes` episodes with images of 32 x 24 pixels (a red ball that moves 2 pixels to the
+// right per frame) and depth.
 void record_ball(const fs::path& out, int episodes) {
   FakeSuite suite({1, 32, 24, true, true});
   Recorder recorder(fake_recording(out, suite, 1, episodes));
   record_all(recorder, suite, {.worlds = 1});
 }
 
-struct Band {  // of rows or columns
+struct Band {  // range of rows or columns
   int begin, end;
 };
 
@@ -56,14 +57,15 @@ class Sheet {
     const std::uint8_t* p = &rgb_[3 * (static_cast<std::size_t>(y) * width_ + x)];
     return {p[0], p[1], p[2]};
   }
-  // Rows of tiles: where the left edge is no ground for longer than a letter.
+  // Rows of tiles: ranges in which the left edge is not background, longer than a letter is high.
   std::vector<Band> strips() const {
     return bands(height_, [&](int y) { return at(kEdge, y) != kGround; });
   }
   std::vector<Band> tiles(Band strip) const {
     return bands(width_, [&](int x) { return at(x, strip.begin) != kGround; });
   }
-  // Whether the line at `y` begins with this and, unless `more`, ends there; or says it before `end`.
+  // reads(): whether the line at `y` begins with `text` and, unless `more`, contains nothing else.
+  // ends(): whether the line shows `text` right before `end`.
   bool reads(int y, std::string_view text, bool more = false) const {
     return reads(kEdge, y, text, more ? kEdge + text_width(text) : width_);
   }
@@ -97,7 +99,7 @@ class Sheet {
   std::vector<std::uint8_t> rgb_;
 };
 
-// The frame that a tile shows, by its ball.
+// Index of the frame that a tile shows, computed from the position of its ball.
 int frame_of(const Sheet& sheet, Band strip, Band tile) {
   double sum = 0;
   int red = 0;
@@ -115,7 +117,7 @@ int frame_of(const Sheet& sheet, Band strip, Band tile) {
 
 TEST(ContactSheet, ShowsEpisodesFromFirstToLastFrame) {
   TempDir dir;
-  record_ball(dir.path, 3);  // of 6, 7 and 8 frames
+  record_ball(dir.path, 3);  // episodes of 6, 7 and 8 frames
   const fs::path png = dir.path / "sheet.png";
   EXPECT_EQ(contact_sheet(dir.path, png, 2, 4), "2 of 3 episodes");
   const Sheet sheet(png);
@@ -141,7 +143,7 @@ TEST(ContactSheet, ShowsEpisodesFromFirstToLastFrame) {
     EXPECT_TRUE(sheet.ends(top - kLine, tiles[2].end, std::to_string(3 + e)));
     EXPECT_TRUE(sheet.ends(top - kLine, tiles[3].end, std::to_string(5 + e)));
   }
-  // As many as asked for, and no frame twice.
+  // If there are fewer frames than columns, each frame is shown once.
   contact_sheet(dir.path, png, 1, 20);
   const Sheet wide(png);
   EXPECT_THAT(frames(strips[0]), SizeIs(4));
@@ -151,8 +153,8 @@ TEST(ContactSheet, ShowsEpisodesFromFirstToLastFrame) {
   EXPECT_THAT(Sheet(png).strips(), SizeIs(6));
 }
 
-// FakeSuite::depth grows along x and with time; nothing is measured in the left upper corner, and
-// the right upper one is infinitely far.
+// FakeSuite::depth increases along x and with time. The upper left corner has no depth, and the
+// upper right corner is infinitely far.
 TEST(ContactSheet, DepthIsColouredFromNearToFar) {
   TempDir dir;
   record_ball(dir.path, 1);

@@ -23,10 +23,10 @@ namespace fs = std::filesystem;
 namespace mjsense {
 namespace {
 
-// Rows of a file may be so much larger than the file before they are a bomb.
+// A file whose rows are more than this many times its own size is taken for a decompression bomb.
 constexpr std::uint64_t kMostUnpacked = 200, kFreeBytes = std::uint64_t{1} << 30;
 
-// Mean and spread in one pass that stays exact for values far from zero (Welford).
+// Mean and standard deviation in one pass, accurate for values far from zero (Welford).
 struct Accumulator {
   std::int64_t count = 0, nan = 0, infinite = 0;
   double mean = 0, squares = 0;
@@ -156,7 +156,7 @@ class Inspector {
   std::uint64_t bytes_ = 0, unpacked_ = 0;
 };
 
-// The answer of the process that reads.
+// Serialises the result of the process that reads the file.
 std::string to_json(const InspectResult& r) {
   nlohmann::json out{{"videos", r.videos}, {"settings", r.settings}};
   for (const InspectResult::File& f : r.files)
@@ -176,7 +176,7 @@ InspectResult from_json(const std::string& text) {
   for (const auto& f : in.value("files", nlohmann::json::array()))
     r.files.push_back({f.at(0), f.at(1), f.at(2), f.at(3), f.at(4),
                        f.at(5).get<std::map<std::string, std::vector<std::string>>>()});
-  // JSON has no infinity: a spread of numbers that overflow comes as null.
+  // JSON has no infinity, so a standard deviation that overflows is written as null.
   const auto number = [](const nlohmann::json& j) {
     return j.is_number() ? j.get<double>() : std::numeric_limits<double>::quiet_NaN();
   };
@@ -258,7 +258,7 @@ std::string InspectResult::text() const {
   }
   out += fmt::format("{} videos\n\n", videos.size());
 
-  // A tree: what a line shares with the one above is left blank.
+  // Printed as a tree: parts of a name that equal the line above are left blank.
   std::vector<std::string> last;
   for (const StreamStats& s : streams) {
     std::vector<std::string> parts = split_path(s.name);

@@ -113,7 +113,7 @@ class Parser {
     ++at_;
   }
 
-  // Escapes are checked, and kept as they are: keys are only names here.
+  // Escapes are validated but not decoded, because keys are only used as names.
   void string(std::string* out) {
     expect('"', "a string");
     const std::size_t start = at_;
@@ -142,7 +142,7 @@ class Parser {
     return at_ - start;
   }
 
-  // "-12.5e-3": no zeros before others, digits on both sides of the point.
+  // "-12.5e-3": no leading zeros, and digits on both sides of the decimal point.
   void number() {
     const std::size_t start = at_;
     if (peek() == '-') ++at_;
@@ -160,7 +160,7 @@ class Parser {
     if (on_number_) on_number_(path_, value_of(text_.substr(start, at_ - start)));
   }
 
-  // As Python reads them, numbers beyond the range of double are infinite or 0.
+  // As in Python, numbers beyond the range of double become infinite or 0.
   static double value_of(std::string_view number) {
     double x = 0;
     const auto read = std::from_chars(number.data(), number.data() + number.size(), x);

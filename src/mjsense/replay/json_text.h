@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
-// Reading the JSON rows of dict sensors: as Python's json.loads accepts them, with NaN and
-// Infinity.
+// Parser for the JSON rows of dict sensors. Accepts what Python's json.loads does, including NaN
+// and Infinity.
 
 #include <functional>
 #include <string>
@@ -9,14 +9,15 @@
 
 namespace mjsense {
 
-// Called for every number (true and false count as 1 and 0); `path` is the keys on the way, joined
-// by '/'. The elements of a list share the path of the list.
+// Called for every number (true and false count as 1 and 0). `path` holds the keys of the enclosing
+// objects, joined by '/'. The elements of a list have the path of the list.
 using OnNumber = std::function<void(const std::string& path, double value)>;
 
-// "" if `text` is one JSON value, else what is wrong and where: "byte 17: expected ',' or '}'".
+// Returns "" if `text` is one JSON value, otherwise the error and its position: "byte 17: expected
+// ',' or '}'".
 std::string parse_json(std::string_view text, const OnNumber& on_number = nullptr);
 
-// A row without its padding.
+// Removes the padding of a row.
 std::string_view trim_row(std::string_view row);
 
 }  // namespace mjsense

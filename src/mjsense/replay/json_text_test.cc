@@ -67,24 +67,25 @@ TEST(JsonText, NumbersBeyondTheRangeOfDoubleAreAsInPython) {
 }
 
 TEST(Lzf, UnpacksRunsAndReferences) {
-  // "abc", then 7 bytes from 3 back (overlapping), then "!".
+  // "abc", then 7 bytes from offset -3 (overlapping), then "!".
   const std::vector<std::uint8_t> packed = {2, 'a', 'b', 'c', 5 << 5, 2, 0, '!'};
   std::vector<std::uint8_t> out(32);
   ASSERT_EQ(lzf_unpack(packed, out), 11u);
   EXPECT_EQ(std::string(out.begin(), out.begin() + 11), "abcabcabca!");
-  // A long reference: 7 + 20 + 2 bytes.
+  // A long back reference: 7 + 20 + 2 bytes.
   const std::vector<std::uint8_t> lengthy = {0, 'z', 7 << 5, 20, 0};
   EXPECT_EQ(lzf_unpack(lengthy, out), 30u);
 }
 
 TEST(Lzf, RefusesDamage) {
   std::vector<std::uint8_t> out(8);
-  EXPECT_EQ(lzf_unpack(std::vector<std::uint8_t>{5, 'a'}, out), 0u);  // run beyond the end
+  // literal run beyond the end of the input
+  EXPECT_EQ(lzf_unpack(std::vector<std::uint8_t>{5, 'a'}, out), 0u);
   EXPECT_EQ(lzf_unpack(std::vector<std::uint8_t>{0, 'a', 1 << 5, 9}, out),
-            0u);  // before the beginning
+            0u);  // reference before the beginning of the output
   EXPECT_EQ(
       lzf_unpack(std::vector<std::uint8_t>{0, 'a', 6 << 5, 0, 0, 'b'}, std::span(out).first(4)),
-      0u);  // no room
+      0u);  // output buffer too small
 }
 
 }  // namespace

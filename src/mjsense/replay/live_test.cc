@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Recordings that are looked at while somebody writes them.
+// Tools that read recordings while another process writes them.
 
 #include <fmt/format.h>
 #include <gmock/gmock.h>
@@ -40,7 +40,7 @@ TEST(Live, WhatIsBeingRecordedIsNotCalledBroken) {
     EXPECT_THAT(error_of([&] { static_cast<void>(inspect(dir.path)); }),
                 HasSubstr("is being recorded: no file of it is published yet"));
     play(1);
-    play(2);  // waits: it is moved at any moment
+    play(2);  // unpublished: may be moved at any time
     const VerifyResult found = verify(dir.path);
     EXPECT_EQ(found.files, 1);
     EXPECT_EQ(found.episodes, 2);
@@ -54,12 +54,12 @@ TEST(Live, WhatIsBeingRecordedIsNotCalledBroken) {
   EXPECT_THAT(inspect(dir.path).files, SizeIs(2));
 }
 
-// Whatever moves between the list of files and their reading.
+// Files may be moved between listing and reading them.
 TEST(Live, ARecordingMayGoOnWhileItIsVerified) {
   TempDir dir;
   std::atomic<bool> ended = false;
   std::thread recording([&] {
-    for (int stop = 1; stop <= 12; ++stop) {  // begun, left and resumed
+    for (int stop = 1; stop <= 12; ++stop) {  // started, stopped and resumed
       record(dir.path, 12, {.worlds = 1, .stop_after = stop == 12 ? -1 : 1}, false, [](auto& c) {
         c.resume = true;
         c.batches = 6;
@@ -83,7 +83,7 @@ TEST(Live, ARecordingMayGoOnWhileItIsVerified) {
   EXPECT_TRUE(verify(dir.path).ok()) << verify(dir.path).text();
 }
 
-// Two states of a file, of which one has bytes behind the other's end.
+// Two versions of a file; one has data beyond the end of the other.
 TEST(Live, AFileThatIsReplacedIsNotCalledBroken) {
   TempDir dir, other;
   record(dir.path, 2, {.worlds = 1});
@@ -119,7 +119,7 @@ TEST(Live, AVideoThatIsReplacedIsNotCalledBroken) {
                                       "read"));
 }
 
-// Datasets of no elements claim any number of rows for nothing.
+// Data sets without elements can claim any number of rows at no cost.
 TEST(Inspect, CountsNoMoreStepsThanThereAreNumbers) {
   TempDir dir;
   const fs::path path = dir.path / "trajectories_batch_1_of_1.h5";

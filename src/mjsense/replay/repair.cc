@@ -33,9 +33,9 @@ namespace fs = std::filesystem;
 namespace mjsense {
 namespace {
 
-constexpr std::int64_t kNameBytes = 1 << 12;  // on disk, of a name with its dataset and groups
+constexpr std::int64_t kNameBytes = 1 << 12;  // on disk, for a name with its data set and groups
 
-// What is left of a recording that never finished an episode.
+// Removes what remains of a recording that never finished an episode.
 void remove_remains(const fs::path& house, const Folder& folder,
                     std::vector<std::string>& actions) {
   const fs::path staging = house / kStagingDir;
@@ -53,7 +53,7 @@ void finish_house(const fs::path& house, std::vector<std::string>& actions) {
   const Folder folder = Folder::open(house);
   std::string fingerprint;
   {
-    // A recording that begins has not said what it is.
+    // A recording that is starting has not written its fingerprint yet.
     const Fd lock = lock_recording(folder, true);
     fingerprint = unfinished_recording(folder.at(kStagingDir));
     if (fingerprint.empty()) return remove_remains(house, folder, actions);
@@ -101,7 +101,7 @@ void add_file_name(hid_t sensor_data, const std::string& key, const std::string&
   h5::check(H5Dwrite(dataset, H5T_NATIVE_UINT8, H5S_ALL, H5S_ALL, H5P_DEFAULT, bytes), key);
 }
 
-// What MolmoSpaces leaves out: the names of the videos of each camera that has parameters.
+// Names that MolmoSpaces leaves out: the video of each camera that has parameters.
 std::string missing_names(const fs::path& path, int batch, int batches) {
   nlohmann::json missing = nlohmann::json::array();
   const h5::H5Lock lock;
@@ -124,7 +124,7 @@ std::string missing_names(const fs::path& path, int batch, int batches) {
   return missing.dump();
 }
 
-// "trajectories_batch_2_of_3.h5": {2, 3}
+// "trajectories_batch_2_of_3.h5" -> {2, 3}
 std::optional<std::pair<int, int>> batch_number(const fs::path& path) {
   const std::string name = path.filename().string();
   int batch = 0, batches = 0;
@@ -144,10 +144,10 @@ int name_videos(const fs::path& path) {
   const auto missing = nlohmann::json::parse(
       h5::in_child(path.string(), static_cast<std::uint64_t>(size_of(bytes)),
                    [&] { return missing_names(path, number->first, number->second); }));
-  if (missing.empty()) return 0;  // most files need nothing: they are not opened for writing
+  if (missing.empty()) return 0;  // most files need no repair and are not opened for writing
   if (flock(bytes.get(), LOCK_EX | LOCK_NB) != 0)
     throw RuntimeError(fmt::format("another process repairs '{}'", path.string()));
-  // In a copy: who is killed, or finds the disk full, leaves the file as it was.
+  // Works on a copy, so that a crash or a full disk leaves the file unchanged.
   const Folder folder = Folder::open(path.parent_path());
   const std::string name = path.filename(), part = name + ".part";
   struct Removed {
@@ -177,7 +177,7 @@ int name_videos(const fs::path& path) {
 
 }  // namespace
 
-// What cannot be repaired is named, and does not keep the rest from being repaired.
+// A failure is reported and does not stop the repair of the other files.
 RepairResult repair(const fs::path& path) {
   RepairResult result;
   if (fs::is_regular_file(path) && !batch_number(path))
@@ -186,7 +186,7 @@ RepairResult repair(const fs::path& path) {
   const auto attempt = [&](const fs::path& what, auto&& deed) {
     try {
       deed();
-    } catch (const std::runtime_error& e) {  // an Error, or one of the file system
+    } catch (const std::runtime_error& e) {  // an mjsense::Error or a filesystem_error
       result.failures.push_back(fmt::format("{}: {}", what.string(), e.what()));
     }
   };
@@ -199,7 +199,7 @@ RepairResult repair(const fs::path& path) {
   std::vector<RecordedFile> files;
   try {
     files = recorded_files(path);
-  } catch (const ValueError&) {  // no recording; perhaps none is left after what was done
+  } catch (const ValueError&) {  // no recording; acceptable if repairing removed what there was
     if (result.actions.empty() && result.failures.empty()) throw;
   }
   for (const RecordedFile& file : files) {

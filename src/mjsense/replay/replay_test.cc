@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Recordings read back: what the recorder wrote, what an interruption left.
+// Reading recordings: complete ones, and those that an interruption left.
 
 #include <fcntl.h>
 #include <fmt/format.h>
@@ -30,7 +30,7 @@ using ::testing::SizeIs;
 
 TEST(Replay, EpisodesReadBackAsWritten) {
   TempDir dir;
-  record(dir.path, 3, {.worlds = 2, .steps = 70});  // more rows than a chunk of dict rows holds
+  record(dir.path, 3, {.worlds = 2, .steps = 70});  // more rows than one chunk of dict rows
   EXPECT_THAT(tree(dir.path), ::testing::ElementsAre("house_0/trajectories_batch_1_of_1.h5"));
   const h5::H5Lock lock;
   const h5::Id file = h5::open_file(dir.path / "house_0/trajectories_batch_1_of_1.h5");
@@ -89,7 +89,7 @@ TEST(Replay, AnUnfinishedRecordingIsReadableAndRepairable) {
   EXPECT_FALSE(fs::exists(dir.path / "house_0/.recording"));
 }
 
-// A video belongs to its episode: as many frames as steps, of the stated size.
+// A video must have as many frames as its episode has steps, of the stated size.
 TEST(Verify, CountsTheFramesOfEveryVideo) {
   TempDir dir, other;
   record(dir.path, 3, {.worlds = 1}, true);
@@ -105,7 +105,7 @@ TEST(Verify, CountsTheFramesOfEveryVideo) {
     EXPECT_EQ(result.findings.size(), 1u) << result.text();
     return result.ok() ? std::string("whole") : result.findings[0].text;
   };
-  // Episodes of 6, 7 and 8 steps.
+  // The episodes have 6, 7 and 8 steps.
   EXPECT_THAT(replaced(video(dir.path, 2), video(dir.path, 0)),
               HasSubstr("has 8 frames, expected 6"));
   EXPECT_THAT(replaced(video(dir.path, 0), video(dir.path, 1)),
@@ -121,7 +121,7 @@ TEST(Verify, CountsTheFramesOfEveryVideo) {
   EXPECT_THAT(verify(dir.path).text(), HasSubstr("does not exist"));
 }
 
-// Every step either succeeds or fails.
+// `fail` must be the negation of `success` at every step.
 TEST(Verify, FailIsTheOppositeOfSuccess) {
   for (const std::int8_t wrong : {0, 1}) {
     TempDir dir;
@@ -136,7 +136,7 @@ TEST(Verify, FailIsTheOppositeOfSuccess) {
         std::vector<std::int8_t> rows(6);
         h5::check(H5Dread(fail, type, H5S_ALL, H5S_ALL, H5P_DEFAULT, rows.data()), "read");
         EXPECT_EQ(rows, (std::vector<std::int8_t>{1, 1, 1, 1, 1, 0}));
-        rows[wrong ? 5 : 2] = wrong;  // both, or neither
+        rows[wrong ? 5 : 2] = wrong;  // both true, or both false
         h5::check(H5Dwrite(fail, type, H5S_ALL, H5S_ALL, H5P_DEFAULT, rows.data()), "write");
       }
       file.close("close");
@@ -148,7 +148,7 @@ TEST(Verify, FailIsTheOppositeOfSuccess) {
   }
 }
 
-// Files without the names of their videos, as MolmoSpaces leaves them.
+// Files without the names of their videos, as MolmoSpaces writes them.
 class RepairNames : public ::testing::Test {
  protected:
   RepairNames() {
@@ -184,7 +184,8 @@ TEST_F(RepairNames, AreThoseOfTheirOwnBatch) {
   EXPECT_THAT(repair(dir.path).text(), HasSubstr("nothing to repair"));
 }
 
-// Killed, or on a full disk, repair leaves the file as it was: here a limit on the size of files.
+// If repair is killed or the disk is full, the file must be unchanged. Simulated by a file size
+// limit.
 TEST_F(RepairNames, AreAddedWhollyOrNotAtAll) {
   const std::string bytes = read_file(path);
   const std::vector<std::string> names = tree(dir.path);
@@ -205,7 +206,7 @@ TEST_F(RepairNames, AreAddedWhollyOrNotAtAll) {
   }
 }
 
-// Both would write into the same copy.
+// Two processes would write to the same copy.
 TEST_F(RepairNames, ByOneProcessAtATime) {
   const std::string bytes = read_file(path);
   {
@@ -217,7 +218,7 @@ TEST_F(RepairNames, ByOneProcessAtATime) {
   EXPECT_THAT(repair(dir.path).text(), HasSubstr("added 1 names of videos"));
 }
 
-// "trajectories_batch_1_of_2.h5.bak" is somebody's copy.
+// "trajectories_batch_1_of_2.h5.bak" is a user's backup.
 TEST_F(RepairNames, OnlyInFilesOfThatName) {
   for (const char* name : {"trajectories_batch_2_of_2.h5.bak", "trajectories_batch_02_of_2.h5",
                            "trajectories_batch_-2147483648_of_3.h5"}) {

@@ -10,9 +10,9 @@ namespace {
 constexpr int kScale = 2, kColumns = 5, kRows = 9;
 static_assert(kRows * kScale == kTextHeight && (kColumns + 1) * kScale == kTextAdvance);
 
-// Rows from the top, a digit in base 32 each, whose bits are the pixels from left to right: e is
-// .###. and h is #...#. The line is below the seventh; rows that are not given are empty. The zero
-// has a stroke, so that it is no O, and a D has corners.
+// One base-32 digit per row, from the top; its bits are the pixels from left to right: e is .###.
+// and h is #...#. The baseline is below the seventh row; missing rows are empty. To be
+// distinguishable from O, 0 has a stroke and D has corners.
 // clang-format off
 constexpr std::string_view kGlyphs[] = {
     "",                                                   // space

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
-// Labels in pictures: ASCII letters 10 x 14 pixels large, 4 more below the line.
+// Bitmap font for labels in images: ASCII characters of 10 x 14 pixels plus 4 pixels below the
+// baseline.
 
 #include <cstdint>
 #include <span>
@@ -14,8 +15,8 @@ inline int text_width(std::string_view text) {
   return static_cast<int>(text.size()) * kTextAdvance;
 }
 
-// Writes light text into `rgb` [*, width, 3] with its left upper corner at (x, y); what does not
-// fit is left out.
+// Draws light text into `rgb` [*, width, 3] with its upper left corner at (x, y). Pixels outside of
+// the image are clipped.
 void draw_text(std::span<std::uint8_t> rgb, int width, int x, int y, std::string_view text);
 
 }  // namespace mjsense

@@ -11,7 +11,7 @@
 namespace mjsense {
 namespace {
 
-// One character as a person sees it: rows of # and space, a pixel of the letter each.
+// Renders one character as text: one # or space per pixel of the glyph.
 std::string drawn(char c) {
   constexpr int kPixel = 2;
   std::vector<std::uint8_t> rgb(3 * kTextAdvance * kTextHeight, 0);
@@ -48,7 +48,7 @@ TEST(SmallText, LettersAreTheirShapes) {
             "      \n");
 }
 
-// Letters and digits that look alike make names of episodes and cameras ambiguous.
+// If letters and digits looked alike, names of episodes and cameras would be ambiguous.
 TEST(SmallText, EveryCharacterLooksItsOwn) {
   std::set<std::string> seen;
   for (char c = ' '; c <= '~'; ++c) {

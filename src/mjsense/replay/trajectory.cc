@@ -22,7 +22,7 @@ namespace {
 constexpr std::size_t kPieceBytes = 1 << 22;
 constexpr std::size_t kMostNameBytes = 4096;
 constexpr hsize_t kLeastTextWidth =
-    100;  // MolmoSpaces' dict rows are 1000 bytes and more, its other uint8 rows are 1
+    100;  // MolmoSpaces' dict rows have 1000 bytes or more, its other uint8 rows have 1
 
 bool is_trajectory_file(const fs::path& path) {
   return path.extension() == ".h5" && path.filename().string().starts_with("trajectories");
@@ -36,8 +36,8 @@ void require_exists(const fs::path& path) {
     throw ValueError(fmt::format("'{}' is neither a file nor a folder", path.string()));
 }
 
-// What a walk through folders meets - one that may not be entered, names too long for the system - is
-// one error of ours, which a program tells.
+// Converts errors of walking through folders (no permission, names that are too long) to a
+// RuntimeError.
 auto walk(const fs::path& path, auto&& steps) {
   try {
     return steps();
@@ -129,7 +129,8 @@ RowDataset::RowDataset(hid_t parent, const std::string& path)
 }
 
 std::int64_t RowDataset::row_size() const {
-  if (std::find(dims_.begin(), dims_.end(), 0) != dims_.end()) return 0;  // others may be any size
+  // if one dimension is 0, the others may have any size
+  if (std::find(dims_.begin(), dims_.end(), 0) != dims_.end()) return 0;
   std::int64_t size = 1;
   for (std::size_t i = 1; i < dims_.size(); ++i) size *= static_cast<std::int64_t>(dims_[i]);
   return size;

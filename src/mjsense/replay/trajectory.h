@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
-// Reading recordings back: where the files are, the datasets of a trajectory, rows in pieces of
+// Reads recordings: finds the files and the data sets of a trajectory, and reads rows in chunks of
 // bounded size.
 
 #include <cstdint>
@@ -16,26 +16,26 @@ namespace mjsense {
 
 struct RecordedFile {
   std::filesystem::path path;
-  std::string name;       // relative to what was asked for
-  bool published = true;  // false: a finished episode that waits for its batch
+  std::string name;       // relative to the path that was given
+  bool published = true;  // false: a finished episode that is not yet in a published batch
 };
 
-// The trajectory files at or below `path`, sorted; of a house that is being recorded, or repaired,
-// only what is published, for the rest moves at any moment. Throws ValueError when there is no such path or
-// nothing recorded in it.
+// Returns the trajectory files at or below `path`, sorted. For a house that is being recorded or
+// repaired, returns published files only, because others may be moved at any time. Throws
+// ValueError if the path does not exist or contains no recording.
 std::vector<RecordedFile> recorded_files(const std::filesystem::path& path);
-// The houses at or below `path` (or around it, when it is a file).
+// Returns the houses at or below `path`, or the house that contains it if it is a file.
 std::vector<std::filesystem::path> recorded_houses(const std::filesystem::path& path);
 
-// "traj_0", "traj_1" ... in the order of their numbers.
+// Returns "traj_0", "traj_1" ... in numerical order.
 std::vector<std::string> trajectory_names(hid_t file);
 
-// A dataset with one row a step. What it claims to be is checked before anything is read.
+// A data set with one row per step. Its header is validated before any data is read.
 class RowDataset {
  public:
   RowDataset(hid_t parent, const std::string& path);
   std::int64_t rows() const { return dims_.empty() ? 1 : static_cast<std::int64_t>(dims_[0]); }
-  std::int64_t row_size() const;  // elements
+  std::int64_t row_size() const;  // in elements
   std::uint64_t bytes() const { return bytes_; }
   bool scalar() const { return dims_.empty(); }
   bool is_json() const { return json_; }
@@ -45,11 +45,11 @@ class RowDataset {
   std::string shape() const;  // "(T, 7)"
   hid_t id() const { return id_; }
 
-  // Calls visit(t, text) with each row of JSON text, without its padding.
+  // Calls visit(t, text) with the JSON text of each row, without its padding.
   void each_text(const std::function<void(std::int64_t t, std::string_view text)>& visit) const;
-  // Calls visit(bytes) with pieces of all elements, in order, as the file has them.
+  // Calls visit(bytes) with chunks of all elements, in order, in the file's representation.
   void each_bytes(const std::function<void(std::string_view bytes)>& visit) const;
-  // Calls visit(values) with pieces of all elements, in order; bool as 0 and 1.
+  // Calls visit(values) with chunks of all elements, in order; bool as 0 and 1.
   void each_number(const std::function<void(std::span<const double> values)>& visit) const;
 
  private:
@@ -61,10 +61,11 @@ class RowDataset {
   std::vector<hsize_t> dims_;
   std::uint64_t bytes_ = 0;  // of all rows
   bool json_ = false;
-  mutable bool checked_ = false;  // its chunks, before the first row is read
+  // whether the chunks were validated, which precedes the first read
+  mutable bool checked_ = false;
 };
 
-// The name of a video in obs/sensor_data. Throws RuntimeError unless it is a plain name.
+// Reads the name of a video from obs/sensor_data. Throws RuntimeError unless it is a plain name.
 std::string read_file_name(hid_t sensor_data, const std::string& key);
 
 }  // namespace mjsense

@@ -26,9 +26,9 @@ namespace {
 
 using Json = nlohmann::json;
 
-constexpr std::int64_t kMostSteps = 10'000'000;  // of one episode: a week at 15 Hz
-constexpr std::size_t kMostFindings = 200;       // of one file
-// Rows of a file may be so much larger than the file before they are a bomb.
+constexpr std::int64_t kMostSteps = 10'000'000;  // per episode: a week at 15 Hz
+constexpr std::size_t kMostFindings = 200;       // per file
+// A file whose rows are more than this many times its own size is taken for a decompression bomb.
 constexpr std::uint64_t kMostUnpacked = 200, kFreeBytes = std::uint64_t{1} << 30;
 
 constexpr const char* kChanged = "was changed while it was read: verify it again";
@@ -38,11 +38,11 @@ struct VideoCheck {
   fs::path folder;
   std::string name;
   std::int64_t frames = 0;
-  std::int64_t width = 0, height = 0;  // 0: not stated
-  std::string crc;                     // "" if not stated
+  std::int64_t width = 0, height = 0;  // 0: unknown
+  std::string crc;                     // "" if unknown
 };
 
-// One file, read in a process of its own: what is found there goes home as JSON text.
+// Verifies one file in a separate process. The result is returned as JSON text.
 class FileVerifier {
  public:
   FileVerifier(const RecordedFile& recorded, std::uint64_t bytes, bool sealed)
@@ -133,7 +133,7 @@ class FileVerifier {
     check_sensor_data(trajectory, T, place);
   }
 
-  // What is compared with the checksum that stands beside the data.
+  // Compares with the checksum stored in the object's attribute.
   void compare(hid_t object, const std::string& place, const Checksum& sum) {
     const std::string stated = h5::text_attribute(object, kChecksumAttribute);
     ++(stated.empty() ? without_sum_ : with_sum_);
@@ -336,7 +336,7 @@ class Verifier {
 
   std::string check_video(const VideoCheck& video, const Fd& file) const {
     VideoFacts facts = read_video_facts(file.get());
-    // Containers of others may be of a form that only ffmpeg knows.
+    // Video containers written by other programs may have a format that only ffmpeg can read.
     if (!facts.error.empty() || options_.decode) {
       const VideoProbe probe =
           probe_video(video.folder / video.name, options_.decode, video.frames, options_.ffmpeg);
@@ -346,7 +346,7 @@ class Verifier {
     }
     if (facts.frames != video.frames)
       return fmt::format("'{}' has {} frames, expected {}", video.name, facts.frames, video.frames);
-    // 4:2:0 videos of odd pictures have one more column or row.
+    // Images of odd size have one additional column or row in 4:2:0 videos.
     const auto fits = [](int got, std::int64_t stated) {
       return stated == 0 || got == stated || got == (stated + 1) / 2 * 2;
     };
@@ -360,7 +360,7 @@ class Verifier {
     return "";
   }
 
-  // Whether this house has other files than those that were read.
+  // Whether the files of this house differ from those that were read.
   bool has_moved(const fs::path& house) const {
     const auto of_house = [&](const std::vector<RecordedFile>& files) {
       std::vector<fs::path> paths;
@@ -373,12 +373,12 @@ class Verifier {
     };
     try {
       return of_house(listed_) != of_house(recorded_files(house));
-    } catch (const Error&) {  // it is gone
+    } catch (const Error&) {  // the house no longer exists
       return true;
     }
   }
 
-  // Findings of episodes that wait, or waited: where they are now, nobody has looked.
+  // Removes the findings of unpublished episodes, because they may have been moved since.
   void forget_waiting(const fs::path& house) {
     for (const RecordedFile& file : listed_) {
       if (file.published || file.path.parent_path().parent_path() != house / kStagingDir) continue;
@@ -401,7 +401,7 @@ class Verifier {
       error(place, fmt::format("is unfinished: {} finished episodes wait to be published; resume "
                                "the recording, or repair",
                                waiting));
-      return;  // an interrupted publication may have moved videos already
+      return;  // an interrupted publication may already have moved some videos
     }
     for (const fs::directory_entry& entry : fs::directory_iterator(house)) {
       const fs::path& path = entry.path();

@@ -14,9 +14,10 @@ namespace mjsense {
 
 namespace {
 
-constexpr double kPatience = 60;  // s without a word
+constexpr double kPatience = 60;  // s without output
 constexpr std::size_t kLineBytes = 96;
-// A small file may claim pictures that take hours and all memory to unpack. Real ones take a tenth.
+// A small file may claim images that take hours and all memory to decode. Real videos need a tenth
+// of this time.
 constexpr std::uint64_t kLeastSeconds = 60, kBytesPerSecond = 50'000;
 constexpr std::uint64_t kMemory = std::uint64_t{4} << 30;
 
@@ -35,7 +36,7 @@ std::vector<std::string> input_of(const std::filesystem::path& path) {
           matroska ? "matroska" : "mov",
           "-codec_whitelist",
           "h264,ffv1",
-          "-threads",  // each takes memory, and many videos are read at a time
+          "-threads",  // each thread takes memory, and many videos are read at the same time
           "1",
           "-an",
           "-sn",
@@ -69,13 +70,13 @@ VideoProbe probe_video(const std::filesystem::path& path, bool decode, std::int6
     const auto most = static_cast<std::size_t>(2 * std::max<std::int64_t>(0, expected) + 100);
     std::string words;
     listing = run_process(command, patience(path, kPatience, most * kLineBytes), &words);
-    // FFV1 says which of its slices are damaged, and ends as if all were well.
+    // ffmpeg only prints a message about damaged FFV1 slices and exits with success.
     if (decode && !words.empty()) probe.error = words;
   } catch (const Error& error) {
     probe.error = error.what();
   }
   if (!probe.error.empty()) return probe;
-  // "#dimensions 0: 640x368", then one line a frame.
+  // "#dimensions 0: 640x368", then one line per frame.
   std::istringstream lines(listing);
   for (std::string line; std::getline(lines, line);) {
     if (line.starts_with("#dimensions")) {
@@ -92,8 +93,9 @@ std::vector<std::uint8_t> grab_frames(const std::filesystem::path& path,
                                       bool grey16, const std::string& ffmpeg) {
   std::string select;
   for (const int n : frames) select += fmt::format("{}eq(n\\,{})", select.empty() ? "" : "+", n);
-  // New time stamps, a frame a second: else a constant frame rate would fill the gaps with copies.
-  // The rate is said, for FFmpeg 7 does not know FRAME_RATE behind select and repeats a frame.
+  // The selected frames get new time stamps, one frame per second; otherwise a constant frame rate
+  // would fill the gaps with copies. The rate is given explicitly, because FFmpeg 7 does not know
+  // FRAME_RATE after `select` and repeats a frame.
   const std::string filters = fmt::format("select='{}',setpts=N/TB,fps=1,scale={}:{}:flags={}",
                                           select, width, height, grey16 ? "neighbor" : "area");
   std::vector<std::string> command = command_of(path, ffmpeg, {});

@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
-// What a video file holds, found with the ffmpeg program alone (not every installation has
-// ffprobe). It opens this one file only, as MP4 with H.264 or as Matroska with FFV1: whatever else
-// the bytes say, no other reader of ffmpeg sees them.
+// Reads the properties of video files with the ffmpeg program only (not every installation has
+// ffprobe). ffmpeg may open only this file, as MP4 with H.264 or Matroska with FFV1. Whatever the
+// file contains, no other demuxer or decoder of ffmpeg processes it.
 
 #include <cstdint>
 #include <filesystem>
@@ -14,17 +14,17 @@ namespace mjsense {
 
 struct VideoProbe {
   int frames = 0, width = 0, height = 0;
-  std::string error;  // "" if the file is a readable video
+  std::string error;  // "" if the video is readable
 };
 
-// Counts packets; with `decode`, decodes every frame, and every complaint of the decoder is an error. Gives up beyond
-// twice the `expected` frames and when nothing comes for 60 s.
+// Counts packets. With `decode`, decodes every frame and treats every message of the decoder as an
+// error. Gives up after twice the `expected` frames, or if ffmpeg prints nothing for 60 s.
 VideoProbe probe_video(const std::filesystem::path& path, bool decode, std::int64_t expected,
                        const std::string& ffmpeg);
 
-// The frames of these numbers, scaled: uint8 [n, height, width, 3], or uint16 values [n, height,
-// width] when `grey16`. Fewer where the video has no such frame. Throws RuntimeError when it cannot
-// be read.
+// Extracts the frames with these indices, scaled: uint8 [n, height, width, 3], or uint16 [n,
+// height, width] if `grey16`. Returns fewer if the video lacks some of them. Throws RuntimeError if
+// the video cannot be read.
 std::vector<std::uint8_t> grab_frames(const std::filesystem::path& path,
                                       std::span<const int> frames, int width, int height,
                                       bool grey16, const std::string& ffmpeg);

@@ -11,7 +11,7 @@
 #include "mjsense/core/error.h"
 #include "mjsense/scene/resolve.h"
 
-// Null in MuJoCo 4.0.0.
+// Null with MuJoCo 4.0.0, which lacks this function.
 extern "C" __attribute__((weak)) const char* mjs_getInStringVec(const mjStringVec* source, int i);
 
 namespace mjsense {
@@ -24,7 +24,7 @@ class Adopter {
   Adopter(const ModelSource& source, const std::string& entity, Vfs& vfs)
       : source_(source), entity_(entity), vfs_(vfs) {}
 
-  // The new name of `file`, which the element names relative to `dir`.
+  // Returns the new name of `file`, which the element specifies relative to `dir`.
   std::string operator()(const mjsElement* element, const char* dir, std::string file) const {
     const mjSpec* origin = mjs_getOriginSpec(element);
     if (origin->strippath) file = fs::path(file).filename().string();
@@ -36,7 +36,7 @@ class Adopter {
     const fs::path base = mjs_getString(origin->modelfiledir);
     std::string path = (base / joined).lexically_normal().generic_string();
     if (!base.empty()) path = fs::absolute(path).generic_string();
-    // "provider:name" is for MuJoCo's resource providers.
+    // "provider:name" refers to MuJoCo's resource providers.
     if (path.find(':') == std::string::npos && !fs::exists(path)) missing(element, path);
     return path;
   }
@@ -63,10 +63,11 @@ class Adopter {
   Vfs& vfs_;
 };
 
-// Name `i` of a list; null beyond its end.
+// Returns name `i` of a list; null beyond its end.
 const char* name_in(const mjStringVec* names, int i) {
   if (mjs_getInStringVec) return mjs_getInStringVec(names, i);
-  // MuJoCo 4.0.0 has no such function. Its list is a vector of its own standard library's strings, of which it reads one.
+  // Fallback for MuJoCo 4.0.0: the list is a std::vector of its own standard library's strings;
+  // mjs_getString() reads one of them.
   constexpr std::ptrdiff_t kString = 24;
   struct {
     const char *begin, *end;
@@ -101,7 +102,7 @@ void adopt_assets(mjSpec* child, const ModelSource& source, const std::string& e
       mjs_setInStringVec(texture->cubefiles, i, adopt(e, dir, file).c_str());
     }
   }
-  // Directories are part of the names now.
+  // The names now include the directories.
   mjs_setString(child->compiler.meshdir, "");
   mjs_setString(child->compiler.texturedir, "");
   child->strippath = 0;

@@ -11,10 +11,9 @@
 
 namespace mjsense {
 
-// Gives every file of the parsed model a name that means the same wherever the spec is compiled or
-// saved: an absolute path, or a file in `vfs` for what came in memory. Two entities may bring
-// different files of one name: the later becomes
-// "<entity>/<name>".
+// Renames every file of the parsed model so that the name is valid wherever the spec is compiled or
+// saved: an absolute path, or a file in `vfs` for files given in memory. If two entities have
+// different files of the same name, the later one is renamed "<entity>/<name>".
 void adopt_assets(mjSpec* child, const ModelSource& source, const std::string& entity, Vfs& vfs);
 
 }  // namespace mjsense

@@ -23,8 +23,7 @@ constexpr const char* kFreeJoint = "floating_base_joint";
 
 std::string place_of(const std::string& name) { return fmt::format("entity '{}'", name); }
 
-// Unnamed elements get their type and number as a name: "geom_3". A name that is taken gets a
-// trailing "_".
+// Names unnamed elements by type and index: "geom_3". If the name exists already, "_" is appended.
 void name_unnamed(mjSpec* spec) {
   for (mjtObj type : {mjOBJ_BODY, mjOBJ_JOINT, mjOBJ_GEOM, mjOBJ_SITE, mjOBJ_CAMERA, mjOBJ_LIGHT,
                       mjOBJ_TENDON, mjOBJ_ACTUATOR, mjOBJ_SENSOR}) {
@@ -55,7 +54,7 @@ void drop_options(mjSpec* spec, const std::string& place, std::vector<std::strin
   spec->authored.disableflags = spec->authored.enableflags = spec->authored.disableactuator = 0;
 }
 
-// Each group of <visual> settings is the first entity's that writes it.
+// Each group of <visual> settings is taken from the first entity that sets it.
 void move_visual(mjSpec* from, mjSpec* to) {
   const auto move = [](std::uint64_t& mine, std::uint64_t& theirs, const auto& value,
                        auto& target) {
@@ -86,7 +85,7 @@ bool is_identity(const EntityCfg& cfg) {
   return cfg.pos == std::array<double, 3>{0, 0, 0} && cfg.quat == std::array<double, 4>{1, 0, 0, 0};
 }
 
-// Elements that refer to others. MuJoCo leaves out, without a word, those whose target is unknown.
+// Elements that refer to others. MuJoCo silently drops those whose target is unknown.
 struct Census {
   mjtObj type;
   std::vector<std::string> names;
@@ -107,7 +106,7 @@ void check_nothing_lost(const std::vector<Census>& child, const std::vector<Cens
   for (std::size_t i = 0; i < child.size(); ++i) {
     const std::vector<std::string>& now = after[i].names;
     if (now.size() - before[i].names.size() == child[i].names.size()) continue;
-    std::string why = explain_fault(source, place);  // MuJoCo's own words for the model alone
+    std::string why = explain_fault(source, place);  // MuJoCo's error for the model alone
     if (!why.empty()) throw ValueError(fmt::format("{}: {}", place, why));
     const auto lost = std::find_if(child[i].names.begin(), child[i].names.end(), [&](auto& name) {
       return std::none_of(now.begin(), now.end(), [&](auto& n) { return n.ends_with("/" + name); });
@@ -230,7 +229,7 @@ Attached attach_entity(mjSpec* scene, const std::string& name, const EntityCfg& 
     std::copy(quat.begin(), quat.end(), frame->quat);
   }
   const std::vector<Census> before = census(child.get()), scene_before = census(scene);
-  // The scene keeps the child alive: it is attached by reference.
+  // The attached model is referenced, so the scene keeps the child spec alive.
   if (!mjs_attach(frame->element, child->element, (name + "/").c_str(), "")) {
     throw ValueError(fmt::format("{}: {}", place, one_line(mjs_getError(scene))));
   }

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
-// Attaching models to the scene's spec.
+// Attaches models to the scene's spec.
 
 #include <mujoco/mujoco.h>
 
@@ -13,13 +13,13 @@
 
 namespace mjsense {
 
-// Parses the entity's model, names what is unnamed, and moves everything into `scene` under the
-// prefix "<name>/". Throws ValueError that names the entity.
+// Parses the entity's model, names unnamed elements, and attaches it to `scene` with the prefix
+// "<name>/". Throws ValueError that names the entity.
 Attached attach_entity(mjSpec* scene, const std::string& name, const EntityCfg& cfg, Vfs& vfs,
                        std::vector<std::string>& warnings);
 
-// Makes a whole model the ground that entities are attached to, in place: names what is unnamed,
-// takes its keyframes out.
+// Prepares a complete model in place as the base to which entities are attached: names unnamed
+// elements and takes out the keyframes.
 Attached adopt_base(mjSpec* base, const ModelSource& source, Vfs& vfs);
 
 }  // namespace mjsense

@@ -37,7 +37,7 @@ bool changes_length_ranges(const mjSpec* spec) {
   return !same && mjs_firstElement(spec, mjOBJ_ACTUATOR) != nullptr;
 }
 
-// A scene computes the range of a muscle that has none.
+// If a muscle has no length range, the scene would compute one.
 void check_muscles_have_ranges(const mjSpec* spec, const mjModel* model, std::string_view place) {
   if (spec->compiler.LRopt.mode != mjLRMODE_NONE) return;
   for (mjsElement* element : spec_elements(spec, mjOBJ_ACTUATOR)) {
@@ -82,7 +82,8 @@ SpecPtr apply_whole_model_settings(SpecPtr spec, const Vfs& vfs, std::string_vie
   SpecPtr made(mj_parseXMLString(xml.c_str(), vfs.get(), error, sizeof error));
   if (!made) fail(error);
 
-  // What is no part of its elements stays as written: it is the scene's to choose from.
+  // Settings that do not belong to elements stay as written; the scene decides which of them to
+  // use.
   made->option = spec->option;
   made->visual = spec->visual;
   made->stat = spec->stat;
@@ -93,7 +94,7 @@ SpecPtr apply_whole_model_settings(SpecPtr spec, const Vfs& vfs, std::string_vie
   made->nconmax = spec->nconmax;
   made->nstack = spec->nstack;
   made->nkey = spec->nkey;
-  // Applied already, before the total mass was.
+  // These bounds were already applied, before the total mass.
   made->compiler.boundmass = made->compiler.boundinertia = 0.0;
   return made;
 }

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Every setting of <compiler>: an entity is in a scene what its model is alone, and so is what
-// to_xml() writes.
+// For every setting of <compiler>: a model attached to a scene must equal the model compiled alone,
+// and so must the output of to_xml().
 
 #include "mjsense/scene/compiler_settings.h"
 
@@ -33,9 +33,8 @@ using ::testing::ThrowsMessage;
 constexpr const char* kObj =
     "v 0 0 0\nv 1 0 0\nv 0 2 0\nv 0 0 3\nf 1 3 2\nf 1 2 4\nf 2 3 4\nf 1 4 3\n";
 
-// A floating base with a welded head, a light arm with a muscle, geoms for looks only, a mesh and a
-// box fitted to it. Inertias on the arm and the tip need no balancing, unless the setting makes it
-// so.
+// A floating base with a welded head, a light arm with a muscle, visual geoms, a mesh and a box
+// fitted to it. The inertias of the arm and the tip need balancing only if the setting causes it.
 std::string robot(const std::string& compiler) {
   return fmt::format(R"(<mujoco><compiler {}/>
     <option timestep=".01"/>
@@ -73,7 +72,7 @@ ModelPtr compile_text(const std::string& xml, const std::map<std::string, std::s
   return model;
 }
 
-// Compares what one model calls `name` with what the other calls prefix + name.
+// Compares elements `name` of one model with elements prefix + name of the other.
 struct Compare {
   const mjModel* alone;
   const mjModel* scene;
@@ -115,7 +114,7 @@ struct Compare {
       }
       return found;
     };
-    int textures = 0;  // the sky need not have a name
+    int textures = 0;  // the sky texture may be unnamed
     for (int i = 0; i < alone->ntex; ++i)
       textures += mj_id2name(alone, mjOBJ_TEXTURE, i) != nullptr;
     EXPECT_EQ(count(mjOBJ_BODY, scene->nbody), alone->nbody - 1);
@@ -123,7 +122,7 @@ struct Compare {
     EXPECT_EQ(count(mjOBJ_MESH, scene->nmesh), alone->nmesh);
     EXPECT_EQ(count(mjOBJ_MATERIAL, scene->nmat), alone->nmat);
     EXPECT_EQ(count(mjOBJ_TEXTURE, scene->ntex), textures);
-    // Results of the scene's mass matrix, and of a simulation in it.
+    // Tolerances for values computed with the scene's mass matrix and by simulating the scene.
     const double solved = std::max(tolerance, 1e-12), simulated = std::max(tolerance, 1e-6);
 #define FIELD(type, name, dim) numbers(#name, type, dim, alone->name, scene->name, tolerance)
     numbers("body_mass", mjOBJ_BODY, 1, alone->body_mass, scene->body_mass, 0);
@@ -167,7 +166,7 @@ struct Compare {
 
 struct Setting {
   const char* text;
-  bool exact;  // attached by MuJoCo as it is, no number is touched
+  bool exact;  // MuJoCo attaches it unchanged; all numbers must be equal
 };
 
 void PrintTo(const Setting& setting, std::ostream* out) { *out << setting.text; }
@@ -248,7 +247,7 @@ TEST(CompilerSettings, LengthRangesAreThoseOfTheModelAlone) {
                                                   "muscle 'u' without a range")));
 }
 
-// A URDF fuses and discards unless it says otherwise.
+// The defaults of URDF are fusestatic and discardvisual.
 TEST(CompilerSettings, Urdf) {
   const std::string inertial =
       "<inertial><origin xyz='0 0 .1'/><mass value='2'/><inertia ixx='.02' iyy='.03' izz='.04' "
@@ -302,7 +301,8 @@ TEST(CompilerSettings, WhatCannotBeAppliedIsRefused) {
           HasSubstr("no support for buffer textures"))));
 }
 
-// Of <visual> the first entity counts that writes it, be it MuJoCo's default.
+// <visual> settings are taken from the first entity that sets them, even to MuJoCo's default
+// values.
 TEST(CompilerSettings, WhatIsWrittenCountsAlsoIfItIsTheDefault) {
   const auto lit = [](const char* compiler, double ambient) {
     return fmt::format(R"(<mujoco><compiler {}/><visual><headlight ambient="{} .1 .1"/></visual>
@@ -330,14 +330,14 @@ TEST(CompilerSettings, ABaseKeepsThemForItselfOnly) {
         ThrowsMessage<ValueError>(HasSubstr(fmt::format(
             "scene base: its <compiler> sets {}, which would act on what is attached", setting))));
   }
-  // Bounds stay with the base's own bodies.
+  // Bounds apply to the base's own bodies only.
   const double plain = compile_text(robot(""), kAssets)->body_subtreemass[0],
                bounded = compile_text(robot("boundmass='.5'"), kAssets)->body_subtreemass[0];
   EXPECT_GT(bounded, plain + .5);
   EXPECT_NEAR(scene("boundmass='.5'", false), plain + bounded, 1e-9);
 }
 
-// Every model below the folders MJSENSE_TEST_MODELS (separated by ':') that MuJoCo itself loads.
+// All models in the folders MJSENSE_TEST_MODELS (separated by ':') that MuJoCo can load.
 TEST(CompilerSettings, ModelsOfFolders) {
   const char* folders = std::getenv("MJSENSE_TEST_MODELS");
   if (!folders) GTEST_SKIP() << "MJSENSE_TEST_MODELS is not set";

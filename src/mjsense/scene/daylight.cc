@@ -38,14 +38,15 @@ void add_squares(mjSpec* spec, mjsGeom* ground) {
   mjs_setName(material->element, "terrain_squares");
   mjs_setInStringVec(material->textures, mjTEXROLE_RGB, "terrain_squares");
   material->texuniform = 1;
-  std::ranges::copy(ground->rgba, material->rgba);  // what lidars get back stays the same
+  std::ranges::copy(ground->rgba, material->rgba);  // keeps the intensity of lidar returns
   mjs_setString(ground->material, "terrain_squares");
 }
 
 }  // namespace
 
 void set_sky(mjSpec* spec, const char* name, const Rgb3& top, const Rgb3& bottom) {
-  for (mjsElement* texture : spec_elements(spec, mjOBJ_TEXTURE)) {  // MuJoCo draws the first
+  // MuJoCo draws the first sky only
+  for (mjsElement* texture : spec_elements(spec, mjOBJ_TEXTURE)) {
     if (is_sky(texture)) mjs_delete(spec, texture);
   }
   add_texture(spec, name, mjTEXTURE_SKYBOX, mjBUILTIN_GRADIENT, top, bottom);

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
-// What a scene is made of: attached MJCF models, and references to their elements.
+// Building blocks of a scene: attached MJCF models, and references to their elements.
 
 #include <mujoco/mujoco.h>
 
@@ -16,13 +16,13 @@
 
 namespace mjsense {
 
-// Where an MJCF comes from: a path, an XML text, or a file of models/ ("embedded:objects/mug.xml").
+// Source of an MJCF model: a path, an XML text, or a file of models/ ("embedded:objects/mug.xml").
 struct ModelSource {
-  std::string path;                           // read from disk, relative assets beside it
-  std::string xml;                            // or this text
-  const mjSpec* spec = nullptr;               // or this spec, which is copied
-  std::shared_ptr<const mjSpec> owner;        // keeps `spec` alive where nobody else does
-  std::map<std::string, std::string> assets;  // name -> bytes, for xml and spec
+  std::string path;                           // read from disk; assets are relative to it
+  std::string xml;                            // or an XML text
+  const mjSpec* spec = nullptr;               // or a spec, which is copied
+  std::shared_ptr<const mjSpec> owner;        // keeps `spec` alive if it has no other owner
+  std::map<std::string, std::string> assets;  // file name -> bytes, for `xml` and `spec`
 
   bool empty() const { return path.empty() && xml.empty() && spec == nullptr; }
 };
@@ -60,10 +60,11 @@ void visit_fields(V& v, EntityCfg& c) {
     "can differ between worlds. False: attach it to the world body.");
 }
 
-// Its rotation and its regular expressions.
+// Checks the rotation and the regular expressions.
 void validate(const EntityCfg& cfg, std::string_view place);
 
-// One MuJoCo element. Full name = "entity/name" if entity is non-empty, else "name".
+// A reference to one MuJoCo element. The full name is "entity/name", or "name" if `entity` is
+// empty.
 struct ObjRef {
   std::string type;
   std::string name;

@@ -19,7 +19,7 @@ std::vector<double> values_of(const mjDoubleVec* values) {
   return {data, data + size};
 }
 
-// A run of numbers in a state vector; an entity's elements are neighbours in the model.
+// A range of a state vector. The elements of an entity are contiguous in the model.
 struct Run {
   int start = -1, size = 0;
   void add(int adr, int n) {
@@ -113,7 +113,8 @@ class Merger {
     if (run.size > 0) std::copy(values.begin(), values.end(), target + run.start * width);
   }
 
-  // An entity without a keyframe: its pose as configured, hinges and slides from joint_pos.
+  // Initial state of an entity without a keyframe: the configured pose, and joint_pos for hinge and
+  // slide joints.
   void make() const {
     const EntityCfg& cfg = entity_.cfg;
     std::vector<Regex> patterns;
@@ -132,7 +133,7 @@ class Merger {
         mju_normalize4(q + 3);
       } else if (type == mjJNT_HINGE || type == mjJNT_SLIDE) {
         q[0] = 0;
-        for (std::size_t k = patterns.size(); k-- > 0;) {  // the first match counts
+        for (std::size_t k = patterns.size(); k-- > 0;) {  // the first match wins
           if (!patterns[k].fullmatch(name.substr(entity_.name.size() + 1))) continue;
           q[0] = cfg.joint_pos[k].second;
           used[k] = true;

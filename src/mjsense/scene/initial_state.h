@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
-// The scene's keyframes: those of the base, each joined with the first keyframes of the entities, then
-// init_state, which joins the first keyframes of all.
+// The keyframe init_state, which joins the first keyframes of all entities.
 
 #include <mujoco/mujoco.h>
 
@@ -16,7 +15,7 @@ namespace mjsense {
 
 inline constexpr std::string_view kInitState = "init_state";
 
-// A keyframe of one model; vectors as its XML has them, possibly shorter than the model.
+// A keyframe of one model. Vectors are as in its XML and may be shorter than the model needs.
 struct Keyframe {
   std::string name;
   double time = 0;  // s
@@ -24,24 +23,25 @@ struct Keyframe {
 };
 
 struct Attached {
-  std::string name;  // "" for the scene's base: elements without a prefix
+  std::string name;  // "" for the scene's base, whose elements have no prefix
   EntityCfg cfg;
   bool fixed_base = false;
-  bool wrapped = false;        // under "<name>/mocap_base"
+  bool wrapped = false;        // attached below "<name>/mocap_base"
   std::vector<Keyframe> keys;  // at most one of an entity
-  // From the root's pose in the entity's own model to its pose in the scene: a keyframe's pose of the
-  // root is moved along.
+  // Transform from the root's pose in the entity's own model to its pose in the scene. It is applied
+  // to the root's pose in a keyframe.
   Pose moved{};
 };
 
-// Removes a spec's keyframes and returns them: MuJoCo would make each a keyframe of the whole scene.
+// Removes and returns the keyframes of a spec, because MuJoCo would make each a keyframe of the whole
+// scene.
 std::vector<Keyframe> take_keyframes(mjSpec* spec);
 
-// Adds the scene's keyframes to the spec, empty but for their names and times; `base` holds those of
-// the base. A keyframe of the base that is called init_state gives its place to the scene's.
+// Adds the scene's keyframes to the spec with names and times only; `base` holds those of the base.
+// The scene's init_state replaces a keyframe of the base with that name.
 void add_keyframes(mjSpec* spec, const std::vector<Keyframe>& base);
 
-// Fills them in the compiled model, in which they are at the model's defaults.
+// Fills the keyframes of the compiled model, which must still have the model's defaults.
 void merge_initial_states(const std::vector<Attached>& entities, mjModel* model);
 
 }  // namespace mjsense

@@ -14,7 +14,7 @@
 namespace mjsense {
 namespace {
 
-constexpr double kLongestTimestep = 0.1;  // s, for which no warning is given
+constexpr double kLongestTimestep = 0.1;  // s; a longer one gives a warning
 
 template <class T>
 void check_field(const mjModel* m, mjtObj type, std::string_view field, const T* values,

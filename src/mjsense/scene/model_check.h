@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
-// What MuJoCo compiles without a word and nothing can be measured in.
+// Checks of compiled models for faults that MuJoCo accepts but that make measurements meaningless.
 
 #include <mujoco/mujoco.h>
 
@@ -9,9 +9,9 @@
 
 namespace mjsense {
 
-// Throws ValueError that names the element for a number of the model that is NaN, a place that is
-// infinite, or a timestep that is not positive. Adds to `warnings` what will hardly be meant: a
-// timestep of more than 0.1 s.
+// Throws ValueError that names the element if a number of the model is NaN, a position is infinite,
+// or the timestep is not positive. Adds to `warnings` what is probably a mistake: a timestep of
+// more than 0.1 s.
 void check_model(const mjModel* model, std::vector<std::string>& warnings);
 
 }  // namespace mjsense

@@ -9,8 +9,9 @@
 
 namespace mjsense {
 
-// MuJoCo also writes its warnings to MUJOCO_LOG.TXT in the current folder. After this call it does
-// not; a file that was chosen by mju_setLogConfig() stays. For programs: it changes the process.
+// Stops MuJoCo from also writing its warnings to MUJOCO_LOG.TXT in the user's current folder. A log
+// file chosen by mju_setLogConfig() is kept. For programs only, because it changes a setting of the
+// process.
 void leave_no_log_file();
 
 // While one exists, MuJoCo's warnings on this thread are appended to `messages` instead of printed.

@@ -20,8 +20,8 @@ std::string lower(std::string_view text) {
   return out;
 }
 
-// MuJoCo's XML names of the flags, lower case without spaces: "Frictionloss" -> "frictionloss",
-// "Clampctrl" -> "clampctrl".
+// Parses flags by MuJoCo's XML names in lower case without spaces: "Frictionloss" ->
+// "frictionloss", "Clampctrl" -> "clampctrl".
 int flags(std::string_view place, std::string_view field, const std::vector<std::string>& wanted,
           std::span<const char* const> known) {
   std::vector<std::string> names;

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
-// Simulation options of a scene. Entities' own <option> values are not carried over: one scene, one
-// physics.
+// Physics options of a scene. The <option> values of entities are not used, because all entities
+// share one simulation.
 
 #include <mujoco/mujoco.h>
 
@@ -73,12 +73,12 @@ void visit_fields(V& v, OptionsCfg& c) {
     "Flags to enable that are off by default, by their lower-case MJCF names.");
 }
 
-// Of the flags.
+// Checks the flags.
 void validate(const OptionsCfg& cfg, std::string_view place);
-// Throws ValueError for what check_fields() refuses.
+// Throws ValueError for values that check_fields() rejects.
 void apply_options(const OptionsCfg& cfg, mjOption& option);
 
-// Names of the fields in which two sets of options differ.
+// Returns the names of the fields in which two sets of options differ.
 std::vector<std::string> differing_options(const mjOption& a, const mjOption& b);
 
 }  // namespace mjsense

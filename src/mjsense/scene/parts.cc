@@ -21,7 +21,7 @@ void copy_pose(const Element* from, mjsFrame* to) {
   to->alt = from->alt;
 }
 
-// Where the part hangs: a frame as the site, or as the body itself.
+// Creates the frame at which the part is attached: that of the site, or of the body.
 mjsFrame* mount(mjSpec* model, const std::string& name, const std::string& place) {
   if (mjsElement* element = mjs_findElement(model, mjOBJ_SITE, name.c_str())) {
     mjsFrame* frame = mjs_addFrame(mjs_getParent(element), mjs_getFrame(element));
@@ -52,7 +52,7 @@ void attach_part(mjSpec* model, const ModelPart& part, std::string_view of) {
   mjsFrame* frame = mjs_addFrame(mjs_getParent(at->element), at);
   std::copy(part.pos.begin(), part.pos.end(), frame->pos);
   std::copy(part.quat.begin(), part.quat.end(), frame->quat);
-  // The model keeps the part alive: it is attached by reference.
+  // The attached part is referenced, so the model keeps its spec alive.
   if (!mjs_attach(frame->element, child->element, part.prefix.c_str(), ""))
     throw ValueError(fmt::format("{}: {}", place, one_line(mjs_getError(model))));
 }
@@ -64,7 +64,8 @@ SpecPtr compose_model(const ModelSource& model, std::span<const ModelPart> parts
   SpecPtr spec = parse_model(model, place);
   Vfs vfs;
   adopt_assets(spec.get(), model, "", vfs);
-  // MuJoCo warns that a part without a prefix may be saved wrongly; save_xml() knows.
+  // MuJoCo warns that a part without a prefix may be saved incorrectly; save_xml() handles this
+  // case.
   std::vector<std::string> warnings;
   const WarningCapture capture(warnings);
   if (!parts.empty()) take_keyframes(spec.get());

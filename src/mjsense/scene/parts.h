@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
-// One model of several MJCF files: each hangs on a site or a body of those before it.
+// Composes one model from several MJCF files, each attached to a site or body of the earlier ones.
 
 #include <array>
 #include <span>
@@ -12,18 +12,18 @@
 
 namespace mjsense {
 
-// A model that hangs on another: a gripper on the flange of an arm.
+// A model that is attached to another, such as a gripper to the flange of an arm.
 struct ModelPart {
-  std::string path;                        // of an MJCF, as ModelSource's
-  std::string to;                          // site, else body, of the model so far
-  std::string prefix;                      // of its names: "gripper/"
-  std::array<double, 3> pos{0, 0, 0};      // m, of its root where it hangs
+  std::string path;    // path of an MJCF file, as ModelSource::path
+  std::string to;      // name of a site, or else a body, of the model composed so far
+  std::string prefix;  // prefix of its names: "gripper/"
+  std::array<double, 3> pos{0, 0, 0};      // m, of its root relative to the attachment point
   std::array<double, 4> quat{1, 0, 0, 0};  // wxyz
 };
 
-// The model with its parts, attached in this order; their <option> and keyframes count for nothing.
-// Throws ValueError, or KeyError where a part hangs on nothing, which begin with `place` and name
-// the part's file.
+// Returns the model with its parts attached in this order. The <option> values and keyframes of the
+// parts are ignored. Throws ValueError, or KeyError if the attachment point does not exist; both
+// begin with `place` and name the part's file.
 SpecPtr compose_model(const ModelSource& model, std::span<const ModelPart> parts,
                       std::string_view place);
 

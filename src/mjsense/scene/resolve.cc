@@ -122,7 +122,7 @@ ResolvedObj resolve(const mjModel* model, const Scene* scene, const ObjRef& ref,
 Elements entity_elements(const mjModel* model, const Scene* scene, std::string_view entity,
                          mjtObj type, std::string_view place) {
   check_entity(scene, entity, place);
-  // The terrain is attached without a prefix: its elements are named "terrain..." without a slash.
+  // The terrain is attached without a prefix; its elements are named "terrain..." without a slash.
   const std::string prefix = entity.empty() ? "" : fmt::format("{}/", entity);
   Elements found;
   const std::vector<std::string> names = model_names(model, type);

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
-// From names to ids, for sensors. `place` starts every message: "sensor 'imu'".
+// Resolves names of MuJoCo elements to ids, for sensors. `place` is the prefix of error messages:
+// "sensor 'imu'".
 
 #include <mujoco/mujoco.h>
 
@@ -18,12 +19,13 @@ class Scene;
 mjtObj obj_type(std::string_view name, std::string_view place);
 std::string obj_type_name(mjtObj type);
 
-// Names of all elements of a type in model order, "" where there is none. XBODY counts as BODY.
+// Names of all elements of a type in model order; "" for unnamed ones. XBODY is treated as BODY.
 std::vector<std::string> model_names(const mjModel* model, mjtObj type);
 std::string name_of(const mjModel* model, mjtObj type, int id);  // full name, "" if unnamed
 int count_of(const mjModel* model, mjtObj type);
 
-// Id of the element with this full name; throws KeyError naming the place and the nearest names.
+// Returns the id of the element with this full name. Throws KeyError with the place and the nearest
+// names.
 int resolve(const mjModel* model, mjtObj type, std::string_view full_name, std::string_view place);
 
 struct ResolvedObj {
@@ -31,13 +33,13 @@ struct ResolvedObj {
   int id = -1;
 };
 
-// An unknown entity is an error that names the entities there are (scene may be null: then it is
-// not checked by itself).
+// Also throws KeyError for an unknown entity, with the names of the entities (not checked if
+// `scene` is null).
 ResolvedObj resolve(const mjModel* model, const Scene* scene, const ObjRef& ref,
                     std::string_view place);
 
-// Local names and ids of an entity's elements, in model order; "" as the entity: every element
-// under its full name. The world body is no entity's. Throws KeyError for an unknown entity.
+// Local names and ids of an entity's elements, in model order. With "" as the entity: all elements,
+// with full names. The world body belongs to no entity. Throws KeyError for an unknown entity.
 struct Elements {
   std::vector<std::string> names;
   std::vector<int> ids;

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// to_xml() compiles to the same model again: every size, every name, every number.
+// The output of to_xml() must compile to the same model: all sizes, names and numbers.
 
 #include <fmt/format.h>
 #include <gmock/gmock.h>
@@ -29,7 +29,7 @@ bool near(T a, T b) {
                        1e-9 * (1 + std::abs(static_cast<double>(a)));
 }
 
-// Names of the sizes and arrays that differ, with the first values that do.
+// Names of the sizes and arrays that differ, with the first values that differ.
 std::vector<std::string> differences(const mjModel* a, const mjModel* b) {
   std::vector<std::string> out;
   const auto compare = [&](const char* name, const auto* x, const auto* y, long n) {
@@ -45,7 +45,7 @@ std::vector<std::string> differences(const mjModel* a, const mjModel* b) {
 #undef X
   if (!out.empty()) return out;
   MJMODEL_POINTERS_PREAMBLE(a)
-  // Sizes that a type does not use are not saved.
+  // Sizes that a geom or site type does not use are not saved.
   const auto compare_sizes = [&](const char* name, const int* type, const mjtNum* x,
                                  const mjtNum* y, long n) {
     for (long i = 0; i < n; ++i) {
@@ -65,7 +65,7 @@ std::vector<std::string> differences(const mjModel* a, const mjModel* b) {
 #undef X
   compare_sizes("geom_size", a->geom_type, a->geom_size, b->geom_size, a->ngeom);
   compare_sizes("site_size", a->site_type, a->site_size, b->site_size, a->nsite);
-  for (int t = 0; t < a->ntendon; ++t) {  // a fixed tendon is not drawn
+  for (int t = 0; t < a->ntendon; ++t) {  // fixed tendons are not drawn
     if (a->wrap_type[a->tendon_adr[t]] == mjWRAP_JOINT) continue;
     compare("tendon_width", a->tendon_width + t, b->tendon_width + t, 1);
   }
@@ -154,7 +154,7 @@ TEST(RoundTrip, FilesInMemory) {
   expect_round_trip(Scene(std::move(cfg)));
 }
 
-// Settings of the compiler that one file cannot hold for two entities.
+// Compiler settings of two entities that one file cannot express.
 TEST(RoundTrip, DifferentCompilers) {
   const auto body = [](const char* compiler) {
     return xml(
@@ -174,7 +174,8 @@ TEST(RoundTrip, DifferentCompilers) {
   expect_round_trip(Scene(std::move(cfg)));
 }
 
-// A model that attaches another without a prefix, both with a default class of one name.
+// A model that attaches another one without a prefix, where both have a default class of the same
+// name.
 TEST(RoundTrip, RepeatedDefaultClasses) {
   const std::string part =
       "<mujoco model='part'><default><default class='robot'><default class='look'><geom rgba='0 1 "
@@ -201,7 +202,7 @@ TEST(RoundTrip, RepeatedDefaultClasses) {
   expect_round_trip(scene);
 }
 
-// Two entities bring different files of one name.
+// Two entities have different files of the same name.
 TEST(RoundTrip, ClashingFiles) {
   const std::string big =
       "v 0 0 0\nv 2 0 0\nv 0 2 0\nv 0 0 2\nf 1 3 2\nf 1 2 4\nf 2 3 4\nf 1 4 3\n";
@@ -225,8 +226,8 @@ TEST(RoundTrip, GeneratedTerrain) {
   expect_round_trip(Scene(std::move(cfg)));
 }
 
-// Every model below the folders MJSENSE_TEST_MODELS (separated by ':') that MuJoCo itself loads,
-// twice in one scene.
+// All models in the folders MJSENSE_TEST_MODELS (separated by ':') that MuJoCo can load, each
+// attached twice to one scene.
 TEST(RoundTrip, ModelsOfFolders) {
   const char* folders = std::getenv("MJSENSE_TEST_MODELS");
   if (!folders) GTEST_SKIP() << "MJSENSE_TEST_MODELS is not set";

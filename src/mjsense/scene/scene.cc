@@ -87,7 +87,7 @@ void Scene::Impl::build() {
     WarningCapture capture(said);
     attach();
   }
-  for (std::string& text : said) {  // which entity's <size> wins is of no use to anybody
+  for (std::string& text : said) {  // it is irrelevant to users which entity's <size> was used
     if (!text.starts_with("Attach conflict")) warnings.push_back(std::move(text));
   }
   add_sensors();
@@ -103,7 +103,7 @@ void Scene::Impl::build() {
   }
 }
 
-// The options as configured; a base keeps its own where nothing is configured.
+// Uses the configured options; if none is configured, a base keeps its own.
 void Scene::Impl::set_options() {
   mjOption standard, configured;
   mj_defaultOption(&standard);
@@ -115,7 +115,7 @@ void Scene::Impl::set_options() {
   if (!has_base || !differing_options(standard, configured).empty()) spec->option = configured;
 }
 
-// What the base's <compiler> does to a whole model would be done to everything in the scene.
+// Whole-model <compiler> settings of the base would apply to everything in the scene.
 void Scene::Impl::check_base_alone() {
   const std::vector<std::string> settings = whole_model_settings(spec.get());
   if (settings.empty() || (!cfg.terrain && cfg.entities.empty())) return;
@@ -126,7 +126,7 @@ void Scene::Impl::check_base_alone() {
                   fmt::join(settings, ", ")));
 }
 
-// Base, options, terrain, entities.
+// Adds base, options, terrain and entities to the spec.
 void Scene::Impl::attach() {
   check_scene(cfg);
   spec = cfg.spec           ? SpecPtr(cfg.spec, SpecDelete{false})
@@ -137,7 +137,7 @@ void Scene::Impl::attach() {
   if (std::isnan(spec->stat.meansize)) spec->stat.meansize = 0.03;
   if (cfg.extent) spec->stat.extent = *cfg.extent;
   spec->compiler.savecompiled = 0;             // numbers are saved exactly
-  spec->compiler.conflict = mjCONFLICT_MERGE;  // sizes: the larger wins
+  spec->compiler.conflict = mjCONFLICT_MERGE;  // the larger size is used
   check_base_alone();
   if (cfg.terrain) terrain.emplace(*cfg.terrain).add_to(spec.get());
   for (const auto& [name, entity] : cfg.entities) {
@@ -146,7 +146,7 @@ void Scene::Impl::attach() {
   }
 }
 
-// Keys are unique: two sensors of one name are an error, always.
+// Keys are unique; two sensors with the same name are always an error.
 void Scene::Impl::add(std::unique_ptr<Sensor> sensor) {
   const std::string& key = sensor->name();
   if (key.empty()) throw ValueError("scene: a sensor needs a name");
@@ -170,8 +170,8 @@ void Scene::Impl::add_sensors() {
     sensors.back()->edit_spec(spec.get());
   }
   const std::size_t configured = sensors.size();
-  // Every MuJoCo sensor that no configured sensor stands for: those of the entities' XML, then
-  // those that sensors added.
+  // MuJoCo sensors without a configured sensor: those of the entities' XML, then those added by
+  // other sensors.
   for (const std::string& name : spec_names(spec.get(), mjOBJ_SENSOR)) {
     const auto taken = [&](const auto& sensor) { return sensor->name() == name; };
     if (std::none_of(sensors.begin(), sensors.end(), taken))
@@ -190,7 +190,7 @@ void Scene::Impl::compile() {
   if (!model) throw ValueError(fmt::format("scene: {}", one_line(mjs_getError(spec.get()))));
   check_model(model.get(), warnings);
   merge_initial_states(attached, model.get());
-  if (!mj_copyBack(spec.get(), model.get())) {  // the keyframe, for to_xml()
+  if (!mj_copyBack(spec.get(), model.get())) {  // copies the keyframe to the spec, for to_xml()
     throw RuntimeError(fmt::format("scene: {}", mjs_getError(spec.get())));
   }
 }

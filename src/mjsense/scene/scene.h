@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
-// A scene: what all worlds share. Entities and terrain attached into one spec, sensors registered,
-// the model compiled.
+// A scene is what all worlds share: entities and terrain attached to one spec, the registered
+// sensors, and the compiled model.
 
 #include <mujoco/mujoco.h>
 
@@ -22,23 +22,23 @@
 namespace mjsense {
 
 struct SceneCfg {
-  // A whole model to start from, as it is: names without a prefix, any number of free joints, its
-  // own options unless `options` are set. Its sensors are discovered; it is no entity. Empty: an
-  // empty world.
+  // A complete model to start from, used unchanged: names have no prefix, it may have any number of
+  // free joints, and its options are kept unless `options` are set. Its sensors are discovered; it
+  // is not an entity. If empty, the scene starts from an empty world.
   ModelSource base;
-  // Attached next, without a prefix.
+  // Attached after the base, without a prefix.
   std::optional<TerrainCfg> terrain;
-  // Attached in this order, names prefixed "name/".
+  // Attached in this order, with the prefix "<name>/".
   std::vector<std::pair<std::string, EntityCfg>> entities;
   std::vector<std::shared_ptr<const SensorCfg>> sensors;
-  double env_spacing = 2.0;      // m, grid of world origins on a plane
+  double env_spacing = 2.0;      // m, grid spacing of the world origins on a plane
   std::optional<double> extent;  // m, overrides stat.extent
   OptionsCfg options;
-  // Called last, before compilation; sensors that it adds are not discovered.
+  // Called last, before compilation. Sensors that it adds are not discovered.
   std::function<void(mjSpec*)> spec_fn;
-  // Spec that the scene is built in (its contents are the base) and that must live as long as the
-  // scene; null: one of the scene's own. The Python package passes its MjSpec's, so that spec_fn
-  // sees the real thing.
+  // Spec that the scene is built in; its contents are the base, and it must outlive the scene. If
+  // null, the scene creates its own. The Python package passes the spec of a MjSpec object, so that
+  // spec_fn edits the actual spec.
   mjSpec* spec = nullptr;
 };
 template <class V>
@@ -65,9 +65,9 @@ void visit_fields(V& v, SceneCfg& c) {
       "``options`` are set. Its sensors become sensors of the scene; it is not an entity.");
 }
 
-// Names of an entity's elements, local (without the prefix), in model order. An element that its
-// MJCF leaves unnamed is given a name: its type and its number among the entity's elements of that
-// type, "geom_3"; a free joint "floating_base_joint".
+// Local names (without the prefix) of an entity's elements, in model order. An element without a
+// name in its MJCF is named by its type and its index among the entity's elements of that type,
+// "geom_3"; a free joint is named "floating_base_joint".
 struct Entity {
   std::string name;
   bool fixed_base = false;  // no free joint
@@ -77,18 +77,17 @@ struct Entity {
 
 class Scene {
  public:
-  // Throws ValueError or KeyError that names the entity or sensor at fault.
+  // Throws ValueError or KeyError that names the entity or sensor with the fault.
   explicit Scene(SceneCfg cfg);
   ~Scene();
   Scene(const Scene&) = delete;
   Scene& operator=(const Scene&) = delete;
 
-  // Its keyframes: those of the base, with their names and times, and "init_state". In each the
-  // entities stand as in their first keyframe; init_state has the base's first. A world starts at
-  // qpos0, not there.
+  // Has one keyframe, "init_state", which joins the first keyframes of the entities. Worlds start
+  // at qpos0, not at this keyframe.
   const mjModel* model() const;
-  // With assets() as files beside it compiles to the same model again. Files on disk are named by
-  // absolute path.
+  // With assets() as files in the same folder, compiles to the same model again. Files on disk are
+  // referenced by absolute path.
   std::string to_xml() const;
   const std::map<std::string, std::string>& assets() const;
   const SceneCfg& cfg() const;
@@ -96,26 +95,26 @@ class Scene {
   // itself reads none of them. Throws ValueError for a wrong option.
   void set_options(const OptionsCfg& options);
 
-  // Configured sensors in order, then those discovered in the entities' XML. Not initialized:
-  // Simulation does that.
+  // Configured sensors in order, then those discovered in the entities' XML. Simulation initializes
+  // them.
   const std::vector<std::unique_ptr<Sensor>>& sensors() const;
   Sensor* find_sensor(std::string_view key) const;  // null if there is none
   Sensor& sensor(std::string_view key) const;       // throws KeyError with the nearest names
 
-  // The sensors hold the rows of one simulation at a time: this scene is taken until the result is
-  // destroyed. Throws RuntimeError if it is taken.
+  // Reserves the scene until the result is destroyed, because its sensors hold the rows of one
+  // simulation at a time. Throws RuntimeError if it is already reserved.
   [[nodiscard]] std::shared_ptr<void> claim();
 
   const std::vector<Entity>& entities() const;        // the terrain, if any, first
   const Entity& entity(std::string_view name) const;  // throws KeyError with the nearest names
 
-  // World origins [B, 3], m: zeros without terrain, a grid on a plane, spawn points of (level,
-  // type) tiles on generated terrain.
+  // World origins [B, 3], m: zero without terrain, a grid on a plane, spawn points of (level, type)
+  // tiles on generated terrain.
   std::vector<double> env_origins(int num_worlds) const;
   const Terrain* terrain() const;  // null if there is none
 
-  // What was found odd but not wrong: options of entities that are not carried over, further
-  // keyframes of entities, MuJoCo's own.
+  // Conditions that are unusual but not errors: options of entities that are ignored, further
+  // keyframes, and MuJoCo's own warnings.
   const std::vector<std::string>& warnings() const;
 
  private:

@@ -117,7 +117,7 @@ TEST(Scene, SaysWhatIsWrongWithAnEntity) {
             "entity 'terrain': the name is taken by the scene's terrain");
 }
 
-// MuJoCo compiles these, and says at most that there is a NaN somewhere.
+// MuJoCo compiles these models; at most it warns that there is a NaN.
 TEST(Scene, RefusesNumbersInWhichNothingCanBeMeasured) {
   const auto base_fault = [](const std::string& inside) {
     SceneCfg cfg;
@@ -160,7 +160,7 @@ TEST(Scene, SaysWhatIsWrongWithAnOption) {
             "options: disableflags has no flag 'contacts'; did you mean 'contact'?");
   EXPECT_THAT(option_fault([](auto& o) { o.enableflags = {"contact"}; }),
               HasSubstr("no flag 'contact'"));
-  for (int i = 0; i < mjNDISABLE; ++i) {  // every name that MJCF knows is known here
+  for (int i = 0; i < mjNDISABLE; ++i) {  // all flag names of MJCF must be accepted
     SceneCfg cfg;
     std::string name = mjDISABLESTRING[i];
     std::transform(name.begin(), name.end(), name.begin(), ::tolower);
@@ -232,7 +232,7 @@ TEST(Scene, PlacesEntities) {
   EXPECT_EQ(m->key_qpos[m->nq - 1], .5);
 }
 
-// Patterns are asked in their order, and the first that matches a joint gives its position.
+// Patterns are tried in order; the first one that matches a joint gives its position.
 TEST(Scene, TheFirstMatchingJointPatternCounts) {
   const char* leg = R"(<mujoco><worldbody><body><joint name="hip"/><geom size=".1"/>
     <body><joint name="knee"/><geom size=".1"/><body><joint name="foot" type="slide" axis="0 0 1"/>
@@ -257,7 +257,7 @@ TEST(Scene, JoinsMocapKeyframes) {
   cfg.entities = {{"table", xml(kTable)}, {"hand", xml(hand)}};
   Scene scene(std::move(cfg));
   const mjModel* m = scene.model();
-  ASSERT_EQ(m->nmocap, 2);  // the table's base and the hand
+  ASSERT_EQ(m->nmocap, 2);  // the table's mocap base and the hand
   EXPECT_THAT(std::vector<double>(m->key_mpos + 3, m->key_mpos + 6), ElementsAre(4, 5, 6));
   EXPECT_THAT(std::vector<double>(m->key_mquat + 4, m->key_mquat + 8), ElementsAre(0, 1, 0, 0));
 }
@@ -430,7 +430,7 @@ TEST(Scene, SpecFnComesLast) {
   EXPECT_EQ(scene.find_sensor("late"), nullptr);
 }
 
-// A whole model as it is, with two free bodies and its keyframe, and an entity on top.
+// A complete model used unchanged, with two free bodies and a keyframe, plus an entity.
 TEST(Scene, Base) {
   SceneCfg cfg;
   cfg.base.xml =

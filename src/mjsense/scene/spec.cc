@@ -12,7 +12,7 @@
 #include "mjsense/core/error.h"
 #include "mjsense/scene/resolve.h"
 
-// Exported for MuJoCo's own Python bindings: significant digits of numbers in saved XML.
+// Exported for MuJoCo's own Python bindings: number of significant digits in saved XML.
 extern "C" int _mjPRIVATE__get_xml_precision(void);
 extern "C" void _mjPRIVATE__set_xml_precision(int precision);
 
@@ -26,13 +26,13 @@ SpecPtr checked(mjSpec* spec, const char* error, std::string_view place) {
   return SpecPtr(spec);
 }
 
-// A model that attaches another without a prefix may have two default classes of one name, which
-// MuJoCo writes but does not read. Elements are written as they differ from the last of them; the
-// others are given names that nothing uses.
+// A model that attaches another one without a prefix may have two default classes of the same name.
+// MuJoCo writes such XML but cannot read it. Elements are written relative to the last of these
+// classes, so the others are renamed to unused names.
 void make_defaults_unique(std::string& xml) {
   constexpr std::string_view kTag = "<default class=\"";
   std::set<std::string> taken;
-  std::vector<std::pair<std::size_t, std::string>> classes;  // where the name begins, last first
+  std::vector<std::pair<std::size_t, std::string>> classes;  // positions of the names, last first
   for (std::size_t at = xml.find(kTag); at != std::string::npos; at = xml.find(kTag, at)) {
     at += kTag.size();
     classes.insert(classes.begin(), {at, xml.substr(at, xml.find('"', at) - at)});
@@ -107,7 +107,7 @@ SpecPtr parse_model(const ModelSource& source, std::string_view place) {
   if (!std::filesystem::is_regular_file(source.path)) {
     throw ValueError(fmt::format("{}: no file '{}'", place, source.path));
   }
-  // Absolute, so that its assets are found from anywhere.
+  // An absolute path, so that its assets are found from any folder.
   const std::string path = std::filesystem::absolute(source.path).lexically_normal().string();
   return checked(mj_parse(path.c_str(), nullptr, vfs.get(), error, sizeof error), error,
                  fmt::format("{} ({})", place, source.path));
@@ -139,7 +139,7 @@ std::string one_line(std::string_view message) {
 
 ModelPtr compile(mjSpec* spec, const Vfs& vfs) {
   const mjtBool save = spec->compiler.saveinertial;
-  spec->compiler.saveinertial = 1;  // as it was at compilation counts for save_compiled_xml()
+  spec->compiler.saveinertial = 1;  // save_compiled_xml() depends on the value at compilation
   ModelPtr model(mj_compile(spec, vfs.get()));
   spec->compiler.saveinertial = save;
   return model;

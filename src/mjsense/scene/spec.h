@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
-// MuJoCo's mjSpec in C++: owners, names, and its messages as exceptions and strings. libmujoco of
-// the wheel is built with another C++ library than ours: touch mjString, mjDoubleVec ... only
-// through the mjs_get* and mjs_set* functions.
+// C++ helpers for MuJoCo's mjSpec: ownership, names, and messages as exceptions and strings. The
+// wheel's libmujoco is built with a different C++ standard library, so mjString, mjDoubleVec etc.
+// must be accessed through the mjs_get* and mjs_set* functions only.
 
 #include <mujoco/mujoco.h>
 
@@ -36,7 +36,8 @@ class Vfs {
   Vfs(const Vfs&) = delete;
   Vfs& operator=(const Vfs&) = delete;
 
-  // A second file of one name must be the same file, else ValueError: `place` says who wanted it.
+  // Files with the same name must have the same content, otherwise throws ValueError; `place`
+  // identifies the user of the file.
   void add(const std::string& name, std::string_view bytes, std::string_view place);
   const mjVFS* get() const { return &vfs_; }
   const std::map<std::string, std::string>& files() const { return files_; }
@@ -46,33 +47,33 @@ class Vfs {
   std::map<std::string, std::string> files_;
 };
 
-// Parses a model. Throws ValueError with MuJoCo's text; `place` names the entity.
+// Parses a model. Throws ValueError with MuJoCo's message; `place` names the entity.
 SpecPtr parse_model(const ModelSource& source, std::string_view place);
 
-// What MuJoCo says when it compiles the model by itself; "" if it does compile.
+// MuJoCo's error message when the model is compiled on its own; "" if it compiles.
 std::string explain_fault(const ModelSource& source, std::string_view place);
 
-// MuJoCo's message without its line breaks and its "Error:".
+// MuJoCo's message without line breaks and without its "Error:".
 std::string one_line(std::string_view message);
 
-// Null if it fails: mjs_getError() says why.
+// Returns null on failure, with the reason in mjs_getError().
 ModelPtr compile(mjSpec* spec, const Vfs& vfs);
 
-// The compiled spec as MJCF: as it is written where one file can say it, exactly; else, where
-// entities were compiled with settings of their own, the values that compilation made.
+// Writes the compiled spec as MJCF: exactly as written, if one file can express that; otherwise
+// (entities that were compiled with different settings) with the values computed by compilation.
 std::string save_xml(mjSpec* spec);
 
-// The values that compile() made, with all their digits: what settings of <compiler> have done to
-// them too. Throws RuntimeError that starts with `place`.
+// Writes the values computed by compile(), with all digits and with the effects of the <compiler>
+// settings. Throws RuntimeError that starts with `place`.
 std::string save_compiled_xml(mjSpec* spec, std::string_view place);
 
 std::string element_name(const mjsElement* element);
-// The elements of one type, in the order of the spec.
+// Elements of one type, in the order of the spec.
 std::vector<mjsElement*> spec_elements(const mjSpec* spec, mjtObj type);
 std::vector<std::string> spec_names(const mjSpec* spec, mjtObj type);
 
-// Element of the spec by its full name; throws KeyError with the nearest names. XBODY is looked up
-// as BODY.
+// Finds an element by its full name. Throws KeyError with the nearest names. XBODY is looked up as
+// BODY.
 mjsElement* find_in_spec(const mjSpec* spec, mjtObj type, const std::string& name,
                          std::string_view place);
 

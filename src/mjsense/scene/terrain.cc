@@ -14,7 +14,7 @@
 namespace mjsense {
 namespace {
 
-// The sub-terrains asked for, or one of every kind.
+// The configured sub-terrains, or one of each kind.
 auto sub_terrains(const TerrainCfg& cfg) {
   auto all = cfg.sub_terrains;
   for (std::size_t kind = 0; cfg.sub_terrains.empty() && kind < kWords<SubTerrain>.size(); ++kind) {
@@ -24,7 +24,7 @@ auto sub_terrains(const TerrainCfg& cfg) {
   return all;
 }
 
-// How many columns each sub-terrain gets: by proportion, in order, ends of the columns rounded
+// Number of columns per sub-terrain: by proportion, in order; the end of each range is rounded
 // down.
 std::vector<int> share_columns(const TerrainCfg& cfg, int types) {
   double total = 0;
@@ -138,7 +138,7 @@ std::vector<double> Terrain::env_origins(int num_worlds, double env_spacing) con
     }
     return origins;
   }
-  // A grid centred on the world's origin: row i div cols goes along -x, column i mod cols along +y.
+  // Grid centred on the world origin: row i / cols along -x, column i % cols along +y.
   const int root = static_cast<int>(std::sqrt(num_worlds));
   const int rows = (num_worlds + root - 1) / root;
   const int cols = (num_worlds + rows - 1) / rows;

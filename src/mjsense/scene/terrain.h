@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
-// The ground of a scene: an infinite plane, or generated tiles of rising difficulty (levels x
+// Ground of a scene: an infinite plane, or generated tiles of increasing difficulty (levels x
 // types).
 
 #include <mujoco/mujoco.h>
@@ -16,13 +16,13 @@
 
 namespace mjsense {
 
-// clang-format off: a table
-//   flat             nothing
-//   rough            height field of uniform noise in [-amplitude, amplitude], a knot every `spacing`
-//   waves            height field: amplitude * sin along both axes, `waves` periods a tile
-//   slope            height field: pyramid that rises to a platform with `slope`
-//   stairs           boxes: pyramid of steps of `step_height` and `step_width` up to a platform
-//   stepping_stones  boxes of `stone_width` with gaps of `gap` over a pit, around a platform
+// clang-format off: this is a table
+// flat             flat ground
+// rough            height field: uniform noise in [-amplitude, amplitude], a value every `spacing`
+// waves            height field: amplitude * sin along both axes, `waves` periods per tile
+// slope            height field: pyramid with slope `slope` and a platform on top
+// stairs           boxes: pyramid of steps of `step_height` and `step_width`, a platform on top
+// stepping_stones  boxes: stones of `stone_width` with gaps of `gap` over a pit, around a platform
 // clang-format on
 enum class SubTerrain { kFlat, kRough, kWaves, kSlope, kStairs, kSteppingStones };
 template <>
@@ -70,15 +70,15 @@ void visit_fields(V& v, SubTerrainCfg& c) {
       .positive();
 }
 
-// What its fields say of each other.
+// Checks relations between the fields.
 void validate(const SubTerrainCfg& cfg, std::string_view place);
 
 enum class TerrainType { kPlane, kGenerator };
 template <>
 inline constexpr std::array<std::string_view, 2> kWords<TerrainType>{"plane", "generator"};
 
-// The generator's tiles: level i along +x with rising difficulty, type j along +y, the whole
-// centred on the world's origin, tiles meeting at z = 0.
+// Generated tiles: levels along +x with increasing difficulty, types along +y. The grid is centred
+// on the world origin, and tiles meet at z = 0.
 struct TerrainCfg {
   Word<TerrainType> terrain_type;
   std::vector<std::pair<std::string, SubTerrainCfg>> sub_terrains;
@@ -119,31 +119,31 @@ void validate(const TerrainCfg& cfg, std::string_view place);
 
 class Terrain {
  public:
-  // Throws ValueError for what check_fields() refuses.
+  // Throws ValueError for values that check_fields() rejects.
   explicit Terrain(TerrainCfg cfg);
 
-  // Adds the body "terrain" to the world: a plane "terrain", or geoms named
-  // "terrain_<level>_<type>" with "_<k>" for tiles of many boxes.
+  // Adds the body "terrain" to the world: a plane named "terrain", or geoms named
+  // "terrain_<level>_<type>", with the suffix "_<k>" for tiles of several boxes.
   void add_to(mjSpec* spec);
 
   int levels() const { return levels_; }  // 0 for a plane
   int types() const { return types_; }
-  // The sub-terrain of column `type`.
+  // Name of the sub-terrain of column `type`.
   const std::string& type_name(int type) const;
   // Spawn points [levels, types, 3], m: the centre of each tile, on its surface. Valid after
   // add_to().
   const std::vector<double>& tile_origins() const { return origins_; }
 
-  // World origins [B, 3], m. Plane: a grid with this spacing. Generated: the spawn point of the
-  // world's tile; types are shared out evenly in order, levels drawn from the seed.
+  // World origins [B, 3], m. Plane: a grid with this spacing. Generated terrain: the spawn point of
+  // the world's tile. Types are distributed evenly in order; levels are drawn from the seed.
   std::vector<double> env_origins(int num_worlds, double env_spacing) const;
-  // Tiles [B, 2] of the worlds: level, type.
+  // Tile [B, 2] of each world: level, type.
   std::vector<int> env_tiles(int num_worlds) const;
 
  private:
   TerrainCfg cfg_;
   int levels_ = 0, types_ = 0;
-  std::vector<int> column_;  // sub-terrain of each column
+  std::vector<int> column_;  // index of the sub-terrain of each column
   std::vector<double> origins_;
 };
 

@@ -43,7 +43,7 @@ class Generated {
   }
   const Terrain& terrain() const { return *scene_->terrain(); }
   const Scene& scene() const { return *scene_; }
-  // Height of the ground below (x, y), NaN where there is none.
+  // Height of the ground at (x, y); NaN if there is none.
   double height(double x, double y) const {
     const mjtNum from[] = {x, y, 50}, down[] = {0, 0, -1};
     int geom = -1;
@@ -71,7 +71,8 @@ TEST(Terrain, SpawnPointsLieOnTheGround) {
   EXPECT_DOUBLE_EQ(origins[1], -20);
 }
 
-// Heights by hand at asymmetric points: they fail for a transposed or mirrored height field.
+// Hand-computed heights at asymmetric points, which a transposed or mirrored height field would
+// fail.
 TEST(Terrain, ShapesByHand) {
   TerrainCfg cfg;
   cfg.levels = 1;
@@ -119,9 +120,9 @@ TEST(Terrain, SteppingStonesHaveGaps) {
     EXPECT_TRUE(std::abs(z) < 1e-9 || std::abs(z + 1) < 1e-9) << x << " " << z;
     z < -.5 ? ++low : ++high;
   }
-  EXPECT_NEAR(low / double(low + high), 1.0 / 6, .06);  // the gaps
+  EXPECT_NEAR(low / double(low + high), 1.0 / 6, .06);  // fraction of gaps
   EXPECT_NEAR(g.height(-4, 0), 0, 1e-9);
-  // No gap is wider than it should be, around the platform neither.
+  // No gap is wider than configured, also next to the platform.
   for (double widest = 0, x = -3.8; x < 3.8; x += .01) {
     widest = g.height(-4 + x, .21) < -.5 ? widest + .01 : 0;
     EXPECT_LT(widest, .12) << x;
@@ -175,7 +176,7 @@ TEST(Terrain, SaysWhatIsWrong) {
               HasSubstr("max_init_level is 5"));
 }
 
-// Colours need a lamp, a sky and something to see; what a model brings stays as it is.
+// Colours need a light, a sky and a textured ground. Existing ones are kept.
 TEST(Terrain, DaylightIsWhatIsMissing) {
   const auto count = [](const mjModel* m, mjtTexture type) {
     return std::count(m->tex_type, m->tex_type + m->ntex, type);

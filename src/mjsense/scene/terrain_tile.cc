@@ -23,7 +23,7 @@ std::array<float, 4> colour(double difficulty) {
   return {0.45f + 0.25f * x, 0.55f - 0.1f * x, 0.45f - 0.1f * x, 1.0f};
 }
 
-// Boxes of one tile, numbered.
+// Adds numbered boxes to one tile.
 class Boxes {
  public:
   explicit Boxes(Tile& tile) : tile_(tile) {}
@@ -39,7 +39,7 @@ class Boxes {
   int count_ = 0;
 };
 
-// A height field from z = height(x, y), x and y from the tile's centre (m).
+// Adds a height field z = height(x, y), with x and y (m) relative to the tile's centre.
 void add_height_field(Tile& tile, const std::function<double(double, double)>& height) {
   const int nx = static_cast<int>(std::lround(tile.size[0] / tile.resolution)) + 1;
   const int ny = static_cast<int>(std::lround(tile.size[1] / tile.resolution)) + 1;
@@ -85,7 +85,7 @@ double rough(const SubTerrainCfg& cfg, Tile& tile) {
   const int ny = static_cast<int>(std::ceil(tile.size[1] / cfg.spacing)) + 2;
   std::vector<double> knots(static_cast<std::size_t>(nx) * ny);
   for (double& z : knots) z = tile.rng.uniform(-amplitude, amplitude);
-  const auto height = [&](double x, double y) {  // bilinear between the knots
+  const auto height = [&](double x, double y) {  // bilinear interpolation of the grid values
     const double u = (x + tile.size[0] / 2) / cfg.spacing, v = (y + tile.size[1] / 2) / cfg.spacing;
     const int i = std::clamp(static_cast<int>(u), 0, nx - 2),
               j = std::clamp(static_cast<int>(v), 0, ny - 2);
@@ -124,7 +124,7 @@ double stairs(const SubTerrainCfg& cfg, Tile& tile) {
   const double room = (std::min(tile.size[0], tile.size[1]) - cfg.platform_width) / 2;
   const int steps = static_cast<int>(room / cfg.step_width);
   Boxes boxes(tile);
-  if (!cfg.inverted) {  // each step is a box that stands on the one before
+  if (!cfg.inverted) {  // each step is a box on top of the previous one
     for (int k = 0; k <= steps; ++k) {
       const double in = 2 * k * cfg.step_width;
       boxes.add(0, 0, tile.size[0] - in, tile.size[1] - in, k == 0 ? -kThickness : (k - 1) * step,
@@ -149,9 +149,9 @@ double stairs(const SubTerrainCfg& cfg, Tile& tile) {
 double stepping_stones(const SubTerrainCfg& cfg, Tile& tile) {
   const double stone = at(cfg.stone_width, tile.difficulty), gap = at(cfg.gap, tile.difficulty);
   const double uneven = at(cfg.stone_height, tile.difficulty), bottom = -cfg.pit_depth;
-  // Along each axis n stones, at least as wide as asked for, share out the tile; the platform takes
-  // the place of m of them. So every gap is the same, around the platform and at the edges (half)
-  // too.
+  // Along each axis, n stones of at least the configured width divide the tile; the platform
+  // replaces m of them. All gaps are therefore equal, including those around the platform; gaps at
+  // the edges of the tile are half as wide.
   struct Row {
     int n, m;
     double pitch;

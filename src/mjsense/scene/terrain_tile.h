@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
-// One tile of a generated terrain.
+// Builds one tile of a generated terrain.
 
 #include <mujoco/mujoco.h>
 
@@ -16,7 +16,7 @@ namespace mjsense {
 struct Tile {
   mjSpec* spec;
   mjsBody* body;
-  std::string name;              // of its geoms, and of its height field
+  std::string name;              // name of its geoms and of its height field
   std::array<double, 2> centre;  // m
   std::array<double, 2> size;    // m
   double difficulty;             // 0 .. 1
@@ -24,10 +24,10 @@ struct Tile {
   Rng rng;
 };
 
-// Adds the tile's geoms; returns the height (m) of its surface at the centre.
+// Adds the tile's geoms. Returns the height (m) of the surface at its centre.
 double build_tile(const SubTerrainCfg& cfg, Tile& tile);
 
-// A box with its top at `top` and its bottom at `bottom`, sizes in m.
+// A box between the heights `bottom` and `top`. All lengths are in m.
 void add_box(mjsBody* body, const std::string& name, std::array<double, 2> centre,
              std::array<double, 2> size, double bottom, double top,
              const std::array<float, 4>& rgba);

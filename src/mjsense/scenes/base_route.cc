@@ -13,13 +13,13 @@ namespace {
 
 using std::numbers::pi;
 
-constexpr double kTurnCost = 0.25;  // m, of 45 degrees
+constexpr double kTurnCost = 0.25;  // m, cost of turning by 45 degrees
 constexpr double kAsideCost =
     0.8;  // per metre, at right angles to the heading; twice that backwards
 constexpr double kNearCost = 3.0;    // per metre and metre below comfort
-constexpr double kCheck = 0.04;      // m, between checked poses
+constexpr double kCheck = 0.04;      // m, between poses checked for collision
 constexpr double kCheckTurn = 0.12;  // rad
-constexpr double kBlend = 0.5;       // m, on which a base turns while it goes
+constexpr double kBlend = 0.5;       // m, distance over which a base turns while it drives
 constexpr std::array<std::array<int, 2>, 8> kWays{
     {{1, 0}, {1, 1}, {0, 1}, {-1, 1}, {-1, 0}, {-1, -1}, {0, -1}, {1, -1}}};
 
@@ -75,7 +75,8 @@ std::vector<BasePose> BaseRoutes::find(
     const BasePose p = pose(n);
     open.emplace(static_cast<float>(c + at_least(p.x, p.y)), static_cast<std::uint32_t>(n));
   };
-  // Onto the lattice: places around the start at which a base that stands a bit tight comes free.
+  // Connects the start to nearby lattice states, so that a base that starts slightly too close to
+  // an obstacle can leave.
   const int c0 = static_cast<int>(std::floor((from.x - x0_) / cfg_.step)),
             r0 = static_cast<int>(std::floor((from.y - y0_) / cfg_.step));
   for (int r = std::max(0, r0 - 1); r <= std::min(rows_ - 1, r0 + 2); ++r) {
@@ -93,7 +94,7 @@ std::vector<BasePose> BaseRoutes::find(
     const auto [estimate, n] = open.top();
     open.pop();
     const BasePose p = pose(n);
-    if (estimate > cost[n] + at_least(p.x, p.y) + 1e-4) continue;  // an older entry
+    if (estimate > cost[n] + at_least(p.x, p.y) + 1e-4) continue;  // an outdated entry of the queue
     if (wanted(p)) {
       std::vector<BasePose> way;
       for (std::uint32_t k = n; k != kNone; k = before[k]) way.push_back(pose(k));
@@ -109,7 +110,7 @@ std::vector<BasePose> BaseRoutes::find(
     }
     for (int way = 0; way < kHeadings; ++way) {
       const int aside = std::min((way - h + kHeadings) % kHeadings,
-                                 (h - way + kHeadings) % kHeadings);  // 45 degrees each
+                                 (h - way + kHeadings) % kHeadings);  // in steps of 45 degrees
       if (!cfg_.sideways && aside % 4 != 0) continue;
       const int c1 = c + kWays[way][0], r1 = r + kWays[way][1];
       if (c1 < 0 || r1 < 0 || c1 >= columns_ || r1 >= rows_) continue;
@@ -138,8 +139,8 @@ std::vector<BasePose> BaseRoutes::find(const BasePose& from, const BasePose& to)
   return way;
 }
 
-// From one pose to another: facing the way, turning on its first part or before it, and at the end
-// to the wanted yaw. False where something is in the way.
+// Segment from one pose to another: the base faces the direction of motion, turning before or on
+// the first part, and turns to the target yaw at the end. Returns false if it collides.
 bool BaseRoutes::leg(const BasePose& from, const BasePose& to, std::vector<BasePose>& out) const {
   const double length = distance(from, to);
   if (length < 1e-6) {
@@ -175,7 +176,7 @@ std::vector<BasePose> BaseRoutes::straightened(const std::vector<BasePose>& way)
       if (distance(out.back(), way[k]) < 0.25) continue;
       std::vector<BasePose> legs;
       if (!leg(out.back(), way[k], legs)) continue;
-      // From where it arrives it must be able to go on.
+      // The path must be able to continue from the end of the shortcut.
       if (!free_between(legs.back(), way[k])) continue;
       next = k;
       best = std::move(legs);
@@ -195,7 +196,8 @@ std::vector<TimedBasePose> timed(std::span<const BasePose> way, const BaseSpeeds
   if (way.empty()) return out;
   double start = 0, yaw = way[0].yaw;
   out.push_back({0, way[0]});
-  // A trapezoid of speed over `length`, from rest to rest: seconds, and the share that is done.
+  // Trapezoidal speed profile over `length`, from rest to rest: duration (s), and the fraction
+  // completed at a time.
   struct Ramp {
     double length, speed, acceleration, ramp, total;
     Ramp(double l, double s, double a)

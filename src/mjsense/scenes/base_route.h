@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
-// Ways of a robot's base over a floor: A* over places and headings, then straightened.
+// Path planning for a mobile base on a floor: A* over positions and headings, followed by
+// shortcutting.
 
 #include <cstdint>
 #include <functional>
@@ -12,17 +13,18 @@
 namespace mjsense {
 
 struct BasePose {
-  double x = 0, y = 0, yaw = 0;  // m, m, rad, world
+  double x = 0, y = 0, yaw = 0;  // m, m, rad; world frame
 };
 
 struct BaseRouteCfg {
-  double step = 0.1;      // m, of the lattice of places; headings are multiples of 45 degrees
-  double margin = 0.05;   // m, kept from everything
-  double comfort = 0.25;  // m, below which being near something costs
-  bool sideways = true;   // moves in every direction whatever the heading; else along it alone
+  double step = 0.1;      // m, grid spacing of positions; headings are multiples of 45 degrees
+  double margin = 0.05;   // m, minimum distance from obstacles
+  double comfort = 0.25;  // m, distance from obstacles below which the path cost increases
+  bool sideways = true;   // true: omnidirectional; false: moves along its heading only
 };
 
-// A lattice of where a base may stand; queries are const and may run in parallel.
+// State lattice of a base: collision-free positions and headings. Queries are const and
+// thread-safe.
 class BaseRoutes {
  public:
   BaseRoutes(const Occupancy& floor, const Footprint& footprint, const BaseRouteCfg& cfg = {});
@@ -30,17 +32,19 @@ class BaseRoutes {
   bool free(const BasePose& pose) const {
     return footprint_.fits(floor_, pose.x, pose.y, pose.yaw, cfg_.margin);
   }
-  // Straight from one to the other, turning evenly the short way.
+  // Whether the straight path between the poses is free; the yaw turns evenly in the shorter
+  // direction.
   bool free_between(const BasePose& from, const BasePose& to) const;
 
-  // From `from` to the first place of the lattice that `wanted` accepts, in the order of the cost of
-  // the way: metres, more where the base does not face where it goes, turns, and is near something.
-  // `at_least(x, y)`: no less than this many metres are left from there (0 is always right). The way
-  // begins with `from`; turns in place are two poses at one place. Empty: there is none.
+  // Finds the cheapest path from `from` to a lattice state that `wanted` accepts. The cost is the
+  // length in metres, plus costs for moving other than along the heading, for turning and for being
+  // near obstacles. `at_least(x, y)` is the A* heuristic: a lower bound of the remaining cost in
+  // metres (0 is always valid). The path begins with `from`; a turn in place is two poses at the
+  // same position. Empty if there is no path.
   std::vector<BasePose> find(const BasePose& from,
                              const std::function<bool(const BasePose&)>& wanted,
                              const std::function<double(double x, double y)>& at_least) const;
-  // To one pose.
+  // Finds a path to one pose.
   std::vector<BasePose> find(const BasePose& from, const BasePose& to) const;
 
  private:
@@ -57,11 +61,11 @@ class BaseRoutes {
   Occupancy floor_;
   Footprint footprint_;
   BaseRouteCfg cfg_;
-  std::vector<float> clearance_;  // [nodes] m beyond the margin; negative: the base does not fit
+  std::vector<float> clearance_;  // [nodes] m beyond the margin; negative: collision
 };
 
-// Moments (s) at which a base passes poses between those of the way, `dt` apart: each leg begins and
-// ends at rest, within speeds (m/s, rad/s) and accelerations (m/s^2, rad/s^2).
+// Time parameterisation of a path: poses `dt` apart, with their times (s). Each segment starts and
+// ends at rest and respects the limits of speed (m/s, rad/s) and acceleration (m/s^2, rad/s^2).
 struct BaseSpeeds {
   double speed = 0.5, turn = 0.8;
   double acceleration = 0.5, turn_acceleration = 1.0;
@@ -73,7 +77,7 @@ struct TimedBasePose {
 std::vector<TimedBasePose> timed(std::span<const BasePose> way, const BaseSpeeds& speeds,
                                  double dt = 0.1);
 
-// An angle in [-pi, pi].
+// Wraps an angle to [-pi, pi].
 double wrapped(double angle);
 
 }  // namespace mjsense

@@ -13,13 +13,13 @@ namespace mjsense {
 namespace {
 
 constexpr double kLeastWidth = 0.4;  // m
-constexpr double kBothWays = 0.2;    // rad, of a door that swings
+constexpr double kBothWays = 0.2;    // rad, minimum range in both directions of a swing door
 
 struct Extent {
   std::array<double, 3> low{1e10, 1e10, 1e10}, high{-1e10, -1e10, -1e10};
 };
 
-// Of the geoms of one body, in its own frame.
+// Bounding box of the geoms of a body, in the body frame.
 Extent extent_of(const mjModel* m, int body) {
   Extent extent;
   for (int g = m->body_geomadr[body]; g < m->body_geomadr[body] + m->body_geomnum[body]; ++g) {
@@ -38,7 +38,7 @@ Extent extent_of(const mjModel* m, int body) {
   return extent;
 }
 
-// Pose of a body where every joint is at its reference.
+// Pose of a body with all joints at their reference positions.
 Pose rest_pose(const mjModel* m, int body) {
   Pose pose{vec3(m->body_pos + 3 * body), quat(m->body_quat + 4 * body)};
   while ((body = m->body_parentid[body]) > 0)
@@ -55,7 +55,8 @@ bool is_leaf(const mjModel* m, int body, int joint) {
   const Extent extent = extent_of(m, body);
   double size[3];
   for (int i = 0; i < 3; ++i) size[i] = extent.high[i] - extent.low[i];
-  // Its height runs along the axis, its width is the greater of the other two.
+  // The height of the leaf is along the hinge axis; its width is the larger of the other two
+  // extents.
   int up = 0;
   for (int i = 1; i < 3; ++i) {
     if (std::abs(axis[i]) > std::abs(axis[up])) up = i;
@@ -109,7 +110,7 @@ std::vector<Door> find_doors(const mjModel* m, std::string_view robot_prefix) {
     if (!is_leaf(m, body, joint)) continue;
     Door door{.joint = joint, .body = body};
     const double low = m->jnt_range[2 * joint], high = m->jnt_range[2 * joint + 1];
-    // Shut is where the model is drawn: 0, or the end of the range next to it.
+    // Shut is the model's reference position: 0, or the nearest end of the range.
     door.shut = std::clamp(0.0, low, high);
     door.open = high - door.shut >= door.shut - low ? high : low;
     door.swings = low < -kBothWays && high > kBothWays;

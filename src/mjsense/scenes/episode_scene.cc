@@ -22,12 +22,12 @@ namespace {
 
 using std::numbers::pi;
 
-constexpr double kHand = 0.085;    // m, what the usual grippers open
-constexpr double kBeside = 0.005;  // m, free beside what an open hand goes around
-constexpr double kReach = 0.25;    // m, half of what is still an object to carry
-constexpr double kInside = 0.002;  // m
-constexpr double kAway = 100;      // m, where those stand that take no part
-// Where nobody looks.
+constexpr double kHand = 0.085;    // m, opening width of common grippers
+constexpr double kBeside = 0.005;  // m, clearance between an open gripper and the object
+constexpr double kReach = 0.25;    // m, maximum radius of an object that can be carried
+constexpr double kInside = 0.002;  // m, penetration
+constexpr double kAway = 100;      // m, position of absent objects
+// Position of an absent object, outside of all cameras' views.
 Pose away(int object) { return {{kAway + object, kAway, 0.5}, {}}; }
 
 Quat rest_of(std::string_view name) {
@@ -50,7 +50,7 @@ bool touches(const mjModel* m, int body) {
   return false;
 }
 
-// m, of its narrowest horizontal or vertical extent.
+// Smallest horizontal or vertical extent of a shape, m.
 double least_extent(const ObjectShape& shape) {
   double low[3] = {1e10, 1e10, 1e10}, high[3] = {-1e10, -1e10, -1e10};
   for (Vec3 p : shape.points) {
@@ -64,16 +64,16 @@ double least_extent(const ObjectShape& shape) {
   return least;
 }
 
-// A hand goes around its narrowest extent.
+// A gripper grasps an object at its smallest extent.
 bool can_be_held(const ObjectShape& shape) {
   return least_extent(shape) <= kHand && shape.reach <= kReach;
 }
 
-// A box that does not move and lies level, whichever of its axes is up.
+// A static box with horizontal top; any of its axes may be vertical.
 struct LevelBox {
   int geom = -1;
-  double x = 0, y = 0, top = 0;  // middle and height of its top
-  double wide = 0, deep = 0;     // half of it, along x and y
+  double x = 0, y = 0, top = 0;  // centre and height of its top
+  double wide = 0, deep = 0;     // half sizes of the top along x and y
 };
 
 std::optional<LevelBox> level_box(const mjModel* m, int g) {
@@ -99,7 +99,7 @@ std::optional<LevelBox> level_box(const mjModel* m, int g) {
   return level ? std::optional(box) : std::nullopt;
 }
 
-// The highest of a body and of what hangs on it; the largest of several as high.
+// The highest box of a body and its descendants; the largest one if several are equally high.
 std::optional<LevelBox> highest_box(const mjModel* m, int body) {
   std::optional<LevelBox> best;
   const auto larger = [](const LevelBox& a, const LevelBox& b) {
@@ -115,7 +115,7 @@ std::optional<LevelBox> highest_box(const mjModel* m, int body) {
   return best;
 }
 
-// What a region is said to be on: a geom, or a body.
+// Finds the surface that a region names: a geom or a body.
 LevelBox surface_named(const mjModel* m, const std::string& name, const std::string& who) {
   const int body = mj_name2id(m, mjOBJ_BODY, name.c_str());
   const bool of_body = body > 0 && mj_name2id(m, mjOBJ_GEOM, name.c_str()) < 0;
@@ -137,7 +137,8 @@ EpisodeScene::EpisodeScene(SceneFileCfg cfg) : cfg_(std::move(cfg)) {
   make_meshes();
 }
 
-// Objects that are found, and not named, are known once the scene is compiled: any of what can move may be one.
+// If the scene names no objects, they are found after compilation, so every body with a free joint
+// may be one.
 void EpisodeScene::make_meshes() {
   std::vector<ObjectMeshes::Object> objects;
   for (const SceneObjectCfg& one : cfg_.objects) {
@@ -147,7 +148,7 @@ void EpisodeScene::make_meshes() {
   const bool found = cfg_.objects.empty() && cfg_.sizes[0] < cfg_.sizes[1];
   if (objects.empty() && !found) return;
   SceneCfg things = scene_cfg("");
-  // Without what is made anew for it alone.
+  // Removes entities whose models were generated for this scene only.
   std::erase_if(things.entities, [&](const auto& entity) {
     return entity.first.empty() || (entity.first == "room" && !generated_.empty());
   });
@@ -186,7 +187,7 @@ SceneCfg EpisodeScene::scene_cfg(const std::string& robot) const {
     }
     entity.pos = one.pos;
     entity.quat = one.quat;
-    // Many things at one place are thousands of contacts before the first episode begins.
+    // Many objects at the same position would cause thousands of contacts before the first episode.
     if (is_placed(one)) {
       const Vec3 p = away(static_cast<int>(i)).p;
       entity.pos = {p.x, p.y, p.z};
@@ -222,7 +223,7 @@ void EpisodeScene::bind(Simulation& simulation) {
   make_sizes();
 }
 
-// Needs both the worlds and the objects; which come first is not ours to say.
+// Needs both the worlds and the objects, which are set by different calls in any order.
 void EpisodeScene::make_sizes() {
   if (!meshes_ || !simulation_ || objects_.empty()) return;
   std::vector<int> bodies;
@@ -325,7 +326,7 @@ void EpisodeScene::set_target_regions(std::span<const char> flags) {
   for (std::size_t i = 0; i < regions_.size(); ++i) regions_[i].for_targets = flags[i] != 0;
 }
 
-// As what carries them stands in this world.
+// Regions at the current positions of the furniture in this world.
 std::vector<Region> EpisodeScene::regions_of(int world) const {
   std::vector<Region> regions = regions_;
   const double* here = look_ ? look_->body_pos(world) : model_->body_pos;
@@ -345,7 +346,7 @@ std::vector<Region> EpisodeScene::regions_of(int world) const {
   return regions;
 }
 
-// As Look does: of two that name a body the second counts.
+// As in Look: if two entries match a body, the later one applies.
 void EpisodeScene::find_furniture() {
   furniture_.clear();
   for (const SceneVaryCfg& one : cfg_.vary) {
@@ -405,7 +406,7 @@ std::vector<int> EpisodeScene::where(bool receptacle) const {
   return found;
 }
 
-// At rest there.
+// Places an object at rest.
 void EpisodeScene::put(int object, const Pose& pose, const StateRow& state) const {
   const int joint = model_->body_jntadr[objects_[object].body];
   double* qpos = state.qpos + model_->jnt_qposadr[joint];
@@ -440,7 +441,7 @@ Pose EpisodeScene::sample(int world, std::span<const int> wanted, std::uint64_t 
     std::fill(present, present + n, 0);
     for (int i : wanted) present[i] = 1;
     many -= static_cast<int>(wanted.size());
-    while (many-- > 0) {  // one of the others, each as likely
+    while (many-- > 0) {  // each of the other objects is equally likely
       int k = static_cast<int>(
           draw.below(static_cast<std::uint32_t>(std::count(present, present + n, 0))));
       for (int i = 0; i < n; ++i) {

@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
-// A scene of data (scene_file.h) in which episodes are played: what it is compiled from, the
-// objects in it, and their places at the start of an episode. Everything that differs is a function
-// of (seed, episode).
+// A scene file (scene_file.h) prepared for episodes: the configuration it is compiled from, its
+// objects, and their placement at the start of an episode. All variation is a function of (seed,
+// episode).
 
 #include <map>
 #include <memory>
@@ -22,83 +22,89 @@
 
 namespace mjsense {
 
-// A body with a free joint that a task may be about.
+// A body with a free joint that a task may refer to.
 struct SceneObject {
   int body = -1;
-  std::string kind;                 // last part of its name: "mug"
-  std::string text;                 // what people call it
-  std::vector<std::string> others;  // what else they call it
+  std::string kind;                 // last part of the name: "mug"
+  std::string text;                 // name in instructions
+  std::vector<std::string> others;  // further names in instructions
   std::vector<Quat> rests;
   ObjectShape shape;        // in the size of its model
-  bool receptacle = false;  // things are put in or on it
+  bool receptacle = false;  // objects can be put in or on it
   std::string color;
-  std::vector<double> sizes;        // that it may have
-  std::vector<ObjectShape> shapes;  // in these
+  std::vector<double> sizes;        // possible scale factors
+  std::vector<ObjectShape> shapes;  // for each of `sizes`
 };
 
 class EpisodeScene {
  public:
-  // Makes the house of a scene that is generated; reads the models of entities that get a free joint. Throws ValueError.
+  // Generates the house of a scene with a generator, and loads the models of entities that get a
+  // free joint. Throws ValueError.
   explicit EpisodeScene(SceneFileCfg cfg);
 
   const SceneFileCfg& cfg() const { return cfg_; }
-  // Everything but the robot, for which there is a place after the first entity, called `robot`.
+  // The scene without the robot, which is to be added under the name `robot`; its place is after
+  // the first entity.
   SceneCfg scene_cfg(const std::string& robot) const;
-  // Finds objects and surfaces. Bodies of the robot, whose names start with `robot_prefix`, are no
-  // objects. Throws KeyError, ValueError; in a scene without objects only object() does.
+  // Finds objects and surfaces. Bodies of the robot, whose names start with `robot_prefix`, are not
+  // objects. Throws KeyError, ValueError. For a scene without objects, only object() throws.
   void initialize(const mjModel* model, int num_worlds, std::string_view robot_prefix);
-  // For what varies, once there are worlds; they live as long as this. Throws KeyError, ValueError.
+  // Connects the scene's variation to the worlds. The simulation must outlive this object. Throws
+  // KeyError, ValueError.
   void bind(Simulation& simulation);
-  // Instead of the height that the scene's file says, m.
+  // Replaces the height (m) of the robot's base that the scene file specifies.
   void put_robot_at(double height) { cfg_.robot.pos[2] = height; }
 
   std::span<const SceneObject> objects() const { return objects_; }
   std::span<const Region> regions() const { return regions_; }
-  // Targets stand in these alone, one flag a region; at least one is true.
+  // Limits targets to some regions: one flag per region, at least one of them true.
   void set_target_regions(std::span<const char> flags);
-  // Whether an object takes part in the episode of this world; the others stand far away.
+  // Whether an object is present in this world's episode. Absent objects are placed far away.
   bool present(int world, int object) const { return present_[world * objects_.size() + object]; }
 
-  // In the size that the object has in this world's episode; lives as long as the scene.
+  // Shape at the object's size in the current episode of this world. Valid for the lifetime of the
+  // scene.
   const ObjectShape& shape(int world, int object) const;
   double size(int world, int object) const;
 
-  // Height (m) of what the target stands on at the start of this world's episode.
+  // Height (m) of the surface under the target at the start of this world's episode.
   double support_height(int world) const { return support_[world]; }
 
-  // The start of an episode, `target` the object that it is about, -1: none of them: writes the objects' joints and
-  // returns where the robot's base stands. `rng` gives the places.
+  // Samples the start of an episode: writes the objects' joints and returns the pose of the robot's
+  // base. `target` is the object of the task, or -1. Positions are drawn from `rng`.
   Pose sample(int world, int target, std::uint64_t seed, std::uint64_t episode, Rng& rng,
               const StateRow& state);
-  // The same, about several: they are there, and within reach; the first is the target.
+  // Like sample() with one target, for several objects of the task: all are present and in the
+  // target area. The first one is the target.
   Pose sample(int world, std::span<const int> wanted, std::uint64_t seed, std::uint64_t episode,
               Rng& rng, const StateRow& state);
-  // A start without what differs from episode to episode: no object that is laid out is there; returns where the
-  // robot's base stands.
+  // A start without random variation: all objects that an episode would place are absent. Returns
+  // the pose of the robot's base.
   Pose clear(const StateRow& state) const;
-  // For a state that another one of this scene has sampled: takes over which objects are there, and in which size, and
-  // returns their indices.
+  // For a state that another instance of this scene has sampled: adopts which objects are present
+  // and their sizes. Returns their indices.
   std::vector<int> adopt(int world, std::uint64_t seed, std::uint64_t episode,
                          const StateRow& state);
-  // One of these objects, any as likely; where no hand of the robot can go around what was drawn, in the size that it
-  // has in this world's episode, another, as long as there is one.
+  // Draws one of these objects uniformly. If no hand of the robot can grasp it at its size in this
+  // world's episode, another one is drawn, as long as there is one.
   int draw(int world, std::span<const int> of, const Robot& robot, Rng& rng) const;
-  // The episode is about this object, where it lies in that state.
+  // Makes an object the target of the episode, at its position in `state`.
   void set_target(int world, int target, const StateRow& state);
   // Indices of the objects to pick up, and of the receptacles.
   std::vector<int> things() const { return where(false); }
   std::vector<int> receptacles() const { return where(true); }
-  // The episode's lights, colours, furniture and sizes of objects, before it is sampled; false if nothing varies.
+  // Varies lights, colours, furniture and object sizes; call it before sample(). Returns false if
+  // nothing varies.
   bool vary(int world, std::uint64_t seed, std::uint64_t episode);
-  // Displacements in the world between which furniture takes this geom from episode to episode, itself or what carries it;
-  // empty where it stands still.
+  // Displacements (world frame) between which the random placement of furniture can move this geom,
+  // itself or with a parent body. Empty if it does not move.
   std::vector<Pose> elsewhere(int geom) const;
-  // What is wrong with the start that this fresh world shows: an object inside something by more
-  // than 2 mm. "" if nothing is.
+  // Checks the start state of a world: an object must not penetrate anything by more than 2 mm.
+  // Returns a description of the fault, or "".
   std::string fault(const World& world) const;
 
  private:
-  // Whether an entity is an object that every episode places.
+  // Whether the entity is an object that every episode places.
   bool is_placed(const SceneEntityCfg& entity) const;
   void find_objects(std::string_view robot_prefix);
   void collect_objects(std::string_view robot_prefix);
@@ -114,15 +120,15 @@ class EpisodeScene {
 
   SceneFileCfg cfg_;
   const mjModel* model_ = nullptr;
-  ModelSource generated_;                        // empty: the scene has no generator
-  std::vector<std::shared_ptr<mjSpec>> edited_;  // models of which the scene changes something
-  std::shared_ptr<const ObjectMeshes> meshes_;   // null: nothing has sizes
+  ModelSource generated_;                        // empty if the scene has no generator
+  std::vector<std::shared_ptr<mjSpec>> edited_;  // models that the scene changes
+  std::shared_ptr<const ObjectMeshes> meshes_;   // null: object sizes do not vary
   std::vector<SceneObject> objects_;
   std::vector<Region> regions_;
-  std::vector<int> region_bodies_;         // what carries each
-  std::map<int, SceneVaryCfg> furniture_;  // by body, how it varies
+  std::vector<int> region_bodies_;         // the body that carries each region
+  std::map<int, SceneVaryCfg> furniture_;  // variation of each furniture body
   std::vector<char> present_;              // [B, objects]
-  std::vector<int> steps_;                 // [B, objects], of its sizes; -1: that of its model
+  std::vector<int> steps_;                 // [B, objects] index into `sizes`; -1: size of the model
   std::vector<double> support_;            // [B]
   Simulation* simulation_ = nullptr;
   std::unique_ptr<Look> look_;

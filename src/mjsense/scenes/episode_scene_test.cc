@@ -62,7 +62,7 @@ struct Files {
   }
 };
 
-// The scene's worlds, with no robot but its place.
+// The scene's simulation, without a robot.
 struct Played {
   EpisodeScene scene;
   std::shared_ptr<Simulation> sim;
@@ -161,7 +161,7 @@ TEST(EpisodeScene, AStartIsOfItsSeedAndEpisodeAlone) {
   EXPECT_NE(one.at(1).x, three.at(1, 2).x);
 }
 
-// A pedestal above the floor: something stands below it, as wide, down to the floor.
+// The pedestal is above the floor; a plinth of the same width must reach down to the floor.
 TEST(EpisodeScene, ARaisedPedestalStandsOnAPlinth) {
   Files files;
   files.write("robot.xml", R"(<mujoco><worldbody><body name="base" mocap="true">
@@ -191,7 +191,7 @@ TEST(EpisodeScene, ARaisedPedestalStandsOnAPlinth) {
   EXPECT_EQ(m->geom_group[plinth], 2);
 }
 
-// The scene's sky, not that of a model in it.
+// The scene's sky must be used, not that of a model in the scene.
 TEST(EpisodeScene, TheSkyIsTheScenes) {
   Files files;
   files.write("wardrobe.xml", R"(<mujoco>
@@ -254,7 +254,7 @@ TEST(EpisodeScene, SeveralSurfacesAreAllUsed) {
   EXPECT_THAT(heights, ::testing::ElementsAre(53, 103));
 }
 
-// A table whose boxes are turned, so that none has its z axis up, and which nobody gave names.
+// A table of rotated boxes, none with its z axis up, and without names.
 TEST(EpisodeScene, ARegionMayBeABody) {
   Files files;
   files.write(

@@ -12,8 +12,9 @@
 namespace mjsense {
 namespace {
 
-// Robots of ours have contype 2 and conaffinity 1. Furniture that is touched and touches nothing by
-// itself (contype 0, conaffinity 1), as scenes of others have it, is touched by them, too.
+// Built-in robots have contype 2 and conaffinity 1. Third-party scenes contain furniture with
+// contype 0 and conaffinity 1, which objects collide with. This makes robots collide with it as
+// well.
 void let_robots_touch(mjSpec* spec) {
   for (mjsElement* element : spec_elements(spec, mjOBJ_GEOM)) {
     mjsGeom* geom = mjs_asGeom(element);
@@ -32,11 +33,12 @@ void apply_look(mjSpec* spec, const SceneFileCfg& cfg) {
   }
   spec->visual.quality.shadowsize = 4096;
   std::optional<SceneSkyCfg> sky = cfg.sky;
-  if (!sky && !cfg.generator.empty()) sky.emplace();  // there are windows
+  if (!sky && !cfg.generator.empty()) sky.emplace();  // generated rooms have windows
   if (sky) set_sky(spec, "", sky->top, sky->bottom);
 }
 
-// Under a pedestal that a scene has put above its floor, as high (m) as that is: it does not float.
+// If a scene places the robot's pedestal `high` m above the floor, adds a plinth of that height, so
+// that the pedestal does not float.
 void stand_on_plinth(mjSpec* spec, const std::string& robot, double high) {
   if (high <= 0) return;
   for (mjsElement* element : spec_elements(spec, mjOBJ_GEOM)) {

@@ -1,7 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
-// What is done to the spec of a whole scene - room, things and robot - before it is compiled: light and sky,
-// a plinth under a raised pedestal, and that the furniture of others touches robots.
+// Final changes to the spec of a complete scene (room, objects and robot) before compilation: light
+// and sky, a plinth under a raised pedestal, and collisions between robots and the furniture of
+// third-party scenes.
 
 #include <mujoco/mujoco.h>
 
@@ -11,7 +12,7 @@
 
 namespace mjsense {
 
-// `robot`: the name of its entity.
+// `robot`: name of its entity.
 void finish_spec(mjSpec* spec, const SceneFileCfg& cfg, const std::string& robot);
 
 }  // namespace mjsense

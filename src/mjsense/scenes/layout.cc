@@ -13,9 +13,9 @@ namespace {
 
 using std::numbers::pi;
 
-// What an object takes up in a resting orientation.
+// Space that an object needs in a resting orientation.
 struct Footprint {
-  double radius = 0;  // m, about the vertical through the body's origin
+  double radius = 0;  // m, about the vertical axis through the body's origin
   double low = 0;     // m, its lowest point
 };
 
@@ -38,8 +38,9 @@ struct Spot {
   double x, y;
 };
 
-// Objects in their order, each where there is room among those before it. Returns how far (m) the circles of two that
-// come too close are apart: negative where they cut each other.
+// Places the objects in order, each where there is room among those before it. Returns the distance
+// (m) between the closest two circles that are closer than they should be; negative if they
+// overlap.
 double lay_out_once(std::span<const Resting> objects, std::span<const int> order,
                     std::span<const int> wanted, std::span<const Region> regions,
                     const LayoutCfg& cfg, Rng& rng, std::span<Pose> poses,
@@ -64,7 +65,7 @@ double lay_out_once(std::span<const Resting> objects, std::span<const int> order
       const double x = rng.uniform(area.x0, area.x1);
       return Spot{x, rng.uniform(area.y0, area.y1)};
     };
-    // Metres to spare at a spot, beyond the gaps or without them.
+    // Clearance (m) at a spot, beyond the required gaps or without them.
     const auto clearance = [&](Spot s, bool gaps) {
       double least = 1.0;
       for (const Placed& other : placed) {

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
-// Where objects stand at the start of an episode: on level surfaces, in one of the ways in which
-// they rest, clear of each other.
+// Random placement of objects on level surfaces at the start of an episode, each in one of its
+// resting orientations, without collisions.
 
 #include <span>
 #include <vector>
@@ -13,7 +13,7 @@
 namespace mjsense {
 
 struct Area {
-  double x0, x1, y0, y1;  // m, world
+  double x0, x1, y0, y1;  // m, world frame
 };
 
 // A level surface.
@@ -24,23 +24,24 @@ struct Region {
 };
 
 struct LayoutCfg {
-  double gap = 0.02;         // m, free between two objects
-  double target_gap = 0.07;  // m, free around the target: room for an open gripper
-  double drop = 0.0003;      // m above the surface
-  int attempts = 200;        // places to try for an object, then the one with most room
-  int layouts = 20;          // tries of them all, while one stands in another's circle
+  double gap = 0.02;         // m, minimum distance between two objects
+  double target_gap = 0.07;  // m, minimum distance around the target, for an open gripper
+  double drop = 0.0003;      // m, initial height above the surface
+  int attempts = 200;        // positions tried per object; then the one with most clearance is used
+  int layouts = 20;          // layouts tried while the circles of two objects overlap
 };
 
-// An object to be placed: its shape, and the ways in which it rests.
+// An object to be placed: its shape and its resting orientations.
 struct Resting {
   const ObjectShape* shape;
   std::span<const Quat> rests;
 };
 
-// Poses X_WO of `objects` and the regions on which they stand: those that are `wanted` first, in this order and in
-// the target areas of regions for targets - the first of them, if any, is the target -, then the others in order; those that
-// are not `present` keep what is there. Where what came first leaves one no room, all begin anew; after the last try
-// the layout in which they come least into each other. A function of the random numbers alone.
+// Computes the poses X_WO of `objects` and the regions they are placed in. Objects in `wanted` are
+// placed first, in this order and in the regions' target areas; the first one, if any, is the
+// target. The others follow in order. Objects that are not `present` keep their output values. If
+// the objects placed first leave no room for a later one, all are placed again; after the last
+// attempt, the layout with the least overlap is used. Deterministic for equal random numbers.
 void lay_out(std::span<const Resting> objects, std::span<const int> wanted,
              std::span<const char> present, std::span<const Region> regions, const LayoutCfg& cfg,
              Rng& rng, std::span<Pose> poses, std::span<int> region_of);

@@ -11,7 +11,7 @@
 namespace mjsense {
 namespace {
 
-// A disc from above.
+// A disc seen from above.
 ObjectShape disc(double radius) {
   ObjectShape shape;
   for (int k = 0; k < 16; ++k) {
@@ -22,14 +22,15 @@ ObjectShape disc(double radius) {
   return shape;
 }
 
-// Three discs on a strip, all of them wanted; returns how far the nearest two are apart.
+// Places three discs on a strip, all in the target area. Returns the distance between the closest
+// two.
 double nearest_of_three(double radius, std::uint64_t seed, const LayoutCfg& cfg) {
   const ObjectShape shape = disc(radius);
   const Quat upright{};
   const std::vector<Resting> objects(3, Resting{&shape, {&upright, 1}});
   const std::array<int, 3> wanted{0, 1, 2};
   const std::array<char, 3> present{1, 1, 1};
-  // ---(o)----(o)----(o)---  origins from end to end
+  // ---(o)----(o)----(o)---  the origins are distributed over the whole strip
   const Area strip{0, 0.6, 0, 0.01};
   const std::array<Region, 1> regions{{{strip, strip, 0.8}}};
   std::array<Pose, 3> poses;
@@ -50,7 +51,7 @@ TEST(Layout, BeginsAnewWhereTheFirstLeaveTheLastNoRoom) {
     EXPECT_GE(nearest_of_three(0.1, seed, {}), 0) << seed;
     crowded += nearest_of_three(0.1, seed, {.layouts = 1}) < 0;
   }
-  EXPECT_GT(crowded, 5);  // there was something to mend
+  EXPECT_GT(crowded, 5);  // some first layouts had overlaps
 }
 
 TEST(Layout, WhatIsWantedStandsInRegionsForTargets) {

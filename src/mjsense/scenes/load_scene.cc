@@ -27,14 +27,14 @@ void read(const DataFile& file, SceneFileCfg& cfg, int depth) {
     read(kScenes.find(is_path ? beside(file.path, own.extends) : own.extends), cfg, depth + 1);
   }
   read_toml_fields(file.text, file.path, cfg);
-  // What the file itself names stands beside it.
+  // Paths in the file are relative to its folder.
   if (!own.entities.empty()) {
     for (SceneEntityCfg& entity : cfg.entities) entity.model = beside(file.path, entity.model);
   }
   if (!own.base.empty()) cfg.base = beside(file.path, own.base);
 }
 
-// Cuts ":7" off; nothing where there is no such end.
+// Removes the suffix ":7" and returns the number; empty if there is no such suffix.
 std::optional<int> cut_house(std::string_view& name) {
   const std::size_t colon = name.rfind(':');
   if (colon == std::string_view::npos || colon == 0 || colon + 1 == name.size()) return {};

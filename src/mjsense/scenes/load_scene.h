@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
-// Scenes by name and from files: ours are models/scenes/<name>/scene.toml.
+// Loads scenes by name or from files. Built-in scenes are models/scenes/<name>/scene.toml.
 
 #include <string>
 #include <string_view>
@@ -11,15 +11,17 @@
 
 namespace mjsense {
 
-// Of ours.
+// Names of the built-in scenes.
 std::vector<std::string> scene_names();
 
-// One of ours by its name, one of a scene.toml by its path, or an MJCF by its path (.xml): the whole
-// model, its bodies as they lie there. "kitchen:7" is house 7 of a scene with a generator. Throws KeyError with the nearest names; ValueError that says
-// file, line and key of what is wrong.
+// Loads a built-in scene by name, a scene.toml by path, or an MJCF file by path (.xml), which is
+// used as a complete model with its bodies at their positions. "kitchen:7" is house 7 of a scene
+// with a generator. Throws KeyError with the nearest names, or ValueError with the file, line and
+// key of the fault.
 SceneFileCfg load_scene(std::string_view name_or_path);
 
-// The scene that a task is played in: the one that its configuration makes or names, else its `own`.
+// Returns the scene that a task uses: the one that its configuration builds or names, otherwise
+// `own`.
 SceneFileCfg task_scene(const TaskCfg& cfg, std::string_view own);
 
 }  // namespace mjsense

@@ -30,7 +30,8 @@ mjtObj object_type(VaryKind what) {
   return mjOBJ_GEOM;
 }
 
-// Rows of a field of the model, made the worlds' own; what is not one of its bodies' is the same.
+// Makes the field `field` of the batch's model an array with rows per world. The values are
+// unchanged.
 template <class T>
 T* expand(mjBatch* batch, const char* field, T* before) {
   return before ? before : static_cast<T*>(mjb_expand(batch, field, nullptr, nullptr));
@@ -38,7 +39,7 @@ T* expand(mjBatch* batch, const char* field, T* before) {
 
 double around(Rng& rng, double half) { return half > 0 ? rng.uniform(-half, half) : 0.0; }
 
-// A direction turned by at most `most` rad, all directions within alike.
+// Rotates a direction by at most `most` rad; uniform within the cone.
 Vec3 turned(Vec3 axis, double most, Rng& rng) {
   const double cosine = rng.uniform(std::cos(most), 1.0),
                angle = rng.uniform(0, 2 * std::numbers::pi);
@@ -60,7 +61,7 @@ void shift_colour(double hue, double saturation, double brightness, float rgb[3]
   h = 60 * h + hue;
   const double s = std::clamp((high > 0 ? chroma / high : 0.0) + saturation, 0.0, 1.0);
   const double v = std::clamp(high * brightness, 0.0, 1.0);
-  // A grey has no hue to shift its saturation towards.
+  // A grey has no hue, so its saturation is not changed.
   const double strength = chroma > 0 ? s : 0.0;
   const double offsets[3] = {5, 3, 1};
   for (int i = 0; i < 3; ++i) {
@@ -98,7 +99,7 @@ Look::Look(std::vector<SceneVaryCfg> cfg, Simulation& simulation, std::string_vi
     if (light && one.angle > 0) light_dir_ = expand(batch, "light_dir", light_dir_);
     if (one.what == VaryKind::kBody) {
       for (int id : part.ids) {
-        // A mocap body stands where the state says.
+        // The pose of a mocap body is part of the state.
         if (model_->body_treeid[id] >= 0 || model_->body_mocapid[id] >= 0 || id == 0)
           throw ValueError(fmt::format("{}: body '{}' moves by itself", who, names[id]));
       }
@@ -111,7 +112,8 @@ Look::Look(std::vector<SceneVaryCfg> cfg, Simulation& simulation, std::string_vi
   }
 }
 
-// Its row of this world, at rest; null if colours of its kind do not vary.
+// Resets this world's row to the model's colour and returns it; null if colours of this kind do not
+// vary.
 float* Look::colour_of(VaryKind what, int world, int id) const {
   const auto row = [&](float* base, int count, int size, const float* rest) -> float* {
     if (!base) return nullptr;

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
-// What is different in every episode: lights, colours, textures and where furniture stands, written
-// to the world's own model, so that nothing is compiled again.
+// Randomisation of lights, colours, textures and furniture positions per episode. It writes to each
+// world's own model fields, so that no recompilation is needed.
 
 #include <cstdint>
 #include <vector>
@@ -14,14 +14,14 @@ namespace mjsense {
 
 class Look {
  public:
-  // Throws KeyError for a pattern that matches nothing and for a texture that there is not, ValueError for a body that
-  // moves; `place` starts its message.
+  // Throws KeyError for a pattern that matches nothing or an unknown texture, and ValueError for a
+  // body that moves. `place` is the prefix of messages.
   Look(std::vector<SceneVaryCfg> cfg, Simulation& simulation, std::string_view place);
 
   bool varies() const { return !parts_.empty(); }
-  // This world's body_pos; the model's where no body stands anywhere else.
+  // body_pos of this world; the model's own array if body positions do not vary.
   const double* body_pos(int world) const;
-  // Writes this world's rows of the model; Worlds::model_changed() and forward() follow.
+  // Writes this world's rows of the model. Call Worlds::model_changed() and forward() afterwards.
   void vary(int world, Rng& rng) const;
 
  private:
@@ -34,13 +34,14 @@ class Look {
 
   std::vector<Part> parts_;
   const mjModel* model_;
-  // [B, n, ...] of MuJoCo's batch; null where nothing varies.
+  // [B, n, ...] fields of MuJoCo's batch; null if the field does not vary.
   double *light_pos_ = nullptr, *light_dir_ = nullptr, *body_pos_ = nullptr, *body_quat_ = nullptr;
   float *light_diffuse_ = nullptr, *mat_rgba_ = nullptr, *geom_rgba_ = nullptr;
   int* mat_texid_ = nullptr;
 };
 
-// A colour with its hue turned (degrees), its saturation shifted, its value scaled; rgb in [0, 1].
+// Rotates the hue (degrees), shifts the saturation and scales the value (brightness) of a colour;
+// rgb in [0, 1].
 void shift_colour(double hue, double saturation, double brightness, float rgb[3]);
 
 }  // namespace mjsense

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
-// Meshes of objects in every size that they may have. A geom's size scales what it is, but for a mesh: that is
-// compiled once more for each size.
+// Meshes of objects at every size that they can have. Geoms of other types are scaled by their
+// size, but a mesh must be compiled once for each size.
 
 #include <span>
 #include <string>
@@ -11,7 +11,7 @@
 
 namespace mjsense {
 
-// Of `objects` in the scene made of `things`, which has no robot.
+// Meshes of `objects` in the scene `things`, which has no robot.
 class ObjectMeshes {
  public:
   struct Object {
@@ -19,12 +19,12 @@ class ObjectMeshes {
     std::vector<double> sizes;
   };
   ObjectMeshes() = default;
-  // Throws KeyError for a body that there is not.
+  // Throws KeyError for an unknown body.
   ObjectMeshes(SceneCfg things, std::span<const Object> objects);
 
-  // Adds them to the whole scene's spec.
+  // Adds the meshes to the complete scene's spec.
   void add(mjSpec* spec) const;
-  // Of the mesh `mesh` in size `step`, in the whole scene's model; -1 if there is none.
+  // Id of mesh `mesh` at size `step` in the complete scene's model; -1 if there is none.
   static int find(const mjModel* model, int mesh, int step);
 
  private:

@@ -88,10 +88,11 @@ ObjectSizes::ObjectSizes(Simulation& simulation, std::span<const int> bodies,
   }
 }
 
-// Collisions are looked for in a tree of boxes about a body's geoms, which worlds do not have their own rows of: it gets
-// boxes for all sizes. They are in the frame of the body's inertia, which scales with it.
+// Collision detection uses a bounding volume tree over a body's geoms, of which worlds do not have
+// their own copy. Its boxes are enlarged to cover all sizes. They are in the body's inertial frame,
+// which scales with the body.
 void ObjectSizes::widen(mjBatch* batch, int body, const std::vector<double>& sizes) const {
-  // The batch's own copy, Simulation::model(), before anything else has read it.
+  // The batch's own copy of the model, which is not shared yet.
   double* boxes = const_cast<double*>(mjb_model(batch)->bvh_aabb);
   const double *from = m_->bvh_aabb, least = sizes.front(), most = sizes.back();
   for (int n = m_->body_bvhadr[body]; n < m_->body_bvhadr[body] + m_->body_bvhnum[body]; ++n) {
@@ -105,7 +106,7 @@ void ObjectSizes::widen(mjBatch* batch, int body, const std::vector<double>& siz
   }
 }
 
-// MuJoCo's compiler moves a mesh into the frame of its own inertia, and its geom with it.
+// MuJoCo's compiler moves a mesh into the frame of its own inertia, and its geom accordingly.
 ObjectSizes::Shown ObjectSizes::shown(int geom, int mesh, double size) const {
   Shown out{};
   out.mesh = mesh;
@@ -152,7 +153,7 @@ void ObjectSizes::set_object(int world, const Object& object, int step, double s
     body_invweight_.of(world)[2 * b] = m_->body_invweight0[2 * b] / s3;
     body_invweight_.of(world)[2 * b + 1] = m_->body_invweight0[2 * b + 1] / s5;
   }
-  for (int i = 0; i < 6; ++i) {  // three that push, three that turn
+  for (int i = 0; i < 6; ++i) {  // three translations, three rotations
     const double factor = i < 3 ? s3 : s5;
     dof_m0_.of(world)[object.dof + i] = factor * m_->dof_M0[object.dof + i];
     dof_invweight_.of(world)[object.dof + i] = m_->dof_invweight0[object.dof + i] / factor;

@@ -1,8 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
-// Objects whose size differs from episode to episode, each world's in its own model, so that nothing is compiled
-// again. An object of size s has what MuJoCo's compiler would give it: lengths s, masses s^3 and inertias s^5 times
-// those of its model, and what the solver scales constraints by to match.
+// Object sizes that vary between episodes. Sizes are written to each world's own model fields, so
+// that no recompilation is needed. An object of size s has what MuJoCo's compiler would compute for
+// it: lengths scale with s, masses with s^3, inertias with s^5, and the constants that scale the
+// solver's constraints accordingly.
 
 #include <array>
 #include <span>
@@ -15,23 +16,24 @@ namespace mjsense {
 
 class ObjectSizes {
  public:
-  // Sizes between least and most: as many as planners can know the grasps of.
+  // Number of sizes between the minimum and the maximum. Limited, so that planners can prepare the
+  // grasps of each size.
   static constexpr int kSteps = 6;
-  // Evenly from least to most; one where they are equal.
+  // Evenly spaced from minimum to maximum; a single size if they are equal.
   static std::vector<double> steps(const std::array<double, 2>& range);
 
-  // Bodies with a free joint, and the sizes of each, meshes as ObjectMeshes has made them. Throws ValueError for one
-  // that has moving parts.
+  // `bodies` have a free joint, `sizes` are the sizes of each, and their meshes were added by
+  // ObjectMeshes. Throws ValueError for an object with moving parts.
   ObjectSizes(Simulation& simulation, std::span<const int> bodies,
               std::vector<std::vector<double>> sizes, std::string_view place);
 
   double size(int object, int step) const { return sizes_[object][step]; }
-  // Which of its sizes each object of this world has. Writes the world's rows of the model; Worlds::model_changed()
-  // follows.
+  // Sets the index of the size of each object in this world. Writes the world's rows of the model;
+  // call Worlds::model_changed() afterwards.
   void set(int world, std::span<const int> steps) const;
 
  private:
-  // A mesh in one size: its id, and the geom's pose, size and bounds with it.
+  // A mesh at one size: its id, and the pose, size and bounds of the geom that uses it.
   struct Shown {
     int mesh;
     double pos[3], quat[4], size[3], bound, aabb[6];
@@ -45,7 +47,7 @@ class ObjectSizes {
     std::vector<int> bodies, geoms, sites;
     std::vector<MeshGeom> meshes;
   };
-  // A field of the model that worlds have their own rows of.
+  // A model field of which each world has its own copy.
   template <class T>
   struct Own {
     T* rows = nullptr;

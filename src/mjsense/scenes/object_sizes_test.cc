@@ -28,7 +28,8 @@ constexpr char kRoom[] = R"(
   </worldbody>
 </mujoco>)";
 
-// Boxes off the origin, a lying cylinder, a mesh to touch whose frame is not that of its vertices, a part fixed to it.
+// An object with boxes off the origin, a lying cylinder, a colliding mesh whose inertial frame
+// differs from that of its vertices, and a part fixed to it.
 std::string thing(double s) {
   const auto v = [&](double x, double y, double z) {
     return fmt::format("{:.17g} {:.17g} {:.17g}", s * x, s * y, s * z);
@@ -102,7 +103,7 @@ struct Played {
     const StateRow row = state_row(sim->worlds(), world);
     return {row.qpos, row.qpos + sim->model()->nq};
   }
-  // This world's model as MuJoCo gives it.
+  // This world's model, as MuJoCo returns it.
   ModelPtr model(int world) const {
     ModelPtr copy(mj_copyModel(nullptr, sim->model()));
     mjb_getModel(sim->worlds().batch(), world, copy.get());
@@ -110,7 +111,8 @@ struct Played {
   }
 };
 
-// Of bodies, geoms, sites and joints whose names begin with "a/": what the compiler makes of the thing's size.
+// Compares the bodies, geoms, sites and joints whose names begin with "a/" with those compiled at
+// that size.
 void expect_same(const mjModel* found, const mjModel* wanted) {
   const auto near = [](const char* what, const double* a, const double* b, int n, double scale) {
     for (int i = 0; i < n; ++i) EXPECT_NEAR(a[i], b[i], 2e-6 * scale) << what << " " << i;
@@ -180,7 +182,7 @@ TEST(ObjectSizes, AnObjectIsWhatTheCompilerMakesInThatSize) {
 TEST(ObjectSizes, AnObjectFallsAndLiesAsTheCompiledOne) {
   Files files;
   files.cfg.sizes = {.6, 1.6};
-  // Lying, so that what it lies on is where the boxes about a smaller one are not.
+  // The object lies on its side, so that its contacts are outside of the boxes of a smaller object.
   files.cfg.objects[0].rests = {"side"};
   Played played(files.cfg);
   for (std::uint64_t episode : {0u, 3u, 5u}) {

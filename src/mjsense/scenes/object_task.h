@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
-// A task about one object of a scene.
+// Base of tasks that concern one object of a scene.
 
 #include <optional>
 #include <span>
@@ -14,7 +14,7 @@ namespace mjsense {
 
 class ObjectTask : public SceneTask {
  public:
-  // `role` is that of the object, and lives as long as the task.
+  // `role` is the role of the object and must outlive the task.
   ObjectTask(TaskCfg cfg, std::string_view own_scene, std::string_view role)
       : SceneTask(std::move(cfg), own_scene), role_(role) {}
   void begin(const World& world) override;
@@ -27,11 +27,11 @@ class ObjectTask : public SceneTask {
   }
 
  protected:
-  // Each world's object, until an episode has another. Its name: what people call it.
+  // Sets each world's object until an episode selects another. `name`: name in instructions.
   void begin_with(int body, const std::string& name, bool thin = false);
   void set_object(int world, int body, const std::string& name);
   const TaskObject& object(int world) const { return subjects_[world].object; }
-  // Its pose at the first observation.
+  // Pose of the object at the first observation.
   const Pose& start(int world) const { return subjects_[world].start; }
 
  private:

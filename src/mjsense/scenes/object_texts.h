@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
-// What people call an object of a scene.
+// Names of an object of a scene in instructions, with probabilities.
 
 #include <vector>
 
@@ -9,7 +9,7 @@
 
 namespace mjsense {
 
-// The usual name half of the time, the others less and less often.
+// The usual name has probability one half; further names have decreasing probabilities.
 std::vector<Referral> referrals_of(const SceneObject& object);
 
 }  // namespace mjsense

@@ -10,15 +10,16 @@
 namespace mjsense {
 namespace {
 
-constexpr int kRound = 16;  // corners of what is round
+constexpr int kRound = 16;  // corners of a circle's polygon
 
-// Points around a geom, world frame: their hull holds it.
+// Points (world frame) whose hull contains a geom.
 std::vector<Vec3> points_of(const mjModel* m, const mjData* d, int g) {
   const Pose pose = pose_from_mat(d->geom_xpos + 3 * g, d->geom_xmat + 9 * g);
   const double *size = m->geom_size + 3 * g, *box = m->geom_aabb + 6 * g;
   std::vector<Vec3> points;
   const auto rings = [&](double rx, double ry, double half, double cap) {
-    const double out = 1 / std::cos(std::numbers::pi / kRound);  // around, not within
+    // the polygon must contain the circle
+    const double out = 1 / std::cos(std::numbers::pi / kRound);
     for (int i = 0; i < kRound; ++i) {
       const double a = 2 * std::numbers::pi * i / kRound, x = out * rx * std::cos(a),
                    y = out * ry * std::sin(a);
@@ -63,7 +64,8 @@ bool solid(const mjModel* m, int g) {
   return m->geom_contype[g] != 0 || m->geom_conaffinity[g] != 0;
 }
 
-// Triangles of a mesh's hull, by its points; of the mesh itself if it has none. Empty: no mesh.
+// Triangles (vertex indices) of a mesh's convex hull, or of the mesh itself if it has no hull.
+// Empty: not a mesh.
 std::span<const int> triangles_of(const mjModel* m, int g) {
   if (m->geom_type[g] != mjGEOM_MESH) return {};
   const int mesh = m->geom_dataid[g];
@@ -71,14 +73,15 @@ std::span<const int> triangles_of(const mjModel* m, int g) {
     return {m->mesh_face + 3 * static_cast<std::ptrdiff_t>(m->mesh_faceadr[mesh]),
             3 * static_cast<std::size_t>(m->mesh_facenum[mesh])};
   }
-  // mjModel.mesh_graph: numvert, numface, 2 of each vertex, its edges, the faces' vertices.
+  // mjModel.mesh_graph: numvert, numface, 2 numbers per vertex, edges, vertices of the faces.
   const int* graph = m->mesh_graph + m->mesh_graphadr[mesh];
   const std::size_t points = graph[0], faces = graph[1];
   return {graph + 2 + 2 * points + (points + 3 * faces), 3 * faces};
 }
 
-// The part of the hull of `points` between two heights has its corners among the points in between
-// and the crossings of the hull's edges; without triangles any pair counts as one.
+// Corners of the part of the hull of `points` between two heights: the points within, and the
+// intersections of the hull's edges with both heights. Without triangles, every pair of points is
+// taken for an edge.
 std::vector<Vec3> between(const std::vector<Vec3>& points, std::span<const int> triangles,
                           double low, double high) {
   std::vector<Vec3> out;
@@ -101,7 +104,7 @@ std::vector<Vec3> between(const std::vector<Vec3>& points, std::span<const int> 
   return out;
 }
 
-// Corners in order (Andrew's monotone chain); z counts for nothing.
+// Convex hull in the xy plane, corners in order (Andrew's monotone chain).
 std::vector<Vec3> hull(std::vector<Vec3> p) {
   std::ranges::sort(p, [](Vec3 a, Vec3 b) { return a.x < b.x || (a.x == b.x && a.y < b.y); });
   std::vector<Vec3> h(2 * p.size() + 1);
@@ -121,8 +124,8 @@ std::vector<Vec3> hull(std::vector<Vec3> p) {
   return h;
 }
 
-// Squared distances along one line (Felzenszwalb and Huttenlocher, "Distance transforms of sampled
-// functions", 2012).
+// Squared distance transform along one line (Felzenszwalb and Huttenlocher, "Distance transforms of
+// sampled functions", 2012).
 void transform(std::vector<double>& f, std::vector<double>& d, std::vector<int>& v,
                std::vector<double>& z) {
   const int n = static_cast<int>(f.size());
@@ -170,7 +173,7 @@ Occupancy::Occupancy(const mjModel* m, const mjData* d, const std::function<bool
         points.push_back(move * p);
         bottom = std::min(bottom, points.back().z);
         top = std::max(top, points.back().z);
-        // What one walks on counts for the size of the grid.
+        // Floors extend the grid too.
         for (int i = 0; i < 2; ++i) {
           low[i] = std::max(std::min(low[i], points.back()[i]), -0.5 * cfg.max_extent);
           high[i] = std::min(std::max(high[i], points.back()[i]), 0.5 * cfg.max_extent);
@@ -192,7 +195,8 @@ Occupancy::Occupancy(const mjModel* m, const mjData* d, const std::function<bool
   measure();
 }
 
-// Cells whose squares the polygon touches: its distance from their middles is below half a cell.
+// Marks the cells whose squares the polygon touches, approximated as a distance from the cell
+// centre below half a cell.
 void Occupancy::fill(std::span<const Vec3> p) {
   double low[2] = {1e10, 1e10}, high[2] = {-1e10, -1e10};
   for (Vec3 v : p) {
@@ -278,7 +282,7 @@ Footprint::Footprint(const mjModel* m, const mjData* d, const std::function<bool
     }
     discs_.push_back({middle.x, middle.y, radius});
   }
-  // Those inside others say nothing.
+  // Discs inside of other discs are redundant.
   std::ranges::sort(discs_, std::greater<>{}, &Disc::radius);
   std::vector<Disc> kept;
   for (const Disc& disc : discs_) {

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
-// What of a floor is taken: a grid seen from above, made of the geoms of a compiled model, whoever
-// wrote it. And how far each place is from what is taken.
+// Occupancy grid of a floor, seen from above and computed from the geoms of any compiled model,
+// with the distance of each position to the nearest occupied cell.
 
 #include <mujoco/mujoco.h>
 
@@ -15,31 +15,32 @@ namespace mjsense {
 
 struct OccupancyCfg {
   double cell = 0.05;             // m
-  double low = 0.05, high = 1.6;  // m, world: what lies below or above is in nobody's way
-  double margin = 0.5;            // m, of floor around what there is
-  double max_extent = 60;         // m, a side; what is further out counts for nothing
-  // Displacements in the world after which a geom may stand where it stands in some episode: it takes the hull of all
-  // these places. Empty, or an empty list: it stands where it is.
+  double low = 0.05, high = 1.6;  // m, world frame; geoms below or above are not obstacles
+  double margin = 0.5;            // m, of free floor around the geoms
+  double max_extent = 60;         // m, side of the grid; geoms farther out are ignored
+  // Displacements (world frame) of a geom that may stand at different positions in different
+  // episodes. The geom occupies the hull of all of them. Empty function or empty list: the geom
+  // does not move.
   std::function<std::vector<Pose>(int geom)> elsewhere;
 };
 
 class Occupancy {
  public:
-  // Of the geoms that touch and that `counts` accepts, where `data` has them (its kinematics must be
-  // up to date). A geom takes the convex hull of what it covers of the floor. Horizontal planes are
-  // floors. Throws ValueError where nothing is left.
+  // Uses the colliding geoms that `counts` accepts, at their positions in `data` (whose kinematics
+  // must be up to date). A geom occupies the convex hull of its projection on the floor. Horizontal
+  // planes are floors. Throws ValueError if there are no such geoms.
   Occupancy(const mjModel* model, const mjData* data, const std::function<bool(int geom)>& counts,
             const OccupancyCfg& cfg = {});
 
   int columns() const { return columns_; }
   int rows() const { return rows_; }
   double cell() const { return cell_; }
-  // Middle of a cell, m in the world.
+  // Centre of a cell, m, world frame.
   double x(int column) const { return x0_ + (column + 0.5) * cell_; }
   double y(int row) const { return y0_ + (row + 0.5) * cell_; }
   bool taken(int column, int row) const { return taken_[index(column, row)] != 0; }
-  // Distance (m) from a place to the nearest cell that is taken, between middles of cells and a bit
-  // less; 0 inside and off the grid.
+  // Distance (m) from a position to the nearest occupied cell. It is measured between cell centres
+  // and slightly reduced; 0 inside of obstacles and outside of the grid.
   double clearance(double x, double y) const;
 
  private:
@@ -55,21 +56,21 @@ class Occupancy {
   std::vector<float> distance_;  // [rows, columns] m
 };
 
-// What a robot takes of the floor, seen from above in its base frame: discs that cover it.
+// Footprint of a robot in its base frame: discs that cover its projection on the floor.
 struct Disc {
   double x, y, radius;  // m
 };
 class Footprint {
  public:
-  // Of the geoms that touch of the bodies that `counts` accepts, below `high` m, as `data` has them;
-  // X_WB is the base.
+  // Uses the colliding geoms that `counts` accepts and that reach below `high` m, at their
+  // positions in `data`. `base` is X_WB.
   Footprint(const mjModel* model, const mjData* data, const std::function<bool(int geom)>& counts,
             const Pose& base, double high);
   std::span<const Disc> discs() const { return discs_; }
-  // About the base's origin.
+  // Maximum distance (m) from the base's origin.
   double radius() const { return radius_; }
   double height() const { return height_; }
-  // Whether it keeps `margin` (m) at x, y, yaw from all that is taken.
+  // Whether the robot at x, y, yaw keeps the distance `margin` (m) from all obstacles.
   bool fits(const Occupancy& floor, double x, double y, double yaw, double margin) const;
   double clearance(const Occupancy& floor, double x, double y, double yaw) const;
 

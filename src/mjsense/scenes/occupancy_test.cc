@@ -18,7 +18,8 @@ struct DataDelete {
   void operator()(mjData* data) const { mj_deleteData(data); }
 };
 
-// A room of 4 x 4 m with a wall in the middle that leaves a gap, a lamp above, a rug below.
+// A room of 4 x 4 m, divided by a wall with a gap, with a lamp above and a rug below the height
+// range.
 std::string room(double gap) {
   const double half = (4 - gap) / 4;
   return "<mujoco><worldbody><geom type='plane' size='5 5 .1'/>"
@@ -67,13 +68,14 @@ TEST(Occupancy, TakesWhatIsInTheWayAndNothingElse) {
   EXPECT_TRUE(free(1, -1)) << "on the rug";
   EXPECT_TRUE(free(-1, -1)) << "what nobody touches";
   EXPECT_EQ(o.clearance(50, 0), 0) << "off the grid";
-  // Analytic distances, to a cell.
+  // Analytic distances, within one cell.
   EXPECT_NEAR(o.clearance(1, 0), 0.95, 0.06)
       << "the middle wall's end is at (0.05, 0.5): " << std::hypot(0.95, 0.5);
   EXPECT_NEAR(o.clearance(-1, 0.4), 0.4, 0.06) << "the cylinder's rim";
 }
 
-// A pillar that has points at its ends alone, more than anybody would compare in pairs, is there in between.
+// A pillar with vertices at its ends only must be an obstacle in between. It has too many vertices
+// to compare all pairs.
 TEST(Occupancy, TakesMeshesBetweenTheirPoints) {
   std::string points;
   for (int i = 0; i < 128; ++i) {
@@ -93,7 +95,7 @@ TEST(Occupancy, TakesMeshesBetweenTheirPoints) {
   EXPECT_NEAR(o.clearance(0.6, 0), 0.3, 0.06);
 }
 
-// The cylinder at x = -1, y = 1 of 0.2 m may stand half a metre on either side along x, and in between.
+// The cylinder of radius 0.2 m at x = -1, y = 1 can move by 0.5 m in both directions along x.
 TEST(Occupancy, TakesWhereFurnitureMayStand) {
   const Floor floor(1.0);
   const int cylinder = floor.model->ngeom - 2;
@@ -120,7 +122,7 @@ TEST(Occupancy, TakesWhereFurnitureMayStand) {
   }
 }
 
-// A disc of 0.3 m.
+// A footprint that is a disc of 0.3 m.
 Footprint disc(const Floor& floor) {
   return {floor.model.get(), floor.data.get(),
           [&](int g) { return floor.model->geom_type[g] == mjGEOM_CYLINDER; }, Pose{{-1, 1, 0}, {}},
@@ -149,7 +151,7 @@ TEST(BaseRoute, GoesThroughTheGapWithoutTouching) {
   EXPECT_NEAR(way.back().yaw, to.yaw, 1e-12);
   for (std::size_t i = 1; i < way.size(); ++i)
     EXPECT_TRUE(routes.free_between(way[i - 1], way[i])) << i;
-  // Not much longer than it must be: by the gap.
+  // The path may be longer than necessary only because of the gap.
   double length = 0;
   for (std::size_t i = 1; i < way.size(); ++i)
     length += std::hypot(way[i].x - way[i - 1].x, way[i].y - way[i - 1].y);
@@ -157,7 +159,7 @@ TEST(BaseRoute, GoesThroughTheGapWithoutTouching) {
 }
 
 TEST(BaseRoute, ThereIsNoneWhereItIsTooNarrow) {
-  const Floor floor(0.45);  // 0.4 and twice the margin are needed
+  const Floor floor(0.45);  // a width of 0.4 m plus twice the margin is needed
   const BaseRoutes routes(floor.occupancy(), disc(floor));
   EXPECT_TRUE(routes.find({-1, 0.3, 0}, {1.2, -1.2, 0}).empty());
   EXPECT_FALSE(routes.find({-1, 0.3, 0}, {-1.2, -1.2, 0}).empty());

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
-// A robot as it starts, and the floor around it, for tasks whose robots drive.
+// The robot at its start configuration and the floor around it, for tasks with mobile robots.
 
 #include <mujoco/mujoco.h>
 
@@ -13,23 +13,23 @@
 
 namespace mjsense {
 
-// Index of the group whose commands are x, y (m) and yaw (rad) of a base on the floor; -1: there is none.
+// Index of the group that commands x, y (m) and yaw (rad) of a mobile base; -1: none.
 int driving_base(const Robot& robot);
 
-// Of the level plane on which wheels stand, m; nothing where there is none.
+// Height (m) of the level plane that wheels stand on; empty if there is none.
 std::optional<double> ground_height(const mjModel* model);
 
-// The model as it is compiled, the robot's groups at their start positions, on data of its own.
+// The compiled model with the robot's groups at their start positions, with its own mjData.
 class RestingRobot {
  public:
   RestingRobot(const mjModel* model, const Robot& robot);
   const mjData* data() const { return data_.get(); }
   Footprint footprint() const;
-  // Without its arms.
+  // Footprint without the arms.
   Footprint trunk() const;
-  // What is in the way of a robot so high (m): everything that touches but the robot and what lies
-  // about freely, and what `without` names. Doors stand as the model has them, furniture wherever `elsewhere` says
-  // (OccupancyCfg).
+  // Obstacles for a robot of this height (m): all colliding geoms except the robot, loose objects
+  // and geoms for which `without` is true. Doors are at their model positions; furniture occupies
+  // all positions that `elsewhere` returns (OccupancyCfg).
   Occupancy occupancy(double height,
                       const std::function<std::vector<Pose>(int geom)>& elsewhere = {},
                       const std::function<bool(int geom)>& without = {}) const;

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
-// What an episode plays in, as data: models, the objects among them, where they may stand, where
-// the robot stands, and what differs from episode to episode.
+// Scene files, the data that defines where episodes take place: models, the objects among them and
+// their placement, the pose of the robot, and what varies between episodes.
 
 #include <array>
 #include <functional>
@@ -51,7 +51,8 @@ void visit_fields(V& v, SceneEntityCfg& c) {
       .within(-1, 5);
 }
 
-// How an object may rest: as its model has it, on its side (turned about y), on an end (about x).
+// Resting orientations of an object: as in its model, on its side (rotated about y), on its end
+// (rotated about x).
 inline constexpr std::array<std::string_view, 3> kRests{"upright", "side", "end"};
 
 struct SceneObjectCfg {
@@ -194,7 +195,7 @@ struct SceneFileCfg {
   double gap = 0.02, target_gap = 0.07;
   double drop = 0.0003;
   std::array<int, 2> count{-1, -1};
-  // Models made by code, in the place of `base` and `entities`; called whenever they are compiled.
+  // Function that creates the models; replaces `base` and `entities`. Called for every compilation.
   std::function<SceneCfg()> models;
 };
 template <class V>
@@ -244,7 +245,7 @@ void visit_fields(V& v, SceneFileCfg& c) {
            "Function that makes the models, instead of ``base`` and ``entities``.");
 }
 
-// What its fields say of each other. Throws ValueError.
+// Checks relations between the fields. Throws ValueError.
 void validate(const SceneFileCfg& cfg, std::string_view place);
 
 }  // namespace mjsense

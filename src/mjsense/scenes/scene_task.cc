@@ -19,7 +19,7 @@ void SceneTask::bind(const std::shared_ptr<Simulation>& simulation) {
 
 void SceneTask::initialize_task() {
   scene_.initialize(model(), num_worlds(), robot().prefix());
-  // Wheels stand on the ground, not where the scene has a pedestal for arms.
+  // A robot on wheels stands on the ground, not at the height of the scene's pedestal for arms.
   const std::optional<double> ground = ground_height(model());
   if (ground && driving_base(robot()) >= 0) scene_.put_robot_at(*ground);
 }

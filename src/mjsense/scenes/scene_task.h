@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
-// A task that plays in a scene of data: cfg.scene, else one of its own.
+// Base of tasks that use a scene file: cfg.scene, or the task's default scene.
 
 #include <memory>
 #include <string>
@@ -13,7 +13,7 @@ namespace mjsense {
 
 class SceneTask : public Task {
  public:
-  // Throws as task_scene().
+  // Throws the errors of task_scene().
   SceneTask(TaskCfg cfg, std::string_view own_scene);
   SceneCfg scene_cfg() const override { return scene_.scene_cfg(robot_entity()); }
   void bind(const std::shared_ptr<Simulation>& simulation) override;
@@ -22,15 +22,15 @@ class SceneTask : public Task {
  protected:
   EpisodeScene& scene() { return scene_; }
   const EpisodeScene& scene() const { return scene_; }
-  // Those who override it call it first.
+  // Overriding functions must call it first.
   void initialize_task() override;
-  // What differs in the episode that this world begins, before the scene is sampled.
+  // Varies the scene for the episode that this world starts, before the scene is sampled.
   void vary_scene(int world);
-  // Worlds::model_of(); the model where there are no worlds.
+  // Worlds::model_of(), or the compiled model if there are no worlds.
   mjModel world_model(int world) const;
-  // EpisodeScene::adopt(), of this world's episode.
+  // Calls EpisodeScene::adopt() for this world's episode.
   std::vector<int> adopt_scene(int world, const StateRow& state);
-  // "task 'pick': scene 'table'", which errors begin with.
+  // Prefix of error messages: "task 'pick': scene 'table'".
   std::string place() const;
 
  private:

@@ -16,18 +16,18 @@ namespace {
 using std::numbers::pi;
 
 constexpr int kGrid = 3;                     // points along each side of a target area
-constexpr double kHeights[] = {0.06, 0.15};  // m above it, of the tool
-constexpr double kTilts[] = {0, 45};         // degrees from above
-constexpr double kStep = 0.05;               // m between two places
+constexpr double kHeights[] = {0.06, 0.15};  // m, tool height above the target area
+constexpr double kTilts[] = {0, 45};         // degrees from vertical
+constexpr double kStep = 0.05;               // m, between two base positions
 constexpr int kBack = 4, kAhead = 8;         // steps
-constexpr double kEnough = 0.95;             // of the points
-constexpr double kHang = 0.35;               // m, tool of a floating hand above the targets
-constexpr double kHangBack = 0.15;           // m, nearer to where the scene has the robot
+constexpr double kEnough = 0.95;             // fraction of the points
+constexpr double kHang = 0.35;      // m, height of a floating hand's tool above the targets
+constexpr double kHangBack = 0.15;  // m, towards the scene's base pose
 constexpr int kIterations = 250;
 constexpr double kDeep = 0.001;  // m
-constexpr double kRoom = 0.01;   // m, kept from what a robot must not stand in
+constexpr double kRoom = 0.01;   // m, minimum distance from obstacles of a base that is moved
 
-// m, world: where tools have to get, and the middle of that on the surface.
+// Points (m, world frame) that tools must reach, and the centre of the target areas on the surface.
 std::vector<Vec3> targets(const mjModel* m, const EpisodeScene& scene) {
   std::vector<Vec3> points;
   for (const Region& region : scene.regions()) {
@@ -58,7 +58,7 @@ RobotValues start_of(const mjModel* model, const Robot& robot, bool stooped = fa
   return start;
 }
 
-// In how many of the ways to come down to a point a hand gets there, of all ways; the best hand counts.
+// Fraction of the approach orientations at a point that a hand can reach; maximum over the hands.
 double ways_to(const Robot& robot, const RobotValues& start, const Pose& base, Vec3 point) {
   double best = 0;
   for (std::size_t g = 0; g < robot.groups().size(); ++g) {
@@ -66,7 +66,8 @@ double ways_to(const Robot& robot, const RobotValues& start, const Pose& base, V
     int reached = 0, ways = 0;
     for (double tilt : kTilts) {
       for (int quarter = 0; quarter < 2; ++quarter, ++ways) {
-        // Down, leaning outwards, the fingers along or across.
+        // Pointing down, tilted outwards by `tilt`, with the fingers in one of two perpendicular
+        // directions.
         const Quat q =
             axis_angle({0, 1, 0}, pi - tilt * pi / 180) * axis_angle({0, 0, 1}, 0.5 * pi * quarter);
         RobotValues values = start;
@@ -79,13 +80,14 @@ double ways_to(const Robot& robot, const RobotValues& start, const Pose& base, V
   return best;
 }
 
-// Of all points, 0 .. 1.
+// Fractions (0 to 1) of the points, and of the approach orientations at all points, that are
+// reachable.
 struct Reached {
   double points = 0, ways = 0;
   std::vector<char> point;  // whether there is a way to it
 };
 
-// Tries places, upright or stooped.
+// Evaluates base positions, with the robot upright or stooped.
 class Search {
  public:
   Search(const mjModel* model, const Robot& robot, const EpisodeScene& scene,
@@ -110,7 +112,7 @@ class Search {
     return out;
   }
 
-  // Wherever the scene puts the robot, and a bit farther.
+  // Whether the base is collision-free at all poses that the scene may sample, with a margin.
   bool is_free(const Pose& base, const Pose& offset) const {
     if (!stands_free(base * offset)) return false;
     const SceneRobotCfg& cfg = scene_.cfg().robot;
@@ -124,8 +126,8 @@ class Search {
     return true;
   }
 
-  // The place ahead or behind from which more ways lead to the points than `best`; of equals the one that is
-  // nearer.
+  // Finds the forward or backward offset with more reachable approach orientations than `best`; of
+  // equal ones, the smallest offset.
   void improve(const Pose& base, double& best, Pose& offset) const {
     for (int k = -kBack; k <= kAhead; ++k) {
       const Pose moved{{kStep * k, 0, 0}, {}};
@@ -148,7 +150,8 @@ class Search {
       for (std::size_t i = 0; i < address.size(); ++i)
         data_->qpos[address[i]] = start_[g].values[i];
     }
-    for (const SceneObject& object : scene_.objects())  // they come later, and never so near
+    // objects are placed later, at a distance from the robot
+    for (const SceneObject& object : scene_.objects())
       data_->qpos[model_->jnt_qposadr[model_->body_jntadr[object.body]]] += 100;
     mj_kinematics(model_, data_.get());
     mj_comPos(model_, data_.get());
@@ -164,7 +167,7 @@ class Search {
     return !stands_in_something(root);
   }
 
-  // Of what does not move MuJoCo makes no contacts: the foot of a robot against furniture.
+  // MuJoCo generates no contacts between static geoms, such as a robot's base and furniture.
   bool stands_in_something(int root) const {
     const auto stands = [&](int g) {
       const int body = model_->geom_bodyid[g];

@@ -1,7 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
-// Where a robot stands in a scene that was made for another: nearer or farther, stooped if it can, so
-// that its hands reach where the targets are; a floating hand hangs above them.
+// Base placement of a robot in a scene that was made for a different robot. The base is moved
+// forward or back, and the robot stoops if it can, until its hands reach the target areas. A
+// floating hand is placed above them.
 
 #include "mjsense/robots/robot.h"
 #include "mjsense/scenes/episode_scene.h"
@@ -11,12 +12,13 @@ namespace mjsense {
 class Standing {
  public:
   Standing() = default;
-  // Where the scene says, if a hand reaches nearly all of the target areas from there; otherwise the place ahead
-  // or behind that is free of the scene and from which most ways lead to them. Where that is not nearly all
-  // either, the robot stoops (Robot::stoop), if more do then. If that is still not enough, targets are limited to
+  // Keeps the scene's base pose if a hand can reach nearly all of the target areas from there.
+  // Otherwise selects the collision-free offset forward or back with the most reachable grasp
+  // poses. If it does not reach nearly all of the target areas either, the robot stoops
+  // (Robot::stoop) if that increases the number. If that is still not enough, targets are limited to
   // the regions of which a hand reaches at least half, unless there is none.
   Standing(const mjModel* model, Robot& robot, EpisodeScene& scene);
-  // X_WB for an episode in which the scene says `scene_pose`.
+  // Returns X_WB for an episode in which the scene gives `scene_pose`.
   Pose operator()(const Pose& scene_pose) const { return scene_pose * offset_; }
   const Pose& offset() const { return offset_; }
 

@@ -26,7 +26,7 @@ Pose offset_of(const char* robot_name) {
   return Standing(compiled.model(), robot, scene).offset();
 }
 
-// The table was made for the Franka.
+// The table scene was made for the Franka.
 TEST(Standing, WhoReachesStaysWhereTheSceneSays) {
   for (const char* robot : {"franka", "mobile_franka"}) {
     const Pose offset = offset_of(robot);
@@ -35,7 +35,7 @@ TEST(Standing, WhoReachesStaysWhereTheSceneSays) {
   }
 }
 
-// The tops are 0.6 m high, RB-Y1's hands twice that.
+// The table tops are 0.6 m high; RB-Y1's hands are at twice that height.
 TEST(Standing, WhoCanStoopDoesWhereATableIsLow) {
   EpisodeScene scene(load_scene("table"));
   TaskCfg cfg;
@@ -53,7 +53,8 @@ TEST(Standing, WhoCanStoopDoesWhereATableIsLow) {
   EXPECT_LE(std::abs(standing.offset().p.x), 0.2);
 }
 
-// Wherever the scene puts it: not in the table, from which it would be pushed off its place.
+// At no base pose that the scene can sample may the robot penetrate the table, which would push it
+// away.
 TEST(Standing, WhoMovesNearerStandsInNothing) {
   TaskCfg cfg;
   cfg.robot = robot_cfg("rby1");
@@ -79,7 +80,7 @@ TEST(Standing, WhoMovesNearerStandsInNothing) {
   }
 }
 
-// A scene whose robot has a pedestal above the ground, which is not at z = 0: wheels stand on the ground.
+// The scene has a pedestal for the robot above the ground, which is not at z = 0.
 TEST(Standing, WhoDrivesStandsOnTheGround) {
   const testing::TempDir dir;
   std::ofstream(dir.file("room.xml")) << R"(<mujoco><worldbody>

@@ -17,8 +17,8 @@
 namespace mjsense {
 namespace {
 
-// Seconds since it was made; 0 and no look at the clock (25 ns, as much as a small sensor) when
-// off.
+// Measures seconds since its construction. If off, returns 0 and does not read the clock, which
+// takes 25 ns, as much as a small sensor.
 class Timer {
  public:
   explicit Timer(bool on) : on_(on) {
@@ -34,13 +34,13 @@ class Timer {
   std::chrono::steady_clock::time_point start_;
 };
 
-// Runs `body` for a sensor; an error that does not say which sensor failed gets its name.
+// Runs `body` for a sensor. Errors that do not name the sensor get its name as a prefix.
 template <class Body>
 void guarded(const Sensor& sensor, Body&& body) {
   try {
     body();
   } catch (const RowError&) {
-    throw;  // names it
+    throw;  // already names the sensor
   } catch (const Error& e) {
     const std::string named = fmt::format("'{}'", sensor.name());
     if (std::string_view(e.what()).find(named) != std::string_view::npos) throw;
@@ -56,8 +56,9 @@ void guarded(const Sensor& sensor, Body&& body) {
   }
 }
 
-// Runs `first`, then `next` until it returns false: what has happened is told to all, whatever rows
-// could not be filled. Then the first fault is thrown.
+// Runs `first`, then `next` until it returns false, even if they throw RowError, so that all
+// listeners are notified although some rows could not be computed. Then the first exception is
+// rethrown.
 template <class First, class Next>
 void after_all(First&& first, Next&& next) {
   std::exception_ptr fault;
@@ -80,19 +81,20 @@ void after_all(First&& first, Next&& next) {
 
 }  // namespace
 
-// A sensor and where its rows stand.
+// A sensor and the state of its rows.
 struct Simulation::Slot {
   Sensor* sensor;
   std::vector<Slot*> inputs;
-  std::vector<std::int64_t> computed;  // by world: version_ to which the row belongs
-  std::vector<double> compute_s;       // by world
+  // by world: version_ of the state that the row was computed from
+  std::vector<std::int64_t> computed;
+  std::vector<double> compute_s;  // by world
   double cast_s = 0;
   mjtStage needs = mjSTAGE_ACC;
-  ControlStepListener* listener = nullptr;  // the sensor, if it is one
-  int phase = 0;        // passes that must come before: 1 + that of an input which casts
+  ControlStepListener* listener = nullptr;  // the sensor, if it is a ControlStepListener
+  int phase = 0;        // number of earlier passes: 1 + the phase of an input that casts
   bool casts = false;   // stage kCast or kBatch: finished by cast()
   bool read = false;    // since the last step
-  bool wanted = false;  // scratch of collect()
+  bool wanted = false;  // temporary flag of collect()
 };
 
 struct Simulation::Scratch {
@@ -122,7 +124,7 @@ class Simulation::Borrowed {
   std::unique_ptr<Scratch> scratch_;
 };
 
-// What happens to the sensors while MuJoCo's threads run over the worlds.
+// Sensor callbacks of the parallel pass of MuJoCo's threads over the worlds.
 class Simulation::Hooks final : public WorldHooks {
  public:
   enum class Only { kNothing, kSubstep, kReset };
@@ -136,7 +138,7 @@ class Simulation::Hooks final : public WorldHooks {
     if (rays_) stage_ = std::max(stage_, mjSTAGE_POS);
   }
 
-  // Nothing but substep() or reset() of every sensor.
+  // Calls only substep() or reset() of every sensor.
   Hooks(Simulation& sim, Only only, double elapsed = 0.0)
       : sim_(sim),
         only_(only),
@@ -201,7 +203,7 @@ Simulation::Simulation(std::shared_ptr<Scene> scene, const SimulationCfg& cfg)
   claim_ = scene_->claim();
   worlds_ = std::make_unique<Worlds>(scene_->model(), cfg.num_worlds, cfg.threads);
   worlds_->seed(cfg.seed);
-  // Not worlds_->threads(): MuJoCo's pool is never larger than the number of worlds, but one image
+  // Not worlds_->threads(): MuJoCo's pool is limited to the number of worlds, but a single image
   // has many tiles.
   pool_ = std::make_unique<ThreadPool>(cfg.threads);
   version_.assign(cfg.num_worlds, 1);
@@ -213,7 +215,7 @@ Simulation::Simulation(std::shared_ptr<Scene> scene, const SimulationCfg& cfg)
 
 Simulation::~Simulation() = default;
 
-// In the order of the registry, but a sensor after those that it reads.
+// Initializes in the order of the registry, except that a sensor follows those that it reads.
 void Simulation::initialize_scene() {
   std::vector<Sensor*> done, open;
   const auto contains = [](const std::vector<Sensor*>& list, const Sensor* s) {
@@ -278,8 +280,8 @@ Simulation::Slot& Simulation::slot_of(const Sensor& sensor) const {
                                sensor.name()));
 }
 
-// The slots for which `wanted` holds and their inputs, in order: an input was initialized before
-// the sensor that reads it.
+// Collects the slots for which `wanted` holds, and their inputs, in order: an input was initialized
+// before the sensor that reads it.
 template <class Wanted>
 void Simulation::collect(std::vector<Slot*>& slots, Wanted&& wanted) {
   for (auto slot = slots_.rbegin(); slot != slots_.rend(); ++slot) {
@@ -310,7 +312,7 @@ void Simulation::compute(std::span<Slot* const> slots, std::span<const int> ids,
       switch (change) {
         case Change::kStep:
           after_all([&] { worlds_->step(cfg_.decimation, hooks, ids); },
-                    // By number: one that hears of it may add others.
+                    // By index, because a listener may add sensors.
                     [&, i = std::size_t{0}]() mutable {
                       if (i == slots_.size()) return false;
                       const Slot& slot = *slots_[i++];
@@ -428,7 +430,8 @@ void Simulation::invalidate(WorldIds ids) { mark_stale(worlds_->checked_ids(ids)
 
 void Simulation::refresh(std::span<Sensor* const> sensors, WorldIds ids) {
   make_current(sensors, ids);
-  for (const Sensor* sensor : sensors) slot_of(*sensor).read = true;  // only if it can be computed
+  // only after they were computed successfully
+  for (const Sensor* sensor : sensors) slot_of(*sensor).read = true;
 }
 
 void Simulation::make_current(std::span<Sensor* const> sensors, WorldIds ids) {

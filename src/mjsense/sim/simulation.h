@@ -1,10 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
-// Scene + worlds + sensors: steps physics and keeps every measurement fresh.
+// A simulation of several worlds of a scene: steps the physics and keeps measurements up to date.
 //
-// A sensor is computed when it is read and stale, and from then on in the same parallel pass as the
-// physics, for as long as it is read every step. Stale means: the world was stepped, reset or
-// forwarded since.
+// A sensor is computed when it is read and its rows are stale, that is, after the world was
+// stepped, reset or forwarded. As long as it is read every step, it is computed in the same
+// parallel pass as the physics.
 
 #include <cstdint>
 #include <functional>
@@ -24,13 +24,13 @@ namespace mjsense {
 struct SimulationCfg {
   int num_worlds = 1;
   int decimation = 1;  // substeps per control step
-  int threads = 0;     // 0: the CPUs this process may use
+  int threads = 0;     // 0: one per CPU that this process may use
   std::uint64_t seed = 0;
 };
 
 class Simulation {
  public:
-  // Every world starts reset, at the model's defaults. Throws RuntimeError if another simulation has
+  // All worlds start reset, at the model's defaults. Throws RuntimeError if another simulation uses
   // this scene.
   Simulation(std::shared_ptr<Scene> scene, const SimulationCfg& cfg);
   ~Simulation();
@@ -47,58 +47,59 @@ class Simulation {
   mjModel model_of(int world) const { return worlds_->model_of(world); }
   int num_worlds() const { return cfg_.num_worlds; }
   int decimation() const { return cfg_.decimation; }
-  double step_dt() const { return cfg_.decimation * model()->opt.timestep; }  // s, one control step
+  // s, duration of a control step
+  double step_dt() const { return cfg_.decimation * model()->opt.timestep; }
 
-  // From here on `control` is called before every `every`-th physics step of a step(), in the
-  // parallel pass: WorldHooks::control() says what it may do. An empty one: never again.
+  // Calls `control` before every `every`-th physics step of step(), in the parallel pass; see
+  // WorldHooks::control() for what it may do. An empty function removes it.
   using Control = std::function<mjtStage(const World& world, int index)>;
   void set_control(int every, Control control);
 
-  // Worlds that are not among the ids stand still.
+  // Steps the worlds `ids`; all others keep their state.
   void step(int control_steps = 1, WorldIds ids = all_worlds);
-  // key: keyframe, -1 the model's defaults.
+  // Resets to keyframe `key`; -1: the model's defaults.
   void reset(WorldIds ids = all_worlds, int key = -1);
-  // Random numbers start again from this seed; reset() usually follows.
+  // Restarts the random numbers from this seed. Usually followed by reset().
   void seed(std::uint64_t seed) { worlds_->seed(seed); }
-  // Makes derived fields and sensors current after state rows were written.
+  // Computes derived fields and sensors after the state was written.
   void forward(WorldIds ids = all_worlds);
 
-  // mjlab's order of calls, by hand: plain mj_step, then one update of the sensors' per-substep
-  // state.
+  // mjlab's order of calls: plain mj_step, then one update of the sensors' per-substep state.
   void step_raw(int substeps);
-  void update_sensors(double dt = 0.0);  // dt: s that this update stands for; 0: the timestep
-  // Forgets the episode in the sensors of these worlds, physics untouched.
+  // dt: s, duration that this update represents; 0: the timestep
+  void update_sensors(double dt = 0.0);
+  // Resets the sensors of these worlds without changing the physics.
   void reset_sensors(WorldIds ids = all_worlds);
 
-  // Adds a sensor that is not part of the scene (observation sensors, users' own) and initializes
-  // it.
+  // Adds and initializes a sensor that is not part of the scene (observation sensors, user-defined
+  // sensors).
   void add(std::shared_ptr<Sensor> sensor);
-  // Makes the sensor's rows current, in the worlds `ids`. They stay so until the next step, reset or
-  // forward.
+  // Makes the sensor's rows in the worlds `ids` current. They stay current until the next step,
+  // reset or forward.
   void refresh(Sensor& sensor) {
     Sensor* one[] = {&sensor};
     refresh(one);
   }
   void refresh(std::span<Sensor* const> sensors, WorldIds ids = all_worlds);
-  // What these sensors show of one world as it is now, to be seen by a human; empty: those with
+  // Debug visualisation of these sensors in the current state of one world; empty: all sensors with
   // debug_vis. Drawing does not count as reading.
   [[nodiscard]] DebugShapes draw(int world, std::span<Sensor* const> sensors = {});
-  // State was changed in a way that only the caller knows.
+  // Marks all rows of these worlds as stale after the caller changed the state.
   void invalidate(WorldIds ids = all_worlds);
 
-  // Time that a sensor has taken since measure_cost(true).
+  // Time spent on a sensor since measure_cost(true).
   struct Cost {
-    double compute = 0;  // s of processor time, all worlds together
+    double compute = 0;  // s of CPU time, all worlds together
     double cast = 0;     // s of wall time
   };
   void measure_cost(bool on) { measure_cost_ = on; }
   Cost cost(const Sensor& sensor) const;
-  // s of processor time spent so far on moving the ray scene to the worlds' poses.
+  // s of CPU time spent on updating the ray scene to the worlds' poses.
   double ray_scene_cost() const;
 
-  // Worlds that failed in the last step, reset or forward; they were reset alone.
+  // Worlds that failed in the last step, reset or forward. Only these worlds were reset.
   const std::vector<Failure>& failures() const { return worlds_->failures(); }
-  RayScene& rays();  // made when first needed
+  RayScene& rays();  // created on first use
 
  private:
   struct Slot;
@@ -109,8 +110,8 @@ class Simulation {
   void initialize_scene();
   void initialize(Sensor& sensor);
   Slot& slot_of(const Sensor& sensor) const;
-  // Makes `change` happen and `slots` (each after its inputs) current in the worlds `ids`; here and
-  // below: checked, in order.
+  // Performs `change` and makes `slots` (each after its inputs) current in the worlds `ids`. Here
+  // and below, `ids` are validated and sorted.
   void compute(std::span<Slot* const> slots, std::span<const int> ids, Change change, int key = -1);
   void cast(std::span<Slot* const> slots, std::span<const int> ids, int phase);
   void make_current(std::span<Sensor* const> sensors, WorldIds ids);
@@ -118,8 +119,8 @@ class Simulation {
   void collect(std::vector<Slot*>& slots, Wanted&& wanted);
   void mark_stale(std::span<const int> ids);
 
-  // Buffers that keep their capacity, so that a step allocates nothing; one for each level of
-  // nested calls (a sensor in Python may read other sensors while it is computed).
+  // Buffers that are reused, so that a step allocates nothing. There is one set per level of nested
+  // calls, because a sensor written in Python may read other sensors while it is computed.
   struct Scratch;
   class Borrowed;
   std::vector<std::unique_ptr<Scratch>> scratch_;
@@ -127,17 +128,18 @@ class Simulation {
   SimulationCfg cfg_;
   Shared shared_;
   std::shared_ptr<Scene> scene_;
-  std::shared_ptr<void> claim_;  // on the scene
+  std::shared_ptr<void> claim_;  // reserves the scene
   std::unique_ptr<Worlds> worlds_;
   std::unique_ptr<ThreadPool> pool_;
   std::unique_ptr<RayScene> rays_;
   std::vector<std::shared_ptr<Sensor>> added_;
-  std::vector<std::unique_ptr<Slot>> slots_;  // scene sensors, then added ones
+  std::vector<std::unique_ptr<Slot>> slots_;  // scene sensors, then added sensors
   std::vector<std::int64_t> version_;         // of each world's state
-  std::vector<std::int64_t> rays_version_;    // of the poses in the ray scene
-  std::vector<double> rays_s_;                // time spent on them, by world
+  std::vector<std::int64_t> rays_version_;    // version_ of the poses in the ray scene
+  std::vector<double> rays_s_;                // s spent on updating the ray scene, by world
   bool any_substep_ = false;
-  mjtStage substep_stage_ = mjSTAGE_NONE;  // that the sensors need which want every substep
+  // maximum stage needed by the sensors with wants_substep()
+  mjtStage substep_stage_ = mjSTAGE_NONE;
   bool measure_cost_ = false;
   int control_every_ = 0;
   Control control_;

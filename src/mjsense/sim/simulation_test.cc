@@ -36,7 +36,7 @@ std::shared_ptr<Scene> scene() {
   return std::make_shared<Scene>(cfg);
 }
 
-// Height of the ball, counting how often it is asked.
+// Height of the ball. Counts the calls of its functions.
 struct Height : Sensor {
   explicit Height(std::string name, Stage stage = Stage::kRow)
       : Sensor(std::move(name)), stage_(stage) {}
@@ -79,7 +79,7 @@ struct Height : Sensor {
   ErrorKind failure = ErrorKind::kValue;
   double last_dt = 0;
   mjtStage reads_up_to = mjSTAGE_ACC;
-  int fail_in = -1, casts = 0, solves = 0, positions = 0;  // counted by MuJoCo
+  int fail_in = -1, casts = 0, solves = 0, positions = 0;  // numbers of calls, counted by MuJoCo
   std::vector<int> computes, substeps, resets, cast_ids;
   std::vector<Sensor*> input_list;
   std::function<void()> on_cast;
@@ -100,14 +100,14 @@ TEST(Simulation, ComputesOnceUntilTheStateChanges) {
   sim.refresh(*h);
   EXPECT_THAT(h->computes, Each(1));
   EXPECT_FLOAT_EQ(h->row(1), 1.0f);
-  sim.step();  // read since: computed in the same pass
+  sim.step();  // was read: computed in the same pass
   EXPECT_THAT(h->computes, Each(2));
   sim.refresh(*h);
   EXPECT_THAT(h->computes, Each(2));
   EXPECT_LT(h->row(1), 1.0f);
-  sim.step(3);  // read once since, so only the last of these
+  sim.step(3);  // was read once since, so only the last step computes it
   EXPECT_THAT(h->computes, Each(3));
-  sim.step();  // not read since: lazy again
+  sim.step();  // was not read since: computed on demand again
   EXPECT_THAT(h->computes, Each(3));
 }
 
@@ -120,7 +120,7 @@ TEST(Simulation, DescribesThePresentState) {
   EXPECT_FLOAT_EQ(h->row(0), static_cast<float>(qpos[2]));
 }
 
-// What a step computes beyond the integration is what the sensors need that are read.
+// Beyond the integration, a step computes only the stages needed by the sensors that are read.
 TEST(Simulation, ComputesTheStagesThatItsSensorsNeed) {
   Simulation sim(scene(), {.decimation = 2});
   const auto sensor = [&](mjtStage stage) {
@@ -132,7 +132,7 @@ TEST(Simulation, ComputesTheStagesThatItsSensorsNeed) {
   auto none = sensor(mjSTAGE_NONE), place = sensor(mjSTAGE_POS), force = sensor(mjSTAGE_ACC);
   auto* push = reinterpret_cast<double*>(sim.worlds().state_component("qfrc_applied").data);
   const auto step = [&](Height& read) {
-    push[0] += 0.1;  // no solve is used again
+    push[0] += 0.1;  // invalidates the previous constraint solve
     sim.step();
     sim.refresh(read);
   };
@@ -151,7 +151,7 @@ TEST(Simulation, ComputesTheStagesThatItsSensorsNeed) {
   EXPECT_FLOAT_EQ(place->row(0), static_cast<float>(qpos[2]));
 }
 
-// A sensor that sees every substep has the forces there, if it asks for them.
+// A sensor with substep() gets the forces there if it needs mjSTAGE_ACC.
 TEST(Simulation, SubstepsHaveTheStagesThatTheirSensorsNeed) {
   for (const mjtStage stage : {mjSTAGE_POS, mjSTAGE_ACC}) {
     Simulation sim(scene(), {.decimation = 2});
@@ -162,7 +162,7 @@ TEST(Simulation, SubstepsHaveTheStagesThatTheirSensorsNeed) {
     sim.step();
     const int before = s->solves;
     reinterpret_cast<double*>(sim.worlds().state_component("qfrc_applied").data)[0] = 0.1;
-    sim.step();  // the first substep solves anew, the second uses the solve of the sensor
+    sim.step();  // the first substep solves anew, the second reuses the solve done for the sensor
     EXPECT_EQ(s->solves - before, stage == mjSTAGE_ACC ? 3 : 2);
   }
 }
@@ -182,8 +182,8 @@ TEST(Simulation, PartialResetRefreshesExactlyThoseWorlds) {
   EXPECT_EQ(h->row(1), before);
 }
 
-// Episodes start with a reset, state that is written, a forward: only then is there something to
-// measure.
+// An episode starts with a reset, writes of the state, and a forward. Sensors must not be computed
+// before that.
 TEST(Simulation, ResetAndForwardComputeWhenReadNotBefore) {
   Simulation sim(scene(), {.num_worlds = 2});
   auto h = add(sim, "h");
@@ -224,7 +224,7 @@ TEST(Simulation, EagerSensorsAndTheirInputsRunEveryControlStep) {
   EXPECT_THAT(filter->substeps, Each(15));
 }
 
-// One that counts control steps, and cannot fill the rows of some worlds.
+// A sensor that counts control steps and cannot compute the rows of some worlds.
 struct Stepped final : Sensor, ControlStepListener {
   explicit Stepped(std::string name) : Sensor(std::move(name)) {}
   std::string_view kind() const override { return "stepped"; }
@@ -258,7 +258,7 @@ TEST(Simulation, TellsSensorsOfEveryControlStepBeforeTheirRows) {
   Simulation sim(scene(), {.num_worlds = 3, .decimation = 2});
   auto sensor = std::make_shared<Stepped>("s");
   sim.add(sensor);
-  sim.step(2);  // also of one that nobody reads
+  sim.step(2);  // also a sensor that is not read
   EXPECT_THAT(sensor->steps, Each(2));
   EXPECT_THAT(sensor->casts, Each(0));
   sim.refresh(*sensor);
@@ -289,7 +289,7 @@ TEST(Simulation, RowsThatCannotBeFilledAreAskedForAgainTheOthersNot) {
     EXPECT_STREQ(e.what(), "sensor 'first', world 2: no");
   }
   EXPECT_THAT(first->steps, Each(1));
-  EXPECT_THAT(second->steps, Each(1));  // heard of it all the same
+  EXPECT_THAT(second->steps, Each(1));  // is notified nevertheless
   try {
     sim.refresh(*first);
     FAIL();
@@ -325,7 +325,7 @@ TEST(Simulation, CastsAfterComputingAndFiltersAfterCasts) {
   EXPECT_THAT(camera->cast_ids, ElementsAre(1));
 }
 
-// A sensor written in Python reads others while it is computed.
+// A sensor written in Python may read other sensors while it is computed.
 TEST(Simulation, BatchSensorsMayReadOthers) {
   Simulation sim(scene(), {.num_worlds = 2});
   auto h = add(sim, "h");
@@ -355,7 +355,7 @@ TEST(Simulation, AFailingSensorIsNamedAndTheOthersGoOn) {
   EXPECT_THAT(good->computes, Each(1));
 }
 
-// Its name is put before an error, which stays of its kind.
+// The sensor's name is added to an error, whose type is unchanged.
 TEST(Simulation, AnErrorKeepsItsKind) {
   Simulation sim(scene(), {.num_worlds = 2});
   auto bad = add(sim, "bad");
@@ -368,7 +368,7 @@ TEST(Simulation, AnErrorKeepsItsKind) {
   EXPECT_THROW(sim.refresh(*bad), ValueError);
 }
 
-// Also if its name is a part of the message: the "a" of "no value".
+// The name is also added if it occurs by chance in the message: the "a" of "no value".
 TEST(Simulation, AnErrorNamesItsSensor) {
   Simulation sim(scene(), {.num_worlds = 2});
   auto bad = add(sim, "a");
@@ -388,7 +388,7 @@ TEST(Simulation, StepsAreAsLongAsTheirSubsteps) {
   EXPECT_DOUBLE_EQ(sim.worlds().time(0), 3 * sim.step_dt());
 }
 
-// mjlab's order of calls: an update stands for the time that it is given.
+// mjlab's order of calls: an update represents the duration that is passed to it.
 TEST(Simulation, AnUpdateByHandLastsAsLongAsItSays) {
   Simulation sim(scene(), {});
   auto filter = std::make_shared<Height>("filter");
@@ -402,7 +402,7 @@ TEST(Simulation, AnUpdateByHandLastsAsLongAsItSays) {
   EXPECT_THAT(filter->substeps, Each(2));
 }
 
-// Rays meet the world as it is, not as it was when they were first cast.
+// Rays hit the world in its current state, not in the state of the first cast.
 TEST(Simulation, RaysFollowTheState) {
   SceneCfg cfg;
   cfg.entities.emplace_back("robot", EntityCfg{.model = {.xml = kXml}});
@@ -443,7 +443,7 @@ TEST(Simulation, AStepAllocatesNothing) {
   EXPECT_EQ(count.since(), 0);
 }
 
-// An empty filter ("the worlds that are done") must not become every world.
+// An empty list of worlds ("the worlds that are done") must not mean all worlds.
 TEST(Simulation, AnEmptyListOfWorldsIsNone) {
   Simulation sim(scene(), {.num_worlds = 3});
   auto h = add(sim, "h");

@@ -23,8 +23,8 @@ class AllocationCount {
 
 }  // namespace mjsense
 
-// The address sanitiser has an operator new of its own, which finds more than a count: there
-// nothing is counted.
+// Under the address sanitiser nothing is counted: it has its own operator new, which also detects
+// errors.
 #ifndef __SANITIZE_ADDRESS__
 
 #pragma GCC diagnostic push

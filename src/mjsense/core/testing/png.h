@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
-// Pictures read back.
+// PNG decoder for tests.
 
 #include <gtest/gtest.h>
 #include <zlib.h>
@@ -22,7 +22,7 @@ struct Picture {
   std::vector<std::uint8_t> pixels;
 };
 
-// A decoder by the PNG specification (11.2, 12.3), of 8-bit pictures that are not interlaced.
+// Decodes 8-bit images that are not interlaced, following the PNG specification (11.2, 12.3).
 inline Picture decode_png(std::span<const std::uint8_t> png) {
   constexpr std::uint8_t kSignature[8] = {0x89, 'P', 'N', 'G', 0x0d, 0x0a, 0x1a, 0x0a};
   EXPECT_TRUE(png.size() > 8 && std::equal(kSignature, kSignature + 8, png.begin()));
@@ -34,17 +34,19 @@ inline Picture decode_png(std::span<const std::uint8_t> png) {
     const std::string type(png.begin() + at + 4, png.begin() + at + 8);
     const std::uint8_t* body = &png[at] + 8;
     EXPECT_EQ(png_number(body + size), crc32(0, &png[at] + 4, size + 4))
-        << type;  // over type and body
+        << type;  // the CRC covers type and body
     order += type + " ";
     if (type == "IHDR") {
       EXPECT_EQ(size, 13u);
       out.width = static_cast<int>(png_number(body));
       out.height = static_cast<int>(png_number(body + 4));
-      EXPECT_EQ(body[8], 8);  // bits a sample
+      EXPECT_EQ(body[8], 8);  // bits per sample
       constexpr int kChannels[] = {1, 0, 3, 0,
-                                   2, 0, 4};  // by colour type, 0: not without a palette
+                                   // indexed by colour type; 0: not supported without a palette
+                                   2, 0, 4};
       out.channels = body[9] < 7 ? kChannels[body[9]] : 0;
-      EXPECT_EQ(body[10] + body[11] + body[12], 0);  // deflate, the five filters, not interlaced
+      // compression: deflate; filters: the standard five; not interlaced
+      EXPECT_EQ(body[10] + body[11] + body[12], 0);
     }
     if (type == "IDAT") packed.insert(packed.end(), body, body + size);
     at += 12 + size;

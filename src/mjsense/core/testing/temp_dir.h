@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
-// A folder of its own for a test that writes files: programs that run beside each other never meet.
+// A unique temporary folder for a test, so that test programs that run in parallel do not
+// interfere.
 
 #include <unistd.h>
 
@@ -12,7 +13,7 @@
 
 namespace mjsense::testing {
 
-// New and empty; removed with all that is in it, also what was made unreadable.
+// Created empty. Removed with all its contents, even if the folder was made unreadable.
 struct TempDir {
   std::filesystem::path path;
 

@@ -11,7 +11,7 @@ namespace mjsense {
 namespace {
 
 struct FrameRows {
-  const mjtNum *pos, *mat;  // null: objects of this type have no frame
+  const mjtNum *pos, *mat;  // null if objects of this type have no frame
 };
 
 FrameRows frame_rows(const mjData* d, mjtObj type) {

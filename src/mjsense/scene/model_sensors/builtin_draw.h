@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
-// What a sensor of MuJoCo's shows of itself: the frame it is attached to.
+// Debug visualisation of MuJoCo's sensors: the frame that a sensor is attached to.
 
 #include <string>
 
@@ -9,8 +9,8 @@
 
 namespace mjsense {
 
-// The axes of the body, site, geom or camera that sensor `id` of the model is attached to, labelled
-// "<name>_x" ...; ValueError if it is attached to something without a frame.
+// Draws the axes of the body, site, geom or camera to which sensor `id` is attached, labelled
+// "<name>_x" etc. Throws ValueError if it is attached to an element without a frame.
 void draw_sensor_frame(const World& world, int id, const std::string& name, DebugShapes& shapes);
 
 }  // namespace mjsense

@@ -24,7 +24,7 @@ std::string joint_unit(const mjModel* m, int joint) {
   return m->jnt_type[joint] == mjJNT_SLIDE ? "m" : "rad";
 }
 
-// Of the coordinate that "~" stands for.
+// Unit of the coordinate that "~" stands for.
 std::string coordinate_unit(const mjModel* m, int sensor) {
   const int id = m->sensor_objid[sensor];
   if (m->sensor_objtype[sensor] == mjOBJ_JOINT) return joint_unit(m, id);
@@ -52,7 +52,7 @@ std::string frame_of(const mjModel* m, int sensor, const BuiltinType& type) {
     case BuiltinFrame::kObject:
       return object(m, m->sensor_objtype[sensor], m->sensor_objid[sensor]);
     case BuiltinFrame::kWorld:
-      // The accelerations ignore their ref; the pair sensors' ref is the other object.
+      // Acceleration sensors ignore their ref; the ref of pair sensors is the second object.
       if (type.group != BuiltinGroup::kFrame || type.type == mjSENS_FRAMELINACC ||
           type.type == mjSENS_FRAMEANGACC || m->sensor_refid[sensor] < 0) {
         return "world";

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
-// Unit, frame, bounds and meaning of a MuJoCo sensor, read off the compiled model.
+// Unit, frame, bounds and description of a MuJoCo sensor, derived from the compiled model.
 
 #include <mujoco/mujoco.h>
 

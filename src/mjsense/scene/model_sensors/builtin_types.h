@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
-// The table of MuJoCo's sensor types: what each takes, measures, and in which unit and frame.
+// Table of MuJoCo's sensor types: the elements they refer to, what they measure, unit and frame.
 
 #include <mujoco/mujoco.h>
 
@@ -11,7 +11,7 @@
 
 namespace mjsense {
 
-// What the sensor is attached to, and what its `ref` may be.
+// Kinds of elements that the sensor is attached to (obj) and that `ref` may name.
 enum class BuiltinGroup {
   kSite,         // obj: site
   kRangefinder,  // obj: site or camera
@@ -24,16 +24,16 @@ enum class BuiltinGroup {
   kProjection,   // obj: site, ref: camera
   kInside,       // obj: body xbody geom site camera, ref: site
   kGeomPair,     // obj and ref: geom or body
-  kTactile,      // obj: mesh of taxels, ref: geom in whose frame it stands
+  kTactile,      // obj: mesh of taxels, ref: geom that defines its frame
   kPlugin,       // obj and ref: anything, optional
   kUser,         // obj: anything, optional
-  kContact,      // only found in XML
+  kContact,      // can only be defined in XML
 };
 
 enum class BuiltinFrame {
-  kNone,    // a scalar, a quaternion's own meaning, a time
+  kNone,    // a scalar, a quaternion, or a time
   kObject,  // axes of the object
-  kWorld,   // global axes; with a ref, the ref's
+  kWorld,   // world axes; axes of `ref` if there is one
   kPixels,
 };
 
@@ -42,7 +42,7 @@ struct BuiltinType {
   mjtSensor type;
   BuiltinGroup group;
   BuiltinFrame frame;
-  std::string_view unit;  // "~" and "~/s": rad or m, after the joint
+  std::string_view unit;  // "~" and "~/s" stand for rad or m, depending on the joint
   std::string_view description;
 };
 
@@ -52,11 +52,11 @@ std::span<const BuiltinType> builtin_types();
 const BuiltinType& builtin_type(std::string_view name, std::string_view place);
 const BuiltinType& builtin_type(mjtSensor type);
 
-// Types of objects that this group takes as obj and as ref; empty: none.
+// Object types that this group accepts as obj and as ref; empty: none.
 std::vector<std::string> allowed_objects(BuiltinGroup group);
 std::vector<std::string> allowed_refs(BuiltinGroup group);
 
-// Names of a rangefinder's data fields in MuJoCo's order, and their sizes.
+// Names and sizes of a rangefinder's data fields, in MuJoCo's order.
 struct RangeField {
   std::string_view name;
   int size;

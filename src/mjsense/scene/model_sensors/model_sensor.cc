@@ -33,7 +33,7 @@ void ModelSensor::compute(const World& world) {
   for (int i = 0; i < dim_; ++i) row[i] = static_cast<float>(values[i]);
   if (nsample_ == 0) return;
 
-  // MuJoCo's ring: [user, index of the newest sample, nsample times, nsample x dim values].
+  // MuJoCo's ring buffer: [user, index of the newest sample, nsample times, nsample x dim values].
   const mjtNum* ring = world.data->history + history_adr_;
   const int newest = static_cast<int>(ring[1]);
   const mjtNum* samples = ring + 2 + nsample_;

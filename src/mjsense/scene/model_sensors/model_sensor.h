@@ -1,7 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
-// A sensor that stands in the model, found under its name: its row is the sensor's numbers in
-// mjData.sensordata, as float32 [B, dim], and with a history `history` [B, nsample, dim].
+// A sensor defined in the MuJoCo model, registered under its full name. The row contains its values
+// in mjData.sensordata, as float32 [B, dim]. If the sensor has a history, the field `history` is
+// [B, nsample, dim].
 
 #include <string>
 
@@ -17,7 +18,7 @@ class ModelSensor : public Sensor {
   void initialize(const SensorInit& init) override;
   mjtStage needs() const override { return needs_; }
   void compute(const World& world) override;
-  void draw(const World& world, DebugShapes& shapes) override;  // the frame it is attached to
+  void draw(const World& world, DebugShapes& shapes) override;  // draws the frame it is attached to
 
  private:
   int id_ = -1;

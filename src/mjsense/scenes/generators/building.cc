@@ -66,7 +66,7 @@ void write_wall(Building& out, Vec3 from, Vec3 to, std::vector<Opening> openings
   const double half = 0.5 * look.thickness;
   Building::Local local(out, "", from, std::atan2(to.y - from.y, to.x - from.x));
   std::ranges::sort(openings, {}, &Opening::from);
-  // Two halves, back to back: a picture lies on one side of a slab.
+  // Two slabs, back to back, because a slab has its texture on one side only.
   const auto piece = [&](double a, double b, double low, double high) {
     if (b - a < 1e-6 || high - low < 1e-6) return;
     const double x = 0.5 * (a + b), z = 0.5 * (low + high);

@@ -10,7 +10,7 @@ namespace {
 constexpr Colour kRugs[] = {{0.48, 0.30, 0.28}, {0.34, 0.40, 0.46}, {0.62, 0.56, 0.44}};
 constexpr Colour kPaintings[] = {{0.36, 0.50, 0.58}, {0.66, 0.52, 0.36}, {0.44, 0.54, 0.38}};
 
-// A body of this name: faces -x or +x, its seat at x, y.
+// A body named `name`: a chair that faces -x or +x, with its seat at x, y.
 void chair(RoomText& room, const char* name, double x, double y, double back) {
   room.open_body(name, {x, y, 0});
   for (int i = 0; i < 4; ++i) {

@@ -5,8 +5,8 @@
 
 namespace mjsense {
 
-// A table in a dining room: geom table_top is level, region "table" before the robot; chairs, a rug, a
-// picture on the wall.
+// A table in a dining room, with chairs, a rug and a picture on the wall. Objects are placed on
+// geom table_top, in the region "table" in front of the robot.
 Generator dining_generator();
 
 }  // namespace mjsense

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
-// What a house is made of: floor, walls, wood, drawn from its random numbers.
+// Random finishes of a house: materials of floor, walls and wood.
 
 #include <span>
 
@@ -9,13 +9,13 @@
 
 namespace mjsense {
 
-// Materials floor, wall, ceiling, skirting, lamp_glass: all that write_shell() needs. Floors are
-// planks or tiles.
+// Writes the materials floor, wall, ceiling, skirting and lamp_glass, which write_shell() needs.
+// Floors are planks or tiles.
 void write_shell_finishes(RoomText& room, Rng& rng);
 
-// One of the colours, each as likely.
+// Draws one of the colours uniformly.
 Colour pick(Rng& rng, std::span<const Colour> colours);
-// Woods and paints that furniture has.
+// Draws a colour of wood or paint for furniture.
 Colour wood_colour(Rng& rng);
 Colour paint_colour(Rng& rng);
 

@@ -19,11 +19,12 @@ namespace {
 using std::numbers::pi;
 
 constexpr double kHeight = 2.6, kWall = 0.12;  // m
-constexpr int kAttempts = 60;                  // places to try for a piece
-// m, to each side, by which a piece stands elsewhere from episode to episode: the first for which there is room.
+constexpr int kAttempts = 60;                  // positions tried per piece
+// m, maximum displacement of a piece between episodes in each direction; the first one that fits is
+// used.
 constexpr std::array<double, 4> kMoves{0.20, 0.14, 0.09, 0.05};
 constexpr double kTableMove =
-    0.05;  // m: who drives up to what lies on it must not have to stop far from it
+    0.05;  // m: small, because a mobile robot must be able to stop close to objects on the table
 
 enum class RoomKind { kLiving, kBedroom, kDining, kStudy, kSecondBedroom, kReading };
 constexpr std::array<const char*, 6> kRoomNames{"living", "bedroom", "dining",
@@ -55,7 +56,7 @@ std::string name_of(Furniture piece) {
   return kNames[static_cast<int>(piece)];
 }
 
-// With its back to a wall: side 0 .. 3 = y1, x1, y0, x0 of the room.
+// Placement with the back to a wall: side 0 .. 3 = y1, x1, y0, x0 of the room.
 struct Stand {
   Vec3 at;
   double yaw;
@@ -89,8 +90,9 @@ class Furnisher {
   Furnisher(Building& out, FloorPlan& plan, Rng& rng, SceneFileCfg& cfg)
       : out_(out), plan_(plan), rng_(rng), cfg_(cfg) {}
 
-  // Along the walls at which they stand, tables in the midst of a room both ways, as far as they leave ways through; what
-  // stands on them goes with them. When all is furnished.
+  // Lets furniture move between episodes: pieces at walls along the wall, tables in the middle of a
+  // room along both axes, as far as paths remain free. Objects on furniture move with it. Call it
+  // after all rooms are furnished.
   void loosen() {
     for (const Piece& piece : pieces_) {
       const Rect& s = piece.space;
@@ -179,7 +181,7 @@ class Furnisher {
     std::string name;
     int room;
     Rect space;
-    bool along_x = false, along_y = false;  // it may stand elsewhere
+    bool along_x = false, along_y = false;  // axes along which it can be displaced
   };
 
   Building& out_;
@@ -207,14 +209,14 @@ void write_walls(Building& out, const FloorPlan& plan, Rng& rng) {
   }
 }
 
-// A picture in the middle of a wall without window or opening.
+// A picture at the centre of a wall without a window or opening.
 void write_pictures(Building& out, const FloorPlan& plan, Rng& rng) {
   for (const PlannedWall& w : plan.walls()) {
     if (w.opening || w.other < 0 || w.length() < 1.2 || rng.below(2) == 0) continue;
     const double side = rng.below(2) == 0 ? 1 : -1, off = side * 0.5 * kWall;
     const Vec3 at{0.5 * (w.x0 + w.x1) + (w.along_x() ? 0 : off),
                   0.5 * (w.y0 + w.y1) + (w.along_x() ? off : 0), 0};
-    // It faces -y of its frame.
+    // The painting faces -y of its frame.
     const double yaw = w.along_x() ? (side > 0 ? pi : 0) : (side > 0 ? 0.5 * pi : -0.5 * pi);
     Building::Local local(out, "", at, yaw);
     write_painting(out, fmt::format("painting_{}", rng.below(3)), 0.7, 0.5, 1.6);
@@ -242,7 +244,7 @@ ModelSource make(House& house, SceneFileCfg& cfg) {
             all.width(), all.depth(), 0.1);
   write_walls(out, plan, rng);
   write_pictures(out, plan, rng);
-  // The largest room is to live in; the others are what they are by size.
+  // The largest room is the living room; the other kinds are assigned by size.
   std::vector<int> order(rooms.size());
   std::iota(order.begin(), order.end(), 0);
   std::ranges::sort(order, [&](int a, int b) { return rooms[a].area() > rooms[b].area(); });

@@ -5,7 +5,7 @@
 
 namespace mjsense {
 
-// A floor of four to six furnished rooms, open to each other, with things on their furniture.
+// A floor with four to six furnished rooms, connected by openings, with objects on the furniture.
 Generator floor_generator();
 
 }  // namespace mjsense

@@ -7,11 +7,11 @@
 namespace mjsense {
 namespace {
 
-constexpr double kLeast = 2.9;      // m, a side of a room
-constexpr double kShared = 1.75;    // m, of a wall that has an opening
+constexpr double kLeast = 2.9;      // m, minimum side of a room
+constexpr double kShared = 1.75;    // m, minimum length of a shared wall with an opening
 constexpr double kHalfWall = 0.06;  // m
-constexpr double kRobot = 0.95;     // m, what a way is wide
-constexpr double kCell = 0.1;       // m, of the test for a way
+constexpr double kRobot = 0.95;     // m, width of a path
+constexpr double kCell = 0.1;       // m, grid of the path test
 
 }  // namespace
 
@@ -54,7 +54,7 @@ void FloorPlan::find_walls(Rng& rng) {
       wall.opening = true;
       wall.from = 0.15 + rng.uniform(0.15, 0.85) * slack;
       wall.to = wall.from + wide;
-      // Nothing stands before it, on both sides.
+      // The areas in front of an opening must stay free on both sides.
       constexpr double kFree = 1.15;
       passages_.push_back(
           wall.along_x()
@@ -102,8 +102,8 @@ bool FloorPlan::widen(int room, const Rect& space, const Rect& wider) {
   return fit;
 }
 
-// A robot that is a disc can go from the first passage to every other, to the middle of every room's
-// free part, and beside `more`.
+// Whether a disc-shaped robot can drive from the first passage to all others, to the centre of each
+// room's free area, and next to `more`.
 bool FloorPlan::connected(const Rect* more) const {
   const int nx = static_cast<int>(whole_.width() / kCell),
             ny = static_cast<int>(whole_.depth() / kCell);
@@ -151,7 +151,7 @@ bool FloorPlan::connected(const Rect* more) const {
   for (const Rect& p : passages_) {
     if (blocked[cell_of(p)] != 2) return false;
   }
-  for (const Rect& room : rooms_) {  // each has a passage; else it is closed
+  for (const Rect& room : rooms_) {  // without a passage, the room is closed
     if (std::ranges::none_of(passages_, [&](const Rect& p) { return overlap(room, p); }))
       return false;
   }

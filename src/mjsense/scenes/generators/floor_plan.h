@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
-// Where the rooms of a floor are, where one goes from one to the next, and what stands where:
-// rectangles only.
+// Floor plan of axis-aligned rectangles: the rooms, the passages between them, and the space taken
+// by furniture.
 
 #include <vector>
 
@@ -21,30 +21,33 @@ inline bool overlap(const Rect& a, const Rect& b, double margin = 0) {
          b.y0 < a.y1 + margin;
 }
 
-// A wall between two rooms (the second -1: outside), from (x0, y0) to (x1, y1), along x or y.
+// A wall between two rooms, from (x0, y0) to (x1, y1), parallel to x or y. `other` is -1 for an
+// outer wall.
 struct PlannedWall {
   int room = 0, other = -1;
   double x0, y0, x1, y1;
-  bool opening = false;     // a way through
-  double from = 0, to = 0;  // m along it
+  bool opening = false;     // has a passage
+  double from = 0, to = 0;  // m along the wall, of the passage
   bool along_x() const { return y0 == y1; }
   double length() const { return along_x() ? x1 - x0 : y1 - y0; }
 };
 
 class FloorPlan {
  public:
-  // 4 to 6 rooms on about 9 to 11 by 7 to 9 m, each open to its neighbours, all connected.
+  // 4 to 6 rooms on about 9 to 11 by 7 to 9 m, each with a passage to a neighbour, all connected.
   explicit FloorPlan(Rng& rng);
 
   const Rect& whole() const { return whole_; }
   const std::vector<Rect>& rooms() const { return rooms_; }
   const std::vector<PlannedWall>& walls() const { return walls_; }
 
-  // Whether something may stand there: inside its room, clear of what stands, not before an opening,
-  // with a way past it, kRobot m wide, between all openings and to the thing itself.
+  // Whether furniture may be placed there: inside its room, not overlapping other furniture or the
+  // area in front of an opening, and such that paths of width kRobot (m) still connect all openings
+  // and reach the piece itself.
   bool fits(int room, const Rect& space) const;
   void take(const Rect& space) { taken_.push_back(space); }
-  // Something takes `wider` in the place of `space`, which it took: false, and as before, if that does not fit.
+  // Replaces the occupied rectangle `space` by `wider`. Returns false and changes nothing if that
+  // does not fit.
   bool widen(int room, const Rect& space, const Rect& wider);
 
  private:

@@ -15,14 +15,14 @@ namespace {
 
 using std::numbers::pi;
 
-constexpr double kRim = 0.07;  // m, of a top on which no origin of a thing lies
+constexpr double kRim = 0.07;  // m, edge of a top on which no object's origin is placed
 
-// Where on a top things may stand, m from its middle.
+// Part of a top where objects may be placed, m from its centre.
 struct Part {
   double x0, x1, y0, y1;
 };
 
-// A level top on which things may stand, on all of it but a rim or on a part.
+// A level top for objects, which may be placed on all of it except the edge, or on a part of it.
 void top(Building& out, const std::string& name, Vec3 center, Vec3 half, std::string_view material,
          std::vector<SceneRegionCfg>& regions, std::optional<Part> part = {}) {
   out.text().box(name + "_top", material, center, half);
@@ -91,7 +91,7 @@ void television(Building& out, const std::string& name, Rng& rng,
                 std::vector<SceneRegionCfg>& regions) {
   const double half = rng.uniform(0.72, 0.85), height = rng.uniform(0.46, 0.56);
   out.box({0, -0.21, 0.5 * height}, {half - 0.02, 0.19, 0.5 * height - 0.05}, "white_wood");
-  // Things stand beside the set.
+  // Objects are placed next to the television.
   top(out, name, {0, -0.21, height - 0.015}, {half, 0.21, 0.015}, "wood", regions,
       Part{0.62 * half, half - kRim, -0.14, 0.14});
   for (const double a : {-0.5, 0.5})
@@ -134,7 +134,7 @@ void desk(Building& out, const std::string& name, Rng& rng, std::vector<SceneReg
           "white_wood");
   for (const double z : {0.28, 0.46, 0.64})
     out.box({half - 0.22, -0.63, z}, {0.06, 0.008, 0.008}, "steel", false);
-  // A screen, its keyboard, and a chair before them.
+  // A screen, its keyboard, and a chair in front.
   out.box({0.30, -0.14, height + 0.27}, {0.27, 0.012, 0.165}, "black");
   out.box({0.30, -0.153, height + 0.27}, {0.26, 0.002, 0.155}, "screen", false);
   out.box({0.30, -0.13, height + 0.06}, {0.02, 0.01, 0.06}, "black", false);
@@ -149,7 +149,7 @@ void bed(Building& out, const std::string& name, Rng& rng, std::vector<SceneRegi
   const double half = rng.uniform(0.70, 0.85);
   out.box({0, -0.03, 0.45}, {half + 0.03, 0.03, 0.45}, "wood");
   out.box({0, -1.05, 0.17}, {half, 1.0, 0.09}, "wood");
-  // Near the foot, where one reaches them.
+  // Near the foot of the bed, where objects are within reach.
   top(out, name, {0, -1.05, 0.36}, {half - 0.02, 0.98, 0.10}, "sheet", regions,
       Part{-half + 0.12, half - 0.12, -0.86, -0.40});
   out.box({0, -1.35, 0.455}, {half + 0.005, 0.70, 0.006}, "cloth_3", false);
@@ -322,7 +322,8 @@ void write_furniture_materials(RoomText& text, Rng& rng) {
   text.plain("leaf_1", around({0.20, 0.42, 0.20}), {0.15, 0.3});
   text.plain("leaf_2", around({0.32, 0.52, 0.26}), {0.15, 0.3});
   text.glowing("shade", {0.95, 0.90, 0.78}, 0.45);
-  // The lamps below it shine down: what the room throws back on it is its own.
+  // Light sources below the ceiling shine down only; emission stands in for the light that the room
+  // reflects onto the ceiling.
   text.glowing("ceiling_paint", {0.90, 0.90, 0.89}, 0.35);
   text.glowing("window_pane", {0.80, 0.89, 0.97}, 0.75);
 }

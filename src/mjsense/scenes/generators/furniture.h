@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
-// Furniture for generated rooms. Each piece stands on the floor in the frame of the writer: its back
-// at y = 0, its front towards -y, its middle at x = 0. Sizes are drawn.
+// Furniture of generated rooms. Each piece is on the floor of the writer's frame, with its back at
+// y = 0, its front towards -y and its centre at x = 0. Sizes are random.
 
 #include <string>
 #include <string_view>
@@ -27,25 +27,25 @@ enum class Furniture {
   kNightstand,
 };
 
-// What it takes of the floor, at most.
+// Maximum floor area of a piece.
 struct FloorSpace {
   double width, depth;  // m
 };
 FloorSpace floor_space(Furniture piece);
 
-// A top on which things may stand is a geom "<name>_top" and goes to `regions`, in the world's axes.
+// A surface for objects is a geom "<name>_top" and is appended to `regions`, in world axes.
 void write_furniture(Building& out, Furniture piece, const std::string& name, Rng& rng,
                      std::vector<SceneRegionCfg>& regions);
-// A table in the middle of a room with chairs on its long sides; around the frame's origin.
+// A table for the centre of a room with chairs along its long sides, centred at the frame's origin.
 void write_dining_table(Building& out, const std::string& name, int chairs, Rng& rng,
                         std::vector<SceneRegionCfg>& regions);
 void write_coffee_table(Building& out, const std::string& name, Rng& rng,
                         std::vector<SceneRegionCfg>& regions);
-// Materials that the pieces, rugs, windows and ceilings are made of, in colours of the house.
+// Materials of furniture, rugs, windows and ceilings, in the colours of the house.
 void write_furniture_materials(RoomText& text, Rng& rng);
-// A material that shows a picture once: for write_painting().
+// A material that shows an image once, for write_painting().
 void write_picture(RoomText& text, const std::string& name, Rng& rng);
-// A flat thing on the floor and on a wall; the wall's is at height z, facing -y.
+// A rug on the floor, and a painting on a wall at height z, facing -y.
 void write_rug(Building& out, std::string_view material, double half_x, double half_y);
 void write_painting(Building& out, std::string_view picture, double width, double height, double z);
 

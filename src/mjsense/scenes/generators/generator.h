@@ -1,8 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
-// Scenes that a function makes: a house of a street. `generator = "kitchen"` in a scene.toml names
-// one; `--scene kitchen:7` is its house 7. All worlds of a job share one house; what differs between
-// episodes is the scene's `vary` and sampler, as for scenes that are written.
+// Procedural scenes: a generator makes any number of houses. `generator = "kitchen"` in a
+// scene.toml selects one; `--scene kitchen:7` is its house 7. All worlds of a job share one house.
+// The scene's `vary` and sampler provide the variation between episodes, as for scenes without a
+// generator.
 
 #include <cstdint>
 #include <span>
@@ -16,17 +17,17 @@
 
 namespace mjsense {
 
-// A number that a scene.toml may give its generator.
+// A number that a scene.toml may pass to its generator.
 struct GeneratorParameter {
   std::string_view name;
-  double value;               // where the scene does not say it
-  std::string_view sentence;  // what it is
+  double value;               // default
+  std::string_view sentence;  // description
 };
 
-// The house that a generator is asked for.
+// The house to be generated.
 struct House {
   std::uint64_t number = 0;
-  Rng rng;                         // of generator and number
+  Rng rng;                         // seeded with the generator's name and the house number
   std::vector<double> parameters;  // in the order in which the generator lists them
 };
 
@@ -34,17 +35,17 @@ struct Generator {
   std::string_view name;
   std::string_view sentence;
   std::vector<GeneratorParameter> parameters;
-  // Makes the first entity of the scene, called `room`: its model's names are "room/...". May add to
-  // `cfg` what belongs to the house: regions, objects, where the robot stands, what varies. A
-  // function of `house` alone.
+  // Creates the first entity of the scene, named `room`; the model's names are "room/...". May add
+  // to `cfg` what depends on the house: regions, objects, the pose of the robot, variation. Must be
+  // a function of `house` only.
   ModelSource (*make)(House& house, SceneFileCfg& cfg);
 };
 
-// The table of ours.
+// Table of the built-in generators.
 std::span<const Generator> generators();
 
-// The model of cfg.generator's house cfg.house, with what it adds to `cfg`. Throws KeyError for a
-// generator or parameter that there is not.
+// Generates house cfg.house with cfg.generator and adds to `cfg`. Throws KeyError for an unknown
+// generator or parameter.
 ModelSource generate(SceneFileCfg& cfg);
 
 }  // namespace mjsense

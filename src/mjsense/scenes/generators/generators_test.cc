@@ -29,7 +29,7 @@ std::string error_of(F f) {
   return "no error";
 }
 
-// One house: compiled without a robot, ready for episodes.
+// A house compiled without a robot, ready for episodes.
 struct Built {
   EpisodeScene scene;
   std::unique_ptr<Scene> whole;
@@ -86,7 +86,8 @@ TEST(Generators, NothingStartsInsideAnything) {
   }
 }
 
-// Furniture stands elsewhere in every episode, and nowhere that a map of the house does not know.
+// Furniture is displaced in every episode. It must stay within the cells that the occupancy map
+// marks.
 TEST(Generators, MapsHoldWhereverFurnitureStands) {
   for (const std::string name : {"floor", "floor:3", "room_with_door", "room_with_door:5"}) {
     EpisodeScene scene(load_scene(name));

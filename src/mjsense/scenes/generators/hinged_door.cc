@@ -8,10 +8,10 @@
 namespace mjsense {
 namespace {
 
-constexpr double kGap = 0.004, kThick = 0.04;  // m, around the leaf and of it
-constexpr double kJamb = 0.03;                 // m, of the frame beside the leaf
-constexpr double kReach = 0.014;               // m, the bolt out of the leaf
-constexpr double kBolt = 0.006;                // m, half its thickness
+constexpr double kGap = 0.004, kThick = 0.04;  // m, gap around the leaf and thickness of the leaf
+constexpr double kJamb = 0.03;                 // m, width of the frame next to the leaf
+constexpr double kReach = 0.014;               // m, by which the bolt protrudes from the leaf
+constexpr double kBolt = 0.006;                // m, half of its thickness
 
 // Jambs, head and casings on both faces of the wall.
 void frame(Building& out, const HingedDoor& door, double thickness) {
@@ -28,14 +28,14 @@ void frame(Building& out, const HingedDoor& door, double thickness) {
   for (const double face : {-1.0, 1.0})
     out.box({face * (deep + 0.008), 0, top + 0.045}, {0.009, half + 0.081, 0.036}, "skirting",
             false);
-  // The rebate against which it shuts, on the side from which it is pushed.
+  // The rebate that stops the leaf, on the side from which it is pushed.
   for (const double side : {-1.0, 1.0})
     out.box({-0.5 * kThick - 0.015, side * (half - 0.006), 0.5 * top}, {0.012, 0.006, 0.5 * top},
             "skirting", false);
 }
 
-// The leaf with panels on both faces: a body at the hinge, x to the latch, s = +-1 the way it opens
-// along y.
+// The leaf with panels on both faces. The body frame is at the hinge, x points to the latch; s =
+// +-1 is the direction of opening along y.
 void leaf(Building& out, const HingedDoor& door, double s) {
   const double middle = 0.5 * door.width, y = -s * 0.5 * kThick;
   const double half = middle - kGap, tall = 0.5 * (door.height - 0.008);
@@ -44,7 +44,7 @@ void leaf(Building& out, const HingedDoor& door, double s) {
       "{:.4f}\" "
       "class=\"furniture\" material=\"door_paint\" mass=\"{:.2f}\" friction=\"0.4 0.005 0.0001\"/>",
       middle, y, tall + 0.008, half, 0.5 * kThick, tall, 24 * door.width * door.height / 1.8));
-  // Beads around two panels.
+  // Mouldings around two panels.
   for (const auto& [low, high] : {std::pair{0.20, 0.84}, std::pair{1.14, door.height - 0.16}}) {
     const double z = 0.5 * (low + high), h = 0.5 * (high - low), w = half - 0.12;
     for (const double face : {-1.0, 1.0}) {
@@ -68,7 +68,7 @@ void lever(Building& out, const HingedDoor& door, double s) {
     out.text().cylinder("", "black", {u, at, z - 0.10}, {u, at + face * 0.006, z - 0.10}, 0.007,
                         "contype=\"0\" conaffinity=\"0\" group=\"2\" mass=\"0\"");
   }
-  // About its axis a positive angle presses it down; a spring brings it back.
+  // A positive angle presses the lever down; a spring returns it.
   out.text().add(fmt::format("<body name=\"door_handle\" pos=\"{:.4f} {:.4f} {:.4f}\">", u, y, z));
   out.text().add(
       "<joint name=\"door_handle_hinge\" type=\"hinge\" axis=\"0 -1 0\" range=\"0 0.85\" "
@@ -118,12 +118,12 @@ double opening_width(const HingedDoor& door) { return door.width + 2 * (kGap + k
 double opening_height(const HingedDoor& door) { return door.height + 2 * kGap + kJamb; }
 
 void write_door(Building& out, const HingedDoor& door, double wall_thickness) {
-  const double side = door.hinge_left ? 1 : -1;  // of the hinge, along y
+  const double side = door.hinge_left ? 1 : -1;  // side of the hinge along y
   const double s = side;                         // the leaf's y axis points to +x or to -x
   {
     Building::Local body(out, "door_frame", {0, 0, 0}, 0);
     frame(out, door, wall_thickness);
-    // Behind the bolt on its way: the latch edge is opposite to the hinge.
+    // The strike blocks the bolt's motion; the latch edge is opposite to the hinge.
     const double from = 0.5 * door.width + 0.001;
     out.text().add(fmt::format(
         "<geom name=\"door_strike\" type=\"box\" pos=\"{:.4f} {:.4f} {:.4f}\" size=\"0.008 {:.4f} "
@@ -132,7 +132,7 @@ void write_door(Building& out, const HingedDoor& door, double wall_thickness) {
         "solref=\"0.004 1\" solimp=\"0.98 0.999 0.0005\"/>",
         kBolt + 0.0085, -side * (from + 0.5 * kReach), door.handle_height, 0.5 * kReach));
   }
-  // The hinge stands on the face towards which the leaf opens.
+  // The hinge axis is on the face towards which the leaf opens.
   out.text().add(
       fmt::format("<body name=\"door\" pos=\"{:.4f} {:.4f} 0\" quat=\"0.70710678 0 0 {:.8f}\">",
                   0.5 * kThick, side * 0.5 * door.width, -side * 0.70710678));

@@ -67,7 +67,7 @@ void materials(RoomText& room, Rng& rng) {
   room.plain("leaf", {0.24, 0.44, 0.22});
 }
 
-// What stands at the back of a worktop and stays there.
+// Static items at the back of a worktop.
 void clutter(RoomText& room, Rng& rng, double z, double y0, double wide) {
   const double x = 0.52;
   const double jar = y0 + 0.08 + rng.uniform(0, 0.05);
@@ -98,7 +98,8 @@ ModelSource make(House& house, SceneFileCfg& cfg) {
   style.wall_low = style.high + rng.uniform(0.50, 0.55);
   style.wall_high = style.wall_low + rng.uniform(0.60, 0.68);
 
-  // The fridge at one end, the other units beside it in any order; the sink and the oven apart.
+  // The fridge is at one end, the other units follow in any order; the sink and the oven are not
+  // adjacent.
   std::vector<Unit> order{Unit::kDrawers, Unit::kDoor, Unit::kWideDrawers, Unit::kSink};
   for (std::size_t i = order.size() - 1; i > 0; --i)
     std::swap(order[i], order[rng.below(static_cast<std::uint32_t>(i + 1))]);
@@ -167,7 +168,8 @@ ModelSource make(House& house, SceneFileCfg& cfg) {
     }
     ++number;
   }
-  // On the wall: above all but the oven, which has a hood, and the microwave's reach.
+  // Wall cabinets above all units except the oven, which has a hood; the microwave's space stays
+  // free.
   for (const Placed& u : units) {
     if (u.unit != Unit::kOven) write_wall_cabinet(room, style, rng, u.y0, u.wide);
     if (u.unit == Unit::kDoor) write_microwave(room, style, u.y0 + u.wide / 2);

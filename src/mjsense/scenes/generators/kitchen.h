@@ -5,16 +5,16 @@
 
 namespace mjsense {
 
-// A fitted kitchen along the wall at +x; its fronts look to -x and stand at x = 0.
+// A fitted kitchen along the wall at +x. The fronts are at x = 0 and face -x.
 //
-//   body          joint              what
-//   drawer_0 ..   drawer_0/slide     three or four in a unit, two units
-//   cabinet_0 ..  cabinet_0/hinge    its leaf is body cabinet_0/door; below the worktop and on the wall
-//   oven_0        oven_0/hinge       oven_0/door, hinged below
+// body          joint              description
+// drawer_0 ..   drawer_0/slide     three or four per unit, two units
+// cabinet_0 ..  cabinet_0/hinge    leaf: body cabinet_0/door; below the worktop and on the wall
+// oven_0        oven_0/hinge       oven_0/door, hinged at the bottom
 //   fridge_0      fridge_0/hinge     fridge_0/door; below it freezer_0, freezer_0/door
 //   microwave_0   microwave_0/hinge  microwave_0/door
 //
-// Each leaf has a geom <thing>/handle. Geoms worktop_0 .. are level, objects may stand on them.
+// Each leaf has a geom <thing>/handle. Geoms worktop_0 .. are level surfaces for objects.
 Generator kitchen_generator();
 
 }  // namespace mjsense

@@ -8,13 +8,13 @@
 namespace mjsense {
 namespace {
 
-constexpr double kPanel = 0.018;  // m, boards
+constexpr double kPanel = 0.018;  // m, thickness of boards
 constexpr double kGap = 0.003;    // m, between fronts
 constexpr char kSlide[] = "damping=\"6\" frictionloss=\"1.5\" armature=\"0.05\"";
 constexpr char kHinge[] = "damping=\"0.35\" frictionloss=\"0.25\" armature=\"0.01\"";
 constexpr char kLight[] = "density=\"450\"";
 
-// The boards of a box that is open at the front, from x = kPanel to `deep`.
+// The boards of a box with an open front, from x = kPanel to `deep`.
 void carcass(RoomText& room, std::string_view material, double y0, double wide, double z0,
              double z1, double deep) {
   const double x = (kPanel + deep) / 2, hx = (deep - kPanel) / 2, t = kPanel / 2;
@@ -26,7 +26,7 @@ void carcass(RoomText& room, std::string_view material, double y0, double wide, 
   room.box("", material, {deep - t, y, z}, {t, wide / 2 - kPanel, hz - kPanel});
 }
 
-// A leaf that hangs on a vertical hinge. It fills y0 .. y0 + wide, z0 .. z1 at x = 0 .. kPanel.
+// A leaf on a vertical hinge. It fills y0 .. y0 + wide, z0 .. z1 at x = 0 .. kPanel.
 struct Leaf {
   std::string thing;
   double x = 0, y0 = 0, wide = 0, z0 = 0, z1 = 0;
@@ -77,7 +77,7 @@ void write_drawer_unit(RoomText& room, KitchenStyle& style, Rng& rng, double y0,
   const double bottom = style.plinth, top = style.carcass_top();
   carcass(room, "carcass", y0, wide, bottom, top, style.deep);
   room.box("", "plinth", {0.07, y0 + wide / 2, bottom / 2}, {0.01, wide / 2, bottom / 2});
-  // The highest is shallower where there are more than two.
+  // If there are more than two drawers, the top one is shallower.
   const double first = drawers > 2 ? rng.uniform(0.16, 0.2) : (top - bottom) / drawers;
   const double rest = drawers > 1 ? (top - bottom - first) / (drawers - 1) : 0;
   double z1 = top;
@@ -135,7 +135,7 @@ void write_wall_cabinet(RoomText& room, KitchenStyle& style, Rng& rng, double y0
   const double x = style.deep + 0.02 - style.wall_deep;
   const int leaves = wide > 0.6 ? 2 : 1;
   const bool at_y0 = rng.below(2) == 0;
-  // Its boards stand in a frame of their own, moved to the wall.
+  // Its boards are in a frame that is moved to the wall.
   room.open_body("", {x, 0, 0});
   carcass(room, "carcass", y0, wide, style.wall_low, style.wall_high, style.wall_deep);
   room.box("", "carcass",
@@ -247,7 +247,7 @@ void write_microwave(RoomText& room, const KitchenStyle& style, double middle) {
   room.open_body("microwave_0", {x, 0, 0});
   const double t = 0.012;
   const Vec3 centre{deep / 2, middle, z + high / 2};
-  const double my = middle + door / 2;  // of the part beside the door
+  const double my = middle + door / 2;  // of the part next to the door
   room.box("", "appliance", {deep / 2, middle, z + t / 2}, {deep / 2, wide / 2, t / 2});
   room.box("", "appliance", {deep / 2, middle, z + high - t / 2}, {deep / 2, wide / 2, t / 2});
   room.box("", "appliance", {deep / 2, y0 + t / 2, centre.z}, {deep / 2, t / 2, high / 2 - t});

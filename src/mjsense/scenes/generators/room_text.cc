@@ -17,7 +17,7 @@ std::string gloss_text(Gloss gloss) {
                      gloss.shininess, gloss.reflectance);
 }
 
-// Axes (x to the right, y up in the picture, z out of the side) of a side that faces there.
+// Axes of a side that faces this direction: x to the right and y up in the texture, z outwards.
 const char* axes(Facing facing) {
   switch (facing) {
     case Facing::kUp:
@@ -76,7 +76,7 @@ void RoomText::texture(std::string_view name, std::string png, bool wrapped) {
 
 void RoomText::tiled(std::string_view name, std::string png, double metres, Gloss gloss) {
   texture(name, std::move(png), false);
-  // With texuniform a texture repeats so often in a metre.
+  // With texuniform, texrepeat is the number of repetitions per metre.
   assets_ += fmt::format(
       "<material name=\"{0}\" texture=\"{0}\" texuniform=\"true\" texrepeat=\"{1} {1}\" {2}/>\n",
       name, 1 / metres, gloss_text(gloss));

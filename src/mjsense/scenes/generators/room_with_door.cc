@@ -20,7 +20,7 @@ constexpr double kWindow = 1.2;                // m wide
 
 struct Sizes {
   double front, back;  // m, depth of the rooms at x < 0 and x > 0
-  double left, right;  // m, from the middle of the door to the walls at y > 0 and y < 0
+  double left, right;  // m, from the centre of the door to the walls at y > 0 and y < 0
 };
 
 void write_shell_of(Building& out, const Sizes& s, const HingedDoor& door) {
@@ -90,7 +90,7 @@ ModelSource make(House& house, SceneFileCfg& cfg) {
     out.cylinder({x, mid, kHeight - 0.03}, 0.16, 0.03, "shade", false);
   }
 
-  // Along the far walls, out of the way of who opens the door: x, y on the wall's face, yaw.
+  // At the far walls, outside of the space needed to open the door: x, y on the wall's face, yaw.
   const double f = -s.front + 0.06, b = s.back - 0.06, l = s.left - 0.06, r = -s.right + 0.06;
   const auto stand = [&](Furniture piece, const char* name, double x, double y, double yaw) {
     Building::Local local(out, name, {x, y, 0}, yaw);

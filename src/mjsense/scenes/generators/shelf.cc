@@ -15,7 +15,7 @@ constexpr Colour kSpines[] = {{0.55, 0.18, 0.16}, {0.16, 0.27, 0.42}, {0.22, 0.3
                               {0.78, 0.66, 0.36}, {0.85, 0.82, 0.74}, {0.30, 0.22, 0.32},
                               {0.80, 0.45, 0.22}, {0.20, 0.20, 0.22}};
 
-// A row of books from y0 on, about `length` long, their backs at `x`; returns how many.
+// A row of books from y0, about `length` long, with their backs at `x`. Returns their number.
 void books(RoomText& room, Rng& rng, double x, double y0, double length, double z, double most) {
   double y = y0;
   while (true) {
@@ -49,7 +49,7 @@ ModelSource make(House& house, SceneFileCfg& cfg) {
                step = rng.uniform(0.34, 0.40);
   constexpr int kBoards = 3;
   constexpr double kThick = 0.022;
-  constexpr double kClear = 0.075;  // m, half of the longest thing
+  constexpr double kClear = 0.075;  // m, half of the longest object
   const double back = front + deep;
   ShellCfg shell{.x0 = -2.4, .x1 = back + 0.03, .y0 = -2.2, .y1 = 2.2, .window_x = -1.2};
   write_shell(room, shell);
@@ -62,7 +62,8 @@ ModelSource make(House& house, SceneFileCfg& cfg) {
   room.box("case_back", "case", {back + 0.008, 0, (top + kThick) / 2},
            {0.006, wide / 2, (top + kThick) / 2});
   room.box("plinth", "case", {front + 0.02, 0, 0.05}, {0.01, wide / 2, 0.05});
-  for (int i = -1; i <= kBoards; ++i) {  // the lowest stands near the floor, the highest is the top
+  // the lowest board is near the floor, the highest is the top
+  for (int i = -1; i <= kBoards; ++i) {
     const double z = i < 0 ? 0.1 : lowest + i * step;
     const std::string name = i < 0          ? "foot_board"
                              : i == kBoards ? "case_top"
@@ -70,7 +71,7 @@ ModelSource make(House& house, SceneFileCfg& cfg) {
     room.box(name, "case", {front + deep / 2, 0, z - kThick / 2}, {deep / 2, wide / 2, kThick / 2},
              "friction=\"0.9 0.005 0.0002\"");
   }
-  // Books below and above what the arm reaches, and at one end of a board.
+  // Books below and above the arm's reach, and at one end of a board.
   const double inside = front + 0.06;
   const double low_row = rng.uniform(0.5, 0.93) * wide;
   room.open_body("books_low", {});
@@ -83,12 +84,12 @@ ModelSource make(House& house, SceneFileCfg& cfg) {
   const int with_books = static_cast<int>(rng.below(kBoards));
   const double taken = 0.2 * wide;
   books(room, rng, inside, wide / 2 - taken, taken - 0.01, lowest + with_books * step, step - 0.06);
-  // A plant beside the case.
+  // A plant next to the bookcase.
   const double side = rng.below(2) == 0 ? 1 : -1, px = back - 0.22, py = side * (wide / 2 + 0.4);
   room.open_body("plant", {px, py, 0});
   room.cylinder("plant", "pot", {0, 0, 0}, {0, 0, 0.28}, 0.14);
   constexpr int kLeaves = 16;
-  for (int i = 0; i < kLeaves; ++i) {  // they lean away from the middle, not into the wall
+  for (int i = 0; i < kLeaves; ++i) {  // leaves lean away from the centre, not into the wall
     double turn = 2.4 * i;
     const double lean = rng.uniform(0.1, 0.55), half = rng.uniform(0.2, 0.36);
     const Vec3 out{std::cos(turn), std::sin(turn), 0};
@@ -101,7 +102,7 @@ ModelSource make(House& house, SceneFileCfg& cfg) {
   room.close_body();
 
   for (int i = 0; i < kBoards; ++i) {
-    // The longest thing lies across, and touches neither sides, nor back, nor books.
+    // The longest object, lying across, touches neither the sides nor the back nor the books.
     const double y1 = wide / 2 - kClear - (i == with_books ? taken : 0.0);
     SceneRegionCfg region;
     region.name = fmt::format("board_{}", i);

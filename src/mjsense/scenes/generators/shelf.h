@@ -5,8 +5,8 @@
 
 namespace mjsense {
 
-// A bookcase against a wall. Geoms board_0 .. board_N-1, the lowest first: level, objects may stand
-// on them; books_*, plant and picture are part of the house.
+// A bookcase at a wall. Geoms board_0 .. board_N-1, from the lowest to the highest, are level
+// surfaces for objects. books_*, plant and picture belong to the house.
 Generator shelf_generator();
 
 }  // namespace mjsense

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Floor, ceiling, walls, skirting boards, lamp and window of a room.
+// Shell of a room: floor, ceiling, walls, skirting boards, lamp and window.
 #include <fmt/format.h>
 
 #include "mjsense/scenes/generators/room_text.h"
@@ -14,7 +14,7 @@ void skirting(RoomText& room, const ShellCfg& s, Vec3 middle, Vec3 half) {
   room.box("", s.skirting, middle, half, "contype=\"0\" conaffinity=\"0\"");
 }
 
-// The wall at y1 with a window: four pieces around the opening, frame, sill, and the sky behind.
+// The wall at y1 with a window: four pieces around the opening, frame, sill, and the sky behind it.
 void window_wall(RoomText& room, const ShellCfg& s) {
   const double left = s.window_x - s.window_wide / 2, right = s.window_x + s.window_wide / 2;
   const double top = s.sill + s.window_high, y = s.y1;
@@ -63,8 +63,8 @@ void write_shell(RoomText& room, const ShellCfg& s) {
   skirting(room, s, {x, s.y0 + t, h}, {wide / 2, t, h});
   skirting(room, s, {x, s.y1 - t, h}, {wide / 2, t, h});
 
-  // A lamp below the ceiling gives the light with shadows; daylight comes from the window without
-  // any, as from a whole sky.
+  // The lamp below the ceiling casts shadows. Daylight from the window casts none, like light from
+  // a whole sky.
   room.box("", "lamp_glass", {x, y, s.height - 0.02}, {0.22, 0.22, 0.02},
            "contype=\"0\" conaffinity=\"0\"");
   room.add(

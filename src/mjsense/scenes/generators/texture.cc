@@ -18,12 +18,12 @@ std::uint32_t hash(std::uint32_t x, std::uint32_t y, std::uint32_t seed) {
   return h ^ (h >> 15);
 }
 
-// [0, 1), of a cell.
+// Random number in [0, 1) of a grid cell.
 double cell(int x, int y, std::uint32_t seed) {
   return hash(static_cast<std::uint32_t>(x), static_cast<std::uint32_t>(y), seed) * 0x1.0p-32;
 }
 
-// Smooth noise in [0, 1) with `nx` x `ny` cells, u and v in [0, 1), continued at the edges.
+// Smooth noise in [0, 1) with `nx` x `ny` cells; u and v in [0, 1). Periodic.
 double noise(double u, double v, int nx, int ny, std::uint32_t seed) {
   const double x = u * nx, y = v * ny;
   const int x0 = static_cast<int>(std::floor(x)), y0 = static_cast<int>(std::floor(y));
@@ -35,7 +35,7 @@ double noise(double u, double v, int nx, int ny, std::uint32_t seed) {
   return std::lerp(std::lerp(at(0, 0), at(1, 0), s), std::lerp(at(0, 1), at(1, 1), s), t);
 }
 
-// Several of them, each finer and weaker: about [0, 1].
+// Sum of several noises with increasing frequency and decreasing weight; about [0, 1].
 double cloud(double u, double v, int nx, int ny, int octaves, std::uint32_t seed) {
   double sum = 0, weight = 0.5, total = 0;
   for (int i = 0; i < octaves; ++i) {
@@ -46,7 +46,7 @@ double cloud(double u, double v, int nx, int ny, int octaves, std::uint32_t seed
   return sum / total;
 }
 
-// Grain of a board: -1 .. 1; lines run along u.
+// Wood grain in [-1, 1], with lines along u.
 double grain(double u, double v, std::uint32_t seed) {
   const double bend = 0.06 * (noise(u, v, 2, 6, seed) - 0.5);
   const double rings =
@@ -93,7 +93,7 @@ std::string wood_png(Colour colour, std::uint32_t seed, int size) {
 std::string planks_png(Colour colour, int boards, std::uint32_t seed, int size) {
   return picture(size, [&](double u, double v) {
     const int row = std::min(boards - 1, static_cast<int>(v * boards));
-    // Two boards a row, their ends somewhere else in each.
+    // Two boards per row, whose ends are shifted by a different amount in each row.
     double along = u + cell(row, 0, seed);
     along -= std::floor(along);
     const int half = along < 0.5 ? 0 : 1;
