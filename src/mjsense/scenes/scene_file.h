@@ -132,7 +132,9 @@ struct SceneVaryCfg {
 };
 template <class V>
 void visit_fields(V& v, SceneVaryCfg& c) {
-  v.object("SceneVaryCfg", "What is randomised in every episode; all draws are uniform.");
+  v.object("SceneVaryCfg",
+           "Randomisation of lights, materials, geoms or bodies in every episode; all draws are "
+           "uniform.");
   v("what", c.what,
     "Type of the elements: lights, materials, geoms (without a material) or bodies that do not "
     "move.")
