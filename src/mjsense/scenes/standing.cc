@@ -18,6 +18,7 @@ using std::numbers::pi;
 constexpr int kGrid = 3;                     // points along each side of a target area
 constexpr double kHeights[] = {0.06, 0.15};  // m, tool height above the target area
 constexpr double kTilts[] = {0, 45};         // degrees from vertical
+constexpr double kAnyTilts[] = {0, 45, 90};  // for the test whether a region is reachable at all
 constexpr double kStep = 0.05;               // m, between two base positions
 constexpr int kBack = 4, kAhead = 8;         // steps
 constexpr double kEnough = 0.95;             // fraction of the points
@@ -59,12 +60,13 @@ RobotValues start_of(const mjModel* model, const Robot& robot, bool stooped = fa
 }
 
 // Fraction of the approach orientations at a point that a hand can reach; maximum over the hands.
-double ways_to(const Robot& robot, const RobotValues& start, const Pose& base, Vec3 point) {
+double ways_to(const Robot& robot, const RobotValues& start, const Pose& base, Vec3 point,
+               std::span<const double> tilts) {
   double best = 0;
   for (std::size_t g = 0; g < robot.groups().size(); ++g) {
     if (robot.groups()[g].kind != GroupKind::kArm || robot.groups()[g].leaf_site < 0) continue;
     int reached = 0, ways = 0;
-    for (double tilt : kTilts) {
+    for (double tilt : tilts) {
       for (int quarter = 0; quarter < 2; ++quarter, ++ways) {
         // Pointing down, tilted outwards by `tilt`, with the fingers in one of two perpendicular
         // directions.
@@ -99,10 +101,10 @@ class Search {
     }
   }
 
-  Reached reached(const Pose& base) const {
+  Reached reached(const Pose& base, std::span<const double> tilts = kTilts) const {
     Reached out;
     for (Vec3 p : points_) {
-      const double ways = ways_to(robot_, start_, base, p);
+      const double ways = ways_to(robot_, start_, base, p, tilts);
       out.points += ways > 0;
       out.ways += ways;
       out.point.push_back(ways > 0);
@@ -241,8 +243,7 @@ Standing::Standing(const mjModel* model, Robot& robot, EpisodeScene& scene) {
   if (there.points >= kEnough) return;
   double best = there.ways;
   upright.improve(base, best, offset_);
-  const Reached here = upright.reached(base * offset_);
-  if (here.points >= kEnough) return;
+  if (upright.reached(base * offset_).points >= kEnough) return;
   const auto stoops = [](const MoveGroupCfg& group) { return !group.stooped.empty(); };
   if (std::ranges::any_of(robot.cfg().groups, stoops)) {
     const Search stooped(model, robot, scene, surface, true);
@@ -252,11 +253,11 @@ Standing::Standing(const mjModel* model, Robot& robot, EpisodeScene& scene) {
     if (lower > best) {
       offset_ = offset;
       robot.stoop();
-      limit_targets(stooped.reached(base * offset_), scene);
+      limit_targets(stooped.reached(base * offset_, kAnyTilts), scene);
       return;
     }
   }
-  limit_targets(here, scene);
+  limit_targets(upright.reached(base * offset_, kAnyTilts), scene);
 }
 
 }  // namespace mjsense
