@@ -403,7 +403,7 @@ class Sensor(Generic[T]):
 
     def _mjs_row(self, world: int) -> Any:
         """The present value of one world, for the taker to keep."""
-        value = self.data
+        value: Any = self.data
         if self._mjs_fields and not self.is_dict:
             return nested(self._mjs_fields, [np.array(array[world]) for array in leaves(value, self._mjs_fields)])
         return copy.copy(value[world])
