@@ -218,7 +218,8 @@ void EpisodeScene::initialize(const mjModel* model, int num_worlds, std::string_
 
 void EpisodeScene::bind(Simulation& simulation) {
   simulation_ = &simulation;
-  if (!cfg_.vary.empty()) look_ = std::make_unique<Look>(cfg_.vary, simulation, place());
+  if (!cfg_.vary.empty())
+    variation_ = std::make_unique<SceneVariation>(cfg_.vary, simulation, place());
   make_sizes();
 }
 
@@ -324,7 +325,7 @@ void EpisodeScene::find_regions() {
 // As what carries them stands in this world.
 std::vector<Region> EpisodeScene::regions_of(int world) const {
   std::vector<Region> regions = regions_;
-  const double* here = look_ ? look_->body_pos(world) : model_->body_pos;
+  const double* here = variation_ ? variation_->body_pos(world) : model_->body_pos;
   if (here == model_->body_pos) return regions;
   for (std::size_t i = 0; i < regions.size(); ++i) {
     Vec3 move;
@@ -341,7 +342,7 @@ std::vector<Region> EpisodeScene::regions_of(int world) const {
   return regions;
 }
 
-// As Look does: of two that name a body the second counts.
+// As SceneVariation does: of two that name a body the second counts.
 void EpisodeScene::find_furniture() {
   furniture_.clear();
   for (const SceneVaryCfg& one : cfg_.vary) {
@@ -490,14 +491,14 @@ void EpisodeScene::set_target(int world, int target, const StateRow& state) {
 }
 
 bool EpisodeScene::vary(int world, std::uint64_t seed, std::uint64_t episode) {
-  if (look_) {
+  if (variation_) {
     Rng rng(seed, 0, stream_of("scene/look"), episode);
-    look_->vary(world, rng);
+    variation_->vary(world, rng);
   }
   draw_sizes(world, seed, episode);
   const std::size_t n = objects_.size();
   if (sizes_) sizes_->set(world, std::span(steps_).subspan(world * n, n));
-  return look_ || sizes_;
+  return variation_ || sizes_;
 }
 
 void EpisodeScene::draw_sizes(int world, std::uint64_t seed, std::uint64_t episode) {

@@ -7,7 +7,7 @@
 #include <cstddef>
 #include <cstdint>
 
-#include "mjsense/render/view/look.h"
+#include "mjsense/render/view/surface_assets.h"
 
 namespace mjsense {
 
@@ -58,7 +58,7 @@ struct alignas(64) ViewGeom {
   void* bvh;    // RTCScene of a mesh, a height field's surface, a flex, a skin; else null
   const Clusters* clusters;  // the same triangles to be drawn; null: rays only
   const Horizons* horizons;  // of its faces; null without clusters
-  const MeshLook* mesh;
+  const MeshSurface* mesh;
   const HeightField* height_field;
   Surface surface;
 };

@@ -23,10 +23,10 @@ struct GeneratorParameter {
   std::string_view sentence;  // what it is
 };
 
-// The house that a generator is asked for.
-struct House {
+// What a generator may use: the house number and everything derived from it.
+struct GeneratorInput {
   std::uint64_t number = 0;
-  Rng rng;                         // of generator and number
+  Rng rng;                         // seeded by the generator's name and `number`
   std::vector<double> parameters;  // in the order in which the generator lists them
 };
 
@@ -36,8 +36,8 @@ struct Generator {
   std::vector<GeneratorParameter> parameters;
   // Makes the first entity of the scene, called `room`: its model's names are "room/...". May add to
   // `cfg` what belongs to the house: regions, objects, where the robot stands, what varies. A
-  // function of `house` alone.
-  ModelSource (*make)(House& house, SceneFileCfg& cfg);
+  // function of `input` alone.
+  ModelSource (*make)(GeneratorInput& input, SceneFileCfg& cfg);
 };
 
 // The table of ours.

@@ -12,11 +12,11 @@
 
 namespace mjsense {
 
-class Look {
+class SceneVariation {
  public:
   // Throws KeyError for a pattern that matches nothing and for a texture that there is not, ValueError for a body that
   // moves; `place` starts its message.
-  Look(std::vector<SceneVaryCfg> cfg, Simulation& simulation, std::string_view place);
+  SceneVariation(std::vector<SceneVaryCfg> cfg, Simulation& simulation, std::string_view place);
 
   bool varies() const { return !parts_.empty(); }
   // This world's body_pos; the model's where no body stands anywhere else.

@@ -27,7 +27,7 @@ struct Texture {
 };
 
 // Per face of a mesh, flex or skin, by face index. Null where there is none.
-struct MeshLook {
+struct MeshSurface {
   const float* normals = nullptr;  // [F, 3 corners, 3]
   const float* uvs = nullptr;      // [F, 3 corners, 2]
   const float* density = nullptr;  // [F] texture units per metre
@@ -38,33 +38,33 @@ struct MeshTables {
   std::vector<float> normals;  // [F, 3 corners, 3]
   std::vector<float> uvs;      // [F, 3 corners, 2]
   std::vector<float> density;  // [F]
-  MeshLook look() const;
+  MeshSurface surface() const;
 };
 
-class Look {
+class SurfaceAssets {
  public:
   // `meshes`: prepare all of them, shown or not, as a world may give a geom another one or another
   // group; false for views that need no normals.
-  Look(const mjModel* model, bool meshes, bool textures);
-  Look(const Look&) = delete;
-  Look& operator=(const Look&) = delete;
+  SurfaceAssets(const mjModel* model, bool meshes, bool textures);
+  SurfaceAssets(const SurfaceAssets&) = delete;
+  SurfaceAssets& operator=(const SurfaceAssets&) = delete;
 
   const Texture* texture(int id) const { return id < 0 ? nullptr : &textures_[id]; }
-  const MeshLook* mesh(int id) const { return &meshes_[id]; }
+  const MeshSurface* mesh(int id) const { return &meshes_[id]; }
   // Without normals, which move.
-  const MeshLook* flex_part(int index) const { return &flex_parts_[index]; }  // of flex_parts()
+  const MeshSurface* flex_part(int index) const { return &flex_parts_[index]; }  // of flex_parts()
   int num_flex_parts() const { return static_cast<int>(flex_parts_.size()); }
-  const MeshLook* skin(int id) const { return &skins_[id]; }
+  const MeshSurface* skin(int id) const { return &skins_[id]; }
   const Texture* skybox() const { return skybox_; }  // null if the model has none
 
  private:
   void add_texture(const mjModel* model, int id);
   void add_flex(const mjModel* model, int id, bool textures);
   void add_skin(const mjModel* model, int id);
-  void keep(std::shared_ptr<const MeshTables> tables, MeshLook& look);
+  void keep(std::shared_ptr<const MeshTables> tables, MeshSurface& surface);
 
   std::vector<Texture> textures_;
-  std::vector<MeshLook> meshes_, flex_parts_, skins_;
+  std::vector<MeshSurface> meshes_, flex_parts_, skins_;
   std::vector<std::vector<std::uint32_t>> texels_;
   std::vector<std::shared_ptr<const MeshTables>> tables_;  // of meshes the process's, by content
   const Texture* skybox_ = nullptr;
