@@ -104,7 +104,7 @@ def function_name(words: list[str]) -> str | None:
             if depth == 0:
                 flat = flat[i + 1 :]
                 break
-    if "static" in flat or "friend" in flat or "=" in flat[: flat.index("(") if "(" in flat else None]:
+    if "static" in flat or "friend" in flat or ("=" in flat[: flat.index("(") if "(" in flat else None] and "operator" not in flat):
         return None
     depth = 0
     for i, word in enumerate(flat):
@@ -115,7 +115,7 @@ def function_name(words: list[str]) -> str | None:
                 name = " ".join(flat[j:i])
             elif not re.match(r"[A-Za-z_]\w*$", name) or name in NOT_A_NAME:
                 return None
-            elif name.isupper():
+            elif name.isupper() and "_" in name:
                 return None  # a macro
             while j > 1 and flat[j - 1] == "::":  # a member: Class::name
                 if flat[j - 2] == ">":
@@ -177,7 +177,7 @@ def definitions(text: str, file: str) -> list[Definition]:
                 continue
             if kind and "(" not in plain and "=" not in plain:
                 # The name may be qualified (`struct Recorder::Impl {`); bases follow a colon. Specialisations are left out.
-                name = re.match(r"(?:\w+::)*\w+|", "".join(w for w in plain[plain.index(kind) + 1 :] if w not in TYPE))[0]
+                name = re.match(r"(?:\w+::)*\w+|", "".join(w for w in plain[plain.index(kind) + 1 :] if w not in TYPE | {"final"}))[0]
                 if name and head[:3] != ["template", "<", ">"]:
                     add(f"type {name}")
                 # Members of `struct X {...} variable;` end at the semicolon.
@@ -191,7 +191,7 @@ def definitions(text: str, file: str) -> list[Definition]:
                         i += 1
                 add(name)
                 head = []
-            elif "=" in head or "(" not in head:
+            elif ("=" in head and "operator" not in head) or "(" not in head:
                 head.append("{}")  # an initialiser: its semicolon ends it
                 continue
             head = []
@@ -228,9 +228,9 @@ def duplicates(found: list[Definition]) -> list[str]:
     ]
 
 
-def main() -> int:
+def main(arguments: list[str]) -> int:
     found: list[Definition] = []
-    for folder in sys.argv[1:] or FOLDERS:
+    for folder in arguments or FOLDERS:
         for path in sorted((ROOT / folder).rglob("*")):
             if path.suffix in (".h", ".cc"):
                 name = path.relative_to(ROOT).as_posix() if path.is_relative_to(ROOT) else str(path)
@@ -241,4 +241,4 @@ def main() -> int:
 
 
 if __name__ == "__main__":
-    sys.exit(main())
+    sys.exit(main(sys.argv[1:]))
