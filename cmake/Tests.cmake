@@ -24,7 +24,7 @@ endforeach()
 
 # Bits that must not change unnoticed: tests/golden, once for each instruction set that the kernels are compiled for. Other
 # optimisation than users get, and another compiler, give other bits.
-if(CMAKE_CXX_COMPILER_ID STREQUAL "GNU" AND NOT CMAKE_CXX_FLAGS MATCHES "-fsanitize")
+if(CMAKE_CXX_COMPILER_ID STREQUAL "GNU" AND NOT CMAKE_CXX_FLAGS MATCHES "-fsanitize" AND NOT CMAKE_BUILD_TYPE STREQUAL "Debug")
   set(MJSENSE_GOLDEN_FILE ${PROJECT_SOURCE_DIR}/tests/golden/hashes.txt)
   add_executable(golden_test tests/golden/golden_test.cc)
   target_link_libraries(golden_test PRIVATE mjsense ${MJSENSE_PRIVATE_LIBS})

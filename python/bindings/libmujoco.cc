@@ -13,6 +13,7 @@
 #include <string>
 #include <vector>
 
+#include "mjsense/core/mujoco_call.h"
 #include "mjsense/scene/mujoco_log.h"
 #include "python/bindings/bindings.h"
 
@@ -63,11 +64,11 @@ class Comparison {
 // mjModel and mjData end with the same number, which compilation gives to both.
 bool model_and_data_agree() {
   const std::unique_ptr<mjSpec, decltype(&mj_deleteSpec)> spec(mj_makeSpec(), &mj_deleteSpec);
-  const std::unique_ptr<mjModel, decltype(&mj_deleteModel)> model(mj_compile(spec.get(), nullptr),
-                                                                  &mj_deleteModel);
+  const std::unique_ptr<mjModel, decltype(&mj_deleteModel)> model(
+      call_mujoco(mj_compile, spec.get(), nullptr), &mj_deleteModel);
   if (!model) return false;
-  const std::unique_ptr<mjData, decltype(&mj_deleteData)> data(mj_makeData(model.get()),
-                                                               &mj_deleteData);
+  const std::unique_ptr<mjData, decltype(&mj_deleteData)> data(
+      call_mujoco(mj_makeData, model.get()), &mj_deleteData);
   return data && model->signature != 0 && model->signature == data->signature;
 }
 

@@ -13,6 +13,7 @@
 #include "mjsense/app/schema.h"
 #include "mjsense/core/embedded.h"
 #include "mjsense/core/error.h"
+#include "mjsense/core/mujoco_call.h"
 #include "mjsense/core/plain_file.h"
 #include "python/bindings/bindings.h"
 #include "python/bindings/callbacks.h"
@@ -222,7 +223,7 @@ void bind_scene(nb::module_& m) {
       .def(
           "copy_model",
           [](const Scene& s) {
-            return reinterpret_cast<std::uintptr_t>(mj_copyModel(nullptr, s.model()));
+            return reinterpret_cast<std::uintptr_t>(call_mujoco(mj_copyModel, nullptr, s.model()));
           },
           "Address of a copy of the mjModel, which the caller owns.")
       .def("sensors",

@@ -7,6 +7,7 @@
     python tests/mutation/run.py --judge pytest scan-in-world    ask this judge alone
     python tests/mutation/run.py --check          only whether every mutant still applies
     python tests/mutation/run.py --report         the figures so far, and who survived
+    python tests/mutation/run.py --draw 60 --seed 1 [ROOMS]    mutants that draw.py makes, asked of their room's own tests
 
 The copy is build/mutation/tree with a build folder of its own; results are kept in build/mutation/results.json. A mutant is
 noticed by the first judge that fails: its room's test program, then the golden hashes, then the other rooms' programs, those that
@@ -16,9 +17,11 @@ build on it first, then the Python tests that could know. --prefix puts a comman
 import argparse
 import dataclasses
 import hashlib
+import importlib.util
 import json
 import os
 import re
+import resource
 import shutil
 import signal
 import subprocess
@@ -46,6 +49,8 @@ PYTESTS = {
     "python": ["tests/python", "tests/conformance"],
 }
 LIMIT_S = 600  # a judge that takes longer has noticed: nothing takes a tenth of this
+MEMORY = 16 << 30  # bytes of address space of a test: a mutant may allocate without end
+DRAWN = WORK / "drawn.json"
 
 
 class Failure(Exception):
@@ -59,6 +64,7 @@ class Mutant:
     what: str
     old: str
     new: str
+    line: int = 0  # where `old` is that whole line; 0: `old` stands once in the file
     tested_in: str = ""  # the room whose tests know it, if not its own: interfaces are tested where something implements them
 
     @property
@@ -84,6 +90,12 @@ class Mutant:
         if not path.is_file():
             raise Failure(f"{self.id}: there is no {self.file}")
         text = path.read_text()
+        if self.line:
+            lines = text.split("\n")
+            if lines[self.line - 1] != self.old:
+                raise Failure(f"{self.id}: line {self.line} of {self.file} is another one")
+            lines[self.line - 1] = self.new
+            return "\n".join(lines)
         found = text.count(self.old)
         if found != 1:
             raise Failure(f"{self.id}: its text stands {found} times in {self.file}, expected once:\n{self.old}")
@@ -131,16 +143,22 @@ def copy_tree() -> None:
         venv.symlink_to((ROOT / ".venv").resolve())
 
 
-class Runner:
-    def __init__(self, prefix: list[str], jobs: int) -> None:
-        self.prefix, self.jobs = prefix, jobs
+def limit_memory() -> None:
+    resource.setrlimit(resource.RLIMIT_AS, (MEMORY, MEMORY))
+    resource.setrlimit(resource.RLIMIT_CORE, (0, 0))
 
-    def run(self, command: list[str], limit: float = LIMIT_S, **env: str) -> tuple[int, str]:
-        """Exit status (None: took too long) and output."""
+
+class Runner:
+    def __init__(self, prefix: list[str], jobs: int, limit: float = LIMIT_S) -> None:
+        self.prefix, self.jobs, self.limit = prefix, jobs, limit
+
+    def run(self, command: list[str], limit: float = 0, **env: str) -> tuple[int, str]:
+        """Exit status (-SIGKILL: took too long) and output. Without a limit of its own it is a test, with the limit of tests."""
         process = subprocess.Popen([*self.prefix, *command], cwd=TREE, env={**os.environ, **env}, stdout=subprocess.PIPE,
-                                   stderr=subprocess.STDOUT, text=True, errors="replace", start_new_session=True)
+                                   stderr=subprocess.STDOUT, text=True, errors="replace", start_new_session=True,
+                                   preexec_fn=None if limit else limit_memory)
         try:
-            out = process.communicate(timeout=limit)[0]
+            out = process.communicate(timeout=limit or self.limit)[0]
         except subprocess.TimeoutExpired:
             os.killpg(process.pid, signal.SIGKILL)
             return -signal.SIGKILL, process.communicate()[0]
@@ -191,7 +209,7 @@ class Runner:
 
     def baseline(self, rooms: set[str], own: bool) -> None:
         """Without a mutant nothing may fail."""
-        self.build(["all"])
+        self.build([t for room in sorted(rooms) for t in next(self.judges(room))[1]] if own else ["all"])
         passed = set()
         for room in sorted(rooms, key=ROOMS.index):
             for i, (name, _, judge) in enumerate(self.judges(room)):
@@ -226,6 +244,49 @@ class Runner:
             path.write_text(original)
 
 
+def drawn(rooms: list[str], count: int, seed: int) -> list[Mutant]:
+    spec = importlib.util.spec_from_file_location("mutation_draw", HERE / "draw.py")
+    draw = sys.modules["mutation_draw"] = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(draw)
+    found = []
+    for _, site in draw.draw(ROOT, rooms, count, seed):
+        file = str(site.file.relative_to(ROOT))
+        old = site.file.read_text().split("\n")[site.line - 1]
+        name = hashlib.sha256(f"{file}\0{old}\0{site.new}".encode()).hexdigest()[:8]
+        found.append(Mutant(f"{Path(file).name}:{site.line}:{name}", file, site.what, old, site.new, site.line))
+    return found
+
+
+def run_drawn(runner: Runner, mutants: list[Mutant]) -> int:
+    """Asks each room's own tests; a mutant that gives the same program to the bit changes nothing."""
+    results = json.loads(DRAWN.read_text()) if DRAWN.exists() else {}
+    due = [m for m in mutants if results.get(m.id, {}).get("digest") != m.digest]
+    runner.baseline({m.room for m in due}, own=True)
+    programs = {room: BUILD / f"{room}_test" for room in {m.room for m in due} & set(PROGRAMS)}
+    original = {room: hashlib.sha256(path.read_bytes()).hexdigest() for room, path in programs.items()}
+    for i, mutant in enumerate(due):
+        try:
+            result = runner.ask(mutant, own=True, only="")
+            path = programs.get(mutant.room)
+            same = not result["noticed"] and path and hashlib.sha256(path.read_bytes()).hexdigest() == original[mutant.room]
+            outcome = "noticed" if result["noticed"] else "same program" if same else "survived"
+        except Failure:
+            result, outcome = {}, "not compiled"
+        results[mutant.id] = {"digest": mutant.digest, "room": mutant.room, "outcome": outcome, **result}
+        DRAWN.write_text(json.dumps(results, indent=1))
+        print(f"[{i + 1}/{len(due)}] {mutant.file}:{mutant.line}: {mutant.what}: {outcome} {result.get('test', '')}", flush=True)
+    outcomes = ["noticed", "survived", "same program", "not compiled"]
+    mine = [(m, results[m.id]) for m in mutants]
+    print("| room | " + " | ".join(outcomes) + " |\n|" + " --- |" * (len(outcomes) + 1))
+    for room in [*[r for r in ROOMS if any(m.room == r for m in mutants)], ""]:
+        counts = [sum(r["outcome"] == o and room in ("", m.room) for m, r in mine) for o in outcomes]
+        print(f"| {room or 'all'} | " + " | ".join(map(str, counts)) + " |")
+    survivors = [m for m, r in mine if r["outcome"] == "survived"]
+    for m in survivors:
+        print(f"survived: {m.file}:{m.line}: {m.what}\n  - {m.old.strip()}\n  + {m.new.strip()}")
+    return 0
+
+
 def report(mutants: list[Mutant], results: dict) -> str:
     lines, survivors, total, noticed, own = [], [], 0, 0, 0
     for room in ROOMS:
@@ -254,6 +315,9 @@ def main() -> int:
     parser.add_argument("--judge", default="", help="ask this one only: pytest, golden, sensors_test ...")
     parser.add_argument("--no-baseline", action="store_true", help="trust that the tests pass without a mutant")
     parser.add_argument("--prefix", default="nice -n 10", help="before every build and test (%(default)s)")
+    parser.add_argument("--draw", type=int, default=0, help="so many mutants made by draw.py, spread over the rooms")
+    parser.add_argument("--seed", type=int, default=0, help="of --draw")
+    parser.add_argument("--limit", type=float, default=LIMIT_S, help="seconds for a judge; one that takes longer has noticed (%(default)s)")
     parser.add_argument("--jobs", type=int, default=os.cpu_count(), help="of a build (%(default)s)")
     options = parser.parse_args()
     mutants = load()
@@ -267,6 +331,14 @@ def main() -> int:
     if options.report:
         print(report(mutants, results))
         return 0
+    if options.draw:
+        if unknown := set(options.which) - set(ROOMS):
+            raise Failure(f"no such room: {', '.join(sorted(unknown))}; there are {', '.join(ROOMS)}")
+        WORK.mkdir(parents=True, exist_ok=True)
+        copy_tree()
+        runner = Runner(options.prefix.split(), options.jobs, options.limit)
+        runner.configure()
+        return run_drawn(runner, drawn(options.which or ROOMS, options.draw, options.seed))
     chosen = [m for m in mutants if not options.which or any(w == m.room if w in ROOMS else w in m.id for w in options.which)]
 
     def due(m: Mutant) -> bool:
@@ -278,7 +350,7 @@ def main() -> int:
     chosen = [m for m in chosen if due(m)]
     WORK.mkdir(parents=True, exist_ok=True)
     copy_tree()
-    runner = Runner(options.prefix.split(), options.jobs)
+    runner = Runner(options.prefix.split(), options.jobs, options.limit)
     runner.configure()
     if not options.no_baseline:
         runner.baseline({m.judged_in for m in chosen}, options.own)

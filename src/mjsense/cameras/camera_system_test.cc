@@ -21,7 +21,7 @@ using ::testing::HasSubstr;
 
 constexpr double kDeg = std::numbers::pi / 180;
 
-// A robot with a camera on a rotated body, a ball, and a wall at x = 0.4 m.
+// A robot with a camera on a turned body, a ball, a wall east of it, and far away a ball whose parent has no geom.
 constexpr char kXml[] = R"(
 <mujoco>
   <worldbody>
@@ -29,6 +29,7 @@ constexpr char kXml[] = R"(
     <geom name="floor" type="plane" size="3 3 .1" pos="0 0 -1"/>
     <body name="wall" pos=".4 0 0"><geom type="box" size=".01 2 2"/></body>
     <body name="ball"><geom type="sphere" size=".1"/></body>
+    <body name="stand" pos="-3 0 0"><body name="holder"><geom type="sphere" size=".1"/></body></body>
     <body name="robot_0/base" pos="0 0 .3" euler="0 0 90">
       <geom type="box" size=".01 .01 .01"/>
       <camera name="robot_0/eye" pos=".1 .2 .3" euler="10 20 30" fovy="50"/>
@@ -214,6 +215,21 @@ TEST(Visibility, BallCoversItsDisc) {
     EXPECT_NEAR(shares[0], share, .02 * share + 1e-4);
     EXPECT_GT(shares[1], 0);
   }
+}
+
+TEST(Visibility, ABodyIsVisibleThroughTheGeomsOfItsChildren) {
+  Bench bench(CameraSystemCfg{});
+  std::vector<double> shares;
+  const int bodies[] = {bench.body("stand"), bench.body("holder"), bench.body("ball")};
+  Hooks hooks([&](const World& w) {
+    bench.sim->rays().update(w);
+    shares = visible_shares(bench.sim->rays(), 0,
+                            {look_at({-3, -1, 0}, {-3, 0, 0}, {0, 0, 1}), 60, 160, 120}, bodies);
+  });
+  bench.sim->worlds().visit(all_worlds, hooks);
+  EXPECT_GT(shares[0], 0.01);
+  EXPECT_EQ(shares[0], shares[1]);
+  EXPECT_EQ(shares[2], 0);
 }
 
 TEST(CameraSystem, OrbitCamerasSeeTheObject) {

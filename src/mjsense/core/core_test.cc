@@ -55,6 +55,17 @@ TEST(Array, RowsAreDenseAlignedAndZero) {
   EXPECT_EQ(v.shape.str(), "(3, 2, 5)");
 }
 
+// A candidate is suggested if at most a third of the letters differ, or one of a short name.
+TEST(Errors, SuggestOnlyWhatIsNear) {
+  const auto near = [](const char* name, const char* candidate) {
+    return !nearest_names(name, std::vector<std::string>{candidate}).empty();
+  };
+  EXPECT_TRUE(near("abcdefghi", "abcdefxyz"));
+  EXPECT_FALSE(near("abcdefghi", "abcdewxyz"));
+  EXPECT_TRUE(near("ab", "ax"));
+  EXPECT_FALSE(near("ab", "xy"));
+}
+
 TEST(Errors, NameTheNearest) {
   const std::vector<std::string> names = {"robot/FR_foot", "robot/FL_foot", "terrain",
                                           "robot/trunk"};

@@ -19,7 +19,8 @@ TEST(Png, ADecoderFindsEveryPixelOfEveryKind) {
     std::vector<std::uint8_t> pixels(width * height * channels);
     for (std::size_t i = 0; i < pixels.size(); ++i)
       pixels[i] = static_cast<std::uint8_t>(i * i * 31 + 7);
-    const testing::Picture back = testing::decode_png(encode_png(pixels, width, height, channels));
+    const testing::DecodedPng back =
+        testing::decode_png(encode_png(pixels, width, height, channels));
     EXPECT_EQ(back.width, width);
     EXPECT_EQ(back.height, height);
     EXPECT_EQ(back.channels, channels);

@@ -205,6 +205,16 @@ TEST(BiasDrift, IsGaussMarkov) {
   }
 }
 
+// The bias of episode n is not drawn from the numbers of tick n.
+TEST(BiasDrift, TheFirstBiasIsIndependentOfTheTicks) {
+  BiasDrift drift;
+  drift.std = {1.0};
+  drift.time_constant_s = 1e-6;  // every row is drawn anew
+  Bench bench(one(drift), 1);
+  const float first = bench.feed(0, 0);  // of episode 1
+  EXPECT_NE(first, bench.feed(0, 1));
+}
+
 TEST(BiasDrift, WithoutTimeConstantIsARandomWalk) {
   BiasDrift walk;
   walk.density = {0.1};  // variance after t: 0.01 t
@@ -413,6 +423,30 @@ TEST(StepDelay, LagsAreUniformHeldAndShared) {
     if (t > 10) {
       ASSERT_EQ(t - x, lag);
     }
+  }
+}
+
+// A lag lasts `update_period` rows. Each world changes its lag at rows of its own, or all do at the same ones.
+TEST(StepDelay, TheUpdatePeriodHasAPhaseForEachWorld) {
+  constexpr int kWorlds = 40, kLags = 9, kUpdate = 5, kRows = 400;
+  for (const bool per_world : {true, false}) {
+    StepDelay delay(0, kLags);
+    delay.update_period = kUpdate;
+    delay.per_world_phase = per_world;
+    Bench bench(one(delay), 1, kWorlds);
+    std::set<int> phases;
+    for (int w = 0; w < kWorlds; ++w) {
+      std::set<int> of_world;
+      float before = -1;
+      for (int t = 0; t < kRows; ++t) {
+        const float lag = t - bench.feed(static_cast<float>(t), t, w);
+        if (t > kLags && lag != before) of_world.insert(t % kUpdate);
+        before = lag;
+      }
+      ASSERT_EQ(of_world.size(), 1u) << "world " << w;
+      phases.insert(*of_world.begin());
+    }
+    EXPECT_EQ(phases.size(), per_world ? kUpdate : 1u);
   }
 }
 

@@ -120,7 +120,7 @@ TEST(Frustum, CullingDoesNotChangeShadows) {
       const Eye e = eye({3.0 * (k % 3 - 1), 2.0 * (k % 5 - 2), 1.5}, 0.6 * k, -0.2 * (k % 3));
       expect_nothing_missed(s, e, pyramid);
       expect_nothing_missed(s, e, slab);
-      ViewBuilder builder(s.model.get(), *s.look, s.options);
+      ViewBuilder builder(s.model.get(), *s.assets, s.options);
       passed_by += s.view(builder, e.at, e.x, e.y, pyramid).num_geoms < s.model->ngeom;
       const Picture dark = s.take(e.at, e.x, e.y, pyramid);
       s.options.shadows = false;

@@ -333,7 +333,7 @@ TEST(FixedLayer, IsUsedWhileItsInputsAreUnchanged) {
   s.update();
   constexpr int kSize = 64;
   const PixelGrid grid = grid_from_fovy(kSize, kSize, 50, false);
-  ViewBuilder builder(s.model.get(), *s.look, s.options);
+  ViewBuilder builder(s.model.get(), *s.assets, s.options);
   FixedLayer layer(s.model.get(), kSize, kSize);
   const double h = std::sqrt(0.5);
   const auto build = [&]() -> const View& {  // at 45 degrees, looking at the middle of the floor
@@ -398,7 +398,7 @@ TEST(FixedLayer, WorldsThatLookTheSameShareALayer) {
   s.update();
   constexpr int kSize = 64;
   const PixelGrid grid = grid_from_fovy(kSize, kSize, 50, false);
-  ViewBuilder builder(s.model.get(), *s.look, s.options);
+  ViewBuilder builder(s.model.get(), *s.assets, s.options);
   const auto view_of = [&](float red) -> const View& {
     s.model->geom_rgba[0] = red;
     s.update();

@@ -46,7 +46,7 @@ class Sheet {
  public:
   explicit Sheet(const fs::path& png) {
     const std::string bytes = read_file(png);
-    Picture picture =
+    DecodedPng picture =
         decode_png({reinterpret_cast<const std::uint8_t*>(bytes.data()), bytes.size()});
     width_ = picture.width;
     height_ = picture.height;

@@ -11,6 +11,7 @@
 
 #include "mjsense/core/error.h"
 #include "mjsense/core/match.h"
+#include "mjsense/core/mujoco_call.h"
 #include "mjsense/scene/assets.h"
 #include "mjsense/scene/compiler_settings.h"
 #include "mjsense/scene/options.h"
@@ -230,7 +231,7 @@ Attached attach_entity(mjSpec* scene, const std::string& name, const EntityCfg& 
   }
   const std::vector<Census> before = census(child.get()), scene_before = census(scene);
   // The attached model is referenced, so the scene keeps the child spec alive.
-  if (!mjs_attach(frame->element, child->element, (name + "/").c_str(), "")) {
+  if (!call_mujoco(mjs_attach, frame->element, child->element, (name + "/").c_str(), "")) {
     throw ValueError(fmt::format("{}: {}", place, one_line(mjs_getError(scene))));
   }
   check_nothing_lost(before, scene_before, census(scene), cfg.model, place);

@@ -8,6 +8,7 @@
 #include <utility>
 
 #include "mjsense/core/error.h"
+#include "mjsense/core/mujoco_call.h"
 
 namespace mjsense {
 namespace {
@@ -79,7 +80,7 @@ SpecPtr apply_whole_model_settings(SpecPtr spec, const Vfs& vfs, std::string_vie
 
   const std::string xml = save_compiled_xml(spec.get(), apart);
   char error[1024] = "";
-  SpecPtr made(mj_parseXMLString(xml.c_str(), vfs.get(), error, sizeof error));
+  SpecPtr made(call_mujoco(mj_parseXMLString, xml.c_str(), vfs.get(), error, sizeof error));
   if (!made) fail(error);
 
   // Settings that do not belong to elements stay as written; the scene decides which of them to

@@ -6,6 +6,7 @@
 #include <algorithm>
 
 #include "mjsense/core/error.h"
+#include "mjsense/core/mujoco_call.h"
 #include "mjsense/scene/assets.h"
 #include "mjsense/scene/compiler_settings.h"
 #include "mjsense/scene/initial_state.h"
@@ -53,7 +54,7 @@ void attach_part(mjSpec* model, const ModelPart& part, std::string_view of) {
   std::copy(part.pos.begin(), part.pos.end(), frame->pos);
   std::copy(part.quat.begin(), part.quat.end(), frame->quat);
   // The attached part is referenced, so the model keeps its spec alive.
-  if (!mjs_attach(frame->element, child->element, part.prefix.c_str(), ""))
+  if (!call_mujoco(mjs_attach, frame->element, child->element, part.prefix.c_str(), ""))
     throw ValueError(fmt::format("{}: {}", place, one_line(mjs_getError(model))));
 }
 

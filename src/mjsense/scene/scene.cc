@@ -183,9 +183,11 @@ void Scene::Impl::add_sensors() {
 }
 
 void Scene::Impl::compile() {
-  {
+  try {
     WarningCapture capture(warnings);
     model = mjsense::compile(spec.get(), vfs);
+  } catch (const RuntimeError& error) {
+    throw RuntimeError(fmt::format("scene: {}", error.what()));
   }
   if (!model) throw ValueError(fmt::format("scene: {}", one_line(mjs_getError(spec.get()))));
   check_model(model.get(), warnings);

@@ -10,6 +10,7 @@
 
 #include "mjsense/core/embedded.h"
 #include "mjsense/core/error.h"
+#include "mjsense/core/mujoco_call.h"
 #include "mjsense/scene/resolve.h"
 
 // Exported for MuJoCo's own Python bindings: number of significant digits in saved XML.
@@ -50,11 +51,12 @@ void make_defaults_unique(std::string& xml) {
 std::optional<std::string> try_save(const mjSpec* spec, std::string& why) {
   char error[1024] = "";
   std::string xml(1 << 16, '\0');
-  int needed =
-      mj_saveXMLString(spec, xml.data(), static_cast<int>(xml.size()), error, sizeof error);
+  int needed = call_mujoco(mj_saveXMLString, spec, xml.data(), static_cast<int>(xml.size()), error,
+                           sizeof error);
   if (needed > 0) {
     xml.resize(needed + 1);
-    needed = mj_saveXMLString(spec, xml.data(), static_cast<int>(xml.size()), error, sizeof error);
+    needed = call_mujoco(mj_saveXMLString, spec, xml.data(), static_cast<int>(xml.size()), error,
+                         sizeof error);
   }
   why = error;
   if (needed != 0) return std::nullopt;
@@ -87,13 +89,14 @@ SpecPtr parse_model(const ModelSource& source, std::string_view place) {
   if (source.spec) {
     if (!source.path.empty() || !source.xml.empty())
       throw ValueError(fmt::format("{}: give a spec, a path or an XML text, only one", place));
-    return checked(mj_copySpec(source.spec), "MuJoCo cannot copy its spec", place);
+    return checked(call_mujoco(mj_copySpec, source.spec), "MuJoCo cannot copy its spec", place);
   }
   if (!source.xml.empty()) {
     if (!source.path.empty())
       throw ValueError(fmt::format("{}: give a path or an XML text, not both", place));
-    return checked(mj_parseXMLString(source.xml.c_str(), vfs.get(), error, sizeof error), error,
-                   place);
+    return checked(
+        call_mujoco(mj_parseXMLString, source.xml.c_str(), vfs.get(), error, sizeof error), error,
+        place);
   }
   if (source.path.empty())
     throw ValueError(fmt::format("{}: no model; give a path or an XML text", place));
@@ -102,22 +105,23 @@ SpecPtr parse_model(const ModelSource& source, std::string_view place) {
     embedded_file(name);  // throws with the nearest names
     for (const EmbeddedFile& file : embedded_files())
       vfs.add(std::string(file.name), file.text, place);
-    return checked(mj_parseXML(name.c_str(), vfs.get(), error, sizeof error), error, place);
+    return checked(call_mujoco(mj_parseXML, name.c_str(), vfs.get(), error, sizeof error), error,
+                   place);
   }
   if (!std::filesystem::is_regular_file(source.path)) {
     throw ValueError(fmt::format("{}: no file '{}'", place, source.path));
   }
   // An absolute path, so that its assets are found from any folder.
   const std::string path = std::filesystem::absolute(source.path).lexically_normal().string();
-  return checked(mj_parse(path.c_str(), nullptr, vfs.get(), error, sizeof error), error,
-                 fmt::format("{} ({})", place, source.path));
+  return checked(call_mujoco(mj_parse, path.c_str(), nullptr, vfs.get(), error, sizeof error),
+                 error, fmt::format("{} ({})", place, source.path));
 }
 
 std::string explain_fault(const ModelSource& source, std::string_view place) {
   Vfs vfs;
   for (const auto& [name, bytes] : source.assets) vfs.add(name, bytes, place);
   const SpecPtr spec = parse_model(source, place);
-  const ModelPtr model(mj_compile(spec.get(), vfs.get()));
+  const ModelPtr model(call_mujoco(mj_compile, spec.get(), vfs.get()));
   return model ? "" : one_line(mjs_getError(spec.get()));
 }
 
@@ -140,7 +144,7 @@ std::string one_line(std::string_view message) {
 ModelPtr compile(mjSpec* spec, const Vfs& vfs) {
   const mjtBool save = spec->compiler.saveinertial;
   spec->compiler.saveinertial = 1;  // save_compiled_xml() depends on the value at compilation
-  ModelPtr model(mj_compile(spec, vfs.get()));
+  ModelPtr model(call_mujoco(mj_compile, spec, vfs.get()));
   spec->compiler.saveinertial = save;
   return model;
 }

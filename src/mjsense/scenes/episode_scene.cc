@@ -219,7 +219,8 @@ void EpisodeScene::initialize(const mjModel* model, int num_worlds, std::string_
 
 void EpisodeScene::bind(Simulation& simulation) {
   simulation_ = &simulation;
-  if (!cfg_.vary.empty()) look_ = std::make_unique<Look>(cfg_.vary, simulation, place());
+  if (!cfg_.vary.empty())
+    variation_ = std::make_unique<SceneVariation>(cfg_.vary, simulation, place());
   make_sizes();
 }
 
@@ -329,7 +330,7 @@ void EpisodeScene::set_target_regions(std::span<const char> flags) {
 // Regions at the current positions of the furniture in this world.
 std::vector<Region> EpisodeScene::regions_of(int world) const {
   std::vector<Region> regions = regions_;
-  const double* here = look_ ? look_->body_pos(world) : model_->body_pos;
+  const double* here = variation_ ? variation_->body_pos(world) : model_->body_pos;
   if (here == model_->body_pos) return regions;
   for (std::size_t i = 0; i < regions.size(); ++i) {
     Vec3 move;
@@ -346,7 +347,7 @@ std::vector<Region> EpisodeScene::regions_of(int world) const {
   return regions;
 }
 
-// As in Look: if two entries match a body, the later one applies.
+// As SceneVariation does: of two that name a body the second counts.
 void EpisodeScene::find_furniture() {
   furniture_.clear();
   for (const SceneVaryCfg& one : cfg_.vary) {
@@ -495,14 +496,14 @@ void EpisodeScene::set_target(int world, int target, const StateRow& state) {
 }
 
 bool EpisodeScene::vary(int world, std::uint64_t seed, std::uint64_t episode) {
-  if (look_) {
+  if (variation_) {
     Rng rng(seed, 0, stream_of("scene/look"), episode);
-    look_->vary(world, rng);
+    variation_->vary(world, rng);
   }
   draw_sizes(world, seed, episode);
   const std::size_t n = objects_.size();
   if (sizes_) sizes_->set(world, std::span(steps_).subspan(world * n, n));
-  return look_ || sizes_;
+  return variation_ || sizes_;
 }
 
 void EpisodeScene::draw_sizes(int world, std::uint64_t seed, std::uint64_t episode) {

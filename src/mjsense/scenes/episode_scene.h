@@ -15,10 +15,10 @@
 #include "mjsense/robots/state_row.h"
 #include "mjsense/scene/scene.h"
 #include "mjsense/scenes/layout.h"
-#include "mjsense/scenes/look.h"
 #include "mjsense/scenes/object_meshes.h"
 #include "mjsense/scenes/object_sizes.h"
 #include "mjsense/scenes/scene_file.h"
+#include "mjsense/scenes/scene_variation.h"
 
 namespace mjsense {
 
@@ -131,7 +131,7 @@ class EpisodeScene {
   std::vector<int> steps_;                 // [B, objects] index into `sizes`; -1: size of the model
   std::vector<double> support_;            // [B]
   Simulation* simulation_ = nullptr;
-  std::unique_ptr<Look> look_;
+  std::unique_ptr<SceneVariation> variation_;
   std::unique_ptr<ObjectSizes> sizes_;
 };
 

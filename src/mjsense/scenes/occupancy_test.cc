@@ -41,7 +41,9 @@ std::string room(double gap) {
 }
 
 struct Floor {
-  explicit Floor(double gap) : model(compile_text(room(gap))), data(mj_makeData(model.get())) {
+  explicit Floor(double gap) : Floor(room(gap)) {}
+  explicit Floor(const std::string& xml)
+      : model(compile_text(xml)), data(mj_makeData(model.get())) {
     mj_kinematics(model.get(), data.get());
   }
   static ModelPtr compile_text(const std::string& xml) {
@@ -122,7 +124,7 @@ TEST(Occupancy, TakesWhereFurnitureMayStand) {
   }
 }
 
-// A footprint that is a disc of 0.3 m.
+// A disc of 0.2 m radius.
 Footprint disc(const Floor& floor) {
   return {floor.model.get(), floor.data.get(),
           [&](int g) { return floor.model->geom_type[g] == mjGEOM_CYLINDER; }, Pose{{-1, 1, 0}, {}},
@@ -178,6 +180,59 @@ TEST(BaseRoute, ADifferentialBaseGoesAlongItsHeading) {
     const double dx = way[i].x - way[i - 1].x, dy = way[i].y - way[i - 1].y;
     if (std::hypot(dx, dy) < 1e-9) continue;
     EXPECT_NEAR(std::remainder(std::atan2(dy, dx) - way[i].yaw, pi), 0, 1e-6) << i;
+  }
+}
+
+// A corridor 1.2 m wide, too narrow for a base of five discs in a row, 1.8 m long, to turn in by 45 degrees:
+//
+//   ---------------------
+//      o o o o o           it wants to be there
+//      o o o o o           it stands here
+//   ---------------------
+TEST(BaseRoute, ADifferentialBaseDoesNotSlide) {
+  std::string discs;
+  for (const double x : {-0.8, -0.4, 0.0, 0.4, 0.8})
+    discs += "<geom type='cylinder' pos='" + std::to_string(x) + " 3 .2' size='.1 .2'/>";
+  const Floor floor(
+      "<mujoco><worldbody><geom type='box' pos='0 .65 1' size='4 .05 1'/>"
+      "<geom type='box' pos='0 -.65 1' size='4 .05 1'/>" +
+      discs + "</worldbody></mujoco>");
+  const auto is_base = [&](int g) { return floor.model->geom_type[g] == mjGEOM_CYLINDER; };
+  const Occupancy occupancy(floor.model.get(), floor.data.get(),
+                            [&](int g) { return !is_base(g); });
+  const Footprint footprint(floor.model.get(), floor.data.get(), is_base, Pose{{0, 3, 0}, {}}, 1);
+  BaseRouteCfg cfg;
+  for (const bool sideways : {true, false}) {
+    cfg.sideways = sideways;
+    const auto way = BaseRoutes(occupancy, footprint, cfg)
+                         .find(
+                             {0, -0.25, 0}, [](const BasePose& p) { return p.y > 0.2; },
+                             [](double, double) { return 0.0; });
+    EXPECT_EQ(way.empty(), !sideways);
+  }
+}
+
+// Of two passages 1.5 m long, 0.7 and 1.2 m wide, a disc of 0.4 m takes the wide one, although the other is nearer.
+TEST(BaseRoute, KeepsClearWhereThereIsRoom) {
+  for (const int side : {1, -1}) {  // of the wide passage
+    const auto wall = [&](double from, double to) {
+      return "<geom type='box' pos='0 " + std::to_string(side * 0.5 * (from + to)) +
+             " 1' size='.75 " + std::to_string(0.5 * (to - from)) + " 1'/>";
+    };
+    const Floor floor("<mujoco><worldbody>" + wall(-2, -0.9) + wall(-0.2, 0.35) + wall(1.55, 2) +
+                      "<geom type='box' pos='2 2 1' size='.05 .05 1'/>"
+                      "<geom type='box' pos='-2 -2 1' size='.05 .05 1'/>"
+                      "<geom type='cylinder' pos='-1 1 .4' size='.2 .4'/></worldbody></mujoco>");
+    const Occupancy occupancy(floor.model.get(), floor.data.get(),
+                              [&](int g) { return floor.model->geom_type[g] != mjGEOM_CYLINDER; });
+    const auto way = BaseRoutes(occupancy, disc(floor)).find({-1.4, 0, 0}, {1.4, 0, 0});
+    ASSERT_GE(way.size(), 2u);
+    for (std::size_t i = 1; i < way.size(); ++i) {
+      const BasePose &a = way[i - 1], &b = way[i];
+      if ((a.x < 0) == (b.x < 0)) continue;
+      EXPECT_GT(side * std::lerp(a.y, b.y, a.x / (a.x - b.x)), 0)
+          << "the wide passage is at " << side;
+    }
   }
 }
 

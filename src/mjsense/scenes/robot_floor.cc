@@ -4,6 +4,7 @@
 #include <algorithm>
 
 #include "mjsense/core/error.h"
+#include "mjsense/core/mujoco_call.h"
 #include "mjsense/observe/frame.h"
 #include "mjsense/scene/resolve.h"
 
@@ -36,8 +37,7 @@ std::optional<double> ground_height(const mjModel* m) {
 }
 
 RestingRobot::RestingRobot(const mjModel* model, const Robot& robot)
-    : model_(model), robot_(robot), data_(mj_makeData(model)) {
-  if (!data_) throw RuntimeError("out of memory for the model's data");
+    : model_(model), robot_(robot), data_(call_mujoco(mj_makeData, model)) {
   for (std::size_t g = 0; g < robot.groups().size(); ++g) {
     const auto& init = robot.cfg().groups[g].init;
     for (std::size_t i = 0; i < init.size(); ++i) data_->qpos[robot.groups()[g].qpos[i]] = init[i];

@@ -8,6 +8,7 @@
 #include <span>
 #include <vector>
 
+#include "mjsense/core/mujoco_call.h"
 #include "mjsense/observe/frame.h"
 
 namespace mjsense {
@@ -94,7 +95,10 @@ class Search {
  public:
   Search(const mjModel* model, const Robot& robot, const EpisodeScene& scene,
          std::span<const Vec3> surface, bool stooped)
-      : model_(model), robot_(robot), scene_(scene), data_(mj_makeData(model), mj_deleteData) {
+      : model_(model),
+        robot_(robot),
+        scene_(scene),
+        data_(call_mujoco(mj_makeData, model), mj_deleteData) {
     start_ = start_of(model, robot, stooped);
     for (Vec3 p : surface) {
       for (double height : kHeights) points_.push_back(p + Vec3{0, 0, height});

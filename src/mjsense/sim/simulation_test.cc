@@ -325,6 +325,24 @@ TEST(Simulation, CastsAfterComputingAndFiltersAfterCasts) {
   EXPECT_THAT(camera->cast_ids, ElementsAre(1));
 }
 
+// Whatever its own stage, a sensor is computed after the casts of its inputs, and casts after those.
+TEST(Simulation, ASensorIsComputedAfterTheCastsThatItReads) {
+  Simulation sim(scene(), {.num_worlds = 3});
+  auto camera = add(sim, "camera", Stage::kCast);
+  auto reader = std::make_shared<Height>("reader", Stage::kRow);
+  reader->input_list = {camera.get()};
+  sim.add(reader);
+  auto second = std::make_shared<Height>("second", Stage::kCast);
+  second->input_list = {reader.get()};
+  sim.add(second);
+  std::vector<int> at_first_cast, at_second_cast;
+  camera->on_cast = [&] { at_first_cast = reader->computes; };
+  second->on_cast = [&] { at_second_cast = reader->computes; };
+  sim.refresh(*second);
+  EXPECT_THAT(at_first_cast, Each(0));
+  EXPECT_THAT(at_second_cast, Each(1));
+}
+
 // A sensor written in Python may read other sensors while it is computed.
 TEST(Simulation, BatchSensorsMayReadOthers) {
   Simulation sim(scene(), {.num_worlds = 2});

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "mjsense/worlds/scratch_data.h"
 
-#include "mjsense/core/error.h"
+#include "mjsense/core/mujoco_call.h"
 
 namespace mjsense {
 
@@ -18,9 +18,7 @@ ScratchData::Loan ScratchData::borrow() {
       return {data, GiveBack{this}};
     }
   }
-  mjData* data = mj_makeData(model_);
-  if (!data) throw RuntimeError("out of memory for the model's data");
-  return {data, GiveBack{this}};
+  return {call_mujoco(mj_makeData, model_), GiveBack{this}};
 }
 
 void ScratchData::give_back(mjData* data) {

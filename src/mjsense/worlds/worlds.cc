@@ -10,6 +10,7 @@
 #include <numeric>
 
 #include "mjsense/core/error.h"
+#include "mjsense/core/mujoco_call.h"
 #include "mjsense/core/os.h"
 #include "mjsense/core/parallel.h"
 #include "mjsense/core/process_state.h"
@@ -142,7 +143,12 @@ std::string_view bad_component(mjBatch* batch, int w) {
 // A world is one mjData and three copies of its state: asked for too many, MuJoCo would end the
 // program, or the system would.
 void check_memory(const mjModel* m, int num_worlds) {
-  mjData* d = mj_makeData(m);
+  mjData* d = nullptr;
+  try {
+    d = call_mujoco(mj_makeData, m);
+  } catch (const RuntimeError& error) {
+    throw RuntimeError(fmt::format("no world of this model fits into memory: {}", error.what()));
+  }
   const std::uint64_t state = 3 * sizeof(mjtNum) * mj_stateSize(m, mjSTATE_INTEGRATION);
   const std::uint64_t each = sizeof(mjData) + d->nbuffer + state, space = each + d->narena;
   mj_deleteData(d);
@@ -177,7 +183,9 @@ class Worlds::Warnings {
   int before_[kNum];
 };
 
-Worlds::Worlds(const mjModel* model, int num_worlds, int threads) : num_worlds_(num_worlds) {
+// The default constructor comes first, so that the destructor runs if this one throws.
+Worlds::Worlds(const mjModel* model, int num_worlds, int threads) : Worlds() {
+  num_worlds_ = num_worlds;
   if (num_worlds < 1)
     throw ValueError(fmt::format("num_worlds is {}: must be at least 1", num_worlds));
   if (threads < 0 || threads > kMostThreads)
@@ -193,12 +201,12 @@ Worlds::Worlds(const mjModel* model, int num_worlds, int threads) : num_worlds_(
   // at every substep, 0.4 MB a world for a Go1 with its meshes. Nobody sees ours. The batch copies.
   mjModel unmarked = *model;
   unmarked.vis.global.bvactive = 0;
-  batch_ = mjb_makeBatch(&unmarked, num_worlds, &config, error, sizeof error);
+  batch_ = call_mujoco(mjb_makeBatch, &unmarked, num_worlds, &config, error, sizeof error);
   if (batch_) add_owner(this);
   if (!batch_) throw RuntimeError(fmt::format("cannot make {} worlds: {}", num_worlds, error));
   num_state_ = static_cast<std::size_t>(mjb_nstate(batch_));
   workbenches_ = std::vector<Workbench>(mjb_nthread(batch_));
-  for (Workbench& bench : workbenches_) bench.data = mj_makeData(mjb_model(batch_));
+  for (Workbench& bench : workbenches_) bench.data = call_mujoco(mj_makeData, mjb_model(batch_));
   clocks_.resize(num_worlds);
   seed(0);
   reset_key_.assign(num_worlds, -1);

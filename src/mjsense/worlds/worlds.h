@@ -116,6 +116,8 @@ class Worlds {
   void checked_ids(WorldIds ids, std::vector<int>& sorted) const;  // into a buffer
 
  private:
+  Worlds() = default;
+
   struct Clock {
     std::int64_t substep = 0, tick = 0, episode = 0;
     std::uint32_t key = 0;
@@ -156,7 +158,7 @@ class Worlds {
   void bring_late(const mjModel* m, mjData* d, int w, mjtStage stage);
 
   mjBatch* batch_ = nullptr;
-  int num_worlds_;
+  int num_worlds_ = 0;
   std::size_t num_state_ = 0;
   std::uint64_t seed_ = 0;
   std::int64_t model_version_ = 0;

@@ -47,14 +47,19 @@ constexpr char kXml[] = R"(
   <keyframe><key name="up" qpos="0.5 0.3 1 0 .5 1 0 0 0"/></keyframe>
 </mujoco>)";
 
-ModelPtr load(const char* integrator) {
-  char xml[4096], error[512] = "";
-  std::snprintf(xml, sizeof xml, kXml, integrator);
+ModelPtr load_text(const char* xml) {
+  char error[512] = "";
   mjSpec* spec = mj_parseXMLString(xml, nullptr, error, sizeof error);
   EXPECT_NE(spec, nullptr) << error;
   ModelPtr m(mj_compile(spec, nullptr), mj_deleteModel);
   mj_deleteSpec(spec);
   return m;
+}
+
+ModelPtr load(const char* integrator) {
+  char xml[4096];
+  std::snprintf(xml, sizeof xml, kXml, integrator);
+  return load_text(xml);
 }
 
 struct Recording : WorldHooks {
@@ -160,6 +165,23 @@ TEST_P(Integrators, EqualTheNaiveLoopBitForBitAndAreFresh) {
     }
     EXPECT_EQ(hooks.substeps[1], every ? kSteps * decimation : 0);
     EXPECT_DOUBLE_EQ(worlds.time(2), kSteps * decimation * 0.004);
+  }
+}
+
+// MuJoCo's own histories and delays take a sample of their sensor at every physics step.
+TEST(Worlds, HistoriesAreThoseOfTheNaiveLoop) {
+  const ModelPtr m = load_text(R"(<mujoco><option timestep="0.004"/><worldbody><body>
+    <joint name="hinge" axis="0 1 0"/><geom type="capsule" fromto="0 0 0 .4 0 0" size=".04"/><site name="tip" pos=".4 0 0"/>
+    </body></worldbody><sensor><jointpos joint="hinge" nsample="4"/><accelerometer site="tip" nsample="5" delay=".008"/></sensor></mujoco>)");
+  ASSERT_GT(m->nhistory, 0);
+  Worlds worlds(m.get(), 1, 1);
+  Recording hooks(1);
+  worlds.reset(all_worlds, -1, hooks);
+  const DataPtr d = make_data(m.get());
+  for (int k = 0; k < 10; ++k) {
+    worlds.step(3, hooks);
+    for (int s = 0; s < 3; ++s) mj_step(m.get(), d.get());
+    expect_same_state(worlds, 0, m.get(), d.get());
   }
 }
 

@@ -17,16 +17,16 @@ inline std::uint32_t png_number(const std::uint8_t* p) {
   return p[0] << 24 | p[1] << 16 | p[2] << 8 | p[3];
 }
 
-struct Picture {
+struct DecodedPng {
   int width = 0, height = 0, channels = 0;
   std::vector<std::uint8_t> pixels;
 };
 
 // Decodes 8-bit images that are not interlaced, following the PNG specification (11.2, 12.3).
-inline Picture decode_png(std::span<const std::uint8_t> png) {
+inline DecodedPng decode_png(std::span<const std::uint8_t> png) {
   constexpr std::uint8_t kSignature[8] = {0x89, 'P', 'N', 'G', 0x0d, 0x0a, 0x1a, 0x0a};
   EXPECT_TRUE(png.size() > 8 && std::equal(kSignature, kSignature + 8, png.begin()));
-  Picture out;
+  DecodedPng out;
   std::vector<std::uint8_t> packed;
   std::string order;
   for (std::size_t at = 8; at + 12 <= png.size();) {

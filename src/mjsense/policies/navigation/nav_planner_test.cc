@@ -45,6 +45,25 @@ TEST(NavPlanner, ArrivesWhereTheObjectIsSeenWithoutTouchingAnything) {
   }
 }
 
+// A base that is pushed farther than `astray` (0.35 m) from its command is planned for again.
+TEST(NavPlanner, PlansAgainWhereTheBaseIsNotWhereItWasSent) {
+  Driven d("rby1");
+  d.start(0);
+  d.planner.reset(d.world);
+  Action action;
+  d.planner.act(d.world, action);
+  d.task.apply(d.world, action, state_row(d.data.get()));
+  const GroupValues& sent = d.task.robot().targets(0)[d.task.robot().group_index("base")];
+  const auto& base = d.task.robot().group("base").qpos;
+  for (const double push : {0.3, 0.4}) {
+    d.data->qpos[base[0]] = sent.values[0] + push;
+    d.data->qpos[base[1]] = sent.values[1];
+    mj_forward(d.model, d.data.get());
+    d.planner.act(d.world, action);
+    EXPECT_EQ(d.planner.failure(0), push < 0.35 ? "" : "things did not move as planned");
+  }
+}
+
 TEST(NavPlanner, SaysWhatItNeeds) {
   PickTask pick(of("mobile_franka"));
   Scene scene(pick.whole_scene_cfg());

@@ -8,6 +8,7 @@
 #include <memory>
 #include <numbers>
 
+#include "mjsense/core/mujoco_call.h"
 #include "mjsense/observe/frame.h"
 #include "mjsense/policies/planner/squeeze.h"
 
@@ -33,7 +34,7 @@ struct DataDelete {
 GripperShape::GripperShape(const mjModel* model, const Robot& robot, int gripper) {
   const MoveGroup& group = robot.groups()[gripper];
   const MoveGroupCfg& cfg = robot.cfg().groups[gripper];
-  const std::unique_ptr<mjData, DataDelete> data(mj_makeData(model));
+  const std::unique_ptr<mjData, DataDelete> data(call_mujoco(mj_makeData, model));
   for (std::size_t i = 0; i < cfg.init.size(); ++i) data->qpos[group.qpos[i]] = cfg.init[i];
   mj_kinematics(model, data.get());
   const int site = group.leaf_site;

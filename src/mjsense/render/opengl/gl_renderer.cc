@@ -11,6 +11,7 @@
 #include <vector>
 
 #include "mjsense/core/error.h"
+#include "mjsense/core/mujoco_call.h"
 #include "mjsense/rays/flex_shapes.h"
 #include "mjsense/rays/ray_world.h"
 #include "mjsense/rays/skin_shapes.h"
@@ -110,8 +111,8 @@ class MujocoGl final : public GlRenderer {
       : cfg_(cfg),
         place_(place),
         egl_(place),
-        model_(mj_copyModel(nullptr, model)),
-        data_(mj_makeData(model_.get())),
+        model_(call_mujoco(mj_copyModel, nullptr, model)),
+        data_(call_mujoco(mj_makeData, model_.get())),
         worlds_(cfg.num_worlds, VisualFields(model)) {
     model_->vis.global.offwidth = cfg.width;
     model_->vis.global.offheight = cfg.height;

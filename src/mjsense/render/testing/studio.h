@@ -55,7 +55,7 @@ struct Studio {
   std::unique_ptr<mjModel, void (*)(mjModel*)> model{nullptr, mj_deleteModel};
   std::unique_ptr<mjData, void (*)(mjData*)> data{nullptr, mj_deleteData};
   std::unique_ptr<RayScene> rays;
-  std::unique_ptr<Look> look;
+  std::unique_ptr<SurfaceAssets> assets;
   ViewOptions options;
   RenderTiles render = best_render_tiles();
 
@@ -87,7 +87,7 @@ struct Studio {
     mj_forward(model.get(), data.get());
     if (!rays) {
       rays = std::make_unique<RayScene>(model.get(), 1);
-      look = std::make_unique<Look>(model.get(), true, true);
+      assets = std::make_unique<SurfaceAssets>(model.get(), true, true);
     }
     World world;
     world.model = model.get();
@@ -115,7 +115,7 @@ struct Studio {
   Picture take(std::array<double, 3> at, std::array<double, 3> x, std::array<double, 3> y,
                const PixelGrid& grid, int samples = 1) {
     if (!rays) update();
-    ViewBuilder builder(model.get(), *look, options);
+    ViewBuilder builder(model.get(), *assets, options);
     Picture out(grid.width, grid.height);
     ImageTargets targets = out.targets();
     targets.samples = samples;

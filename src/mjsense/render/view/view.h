@@ -7,7 +7,7 @@
 #include <cstddef>
 #include <cstdint>
 
-#include "mjsense/render/view/look.h"
+#include "mjsense/render/view/surface_assets.h"
 
 namespace mjsense {
 
@@ -58,7 +58,7 @@ struct alignas(64) ViewGeom {
   void* bvh;  // RTCScene of a mesh, a height field's surface, a flex or a skin; else null
   const Clusters* clusters;  // the same triangles, for rasterising; null: use rays only
   const Horizons* horizons;  // horizons of the mesh's faces; null without clusters
-  const MeshLook* mesh;
+  const MeshSurface* mesh;
   const HeightField* height_field;
   Surface surface;
 };

@@ -62,13 +62,14 @@ float dull_below(float exponent) {
   return x * x;
 }
 
-ViewBuilder::ViewBuilder(const mjModel* model, const Look& look, const ViewOptions& options)
-    : look_(&look),
+ViewBuilder::ViewBuilder(const mjModel* model, const SurfaceAssets& assets,
+                         const ViewOptions& options)
+    : assets_(&assets),
       options_(options),
       unsorted_(max_geoms(model) + options.markers),
       sorted_(unsorted_.size()),
       light_space_(options.shadows ? model->nlight : 0, unsorted_.size()),
-      soft_looks_(look.num_flex_parts() + model->nskin) {
+      soft_surfaces_(assets.num_flex_parts() + model->nskin) {
   order_.reserve(unsorted_.size());
   candidates_.resize((static_cast<std::size_t>(model->ngeom + model->nflex) + 63) / 64);
   if (options.layered) {
@@ -80,11 +81,11 @@ ViewBuilder::ViewBuilder(const mjModel* model, const Look& look, const ViewOptio
   view_.near = options.near;
   view_.far = options.far;
   view_.shadows = options.shadows;
-  view_.skybox = options.textures ? look.skybox() : nullptr;
+  view_.skybox = options.textures ? assets.skybox() : nullptr;
   if (options.reflections && model->nmat > 0) {  // any world may set a material's reflectance
     ViewOptions flat = options;
     flat.reflections = flat.shadows = flat.layered = false;
-    mirrored_ = std::make_unique<ViewBuilder>(model, look, flat);
+    mirrored_ = std::make_unique<ViewBuilder>(model, assets, flat);
   }
 }
 
@@ -255,7 +256,7 @@ void ViewBuilder::set_shape(const RayWorld& world, const SharedGeometry& shapes,
   set_primitive(source.type, mjOBJ_GEOM, g.id, g);
   if (g.type == mjGEOM_MESH || g.type == mjGEOM_SDF) {
     g.bvh = shapes.mesh_scenes[source.data];
-    g.mesh = look_->mesh(source.data);
+    g.mesh = assets_->mesh(source.data);
     g.clusters = shapes.clusters_of_mesh(source.data);
     g.horizons = shapes.horizons_of_mesh(source.data);
   } else if (g.type == mjGEOM_HFIELD) {
@@ -268,12 +269,13 @@ void ViewBuilder::set_shape(const RayWorld& world, const SharedGeometry& shapes,
     const FlexShapes::Part& shape = world.flexes()->parts()[part];
     g.object = mjOBJ_FLEX;
     g.bvh = shape.scene;
-    g.mesh = soft_look(part, *look_->flex_part(part), shape.normals);
+    g.mesh = soft_surface(part, *assets_->flex_part(part), shape.normals);
   } else if (g.type == kSkinType) {
     const int id = source.data;
     g.object = mjOBJ_SKIN;
     g.bvh = world.skins()->scene(id);
-    g.mesh = soft_look(look_->num_flex_parts() + id, *look_->skin(id), world.skins()->normals(id));
+    g.mesh = soft_surface(assets_->num_flex_parts() + id, *assets_->skin(id),
+                          world.skins()->normals(id));
   }
   if (g.object != mjOBJ_GEOM) {
     g.object_id = source.data;
@@ -282,11 +284,12 @@ void ViewBuilder::set_shape(const RayWorld& world, const SharedGeometry& shapes,
 }
 
 // Combines the world's normals with the shared texture coordinates.
-const MeshLook* ViewBuilder::soft_look(int index, const MeshLook& shared, const float* normals) {
-  MeshLook& look = soft_looks_[index];
-  look = shared;
-  look.normals = normals;
-  return &look;
+const MeshSurface* ViewBuilder::soft_surface(int index, const MeshSurface& shared,
+                                             const float* normals) {
+  MeshSurface& surface = soft_surfaces_[index];
+  surface = shared;
+  surface.normals = normals;
+  return &surface;
 }
 
 void ViewBuilder::set_surface(const RayGeom& source, const float* rgba, const Material* material,
@@ -304,7 +307,7 @@ void ViewBuilder::set_surface(const RayGeom& source, const float* rgba, const Ma
   s.specular = material->specular;
   s.emission = material->emission;
   if (!options_.textures) return;
-  s.texture = look_->texture(material->texture);
+  s.texture = assets_->texture(material->texture);
   if (s.texture && s.texture->levels == 0) s.texture = nullptr;
   if (!s.texture) return;
   const bool uniform = material->uniform;

@@ -11,8 +11,8 @@
 
 #include "mjsense/render/view/appearance.h"
 #include "mjsense/render/view/light_space.h"
-#include "mjsense/render/view/look.h"
 #include "mjsense/render/view/markers.h"
+#include "mjsense/render/view/surface_assets.h"
 #include "mjsense/render/view/view.h"
 
 namespace mjsense {
@@ -40,7 +40,7 @@ float dull_below(float exponent);
 // Owns the geoms of one view. build() updates it and allocates nothing.
 class ViewBuilder {
  public:
-  ViewBuilder(const mjModel* model, const Look& look, const ViewOptions& options);
+  ViewBuilder(const mjModel* model, const SurfaceAssets& assets, const ViewOptions& options);
 
   // position, rotation: X_WC, row-major.
   const View& build(const RayWorld& world, const SharedGeometry& shapes,
@@ -65,7 +65,7 @@ class ViewBuilder {
                  ViewGeom& g);
   // Ids of markers follow those of all other objects.
   int first_marker() const { return static_cast<int>(unsorted_.size() - options_.markers); }
-  const MeshLook* soft_look(int index, const MeshLook& shared, const float* normals);
+  const MeshSurface* soft_surface(int index, const MeshSurface& shared, const float* normals);
   void set_surface(const RayGeom& source, const float* rgba, const Material* material,
                    ViewGeom& g) const;
   void set_mirror(const RayWorld& world, const SharedGeometry& shapes, const Appearance& appearance,
@@ -77,7 +77,7 @@ class ViewBuilder {
   void set_lights(const RayWorld& world, const Appearance& appearance, const double position[3],
                   const double rotation[9]);
 
-  const Look* look_;
+  const SurfaceAssets* assets_;
   ViewOptions options_;
   View view_;
   std::vector<ViewGeom> unsorted_, sorted_;
@@ -86,7 +86,8 @@ class ViewBuilder {
   LightSpace light_space_;
   std::vector<std::uint8_t> fixed_;  // per geom; empty if not layered
   std::vector<int> index_of_id_;
-  std::vector<MeshLook> soft_looks_;       // by flex part, then by skin, with the world's normals
+  // By flex part, then by skin, with the world's normals.
+  std::vector<MeshSurface> soft_surfaces_;
   std::unique_ptr<ViewBuilder> mirrored_;  // null: nothing can reflect
   int left_out_ = -1;                      // geom that is not shown: the mirror itself
   bool own_headlight_ = true;  // otherwise headlight_, the viewing direction of the real camera

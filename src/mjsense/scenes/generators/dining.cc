@@ -25,8 +25,8 @@ void chair(RoomText& room, const char* name, double x, double y, double back) {
   room.close_body();
 }
 
-ModelSource make(House& house, SceneFileCfg& cfg) {
-  Rng& rng = house.rng;
+ModelSource make(GeneratorInput& input, SceneFileCfg& cfg) {
+  Rng& rng = input.rng;
   RoomText room("dining");
   write_shell_finishes(room, rng);
   const Colour wood = wood_colour(rng);

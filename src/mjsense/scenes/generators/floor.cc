@@ -223,8 +223,8 @@ void write_pictures(Building& out, const FloorPlan& plan, Rng& rng) {
   }
 }
 
-ModelSource make(House& house, SceneFileCfg& cfg) {
-  Rng& rng = house.rng;
+ModelSource make(GeneratorInput& input, SceneFileCfg& cfg) {
+  Rng& rng = input.rng;
   FloorPlan plan(rng);
   RoomText text("floor");
   write_shell_finishes(text, rng);

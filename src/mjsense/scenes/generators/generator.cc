@@ -31,20 +31,21 @@ ModelSource generate(SceneFileCfg& cfg) {
     throw_unknown(place, "generator", cfg.generator, names);
   }
   const auto number = static_cast<std::uint64_t>(cfg.house);
-  House house{number, Rng(0, 0, stream_of(fmt::format("house/{}", one->name)), number), {}};
+  GeneratorInput input{
+      number, Rng(0, 0, stream_of(fmt::format("house/{}", one->name)), number), {}};
   std::vector<std::string> known;
   for (const GeneratorParameter& parameter : one->parameters) {
     known.emplace_back(parameter.name);
-    house.parameters.push_back(parameter.value);
+    input.parameters.push_back(parameter.value);
   }
   for (const auto& [name, value] : cfg.parameters) {
     const auto at = std::ranges::find(known, name);
     if (at == known.end()) {
       throw_unknown(fmt::format("{}, generator '{}'", place, one->name), "parameter", name, known);
     }
-    house.parameters[at - known.begin()] = value;
+    input.parameters[at - known.begin()] = value;
   }
-  return one->make(house, cfg);
+  return one->make(input, cfg);
 }
 
 }  // namespace mjsense

@@ -24,8 +24,8 @@ struct GeneratorParameter {
   std::string_view sentence;  // description
 };
 
-// The house to be generated.
-struct House {
+// The input of a generator: the house number and everything derived from it.
+struct GeneratorInput {
   std::uint64_t number = 0;
   Rng rng;                         // seeded with the generator's name and the house number
   std::vector<double> parameters;  // in the order in which the generator lists them
@@ -37,8 +37,8 @@ struct Generator {
   std::vector<GeneratorParameter> parameters;
   // Creates the first entity of the scene, named `room`; the model's names are "room/...". May add
   // to `cfg` what depends on the house: regions, objects, the pose of the robot, variation. Must be
-  // a function of `house` only.
-  ModelSource (*make)(House& house, SceneFileCfg& cfg);
+  // a function of `input` only.
+  ModelSource (*make)(GeneratorInput& input, SceneFileCfg& cfg);
 };
 
 // Table of the built-in generators.

@@ -86,8 +86,8 @@ void clutter(RoomText& room, Rng& rng, double z, double y0, double wide) {
   room.close_body();
 }
 
-ModelSource make(House& house, SceneFileCfg& cfg) {
-  Rng& rng = house.rng;
+ModelSource make(GeneratorInput& input, SceneFileCfg& cfg) {
+  Rng& rng = input.rng;
   RoomText room("kitchen");
   materials(room, rng);
   KitchenStyle style;

@@ -72,11 +72,11 @@ void write_materials(RoomText& text, Rng& rng) {
   for (const char* name : {"painting_1", "painting_2"}) write_picture(text, name, rng);
 }
 
-ModelSource make(House& house, SceneFileCfg& cfg) {
-  Rng& rng = house.rng;
+ModelSource make(GeneratorInput& input, SceneFileCfg& cfg) {
+  Rng& rng = input.rng;
   HingedDoor door = draw_door(rng);
-  if (house.parameters[0] > 0) door.width = house.parameters[0];
-  if (house.parameters[1] != 0) door.hinge_left = house.parameters[1] > 0;
+  if (input.parameters[0] > 0) door.width = input.parameters[0];
+  if (input.parameters[1] != 0) door.hinge_left = input.parameters[1] > 0;
   const Sizes s{rng.uniform(3.4, 4.0), rng.uniform(3.4, 4.0), rng.uniform(2.1, 2.6),
                 rng.uniform(2.1, 2.6)};
   RoomText text("room_with_door");

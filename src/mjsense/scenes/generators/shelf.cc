@@ -29,8 +29,8 @@ void books(RoomText& room, Rng& rng, double x, double y0, double length, double 
   }
 }
 
-ModelSource make(House& house, SceneFileCfg& cfg) {
-  Rng& rng = house.rng;
+ModelSource make(GeneratorInput& input, SceneFileCfg& cfg) {
+  Rng& rng = input.rng;
   RoomText room("shelf");
   write_shell_finishes(room, rng);
   const bool painted = rng.below(3) == 0;
@@ -45,7 +45,7 @@ ModelSource make(House& house, SceneFileCfg& cfg) {
 
   const double front = rng.uniform(0.46, 0.52), deep = rng.uniform(0.27, 0.32),
                wide = rng.uniform(0.85, 1.1);
-  const double lowest = house.parameters[0] > 0 ? house.parameters[0] : rng.uniform(0.5, 0.6),
+  const double lowest = input.parameters[0] > 0 ? input.parameters[0] : rng.uniform(0.5, 0.6),
                step = rng.uniform(0.34, 0.40);
   constexpr int kBoards = 3;
   constexpr double kThick = 0.022;

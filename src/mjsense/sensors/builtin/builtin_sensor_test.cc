@@ -271,6 +271,36 @@ TEST(BuiltinSensor, DeclaresUnitAndFrame) {
   EXPECT_EQ(spec(5).frame, "world");
 }
 
+// Bounds of the values. The policy's space and the checks of recordings use them.
+TEST(BuiltinSensor, DeclaresItsBounds) {
+  constexpr double kNone = std::numeric_limits<double>::infinity();
+  struct Case {
+    const char* type;
+    ObjRef obj, ref;
+    double cutoff, low, high;
+  };
+  const std::vector<Case> cases = {
+      {"gyro", in_robot("site", "imu"), {}, 0, -kNone, kNone},
+      {"gyro", in_robot("site", "imu"), {}, 3, -3, 3},
+      {"touch", in_robot("site", "imu"), {}, 0, 0, kNone},
+      {"touch", in_robot("site", "imu"), {}, 5, 0, 5},
+      {"framezaxis", in_robot("body", "hand"), {}, 0, -1, 1},
+      {"framequat", in_robot("body", "hand"), {}, 0, -1, 1},
+      {"insidesite", in_robot("body", "hand"), in_robot("site", "imu"), 0, 0, 1}};
+  std::vector<BuiltinSensorCfg> sensors;
+  for (const Case& c : cases) {
+    sensors.push_back(make(c.type, c.obj, c.ref));
+    sensors.back().name = std::to_string(sensors.size());
+    sensors.back().cutoff = c.cutoff;
+  }
+  Bench bench(with(sensors));
+  for (std::size_t i = 0; i < cases.size(); ++i) {
+    const SensorSpec& spec = bench.scene().sensor("robot/" + std::to_string(i + 1)).field().spec;
+    EXPECT_EQ(spec.low, cases[i].low) << cases[i].type << " " << cases[i].cutoff;
+    EXPECT_EQ(spec.high, cases[i].high) << cases[i].type << " " << cases[i].cutoff;
+  }
+}
+
 // The history field is that of MuJoCo's own reader of the buffer, before and after the buffer wraps
 // around.
 TEST(BuiltinSensor, HistoryIsNewestFirst) {

@@ -44,10 +44,14 @@ ViewOptions view_options(const CameraSensorCfg& cfg, double near) {
 }
 
 // Cameras of one simulation share what they do not change.
-std::shared_ptr<const Look> look_of(const SensorInit& init, bool meshes, bool textures) {
-  const auto make = [&] { return std::make_shared<const Look>(init.model, meshes, textures); };
+std::shared_ptr<const SurfaceAssets> surface_assets_of(const SensorInit& init, bool meshes,
+                                                       bool textures) {
+  const auto make = [&] {
+    return std::make_shared<const SurfaceAssets>(init.model, meshes, textures);
+  };
   if (init.shared == nullptr) return make();
-  return init.shared->get<Look>(fmt::format("look {} {}", meshes, textures), make);
+  return init.shared->get<SurfaceAssets>(fmt::format("surface assets {} {}", meshes, textures),
+                                         make);
 }
 
 }  // namespace
@@ -90,7 +94,8 @@ void CameraSensor::initialize(const SensorInit& init) {
         fmt::format("{}: far is {} m, and clip_near 'model' clips at {:.6g} m (znear x "
                     "extent): need near < far",
                     place, cfg_.far, near_));
-  look_ = look_of(init, wants("rgb") || wants("normals"), wants("rgb") && cfg_.use_textures);
+  assets_ =
+      surface_assets_of(init, wants("rgb") || wants("normals"), wants("rgb") && cfg_.use_textures);
   workspace_.reset();
   clear_fields();
   declare_fields(init.num_worlds);
@@ -153,7 +158,7 @@ void CameraSensor::initialize(const SensorInit& init) {
   ViewOptions options = view_options(cfg_, near_);
   options.markers = markers;
   options.layered = fixed_layers_ != nullptr;
-  for (int i = 0; i < slots; ++i) workspace_->builders.emplace_back(model_, *look_, options);
+  for (int i = 0; i < slots; ++i) workspace_->builders.emplace_back(model_, *assets_, options);
   const int geoms = static_cast<int>(ViewBuilder::max_geoms(model_) + markers);
   for (int i = 0; i < init.threads; ++i) workspace_->memory.emplace_back(geoms);
 }

@@ -9,8 +9,8 @@
 #include "mjsense/render/opengl/gl_renderer.h"
 #include "mjsense/render/view/camera_model.h"
 #include "mjsense/render/view/fixed_layer.h"
-#include "mjsense/render/view/look.h"
 #include "mjsense/render/view/markers.h"
+#include "mjsense/render/view/surface_assets.h"
 #include "mjsense/render/view/view_builder.h"
 #include "mjsense/sensors/camera/camera_sensor_cfg.h"
 #include "mjsense/sensors/camera/optical_flow.h"
@@ -80,7 +80,7 @@ class CameraSensor final : public Sensor {
   std::vector<float> bent_;
   std::vector<int> due_;
   std::vector<std::vector<float>> clean_;  // by thread: true depth of one image; only with noise
-  std::shared_ptr<const Look> look_;
+  std::shared_ptr<const SurfaceAssets> assets_;
   std::unique_ptr<GlRenderer> gl_;  // only with renderer "opengl"
   std::unique_ptr<Workspace> workspace_;
   std::unique_ptr<FixedLayers> fixed_layers_;  // null: not useful, or the camera moves

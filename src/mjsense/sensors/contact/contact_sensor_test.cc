@@ -419,5 +419,26 @@ TEST(Contact, ErrorsNameSensorAndNearest) {
   EXPECT_THAT(message(c), HasSubstr("single name"));
 }
 
+// Three balls of 1, 3 and 1 kg lie on a tray.
+TEST(Contact, NetforceNamesTheStrongestContact) {
+  constexpr char kTray[] = R"(
+<mujoco><worldbody>
+  <body name="tray"><geom name="tray" type="box" size=".5 .1 .05"/></body>
+  <body pos="-.3 0 .0999"><joint type="slide" axis="0 0 1"/><geom name="left" size=".05" mass="1"/></body>
+  <body pos="0 0 .0999"><freejoint/><geom name="heavy" size=".05" mass="3"/></body>
+  <body pos=".3 0 .0999"><joint type="slide" axis="0 0 1"/><geom name="right" size=".05" mass="1"/></body>
+</worldbody></mujoco>)";
+  ContactSensorCfg net = box_cfg("tray");
+  net.reduce = "netforce";
+  net.fields = {"found"};
+  net.other_ids = true;
+  Lab lab("box", kTray, {net});
+  lab.sim->step(500);
+  EXPECT_EQ(lab.read("found")[0], 3.0f);
+  const mjModel* m = lab.scene->model();
+  EXPECT_EQ(lab.sensor().field("other_geom").data.row<std::int32_t>(0)[0],
+            mj_name2id(m, mjOBJ_GEOM, "box/heavy"));
+}
+
 }  // namespace
 }  // namespace mjsense

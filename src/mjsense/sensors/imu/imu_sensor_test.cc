@@ -149,6 +149,27 @@ TEST(Imu, EveryAxisHasItsOwnTolerance) {
   }
 }
 
+// An axis sees of another one the sine of the angle between the axis and where it should be; the tolerance is three standard deviations.
+TEST(Imu, AnAxisSeesPartOfTheOthers) {
+  ImuSensorCfg cfg = imu("");
+  cfg.model.accelerometer.cross_axis_tolerance = 0.06;
+  auto scene = make_scene(cfg);
+  constexpr int kWorlds = 2000;
+  Simulation sim(scene, {.num_worlds = kWorlds});
+  sim.refresh(scene->sensor("imu"));
+  double square[3] = {};
+  for (int w = 0; w < kWorlds; ++w) {
+    for (int k = 0; k < 3; ++k) {
+      const double a = scene->sensor("imu").field("acc").data.row<float>(w)[k];
+      square[k] += a * a / kWorlds;
+    }
+  }
+  const double expected = 9.81 * 0.02, tolerance = 5 * expected / std::sqrt(2.0 * kWorlds);
+  EXPECT_NEAR(std::sqrt(square[0]), expected, tolerance);
+  EXPECT_NEAR(std::sqrt(square[1]), 9.81, 0.01);  // gravity is along y
+  EXPECT_NEAR(std::sqrt(square[2]), expected, tolerance);
+}
+
 TEST(Imu, ErrorsNameSiteAndPreset) {
   const auto message = [](const ImuSensorCfg& cfg) -> std::string {
     try {

@@ -7,6 +7,7 @@
 #include <memory>
 #include <numbers>
 
+#include "mjsense/core/mujoco_call.h"
 #include "mjsense/observe/frame.h"
 #include "mjsense/scene/resolve.h"
 
@@ -21,7 +22,8 @@ constexpr double kSideGap = 0.004;                                  // m, pads t
 // Fingers close along any direction across the approach: where the pads are, in the tool's frame.
 Quat closing_turn(const MoveGroup& gripper, const mjModel* model) {
   if (gripper.pad_sites[0] < 0 || gripper.leaf_site < 0) return {};
-  const std::unique_ptr<mjData, void (*)(mjData*)> data(mj_makeData(model), mj_deleteData);
+  const std::unique_ptr<mjData, void (*)(mjData*)> data(call_mujoco(mj_makeData, model),
+                                                        mj_deleteData);
   for (std::size_t i = 0; i < gripper.qpos.size(); ++i) {  // open: the range's wider end
     const int joint = gripper.joints[std::min(i, gripper.joints.size() - 1)];
     const double low = model->jnt_range[2 * joint], high = model->jnt_range[2 * joint + 1];

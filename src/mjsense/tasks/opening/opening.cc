@@ -8,6 +8,7 @@
 #include <numbers>
 
 #include "mjsense/core/error.h"
+#include "mjsense/core/mujoco_call.h"
 
 namespace mjsense {
 namespace {
@@ -33,8 +34,8 @@ void OpeningTask::initialize_task() {
     throw ValueError(fmt::format(
         "{} has nothing that opens: no hinge or slide with a range and a handle", place()));
   reach_ = std::make_unique<HandleReach>(model(), robot());
-  const std::unique_ptr<mjData, decltype(&mj_deleteData)> data(mj_makeData(model()), mj_deleteData);
-  if (!data) throw RuntimeError(fmt::format("{}: no memory for MuJoCo's data", place()));
+  const std::unique_ptr<mjData, decltype(&mj_deleteData)> data(call_mujoco(mj_makeData, model()),
+                                                               mj_deleteData);
   if (start_key() >= 0) mj_resetDataKeyframe(model(), data.get(), start_key());
   const StateRow empty = state_row(data.get());
   const Pose usual = scene().clear(empty);

@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "mjsense/core/mujoco_call.h"
 #include "mjsense/observe/frame.h"
 #include "mjsense/scene/resolve.h"
 #include "mjsense/scenes/robot_floor.h"
@@ -18,7 +19,7 @@ constexpr double kUnder = 0.7;      // of a contact's normal upwards: what a bas
 }  // namespace
 
 HandleReach::HandleReach(const mjModel* model, const Robot& robot, HandleReachCfg cfg)
-    : own_(mj_copyModel(nullptr, model), mj_deleteModel),
+    : own_(call_mujoco(mj_copyModel, nullptr, model), mj_deleteModel),
       robot_(robot),
       cfg_(cfg),
       base_(driving_base(robot)),

@@ -92,6 +92,36 @@ TEST_F(Support, AWallDoesNotBear) {
   EXPECT_FALSE(carries(world, kWall, kBlock));
 }
 
+// A force bears the block up to 30 degrees from up, and from half of its weight on.
+TEST_F(Support, ForcesAreJudgedByAngleAndSize) {
+  put(0.5, 0, 0.2, 0, 0);
+  const auto force = [](double degrees, double size) {
+    const double a = degrees * M_PI / 180;
+    return Vec3{size * std::sin(a), 0, size * std::cos(a)};
+  };
+  EXPECT_TRUE(bears(world, force(29, 10), kBlock));
+  EXPECT_TRUE(bears(world, force(-29, 10), kBlock));
+  EXPECT_FALSE(bears(world, force(31, 10), kBlock));
+  EXPECT_FALSE(bears(world, force(180, 10), kBlock));
+  const double weight = 0.2 * 9.81;
+  EXPECT_TRUE(bears(world, force(0, 0.51 * weight), kBlock));
+  EXPECT_FALSE(bears(world, force(0, 0.49 * weight), kBlock));
+}
+
+// The block lies on the table, which is tilted about y.
+TEST_F(Support, WithoutForcesTheNormalIsWithinThirtyDegreesOfUp) {
+  for (const double degrees : {29.0, 31.0}) {
+    const Quat tilt = axis_angle({0, 1, 0}, degrees * M_PI / 180);
+    write_quat(tilt, model->body_quat + 4 * kTable);
+    put(0.5, 0, 0.2, 0, 0);
+    const Pose block{vec3(model->body_pos + 3 * kTable) + rotate(tilt, {0.5, 0, 0.0795}), tilt};
+    write_pose(block, data->qpos + 7);
+    data->qpos[0] = 50;  // the tray is elsewhere
+    mj_forward(model.get(), data.get());
+    EXPECT_EQ(seems_to_carry(world, kTable, kBlock), degrees < 30) << degrees;
+  }
+}
+
 // Where nothing has been solved, or there is a hair's breadth between the two.
 TEST_F(Support, WithoutForcesTheBoxesDecide) {
   put(0, 0, 0.02 + 0.03 + 0.005, 0, 0);

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "mjsense/render/view/look.h"
+#include "mjsense/render/view/surface_assets.h"
 
 #include <algorithm>
 #include <array>
@@ -133,17 +133,17 @@ std::shared_ptr<const MeshTables> mesh_tables(const mjModel* m, int id) {
 
 }  // namespace
 
-MeshLook MeshTables::look() const {
+MeshSurface MeshTables::surface() const {
   const auto data = [](const std::vector<float>& v) { return v.empty() ? nullptr : v.data(); };
   return {data(normals), data(uvs), data(density)};
 }
 
-void Look::keep(std::shared_ptr<const MeshTables> tables, MeshLook& look) {
-  look = tables->look();
+void SurfaceAssets::keep(std::shared_ptr<const MeshTables> tables, MeshSurface& surface) {
+  surface = tables->surface();
   tables_.push_back(std::move(tables));
 }
 
-Look::Look(const mjModel* model, bool meshes, bool textures) {
+SurfaceAssets::SurfaceAssets(const mjModel* model, bool meshes, bool textures) {
   textures_.resize(model->ntex);
   meshes_.resize(model->nmesh);
   skins_.resize(model->nskin);
@@ -155,7 +155,7 @@ Look::Look(const mjModel* model, bool meshes, bool textures) {
   for (int i = 0; i < model->nmesh && meshes; ++i) keep(mesh_tables(model, i), meshes_[i]);
 }
 
-void Look::add_texture(const mjModel* model, int id) {
+void SurfaceAssets::add_texture(const mjModel* model, int id) {
   Texture& texture = textures_[id];
   const int channels = model->tex_nchannel[id];
   if (channels != 3 && channels != 4)
@@ -216,7 +216,7 @@ void Look::add_texture(const mjModel* model, int id) {
   }
 }
 
-void Look::add_flex(const mjModel* model, int id, bool textures) {
+void SurfaceAssets::add_flex(const mjModel* model, int id, bool textures) {
   const FlexSurface s = flex_surface(model, id);
   for (const FlexSurface::Part& part : s.parts) {
     flex_parts_.emplace_back();
@@ -232,7 +232,7 @@ void Look::add_flex(const mjModel* model, int id, bool textures) {
   }
 }
 
-void Look::add_skin(const mjModel* model, int id) {
+void SurfaceAssets::add_skin(const mjModel* model, int id) {
   if (model->skin_texcoordadr[id] < 0) return;
   const float* vert = model->skin_vert + 3 * model->skin_vertadr[id];
   const float* texcoord = model->skin_texcoord + 2 * model->skin_texcoordadr[id];

@@ -28,45 +28,45 @@ struct Texture {
 };
 
 // Tables of a mesh, flex or skin by face index. Null if it has none.
-struct MeshLook {
+struct MeshSurface {
   const float* normals = nullptr;  // [F, 3 corners, 3]
   const float* uvs = nullptr;      // [F, 3 corners, 2]
   const float* density = nullptr;  // [F] texture units per metre
 };
 
-// Storage of MeshLook; a table that does not exist is empty.
+// Storage of MeshSurface; a table that does not exist is empty.
 struct MeshTables {
   std::vector<float> normals;  // [F, 3 corners, 3]
   std::vector<float> uvs;      // [F, 3 corners, 2]
   std::vector<float> density;  // [F]
-  MeshLook look() const;
+  MeshSurface surface() const;
 };
 
-class Look {
+class SurfaceAssets {
  public:
   // `meshes`: prepare all meshes, including those that no geom uses, because a world may change a
   // geom's mesh or group. False for views that need no normals.
-  Look(const mjModel* model, bool meshes, bool textures);
-  Look(const Look&) = delete;
-  Look& operator=(const Look&) = delete;
+  SurfaceAssets(const mjModel* model, bool meshes, bool textures);
+  SurfaceAssets(const SurfaceAssets&) = delete;
+  SurfaceAssets& operator=(const SurfaceAssets&) = delete;
 
   const Texture* texture(int id) const { return id < 0 ? nullptr : &textures_[id]; }
-  const MeshLook* mesh(int id) const { return &meshes_[id]; }
+  const MeshSurface* mesh(int id) const { return &meshes_[id]; }
   // Without normals, which change with the shape.
   // index as in flex_parts()
-  const MeshLook* flex_part(int index) const { return &flex_parts_[index]; }
+  const MeshSurface* flex_part(int index) const { return &flex_parts_[index]; }
   int num_flex_parts() const { return static_cast<int>(flex_parts_.size()); }
-  const MeshLook* skin(int id) const { return &skins_[id]; }
+  const MeshSurface* skin(int id) const { return &skins_[id]; }
   const Texture* skybox() const { return skybox_; }  // null if the model has none
 
  private:
   void add_texture(const mjModel* model, int id);
   void add_flex(const mjModel* model, int id, bool textures);
   void add_skin(const mjModel* model, int id);
-  void keep(std::shared_ptr<const MeshTables> tables, MeshLook& look);
+  void keep(std::shared_ptr<const MeshTables> tables, MeshSurface& surface);
 
   std::vector<Texture> textures_;
-  std::vector<MeshLook> meshes_, flex_parts_, skins_;
+  std::vector<MeshSurface> meshes_, flex_parts_, skins_;
   std::vector<std::vector<std::uint32_t>> texels_;
   // Tables of meshes are shared by all models of the process that have equal meshes.
   std::vector<std::shared_ptr<const MeshTables>> tables_;

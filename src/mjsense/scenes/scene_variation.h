@@ -12,11 +12,11 @@
 
 namespace mjsense {
 
-class Look {
+class SceneVariation {
  public:
   // Throws KeyError for a pattern that matches nothing or an unknown texture, and ValueError for a
   // body that moves. `place` is the prefix of messages.
-  Look(std::vector<SceneVaryCfg> cfg, Simulation& simulation, std::string_view place);
+  SceneVariation(std::vector<SceneVaryCfg> cfg, Simulation& simulation, std::string_view place);
 
   bool varies() const { return !parts_.empty(); }
   // body_pos of this world; the model's own array if body positions do not vary.

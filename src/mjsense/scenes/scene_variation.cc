@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "mjsense/scenes/look.h"
+#include "mjsense/scenes/scene_variation.h"
 
 #include <fmt/format.h>
 
@@ -71,7 +71,8 @@ void shift_colour(double hue, double saturation, double brightness, float rgb[3]
   }
 }
 
-Look::Look(std::vector<SceneVaryCfg> cfg, Simulation& simulation, std::string_view place)
+SceneVariation::SceneVariation(std::vector<SceneVaryCfg> cfg, Simulation& simulation,
+                               std::string_view place)
     : model_(simulation.model()) {
   mjBatch* batch = simulation.worlds().batch();
   for (SceneVaryCfg& one : cfg) {
@@ -114,7 +115,7 @@ Look::Look(std::vector<SceneVaryCfg> cfg, Simulation& simulation, std::string_vi
 
 // Resets this world's row to the model's colour and returns it; null if colours of this kind do not
 // vary.
-float* Look::colour_of(VaryKind what, int world, int id) const {
+float* SceneVariation::colour_of(VaryKind what, int world, int id) const {
   const auto row = [&](float* base, int count, int size, const float* rest) -> float* {
     if (!base) return nullptr;
     float* mine = base + (static_cast<std::size_t>(world) * count + id) * size;
@@ -134,12 +135,12 @@ float* Look::colour_of(VaryKind what, int world, int id) const {
   return row(geom_rgba_, static_cast<int>(model_->ngeom), 4, model_->geom_rgba);
 }
 
-const double* Look::body_pos(int world) const {
+const double* SceneVariation::body_pos(int world) const {
   return body_pos_ ? body_pos_ + 3 * static_cast<std::size_t>(world) * model_->nbody
                    : model_->body_pos;
 }
 
-void Look::move_body(const SceneVaryCfg& cfg, int world, int id, Rng& rng) const {
+void SceneVariation::move_body(const SceneVaryCfg& cfg, int world, int id, Rng& rng) const {
   const std::size_t at = static_cast<std::size_t>(world) * model_->nbody + id;
   for (int i = 0; i < 3; ++i)
     body_pos_[3 * at + i] = model_->body_pos[3 * id + i] + around(rng, cfg.pos[i]);
@@ -147,7 +148,7 @@ void Look::move_body(const SceneVaryCfg& cfg, int world, int id, Rng& rng) const
   write_quat(axis_angle({0, 0, 1}, turn) * quat(model_->body_quat + 4 * id), body_quat_ + 4 * at);
 }
 
-void Look::vary(int world, Rng& rng) const {
+void SceneVariation::vary(int world, Rng& rng) const {
   for (const Part& part : parts_) {
     const SceneVaryCfg& c = part.cfg;
     for (int id : part.ids) {

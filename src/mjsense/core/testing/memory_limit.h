@@ -1,0 +1,28 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+// Tests that run out of memory.
+
+#include <gtest/gtest.h>
+#include <sys/resource.h>
+
+#include <cstdio>
+#include <cstdlib>
+
+namespace mjsense::testing {
+
+// Runs `test` in a child process with this address space, in bytes; what fails there fails here. Sanitisers reserve terabytes, so the
+// test is skipped with them.
+inline void with_address_space(rlim_t bytes, auto&& test) {
+#if defined(__SANITIZE_ADDRESS__) || defined(__SANITIZE_THREAD__)
+  GTEST_SKIP() << "an address space of " << bytes << " bytes is too small for a sanitiser";
+#endif
+  const auto child = [&] {
+    const rlimit limit{bytes, bytes};
+    setrlimit(RLIMIT_AS, &limit);
+    test();
+    std::_Exit(::testing::Test::HasFailure() ? 1 : 0);
+  };
+  EXPECT_EXIT(child(), ::testing::ExitedWithCode(0), "");
+}
+
+}  // namespace mjsense::testing

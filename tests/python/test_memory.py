@@ -1,0 +1,67 @@
+# SPDX-License-Identifier: Apache-2.0
+"""A lack of memory, and models whose size asks for more than there is, are errors: the process goes on."""
+
+import os
+import resource
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+import mjsense
+
+SMALL = "<mujoco><worldbody><body><freejoint/><geom size='.1'/></body></worldbody></mujoco>"
+HOSTILE = SMALL.replace("<worldbody>", '<size nuser_geom="2000000000"/><worldbody>')
+CHILD = """
+import resource, sys
+import mjsense as mjs
+pages = int(open("/proc/self/statm").read().split()[0])
+resource.setrlimit(resource.RLIMIT_AS, (pages * resource.getpagesize() + int(sys.argv[1]),) * 2)
+try:
+    sim = mjs.Simulation(mjs.Scene(mjs.SceneCfg(entities={"a": mjs.EntityCfg(model=sys.argv[2])})), num_worlds=2)
+except (RuntimeError, ValueError, MemoryError) as error:
+    print("raised", error)
+else:
+    print("made")
+"""
+
+
+# MuJoCo alone takes 15 MB for a world: too little for the compiler, for a world, for two.
+@pytest.mark.parametrize("megabytes", [1, 8, 40, 100])
+def test_too_little_memory_is_an_error(tmp_path, megabytes):
+    assert "memory" in run(tmp_path, SMALL, megabytes * 1_000_000)
+
+
+# A std::bad_alloc inside libmujoco, which no C++ code outside of it can catch.
+def test_a_size_beyond_all_memory_is_an_error(tmp_path):
+    assert "scene: MuJoCo ran out of memory, or a size in the model is too large" in run(tmp_path, HOSTILE, 3_000_000_000)
+
+
+def test_the_program_ends_with_an_error(tmp_path):
+    model = tmp_path / "model.xml"
+    model.write_text(HOSTILE)
+    program = Path(mjsense.__file__).parents[2] / "mjsense"
+    if not program.is_file():
+        pytest.skip("the program is not beside the package")
+    done = subprocess.run(
+        [program, "sensors", model],
+        preexec_fn=lambda: resource.setrlimit(resource.RLIMIT_AS, (3_000_000_000,) * 2),
+        capture_output=True,
+        text=True,
+        timeout=300,
+        check=False,
+    )
+    assert done.returncode == 2
+    assert "MuJoCo ran out of memory" in done.stderr
+
+
+def run(folder, xml, bytes_left):
+    model = folder / "model.xml"
+    model.write_text(xml)
+    done = subprocess.run(
+        [sys.executable, "-c", CHILD, str(bytes_left), str(model)], env=os.environ, capture_output=True, text=True, timeout=300, check=False
+    )
+    assert done.returncode == 0, done.stderr[-2000:]
+    assert done.stdout.startswith("raised ")
+    return done.stdout
