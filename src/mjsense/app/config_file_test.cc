@@ -56,7 +56,7 @@ std::string with(std::string line, const std::string& key, const std::string& va
   return line.replace(at, std::min(line.find(' ', at), line.size()) - at, key + value);
 }
 
-TEST(ConfigFile, EveryKeyReachesItsOptionAlone) {
+TEST(ConfigFile, EveryKeySetsItsOptionOnly) {
   const std::string before = text(RecordOptions());
   const struct {
     const char *toml, *key, *value;
@@ -149,7 +149,7 @@ TEST(ConfigFile, LettersBeyondAscii) {
 }
 
 // toml++ 3.3 asserts that some of these cannot occur.
-TEST(ConfigFile, HeadersThatAreNoKeys) {
+TEST(ConfigFile, InvalidHeadersAreErrors) {
   for (const std::string header :
        {"+a",   "[+a",    "=", "#",  ".",        ".a",  "a.", "a.+", "a..b",
         ",",    "{",      "'", "\"", "''' a'''", " ",   "\n", "\r",  "\x01",

@@ -13,7 +13,7 @@ TEST(Terminal, TextIsBrokenAtSpaces) {
   EXPECT_THAT(wrap("one two three", 100), ElementsAre("one two three"));
 }
 
-TEST(Terminal, AWordThatIsTooLongGetsALineOfItsOwn) {
+TEST(Terminal, LongWordGetsItsOwnLine) {
   EXPECT_THAT(wrap("a extraordinary b", 4), ElementsAre("a", "extraordinary", "b"));
 }
 

@@ -21,7 +21,7 @@ namespace {
 using ::testing::ElementsAre;
 using ::testing::HasSubstr;
 
-TEST(Array, RowsOfAnotherTypeAreErrors) {
+TEST(Array, RowOfWrongTypeThrows) {
   Array a(DType::kFloat32, {3, 2});
   EXPECT_EQ(a.row<float>(2).size(), 2u);
   EXPECT_THROW(a.row<double>(2), RuntimeError);
@@ -35,7 +35,7 @@ TEST(Array, RowsOfAnotherTypeAreErrors) {
   }
 }
 
-TEST(Array, SharesMemoryWithRowsOfTheSameSizeOnly) {
+TEST(Array, SharesMemoryIfRowsHaveEqualSize) {
   Array owner(DType::kFloat32, {2, 6});
   const Array same = Array::shared(owner, DType::kInt32, {2, 3, 2});
   EXPECT_EQ(same.data(), owner.data());
@@ -66,7 +66,7 @@ TEST(Errors, SuggestOnlyWhatIsNear) {
   EXPECT_FALSE(near("ab", "xy"));
 }
 
-TEST(Errors, NameTheNearest) {
+TEST(Errors, NameTheNearestCandidates) {
   const std::vector<std::string> names = {"robot/FR_foot", "robot/FL_foot", "terrain",
                                           "robot/trunk"};
   EXPECT_THAT(nearest_names("robot/FR_fot", names), ElementsAre("robot/FR_foot", "robot/FL_foot"));
@@ -83,14 +83,14 @@ TEST(Errors, NameTheNearest) {
 }
 
 #ifndef NDEBUG
-TEST(ArrayDeathTest, DevelopmentBuildsStopAtAWorldThatThereIsNot) {
+TEST(ArrayDeathTest, RowOfUnknownWorldAborts) {
   Array rows(DType::kFloat32, {2, 3});
   EXPECT_DEATH(static_cast<void>(rows.row<float>(2)), "no row of this world");
   EXPECT_DEATH(static_cast<void>(rows.row_data(-1)), "no row of this world");
 }
 #endif
 
-TEST(Rng, SameNumbersInAnyOrderAndUniform) {
+TEST(Rng, IsIndependentOfOrderAndUniform) {
   Rng a(7, 3, stream_of("imu"), 11), b(7, 3, stream_of("imu"), 11),
       other(7, 4, stream_of("imu"), 11);
   int same = 0;
@@ -165,7 +165,7 @@ TEST(Json, WritesWholeNumbersOfEitherSign) {
 }
 
 // Overlong forms, half a surrogate pair, code points beyond U+10FFFF, and incomplete characters.
-TEST(Json, WhatIsNoUtf8IsReplaced) {
+TEST(Json, InvalidUtf8IsReplaced) {
   for (const char* text :
        {"\xC0\x80", "\xE0\x80\x80", "\xED\xA0\x80", "\xF4\x90\x80\x80", "\xC3", "\xFF"}) {
     std::vector<std::uint8_t> row(64);
@@ -178,7 +178,7 @@ TEST(Json, WhatIsNoUtf8IsReplaced) {
   }
 }
 
-TEST(Json, SaysWhenTheTextDoesNotFit) {
+TEST(Json, ReportsTextThatDoesNotFit) {
   std::vector<std::uint8_t> row(8);
   JsonWriter json(row);
   json.begin_object().key("long name").value(1).end_object();

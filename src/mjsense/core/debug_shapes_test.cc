@@ -18,7 +18,7 @@ class SceneOf {
   mjvScene scene;
 };
 
-TEST(DebugShapes, AreMuJoCosConnectors) {
+TEST(DebugShapes, EqualMuJoCoConnectors) {
   DebugShapes shapes(0.03);
   shapes.add_arrow({1, 2, 3}, {1, 2, 5}, 0.1, {1, 0, 0, 1}, "up");
   shapes.add_line({0, 0, 0}, {3, 0, 4}, 2, {0, 1, 0, 0.5f}, "line");
@@ -43,7 +43,7 @@ TEST(DebugShapes, AreMuJoCosConnectors) {
   EXPECT_EQ(std::string(g[2].label), std::string(99, 'x'));
 }
 
-TEST(DebugShapes, AFrameIsThreeArrows) {
+TEST(DebugShapes, FrameIsThreeArrows) {
   DebugShapes shapes(0.03);
   const double quarter_about_z[9] = {0, -1, 0, 1, 0, 0, 0, 0, 1};
   shapes.add_frame({1, 1, 1}, quarter_about_z, 0.5, 0.01, "f");
@@ -54,7 +54,7 @@ TEST(DebugShapes, AFrameIsThreeArrows) {
   EXPECT_EQ(shapes.list()[1].label, "f_y");
 }
 
-TEST(DebugShapes, AFullSceneTellsHowManyFoundNoRoom) {
+TEST(DebugShapes, ReportsShapesThatDoNotFit) {
   DebugShapes shapes(0.03);
   for (int i = 0; i < 5; ++i) shapes.add_sphere({}, 1, {}, "hidden");
   SceneOf s(3);

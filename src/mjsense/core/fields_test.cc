@@ -108,7 +108,7 @@ TEST(Fields, EveryValueIsChecked) {
   EXPECT_EQ(fault([](Cfg& c) { c.marks = {}; }), "sensor 'x': marks is empty; choose from a, b");
 }
 
-TEST(Fields, WordsAreReadInAnyCaseAndTheNearestIsNamed) {
+TEST(Fields, WordsIgnoreCaseAndErrorsNameTheNearest) {
   EXPECT_EQ(from_word<Side>("LEFT", "sensor 'x'", "side"), Side::kLeft);
   EXPECT_EQ(word(Side::kRight), "right");
   try {
@@ -150,7 +150,7 @@ TEST(Fields, TextIsReadAndWritten) {
   }
 }
 
-TEST(Fields, ABaseIsKnownAndAPartIsNot) {
+TEST(Fields, BasesAreListedAndPartsAreNot) {
   const StructDecl& decl = struct_of<Cfg>();
   ASSERT_EQ(decl.bases.size(), 1u);
   EXPECT_STREQ(decl.bases[0].name, "Base");

@@ -27,7 +27,7 @@ void write_with_a_limit(const testing::TempDir& folder, auto&& deed) {
   deed(folder.path / "large");
 }
 
-TEST(FileLimit, WritingBeyondItIsAnError) {
+TEST(FileLimit, WriteBeyondTheLimitFails) {
   const testing::TempDir folder;
   EXPECT_EXIT(write_with_a_limit(folder,
                                  [](const std::filesystem::path& path) {
@@ -44,7 +44,7 @@ TEST(FileLimit, WritingBeyondItIsAnError) {
 }
 
 // The guard removes only its own signal. Writes outside of it raise SIGXFSZ as before.
-TEST(FileLimit, OutsideTheSignalIsAsItWas) {
+TEST(FileLimit, SignalIsUnchangedOutsideTheGuard) {
   const testing::TempDir folder;
   const auto write_much = [](const std::filesystem::path& path) {
     const Fd file(creat(path.c_str(), 0600));

@@ -22,7 +22,7 @@ using ::testing::HasSubstr;
 
 const std::vector<std::string> kNames = {"FR_foot", "FL_foot", "RR_foot", "trunk", "FR_calf"};
 
-TEST(Match, WholeNamesInModelOrder) {
+TEST(Match, MatchesFullNamesInModelOrder) {
   const std::vector<std::string> patterns = {".*_calf", "F._foot"};
   EXPECT_THAT(match_names(patterns, kNames, "sensor 'feet'"), ElementsAre(0, 1, 4));
   EXPECT_THAT(match_names(std::vector<std::string>{"(?!R).*_foot"}, kNames, "x"),
@@ -71,7 +71,7 @@ std::string refusal(const std::string& pattern) {
 }
 
 // Syntax that PCRE2 interprets differently from Python must be rejected.
-TEST(Match, RefusesWhatTheTwoReadDifferently) {
+TEST(Match, RejectsPatternsThatDifferFromPython) {
   for (const char* pattern :
        {"[[:a]",  "a{,2}b",         "a{}",     "\\u00e9", "\\N{DIGIT ONE}", "a\\Z",    "(?x) a b",
         "(a)\\1", "(?P<n>a)(?P=n)", "\\v",     "(?a)\\w", "(?(1)a|b)",      "\\101",   "\\0",
@@ -86,7 +86,7 @@ TEST(Match, RefusesWhatTheTwoReadDifferently) {
             "x: 'FR_\\Z' is not a regular expression: not supported: \\Z at position 3");
 }
 
-TEST(Match, PythonsMeaning) {
+TEST(Match, HasPythonSemantics) {
   const auto full = [](const char* pattern, std::string_view text) {
     return Regex(pattern).fullmatch(text);
   };
@@ -229,7 +229,7 @@ std::string ours(const std::vector<std::string>& patterns, const std::vector<std
   }
 }
 
-TEST(Match, TenThousandListsAgainstPython) {
+TEST(Match, RandomListsMatchPython) {
   const testing::TempDir dir;
   const std::string script = dir.file("oracle.py");
   std::ofstream(script) << kOracle;

@@ -18,7 +18,7 @@ using std::chrono::microseconds;
 
 // Threads first spin and then sleep. The runs begin while they spin, when they stop spinning, and
 // while they sleep.
-TEST(ThreadPool, RunsFollowEachOtherAtAnyDistance) {
+TEST(ThreadPool, SuccessiveRunsWithAnyPause) {
   for (const int threads : {2, 5}) {
     ThreadPool pool(threads);
     std::vector<int> sums(16);  // no atomics: what items wrote is visible when run() returns
@@ -32,7 +32,7 @@ TEST(ThreadPool, RunsFollowEachOtherAtAnyDistance) {
   }
 }
 
-TEST(ThreadPool, GoesOnAfterAnException) {
+TEST(ThreadPool, WorksAfterAnException) {
   ThreadPool pool(3);
   for (int run = 0; run < 200; ++run) {
     std::string what;
@@ -48,7 +48,7 @@ TEST(ThreadPool, GoesOnAfterAnException) {
 }
 
 // All threads run at once, one item each. No thread takes another's item while its own is pending.
-TEST(ThreadPool, NearItsThreadsItemsBeginWhereTheyDidBefore) {
+TEST(ThreadPool, RunNearStartsItemsOnTheSameThreads) {
   ThreadPool pool(4);
   for (int run = 0; run < 100; ++run) {
     std::atomic<int> here{0};
@@ -63,7 +63,7 @@ TEST(ThreadPool, NearItsThreadsItemsBeginWhereTheyDidBefore) {
   }
 }
 
-TEST(ThreadPool, NearItsThreadsEveryItemRunsOnce) {
+TEST(ThreadPool, RunNearRunsEveryItemOnce) {
   for (const int threads : {1, 2, 5}) {
     ThreadPool pool(threads);
     for (const int n : {1, 3, 37, 200}) {
@@ -82,7 +82,7 @@ TEST(ThreadPool, NearItsThreadsEveryItemRunsOnce) {
   }
 }
 
-TEST(ThreadPool, EndsWhileItsThreadsAreAwakeOrAsleep) {
+TEST(ThreadPool, DestructionWhileThreadsSpinOrSleep) {
   for (int pools = 0; pools < 60; ++pools) {
     ThreadPool pool(3);
     if (pools % 4) pool.run(pools, [](int, int) {});
@@ -90,7 +90,7 @@ TEST(ThreadPool, EndsWhileItsThreadsAreAwakeOrAsleep) {
   }
 }
 
-TEST(ThreadPool, TakesNoProcessorTimeWhenNothingRuns) {
+TEST(ThreadPool, IdlePoolUsesNoCpuTime) {
   ThreadPool pool(2);
   pool.run(64, [](int, int) {});
   std::this_thread::sleep_for(std::chrono::milliseconds(5));

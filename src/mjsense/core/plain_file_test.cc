@@ -32,7 +32,7 @@ std::string refused(const std::filesystem::path& folder, std::string_view name) 
   }
 }
 
-TEST(PlainFile, OnlyFilesOfTheFolder) {
+TEST(PlainFile, OpensRegularFilesInTheFolderOnly) {
   testing::TempDir dir;
   std::ofstream(dir.path / "video.mp4") << "x";
   std::filesystem::create_symlink("/etc/passwd", dir.path / "link");
@@ -52,7 +52,7 @@ TEST(PlainFile, OnlyFilesOfTheFolder) {
 }
 
 // A checksum of a terabyte of holes would take minutes.
-TEST(PlainFile, HolesAreNotRead) {
+TEST(PlainFile, RejectsSparseFiles) {
   testing::TempDir dir;
   std::ofstream(dir.path / "video.mp4") << "x";
   std::filesystem::resize_file(dir.path / "video.mp4", std::uintmax_t{1} << 40);
@@ -61,7 +61,7 @@ TEST(PlainFile, HolesAreNotRead) {
   EXPECT_EQ(refused(dir.path, "video.mp4"), "");
 }
 
-TEST(PlainFile, TextsThatSomebodyWrote) {
+TEST(PlainFile, ReadsUserTextFiles) {
   testing::TempDir dir;
   const auto read = [](const std::string& path) -> std::string {
     try {
@@ -87,7 +87,7 @@ TEST(PlainFile, TextsThatSomebodyWrote) {
   EXPECT_THAT(read("/proc/self/mem"), EndsWith("cannot be read: Input/output error"));
 }
 
-TEST(PlainFile, WrittenWholeOrNotAtAll) {
+TEST(PlainFile, WritesAtomically) {
   testing::TempDir dir;
   const std::filesystem::path mine = dir.path / "mine", out = dir.path / "out";
   std::ofstream(mine) << "mine";
@@ -106,7 +106,7 @@ TEST(PlainFile, WrittenWholeOrNotAtAll) {
   }
 }
 
-TEST(PlainFile, WrittenByTwoAtOnce) {
+TEST(PlainFile, ConcurrentWritersDoNotInterfere) {
   testing::TempDir dir;
   const std::filesystem::path out = dir.path / "out";
   const auto write = [&](char letter) {
@@ -139,7 +139,7 @@ TEST(PlainFile, PrintableText) {
 }
 
 // If the system refuses to start threads, that is an error. Threads that were started are ended.
-TEST(ThreadPool, ThreadsThatCannotBeStarted) {
+TEST(ThreadPool, FailureToStartThreadsThrows) {
   EXPECT_THROW(ThreadPool(1'000'000), ValueError);
 #if !defined(__SANITIZE_ADDRESS__) && !defined(__SANITIZE_THREAD__)
   const pid_t pid = fork();
@@ -161,7 +161,7 @@ TEST(ThreadPool, ThreadsThatCannotBeStarted) {
 }
 
 // In the child of a fork the threads do not exist. The destructor must not wait for them.
-TEST(ThreadPool, EndsInTheChildOfAFork) {
+TEST(ThreadPool, DestructionInAForkedChild) {
   auto pool = std::make_unique<ThreadPool>(3);
   pool->run(8, [](int, int) {});
   const pid_t pid = fork();

@@ -13,7 +13,7 @@
 namespace mjsense {
 namespace {
 
-TEST(Png, ADecoderFindsEveryPixelOfEveryKind) {
+TEST(Png, DecodesToTheSamePixels) {
   for (const int channels : {1, 3, 4}) {
     const int width = 7, height = 5;
     std::vector<std::uint8_t> pixels(width * height * channels);
@@ -50,7 +50,7 @@ TEST(Png, ReadsBackPixelByPixel) {
   }
 }
 
-TEST(Png, RefusesWrongSizesAndPlaces) {
+TEST(Png, RejectsWrongSizesAndPaths) {
   const std::vector<std::uint8_t> pixels(12);
   EXPECT_THROW(encode_png(pixels, 2, 2, 4), ValueError);
   EXPECT_THROW(encode_png(pixels, 0, 2, 3), ValueError);

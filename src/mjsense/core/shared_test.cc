@@ -6,7 +6,7 @@
 namespace mjsense {
 namespace {
 
-TEST(Shared, IsMadeOnceAndKeptAsLongAsItIsHeld) {
+TEST(Shared, IsCreatedOnceAndReleasedWithItsLastOwner) {
   Shared shared;
   int made = 0;
   const auto get = [&](const char* key) {

@@ -21,7 +21,7 @@ TEST(JsonText, AcceptsWhatPythonWrites) {
   }
 }
 
-TEST(JsonText, NamesThePlaceOfAFault) {
+TEST(JsonText, ReportsThePositionOfAnError) {
   EXPECT_EQ(parse_json(""), "byte 0: expected a value");
   EXPECT_EQ(parse_json("{\"a\":[1,2"), "byte 9: expected ',' or ']'");
   EXPECT_EQ(parse_json("{\"a\" 1}"), "byte 5: expected ':'");
@@ -34,7 +34,7 @@ TEST(JsonText, NamesThePlaceOfAFault) {
   EXPECT_NE(parse_json(std::string(1000, '[')), "");
 }
 
-TEST(JsonText, EveryPrefixOfARowIsRefused) {
+TEST(JsonText, EveryPrefixOfARowIsInvalid) {
   const std::string row =
       "{\"arm\":[0.1,-2.5e-3,Infinity],\"gripper\":{\"held\":true,\"name\":\"a\\u00e9\"}}";
   ASSERT_EQ(parse_json(row), "");
@@ -51,7 +51,7 @@ TEST(JsonText, VisitsNumbersWithTheirPaths) {
   EXPECT_TRUE(std::isnan(seen["n"].at(0)));
 }
 
-TEST(JsonText, NumbersBeyondTheRangeOfDoubleAreAsInPython) {
+TEST(JsonText, NumbersBeyondDoubleEqualPython) {
   constexpr double kInfinity = std::numeric_limits<double>::infinity();
   const std::string tiny = "0." + std::string(400, '0') + "1", huge(400, '9');
   for (const auto& [text, expected] : std::map<std::string, double>{{"1e400", kInfinity},
@@ -77,7 +77,7 @@ TEST(Lzf, UnpacksRunsAndReferences) {
   EXPECT_EQ(lzf_unpack(lengthy, out), 30u);
 }
 
-TEST(Lzf, RefusesDamage) {
+TEST(Lzf, RejectsCorruptInput) {
   std::vector<std::uint8_t> out(8);
   // literal run beyond the end of the input
   EXPECT_EQ(lzf_unpack(std::vector<std::uint8_t>{5, 'a'}, out), 0u);

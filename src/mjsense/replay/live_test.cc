@@ -22,7 +22,7 @@ using ::testing::SizeIs;
 
 FakeSuiteCfg without_video() { return {1, 16, 12, false, false}; }
 
-TEST(Live, WhatIsBeingRecordedIsNotCalledBroken) {
+TEST(Live, ActiveRecordingIsReportedAsSuch) {
   TempDir dir;
   FakeSuite suite(without_video());
   RecordingCfg cfg = fake_recording(dir.path, suite, 1, 4);
@@ -55,7 +55,7 @@ TEST(Live, WhatIsBeingRecordedIsNotCalledBroken) {
 }
 
 // Files may be moved between listing and reading them.
-TEST(Live, ARecordingMayGoOnWhileItIsVerified) {
+TEST(Live, RecordingMayContinueDuringVerify) {
   TempDir dir;
   std::atomic<bool> ended = false;
   std::thread recording([&] {
@@ -84,7 +84,7 @@ TEST(Live, ARecordingMayGoOnWhileItIsVerified) {
 }
 
 // Two versions of a file; one has data beyond the end of the other.
-TEST(Live, AFileThatIsReplacedIsNotCalledBroken) {
+TEST(Live, ReplacedFileIsReportedAsChanged) {
   TempDir dir, other;
   record(dir.path, 2, {.worlds = 1});
   record(other.path, 2, {.worlds = 1, .steps = 90});
@@ -107,7 +107,7 @@ TEST(Live, AFileThatIsReplacedIsNotCalledBroken) {
   replacing.join();
 }
 
-TEST(Live, AVideoThatIsReplacedIsNotCalledBroken) {
+TEST(Live, ReplacedVideoIsReportedAsChanged) {
   TempDir dir;
   record(dir.path, 1, {.worlds = 1}, true);
   const fs::path video = dir.path / "house_0/episode_00000000_wrist_camera_batch_1_of_1.mp4";
@@ -120,7 +120,7 @@ TEST(Live, AVideoThatIsReplacedIsNotCalledBroken) {
 }
 
 // Data sets without elements can claim any number of rows at no cost.
-TEST(Inspect, CountsNoMoreStepsThanThereAreNumbers) {
+TEST(Inspect, IgnoresClaimedRowsWithoutData) {
   TempDir dir;
   const fs::path path = dir.path / "trajectories_batch_1_of_1.h5";
   {

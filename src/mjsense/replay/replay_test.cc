@@ -73,7 +73,7 @@ TEST(Replay, DiscardedAttemptsLeaveNoTrace) {
   EXPECT_TRUE(verify(dir.path).ok()) << verify(dir.path).text();
 }
 
-TEST(Replay, AnUnfinishedRecordingIsReadableAndRepairable) {
+TEST(Replay, UnfinishedRecordingIsReadableAndRepairable) {
   TempDir dir;
   record(dir.path, 8, {.worlds = 2, .stop_after = 3}, true);
   const VerifyResult before = verify(dir.path);
@@ -122,7 +122,7 @@ TEST(Verify, CountsTheFramesOfEveryVideo) {
 }
 
 // `fail` must be the negation of `success` at every step.
-TEST(Verify, FailIsTheOppositeOfSuccess) {
+TEST(Verify, FailIsTheNegationOfSuccess) {
   for (const std::int8_t wrong : {0, 1}) {
     TempDir dir;
     record(dir.path, 1, {.worlds = 1});
@@ -174,7 +174,7 @@ class RepairNames : public ::testing::Test {
   std::string was;
 };
 
-TEST_F(RepairNames, AreThoseOfTheirOwnBatch) {
+TEST_F(RepairNames, BelongToTheirBatch) {
   std::string is;
   EXPECT_EQ(was, "episode_00000001_wrist_camera_batch_2_of_2.mp4");
   EXPECT_THAT(repair(dir.path).text(), HasSubstr("added 1 names of videos"));
@@ -186,7 +186,7 @@ TEST_F(RepairNames, AreThoseOfTheirOwnBatch) {
 
 // If repair is killed or the disk is full, the file must be unchanged. Simulated by a file size
 // limit.
-TEST_F(RepairNames, AreAddedWhollyOrNotAtAll) {
+TEST_F(RepairNames, AreAddedAtomically) {
   const std::string bytes = read_file(path);
   const std::vector<std::string> names = tree(dir.path);
   for (const int more : {-1000, 10, 1000, 3000}) {
@@ -219,7 +219,7 @@ TEST_F(RepairNames, ByOneProcessAtATime) {
 }
 
 // "trajectories_batch_1_of_2.h5.bak" is a user's backup.
-TEST_F(RepairNames, OnlyInFilesOfThatName) {
+TEST_F(RepairNames, OnlyInTrajectoryFiles) {
   for (const char* name : {"trajectories_batch_2_of_2.h5.bak", "trajectories_batch_02_of_2.h5",
                            "trajectories_batch_-2147483648_of_3.h5"}) {
     const fs::path other = path.parent_path() / name;
@@ -232,7 +232,7 @@ TEST_F(RepairNames, OnlyInFilesOfThatName) {
   }
 }
 
-TEST(Replay, OddPicturesArePadded) {
+TEST(Replay, ImagesOfOddSizeArePadded) {
   TempDir dir;
   FakeSuite suite({1, 17, 13});
   RecordingCfg cfg = fake_recording(dir.path, suite, 1, 1);

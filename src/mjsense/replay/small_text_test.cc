@@ -25,7 +25,7 @@ std::string drawn(char c) {
   return rows;
 }
 
-TEST(SmallText, LettersAreTheirShapes) {
+TEST(SmallText, GlyphsHaveTheExpectedPixels) {
   EXPECT_EQ(drawn('p'),
             "      \n"
             "      \n"
@@ -49,7 +49,7 @@ TEST(SmallText, LettersAreTheirShapes) {
 }
 
 // If letters and digits looked alike, names of episodes and cameras would be ambiguous.
-TEST(SmallText, EveryCharacterLooksItsOwn) {
+TEST(SmallText, EveryCharacterIsDistinct) {
   std::set<std::string> seen;
   for (char c = ' '; c <= '~'; ++c) {
     EXPECT_TRUE(seen.insert(drawn(c)).second) << "'" << c << "' looks like another\n" << drawn(c);
@@ -58,7 +58,7 @@ TEST(SmallText, EveryCharacterLooksItsOwn) {
   EXPECT_EQ(drawn('\xc3'), drawn('\x07'));
 }
 
-TEST(SmallText, WhatDoesNotFitIsLeftOut) {
+TEST(SmallText, TextIsClipped) {
   const int width = 30, height = 20;
   std::vector<std::uint8_t> rgb(3 * width * height, 7);
   draw_text(rgb, width, 8, 5, "WWWW");

@@ -173,7 +173,7 @@ void PrintTo(const Setting& setting, std::ostream* out) { *out << setting.text; 
 
 class CompilerSettings : public ::testing::TestWithParam<Setting> {};
 
-TEST_P(CompilerSettings, AnEntityIsWhatItsModelIsAlone) {
+TEST_P(CompilerSettings, EntityEqualsTheModelAlone) {
   const std::string xml = robot(GetParam().text);
   const ModelPtr alone = compile_text(xml, kAssets);
   ASSERT_TRUE(alone);
@@ -224,7 +224,7 @@ std::string with_lengthrange(const std::string& attributes) {
                      fmt::format("<compiler><lengthrange {}/></compiler>", attributes));
 }
 
-TEST(CompilerSettings, LengthRangesAreThoseOfTheModelAlone) {
+TEST(CompilerSettings, LengthRangesEqualTheModelAlone) {
   for (const char* attributes :
        {"mode='all' uselimit='true'", "uselimit='true'", "accel='5' inttotal='20'"}) {
     SCOPED_TRACE(attributes);
@@ -278,7 +278,7 @@ TEST(CompilerSettings, Urdf) {
   }
 }
 
-TEST(CompilerSettings, WhatCannotBeAppliedIsRefused) {
+TEST(CompilerSettings, InapplicableSettingsThrow) {
   const auto make = [](const mjSpec* spec) {
     SceneCfg cfg;
     cfg.entities = {{"e", {.model = {.spec = spec}}}};
@@ -303,7 +303,7 @@ TEST(CompilerSettings, WhatCannotBeAppliedIsRefused) {
 
 // <visual> settings are taken from the first entity that sets them, even to MuJoCo's default
 // values.
-TEST(CompilerSettings, WhatIsWrittenCountsAlsoIfItIsTheDefault) {
+TEST(CompilerSettings, ExplicitDefaultVisualSettingsAreUsed) {
   const auto lit = [](const char* compiler, double ambient) {
     return fmt::format(R"(<mujoco><compiler {}/><visual><headlight ambient="{} .1 .1"/></visual>
         <worldbody><body name="b"><geom size=".1"/></body></worldbody></mujoco>)",
@@ -315,7 +315,7 @@ TEST(CompilerSettings, WhatIsWrittenCountsAlsoIfItIsTheDefault) {
   EXPECT_FLOAT_EQ(Scene(std::move(cfg)).model()->vis.headlight.ambient[0], .1f);
 }
 
-TEST(CompilerSettings, ABaseKeepsThemForItselfOnly) {
+TEST(CompilerSettings, SettingsOfTheBaseDoNotAffectEntities) {
   const auto scene = [](const std::string& compiler, bool alone) {
     SceneCfg cfg;
     cfg.base = {.xml = robot(compiler), .assets = kAssets};
@@ -368,7 +368,7 @@ TEST(CompilerSettings, ModelsOfFolders) {
   std::printf("%d models\n", tested);
 }
 
-TEST(CompilerSettings, OnlyWhatMakesADifferenceIsApplied) {
+TEST(CompilerSettings, OnlyEffectiveSettingsAreApplied) {
   const auto settings = [](const std::string& xml) {
     char error[1000] = "";
     const SpecPtr spec(mj_parseXMLString(xml.c_str(), nullptr, error, sizeof error));

@@ -118,7 +118,7 @@ TEST(Scene, SaysWhatIsWrongWithAnEntity) {
 }
 
 // MuJoCo compiles these models; at most it warns that there is a NaN.
-TEST(Scene, RefusesNumbersInWhichNothingCanBeMeasured) {
+TEST(Scene, RejectsInvalidNumbers) {
   const auto base_fault = [](const std::string& inside) {
     SceneCfg cfg;
     cfg.base.xml = "<mujoco>" + inside + "</mujoco>";
@@ -233,7 +233,7 @@ TEST(Scene, PlacesEntities) {
 }
 
 // Patterns are tried in order; the first one that matches a joint gives its position.
-TEST(Scene, TheFirstMatchingJointPatternCounts) {
+TEST(Scene, FirstMatchingJointPatternWins) {
   const char* leg = R"(<mujoco><worldbody><body><joint name="hip"/><geom size=".1"/>
     <body><joint name="knee"/><geom size=".1"/><body><joint name="foot" type="slide" axis="0 0 1"/>
     <geom size=".1"/></body></body></body></worldbody></mujoco>)";
@@ -262,7 +262,7 @@ TEST(Scene, JoinsMocapKeyframes) {
   EXPECT_THAT(std::vector<double>(m->key_mquat + 4, m->key_mquat + 8), ElementsAre(0, 1, 0, 0));
 }
 
-TEST(Scene, EveryOptionArrives) {
+TEST(Scene, EveryOptionIsApplied) {
   SceneCfg cfg;
   cfg.options.timestep = 0.003;
   cfg.options.integrator = "rk4";
@@ -410,7 +410,7 @@ TEST(Scene, ARootInAFrameStandsWhereItIsPut) {
   EXPECT_LT(angle_between(quat(m->key_qpos + 3), key.q), 1e-7);
 }
 
-TEST(Scene, SpecFnComesLast) {
+TEST(Scene, SpecFnIsCalledLast) {
   SceneCfg cfg;
   cfg.entities = {{"robot", xml(kRobot)}};
   cfg.extent = 4;
@@ -458,7 +458,7 @@ TEST(Scene, Base) {
   EXPECT_EQ(moon.model()->opt.timestep, .002);
 }
 
-TEST(Scene, LeavesMocapBodiesInTheWorld) {
+TEST(Scene, KeepsMocapBodiesInTheWorld) {
   SceneCfg cfg;
   cfg.entities = {
       {"lab", xml("<mujoco><worldbody><body name='post'><geom size='.1'/></body><body name='hand' "
@@ -472,7 +472,7 @@ TEST(Scene, LeavesMocapBodiesInTheWorld) {
   EXPECT_THAT(scene.warnings(), ElementsAre(HasSubstr("entity 'lab': stays on the world body")));
 }
 
-TEST(Scene, KeepsTheLooksOfTheFirstThatSays) {
+TEST(Scene, UsesVisualSettingsOfTheFirstEntity) {
   SceneCfg cfg;
   cfg.entities = {
       {"a", xml("<mujoco><visual><map znear='.5'/></visual><size nuserdata='3'/></mujoco>")},

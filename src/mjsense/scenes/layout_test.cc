@@ -45,7 +45,7 @@ double nearest_of_three(double radius, std::uint64_t seed, const LayoutCfg& cfg)
   return least;
 }
 
-TEST(Layout, BeginsAnewWhereTheFirstLeaveTheLastNoRoom) {
+TEST(Layout, RestartsIfThereIsNoRoom) {
   int crowded = 0;
   for (std::uint64_t seed = 0; seed < 100; ++seed) {
     EXPECT_GE(nearest_of_three(0.1, seed, {}), 0) << seed;
@@ -75,7 +75,7 @@ TEST(Layout, WhatIsWantedStandsInRegionsForTargets) {
   for (int count : others) EXPECT_GT(count, 0) << "the others stand anywhere";
 }
 
-TEST(Layout, TakesTheLeastCrowdedOfThoseThatAllAre) {
+TEST(Layout, UsesTheLayoutWithLeastOverlap) {
   for (std::uint64_t seed = 0; seed < 20; ++seed) {
     const double once = nearest_of_three(0.25, seed, {.layouts = 1});
     EXPECT_LT(once, 0);

@@ -148,14 +148,14 @@ void expect_same(const mjModel* found, const mjModel* wanted) {
 #undef SAME
 }
 
-TEST(ObjectSizes, AreEvenlyApart) {
+TEST(ObjectSizes, AreEvenlySpaced) {
   const std::vector<double> steps = ObjectSizes::steps({.8, 1.3});
   ASSERT_EQ(steps.size(), 6u);
   for (int k = 0; k < 6; ++k) EXPECT_NEAR(steps[k], .8 + .1 * k, 1e-12);
   EXPECT_EQ(ObjectSizes::steps({1, 1}).size(), 1u);
 }
 
-TEST(ObjectSizes, AnObjectIsWhatTheCompilerMakesInThatSize) {
+TEST(ObjectSizes, ObjectEqualsTheCompiledOne) {
   Files files;
   files.cfg.sizes = {.7, 1.3};
   files.cfg.objects[1].sizes = {1, 1};
@@ -179,7 +179,7 @@ TEST(ObjectSizes, AnObjectIsWhatTheCompilerMakesInThatSize) {
   EXPECT_GE(seen.size(), 5u);
 }
 
-TEST(ObjectSizes, AnObjectFallsAndLiesAsTheCompiledOne) {
+TEST(ObjectSizes, ObjectFallsLikeTheCompiledOne) {
   Files files;
   files.cfg.sizes = {.6, 1.6};
   // The object lies on its side, so that its contacts are outside of the boxes of a smaller object.
@@ -212,7 +212,7 @@ TEST(ObjectSizes, AnObjectFallsAndLiesAsTheCompiledOne) {
   }
 }
 
-TEST(ObjectSizes, StartsAreTheEpisodesAloneAndFree) {
+TEST(ObjectSizes, StartsDependOnTheEpisodeOnlyWithoutCollisions) {
   Files files;
   files.cfg.sizes = {.6, 1.6};
   Played one(files.cfg, 1, 1), many(files.cfg, 8, 4);
@@ -238,7 +238,7 @@ TEST(ObjectSizes, StartsAreTheEpisodesAloneAndFree) {
   }
 }
 
-TEST(ObjectSizes, ObjectsThatAreFoundHaveThemToo) {
+TEST(ObjectSizes, DiscoveredObjectsHaveSizes) {
   Files files;
   files.cfg.objects.clear();
   files.cfg.sizes = {.8, 1.2};
@@ -250,7 +250,7 @@ TEST(ObjectSizes, ObjectsThatAreFoundHaveThemToo) {
   expect_same(played.model(0).get(), compiled.sim->model());
 }
 
-TEST(ObjectSizes, WhatStandsOnFurnitureMovesWithIt) {
+TEST(ObjectSizes, ObjectsMoveWithFurniture) {
   Files files;
   SceneVaryCfg table;
   table.what = VaryKind::kBody;

@@ -59,7 +59,7 @@ struct Floor {
   std::unique_ptr<mjData, DataDelete> data;
 };
 
-TEST(Occupancy, TakesWhatIsInTheWayAndNothingElse) {
+TEST(Occupancy, MarksObstaclesOnly) {
   const Floor floor(1.0);
   const Occupancy o = floor.occupancy();
   const auto free = [&](double x, double y) { return o.clearance(x, y) > 0; };
@@ -78,7 +78,7 @@ TEST(Occupancy, TakesWhatIsInTheWayAndNothingElse) {
 
 // A pillar with vertices at its ends only must be an obstacle in between. It has too many vertices
 // to compare all pairs.
-TEST(Occupancy, TakesMeshesBetweenTheirPoints) {
+TEST(Occupancy, MarksMeshesBetweenTheirVertices) {
   std::string points;
   for (int i = 0; i < 128; ++i) {
     const double a = 2 * std::numbers::pi * i / 128;
@@ -98,7 +98,7 @@ TEST(Occupancy, TakesMeshesBetweenTheirPoints) {
 }
 
 // The cylinder of radius 0.2 m at x = -1, y = 1 can move by 0.5 m in both directions along x.
-TEST(Occupancy, TakesWhereFurnitureMayStand) {
+TEST(Occupancy, MarksDisplacedFurniture) {
   const Floor floor(1.0);
   const int cylinder = floor.model->ngeom - 2;
   ASSERT_EQ(floor.model->geom_type[cylinder], mjGEOM_CYLINDER);
@@ -131,7 +131,7 @@ Footprint disc(const Floor& floor) {
           10};
 }
 
-TEST(Occupancy, AFootprintIsMadeOfTheRobotsGeoms) {
+TEST(Occupancy, FootprintCoversTheRobotGeoms) {
   const Floor floor(1.0);
   const Footprint print = disc(floor);
   EXPECT_NEAR(print.radius(), 0.2, 0.005);
@@ -141,7 +141,7 @@ TEST(Occupancy, AFootprintIsMadeOfTheRobotsGeoms) {
   EXPECT_FALSE(print.fits(o, 0, 0, 0, 0.35));
 }
 
-TEST(BaseRoute, GoesThroughTheGapWithoutTouching) {
+TEST(BaseRoute, PassesTheGapWithoutCollision) {
   const Floor floor(1.0);
   const Occupancy o = floor.occupancy();
   const BaseRoutes routes(o, disc(floor));
@@ -160,14 +160,14 @@ TEST(BaseRoute, GoesThroughTheGapWithoutTouching) {
   EXPECT_LT(length, 1.3 * (std::hypot(1, 0.3) + std::hypot(1.2, 1.2)));
 }
 
-TEST(BaseRoute, ThereIsNoneWhereItIsTooNarrow) {
+TEST(BaseRoute, NarrowGapHasNoPath) {
   const Floor floor(0.45);  // a width of 0.4 m plus twice the margin is needed
   const BaseRoutes routes(floor.occupancy(), disc(floor));
   EXPECT_TRUE(routes.find({-1, 0.3, 0}, {1.2, -1.2, 0}).empty());
   EXPECT_FALSE(routes.find({-1, 0.3, 0}, {-1.2, -1.2, 0}).empty());
 }
 
-TEST(BaseRoute, ADifferentialBaseGoesAlongItsHeading) {
+TEST(BaseRoute, DifferentialBaseMovesAlongItsHeading) {
   const Floor floor(1.0);
   BaseRouteCfg cfg;
   cfg.sideways = false;
@@ -236,7 +236,7 @@ TEST(BaseRoute, KeepsClearWhereThereIsRoom) {
   }
 }
 
-TEST(BaseRoute, TimesKeepSpeedsAndAccelerations) {
+TEST(BaseRoute, TimesRespectSpeedAndAccelerationLimits) {
   const BasePose way[] = {{0, 0, 0}, {1.5, 0, 0}, {1.5, 0, 0.5 * pi}, {1.5, 0.1, 0.5 * pi}};
   const BaseSpeeds speeds;
   const auto points = timed(way, speeds, 0.02);

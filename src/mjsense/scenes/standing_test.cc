@@ -27,7 +27,7 @@ Pose offset_of(const char* robot_name) {
 }
 
 // The table scene was made for the Franka.
-TEST(Standing, WhoReachesStaysWhereTheSceneSays) {
+TEST(Standing, KeepsThePlacementIfReachable) {
   for (const char* robot : {"franka", "mobile_franka"}) {
     const Pose offset = offset_of(robot);
     EXPECT_EQ(norm(offset.p), 0) << robot;
@@ -36,7 +36,7 @@ TEST(Standing, WhoReachesStaysWhereTheSceneSays) {
 }
 
 // The table tops are 0.6 m high; RB-Y1's hands are at twice that height.
-TEST(Standing, WhoCanStoopDoesWhereATableIsLow) {
+TEST(Standing, StoopsAtALowTable) {
   EpisodeScene scene(load_scene("table"));
   TaskCfg cfg;
   cfg.robot = robot_cfg("rby1");
@@ -55,7 +55,7 @@ TEST(Standing, WhoCanStoopDoesWhereATableIsLow) {
 
 // At no base pose that the scene can sample may the robot penetrate the table, which would push it
 // away.
-TEST(Standing, WhoMovesNearerStandsInNothing) {
+TEST(Standing, MovedBaseIsCollisionFree) {
   TaskCfg cfg;
   cfg.robot = robot_cfg("rby1");
   cfg.scene = "tableware";
@@ -81,7 +81,7 @@ TEST(Standing, WhoMovesNearerStandsInNothing) {
 }
 
 // The scene has a pedestal for the robot above the ground, which is not at z = 0.
-TEST(Standing, WhoDrivesStandsOnTheGround) {
+TEST(Standing, MobileBaseIsOnTheGround) {
   const testing::TempDir dir;
   std::ofstream(dir.file("room.xml")) << R"(<mujoco><worldbody>
       <geom type="plane" size="3 3 .1" pos="0 0 .5" contype="0" conaffinity="0"/>
@@ -135,7 +135,7 @@ TEST(Standing, TargetsAreLimitedToRegionsThatAHandReaches) {
   }
 }
 
-TEST(Standing, AFloatingHandHangsAboveTheTargetsPointingDown) {
+TEST(Standing, FloatingHandIsAboveTheTargets) {
   const Pose offset = offset_of("floating_rum");
   EXPECT_NEAR(offset.p.x, 0.54 - 0.15, 1e-9);
   EXPECT_NEAR(offset.p.z, 0.6 + 0.35 + 0.235, 1e-3);

@@ -111,7 +111,7 @@ TEST(Simulation, ComputesOnceUntilTheStateChanges) {
   EXPECT_THAT(h->computes, Each(3));
 }
 
-TEST(Simulation, DescribesThePresentState) {
+TEST(Simulation, ReadsTheCurrentState) {
   Simulation sim(scene(), {.decimation = 5});
   auto h = add(sim, "h");
   sim.step(4);
@@ -254,7 +254,7 @@ struct Stepped final : Sensor, ControlStepListener {
   std::vector<RowError::Fault> fail, fail_step;
 };
 
-TEST(Simulation, TellsSensorsOfEveryControlStepBeforeTheirRows) {
+TEST(Simulation, NotifiesListenersOfEveryControlStep) {
   Simulation sim(scene(), {.num_worlds = 3, .decimation = 2});
   auto sensor = std::make_shared<Stepped>("s");
   sim.add(sensor);
@@ -273,7 +273,7 @@ TEST(Simulation, TellsSensorsOfEveryControlStepBeforeTheirRows) {
   EXPECT_THAT(sensor->steps, ElementsAre(3, 2, 3));
 }
 
-TEST(Simulation, RowsThatCannotBeFilledAreAskedForAgainTheOthersNot) {
+TEST(Simulation, OnlyFailedRowsAreRecomputed) {
   Simulation sim(scene(), {.num_worlds = 4});
   auto first = std::make_shared<Stepped>("first"), second = std::make_shared<Stepped>("second");
   sim.add(first);
@@ -344,7 +344,7 @@ TEST(Simulation, ASensorIsComputedAfterTheCastsThatItReads) {
 }
 
 // A sensor written in Python may read other sensors while it is computed.
-TEST(Simulation, BatchSensorsMayReadOthers) {
+TEST(Simulation, BatchSensorsCanReadOtherSensors) {
   Simulation sim(scene(), {.num_worlds = 2});
   auto h = add(sim, "h");
   auto user = add(sim, "user", Stage::kBatch);
@@ -355,7 +355,7 @@ TEST(Simulation, BatchSensorsMayReadOthers) {
   EXPECT_THAT(h->computes, Each(2));
 }
 
-TEST(Simulation, AFailingSensorIsNamedAndTheOthersGoOn) {
+TEST(Simulation, FailingSensorIsNamedAndOthersContinue) {
   Simulation sim(scene(), {.num_worlds = 3});
   auto bad = add(sim, "bad");
   auto good = add(sim, "good");
@@ -374,7 +374,7 @@ TEST(Simulation, AFailingSensorIsNamedAndTheOthersGoOn) {
 }
 
 // The sensor's name is added to an error, whose type is unchanged.
-TEST(Simulation, AnErrorKeepsItsKind) {
+TEST(Simulation, ErrorKeepsItsType) {
   Simulation sim(scene(), {.num_worlds = 2});
   auto bad = add(sim, "bad");
   bad->fail_in = 0;
@@ -387,7 +387,7 @@ TEST(Simulation, AnErrorKeepsItsKind) {
 }
 
 // The name is also added if it occurs by chance in the message: the "a" of "no value".
-TEST(Simulation, AnErrorNamesItsSensor) {
+TEST(Simulation, ErrorNamesItsSensor) {
   Simulation sim(scene(), {.num_worlds = 2});
   auto bad = add(sim, "a");
   bad->fail_in = 0;
@@ -399,7 +399,7 @@ TEST(Simulation, AnErrorNamesItsSensor) {
   }
 }
 
-TEST(Simulation, StepsAreAsLongAsTheirSubsteps) {
+TEST(Simulation, StepLastsAsLongAsItsSubsteps) {
   Simulation sim(scene(), {.decimation = 5});
   EXPECT_DOUBLE_EQ(sim.step_dt(), 5 * sim.model()->opt.timestep);
   sim.step(3);
@@ -407,7 +407,7 @@ TEST(Simulation, StepsAreAsLongAsTheirSubsteps) {
 }
 
 // mjlab's order of calls: an update represents the duration that is passed to it.
-TEST(Simulation, AnUpdateByHandLastsAsLongAsItSays) {
+TEST(Simulation, ManualUpdateUsesTheGivenDuration) {
   Simulation sim(scene(), {});
   auto filter = std::make_shared<Height>("filter");
   filter->with_substeps = true;
@@ -421,7 +421,7 @@ TEST(Simulation, AnUpdateByHandLastsAsLongAsItSays) {
 }
 
 // Rays hit the world in its current state, not in the state of the first cast.
-TEST(Simulation, RaysFollowTheState) {
+TEST(Simulation, RaysUseTheCurrentState) {
   SceneCfg cfg;
   cfg.entities.emplace_back("robot", EntityCfg{.model = {.xml = kXml}});
   cfg.terrain = TerrainCfg{};
@@ -443,7 +443,7 @@ TEST(Simulation, RaysFollowTheState) {
   EXPECT_FLOAT_EQ(sensor.field("distances").data.row<float>(1)[0], 2.4f);
 }
 
-TEST(Simulation, AStepAllocatesNothing) {
+TEST(Simulation, StepAllocatesNothing) {
   Simulation sim(scene(), {.num_worlds = 4, .decimation = 2, .threads = 2});
   auto camera = add(sim, "camera", Stage::kCast);
   auto h = add(sim, "h");
@@ -462,7 +462,7 @@ TEST(Simulation, AStepAllocatesNothing) {
 }
 
 // An empty list of worlds ("the worlds that are done") must not mean all worlds.
-TEST(Simulation, AnEmptyListOfWorldsIsNone) {
+TEST(Simulation, EmptyListOfWorldsMeansNone) {
   Simulation sim(scene(), {.num_worlds = 3});
   auto h = add(sim, "h");
   sim.step(5);
@@ -485,7 +485,7 @@ TEST(Simulation, AnEmptyListOfWorldsIsNone) {
   EXPECT_THAT(h->resets, ElementsAre(1, 1, 1));
 }
 
-TEST(Simulation, WorldsThatAreNotThereAreErrors) {
+TEST(Simulation, UnknownWorldsThrow) {
   Simulation sim(scene(), {.num_worlds = 3});
   auto h = add(sim, "h");
   Sensor* one[] = {h.get()};
@@ -499,7 +499,7 @@ TEST(Simulation, WorldsThatAreNotThereAreErrors) {
   }
 }
 
-TEST(Simulation, ASceneBelongsToOneSimulationAtATime) {
+TEST(Simulation, SceneIsUsedByOneSimulationAtATime) {
   const auto shared = scene();
   {
     Simulation first(shared, {.num_worlds = 4});

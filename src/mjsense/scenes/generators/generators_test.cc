@@ -61,7 +61,7 @@ std::vector<std::string> generated_scenes() {
   return names;
 }
 
-TEST(Generators, AHouseIsTheSameEveryTimeAndNeighboursDiffer) {
+TEST(Generators, HousesAreDeterministicAndDiffer) {
   for (const std::string& name : generated_scenes()) {
     std::vector<std::string> texts;
     for (const char* house : {"", ":0", ":7"}) {
@@ -75,7 +75,7 @@ TEST(Generators, AHouseIsTheSameEveryTimeAndNeighboursDiffer) {
   }
 }
 
-TEST(Generators, NothingStartsInsideAnything) {
+TEST(Generators, StartsWithoutPenetration) {
   for (const std::string& name : generated_scenes()) {
     for (int house = 0; house < 4; ++house) {
       Built built(name + ":" + std::to_string(house));
@@ -88,7 +88,7 @@ TEST(Generators, NothingStartsInsideAnything) {
 
 // Furniture is displaced in every episode. It must stay within the cells that the occupancy map
 // marks.
-TEST(Generators, MapsHoldWhereverFurnitureStands) {
+TEST(Generators, OccupancyCoversDisplacedFurniture) {
   for (const std::string name : {"floor", "floor:3", "room_with_door", "room_with_door:5"}) {
     EpisodeScene scene(load_scene(name));
     SceneCfg whole = scene.scene_cfg("robot_0");
@@ -135,7 +135,7 @@ TEST(Generators, MapsHoldWhereverFurnitureStands) {
   }
 }
 
-TEST(Generators, ErrorsNameWhatThereIs) {
+TEST(Generators, ErrorsNameValidGenerators) {
   EXPECT_THAT(error_of([] { load_scene("table:3"); }), HasSubstr("has no generator"));
   EXPECT_THAT(error_of<KeyError>([] { load_scene("shelv:3"); }), HasSubstr("did you mean 'shelf'"));
   mjsense::testing::TempDir dir;
@@ -148,7 +148,7 @@ TEST(Generators, ErrorsNameWhatThereIs) {
               HasSubstr("did you mean 'lowest'"));
 }
 
-TEST(Generators, ParametersReachTheHouse) {
+TEST(Generators, ParametersArePassedToTheGenerator) {
   mjsense::testing::TempDir dir;
   const std::string file = dir.file("scene.toml");
   std::ofstream(file) << "name = \"mine\"\nextends = \"shelf\"\n[parameters]\nlowest = 0.44\n";
