@@ -56,10 +56,10 @@ class HelpFormatter : public CLI::Formatter {
 
   std::string entry(const std::string& name, const std::string& text) const {
     std::string out = "  " + name;
-    bool begun = text_width(out) + 2 > kNameColumn;  // the description begins on the next line
+    bool begun = display_width(out) + 2 > kNameColumn;  // the description begins on the next line
     if (begun) out += "\n";
     for (const std::string& line : wrap(text, std::max(width_ - kNameColumn, std::size_t{24}))) {
-      out += std::string(begun ? kNameColumn : kNameColumn - text_width(out), ' ') + line + "\n";
+      out += std::string(begun ? kNameColumn : kNameColumn - display_width(out), ' ') + line + "\n";
       begun = true;
     }
     return out;

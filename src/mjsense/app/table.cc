@@ -38,18 +38,18 @@ void add_tree(const std::filesystem::path& folder, const std::string& indent, st
 
 std::string Table::text() const {
   std::vector<std::size_t> widths;
-  for (const std::string& cell : header) widths.push_back(text_width(cell));
+  for (const std::string& cell : header) widths.push_back(display_width(cell));
   std::vector<std::vector<std::string>> shown = rows;
   for (auto& row : shown) {
     for (std::string& cell : row) cell = printable(cell);  // names from files of others
     for (std::size_t i = 0; i < row.size(); ++i)
-      widths[i] = std::max(widths[i], text_width(row[i]));
+      widths[i] = std::max(widths[i], display_width(row[i]));
   }
   std::string out;
   const auto add = [&](const std::vector<std::string>& row) {
     std::string line;
     for (std::size_t i = 0; i < row.size(); ++i) {
-      const std::string padding(widths[i] - text_width(row[i]), ' ');
+      const std::string padding(widths[i] - display_width(row[i]), ' ');
       const bool to_right = i < right.size() && right[i] == 'r';
       line += to_right ? padding + row[i] : row[i] + padding;
       if (i + 1 < row.size()) line += "  ";

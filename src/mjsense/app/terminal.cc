@@ -17,7 +17,7 @@ std::size_t terminal_width(int fd) {
   return given > 1 ? static_cast<std::size_t>(given) : 80;
 }
 
-std::size_t text_width(std::string_view text) {
+std::size_t display_width(std::string_view text) {
   // Continuation bytes of UTF-8 are 10xxxxxx.
   return static_cast<std::size_t>(std::ranges::count_if(
       text, [](char c) { return (static_cast<unsigned char>(c) & 0xC0) != 0x80; }));
@@ -29,7 +29,7 @@ std::vector<std::string> wrap(std::string_view text, std::size_t width) {
   while (!text.empty()) {
     const std::size_t end = std::min(text.find(' '), text.size());
     const std::string_view word = text.substr(0, end);
-    if (!line.empty() && text_width(line) + 1 + text_width(word) > width) {
+    if (!line.empty() && display_width(line) + 1 + display_width(word) > width) {
       lines.push_back(line);
       line.clear();
     }

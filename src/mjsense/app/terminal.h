@@ -13,7 +13,7 @@ namespace mjsense {
 std::size_t terminal_width(int fd);
 
 // Number of characters of UTF-8 text.
-std::size_t text_width(std::string_view text);
+std::size_t display_width(std::string_view text);
 
 // Lines of at most `width` characters, broken at spaces. A longer word gets a line of its own.
 std::vector<std::string> wrap(std::string_view text, std::size_t width);

@@ -20,7 +20,7 @@ TEST(Terminal, LongWordGetsItsOwnLine) {
 TEST(Terminal, EmptyTextIsOneEmptyLine) { EXPECT_THAT(wrap("", 10), ElementsAre("")); }
 
 TEST(Terminal, WidthCountsCharactersNotBytes) {
-  EXPECT_EQ(text_width("└── a"), 5u);
+  EXPECT_EQ(display_width("└── a"), 5u);
   EXPECT_THAT(wrap("éé éé", 5), ElementsAre("éé éé"));
 }
 
