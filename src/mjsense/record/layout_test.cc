@@ -53,7 +53,7 @@ TEST(Layout, StreamsStandWhereMolmoSpacesReadersLook) {
   EXPECT_EQ(place_of("env_states/actors/cup"), "env_states/actors/cup");
   EXPECT_EQ(place_of("object_image_points/cup/wrist/points"),
             "obs/extra/object_image_points/cup/wrist/points");
-  // MolmoSpaces loses every stream with "camera" or "_depth" in its name.
+  // MolmoSpaces drops every stream with "camera" or "_depth" in its name.
   EXPECT_EQ(place_of("camera_shake"), "obs/extra/camera_shake");
   EXPECT_EQ(place_of("water_depth"), "obs/extra/water_depth");
 }
@@ -67,14 +67,14 @@ TEST(Layout, NumbersByMoveGroupAreTextForMolmoSpacesReaders) {
   EXPECT_EQ(p.arrays[0].spec.shape, Shape({2000}));
   EXPECT_EQ(p.arrays[0].row_bytes(), 2000u);
   EXPECT_EQ(p.arrays[0].kept_bytes(), 28u);
-  // One field alone, a picture, or another name: as it is.
+  // A single field, an image or a sensor of another name is not converted to text.
   const Plain row("qvel", spec(DType::kFloat32, {7})),
       picture("grasp_state_cup", spec(DType::kFloat32, {4, 4}), "gripper"),
       other("joints", spec(DType::kFloat32, {7}), "arm");
   const RecordingPlan plain = plan({&row, &picture, &other});
   for (const ArrayStream& stream : plain.arrays) EXPECT_EQ(stream.kind(), "plain");
   EXPECT_EQ(plain.arrays[2].place, "obs/extra/joints/arm");
-  // 80 numbers of 25 bytes are more than a row of text.
+  // 80 numbers of 25 bytes exceed a row of text.
   const Plain many("qpos", spec(DType::kFloat32, {80}), "arm");
   EXPECT_EQ(error_of([&] { plan({&many}); }),
             "sensor 'qpos': its text can need 2012 bytes, a row of it has 2000");
@@ -83,8 +83,8 @@ TEST(Layout, NumbersByMoveGroupAreTextForMolmoSpacesReaders) {
 TEST(Layout, BatchesAreThePeersAndEven) {
   EXPECT_THAT(batch_sizes(8, 0), ElementsAre(4, 4));
   EXPECT_THAT(batch_sizes(1, 0), ElementsAre(1));
-  EXPECT_THAT(batch_sizes(10, 0), ElementsAre(5, 5));        // round(2.5) is 2 in Python
-  EXPECT_THAT(batch_sizes(14, 0), ElementsAre(4, 4, 3, 3));  // round(3.5) is 4
+  EXPECT_THAT(batch_sizes(10, 0), ElementsAre(5, 5));        // Python: round(2.5) == 2
+  EXPECT_THAT(batch_sizes(14, 0), ElementsAre(4, 4, 3, 3));  // Python: round(3.5) == 4
   EXPECT_THAT(batch_sizes(7, 3), ElementsAre(3, 2, 2));
   EXPECT_THROW(batch_sizes(0, 0), ValueError);
   EXPECT_THROW(batch_sizes(2, 3), ValueError);
@@ -160,7 +160,7 @@ TEST(Layout, DifferencesOfRecordingsAreNamed) {
   };
   EXPECT_EQ(difference(), "'episodes' was 8 and is now 10");
   b.episodes = 8;
-  b.video.max_encoders = 3;  // of no consequence for the files
+  b.video.max_encoders = 3;  // does not affect the files
   b.num_worlds = 1;
   EXPECT_EQ(difference(), "");
   b.settings = R"({"task": "place"})";
@@ -196,7 +196,7 @@ TEST(Depth, RedGreenIsThePeersForm) {
   EXPECT_EQ(code(5), 0);
 }
 
-// From a file of a stranger's, deep enough to end any stack.
+// Such a text may come from an untrusted file: it is nested deeply enough to overflow any stack.
 TEST(Fingerprint, OfNoUseIsNeverEqual) {
   const std::string ours = R"({"a":1})";
   const std::string deep =

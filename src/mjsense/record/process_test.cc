@@ -19,7 +19,8 @@ namespace {
 using ::testing::HasSubstr;
 
 TEST(Process, StreamsAndNothingElseAreInherited) {
-  const Fd other(open("/dev/null", O_RDONLY));  // without O_CLOEXEC, as libraries do it
+  // Inheritable, without O_CLOEXEC, as some libraries open files.
+  const Fd other(open("/dev/null", O_RDONLY));
   ASSERT_GT(other.get(), 2);
   std::string words;
   const std::string out =
@@ -76,8 +77,8 @@ TEST(Process, LimitsOfProcessorAndMemory) {
               HasSubstr("MemoryError"));
 }
 
-// Signals rain on a group that starts programs: a handler of it hears them, the programs do not.
-// In a process of its own, which leads such a group.
+// Signals are sent repeatedly to a process group that starts programs. The handler of the parent
+// receives them, the programs do not. Runs in a separate process that leads such a group.
 int start_programs_in_the_rain() {
   if (setpgid(0, 0) != 0) return 2;
   struct sigaction action = {};

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Containers counted without ffmpeg: what it wrote, and what is left of it.
+// Frame counts of video containers without ffmpeg: complete, truncated and random files.
 #include "mjsense/record/video_file.h"
 
 #include <fcntl.h>
@@ -64,7 +64,7 @@ TEST_F(Containers, WithoutTheirEndsAreNotWhole) {
   }
 }
 
-// Whatever the bytes say, reading them ends (the sanitizers watch).
+// Random bytes must not crash or hang the reader (the sanitizers check that).
 TEST_F(Containers, OfNonsenseAreRefused) {
   const fs::path part = dir.path / "part";
   std::mt19937 rng(5);
@@ -87,7 +87,7 @@ TEST(Checksum, IsZlibs) {
   Checksum sum;
   sum.add("12345", 5);
   sum.add("6789", 4);
-  EXPECT_EQ(sum.text(), "cbf43926");  // the check value of CRC-32
+  EXPECT_EQ(sum.text(), "cbf43926");  // check value of CRC-32
 }
 
 TEST(Checksum, OfAFileIsBehindItsEnd) {

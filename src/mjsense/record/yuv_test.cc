@@ -32,7 +32,7 @@ Bytes plain(int width, int height, const Bytes& colour) {
   return rgb;
 }
 
-// A smooth ramp with edges and noise on it, so that every rounding is met.
+// A smooth ramp with edges and noise, so that every rounding case occurs.
 Bytes picture(int width, int height, unsigned seed = 1) {
   Bytes rgb;
   for (int y = 0; y < height; ++y) {
@@ -69,7 +69,7 @@ TEST(Yuv, ColoursAreThoseOfBt601) {
 }
 
 TEST(Yuv, EachPlaneIsWhereItBelongs) {
-  // Left half red, right half blue; the lower half dark.
+  // The left half is red and the right half blue; the lower half is dark.
   const int width = 32, height = 24;
   Bytes rgb(3 * width * height);
   for (int y = 0; y < height; ++y)
@@ -125,8 +125,8 @@ TEST(Yuv, EveryInstructionSetGivesTheSameBits) {
   }
 }
 
-// Brightness bit for bit, chroma within one step and nearly everywhere the same: 2 % of ffmpeg's
-// are rounded the other way.
+// Luma is equal bit for bit. Chroma differs by at most one step, and by 0 nearly everywhere: 2 % of
+// the values are rounded differently by ffmpeg.
 TEST(Yuv, IsWhatFfmpegMakesOfIt) {
   const testing::TempDir dir;
   const int width = 320, height = 96;
