@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// A task and a policy of one's own, in C++: docs/own_task.md shows parts of this file.
+// A user-defined task and policy in C++; docs/own_task.md shows parts of this file.
 
 #include <gmock/gmock.h>
 
@@ -74,8 +74,8 @@ class CartTask final : public Task {
 
   double mark(int world) const { return marks_[world]; }
   int evaluations = 0, samples = 0;
-  double least_start = -1;        // m, of starts that can be played
-  std::vector<std::string> keep;  // of the suite; empty: all
+  double least_start = -1;        // m, minimum distance of playable starts
+  std::vector<std::string> keep;  // sensors of the suite to keep; empty: all
 
  protected:
   void initialize_task() override { marks_.assign(num_worlds(), 0.0); }
@@ -268,7 +268,7 @@ TEST_F(OwnTask, SuccessEndsAnEpisodeIfAskedAndEmptiesItsActions) {
   EXPECT_TRUE(given(rollout, "actions/commanded_action", 0));
 }
 
-// A chunk is its steps, without what is between them.
+// A chunk equals its single steps without the intermediate observations.
 TEST_F(OwnTask, AChunkIsItsSteps) {
   Rollout single(two_worlds(), task, policy);
   auto other = std::make_shared<CartTask>(TaskCfg{});
@@ -299,7 +299,7 @@ TEST_F(OwnTask, AChunkIsItsSteps) {
 TEST_F(OwnTask, AChunkEndsWhereItsEpisodeEnds) {
   Rollout rollout(two_worlds(), task, nullptr);
   start(rollout);
-  // World 0 drives out of the field, world 1 to its mark.
+  // World 0 drives out of the field, world 1 reaches its mark.
   std::vector<Action> chunk;
   for (int t = 0; t < 200; ++t) {
     chunk.push_back(command(*task, 1.0));
@@ -314,7 +314,7 @@ TEST_F(OwnTask, AChunkEndsWhereItsEpisodeEnds) {
   EXPECT_LT(task->episode_step(1), 200);
 }
 
-// A start that cannot be played is drawn again, the same in whichever world.
+// A start that cannot be played is drawn again, with the same result in every world.
 TEST_F(OwnTask, StartsAreDrawnUntilTheyCanBePlayed) {
   task->least_start = 0.2;
   RolloutCfg cfg = two_worlds();
@@ -336,7 +336,7 @@ TEST_F(OwnTask, StartsAreDrawnUntilTheyCanBePlayed) {
     EXPECT_EQ(many.simulation().worlds().time(worlds[k]), 0);
   }
   EXPECT_GT(other->samples, 8);
-  other->least_start = 0.6;  // never
+  other->least_start = 0.6;  // no start can be played
   one.start(std::span(worlds).subspan(7, 1), std::span(episodes).first(1));
   EXPECT_EQ(one.fault(0), "the cart starts on the left");
 }
