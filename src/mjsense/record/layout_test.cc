@@ -44,7 +44,7 @@ RecordingPlan plan(std::initializer_list<const Sensor*> sensors) {
   return plan_recording(cfg);
 }
 
-TEST(Layout, StreamsStandWhereMolmoSpacesReadersLook) {
+TEST(Layout, StreamPathsEqualMolmoSpaces) {
   EXPECT_EQ(place_of("qpos"), "obs/agent/qpos");
   EXPECT_EQ(place_of("qvel"), "obs/agent/qvel");
   EXPECT_EQ(place_of("qpos_extra"), "obs/extra/qpos_extra");
@@ -58,7 +58,7 @@ TEST(Layout, StreamsStandWhereMolmoSpacesReadersLook) {
   EXPECT_EQ(place_of("water_depth"), "obs/extra/water_depth");
 }
 
-TEST(Layout, NumbersByMoveGroupAreTextForMolmoSpacesReaders) {
+TEST(Layout, NumbersPerMoveGroupAreJsonRows) {
   const Plain qpos("qpos", spec(DType::kFloat32, {7}), "arm");
   const RecordingPlan p = plan({&qpos});
   ASSERT_EQ(p.arrays.size(), 1u);
@@ -80,7 +80,7 @@ TEST(Layout, NumbersByMoveGroupAreTextForMolmoSpacesReaders) {
             "sensor 'qpos': its text can need 2012 bytes, a row of it has 2000");
 }
 
-TEST(Layout, BatchesAreThePeersAndEven) {
+TEST(Layout, BatchesEqualMolmoSpacesAndAreEven) {
   EXPECT_THAT(batch_sizes(8, 0), ElementsAre(4, 4));
   EXPECT_THAT(batch_sizes(1, 0), ElementsAre(1));
   EXPECT_THAT(batch_sizes(10, 0), ElementsAre(5, 5));        // Python: round(2.5) == 2
@@ -100,7 +100,7 @@ TEST(Layout, FramesPerSecondAreExact) {
   EXPECT_THROW(Fps::from_period_ms(0), ValueError);
 }
 
-TEST(Layout, EveryFieldOfTheSuiteHasAPlace) {
+TEST(Layout, EveryFieldHasAPath) {
   FakeSuite suite({2, 8, 6});
   RecordingCfg cfg;
   cfg.num_worlds = 2;
@@ -113,7 +113,7 @@ TEST(Layout, EveryFieldOfTheSuiteHasAPlace) {
   EXPECT_EQ(plan_recording(cfg).videos.size(), p.videos.size() + 1);
 }
 
-TEST(Layout, TwoStreamsCannotShareAPlace) {
+TEST(Layout, StreamsCannotShareAPath) {
   const Plain a("feet", spec(DType::kFloat32, {3})), b("feet", spec(DType::kFloat32, {3}), "force");
   EXPECT_THAT(error_of([&] {
                 plan({&a, &a});
@@ -147,7 +147,7 @@ TEST(Layout, BadStreamsAreRefused) {
   EXPECT_THAT(error_of([&] { plan_recording(cfg); }), HasSubstr("expected rows of 3 worlds"));
 }
 
-TEST(Layout, DifferencesOfRecordingsAreNamed) {
+TEST(Layout, FingerprintDifferencesAreDescribed) {
   FakeSuite suite({2, 8, 6});
   RecordingCfg a, b;
   a.num_worlds = b.num_worlds = 2;
@@ -182,7 +182,7 @@ TEST(Depth, SixteenBitsAreExactToHalfAUnit) {
     EXPECT_NEAR(codes[i] * 0.0002, many[i], 0.0001 + 2e-6);
 }
 
-TEST(Depth, RedGreenIsThePeersForm) {
+TEST(Depth, RedGreenEqualsMolmoSpaces) {
   const std::vector<float> metres = {0.05f, 0.55f, 0.3f,
                                      0.04f, 0.56f, std::numeric_limits<float>::infinity()};
   std::vector<std::uint8_t> rgb(metres.size() * 3);
@@ -197,7 +197,7 @@ TEST(Depth, RedGreenIsThePeersForm) {
 }
 
 // Such a text may come from an untrusted file: it is nested deeply enough to overflow any stack.
-TEST(Fingerprint, OfNoUseIsNeverEqual) {
+TEST(Fingerprint, InvalidTextIsNeverEqual) {
   const std::string ours = R"({"a":1})";
   const std::string deep =
       R"({"a":)" + std::string(1'000'000, '[') + std::string(1'000'000, ']') + "}";

@@ -18,7 +18,7 @@ namespace {
 
 using ::testing::HasSubstr;
 
-TEST(Process, StreamsAndNothingElseAreInherited) {
+TEST(Process, OnlyStandardStreamsAreInherited) {
   // Inheritable, without O_CLOEXEC, as some libraries open files.
   const Fd other(open("/dev/null", O_RDONLY));
   ASSERT_GT(other.get(), 2);
@@ -30,7 +30,7 @@ TEST(Process, StreamsAndNothingElseAreInherited) {
   EXPECT_EQ(out.find("\n" + std::to_string(other.get()) + "\n"), std::string::npos);
 }
 
-TEST(Process, AProgramThatIsNotThere) {
+TEST(Process, MissingProgramThrows) {
   try {
     run_process({"mjsense_no_such_program", "x"});
     FAIL();
@@ -40,7 +40,7 @@ TEST(Process, AProgramThatIsNotThere) {
   }
 }
 
-TEST(Process, LeadsItsOwnGroupWithSignalsAsUsual) {
+TEST(Process, LeadsAProcessGroupWithDefaultSignals) {
   sigset_t some, before;
   sigemptyset(&some);
   sigaddset(&some, SIGTERM);
@@ -69,7 +69,7 @@ std::string why_ended(const std::string& script, const Patience& patience) {
   }
 }
 
-TEST(Process, LimitsOfProcessorAndMemory) {
+TEST(Process, CpuTimeAndMemoryAreLimited) {
   const Patience patience{.silence_s = 100, .cpu_s = 1, .memory = std::size_t{1} << 28};
   EXPECT_EQ(why_ended("print(len(bytearray(1 << 20)))", patience), "");
   EXPECT_THAT(why_ended("while True: pass", patience), HasSubstr("more of the processor"));
@@ -108,7 +108,7 @@ int start_programs_in_the_rain() {
   return killed == 0 ? 0 : 1;
 }
 
-TEST(Process, SignalsToOurGroupReachNoProgram) {
+TEST(Process, SignalsToTheParentsGroupReachNoChild) {
   const pid_t pid = fork();
   if (pid == 0) _exit(start_programs_in_the_rain());
   int status = 0;

@@ -78,7 +78,7 @@ TEST(Recorder, ResumingGivesTheFilesOfAnUninterruptedRun) {
 }
 
 // A recording that ended before anything was decided leaves no files; decided episodes are kept.
-TEST(Recorder, ARecordingInWhichNothingWasDecidedLeavesNothing) {
+TEST(Recorder, UndecidedRecordingLeavesNoFiles) {
   TempDir dir;
   FakeSuite suite({2, 16, 12, true, true});
   for (const bool begun : {false, true}) {
@@ -102,7 +102,7 @@ TEST(Recorder, ARecordingInWhichNothingWasDecidedLeavesNothing) {
 // The recording was killed while it published its episodes: some videos have their final names
 // already, but the file of trajectories is missing. The next process completes the publication, and
 // nothing can be added any more.
-TEST(Recorder, AnInterruptedPublicationIsEnded) {
+TEST(Recorder, InterruptedPublicationIsCompleted) {
   TempDir whole;
   {
     FakeSuite suite({2, 16, 12, true, true});
@@ -145,7 +145,7 @@ TEST(Recorder, AnInterruptedPublicationIsEnded) {
 
 // A batch is published once its episodes are final, that is, all earlier ones are kept or
 // discarded.
-TEST(Recorder, ABatchWaitsForEarlierEpisodes) {
+TEST(Recorder, BatchWaitsForEarlierEpisodes) {
   TempDir dir;
   FakeSuite suite(without_video(3));
   RecordingCfg cfg = fake_recording(dir.path, suite, 3, 4);
@@ -204,7 +204,7 @@ TEST(Recorder, FewEncodersGiveTheSameVideos) {
   }
 }
 
-TEST(Recorder, ASlowEncoderHoldsTheProducerAndLosesNothing) {
+TEST(Recorder, SlowEncoderBlocksTheProducerWithoutLoss) {
   TempDir dir, tools;
   FakeSuite suite({1, 16, 12, true, false});
   RecordingCfg cfg = fake_recording(dir.path, suite, 1, 1);
@@ -227,7 +227,7 @@ TEST(Recorder, ASlowEncoderHoldsTheProducerAndLosesNothing) {
   EXPECT_GT(recorder.stats().frames, 0);
 }
 
-TEST(Recorder, AProducerWaitsForAnEncoderThatTakesNothing) {
+TEST(Recorder, ProducerWaitsForABlockedEncoder) {
   TempDir dir, tools;
   FakeSuite suite({1, 320, 240, true, false});
   RecordingCfg cfg = fake_recording(dir.path, suite, 1, 1);
@@ -297,7 +297,7 @@ TEST(RecorderFaults, FfmpegFailsAtTheEnd) {
 }
 
 // An exit code of 0 is not sufficient: the frames in the output are counted.
-TEST(RecorderFaults, FfmpegLies) {
+TEST(RecorderFaults, FfmpegWritesAnIncompleteVideo) {
   const std::pair<const char*, const char*> lies[] = {
       {"cat > /dev/null; echo garbage > $out", "is no whole video: it is neither MP4 nor Matroska"},
       {"cat > /dev/null", "does not exist"},
@@ -435,7 +435,7 @@ TEST(RecorderFaults, DiskFull) {
   }
 }
 
-TEST(RecorderFaults, ATextThatDoesNotFitIsRefused) {
+TEST(RecorderFaults, TruncatedTextIsRejected) {
   TempDir dir;
   FakeSuite suite(without_video(1));
   Recorder recorder(fake_recording(dir.path, suite, 1, 1));
@@ -458,7 +458,7 @@ TEST(RecorderFaults, ATextThatDoesNotFitIsRefused) {
   EXPECT_THAT(tree(dir.path), SizeIs(1));
 }
 
-TEST(RecorderFaults, WrongCallsAreNamed) {
+TEST(RecorderFaults, InvalidCallsThrow) {
   TempDir dir;
   FakeSuite suite(without_video(2));
   Recorder recorder(fake_recording(dir.path, suite, 2, 2));
@@ -490,7 +490,7 @@ TEST(RecorderFaults, WrongCallsAreNamed) {
   EXPECT_THAT(error_of([&] { recorder.begin_episode(0, {1, 0}); }), HasSubstr("is complete"));
 }
 
-TEST(RecorderFaults, WrongConfigurationsAreNamed) {
+TEST(RecorderFaults, InvalidConfigurationsThrow) {
   TempDir dir;
   const auto error = [&](const std::function<void(RecordingCfg&)>& change) {
     return error_of([&] { record(dir.path, 1, {}, false, change); });

@@ -38,7 +38,7 @@ std::string go_on(const fs::path& out) {
 
 // The lock must be tested before anything is read. Otherwise files that the other process publishes
 // in the meantime would be missed and overwritten.
-TEST(RecordingFolder, WhoRecordsIntoItIsAskedFirst) {
+TEST(RecordingFolder, LockIsTestedBeforeReading) {
   TempDir dir;
   begin(dir.path, 3);
   const fs::path house = dir.path / "house_0";
@@ -55,7 +55,7 @@ TEST(RecordingFolder, WhoRecordsIntoItIsAskedFirst) {
 }
 
 // A recording that is starting has not written its description yet.
-TEST(RecordingFolder, RepairLeavesAloneWhatBegins) {
+TEST(RecordingFolder, RepairIgnoresAStartingRecording) {
   TempDir dir;
   const fs::path house = dir.path / "house_0";
   fs::create_directories(house / kStagingDir);
@@ -69,7 +69,7 @@ TEST(RecordingFolder, RepairLeavesAloneWhatBegins) {
 }
 
 // A reader holds the lock of a house for a moment; that must not prevent a recording.
-TEST(RecordingFolder, ALookIsNoRecording) {
+TEST(RecordingFolder, ReadersDoNotBlockRecording) {
   TempDir whole, dir;
   const std::string bytes = go_on(whole.path);
   begin(dir.path, 1);
@@ -84,7 +84,7 @@ TEST(RecordingFolder, ALookIsNoRecording) {
 }
 
 // The process was killed before the last files of an ended recording were removed.
-TEST(RecordingFolder, WhatTheLastStepLeftIsRemoved) {
+TEST(RecordingFolder, FilesOfAnEndedRecordingAreRemoved) {
   for (const bool locked : {false, true}) {
     TempDir dir;
     const std::string bytes = go_on(dir.path);
@@ -98,7 +98,7 @@ TEST(RecordingFolder, WhatTheLastStepLeftIsRemoved) {
 }
 
 // A folder of an episode under an unexpected name is not removed and does not prevent resuming.
-TEST(RecordingFolder, FoldersOfOtherNamesAreSetAside) {
+TEST(RecordingFolder, FoldersOfOtherNamesAreMovedAside) {
   TempDir whole, dir;
   const std::string bytes = go_on(whole.path);
   begin(dir.path, 1);
@@ -130,7 +130,7 @@ std::string contents(const fs::path& dir) {
 
 // While an episode is recorded, .recording is moved away and replaced by a link to another folder.
 // Nothing in the other folder may change, and the recording must report an error.
-TEST(RecordingFolder, AFolderThatIsSwappedForALinkIsNotFollowed) {
+TEST(RecordingFolder, FolderReplacedByALinkIsNotFollowed) {
   constexpr int kSwaps = 100;
   TempDir foreign, other;
   fs::create_directories(foreign.path / "target/deep/er");
@@ -170,7 +170,7 @@ TEST(RecordingFolder, AFolderThatIsSwappedForALinkIsNotFollowed) {
 }
 
 // If the folder is moved back, the recording can be resumed.
-TEST(RecordingFolder, AFolderThatIsPutBackIsResumed) {
+TEST(RecordingFolder, FolderThatIsMovedBackIsResumed) {
   TempDir whole, dir;
   const std::string bytes = go_on(whole.path);
   const fs::path staging = dir.path / "house_0/.recording";
@@ -189,7 +189,7 @@ TEST(RecordingFolder, AFolderThatIsPutBackIsResumed) {
 }
 
 // The system may write a part of the text and report the error only for the rest.
-TEST(RecordingFolder, ADescriptionThatDoesNotFitTellsWhy) {
+TEST(RecordingFolder, DescriptionOnAFullDiskThrows) {
   TempDir dir;
   const fs::path report = dir.path / "report";
   const pid_t pid = fork();

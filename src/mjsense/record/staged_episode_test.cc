@@ -37,7 +37,7 @@ void write_episode(const std::filesystem::path& path, const std::string& chunk) 
 }
 
 // Without the check, the HDF5 library would copy the chunk anyway and free its memory twice.
-TEST(StagedEpisode, AChunkThatDoesNotUnpackIsNamed) {
+TEST(StagedEpisode, CorruptChunkThrows) {
   const testing::TempDir dir;
   write_episode(dir.file("traj.h5"), "no stream");
   try {

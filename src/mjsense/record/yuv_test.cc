@@ -68,7 +68,7 @@ TEST(Yuv, ColoursAreThoseOfBt601) {
   }
 }
 
-TEST(Yuv, EachPlaneIsWhereItBelongs) {
+TEST(Yuv, PlanesAreInOrder) {
   // The left half is red and the right half blue; the lower half is dark.
   const int width = 32, height = 24;
   Bytes rgb(3 * width * height);
@@ -106,7 +106,7 @@ TEST(Yuv, OddSizesRepeatTheirLastColumnAndRow) {
   EXPECT_EQ(converted({255, 0, 0}, 1, 1).size(), 6u);
 }
 
-TEST(Yuv, EveryInstructionSetGivesTheSameBits) {
+TEST(Yuv, InstructionSetsAgree) {
   std::vector<Yuv420Kernel> kernels;
 #if defined(__x86_64__)
   if (cpu_isa() >= Isa::kAvx2) kernels.push_back(yuv420_avx2);
@@ -127,7 +127,7 @@ TEST(Yuv, EveryInstructionSetGivesTheSameBits) {
 
 // Luma is equal bit for bit. Chroma differs by at most one step, and by 0 nearly everywhere: 2 % of
 // the values are rounded differently by ffmpeg.
-TEST(Yuv, IsWhatFfmpegMakesOfIt) {
+TEST(Yuv, EqualsFfmpeg) {
   const testing::TempDir dir;
   const int width = 320, height = 96;
   const Bytes rgb = picture(width, height);

@@ -144,7 +144,7 @@ struct OwnTask : testing::Test {
   }
 };
 
-TEST_F(OwnTask, ItsSceneHasTheRobot) {
+TEST_F(OwnTask, SceneContainsTheRobot) {
   Rollout rollout(two_worlds(), task, policy);
   EXPECT_THAT(rollout.suite().names(),
               ElementsAre("qpos", "qvel", "robot_base_pose", "env_states", "task_info",
@@ -165,7 +165,7 @@ TEST_F(OwnTask, ItsSceneHasTheRobot) {
   EXPECT_NE(task->mark(0), task->mark(1));
 }
 
-TEST_F(OwnTask, TheRobotOfItsSceneIsTheDefault) {
+TEST_F(OwnTask, RobotOfTheSceneIsTheDefault) {
   RolloutCfg cfg = two_worlds();
   cfg.policy = "";
   cfg.make_task = [](TaskCfg wanted) { return std::make_unique<CartTask>(std::move(wanted)); };
@@ -176,7 +176,7 @@ TEST_F(OwnTask, TheRobotOfItsSceneIsTheDefault) {
   EXPECT_EQ(rollout.task().robot().group("joints").actuators.size(), 1u);
 }
 
-TEST_F(OwnTask, AllWorldsAreJudgedAtOnceAndActAtOnce) {
+TEST_F(OwnTask, EvaluatesAndActsForAllWorldsAtOnce) {
   Rollout rollout(two_worlds(), task, policy);
   start(rollout);
   EXPECT_EQ(task->evaluations, 1);
@@ -188,7 +188,7 @@ TEST_F(OwnTask, AllWorldsAreJudgedAtOnceAndActAtOnce) {
   EXPECT_EQ(policy->acts, 5);
 }
 
-TEST_F(OwnTask, RegisteredItHasAName) {
+TEST_F(OwnTask, RegisteredTaskHasAName) {
   register_task("cart", [](TaskCfg cfg) { return std::make_unique<CartTask>(std::move(cfg)); });
   register_policy("drive", [] { return std::make_unique<Drive>(); });
   EXPECT_THAT(task_names(), testing::Contains("cart"));
@@ -223,7 +223,7 @@ TEST_F(OwnTask, PickNeedsARobot) {
   }
 }
 
-TEST_F(OwnTask, MayChangeTheSuite) {
+TEST_F(OwnTask, TaskMayEditTheSuite) {
   task->keep = {"mark", "qpos"};
   Rollout rollout(two_worlds(), task, policy);
   EXPECT_THAT(rollout.suite().names(), ElementsAre("mark", "qpos"));
@@ -237,7 +237,7 @@ TEST_F(OwnTask, MayChangeTheSuite) {
   }
 }
 
-TEST_F(OwnTask, WithoutSensorsTheSuiteIsTheCallersAlone) {
+TEST_F(OwnTask, WithoutSensorsTheSuiteIsTheCallers) {
   RolloutCfg cfg = two_worlds();
   cfg.use_sensors = false;
   Rollout rollout(cfg, task, policy);
@@ -248,7 +248,7 @@ TEST_F(OwnTask, WithoutSensorsTheSuiteIsTheCallersAlone) {
   EXPECT_LT(rollout.evaluation(0).reward, 0);
 }
 
-TEST_F(OwnTask, SuccessEndsAnEpisodeIfAskedAndEmptiesItsActions) {
+TEST_F(OwnTask, SuccessEndsAnEpisodeOnRequest) {
   TaskCfg cfg;
   cfg.terminate_upon_success = true;
   auto eager = std::make_shared<CartTask>(cfg);
@@ -269,7 +269,7 @@ TEST_F(OwnTask, SuccessEndsAnEpisodeIfAskedAndEmptiesItsActions) {
 }
 
 // A chunk equals its single steps without the intermediate observations.
-TEST_F(OwnTask, AChunkIsItsSteps) {
+TEST_F(OwnTask, ChunkEqualsItsSteps) {
   Rollout single(two_worlds(), task, policy);
   auto other = std::make_shared<CartTask>(TaskCfg{});
   Rollout chunked(two_worlds(), other, nullptr);
@@ -296,7 +296,7 @@ TEST_F(OwnTask, AChunkIsItsSteps) {
   EXPECT_THROW(chunked.step_chunk({}), ValueError);
 }
 
-TEST_F(OwnTask, AChunkEndsWhereItsEpisodeEnds) {
+TEST_F(OwnTask, ChunkEndsWithItsEpisode) {
   Rollout rollout(two_worlds(), task, nullptr);
   start(rollout);
   // World 0 drives out of the field, world 1 reaches its mark.
@@ -341,7 +341,7 @@ TEST_F(OwnTask, StartsAreDrawnUntilTheyCanBePlayed) {
   EXPECT_EQ(one.fault(0), "the cart starts on the left");
 }
 
-TEST_F(OwnTask, AnotherSeedIsOtherEpisodes) {
+TEST_F(OwnTask, EpisodesDependOnTheSeed) {
   Rollout rollout(two_worlds(), task, policy);
   start(rollout);
   const double first = task->mark(0);

@@ -54,7 +54,7 @@ void start(Rollout& rollout, std::vector<int> worlds, std::vector<std::int64_t> 
   rollout.start(worlds, episodes);
 }
 
-TEST(Rollout, TheSuiteStandsInItsPublishedOrder) {
+TEST(Rollout, SuiteIsInThePublishedOrder) {
   Rollout rollout(blind());
   EXPECT_THAT(
       rollout.suite().names(),
@@ -66,7 +66,7 @@ TEST(Rollout, TheSuiteStandsInItsPublishedOrder) {
   EXPECT_EQ(rollout.suite().owner("grasp_pose"), "policy 'planner'");
 }
 
-TEST(Rollout, CamerasAreVideosAndImagePointsOfThoseThatGiveThem) {
+TEST(Rollout, CamerasHaveVideosAndImagePoints) {
   RolloutCfg cfg = blind();
   cfg.cameras.reset();
   cfg.width = 16;
@@ -93,7 +93,7 @@ TEST(Rollout, CamerasAreVideosAndImagePointsOfThoseThatGiveThem) {
 }
 
 // docs/observations.md shows these lines.
-TEST(Rollout, AFunctionOfAWorldIsASensor) {
+TEST(Rollout, FunctionSensor) {
   Rollout rollout(blind());
   start(rollout, {0}, {7});
   const Robot& robot = rollout.task().robot();
@@ -167,7 +167,7 @@ TEST(Rollout, ActionsAreMeasuredFromTheObservationBefore) {
   }
 }
 
-TEST(Rollout, AtTheEndOnlyTheCommandIsLeft) {
+TEST(Rollout, OnlyTheCommandIsGivenAtTheEnd) {
   Rollout rollout(blind());
   start(rollout, {0}, {7});
   int actions = 0;
@@ -187,7 +187,7 @@ TEST(Rollout, AtTheEndOnlyTheCommandIsLeft) {
   EXPECT_EQ(row(rollout, "task_info")["episode_step"], actions);
 }
 
-TEST(Rollout, ATimeOutLeavesTheLastAction) {
+TEST(Rollout, TimeOutKeepsTheLastAction) {
   RolloutCfg cfg = blind();
   cfg.horizon = 3;
   Rollout rollout(cfg);
@@ -204,7 +204,7 @@ TEST(Rollout, ATimeOutLeavesTheLastAction) {
   }
 }
 
-TEST(Rollout, WhatThePolicySaysIsNumbers) {
+TEST(Rollout, PolicyVerdictIsNumeric) {
   RolloutCfg cfg = blind();
   cfg.policy.clear();
   Rollout rollout(cfg);
@@ -279,7 +279,7 @@ std::map<std::int64_t, std::vector<std::uint64_t>> play(RolloutCfg cfg) {
   }
 }
 
-TEST(Rollout, AnEpisodeIsTheSameInAnyWorldAtAnyThreadCount) {
+TEST(Rollout, EpisodesDoNotDependOnWorldOrThreads) {
   const auto alone = play(blind(1, 1));
   EXPECT_EQ(alone.size(), 5u);
   EXPECT_NE(alone.at(0)[3], alone.at(1)[3]);
@@ -288,7 +288,7 @@ TEST(Rollout, AnEpisodeIsTheSameInAnyWorldAtAnyThreadCount) {
   EXPECT_EQ(play(blind(5, 5)), alone);
 }
 
-TEST(Rollout, AStepAllocatesNothing) {
+TEST(Rollout, StepDoesNotAllocate) {
   Rollout rollout(blind(3, 2));
   start(rollout, {0, 1, 2}, {0, 1, 2});
   const auto run = [&](int steps) {
@@ -303,7 +303,7 @@ TEST(Rollout, AStepAllocatesNothing) {
   EXPECT_EQ(count.since(), 0);
 }
 
-TEST(Rollout, AWorldThatDivergesIsAloneInIt) {
+TEST(Rollout, DivergingWorldDoesNotAffectOthers) {
   const auto run = [](bool poison) {
     Rollout rollout(blind(2, 2));
     start(rollout, {0, 1}, {0, 1});
@@ -332,7 +332,7 @@ TEST(Rollout, AWorldThatDivergesIsAloneInIt) {
   EXPECT_EQ(run(true), run(false));
 }
 
-TEST(Rollout, ARowThatDoesNotFitEndsItsEpisodeAlone) {
+TEST(Rollout, RowThatDoesNotFitEndsOnlyItsEpisode) {
   Rollout rollout(blind(2));
   rollout.suite().add(std::make_shared<JsonFunctionSensor>(
       "notes", 16, "", [&](const World& world, JsonWriter& json) {
@@ -379,7 +379,7 @@ struct Batch final : Sensor {
   std::vector<int> computed;
 };
 
-TEST(Rollout, RowsThatCannotBeFilledEndTheirEpisodesAlone) {
+TEST(Rollout, FailingRowsEndOnlyTheirEpisodes) {
   RolloutCfg cfg = blind(3);
   std::shared_ptr<Batch> batch;
   cfg.more_sensors = [&](Rollout& rollout) {
@@ -400,7 +400,7 @@ TEST(Rollout, RowsThatCannotBeFilledEndTheirEpisodesAlone) {
   EXPECT_THAT(batch->computed, ElementsAre(3, 5, 3));  // no row was computed twice
 }
 
-TEST(Rollout, WrongNamesAndNumbersAreOneClearLine) {
+TEST(Rollout, WrongNamesAndNumbersThrow) {
   const auto error = [](auto change) -> std::string {
     RolloutCfg cfg = blind();
     change(cfg);

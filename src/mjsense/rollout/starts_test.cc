@@ -36,7 +36,7 @@ std::vector<std::string> faults(const char* task, const char* scene, int episode
 }
 
 // Two large plates next to the object to be moved fit only if all three are drawn again together.
-TEST(Starts, NothingBeginsInsideAnother) {
+TEST(Starts, ObjectsDoNotOverlap) {
   EXPECT_EQ(faults("pick_and_place_color", "", 112), std::vector<std::string>());
 }
 

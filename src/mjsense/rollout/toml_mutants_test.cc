@@ -127,7 +127,7 @@ bool says_something(const std::string& line) { return line != "\n" && !line.star
 
 class RobotMutants : public ::testing::TestWithParam<std::string> {};
 
-TEST_P(RobotMutants, EveryRemovedLineEnds) {
+TEST_P(RobotMutants, RemovedLinesNeitherCrashNorHang) {
   const DataFile file = kRobots.find(GetParam());
   const std::vector<std::string> lines = lines_of(file.text);
   ASSERT_EQ(used_robot(file.text, file.path, true), "");
@@ -141,7 +141,7 @@ INSTANTIATE_TEST_SUITE_P(Robots, RobotMutants, ::testing::ValuesIn(robot_names()
                          [](const auto& info) { return info.param; });
 
 // Models referenced relative to the file are not found from the copy. That is one of the faults.
-TEST(SceneMutants, RemovedLinesEnd) {
+TEST(SceneMutants, RemovedLinesNeitherCrashNorHang) {
   const mjsense::testing::TempDir folder;
   const std::filesystem::path copy = folder.path / "scene.toml";
   const std::size_t stride = random_mutants() > 0 ? 1 : 40;
@@ -191,7 +191,7 @@ std::string mutate(std::vector<std::string> lines, Rng& rng) {
   return joined(lines);
 }
 
-TEST(RandomRobotMutants, End) {
+TEST(RandomRobotMutants, NeitherCrashNorHang) {
   const std::vector<std::string> names = robot_names();
   const int mutants = random_mutants() > 0 ? random_mutants() : 40;
   for (int i = 0; i < mutants; ++i) {

@@ -127,7 +127,7 @@ class Integrators : public ::testing::TestWithParam<std::tuple<const char*, bool
 
 // Split and reused stages must give the same states as mj_step bit for bit, and the same sensors as
 // mj_forward, regardless of what is read and when.
-TEST_P(Integrators, EqualTheNaiveLoopBitForBitAndAreFresh) {
+TEST_P(Integrators, EqualTheNaiveLoop) {
   const auto [integrator, every, decimation] = GetParam();
   const ModelPtr m = load(integrator);
   constexpr int kWorlds = 3, kSteps = 60;
@@ -218,7 +218,7 @@ class Writes : public ::testing::TestWithParam<std::tuple<const char*, Write>> {
 
 // A step after the state was written through the views, without forward(), must equal mj_step from
 // that state, regardless of earlier reads and of reads between the write and the step.
-TEST_P(Writes, BetweenStepsAreSeenByTheNext) {
+TEST_P(Writes, AffectTheNextStep) {
   const auto [integrator, write] = GetParam();
   const ModelPtr m = load(integrator);
   for (const int decimation : {1, 4}) {
@@ -258,7 +258,7 @@ INSTANTIATE_TEST_SUITE_P(All, Writes,
                                   std::get<1>(info.param).name;
                          });
 
-TEST(Worlds, AChangedModelIsSeenByTheNextStep) {
+TEST(Worlds, NextStepUsesAChangedModel) {
   const ModelPtr m = load("Euler"), heavy = load("Euler");
   for (int b = 1; b < heavy->nbody; ++b) heavy->body_mass[b] *= 3;
   for (const mjtStage read : {mjSTAGE_NONE, mjSTAGE_VEL, mjSTAGE_ACC}) {
@@ -281,7 +281,7 @@ TEST(Worlds, AChangedModelIsSeenByTheNextStep) {
 
 // If forces are first read after new controls were written, they must belong to the controls of the
 // last step, and the next step must use the new ones.
-TEST(Worlds, WhatIsReadLateBelongsToTheControlsOfTheStep) {
+TEST(Worlds, LateReadsUseTheControlsOfTheStep) {
   const ModelPtr m = load("implicitfast");
   Worlds worlds(m.get(), 1, 1);
   Recording hooks(1);
@@ -330,7 +330,7 @@ std::array<int, 3> computed_in_steps(const char* integrator, mjtStage read, int 
   return counts;
 }
 
-TEST(Worlds, ComputeAStageOnceForAStateAndOnlyIfItIsRead) {
+TEST(Worlds, StagesAreComputedOnceAndOnlyIfRead) {
   using ::testing::ElementsAre;
   for (const char* integrator : {"Euler", "implicit", "implicitfast"}) {
     for (const int n : {1, 4}) {
@@ -353,7 +353,7 @@ TEST(Worlds, ComputeAStageOnceForAStateAndOnlyIfItIsRead) {
   EXPECT_THAT(computed_in_steps("RK4", mjSTAGE_VEL, 1, true), ElementsAre(40, 40, 40));
 }
 
-TEST(Worlds, SeeStateWrittenThroughTheViews) {
+TEST(Worlds, StepUsesStateWrittenThroughViews) {
   const ModelPtr m = load("Euler");
   Worlds worlds(m.get(), 2, 1);
   Recording hooks(2);
@@ -442,7 +442,7 @@ TEST(Worlds, EveryPartOfTheStateMayBeWrittenBetweenSteps) {
 
 // eq_active is stored as bytes in mjData and as numbers in a state row, so it is written by a
 // separate function.
-TEST(Worlds, AConstraintMayBeReleasedBetweenSteps) {
+TEST(Worlds, ConstraintMayBeDisabledBetweenSteps) {
   char error[512] = "";
   mjSpec* spec = mj_parseXMLString(kHand, nullptr, error, sizeof error);
   ASSERT_NE(spec, nullptr) << error;
@@ -464,7 +464,7 @@ TEST(Worlds, AConstraintMayBeReleasedBetweenSteps) {
 }
 
 // Hooks must see user data as it was written.
-TEST(Worlds, UserDataArriveInMjData) {
+TEST(Worlds, HooksReadUserData) {
   char error[512] = "";
   mjSpec* spec = mj_parseXMLString(kHand, nullptr, error, sizeof error);
   ASSERT_NE(spec, nullptr) << error;
@@ -490,7 +490,7 @@ TEST(Worlds, UserDataArriveInMjData) {
 }
 
 // State written between calls must be current at the next visit, without step or forward().
-TEST(Worlds, AVisitMakesWrittenStateCurrent) {
+TEST(Worlds, VisitUsesWrittenState) {
   const ModelPtr m = load("Euler");
   Worlds worlds(m.get(), 2, 1);
   Recording hooks(2);
@@ -505,7 +505,7 @@ TEST(Worlds, AVisitMakesWrittenStateCurrent) {
 }
 
 // A world's value of a model field must affect every stage from the next step on.
-TEST(Worlds, AModelFieldMayChangeBetweenSteps) {
+TEST(Worlds, ModelFieldMayChangeBetweenSteps) {
   const ModelPtr m = load("implicitfast");
   const ModelPtr heavy = load("implicitfast");
   Worlds worlds(m.get(), 2, 1);
@@ -527,7 +527,7 @@ TEST(Worlds, AModelFieldMayChangeBetweenSteps) {
   EXPECT_NE(std::memcmp(qpos.data, d->qpos, m->nq * sizeof(double)), 0);
 }
 
-TEST(Worlds, AModelOfAWorldHasItsOwnValues) {
+TEST(Worlds, ModelOfAWorldHasItsValues) {
   const ModelPtr m = load("Euler");
   Worlds worlds(m.get(), 3, 1);
   int size = 0;
@@ -547,7 +547,7 @@ TEST(Worlds, AModelOfAWorldHasItsOwnValues) {
 }
 
 // With <flag energy="enable"/>, mj_forward fills e_kinetic before it computes the energy.
-TEST(Worlds, EnergiesAreFresh) {
+TEST(Worlds, EnergySensorsAreFresh) {
   const char* xml = R"(<mujoco><option><flag energy="enable"/></option><worldbody>
     <body pos="0 0 1"><joint axis="1 0 0"/><geom size=".1" pos="0 .3 0"/></body></worldbody>
     <sensor><e_kinetic/><e_potential/></sensor></mujoco>)";
@@ -584,7 +584,7 @@ TEST(Worlds, EnergiesAreFresh) {
 
 // Six boxes in an arena that is too small for their contacts warn at every substep; MuJoCo's
 // handler is called once.
-TEST(Worlds, WarningsAreCountedByWorldAndReportedOnce) {
+TEST(Worlds, WarningsAreCountedPerWorldAndReportedOnce) {
   std::string xml = "<mujoco><size memory='12K'/><worldbody><geom type='plane' size='5 5 .1'/>";
   for (int i = 0; i < 6; ++i)
     xml += "<body pos='" + std::to_string(.05 * i) +
@@ -625,7 +625,7 @@ TEST(Worlds, WarningsAreCountedByWorldAndReportedOnce) {
   EXPECT_THAT(messages[0], ::testing::HasSubstr("world 1"));
 }
 
-TEST(Worlds, ViewsHaveARowAnElement) {
+TEST(Worlds, ViewsHaveOneRowPerElement) {
   const ModelPtr m = load("Euler");
   Worlds worlds(m.get(), 2, 1);
   EXPECT_EQ(worlds.state_component("xfrc_applied").shape, (Shape{2, m->nbody, 6}));
@@ -641,7 +641,7 @@ TEST(Worlds, ViewsHaveARowAnElement) {
 }
 
 // A control that is NaN: MuJoCo would continue with zeros.
-TEST(Worlds, AControlThatIsNoNumberIsAFailure) {
+TEST(Worlds, NanControlIsAFailure) {
   const ModelPtr m = load("Euler");
   Worlds worlds(m.get(), 2, 1);
   Recording hooks(2);
@@ -696,7 +696,7 @@ TEST(Worlds, ClocksCountEpisodesAndTicks) {
 
 // step_raw() is mj_step and nothing else. Fields read after it are as mj_step left them, one step
 // behind the state, until the next step.
-TEST(Worlds, AfterRawStepsWhatIsReadIsWhatMjStepLeft) {
+TEST(Worlds, RawStepsLeaveFieldsOneSubstepBehind) {
   const ModelPtr m = load("Euler");
   Worlds worlds(m.get(), 1, 1);
   Recording hooks(1);
@@ -722,7 +722,7 @@ TEST(Worlds, AfterRawStepsWhatIsReadIsWhatMjStepLeft) {
 
 // Controllers are called before physics steps 0, n, 2n ... and see the current state. Results of
 // old controls or poses must not be reused, regardless of earlier reads.
-TEST(Worlds, ControlsOfTheStateAreThoseOfTheNaiveLoop) {
+TEST(Worlds, ControllersEqualTheNaiveLoop) {
   struct Controller : WorldHooks {
     mjtStage reads = mjSTAGE_NONE;
     std::vector<int> indices;
@@ -770,7 +770,7 @@ TEST(Worlds, ControlsOfTheStateAreThoseOfTheNaiveLoop) {
 }
 
 // Forces must belong to the state at every substep, not only at the last one.
-TEST(Worlds, ASubstepHookSeesFreshForces) {
+TEST(Worlds, SubstepHookReadsFreshForces) {
   struct Forces : Recording {
     using Recording::Recording;
     std::vector<double> seen;
@@ -797,7 +797,7 @@ TEST(Worlds, ASubstepHookSeesFreshForces) {
   EXPECT_EQ(hooks.seen, want);
 }
 
-TEST(Worlds, ResetOnlyTheOnesNamed) {
+TEST(Worlds, ResetAffectsOnlyTheSelection) {
   const ModelPtr m = load("implicitfast");
   Worlds worlds(m.get(), 4, 2);
   Recording hooks(4);
@@ -816,7 +816,7 @@ TEST(Worlds, ResetOnlyTheOnesNamed) {
   EXPECT_THROW(worlds.reset(all_worlds, 7, hooks), ValueError);
 }
 
-TEST(Worlds, AnEmptyListIsNoWorld) {
+TEST(Worlds, EmptyListSelectsNoWorld) {
   const ModelPtr m = load("Euler");
   Worlds worlds(m.get(), 3, 2);
   Recording hooks(3);
@@ -836,7 +836,7 @@ TEST(Worlds, AnEmptyListIsNoWorld) {
   static_assert(!std::is_default_constructible_v<WorldIds>, "{} would not say which worlds");
 }
 
-TEST(Worlds, OneThatDivergesIsNamedAndResetAlone) {
+TEST(Worlds, OnlyADivergingWorldIsReset) {
   const ModelPtr m = load("Euler");
   Worlds worlds(m.get(), 3, 2);
   Recording hooks(3);
@@ -859,7 +859,7 @@ TEST(Worlds, OneThatDivergesIsNamedAndResetAlone) {
 }
 
 // A failing step must be reported by that step, even if nothing is read.
-TEST(Worlds, ThatDivergeUnseenAreNamedAtOnce) {
+TEST(Worlds, DivergenceIsReportedWithoutReads) {
   const ModelPtr m = load("Euler");
   for (const mjtStage read : {mjSTAGE_NONE, mjSTAGE_ACC}) {
     Worlds worlds(m.get(), 2, 1);
@@ -879,7 +879,7 @@ TEST(Worlds, ThatDivergeUnseenAreNamedAtOnce) {
 
 // A read that computes forces from a bad control must report it at once, and the next step must be
 // unaffected.
-TEST(Worlds, NameABadControlWhenItIsLookedAt) {
+TEST(Worlds, ReadingReportsABadControl) {
   const ModelPtr m = load("Euler");
   Worlds worlds(m.get(), 1, 1);
   Recording hooks(1);
@@ -894,7 +894,7 @@ TEST(Worlds, NameABadControlWhenItIsLookedAt) {
 
 // MuJoCo's errors jump out of the call. The mjData that is shared by the worlds of a thread must be
 // usable afterwards.
-TEST(Worlds, InWhichMuJoCoRaisesAnErrorLeaveTheOthersAlone) {
+TEST(Worlds, MuJoCoErrorDoesNotAffectOtherWorlds) {
   const ModelPtr m = load("implicitfast");
   Worlds worlds(m.get(), 2, 1);
   Recording hooks(2);
@@ -921,7 +921,7 @@ TEST(Worlds, InWhichMuJoCoRaisesAnErrorLeaveTheOthersAlone) {
   EXPECT_LT(failed, 10);
 }
 
-TEST(Worlds, AFailingHookLeavesTheOthersAndTheSimulationUsable) {
+TEST(Worlds, FailingHookDoesNotAffectOtherWorlds) {
   const ModelPtr m = load("Euler");
   Worlds worlds(m.get(), 3, 2);
   Recording hooks(3);
@@ -933,7 +933,7 @@ TEST(Worlds, AFailingHookLeavesTheOthersAndTheSimulationUsable) {
   EXPECT_EQ(worlds.substeps(1), 2);
 }
 
-TEST(Worlds, RejectsNonsense) {
+TEST(Worlds, RejectsInvalidArguments) {
   const ModelPtr m = load("Euler");
   EXPECT_THROW(Worlds(m.get(), 0, 1), ValueError);
   EXPECT_THROW(Worlds(m.get(), 1, -2), ValueError);
