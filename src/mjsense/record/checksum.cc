@@ -22,13 +22,13 @@
 namespace mjsense {
 namespace {
 
-constexpr std::size_t kPieceBytes = 1 << 15;  // what a core's nearest cache holds
+constexpr std::size_t kPieceBytes = 1 << 15;  // fits in a core's L1 cache
 
 std::string seal_text(const std::string& crc, std::int64_t bytes) {
   return fmt::format("\nmjsense: crc32 {} of the {:>16} bytes above\n", crc, bytes);
 }
 
-// The first `bytes` of a file; fewer where it ends before.
+// Checksum of the first `bytes` of a file, or of all of it if it is shorter.
 std::string checksum_of(int fd, std::int64_t bytes) {
   Checksum sum;
   std::array<std::uint8_t, kPieceBytes> piece;
@@ -76,7 +76,8 @@ Seal check_seal(int fd) {
   if (pread(fd, found.data(), found.size(), end) != static_cast<ssize_t>(found.size()))
     return Seal::kNone;
   if (found == seal_text(checksum_of(fd, end), end)) return Seal::kWhole;
-  // Damage may have hit the line itself: it is one as long as most of it is.
+  // The line itself may be damaged. It counts as a checksum line if more than half of its fixed
+  // characters match.
   std::size_t same = 0, fixed = 0;
   for (std::size_t i = 0; i < form.size(); ++i) {
     if (form[i] == '0') continue;

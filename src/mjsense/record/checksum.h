@@ -1,8 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
-// CRC-32 as zlib and Python's zlib.crc32 compute it: of datasets and videos as attributes, and of a
-// whole HDF5 file as a line behind its end, where the HDF5 library does not look. A program that
-// opens the file for writing cuts that line off, so it never speaks of an older state.
+// CRC-32 as computed by zlib and Python's zlib.crc32. Data sets and videos store theirs in an
+// attribute. A whole HDF5 file stores it in a text line after its end, which the HDF5 library
+// ignores. A program that opens the file for writing truncates that line, so the line never
+// describes an older state of the file.
 
 #include <cstddef>
 #include <cstdint>
@@ -16,14 +17,14 @@ class Folder;
 class Checksum {
  public:
   void add(const void* bytes, std::size_t count);
-  [[nodiscard]] std::string text() const;  // "1a2b3c4d"
+  [[nodiscard]] std::string text() const;  // for example "1a2b3c4d"
 
  private:
   std::uint32_t crc_ = 0;
 };
 
-// Of everything that can still be read from a descriptor's beginning. Throws RuntimeError when
-// reading fails.
+// Checksum of everything from the descriptor's start to its end. Throws RuntimeError if reading
+// fails.
 [[nodiscard]] std::string checksum_of(int fd);
 
 inline constexpr const char* kChecksumAttribute = "crc32";
@@ -31,9 +32,9 @@ inline constexpr const char* kBytesAttribute = "bytes";
 
 enum class Seal { kWhole, kBroken, kNone };
 
-// Appends the line to a closed file. Throws RuntimeError when the disk refuses.
+// Appends the checksum line to a closed file. Throws RuntimeError if it cannot be written.
 void seal_file(const Folder& folder, const std::string& name);
-// kNone: no such line, as in files of others.
+// kNone: the file has no such line, for example because another program wrote it.
 [[nodiscard]] Seal check_seal(int fd);
 
 }  // namespace mjsense

@@ -21,23 +21,25 @@ std::uint32_t crc32_portable(std::uint32_t crc, const std::uint8_t* bytes, std::
 #if defined(__x86_64__)
 namespace {
 
-// Bytes are polynomials over GF(2); their first bit, the lowest of the first byte, has the highest
-// power. So in a register of n bits, bit i stands for x^(n - 1 - i). The CRC is the remainder by
+// Bytes are polynomials over GF(2). Their first bit, the lowest bit of the first byte, is the
+// coefficient of the highest power. In a register of n bits, bit i is the coefficient of
+// x^(n - 1 - i). The CRC is the remainder of the division by
+//
 //   P = x^32 + x^26 + x^23 + x^22 + x^16 + x^12 + x^11 + x^10 + x^8 + x^7 + x^5 + x^4 + x^2 + x + 1
 constexpr std::uint32_t kP = 0xEDB88320;
 
-// x^n mod P, in 64 bits.
+// x^n mod P, in a 64-bit register.
 constexpr std::int64_t power(int n) {
   std::uint32_t at = 1U << 31;  // x^0
   for (int i = 0; i < n; ++i) at = at >> 1 ^ (at & 1 ? kP : 0);
   return static_cast<std::int64_t>(std::uint64_t{at} << 32);
 }
 
-// In 33 bits: P, and x^64 / P without its remainder.
+// Values of 33 bits: P, and the quotient of x^64 / P without its remainder.
 constexpr std::int64_t kWholeP = (std::int64_t{kP} << 1) | 1;
 constexpr std::int64_t quotient() {
-  std::int64_t of = 1;      // x^32 is what x^64 / P begins with
-  std::uint32_t rest = kP;  // of x^32 / P, then of each power above it
+  std::int64_t of = 1;      // x^32, the first term of x^64 / P
+  std::uint32_t rest = kP;  // remainder of x^32 / P, then of each higher power
   for (int i = 1; i <= 32; ++i) {
     if (rest & 1) of |= std::int64_t{1} << i;
     rest = rest >> 1 ^ (rest & 1 ? kP : 0);
@@ -45,8 +47,9 @@ constexpr std::int64_t quotient() {
   return of;
 }
 
-// What multiplies s = h x^64 + l by x^n, as h x^(64 + n) + l x^n, for each of four s. The product of
-// two registers of 64 bits has 127 bits and stands one power too high in one of 128: here one less.
+// Factors that multiply s = h x^64 + l by x^n, as h x^(64 + n) + l x^n, for each of four
+// polynomials s. The product of two 64-bit registers has 127 bits, which makes it one power too
+// high in a 128-bit register. The exponents are therefore one lower.
 struct Powers {
   std::int64_t bits[8];
 };
@@ -55,9 +58,9 @@ constexpr Powers powers(int n) {
   return {{low, high, low, high, low, high, low, high}};
 }
 
-// Registers hold one polynomial below x^128 or four of them.
-constexpr int kLanes = 4;                        // so many multiplications are under way at a time
-constexpr std::size_t kNarrow = 16, kWide = 64;  // bytes of a register
+// A register holds one polynomial of degree below 128, or four of them.
+constexpr int kLanes = 4;                        // independent multiplications in flight
+constexpr std::size_t kNarrow = 16, kWide = 64;  // bytes per register
 
 #define MJSENSE_NARROW __attribute__((target("pclmul,sse4.1")))
 #define MJSENSE_WIDE __attribute__((target("avx512f,vpclmulqdq,pclmul,sse4.1")))
@@ -67,7 +70,7 @@ MJSENSE_NARROW inline __m128i load(const void* bytes) {
 }
 MJSENSE_WIDE inline __m512i load_wide(const void* bytes) { return _mm512_loadu_si512(bytes); }
 
-// What is congruent to s x^n, plus what stands there.
+// Returns a polynomial congruent to s x^n + there, mod P.
 MJSENSE_NARROW inline __m128i shifted(__m128i s, __m128i powers, __m128i there) {
   return _mm_xor_si128(there, _mm_xor_si128(_mm_clmulepi64_si128(s, powers, 0x00),
                                             _mm_clmulepi64_si128(s, powers, 0x11)));
@@ -78,17 +81,17 @@ MJSENSE_WIDE inline __m512i shifted_wide(__m512i s, __m512i powers, __m512i ther
 }
 
 // V. Gopal et al., Fast CRC Computation for Generic Polynomials Using PCLMULQDQ Instruction, Intel,
-// 2009: what was read is shifted over a block ahead and added to it, so that from there on the
-// remainder is the same without it.
+// 2009. The block that was read is multiplied by a power of x (mod P) and added to a block further
+// ahead. The remainder of the rest is then the same without it.
 
-// Bytes that are left, and what stands for all before them.
+// Remaining bytes; the polynomial of all bytes before them is kept separately.
 struct Rest {
   const std::uint8_t* bytes;
   std::size_t count;
 };
 
-// The first bytes, so many that a multiple of kNarrow is left; 2 * kNarrow is the least `count`.
-// Zeros before the first byte change nothing.
+// Consumes the first bytes, so that the remaining count is a multiple of kNarrow. `count` must be
+// at least 2 * kNarrow. Leading zeros do not change the remainder.
 MJSENSE_NARROW inline __m128i head(std::uint32_t crc, Rest& rest) {
   const std::size_t odd = rest.count % kNarrow;
   std::uint8_t aligned[2 * kNarrow] = {};
@@ -105,17 +108,18 @@ MJSENSE_NARROW inline __m128i head(std::uint32_t crc, Rest& rest) {
   return shifted(load(aligned), load(kNext.bits), load(aligned + kNarrow));
 }
 
-// Through a multiple of kNarrow bytes, to the CRC.
+// Consumes the remaining bytes, a multiple of kNarrow, and returns the CRC.
 MJSENSE_NARROW inline std::uint32_t tail(__m128i s, Rest rest) {
   constexpr Powers kNext = powers(8 * kNarrow);
   const __m128i next = load(kNext.bits);
   for (; rest.count > 0; rest.bytes += kNarrow, rest.count -= kNarrow)
     s = shifted(s, next, load(rest.bytes));
-  // (h x^64 + l) x^32, below x^96 and then below x^64.
+  // Reduces (h x^64 + l) x^32 to degree below 96, then below 64.
   const __m128i fold = _mm_set_epi64x(power(64 - 1), power(96 - 1));
   s = _mm_xor_si128(_mm_clmulepi64_si128(s, fold, 0x00), _mm_slli_si128(_mm_srli_si128(s, 8), 4));
   s = _mm_srli_si128(_mm_xor_si128(s, _mm_clmulepi64_si128(s, fold, 0x10)), 8);
-  // P. Barrett's reduction: the quotient by P needs the upper half alone, and is subtracted.
+  // Barrett reduction (P. Barrett): the quotient by P depends only on the upper half; its product
+  // with P is subtracted.
   const __m128i by = _mm_set_epi64x(quotient(), kWholeP), half = _mm_set_epi32(0, 0, 0, -1);
   __m128i q = _mm_clmulepi64_si128(_mm_and_si128(s, half), by, 0x10);
   q = _mm_clmulepi64_si128(_mm_and_si128(q, half), by, 0x00);

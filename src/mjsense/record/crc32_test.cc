@@ -39,7 +39,7 @@ std::vector<detail::Crc32> all_ways() {
   return ways;
 }
 
-// Of every length, from every place, after anything: the same as bit by bit.
+// Every length, alignment and initial value gives the same result as the bitwise algorithm.
 TEST(Crc32, EveryLengthAndPlace) {
   const std::vector<std::uint8_t> bytes = some_bytes(1400);
   for (const std::size_t begin : {0, 1, 7, 15, 33, 63}) {

@@ -1,14 +1,16 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
-// The JSON text that says what a recording is, as it stands in files that anybody may have made.
+// Parser for the JSON text that describes a recording. The text comes from files and is not
+// trusted.
 
 #include <nlohmann/json_fwd.hpp>
 #include <string>
 
 namespace mjsense {
 
-// Discarded (is_discarded()) where it is no JSON text, longer than 4 MiB, or nested more than 64
-// times: what is done with it further on calls itself once for each level.
+// Returns a discarded value (is_discarded()) if the text is not JSON, is longer than 4 MiB or is
+// nested deeper than 64 levels. The depth is limited because later functions recurse once per
+// level.
 nlohmann::json parse_description(const std::string& text);
 
 }  // namespace mjsense

@@ -31,8 +31,8 @@ double seconds_since(Clock::time_point start) {
 }
 
 constexpr int kDefaultEncoders = 32;
-constexpr int kWatchPeriodMs = 250;  // how often running ones are looked at
-constexpr int kReapPeriodMs = 4;     // how often ending encoders are looked after
+constexpr int kWatchPeriodMs = 250;  // period of the check for hanging encoders
+constexpr int kReapPeriodMs = 4;     // polling period while an encoder is exiting
 
 }  // namespace
 
@@ -40,23 +40,23 @@ class EncoderPool::Stream {
  public:
   const VideoStream* video = nullptr;
   std::shared_ptr<const Folder> folder;
-  std::string output, spool;  // files in it
+  std::string output, spool;  // files in `folder`
   OnDone on_done;
   Child child;
   Fd spool_file;
-  bool direct = true;   // has its own ffmpeg from the start
-  bool closed = false;  // the producer is done
+  bool direct = true;   // has an ffmpeg process from the start
+  bool closed = false;  // the producer has called close() or abort()
   bool aborted = false;
   std::string failure;
-  // Wall seconds since its ffmpeg has last taken or written something, less those in which it waited
-  // for a processor.
+  // Wall-clock seconds since its ffmpeg last read or wrote something, without the time in which it
+  // waited for a CPU.
   double idle_s = 0;
-  double waited_s = 0;       // for a processor, in all
-  std::int64_t written = 0;  // bytes that went into its ffmpeg
-  std::int64_t seen = 0;     // of its input or output, when it last did
+  double waited_s = 0;       // total time in which it waited for a CPU
+  std::int64_t written = 0;  // bytes written to its ffmpeg
+  std::int64_t seen = 0;     // progress (`written` or moved()) at the last check
 
-  // Ring of frames: [taken, filled) wait for the pool's thread, which has written `offset` bytes of
-  // the first.
+  // Ring of frames. Frames [taken, filled) wait for the pool's thread, which has written `offset`
+  // bytes of the first one.
   std::vector<std::vector<std::uint8_t>> ring;
   std::uint64_t filled = 0, taken = 0;
   std::size_t offset = 0;
@@ -69,10 +69,10 @@ class EncoderPool::Stream {
 struct EncoderPool::Impl {
   VideoCfg cfg;
   Fps fps;
-  const std::atomic<int>* leave;  // at 2 or more: whoever waits wants to leave
+  const std::atomic<int>* leave;  // 2 or more: the user wants to stop immediately
   int max_encoders;
-  int max_direct;   // encoders that streams may hold while they grow; the others drain spool files
-  int max_waiting;  // spool files that wait for an encoder
+  int max_direct;   // encoders for streams that are still open; the others encode spool files
+  int max_waiting;  // maximum number of spool files that wait for an encoder
 
   mutable std::mutex mutex;
   std::condition_variable changed;
@@ -119,15 +119,15 @@ struct EncoderPool::Impl {
     return count([](const Stream& s) { return !s.direct && s.closed && s.child.pid < 0; });
   }
 
-  // The pool's thread: writes what producers queued, starts encoders on complete spool files,
-  // collects what has ended.
+  // The pool's thread: writes queued frames, starts encoders on complete spool files and collects
+  // processes that have ended.
   void run() {
     sigset_t errors;
     sigemptyset(&errors);
     sigaddset(&errors, SIGPIPE);
     sigaddset(&errors, SIGXFSZ);
-    // An encoder that died is an EPIPE for us, and a spool file that may not grow an EFBIG; not the
-    // end of the program.
+    // Without this mask, writing to an encoder that died (EPIPE) or beyond the file size limit
+    // (EFBIG) would kill this process with a signal.
     pthread_sigmask(SIG_BLOCK, &errors, nullptr);
     std::vector<pollfd> polled;
     std::vector<Stream*> ready;
@@ -148,7 +148,8 @@ struct EncoderPool::Impl {
       }
       const bool waiting = polled.size() > 1;
       poll(polled.data(), polled.size(), ending ? kReapPeriodMs : waiting ? kWatchPeriodMs : -1);
-      // A pause of ours (Ctrl-Z, a sleeping machine) is not theirs.
+      // A pause of this process (Ctrl-Z, a suspended machine) must not count as idle time of an
+      // encoder.
       const double elapsed = std::min(seconds_since(last), 1e-3 * 4 * kWatchPeriodMs);
       last = Clock::now();
       std::uint64_t drained;
@@ -162,7 +163,7 @@ struct EncoderPool::Impl {
     }
   }
 
-  // Ends encoders that have not moved for too long.
+  // Fails streams whose encoder has made no progress for too long.
   void watch(double elapsed) {
     constexpr double kHurrySeconds = 2;
     const bool hurry = leave && leave->load() >= 2;
@@ -175,7 +176,7 @@ struct EncoderPool::Impl {
         continue;
       }
       const std::int64_t now = ending ? moved(*stream) : stream->written;
-      // On a machine with too much to do it may get no processor: that is no hang.
+      // On an overloaded machine an encoder may get no CPU time; that is not a hang.
       const double waited = os::waited_for_processor(stream->child.pid);
       const double without = std::clamp(waited - stream->waited_s, 0.0, elapsed);
       stream->idle_s = now != stream->seen ? 0 : stream->idle_s + elapsed - without;
@@ -188,15 +189,15 @@ struct EncoderPool::Impl {
     }
   }
 
-  // How far an ffmpeg has come that gets no more from us: in the file that it reads, or in the one
-  // that it writes.
+  // Progress of an ffmpeg process whose input is complete: bytes read from its input plus bytes
+  // written to its output file.
   static std::int64_t moved(const Stream& stream) {
     const std::int64_t read =
         stream.spool_file ? lseek(stream.spool_file.get(), 0, SEEK_CUR) : stream.written;
     return read + stream.folder->size_of(stream.output);
   }
 
-  // Writes as much as the sink takes now.
+  // Writes as much as the sink accepts without blocking.
   void feed(Stream& stream) {
     const std::size_t size = stream.video->frame_bytes();
     while (true) {
@@ -240,11 +241,12 @@ struct EncoderPool::Impl {
       std::erase(streams, nullptr);
       if (!done.empty()) changed.notify_all();
     }
-    if (!done.empty()) wake();  // an encoder is free: look again at what waits for one
+    // An encoder has become free: check again for streams that wait for one.
+    if (!done.empty()) wake();
     for (auto& [on_done, result] : done) on_done(result);
   }
 
-  // Takes the next step of a stream that is complete or has failed.
+  // Advances a stream that is complete or has failed.
   void advance(Stream& stream) {
     if (stream.failed()) {
       if (stream.child.pid >= 0) finish(stream, true);
@@ -253,7 +255,7 @@ struct EncoderPool::Impl {
     if (!stream.closed || stream.has_frames()) return;
     stream.ring.clear();
     if (stream.direct) {
-      stream.child.in.reset();  // the end of its input
+      stream.child.in.reset();  // signals the end of input
     } else if (stream.child.pid < 0 && running < max_encoders) {
       stream.spool_file =
           Fd(openat(stream.folder->fd(), stream.spool.c_str(), O_RDONLY | O_NOFOLLOW | O_CLOEXEC));
@@ -268,12 +270,14 @@ struct EncoderPool::Impl {
     }
   }
 
-  // Collects an ffmpeg that ends by itself; with `now`, makes it end. False if it still runs.
+  // Collects an ffmpeg process that has exited; with `now`, kills it if necessary. False if it
+  // still runs.
   bool finish(Stream& stream, bool now) {
     Exit exit;
     bool ended = wait_process(stream.child, false, exit);
     if (!ended && now && !stream.failure.empty()) {
-      usleep(50000);  // it stopped reading, so it is about to end: wait for its own words
+      // It stopped reading and is about to exit: give it time to write its error message.
+      usleep(50000);
       ended = wait_process(stream.child, false, exit);
     }
     if (ended && !exit.ok) stream.failure = "ffmpeg: " + exit.why;
@@ -291,10 +295,11 @@ struct EncoderPool::Impl {
   bool ended(Stream& stream, Result& result) {
     if (!stream.failed()) {
       const bool started = stream.child.pid >= 0;
-      if (!started || stream.child.in) return false;  // still fed, or waits for an encoder
+      // Still receives input, or waits for an encoder.
+      if (!started || stream.child.in) return false;
       if (!finish(stream, false)) return false;
     } else if (!stream.closed && !stream.aborted) {
-      return false;  // the producer still holds it; reserve() tells it
+      return false;  // the producer still uses it; reserve() reports the failure
     }
     if (!stream.spool.empty()) stream.folder->remove(stream.spool);
     result = {!stream.failed(), stream.aborted,

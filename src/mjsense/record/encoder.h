@@ -1,13 +1,13 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
-// Frames to video files through ffmpeg programs: one thread feeds them all.
+// Encodes frames to video files with ffmpeg processes that one thread feeds.
 //
-// A stream is one video of one episode. Usually it has its own ffmpeg from the first frame on. When
-// the worlds have more streams than max_encoders, the surplus streams write raw frames to a file
-// beside their video, and encoders take these files up as they come free; the video is the same,
-// byte for byte. Either way the producer waits while `queue_frames` of its frames are not taken
-// yet, so memory is bounded and no frame is lost. An ffmpeg that takes nothing, or does not end, for
-// VideoCfg::ffmpeg_timeout is ended, and its stream has failed.
+// A stream is one video of one episode. Usually it has an ffmpeg process from its first frame. If
+// the worlds have more streams than max_encoders, the surplus streams write raw frames to a spool
+// file next to their video. These files are encoded when an encoder becomes free; the video is the
+// same byte for byte. In both cases the producer waits while `queue_frames` of its frames are
+// pending, so memory is bounded and no frame is lost. An ffmpeg process that accepts no input, or
+// does not exit, for VideoCfg::ffmpeg_timeout is killed, and its stream fails.
 
 #include <atomic>
 #include <cstddef>
@@ -24,7 +24,8 @@
 
 namespace mjsense {
 
-// What ffmpeg is told: raw frames from its stdin to the file `output` of the folder it runs in.
+// Command line of ffmpeg: it reads raw frames from stdin and writes the file `output` in its
+// working directory.
 std::vector<std::string> encoder_command(const VideoCfg& cfg, const Fps& fps,
                                          const VideoStream& video, const std::string& output);
 
@@ -37,28 +38,29 @@ class EncoderPool {
   struct Result {
     bool ok = false;
     bool aborted = false;
-    std::string why;  // if not ok
+    std::string why;  // reason, if not ok
   };
-  // Called once per stream by the pool's thread, after its ffmpeg has ended.
+  // Called once per stream by the pool's thread, after the stream's ffmpeg process has ended.
   using OnDone = std::function<void(const Result&)>;
 
-  // `streams_at_once`: the most streams that grow at the same time.
+  // `streams_at_once`: maximum number of streams that are open at the same time.
   EncoderPool(const VideoCfg& cfg, const Fps& fps, int streams_at_once,
               const std::atomic<int>* stop = nullptr);
-  ~EncoderPool();  // kills what still runs
+  ~EncoderPool();  // kills the processes that still run
 
-  // Waits for a free encoder, or for disk space to be drained. `video` outlives the stream, which
-  // writes the file `output` of `folder`. Throws RuntimeError when ffmpeg cannot be started.
+  // Waits for a free encoder or, with spool files, until few enough of them are pending. `video`
+  // must outlive the stream, which writes the file `output` of `folder`. Throws RuntimeError if
+  // ffmpeg cannot be started.
   Stream* open(const VideoStream& video, std::shared_ptr<const Folder> folder,
                const std::string& output, OnDone on_done);
-  // The place of the next frame; waits while the queue is full. Empty when the stream has failed:
-  // on_done tells why.
+  // Buffer for the next frame. Waits while the queue is full. Empty if the stream has failed;
+  // on_done receives the reason.
   [[nodiscard]] std::span<std::uint8_t> reserve(Stream* stream);
   void commit(Stream* stream);
-  void close(Stream* stream);  // no more frames; the stream must not be used any more
-  void abort(Stream* stream);  // no more frames, and the video is not wanted
+  void close(Stream* stream);  // ends the stream, which must not be used afterwards
+  void abort(Stream* stream);  // the same, and discards the video
 
-  double cpu_s() const;  // processor time of the programs that have ended
+  double cpu_s() const;  // CPU time of the ffmpeg processes that have ended
 
  private:
   struct Impl;

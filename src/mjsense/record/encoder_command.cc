@@ -9,10 +9,10 @@
 namespace mjsense {
 std::vector<std::string> encoder_command(const VideoCfg& cfg, const Fps& fps,
                                          const VideoStream& video, const std::string& output) {
-  // What the frames are when they reach it, so that it converts nothing.
+  // Frames already have the pixel format of the codec, so that ffmpeg does not convert them.
   constexpr const char* kPixels[] = {"yuv420p", "gray16le", "rgb24"};
   const char* pixels = kPixels[static_cast<int>(video.kind)];
-  const int odd = video.kind == VideoKind::kRgb ? 1 : 0;  // 4:2:0 has even sizes
+  const int odd = video.kind == VideoKind::kRgb ? 1 : 0;  // 4:2:0 needs even sizes
   std::vector<std::string> a = {ffmpeg_program(cfg.ffmpeg)};
   const auto add = [&a](std::initializer_list<std::string> more) { a.insert(a.end(), more); };
   add({"-nostdin", "-hide_banner", "-loglevel", "error", "-y"});

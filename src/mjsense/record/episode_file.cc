@@ -109,7 +109,7 @@ void EpisodeFile::add_dataset(std::string_view place, DType dtype, const Shape& 
   dataset.rank = row.rank() + 1;
   dataset.row_bytes = static_cast<std::size_t>(row.size()) * dtype_size(dtype);
   for (int i = 0; i < row.rank(); ++i) {
-    // A row of no elements is stored as such; HDF5 wants its chunks to have a size all the same.
+    // A row may have no elements, but HDF5 requires chunk dimensions of at least 1.
     const auto size = static_cast<hsize_t>(row[i]);
     dataset.dims[i + 1] = size;
     chunk[i + 1] = std::max<hsize_t>(1, size);
@@ -145,7 +145,8 @@ void EpisodeFile::write_chunk(int stream, std::int64_t rows, std::span<const std
   if (index < plan_.arrays.size() && plan_.arrays[index].text)
     chunk = texts_of(plan_.arrays[index], rows, chunk);
   std::span<const std::uint8_t> bytes = chunk;
-  if (gzip_ > 0 && !chunk.empty()) {  // outside the library's lock: here the time goes
+  // Without the lock of the HDF5 library, because compression takes most of the time.
+  if (gzip_ > 0 && !chunk.empty()) {
     packed_.resize(compressBound(chunk.size()));
     uLongf size = packed_.size();
     if (compress2(packed_.data(), &size, chunk.data(), chunk.size(), gzip_) != Z_OK) {
@@ -154,7 +155,7 @@ void EpisodeFile::write_chunk(int stream, std::int64_t rows, std::span<const std
     }
     bytes = {packed_.data(), size};
   }
-  // Now that the compressor has brought it into this core's cache.
+  // Computed here because the compressor has just loaded the chunk into this core's cache.
   if (!chunk.empty())
     datasets_[index].sum.add(chunk.data(),
                              static_cast<std::size_t>(rows) * datasets_[index].row_bytes);

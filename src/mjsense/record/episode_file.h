@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
-// The HDF5 file of one episode while it is recorded: `traj_0` of a file of its own. Used by one
-// thread; the plan outlives it.
+// The HDF5 file of one running episode, which contains the single trajectory `traj_0`. It is used
+// by one thread, and the plan must outlive it.
 
 #include <cstdint>
 #include <memory>
@@ -17,27 +17,28 @@
 
 namespace mjsense {
 
-// What the recorder adds to every step; the places of these datasets stand beside the suite's.
+// Streams that the recorder adds to those of the suite.
 enum OwnStream { kRewards, kSuccess, kFail, kTerminated, kTruncated, kOwnStreams };
 std::string_view own_place(int stream);
 DType own_dtype(int stream);
 
 class EpisodeFile {
  public:
-  // The file `name` of a folder.
+  // Creates the file `name` in `folder`.
   EpisodeFile(std::shared_ptr<const Folder> folder, const std::string& name,
               const RecordingCfg& cfg, const RecordingPlan& plan, const EpisodeMeta& meta);
   ~EpisodeFile();
   EpisodeFile(const EpisodeFile&) = delete;
   EpisodeFile& operator=(const EpisodeFile&) = delete;
 
-  // Appends `rows` rows of a stream: streams [0, arrays) are the plan's, then OwnStream. `chunk`
-  // has the kept bytes of a whole chunk, zero beyond the rows: what is text on disk becomes it
-  // here. Chunks of a stream come in order, all but the last full.
+  // Appends `rows` rows to a stream. Streams [0, arrays) are those of the plan; the OwnStream
+  // values follow. `chunk` is the buffer of a whole chunk (kept_bytes() per row), zero beyond the
+  // rows; JSON text is generated from it here. The chunks of a stream must come in order, and all
+  // but the last must be full.
   void write_chunk(int stream, std::int64_t rows, std::span<const std::uint8_t> chunk);
   void write_scene(std::string_view obs_scene, std::string_view outcome);
-  // Of the videos, in the plan's order: their checksums and sizes. Closes; throws when the disk
-  // refuses.
+  // Checksums and sizes of the videos, in the order of the plan. finish() writes them and closes
+  // the file; it throws if the disk reports an error.
   struct VideoSum {
     std::string crc;
     std::int64_t bytes = 0;
@@ -46,13 +47,13 @@ class EpisodeFile {
 
  private:
   struct Dataset {
-    h5::Id id, crc;  // the dataset, and its attribute of that name
+    h5::Id id, crc;  // the dataset and its checksum attribute
     int rank = 0;
     std::size_t row_bytes = 0;
     Checksum sum;  // of all rows
     hsize_t dims[Shape::kMaxRank + 1] = {};
   };
-  // A chunk of texts; valid until the next call.
+  // Returns a chunk converted to text; valid until the next call.
   std::span<const std::uint8_t> texts_of(const ArrayStream& stream, std::int64_t rows,
                                          std::span<const std::uint8_t> kept);
   void add_dataset(std::string_view place, DType dtype, const Shape& row, std::int64_t chunk_rows);

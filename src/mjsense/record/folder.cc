@@ -38,7 +38,7 @@ bool is_entry(int folder, const std::string& name, int fd) {
 
 std::vector<std::string> names_in(int folder) {
   std::vector<std::string> names;
-  // A descriptor of its own: the position in a directory belongs to the open file.
+  // A separate open file, because the read position of a directory belongs to the open file.
   Fd own(openat(folder, ".", kFolderFlags));
   if (!own) return names;
   const std::unique_ptr<DIR, int (*)(DIR*)> entries(fdopendir(own.get()), closedir);
@@ -170,7 +170,7 @@ void Folder::reserve_space(const std::string& name, std::int64_t bytes) const {
     throw_file("write", shown(name), EFBIG);
   if (os::reserve(file.get(), bytes)) return;
   if (errno == ENOSPC || errno == EDQUOT || errno == EFBIG) throw_file("write", shown(name), errno);
-  // Where space cannot be reserved (some network file systems), at least ask how much there is.
+  // If space cannot be reserved (some network file systems), at least check that enough is free.
   std::error_code error;
   const fs::space_info space = fs::space(os::path_of(file.get()), error);
   if (!error && space.available < static_cast<std::uintmax_t>(bytes))

@@ -14,7 +14,7 @@ namespace mjsense {
 namespace {
 
 constexpr std::string_view kGiven = "given/";
-// Longest text of a number: "-1.2345678901234567e-123", and the comma after it.
+// Longest text of a number, "-1.2345678901234567e-123", and a comma.
 constexpr std::size_t kNumberBytes = 25;
 
 std::vector<std::string> split(std::string_view path) {
@@ -27,7 +27,7 @@ std::vector<std::string> split(std::string_view path) {
   return parts;
 }
 
-// An element of a kept row, which is not aligned.
+// Reads an element of a kept row; elements are not aligned.
 template <class T>
 T read(const std::uint8_t* at) {
   T x;
@@ -107,7 +107,7 @@ std::size_t JsonRows::longest() const {
     for (const std::string& key : member.path) {
       JsonWriter json({});
       json.begin_object().key(key);
-      bytes += json.size() + 2;  // what opens it, what closes it, a comma
+      bytes += json.size() + 2;  // braces and a comma
     }
     bytes += 1 + member.field->spec.shape.size() * kNumberBytes;
   }
@@ -125,7 +125,7 @@ void JsonRows::copy(int world, std::uint8_t* row) const {
 void JsonRows::write(const std::uint8_t* row, std::span<std::uint8_t> text) const {
   JsonWriter json(text);
   json.begin_object();
-  std::span<const std::string> open;  // the objects inside the outermost that are not closed
+  std::span<const std::string> open;  // the objects below the root that are still open
   const auto close_to = [&](std::size_t depth) {
     for (; open.size() > depth; open = open.first(open.size() - 1)) json.end_object();
   };

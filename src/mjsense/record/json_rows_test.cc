@@ -41,7 +41,7 @@ std::string text_of_row(const JsonRows& rows) {
   return all.substr(0, end);
 }
 
-TEST(JsonRows, AreSortedListsOfWidenedNumbers) {
+TEST(JsonRows, MembersAreSortedAndWidened) {
   Numbers sensor("qpos");
   sensor.add<float>("base", {0}, {});
   sensor.add<float>("arm", {2}, {0.05f, -1e-5f});
@@ -50,7 +50,7 @@ TEST(JsonRows, AreSortedListsOfWidenedNumbers) {
             R"({"a":{"b":[0.05]},"arm":[0.05000000074505806,-9.999999747378752e-06],"base":[]})");
 }
 
-TEST(JsonRows, LeaveOutWhatIsNotGiven) {
+TEST(JsonRows, OmitFieldsThatAreNotGiven) {
   Numbers sensor("actions/x");
   sensor.add<double>("arm", {2}, {0, 0}).add<double>("base", {0}, {});
   sensor.add<double>("gripper", {1}, {255});
@@ -72,7 +72,7 @@ TEST(JsonRows, NestByThePathOfAField) {
             R"("right":{"deep":{"er":true},"touching":true}})");
 }
 
-TEST(JsonRows, WriteWhatPythonWrites) {
+TEST(JsonRows, EqualPythonsJson) {
   Numbers sensor("qpos");
   constexpr double kInf = std::numeric_limits<double>::infinity();
   sensor.add<double>("x", {4}, {kInf, -kInf, std::numeric_limits<double>::quiet_NaN(), -0.0});
@@ -81,7 +81,7 @@ TEST(JsonRows, WriteWhatPythonWrites) {
             R"({"x":[Infinity,-Infinity,NaN,-0.0],"y":[0,255],"z":-4611686018427387904})");
 }
 
-TEST(JsonRows, TheLongestTextMustFit) {
+TEST(JsonRows, LongestTextMustFit) {
   Numbers sensor("qpos");
   constexpr double kLong = -1.2345678901234567e-123;
   sensor.add<double>("arm", {2}, {kLong, kLong}).add<bool>("hand/held", {}, {false});
@@ -91,7 +91,7 @@ TEST(JsonRows, TheLongestTextMustFit) {
   EXPECT_LE(text.size(), 108u);
 }
 
-TEST(JsonRows, AListCannotHoldAField) {
+TEST(JsonRows, ArraysCannotContainFields) {
   Numbers sensor("qpos");
   sensor.add<double>("arm/tip", {1}, {0}).add<double>("arm", {1}, {0});
   EXPECT_EQ(error_of([&] { JsonRows(sensor, 200); }),

@@ -18,12 +18,12 @@
 namespace mjsense {
 namespace {
 
-// About 128 KiB: large enough for gzip and the file system, small enough that many worlds' buffers
-// fit the cache.
+// About 128 KiB: large enough for gzip and the file system to be efficient, small enough for the
+// buffers of many worlds to fit in the cache.
 constexpr std::size_t kChunkBytes = 1 << 17;
 constexpr std::int64_t kMostChunkRows = 512;
 
-// What the recorder itself writes into every episode.
+// Datasets that the recorder itself writes into every episode.
 constexpr const char* kOwnPlaces[] = {"rewards",    "success",   "fail",
                                       "terminated", "truncated", "obs_scene"};
 
@@ -69,7 +69,8 @@ void add_videos(const RecordingCfg& cfg, const Sensor& sensor, const Field& fiel
                     static_cast<int>(spec.shape[1]),
                     static_cast<int>(spec.shape[0])};
   if (!rgb && cfg.video.molmospaces_depth) {
-    // MolmoSpaces' loaders find their form under the camera's depth name; ours stands beside it.
+    // MolmoSpaces' loaders expect their encoding under the camera's depth name; mjsense's lossless
+    // video is stored in addition to it.
     VideoStream lossy = video;
     lossy.kind = VideoKind::kDepthRedGreen;
     lossy.extension = ".mp4";
@@ -79,7 +80,7 @@ void add_videos(const RecordingCfg& cfg, const Sensor& sensor, const Field& fiel
   videos.push_back(video);
 }
 
-// Two datasets cannot have one name, and a dataset cannot be a group.
+// Two datasets cannot have the same path, and a dataset cannot be a group.
 void check_places(const std::map<std::string, std::string>& owners) {
   for (const auto& [place, owner] : owners) {
     for (std::size_t slash = place.find('/'); slash != std::string::npos;
@@ -153,8 +154,8 @@ std::size_t ArrayStream::kept_bytes() const { return text ? text->row_bytes() : 
 
 RecordingPlan plan_recording(const RecordingCfg& cfg) {
   RecordingPlan plan;
-  nlohmann::json streams = nlohmann::json::array();  // in the suite's order
-  std::map<std::string, std::string> owners;         // place -> "sensor 'x'"
+  nlohmann::json streams = nlohmann::json::array();  // in the order of the suite
+  std::map<std::string, std::string> owners;         // path -> "sensor 'x'"
   const auto claim = [&](const std::string& place, const std::string& owner) {
     const auto [at, fresh] = owners.emplace(place, owner);
     if (!fresh)
@@ -222,7 +223,8 @@ Batches batches_of(int episodes, int batches) {
   }
   if (batches == 0)
     batches = std::max(
-        1, static_cast<int>(std::nearbyint(episodes / 4.0)));  // Python's round(): half to even
+        // Like Python's round(): half to even.
+        1, static_cast<int>(std::nearbyint(episodes / 4.0)));
   return {episodes, batches};
 }
 
@@ -273,7 +275,7 @@ std::string fingerprint_difference(const std::string& was, const std::string& no
   if (!a.is_object() || !b.is_object()) return "its description cannot be read";
   const nlohmann::json difference = nlohmann::json::diff(a, b);
   if (difference.empty()) return "";
-  // A setting that was changed may have changed the model and the streams, too: it is named first.
+  // A changed setting may also have changed the model and the streams, so it is reported first.
   constexpr std::string_view kConsequences[] = {"/model", "/streams"};
   const auto is_consequence = [&](const nlohmann::json& change) {
     const auto& path = change["path"].get_ref<const std::string&>();

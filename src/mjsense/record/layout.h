@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
-// What becomes of a suite on disk: datasets and videos, the names of files, the batches. Pure
-// functions; the places in the HDF5 tree are molmospaces.h.
+// Maps a suite to files: datasets, videos, file names and batches. All functions are pure.
+// molmospaces.h defines the paths in the HDF5 tree.
 
 #include <cstddef>
 #include <cstdint>
@@ -16,24 +16,24 @@
 
 namespace mjsense {
 
-// One dataset with a row a step: a field of a sensor as it is, or all of them as JSON text.
+// One dataset with one row per step: one field of a sensor, or all its fields as JSON text.
 struct ArrayStream {
   const Sensor* sensor = nullptr;
   SensorSpec spec;                       // of the dataset
-  const Field* field = nullptr;          // null if it is text of many
-  std::shared_ptr<const JsonRows> text;  // null if it is a field
-  std::string place;                     // "obs/extra/tcp_pose"
+  const Field* field = nullptr;          // null if it is text of several fields
+  std::shared_ptr<const JsonRows> text;  // null if it is a single field
+  std::string place;                     // path in the trajectory's group: "obs/extra/tcp_pose"
   std::int64_t chunk_rows = 1;
 
-  std::string_view kind() const;   // "json", or the sensor's
+  std::string_view kind() const;   // "json", or the sensor's kind
   std::size_t row_bytes() const;   // on disk, before compression
-  std::size_t kept_bytes() const;  // of a row until it is written
+  std::size_t kept_bytes() const;  // of a row in the buffers, before it is written
 };
 
 enum class VideoKind { kRgb, kDepth16, kDepthRedGreen };
 
-// One field of one sensor that becomes one video file. A depth field becomes two when MolmoSpaces'
-// form is asked for.
+// One video file of one field of a sensor. A depth field has a second one if MolmoSpaces' encoding
+// is requested.
 struct VideoStream {
   const Sensor* sensor = nullptr;
   const Field* field = nullptr;
@@ -42,7 +42,7 @@ struct VideoStream {
   std::string stem;       // in file names: "wrist_camera"
   std::string extension;  // ".mp4", ".mkv"
   int width = 0, height = 0;
-  std::size_t frame_bytes() const;  // as the encoder reads it
+  std::size_t frame_bytes() const;  // in the encoder's input format
   std::string_view codec() const { return kind == VideoKind::kDepth16 ? "ffv1" : "h264"; }
   std::string_view container() const { return extension == ".mkv" ? "Matroska" : "MP4"; }
 };
@@ -50,23 +50,24 @@ struct VideoStream {
 struct RecordingPlan {
   std::vector<ArrayStream> arrays;
   std::vector<VideoStream> videos;
-  std::string fingerprint;  // what two recordings must share to be one: JSON text
+  // JSON text of everything that must be equal for a recording to be resumed
+  std::string fingerprint;
 };
 
-// Finds a place for every field of every sensor. Throws ValueError when two streams would share a
-// place, when one would stand inside the other, when a name is no path, and when a video stream is
-// not uint8 [H, W, 3] or float32 [H, W].
+// Assigns a path to every field of every sensor. Throws ValueError if two streams would share a
+// path, if the path of one would be inside that of another, if a name is not a valid path, or if a
+// video stream is not uint8 [H, W, 3] or float32 [H, W].
 RecordingPlan plan_recording(const RecordingCfg& cfg);
 
 std::int64_t chunk_rows(std::size_t row_bytes);
 
-// Episodes of each batch: sizes differ by one at most, the larger first.
+// Number of episodes in each batch. Sizes differ by at most one; larger batches come first.
 std::vector<int> batch_sizes(int episodes, int batches);
 
-// The same without a list of them: which episodes are in which batch.
+// The same without storing the sizes: maps batches to ranges of episodes.
 struct Batches {
   int episodes = 0, count = 0;
-  std::int64_t first(int batch) const;  // position of its first episode; of `count`: `episodes`
+  std::int64_t first(int batch) const;  // position of its first episode; first(count) == episodes
   int size(int batch) const { return static_cast<int>(first(batch + 1) - first(batch)); }
 };
 Batches batches_of(int episodes, int batches);
@@ -77,10 +78,10 @@ std::string video_file(std::string_view stem, std::string_view extension, int in
                        int batches);
 constexpr std::size_t kFileNameBytes = 100;  // width of a file name in obs/sensor_data
 
-// The spec of a dataset as JSON text: an attribute of it.
+// Spec of a dataset as JSON text, which is stored as its attribute.
 std::string spec_json(std::string_view sensor, std::string_view kind, const SensorSpec& spec);
 
-// Of two fingerprints: "" if equal, else "'episodes' was 8 and is now 10".
+// Describes how two fingerprints differ: "'episodes' was 8 and is now 10". "" if they are equal.
 std::string fingerprint_difference(const std::string& was, const std::string& now);
 
 }  // namespace mjsense

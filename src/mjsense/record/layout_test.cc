@@ -44,7 +44,7 @@ RecordingPlan plan(std::initializer_list<const Sensor*> sensors) {
   return plan_recording(cfg);
 }
 
-TEST(Layout, StreamsStandWhereMolmoSpacesReadersLook) {
+TEST(Layout, StreamPathsEqualMolmoSpaces) {
   EXPECT_EQ(place_of("qpos"), "obs/agent/qpos");
   EXPECT_EQ(place_of("qvel"), "obs/agent/qvel");
   EXPECT_EQ(place_of("qpos_extra"), "obs/extra/qpos_extra");
@@ -53,12 +53,12 @@ TEST(Layout, StreamsStandWhereMolmoSpacesReadersLook) {
   EXPECT_EQ(place_of("env_states/actors/cup"), "env_states/actors/cup");
   EXPECT_EQ(place_of("object_image_points/cup/wrist/points"),
             "obs/extra/object_image_points/cup/wrist/points");
-  // MolmoSpaces loses every stream with "camera" or "_depth" in its name.
+  // MolmoSpaces drops every stream with "camera" or "_depth" in its name.
   EXPECT_EQ(place_of("camera_shake"), "obs/extra/camera_shake");
   EXPECT_EQ(place_of("water_depth"), "obs/extra/water_depth");
 }
 
-TEST(Layout, NumbersByMoveGroupAreTextForMolmoSpacesReaders) {
+TEST(Layout, NumbersPerMoveGroupAreJsonRows) {
   const Plain qpos("qpos", spec(DType::kFloat32, {7}), "arm");
   const RecordingPlan p = plan({&qpos});
   ASSERT_EQ(p.arrays.size(), 1u);
@@ -67,24 +67,24 @@ TEST(Layout, NumbersByMoveGroupAreTextForMolmoSpacesReaders) {
   EXPECT_EQ(p.arrays[0].spec.shape, Shape({2000}));
   EXPECT_EQ(p.arrays[0].row_bytes(), 2000u);
   EXPECT_EQ(p.arrays[0].kept_bytes(), 28u);
-  // One field alone, a picture, or another name: as it is.
+  // A single field, an image or a sensor of another name is not converted to text.
   const Plain row("qvel", spec(DType::kFloat32, {7})),
       picture("grasp_state_cup", spec(DType::kFloat32, {4, 4}), "gripper"),
       other("joints", spec(DType::kFloat32, {7}), "arm");
   const RecordingPlan plain = plan({&row, &picture, &other});
   for (const ArrayStream& stream : plain.arrays) EXPECT_EQ(stream.kind(), "plain");
   EXPECT_EQ(plain.arrays[2].place, "obs/extra/joints/arm");
-  // 80 numbers of 25 bytes are more than a row of text.
+  // 80 numbers of 25 bytes exceed a row of text.
   const Plain many("qpos", spec(DType::kFloat32, {80}), "arm");
   EXPECT_EQ(error_of([&] { plan({&many}); }),
             "sensor 'qpos': its text can need 2012 bytes, a row of it has 2000");
 }
 
-TEST(Layout, BatchesAreThePeersAndEven) {
+TEST(Layout, BatchesEqualMolmoSpacesAndAreEven) {
   EXPECT_THAT(batch_sizes(8, 0), ElementsAre(4, 4));
   EXPECT_THAT(batch_sizes(1, 0), ElementsAre(1));
-  EXPECT_THAT(batch_sizes(10, 0), ElementsAre(5, 5));        // round(2.5) is 2 in Python
-  EXPECT_THAT(batch_sizes(14, 0), ElementsAre(4, 4, 3, 3));  // round(3.5) is 4
+  EXPECT_THAT(batch_sizes(10, 0), ElementsAre(5, 5));        // Python: round(2.5) == 2
+  EXPECT_THAT(batch_sizes(14, 0), ElementsAre(4, 4, 3, 3));  // Python: round(3.5) == 4
   EXPECT_THAT(batch_sizes(7, 3), ElementsAre(3, 2, 2));
   EXPECT_THROW(batch_sizes(0, 0), ValueError);
   EXPECT_THROW(batch_sizes(2, 3), ValueError);
@@ -100,7 +100,7 @@ TEST(Layout, FramesPerSecondAreExact) {
   EXPECT_THROW(Fps::from_period_ms(0), ValueError);
 }
 
-TEST(Layout, EveryFieldOfTheSuiteHasAPlace) {
+TEST(Layout, EveryFieldHasAPath) {
   FakeSuite suite({2, 8, 6});
   RecordingCfg cfg;
   cfg.num_worlds = 2;
@@ -113,7 +113,7 @@ TEST(Layout, EveryFieldOfTheSuiteHasAPlace) {
   EXPECT_EQ(plan_recording(cfg).videos.size(), p.videos.size() + 1);
 }
 
-TEST(Layout, TwoStreamsCannotShareAPlace) {
+TEST(Layout, StreamsCannotShareAPath) {
   const Plain a("feet", spec(DType::kFloat32, {3})), b("feet", spec(DType::kFloat32, {3}), "force");
   EXPECT_THAT(error_of([&] {
                 plan({&a, &a});
@@ -147,7 +147,7 @@ TEST(Layout, BadStreamsAreRefused) {
   EXPECT_THAT(error_of([&] { plan_recording(cfg); }), HasSubstr("expected rows of 3 worlds"));
 }
 
-TEST(Layout, DifferencesOfRecordingsAreNamed) {
+TEST(Layout, FingerprintDifferencesAreDescribed) {
   FakeSuite suite({2, 8, 6});
   RecordingCfg a, b;
   a.num_worlds = b.num_worlds = 2;
@@ -160,7 +160,7 @@ TEST(Layout, DifferencesOfRecordingsAreNamed) {
   };
   EXPECT_EQ(difference(), "'episodes' was 8 and is now 10");
   b.episodes = 8;
-  b.video.max_encoders = 3;  // of no consequence for the files
+  b.video.max_encoders = 3;  // does not affect the files
   b.num_worlds = 1;
   EXPECT_EQ(difference(), "");
   b.settings = R"({"task": "place"})";
@@ -182,7 +182,7 @@ TEST(Depth, SixteenBitsAreExactToHalfAUnit) {
     EXPECT_NEAR(codes[i] * 0.0002, many[i], 0.0001 + 2e-6);
 }
 
-TEST(Depth, RedGreenIsThePeersForm) {
+TEST(Depth, RedGreenEqualsMolmoSpaces) {
   const std::vector<float> metres = {0.05f, 0.55f, 0.3f,
                                      0.04f, 0.56f, std::numeric_limits<float>::infinity()};
   std::vector<std::uint8_t> rgb(metres.size() * 3);
@@ -196,8 +196,8 @@ TEST(Depth, RedGreenIsThePeersForm) {
   EXPECT_EQ(code(5), 0);
 }
 
-// From a file of a stranger's, deep enough to end any stack.
-TEST(Fingerprint, OfNoUseIsNeverEqual) {
+// Such a text may come from an untrusted file: it is nested deeply enough to overflow any stack.
+TEST(Fingerprint, InvalidTextIsNeverEqual) {
   const std::string ours = R"({"a":1})";
   const std::string deep =
       R"({"a":)" + std::string(1'000'000, '[') + std::string(1'000'000, ']') + "}";

@@ -13,7 +13,7 @@ std::map<std::string, std::string> model_checksums(const mjModel& model) {
   std::map<std::string, Checksum> sums;
   const mjModel* m = &model;
   {
-    // The fields one by one: the bytes between them may hold anything.
+    // Fields are added one by one, because the padding bytes between them are undefined.
     Checksum& option = sums["option"];
 #define X(type, name, n) option.add(&m->opt.name, sizeof(type) * (n));
 #define XVEC(type, name, n) option.add(m->opt.name, sizeof(type) * (n));
@@ -21,16 +21,18 @@ std::map<std::string, std::string> model_checksums(const mjModel& model) {
 #undef XVEC
 #undef X
   }
-  sums["statistic"].add(&m->stat, sizeof m->stat);  // of one type each, so without gaps
+  // All members have the same type, so there is no padding.
+  sums["statistic"].add(&m->stat, sizeof m->stat);
   sums["visual"].add(&m->vis, sizeof m->vis);
 
   const auto add = [&](std::string_view name, const void* data, std::size_t bytes) {
-    // "qpos0" and "qpos_spring" are both of "qpos".
+    // "qpos0" and "qpos_spring" both count as "qpos".
     std::string_view kind = name.substr(0, name.find('_'));
     if (kind == "qpos0") kind = "qpos";
-    if (kind == "bvh") return;  // follows from the geoms and meshes
+    if (kind == "bvh") return;  // derived from the geoms and meshes
     if (kind == "paths" || name.ends_with("_pathadr")) return;
-    sums[std::string(kind)].add(&bytes, sizeof bytes);  // where one array ends is data, too
+    // The boundary between two arrays is part of the data.
+    sums[std::string(kind)].add(&bytes, sizeof bytes);
     sums[std::string(kind)].add(data, bytes);
   };
   MJMODEL_POINTERS_PREAMBLE(m)

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
-// Checksums of a compiled model, one for each kind of element ("body", "geom", "mesh" ...), so that
-// a recording that is resumed with another model can say what differs.
+// Checksums of a compiled model, one per kind of element ("body", "geom", "mesh" ...), so that the
+// error for resuming a recording with another model can say what differs.
 
 #include <mujoco/mujoco.h>
 
@@ -10,8 +10,8 @@
 
 namespace mjsense {
 
-// By the part of the arrays' names before the first '_'; "size", "option", "statistic" and "visual"
-// are those of the structs. The paths of files are left out: a model may move.
+// The key of an array is its name up to the first '_'. "size", "option", "statistic" and "visual"
+// are the structs of mjModel. File paths are excluded, so that a model may be moved.
 [[nodiscard]] std::map<std::string, std::string> model_checksums(const mjModel& model);
 
 }  // namespace mjsense

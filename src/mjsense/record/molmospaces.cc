@@ -13,8 +13,8 @@ namespace {
 constexpr int kTextBytes = 2000;
 
 struct Text {
-  std::string_view sensor;  // ends in '_': every sensor whose name begins so
-  const char* unit;         // null: those of its streams, "arm: rad; gripper: 0 open .. 255 closed"
+  std::string_view sensor;  // if it ends in '_': every sensor whose name begins with it
+  const char* unit;  // null: the units of its streams, "arm: rad; gripper: 0 open .. 255 closed"
   const char* description;
 };
 

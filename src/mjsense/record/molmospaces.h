@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
-// MolmoSpaces' layout of an episode: which group of the file a stream stands in, and which sensors
-// its readers expect as JSON text.
+// MolmoSpaces' episode layout: the HDF5 group of each stream, and the sensors that its readers
+// expect as JSON text.
 
 #include <optional>
 #include <span>
@@ -15,12 +15,12 @@ namespace mjsense {
 // "qpos" -> "obs/agent/qpos", "feet/force" -> "obs/extra/feet/force" ...
 std::string place_of(std::string_view stream);
 
-// Groups that every episode has, empty or not.
+// Groups that exist in every episode, even if they are empty.
 std::span<const char* const> standard_groups();
 
-// Joint positions and velocities, the actions and what grippers hold are numbers in a suite, and
-// one dataset a sensor of JSON rows here: what that dataset says of itself. Empty for any other
-// sensor, whose fields are datasets of their own.
+// Spec of the dataset of JSON rows that replaces a sensor's fields, or empty if the fields are
+// separate datasets. Joint positions, joint velocities, actions and grasp states are numeric fields
+// in a suite, but MolmoSpaces stores each of these sensors as one dataset of JSON text.
 std::optional<SensorSpec> text_of(const Sensor& sensor);
 
 }  // namespace mjsense

@@ -40,8 +40,8 @@ std::string last_words(int log) {
   throw RuntimeError(fmt::format("{}: {}", what, std::strerror(errno)));
 }
 
-// Both ends are closed on exec: a program started at the same time by another thread must not hold
-// our write end, or the reader would never see the end of its input.
+// Both ends are closed on exec. Otherwise a program that another thread starts at the same time
+// would keep the write end open, and the reader would never reach the end of its input.
 std::pair<Fd, Fd> make_pipe() {
   std::pair<Fd, Fd> ends = os::make_pipe();
   if (!ends.first) throw_system("cannot create a pipe");
@@ -57,7 +57,7 @@ Child start(const std::vector<std::string>& argv, bool pipe_in, bool pipe_out, i
   if (pipe_in) {
     std::tie(child_in, child.in) = make_pipe();
     fcntl(child.in.get(), F_SETFL, O_NONBLOCK);
-    os::widen_pipe(child.in.get(), 1 << 20);  // fewer wake-ups a frame
+    os::widen_pipe(child.in.get(), 1 << 20);  // larger pipe: fewer wake-ups per frame
   } else if (input < 0) {
     child_in = Fd(open("/dev/null", O_RDONLY | O_CLOEXEC));
   }
@@ -154,7 +154,7 @@ std::string run_process(const std::vector<std::string>& argv, const Patience& pa
       give_up(fmt::format("it said more than {} bytes", patience.most_bytes));
   }
   Exit result;
-  // It may have closed its output and go on.
+  // The program may have closed its output but continue to run.
   for (double waited = 0; !wait_process(child, false, result); waited += 5e-4) {
     if (waited > patience.silence_s)
       give_up(fmt::format("it did not end for {:g} s", patience.silence_s));

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
-// Starting other programs from a process with many threads: no inherited descriptors, no signals
-// but those that we send.
+// Starts other programs from a multi-threaded process. The programs inherit no descriptors and
+// receive only signals that this process sends to them.
 
 #include <sys/types.h>
 
@@ -18,18 +18,18 @@ namespace mjsense {
 
 struct Child {
   pid_t pid = -1;
-  Fd in;   // write end of its stdin, non-blocking; none if it reads nothing
-  Fd out;  // read end of its stdout; none unless asked for
-  Fd log;  // what it writes to stderr: an anonymous file
+  Fd in;   // write end of its stdin, non-blocking; empty if it has no input
+  Fd out;  // read end of its stdout; empty unless requested
+  Fd log;  // its stderr, in an anonymous file
 };
 
-// Starts argv[0] (found on PATH). The child leads its own process group, so that Ctrl-C in the
-// terminal reaches only us and we decide what becomes of it; if we are killed it sees the end of
-// its input and ends. `folder`: an open directory in which it runs; -1: ours. Throws RuntimeError when
-// it cannot start.
+// Starts argv[0] (searched in PATH). The child leads a new process group, so that Ctrl-C in the
+// terminal reaches only this process, which then decides what to do with the child. If this process
+// is killed, the child reads the end of its input and exits. `folder`: open directory used as its
+// working directory; -1: the current one. Throws RuntimeError if the program cannot be started.
 Child start_process(const std::vector<std::string>& argv, bool pipe_in, bool pipe_out,
                     int folder = -1);
-// The same with an open file as its stdin: where it stands in it tells how far it has come.
+// The same with an open file as stdin. The file's position shows how much the child has read.
 Child start_process(const std::vector<std::string>& argv, const Fd& input, int folder = -1);
 
 struct Exit {
@@ -38,25 +38,25 @@ struct Exit {
   double cpu_s = 0;
 };
 
-// Waits for the end (or, if `block` is false, returns false when it still runs). In a process that
-// ignores SIGCHLD the system keeps no exit status: a program then counts as failed if it wrote to its
-// stderr, and what it has made must be checked, as it is with a status.
+// Waits for the child to exit; with `block` false, returns false if it still runs. In a process
+// that ignores SIGCHLD the system keeps no exit status. The child then counts as failed if it wrote
+// to stderr. In either case the caller must check its output.
 bool wait_process(Child& child, bool block, Exit& result);
-void kill_process(Child& child);  // SIGKILL, and waits
+void kill_process(Child& child);  // sends SIGKILL and waits
 
-// How long a program may say nothing, how much it may say, and what it may use.
+// Limits of a program: time without output, amount of output, CPU time and memory.
 struct Patience {
   double silence_s = 60;
-  std::uint64_t cpu_s = 0, memory = 0;  // seconds of the processor, bytes; 0: as much as it likes
+  std::uint64_t cpu_s = 0, memory = 0;  // CPU time in seconds, memory in bytes; 0: unlimited
   std::size_t most_bytes = std::size_t{1} << 30;
 };
 
-// Runs a program to its end; its whole stdout, and the end of its stderr in `words`. Throws RuntimeError if it fails or
-// goes beyond our patience; it is killed then.
+// Runs a program and returns its stdout; `words` receives the end of its stderr. Throws
+// RuntimeError if it fails or exceeds a limit, in which case it is killed.
 std::string run_process(const std::vector<std::string>& argv, const Patience& patience = {},
                         std::string* words = nullptr);
 
-// The ffmpeg program to use: `wanted`, else $MJSENSE_FFMPEG, else "ffmpeg".
+// ffmpeg program: `wanted`, otherwise $MJSENSE_FFMPEG, otherwise "ffmpeg".
 std::string ffmpeg_program(const std::string& wanted);
 
 }  // namespace mjsense

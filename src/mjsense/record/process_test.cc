@@ -18,8 +18,9 @@ namespace {
 
 using ::testing::HasSubstr;
 
-TEST(Process, StreamsAndNothingElseAreInherited) {
-  const Fd other(open("/dev/null", O_RDONLY));  // without O_CLOEXEC, as libraries do it
+TEST(Process, OnlyStandardStreamsAreInherited) {
+  // Inheritable, without O_CLOEXEC, as some libraries open files.
+  const Fd other(open("/dev/null", O_RDONLY));
   ASSERT_GT(other.get(), 2);
   std::string words;
   const std::string out =
@@ -29,7 +30,7 @@ TEST(Process, StreamsAndNothingElseAreInherited) {
   EXPECT_EQ(out.find("\n" + std::to_string(other.get()) + "\n"), std::string::npos);
 }
 
-TEST(Process, AProgramThatIsNotThere) {
+TEST(Process, MissingProgramThrows) {
   try {
     run_process({"mjsense_no_such_program", "x"});
     FAIL();
@@ -39,7 +40,7 @@ TEST(Process, AProgramThatIsNotThere) {
   }
 }
 
-TEST(Process, LeadsItsOwnGroupWithSignalsAsUsual) {
+TEST(Process, LeadsAProcessGroupWithDefaultSignals) {
   sigset_t some, before;
   sigemptyset(&some);
   sigaddset(&some, SIGTERM);
@@ -68,7 +69,7 @@ std::string why_ended(const std::string& script, const Patience& patience) {
   }
 }
 
-TEST(Process, LimitsOfProcessorAndMemory) {
+TEST(Process, CpuTimeAndMemoryAreLimited) {
   const Patience patience{.silence_s = 100, .cpu_s = 1, .memory = std::size_t{1} << 28};
   EXPECT_EQ(why_ended("print(len(bytearray(1 << 20)))", patience), "");
   EXPECT_THAT(why_ended("while True: pass", patience), HasSubstr("more of the processor"));
@@ -76,8 +77,8 @@ TEST(Process, LimitsOfProcessorAndMemory) {
               HasSubstr("MemoryError"));
 }
 
-// Signals rain on a group that starts programs: a handler of it hears them, the programs do not.
-// In a process of its own, which leads such a group.
+// Signals are sent repeatedly to a process group that starts programs. The handler of the parent
+// receives them, the programs do not. Runs in a separate process that leads such a group.
 int start_programs_in_the_rain() {
   if (setpgid(0, 0) != 0) return 2;
   struct sigaction action = {};
@@ -107,7 +108,7 @@ int start_programs_in_the_rain() {
   return killed == 0 ? 0 : 1;
 }
 
-TEST(Process, SignalsToOurGroupReachNoProgram) {
+TEST(Process, SignalsToTheParentsGroupReachNoChild) {
   const pid_t pid = fork();
   if (pid == 0) _exit(start_programs_in_the_rain());
   int status = 0;

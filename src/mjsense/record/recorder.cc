@@ -256,7 +256,7 @@ Recorder::Recorder(const RecordingCfg& cfg) : impl_(std::make_unique<Impl>(cfg))
   add_owner(impl_.get());
 }
 Recorder::~Recorder() {
-  // In a forked process its threads are not there to be joined.
+  // The threads do not exist in a forked process and cannot be joined.
   if (forget_owner(impl_.get())) static_cast<void>(impl_.release());
 }
 

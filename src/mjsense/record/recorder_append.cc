@@ -15,7 +15,7 @@ void copy_row(const ArrayStream& stream, int world, std::uint8_t* to) {
   if (stream.text) return stream.text->copy(world, to);
   const std::byte* from = stream.field->data.row_data(world);
   const std::size_t most = stream.row_bytes();
-  // Of a dict row only the text is copied: what follows is zero here as there.
+  // Only the text of a dict row is copied; the rest is zero in both buffers.
   const bool text = stream.spec.is_dict;
   std::memcpy(to, from, text ? strnlen(reinterpret_cast<const char*>(from), most) : most);
 }
@@ -31,7 +31,7 @@ void Recorder::Impl::append(int world, const StepRow& row) {
     const std::span<std::uint8_t> frame = pool->reserve(episode.videos[v]);
     wait_s += seconds_since(asked);
     if (frame.empty()) {
-      abort_videos(episode);  // so that the encoder's own words are collected
+      abort_videos(episode);  // so that ffmpeg's error message is collected
       wait_for_failure();
     }
     const Clock::time_point start = Clock::now();

@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
-// The recorder's two sides: the caller's (recorder.cc, recorder_append.cc), which copies rows into
-// chunks and frames into queues, and the writer thread's (recorder_writer.cc), which does
-// everything that waits for a disk.
+// The two sides of the recorder. The caller's side (recorder.cc, recorder_append.cc) copies rows
+// into chunks and frames into queues. The writer thread (recorder_writer.cc) does everything that
+// waits for a disk.
 
 #include <atomic>
 #include <chrono>
@@ -31,8 +31,7 @@ struct Recorder::Impl {
     return std::chrono::duration<double>(Clock::now() - start).count();
   }
 
-  // Chunks of one stream that wait for the writer, per world: while one is written the next is
-  // filled.
+  // Chunk buffers per stream and world: one is written while the next is filled.
   static constexpr int kBuffersPerWorld = 2;
 
   enum class Fate { kRunning, kKept, kDiscarded, kAbandoned };
@@ -40,17 +39,17 @@ struct Recorder::Impl {
   // One attempt, from begin_episode() until its directory is renamed or removed.
   struct Episode {
     EpisodeMeta meta;
-    std::shared_ptr<const Folder> folder;  // its files, until they are kept
+    std::shared_ptr<const Folder> folder;  // folder of its files, until the episode is kept
     Fate fate = Fate::kRunning;
     std::int64_t rows = 0;
-    bool refused = false;  // a row held cut text
-    double waited_s = 0;   // for free buffers
+    bool refused = false;  // a row contained truncated text
+    double waited_s = 0;   // waiting time for free buffers
     std::string why;
     std::vector<EncoderPool::Stream*> videos;
-    std::vector<Buffer> chunks;            // one a stream, being filled
-    std::vector<std::int64_t> chunk_fill;  // rows in it
-    std::unique_ptr<EpisodeFile> file;     // the writer thread's
-    std::atomic<int> parts{0};             // HDF5 file and videos that are not done
+    std::vector<Buffer> chunks;            // one per stream, being filled
+    std::vector<std::int64_t> chunk_fill;  // rows in each chunk
+    std::unique_ptr<EpisodeFile> file;     // used by the writer thread only
+    std::atomic<int> parts{0};             // unfinished parts: HDF5 file and videos
   };
   using EpisodePtr = std::shared_ptr<Episode>;
 
@@ -65,26 +64,28 @@ struct Recorder::Impl {
 
   RecordingCfg cfg;
   RecordingPlan plan;
-  int streams;                         // arrays and the recorder's own
-  std::vector<std::size_t> row_bytes;  // of a stream in a chunk that is filled
+  int streams;                         // array streams plus the recorder's own
+  std::vector<std::size_t> row_bytes;  // bytes of a row in a chunk buffer, per stream
   std::vector<std::int64_t> chunk_rows_of;
 
   std::unique_ptr<RecordingFolder>
-      house;  // changed by the writer thread, or while it has nothing to do
+      house;  // accessed by the writer thread, or while that thread is idle
   std::unique_ptr<EncoderPool> pool;
 
   mutable std::mutex mutex;
   std::vector<EpisodePtr> worlds;
-  Decisions decisions;  // as the caller took them; the house follows as they become durable
+  // Updated when the caller decides; `house` follows once the decision is on disk.
+  Decisions decisions;
   std::condition_variable work, progress;
   std::deque<Job> jobs;
   std::vector<std::vector<Buffer>> free_chunks;  // per stream
-  int unsettled = 0;  // episodes finished or given up whose directories are not settled
+  // Finished or abandoned episodes whose directories are not yet renamed or removed.
+  int unsettled = 0;
   bool stop = false;
   std::exception_ptr failure;
   std::thread writer;
 
-  std::atomic<int> saved{0};  // episodes that are whole on disk
+  std::atomic<int> saved{0};  // episodes that are completely on disk
   std::atomic<std::int64_t> rows{0}, frames{0}, published_bytes{0};
   std::atomic<double> copy_s{0}, wait_s{0}, write_s{0}, commit_s{0};
 
@@ -92,7 +93,7 @@ struct Recorder::Impl {
   ~Impl();
   void check_names() const;
 
-  // ---- the producer's side
+  // ---- the caller's side
   void rethrow() const;
   Episode& running(int world, const char* deed) const;
   void check_world(int world) const;
@@ -100,10 +101,11 @@ struct Recorder::Impl {
   void check_begin(int world, std::int64_t number) const;
   void open_video(const EpisodePtr& episode, const VideoStream& video);
   void append(int world, const StepRow& row);
-  // Text that was cut is no JSON any more. Nothing of the step is stored then.
+  // Throws if a text was truncated, because it is not valid JSON any more. Nothing of that step is
+  // stored.
   void check_texts(int world, Episode& episode) const;
   void copy_frame(const VideoStream& video, int world, std::span<std::uint8_t> frame) const;
-  // Where the next row of a stream goes, zero all over; null if it has no bytes.
+  // Buffer for the next row of a stream, filled with zeros; null if the row has no bytes.
   std::uint8_t* next_row(Episode& episode, int s);
   void end_row(Episode& episode, int world, int s);
   Buffer take_buffer(Episode& episode, int s);
@@ -113,12 +115,12 @@ struct Recorder::Impl {
   void leave(int world, const Episode& episode);
   void abort_videos(Episode& episode);
   [[noreturn]] void wait_for_failure();
-  // Waits until every episode that is not running is settled.
+  // Waits until every episode that is not running is kept or removed on disk.
   void flush();
   int running_count() const;
   void post(Job job);
 
-  // ---- the encoders' thread
+  // ---- the encoder pool's thread
   void video_done(const EpisodePtr& episode, const EncoderPool::Result& result);
   void part_done(const EpisodePtr& episode);
   void fail(std::exception_ptr error);
@@ -128,7 +130,7 @@ struct Recorder::Impl {
   void run(Job& job, bool failed);
   void after(Job& job);
   void settle(Episode& episode, bool failed);
-  // Counts what the encoders left: an exit code of 0 is believed of nobody.
+  // Counts the frames in the video files, because an encoder's exit code of 0 is not trusted.
   std::vector<EpisodeFile::VideoSum> check_videos(const Episode& episode) const;
 };
 

@@ -64,7 +64,7 @@ TEST(Recorder, WorldsMayAppendFromDifferentThreads) {
 TEST(Recorder, ResumingGivesTheFilesOfAnUninterruptedRun) {
   TempDir whole, broken;
   const std::string bytes = record(whole.path, 6, {.worlds = 2, .discard_every = 3}, true);
-  for (const int count : {1, 3}) {  // so many more each time, then the recorder is dropped
+  for (const int count : {1, 3}) {  // episodes that are added before the recorder is destroyed
     record(broken.path, 6, {.worlds = 2, .discard_every = 3, .stop_after = count}, true,
            [&](RecordingCfg& c) { c.resume = true; });
     EXPECT_TRUE(fs::exists(broken.path / "house_0/.recording"));
@@ -72,13 +72,13 @@ TEST(Recorder, ResumingGivesTheFilesOfAnUninterruptedRun) {
   EXPECT_EQ(bytes, record(broken.path, 6, {.worlds = 3, .discard_every = 3}, true,
                           [&](RecordingCfg& c) { c.resume = true; }));
   EXPECT_EQ(tree(whole.path), tree(broken.path));
-  // Resuming what is complete changes nothing and records nothing.
+  // Resuming a complete recording changes nothing and records nothing.
   EXPECT_EQ(bytes,
             record(broken.path, 6, {.worlds = 2}, true, [&](RecordingCfg& c) { c.resume = true; }));
 }
 
-// What ended before anything was decided blocks nobody; what was decided stays.
-TEST(Recorder, ARecordingInWhichNothingWasDecidedLeavesNothing) {
+// A recording that ended before anything was decided leaves no files; decided episodes are kept.
+TEST(Recorder, UndecidedRecordingLeavesNoFiles) {
   TempDir dir;
   FakeSuite suite({2, 16, 12, true, true});
   for (const bool begun : {false, true}) {
@@ -99,9 +99,10 @@ TEST(Recorder, ARecordingInWhichNothingWasDecidedLeavesNothing) {
               HasSubstr("unfinished recording"));
 }
 
-// Killed while its episodes were being published: some videos have their final names already, the
-// file of trajectories is not there. Whoever comes next ends it, and nothing can be added any more.
-TEST(Recorder, AnInterruptedPublicationIsEnded) {
+// The recording was killed while it published its episodes: some videos have their final names
+// already, but the file of trajectories is missing. The next process completes the publication, and
+// nothing can be added any more.
+TEST(Recorder, InterruptedPublicationIsCompleted) {
   TempDir whole;
   {
     FakeSuite suite({2, 16, 12, true, true});
@@ -142,8 +143,9 @@ TEST(Recorder, AnInterruptedPublicationIsEnded) {
   }
 }
 
-// A batch is published when its episodes are settled: all earlier ones kept or discarded.
-TEST(Recorder, ABatchWaitsForEarlierEpisodes) {
+// A batch is published once its episodes are final, that is, all earlier ones are kept or
+// discarded.
+TEST(Recorder, BatchWaitsForEarlierEpisodes) {
   TempDir dir;
   FakeSuite suite(without_video(3));
   RecordingCfg cfg = fake_recording(dir.path, suite, 3, 4);
@@ -156,7 +158,7 @@ TEST(Recorder, ABatchWaitsForEarlierEpisodes) {
     recorder.finish_episode(world, "{}", "success");
   };
   finish(1, 1);
-  finish(2, 2);  // two are kept, but episode 0 may come before them
+  finish(2, 2);  // two are kept, but episode 0 may still precede them
   recorder.flush();
   EXPECT_THAT(tree(dir.path / "house_0"),
               ::testing::Not(::testing::Contains(HasSubstr("batch_1_of_2"))));
@@ -167,7 +169,7 @@ TEST(Recorder, ABatchWaitsForEarlierEpisodes) {
               ::testing::Contains(HasSubstr("trajectories_batch_1_of_2.h5")));
 }
 
-// What is said to be saved is on disk already, whatever happens to the program next.
+// Episodes counted by saved() are on disk, even if the program crashes next.
 TEST(Recorder, SavedEpisodesAreOnDisk) {
   TempDir dir;
   FakeSuite suite(without_video(1));
@@ -175,7 +177,7 @@ TEST(Recorder, SavedEpisodesAreOnDisk) {
   RecordingCfg cfg = fake_recording(dir.path, suite, 1, kEpisodes);
   cfg.batches = 1;
   Recorder recorder(cfg);
-  for (int e = 0; e < kEpisodes - 1; ++e) {  // the batch stays open: nothing is published
+  for (int e = 0; e < kEpisodes - 1; ++e) {  // the batch stays incomplete, so nothing is published
     recorder.begin_episode(0, {e, 7});
     suite.fill(0, e, 0, 1);
     recorder.append(0, {1, true, false, true});
@@ -202,11 +204,11 @@ TEST(Recorder, FewEncodersGiveTheSameVideos) {
   }
 }
 
-TEST(Recorder, ASlowEncoderHoldsTheProducerAndLosesNothing) {
+TEST(Recorder, SlowEncoderBlocksTheProducerWithoutLoss) {
   TempDir dir, tools;
   FakeSuite suite({1, 16, 12, true, false});
   RecordingCfg cfg = fake_recording(dir.path, suite, 1, 1);
-  // Takes one frame in 10 ms.
+  // Takes one frame every 10 ms.
   cfg.video.ffmpeg = fake_ffmpeg(
       tools.path, "for i in $(seq 60); do head -c 576; sleep 0.01; done | ffmpeg \"$@\"");
   cfg.video.queue_frames = 2;
@@ -225,7 +227,7 @@ TEST(Recorder, ASlowEncoderHoldsTheProducerAndLosesNothing) {
   EXPECT_GT(recorder.stats().frames, 0);
 }
 
-TEST(Recorder, AProducerWaitsForAnEncoderThatTakesNothing) {
+TEST(Recorder, ProducerWaitsForABlockedEncoder) {
   TempDir dir, tools;
   FakeSuite suite({1, 320, 240, true, false});
   RecordingCfg cfg = fake_recording(dir.path, suite, 1, 1);
@@ -233,7 +235,7 @@ TEST(Recorder, AProducerWaitsForAnEncoderThatTakesNothing) {
   cfg.video.queue_frames = 2;
   Recorder recorder(cfg);
   recorder.begin_episode(0, {});
-  constexpr int kFrames = 20;  // 4.6 MB: the pipe holds 1 MiB, the queue 2 frames
+  constexpr int kFrames = 20;  // 4.6 MB; the pipe holds 1 MiB and the queue 2 frames
   for (int t = 0; t < kFrames; ++t) {
     suite.fill(0, 0, t, kFrames);
     recorder.append(0, {});
@@ -246,7 +248,7 @@ TEST(Recorder, AProducerWaitsForAnEncoderThatTakesNothing) {
   EXPECT_EQ(read_video_facts(video.get()).frames, kFrames);
 }
 
-// ---- faults: one clear error, nothing under a final name
+// ---- faults: one clear error and no file under a final name
 
 void expect_nothing_published(const fs::path& out) {
   if (!fs::exists(out)) return;
@@ -263,7 +265,7 @@ TEST(RecorderFaults, FfmpegIsAbsent) {
   EXPECT_THAT(tree(dir.path), IsEmpty());
   record(dir.path, 1, {}, false, [](RecordingCfg& c) {
     c.video.ffmpeg = "/nonexistent/ffmpeg";
-  });  // without video it is not needed
+  });  // without video ffmpeg is not needed
 }
 
 TEST(RecorderFaults, FfmpegDies) {
@@ -294,8 +296,8 @@ TEST(RecorderFaults, FfmpegFailsAtTheEnd) {
   expect_nothing_published(dir.path);
 }
 
-// An exit code of 0 is not enough: what was written is counted.
-TEST(RecorderFaults, FfmpegLies) {
+// An exit code of 0 is not sufficient: the frames in the output are counted.
+TEST(RecorderFaults, FfmpegWritesAnIncompleteVideo) {
   const std::pair<const char*, const char*> lies[] = {
       {"cat > /dev/null; echo garbage > $out", "is no whole video: it is neither MP4 nor Matroska"},
       {"cat > /dev/null", "does not exist"},
@@ -324,10 +326,10 @@ TEST(RecorderFaults, FfmpegLies) {
   }
 }
 
-// A hung encoder is ended, with a word.
+// A hanging encoder is killed and reported.
 TEST(RecorderFaults, FfmpegHangs) {
   for (const char* body : {"kill -STOP $$", "exec sleep 1000", "cat > /dev/null; exec sleep 1000",
-                           // It uses the processor now and then.
+                           // This one uses the CPU occasionally.
                            "cat > /dev/null; while :; do sleep 0.05; done"}) {
     TempDir dir, tools;
     FakeSuite suite({1, 320, 240, true, false});
@@ -345,7 +347,7 @@ TEST(RecorderFaults, FfmpegHangs) {
   }
 }
 
-// In a process that ignores SIGCHLD the system keeps no exit status of its programs.
+// In a process that ignores SIGCHLD the system keeps no exit status of child processes.
 TEST(RecorderFaults, SigchldIsIgnored) {
   for (const bool fails : {false, true}) {
     TempDir dir, tools;
@@ -403,7 +405,7 @@ TEST(RecorderFaults, UnwritableDirectory) {
   EXPECT_THAT(error, AllOf(HasSubstr("cannot create the directory"), HasSubstr("Not a directory")));
 }
 
-// A full disk, as a limit on the size of files in a process of its own.
+// A full disk is simulated by a file size limit in a separate process.
 TEST(RecorderFaults, DiskFull) {
   for (const bool video : {false, true}) {
     TempDir dir;
@@ -433,7 +435,7 @@ TEST(RecorderFaults, DiskFull) {
   }
 }
 
-TEST(RecorderFaults, ATextThatDoesNotFitIsRefused) {
+TEST(RecorderFaults, TruncatedTextIsRejected) {
   TempDir dir;
   FakeSuite suite(without_video(1));
   Recorder recorder(fake_recording(dir.path, suite, 1, 1));
@@ -441,14 +443,14 @@ TEST(RecorderFaults, ATextThatDoesNotFitIsRefused) {
   suite.fill(0, 0, 0, 2);
   recorder.append(0, {});
   auto row = suite.sensor("task_info").fields()[0].data.row<std::uint8_t>(0);
-  std::fill(row.begin(), row.end(), 'x');  // cut in the middle
+  std::fill(row.begin(), row.end(), 'x');  // truncated in the middle
   EXPECT_THAT(
       error_of([&] { recorder.append(0, {}); }),
       AllOf(HasSubstr("sensor 'task_info': step 1 of episode 0"), HasSubstr("str_max_len = 4000")));
   EXPECT_THAT(error_of([&] { recorder.finish_episode(0, "{}"); }), HasSubstr("was refused"));
   recorder.discard_episode(0, "text cut");
   EXPECT_EQ(recorder.discarded(), 1);
-  recorder.begin_episode(0, {1, 0});  // the next one is recorded
+  recorder.begin_episode(0, {1, 0});  // the next episode is recorded
   suite.fill(0, 1, 0, 1);
   recorder.append(0, {});
   recorder.finish_episode(0, "{}");
@@ -456,7 +458,7 @@ TEST(RecorderFaults, ATextThatDoesNotFitIsRefused) {
   EXPECT_THAT(tree(dir.path), SizeIs(1));
 }
 
-TEST(RecorderFaults, WrongCallsAreNamed) {
+TEST(RecorderFaults, InvalidCallsThrow) {
   TempDir dir;
   FakeSuite suite(without_video(2));
   Recorder recorder(fake_recording(dir.path, suite, 2, 2));
@@ -488,7 +490,7 @@ TEST(RecorderFaults, WrongCallsAreNamed) {
   EXPECT_THAT(error_of([&] { recorder.begin_episode(0, {1, 0}); }), HasSubstr("is complete"));
 }
 
-TEST(RecorderFaults, WrongConfigurationsAreNamed) {
+TEST(RecorderFaults, InvalidConfigurationsThrow) {
   TempDir dir;
   const auto error = [&](const std::function<void(RecordingCfg&)>& change) {
     return error_of([&] { record(dir.path, 1, {}, false, change); });

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
-// What a recording is: which sensors, how many episodes, where and how they are kept.
-// docs/formats.md shows the files.
+// Configuration of a recording: sensors, number of episodes, location and file formats.
+// docs/formats.md describes the files.
 
 #include <mujoco/mujoco.h>
 
@@ -17,7 +17,8 @@ namespace mjsense {
 
 class Sensor;
 
-// Frames a second, exact: a policy period of 66 ms is 500/33, which no decimal number is.
+// Frames per second as an exact fraction: a policy period of 66 ms is 500/33 frames per second,
+// which has no finite decimal representation.
 struct Fps {
   std::int64_t num = 30;
   std::int64_t den = 1;
@@ -86,33 +87,36 @@ struct RecordingCfg {
   std::filesystem::path out_dir;
   int house = 0;     // {out_dir}/house_{house}/
   int episodes = 1;  // episodes to keep
-  // Files they are spread over; 0: max(1, round(episodes / 4)), as MolmoSpaces does.
+  // Number of HDF5 files; 0: max(1, round(episodes / 4)), as in MolmoSpaces.
   int batches = 0;
   int num_worlds = 1;
   Fps fps;
-  // The suite, in its order. Initialized; they outlive the recorder. Every field is on disk.
+  // Initialized sensors, in the order of the suite. They must outlive the recorder. All their
+  // fields are recorded.
   std::vector<const Sensor*> sensors;
-  // JSON text of what made the data (task, robot, seed ...): kept in every file; a recording can
-  // only be resumed with the same.
+  // JSON text of the settings that produced the data (task, robot, seed ...). It is stored in every
+  // file, and a recording can only be resumed with equal settings.
   std::string settings = "{}";
-  // The compiled model. Its checksums are kept in every file, too: a recording is not resumed with
-  // another one. Null: there is none.
+  // Compiled model, or null. Its checksums are stored in every file, and a recording cannot be
+  // resumed with another model.
   const mjModel* model = nullptr;
-  bool resume = false;  // go on with what is there; else existing output is an error
-  int gzip = 4;         // 0: no compression .. 9
+  bool resume = false;  // continue an existing recording; otherwise existing output is an error
+  int gzip = 4;         // compression level, 0 (none) to 9
   VideoCfg video;
-  // At 2 or more whoever asked wants to leave: an ffmpeg that hangs gets 2 s instead of its time-out.
+  // At 2 or more the user wants to stop immediately: a hanging ffmpeg gets 2 s instead of
+  // ffmpeg_timeout.
   const std::atomic<int>* stop = nullptr;
 };
 
-// One attempt. Numbers start at 0 and leave no gap: they, and not the order of finishing, give the
-// order on disk, so that the files do not depend on the number of worlds or on an interruption.
+// One attempt. Episode numbers start at 0 without gaps. They, and not the order in which episodes
+// finish, determine the order on disk, so the files do not depend on the number of worlds or on
+// interruptions.
 struct EpisodeMeta {
   std::int64_t episode = 0;
   std::uint64_t seed = 0;
 };
 
-// What belongs to a step beside the sensors' rows.
+// Data of a step in addition to the sensors' rows.
 struct StepRow {
   float reward = 0;
   bool terminated = false;

@@ -37,7 +37,7 @@ void make_dir(const fs::path& path) {
   if (error) throw_file("create the directory", path, error.value());
 }
 
-// A file of ours, which is short; "" if it is none.
+// Reads a small file of the recording; "" if it cannot be read.
 std::string read_whole(const Folder& folder, const char* name) {
   constexpr std::int64_t kMostBytes = 1 << 24;
   try {
@@ -51,7 +51,7 @@ std::string read_whole(const Folder& folder, const char* name) {
   }
 }
 
-// What the recording of this house must be if it is to be published: JSON text of our own making.
+// True if `text` describes a recording completely enough to publish it.
 bool is_description(const std::string& text) {
   const nlohmann::json json = parse_description(text);
   const auto number = [&](const char* name) {
@@ -77,8 +77,8 @@ std::optional<std::int64_t> episode_number(const std::string& name, std::string_
 }
 
 std::string part_name(std::int64_t episode) {
-  // The process number keeps us from the files of an encoder that outlives a killed recording by a
-  // moment.
+  // The process id prevents conflicts with the files of an encoder that outlives a killed recording
+  // for a moment.
   return fmt::format("{}.part.{}", episode_name(episode), getpid());
 }
 
@@ -90,12 +90,12 @@ std::vector<std::string> published_files(const Folder& house) {
   return files;
 }
 
-// A video on its way from an episode's folder to the house.
+// A video to be moved from an episode's folder to the house.
 struct Move {
   std::string episode, name, final_name;
 };
 
-// {"recording": text, "episodes": [0, 1 ...]} of a published file.
+// Describes a published file: {"recording": text, "episodes": [0, 1 ...]}.
 std::string describe_published(const Fd& published, const std::string& shown) {
   const h5::H5Lock lock;
   const h5::Id file = h5::open_file(os::path_of(published.get()), false, shown);
@@ -113,8 +113,8 @@ std::string final_name_of(const StagedVideo& video, int index, int batch, int ba
   return video_file(name.stem().string(), name.extension().string(), index, batch, batches);
 }
 
-// Writes the final names of the videos of traj_{index} into the file, and notes what has to be
-// moved where.
+// Writes the final names of the videos of traj_{index} into the file, and appends the moves that
+// this requires.
 void name_videos(hid_t trajectory, const std::string& episode, int index, int batch, int batches,
                  std::vector<Move>& moves) {
   const h5::Id names = h5::open_group(trajectory, "obs/sensor_data");
@@ -160,7 +160,8 @@ RecordingFolder::RecordingFolder(const fs::path& dir, const std::string& fingerp
 
   make_dir(dir);
   dir_ = Folder::open(dir);
-  lock_ = lock_recording(dir_, false);  // first: a process that holds it may still publish
+  // First, because a process that holds the lock may still publish.
+  lock_ = lock_recording(dir_, false);
   staging_ = dir_.find(kStagingDir);
   const std::vector<std::string> published = published_files(dir_);
   const bool any_published = !published.empty();
@@ -176,11 +177,12 @@ RecordingFolder::RecordingFolder(const fs::path& dir, const std::string& fingerp
       !difference.empty()) {
     throw ValueError(fmt::format("'{}' holds a different recording: {}", dir.string(), difference));
   }
-  // A lock without the mark of the end: it goes on, though recording.json was lost.
+  // A lock file without kEndingFile means that the recording continues, even if recording.json was
+  // lost.
   const bool goes_on = lock_ && !staging_.contains(kEndingFile);
   if (unfinished.empty() && any_published && !goes_on) {
     ended_ = true;
-    // What a process killed in its last step left.
+    // Remove what a process that was killed in its last step left.
     if (lock_) staging_.remove(kLockFile);
     if (staging_ && staging_.contains(kEndingFile)) dir_.remove(kStagingDir, staging_);
     lock_.reset();
@@ -189,7 +191,7 @@ RecordingFolder::RecordingFolder(const fs::path& dir, const std::string& fingerp
   if (!staging_) staging_ = dir_.make(kStagingDir);
   if (!lock_) {
     lock_ = lock_recording(dir_, true);
-    // Whether somebody came and went between our reading and our lock.
+    // Another process may have recorded between the reads above and the acquisition of the lock.
     if (unfinished != unfinished_recording(staging_) || published != published_files(dir_))
       throw ValueError(fmt::format("another process records into '{}'", dir.string()));
   }
@@ -205,7 +207,7 @@ RecordingFolder::~RecordingFolder() {
   const bool decided = decisions_.kept() + decisions_.discarded() > 0;
   if (ended_ || !published_.empty() || decided) return;
   end();
-  if (dir_.is_at_its_path()) rmdir(dir_.path().c_str());  // unless something is in it
+  if (dir_.is_at_its_path()) rmdir(dir_.path().c_str());  // fails if it is not empty
 }
 
 void RecordingFolder::require_in_place() const {
@@ -244,8 +246,8 @@ void RecordingFolder::load_published(const std::vector<std::string>& files,
   }
 }
 
-// Moves videos back that an interrupted publication had moved already: then every episode is whole
-// in its folder or it is not, and one that is not takes nothing from the others.
+// Moves the videos of an interrupted publication back. Afterwards every episode is either complete
+// in its folder or damaged, and a damaged episode takes no files of others.
 void RecordingFolder::bring_back(const std::map<std::int64_t, StagedEpisode>& staged, bool ending) {
   Decisions then = decisions_;
   for (const auto& [episode, found] : staged) then.add(episode, true);
@@ -318,7 +320,7 @@ std::shared_ptr<const Folder> RecordingFolder::begin(std::int64_t episode) {
   require_in_place();
   const std::string part = part_name(episode);
   staging_.remove(part);
-  // It must be new: a folder that another process put there may hold links.
+  // The folder must be new: one that another process created may contain symbolic links.
   return std::make_shared<const Folder>(staging_.make(part));
 }
 
@@ -363,7 +365,8 @@ void RecordingFolder::publish_ready() {
 void RecordingFolder::publish_all() {
   if (ended_) return;
   publish_ready();
-  // From here on the order of episodes is settled, also for a process that finds us interrupted.
+  // From here on the order of episodes is final, also for a process that resumes after an
+  // interruption.
   require_in_place();
   staging_.write(kEndingFile, "");
   staging_.sync();
@@ -381,7 +384,8 @@ void RecordingFolder::publish(int batch, const std::vector<std::int64_t>& episod
   const int batches = batches_.count;
   const std::string part = "batch.part";
   const std::string what = fmt::format("cannot write '{}'", staging_.shown(part));
-  // What could not be written whole leaves its disk space to others; its episodes wait as before.
+  // If writing fails, incomplete files are removed to free their disk space. Their episodes stay
+  // staged.
   struct Removed {
     const Folder& folder;
     const std::string& name;
@@ -391,7 +395,7 @@ void RecordingFolder::publish(int batch, const std::vector<std::int64_t>& episod
   {
     const h5::H5Lock lock;
     h5::Id file = h5::create_file(staging_.reachable(part), staging_.shown(part));
-    std::int64_t most = 1 << 17;  // what a file has beside its episodes, and then some
+    std::int64_t most = 1 << 17;  // margin for the file's contents apart from its episodes, bytes
     for (const std::int64_t episode : episodes)
       most += staging_.at(episode_name(episode)).size_of(kEpisodeFile) * 9 / 8;
     staging_.reserve_space(part, most);
@@ -413,7 +417,7 @@ void RecordingFolder::publish(int batch, const std::vector<std::int64_t>& episod
   seal_file(staging_, part);
   staging_.sync(part);
   for (const Move& move : moves) {
-    // A missing one was moved before an earlier attempt to publish was interrupted.
+    // A missing video was already moved by an earlier, interrupted publication.
     const Folder staged = staging_.at(move.episode);
     if (staged.contains(move.name) || !dir_.contains(move.final_name))
       staged.rename(move.name, dir_, move.final_name);
@@ -433,12 +437,13 @@ bool RecordingFolder::end() {
   if (!staging_) return true;
   for (const std::string& name : staging_.names()) {
     if (name == kDescription || name == kLockFile || name == kEndingFile) continue;
-    // An episode beyond the wanted number: half removed under its own name it would look damaged.
+    // This episode exceeds the wanted number. It is renamed first, because a half-removed one would
+    // look damaged.
     const std::string dropped = name + ".part";
     const bool renamed = renameat(staging_.fd(), name.c_str(), staging_.fd(), dropped.c_str()) == 0;
     staging_.remove(renamed ? dropped : name);
   }
-  // The mark that says it has ended goes last.
+  // The files that mark the recording as unfinished are removed last.
   staging_.remove(kDescription);
   staging_.remove(kLockFile);
   lock_.reset();
@@ -462,8 +467,8 @@ std::vector<std::string> finished_names(const Folder& staging) {
 std::string unfinished_recording(const Folder& staging) {
   const std::string text = read_whole(staging, kDescription);
   const bool sound = is_description(text);
-  // Every finished episode carries the same text, with a checksum: where none agrees with
-  // recording.json, it is that which was lost or changed.
+  // Every finished episode carries the same text with a checksum. If none agrees with
+  // recording.json, that file was lost or changed.
   std::map<std::string, int> said;
   for (const std::string& episode : finished_names(staging)) {
     try {

@@ -1,21 +1,21 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
-// The directory of one house, as a small store that survives kill -9 at any moment:
+// Storage of one house: a directory that survives kill -9 at any moment.
 //
-//   trajectories_batch_1_of_2.h5, episode_*.mp4   published: whole, under their final names
-//   .recording/recording.json                     what the recording is
+//   trajectories_batch_1_of_2.h5, episode_*.mp4   published: complete, under their final names
+//   .recording/recording.json                     description of the recording
 //   .recording/lock                               held by the process that records
-//   .recording/episode_00000007/                  finished, waits until its batch is whole
+//   .recording/episode_00000007/                  finished; waits until its batch is complete
 //   .recording/episode_00000008.discarded         attempted, not kept
-//   .recording/episode_00000009.part.1234/        running in process 1234, worthless after it
-//   damaged/episode_00000010/                     finished, found broken later: set aside
+//   .recording/episode_00000009.part.1234/        running in process 1234; useless after it ends
+//   damaged/episode_00000010/                     finished, but found damaged later
 //
-// Every change of state is one rename. A batch is published by moving videos first and the HDF5
-// file last; when that is interrupted, doing it again ends in the same state, because the order of
-// episodes is that of their numbers. All of them go through open directories (folder.h): when .recording
-// is moved away or replaced by a link, the recording fails and nothing in the other folder changes. What an
-// earlier process left is checked before it is published,
-// and no name that stands in a file leads out of its folder.
+// Every change of state is one rename. To publish a batch, the videos are moved first and the HDF5
+// file last. If publishing is interrupted, repeating it reaches the same state, because episodes
+// are ordered by their numbers. All renames go through open directories (folder.h): if .recording
+// is moved away or replaced by a symbolic link, the recording fails and nothing in the other
+// directory changes. Files that an earlier process left are checked before they are published, and
+// no name inside a file can lead out of its folder.
 
 #include <cstdint>
 #include <filesystem>
@@ -32,53 +32,53 @@
 
 namespace mjsense {
 
-// Which attempts were decided, and how.
+// Set of the attempts that were kept or discarded.
 class Decisions {
  public:
-  void add(std::int64_t episode, bool kept);  // once for each
+  void add(std::int64_t episode, bool kept);  // call once per episode
 
   bool contains(std::int64_t episode) const { return kept_by_episode_.contains(episode); }
   int kept() const { return kept_; }
   int discarded() const { return static_cast<int>(kept_by_episode_.size()) - kept_; }
-  // The kept episodes whose place no undecided attempt can take any more, in order.
+  // Kept episodes, in order, that no undecided attempt can precede any more.
   const std::vector<std::int64_t>& settled() const { return settled_; }
-  // All kept episodes, in order.
   std::vector<std::int64_t> all_kept() const;
 
  private:
   std::map<std::int64_t, bool> kept_by_episode_;
   std::vector<std::int64_t> settled_;
-  std::int64_t next_ = 0;  // the lowest that is undecided
+  std::int64_t next_ = 0;  // lowest undecided episode
   int kept_ = 0;
 };
 
 class RecordingFolder {
  public:
-  // Opens or begins a recording. Throws ValueError when there is one and `resume` is false, or it
-  // is a different one, or another process records into it; RuntimeError when the directory cannot
-  // be written.
+  // Opens or creates a recording. Throws ValueError if there is one and `resume` is false, if it
+  // has another fingerprint, or if another process records into it. Throws RuntimeError if the
+  // directory cannot be written.
   RecordingFolder(const std::filesystem::path& dir, const std::string& fingerprint, bool resume);
-  // A recording in which nothing was decided leaves nothing behind: what failed at its first step
-  // blocks nobody.
+  // Removes the recording if nothing was decided, so that a run that failed at its first step does
+  // not block later ones.
   ~RecordingFolder();
   RecordingFolder(const RecordingFolder&) = delete;
   RecordingFolder& operator=(const RecordingFolder&) = delete;
 
   const std::filesystem::path& dir() const { return dir_.path(); }
-  // An empty folder for the files of an episode.
+  // Creates an empty folder for the files of an episode.
   std::shared_ptr<const Folder> begin(std::int64_t episode);
-  // Syncs that folder and makes it a finished episode.
+  // Syncs that folder and renames it to a finished episode.
   void keep(std::int64_t episode, const Folder& part);
   void discard(std::int64_t episode, const std::string& why);
   void abandon(std::int64_t episode);
 
   const Decisions& decisions() const { return decisions_; }
-  bool ended() const { return ended_; }  // published; nothing more to record
+  // Everything is published; nothing can be recorded any more.
+  bool ended() const { return ended_; }
 
-  void publish_ready();  // the batches whose episodes are all decided
-  void publish_all();    // also batches that lack episodes; ends the recording
+  void publish_ready();  // publishes the batches whose episodes are all decided
+  void publish_all();    // publishes incomplete batches too and ends the recording
   std::int64_t published_bytes() const { return published_bytes_; }
-  // What was found broken, a sentence each: these attempts are undecided again.
+  // Damaged episodes, one sentence each. They are undecided again.
   const std::vector<std::string>& damage() const { return damage_; }
 
  private:
@@ -88,9 +88,9 @@ class RecordingFolder {
   void set_aside(const std::string& name, const std::string& why);
   void publish(int batch, const std::vector<std::int64_t>& episodes);
   std::vector<std::int64_t> batch_of(int batch, const std::vector<std::int64_t>& kept) const;
-  bool end();  // false: the folder that it recorded into is elsewhere now, and empty
+  bool end();  // false: the recording's folder was moved elsewhere and is empty
   void end_or_throw();
-  // Throws RuntimeError when the folders were moved or replaced since they were opened.
+  // Throws RuntimeError if the folders were moved or replaced after they were opened.
   void require_in_place() const;
   [[noreturn]] void throw_moved(const std::filesystem::path& path) const;
 
@@ -98,7 +98,7 @@ class RecordingFolder {
   std::string fingerprint_;
   Batches batches_;
   std::set<int> published_;
-  int next_batch_ = 0;  // those before it are published
+  int next_batch_ = 0;  // batches before it are published
   Decisions decisions_;
   std::vector<std::string> damage_;
   std::int64_t published_bytes_ = 0;
@@ -106,13 +106,14 @@ class RecordingFolder {
   Fd lock_;
 };
 
-// The names under which a house keeps what is not published.
+// Names that a house uses for unpublished files.
 inline constexpr const char* kStagingDir = ".recording";
 inline constexpr const char* kEpisodeFile = "traj.h5";
 inline constexpr const char* kDamagedDir = "damaged";
 
-// recording.json of a recording's folder (kStagingDir), or what most of its finished episodes say where
-// that is lost or none of them agrees with it: "" when it holds no unfinished recording.
+// Description of the unfinished recording in the folder `staging` (kStagingDir): the text of
+// recording.json. If that file is lost or no finished episode agrees with it, it is the text that
+// most finished episodes carry. "" if there is no unfinished recording.
 std::string unfinished_recording(const Folder& staging);
 // Directories of finished, unpublished episodes, in order.
 std::vector<std::filesystem::path> finished_episodes(const std::filesystem::path& house);

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// A house that others look at, write into, or left in the middle of something.
+// Houses that other processes read, write or left in an intermediate state.
 
 #include "mjsense/record/recording_folder.h"
 
@@ -28,7 +28,7 @@ using namespace testing;
 using ::testing::AllOf;
 using ::testing::HasSubstr;
 
-// Six episodes in three batches, of which `decided` are there.
+// Records `decided` of six episodes in three batches.
 void begin(const fs::path& out, int decided) {
   record(out, 6, {.worlds = 1, .stop_after = decided}, false, [](auto& c) { c.batches = 3; });
 }
@@ -36,8 +36,9 @@ std::string go_on(const fs::path& out) {
   return record(out, 6, {.worlds = 1}, false, [](auto& c) { c.batches = 3, c.resume = true; });
 }
 
-// Nothing is read before: what the other publishes meanwhile would be missed, and published over.
-TEST(RecordingFolder, WhoRecordsIntoItIsAskedFirst) {
+// The lock must be tested before anything is read. Otherwise files that the other process publishes
+// in the meantime would be missed and overwritten.
+TEST(RecordingFolder, LockIsTestedBeforeReading) {
   TempDir dir;
   begin(dir.path, 3);
   const fs::path house = dir.path / "house_0";
@@ -53,8 +54,8 @@ TEST(RecordingFolder, WhoRecordsIntoItIsAskedFirst) {
   EXPECT_THAT(error_of([&] { go_on(dir.path); }), HasSubstr("trajectories_batch_2_of_3.h5"));
 }
 
-// A recording that begins has not said yet what it is.
-TEST(RecordingFolder, RepairLeavesAloneWhatBegins) {
+// A recording that is starting has not written its description yet.
+TEST(RecordingFolder, RepairIgnoresAStartingRecording) {
   TempDir dir;
   const fs::path house = dir.path / "house_0";
   fs::create_directories(house / kStagingDir);
@@ -67,8 +68,8 @@ TEST(RecordingFolder, RepairLeavesAloneWhatBegins) {
   EXPECT_FALSE(fs::exists(house / kStagingDir));
 }
 
-// Whoever looks at a house holds its lock for a moment: that is no reason not to record.
-TEST(RecordingFolder, ALookIsNoRecording) {
+// A reader holds the lock of a house for a moment; that must not prevent a recording.
+TEST(RecordingFolder, ReadersDoNotBlockRecording) {
   TempDir whole, dir;
   const std::string bytes = go_on(whole.path);
   begin(dir.path, 1);
@@ -82,8 +83,8 @@ TEST(RecordingFolder, ALookIsNoRecording) {
   end.join();
 }
 
-// Killed before the last files of a recording that has ended were removed.
-TEST(RecordingFolder, WhatTheLastStepLeftIsRemoved) {
+// The process was killed before the last files of an ended recording were removed.
+TEST(RecordingFolder, FilesOfAnEndedRecordingAreRemoved) {
   for (const bool locked : {false, true}) {
     TempDir dir;
     const std::string bytes = go_on(dir.path);
@@ -96,8 +97,8 @@ TEST(RecordingFolder, WhatTheLastStepLeftIsRemoved) {
   }
 }
 
-// An episode's folder under another name is not removed, and keeps nobody from going on.
-TEST(RecordingFolder, FoldersOfOtherNamesAreSetAside) {
+// A folder of an episode under an unexpected name is not removed and does not prevent resuming.
+TEST(RecordingFolder, FoldersOfOtherNamesAreMovedAside) {
   TempDir whole, dir;
   const std::string bytes = go_on(whole.path);
   begin(dir.path, 1);
@@ -127,9 +128,9 @@ std::string contents(const fs::path& dir) {
   return text;
 }
 
-// While an episode is recorded, .recording is moved away and a link to another folder takes its place:
-// nothing in the other folder changes, and the recording reports an error.
-TEST(RecordingFolder, AFolderThatIsSwappedForALinkIsNotFollowed) {
+// While an episode is recorded, .recording is moved away and replaced by a link to another folder.
+// Nothing in the other folder may change, and the recording must report an error.
+TEST(RecordingFolder, FolderReplacedByALinkIsNotFollowed) {
   constexpr int kSwaps = 100;
   TempDir foreign, other;
   fs::create_directories(foreign.path / "target/deep/er");
@@ -168,8 +169,8 @@ TEST(RecordingFolder, AFolderThatIsSwappedForALinkIsNotFollowed) {
   EXPECT_EQ(swapped_runs, kSwaps);
 }
 
-// Put back, it goes on where it was.
-TEST(RecordingFolder, AFolderThatIsPutBackIsResumed) {
+// If the folder is moved back, the recording can be resumed.
+TEST(RecordingFolder, FolderThatIsMovedBackIsResumed) {
   TempDir whole, dir;
   const std::string bytes = go_on(whole.path);
   const fs::path staging = dir.path / "house_0/.recording";
@@ -187,8 +188,8 @@ TEST(RecordingFolder, AFolderThatIsPutBackIsResumed) {
   EXPECT_EQ(go_on(dir.path), bytes);
 }
 
-// The system may write a part and say why only when asked for the rest.
-TEST(RecordingFolder, ADescriptionThatDoesNotFitTellsWhy) {
+// The system may write a part of the text and report the error only for the rest.
+TEST(RecordingFolder, DescriptionOnAFullDiskThrows) {
   TempDir dir;
   const fs::path report = dir.path / "report";
   const pid_t pid = fork();

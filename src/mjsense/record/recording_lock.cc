@@ -18,7 +18,7 @@ namespace fs = std::filesystem;
 namespace mjsense {
 namespace {
 
-// Who only looks holds it for a moment, and a program that is being started for another.
+// Readers and programs that are being started hold the lock only for a moment.
 constexpr int kTries = 20, kPauseMicroseconds = 10'000;
 
 }  // namespace
@@ -32,7 +32,8 @@ Fd lock_recording(const Folder& house, bool make) {
     Fd lock(openat(staging.fd(), kLockFile, flags, 0644));
     if (!lock && !make && errno == ENOENT) return {};
     if (!lock) throw_file("write", staging.shown(kLockFile), errno);
-    // The process that held it may have removed it meanwhile: then that name is another one's.
+    // The process that held the lock may have removed the file; the name then belongs to another
+    // one.
     if (flock(lock.get(), LOCK_EX | LOCK_NB) == 0 && staging.contains(kLockFile, lock)) return lock;
   }
   throw ValueError(fmt::format("another process records into '{}'", house.path().string()));

@@ -17,26 +17,27 @@
 namespace mjsense {
 namespace {
 
-constexpr int kFirstOther = 3;  // the first descriptor that is no standard stream
+constexpr int kFirstOther = 3;  // first descriptor after the standard streams
 
 struct Plan {
   char* const* argv;
   int streams[3];
   int folder;
-  const std::vector<int>* open;  // our descriptors, for kernels before 5.9
-  volatile int error = 0;        // written by the child, in our memory
+  const std::vector<int>* open;  // open descriptors, for kernels before 5.9
+  volatile int error = 0;        // set by the child, which shares this memory
 };
 
-// The child of vfork() runs in our memory while we wait: system calls only. All signals are blocked.
+// The child of vfork() shares memory with the suspended parent, so it may only make system calls.
+// All signals are blocked.
 [[noreturn]] __attribute__((noinline)) void become(Plan& plan) {
   const auto fail = [&] {
     plan.error = errno;
     _exit(127);
   };
-  // From here on what is sent to the group of our parent is not for us...
+  // From here on signals to the parent's group do not reach this process...
   if (setpgid(0, 0) != 0) fail();
   if (plan.folder >= 0 && fchdir(plan.folder) != 0) fail();
-  int moved[3];  // out of the way of each other
+  int moved[3];  // copies with numbers that do not conflict
   for (int i = 0; i < 3; ++i) {
     moved[i] = fcntl(plan.streams[i], F_DUPFD_CLOEXEC, kFirstOther);
     if (moved[i] < 0) fail();
@@ -48,7 +49,7 @@ struct Plan {
     for (const int fd : *plan.open) close(fd);
     for (const int fd : moved) close(fd);
   }
-  // ...and what was sent before is forgotten: to ignore a signal discards it.
+  // ...and pending ones are discarded by ignoring each signal once.
   for (int signal = 1; signal < NSIG; ++signal) {
     struct sigaction action = {};
     action.sa_handler = SIG_IGN;
@@ -70,7 +71,8 @@ pid_t spawn(const std::vector<std::string>& argv, int in, int out, int log, int 
   std::vector<char*> args;
   for (const std::string& a : argv) args.push_back(const_cast<char*>(a.c_str()));
   std::string program = argv[0];
-  if (folder >= 0 && program.find('/') != std::string::npos) {  // "./ffmpeg" is one of our folder
+  // A path such as "./ffmpeg" is relative to the current directory.
+  if (folder >= 0 && program.find('/') != std::string::npos) {
     std::error_code ignored;
     program = std::filesystem::absolute(program, ignored).string();
     args[0] = program.data();
@@ -81,8 +83,9 @@ pid_t spawn(const std::vector<std::string>& argv, int in, int out, int log, int 
 
   sigset_t all, before;
   sigfillset(&all);
-  pthread_sigmask(SIG_SETMASK, &all, &before);  // no handler of ours runs in the child
-  const pid_t pid = vfork();                    // NOLINT(clang-analyzer-security.insecureAPI.vfork)
+  // No signal handler of the parent may run in the child.
+  pthread_sigmask(SIG_SETMASK, &all, &before);
+  const pid_t pid = vfork();  // NOLINT(clang-analyzer-security.insecureAPI.vfork)
   if (pid == 0) become(plan);
   const int error = pid < 0 ? errno : plan.error;
   pthread_sigmask(SIG_SETMASK, &before, nullptr);

@@ -20,7 +20,7 @@ namespace {
 
 using Json = nlohmann::json;
 
-// A copy in memory alone: what the library cannot copy must not be copied into a file of ours.
+// Copies in memory only: data that the library cannot copy must not reach an output file.
 void try_copy(hid_t file) {
   const h5::Id access(H5Pcreate(H5P_FILE_ACCESS), H5Pclose, "HDF5 property list");
   h5::check(H5Pset_fapl_core(access, std::size_t{1} << 20, false), "HDF5 memory file");
@@ -36,7 +36,8 @@ std::string describe(const Fd& traj) {
   h5::each_dataset(trajectory, [&](const std::string& name) {
     const h5::Id dataset = h5::open_dataset(trajectory, name);
     h5::check_storage(dataset, name);
-    h5::check_chunks(dataset, name);  // the library copies what does not unpack, and frees it twice
+    // The HDF5 library copies chunks that cannot be unpacked, and frees them twice.
+    h5::check_chunks(dataset, name);
   });
   try_copy(file);
   const std::vector<hsize_t> rows = h5::dims(h5::open_dataset(trajectory, "success"));

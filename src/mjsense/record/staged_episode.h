@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
-// A finished episode that waits in {house}/.recording: what its folder holds, checked. It may have
-// been left by a killed process, by a broken disk or by a stranger.
+// Reads and checks a finished episode in {house}/.recording before it is published. Its files are
+// not trusted: a killed process, a faulty disk or another program may have left them.
 
 #include <cstdint>
 #include <string>
@@ -14,26 +14,26 @@ namespace mjsense {
 
 struct StagedVideo {
   std::string key;   // dataset in obs/sensor_data
-  std::string name;  // of the file, in the episode's folder
-  std::string crc;   // "" if not stated
+  std::string name;  // file name in the episode's folder
+  std::string crc;   // "" if the file does not state it
 };
 
 struct StagedEpisode {
-  std::string recording;  // what recording it belongs to: JSON text
+  std::string recording;  // description of the recording it belongs to, JSON text
   std::int64_t steps = 0;
   std::vector<StagedVideo> videos;
 };
 
-// What traj.h5 of this folder says, read in a process of its own. Throws RuntimeError that says
-// what is wrong with it.
+// Reads traj.h5 of this folder in a child process. Throws RuntimeError with a description of the
+// fault.
 StagedEpisode read_staged(const Folder& folder);
 
-// Throws RuntimeError unless every video is there, whole, with a picture for each step.
+// Throws RuntimeError unless every video is present and complete and has one frame per step.
 void check_staged_videos(const Folder& folder, const StagedEpisode& episode);
-// Of one of them.
+// The same for one video.
 void check_staged_video(const Folder& folder, const StagedVideo& video, std::int64_t steps);
 
-// The names in traj/obs/sensor_data, which are plain. Throws RuntimeError if one is not.
+// Videos named in traj/obs/sensor_data. Throws RuntimeError unless all are plain file names.
 std::vector<StagedVideo> staged_videos(hid_t trajectory);
 
 }  // namespace mjsense

@@ -15,7 +15,7 @@ namespace {
 
 using ::testing::HasSubstr;
 
-// An episode of two steps, with a packed dataset of lists whose only chunk has these bytes.
+// An episode of two steps with a compressed dataset of lists whose only chunk has these bytes.
 void write_episode(const std::filesystem::path& path, const std::string& chunk) {
   const h5::H5Lock lock;
   const h5::Id file = h5::create_file(path);
@@ -36,8 +36,8 @@ void write_episode(const std::filesystem::path& path, const std::string& chunk) 
   h5::check(H5Dwrite_chunk(dataset, H5P_DEFAULT, 0, &at, chunk.size(), chunk.data()), "chunk");
 }
 
-// The library would copy the chunk all the same, and give its memory back twice.
-TEST(StagedEpisode, AChunkThatDoesNotUnpackIsNamed) {
+// Without the check, the HDF5 library would copy the chunk anyway and free its memory twice.
+TEST(StagedEpisode, CorruptChunkThrows) {
   const testing::TempDir dir;
   write_episode(dir.file("traj.h5"), "no stream");
   try {

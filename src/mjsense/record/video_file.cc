@@ -22,7 +22,7 @@ struct Unreadable {
   const char* why;
 };
 
-// A file of which any part may be asked for.
+// A file with random access.
 class File {
  public:
   explicit File(int fd) : fd_(fd) {
@@ -31,7 +31,7 @@ class File {
   }
   std::uint64_t size() const { return size_; }
 
-  // Fewer bytes at the end of the file.
+  // Reads fewer bytes at the end of the file.
   std::size_t read(std::uint64_t at, std::span<std::uint8_t> out) const {
     std::size_t done = 0;
     while (done < out.size() && at + done < size_) {
@@ -55,7 +55,7 @@ std::uint64_t big_endian(std::span<const std::uint8_t> bytes) {
   return value;
 }
 
-// ---- MP4: boxes of a size, four letters and a content
+// ---- MP4: boxes with a size, a four-letter type and contents
 
 using Bytes = std::span<const std::uint8_t>;
 
@@ -68,7 +68,7 @@ std::uint64_t number(Bytes bytes, std::size_t at, std::size_t count) {
   return big_endian(part(bytes, at, count));
 }
 
-// Calls visit(letters, content) for each box of `bytes`.
+// Calls visit(type, contents) for each box of `bytes`.
 template <class Visit>
 void each_box(Bytes bytes, Visit&& visit) {
   while (bytes.size() >= 8) {
@@ -156,7 +156,7 @@ VideoFacts read_mp4(const File& file) {
   return facts;
 }
 
-// ---- Matroska: elements of a number, a size and a content
+// ---- Matroska: elements with an id, a size and contents
 
 constexpr std::uint64_t kHeader = 0x1A45DFA3, kSegment = 0x18538067, kTracks = 0x1654AE6B,
                         kTrack = 0xAE, kTrackNumber = 0xD7, kTrackType = 0x83, kVideo = 0xE0,
@@ -185,7 +185,7 @@ class Matroska {
     std::uint64_t id, begin, end;
   };
 
-  // A number of 1 to 8 bytes whose first byte says how many they are. Advances `at`.
+  // Reads an integer of 1 to 8 bytes, whose first byte encodes its length, and advances `at`.
   std::uint64_t variable(std::span<const std::uint8_t> bytes, std::size_t& at, bool marker) const {
     if (at >= bytes.size() || bytes[at] == 0) throw Unreadable{"an element is broken"};
     std::size_t size = 1;
@@ -226,7 +226,7 @@ class Matroska {
     return big_endian({bytes, count});
   }
 
-  // The first bytes of an element.
+  // The first bytes of an element, as text.
   std::string text(const Element& e) const {
     constexpr std::uint64_t kMostBytes = 64;
     std::string bytes(static_cast<std::size_t>(std::min(e.end - e.begin, kMostBytes)), '\0');
@@ -235,7 +235,7 @@ class Matroska {
     return bytes;
   }
 
-  // "V_MS/VFW/FOURCC" has four letters in a BITMAPINFOHEADER.
+  // "V_MS/VFW/FOURCC" stores its four letters in a BITMAPINFOHEADER.
   static std::string codec_of(std::string id, const std::string& description) {
     constexpr std::size_t kLetters = 16;
     id.resize(std::min(id.size(), id.find('\0')));

@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
-// How many pictures a video file holds, how large they are and how they are coded, from its container
-// alone: what an
-// encoder left is counted without starting another program. MP4 and Matroska as ffmpeg writes them.
+// Reads the number of frames, the size and the codec of a video from its container, so that an
+// encoder's output can be checked without starting another program. Supports MP4 and Matroska as
+// written by ffmpeg.
 
 #include <cstdint>
 #include <string>
@@ -13,11 +13,11 @@ struct VideoFacts {
   std::int64_t frames = 0;
   int width = 0, height = 0;
   std::string container;  // "MP4", "Matroska"
-  std::string codec;      // "h264", "ffv1"; another one as the container names it: "mp4v"
-  std::string error;      // "" if the file could be understood to its end
+  std::string codec;      // "h264" or "ffv1"; others as the container names them: "mp4v"
+  std::string error;      // "" if the file could be parsed to its end
 };
 
-// Reads only the tables of the file, never more than 64 MiB, and trusts none of their sizes.
+// Reads only the tables of the file, at most 64 MiB, and validates all sizes in them.
 [[nodiscard]] VideoFacts read_video_facts(int fd);
 
 }  // namespace mjsense

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Containers counted without ffmpeg: what it wrote, and what is left of it.
+// Frame counts of video containers without ffmpeg: complete, truncated and random files.
 #include "mjsense/record/video_file.h"
 
 #include <fcntl.h>
@@ -40,7 +40,7 @@ class Containers : public ::testing::Test {
   std::vector<fs::path> videos;
 };
 
-TEST_F(Containers, AreCounted) {
+TEST_F(Containers, FramesAreCounted) {
   for (const fs::path& video : videos) {
     const VideoFacts facts = facts_of(video);
     EXPECT_EQ(facts.error, "") << video;
@@ -52,7 +52,7 @@ TEST_F(Containers, AreCounted) {
   }
 }
 
-TEST_F(Containers, WithoutTheirEndsAreNotWhole) {
+TEST_F(Containers, TruncatedFilesAreIncomplete) {
   const fs::path part = dir.path / "part";
   for (const fs::path& video : videos) {
     const std::string bytes = read_file(video);
@@ -64,8 +64,8 @@ TEST_F(Containers, WithoutTheirEndsAreNotWhole) {
   }
 }
 
-// Whatever the bytes say, reading them ends (the sanitizers watch).
-TEST_F(Containers, OfNonsenseAreRefused) {
+// Random bytes must not crash or hang the reader (the sanitizers check that).
+TEST_F(Containers, RandomBytesAreRejected) {
   const fs::path part = dir.path / "part";
   std::mt19937 rng(5);
   for (const fs::path& video : videos) {
@@ -83,14 +83,14 @@ TEST_F(Containers, OfNonsenseAreRefused) {
   }
 }
 
-TEST(Checksum, IsZlibs) {
+TEST(Checksum, EqualsZlib) {
   Checksum sum;
   sum.add("12345", 5);
   sum.add("6789", 4);
-  EXPECT_EQ(sum.text(), "cbf43926");  // the check value of CRC-32
+  EXPECT_EQ(sum.text(), "cbf43926");  // check value of CRC-32
 }
 
-TEST(Checksum, OfAFileIsBehindItsEnd) {
+TEST(Checksum, SealIsAppendedToTheFile) {
   TempDir dir;
   const fs::path path = dir.path / "file";
   const auto seal = [&] { return check_seal(Fd(open(path.c_str(), O_RDONLY | O_CLOEXEC)).get()); };

@@ -28,7 +28,7 @@ std::size_t yuv420_bytes(int width, int height) {
   return columns * rows / 2 * 3;
 }
 
-// A row of red, green, blue, then eight of both chromas.
+// One row of red, green and blue, then eight rows of both chroma planes.
 std::size_t yuv420_scratch(int width) {
   return static_cast<std::size_t>(3 + 8) * (width + width % 2);
 }

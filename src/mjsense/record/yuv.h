@@ -1,11 +1,12 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
-// RGB to YUV 4:2:0, as the video encoder wants it: half the bytes through its pipe, and a fifth of
-// the time that ffmpeg takes for it.
+// RGB to YUV 4:2:0 conversion for the video encoder. It halves the bytes that go through the
+// encoder's pipe and takes a fifth of the time of ffmpeg's conversion.
 //
-// BT.601, limited range, untagged in the file: what ffmpeg's scaler makes of RGB unless told
-// otherwise, and what players take an untagged file for. Brightness is the same as ffmpeg's bit for
-// bit, chroma within one step, so that sizes and colours of videos stay what they were.
+// The colours are BT.601, limited range, untagged in the file. This is the default of ffmpeg's
+// scaler for RGB input and what players assume for untagged files. Luma equals ffmpeg's bit for bit
+// and chroma differs by at most one step, so that sizes and colours of videos do not depend on who
+// converts.
 
 #include <cstddef>
 #include <cstdint>
@@ -13,15 +14,15 @@
 
 namespace mjsense {
 
-// Bytes of a picture: Y [H, W], U [H/2, W/2], V [H/2, W/2], of sizes rounded up to even ones.
+// Bytes of a frame: Y [H, W], U [H/2, W/2], V [H/2, W/2], with H and W rounded up to even numbers.
 std::size_t yuv420_bytes(int width, int height);
 
-// rgb: [height, width, 3]. An odd width or height repeats its last column or row. The same bits on
-// every machine.
+// rgb: [height, width, 3]. If the width or height is odd, the last column or row is repeated. The
+// result is the same bit for bit on every machine.
 void encode_yuv420(std::span<const std::uint8_t> rgb, int width, int height,
                    std::span<std::uint8_t> out);
 
-// The same for each instruction set (core/cpu.h). `scratch` holds yuv420_scratch(width) numbers.
+// Variants for each instruction set (core/cpu.h). `scratch` holds yuv420_scratch(width) values.
 using Yuv420Kernel = void (*)(const std::uint8_t* rgb, int width, int height, std::uint8_t* out,
                               std::int16_t* scratch);
 std::size_t yuv420_scratch(int width);

@@ -1,7 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
-// The conversion in integers, in loops that compilers vectorise. Everything lies in an unnamed
-// namespace and nothing of std:: is called: each instruction set must keep its own copy.
+// The conversion in integer arithmetic, in loops that compilers vectorise. Everything is in an
+// unnamed namespace and calls nothing of std::, because each instruction set must compile to a
+// separate copy.
 
 #include <cstddef>
 #include <cstdint>
@@ -12,16 +13,16 @@ namespace mjsense {
 namespace {
 
 constexpr int kTaps = 8;
-constexpr int kRing = kTaps;  // rows of chroma that are kept
+constexpr int kRing = kTaps;  // chroma rows that are kept
 
 struct Taps {
   int rows[kTaps];
   std::int16_t factors[kTaps];
 };
 
-// Which rows make row `i` of the chroma, and how much of each: the bicubic kernel (0, 0.6) at half
-// the resolution, in 4096ths, what is beyond the picture added to its first or last row. Rounding
-// errors go on to the next tap, so that the sum is exact.
+// Source rows of chroma row `i` and their weights, in 4096ths: the bicubic kernel (0, 0.6) at half
+// the resolution. Weights of rows outside the image go to its first or last row. Each rounding
+// error is carried to the next tap, so that the sum is exact.
 inline Taps taps_of(int i, int height) {
   constexpr int kTenths[kTaps] = {-576, -1728, 4928, 17856, 17856, 4928, -1728, -576};
   Taps taps = {};
@@ -39,7 +40,7 @@ inline Taps taps_of(int i, int height) {
     taps.factors[used++] = static_cast<std::int16_t>(factor);
     sum = 0;
   }
-  for (; used < kTaps; ++used) taps.rows[used] = taps.rows[0];  // of nothing
+  for (; used < kTaps; ++used) taps.rows[used] = taps.rows[0];  // weight 0
   return taps;
 }
 
@@ -52,7 +53,7 @@ inline void split(const std::uint8_t* __restrict rgb, int n, std::int16_t* __res
   }
 }
 
-// 16 + (0.299 R + 0.587 G + 0.114 B) 219 / 255, rounded to 64ths, then to ones.
+// 16 + (0.299 R + 0.587 G + 0.114 B) 219 / 255, rounded to 64ths, then to integers.
 inline void luma(const std::int16_t* __restrict r, const std::int16_t* __restrict g,
                  const std::int16_t* __restrict b, int n, std::uint8_t* __restrict out) {
   for (int x = 0; x < n; ++x) {
@@ -61,8 +62,8 @@ inline void luma(const std::int16_t* __restrict r, const std::int16_t* __restric
   }
 }
 
-// 128 + (B - Y) 0.564 224 / 255 and 128 + (R - Y) 0.713 224 / 255 of two neighbours' mean, in
-// 128ths.
+// 128 + (B - Y) 0.564 224 / 255 and 128 + (R - Y) 0.713 224 / 255 of the mean of two neighbouring
+// pixels, in 128ths.
 inline void chroma(const std::int16_t* __restrict r, const std::int16_t* __restrict g,
                    const std::int16_t* __restrict b, int n, std::int16_t* __restrict u,
                    std::int16_t* __restrict v) {
@@ -78,7 +79,8 @@ inline void chroma(const std::int16_t* __restrict r, const std::int16_t* __restr
   }
 }
 
-// Each product is cut to 8ths; 7 of these make up for the eight cuts and round.
+// Each of the eight products is truncated to 8ths. The initial 7 eighths compensate for the
+// truncations and for rounding.
 inline void mix(const std::int16_t* const* rows, const std::int16_t* factors, int n,
                 std::uint8_t* __restrict out) {
   for (int x = 0; x < n; ++x) {

@@ -32,7 +32,7 @@ Bytes plain(int width, int height, const Bytes& colour) {
   return rgb;
 }
 
-// A smooth ramp with edges and noise on it, so that every rounding is met.
+// A smooth ramp with edges and noise, so that every rounding case occurs.
 Bytes picture(int width, int height, unsigned seed = 1) {
   Bytes rgb;
   for (int y = 0; y < height; ++y) {
@@ -68,8 +68,8 @@ TEST(Yuv, ColoursAreThoseOfBt601) {
   }
 }
 
-TEST(Yuv, EachPlaneIsWhereItBelongs) {
-  // Left half red, right half blue; the lower half dark.
+TEST(Yuv, PlanesAreInOrder) {
+  // The left half is red and the right half blue; the lower half is dark.
   const int width = 32, height = 24;
   Bytes rgb(3 * width * height);
   for (int y = 0; y < height; ++y)
@@ -106,7 +106,7 @@ TEST(Yuv, OddSizesRepeatTheirLastColumnAndRow) {
   EXPECT_EQ(converted({255, 0, 0}, 1, 1).size(), 6u);
 }
 
-TEST(Yuv, EveryInstructionSetGivesTheSameBits) {
+TEST(Yuv, InstructionSetsAgree) {
   std::vector<Yuv420Kernel> kernels;
 #if defined(__x86_64__)
   if (cpu_isa() >= Isa::kAvx2) kernels.push_back(yuv420_avx2);
@@ -125,9 +125,9 @@ TEST(Yuv, EveryInstructionSetGivesTheSameBits) {
   }
 }
 
-// Brightness bit for bit, chroma within one step and nearly everywhere the same: 2 % of ffmpeg's
-// are rounded the other way.
-TEST(Yuv, IsWhatFfmpegMakesOfIt) {
+// Luma is equal bit for bit. Chroma differs by at most one step, and by 0 nearly everywhere: 2 % of
+// the values are rounded differently by ffmpeg.
+TEST(Yuv, EqualsFfmpeg) {
   const testing::TempDir dir;
   const int width = 320, height = 96;
   const Bytes rgb = picture(width, height);

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
-// What each world looked like when its last action was chosen: relative actions are measured from
-// there.
+// Robot state of each world at the time its last action was chosen. Relative actions are measured
+// from this state.
 
 #include <array>
 #include <vector>
@@ -18,12 +18,13 @@ class ActionLog {
 
   struct Entry {
     bool given = false;                              // false: the episode has had no action yet
-    RobotValues qpos;                                // of every group
-    std::array<Pose, RobotValues::kMaxGroups> leaf;  // X_BL of every group
+    RobotValues qpos;                                // of all groups
+    std::array<Pose, RobotValues::kMaxGroups> leaf;  // X_BL of each group
   };
 
   void begin(int world) { entries_[world].given = false; }
-  // Before an action is applied; `world` is fresh and shows the observation it answers.
+  // Call before an action is applied. `world` must be fresh and show the observation that the
+  // action answers.
   void remember(const World& world, const Robot& robot) {
     Entry& entry = entries_[world.id];
     entry.given = true;

@@ -11,11 +11,11 @@
 namespace mjsense {
 namespace {
 
-// True at an observation after which the episode is over by the policy's word; by the task's, see
-// blank_actions(). A time-out is neither.
+// True if the policy ended the episode with this observation. For episodes that the task ends see
+// blank_actions(). A time-out is not terminal.
 bool terminal(const Task& task, const World& world) { return task.done_received(world.id); }
 
-// Numbers of the robot's groups: fields `<group>`, then `given/<group>`.
+// Values per move group: fields `<group>`, then `given/<group>`.
 template <class T>
 class ActionSensor : public Sensor {
  public:
@@ -47,12 +47,12 @@ class ActionSensor : public Sensor {
   }
 
  protected:
-  // What a group's numbers are; of rank 0 if the group has none.
+  // Spec of a group's values; rank 0 if the group has none.
   virtual SensorSpec group_spec(const MoveGroup& group) const = 0;
   virtual void declare_more(const SensorInit& /*init*/) {}
-  // False: no group has an action at this observation.
+  // Whether any group has an action at this observation.
   virtual bool shown(const World& /*world*/) { return true; }
-  // Fills the numbers of a group; false if it has no action at this observation.
+  // Writes the values of a group. Returns false if it has no action at this observation.
   virtual bool write(const World& world, int group, std::span<T> row) = 0;
 
   Field& add(std::string_view name, SensorSpec spec, const SensorInit& init) {
@@ -138,7 +138,7 @@ class JointPos final : public ActionSensor<double> {
     SensorSpec spec =
         spec_of(g.target_size, g.target_unit, "",
                 fmt::format("Target of the controller of '{}', without noise.", g.name));
-    // The least box around the control ranges, and 0 where nothing is given.
+    // The smallest interval around the control ranges and 0, the value without an action.
     const double low = std::ranges::min(g.ctrl_low), high = std::ranges::max(g.ctrl_high);
     if (low > -mjMAXVAL) spec.low = std::min(0.0, low);
     if (high < mjMAXVAL) spec.high = std::max(0.0, high);
@@ -230,7 +230,7 @@ void blank_actions(SensorSuite& suite, int world, bool first) {
        {"actions/joint_pos", "actions/ee_pose", "actions/joint_pos_rel", "actions/ee_twist"}) {
     if (first && (name == std::string_view("actions/joint_pos_rel") ||
                   name == std::string_view("actions/ee_twist"))) {
-      continue;  // zeros, and shown as such
+      continue;  // stay valid: zeros that are marked as given
     }
     Sensor* sensor = suite.find(name);
     if (!sensor) continue;

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
-// The five `actions/*` of an observation: what led to it. Row t belongs to the action between
-// observations t-1 and t.
+// The five `actions/*` sensors of an observation. Row t describes the action between observations
+// t-1 and t.
 
 #include <memory>
 #include <vector>
@@ -12,29 +12,32 @@
 
 namespace mjsense {
 
-// Streams `<sensor>/<group>` and `<sensor>/given/<group>` (bool []: false where the group has no
-// action at this observation; its numbers are 0 then). Units: what each group's actuators
-// take (MoveGroup::command_unit: rad of an arm's servos, 0 open .. 255 closed of a gripper), m and
-// wxyz (poses). "Before" is the observation that the action answers. At a
-// terminal observation nothing is given but commanded_action.
+// Streams `<sensor>/<group>` and `<sensor>/given/<group>` (bool []). `given` is false if the group
+// has no action at this observation; its values are then 0. Units are those of each group's
+// actuators (MoveGroup::command_unit: rad for the servos of an arm, 0 open .. 255 closed for a
+// gripper), and m and wxyz for poses. X_BL is the pose of a group's leaf frame in the robot's base
+// frame, and "before" is the observation that the action answers. At a terminal observation only
+// commanded_action is given.
 //
-//   actions/commanded_action  float32, as the policy gave it to the group's controller; first: nothing. `success` [1] is the
+//   actions/commanded_action  float32, the command that the policy gave to the group's
+//                             controller; none at the first observation. `success` [1] is the
 //                             policy's own verdict, 0 or 1
-//   actions/joint_pos         float64, the joint positions that the controllers aim at, without
-//                             noise, of groups whose controller aims at some; first: what they hold
-//   actions/joint_pos_rel     float64, these minus qpos before; only of groups that have as many
-//                             targets as joints; first: zeros of every group
+//   actions/joint_pos         float64, joint position targets of the controllers, without noise, of
+//                             groups whose controller has such targets; the positions that they
+//                             hold at the first observation
+//   actions/joint_pos_rel     float64, these targets minus qpos before, only of groups with as many
+//                             targets as joints; zeros of every group at the first observation
 //   actions/ee_twist          float64 [6], log6(inv(X_BL before) * fk(targets)) = [linear 3 (m),
-//                             angular 3 (rad)], in the axes of that leaf, per control step; first:
-//                             zeros
-//   actions/ee_pose           float64 [7], fk(targets), X_BL of every group; a base gives the
-//                             identity
+//                             angular 3 (rad)], in the axes of that leaf frame, per control step;
+//                             zeros at the first observation
+//   actions/ee_pose           float64 [7], fk(targets), X_BL of every group; identity for a base
 //
-// They refer to the task and the log, which live longer.
+// The sensors refer to the task and the log, which must outlive them.
 std::vector<std::shared_ptr<Sensor>> action_sensors(const Task& task, const ActionLog& log);
 
-// Empties the rows of this world that show nothing at a terminal observation: the judgement comes
-// after the sensors. `first`: no action was taken yet.
+// Clears the rows of this world that have no meaning at a terminal observation. This happens after
+// the sensors were computed, because the evaluation follows them. `first`: no action has been taken
+// yet.
 void blank_actions(SensorSuite& suite, int world, bool first);
 
 }  // namespace mjsense

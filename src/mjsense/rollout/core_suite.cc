@@ -31,8 +31,8 @@ void add_camera(SensorSuite& suite, const RecordedCamera& camera, const std::str
   if (camera.segmentation) add("_segmentation", "segmentation");
 }
 
-// Parts of the robot, then what plays a role in the task. Null where there is nothing to be seen, or
-// nothing to see it with.
+// Sensor for image points of the robot's parts and of the objects with a role in the task. Null if
+// there is no such object or no camera.
 std::shared_ptr<Sensor> image_points(const Task& task, const std::vector<RecordedCamera>& cameras) {
   std::vector<ImagePointsSensor::Object> objects = task.robot().image_objects();
   for (std::size_t i = 0; i < task.objects(0).size(); ++i) {
@@ -74,7 +74,7 @@ SensorSuite core_suite(const Task& task, const ActionLog& log,
                   write_pose(robot.base_pose(world), row.data());
                 }),
             of_task);
-  // Everything hangs below the world: it is no part of a robot.
+  // Without a base body everything hangs below the world body, which is not part of the robot.
   const char* base =
       robot.base_body() > 0 ? mj_id2name(task.model(), mjOBJ_BODY, robot.base_body()) : nullptr;
   suite.add(

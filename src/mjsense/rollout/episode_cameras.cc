@@ -24,7 +24,8 @@ CameraMountCfg of_model(const CameraMount& mount, bool of_scene) {
   return out;
 }
 
-// The other side of a picture that keeps its aspect ratio: the nearest even number, as videos need.
+// The other side of an image with the same aspect ratio, rounded to an even number as videos
+// require.
 int scaled(int side, int other, int of) {
   return std::max(2, 2 * static_cast<int>(std::lround(0.5 * side * other / of)));
 }
@@ -124,7 +125,7 @@ CameraSensorCfg default_view(const Task& task, const RolloutCfg& cfg) {
   out.use_shadows = cfg.shadows;
   out.samples = cfg.samples;
   if (robot.name.empty()) return out;
-  // m, in the robot's base frame: x ahead, z up.
+  // m, in the robot's base frame: x forward, z up.
   const Vec3 eye{1.5, -1.2, 1.5}, target{0.4, 0, 0.6};
   const Vec3 back = normalized(eye - target);
   const Vec3 right = normalized(cross(Vec3{0, 0, 1}, back));

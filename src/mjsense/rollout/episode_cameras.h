@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
-// Which cameras an episode has: the robot's own or those of a system, then the task's; all of them
-// or those that are asked for.
+// Chooses the cameras of an episode: those of the robot or of a camera system, then those of the
+// task. RolloutCfg may select a subset.
 
 #include <string>
 #include <vector>
@@ -15,16 +15,17 @@ namespace mjsense {
 
 struct RolloutCfg;
 
-// Mounts with their sizes, in the order of a recording. Throws KeyError for an unknown camera or
-// system, ValueError for a camera that is given twice.
+// Camera mounts and image sizes, in the order of a recording. Throws KeyError for an unknown camera
+// or system and ValueError for a camera that is named twice.
 CameraSystem choose_cameras(const Task& task, const RolloutCfg& cfg);
 
-// What is recorded of them, and the sensors of the scene that take the pictures.
+// The recorded cameras, and the configuration of the scene's sensor that renders each of them.
 std::vector<RecordedCamera> recorded_cameras(const CameraSystem& system);
 CameraSensorCfg camera_sensor_cfg(const CameraSystem& system, int camera,
                                   const RecordedCamera& recorded, const RolloutCfg& cfg);
 
-// What orbiting cameras go round: the middle of the task's objects and of the robot's grippers.
+// Centre of the orbits of orbiting cameras: the mean position of the task's objects and the robot's
+// grippers. World frame, m.
 Vec3 middle_of(const Task& task, const World& world);
 
 // The camera of RolloutCfg::default_view.

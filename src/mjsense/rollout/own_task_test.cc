@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// A task and a policy of one's own, in C++: docs/own_task.md shows parts of this file.
+// A user-defined task and policy in C++; docs/own_task.md shows parts of this file.
 
 #include <gmock/gmock.h>
 
@@ -74,8 +74,8 @@ class CartTask final : public Task {
 
   double mark(int world) const { return marks_[world]; }
   int evaluations = 0, samples = 0;
-  double least_start = -1;        // m, of starts that can be played
-  std::vector<std::string> keep;  // of the suite; empty: all
+  double least_start = -1;        // m, minimum distance of playable starts
+  std::vector<std::string> keep;  // sensors of the suite to keep; empty: all
 
  protected:
   void initialize_task() override { marks_.assign(num_worlds(), 0.0); }
@@ -144,7 +144,7 @@ struct OwnTask : testing::Test {
   }
 };
 
-TEST_F(OwnTask, ItsSceneHasTheRobot) {
+TEST_F(OwnTask, SceneContainsTheRobot) {
   Rollout rollout(two_worlds(), task, policy);
   EXPECT_THAT(rollout.suite().names(),
               ElementsAre("qpos", "qvel", "robot_base_pose", "env_states", "task_info",
@@ -165,7 +165,7 @@ TEST_F(OwnTask, ItsSceneHasTheRobot) {
   EXPECT_NE(task->mark(0), task->mark(1));
 }
 
-TEST_F(OwnTask, TheRobotOfItsSceneIsTheDefault) {
+TEST_F(OwnTask, RobotOfTheSceneIsTheDefault) {
   RolloutCfg cfg = two_worlds();
   cfg.policy = "";
   cfg.make_task = [](TaskCfg wanted) { return std::make_unique<CartTask>(std::move(wanted)); };
@@ -176,7 +176,7 @@ TEST_F(OwnTask, TheRobotOfItsSceneIsTheDefault) {
   EXPECT_EQ(rollout.task().robot().group("joints").actuators.size(), 1u);
 }
 
-TEST_F(OwnTask, AllWorldsAreJudgedAtOnceAndActAtOnce) {
+TEST_F(OwnTask, EvaluatesAndActsForAllWorldsAtOnce) {
   Rollout rollout(two_worlds(), task, policy);
   start(rollout);
   EXPECT_EQ(task->evaluations, 1);
@@ -188,7 +188,7 @@ TEST_F(OwnTask, AllWorldsAreJudgedAtOnceAndActAtOnce) {
   EXPECT_EQ(policy->acts, 5);
 }
 
-TEST_F(OwnTask, RegisteredItHasAName) {
+TEST_F(OwnTask, RegisteredTaskHasAName) {
   register_task("cart", [](TaskCfg cfg) { return std::make_unique<CartTask>(std::move(cfg)); });
   register_policy("drive", [] { return std::make_unique<Drive>(); });
   EXPECT_THAT(task_names(), testing::Contains("cart"));
@@ -223,7 +223,7 @@ TEST_F(OwnTask, PickNeedsARobot) {
   }
 }
 
-TEST_F(OwnTask, MayChangeTheSuite) {
+TEST_F(OwnTask, TaskMayEditTheSuite) {
   task->keep = {"mark", "qpos"};
   Rollout rollout(two_worlds(), task, policy);
   EXPECT_THAT(rollout.suite().names(), ElementsAre("mark", "qpos"));
@@ -237,7 +237,7 @@ TEST_F(OwnTask, MayChangeTheSuite) {
   }
 }
 
-TEST_F(OwnTask, WithoutSensorsTheSuiteIsTheCallersAlone) {
+TEST_F(OwnTask, WithoutSensorsTheSuiteIsTheCallers) {
   RolloutCfg cfg = two_worlds();
   cfg.use_sensors = false;
   Rollout rollout(cfg, task, policy);
@@ -248,7 +248,7 @@ TEST_F(OwnTask, WithoutSensorsTheSuiteIsTheCallersAlone) {
   EXPECT_LT(rollout.evaluation(0).reward, 0);
 }
 
-TEST_F(OwnTask, SuccessEndsAnEpisodeIfAskedAndEmptiesItsActions) {
+TEST_F(OwnTask, SuccessEndsAnEpisodeOnRequest) {
   TaskCfg cfg;
   cfg.terminate_upon_success = true;
   auto eager = std::make_shared<CartTask>(cfg);
@@ -268,8 +268,8 @@ TEST_F(OwnTask, SuccessEndsAnEpisodeIfAskedAndEmptiesItsActions) {
   EXPECT_TRUE(given(rollout, "actions/commanded_action", 0));
 }
 
-// A chunk is its steps, without what is between them.
-TEST_F(OwnTask, AChunkIsItsSteps) {
+// A chunk equals its single steps without the intermediate observations.
+TEST_F(OwnTask, ChunkEqualsItsSteps) {
   Rollout single(two_worlds(), task, policy);
   auto other = std::make_shared<CartTask>(TaskCfg{});
   Rollout chunked(two_worlds(), other, nullptr);
@@ -296,10 +296,10 @@ TEST_F(OwnTask, AChunkIsItsSteps) {
   EXPECT_THROW(chunked.step_chunk({}), ValueError);
 }
 
-TEST_F(OwnTask, AChunkEndsWhereItsEpisodeEnds) {
+TEST_F(OwnTask, ChunkEndsWithItsEpisode) {
   Rollout rollout(two_worlds(), task, nullptr);
   start(rollout);
-  // World 0 drives out of the field, world 1 to its mark.
+  // World 0 drives out of the field, world 1 reaches its mark.
   std::vector<Action> chunk;
   for (int t = 0; t < 200; ++t) {
     chunk.push_back(command(*task, 1.0));
@@ -314,7 +314,7 @@ TEST_F(OwnTask, AChunkEndsWhereItsEpisodeEnds) {
   EXPECT_LT(task->episode_step(1), 200);
 }
 
-// A start that cannot be played is drawn again, the same in whichever world.
+// A start that cannot be played is drawn again, with the same result in every world.
 TEST_F(OwnTask, StartsAreDrawnUntilTheyCanBePlayed) {
   task->least_start = 0.2;
   RolloutCfg cfg = two_worlds();
@@ -336,12 +336,12 @@ TEST_F(OwnTask, StartsAreDrawnUntilTheyCanBePlayed) {
     EXPECT_EQ(many.simulation().worlds().time(worlds[k]), 0);
   }
   EXPECT_GT(other->samples, 8);
-  other->least_start = 0.6;  // never
+  other->least_start = 0.6;  // no start can be played
   one.start(std::span(worlds).subspan(7, 1), std::span(episodes).first(1));
   EXPECT_EQ(one.fault(0), "the cart starts on the left");
 }
 
-TEST_F(OwnTask, AnotherSeedIsOtherEpisodes) {
+TEST_F(OwnTask, EpisodesDependOnTheSeed) {
   Rollout rollout(two_worlds(), task, policy);
   start(rollout);
   const double first = task->mark(0);

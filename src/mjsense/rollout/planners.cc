@@ -25,7 +25,7 @@ std::unique_ptr<PlannerPolicy> make_manipulation() {
 
 struct Planners {
   std::mutex mutex;
-  // By task type; ours, then others in the order in which they came.
+  // Built-in task types first, then registered ones in the order of registration.
   std::vector<std::pair<std::string, PlannerFactory>> entries{
       {"open", [] { return std::make_unique<OpeningPlanner>(); }},
       {"close", [] { return std::make_unique<OpeningPlanner>(); }},
@@ -48,11 +48,11 @@ bool has_its_own(const Task& task) {
   return std::ranges::any_of(all.entries, [&](const auto& e) { return e.first == task.type(); });
 }
 
-// A task that no planner is for but that has things to grasp.
+// True for tasks without a specific planner that have objects to grasp.
 bool picks(const Task& task) { return task.grasp_scene() && !has_its_own(task); }
 bool has_planner(const Task& task) { return task.grasp_scene() || has_its_own(task); }
 
-// From above, or from wherever it can where nothing can be taken from above.
+// Picks from above if possible, otherwise with the general manipulation planner.
 class TopDownPlanner final : public PlannerPolicy {
  public:
   std::string_view name() const override { return "top_down_planner"; }
@@ -95,10 +95,11 @@ class TopDownPlanner final : public PlannerPolicy {
 
   PickPlanner above_;
   ManipulationPlanner anywhere_;
-  std::vector<char> anywhere_plays_;  // [B]
+  std::vector<char> anywhere_plays_;  // [B], 1: the episode uses anywhere_
 };
 
-// Of several tasks of which any will do, the first that there is a planner for.
+// The first child of a MultiTask that a planner exists for; any child counts as success. Other
+// tasks are returned unchanged.
 Task& first_doable(Task& task) {
   auto* several = dynamic_cast<MultiTask*>(&task);
   if (!several) return task;
@@ -142,7 +143,7 @@ class AnyPlanner final : public PlannerPolicy {
 
  private:
   std::unique_ptr<PlannerPolicy> planner_;
-  std::shared_ptr<Simulation> simulation_;  // until there is a planner to be bound to it
+  std::shared_ptr<Simulation> simulation_;  // until it can be passed to planner_
 };
 
 }  // namespace

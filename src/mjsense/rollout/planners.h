@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
-// Policy "planner": for every task the planner that can do it.
+// Registry of planners by task type, for the policy "planner".
 
 #include <functional>
 #include <memory>
@@ -13,17 +13,18 @@ namespace mjsense {
 
 using PlannerFactory = std::function<std::unique_ptr<PlannerPolicy>()>;
 
-// From here on policy "planner" does tasks of this type (Task::type()) so. Throws ValueError for a
-// type that has a planner, or none. Any thread may call it.
+// Makes policy "planner" use this factory for tasks of this type (Task::type()). Throws ValueError
+// for an empty type or one that has a planner. Thread-safe.
 void register_planner(std::string task_type, PlannerFactory make);
-// For the task's type; for any other task with a GraspScene the planner that picks. Throws
-// ValueError for a task that none can do.
+// Planner for the task's type, or the picking planner for any other task with a GraspScene. Throws
+// ValueError if there is neither.
 std::unique_ptr<PlannerPolicy> make_planner(const Task& task);
 
-// Becomes, at initialize(), what make_planner() makes for the task.
+// Policy that creates its planner with make_planner() in initialize().
 std::unique_ptr<Policy> make_any_planner();
-// Picks from above in five legs that are the same in every episode, where something can be taken so: what is easiest to
-// learn from.
+// Policy that picks from above in five phases that are the same in every episode, which makes the
+// data easy to learn from. Episodes in which nothing can be picked from above use the general
+// planner.
 std::unique_ptr<Policy> make_top_down_planner();
 
 }  // namespace mjsense

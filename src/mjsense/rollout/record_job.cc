@@ -58,7 +58,7 @@ class RecordJob {
       const int level = stop ? stop->load() : 0;
       if (level >= 2) abandon();
       const bool started = level == 0 && start_episodes();
-      if (running_ == 0 && started) continue;  // all of them ended where they began
+      if (running_ == 0 && started) continue;  // all of them ended at their first observation
       if (running_ == 0) break;
       rollout_.act();
       rollout_.step();
@@ -87,7 +87,8 @@ class RecordJob {
   }
 
  private:
-  // No more worlds than episodes, and the robot's own name: recordings know each other by it.
+  // Limits the number of worlds to that of the episodes and replaces the robot by its own name, by
+  // which recordings identify it.
   static RecordJobCfg checked(RecordJobCfg cfg) {
     check_fields(cfg, "");
     if (!cfg.rollout.use_sensors)
@@ -107,8 +108,8 @@ class RecordJob {
     summary_.recording_s += since(begun);
   }
 
-  // Free worlds take the next attempts, as many as are still needed if all that run succeed. Whether
-  // there were any.
+  // Starts the next attempts in free worlds, as many as are needed if all running ones succeed.
+  // Returns false if none was started.
   bool start_episodes() {
     worlds_.clear();
     episodes_.clear();
@@ -132,7 +133,7 @@ class RecordJob {
     return true;
   }
 
-  // Records the observation that world w shows, and ends its episode where it ends.
+  // Records the current observation of world w and ends its episode if it is over.
   void observe(int w) {
     if (!rollout_.fault(w).empty()) return end(w, false, rollout_.fault(w));
     const Evaluation& now = rollout_.evaluation(w);
@@ -148,8 +149,8 @@ class RecordJob {
     end(w, now.success, outcome(w, now));
   }
 
-  // "horizon reached: the object is not lifted", "the policy gave up: found no way (256 grasps:
-  // 200 out of reach; ...)".
+  // Outcome of an attempt: "horizon reached: the object is not lifted", "the policy gave up: found
+  // no way (256 grasps: 200 out of reach; ...)".
   std::string outcome(int w, const Evaluation& now) {
     if (now.success) return "success";
     const Action* last = rollout_.task().last_action(w);
@@ -170,13 +171,13 @@ class RecordJob {
         recorder_.discard_episode(w, outcome);
       }
     });
-    // Attempts that fail make what is kept dearer.
+    // The steps of failed attempts count towards the cost of a kept episode.
     ended_steps_ += std::max(0, lengths_[w] - 1);
     ++(success ? progress_.succeeded : progress_.failed);
     progress_.mean_length = static_cast<double>(ended_steps_) /
                             std::max(1, cfg_.keep_failures ? progress_.succeeded + progress_.failed
                                                            : progress_.succeeded);
-    // Counted without the details of the episode, which planners write in parentheses.
+    // Failures are counted without episode details, which planners write in parentheses.
     if (!success) ++summary_.failures[outcome.substr(0, outcome.find(" ("))];
     summary_.lengths.push_back(lengths_[w]);
     rollout_.stop(w);
@@ -208,14 +209,14 @@ class RecordJob {
   Recorder recorder_;
   RecordProgress progress_;
   RecordSummary summary_;
-  std::vector<int> lengths_;  // observations of each world's episode so far
+  std::vector<int> lengths_;  // observations recorded of each world's current episode
   std::vector<int> worlds_;
   std::vector<std::int64_t> episodes_;
   std::int64_t next_ = 0;
   std::int64_t ended_steps_ = 0;
   std::int64_t max_attempts_;
   int running_ = 0;
-  int pictures_ = 0;  // of one observation
+  int pictures_ = 0;  // images per observation
 };
 
 }  // namespace

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
-// The main job: episodes of a task, played in B worlds, kept on disk.
+// Records episodes of a task, played in B worlds, to disk.
 
 #include <atomic>
 #include <cstdint>
@@ -49,26 +49,27 @@ void visit_fields(V& v, RecordJobCfg& c) {
   v.include(c.video);
 }
 
-// Worlds take attempts 0, 1, 2 ... as they become free. Which attempts are kept, and every byte of
-// them, depends on seed and number alone: not on the number of worlds, threads, or an interruption.
+// Progress of a recording. Worlds take attempts 0, 1, 2 ... as they become free. Which attempts are
+// kept, and every byte of them, depends only on the seed and the attempt's number, not on the
+// number of worlds, threads or interruptions.
 struct RecordProgress {
   int kept = 0, wanted = 0, running = 0;
   int succeeded = 0, failed = 0;  // attempts of this run
   std::int64_t steps = 0;         // control steps of this run, all worlds
   std::int64_t physics_steps = 0;
-  std::int64_t frames = 0;         // pictures recorded, all cameras
-  double seconds = 0;              // wall
-  double mean_length = 0;          // steps of a kept episode of this run
-  std::int64_t running_steps = 0;  // that the running attempts have taken
-  double seconds_left() const;     // NaN until an episode was kept
+  std::int64_t frames = 0;         // images recorded, all cameras
+  double seconds = 0;              // wall-clock time
+  double mean_length = 0;          // mean number of steps of this run per kept episode
+  std::int64_t running_steps = 0;  // steps that the running attempts have taken
+  double seconds_left() const;     // NaN until an episode is kept
 };
 
 struct RecordSummary {
   RecordProgress progress;
   bool interrupted = false;
-  bool enough = false;                  // all wanted episodes are there
-  std::map<std::string, int> failures;  // why attempts failed, and how often
-  std::vector<int> lengths;             // observations of each attempt that ended
+  bool enough = false;                  // all wanted episodes are kept
+  std::map<std::string, int> failures;  // number of failed attempts by reason
+  std::vector<int> lengths;             // number of observations of each ended attempt
   RolloutTimes times;
   double recording_s =
       0;  // wall seconds in the recorder: copying, and waiting for encoders and the disk
@@ -77,11 +78,11 @@ struct RecordSummary {
   std::vector<std::string> damage;  // see Recorder::damage()
 };
 
-// 0: go on. 1: start no more episodes, finish those that run. 2: abandon them, keep what is
-// finished.
+// 0: continue. 1: start no more episodes and finish the running ones. 2: abandon running episodes
+// and keep the finished ones.
 using StopFlag = std::atomic<int>;
 
-// Calls `progress` about ten times a second. Throws as Rollout and Recorder do.
+// Calls `progress` about ten times per second. Throws the errors of Rollout and Recorder.
 RecordSummary record_episodes(const RecordJobCfg& cfg,
                               const std::function<void(const RecordProgress&)>& progress = {},
                               const StopFlag* stop = nullptr);

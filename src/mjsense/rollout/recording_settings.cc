@@ -31,11 +31,12 @@ Json json_of(const FieldDecl& field, const void* object) {
   }
 }
 
-// Adds a value of any declared type, with what it consists of.
+// Adds a value of any declared type to the checksum, recursively.
 void add_value(Checksum& sum, const FieldType& type, const void* value) {
-  void* v = const_cast<void*>(value);  // the functions of a type serve reading and writing
+  // const_cast: the functions of a type are shared between reading and writing.
+  void* v = const_cast<void*>(value);
   const auto add_text = [&](std::string_view text) {
-    const std::size_t size = text.size();  // "ab", "c" is not "a", "bc"
+    const std::size_t size = text.size();  // separates "ab", "c" from "a", "bc"
     sum.add(&size, sizeof size);
     sum.add(text.data(), size);
   };
@@ -87,7 +88,7 @@ void add_value(Checksum& sum, const FieldType& type, const void* value) {
   }
 }
 
-// A checksum of each field of a structure that was read from a file.
+// Checksum of each field of a struct that was read from a file.
 template <Described T>
 Json checksums_of(const T& object) {
   Json sums = Json::object();

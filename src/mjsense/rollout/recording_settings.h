@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
-// What the data of a recording depend on, as JSON text: every field that declares it, what fields
-// become that leave it to the robot or the task, and checksums of the robot's and the scene's files
-// and of the user's code. A recording is resumed only with equal settings. The number of worlds and
-// threads is not among them.
+// Everything that the data of a recording depend on, as JSON text: each field that is declared to
+// affect the data, the resolved values of fields that default to the robot or the task, and
+// checksums of the robot's and the scene's files and of user code. A recording can only be resumed
+// with equal settings. The numbers of worlds and threads are not included.
 
 #include <string>
 
@@ -11,8 +11,8 @@
 
 namespace mjsense {
 
-// Throws ValueError where `job` resumes with a task, policy or scene of the caller's that does not
-// say what it depends on (RolloutCfg::code).
+// Throws ValueError if `job` resumes a recording with a user-defined task, policy or scene whose
+// dependencies are unknown (RolloutCfg::code).
 [[nodiscard]] std::string recording_settings(const RecordJobCfg& job, Rollout& rollout);
 
 }  // namespace mjsense

@@ -18,7 +18,7 @@
 namespace mjsense {
 namespace {
 
-// Things of one kind by name; `group` and `kind` are for messages: "tasks", "task".
+// Factories by name. `group` and `kind` are for messages: "tasks", "task".
 template <class Factory>
 class Registry {
  public:
@@ -87,10 +87,10 @@ Registry<TaskFactory>& tasks() {
   return all;
 }
 
-// Several tasks in the scene of the first.
+// Combines several tasks in the scene of the first one.
 std::unique_ptr<Task> any_of(std::string_view name, TaskCfg cfg) {
   const std::vector<std::string> parts = parts_of_task(name);
-  for (const std::string& part : parts) tasks().at(part);  // or its error
+  for (const std::string& part : parts) tasks().at(part);  // throws for unknown names
   if (cfg.scene.empty()) cfg.scene = default_scene(parts[0]);
   if (cfg.scene.empty() && !cfg.make_scene) {
     throw ValueError(fmt::format(

@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
-// The robots (robots/load_robot.h), tasks and policies that have a name: what the program's options
-// and Python's strings choose from. Yours join them by register_task() and register_policy(). Each
-// make throws KeyError with the nearest names.
+// Tasks and policies by name, for the program's options and for strings in Python (for robots see
+// robots/load_robot.h). Users add theirs with register_task() and register_policy(). Unknown names
+// throw KeyError with the nearest names.
 
 #include <functional>
 #include <memory>
@@ -19,10 +19,10 @@ namespace mjsense {
 using TaskFactory = std::function<std::unique_ptr<Task>(TaskCfg)>;
 using PolicyFactory = std::function<std::unique_ptr<Policy>()>;
 
-// Ours first, then yours in the order in which they came.
+// Built-in names first, then registered ones in the order of registration.
 std::vector<std::string> task_names();
 std::unique_ptr<Task> make_task(std::string_view name, TaskCfg cfg);
-// Throws ValueError for a name that is taken, or empty. Any thread may call it.
+// Throws ValueError for a name that is empty or in use. Thread-safe.
 void register_task(std::string name, TaskFactory make);
 
 std::vector<std::string> policy_names();

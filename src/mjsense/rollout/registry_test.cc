@@ -21,7 +21,7 @@ void expect_unknown(Make&& make, const char* nearest) {
   }
 }
 
-TEST(Registry, MakesWhatItNames) {
+TEST(Registry, CreatesEveryNamedTaskAndPolicy) {
   for (const std::string& robot : robot_names()) {
     for (const std::string& task : task_names()) {
       TaskCfg cfg;
@@ -33,7 +33,7 @@ TEST(Registry, MakesWhatItNames) {
   for (const std::string& policy : policy_names()) EXPECT_EQ(make_policy(policy)->name(), policy);
 }
 
-TEST(Registry, UnknownNamesAreErrorsWithTheNearest) {
+TEST(Registry, UnknownNamesThrowWithTheNearest) {
   expect_unknown([] { robot_cfg("frnka"); }, "did you mean 'franka'?");
   expect_unknown([] { make_task("pik", {}); }, "did you mean 'pick'?");
   expect_unknown([] { make_policy("plannr"); }, "did you mean 'planner'?");

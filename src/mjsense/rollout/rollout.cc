@@ -21,7 +21,7 @@ namespace {
 
 using Clock = std::chrono::steady_clock;
 
-constexpr int kDraws = 10;  // of a start, until one can be played
+constexpr int kDraws = 10;  // maximum draws of a start until one is playable
 
 double since(Clock::time_point start) {
   return std::chrono::duration<double>(Clock::now() - start).count();
@@ -60,7 +60,8 @@ TaskCfg task_cfg(const RolloutCfg& cfg) {
   return out;
 }
 
-// Whoever composes the suite may bring sensors of their own under the names of the task's.
+// Removes the task's sensors whose names are used by `others`: a user-composed suite may replace
+// them.
 void drop_of_task(SensorSuite& suite, std::span<const std::shared_ptr<Sensor>> others) {
   std::vector<std::string> kept;
   for (const std::string& name : suite.names()) {
@@ -74,7 +75,7 @@ void drop_of_task(SensorSuite& suite, std::span<const std::shared_ptr<Sensor>> o
 }  // namespace
 
 RolloutCfg resolved(RolloutCfg cfg) {
-  // A task of the user's brings its robot in its scene.
+  // A user-defined task may have its robot in its scene.
   if (cfg.robot == kTaskRobot) cfg.robot = cfg.make_task ? "" : default_robot(cfg.task);
   if (cfg.scene.empty() && !cfg.make_scene && !cfg.make_task)
     cfg.scene = default_scene(parts_of_task(cfg.task)[0]);
@@ -93,7 +94,7 @@ class Rollout::EachActive final : public WorldHooks {
   std::function<void(const World&)> body_;
 };
 
-// Some of the worlds, for tasks and policies.
+// A subset of the worlds, as seen by tasks and policies.
 class Rollout::Some final : public ActiveWorlds {
  public:
   Some(Rollout& rollout, std::span<const int> ids) : rollout_(rollout), ids_(ids) {}
@@ -184,7 +185,7 @@ void Rollout::make() {
   if (cfg_.made) cfg_.made(*this);
 }
 
-// Those of its file, then those that Python makes.
+// The sensors of the robot's file, then those created in Python.
 std::vector<std::shared_ptr<Sensor>> Rollout::robot_sensors() {
   std::vector<std::shared_ptr<Sensor>> sensors;
   for (const auto& cfg : task_->cfg().robot.sensors) {
@@ -215,7 +216,7 @@ void Rollout::for_each(std::span<const int> worlds, std::function<void(const Wor
 void Rollout::set_fault(int world, std::string text) {
   if (!active_[world] || !faults_[world].empty()) return;
   faults_[world] = std::move(text);
-  evaluations_[world] = {};  // what was judged before is not this step's
+  evaluations_[world] = {};  // discard the evaluation of the previous step
 }
 
 void Rollout::take_failures() {
@@ -259,7 +260,8 @@ void Rollout::start(std::span<const int> worlds, std::span<const std::int64_t> e
   finish_rows();
 }
 
-// The starts, fresh; those that cannot be played are drawn again, and after the last draw are faults.
+// Samples the starts and makes them fresh. Starts that cannot be played are drawn again; those that
+// still cannot after kDraws draws become faults.
 void Rollout::sample(std::span<const int> worlds, std::span<const std::int64_t> episodes) {
   std::vector<std::int64_t> of(num_worlds());
   for (std::size_t k = 0; k < worlds.size(); ++k) of[worlds[k]] = episodes[k];
@@ -277,7 +279,7 @@ void Rollout::sample(std::span<const int> worlds, std::span<const std::int64_t> 
   for (int w : left) set_fault(w, std::move(why[w]));
 }
 
-// Cameras that differ from episode to episode find their places.
+// Computes the poses of cameras that vary between episodes.
 void Rollout::place_cameras(std::span<const int> worlds) {
   if (!camera_system_->varies()) return;
   std::vector<std::string> why(num_worlds());
@@ -317,8 +319,8 @@ void Rollout::act() {
   times_.policy += since(begun);
 }
 
-// Applies the actions of these worlds and moves them. `answers`: the actions answer the observation
-// that there is.
+// Applies the actions of these worlds and advances them. `answers`: the actions answer the current
+// observation (false for the later steps of a chunk).
 void Rollout::move(std::span<const int> worlds, bool answers) {
   auto begun = Clock::now();
   if (answers) {
@@ -381,7 +383,8 @@ void Rollout::step_chunk(std::span<const Action> actions, bool stop_on_success) 
   finish_rows();
 }
 
-// A row that cannot be filled ends the episode of its world alone.
+// Runs `body`. If a row cannot be computed, only the episode of its world ends, and the result is
+// false.
 bool Rollout::guard_rows(const std::function<void()>& body) {
   try {
     body();
@@ -408,7 +411,8 @@ void Rollout::sense() {
   times_.sensing += since(begun) - spent_cast;
 }
 
-// Each world once an observation: a task may remember what it judged.
+// Evaluates each world exactly once per observation, because a task may keep state between
+// evaluations.
 void Rollout::evaluate(std::span<const int> worlds) {
   if (worlds.empty()) return;
   const auto begun = Clock::now();
@@ -422,7 +426,7 @@ void Rollout::evaluate(std::span<const int> worlds) {
   times_.sensing += since(begun);
 }
 
-// Rows that depend on the judgement, which is made after the sensors.
+// Updates rows that depend on the evaluation, which happens after the sensors.
 void Rollout::finish_rows() {
   for (int w : ids_) {
     if (evaluations_[w].terminal) blank_actions(suite_, w, !(*log_)[w].given);
@@ -450,7 +454,7 @@ double Rollout::cast_cost() const {
   return seconds;
 }
 
-// Threads that share the work on the rows of one step.
+// Number of threads that share the sensor work of one step.
 int Rollout::threads() const {
   return std::max(1, std::min<int>(simulation_->worlds().threads(), static_cast<int>(ids_.size())));
 }

@@ -1,19 +1,19 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
-// B worlds that play episodes of a task, in lock step: the loop under recording, gym environments
-// and benchmarks.
+// Plays episodes of a task in B worlds in lock step. This is the loop of recordings, gym
+// environments and benchmarks.
 //
 //   Rollout rollout(cfg);
 //   rollout.start(worlds, episodes);   observation 0 of these episodes is fresh
 //   while (...) {
 //     rollout.act();                   the policy's actions; or write rollout.action(w) yourself
-//     rollout.step();                  apply -> controllers -> physics -> sensors -> judgement
-//                                      or step_chunk(actions): several, sensors after the last
+//     rollout.step();                  apply -> controllers -> physics -> sensors -> evaluation
+//                                      or step_chunk(actions): steps, sensors after the last one
 //     rollout.suite(), rollout.evaluation(w), rollout.fault(w)
 //   }
 //
-// An episode is a function of (seed, number): it does not depend on B, on its world, on threads, or
-// on what ran beside it.
+// An episode is a function of (seed, number). It does not depend on B, on its world, on threads, or
+// on the episodes in other worlds.
 
 #include <array>
 #include <cstdint>
@@ -40,15 +40,15 @@ namespace mjsense {
 
 class Rollout;
 
-// What robots are drawn with: shapes of ours, real meshes of other packages, or these where there
-// are some.
+// Geometry with which robots are drawn: built-in primitive shapes, real meshes from other packages,
+// or real meshes if they are available ("auto").
 inline constexpr std::array<std::string_view, 3> kMeshes{"auto", "shapes", "real"};
 
-// A camera beside the robot that looks at what is in front of it. In a scene with its own robot it
-// stands at the origin until somebody places it.
+// A camera next to the robot that looks at the workspace in front of it. In a scene that contains
+// its own robot, it is at the origin until its pose is set.
 inline constexpr std::string_view kDefaultView = "default_view";
 
-// For RolloutCfg::robot: that of the task.
+// Value of RolloutCfg::robot for the task's default robot.
 inline constexpr std::string_view kTaskRobot = "auto";
 
 struct RolloutCfg {
@@ -72,24 +72,25 @@ struct RolloutCfg {
   bool terminate_upon_success = false;
   double perturb = 0;
   bool use_sensors = true;
-  // Make the task, the policy and the scene instead of those with a name; `task`, `policy` and
-  // `scene` above are then what people read.
+  // User-defined factories, used instead of a named task, policy or scene. `task`, `policy` and
+  // `scene` above are then only display names.
   TaskFactory make_task;
   PolicyFactory make_policy;
   std::function<SceneFileCfg()> make_scene;
-  // What these functions and `more_sensors` depend on: checksums of code and of the values that it
-  // uses, by name, for "task", "policy", "sensor 'x'" ... A recording is resumed only with the same.
+  // Dependencies of these functions and of `more_sensors`: checksums of code and of the values that
+  // it uses, by name, for "task", "policy", "sensor 'x'" ... A recording can only be resumed with
+  // equal ones.
   std::map<std::string, std::map<std::string, std::string>> code;
-  // The scene has a further camera sensor, kDefaultView, which the suite does not contain.
+  // Adds a camera sensor kDefaultView to the scene, which the suite does not contain.
   bool default_view = false;
   // Makes further sensors for the suite, recorded like the others. The rollout is being made: task,
   // policy, simulation, cameras and the suite so far are there.
   std::function<std::vector<std::shared_ptr<Sensor>>(Rollout&)> more_sensors;
-  // Likewise the robot's sensors that are written in Python; they come before the policy's.
+  // The same for the robot's sensors that are written in Python. They precede the policy's sensors.
   std::function<std::vector<std::shared_ptr<Sensor>>(Rollout&)> robot_sensors;
-  // Edits the suite last.
+  // Edits the suite after everything else.
   std::function<void(SensorSuite&)> edit_suite;
-  // Called when there is nothing but task and policy, and once everything is there.
+  // Called when only task and policy exist, and after construction.
   std::function<void(Rollout&)> making, made;
 };
 template <class V>
@@ -156,15 +157,15 @@ void visit_fields(V& v, RolloutCfg& c) {
       .hidden();
 }
 
-// With robot and scene by their names where they were left to the task.
+// Replaces robot and scene by their names if they were left to the task.
 RolloutCfg resolved(RolloutCfg cfg);
 
-// Where the time of steps went, wall seconds.
+// Time spent in steps, wall-clock seconds.
 struct RolloutTimes {
   double policy = 0;     // act(): planning, inverse kinematics, controllers
   double physics = 0;    // MuJoCo
-  double sensing = 0;    // rows
-  double rendering = 0;  // cameras and rays
+  double sensing = 0;    // rows of sensors
+  double rendering = 0;  // cameras and ray casting
   double reset = 0;      // start(): sampling, first plans, first observations
 };
 
@@ -172,7 +173,8 @@ class Rollout {
  public:
   // Throws KeyError for an unknown task, robot, policy or camera, ValueError for bad sizes.
   explicit Rollout(const RolloutCfg& cfg);
-  // Of a task and a policy (or null) that exist; robot, seed, horizon and noise are the task's own.
+  // Uses an existing task and policy (or null). Robot, seed, horizon and noise are those of the
+  // task.
   Rollout(RolloutCfg cfg, std::shared_ptr<Task> task, std::shared_ptr<Policy> policy);
   ~Rollout();
   Rollout(const Rollout&) = delete;
@@ -189,34 +191,35 @@ class Rollout {
   void for_each(std::span<const int> worlds, std::function<void(const World&)> body);
   const std::vector<RecordedCamera>& cameras() const { return cameras_; }
 
-  // What a recording says of this world's episode: the task's, and where a named camera system has
-  // put its cameras. JSON text.
+  // Description of this world's episode for a recording, JSON text: that of the task, and the
+  // camera poses if a named camera system is used.
   std::string obs_scene(int world) const;
 
-  // Stops all worlds; episodes started from here on are those of this seed.
+  // Stops all worlds. Episodes that start afterwards use this seed.
   void reseed(std::uint64_t seed);
-  // World worlds[k] plays episode episodes[k] from its start. Its faults are forgotten.
+  // Starts episode episodes[k] in world worlds[k] and clears its faults.
   void start(std::span<const int> worlds, std::span<const std::int64_t> episodes);
-  // This world plays nothing until it is started again; it stands still.
+  // Stops this world. It does not move until it is started again.
   void stop(int world) { active_[world] = false; }
   bool active(int world) const { return active_[world]; }
   std::int64_t episode(int world) const { return task_->episode(world); }
 
-  // The policy fills the actions of the active worlds.
+  // Lets the policy fill the actions of the active worlds.
   void act();
   Action& action(int world) { return actions_[world]; }
-  // One control step; then suite and evaluations of the active worlds are current.
+  // One control step. Updates the suite and the evaluations of the active worlds.
   void step();
-  // Control steps with these actions [steps, B], sensed after the last alone. A world stops early
-  // where its episode ends, or with its first success if `stop_on_success`; the evaluation is that
-  // of its last step, its reward the sum over all. Throws ValueError if there is no whole step.
+  // Control steps with these actions [steps, B]; sensors are computed only after the last one. A
+  // world stops early at the end of its episode or, with `stop_on_success`, at its first success.
+  // Its evaluation is that of its last step, with the sum of all rewards. Throws ValueError unless
+  // there is at least one whole step.
   void step_chunk(std::span<const Action> actions, bool stop_on_success = false);
 
   const Evaluation& evaluation(int world) const { return evaluations_[world]; }
   // Why this world's episode cannot go on: physics that diverged (MuJoCo's text), a row that could
   // not be filled. "" if it can. Its rows mean nothing until it is started again.
   const std::string& fault(int world) const { return faults_[world]; }
-  // The fault is a row that could not be filled: nothing of this episode may be kept.
+  // True if the fault is a row that could not be computed: the episode must not be kept.
   bool refused(int world) const { return refused_[world]; }
 
   const RolloutTimes& times() const { return times_; }

@@ -39,7 +39,7 @@ json row(Rollout& rollout, const std::string& name, int world = 0) {
   return json::parse(text.substr(0, text.find('\0')));
 }
 
-// Numbers of one stream.
+// Values of one stream in world 0.
 template <class T = double>
 std::vector<double> numbers(Rollout& rollout, const std::string& stream) {
   const auto row = rollout.suite().stream(stream).data.row<T>(0);
@@ -54,7 +54,7 @@ void start(Rollout& rollout, std::vector<int> worlds, std::vector<std::int64_t> 
   rollout.start(worlds, episodes);
 }
 
-TEST(Rollout, TheSuiteStandsInItsPublishedOrder) {
+TEST(Rollout, SuiteIsInThePublishedOrder) {
   Rollout rollout(blind());
   EXPECT_THAT(
       rollout.suite().names(),
@@ -66,7 +66,7 @@ TEST(Rollout, TheSuiteStandsInItsPublishedOrder) {
   EXPECT_EQ(rollout.suite().owner("grasp_pose"), "policy 'planner'");
 }
 
-TEST(Rollout, CamerasAreVideosAndImagePointsOfThoseThatGiveThem) {
+TEST(Rollout, CamerasHaveVideosAndImagePoints) {
   RolloutCfg cfg = blind();
   cfg.cameras.reset();
   cfg.width = 16;
@@ -93,7 +93,7 @@ TEST(Rollout, CamerasAreVideosAndImagePointsOfThoseThatGiveThem) {
 }
 
 // docs/observations.md shows these lines.
-TEST(Rollout, AFunctionOfAWorldIsASensor) {
+TEST(Rollout, FunctionSensor) {
   Rollout rollout(blind());
   start(rollout, {0}, {7});
   const Robot& robot = rollout.task().robot();
@@ -114,16 +114,17 @@ TEST(Rollout, CommandsAreInTheUnitOfTheirActuators) {
   for (const std::string name : {"commanded_action", "joint_pos"}) {
     EXPECT_EQ(unit(name + "/arm"), "rad");
     EXPECT_EQ(unit(name + "/gripper"), "0 open .. 255 closed");
-    // And of the dataset that a recording makes of them.
+    // The dataset that a recording writes has the same unit.
     EXPECT_EQ(text_of(rollout.suite().get("actions/" + name))->unit,
               "arm: rad; gripper: 0 open .. 255 closed");
   }
   EXPECT_EQ(unit("joint_pos_rel/arm"), "rad");
-  EXPECT_EQ(unit("joint_pos_rel/gripper"), "");  // one command, two joints: never measured
+  // One command but two joints, so it has no relative position.
+  EXPECT_EQ(unit("joint_pos_rel/gripper"), "");
   EXPECT_EQ(text_of(rollout.suite().get("actions/joint_pos_rel"))->unit, "arm: rad");
 }
 
-// Row t belongs to the action between the observations t-1 and t.
+// Row t describes the action between observations t-1 and t.
 TEST(Rollout, ActionsAreMeasuredFromTheObservationBefore) {
   Rollout rollout(blind());
   start(rollout, {0}, {7});
@@ -148,10 +149,10 @@ TEST(Rollout, ActionsAreMeasuredFromTheObservationBefore) {
     rollout.step();
     const auto target = numbers(rollout, "actions/joint_pos/arm");
     const auto relative = numbers(rollout, "actions/joint_pos_rel/arm");
-    EXPECT_FALSE(given(rollout, "joint_pos_rel", "gripper"));  // one command, two joints
+    EXPECT_FALSE(given(rollout, "joint_pos_rel", "gripper"));  // one command but two joints
     EXPECT_TRUE(given(rollout, "joint_pos_rel", "arm"));
     for (int i = 0; i < 7; ++i) EXPECT_NEAR(relative[i], target[i] - before[i], 1e-6);
-    // The target pose, reached from the leaf by the twist.
+    // The twist must lead from the leaf frame to the target pose.
     const auto twist = numbers(rollout, "actions/ee_twist/arm");
     const Pose reached =
         leaf * exp6({{twist[0], twist[1], twist[2]}, {twist[3], twist[4], twist[5]}});
@@ -166,7 +167,7 @@ TEST(Rollout, ActionsAreMeasuredFromTheObservationBefore) {
   }
 }
 
-TEST(Rollout, AtTheEndOnlyTheCommandIsLeft) {
+TEST(Rollout, OnlyTheCommandIsGivenAtTheEnd) {
   Rollout rollout(blind());
   start(rollout, {0}, {7});
   int actions = 0;
@@ -186,7 +187,7 @@ TEST(Rollout, AtTheEndOnlyTheCommandIsLeft) {
   EXPECT_EQ(row(rollout, "task_info")["episode_step"], actions);
 }
 
-TEST(Rollout, ATimeOutLeavesTheLastAction) {
+TEST(Rollout, TimeOutKeepsTheLastAction) {
   RolloutCfg cfg = blind();
   cfg.horizon = 3;
   Rollout rollout(cfg);
@@ -203,7 +204,7 @@ TEST(Rollout, ATimeOutLeavesTheLastAction) {
   }
 }
 
-TEST(Rollout, WhatThePolicySaysIsNumbers) {
+TEST(Rollout, PolicyVerdictIsNumeric) {
   RolloutCfg cfg = blind();
   cfg.policy.clear();
   Rollout rollout(cfg);
@@ -221,7 +222,7 @@ TEST(Rollout, WhatThePolicySaysIsNumbers) {
   EXPECT_THAT(numbers<float>(rollout, "actions/commanded_action/success"), ElementsAre(0));
   EXPECT_THAT(numbers(rollout, "actions/joint_pos/arm"),
               ElementsAre(0.1, -0.7, 0, -2.3, 0, 1.6, 0));
-  EXPECT_TRUE(given(rollout, "joint_pos", "gripper"));  // its controller holds something
+  EXPECT_TRUE(given(rollout, "joint_pos", "gripper"));  // its controller holds a position
 
   const auto& target = rollout.suite().stream("actions/joint_pos/gripper").spec;
   EXPECT_EQ(target.low, 0);
@@ -232,7 +233,7 @@ TEST(Rollout, WhatThePolicySaysIsNumbers) {
   EXPECT_EQ(rollout.suite().stream("actions/ee_pose/arm").spec.frame, "body robot_0/base");
 }
 
-// FNV-1a of every row that a world shows.
+// FNV-1a hash of all rows of a world.
 std::uint64_t hash(Rollout& rollout, int world) {
   std::uint64_t h = 1469598103934665603ull;
   for (const Field* field : rollout.suite().streams()) {
@@ -243,9 +244,9 @@ std::uint64_t hash(Rollout& rollout, int world) {
   return h;
 }
 
-// Hashes of the first observations of episodes 0 .. 4, played as worlds become free.
+// Hashes of the first observations of episodes 0 .. 4, played in worlds as they become free.
 std::map<std::int64_t, std::vector<std::uint64_t>> play(RolloutCfg cfg) {
-  cfg.more_sensors = [](Rollout&) {  // one with noise
+  cfg.more_sensors = [](Rollout&) {  // a sensor with noise
     return std::vector<std::shared_ptr<Sensor>>{std::make_shared<FunctionSensor<double>>(
         "noise", SensorSpec{}, [](const World& world, std::span<double> row) {
           row[0] = world.rng(stream_of("noise")).uniform();
@@ -278,7 +279,7 @@ std::map<std::int64_t, std::vector<std::uint64_t>> play(RolloutCfg cfg) {
   }
 }
 
-TEST(Rollout, AnEpisodeIsTheSameInAnyWorldAtAnyThreadCount) {
+TEST(Rollout, EpisodesDoNotDependOnWorldOrThreads) {
   const auto alone = play(blind(1, 1));
   EXPECT_EQ(alone.size(), 5u);
   EXPECT_NE(alone.at(0)[3], alone.at(1)[3]);
@@ -287,7 +288,7 @@ TEST(Rollout, AnEpisodeIsTheSameInAnyWorldAtAnyThreadCount) {
   EXPECT_EQ(play(blind(5, 5)), alone);
 }
 
-TEST(Rollout, AStepAllocatesNothing) {
+TEST(Rollout, StepDoesNotAllocate) {
   Rollout rollout(blind(3, 2));
   start(rollout, {0, 1, 2}, {0, 1, 2});
   const auto run = [&](int steps) {
@@ -302,7 +303,7 @@ TEST(Rollout, AStepAllocatesNothing) {
   EXPECT_EQ(count.since(), 0);
 }
 
-TEST(Rollout, AWorldThatDivergesIsAloneInIt) {
+TEST(Rollout, DivergingWorldDoesNotAffectOthers) {
   const auto run = [](bool poison) {
     Rollout rollout(blind(2, 2));
     start(rollout, {0, 1}, {0, 1});
@@ -316,7 +317,7 @@ TEST(Rollout, AWorldThatDivergesIsAloneInIt) {
     }
     if (poison) {
       EXPECT_THAT(rollout.fault(1), HasSubstr("MuJoCo"));
-      start(rollout, {1}, {1});  // and it can begin again
+      start(rollout, {1}, {1});  // and it can start again
       EXPECT_EQ(rollout.fault(1), "");
       rollout.act();
       rollout.step();
@@ -331,7 +332,7 @@ TEST(Rollout, AWorldThatDivergesIsAloneInIt) {
   EXPECT_EQ(run(true), run(false));
 }
 
-TEST(Rollout, ARowThatDoesNotFitEndsItsEpisodeAlone) {
+TEST(Rollout, RowThatDoesNotFitEndsOnlyItsEpisode) {
   Rollout rollout(blind(2));
   rollout.suite().add(std::make_shared<JsonFunctionSensor>(
       "notes", 16, "", [&](const World& world, JsonWriter& json) {
@@ -355,7 +356,7 @@ TEST(Rollout, ARowThatDoesNotFitEndsItsEpisodeAlone) {
   EXPECT_EQ(row(rollout, "task_info", 0)["episode_step"], 5);
 }
 
-// Fills its rows in one go, but for two worlds at one step.
+// Computes the rows of all worlds in one call, and fails for two of them at one step.
 struct Batch final : Sensor {
   explicit Batch(const Task& task) : Sensor("batch"), task(task) {}
   std::string_view kind() const override { return "batch"; }
@@ -378,7 +379,7 @@ struct Batch final : Sensor {
   std::vector<int> computed;
 };
 
-TEST(Rollout, RowsThatCannotBeFilledEndTheirEpisodesAlone) {
+TEST(Rollout, FailingRowsEndOnlyTheirEpisodes) {
   RolloutCfg cfg = blind(3);
   std::shared_ptr<Batch> batch;
   cfg.more_sensors = [&](Rollout& rollout) {
@@ -399,7 +400,7 @@ TEST(Rollout, RowsThatCannotBeFilledEndTheirEpisodesAlone) {
   EXPECT_THAT(batch->computed, ElementsAre(3, 5, 3));  // no row was computed twice
 }
 
-TEST(Rollout, WrongNamesAndNumbersAreOneClearLine) {
+TEST(Rollout, WrongNamesAndNumbersThrow) {
   const auto error = [](auto change) -> std::string {
     RolloutCfg cfg = blind();
     change(cfg);

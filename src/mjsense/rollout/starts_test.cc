@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Starts of many episodes, and nothing of them: no object begins inside another.
+// Samples starts of many episodes and plays none of them: no object may start inside another.
 #include <gtest/gtest.h>
 
 #include <numeric>
@@ -35,8 +35,8 @@ std::vector<std::string> faults(const char* task, const char* scene, int episode
   return found;
 }
 
-// Two large plates beside what is carried leave each other no room unless all three are drawn again.
-TEST(Starts, NothingBeginsInsideAnother) {
+// Two large plates next to the object to be moved fit only if all three are drawn again together.
+TEST(Starts, ObjectsDoNotOverlap) {
   EXPECT_EQ(faults("pick_and_place_color", "", 112), std::vector<std::string>());
 }
 

@@ -9,7 +9,7 @@ namespace {
 
 constexpr std::string_view kUsualRobot = "franka";
 
-// MolmoSpaces' configurations; 0: the robot's.
+// Values of MolmoSpaces' configurations; 0: the robot's value.
 struct Defaults {
   std::string_view task, robot;
   int horizon, policy_dt_ms, ctrl_dt_ms, sim_dt_ms;
@@ -20,7 +20,8 @@ constexpr Defaults kDefaults[] = {
     {"door_opening", "rby1", 400, 0, 0, 0},
     {"nav_to_obj", "rby1", 500, 200, 2, 2},
 };
-// Of the other tasks where the robot is commanded so seldom: 40 s; TaskCfg's 500 steps of 66 ms are 33 s.
+// For the other tasks with a robot of such a long control period: 400 steps of 100 ms are 40 s.
+// TaskCfg's 500 steps of 66 ms are 33 s.
 constexpr int kSeldomMs = 100, kSeldomHorizon = 400;
 
 constexpr std::string_view kAnyOf = "nav_to_obj+pick";

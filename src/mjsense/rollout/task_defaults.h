@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
-// What a task is played with where nobody says another: scene, robot, and the time where it is not the robot's.
+// Default scene, robot and periods of the built-in tasks.
 
 #include <string>
 #include <string_view>
@@ -10,18 +10,19 @@
 
 namespace mjsense {
 
-// The tasks that a name stands for: itself, or of "nav_to_obj+pick" the two. "multi_task" alone is
-// that.
+// Names of the tasks that a name denotes: itself, or the parts of "nav_to_obj+pick". "multi_task"
+// denotes "nav_to_obj+pick".
 std::vector<std::string> parts_of_task(std::string_view name);
-// The scene in which one of our tasks plays when nobody names another; "" for others.
+// Default scene of a built-in task; "" for other tasks.
 std::string_view default_scene(std::string_view task);
 
-// The robot that plays a task when nobody names another: the usual one if it can, else the first
-// that can.
+// Default robot of a task: the usual robot if it can perform the task, otherwise the first one that
+// can.
 std::string_view default_robot(std::string_view task);
 
-// Sets the horizon, and the periods where the task has its own, of one of our tasks, of
-// the first of several; leaves those of others. `cfg.robot` is there, its periods are in `cfg`.
+// Sets the horizon of a built-in task (of the first part of a combined one), and its periods if
+// they differ from the robot's. Other tasks are left unchanged. `cfg` must already contain the
+// robot and its periods.
 void set_task_defaults(std::string_view task, TaskCfg& cfg);
 
 }  // namespace mjsense

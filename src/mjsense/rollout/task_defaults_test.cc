@@ -14,7 +14,7 @@ int horizon(const char* task, const char* robot) {
   return cfg.horizon;
 }
 
-TEST(TaskDefaults, HorizonsAreMolmoSpaces) {
+TEST(TaskDefaults, HorizonsEqualMolmoSpaces) {
   EXPECT_EQ(horizon("pick", "franka"), 500);
   EXPECT_EQ(horizon("pick_and_place", "franka"), 500);
   EXPECT_EQ(horizon("pick", "rby1"), 400);

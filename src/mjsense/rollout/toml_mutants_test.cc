@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
-// Files of robots and scenes with a change: each is used as far as the planner's first plan, or
-// refused with a message, and neither crashes nor goes on for ever. Every mutant runs in a child
-// process with limits on its time.
+// Mutated robot and scene files. Each must either work up to the planner's first plan or be
+// rejected with a message; it must neither crash nor hang. Every mutant runs in a child process
+// with time limits.
 //
-// MJSENSE_MUTANTS=3300: as many random mutants, and every removed line of the scenes too.
+// MJSENSE_MUTANTS=3300 runs that many random mutants, and every removed line of the scenes too.
 
 #include <fmt/format.h>
 #include <gtest/gtest.h>
@@ -31,15 +31,15 @@ namespace {
 
 constexpr DataFolder kRobots{"robot", "robots/", "/robot.toml"};
 constexpr DataFolder kScenes{"scene", "scenes/", "/scene.toml", true};
-constexpr rlim_t kProcessorSeconds = 30;  // of a mutant; the whole files take 1 s
-constexpr unsigned kSeconds = 300;        // of the clock, beside much other work
+constexpr rlim_t kProcessorSeconds = 30;  // CPU time per mutant; the unchanged files take 1 s
+constexpr unsigned kSeconds = 300;        // wall-clock time, on a busy machine
 
 int random_mutants() {
   const char* value = std::getenv("MJSENSE_MUTANTS");
   return value ? std::atoi(value) : 0;
 }
 
-// A task in which the robot plays, and the planner's first plan.
+// Loads a task with the robot and computes the planner's first plan.
 void use(TaskCfg cfg, bool plan) {
   set_task_defaults("pick", cfg);
   const std::unique_ptr<Task> task = make_task("pick", cfg);
@@ -57,7 +57,8 @@ void use(TaskCfg cfg, bool plan) {
   policy->reset(world);
 }
 
-// "" if `action` returns or throws an Error with a message, else what happened instead.
+// "" if `action` returns or throws an Error with a message; otherwise a description of what
+// happened.
 std::string outcome(const std::function<void()>& action) {
   const pid_t child = fork();
   if (child == 0) {
@@ -126,7 +127,7 @@ bool says_something(const std::string& line) { return line != "\n" && !line.star
 
 class RobotMutants : public ::testing::TestWithParam<std::string> {};
 
-TEST_P(RobotMutants, EveryRemovedLineEnds) {
+TEST_P(RobotMutants, RemovedLinesNeitherCrashNorHang) {
   const DataFile file = kRobots.find(GetParam());
   const std::vector<std::string> lines = lines_of(file.text);
   ASSERT_EQ(used_robot(file.text, file.path, true), "");
@@ -139,8 +140,8 @@ TEST_P(RobotMutants, EveryRemovedLineEnds) {
 INSTANTIATE_TEST_SUITE_P(Robots, RobotMutants, ::testing::ValuesIn(robot_names()),
                          [](const auto& info) { return info.param; });
 
-// Models that stand beside the file are not found from the copy: that is one of the faults.
-TEST(SceneMutants, RemovedLinesEnd) {
+// Models referenced relative to the file are not found from the copy. That is one of the faults.
+TEST(SceneMutants, RemovedLinesNeitherCrashNorHang) {
   const mjsense::testing::TempDir folder;
   const std::filesystem::path copy = folder.path / "scene.toml";
   const std::size_t stride = random_mutants() > 0 ? 1 : 40;
@@ -156,7 +157,7 @@ TEST(SceneMutants, RemovedLinesEnd) {
   }
 }
 
-// A line twice, two lines exchanged, a number or a letter that is another.
+// Duplicates a line, swaps two lines, or changes a digit or a letter.
 std::string mutate(std::vector<std::string> lines, Rng& rng) {
   const auto draw = [&](std::size_t n) { return rng.below(static_cast<std::uint32_t>(n)); };
   const std::size_t changes = 1 + draw(3);
@@ -190,7 +191,7 @@ std::string mutate(std::vector<std::string> lines, Rng& rng) {
   return joined(lines);
 }
 
-TEST(RandomRobotMutants, End) {
+TEST(RandomRobotMutants, NeitherCrashNorHang) {
   const std::vector<std::string> names = robot_names();
   const int mutants = random_mutants() > 0 ? random_mutants() : 40;
   for (int i = 0; i < mutants; ++i) {

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
-// Data of a model in which configurations are tried, beside those of the worlds.
+// Pool of mjData in which configurations are evaluated without touching the worlds.
 
 #include <mujoco/mujoco.h>
 
@@ -10,8 +10,9 @@
 
 namespace mjsense {
 
-// Lends each to one caller at a time; safe for any thread. Made when first wanted, and kept for the next caller, who
-// finds it as the last one left it. It outlives what it lends.
+// Lends each mjData to one caller at a time. Thread-safe. An mjData is created when needed and
+// reused by later callers, who find it as the previous one left it. The pool must outlive all
+// loans.
 class ScratchData {
  public:
   struct GiveBack {
@@ -24,7 +25,7 @@ class ScratchData {
   ~ScratchData();
   ScratchData(const ScratchData&) = delete;
   ScratchData& operator=(const ScratchData&) = delete;
-  // Throws RuntimeError where there is no memory for it.
+  // Throws RuntimeError if the memory cannot be allocated.
   Loan borrow();
 
  private:

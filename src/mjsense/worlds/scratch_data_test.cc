@@ -20,7 +20,7 @@ std::unique_ptr<mjModel, decltype(&mj_deleteModel)> slide() {
   return {model, mj_deleteModel};
 }
 
-TEST(ScratchData, LendsEachToOneCallerAndAgainToTheNext) {
+TEST(ScratchData, LendsToOneCallerAtATimeAndReuses) {
   const auto model = slide();
   ScratchData scratch(model.get());
   std::set<mjData*> seen;
@@ -37,7 +37,7 @@ TEST(ScratchData, LendsEachToOneCallerAndAgainToTheNext) {
   EXPECT_EQ(c->qpos[0], 0);
 }
 
-TEST(ScratchData, NoTwoThreadsHaveTheSame) {
+TEST(ScratchData, ThreadsNeverShareData) {
   const auto model = slide();
   ScratchData scratch(model.get());
   ThreadPool pool(4);

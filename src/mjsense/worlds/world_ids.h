@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
-// Which worlds a call is about.
+// Selection of the worlds that a call applies to.
 
 #include <concepts>
 #include <span>
@@ -10,8 +10,8 @@ namespace mjsense {
 struct AllWorlds {};
 inline constexpr AllWorlds all_worlds;
 
-// `all_worlds`, or a list of ids in any order, which may be empty: no world. Made of whatever is a
-// span of ints; the caller's list must live as long as the call.
+// `all_worlds`, or a list of ids in any order; an empty list selects no world. Converts from
+// anything that converts to a span of ints. The caller's list must outlive the call.
 class WorldIds {
  public:
   WorldIds(AllWorlds) : all_(true) {}

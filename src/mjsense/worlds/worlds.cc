@@ -23,8 +23,8 @@
 namespace mjsense {
 namespace {
 
-// MuJoCo's pool is not instrumented: these tell the thread sanitiser what its atomics order.
-// Nothing in other builds.
+// MuJoCo's thread pool is not instrumented. These functions tell the thread sanitizer which
+// accesses its atomics order. They do nothing in other builds.
 void orders_before([[maybe_unused]] void* event) {
 #ifdef __SANITIZE_THREAD__
   __tsan_release(event);
@@ -36,7 +36,7 @@ void ordered_after([[maybe_unused]] void* event) {
 #endif
 }
 
-// One call of mjb_apply with that order made visible.
+// Calls mjb_apply and makes its ordering visible to the thread sanitizer.
 void apply_ordered(mjBatch* batch, const int* ids, int n, mjfBatchFunc run, void* call, int save) {
   orders_before(call);
   mjb_apply(batch, ids, n, run, call, save);
@@ -46,7 +46,7 @@ void apply_ordered(mjBatch* batch, const int* ids, int n, mjfBatchFunc run, void
 struct Component {
   std::string_view name;
   int bit;
-  int width;  // columns of one element; 0: scalar elements, one column each
+  int width;  // columns per element; 0: scalar elements, one column each
 };
 constexpr Component kComponents[] = {{"time", mjSTATE_TIME, 0},
                                      {"qpos", mjSTATE_QPOS, 0},
@@ -61,14 +61,15 @@ constexpr Component kComponents[] = {{"time", mjSTATE_TIME, 0},
                                      {"qacc_warmstart", mjSTATE_WARMSTART, 0},
                                      {"userdata", mjSTATE_USERDATA, 0}};
 
-// Warnings after which the numbers of a world mean nothing. A bad control is one: MuJoCo would
-// silently use zeros.
-constexpr int kBadState = mjNWARNING;  // not a warning of MuJoCo's: written state is no number
+// Warnings after which the state of a world is invalid. A bad control is one of them, because
+// MuJoCo would silently replace it by zeros.
+// Not one of MuJoCo's warnings: the state that was written contains NaN or infinity.
+constexpr int kBadState = mjNWARNING;
 constexpr int kFatalWarnings[] = {mjWARN_BADQPOS, mjWARN_BADQVEL, mjWARN_BADQACC, mjWARN_BADCTRL};
 
-// Whether a step may be mj_step taken apart, so that it starts from stages that are there already
-// and leaves out what nobody reads. Otherwise it is mj_step whole: a callback or a plugin may count
-// how often it is asked, MuJoCo's own delays and histories take sensors at every substep, and
+// Whether mj_step may be split into stages, so that a step starts from stages that are already
+// computed and skips those that are not read. Otherwise mj_step is called as a whole: callbacks and
+// plugins may count their calls, MuJoCo's delays and histories sample sensors at every substep, and
 // sleep, IPC and the discrete integrator do more than the stages.
 bool can_split_step(const mjModel* m) {
   const int whole = mjENBL_SLEEP | mjENBL_IPC | mjENBL_SPECULATIVE | mjENBL_FWDINV;
@@ -78,9 +79,9 @@ bool can_split_step(const mjModel* m) {
          m->nhistory == 0 && m->nplugin == 0;
 }
 
-// mj_forward up to velocities; without `sensors` MuJoCo's own sensors keep their old values. Unlike
-// in mj_forward, energies come before the sensors that report them: e_kinetic is a sensor of the
-// position stage, and with <flag energy="enable"/> MuJoCo's has the energy of the forward before.
+// mj_forward up to the velocity stage. Without `sensors`, MuJoCo's own sensors keep their old
+// values. Unlike in mj_forward, energies are computed before the sensors that report them: with
+// <flag energy="enable"/>, MuJoCo's e_kinetic reports the energy of the previous forward.
 void position_and_velocity(const mjModel* m, mjData* d, bool sensors) {
   const bool energy = m->opt.enableflags & mjENBL_ENERGY;
   mj_fwdPosition(m, d);
@@ -94,20 +95,20 @@ void position_and_velocity(const mjModel* m, mjData* d, bool sensors) {
   if (sensors) mj_sensorVel(m, d);
 }
 
-// The state, and what MuJoCo counts.
+// Copies the state and MuJoCo's counters.
 void carry(const mjModel* m, const mjData* from, mjData* to) {
   mj_copyState(m, from, to, mjSTATE_INTEGRATION);
   std::copy_n(from->warning, mjNWARNING, to->warning);
   std::copy_n(from->timer, mjNTIMER, to->timer);
 }
 
-// MuJoCo warns of a bad control when it uses it: forces made with one are not to be reused.
+// MuJoCo warns about a bad control when it uses it. Forces computed with one must not be reused.
 bool bad_control(const mjModel* m, const mjData* d) {
   return std::any_of(d->ctrl, d->ctrl + m->nu, [](mjtNum x) { return mju_isBad(x); });
 }
 
-// mj_step from the stage that is there. MuJoCo's sensors are left out: nobody sees them between the
-// stages before the integration and those after it.
+// mj_step from the stage that is already computed. MuJoCo's sensors are skipped, because they
+// cannot be read between the stages before the integration and those after it.
 void step_from(mjtStage stage, const mjModel* m, mjData* d) {
   if (stage < mjSTAGE_VEL) position_and_velocity(m, d, false);
   if (stage < mjSTAGE_ACC) mj_forwardSkip(m, d, mjSTAGE_VEL, 1);
@@ -122,11 +123,12 @@ void step_from(mjtStage stage, const mjModel* m, mjData* d) {
   }
 }
 
-// The name of the first component of a state that holds NaN or infinity; "" if none does.
+// Name of the first state component that contains NaN or infinity; "" if there is none.
 std::string_view bad_component(mjBatch* batch, int w) {
   const auto size = static_cast<std::size_t>(mjb_nstate(batch));
   const mjtNum* row = mjb_state(batch) + w * size;
-  // A sum of zeros is none if a term is bad; such states are rare and looked at twice.
+  // The sum of zero multiples is 0 unless a term is NaN or infinite. Only then the components are
+  // searched.
   mjtNum sum = 0;
   for (std::size_t i = 0; i < size; ++i) sum += row[i] * 0;
   if (sum == 0) return "";
@@ -140,8 +142,8 @@ std::string_view bad_component(mjBatch* batch, int w) {
   return "";
 }
 
-// A world is one mjData and three copies of its state: asked for too many, MuJoCo would end the
-// program, or the system would.
+// Throws if the memory is insufficient. A world needs one mjData and three copies of its state. If
+// allocation failed later, MuJoCo or the system would terminate the program.
 void check_memory(const mjModel* m, int num_worlds) {
   mjData* d = nullptr;
   try {
@@ -163,13 +165,13 @@ void check_memory(const mjModel* m, int num_worlds) {
 
 }  // namespace
 
-// The warnings that a world had before, to see which came.
+// Snapshot of a world's warning counts, used to detect new warnings.
 class Worlds::Warnings {
  public:
   explicit Warnings(const mjData* d) : d_(d) {
     for (int i = 0; i < kNum; ++i) before_[i] = d->warning[kFatalWarnings[i]].number;
   }
-  // The first fatal one since, -1 if none.
+  // The first fatal warning since then; -1 if there is none.
   int fatal() const {
     for (int i = 0; i < kNum; ++i) {
       if (d_->warning[kFatalWarnings[i]].number > before_[i]) return kFatalWarnings[i];
@@ -197,8 +199,9 @@ Worlds::Worlds(const mjModel* model, int num_worlds, int threads) : Worlds() {
   config.nthread = threads > 0 ? threads : available_cpus();
   config.persistent = 1;
   char error[1024] = "";
-  // A byte for every box around triangles, for viewers that show which boxes were looked at: cleared
-  // at every substep, 0.4 MB a world for a Go1 with its meshes. Nobody sees ours. The batch copies.
+  // bvactive fills one byte per bounding box of a mesh, for viewers that show which boxes were
+  // tested. It is cleared at every substep and takes 0.4 MB per world for a Go1 with its meshes.
+  // Nothing here reads it. The batch copies the model.
   mjModel unmarked = *model;
   unmarked.vis.global.bvactive = 0;
   batch_ = call_mujoco(mjb_makeBatch, &unmarked, num_worlds, &config, error, sizeof error);
@@ -225,7 +228,8 @@ Worlds::Worlds(const mjModel* model, int num_worlds, int threads) : Worlds() {
 }
 
 Worlds::~Worlds() {
-  if (forget_owner(this)) return;  // MuJoCo's pool would wait for threads that are not here
+  // MuJoCo's pool would wait for threads that do not exist after a fork.
+  if (forget_owner(this)) return;
   mjb_deleteBatch(batch_);
   for (Workbench& bench : workbenches_) mj_deleteData(bench.data);
 }
@@ -358,7 +362,7 @@ bool Worlds::same_columns(int w, std::size_t begin, std::size_t end) const {
                      (end - begin) * sizeof(mjtNum)) == 0;
 }
 
-// True if neither the model nor what positions and velocities follow from was written since.
+// True if neither the model nor any state that positions and velocities depend on was written.
 bool Worlds::same_state(int w) const {
   return derived_[w].model_version == model_version_ && same_columns(w, 0, ctrl_begin_) &&
          same_columns(w, ctrl_end_, num_state_);
@@ -372,10 +376,10 @@ void Worlds::remember(const mjModel* m, const mjData* d, int w) {
   derived_[w].behind = false;
 }
 
-// Derived fields up to `stage`, MuJoCo's sensors among them, belong to the state.
+// Computes derived fields, MuJoCo's sensors included, up to `stage`.
 void Worlds::bring(const mjModel* m, mjData* d, int w, mjtStage stage) {
   mjtStage& now = derived_[w].stage;
-  if (stage == mjSTAGE_POS) stage = mjSTAGE_VEL;  // the next step wants both
+  if (stage == mjSTAGE_POS) stage = mjSTAGE_VEL;  // the next step needs both
   if (now < mjSTAGE_VEL && now < stage) {
     position_and_velocity(m, d, true);
     now = mjSTAGE_VEL;
@@ -386,8 +390,8 @@ void Worlds::bring(const mjModel* m, mjData* d, int w, mjtStage stage) {
   }
 }
 
-// The same some time after the state came about. Controls written meanwhile take effect at the next
-// step: the forces that are measured are still those of the old ones.
+// The same, later than the step that reached the state. Controls written in the meantime take
+// effect at the next step, so forces are still computed with the old controls.
 void Worlds::bring_late(const mjModel* m, mjData* d, int w, mjtStage stage) {
   if (derived_[w].stage >= stage) return;
   constexpr int kControls =
@@ -404,12 +408,13 @@ bool Worlds::healthy(int w, const Warnings& warnings) {
   return diverged_[w] == 0;
 }
 
-// Advances one world by call.substeps and leaves it as fresh as somebody reads it. False if it
+// Advances one world by call.substeps and computes the stages that are read. Returns false if it
 // diverged.
 //
-// Positions and velocities of a state are computed once, whether a sensor or the next substep wants
-// them first. So is the constraint solve as long as the controls stay what they were: within a
-// control step, and over its end if nobody wrote others. A fresh force costs at most one solve a
+// Positions and velocities are computed once per state, whether a sensor or the next substep needs
+// them first. The same holds for the constraint solve while the controls are unchanged: within a
+// control step, and beyond its end if no new controls are written. A fresh force therefore costs at
+// most one solve per control step.
 // control step.
 bool Worlds::step_world(const mjModel* m, mjData* d, int w, const Call& call) {
   mjtStage& stage = derived_[w].stage;
@@ -436,7 +441,7 @@ bool Worlds::step_whole(const mjModel* m, mjData* d, int w, const Call& call) {
     if (control_every > 0 && k % control_every == 0)
       stage = std::min(stage, call.hooks->control(view(m, d, w), k / control_every));
     const mjtStage from = stage;
-    stage = mjSTAGE_NONE;  // also if MuJoCo jumps out of the step
+    stage = mjSTAGE_NONE;  // also if a MuJoCo error jumps out of the step
     if (split) {
       step_from(from, m, d);
     } else {
@@ -457,10 +462,10 @@ bool Worlds::step_whole(const mjModel* m, mjData* d, int w, const Call& call) {
   return healthy(w, warnings);
 }
 
-// A world that starts from its state alone and leaves nothing else: it is stepped in an mjData that
-// the thread's worlds share and that stays in its cache. A hundred kilobytes for each of many worlds
-// do not, which costs a tenth of a step of a Go1 (bench/physics.py: MuJoCo's batch with and without
-// `persistent`).
+// Steps a world that has no valid stages and whose derived fields are not read. It uses an mjData
+// that is shared by the thread's worlds and stays in its cache. The mjData of many worlds, a
+// hundred kilobytes each, would not, which costs a tenth of a step of a Go1 (bench/physics.py:
+// MuJoCo's batch with and without `persistent`).
 bool Worlds::step_unseen(const mjModel* m, mjData* d, int w, const Call& call) {
   const int substeps = call.substeps;
   Workbench* bench = nullptr;
@@ -469,7 +474,8 @@ bool Worlds::step_unseen(const mjModel* m, mjData* d, int w, const Call& call) {
     bench = &each;
     break;
   }
-  if (!bench) return step_whole(m, d, w, call);  // an error of MuJoCo in this call left one behind
+  // A MuJoCo error in this call left one marked as taken.
+  if (!bench) return step_whole(m, d, w, call);
   mjData* s = bench->data;
   carry(m, d, s);
   const Warnings warnings(s);
@@ -495,11 +501,11 @@ void Worlds::run_world(const mjModel* m, mjData* d, int w, const Call& call) {
   Derived& derived = derived_[w];
   switch (call.op) {
     case Op::kStep:
-      if (!step_world(m, d, w, call)) return;  // apply() resets it
+      if (!step_world(m, d, w, call)) return;  // apply() resets the world
       break;
     case Op::kForward:
       if (!bad_component(batch_, w).empty()) {
-        diverged_[w] = kBadState + 1;  // apply() resets it
+        diverged_[w] = kBadState + 1;  // apply() resets the world
         return;
       }
       derived.stage = mjSTAGE_NONE;
@@ -544,13 +550,14 @@ void Worlds::run_world(const mjModel* m, mjData* d, int w, const Call& call) {
   call.hooks->refreshed(view(m, d, w));
 }
 
-// On one of MuJoCo's threads. A MuJoCo error jumps over this frame: it holds nothing to destroy.
+// Runs on MuJoCo's threads. A MuJoCo error jumps over this frame, so it must not hold objects with
+// destructors.
 void Worlds::run(const mjModel* m, mjData* d, int w, void* arg) {
   ordered_after(arg);
   const Call& call = *static_cast<const Call*>(arg);
   int before[mjNWARNING];
   for (int i = 0; i < mjNWARNING; ++i)
-    before[i] = call.op == Op::kReset ? 0 : d->warning[i].number;  // a reset begins with zeros
+    before[i] = call.op == Op::kReset ? 0 : d->warning[i].number;  // a reset starts counting at 0
   drop_warnings(true);
   try {
     call.self->run_world(m, d, w, call);
@@ -566,14 +573,14 @@ void Worlds::count_warnings(const mjData* d, int w, const int* before) {
   for (int i = 0; i < mjNWARNING; ++i) {
     const int now = d->warning[i].number;
     const int more =
-        now < before[i] ? now : now - before[i];  // MuJoCo's own reset begins with zeros
+        now < before[i] ? now : now - before[i];  // MuJoCo's own reset starts counting at 0
     if (more == 0) continue;
     warning_counts_[w][i] += more;
     if (!reported_[i]) warned_ = true;
   }
 }
 
-// The first warning of each kind, as a message of MuJoCo's.
+// Reports the first warning of each kind through MuJoCo's handler.
 void Worlds::report_warnings() {
   if (!warned_.exchange(false)) return;
   for (int i = 0; i < mjNWARNING; ++i) {
@@ -593,11 +600,11 @@ void Worlds::apply(WorldIds ids, Call call, bool save) {
         "there; make it after the fork, or start processes with 'spawn'");
   checked_ids(ids, ids_);
   if (call.op != Op::kVisit) failures_.clear();
-  if (ids_.empty()) return;  // MuJoCo would take it for all
+  if (ids_.empty()) return;  // MuJoCo would interpret an empty list as all worlds
   apply_ordered(batch_, ids_.data(), static_cast<int>(ids_.size()), run, &call, save ? 1 : 0);
-  drop_warnings(false);  // an error leaves it on
+  drop_warnings(false);  // an error leaves the flag set
   report_warnings();
-  for (Workbench& bench : workbenches_) {  // left behind by an error
+  for (Workbench& bench : workbenches_) {  // left as taken by an error
     if (bench.taken.exchange(false)) mj_resetData(model(), bench.data);
   }
 
@@ -614,7 +621,7 @@ void Worlds::apply(WorldIds ids, Call call, bool save) {
   if (first) std::rethrow_exception(first);
 }
 
-// Worlds that failed in this call, of which failures_ tells why.
+// Returns the worlds that failed in this call and appends the reasons to failures_.
 std::vector<int> Worlds::take_failures(Op op) {
   std::vector<int> failed;
   for (int w : ids_) {
@@ -632,7 +639,7 @@ std::vector<int> Worlds::take_failures(Op op) {
           fmt::format("MuJoCo: {} (at {:.4f} s)", mju_warningText(warning, stat.lastinfo), time(w));
     }
     if (op == Op::kVisit && mjb_status(batch_)[w]) {
-      // Nothing happened that could be undone: the reader is told.
+      // A read has no state change to undo: the error is passed to the caller.
       exceptions_[w] = std::make_exception_ptr(RuntimeError(fmt::format("world {}: {}", w, why)));
     } else {
       failures_.push_back({w, std::move(why)});
@@ -644,8 +651,8 @@ std::vector<int> Worlds::take_failures(Op op) {
   return failed;
 }
 
-// They are reset alone, each with the keyframe of its last reset; the others went on. Returns what
-// is to be said of one that fails even so.
+// Resets only these worlds, each with the keyframe of its last reset. Returns an error message if a
+// world fails even in the reset.
 std::string Worlds::reset_failed(std::vector<int> failed, Call call) {
   std::string helpless;
   std::ranges::stable_sort(failed, {}, [this](int w) { return reset_key_[w]; });

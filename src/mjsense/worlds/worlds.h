@@ -1,12 +1,12 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
-// B parallel worlds: a thin owner of MuJoCo's mjBatch (persistent, one mjData a world). Steps,
-// resets, clocks, and the promise that whoever looks at a world sees derived fields that belong to
-// its present state.
+// B parallel worlds in MuJoCo's mjBatch (persistent, one mjData per world): steps, resets, clocks,
+// and the guarantee that derived fields always belong to the current state when they are read.
 //
-// MuJoCo computes them in stages (mjtStage): positions, velocities, accelerations with the
-// constraint solve. A world remembers how far it got at its present state. A stage is computed when
-// somebody reads it, at most once for a state, and the next step starts from what is there.
+// MuJoCo computes derived fields in stages (mjtStage): positions, velocities, and accelerations
+// with the constraint solve. A world keeps track of the last stage computed for its current state.
+// A stage is computed when it is read, at most once per state, and the next step starts from the
+// stages that are available.
 
 #include <mujoco/mjbatch.h>
 #include <mujoco/mujoco.h>
@@ -27,28 +27,30 @@
 
 namespace mjsense {
 
-// What happens inside the parallel pass over worlds, on MuJoCo's threads. Exceptions are caught,
-// and rethrown by the call. "Fresh": derived fields up to the stage named belong to the state.
+// Callbacks inside the parallel pass over worlds, on MuJoCo's threads. Exceptions are caught and
+// rethrown by the call. "Fresh" means that the derived fields up to the given stage belong to the
+// state.
 class WorldHooks {
  public:
   virtual ~WorldHooks() = default;
-  // The last stage that refreshed() and substep() read; mjSTAGE_NONE: the state alone.
+  // The last stage that refreshed() and substep() read; mjSTAGE_NONE: only the state.
   virtual mjtStage stage() const { return mjSTAGE_ACC; }
   virtual mjtStage substep_stage() const { return mjSTAGE_ACC; }
   virtual bool wants_substep() const { return false; }
-  virtual void substep(const World& world) = 0;  // after every physics step, world fresh
-  // Controllers that look at the state: control() is called before physics steps 0, n, 2n ... of a
-  // step(), n = control_every(); 0: never. Of the world the state alone is current; controls and
-  // mocap poses may be written. Returns the last stage that is still valid then: mjSTAGE_VEL after
-  // controls, mjSTAGE_NONE after mocap poses, mjSTAGE_ACC if nothing was written. `index` counts.
+  virtual void substep(const World& world) = 0;  // after every physics step; world is fresh
+  // Controllers that read the state. control() is called before physics steps 0, n, 2n ... of a
+  // step(), with n = control_every(); 0: never. Only the state of the world is current; control()
+  // may write controls and mocap poses. It returns the last stage that is still valid: mjSTAGE_VEL
+  // after it wrote controls, mjSTAGE_NONE after mocap poses, mjSTAGE_ACC if it wrote nothing.
+  // `index` counts the calls.
   virtual int control_every() const { return 0; }
   virtual mjtStage control(const World& /*world*/, int /*index*/) { return mjSTAGE_ACC; }
-  virtual void reset(const World& world) = 0;  // a new episode begins; fresh in all stages
+  virtual void reset(const World& world) = 0;  // a new episode begins; all stages are fresh
   virtual void refreshed(
       const World& world) = 0;  // once, at the end of step/reset/forward/visit, world fresh
 };
 
-// A world whose physics went wrong in the last call. It was reset alone; the others went on.
+// A world whose physics diverged in the last call. Only this world was reset; the others continued.
 struct Failure {
   int world;
   std::string message;  // MuJoCo's text, or the warning it raised ("bad qacc at 0.314 s")
@@ -64,42 +66,44 @@ class Worlds {
   int size() const { return num_worlds_; }
   int threads() const;
   const mjModel* model() const;
-  // As this world has it: the model, with the world's own values in the place of arrays that differ between worlds
-  // (options stay the model's). It holds no memory of its own (no mj_deleteModel), and is valid as long as the worlds are.
+  // The model with the values of this world in the arrays that differ between worlds (options are
+  // those of the model). It owns no memory (do not call mj_deleteModel) and is valid as long as the
+  // worlds are.
   mjModel model_of(int world) const;
-  // Writes this world's own values into `copy`, which is a copy of model().
+  // Writes this world's values into `copy`, a copy of model().
   void write_model(int world, mjModel* copy) const;
   mjBatch* batch() { return batch_; }
 
-  // A new seed starts ticks and episodes again at 0 (of all worlds).
+  // Sets the seed, and the ticks and episodes of all worlds to 0.
   void seed(std::uint64_t seed);
   std::uint64_t seed() const { return seed_; }
-  // From here on this world draws as world `key` would, ticks and episodes from 0: an episode that
-  // always takes the same key draws the same numbers in whatever world it runs.
+  // From now on this world draws the random numbers of world `key`, with ticks and episodes from 0.
+  // An episode that always uses the same key draws the same numbers in every world.
   void rekey(int world, std::uint32_t key);
 
-  // Ids are checked (range, duplicates) before anything happens.
+  // All ids are checked (range, duplicates) before anything else happens.
   void step(int substeps, WorldHooks& hooks, WorldIds ids = all_worlds);
   void forward(WorldIds ids, WorldHooks& hooks);
-  // key: keyframe, -1 the model's defaults.
+  // key: keyframe index; -1: the model's defaults.
   void reset(WorldIds ids, int key, WorldHooks& hooks);
-  // Plain mj_step: derived fields stay one substep behind the state, as MuJoCo's users know it.
+  // Plain mj_step: derived fields stay one substep behind the state, as usual in MuJoCo.
   void step_raw(int substeps);
-  // refreshed() on worlds as they are. State rows written since the last call are made current
-  // first.
+  // Calls refreshed() without stepping. State rows written since the last call are taken into
+  // account.
   void visit(WorldIds ids, WorldHooks& hooks);
-  // Model fields of the batch (mjb_expand) were written: the next step must not reuse what was
-  // computed from the old ones.
+  // Call after model fields of the batch (mjb_expand) were written: the next step then does not
+  // reuse results of the old values.
   void model_changed() { model_version_++; }
-  std::int64_t model_version() const { return model_version_; }  // how often it was called
+  // Number of calls of model_changed().
+  std::int64_t model_version() const { return model_version_; }
 
-  // Worlds that failed in the last call, by index. Their state is the reset state; after step_raw(),
-  // which lets MuJoCo do with a world that diverges what it always does, it is as that left it.
+  // Worlds that failed in the last call, by index. They were reset. Only after step_raw() a failed
+  // world is as MuJoCo left it, because MuJoCo handles divergence itself there.
   const std::vector<Failure>& failures() const { return failures_; }
 
-  // How often each of MuJoCo's warnings (mjtWarning) was raised in this world since the worlds were
-  // made. The first of each kind is also a message of MuJoCo's that names the world; the others are
-  // only counted.
+  // Number of times that each of MuJoCo's warnings (mjtWarning) was raised in this world since
+  // construction. The first warning of each kind is also reported through MuJoCo's handler, with
+  // its world; later ones are only counted.
   using WarningCounts = std::array<std::int64_t, mjNWARNING>;
   const WarningCounts& warning_counts(int world) const { return warning_counts_[world]; }
 
@@ -111,9 +115,10 @@ class Worlds {
 
   std::int64_t substeps(int world) const { return clocks_[world].substep; }
   double time(int world) const;
-  // The ids in order, all of them written out. Throws ValueError for one out of range or given twice.
+  // The ids, sorted and with `all_worlds` expanded. Throws ValueError for ids that are out of range
+  // or duplicate.
   [[nodiscard]] std::vector<int> checked_ids(WorldIds ids) const;
-  void checked_ids(WorldIds ids, std::vector<int>& sorted) const;  // into a buffer
+  void checked_ids(WorldIds ids, std::vector<int>& sorted) const;  // the same into a buffer
 
  private:
   Worlds() = default;
@@ -123,11 +128,12 @@ class Worlds {
     std::uint32_t key = 0;
     std::uint64_t moment = 0;
   };
-  // Which of a world's derived fields belong to its remembered state row.
+  // Which of a world's derived fields are valid for its remembered state row.
   struct Derived {
-    mjtStage stage = mjSTAGE_NONE;   // up to here
-    bool behind = false;             // step_raw() left them one substep behind, and so they stay
-    std::int64_t model_version = 0;  // of the model they were computed with
+    mjtStage stage = mjSTAGE_NONE;  // the last valid stage
+    // step_raw() left them one substep behind, where they stay until the next step.
+    bool behind = false;
+    std::int64_t model_version = 0;  // version of the model they were computed with
   };
   enum class Op { kStep, kForward, kReset, kStepRaw, kVisit };
   class Warnings;
@@ -164,7 +170,7 @@ class Worlds {
   std::int64_t model_version_ = 0;
   std::vector<Clock> clocks_;
   std::vector<int> reset_key_;      // keyframe of each world's last reset
-  std::vector<mjtNum> remembered_;  // state rows to which the derived fields belong
+  std::vector<mjtNum> remembered_;  // state rows that the derived fields belong to
   std::vector<Derived> derived_;
   std::vector<std::exception_ptr> exceptions_;  // of hooks, by world
   std::vector<std::uint8_t> diverged_;          // by world: mjtWarning + 1 in this call
@@ -173,14 +179,14 @@ class Worlds {
   std::array<bool, mjNWARNING> reported_{};    // by warning
   std::atomic<bool> warned_ = false;           // a count has risen in this call
   std::vector<int> ids_;                       // scratch: the sorted selection
-  // One mjData a thread, in which worlds are stepped that nobody looks at.
+  // One mjData per thread, used to step worlds whose derived fields are not read.
   struct Workbench {
     mjData* data = nullptr;
     std::atomic<bool> taken = false;
   };
   std::vector<Workbench> workbenches_;
-  // Part of a state row that the position and velocity stages do not read: warm start, controls
-  // and applied forces.
+  // Columns of a state row that do not affect the position and velocity stages: warm start,
+  // controls and applied forces.
   std::size_t ctrl_begin_ = 0, ctrl_end_ = 0;
 };
 

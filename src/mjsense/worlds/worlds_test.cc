@@ -25,8 +25,8 @@ namespace {
 using ModelPtr = std::unique_ptr<mjModel, decltype(&mj_deleteModel)>;
 using DataPtr = std::unique_ptr<mjData, decltype(&mj_deleteData)>;
 
-// A hand that drops a box on a plane: contacts, actuators with and without state, a constraint that
-// can be switched, a mocap body in the way, sensors of every stage.
+// A hand that drops a box on a plane: contacts, actuators with and without activation, an equality
+// constraint that can be disabled, a mocap body in the box's path, and sensors of every stage.
 constexpr char kXml[] = R"(
 <mujoco>
   <option timestep="0.004" integrator="%s"/>
@@ -65,10 +65,11 @@ ModelPtr load(const char* integrator) {
 struct Recording : WorldHooks {
   bool every = false;
   mjtStage read = mjSTAGE_ACC, read_every = mjSTAGE_ACC;
-  std::vector<std::vector<double>> sensordata;  // by world, as last refreshed
+  std::vector<std::vector<double>> sensordata;  // by world, at the last refreshed()
   std::vector<int> substeps, resets, refreshes;
   std::vector<double> force;
-  std::vector<std::array<int, 3>> computed;  // how often positions, velocities, solves
+  // How often positions, velocities and the constraint solve were computed.
+  std::vector<std::array<int, 3>> computed;
   int throw_in = -1;
   explicit Recording(int n)
       : sensordata(n), substeps(n), resets(n), refreshes(n), force(n), computed(n) {}
@@ -86,7 +87,7 @@ struct Recording : WorldHooks {
                       timer[mjTIMER_CONSTRAINT].number};
     if (w.id == throw_in) throw ValueError("hook failed");
   }
-  // The sensors of the stages that were asked for, and the first force, are those of mj_forward.
+  // Sensors of the requested stages and the first force must equal those of mj_forward.
   void expect_fresh(int w, const mjModel* m, const mjData* d) const {
     for (int i = 0; i < m->nsensor; ++i) {
       if (m->sensor_needstage[i] > read) continue;
@@ -103,7 +104,7 @@ struct Recording : WorldHooks {
 
 DataPtr make_data(const mjModel* m) { return DataPtr(mj_makeData(m), mj_deleteData); }
 
-// The whole state row, warm start and all.
+// Compares the complete state row, warm start included.
 void expect_same_state(Worlds& worlds, int w, const mjModel* m, const mjData* d) {
   std::vector<mjtNum> row(mj_stateSize(m, mjSTATE_INTEGRATION));
   mj_getState(m, d, row.data(), mjSTATE_INTEGRATION);
@@ -129,9 +130,9 @@ void drive(Worlds& worlds, int step) {
 
 class Integrators : public ::testing::TestWithParam<std::tuple<const char*, bool, int>> {};
 
-// Taken apart and reused, whatever is read when, the stages give the states of plain mj_step bit
-// for bit, and the sensors of mj_forward there.
-TEST_P(Integrators, EqualTheNaiveLoopBitForBitAndAreFresh) {
+// Split and reused stages must give the same states as mj_step bit for bit, and the same sensors as
+// mj_forward, regardless of what is read and when.
+TEST_P(Integrators, EqualTheNaiveLoop) {
   const auto [integrator, every, decimation] = GetParam();
   const ModelPtr m = load(integrator);
   constexpr int kWorlds = 3, kSteps = 60;
@@ -146,7 +147,7 @@ TEST_P(Integrators, EqualTheNaiveLoopBitForBitAndAreFresh) {
     for (int w = 0; w < kWorlds; ++w) naive.push_back(make_data(m.get()));
     const DataPtr fresh = make_data(m.get());
     for (int k = 0; k < kSteps; ++k) {
-      const int drawn = k / 3;  // controls that stay for a while let a solve be used again
+      const int drawn = k / 3;  // controls that are constant for a while allow a solve to be reused
       drive(worlds, drawn);
       hooks.read = kRead[k % 7];
       hooks.read_every = kRead[k % 5];
@@ -190,7 +191,7 @@ INSTANTIATE_TEST_SUITE_P(All, Integrators,
                                                               "RK4", "discrete"),
                                             ::testing::Bool(), ::testing::Values(1, 4)));
 
-// What may be written between two steps: to a plain mjData, and to a world in the same way.
+// A write between two steps, applied in the same manner to a plain mjData and to a world.
 struct Write {
   const char* name;
   const char* component;
@@ -237,9 +238,9 @@ void write_plain(const mjModel* m, mjData* d, const Write& write) {
 
 class Writes : public ::testing::TestWithParam<std::tuple<const char*, Write>> {};
 
-// A step from a state that was written through the views, without forward(), is mj_step from there,
-// whatever was read before and whether somebody looks between the write and the step.
-TEST_P(Writes, BetweenStepsAreSeenByTheNext) {
+// A step after the state was written through the views, without forward(), must equal mj_step from
+// that state, regardless of earlier reads and of reads between the write and the step.
+TEST_P(Writes, AffectTheNextStep) {
   const auto [integrator, write] = GetParam();
   const ModelPtr m = load(integrator);
   for (const int decimation : {1, 4}) {
@@ -279,7 +280,7 @@ INSTANTIATE_TEST_SUITE_P(All, Writes,
                                   std::get<1>(info.param).name;
                          });
 
-TEST(Worlds, AChangedModelIsSeenByTheNextStep) {
+TEST(Worlds, NextStepUsesAChangedModel) {
   const ModelPtr m = load("Euler"), heavy = load("Euler");
   for (int b = 1; b < heavy->nbody; ++b) heavy->body_mass[b] *= 3;
   for (const mjtStage read : {mjSTAGE_NONE, mjSTAGE_VEL, mjSTAGE_ACC}) {
@@ -300,9 +301,9 @@ TEST(Worlds, AChangedModelIsSeenByTheNextStep) {
   }
 }
 
-// Between a step and the next somebody may read what nobody read before: the forces are those of
-// the controls of the step, and the next step is that of the new ones.
-TEST(Worlds, WhatIsReadLateBelongsToTheControlsOfTheStep) {
+// If forces are first read after new controls were written, they must belong to the controls of the
+// last step, and the next step must use the new ones.
+TEST(Worlds, LateReadsUseTheControlsOfTheStep) {
   const ModelPtr m = load("implicitfast");
   Worlds worlds(m.get(), 1, 1);
   Recording hooks(1);
@@ -314,7 +315,7 @@ TEST(Worlds, WhatIsReadLateBelongsToTheControlsOfTheStep) {
     hooks.read = mjSTAGE_NONE;
     worlds.step(2, hooks);
     for (int s = 0; s < 2; ++s) mj_step(m.get(), plain.get());
-    state_row(worlds, "ctrl", 0)[0] = 100.0;  // for the next step, which will see another
+    state_row(worlds, "ctrl", 0)[0] = 100.0;  // for the next step, which uses other controls
     for (const mjtStage read : {mjSTAGE_VEL, mjSTAGE_ACC}) {
       hooks.read = read;
       worlds.visit(all_worlds, hooks);
@@ -328,7 +329,7 @@ TEST(Worlds, WhatIsReadLateBelongsToTheControlsOfTheStep) {
   }
 }
 
-// How often positions, velocities and the solve were computed in 10 control steps.
+// Number of computations of positions, velocities and the constraint solve in 10 control steps.
 std::array<int, 3> computed_in_steps(const char* integrator, mjtStage read, int decimation,
                                      bool changing_controls, bool every = false,
                                      mjtStage read_every = mjSTAGE_ACC) {
@@ -344,14 +345,14 @@ std::array<int, 3> computed_in_steps(const char* integrator, mjtStage read, int 
   for (int k = 0; k < 10; ++k) {
     if (changing_controls) drive(worlds, k + 1);
     worlds.step(decimation, hooks);
-    worlds.visit(all_worlds, hooks);  // nothing is out of date
+    worlds.visit(all_worlds, hooks);  // everything is up to date
   }
   std::array<int, 3> counts;
   for (int i = 0; i < 3; ++i) counts[i] = hooks.computed[0][i] - before[i];
   return counts;
 }
 
-TEST(Worlds, ComputeAStageOnceForAStateAndOnlyIfItIsRead) {
+TEST(Worlds, StagesAreComputedOnceAndOnlyIfRead) {
   using ::testing::ElementsAre;
   for (const char* integrator : {"Euler", "implicit", "implicitfast"}) {
     for (const int n : {1, 4}) {
@@ -370,11 +371,11 @@ TEST(Worlds, ComputeAStageOnceForAStateAndOnlyIfItIsRead) {
                   ElementsAre(steps, steps, steps));
     }
   }
-  // Four evaluations a step.
+  // Four evaluations per step.
   EXPECT_THAT(computed_in_steps("RK4", mjSTAGE_VEL, 1, true), ElementsAre(40, 40, 40));
 }
 
-TEST(Worlds, SeeStateWrittenThroughTheViews) {
+TEST(Worlds, StepUsesStateWrittenThroughViews) {
   const ModelPtr m = load("Euler");
   Worlds worlds(m.get(), 2, 1);
   Recording hooks(2);
@@ -384,11 +385,11 @@ TEST(Worlds, SeeStateWrittenThroughTheViews) {
   const ArrayView qpos = worlds.state_component("qpos");
   reinterpret_cast<double*>(qpos.data + qpos.strides[0])[0] = d->qpos[0] = -1.2;
   for (int s = 0; s < 3; ++s) mj_step(m.get(), d.get());
-  worlds.step(3, hooks);  // no forward() in between: the step must not reuse the old stages
+  worlds.step(3, hooks);  // without forward() in between: the step must not reuse old stages
   EXPECT_EQ(std::memcmp(qpos.data + qpos.strides[0], d->qpos, m->nq * sizeof(double)), 0);
 }
 
-// A hand without a joint: a mocap body that pushes a box by contact and pulls another by a weld.
+// A hand without joints: a mocap body that pushes one box by contact and pulls another by a weld.
 constexpr char kHand[] = R"(
 <mujoco>
   <size nuserdata="3"/><option timestep="0.004"/>
@@ -402,8 +403,8 @@ constexpr char kHand[] = R"(
   <sensor><framepos objtype="body" objname="hand"/><framequat objtype="body" objname="hand"/></sensor>
 </mujoco>)";
 
-// Whatever part of the state is written between two steps, the next step is that of a mjData in
-// which the same was written.
+// Whatever part of the state is written between two steps, the next step must equal that of an
+// mjData with the same write.
 TEST(Worlds, EveryPartOfTheStateMayBeWrittenBetweenSteps) {
   char error[512] = "";
   mjSpec* spec = mj_parseXMLString(kHand, nullptr, error, sizeof error);
@@ -461,8 +462,9 @@ TEST(Worlds, EveryPartOfTheStateMayBeWrittenBetweenSteps) {
   }
 }
 
-// eq_active is bytes in mjData and numbers in a row: it is written by its own.
-TEST(Worlds, AConstraintMayBeReleasedBetweenSteps) {
+// eq_active is stored as bytes in mjData and as numbers in a state row, so it is written by a
+// separate function.
+TEST(Worlds, ConstraintMayBeDisabledBetweenSteps) {
   char error[512] = "";
   mjSpec* spec = mj_parseXMLString(kHand, nullptr, error, sizeof error);
   ASSERT_NE(spec, nullptr) << error;
@@ -480,11 +482,11 @@ TEST(Worlds, AConstraintMayBeReleasedBetweenSteps) {
   for (int s = 0; s < 5; ++s) mj_step(m.get(), d.get());
   const auto* qpos = reinterpret_cast<const double*>(worlds.state_component("qpos").data);
   EXPECT_EQ(std::memcmp(qpos, d->qpos, m->nq * sizeof(double)), 0);
-  EXPECT_LT(qpos[9], 0.3 - 1e-4);  // it falls
+  EXPECT_LT(qpos[9], 0.3 - 1e-4);  // the box falls
 }
 
-// What a hook sees of the user's own numbers is what was written.
-TEST(Worlds, UserDataArriveInMjData) {
+// Hooks must see user data as it was written.
+TEST(Worlds, HooksReadUserData) {
   char error[512] = "";
   mjSpec* spec = mj_parseXMLString(kHand, nullptr, error, sizeof error);
   ASSERT_NE(spec, nullptr) << error;
@@ -509,8 +511,8 @@ TEST(Worlds, UserDataArriveInMjData) {
   EXPECT_THAT(hooks.seen, ::testing::ElementsAre(0, 7, 8));
 }
 
-// What is written between calls is current at the next look, without a step or a forward().
-TEST(Worlds, AVisitMakesWrittenStateCurrent) {
+// State written between calls must be current at the next visit, without step or forward().
+TEST(Worlds, VisitUsesWrittenState) {
   const ModelPtr m = load("Euler");
   Worlds worlds(m.get(), 2, 1);
   Recording hooks(2);
@@ -524,8 +526,8 @@ TEST(Worlds, AVisitMakesWrittenStateCurrent) {
   for (int i = 0; i < m->nsensordata; ++i) EXPECT_EQ(hooks.sensordata[1][i], d->sensordata[i]);
 }
 
-// A world's own value of a model field counts from the next step on, in every stage of it.
-TEST(Worlds, AModelFieldMayChangeBetweenSteps) {
+// A world's value of a model field must affect every stage from the next step on.
+TEST(Worlds, ModelFieldMayChangeBetweenSteps) {
   const ModelPtr m = load("implicitfast");
   const ModelPtr heavy = load("implicitfast");
   Worlds worlds(m.get(), 2, 1);
@@ -547,7 +549,7 @@ TEST(Worlds, AModelFieldMayChangeBetweenSteps) {
   EXPECT_NE(std::memcmp(qpos.data, d->qpos, m->nq * sizeof(double)), 0);
 }
 
-TEST(Worlds, AModelOfAWorldHasItsOwnValues) {
+TEST(Worlds, ModelOfAWorldHasItsValues) {
   const ModelPtr m = load("Euler");
   Worlds worlds(m.get(), 3, 1);
   int size = 0;
@@ -570,8 +572,8 @@ TEST(Worlds, AModelOfAWorldHasItsOwnValues) {
   EXPECT_EQ(copy->opt.gravity[2], -1);
 }
 
-// With <flag energy="enable"/> mj_forward fills e_kinetic before it computes the energy.
-TEST(Worlds, EnergiesAreFresh) {
+// With <flag energy="enable"/>, mj_forward fills e_kinetic before it computes the energy.
+TEST(Worlds, EnergySensorsAreFresh) {
   const char* xml = R"(<mujoco><option><flag energy="enable"/></option><worldbody>
     <body pos="0 0 1"><joint axis="1 0 0"/><geom size=".1" pos="0 .3 0"/></body></worldbody>
     <sensor><e_kinetic/><e_potential/></sensor></mujoco>)";
@@ -606,8 +608,9 @@ TEST(Worlds, EnergiesAreFresh) {
   expect("at a visit");
 }
 
-// Six boxes in an arena for few contacts warn at every substep; MuJoCo's handler hears it once.
-TEST(Worlds, WarningsAreCountedByWorldAndReportedOnce) {
+// Six boxes in an arena that is too small for their contacts warn at every substep; MuJoCo's
+// handler is called once.
+TEST(Worlds, WarningsAreCountedPerWorldAndReportedOnce) {
   std::string xml = "<mujoco><size memory='12K'/><worldbody><geom type='plane' size='5 5 .1'/>";
   for (int i = 0; i < 6; ++i)
     xml += "<body pos='" + std::to_string(.05 * i) +
@@ -625,7 +628,7 @@ TEST(Worlds, WarningsAreCountedByWorldAndReportedOnce) {
   heard = &messages;
   const auto before = mju_user_warning;
   mju_user_warning = [](const char* text) { heard->emplace_back(text); };
-  // Apart from world 1 they are far from each other.
+  // Except in world 1, the boxes are far from each other.
   for (int w = 0; w < 3; w += 2) {
     for (int i = 0; i < 6; ++i) state_row(worlds, "qpos", w)[7 * i] = 3 * i;
     for (int i = 0; i < 6; ++i) state_row(worlds, "qpos", w)[7 * i + 2] = 9;
@@ -648,7 +651,7 @@ TEST(Worlds, WarningsAreCountedByWorldAndReportedOnce) {
   EXPECT_THAT(messages[0], ::testing::HasSubstr("world 1"));
 }
 
-TEST(Worlds, ViewsHaveARowAnElement) {
+TEST(Worlds, ViewsHaveOneRowPerElement) {
   const ModelPtr m = load("Euler");
   Worlds worlds(m.get(), 2, 1);
   EXPECT_EQ(worlds.state_component("xfrc_applied").shape, (Shape{2, m->nbody, 6}));
@@ -663,8 +666,8 @@ TEST(Worlds, ViewsHaveARowAnElement) {
   EXPECT_EQ(hands.state_component("userdata").shape, (Shape{3, 3}));
 }
 
-// A control that is no number: MuJoCo would go on with zeros.
-TEST(Worlds, AControlThatIsNoNumberIsAFailure) {
+// A control that is NaN: MuJoCo would continue with zeros.
+TEST(Worlds, NanControlIsAFailure) {
   const ModelPtr m = load("Euler");
   Worlds worlds(m.get(), 2, 1);
   Recording hooks(2);
@@ -677,7 +680,7 @@ TEST(Worlds, AControlThatIsNoNumberIsAFailure) {
   EXPECT_THAT(worlds.failures()[0].message, ::testing::HasSubstr("CTRL"));
 }
 
-// Random numbers depend on the episode and the step; both begin again with the seed.
+// Random numbers depend on the episode and the tick; both restart with the seed.
 TEST(Worlds, ClocksCountEpisodesAndTicks) {
   struct Clock : Recording {
     using Recording::Recording;
@@ -699,7 +702,7 @@ TEST(Worlds, ClocksCountEpisodesAndTicks) {
   worlds.step(3, hooks);
   worlds.reset(all_worlds, -1, hooks);
   EXPECT_EQ(hooks.episode, 2);
-  EXPECT_EQ(hooks.tick, 3);  // never the same numbers twice
+  EXPECT_EQ(hooks.tick, 3);  // random numbers never repeat
   EXPECT_EQ(hooks.substep, 0);
   worlds.step_raw(4);
   worlds.visit(all_worlds, hooks);
@@ -717,9 +720,9 @@ TEST(Worlds, ClocksCountEpisodesAndTicks) {
   EXPECT_EQ(hooks.key, 17u);
 }
 
-// step_raw() is mj_step and nothing else: what is read after it is what mj_step left, one step behind
-// the state, until the next step.
-TEST(Worlds, AfterRawStepsWhatIsReadIsWhatMjStepLeft) {
+// step_raw() is mj_step and nothing else. Fields read after it are as mj_step left them, one step
+// behind the state, until the next step.
+TEST(Worlds, RawStepsLeaveFieldsOneSubstepBehind) {
   const ModelPtr m = load("Euler");
   Worlds worlds(m.get(), 1, 1);
   Recording hooks(1);
@@ -743,9 +746,9 @@ TEST(Worlds, AfterRawStepsWhatIsReadIsWhatMjStepLeft) {
   hooks.expect_fresh(0, m.get(), d.get());
 }
 
-// Controllers are asked before physics steps 0, n, 2n ... and see the state that they control; what
-// was computed from old controls or poses is not reused, whatever was read in between.
-TEST(Worlds, ControlsOfTheStateAreThoseOfTheNaiveLoop) {
+// Controllers are called before physics steps 0, n, 2n ... and see the current state. Results of
+// old controls or poses must not be reused, regardless of earlier reads.
+TEST(Worlds, ControllersEqualTheNaiveLoop) {
   struct Controller : WorldHooks {
     mjtStage reads = mjSTAGE_NONE;
     std::vector<int> indices;
@@ -792,8 +795,8 @@ TEST(Worlds, ControlsOfTheStateAreThoseOfTheNaiveLoop) {
   }
 }
 
-// Forces belong to the state at every substep, not at the last one alone.
-TEST(Worlds, ASubstepHookSeesFreshForces) {
+// Forces must belong to the state at every substep, not only at the last one.
+TEST(Worlds, SubstepHookReadsFreshForces) {
   struct Forces : Recording {
     using Recording::Recording;
     std::vector<double> seen;
@@ -820,7 +823,7 @@ TEST(Worlds, ASubstepHookSeesFreshForces) {
   EXPECT_EQ(hooks.seen, want);
 }
 
-TEST(Worlds, ResetOnlyTheOnesNamed) {
+TEST(Worlds, ResetAffectsOnlyTheSelection) {
   const ModelPtr m = load("implicitfast");
   Worlds worlds(m.get(), 4, 2);
   Recording hooks(4);
@@ -839,7 +842,7 @@ TEST(Worlds, ResetOnlyTheOnesNamed) {
   EXPECT_THROW(worlds.reset(all_worlds, 7, hooks), ValueError);
 }
 
-TEST(Worlds, AnEmptyListIsNoWorld) {
+TEST(Worlds, EmptyListSelectsNoWorld) {
   const ModelPtr m = load("Euler");
   Worlds worlds(m.get(), 3, 2);
   Recording hooks(3);
@@ -859,7 +862,7 @@ TEST(Worlds, AnEmptyListIsNoWorld) {
   static_assert(!std::is_default_constructible_v<WorldIds>, "{} would not say which worlds");
 }
 
-TEST(Worlds, OneThatDivergesIsNamedAndResetAlone) {
+TEST(Worlds, OnlyADivergingWorldIsReset) {
   const ModelPtr m = load("Euler");
   Worlds worlds(m.get(), 3, 2);
   Recording hooks(3);
@@ -881,8 +884,8 @@ TEST(Worlds, OneThatDivergesIsNamedAndResetAlone) {
   EXPECT_TRUE(worlds.failures().empty());
 }
 
-// Nobody reads anything, and still the step that went wrong is the one that says so.
-TEST(Worlds, ThatDivergeUnseenAreNamedAtOnce) {
+// A failing step must be reported by that step, even if nothing is read.
+TEST(Worlds, DivergenceIsReportedWithoutReads) {
   const ModelPtr m = load("Euler");
   for (const mjtStage read : {mjSTAGE_NONE, mjSTAGE_ACC}) {
     Worlds worlds(m.get(), 2, 1);
@@ -900,8 +903,9 @@ TEST(Worlds, ThatDivergeUnseenAreNamedAtOnce) {
   }
 }
 
-// Whoever brings forces to a bad control says so at once, and the next step is as good as new.
-TEST(Worlds, NameABadControlWhenItIsLookedAt) {
+// A read that computes forces from a bad control must report it at once, and the next step must be
+// unaffected.
+TEST(Worlds, ReadingReportsABadControl) {
   const ModelPtr m = load("Euler");
   Worlds worlds(m.get(), 1, 1);
   Recording hooks(1);
@@ -914,15 +918,16 @@ TEST(Worlds, NameABadControlWhenItIsLookedAt) {
   EXPECT_TRUE(worlds.failures().empty());
 }
 
-// MuJoCo's errors jump out of whatever is going on; what the worlds of a thread share is as new.
-TEST(Worlds, InWhichMuJoCoRaisesAnErrorLeaveTheOthersAlone) {
+// MuJoCo's errors jump out of the call. The mjData that is shared by the worlds of a thread must be
+// usable afterwards.
+TEST(Worlds, MuJoCoErrorDoesNotAffectOtherWorlds) {
   const ModelPtr m = load("implicitfast");
   Worlds worlds(m.get(), 2, 1);
   Recording hooks(2);
   hooks.read = mjSTAGE_NONE;
   auto* solver = static_cast<int*>(mjb_expand(worlds.batch(), "opt.solver", nullptr, nullptr));
   ASSERT_NE(solver, nullptr);
-  solver[0] = 99;  // found when the box touches the floor
+  solver[0] = 99;  // detected when the box touches the floor
   worlds.model_changed();
   worlds.reset(all_worlds, -1, hooks);
   const DataPtr plain = make_data(m.get());
@@ -942,7 +947,7 @@ TEST(Worlds, InWhichMuJoCoRaisesAnErrorLeaveTheOthersAlone) {
   EXPECT_LT(failed, 10);
 }
 
-TEST(Worlds, AFailingHookLeavesTheOthersAndTheSimulationUsable) {
+TEST(Worlds, FailingHookDoesNotAffectOtherWorlds) {
   const ModelPtr m = load("Euler");
   Worlds worlds(m.get(), 3, 2);
   Recording hooks(3);
@@ -954,7 +959,7 @@ TEST(Worlds, AFailingHookLeavesTheOthersAndTheSimulationUsable) {
   EXPECT_EQ(worlds.substeps(1), 2);
 }
 
-TEST(Worlds, RejectsNonsense) {
+TEST(Worlds, RejectsInvalidArguments) {
   const ModelPtr m = load("Euler");
   EXPECT_THROW(Worlds(m.get(), 0, 1), ValueError);
   EXPECT_THROW(Worlds(m.get(), 1, -2), ValueError);

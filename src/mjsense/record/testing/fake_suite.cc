@@ -71,7 +71,8 @@ std::unique_ptr<FakeSensor> dict(const std::string& name, int size, int worlds, 
   return sensor;
 }
 
-// An arm, a base without joints and a gripper. `action`: nothing is given at the last step.
+// Streams of an arm, a base without joints and a gripper. With `action`, no action is given at the
+// last step.
 std::unique_ptr<FakeSensor> groups(const std::string& name, bool action, int worlds) {
   auto sensor = std::make_unique<FakeSensor>(name, [action](FakeSensor& s, const Moment& m) {
     const bool given = !action || m.t + 1 < m.length;

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
-// A suite without physics, in the shape of a Franka pick: every value is a function of (episode,
-// step), so that tests and benchmarks know what must be on disk.
+// A suite without physics that has the streams of a Franka pick. Every value is a function of
+// (episode, step), so that tests and benchmarks know which values must be on disk.
 
 #include <cstdint>
 #include <memory>
@@ -16,7 +16,7 @@ struct FakeSuiteCfg {
   int num_worlds = 1;
   int width = 64, height = 48;
   bool rgb = true, depth = true;
-  int cameras = 1;  // wrist_camera, exo_camera_1, ...
+  int cameras = 1;  // names: wrist_camera, exo_camera_1, ...
 };
 
 class FakeSuite {
@@ -29,7 +29,8 @@ class FakeSuite {
   void fill(int world, std::int64_t episode, int t, int length);
 
   static float joint(std::int64_t episode, int t, int j);  // rad
-  static float depth(int x, int y, int t);  // m; 0 in the left upper corner, infinite in the right
+  // m; 0 in the upper left corner, infinite in the upper right one
+  static float depth(int x, int y, int t);
   static std::string obs_scene(std::int64_t episode);
 
  private:

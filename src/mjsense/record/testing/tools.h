@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
-// For the tests of recordings, written and read back.
+// Helpers for tests that write recordings and read them back.
 
 #include <algorithm>
 #include <filesystem>
@@ -25,7 +25,7 @@ inline std::string read_file(const fs::path& path) {
   return text.str();
 }
 
-// Every file below `dir`, by its relative path.
+// Relative paths of all files below `dir`, sorted.
 inline std::vector<std::string> tree(const fs::path& dir) {
   std::vector<std::string> names;
   for (const auto& e : fs::recursive_directory_iterator(dir)) {
@@ -35,8 +35,9 @@ inline std::vector<std::string> tree(const fs::path& dir) {
   return names;
 }
 
-// An executable script in the place of ffmpeg. `body` sees the output file as $out, and can run the
-// true one with what was asked as `ffmpeg "$@"`; the question for encoders is answered.
+// Creates an executable script that replaces ffmpeg. `body` finds the output file in $out and can
+// run the real program with the given arguments as `ffmpeg "$@"`. The script itself answers the
+// query for encoders.
 inline std::string fake_ffmpeg(const fs::path& dir, const std::string& body) {
   const fs::path path = dir / "ffmpeg";
   std::ofstream(path) << "#!/bin/sh\n"
@@ -52,15 +53,15 @@ inline std::string fake_ffmpeg(const fs::path& dir, const std::string& body) {
 struct Attempts {
   int worlds = 2;
   int steps = 6;
-  int discard_every = 0;  // the last of so many attempts; 0: none
-  int stop_after = -1;    // decided attempts after which the recorder is dropped without complete()
+  int discard_every = 0;  // discards every n-th attempt; 0: none
+  int stop_after = -1;  // decided attempts after which the recorder is destroyed without complete()
 };
 
 inline int length_of(std::int64_t episode, int steps) {
   return steps + static_cast<int>(episode % 3);
 }
 
-// Runs attempts 0, 1, 2 ... as a rollout does, until the recording has enough.
+// Runs attempts 0, 1, 2 ... like a rollout until the recording has enough episodes.
 inline void record_all(Recorder& recorder, FakeSuite& suite, const Attempts& a) {
   struct Running {
     std::int64_t episode = -1;
@@ -127,7 +128,7 @@ inline std::string record(const fs::path& out, int episodes, const Attempts& att
   return bytes;
 }
 
-// What() of the error that `run` throws; "" if it throws none.
+// Message of the exception that `run` throws; "" if it throws none.
 template <class Run>
 std::string error_of(Run&& run) {
   try {
