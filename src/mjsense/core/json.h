@@ -16,6 +16,12 @@ class JsonWriter {
   // Writes into `row`; what is not used is filled with 0 by finish().
   explicit JsonWriter(std::span<std::uint8_t> row) : row_(row) {}
 
+  // From here on NaN and infinities are written as null, so that the text is JSON by the standard.
+  JsonWriter& finite_only() {
+    finite_only_ = true;
+    return *this;
+  }
+
   // Members of an object must be written in sorted order of their keys; a key that is not raises
   // std::logic_error.
   JsonWriter& begin_object();
@@ -53,6 +59,7 @@ class JsonWriter {
   std::span<std::uint8_t> row_;
   std::size_t size_ = 0;
   bool comma_ = false;
+  bool finite_only_ = false;
   static constexpr int kMaxDepth = 16;
   static constexpr int kMaxKey = 64;
   int depth_ = 0;

@@ -22,6 +22,7 @@ struct ArrayStream {
   SensorSpec spec;                       // of the dataset
   const Field* field = nullptr;          // null if it is text of many
   std::shared_ptr<const JsonRows> text;  // null if it is a field
+  const Field* present = nullptr;        // bool: where it is false the row is NaN; null: never
   std::string place;                     // "obs/extra/tcp_pose"
   std::int64_t chunk_rows = 1;
 

@@ -54,8 +54,13 @@ class EpisodeScene {
 
   std::span<const SceneObject> objects() const { return objects_; }
   std::span<const Region> regions() const { return regions_; }
-  // Whether an object takes part in the episode of this world; the others stand far away.
+  // Whether an object takes part in the episode of this world. The others are held far away: no gravity moves them and
+  // they touch nothing.
   bool present(int world, int object) const { return present_[world * objects_.size() + object]; }
+
+  // Bodies of the objects that are absent from some episodes, and whether a body takes part; one that is no object does.
+  std::vector<int> absentees() const;
+  bool body_present(int world, int body) const;
 
   // In the size that the object has in this world's episode; lives as long as the scene.
   const ObjectShape& shape(int world, int object) const;
@@ -96,6 +101,8 @@ class EpisodeScene {
   std::string fault(const World& world) const;
 
  private:
+  // Whether `count` chooses among the objects.
+  bool counts_objects() const;
   // Whether an entity is an object that every episode places.
   bool is_placed(const SceneEntityCfg& entity) const;
   void find_objects(std::string_view robot_prefix);

@@ -228,8 +228,8 @@ void visit_fields(V& v, SceneFileCfg& c) {
       .at_least(0);
   v("drop", c.drop, "Above the surface at the start.").unit("m").at_least(0);
   v("count", c.count,
-    "Objects that are there, the target among them, least and most; -1: all. The others stand far "
-    "away.");
+    "Objects that are there, the target among them, least and most; -1: all. The others are "
+    "absent.");
   v.python("models", "Callable[[], SceneCfg] | None", "None",
            "Makes the models, in the place of ``base`` and ``entities``.");
 }

@@ -82,6 +82,9 @@ class Worlds {
   void reset(WorldIds ids, int key, WorldHooks& hooks);
   // Plain mj_step: derived fields stay one substep behind the state, as MuJoCo's users know it.
   void step_raw(int substeps);
+  // Keeps the body of a free joint at rest where the world's state has it, until the world's next reset: after
+  // every physics step its pose is written back and its velocity is zero. For bodies that take no part.
+  void hold(int world, int joint);
   // refreshed() on worlds as they are. State rows written since the last call are made current
   // first.
   void visit(WorldIds ids, WorldHooks& hooks);
@@ -117,6 +120,11 @@ class Worlds {
     bool behind = false;             // step_raw() left them one substep behind, and so they stay
     std::int64_t model_version = 0;  // of the model they were computed with
   };
+  // A free joint that is held, and the pose in which it is.
+  struct Held {
+    int qpos, dof;  // addresses
+    mjtNum pose[7];
+  };
   enum class Op { kStep, kForward, kReset, kStepRaw, kVisit };
   class Warnings;
   struct Call {
@@ -132,6 +140,7 @@ class Worlds {
   bool step_unseen(const mjModel* m, mjData* d, int w, const Call& call);
   bool step_whole(const mjModel* m, mjData* d, int w, const Call& call);
   bool healthy(int w, const Warnings& warnings);
+  void keep_held(mjData* d, int w) const;
   void apply(WorldIds ids, Call call, bool save);
   std::vector<int> take_failures(Op op);
   std::string reset_failed(std::vector<int> failed, Call call);
@@ -149,8 +158,9 @@ class Worlds {
   std::uint64_t seed_ = 0;
   std::int64_t model_version_ = 0;
   std::vector<Clock> clocks_;
-  std::vector<int> reset_key_;      // keyframe of each world's last reset
-  std::vector<mjtNum> remembered_;  // state rows to which the derived fields belong
+  std::vector<std::vector<Held>> held_;  // by world
+  std::vector<int> reset_key_;           // keyframe of each world's last reset
+  std::vector<mjtNum> remembered_;       // state rows to which the derived fields belong
   std::vector<Derived> derived_;
   std::vector<std::exception_ptr> exceptions_;  // of hooks, by world
   std::vector<std::uint8_t> diverged_;          // by world: mjtWarning + 1 in this call
