@@ -743,7 +743,7 @@ class SceneFileCfg(_config_methods.SceneFileCfg):
     drop: float = 0.0003
     """Above the surface at the start. [m]"""
     count: Sequence[int] = (-1, -1)
-    """Objects that are there, the target among them, least and most; -1: all. The others stand far away."""
+    """Objects that are there, the target among them, least and most; -1: all. The others are absent."""
     models: Callable[[], SceneCfg] | None = None
     """Makes the models, in the place of ``base`` and ``entities``."""
 

@@ -73,10 +73,13 @@ void visit_fields(V& v, CameraMountCfg& c) {
   v("height_range", c.height_range, "orbit: above the centre, least and most.").unit("m");
   v("azimuth_range", c.azimuth_range, "orbit: least and most, degrees, 0 along the world's x.");
   v("min_visible", c.min_visible,
-    "orbit: the share of the pixels that each object of the task must cover at the start.")
+    "Share of the pixels that each object of the task must cover at the start. Where the pose of "
+    "another mount than "
+    "orbit does not show that much, the camera is moved to one that orbit would choose.")
       .within(0, 1);
-  v("max_attempts", c.max_attempts, "orbit: poses to try for that.").at_least(1);
-  v("relaxed", c.relaxed, "orbit: where none does, take the best; else the episode fails.");
+  v("max_attempts", c.max_attempts, "Poses of an orbit to try for that.").at_least(1);
+  v("relaxed", c.relaxed,
+    "If none of them shows that much, the best is taken; otherwise the episode fails.");
   v("fovy_noise", c.fovy_noise, "Degrees.").at_least(0);
   v("pos_noise", c.pos_noise,
     "mjcf: along the camera's axes; body, look_at: the body's; fixed: right, down, forward.")

@@ -73,6 +73,7 @@ struct CameraMount {
   std::string mjcf_camera;  // local name
   bool record_depth = false;
   bool image_points = true;
+  double min_visible = 0;  // of CameraMountCfg
 };
 template <class V>
 void visit_fields(V& v, CameraMount& c) {
@@ -81,6 +82,11 @@ void visit_fields(V& v, CameraMount& c) {
   v("camera", c.mjcf_camera, "Camera of the model.").required();
   v("depth", c.record_depth, "Its depth is recorded, too.");
   v("image_points", c.image_points, "``object_image_points`` looks through it.");
+  v("min_visible", c.min_visible,
+    "Share of the pixels that each object of the task must cover at the start; where the camera of "
+    "the model does not "
+    "show that much, it is moved to where it does.")
+      .within(0, 1);
 }
 
 // Displacement of the tool that the arm's controllers see and recordings do not; normal, truncated.
