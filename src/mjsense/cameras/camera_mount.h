@@ -44,6 +44,7 @@ struct CameraMountCfg {
 
   // Its pose or its lens is another in every episode, or its lens not that of the model.
   bool varies() const;
+  bool has_noise() const;
 };
 template <class V>
 void visit_fields(V& v, CameraMountCfg& c) {

@@ -110,6 +110,7 @@ void CameraSystem::initialize(Simulation& simulation) {
 CameraSystem::Lens CameraSystem::with_noise(int camera, Rng& rng) const {
   const CameraMountCfg& c = cfg_.cameras[camera];
   Lens lens = rest_[camera];
+  if (!c.has_noise()) return lens;
   lens.fovy += around(rng, c.fovy_noise);
   const Vec3 move = around(rng, c.pos_noise);
   const Quat turn = turned(around(rng, c.rot_noise));
@@ -151,12 +152,14 @@ double CameraSystem::least_visible(int camera, const World& world, const Lens& l
 std::string CameraSystem::orbit(int camera, const World& world, Rng& rng, Vec3 centre,
                                 std::span<const int> objects, double best, Lens& out) const {
   const CameraMountCfg& c = cfg_.cameras[camera];
+  // The target of another mount is a point of its body.
+  const Vec3 aim = c.mount == MountKind::kOrbit ? centre + vec(c.target) : centre;
   for (int attempt = 0; attempt < c.max_attempts; ++attempt) {
     const double far = rng.uniform(c.distance_range[0], c.distance_range[1]);
     const double angle = kRad * rng.uniform(c.azimuth_range[0], c.azimuth_range[1]);
     const double high = rng.uniform(c.height_range[0], c.height_range[1]);
     const Vec3 eye = centre + Vec3{far * std::cos(angle), far * std::sin(angle), high};
-    const Vec3 target = centre + vec(c.target) + around(rng, c.target_noise);
+    const Vec3 target = aim + around(rng, c.target_noise);
     if (!(norm(target - eye) > 1e-6)) continue;
     const Lens lens{look_at(eye, target, {0, 0, 1}), out.fovy};
     if (c.min_visible > 0 && is_inside(simulation_->rays(), world.id, lens.pose)) continue;

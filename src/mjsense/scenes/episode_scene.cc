@@ -455,11 +455,12 @@ Pose EpisodeScene::sample(int world, std::span<const int> wanted, std::uint64_t 
     }
     lay_out(resting, wanted, {present, static_cast<std::size_t>(n)}, regions,
             {cfg_.gap, cfg_.target_gap, cfg_.drop}, rng, poses, region_of);
+    std::vector<int> absent;
     for (int i = 0; i < n; ++i) {
       put(i, poses[i], state);
-      if (!present[i] && simulation_)
-        simulation_->worlds().hold(world, model_->body_jntadr[objects_[i].body]);
+      if (!present[i]) absent.push_back(model_->body_jntadr[objects_[i].body]);
     }
+    if (simulation_) simulation_->worlds().hold(world, absent);
     if (target >= 0) support_[world] = regions[region_of[target]].height;
   } else if (n > 0 && target >= 0) {
     set_target(world, target, state);

@@ -372,15 +372,18 @@ void Worlds::bring_late(const mjModel* m, mjData* d, int w, mjtStage stage) {
   if (swap) mj_setState(m, d, mjb_state(batch_) + controls, kControls);
 }
 
-void Worlds::hold(int world, int joint) {
+void Worlds::hold(int world, std::span<const int> joints) {
   const mjModel* m = model();
-  if (joint < 0 || joint >= m->njnt || m->jnt_type[joint] != mjJNT_FREE)
-    throw ValueError(fmt::format("hold: joint {} is not a free joint", joint));
   int size = 0;
   const mjtNum* qpos = mjb_stateComponent(batch_, mjSTATE_QPOS, &size) + world * num_state_;
-  Held held{m->jnt_qposadr[joint], m->jnt_dofadr[joint], {}};
-  std::copy_n(qpos + held.qpos, 7, held.pose);
-  held_[world].push_back(held);
+  held_[world].clear();
+  for (int joint : joints) {
+    if (joint < 0 || joint >= m->njnt || m->jnt_type[joint] != mjJNT_FREE)
+      throw ValueError(fmt::format("hold: joint {} is not a free joint", joint));
+    Held held{m->jnt_qposadr[joint], m->jnt_dofadr[joint], {}};
+    std::copy_n(qpos + held.qpos, 7, held.pose);
+    held_[world].push_back(held);
+  }
 }
 
 void Worlds::keep_held(mjData* d, int w) const {

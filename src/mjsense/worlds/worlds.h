@@ -82,9 +82,10 @@ class Worlds {
   void reset(WorldIds ids, int key, WorldHooks& hooks);
   // Plain mj_step: derived fields stay one substep behind the state, as MuJoCo's users know it.
   void step_raw(int substeps);
-  // Keeps the body of a free joint at rest where the world's state has it, until the world's next reset: after
-  // every physics step its pose is written back and its velocity is zero. For bodies that take no part.
-  void hold(int world, int joint);
+  // Keeps the bodies of these free joints, and no others, at rest where the world's state has them, until the world's
+  // next reset: after every physics step their poses are written back and their velocities are zero. For bodies that
+  // take no part.
+  void hold(int world, std::span<const int> joints);
   // refreshed() on worlds as they are. State rows written since the last call are made current
   // first.
   void visit(WorldIds ids, WorldHooks& hooks);

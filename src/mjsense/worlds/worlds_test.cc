@@ -855,7 +855,7 @@ TEST(Worlds, RejectsNonsense) {
 TEST(Hold, KeepsABodyWhereItIsUntilTheReset) {
   for (const char* integrator : {"Euler", "RK4", "implicitfast"}) {
     const ModelPtr m = load(integrator);
-    const int joint = m->njnt - 1;
+    const int joint[] = {m->njnt - 1}, hinge[] = {0};
     Worlds worlds(m.get(), 2, 1);
     Recording hooks(2);
     const auto box = [&](int world) {
@@ -883,7 +883,7 @@ TEST(Hold, KeepsABodyWhereItIsUntilTheReset) {
       worlds.step(20, hooks);
       EXPECT_EQ(box(0), box(1));
     }
-    EXPECT_THROW(worlds.hold(0, 0), ValueError);
+    EXPECT_THROW(worlds.hold(0, hinge), ValueError);
   }
 }
 
