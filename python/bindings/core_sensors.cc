@@ -22,6 +22,7 @@
 #include "mjsense/robots/grasp_state.h"
 #include "python/bindings/bindings.h"
 #include "python/bindings/sensor_handle.h"
+#include "python/bindings/task_view.h"
 
 namespace mjsense::python {
 
@@ -61,9 +62,14 @@ SensorHandle camera_parameters(const std::string& name, const std::string& camer
 
 SensorHandle env_states(const std::string& name, const std::string& articulation,
                         const std::vector<Group>& groups, int length, const std::string& robot_body,
-                        const std::string& robot) {
+                        const std::string& robot, const TaskView* view) {
+  Presence presence;
+  if (view) {
+    presence = {view->task().absentees(),
+                [task = *view](int world, int body) { return task.task().present(world, body); }};
+  }
   return {std::make_shared<EnvStatesSensor>(name, articulation, groups_of(groups), length,
-                                            robot_body, robot)};
+                                            robot_body, robot, std::move(presence))};
 }
 
 SensorHandle grasp_state(const std::string& name, const std::string& object,
@@ -102,7 +108,7 @@ void bind_core_sensors(nb::module_& m) {
   m.def("make_camera_parameters", &camera_parameters, nb::arg("name"), nb::arg("camera"),
         nb::arg("width"), nb::arg("height"));
   m.def("make_env_states", &env_states, nb::arg("name"), nb::arg("articulation"), nb::arg("groups"),
-        nb::arg("length"), nb::arg("robot_body"), nb::arg("robot"));
+        nb::arg("length"), nb::arg("robot_body"), nb::arg("robot"), nb::arg("view").none());
   m.def("make_grasp_state", &grasp_state, nb::arg("name"), nb::arg("object"), nb::arg("grippers"));
   m.def("make_image_points", &image_points, nb::arg("name"), nb::arg("objects"),
         nb::arg("cameras"));

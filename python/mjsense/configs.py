@@ -753,8 +753,7 @@ class SceneFileCfg(_config_methods.SceneFileCfg):
     drop: float = 0.0003
     """Height above the surface at which objects start. [m]"""
     count: Sequence[int] = (-1, -1)
-    """Minimum and maximum number of objects that are present, the target included; -1: all. The others are parked far
-    away."""
+    """Objects that are there, the target among them, least and most; -1: all. The others are absent."""
     models: Callable[[], SceneCfg] | None = None
     """Function that makes the models, instead of ``base`` and ``entities``."""
 

@@ -219,7 +219,8 @@ class EnvStatesSensor(CoreSensor):
 
     Fields ``actors/<body>`` float32 ``[B, 13]`` (m, wxyz, m/s, rad/s: MuJoCo's qpos and qvel of the free joint);
     ``articulations/<name>`` float64 ``[B, nq + nv]`` of the robot and of every body with joints inside; and, where it is asked for,
-    MolmoSpaces' ``articulations/<articulation>`` float32 ``[B, length]`` (qpos of all groups, then their qvel, then zeros).
+    MolmoSpaces' ``articulations/<articulation>`` float32 ``[B, length]`` (qpos of all groups, then their qvel, then zeros). In an
+    environment ``present/<body>`` bool ``[B]`` of each object that can be absent from an episode; an absent one's row is zeros.
     """
 
     def __init__(
@@ -251,7 +252,7 @@ class EnvStatesSensor(CoreSensor):
         if not body and sim._view is not None and sim._view.base_body > 0:
             body = sim.model.body(sim._view.base_body).name
         addresses = _sim_groups(sim, f"sensor '{self.name}'", groups)
-        return _core.make_env_states(self.name, articulation, addresses, length, body, robot)
+        return _core.make_env_states(self.name, articulation, addresses, length, body, robot, sim._view)
 
 
 @checked

@@ -96,6 +96,39 @@ def test_a_pick_as_molmospaces_readers_know_it(mjsense):
     mjsense("verify", "data")
 
 
+def test_absent_objects_are_marked(mjsense):
+    """`floor` has 12 objects, 6 to 10 of them in an episode: the others are NaN in the file, and not present."""
+    mjsense("record", "nav_to_obj", "--episodes", 2, "--horizon", 3, "--keep-failures", "--cameras", "none", "--no-sheet", "--out", "data")
+    with h5py.File(mjsense.folder / "data/house_0/trajectories_batch_1_of_1.h5") as file:
+        for traj in file.values():
+            present = {name: flags[()] for name, flags in traj["env_states/present"].items()}
+            assert set(present) == set(traj["env_states/actors"]) and len(present) == 12
+            assert all(flags.dtype == bool and (flags == flags[0]).all() for flags in present.values())
+            assert 6 <= sum(flags[0] for flags in present.values()) <= 10
+            for name, flags in present.items():
+                rows_of = traj["env_states/actors"][name][()]
+                assert np.isfinite(rows_of).all() if flags[0] else np.isnan(rows_of).all(), name
+                assert not flags[0] or np.abs(rows_of[:, :3]).max() < 50
+            scene = json.loads(traj["obs_scene"][()])
+            target = scene["objects"]["pickup_obj"]
+            assert present[target["actor"]].all() and target["body"].rpartition("/")[2] in target["actor"]
+    mjsense("verify", "data")
+    told = json.loads(mjsense("inspect", "data", "--json").stdout)
+    actors = [stream for stream in told["streams"] if "env_states/actors/" in stream["name"]]
+    assert actors and all(np.max(stream["max"]) < 50 for stream in actors if stream["count"] > 0)
+
+
+def test_task_info_is_json_by_the_standard(mjsense):
+    mjsense("record", "pick_and_place", "--episodes", 2, "--horizon", 3, "--keep-failures", "--cameras", "none", "--no-sheet", "--out", "data")
+    with h5py.File(mjsense.folder / "data/house_0/trajectories_batch_1_of_1.h5") as file:
+        for traj in file.values():
+            for row in traj["obs/extra/task_info"][()]:
+                info = json.loads(row.tobytes().rstrip(b"\0"), parse_constant=lambda word: pytest.fail(f"bare {word}"))
+                assert info["carry_forward_pos_diff"] is None or info["supported_by_receptacle"]
+            roles = json.loads(traj["obs_scene"][()])["objects"]
+            assert set(roles) == {"pickup_obj", "place_receptacle"} and all({"body", "actor"} == set(r) for r in roles.values())
+
+
 def test_the_same_bytes_with_other_worlds_and_threads(mjsense):
     common = [*QUICK, "--episodes", 3, "--no-sheet"]
     mjsense(*common, "--seed", 5, "--worlds", 1, "--threads", 1, "--out", "a")

@@ -40,7 +40,7 @@ def test_numbers_by_move_group(env):
     assert list(observation["qpos"]) == ["arm", "gripper"]  # a base has no joints
     assert observation["qpos"]["arm"].shape == (3, 7) and (observation["qpos"]["arm"][:, 3] < -1).all()
     assert space["actions/joint_pos"]["gripper"].high == 255
-    assert set(observation["env_states"]) == {"actors", "articulations"} and "mug" in observation["env_states"]["actors"]
+    assert set(observation["env_states"]) == {"actors", "articulations", "present"} and "mug" in observation["env_states"]["actors"]
     given = observation["actions/commanded_action"]["given"]
     assert not given["arm"].any() and observation["actions/ee_pose"]["given"]["arm"].all()
     assert env.specs["qpos/arm"].unit == "rad" and env.rows["qpos/arm"].shape == (3, 7)

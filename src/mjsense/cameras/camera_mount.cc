@@ -18,9 +18,13 @@ bool any(const std::array<double, 3>& v) {
 
 }  // namespace
 
+bool CameraMountCfg::has_noise() const {
+  return fovy_noise > 0 || any(pos_noise) || any(rot_noise) || any(target_noise);
+}
+
 bool CameraMountCfg::varies() const {
-  return mount == MountKind::kOrbit || (mount == MountKind::kMjcf && fovy) || fovy_noise > 0 ||
-         any(pos_noise) || any(rot_noise) || any(target_noise);
+  return mount == MountKind::kOrbit || (mount == MountKind::kMjcf && fovy) || has_noise() ||
+         min_visible > 0;
 }
 
 void validate(const CameraMountCfg& c, std::string_view place) {

@@ -44,6 +44,7 @@ struct CameraMountCfg {
   // True if the pose or the field of view differs between episodes, or if the field of view is not
   // that of the model.
   bool varies() const;
+  bool has_noise() const;
 };
 template <class V>
 void visit_fields(V& v, CameraMountCfg& c) {
@@ -83,11 +84,12 @@ void visit_fields(V& v, CameraMountCfg& c) {
   v("azimuth_range", c.azimuth_range,
     "orbit: minimum and maximum azimuth, degrees, 0 along the world's x axis.");
   v("min_visible", c.min_visible,
-    "orbit: share of the pixels that each object of the task must cover at the start.")
+    "Share of the pixels that each object of the task must cover at the start. If the pose of a "
+    "mount other than orbit does not show that much, the camera is moved to a pose of an orbit.")
       .within(0, 1);
-  v("max_attempts", c.max_attempts, "orbit: maximum number of poses to try.").at_least(1);
+  v("max_attempts", c.max_attempts, "Maximum number of poses of an orbit to try.").at_least(1);
   v("relaxed", c.relaxed,
-    "orbit: use the best pose if none satisfies min_visible. False: the episode fails.");
+    "Use the best pose if none satisfies min_visible. False: the episode fails.");
   v("fovy_noise", c.fovy_noise, "Noise of the field of view, degrees.").at_least(0);
   v("pos_noise", c.pos_noise,
     "Noise of the position; mjcf: along the camera's axes; body, look_at: along the body's axes; "

@@ -110,6 +110,7 @@ void CameraSystem::initialize(Simulation& simulation) {
 CameraSystem::Lens CameraSystem::with_noise(int camera, Rng& rng) const {
   const CameraMountCfg& c = cfg_.cameras[camera];
   Lens lens = rest_[camera];
+  if (!c.has_noise()) return lens;
   lens.fovy += around(rng, c.fovy_noise);
   const Vec3 move = around(rng, c.pos_noise);
   const Quat turn = turned(around(rng, c.rot_noise));
@@ -138,25 +139,31 @@ CameraSystem::Lens CameraSystem::with_noise(int camera, Rng& rng) const {
   return lens;
 }
 
+// Share of the pixels, of the object that covers the fewest.
+double CameraSystem::least_visible(int camera, const World& world, const Lens& lens,
+                                   std::span<const int> objects) const {
+  const Lookout from{lens.pose, lens.fovy, width(camera), height(camera)};
+  double least = 1;
+  for (double share : visible_shares(simulation_->rays(), world.id, from, objects))
+    least = std::min(least, share);
+  return least;
+}
+
 std::string CameraSystem::orbit(int camera, const World& world, Rng& rng, Vec3 centre,
-                                std::span<const int> objects, Lens& out) const {
+                                std::span<const int> objects, double best, Lens& out) const {
   const CameraMountCfg& c = cfg_.cameras[camera];
-  const double fovy = rest_[camera].fovy + around(rng, c.fovy_noise);
-  double best = -1;
+  // The target of another mount is a point of its body.
+  const Vec3 aim = c.mount == MountKind::kOrbit ? centre + vec(c.target) : centre;
   for (int attempt = 0; attempt < c.max_attempts; ++attempt) {
     const double far = rng.uniform(c.distance_range[0], c.distance_range[1]);
     const double angle = kRad * rng.uniform(c.azimuth_range[0], c.azimuth_range[1]);
     const double high = rng.uniform(c.height_range[0], c.height_range[1]);
     const Vec3 eye = centre + Vec3{far * std::cos(angle), far * std::sin(angle), high};
-    const Vec3 target = centre + vec(c.target) + around(rng, c.target_noise);
+    const Vec3 target = aim + around(rng, c.target_noise);
     if (!(norm(target - eye) > 1e-6)) continue;
-    const Lens lens{look_at(eye, target, {0, 0, 1}), fovy};
-    double least = 1;
-    if (c.min_visible > 0) {
-      const Lookout from{lens.pose, fovy, width(camera), height(camera)};
-      for (double share : visible_shares(simulation_->rays(), world.id, from, objects))
-        least = std::min(least, share);
-    }
+    const Lens lens{look_at(eye, target, {0, 0, 1}), out.fovy};
+    if (c.min_visible > 0 && is_inside(simulation_->rays(), world.id, lens.pose)) continue;
+    const double least = c.min_visible > 0 ? least_visible(camera, world, lens, objects) : 1;
     if (least > best) {
       best = least;
       out = lens;
@@ -171,12 +178,25 @@ std::string CameraSystem::orbit(int camera, const World& world, Rng& rng, Vec3 c
       100 * c.min_visible);
 }
 
+std::string CameraSystem::make_visible(int camera, const World& world, Rng& rng, Vec3 centre,
+                                       std::span<const int> objects, Lens& lens) const {
+  const double wanted = cfg_.cameras[camera].min_visible;
+  if (wanted == 0) return "";
+  const int body = world.model->cam_bodyid[ids_[camera]];
+  const Pose mount{vec3(world.data->xpos + 3 * body), quat(world.data->xquat + 4 * body)};
+  Lens in_world{mount * lens.pose, lens.fovy};
+  const double shown = least_visible(camera, world, in_world, objects);
+  if (shown >= wanted) return "";
+  std::string why = orbit(camera, world, rng, centre, objects, shown, in_world);
+  lens.pose = inverse(mount) * in_world.pose;
+  return why;
+}
+
 std::string CameraSystem::place(const World& world, std::uint64_t seed, std::uint64_t episode,
                                 Vec3 centre, std::span<const int> objects) {
   if (!varies_) return "";
-  const bool looks = std::ranges::any_of(cfg_.cameras, [](const CameraMountCfg& c) {
-    return c.mount == MountKind::kOrbit && c.min_visible > 0;
-  });
+  const bool looks =
+      std::ranges::any_of(cfg_.cameras, [](const CameraMountCfg& c) { return c.min_visible > 0; });
   if (looks) simulation_->rays().update(world);
   for (std::size_t i = 0; i < ids_.size(); ++i) {
     const CameraMountCfg& c = cfg_.cameras[i];
@@ -186,10 +206,13 @@ std::string CameraSystem::place(const World& world, std::uint64_t seed, std::uin
     Rng rng(seed, 0, stream_of("camera/" + c.name), episode);
     Lens lens = rest_[i];
     if (c.mount == MountKind::kOrbit) {
-      std::string why = orbit(camera, world, rng, centre, objects, lens);
+      lens.fovy += around(rng, c.fovy_noise);
+      std::string why = orbit(camera, world, rng, centre, objects, -1, lens);
       if (!why.empty()) return why;
     } else {
       lens = with_noise(camera, rng);
+      std::string why = make_visible(camera, world, rng, centre, objects, lens);
+      if (!why.empty()) return why;
     }
     const std::size_t at = static_cast<std::size_t>(world.id) * world.model->ncam + ids_[i];
     write_vec(lens.pose.p, pos_ + 3 * at);

@@ -84,8 +84,14 @@ class CameraSystem {
     double fovy;
   };
   Lens with_noise(int camera, Rng& rng) const;
+  // Searches for a lens in the world that shows more than `best`, the share that `out` shows.
   std::string orbit(int camera, const World& world, Rng& rng, Vec3 centre,
-                    std::span<const int> objects, Lens& out) const;
+                    std::span<const int> objects, double best, Lens& out) const;
+  // Moves a lens that does not show enough of the objects.
+  std::string make_visible(int camera, const World& world, Rng& rng, Vec3 centre,
+                           std::span<const int> objects, Lens& lens) const;
+  double least_visible(int camera, const World& world, const Lens& lens,
+                       std::span<const int> objects) const;
 
   CameraSystemCfg cfg_;
   std::vector<Mounted> mounted_;

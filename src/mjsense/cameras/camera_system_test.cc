@@ -302,5 +302,45 @@ TEST(CameraSystem, ErrorsNameTheCamera) {
   EXPECT_THROW(Bench bench(unknown), KeyError);
 }
 
+// A camera that asks for visible objects keeps its pose where it shows them and is moved where it does not.
+TEST(CameraSystem, ACameraThatDoesNotShowTheObjectIsMoved) {
+  CameraSystemCfg cfg;
+  cfg.cameras = {mount("sees", MountKind::kFixed), mount("blocked", MountKind::kFixed),
+                 mount("turned", MountKind::kLookAt)};
+  cfg.cameras[0].pos = {0, -1, 0};
+  cfg.cameras[1].pos = {1, 0, 0};  // behind the wall
+  cfg.cameras[2].pos = {.1, .2, .3};
+  cfg.cameras[2].target = {0, 0, 5};  // the ceiling
+  for (CameraMountCfg& c : cfg.cameras) {
+    c.min_visible = .002;
+    c.distance_range = {.6, 1};
+    c.height_range = {.1, .4};
+  }
+  Bench bench(cfg);
+  for (std::uint64_t episode = 0; episode < 10; ++episode) {
+    ASSERT_EQ(bench.place(0, {episode}), "");
+    expect_near(bench.pose("sees").p, {0, -1, 0}, 1e-9);
+    for (const char* name : {"blocked", "turned"}) {
+      const Pose pose = bench.pose(name);
+      EXPECT_LT(pose.p.x, .4) << name << " is still behind the wall";
+      expect_near(forward(pose), normalized(-pose.p), 1e-9);
+    }
+  }
+  EXPECT_EQ(nlohmann::json::parse(bench.cameras.frozen(0))["turned"]["body"], "robot_0/base");
+}
+
+// From inside a box a camera would see out through its walls.
+TEST(Visibility, ACameraInsideAGeomIsFound) {
+  Bench bench(CameraSystemCfg{});
+  Hooks hooks([&](const World& w) {
+    bench.sim->rays().update(w);
+    const RayScene& rays = bench.sim->rays();
+    EXPECT_TRUE(is_inside(rays, 0, look_at({.4, 0, .3}, {0, 0, 0}, {0, 0, 1})));
+    EXPECT_FALSE(is_inside(rays, 0, look_at({.3, 0, .3}, {0, 0, 0}, {0, 0, 1})));
+    EXPECT_FALSE(is_inside(rays, 0, look_at({0, -1, .3}, {0, 0, 0}, {0, 0, 1})));
+  });
+  bench.sim->worlds().visit(all_worlds, hooks);
+}
+
 }  // namespace
 }  // namespace mjsense

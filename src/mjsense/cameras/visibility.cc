@@ -11,6 +11,7 @@ namespace mjsense {
 namespace {
 
 constexpr double kMostRays = 16384;
+constexpr std::uint32_t kDrawn = 0b111;  // groups 0 to 2
 
 }  // namespace
 
@@ -18,7 +19,7 @@ std::vector<double> visible_shares(const RayScene& rays, int world, const Lookou
                                    std::span<const int> bodies) {
   const mjModel* m = rays.model();
   RayFilter filter;
-  filter.groups = 0b111;
+  filter.groups = kDrawn;
   filter.backfaces = RayFilter::Backfaces::kCull;
   RayScratch scratch(rays.num_objects());
 
@@ -56,6 +57,16 @@ std::vector<double> visible_shares(const RayScene& rays, int world, const Lookou
     shares.push_back(static_cast<double>(count) / (static_cast<double>(rows) * columns));
   }
   return shares;
+}
+
+bool is_inside(const RayScene& rays, int world, const Pose& camera) {
+  RayFilter filter;
+  filter.groups = kDrawn;
+  double eye[3], up[3];
+  write_vec(camera.p, eye);
+  write_vec(rotate(camera.q, {0, 1, 0}), up);
+  const Hit hit = rays.trace(world, filter, eye, up);
+  return hit.geom >= 0 && hit.normal[0] * up[0] + hit.normal[1] * up[1] + hit.normal[2] * up[2] > 0;
 }
 
 }  // namespace mjsense

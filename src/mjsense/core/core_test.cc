@@ -156,6 +156,15 @@ TEST(Json, WritesPaddedSortedAsciiRows) {
   EXPECT_EQ(row.back(), 0);
 }
 
+TEST(Json, NumbersThatAreNotFiniteBecomeNullOnRequest) {
+  std::vector<std::uint8_t> row(64);
+  JsonWriter json(row);
+  const double bad[] = {std::nan(""), -std::numeric_limits<double>::infinity(), 1};
+  json.finite_only().values(bad);
+  ASSERT_TRUE(json.finish());
+  EXPECT_STREQ(reinterpret_cast<char*>(row.data()), "[null,null,1.0]");
+}
+
 TEST(Json, WritesWholeNumbersOfEitherSign) {
   std::vector<std::uint8_t> row(64);
   JsonWriter json(row);

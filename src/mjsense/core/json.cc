@@ -77,6 +77,10 @@ JsonWriter& JsonWriter::key(std::string_view name) {
 JsonWriter& JsonWriter::value(double x) {
   char text[32];
   separate();
+  if (finite_only_ && !std::isfinite(x)) {
+    put("null");
+    return *this;
+  }
   put(std::string_view(text, format_python_float(x, text)));
   return *this;
 }

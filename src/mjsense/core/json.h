@@ -16,6 +16,12 @@ class JsonWriter {
   // Writes into `row`; finish() fills the unused bytes with 0.
   explicit JsonWriter(std::span<std::uint8_t> row) : row_(row) {}
 
+  // Writes NaN and infinities as null from here on, so that the text is standard JSON.
+  JsonWriter& finite_only() {
+    finite_only_ = true;
+    return *this;
+  }
+
   // Members of an object must be written in sorted order of their keys; otherwise std::logic_error
   // is thrown.
   JsonWriter& begin_object();
@@ -53,6 +59,7 @@ class JsonWriter {
   std::span<std::uint8_t> row_;
   std::size_t size_ = 0;
   bool comma_ = false;
+  bool finite_only_ = false;
   static constexpr int kMaxDepth = 16;
   static constexpr int kMaxKey = 64;
   int depth_ = 0;

@@ -8,6 +8,8 @@
 
 #include "mjsense/core/error.h"
 #include "mjsense/episode/policy.h"
+#include "mjsense/observe/env_states.h"
+#include "mjsense/scene/resolve.h"
 
 namespace mjsense {
 
@@ -164,6 +166,15 @@ std::string Task::obs_scene(int world) const {
     auto& list = expressions[role] = nlohmann::ordered_json::array();
     for (const Referral& referral : referrals)
       list.push_back({referral.text, referral.probability});
+  }
+  auto& bodies = scene["objects"] = nlohmann::ordered_json::object();
+  const int base = robot().base_body() > 0 ? robot().base_body() : -1;
+  const auto actors = actors_of(model(), base);
+  for (const TaskObject& object : objects(world)) {
+    if (object.body < 0) continue;
+    bodies[object.role]["body"] = name_of(model(), mjOBJ_BODY, object.body);
+    const auto actor = std::ranges::find(actors, object.body, &std::pair<int, std::string>::first);
+    if (actor != actors.end()) bodies[object.role]["actor"] = actor->second;
   }
   if (policy_ && !policy_->phases().empty()) {
     auto& phases = scene["policy_phases"] = nlohmann::ordered_json::object();

@@ -175,6 +175,10 @@ class Task {
   // may change.
   virtual std::span<const TaskObject> objects(int world) const = 0;
   virtual std::string description(int world) const = 0;  // "Pick up the mug"
+  // Bodies with a free joint that are absent from some episodes, and whether one of them takes part in this world's.
+  // An absent body is held far away.
+  virtual std::vector<int> absentees() const { return {}; }
+  virtual bool present(int /*world*/, int /*body*/) const { return true; }
   using Referrals = std::vector<std::pair<std::string, std::vector<Referral>>>;  // by role
   virtual Referrals referrals(int world) const = 0;
   // Pose of the object with this role at the first observation, and its goal pose. Both throw

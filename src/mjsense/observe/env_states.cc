@@ -12,13 +12,14 @@ namespace mjsense {
 
 EnvStatesSensor::EnvStatesSensor(std::string name, std::string articulation,
                                  std::vector<JointGroup> groups, int length, std::string robot_body,
-                                 std::string robot)
+                                 std::string robot, Presence presence)
     : Sensor(std::move(name)),
       articulation_(std::move(articulation)),
       robot_(std::move(robot)),
       groups_(std::move(groups)),
       length_(length),
-      robot_body_(std::move(robot_body)) {
+      robot_body_(std::move(robot_body)),
+      presence_(std::move(presence)) {
   int needed = 0;
   for (const JointGroup& group : groups_)
     needed += static_cast<int>(group.qpos.size() + group.dof.size());
@@ -27,6 +28,25 @@ EnvStatesSensor::EnvStatesSensor(std::string name, std::string articulation,
     throw ValueError(fmt::format("sensor '{}': articulation '{}' needs {} numbers, length is {}",
                                  this->name(), articulation_, needed, length_));
   }
+}
+
+std::vector<std::pair<int, std::string>> actors_of(const mjModel* m, int robot) {
+  std::vector<std::pair<int, std::string>> found;
+  std::vector<std::string> last;
+  for (int j = 0; j < m->njnt; ++j) {
+    const int body = m->jnt_bodyid[j];
+    if (m->jnt_type[j] != mjJNT_FREE) continue;
+    if (robot >= 0 && is_below(m, body, robot)) continue;
+    const char* name = mj_id2name(m, mjOBJ_BODY, body);
+    found.emplace_back(body, name ? name : fmt::format("body_{}", body));
+    last.push_back(found.back().second.substr(found.back().second.rfind('/') + 1));
+  }
+  for (std::size_t i = 0; i < found.size(); ++i) {
+    std::string& actor = found[i].second;
+    if (std::ranges::count(last, last[i]) == 1) actor = last[i];
+    std::ranges::replace(actor, '/', '_');
+  }
+  return found;
 }
 
 // Kinematic trees with a joint that is not free, and the robot's tree.
@@ -63,24 +83,16 @@ void EnvStatesSensor::initialize(const SensorInit& init) {
                         : object_id(m, mjOBJ_BODY, fmt::format("sensor '{}'", name()), robot_body_);
   clear_fields();
   actors_.clear();
-  std::vector<std::string> full, last;
-  for (int j = 0; j < m->njnt; ++j) {
-    const int body = m->jnt_bodyid[j];
-    if (m->jnt_type[j] != mjJNT_FREE) continue;
-    if (robot >= 0 && is_below(m, body, robot)) continue;
-    const char* name = mj_id2name(m, mjOBJ_BODY, body);
-    full.push_back(name ? name : fmt::format("body_{}", body));
-    last.push_back(full.back().substr(full.back().rfind('/') + 1));
-    actors_.push_back({m->jnt_qposadr[j], m->jnt_dofadr[j]});
-  }
-  for (std::size_t i = 0; i < full.size(); ++i) {
-    std::string actor = std::ranges::count(last, last[i]) == 1 ? last[i] : full[i];
-    std::ranges::replace(actor, '/', '_');
+  for (const auto& [body, actor] : actors_of(m, robot)) {
+    const bool leaves = std::ranges::count(presence_.bodies, body) > 0;
+    const int j = m->body_jntadr[body];
+    actors_.push_back({m->jnt_qposadr[j], m->jnt_dofadr[j], leaves ? body : -1});
     SensorSpec spec;
     spec.shape = {13};
     spec.unit = "m, wxyz, m/s, rad/s";
     spec.frame = "world (angular velocity: body)";
     spec.description = "Free joint of the body: position, quaternion, linear and angular velocity.";
+    if (leaves) spec.description += " While it is absent: zeros, NaN in a file.";
     add_field(fmt::format("actors/{}", actor), spec, init.num_worlds);
   }
   articulations_.clear();
@@ -93,18 +105,37 @@ void EnvStatesSensor::initialize(const SensorInit& init) {
     spec.description = "qpos of all its joints in the model's order, then their qvel.";
     add_field(fmt::format("articulations/{}", each.name), spec, init.num_worlds);
   }
-  if (articulation_.empty()) return;
-  SensorSpec spec;
-  spec.shape = {length_};
-  spec.unit = "rad or m, rad/s or m/s";
-  spec.description = "qpos of the robot's move groups in order, then their qvel, then zeros.";
-  add_field(fmt::format("articulations/{}", articulation_), spec, init.num_worlds);
+  if (!articulation_.empty()) {
+    SensorSpec spec;
+    spec.shape = {length_};
+    spec.unit = "rad or m, rad/s or m/s";
+    spec.description = "qpos of the robot's move groups in order, then their qvel, then zeros.";
+    add_field(fmt::format("articulations/{}", articulation_), spec, init.num_worlds);
+  }
+  for (std::size_t i = 0; i < actors_.size(); ++i) {
+    if (actors_[i].body < 0) continue;
+    SensorSpec spec;
+    spec.dtype = DType::kBool;
+    spec.shape = {};
+    spec.description = "Whether the body takes part in the episode.";
+    actors_[i].field = static_cast<int>(fields().size());
+    const std::string actor = fields()[i].name.substr(std::string_view("actors/").size());
+    add_field(fmt::format("present/{}", actor), spec, init.num_worlds);
+  }
 }
 
 void EnvStatesSensor::compute(const World& world) {
   const mjData* d = world.data;
   for (std::size_t i = 0; i < actors_.size(); ++i) {
     const auto row = fields()[i].data.row<float>(world.id);
+    if (actors_[i].body >= 0) {
+      const bool present = presence_.present(world.id, actors_[i].body);
+      fields()[actors_[i].field].data.row<bool>(world.id)[0] = present;
+      if (!present) {
+        std::ranges::fill(row, 0.0f);
+        continue;
+      }
+    }
     for (int k = 0; k < 7; ++k) row[k] = static_cast<float>(d->qpos[actors_[i].qpos + k]);
     for (int k = 0; k < 6; ++k) row[7 + k] = static_cast<float>(d->qvel[actors_[i].dof + k]);
   }
@@ -116,7 +147,7 @@ void EnvStatesSensor::compute(const World& world) {
     for (int address : each.dof) row[n++] = d->qvel[address];
   }
   if (articulation_.empty()) return;
-  const auto row = fields().back().data.row<float>(world.id);
+  const auto row = fields()[actors_.size() + articulations_.size()].data.row<float>(world.id);
   std::size_t n = 0;
   for (const JointGroup& group : groups_) {
     for (int address : group.qpos) row[n++] = static_cast<float>(d->qpos[address]);

@@ -3,13 +3,25 @@
 // `env_states`: the state that is needed to restore the scene: every free body, the robot's joints,
 // and those of articulated objects.
 
+#include <functional>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "mjsense/core/sensor.h"
 #include "mjsense/observe/joint_state.h"
 
 namespace mjsense {
+
+// Which free bodies can be absent from an episode, and whether one of them takes part in that of a world.
+struct Presence {
+  std::vector<int> bodies;
+  std::function<bool(int world, int body)> present;
+};
+
+// Bodies with a free joint outside a robot, in the order of their joints, and the names of their actors. `robot`: free
+// bodies at or below it are no actors; -1: all are.
+std::vector<std::pair<int, std::string>> actors_of(const mjModel* model, int robot);
 
 // Streams
 //   env_states/articulations/<name>   float64 [nq + nv]: qpos, then qvel, of all joints of a
@@ -19,13 +31,15 @@ namespace mjsense {
 //                                     each such tree of the scene, by the name of its root body.
 //   env_states/actors/<name>          float32 [13]: position 3 (m), quaternion 4 (wxyz), velocity 6
 //                                     (m/s in world axes, rad/s in body axes): MuJoCo's qpos and
-//                                     qvel of the free joint. Writing them back restores the body.
-//                                     One stream for each free body outside the robot.
-//   env_states/articulations/<articulation>
-//                                     float32 [N]: qpos of all groups in order, then their qvel,
-//                                     then zeros: MolmoSpaces' row, if it is requested
-// An actor has the name of its body without the entity's prefix ("mug" for "mug/mug") if that is
-// unique. Otherwise it has the full name with '_' for '/', which would create a group in a file.
+//                                     qvel of the free joint, which written back restore the body.
+//                                     One for each free body outside the robot. Zeros while the
+//                                     body is absent
+//   env_states/present/<name>         bool []: whether the actor takes part in the episode; one for
+//                                     each actor that can be absent
+//   env_states/articulations/<peer>   float32 [N]: qpos of all groups in order, then their qvel,
+//                                     then zeros: MolmoSpaces' row, where it is asked for
+// An actor is called as its body, without the entity's prefix ("mug" for "mug/mug") where that is
+// unique, else with '_' for '/', which would make a folder of it in a file.
 class EnvStatesSensor final : public Sensor {
  public:
   // `length`: N, at least the number of values of the groups; 0: exactly that number. `robot_body`:
@@ -33,7 +47,8 @@ class EnvStatesSensor final : public Sensor {
   // MolmoSpaces' row; "": no such row. `robot`: name of the robot's float64 row; "": no float64
   // rows, neither of the robot nor of the scene.
   EnvStatesSensor(std::string name, std::string articulation, std::vector<JointGroup> groups,
-                  int length, std::string robot_body, std::string robot = "");
+                  int length, std::string robot_body, std::string robot = "",
+                  Presence presence = {});
   std::string_view kind() const override { return "env_states"; }
   mjtStage needs() const override { return mjSTAGE_NONE; }
   void initialize(const SensorInit& init) override;
@@ -42,6 +57,8 @@ class EnvStatesSensor final : public Sensor {
  private:
   struct Actor {
     int qpos, dof;
+    int body = -1;   // -1: it is never absent
+    int field = -1;  // its flag
   };
   struct Articulation {
     std::string name;
@@ -53,8 +70,10 @@ class EnvStatesSensor final : public Sensor {
   std::vector<JointGroup> groups_;
   int length_;
   std::string robot_body_;
-  std::vector<Actor> actors_;                // field i belongs to actor i
-  std::vector<Articulation> articulations_;  // their fields follow; MolmoSpaces' row is the last
+  Presence presence_;
+  std::vector<Actor> actors_;  // field i belongs to actor i
+  // Their fields follow those of the actors, then MolmoSpaces' row, then the flags.
+  std::vector<Articulation> articulations_;
 };
 
 }  // namespace mjsense

@@ -165,6 +165,28 @@ TEST(EnvStates, ContainsEveryFreeBodyAndTheRobot) {
   EXPECT_THAT(values<float>(least, "articulations/arm"), ElementsAre(.25f, -2));
 }
 
+// While an actor is absent its row is zeros and its flag false; actors that cannot be absent have no
+// flag.
+TEST(EnvStates, AbsentActorsAreMasked) {
+  TestWorld w(R"(<mujoco><worldbody><body name="a/cup"><freejoint/><geom size=".1"/></body>
+    <body name="a/mug" pos="2 0 0"><freejoint/><geom size=".1"/></body></worldbody></mujoco>)");
+  bool there = true;
+  EnvStatesSensor states("env_states", "panda", {}, 3, "", "",
+                         {{2}, [&](int /*world*/, int body) { return body != 2 || there; }});
+  w.compute(states);
+  std::vector<std::string> names;
+  for (const Field& f : states.fields()) names.push_back(f.name);
+  EXPECT_THAT(names, ElementsAre("actors/cup", "actors/mug", "articulations/panda", "present/mug"));
+  EXPECT_EQ(values<float>(states, "actors/mug")[0], 2);
+  EXPECT_TRUE(states.fields()[3].data.row<bool>(0)[0]);
+  there = false;
+  states.compute(w.world());
+  EXPECT_THAT(values<float>(states, "actors/mug"),
+              ::testing::ElementsAreArray(std::vector<float>(13)));
+  EXPECT_EQ(values<float>(states, "actors/cup")[3], 1);
+  EXPECT_FALSE(states.fields()[3].data.row<bool>(0)[0]);
+}
+
 // Actors whose bodies have the same local name are distinguished by the names of their entities.
 TEST(EnvStates, ActorsWithTheSameNameKeepTheirEntities) {
   TestWorld w(R"(<mujoco><worldbody><body name="left/cup"><freejoint/><geom size=".1"/></body>

@@ -80,6 +80,16 @@ void add_videos(const RecordingCfg& cfg, const Sensor& sensor, const Field& fiel
   videos.push_back(video);
 }
 
+// The flag "present/mug" that belongs to the float field "actors/mug" of the same sensor; null if there
+// is none.
+const Field* presence_of(const Sensor& sensor, const Field& field) {
+  constexpr std::string_view kActors = "actors/";
+  if (!field.name.starts_with(kActors) || field.spec.dtype != DType::kFloat32) return nullptr;
+  const std::string flag = "present/" + field.name.substr(kActors.size());
+  const auto found = std::ranges::find(sensor.fields(), flag, &Field::name);
+  return found != sensor.fields().end() && found->spec.dtype == DType::kBool ? &*found : nullptr;
+}
+
 // Two datasets cannot have the same path, and a dataset cannot be a group.
 void check_places(const std::map<std::string, std::string>& owners) {
   for (const auto& [place, owner] : owners) {
@@ -198,7 +208,7 @@ RecordingPlan plan_recording(const RecordingCfg& cfg) {
     for (const Field& field : sensor->fields()) {
       note(field.spec);
       if (field.spec.storage == Storage::kArray) {
-        add_array({.spec = field.spec, .field = &field});
+        add_array({.spec = field.spec, .field = &field, .present = presence_of(*sensor, field)});
       } else {
         const std::size_t first = plan.videos.size();
         add_videos(cfg, *sensor, field, plan.videos);

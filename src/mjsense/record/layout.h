@@ -22,6 +22,7 @@ struct ArrayStream {
   SensorSpec spec;                       // of the dataset
   const Field* field = nullptr;          // null if it is text of several fields
   std::shared_ptr<const JsonRows> text;  // null if it is a single field
+  const Field* present = nullptr;        // bool; the row is NaN where it is false. Null: no flag
   std::string place;                     // path in the trajectory's group: "obs/extra/tcp_pose"
   std::int64_t chunk_rows = 1;
 

@@ -113,6 +113,25 @@ TEST(Layout, EveryFieldHasAPath) {
   EXPECT_EQ(plan_recording(cfg).videos.size(), p.videos.size() + 1);
 }
 
+// An actor's row depends on its own flag; an actor without a flag is always present.
+TEST(Layout, FlagsOfPresenceBelongToTheirActors) {
+  struct States final : Sensor {
+    States() : Sensor("env_states") {
+      for (const char* actor : {"actors/cup", "actors/mug"})
+        add_field(actor, spec(DType::kFloat32, {13}), 2);
+      add_field("present/mug", spec(DType::kBool, {}), 2);
+    }
+    std::string_view kind() const override { return "states"; }
+    void initialize(const SensorInit&) override {}
+    void compute(const World&) override {}
+  } states;
+  const RecordingPlan p = plan({&states});
+  ASSERT_EQ(p.arrays.size(), 3u);
+  EXPECT_EQ(p.arrays[0].present, nullptr);
+  EXPECT_EQ(p.arrays[1].present, &states.fields()[2]);
+  EXPECT_EQ(p.arrays[2].place, "env_states/present/mug");
+}
+
 TEST(Layout, StreamsCannotShareAPath) {
   const Plain a("feet", spec(DType::kFloat32, {3})), b("feet", spec(DType::kFloat32, {3}), "force");
   EXPECT_THAT(error_of([&] {

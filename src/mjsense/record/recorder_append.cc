@@ -2,6 +2,7 @@
 #include <fmt/format.h>
 
 #include <cstring>
+#include <limits>
 
 #include "mjsense/core/error.h"
 #include "mjsense/record/depth.h"
@@ -15,6 +16,11 @@ void copy_row(const ArrayStream& stream, int world, std::uint8_t* to) {
   if (stream.text) return stream.text->copy(world, to);
   const std::byte* from = stream.field->data.row_data(world);
   const std::size_t most = stream.row_bytes();
+  if (stream.present && stream.present->data.row_data(world)[0] == std::byte{0}) {
+    constexpr float kNaN = std::numeric_limits<float>::quiet_NaN();
+    for (std::size_t at = 0; at < most; at += sizeof kNaN) std::memcpy(to + at, &kNaN, sizeof kNaN);
+    return;
+  }
   // Only the text of a dict row is copied; the rest is zero in both buffers.
   const bool text = stream.spec.is_dict;
   std::memcpy(to, from, text ? strnlen(reinterpret_cast<const char*>(from), most) : most);

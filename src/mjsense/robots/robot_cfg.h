@@ -82,6 +82,7 @@ struct CameraMount {
   std::string mjcf_camera;  // local name
   bool record_depth = false;
   bool image_points = true;
+  double min_visible = 0;  // of CameraMountCfg
 };
 template <class V>
 void visit_fields(V& v, CameraMount& c) {
@@ -90,6 +91,10 @@ void visit_fields(V& v, CameraMount& c) {
   v("camera", c.mjcf_camera, "Name of the camera in the model.").required();
   v("depth", c.record_depth, "Record its depth too.");
   v("image_points", c.image_points, "Use it for ``object_image_points``.");
+  v("min_visible", c.min_visible,
+    "Share of the pixels that each object of the task must cover at the start. If the pose in the "
+    "model does not show that much, the camera is moved to one that does.")
+      .within(0, 1);
 }
 
 // Displacement of the tool that the arm's controllers see and recordings do not; normal, truncated.

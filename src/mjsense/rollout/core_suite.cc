@@ -77,14 +77,16 @@ SensorSuite core_suite(const Task& task, const ActionLog& log,
   // Without a base body everything hangs below the world body, which is not part of the robot.
   const char* base =
       robot.base_body() > 0 ? mj_id2name(task.model(), mjOBJ_BODY, robot.base_body()) : nullptr;
-  suite.add(
-      std::make_shared<EnvStatesSensor>("env_states", cfg.env_state_name, robot.joint_groups(),
-                                        cfg.env_state_size, base ? base : "", cfg.name),
-      of_task);
+  suite.add(std::make_shared<EnvStatesSensor>(
+                "env_states", cfg.env_state_name, robot.joint_groups(), cfg.env_state_size,
+                base ? base : "", cfg.name,
+                Presence{task.absentees(),
+                         [&task](int world, int body) { return task.present(world, body); }}),
+            of_task);
   suite.add(std::make_shared<JsonFunctionSensor>("task_info", kTaskInfoLength,
                                                  "What the task says about the state.",
                                                  [&task](const World& world, JsonWriter& json) {
-                                                   json.begin_object();
+                                                   json.finite_only().begin_object();
                                                    task.write_info(world, json);
                                                    json.end_object();
                                                  }),

@@ -21,6 +21,10 @@ CameraMountCfg of_model(const CameraMount& mount, bool of_scene) {
   out.of_scene = of_scene;
   out.depth = mount.record_depth;
   out.image_points = mount.image_points;
+  out.min_visible = mount.min_visible;
+  out.relaxed = true;
+  out.distance_range = {0.6, 1.1};
+  out.height_range = {0.35, 0.8};
   return out;
 }
 

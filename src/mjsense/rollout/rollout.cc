@@ -303,7 +303,7 @@ void Rollout::place_cameras(std::span<const int> worlds) {
 
 std::string Rollout::obs_scene(int world) const {
   std::string scene = task_->obs_scene(world);
-  if (cfg_.camera_system.empty()) return scene;
+  if (cfg_.camera_system.empty() && !camera_system_->varies()) return scene;
   return fmt::format("{},\"cameras\":{}}}", scene.substr(0, scene.rfind('}')),
                      camera_system_->frozen(world));
 }

@@ -22,12 +22,12 @@ namespace {
 
 using std::numbers::pi;
 
-constexpr double kHand = 0.085;    // m, opening width of common grippers
-constexpr double kBeside = 0.005;  // m, clearance between an open gripper and the object
-constexpr double kReach = 0.25;    // m, maximum radius of an object that can be carried
-constexpr double kInside = 0.002;  // m, penetration
-constexpr double kAway = 100;      // m, position of absent objects
-// Position of an absent object, outside of all cameras' views.
+constexpr double kHand = 0.085;    // m, what the usual grippers open
+constexpr double kBeside = 0.005;  // m, free beside what an open hand goes around
+constexpr double kReach = 0.25;    // m, half of what is still an object to carry
+constexpr double kInside = 0.002;  // m
+constexpr double kAway = 100;      // m, x and y of absent objects
+// Out of sight, a metre apart and above a floor that extends so far.
 Pose away(int object) { return {{kAway + object, kAway, 0.5}, {}}; }
 
 Quat rest_of(std::string_view name) {
@@ -435,7 +435,7 @@ Pose EpisodeScene::sample(int world, std::span<const int> wanted, std::uint64_t 
   const auto n = static_cast<int>(objects_.size());
   char* present = present_.data() + static_cast<std::size_t>(world) * n;
   std::fill(present, present + n, 1);
-  if (cfg_.count[0] > 0 && n > 0) {
+  if (counts_objects()) {
     Rng draw(seed, 0, stream_of("scene/count"), episode);
     const int most = std::min(cfg_.count[1], n), least = std::min(cfg_.count[0], n);
     int many = least + static_cast<int>(draw.below(static_cast<std::uint32_t>(most - least + 1)));
@@ -461,7 +461,12 @@ Pose EpisodeScene::sample(int world, std::span<const int> wanted, std::uint64_t 
     }
     lay_out(resting, wanted, {present, static_cast<std::size_t>(n)}, regions,
             {cfg_.gap, cfg_.target_gap, cfg_.drop}, rng, poses, region_of);
-    for (int i = 0; i < n; ++i) put(i, poses[i], state);
+    std::vector<int> absent;
+    for (int i = 0; i < n; ++i) {
+      put(i, poses[i], state);
+      if (!present[i]) absent.push_back(model_->body_jntadr[objects_[i].body]);
+    }
+    if (simulation_) simulation_->worlds().hold(world, absent);
     if (target >= 0) support_[world] = regions[region_of[target]].height;
   } else if (n > 0 && target >= 0) {
     set_target(world, target, state);
@@ -485,6 +490,22 @@ std::vector<int> EpisodeScene::adopt(int world, std::uint64_t seed, std::uint64_
     if (present) here.push_back(static_cast<int>(i));
   }
   return here;
+}
+
+bool EpisodeScene::counts_objects() const {
+  return cfg_.count[0] > 0 && !objects_.empty() && !regions_.empty();
+}
+
+std::vector<int> EpisodeScene::absentees() const {
+  std::vector<int> bodies;
+  if (!counts_objects() || cfg_.count[0] >= static_cast<int>(objects_.size())) return bodies;
+  for (const SceneObject& object : objects_) bodies.push_back(object.body);
+  return bodies;
+}
+
+bool EpisodeScene::body_present(int world, int body) const {
+  const auto object = std::ranges::find(objects_, body, &SceneObject::body);
+  return object == objects_.end() || present(world, static_cast<int>(object - objects_.begin()));
 }
 
 void EpisodeScene::set_target(int world, int target, const StateRow& state) {

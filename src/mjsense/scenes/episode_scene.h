@@ -58,8 +58,14 @@ class EpisodeScene {
   std::span<const Region> regions() const { return regions_; }
   // Limits targets to some regions: one flag per region, at least one of them true.
   void set_target_regions(std::span<const char> flags);
-  // Whether an object is present in this world's episode. Absent objects are placed far away.
+  // Whether an object is present in this world's episode. Absent objects are held at rest far away:
+  // they do not fall and touch nothing.
   bool present(int world, int object) const { return present_[world * objects_.size() + object]; }
+
+  // Bodies of the objects that are absent from some episodes.
+  std::vector<int> absentees() const;
+  // Whether a body is present in this world's episode; true for bodies that are not objects.
+  bool body_present(int world, int body) const;
 
   // Shape at the object's size in the current episode of this world. Valid for the lifetime of the
   // scene.
@@ -103,6 +109,8 @@ class EpisodeScene {
   std::string fault(const World& world) const;
 
  private:
+  // Whether `count` selects a subset of the objects.
+  bool counts_objects() const;
   // Whether the entity is an object that every episode places.
   bool is_placed(const SceneEntityCfg& entity) const;
   void find_objects(std::string_view robot_prefix);

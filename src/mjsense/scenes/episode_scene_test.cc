@@ -400,5 +400,39 @@ TEST(EpisodeScene, FaultsNameWhatIsWrong) {
   EXPECT_THAT(fault([](auto& c) { c.entities[1].name = "b"; }), HasSubstr("two entities"));
 }
 
+// Absent objects neither move nor touch anything, though the floor extends to where they are.
+TEST(EpisodeScene, AbsentObjectsAreInert) {
+  Files files;
+  files.cfg.count = {1, 1};
+  Played played(files.cfg);
+  EXPECT_EQ(played.scene.absentees().size(), 3u);
+  played.sim->reset();
+  played.start(1, 2);  // a start that is drawn again
+  played.start(0, 1);
+  std::vector<Vec3> before;
+  for (int i = 0; i < 3; ++i) before.push_back(played.at(i));
+  for (int k = 0; k < 200; ++k) played.sim->step();
+  const double* qvel = state_row(played.sim->worlds(), 0).qvel;
+  const mjModel* m = played.sim->model();
+  for (const int i : {0, 2}) {
+    const int body = played.scene.objects()[i].body;
+    EXPECT_FALSE(played.scene.body_present(0, body));
+    EXPECT_EQ(norm(played.at(i) - before[i]), 0);
+    for (int k = 0; k < 6; ++k) EXPECT_EQ(qvel[m->jnt_dofadr[m->body_jntadr[body]] + k], 0);
+  }
+  EXPECT_TRUE(played.scene.body_present(0, played.scene.objects()[1].body));
+  EXPECT_NE(played.at(1).z, before[1].z) << "what is present is not held";
+  EXPECT_LT(norm(played.at(1) - before[1]), 0.01);
+
+  files.cfg.count = {-1, -1};
+  EXPECT_TRUE(Played(files.cfg).scene.absentees().empty());
+  files.cfg.count = {1, 1};  // nothing is laid out: all objects are where their models have them
+  files.cfg.regions.clear();
+  Played still(files.cfg);
+  still.start(0, 1);
+  EXPECT_TRUE(still.scene.present(0, 0));
+  EXPECT_TRUE(still.scene.absentees().empty());
+}
+
 }  // namespace
 }  // namespace mjsense

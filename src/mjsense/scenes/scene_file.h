@@ -240,7 +240,7 @@ void visit_fields(V& v, SceneFileCfg& c) {
   v("drop", c.drop, "Height above the surface at which objects start.").unit("m").at_least(0);
   v("count", c.count,
     "Minimum and maximum number of objects that are present, the target included; -1: all. The "
-    "others are parked far away.");
+    "others are absent.");
   v.python("models", "Callable[[], SceneCfg] | None", "None",
            "Function that makes the models, instead of ``base`` and ``entities``.");
 }

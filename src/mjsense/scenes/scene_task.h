@@ -18,6 +18,8 @@ class SceneTask : public Task {
   SceneCfg scene_cfg() const override { return scene_.scene_cfg(robot_entity()); }
   void bind(const std::shared_ptr<Simulation>& simulation) override;
   std::string start_fault(const World& world) const override { return scene_.fault(world); }
+  std::vector<int> absentees() const override { return scene_.absentees(); }
+  bool present(int world, int body) const override { return scene_.body_present(world, body); }
 
  protected:
   EpisodeScene& scene() { return scene_; }

@@ -212,6 +212,7 @@ Worlds::Worlds(const mjModel* model, int num_worlds, int threads) : Worlds() {
   for (Workbench& bench : workbenches_) bench.data = call_mujoco(mj_makeData, mjb_model(batch_));
   clocks_.resize(num_worlds);
   seed(0);
+  held_.resize(num_worlds);
   reset_key_.assign(num_worlds, -1);
   remembered_.resize(num_worlds * num_state_);
   derived_.resize(num_worlds);
@@ -403,6 +404,27 @@ void Worlds::bring_late(const mjModel* m, mjData* d, int w, mjtStage stage) {
   if (swap) mj_setState(m, d, mjb_state(batch_) + controls, kControls);
 }
 
+void Worlds::hold(int world, std::span<const int> joints) {
+  const mjModel* m = model();
+  int size = 0;
+  const mjtNum* qpos = mjb_stateComponent(batch_, mjSTATE_QPOS, &size) + world * num_state_;
+  held_[world].clear();
+  for (int joint : joints) {
+    if (joint < 0 || joint >= m->njnt || m->jnt_type[joint] != mjJNT_FREE)
+      throw ValueError(fmt::format("hold: joint {} is not a free joint", joint));
+    Held held{m->jnt_qposadr[joint], m->jnt_dofadr[joint], {}};
+    std::copy_n(qpos + held.qpos, 7, held.pose);
+    held_[world].push_back(held);
+  }
+}
+
+void Worlds::keep_held(mjData* d, int w) const {
+  for (const Held& held : held_[w]) {
+    std::copy_n(held.pose, 7, d->qpos + held.qpos);
+    std::fill_n(d->qvel + held.dof, 6, 0.0);
+  }
+}
+
 bool Worlds::healthy(int w, const Warnings& warnings) {
   diverged_[w] = static_cast<std::uint8_t>(warnings.fatal() + 1);
   return diverged_[w] == 0;
@@ -447,6 +469,7 @@ bool Worlds::step_whole(const mjModel* m, mjData* d, int w, const Call& call) {
     } else {
       mj_step(m, d);
     }
+    keep_held(d, w);
     mj_checkPos(m, d);
     mj_checkVel(m, d);
     if (!healthy(w, warnings)) return false;
@@ -484,6 +507,7 @@ bool Worlds::step_unseen(const mjModel* m, mjData* d, int w, const Call& call) {
   bool good = healthy(w, warnings);
   for (int k = 0; k < substeps && good; ++k) {
     step_from(mjSTAGE_NONE, m, s);
+    keep_held(s, w);
     mj_checkPos(m, s);
     mj_checkVel(m, s);
     good = healthy(w, warnings);
@@ -519,6 +543,7 @@ void Worlds::run_world(const mjModel* m, mjData* d, int w, const Call& call) {
       } else {
         mj_resetData(m, d);
       }
+      held_[w].clear();
       derived.stage = mjSTAGE_NONE;
       bring(m, d, w, mjSTAGE_ACC);
       remember(m, d, w);
@@ -528,7 +553,10 @@ void Worlds::run_world(const mjModel* m, mjData* d, int w, const Call& call) {
       ++clocks_[w].moment;
       break;
     case Op::kStepRaw:
-      for (int k = 0; k < call.substeps; ++k) mj_step(m, d);
+      for (int k = 0; k < call.substeps; ++k) {
+        mj_step(m, d);
+        keep_held(d, w);
+      }
       clocks_[w].substep += call.substeps;
       clocks_[w].tick += call.substeps;
       ++clocks_[w].moment;

@@ -88,6 +88,10 @@ class Worlds {
   void reset(WorldIds ids, int key, WorldHooks& hooks);
   // Plain mj_step: derived fields stay one substep behind the state, as usual in MuJoCo.
   void step_raw(int substeps);
+  // Holds the bodies of these free joints at rest where the world's state has them, until the world's
+  // next reset, and releases all others: after every physics step their poses are written back and
+  // their velocities are set to zero. Used for absent bodies.
+  void hold(int world, std::span<const int> joints);
   // Calls refreshed() without stepping. State rows written since the last call are taken into
   // account.
   void visit(WorldIds ids, WorldHooks& hooks);
@@ -135,6 +139,11 @@ class Worlds {
     bool behind = false;
     std::int64_t model_version = 0;  // version of the model they were computed with
   };
+  // A free joint that is held, and the pose in which it is.
+  struct Held {
+    int qpos, dof;  // addresses
+    mjtNum pose[7];
+  };
   enum class Op { kStep, kForward, kReset, kStepRaw, kVisit };
   class Warnings;
   struct Call {
@@ -150,6 +159,7 @@ class Worlds {
   bool step_unseen(const mjModel* m, mjData* d, int w, const Call& call);
   bool step_whole(const mjModel* m, mjData* d, int w, const Call& call);
   bool healthy(int w, const Warnings& warnings);
+  void keep_held(mjData* d, int w) const;
   void apply(WorldIds ids, Call call, bool save);
   void count_warnings(const mjData* d, int w, const int* before);
   void report_warnings();
@@ -169,8 +179,9 @@ class Worlds {
   std::uint64_t seed_ = 0;
   std::int64_t model_version_ = 0;
   std::vector<Clock> clocks_;
-  std::vector<int> reset_key_;      // keyframe of each world's last reset
-  std::vector<mjtNum> remembered_;  // state rows that the derived fields belong to
+  std::vector<std::vector<Held>> held_;  // by world
+  std::vector<int> reset_key_;           // keyframe of each world's last reset
+  std::vector<mjtNum> remembered_;       // state rows that the derived fields belong to
   std::vector<Derived> derived_;
   std::vector<std::exception_ptr> exceptions_;  // of hooks, by world
   std::vector<std::uint8_t> diverged_;          // by world: mjtWarning + 1 in this call

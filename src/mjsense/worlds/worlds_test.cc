@@ -967,5 +967,41 @@ TEST(Worlds, RejectsInvalidArguments) {
   EXPECT_THROW(worlds.state_component("qpoz"), KeyError);
 }
 
+// A held box stays in the air, bit for bit, however the world is stepped; a reset lets it go.
+TEST(Hold, KeepsABodyWhereItIsUntilTheReset) {
+  for (const char* integrator : {"Euler", "RK4", "implicitfast"}) {
+    const ModelPtr m = load(integrator);
+    const int joint[] = {m->njnt - 1}, hinge[] = {0};
+    Worlds worlds(m.get(), 2, 1);
+    Recording hooks(2);
+    const auto box = [&](int world) {
+      const ArrayView qpos = worlds.state_component("qpos"), qvel = worlds.state_component("qvel");
+      const auto row = [&](const ArrayView& view) {
+        return reinterpret_cast<const double*>(reinterpret_cast<const char*>(view.data) +
+                                               world * view.strides[0]);
+      };
+      std::vector<double> state(row(qpos) + 2, row(qpos) + 9);
+      state.insert(state.end(), row(qvel) + 2, row(qvel) + 8);
+      return state;
+    };
+    for (const bool every : {false, true}) {
+      worlds.reset(all_worlds, -1, hooks);
+      hooks.every = every;
+      hooks.read = every ? mjSTAGE_ACC : mjSTAGE_NONE;
+      const std::vector<double> start = box(0);
+      worlds.hold(0, joint);
+      for (int k = 0; k < 5; ++k) worlds.step(10, hooks);
+      EXPECT_EQ(box(0), start) << integrator;
+      EXPECT_LT(box(1)[2], start[2] - 0.05) << "the other world's box falls";
+      worlds.step_raw(3);
+      EXPECT_EQ(box(0), start) << integrator;
+      worlds.reset(all_worlds, -1, hooks);
+      worlds.step(20, hooks);
+      EXPECT_EQ(box(0), box(1));
+    }
+    EXPECT_THROW(worlds.hold(0, hinge), ValueError);
+  }
+}
+
 }  // namespace
 }  // namespace mjsense

@@ -55,16 +55,15 @@ BasePose NavPlanner::base(const World& world) const {
 
 bool NavPlanner::would_do(const World& world, const BasePose& there, const Pose& camera_in_base,
                           double arrive, double facing) const {
-  const auto [index, distance] = nav_->nearest(world, there.x, there.y);
-  if (distance > arrive) return false;
-  const double* at = world.data->xpos + 3 * nav_->scene_object(index).body;
+  if (nav_->distance(world, there.x, there.y) > arrive) return false;
+  const double* at = world.data->xpos + 3 * nav_->objects(world.id)[0].body;
   if (std::abs(wrapped(std::atan2(at[1] - there.y, at[0] - there.x) - there.yaw)) > facing)
     return false;
   for (const BasePose& tried : tried_[world.id]) {
     if (std::hypot(tried.x - there.x, tried.y - there.y) < kElsewhere) return false;
   }
   const Pose base{{there.x, there.y, 0}, axis_angle({0, 0, 1}, there.yaw)};
-  return nav_->sees(world, base * camera_in_base, index);
+  return nav_->sees(world, base * camera_in_base);
 }
 
 void NavPlanner::make_plan(const World& world, const PlanRequest& request, Plan& plan) {
@@ -72,8 +71,8 @@ void NavPlanner::make_plan(const World& world, const PlanRequest& request, Plan&
   if (request.stage == 0 && request.attempt == 0) tried.clear();
   const BasePose here = base(world);
   const Pose camera_in_base = inverse(robot().base_pose(world)) * nav_->camera_pose(world);
-  const auto [index, distance] = nav_->nearest(world, here.x, here.y);
-  if (distance < cfg_.arrive + 0.2 && nav_->sees(world, nav_->camera_pose(world), index)) {
+  if (nav_->distance(world, here.x, here.y) < cfg_.arrive + 0.2 &&
+      nav_->sees(world, nav_->camera_pose(world))) {
     plan.wait(0, 0.2);  // arrived
     return;
   }
@@ -101,7 +100,7 @@ void NavPlanner::make_plan(const World& world, const PlanRequest& request, Plan&
           return would_do(world, p, camera_in_base, wanted.arrive, wanted.facing);
         },
         [&](double x, double y) {
-          return std::max(0.0, nav_->nearest(world, x, y).second - wanted.arrive);
+          return std::max(0.0, nav_->distance(world, x, y) - wanted.arrive);
         });
   }
   if (way.size() < 2) {

@@ -41,6 +41,8 @@ class MultiTask final : public Task {
   // The first's, then those of the others whose roles nobody has yet; so are referrals and sensors.
   std::span<const TaskObject> objects(int world) const override { return objects_[world]; }
   std::string description(int world) const override;  // theirs, joined by " OR "
+  std::vector<int> absentees() const override { return children_[0]->absentees(); }
+  bool present(int world, int body) const override { return children_[0]->present(world, body); }
   Referrals referrals(int world) const override;
   Pose start_pose(int world, std::string_view role) const override;
   std::optional<Pose> goal_pose(int world, std::string_view role) const override;

@@ -21,7 +21,7 @@ using std::numbers::pi;
 constexpr std::string_view kScene = "floor";
 constexpr const char* kCamera = "head_camera";
 constexpr int kPoints = 16;
-constexpr double kFarStart = 2.0;  // m, from every candidate, where there is such a place
+constexpr double kFarStart = 2.0;  // m, from the target, where there is such a place
 constexpr double kArrived = 1.35;  // m, of a way that shows that a start can be played
 constexpr int kStarts = 30;        // places to try
 
@@ -69,24 +69,30 @@ void NavToObjTask::initialize_task() {
       }
     }
   }
-  candidates_.assign(num_worlds(), {0});
-  for (std::vector<int>& candidates : candidates_) candidates.reserve(scene().objects().size());
+  targets_.assign(num_worlds(), 0);
   begin_with(scene().objects()[0].body, scene().objects()[0].text);
 }
 
-void NavToObjTask::set_goal(int world, int target) {
+void NavToObjTask::set_target(int world, int target) {
+  targets_[world] = target;
+  const SceneObject& object = scene().objects()[target];
+  set_object(world, object.body, object.text);
+}
+
+bool NavToObjTask::alone(int world, int index) const {
   const auto& all = scene().objects();
-  candidates_[world].assign(1, target);
   for (int i = 0; i < static_cast<int>(all.size()); ++i) {
-    if (i != target && scene().present(world, i) && all[i].text == all[target].text)
-      candidates_[world].push_back(i);
+    if (i != index && scene().present(world, i) && all[i].text == all[index].text) return false;
   }
-  set_object(world, all[target].body, all[target].text);
+  return true;
 }
 
 void NavToObjTask::choose_goal(int world, Rng& rng, const StateRow& state) {
-  const std::vector<int> here = adopt_scene(world, state);
-  if (!here.empty()) set_goal(world, here[rng.below(static_cast<std::uint32_t>(here.size()))]);
+  std::vector<int> here = adopt_scene(world, state);
+  std::vector<int> unique;
+  std::ranges::copy_if(here, std::back_inserter(unique), [&](int i) { return alone(world, i); });
+  if (!unique.empty()) here = std::move(unique);
+  if (!here.empty()) set_target(world, here[rng.below(static_cast<std::uint32_t>(here.size()))]);
 }
 
 std::optional<Pose> NavToObjTask::sample_scene(int world, Rng& rng, const StateRow& state) {
@@ -95,28 +101,24 @@ std::optional<Pose> NavToObjTask::sample_scene(int world, Rng& rng, const StateR
   vary_scene(world);
   const int first = static_cast<int>(rng.below(static_cast<std::uint32_t>(n)));
   Pose placed;
-  for (int k = 0; k < n; ++k) {  // another one, where the robot cannot come near the first
+  // Another one where the first is not alone, or the robot cannot come near it.
+  for (int k = 0; k < n; ++k) {
     const int target = (first + k) % n;
     placed = scene().sample(world, target, cfg().seed, number, rng, state);
-    set_goal(world, target);
+    set_target(world, target);
+    if (!alone(world, target)) continue;
     if (!routes_) return placed;
     if (const std::optional<Pose> start = start_place(world, placed, state, rng)) return start;
   }
   return placed;
 }
 
-// Somewhere from where there is a way to a candidate, if there is such a place.
+// A place from which a path leads to the target, if there is one.
 std::optional<Pose> NavToObjTask::start_place(int world, const Pose& placed, const StateRow& state,
                                               Rng& rng) const {
-  const auto distance = [&](double x, double y) {
-    double least = 1e10;
-    for (int i : candidates(world)) {
-      const double* at =
-          state.qpos + model()->jnt_qposadr[model()->body_jntadr[scene_object(i).body]];
-      least = std::min(least, std::hypot(x - at[0], y - at[1]));
-    }
-    return least;
-  };
+  const double* at =
+      state.qpos + model()->jnt_qposadr[model()->body_jntadr[this->object(world).body]];
+  const auto distance = [at](double x, double y) { return std::hypot(x - at[0], y - at[1]); };
   for (int attempt = 0; attempt < kStarts && !places_.empty(); ++attempt) {
     const auto [x, y] = places_[rng.below(static_cast<std::uint32_t>(places_.size()))];
     const BasePose from{x, y, rng.uniform(-pi, pi)};
@@ -133,16 +135,22 @@ std::optional<Pose> NavToObjTask::start_place(int world, const Pose& placed, con
 // Behind furniture, or at the back of it, a thing may be near a way and yet never in sight.
 std::string NavToObjTask::start_fault(const World& world) const {
   const std::string fault = ObjectTask::start_fault(world);
-  if (!fault.empty() || !routes_) return fault;
+  if (!fault.empty()) return fault;
+  if (!alone(world.id, targets_[world.id]))
+    return fmt::format(
+        "{} has several objects called '{}' and none whose text names it alone: give them "
+        "different "
+        "texts",
+        place(), object(world.id).name);
+  if (!routes_) return "";
   const Pose base = robot().base_pose(world), camera = inverse(base) * camera_pose(world);
   const Vec3 ahead = rotate(base.q, {1, 0, 0});
   const auto seen = [&](const BasePose& p) {
-    const auto [index, distance] = nearest(world, p.x, p.y);
     const Pose there{{p.x, p.y, base.p.z}, axis_angle({0, 0, 1}, p.yaw)};
-    return distance < kNearby && sees(world, there * camera, index);
+    return distance(world, p.x, p.y) < kNearby && sees(world, there * camera);
   };
   const auto left = [&](double x, double y) {
-    return std::max(0.0, nearest(world, x, y).second - kNearby);
+    return std::max(0.0, distance(world, x, y) - kNearby);
   };
   if (!routes_->find({base.p.x, base.p.y, std::atan2(ahead.y, ahead.x)}, seen, left).empty())
     return "";
@@ -151,19 +159,15 @@ std::string NavToObjTask::start_fault(const World& world) const {
       robot().name(), object(world.id).name, scene().cfg().name);
 }
 
-std::pair<int, double> NavToObjTask::nearest(const World& world, double x, double y) const {
-  std::pair<int, double> best{-1, 1e10};
-  for (int i : candidates(world.id)) {
-    const double* at = world.data->xpos + 3 * scene_object(i).body;
-    const double d = std::hypot(at[0] - x, at[1] - y);
-    if (d < best.second) best = {i, d};
-  }
-  return best;
+double NavToObjTask::distance(const World& world, double x, double y) const {
+  const double* at = world.data->xpos + 3 * object(world.id).body;
+  return std::hypot(at[0] - x, at[1] - y);
 }
 
-bool NavToObjTask::sees(const World& world, const Pose& camera, int index) const {
+bool NavToObjTask::sees(const World& world, const Pose& camera) const {
+  const int index = targets_[world.id];
   const auto with = [&](std::span<const Vec3> points) {
-    return sight_.sees(world.model, world.data, camera, scene_object(index).body, points);
+    return sight_.sees(world.model, world.data, camera, object(world.id).body, points);
   };
   const double size = scene().size(world.id, index);
   if (size == 1) return with(points_[index]);
@@ -174,10 +178,9 @@ bool NavToObjTask::sees(const World& world, const Pose& camera, int index) const
 
 NavToObjTask::Judgement NavToObjTask::judgement(const World& world) const {
   const Vec3 base = robot().base_pose(world).p;
-  const auto [index, distance] = nearest(world, base.x, base.y);
-  Judgement out{distance, 0};
-  if (distance < kReach && sees(world, camera_pose(world), index))
-    out.reward = 1 - distance / kReach;
+  Judgement out{distance(world, base.x, base.y), 0};
+  if (out.distance < kReach && sees(world, camera_pose(world)))
+    out.reward = 1 - out.distance / kReach;
   return out;
 }
 
@@ -190,14 +193,11 @@ Evaluation NavToObjTask::evaluate(const World& world) const {
 }
 
 std::string NavToObjTask::description(int world) const {
-  const auto& candidates = candidates_[world];
-  const std::string& text = object(world).name;
-  if (candidates.size() == 1) return "Navigate to the " + text;
-  return fmt::format("Navigate to any {} ({} available)", text, candidates.size());
+  return "Navigate to the " + object(world).name;
 }
 
 Task::Referrals NavToObjTask::referrals(int world) const {
-  return {{"object_name", referrals_of(scene_object(candidates(world)[0]))}};
+  return {{"object_name", referrals_of(scene().objects()[targets_[world]])}};
 }
 
 void NavToObjTask::write_info(const World& world, JsonWriter& json) const {
@@ -210,10 +210,8 @@ std::vector<std::shared_ptr<Sensor>> NavToObjTask::create_task_sensors() const {
   std::vector<NamedBody> bodies;
   for (int i = 0; i < static_cast<int>(scene().objects().size()); ++i) {
     const int body = scene().objects()[i].body;
-    bodies.push_back({mjsense::name_of(model(), mjOBJ_BODY, body), [this, i, body](int world) {
-                        const auto& of = candidates_[world];
-                        return std::ranges::find(of, i) != of.end() ? body : -1;
-                      }});
+    bodies.push_back({mjsense::name_of(model(), mjOBJ_BODY, body),
+                      [this, i, body](int world) { return targets_[world] == i ? body : -1; }});
   }
   return {body_poses_sensor(*this, "pickup_obj_pose", std::move(bodies))};
 }

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
-// Drive to an object of a kind: success while the nearest of them is seen by the head camera from
-// less than 1.5 m.
+// Drive to an object: success while the head camera sees it from less than 1.5 m. The target is the only object
+// of its kind in the episode, so that its text names it.
 
 #include <string>
 #include <vector>
@@ -23,24 +23,21 @@ class NavToObjTask final : public ObjectTask {
   std::string_view name() const override { return "nav_to_obj"; }
   std::string_view type() const override { return "nav_to_obj"; }
 
-  // Also: the robot drives nowhere from where it sees a candidate.
+  // Also: several objects have the target's text, or the robot sees the target from no place that it can reach.
   std::string start_fault(const World& world) const override;
-  // Reward: 1 - d / 1.5 m of the nearest candidate if the camera sees it, else 0; success: reward > 0.
+  // Reward: 1 - d / 1.5 m if the camera sees the target, else 0; success: reward > 0.
   Evaluation evaluate(const World& world) const override;
 
   std::string description(int world) const override;
   Referrals referrals(int world) const override;
-  // position_error (m, on the floor, to the nearest candidate), success.
+  // position_error (m, on the floor, to the target), success.
   void write_info(const World& world, JsonWriter& json) const override;
   std::vector<std::shared_ptr<Sensor>> create_task_sensors() const override;
 
-  // For those who plan: indices of the objects of the kind in this world, and what they are.
-  std::span<const int> candidates(int world) const { return candidates_[world]; }
-  const SceneObject& scene_object(int index) const { return scene().objects()[index]; }
-  // Index of the candidate nearest to a place on the floor, and how far (m) it is.
-  std::pair<int, double> nearest(const World& world, double x, double y) const;
-  // Whether the camera would see the object from there, X_WC.
-  bool sees(const World& world, const Pose& camera, int index) const;
+  // For planners: distance (m) of the target from a point of the floor.
+  double distance(const World& world, double x, double y) const;
+  // Whether the camera would see the target from there, X_WC.
+  bool sees(const World& world, const Pose& camera) const;
   Pose camera_pose(const World& world) const { return sight_.pose(world.data); }
   const BaseRoutes* routes() const { return routes_.get(); }
 
@@ -56,7 +53,9 @@ class NavToObjTask final : public ObjectTask {
   };
   Judgement judgement(const World& world) const;
   void find_camera();
-  void set_goal(int world, int target);
+  void set_target(int world, int target);
+  // Whether no other object of the episode has the same text.
+  bool alone(int world, int index) const;
   std::optional<Pose> start_place(int world, const Pose& placed, const StateRow& state,
                                   Rng& rng) const;
 
@@ -64,7 +63,7 @@ class NavToObjTask final : public ObjectTask {
   std::vector<std::vector<Vec3>> points_;          // of each object, to look at
   std::unique_ptr<BaseRoutes> routes_;             // null: the base does not drive
   std::vector<std::pair<double, double>> places_;  // of the floor, where the robot may start
-  std::vector<std::vector<int>> candidates_;       // [B]; the target first
+  std::vector<int> targets_;                       // [B], of the scene's objects
 };
 
 }  // namespace mjsense

@@ -79,14 +79,10 @@ struct Table {
   nlohmann::json info() {
     std::vector<std::uint8_t> text(4000);
     JsonWriter json(text);
-    json.begin_object();
+    json.finite_only().begin_object();  // before the first support there is none to compare with
     task.write_info(world, json);
     json.end_object();
-    std::string found(text.begin(), std::ranges::find(text, 0));
-    // Before the first support there is none to compare with.
-    for (std::size_t at; (at = found.find("Infinity")) != std::string::npos;)
-      found.replace(at, 8, "null");
-    return nlohmann::json::parse(found);
+    return nlohmann::json::parse(std::string(text.begin(), std::ranges::find(text, 0)));
   }
   PickAndPlaceTask task;
   std::unique_ptr<Scene> scene;

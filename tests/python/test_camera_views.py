@@ -1,0 +1,22 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The default cameras show what a task is about when an episode begins; MJSENSE_EPISODES=200 looks at as many starts of each pair."""
+
+import importlib.util
+import os
+from pathlib import Path
+
+import pytest
+
+EPISODES = int(os.environ.get("MJSENSE_EPISODES", "8"))
+LEAST = 0.95
+
+spec = importlib.util.spec_from_file_location("camera_views", Path(__file__).parents[2] / "tools" / "camera_views.py")
+assert spec and spec.loader
+camera_views = importlib.util.module_from_spec(spec)
+spec.loader.exec_module(camera_views)
+
+
+@pytest.mark.parametrize(("task", "robot"), camera_views.PAIRS)
+def test_one_view_shows_every_object(task: str, robot: str) -> None:
+    found = camera_views.count(task, robot, episodes=EPISODES)
+    assert found.starts > 0 and found.all_seen >= int(LEAST * found.starts), found
