@@ -86,7 +86,7 @@ void PythonSensor::update(std::span<const int> ids, double dt) {
   throw_faults(self().attr("_mjs_control_step")(list_of(ids), dt, seeds));
 }
 
-// The seed depends only on the episode and its time, not on the world.
+// The seed depends on the episode and its time, not on the world.
 void PythonSensor::draw_seed(const World& world) {
   seeds_[world.id] = world.rng(stream_of(name())).next();
 }
