@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
-// The rooms of the extension: each function stands in the file of its name.
+// Binding functions of the extension. Each is defined in the file of the same name.
 
 #include <nanobind/nanobind.h>
 

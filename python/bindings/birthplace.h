@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
-// A child of fork() has a copy of everything and none of the threads: who waits for one of them
-// waits for ever. So what has threads is used in the process that made it, and nowhere destroyed
-// but there.
+// Protects objects with threads against fork(). The child of fork() has a copy of the memory but
+// none of the threads, so waiting for one of them never ends. Such objects may only be used and
+// destroyed in the process that created them.
 
 #include <unistd.h>
 
@@ -17,7 +17,7 @@ namespace mjsense::python {
 class Birthplace {
  public:
   bool here() const { return getpid() == pid_; }
-  // Throws in a child of fork(). `what`: "simulation".
+  // Throws RuntimeError in a child of fork(). `what` names the object: "simulation".
   void check(const char* what) const {
     if (here()) return;
     throw RuntimeError(std::string(what) + ": this process (" + std::to_string(getpid()) +
@@ -30,7 +30,7 @@ class Birthplace {
   pid_t pid_ = getpid();
 };
 
-// As std::make_shared, but for a copy in another process, which is left alone.
+// Like std::make_shared, but the object's copy in a forked process is never destroyed.
 template <class T, class... Args>
 std::shared_ptr<T> make_shared_here(Args&&... args) {
   return {new T(std::forward<Args>(args)...), [place = Birthplace()](T* object) {

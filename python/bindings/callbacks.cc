@@ -28,7 +28,7 @@ void refuse_python_callbacks() {
     const nb::gil_scoped_acquire lock;
     const nb::object function =
         nb::module_::import_("mujoco").attr((std::string("get_") + callback.name).c_str())();
-    // A function pointer of ctypes, which MuJoCo calls itself, is callable too.
+    // A ctypes function pointer is callable too, but MuJoCo calls it directly.
     const nb::object pointer = nb::module_::import_("ctypes").attr("_CFuncPtr");
     if (!PyCallable_Check(function.ptr()) || nb::isinstance(function, pointer)) continue;
     throw RuntimeError(

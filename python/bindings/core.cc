@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Errors, specs and versions in Python.
+// Bindings of errors, specs and versions.
 
 #include <nanobind/nanobind.h>
 #include <nanobind/stl/string.h>
@@ -15,7 +15,7 @@
 namespace mjsense::python {
 namespace {
 
-// mjsense.errors.UnknownNameError is a KeyError whose text is not quoted.
+// Translates to mjsense.errors.UnknownNameError, a KeyError whose text is printed without quotes.
 void translate(const std::exception_ptr& error, void*) {
   try {
     std::rethrow_exception(error);
@@ -23,7 +23,7 @@ void translate(const std::exception_ptr& error, void*) {
     const nb::handle exception = e.exception.get();
     PyErr_SetObject(reinterpret_cast<PyObject*>(Py_TYPE(exception.ptr())), exception.ptr());
   } catch (const Error& e) {
-    const std::string what = printable_lines(e.what());  // names from files of others
+    const std::string what = printable_lines(e.what());  // names may come from untrusted files
     switch (e.kind()) {
       case ErrorKind::kValue:
         PyErr_SetString(PyExc_ValueError, what.c_str());

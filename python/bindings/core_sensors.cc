@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// The sensors of the core suite for Python's: python/mjsense/core_sensors.py makes public classes of
-// them, which resolve names.
+// Bindings of the core suite's sensors. python/mjsense/core_sensors.py defines their public
+// classes, which resolve names.
 
 #include <nanobind/nanobind.h>
 #include <nanobind/stl/pair.h>

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
-// mujoco.MjData objects of Python that show the worlds as they are.
+// Copies of the worlds in mujoco.MjData objects of Python.
 
 #include <nanobind/nanobind.h>
 
@@ -10,8 +10,8 @@
 
 namespace mjsense::python {
 
-// Copies world w into datas[w] when it is read and not current. It keeps the list alive, whose
-// objects must be of the simulation's model. Needs the interpreter's lock.
+// Sensor that copies world w into datas[w] when it is read and out of date. It keeps the list
+// alive, whose objects must belong to the simulation's model. Requires the GIL.
 std::shared_ptr<Sensor> make_data_copies(nanobind::list datas);
 
 }  // namespace mjsense::python

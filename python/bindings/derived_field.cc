@@ -13,7 +13,7 @@
 namespace mjsense::python {
 namespace {
 
-// One line of MuJoCo's table of mjData fields.
+// An entry of MuJoCo's table of mjData fields.
 struct DataField {
   std::string name;
   DType dtype;
@@ -46,8 +46,8 @@ std::vector<DataField> data_fields(const mjModel* m) {
   return fields;
 }
 
-// Fields that MuJoCo computes before accelerations, in the order of mjdata.h. Any other may need
-// all.
+// Fields that MuJoCo computes before accelerations, in the order of mjdata.h. All other fields may
+// require all stages.
 constexpr std::string_view kBeforeAccelerations[] = {"xpos",
                                                      "xquat",
                                                      "xmat",

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
-// A field of mjData as a sensor: sim.data.xpos in Python is fresh, lazy and cached in the same way
-// as any measurement.
+// A field of mjData as a sensor, so that sim.data.xpos in Python is fresh, lazily computed and
+// cached like any measurement.
 
 #include <nanobind/nanobind.h>
 
@@ -14,11 +14,11 @@
 
 namespace mjsense::python {
 
-// Rows of MuJoCo's own type, [B, *]; 3 x 3 matrices as [9]. Throws KeyError for a name that is no
-// field with a row per world.
+// Rows in MuJoCo's data type, [B, *]; 3 x 3 matrices are [9]. Throws KeyError unless `name` is a
+// field with one row per world.
 std::shared_ptr<Sensor> make_derived_field(std::string_view name, const mjModel* model);
 
-// What it takes, in MuJoCo's order.
+// Valid field names, in MuJoCo's order.
 std::vector<std::string> derived_field_names(const mjModel* model);
 
 }  // namespace mjsense::python

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// The observation pipeline, driven by hand.
+// Bindings of the observation pipeline for values from outside the simulation.
 
 #include <nanobind/nanobind.h>
 #include <nanobind/ndarray.h>
@@ -24,7 +24,7 @@ namespace mjsense::python {
 
 namespace {
 
-// Effects on float32 rows [B, D] that come from anywhere; D is that of the first rows.
+// Applies effects to float32 rows [B, D]; D is determined by the first rows.
 class PyPipeline {
  public:
   PyPipeline(nb::handle config, int num_worlds, std::uint64_t seed) : seed_(seed) {
@@ -35,7 +35,7 @@ class PyPipeline {
     worlds_.resize(num_worlds);
   }
 
-  // None: all worlds.
+  // None selects all worlds.
   void reset(const std::optional<std::vector<int>>& chosen) {
     std::vector<int> ids(worlds_.size());
     std::iota(ids.begin(), ids.end(), 0);
@@ -44,7 +44,7 @@ class PyPipeline {
       if (w < 0 || w >= static_cast<int>(worlds_.size()))
         throw ValueError("world id " + std::to_string(w) + " is out of range");
     }
-    if (!chain_) return;  // has seen nothing
+    if (!chain_) return;  // no rows have been processed yet
     for (int w : ids) start_episode(w);
   }
 
@@ -94,9 +94,9 @@ class PyPipeline {
   }
 
   EffectChainCfg cfg_;
-  std::unique_ptr<EffectChain> chain_;  // made with the first rows
+  std::unique_ptr<EffectChain> chain_;  // created with the first rows
   std::int64_t size_ = 0;
-  Array out_;  // its output, whose rows are its memory of the history
+  Array out_;  // its output, which also stores the history
   std::vector<World> worlds_;
   std::uint64_t seed_;
 };

@@ -14,7 +14,7 @@ namespace {
 
 using Kind = FieldType::Kind;
 
-// "ContactSensorCfg 'feet'"
+// For example "ContactSensorCfg 'feet'".
 std::string place_of(nb::handle config) {
   if (nb::isinstance<nb::dict>(config)) return "options";
   std::string place = nb::cast<std::string>(config.type().attr("__name__"));
@@ -28,7 +28,7 @@ std::string kind_of(nb::handle config) {
   return nb::isinstance<nb::str>(kind) ? nb::cast<std::string>(kind) : "";
 }
 
-// A value on its way from the attribute of a configuration.
+// Converts the value of a configuration's attribute to its declared type.
 struct Reader {
   nb::handle config;
   const FieldDecl& field;
@@ -93,7 +93,7 @@ struct Reader {
         }
         return;
       case Kind::kObject:
-        if (value.is_none() && field.is_or_none) return;  // as it is: empty
+        if (value.is_none() && field.is_or_none) return;  // leave the optional empty
         return object(value, type.object(), out, type);
       case Kind::kChoice:
         return choice(value, type, out);
@@ -105,7 +105,8 @@ struct Reader {
     const bool single = nb::isinstance<nb::str>(value) || !nb::hasattr(value, "__iter__");
     if (single && (fixed || value.is_none())) fail(value, type);
     if (!fixed) type.clear(out);
-    if (single) return read(value, type.element(), type.append(out));  // stands for a list of one
+    // A single value is accepted as a list of one.
+    if (single) return read(value, type.element(), type.append(out));
     std::size_t i = 0;
     for (nb::handle item : value) {
       if (fixed && i >= type.count(out)) fail(value, type);

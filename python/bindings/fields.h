@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
-// Reads Python objects into C++ configurations, by the table of their fields.
+// Reads Python objects into C++ configurations, based on their field declarations.
 
 #include <nanobind/nanobind.h>
 
@@ -12,24 +12,24 @@ namespace mjsense::python {
 
 namespace nb = nanobind;
 
-// TypeError for a missing attribute or a value of another type, "ContactSensorCfg 'feet': num_slots
-// must be an int, not 'two'"; ValueError for an unknown word.
+// Throws TypeError for a missing attribute or a value of the wrong type, "ContactSensorCfg 'feet':
+// num_slots must be an int, not 'two'"; ValueError for an unknown word.
 void read_struct(nb::handle config, const StructDecl& decl, void* out);
 template <Described T>
 void read_struct(nb::handle config, T& out) {
   read_struct(config, struct_of<T>(), &out);
 }
-// Only what is given: a dict whose keys are names of fields or of their options.
+// Reads only the given entries of a dict whose keys are names of fields or of their options.
 void read_options(nb::dict options, const StructDecl& decl, void* out);
-// One value, as the attribute `field` of `config`.
+// Reads one value as if it were the attribute `field` of `config`.
 void read_value(nb::handle config, const FieldDecl& field, nb::handle value, void* out);
 
-// Raises what is wrong with a configuration: TypeError or ValueError.
+// Throws TypeError or ValueError if the configuration is invalid.
 void check_cfg(nb::handle config);
-// Throws TypeError for an object that is no sensor configuration.
+// Throws TypeError if `config` is not a sensor configuration.
 std::shared_ptr<SensorCfg> read_sensor_cfg(nb::handle config);
 
-// Any mapping, or pairs; TypeError for what is neither.
+// Converts a mapping or a sequence of pairs; throws TypeError for other objects.
 nb::dict dict_of(nb::handle mapping);
 
 }  // namespace mjsense::python

@@ -9,7 +9,7 @@ namespace mjsense::python {
 
 namespace nb = nanobind;
 
-// A Python object that any thread may copy and destroy.
+// A reference to a Python object that any thread may copy and destroy.
 class Held {
  public:
   Held() = default;

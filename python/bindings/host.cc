@@ -45,7 +45,7 @@ std::vector<std::shared_ptr<Sensor>> PythonHost::members(nb::handle sensors,
     }
     auto sensor = std::make_shared<PythonSensor>(nb::cast<std::string>(object.attr("uuid")),
                                                  WeakObject(object), read_python_spec(object));
-    // The simulation owns the sensor: in a circle they would never be freed.
+    // Weak, because the simulation owns the sensor and a reference cycle would never be freed.
     sensor->on_initialized = [weak = std::weak_ptr<PythonSensor>(sensor), host = weak_from_this()] {
       auto self = weak.lock();
       self->self().attr("_mjs_bind")(host.lock()->simulation_.get(), SensorHandle{self});

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
-// What a rollout has of Python's: its worlds there, and code of users that runs for it.
+// The Python side of a rollout: its simulation object, and user code that runs inside the rollout.
 
 #include <fmt/format.h>
 #include <nanobind/nanobind.h>
@@ -18,17 +18,17 @@
 
 namespace mjsense::python {
 
-// C++ calls it without the interpreter's lock, except where a function says that it needs it. A task
-// or a policy runs on the caller's thread, while the simulation counts as at work: it may read the
-// simulation and write its state, but not step or reset it.
+// C++ calls it without the GIL, except where a function requires it. Tasks and policies run on the
+// caller's thread while the simulation is marked as working: they may read the simulation and write
+// its state, but not step or reset it.
 class PythonHost : public std::enable_shared_from_this<PythonHost> {
  public:
   explicit PythonHost(nb::object make_simulation) : make_(std::move(make_simulation)) {}
 
   const std::shared_ptr<Turns>& turns() const { return turns_; }
 
-  // Runs `body` with the interpreter's lock. An exception of Python's comes out as it is, with a note
-  // that names `place`: "task 'push': evaluate()".
+  // Runs `body` with the GIL. Python exceptions pass through, with a note that names `place`: "task
+  // 'push': evaluate()".
   template <class Body>
   auto call(const std::string& place, Body&& body) {
     return turns_->work([&] {
@@ -44,18 +44,18 @@ class PythonHost : public std::enable_shared_from_this<PythonHost> {
     });
   }
 
-  // The rollout's scene, as `prepared`, which _mjs_scene() of a task or a scene returned, describes
-  // it; before simulation(). Needs the lock.
+  // Reads the scene of the rollout from `prepared`, the result of _mjs_scene() of a task or a
+  // scene. Call before simulation(). Requires the GIL.
   SceneCfg read_prepared(nb::object prepared);
-  // mjsense.Simulation of these worlds, made when it is first wanted. Needs the lock.
+  // The mjsense.Simulation of these worlds, created on first use. Requires the GIL.
   nb::object simulation(const std::shared_ptr<Simulation>& sim);
-  // The rollout that is being made, whose task and robot sensors may ask for until it has ended.
+  // Sets the rollout under construction. Task and robot sensors may access it until end().
   void set_rollout(Rollout& rollout) { *cell_ = &rollout; }
   void end() { *cell_ = nullptr; }
-  // Sensors as members of a suite. Needs the lock.
+  // Converts Python sensors to members of a suite. Requires the GIL.
   std::vector<std::shared_ptr<Sensor>> members(nb::handle sensors,
                                                const std::shared_ptr<Simulation>& sim);
-  // Nothing of Python's may hold on to a rollout that has ended. Needs the lock.
+  // Drops all Python references to the rollout, which has ended. Requires the GIL.
   void close();
 
  private:
@@ -64,10 +64,10 @@ class PythonHost : public std::enable_shared_from_this<PythonHost> {
   std::shared_ptr<Turns> turns_ = std::make_shared<Turns>();
   Held make_, scene_, alive_, simulation_;
   TaskView::Cell cell_ = std::make_shared<Rollout*>(nullptr);
-  PySimulation* core_ = nullptr;  // simulation_ keeps it alive
+  PySimulation* core_ = nullptr;  // kept alive by simulation_
 };
 
-// For settings that are optional in Python: an attribute, or what it is without.
+// Entry of a dict of optional settings, or a default value.
 template <class T>
 T item_or(nb::handle dict, const char* key, T otherwise) {
   nb::object value = dict.attr("get")(key);

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
-// Is the libmujoco that Python has loaded the one that this was compiled for? The extension is not linked to a file of a certain
-// name (mjsense/_libmujoco.py loads what is installed), so it looks at the structs that both sides read and write.
+// Checks that the libmujoco loaded by Python is the one this extension was compiled for. The
+// extension is not linked to a file name (mjsense/_libmujoco.py loads the installed library), so it
+// compares the layouts of the structs that both use.
 
 #include <mujoco/mjbatch.h>
 #include <mujoco/mujoco.h>
@@ -23,10 +24,10 @@ namespace nb = nanobind;
 
 namespace {
 
-constexpr std::size_t kBeyond = 1024;  // how much larger than ours a struct is looked for
+constexpr std::size_t kBeyond = 1024;  // maximum excess over the expected size that is detected
 constexpr unsigned char kFirst = 0xA5, kSecond = 0x5A;
 
-// Bytes that `set_default` writes from the beginning of a T on, rounded up as the compiler pads T.
+// Number of bytes that `set_default` writes to a T, rounded up to its alignment.
 template <class T>
 std::size_t written(void (*set_default)(T*)) {
   constexpr std::size_t bytes = sizeof(T) + kBeyond;
@@ -61,7 +62,7 @@ class Comparison {
   std::string text_;
 };
 
-// mjModel and mjData end with the same number, which compilation gives to both.
+// mjModel and mjData both end with the same signature, which is set at compilation.
 bool model_and_data_agree() {
   const std::unique_ptr<mjSpec, decltype(&mj_deleteSpec)> spec(mj_makeSpec(), &mj_deleteSpec);
   const std::unique_ptr<mjModel, decltype(&mj_deleteModel)> model(
@@ -72,7 +73,7 @@ bool model_and_data_agree() {
   return data && model->signature != 0 && model->signature == data->signature;
 }
 
-// What differs; empty if nothing does.
+// Description of the differences; empty if there are none.
 std::string layout_difference() {
   Comparison compare;
   compare.of("mjOption", &mj_defaultOption);
@@ -90,7 +91,7 @@ std::string layout_difference() {
   compare.of("mjvOption", &mjv_defaultOption);
   compare.of("mjvScene", &mjv_defaultScene);
   compare.of("mjBatchConfig", &mjb_defaultConfig);
-  // Only now: what is below follows pointers.
+  // Only after the sizes are known to agree, because this follows pointers.
   if (compare.text().empty() && !model_and_data_agree())
     compare.add("mjModel or mjData is not as expected");
   return compare.text();

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// The extension mjsense._core. Users see it through the package mjsense.
+// The extension module mjsense._core. Users access it through the package mjsense.
 
 #include <nanobind/nanobind.h>
 
@@ -7,7 +7,8 @@
 
 NB_MODULE(_core, m) {
   m.doc() = "The C++ side of mjsense.";
-  // Interpreters tear modules down in no order we control; a leak report there tells users nothing.
+  // The order of destruction at interpreter exit is arbitrary, so leak reports would be meaningless
+  // to users.
   nanobind::set_leak_warnings(false);
   mjsense::python::bind_libmujoco(m);
   mjsense::python::bind_core(m);

@@ -31,14 +31,14 @@ NumpyArray make_numpy(const ArrayView& view, nb::handle owner) {
   const int rank = view.shape.rank();
   const auto item = static_cast<std::int64_t>(dtype_size(view.dtype));
   std::array<std::size_t, Shape::kMaxRank> shape{};
-  std::array<std::int64_t, Shape::kMaxRank> strides{};  // in elements, as DLPack counts
+  std::array<std::int64_t, Shape::kMaxRank> strides{};  // in elements, as in DLPack
   for (int i = 0; i < rank; ++i) {
     shape[i] = static_cast<std::size_t>(view.shape[i]);
     if (view.strides[i] % item != 0)
       throw RuntimeError("array strides are not a multiple of its element size");
     strides[i] = view.strides[i] / item;
   }
-  // An empty array may have no memory at all, but an owner must belong to a pointer.
+  // An empty array may have no memory, but an owner requires a non-null pointer.
   static std::byte nothing[64];
   void* data = view.data ? view.data : nothing;
   nb::object array =

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
-// Arrays cross the language border without a copy.
+// Shares arrays between C++ and NumPy without copying.
 
 #include <nanobind/nanobind.h>
 #include <nanobind/ndarray.h>
@@ -11,19 +11,19 @@ namespace mjsense::python {
 
 namespace nb = nanobind;
 
-// A Python object that is one: so signatures say what comes back.
+// Type of returned NumPy arrays, so that the signatures of the bindings state it.
 class NumpyArray : public nb::object {
-  static bool any(PyObject*) { return true; }  // none is ever taken as an argument
+  static bool any(PyObject*) { return true; }  // never used to check an argument
   NB_OBJECT(NumpyArray, nb::object, "numpy.ndarray", any)
 };
 
-// A NumPy array on the view's memory, which `owner` keeps alive.
+// NumPy array on the view's memory, which `owner` keeps alive.
 NumpyArray to_numpy(const ArrayView& view, nb::handle owner);
-// One that NumPy refuses to write: what a sensor measured.
+// The same, but read-only: for measurements of sensors.
 NumpyArray to_readonly_numpy(const ArrayView& view, nb::handle owner);
 
-// A Python object that holds `pointer` until it is collected: the owner of arrays on memory inside
-// *pointer.
+// A Python object that holds `pointer` until it is collected: the owner of arrays that share memory
+// with *pointer.
 template <class T>
 nb::object owner_of(std::shared_ptr<T> pointer) {
   return nb::capsule(new std::shared_ptr<T>(std::move(pointer)),

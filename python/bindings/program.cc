@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// The `mjsense` program in the wheel.
+// The `mjsense` program of the Python package.
 
 #include "mjsense/app/program.h"
 
@@ -21,7 +21,7 @@ void bind_program(nb::module_& m) {
   m.def(
       "run_program",
       [](const std::vector<nb::bytes>& given) {
-        std::vector<std::string> words;  // names of files need not be UTF-8
+        std::vector<std::string> words;  // file names need not be UTF-8
         for (const nb::bytes& word : given) words.emplace_back(word.c_str(), word.size());
         std::vector<char*> argv;
         for (std::string& word : words) argv.push_back(word.data());

@@ -1,13 +1,13 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
-// A simulation as Python holds it.
+// The simulation object behind mjsense.Simulation.
 //
-// Memory: arrays handed out hold a share of the simulation, so close() frees it when the last of
-// them is gone.
-// Threads: every call runs without the interpreter's lock and takes the simulation's own mutex, so
-// that Python threads take turns. The mutex is recursive because a sensor written in Python reads
-// other sensors while it is computed; it is never waited for with the interpreter's lock held.
-// Processes: a fork's copy raises (birthplace.h).
+// Memory: arrays handed out share ownership of the simulation, so after close() the memory is freed
+// once no array is left.
+// Threads: every call releases the GIL and locks the simulation's mutex, so Python threads use it
+// one at a time. The mutex is recursive, because a sensor written in Python reads other sensors
+// while it is computed. No thread waits for it while holding the GIL.
+// Processes: the copy in a forked process throws (birthplace.h).
 
 #include <nanobind/nanobind.h>
 
@@ -26,12 +26,13 @@
 
 namespace mjsense::python {
 
-// Whose turn it is with a simulation, and whether it is at work. Everything that Python holds of
-// one simulation shares one of these.
+// Serialises access to a simulation and records whether it is working. All Python objects of one
+// simulation share one instance.
 class Turns {
  public:
   bool here() const { return place_.here(); }
-  // `what` names the call in the message when a sensor's own code makes it.
+  // `what` names the call in the error message if user code calls it while the simulation is
+  // working.
   template <class Body>
   void change(std::string_view what, Body&& body) {
     place_.check("simulation");
@@ -56,7 +57,7 @@ class Turns {
     const Depth in(depth_);
     body();
   }
-  // For code that runs for the simulation. Called without the interpreter's lock.
+  // For code that runs inside the simulation. Must be called without the GIL.
   template <class Body>
   auto work(Body&& body) {
     place_.check("simulation");
@@ -85,24 +86,25 @@ class PySimulation {
     nb::gil_scoped_release unlock;
     sim_ = make_shared_here<Simulation>(std::move(scene), cfg);
   }
-  // One that somebody else made.
+  // Wraps an existing simulation.
   explicit PySimulation(std::shared_ptr<Simulation> sim,
                         std::shared_ptr<Turns> turns = std::make_shared<Turns>())
       : sim_(std::move(sim)), turns_(std::move(turns)) {}
 
   void close() {
-    if (!turns_->here()) return sim_.reset();  // a fork's copy is only forgotten
+    if (!turns_->here()) return sim_.reset();  // in a forked process the copy must not be destroyed
     std::shared_ptr<Simulation> last;
     turns_->change("close", [&] { last = std::move(sim_); });
   }
   bool closed() const { return sim_ == nullptr; }
 
-  // `what` names the call in the message when a sensor's own code makes it.
+  // `what` names the call in the error message if user code calls it while the simulation is
+  // working.
   template <class Body>
   void change(const char* what, Body&& body) {
     turns_->change(what, [&] {
       body(open());
-      // By number: one that hears of it may add others.
+      // By index, because a notified sensor may add further ones.
       for (std::size_t i = 0; i < python_.size(); ++i) python_[i]->tell_resets();
     });
   }
@@ -119,14 +121,15 @@ class PySimulation {
     open();
     return owner_of(sim_);
   }
-  // In its turn: from the body of a change or read.
+  // Must be called from the body of a change or read.
   void add_python(std::shared_ptr<PythonSensor> sensor) { python_.push_back(std::move(sensor)); }
   const std::vector<std::shared_ptr<PythonSensor>>& python() const { return python_; }
 
  private:
   std::shared_ptr<Simulation> sim_;
   std::shared_ptr<Turns> turns_ = std::make_shared<Turns>();
-  // Learn of the resets of their worlds (also of worlds that failed), computed or not.
+  // These sensors are notified of the resets of their worlds (also of failed worlds), even if they
+  // are not computed.
   std::vector<std::shared_ptr<PythonSensor>> python_;
 };
 

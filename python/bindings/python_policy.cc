@@ -31,7 +31,7 @@ std::string shape_text(const Numbers& array) {
 nb::list suite_streams(Rollout& rollout) {
   nb::list list;
   for (const auto& sensor : rollout.suite().sensors()) {
-    // Some rows are those of a camera of the scene.
+    // Keep the simulation alive too, because some rows belong to a camera of the scene.
     auto keep = std::make_shared<std::pair<std::shared_ptr<Simulation>, std::shared_ptr<Sensor>>>(
         rollout.simulation_ptr(), sensor);
     nb::object owner = owner_of(keep);
@@ -68,7 +68,7 @@ std::string PythonPolicy::place(const char* method) const {
   return fmt::format("policy '{}': {}()", name_, method);
 }
 
-// "(64, 8), or (64, H, 8) for H steps; 8 are arm 7, gripper 1"
+// For example "(64, 8), or (64, H, 8) for H steps; 8 are arm 7, gripper 1".
 std::string PythonPolicy::layout_text() const {
   std::vector<std::string> groups;
   for (std::size_t i = 0; i < group_.size(); ++i)
@@ -168,7 +168,7 @@ void PythonPolicy::call_act() {
   std::vector<double> kept;
   if (before > 1) kept = chunk_.values;
   read(found);
-  // Worlds in the middle of a chunk go on with it.
+  // Worlds in the middle of a chunk continue it.
   if (before > 1 && std::ranges::any_of(chunk_.left, [](std::size_t left) { return left > 0; })) {
     if (before != chunk_.steps) {
       throw ValueError(
@@ -190,7 +190,7 @@ void PythonPolicy::call_act() {
 void PythonPolicy::read(nb::handle value) {
   const auto B = static_cast<std::size_t>(task_->num_worlds());
   chunk_.steps = 0;
-  // What was given and said for worlds in the middle of a chunk stays.
+  // Values of worlds in the middle of a chunk are kept.
   const auto give = [&](std::size_t first, std::size_t count, bool given) {
     for (std::size_t w = 0; w < B; ++w) {
       if (wanted_rows_[w]) std::fill_n(&chunk_.given[w * group_.size()] + first, count, given);
@@ -233,13 +233,13 @@ void PythonPolicy::read(nb::handle value) {
     give(i, 1, true);
     read_group(item, first, width_[i], name);
   }
-  if (chunk_.steps == 0) {  // nothing but flags: everything holds
+  if (chunk_.steps == 0) {  // only flags were returned: all groups hold their position
     chunk_.steps = 1;
     chunk_.values.assign(B * n_, 0.0);
   }
 }
 
-// Columns first .. first + width of the actions.
+// Reads a group's commands into columns first .. first + width of the actions.
 void PythonPolicy::read_group(nb::handle value, std::size_t first, std::size_t width,
                               const std::string& what) {
   const auto B = static_cast<std::size_t>(task_->num_worlds());

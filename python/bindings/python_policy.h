@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
-// A policy written in Python (mjsense.Policy, python/mjsense/policy.py), as a rollout sees it: called
-// once a step for all worlds, or once a chunk of actions.
+// Adapter of a policy written in Python (mjsense.Policy, python/mjsense/policy.py) for a rollout.
+// It is called once per step for all worlds, or once per chunk of actions.
 
 #include <memory>
 #include <string>
@@ -17,20 +17,21 @@ class Rollout;
 
 namespace mjsense::python {
 
-// (sensor, spec, rows) of every stream of a rollout's suite; the rows are read-only and outlive it.
+// (sensor, spec, rows) of every stream of a rollout's suite. The rows are read-only and may outlive
+// the rollout.
 nb::list suite_streams(Rollout& rollout);
 // (name, low, high) of every controlled move group.
 nb::list action_layout(const Robot& robot);
 
 class PythonPolicy final : public PlannerPolicy {
  public:
-  // Needs the interpreter's lock.
+  // Requires the GIL.
   PythonPolicy(nb::object policy, std::shared_ptr<PythonHost> host);
 
   std::string_view name() const override { return name_; }
   void bind(const std::shared_ptr<Simulation>& simulation) override { simulation_ = simulation; }
   void initialize(Task& task) override;
-  // The suite exists: act() will see its rows.
+  // Call when the suite exists: act() receives its rows.
   void observe(Rollout& rollout);
   void reset_all(ActiveWorlds& worlds) override;
   void act_all(ActiveWorlds& worlds, std::span<Action> actions) override;
@@ -45,13 +46,13 @@ class PythonPolicy final : public PlannerPolicy {
   std::vector<std::shared_ptr<Sensor>> create_policy_sensors() const override;
 
  private:
-  // What act() returned: `steps` actions for every world, and how many a world has left.
+  // The result of act(): `steps` actions per world, and the number of actions left in each world.
   struct Chunk {
     std::size_t steps = 0;
     std::vector<double> values;        // [B, steps, n]
     std::vector<std::uint8_t> given;   // [B, move groups]
-    std::vector<std::uint8_t> done;    // [B], of the last step
-    std::vector<std::int8_t> success;  // [B], -1: nothing is said
+    std::vector<std::uint8_t> done;    // [B], at the last step
+    std::vector<std::int8_t> success;  // [B], -1: not reported
     std::vector<std::size_t> left;     // [B]
   };
   std::string place(const char* method) const;
@@ -72,9 +73,9 @@ class PythonPolicy final : public PlannerPolicy {
   std::vector<Phase> phases_;
   std::vector<int> phase_, retries_;  // [B]
   Held act_, observation_, wanted_, as_array_;
-  bool* wanted_rows_ = nullptr;     // [B] of wanted_
+  bool* wanted_rows_ = nullptr;     // [B], memory of wanted_
   std::vector<int> group_, width_;  // of the controlled move groups
-  std::size_t n_ = 0;               // their widths together
+  std::size_t n_ = 0;               // sum of the widths
   Chunk chunk_;
 };
 

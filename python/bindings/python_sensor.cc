@@ -9,8 +9,8 @@
 namespace mjsense::python {
 namespace {
 
-// Deletes a reference to Python from any thread. What outlives the interpreter has nobody left to
-// give it back to.
+// Deletes a reference to a Python object from any thread. After the interpreter has ended, the
+// reference is leaked.
 template <class T>
 void give_back(T* reference) {
   if (!nb::is_alive()) return;
@@ -24,7 +24,7 @@ nb::list list_of(std::span<const int> ids) {
   return list;
 }
 
-// `faults`: [(world, exception)] of a mjsense.Sensor.
+// `faults`: [(world, exception)] as returned by a mjsense.Sensor.
 void throw_faults(nb::handle faults) {
   if (nb::len(faults) == 0) return;
   std::vector<RowError::Fault> all;
@@ -76,7 +76,7 @@ void PythonSensor::cast(const CastContext& context) {
   throw_faults(self().attr("_mjs_compute_rows")(list_of(context.ids), seeds_of(context.ids)));
 }
 
-// Its random numbers are those of the n-th update since the reset, read or not in between.
+// The random numbers depend on the number of updates since the reset, not on reads in between.
 void PythonSensor::update(std::span<const int> ids, double dt) {
   if (!spec_.updates) return;
   nb::gil_scoped_acquire lock;
@@ -86,7 +86,7 @@ void PythonSensor::update(std::span<const int> ids, double dt) {
   throw_faults(self().attr("_mjs_control_step")(list_of(ids), dt, seeds));
 }
 
-// The same for the same moment of an episode, whatever its world.
+// The seed depends on the episode and its time, not on the world.
 void PythonSensor::draw_seed(const World& world) {
   seeds_[world.id] = world.rng(stream_of(name())).next();
 }

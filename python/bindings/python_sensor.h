@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
-// A sensor written in Python, as the simulation sees it: computed on the caller's thread, for all
-// worlds whose rows are wanted at once.
+// Adapter of a sensor written in Python for the simulation. It is computed on the caller's thread,
+// for all requested worlds in one call.
 
 #include <nanobind/nanobind.h>
 
@@ -20,27 +20,28 @@
 
 namespace mjsense::python {
 
-// A Python object that C++ refers to without keeping it alive, for references in a circle would
-// never be freed. May be copied and destroyed by any thread.
+// A weak reference to a Python object, because reference cycles through C++ are never collected.
+// Any thread may copy and destroy it.
 class WeakObject {
  public:
   explicit WeakObject(nb::handle object);
-  // Needs the interpreter's lock. RuntimeError if the object is gone.
+  // Requires the GIL. Throws RuntimeError if the object no longer exists.
   nb::object get() const;
 
  private:
   std::shared_ptr<nb::weakref> reference_;
 };
 
-// Rows that a sensor written in Python could not fill. Python sees the exception of the first world.
+// Worlds in which a sensor written in Python failed. Python receives the exception of the first
+// one.
 struct PythonRowError : RowError {
   PythonRowError(std::vector<Fault> faults, Held exception)
       : RowError(std::move(faults)), exception(std::move(exception)) {}
   Held exception;
 };
 
-// What a sensor written in Python declares of its rows: the fields, none if its value is a Python
-// object only, and whether it wants to hear of every control step.
+// Declaration of a Python sensor's rows: the fields (none if its value is an arbitrary Python
+// object), and whether it is called after every control step.
 struct PythonSensorSpec {
   std::vector<std::pair<std::string, SensorSpec>> fields;
   bool updates = false;
@@ -48,49 +49,49 @@ struct PythonSensorSpec {
 PythonSensorSpec read_python_spec(nb::handle sensor);
 
 // Calls _mjs_edit_spec(), _mjs_compute_rows(ids, seeds), _mjs_control_step(ids, dt, seeds) and
-// _mjs_reset(ids, seeds) of a mjsense.Sensor (python/mjsense/sensor.py), seeds for the random numbers
-// that it draws in each of these worlds; its initialize(sim) is called by the Python simulation, once
-// that exists. Any thread may call and destroy this: it takes the interpreter's lock where it needs
-// it.
+// _mjs_reset(ids, seeds) of a mjsense.Sensor (python/mjsense/sensor.py). The seeds are for random
+// numbers drawn in each of these worlds. The Python simulation calls its initialize(sim) once it is
+// created. Any thread may call and destroy this object; it acquires the GIL where necessary.
 class PythonSensor final : public Sensor, public ControlStepListener {
  public:
-  // `self` is kept alive by the Python scene or simulation that it belongs to.
+  // `self` must be kept alive by the Python scene or simulation that it belongs to.
   PythonSensor(std::string name, WeakObject self, PythonSensorSpec spec)
       : Sensor(std::move(name)), self_(std::move(self)), spec_(std::move(spec)) {}
 
   std::string_view kind() const override { return "python"; }
   Stage stage() const override { return Stage::kBatch; }
-  // What it reads of the simulation in Python is brought up to date when it reads it.
+  // The stages that it reads through the Python simulation are computed at the read.
   mjtStage needs() const override { return mjSTAGE_NONE; }
   void edit_spec(mjSpec* spec) override;
   void initialize(const SensorInit& init) override;
   void compute(const World& world) override { draw_seed(world); }
-  // Throws PythonRowError for the worlds whose rows could not be filled; the others are.
+  // Throws PythonRowError with the worlds whose rows could not be computed; the other rows are
+  // valid.
   void cast(const CastContext& context) override;
   void control_step(std::span<const int> ids) override { update(ids, step_dt_); }
-  // The same for `dt` seconds.
+  // The same for a period of `dt` seconds.
   void update(std::span<const int> ids, double dt);
   void reset(const World& world) override;
 
-  // Called with the interpreter's lock when the rows exist.
+  // Called with the GIL when the rows exist.
   std::function<void()> on_initialized;
-  // Tells Python which worlds were reset since the last call. Without the interpreter's lock, which
-  // it takes if there is something to tell.
+  // Passes the worlds that were reset since the last call to Python. Call without the GIL, which is
+  // acquired if there are any.
   void tell_resets();
-  nb::object self() const { return self_.get(); }  // needs the lock
+  nb::object self() const { return self_.get(); }  // requires the GIL
 
  private:
   void draw_seed(const World& world);
   nb::list seeds_of(std::span<const int> ids) const;
-  void flush_resets();  // needs the lock
+  void flush_resets();  // requires the GIL
 
   WeakObject self_;
   PythonSensorSpec spec_;
-  double step_dt_ = 0;                  // s, one control step
-  std::vector<std::uint32_t> seeds_;    // [B] of the moment of the last compute() or reset()
-  std::vector<std::uint32_t> begun_;    // [B] seeds of the last reset()
-  std::vector<std::uint64_t> updates_;  // [B] since then
-  std::vector<std::uint8_t> reset_;     // [B] worlds reset since the last call into Python
+  double step_dt_ = 0;                  // s, control period
+  std::vector<std::uint32_t> seeds_;    // [B], at the last compute() or reset()
+  std::vector<std::uint32_t> begun_;    // [B], at the last reset()
+  std::vector<std::uint64_t> updates_;  // [B], number of updates since then
+  std::vector<std::uint8_t> reset_;     // [B], worlds reset since the last call into Python
   std::atomic<bool> any_reset_{false};
 };
 

@@ -21,7 +21,7 @@ using Doubles = nb::ndarray<const double, nb::ndim<1>, nb::c_contig, nb::device:
 using Bools = nb::ndarray<const bool, nb::ndim<1>, nb::c_contig, nb::device::cpu>;
 using Values = nb::ndarray<const double, nb::ndim<2>, nb::c_contig, nb::device::cpu>;
 
-// Position (m) and quaternion, as a sequence of 7.
+// Position (m) and quaternion (wxyz) from a sequence of 7 numbers.
 Pose read_pose(nb::handle value, const std::string& place) {
   const auto numbers = nb::cast<std::vector<double>>(value);
   if (numbers.size() != 7) {
@@ -48,7 +48,7 @@ std::unique_ptr<PythonTask> PythonTask::make(nb::object task, std::shared_ptr<Py
   cfg.policy_dt_ms = item_or(settings, "policy_dt_ms", cfg.policy_dt_ms);
   const int of_robot = cfg.sim_dt_ms;
   cfg.sim_dt_ms = item_or(settings, "sim_dt_ms", cfg.sim_dt_ms);
-  // The controllers' period is the robot's as long as the physics' is.
+  // The controllers' period is the robot's unless the task changes the physics timestep.
   cfg.ctrl_dt_ms = item_or(settings, "ctrl_dt_ms", cfg.sim_dt_ms == of_robot ? cfg.ctrl_dt_ms : 0);
   if (own_horizon) cfg.horizon = item_or(settings, "horizon", cfg.horizon);
   std::unique_ptr<PythonTask> made(
@@ -130,7 +130,7 @@ void PythonTask::set_objects(int world, nb::handle roles) {
 }
 
 std::optional<Pose> PythonTask::sample_scene(int world, Rng& rng, const StateRow& state) {
-  robot().write_joints(state, rng);  // which sample() may move
+  robot().write_joints(state, rng);  // before sample(), which may change them
   return call("sample", [&]() -> std::optional<Pose> {
     nb::object base = task_.get().attr("_mjs_sample")(world, episode(world), cfg().seed);
     set_objects(world, task_.get().attr("_mjs_roles")(world));
@@ -196,7 +196,7 @@ void PythonTask::write_info(const World& world, JsonWriter& json) const {
   std::size_t next = 0;
   for (const auto& [key, info] : info_) {
     while (next < 2 && ours[next] < key) own(ours[next++]);
-    if (next < 2 && key == ours[next]) ++next;  // the task's own word counts
+    if (next < 2 && key == ours[next]) ++next;  // values of the task have priority
     json.key(key);
     const std::size_t n = std::max<std::size_t>(info.width, 1);
     const double* values = info.values.data() + world.id * n;

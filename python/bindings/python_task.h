@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
-// A task written in Python (mjsense.Task, python/mjsense/task.py), as a rollout sees it. Python is
-// called once a step for all worlds, and at the start of an episode.
+// Adapter of a task written in Python (mjsense.Task, python/mjsense/task.py) for a rollout. Python
+// is called once per step for all worlds, and at the start of an episode.
 
 #include <map>
 #include <memory>
@@ -16,11 +16,11 @@ namespace mjsense::python {
 
 class PythonTask final : public Task, public GraspScene {
  public:
-  // `cfg`: what the rollout wants. Needs the interpreter's lock.
+  // `cfg`: settings of the rollout. Requires the GIL.
   static std::unique_ptr<PythonTask> make(nb::object task, std::shared_ptr<PythonHost> host,
                                           TaskCfg cfg, bool own_horizon);
 
-  // The user's object. Needs the lock.
+  // The user-defined object. Requires the GIL.
   nb::object object() const { return nb::borrow(task_.get()); }
 
   std::string_view name() const override { return name_; }
@@ -59,10 +59,10 @@ class PythonTask final : public Task, public GraspScene {
   std::vector<std::pair<std::string, std::string>> scene_info(int world) const override;
 
  private:
-  // What evaluate() says of every world beside its judgement.
+  // A value that evaluate() returns for every world in addition to reward and success.
   struct Info {
-    char kind = 'f';             // bool, int or float, as NumPy calls them
-    std::size_t width = 0;       // 0: one value a world, else a list of so many
+    char kind = 'f';             // bool, int or float, as NumPy's kind codes
+    std::size_t width = 0;       // 0: one value per world, otherwise a list of this length
     std::vector<double> values;  // [B, max(width, 1)]
   };
   PythonTask(TaskCfg cfg, nb::object task, std::shared_ptr<PythonHost> host);
@@ -82,11 +82,11 @@ class PythonTask final : public Task, public GraspScene {
   ActuatorGroups groups_;
   std::vector<CameraMount> cameras_;
   std::vector<std::vector<TaskObject>> objects_;  // [B]
-  std::vector<std::vector<Pose>> starts_;         // [B], of the objects
+  std::vector<std::vector<Pose>> starts_;         // [B], initial poses of the objects
   std::vector<Evaluation> found_;                 // [B]
   std::map<std::string, Info> info_;
   std::vector<GraspObject> graspable_;
-  std::vector<int> target_;  // [B], of graspable_
+  std::vector<int> target_;  // [B], index into graspable_
   double table_height_ = 0;
 };
 

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// The recorder in Python, for loops of the user's own. python/mjsense/recorder.py makes the public
-// class of it.
+// Bindings of the recorder for user-defined loops. python/mjsense/recorder.py defines the public
+// class.
 
 #include "mjsense/record/recorder.h"
 
@@ -22,7 +22,7 @@
 namespace mjsense::python {
 namespace {
 
-// `episodes` and so on: fields of RecordJobCfg, of which a recorder takes what concerns files.
+// `episodes` and so on are fields of RecordJobCfg, of which a recorder uses those about files.
 class PyRecorder {
  public:
   PyRecorder(PySimulation& sim, nb::list handles, const std::string& out, std::int64_t fps_num,
@@ -112,7 +112,7 @@ class PyRecorder {
     if (world < 0 || world >= B)
       throw ValueError(fmt::format("world {}: must be in [0, {})", world, B));
   }
-  // A camera with colours or depth becomes films and what else it has, as in the recordings of tasks.
+  // A camera with rgb or depth becomes videos plus its other fields, as in recordings of tasks.
   void add(const std::shared_ptr<Sensor>& sensor) {
     sources_.push_back(sensor);
     const auto has = [&](std::string_view field) {
@@ -130,9 +130,9 @@ class PyRecorder {
   }
 
   PySimulation& sim_;
-  nb::object simulation_;                         // keeps it alive
-  std::vector<std::shared_ptr<Sensor>> sources_;  // what is refreshed
-  std::vector<std::shared_ptr<Sensor>> sensors_;  // what is stored
+  nb::object simulation_;                         // keeps the simulation alive
+  std::vector<std::shared_ptr<Sensor>> sources_;  // sensors to refresh
+  std::vector<std::shared_ptr<Sensor>> sensors_;  // sensors to store
   const Birthplace place_;
   std::shared_ptr<Recorder> recorder_;
 };

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Robots in Python: what a robot.toml says, and kinematics of the robot alone.
+// Bindings of robots: the contents of a robot.toml, and kinematics of the robot alone.
 
 #include "mjsense/robots/robot.h"
 
@@ -23,7 +23,7 @@ namespace {
 
 using Values = std::vector<std::vector<double>>;
 
-// A robot that stands alone in a scene of its own.
+// A robot in a scene without other objects.
 class PyRobot {
  public:
   explicit PyRobot(const std::string& name_or_path) : cfg_(robot_cfg(name_or_path)) {
@@ -83,7 +83,7 @@ class PyRobot {
     write_pose(robot_->fk(robot_->group_index(group), read(values)), pose.data());
     return pose;
   }
-  // Empty if it is not reached.
+  // Returns an empty vector if the pose is not reached.
   std::vector<double> ik(const std::string& group, const std::vector<double>& pose,
                          const Values& values, int max_iterations) const {
     const int g = robot_->group_index(group);

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Episodes in Python: recording them, and playing them with the caller's actions.
+// Bindings of episodes: recording them, and playing them with the caller's actions.
 
 #include "mjsense/rollout/rollout.h"
 
@@ -30,9 +30,9 @@ namespace mjsense::python {
 namespace {
 
 // The Python objects of a rollout. `parts` is a tuple: a task or None, a policy or None, sensors, a
-// scene or None, what their code depends on (RolloutCfg::code), sensors of the robot, and None or a
-// function that selects among [(sensor, owner)]. Sensors are a list, or a function that makes it for
-// the simulation. C++ copies and destroys its configuration without the interpreter's lock.
+// scene or None, the dependencies of their code (RolloutCfg::code), sensors of the robot, and None
+// or a function that selects among [(sensor, owner)]. Sensors are a list, or a function that
+// creates the list for a simulation. C++ may copy and destroy its configuration without the GIL.
 class Parts {
  public:
   Parts(nb::object parts, nb::object make_simulation)
@@ -96,7 +96,7 @@ class Parts {
 
  private:
   std::shared_ptr<PythonHost> host_;
-  // The configuration with what only Python has: a function that makes its models.
+  // Reads the configuration, including a Python function that creates its models.
   static SceneFileCfg read_scene_file(nb::object scene, const std::shared_ptr<PythonHost>& host) {
     SceneFileCfg cfg;
     read_struct(scene, cfg);
@@ -137,7 +137,7 @@ nb::dict record(nb::dict options, nb::object progress, nb::object objects,
   const Parts parts(objects, make_simulation);
   parts.join(cfg.rollout);
   StopFlag stop{0};
-  nb::object error;  // of `progress`, or KeyboardInterrupt
+  nb::object error;  // raised by `progress`, or KeyboardInterrupt
   const auto report = [&](const RecordProgress& p) {
     nb::gil_scoped_acquire lock;
     if (error) return;
@@ -153,7 +153,7 @@ nb::dict record(nb::dict options, nb::object progress, nb::object objects,
   refuse_python_callbacks();
   try {
     nb::gil_scoped_release unlock;
-    // Code of users that runs for it may read the worlds, not move them.
+    // User code that runs inside may read the worlds but not step or reset them.
     parts.host()->turns()->work([&] { s = record_episodes(cfg, report, &stop); });
   } catch (...) {
     parts.host()->close();
@@ -209,7 +209,7 @@ class PyRollout {
   }
 
   Rollout& rollout() { return *rollout_; }
-  // mjsense.Simulation of the worlds, which takes turns with the rollout.
+  // mjsense.Simulation of the worlds, which shares the rollout's lock.
   nb::object simulation() const { return parts_.host()->simulation(rollout_->simulation_ptr()); }
 
   void start(const std::vector<int>& worlds, const std::vector<std::int64_t>& episodes) {
@@ -228,7 +228,8 @@ class PyRollout {
     turns_->change("reseed", [&] { rollout_->reseed(seed); });
   }
 
-  // Commands of all controlled groups in a row, [B, n]; `done` [B]: the episode ends after them.
+  // Commands of all controlled groups, concatenated, [B, n]. `done` [B]: the episode ends after
+  // this step.
   using Commands = nb::ndarray<const double, nb::shape<-1, -1>, nb::c_contig, nb::device::cpu>;
   using Flags = nb::ndarray<const bool, nb::shape<-1>, nb::c_contig, nb::device::cpu>;
   void set_actions(const Commands& values, std::optional<Flags> done) {
@@ -244,7 +245,7 @@ class PyRollout {
       }
     });
   }
-  // Chunks [B, steps, n].
+  // Chunks of actions, [B, steps, n].
   using Chunks = nb::ndarray<const double, nb::shape<-1, -1, -1>, nb::c_contig, nb::device::cpu>;
   void step_chunk(const Chunks& values, bool stop_on_success) {
     check(values.shape(0), values.shape(2), "(B, steps, n)");
@@ -256,7 +257,7 @@ class PyRollout {
     }
     turns_->change("step_chunk", [&] { rollout_->step_chunk(actions, stop_on_success); });
   }
-  // What act() chose, [B, n], and which worlds it said to be done in.
+  // Actions that act() chose, [B, n], and the worlds for which the policy reported done.
   nb::tuple actions() {
     std::vector<std::vector<double>> rows(rollout_->num_worlds());
     std::vector<int> done(rollout_->num_worlds()), all(rollout_->num_worlds());
@@ -302,7 +303,7 @@ class PyRollout {
   std::shared_ptr<Rollout> rollout_;
 };
 
-// (reward, success, terminal, truncated) [B] each, and {world: why it cannot go on}.
+// (reward, success, terminal, truncated), each [B], and {world: fault}.
 nb::tuple outcomes(PyRollout& self) {
   const int B = self.rollout().num_worlds();
   const auto make = [&](DType dtype) { return std::make_shared<Array>(dtype, Shape{B}); };

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Scenes in Python. python/mjsense/scene.py makes the public class of it.
+// Bindings of scenes. python/mjsense/scene.py defines the public class.
 
 #include "python/bindings/scene.h"
 
@@ -30,9 +30,8 @@ mjSpec* spec_of(nb::handle mjspec) {
   return reinterpret_cast<mjSpec*>(nb::cast<std::uintptr_t>(mjspec.attr("_address")));
 }
 
-// What an EntityCfg's `model` stands for, as EntityCfg._source() tells: ("path" | "xml" | "spec",
-// value).
-// What it refers to is added to `alive`.
+// Reads an EntityCfg's `model` as returned by EntityCfg._source(): ("path" | "xml" | "spec",
+// value). Referenced objects are added to `alive`.
 ModelSource read_source(nb::handle config, nb::list& alive) {
   ModelSource source;
   const auto from = nb::cast<nb::tuple>(config.attr("_source")());
@@ -48,7 +47,7 @@ ModelSource read_source(nb::handle config, nb::list& alive) {
   return source;
 }
 
-// A sensor written in Python among a scene's configured ones.
+// A sensor written in Python in a scene's list of sensors.
 class PythonSensorCfg final : public SensorCfg {
  public:
   PythonSensorCfg(std::string key, nb::handle sensor, PythonSensorSpec spec)
@@ -72,7 +71,7 @@ std::shared_ptr<const SensorCfg> read_sensor(nb::handle item) {
 
 std::shared_ptr<Scene> make_scene(nb::handle config, nb::handle spec, nb::list sensors,
                                   nb::object edit) {
-  refuse_python_callbacks();  // compilation calls them too
+  refuse_python_callbacks();  // compilation may call them too
   nb::list alive;
   SceneCfg cfg = read_scene(config, spec, sensors, edit, alive);
   nb::gil_scoped_release unlock;
@@ -109,7 +108,7 @@ NumpyArray env_origins(const Scene& scene, int num_worlds) {
   return array_of<float>(scene.env_origins(num_worlds), {num_worlds, 3});
 }
 
-// Of generated terrain; None without.
+// Generated terrain; null if there is none.
 const Terrain* tiles_of(const Scene& scene) {
   return scene.terrain() && scene.terrain()->levels() > 0 ? scene.terrain() : nullptr;
 }
@@ -137,7 +136,8 @@ SceneCfg read_scene(nb::handle config, nb::handle spec, nb::list sensors, nb::ha
     cfg.entities[i++].second.model = read_source(entity, alive);
   for (nb::handle sensor : sensors) cfg.sensors.push_back(read_sensor(sensor));
   cfg.spec = spec_of(spec);
-  // Called once, while the Scene is made: the stored config may be destroyed without the lock.
+  // Called once during construction of the Scene; afterwards the stored config may be destroyed
+  // without the GIL.
   cfg.spec_fn = [edit](mjSpec*) {
     nb::gil_scoped_acquire lock;
     edit();

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
-// Reads a scene that Python configured.
+// Reads a scene that was configured in Python.
 
 #include <nanobind/nanobind.h>
 
@@ -10,9 +10,9 @@ namespace mjsense::python {
 
 namespace nb = nanobind;
 
-// `spec` is the empty MjSpec that the scene is built in, so that Python's spec_fn sees the real
-// thing; `edit` is called with no argument when everything is attached. Both, and what is added to
-// `alive`, must live until the Scene is made.
+// `spec` is the empty MjSpec in which the scene is built, so that Python's spec_fn receives the
+// actual object. `edit` is called without arguments after everything is attached. Both, and the
+// objects added to `alive`, must live until the Scene is constructed.
 SceneCfg read_scene(nb::handle config, nb::handle spec, nb::list sensors, nb::handle edit,
                     nb::list& alive);
 

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
-// A C++ sensor as Python holds it.
+// A C++ sensor as a Python object.
 
 #include <memory>
 
@@ -10,9 +10,9 @@
 namespace mjsense::python {
 
 struct SensorHandle {
-  std::shared_ptr<Sensor> sensor;  // keeps alive whoever owns it, too
+  std::shared_ptr<Sensor> sensor;  // also keeps its owner alive
 
-  // The sensor as one of a kind, for the methods of that kind.
+  // The sensor as a subclass, for the methods of that class.
   template <class T>
   T& as() const {
     if (auto* typed = dynamic_cast<T*>(sensor.get())) return *typed;

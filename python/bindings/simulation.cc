@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Simulations in Python. python/mjsense/simulation.py makes the public class of it.
+// Bindings of simulations. python/mjsense/simulation.py defines the public class.
 
 #include "mjsense/sim/simulation.h"
 
@@ -24,7 +24,7 @@ namespace {
 
 using Ids = std::optional<std::vector<int>>;
 
-// None is every world.
+// None selects all worlds.
 WorldIds worlds_of(const Ids& ids) { return ids ? WorldIds(*ids) : WorldIds(all_worlds); }
 
 void step(PySimulation& self, int control_steps) {
@@ -39,8 +39,8 @@ void reset(PySimulation& self, const Ids& ids, int key, std::optional<std::uint6
   });
 }
 
-// mjlab's order of calls: first MuJoCo's steps, then every sensor's update, whatever rows of others
-// cannot be filled; then the first error is thrown.
+// mjlab's call order: MuJoCo's steps first, then the update of every sensor. All sensors are
+// updated even if rows of some fail; then the first error is thrown.
 void update_sensors(PySimulation& self, double dt) {
   self.change("update", [&](Simulation& sim) {
     sim.update_sensors(dt);
@@ -66,7 +66,7 @@ void forward(PySimulation& self, const Ids& ids) {
   self.change("forward", [&](Simulation& sim) { sim.forward(worlds_of(ids)); });
 }
 
-// Rows [B, bytes] of a field of the model: Python knows its type and shape from MuJoCo's own
+// Rows [B, bytes] of a field of the model. Python gets the data type and shape from MuJoCo's own
 // bindings.
 NumpyArray model_field(PySimulation& self, const std::string& name) {
   int size = 0, element = 0, worlds = 0;
@@ -84,7 +84,7 @@ std::string_view kind_name(mjtGeom kind) {
   return kind == mjGEOM_SPHERE ? "sphere" : kind == mjGEOM_LINE ? "line" : "arrow";
 }
 
-// (kinds, positions [n, 3], vectors [n, 3], widths [n], rgba [n, 4], labels), float64 but for rgba.
+// (kinds, positions [n, 3], vectors [n, 3], widths [n], rgba [n, 4], labels); float64 except rgba.
 nb::tuple draw(PySimulation& self, int world, nb::list handles) {
   std::vector<Sensor*> sensors;
   for (nb::handle h : handles) sensors.push_back(nb::cast<SensorHandle&>(h).sensor.get());
@@ -220,7 +220,7 @@ void bind_simulation(nb::module_& m) {
           [](PySimulation& s, const Ids& ids, bool set_const) {
             s.change("randomize", [&](Simulation& sim) {
               const std::vector<int> checked = sim.worlds().checked_ids(worlds_of(ids));
-              if (checked.empty()) return;  // MuJoCo would take it for all
+              if (checked.empty()) return;  // MuJoCo would interpret an empty list as all worlds
               if (set_const)
                 mjb_setConst(sim.worlds().batch(), checked.data(),
                              static_cast<int>(checked.size()));

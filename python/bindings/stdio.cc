@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// libc's streams under the names that libhdf5_shared.a has for them (cmake/PythonModule.cmake).
+// libc's streams under the names that libhdf5_shared.a uses (cmake/PythonModule.cmake).
 
 #include <cstdio>
 

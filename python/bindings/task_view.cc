@@ -74,7 +74,7 @@ nb::dict targets(const TaskView& view, int world) {
   return d;
 }
 
-// {group: [x, y, z, qw, qx, qy, qz]} of every group, in the base frame.
+// {group: [x, y, z, qw, qx, qy, qz]} of all groups, in the base frame, m.
 nb::dict fk(const TaskView& view, nb::dict values) {
   const Robot& robot = view.robot();
   RobotValues q;
@@ -88,7 +88,7 @@ nb::dict fk(const TaskView& view, nb::dict values) {
   return d;
 }
 
-// As the policy gave it; None before the first.
+// The action as the policy returned it; None before the first one.
 nb::object last_action(const TaskView& view, int world) {
   const Action* action = view.task().last_action(view.checked(world));
   if (!action) return nb::none();
@@ -101,7 +101,7 @@ nb::object last_action(const TaskView& view, int world) {
   return d;
 }
 
-// JSON text of what the task says about the state.
+// The task's information about the state, JSON text.
 std::string info(const TaskView& view, int world) {
   std::vector<std::uint8_t> text(1 << 13);
   std::size_t size = 0;
@@ -123,7 +123,7 @@ std::string info(const TaskView& view, int world) {
 nb::tuple evaluate(const TaskView& view, int world) {
   Evaluation e;
   visit(view, world, [&](const World& w) { e = view.task().evaluate(w); });
-  // One that judges after the sensors has not judged this observation yet.
+  // A task that is evaluated after the sensors has not evaluated this observation yet.
   if (view.task().info_follows_evaluation()) e.terminal = view.task().done_received(world);
   return nb::make_tuple(e.reward, e.success, e.terminal, e.truncated);
 }
@@ -169,18 +169,18 @@ nb::list cameras(const TaskView& view) {
   return all;
 }
 
-// The object of a task that is written in Python; None of any other.
+// The object of a task that is written in Python; None for other tasks.
 nb::object own(const TaskView& view) {
   const auto* task = dynamic_cast<const PythonTask*>(&view.task());
   return task ? task->object() : nb::none();
 }
 
-// None: the policy follows no phases.
+// Null if the policy has no phases.
 const PlannerPolicy* planner_of(const TaskView& view) {
   return dynamic_cast<const PlannerPolicy*>(view.task().policy());
 }
 
-// (phase, retries, grasp pose); None if the policy follows no phases.
+// (phase, retries, grasp pose); None if the policy has no phases.
 nb::object plan(const TaskView& view, int world) {
   const PlannerPolicy* planner = planner_of(view);
   if (!planner) return nb::none();

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
-// What sensors written in Python learn of the task, the robot and the policy of a rollout.
+// Access to the task, robot and policy of a rollout for sensors written in Python.
 
 #include <nanobind/nanobind.h>
 
@@ -12,10 +12,11 @@ namespace mjsense::python {
 
 class Turns;
 
-// Outlives its rollout: every call then raises RuntimeError.
+// May outlive its rollout; every call then throws RuntimeError.
 class TaskView {
  public:
-  // One for all that refer to a rollout: its owner says when it ends.
+  // Shared by all objects that refer to a rollout. The owner sets the pointer to null when the
+  // rollout ends.
   using Cell = std::shared_ptr<Rollout*>;
   TaskView(Cell cell, std::shared_ptr<Turns> turns)
       : cell_(std::move(cell)), turns_(std::move(turns)) {}
@@ -24,12 +25,12 @@ class TaskView {
   Task& task() const { return rollout().task(); }
   const Robot& robot() const { return rollout().task().robot(); }
   Turns& turns() const { return *turns_; }
-  // Throws ValueError for a world that there is not.
+  // Throws ValueError if there is no such world.
   int checked(int world) const;
 
  private:
   Cell cell_;
-  std::shared_ptr<Turns> turns_;  // with the rollout's simulation
+  std::shared_ptr<Turns> turns_;  // shared with the rollout's simulation
 };
 
 }  // namespace mjsense::python

@@ -18,9 +18,9 @@ Where to look (``help(mjs.Simulation)`` and so on):
     many worlds                  Simulation: step, reset, qpos, ctrl, randomize, draw
     sensors of a scene           BuiltinSensorCfg, ContactSensorCfg, RayCastSensorCfg, TerrainHeightSensorCfg, LidarSensorCfg,
                                  CameraSensorCfg, ImuSensorCfg; wrapped by noise, delay, dropout: effects
-    sensors of yours             Sensor; sets of sensors: SensorSuite
+    user-defined sensors         Sensor; sets of sensors: SensorSuite
     episodes of tasks            make (gymnasium.Env), make_vec (gymnasium.vector.VectorEnv), record, Recorder
-    names that these know        task_names(), robot_names(), policy_names(); of yours: Task, Policy, Robot
+    names that these accept      task_names(), robot_names(), policy_names(); user-defined: Task, Policy, Robot
     trainers                     mjsense.rl.sb3, mjsense.rl.rsl
     configurations of mjlab      mjsense.compat.mjlab
 
@@ -29,7 +29,7 @@ Where to look (``help(mjs.Simulation)`` and so on):
 
 from mjsense import _libmujoco
 
-_libmujoco.load()  # first: the extension shares what `import mujoco` loads
+_libmujoco.load()  # first, because the extension uses the libmujoco that `import mujoco` loads
 
 from mjsense import _core
 

@@ -14,8 +14,8 @@ from mjsense.ffmpeg import use_installed_ffmpeg
 
 
 def main() -> int:
-    """Runs the program with this process's arguments; its exit code."""
-    # Ctrl-C is the program's affair, as where no Python is.
+    """Runs the program with the arguments of this process and returns its exit code."""
+    # The program handles Ctrl-C itself, as it does outside of Python.
     signal.signal(signal.SIGINT, signal.SIG_DFL)
     words = sys.argv[1:]
     if "--meshes=real" in words or ("--meshes", "real") in pairwise(words):

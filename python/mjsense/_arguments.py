@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Wrong arguments and misspelt attributes of the Python API are said in one sentence.
+"""Checks arguments and attribute names of the Python API and reports errors in one sentence.
 
-What an argument may be is what its annotation says. ``checked`` reads the annotations of a function, or of every public method of
-a class, once; a call then costs one test for each argument that is given.
+Annotations define the valid arguments. ``checked`` reads the annotations of a function, or of every public method of a class,
+once. A call then costs one test per given argument.
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ from typing import Any, TypeVar, cast
 import numpy as np
 
 Seed = int
-"""An int of 64 bits from 0 on."""
+"""A non-negative int of 64 bits."""
 
 T = TypeVar("T")
 
@@ -41,7 +41,7 @@ def _is_a(value: Any, name: str) -> bool:
     return any(base.__name__ == name for base in type(value).__mro__)
 
 
-# What an annotation may consist of: the test, and the words for it. Names of classes are tested by name.
+# The elements of annotations: a test and its description for messages. Names of classes are tested by name.
 _KINDS: dict[str, tuple[Callable[[Any], bool], str]] = {
     "None": (lambda value: value is None, "None"),
     "int": (_is_int, "an int of 32 bits"),
@@ -70,7 +70,7 @@ _KINDS: dict[str, tuple[Callable[[Any], bool], str]] = {
     "Mapping": (lambda value: hasattr(value, "keys"), "a mapping"),
     "dict": (lambda value: isinstance(value, dict), "a dict"),
 }
-_ANYTHING = {"Any", "np.ndarray", "Sequence[int]"}  # world ids have a test of their own: masks will do
+_ANYTHING = {"Any", "np.ndarray", "Sequence[int]"}  # world ids are checked elsewhere, because masks are valid too
 
 
 def _kind(word: str) -> tuple[Callable[[Any], bool], str] | None:
@@ -79,14 +79,14 @@ def _kind(word: str) -> tuple[Callable[[Any], bool], str] | None:
     for name in (word, word.split("[")[0]):
         if name in _KINDS:
             return _KINDS[name]
-    if word.startswith("Literal["):  # C++ knows the words, and the nearest one
+    if word.startswith("Literal["):  # C++ checks the word and suggests the nearest one
         return _KINDS["str"]
     cls = word.split(".")[-1]
     return (lambda value: _is_a(value, cls)), f"a {word}"
 
 
 def _check_of(place: str, name: str, annotation: Any) -> Callable[[Any], None] | None:
-    """A function that raises for a value that the annotation does not allow; None if it allows all."""
+    """A function that raises for values that the annotation does not allow; None if it allows every value."""
     if not isinstance(annotation, str):
         return None
     kinds = [_kind(word.strip()) for word in re.split(r"\|(?![^\[]*\])", annotation)]
@@ -112,7 +112,7 @@ def _short(value: Any) -> str:
 
 
 def checked(target: T, owner: str = "") -> T:
-    """A function, or a class with public methods, whose arguments are checked by their annotations."""
+    """Decorates a function, or a class with public methods, to check arguments against their annotations."""
     if isinstance(target, type):
         for name, value in list(vars(target).items()):
             if isinstance(value, FunctionType) and (name in ("__init__", "__call__", "__getitem__") or name[0] != "_"):
@@ -146,10 +146,10 @@ def checked(target: T, owner: str = "") -> T:
 
 
 class KnownAttributes:
-    """Assigning to an attribute that does not exist is an error: ``sim.qposs = 3``. Classes of yours may add what they like."""
+    """Makes assignment to an unknown attribute an error: ``sim.qposs = 3``. Subclasses may add attributes."""
 
     _complete = False
-    """Set when __init__ has made all attributes; dataclasses have a list of theirs."""
+    """True when __init__ has created all attributes; dataclasses have a list of them."""
 
     def __setattr__(self, name: str, value: Any) -> None:
         cls = type(self)

@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Checksums of a user's task, policy or sensor, so that a recording is resumed only with the same.
+"""Checksums of user-defined tasks, policies and sensors, so that a recording can only be resumed with equal ones.
 
-Two things are compared: the code, which is the bytecode of the object's classes and of every function that they use outside of
-installed packages; and the values of its attributes. Of installed packages the version is compared.
+Two parts are compared: the code, that is, the bytecode of the object's classes and of every function that they use outside of
+installed packages; and the values of its attributes. For installed packages the version is compared.
 """
 
 from __future__ import annotations
@@ -28,16 +28,17 @@ _BOUND = {"sim", "num_worlds", "action_groups", "action_low", "action_high", "wa
 
 
 def checksums(owner: Any, place: str, must_compare: bool = False) -> dict[str, str]:
-    """A checksum of the code and of each attribute of ``owner``, by name; of what its ``fingerprint()`` returns, if it has one.
+    """Checksums of the code and of each attribute of ``owner``, by name; with a method ``fingerprint()``, of its result instead
+    of the attributes.
 
     Raises:
-        ValueError: the value of an attribute cannot be compared, and ``must_compare``.
+        ValueError: An attribute's value cannot be compared, and ``must_compare`` is true.
     """
     values = {"fingerprint": owner.fingerprint()} if callable(getattr(owner, "fingerprint", None)) else _attributes(owner)
     found = {}
     for name, value in {"code": type(owner), **values}.items():
         try:
-            # Values of its classes are compared by name.
+            # Attribute values of its classes are compared separately, by name.
             found[name] = _digest(value, type(owner).__mro__ if name == "code" else ())
         except _NotComparable as error:
             if must_compare:
@@ -51,7 +52,7 @@ def checksums(owner: Any, place: str, must_compare: bool = False) -> dict[str, s
 
 
 def _attributes(owner: Any) -> dict[str, Any]:
-    """Its own attributes, and the values that its classes give it."""
+    """Attributes of the instance and of its user-defined classes."""
     names = set(getattr(owner, "__dict__", ()))
     for cls in type(owner).__mro__:
         slots = vars(cls).get("__slots__", ())
@@ -59,7 +60,7 @@ def _attributes(owner: Any) -> dict[str, Any]:
         if not _is_installed(cls.__module__):
             names |= {name for name, value in vars(cls).items() if not _is_code(value)}
     names = {name for name in names - _BOUND if not name.startswith(("__", "_mjs_", "_abc_"))}
-    # What a used object has beside these was made for the worlds of its last recording.
+    # Attributes that were added later belong to the worlds of a previous recording.
     names = getattr(owner, "__dict__", {}).setdefault("_mjs_compared", names)
     return {name: getattr(owner, name) for name in sorted(names) if hasattr(owner, name)}
 
@@ -87,13 +88,13 @@ def _digest(value: Any, without_values: tuple[type, ...] = ()) -> str:
 
 
 class _Writer:
-    """Feeds a hash with a value and all that it consists of."""
+    """Updates a hash with a value and, recursively, its contents."""
 
     def __init__(self, without_values: tuple[type, ...]) -> None:
         self._without_values = without_values
         self.sum = hashlib.sha256()
         self._seen: dict[int, int] = {}
-        self._kept: list[Any] = []  # an id belongs to its object while that lives
+        self._kept: list[Any] = []  # keeps objects alive, so that their ids stay unique
 
     def add(self, value: Any) -> None:
         plain = (type(None), bool, int, float, complex, str, bytes, pathlib.PurePath)
@@ -179,7 +180,7 @@ class _Writer:
         self.add(type(value))
         if isinstance(value, np.random.Generator):
             return self.add(value.bit_generator.state)
-        if callable(getattr(value, "detach", None)):  # a tensor of PyTorch
+        if callable(getattr(value, "detach", None)):  # a PyTorch tensor
             return self.add(_numbers(value))
         if isinstance(value, types.BuiltinFunctionType):
             return self._text(value.__qualname__)
@@ -213,7 +214,7 @@ def _is_filled(cell: types.CellType) -> bool:
 
 
 def _names(code: types.CodeType) -> list[str]:
-    """Names that a function and those inside it may look up."""
+    """Names that a function and its nested functions may look up."""
     names = set(code.co_names)
     for const in code.co_consts:
         if isinstance(const, types.CodeType):

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What configurations can do: the generated dataclasses of the same names (configs.py, effects.py) inherit from these."""
+"""Methods of configurations: the generated dataclasses of the same names (configs.py, effects.py) inherit from these classes."""
 
 from __future__ import annotations
 
@@ -18,11 +18,11 @@ if TYPE_CHECKING:
 
 
 class Config(KnownAttributes):
-    """Base of all configurations: C++ checks them when they are made, and a misspelt attribute is an AttributeError."""
+    """Base class of all configurations. C++ checks them at construction, and a misspelt attribute raises AttributeError."""
 
     if TYPE_CHECKING:
 
-        def __init__(self, *args: Any, **kwargs: Any) -> None: ...  # each dataclass has its own
+        def __init__(self, *args: Any, **kwargs: Any) -> None: ...  # for type checkers: each dataclass has its own
 
     def __post_init__(self) -> None:
         _core.check_cfg(self)
@@ -49,7 +49,7 @@ class EntityCfg(Config):
         super().__post_init__()
 
     def _source(self) -> tuple[str, Any, dict[str, bytes]]:
-        """(kind, value, assets): kind path, xml or spec."""
+        """Returns (kind, value, assets) with kind path, xml or spec."""
         model, assets = self.model, dict(self.assets)
         if callable(model):
             model = cast(Any, model())
@@ -105,7 +105,7 @@ class SceneCfg(Config):
         super().__post_init__()
 
     def _base_spec(self) -> mujoco.MjSpec:
-        """The spec that the scene is built in."""
+        """The spec in which the scene is built."""
         if self.base is None:
             return mujoco.MjSpec()
         text = str(self.base)
@@ -123,13 +123,13 @@ class SensorCfg(Config):
 
     @property
     def prefixed_name(self) -> str:
-        """Key in the scene's registry."""
+        """Key of the sensor in the scene."""
         return self.name if hasattr(self, "build") else _core.cfg_key(self)
 
 
 class RayPattern(Config):
     def generate_rays(self) -> tuple[Any, Any]:
-        """Offsets (m) and unit directions, float32 ``[n, 3]`` each, in the local frame."""
+        """Origins (m) and unit directions of the rays in the local frame, float32 ``[n, 3]`` each."""
         return _core.pattern_rays(self)
 
 
@@ -144,7 +144,8 @@ class UserPatternCfg(RayPattern):
 class PinholeCameraPatternCfg(RayPattern):
     @classmethod
     def from_intrinsic_matrix(cls, intrinsic_matrix: Any, width: int, height: int) -> Self:
-        """From a 3x3 matrix, as 9 numbers or rows; only its fy is used. ValueError if that is not positive."""
+        """Creates the pattern from a 3x3 matrix, given as 9 numbers or as rows. Only its fy is used; raises ValueError unless it
+        is positive."""
         flat = [float(x) for row in intrinsic_matrix for x in (row if hasattr(row, "__iter__") else (row,))]
         if len(flat) != 9:
             raise ValueError(f"intrinsic_matrix must be 3x3, not {intrinsic_matrix!r}")
@@ -152,7 +153,7 @@ class PinholeCameraPatternCfg(RayPattern):
 
     @classmethod
     def from_mujoco_camera(cls, camera_name: str) -> Self:
-        """Resolution and angles of a camera of the model."""
+        """Creates the pattern with the resolution and field of view of a camera of the model."""
         return cls(camera_name=camera_name)
 
 

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
-"""``dataclasses.dataclass`` whose methods are written when one is first wanted.
+"""A variant of ``dataclasses.dataclass`` that generates methods when one of them is first used.
 
-Python compiles the methods of a dataclass while its module is imported. There are sixty configurations, and a program uses five of them.
+The standard one compiles all methods at import. There are sixty configuration classes, and a program uses about five of them.
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ def dataclass(cls: T, /) -> T: ...
 def dataclass(*, frozen: bool = False) -> Callable[[T], T]: ...
 @dataclass_transform(field_specifiers=(dataclasses.field,))
 def dataclass(cls: Any = None, /, *, frozen: bool = False) -> Any:
-    """As that of ``dataclasses``, to whose functions these classes are such."""
+    """Like ``dataclasses.dataclass``; the functions of ``dataclasses`` accept these classes."""
     if cls is None:
         return lambda cls: _declare(cls, frozen)
     return _declare(cls, frozen)
@@ -36,7 +36,7 @@ def _declare(cls: type, frozen: bool) -> type:
 
 
 class _Method:
-    """Stands for a method; when it is looked up, all that are missing are written."""
+    """Placeholder of a method. The first look-up of any of them generates all missing methods."""
 
     def __init__(self, cls: type, name: str, frozen: bool) -> None:
         self._cls, self._name, self._frozen = cls, name, frozen
@@ -50,10 +50,10 @@ class _Method:
 
 
 def _write(cls: type, frozen: bool) -> type:
-    """A dataclass with the same fields, those of bases included, in their order: its methods fit."""
+    """A dataclass with the same fields in the same order, including those of bases, whose methods can therefore be used."""
     fields = dataclasses.fields(cls)  # type: ignore[arg-type]
     namespace: dict[str, Any] = {f.name: f for f in fields}
     namespace.update(__annotations__={f.name: f.type for f in fields}, __module__=cls.__module__, __qualname__=cls.__qualname__, __doc__="-")
     if hasattr(cls, "__post_init__"):
-        namespace["__post_init__"] = None  # __init__ calls it if there is one
+        namespace["__post_init__"] = None  # the generated __init__ then calls __post_init__
     return dataclasses.dataclass(frozen=frozen)(type(cls.__name__, (), namespace))

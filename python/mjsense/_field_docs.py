@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Shows what stands under a dataclass's fields in ``help()``: Python forgets these strings when it compiles a class."""
+"""Shows the docstrings of dataclass fields in ``help()``; Python discards these strings when it compiles a class."""
 
 from __future__ import annotations
 
@@ -10,14 +10,16 @@ from typing import Any
 
 
 def show_field_docs(module_name: str) -> None:
-    """Appends its fields to the docstring of every dataclass of this module, those of its bases included; when it is first asked for."""
+    """Appends the field docstrings to the docstring of every dataclass of this module, including fields of bases, at the first
+    access."""
     for cls in list(vars(sys.modules[module_name]).values()):
         if isinstance(cls, type) and cls.__module__ == module_name and dataclasses.is_dataclass(cls):
             cls.__doc__ = _Doc(cls.__doc__ or "")  # type: ignore[assignment]
 
 
 class _Doc:
-    """A docstring that is made when it is read: importing ast and parsing the module takes longer than everything else in it."""
+    """A docstring that is generated on access, because importing ast and parsing the module takes longer than the rest of the
+    import."""
 
     def __init__(self, text: str) -> None:
         self.text = text
@@ -32,7 +34,7 @@ class _Doc:
 
 @functools.cache
 def _texts(module_name: str) -> dict[str, dict[str, str]]:
-    """What stands under the fields, by class and field."""
+    """Docstrings of the fields, by class and field."""
     import ast
     import inspect
 

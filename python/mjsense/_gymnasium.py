@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Tasks in gymnasium's registry: ``gymnasium.make("mjsense/Pick-Franka-v0")`` once mjsense is imported."""
+"""Tasks in gymnasium's registry: ``gymnasium.make("mjsense/Pick-Franka-v0")`` after ``import mjsense``."""
 
 from __future__ import annotations
 
@@ -11,13 +11,15 @@ from mjsense import _core
 
 
 def env_id(task: str, robot: str | None = None) -> str:
-    """``mjsense/PickAndPlace-Franka-v0``; without a robot ``mjsense/PickAndPlace-v0``, with the task's own."""
+    """Id of an environment, ``mjsense/PickAndPlace-Franka-v0``; without a robot ``mjsense/PickAndPlace-v0``, which uses the
+    task's default robot."""
     words = ["".join(part.capitalize() for part in name.split("_")) for name in (task, robot) if name]
     return f"mjsense/{'-'.join(words)}-v0"
 
 
 def register(task: str, robot: str | None = None) -> None:
-    """Registers a task, unless its name is outside gymnasium's grammar or registered already; its options are those of :func:`mjsense.make` and :func:`mjsense.make_vec`."""
+    """Registers a task, unless gymnasium does not allow its name or it is already registered. Its options are those of
+    :func:`mjsense.make` and :func:`mjsense.make_vec`."""
     if not re.fullmatch(r"[\w.-]+", task) or env_id(task, robot) in gymnasium.registry:
         return
     kwargs = {"task": task} if robot is None else {"task": task, "robot": robot}
@@ -26,7 +28,8 @@ def register(task: str, robot: str | None = None) -> None:
 
 
 def register_all() -> None:
-    """Every task, with its own robot and with each that there is. Whether the two go together is found when they are made."""
+    """Registers every task with its default robot and with every robot. Incompatible pairs raise an error when an environment is
+    made."""
     for task in _core.task_names():
         for robot in (None, *_core.robot_names()):
             register(task, robot)

@@ -1,7 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The libmujoco that ``import mujoco`` loads, shared with the extension: found, checked, and made visible to it.
+"""Finds and checks the libmujoco that ``import mujoco`` loads, and makes its symbols visible to the extension.
 
-The extension names no file: any MuJoCo of the range will do, and there is one libmujoco in the process.
+The extension is not linked to a file name, so it works with every MuJoCo of the supported series, and a process contains only one
+libmujoco.
 """
 
 from __future__ import annotations
@@ -13,12 +14,12 @@ from pathlib import Path
 from types import ModuleType
 
 SERIES = (4, 0)
-"""Major and minor of the MuJoCo that this is built for; its structs are the same in all of them."""
+"""Major and minor version of MuJoCo that this package is built for; struct layouts are equal within the series."""
 REQUIREMENT = "mujoco-core>=4.0,<4.1"
 
 
 def _installed(name: str) -> str | None:
-    """The version that pip believes to be installed."""
+    """The installed version according to the package metadata."""
     import importlib.metadata  # slow to import, and needed for errors only
 
     try:
@@ -35,7 +36,7 @@ def _error(found: str) -> ImportError:
     if whole is None:
         mend = f"{again} '{REQUIREMENT}'" if core else install
     elif whole.split(".")[:2] == [str(n) for n in SERIES]:
-        mend = f"{again} 'mujoco-core=={whole}'"  # mujoco's own files need a core of the very same version
+        mend = f"{again} 'mujoco-core=={whole}'"  # the mujoco package requires mujoco-core of exactly the same version
     else:
         mend = f"pip uninstall -y mujoco && {again if core else 'pip install'} '{REQUIREMENT}'"
     return ImportError(
@@ -51,7 +52,7 @@ def _libraries(mujoco: ModuleType) -> list[Path]:
 
 
 def load() -> None:
-    """Imports mujoco and makes its libmujoco's functions visible to the extension; ImportError if it is of another series."""
+    """Imports mujoco and makes its libmujoco's symbols visible to the extension; raises ImportError for another series."""
     if importlib.util.find_spec("mujoco") is None:
         raise _error("found no package mujoco")
     try:
@@ -63,7 +64,7 @@ def load() -> None:
     if tuple(int(n) for n in version.split(".")[:2]) != SERIES:
         raise _error(f"found {version} in {Path(mujoco.__file__ or '').parent}")
     libraries = _libraries(mujoco)
-    # More than one is what an installation over another leaves; the bindings have loaded that of their version.
+    # Installing over an older version can leave several files. The bindings have loaded the one of their version.
     chosen = [file for file in libraries if version in file.name] or libraries
     if not chosen:
         raise _error(f"found {version}, but no libmujoco in {', '.join(mujoco.__path__)}")
@@ -71,7 +72,7 @@ def load() -> None:
 
 
 def check(core: ModuleType) -> None:
-    """ImportError unless the extension met the libmujoco of `mujoco`, with the structs it was compiled for."""
+    """Raises ImportError unless the extension uses the libmujoco of `mujoco` with the struct layouts it was compiled for."""
     import mujoco
 
     if core.mujoco_version() != mujoco.mj_versionString():

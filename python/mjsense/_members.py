@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Sensors of the user's as members of a rollout's suite: a recording, an environment."""
+"""User-defined sensors as members of a rollout's suite."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ if TYPE_CHECKING:
 
 
 def member(thing: Any) -> Any:
-    """A sensor that may become one; TypeError or ValueError if it cannot."""
+    """Converts an object to a sensor that can join a suite; raises TypeError or ValueError if that is impossible."""
     sensor = as_sensor(thing)
     if isinstance(sensor, NativeSensor) and not hasattr(sensor, "_make"):
         raise ValueError(f"sensor '{sensor.uuid}' belongs to a scene: give its values as a sensor of your own")
@@ -22,13 +22,14 @@ def member(thing: Any) -> Any:
 
 
 def prepare(sim: Simulation, sensors: Iterable[Any] | Callable[[Simulation], Iterable[Any]]) -> list[Any]:
-    """What C++ adds to the suite: a Sensor, or the handle of one that it computes itself. The simulation keeps them alive."""
+    """Objects that C++ adds to the suite: a Sensor, or the handle of a sensor that is computed in C++. The simulation keeps them
+    alive."""
     members = []
     for sensor in map(member, sensors(sim) if callable(sensors) else sensors):
         if not isinstance(sensor, Sensor):
             members.append(sensor._make(sim))
             continue
-        sensor._mjs_core = None  # it may have been in a recording before
+        sensor._mjs_core = None  # it may have been used in a previous recording
         sensor._mjs_probe(sim)
         if not sensor._mjs_row_specs():
             raise ValueError(f"sensor '{sensor.uuid}' cannot be recorded: give it an observation_space, or is_dict = True")

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Tasks, policies and sensors of the user's, on their way into a rollout."""
+"""Prepares user-defined tasks, policies and sensors for a rollout."""
 
 from __future__ import annotations
 
@@ -15,24 +15,24 @@ from mjsense.robot import Robot, robot_of
 from mjsense.task import Task, task_of
 
 Tasks = str | Task | type[Task] | Callable[[], Task]
-"""A task, what makes one, or its registered name."""
+"""A task, its class, a function that returns one, or its registered name."""
 Policies = str | Policy | type[Policy] | Callable[[dict[str, Any]], Any] | None
 """A policy, a function from observations to actions, or its registered name."""
 Scenes = str | Path | SceneFileCfg | Callable[[], SceneCfg]
-"""A scene: its name, its file, what such a file would say, or a function that makes its models."""
+"""A scene: its name, its file, a configuration equal to such a file, or a function that returns its configuration."""
 
 Robots = str | Path | Robot
-"""A robot: its registered name, the path of its .toml, or an object that may have sensors."""
+"""A robot: its registered name, the path of its .toml, or an object, which may have sensors."""
 
 Code = dict[str, dict[str, str]]
-"""Owner -> what a recording compares of its code when it is resumed."""
+"""Owner -> checksums of its code, which are compared when a recording is resumed."""
 Select = Callable[[list[tuple[str, str]]], list[str]]
 Parts = tuple[Task | None, Policy | None, Any, SceneFileCfg | None, Code, list[Any], Select | None]
 
 
 def parts_of(options: dict[str, Any], sensors: Iterable[Any]) -> Parts:
-    """(task, policy, sensors, scene, code, the robot's sensors, selection of the suite) made in Python; the options get the names of
-    all."""
+    """Returns the parts that are written in Python: (task, policy, sensors, scene, code, the robot's sensors, selection of the
+    suite). Replaces all parts in the options by their names."""
     composed = _composed(options)
     options["task"], task = task_of(options["task"])
     options["policy"], policy = policy_of(options["policy"])
@@ -59,7 +59,7 @@ def parts_of(options: dict[str, Any], sensors: Iterable[Any]) -> Parts:
 
 
 class Composition:
-    """The sensors that a task composes once its simulation exists, and those of the call."""
+    """The sensors that a task creates after its simulation exists, followed by those passed by the caller."""
 
     def __init__(self, task: Any, given: list[Any]) -> None:
         self._task, self._given = task, given
@@ -74,7 +74,8 @@ class Composition:
 
 
 def _composed(options: dict[str, Any]) -> Any:
-    """The task of ``mjsense.compat.molmospaces``, if it is one; the options then name the task that is played, and its policy."""
+    """Returns the task of ``mjsense.compat.molmospaces`` if it is one; the options are then set to the underlying task and its
+    policy."""
     task = options["task"]
     if not hasattr(task, "_mjs_compose"):
         return None
@@ -88,7 +89,7 @@ def _composed(options: dict[str, Any]) -> Any:
 
 
 def scene_of(scene: Scenes) -> tuple[str, SceneFileCfg | None]:
-    """(name for messages and files, the object if it is made in Python)."""
+    """Returns (name for messages and files, the object if the scene is configured in Python)."""
     if isinstance(scene, (str, Path)):
         return str(scene), None
     if not isinstance(scene, SceneFileCfg):

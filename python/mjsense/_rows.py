@@ -1,8 +1,9 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What a sensor written in Python declares of its values, and the checks that they are so.
+"""Declarations of the values of sensors written in Python, and their validation.
 
-A value is an array or a nested dict of arrays. Each array has the dtype, shape and bounds that its space declares; nothing is cast in
-silence. Python's own numbers and lists of them, which have no dtype, take the declared one where it can hold them.
+A value is an array or a nested dict of arrays. Each array must have the dtype, shape and bounds that its space declares; nothing
+is converted implicitly. Only Python numbers and lists of them, which have no dtype, are converted to the declared dtype if it can
+represent them.
 """
 
 from __future__ import annotations
@@ -14,7 +15,7 @@ from typing import Any
 import gymnasium
 import numpy as np
 
-# What rows are kept in where recordings have no such type: one that holds every value.
+# dtype in which rows are stored if recordings do not support their own: it can represent every value.
 _KEPT = {"int8": "int32", "int16": "int32", "uint32": "int64", "float16": "float32"}
 _TYPES = {"float32", "float64", "uint8", "uint16", "int32", "int64", "bool"}
 
@@ -24,11 +25,11 @@ class Row:
     """One array of a world's value."""
 
     path: tuple[str, ...]
-    """Keys that lead to it, () if the value is the array itself."""
+    """Keys that lead to the array; () if it is the value itself."""
     shape: tuple[int, ...]
     dtype: np.dtype
     low: np.ndarray | None = None
-    """Bounds, broadcastable to shape; None: there are none."""
+    """Bounds, broadcastable to shape; None: unbounded."""
     high: np.ndarray | None = None
 
     @property
@@ -37,14 +38,14 @@ class Row:
 
     @property
     def kept(self) -> str:
-        """Name of the dtype in which rows are kept."""
+        """Name of the dtype in which rows are stored."""
         name = _KEPT.get(self.dtype.name, self.dtype.name)
         if name not in _TYPES:
             raise ValueError(f"{self._what()}no rows of {self.dtype} can be kept: {', '.join(sorted(_TYPES | set(_KEPT)))} can")
         return name
 
     def bounds(self) -> tuple[float, float]:
-        """Least and largest of the bounds."""
+        """Minimum and maximum of the bounds."""
         if self.low is None or self.high is None or not self.low.size:
             return -np.inf, np.inf
         return float(np.min(self.low)), float(np.max(self.high))
@@ -53,7 +54,7 @@ class Row:
         return f"'{self.name}': " if self.path else ""
 
     def array(self, value: Any, worlds: int | None = None) -> np.ndarray:
-        """The value of one world, or of `worlds` of them, as an array; ValueError if it is not what was declared."""
+        """The value of one world, or of `worlds` worlds, as an array; raises ValueError if it is not as declared."""
         shape = self.shape if worlds is None else (worlds, *self.shape)
         array = np.asarray(value)
         weak = _weak(value)
@@ -72,7 +73,7 @@ class Row:
         return self._typed(array)
 
     def _typed(self, array: np.ndarray) -> np.ndarray:
-        """Python's numbers in the declared dtype."""
+        """Converts Python numbers to the declared dtype."""
         kinds = {"f": "iuf", "i": "biu", "u": "biu", "b": "b"}[self.dtype.kind]
         if array.size and array.dtype.kind not in kinds:
             raise ValueError(f"{self._what()}{array.dtype} values do not fit the observation_space's {self.dtype}")
@@ -84,12 +85,12 @@ class Row:
         return array.astype(self.dtype)
 
     def outside(self, rows: np.ndarray) -> Iterator[tuple[int, str]]:
-        """(index, what is wrong) of the rows ``[n, ...]`` with a value outside the bounds."""
+        """Yields (index, problem) of the rows ``[n, ...]`` with a value outside the bounds."""
         if self.low is None or self.high is None or not rows.size:
             return
         low, high = np.broadcast_to(self.low, self.shape), np.broadcast_to(self.high, self.shape)
         bad = ~((rows >= low) & (rows <= high))
-        if rows.dtype.kind == "f":  # where nothing bounds it, a number may be none
+        if rows.dtype.kind == "f":  # NaN is valid only for unbounded elements
             bad &= ~(np.isnan(rows) & np.isneginf(low) & np.isposinf(high))
         for i in np.flatnonzero(bad.reshape(len(rows), -1).any(1)):
             at = tuple(int(k) for k in np.argwhere(bad[i])[0])
@@ -98,14 +99,14 @@ class Row:
 
 
 def _weak(value: Any) -> bool:
-    """Made of Python's numbers, which have no dtype."""
+    """Whether a value consists of Python numbers, which have no dtype."""
     if isinstance(value, (list, tuple)):
         return all(_weak(v) for v in value)
     return isinstance(value, (bool, int, float)) and not isinstance(value, np.generic)
 
 
 def rows_of_space(space: Any, path: tuple[str, ...] = ()) -> list[Row]:
-    """The arrays of a space, none for one that names none; TypeError for a space that has no arrays."""
+    """The arrays of a space; empty for a Dict without entries. Raises TypeError for spaces without arrays."""
     spaces = gymnasium.spaces
     if space is None:
         return []
@@ -132,7 +133,7 @@ def rows_of_space(space: Any, path: tuple[str, ...] = ()) -> list[Row]:
 
 
 def rows_of_value(value: Any, path: tuple[str, ...] = ()) -> list[Row]:
-    """The arrays of a value, as they are."""
+    """The arrays of an actual value."""
     if isinstance(value, Mapping):
         return [row for key, inner in value.items() for row in rows_of_value(inner, (*path, str(key)))]
     array = np.asarray(value)
@@ -140,7 +141,7 @@ def rows_of_value(value: Any, path: tuple[str, ...] = ()) -> list[Row]:
 
 
 def leaves(value: Any, rows: list[Row]) -> list[Any]:
-    """The part of a value that belongs to each row; ValueError if keys are missing or too many."""
+    """The parts of a value that belong to the rows; raises ValueError for missing or additional keys."""
     if rows and not rows[0].path:
         return [value]
     flat = dict(_flat(value, ()))
@@ -164,7 +165,7 @@ def _flat(value: Any, path: tuple[str, ...]) -> Iterator[tuple[tuple[str, ...], 
 
 
 def nested(rows: list[Row], values: list[Any]) -> Any:
-    """The values as the sensor gives them: the array itself, or a nested dict."""
+    """The inverse of leaves(): the array itself, or a nested dict."""
     if rows and not rows[0].path:
         return values[0]
     out: dict[str, Any] = {}

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The base of what sensors with several fields return (data.py)."""
+"""Base class of the measurements of sensors with several fields (data.py)."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ import numpy as np
 
 @dataclass(slots=True, frozen=True)
 class SensorData:
-    """Base: the fields of a sensor that is none of the kinds below."""
+    """Base class; used directly for sensors of other kinds."""
 
     def __repr__(self) -> str:
         shown = ", ".join(
@@ -23,7 +23,7 @@ class SensorData:
 
 
 def make_data(base: type, arrays: dict[str, np.ndarray]) -> Any:
-    """An instance of `base` with these fields; fields that it does not name are added in a class of their own."""
+    """An instance of `base` with these fields; fields that it does not declare are added in a subclass."""
     known = {f.name for f in fields(base)}
     extra = [name for name in arrays if name not in known]
     if extra:

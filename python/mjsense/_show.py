@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""How sensors show themselves: a line of text, in notebooks a table with thumbnails of images, and what help() says."""
+"""Representations of sensors: one line of text, a table with thumbnails in notebooks, and the text of help()."""
 
 from __future__ import annotations
 
@@ -13,17 +13,17 @@ from typing import Any, NamedTuple
 import numpy as np
 
 _THUMBNAIL = 160
-"""Pixels, the longer side at most."""
+"""Maximum side length, pixels."""
 
 
 class Row(NamedTuple):
-    """What is shown of one field."""
+    """A row of a sensor's representation: one field."""
 
     name: str
-    """Empty for the only or main one."""
+    """Empty for the only or main field."""
     dtype: str
     shape: tuple[int, ...]
-    """With the worlds, if they are known."""
+    """Including the world axis, if the number of worlds is known."""
     unit: str
     frame: str
     sentence: str
@@ -35,13 +35,13 @@ class Row(NamedTuple):
 
 
 def rows_of(specs: Mapping[str, Any], num_worlds: int | None) -> list[Row]:
-    """From the specs of a sensor's fields."""
+    """Creates the rows from the specs of a sensor's fields."""
     worlds = () if num_worlds is None else (num_worlds,)
     return [Row(name, s.dtype, (*worlds, *s.shape), s.unit, s.frame, s.description) for name, s in specs.items()]
 
 
 def printable(text: str) -> str:
-    """Names come from files of others: control characters, and those that turn the direction of writing, become '?'."""
+    """Replaces control characters and bidirectional marks by '?', because names come from untrusted files."""
     return "".join(c if c.isprintable() or c == "\n" else "?" for c in text)
 
 
@@ -51,7 +51,7 @@ def line(head: str, rows: list[Row]) -> str:
 
 
 class HelpOfObject:
-    """``__doc__`` of a class whose objects have a text of their own, ``_help()``: so help(sensor) says what this one gives."""
+    """``__doc__`` of a class whose instances have their own text, ``_help()``, so that help(sensor) describes the instance."""
 
     def __init__(self, of_class: str | None) -> None:
         self._of_class = of_class
@@ -65,15 +65,15 @@ def help_of_objects(cls: type) -> None:
 
 
 def help_text(cls: type, rows: list[Row]) -> str:
-    """A line a field, then those of the class."""
+    """One line per field, then the documentation of the class."""
     fields = [f"{row.text()}: {row.sentence}" if row.sentence else row.text() for row in rows]
     text = "\n".join([*fields, "", f"help({cls.__name__}) says what it can do.", "", inspect.cleandoc(cls.__doc__ or "")])
     return printable(text).strip()
 
 
 def table(head: str, rows: list[Row], images: Mapping[str, np.ndarray]) -> str:
-    """HTML of the same, with the images ``[H, W, C]`` that can be shown."""
-    import html  # slow to import, and notebooks alone want it
+    """The same as HTML, with those images ``[H, W, C]`` that can be displayed."""
+    import html  # slow to import, and needed in notebooks only
 
     columns = ("field", "dtype", "shape", "unit", "frame", "")
     body = "".join(
@@ -94,7 +94,7 @@ def _cells(row: Row) -> tuple[str, ...]:
 
 
 def thumbnail(image: np.ndarray) -> str | None:
-    """A data URL of a small PNG; None for what is no picture of numbers we can colour."""
+    """Data URL of a small PNG; None for arrays that cannot be displayed as an image."""
     if image.ndim != 3 or min(image.shape) < 1:
         return None
     step = -(-max(image.shape[:2]) // _THUMBNAIL)
@@ -103,7 +103,8 @@ def thumbnail(image: np.ndarray) -> str | None:
 
 
 def _coloured(image: np.ndarray) -> np.ndarray | None:
-    """uint8 [H, W, 3] of an image: colours as they are, near things bright, each id a colour of its own, normals as usual."""
+    """uint8 [H, W, 3] image for display: colours unchanged, depth with near surfaces bright, a colour per id, normals in the
+    usual colours."""
     channels = image.shape[2]
     if image.dtype == np.uint8 and channels == 3:
         return image

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""From the streams of a suite to the nested dict that environments and policies show."""
+"""Converts the streams of a suite to the nested dicts of environments and policies."""
 
 from __future__ import annotations
 
@@ -8,11 +8,12 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 Streams = Mapping[str, tuple[str, Any, Any]]
-"""stream -> (sensor, spec, rows)"""
+"""stream name -> (sensor, spec, rows)"""
 
 
 def choose_streams(wanted: Sequence[str] | None, streams: Streams, texts: Sequence[str] = ()) -> list[str]:
-    """Names of the streams to observe: those wanted, by their own names or their sensors'; else all that are numbers, and ``texts``."""
+    """Names of the streams to observe: those in `wanted`, by their own or their sensors' names; by default all numeric ones and
+    ``texts``."""
     if wanted is None:
         plain = [name for name, (_, spec, array) in streams.items() if array.size > 0 and (not spec.is_dict or name in texts)]
         return [name for name in plain if not name.startswith(("sensor_param_", "object_image_points"))]
@@ -29,7 +30,7 @@ def choose_streams(wanted: Sequence[str] | None, streams: Streams, texts: Sequen
 
 
 def stream_path(sensor: str, stream: str) -> tuple[str, ...]:
-    """Where a stream stands in an observation: ("qpos", "arm")."""
+    """Keys of a stream in an observation: ("qpos", "arm")."""
     return (sensor, *stream[len(sensor) + 1 :].split("/")) if stream != sensor else (sensor,)
 
 

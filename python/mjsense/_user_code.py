@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
-"""How a sensor's code is called: with the arguments that it takes, random numbers of its own, and errors that name it."""
+"""Calls the code of user-defined sensors with the arguments that it takes, with reproducible random numbers and with errors that
+name it."""
 
 from __future__ import annotations
 
@@ -15,7 +16,7 @@ if TYPE_CHECKING:
 
 
 class SensorError(RuntimeError):
-    """Code of a sensor written in Python failed, or its value is not what it declares; ``__cause__`` is its exception."""
+    """Code of a sensor written in Python failed, or its value is not as declared; ``__cause__`` is the original exception."""
 
 
 @functools.lru_cache(maxsize=1024)
@@ -27,7 +28,7 @@ def _parameters_of(function: Any) -> tuple[inspect.Parameter, ...]:
 
 
 def _parameters(function: Any) -> tuple[inspect.Parameter, ...]:
-    """Those that a call gives."""
+    """The parameters that a call must pass, without self."""
     return _parameters_of(function.__func__)[1:] if inspect.ismethod(function) else _parameters_of(function)
 
 
@@ -37,12 +38,12 @@ def required(function: Any) -> list[inspect.Parameter]:
 
 
 def takes(function: Any, count: int) -> bool:
-    """It has so many positional parameters."""
+    """Whether it has at least `count` positional parameters."""
     return len([p for p in _parameters(function) if p.kind < 2]) >= count
 
 
 def observe(instance: Any, env: Any, task: Any, world: int) -> Any:
-    """Calls get_observation() as MolmoSpaces does."""
+    """Calls get_observation() like MolmoSpaces."""
     function = instance.get_observation
     names = {p.name for p in _parameters(function)}
     if "batch_index" in names or any(p.kind is p.VAR_KEYWORD for p in _parameters(function)):
@@ -50,14 +51,14 @@ def observe(instance: Any, env: Any, task: Any, world: int) -> Any:
     return function(env, task)
 
 
-_RANDOM: Any = np.random  # its stubs leave out get_bit_generator() and set_bit_generator()
+_RANDOM: Any = np.random  # its type stubs lack get_bit_generator() and set_bit_generator()
 
 
 class Dice:
-    """NumPy's global random numbers while sensors are asked: a stream of their own for each world and moment, the same in whatever world
-    and beside whatever others an episode runs; those of the program go on as if nothing had happened."""
+    """Replaces NumPy's global random numbers while sensors are computed. Each world and time has its own stream, which does not
+    depend on the world's id or on the other worlds. The program's random state is restored afterwards."""
 
-    _own: ClassVar[list[Any]] = []  # a generator for each level: a sensor may read another one while it is asked
+    _own: ClassVar[list[Any]] = []  # one generator per nesting level, because a sensor may read another one
     _depth: ClassVar[int] = 0
 
     def __init__(self, seeds: Sequence[int], world_ids: Sequence[int], occasion: int) -> None:
@@ -84,7 +85,7 @@ class Dice:
 
 
 class named:
-    """Errors of user code say which sensor, world and method failed; the traceback stays."""
+    """Adds the sensor, world and method to errors of user code and keeps the traceback."""
 
     def __init__(self, sensor: Sensor, method: str, world: int | None = None) -> None:
         place = "" if world is None else f", world {world}"

@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Meshes that other installed packages bring. Robots are drawn with shapes of our own without them; motion is the same."""
+"""Robot meshes of other installed packages. Without them, robots are drawn with built-in primitive shapes; their motion is the
+same."""
 
 from __future__ import annotations
 
@@ -13,7 +14,8 @@ _PACKAGE = "package:"
 
 
 def installed_meshes(robots: Iterable[str]) -> dict[str, Path]:
-    """Folders of meshes by the environment variable that names them, of robots given by the texts of their files. Imports nothing."""
+    """Folders of meshes by the name of their environment variable, for robots given by the texts of their files. Imports no
+    package."""
     import tomllib  # slow to import
 
     found = {}
@@ -31,7 +33,8 @@ def installed_meshes(robots: Iterable[str]) -> dict[str, Path]:
 
 
 def use_installed_meshes() -> None:
-    """Draws robots with the meshes there are, for tasks made from now on. A variable that is set, even if empty, has priority."""
+    """Makes tasks created from now on draw robots with the installed meshes. An environment variable that is set, even if empty,
+    has priority."""
     from mjsense import _core
 
     for variable, folder in installed_meshes(map(_core.robot_text, _core.robot_names())).items():
@@ -39,11 +42,12 @@ def use_installed_meshes() -> None:
 
 
 def name_package_folders() -> None:
-    """Tells the library where installed packages are, for scenes that name files of them. A variable that is set has priority."""
+    """Tells the library the folders of installed packages, for scenes that refer to their files. A variable that is set has
+    priority."""
     folders = dict.fromkeys(path for path in sys.path if Path(path).name in ("site-packages", "dist-packages"))
     os.environ.setdefault("MJSENSE_PACKAGES", os.pathsep.join(folders))
 
 
-if __name__ == "__main__":  # as lines for a shell, of the robots in a folder
+if __name__ == "__main__":  # Prints lines for a shell, for the robots in a folder.
     for variable, folder in installed_meshes(p.read_text() for p in Path(sys.argv[1]).glob("*/robot.toml")).items():
         print(f"export {variable}=${{{variable}-{folder}}}")

@@ -24,22 +24,22 @@ class ContactSensor(NativeSensor):
 
     @property
     def primary_names(self) -> tuple[str, ...]:
-        """Local names of the primaries, in the order of the columns."""
+        """Names of the primaries without prefix, in the order of the columns."""
         return _core.contact_primary_names(self._handle)
 
     @property
     def secondary_names(self) -> tuple[str, ...]:
-        """Local names of the secondaries."""
+        """Names of the secondaries without prefix."""
         return _core.contact_secondary_names(self._handle)
 
     def compute_first_contact(self, dt: float, abs_tol: float = 1e-6) -> np.ndarray:
-        """Which primaries came into contact within the last `dt` seconds: bool ``[B, P]``. Needs track_air_time."""
+        """Primaries that came into contact within the last `dt` seconds: bool ``[B, P]``. Requires track_air_time."""
         return self._first("contact", dt, abs_tol)
 
     def compute_first_air(self, dt: float, abs_tol: float = 1e-6) -> np.ndarray:
-        """Which primaries took off within the last `dt` seconds: bool ``[B, P]``. Needs track_air_time."""
+        """Primaries that lost contact within the last `dt` seconds: bool ``[B, P]``. Requires track_air_time."""
         return self._first("air", dt, abs_tol)
 
     def _first(self, phase: str, dt: float, abs_tol: float) -> np.ndarray:
-        self.data  # makes it current
+        self.data  # update the sensor
         return _core.contact_first(self._handle, phase, dt, abs_tol)

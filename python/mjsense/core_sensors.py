@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The sensors of the core suite as classes: put them into a SensorSuite, a Simulation, a recording."""
+"""Classes of the core suite's sensors, for use in a SensorSuite, a Simulation or a recording."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 
 
 class CoreSensor(NativeSensor):
-    """Base: a sensor that C++ computes, made when it comes to its simulation."""
+    """Base class of sensors that are computed in C++ and created when they are added to a simulation."""
 
     def __init__(self, uuid: str, kind: str) -> None:
         if not uuid:
@@ -35,7 +35,7 @@ class CoreSensor(NativeSensor):
         self.cfg: Any = None
 
     def _make(self, sim: Simulation) -> _core.SensorHandle:
-        """The C++ sensor for this simulation, which is then to be added to it."""
+        """Creates the C++ sensor for this simulation; the caller adds it."""
         self._handle, self._core, self._fields = self._build(sim), sim._core, {}
         return self._handle
 
@@ -52,7 +52,7 @@ class CoreSensor(NativeSensor):
 
     @property
     def data(self) -> Any:
-        """The present values: an array ``[B, ...]``, or a dict of them by field, nested as the fields' names are."""
+        """The current values: an array ``[B, ...]``, or a dict by field, nested by the paths of the fields."""
         if self._core is None:
             raise RuntimeError(f"sensor '{self.name}' has no data yet: it belongs to no simulation")
         if not self._fields:
@@ -61,7 +61,7 @@ class CoreSensor(NativeSensor):
 
     @property
     def specs(self) -> dict[str, _core.SensorSpec]:
-        """What each field is: dtype, shape, unit, frame. A sensor with one field calls it ''."""
+        """Spec of each field: dtype, shape, unit, frame. The name of a single field is ''."""
         if self._handle is None:
             raise RuntimeError(f"sensor '{self.name}' has no fields yet: it belongs to no simulation")
         return super().specs
@@ -74,7 +74,7 @@ def _nested(fields: Any) -> Any:
 
 
 def _sim_groups(sim: Simulation, place: str, groups: Mapping[str, Sequence[str]] | None) -> list[tuple[str, list[int], list[int]]]:
-    """Addresses of the joints of each group; without groups those of the robot, or all joints as one."""
+    """Addresses of the joints of each group. Default groups: those of the robot, or all joints as one group."""
     model = sim.model
     if groups is None and sim._view is not None:
         return [(g["name"], g["qpos"], g["dofs"]) for g in sim._view.groups()]
@@ -105,15 +105,16 @@ def _id(model: mujoco.MjModel, kind: mujoco.mjtObj, name: str, place: str) -> in
 
 @checked
 class JointPositionSensor(CoreSensor):
-    """Joint positions, one field a group: float32 ``[B, n]``, rad or m."""
+    """Joint positions, one field per group: float32 ``[B, n]``, rad or m."""
 
     _velocity = False
 
     def __init__(self, groups: Mapping[str, Sequence[str]] | None = None, uuid: str = "qpos") -> None:
         """
         Args:
-            groups: full names of the joints by group; if not given the robot's move groups, in a plain simulation all joints as one.
-            uuid: name in suites and files.
+            groups: Full names of the joints by group; by default the robot's move groups or, without a robot, all joints as one
+                group.
+            uuid: Name in suites and files.
         """
         super().__init__(uuid, "joint_state")
         self._groups = None if groups is None else {name: list(joints) for name, joints in groups.items()}
@@ -125,22 +126,23 @@ class JointPositionSensor(CoreSensor):
 
 @checked
 class JointVelocitySensor(JointPositionSensor):
-    """Joint velocities, one field a group: float32 ``[B, n]``, rad/s or m/s."""
+    """Joint velocities, one field per group: float32 ``[B, n]``, rad/s or m/s."""
 
     _velocity = True
 
     def __init__(self, groups: Mapping[str, Sequence[str]] | None = None, uuid: str = "qvel") -> None:
         """
         Args:
-            groups: full names of the joints by group; if not given the robot's move groups, in a plain simulation all joints as one.
-            uuid: name in suites and files.
+            groups: Full names of the joints by group; by default the robot's move groups or, without a robot, all joints as one
+                group.
+            uuid: Name in suites and files.
         """
         super().__init__(groups, uuid)
 
 
 @checked
 class PoseSensor(CoreSensor):
-    """Pose of a body or site, float32 ``[B, 7]``: position (m), quaternion (wxyz), in the world or in another frame."""
+    """Pose of a body or site in the world or in another frame, float32 ``[B, 7]``: position (m), quaternion (wxyz)."""
 
     def __init__(
         self,
@@ -154,10 +156,10 @@ class PoseSensor(CoreSensor):
     ) -> None:
         """
         Args:
-            uuid: name in suites and files.
-            body, site: whose pose, one of them: the full name, ``robot/tool``.
-            reference_body, reference_site: in whose frame; the world without.
-            description: one sentence.
+            uuid: Name in suites and files.
+            body, site: Full name of the measured body or site, such as ``robot/tool``; give one of the two.
+            reference_body, reference_site: Reference frame; by default the world.
+            description: One sentence.
         """
         super().__init__(uuid, "pose")
         if (body is None) == (site is None) or (reference_body is not None and reference_site is not None):
@@ -175,13 +177,14 @@ class PoseSensor(CoreSensor):
 
 @checked
 class TcpPoseSensor(CoreSensor):
-    """Pose of a gripper's tool in the robot's base frame, which stands on the floor: float32 ``[B, 7]``, m and wxyz. Needs a robot."""
+    """Pose of a gripper's tool frame in the robot's base frame, which is on the floor: float32 ``[B, 7]``, m and wxyz. Requires a
+    robot."""
 
     def __init__(self, gripper: str | None = None, uuid: str = "tcp_pose") -> None:
         """
         Args:
-            gripper: its move group; the first if not given.
-            uuid: name in suites and files.
+            gripper: Move group of the gripper; by default the first one.
+            uuid: Name in suites and files.
         """
         super().__init__(uuid, "pose")
         self._gripper = gripper
@@ -198,12 +201,12 @@ class TcpPoseSensor(CoreSensor):
 
 @checked
 class RobotBasePoseSensor(CoreSensor):
-    """Pose of the robot's base in the world: float32 ``[B, 7]``, m and wxyz. Needs a robot."""
+    """Pose of the robot's base in the world: float32 ``[B, 7]``, m and wxyz. Requires a robot."""
 
     def __init__(self, uuid: str = "robot_base_pose") -> None:
         """
         Args:
-            uuid: name in suites and files.
+            uuid: Name in suites and files.
         """
         super().__init__(uuid, "pose")
         self._complete = True
@@ -215,12 +218,12 @@ class RobotBasePoseSensor(CoreSensor):
 
 @checked
 class EnvStatesSensor(CoreSensor):
-    """What it takes to put the scene back: every free body outside the robot, and the robot's joints.
+    """The state needed to restore the scene: every free body outside the robot, and the robot's joints.
 
     Fields ``actors/<body>`` float32 ``[B, 13]`` (m, wxyz, m/s, rad/s: MuJoCo's qpos and qvel of the free joint);
-    ``articulations/<name>`` float64 ``[B, nq + nv]`` of the robot and of every body with joints inside; and, where it is asked for,
+    ``articulations/<name>`` float64 ``[B, nq + nv]`` of the robot and of every body with inner joints; and, on request,
     MolmoSpaces' ``articulations/<articulation>`` float32 ``[B, length]`` (qpos of all groups, then their qvel, then zeros). In an
-    environment ``present/<body>`` bool ``[B]`` of each object that can be absent from an episode; an absent one's row is zeros.
+    environment ``present/<body>`` bool ``[B]`` of each object that can be absent from an episode; the row of an absent object is zeros.
     """
 
     def __init__(
@@ -234,12 +237,12 @@ class EnvStatesSensor(CoreSensor):
     ) -> None:
         """
         Args:
-            groups: full names of the robot's joints by group; if not given its move groups, in a plain simulation none.
-            articulation: what MolmoSpaces' field is called; "": there is none.
-            length: of its row; 0: what the groups need.
-            robot_body: free bodies at or below it are no actors; the robot's base if not given.
-            robot: what the robot's field is called; "": no fields of bodies with joints inside.
-            uuid: name in suites and files.
+            groups: Full names of the robot's joints by group; by default its move groups or, without a robot, none.
+            articulation: Name of MolmoSpaces' field; "": none.
+            length: Length of its row; 0: the size of the groups.
+            robot_body: Free bodies at or below this body are not actors; by default the robot's base.
+            robot: Name of the robot's field; "": no fields of bodies with inner joints.
+            uuid: Name in suites and files.
         """
         super().__init__(uuid, "env_states")
         self._groups = None if groups is None else {name: list(joints) for name, joints in groups.items()}
@@ -257,15 +260,15 @@ class EnvStatesSensor(CoreSensor):
 
 @checked
 class CameraParameterSensor(CoreSensor):
-    """Where a camera is and how it projects: fields ``cam2world_gl`` float64 ``[B, 4, 4]`` (axes right, down, forward), ``extrinsic_cv``
-    ``[B, 3, 4]``, ``intrinsic_cv`` ``[B, 3, 3]`` (pixels)."""
+    """Pose and projection of a camera: fields ``cam2world_gl`` float64 ``[B, 4, 4]`` (axes right, down, forward),
+    ``extrinsic_cv`` ``[B, 3, 4]``, ``intrinsic_cv`` ``[B, 3, 3]`` (pixels)."""
 
     def __init__(self, camera: str, width: int = 640, height: int = 480, uuid: str | None = None) -> None:
         """
         Args:
-            camera: full name of the camera in the model, ``robot/wrist``; in recordings also that of its stream.
-            width, height: of the picture, pixels.
-            uuid: name in suites and files; ``sensor_param_<camera>`` if not given.
+            camera: Full name of the camera in the model, such as ``robot/wrist``; in recordings also the name of its stream.
+            width, height: Size of the image, pixels.
+            uuid: Name in suites and files; by default ``sensor_param_<camera>``.
         """
         super().__init__(uuid or f"sensor_param_{camera}", "camera_parameters")
         self._camera, self._size = camera, (width, height)
@@ -280,14 +283,15 @@ class CameraParameterSensor(CoreSensor):
 
 @checked
 class CameraImageSensor(CoreSensor):
-    """One field of a camera of the scene under a name of the suite, without a copy: rgb uint8 ``[B, H, W, 3]``, depth float32 ``[B, H, W]``."""
+    """One field of a camera of the scene as a sensor of the suite, without a copy: rgb uint8 ``[B, H, W, 3]``, depth float32
+    ``[B, H, W]``."""
 
     def __init__(self, camera: str, field: str = "rgb", uuid: str | None = None) -> None:
         """
         Args:
-            camera: name of the scene's camera sensor.
-            field: one of its ``data_types``.
-            uuid: name in suites and files; the camera's, with ``_<field>`` but for rgb, if not given.
+            camera: Name of the scene's camera sensor.
+            field: One of its ``data_types``.
+            uuid: Name in suites and files; by default the camera's name, followed by ``_<field>`` except for rgb.
         """
         super().__init__(uuid or (camera if field == "rgb" else f"{camera}_{field}"), "shared")
         self._camera, self._field = camera, field
@@ -299,16 +303,16 @@ class CameraImageSensor(CoreSensor):
 
 @checked
 class ImagePointsSensor(CoreSensor):
-    """Up to ten pixels that show each object in each camera: fields ``<object>/<camera>/points`` float32 ``[B, 10, 2]`` (fractions of the
-    picture, NaN where there is none) and ``num_points`` int32 ``[B, 1]``."""
+    """Up to ten pixels that show each object in each camera: fields ``<object>/<camera>/points`` float32 ``[B, 10, 2]``
+    (fractions of the image size; unused entries are NaN) and ``num_points`` int32 ``[B, 1]``."""
 
     def __init__(self, objects: Mapping[str, str], cameras: Sequence[str], thin: Sequence[str] = (), uuid: str = "object_image_points") -> None:
         """
         Args:
-            objects: full names of bodies by the key of the object.
-            cameras: names of the scene's camera sensors, which have a segmentation.
-            thin: keys of objects whose points may lie on their rim.
-            uuid: name in suites and files.
+            objects: Full names of bodies by object key.
+            cameras: Names of the scene's camera sensors; they must have a segmentation.
+            thin: Keys of objects whose points may be at the edge of their visible area.
+            uuid: Name in suites and files.
         """
         super().__init__(uuid, "image_points")
         self._objects, self._cameras, self._thin = dict(objects), list(cameras), set(thin)
@@ -321,15 +325,15 @@ class ImagePointsSensor(CoreSensor):
 
 @checked
 class GraspStateSensor(CoreSensor):
-    """Whether grippers touch and hold an object: fields ``<gripper>/held`` and ``<gripper>/touching``, bool ``[B]``. Held: it touches
-    nothing else."""
+    """Whether grippers touch and hold an object: fields ``<gripper>/held`` and ``<gripper>/touching``, bool ``[B]``. An object is
+    held if it touches nothing else."""
 
     def __init__(self, object: str, grippers: Mapping[str, str] | None = None, uuid: str | None = None) -> None:
         """
         Args:
-            object: full name of its body.
-            grippers: full names of root bodies by gripper; the robot's if not given.
-            uuid: name in suites and files; ``grasp_state_<object>`` if not given.
+            object: Full name of its body.
+            grippers: Full names of root bodies by gripper; by default the robot's grippers.
+            uuid: Name in suites and files; by default ``grasp_state_<object>``.
         """
         super().__init__(uuid or f"grasp_state_{object}", "grasp_state")
         self._object, self._grippers = object, grippers
@@ -372,11 +376,11 @@ class FunctionSensor(Sensor):
     ) -> None:
         """
         Args:
-            uuid: name in suites and files.
-            function: of :attr:`mjsense.Simulation.env` and the world's id; it keeps no state.
-            observation_space: of one world's value.
-            is_dict: the value is a dict, kept as JSON text of at most ``str_max_len`` bytes.
-            str_max_len, unit, frame: see :class:`Sensor`.
+            uuid: Name in suites and files.
+            function: Stateless function of :attr:`mjsense.Simulation.env` and the world's id.
+            observation_space: Space of one world's value.
+            is_dict: True if the value is a dict, which is stored as JSON text of at most ``str_max_len`` bytes.
+            str_max_len, unit, frame: See :class:`Sensor`.
         """
         super().__init__(uuid, observation_space)
         self._function = function

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What sensors show a human of their measurements: shapes in the world, for any viewer."""
+"""Visualisation of sensor measurements as shapes in the world frame, for any viewer."""
 
 from __future__ import annotations
 
@@ -22,17 +22,17 @@ _AXES = ((0.9, 0.0, 0.0), (0.0, 0.9, 0.0), (0.0, 0.0, 0.9))
 
 @checked
 class DebugShapes(KnownAttributes):
-    """Spheres, arrows, lines and cylinders in the world frame, as NumPy arrays with one row a shape.
+    """Spheres, arrows, lines and cylinders in the world frame, as NumPy arrays with one row per shape.
 
-    ``draw(scene)`` puts them into a scene of MuJoCo's; the arrays serve every other viewer. It is also the visualizer that a sensor
-    written in Python gets in ``debug_vis(visualizer)``, with mjlab's methods.
+    ``draw(scene)`` adds them to a MuJoCo scene; the arrays serve all other viewers. This class is also the visualizer passed to
+    ``debug_vis(visualizer)`` of sensors written in Python, with mjlab's methods.
     """
 
     def __init__(self, world: int = 0, meansize: float = 0.1) -> None:
         self.env_idx = world
-        """The world that is drawn."""
+        """Id of the world that is drawn."""
         self.meansize = meansize
-        """m, the model's ``stat.meansize``: a size that is seen well."""
+        """The model's ``stat.meansize``, m: a reference length for shapes."""
         self._blocks: list[tuple[Any, ...]] = []
         self._complete = True
 
@@ -48,32 +48,32 @@ class DebugShapes(KnownAttributes):
 
     @property
     def kinds(self) -> np.ndarray:
-        """sphere, arrow, line or cylinder: str ``[n]``."""
+        """``"sphere"``, ``"arrow"``, ``"line"`` or ``"cylinder"``: str ``[n]``."""
         return self._column(0, np.zeros(0, "U8"))
 
     @property
     def positions(self) -> np.ndarray:
-        """Centres of spheres, starts of everything else: float64 ``[n, 3]`` m."""
+        """Centres of spheres and start points of other shapes: float64 ``[n, 3]`` m, world frame."""
         return self._column(1, np.zeros((0, 3)))
 
     @property
     def vectors(self) -> np.ndarray:
-        """From start to end: float64 ``[n, 3]`` m; 0 for spheres."""
+        """Vectors from start to end point: float64 ``[n, 3]`` m, world frame; 0 for spheres."""
         return self._column(2, np.zeros((0, 3)))
 
     @property
     def widths(self) -> np.ndarray:
-        """Radii, m; of lines their width in pixels: float64 ``[n]``."""
+        """Radii in m, or widths in pixels for lines: float64 ``[n]``."""
         return self._column(3, np.zeros(0))
 
     @property
     def rgba(self) -> np.ndarray:
-        """Colours 0..1: float32 ``[n, 4]``."""
+        """Colours, 0 to 1: float32 ``[n, 4]``."""
         return self._column(4, np.zeros((0, 4), np.float32))
 
     @property
     def labels(self) -> list[str]:
-        """What each shape is: ``feet_FR_foot_0_force``."""
+        """Names of the shapes: ``feet_FR_foot_0_force``."""
         return [label for block in self._blocks for label in block[5]]
 
     def of(self, kind: str) -> DebugShapes:
@@ -90,11 +90,11 @@ class DebugShapes(KnownAttributes):
     # ---------------------------------------------------------------------------------------------------- in MuJoCo's scenes
 
     def draw(self, scene: mujoco.MjvScene, labels: bool = False) -> int:
-        """Appends the shapes to a scene (``renderer.scene``, ``viewer.user_scn``), labels as texts if wanted.
+        """Appends the shapes to a scene (``renderer.scene``, ``viewer.user_scn``), optionally with their labels as text.
 
-        Returns how many found no room: a scene holds ``maxgeom`` geoms.
+        Returns the number of shapes that did not fit; a scene holds ``maxgeom`` geoms.
         """
-        # What DebugShapes::append_to does in C++, which MuJoCo's Python gives no pointer to its scene.
+        # Duplicates the C++ function DebugShapes::append_to, because MuJoCo's Python bindings give no pointer to a scene.
         room = min(len(self), max(0, scene.maxgeom - scene.ngeom))
         geoms, identity = scene.geoms[scene.ngeom : scene.ngeom + room], np.eye(3).ravel()
         rows = zip(geoms, self.kinds, self.positions, self.positions + self.vectors, self.widths, self.rgba, self.labels)
@@ -120,7 +120,7 @@ class DebugShapes(KnownAttributes):
         self._add("cylinder", start, end, radius, color, label)
 
     def add_line(self, start: Any, end: Any, color: Sequence[float], width: float = 2.0, label: str | None = None) -> None:
-        """A line some pixels wide."""
+        """Adds a line; ``width`` is in pixels."""
         self._add("line", start, end, width, color, label)
 
     def add_frame(
@@ -133,14 +133,14 @@ class DebugShapes(KnownAttributes):
         alpha: float = 1.0,
         axis_colors: Sequence[Sequence[float]] | None = None,
     ) -> None:
-        """Axes as arrows of length `scale`: x red, y green, z blue, labelled ``<label>_x`` ..."""
+        """Adds a frame as three arrows of length `scale`: x red, y green, z blue, labelled ``<label>_x`` ..."""
         rotation = np.asarray(rotation_matrix, np.float64).reshape(3, 3)
         for k, color in enumerate(axis_colors or _AXES):
             end = np.asarray(position) + scale * rotation[:, k]
             self.add_arrow(position, end, (*color[:3], alpha), axis_radius, f"{label}_{'xyz'[k]}" if label else None)
 
     def clear(self) -> None:
-        """Forgets all shapes."""
+        """Removes all shapes."""
         self._blocks.clear()
 
     # ------------------------------------------------------------------------------------------------------------ inside

@@ -16,34 +16,36 @@ from mjsense.vector import TaskVectorEnv, _row, make_vec
 
 @checked
 class TaskEnv(gymnasium.Env):
-    """One world that plays episodes of a task; made by :func:`make`. It is a :class:`TaskVectorEnv` of one, without the batch axis."""
+    """Plays episodes of a task in one world; created by :func:`make`. Equals a :class:`TaskVectorEnv` with one world, without the
+    batch axis."""
 
     metadata = {"render_modes": ["rgb_array"], "render_fps": 15.15}
 
     def __init__(self, worlds: TaskVectorEnv) -> None:
         self.worlds = worlds
-        """The vector environment behind it."""
+        """The underlying vector environment."""
         self.metadata = {key: value for key, value in worlds.metadata.items() if key != "autoreset_mode"}
         self.render_mode = worlds.render_mode
         self.observation_space = worlds.single_observation_space
         self.action_space = worlds.single_action_space
         self.action_groups = worlds.action_groups
-        """Columns of the action by move group."""
+        """Columns of an action by move group."""
         self.sim = worlds.sim
-        """The world. Read it as you like; the task writes it."""
+        """The simulation, for reading only; the task writes its state."""
 
     def reset(self, *, seed: Seed | None = None, options: dict[str, Any] | None = None) -> tuple[dict[str, Any], dict[str, Any]]:
-        """Begins the next episode; with a seed, the first one of that seed."""
+        """Starts the next episode; with a seed, the first episode of that seed."""
         super().reset(seed=seed)
         observation, _ = self.worlds.reset(seed=seed)
         return _row(observation, 0), {}
 
     def step(self, action: Any) -> tuple[dict[str, Any], float, bool, bool, dict[str, Any]]:
-        """One control step. The action ``[n]``: actuator commands of the move groups, see ``action_groups``."""
+        """Performs one control step with the action ``[n]``: actuator commands of the move groups; see ``action_groups``."""
         return self._single(*self.worlds.step(np.asarray(action)[None]))
 
     def step_chunk(self, actions: Any, stop_on_success: bool = False) -> tuple[dict[str, Any], float, bool, bool, dict[str, Any]]:
-        """Several control steps ``[steps, n]`` with one observation, after the last; see :meth:`TaskVectorEnv.step_chunk`."""
+        """Performs several control steps ``[steps, n]`` with one observation after the last; see
+        :meth:`TaskVectorEnv.step_chunk`."""
         return self._single(*self.worlds.step_chunk(np.asarray(actions)[None], stop_on_success))
 
     @staticmethod
@@ -56,21 +58,21 @@ class TaskEnv(gymnasium.Env):
         return _row(observation, 0), float(reward[0]), bool(terminated[0]), bool(truncated[0]), info
 
     def expert_action(self) -> np.ndarray:
-        """What the policy of ``make(..., policy="planner")`` would do now, ``[n]``; ``expert_done`` is its word."""
+        """Action of the policy given to ``make(..., policy="planner")`` for the current state, ``[n]``; sets ``expert_done``."""
         return self.worlds.expert_action()[0]
 
     @property
     def expert_done(self) -> bool:
-        """Whether the policy said to be done, with the last :meth:`expert_action`."""
+        """Whether the policy reported ``done`` in the last :meth:`expert_action`."""
         return bool(self.worlds.expert_done[0])
 
     @property
     def scene(self) -> Scene:
-        """``env.scene["name"]``: sensors and entities of the world."""
+        """The scene: ``env.scene["name"]`` is a sensor or an entity."""
         return self.sim.scene
 
     def render(self) -> Any:
-        """The picture of the first camera in the observation; without one that of a default view."""
+        """Image of the first camera of the observation or, without one, of a default view."""
         pictures = self.worlds.render()
         return None if pictures is None else pictures[0]
 
@@ -81,8 +83,8 @@ class TaskEnv(gymnasium.Env):
 
 @checked
 def make(task: Tasks = "pick", robot: Robots | None = None, **options: Any) -> TaskEnv:
-    """A task as a gymnasium environment of one world. The options are those of :func:`make_vec`, but ``num_envs`` and
-    ``autoreset_mode``: after the end of an episode call ``reset()``."""
+    """Creates a gymnasium environment of a task with one world. The options are those of :func:`make_vec` except ``num_envs`` and
+    ``autoreset_mode``: call ``reset()`` after the end of an episode."""
     for word in ("num_envs", "autoreset_mode"):
         if word in options:
             raise TypeError(f"make() has no {word}: that is make_vec()'s")

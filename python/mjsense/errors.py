@@ -1,12 +1,12 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Errors of mjsense: ValueError, RuntimeError, and a KeyError that prints as a sentence."""
+"""The exception class for unknown names. All other errors are ValueError, TypeError or RuntimeError."""
 
 from mjsense._show import printable
 
 
 class UnknownNameError(KeyError):
-    """A name that does not exist; the message gives the nearest ones."""
+    """A name does not exist. The message contains the most similar names."""
 
     def __str__(self) -> str:
-        # KeyError shows the repr of its argument: quotes around a sentence, escapes within.
+        # KeyError would print the repr of its argument, with quotes and escapes.
         return printable(str(self.args[0])) if self.args else ""

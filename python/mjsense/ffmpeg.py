@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The ffmpeg that writes videos: that of ``PATH`` or, where there is none, that of the package imageio-ffmpeg (extra ``video``)."""
+"""The ffmpeg program that writes videos: the one in ``PATH``, otherwise that of the package imageio-ffmpeg (extra ``video``)."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ _FFMPEG = "MJSENSE_FFMPEG"
 
 
 def installed_ffmpeg() -> Path | None:
-    """The program in imageio-ffmpeg, None without it. Imports nothing."""
+    """Path of the program in imageio-ffmpeg, or None if it is not installed. Imports no package."""
     spec = importlib.util.find_spec("imageio_ffmpeg")
     for root in (spec.submodule_search_locations or ()) if spec else ():
         for file in sorted(Path(root, "binaries").glob("ffmpeg-*")):
@@ -22,6 +22,6 @@ def installed_ffmpeg() -> Path | None:
 
 
 def use_installed_ffmpeg() -> None:
-    """Writes videos with imageio-ffmpeg's program if ``PATH`` has none. ``MJSENSE_FFMPEG`` has priority."""
+    """Uses imageio-ffmpeg's program to write videos if ``PATH`` contains none. ``MJSENSE_FFMPEG`` has priority."""
     if not os.environ.get(_FFMPEG) and shutil.which("ffmpeg") is None and (file := installed_ffmpeg()):
         os.environ[_FFMPEG] = str(file)

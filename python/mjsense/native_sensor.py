@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Sensors that C++ computes, as Python sees them."""
+"""Python interface of the sensors that are computed in C++."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ from mjsense.drawing import DebugShapes
 
 @checked
 class NativeSensor(KnownAttributes):
-    """A sensor of the scene that C++ computes."""
+    """A sensor of the scene that is computed in C++."""
 
     def __init__(self, handle: _core.SensorHandle) -> None:
         self._handle = handle
@@ -28,7 +28,7 @@ class NativeSensor(KnownAttributes):
         self.name: str = handle.name
         """Key in the scene."""
         self.kind: str = handle.kind
-        """builtin, contact, raycast, camera ..."""
+        """Kind of sensor: ``"builtin"``, ``"contact"``, ``"raycast"``, ``"camera"`` ..."""
         self.cfg: Any = None
         """Its configuration; None for a sensor that was found in the model."""
         self._complete = True
@@ -43,7 +43,7 @@ class NativeSensor(KnownAttributes):
         return _show.line(f"{self.kind} sensor '{self.name}'", self._shown())
 
     def _repr_html_(self) -> str:
-        """For notebooks: its fields, and thumbnails of the first world's images."""
+        """HTML for notebooks: its fields, and thumbnails of the first world's images."""
         images = {}
         if self.kind == "camera" and self._core is not None and not self._core.closed:
             images = {name or self.name: rows[0] for name, rows in self.fields.items() if rows.ndim == 4}
@@ -61,10 +61,10 @@ class NativeSensor(KnownAttributes):
 
     @property
     def data(self) -> Any:
-        """The measurement of every world as it is now: an array ``[B, ...]``, or an object with one array a field.
+        """The current measurement of all worlds: an array ``[B, ...]``, or an object with one array per field.
 
-        Computed when it is read and not current. The arrays are the sensor's own memory, read-only: the next read after a step,
-        reset or forward writes them again, and step() itself may. Copy what you keep, or change.
+        Computed when it is read, if it is out of date. The arrays are the sensor's own memory and read-only. The next read after
+        a step, reset or forward overwrites them, and step() itself may do so. Copy them to keep or change them.
         """
         if self._core is None:
             raise RuntimeError(f"sensor '{self.name}' has no data yet: make a Simulation of its scene first")
@@ -72,24 +72,24 @@ class NativeSensor(KnownAttributes):
         return self._data
 
     def _row(self, world: int) -> Any:
-        """The present value of one world, for the taker to keep."""
+        """A copy of the current value of one world."""
         rows = {name: array[world].copy() for name, array in self.fields.items()}
         return rows.get("", rows)
 
     @property
     def fields(self) -> Mapping[str, np.ndarray]:
-        """Every field as it is now, by name; the only or main one is ''."""
-        self.data  # makes them current
+        """All current fields by name; the name of the only or main field is ''."""
+        self.data  # update the sensor
         return self._fields
 
     @property
     def specs(self) -> dict[str, _core.SensorSpec]:
-        """What each field is: dtype, shape, unit, frame. A sensor with one field calls it ''."""
+        """Spec of each field: dtype, shape, unit, frame. The name of a single field is ''."""
         return self._handle.specs()
 
     @property
     def spec(self) -> _core.SensorSpec:
-        """The spec of a sensor with one field, or of its main one."""
+        """Spec of the only or main field."""
         specs = self.specs
         if "" not in specs:
             raise ValueError(f"sensor '{self.name}' has the fields {sorted(specs)}: use specs")
@@ -97,17 +97,17 @@ class NativeSensor(KnownAttributes):
 
     @property
     def uuid(self) -> str:
-        """Its name, as suites call it."""
+        """Its name, as used in suites."""
         return self.name
 
     @property
     def observation_space(self) -> gymnasium.Space:
-        """gymnasium space of one world's value: a Box, or a Dict of one Box a field."""
+        """gymnasium space of one world's value: a Box, or a Dict with one Box per field."""
         spaces: dict[str, gymnasium.Space] = {name: box_of(spec) for name, spec in self.specs.items()}
         return spaces[""] if "" in spaces else gymnasium.spaces.Dict(spaces)
 
     def debug_shapes(self, world: int = 0) -> DebugShapes:
-        """What it measures in this world, as shapes to look at: see :meth:`mjsense.Simulation.draw`."""
+        """Shapes that visualise the measurement of one world; see :meth:`mjsense.Simulation.draw`."""
         if self._core is None:
             raise RuntimeError(f"sensor '{self.name}' has no data yet: make a Simulation of its scene first")
         shapes = DebugShapes(world, self._core.meansize)
@@ -116,7 +116,7 @@ class NativeSensor(KnownAttributes):
 
     @property
     def bytes_per_world(self) -> int:
-        """Memory of one world's row."""
+        """Size of one world's row, bytes."""
         return self._handle.bytes_per_world
 
 

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Observation functions on sensors, with mjlab's names: ``height_scan(sim, sensor_name="scan")``.
+"""Observation functions of sensors with mjlab's names: ``height_scan(sim, sensor_name="scan")``.
 
-`env` is anything with a ``scene``: a :class:`mjsense.Simulation`, or an environment that has one. They return new arrays.
+`env` is any object with a ``scene``: a :class:`mjsense.Simulation`, or an environment. The functions return new arrays.
 """
 
 from __future__ import annotations
@@ -15,19 +15,21 @@ from mjsense._arguments import checked
 
 @checked
 def builtin_sensor(env: Any, sensor_name: str) -> np.ndarray:
-    """The sensor's value, ``[B, dim]``."""
+    """Value of the sensor, ``[B, dim]``."""
     return np.array(env.scene[sensor_name].data)
 
 
 @checked
 def projected_gravity_from_sensor(env: Any, sensor_name: str) -> np.ndarray:
-    """Direction of gravity in a body's frame ``[B, 3]``, from a sensor of the world's up vector there: its negation."""
+    """Unit direction of gravity in a body's frame ``[B, 3]``: the negated value of a sensor of the world's up vector in that
+    frame."""
     return -env.scene[sensor_name].data
 
 
 @checked
 def height_scan(env: Any, sensor_name: str, offset: float = 0.0, miss_value: float | None = None) -> np.ndarray:
-    """Height of each ray's frame above its hit, less `offset`: ``[B, R]`` m; misses are `miss_value` (max_distance)."""
+    """Height of each ray's frame above the hit minus `offset`, ``[B, R]`` m; misses are `miss_value` (by default max_distance).
+    """
     sensor = env.scene[sensor_name]
     data = sensor.data
     if miss_value is None:
@@ -46,18 +48,18 @@ def foot_height(env: Any, sensor_name: str) -> np.ndarray:
 
 @checked
 def foot_contact(env: Any, sensor_name: str) -> np.ndarray:
-    """1 where a contact was found, ``[B, N]`` float32."""
+    """1 for each contact, otherwise 0: float32 ``[B, N]``."""
     return (env.scene[sensor_name].data.found > 0).astype(np.float32)
 
 
 @checked
 def foot_contact_forces(env: Any, sensor_name: str) -> np.ndarray:
-    """Forces compressed to sign(F) log(1 + |F|), component by component: ``[B, 3 N]``."""
+    """Contact forces, compressed per component to sign(F) log(1 + |F|): ``[B, 3 N]``."""
     force = env.scene[sensor_name].data.force
     return (np.sign(force) * np.log1p(np.abs(force))).reshape(len(force), -1)
 
 
 @checked
 def foot_air_time(env: Any, sensor_name: str) -> np.ndarray:
-    """Present time in the air, ``[B, P]`` s."""
+    """Current air time, ``[B, P]`` s."""
     return np.array(env.scene[sensor_name].data.current_air_time)

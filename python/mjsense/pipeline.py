@@ -17,14 +17,15 @@ class _Settings(SimpleNamespace):
     """The fields of the C++ pipeline's configuration."""
 
 
-_Settings.__name__ = "ObservationPipeline"  # as messages call it
+_Settings.__name__ = "ObservationPipeline"  # name in messages
 
 
 @checked
 class ObservationPipeline(KnownAttributes):
-    """Noise, bias, clip, scale, NaN policy, delay, history, in this order: ``pipeline(values)`` takes ``[B, D]`` once a control step.
+    """Noise, bias, clip, scale, NaN policy, delay and history, in this order: call ``pipeline(values)`` with ``[B, D]`` once per
+    control step.
 
-    For sensors use :class:`mjsense.EffectSensorCfg`: the same effects, inside the simulation.
+    For sensors use :class:`mjsense.EffectSensorCfg`, which applies the same effects inside the simulation.
     """
 
     def __init__(
@@ -51,24 +52,24 @@ class ObservationPipeline(KnownAttributes):
     ) -> None:
         """
         Args:
-            enable_corruption: False leaves noise and biases out.
-            bias: constant, per component or for all; after the noise.
+            enable_corruption: False disables noise and biases.
+            bias: Constant bias, per component or for all; added after the noise.
             noise: ``effects.Gaussian`` or ``effects.Uniform``, drawn anew for every value.
-            operation: of bias and noise: add, scale, abs (replace the value).
-            episode_bias: drawn at every reset (mjlab's noise model with additive bias), after noise and bias.
-            clip: (low, high).
-            scale: factor, per component or for all; after clip.
-            nan_policy: disabled, warn, sanitize (0), error.
-            delay_min_lag, delay_max_lag: control steps by which the value is late.
-            delay_per_env: False: all worlds have the same lag.
-            delay_hold_prob: that a drawn lag is not taken.
-            delay_update_period: control steps between draws; 0: every step.
-            delay_per_env_phase: worlds draw at steps of their own.
-            history_length: frames kept, oldest first; a world's first frame fills all.
-            flatten_history_dim: ``[B, history * D]`` instead of ``[B, history, D]``.
+            operation: Operation of bias and noise: add, scale, abs (replace the value).
+            episode_bias: Bias that is drawn at every reset (mjlab's noise model with additive bias), added after noise and bias.
+            clip: Limits (low, high).
+            scale: Factor, per component or for all; applied after clip.
+            nan_policy: disabled, warn, sanitize (replace by 0) or error.
+            delay_min_lag, delay_max_lag: Range of the delay, in control steps.
+            delay_per_env: Draw a lag for each world. False: all worlds have the same lag.
+            delay_hold_prob: Probability that a drawn lag is discarded and the previous one kept.
+            delay_update_period: Number of control steps between draws; 0: every step.
+            delay_per_env_phase: Give each world its own phase for the draws.
+            history_length: Number of rows kept, oldest first; the first row of an episode fills all of them.
+            flatten_history_dim: Return ``[B, history * D]`` instead of ``[B, history, D]``.
 
         Raises:
-            ValueError: a setting is out of its range.
+            ValueError: A setting is out of range.
         """
         settings = _Settings(
             enable_corruption=enable_corruption,
@@ -93,11 +94,11 @@ class ObservationPipeline(KnownAttributes):
         self._complete = True
 
     def reset(self, world_ids: Sequence[int] | None = None) -> None:
-        """These worlds (None: all) forget what they have seen."""
+        """Clears the history and the state of the effects in these worlds (None: all)."""
         self._pipeline.reset(None if world_ids is None else [int(w) for w in world_ids])
 
     def __call__(self, values: Any) -> np.ndarray:
-        """The next rows: float32 ``[B, D]``, or with a history ``[B, history * D]`` or ``[B, history, D]``."""
+        """Processes the next rows and returns float32 ``[B, D]``, or ``[B, history * D]`` or ``[B, history, D]``."""
         rows = np.ascontiguousarray(values, dtype=np.float32)
         if rows.ndim != 2:
             raise ValueError(f"shape {rows.shape}: expected ({self.num_envs}, D)")

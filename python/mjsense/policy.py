@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Policies written in Python: what to command next, for all worlds at once."""
+"""Policies written in Python: compute the next commands for all worlds at once."""
 
 from __future__ import annotations
 
@@ -17,75 +17,75 @@ if TYPE_CHECKING:
 
 
 class Policy:
-    """Base class of policies. Write ``act``; a plain function ``obs -> actions``, such as a trained network, is a policy too.
+    """Base class of user-defined policies. Implement ``act``. A function ``obs -> actions``, such as a trained network, is a
+    policy too.
 
     Shapes: ``B`` worlds, ``n`` commands of all controlled move groups, ``H`` steps.
     """
 
     name: str = ""
-    """What files and messages call it; if not given, the class's name in small letters."""
+    """Name in files and messages; by default the class's name in snake case."""
     observation: Sequence[str] | None = None
-    """Names of the sensors ("qpos") or streams ("qpos/arm") that ``act`` sees; None: all that are numbers, as ``make_vec`` shows
-    them."""
+    """Names of the sensors ("qpos") or streams ("qpos/arm") that ``act`` receives; None: all numeric ones, as in ``make_vec``."""
     phases: Mapping[str, int] = {}
-    """Numbers of its phases, if it follows some: ``self.phase`` ``[B]`` then holds the present ones, ``self.num_retries`` ``[B]``
-    how often it began again; files hold both."""
+    """Phase name -> number, if the policy has phases. ``self.phase`` ``[B]`` then contains the current phases and
+    ``self.num_retries`` ``[B]`` the number of retries; both are recorded."""
 
     # Set before initialize().
     sim: Simulation
-    """The worlds."""
+    """The simulation."""
     num_worlds: int
-    """B."""
+    """Number of worlds, ``B``."""
     action_groups: dict[str, slice]
     """Columns of an action by move group."""
     action_low: np.ndarray
-    """Least commands, float64 ``[n]``."""
+    """Lower bounds of commands, float64 ``[n]``."""
     action_high: np.ndarray
-    """Greatest commands, float64 ``[n]``."""
+    """Upper bounds of commands, float64 ``[n]``."""
     wanted: np.ndarray
-    """Worlds of which ``act`` is asked, bool ``[B]``: those that play, and have come to the end of their chunk."""
+    """Worlds for which ``act`` must return actions, bool ``[B]``: active worlds without remaining actions of their chunk."""
     phase: np.ndarray
     num_retries: np.ndarray
 
     _mjs_own: Sequence[Any] = ()
 
-    # ------------------------------------------------------------------------------------------------- yours to write
+    # -------------------------------------------------------------------------------------------- to be implemented or overridden
 
     def initialize(self) -> None:
-        """Called once the worlds exist."""
+        """Called once after the worlds are created."""
 
     def reset(self, ids: np.ndarray) -> None:
-        """These worlds begin a new episode; ``obs`` does not show it yet, ``self.sim`` does."""
+        """Called when new episodes start in these worlds. ``self.sim`` already shows them; ``obs`` does not yet."""
 
     def act(self, obs: dict[str, Any]) -> Any:
-        """The next commands.
+        """Returns the next commands.
 
         Args:
-            obs: the suite's rows ``[B, ...]``, read-only and live: nested as ``make_vec`` has them, ``obs["qpos"]["arm"]``.
+            obs: Rows of the suite ``[B, ...]``, read-only and live, nested as in ``make_vec``: ``obs["qpos"]["arm"]``.
 
         Returns:
-            ``[B, n]``, or ``[B, H, n]`` for the next ``H`` steps, or a dict: move group -> ``[B, k]`` or ``[B, H, k]`` (a group that is
-            left out holds), or ``"action"`` -> ``[B, n]``; and if you like ``"done"`` and ``"success"``, bool ``[B]``: the episode
-            ends after this, and your own verdict of it.
+            ``[B, n]``, or ``[B, H, n]`` for the next ``H`` steps, or a dict: move group -> ``[B, k]`` or ``[B, H, k]`` (omitted
+            groups hold their position), or ``"action"`` -> ``[B, n]``. The dict may also contain ``"done"`` and ``"success"``,
+            bool ``[B]``: the episode ends after this step, and the policy's own verdict.
         """
         raise NotImplementedError(f"{type(self).__name__}: write act(obs)")
 
     def sensors(self) -> Iterable[Any]:
-        """Sensors of yours that observations and recordings with this policy have."""
+        """Additional sensors for observations and recordings with this policy."""
         return ()
 
     def info(self, world: int) -> Mapping[str, str]:
-        """Further texts for ``obs_scene``, such as which network this is."""
+        """Additional texts for ``obs_scene``, such as the name of the network."""
         return {}
 
     def failure(self, world: int) -> str:
-        """Why it gave up, in a few words that are the same for the same reason: files have it in the episode's ``outcome``."""
+        """Short reason why the policy gave up; equal for equal reasons. It becomes part of the episode's ``outcome`` in files."""
         return ""
 
     # --------------------------------------------------------------------------------------------------------- reading
 
     def rng(self, world: int) -> np.random.Generator:
-        """Random numbers for this world's episode: what is drawn from them depends on the seed and the episode alone."""
+        """Random number generator of this world's episode; it depends only on the seed and the episode."""
         rng = self._mjs_rngs[world]
         if rng is None:
             rng = self._mjs_rngs[world] = episode_rng(self._mjs_seed, int(self._mjs_episodes[world]), "policy")
@@ -100,7 +100,7 @@ class Policy:
         return {"name": self._mjs_name(), "phases": dict(self.phases)}
 
     def _mjs_make_sensors(self) -> list[Any]:
-        self._mjs_own = list(self.sensors())  # kept here: C++ refers to them without keeping them alive
+        self._mjs_own = list(self.sensors())  # keep a reference, because C++ does not keep them alive
         return self._mjs_sensors()
 
     def _mjs_sensors(self) -> list[Any]:
@@ -129,7 +129,7 @@ class Policy:
 
 
 class FunctionPolicy(Policy):
-    """A function ``obs -> actions``."""
+    """A function ``obs -> actions`` as a policy."""
 
     def __init__(self, function: Callable[[dict[str, Any]], Any], name: str = "", observation: Sequence[str] | None = None) -> None:
         self.name = name or snake_case(getattr(function, "__name__", type(function).__name__).strip("<>"))
@@ -144,11 +144,11 @@ _POLICIES: dict[str, Callable[[], Policy]] = {}
 
 
 def register_policy(name: str, make: Callable[[], Policy]) -> None:
-    """Lets ``mjs.record(policy=name)`` find a policy of yours.
+    """Registers a user-defined policy, so that ``mjs.record(policy=name)`` finds it.
 
     Args:
-        name: not taken yet.
-        make: the class, or a function that makes one.
+        name: A name that is not in use.
+        make: The policy class, or a function that returns a policy.
     """
     if name in policy_names():
         raise ValueError(f"there is a policy called '{name}' already")
@@ -158,12 +158,12 @@ def register_policy(name: str, make: Callable[[], Policy]) -> None:
 
 
 def policy_names() -> list[str]:
-    """Names of the policies there are, yours last."""
+    """Names of all policies, registered ones last."""
     return [*_core.policy_names(), *_POLICIES]
 
 
 def policy_of(policy: Any) -> tuple[str, Policy | None]:
-    """(name for messages and files, the object if it is written in Python); "" for None."""
+    """Returns (name for messages and files, the object if the policy is written in Python); "" for None."""
     if policy is None:
         return "", None
     if isinstance(policy, str):

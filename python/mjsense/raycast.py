@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Sensors that trace rays."""
+"""Sensors that cast rays."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from mjsense.native_sensor import NativeSensor
 
 
 class RayCastSensor(NativeSensor):
-    """Rays from frames; ``data`` is a :class:`mjsense.RayCastData`."""
+    """Rays cast from frames; ``data`` is a :class:`mjsense.RayCastData`."""
 
     if TYPE_CHECKING:
 
@@ -23,30 +23,30 @@ class RayCastSensor(NativeSensor):
 
     @property
     def num_frames(self) -> int:
-        """F."""
+        """Number of frames, ``F``."""
         return _core.ray_counts(self._handle)[0]
 
     @property
     def num_rays_per_frame(self) -> int:
-        """n, known once the simulation exists."""
+        """Number of rays per frame, ``n``; known once the simulation is created."""
         return _core.ray_counts(self._handle)[1]
 
     @property
     def num_rays(self) -> int:
-        """R = F * n."""
+        """Number of rays, ``R = F * n``."""
         return self.num_frames * self.num_rays_per_frame
 
 
 class TerrainHeightSensor(RayCastSensor):
-    """Height above the ground below its frames, ``data.heights``."""
+    """Height of its frames above the ground, ``data.heights``."""
 
 
 @checked
 class LidarSensor(RayCastSensor):
-    """A lidar: ``data.points``, ``data.intensity`` and all of a RayCastSensor's."""
+    """A lidar: ``data.points``, ``data.intensity`` and all fields of a RayCastSensor."""
 
     def write_point_cloud(self, path: str | Path, world: int = 0) -> None:
-        """The returns of one world, in the sensor's frame, as .ply or .pcd."""
+        """Writes the returns of one world, in the sensor's frame, to a .ply or .pcd file."""
         data: Any = self.data
         if not 0 <= world < len(data.points):
             raise ValueError(f"world {world}: must be in [0, {len(data.points)})")
@@ -54,11 +54,11 @@ class LidarSensor(RayCastSensor):
 
 
 class CameraSensor(NativeSensor):
-    """Images; ``data`` is a :class:`mjsense.CameraData`."""
+    """A camera; ``data`` is a :class:`mjsense.CameraData`."""
 
     @property
     def data(self) -> CameraData:
-        """The present images."""
+        """The current images."""
         data = super().data
         if self.cfg is None or not self.cfg.clone_data:
             return data

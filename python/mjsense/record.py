@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Recording episodes."""
+"""Recording of episodes."""
 
 from __future__ import annotations
 
@@ -18,42 +18,42 @@ from mjsense.simulation import Simulation
 
 @dataclass(frozen=True)
 class RecordProgress:
-    """How far a recording is."""
+    """Progress of a recording."""
 
     kept: int
-    """Episodes on disk."""
+    """Number of episodes on disk."""
     wanted: int
     running: int
     succeeded: int
-    """Attempts of this run."""
+    """Successful attempts of this run."""
     failed: int
     steps: int
-    """Control steps, all worlds."""
+    """Control steps of all worlds."""
     physics_steps: int
     frames: int
-    """Pictures, all cameras."""
+    """Images of all cameras."""
     seconds: float
-    """Wall time."""
+    """Wall-clock time."""
     seconds_left: float
-    """NaN until an episode has ended."""
+    """Estimated remaining time; NaN until an episode has ended."""
 
 
 @dataclass(frozen=True)
 class RecordSummary(RecordProgress):
-    """What a recording has done."""
+    """Result of a recording."""
 
     interrupted: bool
     enough: bool
-    """All wanted episodes are on disk."""
+    """All requested episodes are on disk."""
     failures: dict[str, int]
-    """Why attempts failed, and how often."""
+    """Number of failed attempts by reason."""
     lengths: list[int]
-    """Observations of each attempt that ended."""
+    """Number of observations of each ended attempt."""
     times: dict[str, float]
-    """Wall seconds by room: policy, physics, sensing, rendering, reset, recording."""
+    """Wall-clock seconds by activity: policy, physics, sensing, rendering, reset, recording."""
     published_bytes: int
     path: Path
-    """The folder of the episodes."""
+    """Folder of the episodes."""
 
 
 @checked
@@ -96,18 +96,19 @@ def record(
     sensors: Iterable[Any] = (),
     progress: Callable[[RecordProgress], None] | None = None,
 ) -> RecordSummary:
-    """Plays episodes and keeps them as HDF5 and MP4 in ``out/house_<house>/``.
+    """Records episodes of a task as HDF5 and MP4 files in ``out/house_<house>/``.
 
-    Which attempts are kept, and every byte of them but the videos' containers, depends on the seed alone: not on the number of
-    worlds, on threads, or on an interruption. Ctrl-C keeps what is finished and raises KeyboardInterrupt; call again with
-    ``resume=True`` to go on.
+    Which attempts are kept, and every byte of them except the videos' containers, depends only on the seed, not on the number of
+    worlds, threads or interruptions. Ctrl-C keeps the finished episodes and raises KeyboardInterrupt; call again with
+    ``resume=True`` to continue.
 
     Args:
-        task: a :class:`Task`, its class, or a registered name (:func:`task_names`).
-        robot: a registered name (:func:`robot_names`), the path of a ``.toml``, or a :class:`Robot`; None is the task's own.
-        policy: a :class:`Policy`, a function ``obs -> actions``, or a registered name (:func:`policy_names`).
-        out: folder.
-        scene: a name, a file, a :class:`SceneFileCfg`, or a function that makes a :class:`SceneCfg`; by default the task's own.
+        task: A :class:`Task`, its class, or a registered name (:func:`task_names`).
+        robot: A registered name (:func:`robot_names`), the path of a ``.toml``, or a :class:`Robot`; by default the task's robot.
+        policy: A :class:`Policy`, a function ``obs -> actions``, or a registered name (:func:`policy_names`).
+        out: Output directory.
+        scene: A name, a file, a :class:`SceneFileCfg`, or a function that returns a :class:`SceneCfg`; by default the task's
+            scene.
 
         Options:
         worlds: Number of worlds that run in parallel.
@@ -139,10 +140,11 @@ def record(
         preset: Speed preset of the video encoder, from ultrafast to veryslow; see the page on file formats.
         molmospaces_depth: Add depth in the form that MolmoSpaces' loaders read: a lossy red-green video.
         Others:
-        sensors: of your own, with an observation_space or is_dict, of the core suite, or written for MolmoSpaces: recorded with the
-            suite. An error of one in a world refuses that world's episode (see ``failures``); one that fails in every world from the
-            first observation on ends the recording.
-        progress: called about ten times a second.
+        sensors: Additional sensors: user-defined ones with an observation_space or is_dict, ones of the core suite, or ones
+            written for MolmoSpaces. They are recorded with the suite. If a sensor fails in a world, that world's episode is
+            rejected (see ``failures``); if it fails in every world from the first observation on, the recording ends with its
+            error.
+        progress: Called with the progress about ten times per second.
     """
     options = dict(locals())
     del options["sensors"], options["progress"]

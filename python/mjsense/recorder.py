@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The recorder itself, for loops of your own."""
+"""The recorder for user-defined loops."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ if TYPE_CHECKING:
 
 @checked
 class Recorder(KnownAttributes):
-    """Keeps what sensors show, row by row, as the files that :func:`mjsense.record` writes::
+    """Records sensors row by row to the same files as :func:`mjsense.record`::
 
         with mjs.Recorder("data", sim, sensors, episodes=2) as recorder:
             recorder.begin_episode(world=0, episode=0)
@@ -32,9 +32,9 @@ class Recorder(KnownAttributes):
                 recorder.append([0], reward=[1.0])
             recorder.finish_episode(0, {"task_description": "walk"})
 
-    An episode is kept or decided against by its number: from 0 on, without gaps. It is safe on disk once it is finished; what is
-    not finished when the program dies can be attempted again with ``resume=True``. At the end of the ``with`` block, unless by an
-    exception, the recording is completed.
+    Episodes are identified by their numbers, from 0 without gaps; each is kept, discarded or abandoned. A finished episode is
+    safe on disk. One that was not finished when the program died can be attempted again with ``resume=True``. The recording is
+    completed at the end of the ``with`` block, unless an exception ends it.
     """
 
     def __init__(
@@ -57,22 +57,23 @@ class Recorder(KnownAttributes):
     ) -> None:
         """
         Args:
-            out: folder; files are in ``out/house_<house>/``.
-            simulation: its worlds are recorded.
-            sensors: a :class:`SensorSuite` or sensors, in the order of the files; None: all of the scene. A camera becomes videos of
-                its ``rgb`` and ``depth``; whatever else it has are arrays, ``<camera>_<field>``. Sensors of your own need an
-                ``observation_space``, or ``is_dict``.
-            episodes: how many to keep.
-            fps: rows a second; by default one row a control step.
-            resume: go on with an interrupted recording of the same settings.
-            house: number of the ``house_N`` folder.
-            batches: HDF5 files that episodes are spread over; 0: one for every four.
-            gzip: compression of arrays, 0 to 9.
-            ffmpeg: the program; by default ``$MJSENSE_FFMPEG``, else that of ``PATH``.
-            crf: quality of videos, 0 lossless to 51.
-            preset: effort of the video encoder, ultrafast to veryslow.
-            molmospaces_depth: also depth as MolmoSpaces' loaders read it.
-            settings: what made the data, as JSON; kept in every file, and equal where a recording is resumed.
+            out: Output directory; the files are in ``out/house_<house>/``.
+            simulation: The simulation to record.
+            sensors: A :class:`SensorSuite` or sensors, in the order of the files; by default all of the scene. A camera becomes
+                videos of its ``rgb`` and ``depth`` and arrays ``<camera>_<field>`` of its other fields. User-defined sensors need
+                an ``observation_space`` or ``is_dict``.
+            episodes: Number of episodes to keep.
+            fps: Rows per second; by default one row per control step.
+            resume: Continue an interrupted recording with the same settings.
+            house: Number of the ``house_N`` folder.
+            batches: Number of HDF5 files over which the episodes are distributed; 0: one per four episodes.
+            gzip: Compression level of arrays, 0 to 9.
+            ffmpeg: Path of the ffmpeg program; by default ``$MJSENSE_FFMPEG``, else the one in ``PATH``.
+            crf: Quality of the videos, from 0 (lossless) to 51 (worst).
+            preset: Speed preset of the video encoder, from ultrafast to veryslow.
+            molmospaces_depth: Add depth in the form that MolmoSpaces' loaders read.
+            settings: Settings that produced the data, as JSON. They are stored in every file and must be equal when a recording
+                is resumed.
         """
         chosen = list(simulation.scene.sensors.values() if sensors is None else sensors)
         chosen = [as_sensor(sensor) for sensor in chosen]
@@ -81,7 +82,7 @@ class Recorder(KnownAttributes):
                 simulation.add(sensor)
             if isinstance(sensor, Sensor) and not sensor._mjs_fields:
                 raise ValueError(f"sensor '{sensor.uuid}' cannot be recorded: give it an observation_space, or is_dict = True")
-        SensorSuite(chosen)  # names are unique
+        SensorSuite(chosen)  # raises if names are not unique
         rate = _rate(fps, simulation)
         options = {
             "episodes": episodes, "resume": resume, "house": house, "batches": batches, "gzip": gzip, "ffmpeg": ffmpeg, "crf": crf,
@@ -94,7 +95,7 @@ class Recorder(KnownAttributes):
         )
         self._num_worlds = simulation.num_worlds
         self.sensors: tuple[Any, ...] = tuple(chosen)
-        """What is stored."""
+        """The recorded sensors."""
         self._published = False
         self._complete = True
 
@@ -106,12 +107,12 @@ class Recorder(KnownAttributes):
             self.complete()
 
     def begin_episode(self, world: int, episode: int, seed: Seed = 0) -> None:
-        """From here on rows of this world belong to this episode.
+        """Starts recording rows of this world as an episode.
 
         Args:
-            world: which.
-            episode: its number.
-            seed: kept with it.
+            world: Id of the world.
+            episode: Number of the episode.
+            seed: Seed of the episode, which is stored with it.
         """
         self._core.begin_episode(world, episode, seed)
 
@@ -124,11 +125,11 @@ class Recorder(KnownAttributes):
         truncated: Any = False,
         success: Any = False,
     ) -> None:
-        """Stores what the sensors show of these worlds now; once an observation.
+        """Records the current measurements of these worlds. Call once per observation.
 
         Args:
-            world_ids: None: all that have an episode.
-            reward, terminated, truncated, success: one value, or one for each of these worlds.
+            world_ids: Worlds to record; by default all that have an episode.
+            reward, terminated, truncated, success: One value, or one for each of these worlds.
         """
         if self._published:
             raise RuntimeError("append: the recorder is complete; it takes no more rows")
@@ -149,22 +150,22 @@ class Recorder(KnownAttributes):
         )
 
     def finish_episode(self, world: int, obs_scene: Mapping[str, Any] | str | None = None, outcome: str = "") -> None:
-        """The episode of this world is whole, and kept.
+        """Ends the episode of this world and keeps it.
 
         Args:
-            world: which.
-            obs_scene: what is to be known of the episode (``task_description`` ...): a JSON object, or its text.
-            outcome: one word or sentence.
+            world: Id of the world.
+            obs_scene: Description of the episode (``task_description`` ...): a JSON object or its text.
+            outcome: A word or a sentence.
         """
         text = obs_scene if isinstance(obs_scene, str) else json.dumps(dict(obs_scene or {}))
         self._core.finish_episode(world, text, outcome)
 
     def discard_episode(self, world: int, why: str = "") -> None:
-        """The episode of this world is not kept, and not attempted again."""
+        """Ends the episode of this world without keeping it. A resumed recording does not attempt it again."""
         self._core.discard_episode(world, why)
 
     def abandon_episode(self, world: int) -> None:
-        """The episode of this world is undecided: a resumed recording attempts it again."""
+        """Leaves the episode of this world undecided: a resumed recording attempts it again."""
         self._core.abandon_episode(world)
 
     def flush(self) -> None:
@@ -172,12 +173,12 @@ class Recorder(KnownAttributes):
         self._core.flush()
 
     def complete(self) -> None:
-        """Publishes everything under its final name. No more episodes after that."""
+        """Publishes everything under its final name. No episode can be recorded afterwards."""
         self._published = True
         self._core.complete()
 
     def recording(self, world: int) -> bool:
-        """Whether this world has an episode."""
+        """Whether an episode of this world is being recorded."""
         return self._core.recording(world)
 
     def decided(self, episode: int) -> bool:
@@ -186,22 +187,22 @@ class Recorder(KnownAttributes):
 
     @property
     def kept(self) -> int:
-        """Episodes finished so far."""
+        """Number of episodes finished so far."""
         return self._core.kept
 
     @property
     def enough(self) -> bool:
-        """All episodes are kept, and no earlier attempt is undecided."""
+        """Whether all episodes are kept and no earlier attempt is undecided."""
         return self._core.enough
 
     @property
     def path(self) -> Path:
-        """The folder of the episodes."""
+        """Folder of the episodes."""
         return Path(self._core.path)
 
     @property
     def stats(self) -> dict[str, float]:
-        """Rows, frames and bytes so far, and seconds by what they were spent on."""
+        """Rows, frames and bytes recorded so far, and seconds by activity."""
         return self._core.stats()
 
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Robots: what their files say, and their kinematics."""
+"""Robots: the contents of their files, and kinematics."""
 
 from __future__ import annotations
 
@@ -25,67 +25,67 @@ class MoveGroup:
 
     name: str
     kind: str
-    """base, torso, arm, gripper or head."""
+    """``"base"``, ``"torso"``, ``"arm"``, ``"gripper"`` or ``"head"``."""
     joints: tuple[str, ...]
     actuators: tuple[str, ...]
     controller: str
-    """What a command means: ``joint_position`` and so on."""
+    """Type of controller, which defines the meaning of a command: ``joint_position`` and so on."""
     num_qpos: int
-    """Numbers of its position: 1 a hinge or slide, 7 a free joint."""
+    """Size of the group's position: 1 per hinge or slide, 7 for a free joint."""
     num_qvel: int
     num_commands: int
-    """Numbers of a command; 0: it takes none."""
+    """Size of a command; 0: the group takes none."""
     command_unit: str
     command_low: np.ndarray
-    """float64 ``[num_commands]``."""
+    """Lower bounds of a command, float64 ``[num_commands]``."""
     command_high: np.ndarray
     low: np.ndarray
-    """Ranges of its hinges and slides: float64 ``[joints]`` rad or m."""
+    """Lower limits of its hinges and slides, float64 ``[joints]``, rad or m."""
     high: np.ndarray
     init: np.ndarray
-    """Start positions: float64 ``[num_qpos]``, empty where the robot's file gives none."""
+    """Initial positions, float64 ``[num_qpos]``; empty if the robot's file has none."""
     leaf_site: str
     """Site of its tool frame; ``""``: the robot's base frame."""
 
 
 @dataclass(frozen=True)
 class RobotCamera:
-    """A camera of a robot that an episode records."""
+    """A camera of a robot that is recorded in episodes."""
 
     name: str
-    """Of its stream."""
+    """Name of its stream."""
     camera: str
-    """Of the model."""
+    """Name of the camera in the model."""
     depth: bool
 
 
 @checked
 class Robot(KnownAttributes):
-    """A robot: one of ours by its name (:func:`mjsense.robot_names`), or any by the path of its ``robot.toml``.
+    """A robot: a built-in one by its name (:func:`mjsense.robot_names`), or any robot by the path of its ``robot.toml``.
 
-    ``record`` and ``make_vec`` take the same name or path, or this object. ``sensors`` are observed and recorded in every episode with
-    it; a subclass may override :meth:`create_robot_sensors` instead. Names of its elements are without the prefix ``robot_0/`` that they
-    have in a task's scene. Poses are x, y, z (m) and a quaternion wxyz, in the robot's base frame.
+    ``record`` and ``make_vec`` accept a name, a path or this object. ``sensors`` are observed and recorded in every episode with
+    the robot; a subclass may override :meth:`create_robot_sensors` instead. Names of elements have no prefix here; in a task's
+    scene their prefix is ``robot_0/``. Poses are x, y, z (m) and a quaternion wxyz, in the robot's base frame.
     """
 
     def __init__(self, name_or_path: str | Path, sensors: Iterable[Any] = ()) -> None:
         """
         Args:
-            name_or_path: one of ours, or the path of a ``robot.toml``.
-            sensors: that are written in Python, or of the core suite; those of the file are added.
+            name_or_path: Name of a built-in robot, or path of a ``robot.toml``.
+            sensors: Sensors written in Python or of the core suite, in addition to those of the file.
         """
         self._given = os.fspath(name_or_path)
         self._core: Any = _core.Robot(self._given)
         self.sensors: list[Any] = list(sensors)
-        """Sensors of this robot besides those of its file."""
+        """Sensors of this robot in addition to those of its file."""
         self.name: str = self._core.name
-        """What messages and recordings call it."""
+        """Name in messages and recordings."""
         self.description: str = self._core.description
-        """A sentence."""
+        """One sentence."""
         self.file: str = self._core.file
-        """Its ``robot.toml``; ``embedded:...`` for one of ours."""
+        """Path of its ``robot.toml``; ``embedded:...`` for a built-in robot."""
         self.base: str = self._core.base
-        """The body that is its base frame."""
+        """The body that defines the base frame."""
         arrays = {"command_low", "command_high", "low", "high", "init"}
 
         def value_of(key: str, value: Any) -> Any:
@@ -94,59 +94,61 @@ class Robot(KnownAttributes):
         self.groups: dict[str, MoveGroup] = {
             info["name"]: MoveGroup(**{key: value_of(key, value) for key, value in info.items()}) for info in self._core.groups
         }
-        """Its move groups, in the order of actions and observations."""
+        """Move groups, in the order of actions and observations."""
         self.cameras: tuple[RobotCamera, ...] = tuple(RobotCamera(*camera) for camera in self._core.cameras)
-        """What an episode records."""
+        """Cameras that episodes record."""
         self.image_size: tuple[int, int] = self._core.image_size
-        """Width and height of their pictures, pixels."""
+        """Width and height of their images, pixels."""
         self.policy_dt, self.ctrl_dt, self.sim_dt = (0.001 * ms for ms in self._core.periods_ms)
-        """s: of a policy's action, of the controllers, of the physics."""
+        """Periods of policy actions, controllers and physics, s."""
 
     def __repr__(self) -> str:
         groups = ", ".join(f"{g.name} {g.num_commands}" for g in self.groups.values())
         return f"<robot '{self.name}': {groups}>"
 
     def create_robot_sensors(self) -> list[Any]:
-        """The robot's sensors that are made in Python: those of its file, then ``sensors``."""
+        """Creates the robot's sensors that are written in Python: those of its file, then ``sensors``."""
         return [*_sensors_of_file(self._given), *self.sensors]
 
     @property
     def joints(self) -> tuple[str, ...]:
-        """Of all move groups, in order."""
+        """Joints of all move groups, in order."""
         return tuple(joint for group in self.groups.values() for joint in group.joints)
 
     @property
     def actuators(self) -> tuple[str, ...]:
-        """Of all move groups, in order."""
+        """Actuators of all move groups, in order."""
         return tuple(actuator for group in self.groups.values() for actuator in group.actuators)
 
     @property
     def xml(self) -> str:
-        """The whole robot as one MJCF, its parts attached."""
+        """MJCF of the complete robot with all parts attached."""
         return self._core.xml
 
     def entity(self, **fields) -> EntityCfg:
-        """The robot as an entity of a scene; ``fields`` are further ones of :class:`mjsense.EntityCfg`, such as ``pos``."""
+        """The robot as an entity of a scene. ``fields`` are further fields of :class:`mjsense.EntityCfg`, such as ``pos``."""
         return EntityCfg(model=self.xml, **fields)
 
     def fk(self, group: str, **qpos: Sequence[float]) -> np.ndarray:
-        """Pose of the group's tool frame where the named groups have these positions, the others those of the start.
+        """Forward kinematics: pose of the group's tool frame at the given positions of groups; the others are at their initial
+        positions.
 
         Returns:
-            float64 ``[7]``. UnknownNameError for a group that there is not, ValueError for a wrong number of positions.
+            float64 ``[7]`` in the base frame. Raises UnknownNameError for an unknown group, ValueError for a wrong number of
+            positions.
         """
         return np.array(self._core.fk(group, self._values(qpos)))
 
     def ik(
         self, group: str, pose: Sequence[float], max_iterations: int = 1000, **qpos: Sequence[float]
     ) -> np.ndarray | None:
-        """Positions of the group's joints that bring its tool frame to ``pose`` ``[7]``; the other groups stand still.
+        """Inverse kinematics: positions of the group that bring its tool frame to ``pose`` ``[7]``; the other groups do not move.
 
-        The search begins at ``qpos``, by default the start, and begins again elsewhere after 100 iterations: ``max_iterations=100``
-        stays near, for a path.
+        The search starts at ``qpos``, by default the initial positions, and restarts from other positions every 100 iterations.
+        With ``max_iterations=100`` the result is close to ``qpos``, as needed for a path.
 
         Returns:
-            float64 ``[num_qpos]``, None if the pose is not reached.
+            float64 ``[num_qpos]``, or None if the pose is not reached.
         """
         target = np.array(pose, np.float64)
         if target.shape != (7,) or not np.isfinite(target).all() or not target[3:].any():
@@ -172,7 +174,7 @@ class Robot(KnownAttributes):
 
 
 def robot_of(robot: Any, place: str = "robot") -> tuple[str, list[Any]]:
-    """(name or path for C++, the robot's sensors that are made in Python); "" for None."""
+    """Returns (name or path for C++, the robot's sensors that are written in Python); "" for None."""
     if robot is None:
         return "", []
     if isinstance(robot, Robot):
@@ -184,7 +186,7 @@ def robot_of(robot: Any, place: str = "robot") -> tuple[str, list[Any]]:
 
 
 def _sensors_of_file(name_or_path: str) -> list[Any]:
-    """Makes the sensors that a robot.toml names by ``class = "module:Class"``."""
+    """Creates the sensors that a robot.toml declares as ``class = "module:Class"``."""
     sensors = []
     for name, reference, args in _core.robot_python_sensors(name_or_path):
         place = f"{name_or_path}: sensor '{name}': class '{reference}'"

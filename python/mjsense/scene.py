@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Scenes: what all worlds share."""
+"""Scenes: everything that is shared by all worlds."""
 
 from __future__ import annotations
 
@@ -36,12 +36,12 @@ _CLASSES = {
 
 
 class Entity(KnownAttributes):
-    """An attached model: the names of its elements, local (without the prefix), in model order."""
+    """A model that is attached to the scene. Names of its elements are without its prefix, in model order."""
 
     def __init__(self, name: str, description: dict[str, Any]) -> None:
         self.name = name
         self.fixed_base: bool = description["fixed_base"]
-        """No free joint."""
+        """True if the model has no free joint."""
         self.body_names: tuple[str, ...] = description["body_names"]
         self.geom_names: tuple[str, ...] = description["geom_names"]
         self.site_names: tuple[str, ...] = description["site_names"]
@@ -57,7 +57,8 @@ class Entity(KnownAttributes):
 
 @checked
 class Scene(KnownAttributes):
-    """Entities, terrain and sensors, compiled into one model. ``scene[key]`` is a sensor or, failing that, an entity."""
+    """Entities, terrain and sensors, compiled into one model. ``scene[key]`` is a sensor or, if there is none of that name, an
+    entity."""
 
     def __init__(self, cfg: SceneCfg) -> None:
         items, edit = self._prepare(cfg)
@@ -65,11 +66,12 @@ class Scene(KnownAttributes):
         self._finish()
 
     def _prepare(self, cfg: SceneCfg) -> tuple[list[Any], Callable[[], None]]:
-        """What C++ makes the scene of, beside the configuration and the spec: its sensors, and the last edit."""
-        cfg.__post_init__()  # it may have been changed since it was made
+        """Returns the arguments of the C++ scene in addition to the configuration and the spec: its sensors and the final edit.
+        """
+        cfg.__post_init__()  # it may have been changed after its construction
         self.cfg = cfg
         self.spec = cfg._base_spec()
-        """The spec the scene is built in."""
+        """The spec in which the scene is built."""
         self._simulation: Any = None
         items = [self._item(sensor) for sensor in cfg.sensors]
         for item in items:
@@ -90,13 +92,13 @@ class Scene(KnownAttributes):
         self._register()
 
     def _set_options(self, options: MujocoCfg) -> None:
-        """Replaces the physics options, also those of ``model``. No simulation may exist yet."""
+        """Replaces the physics options, including those of ``model``. Must be called before a simulation is created."""
         self._core.set_options(options, self.model._address)
         self.cfg.options = options
 
     @classmethod
     def _of(cls, core: Any, prepared: Scene | None = None) -> Scene:
-        """Of a C++ scene that something else made, of what ``prepared`` said."""
+        """Wraps a C++ scene that was created elsewhere, from the result of ``prepared``."""
         if prepared is not None:
             prepared._core = core
             prepared._finish()
@@ -120,7 +122,7 @@ class Scene(KnownAttributes):
 
     @staticmethod
     def _item(sensor: Any) -> Any:
-        """What C++ takes: a configuration it knows, or a Sensor."""
+        """The object passed to C++: a configuration or a Sensor."""
         if isinstance(sensor, Sensor):
             return sensor
         if hasattr(sensor, "build"):
@@ -149,35 +151,36 @@ class Scene(KnownAttributes):
         raise UnknownNameError(f"Scene element '{key}' not found. {hint}")
 
     def builtin(self, name: str) -> BuiltinSensor:
-        """``self[name]``, which is one of MuJoCo's own sensors; TypeError for another kind, as for all of these."""
+        """``self[name]`` if it is one of MuJoCo's own sensors; raises TypeError for other kinds. The methods below behave
+        likewise."""
         return self._of_class(name, BuiltinSensor)
 
     def contact(self, name: str) -> ContactSensor:
-        """``self[name]``, which is a contact sensor."""
+        """``self[name]`` as a contact sensor."""
         return self._of_class(name, ContactSensor)
 
     def raycast(self, name: str) -> RayCastSensor:
-        """``self[name]``, which casts rays."""
+        """``self[name]`` as a ray-cast sensor."""
         return self._of_class(name, RayCastSensor)
 
     def terrain_height(self, name: str) -> TerrainHeightSensor:
-        """``self[name]``, which is a terrain height sensor."""
+        """``self[name]`` as a terrain height sensor."""
         return self._of_class(name, TerrainHeightSensor)
 
     def lidar(self, name: str) -> LidarSensor:
-        """``self[name]``, which is a lidar."""
+        """``self[name]`` as a lidar."""
         return self._of_class(name, LidarSensor)
 
     def camera(self, name: str) -> CameraSensor:
-        """``self[name]``, which is a camera."""
+        """``self[name]`` as a camera."""
         return self._of_class(name, CameraSensor)
 
     def imu(self, name: str) -> ImuSensor:
-        """``self[name]``, which is an IMU."""
+        """``self[name]`` as an IMU."""
         return self._of_class(name, ImuSensor)
 
     def entity(self, name: str) -> Entity:
-        """``self[name]``, which is an entity."""
+        """``self[name]`` as an entity."""
         if name not in self._sensors:
             return self[name]
         if name not in self.entities:
@@ -198,7 +201,7 @@ class Scene(KnownAttributes):
         return [*self._sensors, *self.entities]
 
     def _repr_html_(self) -> str:
-        """For notebooks: each sensor as it shows itself."""
+        """HTML for notebooks: the representation of each sensor."""
         return "".join(sensor._repr_html_() for sensor in self._sensors.values())
 
     @property
@@ -208,11 +211,11 @@ class Scene(KnownAttributes):
 
     @cached_property
     def entities(self) -> Mapping[str, Entity]:
-        """The terrain, if there is one, first."""
+        """Entities by name; the terrain, if any, comes first."""
         return MappingProxyType({name: Entity(name, names) for name, names in self._core.entities().items()})
 
     def _entities_of_spec(self) -> dict[str, Entity]:
-        """The entities before compilation, as far as names go."""
+        """The entities before compilation, with names only."""
         kinds = {"body": "bodies", "geom": "geoms", "site": "sites", "joint": "joints", "actuator": "actuators",
                  "tendon": "tendons", "camera": "cameras"}  # fmt: skip
         entities = {}
@@ -228,19 +231,19 @@ class Scene(KnownAttributes):
 
     @cached_property
     def model(self) -> mujoco.MjModel:
-        """A copy of the compiled model, for looking things up. Changing it changes no simulation."""
+        """A copy of the compiled model for look-ups. Changing it does not affect any simulation."""
         return mujoco.MjModel._from_model_ptr(self._core.copy_model())
 
     def to_xml(self) -> str:
-        """MJCF that compiles to the same model; with ``assets()`` as files beside it if there are any."""
+        """MJCF that compiles to the same model. If ``assets()`` is not empty, write its files to the same folder."""
         return self._core.to_xml()
 
     def assets(self) -> dict[str, bytes]:
-        """Files that the scene got as bytes, by name."""
+        """Files that were given to the scene as bytes, by name."""
         return self._core.assets()
 
     def env_origins(self, num_worlds: int | None = None) -> np.ndarray:
-        """Origins of the worlds, float32 ``[B, 3]`` m: zeros without terrain, a grid on a plane."""
+        """Origins of the worlds, float32 ``[B, 3]`` m: 0 without terrain, a grid on a plane."""
         return self._core.env_origins(self.cfg.num_envs if num_worlds is None else num_worlds)
 
     def env_tiles(self, num_worlds: int | None = None) -> np.ndarray | None:
@@ -253,7 +256,8 @@ class Scene(KnownAttributes):
 
 
 def prepared(cfg: Any, place: str) -> tuple[Any, ...]:
-    """What C++ makes the scene of a rollout of: the configuration, its spec, its sensors, its last edit, and the Scene to be."""
+    """Arguments from which C++ builds the scene of a rollout: the configuration, its spec, its sensors, the final edit, and the
+    Scene."""
     if not isinstance(cfg, SceneCfg):
         raise TypeError(f"{place} must return a mjsense.SceneCfg, not {cfg!r}")
     scene: Scene = Scene.__new__(Scene)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The base class of your own sensors."""
+"""Base class of user-defined sensors."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ T = TypeVar("T")
 
 
 def encode_json(value: Any) -> bytes:
-    """JSON text as it stands in files: sorted keys, no blanks, ASCII; NumPy values as Python numbers and lists."""
+    """JSON text as stored in files: sorted keys, no blanks, ASCII; NumPy values as Python numbers and lists."""
     return json.dumps(value, sort_keys=True, separators=(",", ":"), default=_plain).encode("ascii")
 
 
@@ -39,45 +39,47 @@ def _plain(value: Any) -> Any:
 
 
 class Sensor(Generic[T]):
-    """Base class of sensors written in Python; ``Sensor[T]`` says of which type ``data`` is. Write one of these methods, whichever suits:
+    """Base class of sensors written in Python; ``T`` in ``Sensor[T]`` is the type of ``data``. Implement one of these methods:
 
-    - ``compute(sim)`` returns the values of all worlds, ``[B, ...]``; ``compute(sim, world_ids)`` those of these worlds, in their order;
-    - ``_compute_data()`` the same as ``compute(sim)``, without an argument (as in mjlab);
+    - ``compute(sim)`` returns the values of all worlds, ``[B, ...]``; ``compute(sim, world_ids)`` returns those of the given
+      worlds, in order;
+    - ``_compute_data()`` equals ``compute(sim)`` without an argument (as in mjlab);
     - ``get_observation(env, task, batch_index=0)`` returns the value of one world (as in MolmoSpaces). `env` is
-      :attr:`mjsense.Simulation.env`; `task` is None but in recordings and environments.
+      :attr:`mjsense.Simulation.env`; `task` is None except in recordings and environments.
 
-    The first two have one instance for all worlds, which keeps its state by world. The third has one instance a world: the one that is
-    given belongs to world 0, the others are deep copies of it, made when it comes to its simulation; its ``reset()`` has no arguments.
-    (With a ``reset(world_ids)`` it is one for all worlds, too.)
+    With the first two methods, one instance serves all worlds and stores its state per world. With the third, there is one
+    instance per world: the given object belongs to world 0, and the others are deep copies that are created when the sensor is
+    added to its simulation. Its ``reset()`` has no arguments. (A ``reset(world_ids)`` makes one instance serve all worlds here
+    too.)
 
-    The value is computed when it is read and not current, once. With an ``observation_space`` the rows are kept in arrays of its dtype
-    and shape, which suites and recordings read; a value with another dtype or shape, or outside the bounds, is an error. Python's own
-    numbers and lists take the declared dtype. A ``gymnasium.spaces.Dict`` stands for a nested dict of arrays; for an empty one the arrays
-    are those of a first value. Without a space ``data`` is whatever you return.
+    The value is computed once per state, when it is read. With an ``observation_space``, rows are stored in arrays of its dtype
+    and shape, from which suites and recordings read. A value with another dtype or shape, or outside the bounds, is an error;
+    Python numbers and lists are converted to the declared dtype. A ``gymnasium.spaces.Dict`` describes a nested dict of arrays;
+    if it is empty, the arrays are those of the first value. Without a space, ``data`` is whatever the method returns.
     """
 
     uuid: str = ""
     """Name in scenes, suites and files."""
     observation_space: Any = None
-    """gymnasium space of one world's value: Box, Discrete, MultiBinary, MultiDiscrete, or a Dict of such."""
+    """gymnasium space of one world's value: Box, Discrete, MultiBinary, MultiDiscrete, or a Dict of these."""
     is_dict: bool = False
-    """The value of a world is a dict, kept as JSON text of at most ``str_max_len`` bytes."""
+    """True if the value of a world is a dict, which is stored as JSON text of at most ``str_max_len`` bytes."""
     str_max_len: int = 2000
     unit: str = ""
     frame: str = ""
 
-    # Names of ours begin so, that yours are free.
+    # Private names start with _mjs_, so that subclasses can use all others.
     _mjs_handle: Any = None
     _mjs_core: Any = None
     _mjs_sim_ref: Any = None
     _mjs_scene_ref: Any = None
     _mjs_value: Any = None
-    _mjs_fields: list[Row] | None = None  # declared; [] if the value is a Python object only
-    _mjs_rows: Any = None  # a list: of each field, None without any
+    _mjs_fields: list[Row] | None = None  # None until declared; [] if the value is a Python object without rows
+    _mjs_rows: Any = None  # a list with the array of each field; None without fields
     _mjs_shown: Any = None
-    _mjs_instances: Any = None  # a list by world; None: one computes all worlds at once
-    _mjs_faults: Any = None  # dict[int, SensorError]: of reset(), by world, until the value is asked for
-    _mjs_worked: bool = False  # a row of it was right once
+    _mjs_instances: Any = None  # a list by world; None: one instance computes all worlds at once
+    _mjs_faults: Any = None  # dict[int, SensorError]: errors of reset() by world, raised when the value is computed
+    _mjs_worked: bool = False  # True after the first valid row
 
     def __init__(self, uuid: str | None = None, observation_space: Any = None, **kwargs: Any) -> None:
         if uuid is not None:
@@ -96,7 +98,7 @@ class Sensor(Generic[T]):
         return _show.line(f"{type(self).__name__} '{self.uuid}'", self._mjs_about())
 
     def _repr_html_(self) -> str:
-        """For notebooks: what it is, and a thumbnail if its row is an image."""
+        """HTML for notebooks: its fields, and a thumbnail if its row is an image."""
         live = isinstance(self._mjs_shown, np.ndarray) and not self._mjs_core.closed
         images = {self.uuid: self.rows[0]} if live and self._mjs_shown.ndim == 4 else {}
         return _show.table(f"{type(self).__name__} '{self.uuid}'", self._mjs_about(), images)
@@ -108,16 +110,17 @@ class Sensor(Generic[T]):
             for spec in (self._mjs_row_specs() if self.uuid else [])
         ]
 
-    # ------------------------------------------------------------------------------------------------- yours to write
+    # -------------------------------------------------------------------------------------------- to be implemented or overridden
 
     def edit_spec(self, spec: mujoco.MjSpec) -> None:
-        """Adds MuJoCo elements before compilation."""
+        """Adds MuJoCo elements to the model before compilation."""
 
     def initialize(self, sim: Simulation) -> None:
-        """Called once the model is compiled: resolve names, allocate."""
+        """Called once after compilation: resolve names and allocate memory here."""
 
     def compute(self, sim: Simulation) -> Any:
-        """Values of all worlds, ``[B, ...]``. It may run more than once a step (a world began anew): change state in update()."""
+        """Returns the values of all worlds, ``[B, ...]``. May be called several times per step (if a world was reset): change
+        state only in update()."""
         if _overrides(self, "_compute_data"):
             value = self._compute_data()
             if value is None:
@@ -129,23 +132,23 @@ class Sensor(Generic[T]):
         raise NotImplementedError
 
     def get_observation(self, env: Any, task: Any = None, batch_index: int = 0, *args: Any, **kwargs: Any) -> Any:
-        """Value of one world; called once for each state of it."""
+        """Returns the value of one world; called once per state."""
         return self._mjs_row(batch_index)
 
     def update(self, dt: float) -> None:
-        """Called after every control step with its length (s), before the value of that step is computed."""
+        """Called after every control step of ``dt`` seconds, before the value of that step is computed."""
 
     def reset(self, world_ids: Sequence[int] | None = None) -> None:
-        """These worlds (None: all) begin a new episode."""
+        """Called when a new episode starts in these worlds (None: all)."""
 
     def debug_vis(self, visualizer: DebugShapes) -> None:
-        """Shows world ``visualizer.env_idx`` to a human: ``visualizer.add_arrow(start, end, color)`` and so on."""
+        """Visualises the measurement of world ``visualizer.env_idx``: ``visualizer.add_arrow(start, end, color)`` and so on."""
 
     # --------------------------------------------------------------------------------------------------------- reading
 
     @property
     def name(self) -> str:
-        """The same as uuid, as mjlab calls it."""
+        """The same as ``uuid``; the name that mjlab uses."""
         return self.uuid
 
     @name.setter
@@ -154,7 +157,7 @@ class Sensor(Generic[T]):
 
     @property
     def simulation(self) -> Simulation:
-        """The simulation it belongs to."""
+        """The simulation that it belongs to; raises RuntimeError if there is none."""
         sim = self._mjs_sim_ref() if self._mjs_sim_ref else None
         if sim is None:
             raise RuntimeError(f"sensor '{self.uuid}' belongs to no simulation yet")
@@ -162,7 +165,7 @@ class Sensor(Generic[T]):
 
     @property
     def data(self) -> T:
-        """The present value, of all worlds: an array ``[B, ...]``, a nested dict of such, a list of dicts by world (is_dict)."""
+        """The current value of all worlds: an array ``[B, ...]``, a nested dict of arrays, or a list of dicts by world."""
         if self._mjs_core is None:
             raise RuntimeError(f"sensor '{self.uuid}' has no data yet: it belongs to no simulation")
         self._mjs_core.refresh(self._mjs_handle)
@@ -170,28 +173,29 @@ class Sensor(Generic[T]):
 
     @property
     def rows(self) -> Any:
-        """What a recording stores: ``[B, ...]``, or a nested dict of such; for is_dict sensors JSON text in uint8 ``[B, str_max_len]``."""
+        """Rows as they are recorded: ``[B, ...]`` or a nested dict of such arrays; JSON text in uint8 ``[B, str_max_len]`` for
+        is_dict sensors."""
         if self._mjs_rows is None:
             raise RuntimeError(f"sensor '{self.uuid}' has no rows: give it an observation_space, or is_dict = True")
         self._mjs_core.refresh(self._mjs_handle)
         return self._mjs_shown
 
     def debug_shapes(self, world: int = 0) -> DebugShapes:
-        """What ``debug_vis`` shows of this world."""
+        """The shapes that ``debug_vis`` adds for this world."""
         return self.simulation.debug_shapes(world, self)
 
     # ----------------------------------------------------------------------------------------- called by mjsense: its life
 
     def _mjs_original(self) -> Any:
-        """The object whose methods are the user's."""
+        """The object whose methods are called."""
         return self
 
     def _mjs_by_world(self) -> bool:
-        """The user's method is get_observation()."""
+        """Whether the implemented method is get_observation()."""
         return _overrides(self, "get_observation") and not (_overrides(self, "compute") or _overrides(self, "_compute_data"))
 
     def _mjs_is_shared(self) -> bool:
-        """One instance serves all worlds."""
+        """Whether one instance serves all worlds."""
         return not self._mjs_by_world() or (_overrides(self, "reset") and takes(self.reset, 1))
 
     def _mjs_edit_spec(self) -> None:
@@ -225,7 +229,7 @@ class Sensor(Generic[T]):
             self._mjs_instances = [first] + [self._mjs_copy(sim, first) for _ in range(1, sim.num_worlds)]
 
     def _mjs_copy(self, sim: Simulation, first: Any) -> Any:
-        """A sensor like it for another world. What it refers to of the simulation is the same one."""
+        """A copy of the sensor for another world. References to the simulation and its parts are not copied."""
         kept = [sim, sim.scene, *sim.scene.sensors.values(), *sim._python]
         kept += [value for name, value in vars(self).items() if name.startswith("_mjs_")]
         kept.append(getattr(first, "observation_space", None))
@@ -242,13 +246,13 @@ class Sensor(Generic[T]):
             ) from error
 
     def _mjs_originals(self) -> list[Any]:
-        """Every instance once."""
+        """All distinct instances."""
         if self._mjs_instances is None or self._mjs_is_shared():
             return [self._mjs_original()]
         return self._mjs_instances
 
     def _mjs_call(self, instance: Any, method: str, first: Any, owner: Any) -> None:
-        """Calls edit_spec or initialize with our arguments or, where it takes more, with mjlab's."""
+        """Calls edit_spec or initialize with mjsense's arguments or, if it requires more, with mjlab's."""
         function = getattr(instance, method, None)
         if function is None:
             return
@@ -288,7 +292,7 @@ class Sensor(Generic[T]):
             (self._mjs_instances[shapes.env_idx] if self._mjs_instances else self).debug_vis(shapes)
 
     def _mjs_updates(self) -> bool:
-        """It wants to hear of every control step."""
+        """Whether it must be called after every control step."""
         return _overrides(self, "update")
 
     def _mjs_control_step(self, world_ids: list[int], dt: float, seeds: Sequence[int] = ()) -> list[tuple[int, SensorError]]:
@@ -313,15 +317,16 @@ class Sensor(Generic[T]):
     # ---------------------------------------------------------------------------------------- called by mjsense: its values
 
     def _mjs_compute_rows(self, world_ids: list[int], seeds: Sequence[int] = ()) -> list[tuple[int, SensorError]]:
-        """Computes these worlds. Returns (world, error) of those whose value is wrong; raises where none can be right."""
+        """Computes the rows of these worlds and returns (world, error) of those that failed. Raises if all failed and none ever
+        succeeded."""
         if self._mjs_sim_ref is None:
-            return []  # the simulation is being made; initialize() has not been called
+            return []  # the simulation is under construction and initialize() has not been called
         by_world = self._mjs_instances is not None
         faults = self._mjs_compute_worlds(world_ids, seeds) if by_world else self._mjs_compute_batch(world_ids)
         if len(faults) < len(world_ids):
             self._mjs_worked = True
         elif not self._mjs_worked and faults:
-            raise faults[0][1]  # it never works: no matter of single episodes
+            raise faults[0][1]  # it has never worked, so the fault is not limited to single episodes
         return faults
 
     def _mjs_compute_worlds(self, world_ids: list[int], seeds: Sequence[int]) -> list[tuple[int, SensorError]]:
@@ -341,11 +346,11 @@ class Sensor(Generic[T]):
         return faults
 
     def _mjs_observe(self, env: Any, task: Any, world: int) -> Any:
-        """Asks the instance of this world now."""
+        """Computes the current value of this world with its instance."""
         return observe(self._mjs_instances[world] if self._mjs_instances else self._mjs_original(), env, task, world)
 
     def _mjs_put(self, world: int, value: Any) -> None:
-        """Keeps the value of one world."""
+        """Stores the value of one world."""
         if not self._mjs_fields:
             self._mjs_value[world] = value
         elif self.is_dict:
@@ -402,14 +407,14 @@ class Sensor(Generic[T]):
         self._mjs_value[world] = value
 
     def _mjs_row(self, world: int) -> Any:
-        """The present value of one world, for the taker to keep."""
+        """A copy of the current value of one world."""
         value: Any = self.data
         if self._mjs_fields and not self.is_dict:
             return nested(self._mjs_fields, [np.array(array[world]) for array in leaves(value, self._mjs_fields)])
         return copy.copy(value[world])
 
     def _mjs_probe(self, sim: Simulation) -> None:
-        """Finds the arrays of values that the space leaves open, from a copy's value of world 0 as it is now."""
+        """Determines the arrays that the space leaves open from the value of a copied sensor in world 0."""
         space = self.observation_space
         if self.is_dict or not isinstance(space, gymnasium.spaces.Dict) or space.spaces or not self._mjs_by_world():
             return
@@ -429,14 +434,14 @@ class Sensor(Generic[T]):
         if self.is_dict:
             return [Row((), (int(self.str_max_len),), np.dtype(np.uint8))]
         if self._mjs_fields is not None and self._mjs_fields[:1] and not rows_of_space(self.observation_space):
-            return self._mjs_fields  # found by a probe
+            return self._mjs_fields  # determined by _mjs_probe()
         try:
             return rows_of_space(self.observation_space)
         except TypeError as error:
             raise TypeError(f"sensor '{self.uuid}': {error}") from None
 
     def _mjs_row_specs(self) -> list[dict[str, Any]]:
-        """What C++ needs to know of the rows."""
+        """Specs of the rows for C++."""
         if not self.uuid:
             raise ValueError(f"{type(self).__name__} has no uuid")
         self._mjs_fields = self._mjs_declared()
@@ -456,11 +461,11 @@ class Sensor(Generic[T]):
 
 
 class ForeignSensor(Sensor):
-    """A sensor of another library, made for MolmoSpaces: any object with a uuid and ``get_observation(env, task, batch_index)``."""
+    """Wraps a sensor written for MolmoSpaces: any object with a uuid and ``get_observation(env, task, batch_index)``."""
 
     def __init__(self, original: Any) -> None:
         self.original = original
-        """The object that was given; world 0's."""
+        """The wrapped object, which belongs to world 0."""
         self.uuid = original.uuid
         self.observation_space = getattr(original, "observation_space", None)
         self.is_dict = bool(getattr(original, "is_dict", False))
@@ -491,7 +496,7 @@ class ForeignSensor(Sensor):
             self.original.reset(world_ids)
 
     def _mjs_call(self, instance: Any, method: str, first: Any, owner: Any) -> None:
-        """It has no edit_spec or initialize of ours."""
+        """Does nothing: such an object has no edit_spec or initialize."""
 
     def _mjs_updates(self) -> bool:
         update = getattr(self.original, "update", None)
@@ -499,7 +504,7 @@ class ForeignSensor(Sensor):
 
 
 def as_sensor(thing: Any) -> Any:
-    """A sensor of ours, or one of another library as one; TypeError for anything else."""
+    """Returns an mjsense sensor, wrapping one of another library if necessary; raises TypeError for other objects."""
     if isinstance(thing, (Sensor, NativeSensor)):
         return thing
     if isinstance(thing, type):

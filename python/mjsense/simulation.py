@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Simulations: B worlds of one scene, stepped together, with every sensor fresh."""
+"""Simulations: B worlds of one scene that are stepped together, with sensors that are always up to date."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ from mjsense.scene import Scene
 from mjsense.sensor import Sensor, as_sensor
 
 _IDS = {"geom_matid": "nmat", "flex_matid": "nmat", "mat_texid": "ntex"}
-"""Fields of ids that sensors follow, and how many there are."""
+"""Model fields that contain ids which sensors resolve, and the mjModel size that bounds each."""
 _WHOLE = {
     "geom_contype", "geom_conaffinity", "geom_condim", "geom_priority", "geom_group", "geom_matid", "geom_castshadow",
     "geom_dataid", "site_group", "site_matid", "jnt_group", "jnt_limited", "jnt_actfrclimited", "jnt_actgravcomp",
@@ -31,18 +31,18 @@ _WHOLE = {
     "actuator_group", "actuator_ctrllimited", "actuator_forcelimited", "actuator_actlimited", "actuator_actearly",
     "geom_type",
 }  # fmt: skip
-"""Integers and flags that may differ between worlds. All others say how large things are and where they stand: MuJoCo indexes
-memory with them."""
+"""Integer and boolean model fields that may differ between worlds. All others are sizes and addresses, which MuJoCo uses to index
+memory."""
 _FIXED = {
     "actuator_delay", "sensor_delay", "sensor_interval", "efm0_L", "bvh_aabb", "oct_aabb", "oct_coeff", "numeric_data",
     "tuple_objprm",
 }  # fmt: skip
-"""Real numbers that may not: sizes of buffers and parts of structures follow from them."""
+"""Floating-point model fields that may not differ between worlds: buffer sizes and data structures depend on them."""
 _STATE = ("qpos", "qvel", "act", "ctrl", "qfrc_applied", "xfrc_applied", "mocap_pos", "mocap_quat", "eq_active", "userdata")
 
 
 class _State:
-    """A part of the state as an attribute of a simulation: the live array ``[B, n]``; assigning writes into it."""
+    """A component of the state as an attribute of a simulation: the live array ``[B, n]``; assignment writes into it."""
 
     def __init__(self, text: str) -> None:
         self.__doc__ = text + " Live, float64; call forward() after writing."
@@ -63,27 +63,27 @@ class _State:
 
 @checked
 class Simulation(KnownAttributes):
-    """B worlds of a scene.
+    """B parallel worlds of a scene.
 
-    After ``step()``, ``reset()`` and ``forward()`` every derived quantity and every sensor belongs to the present state. Worlds
-    are independent, results are the same bit for bit at any number of threads.
+    After ``step()``, ``reset()`` and ``forward()``, every derived quantity and every sensor belongs to the current state. Worlds
+    are independent, and results are equal bit for bit for any number of threads.
 
     Attributes:
-        scene: what all worlds share; ``sim.scene["name"].data`` is a sensor's measurement.
-        num_worlds: B.
-        decimation: substeps per control step.
-        physics_dt: s, one substep.
-        step_dt: s, one control step.
+        scene: The scene that all worlds share; ``sim.scene["name"].data`` is a sensor's measurement.
+        num_worlds: Number of worlds, ``B``.
+        decimation: Physics steps (substeps) per control step.
+        physics_dt: Duration of a physics step, s.
+        step_dt: Duration of a control step, s.
     """
 
     def __init__(self, scene: Scene, num_worlds: int | None = None, decimation: int = 1, threads: int = 0, seed: Seed = 0) -> None:
         """
         Args:
-            scene: its sensors belong to this simulation from now on; a second one needs a scene of its own.
-            num_worlds: B; the scene's num_envs if not given.
-            decimation: physics steps (substeps) per control step.
-            threads: 0 takes every CPU that this process may use.
-            seed: of random numbers (noise, delays).
+            scene: The scene. Its sensors belong to this simulation from now on, so that a second simulation needs its own scene.
+            num_worlds: Number of worlds, ``B``; by default the scene's ``num_envs``.
+            decimation: Physics steps (substeps) per control step.
+            threads: Number of threads; 0: one per CPU that is available to this process.
+            seed: Seed of the random numbers (noise, delays).
         """
         if scene._simulation is not None:
             raise RuntimeError("this scene belongs to a simulation already: make another with Scene(scene.cfg)")
@@ -94,11 +94,11 @@ class Simulation(KnownAttributes):
 
     @classmethod
     def _of(cls, core: Any, prepared: Scene | None = None, view: Any = None) -> Simulation:
-        """Of a C++ simulation that something else steps.
+        """Wraps a C++ simulation that is stepped elsewhere.
 
         Args:
-            prepared: what its scene was made of, if Python did.
-            view: of the task that is played in it.
+            prepared: The Python scene that it was created from, if any.
+            view: View of the task that is played in it.
         """
         self = cls.__new__(cls)
         self._core = core
@@ -112,13 +112,13 @@ class Simulation(KnownAttributes):
         self._view = view
         self._env: PeerEnv | None = None
         self.num_worlds: int = self._core.num_worlds
-        """B."""
+        """Number of worlds, ``B``."""
         self.decimation: int = self._core.decimation
-        """Substeps per control step."""
+        """Physics steps (substeps) per control step."""
         self.physics_dt: float = self._core.physics_dt
-        """s, one substep."""
+        """Duration of a physics step, s."""
         self.step_dt: float = self._core.step_dt
-        """s, one control step."""
+        """Duration of a control step, s."""
         self._views: dict[str, np.ndarray] = {}
         self._python: list[Sensor] = []
         self._derived: dict[str, tuple[Any, np.ndarray]] = {}
@@ -145,7 +145,7 @@ class Simulation(KnownAttributes):
         self.close()
 
     def close(self) -> None:
-        """Frees the worlds once the arrays taken from them are gone. Every later call raises."""
+        """Frees the worlds once no array of them is referenced any more. Every later call raises RuntimeError."""
         self._views.clear()
         self._core.close()
 
@@ -153,21 +153,21 @@ class Simulation(KnownAttributes):
 
     def step(self, control_steps: int = 1) -> None:
         """Advances every world by control steps of ``decimation`` substeps each."""
-        if control_steps <= 1:  # the core says what is wrong with 0
+        if control_steps <= 1:  # The core reports 0 as an error.
             self._core.step(control_steps)
             return
-        # One by one: between two of them Ctrl-C is heard.
+        # One at a time, so that Ctrl-C is handled between two steps.
         for _ in range(control_steps):
             self._core.step(1)
 
     def reset(self, world_ids: Sequence[int] | None = None, *, seed: Seed | None = None, key: int | str | None = None) -> None:
-        """Begins a new episode.
+        """Starts a new episode.
 
         Args:
-            world_ids: which worlds; all if not given.
-            seed: random numbers start again from this seed, in all worlds.
-            key: keyframe (name or index) to start from, the model's own pose if not given. ``"init_state"`` joins the entities'
-                first keyframes; those of a scene's base have their own names and numbers.
+            world_ids: Worlds to reset; by default all.
+            seed: If given, the random numbers of all worlds restart from this seed.
+            key: Keyframe (name or index) to start from; by default the model's own pose. ``"init_state"`` combines the first
+                keyframes of the entities; keyframes of a scene's base keep their own names and indices.
         """
         if isinstance(key, str):
             found = mujoco.mj_name2id(self.model, mujoco.mjtObj.mjOBJ_KEY, key)
@@ -178,14 +178,14 @@ class Simulation(KnownAttributes):
         self._core.reset(_ids(world_ids), -1 if key is None else key, seed)
 
     def forward(self, world_ids: Sequence[int] | None = None) -> None:
-        """Makes derived quantities and sensors current after state was written."""
+        """Updates derived quantities and sensors after the state was written."""
         self._core.forward(_ids(world_ids))
 
     def set_state(self, world_ids: Sequence[int] | None = None, *, forward: bool = True, **components: Any) -> None:
-        """Writes parts of the state, ``set_state(qpos=..., qvel=...)``, then calls forward().
+        """Writes components of the state, ``set_state(qpos=..., qvel=...)``, then calls forward().
 
-        The parts are qpos, qvel, act, ctrl ...: the arrays of the same name. Values are ``[n]`` (the same for every world) or
-        ``[worlds, n]``; with ``forward=False`` nothing is computed until it is read.
+        The components are those of the attributes qpos, qvel, act, ctrl ... Values have the shape ``[n]`` (the same for every
+        world) or ``[worlds, n]``. With ``forward=False``, derived quantities are computed when they are read.
         """
         rows = self._rows(world_ids)
         checked = []
@@ -205,7 +205,8 @@ class Simulation(KnownAttributes):
 
     @property
     def state(self) -> NDArray[np.float64]:
-        """The whole integration state, one row a world (mjSTATE_INTEGRATION). Live, float64; copy it to keep it."""
+        """The complete integration state (mjSTATE_INTEGRATION), float64 ``[B, nstate]``. The array is live; copy it to keep it.
+        """
         if "state" not in self._views or self._core.closed:
             self._views["state"] = self._core.state()
         return self._views["state"]
@@ -223,50 +224,54 @@ class Simulation(KnownAttributes):
 
     @property
     def env(self) -> PeerEnv:
-        """The worlds as sensors written for MolmoSpaces see them: what ``get_observation(env, task, batch_index)`` is given."""
+        """The worlds in the interface of sensors written for MolmoSpaces: the first argument of ``get_observation(env, task,
+        batch_index)``."""
         if self._env is None:
             self._env = PeerEnv(self, self._view)
         return self._env
 
     @property
     def data(self) -> DerivedFields:
-        """Fields of mjData as they are now, ``[B, ...]``: ``sim.data.xpos``."""
+        """Fields of mjData at the current state, ``[B, ...]``: ``sim.data.xpos``."""
         return DerivedFields(self)
 
     @property
     def time(self) -> NDArray[np.float64]:
-        """Simulation time of each world since its reset, s ``[B]``; counted in whole substeps."""
+        """Simulation time of each world since its reset, s, ``[B]``; an exact multiple of the substep."""
         return np.array(self._core.times())
 
     @property
     def failures(self) -> list[tuple[int, str]]:
-        """Worlds that failed in the last call, with MuJoCo's words; each was reset alone. After :meth:`step_raw` only those in which MuJoCo
-        gave up: what diverges there MuJoCo resets by itself, without a word."""
+        """``(world, reason)`` of the worlds that failed in the last call, with MuJoCo's message. Only these worlds were reset.
+        After :meth:`step_raw`, only worlds in which MuJoCo raised an error: worlds that diverge there are reset by MuJoCo
+        without a report."""
         return self._core.failures()
 
     @property
     def warning_counts(self) -> dict[str, np.ndarray]:
-        """How often MuJoCo has warned since the simulation was made, int ``[B]`` by the warning's name, ``"mjWARN_CONTACTFULL"``.
+        """Number of warnings that MuJoCo has raised since construction, int ``[B]`` by the warning's name,
+        ``"mjWARN_CONTACTFULL"``.
 
-        Warnings that were never raised are absent. The first of each name is also printed by MuJoCo, with its world.
+        Warnings that were never raised are absent. MuJoCo also prints the first warning of each name, with its world.
         """
         counts = {mujoco.mjtWarning(i).name: np.array(row) for i, row in enumerate(self._core.warning_counts())}
         return {name: row for name, row in counts.items() if row.any()}
 
     @property
     def model(self) -> mujoco.MjModel:
-        """A copy of the model that is simulated, for looking things up. It has none of the values that differ between worlds:
-        :meth:`model_of` has."""
+        """A copy of the simulated model for look-ups. It does not contain values that differ between worlds; see
+        :meth:`model_of`."""
         if self._model is None:
             self._model = mujoco.MjModel._from_model_ptr(self._core.copy_model())
         return self._model
 
     def model_of(self, world: int) -> mujoco.MjModel:
-        """A copy of the model with the values of one world: those that :meth:`randomize` gave it, and the sizes, furniture, lights
-        and colours of its episode.
+        """A copy of the model with the values of one world: those set by :meth:`randomize`, and the sizes, furniture, lights and
+        colours of its episode.
 
-        A world has one copy, made when it is first asked for, with all memory of a model. It follows :meth:`randomize`; what a new
-        episode or a write to :meth:`model_field` has changed is copied by the next call. Changing it changes no simulation.
+        Each world has one copy, created at its first use, with the full memory of a model. It follows :meth:`randomize`; changes
+        by a new episode or by writing to :meth:`model_field` are copied by the next call. Changing the copy does not affect the
+        simulation.
         """
         (world,) = self._rows([world]).tolist()
         if world not in self._models:
@@ -275,7 +280,7 @@ class Simulation(KnownAttributes):
         return self._models[world]
 
     def _follow_models(self) -> None:
-        """Brings the copies that model_of() has made up to date."""
+        """Updates the copies that model_of() has created."""
         version = self._core.model_version()
         if version != self._models_version:
             for world in self._models:
@@ -284,20 +289,20 @@ class Simulation(KnownAttributes):
 
     @property
     def threads(self) -> int:
-        """How many threads step the worlds and cast rays."""
+        """Number of threads that step the worlds and trace rays."""
         return self._core.threads
 
     @property
     def seed(self) -> int:
-        """Where random numbers (noise, delays) start; reset(seed=) gives another."""
+        """Seed of the random numbers (noise, delays); set another one with ``reset(seed=...)``."""
         return self._core.seed
 
     def randomize(self, field: str, values: Any, world_ids: Sequence[int] | None = None) -> None:
-        """Gives worlds their own values of a field of the model: ``randomize("geom_friction", values)``.
+        """Sets a field of the model per world: ``randomize("geom_friction", values)``.
 
-        Values are ``[worlds, ...]`` or broadcast to it. Quantities that MuJoCo derives from the field follow, and so do rays and
-        images. Meshes, height fields and the pixels of textures cannot differ between worlds: ValueError, as for values of another
-        shape, and for such as are not finite.
+        Values have the shape ``[worlds, ...]`` or broadcast to it. Quantities that MuJoCo derives from the field, rays and images
+        follow. Raises ValueError for fields that cannot differ between worlds (meshes, height fields, texture pixels), for a
+        wrong shape, and for values that are not finite.
         """
         self._check_randomizable(field)
         target = self.model_field(field)
@@ -333,7 +338,7 @@ class Simulation(KnownAttributes):
         self.forward(world_ids)
 
     def _check_types(self, field: str, values: np.ndarray) -> None:
-        """Geoms may become other primitives; meshes, height fields and signed distances stay what they are."""
+        """Geom types may change to other primitives; meshes, height fields and signed distance fields cannot change."""
         if field == "geom_type":
             kinds = mujoco.mjtGeom
             primitives = [int(k) for k in (kinds.mjGEOM_PLANE, kinds.mjGEOM_SPHERE, kinds.mjGEOM_CAPSULE, kinds.mjGEOM_ELLIPSOID,
@@ -347,13 +352,13 @@ class Simulation(KnownAttributes):
     def _check_randomizable(self, field: str) -> None:
         like = getattr(self.model, field, None)
         if not isinstance(like, np.ndarray):
-            return  # model_field() says what there is
+            return  # model_field() reports the available fields
         real = like.dtype.kind == "f"
         if (real and field in _FIXED) or (not real and field not in _WHOLE):
             raise ValueError(f"{field}: part of the model's structure, which is the same in all worlds")
 
     def model_field(self, name: str) -> np.ndarray:
-        """A field of the model with a value per world, ``[B, ...]``, live: see :meth:`randomize`."""
+        """A field of the model with one value per world, ``[B, ...]``, live; see :meth:`randomize`."""
         key = f"model.{name}"
         if key not in self._views or self._core.closed:
             like = getattr(self.model, name, None)
@@ -366,7 +371,7 @@ class Simulation(KnownAttributes):
         return self._views[key]
 
     def _rows(self, world_ids: Any) -> Any:
-        """Index of these worlds; ValueError for ids out of range."""
+        """Index of these worlds; raises ValueError for ids out of range."""
         ids = _ids(world_ids)
         if ids is None:
             return slice(None)
@@ -384,10 +389,11 @@ class Simulation(KnownAttributes):
     # --------------------------------------------------------------------------------------------------------- sensors
 
     def add(self, sensor: Any) -> Any:
-        """Adds a sensor that is not part of the scene, for suites; returns it.
+        """Adds a sensor that is not part of the scene, for use in suites, and returns it.
 
-        It may be one of your own, one of the core suite (:class:`mjsense.PoseSensor`), or an object of another library with a uuid and
-        ``get_observation(env, task, batch_index)``, for which a sensor that wraps it is returned.
+        The sensor is a user-defined one, one of the core suite (such as :class:`mjsense.PoseSensor`), or an object of another
+        library with a ``uuid`` and ``get_observation(env, task, batch_index)``; the latter is wrapped, and the wrapper is
+        returned.
         """
         sensor = as_sensor(sensor)
         if isinstance(sensor, NativeSensor):
@@ -412,30 +418,30 @@ class Simulation(KnownAttributes):
         sensor._mjs_bind(self, handle)
 
     def refresh(self, sensors: Sequence[Any]) -> None:
-        """Computes several sensors, as ``scene["name"]`` gives them, in one pass over the worlds; reading each ``.data`` then costs
-        nothing."""
+        """Computes several sensors (as returned by ``scene["name"]``) in one pass over the worlds. Reading their ``.data``
+        afterwards is free."""
         for sensor in sensors:
             if not isinstance(sensor, (NativeSensor, Sensor)):
                 raise TypeError(f"not a sensor: {sensor!r}")
         self._core.refresh_all([s._mjs_handle if isinstance(s, Sensor) else s._handle for s in sensors])
 
     def invalidate(self, world_ids: Sequence[int] | None = None) -> None:
-        """Says that state was changed behind the simulation's back: sensors are computed anew at their next read."""
+        """Call after the state was changed outside of this class: sensors are recomputed at their next read."""
         self._core.invalidate(_ids(world_ids))
 
     # --------------------------------------------------------------------------------------------------------- drawing
 
     def draw(self, scene: mujoco.MjvScene, world: int = 0, sensors: Any = None, *, labels: bool = False) -> int:
-        """Adds what sensors measure to a scene of MuJoCo's (``renderer.scene``, ``viewer.user_scn``).
+        """Adds shapes that visualise sensor measurements to a MuJoCo scene (``renderer.scene``, ``viewer.user_scn``).
 
         Args:
-            world: whose measurements.
-            sensors: a sensor, its name, or a sequence of these; None: those whose configuration has ``debug_vis=True`` (and
-                sensors of your own that have a ``debug_vis`` method).
-            labels: also write what each shape is.
+            world: Id of the world to draw.
+            sensors: A sensor, its name, or a sequence of these. None: sensors configured with ``debug_vis=True``, and
+                user-defined sensors with a ``debug_vis`` method.
+            labels: Also label each shape.
 
         Returns:
-            How many shapes found no room in the scene; 0: all are drawn.
+            Number of shapes that did not fit into the scene; 0: all are drawn.
         """
         return self.debug_shapes(world, sensors).draw(scene, labels)
 
@@ -459,7 +465,7 @@ class Simulation(KnownAttributes):
         return shapes
 
     def _sensor(self, sensor: Any) -> Any:
-        """A sensor of this simulation, from itself or its name."""
+        """A sensor of this simulation, given by itself or its name."""
         if isinstance(sensor, (NativeSensor, Sensor)):
             return sensor
         if not isinstance(sensor, str):
@@ -471,29 +477,31 @@ class Simulation(KnownAttributes):
             raise UnknownNameError(f"no sensor named '{sensor}'; {hint}")
         return known[sensor]
 
-    # ------------------------------------------------------------------------------------------- mjlab's order of calls
+    # ------------------------------------------------------------------------------------------------ mjlab's call order
 
     def step_raw(self, substeps: int = 1) -> None:
-        """Plain mj_step: derived quantities stay one substep behind the state, as in MuJoCo and mjlab."""
+        """Steps all worlds with mj_step: derived quantities stay one substep behind the state, as in MuJoCo and mjlab."""
         self._core.step_raw(substeps)
 
     def update_sensors(self, dt: float = 0.0) -> None:
-        """One update of the sensors' per-substep state (air time, history), after step_raw(1). dt 0: the timestep."""
+        """Updates the sensors' per-substep state (air time, history) once, after ``step_raw(1)``. ``dt`` is in s; 0: the
+        timestep."""
         self._core.update_sensors(dt)
 
     def reset_sensors(self, world_ids: Sequence[int] | None = None) -> None:
-        """Sensors forget the episode of these worlds; the physics goes on."""
+        """Resets the sensors' episode state in these worlds without resetting the physics."""
         self._core.reset_sensors(_ids(world_ids))
 
 
 class DerivedFields:
-    """Fields of mjData of every world, as they are now: ``sim.data.xpos`` is float64 ``[B, nbody, 3]``.
+    """Fields of mjData of all worlds at the current state: ``sim.data.xpos`` is float64 ``[B, nbody, 3]``.
 
-    Like a sensor's, the arrays are read-only, overwritten by the next read after a change, and cost a copy only when they are read.
+    Like sensor data, the arrays are read-only and overwritten by the next read after a change. A field is copied only when it is
+    read.
     """
 
     _sim: Simulation
-    # What editors and type checkers know of; all others of MuJoCo's are there, too, and dir() has them.
+    # Declared for editors and type checkers; all other fields of mjData are available too and listed by dir().
     xpos: np.ndarray
     xquat: np.ndarray
     xmat: np.ndarray

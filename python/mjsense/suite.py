@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Suites: what a policy observes and what a recording stores."""
+"""Sensor suites: what a policy observes and what a recording stores."""
 
 from __future__ import annotations
 
@@ -18,8 +18,8 @@ from mjsense.sensor import Sensor, as_sensor
 class SensorSuite(KnownAttributes):
     """An ordered set of sensors with unique names.
 
-    ``suite.get_observations(sim)`` gives the arrays of all worlds ``[B, ...]``, without a copy;
-    ``suite.get_observations(env, task, batch_index)`` one world's, copied, as MolmoSpaces does.
+    ``suite.get_observations(sim)`` returns the arrays of all worlds ``[B, ...]`` without copying; ``suite.get_observations(env,
+    task, batch_index)`` returns copies for one world, as in MolmoSpaces.
     """
 
     def __init__(self, sensors: Iterable[Any] = ()) -> None:
@@ -28,7 +28,8 @@ class SensorSuite(KnownAttributes):
         self.extend(sensors)
 
     def add(self, sensor: Any) -> None:
-        """Adds a sensor of the scene, of the core suite, one of your own, or one written for MolmoSpaces."""
+        """Adds a sensor of the scene, of the core suite, a user-defined one, or one written for MolmoSpaces. Raises ValueError if
+        the name is in use."""
         sensor = as_sensor(sensor)
         uuid = sensor.uuid
         if not uuid:
@@ -38,7 +39,7 @@ class SensorSuite(KnownAttributes):
         self.sensors[uuid] = sensor
 
     def extend(self, sensors: Iterable[Any]) -> None:
-        """Adds them in order; those before a clash stay added."""
+        """Adds several sensors in order. If a name is in use, the sensors before it stay added."""
         for sensor in sensors:
             self.add(sensor)
 
@@ -46,7 +47,7 @@ class SensorSuite(KnownAttributes):
         return printable(f"<suite of {len(self.sensors)} sensors: {', '.join(self.sensors)}>")
 
     def _repr_html_(self) -> str:
-        """For notebooks: each sensor as it shows itself."""
+        """HTML for notebooks: the representation of each sensor."""
         return "".join(sensor._repr_html_() for sensor in self.sensors.values())
 
     def get(self, uuid: str) -> Any:
@@ -81,13 +82,13 @@ class SensorSuite(KnownAttributes):
                 sensor._mjs_reset(list(range(sensor.simulation.num_worlds)) if world_ids is None else list(world_ids))
 
     def get_observations(self, env: Any, task: Any = None, batch_index: int | None = None) -> dict[str, Any]:
-        """A new dict in the suite's order.
+        """Returns a new dict of observations in the suite's order.
 
         Args:
-            env: a Simulation, or anything that has one as ``sim``.
-            task: one of yours, to hand to get_observation() of the sensors that have it. Without one such a sensor's value is that of
-                ``data``: asked for once a state.
-            batch_index: one world; all of them if not given.
+            env: A Simulation, or any object with one as its ``sim``.
+            task: Task object that is passed to get_observation() of sensors that have this method. Without a task their value is
+                that of ``data``, computed once per state.
+            batch_index: Id of one world; by default all worlds.
         """
         sim = getattr(env, "sim", env)
         for sensor in self.sensors.values():

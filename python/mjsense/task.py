@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Tasks written in Python: a scene, how an episode begins, what is good."""
+"""Tasks written in Python: a scene, the start of an episode, and its evaluation."""
 
 from __future__ import annotations
 
@@ -20,10 +20,11 @@ if TYPE_CHECKING:
 
 
 class Task:
-    """Base class of tasks. Write ``scene``, ``evaluate``, and what else your task has; all worlds are judged by one call a step.
+    """Base class of user-defined tasks. Implement ``scene`` and ``evaluate``, and override other methods as needed. One call
+    evaluates all worlds.
 
-    Life: ``scene()`` once, ``initialize(sim)`` once; then for every episode ``sample(rng, world)``, and ``begin(ids)`` once its
-    world shows that state; after that and after every control step ``evaluate(sim)``. Shapes: ``B`` worlds.
+    Life cycle: ``scene()`` once, ``initialize(sim)`` once; for every episode ``sample(rng, world)``, then ``begin(ids)`` when the
+    world shows the sampled state; then, and after every control step, ``evaluate(sim)``. Shapes: ``B`` worlds.
 
     >>> class Reach(mjs.Task): ...
     >>> mjs.record(Reach(), robot="franka", policy=my_policy, out="data")
@@ -31,103 +32,103 @@ class Task:
     """
 
     name: str = ""
-    """What files and messages call it; if not given, the class's name in small letters."""
+    """Name in files and messages; by default the class's name in snake case."""
     task_type: str = ""
-    """``task_type`` of ``obs_scene`` in files; if not given, the name."""
+    """``task_type`` of ``obs_scene`` in files; by default the name."""
     horizon: int = 500
-    """Control steps after which an episode is truncated."""
+    """Number of control steps after which an episode is truncated."""
     policy_dt_ms: int | None = None
-    """One control step, ms; None: the robot's, 66 without one."""
+    """Control period, ms; None: the robot's, or 66 without a robot."""
     ctrl_dt_ms: int | None = None
-    """One step of the robot's controllers, ms; None: the robot's, ``sim_dt_ms`` without one."""
+    """Period of the robot's controllers, ms; None: the robot's, or ``sim_dt_ms`` without a robot."""
     sim_dt_ms: int | None = None
-    """One physics step, ms; None: the robot's, 2 without one."""
+    """Physics timestep, ms; None: the robot's, or 2 without a robot."""
     robot: str | None = None
-    """Robot that the task is played with unless another is asked for; None: the scene has its own."""
+    """Default robot of the task; None: the scene contains the robot."""
     robot_entity: str = "robot"
-    """Where the scene has its own robot: the entity that it is; "" takes whatever has actuators."""
+    """Name of the robot's entity if the scene contains the robot; "": all actuators of the scene belong to it."""
     move_groups: Mapping[str, str | Sequence[str]] = {}
-    """For such a robot: names (regular expressions) of actuators by move group; none: one group, ``joints``, of all. An action is
-    their controls."""
+    """Move groups of such a robot: group name -> names (regular expressions) of its actuators. Empty: one group, ``joints``, with
+    all actuators. An action consists of their controls."""
     cameras: Mapping[str, str] = {}
-    """Cameras of the scene that episodes show, besides the robot's: name -> the model's camera."""
+    """Cameras of the scene that are observed in addition to the robot's: name -> the model's camera."""
     objects: Mapping[str, str] | Callable[[int], Mapping[str, str]] = {}
-    """What plays a role: role -> body, the main one first. A method ``objects(world)`` says it for each episode; the roles must
-    always be the same."""
+    """Objects with a role in the task: role -> body, the main object first. A method ``objects(world)`` may return them per
+    episode; the roles must always be the same."""
     graspable: Sequence[str] = ()
-    """Bodies that the planner may see and grasp; the first of ``objects`` is its target."""
+    """Bodies that the planner may perceive and grasp; its target is the first of ``objects``."""
     table_height: float = 0.0
-    """On which they stand, m."""
+    """Height of the surface that they stand on, m."""
 
     # Set before initialize().
     sim: Simulation
-    """The worlds."""
+    """The simulation."""
     num_worlds: int
-    """B."""
+    """Number of worlds, ``B``."""
     action_groups: dict[str, slice]
     """Columns of an action by move group."""
 
     _mjs_own: Sequence[Any] = ()
     _mjs_found: tuple[Any, ...] | None = None
 
-    # ------------------------------------------------------------------------------------------------- yours to write
+    # -------------------------------------------------------------------------------------------- to be implemented or overridden
 
     def scene(self) -> SceneCfg:
-        """Everything but the robot that the task is played with, which joins it as the entity ``robot_0``."""
+        """Returns the scene without the robot that the task is played with, which is added as the entity ``robot_0``."""
         raise NotImplementedError(f"{type(self).__name__}: write scene()")
 
     def initialize(self, sim: Simulation) -> None:
-        """The model is compiled: resolve names, allocate."""
+        """Called once after compilation: resolve names and allocate memory here."""
 
     def sample(self, rng: np.random.Generator, world: WorldState) -> Any:
-        """Writes the start of an episode into ``world``, whose state is the scene's ``init_state``.
+        """Writes the initial state of an episode into ``world``, whose state is the scene's ``init_state``.
 
-        Random numbers come from ``rng``, which depends on the seed and the episode's number alone.
+        Draw random numbers from ``rng``, which depends only on the seed and the episode's number.
 
         Returns:
-            Where the robot's base stands in the world, position (m) and quaternion (wxyz) ``[7]``; None leaves it where it is.
+            Pose of the robot's base in the world frame, position (m) and quaternion (wxyz) ``[7]``; None: it is not moved.
         """
 
     def begin(self, ids: np.ndarray) -> None:
-        """New episodes of these worlds begin from what ``self.sim`` shows."""
+        """Called when new episodes start in these worlds and ``self.sim`` shows their initial states."""
 
     def evaluate(self, sim: Simulation) -> Any:
-        """Judges what all worlds show.
+        """Evaluates the current state of all worlds.
 
-        Worlds that play nothing may hold anything; what is said of them does not count. A method ``evaluate(sim, ids)`` is also
-        told which worlds are judged: each once an observation.
+        Inactive worlds may be in any state, and the results for them are ignored. A method with the signature ``evaluate(sim,
+        ids)`` also receives the worlds that are evaluated, each once per observation.
 
         Returns:
-            ``(reward, success)``, both ``[B]``, or a dict with ``reward`` and ``success``, and if you like ``terminated`` ``[B]``
-            (the episode is over) and ``info``: name -> ``[B]`` or ``[B, k]`` of numbers, which files hold as ``task_info``.
+            ``(reward, success)``, both ``[B]``, or a dict with ``reward``, ``success`` and optionally ``terminated`` ``[B]`` (the
+            episode is over) and ``info``: name -> numbers ``[B]`` or ``[B, k]``, which are stored as ``task_info``.
         """
         raise NotImplementedError(f"{type(self).__name__}: write evaluate(sim)")
 
     def description(self, world: int) -> str:
-        """What is to be done, in words; if not written, the first line of the class's documentation."""
+        """Instruction in natural language; by default the first line of the class's docstring."""
         own = type(self).__doc__
         return own.strip().split("\n")[0] if own else self._mjs_name()
 
     def referrals(self, world: int) -> Mapping[str, Sequence[tuple[str, float]]]:
-        """How people call the objects: role -> (text, probability) each."""
+        """Referring expressions for the objects: role -> (text, probability) each."""
         return {role: [(body.split("/")[-1], 1.0)] for role, body in self._mjs_roles(world).items()}
 
     def scene_info(self, world: int) -> Mapping[str, str]:
-        """Further texts for ``obs_scene``."""
+        """Additional texts for ``obs_scene``."""
         return {}
 
     def sensors(self) -> Iterable[Any]:
-        """Sensors of yours that observations and recordings of this task have."""
+        """Additional sensors for observations and recordings of this task."""
         return ()
 
     def suite(self, names: list[str]) -> Sequence[str] | None:
-        """Which of the suite's sensors to keep, in which order; None keeps them all."""
+        """Names of the suite's sensors to keep, in order; None: all of them."""
         return None
 
     # --------------------------------------------------------------------------------------------------------- reading
 
     def get_info(self) -> list[dict[str, Any]]:
-        """``task_info`` of every world at the present observation, without ``episode_step``."""
+        """``task_info`` of every world at the current observation, without ``episode_step``."""
         if self._mjs_found is None:
             raise RuntimeError(f"task '{self._mjs_name()}': nothing was evaluated yet")
         _, success, _, info = self._mjs_found
@@ -252,18 +253,19 @@ class Task:
 
 @checked
 class WorldState:
-    """The state of one world at the start of an episode, to be written. Names are those of the model: ``"mug/mug"``."""
+    """The state of one world at the start of an episode, to be written by the task. Names are those of the model: ``"mug/mug"``.
+    """
 
     def __init__(self, sim: Simulation, world: int, episode: int) -> None:
         self._sim = sim
         self.id = world
-        """Row of the world. What an episode is must not depend on it."""
+        """Id of the world. The episode must not depend on it."""
         self.episode = episode
         """Number of the episode."""
 
     @property
     def model(self) -> mujoco.MjModel:
-        """A copy of the model, for looking things up."""
+        """A copy of the model for look-ups."""
         return self._sim.model
 
     @property
@@ -292,13 +294,13 @@ class WorldState:
         return self._sim.mocap_quat[self.id]
 
     def place(self, body: str, pos: Sequence[float], quat: Sequence[float] = (1, 0, 0, 0), velocity: Sequence[float] | None = None) -> None:
-        """Puts a free or mocap body somewhere.
+        """Sets the pose of a free or mocap body.
 
         Args:
-            body: its name.
-            pos: of its frame in the world, m ``[3]``.
-            quat: wxyz ``[4]``.
-            velocity: of a free body, m/s in world axes and rad/s in its own ``[6]``; at rest if not given.
+            body: Name of the body.
+            pos: Position of its frame in the world, m ``[3]``.
+            quat: Orientation, wxyz ``[4]``.
+            velocity: Velocity of a free body ``[6]``: linear in world axes, m/s, then angular in body axes, rad/s; by default 0.
         """
         model = self.model
         index = self._id(mujoco.mjtObj.mjOBJ_BODY, "body", body)
@@ -315,7 +317,7 @@ class WorldState:
         self.qvel[dof : dof + 6] = 0 if velocity is None else velocity
 
     def set_joint(self, joint: str, value: float | Sequence[float], velocity: float | Sequence[float] = 0.0) -> None:
-        """Writes a joint's position (rad, m; 7 values of a free one) and velocity."""
+        """Sets a joint's position (rad or m; 7 values for a free joint) and velocity."""
         model = self.model
         index = self._id(mujoco.mjtObj.mjOBJ_JOINT, "joint", joint)
         kind = model.jnt_type[index]
@@ -343,7 +345,7 @@ def snake_case(name: str) -> str:
 
 
 def takes_ids(function: Callable[..., Any]) -> bool:
-    """Whether evaluate() or reset() asks for the worlds it is for, besides its first argument."""
+    """Whether evaluate() or reset() takes the world ids as a second argument."""
     import inspect
 
     return len(inspect.signature(function).parameters) > 1
@@ -359,7 +361,7 @@ def group_slices(layout: list[tuple[str, list[float], list[float]]]) -> dict[str
 
 
 def episode_rng(seed: int, episode: int, stream: str) -> np.random.Generator:
-    """Random numbers of an episode: a function of these alone."""
+    """Random number generator of an episode; a function of the arguments only."""
     return np.random.default_rng([seed, episode, *stream.encode()])
 
 
@@ -367,11 +369,11 @@ _TASKS: dict[str, Callable[[], Task]] = {}
 
 
 def register_task(name: str, make: Callable[[], Task]) -> None:
-    """Lets ``mjs.record(name)`` and ``mjs.make_vec(name)`` find a task of yours.
+    """Registers a user-defined task, so that ``mjs.record(name)`` and ``mjs.make_vec(name)`` find it.
 
     Args:
-        name: not taken yet.
-        make: the class, or a function that makes one.
+        name: A name that is not in use.
+        make: The task class, or a function that returns a task.
     """
     if name in task_names():
         raise ValueError(f"there is a task called '{name}' already")
@@ -382,12 +384,12 @@ def register_task(name: str, make: Callable[[], Task]) -> None:
 
 
 def task_names() -> list[str]:
-    """Names of the tasks there are, yours last."""
+    """Names of all tasks, registered ones last."""
     return [*_core.task_names(), *_TASKS]
 
 
 def task_of(task: Any) -> tuple[str, Task | None]:
-    """(name for messages and files, the object if it is written in Python)."""
+    """Returns (name for messages and files, the object if the task is written in Python)."""
     if isinstance(task, str):
         if task not in _TASKS:
             return task, None

@@ -23,26 +23,27 @@ from mjsense.simulation import Simulation
 from mjsense.task import group_slices
 
 _VIEW = "default_view"
-"""Sensor of the scene that is there where a render_mode is."""
+"""Camera sensor that is added to the scene if there is a render_mode."""
 
 
 @checked
 class TaskVectorEnv(VectorEnv):
-    """``num_envs`` worlds that play episodes of a task; made by :func:`make_vec`.
+    """Plays episodes of a task in ``num_envs`` worlds; created by :func:`make_vec`.
 
-    An observation is a dict by sensor; a sensor with several streams is a dict of them in turn, nested by their path:
-    ``observation["qpos"]["arm"]``, ``observation["env_states"]["actors"]["mug"]``. Observations are copies (gymnasium's rule);
-    ``env.rows`` are the sensors' own arrays by stream, ``env.rows["qpos/arm"]``.
+    An observation is a dict by sensor. A sensor with several streams is a dict of them, nested by their paths:
+    ``observation["qpos"]["arm"]``, ``observation["env_states"]["actors"]["mug"]``. Observations are copies, as gymnasium
+    requires; ``env.rows`` contains the sensors' own arrays by stream, ``env.rows["qpos/arm"]``.
 
-    ``terminated``: the task says that the episode is over, the policy said ``done``, or success with ``terminate_upon_success``.
-    ``truncated``: the horizon, or physics that diverged. When an episode has ended, by ``autoreset_mode``:
+    ``terminated`` is true if the task ended the episode, the policy set ``done``, or at a success with
+    ``terminate_upon_success``. ``truncated`` is true at the horizon or if the physics diverged. The end of an episode is handled
+    according to ``autoreset_mode``:
 
-    - ``next_step``: the world begins the next one in the next step, whose action it ignores;
-    - ``same_step``: it has begun the next one already when ``step`` returns; ``infos["final_obs"]`` and ``infos["final_info"]``
-      are of the last moment of the old one;
-    - ``disabled``: it stands still until ``reset(options={"reset_mask": mask})``.
+    - ``next_step``: the next step starts a new episode and ignores its action;
+    - ``same_step``: the new episode has started when ``step`` returns; ``infos["final_obs"]`` and ``infos["final_info"]`` are
+      those of the end of the old episode;
+    - ``disabled``: the world stops until ``reset(options={"reset_mask": mask})``.
 
-    ``infos["success"]`` is bool ``[num_envs]``; ``infos["_success"]`` says for which worlds, as gymnasium's masks do.
+    ``infos["success"]`` is bool ``[num_envs]``; ``infos["_success"]`` is the mask of the worlds it applies to, as in gymnasium.
     """
 
     metadata = {"render_modes": ["rgb_array"], "render_fps": 15.15, "autoreset_mode": AutoresetMode.NEXT_STEP}
@@ -70,34 +71,35 @@ class TaskVectorEnv(VectorEnv):
         streams = {spec.name: (sensor, spec, array) for sensor, spec, array in self._rollout.streams()}
         names = choose_streams(observations, streams, [sensor.uuid for sensor in objects[2]])
         self.rows: dict[str, np.ndarray] = {name: streams[name][2] for name in names}
-        """The streams' own arrays [B, ...], as they are now."""
+        """The sensors' own arrays by stream, ``[B, ...]``, at the current state."""
         self.specs: dict[str, _core.SensorSpec] = {name: streams[name][1] for name in names}
         """Unit, frame and shape of each stream."""
         self._paths = {name: stream_path(streams[name][0], name) for name in names}
         self.sim: Simulation = self._rollout.simulation()
-        """The worlds. Read them as you like; the task writes them."""
+        """The worlds, for reading only; the task writes their state."""
         if render_mode is not None and self.sim.model.cam_bodyid[self.sim.model.camera(_VIEW).id] == 0:
             self._place_view()
         self.horizon: int = self._rollout.horizon
-        """Control steps after which an episode is truncated."""
+        """Number of control steps after which an episode is truncated."""
         self._next_episode = 0
         self._ended = np.zeros(self.num_envs, bool)
         self._started = False
         layout = self._rollout.action_layout()
         self.action_groups: dict[str, slice] = group_slices(layout)
-        """Columns of the action by move group."""
+        """Columns of an action by move group."""
         low, high = (np.concatenate([[], *(row[k] for row in layout)]).astype(np.float32) for k in (1, 2))
-        low[low <= -mujoco.mjMAXVAL], high[high >= mujoco.mjMAXVAL] = -np.inf, np.inf  # nothing limits them
+        low[low <= -mujoco.mjMAXVAL], high[high >= mujoco.mjMAXVAL] = -np.inf, np.inf  # no limit
         self.single_action_space = gymnasium.spaces.Box(low, high, dtype=np.float32)
         self.action_space = batch_space(self.single_action_space, self.num_envs)
         boxes = {name: box_of(spec) for name, spec in self.specs.items()}
         self.single_observation_space = _space(nest(self._paths, boxes))
         self.observation_space = batch_space(self.single_observation_space, self.num_envs)
         self.expert_done = np.zeros(self.num_envs, bool)
-        """Which worlds the policy said to be done in, with the last :meth:`expert_action`."""
+        """bool ``[num_envs]``: worlds for which the policy reported ``done`` in the last :meth:`expert_action`."""
 
     def reset(self, *, seed: Any = None, options: dict[str, Any] | None = None) -> tuple[dict[str, Any], dict]:
-        """Begins a new episode in every world, or in those of ``options["reset_mask"]``; with a seed, the first ones of that seed."""
+        """Starts a new episode in all worlds or in those of ``options["reset_mask"]``; with a seed, the first episodes of that
+        seed."""
         self._check_open()
         mask = np.ones(self.num_envs, bool)
         if options and "reset_mask" in options:
@@ -115,7 +117,8 @@ class TaskVectorEnv(VectorEnv):
         return self._observe(), {}
 
     def _one_seed(self, seed: Any) -> int:
-        """Episodes are numbered from one seed; gymnasium's list of seeds, s, s + 1, ..., stands for its first."""
+        """Returns the seed from which episodes are numbered; gymnasium's list of seeds, s, s + 1, ..., is reduced to its first
+        element."""
         if np.ndim(seed) == 1 and len(seed) == self.num_envs:
             if list(seed) != [seed[0] + i for i in range(self.num_envs)]:
                 raise ValueError("seed: a list must be s, s + 1, ...: the worlds' episodes are numbered from one seed")
@@ -133,11 +136,11 @@ class TaskVectorEnv(VectorEnv):
         self._started = True
 
     def step(self, actions: Any, done: Any = None) -> tuple[dict[str, Any], np.ndarray, np.ndarray, np.ndarray, dict[str, Any]]:
-        """One control step.
+        """Performs one control step.
 
         Args:
-            actions: ``[num_envs, n]``: actuator commands of the move groups, see ``action_groups``.
-            done: bool ``[num_envs]``, if you like: the policy has finished, the episode ends after this step.
+            actions: ``[num_envs, n]``: actuator commands of the move groups; see ``action_groups``.
+            done: Optional, bool ``[num_envs]``: the policy has finished and the episode ends after this step.
         """
         values = self._checked(actions, (self.num_envs, *(self.single_action_space.shape or ())))
         flags = None if done is None else np.ascontiguousarray(done, dtype=bool)
@@ -151,12 +154,12 @@ class TaskVectorEnv(VectorEnv):
     def step_chunk(
         self, actions: Any, stop_on_success: bool = False
     ) -> tuple[dict[str, Any], np.ndarray, np.ndarray, np.ndarray, dict[str, Any]]:
-        """Several control steps with one observation, after the last.
+        """Performs several control steps with one observation after the last of them.
 
-        A world stops early where its episode ends, with ``stop_on_success`` also at its first success. Rewards are summed.
+        A world stops early at the end of its episode or, with ``stop_on_success``, at its first success. Rewards are summed.
 
         Args:
-            actions: ``[num_envs, steps, n]``.
+            actions: ``[num_envs, steps, n]``: actuator commands.
         """
         shape = np.shape(actions)
         steps = shape[1] if len(shape) == 3 and shape[1] > 0 else "steps"
@@ -209,7 +212,8 @@ class TaskVectorEnv(VectorEnv):
         return self._observe(), reward, terminated, truncated, infos
 
     def expert_action(self) -> np.ndarray:
-        """What the policy of ``make_vec(..., policy="planner")`` would do now, ``[num_envs, n]``; ``expert_done`` is its word."""
+        """Actions of the policy given to ``make_vec(..., policy="planner")`` for the current state, ``[num_envs, n]``; sets
+        ``expert_done``."""
         self._check_open()
         self._rollout.act()
         actions, done = self._rollout.actions()
@@ -220,7 +224,7 @@ class TaskVectorEnv(VectorEnv):
         return nest(self._paths, {name: rows.copy() for name, rows in self.rows.items()})
 
     def render(self) -> tuple[np.ndarray, ...] | None:
-        """The picture of the first camera in the observation, of every world; without one that of a default view."""
+        """Images of all worlds: of the first camera of the observation or, without one, of a default view."""
         if self.render_mode is None:
             return None
         self._check_open()
@@ -228,7 +232,7 @@ class TaskVectorEnv(VectorEnv):
         return tuple((pictures[0] if pictures else self.sim.scene[_VIEW].data.rgb).copy())
 
     def _place_view(self) -> None:
-        """In a scene with its own robot the default view is that of MuJoCo's free camera."""
+        """In a scene with its own robot, the default view is that of MuJoCo's free camera."""
         model = self.sim.model
         azimuth, elevation = np.radians([model.vis.global_.azimuth, model.vis.global_.elevation])
         forward = np.array([np.cos(elevation) * np.cos(azimuth), np.cos(elevation) * np.sin(azimuth), np.sin(elevation)])
@@ -243,7 +247,7 @@ class TaskVectorEnv(VectorEnv):
 
     @property
     def scene(self) -> Scene:
-        """``env.scene["name"]``: sensors and entities of the worlds."""
+        """The scene: ``env.scene["name"]`` is a sensor or an entity."""
         return self.sim.scene
 
     def _check_open(self) -> None:
@@ -267,7 +271,7 @@ def _autoreset_mode(mode: str | AutoresetMode) -> AutoresetMode:
 
 
 def _row(observation: dict[str, Any], world: int) -> dict[str, Any]:
-    """One world's observation."""
+    """Observation of one world."""
     return {key: _row(value, world) if isinstance(value, dict) else value[world, ...] for key, value in observation.items()}
 
 
@@ -306,16 +310,17 @@ def make_vec(
     autoreset_mode: str | AutoresetMode = "next_step",
     render_mode: str | None = None,
 ) -> TaskVectorEnv:
-    """A task as a gymnasium vector environment.
+    """Creates a gymnasium vector environment of a task.
 
     Args:
-        task: a :class:`Task`, its class, or a registered name (:func:`task_names`).
-        robot: a registered name (:func:`robot_names`), the path of a ``.toml``, or a :class:`Robot`; None is the task's own.
-        scene: a name, a file, a :class:`SceneFileCfg`, or a function that makes a :class:`SceneCfg`; by default the task's own.
-        policy: what :meth:`TaskVectorEnv.expert_action` asks: a :class:`Policy`, a function or a registered name.
-        observations: names of sensors ("qpos") or of single streams ("qpos/arm") to observe; if not given, all that are numbers.
-        sensors: of your own, as in :func:`record`: observed with the suite, dict sensors as JSON text (uint8). An error of one in a world ends that world's episode:
-            ``truncated``, and ``info["fault"]`` says why.
+        task: A :class:`Task`, its class, or a registered name (:func:`task_names`).
+        robot: A registered name (:func:`robot_names`), the path of a ``.toml``, or a :class:`Robot`; by default the task's robot.
+        scene: A name, a file, a :class:`SceneFileCfg`, or a function that returns a :class:`SceneCfg`; by default the task's
+            scene.
+        policy: Policy of :meth:`TaskVectorEnv.expert_action`: a :class:`Policy`, a function or a registered name.
+        observations: Names of the sensors ("qpos") or streams ("qpos/arm") to observe; by default all numeric ones.
+        sensors: Additional sensors, as in :func:`record`. They are observed with the suite; dict sensors as JSON text (uint8). If
+            a sensor fails in a world, that world's episode is ``truncated`` and ``info["fault"]`` contains the reason.
 
         Options:
         num_envs: Number of worlds that run in parallel.
@@ -336,7 +341,7 @@ def make_vec(
         perturb: Fraction of episodes that are disturbed on purpose: the object is pushed, or slips from the gripper.
         terminate_upon_success: End an episode at its first success.
         Others:
-        use_sensors: Task, robot and policy bring their sensors; without them only those that are given.
+        use_sensors: Use the sensors of the task, the robot and the policy. False: only those in ``sensors``.
         autoreset_mode: next_step, same_step or disabled.
         render_mode: None or rgb_array.
     """

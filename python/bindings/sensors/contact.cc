@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// What contact sensors know beyond their rows.
+// Bindings of contact sensors beyond their rows.
 
 #include <nanobind/nanobind.h>
 #include <nanobind/stl/string.h>

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// What ray sensors know beyond their rows.
+// Bindings of ray-casting sensors beyond their rows.
 
 #include <nanobind/nanobind.h>
 #include <nanobind/ndarray.h>

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What trainers share: observations as one row of numbers a world, actions around a middle."""
+"""Shared by the adapters: observations as one row of numbers per world, and normalised actions."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from mjsense.vector import TaskVectorEnv
 
 
 def checked_env(env: Any, who: str) -> TaskVectorEnv:
-    """TypeError or ValueError unless it is an environment that begins the next episode in the step that ends one."""
+    """Raises TypeError or ValueError unless `env` is a vector environment with autoreset_mode "same_step"."""
     if not isinstance(env, TaskVectorEnv):
         raise TypeError(f"{who}: env must be what mjsense.make_vec() returns, not {env!r}")
     if env.autoreset_mode != AutoresetMode.SAME_STEP:
@@ -24,32 +24,32 @@ def checked_env(env: Any, who: str) -> TaskVectorEnv:
 
 
 class Numbers:
-    """Streams of numbers, each world's joined to one row: float32 ``[B, n]``."""
+    """Concatenates numeric streams to one row per world: float32 ``[B, n]``."""
 
     def __init__(self, env: TaskVectorEnv, observations: Sequence[str] | None = None) -> None:
         self._paths = env._paths
         streams = {name: (env._paths[name][0], env.specs[name], rows) for name, rows in env.rows.items()}
         chosen = list(streams) if observations is None else choose_streams(observations, streams)
         self.names = [name for name in chosen if not is_image(env.rows[name])]
-        """The streams, in the order of the columns."""
+        """Names of the streams, in the order of the columns."""
         self.images = [name for name in chosen if is_image(env.rows[name])]
-        """Streams that are pictures, no numbers."""
+        """Names of the streams that are images."""
         self.columns: dict[str, slice] = {}
-        """Where each stream is."""
+        """Columns of each stream."""
         at = 0
         for name in self.names:
             width = int(np.prod(env.rows[name].shape[1:], dtype=int))
             self.columns[name] = slice(at, at + width)
             at += width
         self.size = at
-        """n."""
+        """Number of columns, ``n``."""
 
     def box(self) -> gymnasium.spaces.Box:
-        """The space of one world's row."""
+        """Space of one world's row."""
         return gymnasium.spaces.Box(-np.inf, np.inf, (self.size,), np.float32)
 
     def of(self, observation: dict[str, Any], worlds: int) -> np.ndarray:
-        """A new row for each world, ``[worlds, n]``."""
+        """A new array with the rows of all worlds, ``[worlds, n]``."""
         out = np.empty((worlds, self.size), np.float32)
         for name, columns in self.columns.items():
             out[:, columns] = stream_of(observation, self._paths[name]).reshape(worlds, -1)
@@ -57,7 +57,7 @@ class Numbers:
 
 
 def is_image(rows: np.ndarray) -> bool:
-    """``[B, H, W, C]`` bytes."""
+    """Whether the rows are uint8 ``[B, H, W, C]``."""
     return rows.ndim == 4 and rows.dtype == np.uint8
 
 
@@ -69,7 +69,7 @@ def stream_of(observation: Any, path: Sequence[str]) -> np.ndarray:
 
 
 class Actions:
-    """Commands = ``mean + scale * action``, within the limits of the actuators, float64 ``[B, n]``."""
+    """Commands ``mean + scale * action``, clipped to the limits of the actuators, float64 ``[B, n]``."""
 
     def __init__(self, space: gymnasium.spaces.Box, mean: Any, scale: Any) -> None:
         self.low, self.high = np.float64(space.low), np.float64(space.high)

@@ -22,12 +22,12 @@ class RslRlVecEnv(VecEnv):
     """A :class:`mjsense.TaskVectorEnv` for the runners of rsl-rl 5.
 
     Args:
-        env: of ``make_vec(..., autoreset_mode="same_step")``.
-        groups: observation groups, each the names of its sensors or streams (None: all): float32 ``[B, n]`` rows of a TensorDict; if not
-            given, one group ``policy`` of everything.
-        action_mean, action_scale: a command is ``action_mean + action_scale * action``, numbers or ``[n]``; if not given, the middle and half
-            the width of the actuators' range. Commands are kept within that range.
-        device: of the trainer; the worlds are on the CPU.
+        env: Result of ``make_vec(..., autoreset_mode="same_step")``.
+        groups: Observation groups, each with the names of its sensors or streams (None: all). Their values are float32 ``[B, n]``
+            rows of a TensorDict. By default one group ``policy`` with all streams.
+        action_mean, action_scale: A command is ``action_mean + action_scale * action``; numbers or ``[n]``. By default the centre
+            and half the width of the actuators' ranges. Commands are clipped to these ranges.
+        device: Device of the trainer; the worlds are on the CPU.
     """
 
     def __init__(
@@ -41,7 +41,7 @@ class RslRlVecEnv(VecEnv):
     ) -> None:
         self.env = checked_env(env, "RslRlVecEnv")
         self.numbers = {name: Numbers(env, chosen) for name, chosen in (groups or {"policy": None}).items()}
-        """By group: where each stream is in the row."""
+        """Columns of each stream, by group."""
         self._commands = Actions(env.single_action_space, action_mean, action_scale)
         self.num_envs: int = env.num_envs
         self.num_actions: int = env.single_action_space.shape[0]
@@ -49,7 +49,8 @@ class RslRlVecEnv(VecEnv):
         self.device = device
         self.cfg: dict[str, Any] = {}
         self.episode_length_buf = torch.zeros(self.num_envs, dtype=torch.long, device=device)
-        """Steps of the present episodes. Writing it changes no episode: the task counts its own."""
+        """Number of steps of the current episodes. Writing it does not affect the episodes, because the task counts them
+        separately."""
         observation, _ = env.reset()
         self._last = self._observation(observation)
 
@@ -58,11 +59,12 @@ class RslRlVecEnv(VecEnv):
         return TensorDict(rows, batch_size=[self.num_envs]).to(self.device)
 
     def get_observations(self) -> Any:
-        """Those of the last step."""
+        """Observations of the last step."""
         return self._last
 
     def step(self, actions: Any) -> tuple[Any, Any, Any, dict[str, Any]]:
-        """One control step; worlds whose episode ended have begun the next. Returns (observations, rewards ``[B]``, dones ``[B]``, extras)."""
+        """Performs one control step; worlds whose episode has ended start the next one. Returns (observations, rewards ``[B]``,
+        dones ``[B]``, extras)."""
         commands = self._commands.commands(actions.detach().cpu().numpy().astype(np.float64))
         observation, reward, terminated, truncated, infos = self.env.step(commands)
         done = terminated | truncated

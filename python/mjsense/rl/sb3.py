@@ -20,20 +20,20 @@ from mjsense.rl._numbers import Actions, Numbers, checked_env, stream_of
 class SB3VecEnv(VecEnv):
     """A :class:`mjsense.TaskVectorEnv` for the algorithms of Stable-Baselines3.
 
-    Observations are one row of float32 ``[n]`` (``MlpPolicy``), with pictures a dict of ``"state"`` and them (``MultiInputPolicy``);
-    actions are in [-1, 1].
+    Observations are one row of float32 ``[n]`` (``MlpPolicy``), or with images a dict of ``"state"`` and the images
+    (``MultiInputPolicy``). Actions are in [-1, 1].
 
     Args:
-        env: of ``make_vec(..., autoreset_mode="same_step")``.
-        observations: names of sensors or streams to observe; if not given, all that ``env`` has.
-        action_mean, action_scale: a command is ``action_mean + action_scale * action``, numbers or ``[n]``; if not given, the middle and half
-            the width of the actuators' range. Commands are kept within that range.
+        env: Result of ``make_vec(..., autoreset_mode="same_step")``.
+        observations: Names of the sensors or streams to observe; by default all of ``env``.
+        action_mean, action_scale: A command is ``action_mean + action_scale * action``; numbers or ``[n]``. By default the centre
+            and half the width of the actuators' ranges. Commands are clipped to these ranges.
     """
 
     def __init__(self, env: Any, observations: Sequence[str] | None = None, *, action_mean: Any = None, action_scale: Any = None) -> None:
         self.env = checked_env(env, "SB3VecEnv")
         self.numbers = Numbers(self.env, observations)
-        """Where each stream is in the row."""
+        """Columns of each stream."""
         self._images = self.numbers.images
         self._commands = Actions(env.single_action_space, action_mean, action_scale)
         self._actions: np.ndarray | None = None
@@ -53,7 +53,7 @@ class SB3VecEnv(VecEnv):
         return {"state": numbers, **{name: stream_of(observation, paths[name]) for name in self._images}}
 
     def reset(self) -> Any:
-        """Begins a new episode in every world; after ``seed(s)`` the first ones of that seed."""
+        """Starts a new episode in every world; after ``seed(s)`` the first episodes of that seed."""
         seed = self._seeds[0]
         observation, _ = self.env.reset(seed=seed)
         self._reset_seeds()
@@ -61,11 +61,12 @@ class SB3VecEnv(VecEnv):
         return self._observation(observation, self.num_envs)
 
     def step_async(self, actions: np.ndarray) -> None:
-        """Remembers the actions ``[B, n]``."""
+        """Stores the actions ``[B, n]`` for :meth:`step_wait`."""
         self._actions = self._commands.commands(np.asarray(actions, np.float64))
 
     def step_wait(self) -> tuple[Any, np.ndarray, np.ndarray, list[dict[str, Any]]]:
-        """Plays them. Infos of worlds whose episode ended have ``terminal_observation``, ``TimeLimit.truncated``, ``episode``, ``is_success``."""
+        """Performs the step. Infos of worlds whose episode ended contain ``terminal_observation``, ``TimeLimit.truncated``,
+        ``episode`` and ``is_success``."""
         observation, reward, terminated, truncated, infos = self.env.step(self._actions)
         done = terminated | truncated
         self._returns += reward
@@ -90,23 +91,23 @@ class SB3VecEnv(VecEnv):
         self.env.close()
 
     def get_images(self) -> Sequence[Any]:
-        """The first camera's picture of every world."""
+        """Images of the first camera in every world."""
         return list(self.env.render() or [None] * self.num_envs)
 
     def get_attr(self, attr_name: str, indices: Any = None) -> list[Any]:
-        """An attribute of the environment, once for each world."""
+        """An attribute of the environment, repeated for each world."""
         return [getattr(self.env, attr_name)] * len(self._get_indices(indices))
 
     def set_attr(self, attr_name: str, value: Any, indices: Any = None) -> None:
-        """Sets an attribute of the environment, which all worlds share; ValueError for some of them."""
+        """Sets an attribute of the environment, which all worlds share; raises ValueError for a subset of the worlds."""
         if len(self._get_indices(indices)) != self.num_envs:
             raise ValueError(f"set_attr('{attr_name}'): the worlds are one environment, and have it in common")
         setattr(self.env, attr_name, value)
 
     def env_method(self, method_name: str, *args: Any, indices: Any = None, **kwargs: Any) -> list[Any]:
-        """Calls a method of the environment once; its result for each world."""
+        """Calls a method of the environment once and repeats its result for each world."""
         return [getattr(self.env, method_name)(*args, **kwargs)] * len(self._get_indices(indices))
 
     def env_is_wrapped(self, wrapper_class: type, indices: Any = None) -> list[bool]:
-        """Episodes are counted here, as ``Monitor`` does."""
+        """True for ``Monitor``, because episodes are counted here in the same manner."""
         return [wrapper_class.__name__ == "Monitor"] * len(self._get_indices(indices))

@@ -69,7 +69,7 @@ struct Recorder::Impl {
   std::vector<std::int64_t> chunk_rows_of;
 
   std::unique_ptr<RecordingFolder>
-      house;  // accessed by the writer thread, or while that thread is idle
+      house;  // modified by the writer thread, or while that thread is idle
   std::unique_ptr<EncoderPool> pool;
 
   mutable std::mutex mutex;
