@@ -3,6 +3,7 @@
 
 import importlib.util
 import os
+import sys
 from pathlib import Path
 
 import pytest
@@ -13,6 +14,7 @@ LEAST = 0.95
 spec = importlib.util.spec_from_file_location("camera_views", Path(__file__).parents[2] / "tools" / "camera_views.py")
 assert spec and spec.loader
 camera_views = importlib.util.module_from_spec(spec)
+sys.modules[spec.name] = camera_views  # dataclasses look their module up
 spec.loader.exec_module(camera_views)
 
 
