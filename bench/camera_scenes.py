@@ -53,8 +53,8 @@ VIEWS = {
     "go1_head": View("Go1's head camera", "go1", "head"),
     "panda_randomised": View("Panda table, camera, lights, materials randomised", "panda", "view", moves=True, randomised=True),
     "kitchen_randomised": View("kitchen, camera, lights, materials randomised", "kitchen", "view", moves=True, randomised=True),
-    "panda_episode": View("Panda table, randomised an episode", "panda", "view", moves=True, randomised=True, episode=True),
-    "kitchen_episode": View("kitchen, randomised an episode", "kitchen", "view", moves=True, randomised=True, episode=True),
+    "panda_episode": View("Panda table, randomised once an episode", "panda", "view", moves=True, randomised=True, episode=True),
+    "kitchen_episode": View("kitchen, randomised once an episode", "kitchen", "view", moves=True, randomised=True, episode=True),
     "panda_fixed": View("Panda table, camera fixed", "panda", "view"),
     "kitchen_fixed": View("kitchen, camera fixed", "kitchen", "view"),
 }

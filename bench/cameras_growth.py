@@ -31,7 +31,7 @@ def main() -> None:
         peer = {k: 1e6 / rate for k, rate in run_peer(None, "classic_cameras", name, *map(str, SIZE)).items()}
 
         def cost(what: str, own: float, other: float, label: str) -> Row:
-            return Row(f"{GROWTH[name].label}, {what}", own, "us an image", other, label, higher_is_better=False)
+            return Row(f"{GROWTH[name].label}, {what}", own, "us per image", other, label, higher_is_better=False)
 
         rows += [cost("rgb with shadows", shadows, peer[k], label) for k, label in MAPS.items()]
         rows.append(cost("rgb without shadows", plain, peer["plain"], "classic without shadows"))

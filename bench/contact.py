@@ -119,12 +119,12 @@ def main() -> None:
     for _ in range(rounds):
         for case in cases.values():
             case.measure(steps)
-    rows.append(Row("64 Go1 on rough terrain: physics", cases["physics"].us_per_world_step(), "us a world-substep"))
+    rows.append(Row("64 Go1 on rough terrain: physics", cases["physics"].us_per_world_step(), "us per world and substep"))
     physics = cases["physics"]
-    rows.append(Row("IMU alone, which wants the constraints solved at the new state", share(cases["imu"], physics), "% of physics",
+    rows.append(Row("IMU alone, needs one constraint solve at the new state", share(cases["imu"], physics), "% of physics",
                     higher_is_better=False))  # fmt: skip
     peer = share(cases["mujoco"], physics)
-    rows.append(Row("IMU and feet, 7 fields, that solve among it", share(cases["fields"], physics), "% of physics", peer, "MuJoCo's sensors",
+    rows.append(Row("IMU and feet, 7 fields, including that solve", share(cases["fields"], physics), "% of physics", peer, "MuJoCo's sensors",
                     higher_is_better=False))
     remembered = Row("the same with air time, events, peak, history", share(cases["memory"], physics), "% of physics",
                      higher_is_better=False)
@@ -135,15 +135,15 @@ def main() -> None:
         remembered.peer, remembered.peer_name = 100 * sensing / other["physics"], f"mjlab on the CPU, of its {other['physics']:.0f} us"
         touching = (cases["memory"].scene["feet"].data.found > 0).mean(), other["feet_in_contact"]
         rows.append(Row("- in time ({:.0%} of the feet touch, {:.0%} of mjlab's)".format(*touching),
-                        added_us(cases["memory"], physics), "us a world-substep", sensing,
+                        added_us(cases["memory"], physics), "us per world and substep", sensing,
                         f"mjlab on the CPU, {other['torch']:.1f} of it in torch", higher_is_better=False))
     for worlds in (16, 256) if quick else (16, 256, 2048):
         case = Case(xml, worlds, (feet(**memory),), ["feet"], rough=False)
         for _ in range(3):
             case.measure(8)
         kilobytes = sum(a.nbytes for a in case.scene["feet"].fields.values()) / worlds / 1024
-        rows.append(Row(f"{worlds} Go1 on a plane: physics and feet", case.us_per_world_step(), "us a world-substep"))
-        rows.append(Row("- rows of the sensor", kilobytes, "KiB a world"))
+        rows.append(Row(f"{worlds} Go1 on a plane: physics and feet", case.us_per_world_step(), "us per world and substep"))
+        rows.append(Row("- rows of the sensor", kilobytes, "KiB per world"))
         del case
     report("Contact sensors", rows)
 

@@ -72,9 +72,9 @@ def main() -> None:
                 continue
             rounds = [[encode(raw, setting, folder / "video.mp4") for setting in (OURS, options)] for _ in range(RUNS)]
             ours, other = ([statistics.median(r[i][k] for r in rounds) for k in range(3)] for i in range(2))
-            rows.append(Row(name, ours[0], "CPU ms a frame", other[0], "it", higher_is_better=False))
-            rows.append(Row(name, ours[1], "bytes a frame", other[1], "it", higher_is_better=False))
-            rows.append(Row(f"- {name}", other[2] - ours[2], "dB more of it"))
+            rows.append(Row(name, ours[0], "CPU ms a frame", other[0], "the named encoder", higher_is_better=False))
+            rows.append(Row(name, ours[1], "bytes a frame", other[1], "the named encoder", higher_is_better=False))
+            rows.append(Row(f"- {name}", other[2] - ours[2], "dB difference"))
             print(rows[-3:], file=sys.stderr)
     report("Encoders beside libx264, veryfast, crf 24", rows)
 

@@ -52,8 +52,8 @@ def main() -> None:
         for room in results[0]["time"]:
             share = median(100 * r["time"][room] / r["seconds"] for r in results)
             rows.append(Row(f"- {room}", share, "% of the time"))
-        rows.append(Row("- beside it: encoders", median(r["encode_cpu_s"] for r in results), "CPU s"))
-        rows.append(Row("- beside it: files", median(r["write_s"] for r in results), "s"))
+        rows.append(Row("- in parallel: encoders", median(r["encode_cpu_s"] for r in results), "CPU s"))
+        rows.append(Row("- in parallel: files", median(r["write_s"] for r in results), "s"))
     report("Main job", rows)
 
 

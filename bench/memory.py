@@ -93,10 +93,10 @@ def main() -> None:
     rows = []
     first, second, model = np.median([measured("geometry", "1000000") for _ in range(3)], axis=0)
     rows.append(Row("1,000,000 triangles, seen and met by rays", first, "MB"))
-    rows.append(Row("- a second simulation of an equal model adds", second, "MB"))
+    rows.append(Row("- added by a second simulation of an equal model", second, "MB"))
     rows.append(Row("- MuJoCo's model of either", model, "MB"))
     for name, label in SCENES.items():
-        rows.append(Row(f"a world more: {label}", a_world("worlds", name), "MB", a_world("mujoco", name), "mjData alone", higher_is_better=False))
+        rows.append(Row(f"one more world: {label}", a_world("worlds", name), "MB", a_world("mujoco", name), "mjData alone", higher_is_better=False))
     report("Memory", rows)
 
 

@@ -155,10 +155,10 @@ def compare(name: str, scene: mjs.SceneCfg, body: str, touching: str, rounds: in
             own = statistics.median(again[case][3:]) if again[case] else 0.0
             for peer in peers:
                 wanted = goal if peer == "mj_batch" else None
-                rows.append(Row(label, statistics.median(spent[case][3:]) - own, "us a world-substep", statistics.median(spent[peer][3:]),
+                rows.append(Row(label, statistics.median(spent[case][3:]) - own, "us per world and substep", statistics.median(spent[peer][3:]),
                                 peer, higher_is_better=False, goal=wanted))  # fmt: skip
             if own:
-                rows.append(Row("- and the sensors themselves", own, "us a world-substep"))
+                rows.append(Row("- the sensors themselves", own, "us per world and substep"))
     return rows
 
 

@@ -66,7 +66,7 @@ def main() -> None:
     rows.append(Row(many, rate(m["lidar_worlds"]), unit, rate(m["lidar_worlds_mj_multiRay"]), "mj_multiRay", goal=5))
     for count in (100, 1000, 10000):
         ours = rate(m[f"among_boxes/{count}"])
-        for name, column in (("mj_multiRay", "mj_multiRay"), ("of_one_mesh", "ours, the boxes one mesh")):
+        for name, column in (("mj_multiRay", "mj_multiRay"), ("of_one_mesh", "ours, the boxes as one mesh")):
             rows.append(Row(f"lidar among {count:,} boxes and one that moves", ours, unit, rate(m[f"among_boxes_{name}/{count}"]), column))
         rows.append(Row(f"- bringing the {count:,} up to date", m[f"among_boxes_update/{count}"]["cpu"] * 1e-3, "us"))
     for pose in ("moving", "still"):

@@ -6,7 +6,7 @@ import subprocess
 import sys
 
 HERE = pathlib.Path(__file__).parent
-SHARED = {"run", "harness", "fetch", "opengl", "images", "camera_scenes", "camera_rate", "pictures", "page"}  # not benchmarks
+SHARED = {"run", "harness", "fetch", "opengl", "images", "camera_scenes", "camera_rate", "pictures", "page", "figures"}  # not benchmarks
 
 ASKED_FOR = {"builds"}  # wants another build
 

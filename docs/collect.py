@@ -1,25 +1,72 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Collects the pages that stand in the rooms (src/mjsense/sensors/*/page.md and so on) and beside robots into the documentation."""
+"""MkDocs hook: adds the pages that live outside docs/ and expands `folder/*` in the navigation.
+
+The page of a sensor, task, policy or robot lies next to its code (src/mjsense/sensors/*/page.md and so on). CHANGELOG.md and
+CONTRIBUTING.md are read from the root of the repository.
+"""
 
 import pathlib
+import re
 
 from mkdocs.structure.files import File
 
 ROOT = pathlib.Path(__file__).parent.parent
 SOURCE = ROOT / "src" / "mjsense"
-ROOMS = {"sensors": SOURCE, "robots": ROOT / "models", "tasks": SOURCE, "policies": SOURCE}
-ALONE = ("effects",)  # rooms with one page
+FOLDERS = {"sensors": SOURCE, "robots": ROOT / "models", "tasks": SOURCE, "policies": SOURCE}
+SINGLE = ("effects",)
+FROM_ROOT = {"CHANGELOG.md": "changelog.md", "CONTRIBUTING.md": "contributing.md"}
+INTRODUCTIONS = {
+    "sensors": "One page for each kind of sensor: what it measures, an example, its fields, its cost and its configuration.",
+    "robots": "Pages of the robots that have one. `mjsense robots` lists all of them.",
+    "tasks": "What each task asks for: start, success, reward and the sensors that it adds. [Tasks and planners](../tasks.md) compares them.",
+    "policies": "Policies that have a page of their own. The general planner is described in [Tasks and planners](../tasks.md).",
+}
+
+
+def title(page):
+    """The first heading."""
+    return re.search(r"^# (.+)$", page.read_text(), re.MULTILINE)[1]
+
+
+def description(page):
+    """The first sentence."""
+    text = re.sub(r"<!--.*?-->|```.*?```", "", page.read_text(), flags=re.DOTALL)
+    paragraph = next(p for p in text.split("\n\n")[1:] if re.match(r"\w", p))
+    return re.split(r"(?<=[.])\s", " ".join(paragraph.split()))[0]
+
+
+def with_site_links(text):
+    """Links of a file in the root: those into docs/ lead to the site's pages, those to other files become plain text."""
+    text = re.sub(r"\]\(docs/", "](", text)
+    return re.sub(r"\[([^\]]+)\]\((?!https?:)([\w./-]+/[\w./-]*|[A-Z]+\.md)\)", r"\1", text)
+
+
+def expanded(nav, folders):
+    """The navigation with `folder/*` replaced by the pages of the folder."""
+    if isinstance(nav, list):
+        return [expanded(entry, folders) for entry in nav]
+    if isinstance(nav, dict):
+        return {key: expanded(value, folders) for key, value in nav.items()}
+    return folders[nav[:-2]] if nav.endswith("/*") else nav
 
 
 def on_files(files, config):
-    for room, root in ROOMS.items():
-        pages = sorted((root / room).glob("*/page.md"))
+    def add(path, content):
+        files.append(File.generated(config, path, content=content))
+
+    folders = {}
+    for folder, root in FOLDERS.items():
+        pages = sorted((root / folder).glob("*/page.md"))
         for page in pages:
-            files.append(File.generated(config, f"{room}/{page.parent.name}.md", content=page.read_text().replace("../../../../docs/", "../")))
-            for picture in sorted(page.parent.glob("*.svg")) + sorted(page.parent.glob("*.png")):
-                files.append(File.generated(config, f"{room}/{picture.name}", content=picture.read_bytes()))
-        index = f"# {room.capitalize()}\n\n" + "".join(f"- [{p.parent.name}]({p.parent.name}.md)\n" for p in pages)
-        files.append(File.generated(config, f"{room}/index.md", content=index))
-    for room in ALONE:
-        files.append(File.generated(config, f"{room}.md", content=(SOURCE / room / "page.md").read_text()))
+            add(f"{folder}/{page.parent.name}.md", page.read_text().replace("../../../../docs/", "../"))
+            for picture in sorted([*page.parent.glob("*.svg"), *page.parent.glob("*.png")]):
+                add(f"{folder}/{picture.name}", picture.read_bytes())
+        rows = "".join(f"| [{title(page).split(':')[0]}]({page.parent.name}.md) | {description(page)} |\n" for page in pages)
+        add(f"{folder}/index.md", f"# {folder.capitalize()}\n\n{INTRODUCTIONS[folder]}\n\n| page | summary |\n| --- | --- |\n{rows}")
+        folders[folder] = [f"{folder}/index.md", *(f"{folder}/{page.parent.name}.md" for page in pages)]
+    for folder in SINGLE:
+        add(f"{folder}.md", (SOURCE / folder / "page.md").read_text())
+    for source, page in FROM_ROOT.items():
+        add(page, with_site_links((ROOT / source).read_text()))
+    config.nav = expanded(config.nav, folders)
     return files

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""A sensor of your own, beside a camera and a lidar-like scan, in one suite."""
+"""A user-defined sensor, a camera and a lidar-like scan in one suite."""
 
 import gymnasium
 import numpy as np

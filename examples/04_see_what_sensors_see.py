@@ -88,7 +88,7 @@ except (ImportError, RuntimeError) as error:
 else:
     renderer.update_scene(data, view)
     left_out = sim.draw(renderer.scene, world)
-    left_out += sim.draw(renderer.scene, world, sensors="dog/gyro")  # what has no debug_vis is drawn by name
+    left_out += sim.draw(renderer.scene, world, sensors="dog/gyro")  # sensors without debug_vis are drawn if they are named
     path = Path(sys.argv[1] if len(sys.argv) > 1 else "sensors.ppm")
     path.write_bytes(b"P6 640 480 255\n" + renderer.render().tobytes())
     print(f"{path}: {left_out} shapes found no room")

@@ -21,6 +21,7 @@ ENVIRONMENTS: dict[str, list[str]] = {
     "mujoco": ["mujoco>=4.0,<4.1"],
     "mujoco-warp": ["mujoco-warp", "mujoco>=4.0,<4.1"],
     "gymnasium-robotics": ["gymnasium-robotics>=1.4", "mujoco>=4.0,<4.1"],
+    "viewers": ["rerun-sdk>=0.22", "viser>=0.2"],
     "trainers": ["rsl-rl-lib", "stable-baselines3"],
 }
 """Name -> what is asked for beside mjsense."""

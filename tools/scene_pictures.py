@@ -73,7 +73,7 @@ def write_jpeg(path: Path, pixels: np.ndarray) -> None:
 
 
 def picture(view: View) -> np.ndarray:
-    """Two episodes beside each other, [H, 2 W, 3]."""
+    """Two episodes next to each other, [H, 2 W, 3]."""
     where = 'mount = "mjcf"\ncamera = "camera_follower"\n'
     if view.pos is not None:
         where = f'mount = "fixed"\npos = {list(view.pos)}\ntarget = {list(view.target)}\nfovy = 62\n'

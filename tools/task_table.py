@@ -123,7 +123,7 @@ def row(r: dict[str, Any]) -> str:
 
 
 def table(results: list[dict[str, Any]]) -> str:
-    head = ["| task | robot | success | steps | retried | slanted | first plan, ms | steps/s | why not |",
+    head = ["| task | robot | success | steps | retried | slanted | first plan, ms | steps/s | failures |",
             "| --- | --- | ---: | ---: | ---: | ---: | ---: | ---: | --- |"]  # fmt: skip
     return "\n".join([*head, *map(row, results)])
 

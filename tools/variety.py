@@ -118,19 +118,19 @@ def measure(task: str, scene: str, robot: str, system: str, policy: str, episode
 
 def table(results: list[dict[str, Any]]) -> str:
     rows = [
-        ("played", lambda r: f"`{r['task']}`, {r['episodes']}"),
-        ("objects, number", lambda r: r["count"]),
-        ("their x, m", lambda r: r["x"]),
-        ("their y, m", lambda r: r["y"]),
-        ("their turn, standard deviation, degrees", lambda r: f"{r['turn']:.0f}"),
-        ("their size, cm", lambda r: r["size"]),
-        ("against that of its model, %", lambda r: r["factor"]),
-        ("furniture that stands elsewhere; standard deviation, cm", lambda r: f"{r['furniture']}; {r['moved']:.1f}"),
+        ("task, episodes", lambda r: f"`{r['task']}`, {r['episodes']}"),
+        ("number of objects", lambda r: r["count"]),
+        ("x of objects, m", lambda r: r["x"]),
+        ("y of objects, m", lambda r: r["y"]),
+        ("rotation of objects, standard deviation, degrees", lambda r: f"{r['turn']:.0f}"),
+        ("size of objects, cm", lambda r: r["size"]),
+        ("size relative to the model, %", lambda r: r["factor"]),
+        ("furniture that moves, count; standard deviation, cm", lambda r: f"{r['furniture']}; {r['moved']:.1f}"),
         ("light, sum of the lamps' colours", lambda r: r["light"]),
         ("materials with other colours", lambda r: f"{r['colours']} of {r['materials']}"),
         ("cameras, standard deviation, cm", lambda r: f"{r['camera']:.0f}"),
         ("approach, degrees from vertical", lambda r: r["tilt"]),
-        ("approach more than 30 degrees", lambda r: "" if r["slanted"] is None else f"{r['slanted']:.0%}"),
+        ("approaches more than 30 degrees from vertical", lambda r: "" if r["slanted"] is None else f"{r['slanted']:.0%}"),
         ("retried, `--perturb 0.5`", lambda r: f"{r['retried']:.0%} of {r['played']}" if r["played"] else ""),
     ]
     head = ["| | " + " | ".join(f"`{r['scene']}`" for r in results) + " |", "| --- |" + " --- |" * len(results)]

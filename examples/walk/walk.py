@@ -103,7 +103,7 @@ class Walk(mjs.Task):
 
 
 class Feeling(mjs.Sensor):
-    """What the policy knows: how it moves, what it is asked for, its joints, which feet stand, and the ground around it."""
+    """Observation of the policy: velocities, commanded velocity, joints, feet in contact, terrain heights around the robot."""
 
     uuid = "feeling"
     observation_space = gymnasium.spaces.Box(-np.inf, np.inf, (3 + 3 + 3 + 3 + 3 * 12 + 4 + 187,), np.float32)

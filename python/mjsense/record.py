@@ -110,35 +110,34 @@ def record(
         scene: a name, a file, a :class:`SceneFileCfg`, or a function that makes a :class:`SceneCfg`; by default the task's own.
 
         Options:
-        worlds: How many run at one time.
-        threads: Of the simulation; 0: every CPU this process may use.
-        seed: Same seed, same episodes.
-        camera_system: Cameras of the robot's, by the system's name or a file; by default those of its model.
-        cameras: Names of the cameras, in this order; by default all, none for an empty list.
-        width: Of pictures; by default the robot's. [pixels]
-        height: Of pictures; by default the robot's. [pixels]
-        depth: Also the depth of every camera, losslessly.
-        segmentation: Also what each pixel of every camera shows, losslessly: (id, mjtObj), of geoms mostly.
-        samples: Rays a pixel of rgb: smooth edges for time.
-        shadows: Pictures have shadows.
-        meshes: What the robot is drawn with: ``shapes`` of ours, its ``real`` meshes, or ``auto``: these where its
-            environment variable (``MJSENSE_FRANKA_MESHES``) names them. It moves the same.
-        horizon: Control steps after which an episode is cut; by default the task's.
-        action_noise: Commands reach the arm with noise.
-        perturb: Share of episodes in which something goes wrong on purpose: the object is shoved, or slips from the
-            hand.
-        terminate_upon_success: An episode ends at its first success.
-        episodes: How many to keep.
-        max_attempts: Episodes to try; 0: six times those to keep.
-        keep_failures: Keep episodes that fail, too.
-        resume: Go on with an interrupted recording; everything that decides the data must be the same.
-        house: Number of the ``house_N`` folder below it.
-        batches: HDF5 files that episodes are spread over; 0: one for every four.
-        gzip: Compression of arrays, 0 to 9.
-        ffmpeg: The program; by default ``$MJSENSE_FFMPEG``, else that of ``PATH``.
-        crf: Quality of videos, 0 lossless to 51.
-        preset: Effort of the video encoder, ultrafast to veryslow; see the file formats.
-        molmospaces_depth: Also depth as MolmoSpaces' loaders read it: a lossy red-green video.
+        worlds: Number of worlds that run in parallel.
+        threads: Number of simulation threads; 0: one per available CPU.
+        seed: Random seed; the same seed gives the same episodes.
+        camera_system: Name or file of the camera system; by default the cameras of the robot's model.
+        cameras: Names of the cameras to render, in this order; by default all, an empty list renders none.
+        width: Width of the images; by default the robot's. [pixels]
+        height: Height of the images; by default the robot's. [pixels]
+        depth: Add a lossless depth image for every camera.
+        segmentation: Add a lossless segmentation image for every camera: (id, mjtObj) of each pixel.
+        samples: Rays per pixel of rgb; more samples give smoother edges and take longer.
+        shadows: Draw shadows.
+        meshes: Geometry used to draw the robot: ``shapes`` (primitives), ``real`` (its meshes), or ``auto``: the meshes
+            if the robot's environment variable (``MJSENSE_FRANKA_MESHES``) names their folder. Physics is not affected.
+        horizon: Maximum number of control steps of an episode; by default the task's.
+        action_noise: Add noise to the commands of the arm.
+        perturb: Fraction of episodes that are disturbed on purpose: the object is pushed, or slips from the gripper.
+        terminate_upon_success: End an episode at its first success.
+        episodes: Number of episodes to keep.
+        max_attempts: Maximum number of episodes to attempt; 0: six times the number to keep.
+        keep_failures: Keep failed episodes too.
+        resume: Continue an interrupted recording; all settings that affect the data must be unchanged.
+        house: Number of the ``house_N`` folder in the output directory.
+        batches: Number of HDF5 files over which the episodes are distributed; 0: one per four episodes.
+        gzip: Compression level of arrays, 0 to 9.
+        ffmpeg: Path of the ffmpeg program; by default ``$MJSENSE_FFMPEG``, else the one in ``PATH``.
+        crf: Quality of the videos, from 0 (lossless) to 51 (worst).
+        preset: Speed preset of the video encoder, from ultrafast to veryslow; see the page on file formats.
+        molmospaces_depth: Add depth in the form that MolmoSpaces' loaders read: a lossy red-green video.
         Others:
         sensors: of your own, with an observation_space or is_dict, of the core suite, or written for MolmoSpaces: recorded with the
             suite. An error of one in a world refuses that world's episode (see ``failures``); one that fails in every world from the

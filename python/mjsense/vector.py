@@ -294,24 +294,23 @@ def make_vec(
             ``truncated``, and ``info["fault"]`` says why.
 
         Options:
-        num_envs: How many run at one time.
-        threads: Of the simulation; 0: every CPU this process may use.
-        seed: Same seed, same episodes.
-        camera_system: Cameras of the robot's, by the system's name or a file; by default those of its model.
-        cameras: Names of the cameras, in this order; by default all, none for an empty list.
-        width: Of pictures; by default the robot's. [pixels]
-        height: Of pictures; by default the robot's. [pixels]
-        depth: Also the depth of every camera, losslessly.
-        segmentation: Also what each pixel of every camera shows, losslessly: (id, mjtObj), of geoms mostly.
-        samples: Rays a pixel of rgb: smooth edges for time.
-        shadows: Pictures have shadows.
-        meshes: What the robot is drawn with: ``shapes`` of ours, its ``real`` meshes, or ``auto``: these where its
-            environment variable (``MJSENSE_FRANKA_MESHES``) names them. It moves the same.
-        horizon: Control steps after which an episode is cut; by default the task's.
-        action_noise: Commands reach the arm with noise.
-        perturb: Share of episodes in which something goes wrong on purpose: the object is shoved, or slips from the
-            hand.
-        terminate_upon_success: An episode ends at its first success.
+        num_envs: Number of worlds that run in parallel.
+        threads: Number of simulation threads; 0: one per available CPU.
+        seed: Random seed; the same seed gives the same episodes.
+        camera_system: Name or file of the camera system; by default the cameras of the robot's model.
+        cameras: Names of the cameras to render, in this order; by default all, an empty list renders none.
+        width: Width of the images; by default the robot's. [pixels]
+        height: Height of the images; by default the robot's. [pixels]
+        depth: Add a lossless depth image for every camera.
+        segmentation: Add a lossless segmentation image for every camera: (id, mjtObj) of each pixel.
+        samples: Rays per pixel of rgb; more samples give smoother edges and take longer.
+        shadows: Draw shadows.
+        meshes: Geometry used to draw the robot: ``shapes`` (primitives), ``real`` (its meshes), or ``auto``: the meshes
+            if the robot's environment variable (``MJSENSE_FRANKA_MESHES``) names their folder. Physics is not affected.
+        horizon: Maximum number of control steps of an episode; by default the task's.
+        action_noise: Add noise to the commands of the arm.
+        perturb: Fraction of episodes that are disturbed on purpose: the object is pushed, or slips from the gripper.
+        terminate_upon_success: End an episode at its first success.
         Others:
         use_sensors: Task, robot and policy bring their sensors; without them only those that are given.
         autoreset_mode: next_step, same_step or disabled.

@@ -17,7 +17,7 @@ SCENE = """<mujoco><worldbody><body name="ball"><freejoint/><geom size=".1"/><si
     ("record pick --out x --robot frnka", "no robot named 'frnka'; did you mean 'franka'?"),
     ("record pick --out x --policy planer", "no policy named 'planer'; did you mean 'planner'?"),
     ("record pick --out x --cameras exo_camera_2", "no camera named 'exo_camera_2'; did you mean 'exo_camera_1'"),
-    ("record pick", "give --out DIR"),
+    ("record pick", "the output directory is missing: pass --out DIR"),
     ("record pick --out x --episodes 0", "episodes is 0: must be at least 1"),
     ("record pick --out x --episodes many", "--episodes"),
     ("record pick --out x --worlds -1", "worlds is -1: must be at least 1"),
@@ -59,8 +59,8 @@ SCENE = """<mujoco><worldbody><body name="ball"><freejoint/><geom size=".1"/><si
     ("repair pipe", "'pipe' is neither a file nor a folder"),
     ("repair broken.xml", "'broken.xml' is no trajectories_batch_*_of_*.h5"),
     ("sensors", "what is required"),
-    ("sensors folder", "folder: is no file: expected an MJCF file or the name of a task"),
-    ("sensors pipe", "pipe: is no file"),
+    ("sensors folder", "folder: is not a file; expected an MJCF file or the name of a task"),
+    ("sensors pipe", "pipe: is not a file"),
     ("sensors scene.xml --robot franka", "--robot is an option of tasks, and scene.xml is a scene"),
     ("sensors scene.xml --steps -1", "--steps"),
     ("sensors pick --scene tabel", "no scene named 'tabel'; did you mean 'table'?"),
@@ -239,14 +239,64 @@ def test_verify_inspect_repair(mjsense):
     assert video.name in done.stdout
 
 
+def unwrapped(text):
+    return " ".join(text.split())
+
+
 def test_help_names_tasks_robots_and_policies(mjsense):
     import mjsense as package
 
-    text = mjsense("record", "--help").stdout
-    for line, names in (("which task: ", package.task_names()), ("has its own: ", package.robot_names()),
-                        ("what drives it: ", package.policy_names())):  # fmt: skip
-        assert line + ", ".join(names) in text
-    assert ", ".join(package.task_names()) in mjsense("sensors", "--help").stdout
+    text = unwrapped(mjsense("record", "--help").stdout)
+    for names in (package.task_names(), package.robot_names(), package.policy_names()):
+        assert f"One of: {', '.join(names)}." in text
+    assert ", ".join(package.task_names()) in unwrapped(mjsense("sensors", "--help").stdout)
+
+
+COMMANDS = ("record", "sensors", "scan", "inspect", "verify", "repair", "tasks", "robots", "scenes", "schema", "completion")
+
+
+@pytest.mark.parametrize("command", COMMANDS)
+@pytest.mark.parametrize("columns", (60, 80, 200))
+def test_help_is_wrapped_and_shows_two_examples(mjsense, command, columns):
+    text = mjsense(command, "--help", env={"COLUMNS": str(columns)}).stdout
+    description, examples = text.split("Examples:\n")
+    assert max(map(len, description.splitlines())) <= max(60, min(columns, 100))
+    assert sum("mjsense " + command in line for line in examples.splitlines()) >= 2
+    assert not any(line.endswith(" ") for line in text.splitlines())
+
+
+def test_flags_say_what_they_do(mjsense):
+    text = unwrapped(mjsense("record", "--help").stdout)
+    assert "--no-shadows Do not draw shadows." in text
+    assert "--meshes auto|shapes|real" in text
+
+
+@pytest.mark.parametrize("words, expected", (
+    (["re"], ["record", "repair"]),
+    (["record", "door"], ["door_opening"]),
+    (["record", "--robot", "fra"], ["franka", "franka_hand"]),
+    (["record", "--meshes", ""], ["auto", "shapes", "real"]),
+    (["record", "pick", "--term"], ["--terminate-upon-success"]),
+    (["record", "--out", ""], []),  # the shell completes file names
+    (["inspect", ""], []),
+    (["nothing", ""], []),
+))  # fmt: skip
+def test_completion(mjsense, words, expected):
+    assert mjsense("complete", "--", *words).stdout.split() == expected
+
+
+def test_completion_in_bash(mjsense):
+    """As bash does it: the script is sourced, the function is called with the words, and leaves what it found in COMPREPLY."""
+    script = '''source <("$1" completion bash); PATH="$2:$PATH"; COMP_WORDS=(mjsense record --policy p); COMP_CWORD=3; _mjsense
+    printf '%s\n' "${COMPREPLY[@]}"'''
+    done = subprocess.run(["bash", "-c", script, "bash", mjsense.program, os.path.dirname(mjsense.program)], capture_output=True, text=True)
+    assert done.stdout.split() == ["planner"], done.stderr
+
+
+def test_completion_of_another_shell_is_an_error(mjsense):
+    assert "did you mean 'fish'?" in mjsense("completion", "fisch", rc=2).stderr
+    for shell in ("bash", "zsh", "fish"):
+        assert "mjsense complete -- " in mjsense("completion", shell).stdout
 
 
 BALL = """<mujoco><option timestep="{timestep}"/><worldbody><geom type="plane" size="1 1 1"/>
@@ -277,4 +327,4 @@ def test_physics_that_fails_prints_no_table(mjsense):
 
 def test_a_recording_says_what_its_sheet_shows(mjsense):
     text = mjsense("record", "pick", "--episodes", 5, "--horizon", 2, "--keep-failures", "--size", "32x24", "-q", "--out", "d").stdout
-    assert "pictures of every camera over time (4 of 5 episodes): d/contact_sheet.png" in text
+    assert "contact sheet, every camera over time (4 of 5 episodes): d/contact_sheet.png" in text

@@ -18,7 +18,7 @@ import mjsense as mjs
 
 ROOT = Path(__file__).parents[2]
 PROGRAM = Path(os.environ.get("MJSENSE_PROGRAM", ROOT / "build/dev/mjsense"))
-PAGES = [ROOT / "README.md", ROOT / "CONTRIBUTING.md", *sorted(ROOT.glob("docs/*.md")), *sorted(ROOT.glob("src/mjsense/**/page.md")),
+PAGES = [ROOT / "README.md", ROOT / "CONTRIBUTING.md", *sorted(ROOT.glob("docs/**/*.md")), *sorted(ROOT.glob("src/mjsense/**/page.md")),
          *sorted(ROOT.glob("models/**/page.md"))]
 FENCE = re.compile(r"^```(\w+)\n(.*?)^```$", re.MULTILINE | re.DOTALL)
 # What pages import of others -> what of it; what is not installed is imitated.
@@ -126,12 +126,15 @@ def test_command_lines(page, tmp_path):
             run(line, tmp_path)
 
 
-@pytest.mark.parametrize("index", ["README.md", "docs/index.md"])
-def test_every_page_is_named_where_readers_begin(index):
-    text = (ROOT / index).read_text()
-    linked = {(ROOT / index).parent / link for link in re.findall(r"\]\(([\w/]+\.md)\)", text)}
-    pages = {page for page in ROOT.glob("docs/*.md") if page.name != "index.md"}
-    assert pages <= linked, sorted(str(page.relative_to(ROOT)) for page in pages - linked)
+def test_figures_are_those_of_the_performance_notes(monkeypatch):
+    monkeypatch.syspath_prepend(ROOT / "bench")
+    import figures
+
+    notes = (ROOT / "docs/performance_notes.md").read_text()
+    for page in (ROOT / "README.md", ROOT / "docs/performance.md"):
+        text = page.read_text()
+        assert "<!-- bench " in text
+        assert text == figures.rewritten(text, lambda name, _: figures.table(name, notes)), "python bench/page.py renews it"
 
 
 def test_models_of_the_pages_are_there():

@@ -44,8 +44,8 @@ def test_registries():
 
 def test_help_shows_every_field():
     text = pydoc.plain(pydoc.render_doc(mjs.LidarSensorCfg))
-    assert "Each ray leaves from where the frame was at its own moment of the sweep." in text  # its own
-    assert "Hits farther away are misses. [m]" in text  # inherited
+    assert "Emit each ray from the pose that the frame had at that ray's moment of the sweep." in text  # its own
+    assert "Maximum distance; more distant hits are misses. [m]" in text  # inherited
     assert "uint8 [B, H, W, 3]" in pydoc.plain(pydoc.render_doc(mjs.CameraData))
 
 

@@ -30,7 +30,7 @@ RecordOptions read(const std::string& toml) {
   return options;
 }
 
-// What a file may say, as one text: what it does not say stays as it was.
+// The options that a file can set, as one text; options that it does not set keep their value.
 std::string text(const RecordOptions& options) {
   const RecordJobCfg& job = options.job;
   const RolloutCfg& r = job.rollout;
@@ -119,8 +119,8 @@ TEST(ConfigFile, WrongKeysAndTypesAreErrors) {
               HasSubstr(":2: cameras is 'a,,b': must be a list"));
 }
 
-// Of letters beyond ASCII outside of texts, toml++ 3.3 says that they cannot be there, and what its
-// compiler makes of that is asked here of all of them: spaces are spaces, the rest is no key.
+// toml++ 3.3 assumes that there are no letters beyond ASCII outside of strings. This tests all of
+// them: Unicode spaces are spaces, and no other letter can be part of a key.
 TEST(ConfigFile, LettersBeyondAscii) {
   const std::set<int> spaces = {0xA0,   0x1680, 0x180E, 0x202F, 0x205F, 0x2060,
                                 0x3000, 0x85,   0x2028, 0x2029, 0xFEFF};

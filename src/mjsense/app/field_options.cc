@@ -2,6 +2,7 @@
 #include "mjsense/app/field_options.h"
 
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 
 #include <algorithm>
 #include <cctype>
@@ -61,11 +62,30 @@ const char* type_name(const FieldType& type) {
 std::string help(const FieldDecl& field) {
   std::string text = field.sentence;
   std::erase(text, '`');
-  text.pop_back();  // as a line of a list: no sentence
-  const auto letter = [&](int i) { return static_cast<unsigned char>(text[i]); };
-  if (!std::isupper(letter(1))) text[0] = static_cast<char>(std::tolower(letter(0)));
   if (*field.unit_) text += fmt::format(" [{}]", field.unit_);
   return text;
+}
+
+// "Draw shadows." -> "Do not draw shadows."
+std::string negated_help(const FieldDecl& field) {
+  std::string text = help(field);
+  text[0] = static_cast<char>(std::tolower(static_cast<unsigned char>(text[0])));
+  return "Do not " + text;
+}
+
+// The words that a field accepts; empty if it accepts anything of its type.
+std::span<const std::string_view> words_of(const FieldDecl& field) {
+  if (!field.words.empty()) return field.words;
+  const FieldType* type = field.type;
+  while (type->kind == Kind::kOptional || type->kind == Kind::kList) type = &type->element();
+  return type->words;
+}
+
+// "auto|shapes|real" if it is short, else the name of the type.
+std::string value_name(const FieldDecl& field) {
+  constexpr std::size_t kMaxWidth = 24;
+  const std::string words = fmt::format("{}", fmt::join(words_of(field), "|"));
+  return words.empty() || words.size() > kMaxWidth ? type_name(*field.type) : words;
 }
 
 void set_field(const StructDecl& decl, void* object, const std::string& assignment) {
@@ -95,7 +115,7 @@ void add_field_options(CLI::App& app, const StructDecl& decl, void* object,
       bool& value = *static_cast<bool*>(at(object, field));
       if (flag_default(decl, field)) {
         app.add_flag_callback(
-            "--no-" + name, [&value] { value = false; }, "not: " + help(field));
+            "--no-" + name, [&value] { value = false; }, negated_help(field));
       } else {
         app.add_flag("--" + name, value, help(field));
       }
@@ -111,22 +131,30 @@ void add_field_options(CLI::App& app, const StructDecl& decl, void* object,
              }
            },
            help(field))
-        ->type_name(type_name(*field.type))
+        ->type_name(value_name(field))
         ->default_str(write_text(field, object));
+  }
+}
+
+void add_choices(const StructDecl& decl, Choices& choices) {
+  for (const FieldDecl& field : decl.fields) {
+    if (field.type && !words_of(field).empty())
+      choices["--" + dashed(field.flag_name())].assign(words_of(field).begin(),
+                                                       words_of(field).end());
   }
 }
 
 void add_set_options(CLI::App& app, const StructDecl& decl, void* object) {
   app.add_option_function<std::string>(
          "--size", [&decl, object](const std::string& text) { read_size(decl, object, text); },
-         "width and height at once")
+         "Width and height of the images.")
       ->type_name("WxH");
   app.add_option_function<std::vector<std::string>>(
          "--set",
          [&decl, object](const std::vector<std::string>& all) {
            for (const std::string& one : all) set_field(decl, object, one);
          },
-         "any field by its name, also those without an option")
+         "Set any field by its name, including fields without an option. May be repeated.")
       ->type_name("NAME=VALUE")
       ->expected(1)
       ->take_all();

@@ -6,15 +6,18 @@
 #include <string>
 #include <string_view>
 
+#include "mjsense/app/completion.h"
 #include "mjsense/core/fields.h"
 
 namespace mjsense {
 
-// An option for every field that is not hidden and can be written as one text: --name VALUE, --name
-// for what is false by default, --no-name for what is true. `skip`: names that the command has as
-// arguments of its own, or that mean nothing to it.
+// Adds an option for every field that is not hidden and can be written as one text: --name VALUE;
+// for booleans --name if the default is false, --no-name if it is true. `skip`: names of fields
+// that are arguments of the command or do not apply to it.
 void add_field_options(CLI::App& app, const StructDecl& decl, void* object,
                        std::initializer_list<std::string_view> skip);
+// Adds the words that fields accept.
+void add_choices(const StructDecl& decl, Choices& choices);
 // --size WxH, and --set name=value for every field.
 void add_set_options(CLI::App& app, const StructDecl& decl, void* object);
 

@@ -2,12 +2,13 @@
 #include "mjsense/app/list_command.h"
 
 #include <fmt/format.h>
+#include <unistd.h>
 
 #include <algorithm>
 #include <nlohmann/json.hpp>
 #include <vector>
 
-#include "mjsense/app/table.h"
+#include "mjsense/app/terminal.h"
 #include "mjsense/robots/load_robot.h"
 #include "mjsense/rollout/registry.h"
 #include "mjsense/rollout/task_defaults.h"
@@ -16,47 +17,55 @@
 namespace mjsense {
 namespace {
 
+constexpr std::size_t kMaxWidth = 100;  // longer lines are hard to read
+
 struct Line {
   std::string name, what, needs;
 };
 
-std::string text_of(const char* kind, const std::vector<Line>& lines, bool json) {
+std::string text_of(const std::vector<Line>& lines, bool json) {
   if (json) {
     nlohmann::ordered_json out = nlohmann::ordered_json::array();
     for (const Line& line : lines)
       out.push_back({{"name", line.name}, {"description", line.what}, {"needs", line.needs}});
     return out.dump(2);
   }
-  const bool needs =
-      std::ranges::any_of(lines, [](const Line& line) { return !line.needs.empty(); });
-  Table table{{kind, "what"}, needs ? "lll" : "ll", {}};
-  if (needs) table.header.push_back("needs");
+  const std::size_t width = std::clamp(terminal_width(STDOUT_FILENO), std::size_t{40}, kMaxWidth);
+  std::string out;
+  const auto add = [&](const std::string& text) {
+    for (const std::string& one : wrap(text, width - 4)) out += "    " + one + "\n";
+  };
   for (const Line& line : lines) {
-    table.rows.push_back({line.name, line.what});
-    if (needs) table.rows.back().push_back(line.needs);
+    out += line.name + "\n";
+    if (!line.what.empty()) add(line.what);
+    if (!line.needs.empty()) add("Needs: " + line.needs);
   }
-  return table.text();
+  return out;
 }
 
-// Of our tasks; a task of somebody else's has its name alone.
+// Built-in tasks. User-defined tasks are listed by name only.
 constexpr struct {
   const char *name, *what, *needs;
 } kTasks[] = {
-    {"pick", "Pick up one of the things of a scene.", "arm and gripper; things to hold"},
-    {"pick_and_place", "Put a thing in or on a receptacle.",
-     "arm and gripper; things, receptacles"},
-    {"pick_and_place_next_to", "Put a thing next to another.", "arm and gripper; things"},
-    {"pick_and_place_color", "Put a thing in or on the receptacle of a colour.",
-     "arm and gripper; things, receptacles"},
-    {"packing", "Put a thing into a box.", "arm and gripper; things, a box"},
-    {"open", "Open a drawer, a cabinet, a microwave, a fridge.",
-     "arm and gripper; something with a handle that opens"},
-    {"close", "Close a drawer, a cabinet, a microwave, a fridge.",
-     "arm and gripper; something with a handle that opens"},
-    {"door_opening", "Open a door by its handle.", "a base that drives, arm and gripper; a door"},
-    {"nav_to_obj", "Drive to a thing.", "a base that drives, a head camera; things"},
-    {"multi_task", "Any of several tasks in one scene: nav_to_obj+pick, or others named so.",
-     "what each of them needs"},
+    {"pick", "Pick up one of the objects of a scene.",
+     "an arm with a gripper; a scene with graspable objects."},
+    {"pick_and_place", "Put an object in or on a receptacle.",
+     "an arm with a gripper; a scene with objects and receptacles."},
+    {"pick_and_place_next_to", "Put an object next to another one.",
+     "an arm with a gripper; a scene with objects."},
+    {"pick_and_place_color", "Put an object in or on the receptacle of a given colour.",
+     "an arm with a gripper; a scene with objects and receptacles."},
+    {"packing", "Put an object into a box.",
+     "an arm with a gripper; a scene with objects and a box."},
+    {"open", "Open a drawer, cabinet, microwave or fridge.",
+     "an arm with a gripper; a scene with a door or drawer that has a handle."},
+    {"close", "Close a drawer, cabinet, microwave or fridge.",
+     "an arm with a gripper; a scene with a door or drawer that has a handle."},
+    {"door_opening", "Open a door by its handle.",
+     "a mobile base, an arm with a gripper; a scene with a door."},
+    {"nav_to_obj", "Drive to an object.", "a mobile base, a head camera; a scene with objects."},
+    {"multi_task", "Several tasks in one scene, such as nav_to_obj+pick.",
+     "whatever its tasks need."},
 };
 
 // Packages that entities of a scene come from: "package:<package>/...".
@@ -85,28 +94,28 @@ std::string list_tasks(bool json) {
       if (name == one.name) line = {name, one.what, one.needs};
     }
     if (!line.what.empty())
-      line.needs += fmt::format("; by default {} in {}", default_robot(name),
+      line.needs += fmt::format(" Default: {} in {}.", default_robot(name),
                                 default_scene(parts_of_task(name)[0]));
     lines.push_back(line);
   }
-  return text_of("task", lines, json);
+  return text_of(lines, json);
 }
 
 std::string list_robots(bool json) {
   std::vector<Line> lines;
   for (const std::string& name : robot_names())
     lines.push_back({name, robot_cfg(name).description, ""});
-  return text_of("robot", lines, json);
+  return text_of(lines, json);
 }
 
 std::string list_scenes(bool json) {
   std::vector<Line> lines;
   for (const std::string& name : scene_names()) {
     const SceneFileCfg scene = load_scene(name);
-    const char* houses = scene.generator.empty() ? "" : " A house for every number.";
+    const char* houses = scene.generator.empty() ? "" : " Every house number is another house.";
     lines.push_back({name, scene.description + houses, packages_of(scene)});
   }
-  return text_of("scene", lines, json);
+  return text_of(lines, json);
 }
 
 }  // namespace mjsense

@@ -18,8 +18,10 @@
 #include <system_error>
 #include <vector>
 
+#include "mjsense/app/completion.h"
 #include "mjsense/app/external.h"
 #include "mjsense/app/field_options.h"
+#include "mjsense/app/help.h"
 #include "mjsense/app/list_command.h"
 #include "mjsense/app/record_command.h"
 #include "mjsense/app/scan_command.h"
@@ -31,6 +33,7 @@
 #include "mjsense/replay/check.h"
 #include "mjsense/rollout/registry.h"
 #include "mjsense/scene/mujoco_log.h"
+#include "mjsense/scenes/load_scene.h"
 
 namespace mjsense {
 namespace {
@@ -38,66 +41,91 @@ namespace {
 constexpr int kFailed = 1;
 constexpr int kWrongInput = 2;
 
-// "which task: pick, place"
-std::string one_of(const std::string& what, const std::vector<std::string>& names) {
-  return fmt::format("{}: {}", what, fmt::join(names, ", "));
+// Lists the names that the option accepts, after its description.
+void list_names(CLI::Option* option, const std::vector<std::string>& names) {
+  option->description(
+      fmt::format("{} One of: {}.", option->get_description(), fmt::join(names, ", ")));
 }
 
-// What there is to choose from, behind the fields' own words.
-void add_choices(CLI::App& app) {
-  for (const auto& [option, names] :
-       {std::pair{"--robot", robot_names()}, std::pair{"--policy", policy_names()}}) {
-    CLI::Option* o = app.get_option(option);
-    o->description(one_of(o->get_description(), names));
-  }
+void list_names(CLI::App& app) {
+  list_names(app.get_option("--robot"), robot_names());
+  list_names(app.get_option("--policy"), policy_names());
+}
+
+Choices choices() {
+  Choices choices;
+  add_choices(struct_of<RecordJobCfg>(), choices);
+  add_choices(struct_of<LidarSensorCfg>(), choices);
+  choices["--robot"] = robot_names();
+  choices["--policy"] = policy_names();
+  choices["--scene"] = scene_names();
+  choices["task"] = choices["what"] = task_names();
+  choices["shell"] = {"bash", "zsh", "fish"};
+  return choices;
 }
 
 CLI::App& add_record(CLI::App& program, RecordOptions& options) {
-  CLI::App& app = *program.add_subcommand("record", "play episodes of a task and keep them");
-  app.add_option("task", options.job.rollout.task, one_of("which task", task_names()))
-      ->capture_default_str();
+  CLI::App& app = *program.add_subcommand("record", "Record episodes of a task.");
+  list_names(app.add_option("task", options.job.rollout.task, "Name of the task.")
+                 ->capture_default_str()
+                 ->type_name("TASK"),
+             task_names());
   add_field_options(app, struct_of<RecordJobCfg>(), &options.job, {"task"});
   add_set_options(app, struct_of<RecordJobCfg>(), &options.job);
-  add_choices(app);
-  app.add_option("--config", "TOML file with these options; the command line wins")
+  list_names(app);
+  app.add_option("--config",
+                 "TOML file with these options; options on the command line take precedence.")
       ->type_name("FILE");
   app.add_flag_callback(
-      "--no-sheet", [&options] { options.sheet = false; }, "write no contact sheet");
-  app.add_flag("--json", options.json, "summary as JSON");
-  app.add_flag("-q,--quiet", options.quiet, "no progress");
+      "--no-sheet", [&options] { options.sheet = false; }, "Do not write a contact sheet.");
+  app.add_flag("--json", options.json, "Print the summary as JSON.");
+  app.add_flag("-q,--quiet", options.quiet, "Do not show progress.");
+  add_examples(app, {{"mjsense record pick --episodes 8 --worlds 4 --out data",
+                      "Record eight episodes of the task pick, four at a time."},
+                     {"mjsense record open --scene kitchen:7 --robot rby1 --depth --out data",
+                      "Open something in kitchen number 7 with RB-Y1, and record depth too."}});
   return app;
 }
 
-// Checks that add nothing to the help: it shows the type's name and the default.
+// Checks that do not change the help, which shows the name of the type and the default.
 CLI::Validator existing_file() { return CLI::Validator(CLI::ExistingFile).description(""); }
 CLI::Validator number_of_steps() { return CLI::Range(0, 1'000'000'000).description(""); }
 
 CLI::App& add_sensors(CLI::App& program, SensorsOptions& options) {
-  CLI::App& app = *program.add_subcommand("sensors", "what is measured, and what it costs");
-  app.add_option("what", options.what,
-                 one_of("an MJCF file, embedded:FILE, or the name of a task", task_names()))
-      ->required()
-      ->type_name("SCENE.xml|TASK");
+  CLI::App& app = *program.add_subcommand(
+      "sensors", "List the sensors of a scene or task: shapes, units, frames and cost.");
+  list_names(
+      app.add_option("what", options.what, "An MJCF file, embedded:FILE, or the name of a task.")
+          ->required()
+          ->type_name("SCENE.xml|TASK"),
+      task_names());
   add_field_options(app, struct_of<RolloutCfg>(), &options.rollout, {"task", "worlds"});
   add_set_options(app, struct_of<RolloutCfg>(), &options.rollout);
-  add_choices(app);
-  app.add_option("--steps", options.steps, "to measure the cost over; 0: do not measure")
+  list_names(app);
+  app.add_option("--steps", options.steps,
+                 "Number of steps over which the cost is measured; 0: do not measure.")
       ->capture_default_str()
       ->check(number_of_steps());
-  app.add_flag("--json", options.json, "as JSON");
+  app.add_flag("--json", options.json, "Print JSON.");
+  add_examples(app, {{"mjsense sensors embedded:robots/quadruped.xml",
+                      "List the sensors of a model that mjsense includes."},
+                     {"mjsense sensors pick --robot franka --steps 0",
+                      "List what a recording of a task contains, without measuring the cost."}});
   return app;
 }
 
 CLI::App& add_scan(CLI::App& program, ScanOptions& options) {
-  CLI::App& app = *program.add_subcommand("scan", "what a lidar sees, as a point cloud");
-  app.add_option("scene", options.scene, "an MJCF file, or embedded:FILE")
+  CLI::App& app =
+      *program.add_subcommand("scan", "Write the point cloud that a lidar measures in a scene.");
+  app.add_option("scene", options.scene, "An MJCF file, or embedded:FILE.")
       ->required()
       ->type_name("SCENE.xml");
-  app.add_option("--frame", options.frame, "what carries the lidar: site:NAME, body:NAME, ...")
+  app.add_option("--frame", options.frame,
+                 "The frame that carries the lidar: site:NAME, body:NAME, ...")
       ->required()
       ->type_name("TYPE:NAME");
-  app.add_option("--out", options.out, "the file, .ply or .pcd")->required()->type_name("FILE");
-  // The scene stands still: the rate of a scan and the distortion by motion mean nothing.
+  app.add_option("--out", options.out, "Output file, .ply or .pcd.")->required()->type_name("FILE");
+  // The scene does not move, so the rate of a scan and motion distortion have no effect.
   add_field_options(app, struct_of<TableScan>(), &options.table, {"rate-hz"});
   CLI::Option* table = app.get_option("--table")->check(existing_file())->type_name("FILE.npy");
   app.get_option("--rays")->needs(table);
@@ -107,10 +135,17 @@ CLI::App& add_scan(CLI::App& program, ScanOptions& options) {
   for (std::size_t i = others; i < all.size(); ++i) all[i]->excludes(table);
   add_field_options(app, struct_of<LidarSensorCfg>(), &options.lidar,
                     {"name", "any-frame", "debug-vis", "hit-ids", "motion-distortion"});
-  app.add_option("--steps", options.steps, "physics steps before the scan")
+  app.add_option("--steps", options.steps, "Number of physics steps before the scan.")
       ->capture_default_str()
       ->check(number_of_steps());
-  app.add_flag("--world", options.world, "points in the world, not in the lidar's frame");
+  app.add_flag("--world", options.world,
+               "Write the points in the world frame instead of the lidar's frame.");
+  add_examples(
+      app,
+      {{"mjsense scan embedded:scenes/table/room.xml --frame geom:table_top --out cloud.ply",
+        "Scan a room from its table."},
+       {"mjsense scan scene.xml --frame site:lidar --channels 32 --samples 1024 --out cloud.pcd",
+        "Scan with 32 lasers and 1,024 firings per sweep."}});
   return app;
 }
 
@@ -122,8 +157,8 @@ struct PathOptions {
 CLI::App& add_path_command(CLI::App& program, const char* name, const char* help,
                            PathOptions& options) {
   CLI::App& app = *program.add_subcommand(name, help);
-  app.add_option("path", options.path, "a recording, a house_N folder or an .h5 file")->required();
-  app.add_flag("--json", options.json, "as JSON");
+  app.add_option("path", options.path, "A recording, a house_N folder or an .h5 file.")->required();
+  app.add_flag("--json", options.json, "Print JSON.");
   return app;
 }
 
@@ -134,8 +169,8 @@ std::string one_line(std::string text) {
   return text;
 }
 
-// MuJoCo's warnings, each once, on stderr and in no file. A world that diverges is reported with
-// its episode.
+// Prints each warning of MuJoCo once, on stderr, and writes no log file. Divergence is not printed:
+// it is reported with its episode.
 void show_warnings() {
   mju_user_warning = [](const char* text) {
     static std::mutex mutex;
@@ -155,7 +190,8 @@ const std::string& existing(const std::string& path) {
 
 void print(const std::string& text) { fmt::print("{}{}", text, text.ends_with('\n') ? "" : "\n"); }
 
-// --config must be read before the command line is: what is given there wins.
+// Reads --config before the command line is parsed, because options of the command line take
+// precedence.
 void read_config_argument(int argc, char** argv, RecordOptions& options) {
   for (int i = 2; i < argc; ++i) {
     const std::string word = argv[i];
@@ -169,8 +205,9 @@ void read_config_argument(int argc, char** argv, RecordOptions& options) {
 int run(int argc, char** argv) {
   show_warnings();
   leave_no_log_file();
-  CLI::App program("Senses of MuJoCo worlds: measured, rendered, recorded.", "mjsense");
-  program.set_version_flag("--version", "mjsense " MJSENSE_VERSION);
+  CLI::App program("Sensors, cameras and recordings for MuJoCo simulations.", "mjsense");
+  use_our_help(program);
+  program.set_version_flag("--version", "mjsense " MJSENSE_VERSION, "Print the version and exit.");
   program.require_subcommand(1);
 
   RecordOptions record_options;
@@ -180,57 +217,90 @@ int run(int argc, char** argv) {
   CLI::App& record = add_record(program, record_options);
   CLI::App& sensors = add_sensors(program, sensors_options);
   CLI::App& scan = add_scan(program, scan_options);
-  CLI::App& inspect_app =
-      add_path_command(program, "inspect", "trees, statistics, pictures", inspect_options);
-  inspect_app.add_option("--sheet", inspect_options.sheet, "write a contact sheet")
+  CLI::App& inspect_app = add_path_command(
+      program, "inspect", "Show the contents and statistics of a recording.", inspect_options);
+  inspect_app.add_option("--sheet", inspect_options.sheet, "Write a contact sheet of the videos.")
       ->type_name("FILE.png");
-  inspect_app.add_option("--ffmpeg", inspect_options.ffmpeg, "the program")->type_name("PATH");
-  CLI::App& verify_app =
-      add_path_command(program, "verify", "is a recording whole and readable", verify_options);
-  verify_app.add_flag("--decode", verify_options.decode, "decode every frame");
-  verify_app.add_option("--ffmpeg", verify_options.ffmpeg, "the program")->type_name("PATH");
-  add_path_command(program, "repair", "publish what an interrupted recording has finished",
-                   repair_options);
+  inspect_app.add_option("--ffmpeg", inspect_options.ffmpeg, "Path of the ffmpeg program.")
+      ->type_name("PATH");
+  CLI::App& verify_app = add_path_command(
+      program, "verify", "Check that a recording is complete and undamaged.", verify_options);
+  verify_app.add_flag("--decode", verify_options.decode, "Decode every frame of the videos.");
+  verify_app.add_option("--ffmpeg", verify_options.ffmpeg, "Path of the ffmpeg program.")
+      ->type_name("PATH");
+  CLI::App& repair_app = add_path_command(
+      program, "repair", "Publish the finished episodes of an interrupted recording.",
+      repair_options);
+  add_examples(inspect_app, {{"mjsense inspect data", "Show what a recording contains."},
+                             {"mjsense inspect data --sheet sheet.png",
+                              "Write a picture of every camera too."}});
+  add_examples(verify_app, {{"mjsense verify data", "Check all checksums."},
+                            {"mjsense verify --decode data", "Decode every video frame too."}});
+  add_examples(repair_app,
+               {{"mjsense repair data", "Keep what an interrupted recording has finished."},
+                {"mjsense repair --json data/house_0", "Print the result as JSON."}});
 
   bool list_json = false;
   const auto add_list = [&](const char* name, const char* help) -> CLI::App& {
     CLI::App& list = *program.add_subcommand(name, help);
-    list.add_flag("--json", list_json, "as JSON");
+    list.add_flag("--json", list_json, "Print JSON.");
+    add_examples(list, {{fmt::format("mjsense {}", name), "Print the list."},
+                        {fmt::format("mjsense {} --json", name), "Print the list for programs."}});
     return list;
   };
-  CLI::App& tasks = add_list("tasks", "the tasks there are, and what they need");
-  CLI::App& robots = add_list("robots", "the robots there are");
-  CLI::App& scenes = add_list("scenes", "the scenes there are, and what they need");
+  CLI::App& tasks = add_list("tasks", "List the tasks and what they need.");
+  CLI::App& robots = add_list("robots", "List the robots.");
+  CLI::App& scenes = add_list("scenes", "List the scenes and what they need.");
 
   CLI::App& schema =
-      *program.add_subcommand("schema", "all configurations and their fields, as JSON");
-  program.footer("Any other word runs mjsense-<word> from PATH.");  // no subcommand inherits it
+      *program.add_subcommand("schema", "Print all configurations and their fields as JSON.");
+  add_examples(schema, {{"mjsense schema > schema.json", "Keep the schema in a file."},
+                        {"mjsense schema | python -m json.tool | less", "Read it."}});
+
+  std::string shell;
+  CLI::App& completion = *program.add_subcommand(
+      "completion", "Print a shell script that completes this program's words.");
+  completion.add_option("shell", shell, "bash, zsh or fish.")->required()->type_name("SHELL");
+  add_examples(completion, {{"source <(mjsense completion bash)",
+                             "Use it in this bash; for all, add the line to ~/.bashrc."},
+                            {"mjsense completion fish > ~/.config/fish/completions/mjsense.fish",
+                             "Use it in fish."}});
+  // Run by the shells' scripts.
+  std::vector<std::string> to_complete;
+  CLI::App& complete_app = *program.add_subcommand("complete", "")->group("");
+  complete_app.add_option("words", to_complete);
+
+  // Set last, because subcommands inherit the footer.
+  program.footer(
+      "Use `mjsense COMMAND --help` for the options of a command.\n"
+      "Any other word runs the program mjsense-<word> from PATH.");
 
   std::vector<std::string> known;
-  for (const CLI::App* app : program.get_subcommands({})) known.push_back(app->get_name());
+  for (const CLI::App* app : program.get_subcommands({}))
+    if (!app->get_group().empty()) known.push_back(app->get_name());
   if (argc < 2) {
     say("{}", program.help());
     return kWrongInput;
   }
   const std::string word = argv[1];
   if (word.starts_with('-')) {
-    // The library would ask for a command first.
+    // CLI11 would report a missing command first.
     const CLI::Option* option = program.get_option_no_throw(word);
     if (option == nullptr)
-      throw ValueError(fmt::format("no option '{}' (mjsense --help shows how)", word));
-  } else if (std::ranges::find(known, word) == known.end()) {
+      throw ValueError(fmt::format("no option '{}'; see mjsense --help", word));
+  } else if (word != "complete" && std::ranges::find(known, word) == known.end()) {
     run_external(word, argv + 1, known);
   }
-  // Writing beyond ulimit -f, on stdout too, is an error of that write. (Another program, above, gets
-  // its signals as we got them.)
+  // Writing beyond ulimit -f must fail instead of killing the process. Programs that run_external()
+  // starts keep the default.
   std::signal(SIGXFSZ, SIG_IGN);
   if (word == "record") read_config_argument(argc, argv, record_options);
   try {
     program.parse(argc, argv);
   } catch (const CLI::ParseError& e) {
     if (e.get_exit_code() == 0) return program.exit(e);  // --help, --version
-    throw ValueError(fmt::format("{} (mjsense{} --help shows how)", e.what(),
-                                 word.starts_with('-') ? "" : " " + word));
+    throw ValueError(
+        fmt::format("{}; see mjsense{} --help", e.what(), word.starts_with('-') ? "" : " " + word));
   }
 
   if (record.parsed()) return run_record(record_options);
@@ -246,13 +316,21 @@ int run(int argc, char** argv) {
                             : list_scenes(list_json));
     return 0;
   }
+  if (completion.parsed()) {
+    print(completion_script(shell));
+    return 0;
+  }
+  if (complete_app.parsed()) {
+    for (const std::string& found : complete(program, choices(), to_complete)) print(found);
+    return 0;
+  }
   if (schema.parsed()) {
     print(schema_json());
     return 0;
   }
   if (inspect_app.parsed()) {
     const InspectResult result = inspect(existing(inspect_options.path));
-    // Before anything is printed: what cannot be drawn or written is one line.
+    // Before anything is printed, so that a failure prints one line only.
     if (inspect_app.get_option("--sheet")->count() > 0)
       contact_sheet(inspect_options.path, inspect_options.sheet, 4, 8, inspect_options.ffmpeg);
     print(inspect_options.json ? result.json() : result.text());
@@ -274,17 +352,17 @@ int run(int argc, char** argv) {
 int run_program(int argc, char** argv) {
   try {
     const int code = run(argc, argv);
-    // A full disk behind > is no success.
+    // Output that was redirected to a full disk is an error.
     if (std::fflush(stdout) != 0 || std::ferror(stdout))
       throw RuntimeError(fmt::format("cannot write to stdout: {}", std::strerror(errno)));
     return code;
   } catch (const std::exception& e) {
     std::string why = e.what();
-    // fmt does not know which file it could not write to.
+    // The error of fmt does not say which file it could not write to.
     if (const auto* of_fmt = dynamic_cast<const std::system_error*>(&e);
         of_fmt && std::ferror(stdout))
       why = "cannot write to stdout: " + of_fmt->code().message();
-    // It may quote a file of a stranger's.
+    // The message may quote a file of any size.
     constexpr std::size_t kMostBytes = 4000;
     if (why.size() > kMostBytes) why = why.substr(0, kMostBytes) + " ...";
     say("mjsense: {}\n", printable(one_line(why)));

@@ -4,8 +4,8 @@
 
 namespace mjsense {
 
-// Exit codes: 0 done; 1 some episodes or checks failed; 2 wrong usage or input. Errors are told on
-// stderr. An unknown word may replace this process (external.h).
+// Exit codes: 0 done; 1 some episodes or checks failed; 2 wrong usage or input. Errors are printed
+// on stderr. An unknown command may replace this process (external.h).
 int run_program(int argc, char** argv);
 
 }  // namespace mjsense

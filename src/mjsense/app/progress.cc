@@ -2,26 +2,16 @@
 #include "mjsense/app/progress.h"
 
 #include <fmt/format.h>
-#include <sys/ioctl.h>
 #include <unistd.h>
 
 #include <cmath>
 #include <cstdio>
 #include <utility>
 
+#include "mjsense/app/terminal.h"
 #include "mjsense/core/say.h"
 
 namespace mjsense {
-
-namespace {
-
-// A longer line would wrap, and the next could not take its place.
-std::size_t terminal_width() {
-  winsize size{};
-  return ioctl(STDERR_FILENO, TIOCGWINSZ, &size) == 0 && size.ws_col > 1 ? size.ws_col : 80;
-}
-
-}  // namespace
 
 std::string clock_text(double seconds) {
   const auto s = static_cast<long>(std::lround(seconds));
@@ -60,7 +50,8 @@ void ProgressLine::show(const RecordProgress& progress, int stop_level) {
     text_ += fmt::format("  stopping: {} running; Ctrl-C discards them", progress.running);
   }
   if (terminal_) {
-    say("\r\033[K{}", text_.substr(0, terminal_width() - 1));
+    // A longer line would wrap, and "\r" would not return to its beginning.
+    say("\r\033[K{}", text_.substr(0, terminal_width(STDERR_FILENO) - 1));
     std::fflush(stderr);
     open_ = true;
     return;

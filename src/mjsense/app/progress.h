@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
-// The line that tells a person how a recording goes: on a terminal one line that changes, else a
-// line whenever an episode ends. Its title comes once, when the recording has begun: what is wrong
-// with its configuration is said alone.
+// The progress of a recording: on a terminal one line that is rewritten, otherwise one line for
+// each episode. The title is printed once, when the recording has begun, so that an error in the
+// configuration is printed without it.
 
 #include <string>
 

@@ -102,15 +102,16 @@ std::string summary_text(const RecordSummary& s, const Sheet& sheet) {
     for (const auto& [name, seconds] : time_split(s)) {
       out += fmt::format("  {} {:.0f} %", name, 100 * seconds * rate);
     }
-    out += fmt::format("  (beside it: encoders {:.1f} s, files {:.1f} s)\n", s.record.encode_cpu_s,
-                       s.record.write_s + s.record.commit_s);
+    out += fmt::format("  (in parallel: encoders {:.1f} s, files {:.1f} s)\n",
+                       s.record.encode_cpu_s, s.record.write_s + s.record.commit_s);
   }
   if (std::filesystem::exists(s.house_dir)) {
-    out += fmt::format("\n{}{} in all\n", tree_text(s.house_dir.string()),
+    out += fmt::format("\n{}{} in total\n", tree_text(s.house_dir.string()),
                        bytes_text(static_cast<double>(bytes_below(s.house_dir))));
   }
   if (!sheet.path.empty())
-    out += fmt::format("\npictures of every camera over time ({}): {}\n", sheet.shows, sheet.path);
+    out +=
+        fmt::format("\ncontact sheet, every camera over time ({}): {}\n", sheet.shows, sheet.path);
   return out;
 }
 
@@ -142,7 +143,7 @@ std::string summary_json(const RecordSummary& s, const Sheet& sheet) {
 
 int run_record(const RecordOptions& options) {
   const RecordJobCfg& job = options.job;
-  if (job.out.empty()) throw ValueError("record: where to? give --out DIR");
+  if (job.out.empty()) throw ValueError("record: the output directory is missing: pass --out DIR");
   RecordSummary summary;
   {
     const StopOnSignal signals;
@@ -169,11 +170,11 @@ int run_record(const RecordOptions& options) {
   }
   for (const std::string& damage : summary.damage) say("mjsense: {}\n", damage);
   if (summary.interrupted) {
-    say("interrupted: the finished episodes are safe; go on with --resume, or end it with "
-        "`mjsense repair {}`\n",
+    say("interrupted: the finished episodes are safe. Continue with --resume, or finish with "
+        "`mjsense repair {}`.\n",
         summary.house_dir.string());
   } else if (!summary.enough) {
-    say("gave up after {} attempts; --max-attempts allows more\n",
+    say("stopped after {} attempts; --max-attempts allows more\n",
         summary.progress.succeeded + summary.progress.failed);
   }
   return summary.enough ? 0 : 1;

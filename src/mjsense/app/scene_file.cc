@@ -16,7 +16,7 @@ bool names_model(const std::string& what, const std::string& expected) {
   const std::filesystem::path path = what;
   if (std::filesystem::is_regular_file(path)) return true;
   if (std::filesystem::exists(path))
-    throw ValueError(fmt::format("{}: is no file: expected {}", what, expected));
+    throw ValueError(fmt::format("{}: is not a file; expected {}", what, expected));
   if (path.has_extension()) throw ValueError(fmt::format("{}: no such file", what));
   return false;
 }

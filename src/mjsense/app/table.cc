@@ -7,15 +7,10 @@
 #include <filesystem>
 
 #include "mjsense/app/progress.h"
+#include "mjsense/app/terminal.h"
 
 namespace mjsense {
 namespace {
-
-// Characters that a reader sees: UTF-8 continuation bytes are none.
-std::size_t width(const std::string& text) {
-  return static_cast<std::size_t>(std::ranges::count_if(
-      text, [](char c) { return (static_cast<unsigned char>(c) & 0xC0) != 0x80; }));
-}
 
 void add_tree(const std::filesystem::path& folder, const std::string& indent, std::size_t most,
               std::string& out) {
@@ -42,15 +37,16 @@ void add_tree(const std::filesystem::path& folder, const std::string& indent, st
 
 std::string Table::text() const {
   std::vector<std::size_t> widths;
-  for (const std::string& cell : header) widths.push_back(width(cell));
+  for (const std::string& cell : header) widths.push_back(text_width(cell));
   for (const auto& row : rows) {
-    for (std::size_t i = 0; i < row.size(); ++i) widths[i] = std::max(widths[i], width(row[i]));
+    for (std::size_t i = 0; i < row.size(); ++i)
+      widths[i] = std::max(widths[i], text_width(row[i]));
   }
   std::string out;
   const auto add = [&](const std::vector<std::string>& row) {
     std::string line;
     for (std::size_t i = 0; i < row.size(); ++i) {
-      const std::string padding(widths[i] - width(row[i]), ' ');
+      const std::string padding(widths[i] - text_width(row[i]), ' ');
       const bool to_right = i < right.size() && right[i] == 'r';
       line += to_right ? padding + row[i] : row[i] + padding;
       if (i + 1 < row.size()) line += "  ";

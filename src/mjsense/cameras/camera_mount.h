@@ -48,52 +48,70 @@ struct CameraMountCfg {
 template <class V>
 void visit_fields(V& v, CameraMountCfg& c) {
   v.object("CameraMountCfg",
-           "A camera of an episode: where it is mounted, and how that differs from episode to "
-           "episode. Noise is uniform in [-x, x] and drawn once an episode.");
-  v("name", c.name, "Of its streams and videos.").required();
+           "A camera of an episode: where it is mounted, and its random variation. Noise is "
+           "uniform in [-x, x] and drawn once per episode.");
+  v("name", c.name, "Name of the camera's streams and videos.").required();
   v("mount", c.mount,
-    "mjcf: a camera of the robot's MJCF; body: on a body of the robot, turned by ``quat``; "
-    "look_at: "
-    "on a body, looking at a point of it; fixed: in the world, looking at a point; orbit: in the "
-    "world, somewhere around what the episode is about.");
-  v("camera", c.camera, "mjcf: its name there, without the robot's prefix.").or_none();
-  v("of_scene", c.of_scene, "mjcf: ``camera`` is a full name in the scene.");
-  v("body", c.body, "body, look_at: which one, without the robot's prefix; its base without one.")
+    "mjcf: a camera of the robot's MJCF; body: on a body of the robot, oriented by ``quat``; "
+    "look_at: on a body, looking at a point in the body's frame; fixed: in the world, looking at a "
+    "point; orbit: in the world, at a random place around the objects of the task.");
+  v("camera", c.camera, "mjcf: name of the camera in the MJCF, without the robot's prefix.")
       .or_none();
-  v("pos", c.pos, "body, look_at: in the body; fixed: in the world.").unit("m");
-  v("quat", c.quat, "body: wxyz in the body, x right, y up, looking along -z.");
-  v("target", c.target,
-    "look_at: the point in the body, fixed: in the world; orbit: offset from the centre.")
+  v("of_scene", c.of_scene, "mjcf: ``camera`` is a full name in the scene.");
+  v("body", c.body,
+    "body, look_at: name of the body, without the robot's prefix; empty: the robot's base.")
+      .or_none();
+  v("pos", c.pos, "body, look_at: position in the frame of the body; fixed: position in the world.")
       .unit("m");
-  v("up", c.up, "look_at, fixed: what is up in the image, in the body or the world.");
-  v("fovy", c.fovy, "Vertical, degrees; mjcf: the MJCF's, others: 45.").positive();
-  v("distance_range", c.distance_range, "orbit: from the centre, on the ground, least and most.")
+  v("quat", c.quat,
+    "body: orientation (wxyz) in the frame of the body: x right, y up, looking along -z.");
+  v("target", c.target,
+    "look_at: the point in the frame of the body; fixed: the point in the world; orbit: offset "
+    "from the centre.")
+      .unit("m");
+  v("up", c.up,
+    "look_at, fixed: up direction of the image, in the frame of the body or the world.");
+  v("fovy", c.fovy,
+    "Vertical field of view, degrees; by default that of the MJCF (mjcf) or 45 (others).")
+      .positive();
+  v("distance_range", c.distance_range,
+    "orbit: minimum and maximum horizontal distance from the centre.")
       .unit("m")
       .at_least(0);
-  v("height_range", c.height_range, "orbit: above the centre, least and most.").unit("m");
-  v("azimuth_range", c.azimuth_range, "orbit: least and most, degrees, 0 along the world's x.");
+  v("height_range", c.height_range, "orbit: minimum and maximum height above the centre.")
+      .unit("m");
+  v("azimuth_range", c.azimuth_range,
+    "orbit: minimum and maximum azimuth, degrees, 0 along the world's x axis.");
   v("min_visible", c.min_visible,
-    "orbit: the share of the pixels that each object of the task must cover at the start.")
+    "orbit: share of the pixels that each object of the task must cover at the start.")
       .within(0, 1);
-  v("max_attempts", c.max_attempts, "orbit: poses to try for that.").at_least(1);
-  v("relaxed", c.relaxed, "orbit: where none does, take the best; else the episode fails.");
-  v("fovy_noise", c.fovy_noise, "Degrees.").at_least(0);
+  v("max_attempts", c.max_attempts, "orbit: maximum number of poses to try.").at_least(1);
+  v("relaxed", c.relaxed,
+    "orbit: use the best pose if none satisfies min_visible. False: the episode fails.");
+  v("fovy_noise", c.fovy_noise, "Noise of the field of view, degrees.").at_least(0);
   v("pos_noise", c.pos_noise,
-    "mjcf: along the camera's axes; body, look_at: the body's; fixed: right, down, forward.")
+    "Noise of the position; mjcf: along the camera's axes; body, look_at: along the body's axes; "
+    "fixed: right, down, forward.")
       .unit("m")
       .at_least(0);
   v("rot_noise", c.rot_noise,
-    "Degrees about x, y, z in turn; mjcf, fixed: the camera's axes; body: the body's.")
+    "Noise of the rotation about x, y, z in this order, degrees; mjcf, fixed: about the camera's "
+    "axes; body: about the body's axes.")
       .at_least(0);
-  v("target_noise", c.target_noise, "look_at, fixed, orbit: of the point, along its axes.")
+  v("target_noise", c.target_noise,
+    "look_at, fixed, orbit: noise of the point, along the axes in which it is given.")
       .unit("m")
       .at_least(0);
-  v("width", c.width, "Of its pictures; without one the system's.").unit("pixels").at_least(1);
-  v("height", c.height, "Of its pictures; without one the system's.").unit("pixels").at_least(1);
-  v("depth", c.depth, "Also its depth is recorded, losslessly.");
-  v("segmentation", c.segmentation, "Also which geom each pixel shows is recorded.");
-  v("image_points", c.image_points, "``object_image_points`` looks through it.");
-  v("erosion", c.erosion, "Image points keep off an object's rim.");
+  v("width", c.width, "Width of its images; by default the camera system's.")
+      .unit("pixels")
+      .at_least(1);
+  v("height", c.height, "Height of its images; by default the camera system's.")
+      .unit("pixels")
+      .at_least(1);
+  v("depth", c.depth, "Record its depth too, losslessly.");
+  v("segmentation", c.segmentation, "Record its segmentation too.");
+  v("image_points", c.image_points, "Use it for ``object_image_points``.");
+  v("erosion", c.erosion, "Keep image points away from the rim of an object.");
 }
 
 // What its fields say of each other. Throws ValueError.

@@ -30,10 +30,10 @@ struct CameraSystemCfg {
 template <class V>
 void visit_fields(V& v, CameraSystemCfg& c) {
   v.object("CameraSystemCfg", "The cameras of an episode, in the order of a recording.");
-  v("name", c.name, "Of the system.");
-  v("cameras", c.cameras, "Each of them.");
-  v("width", c.width, "Of pictures whose camera does not say.").unit("pixels").at_least(1);
-  v("height", c.height, "Of pictures whose camera does not say.").unit("pixels").at_least(1);
+  v("name", c.name, "Name of the camera system.");
+  v("cameras", c.cameras, "The cameras.");
+  v("width", c.width, "Default width of the images.").unit("pixels").at_least(1);
+  v("height", c.height, "Default height of the images.").unit("pixels").at_least(1);
 }
 
 // Two cameras of one name, and each camera's own. Throws ValueError.

@@ -13,7 +13,7 @@ namespace mjsense {
 template <class V>
 void visit_fields(V& v, SensorCfg& c) {
   v.object("SensorCfg", "Base of the built-in sensor configurations.");
-  v("name", c.name, "Key in the scene: ``scene[name]``.").required();
+  v("name", c.name, "Name of the sensor in the scene: ``scene[name]``.").required();
 }
 
 struct SensorKind {

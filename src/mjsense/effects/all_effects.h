@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
-// The effects there are, as one choice: what stands here is known to Python and to every reader of
-// fields.
+// All effects as one variant. Python and every reader of fields know the types that are listed here.
 
 #include <memory>
 

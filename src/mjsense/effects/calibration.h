@@ -26,8 +26,8 @@ struct Scale : Effect {
 };
 template <class V>
 void visit_fields(V& v, Scale& c) {
-  v.object("Scale", "x <- factor x.", "scale").frozen().module("effects");
-  v("factor", c.factor, "By which values are multiplied.").or_one().not_empty();
+  v.object("Scale", "Multiplies values by a factor.", "scale").frozen().module("effects");
+  v("factor", c.factor, "The factor.").or_one().not_empty();
   v.include(static_cast<Effect&>(c));
 }
 
@@ -51,15 +51,16 @@ struct Misalignment : Effect {
 template <class V>
 void visit_fields(V& v, Misalignment& c) {
   v.object("Misalignment",
-           "Scale errors and small rotations of every three components, fixed plus drawn at every "
-           "reset.",
+           "Scale errors and small rotations of each group of three components: a fixed part, and "
+           "a part drawn at every reset.",
            "misalignment")
       .frozen()
       .module("effects");
-  v("scale_error", c.scale_error, "Of x, y, z.");
-  v("angle", c.angle, "About x, y, z.").unit("rad");
-  v("scale_error_std", c.scale_error_std, "Of what is drawn.").at_least(0);
-  v("angle_std", c.angle_std, "Of what is drawn.").unit("rad").at_least(0);
+  v("scale_error", c.scale_error, "Fixed scale errors of x, y, z.");
+  v("angle", c.angle, "Fixed rotation about x, y, z.").unit("rad");
+  v("scale_error_std", c.scale_error_std, "Standard deviation of the drawn scale errors.")
+      .at_least(0);
+  v("angle_std", c.angle_std, "Standard deviation of the drawn rotation.").unit("rad").at_least(0);
   v.include(static_cast<Effect&>(c));
 }
 
@@ -79,9 +80,11 @@ struct Clip : Effect {
 };
 template <class V>
 void visit_fields(V& v, Clip& c) {
-  v.object("Clip", "Limits of a device, or of an observation.", "clip").frozen().module("effects");
-  v("low", c.low, "Values are at least this.").may_be_infinite().or_one().not_empty();
-  v("high", c.high, "Values are at most this.").may_be_infinite().or_one().not_empty();
+  v.object("Clip", "Clips values to the limits of a device or of an observation.", "clip")
+      .frozen()
+      .module("effects");
+  v("low", c.low, "Lower limit.").may_be_infinite().or_one().not_empty();
+  v("high", c.high, "Upper limit.").may_be_infinite().or_one().not_empty();
   v.include(static_cast<Effect&>(c));
 }
 
@@ -98,8 +101,10 @@ struct Quantize : Effect {
 };
 template <class V>
 void visit_fields(V& v, Quantize& c) {
-  v.object("Quantize", "Rounds to multiples of step.", "quantize").frozen().module("effects");
-  v("step", c.step, "One count; 0: none.").at_least(0).or_one().not_empty();
+  v.object("Quantize", "Rounds values to multiples of a step.", "quantize")
+      .frozen()
+      .module("effects");
+  v("step", c.step, "Resolution; 0: no rounding.").at_least(0).or_one().not_empty();
   v.include(static_cast<Effect&>(c));
 }
 
@@ -125,11 +130,12 @@ struct NanPolicy : Effect {
 };
 template <class V>
 void visit_fields(V& v, NanPolicy& c) {
-  v.object("NanPolicy", "What becomes of NaN and infinite values.", "nan_policy")
+  v.object("NanPolicy", "Handles NaN and infinite values.", "nan_policy")
       .frozen()
       .module("effects");
   v("action", c.action,
-    "disabled: nothing; warn: said once on stderr; sanitize: 0; error: RuntimeError.");
+    "disabled: keep them; warn: print one warning on stderr; sanitize: replace them by 0; error: "
+    "raise RuntimeError.");
   v.include(static_cast<Effect&>(c));
 }
 

@@ -97,8 +97,8 @@ class Effect {
 };
 template <class V>
 void visit_fields(V& v, Effect& c) {
-  v.object("Effect", "One imperfection.");
-  v("fields", c.fields, "Of the sensor; empty: all.");
+  v.object("Effect", "An imperfection of a sensor.");
+  v("fields", c.fields, "Fields of the sensor that are affected; empty: all.");
 }
 
 // One value for all components or one for each.
@@ -146,18 +146,18 @@ template <class V>
 void visit_fields(V& v, Gaussian& c) {
   v.object("Gaussian", "Normal distribution.", "gaussian").frozen().module("effects");
   v("std", c.std, "Standard deviation.").at_least(0).or_one().not_empty();
-  v("mean", c.mean, "Its centre.").or_one().not_empty();
+  v("mean", c.mean, "Mean.").or_one().not_empty();
 }
 template <class V>
 void visit_fields(V& v, Uniform& c) {
-  v.object("Uniform", "Evenly in [low, high).", "uniform").frozen().module("effects");
-  v("low", c.low, "The smallest value.").or_one().not_empty();
-  v("high", c.high, "Above the largest one.").or_one().not_empty();
+  v.object("Uniform", "Uniform distribution on [low, high).", "uniform").frozen().module("effects");
+  v("low", c.low, "Lower bound, included.").or_one().not_empty();
+  v("high", c.high, "Upper bound, excluded.").or_one().not_empty();
 }
 template <class V>
 void visit_fields(V& v, Constant& c) {
-  v.object("Constant", "Always the same.", "constant").frozen().module("effects");
-  v("value", c.value, "The number.").or_one().not_empty();
+  v.object("Constant", "A constant value.", "constant").frozen().module("effects");
+  v("value", c.value, "The value.").or_one().not_empty();
 }
 
 // How a random number e meets a value x: x + e, x e, or e alone.

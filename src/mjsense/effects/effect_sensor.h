@@ -24,17 +24,21 @@ struct EffectSensorCfg : SensorCfg {
 };
 template <class V>
 void visit_fields(V& v, EffectSensorCfg& c) {
-  v.object("EffectSensorCfg", "A sensor of the scene seen through effects; it has the same fields.",
+  v.object("EffectSensorCfg",
+           "A sensor of the scene with effects (noise, delay and so on) applied; it has the same "
+           "fields.",
            "effect")
       .module("effects");
   v.extends(static_cast<SensorCfg&>(c));
-  v("sensor", c.sensor, "Key of the clean sensor: ``robot/imu_acc``.");
-  v("effects", c.effects, "In this order; each may be limited to some fields.");
-  v("fields", c.fields, "Of the clean sensor; empty: all.");
+  v("sensor", c.sensor, "Name of the clean sensor, such as ``robot/imu_acc``.");
+  v("effects", c.effects,
+    "The effects, applied in this order; each may be limited to some fields.");
+  v("fields", c.fields, "Fields of the clean sensor that are reported; empty: all.");
   v("history_length", c.history_length,
-    "Rows of every field, oldest first; the first of an episode fills all. 0: no history.")
+    "Number of rows kept of every field, oldest first; the first row of an episode fills all of "
+    "them. 0: no history.")
       .at_least(0);
-  v("flatten_history", c.flatten_history, "[h d] instead of [h, *shape].");
+  v("flatten_history", c.flatten_history, "Return the history as [h d] instead of [h, *shape].");
 }
 
 class EffectSensor : public Sensor {

@@ -35,11 +35,13 @@ struct Noise : Effect {
 };
 template <class V>
 void visit_fields(V& v, Noise& c) {
-  v.object("Noise", "A new error for every row and component.", "noise").frozen().module("effects");
-  v("draw", c.draw.law, "Gaussian, Uniform or Constant; a number: Constant.");
-  v("operation", c.operation, "What the error does to the value; abs: it replaces it.");
+  v.object("Noise", "Independent noise for every row and component.", "noise")
+      .frozen()
+      .module("effects");
+  v("draw", c.draw.law, "Distribution: Gaussian, Uniform or Constant; a number means Constant.");
+  v("operation", c.operation, "How the noise changes the value; abs: it replaces the value.");
   v("density", c.density,
-    "The noise density of a data sheet: std = density / sqrt(period), on top of draw.")
+    "Noise density as on a data sheet: std = density / sqrt(period) is added to draw.")
       .unit("unit/sqrt(Hz)")
       .at_least(0)
       .or_one()
@@ -72,13 +74,16 @@ struct EpisodeBias : Effect {
 };
 template <class V>
 void visit_fields(V& v, EpisodeBias& c) {
-  v.object("EpisodeBias", "A constant error within an episode (turn-on bias).", "episode_bias")
+  v.object("EpisodeBias", "A bias that is constant within an episode (turn-on bias).",
+           "episode_bias")
       .frozen()
       .module("effects");
-  v("draw", c.draw.law, "Gaussian, Uniform or Constant; a number: Constant.");
+  v("draw", c.draw.law, "Distribution: Gaussian, Uniform or Constant; a number means Constant.");
   v("operation", c.operation,
-    "At every reset: abs draws the bias anew, add lets it walk from episode to episode.");
-  v("per_component", c.per_component, "False: one number for the whole row.");
+    "What happens at a reset. abs: the bias is drawn anew; add: the draw is added to the previous "
+    "bias.");
+  v("per_component", c.per_component,
+    "Draw each component separately. False: one number for the whole row.");
   v.include(static_cast<Effect&>(c));
 }
 
@@ -110,14 +115,15 @@ void visit_fields(V& v, BiasDrift& c) {
            "bias_drift")
       .frozen()
       .module("effects");
-  v("std", c.std, "Of the stationary process.").at_least(0).or_one().not_empty();
-  v("time_constant_s", c.time_constant_s, "In which it forgets.").positive().may_be_infinite();
-  v("density", c.density, "Of the random walk.")
+  v("std", c.std, "Standard deviation of the stationary process.").at_least(0).or_one().not_empty();
+  v("time_constant_s", c.time_constant_s, "Correlation time.").positive().may_be_infinite();
+  v("density", c.density, "Density of the random walk.")
       .unit("unit/sqrt(s)")
       .at_least(0)
       .or_one()
       .not_empty();
-  v("start_at_zero", c.start_at_zero, "An episode begins without bias, not with a random one.");
+  v("start_at_zero", c.start_at_zero,
+    "Start an episode without bias instead of with a random one.");
   v.include(static_cast<Effect&>(c));
 }
 

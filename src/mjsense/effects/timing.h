@@ -59,13 +59,14 @@ struct Delay : Effect {
 };
 template <class V>
 void visit_fields(V& v, Delay& c) {
-  v.object("Delay", "The row of delay_s ago.", "delay").frozen().module("effects");
-  v("delay_s", c.delay_s, "By which rows are late.").at_least(0);
+  v.object("Delay", "Delays the rows by a time.", "delay").frozen().module("effects");
+  v("delay_s", c.delay_s, "The delay.").at_least(0);
   v("delay_max_s", c.delay_max_s,
-    "Larger than delay_s: drawn between them for each world and episode.")
+    "If larger than delay_s, the delay is drawn between the two for each world and episode.")
       .at_least(0);
-  v("jitter_s", c.jitter_s, "Uniform in +-jitter_s, fresh for every row.").at_least(0);
-  v("interpolate", c.interpolate, "Linear between rows; floats only.");
+  v("jitter_s", c.jitter_s, "Jitter, uniform in +-jitter_s and drawn anew for every row.")
+      .at_least(0);
+  v("interpolate", c.interpolate, "Interpolate linearly between rows; floating-point fields only.");
   v.include(static_cast<Effect&>(c));
 }
 
@@ -100,12 +101,14 @@ void visit_fields(V& v, StepDelay& c) {
   v.object("StepDelay", "mjlab's delay, in control steps.", "step_delay")
       .frozen()
       .module("effects");
-  v("min_lag", c.min_lag, "The least.").at_least(0);
-  v("max_lag", c.max_lag, "The most; drawn between them.").at_least(0);
-  v("per_world", c.per_world, "False: all worlds have the same lag.");
-  v("hold_probability", c.hold_probability, "That a drawn lag is not taken.").within(0, 1);
-  v("update_period", c.update_period, "Steps between draws; 0: every step.").at_least(0);
-  v("per_world_phase", c.per_world_phase, "Worlds draw at steps of their own.");
+  v("min_lag", c.min_lag, "Minimum lag.").at_least(0);
+  v("max_lag", c.max_lag, "Maximum lag; the lag is drawn between the two.").at_least(0);
+  v("per_world", c.per_world, "Draw a lag for each world. False: all worlds have the same lag.");
+  v("hold_probability", c.hold_probability,
+    "Probability that a drawn lag is discarded and the previous one is kept.")
+      .within(0, 1);
+  v("update_period", c.update_period, "Number of steps between draws; 0: every step.").at_least(0);
+  v("per_world_phase", c.per_world_phase, "Give each world its own phase for the draws.");
   v.include(static_cast<Effect&>(c));
 }
 
@@ -133,12 +136,14 @@ struct Rate : Effect {
 };
 template <class V>
 void visit_fields(V& v, Rate& c) {
-  v.object("Rate", "A device slower than the control loop: rows are held in between.", "rate")
+  v.object("Rate", "A device that is slower than the control loop: rows are held in between.",
+           "rate")
       .frozen()
       .module("effects");
-  v("rate_hz", c.rate_hz, "New rows a second.").positive();
-  v("phase_s", c.phase_s, "Of the first one.");
-  v("random_phase", c.random_phase, "Uniform over a period, for each world and episode.");
+  v("rate_hz", c.rate_hz, "Number of new rows per second.").positive();
+  v("phase_s", c.phase_s, "Time of the first row.");
+  v("random_phase", c.random_phase,
+    "Draw the phase uniformly over one period, for each world and episode.");
   v.include(static_cast<Effect&>(c));
 }
 
@@ -168,10 +173,11 @@ struct Dropout : Effect {
 };
 template <class V>
 void visit_fields(V& v, Dropout& c) {
-  v.object("Dropout", "A row is lost with this probability.", "dropout").frozen().module("effects");
-  v("probability", c.probability, "That a row is lost; the first of an episode never is.")
+  v.object("Dropout", "Loses rows with a given probability.", "dropout").frozen().module("effects");
+  v("probability", c.probability,
+    "Probability that a row is lost; the first row of an episode is never lost.")
       .within(0, 1);
-  v("mode", c.mode, "What is given instead; hold: the last row.");
+  v("mode", c.mode, "The value reported instead; hold: the last row.");
   v.include(static_cast<Effect&>(c));
 }
 

@@ -40,34 +40,41 @@ struct VideoCfg {
 };
 template <class V>
 void visit_fields(V& v, VideoCfg& c) {
-  v.object("VideoCfg", "How pictures are kept.");
-  v("ffmpeg", c.ffmpeg, "The program; by default ``$MJSENSE_FFMPEG``, else that of ``PATH``.");
-  v("crf", c.crf, "Quality of videos, 0 lossless to 51.").within(0, 51);
+  v.object("VideoCfg", "How images are stored.");
+  v("ffmpeg", c.ffmpeg,
+    "Path of the ffmpeg program; by default ``$MJSENSE_FFMPEG``, else the one in ``PATH``.");
+  v("crf", c.crf, "Quality of the videos, from 0 (lossless) to 51 (worst).").within(0, 51);
   v("preset", c.preset,
-    "Effort of the video encoder, ultrafast to veryslow; see the file formats.");
+    "Speed preset of the video encoder, from ultrafast to veryslow; see the page on file formats.");
   v("molmospaces_depth", c.molmospaces_depth,
-    "Also depth as MolmoSpaces' loaders read it: a lossy red-green video.");
+    "Add depth in the form that MolmoSpaces' loaders read: a lossy red-green video.");
   v("max_encoders", c.max_encoders,
-    "ffmpeg processes at one time; 0: 32. Streams beyond them wait in raw files on disk.")
+    "Maximum number of concurrent ffmpeg processes; 0: 32. Further streams wait in raw files on "
+    "disk.")
       .at_least(0)
       .hidden();
   v("queue_frames", c.queue_frames,
-    "Frames of a stream that wait in memory; when they are full, the simulation waits.")
+    "Number of frames of a stream that are buffered in memory; when the buffer is full, the "
+    "simulation waits.")
       .at_least(1)
       .hidden();
   v("encoder_threads", c.threads,
-    "Of each encoder. The bytes of a video depend on it, so it is never taken from the machine.")
+    "Number of threads of each encoder. The bytes of a video depend on it, so it does not follow "
+    "the number of CPUs.")
       .at_least(1)
       .hidden();
-  v("keyint", c.keyint, "Most frames between key frames: fewer seek faster, more shrink.")
+  v("keyint", c.keyint,
+    "Maximum number of frames between key frames. A small value makes seeking faster, a large "
+    "value makes files smaller.")
       .at_least(1)
       .hidden();
   v("ffmpeg_timeout", c.ffmpeg_timeout,
-    "How long an ffmpeg may take no picture, or not come to its end, before it is ended.")
+    "Time after which an ffmpeg process that accepts no frame, or does not finish, is killed.")
       .unit("s")
       .positive()
       .hidden();
-  v("depth_unit", c.depth_unit, "Of the 16-bit depth video; 0.0002 reaches to 13.1 m.")
+  v("depth_unit", c.depth_unit,
+    "Unit of the 16-bit depth video; 0.0002 m covers distances up to 13.1 m.")
       .unit("m")
       .positive()
       .hidden();

@@ -45,25 +45,32 @@ struct MoveGroupCfg {
 template <class V>
 void visit_fields(V& v, MoveGroupCfg& c) {
   v.object("MoveGroupCfg", "Joints of a robot that are commanded together.");
-  v("name", c.name, "What actions and observations call it.").required();
-  v("kind", c.kind, "What it is: the first arm and gripper are those that tasks use.").required();
-  v("joints", c.joints, "Its joints, in the order of its numbers.");
+  v("name", c.name, "Name of the group in actions and observations.").required();
+  v("kind", c.kind, "Type of the group; tasks use the first arm and the first gripper.").required();
+  v("joints", c.joints, "Its joints, in the order of its values.");
   v("actuators", c.actuators,
-    "Its actuators, in the order of its targets; none: nothing drives it.");
-  v("controller", c.controller, "What a command means.");
-  v("leaf_site", c.leaf_site, "Site of its tool frame; none: the robot's base frame.");
-  v("root_body", c.root_body, "Body whose subtree is the group; a gripper's geoms are there.");
-  v("init", c.init, "Start positions (qpos) of its joints: rad or m.");
+    "Its actuators, in the order of its targets; empty: the group is not actuated.");
+  v("controller", c.controller, "The meaning of a command.");
+  v("leaf_site", c.leaf_site, "Site of its tool frame; empty: the robot's base frame.");
+  v("root_body", c.root_body,
+    "Body whose subtree forms the group; it contains the geoms of a gripper.");
+  v("init", c.init, "Start positions (qpos) of its joints, rad or m.");
   v("stooped", c.stooped,
-    "Likewise, where what it is to take is too low for ``init``; none: it does not stoop.");
-  v("spread", c.spread, "Half widths of the uniform noise of the start; none: no noise.")
+    "Start positions used if the target is too low for ``init``; empty: always ``init``.");
+  v("spread", c.spread, "Half widths of the uniform noise of the start positions; empty: no noise.")
       .at_least(0);
-  v("open_command", c.open_command, "Of a gripper's actuators: open.");
-  v("closed_command", c.closed_command, "Of a gripper's actuators: closed.");
-  v("max_opening", c.max_opening, "Of a gripper, between the pads.").unit("m").at_least(0);
-  v("pad_sites", c.pad_sites, "Two sites on the faces of a gripper's pads.");
-  v("pad_half_width", c.pad_half_width, "Of a pad, across the approach.").unit("m").at_least(0);
-  v("pad_half_length", c.pad_half_length, "Of a pad, along the approach.").unit("m").at_least(0);
+  v("open_command", c.open_command, "Command of the actuators that opens a gripper.");
+  v("closed_command", c.closed_command, "Command of the actuators that closes a gripper.");
+  v("max_opening", c.max_opening, "Maximum distance between the pads of a gripper.")
+      .unit("m")
+      .at_least(0);
+  v("pad_sites", c.pad_sites, "Two sites on the contact faces of a gripper's pads.");
+  v("pad_half_width", c.pad_half_width, "Half size of a pad across the approach direction.")
+      .unit("m")
+      .at_least(0);
+  v("pad_half_length", c.pad_half_length, "Half size of a pad along the approach direction.")
+      .unit("m")
+      .at_least(0);
 }
 void validate(const MoveGroupCfg& cfg, std::string_view place);
 
@@ -77,10 +84,10 @@ struct CameraMount {
 template <class V>
 void visit_fields(V& v, CameraMount& c) {
   v.object("CameraMount", "A camera of the robot that an episode records.");
-  v("name", c.name, "Of its stream.").required();
-  v("camera", c.mjcf_camera, "Camera of the model.").required();
-  v("depth", c.record_depth, "Its depth is recorded, too.");
-  v("image_points", c.image_points, "``object_image_points`` looks through it.");
+  v("name", c.name, "Name of its stream.").required();
+  v("camera", c.mjcf_camera, "Name of the camera in the model.").required();
+  v("depth", c.record_depth, "Record its depth too.");
+  v("image_points", c.image_points, "Use it for ``object_image_points``.");
 }
 
 // Displacement of the tool that the arm's controllers see and recordings do not; normal, truncated.
@@ -92,12 +99,11 @@ struct ActionNoiseCfg {
 };
 template <class V>
 void visit_fields(V& v, ActionNoiseCfg& c) {
-  v.object("ActionNoiseCfg", "Displacement of the tool by noise on an arm's commands.");
-  v("scale", c.scale, "Standard deviation per metre that the command would move the tool.")
-      .at_least(0);
+  v.object("ActionNoiseCfg", "Random displacement of the tool, added to the commands of an arm.");
+  v("scale", c.scale, "Standard deviation per metre of commanded tool motion.").at_least(0);
   v("rotation_ratio", c.rotation_ratio, "Rotation (rad) per displacement (m).").at_least(0);
-  v("max_position", c.max_position, "Where it is cut.").unit("m").positive();
-  v("max_rotation", c.max_rotation, "Where it is cut.").unit("rad").positive();
+  v("max_position", c.max_position, "Limit of the displacement.").unit("m").positive();
+  v("max_rotation", c.max_rotation, "Limit of the rotation.").unit("rad").positive();
 }
 
 // A model that hangs on the robot's: a gripper on the flange of an arm.
@@ -110,12 +116,13 @@ struct PartCfg {
 };
 template <class V>
 void visit_fields(V& v, PartCfg& c) {
-  v.object("PartCfg", "A model that hangs on the robot's.");
-  v("model", c.model, "Its MJCF, from the file's folder, or ``embedded:<file>``.").required();
-  v("to", c.to, "Site or body that it hangs on.").required();
-  v("prefix", c.prefix, "Of its names.");
-  v("pos", c.pos, "Of its root where it hangs.").unit("m");
-  v("quat", c.quat, "Likewise, wxyz.");
+  v.object("PartCfg", "A model that is attached to the robot's model.");
+  v("model", c.model, "Its MJCF, relative to this file's folder, or ``embedded:<file>``.")
+      .required();
+  v("to", c.to, "Site or body to which it is attached.").required();
+  v("prefix", c.prefix, "Prefix of its names.");
+  v("pos", c.pos, "Position of its root in the frame to which it is attached.").unit("m");
+  v("quat", c.quat, "Orientation (wxyz) of its root in the frame to which it is attached.");
 }
 
 // Meshes that take the place of shapes where a folder has them.
@@ -128,12 +135,14 @@ struct MeshesCfg {
 };
 template <class V>
 void visit_fields(V& v, MeshesCfg& c) {
-  v.object("MeshesCfg", "Meshes that take the place of shapes where a folder has them.");
-  v("env", c.env, "Environment variable that names the folder; it goes before ``folder``.");
-  v("folder", c.folder, "The folder, from the file's own; nothing happens where there is none.");
-  v("replace", c.replace, "Regular expression of the names of the geoms that they replace.");
-  v("material", c.material, "Of the meshes.");
-  v("files", c.files, "File of the mesh of each body.");
+  v.object("MeshesCfg", "Meshes that replace primitive shapes if their folder exists.");
+  v("env", c.env,
+    "Environment variable that names the folder; it takes precedence over ``folder``.");
+  v("folder", c.folder,
+    "The folder, relative to this file; a folder that does not exist is ignored.");
+  v("replace", c.replace, "Regular expression for the names of the geoms that are replaced.");
+  v("material", c.material, "Material of the meshes.");
+  v("files", c.files, "Mesh file of each body.");
 }
 
 struct RobotCfg {
@@ -161,32 +170,34 @@ struct RobotCfg {
 };
 template <class V>
 void visit_fields(V& v, RobotCfg& c) {
-  v.object("RobotCfg", "What a robot is.");
-  v("name", c.name, "What messages and recordings call it; by default its folder's name.");
-  v("description", c.description, "A sentence for people.");
-  v("model", c.mjcf, "Its MJCF, from the file's folder, or ``embedded:<file>``.").required();
-  v("parts", c.parts, "Models that hang on it, in this order.");
-  v("meshes", c.meshes, "Meshes that take the place of shapes.");
+  v.object("RobotCfg", "A robot.");
+  v("name", c.name, "Name in messages and recordings; by default the folder's name.");
+  v("description", c.description, "Description in one sentence.");
+  v("model", c.mjcf, "Its MJCF, relative to this file's folder, or ``embedded:<file>``.")
+      .required();
+  v("parts", c.parts, "Models that are attached to it, in this order.");
+  v("meshes", c.meshes, "Meshes that replace primitive shapes.");
   v("base", c.base_body, "Body that is the robot's base frame.").required();
-  v("groups", c.groups, "Its move groups; their order is that of actions and observations.");
+  v("groups", c.groups, "Its move groups; actions and observations have the same order.");
   v("cameras", c.cameras, "Cameras that an episode records.");
-  v("width", c.image_width, "Of their pictures.").unit("pixels").at_least(1);
-  v("height", c.image_height, "Of their pictures.").unit("pixels").at_least(1);
-  v("noise", c.noise, "On the commands of arms.");
-  v("policy_dt_ms", c.policy_dt_ms, "One action of a policy.").unit("ms").at_least(1);
-  v("ctrl_dt_ms", c.ctrl_dt_ms, "One step of the controllers; divides ``policy_dt_ms``.")
+  v("width", c.image_width, "Width of the images.").unit("pixels").at_least(1);
+  v("height", c.image_height, "Height of the images.").unit("pixels").at_least(1);
+  v("noise", c.noise, "Noise on the commands of arms.");
+  v("policy_dt_ms", c.policy_dt_ms, "Duration of one action of a policy.").unit("ms").at_least(1);
+  v("ctrl_dt_ms", c.ctrl_dt_ms, "Period of the controllers; it divides ``policy_dt_ms``.")
       .unit("ms")
       .at_least(1);
-  v("sim_dt_ms", c.sim_dt_ms, "One step of the physics; divides ``ctrl_dt_ms``.")
+  v("sim_dt_ms", c.sim_dt_ms, "Duration of one physics step; it divides ``ctrl_dt_ms``.")
       .unit("ms")
       .at_least(1);
   v("opened", c.opened,
-    "Fraction of its range at which what the robot opens counts as open (task ``open``).")
+    "Fraction of its range beyond which a door or drawer counts as open (task ``open``).")
       .positive()
       .at_most(1);
   v("env_state_name", c.env_state_name,
-    "Name of a further row of ``env_states`` in MolmoSpaces' form; none: there is no such row.");
-  v("env_state_size", c.env_state_size, "Numbers of that row; 0: what the groups need.")
+    "Name of an additional row of ``env_states`` in MolmoSpaces' form; empty: no such row.");
+  v("env_state_size", c.env_state_size,
+    "Number of values in that row; 0: as many as the groups need.")
       .at_least(0);
 }
 // Periods that divide, unique names.

@@ -33,16 +33,19 @@ template <class V>
 void visit_fields(V& v, RecordJobCfg& c) {
   v.object("RecordJobCfg", "A recording of episodes.");
   v.include(c.rollout);
-  v("out", c.out, "Folder for the files.");
-  v("episodes", c.episodes, "How many to keep.").at_least(1);
-  v("max_attempts", c.max_attempts, "Episodes to try; 0: six times those to keep.").at_least(0);
-  v("keep_failures", c.keep_failures, "Keep episodes that fail, too.").decides_data();
-  v("resume", c.resume,
-    "Go on with an interrupted recording; everything that decides the data must be the same.");
-  v("house", c.house, "Number of the ``house_N`` folder below it.").at_least(0);
-  v("batches", c.batches, "HDF5 files that episodes are spread over; 0: one for every four.")
+  v("out", c.out, "Output directory.");
+  v("episodes", c.episodes, "Number of episodes to keep.").at_least(1);
+  v("max_attempts", c.max_attempts,
+    "Maximum number of episodes to attempt; 0: six times the number to keep.")
       .at_least(0);
-  v("gzip", c.gzip, "Compression of arrays, 0 to 9.").within(0, 9);
+  v("keep_failures", c.keep_failures, "Keep failed episodes too.").decides_data();
+  v("resume", c.resume,
+    "Continue an interrupted recording; all settings that affect the data must be unchanged.");
+  v("house", c.house, "Number of the ``house_N`` folder in the output directory.").at_least(0);
+  v("batches", c.batches,
+    "Number of HDF5 files over which the episodes are distributed; 0: one per four episodes.")
+      .at_least(0);
+  v("gzip", c.gzip, "Compression level of arrays, 0 to 9.").within(0, 9);
   v.include(c.video);
 }
 

@@ -80,59 +80,64 @@ struct RolloutCfg {
 };
 template <class V>
 void visit_fields(V& v, RolloutCfg& c) {
-  v.object("RolloutCfg", "Worlds that play episodes of a task.");
-  v("task", c.task, "Which task.").decides_data();
+  v.object("RolloutCfg", "Worlds that run episodes of a task.");
+  v("task", c.task, "Name of the task.").decides_data();
   v("robot", c.robot,
-    "Which robot; auto: the usual one, or of a task that it cannot do the first that can; none for "
-    "a "
-    "task whose scene has its own.")
+    "Name or file of the robot. ``auto``: the task's default robot, or the first that can do the "
+    "task; no robot for a task whose scene includes one.")
       .decides_data();
-  v("scene", c.scene, "Which scene, by its name or a file; by default the task's.")
-      .decides_data_as("scene");
-  v("policy", c.policy, "What drives it.").decides_data();
-  v("num_worlds", c.num_worlds, "How many run at one time.").option("worlds").at_least(1);
-  v("threads", c.threads, "Of the simulation; 0: every CPU this process may use.").at_least(0);
-  v("seed", c.seed, "Same seed, same episodes.").decides_data();
+  v("scene", c.scene, "Name or file of the scene; by default the task's.").decides_data_as("scene");
+  v("policy", c.policy, "Name of the policy.").decides_data();
+  v("num_worlds", c.num_worlds, "Number of worlds that run in parallel.")
+      .option("worlds")
+      .at_least(1);
+  v("threads", c.threads, "Number of simulation threads; 0: one per available CPU.").at_least(0);
+  v("seed", c.seed, "Random seed; the same seed gives the same episodes.").decides_data();
   v("camera_system", c.camera_system,
-    "Cameras of the robot's, by the system's name or a file; by default those of its model.")
+    "Name or file of the camera system; by default the cameras of the robot's model.")
       .decides_data_as("camera_system");
   v("cameras", c.cameras,
-    "Names of the cameras, in this order; by default all, none for an empty list.")
+    "Names of the cameras to render, in this order; by default all, an empty list renders none.")
       .decides_data_as("cameras");
-  v("width", c.width, "Of pictures; by default the robot's.")
+  v("width", c.width, "Width of the images; by default the robot's.")
       .unit("pixels")
       .at_least(1)
       .decides_data_as("cameras");
-  v("height", c.height, "Of pictures; by default the robot's.")
+  v("height", c.height, "Height of the images; by default the robot's.")
       .unit("pixels")
       .at_least(1)
       .decides_data_as("cameras");
-  v("depth", c.depth, "Also the depth of every camera, losslessly.").decides_data_as("cameras");
+  v("depth", c.depth, "Add a lossless depth image for every camera.").decides_data_as("cameras");
   v("segmentation", c.segmentation,
-    "Also what each pixel of every camera shows, losslessly: (id, mjtObj), of geoms mostly.")
+    "Add a lossless segmentation image for every camera: (id, mjtObj) of each pixel.")
       .decides_data_as("cameras");
-  v("samples", c.samples, "Rays a pixel of rgb: smooth edges for time.").at_least(1).decides_data();
-  v("shadows", c.shadows, "Pictures have shadows.").decides_data();
+  v("samples", c.samples,
+    "Rays per pixel of rgb; more samples give smoother edges and take longer.")
+      .at_least(1)
+      .decides_data();
+  v("shadows", c.shadows, "Draw shadows.").decides_data();
   v("meshes", c.meshes,
-    "What the robot is drawn with: ``shapes`` of ours, its ``real`` meshes, or ``auto``: these "
-    "where its environment variable (``MJSENSE_FRANKA_MESHES``) names them. It moves the same.")
+    "Geometry used to draw the robot: ``shapes`` (primitives), ``real`` (its meshes), or ``auto``: "
+    "the meshes if the robot's environment variable (``MJSENSE_FRANKA_MESHES``) names their "
+    "folder. Physics is not affected.")
       .one_of(kMeshes)
       .decides_data_as("meshes");
-  v("horizon", c.horizon, "Control steps after which an episode is cut; by default the task's.")
+  v("horizon", c.horizon, "Maximum number of control steps of an episode; by default the task's.")
       .at_least(1)
       .decides_data_as("horizon");
-  v("action_noise", c.action_noise, "Commands reach the arm with noise.")
+  v("action_noise", c.action_noise, "Add noise to the commands of the arm.")
       .option("noise")
       .decides_data();
   v("perturb", c.perturb,
-    "Share of episodes in which something goes wrong on purpose: the object is shoved, or slips "
-    "from the hand.")
+    "Fraction of episodes that are disturbed on purpose: the object is pushed, or slips from the "
+    "gripper.")
       .within(0, 1)
       .decides_data_as("perturb");
-  v("terminate_upon_success", c.terminate_upon_success, "An episode ends at its first success.")
+  v("terminate_upon_success", c.terminate_upon_success, "End an episode at its first success.")
       .decides_data_as("terminate_upon_success");
   v("use_sensors", c.use_sensors,
-    "Task, robot and policy bring their sensors; without them only those that are given.")
+    "Add the sensors of the task, of the robot and of the policy. False: only the sensors that are "
+    "passed in.")
       .decides_data_as("use_sensors")
       .hidden();
 }

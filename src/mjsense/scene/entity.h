@@ -40,22 +40,23 @@ void visit_fields(V& v, EntityCfg& c) {
            "A model that is attached to the scene; all its names get the prefix ``<entity>/``.");
   v.python("model", "str | Path | mujoco.MjSpec | Callable[[], mujoco.MjSpec]", "",
            "Path of an MJCF file, XML text, ``embedded:<file>`` (see "
-           ":func:`mjsense.embedded_models`), an MjSpec, or a function that makes one.")
+           ":func:`mjsense.embedded_models`), an MjSpec, or a function that returns one.")
       .required();
   v.python("assets", "Mapping[str, bytes]", "field(default_factory=dict)",
-           "Files that XML text refers to, by name.");
+           "Contents of the files that the XML text refers to, by file name.");
   v("pos", c.pos,
-    "Of the entity's root in the world: of its free body, else of the mocap body that a fixed base "
-    "hangs under.")
+    "Position of the entity's root in the world: of its free body or, for a fixed base, of the "
+    "mocap body that carries it.")
       .unit("m");
-  v("quat", c.quat, "Of the same, wxyz; the identity keeps what the XML says.");
+  v("quat", c.quat,
+    "Orientation (wxyz) of the entity's root; the identity keeps the orientation of the XML.");
   v("joint_pos", c.joint_pos,
-    "Joint positions (rad, m) of the keyframe ``init_state`` by regular expression that matches "
-    "the "
-    "whole local name, the first match counts; unless the model has a keyframe.");
+    "Joint positions (rad, m) of the keyframe ``init_state``, by regular expressions that must "
+    "match the whole local joint name; the first match counts. Ignored if the model has a "
+    "keyframe.");
   v("mocap_base", c.mocap_base,
-    "Hang a model without a free joint under the mocap body ``<entity>/mocap_base``, so that each "
-    "world can place it; False: attach it to the world as it is.");
+    "Attach a model without a free joint to a mocap body ``<entity>/mocap_base``, so that its pose "
+    "can differ between worlds. False: attach it to the world body.");
 }
 
 // Its rotation and its regular expressions.
@@ -72,13 +73,14 @@ struct ObjRef {
 template <class V>
 void visit_fields(V& v, ObjRef& c) {
   v.object("ObjRef",
-           "One MuJoCo element. Its full name is ``entity/name``, or ``name`` without an entity.")
+           "A reference to one MuJoCo element. Its full name is ``entity/name``, or ``name`` "
+           "without an entity.")
       .frozen();
   v("type", c.type,
-    "body (inertial frame), xbody (body frame), joint, geom, site, actuator, tendon, camera, and "
-    "so on.");
-  v("name", c.name, "Its name in the entity.");
-  v("entity", c.entity, "Whose name it is.").or_none();
+    "Type of the element: body (inertial frame), xbody (body frame), joint, geom, site, actuator, "
+    "tendon, camera and so on.");
+  v("name", c.name, "Name of the element within the entity.");
+  v("entity", c.entity, "Entity that contains the element.").or_none();
 }
 
 }  // namespace mjsense

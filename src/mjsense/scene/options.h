@@ -45,29 +45,32 @@ struct OptionsCfg {
 };
 template <class V>
 void visit_fields(V& v, OptionsCfg& c) {
-  v.object(
-      "MujocoCfg",
-      "Physics options of a scene. Entities' own ``<option>`` values are not carried over: one "
-      "scene, one physics.");
-  v("timestep", c.timestep, "Of one substep.").unit("s").positive();
-  v("integrator", c.integrator, "How a state becomes the next one.");
-  v("cone", c.cone, "Of friction.");
-  v("solver", c.solver, "Of the constraints.");
-  v("jacobian", c.jacobian, "How the constraints' Jacobian is kept.");
-  v("impratio", c.impratio, "Stiffness of friction over that of normal forces.").positive();
-  v("iterations", c.iterations, "Of the solver, at most.").at_least(1);
-  v("tolerance", c.tolerance, "At which the solver stops.").at_least(0);
-  v("ls_iterations", c.ls_iterations, "Of the solver's line search, at most.").at_least(1);
-  v("ls_tolerance", c.ls_tolerance, "At which the line search stops.").at_least(0);
-  v("ccd_iterations", c.ccd_iterations, "Of convex collision detection, at most.").at_least(1);
-  v("gravity", c.gravity, "In the world frame.").unit("m/s^2");
-  v("magnetic", c.magnetic, "What magnetometers read, in the world frame.");
-  v("wind", c.wind, "Velocity of the medium.").unit("m/s");
-  v("density", c.density, "Of the medium.").unit("kg/m^3").at_least(0);
-  v("viscosity", c.viscosity, "Of the medium.").unit("Pa s").at_least(0);
+  v.object("MujocoCfg",
+           "Physics options of a scene. The ``<option>`` values of entities are not used, because "
+           "a scene has one set of physics options.");
+  v("timestep", c.timestep, "Duration of one physics step.").unit("s").positive();
+  v("integrator", c.integrator, "Numerical integrator.");
+  v("cone", c.cone, "Type of the friction cone.");
+  v("solver", c.solver, "Constraint solver.");
+  v("jacobian", c.jacobian, "Storage of the constraint Jacobian.");
+  v("impratio", c.impratio, "Ratio of frictional to normal constraint impedance.").positive();
+  v("iterations", c.iterations, "Maximum number of solver iterations.").at_least(1);
+  v("tolerance", c.tolerance, "Termination tolerance of the solver.").at_least(0);
+  v("ls_iterations", c.ls_iterations, "Maximum number of line search iterations of the solver.")
+      .at_least(1);
+  v("ls_tolerance", c.ls_tolerance, "Termination tolerance of the line search.").at_least(0);
+  v("ccd_iterations", c.ccd_iterations,
+    "Maximum number of iterations of convex collision detection.")
+      .at_least(1);
+  v("gravity", c.gravity, "Gravitational acceleration in the world frame.").unit("m/s^2");
+  v("magnetic", c.magnetic, "Magnetic flux that magnetometers measure, in the world frame.");
+  v("wind", c.wind, "Velocity of the medium in the world frame.").unit("m/s");
+  v("density", c.density, "Density of the medium.").unit("kg/m^3").at_least(0);
+  v("viscosity", c.viscosity, "Viscosity of the medium.").unit("Pa s").at_least(0);
   v("disableflags", c.disableflags,
-    "Lower-case names of MJCF flags: ``(\"contact\", \"gravity\")``.");
-  v("enableflags", c.enableflags, "Likewise, of those that are off.");
+    "Flags to disable, by their lower-case MJCF names: ``(\"contact\", \"gravity\")``.");
+  v("enableflags", c.enableflags,
+    "Flags to enable that are off by default, by their lower-case MJCF names.");
 }
 
 // Of the flags.

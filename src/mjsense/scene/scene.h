@@ -43,25 +43,26 @@ struct SceneCfg {
 };
 template <class V>
 void visit_fields(V& v, SceneCfg& c) {
-  v.object("SceneCfg", "What all worlds share.");
-  v.python("num_envs", "int", "1", "B, unless ``Simulation(num_worlds=...)`` says otherwise.");
-  v("env_spacing", c.env_spacing, "Between the origins of neighbouring worlds on a plane.")
+  v.object("SceneCfg", "The configuration shared by all worlds.");
+  v.python("num_envs", "int", "1",
+           "Number of worlds B; ``Simulation(num_worlds=...)`` overrides it.");
+  v("env_spacing", c.env_spacing, "Distance between the origins of neighbouring worlds on a plane.")
       .unit("m")
       .at_least(0);
-  v("terrain", c.terrain, "The ground.");
-  v("entities", c.entities, "Attached in this order.");
+  v("terrain", c.terrain, "The ground; None adds no ground.");
+  v("entities", c.entities, "Models by name; they are attached in this order.");
   v.python("sensors", "Sequence[Any]", "()",
-           "Sensor configurations, configurations of your own with ``build()``, or "
+           "Sensor configurations, user-defined configurations with ``build()``, or "
            ":class:`mjsense.Sensor` objects.");
-  v("extent", c.extent, "Overrides ``stat.extent`` of the model.").unit("m").positive();
+  v("extent", c.extent, "Value that replaces ``stat.extent`` of the model.").unit("m").positive();
   v.python("spec_fn", "Callable[[mujoco.MjSpec], None] | None", "None",
-           "Edits the spec last, before compilation.");
-  v("options", c.options, "Of the physics.");
+           "Function that edits the MjSpec last, before compilation.");
+  v("options", c.options, "Physics options.");
   v.python(
       "base", "str | Path | None", "None",
-      "A whole model to start from, as it is (path or XML text): names without a prefix, any "
-      "number of free joints, its own ``<option>`` unless ``options`` are set. Its sensors are "
-      "found; it is no entity.");
+      "A complete model (path or XML text) that the scene starts from, used unchanged: its names "
+      "get no prefix, it may have any number of free joints, and its ``<option>`` is kept unless "
+      "``options`` are set. Its sensors become sensors of the scene; it is not an entity.");
 }
 
 // Names of an entity's elements, local (without the prefix), in model order. An element that its

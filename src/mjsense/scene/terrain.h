@@ -48,22 +48,26 @@ struct SubTerrainCfg {
 template <class V>
 void visit_fields(V& v, SubTerrainCfg& c) {
   v.object("SubTerrainCfg",
-           "One kind of tile. Pairs are (value at difficulty 0, value at difficulty 1).");
-  v("kind", c.kind, "What it looks like.");
-  v("proportion", c.proportion, "Share of the columns.").at_least(0);
-  v("inverted", c.inverted, "slope, stairs: down into a pit.");
-  v("platform_width", c.platform_width, "The flat square at the centre.").unit("m").positive();
-  v("amplitude", c.amplitude, "rough and waves: half the height.").unit("m").at_least(0);
-  v("spacing", c.spacing, "rough: between the knots.").unit("m").positive();
-  v("waves", c.waves, "waves: periods a tile.").at_least(1);
-  v("slope", c.slope, "slope: rise over run; inverted for a pit.").at_least(0);
-  v("step_height", c.step_height, "stairs: of a step.").unit("m").positive();
-  v("step_width", c.step_width, "stairs: of a step.").unit("m").positive();
-  v("stone_width", c.stone_width, "stepping_stones: of a stone.").unit("m").above(0.02);
-  v("gap", c.gap, "stepping_stones: between stones.").unit("m").at_least(0);
-  v("stone_height", c.stone_height, "stepping_stones: by which stones stand higher or lower.")
+           "One kind of tile. Pairs hold the value at difficulty 0 and the value at difficulty 1.");
+  v("kind", c.kind, "The shape of the tile.");
+  v("proportion", c.proportion, "Share of the columns that have this kind.").at_least(0);
+  v("inverted", c.inverted, "slope, stairs: descend into a pit instead of rising to a platform.");
+  v("platform_width", c.platform_width, "Width of the flat square at the centre.")
+      .unit("m")
+      .positive();
+  v("amplitude", c.amplitude, "rough, waves: half of the height difference.").unit("m").at_least(0);
+  v("spacing", c.spacing, "rough: distance between the random heights.").unit("m").positive();
+  v("waves", c.waves, "waves: number of periods per tile.").at_least(1);
+  v("slope", c.slope, "slope: rise over run.").at_least(0);
+  v("step_height", c.step_height, "stairs: height of a step.").unit("m").positive();
+  v("step_width", c.step_width, "stairs: depth of a step.").unit("m").positive();
+  v("stone_width", c.stone_width, "stepping_stones: width of a stone.").unit("m").above(0.02);
+  v("gap", c.gap, "stepping_stones: distance between stones.").unit("m").at_least(0);
+  v("stone_height", c.stone_height, "stepping_stones: maximum deviation of a stone's height.")
       .unit("m");
-  v("pit_depth", c.pit_depth, "stepping_stones: below them.").unit("m").positive();
+  v("pit_depth", c.pit_depth, "stepping_stones: depth of the pit below the stones.")
+      .unit("m")
+      .positive();
 }
 
 // What its fields say of each other.
@@ -91,23 +95,24 @@ struct TerrainCfg {
 template <class V>
 void visit_fields(V& v, TerrainCfg& c) {
   v.object("TerrainCfg",
-           "The ground, registered as entity ``terrain``: a plane, or tiles of rising difficulty "
-           "(levels along x, types along y).");
-  v("terrain_type", c.terrain_type, "An infinite plane, or tiles.");
-  v("sub_terrains", c.sub_terrains, "Kinds of tiles by name; empty: one of every kind.");
-  v("levels", c.levels, "Tiles along x.").at_least(1);
-  v("types", c.types, "Columns; 0: one for each sub-terrain.").at_least(0);
-  v("tile_size", c.tile_size, "In x and y.").unit("m").positive();
-  v("difficulty", c.difficulty, "Of the first and the last level.");
-  v("resolution", c.resolution, "Of height fields.").unit("m").positive();
-  v("border", c.border, "Flat, around all tiles; 0: none.").unit("m").at_least(0);
-  v("max_init_level", c.max_init_level, "Highest level that a world starts on; -1: any.")
+           "The ground, registered as entity ``terrain``: a plane, or a grid of tiles of "
+           "increasing difficulty (levels along x, types along y).");
+  v("terrain_type", c.terrain_type, "An infinite plane, or generated tiles.");
+  v("sub_terrains", c.sub_terrains, "Tile kinds by name; empty: one of each kind.");
+  v("levels", c.levels, "Number of tiles along x.").at_least(1);
+  v("types", c.types, "Number of columns along y; 0: one per sub-terrain.").at_least(0);
+  v("tile_size", c.tile_size, "Size of a tile in x and y.").unit("m").positive();
+  v("difficulty", c.difficulty, "Difficulty of the first and of the last level.");
+  v("resolution", c.resolution, "Grid spacing of height fields.").unit("m").positive();
+  v("border", c.border, "Width of the flat border around all tiles; 0: no border.")
+      .unit("m")
+      .at_least(0);
+  v("max_init_level", c.max_init_level, "Highest level on which a world may start; -1: any level.")
       .at_least(-1);
-  v("seed", c.seed, "Of the tiles and of where worlds start.");
+  v("seed", c.seed, "Seed of the tile shapes and of the worlds' start tiles.");
   v("daylight", c.daylight,
-    "Where models and ``spec_fn`` bring no lamp a sun, where no sky one, and squares on a plane "
-    "that "
-    "has no material. False: MuJoCo's headlight alone.");
+    "Add a sun, a sky and a checkered ground where the models and ``spec_fn`` define none. False: "
+    "MuJoCo's headlight is the only light.");
 }
 
 void validate(const TerrainCfg& cfg, std::string_view place);

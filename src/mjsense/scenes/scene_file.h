@@ -31,24 +31,23 @@ struct SceneEntityCfg {
 template <class V>
 void visit_fields(V& v, SceneEntityCfg& c) {
   v.object("SceneEntityCfg", "A model of a scene; its names get the prefix ``<name>/``.");
-  v("name", c.name, "Of the entity.").required();
+  v("name", c.name, "Name of the entity.").required();
   v("model", c.model,
-    "An MJCF: a path, beside the scene's file, ``embedded:<file>``, or "
-    "``package:<package>/<file>`` "
-    "of an installed Python package.")
+    "An MJCF file: a path relative to the scene's file, ``embedded:<file>``, or "
+    "``package:<package>/<file>`` of an installed Python package.")
       .required();
-  v("pos", c.pos, "Where it stands.").unit("m");
-  v("quat", c.quat, "How it is turned, wxyz.");
+  v("pos", c.pos, "Position of the model.").unit("m");
+  v("quat", c.quat, "Orientation of the model, wxyz.");
   v("free", c.free,
-    "Its body gets a free joint, which models of single objects often lack; a body without a name "
-    "is called as the entity.");
+    "Give its body a free joint, which models of single objects often lack; a body without a name "
+    "is named after the entity.");
   v("without", c.without,
-    "Bodies that are left out, each with the whole tree in which it is: the robot of a model that "
-    "has one.");
+    "Bodies whose whole kinematic tree is removed, such as the robot of a model that includes "
+    "one.");
   v("inertia_groups", c.inertia_groups,
-    "Groups of the geoms whose masses count, first and last, instead of what the model says.");
+    "First and last group of the geoms whose masses count, instead of the model's setting.");
   v("hidden_group", c.hidden_group,
-    "Geoms of this group are there to be touched and are not seen; -1: those of group 3 and up.")
+    "Group of geoms that take part in contacts but are invisible; -1: groups 3 and up.")
       .within(-1, 5);
 }
 
@@ -66,14 +65,16 @@ struct SceneObjectCfg {
 };
 template <class V>
 void visit_fields(V& v, SceneObjectCfg& c) {
-  v.object("SceneObjectCfg", "A body with a free joint that a task may be about.");
-  v("body", c.body, "Full name in the scene, ``mug/mug``.").required();
-  v("text", c.text, "What people call it; without it the last part of its name.").or_none();
-  v("other_texts", c.other_texts, "What else they call it.");
-  v("rests", c.rests, "How it may rest.").one_of(kRests).not_empty();
-  v("receptacle", c.receptacle, "Things are put in or on it; it is not picked up itself.");
-  v("color", c.color, "Of a receptacle: what tells it from others of its kind.").or_none();
-  v("sizes", c.sizes, "Its own range of sizes, where the scene's does not suit it.")
+  v.object("SceneObjectCfg", "A body with a free joint that a task may use.");
+  v("body", c.body, "Full name in the scene, such as ``mug/mug``.").required();
+  v("text", c.text, "Word for the object in instructions; by default the last part of its name.")
+      .or_none();
+  v("other_texts", c.other_texts, "Other words for the object.");
+  v("rests", c.rests, "Poses in which it may rest.").one_of(kRests).not_empty();
+  v("receptacle", c.receptacle, "Objects are placed in or on it; it is not picked up.");
+  v("color", c.color, "Colour of a receptacle, which distinguishes it from others of its kind.")
+      .or_none();
+  v("sizes", c.sizes, "Minimum and maximum scale of this object, instead of the scene's.")
       .within(0.1, 10);
 }
 
@@ -85,15 +86,16 @@ struct SceneRegionCfg {
 };
 template <class V>
 void visit_fields(V& v, SceneRegionCfg& c) {
-  v.object("SceneRegionCfg", "A level surface on which objects may stand.");
-  v("name", c.name, "Of the region.").required();
-  v("on", c.on, "Full name of the box geom whose top it is, or of a body: then its highest.")
+  v.object("SceneRegionCfg", "A level surface on which objects may be placed.");
+  v("name", c.name, "Name of the region.").required();
+  v("on", c.on,
+    "Full name of the box geom whose top is the surface, or of a body: then its highest box.")
       .required();
   v("area", c.area,
-    "Where origins of objects may be: least x, most x, least y, most y in the world; all 0: the "
-    "whole top.")
+    "Area for the origins of objects: min x, max x, min y, max y in the world; all 0: the whole "
+    "surface.")
       .unit("m");
-  v("target_area", c.target_area, "The same for the object that a task is about.").unit("m");
+  v("target_area", c.target_area, "The same for the object that the task is about.").unit("m");
 }
 
 struct SceneRobotCfg {
@@ -104,11 +106,13 @@ struct SceneRobotCfg {
 };
 template <class V>
 void visit_fields(V& v, SceneRobotCfg& c) {
-  v.object("SceneRobotCfg", "Where the robot's base stands at the start of an episode.");
-  v("pos", c.pos, "On the floor.").unit("m");
-  v("yaw", c.yaw, "About the vertical, degrees.");
-  v("pos_spread", c.pos_spread, "Half width of uniform noise in x and y.").unit("m").at_least(0);
-  v("yaw_spread", c.yaw_spread, "Half width of uniform noise, degrees.").at_least(0);
+  v.object("SceneRobotCfg", "Placement of the robot's base at the start of an episode.");
+  v("pos", c.pos, "Position on the floor.").unit("m");
+  v("yaw", c.yaw, "Rotation about the vertical, degrees.");
+  v("pos_spread", c.pos_spread, "Half width of the uniform noise of x and y.")
+      .unit("m")
+      .at_least(0);
+  v("yaw_spread", c.yaw_spread, "Half width of the uniform noise of the yaw, degrees.").at_least(0);
 }
 
 enum class VaryKind { kLight, kMaterial, kGeom, kBody };
@@ -128,20 +132,24 @@ struct SceneVaryCfg {
 };
 template <class V>
 void visit_fields(V& v, SceneVaryCfg& c) {
-  v.object("SceneVaryCfg", "What is different in every episode; all draws are uniform.");
-  v("what", c.what, "Lights, materials, geoms (without a material) or bodies that do not move.")
+  v.object("SceneVaryCfg",
+           "Randomisation of lights, materials, geoms or bodies in every episode; all draws are "
+           "uniform.");
+  v("what", c.what,
+    "Type of the elements: lights, materials, geoms (without a material) or bodies that do not "
+    "move.")
       .required();
-  v("pattern", c.pattern, "Regular expression that matches the whole full name of each.")
+  v("pattern", c.pattern, "Regular expression that must match the whole full name of an element.")
       .required();
-  v("brightness", c.brightness, "Factor on the colour, least and most.").at_least(0);
-  v("hue", c.hue, "Half width of a turn of the hue, degrees.").within(0, 180);
-  v("saturation", c.saturation, "Half width of a shift of the saturation.").within(0, 1);
-  v("pos", c.pos, "light, body: half widths of a move.").unit("m").at_least(0);
+  v("brightness", c.brightness, "Minimum and maximum factor of the colour.").at_least(0);
+  v("hue", c.hue, "Half width of the change of the hue, degrees.").within(0, 180);
+  v("saturation", c.saturation, "Half width of the change of the saturation.").within(0, 1);
+  v("pos", c.pos, "light, body: half widths of the displacement.").unit("m").at_least(0);
   v("angle", c.angle,
-    "light: most by which its direction turns, body: half width of a turn about the vertical, "
+    "light: maximum change of its direction; body: half width of the rotation about the vertical, "
     "degrees.")
       .within(0, 90);
-  v("textures", c.textures, "material: full names of textures, one of which it has.");
+  v("textures", c.textures, "material: full names of the textures to choose from.");
 }
 
 struct SceneSkyCfg {
@@ -149,9 +157,9 @@ struct SceneSkyCfg {
 };
 template <class V>
 void visit_fields(V& v, SceneSkyCfg& c) {
-  v.object("SceneSkyCfg", "The colours around.");
-  v("top", c.top, "Of the zenith, rgb.").within(0, 1);
-  v("bottom", c.bottom, "Of the nadir, rgb.").within(0, 1);
+  v.object("SceneSkyCfg", "The colours of the sky.");
+  v("top", c.top, "Colour at the zenith, rgb.").within(0, 1);
+  v("bottom", c.bottom, "Colour at the nadir, rgb.").within(0, 1);
 }
 
 struct SceneHeadlightCfg {
@@ -159,10 +167,10 @@ struct SceneHeadlightCfg {
 };
 template <class V>
 void visit_fields(V& v, SceneHeadlightCfg& c) {
-  v.object("SceneHeadlightCfg", "The light at the camera, grey.");
-  v("ambient", c.ambient, "From everywhere.").within(0, 1);
-  v("diffuse", c.diffuse, "Scattered.").within(0, 1);
-  v("specular", c.specular, "Mirrored.").within(0, 1);
+  v.object("SceneHeadlightCfg", "The grey light at the camera.");
+  v("ambient", c.ambient, "Ambient intensity.").within(0, 1);
+  v("diffuse", c.diffuse, "Diffuse intensity.").within(0, 1);
+  v("specular", c.specular, "Specular intensity.").within(0, 1);
 }
 
 struct SceneFileCfg {
@@ -192,46 +200,48 @@ struct SceneFileCfg {
 template <class V>
 void visit_fields(V& v, SceneFileCfg& c) {
   v.object("SceneFileCfg",
-           "What an episode plays in: models, objects, where they may stand, and what differs.");
-  v("name", c.name, "Of the scene.").required();
-  v("description", c.description, "A sentence for people.");
+           "The scene of an episode: its models, its objects, where the objects may be placed, and "
+           "what is randomised.");
+  v("name", c.name, "Name of the scene.").required();
+  v("description", c.description, "Description in one sentence.");
   v("extends", c.extends,
-    "A scene, by name or file, whose values it has where it does not say another.")
+    "A scene, by name or file, that provides the values that this file does not set.")
       .or_none();
-  v("base", c.base, "An MJCF to start from, as it is, beside the file: names without a prefix.")
+  v("base", c.base,
+    "An MJCF file, next to this file, that the scene starts from unchanged: its names get no "
+    "prefix.")
       .or_none();
-  v("generator", c.generator,
-    "What makes its first entity, ``room``, and what belongs to it: one house of a street.")
+  v("generator", c.generator, "Generator of the first entity, ``room``, and of what belongs to it.")
       .or_none();
-  v("house", c.house, "Which of the generator's; ``<scene>:7`` is house 7 of a scene.").at_least(0);
-  v("parameters", c.parameters, "Numbers for the generator, by its names.");
-  v("entities", c.entities, "Its models, in this order.");
+  v("house", c.house, "Number of the generated house; ``<scene>:7`` is house 7 of a scene.")
+      .at_least(0);
+  v("parameters", c.parameters, "Parameters of the generator, by name.");
+  v("entities", c.entities, "The models, in this order.");
   v("objects", c.objects,
-    "Bodies that a task may be about; none named: all that have a free joint and that a hand can "
-    "hold.");
-  v("regions", c.regions, "Where they may stand; none: where their models have them.");
-  v("robot", c.robot, "Where the robot stands.");
-  v("vary", c.vary, "What is different in every episode.");
+    "Bodies that a task may use; empty: all graspable bodies with a free joint.");
+  v("regions", c.regions,
+    "Where objects may be placed; empty: objects stay where their models put them.");
+  v("robot", c.robot, "Placement of the robot.");
+  v("vary", c.vary, "What is randomised in every episode.");
   v("sky", c.sky,
-    "The colours around; without it a generated scene has blue ones outside its windows.");
-  v("headlight", c.headlight, "The light at the camera; without it MuJoCo's.");
-  v("options", c.options, "Of the physics.");
-  v("extent", c.extent, "``stat.extent`` of the model.").unit("m").positive();
+    "Colours of the sky; by default a generated scene has a blue sky outside its windows.");
+  v("headlight", c.headlight, "The light at the camera; by default MuJoCo's.");
+  v("options", c.options, "Physics options.");
+  v("extent", c.extent, "Value that replaces ``stat.extent`` of the model.").unit("m").positive();
   v("sizes", c.sizes,
-    "Of each object in an episode, as a factor on its model's, least and most: one of six, "
-    "evenly "
-    "apart.")
+    "Minimum and maximum scale of the objects; an episode uses one of six evenly spaced scales.")
       .within(0.1, 10);
-  v("gap", c.gap, "Free between two objects.").unit("m").at_least(0);
-  v("target_gap", c.target_gap, "Free around the object that a task is about.")
+  v("gap", c.gap, "Minimum distance between two objects.").unit("m").at_least(0);
+  v("target_gap", c.target_gap,
+    "Minimum distance between the object that the task is about and the others.")
       .unit("m")
       .at_least(0);
-  v("drop", c.drop, "Above the surface at the start.").unit("m").at_least(0);
+  v("drop", c.drop, "Height above the surface at which objects start.").unit("m").at_least(0);
   v("count", c.count,
-    "Objects that are there, the target among them, least and most; -1: all. The others stand far "
-    "away.");
+    "Minimum and maximum number of objects that are present, the target included; -1: all. The "
+    "others are parked far away.");
   v.python("models", "Callable[[], SceneCfg] | None", "None",
-           "Makes the models, in the place of ``base`` and ``entities``.");
+           "Function that makes the models, instead of ``base`` and ``entities``.");
 }
 
 // What its fields say of each other. Throws ValueError.

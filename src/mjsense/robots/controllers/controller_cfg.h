@@ -20,7 +20,7 @@ struct JointPositionCfg {
 };
 template <class V>
 void visit_fields(V& v, JointPositionCfg& c) {
-  v.object("JointPositionCfg", "A command is what the actuators take: positions.",
+  v.object("JointPositionCfg", "A command is the positions that the actuators take.",
            "joint_position");
   v("ramp", c.ramp, kRampText);
 }
@@ -30,16 +30,17 @@ struct JointPositionRelativeCfg {
 };
 template <class V>
 void visit_fields(V& v, JointPositionRelativeCfg& c) {
-  v.object("JointPositionRelativeCfg", "A command is a motion away from the present positions.",
+  v.object("JointPositionRelativeCfg", "A command is a displacement from the current positions.",
            "joint_position_relative");
-  v("threshold", c.threshold, "A joint whose command is smaller keeps its target.").at_least(0);
+  v("threshold", c.threshold, "A joint whose command is smaller than this keeps its target.")
+      .at_least(0);
 }
 
 struct JointVelocityCfg {};
 template <class V>
 void visit_fields(V& v, JointVelocityCfg&) {
   v.object("JointVelocityCfg",
-           "A command is a velocity, of velocity servos or of position servos' targets.",
+           "A command is a velocity, for velocity servos or for the targets of position servos.",
            "joint_velocity");
 }
 
@@ -49,10 +50,10 @@ struct TorsoHeightCfg {
 };
 template <class V>
 void visit_fields(V& v, TorsoHeightCfg& c) {
-  v.object("TorsoHeightCfg", "One command bends several joints that lift the torso.",
+  v.object("TorsoHeightCfg", "A single command moves the joints that lift the torso.",
            "torso_height");
-  v("range", c.range, "Of the command.").unit("rad");
-  v("ratio", c.ratio, "Each joint's position per unit of the command.").required();
+  v("range", c.range, "Range of the command.").unit("rad");
+  v("ratio", c.ratio, "Position of each joint per unit of the command.").required();
 }
 
 struct HolonomicBaseCfg {
@@ -63,13 +64,18 @@ struct HolonomicBaseCfg {
 };
 template <class V>
 void visit_fields(V& v, HolonomicBaseCfg& c) {
-  v.object("HolonomicBaseCfg",
-           "A command is a place on the floor, x, y and yaw, of two slides and a hinge.",
-           "holonomic_base");
+  v.object(
+      "HolonomicBaseCfg",
+      "A command is a pose on the floor, x, y and yaw, for two slide joints and a hinge joint.",
+      "holonomic_base");
   v("ramp", c.ramp, kRampText);
   v("noise", c.noise, "Standard deviation per unit of the motion.").at_least(0);
-  v("max_position_noise", c.max_position_noise, "Where it is cut.").unit("m").positive();
-  v("max_rotation_noise", c.max_rotation_noise, "Where it is cut.").unit("rad").positive();
+  v("max_position_noise", c.max_position_noise, "Limit of the position noise.")
+      .unit("m")
+      .positive();
+  v("max_rotation_noise", c.max_rotation_noise, "Limit of the rotation noise.")
+      .unit("rad")
+      .positive();
 }
 
 struct DifferentialBaseCfg {
@@ -81,13 +87,13 @@ struct DifferentialBaseCfg {
 template <class V>
 void visit_fields(V& v, DifferentialBaseCfg& c) {
   v.object("DifferentialBaseCfg",
-           "A command is a speed ahead and a turning speed, of two wheels (left, right) or of two "
-           "slides and a hinge.",
+           "A command is a forward speed and a turning speed, for two wheels (left, right) or for "
+           "two slide joints and a hinge joint.",
            "differential_base");
-  v("max_speed", c.max_speed, "Commands beyond it are cut.").unit("m/s").positive();
-  v("max_turn", c.max_turn, "Commands beyond it are cut.").unit("rad/s").positive();
-  v("wheel_radius", c.wheel_radius, "Of wheels.").unit("m").positive();
-  v("track", c.track, "Between the wheels.").unit("m").positive();
+  v("max_speed", c.max_speed, "Limit of the forward speed.").unit("m/s").positive();
+  v("max_turn", c.max_turn, "Limit of the turning speed.").unit("rad/s").positive();
+  v("wheel_radius", c.wheel_radius, "Radius of the wheels.").unit("m").positive();
+  v("track", c.track, "Distance between the wheels.").unit("m").positive();
 }
 
 struct MocapBaseCfg {
@@ -96,10 +102,10 @@ struct MocapBaseCfg {
 };
 template <class V>
 void visit_fields(V& v, MocapBaseCfg& c) {
-  v.object("MocapBaseCfg", "A command is a pose in the world, of a base that is a mocap body.",
+  v.object("MocapBaseCfg", "A command is a pose in the world, for a base that is a mocap body.",
            "mocap_base");
-  v("max_speed", c.max_speed, "It goes there no faster.").unit("m/s").positive();
-  v("max_turn", c.max_turn, "It turns there no faster.").unit("rad/s").positive();
+  v("max_speed", c.max_speed, "Maximum speed of the base.").unit("m/s").positive();
+  v("max_turn", c.max_turn, "Maximum turning speed of the base.").unit("rad/s").positive();
 }
 
 struct FreeBaseCfg {
@@ -110,17 +116,17 @@ struct FreeBaseCfg {
 template <class V>
 void visit_fields(V& v, FreeBaseCfg& c) {
   v.object("FreeBaseCfg",
-           "A command is a pose in the world, of a floating base that is welded to a mocap body.",
+           "A command is a pose in the world, for a floating base that is welded to a mocap body.",
            "free_base");
   v("target", c.target, "The mocap body.").required();
-  v("max_speed", c.max_speed, "The target goes there no faster.").unit("m/s").positive();
-  v("max_turn", c.max_turn, "The target turns there no faster.").unit("rad/s").positive();
+  v("max_speed", c.max_speed, "Maximum speed of the mocap body.").unit("m/s").positive();
+  v("max_turn", c.max_turn, "Maximum turning speed of the mocap body.").unit("rad/s").positive();
 }
 
 struct NoControllerCfg {};
 template <class V>
 void visit_fields(V& v, NoControllerCfg&) {
-  v.object("NoControllerCfg", "It takes no command and stays as it starts.", "none");
+  v.object("NoControllerCfg", "The group takes no command and keeps its start position.", "none");
 }
 
 using ControllerCfg =

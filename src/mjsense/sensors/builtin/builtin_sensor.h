@@ -58,32 +58,36 @@ void visit_fields(V& v, BuiltinSensorCfg& c) {
            "builtin");
   v.extends(static_cast<SensorCfg&>(c));
   v("sensor_type", c.sensor_type,
-    "accelerometer, gyro, framepos, jointpos, rangefinder and so on: the MJCF name.");
-  v("obj", c.obj, "What is measured.").or_none();
+    "MJCF name of the sensor type: accelerometer, gyro, framepos, jointpos, rangefinder and so "
+    "on.");
+  v("obj", c.obj, "The element that is measured.").or_none();
   v("ref", c.ref,
-    "Frame in which a frame sensor's value is expressed, the world without one; the second object "
-    "of "
-    "camprojection, insidesite, distance, normal, fromto, tactile.")
+    "Reference frame of a frame sensor, the world by default; the second object of camprojection, "
+    "insidesite, distance, normal, fromto and tactile.")
       .or_none();
   v("cutoff", c.cutoff,
-    "Positive: every component is limited to [-cutoff, cutoff] (a rangefinder's -1 too). Distance, "
-    "normal and fromto: the largest distance that is looked for, m.");
-  v("delay", c.delay, "Between a reading and its showing. Needs nsample.").unit("s").at_least(0);
-  v("interval", c.interval, "Between readings; 0: every physics step. Needs nsample.")
+    "If positive, every component is clipped to [-cutoff, cutoff] (the -1 of a rangefinder too). "
+    "For distance, normal and fromto: the maximum distance that is searched, m.");
+  v("delay", c.delay, "Delay of the readings. Requires nsample.").unit("s").at_least(0);
+  v("interval", c.interval,
+    "Time between readings; 0: one reading per physics step. Requires nsample.")
       .unit("s")
       .at_least(0);
-  v("phase", c.phase, "When readings are taken, in (-interval, 0].").unit("s").at_most(0);
-  v("nsample", c.nsample, "Readings kept, newest first, in the field ``history``.").at_least(0);
-  v("interp", c.interp, "What is read between readings.");
-  v("noise", c.noise, "Standard deviation; stored in the model, never applied by MuJoCo.")
+  v("phase", c.phase, "Time offset of the readings, in (-interval, 0].").unit("s").at_most(0);
+  v("nsample", c.nsample, "Number of readings kept in the field ``history``, newest first.")
       .at_least(0);
-  v("data", c.data, "Rangefinder: what of each ray, in this order.").one_of(kRangeFields);
-  v("enclosed", c.enclosed, "insidesite: by how much the whole object juts out, m.");
-  v("dim", c.dim, "User sensors: numbers in a row.").at_least(0);
-  v("datatype", c.datatype, "User sensors: what the numbers are.");
-  v("needstage", c.needstage, "User sensors: what must be computed before.");
-  v("plugin", c.plugin, "Plugin sensors: identifier.");
-  v("instance", c.instance, "Plugin sensors: full name of an instance in an entity's XML.");
+  v("interp", c.interp, "Interpolation between readings.");
+  v("noise", c.noise,
+    "Standard deviation of the noise; it is stored in the model, but MuJoCo does not apply it.")
+      .at_least(0);
+  v("data", c.data, "Rangefinder: the quantities reported for each ray, in this order.")
+      .one_of(kRangeFields);
+  v("enclosed", c.enclosed, "insidesite: report by how much the whole object protrudes, m.");
+  v("dim", c.dim, "User sensors: number of values in a row.").at_least(0);
+  v("datatype", c.datatype, "User sensors: type of the values.");
+  v("needstage", c.needstage, "User sensors: the last stage of the computation that they require.");
+  v("plugin", c.plugin, "Plugin sensors: identifier of the plugin.");
+  v("instance", c.instance, "Plugin sensors: full name of a plugin instance in an entity's XML.");
 }
 
 // Fields: "" float32 [dim]; with a history (nsample > 0) also "history" float32 [nsample, dim], the

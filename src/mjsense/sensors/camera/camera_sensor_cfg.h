@@ -42,13 +42,13 @@ struct CameraIntrinsics {
 template <class V>
 void visit_fields(V& v, CameraIntrinsics& c) {
   v.object("CameraIntrinsics",
-           "Focal lengths and principal point in pixels of the image; replaces fovy and what the "
-           "model says.")
+           "Focal lengths and principal point in pixels of the image; they replace fovy and the "
+           "parameters of the model.")
       .frozen();
-  v("fx", c.fx, "Focal length in u.").unit("pixels").positive().required();
-  v("fy", c.fy, "Focal length in v.").unit("pixels").positive().required();
-  v("cx", c.cx, "Principal point, to the right.").unit("pixels").required();
-  v("cy", c.cy, "Principal point, down.").unit("pixels").required();
+  v("fx", c.fx, "Horizontal focal length.").unit("pixels").positive().required();
+  v("fy", c.fy, "Vertical focal length.").unit("pixels").positive().required();
+  v("cx", c.cx, "Principal point, from the left border.").unit("pixels").required();
+  v("cy", c.cy, "Principal point, from the top border.").unit("pixels").required();
 }
 
 enum class LensKind { kNone, kBrownConrady, kFisheye };
@@ -72,7 +72,7 @@ void visit_fields(V& v, LensDistortion& c) {
        "fisheye: ``r' = theta (1 + k1 theta^2 + k2 theta^4 + k3 theta^6 + k4 theta^8)``, theta "
        "the angle to the axis, up to 89 degrees.")
       .frozen();
-  v("model", c.model, "Which of them.");
+  v("model", c.model, "The distortion model.");
   v("coefficients", c.coefficients, "brown_conrady: k1 k2 p1 p2 k3; fisheye: k1 k2 k3 k4.");
 }
 
@@ -88,20 +88,19 @@ struct CameraVizCfg {
 };
 template <class V>
 void visit_fields(V& v, CameraVizCfg& c) {
-  v.object(
-      "CameraVizCfg",
-      "What a viewer draws of a camera: the pyramid of what it sees, from ``near`` (or its own "
-      "place) on, and its axes (it looks along -z, the blue one).");
-  v("show_frustum", c.show_frustum, "The pyramid.");
-  v("show_frame", c.show_frame, "The axes.");
+  v.object("CameraVizCfg",
+           "The debug drawing of a camera: its view frustum, starting at ``near`` (or at the "
+           "camera), and its axes (it looks along -z, the blue axis is +z).");
+  v("show_frustum", c.show_frustum, "Draw the view frustum.");
+  v("show_frame", c.show_frame, "Draw the axes.");
   v("frustum_depth", c.frustum_depth,
-    "From the camera plane (through a lens: along the rays); 0: ``far``, or without one 10 "
-    "``stat.meansize``.")
+    "Length of the frustum from the camera plane (with a lens model: along the rays); 0: ``far``, "
+    "or 10 ``stat.meansize`` without one.")
       .unit("m")
       .at_least(0);
-  v("frustum_color", c.frustum_color, "Of the pyramid, rgba.").within(0, 1);
-  v("line_width", c.line_width, "Of the pyramid.").unit("pixels").at_least(0);
-  v("axis_length", c.axis_length, "Of the axes, in units of ``stat.meansize``.").at_least(0);
+  v("frustum_color", c.frustum_color, "Colour of the frustum, rgba.").within(0, 1);
+  v("line_width", c.line_width, "Line width of the frustum.").unit("pixels").at_least(0);
+  v("axis_length", c.axis_length, "Length of the axes, in units of ``stat.meansize``.").at_least(0);
 }
 
 enum class DepthKind { kPlanar, kRay };
@@ -155,34 +154,40 @@ struct CameraSensorCfg : SensorCfg {
 template <class V>
 void visit_fields(V& v, CameraSensorCfg& c) {
   v.object("CameraSensorCfg",
-           "A camera of the model (``camera_name``), or a new one. ``data`` is a "
+           "A camera of the model (``camera_name``) or a new camera. ``data`` is a "
            ":class:`mjsense.CameraData`.",
            "camera");
   v.extends(static_cast<SensorCfg&>(c));
   v("camera_name", c.camera_name,
-    "Full name of an existing camera, ``robot/wrist``; without one: a new camera called as the "
-    "sensor.")
+    "Full name of an existing camera, such as ``robot/wrist``; empty: a new camera with the "
+    "sensor's name is added.")
       .or_none();
   v("parent_body", c.parent_body,
-    "Full name of the body that carries a new camera; the world without one.")
+    "Full name of the body that carries a new camera; empty: the world.")
       .or_none();
-  v("pos", c.pos, "Of a new camera in the parent body.").unit("m");
-  v("quat", c.quat, "wxyz, of a new camera in the parent body: x right, y up, looking along -z.");
+  v("pos", c.pos, "Position of a new camera in the frame of its parent body.").unit("m");
+  v("quat", c.quat,
+    "Orientation (wxyz) of a new camera in the frame of its parent body: x right, y up, looking "
+    "along -z.");
   v("fovy", c.fovy,
-    "Vertical, degrees; orthographic: height of the image, m. None: the camera's own, 45 for a new "
-    "one. Beside ``camera_name`` it is this sensor's alone.")
+    "Vertical field of view in degrees; with orthographic: height of the image in m. None: that of "
+    "the camera, 45 for a new one. With ``camera_name`` only this sensor is affected.")
       .positive();
-  v("width", c.width, "The resolution in the MJCF plays no part.").unit("pixels").within(1, 16384);
-  v("height", c.height, "Likewise.").unit("pixels").within(1, 16384);
-  v("data_types", c.data_types, "Which fields there are.").one_of(kCameraDataTypes).not_empty();
-  v("use_textures", c.use_textures, "Textures of materials, and the skybox.");
-  v("use_shadows", c.use_shadows, "Of lights that cast them.");
-  v("enabled_geom_groups", c.enabled_geom_groups, "Groups (0 to 5) that are seen.")
+  v("width", c.width, "Width of the image; the resolution in the MJCF is not used.")
+      .unit("pixels")
+      .within(1, 16384);
+  v("height", c.height, "Height of the image; the resolution in the MJCF is not used.")
+      .unit("pixels")
+      .within(1, 16384);
+  v("data_types", c.data_types, "The image types to compute.").one_of(kCameraDataTypes).not_empty();
+  v("use_textures", c.use_textures, "Draw the textures of materials and the skybox.");
+  v("use_shadows", c.use_shadows, "Draw the shadows of lights that cast shadows.");
+  v("enabled_geom_groups", c.enabled_geom_groups, "Geom groups (0 to 5) that are visible.")
       .within(0, 5)
       .not_empty();
   v("orthographic", c.orthographic,
-    "Parallel rays. Beside ``camera_name`` it is this sensor's alone.");
-  v("clone_data", c.clone_data, "``data`` is a copy at every read.");
+    "Use an orthographic projection. With ``camera_name`` only this sensor is affected.");
+  v("clone_data", c.clone_data, "Return a copy of ``data`` at every read.");
   v("enabled_site_groups", c.enabled_site_groups,
     "Groups (0 to 5) of sites that are drawn, as MuJoCo draws them.")
       .within(0, 5);
@@ -190,17 +195,20 @@ void visit_fields(V& v, CameraSensorCfg& c) {
     "Groups (0 to 5) of tendons that are drawn, as MuJoCo draws them.")
       .within(0, 5);
   v("max_lights", c.max_lights,
-    "Of the lights that are on, the headlight first, so many shine. MuJoCo's OpenGL has 8.")
+    "Maximum number of active lights, the headlight first. MuJoCo's OpenGL renderer has 8.")
       .within(0, 32);
-  v("near", c.near, "From the camera plane; what is nearer is not seen.").unit("m").at_least(0);
-  v("far", c.far, "From the camera plane; what is farther is not seen; 0: no limit.")
+  v("near", c.near,
+    "Distance of the near plane from the camera plane; nearer surfaces are invisible.")
+      .unit("m")
+      .at_least(0);
+  v("far", c.far, "Distance of the far plane from the camera plane; 0: no limit.")
       .unit("m")
       .at_least(0)
       .may_be_infinite();
   v("clip_near", c.clip_near,
-    "model: ``near`` is where MuJoCo's renderers clip, ``visual/map/znear`` times the model's "
+    "model: clip at the near plane of MuJoCo's renderers, ``visual/map/znear`` times the model's "
     "extent.");
-  v("update_period", c.update_period, "Between images; 0: at every read.")
+  v("update_period", c.update_period, "Time between images; 0: a new image at every read.")
       .unit("s")
       .within(0, 1e6);  // more would be a mistake, and physics steps are counted in whole numbers
   v("phase", c.phase,
@@ -208,16 +216,18 @@ void visit_fields(V& v, CameraSensorCfg& c) {
     "reset.")
       .unit("s")
       .within(0, 1e6);
-  v("samples", c.samples, "Per pixel of rgb, for smooth edges.").within(1, 64);
+  v("samples", c.samples, "Rays per pixel of rgb; more samples give smoother edges.").within(1, 64);
   v("depth_kind", c.depth_kind,
-    "planar: distance to the camera plane; ray: along the pixel's ray.");
-  v("intrinsics", c.intrinsics, "Instead of fovy and of what the MJCF says.");
-  v("distortion", c.distortion, "Of the lens; the image is as distorted as the lens leaves it.");
+    "planar: distance to the camera plane; ray: distance along the pixel's ray.");
+  v("intrinsics", c.intrinsics,
+    "Intrinsic parameters; they replace fovy and the parameters of the MJCF.");
+  v("distortion", c.distortion, "Lens distortion; the image is not rectified.");
   v("depth_noise", c.depth_noise,
-    "What these stereo cameras make of ``depth``; the other fields stay exact.");
-  v("renderer", c.renderer, "opengl: MuJoCo's own renderer, where it was built in.");
-  v("debug_vis", c.debug_vis, "Drawn by ``Simulation.draw(scene)`` unasked.");
-  v("viz", c.viz, "How it is drawn.");
+    "Error model of a stereo camera, applied to ``depth``; the other fields stay exact.");
+  v("renderer", c.renderer, "opengl: MuJoCo's own renderer, if it was built in.");
+  v("debug_vis", c.debug_vis,
+    "Include this sensor when ``Simulation.draw(scene)`` is called without a list of sensors.");
+  v("viz", c.viz, "Appearance of the debug drawing.");
 }
 
 }  // namespace mjsense

@@ -31,17 +31,19 @@ struct ContactMatch {
 };
 template <class V>
 void visit_fields(V& v, ContactMatch& c) {
-  v.object("ContactMatch", "Which geoms or bodies take part in a contact.").frozen();
-  v("mode", c.mode, "A subtree is a body and all its descendants.").required();
+  v.object("ContactMatch", "Selects the geoms or bodies that take part in a contact.").frozen();
+  v("mode", c.mode, "Type of the matched elements. A subtree is a body and all its descendants.")
+      .required();
   v("pattern", c.pattern,
     "With an entity: regular expressions that must match a whole local name. Without: full MuJoCo "
-    "names, literally. Each must match something, and no name two of them.")
+    "names, taken literally. Each pattern must match something, and no element may be matched "
+    "twice.")
       .required()
       .or_one();
-  v("entity", c.entity, "Whose names these are.").or_none();
+  v("entity", c.entity, "Entity that contains the elements.").or_none();
   v("exclude", c.exclude,
-    "With an entity: names to leave out; one with any of ``.*+?[]{}()\\|^$`` is a regular "
-    "expression that is searched.");
+    "With an entity: names to leave out; an entry with any of ``.*+?[]{}()\\|^$`` is a regular "
+    "expression that is searched for.");
 }
 
 // Throw ValueError for what is wrong in any model. `place` starts the message: "sensor 'feet':

@@ -35,25 +35,25 @@ struct ContactVizCfg {
 };
 template <class V>
 void visit_fields(V& v, ContactVizCfg& c) {
-  v.object(
-      "ContactVizCfg",
-      "What a viewer draws of every contact in a slot. Colours are rgba, sizes in units of the "
-      "model's ``stat.meansize``.");
-  v("show_points", c.show_points, "A ball at the contact point.");
+  v.object("ContactVizCfg",
+           "The debug drawing of every contact in a slot. Colours are rgba, sizes are in units of "
+           "the model's ``stat.meansize``.");
+  v("show_points", c.show_points, "Draw a sphere at the contact point.");
   v("show_frames", c.show_frames,
-    "Axes of the contact: x (red) is the normal, from the primary to the secondary.");
+    "Draw the axes of the contact frame: x (red) is the normal, from the primary to the "
+    "secondary.");
   v("show_forces", c.show_forces,
-    "The force that the primary exerts on the secondary, as an arrow that ends at the contact "
+    "Draw the force that the primary exerts on the secondary, as an arrow that ends at the contact "
     "point.");
   v("force_scale", c.force_scale,
-    "Length of that arrow; 0: the model's ``vis.map.force``, as MuJoCo's own arrows.")
+    "Length of the arrow per newton; 0: the model's ``vis.map.force``, as for MuJoCo's own arrows.")
       .unit("m/N")
       .at_least(0);
-  v("point_color", c.point_color, "Of the balls.").within(0, 1);
-  v("force_color", c.force_color, "Of the arrows.").within(0, 1);
-  v("point_radius", c.point_radius, "Of the balls.").at_least(0);
-  v("axis_length", c.axis_length, "Of the axes.").at_least(0);
-  v("force_width", c.force_width, "Of the arrows.").at_least(0);
+  v("point_color", c.point_color, "Colour of the spheres.").within(0, 1);
+  v("force_color", c.force_color, "Colour of the arrows.").within(0, 1);
+  v("point_radius", c.point_radius, "Radius of the spheres.").at_least(0);
+  v("axis_length", c.axis_length, "Length of the axes.").at_least(0);
+  v("force_width", c.force_width, "Width of the arrows.").at_least(0);
 }
 
 struct ContactSensorCfg : SensorCfg {
@@ -93,37 +93,40 @@ void visit_fields(V& v, ContactSensorCfg& c) {
            "exerts on the secondary**: a box on the floor reads (0, 0, -m g) in the world frame.",
            "contact");
   v.extends(static_cast<SensorCfg&>(c));
-  v("primary", c.primary, "Whose contacts these are.").required();
-  v("secondary", c.secondary, "What they are with; without one: with anything.");
-  v("fields", c.fields, "What is measured of each contact.").one_of(kContactFields).not_empty();
+  v("primary", c.primary, "The geoms or bodies whose contacts are measured.").required();
+  v("secondary", c.secondary, "The other side of the contacts; None: anything.");
+  v("fields", c.fields, "The quantities measured for each contact.")
+      .one_of(kContactFields)
+      .not_empty();
   v("reduce", c.reduce,
-    "Which contacts come first: none: in MuJoCo's order; mindist: the deepest; maxforce: the "
-    "strongest; netforce: one synthetic contact at the force-weighted centroid, with the net "
-    "wrench "
-    "in the world frame.");
-  v("num_slots", c.num_slots, "S, contacts kept for each primary.").at_least(1);
+    "Order in which contacts fill the slots. none: MuJoCo's order; mindist: deepest first; "
+    "maxforce: strongest first; netforce: one synthetic contact at the force-weighted centroid, "
+    "with the net wrench in the world frame.");
+  v("num_slots", c.num_slots, "S, number of contacts kept for each primary.").at_least(1);
   v("secondary_policy", c.secondary_policy,
-    "When several elements match the secondary: first: the first in model order; error: an error; "
-    "any: no filter, the secondary is not looked at; each: every match, and who touches whom is "
-    "reported.");
+    "What to do if several elements match the secondary. first: use the first in model order; "
+    "error: raise an error; any: no filter, the secondary is ignored; each: use every match, and "
+    "report which pairs touch.");
   v("track_air_time", c.track_air_time,
-    "Timers of flight and contact; without found among the fields they stay 0, as in mjlab.");
+    "Measure the durations of flight and contact; they stay 0 unless found is among the fields, as "
+    "in mjlab.");
   v("global_frame", c.global_frame,
-    "Forces and torques in the world frame instead of the contact frame (x = normal); needs normal "
-    "and tangent.");
+    "Report forces and torques in the world frame instead of the contact frame (x = normal); "
+    "requires normal and tangent.");
   v("history_length", c.history_length,
-    "H, substeps kept of every field, newest first; 0 or less: none.")
+    "H, number of substeps kept of every field, newest first; 0 or less: none.")
       .at_most(65535);
   v("track_events", c.track_events,
-    "touchdown and liftoff: exact, also when both happened within one control step.");
+    "Report touchdown and liftoff, exactly, also if both happened within one control step.");
   v("latch", c.latch,
-    "What happened at any time in the control step: found_any, force_peak, dist_at_peak, "
+    "Report what happened at any time in the control step: found_any, force_peak, dist_at_peak, "
     "pos_at_peak, first_touch_time.");
-  v("friction_split", c.friction_split, "The fields normal_force and friction_force.");
-  v("other_ids", c.other_ids, "The fields other_geom and other_body.");
-  v("debug", c.debug, "Print what was matched.");
-  v("debug_vis", c.debug_vis, "Drawn by ``Simulation.draw(scene)`` unasked.");
-  v("viz", c.viz, "How it is drawn.");
+  v("friction_split", c.friction_split, "Add the fields normal_force and friction_force.");
+  v("other_ids", c.other_ids, "Add the fields other_geom and other_body.");
+  v("debug", c.debug, "Print the matched names.");
+  v("debug_vis", c.debug_vis,
+    "Include this sensor when ``Simulation.draw(scene)`` is called without a list of sensors.");
+  v("viz", c.viz, "Appearance of the debug drawing.");
 }
 
 // Fields (float32 unless said; B worlds, P primaries, K slots, N = P K with index p K + k, S

@@ -33,25 +33,29 @@ struct ImuModel {
 template <class V>
 void visit_fields(V& v, ImuModel::Axis& c) {
   v.object("ImuAxis",
-           "Half of a device, in m/s^2 or rad/s. Tolerances are three standard deviations, drawn "
-           "anew for each episode.")
+           "Error model of the accelerometer or of the gyroscope, in m/s^2 or rad/s. Tolerances "
+           "are three standard deviations, drawn anew for each episode.")
       .frozen();
-  v("noise_density", c.noise_density, "White noise.").unit("unit/sqrt(Hz)").at_least(0);
+  v("noise_density", c.noise_density, "Density of the white noise.")
+      .unit("unit/sqrt(Hz)")
+      .at_least(0);
   v("bias_tolerance", c.bias_tolerance, "Turn-on bias of x, y, z.").unit("unit").at_least(0);
-  v("scale_tolerance", c.scale_tolerance, "Error of scale.").at_least(0);
-  v("cross_axis_tolerance", c.cross_axis_tolerance, "What an axis sees of the others.").at_least(0);
-  v("range", c.range, "Values are limited to +-range; 0: unlimited.").unit("unit").at_least(0);
-  v("resolution", c.resolution, "Of one count; 0: continuous.").unit("unit").at_least(0);
+  v("scale_tolerance", c.scale_tolerance, "Scale error.").at_least(0);
+  v("cross_axis_tolerance", c.cross_axis_tolerance, "Cross-axis sensitivity.").at_least(0);
+  v("range", c.range, "Values are clipped to +-range; 0: no limit.").unit("unit").at_least(0);
+  v("resolution", c.resolution, "Size of one count; 0: continuous.").unit("unit").at_least(0);
   v("bias_drift", c.bias_drift, "Standard deviation of a Gauss-Markov bias.")
       .unit("unit")
       .at_least(0);
-  v("bias_drift_time_s", c.bias_drift_time_s, "Its time constant.").at_least(0);
+  v("bias_drift_time_s", c.bias_drift_time_s, "Correlation time of the bias drift.").at_least(0);
 }
 template <class V>
 void visit_fields(V& v, ImuModel& c) {
-  v.object("ImuModel", "What a data sheet says of a device; what it does not say is 0.").frozen();
-  v("accelerometer", c.accelerometer, "In m/s^2.");
-  v("gyroscope", c.gyroscope, "In rad/s.");
+  v.object("ImuModel",
+           "Error model of a device, from its data sheet; values that the data sheet omits are 0.")
+      .frozen();
+  v("accelerometer", c.accelerometer, "Error model of the accelerometer, in m/s^2.");
+  v("gyroscope", c.gyroscope, "Error model of the gyroscope, in rad/s.");
 }
 
 // Presets:
@@ -92,15 +96,15 @@ void visit_fields(V& v, ImuSensorCfg& c) {
       "``<name>_gyro``.",
       "imu");
   v.extends(static_cast<SensorCfg&>(c));
-  v("site", c.site, "Where it is mounted.").or_none();
+  v("site", c.site, "The site on which the IMU is mounted.").or_none();
   v("preset", c.preset,
-    "ideal, mpu6050 (InvenSense PS-MPU-6000A-00 rev. 3.4), icm42688p (TDK DS-000347 rev. 1.7); "
-    "\"\": model.")
+    "ideal, mpu6050 (InvenSense PS-MPU-6000A-00 rev. 3.4) or icm42688p (TDK DS-000347 rev. 1.7); "
+    "\"\": use model.")
       .one_of(kImuPresets);
-  v("model", c.model, "Used if preset is \"\".");
-  v("orientation", c.orientation, "Also the site's orientation, without errors.");
+  v("model", c.model, "Error model, used if preset is \"\".");
+  v("orientation", c.orientation, "Report the orientation of the site too, without errors.");
   v("effects", c.effects,
-    "After those of the device, on acc and gyro alike: delay, rate, dropout.");
+    "Effects applied to acc and gyro after the error model: delay, rate, dropout.");
 }
 
 // Fields, in the axes of the site:

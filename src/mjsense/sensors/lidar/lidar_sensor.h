@@ -31,24 +31,24 @@ struct SpinningScan {
 template <class V>
 void visit_fields(V& v, SpinningScan& c) {
   v.object("SpinningScanCfg",
-           "Lasers over each other that turn about the frame's z axis; rays are ``[channels, "
-           "samples]``.",
+           "Stacked lasers that rotate about the frame's z axis; rays are ``[channels, samples]``.",
            "spinning")
       .frozen();
-  v("channels", c.channels, "Lasers.").at_least(1);
-  v("elevation_min_deg", c.elevation_min_deg, "Of channel 0, above the xy plane.")
+  v("channels", c.channels, "Number of lasers.").at_least(1);
+  v("elevation_min_deg", c.elevation_min_deg, "Elevation of channel 0 above the xy plane.")
       .within(-90, 90)
       .flag("low");
-  v("elevation_max_deg", c.elevation_max_deg, "Of the last channel; the others lie evenly between.")
+  v("elevation_max_deg", c.elevation_max_deg,
+    "Elevation of the last channel; the others are evenly spaced in between.")
       .within(-90, 90)
       .flag("high");
-  v("elevations_deg", c.elevations_deg, "One a channel instead of evenly spaced ones.")
+  v("elevations_deg", c.elevations_deg, "Elevation of each channel, instead of evenly spaced ones.")
       .within(-90, 90);
-  v("samples", c.samples, "Firings of each channel in a sweep.").at_least(1);
+  v("samples", c.samples, "Number of firings of each channel in a sweep.").at_least(1);
   v("azimuth_start_deg", c.azimuth_start_deg,
-    "Of the first firing; 0: along +x; counter-clockwise.");
-  v("azimuth_span_deg", c.azimuth_span_deg, "Of a sweep.").above(0).at_most(360);
-  v("rate_hz", c.rate_hz, "Turns a second; matters with motion distortion only.").positive();
+    "Azimuth of the first firing, counter-clockwise; 0: along +x.");
+  v("azimuth_span_deg", c.azimuth_span_deg, "Angle that a sweep covers.").above(0).at_most(360);
+  v("rate_hz", c.rate_hz, "Sweeps per second; used only with motion distortion.").positive();
 }
 
 struct TableScan {
@@ -67,11 +67,11 @@ void visit_fields(V& v, TableScan& c) {
       .flag("table");
   v("angles", c.angles, "The table itself, [M, 2].").unit("rad");
   v("rays_per_scan", c.rays_per_scan,
-    "Rows that a scan takes, the next ones at the next scan; 0: all. Rows left over at the end are "
-    "not used.")
+    "Rows used by one scan; the next scan uses the following rows. 0: all rows. Rows left over at "
+    "the end are not used.")
       .at_least(0)
       .flag("rays");
-  v("rate_hz", c.rate_hz, "Scans a second.").positive();
+  v("rate_hz", c.rate_hz, "Scans per second.").positive();
 }
 
 using ScanCfg = std::variant<SpinningScan, TableScan>;
@@ -99,19 +99,23 @@ struct LidarSensorCfg : RayCastSensorCfg {
 };
 template <class V>
 void visit_fields(V& v, LidarSensorCfg& c) {
-  v.object("LidarSensorCfg",
-           "A spinning or table lidar. ``data`` is a :class:`mjsense.RayCastData` with points and "
-           "intensity; ``pattern`` is not for lidars, and hit ids are always there.",
-           "lidar");
+  v.object(
+      "LidarSensorCfg",
+      "A lidar with a spinning scan or a table of rays. ``data`` is a :class:`mjsense.RayCastData` "
+      "with points and intensity. ``pattern`` does not apply, and hit ids are always reported.",
+      "lidar");
   v.extends(static_cast<RayCastSensorCfg&>(c));
-  v("scan", c.scan, "Where its rays point.");
+  v("scan", c.scan, "The scan pattern.");
   v("motion_distortion", c.motion_distortion,
-    "Each ray leaves from where the frame was at its own moment of the sweep.");
-  v("range_noise_std", c.range_noise_std, "Standard deviation of distances.").unit("m").at_least(0);
-  v("range_noise_relative", c.range_noise_relative,
-    "Standard deviation in parts of the range, added in squares.")
+    "Emit each ray from the pose that the frame had at that ray's moment of the sweep.");
+  v("range_noise_std", c.range_noise_std, "Standard deviation of the distances.")
+      .unit("m")
       .at_least(0);
-  v("range_resolution", c.range_resolution, "Distances are rounded to multiples of it; 0: exact.")
+  v("range_noise_relative", c.range_noise_relative,
+    "Standard deviation as a fraction of the distance; the two variances are added.")
+      .at_least(0);
+  v("range_resolution", c.range_resolution,
+    "Distances are rounded to multiples of this value; 0: no rounding.")
       .unit("m")
       .at_least(0);
   v("dropout", c.dropout, "Probability that a return is lost.").within(0, 1);

@@ -34,9 +34,9 @@ template <class V>
 void visit_fields(V& v, GridPattern& c) {
   v.object("GridPatternCfg", "Parallel rays from the points of a grid, x fastest.", "grid")
       .frozen();
-  v("size", c.size, "In x and y, around the frame.").unit("m").at_least(0);
-  v("resolution", c.resolution, "Between rays.").unit("m").positive();
-  v("direction", c.direction, "Of all rays; any length but 0.");
+  v("size", c.size, "Size of the grid in x and y, centred on the frame.").unit("m").at_least(0);
+  v("resolution", c.resolution, "Distance between rays.").unit("m").positive();
+  v("direction", c.direction, "Direction of all rays; any non-zero length.");
 }
 
 // u = linspace(-1, 1, width) varies fastest; horizontally tan(fovx / 2) = tan(fovy / 2) * width /
@@ -54,17 +54,16 @@ struct PinholePattern {
 };
 template <class V>
 void visit_fields(V& v, PinholePattern& c) {
-  v.object(
-       "PinholeCameraPatternCfg",
-       "Rays of a pinhole camera that looks along -Z, through the edges (not the centres) of its "
-       "pixels, bottom row first.",
-       "pinhole")
+  v.object("PinholeCameraPatternCfg",
+           "Rays of a pinhole camera that looks along -Z, through the edges (not the centres) of "
+           "its pixels, bottom row first.",
+           "pinhole")
       .frozen();
-  v("width", c.width, "Rays in a row.").at_least(1);
-  v("height", c.height, "Rows.").at_least(1);
+  v("width", c.width, "Number of rays in a row.").at_least(1);
+  v("height", c.height, "Number of rows.").at_least(1);
   v("fovy", c.fovy, "Vertical field of view.").unit("degrees").positive();
   v("camera_name", c.camera,
-    "Take resolution and angles from this camera of the model instead; not its pose.")
+    "Camera of the model whose resolution and angles are used instead; its pose is not used.")
       .or_none();
 }
 
@@ -85,17 +84,18 @@ struct RingPattern {
 template <class V>
 void visit_fields(V& v, RingPattern::Ring& c) {
   v.object("RingPatternCfg.Ring", "One circle of rays.").frozen();
-  v("radius", c.radius, "Around the frame's z axis.").unit("m").at_least(0);
-  v("num_samples", c.num_samples, "Rays on it.").at_least(1);
+  v("radius", c.radius, "Radius around the frame's z axis.").unit("m").at_least(0);
+  v("num_samples", c.num_samples, "Number of rays on the circle.").at_least(1);
 }
 template <class V>
 void visit_fields(V& v, RingPattern& c) {
   v.object("RingPatternCfg",
-           "Parallel rays from the points of circles in the XY plane, after the centre.", "ring")
+           "Parallel rays from points on circles in the XY plane, after the ray from the centre.",
+           "ring")
       .frozen();
-  v("rings", c.rings, "From the inside out, or in any order.");
-  v("include_center", c.include_center, "Also a ray from the centre.");
-  v("direction", c.direction, "Of all rays; any length but 0.");
+  v("rings", c.rings, "The circles.");
+  v("include_center", c.include_center, "Add a ray from the centre.");
+  v("direction", c.direction, "Direction of all rays; any non-zero length.");
 }
 
 struct UserPattern {
@@ -106,14 +106,13 @@ struct UserPattern {
 };
 template <class V>
 void visit_fields(V& v, UserPattern& c) {
-  v.object(
-       "UserPatternCfg",
-       "Your own rays. One direction for all offsets, or one offset for all directions, will do.",
-       "user")
+  v.object("UserPatternCfg",
+           "User-defined rays. A single direction or a single offset applies to all rays.", "user")
       .frozen();
-  v("offsets", c.offsets, "Where they start, [n, 3].").unit("m");
-  v("directions", c.directions, "Where they point, [n, 3], of any length but 0.");
-  v("times", c.times, "[n] or none: each ray leaves from where the frame was then.")
+  v("offsets", c.offsets, "Start points, [n, 3].").unit("m");
+  v("directions", c.directions, "Directions, [n, 3], of any non-zero length.");
+  v("times", c.times,
+    "Times, [n] or empty: each ray starts from the pose that the frame had at its time.")
       .unit("s")
       .at_most(0);
 }

@@ -45,17 +45,17 @@ struct RayCastVizCfg {
 template <class V>
 void visit_fields(V& v, RayCastVizCfg& c) {
   v.object("RayCastVizCfg",
-           "What a viewer draws of a ray sensor. Colours are rgba, sizes in units of the model's "
+           "The debug drawing of a ray sensor. Colours are rgba, sizes are in units of the model's "
            "``stat.meansize``.");
-  v("show_rays", c.show_rays, "Arrows from origin to hit.");
-  v("show_normals", c.show_normals, "Arrows along the normals of what is hit.");
-  v("hit_color", c.hit_color, "Of balls at the hits.").within(0, 1);
-  v("ray_color", c.ray_color, "Of rays that hit.").within(0, 1);
-  v("miss_color", c.miss_color, "Of rays that miss.").within(0, 1);
-  v("normal_color", c.normal_color, "Of normals.").within(0, 1);
-  v("hit_radius", c.hit_radius, "Of the balls.").at_least(0);
-  v("ray_width", c.ray_width, "Of the arrows.").at_least(0);
-  v("normal_length", c.normal_length, "Of the normals.").at_least(0);
+  v("show_rays", c.show_rays, "Draw arrows from the origins to the hits.");
+  v("show_normals", c.show_normals, "Draw arrows along the surface normals at the hits.");
+  v("hit_color", c.hit_color, "Colour of the spheres at the hits.").within(0, 1);
+  v("ray_color", c.ray_color, "Colour of rays that hit.").within(0, 1);
+  v("miss_color", c.miss_color, "Colour of rays that miss.").within(0, 1);
+  v("normal_color", c.normal_color, "Colour of the normals.").within(0, 1);
+  v("hit_radius", c.hit_radius, "Radius of the spheres.").at_least(0);
+  v("ray_width", c.ray_width, "Width of the arrows.").at_least(0);
+  v("normal_length", c.normal_length, "Length of the normals.").at_least(0);
 }
 
 struct RayCastSensorCfg : SensorCfg {
@@ -78,31 +78,34 @@ struct RayCastSensorCfg : SensorCfg {
 template <class V>
 void visit_fields(V& v, RayCastSensorCfg& c) {
   v.object("RayCastSensorCfg",
-           "Rays from frames against everything visible. ``data`` is a "
+           "Casts rays from frames against all visible geoms. ``data`` is a "
            ":class:`mjsense.RayCastData`.",
            "raycast");
   v.extends(static_cast<SensorCfg&>(c));
   v("frame", c.frame,
-    "Bodies (their own frame, not the inertial one), sites or geoms that the rays start from.")
+    "Bodies (their own frame, not the inertial one), sites or geoms from which the rays start.")
       .or_one();
   v("pattern", c.pattern, "The rays of one frame.");
   v("ray_alignment", c.ray_alignment,
-    "base: offsets and directions turn with the frame; yaw: only with its heading; world: not at "
+    "base: offsets and directions rotate with the frame; yaw: only with its heading; world: not at "
     "all.");
-  v("max_distance", c.max_distance, "Hits farther away are misses.")
+  v("max_distance", c.max_distance, "Maximum distance; more distant hits are misses.")
       .unit("m")
       .positive()
       .may_be_infinite();
   v("exclude_parent_body", c.exclude_parent_body,
-    "Rays pass through the body they start from (not through its children).");
-  v("include_geom_groups", c.include_geom_groups, "Groups that rays see; None: all.").within(0, 5);
-  v("debug_vis", c.debug_vis, "Drawn by ``Simulation.draw(scene)`` unasked.");
-  v("viz", c.viz, "How it is drawn.");
-  v("min_distance", c.min_distance, "Nearer hits are misses, and hide what is behind them.")
+    "Ignore the body from which a ray starts (but not its children).");
+  v("include_geom_groups", c.include_geom_groups, "Geom groups that rays can hit; None: all.")
+      .within(0, 5);
+  v("debug_vis", c.debug_vis,
+    "Include this sensor when ``Simulation.draw(scene)`` is called without a list of sensors.");
+  v("viz", c.viz, "Appearance of the debug drawing.");
+  v("min_distance", c.min_distance,
+    "Minimum distance; nearer hits are misses, and they hide what is behind them.")
       .unit("m")
       .at_least(0);
-  v("hit_ids", c.hit_ids, "The fields geom_id, body_id and material_id of what was hit.");
-  v("any_frame", c.any_frame, "Take xbody and camera frames too, which mjlab refuses.");
+  v("hit_ids", c.hit_ids, "Add the fields geom_id, body_id and material_id of what was hit.");
+  v("any_frame", c.any_frame, "Allow xbody and camera frames too, which mjlab refuses.");
 }
 
 class RayCastSensor : public Sensor {

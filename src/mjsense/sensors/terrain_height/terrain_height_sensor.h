@@ -30,11 +30,11 @@ struct TerrainHeightSensorCfg : RayCastSensorCfg {
 template <class V>
 void visit_fields(V& v, TerrainHeightSensorCfg& c) {
   v.object("TerrainHeightSensorCfg",
-           "Height of frames above what lies below them. ``data.heights`` is float32 ``[B, F]``, "
-           "``[B, F, n]`` without reduction.",
+           "Height of frames above the surface below them. ``data.heights`` is float32 ``[B, F]``, "
+           "or ``[B, F, n]`` without reduction.",
            "terrain_height");
   v.extends(static_cast<RayCastSensorCfg&>(c));
-  v("reduction", c.reduction, "Over a frame's rays.");
+  v("reduction", c.reduction, "Reduction over the rays of a frame.");
 }
 
 class TerrainHeightSensor : public RayCastSensor {

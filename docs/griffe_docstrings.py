@@ -1,0 +1,63 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Griffe extension: turns the reStructuredText marks of our docstrings (roles, double backticks, `::`) into Markdown, and gives the
+configurations (`mjsense._dataclass`) the signature that their fields make."""
+
+import re
+from typing import Any
+
+import griffe
+
+ROLE = re.compile(r":(?:class|func|meth|mod|attr):`~?([\w.]+)`")
+
+
+class Docstrings(griffe.Extension):
+    def on_object(self, *, obj: griffe.Object, loader: Any, **kwargs: Any) -> None:
+        if obj.docstring is None:
+            return
+        text = ROLE.sub(lambda match: reference(match[1], obj), obj.docstring.value)
+        text = text.replace("``", "`")
+        obj.docstring.value = re.sub(r"::$", ":", text, flags=re.MULTILINE)
+
+    def on_package(self, *, pkg: griffe.Module, loader: Any, **kwargs: Any) -> None:
+        for module in pkg.modules.values():
+            for cls in module.classes.values() if not module.is_alias else ():
+                if cls.is_alias:
+                    continue
+                cls.bases = [base for base in cls.bases if "._" not in getattr(base, "canonical_path", "")]  # private ones
+                if any("_dataclass.dataclass" in d.callable_path for d in cls.decorators):
+                    parameters = [griffe.Parameter(f.name, annotation=f.annotation, kind=griffe.ParameterKind.positional_or_keyword,
+                                                   default=default(f)) for f in fields(cls)]  # fmt: skip
+                    for name in [n for n, a in cls.attributes.items() if not a.is_alias and "ClassVar" in str(a.annotation)]:
+                        cls.del_member(name)
+                    own = griffe.Parameter("self", kind=griffe.ParameterKind.positional_or_keyword)
+                    cls.set_member("__init__", griffe.Function("__init__", parameters=griffe.Parameters(own, *parameters)))
+
+
+def reference(name: str, obj: griffe.Object) -> str:
+    """A link to the entry of `name`: a full path, a member of the same class, or a name of the package."""
+    owner = obj if obj.is_class else obj.parent
+    if name.startswith("mjsense"):
+        path = name
+    elif owner is not None and owner.is_class and name in owner.members:
+        path = f"mjsense.{owner.name}.{name}"
+    else:
+        path = f"mjsense.{name}"
+    return f"[`{name}`][{path}]"
+
+
+def fields(cls: griffe.Class) -> list[griffe.Attribute]:
+    """Of a dataclass, those of its bases first; a field that is declared again keeps its place."""
+    found: dict[str, griffe.Attribute] = {}
+    for owner in [*reversed(cls.mro()), cls]:
+        for attribute in owner.attributes.values():
+            declared = not attribute.is_alias and attribute.annotation is not None and "property" not in attribute.labels
+            if declared and "ClassVar" not in str(attribute.annotation):
+                found[attribute.name] = attribute
+    return list(found.values())
+
+
+def default(attribute: griffe.Attribute) -> str | None:
+    """As it is written; `field(default_factory=X)` is `X()`."""
+    value = None if attribute.value is None else str(attribute.value)
+    factory = re.search(r"default_factory=(.+?)\)$", value or "")
+    return value if factory is None else re.sub(r"^lambda: ", "", factory[1]) + ("" if "lambda" in factory[1] else "()")
