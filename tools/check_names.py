@@ -177,9 +177,9 @@ def definitions(text: str, file: str) -> list[Definition]:
                 continue
             if kind and "(" not in plain and "=" not in plain:
                 # The name may be qualified (`struct Recorder::Impl {`); bases follow a colon. Specialisations are left out.
-                name = re.match(r"(?:\w+::)*\w+|", "".join(w for w in plain[plain.index(kind) + 1 :] if w not in TYPE | {"final"}))[0]
+                name = re.match(r"(?:\w+::)*\w+", "".join(w for w in plain[plain.index(kind) + 1 :] if w not in TYPE | {"final"}))
                 if name and head[:3] != ["template", "<", ">"]:
-                    add(f"type {name}")
+                    add(f"type {name[0]}")
                 # Members of `struct X {...} variable;` end at the semicolon.
                 continue
             name = function_name(head)

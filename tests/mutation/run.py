@@ -49,7 +49,7 @@ PYTESTS = {
     "python": ["tests/python", "tests/conformance"],
 }
 LIMIT_S = 600  # a judge that takes longer has noticed: nothing takes a tenth of this
-MEMORY = 16 << 30  # bytes of address space of a test: a mutant may allocate without end
+MEMORY = 64 << 30  # bytes of address space of a test: a mutant may allocate without end; two thousand worlds take half of it
 DRAWN = WORK / "drawn.json"
 
 
@@ -146,6 +146,7 @@ def copy_tree() -> None:
 def limit_memory() -> None:
     resource.setrlimit(resource.RLIMIT_AS, (MEMORY, MEMORY))
     resource.setrlimit(resource.RLIMIT_CORE, (0, 0))
+    Path("/proc/self/oom_score_adj").write_text("1000")  # where memory ends, it ends first
 
 
 class Runner:

@@ -211,7 +211,7 @@ std::string contact_sheet(const fs::path& path, const fs::path& png, int episode
   // The images are read first, because the label above a depth strip depends on their values.
   std::vector<std::vector<std::uint8_t>> pictures;
   const std::string title = fmt::format("{} of {} episodes", std::min(episodes, all), all);
-  int tile_width = 0, width = text_width(title), height = kGap + kLine;
+  int tile_width = 0, width = label_width(title), height = kGap + kLine;
   for (std::size_t s = 0; s < strips.size(); ++s) {
     Strip& strip = strips[s];
     const std::vector<int> moments = strip.moments(columns);
@@ -225,7 +225,7 @@ std::string contact_sheet(const fs::path& path, const fs::path& png, int episode
                       strip.video.string(), pictures[s].size(), bytes));
     if (strip.depth16) pictures[s] = colour_depth(pictures[s], strip.unit, strip.camera);
     tile_width = std::max(tile_width, strip.tile_width());
-    width = std::max({width, text_width(strip.episode), text_width(strip.camera)});
+    width = std::max({width, label_width(strip.episode), label_width(strip.camera)});
     height += kLine + kTileHeight + kGap;
     if (s == 0 || strip.episode != strips[s - 1].episode) height += kApart + kLine;
   }
@@ -241,7 +241,7 @@ std::string contact_sheet(const fs::path& path, const fs::path& png, int episode
       y += kApart + kLine;
     }
     sheet.text(kGap, y, strip.camera);
-    const int said = kGap + text_width(strip.camera) + 2 * kTextAdvance;
+    const int said = kGap + label_width(strip.camera) + 2 * kTextAdvance;
     y += kLine;
     const std::vector<int> moments = strip.moments(columns);
     const std::size_t bytes = std::size_t{3} * strip.tile_width() * kTileHeight;
@@ -250,7 +250,7 @@ std::string contact_sheet(const fs::path& path, const fs::path& png, int episode
       sheet.picture(x, y, strip.tile_width(), kTileHeight, &pictures[s][c * bytes]);
       // The frame number, right-aligned above the tile if the text of the line leaves room.
       const std::string number = std::to_string(moments[c]);
-      const int left = x + strip.tile_width() - text_width(number);
+      const int left = x + strip.tile_width() - label_width(number);
       if (left >= said) sheet.text(left, y - kLine, number);
     }
     y += kTileHeight + kGap;

@@ -67,10 +67,10 @@ class Sheet {
   // reads(): whether the line at `y` begins with `text` and, unless `more`, contains nothing else.
   // ends(): whether the line shows `text` right before `end`.
   bool reads(int y, std::string_view text, bool more = false) const {
-    return reads(kEdge, y, text, more ? kEdge + text_width(text) : width_);
+    return reads(kEdge, y, text, more ? kEdge + label_width(text) : width_);
   }
   bool ends(int y, int end, std::string_view text) const {
-    return reads(end - text_width(text), y, text, end);
+    return reads(end - label_width(text), y, text, end);
   }
   bool reads(int begin, int y, std::string_view text, int end) const {
     std::vector<std::uint8_t> line(std::size_t{3} * width_ * kTextHeight, 0);

@@ -11,7 +11,7 @@ namespace mjsense {
 
 inline constexpr int kTextHeight = 18, kTextAdvance = 12;  // pixels
 
-inline int text_width(std::string_view text) {
+inline int label_width(std::string_view text) {
   return static_cast<int>(text.size()) * kTextAdvance;
 }
 

@@ -66,7 +66,7 @@ TEST(SmallText, TextIsClipped) {
   EXPECT_EQ(at(8, 5), 225);
   for (int y = 0; y < height; ++y)
     for (int x = 0; x < 8; ++x) EXPECT_EQ(at(x, y), 7) << "wrapped into the next row";
-  EXPECT_EQ(text_width("WWWW"), 48);
+  EXPECT_EQ(label_width("WWWW"), 48);
 }
 
 }  // namespace
