@@ -169,7 +169,7 @@ class EntityCfg(_config_methods.EntityCfg):
     """Contents of the files that the XML text refers to, by file name."""
     pos: Sequence[float] = (0.0, 0.0, 0.0)
     """Position of the entity's root in the world: of its free body or, for a fixed base, of the mocap body that carries
-    it. [m]"""
+    it. A keyframe of the model moves with it: its pose relative to the root's pose in the XML stays the same. [m]"""
     quat: Sequence[float] = (1.0, 0.0, 0.0, 0.0)
     """Orientation (wxyz) of the entity's root; the identity keeps the orientation of the XML."""
     joint_pos: Mapping[str, float] = field(default_factory=dict)
@@ -753,7 +753,7 @@ class SceneFileCfg(_config_methods.SceneFileCfg):
     drop: float = 0.0003
     """Height above the surface at which objects start. [m]"""
     count: Sequence[int] = (-1, -1)
-    """Objects that are there, the target among them, least and most; -1: all. The others are absent."""
+    """Minimum and maximum number of objects that are present, the target included; -1: all. The others are absent."""
     models: Callable[[], SceneCfg] | None = None
     """Function that makes the models, instead of ``base`` and ``entities``."""
 
