@@ -126,7 +126,9 @@ TEST(Pose, QuaternionIsContinuousWithinAnEpisode) {
     EXPECT_GT(cosine, 0.99) << "step " << step;
     EXPECT_EQ(at(step * 0.05 * std::numbers::pi), now) << "computed again it is the same";
     last = now;
-    if (step == 40) EXPECT_NEAR(now[3], -1, 1e-6) << "after one turn";
+    if (step == 40) {
+      EXPECT_NEAR(now[3], -1, 1e-6) << "after one turn";
+    }
   }
   at(1.5 * std::numbers::pi);
   tcp.reset(w.world());

@@ -971,7 +971,7 @@ TEST(Worlds, RejectsInvalidArguments) {
 TEST(Hold, KeepsABodyWhereItIsUntilTheReset) {
   for (const char* integrator : {"Euler", "RK4", "implicitfast"}) {
     const ModelPtr m = load(integrator);
-    const int joint[] = {m->njnt - 1}, hinge[] = {0};
+    const int joint[] = {static_cast<int>(m->njnt) - 1}, hinge[] = {0};
     Worlds worlds(m.get(), 2, 1);
     Recording hooks(2);
     const auto box = [&](int world) {
