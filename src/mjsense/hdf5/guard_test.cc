@@ -99,6 +99,11 @@ TEST_F(Guard, DataInOtherFilesIsNotRead) {
   const Id elsewhere = dataset_properties();
   ASSERT_GE(H5Pset_external(elsewhere, dir_.file("outside").c_str(), 0, 3), 0);
   EXPECT_THAT(storage(bytes("x", {3}, elsewhere)), HasSubstr("lies in other files"));
+  const Id text(H5Tcopy(H5T_C_S1), H5Tclose, "type"), one(H5Screate(H5S_SCALAR), H5Sclose, "space");
+  ASSERT_GE(H5Tset_size(text, 3), 0);
+  const Id secret(H5Dcreate2(file_, "text", text, one, link_properties(), elsewhere, H5P_DEFAULT),
+                  H5Dclose, "text");
+  EXPECT_THAT(complaint([&] { read_text(file_, "text"); }), HasSubstr("lies in other files"));
 
   const Id composed = dataset_properties();
   const hsize_t size = 3;
