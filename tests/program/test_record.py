@@ -182,7 +182,7 @@ def test_failures_are_dropped_unless_asked_for(mjsense):
                    "--json", rc=1)
     summary = json.loads(done.stdout)
     assert summary["kept"] == 0 and summary["failures"] == {"horizon reached: the object is not lifted": 3}
-    assert "gave up after 3 attempts" in done.stderr
+    assert "stopped after 3 attempts" in done.stderr
 
 
 def test_why_an_episode_failed_is_in_the_recording(mjsense):

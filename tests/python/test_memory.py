@@ -30,7 +30,8 @@ else:
 # MuJoCo alone takes 15 MB for a world: too little for the compiler, for a world, for two.
 @pytest.mark.parametrize("megabytes", [1, 8, 40, 100])
 def test_too_little_memory_is_an_error(tmp_path, megabytes):
-    assert "memory" in run(tmp_path, SMALL, megabytes * 1_000_000)
+    said = run(tmp_path, SMALL, megabytes * 1_000_000)
+    assert "memory" in said or "address space" in said
 
 
 # A std::bad_alloc inside libmujoco, which no C++ code outside of it can catch.

@@ -13,6 +13,7 @@
 #include "mjsense/core/plain_file.h"
 #include "mjsense/hdf5/guard.h"
 #include "mjsense/record/description.h"
+#include "mjsense/record/outcome.h"
 #include "mjsense/record/recording_lock.h"
 #include "mjsense/replay/check.h"
 #include "mjsense/replay/json_text.h"
@@ -88,8 +89,8 @@ class Inspector {
       const h5::Id trajectory = h5::open_group(file, name);
       ++entry.episodes;
       const std::string outcome = h5::text_attribute(trajectory, "outcome");
-      // The details of the episode, in parentheses, are left out.
-      if (!outcome.empty()) entry.outcomes[outcome.substr(0, outcome.find(" ("))].push_back(name);
+      if (!outcome.empty())
+        entry.outcomes[std::string(outcome_without_details(outcome))].push_back(name);
       add_trajectory(trajectory, entry);
       if (!h5::exists(trajectory, "obs/sensor_data")) continue;
       const h5::Id videos = h5::open_group(trajectory, "obs/sensor_data");

@@ -9,6 +9,7 @@
 #include <limits>
 
 #include "mjsense/core/error.h"
+#include "mjsense/record/outcome.h"
 #include "mjsense/rollout/recording_settings.h"
 #include "mjsense/rollout/registry.h"
 
@@ -177,8 +178,7 @@ class RecordJob {
     progress_.mean_length = static_cast<double>(ended_steps_) /
                             std::max(1, cfg_.keep_failures ? progress_.succeeded + progress_.failed
                                                            : progress_.succeeded);
-    // Failures are counted without episode details, which planners write in parentheses.
-    if (!success) ++summary_.failures[outcome.substr(0, outcome.find(" ("))];
+    if (!success) ++summary_.failures[std::string(outcome_without_details(outcome))];
     summary_.lengths.push_back(lengths_[w]);
     rollout_.stop(w);
     --running_;
