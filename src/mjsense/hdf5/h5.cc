@@ -129,7 +129,7 @@ Id file_access() {
   // Closing a file also closes every object in it that an error left open.
   H5Pset_fclose_degree(access, H5F_CLOSE_STRONG);
   // Disables the library's file locking: a child process that inherits the file could keep the lock
-  // after this process ends. Recordings have a lock of their own (record/house.h).
+  // after this process ends. Recordings have a lock of their own (record/recording_lock.h).
   H5Pset_file_locking(access, false, true);
   return access;
 }
