@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 
 
 class _Models(Sequence):
-    """The model of each world, made when it is asked for."""
+    """The models of the worlds, each created on first access."""
 
     def __init__(self, sim: Simulation) -> None:
         self._sim = sim
@@ -87,7 +87,7 @@ class PeerEnv:
 
     @property
     def mj_model(self) -> mujoco.MjModel:
-        """That of the world whose sensor is asked."""
+        """The model of the world whose sensor is being computed."""
         return self.sim.model_of(self._world)
 
     current_model = mj_model
@@ -103,7 +103,7 @@ class PeerEnv:
 
     @property
     def current_data(self) -> mujoco.MjData:
-        """That of the world whose sensor is asked."""
+        """The model of the world whose sensor is being computed."""
         return self.mj_datas[self._world]
 
     def _make_current(self) -> None:
@@ -132,7 +132,7 @@ class PeerEnv:
 
     @property
     def current_robot(self) -> PeerRobot:
-        """That of the world whose sensor is asked."""
+        """The model of the world whose sensor is being computed."""
         return self.robots[self._world]
 
     def _image(self, camera_name: str, field: str) -> np.ndarray:

@@ -25,7 +25,7 @@ struct Lookout {
 std::vector<double> visible_shares(const RayScene& rays, int world, const Lookout& from,
                                    std::span<const int> bodies);
 
-// Whether a camera stands inside a solid geom that is drawn: it would see out of it, and other cameras cannot.
+// Whether a camera is inside a visible solid geom. Its image would still show what is outside.
 bool is_inside(const RayScene& rays, int world, const Pose& camera);
 
 }  // namespace mjsense

@@ -13,7 +13,7 @@ from mjsense.suite import SensorSuite
 
 
 class CoreSensor(Sensor):
-    """A sensor of mjsense's core suite, which C++ computes: it stands for the one of this uuid when a task composes its suite."""
+    """A sensor of mjsense's core suite, computed in C++. In a task's suite it represents the core sensor with this uuid."""
 
     def __init__(self, uuid: str, optional: bool = False) -> None:
         super().__init__(uuid, gymnasium.spaces.Box(-np.inf, np.inf, (1,), np.float64))
