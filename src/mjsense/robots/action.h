@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
-// What a policy commands for one control step of one world: plain memory, no allocation.
+// The action of a policy: commands for one control step of one world. Plain memory, no allocation.
 
 #include <array>
 #include <optional>
@@ -11,12 +11,12 @@
 
 namespace mjsense {
 
-// Values of one move group: joint positions (a free joint has 7), or a command.
+// Values of one move group: joint positions (qpos; a free joint has 7), or a command.
 struct GroupValues {
   static constexpr int kMaxSize = 32;
   std::array<double, kMaxSize> values{};
   int size = 0;
-  bool given = false;  // false: the policy says nothing about this group, its controller holds
+  bool given = false;  // false: no command for this group, its controller holds
 
   std::span<const double> view() const { return {values.data(), static_cast<std::size_t>(size)}; }
   // Throws ValueError for more than kMaxSize values.
@@ -31,7 +31,7 @@ struct GroupValues {
   }
 };
 
-// One GroupValues a move group, in the robot's order.
+// The values of every move group, in the robot's order.
 struct RobotValues {
   static constexpr int kMaxGroups = 16;
   std::array<GroupValues, kMaxGroups> groups{};
@@ -40,9 +40,10 @@ struct RobotValues {
 };
 
 struct Action {
-  RobotValues commands;         // as each group's controller takes them; "base": [] has size 0
-  bool done = false;            // the policy has finished: after this step the episode ends
-  std::optional<bool> success;  // the policy's own verdict; {done, success: false} gives up
+  // in the format of each group's controller; an uncontrolled base has size 0
+  RobotValues commands;
+  bool done = false;            // the policy has finished: the episode ends after this step
+  std::optional<bool> success;  // the policy's own verdict; {done, success: false} means it gave up
 };
 
 }  // namespace mjsense

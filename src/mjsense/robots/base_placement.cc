@@ -12,7 +12,7 @@
 namespace mjsense {
 namespace {
 
-// m and rad: closer than that it stands there.
+// m and rad; two poses that are closer than this are the same.
 constexpr double kSame = 1e-9;
 
 Pose body_pose(const mjModel* m, int body) {
@@ -103,11 +103,11 @@ void BasePlacement::write(const StateRow& state, const Pose& base) const {
     state.qpos[qpos_[i]] = links_[i].zero;
     state.qvel[dofs_[i]] = 0;
   }
-  // Turns first: what they do not turn about, slides cannot change; then the way that is left.
+  // Hinges first, since slides cannot change the orientation; then the slides for the position.
   for (const bool slide : {false, true}) {
     for (std::size_t i = 0; i < links_.size(); ++i) {
       if (links_[i].slide != slide) continue;
-      // What is missing, in the axes of the frame in which the joint moves.
+      // Pose of the frame in which the joint moves (its parent's motion included), world frame.
       Pose before = root_ * links_[0].fixed;
       for (std::size_t k = 0; k < i; ++k) {
         const Link& link = links_[k];

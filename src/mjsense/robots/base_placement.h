@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
-// Where a robot stands: the state that puts its base at a pose in the world, whatever carries it.
+// Base placement: writes the state that puts a robot's base at a pose in the world.
 
 #include <mujoco/mujoco.h>
 
@@ -14,34 +14,34 @@
 
 namespace mjsense {
 
-// What may carry a base, and is used in this order:
-//   its free joint;
-//   the joints of the base's move group (slides and hinges: a base that drives), for what of the
-//   pose they can do;
-//   the mocap body that it is or hangs under, for the rest (a scene puts a robot without a free
-//   joint under one).
+// The base is moved by the first of these that the model has:
+//   1. its free joint;
+//   2. the joints of the base's move group (slides and hinges of a mobile base), as far as they can
+//      reach the pose; the rest by 3;
+//   3. the mocap body that is the base or its ancestor (a scene attaches a robot without a free
+//      joint to one).
 class BasePlacement {
  public:
   BasePlacement() = default;
-  // `joints`: of the base's move group.
+  // `joints`: ids of the joints of the base's move group. `place` starts the messages of errors.
   BasePlacement(const mjModel* model, int base_body, std::span<const int> joints,
                 std::string place);
 
-  // Throws ValueError where nothing can carry it there, which says what would.
+  // Throws ValueError if the base cannot be put there; the message says how to make it placeable.
   void write(const StateRow& state, const Pose& base) const;
 
  private:
   Pose from_root(const StateRow& state) const;  // X_RB
 
   std::string place_, base_name_;
-  std::string fault_;  // why it cannot be placed
+  std::string fault_;  // why the base cannot be placed; empty if it can
   int free_qpos_ = -1, free_dof_ = -1;
   int mocap_ = -1;
-  bool is_mocap_ = false;  // the base itself
-  Pose root_;              // X_WR of the model: of the mocap body, or of what stands in the world
+  bool is_mocap_ = false;  // the base itself is the mocap body
+  Pose root_;              // X_WR in the model; R: the mocap body, or the world if there is none
   std::vector<Link> links_;
   Pose tail_;
-  std::vector<int> qpos_, dofs_;  // of the links
+  std::vector<int> qpos_, dofs_;  // addresses, per link
 };
 
 }  // namespace mjsense

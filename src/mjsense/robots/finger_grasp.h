@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
-// Whether the fingers of a gripper have something between them.
+// Tests whether an object is between the fingers of a gripper.
 
 #include <memory>
 #include <string>
@@ -12,13 +12,14 @@
 
 namespace mjsense {
 
-// Both fingers of a gripper - the bodies of its pad sites and what hangs on them - touch the body or
-// what hangs on it. False for a gripper without pads and for body < 0.
+// True if both fingers of the gripper touch `body` or a body below it. A finger is the body of a
+// pad site with the bodies below it. False for a gripper without pads and for body < 0.
 bool fingers_touch(const World& world, const MoveGroup& gripper, int body);
 
-// `<robot>_<side>_grasp_state` of each gripper of a robot with several: uint8 [1], 1 where its
-// fingers have the object between them. The side is what the gripper's name begins with. Empty for
-// a robot with one gripper. They refer to the robot, which lives longer.
+// Sensors `<robot>_<side>_grasp_state`, one for each gripper of a robot with several: uint8 [1], 1
+// if both of its fingers touch the object. The side is the part of the gripper's name before the
+// first '_'. Empty for a robot with one gripper. The sensors refer to `robot`, which must outlive
+// them.
 std::vector<std::shared_ptr<Sensor>> finger_grasp_sensors(const Robot& robot,
                                                           const BodyRef& object);
 

@@ -10,7 +10,8 @@
 namespace mjsense {
 namespace {
 
-// Two fingers whose pads face each other along y, 4 cm apart; a box with a knob hanging on it, and a wall.
+// Two fingers with pads that face each other along y, 4 cm apart; a box with a child body, the
+// knob; and a wall.
 constexpr char kScene[] = R"(
 <mujoco>
   <option gravity="0 0 0"/>
@@ -34,7 +35,7 @@ struct Fingers : testing::Test {
   }
   int site(const char* name) const { return mj_name2id(w.model, mjOBJ_SITE, name); }
   int body(const char* name) const { return mj_name2id(w.model, mjOBJ_BODY, name); }
-  // Whether they have it between them, the box standing there.
+  // Result of fingers_touch() with the box at (x, y, z).
   bool touch(double x, double y, double z, const char* what = "box") {
     w.data->qpos[0] = x, w.data->qpos[1] = y, w.data->qpos[2] = z;
     mj_forward(w.model, w.data);

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
-// `grasp_state_<role>`: does a gripper touch the object, and does it hold it alone.
+// `grasp_state_<role>`: whether a gripper touches the object, and whether only grippers do.
 
 #include <string>
 #include <vector>
@@ -10,15 +10,15 @@
 
 namespace mjsense {
 
-// Streams <name>/<gripper>/held and <name>/<gripper>/touching: bool []. Over the contacts that have
-// exactly one side in the object: touching = the other side is in this gripper; held = touching,
-// and no contact has its other side outside all grippers. No force, no two-finger test: an object
-// that rests on the table and touches the gripper is not held.
+// Streams <name>/<gripper>/held and <name>/<gripper>/touching: bool []. Only contacts with exactly
+// one geom in the object count. touching: the other geom is in this gripper. held: touching, and no
+// contact has its other geom outside all grippers. There is no force threshold and no two-finger
+// test: an object that rests on the table and touches the gripper is not held.
 class GraspStateSensor final : public Sensor {
  public:
   struct Gripper {
-    std::string name;  // move group: "gripper"
-    std::string body;  // root body; its geoms and those of the bodies below it
+    std::string name;  // move group, e.g. "gripper"
+    std::string body;  // root body; the gripper consists of the geoms of its subtree
   };
   GraspStateSensor(std::string name, BodyRef object, std::vector<Gripper> grippers);
   std::string_view kind() const override { return "grasp_state"; }
@@ -29,8 +29,8 @@ class GraspStateSensor final : public Sensor {
  private:
   static constexpr int kMaxGrippers = 30;
   BodyRef object_;
-  std::vector<Gripper> grippers_;            // fields 2 i and 2 i + 1 are gripper i's
-  std::vector<std::uint32_t> gripper_bits_;  // [ngeom] bit i set: in gripper i
+  std::vector<Gripper> grippers_;            // gripper i has fields 2 i and 2 i + 1
+  std::vector<std::uint32_t> gripper_bits_;  // [ngeom]; bit i is set if the geom is in gripper i
 };
 
 }  // namespace mjsense

@@ -8,7 +8,7 @@
 namespace mjsense {
 namespace {
 
-// A gripper of one sphere at (1, 0, .58), and a cube on the floor.
+// A gripper that is one sphere at (1, 0, .58), and a cube on the floor.
 constexpr char kScene[] = R"(
 <mujoco>
   <worldbody>
@@ -25,7 +25,7 @@ TEST(GraspState, TouchingIsNotHolding) {
   GraspStateSensor grasp("grasp_state_pickup_obj", "thing/cube", {{"gripper", "robot/base"}});
   const auto held = [&]() -> bool { return values<bool>(grasp, "gripper/held")[0]; };
   const auto touching = [&]() -> bool { return values<bool>(grasp, "gripper/touching")[0]; };
-  w.compute(grasp);  // the cube rests on the floor, alone
+  w.compute(grasp);  // the cube rests on the floor; the gripper is far away
   EXPECT_FALSE(held());
   EXPECT_FALSE(touching());
 
@@ -38,7 +38,7 @@ TEST(GraspState, TouchingIsNotHolding) {
   place(.58 + .09);
   EXPECT_TRUE(held());
   EXPECT_TRUE(touching());
-  // Now the cube rests on the floor, too: the gripper comes down to it.
+  // Now the gripper touches the cube from above while the cube rests on the floor.
   w.data->mocap_pos[2] = -.58 + .05 + .05 + .04;
   place(.0499);
   EXPECT_FALSE(held());

@@ -13,17 +13,17 @@
 namespace mjsense {
 namespace {
 
-// Iterations from the caller's configuration, then from each new one. A solution is usually found
-// within 10.
+// kDamping: eps of damped_step(). kAttempt: iterations from each restart; a solution is usually
+// found within 10.
 constexpr double kDamping = 1e-12;
 constexpr int kAttempt = 25;
-// Of a new attempt: the nearest of so many configurations begins it, and no joint goes farther in
-// one iteration.
+// A restart takes the best of kCandidates configurations. After it no joint moves by more than
+// kFarthest in one iteration.
 constexpr int kCandidates = 16;
 constexpr double kFarthest = 0.4;  // rad or m
-constexpr double kSlack = 1e-3;    // m, more than a solution is off its target
-// Of joint_motion(), in m or rad per unit of q: damping begins where the leaf moves by less than
-// kSingular per unit of joint motion and rises to kMaxDamping at a singular configuration.
+constexpr double kSlack = 1e-3;    // m; larger than the position error of a solution
+// For joint_motion(), m or rad per unit of q: damping begins if the leaf moves by less than
+// kSingular per unit of joint motion, and rises to kMaxDamping at a singular configuration.
 constexpr double kSingular = 0.1, kMaxDamping = 0.05;
 
 // Solves (J J^T + eps I) y = e for a [6, n] Jacobian, by Cholesky factorisation, and returns J^T y.
@@ -59,13 +59,13 @@ void damped_step(std::span<const double> jacobian, int n, double eps, const doub
   }
 }
 
-// The first links of a chain, whose joints stand still, and the frame that they carry.
+// The first links of a chain if their joints may not move, and the frame after the last of them.
 struct Still {
   std::size_t links;
   Pose frame;
 };
 
-// The frame after so many links.
+// Returns the frame after the first `many` links, in the base frame.
 Pose carried(std::span<const Link> links, const Still& still, std::size_t many,
              std::span<const double> q) {
   Pose pose = still.frame;
@@ -83,7 +83,7 @@ Still still_part(std::span<const Link> links, std::span<const double> q,
   return {n, carried(links, {0, {}}, n, q)};
 }
 
-// Pose of the leaf, and the Jacobian [6, J] of the joints after those that stand still.
+// Returns the pose of the leaf and writes the Jacobian [6, J] of the joints after `still`.
 Pose jacobian_of(std::span<const Link> links, const Still& still, const Pose& tail,
                  std::span<const double> q, std::span<double> jacobian) {
   const std::size_t n = links.size() - still.links;
@@ -109,7 +109,7 @@ Pose jacobian_of(std::span<const Link> links, const Still& still, const Pose& ta
   return leaf;
 }
 
-// Farther from the first joint that moves than all lengths together the leaf cannot be.
+// True if the target is farther from the first moving joint than the sum of all link lengths.
 bool is_out_of_reach(std::span<const Link> links, const Still& still, const Pose& tail, Vec3 target,
                      std::span<const double> low, std::span<const double> high) {
   if (still.links == links.size()) return false;
@@ -193,14 +193,14 @@ void Chain::joint_motion(std::span<const double> q, const Twist& twist,
   damped_step(jac, n, kDamping, e, dq);
   double motion = 0;
   for (double d : dq.first(n)) motion += d * d;
-  // The gain of J along this twist: at least J's smallest singular value.
+  // The gain of J for this twist is at least J's smallest singular value.
   const double gain = norm(twist) / std::sqrt(motion), part = gain / kSingular;
   if (!(part < 1)) return;  // also for a twist of 0
   damped_step(jac, n, kMaxDamping * kMaxDamping * (1 - part * part), e, dq);
 }
 
-// Additive recurrence: the fractional parts of k * alpha_i, alpha_i powers of the generalised
-// golden ratio, fill the box of joint ranges evenly whatever their number.
+// Additive recurrence: the fractional parts of k * alpha_i, with alpha_i the powers of the inverse
+// generalised golden ratio, fill the box of joint ranges evenly for any number of joints.
 void Chain::spread(int k, std::span<double> q, std::span<const bool> moves) const {
   const int n = static_cast<int>(links_.size());
   const double phi = golden(n);

@@ -69,7 +69,7 @@ TEST_F(Fr3, ForwardKinematicsAndJacobianAreMuJoCos) {
   }
 }
 
-// Joints that do not stand at their body's origin, and a slide.
+// A chain with a slide joint and with joints that are offset from their body's origin.
 TEST(Chain, OfOffsetJointsIsMuJoCos) {
   const char* xml = R"(<mujoco><worldbody><body name="base" pos=".1 0 .2" euler="10 0 20">
       <geom size=".1"/>
@@ -99,8 +99,8 @@ TEST(Chain, OfOffsetJointsIsMuJoCos) {
   mj_deleteSpec(spec);
 }
 
-// The joint motion is exact where the leaf follows the joints well, and bounded where it does not:
-// stretched out, with the wrist aligned, wherever else.
+// The joint motion is exact away from singular configurations and bounded near them. Every fourth
+// configuration is singular or close to it: arm stretched out and wrist aligned.
 TEST_F(Fr3, JointMotionIsDampedNearSingularConfigurations) {
   Rng rng(3, 0, 0, 0);
   std::array<double, 6 * 7> jac;
@@ -158,7 +158,7 @@ TEST_F(Fr3, InverseKinematicsGivesUpOutOfReach) {
   EXPECT_FALSE(chain->ik({{2.0, 0, 0.5}, {}}, q));
 }
 
-// Whatever the leaf can reach, from wherever: the test of lengths refuses none of it.
+// The early test of the link lengths never rejects a reachable pose.
 TEST_F(Fr3, NothingThatIsReachedIsOutOfReach) {
   Rng rng(5, 0, 0, 0);
   for (int trial = 0; trial < 1000; ++trial) {

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
-// A hinge or slide between two bodies, as chains of them are made of.
+// One link of a kinematic chain: a hinge or slide joint and the fixed transform before it.
 
 #include <mujoco/mujoco.h>
 
@@ -9,14 +9,14 @@
 namespace mjsense {
 
 struct Link {
-  Pose fixed;         // from the moved frame of the one before
-  Vec3 axis, anchor;  // of the joint, in the frame after `fixed`
+  Pose fixed;         // from the moved frame of the previous link
+  Vec3 axis, anchor;  // of the joint, in the frame after `fixed`; anchor in m
   bool slide = false;
-  double zero = 0;  // qpos0
+  double zero = 0;  // qpos0 of the joint
 
   Link(const mjModel* model, int joint, const Pose& fixed);
 
-  // From the pose of the frame after `fixed` to that of the moved frame, the joint at q.
+  // Changes `pose` from the frame after `fixed` to the moved frame, for joint position q.
   void move(Pose& pose, double q) const;
 };
 

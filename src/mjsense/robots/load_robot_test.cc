@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// A robot.toml says what a robot is, or an error says file, line and key of what is wrong.
+// Tests of robot.toml files: what they define, and that errors name file, line and key.
 #include "mjsense/robots/load_robot.h"
 
 #include <gmock/gmock.h>
@@ -73,7 +73,7 @@ struct RobotFile : ::testing::Test {
     }
     return "no error";
   }
-  // kToml with one text in place of another.
+  // kToml with `old` replaced by `now`.
   static std::string with(const std::string& old, const std::string& now) {
     std::string text = kToml;
     return text.replace(text.find(old), old.size(), now);
@@ -137,7 +137,7 @@ TEST_F(RobotFile, ErrorsNameFileLineAndKey) {
   EXPECT_THAT(fault("base = \"base\"\n"), HasSubstr("'model' is missing"));
 }
 
-// Also what is referred to by default, by a key that is not there.
+// Also required references whose key is missing.
 TEST_F(RobotFile, EveryReferenceIsResolvedWhenItIsLoaded) {
   const std::string place = path() + ": move group 'arm': ";
   EXPECT_EQ(fault(with("base = \"base\"", "base = \"bas\"")),

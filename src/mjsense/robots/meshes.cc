@@ -51,7 +51,7 @@ std::function<void(mjSpec* spec, const std::string& prefix)> use_meshes(
   std::string who = "meshes.folder";
   const char* named = cfg.env.empty() ? nullptr : std::getenv(cfg.env.c_str());
   if (named) {
-    if (!*named) return {};  // said to be none
+    if (!*named) return {};  // set but empty: no meshes
     folder = named;
     who = cfg.env;
   } else if (!cfg.folder.empty()) {

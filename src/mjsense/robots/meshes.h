@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
-// Real meshes in the place of a robot's shapes, where an installed package or a folder has them.
+// Replaces a robot's primitive shapes by meshes if a package or a folder provides them.
 
 #include <mujoco/mujoco.h>
 
@@ -11,9 +11,10 @@
 
 namespace mjsense {
 
-// What does it to a scene's spec with a robot whose names have a prefix; empty where there is no
-// folder. Touch, mass and motion stay. Throws ValueError if the folder lacks a file. `robot_file`:
-// of the robot, whose folder MeshesCfg::folder is relative to.
+// Returns a function that replaces the shapes in a scene's spec, for a robot whose names have
+// `prefix`; an empty function if there is no folder with meshes. Collision geoms, masses and joints
+// do not change. Throws ValueError if the folder lacks a file. `robot_file`: path of the
+// robot.toml; MeshesCfg::folder is relative to its folder.
 std::function<void(mjSpec* spec, const std::string& prefix)> use_meshes(
     const MeshesCfg& cfg, const std::string& robot_file);
 

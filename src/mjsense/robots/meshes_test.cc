@@ -21,7 +21,7 @@ namespace {
 namespace fs = std::filesystem;
 using ::testing::HasSubstr;
 
-// A folder of eight tetrahedra in place of the robot's meshes.
+// Sets the mesh folder to a temporary folder with eight tetrahedra as meshes.
 struct Meshes {
   Meshes() {
     for (int i = 0; i < 8; ++i) {
@@ -86,7 +86,8 @@ TEST(FrankaMeshes, AnIncompleteFolderIsAnError) {
   }
 }
 
-// Where the cameras stand, for those who calibrate against it: in the frame of their link, m and degrees.
+// Camera extrinsics (m, in the frame of their link) and vertical fields of view (degrees) that
+// users calibrate against.
 TEST(FrankaModel, CamerasStandWhereTheyShould) {
   const auto scene = scene_of(robot_cfg("franka"));
   const mjModel* m = scene->model();

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
-// The law of noise on commands.
+// Distribution of the noise on commands.
 
 #include <cmath>
 
@@ -8,10 +8,10 @@
 
 namespace mjsense {
 
-// Normal with this deviation, drawn again beyond +-limit.
+// Normal distribution with standard deviation `deviation`, truncated to +-limit.
 inline double truncated_normal(Rng& rng, double deviation, double limit) {
   if (!(deviation > 0)) return 0.0;
-  // Far inside the bell the distribution is flat, and rejection would take for ever.
+  // Here the density is almost uniform, and rejection sampling would take too long.
   if (deviation > 100 * limit) return rng.uniform(-limit, limit);
   for (;;) {
     const double x = deviation * rng.normal();

@@ -153,7 +153,7 @@ Pose Robot::target_pose(const World& world, int group) const {
   for (std::size_t i = 0; i < source.size(); ++i) {
     const auto [g, k] = source[i];
     const GroupValues& from = targets[g];
-    // A gripper's one target stands for all its joints.
+    // A gripper's single target applies to all of its joints.
     q[i] =
         from.size > 0 ? from.values[k < from.size ? k : 0] : world.data->qpos[groups_[g].qpos[k]];
   }
@@ -200,7 +200,7 @@ bool Robot::stoop() {
   return any;
 }
 
-// The target of a group that has no command.
+// Returns the target of a group and marks it as having no command.
 std::span<double> Robot::holding(int world, int g) {
   GroupValues& target = targets_[world][g];
   target.size = groups_[g].target_size;
@@ -219,8 +219,8 @@ void Robot::command(const World& world, const Action& action) {
     const GroupValues& wanted = action.commands[g];
     GroupValues& target = targets_[world.id][g];
     if (!wanted.given) {
-      // Held from the first step that leaves the group out: reading qpos every step would let it
-      // drift.
+      // The target is set in the first step without a command. Reading qpos in every step would let
+      // the group drift.
       if (target.given) controllers_[g]->hold(world, holding(world.id, static_cast<int>(g)));
       continue;
     }

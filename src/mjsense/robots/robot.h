@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
-// A robot of a compiled model: move groups, controllers, kinematics. State is per world, in arrays
-// indexed by world; every function that takes a World (or a world index) touches that world's alone
-// and may run in parallel with the others.
+// A robot of a compiled model: move groups, controllers, kinematics. State is stored per world. A
+// function that takes a World (or a world index) accesses the state of that world only and may run
+// in parallel with calls for other worlds.
 
 #include <mujoco/mujoco.h>
 
@@ -32,7 +32,7 @@ class Robot {
  public:
   static constexpr std::string_view kPrefix = "robot_0/";
 
-  // Resolves every name of cfg; throws KeyError naming the first that `model` does not have.
+  // Resolves every name of cfg. Throws KeyError that names the first one that `model` lacks.
   Robot(RobotCfg cfg, const mjModel* model, int num_worlds, std::string_view prefix = kPrefix,
         std::optional<ControlPeriods> periods = {});
 
@@ -42,66 +42,69 @@ class Robot {
   std::span<const MoveGroup> groups() const { return groups_; }
   int group_index(std::string_view name) const;  // throws KeyError
   const MoveGroup& group(std::string_view name) const { return groups_[group_index(name)]; }
-  int arm() const { return arm_; }          // index of the first arm, -1: it has none
-  int gripper() const { return gripper_; }  // index of the first gripper, -1: it has none
+  int arm() const { return arm_; }          // index of the first arm; -1: no arm
+  int gripper() const { return gripper_; }  // index of the first gripper; -1: no gripper
   int base_body() const { return base_body_; }
 
-  // --- what a fresh world shows
-  Pose base_pose(const World& world) const;                    // X_WB: on the floor
-  Pose leaf_pose(const World& world, int group) const;         // X_WL
-  Pose tcp_pose(const World& world, int group) const;          // X_BL = inv(base) leaf
-  double opening(const World& world, int gripper) const;       // m, between the pads
-  bool is_open(const World& world, int gripper) const;         // above half of max_opening
-  void read_qpos(const World& world, RobotValues& out) const;  // every group
+  // --- measurements; the derived fields of the world must be current (mj_forward)
+  Pose base_pose(const World& world) const;               // X_WB; the base frame is on the floor
+  Pose leaf_pose(const World& world, int group) const;    // X_WL
+  Pose tcp_pose(const World& world, int group) const;     // X_BL = X_WB^-1 X_WL
+  double opening(const World& world, int gripper) const;  // distance between the pads, m
+  bool is_open(const World& world, int gripper) const;    // opening is above half of max_opening
+  void read_qpos(const World& world, RobotValues& out) const;  // joint positions of all groups
 
   // --- kinematics, in the base frame
-  // Leaf of `group` where each joint stands at its group's value; a group with fewer values than
-  // joints (a gripper's one command for two drivers) gives all of them its first. A base gives the
-  // identity.
+  // X_BL of `group` for the given joint positions. If a group has fewer values than joints (one
+  // command for the two driver joints of a gripper), all of its joints take the first value. The
+  // identity for a base.
   Pose fk(int group, const RobotValues& values) const;
-  // From the base to the group's leaf, through every joint of a move group on the way. Not for a
-  // base, which has none.
+  // The chain from the base to the group's leaf. It contains every joint of a move group on this
+  // path. Undefined for a base, which has no chain.
   const Chain& chain(int group) const { return *chains_[group]; }
-  // Moves the joints of `group` alone until its leaf is at `target` (base frame); the other groups
-  // stand as `values` says (in: the start, out: the solution). False, and `values` as they were, if
-  // it is not reached. For a path: max_iterations = Chain::kTracking stays near the start.
+  // Inverse kinematics: moves the joints of `group` only, until its leaf is at `target` (base
+  // frame). The other groups keep their positions in `values` (in: the start, out: the solution).
+  // Returns false and leaves `values` unchanged if the target is not reached. With max_iterations =
+  // Chain::kTracking the solution stays near the start, as a path needs it.
   bool ik(int group, const Pose& target, RobotValues& values, int max_iterations = 1000) const;
-  // X_BL where the controllers' targets put the leaf; joints without a target stay where they are.
+  // X_BL at the controllers' targets; joints without a target use their measured positions.
   Pose target_pose(const World& world, int group) const;
 
   // --- controllers
   const Controller& controller(int group) const { return *controllers_[group]; }
-  // Start configuration with noise drawn from rng, robot standing at X_WB, or where it stands;
-  // controls hold it. Throws ValueError where nothing can carry the base there.
+  // Writes the start configuration with noise from rng, the base at X_WB (unchanged if empty), and
+  // controls that hold it. Throws ValueError if the base cannot be put there.
   void write_start(const StateRow& state, const std::optional<Pose>& base, Rng& rng) const;
-  // Its two parts: where the joints are, and all else.
+  // The two parts of write_start(): the joint positions; and the base placement with the controls.
   void write_joints(const StateRow& state, Rng& rng) const;
   void stand(const StateRow& state, const std::optional<Pose>& base) const;
-  // From now on it starts stooped: cfg().groups[i].init is what `stooped` says, where it says
-  // something. Whether there is such a group.
+  // Replaces the start positions of every group that has `stooped` positions by these, for all
+  // later starts. Returns whether there is such a group.
   bool stoop();
-  // A new episode: the targets are what the controllers hold now (arm: its qpos; gripper: open or
-  // closed as it is).
+  // Starts an episode: the targets become what the controllers hold now (arm: its qpos; gripper:
+  // its open or closed command, whichever is nearer).
   void reset(const World& world);
-  // New targets: what the controllers make of the action; groups that it leaves out hold. Throws
-  // ValueError when a group has the wrong number of values.
+  // Sets new targets from the action; groups without a command hold. Throws ValueError if a command
+  // has the wrong number of values or is not finite.
   void command(const World& world, const Action& action);
-  // Commands of all controlled groups in a row: what the action has and, of a group that it leaves
-  // out, what leaves that as it is. In a fresh world.
+  // Commands of all controlled groups, concatenated. For a group without a command in the action
+  // this is the command that keeps it as it is. The derived fields of the world must be current.
   std::vector<double> commands(const World& world, const Action& action) const;
-  // Controls of the first control step, with noise on the targets if rng is not null.
+  // Writes the controls of the first control step of a policy step; adds noise to the targets if
+  // `noise` is not null.
   void write_ctrl(const World& world, const StateRow& state, Rng* noise) const;
-  // Control step `index` (from 1) after that, in the pass over the worlds; only where a controller
-  // has something to do there. Returns the last of MuJoCo's stages that stays valid.
+  // Writes the controls of control step `index` (1, 2, ...) of a policy step; called in the
+  // parallel pass over the worlds, and only if controls_every_step(). Returns the last of MuJoCo's
+  // stages that is still valid.
   bool controls_every_step() const { return every_step_; }
   mjtStage control(const World& world, int index) const;
-  // Un-noised targets of the groups whose controllers aim at positions: what actions/joint_pos
-  // records.
+  // Targets without noise, for groups with position targets. `actions/joint_pos` records them.
   const RobotValues& targets(int world) const { return targets_[world]; }
 
-  // Sensors that every task with this robot records (tcp_pose). They refer to this robot.
+  // Sensors that every task with this robot records (tcp_pose). They refer to this robot, which
+  // must outlive them.
   std::vector<std::shared_ptr<Sensor>> create_robot_sensors() const;
-  // Its parts that object_image_points shows in pictures: the grippers.
+  // Parts of the robot that object_image_points includes: the grippers.
   std::vector<ImagePointsSensor::Object> image_objects() const;
   std::vector<JointGroup> joint_groups() const;
 
@@ -114,13 +117,13 @@ class Robot {
   std::string prefix_;
   std::vector<MoveGroup> groups_;
   std::vector<std::unique_ptr<Controller>> controllers_;  // per group
-  std::vector<std::unique_ptr<Chain>> chains_;            // per group, null without a leaf
-  // Per group, per joint of its chain: (group, index) of its value.
+  std::vector<std::unique_ptr<Chain>> chains_;            // per group, null without a leaf site
+  // [group][joint of its chain]: (group, index) of the joint's value in RobotValues.
   std::vector<std::vector<std::pair<int, int>>> source_;
   int arm_ = -1, gripper_ = -1, base_body_ = -1;
   bool every_step_ = false;
   BasePlacement placement_;
-  std::vector<RobotValues> targets_;  // [B]; `given` false: the group holds
+  std::vector<RobotValues> targets_;  // [B]; `given` is false while the group holds
 };
 
 }  // namespace mjsense

@@ -1,8 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
-// What a robot is, as data: the MJCF files that make it up, move groups with their controllers,
-// start configuration, cameras. A robot.toml says it (robots/load_robot.h); its keys are the fields
-// below.
+// Configuration of a robot: the MJCF files that make it up, move groups with their controllers,
+// start configuration, cameras. A robot.toml (robots/load_robot.h) has the fields below as keys.
 
 #include <mujoco/mujoco.h>
 
@@ -21,7 +20,7 @@
 
 namespace mjsense {
 
-// kActuators: whatever they drive; without a command they stay as they are.
+// kActuators: a group defined by its actuators; without a command their controls do not change.
 enum class GroupKind { kBase, kTorso, kArm, kGripper, kHead, kActuators };
 template <>
 inline constexpr std::array<std::string_view, 6> kWords<GroupKind>{"base",    "torso", "arm",
@@ -82,7 +81,7 @@ struct CameraMount {
   std::string mjcf_camera;  // local name
   bool record_depth = false;
   bool image_points = true;
-  double min_visible = 0;  // of CameraMountCfg
+  double min_visible = 0;  // see CameraMountCfg
 };
 template <class V>
 void visit_fields(V& v, CameraMount& c) {
@@ -97,7 +96,8 @@ void visit_fields(V& v, CameraMount& c) {
       .within(0, 1);
 }
 
-// Displacement of the tool that the arm's controllers see and recordings do not; normal, truncated.
+// Action noise: a random displacement of the tool (truncated normal) that the arm's controller
+// receives but recordings do not contain.
 struct ActionNoiseCfg {
   double scale = 0.1;
   double rotation_ratio = 0.1;
@@ -118,7 +118,7 @@ void visit_fields(V& v, ActionNoiseCfg& c) {
       .positive();
 }
 
-// A model that hangs on the robot's: a gripper on the flange of an arm.
+// A model attached to the robot's model, e.g. a gripper on the flange of an arm.
 struct PartCfg {
   std::string model;
   std::string to;
@@ -137,7 +137,7 @@ void visit_fields(V& v, PartCfg& c) {
   v("quat", c.quat, "Orientation (wxyz) of its root in the frame to which it is attached.");
 }
 
-// Meshes that take the place of shapes where a folder has them.
+// Meshes that replace primitive shapes if a folder contains them.
 struct MeshesCfg {
   std::string env;
   std::string folder;
@@ -157,7 +157,7 @@ void visit_fields(V& v, MeshesCfg& c) {
   v("files", c.files, "Mesh file of each body.");
 }
 
-// A sensor that is a class of Python's.
+// A sensor implemented by a Python class.
 struct PythonSensorRef {
   std::string name;
   std::string class_name;  // "package.module:Class"
@@ -172,24 +172,25 @@ struct RobotCfg {
   // empty.
   std::function<void(mjSpec* spec, const std::string& prefix)> edit_spec;
   std::string base_body;             // the robot's base frame
-  std::vector<MoveGroupCfg> groups;  // in this order everywhere
+  std::vector<MoveGroupCfg> groups;  // actions and observations have the same order
   std::vector<CameraMount> cameras;
   int image_width = 640, image_height = 368;  // one resolution for all cameras
   ActionNoiseCfg noise;
   int policy_dt_ms = 66, ctrl_dt_ms = 2, sim_dt_ms = 2;
-  double opened = 0.15;        // fraction of its range that is open for the task `open`
-  std::string env_state_name;  // of the row of env_states in MolmoSpaces' form; "": there is none
-  int env_state_size = 0;      // its numbers; 0: what the groups need
+  double opened = 0.15;  // task `open`: fraction of the range that counts as open
+  // name of the additional row of env_states in MolmoSpaces' form; "": no row
+  std::string env_state_name;
+  int env_state_size = 0;  // number of its values; 0: as many as the groups need
 
-  // Sensors that episodes with this robot observe and record. Elements have their full names.
+  // Sensors that episodes with this robot observe and record. Elements are named with their prefix.
   std::vector<std::shared_ptr<const SensorCfg>> sensors;
   std::vector<PythonSensorRef> python_sensors;
 
-  // What the file says where its model comes from; load_robot() makes `model` and `edit_spec` of it.
+  // The model as the file describes it; robot_cfg() makes `model` and `edit_spec` from these.
   std::string mjcf;
   std::vector<PartCfg> parts;
   std::optional<MeshesCfg> meshes;
-  std::string file;  // that it was read from
+  std::string file;  // path of the robot.toml
 };
 template <class V>
 void visit_fields(V& v, RobotCfg& c) {
@@ -223,7 +224,7 @@ void visit_fields(V& v, RobotCfg& c) {
     "Number of values in that row; 0: as many as the groups need.")
       .at_least(0);
 }
-// Periods that divide, unique names.
+// Checks that the periods divide each other and that names are unique.
 void validate(const RobotCfg& cfg, std::string_view place);
 
 }  // namespace mjsense

@@ -5,7 +5,8 @@
 
 namespace mjsense {
 
-// One tool pose a gripper: `tcp_pose` of the only one, `tcp_pose_left` of "left_gripper".
+// One tool pose for each gripper: `tcp_pose` if there is one gripper, else for example
+// `tcp_pose_left` for "left_gripper".
 std::vector<std::shared_ptr<Sensor>> Robot::create_robot_sensors() const {
   std::vector<const MoveGroup*> grippers;
   for (const MoveGroup& group : groups_) {

@@ -17,7 +17,7 @@ struct DataDelete {
   void operator()(mjData* data) const { mj_deleteData(data); }
 };
 
-// A Franka alone in two worlds.
+// A Franka without other objects, in two worlds.
 struct Franka : testing::Test {
   static SceneCfg scene_cfg() {
     SceneCfg cfg;
@@ -71,13 +71,13 @@ TEST_F(Franka, StartsNearItsStartConfigurationAndStaysThere) {
   const double spread[] = {0.025, 0.05, 0.075, 0.1, 0.125, 0.15, 0.175};
   const auto before = arm_qpos(0);
   for (int i = 0; i < 7; ++i) EXPECT_LE(std::abs(before[i] - init[i]), spread[i]);
-  EXPECT_NE(before, arm_qpos(1));  // drawn from different numbers
+  EXPECT_NE(before, arm_qpos(1));  // each world draws its own noise
   step(0, 1000);
   const auto after = arm_qpos(0);
   for (int i = 0; i < 7; ++i) EXPECT_NEAR(after[i], before[i], 1e-6);
 }
 
-// Whatever the noise, a start lies within the limits: what would be beyond is at the limit.
+// Start positions are clipped to the joint limits.
 TEST_F(Franka, StartsNeverLieBeyondTheLimits) {
   RobotCfg cfg = robot_cfg("franka");
   MoveGroupCfg& arm = cfg.groups[1];
@@ -105,13 +105,13 @@ TEST_F(Franka, StartsNeverLieBeyondTheLimits) {
       ++(q == low[i] || q == high[i] ? at_limit : inside)[i];
     }
   }
-  for (int i = 0; i < 7; ++i) {  // P(beyond) = 0.4
+  for (int i = 0; i < 7; ++i) {  // the probability of a draw beyond the limit is 0.4
     EXPECT_NEAR(at_limit[i], 80, 35) << i;
     EXPECT_NEAR(inside[i], 120, 35) << i;
   }
 }
 
-// Each joint's noise fills its own width, on both sides.
+// The noise of each joint covers its own width on both sides.
 TEST_F(Franka, StartNoiseIsAsWideAsItSays) {
   const double init[] = {0, -0.7853, 0, -2.35619, 0, 1.57079, 0};
   const double spread[] = {0.025, 0.05, 0.075, 0.1, 0.125, 0.15, 0.175};
@@ -153,7 +153,7 @@ TEST_F(Franka, ToolPoseIsForwardKinematicsInTheBaseFrame) {
   EXPECT_GT(measured.p.z, 0.58);  // the base frame is on the floor
   EXPECT_EQ(norm(robot.fk(0, q).p), 0);
 
-  // Where the base stands changes nothing.
+  // The tool pose in the base frame does not depend on the base placement.
   data[0]->mocap_pos[0] = 1.5;
   write_quat(axis_angle({0, 0, 1}, 0.7), data[0]->mocap_quat);
   mj_forward(model, data[0].get());
@@ -173,7 +173,7 @@ TEST_F(Franka, GripperOpensAndClosesOnCommand) {
   EXPECT_NEAR(robot.opening(worlds[0], g), 0.0, 0.001);
   EXPECT_FALSE(robot.is_open(worlds[0], g));
   EXPECT_NEAR(data[0]->qpos[robot.groups()[g].qpos[0]], 0.8, 0.005);
-  // Left out, it holds what it is: closed.
+  // Without a command the gripper holds its state: closed.
   robot.command(worlds[0], {});
   EXPECT_EQ(robot.targets(0)[g].values[0], 255);
   const double open = 0;
@@ -194,13 +194,13 @@ TEST_F(Franka, LeftOutGroupsHoldWhereTheyWere) {
   const auto held = arm_qpos(0);
   const auto first = robot.targets(0)[robot.arm()].view();
   EXPECT_EQ(std::vector<double>(first.begin(), first.end()), held);
-  // Set once: the arm still moves, the target does not follow it.
+  // The target is set once: the arm still moves, but the target does not follow it.
   step(0, 33);
   robot.command(worlds[0], {});
   const auto second = robot.targets(0)[robot.arm()].view();
   EXPECT_EQ(std::vector<double>(second.begin(), second.end()), held);
   EXPECT_NE(arm_qpos(0), held);
-  // The other world was not touched.
+  // The other world's targets are unchanged.
   EXPECT_FALSE(robot.targets(1)[robot.arm()].given);
 }
 
@@ -254,7 +254,7 @@ TEST_F(Franka, ActionNoiseGrowsWithTheMotionAndIsNotRecorded) {
     const double angle = angle_between(disturbed.q, wanted.q);
     turned += angle * angle;
     for (int i = 0; i < 3; ++i)
-      EXPECT_LT(std::abs(off[i]), 0.023);  // 0.02 and what the linear map leaves
+      EXPECT_LT(std::abs(off[i]), 0.023);  // 0.02 and the error of the linearisation
     square += dot(off, off);
   }
   EXPECT_NEAR(std::sqrt(square / (3 * draws)), 0.1 * move, 0.01 * move);
@@ -263,7 +263,7 @@ TEST_F(Franka, ActionNoiseGrowsWithTheMotionAndIsNotRecorded) {
   EXPECT_EQ(robot.targets(0)[arm].values[0], target[0]);
 }
 
-// A motion of 0.25 m would have a deviation of 0.025 m.
+// Untruncated, this motion of 0.25 m would get noise with a standard deviation of 0.025 m.
 TEST_F(Franka, ActionNoiseIsTruncated) {
   const StateRow state = state_row(data[0].get());
   const int arm = robot.arm();
@@ -282,12 +282,13 @@ TEST_F(Franka, ActionNoiseIsTruncated) {
     values[arm].set({state.ctrl, 7});
     farthest = std::max(farthest, norm(robot.fk(arm, values).p - wanted.p));
   }
-  // To the corner of a cube of 2 x 0.02 m, and what the linear map leaves.
+  // Distance to the corner of a cube with edges of 2 x 0.02 m, plus the error of the linearisation.
   EXPECT_LT(farthest, 1.1 * std::sqrt(3.0) * 0.02);
   EXPECT_GT(farthest, 0.025);
 }
 
-// Stretched out, a displacement of the tool by millimetres would turn joints by radians.
+// With the arm stretched out, an undamped displacement of the tool by millimetres would move joints
+// by radians.
 TEST_F(Franka, ActionNoiseIsBoundedAtSingularPostures) {
   const StateRow state = state_row(data[0].get());
   const int arm = robot.arm();

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// What holds of every robot there is: kinematics against MuJoCo, controllers that reach what they
-// are told, a base that stands anywhere.
+// Properties of every built-in robot: kinematics agree with MuJoCo, controllers reach their
+// targets, and the base can be placed anywhere.
 
 #include <fmt/format.h>
 #include <gmock/gmock.h>
@@ -22,7 +22,7 @@ struct DataDelete {
   void operator()(mjData* data) const { mj_deleteData(data); }
 };
 
-// One robot alone in one world.
+// One robot without other objects, in one world.
 struct Alone {
   explicit Alone(const std::string& name) : cfg(robot_cfg(name)) {
     SceneCfg scene_cfg;
@@ -43,7 +43,7 @@ struct Alone {
     mj_forward(model, data.get());
     robot->reset(world);
   }
-  // One policy step: command, controls and physics at their periods.
+  // Runs one policy step: command, controls and physics at their periods.
   void play(const Action& action) {
     robot->command(world, action);
     const int controls = cfg.policy_dt_ms / cfg.ctrl_dt_ms,
@@ -85,12 +85,12 @@ Pose on_the_floor(Rng& rng) {
 
 void expect_same(const Pose& a, const Pose& b, double tolerance, const char* what) {
   EXPECT_LT(norm(a.p - b.p), tolerance) << what;
-  // An angle by arc cosine has half the digits.
+  // The vector part of the quaternion: an angle from the arc cosine has only half the digits.
   const Quat d = conjugate(a.q) * b.q;
   EXPECT_LT(std::sqrt(d.x * d.x + d.y * d.y + d.z * d.z), tolerance) << what;
 }
 
-// Chain joints of a group: random within their ranges.
+// Sets the joints of all groups but the base to random positions within their ranges.
 void randomize(const Robot& robot, const mjModel* m, mjData* d, Rng& rng) {
   for (const MoveGroup& group : robot.groups()) {
     if (group.kind == GroupKind::kBase) continue;
@@ -133,7 +133,8 @@ TEST_P(EveryRobot, ForwardKinematicsAreMuJoCosWhereverItStands) {
   }
 }
 
-// Of poses that the arm has in random configurations, the other groups as they start.
+// Targets are the leaf poses of random configurations of the arm; the other groups stay at their
+// start positions.
 TEST_P(EveryRobot, InverseKinematicsReachesWhatCanBeReached) {
   const Robot& robot = *alone.robot;
   alone.start();
@@ -251,7 +252,7 @@ TEST_P(EveryRobot, AMovingBaseGoesWhereItIsTold) {
   }
   alone.play(action, 4.0);
   expect_same(robot.base_pose(alone.world), goal, 5e-3, "base");
-  // Tool and kinematics do not notice that the base is elsewhere.
+  // Tool pose and kinematics do not depend on the base's position.
   RobotValues q;
   robot.read_qpos(alone.world, q);
   for (std::size_t g = 0; g < robot.groups().size(); ++g) {
@@ -269,7 +270,7 @@ TEST(Robots, AreTheseByName) {
                                    "i2rt_yam", "mobile_franka", "rby1"));
 }
 
-// MolmoSpaces' groups, their numbers and their order.
+// The groups, their order and their numbers of qpos and command values are those of MolmoSpaces.
 TEST(Robots, GroupsAreMolmoSpaces) {
   const auto groups = [](const char* name) {
     const Alone alone(name);

@@ -13,7 +13,7 @@
 namespace mjsense {
 namespace {
 
-// The elements of one type whose names begin with the prefix, by local name.
+// The elements of one type whose names begin with the prefix: local names and ids.
 struct Named {
   std::vector<std::string> names;
   std::vector<int> ids;
@@ -21,7 +21,8 @@ struct Named {
 
 Named named(const mjModel* m, mjtObj type, const std::string& prefix) {
   Named found;
-  const int first = type == mjOBJ_BODY && prefix.empty() ? 1 : 0;  // the world is no part of it
+  // the world body is not part of the robot
+  const int first = type == mjOBJ_BODY && prefix.empty() ? 1 : 0;
   for (int id = first; id < count_of(m, type); ++id) {
     const std::string name = name_of(m, type, id);
     if (!name.starts_with(prefix)) continue;
@@ -35,7 +36,7 @@ bool turns_or_slides(const mjModel* m, int joint) {
   return m->jnt_type[joint] == mjJNT_HINGE || m->jnt_type[joint] == mjJNT_SLIDE;
 }
 
-// Joints that an actuator drives: its own, or those of its tendon.
+// Adds the joints that an actuator drives: its own joint, or those of its tendon.
 void add_driven(const mjModel* m, int actuator, std::set<int>& joints) {
   const int target = m->actuator_trnid[2 * actuator];
   switch (m->actuator_trntype[actuator]) {

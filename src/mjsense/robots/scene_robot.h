@@ -1,7 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
-// The robot that a scene brings along: whatever of it has actuators. It needs no description of its
-// own; commands are its actuators' controls, and between commands they stay as they are.
+// A robot configuration made from the actuators that a scene's model already contains; no
+// robot.toml is needed. Commands are the actuators' controls; without a command the controls do not
+// change.
 
 #include <mujoco/mujoco.h>
 
@@ -14,14 +15,15 @@
 
 namespace mjsense {
 
-// (move group, patterns of the local names of its actuators)
+// Pairs of move group name and regular expressions for the local names of its actuators.
 using ActuatorGroups = std::vector<std::pair<std::string, std::vector<std::string>>>;
 
-// Of the entity, or of the whole model if it is "". Its base is the entity's mocap body, else its
-// first body, else the world. Move groups: "base", then `groups`, or "joints" of all actuators;
-// a group has the hinges and slides that its actuators drive, "joints" all there are. Throws
-// KeyError for an entity that the scene has not, ValueError for patterns that match nothing or what
-// another has matched; `place` starts the message.
+// Configuration of the robot that is this entity, or the whole model if `entity` is "". Its base is
+// the entity's mocap body, else its first body, else the world. Its move groups are "base", then
+// `groups`; without `groups`, one group "joints" of all actuators and all hinges and slides. A
+// group in `groups` has the hinges and slides that its actuators drive. Throws KeyError for an
+// unknown entity, and ValueError for patterns that match no actuator or one of another group;
+// `place` starts the message.
 RobotCfg scene_robot(const mjModel* model, const std::string& entity, const ActuatorGroups& groups,
                      std::string_view place);
 

@@ -13,7 +13,7 @@ namespace {
 using testing::ElementsAre;
 using testing::HasSubstr;
 
-// Two hinges, each with a motor, two slides that a tendon moves, and one that nothing drives.
+// Two hinges with a motor each, two slides driven by one tendon, and one joint without actuator.
 constexpr const char* kArm = R"(
 <mujoco>
   <worldbody>
@@ -88,7 +88,7 @@ TEST_F(SceneRobot, WithoutACommandControlsStay) {
   robot.reset(world);
   EXPECT_THAT(robot.targets(0)[1].view(), ElementsAre(1.5, -7, 0));
   Action action;
-  const double command[] = {5, 1, 2};  // the first is limited
+  const double command[] = {5, 1, 2};  // the first exceeds its control range
   action.commands[1].set(command);
   robot.command(world, action);
   robot.write_ctrl(world, state_row(data), nullptr);

@@ -18,7 +18,8 @@ namespace {
 using Kind = FieldType::Kind;
 
 constexpr std::string_view kPython = "python";
-// Cameras have tables of their own, and an effect refers to a sensor of the scene by its key.
+// Kinds that are not allowed here: cameras have their own tables, and an effect refers to another
+// sensor of the scene by its key.
 constexpr std::string_view kNotHere[] = {"camera", "effect"};
 
 std::string robot_entity() {
@@ -44,7 +45,7 @@ void name_entity(const FieldType& type, void* value) {
   }
 }
 
-// Whether the reference names anything: one that is left out stays as it is.
+// True if the reference names an element; an empty reference is left unchanged.
 bool refers(const StructDecl& decl, void* object) {
   for (const char* key : {"name", "pattern"}) {
     const FieldDecl* field = decl.find(key);
@@ -56,7 +57,7 @@ bool refers(const StructDecl& decl, void* object) {
   return false;
 }
 
-// References without an entity become the robot's.
+// Sets the entity of references that have none to the robot's.
 void name_entity(const StructDecl& decl, void* object) {
   const FieldDecl* entity = decl.find("entity");
   if (entity && entity->type && entity->type->kind == Kind::kText && refers(decl, object)) {

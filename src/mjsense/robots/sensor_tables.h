@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
-// [[sensors]] of a robot.toml: sensors of the scene by their kind and fields, and classes of Python's.
+// Reads [[sensors]] of a robot.toml: built-in sensors by kind and fields, and Python classes.
 //
 //   [[sensors]]
 //   kind = "contact"
@@ -13,14 +13,15 @@
 //   class = "my_lab.sensors:GripForce"
 //   args = { gain = 2.5 }
 //
-// Elements without an `entity` are the robot's, except those of `secondary`, which are the scene's.
+// A reference without `entity` refers to the robot, except in `secondary`, where it refers to the
+// whole scene.
 
 #include "mjsense/core/toml_value.h"
 #include "mjsense/robots/robot_cfg.h"
 
 namespace mjsense {
 
-// Takes the tables out of the file. ValueError that says file, line and key of what is wrong.
+// Moves the [[sensors]] tables from `file` to `cfg`. Throws ValueError with file, line and key.
 void take_robot_sensors(toml::table& file, const std::string& path, RobotCfg& cfg);
 
 }  // namespace mjsense

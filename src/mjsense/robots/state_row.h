@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
-// The state of one world that an episode writes: MuJoCo's own rows, wherever they live. Call
-// forward() after writing.
+// Pointers to the state components of one world that an episode's start writes. They point into the
+// mjData or the worlds' state; call forward() after writing.
 
 #include <mujoco/mujoco.h>
 

@@ -38,7 +38,7 @@ double ActuatedController::clip(int i, double value) const {
 
 std::string ActuatedController::position_unit(int i) const {
   const int a = group_.actuators[i];
-  // A servo whose control is a joint's position has its unit; others take what their range says.
+  // A position servo has the joint's unit; for other actuators the unit is the control range.
   if (is_position_servo(model_, a))
     return model_->jnt_type[model_->actuator_trnid[2 * a]] == mjJNT_SLIDE ? "m" : "rad";
   if (group_.kind == GroupKind::kGripper)
@@ -60,7 +60,7 @@ void ActuatedController::describe(MoveGroup& group) const {
 }
 
 void ActuatedController::start(const StateRow& state) const {
-  if (group_.kind == GroupKind::kActuators) return;  // as the scene has them
+  if (group_.kind == GroupKind::kActuators) return;  // keep the scene's controls
   for (int i = 0; i < size(); ++i) {
     const int a = group_.actuators[i];
     state.ctrl[a] = group_.kind == GroupKind::kGripper ? group_.open_command

@@ -1,15 +1,16 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
-// What turns a policy's command into controls. Three periods: a policy gives a command every
-// policy_dt, a controller computes controls every ctrl_dt, the physics steps every sim_dt:
+// Controller interface: turns a policy's commands into controls. There are three periods: a policy
+// gives a command every policy_dt, a controller computes controls every ctrl_dt, and the physics
+// steps every sim_dt:
 //
 //   policy   |command                            |command
 //   control  |begin |compute |compute |compute   |begin ...
 //   physics  |.|.|.|.|.|.|.|.|.|.|.|.|.|.|.|.|
 //
-// A controller whose controls stay as they are between two commands has no compute, which costs
-// nothing. State is per world; functions that take a world touch that world's alone and may run in
-// parallel with the others.
+// A controller whose controls do not change between two commands has no compute step and no cost
+// for it. State is stored per world; functions that take a world access the state of that world
+// only and may run in parallel with calls for other worlds.
 
 #include <memory>
 #include <span>
@@ -22,7 +23,7 @@
 
 namespace mjsense {
 
-// The periods of a robot's control, s.
+// Periods of the policy and the controllers, s.
 struct ControlPeriods {
   double policy_dt = 0.066;
   double ctrl_dt = 0.002;
@@ -41,39 +42,40 @@ class Controller {
  public:
   virtual ~Controller() = default;
 
-  // Fills command_size, command_unit, target_size, target_unit of the group.
+  // Sets command_size, command_unit, command_low, command_high, target_size and target_unit of the
+  // group.
   virtual void describe(MoveGroup& group) const = 0;
 
-  // The state row of an episode's start was written: controls that keep it.
+  // Writes controls that hold the start state, after that has been written to `state`.
   virtual void start(const StateRow& state) const = 0;
-  // A new episode, in a fresh world.
+  // Starts an episode. The derived fields of the world are current.
   virtual void reset(const World& world, std::span<double> target) { hold(world, target); }
-  // No command: from here on the group stays as it is in this fresh world. `target`: what it aims
-  // at then, as for command().
+  // The policy gives no command: from now on the group stays as it is in this world, whose derived
+  // fields are current. `target` receives the resulting positions, as in command().
   virtual void hold(const World& world, std::span<double> target) = 0;
-  // The command that leaves the group as it is, or where `target` sends it.
+  // Writes the command that keeps the group as it is or, if it has a target, sends it to `target`.
   virtual void keep(const World& world, std::span<const double> target,
                     std::span<double> command) const = 0;
-  // A command: as many finite numbers as describe() says. `target` [target_size] (in: the last one)
-  // becomes the positions that it aims at, without noise: what actions/joint_pos records.
+  // A new command: as many finite numbers as describe() says. `target` [target_size] (in: the last
+  // target) receives the new target positions, without noise; `actions/joint_pos` records them.
   virtual void command(const World& world, std::span<const double> command,
                        std::span<double> target) = 0;
-  // Noise on a target, of a kind that only the controller knows; the arms' is Robot's.
+  // Adds controller-specific noise to a target. Noise on arms is added by Robot.
   virtual void disturb(const World& /*world*/, Rng& /*rng*/, std::span<double> /*target*/) {}
-  // A policy step begins, after hold() or command(): controls for its first control step.
+  // Writes the controls of the first control step of a policy step, after hold() or command().
   virtual void begin(const World& world, std::span<const double> target, const StateRow& state) = 0;
 
-  // True if controls change between commands: then compute() follows before every other control
-  // step, `index` from 1, in the parallel pass over the worlds. Of the world, the state alone (qpos,
-  // qvel, mocap) is current. Returns the last of MuJoCo's stages that what it wrote leaves valid:
-  // mjSTAGE_VEL after controls, mjSTAGE_NONE after mocap bodies.
+  // True if controls change between commands. Then compute() is called before every later control
+  // step (`index` 1, 2, ...) in the parallel pass over the worlds. Only the state (qpos, qvel,
+  // mocap) of the world is current then. Returns the last of MuJoCo's stages that remains valid
+  // after the write: mjSTAGE_VEL after controls, mjSTAGE_NONE after mocap bodies.
   virtual bool every_step() const { return false; }
   virtual mjtStage compute(const World& /*world*/, int /*index*/, const StateRow& /*state*/) {
     return mjSTAGE_ACC;
   }
 };
 
-// Of a group's configuration. Throws ValueError where the group is not as its controller needs it.
+// Makes the controller of a group. Throws ValueError if the group does not meet its requirements.
 std::unique_ptr<Controller> make_controller(const ControllerCfg& cfg, const MoveGroup& group,
                                             const ControllerInit& init);
 

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
-// The controllers that a move group may have: what a command means, as data.
+// Configurations of the controllers; each defines the meaning of a group's commands.
 
 #include <array>
 #include <string>
@@ -11,7 +11,7 @@
 
 namespace mjsense {
 
-// Where commands are far apart a servo jumps with each of them, and what the robot holds slips.
+// Without a ramp a servo jumps at every command; if the policy period is long, held objects slip.
 inline constexpr const char* kRampText =
     "Controls go evenly from command to command, a piece every control step, instead of jumping.";
 
@@ -135,7 +135,7 @@ using ControllerCfg =
 template <>
 inline constexpr const char* kChoiceName<ControllerCfg> = "ControllerCfg";
 
-// "joint_position" ...
+// Name of the kind, e.g. "joint_position".
 inline const char* controller_kind(const ControllerCfg& cfg) {
   return std::visit([]<class C>(const C&) { return struct_of<C>().kind; }, cfg);
 }

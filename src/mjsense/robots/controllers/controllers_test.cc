@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Every kind of controller on the smallest robot that has it.
+// Tests of every kind of controller on a minimal robot.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
@@ -19,7 +19,7 @@ struct DataDelete {
   void operator()(mjData* data) const { mj_deleteData(data); }
 };
 
-// One move group "g" of a model; 60 ms a command, 6 ms a control step, 2 ms a physics step.
+// A robot with one move group "g"; policy, control and physics periods of 60, 6 and 2 ms.
 struct OneGroup {
   OneGroup(const std::string& xml, MoveGroupCfg group, const char* base = "base") {
     cfg.name = "small";
@@ -99,7 +99,7 @@ TEST(Controllers, PositionsAreTargets) {
   EXPECT_NEAR(r.data->qpos[0], 0.5, 1e-3);
 }
 
-// Ten control steps a command: each a tenth of the way.
+// A command has ten control steps; each covers a tenth of the path.
 TEST(Controllers, PositionsMayBeRamped) {
   OneGroup r(kPositions, group_of(JointPositionCfg{.ramp = true}));
   EXPECT_TRUE(r.robot->controls_every_step());
@@ -159,7 +159,8 @@ TEST(Controllers, OneHeightBendsTheTorso) {
   EXPECT_EQ(r.target(0), 0.7);
 }
 
-// What a controller says would keep a group as it is does, also as float32.
+// The command that commands() returns for a group without a command keeps the group's positions,
+// also after rounding to float32.
 void expect_kept(OneGroup& r) {
   const std::vector<double> before(r.data->qpos, r.data->qpos + r.model->nq);
   std::vector<double> command = r.robot->commands(r.world, {});
@@ -173,7 +174,7 @@ TEST(Controllers, SayWhatKeepsAGroupAsItIs) {
        {ControllerCfg(JointPositionCfg{}), ControllerCfg(JointPositionRelativeCfg{}),
         ControllerCfg(JointVelocityCfg{}), ControllerCfg(TorsoHeightCfg{{0, 0.7}, {1, -2}})}) {
     MoveGroupCfg group = group_of(kind);
-    group.init = {0.5, -0.3};  // no height bends a torso so
+    group.init = {0.5, -0.3};  // not a multiple of the torso's ratio
     OneGroup r(kPositions, group);
     expect_kept(r);
   }
@@ -212,7 +213,7 @@ TEST(Controllers, DifferentialBasesGoWhereTheyLook) {
   Pose base = r.robot->base_pose(r.world);
   EXPECT_NEAR(base.p.x, 1 + 0.6 * std::cos(0.5), 0.01);
   EXPECT_NEAR(base.p.y, 0.6 * std::sin(0.5), 0.01);
-  // Half a circle of 1 m, for 52 * 60 ms.
+  // Half a circle with radius 1 m, 52 * 60 ms.
   r.start({});
   r.play({1.0, 1.0}, 52);
   r.play({}, 10);
@@ -279,7 +280,8 @@ TEST(Controllers, SayWhatTheyNeed) {
   EXPECT_THAT(fault(kPositions, mocap), HasSubstr("needs a free joint"));
 }
 
-// Nothing carries it: it stands where it stands, and says so.
+// A base that nothing can move: its present pose is accepted, any other pose is an error that says
+// how to make it movable.
 TEST(Bases, FixedOnesSayWhatWouldCarryThem) {
   RobotCfg cfg;
   cfg.name = "small";

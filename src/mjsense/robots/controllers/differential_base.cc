@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
-// Commands are a speed ahead (m/s) and a turning speed (rad/s). Two wheels turn accordingly. A base
-// on two slides and a hinge goes where its heading points, which is read anew every control step.
+// Controller `differential_base`: commands are a forward speed (m/s) and a turning speed (rad/s).
+// For two wheels they are converted to wheel speeds. A base on two slides and a hinge moves along
+// its heading, which is read in every control step.
 #include <fmt/format.h>
 
 #include <algorithm>
@@ -24,7 +25,7 @@ class DifferentialBase : public ActuatedController {
     group.command_unit = "m/s, rad/s";
     group.command_low = {-cfg_.max_speed, -cfg_.max_turn};
     group.command_high = {cfg_.max_speed, cfg_.max_turn};
-    group.target_size = 0;  // it aims at no position
+    group.target_size = 0;  // no position target
     group.target_unit = "";
   }
   void hold(const World& world, std::span<double> /*target*/) override { motion_[world.id] = {}; }
@@ -94,7 +95,7 @@ class Planar final : public DifferentialBase {
 
  private:
   double dt_;
-  std::vector<std::array<double, 3>> place_;  // [B] of the servos' targets
+  std::vector<std::array<double, 3>> place_;  // [B] targets x, y (m), yaw (rad)
 };
 
 }  // namespace

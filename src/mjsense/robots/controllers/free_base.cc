@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Commands are poses of a floating base, x, y, z (m) and a quaternion (wxyz), world frame: a mocap
-// body goes there, and a weld draws the base after it.
+// Controller `free_base`: commands are poses of a floating base, x, y, z (m) and a quaternion
+// (wxyz), world frame. A mocap body moves there and pulls the base with a weld constraint.
 #include <fmt/format.h>
 
 #include "mjsense/core/error.h"

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Commands are places on the floor: x, y (m) and yaw (rad) of two slides and a hinge. The base turns
-// to a yaw the short way.
+// Controller `holonomic_base`: commands are poses on the floor, x, y (m) and yaw (rad), for two
+// slides and a hinge. The base takes the shorter direction to a yaw.
 #include <cmath>
 #include <numbers>
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Commands are what the actuators take, clipped to their ranges.
+// Controller `joint_position`: commands are the actuators' controls, clipped to their ranges.
 
 #include "mjsense/robots/controllers/kinds.h"
 #include "mjsense/robots/controllers/ramp.h"

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
-// Commands are motions: target = position + command. A joint whose command is next to nothing keeps
-// its target, so that it does not sag step by step under a load.
+// Controller `joint_position_relative`: commands are displacements, target = position + command. A
+// joint whose command is below the threshold keeps its target, so that it does not sag step by step
+// under a load.
 #include <cmath>
 
 #include "mjsense/robots/controllers/actuated.h"

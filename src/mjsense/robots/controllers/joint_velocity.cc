@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Commands are velocities. Velocity servos take them as they are; the targets of position servos
-// move with them, a piece every control step.
+// Controller `joint_velocity`: commands are velocities. Velocity servos take them as controls; for
+// position servos the targets move at these velocities, in every control step.
 #include <fmt/format.h>
 
 #include <algorithm>
@@ -23,7 +23,7 @@ class VelocityServos final : public ChangeController {
     for (int a : group_.actuators)
       (model_->jnt_type[model_->actuator_trnid[2 * a]] == mjJNT_SLIDE ? slides : turns) = true;
     group.command_unit = slides && turns ? "m/s or rad/s" : slides ? "m/s" : "rad/s";
-    group.target_size = 0;  // it aims at no position
+    group.target_size = 0;  // no position target
     group.target_unit = "";
   }
   void hold(const World& world, std::span<double> /*target*/) override {
@@ -65,13 +65,15 @@ class MovingTargets final : public ChangeController {
     ActuatedController::hold(world, target);
     hold(world, target);
   }
-  // Where the targets are: servos lag behind, and would swing back.
+  // Keeps the targets: servos lag behind them, so the measured positions would make the joints
+  // swing back.
   void hold(const World& world, std::span<double> target) override {
     std::copy_n(target.begin(), size(), from_.begin() + world.id * size());
   }
   void command(const World& world, std::span<const double> command,
                std::span<double> target) override {
-    // From the last target, not from where the joint is: servos lag behind, and would for ever.
+    // Starts from the last target, not from the measured position: servos lag behind, and starting
+    // from the measurement would add that lag at every command.
     std::copy_n(target.begin(), size(), from_.begin() + world.id * size());
     for (int i = 0; i < size(); ++i)
       target[i] = clip(i, target[i] + periods_.policy_dt * command[i]);

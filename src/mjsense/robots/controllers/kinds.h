@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
-// The makers of the controllers, one file each.
+// Factory functions of the controllers, each defined in its controller's file.
 
 #include "mjsense/robots/controllers/controller.h"
 

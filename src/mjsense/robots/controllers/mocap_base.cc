@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Commands are poses of a base that is a mocap body: x, y, z (m) and a quaternion (wxyz), world
-// frame.
+// Controller `mocap_base`: commands are poses of a base that is a mocap body, x, y, z (m) and a
+// quaternion (wxyz), world frame.
 #include <fmt/format.h>
 
 #include "mjsense/core/error.h"

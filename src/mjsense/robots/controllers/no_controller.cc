@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// No command: the group stays as it starts.
+// Controller `none`: the group takes no command and keeps its start position.
 #include "mjsense/robots/controllers/actuated.h"
 #include "mjsense/robots/controllers/kinds.h"
 

@@ -23,7 +23,7 @@ void PoseTarget::describe(MoveGroup& group) const {
   group.command_unit = "m, wxyz";
   group.command_low = {-mjMAXVAL, -mjMAXVAL, -mjMAXVAL, -1, -1, -1, -1};
   group.command_high = {mjMAXVAL, mjMAXVAL, mjMAXVAL, 1, 1, 1, 1};
-  group.target_size = 0;  // it aims at a pose, not at joint positions
+  group.target_size = 0;  // the target is a pose, not joint positions
 }
 
 void PoseTarget::hold(const World& world, std::span<double> /*target*/) {
@@ -64,7 +64,7 @@ mjtStage PoseTarget::compute(const World& world, int /*index*/, const StateRow& 
   const Pose now = base_at(state.mocap_pos, state.mocap_quat);
   const Vec3 way = goal.base.p - now.p;
   const Vec3 turn = log3(conjugate(now.q) * goal.base.q);
-  // Both arrive at once where neither is held back.
+  // Translation and rotation take the same number of control steps.
   const double far = std::max(norm(way) / max_step_, norm(turn) / max_turn_);
   if (far <= 1.0) {
     write(goal.base, state);

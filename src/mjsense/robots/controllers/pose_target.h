@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
-// A mocap body that goes to a commanded pose no faster than it may: what bases that are mocap
-// bodies, or hang on one, share.
+// Moves a mocap body to a commanded pose at limited speed. Base class for bases that are mocap
+// bodies or are welded to one.
 
 #include <vector>
 
@@ -12,7 +12,7 @@ namespace mjsense {
 
 class PoseTarget : public Controller {
  public:
-  // `mocap`: number of the mocap body; it stands at X_WB * X_BM for a base at X_WB.
+  // `mocap`: index of the mocap body. Its pose is X_WB * X_BM if the base is at X_WB.
   PoseTarget(int mocap, const Pose& base_to_mocap, double max_speed, double max_turn,
              const ControllerInit& init);
 
@@ -35,7 +35,7 @@ class PoseTarget : public Controller {
 
   int mocap_;
   Pose base_to_mocap_;
-  double max_step_, max_turn_;  // m and rad a control step
+  double max_step_, max_turn_;  // m and rad per control step
   std::string place_;
   struct Goal {
     bool given = false;

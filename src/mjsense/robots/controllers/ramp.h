@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
-// Controls that go evenly from where they are to a target, a piece every control step.
+// Linear ramp of controls from their current values to a target over one policy step.
 
 #include <algorithm>
 #include <cmath>
@@ -21,7 +21,7 @@ class Ramp {
         from_(num_worlds * actuators_.size()),
         to_(from_.size()) {}
 
-  // A policy step begins; the first control step's controls.
+  // Starts a ramp to `target` and writes the controls of the first control step.
   void begin(int world, std::span<const double> target, const StateRow& state) {
     for (std::size_t i = 0; i < actuators_.size(); ++i) {
       from_[world * actuators_.size() + i] = state.ctrl[actuators_[i]];
@@ -29,7 +29,7 @@ class Ramp {
     }
     write(world, 0, state);
   }
-  // Those of control step `index`; the last is at the target.
+  // Writes the controls of control step `index`; the last one equals the target.
   mjtStage write(int world, int index, const StateRow& state) const {
     const double s = std::min(1.0, (index + 1.0) / static_cast<double>(steps_));
     for (std::size_t i = 0; i < actuators_.size(); ++i) {
@@ -41,12 +41,12 @@ class Ramp {
   }
 
  private:
-  long steps_;  // control steps of a policy step
+  long steps_;  // control steps per policy step
   std::vector<int> actuators_;
   std::vector<double> from_, to_;  // [B, n]
 };
 
-// Its controls are its targets, at once or on a ramp.
+// Base class of controllers whose controls are their targets, set at once or along a ramp.
 class RampedController : public ActuatedController {
  public:
   RampedController(bool ramp, const MoveGroup& group, const ControllerInit& init)

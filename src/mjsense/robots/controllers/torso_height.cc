@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// One number bends hip, knees and ankle together, so that a torso rises and sinks upright:
-// positions = ratio * command.
+// Controller `torso_height`: one value moves hip, knees and ankle together, so that a torso moves
+// up and down upright: positions = ratio * command.
 #include <fmt/format.h>
 
 #include <algorithm>
@@ -33,7 +33,8 @@ class TorsoHeight final : public ActuatedController {
             std::span<double> command) const override {
     command[0] = height_of(target);
   }
-  // The height that it has leaves it as it is, joints between which the ratio is another one, too.
+  // A command equal to the current height changes no target, even if the joints do not have the
+  // configured ratio.
   void command(const World& /*world*/, std::span<const double> command,
                std::span<double> target) override {
     const double height = std::clamp(command[0], cfg_.range[0], cfg_.range[1]);
@@ -44,7 +45,7 @@ class TorsoHeight final : public ActuatedController {
  private:
   static constexpr double kSame = 1e-6;  // rad; commands may come as float32
 
-  // Nearest to where the joints aim.
+  // The height whose joint positions are nearest to the targets (least squares).
   double height_of(std::span<const double> target) const {
     double along = 0, square = 0;
     for (int i = 0; i < size(); ++i) {
