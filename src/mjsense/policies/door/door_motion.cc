@@ -12,17 +12,17 @@ namespace mjsense {
 namespace {
 
 constexpr int kReachIterations = 300;  // of inverse kinematics, for the first configuration
-constexpr int kTries = 40;             // next places of the base that are looked at for collisions
-constexpr double kLeafHalf = 0.025;    // m, half the thickness of a leaf
-constexpr double kMaxJump = 0.5;       // rad, of a joint from one waypoint to the next
-// Costs: of a joint's motion, of leaving the posture of the grasp, of being near a limit, of the
-// base's motion and turn, and of being near something.
+constexpr int kTries = 40;  // candidates of the next base pose that are checked for collisions
+constexpr double kLeafHalf = 0.025;  // m, half the thickness of a leaf
+constexpr double kMaxJump = 0.5;     // rad, of a joint between two waypoints
+// Weights of the cost: joint motion, deviation from the posture at the grasp, closeness to a joint
+// limit, translation and rotation of the base, closeness of the base to obstacles.
 constexpr double kMove = 1.0, kPosture = 0.12, kLimit = 6.0, kDrive = 6.0, kTurn = 1.5,
                  kNear = 25.0;
 constexpr double kNearLimit = 0.25, kComfort = 0.12;  // rad, m
-constexpr double kReachCost = 0.15;                   // of a joint on the way to the handle
-constexpr double kGood = 6;                           // a motion that costs less is taken
-constexpr double kSwivel = 0.8, kMostSwivel = 0.9;    // cost of rad^2; rad
+constexpr double kReachCost = 0.15;                   // joint motion on the path to the handle
+constexpr double kGood = 6;  // the search stops at a motion with a lower cost
+constexpr double kSwivel = 0.8, kMostSwivel = 0.9;  // cost per rad^2; limit, rad
 
 Pose pose_of(const BasePose& base, double z) {
   return {{base.x, base.y, z}, axis_angle({0, 0, 1}, base.yaw)};
@@ -35,8 +35,8 @@ double distance_to_segment(double px, double py, Vec3 a, Vec3 b) {
   return std::hypot(px - a.x - t * ex, py - a.y - t * ey);
 }
 
-// Positions, then contacts. Nothing with a destructor lives across it: a MuJoCo error leaves by
-// longjmp.
+// Computes positions, then contacts. No object with a destructor may live in this frame: a MuJoCo
+// error leaves it by longjmp.
 void collide(const mjModel* m, mjData* d) {
   mj_kinematics(m, d);
   mj_comPos(m, d);
@@ -45,7 +45,7 @@ void collide(const mjModel* m, mjData* d) {
 
 }  // namespace
 
-// One hand, one way to take the handle, one place of the base at the grasp.
+// Plans for one hand, one grasp of the handle and one base pose at the grasp.
 class DoorMotions::Attempt {
  public:
   Attempt(const DoorMotions& motions, const World& world, const Door& door,
@@ -66,8 +66,8 @@ class DoorMotions::Attempt {
     for (std::size_t i = 0; i < init.size(); ++i) start_[hand.tool].values[i] = init[i];
   }
 
-  // The hand, turned by `swivel` about the direction in which it closes: a bar between flat pads
-  // lets it.
+  // `swivel`: rotation of the hand about its closing direction, rad; a bar between flat pads
+  // permits it.
   bool run(const Pose& straight, double swivel, const BasePose& base, double leaf,
            DoorMotion& out) {
     const Pose grasp = swivelled(straight, swivel);
@@ -100,7 +100,7 @@ class DoorMotions::Attempt {
       if (!open_step(straight, leaf * i / steps, leaf * (i - 1) / steps, at, values, out))
         return false;
     }
-    // Straight off the leaf as it stands then.
+    // Straight away from the leaf at its final angle.
     const Pose last = swivelled(geometry_.carried(straight, geometry_.press, leaf), swivel_);
     const Pose off = moved(last, -0.08 * rotate(last.q, {0, 0, 1}));
     if (!follow_line(last, off, at, leaf, geometry_.press, values, out.leave)) out.leave.clear();
@@ -179,8 +179,8 @@ class DoorMotions::Attempt {
     return true;
   }
 
-  // The door a bit further: of small moves of the base - with the door, or not, aside, turned - the
-  // one with which the arm does best.
+  // Opens the door by one step. Tries small motions of the base (with the door by 0, half or all of
+  // its motion, sideways, rotated) and keeps the one with the lowest cost of the arm's motion.
   bool open_step(const Pose& grasp, double leaf, double last, BasePose& base, RobotValues& values,
                  DoorMotion& out) {
     struct Choice {
@@ -189,7 +189,7 @@ class DoorMotions::Attempt {
       RobotValues values;
     };
     const Pose straight = geometry_.carried(grasp, geometry_.press, leaf);
-    // As if the base were a part of the door.
+    // The base pose if the base were rigidly attached to the door.
     const Quat turn = axis_angle(geometry_.hinge_axis, leaf - last);
     const Vec3 carried =
         geometry_.hinge +
@@ -234,9 +234,10 @@ class DoorMotions::Attempt {
     return false;
   }
 
-  // The robot in anything but the handle in its hand.
+  // True if the robot is in collision with anything; contact of the gripper with the handle is
+  // allowed.
   bool collides(const RobotValues& values, const BasePose& base, double leaf, double lever) {
-    const mjModel* m = world_.model;  // furniture where it stands in this world
+    const mjModel* m = world_.model;  // this world's model: furniture differs between worlds
     mjData* d = scratch_;
     mju_copy(d->qpos, world_.data->qpos, m->nq);
     const MoveGroup& carrier = motions_.robot_.groups()[motions_.base_group_];
@@ -278,8 +279,8 @@ class DoorMotions::Attempt {
   mjData* scratch_;
   const MoveGroup& arm_;
   double z_;
-  Vec3 closing_;       // in the tool's frame
-  double swivel_ = 0;  // rad, of the hand about it
+  Vec3 closing_;       // closing direction, tool frame
+  double swivel_ = 0;  // rad, current rotation of the hand about closing_
   RobotValues start_, reference_;
 };
 
@@ -325,7 +326,8 @@ std::vector<BasePose> DoorMotions::places(const World& world, const Door& door) 
   const Vec3 handle = vec3(world.data->xpos + 3 * door.handle);
   const Vec3 hinge_side =
       normalized(Vec3{geometry.hinge.x - handle.x, geometry.hinge.y - handle.y, 0});
-  // Who pushes goes through the doorway, who pulls keeps out of the leaf's way.
+  // To push the door, the base drives through the doorway; to pull it, the base stays clear of the
+  // leaf's path. Preferred offset towards the hinge, m.
   const double wanted =
       dot(geometry.away, opening_direction(model_, world.data, door)) < 0 ? 0.3 : -0.2;
   struct Place {

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
-// How arm and base together take a handle, press it and lead the door along its arc: the arm's joint
-// positions and the base's place for every few degrees, none of them in collision.
+// Plans how arm and base together grasp a handle, press it and move the door along its arc: the
+// arm's joint positions and the base pose for every few degrees, all free of collisions.
 
 #include <mujoco/mujoco.h>
 
@@ -17,17 +17,17 @@
 namespace mjsense {
 
 struct DoorMotionCfg {
-  double before = 0.10;      // m, of the pregrasp from the handle
-  double leaf_step = 0.07;   // rad, of the door between two waypoints
-  double press_step = 0.15;  // rad, of a lever
-  double margin = 0.03;      // m, that the base keeps from walls and leaf where it takes the handle
-  double depth = 0.0005;     // m, that counts as a collision
+  double before = 0.10;      // m, from the pregrasp to the handle
+  double leaf_step = 0.07;   // rad, door rotation between two waypoints
+  double press_step = 0.15;  // rad, lever rotation between two waypoints
+  double margin = 0.03;   // m, clearance of the base from walls and leaf where it grasps the handle
+  double depth = 0.0005;  // m, penetration that counts as a collision
 };
 
 struct DoorWaypoint {
-  std::vector<double> q;  // of the arm
+  std::vector<double> q;  // arm joint positions
   BasePose base;
-  double leaf = 0;  // rad, of the hinge from where it began
+  double leaf = 0;  // rad, hinge rotation since the start
 };
 
 struct DoorMotion {
@@ -35,11 +35,11 @@ struct DoorMotion {
   Pose grasp;                          // X_WT
   std::vector<DoorWaypoint> approach;  // pregrasp .. grasp
   std::vector<DoorWaypoint> press, open;
-  std::vector<DoorWaypoint> leave;  // back off the handle
+  std::vector<DoorWaypoint> leave;  // withdraw from the handle
   double cost = 0;
 };
 
-// What a base may stand on while a door opens: the floor without the leaf.
+// The floor without the door leaf, and the footprint of the base.
 struct DoorFloor {
   const Occupancy* floor;
   const Footprint* footprint;
@@ -50,16 +50,18 @@ class DoorMotions {
   DoorMotions(const mjModel* model, const Robot& robot, DoorFloor floor, DoorMotionCfg cfg = {});
 
   std::span<const Hand> hands() const { return hands_; }
-  // With the base here at the grasp, the door led to `leaf` rad from where it stands, the base `margin`
-  // m off walls and leaf on the way; the best of the hands (`tool` >= 0: of this arm) and of both
-  // ways to take the handle, the other arms tucked in. Nothing where it cannot be done.
+  // The motion that opens the door by `leaf` rad from its current angle, with the base at `base`
+  // for the grasp and at least `margin` m away from walls and leaf afterwards. It is the cheapest
+  // over the hands (`tool` >= 0: only this arm) and both grasps of the handle; the other arms are
+  // tucked in. Empty if there is none.
   std::optional<DoorMotion> plan(const World& world, const Door& door, const BasePose& base,
                                  double leaf, double margin, int tool = -1) const;
-  // Joint positions of an arm that is not needed: all at 0, as far as their ranges go.
+  // Joint positions of an arm that is not used: all at 0, clipped to their ranges.
   std::vector<double> tucked(const Hand& hand) const;
-  // Places before the door from which to take the handle, those first that are likely to do.
+  // Base poses in front of the door from which to grasp the handle, the most promising first.
   std::vector<BasePose> places(const World& world, const Door& door) const;
-  // Whether a base there keeps off walls and leaf, the leaf turned by so much.
+  // Clearance (m) of a base at this pose from walls and from the leaf, with the leaf rotated by
+  // `leaf` rad.
   double clearance(const DoorGeometry& geometry, const BasePose& base, double leaf) const;
 
  private:

@@ -23,10 +23,10 @@ constexpr Phase kPhases[] = {{"NAVIGATE_TO_DOOR", DoorPlanner::kNavigate},
                              {"RELEASE_HANDLE", DoorPlanner::kRelease},
                              {"COMPLETE", DoorPlanner::kComplete},
                              {"RECOVERY", DoorPlanner::kRecovery}};
-constexpr double kThere = 0.06, kThereYaw = 0.1;  // m and rad, from a place to stand at
-constexpr int kPlaces = 2;                        // tried anew before it begins again
-constexpr std::size_t kReachParts = 16;           // of the way to the pregrasp
-constexpr std::size_t kParts = 5;                 // of the opening, each looked at
+constexpr double kThere = 0.06, kThereYaw = 0.1;  // m and rad, from the desired base pose
+constexpr int kPlaces = 2;                        // further base poses tried before a retry
+constexpr std::size_t kReachParts = 16;           // waypoints on the path to the pregrasp
+constexpr std::size_t kParts = 5;  // segments of the opening; progress is checked at each
 
 }  // namespace
 
@@ -74,13 +74,13 @@ void DoorPlanner::make_plan(const World& world, const PlanRequest& request, Plan
     return;
   }
   if (request.attempt > 0 && request.stage == 0) return recover(world, plan);
-  const int first = request.attempt > 0 ? 1 : 0;  // stage in which it drives to the door
+  const int first = request.attempt > 0 ? 1 : 0;  // stage that drives to the door
   if (request.stage > first) {
     const std::optional<DoorMotion> motion =
         motions_->plan(world, door_->door(world.id), base(world),
                        leaf_to_go(world, goal_[world.id]), margin_[world.id], tool_[world.id]);
     if (motion) return open_door(world, *motion, plan);
-    // It does not stand quite where it wanted to: another place.
+    // The base has missed the planned pose, and no plan works from here: try another pose.
     if (request.stage > first + kPlaces) {
       plan.refusal = "no arm can open the door free of collisions from where the base stands";
       return;
@@ -95,7 +95,7 @@ void DoorPlanner::make_plan(const World& world, const PlanRequest& request, Plan
   }
 }
 
-// Lets go, backs off, and brings the arms to where they began.
+// Releases the handle, drives back, and returns the arms to their start positions.
 void DoorPlanner::recover(const World& world, Plan& plan) const {
   plan.more = true;
   const BasePose here = base(world);
@@ -124,7 +124,7 @@ void DoorPlanner::recover(const World& world, Plan& plan) const {
   plan.move_groups(kRecovery, std::move(paths), 0.2);
 }
 
-// To the first place from which the door can be opened.
+// Plans the drive to the first base pose from which the door can be opened.
 bool DoorPlanner::approach(const World& world, double goal, double margin, Plan& plan) {
   const BasePose here = base(world);
   const Door& door = door_->door(world.id);
@@ -138,7 +138,8 @@ bool DoorPlanner::approach(const World& world, double goal, double margin, Plan&
     if (std::hypot(place.x - here.x, place.y - here.y) > kThere ||
         std::abs(wrapped(place.yaw - here.yaw)) > kThereYaw) {
       way = door_->routes()->find(here, place);
-      // Off its map - in the doorway, beside the open leaf - straight.
+      // The start or the goal is outside the free floor (in the doorway, beside the open leaf):
+      // drive straight.
       if (way.empty() && std::hypot(place.x - here.x, place.y - here.y) < 0.8) way = {here, place};
       if (way.empty()) continue;
     }
@@ -172,7 +173,7 @@ void DoorPlanner::tuck(const World& world, const Hand& hand, Segment& segment) c
   segment.duration = std::max(segment.duration, 2.2);
 }
 
-// Seconds to each of the waypoints from the one before.
+// Duration (s) of the motion to each waypoint from the previous one.
 std::vector<double> DoorPlanner::seconds(std::span<const DoorWaypoint> waypoints,
                                          std::span<const double> from, const BasePose& at,
                                          double joint_speed) const {
@@ -193,7 +194,7 @@ std::vector<double> DoorPlanner::seconds(std::span<const DoorWaypoint> waypoints
   return out;
 }
 
-// A segment along the waypoints, each after the one before.
+// Adds a segment that follows the waypoints.
 void DoorPlanner::add_path(Plan& plan, int phase, const DoorMotion& motion,
                            std::span<const DoorWaypoint> waypoints, std::span<const double> seconds,
                            std::vector<double>& from, BasePose& at) const {
@@ -261,10 +262,10 @@ void DoorPlanner::open_door(const World& world, const DoorMotion& motion, Plan& 
         {static_cast<int>(plan.segments.size()), begin + done * (goal_[world.id] - begin)});
   }
   plan.wait(kOpen, 0.3);
-  // As far as the handle needs: fingers that open wide reach the leaf.
+  // Open only halfway: fully open fingers would hit the leaf.
   plan.wait(kRelease, 0.4)
       .grip(motion.hand.gripper, std::midpoint(gripper.closed_command, gripper.open_command));
-  // What was pushed open its closer would shut again.
+  // After a push the hand stays at the leaf: the door closer would shut the door again.
   if (!motion.leave.empty() && !door_->push(world.id))
     add(kRelease, motion.leave, cfg_.press_speed);
   plan.wait(kComplete, 0.3);
@@ -276,7 +277,7 @@ bool DoorPlanner::gone_wrong(const World& world) const {
   for (const Expected& one : expected_[world.id]) {
     if (segment >= one.segment) wanted = one.fraction;
   }
-  // It is open: whatever else has gone wrong.
+  // Once the door is open, a lag no longer matters.
   const double fraction = door_->fraction(world);
   return fraction < DoorOpeningTask::kOpen + 0.02 && fraction < wanted - cfg_.lag;
 }

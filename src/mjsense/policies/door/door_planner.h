@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
-// Opens a door: drives to it, takes the handle, presses it, and pulls or pushes the door along its
-// arc with arm and base together.
+// Planner of door opening: drives to the door, grasps the handle, presses it, and pulls or pushes
+// the door along its arc with arm and base together.
 
 #include <memory>
 #include <string>
@@ -15,18 +15,18 @@ namespace mjsense {
 class DoorOpeningTask;
 
 struct DoorPlannerCfg {
-  double open = 0.76;    // fraction to which the door is led
-  double enough = 0.70;  // where it cannot be led there from anywhere
-  double margin = 0.03;  // m, that the base keeps from walls and leaf while it leads the door
-  double tight = 0.01;   // where it does not get through the doorway with that
-  double lag = 0.15;     // fraction by which it may stay behind: it begins again
-  // rad/s, of the arm's joints: on the way to the handle, at it, pressing, with the door
+  double open = 0.76;    // goal, fraction of the door's range
+  double enough = 0.70;  // goal if `open` is not possible from any base pose
+  double margin = 0.03;  // m, clearance of the base from walls and leaf while it moves the door
+  double tight = 0.01;   // clearance if the base does not fit through the doorway with `margin`
+  double lag = 0.15;     // fraction by which the door may lag before the planner retries
+  // rad/s, joint speed of the arm: to the pregrasp, to the handle, pressing, moving the door
   double reach_speed = 1.2, slow_speed = 0.6, press_speed = 0.5, joint_speed = 0.9;
   double leaf_speed = 0.28;  // rad/s
   double close_time = 0.7;   // s
   BaseSpeeds speeds{0.4, 0.7, 0.4, 0.8};
-  double base_speed = 0.16, base_turn = 0.3;  // m/s, rad/s, with the door
-  int max_places = 60;                        // to stand at that are tried
+  double base_speed = 0.16, base_turn = 0.3;  // m/s, rad/s, while moving the door
+  int max_places = 60;                        // base poses that are tried
 };
 
 class DoorPlanner final : public TaskPlanner {
@@ -60,13 +60,13 @@ class DoorPlanner final : public TaskPlanner {
 
   DoorPlannerCfg cfg_;
   const DoorOpeningTask* door_ = nullptr;
-  int group_ = -1;  // of the base
+  int group_ = -1;  // move group of the base
   std::unique_ptr<DoorMotions> motions_;
-  std::vector<int> tool_;       // [B] arm that is to take the handle
-  std::vector<double> goal_;    // [B] fraction to which the door is led
-  std::vector<double> margin_;  // [B] m, of the base on the way with the door
-  std::vector<std::vector<Expected>>
-      expected_;  // [B] how far the door is open when a segment begins
+  std::vector<int> tool_;       // [B] arm that is to grasp the handle
+  std::vector<double> goal_;    // [B] goal, fraction of the door's range
+  std::vector<double> margin_;  // [B] m, clearance of the base while it moves the door
+  // [B] opening fraction expected at the start of each segment
+  std::vector<std::vector<Expected>> expected_;
 };
 
 }  // namespace mjsense

@@ -22,7 +22,7 @@ struct DoorPlan : testing::Test, PlayedTask<DoorOpeningTask> {
   DoorPlan() : PlayedTask(cfg()) {}
 };
 
-// What DoorGeometry says of the handle is what MuJoCo makes of the joints.
+// DoorGeometry::carried() agrees with MuJoCo's kinematics of the door joints.
 TEST_F(DoorPlan, TheHandleIsCarriedAsTheJointsCarryIt) {
   start(0);
   const Door& door = task.door(0);

@@ -9,9 +9,11 @@
 namespace mjsense {
 namespace {
 
-constexpr double kPressed = 0.86;  // of the way to the end of a lever's range
-constexpr double kDeep = 0.018;  // m, of the tool's origin behind the bar: who pulls may slip a bit
-constexpr double kOut = 0.35;    // of half a bar, from its middle to its end, where it is taken
+constexpr double kPressed = 0.86;  // fraction of the lever's range
+// m, of the tool's origin behind the bar: when the hand pulls, it may slip a little
+constexpr double kDeep = 0.018;
+// grasp point, as a fraction of half the bar's length from its middle to its end
+constexpr double kOut = 0.35;
 
 Pose turned_about(Vec3 point, Vec3 axis, double angle) {
   const Quat q = axis_angle(axis, angle);
@@ -19,7 +21,7 @@ Pose turned_about(Vec3 point, Vec3 axis, double angle) {
 }
 
 struct Bar {
-  Vec3 center, along;  // along: a unit vector
+  Vec3 center, along;  // along: unit vector
   double half = 0;
 };
 
@@ -50,7 +52,7 @@ DoorGeometry::DoorGeometry(const mjModel* m, const mjData* d, const Door& door, 
   const double now = d->qpos[m->jnt_qposadr[j]];
   if (!m->jnt_limited[j]) return;
   const double low = m->jnt_range[2 * j], high = m->jnt_range[2 * j + 1];
-  // From the end at which it rests to the other.
+  // From its rest position towards the more distant end of its range.
   const double rest = std::clamp(m->qpos0[m->jnt_qposadr[j]], low, high);
   const double end = high - rest >= rest - low ? high : low;
   press = rest + kPressed * (end - rest) - now;
@@ -74,7 +76,7 @@ std::optional<HandleGrasps> handle_grasps(const mjModel* m, const mjData* d, con
     if (!is_below(m, m->geom_bodyid[g], door.handle) ||
         (m->geom_contype[g] == 0 && m->geom_conaffinity[g] == 0))
       continue;
-    if (door.handle == door.body && m->geom_rbound[g] > 0.3) continue;  // the leaf itself
+    if (door.handle == door.body && m->geom_rbound[g] > 0.3) continue;  // this geom is the leaf
     const Bar bar = bar_of(m, d, g);
     if (dot(bar.center - middle, geometry.away) < 0.01) continue;
     const double length =
@@ -91,7 +93,7 @@ std::optional<HandleGrasps> handle_grasps(const mjModel* m, const mjData* d, con
       best.center + (door.handle_joint >= 0 ? kOut * best.half : 0.0) * out + kDeep * approach;
   const Vec3 bar = normalized(out - dot(out, approach) * approach),
              closing = normalized(cross(approach, bar));
-  // The tool's frame of approach, closing direction and the third, in the world's.
+  // Rotation from (across, closing, approach) to the tool frame; below the same axes in the world.
   const Vec3 z{0, 0, 1}, c = normalized(closing_in_tool - dot(closing_in_tool, z) * z);
   const Quat tool = quat_from_columns(cross(c, z), c, z);
   HandleGrasps grasps;

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
-// How a hand takes the handle of a door, and where the handle takes the hand.
+// Grasps of a door handle, and the motion of the handle as the door opens.
 
 #include <mujoco/mujoco.h>
 
@@ -12,25 +12,25 @@
 
 namespace mjsense {
 
-// A door as it stands, its axes in the world.
+// The geometry of a door in its current state, world frame, m.
 struct DoorGeometry {
-  Vec3 hinge, hinge_axis;  // a point of it, and the direction about which positive angles turn
-  Vec3 pivot, pivot_axis;  // of the lever; unused without one
-  double angle = 0;        // rad, of the hinge now
-  double press = 0;        // rad, by which the lever is to be turned from where it is; 0: no lever
-  Vec3 away;               // horizontal, from the leaf to the robot
-  Vec3 edge;               // of the leaf, far from the hinge, at the height of the hinge's point
+  Vec3 hinge, hinge_axis;  // a point on the hinge, and its axis (right-handed)
+  Vec3 pivot, pivot_axis;  // of the lever; unused without a lever
+  double angle = 0;        // rad, current hinge angle
+  double press = 0;        // rad, planned rotation of the lever from its current angle; 0: no lever
+  Vec3 away;               // horizontal unit vector from the leaf towards the robot
+  Vec3 edge;               // free edge of the leaf, at the height of `hinge`
 
-  // `from`: where the robot stands.
+  // `from`: position of the robot.
   DoorGeometry(const mjModel* model, const mjData* data, const Door& door, Vec3 from);
-  // What is carried along when the lever has been turned by `lever` and the hinge by `leaf` rad.
+  // The pose of something attached to the handle after the lever has rotated by `lever` and the
+  // hinge by `leaf` rad.
   Pose carried(const Pose& pose, double lever, double leaf) const;
   Vec3 edge_at(double leaf) const;
 };
 
-// Two ways, one the other turned about the approach by half a turn; the tool's z axis is the
-// approach, its closing direction is found from its pads. Nothing where the handle has no bar on the
-// robot's side.
+// Two grasps that differ by half a turn about the approach. The tool's z axis is the approach; its
+// closing direction follows from the pads. Empty if the handle has no bar on the robot's side.
 struct HandleGrasps {
   Pose poses[2];  // X_WT
 };
@@ -38,7 +38,7 @@ std::optional<HandleGrasps> handle_grasps(const mjModel* model, const mjData* da
                                           const Door& door, const DoorGeometry& geometry,
                                           Vec3 closing_in_tool);
 
-// Direction in which the pads of a gripper close, in its tool frame, as it stands.
+// Closing direction of a gripper's pads at its current state, tool frame.
 Vec3 closing_direction(const mjData* data, const MoveGroup& gripper);
 
 }  // namespace mjsense

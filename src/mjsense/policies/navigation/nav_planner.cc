@@ -15,8 +15,8 @@ namespace mjsense {
 namespace {
 
 constexpr Phase kPhases[] = {{"navigate", 0}};
-constexpr double kLook = 0.4;        // rad aside
-constexpr double kElsewhere = 0.35;  // m, from where nothing was seen
+constexpr double kLook = 0.4;        // rad, turn to each side
+constexpr double kElsewhere = 0.35;  // m, minimum distance from poses that were tried
 constexpr int kLooks = 2;
 
 }  // namespace
@@ -87,7 +87,8 @@ void NavPlanner::make_plan(const World& world, const PlanRequest& request, Plan&
   }
   if (request.stage > 0) tried.push_back(here);
   std::vector<BasePose> way;
-  // At last whatever counts: from farther away, in a corner of the picture.
+  // The last resort is any pose that counts as success: farther away, or with the object near the
+  // image border.
   struct Wanted {
     double arrive, facing;
   };

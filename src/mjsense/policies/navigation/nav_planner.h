@@ -1,8 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
-// Drives to where the head camera sees an object of the wanted kind: A* over the floor that the
-// model's geoms leave free. Its only phase is 0. Where the object is not seen on arrival - the arm is
-// in the way - it looks aside, then goes elsewhere.
+// Planner of navigation: drives to a pose from which the head camera sees an object of the wanted
+// kind, by A* over the floor that the model's geoms leave free. It has one phase, 0. If the object
+// is not visible on arrival (an arm may occlude it), the base turns sideways, then drives
+// elsewhere.
 
 #include <string>
 #include <vector>
@@ -15,10 +16,10 @@ namespace mjsense {
 class NavToObjTask;
 
 struct NavPlannerCfg {
-  double arrive = 1.1;   // m, from the object
-  double reach = 1.4;    // m, at most, where one does not come nearer
-  double facing = 0.45;  // rad, the object off the heading, at most
-  double astray = 0.35;  // m, the base from its command: it plans again
+  double arrive = 1.1;   // m, distance to the object at the goal
+  double reach = 1.4;    // m, maximum distance if the base cannot come closer
+  double facing = 0.45;  // rad, maximum angle between heading and object
+  double astray = 0.35;  // m, distance of the base from its command that triggers a new plan
   BaseSpeeds speeds;
 };
 
@@ -40,11 +41,11 @@ class NavPlanner final : public TaskPlanner {
 
   NavPlannerCfg cfg_;
   const NavToObjTask* nav_ = nullptr;
-  int group_ = -1;                            // of the base
-  std::vector<std::vector<BasePose>> tried_;  // [B] where nothing was seen
+  int group_ = -1;                            // move group of the base
+  std::vector<std::vector<BasePose>> tried_;  // [B] poses from which the object was not visible
 };
 
-// A path of the group's commands along the way; commands are x, y, yaw.
+// Timed path of the base group's commands (x, y, yaw) through the poses `way`.
 CommandPath base_path(int group, std::span<const BasePose> way, const BaseSpeeds& speeds);
 
 }  // namespace mjsense

@@ -45,7 +45,7 @@ TEST(NavPlanner, ArrivesWhereTheObjectIsSeenWithoutTouchingAnything) {
   }
 }
 
-// A base that is pushed farther than `astray` (0.35 m) from its command is planned for again.
+// The planner makes a new plan if the base is farther than `astray` (0.35 m) from its command.
 TEST(NavPlanner, PlansAgainWhereTheBaseIsNotWhereItWasSent) {
   Driven d("rby1");
   d.start(0);

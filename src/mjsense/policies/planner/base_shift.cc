@@ -11,13 +11,13 @@
 namespace mjsense {
 namespace {
 
-constexpr double kStep = 0.12;               // m between places
-constexpr int kSteps = 4;                    // to each side
+constexpr double kStep = 0.12;               // m, grid of base poses
+constexpr int kSteps = 4;                    // in each direction
 constexpr double kTurns[] = {0, 0.4, -0.4};  // rad
 constexpr double kTurnCost = 0.3;            // m/rad
-constexpr int kMostTried = 16;               // places to which there is a way
-constexpr double kMargin = 0.015;            // m, of everything to everything on the way
-constexpr double kFloor = 0.05;              // m: what is lower is driven over
+constexpr int kMostTried = 16;               // reachable base poses for which works() is called
+constexpr double kMargin = 0.015;            // m, clearance along the path
+constexpr double kFloor = 0.05;              // m; the base drives over what is lower
 constexpr double kSettle = 0.3;              // s
 constexpr BaseSpeeds kSpeeds{0.25, 0.5, 0.25, 0.5};
 

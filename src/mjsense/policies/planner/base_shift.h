@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
-// Moves a base that drives a little, straight, with what a hand holds, to where something can be done that cannot be
-// done from here.
+// Moves a mobile base a short distance along a straight line, with a held object, to a pose from
+// which a task is possible that is not possible from the current one.
 
 #include <functional>
 #include <optional>
@@ -16,14 +16,15 @@ class BaseShift {
  public:
   struct Held {
     Hand hand;
-    int body = -1;     // with a free joint
+    int body = -1;     // has a free joint
     Pose tool_object;  // X_TO
   };
 
-  BaseShift(const mjModel* model, const Robot& robot);  // driving_base(robot) >= 0
+  BaseShift(const mjModel* model, const Robot& robot);  // requires driving_base(robot) >= 0
 
-  // Adds a segment that drives to the nearest place for which `works` - it sees the world as if the base stood there,
-  // positions alone - and on the way to which nothing is touched. False, and the plan as it was, if there is none.
+  // Adds a segment that drives to the nearest base pose for which `works` returns true and whose
+  // path is free of collisions. `works` receives a world with the base at that pose, in which only
+  // positions are valid. Returns false and leaves the plan unchanged if there is none.
   bool plan(const World& world, int phase, const std::optional<Held>& held,
             const std::function<bool(const World& there)>& works, Plan& plan);
 

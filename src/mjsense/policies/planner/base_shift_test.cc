@@ -9,11 +9,11 @@
 namespace mjsense {
 namespace {
 
-// RB-Y1 before a table, which is ahead of it.
+// RB-Y1 in front of a table.
 struct Shifted : testing::Test {
   TableStage stage{"rby1"};
   BaseShift shift{stage.world.model, stage.robot()};
-  // m, ahead of where it stands.
+  // Forward distance (m) of the base in `there` from its present position.
   double ahead(const World& there) const {
     return (inverse(stage.robot().base_pose(stage.world)) * stage.robot().base_pose(there)).p.x;
   }

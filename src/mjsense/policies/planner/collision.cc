@@ -9,7 +9,7 @@
 namespace mjsense {
 namespace {
 
-constexpr double kTurnStep = 0.04;    // rad between two configurations that are looked at
+constexpr double kTurnStep = 0.04;    // rad between two configurations that are checked
 constexpr double kSlideStep = 0.015;  // m
 
 bool is_solid(const mjModel* m, int g) {
@@ -29,7 +29,8 @@ bool is_neighbour(const mjModel* m, int a, int b) {
          m->body_weldid[m->body_parentid[wb]] == wa;
 }
 
-// mj_geomDistance without a segment. Nothing with a destructor lives across it: a MuJoCo error leaves by longjmp.
+// mj_geomDistance without the segment. No object with a destructor may live in this frame: a MuJoCo
+// error leaves it by longjmp.
 double distance(const mjModel* m, mjData* d, int a, int b, double most) {
   return mj_geomDistance(m, d, a, b, most, nullptr);
 }
@@ -54,7 +55,7 @@ CollisionModel::CollisionModel(const mjModel* model, const Robot& robot, std::ve
     if (moves[body]) moving_.push_back(g);
     if (!of_robot && !moves[body]) scene_.push_back(g);
   }
-  // Links that meet at the start are built so.
+  // Pairs of links in contact at the start configuration are exempt from collision checks.
   const ScratchData::Loan loan = scratch_.borrow();
   mjData* d = loan.get();
   for (std::size_t g = 0; g < robot.groups().size(); ++g) {
@@ -157,7 +158,7 @@ void CollisionQuery::move_held() {
   }
 }
 
-// Bounding sphere of one against the box around the other.
+// True if the bounding sphere of `moving` is within the margin of the bounding box of `other`.
 bool CollisionQuery::near_enough(int moving, int other) const {
   const double reach = m_->geom_rbound[moving] + margin_;
   const double* c = d_->geom_xpos + 3 * moving;
@@ -226,7 +227,7 @@ bool CollisionQuery::free_between(std::span<const double> from, std::span<const 
     const double step = m_->jnt_type[cm_.joints_[i]] == mjJNT_SLIDE ? kSlideStep : kTurnStep;
     steps = std::max(steps, std::abs(to[i] - from[i]) / step);
   }
-  // Coarse, then finer: what is in the way is found early.
+  // Coarse steps first, then finer ones: this finds collisions early.
   const int n = 1 << static_cast<int>(std::ceil(std::log2(steps)));
   for (int stride = n; stride > 1; stride /= 2) {
     for (int k = stride / 2; k < n; k += stride) {

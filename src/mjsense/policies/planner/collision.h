@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
-// Does a robot, somewhere else than it stands, touch anything? Distances are MuJoCo's own, between
-// the geoms that touch of the scene's model, on scratch data; there is no second geometry. Among
-// themselves the robot's links are looked at whatever their contact bits say. Height fields and SDF
-// geoms are not seen: MuJoCo has no distance to them.
+// Collision checks of a robot in other configurations than its current one. Distances are MuJoCo's,
+// between the colliding geoms of the scene's model, on scratch data; there is no second geometry.
+// Pairs of the robot's own links are checked regardless of contype and conaffinity. Height fields
+// and SDF geoms are ignored: MuJoCo has no distance function for them.
 
 #include <span>
 #include <utility>
@@ -14,11 +14,11 @@
 
 namespace mjsense {
 
-// Which pairs of geoms matter to a robot whose planned joints move, and scratch data for queries.
+// The pairs of geoms to check for a robot whose planned joints move, and scratch data for queries.
 class CollisionModel {
  public:
-  // `joints`: ids; configurations are their positions in this order. A free joint has none: it is
-  // moved by CollisionQuery::place_base.
+  // `joints`: ids of hinges and slides; a configuration is their positions in this order. A free
+  // joint cannot be one of them; CollisionQuery::place_base moves it.
   CollisionModel(const mjModel* model, const Robot& robot, std::vector<int> joints);
 
   std::span<const int> joints() const { return joints_; }
@@ -28,37 +28,38 @@ class CollisionModel {
 
   const Robot* robot_;
   std::vector<int> joints_;
-  std::vector<int> moving_, scene_;        // geoms
-  std::vector<std::pair<int, int>> self_;  // of links that do not touch at the start
+  std::vector<int> moving_, scene_;        // geom ids
+  std::vector<std::pair<int, int>> self_;  // link geoms that are not in contact at the start
   ScratchData scratch_;
 };
 
-// Questions about one world as it stands now, for one thread.
+// Queries about the current state of one world, for use by one thread.
 class CollisionQuery {
  public:
   CollisionQuery(CollisionModel& model, const World& world);
 
-  // Nothing that is below this body is looked at.
+  // Ignores this body and the bodies below it.
   void ignore(int body);
-  // Nor what nowhere rises above this height (m): the floor, of a robot whose base drives.
+  // Ignores geoms whose top is below this height (m): the floor, for a mobile base.
   void ignore_below(double height);
-  // The group `gripper` may touch what is below this body, the rest of the robot may not.
+  // Permits contact of the group `gripper` with `body` and the bodies below it, but not of the rest
+  // of the robot.
   void allow(int gripper, int body);
-  // What is below this body - one with a free joint - moves with the leaf of `tool` at X_TO and is looked at with the
-  // robot; the group `gripper` may touch it.
+  // Attaches `body` (which has a free joint) and the bodies below it to the leaf of `tool`, at
+  // X_TO. They are checked like the robot; contact with the group `gripper` is permitted.
   void hold(int tool, int gripper, int body, const Pose& tool_object);
-  // The gripper is open, as at the start of an episode.
+  // Opens the gripper, as at the start of an episode.
   void open(int gripper);
-  // A body with a free joint stands somewhere else.
+  // Moves a body with a free joint.
   void place(int body, const Pose& pose);
-  void place_base(const Pose& base);                    // of a floating robot
-  void set_margin(double margin) { margin_ = margin; }  // m that must be free; 0 at the start
+  void place_base(const Pose& base);                    // for a floating robot
+  void set_margin(double margin) { margin_ = margin; }  // required clearance, m; initially 0
 
   bool free(std::span<const double> q);
-  // Also between the two, both ends excluded.
+  // True if the straight line between two configurations is free, both ends excluded.
   bool free_between(std::span<const double> from, std::span<const double> to);
-  bool free_here();  // as it has been placed
-  // The two geoms that touched when the last answer was no; -1 since forget_touching().
+  bool free_here();  // at the current placement
+  // The two geoms of the last collision; -1 if there was none since forget_touching().
   std::pair<int, int> touching() const { return touching_; }
   void forget_touching() { touching_ = {-1, -1}; }
 
@@ -73,7 +74,7 @@ class CollisionQuery {
   ScratchData::Loan loan_;
   mjData* d_;
   double margin_ = 0;
-  std::vector<int> scene_;  // geoms that are looked at
+  std::vector<int> scene_;  // geoms that are checked
   std::vector<int> allowed_gripper_, allowed_body_;
   struct Held {
     int site = -1, gripper_body = -1, body = -1;

@@ -12,7 +12,8 @@
 namespace mjsense {
 namespace {
 
-// The truth: robot and scene in mj_collision, every contact of the robot deeper than the margin.
+// Reference: mj_collision on the whole model, counting penetrating contacts between robot and
+// scene.
 bool mujoco_says_free(const TableStage& stage, std::span<const double> q, mjData* d) {
   const mjModel* m = stage.world.model;
   const Robot& robot = stage.robot();
@@ -34,8 +35,8 @@ bool mujoco_says_free(const TableStage& stage, std::span<const double> q, mjData
   return true;
 }
 
-// Configurations all over the joint ranges: what mj_collision finds, the query finds; what it finds besides is the robot
-// itself.
+// For random configurations the query finds every collision that mj_collision finds; the additional
+// ones are self-collisions of the robot.
 TEST(Collision, AgreesWithMuJoCo) {
   TableStage stage("franka");
   const Robot& robot = stage.robot();
@@ -76,7 +77,7 @@ TEST(Collision, EveryRobotStartsFree) {
   }
 }
 
-// A block under the tool: 3 cm above the table it is free, at the table it is not.
+// A held block is free 3 cm above the table and in collision 3 cm below its surface.
 TEST(Collision, AHeldObjectMovesWithTheTool) {
   TableStage stage("franka");
   const Robot& robot = stage.robot();

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
-// Grasps of an episode that did not hold, or not to the end: rather another one than the same again.
+// Grasps of an episode that failed, so that a retry takes another one.
 
 #include <algorithm>
 #include <vector>
@@ -13,8 +13,8 @@ class FailedGrasps {
  public:
   void clear() { grasps_.clear(); }
   void add(const Pose& object_tool) { grasps_.push_back(object_tool); }  // X_OT
-  // Whether one that failed is the same as X_OT, or nearly. With the fingers the other way round it
-  // is the same.
+  // True if X_OT is close to a failed grasp. Grasps that differ by half a turn about the approach
+  // (swapped fingers) count as the same.
   bool has(const Pose& object_tool) const {
     const Quat flipped = object_tool.q * Quat{0, 0, 0, 1};
     return std::ranges::any_of(grasps_, [&](const Pose& failed) {

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// OMPL's RRT-Connect and its shortcuts, with our questions about collisions and every random number from ours.
+// find_path() by OMPL's RRT-Connect and its shortcuts, with the planner's own collision checks;
+// every random number comes from the caller's Rng.
 #include <ompl/base/ProblemDefinition.h>
 #include <ompl/base/ScopedState.h>
 #include <ompl/base/SpaceInformation.h>
@@ -27,7 +28,7 @@ Config view(const ob::SpaceInformation& info, const ob::State* state) {
   return {state->as<Joints::StateType>()->values, info.getStateDimension()};
 }
 
-// Uniform within the limits. RRT-Connect asks for nothing else.
+// Uniform within the limits. RRT-Connect uses only sampleUniform().
 class Samples : public ob::StateSampler {
  public:
   Samples(const ob::StateSpace* space, const JointSpace& joints, Rng& rng)
@@ -47,7 +48,7 @@ class Samples : public ob::StateSampler {
   Rng& rng_;
 };
 
-// Motions between two places, of which the first is known to be free.
+// Checks motions between two states, the first of which is known to be free.
 class Motions : public ob::MotionValidator {
  public:
   Motions(const ob::SpaceInformationPtr& info, const FreeSpace& free)
@@ -71,10 +72,11 @@ class Shortcuts : public og::PathSimplifier {
   }
 };
 
-// Shares of the way's length: how far a shortcut may lead, and how near a point its ends are that point.
+// Fractions of the path's length: maximum length of a shortcut, and the distance within which its
+// ends snap to a waypoint.
 constexpr double kReach = 1.0, kSnap = 0.2;
 
-// Points whose neighbours see each other.
+// Removes waypoints whose neighbours have a free straight line between them.
 void drop_needless(const ob::SpaceInformation& info, const FreeSpace& is_free,
                    std::vector<ob::State*>& way) {
   for (std::size_t i = 1; i + 1 < way.size();) {
@@ -87,7 +89,7 @@ void drop_needless(const ob::SpaceInformation& info, const FreeSpace& is_free,
   }
 }
 
-// The planner says at every call that it begins and what it has built: for who looks for a fault.
+// Raises OMPL's log level to warnings: by default it logs the start and the result of every search.
 void keep_quiet() {
   static const bool once = [] {
     ompl::msg::setLogLevel(std::max(ompl::msg::getLogLevel(), ompl::msg::LOG_WARN));
@@ -108,7 +110,7 @@ std::vector<double> find_path(const JointSpace& space, std::span<const double> s
   }
   keep_quiet();
   const auto joints = std::make_shared<Joints>(space.size());
-  // A joint may stand a hair beyond its limit; OMPL would not begin there.
+  // A joint may be slightly beyond its limit; OMPL would reject such a start.
   ob::RealVectorBounds bounds(space.size());
   for (std::size_t i = 0; i < space.size(); ++i) {
     bounds.low[i] = std::min({space.low[i], start[i], goal[i]});
@@ -118,7 +120,7 @@ std::vector<double> find_path(const JointSpace& space, std::span<const double> s
   joints->setStateSamplerAllocator(
       [&](const ob::StateSpace* s) { return std::make_shared<Samples>(s, space, rng); });
   const auto info = std::make_shared<ob::SpaceInformation>(joints);
-  // Both ends are given, whatever they touch.
+  // Start and goal are valid even if they are in contact with something.
   info->setStateValidityChecker([&](const ob::State* state) {
     const Config q = view(*info, state);
     return std::ranges::equal(q, start) || std::ranges::equal(q, goal) || is_free.at(q);
@@ -133,7 +135,7 @@ std::vector<double> find_path(const JointSpace& space, std::span<const double> s
   problem->setStartAndGoalStates(from, to);
   og::RRTConnect planner(info);
   planner.setRange(cfg.step);
-  // The others, for larger trees, draw random numbers of their own.
+  // OMPL's other structures, for larger trees, use their own random numbers.
   planner.setNearestNeighbors<ompl::NearestNeighborsLinear>();
   planner.setProblemDefinition(problem);
   int samples = 0;
@@ -141,7 +143,8 @@ std::vector<double> find_path(const JointSpace& space, std::span<const double> s
   if (planner.solve(enough) != ob::PlannerStatus::EXACT_SOLUTION) return {};
 
   auto& way = *problem->getSolutionPath()->as<og::PathGeometric>();
-  // Of a hundred ways among clutter (motion_bench.cc) the least time, theirs and the arm's, was with these numbers.
+  // These numbers gave the lowest sum of planning time and motion time for 100 paths in clutter
+  // (motion_bench.cc).
   Shortcuts shortcuts(info, rng);
   shortcuts.reduceVertices(way);
   shortcuts.shortcutPath(way, cfg.shortcuts, cfg.shortcuts, kReach, kSnap);

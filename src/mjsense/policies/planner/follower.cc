@@ -14,8 +14,8 @@
 namespace mjsense {
 namespace {
 
-constexpr double kFade = 1.0;       // s, at least
-constexpr double kFadeSpeed = 0.5;  // rad/s or m/s, on average, of what fades faster otherwise
+constexpr double kFade = 1.0;       // s, minimum duration of the fade of an offset
+constexpr double kFadeSpeed = 0.5;  // rad/s or m/s, maximum average speed of that fade
 
 int floating_base(const Robot& robot) {
   for (std::size_t g = 0; g < robot.groups().size(); ++g) {
@@ -127,7 +127,7 @@ PlanFailure Follower::failure(const World& world) const {
   return state.ik_failures >= cfg_.max_ik_failures ? PlanFailure::kUnreachable : PlanFailure::kNone;
 }
 
-// What nobody commands is where it is: a torso under an arm.
+// Groups without a command use their measured positions, e.g. a torso below an arm.
 void Follower::read_free_joints(const World& world, State& state) const {
   for (std::size_t g = 0; g < robot_->groups().size(); ++g) {
     if (state.commands[g].given && joints_are_commanded(static_cast<int>(g))) continue;
@@ -142,7 +142,7 @@ bool Follower::move_tool(const World& world, State& state, const ToolMove& move,
   const double s = move.seconds == 0 ? 1.0 : std::min(1.0, time / move.seconds);
   const Pose pose = move.from * exp6((move.eased ? s * s * (3 - 2 * s) : s) * move.screw);
   state.targets[move.tool] = {true, move.in_world, pose};
-  if (robot_->groups()[move.tool].kind == GroupKind::kGripper) {  // the base carries it
+  if (robot_->groups()[move.tool].kind == GroupKind::kGripper) {  // a floating base carries it
     const Pose to = move.in_world ? pose : robot_->base_pose(world) * pose;
     const Pose base = to * inverse(robot_->tcp_pose(world, move.tool));
     double command[7];
@@ -152,7 +152,7 @@ bool Follower::move_tool(const World& world, State& state, const ToolMove& move,
   }
   const Pose target = move.in_world ? inverse(robot_->base_pose(world)) * pose : pose;
   const bool solved = robot_->ik(move.tool, target, state.joints, Chain::kTracking);
-  // Where it is not, the last command stands.
+  // If inverse kinematics fails, the last command stays.
   state.commands[move.tool].set(
       {state.joints[move.tool].values.data(), robot_->groups()[move.tool].qpos.size()});
   return solved;
@@ -187,8 +187,8 @@ void Follower::move_group(State& state, const CommandPath& path, double time) {
   std::copy_n(command.values.begin(), n, state.joints[path.group].values.begin());
 }
 
-// How much longer an eased screw takes so that joints keep to their limits. With s = 3u^2 - 2u^3,
-// u = t / T: dq/dt = q'(s) s' / T, d2q/dt2 = (q''(s) s'^2 + q'(s) s'') / T^2.
+// Factor by which the duration of an eased screw must grow so that joints stay within their limits.
+// With s = 3u^2 - 2u^3, u = t / T: dq/dt = q'(s) s' / T, d2q/dt2 = (q''(s) s'^2 + q'(s) s'') / T^2.
 double Follower::stretch(const World& world, const State& state, const ToolMove& move) const {
   constexpr int kParts = 12;
   const MoveGroup& arm = robot_->groups()[move.tool];
@@ -207,7 +207,7 @@ double Follower::stretch(const World& world, const State& state, const ToolMove&
   for (int k = 0; k <= kParts; ++k) {
     const int a = std::max(0, k - 1), b = std::min(kParts, k + 1),
               middle = std::clamp(k, 1, kParts - 1);
-    // s' and s'' where the screw has done k parts of kParts.
+    // s' and s'' at s = k / kParts.
     const double s = k * ds;
     const double u = 0.5 - std::sin(std::asin(1 - 2 * s) / 3);
     const double rate = 6 * u * (1 - u), change = 6 - 12 * u;
@@ -226,8 +226,8 @@ double Follower::stretch(const World& world, const State& state, const ToolMove&
   return factor;
 }
 
-// Inverse kinematics along a line ends near, not at, the joints from which a path was planned: an arm with more joints than it
-// needs drifts. What is left fades away along the path.
+// Inverse kinematics along a line ends near, but not at, the joint positions from which the next
+// path was planned, since a redundant arm drifts. The offset fades out along the path.
 void Follower::enter(const World& world, State& state, Segment& segment) const {
   double longer = 0;
   for (ToolMove& move : segment.tools) {
@@ -249,8 +249,8 @@ void Follower::enter(const World& world, State& state, Segment& segment) const {
   }
 }
 
-// A segment ends between two steps, or takes no time at all: what it was to reach is commanded,
-// unless the next segment takes over.
+// A segment may end between two control steps or have no duration. Its end is commanded unless the
+// next segment takes over.
 void Follower::finish(const World& world, State& state, const Segment& done, const Segment& next) {
   for (const GripperCommand& grip : done.grippers)
     state.commands[grip.gripper].set({&grip.command, 1});
@@ -263,8 +263,8 @@ void Follower::finish(const World& world, State& state, const Segment& done, con
 
 namespace {
 
-// Speed at which what is `away` from where it is wanted gets there and stops, braking with `most`,
-// at steps of dt.
+// Speed (with sign) that closes the distance `away` and stops there, with deceleration at most
+// `most` at steps of dt.
 double closing_speed(double away, double most, double dt) {
   const double far = std::abs(away);
   const double speed =
@@ -272,7 +272,8 @@ double closing_speed(double away, double most, double dt) {
   return std::copysign(speed, away);
 }
 
-constexpr double kBraking = 0.7;  // of the limit, for closing in: the rest is for what is followed
+// fraction of the limit used for closing in; the rest is for following the target
+constexpr double kBraking = 0.7;
 
 }  // namespace
 
@@ -282,7 +283,7 @@ Follower::Sent& Follower::Sending::at(double step) {
   return now = last;
 }
 
-// Of a base that drives: plans begin with an angle between -pi and pi, whichever turn it is in.
+// Yaw of a mobile base: plans use an angle between -pi and pi, regardless of full turns.
 bool Follower::is_yaw(int group, std::size_t joint) const {
   return robot_->groups()[group].kind == GroupKind::kBase && !slides_[group][joint];
 }
@@ -294,8 +295,8 @@ double Follower::most_acceleration(int group, std::size_t joint) const {
   return slide ? cfg_.most_slide_acceleration : cfg_.most_acceleration;
 }
 
-// A command that can be reached from the last one stands as it is, to the bit; otherwise its rate
-// changes as fast as it may, until it is caught up with.
+// A command within the limits is not changed, bit for bit. Otherwise its rate changes at the limit
+// until it has caught up.
 void Follower::limit(int group, Sent& sent, std::span<double> command) const {
   sent.moved = true;
   for (std::size_t i = 0; i < command.size(); ++i) {
@@ -361,7 +362,7 @@ bool Follower::brake(const World& world, Action& action) {
   return at_rest;
 }
 
-// What was commanded, and is not now, stops; an arm then stays by command, a base without.
+// Brings a group without a command to rest. An arm then stays by command, a base without one.
 bool Follower::rest(const World& world, int group, Action& action) {
   Sent& sent = states_[world.id].sent[group].at(world.time());
   if (!sent.moved || group == floating_base_) return true;
@@ -413,7 +414,7 @@ void Follower::follow(const World& world, Action& action) {
       state.commands[grip.gripper].set({&grip.command, 1});
     read_free_joints(world, state);
     for (const CommandPath& path : segment.paths) move_group(state, path, time);
-    // Arms that no tool move draws: where their joints put the tool, whatever carries them.
+    // Arms without a tool move: the target follows from their commanded joints.
     for (std::size_t g = 0; g < robot_->groups().size(); ++g) {
       const bool arm = robot_->groups()[g].kind == GroupKind::kArm && state.commands[g].given;
       if (arm &&
@@ -441,7 +442,7 @@ void Follower::follow(const World& world, Action& action) {
         }
       }
     } else if (group.kind == GroupKind::kBase && !group.controlled()) {
-      action.commands[g].set({});  // one that drives is left out: it holds
+      action.commands[g].set({});  // a mobile base gets no command: it holds
     } else {
       rest(world, static_cast<int>(g), action);
     }

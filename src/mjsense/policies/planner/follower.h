@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
-// Follows one plan a world by simulation time: commands of every group at this moment, and whether
-// the robot still does what it is told. Nothing is allocated while following.
+// Follows one plan in each world by simulation time: computes the commands of all groups and
+// detects failures. It allocates no memory while following.
 
 #include <array>
 #include <vector>
@@ -26,62 +26,65 @@ inline constexpr std::array<std::string_view, 7> kWords<PlanFailure>{
     "none", "unplanned", "tool_away", "tool_turned", "dropped", "unreachable", "astray"};
 
 struct FollowerCfg {
-  double max_position_error = 0.1;     // m, tool against its target
+  double max_position_error = 0.1;     // m, of the tool from its target
   double max_rotation_error = 0.5236;  // rad (30 degrees)
-  double min_held_opening = 0.002;     // m: less between the fingers means nothing is held
-  int max_ik_failures = 8;             // in a row
-  // Of joints while a tool goes eased along a screw: it takes longer where inverse kinematics would
-  // exceed them. Slides: m/s, m/s^2.
+  double min_held_opening = 0.002;     // m; a smaller opening means that nothing is held
+  int max_ik_failures = 8;             // consecutive
+  // Joint limits during an eased tool move along a screw: it is slowed down if inverse kinematics
+  // would exceed them. Slides: m/s, m/s^2.
   double line_speed = 1.5, line_acceleration = 4.0;  // rad/s, rad/s^2
   double slide_speed = 0.3, slide_acceleration = 1.0;
-  // Of commands from one control step to the next, whatever plans say: where a plan is given up in
-  // the midst of a motion, too. Of arms' joints, and of bases.
+  // Limits of commands between control steps, independent of the plan; they also apply when a plan
+  // is aborted during a motion. For arm joints and bases.
   double most_acceleration = 10, most_slide_acceleration = 2.5;           // rad/s^2, m/s^2
-  double most_speed = 2.62;                                               // rad/s, of arms
+  double most_speed = 2.62;                                               // rad/s, arm joints
   double most_base_acceleration = 3.0, most_base_turn_acceleration = 10;  // m/s^2, rad/s^2
 };
 
-// A gripper and what moves it.
+// A gripper and the group that moves it.
 struct Hand {
-  int gripper = -1;  // group
-  int tool = -1;     // group that ToolMove names: its arm; the gripper itself on a floating base
+  int gripper = -1;  // group index
+  // group index used by ToolMove: the gripper's arm, or the gripper itself on a floating base
+  int tool = -1;
 };
-// The hands of a robot, in the order of its grippers. A gripper hangs on the arm with the same leaf
-// site, else on the one whose root body it is below; one that nothing moves is left out.
+// The hands of a robot, in the order of its grippers. A gripper belongs to the arm with the same
+// leaf site, else to the arm whose root body is above it. A gripper that nothing moves is omitted.
 std::vector<Hand> hands_of(const Robot& robot, const mjModel* model);
 
-// Functions that take a world touch that world's state alone and may run in parallel.
+// A function that takes a world accesses the state of that world only and may run in parallel with
+// calls for other worlds.
 class Follower {
  public:
   explicit Follower(FollowerCfg cfg = {}) : cfg_(cfg) {}
-  // Throws ValueError for an arm whose commands are no joint positions. `dt`: seconds between two
-  // commands; 0: their accelerations are not limited.
+  // Throws ValueError for an arm whose commands are not joint positions. `dt`: period of the
+  // commands, s; 0: accelerations are not limited.
   void initialize(const Robot& robot, const mjModel* model, int num_worlds, double dt = 0);
 
   Plan& plan(int world) { return states_[world].plan; }
   const Plan& plan(int world) const { return states_[world].plan; }
-  // A new episode: the robot is at rest, then as restart().
+  // Starts an episode: the robot is at rest. Includes restart().
   void reset(const World& world);
-  // The robot is taken as it stands; commands of an earlier plan are forgotten. Before planning, so
-  // that tool_target() and joints() say where the plan begins.
+  // Uses the robot's measured state and drops the commands of the previous plan. Call it before
+  // planning, so that tool_target() and joints() return where the plan begins.
   void restart(const World& world);
-  // The plan begins now; unless restart() was called, from the last commands.
+  // Starts the plan, from the last commands unless restart() was called.
   void begin(const World& world);
-  // What is wrong with how the world follows; kNone while nothing is.
+  // How following has failed; kNone if it has not.
   PlanFailure failure(const World& world) const;
   // Commands for the next control step.
   void follow(const World& world, Action& action);
-  // Commands for a control step without a plan: arms that move come to rest. True once they are.
+  // Commands for a control step without a plan: moving groups are brought to rest. Returns true
+  // once all are at rest.
   bool brake(const World& world, Action& action);
   bool finished(int world) const { return states_[world].finished; }
   int phase(int world) const { return states_[world].phase; }
   void set_phase(int world, int phase) { states_[world].phase = phase; }
-  // Index in plan().segments; their number where finished.
+  // Index in plan().segments; their number if the plan is finished.
   int segment(int world) const { return states_[world].segment; }
 
-  // X_BT where the tool of a group is commanded to be; where it is, if nothing is commanded.
+  // Commanded X_BT of a group's tool; the measured one if there is no command.
   Pose tool_target(const World& world, int tool) const;
-  // Joint positions as commanded, of groups without such commands as they are.
+  // Commanded joint positions; measured ones for groups without such commands.
   const RobotValues& joints(int world) const { return states_[world].joints; }
 
  private:
@@ -89,14 +92,15 @@ class Follower {
     bool given = false, in_world = false;
     Pose pose;
   };
-  // What was commanded last, and how it moved: n values of an arm or a base that drives; X_WB of a floating base, of whose
-  // pose the rates are three of the position and three of the rotation, in the world.
+  // The last command and its rates: n values of an arm or a mobile base; X_WB of a floating base,
+  // with three rates of the position and three of the rotation, world frame.
   struct Sent {
-    bool given = false;  // it is limited
-    bool moved = false;  // it was commanded in this episode
+    bool given = false;  // commands of this group are limited
+    bool moved = false;  // was commanded in this episode
     std::array<double, GroupValues::kMaxSize> values{}, wanted{}, rates{};
   };
-  // A step may be planned, and commanded, more than once: each time from what the step before sent.
+  // A step may be planned and commanded more than once; each time starts from what the previous
+  // step sent.
   struct Sending {
     double time = -1;  // s, of the step
     Sent last, now;
@@ -105,14 +109,14 @@ class Follower {
   struct State {
     Plan plan;
     int segment = 0;
-    double start = 0;  // s, simulation time, of the segment
+    double start = 0;  // s, simulation time at which the segment began
     bool finished = false;
     int phase = 0;
     int ik_failures = 0;
     RobotValues joints, commands;
-    RobotValues
-        offsets;  // of joints from the path that they are about to follow, `given` where there are
-    std::array<Target, RobotValues::kMaxGroups> targets;  // per tool
+    // Joint offsets from the start of the path that is followed; `given` if there are any.
+    RobotValues offsets;
+    std::array<Target, RobotValues::kMaxGroups> targets;  // per tool group
     std::array<Sending, RobotValues::kMaxGroups> sent;
   };
   void read_free_joints(const World& world, State& state) const;
@@ -130,9 +134,9 @@ class Follower {
 
   FollowerCfg cfg_;
   const Robot* robot_ = nullptr;
-  int floating_base_ = -1;  // group whose commands are poses of the base
+  int floating_base_ = -1;  // group whose commands are base poses; -1: none
   double dt_ = 0;
-  std::vector<std::vector<char>> slides_;  // per group, per joint
+  std::vector<std::vector<char>> slides_;  // [group][joint]: the joint is a slide
   std::vector<State> states_;              // [B]
 };
 

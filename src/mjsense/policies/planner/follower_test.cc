@@ -86,8 +86,8 @@ TEST(Follower, ABaseDrivesAlongAPathWhileTheToolStaysInTheWorld) {
   EXPECT_LT(norm(robot.leaf_pose(stage.world, arm).p - tool.p), 0.01);
 }
 
-// A path that begins where the base is not, and a plan that is given up while it drives: what it is told
-// changes its speed by no more than it may, and stops.
+// A path starts away from the base, and the plan is aborted while the base drives. The commanded
+// speed changes within its limits and becomes zero.
 TEST(Follower, ABaseIsNeverToldToJump) {
   constexpr double kDt = 0.066;
   TableStage stage("mobile_franka");
@@ -99,7 +99,7 @@ TEST(Follower, ABaseIsNeverToldToJump) {
   RobotValues now;
   robot.read_qpos(stage.world, now);
   const auto at = [&](int i) { return now[base].values[i]; };
-  // A turn more is the same way to look.
+  // The same yaw, a full turn off.
   const double yaw = at(2) + 0.3 - 2 * std::numbers::pi;
   CommandPath path{base, {0, 4}, {at(0) - 0.1, at(1), yaw, at(0) - 1.3, at(1), yaw}};
   follower.plan(0).move_groups(1, {path}, 1.0);
@@ -140,7 +140,7 @@ TEST(Follower, ABaseIsNeverToldToJump) {
   EXPECT_GT(most, 0.5 * cfg.most_base_acceleration);
 }
 
-// The next path names the same place by an angle of another turn.
+// The next path gives the same yaw, a full turn off.
 TEST(Follower, ABaseDoesNotSpinFromOnePathToTheNext) {
   constexpr double kTurn = 2 * std::numbers::pi;
   TableStage stage("mobile_franka");
@@ -166,7 +166,7 @@ TEST(Follower, ABaseDoesNotSpinFromOnePathToTheNext) {
   }
 }
 
-// What a segment was to reach is commanded where it ends between two steps.
+// The end of a segment is commanded if it lies between two control steps.
 TEST(Follower, AGroupReachesTheEndOfItsPath) {
   TableStage stage("franka");
   const int arm = stage.robot().arm();
@@ -191,7 +191,7 @@ TEST(Follower, AGroupReachesTheEndOfItsPath) {
   EXPECT_EQ(action.commands[arm].values[6], path.points.back());
 }
 
-// The path begins 0.1 rad from where the arm is commanded to be: it goes over to it, and does not jump.
+// The path begins 0.1 rad from the commanded arm position: the arm converges to it without a jump.
 TEST(Follower, AnArmThatIsBesideAPathGoesOverToIt) {
   TableStage stage("franka");
   const int arm = stage.robot().arm();
@@ -244,7 +244,8 @@ TEST(Follower, AFloatingHandGoesWhereItsToolIsWanted) {
   EXPECT_LT(norm(robot.leaf_pose(stage.world, hands[0].tool).p - to.p), 0.01);
 }
 
-// Two stages, the second planned from what the first left; nothing at all for the third attempt.
+// A planner of two stages; the second is planned from the end of the first. `bad_stage` gets no
+// plan.
 class TwoStages final : public TaskPlanner {
  public:
   explicit TwoStages(int bad_stage) : bad_stage_(bad_stage) {}
@@ -299,7 +300,7 @@ TEST(TaskPlanner, AStageWithoutAWayBeginsAgainThenGivesUp) {
   EXPECT_EQ(planner.requests.size(), 8u);
 }
 
-// Closes on nothing, then knows no way.
+// Closes the gripper on nothing, then finds no plan.
 class ClosesOnce final : public TaskPlanner {
  protected:
   void initialize_planner() override {}

@@ -18,9 +18,9 @@ namespace {
 using std::numbers::pi;
 
 constexpr int kYaws = 24;              // closing directions over half a turn
-constexpr double kSupportGap = 0.004;  // m, finger tips above the support
-constexpr double kTopGap = 0.012;      // m, of the tool's origin below the top of a high object
-// Slides of the grasp along the object, across the closing direction.
+constexpr double kSupportGap = 0.004;  // m, between finger tips and support
+constexpr double kTopGap = 0.012;      // m, of the tool's origin below the top of a tall object
+// Offsets (m) of the grasp along the object, perpendicular to the closing direction.
 constexpr std::array<double, 5> kSlides{0.0, 0.012, -0.012, 0.024, -0.024};
 
 constexpr double kSameEnd = 0.0005;  // m
@@ -69,12 +69,12 @@ GripperShape::GripperShape(const mjModel* model, const Robot& robot, int gripper
   }
   center = 0.5 * (low + high);
   radius = 0.5 * norm(high - low);
-  // The fingers swing on arcs: half closed they reach a little further than open.
+  // The fingers swing on arcs: half closed they reach slightly further than open.
   constexpr double kSwing = 0.005;
   tip = high.z + kSwing;
   pad_half_width = cfg.pad_half_width;
   pad_half_length = cfg.pad_half_length;
-  // Pads end where the fingers do.
+  // The pads end at the finger tips.
   if (high.z < pad_half_length - kSameEnd) pad_middle = high.z - pad_half_length;
 }
 
@@ -110,7 +110,7 @@ std::vector<Grasp> propose_grasps(const GripperShape& gripper, const ObjectShape
     points.push_back(object * p);
     top = std::max(top, points.back().z);
   }
-  // Directions are counted from an axis of the body that lies flat: faces are often square to it.
+  // Closing directions start at a horizontal axis of the body: faces are often square to it.
   Vec3 flat = rotate(object.q, {1, 0, 0});
   if (std::abs(flat.z) > 0.7) flat = rotate(object.q, {0, 1, 0});
   const double yaw0 = std::atan2(flat.y, flat.x);

@@ -13,15 +13,17 @@ namespace {
 
 using std::numbers::pi;
 
-constexpr int kDirections = 40;  // closing directions all over half a sphere, besides those
-constexpr int kAroundAxis = 12;  // about each axis of the body
-constexpr int kApproaches = 16;  // about a closing direction
-constexpr std::array<double, 3> kSlides{0.0, 0.015, -0.015};  // m, across closing and approach
-// m, of the ends of the pads behind the surface that comes first: what lies flat is taken with them, because
-// the tips would meet what it lies on.
+// closing directions over half a sphere, in addition to those about the axes
+constexpr int kDirections = 40;
+constexpr int kAroundAxis = 12;  // closing directions about each axis of the body
+constexpr int kApproaches = 16;  // approaches for each closing direction
+// m, perpendicular to closing direction and approach
+constexpr std::array<double, 3> kSlides{0.0, 0.015, -0.015};
+// m, depth of the pads' ends behind the first surface along the approach. The small depths are for
+// flat objects, where deeper finger tips would hit the support.
 constexpr std::array<double, 4> kDepths{0.0091, 0.0191, 0.0291, 0.0471};
-constexpr double kSlope = 4.0, kMostSlope = 4.0;  // cost of a slope, and its most
-constexpr std::size_t kPoints = 450;              // most that are looked at
+constexpr double kSlope = 4.0, kMostSlope = 4.0;  // cost of the slope, and its maximum
+constexpr std::size_t kPoints = 450;              // maximum number of surface points that are used
 
 std::vector<Vec3> closing_directions() {
   std::vector<Vec3> all;
@@ -61,7 +63,7 @@ std::vector<Grasp> grasps_all_around(const GripperShape& gripper, const ObjectSh
   std::vector<Vec3> points;
   const std::size_t stride = shape.points.size() / kPoints + 1;
   for (std::size_t i = 0; i < shape.points.size(); i += stride) points.push_back(shape.points[i]);
-  // The middle of the extents: bodies have their origins anywhere.
+  // The middle of the bounding box, since a body's origin may be anywhere.
   Vec3 low = points[0], high = points[0];
   for (Vec3 p : points) {
     low = {std::min(low.x, p.x), std::min(low.y, p.y), std::min(low.z, p.z)};
@@ -81,7 +83,7 @@ std::vector<Grasp> grasps_all_around(const GripperShape& gripper, const ObjectSh
         near = std::min(near, dot(p - middle, approach));
         far = std::max(far, dot(p - middle, approach));
       }
-      // No deeper than the middle.
+      // The middle of the object limits the depth.
       const double mid = 0.5 * (near + far);
       for (double end : kDepths) {
         const double depth = end - half_length - gripper.pad_middle;

@@ -8,11 +8,11 @@
 namespace mjsense {
 namespace {
 
-constexpr double kJump = 0.15;    // rad in a step of a line: 1.5 rad/s at 0.2 m/s
-constexpr int kParts = 10;        // of the way of reach_along()
-constexpr double kDetour = 0.25;  // m up, of a floating hand that cannot go straight
+constexpr double kJump = 0.15;    // rad per step of a line: 1.5 rad/s at 0.2 m/s
+constexpr int kParts = 10;        // steps of reach_along()
+constexpr double kDetour = 0.25;  // m upwards, of a floating hand whose straight line is blocked
 
-// Free joints of the base, for a hand that floats.
+// The joints of the hand's arm; for a floating hand the joints of the base.
 std::vector<int> planned_joints(const Robot& robot, const Hand& hand) {
   if (hand.tool != hand.gripper) return robot.groups()[hand.tool].joints;
   for (const MoveGroup& group : robot.groups()) {
@@ -85,7 +85,7 @@ bool HandPlanner::line_is_free(const World& world, CollisionQuery& query, const 
   for (int k = 1; k <= steps; ++k) {
     const Pose tool = k == steps ? to : from.tool * exp6((static_cast<double>(k) / steps) * screw);
     if (!reach(world, tool, at, end)) return false;
-    // A joint that jumps would not go straight.
+    // If a joint jumps, the tool leaves the line.
     if (!floats()) {
       for (std::size_t i = 0; i < joints(at).size(); ++i) {
         if (std::abs(joints(end)[i] - joints(at)[i]) > kJump) return false;

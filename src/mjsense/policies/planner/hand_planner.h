@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
-// Where a hand can go, and how: inverse kinematics, free ways, and the segments for them. An arm moves its own
-// joints; a floating hand goes on screws.
+// Motions of one hand: inverse kinematics, collision-free paths, and the plan segments for them. An
+// arm moves its joints; a floating hand moves along screws.
 
 #include <memory>
 #include <optional>
@@ -15,12 +15,12 @@ namespace mjsense {
 struct HandPlannerCfg {
   double joint_speed = 1.5, joint_acceleration = 4.0;  // rad/s, rad/s^2
   double slide_speed = 0.3, slide_acceleration = 1.0;  // m/s, m/s^2
-  double tool_speed = 0.30;                            // m/s, on free ways
-  double turn_speed = 1.5;                             // rad/s, of tools on lines
-  double line_step = 0.02;  // m between places of a line that are looked at
+  double tool_speed = 0.30;                            // m/s, on collision-free paths
+  double turn_speed = 1.5;                             // rad/s, of the tool on lines
+  double line_step = 0.02;                             // m between the checked poses of a line
 };
 
-// The hand somewhere: its tool, and the joints that put it there.
+// A pose of the hand: its tool pose and the joint positions for it.
 struct HandPose {
   Pose tool;  // X_WT
   RobotValues joints;
@@ -34,23 +34,26 @@ class HandPlanner {
   bool floats() const { return hand_.tool == hand_.gripper; }
   CollisionModel& collisions() { return *collisions_; }
 
-  // Where a plan begins: as commanded, or as it stands.
+  // The start of a plan: the commanded pose or, without a command, the measured one.
   HandPose now(const World& world, const Follower& follower) const;
-  // The tool at X_WT, from joints near those of `near`; `iterations` above Chain::kTracking also looks farther away.
+  // Inverse kinematics for the tool at X_WT, starting from `near`. `iterations` above
+  // Chain::kTracking also searches farther away.
   bool reach(const World& world, const Pose& tool, const HandPose& near, HandPose& out,
              int iterations = Chain::kTracking) const;
-  // The joints at the end of a screw from `from` to X_WT, whatever is in the way: where reach() leaps, an
-  // arm with more joints than it needs may end up in a knot.
+  // Joint positions at the end of a screw from `from` to X_WT, without collision checks. They are
+  // continuous with `from`; reach() could end in a contorted posture of a redundant arm.
   bool reach_along(const World& world, const Pose& tool, const HandPose& from, HandPose& out) const;
   bool is_free(CollisionQuery& query, const HandPose& at) const;
-  // Whether the tool can go straight (on a screw) and touches nothing, ends excluded; `end` is where it arrives.
+  // True if the tool can move along a screw without collision, ends excluded. `end` is the pose at
+  // its end.
   bool line_is_free(const World& world, CollisionQuery& query, const HandPose& from, const Pose& to,
                     HandPose& end) const;
 
   // Adds the segment of a straight line.
   Segment& add_line(const World& world, Plan& plan, int phase, const Pose& from, const Pose& to,
                     double speed, double settle = 0) const;
-  // Adds segments of a free way between two poses; false, and the plan as it was, if none is found.
+  // Adds segments of a collision-free path between two poses. Returns false and leaves the plan
+  // unchanged if none is found.
   bool add_way(const World& world, CollisionQuery& query, Plan& plan, int phase,
                const HandPose& from, const HandPose& to, Rng& rng) const;
 

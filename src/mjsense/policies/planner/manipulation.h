@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
-// What picking (picking.h) and placing (placing.h) share: the hands of the robot, the object of the
-// episode, distances.
+// State shared by picking (picking.h) and placing (placing.h): configuration, the robot's hands,
+// the target object, clearances.
 
 #include <memory>
 #include <string_view>
@@ -18,23 +18,24 @@ struct ManipulationPlannerCfg {
   TaskPlannerCfg planner;
   HandPlannerCfg hand;
   double fast = 0.20, slow = 0.08;              // m/s, of the tool on lines
-  double pregrasp = 0.04;                       // m before the grasp, against the approach
+  double pregrasp = 0.04;                       // m, behind the grasp along the approach
   double lift = 0.08;                           // m above the grasp
   double settle = 0.1, close_time = 0.5;        // s
-  double preplace = 0.07;                       // m above the place
-  double clearance = 0.005;                     // m between object and place when it is let go
+  double preplace = 0.07;                       // m, above the place pose
+  double clearance = 0.005;                     // m, between object and support at release
   double place_settle = 0.5, open_time = 0.25;  // s
-  double retreat = 0.05;                        // m, against the approach
-  double rest = 0.5;                            // s at the end
-  double most_tilt = 90;        // degrees from above; the approach asked for is drawn up to here
+  double retreat = 0.05;                        // m, opposite to the approach
+  double rest = 0.5;                            // s, at the end
+  // degrees from vertical; maximum tilt of the preferred approach, which is drawn at random
+  double most_tilt = 90;
   int max_ik_candidates = 256;  // grasps tried before giving up
-  int max_far_candidates =
-      60;            // of them with a search far from the present joints, if none is near
-  int max_ways = 6;  // of them with a search for a way
+  // How many of them get a search far from the current joints, if there is no near solution.
+  int max_far_candidates = 60;
+  int max_ways = 6;  // how many of them get a path search
 };
 
-inline constexpr double kMargin = 0.004;       // m, of everything to everything on the way
-inline constexpr double kGraspMargin = 0.001;  // m, of the open gripper at the grasp
+inline constexpr double kMargin = 0.004;       // m, clearance along paths
+inline constexpr double kGraspMargin = 0.001;  // m, clearance of the open gripper at the grasp
 
 inline Pose raised(Pose pose, double height) {
   pose.p.z += height;
@@ -57,13 +58,14 @@ class Manipulation {
     return robot().groups()[hand.hand().gripper];
   }
 
-  // The target, as it stands.
+  // The target object of this world.
   const ObjectShape& target_shape(int world) const {
     return scene_.shape(world, scene_.target(world));
   }
   int target_body(int world) const { return scene_.all_objects()[scene_.target(world)].body; }
   Pose object_pose(const World& world) const;  // X_WO
-  // A function of the episode alone, whatever the world and what was planned before.
+  // Random numbers that depend only on the episode and the request, not on the world or on earlier
+  // plans.
   Rng rng(const World& world, const PlanRequest& request, std::string_view what) const;
 
  private:

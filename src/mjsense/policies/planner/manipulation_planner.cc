@@ -6,7 +6,7 @@
 namespace mjsense {
 namespace {
 
-constexpr double kSlipped = 0.05;  // m, object in the hand against where it was taken
+constexpr double kSlipped = 0.05;  // m, displacement of the object in the hand since the grasp
 
 }  // namespace
 
@@ -30,7 +30,7 @@ bool ManipulationPlanner::gone_wrong(const World& world) const {
   if (!state.holding) return false;
   const int phase = follower().phase(world.id);
   if (phase != kLift && phase != kPreplace && phase != kPlace) return false;
-  // What has been let go may roll.
+  // A released object may roll away.
   const auto& segments = follower().plan(world.id).segments;
   const auto segment = static_cast<std::size_t>(follower().segment(world.id));
   if (segment >= segments.size() || segments[segment].holding.empty()) return false;
@@ -49,7 +49,7 @@ void ManipulationPlanner::make_plan(const World& world, const PlanRequest& reque
     state.inserted = 0;
     state.went_home = state.drove_to_pick = state.drove_to_place = false;
   }
-  // After a failure the hands open and what they had comes to rest, before it is looked for.
+  // After a failure the hands open, and the object comes to rest before the next pick is planned.
   const int stage = request.stage - state.inserted - (request.attempt == 0 ? 0 : 1);
   if (stage < 0) {
     state.holding = false;
@@ -73,7 +73,7 @@ void ManipulationPlanner::let_go(Plan& plan) const {
   plan.more = true;
 }
 
-// This plan leads to where the next can be made, for the same stage.
+// Counts a plan that only prepares the next one, for the same stage.
 bool ManipulationPlanner::insert(State& state) {
   ++state.inserted;
   return true;

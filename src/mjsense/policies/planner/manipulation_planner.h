@@ -1,10 +1,11 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
-// Picks up the target of a task that has a GraspScene, from any direction, and puts it where the task's PlaceScene
-// says. The way to the object is free of everything, the object in the hand included. With several hands the
-// nearest takes it. The plan has stages: pick; place, from where the object is in the hand; a look at
-// whether it is done - if not, it begins again. Where there is no way from here, arms go to where they began, and a
-// base that drives goes to where there is one; these are stages of their own.
+// Planner of picking and placing: picks the target of a task with a GraspScene, from any direction,
+// and puts it where the task's PlaceScene says. Paths are checked for collisions, including the
+// held object. With several hands the nearest one picks. The plan has stages: pick; place, planned
+// from the object's actual pose in the hand; check of success, with a retry if it fails. If no path
+// exists, the arms return to their start positions, and a mobile base drives to a pose with a path;
+// these are separate stages.
 
 #include <optional>
 #include <vector>
@@ -28,12 +29,12 @@ class ManipulationPlanner final : public TaskPlanner {
 
  private:
   struct State {
-    std::optional<Picking::Grip> grip;  // of the last plan to pick, until it has failed
+    std::optional<Picking::Grip> grip;  // of the last pick, until it fails
     bool holding = false;
-    Placing::Home home;  // the start of the episode
+    Placing::Home home;  // pose at the start of the episode
     FailedGrasps failed;
-    // Since it began, or began again.
-    int inserted = 0;  // stages that only lead to where the next can be done
+    // Since the start of the attempt.
+    int inserted = 0;  // stages that only prepare the next one
     bool went_home = false, drove_to_pick = false, drove_to_place = false;
   };
   void let_go(Plan& plan) const;
@@ -43,9 +44,9 @@ class ManipulationPlanner final : public TaskPlanner {
 
   ManipulationPlannerCfg cfg_;
   std::optional<Manipulation> shared_;
-  std::optional<Placing> placing_;  // of a task with a PlaceScene
+  std::optional<Placing> placing_;  // if the task has a PlaceScene
   std::optional<Picking> picking_;
-  std::optional<BaseShift> shift_;  // of a robot whose base drives
+  std::optional<BaseShift> shift_;  // if the robot has a mobile base
   std::vector<State> states_;       // [B]
 };
 

@@ -22,7 +22,7 @@ namespace {
 
 using DataPtr = std::unique_ptr<mjData, decltype(&mj_deleteData)>;
 
-// A task with its planner in worlds of plain MuJoCo.
+// A task with its planner, in worlds of plain MuJoCo.
 struct Play {
   Play(const std::string& task_name, const std::string& robot, const std::string& scene_name,
        int num_worlds, bool noise = false, double perturb = 0) {
@@ -55,7 +55,7 @@ std::string setting(const char* name, const char* otherwise) {
   return value ? value : otherwise;
 }
 
-// Of a grasp's approach, from above.
+// Tilt of a grasp's approach from vertical, degrees.
 double tilt(const Pose& grasp) {
   return std::acos(std::clamp(-rotate(grasp.q, {0, 0, 1}).z, -1.0, 1.0)) * 180 / M_PI;
 }
@@ -106,7 +106,7 @@ TEST(ManipulationPlanner, PicksFromManyDirections) {
   EXPECT_GE(slanting, episodes / 3);
 }
 
-// Nothing on the way is touched but what is picked up; joints keep below the 2.62 rad/s of an FR3.
+// The robot touches only the target; joint speeds stay below the 2.62 rad/s of an FR3.
 TEST(ManipulationPlanner, MovesWell) {
   Play play("pick_and_place", "franka", "", 1);
   for (int episode = 0; episode < 3; ++episode) {
@@ -122,13 +122,13 @@ TEST(ManipulationPlanner, MovesWell) {
 TEST(ManipulationPlanner, AnEpisodeIsTheSameInEveryWorld) {
   Play play("pick_and_place", "franka", "", 3, /*noise=*/true, /*perturb=*/1.0);
   play.run(0, 3);
-  play.run(2, 5);  // leaves nothing behind
+  play.run(2, 5);  // must not affect the next episode
   play.run(2, 3);
   EXPECT_EQ(0, std::memcmp(play.data[0]->qpos, play.data[2]->qpos,
                            play.scene->model()->nq * sizeof(double)));
 }
 
-// One world or five, one thread or two: the same bits, with other episodes beside.
+// The result is identical bit for bit for one and two threads, with other episodes in parallel.
 TEST(ManipulationPlanner, AnEpisodeIsTheSameBesideOthers) {
   const auto play = [](int worlds, int threads) {
     RolloutCfg cfg;
@@ -152,12 +152,12 @@ TEST(ManipulationPlanner, AnEpisodeIsTheSameBesideOthers) {
     const StateRow row = state_row(rollout.simulation().worlds(), worlds - 1);
     return std::vector<double>(row.qpos, row.qpos + rollout.simulation().scene().model()->nq);
   };
-  // Episode 3 is that of the last of five worlds.
+  // The last of five worlds has episode 3.
   const auto many = play(5, 2);
   EXPECT_EQ(many, play(5, 1));
 }
 
-// Left is +y; the episodes are some in which the object is well aside.
+// +y is left. In these episodes the object is well off the middle.
 TEST(ManipulationPlanner, OfTwoArmsTheNearerPicks) {
   Play play("pick", "bimanual_yam", "", 1);
   std::set<std::string> used;
@@ -182,7 +182,8 @@ TEST(ManipulationPlanner, OfTwoArmsTheNearerPicks) {
   EXPECT_EQ(used.size(), 2u);
 }
 
-// Shoved or slipped, the object is picked up after all, and what opens is opened; which episodes, is a function of their numbers.
+// Perturbed episodes: the object is pushed or slips but is picked up by a retry, and furniture is
+// opened. The episode number determines which episodes are perturbed.
 TEST(ManipulationPlanner, MishapsAreMended) {
   for (const auto& [task, scene] : {std::pair{"pick", "tableware"}, {"open", "kitchen"}}) {
     Play play(task, "franka", scene, 1, /*noise=*/false, /*perturb=*/1.0);

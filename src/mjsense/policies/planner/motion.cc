@@ -27,10 +27,10 @@ void blend(Config a, Config c, Config b, double s, std::vector<double>& out) {
     out[d] = (1 - s) * (1 - s) * a[d] + 2 * s * (1 - s) * c[d] + s * s * b[d];
 }
 
-constexpr int kChecks = 8;         // pieces of a rounded corner that are looked at
+constexpr int kChecks = 8;         // checked pieces of a rounded corner
 constexpr double kArcStep = 0.01;  // rad or m between two samples of a path
 
-// Dense samples [M, n] of the path with parabolas at its corners, about evenly spaced.
+// Dense samples [M, n] of the path with parabolas at its corners, approximately evenly spaced.
 std::vector<double> round_corners(std::span<const double> w, std::size_t n,
                                   const FreeSpace& is_free, double share) {
   const std::size_t many = w.size() / n;
@@ -46,7 +46,7 @@ std::vector<double> round_corners(std::span<const double> w, std::size_t n,
   };
   out.insert(out.end(), row(0).begin(), row(0).end());
   for (std::size_t i = 1; i + 1 < many; ++i) {
-    // From a, before the corner c, to b behind it.
+    // The parabola runs from a, before the corner c, to b, after it.
     const Config c = row(i);
     double part = share;
     bool round = false;
@@ -77,7 +77,8 @@ std::vector<double> round_corners(std::span<const double> w, std::size_t n,
   return out;
 }
 
-// By how much a path must be slower, at least 1, to keep to the limits. Its times are evenly spaced.
+// Factor (at least 1) by which a path must be slower to satisfy the limits. Its times are evenly
+// spaced.
 double excess(const JointSpace& space, const CommandPath& path) {
   const std::size_t n = space.size(), many = path.times.size();
   const double dt = path.times[1] - path.times[0];
@@ -113,8 +114,9 @@ CommandPath time_path(const JointSpace& space, int group, std::span<const double
   }
   const std::vector<double> q = round_corners(waypoints, n, is_free, cfg.rounding);
   const int m = static_cast<int>(q.size() / n);
-  // The parameter is the number of the sample: q'(i), q''(i) by differences. x(i) is the square of
-  // its rate, which limits and their consequences forwards and backwards bound from above.
+  // The path parameter is the sample index; q'(i) and q''(i) are finite differences. x(i) is the
+  // square of its rate. The limits bound x from above, and a forward and a backward pass propagate
+  // these bounds.
   const auto slope = [&](int i, std::size_t d) {
     const int lo = std::max(0, i - 1), hi = std::min(m - 1, i + 1);
     return (q[hi * n + d] - q[lo * n + d]) / (hi - lo);
@@ -124,13 +126,13 @@ CommandPath time_path(const JointSpace& space, int group, std::span<const double
     return q[(i + 1) * n + d] - 2 * q[i * n + d] + q[(i - 1) * n + d];
   };
   std::vector<double> x(m);
-  std::vector<double> gain(m);  // most |d(rate)/dt| once the bend has taken its part
+  std::vector<double> gain(m);  // maximum |d(rate)/dt| that the curvature term leaves
   for (int i = 0; i < m; ++i) {
     double most = 1e12;
     for (std::size_t d = 0; d < n; ++d) {
       const double s = std::abs(slope(i, d)), c = std::abs(bend(i, d));
       if (s > 1e-12) most = std::min(most, (space.speed[d] / s) * (space.speed[d] / s));
-      // Half of the acceleration is for the bend, half for speeding up.
+      // Half of the acceleration is reserved for the curvature, half for speeding up.
       if (c > 1e-12) most = std::min(most, 0.5 * space.acceleration[d] / c);
     }
     if (extra && extra_speed > 0) {
@@ -162,19 +164,19 @@ CommandPath time_path(const JointSpace& space, int group, std::span<const double
   for (int k = 0; k <= samples; ++k) {
     const double t = time[m - 1] * k / samples;
     while (i + 2 < m && time[i + 1] <= t) ++i;
-    // Between two samples the rate changes evenly.
+    // The rate is linear between two samples.
     const double a = std::sqrt(x[i]), span = time[i + 1] - time[i];
     const double rise = span > 0 ? (std::sqrt(x[i + 1]) - a) / span : 0;
     const double u = t - time[i];
     const double s = k == samples ? 1.0 : std::clamp(a * u + 0.5 * rise * u * u, 0.0, 1.0);
     out.times.push_back(t);
-    // Cubic between the samples: speeds do not jump there.
+    // Cubic interpolation between the samples keeps the speed continuous.
     const double h01 = s * s * (3 - 2 * s), h10 = s * (1 - s) * (1 - s), h11 = s * s * (s - 1);
     for (std::size_t d = 0; d < n; ++d)
       out.points.push_back((1 - h01) * q[i * n + d] + h01 * q[(i + 1) * n + d] + h10 * slope(i, d) +
                            h11 * slope(i + 1, d));
   }
-  // What is left over a limit between the samples is taken away everywhere.
+  // A uniform slowdown removes what still exceeds a limit between the samples.
   const double slower = excess(space, out);
   for (double& t : out.times) t *= slower;
   return out;

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Ways of a Franka among clutter that are not straight: how long they take to find, how often collisions are asked
-// about, how long they are and how long the arm takes.
+// Benchmark of path planning for a Franka in clutter, for problems whose straight line is blocked:
+// planning time, number of collision checks, path length and motion time.
 //   mjsense_bench --benchmark_filter=Ways
 
 #include <benchmark/benchmark.h>
@@ -21,7 +21,7 @@ namespace {
 using Config = std::span<const double>;
 constexpr int kProblems = 100;
 
-// Two places of the arm, and something between them.
+// Two free configurations with a blocked straight line.
 struct Problem {
   std::vector<double> start, goal;
 };
@@ -71,12 +71,12 @@ struct Clutter {
   CollisionQuery ask() { return {hand->collisions(), World{0, scene->model(), data.get()}}; }
 };
 
-// What a way has cost, and how good it is.
+// Cost and quality of one path.
 struct Found {
   bool solved = false;
   double ms = 0;
-  double length = 0, seconds = 0;  // rad; of the motion
-  long asked = 0;                  // configurations and pieces between two
+  double length = 0, seconds = 0;  // path length, rad; motion time
+  long asked = 0;                  // collision checks, of configurations and lines
 };
 
 double length_of(std::span<const double> path, std::size_t n) {
@@ -96,7 +96,7 @@ double median(std::vector<double> values) {
   return values[values.size() / 2];
 }
 
-// All problems an iteration.
+// One iteration plans all problems.
 void ways(benchmark::State& state) {
   static Clutter clutter;
   std::vector<Found> all;

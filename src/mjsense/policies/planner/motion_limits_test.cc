@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Every task with every kind of robot: what is commanded can be done by the robot, whatever goes
-// wrong on the way, and what was not to be touched is not.
+// Motion quality of every task with every kind of robot: commands stay within the robot's limits,
+// also after failures, and the robot touches nothing that it should not.
 
 #include <gtest/gtest.h>
 
@@ -23,19 +23,20 @@ namespace {
 struct Case {
   const char *task, *robot, *scene;
   int episodes, first = 0;
-  double depth = 0.001;  // m, of a contact of the robot, where nothing goes wrong
+  // m, maximum penetration of a contact of the robot in an undisturbed episode
+  double depth = 0.001;
   std::uint64_t seed = 0;
 };
 std::ostream& operator<<(std::ostream& out, const Case& c) {
   return out << c.task << " " << c.robot << " " << c.scene;
 }
 
-// Of an FR3: 10 rad/s^2, 2.62 rad/s. What others publish is above that.
+// Limits of an FR3: 10 rad/s^2, 2.62 rad/s. Published limits are higher.
 constexpr double kAcceleration = 10, kSpeed = 2.62;
-// Of bases, which drive with things in their hands: m/s^2, rad/s^2.
+// Limits of bases, which drive with held objects: m/s^2, rad/s^2.
 constexpr double kBase = 3.0, kBaseTurn = 10;
 constexpr double kBaseSpeed = 0.6, kBaseTurnSpeed = 1.5;  // m/s, rad/s
-// Hands that float come back onto their way a little faster.
+// Floating hands return to their path slightly faster.
 constexpr double kHandSpeed = 0.7, kHandTurnSpeed = 1.8;
 
 int number(const char* name, int otherwise) {
@@ -63,7 +64,7 @@ struct Stage {
         [&](const World& world) { quality.look(world, task->last_action(0), planner().phase(0)); },
         [&](const World& world) { quality.begin(world); });
   }
-  // The greatest speed of a joint of an arm (rad/s) after any physics step, and when.
+  // The maximum speed of an arm joint (rad/s) after any physics step, and its time.
   MotionQuality::Greatest executed_speed(std::int64_t episode) {
     MotionQuality::Greatest speed;
     run_episode(*task, *policy, data.get(), 0, episode, {}, {}, [&](const World& world) {
@@ -91,7 +92,7 @@ std::string said(const Case& c, std::int64_t episode, const MotionQuality::Great
 
 class MotionLimits : public testing::TestWithParam<Case> {};
 
-// MJSENSE_FIRST, MJSENSE_EPISODES: other episodes.
+// MJSENSE_FIRST and MJSENSE_EPISODES select other episodes.
 TEST_P(MotionLimits, CommandsKeepToThem) {
   const Case& c = GetParam();
   Stage stage(c, 0.5, /*noise=*/false);
@@ -126,7 +127,7 @@ TEST_P(MotionLimits, CommandsKeepToThem) {
 }
 
 const std::vector<Case> kCases{
-    // Of those that are alike one episode, unless they were found to differ.
+    // One episode for similar cases, unless they were found to differ.
     Case{"pick", "franka", "", 2}, Case{"pick", "franka", "table", 1},
     Case{"pick", "franka", "clutter", 3}, Case{"pick", "mobile_franka", "", 1},
     Case{"pick", "i2rt_yam", "", 2}, Case{"pick", "bimanual_yam", "", 1},
@@ -143,7 +144,7 @@ const std::vector<Case> kCases{
     Case{"close", "i2rt_yam", "", 1}, Case{"close", "bimanual_yam", "", 1},
     Case{"close", "floating_rum", "", 2}, Case{"close", "rby1", "", 2},
     Case{"door_opening", "rby1", "", 2}, Case{"door_opening", "rby1", "room_with_door:2", 2},
-    // Fingers that lead a heavy door by its handle.
+    // Fingers that move a heavy door by its handle penetrate deeper.
     Case{"door_opening", "mobile_franka", "", 1, 0, 0.0015}, Case{"nav_to_obj", "rby1", "", 1},
     Case{"nav_to_obj", "mobile_franka", "", 1}};
 
@@ -160,8 +161,8 @@ INSTANTIATE_TEST_SUITE_P(Tasks, MotionLimits, testing::ValuesIn(kCases), name_of
 
 class NoisyMotion : public testing::TestWithParam<Case> {};
 
-// With action noise the executed motion keeps to the speed, near singular postures too.
-// MJSENSE_EPISODES=65: so many episodes of each task and robot, from MJSENSE_FIRST on.
+// With action noise the executed motion stays below the speed limit, also near singular postures.
+// MJSENSE_EPISODES=65 runs that many episodes of each task and robot, from MJSENSE_FIRST on.
 TEST_P(NoisyMotion, KeepsToTheSpeedOfJoints) {
   const Case& c = GetParam();
   const int first = number("MJSENSE_FIRST", c.first), many = number("MJSENSE_EPISODES", c.episodes);
@@ -177,7 +178,7 @@ TEST_P(NoisyMotion, KeepsToTheSpeedOfJoints) {
   }
 }
 
-// Each task and robot once, if MJSENSE_EPISODES is set.
+// Each pair of task and robot once; only if MJSENSE_EPISODES is set.
 std::vector<Case> noisy_cases() {
   std::vector<Case> cases;
   for (const Case& c : kCases) {

@@ -10,10 +10,11 @@ namespace {
 
 using Config = std::span<const double>;
 
-// A point in a square with a wall that has one gap, far from the straight way:
+// A point in a square. The start is on the left, the goal on the right; the wall at |x| < 0.2 has
+// one gap, y > 1.5, far from the straight line:
 //
-//   +-----------+      goal on the right, start on the left; the wall at |x| < 0.2 leaves only
-//   |    #      |      y > 1.5 free
+//   +-----------+
+//   |    #      |
 //   | s  #   g  |
 //   +----#------+
 JointSpace square() { return {{-2, -2}, {2, 2}, {1.0, 0.5}, {2.0, 2.0}}; }
@@ -58,7 +59,7 @@ TEST(Motion, TheStraightLineWhereItIsFree) {
 }
 
 TEST(Motion, BeginsWhereItStands) {
-  // Beyond a limit, and in touch with something.
+  // The start is beyond a limit and in collision.
   const double start[2] = {-2.001, -1}, goal[2] = {1, -1};
   const FreeSpace walls = wall();
   const FreeSpace free{[&](Config q) { return q[0] > -2 && walls.at(q); }, walls.between};
@@ -76,7 +77,7 @@ TEST(Motion, NoWayIsAnEmptyPath) {
   EXPECT_TRUE(find_path(square(), start, goal, shut, rng).empty());
 }
 
-// Differences of the points of a path against the limits, from rest to rest.
+// Checks finite differences of a path's points against the limits, from rest to rest.
 void expect_within_limits(const JointSpace& space, const CommandPath& path) {
   const std::size_t n = space.size(), many = path.times.size();
   const double dt = path.times[1];

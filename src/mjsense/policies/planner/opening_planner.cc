@@ -28,7 +28,7 @@ void OpeningPlanner::initialize_planner() {
   ways_.assign(task().num_worlds(), {});
 }
 
-// Lets go of whatever it has and draws the hands back, before it looks again.
+// Opens the grippers and retracts the hands before the next attempt.
 void OpeningPlanner::back_off(const World& world, Plan& plan) const {
   for (const ArmAndHand& hand : opening_->reach().hands())
     plan.wait(kOpenGripper, cfg_.close_time)
@@ -67,11 +67,11 @@ void OpeningPlanner::float_along(const World& world, const HandleWay& way, bool 
   go(plan, kGrasp, way.hand, at, way.grasp, cfg_.slow);
   go(plan, kCloseGripper, way.hand, way.grasp, way.grasp, cfg_.slow, cfg_.close_time)
       .grip(way.hand.gripper, gripper.closed_command);
-  // About a hinge or along a slide: both are screws.
+  // A rotation about a hinge and a translation along a slide are both screws.
   go(plan, kLift, way.hand, way.grasp, way.end, cfg_.fast).holds(way.hand.gripper);
 }
 
-// Joint positions at times, and places of a base that drives, the tool at `speed` between them.
+// Timed joint positions and, with `driving`, poses of the mobile base; the tool moves at `speed`.
 std::vector<CommandPath> OpeningPlanner::paths(int arm, std::span<const RobotValues> points,
                                                double speed, bool driving) const {
   const std::size_t n = robot().groups()[arm].qpos.size();
@@ -110,8 +110,8 @@ std::vector<CommandPath> OpeningPlanner::paths(int arm, std::span<const RobotVal
   return out;
 }
 
-// To the pregrasp; there it looks again where the handle is, takes it and goes along. At the end it looks
-// whether that was enough.
+// Stages: move to the pregrasp; plan again from there for the measured handle pose, grasp it and
+// follow its path; check success.
 void OpeningPlanner::make_plan(const World& world, const PlanRequest& request, Plan& plan) {
   const int first = request.attempt > 0 ? 1 : 0;  // stage
   if (request.stage < first) return back_off(world, plan);

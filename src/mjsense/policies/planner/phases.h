@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
-// Phases of planners that grasp things, with the numbers that readers of recordings know.
+// Phases of the planners that grasp objects; the numbers are part of the recording format.
 
 #include "mjsense/episode/policy.h"
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// The pick without sensors: what planning and physics cost, and how often it succeeds.
+// Benchmark of the pick task without sensors: time of planning and physics, and success rate.
 //   mjsense_bench --benchmark_filter=Pick
 
 #include <benchmark/benchmark.h>
@@ -33,7 +33,7 @@ struct Stage {
   std::unique_ptr<mjData, decltype(&mj_deleteData)> data{nullptr, mj_deleteData};
 };
 
-// One episode an iteration: episodes 0, 1, 2 ... of seed 0.
+// One episode per iteration: episodes 0, 1, 2 ... of seed 0.
 void pick_episode(benchmark::State& state) {
   Stage stage(state.range(0) != 0);
   std::int64_t episode = 0, steps = 0, successes = 0;
@@ -54,7 +54,7 @@ BENCHMARK(pick_episode)
     ->Iterations(100)
     ->Unit(benchmark::kMillisecond);
 
-// Sampling an episode and planning it: what a reset costs.
+// Samples and plans an episode: the cost of a reset.
 void pick_plan(benchmark::State& state) {
   Stage stage(false);
   mjData* data = stage.data.get();

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
-// For tests and benchmarks: one episode of a task with plain MuJoCo, without sensors.
+// Runs one episode of a task with plain MuJoCo, without sensors; for tests and benchmarks.
 
 #include <mujoco/mujoco.h>
 
@@ -13,8 +13,8 @@
 
 namespace mjsense {
 
-// The physics of one control step, with the controllers that go on in it; then derived fields are
-// fresh.
+// The physics of one policy step with the controllers that run in it; afterwards derived fields are
+// current.
 inline void physics_steps(Task& task, World& world, mjData* data,
                           const std::function<void(const World&)>& each_physics_step = {}) {
   const bool controlled = task.robot().controls_every_step();
@@ -31,12 +31,12 @@ inline void physics_steps(Task& task, World& world, mjData* data,
 }
 
 struct EpisodeResult {
-  int steps = 0;  // control steps
+  int steps = 0;  // policy steps
   bool success = false;
   bool gave_up = false;
   bool truncated = false;
-  double reward = 0;        // of the last observation
-  double first_plan_s = 0;  // wall
+  double reward = 0;        // of the last evaluation
+  double first_plan_s = 0;  // wall time
 };
 
 inline EpisodeResult run_episode(Task& task, Policy& policy, mjData* data, int world_id,

@@ -11,8 +11,9 @@
 namespace mjsense {
 namespace {
 
-// m, gripper to all objects on the way to the pregrasp. The target too: at the end of the fast leg
-// the tool is 2 cm behind its command, and fingers already beside a high object would push it over.
+// m, clearance between gripper and all objects on the path to the pregrasp, including the target:
+// at the end of the fast segment the tool is 2 cm behind its command, and fingers that are already
+// beside a tall object would push it over.
 constexpr double kPathMargin = 0.008;
 constexpr double kGraspMargin = 0.003;  // m, at the grasp
 constexpr double kPathStep = 0.01;      // m
@@ -89,7 +90,7 @@ bool PickPlanner::choose_grasp(const World& world, Grasp& chosen) const {
   std::array<double, Chain::kMaxJoints> q;
   read_arm(world, q);
   int tried = 0;
-  const Grasp* second_best = nullptr;  // reachable, but something stands in the way
+  const Grasp* second_best = nullptr;  // reachable, but its path is blocked
   for (const Grasp& grasp : grasps) {
     bool blocked = false;
     for (std::size_t i = 0; i < objects.size(); ++i) {
@@ -119,8 +120,8 @@ bool PickPlanner::reachable(const Pose& base, const Pose& grasp, std::span<const
   std::copy_n(q.begin(), chain.joints().size(), solution.begin());
   const std::span<double> s(solution.data(), chain.joints().size());
   const Pose to_base = inverse(base);
-  // In the order of the motion, each from the one before: what works here works when it is
-  // followed.
+  // Solved in the order of the motion, each from the previous solution, as the follower does; so a
+  // solution found here is found while following.
   return chain.ik(to_base * raised(grasp, cfg_.pregrasp_height), s, Chain::kTracking) &&
          chain.ik(to_base * grasp, s, Chain::kTracking) &&
          chain.ik(to_base * raised(grasp, cfg_.lift_height), s, Chain::kTracking);

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
-// Picks up the target of a task that has a GraspScene: open, pregrasp, grasp, settle, close, lift.
+// Planner of picks from above, for a task with a GraspScene: open, pregrasp, grasp, settle, close,
+// lift.
 
 #include <memory>
 
@@ -16,13 +17,13 @@ struct PickPlannerCfg {
   double pregrasp_height = 0.04;          // m above the grasp, world z
   double lift_height = 0.08;              // m above the grasp, world z
   double settle = 0.1, close_time = 0.5;  // s
-  int max_ik_candidates = 256;            // grasps tried before giving up
+  int max_ik_candidates = 256;            // maximum number of grasps that are tried
 };
 
 class PickPlanner final : public TaskPlanner {
  public:
   explicit PickPlanner(PickPlannerCfg cfg = {}) : TaskPlanner(cfg.planner), cfg_(cfg) {}
-  // It has a gripper on an arm, whose joints alone move the tool.
+  // True if the robot has a gripper on an arm and the arm's joints alone move the tool.
   static bool can_use(const Robot& robot);
   std::span<const Phase> phases() const override;
 

@@ -70,13 +70,14 @@ TEST(PickPlanner, PicksUpMostObjects) {
 TEST(PickPlanner, AnEpisodeIsTheSameInEveryWorld) {
   Stage stage(3, /*noise=*/true);
   run_episode(*stage.task, *stage.policy, stage.data[0].get(), 0, 4);
-  run_episode(*stage.task, *stage.policy, stage.data[2].get(), 2, 8);  // leaves nothing behind
+  // must not affect the next episode
+  run_episode(*stage.task, *stage.policy, stage.data[2].get(), 2, 8);
   run_episode(*stage.task, *stage.policy, stage.data[2].get(), 2, 4);
   const int nq = stage.scene->model()->nq;
   EXPECT_EQ(0, std::memcmp(stage.data[0]->qpos, stage.data[2]->qpos, nq * sizeof(double)));
 }
 
-// A world whose target has been put somewhere else after sampling.
+// A world whose target is moved after sampling.
 struct Moved {
   Moved(Stage& stage, double x, double y)
       : world{.id = 0, .model = stage.scene->model(), .data = stage.data[0].get()} {
@@ -97,8 +98,8 @@ struct Moved {
   double* qpos;
 };
 
-// With another object close by on each side in turn: the gripper closes where it touches neither that nor, before it
-// closes, the target; and its way down is free where there is a free one.
+// Another object is close to the target, on each side in turn. The chosen grasp must not collide
+// with it or, before closing, with the target; and the path down must be free if a free one exists.
 TEST(PickPlanner, ChoosesAGraspBesideWhichThereIsRoom) {
   Stage stage(1);
   const auto& pick = static_cast<PickTask&>(*stage.task);
@@ -179,7 +180,7 @@ TEST(PickPlanner, RetriesAfterClosingOnNothingThenGivesUp) {
       return;
     }
     stage.task->apply(world, action, state_row(world.data));
-    // Whenever the fingers are about to close, the object slips away.
+    // The object moves away whenever the fingers are about to close.
     if (planner.phase(0) == 4 &&
         stage.task->robot().opening(world, stage.task->robot().gripper()) > 0.08) {
       moved.move(0, 0.15 * side);
@@ -210,7 +211,7 @@ TEST(Grasp, ClosesOnOppositeFacesOfABox) {
     EXPECT_FALSE(gripper.hits(grasps[i].pose, object, block.shape, 0.0));
     EXPECT_LT(rotate(grasps[i].pose.q, {0, 0, 1}).z, -0.999) << "from above";
     EXPECT_GT(grasps[i].pose.p.z, 0.6 + gripper.tip) << "finger tips above the table";
-    // Along one of the sides (0.044 or 0.070 m), not over a corner.
+    // The closing direction is along one of the sides (0.044 or 0.070 m), not a diagonal.
     const Vec3 closing = rotate(conjugate(object.q), rotate(grasps[i].pose.q, {0, 1, 0}));
     EXPECT_GT(std::max(std::abs(closing.x), std::abs(closing.y)), std::cos(0.2));
   }

@@ -17,13 +17,15 @@ namespace {
 
 using std::numbers::pi;
 
-constexpr double kBelow = 0.004;  // m that boxes around a slanting gripper reach below it
-constexpr double kSide = 100;     // degrees, most that the approach turns from the way out
+// m; the boxes of a tilted gripper reach this far below the gripper itself
+constexpr double kBelow = 0.004;
+// degrees, maximum yaw of the approach from the direction robot to object
+constexpr double kSide = 100;
 constexpr int kFewGrasps = 64;
-constexpr int kMostMisplaced =
-    24;                          // grasps with which a hand does not get to the place: none will do
+// A hand is given up after this many grasps from which it does not reach the place.
+constexpr int kMostMisplaced = 24;
 constexpr double kAtHome = 0.1;  // rad
-// Of a tool that must get away from what it touches.
+// Distances for moving a tool away from an obstacle it touches.
 constexpr double kBack = 0.06, kUp = 0.10;  // m
 
 }  // namespace
@@ -33,7 +35,7 @@ struct Picking::Search {
   const PlanRequest& request;
   const Follower& follower;
   const FailedGrasps& failed;
-  int most_near, most_far;  // grasps that are tried
+  int most_near, most_far;  // maximum number of grasps that are tried
 };
 
 Picking::Picking(const Manipulation& shared, const Placing* placing)
@@ -61,7 +63,7 @@ std::optional<Picking::Grip> Picking::plan(const World& world, const PlanRequest
   });
   const Search search{
       world, request, follower, failed, m_.cfg().max_ik_candidates, m_.cfg().max_far_candidates};
-  std::vector<std::string> refusals;  // of the hands, as tried last
+  std::vector<std::string> refusals;  // of the hands, from their last search
   for (const bool to_place : {true, false}) {
     if (to_place && (order.size() < 2 || !placing_)) continue;
     refusals.clear();
@@ -96,7 +98,7 @@ Vec3 Picking::wanted_approach(const World& world, const PlanRequest& request,
   return {std::sin(tilt) * std::cos(turn), std::sin(tilt) * std::sin(turn), -std::cos(tilt)};
 }
 
-// Away from what the hand touches; returns where it then is.
+// Moves the hand out of contact; returns its pose afterwards.
 HandPose Picking::draw_back(const World& world, HandPlanner& hand, CollisionQuery& query,
                             const HandPose& start, Plan& plan) const {
   if (hand.is_free(query, start)) return start;
@@ -126,7 +128,8 @@ std::optional<Picking::Grip> Picking::pick_with(const Search& search, int h, boo
   plan.wait(kOpenGripper, is_open ? 0 : cfg.close_time).grip(gripper, group.open_command);
   const HandPose start = draw_back(world, hand, query, now, plan);
   Rng way = m_.rng(world, search.request, "planner/way");
-  // The tool as a gripper whose y axis is the closing direction; near the present joints, then farther away.
+  // The tool frame is turned so that its y axis is the closing direction. First pass: solutions
+  // near the current joints; second pass: farther away.
   const GripperShape& shape = m_.gripper(h);
   const std::vector<Grasp> ranked =
       rank_grasps(grasps(m_.target_shape(world.id), h), object, start.tool * Pose{{}, shape.turn},
@@ -216,7 +219,7 @@ void Picking::go_home(const World& world, const PlanRequest& request, const Foll
   }
 }
 
-// Up with what is held, as far as there is room; else back, against the approach.
+// Lifts the held object as far as there is room; otherwise moves back, opposite to the approach.
 bool Picking::lift(const World& world, HandPlanner& hand, const HandPose& at, Plan& plan) const {
   const ManipulationPlannerCfg& cfg = m_.cfg();
   const int gripper = hand.hand().gripper, body = m_.target_body(world.id);

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
-// Takes the object of an episode with one of the hands, from any direction, and lifts it.
+// Plans a pick: grasps the target object with one of the hands, from any direction, and lifts it.
 
 #include <map>
 #include <memory>
@@ -19,28 +19,31 @@ class Picking {
   struct Grip {
     int hand = 0;
     Pose tool_object;  // X_TO in the hand
-    Pose start;        // X_WT of the hand where the plan begins
+    Pose start;        // X_WT of the hand at the start of the plan
   };
 
-  // `placing`: of several hands one is preferred that also gets to the place; null: nothing is placed.
+  // `placing`: if not null, a hand is preferred that can also reach the place; null: no placing.
   Picking(const Manipulation& shared, const Placing* placing);
 
-  // Adds segments from where the hands are until the object is lifted. Nothing, and no segments, if there is no way.
+  // Adds segments from the current state until the object is lifted. Returns nothing and adds no
+  // segments if no plan is found.
   std::optional<Grip> plan(const World& world, const PlanRequest& request, const Follower& follower,
                            const FailedGrasps& failed, Plan& plan);
-  // Whether it could take one of the best grasps from where it is, without a long search.
+  // True if one of the best grasps is possible from the current state; a short search.
   bool can(const World& world, const PlanRequest& request, const Follower& follower,
            const FailedGrasps& failed);
-  // Adds segments that bring the arms to the joints of `home`, as far as there are free ways: from elsewhere they may
-  // reach nothing, or be in each other's way.
+  // Adds segments that move the arms to the joint positions of `home` as far as collision-free
+  // paths exist. From other positions the arms may be unable to reach the object or may block each
+  // other.
   void go_home(const World& world, const PlanRequest& request, const Follower& follower,
                const RobotValues& home, Plan& plan) const;
 
  private:
   struct Search;
-  // With `to_place` only a grasp with which the object also gets to where it is wanted.
+  // With `to_place`, accepts only grasps from which the place is reachable.
   std::optional<Grip> pick_with(const Search& search, int hand, bool to_place, Plan& plan);
-  // The approach that an episode asks for: anything from above to nearly level, out of the way of the robot.
+  // The preferred approach of an episode, drawn at random: from vertical to nearly horizontal,
+  // pointing away from the robot.
   Vec3 wanted_approach(const World& world, const PlanRequest& request, const Pose& object) const;
   HandPose draw_back(const World& world, HandPlanner& hand, CollisionQuery& query,
                      const HandPose& start, Plan& plan) const;
@@ -53,9 +56,9 @@ class Picking {
     std::once_flag once;
     std::vector<Grasp> of_object;
   };
-  // Of shapes, by their addresses, and hands; made when they are needed.
+  // By address of the shape and hand; computed on first use.
   std::map<std::pair<const ObjectShape*, int>, Grasps> grasps_;
-  std::mutex grasps_mutex_;  // of the map, not of what is in it
+  std::mutex grasps_mutex_;  // guards the map, not its values
 };
 
 }  // namespace mjsense

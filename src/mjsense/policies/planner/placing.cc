@@ -13,11 +13,12 @@ namespace {
 
 using std::numbers::pi;
 
-constexpr int kTurns = 16;                       // about the vertical, of what is put down
-constexpr std::size_t kMostGoals = 25 * kTurns;  // places and turns, before there is no way
-constexpr double kMostLowered = 0.3;             // m, of what is put back
+constexpr int kTurns = 16;  // turns about the vertical that are tried
+// maximum number of places and turns that are tried
+constexpr std::size_t kMostGoals = 25 * kTurns;
+constexpr double kMostLowered = 0.3;  // m, maximum height from which the object is put back
 
-// As it hangs, then turned to both sides, then between.
+// The k-th turn: first none, then alternating to both sides, then the angles in between.
 Quat turned(int k) {
   const int turns = (k % 2 ? -1 : 1) * ((k % 8 + 1) / 2);
   return axis_angle({0, 0, 1}, (turns + (k < 8 ? 0 : 0.5)) * 0.25 * pi);
@@ -62,7 +63,7 @@ double Placing::underside(const ObjectShape& shape, const Quat& object) const {
 }
 
 Pose Placing::placed(const Pose& object, const ObjectShape& shape, Vec3 place, int k) const {
-  // The middle of its underside, from its origin, as it hangs.
+  // Middle of the underside relative to the origin, at its current orientation.
   Vec3 low{1e9, 1e9, 1e9}, high{-1e9, -1e9, -1e9};
   for (Vec3 point : shape.points) {
     const Vec3 p = rotate(object.q, point);
@@ -97,7 +98,7 @@ bool Placing::gets_away(const World& world, HandPlanner& hand, const HandPose& a
   empty.open(gripper);
   empty.place(body, object);
   empty.allow(gripper, body);
-  if (!hand.is_free(empty, at)) return false;  // the fingers open into the bowl's wall
+  if (!hand.is_free(empty, at)) return false;  // e.g. the fingers would open into a bowl's wall
   const double retreat = m_.cfg().retreat;
   for (const Pose& to : {backed(at.tool, retreat), raised(at.tool, retreat)}) {
     if (hand.line_is_free(world, empty, at, to, away) && hand.is_free(empty, away)) return true;
@@ -169,14 +170,14 @@ bool Placing::put_back(const World& world, const Follower& follower, HandPlanner
   return true;
 }
 
-// Where there is a free way: otherwise it stays.
+// The hand stays where it is if no collision-free path exists.
 void Placing::go_home(const World& world, HandPlanner& hand, const HandPose& from,
                       const Pose& object, const Home& home, Rng& rng, Plan& plan) const {
   CollisionQuery query(hand.collisions(), world);
   query.open(hand.hand().gripper);
   query.place(m_.target_body(world.id), object);
-  HandPose there{home.tool,
-                 from.joints};  // the tool counts where the hand floats, the joints of an arm
+  // A floating hand uses the tool pose, an arm its joint positions.
+  HandPose there{home.tool, from.joints};
   there.joints[hand.hand().tool] = home.joints[hand.hand().tool];
   query.set_margin(kMargin);
   if (!hand.is_free(query, from) || !hand.is_free(query, there)) query.set_margin(0);

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
-// Puts down what a hand holds, where the task's PlaceScene says, lets it go and draws back.
+// Plans a placement: puts the held object where the task's PlaceScene says, releases it and
+// retreats.
 
 #include "mjsense/policies/planner/manipulation.h"
 #include "mjsense/policies/planner/refusals.h"
@@ -9,7 +10,8 @@ namespace mjsense {
 
 class Placing {
  public:
-  // Where a hand goes in the end, if there is a free way: joints of arms, X_WT of one that floats.
+  // Final pose of a hand, used if a collision-free path exists: joint positions of an arm, X_WT of
+  // a floating hand.
   struct Home {
     RobotValues joints;
     Pose tool;
@@ -17,22 +19,25 @@ class Placing {
 
   explicit Placing(const Manipulation& shared) : m_(shared) {}
 
-  // A hand that took the object at `at`, as it lies, could put it down so: inverse kinematics alone.
+  // True if a hand that grasps the object at `at`, at its current pose, can reach the place;
+  // inverse kinematics only.
   bool reaches(const World& world, const HandPlanner& hand, const HandPose& at) const;
-  // From where the hand is, with the object at X_TO in it. False, and the plan as it was, if there is no way.
+  // Plans from the current state, with the object at X_TO in the hand. Returns false and leaves the
+  // plan unchanged if there is no path.
   bool plan(const World& world, const PlanRequest& request, const Follower& follower,
             HandPlanner& hand, const Pose& tool_object, const Home& home, Plan& plan) const;
-  // Straight down to what it was taken from, and lets it go, where there is no way to the place. False, and the plan
-  // as it was, if there is something in between.
+  // Lowers the object straight down to its support and releases it, if the place cannot be reached.
+  // Returns false and leaves the plan unchanged if something is in between.
   bool put_back(const World& world, const Follower& follower, HandPlanner& hand,
                 const Pose& tool_object, Plan& plan) const;
 
  private:
-  // X_WO of the object at a place, turned the k-th way from how it hangs at X_WO.
+  // X_WO of the object at a place, with the k-th turn from its orientation in the hand.
   Pose placed(const Pose& object, const ObjectShape& shape, Vec3 place, int k) const;
-  // Height (m) of its lowest point above its origin, as it hangs.
+  // Height (m) of the object's lowest point above its origin, at orientation `object`.
   double underside(const ObjectShape& shape, const Quat& object) const;
-  // Where the open hand gets away from the object that it has let go at X_WO.
+  // True if the open hand can retreat from the object released at X_WO; `away` is the pose after
+  // that.
   bool gets_away(const World& world, HandPlanner& hand, const HandPose& at, const Pose& object,
                  HandPose& away) const;
   bool place_at(const World& world, HandPlanner& hand, CollisionQuery& query, const HandPose& start,

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
-// What a robot is to do next: segments one after the other, each with a phase and what the move
-// groups do in it. Planners make plans; the Follower (follower.h) follows them.
+// A plan: a sequence of segments, each with a phase and the motions of the move groups. Planners
+// make plans; the Follower (follower.h) executes them.
 
 #include <limits>
 #include <span>
@@ -12,37 +12,37 @@
 
 namespace mjsense {
 
-// The tool of a group goes from one pose to another on a screw, then stays.
+// Moves the tool of a group from one pose to another along a screw; afterwards it stays.
 struct ToolMove {
-  int tool = -1;          // group whose leaf it is: an arm, or a gripper on a floating base
-  Pose from;              // X_BT, base frame; X_WT where in_world
-  Twist screw;            // log6(from^-1 to)
-  double seconds = 0;     // of the way
-  bool in_world = false;  // what the base does meanwhile is made up for
-  bool eased = false;     // from rest to rest, instead of at one speed
+  int tool = -1;  // group that has the tool as its leaf: an arm, or a gripper on a floating base
+  Pose from;      // X_BT, base frame; X_WT where in_world
+  Twist screw;    // log6(from^-1 to)
+  double seconds = 0;     // duration of the motion
+  bool in_world = false;  // poses are in the world frame: motion of the base is compensated
+  bool eased = false;     // smooth start and stop instead of constant speed
 };
 
-// Commands of a group along a path; they change linearly between its points, then stay.
+// Commands of a group along a path, linear between its points; after the last point they stay.
 struct CommandPath {
   int group = -1;
-  std::vector<double> times;  // [N] s from the beginning of the segment, rising
-  std::vector<double>
-      points;  // [N, n] as the group's controller takes them (MoveGroup::command_size)
+  std::vector<double> times;  // [N] s from the start of the segment, increasing
+  // [N, n] in the format of the group's controller; n = MoveGroup::command_size.
+  std::vector<double> points;
 };
 
 struct GripperCommand {
-  int gripper = -1;  // group
+  int gripper = -1;  // group index
   double command = 0;
 };
 
-// What is commanded stands until another segment commands the same group.
+// A command stays in effect until a later segment commands the same group.
 struct Segment {
   int phase = 0;
   double duration = 0;  // s
   std::vector<ToolMove> tools;
   std::vector<CommandPath> paths;
   std::vector<GripperCommand> grippers;
-  std::vector<int> holding;  // grippers that hold something: closed on nothing is a failure
+  std::vector<int> holding;  // grippers that must hold an object: the plan fails if one is empty
 
   Segment& grip(int gripper, double command) {
     grippers.push_back({gripper, command});
@@ -55,11 +55,11 @@ struct Segment {
 };
 
 struct Plan {
-  std::vector<Segment> segments;  // none: there is no way
-  std::string refusal;            // then why, for people; "" is allowed
+  std::vector<Segment> segments;  // empty: no plan was found
+  std::string refusal;            // reason for that, shown to users; may be empty
   Pose grasp;                     // X_WT that policies record; kept from plan to plan
-  // There is more to do than can be planned yet: when these segments are done, the planner is asked
-  // for the next stage.
+  // The task needs a further stage that cannot be planned yet. The planner is called for it when
+  // these segments are done.
   bool more = false;
 
   void clear() {
@@ -67,25 +67,26 @@ struct Plan {
     refusal.clear();
     more = false;
   }
-  // The tool goes at `speed` (m/s, and where given `turn` rad/s) and waits for `settle` s. References
-  // to segments hold until the next is added.
+  // Moves the tool at `speed` (m/s) and at most `turn` (rad/s), then waits for `settle` s.
+  // References to segments are valid until the next one is added.
   Segment& move_tool(int phase, int tool, const Pose& from, const Pose& to, double speed,
                      double settle = 0, double turn = std::numeric_limits<double>::infinity());
   // The same with poses in the world frame.
   Segment& move_tool_in_world(int phase, int tool, const Pose& from, const Pose& to, double speed,
                               double settle = 0,
                               double turn = std::numeric_limits<double>::infinity());
-  // From rest to rest, at `speed` and `turn` in the middle; so it takes half as long again. In the world
-  // or, like move_tool(), relative to the base.
+  // Smooth motion from rest to rest that reaches `speed` and `turn` in the middle and so takes 1.5
+  // times as long. Poses are in the world frame or, as for move_tool(), relative to the base.
   Segment& ease_tool(int phase, int tool, const Pose& from, const Pose& to, double speed,
                      double settle, double turn, bool in_world);
-  // One or more groups follow their paths at the same time: seconds of the longest and `settle`.
+  // Groups follow their paths at the same time; the duration is that of the longest path plus
+  // `settle`.
   Segment& move_groups(int phase, std::vector<CommandPath> paths, double settle = 0);
   Segment& wait(int phase, double seconds);
 };
 
-// Of the seconds to each point of a path from the one before: slow at its ends, and never much faster than a
-// moment before or after. What hangs on the hand is heavy.
+// Lengthens the durations between path points, so that the motion is slow at both ends and speeds
+// change gradually: a handle or a held object can be heavy.
 void ease(std::span<double> seconds);
 
 }  // namespace mjsense

@@ -12,7 +12,8 @@
 namespace mjsense {
 namespace {
 
-// The nearest body at or above that of the geom that has a name; of the world the geom.
+// Name of the geom's body or its nearest named ancestor; name of the geom if it belongs to the
+// world body.
 std::string named(const mjModel* m, int geom) {
   int body = m->geom_bodyid[geom];
   while (body > 0 && name_of(m, mjOBJ_BODY, body).empty()) body = m->body_parentid[body];

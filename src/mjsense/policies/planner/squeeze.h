@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
-// What is between two pads before they close.
+// The part of an object's surface between two pads before they close.
 
 #include <algorithm>
 #include <cmath>
@@ -11,17 +11,19 @@
 
 namespace mjsense {
 
-constexpr double kSideGap = 0.006;        // m, free on each side of the object before closing
-constexpr double kLeastSideGap = 0.0025;  // m, the same where the gripper opens hardly wider
-constexpr double kFaceDepth = 0.002;      // m, what counts as one face
-constexpr double kFaceWidth = 0.010;      // m, of the face that both pads touch
-constexpr double kLeastWidth = 0.004;     // m, of an object
+constexpr double kSideGap = 0.006;        // m, gap on each side of the object before closing
+constexpr double kLeastSideGap = 0.0025;  // m, the same for grippers with a small maximum opening
+constexpr double kFaceDepth = 0.002;      // m, points within this depth form one face
+constexpr double kFaceWidth = 0.010;      // m, minimum width of the face that both pads touch
+constexpr double kLeastWidth = 0.004;     // m, minimum width of an object
 
-// Extent of the surface between the pads, and of the faces that they would touch.
+// Extent (m) of the surface between the pads along the closing direction, and the faces that the
+// pads would touch.
 struct Squeeze {
   double low = std::numeric_limits<double>::infinity(), high = -low;
-  double face = 0;   // m, overlap of the two faces across the closing direction
-  double slope = 0;  // how much wider it becomes along the approach: what slopes slips out
+  double face = 0;  // m, overlap of the two faces across the closing direction
+  // increase of the width along the approach (m per m); the object slips out if it is large
+  double slope = 0;
 };
 
 inline Squeeze squeeze(std::span<const Vec3> points, Vec3 center, Vec3 close, Vec3 across,

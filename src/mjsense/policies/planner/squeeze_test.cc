@@ -11,7 +11,7 @@ namespace {
 
 constexpr double kRadius = 0.016, kHalfWidth = 0.008, kHalfLength = 0.009;  // m
 
-// A bar of that radius along x; its points are 1 mm apart.
+// A round bar along x with points 1 mm apart.
 std::vector<Vec3> bar() {
   std::vector<Vec3> points;
   for (int k = 0; k < 100; ++k) {
@@ -22,7 +22,7 @@ std::vector<Vec3> bar() {
   return points;
 }
 
-// From above, the middle of the pads at a height over the bar's axis.
+// Grasp from above; z: height of the pads' middle above the bar's axis.
 Squeeze at_height(double z) {
   return squeeze(bar(), {0, 0, z}, {0, 1, 0}, {1, 0, 0}, {0, 0, -1}, kHalfWidth, kHalfLength);
 }
@@ -35,12 +35,13 @@ TEST(Squeeze, AroundTheMiddleItIsAsWideAsTheBarAndSlopesNowhere) {
 }
 
 //   | |
-//  ( _ )   the ends of the pads hold the top alone, and slip off it
+//  ( _ )   the ends of the pads touch only the top and slip off
 TEST(Squeeze, OnTheTopItSlopes) {
   const Squeeze s = at_height(kRadius);
   EXPECT_LT(s.high - s.low, 1.9 * kRadius);
   EXPECT_GT(s.slope, 0.5);
-  EXPECT_LT(at_height(-kRadius).slope, -0.5);  // wider behind: it is drawn into the hand
+  // narrower towards the tips: closing pulls the bar into the hand
+  EXPECT_LT(at_height(-kRadius).slope, -0.5);
 }
 
 TEST(Squeeze, OfOneRowOfPointsNothingIsKnown) {

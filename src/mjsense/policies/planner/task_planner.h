@@ -1,11 +1,11 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
-// A planner for one kind of task: a class that makes plans. Following them, noticing that they fail,
-// beginning again, giving up and the end are here.
+// Base class of planners for one kind of task. A subclass makes plans; this class follows them,
+// detects failures, retries, gives up and ends the episode.
 //
 //   class MyPlanner final : public TaskPlanner {
 //     std::span<const Phase> phases() const override { ... }
-//     void initialize_planner() override { ... }                   task() and robot() are there
+//     void initialize_planner() override { ... }          // task() and robot() are available
 //     void make_plan(const World& world, const PlanRequest& request, Plan& plan) override {
 //       plan.move_tool(kReach, hand.tool, tool_target(world, hand.tool), goal, 0.2).grip(...);
 //     }
@@ -25,12 +25,12 @@ struct TaskPlannerCfg {
 };
 
 struct PlanRequest {
-  int attempt = 0;  // how often it has begun again in this episode
-  int stage = 0;    // how often Plan::more has been asked for since then
+  int attempt = 0;  // number of retries so far in this episode
+  int stage = 0;    // number of further stages requested by Plan::more in this attempt
 };
 
-// Commands the groups that its plans name; the others hold. An action that gives up is {done,
-// success: false} without commands; before a retry it comes to rest, in a step at least.
+// Commands the groups that its plans name; the others hold. Giving up is the action {done, success:
+// false} without commands. Before a retry the robot comes to rest, which takes at least one step.
 class TaskPlanner : public PlannerPolicy {
  public:
   explicit TaskPlanner(TaskPlannerCfg cfg = {}) : planner_cfg_(cfg), follower_(cfg.follower) {}
@@ -43,25 +43,25 @@ class TaskPlanner : public PlannerPolicy {
   int num_retries(int world) const override { return states_[world].retries; }
   std::string failure(int world) const override;
   Pose grasp_pose(int world) const override { return follower_.plan(world).grasp; }
-  // Why it last began again or gave up; kNone if it never did.
+  // Reason of the last retry or of giving up; kNone if there was none.
   PlanFailure last_failure(int world) const { return states_[world].failure; }
 
  protected:
-  // Throws ValueError for a task or a robot with which it can do nothing.
+  // Throws ValueError for an unsupported task or robot.
   virtual void initialize_planner() = 0;
-  // Fills an empty plan for the world as it stands; no segments: there is no way, it gives up, or
-  // begins again where that was not the first stage, and plan.refusal says why. Worlds plan in
-  // parallel.
+  // Fills an empty plan for the current state of the world. No segments mean that there is no plan:
+  // the planner gives up, or retries if this was not the first stage; plan.refusal is the reason.
+  // Calls for different worlds run in parallel.
   virtual void make_plan(const World& world, const PlanRequest& request, Plan& plan) = 0;
   // Phase while the first plan is made.
   virtual int first_phase() const { return 0; }
-  // A further reason to begin again, looked for in every step.
+  // A further reason for a retry, checked in every step.
   virtual bool gone_wrong(const World& /*world*/) const { return false; }
 
   Task& task() const { return *task_; }
   const Robot& robot() const { return task_->robot(); }
   const Follower& follower() const { return follower_; }
-  // Where a plan begins, X_BT: what is commanded, or where the tool is.
+  // X_BT at the start of a plan: commanded or, without a command, measured.
   Pose tool_target(const World& world, int tool) const {
     return follower_.tool_target(world, tool);
   }
@@ -69,12 +69,12 @@ class TaskPlanner : public PlannerPolicy {
  private:
   struct State {
     bool planned = false;
-    bool stops = false;     // before it begins again
-    bool gives_up = false;  // instead, once it is at rest
+    bool stops = false;     // coming to rest before a retry
+    bool gives_up = false;  // gives up instead, once at rest
     int retries = 0, stage = 0;
     PlanFailure failure = PlanFailure::kNone;
-    bool no_other_way = false;  // and to begin again there was no plan
-    std::string refusal;        // why there was no plan, the last time that there was none
+    bool no_other_way = false;  // the retry found no plan
+    std::string refusal;        // reason of the last time that no plan was found
   };
   bool plan(const World& world);
   void begin_again(const World& world, Action& action);

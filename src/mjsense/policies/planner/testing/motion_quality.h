@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
-// How well a robot moved, and what it was told: looked at after every control step of an episode.
-// Of commands c at control steps dt apart, (c' - c) / dt is a speed, and its change over dt an
-// acceleration: what a robot does that goes evenly from each command to the next.
+// Measures how a robot moves and what is commanded, after every control step of an episode. For
+// commands c at control steps dt apart, (c' - c) / dt is a speed, and its change divided by dt an
+// acceleration: those of a robot that moves linearly from command to command.
 
 #include <algorithm>
 #include <array>
@@ -19,18 +19,19 @@ namespace mjsense {
 
 class MotionQuality {
  public:
-  // Of the joints of all arms.
-  double speed = 0;           // rad/s, greatest
-  double acceleration = 0;    // rad/s^2, greatest between two control steps
+  // Measured at the joints of all arms.
+  double speed = 0;           // rad/s, maximum
+  double acceleration = 0;    // rad/s^2, maximum between two control steps
   double accelerated_at = 0;  // s
-  double depth = 0;           // m, deepest of a contact of the robot with anything
-  std::string deepest;        // between which, and when
-  int self_collisions = 0;    // control steps in which links of the robot met
-  std::string met;            // the last of them
-  // Of commands: joints of arms, rad and s; a base that drives or floats, m and s, rad and s.
+  double depth = 0;           // m, maximum penetration of a contact of the robot with the scene
+  std::string deepest;        // the bodies of that contact, and its time
+  int self_collisions = 0;    // number of control steps with a self-collision of the robot
+  std::string met;            // the last self-collision
+  // Maxima of commands: joints of arms (rad/s, rad/s^2); a mobile or floating base (m/s, m/s^2,
+  // rad/s, rad/s^2).
   struct Greatest {
-    double value = 0, at = 0;  // s
-    int phase = 0;             // of the policy, then
+    double value = 0, at = 0;  // at: s
+    int phase = 0;             // of the policy at that time
     void see(double v, double time, int now) {
       if (v > value) *this = {v, time, now};
     }
@@ -50,7 +51,7 @@ class MotionQuality {
     root_ = model->body_rootid[robot.base_body()];
   }
 
-  // Before the first step: where the robot stands is what it was told last.
+  // Call before the first step: the present state counts as the last command.
   void begin(const World& world) {
     RobotValues now;
     robot_->read_qpos(world, now);
@@ -59,7 +60,7 @@ class MotionQuality {
     time_ = world.time();
   }
 
-  // `action`: as the policy gave it for the step that is over; null: commands are not looked at.
+  // `action`: the policy's action of the last step; null: commands are not measured.
   void look(const World& world, const Action* action = nullptr, int phase = 0) {
     if (action) look_at_commands(world, *action, phase);
     const mjModel* m = world.model;
@@ -101,7 +102,7 @@ class MotionQuality {
       return -1;
     };
     const int one = gripper(query.touching().first);
-    if (one >= 0 && one == gripper(query.touching().second)) return;  // it is closed
+    if (one >= 0 && one == gripper(query.touching().second)) return;  // fingers of a closed gripper
     ++self_collisions;
     const auto link = [&](int geom) { return name_of(m, mjOBJ_BODY, m->geom_bodyid[geom]); };
     met = link(query.touching().first) + " and " + link(query.touching().second) + " at " +
@@ -124,7 +125,7 @@ class MotionQuality {
         continue;
       }
       if (!group.targets_are_qpos()) continue;
-      // What is not commanded is held where it is.
+      // A group without a command holds its position.
       const GroupValues& target = robot_->targets(world.id)[g];
       if (given.given) {
         next[g].set(given.view());

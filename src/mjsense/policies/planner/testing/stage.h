@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
-// For tests of planners: a robot at a table with things on it.
+// Test fixture for planners: a robot at a table with objects on it.
 
 #include <memory>
 
@@ -10,7 +10,7 @@
 
 namespace mjsense {
 
-// A robot at a table, and plain MuJoCo.
+// A robot at a table in plain MuJoCo.
 struct TableStage {
   explicit TableStage(const char* robot_name) {
     TaskCfg cfg = task_cfg(robot_name, "table");
