@@ -196,9 +196,9 @@ def test_why_an_episode_failed_is_in_the_recording(mjsense):
     # Details of one episode stand in parentheses; outcomes are counted without them.
     counted = {name: outcome.split(" (")[0] for name, outcome in outcomes.items()}
     reasons = {counted[name] for name in failed}
-    assert failed and reasons <= {"horizon reached: the object is not lifted", "the policy gave up: found no way"}
+    assert failed and reasons <= {"horizon reached: the object is not lifted", "the policy gave up: found no plan"}
     for outcome in failed.values():
-        assert "found no way" not in outcome or re.search(r" \(\d+ grasps: \d+ (out of reach|in collision|without)", outcome), outcome
+        assert "found no plan" not in outcome or re.search(r" \(\d+ grasps: \d+ (out of reach|in collision|without)", outcome), outcome
     file = json.loads(mjsense("inspect", "data", "--json").stdout)["files"][0]
     assert {name: outcome for outcome, names in file["outcomes"].items() for name in names} == counted
     shown = mjsense("inspect", "data").stdout

@@ -89,7 +89,7 @@ SCENE = """<mujoco><worldbody><body name="ball"><freejoint/><geom size=".1"/><si
     ("record pick --out x --ffmpeg /bin/true", "'/bin/true' has no encoder"),
     ("record pick --out x --config folder", "folder: is a folder, expected a file"),
     ("record pick --out x --config pipe", "pipe: is a pipe, expected a file"),
-    ("record nav_to_obj --out x --robot franka", "needs a base that drives"),
+    ("record nav_to_obj --out x --robot franka", "needs a mobile base"),
     ("record packing --out x --scene table", "scene 'table' has no receptacle"),
     ("record pick --out x --cameras none extra", "extra"),
 ])

@@ -147,7 +147,7 @@ def test_the_robot_of_the_scene_and_its_move_groups():
     class Nobody(Cart):
         robot_entity = "card"
 
-    with pytest.raises(KeyError, match="task 'nobody': no entity that is the robot named 'card'; did you mean 'cart'"):
+    with pytest.raises(KeyError, match="task 'nobody': no robot entity named 'card'; did you mean 'cart'"):
         make(Nobody)
 
 

@@ -136,11 +136,11 @@ def test_the_program_refuses_what_python_computes(robot, tmp_path):
     [
         ('kind = "contakt"\nname = "x"', r"robot\.toml:\d+: no kind of 'sensors\[0\]' named 'contakt'; did you mean 'contact'"),
         ('kind = "camera"\nname = "x"', r"no kind of 'sensors\[0\]' named 'camera'"),
-        ('name = "x"', r"robot\.toml:\d+: 'sensors\[0\]' needs the text 'kind'"),
+        ('name = "x"', r"robot\.toml:\d+: 'sensors\[0\]': 'kind' must be a non-empty string"),
         ('kind = "contact"\nname = "x"', r"robot\.toml:\d+: 'sensors\[0\]': 'primary' is missing"),
         ('kind = "imu"\nname = "x"\npresett = "y"', r"robot\.toml:\d+: no key of 'sensors\[0\]' named 'presett'; did you mean 'preset'"),
         ('kind = "python"\nname = "x"\nclass = "Grip"', r"class is 'Grip': must be 'package\.module:Class'"),
-        ('kind = "python"\nname = "x"', r"'sensors\[0\]' needs the text 'class'"),
+        ('kind = "python"\nname = "x"', r"'sensors\[0\]': 'class' must be a non-empty string"),
         ('kind = "python"\nname = "x"\nclass = "a:B"\ngain = 2', r"no key of 'sensors\[0\]' named 'gain'; available: name, class, args"),
         ('kind = "python"\nname = "x"\nclass = "lab_sensors:Gripp"', r"class 'lab_sensors:Gripp' is not found"),
         ('kind = "python"\nname = "x"\nclass = "lab_sensors:Grip"\nargs = { force = 2 }', r"class 'lab_sensors:Grip' cannot be made"),

@@ -51,12 +51,12 @@ BasePlacement::BasePlacement(const mjModel* m, int base_body, std::span<const in
     for (int j = m->body_jntadr[b]; j < m->body_jntadr[b] + m->body_jntnum[b]; ++j) {
       const int type = m->jnt_type[j];
       if (type != mjJNT_SLIDE && type != mjJNT_HINGE) {
-        fault_ = fmt::format("it hangs on the joint '{}', which is neither a slide nor a hinge",
+        fault_ = fmt::format("the joint '{}' that moves it is neither a slide nor a hinge",
                              name_of(m, mjOBJ_JOINT, j));
         return;
       }
       if (std::ranges::find(joints, j) == joints.end()) {
-        fault_ = fmt::format("the joint '{}' that it moves by is in no move group of kind 'base'",
+        fault_ = fmt::format("the joint '{}' that moves it belongs to no move group of kind 'base'",
                              name_of(m, mjOBJ_JOINT, j));
         return;
       }
@@ -87,7 +87,7 @@ void BasePlacement::write(const StateRow& state, const Pose& base) const {
   }
   if (!fault_.empty())
     throw ValueError(
-        fmt::format("{}: its base '{}' cannot be placed: {}", place_, base_name_, fault_));
+        fmt::format("{}: the base '{}' cannot be placed: {}", place_, base_name_, fault_));
   if (mocap_ >= 0 && is_mocap_) {
     write_vec(base.p, state.mocap_pos + 3 * mocap_);
     write_quat(base.q, state.mocap_quat + 4 * mocap_);
@@ -137,9 +137,9 @@ void BasePlacement::write(const StateRow& state, const Pose& base) const {
   } else if (!stands) {
     const Pose now = root_ * from_root(state);
     throw ValueError(fmt::format(
-        "{}: its base '{}' cannot stand at ({:g}, {:g}, {:g}) turned by ({:g}, {:g}, {:g}, {:g}), "
-        "it is fixed to the world; at best at ({:g}, {:g}, {:g}). Attach it with "
-        "EntityCfg.mocap_base, make the base a mocap body, or give it a free joint",
+        "{}: the base '{}' cannot be placed at ({:g}, {:g}, {:g}), rotation ({:g}, {:g}, {:g}, "
+        "{:g}): it is fixed to the world, and the nearest position is ({:g}, {:g}, {:g}). Attach "
+        "it with EntityCfg.mocap_base, make the base a mocap body, or give it a free joint",
         place_, base_name_, base.p.x, base.p.y, base.p.z, base.q.w, base.q.x, base.q.y, base.q.z,
         now.p.x, now.p.y, now.p.z));
   }

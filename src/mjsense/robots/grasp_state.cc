@@ -10,7 +10,7 @@ namespace mjsense {
 GraspStateSensor::GraspStateSensor(std::string name, BodyRef object, std::vector<Gripper> grippers)
     : Sensor(std::move(name)), object_(std::move(object)), grippers_(std::move(grippers)) {
   if (grippers_.size() > kMaxGrippers) {
-    throw ValueError(fmt::format("sensor '{}': {} grippers, at most {}", this->name(),
+    throw ValueError(fmt::format("sensor '{}': {} grippers: the maximum is {}", this->name(),
                                  grippers_.size(), kMaxGrippers));
   }
 }

@@ -29,7 +29,7 @@ void check_unique(std::string_view place, const char* what, const std::string& n
   if (name.find('/') != std::string::npos)
     throw ValueError(fmt::format("{}: {} '{}': '/' is not allowed in a name", place, what, name));
   if (!seen.insert(name).second)
-    throw ValueError(fmt::format("{}: there are two {}s '{}'", place, what, name));
+    throw ValueError(fmt::format("{}: duplicate {} '{}'", place, what, name));
 }
 
 // Throws KeyError unless the model has every element that `cfg` names.
@@ -57,16 +57,16 @@ void check_references(const RobotCfg& cfg, const mjSpec* spec, const std::string
 
 void validate(const MoveGroupCfg& cfg, std::string_view place) {
   if (!cfg.spread.empty() && cfg.spread.size() != cfg.init.size()) {
-    throw ValueError(fmt::format("{}: '{}' has {} widths of start noise for {} start positions",
-                                 place, cfg.name, cfg.spread.size(), cfg.init.size()));
+    throw ValueError(fmt::format("{}: '{}': spread has {} values, init has {}", place, cfg.name,
+                                 cfg.spread.size(), cfg.init.size()));
   }
   if (!cfg.stooped.empty() && cfg.stooped.size() != cfg.init.size()) {
-    throw ValueError(fmt::format("{}: '{}' has {} stooped positions for {} start positions", place,
-                                 cfg.name, cfg.stooped.size(), cfg.init.size()));
+    throw ValueError(fmt::format("{}: '{}': stooped has {} values, init has {}", place, cfg.name,
+                                 cfg.stooped.size(), cfg.init.size()));
   }
   if (cfg.kind == GroupKind::kBase && !cfg.init.empty()) {
     throw ValueError(
-        fmt::format("{}: '{}' is a base and has start positions: where it stands is the task's",
+        fmt::format("{}: the base '{}' must not have start positions (init): the task places it",
                     place, cfg.name));
   }
   if (cfg.kind != GroupKind::kGripper) return;
@@ -98,7 +98,7 @@ void validate(const RobotCfg& cfg, std::string_view place) {
   }
   if (!cfg.env_state_name.empty() && cfg.env_state_name == cfg.name) {
     throw ValueError(
-        fmt::format("{}: env_state_name '{}' is the robot's own name", place, cfg.name));
+        fmt::format("{}: env_state_name '{}' must differ from the robot's name", place, cfg.name));
   }
 }
 

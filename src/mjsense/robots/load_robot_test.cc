@@ -124,7 +124,7 @@ TEST_F(RobotFile, ErrorsNameFileLineAndKey) {
               HasSubstr(file + ":17: the value of 'groups[0].init' is of a wrong type"));
   EXPECT_THAT(fault(with("name = \"arm\"\n", "")), HasSubstr("'groups[0]': 'name' is missing"));
   EXPECT_THAT(fault(with("[0.1]", "[0.1, 0.2]")),
-              HasSubstr("'arm' has 2 widths of start noise for 1 start positions"));
+              HasSubstr("'arm': spread has 2 values, init has 1"));
   EXPECT_THAT(fault(with("[0.1]", "[-0.1]")), HasSubstr(":18: groups[0]: spread[0] is -0.1"));
   EXPECT_THAT(fault(with("ctrl_dt_ms = 6", "ctrl_dt_ms = 4")), HasSubstr("policy_dt_ms = 66"));
   EXPECT_THAT(fault(with("joint_position_relative", "joint_posision")),

@@ -63,7 +63,7 @@ std::function<void(mjSpec* spec, const std::string& prefix)> use_meshes(
   for (const auto& [body, file] : cfg.files) {
     if (fs::is_regular_file(folder / file)) continue;
     throw ValueError(
-        fmt::format("{}: '{}' is no file; the folder must hold the {} meshes that {} "
+        fmt::format("{}: '{}' is not a file; the folder must contain the {} meshes that {} "
                     "names",
                     who, (folder / file).string(), cfg.files.size(), robot_file));
   }

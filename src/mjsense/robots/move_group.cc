@@ -21,8 +21,8 @@ int dof_width(int joint_type) {
 
 void check_size(const std::string& place, const char* what, std::size_t found) {
   if (found > GroupValues::kMaxSize) {
-    throw ValueError(fmt::format("{}: {} {}, at most {} are possible", place, found, what,
-                                 GroupValues::kMaxSize));
+    throw ValueError(
+        fmt::format("{}: {} {}: the maximum is {}", place, found, what, GroupValues::kMaxSize));
   }
 }
 
@@ -53,7 +53,7 @@ MoveGroup resolve_group(const MoveGroupCfg& cfg, const mjModel* model, const std
   check_size(place, "joint positions", group.qpos.size());
   check_size(place, "actuators", group.actuators.size());
   if (!cfg.init.empty() && cfg.init.size() != group.qpos.size()) {
-    throw ValueError(fmt::format("{}: {} start positions for {} joints that have {} positions",
+    throw ValueError(fmt::format("{}: {} start positions (init) for {} joints with {} positions",
                                  place, cfg.init.size(), cfg.joints.size(), group.qpos.size()));
   }
   if (!cfg.leaf_site.empty()) group.leaf_site = find(mjOBJ_SITE, cfg.leaf_site);

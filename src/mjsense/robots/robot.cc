@@ -16,7 +16,7 @@ namespace {
 
 void check_groups(const std::string& place, std::size_t found) {
   if (found > RobotValues::kMaxGroups) {
-    throw ValueError(fmt::format("{}: {} move groups, at most {} are possible", place, found,
+    throw ValueError(fmt::format("{}: {} move groups: the maximum is {}", place, found,
                                  RobotValues::kMaxGroups));
   }
 }

@@ -76,7 +76,7 @@ RobotCfg scene_robot(const mjModel* m, const std::string& entity, const Actuator
     for (const std::string& name : model_names(m, mjOBJ_BODY)) {
       if (name.find('/') != std::string::npos) entities.insert(name.substr(0, name.find('/')));
     }
-    throw_unknown(place, "entity that is the robot", entity,
+    throw_unknown(place, "robot entity", entity,
                   std::vector<std::string>(entities.begin(), entities.end()));
   }
 
@@ -104,8 +104,8 @@ RobotCfg scene_robot(const mjModel* m, const std::string& entity, const Actuator
     std::set<int> driven;
     for (int i : match_names(patterns, actuators.names, of_group)) {
       if (!owner[i].empty()) {
-        throw ValueError(fmt::format("{}: actuator '{}' is in move group '{}' already", of_group,
-                                     actuators.names[i], owner[i]));
+        throw ValueError(fmt::format("{}: actuator '{}' already belongs to move group '{}'",
+                                     of_group, actuators.names[i], owner[i]));
       }
       owner[i] = name;
       group.actuators.push_back(actuators.names[i]);

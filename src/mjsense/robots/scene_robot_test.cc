@@ -97,11 +97,10 @@ TEST_F(SceneRobot, WithoutACommandControlsStay) {
 }
 
 TEST_F(SceneRobot, WrongNamesAreErrors) {
-  EXPECT_EQ(error("amr", {}),
-            "task 'x': no entity that is the robot named 'amr'; did you mean 'arm'?");
+  EXPECT_EQ(error("amr", {}), "task 'x': no robot entity named 'amr'; did you mean 'arm'?");
   EXPECT_THAT(error("arm", {{"g", {"motr_a"}}}), HasSubstr("task 'x', move group 'g'"));
   EXPECT_THAT(error("arm", {{"g", {"motor_a"}}, {"h", {"motor_.*"}}}),
-              HasSubstr("actuator 'motor_a' is in move group 'g' already"));
+              HasSubstr("actuator 'motor_a' already belongs to move group 'g'"));
 }
 
 }  // namespace

@@ -75,7 +75,7 @@ std::string text_of(const toml::table& table, std::string_view key, const std::s
   const toml::node* node = table.get(key);
   const auto text = node ? node->value_exact<std::string>() : std::nullopt;
   if (!text || text->empty()) {
-    throw ValueError(fmt::format("{}: '{}' needs the text '{}'",
+    throw ValueError(fmt::format("{}: '{}': '{}' must be a non-empty string",
                                  toml_place(path, node ? *node : table), inside, key));
   }
   return *text;

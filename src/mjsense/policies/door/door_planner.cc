@@ -40,14 +40,14 @@ void DoorPlanner::initialize_planner() {
   group_ = driving_base(robot());
   if (group_ < 0 || !door_->routes())
     throw ValueError(
-        fmt::format("the door planner needs a base that drives; that of robot '{}' does not "
-                    "(`mjsense robots` says which drive)",
+        fmt::format("the door planner needs a mobile base; robot '{}' has none "
+                    "(see `mjsense robots`)",
                     robot().name()));
   motions_ = std::make_unique<DoorMotions>(task().model(), robot(),
                                            DoorFloor{&door_->open_floor(), &door_->trunk()});
   if (motions_->hands().empty())
     throw ValueError(fmt::format(
-        "the door planner needs an arm with a gripper; robot '{}' lacks one", robot().name()));
+        "the door planner needs an arm with a gripper; robot '{}' has none", robot().name()));
   expected_.assign(task().num_worlds(), {});
   tool_.assign(task().num_worlds(), -1);
   goal_.assign(task().num_worlds(), cfg_.open);
@@ -82,7 +82,7 @@ void DoorPlanner::make_plan(const World& world, const PlanRequest& request, Plan
     if (motion) return open_door(world, *motion, plan);
     // The base has missed the planned pose, and no plan works from here: try another pose.
     if (request.stage > first + kPlaces) {
-      plan.refusal = "no arm can open the door free of collisions from where the base stands";
+      plan.refusal = "no collision-free motion of an arm opens the door from the current base pose";
       return;
     }
   }
@@ -90,8 +90,7 @@ void DoorPlanner::make_plan(const World& world, const PlanRequest& request, Plan
       !approach(world, cfg_.enough, cfg_.margin, plan) &&
       !approach(world, cfg_.enough, cfg_.tight, plan)) {
     plan.clear();
-    plan.refusal =
-        "no base placement that it can drive to lets an arm open the door free of collisions";
+    plan.refusal = "no reachable base pose allows a collision-free opening of the door";
   }
 }
 

@@ -40,8 +40,8 @@ void NavPlanner::initialize_planner() {
                                  task().name()));
   if (!nav_->routes())
     throw ValueError(
-        fmt::format("the navigation planner needs a base that drives; that of robot '{}' does not "
-                    "(`mjsense robots` says which drive)",
+        fmt::format("the navigation planner needs a mobile base; robot '{}' has none "
+                    "(see `mjsense robots`)",
                     robot().name()));
   group_ = driving_base(robot());
   tried_.assign(task().num_worlds(), {});
@@ -106,8 +106,7 @@ void NavPlanner::make_plan(const World& world, const PlanRequest& request, Plan&
   }
   if (way.size() < 2) {
     plan.more = false;
-    plan.refusal =
-        "no path of the base leads to where the camera sees the object and that was not tried";
+    plan.refusal = "no reachable base pose is left from which the camera sees the object";
     return;
   }
   plan.move_groups(0, {base_path(group_, way, cfg_.speeds)}, 0.4);

@@ -60,7 +60,7 @@ TEST(NavPlanner, PlansAgainWhereTheBaseIsNotWhereItWasSent) {
     d.data->qpos[base[1]] = sent.values[1];
     mj_forward(d.model, d.data.get());
     d.planner.act(d.world, action);
-    EXPECT_EQ(d.planner.failure(0), push < 0.35 ? "" : "things did not move as planned");
+    EXPECT_EQ(d.planner.failure(0), push < 0.35 ? "" : "the motion deviated from the plan");
   }
 }
 

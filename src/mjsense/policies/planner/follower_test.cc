@@ -296,7 +296,7 @@ TEST(TaskPlanner, AStageWithoutAWayBeginsAgainThenGivesUp) {
   EXPECT_EQ(action.success, std::optional<bool>(false));
   EXPECT_EQ(planner.num_retries(0), 3);
   EXPECT_EQ(planner.last_failure(0), PlanFailure::kUnplanned);
-  EXPECT_EQ(planner.failure(0), "found no way");
+  EXPECT_EQ(planner.failure(0), "found no plan");
   EXPECT_EQ(planner.requests.size(), 8u);
 }
 
@@ -326,7 +326,7 @@ TEST(TaskPlanner, SaysWhatWentWrongAndThatThereWasNoOtherWay) {
   }
   EXPECT_EQ(action.success, std::optional<bool>(false));
   EXPECT_EQ(planner.failure(0),
-            "the hand held nothing, then it found no way (nothing to close on)");
+            "the hand held nothing, then it found no plan (nothing to close on)");
   planner.reset(stage.world);
   EXPECT_EQ(planner.failure(0), "") << "another episode";
 }

@@ -10,7 +10,8 @@ namespace {
 
 const GraspScene& grasp_scene_of(const Task& task) {
   if (const GraspScene* scene = task.grasp_scene()) return *scene;
-  throw ValueError(fmt::format("policy 'planner' picks; it cannot do task '{}'", task.name()));
+  throw ValueError(fmt::format(
+      "policy 'planner' supports picking tasks only; it cannot do task '{}'", task.name()));
 }
 
 }  // namespace
@@ -22,8 +23,9 @@ Manipulation::Manipulation(const Task& task, const ManipulationPlannerCfg& cfg)
     grippers_.emplace_back(task.model(), robot(), hand.gripper);
   }
   if (hands_.empty())
-    throw ValueError(fmt::format(
-        "policy 'planner' needs an arm and a gripper; robot '{}' lacks one", robot().name()));
+    throw ValueError(
+        fmt::format("policy 'planner' needs an arm and a gripper; robot '{}' does not have both",
+                    robot().name()));
 }
 
 Pose Manipulation::object_pose(const World& world) const {

@@ -18,12 +18,12 @@ void OpeningPlanner::initialize_planner() {
   opening_ = dynamic_cast<const OpeningTask*>(&task());
   if (!opening_)
     throw ValueError(
-        fmt::format("policy 'planner' opens and closes what task 'open' or 'close' names; it "
-                    "cannot do task '{}'",
+        fmt::format("policy 'planner': the opening planner supports tasks 'open' and 'close'; "
+                    "it cannot do task '{}'",
                     task().name()));
   if (opening_->reach().hands().empty())
     throw ValueError(fmt::format(
-        "policy 'planner' needs a gripper on an arm or one that floats; robot '{}' has none",
+        "policy 'planner' needs a gripper on an arm or a floating gripper; robot '{}' has none",
         robot().name()));
   ways_.assign(task().num_worlds(), {});
 }
@@ -134,7 +134,7 @@ void OpeningPlanner::make_plan(const World& world, const PlanRequest& request, P
     }
   }
   if (!found) {
-    plan.refusal = "no grasp of the handle leads free of collisions along its whole path";
+    plan.refusal = "no grasp of the handle allows a collision-free motion along its whole path";
     return;
   }
   way = *std::move(found);

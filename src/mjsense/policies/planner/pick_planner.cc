@@ -41,17 +41,19 @@ bool PickPlanner::can_use(const Robot& robot) {
 void PickPlanner::initialize_planner() {
   scene_ = task().grasp_scene();
   if (!scene_)
-    throw ValueError(fmt::format("policy 'planner' picks; it cannot do task '{}'", task().name()));
+    throw ValueError(fmt::format(
+        "policy 'planner' supports picking tasks only; it cannot do task '{}'", task().name()));
   if (can_use(robot())) {
     gripper_shape_ = std::make_unique<GripperShape>(task().model(), robot(), robot().gripper());
     return;
   }
   if (robot().arm() < 0 || robot().gripper() < 0)
-    throw ValueError(fmt::format(
-        "policy 'planner' needs an arm and a gripper; robot '{}' lacks one", robot().name()));
+    throw ValueError(
+        fmt::format("policy 'planner' needs an arm and a gripper; robot '{}' does not have both",
+                    robot().name()));
   throw ValueError(
-      fmt::format("policy 'planner' moves the tool by the arm alone; that of robot '{}' moves "
-                  "with others too",
+      fmt::format("policy 'planner' moves the tool by the joints of the arm only; the tool of "
+                  "robot '{}' also moves with other groups",
                   robot().name()));
 }
 

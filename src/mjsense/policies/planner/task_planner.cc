@@ -9,17 +9,17 @@ const char* text_of(PlanFailure failure) {
     case PlanFailure::kNone:
       return "";
     case PlanFailure::kUnplanned:
-      return "found no way";
+      return "found no plan";
     case PlanFailure::kToolAway:
-      return "the tool was held off its way";
+      return "the tool deviated from its path";
     case PlanFailure::kToolTurned:
-      return "the tool was turned off its way";
+      return "the tool's rotation deviated from its path";
     case PlanFailure::kDropped:
       return "the hand held nothing";
     case PlanFailure::kUnreachable:
-      return "the arm did not reach along its way";
+      return "the arm could not reach all of its path";
     case PlanFailure::kAstray:
-      return "things did not move as planned";
+      return "the motion deviated from the plan";
   }
   return "";
 }
@@ -69,7 +69,7 @@ std::string TaskPlanner::failure(int world) const {
   const State& state = states_[world];
   std::string text = text_of(state.failure);
   const bool unplanned = state.failure == PlanFailure::kUnplanned;
-  if (state.no_other_way && !unplanned) text += ", then it found no way";
+  if (state.no_other_way && !unplanned) text += ", then it found no plan";
   if ((state.no_other_way || unplanned) && !state.refusal.empty())
     text += " (" + state.refusal + ")";
   return text;

@@ -100,13 +100,13 @@ void ActuatedController::begin(const World& /*world*/, std::span<const double> t
 void ActuatedController::need_position_servos(const ControllerInit& init, const char* kind,
                                               int count) const {
   if (count > 0 && size() != count) {
-    throw ValueError(fmt::format("{}: the controller '{}' drives {} actuators, the group has {}",
+    throw ValueError(fmt::format("{}: the controller '{}' needs {} actuators; the group has {}",
                                  init.place, kind, count, size()));
   }
   for (int a : group_.actuators) {
     if (is_position_servo(model_, a)) continue;
     throw ValueError(fmt::format(
-        "{}: the controller '{}' needs position servos of joints, the actuator '{}' is none",
+        "{}: the controller '{}' needs position servos of joints; the actuator '{}' is not one",
         init.place, kind, name_of(model_, mjOBJ_ACTUATOR, a)));
   }
 }

@@ -253,7 +253,7 @@ TEST(Controllers, MocapBasesGoNoFasterThanTheyMay) {
     r.play({1, 0, 0, 0, 0, 0, 0});
     FAIL();
   } catch (const ValueError& e) {
-    EXPECT_THAT(e.what(), HasSubstr("is no rotation"));
+    EXPECT_THAT(e.what(), HasSubstr("is not a rotation"));
   }
 }
 
@@ -267,15 +267,15 @@ TEST(Controllers, SayWhatTheyNeed) {
     }
   };
   EXPECT_THAT(fault(kPositions, group_of(HolonomicBaseCfg{})),
-              HasSubstr("robot 'small', move group 'g': the controller 'holonomic_base' drives 3 "
-                        "actuators, the group has 2"));
+              HasSubstr("robot 'small', move group 'g': the controller 'holonomic_base' needs 3 "
+                        "actuators; the group has 2"));
   EXPECT_THAT(fault(two_joints(R"(<motor name="a" joint="a"/><motor name="b" joint="b"/>)"),
                     group_of(JointPositionRelativeCfg{})),
-              HasSubstr("needs position servos of joints, the actuator 'robot_0/a' is none"));
+              HasSubstr("needs position servos of joints; the actuator 'robot_0/a' is not one"));
   MoveGroupCfg mocap;
   mocap.kind = GroupKind::kBase;
   mocap.controller = MocapBaseCfg{};
-  EXPECT_THAT(fault(kPositions, mocap), HasSubstr("the base 'robot_0/base' is none"));
+  EXPECT_THAT(fault(kPositions, mocap), HasSubstr("the base 'robot_0/base' is not one"));
   mocap.controller = FreeBaseCfg{"target"};
   EXPECT_THAT(fault(kPositions, mocap), HasSubstr("needs a free joint"));
 }
@@ -302,7 +302,7 @@ TEST(Bases, FixedOnesSayWhatWouldCarryThem) {
     robot.write_start(state_row(data.get()), Pose{{1, 2, 2}, {}}, rng);
     FAIL();
   } catch (const ValueError& e) {
-    EXPECT_THAT(e.what(), HasSubstr("its base 'robot_0/base' cannot stand at (1, 2, 2)"));
+    EXPECT_THAT(e.what(), HasSubstr("the base 'robot_0/base' cannot be placed at (1, 2, 2)"));
     EXPECT_THAT(e.what(), HasSubstr("mocap_base"));
   }
 }

@@ -50,8 +50,8 @@ class Wheels final : public DifferentialBase {
     for (int a : group.actuators) {
       if (is_velocity_servo(init.model, a)) continue;
       throw ValueError(
-          fmt::format("{}: the controller 'differential_base' of two wheels needs velocity servos, "
-                      "the actuator '{}' is none",
+          fmt::format("{}: the controller 'differential_base' of two wheels needs velocity servos; "
+                      "the actuator '{}' is not one",
                       init.place, name_of(init.model, mjOBJ_ACTUATOR, a)));
     }
   }

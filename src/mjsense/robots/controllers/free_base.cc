@@ -33,13 +33,14 @@ std::unique_ptr<Controller> make_kind(const FreeBaseCfg& cfg, const MoveGroup& /
   const int joint = m->body_jntnum[base] == 1 ? m->body_jntadr[base] : -1;
   if (joint < 0 || m->jnt_type[joint] != mjJNT_FREE) {
     throw ValueError(
-        fmt::format("{}: the controller 'free_base' needs a free joint, the base '{}' "
+        fmt::format("{}: the controller 'free_base' needs a free joint; the base '{}' "
                     "has none",
                     init.place, name_of(m, mjOBJ_BODY, base)));
   }
   const int target = resolve(m, mjOBJ_BODY, init.prefix + cfg.target, init.place);
   if (m->body_mocapid[target] < 0) {
-    throw ValueError(fmt::format("{}: the target '{}' is no mocap body", init.place, cfg.target));
+    throw ValueError(
+        fmt::format("{}: the target '{}' is not a mocap body", init.place, cfg.target));
   }
   const double* q0 = m->qpos0 + m->jnt_qposadr[joint];
   const Pose X_WB{vec3(q0), quat(q0 + 3)};

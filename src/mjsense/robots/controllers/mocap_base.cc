@@ -15,7 +15,7 @@ std::unique_ptr<Controller> make_kind(const MocapBaseCfg& cfg, const MoveGroup& 
   const int mocap = init.model->body_mocapid[init.base_body];
   if (mocap < 0) {
     throw ValueError(
-        fmt::format("{}: the controller 'mocap_base' needs a mocap body, the base '{}' is none",
+        fmt::format("{}: the controller 'mocap_base' needs a mocap body; the base '{}' is not one",
                     init.place, name_of(init.model, mjOBJ_BODY, init.base_body)));
   }
   return std::make_unique<PoseTarget>(mocap, Pose{}, cfg.max_speed, cfg.max_turn, init);

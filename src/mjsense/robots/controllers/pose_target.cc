@@ -46,8 +46,8 @@ void PoseTarget::command(const World& world, std::span<const double> command,
   const double size = q.w * q.w + q.x * q.x + q.y * q.y + q.z * q.z;
   if (!(size > 1e-12)) {
     throw ValueError(
-        fmt::format("{}: the command ({}, {}, {}, {}) is no rotation; expected x, y, z "
-                    "and w, x, y, z",
+        fmt::format("{}: the quaternion ({}, {}, {}, {}) of the command is not a rotation; a "
+                    "command is x, y, z and the quaternion w, x, y, z",
                     place_, q.w, q.x, q.y, q.z));
   }
   goals_[world.id] = {true, {vec3(command.data()), normalized(q)}};
