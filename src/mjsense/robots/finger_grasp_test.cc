@@ -45,28 +45,28 @@ struct Fingers : testing::Test {
   MoveGroup gripper;
 };
 
-TEST_F(Fingers, BothMustTouch) {
+TEST_F(Fingers, BothFingersMustTouch) {
   EXPECT_TRUE(touch(0, 0, 0));
-  EXPECT_FALSE(touch(0, 0.004, 0)) << "the left alone";
-  EXPECT_FALSE(touch(0, -0.004, 0)) << "the right alone";
-  EXPECT_FALSE(touch(0.2, 0, 0)) << "none";
+  EXPECT_FALSE(touch(0, 0.004, 0)) << "only the left finger touches";
+  EXPECT_FALSE(touch(0, -0.004, 0)) << "only the right finger touches";
+  EXPECT_FALSE(touch(0.2, 0, 0)) << "no finger touches";
 }
 
-TEST_F(Fingers, WhatHangsOnThemCounts) {
-  EXPECT_TRUE(touch(-0.1, 0, 0)) << "the knob of the box";
+TEST_F(Fingers, ChildBodiesCount) {
+  EXPECT_TRUE(touch(-0.1, 0, 0)) << "the knob is a child of the box";
   EXPECT_FALSE(touch(0, 0, 0, "knob")) << "the box is not below its knob";
   EXPECT_TRUE(touch(-0.1, 0, 0, "knob"));
-  EXPECT_FALSE(touch(0, 0.0042, 0.03)) << "the tip alone, at the height of no other finger";
+  EXPECT_FALSE(touch(0, 0.0042, 0.03)) << "only the tip of the left finger touches";
 }
 
-TEST_F(Fingers, OtherTouchesDoNot) {
-  EXPECT_FALSE(touch(0.49, 0, 0)) << "a wall";
+TEST_F(Fingers, OtherContactsDoNotCount) {
+  EXPECT_FALSE(touch(0.49, 0, 0)) << "the box touches the wall only";
   EXPECT_TRUE(touch(0, 0, 0));
   EXPECT_FALSE(fingers_touch(w.world(), gripper, -1));
   std::swap(gripper.pad_sites[0], gripper.pad_sites[1]);
-  EXPECT_TRUE(touch(0, 0, 0)) << "in whatever order";
+  EXPECT_TRUE(touch(0, 0, 0)) << "the order of the pads does not matter";
   gripper.pad_sites[1] = -1;
-  EXPECT_FALSE(touch(0, 0, 0)) << "without pads";
+  EXPECT_FALSE(touch(0, 0, 0)) << "a gripper without pads";
 }
 
 }  // namespace

@@ -44,7 +44,7 @@ struct Fr3 : testing::Test {
   std::unique_ptr<Chain> chain;
 };
 
-TEST_F(Fr3, ForwardKinematicsAndJacobianAreMuJoCos) {
+TEST_F(Fr3, ForwardKinematicsAndJacobianAgreeWithMuJoCo) {
   Rng rng(1, 0, 0, 0);
   std::array<double, 6 * 7> jac;
   std::vector<double> jacp(3 * model->nv), jacr(3 * model->nv);
@@ -70,7 +70,7 @@ TEST_F(Fr3, ForwardKinematicsAndJacobianAreMuJoCos) {
 }
 
 // A chain with a slide joint and with joints that are offset from their body's origin.
-TEST(Chain, OfOffsetJointsIsMuJoCos) {
+TEST(Chain, OffsetJointsAgreeWithMuJoCo) {
   const char* xml = R"(<mujoco><worldbody><body name="base" pos=".1 0 .2" euler="10 0 20">
       <geom size=".1"/>
       <body pos="0 .1 .3" euler="0 30 0"><joint name="a" pos=".1 -.2 .05" axis=".2 1 0" range="-90 90"/><geom size=".1"/>
@@ -159,7 +159,7 @@ TEST_F(Fr3, InverseKinematicsGivesUpOutOfReach) {
 }
 
 // The early test of the link lengths never rejects a reachable pose.
-TEST_F(Fr3, NothingThatIsReachedIsOutOfReach) {
+TEST_F(Fr3, ReachablePosesAreNeverOutOfReach) {
   Rng rng(5, 0, 0, 0);
   for (int trial = 0; trial < 1000; ++trial) {
     std::array<double, 7> q = random_configuration(rng);
@@ -168,11 +168,11 @@ TEST_F(Fr3, NothingThatIsReachedIsOutOfReach) {
     }
     bool moves[7] = {true, true, true, true, true, true, true};
     for (int i = 0; i < trial % 5; ++i) moves[i] = false;
-    EXPECT_TRUE(chain->ik(chain->fk(q), q, 1, 1e-4, moves)) << "it is there";
+    EXPECT_TRUE(chain->ik(chain->fk(q), q, 1, 1e-4, moves)) << "the start is already at the target";
   }
 }
 
-TEST_F(Fr3, JointsThatMayNotMoveStandStill) {
+TEST_F(Fr3, FixedJointsDoNotMove) {
   Rng rng(6, 0, 0, 0);
   int solved = 0;
   for (int trial = 0; trial < 200; ++trial) {

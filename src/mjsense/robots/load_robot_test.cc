@@ -81,7 +81,7 @@ struct RobotFile : ::testing::Test {
   mjsense::testing::TempDir folder;
 };
 
-TEST_F(RobotFile, SaysWhatARobotIs) {
+TEST_F(RobotFile, DefinesARobot) {
   const RobotCfg cfg = load(kToml);
   EXPECT_EQ(cfg.name, "lifter");
   EXPECT_EQ(cfg.file, path());
@@ -94,7 +94,7 @@ TEST_F(RobotFile, SaysWhatARobotIs) {
   EXPECT_EQ(std::get<JointPositionRelativeCfg>(cfg.groups[0].controller).threshold, 0.001);
 }
 
-TEST_F(RobotFile, ItsPartsHangWhereTheyShould) {
+TEST_F(RobotFile, PartsAreAttachedAtTheirPoses) {
   const RobotCfg cfg = load(kToml);
   SceneCfg scene_cfg;
   EntityCfg entity;
@@ -168,7 +168,7 @@ pad_sites = ["flange", "tool/tip"]
   EXPECT_THAT(fault(with("arm.xml", "amr.xml")), HasSubstr("amr.xml"));
 }
 
-TEST(RobotNames, AreKnownOrTheNearestIsSaid) {
+TEST(RobotNames, AreFoundOrTheNearestIsSuggested) {
   for (const std::string& name : robot_names()) EXPECT_EQ(robot_cfg(name).name, name);
   try {
     robot_cfg("frnka");

@@ -88,7 +88,7 @@ TEST(FrankaMeshes, AnIncompleteFolderIsAnError) {
 
 // Camera extrinsics (m, in the frame of their link) and vertical fields of view (degrees) that
 // users calibrate against.
-TEST(FrankaModel, CamerasStandWhereTheyShould) {
+TEST(FrankaModel, CamerasHaveTheirPosesAndFieldsOfView) {
   const auto scene = scene_of(robot_cfg("franka"));
   const mjModel* m = scene->model();
   const struct {
@@ -130,7 +130,7 @@ TEST(FrankaModel, CamerasStandWhereTheyShould) {
   EXPECT_EQ(cfg.cameras[1].name, "exo_camera_1");
 }
 
-TEST(FrankaModel, MassesArePublishedOnes) {
+TEST(FrankaModel, MassesAreThePublishedOnes) {
   const auto scene = scene_of(robot_cfg("franka"));
   const mjModel* m = scene->model();
   const double masses[] = {2.3966,       2.9274653454, 2.9355370338, 2.2449013699,

@@ -55,7 +55,7 @@ struct Franka : testing::Test {
   World worlds[2];
 };
 
-TEST_F(Franka, GroupsAreThoseOfTheStation) {
+TEST_F(Franka, HasThreeMoveGroups) {
   ASSERT_EQ(robot.groups().size(), 3u);
   EXPECT_EQ(robot.groups()[0].name, "base");
   EXPECT_FALSE(robot.groups()[0].controlled());
@@ -78,7 +78,7 @@ TEST_F(Franka, StartsNearItsStartConfigurationAndStaysThere) {
 }
 
 // Start positions are clipped to the joint limits.
-TEST_F(Franka, StartsNeverLieBeyondTheLimits) {
+TEST_F(Franka, StartsAreClippedToTheLimits) {
   RobotCfg cfg = robot_cfg("franka");
   MoveGroupCfg& arm = cfg.groups[1];
   double low[7], high[7];
@@ -101,7 +101,8 @@ TEST_F(Franka, StartsNeverLieBeyondTheLimits) {
       EXPECT_GE(q, low[i]);
       EXPECT_LE(q, high[i]);
       EXPECT_EQ(data[0]->qvel[near.groups()[1].dofs[i]], 0) << "it starts at rest";
-      EXPECT_EQ(data[0]->ctrl[near.groups()[1].actuators[i]], q) << "and is told to stay";
+      EXPECT_EQ(data[0]->ctrl[near.groups()[1].actuators[i]], q)
+          << "its target is the start position";
       ++(q == low[i] || q == high[i] ? at_limit : inside)[i];
     }
   }
@@ -112,7 +113,7 @@ TEST_F(Franka, StartsNeverLieBeyondTheLimits) {
 }
 
 // The noise of each joint covers its own width on both sides.
-TEST_F(Franka, StartNoiseIsAsWideAsItSays) {
+TEST_F(Franka, StartNoiseHasItsWidth) {
   const double init[] = {0, -0.7853, 0, -2.35619, 0, 1.57079, 0};
   const double spread[] = {0.025, 0.05, 0.075, 0.1, 0.125, 0.15, 0.175};
   double least[7] = {}, most[7] = {};
@@ -183,7 +184,7 @@ TEST_F(Franka, GripperOpensAndClosesOnCommand) {
   EXPECT_NEAR(robot.opening(worlds[0], g), 0.087, 0.001);
 }
 
-TEST_F(Franka, LeftOutGroupsHoldWhereTheyWere) {
+TEST_F(Franka, GroupsWithoutACommandHold) {
   Action action;
   auto target = arm_qpos(0);
   target[0] += 0.3;
@@ -310,7 +311,7 @@ TEST_F(Franka, ActionNoiseIsBoundedAtSingularPostures) {
   EXPECT_GT(farthest, 0.01);
 }
 
-TEST_F(Franka, UnknownNamesAreErrorsWithTheNearest) {
+TEST_F(Franka, UnknownNamesAreErrorsWithASuggestion) {
   try {
     robot.group_index("griper");
     FAIL();

@@ -107,7 +107,7 @@ struct EveryRobot : testing::TestWithParam<std::string> {
   Alone alone{GetParam()};
 };
 
-TEST_P(EveryRobot, StandsWhereItIsPut) {
+TEST_P(EveryRobot, TheBaseCanBePlacedAnywhere) {
   Rng rng(1, 0, 0, 0);
   for (int k = 0; k < 20; ++k) {
     const Pose base = k < 10 ? on_the_floor(rng) : anywhere(rng);
@@ -116,7 +116,7 @@ TEST_P(EveryRobot, StandsWhereItIsPut) {
   }
 }
 
-TEST_P(EveryRobot, ForwardKinematicsAreMuJoCosWhereverItStands) {
+TEST_P(EveryRobot, ForwardKinematicsAgreeWithMuJoCo) {
   const Robot& robot = *alone.robot;
   Rng rng(2, 0, 0, 0);
   for (int k = 0; k < 100; ++k) {
@@ -135,7 +135,7 @@ TEST_P(EveryRobot, ForwardKinematicsAreMuJoCosWhereverItStands) {
 
 // Targets are the leaf poses of random configurations of the arm; the other groups stay at their
 // start positions.
-TEST_P(EveryRobot, InverseKinematicsReachesWhatCanBeReached) {
+TEST_P(EveryRobot, InverseKinematicsReachesReachablePoses) {
   const Robot& robot = *alone.robot;
   alone.start();
   for (std::size_t g = 0; g < robot.groups().size(); ++g) {
@@ -186,7 +186,7 @@ TEST_P(EveryRobot, WithoutACommandItStaysWhereItStarts) {
   expect_same(robot.base_pose(alone.world), base, 2e-3, "base");
 }
 
-TEST_P(EveryRobot, ArmsGoWhereTheyAreTold) {
+TEST_P(EveryRobot, ArmsReachTheirTargets) {
   const Robot& robot = *alone.robot;
   Rng rng(5, 0, 0, 0);
   alone.start(on_the_floor(rng));
@@ -234,10 +234,10 @@ TEST_P(EveryRobot, GrippersOpenAndClose) {
   }
 }
 
-TEST_P(EveryRobot, AMovingBaseGoesWhereItIsTold) {
+TEST_P(EveryRobot, AMobileBaseReachesItsTarget) {
   const Robot& robot = *alone.robot;
   const int base = alone.find(GroupKind::kBase);
-  if (base < 0 || !robot.groups()[base].controlled()) GTEST_SKIP() << "its base does not move";
+  if (base < 0 || !robot.groups()[base].controlled()) GTEST_SKIP() << "the base is not mobile";
   alone.start({{1, 0.5, 0}, axis_angle({0, 0, 1}, 0.4)});
   const Pose goal{{1.4, 0.2, 0}, axis_angle({0, 0, 1}, 0.9)};
   Action action;
@@ -264,14 +264,14 @@ TEST_P(EveryRobot, AMovingBaseGoesWhereItIsTold) {
 INSTANTIATE_TEST_SUITE_P(Robots, EveryRobot, testing::ValuesIn(robot_names()),
                          [](const auto& info) { return info.param; });
 
-TEST(Robots, AreTheseByName) {
+TEST(Robots, HaveTheseNames) {
   EXPECT_THAT(robot_names(),
               testing::ElementsAre("bimanual_yam", "floating_rum", "franka", "franka_hand",
                                    "i2rt_yam", "mobile_franka", "rby1"));
 }
 
 // The groups, their order and their numbers of qpos and command values are those of MolmoSpaces.
-TEST(Robots, GroupsAreMolmoSpaces) {
+TEST(Robots, GroupsMatchMolmoSpaces) {
   const auto groups = [](const char* name) {
     const Alone alone(name);
     std::string text;

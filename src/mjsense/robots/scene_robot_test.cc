@@ -53,7 +53,7 @@ struct SceneRobot : testing::Test {
   }
 };
 
-TEST_F(SceneRobot, IsWhateverHasActuators) {
+TEST_F(SceneRobot, HasAllActuatorsOfTheEntity) {
   const RobotCfg cfg = scene_robot(model, "arm", {}, "");
   EXPECT_EQ(cfg.base_body, "mocap_base");
   ASSERT_EQ(cfg.groups.size(), 2u);
@@ -67,7 +67,7 @@ TEST_F(SceneRobot, IsWhateverHasActuators) {
   EXPECT_THAT(whole.groups[1].actuators, ElementsAre("arm/motor_a", "arm/motor_b", "arm/fingers"));
 }
 
-TEST_F(SceneRobot, GroupsHaveTheJointsThatTheyDrive) {
+TEST_F(SceneRobot, GroupsHaveTheJointsOfTheirActuators) {
   const RobotCfg cfg =
       scene_robot(model, "arm", {{"gripper", {"fingers"}}, {"turns", {"motor_.*"}}}, "");
   EXPECT_THAT(cfg.groups[1].joints, ElementsAre("left", "right"));

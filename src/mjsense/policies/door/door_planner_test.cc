@@ -23,7 +23,7 @@ struct DoorPlan : testing::Test, PlayedTask<DoorOpeningTask> {
 };
 
 // DoorGeometry::carried() agrees with MuJoCo's kinematics of the door joints.
-TEST_F(DoorPlan, TheHandleIsCarriedAsTheJointsCarryIt) {
+TEST_F(DoorPlan, HandleMotionAgreesWithMuJoCosKinematics) {
   start(0);
   const Door& door = task.door(0);
   const DoorGeometry geometry(model, data.get(), door, task.robot().base_pose(world).p);
@@ -37,7 +37,7 @@ TEST_F(DoorPlan, TheHandleIsCarriedAsTheJointsCarryIt) {
   EXPECT_LT(angle_between(expected.q, quat(data->xquat + 4 * door.handle)), 1e-6);
 }
 
-TEST_F(DoorPlan, AHandClosesAcrossTheBarOnTheRobotsSide) {
+TEST_F(DoorPlan, GraspsCloseAcrossTheBarOnTheRobotsSide) {
   std::set<bool> sides;
   for (int episode = 0; episode < 8; ++episode) {
     start(episode);
@@ -50,15 +50,16 @@ TEST_F(DoorPlan, AHandClosesAcrossTheBarOnTheRobotsSide) {
     ASSERT_TRUE(grasps);
     for (const Pose& pose : grasps->poses) {
       EXPECT_GT(dot(pose.p - leaf_middle(model, data.get(), door), geometry.away), 0.04);
-      EXPECT_NEAR(dot(rotate(pose.q, {0, 0, 1}), geometry.away), -1, 1e-9) << "it comes straight";
+      EXPECT_NEAR(dot(rotate(pose.q, {0, 0, 1}), geometry.away), -1, 1e-9)
+          << "the approach is perpendicular to the leaf";
       EXPECT_NEAR(std::abs(rotate(pose.q, closing).z), 1, 1e-6)
-          << "the bar lies, the fingers close up and down";
+          << "the bar is horizontal, so the fingers close vertically";
     }
   }
   EXPECT_EQ(sides.size(), 2u);
 }
 
-TEST_F(DoorPlan, OpensIt) {
+TEST_F(DoorPlan, OpensTheDoor) {
   DoorPlanner planner;
   task.register_policy(planner);
   int opened = 0;

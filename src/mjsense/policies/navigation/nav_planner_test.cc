@@ -24,7 +24,7 @@ struct Driven : PlayedTask<NavToObjTask> {
   NavPlanner planner;
 };
 
-TEST(NavPlanner, ArrivesWhereTheObjectIsSeenWithoutTouchingAnything) {
+TEST(NavPlanner, ReachesAPoseThatSeesTheObjectWithoutContact) {
   for (const char* robot : {"rby1", "mobile_franka"}) {
     Driven d(robot);
     for (int episode = 0; episode < 2; ++episode) {
@@ -46,7 +46,7 @@ TEST(NavPlanner, ArrivesWhereTheObjectIsSeenWithoutTouchingAnything) {
 }
 
 // The planner makes a new plan if the base is farther than `astray` (0.35 m) from its command.
-TEST(NavPlanner, PlansAgainWhereTheBaseIsNotWhereItWasSent) {
+TEST(NavPlanner, PlansAgainIfTheBaseIsFarFromItsCommand) {
   Driven d("rby1");
   d.start(0);
   d.planner.reset(d.world);
@@ -64,7 +64,7 @@ TEST(NavPlanner, PlansAgainWhereTheBaseIsNotWhereItWasSent) {
   }
 }
 
-TEST(NavPlanner, SaysWhatItNeeds) {
+TEST(NavPlanner, RejectsUnsupportedTasksAndRobots) {
   PickTask pick(of("mobile_franka"));
   Scene scene(pick.whole_scene_cfg());
   pick.initialize(scene.model(), 1);
@@ -74,7 +74,7 @@ TEST(NavPlanner, SaysWhatItNeeds) {
   Scene floor(task.whole_scene_cfg());
   task.initialize(floor.model(), 1);
   NavPlanner other;
-  EXPECT_THROW(task.register_policy(other), ValueError) << "a base that does not drive";
+  EXPECT_THROW(task.register_policy(other), ValueError) << "the base is not mobile";
 }
 
 }  // namespace

@@ -19,7 +19,7 @@ struct Shifted : testing::Test {
   }
 };
 
-TEST_F(Shifted, ItDrivesToTheNearestPlaceThatWorks) {
+TEST_F(Shifted, DrivesToTheNearestPoseThatWorks) {
   Plan plan;
   std::optional<Pose> seen;
   ASSERT_TRUE(shift.plan(
@@ -33,19 +33,19 @@ TEST_F(Shifted, ItDrivesToTheNearestPlaceThatWorks) {
   EXPECT_EQ(plan.segments[0].phase, 6);
   const auto& path = plan.segments[0].paths.at(0);
   const Pose from = stage.robot().base_pose(stage.world);
-  EXPECT_NEAR(norm(seen->p - from.p), 0.24, 1e-9) << "straight back, the second step";
+  EXPECT_NEAR(norm(seen->p - from.p), 0.24, 1e-9) << "two grid steps straight back";
   EXPECT_NEAR(path.points[path.points.size() - 3], seen->p.x, 1e-9);
   EXPECT_NEAR(path.points[path.points.size() - 2], seen->p.y, 1e-9);
 }
 
-TEST_F(Shifted, NotIntoTheTable) {
+TEST_F(Shifted, RejectsPosesInsideTheTable) {
   Plan plan;
   EXPECT_FALSE(shift.plan(
       stage.world, 6, {}, [&](const World& there) { return ahead(there) > 0.3; }, plan));
   EXPECT_TRUE(plan.segments.empty());
 }
 
-TEST_F(Shifted, WhatItHoldsComesAlong) {
+TEST_F(Shifted, HeldObjectsMoveWithTheBase) {
   const mjModel* m = stage.world.model;
   const int block = object_id(m, mjOBJ_BODY, "test", "red_block/red_block");
   const Hand hand = hands_of(stage.robot(), m).at(0);

@@ -64,7 +64,7 @@ TEST(Collision, AgreesWithMuJoCo) {
   EXPECT_GT(self, 5);
 }
 
-TEST(Collision, EveryRobotStartsFree) {
+TEST(Collision, StartConfigurationsAreCollisionFree) {
   for (const char* name : {"franka", "mobile_franka", "i2rt_yam", "bimanual_yam", "rby1"}) {
     TableStage stage(name);
     const Robot& robot = stage.robot();

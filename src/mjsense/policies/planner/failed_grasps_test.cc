@@ -8,7 +8,7 @@
 namespace mjsense {
 namespace {
 
-TEST(FailedGrasps, TheSameAndItsMirrorImage) {
+TEST(FailedGrasps, MatchesSimilarGraspsAndSwappedFingers) {
   FailedGrasps failed;
   const Pose grasp{{0.01, 0.02, 0.03}, axis_angle({0, 1, 0}, 0.7)};
   EXPECT_FALSE(failed.has(grasp));

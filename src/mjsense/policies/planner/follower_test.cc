@@ -18,7 +18,7 @@ Pose moved(Pose pose, Vec3 by) {
   return pose;
 }
 
-TEST(Follower, TwoToolsGoAtTheSameTimeAndGrippersKeepTheirCommand) {
+TEST(Follower, TwoToolsMoveAtTheSameTimeAndGrippersKeepTheirCommand) {
   TableStage stage("bimanual_yam");
   const Robot& robot = stage.robot();
   const auto hands = hands_of(robot, stage.world.model);
@@ -43,7 +43,7 @@ TEST(Follower, TwoToolsGoAtTheSameTimeAndGrippersKeepTheirCommand) {
     const AllocationCount count;
     follower.follow(stage.world, action);
     EXPECT_EQ(count.since(), 0) << "while following";
-    EXPECT_FALSE(action.commands[hands[1].gripper].given) << "no plan has named it";
+    EXPECT_FALSE(action.commands[hands[1].gripper].given) << "the plan does not command it";
     ASSERT_TRUE(action.commands[hands[0].gripper].given);
     EXPECT_EQ(action.commands[hands[0].gripper].values[0], 0.0);
     EXPECT_EQ(follower.failure(stage.world), PlanFailure::kNone);
@@ -88,7 +88,7 @@ TEST(Follower, ABaseDrivesAlongAPathWhileTheToolStaysInTheWorld) {
 
 // A path starts away from the base, and the plan is aborted while the base drives. The commanded
 // speed changes within its limits and becomes zero.
-TEST(Follower, ABaseIsNeverToldToJump) {
+TEST(Follower, BaseCommandsStayWithinTheAccelerationLimits) {
   constexpr double kDt = 0.066;
   TableStage stage("mobile_franka");
   const Robot& robot = stage.robot();
@@ -122,7 +122,7 @@ TEST(Follower, ABaseIsNeverToldToJump) {
     look(action);
     stage.step(action);
   }
-  EXPECT_NEAR(rate[0], -0.3, 1e-6) << "it has caught up";
+  EXPECT_NEAR(rate[0], -0.3, 1e-6) << "the command has caught up with the path";
   EXPECT_NEAR(told[2], at(2) + 0.3, 1e-9);
   for (bool stopped = false; !stopped;) {
     Action action;
@@ -133,7 +133,7 @@ TEST(Follower, ABaseIsNeverToldToJump) {
   EXPECT_EQ(rate[0], 0);
   Action held;
   EXPECT_TRUE(follower.brake(stage.world, held));
-  EXPECT_FALSE(held.commands[base].given) << "it stays without being told";
+  EXPECT_FALSE(held.commands[base].given) << "a base holds without a command";
   const FollowerCfg cfg;
   EXPECT_LE(most, cfg.most_base_acceleration * (1 + 1e-9));
   EXPECT_LE(most_turn, cfg.most_base_turn_acceleration * (1 + 1e-9));
@@ -141,7 +141,7 @@ TEST(Follower, ABaseIsNeverToldToJump) {
 }
 
 // The next path gives the same yaw, a full turn off.
-TEST(Follower, ABaseDoesNotSpinFromOnePathToTheNext) {
+TEST(Follower, ABaseDoesNotMakeAFullTurnBetweenPaths) {
   constexpr double kTurn = 2 * std::numbers::pi;
   TableStage stage("mobile_franka");
   const int base = stage.robot().group_index("base");
@@ -192,7 +192,7 @@ TEST(Follower, AGroupReachesTheEndOfItsPath) {
 }
 
 // The path begins 0.1 rad from the commanded arm position: the arm converges to it without a jump.
-TEST(Follower, AnArmThatIsBesideAPathGoesOverToIt) {
+TEST(Follower, AnArmConvergesToAPathThatStartsElsewhere) {
   TableStage stage("franka");
   const int arm = stage.robot().arm();
   Follower follower;
@@ -219,7 +219,7 @@ TEST(Follower, AnArmThatIsBesideAPathGoesOverToIt) {
   EXPECT_EQ(last, row[3]);
 }
 
-TEST(Follower, AFloatingHandGoesWhereItsToolIsWanted) {
+TEST(Follower, AFloatingHandMovesItsToolToTheTarget) {
   TableStage stage("floating_rum");
   const Robot& robot = stage.robot();
   Rng rng(0, 0, 0, 0);
@@ -264,7 +264,7 @@ class TwoStages final : public TaskPlanner {
   int bad_stage_;
 };
 
-TEST(TaskPlanner, AsksForTheNextStageAndEndsOnce) {
+TEST(TaskPlanner, PlansTheNextStageAndEndsOnce) {
   TableStage stage("franka");
   TwoStages planner(-1);
   planner.initialize(*stage.task);
@@ -283,7 +283,7 @@ TEST(TaskPlanner, AsksForTheNextStageAndEndsOnce) {
   EXPECT_EQ(planner.num_retries(0), 0);
 }
 
-TEST(TaskPlanner, AStageWithoutAWayBeginsAgainThenGivesUp) {
+TEST(TaskPlanner, AStageWithoutAPlanIsRetriedThenGivenUp) {
   TableStage stage("franka");
   TwoStages planner(1);
   planner.initialize(*stage.task);
@@ -312,13 +312,13 @@ class ClosesOnce final : public TaskPlanner {
   }
 };
 
-TEST(TaskPlanner, SaysWhatWentWrongAndThatThereWasNoOtherWay) {
+TEST(TaskPlanner, ReportsTheFailureAndThatTheRetryFoundNoPlan) {
   TableStage stage("franka");
   ClosesOnce planner;
   planner.initialize(*stage.task);
   planner.reset(stage.world);
   EXPECT_EQ(planner.failure(0), "");
-  EXPECT_EQ(planner.grasp_pose(0).q.w, 1) << "the identity before there is a grasp";
+  EXPECT_EQ(planner.grasp_pose(0).q.w, 1) << "the identity before the first grasp";
   Action action;
   for (int i = 0; i < 60 && !action.done; ++i) {
     planner.act(stage.world, action);
@@ -328,7 +328,7 @@ TEST(TaskPlanner, SaysWhatWentWrongAndThatThereWasNoOtherWay) {
   EXPECT_EQ(planner.failure(0),
             "the hand held nothing, then it found no plan (nothing to close on)");
   planner.reset(stage.world);
-  EXPECT_EQ(planner.failure(0), "") << "another episode";
+  EXPECT_EQ(planner.failure(0), "") << "cleared by the next episode";
 }
 
 }  // namespace

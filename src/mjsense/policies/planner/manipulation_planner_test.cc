@@ -107,7 +107,7 @@ TEST(ManipulationPlanner, PicksFromManyDirections) {
 }
 
 // The robot touches only the target; joint speeds stay below the 2.62 rad/s of an FR3.
-TEST(ManipulationPlanner, MovesWell) {
+TEST(ManipulationPlanner, MotionsAreSmoothAndFreeOfCollisions) {
   Play play("pick_and_place", "franka", "", 1);
   for (int episode = 0; episode < 3; ++episode) {
     MotionQuality quality(play.scene->model(), play.task->robot());
@@ -129,7 +129,7 @@ TEST(ManipulationPlanner, AnEpisodeIsTheSameInEveryWorld) {
 }
 
 // The result is identical bit for bit for one and two threads, with other episodes in parallel.
-TEST(ManipulationPlanner, AnEpisodeIsTheSameBesideOthers) {
+TEST(ManipulationPlanner, AnEpisodeDoesNotDependOnOtherWorldsOrThreads) {
   const auto play = [](int worlds, int threads) {
     RolloutCfg cfg;
     cfg.task = "pick_and_place";
@@ -158,7 +158,7 @@ TEST(ManipulationPlanner, AnEpisodeIsTheSameBesideOthers) {
 }
 
 // +y is left. In these episodes the object is well off the middle.
-TEST(ManipulationPlanner, OfTwoArmsTheNearerPicks) {
+TEST(ManipulationPlanner, TheNearerOfTwoArmsPicks) {
   Play play("pick", "bimanual_yam", "", 1);
   std::set<std::string> used;
   for (int episode : {5, 12, 14, 18}) {
@@ -184,7 +184,7 @@ TEST(ManipulationPlanner, OfTwoArmsTheNearerPicks) {
 
 // Perturbed episodes: the object is pushed or slips but is picked up by a retry, and furniture is
 // opened. The episode number determines which episodes are perturbed.
-TEST(ManipulationPlanner, MishapsAreMended) {
+TEST(ManipulationPlanner, RetriesSucceedAfterPerturbations) {
   for (const auto& [task, scene] : {std::pair{"pick", "tableware"}, {"open", "kitchen"}}) {
     Play play(task, "franka", scene, 1, /*noise=*/false, /*perturb=*/1.0);
     int happened = 0, retried = 0, mended = 0;

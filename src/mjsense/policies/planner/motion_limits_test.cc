@@ -93,7 +93,7 @@ std::string said(const Case& c, std::int64_t episode, const MotionQuality::Great
 class MotionLimits : public testing::TestWithParam<Case> {};
 
 // MJSENSE_FIRST and MJSENSE_EPISODES select other episodes.
-TEST_P(MotionLimits, CommandsKeepToThem) {
+TEST_P(MotionLimits, CommandsStayWithinTheLimits) {
   const Case& c = GetParam();
   Stage stage(c, 0.5, /*noise=*/false);
   const int first = number("MJSENSE_FIRST", c.first), many = number("MJSENSE_EPISODES", c.episodes);
@@ -163,7 +163,7 @@ class NoisyMotion : public testing::TestWithParam<Case> {};
 
 // With action noise the executed motion stays below the speed limit, also near singular postures.
 // MJSENSE_EPISODES=65 runs that many episodes of each task and robot, from MJSENSE_FIRST on.
-TEST_P(NoisyMotion, KeepsToTheSpeedOfJoints) {
+TEST_P(NoisyMotion, StaysBelowTheJointSpeedLimit) {
   const Case& c = GetParam();
   const int first = number("MJSENSE_FIRST", c.first), many = number("MJSENSE_EPISODES", c.episodes);
   Stage stage(c, 0, /*noise=*/true);

@@ -32,7 +32,7 @@ FreeSpace wall() {
           }};
 }
 
-TEST(Motion, GoesRoundAWallAndIsAFunctionOfTheRng) {
+TEST(Motion, AvoidsAWallAndDependsOnlyOnTheRng) {
   const double start[2] = {-1, -1}, goal[2] = {1, -1};
   std::vector<double> first;
   for (int k = 0; k < 20; ++k) {
@@ -48,7 +48,7 @@ TEST(Motion, GoesRoundAWallAndIsAFunctionOfTheRng) {
     double length = 0;
     for (std::size_t i = 2; i < path.size(); i += 2)
       length += std::hypot(path[i] - path[i - 2], path[i + 1] - path[i - 1]);
-    EXPECT_LT(length, 1.4 * (2 * std::hypot(0.8, 2.5) + 0.4)) << "shortened";
+    EXPECT_LT(length, 1.4 * (2 * std::hypot(0.8, 2.5) + 0.4)) << "the path is shortened";
   }
 }
 
@@ -58,7 +58,7 @@ TEST(Motion, TheStraightLineWhereItIsFree) {
   EXPECT_EQ(find_path(square(), start, goal, wall(), rng), (std::vector<double>{-1, -1, -1, 1}));
 }
 
-TEST(Motion, BeginsWhereItStands) {
+TEST(Motion, AcceptsAnInvalidStart) {
   // The start is beyond a limit and in collision.
   const double start[2] = {-2.001, -1}, goal[2] = {1, -1};
   const FreeSpace walls = wall();
@@ -69,7 +69,7 @@ TEST(Motion, BeginsWhereItStands) {
   EXPECT_EQ(path[0], -2.001);
 }
 
-TEST(Motion, NoWayIsAnEmptyPath) {
+TEST(Motion, ReturnsAnEmptyPathIfThereIsNone) {
   const double start[2] = {-1, -1}, goal[2] = {1, -1};
   const FreeSpace shut{[](Config q) { return std::abs(q[0]) > 0.2; },
                        [](Config a, Config b) { return a[0] * b[0] > 0; }};
@@ -102,7 +102,8 @@ TEST(Motion, TimesAreWithinTheLimits) {
     EXPECT_EQ(timed.group, 3);
     expect_within_limits(square(), timed);
     for (std::size_t i = 0; i < timed.times.size(); ++i)
-      EXPECT_TRUE(clear(Config(timed.points).subspan(2 * i, 2))) << "rounding cuts no corner of it";
+      EXPECT_TRUE(clear(Config(timed.points).subspan(2 * i, 2)))
+          << "rounded corners stay clear of the wall";
     EXPECT_NEAR(timed.points[timed.points.size() - 2], 1, 1e-9);
   }
 }

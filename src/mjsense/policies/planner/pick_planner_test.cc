@@ -57,7 +57,8 @@ TEST(PickPlanner, PicksUpMostObjects) {
   for (int e = 0; e < episodes; ++e) {
     const EpisodeResult& r = results[e];
     successes += r.success;
-    EXPECT_FALSE(r.success && r.truncated) << text[e] << ": the planner says when it is done";
+    EXPECT_FALSE(r.success && r.truncated)
+        << text[e] << ": the planner must end the episode itself";
     if (wanted)
       printf("%3d %-32s steps %3d success %d gave_up %d truncated %d reward %.4f\n", e,
              text[e].c_str(), r.steps, r.success, r.gave_up, r.truncated, r.reward);
@@ -100,7 +101,7 @@ struct Moved {
 
 // Another object is close to the target, on each side in turn. The chosen grasp must not collide
 // with it or, before closing, with the target; and the path down must be free if a free one exists.
-TEST(PickPlanner, ChoosesAGraspBesideWhichThereIsRoom) {
+TEST(PickPlanner, ChoosesAGraspWithClearanceToNeighbours) {
   Stage stage(1);
   const auto& pick = static_cast<PickTask&>(*stage.task);
   const Robot& robot = pick.robot();
@@ -137,13 +138,13 @@ TEST(PickPlanner, ChoosesAGraspBesideWhichThereIsRoom) {
             << objects[i].kind << " at " << objects[target].kind << ", side " << side;
       }
       EXPECT_GT(grasp.p.z - gripper.tip, pick.support_height(0) + 0.003)
-          << "finger tips above the table";
+          << "finger tips are above the table";
     }
   }
   EXPECT_GT(planned, 20);
 }
 
-TEST(PickPlanner, GivesUpWhatItCannotReach) {
+TEST(PickPlanner, GivesUpIfTheObjectIsOutOfReach) {
   Stage stage(1);
   Moved moved(stage, 2.0, 0.0);
   Action action;
@@ -209,8 +210,8 @@ TEST(Grasp, ClosesOnOppositeFacesOfABox) {
   for (std::size_t i = 0; i < grasps.size(); ++i) {
     EXPECT_GE(grasps[i].cost, grasps[i > 0 ? i - 1 : 0].cost);
     EXPECT_FALSE(gripper.hits(grasps[i].pose, object, block.shape, 0.0));
-    EXPECT_LT(rotate(grasps[i].pose.q, {0, 0, 1}).z, -0.999) << "from above";
-    EXPECT_GT(grasps[i].pose.p.z, 0.6 + gripper.tip) << "finger tips above the table";
+    EXPECT_LT(rotate(grasps[i].pose.q, {0, 0, 1}).z, -0.999) << "the approach is vertical";
+    EXPECT_GT(grasps[i].pose.p.z, 0.6 + gripper.tip) << "finger tips are above the table";
     // The closing direction is along one of the sides (0.044 or 0.070 m), not a diagonal.
     const Vec3 closing = rotate(conjugate(object.q), rotate(grasps[i].pose.q, {0, 1, 0}));
     EXPECT_GT(std::max(std::abs(closing.x), std::abs(closing.y)), std::cos(0.2));

@@ -27,7 +27,7 @@ Squeeze at_height(double z) {
   return squeeze(bar(), {0, 0, z}, {0, 1, 0}, {1, 0, 0}, {0, 0, -1}, kHalfWidth, kHalfLength);
 }
 
-TEST(Squeeze, AroundTheMiddleItIsAsWideAsTheBarAndSlopesNowhere) {
+TEST(Squeeze, AtTheMiddleTheWidthIsTheBarsAndTheSlopeIsZero) {
   const Squeeze s = at_height(0);
   EXPECT_NEAR(s.high - s.low, 2 * kRadius, 1e-4);
   EXPECT_NEAR(s.slope, 0, 0.05);
@@ -36,7 +36,7 @@ TEST(Squeeze, AroundTheMiddleItIsAsWideAsTheBarAndSlopesNowhere) {
 
 //   | |
 //  ( _ )   the ends of the pads touch only the top and slip off
-TEST(Squeeze, OnTheTopItSlopes) {
+TEST(Squeeze, AtTheTopTheSurfaceSlopes) {
   const Squeeze s = at_height(kRadius);
   EXPECT_LT(s.high - s.low, 1.9 * kRadius);
   EXPECT_GT(s.slope, 0.5);
@@ -44,7 +44,7 @@ TEST(Squeeze, OnTheTopItSlopes) {
   EXPECT_LT(at_height(-kRadius).slope, -0.5);
 }
 
-TEST(Squeeze, OfOneRowOfPointsNothingIsKnown) {
+TEST(Squeeze, SlopeIsInfiniteForOneRowOfPoints) {
   const std::vector<Vec3> row{{0, -0.01, 0}, {0, 0.01, 0}, {0.005, -0.01, 0}, {0.005, 0.01, 0}};
   const Squeeze s = squeeze(row, {}, {0, 1, 0}, {1, 0, 0}, {0, 0, -1}, kHalfWidth, kHalfLength);
   EXPECT_TRUE(std::isinf(s.slope));

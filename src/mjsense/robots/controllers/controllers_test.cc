@@ -105,12 +105,12 @@ TEST(Controllers, PositionsMayBeRamped) {
   EXPECT_TRUE(r.robot->controls_every_step());
   r.play({0.5, -0.5}, 1);
   EXPECT_EQ(r.target(0), 0.5);
-  EXPECT_EQ(r.data->ctrl[0], 0.5) << "there at the end of the step";
+  EXPECT_EQ(r.data->ctrl[0], 0.5) << "the ramp ends at the target";
   r.play({0.7, -0.5}, 1);
   EXPECT_EQ(r.data->ctrl[0], 0.7);
   r.play({0.0, -0.5}, 40);
   for (int k = 1; k < 30; ++k) r.play({0.03 * k, -0.5}, 1);
-  EXPECT_NEAR(r.data->qvel[0], 0.03 / 0.06, 0.01) << "no jerks between commands";
+  EXPECT_NEAR(r.data->qvel[0], 0.03 / 0.06, 0.01) << "constant speed between commands";
   EXPECT_EQ(r.data->ctrl[1], -0.5);
 }
 
@@ -121,7 +121,7 @@ TEST(Controllers, RelativePositionsAreMotions) {
   const double q = r.data->qpos[0], kept = r.target(1);
   r.play({0.1, 0.001});
   EXPECT_NEAR(r.target(0), q + 0.1, 1e-12);
-  EXPECT_EQ(r.target(1), kept) << "next to nothing: the target stays";
+  EXPECT_EQ(r.target(1), kept) << "below the threshold the target does not change";
 }
 
 TEST(Controllers, VelocitiesMoveTheTargetsEvenly) {
@@ -131,7 +131,7 @@ TEST(Controllers, VelocitiesMoveTheTargetsEvenly) {
   r.play({0.5, -0.25}, 20);
   EXPECT_NEAR(r.target(0), 0.5 * 1.2, 1e-12);
   EXPECT_NEAR(r.target(1), -0.25 * 1.2, 1e-12);
-  EXPECT_NEAR(r.data->qvel[0], 0.5, 0.02) << "no jerks between commands";
+  EXPECT_NEAR(r.data->qvel[0], 0.5, 0.02) << "constant speed between commands";
   r.play({}, 20);
   EXPECT_NEAR(r.data->qvel[0], 0, 1e-3);
 }
@@ -148,7 +148,7 @@ TEST(Controllers, VelocityServosTakeVelocities) {
   EXPECT_NEAR(r.data->qvel[0], 0.0, 0.01);
 }
 
-TEST(Controllers, OneHeightBendsTheTorso) {
+TEST(Controllers, OneHeightMovesTheJointsOfTheTorso) {
   OneGroup r(kPositions, group_of(TorsoHeightCfg{{0, 0.7}, {1, -2}}));
   ASSERT_EQ(r.robot->groups()[0].command_size, 1);
   r.play({0.5}, 30);
@@ -169,7 +169,7 @@ void expect_kept(OneGroup& r) {
   for (int i = 0; i < r.model->nq; ++i) EXPECT_NEAR(r.data->qpos[i], before[i], 1e-4) << i;
 }
 
-TEST(Controllers, SayWhatKeepsAGroupAsItIs) {
+TEST(Controllers, KeepCommandsKeepAGroupAsItIs) {
   for (const ControllerCfg& kind :
        {ControllerCfg(JointPositionCfg{}), ControllerCfg(JointPositionRelativeCfg{}),
         ControllerCfg(JointVelocityCfg{}), ControllerCfg(TorsoHeightCfg{{0, 0.7}, {1, -2}})}) {
@@ -194,17 +194,18 @@ MoveGroupCfg planar(ControllerCfg controller) {
   return group;
 }
 
-TEST(Controllers, HolonomicBasesGoAnywhereTheShortWay) {
+TEST(Controllers, HolonomicBasesReachAPoseByTheShorterTurn) {
   OneGroup r(kPlanar, planar(HolonomicBaseCfg{}));
   r.start({{1, 2, 0}, axis_angle({0, 0, 1}, 3.0)});
   r.play({1.5, 1.8, -3.0}, 40);
   const Pose base = r.robot->base_pose(r.world);
   EXPECT_NEAR(base.p.x, 1.5, 1e-3);
   EXPECT_NEAR(base.p.y, 1.8, 1e-3);
-  EXPECT_NEAR(r.data->qpos[2], 2 * std::numbers::pi - 3.0, 1e-3) << "not back over zero";
+  EXPECT_NEAR(r.data->qpos[2], 2 * std::numbers::pi - 3.0, 1e-3)
+      << "the shorter turn passes through pi";
 }
 
-TEST(Controllers, DifferentialBasesGoWhereTheyLook) {
+TEST(Controllers, DifferentialBasesMoveAlongTheirHeading) {
   OneGroup r(kPlanar, planar(DifferentialBaseCfg{}));
   EXPECT_EQ(r.robot->groups()[0].target_size, 0);
   r.start({{1, 0, 0}, axis_angle({0, 0, 1}, 0.5)});
@@ -222,7 +223,7 @@ TEST(Controllers, DifferentialBasesGoWhereTheyLook) {
   EXPECT_NEAR(base.p.y, 1 - std::cos(3.12), 0.02);
 }
 
-TEST(Controllers, WheelsTurnAsTheBaseShouldMove) {
+TEST(Controllers, WheelSpeedsFollowFromTheCommand) {
   MoveGroupCfg group;
   group.kind = GroupKind::kBase;
   group.actuators = {"l", "r"};
@@ -238,7 +239,7 @@ TEST(Controllers, WheelsTurnAsTheBaseShouldMove) {
   EXPECT_NEAR(r.data->ctrl[1], (0.5 + 0.25) / 0.1, 1e-12);
 }
 
-TEST(Controllers, MocapBasesGoNoFasterThanTheyMay) {
+TEST(Controllers, MocapBasesStayBelowTheirSpeedLimit) {
   MoveGroupCfg group;
   group.kind = GroupKind::kBase;
   group.controller = MocapBaseCfg{0.5, 1.0};
@@ -257,7 +258,7 @@ TEST(Controllers, MocapBasesGoNoFasterThanTheyMay) {
   }
 }
 
-TEST(Controllers, SayWhatTheyNeed) {
+TEST(Controllers, ErrorsNameTheRequirements) {
   const auto fault = [](const std::string& xml, MoveGroupCfg group) -> std::string {
     try {
       OneGroup r(xml, std::move(group));
@@ -282,7 +283,7 @@ TEST(Controllers, SayWhatTheyNeed) {
 
 // A base that nothing can move: its present pose is accepted, any other pose is an error that says
 // how to make it movable.
-TEST(Bases, FixedOnesSayWhatWouldCarryThem) {
+TEST(Bases, AFixedBaseCannotBePlacedElsewhere) {
   RobotCfg cfg;
   cfg.name = "small";
   cfg.base_body = "base";
