@@ -186,7 +186,7 @@ struct RobotCfg {
   std::vector<std::shared_ptr<const SensorCfg>> sensors;
   std::vector<PythonSensorRef> python_sensors;
 
-  // The model as the file describes it; robot_cfg() makes `model` and `edit_spec` from these.
+  // The model as the file describes it; parse_robot() makes `model` and `edit_spec` from these.
   std::string mjcf;
   std::vector<PartCfg> parts;
   std::optional<MeshesCfg> meshes;
