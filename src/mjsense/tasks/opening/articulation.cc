@@ -168,7 +168,8 @@ std::string category_of(const mjModel* m, int body, bool slide) {
   for (int b = body; b > 0 && found.empty(); b = m->body_parentid[b]) {
     const std::string name = lower(name_of(m, mjOBJ_BODY, b));
     for (const auto& [word, category] : kWordsOfThings) {
-      // "door" alone is ambiguous: names of ancestors or siblings tell what kind of door it is.
+      // "door" is ambiguous: it counts only in the name of a top-level body with the joint.
+      // Otherwise the names of ancestors decide, then the name of the joint.
       if (category == "door" && b != body) continue;
       if (name.find(word) != name.npos && !(category == "door" && m->body_parentid[b] > 0)) {
         found = category;

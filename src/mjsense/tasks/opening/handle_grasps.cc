@@ -74,7 +74,7 @@ std::vector<HandleGrasp> propose_handle_grasps(const Handle& handle, const Pose&
   const Vec3 middle = body * handle.middle;
   const bool knob = handle.half_along < 0.03;
   for (int side = 0; side < (knob ? 2 : 1); ++side) {
-    // The fingers close perpendicular to the bar. A knob may be grasped in both directions.
+    // The fingers close perpendicular to the bar. A knob may also be grasped along it.
     const Vec3 bar = side == 0 ? along : normalized(cross(along, outward));
     const double across = side == 0 ? handle.half_across : handle.half_along;
     if (2 * across + 2 * kSideGap > max_opening) continue;
