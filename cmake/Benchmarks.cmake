@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-# One benchmark program, made of the x_bench.cc beside the code.
+# One benchmark program, built from all x_bench.cc files in the source folders.
 find_package(benchmark REQUIRED)
 file(GLOB_RECURSE benches CONFIGURE_DEPENDS ${PROJECT_SOURCE_DIR}/src/mjsense/*_bench.cc)
 if(benches)

@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
-# Fuzz targets (libFuzzer, which comes with clang): the readers of what strangers send, with sanitisers. ./dev fuzz runs them.
-# They need few rooms; the rest of the library is not built for them.
+# Fuzz targets (libFuzzer, part of clang) for the readers of untrusted files, built with sanitizers. ./dev fuzz runs them.
+# They need few modules; the rest of the library is not built for them.
 if(NOT CMAKE_CXX_COMPILER_ID MATCHES "Clang")
   message(FATAL_ERROR "MJSENSE_FUZZ needs clang: cmake --preset fuzz")
 endif()
@@ -28,7 +28,7 @@ foreach(source IN LISTS targets)
   add_dependencies(fuzz ${name})
 endforeach()
 
-# The recorder without physics with the same sanitisers, and its readers in a process of their own: for tests/faults.
+# The recorder without physics, with the same sanitizers. Its readers run in a separate process. Used by tests/faults.
 add_executable(record_fake EXCLUDE_FROM_ALL tests/record/fake_writer.cc src/mjsense/record/testing/fake_suite.cc src/mjsense/hdf5/in_child.cc)
 target_link_libraries(record_fake PRIVATE mjsense_fuzzed)
 add_dependencies(fuzz record_fake)

@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
-# Every header compiles by itself: ninja headers_alone. A file that includes one header and nothing else, for each that no x.cc
-# beside it includes first (tools/check_rooms.py).
+# Checks that every header compiles without other includes: ninja headers_alone. A source file that includes only this header is
+# generated for each header that is not the first include of an x.cc in the same folder (tools/check_rooms.py).
 file(GLOB_RECURSE headers RELATIVE ${PROJECT_SOURCE_DIR}/src CONFIGURE_DEPENDS ${PROJECT_SOURCE_DIR}/src/mjsense/*.h)
 if(NOT MJSENSE_OPENGL)
   list(FILTER headers EXCLUDE REGEX "/opengl/")

@@ -1,11 +1,11 @@
 # SPDX-License-Identifier: Apache-2.0
 # Instruction sets. The library runs on any x86-64. Files named *_avx2.cc and *_avx512.cc are compiled for these and chosen at
-# run time (core/cpu.h), so that a machine without them never meets an illegal instruction.
-# GCC 12 warns of uninitialised values inside its own AVX-512 headers. What it vectorises in straight lines at -O3 loses the
-# rounding of double(float(x)); kernels are vectors already.
+# run time (core/cpu.h), so that no CPU executes an instruction that it does not support.
+# GCC 12 warns of uninitialised values inside its own AVX-512 headers. At -O3 its vectorizer for straight-line code drops the
+# rounding of double(float(x)); it is disabled, because the kernels are already written with vectors.
 # GCC copies structures 16 bytes at a time; a vector of 32 or 64 that is read right after such a copy has to wait until all parts
-# have left the store buffer. Copies as wide as the vectors: depth of the moving Panda 4.1 -> 2.4 ms, of the kitchen 6.1 -> 4.4,
-# their colours 14.2 -> 11.6 and 14.8 -> 12.8 (640 x 480, shortest of 21 with AVX2).
+# have left the store buffer. Effect of copies as wide as the vectors: depth of the moving Panda 4.1 -> 2.4 ms, of the kitchen 6.1 -> 4.4,
+# colors 14.2 -> 11.6 and 14.8 -> 12.8 (640 x 480, shortest of 21 with AVX2).
 if(CMAKE_SYSTEM_PROCESSOR MATCHES "x86_64|AMD64")
   if(CMAKE_CXX_COMPILER_ID STREQUAL "GNU")
     set(quiet "-Wno-uninitialized;-Wno-maybe-uninitialized")

@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
-# The wheel's libraries: packaging/libraries.sh has made them. Only the linker's input changes: headers, and so objects, are those of
-# every other build.
+# Static libraries for the wheel, built by packaging/libraries.sh. Only the linker's input differs from other builds: headers, and
+# therefore object files, are the same.
 set(MJSENSE_STATIC_DIR ${PROJECT_SOURCE_DIR}/build/wheel/lib)
 if(NOT EXISTS ${MJSENSE_STATIC_DIR}/libembree.a)
   message(FATAL_ERROR "MJSENSE_STATIC: no libraries in ${MJSENSE_STATIC_DIR}: run ./dev wheel")
@@ -8,7 +8,7 @@ endif()
 find_library(PCRE2_STATIC libpcre2-8.a REQUIRED)
 find_library(ZLIB_STATIC libz.a REQUIRED)
 
-# mjsense_static(NAME LIKE ARCHIVE...): what includes and defines as LIKE and links the archives.
+# mjsense_static(NAME LIKE ARCHIVE...): a target with the includes and definitions of LIKE that links the archives.
 function(mjsense_static name like)
   add_library(${name} INTERFACE)
   foreach(what INCLUDE_DIRECTORIES SYSTEM_INCLUDE_DIRECTORIES COMPILE_DEFINITIONS COMPILE_OPTIONS)
@@ -27,11 +27,11 @@ mjsense_static(mjsense_static_hdf5 mjsense_hdf5 ${HDF5_STATIC} ${SZ_STATIC} ${AE
 set(MJSENSE_PRIVATE_LIBS mjsense_static_fmt nlohmann_json::nlohmann_json mjsense_static_pcre2 mjsense_static_embree
                          mjsense_static_ompl mjsense_static_hdf5 Threads::Threads)
 
-# libstdc++ inside as well, and glibc's names as they were in the version that packaging/libraries.sh chose.
+# Links libstdc++ statically and uses glibc's symbol versions chosen by packaging/libraries.sh.
 set(MJSENSE_STATIC_LINK -static-libstdc++ -L${MJSENSE_STATIC_DIR}/glibc -Wl,-rpath-link,${MJSENSE_STATIC_DIR}/glibc
                         -Wl,--version-script=${PROJECT_SOURCE_DIR}/packaging/exports.map -Wl,--gc-sections -pthread)
 
-# Their licences go with them, into the wheel.
+# The licenses of these libraries are added to the wheel.
 foreach(package fmt nlohmann-json3 cli11 tomlplusplus pcre2 embree ompl eigen3 boost hdf5 aec zlib1g)
   find_file(MJSENSE_LICENCE_${package} copyright PATHS /usr/share/doc/lib${package}-dev /usr/share/doc/${package}-dev
             NO_DEFAULT_PATH REQUIRED)

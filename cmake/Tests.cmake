@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-# One test program per room, made of the x_test.cc beside the code; ctest runs each as one test.
+# One test program per module, built from the x_test.cc files in its folder. ctest runs each program as one test.
 find_package(GTest REQUIRED)
 file(GLOB MJSENSE_ROOMS RELATIVE ${PROJECT_SOURCE_DIR}/src/mjsense CONFIGURE_DEPENDS ${PROJECT_SOURCE_DIR}/src/mjsense/*)
 foreach(room IN LISTS MJSENSE_ROOMS)
@@ -16,14 +16,14 @@ foreach(room IN LISTS MJSENSE_ROOMS)
   endif()
 endforeach()
 
-# What kernels do where the CPU has no wide vectors.
+# Tests of the kernels as on a CPU without wide vectors.
 foreach(room rays render)
   add_test(NAME ${room}_portable COMMAND ${room}_test)
   set_tests_properties(${room}_portable PROPERTIES ENVIRONMENT MJSENSE_ISA=portable)
 endforeach()
 
-# Bits that must not change unnoticed: tests/golden, once for each instruction set that the kernels are compiled for. Other
-# optimisation than users get, and another compiler, give other bits.
+# Golden tests of exact results (tests/golden), once for each instruction set that the kernels are compiled for. Results depend on
+# the optimization level and on the compiler.
 if(CMAKE_CXX_COMPILER_ID STREQUAL "GNU" AND NOT CMAKE_CXX_FLAGS MATCHES "-fsanitize" AND NOT CMAKE_BUILD_TYPE STREQUAL "Debug")
   set(MJSENSE_GOLDEN_FILE ${PROJECT_SOURCE_DIR}/tests/golden/hashes.txt)
   add_executable(golden_test tests/golden/golden_test.cc)

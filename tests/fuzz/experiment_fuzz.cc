@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// An experiment file: it is read, or refused by one error that a person can read.
+// Fuzz target for experiment files: a file is either read or rejected with one readable error.
 
 #include "mjsense/app/field_options.h"
 #include "mjsense/core/error.h"
@@ -12,7 +12,7 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
   try {
     read_toml_text({reinterpret_cast<const char*>(data), size}, "experiment.toml",
                    struct_of<RecordJobCfg>(), &job);
-    check_fields(job, "");  // each was checked as it was read
+    check_fields(job, "");  // the fields were also checked while reading
   } catch (const Error& e) {
     if (!std::string_view(e.what()).starts_with("experiment.toml"))
       fuzz::broken("an error names the file", e.what());

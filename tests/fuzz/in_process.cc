@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// In the fuzz targets, instead of hdf5/in_child.cc: a reader that runs in this process, where the
-// fuzzer sees which way it takes.
+// Replaces hdf5/in_child.cc in the fuzz targets: readers run in this process, so that the fuzzer
+// can trace their execution.
 
 #include "mjsense/core/error.h"
 #include "mjsense/hdf5/guard.h"

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// JSON rows, and the JSON text that says what a recording is. Another parser is asked too: what
-// both can know they must agree on.
+// Fuzz target for JSON rows and for the JSON description of a recording. Results must agree with
+// another parser (nlohmann::json) where both apply.
 
 #include <nlohmann/json.hpp>
 
@@ -34,8 +34,8 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
     ++numbers;
   });
   if (numbers > size) fuzz::broken("a number takes a byte", text);
-  // Ours takes NaN and Infinity as Python does, and leaves the encoding of texts alone. To the other
-  // one a NUL is the end.
+  // Our parser accepts NaN and Infinity, as Python does, and does not check the encoding of
+  // strings. The other parser ends at a NUL.
   const bool accepted = nlohmann::json::accept(text);
   const bool odd = text.find('\0') != std::string::npos || text.starts_with("\xEF\xBB\xBF");
   if (accepted && !wrong.empty() && depth_of(text) < 60 && !odd)
@@ -43,7 +43,7 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
   const bool ascii = std::all_of(text.begin(), text.end(), [](char c) { return (c & 0x80) == 0; });
   const bool plain = ascii && text.find_first_of("NI\\") == std::string::npos;
   if (!accepted && wrong.empty() && plain) {
-    // A number beyond the range of double is infinite here and an error there.
+    // A number beyond the range of double is infinite here and an error in the other parser.
     try {
       static_cast<void>(nlohmann::json::parse(text));
     } catch (const nlohmann::json::out_of_range&) {
@@ -52,7 +52,7 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
       fuzz::broken("what is no JSON is found", e.what() + (" in " + text));
     }
   }
-  // Of two descriptions of a recording, one comes from a file.
+  // Comparison of two descriptions of a recording, one of which comes from a file.
   for (const auto& [was, now] :
        {std::pair<std::string, std::string>{text, kRecording}, {kRecording, text}}) {
     try {

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// A table of scan angles in NumPy's format: as many rows as the file holds, or an error.
+// Fuzz target for tables of scan angles in NumPy's format: reading returns all rows of the file or
+// throws an error.
 
 #include "mjsense/core/error.h"
 #include "mjsense/sensors/lidar/npy.h"

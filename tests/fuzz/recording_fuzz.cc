@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
-// A recording that the HDF5 library has written and that says anything at all: the bytes choose
-// types, shapes, layouts, links and attributes where the readers look. (Files that are broken below
-// that, so that the library itself fails, are the fault suite's: they are read in another process.)
+// Fuzz target for recordings. The HDF5 library writes them; the fuzzer's bytes choose types,
+// shapes, layouts, links and attributes of everything that is read. Files on which the HDF5 library
+// itself fails are tested by the fault suite, where they are read in another process.
 
 #include <fuzzer/FuzzedDataProvider.h>
 
@@ -61,7 +61,7 @@ constexpr const char* kTexts[] = {"",
                                   "[[[[",
                                   "traj_0"};
 
-// The library says what it does not like; the fuzzer asks for much of that.
+// Wraps an HDF5 id. Errors are expected here, because the fuzzer makes many invalid requests.
 h5::Id id(hid_t number, herr_t (*close)(hid_t)) {
   if (number >= 0) return {number, close, "fuzz"};
   H5Eclear2(H5E_DEFAULT);
@@ -103,7 +103,7 @@ class Writer {
   std::string place() {
     std::string at = in_.PickValueInArray(kPlaces);
     if (in_.ConsumeIntegralInRange(0, 15) == 0) at += "/" + in_.ConsumeRandomLengthString(8);
-    return at.c_str();  // without what follows a NUL
+    return at.c_str();  // truncated at the first NUL
   }
   std::string text() {
     return in_.ConsumeBool() ? in_.PickValueInArray(kTexts) : in_.ConsumeRandomLengthString(40);
@@ -197,7 +197,7 @@ class Writer {
     if (in_.ConsumeBool()) H5Pset_deflate(properties, 1);
     if (in_.ConsumeIntegralInRange(0, 7) == 0) H5Pset_shuffle(properties);
     if (in_.ConsumeIntegralInRange(0, 7) == 0) H5Pset_fletcher32(properties);
-    if (in_.ConsumeIntegralInRange(0, 7) == 0)  // lzf, which is ours to read
+    if (in_.ConsumeIntegralInRange(0, 7) == 0)  // lzf, which our own code decodes
       H5Pset_filter(properties, 32000, H5Z_FLAG_OPTIONAL, 0, nullptr);
     return properties;
   }
@@ -215,7 +215,7 @@ class Writer {
     const hssize_t count = H5Sget_simple_extent_npoints(in);
     if (!made.valid() || count <= 0) return;
     if (H5Pget_layout(properties) == H5D_CHUNKED && in_.ConsumeBool()) {
-      // A chunk of any bytes at all, whatever the filters would have made of it.
+      // Writes a chunk of arbitrary bytes that bypasses the filters.
       const std::string bytes = in_.ConsumeRandomLengthString(300);
       const hsize_t origin[4] = {};
       H5Dwrite_chunk(made, H5P_DEFAULT, 0, origin, bytes.size(), bytes.data());
@@ -283,7 +283,7 @@ class Writer {
   hid_t file_;
 };
 
-// What is sound, for the bytes to change.
+// Writes a valid recording, which the fuzzer's bytes then change.
 void write_sound(hid_t file) {
   h5::set_attribute(file, "recording", std::string_view(R"({"batches":1,"episodes":1})"));
   const auto rows = [&](const char* at, hid_t type, std::vector<hsize_t> dims, const void* data) {
@@ -311,7 +311,7 @@ void write_sound(hid_t file) {
   h5::write_text(file, "traj_0/obs_scene", "{}");
 }
 
-// A house of one file, in memory where the machine has that.
+// A folder with one file, in memory if the machine has a file system in memory.
 const fs::path& house() {
   static const fs::path folder = [] {
     const char* base = fs::is_directory("/dev/shm") ? "/dev/shm" : "/tmp";
@@ -339,7 +339,7 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
     if (in.ConsumeIntegralInRange(0, 7) != 0) write_sound(made);
     Writer(in, made).all();
   } catch (const Error&) {
-    // What could be written is read.
+    // Continue with the part that was written.
   }
   try {
     if (staged) {

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// The tables of an MP4 or Matroska file: what they claim is bounded by what the file holds.
+// Fuzz target for the tables of MP4 and Matroska files: values in the tables are bounded by the
+// size of the file.
 
 #include "mjsense/record/video_file.h"
 #include "tests/fuzz/fuzz.h"

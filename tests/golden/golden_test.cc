@@ -1,8 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
-// Are the bits the same as before? Plays five scenes and compares hashes of the states, of every sensor's rows and of the images
-// with the file of hashes. See README.md: what a difference means, and how the file is renewed.
+// Regression test of exact results. Plays five scenes and compares hashes of the states, of every
+// sensor's rows and of the images with a file. README.md explains differences and how to renew the
+// file.
 //
-//   golden_test [FILE]      compares; 0 equal, 1 different, 77 nothing is known of this CPU
+//   golden_test [FILE]      compares; 0 equal, 1 different, 77 no hashes for this CPU
 //   golden_test --print     prints this CPU's lines, with the kernels that MJSENSE_ISA names
 
 #include <fmt/format.h>
@@ -77,7 +78,7 @@ void add_entity(SceneCfg& scene, const char* name, const char* xml,
   scene.entities.emplace_back(name, entity);
 }
 
-// Worlds that differ in their start and their controls, with a reset of one of them halfway.
+// Plays worlds with different starts and controls. One world is reset halfway.
 Hashes play(SceneCfg cfg, int steps) {
   constexpr int kWorlds = 3;
   Simulation sim(std::make_shared<Scene>(std::move(cfg)),
@@ -87,7 +88,7 @@ Hashes play(SceneCfg cfg, int steps) {
     const ArrayView v = sim.worlds().state_component(component);
     return reinterpret_cast<double*>(v.data + w * v.strides[0]);
   };
-  // No libm in what drives the scene: a triangle wave.
+  // A triangle wave, because results of libm functions differ between versions.
   const auto wave = [](double x) { return 4 * std::abs(x - std::floor(x + 0.5)) - 1; };
   const int key = m->nkey > 0 ? 0 : -1;
   sim.reset(all_worlds, key);
@@ -112,7 +113,7 @@ Hashes play(SceneCfg cfg, int steps) {
   return out;
 }
 
-// --- a Franka picks things up: planner, controllers, core suite, two cameras with depth
+// --- a Franka picks up objects: planner, controllers, core suite, two cameras with depth
 
 Hashes pick() {
   unsetenv("MJSENSE_FRANKA_MESHES");
@@ -143,7 +144,8 @@ Hashes pick() {
   return out;
 }
 
-// --- a legged robot on generated terrain: contacts, air time, an IMU of a data sheet, height scans
+// --- a legged robot on generated terrain: contacts, air time, an IMU modelled by its data sheet,
+// height scans
 
 constexpr char kDog[] = R"(
 <mujoco>
@@ -217,7 +219,7 @@ Hashes legged() {
   return play(std::move(scene), 60);
 }
 
-// --- everything that images know: textures, lights, shadows, sky, mirror, glass, a mesh, a lens, flow
+// --- features of images: textures, lights, shadows, sky, mirror, glass, a mesh, a lens, flow
 
 constexpr char kStudio[] = R"(
 <mujoco>
@@ -279,7 +281,7 @@ Hashes studio() {
   return play(std::move(scene), 10);
 }
 
-// --- what bends: cloth and a rope, seen by a camera and met by rays
+// --- deformable objects: cloth and a rope, in images and in ray casts
 
 constexpr char kSoft[] = R"(
 <mujoco>
@@ -311,7 +313,7 @@ Hashes soft() {
   return play(std::move(scene), 25);
 }
 
-// --- what devices do to numbers: noise, bias, delay, rate, dropout, quantisation; noise of lidars and stereo cameras
+// --- effects: noise, bias, delay, rate, dropout, quantisation; noise of lidars and stereo cameras
 
 constexpr char kDevices[] = R"(
 <mujoco>
@@ -385,7 +387,7 @@ constexpr struct {
 } kScenes[] = {
     {"pick", pick}, {"legged", legged}, {"studio", studio}, {"soft", soft}, {"devices", devices}};
 
-// What of this CPU the C library and Embree choose their own code by.
+// CPU features by which the C library and Embree select their code.
 std::string cpu_level() {
 #if defined(__x86_64__)
   __builtin_cpu_init();
@@ -464,7 +466,8 @@ int run(const std::string& path) {
 int main(int argc, char** argv) {
   try {
     return mjsense::run(argc > 1 ? argv[1] : MJSENSE_GOLDEN_FILE);
-  } catch (const mjsense::RuntimeError& error) {  // MJSENSE_ISA asks for more than this CPU has
+  } catch (const mjsense::RuntimeError&
+               error) {  // MJSENSE_ISA names an instruction set that this CPU lacks
     fmt::print("golden: {}\n", error.what());
     return 77;
   } catch (const std::exception& error) {

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Records a suite without physics: what the Python tests of the files read, kill and resume.
+// Program that records a suite without physics. The Python tests read, kill and resume its
+// recordings.
 //   record_fake OUT [--episodes N] [--worlds B] [--steps T] [--batches n] [--discard K]
 //               [--width W] [--height H] [--cameras C] [--no-video] [--no-depth] [--red-green]
 //               [--encoders E] [--threads n] [--gzip G] [--timeout S] [--resume]
@@ -7,8 +8,8 @@
 //   record_fake verify PATH [decode]
 //   record_fake repair|inspect PATH
 //   record_fake sheet PATH PNG
-// Every K-th attempt is discarded (0: none). --print says "finished E" after each episode that is
-// safe on disk; --measure says how long recording took.
+// Every K-th attempt is discarded (0: none). --print prints "finished E" after each episode that
+// is stored on disk; --measure prints the duration of the recording.
 
 #include <fmt/format.h>
 
@@ -47,7 +48,7 @@ Options parse(int argc, char** argv) {
   return options;
 }
 
-// One episode's rows, made before the clock starts: what is measured is the recorder, not the making of pictures.
+// Rows of one episode, created before the time measurement, which covers only the recorder.
 class Rows {
  public:
   Rows(FakeSuite& suite, int steps) : suite_(suite) {
@@ -108,7 +109,7 @@ int record(const std::string& out, const Options& o) {
   if (measure) rows.emplace(suite, steps);
   const auto start = std::chrono::steady_clock::now();
   const auto rejected = [&](std::int64_t e) { return discard > 0 && e % discard == discard - 1; };
-  // Worlds finish at different times, unless time is measured.
+  // Episodes have different lengths, unless time is measured.
   const auto length = [&](std::int64_t e) {
     return measure ? steps : steps + static_cast<int>(e % 3);
   };

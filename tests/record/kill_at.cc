@@ -1,7 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
-// A program linked with this file dies by SIGKILL before its N-th change of the file system, N from
-// the environment (MJSENSE_KILL_AT): every state that a kill may leave can be tried in turn.
-// MJSENSE_COUNT_CHANGES=1 makes it say at its end how many there were.
+// Kills the program that is linked with this file by SIGKILL before its N-th change of the file
+// system, with N from the environment variable MJSENSE_KILL_AT. Tests can thus try every state that
+// a kill can leave. With MJSENSE_COUNT_CHANGES=1 the program prints the number of changes at its
+// end.
 
 #include <dlfcn.h>
 #include <fcntl.h>
@@ -15,11 +16,11 @@
 
 namespace {
 
-const pid_t kProgram = getpid();  // its encoders and readers are not counted
+const pid_t kProgram = getpid();  // changes by encoder and reader processes are not counted
 std::atomic<int> changes = 0;
 std::atomic<bool> wrote = false;
 
-// Writes one after the other count as one: they go to files that have no final name yet.
+// Consecutive writes count as one, because they go to files without a final name.
 void count(bool writes = false) {
   static const char* at = std::getenv("MJSENSE_KILL_AT");
   if (wrote.exchange(writes) && writes) return;

@@ -61,10 +61,10 @@ constexpr Component kComponents[] = {{"time", mjSTATE_TIME, 0},
                                      {"qacc_warmstart", mjSTATE_WARMSTART, 0},
                                      {"userdata", mjSTATE_USERDATA, 0}};
 
-// Warnings after which the state of a world is invalid. A bad control is one of them, because
-// MuJoCo would silently replace it by zeros.
 // Not one of MuJoCo's warnings: the state that was written contains NaN or infinity.
 constexpr int kBadState = mjNWARNING;
+// Warnings after which the state of a world is invalid. A bad control is one of them, because
+// MuJoCo would silently replace it by zeros.
 constexpr int kFatalWarnings[] = {mjWARN_BADQPOS, mjWARN_BADQVEL, mjWARN_BADQACC, mjWARN_BADCTRL};
 
 // Whether mj_step may be split into stages, so that a step starts from stages that are already
@@ -437,7 +437,6 @@ bool Worlds::healthy(int w, const Warnings& warnings) {
 // them first. The same holds for the constraint solve while the controls are unchanged: within a
 // control step, and beyond its end if no new controls are written. A fresh force therefore costs at
 // most one solve per control step.
-// control step.
 bool Worlds::step_world(const mjModel* m, mjData* d, int w, const Call& call) {
   mjtStage& stage = derived_[w].stage;
   if (stage != mjSTAGE_NONE && (derived_[w].behind || !same_state(w))) stage = mjSTAGE_NONE;

@@ -20,10 +20,10 @@ using std::numbers::pi;
 
 constexpr std::string_view kScene = "room_with_door";
 constexpr const char* kHandle = "door handle";
-constexpr double kNear = 1.15, kFar = 1.9;  // m, from the leaf, of the start
-constexpr double kAside = 0.5;              // m, half width
-constexpr double kTurned = 0.35;            // rad, half width
-constexpr int kStarts = 200;                // places to try
+constexpr double kNear = 1.15, kFar = 1.9;  // m, distance of the start from the leaf
+constexpr double kAside = 0.5;              // m, lateral half range of the start
+constexpr double kTurned = 0.35;            // rad, half range of the start's heading
+constexpr int kStarts = 200;                // maximum number of sampled base placements
 
 }  // namespace
 
@@ -67,7 +67,7 @@ std::optional<Pose> DoorOpeningTask::sample_scene(int world, Rng& rng, const Sta
   const Pose placed = scene().sample(world, -1, cfg().seed, number, rng, state);
   state.qpos[model()->jnt_qposadr[door.joint]] = door.shut;
 
-  // Before the door, on one of its sides, facing it more or less.
+  // The robot starts in front of the door, on a random side, facing it up to kTurned.
   const Side& side = sides_[episode.door];
   const Vec3 along{-side.way.y, side.way.x, 0};
   const bool push = rng.below(2) == 0;

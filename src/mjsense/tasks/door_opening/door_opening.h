@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
-// Open a door, by pushing or pulling: success while it is open by two thirds of its range.
+// The door_opening task: push or pull a door open. The episode succeeds while the door is open by
+// at least 67 % of its range.
 
 #include <string>
 #include <vector>
@@ -16,33 +17,33 @@ class DoorOpeningTask final : public ObjectTask {
   static constexpr std::string_view kRole = "door_handle";
   static constexpr double kOpen = 0.67;  // fraction of the range
 
-  // In cfg.scene, in which a door is found (scenes/doors.h); by default two rooms with one.
+  // Doors are found in cfg.scene (scenes/doors.h). The default scene has two rooms and one door.
   explicit DoorOpeningTask(TaskCfg cfg);
   std::string_view name() const override { return "door_opening"; }
   std::string_view type() const override { return "door_open"; }
 
   void begin(const World& world) override;
-  Evaluation evaluate(const World& world) const override;  // reward: 1 while it succeeds
+  Evaluation evaluate(const World& world) const override;  // reward: 1 on success, else 0
 
   std::string description(int world) const override;  // "Push the door open"
   Referrals referrals(int world) const override;
-  // handle_grasped, joint_position (the fraction), success.
+  // Writes handle_grasped, joint_position (opening fraction, not an angle) and success.
   void write_info(const World& world, JsonWriter& json) const override;
   std::vector<std::shared_ptr<Sensor>> create_task_sensors() const override;
   void edit_suite(SensorSuite& suite) const override;
 
-  // The door of this world's episode, how far it is open now, and whether the robot started on the
-  // side from which it is pushed.
+  // The door of this world's episode, its current opening fraction, and whether the robot started
+  // on the side from which the door is pushed.
   const Door& door(int world) const { return doors_[episodes_[world].door]; }
   double fraction(const World& world) const {
     return door(world.id).fraction(world.model, world.data->qpos);
   }
   bool push(int world) const { return episodes_[world].push; }
-  // Where the base may drive while the doors are shut; null for a robot whose base does not move.
+  // Free base poses with all doors shut; null for a robot whose base cannot drive.
   const BaseRoutes* routes() const { return routes_.get(); }
-  // The floor where the doors were not.
+  // Occupancy of the floor without the doors.
   const Occupancy& open_floor() const { return *open_floor_; }
-  // What the robot takes of it without its arms.
+  // Footprint of the robot without its arms.
   const Footprint& trunk() const { return *trunk_; }
 
  protected:
@@ -53,23 +54,24 @@ class DoorOpeningTask final : public ObjectTask {
 
  private:
   struct Side {
-    Vec3 middle, way;  // of the leaf when shut; the way it begins to open
+    Vec3 middle, way;  // middle of the shut leaf; direction in which it starts to open
   };
   struct Episode {
     int door = 0;
     bool push = true;
   };
   std::vector<Door> doors_;
-  std::vector<Side> sides_;  // of each door
+  std::vector<Side> sides_;  // one per door
   std::unique_ptr<Occupancy> floor_, open_floor_;
   std::unique_ptr<Footprint> footprint_, trunk_;
   std::unique_ptr<BaseRoutes> routes_;
   std::vector<Episode> episodes_;  // [B]
 };
 
-// `door_state`, JSON, 1-element lists: joint_angle (rad), opening_percentage (fraction 0 .. 1), is_open;
-// handle_position and door_position (the hinge's anchor), m, world; handle_extents (m): edges of the
-// box around the handle's first geom that is seen, in the geom's frame. All of this very state.
+// The `door_state` sensor, JSON. 1-element lists: joint_angle (rad), opening_percentage (fraction,
+// 0 to 1), is_open. handle_position and door_position (anchor of the hinge): m, world frame.
+// handle_extents: edge lengths in m of the box around the handle's first visible geom, in that
+// geom's frame. All values belong to the current state.
 std::shared_ptr<Sensor> door_state_sensor(const DoorOpeningTask& task);
 
 }  // namespace mjsense

@@ -20,7 +20,8 @@ struct Played : PlayedTask<DoorOpeningTask> {
   explicit Played(const std::string& scene = "room_with_door")
       : PlayedTask(task_cfg("rby1", scene), 2) {}
   double& position() { return data->qpos[model->jnt_qposadr[task.door(0).joint]]; }
-  // Torques about hinge (towards open) and lever (down) for so long.
+  // Applies torques (N m) to the hinge (positive opens) and the lever (positive presses down) for
+  // `seconds`.
   void turn(double hinge, double lever, double seconds) {
     const Door& door = task.door(0);
     const double sign = door.open > door.shut ? 1 : -1;
@@ -106,7 +107,7 @@ TEST(DoorOpening, TheStateOfTheDoorIsThatOfNow) {
     EXPECT_NEAR(state["opening_percentage"][0].get<double>(), part, 1e-9);
     EXPECT_NEAR(state["joint_angle"][0].get<double>(), p.position(), 1e-9);
     EXPECT_EQ(state["is_open"][0].get<bool>(), part > 0.67);
-    // The handle goes round the hinge: its distance from the axis is the same, its place is turned.
+    // The handle rotates about the hinge, so its distance from the axis is constant.
     const Vec3 hinge{state["door_position"][0], state["door_position"][1],
                      state["door_position"][2]};
     const Vec3 handle{state["handle_position"][0], state["handle_position"][1],

@@ -12,7 +12,7 @@ namespace {
 
 constexpr int kStateLength = 1000;
 
-// The handle's first geom that is seen, of the first body at the end of its branch.
+// First visible geom (group 0 to 2) in the handle's subtree; without one, the first geom; -1: none.
 int handle_geom(const mjModel* m, int handle) {
   int fallback = -1;
   for (int g = 0; g < m->ngeom; ++g) {
@@ -76,7 +76,7 @@ std::vector<std::shared_ptr<Sensor>> DoorOpeningTask::create_task_sensors() cons
   return sensors;
 }
 
-// The tools' poses are there under the names that door recordings have.
+// Removes tcp_pose_<side>: door recordings hold the same pose as <side>_tcp_pose.
 void DoorOpeningTask::edit_suite(SensorSuite& suite) const {
   std::vector<std::string> names = suite.names();
   for (const MoveGroup& group : robot().groups()) {

@@ -51,7 +51,7 @@ void MultiTask::collect_objects(int world) {
   }
 }
 
-// The first plays the very episode that it would play alone.
+// The first child samples the same episode that it would sample as the only task.
 std::optional<Pose> MultiTask::sample_scene(int world, Rng& rng, const StateRow& state) {
   for (const auto& child : children_) child->reseed(cfg().seed);
   const std::optional<Pose> base = children_[0]->sample_scene(world, rng, state);
@@ -128,7 +128,7 @@ Task::Referrals MultiTask::referrals(int world) const {
   return all;
 }
 
-// The child whose object has this role; the first for one that nobody has, which says so.
+// The child that has an object with this role. Throws KeyError for an unknown role.
 const Task& MultiTask::with_role(std::string_view role) const {
   for (const auto& child : children_) {
     if (std::ranges::count(child->objects(0), role, &TaskObject::role) > 0) return *child;
@@ -175,7 +175,7 @@ const GraspScene* MultiTask::grasp_scene() const {
   return nullptr;
 }
 
-// The first's, but for the text.
+// Scene information of the first child, with the text of all children.
 std::vector<std::pair<std::string, std::string>> MultiTask::scene_info(int world) const {
   auto info = children_[0]->scene_info(world);
   for (auto& [key, value] : info) {

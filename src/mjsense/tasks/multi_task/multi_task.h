@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
-// Several tasks in one scene, any of which will do: the reward is the greatest of theirs.
+// A task made of several child tasks in one scene. It succeeds if any child succeeds; its reward is
+// the maximum of the children's rewards.
 
 #include <memory>
 #include <string>
@@ -13,9 +14,9 @@ namespace mjsense {
 
 class MultiTask final : public Task {
  public:
-  // The first samples the scene and brings cameras; the others choose their goals in it. They play
-  // with the whole's robot, policy and episodes. Throws ValueError for fewer than two, and where
-  // their scenes or robots differ.
+  // The first child samples the scene and provides the cameras; the others choose goals in that
+  // scene. All children share this task's robot, policy and episodes. Throws ValueError for fewer
+  // than two children, or if their scenes or robots differ.
   MultiTask(std::string name, TaskCfg cfg, std::vector<std::unique_ptr<Task>> children);
   std::string_view name() const override { return name_; }
   std::string_view type() const override { return "multi_task"; }
@@ -38,19 +39,20 @@ class MultiTask final : public Task {
   void evaluate_all(ActiveWorlds& worlds, std::span<Evaluation> out) override;
   bool info_follows_evaluation() const override { return true; }
 
-  // The first's, then those of the others whose roles nobody has yet; so are referrals and sensors.
+  // Objects of the first child, then those of later children. A later child's object is dropped if
+  // its role is already taken. Referrals and sensors are merged in the same manner.
   std::span<const TaskObject> objects(int world) const override { return objects_[world]; }
-  std::string description(int world) const override;  // theirs, joined by " OR "
+  std::string description(int world) const override;  // the children's, joined by " OR "
   std::vector<int> absentees() const override { return children_[0]->absentees(); }
   bool present(int world, int body) const override { return children_[0]->present(world, body); }
   Referrals referrals(int world) const override;
   Pose start_pose(int world, std::string_view role) const override;
   std::optional<Pose> goal_pose(int world, std::string_view role) const override;
-  // success, tasks: {name: what that task says}; a name that comes again has a number: "pick_2".
+  // Writes success and tasks: {name: info of that child}. Repeated names are numbered: "pick_2".
   void write_info(const World& world, JsonWriter& json) const override;
   std::vector<std::shared_ptr<Sensor>> create_task_sensors() const override;
   void edit_suite(SensorSuite& suite) const override { children_[0]->edit_suite(suite); }
-  const GraspScene* grasp_scene() const override;  // the first that there is
+  const GraspScene* grasp_scene() const override;  // of the first child that has one
 
   int size() const { return static_cast<int>(children_.size()); }
   Task& child(int index) { return *children_[index]; }
@@ -68,9 +70,9 @@ class MultiTask final : public Task {
 
   std::string name_;
   std::vector<std::unique_ptr<Task>> children_;
-  std::vector<std::pair<std::string, int>> names_;  // unique and sorted, with the child's index
+  std::vector<std::pair<std::string, int>> names_;  // unique names, sorted, with the child's index
   std::vector<std::vector<TaskObject>> objects_;    // [B]
-  mutable std::vector<char> success_;               // [B], as last judged
+  mutable std::vector<char> success_;               // [B], result of the last evaluation
   std::vector<Evaluation> found_;                   // [children, B]
 };
 

@@ -59,7 +59,7 @@ TEST(MultiTask, AnyOfThemIsSuccessAndTheGreatestRewardCounts) {
                                             task->child(1).description(world) + " OR " +
                                             task->child(2).description(world));
 
-    // The second one's object in the air: its reward, but nobody holds it.
+    // The second child's object is in the air without a grasp: it gives a reward but no success.
     const int body = task->child(1).objects(world)[0].body;
     data->qpos[model->jnt_qposadr[model->body_jntadr[body]] + 2] += 0.3;
     mj_forward(model, data.get());

@@ -21,15 +21,15 @@ using std::numbers::pi;
 constexpr std::string_view kScene = "floor";
 constexpr const char* kCamera = "head_camera";
 constexpr int kPoints = 16;
-constexpr double kFarStart = 2.0;  // m, from the target, where there is such a place
-constexpr double kArrived = 1.35;  // m, of a way that shows that a start can be played
-constexpr int kStarts = 30;        // places to try
+constexpr double kFarStart = 2.0;  // m, preferred minimum distance of the start from the target
+constexpr double kArrived = 1.35;  // m, a start is playable if a path ends this close to the target
+constexpr int kStarts = 30;        // maximum number of sampled base placements
 
 }  // namespace
 
 NavToObjTask::NavToObjTask(TaskCfg cfg) : ObjectTask(std::move(cfg), kScene, kRole) {}
 
-// The robot's head camera, else the first that it records.
+// Uses the robot's head camera if it has one, otherwise its first recorded camera.
 void NavToObjTask::find_camera() {
   const RobotCfg& cfg = robot().cfg();
   std::vector<std::string> names{kCamera};
@@ -101,7 +101,7 @@ std::optional<Pose> NavToObjTask::sample_scene(int world, Rng& rng, const StateR
   vary_scene(world);
   const int first = static_cast<int>(rng.below(static_cast<std::uint32_t>(n)));
   Pose placed;
-  // Another one where the first is not alone, or the robot cannot come near it.
+  // Try further objects if the text of the first is not unique or the robot cannot get near it.
   for (int k = 0; k < n; ++k) {
     const int target = (first + k) % n;
     placed = scene().sample(world, target, cfg().seed, number, rng, state);
@@ -113,7 +113,7 @@ std::optional<Pose> NavToObjTask::sample_scene(int world, Rng& rng, const StateR
   return placed;
 }
 
-// A place from which a path leads to the target, if there is one.
+// A base placement from which a path leads to the target; nullopt if none is found.
 std::optional<Pose> NavToObjTask::start_place(int world, const Pose& placed, const StateRow& state,
                                               Rng& rng) const {
   const double* at =
@@ -132,7 +132,7 @@ std::optional<Pose> NavToObjTask::start_place(int world, const Pose& placed, con
   return {};
 }
 
-// Behind furniture, or at the back of it, a thing may be near a way and yet never in sight.
+// An object behind furniture may be close to a path without being visible from any point of it.
 std::string NavToObjTask::start_fault(const World& world) const {
   const std::string fault = ObjectTask::start_fault(world);
   if (!fault.empty()) return fault;

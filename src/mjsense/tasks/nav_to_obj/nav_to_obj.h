@@ -1,7 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
-// Drive to an object: success while the head camera sees it from less than 1.5 m. The target is the only object
-// of its kind in the episode, so that its text names it.
+// The nav_to_obj task: drive to an object. The episode succeeds while the head camera sees the
+// target from less than 1.5 m. The target is the only object with its text in the episode, so the
+// text identifies it.
 
 #include <string>
 #include <vector>
@@ -15,28 +16,30 @@ namespace mjsense {
 class NavToObjTask final : public ObjectTask {
  public:
   static constexpr std::string_view kRole = "pickup_obj";
-  static constexpr double kReach = 1.5;    // m, of reward
-  static constexpr double kNearby = 1.45;  // m, at most, of a place to drive to
+  static constexpr double kReach = 1.5;  // m, distance at which the reward becomes 0
+  static constexpr double kNearby =
+      1.45;  // m, maximum distance of a planner's goal from the target
 
-  // In cfg.scene; by default on a floor of several rooms.
+  // Plays in cfg.scene; the default scene is a floor with several rooms.
   explicit NavToObjTask(TaskCfg cfg);
   std::string_view name() const override { return "nav_to_obj"; }
   std::string_view type() const override { return "nav_to_obj"; }
 
-  // Also: several objects have the target's text, or the robot sees the target from no place that it can reach.
+  // Also rejects starts in which several objects have the target's text, or in which the target is
+  // not visible from any base pose that the robot can drive to.
   std::string start_fault(const World& world) const override;
   // Reward: 1 - d / 1.5 m if the camera sees the target, else 0; success: reward > 0.
   Evaluation evaluate(const World& world) const override;
 
   std::string description(int world) const override;
   Referrals referrals(int world) const override;
-  // position_error (m, on the floor, to the target), success.
+  // Writes position_error (m, horizontal distance to the target) and success.
   void write_info(const World& world, JsonWriter& json) const override;
   std::vector<std::shared_ptr<Sensor>> create_task_sensors() const override;
 
-  // For planners: distance (m) of the target from a point of the floor.
+  // For planners: horizontal distance (m) of the target from a point on the floor.
   double distance(const World& world, double x, double y) const;
-  // Whether the camera would see the target from there, X_WC.
+  // Whether the target is visible from the camera pose X_WC.
   bool sees(const World& world, const Pose& camera) const;
   Pose camera_pose(const World& world) const { return sight_.pose(world.data); }
   const BaseRoutes* routes() const { return routes_.get(); }
@@ -54,16 +57,16 @@ class NavToObjTask final : public ObjectTask {
   Judgement judgement(const World& world) const;
   void find_camera();
   void set_target(int world, int target);
-  // Whether no other object of the episode has the same text.
+  // Whether the text of this object is unique among the objects of the episode.
   bool alone(int world, int index) const;
   std::optional<Pose> start_place(int world, const Pose& placed, const StateRow& state,
                                   Rng& rng) const;
 
   Sight sight_;
-  std::vector<std::vector<Vec3>> points_;          // of each object, to look at
-  std::unique_ptr<BaseRoutes> routes_;             // null: the base does not drive
-  std::vector<std::pair<double, double>> places_;  // of the floor, where the robot may start
-  std::vector<int> targets_;                       // [B], of the scene's objects
+  std::vector<std::vector<Vec3>> points_;          // surface points of each object, body frame
+  std::unique_ptr<BaseRoutes> routes_;             // null if the base cannot drive
+  std::vector<std::pair<double, double>> places_;  // possible start positions on the floor, m
+  std::vector<int> targets_;                       // [B], index of a scene object
 };
 
 }  // namespace mjsense

@@ -17,12 +17,13 @@ std::string last_part(const std::string& name) { return name.substr(name.rfind('
 
 struct Nav : testing::Test, PlayedTask<NavToObjTask> {
   Nav() : PlayedTask(task_cfg("rby1"), 2) {}
-  // The robot at a distance from its target, facing it or away; false where there is no such place.
+  // Places the robot at a distance (m) from its target, turned away from it by `turned` (rad).
+  // False if no placement is free. Facing the target, the robot must also see it.
   bool stand(double distance, double turned) {
     const double* at = data->xpos + 3 * task.objects(0)[0].body;
     const Vec3 target = vec3(at);
     const auto& base = task.robot().group("base").qpos;
-    // From the side on which there is most floor: try all around for one that is free.
+    // Try directions all around the target until a placement is free.
     for (int k = 0; k < 36; ++k) {
       const double a = k * 3.14159265 / 18;
       const BasePose p{target.x - distance * std::cos(a), target.y - distance * std::sin(a),
@@ -56,7 +57,7 @@ TEST_F(Nav, RewardFallsWithTheDistanceOfWhatIsSeen) {
   EXPECT_EQ(tested, 3);
 }
 
-// Out of sight wherever the robot drives: such a start is drawn again.
+// A start is rejected if the target is not visible from any base pose.
 TEST_F(Nav, WhatIsSeenFromNowhereIsNoTarget) {
   start(0);
   EXPECT_EQ(task.start_fault(world), "");
@@ -78,7 +79,7 @@ TEST_F(Nav, WhatStandsBehindSomethingIsNotSeen) {
   qpos[2] = 10;  // above the ceiling
   mj_forward(model, data.get());
   EXPECT_FALSE(task.sees(world, camera));
-  // Before the camera, wherever it looks.
+  // In front of the camera.
   write_vec(camera * Vec3{0, 0, -0.4}, qpos);
   mj_forward(model, data.get());
   EXPECT_TRUE(task.sees(world, camera));
@@ -87,8 +88,8 @@ TEST_F(Nav, WhatStandsBehindSomethingIsNotSeen) {
   EXPECT_FALSE(task.sees(world, camera));
 }
 
-// What is named, labelled and judged is one body, and no other object of the episode has its name. The floor has two
-// mugs, which are both there in some episodes.
+// The text, the labels and the evaluation refer to one body, and no other object of the episode has
+// its name. The floor scene has two mugs, which are both present in some episodes.
 TEST_F(Nav, TheTargetIsTheOnlyObjectOfItsKind) {
   int pairs = 0;
   std::set<std::string> named;
@@ -98,7 +99,7 @@ TEST_F(Nav, TheTargetIsTheOnlyObjectOfItsKind) {
     EXPECT_EQ(task.description(0), "Navigate to the " + target.name);
     EXPECT_EQ(task.start_fault(world), "");
     named.insert(target.name);
-    std::map<std::string, int> there;  // objects by the last part of their bodies' names
+    std::map<std::string, int> there;  // present objects by the last part of their body names
     for (int body = 1; body < model->nbody; ++body) {
       if (task.present(0, body) && model->body_dofnum[body] == 6)
         ++there[last_part(mj_id2name(model, mjOBJ_BODY, body))];
@@ -114,7 +115,7 @@ TEST_F(Nav, TheTargetIsTheOnlyObjectOfItsKind) {
   EXPECT_GT(named.size(), 5u);
 }
 
-// Judged is the labelled object, also where another one is nearer and in sight.
+// The labelled object is evaluated even if another object is closer and visible.
 TEST_F(Nav, AnotherObjectInFrontOfTheRobotIsNoSuccess) {
   start(0);
   ASSERT_TRUE(stand(1.2, 0));
@@ -141,8 +142,8 @@ TEST_F(Nav, AnEpisodeDependsOnItsNumberAlone) {
   EXPECT_EQ(qpos, std::vector<double>(data->qpos, data->qpos + model->nq));
 }
 
-// The robot's discs are clear of walls, and so is the camera that follows it: no wall is between the middle of the
-// robot and the camera, which is not behind its back.
+// The follower camera, like the discs of the robot's footprint, is clear of walls: no wall is
+// between the middle of the robot and the camera, which is less than 0.35 m away horizontally.
 TEST_F(Nav, TheFollowerIsInsideTheHouse) {
   const int camera = mj_name2id(model, mjOBJ_CAMERA, "robot_0/camera_follower");
   ASSERT_GE(camera, 0);
@@ -154,7 +155,7 @@ TEST_F(Nav, TheFollowerIsInsideTheHouse) {
     write_vec({base.x, base.y, eye.z}, from);
     write_vec(eye - Vec3{base.x, base.y, eye.z}, to);
     constexpr mjtByte kDrawn[mjNGROUP] = {1, 1, 1, 0, 0, 0};
-    // From above the head outwards.
+    // A ray from above the head to the camera.
     const double wall = mj_ray(model, data.get(), from, to, kDrawn, 1, -1, nullptr, nullptr);
     EXPECT_TRUE(wall < 0 || wall > 1) << "episode " << episode;
   }

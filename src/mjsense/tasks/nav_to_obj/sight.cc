@@ -39,7 +39,7 @@ bool Sight::sees(const mjModel* m, const mjData* d, const Pose& from, int body,
 
 std::vector<Vec3> sight_points(const ObjectShape& shape, int count) {
   std::vector<Vec3> points{{0, 0, 0.5 * (shape.low + shape.high)}};
-  // Each the farthest from those before it.
+  // Farthest point sampling: each point is the farthest from all previous ones.
   std::vector<double> nearest(shape.points.size(), 1e10);
   while (static_cast<int>(points.size()) < count && points.size() <= shape.points.size()) {
     std::size_t far = 0;
@@ -47,7 +47,7 @@ std::vector<Vec3> sight_points(const ObjectShape& shape, int count) {
       nearest[i] = std::min(nearest[i], norm(shape.points[i] - points.back()));
       if (nearest[i] > nearest[far]) far = i;
     }
-    // A ray to the very rim may miss it.
+    // Move the point inwards, because a ray to the silhouette may miss the body.
     points.push_back(0.97 * shape.points[far] + 0.03 * points[0]);
   }
   return points;

@@ -12,7 +12,8 @@ namespace {
 
 constexpr double kDeg = std::numbers::pi / 180;
 
-// A camera at the origin that looks along x, z up, 60 degrees from the bottom to the top of a picture of 4:3, and a ball 2 m away.
+// A camera at the origin that looks along x with z up, a vertical field of view of 60 degrees, a
+// 4:3 image, and a ball 2 m away.
 struct Sighting : testing::Test {
   Sighting() {
     mjSpec* spec = mj_parseXMLString(R"(<mujoco><worldbody>
@@ -26,7 +27,7 @@ struct Sighting : testing::Test {
     data.reset(mj_makeData(model.get()));
     sight = Sight(model.get(), 0, 4, 3);
   }
-  // The ball in this direction, degrees to the left and up from the camera's axis.
+  // Moves the ball to this direction: degrees to the left of and above the camera's axis.
   bool sees(double left, double up) {
     return sees_at({2, 2 * std::tan(left * kDeg), 2 * std::tan(up * kDeg)});
   }

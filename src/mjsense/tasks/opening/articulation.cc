@@ -12,13 +12,14 @@
 namespace mjsense {
 namespace {
 
-constexpr double kLeastTravel = 0.05, kLeastSwing = 0.3;   // m, rad: less is a button or a knob
-constexpr double kLeastLever = 0.08;                       // m, from a hinge to its handle
-constexpr double kThick = 0.062;                           // m, that a hand goes round
-constexpr double kLeastLength = 0.012, kMostLength = 0.8;  // m, of a handle
-constexpr double kProtrusion = 0.0008;                     // m, beyond everything else
+constexpr double kLeastTravel = 0.05,
+                 kLeastSwing = 0.3;   // m, rad: smaller ranges are buttons or knobs
+constexpr double kLeastLever = 0.08;  // m, minimum distance of the handle from the hinge
+constexpr double kThick = 0.062;      // m, maximum thickness that a gripper can enclose
+constexpr double kLeastLength = 0.012, kMostLength = 0.8;  // m, length of a handle
+constexpr double kProtrusion = 0.0008;  // m, minimum protrusion beyond all other parts
 
-// Words in names, and the category that each means.
+// Words in body names and their categories.
 constexpr std::array<std::pair<std::string_view, std::string_view>, 14> kWordsOfThings{
     {{"drawer", "drawer"},
      {"microwave", "microwave"},
@@ -48,16 +49,16 @@ struct Box {
   }
 };
 
-// A geom that moves with the joint: its box in the frame of the joint's body.
+// A geom that moves with the joint, as a box in the frame of the joint's body.
 struct Part {
   int geom;
-  Pose pose;  // of the box
+  Pose pose;  // pose of the box
   Vec3 half;
-  bool named;  // "handle" or "knob"
-  Box box;     // along the body's axes
+  bool named;  // its name contains "handle" or "knob"
+  Box box;     // bounding box along the body's axes
 };
 
-// Pose of `body` in the frame of `root`, null if something between them moves.
+// Pose of `body` in the frame of `root`; nullopt if there is a joint between them.
 std::optional<Pose> rigid_pose(const mjModel* m, int body, int root) {
   Pose pose;
   for (; body != root; body = m->body_parentid[body]) {
@@ -98,14 +99,14 @@ Vec3 axis_of(const Pose& pose, int i) {
   return rotate(pose.q, {i == 0 ? 1.0 : 0, i == 1 ? 1.0 : 0, i == 2 ? 1.0 : 0});
 }
 
-// Half of the extent of a part along a direction.
+// Half the extent of a part along a unit vector.
 double half_along(const Part& part, Vec3 direction) {
   double sum = 0;
   for (int i = 0; i < 3; ++i) sum += std::abs(dot(direction, axis_of(part.pose, i))) * part.half[i];
   return sum;
 }
 
-// Whether its two shorter extents fit into a hand, and which is the longest.
+// Whether the two shorter extents fit into a gripper; `longest` is set to the axis of the longest.
 bool is_bar(const Part& part, int& longest) {
   longest = 0;
   for (int i = 1; i < 3; ++i) {
@@ -118,12 +119,12 @@ bool is_bar(const Part& part, int& longest) {
   return length >= kLeastLength && length <= kMostLength;
 }
 
-// How far a part stands out beyond the others in a direction along the body's axes.
+// Distance by which a part protrudes beyond all others along one axis of the body (m).
 double protrusion(const std::vector<Part>& parts, const Part& one, int axis, int sign) {
   const auto reach = [&](const Part& p) { return sign > 0 ? p.box.high[axis] : -p.box.low[axis]; };
   double others = -1e10;
   for (const Part& p : parts) {
-    // What is itself a handle's - its posts - does not hide it.
+    // Other parts of the same handle, such as its posts, are ignored.
     if (p.geom != one.geom && !(one.named && p.named)) others = std::max(others, reach(p));
   }
   return reach(one) - others;
@@ -142,7 +143,8 @@ std::optional<Handle> find_handle(const std::vector<Part>& parts) {
         const Vec3 outward{axis == 0 ? double(sign) : 0, axis == 1 ? double(sign) : 0,
                            axis == 2 ? double(sign) : 0};
         Vec3 along = axis_of(part.pose, longest);
-        // A bar stands across the direction in which it stands out; a knob has no long side.
+        // A bar must be perpendicular to the direction in which it protrudes. A knob has no long
+        // side.
         if (std::abs(dot(along, outward)) > 0.5) {
           const int other = (longest + 1) % 3;
           along = axis_of(part.pose, other);
@@ -166,7 +168,8 @@ std::string category_of(const mjModel* m, int body, bool slide) {
   for (int b = body; b > 0 && found.empty(); b = m->body_parentid[b]) {
     const std::string name = lower(name_of(m, mjOBJ_BODY, b));
     for (const auto& [word, category] : kWordsOfThings) {
-      // "door" alone says little: what it is the door of stands further up, or beside it.
+      // "door" is ambiguous: it counts only in the name of a top-level body with the joint.
+      // Otherwise the names of ancestors decide, then the name of the joint.
       if (category == "door" && b != body) continue;
       if (name.find(word) != name.npos && !(category == "door" && m->body_parentid[b] > 0)) {
         found = category;
@@ -214,7 +217,7 @@ std::vector<Articulation> find_articulations(const mjModel* m, std::string_view 
     if ((!slide && m->jnt_type[j] != mjJNT_HINGE) || !m->jnt_limited[j] || driven[j]) continue;
     const int body = m->jnt_bodyid[j];
     if (m->body_jntnum[body] != 1) continue;
-    // Nothing of the robot; nothing that hangs on what moves by itself.
+    // Skip joints of the robot and joints of bodies that have an ancestor with a joint.
     const std::string root = name_of(m, mjOBJ_BODY, m->body_rootid[body]);
     const std::string name = name_of(m, mjOBJ_BODY, body);
     if (!robot_prefix.empty() && (root.starts_with(robot_prefix) || name.starts_with(robot_prefix)))
@@ -245,7 +248,7 @@ std::vector<Articulation> find_articulations(const mjModel* m, std::string_view 
     }
     one.name = name;
     one.category = category_of(m, body, slide);
-    // A slide that pulls its handle straight out of a cabinet is a drawer of it.
+    // A slide of a cabinet that moves along the handle's outward direction is a drawer.
     const double pull = dot(vec3(m->jnt_axis + 3 * j), one.handle.outward);
     if (slide && one.category == "cabinet" && std::abs(pull) > 0.7) one.category = "drawer";
     one.text = one.category;

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
-// What opens and closes in a model: drawers, doors of cabinets, microwaves, fridges. Found, not
-// listed: a limited hinge or slide whose body has something that a hand can pull.
+// Detection of articulated furniture in a model: drawers and the doors of cabinets, microwaves and
+// fridges. An articulation is a limited hinge or slide joint whose body has a graspable handle.
 
 #include <mujoco/mujoco.h>
 
@@ -14,39 +14,39 @@
 
 namespace mjsense {
 
-// What a hand takes: a bar or knob, in the frame of the joint's body.
+// A bar or knob that a gripper can grasp, in the frame of the joint's body.
 struct Handle {
   int geom = -1;
   Vec3 middle;
-  Vec3 along;                                // unit, of its longest extent
+  Vec3 along;                                // unit vector along the longest extent
   double half_along = 0;                     // m
-  Vec3 outward;                              // unit, away from what it is fixed to
-  double half_across = 0, half_outward = 0;  // m, across both, and along `outward`
+  Vec3 outward;                              // unit vector away from the front that it is fixed to
+  double half_across = 0, half_outward = 0;  // m, perpendicular to both axes; along `outward`
 };
 
 struct Articulation {
   int joint = -1, body = -1, qpos = -1, dof = -1;
   bool slide = false;
   double low = 0, high = 0;  // range: rad or m
-  // The ends: closed is the one nearer to 0.
+  // Joint positions at the ends of the range; `closed` is the end nearer to 0.
   double closed = 0, open = 0;
-  std::string name;      // full, of its body
-  std::string category;  // what counts as the same kind: "drawer"
-  std::string text;      // what people call it
+  std::string name;      // full name of its body
+  std::string category;  // kind of furniture, such as "drawer"
+  std::string text;      // name for task descriptions
   Handle handle;
 
   double range() const { return high - low; }
-  // |q| / range, the measure of open.
+  // Opening fraction |q| / range.
   double fraction(double q) const { return (q < 0 ? -q : q) / range(); }
-  // The position whose fraction this is, between closed and open.
+  // The joint position with this opening fraction, between closed and open.
   double at(double fraction) const;
-  // How the body has moved in the world when the joint goes from one position to another, given
-  // its axis and anchor in the world.
+  // Motion of the body in the world frame when the joint moves from one position to another. `axis`
+  // and `anchor` are the joint's, in the world frame.
   Pose motion(double from, double to, Vec3 axis, Vec3 anchor) const;
 };
 
-// In the order of the model. Joints of bodies whose names start with `robot_prefix` (unless empty),
-// and those with actuators, are left out.
+// In the order of the model's joints. Joints with actuators are skipped, and joints of bodies whose
+// names start with `robot_prefix` (unless it is empty).
 std::vector<Articulation> find_articulations(const mjModel* model, std::string_view robot_prefix);
 
 }  // namespace mjsense

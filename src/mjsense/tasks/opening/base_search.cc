@@ -26,14 +26,14 @@ HandleReach::Start BaseSearch::placed(const HandleReach::Start& start, const Pos
   return out;
 }
 
-// Of a hand that floats: before the handle, as it would take it.
+// For a floating gripper: in front of the handle, oriented as for a grasp.
 Pose BaseSearch::before(const Pose& body, const Articulation& one, double distance, double aside,
                         double turn) const {
   const ArmAndHand& hand = reach_.hands()[0];
   const double opening = robot_.groups()[hand.gripper].max_opening;
   const std::vector<HandleGrasp> grasps = propose_handle_grasps(one.handle, body, opening);
   if (grasps.empty()) return usual_;
-  const Vec3 back{0.5 * aside, 0, -(0.1 + 0.5 * distance)};  // an arm is not in between
+  const Vec3 back{0.5 * aside, 0, -(0.1 + 0.5 * distance)};  // closer, because there is no arm
   return reach_.base_with(
       hand, grasps[0].pose * Pose{back, axis_angle({0, 1, 0}, turn)} * Pose{{}, hand.turn});
 }
@@ -52,7 +52,7 @@ BasePlaces BaseSearch::places(const Articulation& one, double from, double to) c
 
 std::vector<Pose> BaseSearch::search(const Articulation& one, double from, double to,
                                      bool driving) const {
-  // The handle as it is seen from above, and where it looks.
+  // The handle's position and outward direction in the horizontal plane.
   const Pose body = reach_.body_pose(empty_, one, from);
   const Vec3 handle = body * one.handle.middle, out = rotate(body.q, one.handle.outward);
   const double flat = std::hypot(out.x, out.y);

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
-// Where a robot's base can stand to open or close something.
+// Search for base placements from which a robot can open or close an articulation.
 
 #include <map>
 #include <mutex>
@@ -11,14 +11,15 @@
 namespace mjsense {
 
 struct BaseSearchCfg {
-  int candidates = 80;  // places tried for a target
-  int wanted = 6;       // places kept
-  int grasps = 10;      // tried at each
-  // m and rad, about a point before the handle.
+  int candidates = 80;  // base placements tried for each target
+  int wanted = 6;       // maximum number of base placements kept
+  int grasps = 10;      // maximum number of grasps tried at each
+  // m and rad: range of sampled base placements relative to a point in front of the handle.
   double nearest = 0.30, farthest = 0.90, aside = 0.55, turn = 0.35;
 };
 
-// Where a base can stand; `driving`: the arm alone does not do it from there.
+// Possible base placements. `driving`: the base must drive during the motion, because the arm alone
+// cannot complete it.
 struct BasePlaces {
   std::vector<Pose> at;  // X_WB
   bool driving = false;
@@ -26,15 +27,16 @@ struct BasePlaces {
 
 class BaseSearch {
  public:
-  // `empty`: a start without what differs from episode to episode; `usual`: where the base stands then.
+  // `empty`: a start without the objects that vary between episodes; `usual`: the base placement
+  // there.
   BaseSearch(const Robot& robot, const HandleReach& reach, HandleReach::Start empty,
              const Pose& usual, BaseSearchCfg cfg = {});
 
-  // The start with the robot's base there, in its start configuration without noise.
+  // `start` with the robot's base at `base`, in the initial configuration without noise.
   HandleReach::Start placed(const HandleReach::Start& start, const Pose& base) const;
-  // Places from which `one` goes from `from` to `to` in the empty scene, at the height of the usual one,
-  // which is tried first; those from which the base drives meanwhile where there are no others. Found
-  // once for this articulation, then kept.
+  // Base placements from which the robot can move `one` from `from` to `to` in the empty scene, at
+  // the height of the usual placement, which is tried first. Placements that need a driving base
+  // are returned only if there are no others. Results are cached per articulation. Thread-safe.
   BasePlaces places(const Articulation& one, double from, double to) const;
 
  private:
@@ -48,7 +50,7 @@ class BaseSearch {
   Pose usual_;
   BaseSearchCfg cfg_;
   mutable std::mutex mutex_;
-  mutable std::map<int, BasePlaces> known_;  // by joint
+  mutable std::map<int, BasePlaces> known_;  // by joint id
 };
 
 }  // namespace mjsense

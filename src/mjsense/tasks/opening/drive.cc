@@ -10,9 +10,9 @@ namespace {
 constexpr double kShares[] = {0.75, 1.0, 0.5, 0.25, 0.0};
 constexpr double kPlaces[] = {0, -0.15, 0.15, -0.3, 0.3};  // m
 constexpr double kTurns[] = {0, -0.35, 0.35};              // rad
-constexpr std::size_t kMost = 90;                          // of these, by cost
-constexpr double kUpright = 0.7;                           // of an axis
-// Costs in metres: of a share other than the first, and of a turn.
+constexpr std::size_t kMost = 90;                          // number of candidates kept, by cost
+constexpr double kUpright = 0.7;                           // minimum |z| of a vertical axis
+// Costs in metres: of a share that differs from the first one, and of a turn.
 constexpr double kShareCost = 0.3, kTurnCost = 0.4;  // m, m/rad
 
 double cost(const Drive& d) {
@@ -40,7 +40,7 @@ BasePose driven(const BasePose& from, const Drive& drive, const HandleMotion& mo
                 double part) {
   BasePose base = from;
   if (!motion.one->slide && std::abs(motion.axis.z) > kUpright) {
-    // About the hinge as seen from above.
+    // Rotate about the hinge in the horizontal plane.
     const double angle = drive.share * part * (motion.to - motion.from) * motion.axis.z;
     const double c = std::cos(angle), s = std::sin(angle);
     const double x = from.x - motion.anchor.x, y = from.y - motion.anchor.y;

@@ -15,7 +15,7 @@ namespace {
 
 using std::numbers::pi;
 
-// From above, the base B and the hinge H; a quarter turn to the left brings B to B'.
+// Top view of the base B and the hinge H. A rotation by 90 degrees to the left moves B to B'.
 //
 //        B'
 //        |
@@ -30,14 +30,14 @@ TEST(Drive, WithAShareOfOneTheBaseGoesAroundTheHinge) {
   const BasePose half = driven({2, 2, 0.1}, {.share = 1}, motion, {}, 0.5);
   EXPECT_NEAR(half.x, 1 + std::sqrt(0.5), 1e-12);
   EXPECT_NEAR(half.y, 2 + std::sqrt(0.5), 1e-12);
-  // What is beyond that grows along the way.
+  // The additional offset grows linearly along the path.
   const BasePose aside = driven({2, 2, 0}, {.x = 0.2, .y = -0.4, .turn = 0.3}, motion, {}, 0.5);
   EXPECT_NEAR(aside.x, 2.1, 1e-12);
   EXPECT_NEAR(aside.y, 1.8, 1e-12);
   EXPECT_NEAR(aside.yaw, 0.15, 1e-12);
 }
 
-// A drawer, and a lid whose hinge lies: the base goes where the handle goes, on the floor.
+// For a drawer, or a lid with a horizontal hinge, the base follows the handle's horizontal motion.
 TEST(Drive, OtherwiseItGoesWithTheHandle) {
   Articulation drawer;
   drawer.slide = true;
@@ -53,8 +53,8 @@ TEST(Drive, OtherwiseItGoesWithTheHandle) {
   EXPECT_NEAR(away.y, 0.2, 1e-12);
 }
 
-// RB-Y1 at the fridge, farther than its arms alone lead the door: the hand stays on the handle, to the
-// accuracy of inverse kinematics, and nothing touches but it.
+// RB-Y1 opens the fridge farther than its arms alone can. The gripper stays on the handle to the
+// accuracy of inverse kinematics, and no other part of the robot touches anything.
 TEST(Drive, BaseAndArmKeepTheHandOnItsWay) {
   TaskCfg cfg;
   cfg.robot = robot_cfg("rby1");
@@ -92,7 +92,7 @@ TEST(Drive, BaseAndArmKeepTheHandOnItsWay) {
   EXPECT_LT(norm(tool.p - last.p), 2e-4);
   EXPECT_LT(angle_between(tool.q, last.q), 2e-4);
   EXPECT_GT(norm(base.p - places.at[0].p), 0.1);
-  // There, as MuJoCo sees it, the hand alone touches, and the door alone is touched.
+  // In MuJoCo's contacts, only the gripper touches something, and only the door is touched.
   mju_copy(data->qpos, there.qpos.data(), scene.model()->nq);
   for (int group : {way->hand.arm, reach.base()}) {
     for (std::size_t i = 0; i < robot.groups()[group].qpos.size(); ++i)
@@ -136,7 +136,7 @@ TEST(Opening, WhatIsOpenIsTheRobotsMatter) {
     EXPECT_FALSE(task.evaluate(world).success) << name;
     data->qpos[one.qpos] = one.at(opened + 0.001);
     EXPECT_TRUE(task.evaluate(world).success) << name;
-    // Where it counts is where obj_end says.
+    // The success threshold corresponds to the pose in obj_end.
     data->qpos[one.qpos] = one.at(opened);
     mj_kinematics(scene.model(), data.get());
     const Pose goal = *task.goal_pose(0, "pickup_obj");

@@ -16,15 +16,17 @@ namespace {
 
 constexpr std::array<double, 5> kTilts{0, 0.35, -0.35, 0.7, -0.7};  // rad, about the handle
 constexpr std::array<double, 3> kTurns{0, 0.4, -0.4};               // rad, across the handle
-constexpr std::array<double, 3> kPlaces{0, 0.45, -0.45};            // of its half length
-constexpr double kSideGap = 0.004;                                  // m, pads to the handle
+constexpr std::array<double, 3> kPlaces{0, 0.45, -0.45};            // fractions of its half length
+constexpr double kSideGap = 0.004;  // m, clearance between the pads and the handle
 
-// Fingers close along any direction across the approach: where the pads are, in the tool's frame.
+// Rotation about the approach axis to the closing direction, which is found from the positions of
+// the open pads in the tool frame.
 Quat closing_turn(const MoveGroup& gripper, const mjModel* model) {
   if (gripper.pad_sites[0] < 0 || gripper.leaf_site < 0) return {};
   const std::unique_ptr<mjData, void (*)(mjData*)> data(call_mujoco(mj_makeData, model),
                                                         mj_deleteData);
-  for (std::size_t i = 0; i < gripper.qpos.size(); ++i) {  // open: the range's wider end
+  for (std::size_t i = 0; i < gripper.qpos.size();
+       ++i) {  // open: the end of the range with the larger opening
     const int joint = gripper.joints[std::min(i, gripper.joints.size() - 1)];
     const double low = model->jnt_range[2 * joint], high = model->jnt_range[2 * joint + 1];
     if (model->jnt_type[joint] == mjJNT_SLIDE && model->jnt_limited[joint])
@@ -38,7 +40,7 @@ Quat closing_turn(const MoveGroup& gripper, const mjModel* model) {
                                     vec3(data->site_xpos + 3 * gripper.pad_sites[0]));
   if (std::hypot(apart.x, apart.y) < 1e-4) return {};
   const double angle = 0.5 * std::numbers::pi - std::atan2(apart.y, apart.x);
-  // A right angle or none: pads that are a little off the middle turn nothing.
+  // Only 0 or 90 degrees: pads that are slightly off-center must not rotate the frame.
   return axis_angle({0, 0, 1},
                     0.5 * std::numbers::pi * std::round(angle / (0.5 * std::numbers::pi)));
 }
@@ -72,7 +74,7 @@ std::vector<HandleGrasp> propose_handle_grasps(const Handle& handle, const Pose&
   const Vec3 middle = body * handle.middle;
   const bool knob = handle.half_along < 0.03;
   for (int side = 0; side < (knob ? 2 : 1); ++side) {
-    // The fingers close across the bar; a knob may be taken both ways.
+    // The fingers close perpendicular to the bar. A knob may also be grasped along it.
     const Vec3 bar = side == 0 ? along : normalized(cross(along, outward));
     const double across = side == 0 ? handle.half_across : handle.half_along;
     if (2 * across + 2 * kSideGap > max_opening) continue;

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
-// How a hand takes the handle of a drawer or a door.
+// Grasp poses for the handles of drawers and doors.
 
 #include <mujoco/mujoco.h>
 
@@ -11,23 +11,24 @@
 
 namespace mjsense {
 
-// An arm and its gripper: move groups of a robot. A hand that floats is both.
+// Move groups of an arm and its gripper. A floating gripper is both (arm == gripper).
 struct ArmAndHand {
   int arm = -1, gripper = -1;
-  Quat turn;  // from a tool frame whose fingers close along y to the hand's own
+  Quat turn;  // from a tool frame whose fingers close along y to the gripper's own tool frame
   bool floats() const { return arm == gripper; }
 };
-// Those whose gripper is an arm's leaf, or hangs on a base that floats, in the robot's order.
+// All pairs in which the gripper is attached to the arm, and all floating grippers, in the robot's
+// order.
 std::vector<ArmAndHand> arms_with_hands(const Robot& robot, const mjModel* model);
 
-// Where the tool takes a handle: z the approach, y the closing direction, the origin between the
-// finger tips.
+// Tool pose for grasping a handle: z is the approach direction, y the closing direction, and the
+// origin lies between the finger tips.
 struct HandleGrasp {
   Pose pose;  // X_WT
   double cost = 0;
 };
-// By rising cost: straight on in the middle first, then from other sides and places. `body` is the
-// pose of the handle's body.
+// Grasps by increasing cost: first the straight approach at the middle of the handle, then other
+// directions and positions. `body`: X_WB of the handle's body. `max_opening`: m.
 std::vector<HandleGrasp> propose_handle_grasps(const Handle& handle, const Pose& body,
                                                double max_opening);
 

@@ -14,13 +14,14 @@ namespace mjsense {
 namespace {
 
 constexpr std::string_view kScene = "kitchen";
-// Where planners stop: fractions of the range. A drawer is pulled well out, a door swung until it is
-// plainly open.
+// Fractions of the range that planners aim at: a drawer is pulled far out, and a door is swung
+// until it is clearly open.
 constexpr double kAimSlide = 0.55, kAimHinge = 0.38;
-constexpr double kBeyond = 0.06;  // what counts, at least
-// A base stands a little different in every episode.
+constexpr double kBeyond =
+    0.06;  // minimum margin beyond the success threshold, fraction of the range
+// The base placement varies slightly between episodes.
 constexpr double kSpread = 0.02, kTurn = 0.05;  // m, rad
-constexpr int kTries = 12;                      // grasps tried from it
+constexpr int kTries = 12;                      // maximum number of grasps tried from a placement
 
 }  // namespace
 
@@ -54,7 +55,7 @@ std::optional<OpeningTask::Found> OpeningTask::find_base(const Articulation& one
                                                          const HandleReach::Start& start,
                                                          Rng& rng) const {
   const double to = aim(one);
-  // Places are those of the middle of what episodes begin with.
+  // Base placements are searched once, for the middle of the range of start positions.
   const double middle =
       kind_ == OpeningKind::kOpen ? one.closed : one.at(0.5 * (kLeastStart + kMostStart));
   BasePlaces places = bases_->places(one, middle, to);
@@ -80,8 +81,8 @@ std::optional<Pose> OpeningTask::sample_scene(int world, Rng& rng, const StateRo
   const Pose usual = scene().sample(world, -1, cfg().seed, episode, rng, state);
   for (const Articulation& one : articulations_) state.qpos[one.qpos] = one.closed;
 
-  // Categories are equally likely, and so are the things of one. A target that cannot be reached
-  // leaves its place to the next.
+  // Categories are equally likely, and so are the articulations within a category. If a target
+  // cannot be reached, the next one in this random order is used.
   std::vector<std::string> categories;
   for (const Articulation& one : articulations_) {
     if (std::ranges::find(categories, one.category) == categories.end())

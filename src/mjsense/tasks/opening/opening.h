@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
-// Open or close something of a scene: a drawer, a door of a cabinet, a microwave, a fridge. Whatever
-// articulation.h finds in the model may be the target of an episode.
+// The open and close tasks: open or close a drawer or the door of a cabinet, microwave or fridge.
+// Every articulation found by articulation.h can be the target of an episode.
 
 #include <string>
 #include <vector>
@@ -18,28 +18,31 @@ enum class OpeningKind { kOpen, kClose };
 class OpeningTask final : public ObjectTask {
  public:
   static constexpr std::string_view kRole = "pickup_obj";
-  // Fractions of the range; success, and where a close begins. What is open is the robot's matter
-  // (RobotCfg::opened).
+  // Fractions of the range: success of `close`, and the range of its start. The success threshold
+  // of `open` depends on the robot (RobotCfg::opened).
   static constexpr double kClosed = 0.85;
   static constexpr double kLeastStart = 0.35, kMostStart = 0.65;
 
-  // In cfg.scene; by default in a kitchen.
+  // Plays in cfg.scene; the default scene is a kitchen.
   OpeningTask(TaskCfg cfg, OpeningKind kind);
   std::string_view name() const override { return type(); }
   std::string_view type() const override { return kind_ == OpeningKind::kOpen ? "open" : "close"; }
-  // An object inside something, or a target that the robot reaches from nowhere.
+  // Rejects starts in which an object penetrates another one, or in which the target is unreachable
+  // from every base placement.
   std::string start_fault(const World& world) const override;
 
   void begin(const World& world) override;
-  // Reward of open: the most of |q| / range over all things of the target's category; of close: 1 -
-  // |q| / range of the target. Success: it is at least opened(), 0.85.
+  // Reward of `open`: the maximum of |q| / range over all articulations of the target's category.
+  // Reward of `close`: 1 - |q| / range of the target. Success: the reward is at least opened() for
+  // `open`, 0.85 for `close`.
   Evaluation evaluate(const World& world) const override;
 
   std::string description(int world) const override;  // "Open the drawer"
   Referrals referrals(int world) const override;
-  // The body where the joint is as far as counts.
+  // Pose of the body at the joint position where success begins.
   std::optional<Pose> goal_pose(int world, std::string_view role) const override;
-  // episode_step, joint_position (rad or m, of the first thing of the category), success.
+  // Writes episode_step, joint_position (rad or m, of the category's first articulation) and
+  // success.
   void write_info(const World& world, JsonWriter& json) const override;
   std::vector<std::shared_ptr<Sensor>> create_task_sensors() const override;
 
@@ -49,9 +52,9 @@ class OpeningTask final : public ObjectTask {
   std::span<const Articulation> articulations() const { return articulations_; }
   const Articulation& target(int world) const { return articulations_[targets_[world].index]; }
   const HandleReach& reach() const { return *reach_; }
-  // Whether the robot stands where its arm alone does not do it.
+  // Whether the base must drive during the motion, because the arm alone cannot complete it.
   bool driving(int world) const { return targets_[world].driving; }
-  // Joint position that a planner brings the target to: well beyond what counts.
+  // Joint position that a planner aims at, well beyond the success threshold.
   double aim(const Articulation& one) const;
 
  protected:
@@ -62,7 +65,7 @@ class OpeningTask final : public ObjectTask {
   struct Target {
     int index = 0;
     bool reached = true;
-    bool driving = false;  // the arm alone does not do it
+    bool driving = false;  // the arm alone cannot complete the motion
     Pose goal;
   };
   double reward(const World& world) const;

@@ -75,7 +75,7 @@ ModelPtr compiled(const std::string& bodies) {
   return model;
 }
 
-// A front of 0.4 x 0.2 m at x = 0 that looks to -x, with a bar 5 cm before it.
+// A front of 0.4 x 0.2 m at x = 0 that faces -x, with a bar 5 cm in front of it.
 std::string box_with_bar(const std::string& name, const std::string& joint,
                          const std::string& more = "") {
   return "<body name='" + name + "' pos='1 0 0.5'>" + joint +
@@ -136,7 +136,7 @@ TEST(Articulations, NamesSayWhatItIs) {
     ASSERT_EQ(found.size(), 1u) << body;
     EXPECT_EQ(found[0].category, category);
   }
-  // A range about 0 from below: closed at its end near 0, open at the other.
+  // A range with negative positions: closed is the end near 0, open the other one.
   const auto found = find_articulations(compiled(box_with_bar("cabinet_top", out)).get(), "");
   EXPECT_EQ(found[0].closed, 0);
   EXPECT_EQ(found[0].open, -.3);
@@ -191,7 +191,7 @@ TEST(Opening, AnEpisodeDependsOnItsNumberAlone) {
   EXPECT_NE(qpos, std::vector<double>(stage.data->qpos, stage.data->qpos + stage.model->nq));
   stage.start(2, 5);
   EXPECT_EQ(qpos, std::vector<double>(stage.data->qpos, stage.data->qpos + stage.model->nq));
-  other.start(0, 5);  // its first: nothing was found before
+  other.start(0, 5);  // the first search of this stage: nothing is cached
   EXPECT_EQ(qpos, std::vector<double>(other.data->qpos, other.data->qpos + other.model->nq));
   EXPECT_EQ(what, stage.task.description(2));
 }
@@ -215,7 +215,8 @@ TEST(Opening, StartsCanBePlayedAndDiffer) {
   EXPECT_EQ(places.size(), 20u);
 }
 
-// Open: the most of all things of the category, whichever it is; 0.15 of the range is enough.
+// The reward of `open` is the maximum over all articulations of the category. The Franka needs 0.15
+// of the range.
 TEST(Opening, OpenCountsEveryThingOfTheKind) {
   Stage stage(franka(), OpeningKind::kOpen);
   const World w = stage.start(1, 3);
@@ -252,7 +253,7 @@ TEST(Opening, CloseCountsTheTargetAlone) {
     stage.data->qpos[target.qpos] = target.at(0.151);
     EXPECT_EQ(stage.task.evaluate(w).lacks, "it is not closed far enough");
     EXPECT_THAT(stage.task.description(1), HasSubstr("Close the " + target.text));
-    // Where it counts as closed is where obj_end says.
+    // The success threshold of `close` corresponds to the pose in obj_end.
     stage.data->qpos[target.qpos] = target.at(0.15);
     mj_kinematics(stage.model, stage.data.get());
     const Pose goal = *stage.task.goal_pose(1, "pickup_obj");
@@ -272,9 +273,9 @@ TEST(Opening, ARobotDoesNotStandInACupboard) {
                           stage.task.robot().base_pose(w));
   EXPECT_TRUE(stage.task.reach().stands_free(start));
   const auto at = [&](double x) { return search.placed(start, {{x, 0, 0}, {}}); };
-  EXPECT_FALSE(stage.task.reach().stands_free(at(0.1)));  // the pedestal in the fronts
+  EXPECT_FALSE(stage.task.reach().stands_free(at(0.1)));  // the pedestal penetrates the fronts
   EXPECT_TRUE(stage.task.reach().stands_free(at(-0.9)));
-  // The pedestal in a wall.
+  // The pedestal penetrates a wall.
   const int wall = resolve(stage.model, mjOBJ_GEOM, "room/wall_x0", "test");
   const double inside =
       stage.model->geom_pos[3 * wall] + stage.model->geom_size[3 * wall + 2];  // its face
@@ -282,8 +283,9 @@ TEST(Opening, ARobotDoesNotStandInACupboard) {
   EXPECT_TRUE(stage.task.reach().stands_free(at(inside + 0.3)));
 }
 
-// The arm goes straight in its joints from each point of the way to the next: it stays with the handle
-// there, too. What is found at first is found again from where a slack arm stands.
+// The arm is interpolated linearly in joint space between the points of the path. The gripper must
+// stay on the handle there, too. A path must be found again from the pose of an arm that deviates
+// slightly.
 TEST(Opening, OnAWayTheHandStaysWithTheHandle) {
   Stage stage(franka(), OpeningKind::kClose);
   const HandleReach& reach = stage.task.reach();
@@ -296,7 +298,7 @@ TEST(Opening, OnAWayTheHandStaysWithTheHandle) {
     const double from = stage.data->qpos[one.qpos], to = stage.task.aim(one);
     HandleReach::Start start = reach.start_of(w);
     const auto way = reach.find(start, one, from, to, 12, false);
-    if (!way) continue;  // such a start is drawn again
+    if (!way) continue;  // a start without a path is rejected and sampled again
     ++found;
     const int arm = way->hand.arm;
     const Pose base = robot.base_pose(w);
@@ -317,8 +319,8 @@ TEST(Opening, OnAWayTheHandStaysWithTheHandle) {
   EXPECT_GE(found, 45);
 }
 
-// Things as near as 5 mm to an arm are in its way, where they stand in their world.
-// Its tool goes with the handle as a door goes about its hinge; at the start it hangs in front of it, clear of everything.
+// The tool of a floating gripper moves with the handle about the door's hinge. At the start, it
+// floats in front of the handle without touching anything.
 TEST(Opening, AHandThatFloatsGoesOnAScrew) {
   TaskCfg cfg;
   cfg.robot = robot_cfg("floating_rum");
@@ -343,7 +345,7 @@ TEST(Opening, AHandThatFloatsGoesOnAScrew) {
     const Pose body = reach.body_pose(start, one, from), later = reach.body_pose(start, one, to);
     const Pose in_it = inverse(body) * way->grasp, then = inverse(later) * way->end;
     EXPECT_NEAR(norm(in_it.p - then.p), 0, 1e-9);
-    // A screw from the one to the other keeps it there all the way.
+    // A screw motion between the two poses keeps the tool on the handle halfway, too.
     const Pose half = way->grasp * exp6(0.5 * log6(inverse(way->grasp) * way->end));
     const Pose between = inverse(reach.body_pose(start, one, 0.5 * (from + to))) * half;
     EXPECT_NEAR(norm(in_it.p - between.p), 0, 1e-9);
@@ -351,6 +353,7 @@ TEST(Opening, AHandThatFloatsGoesOnAScrew) {
   }
 }
 
+// An obstacle 5 mm from the arm blocks the path. Its pose is taken from the world's own model.
 TEST(Opening, WhatAnArmComesNearIsThatOfItsWorld) {
   Stage stage(franka(), OpeningKind::kOpen);
   const World w = stage.start(0, 0);
@@ -372,7 +375,8 @@ TEST(Opening, WhatAnArmComesNearIsThatOfItsWorld) {
   }
   for (const Articulation& one : stage.task.articulations()) {
     const int top = m->body_parentid[one.body];
-    if (top == 0 || one.category == "drawer") continue;  // drawers share theirs with others
+    if (top == 0 || one.category == "drawer")
+      continue;  // drawers share the body with other drawers
     mjModel other = *m;
     std::vector<double> pos(m->body_pos, m->body_pos + 3 * m->nbody);
     other.body_pos = pos.data();
@@ -387,7 +391,7 @@ TEST(Opening, WhatAnArmComesNearIsThatOfItsWorld) {
       return least;
     };
     mj_kinematics(m, d);
-    // Its handle goes to a pad.
+    // Moves the handle towards a pad.
     const Pose body{vec3(d->xpos + 3 * one.body), quat(d->xquat + 4 * one.body)};
     const Vec3 by = vec3(d->geom_xpos + 3 * pad) - body * one.handle.middle;
     const auto gap = [&](double part) {
@@ -396,10 +400,10 @@ TEST(Opening, WhatAnArmComesNearIsThatOfItsWorld) {
       mj_kinematics(&other, d);
       return nearest();
     };
-    double low = 0, high = 1;  // the last part of the way there at which 5 mm are between
+    double low = 0, high = 1;  // find by bisection the fraction at which the gap is 5 mm
     for (int k = 0; k < 30; ++k)
       (gap(0.5 * (low + high)) > 0.005 ? low : high) = 0.5 * (low + high);
-    if (std::abs(gap(low) - 0.005) > 1e-3) continue;  // in something else's way
+    if (std::abs(gap(low) - 0.005) > 1e-3) continue;  // another geom is closer
     const auto near = reach.start_of(World{.id = 0, .model = &other, .data = d});
     EXPECT_FALSE(reach.stands_free(near)) << one.name;
     EXPECT_NEAR(norm(reach.body_pose(near, one, one.closed).p - vec3(d->xpos + 3 * one.body)), 0,

@@ -12,9 +12,10 @@
 namespace mjsense {
 namespace {
 
-constexpr int kOfRobot = 1 << 30;   // contact bit of the robot's geoms
-constexpr double kBuiltSo = 0.002;  // m between links at the start
-constexpr double kUnder = 0.7;      // of a contact's normal upwards: what a base stands on
+constexpr int kOfRobot = 1 << 30;  // contact bit of the robot's geoms
+constexpr double kBuiltSo =
+    0.002;  // m, links closer than this at the initial pose are exempt from checks
+constexpr double kUnder = 0.7;  // minimum |z| of the normal of a contact with the ground
 
 }  // namespace
 
@@ -30,7 +31,7 @@ HandleReach::HandleReach(const mjModel* model, const Robot& robot, HandleReachCf
       scratch_(own_.get()) {
   for (int b = 1; b < model->nbody; ++b) {
     of_robot_[b] = name_of(model, mjOBJ_BODY, b).starts_with(robot.prefix());
-    // Links without a name belong to what carries them.
+    // A body without a name belongs to the robot if its parent does.
     if (!of_robot_[b] && name_of(model, mjOBJ_BODY, b).empty())
       of_robot_[b] = of_robot_[model->body_parentid[b]];
     for (const ArmAndHand& hand : hands_) {
@@ -46,17 +47,17 @@ HandleReach::HandleReach(const mjModel* model, const Robot& robot, HandleReachCf
     if (!of_robot_[model->geom_bodyid[g]]) continue;
     const int body = model->geom_bodyid[g];
     own_->geom_margin[g] = base_ >= 0 && fixed_[body] ? cfg_.room : cfg_.clearance;
-    // What the broad phase looks at.
+    // The broad phase uses these margins.
     own_->body_margin[body] =
         std::max(own_->body_margin[body], own_->geom_margin[g] + model->geom_gap[g]);
     if (!model->geom_contype[g] && !model->geom_conaffinity[g]) continue;
-    // Its links touch each other here, whatever they do in the simulation.
+    // Here the robot's links collide with each other even if they do not in the simulation.
     own_->geom_contype[g] |= kOfRobot;
     own_->geom_conaffinity[g] |= kOfRobot;
     own_->body_contype[body] |= kOfRobot;
     own_->body_conaffinity[body] |= kOfRobot;
   }
-  // Links that meet at the start are built so.
+  // Pairs of links in contact at the initial pose are exempt from collision checks.
   const ScratchData::Loan loan = scratch_.borrow();
   mjData* data = loan.get();
   for (std::size_t g = 0; g < robot.groups().size(); ++g) {
@@ -107,8 +108,8 @@ void HandleReach::show(mjData* data, const RobotValues& values) const {
   if (base_ >= 0) set(base_);
 }
 
-// Everything else is as far from the robot; `hand` may touch what it holds. A base that drives keeps
-// off what it does not stand on.
+// True if everything else is at least `clearance` away from the robot. `hand` may touch the `held`
+// articulation. A driving base may touch only the ground.
 bool HandleReach::free(mjData* data, const Start& start, double clearance, const Articulation* held,
                        const ArmAndHand* hand, bool driving) const {
   const mjModel* m = &start.model;
@@ -128,7 +129,7 @@ bool HandleReach::free(mjData* data, const Start& start, double clearance, const
     if (!of_robot_[mine]) std::swap(mine, other);
     const bool beside = driving && fixed_[mine] && std::abs(contact.frame[2]) < kUnder;
     if (beside) return false;
-    // What it stands on touches its base.
+    // The ground touches the base, so bodies fixed to the base have a smaller clearance.
     if (contact.dist > (fixed_[mine] ? cfg_.contact : clearance)) continue;
     if (held && of_gripper_[mine] == hand->gripper && is_below(m, other, held->body)) continue;
     return false;
@@ -153,11 +154,12 @@ Pose HandleReach::body_pose(const Start& start, const Articulation& one, double 
   return {vec3(data->xpos + 3 * one.body), quat(data->xquat + 4 * one.body)};
 }
 
-// The arm goes straight from one configuration to the next; the first may be anywhere.
+// Whether the arm can move in a straight line in joint space from each configuration to the next.
 bool HandleReach::way_is_free(mjData* data, const Start& start, int arm,
                               std::span<const RobotValues> way) const {
   const std::size_t n = robot_.groups()[arm].qpos.size();
-  for (std::size_t k = way.size() - 1; k > 0; --k) {  // the end is the likeliest to be barred
+  for (std::size_t k = way.size() - 1; k > 0;
+       --k) {  // start at the end, which is most likely blocked
     const auto &a = way[k - 1][arm].values, &b = way[k][arm].values;
     double most = 0;
     for (std::size_t i = 0; i < n; ++i) most = std::max(most, std::abs(b[i] - a[i]));
@@ -173,14 +175,14 @@ bool HandleReach::way_is_free(mjData* data, const Start& start, int arm,
   return true;
 }
 
-// What a start shows of the robot and of what it is to move.
+// Quantities computed once per start and used for all grasps.
 struct HandleReach::Seen {
   RobotValues now;
   Pose to_base;  // X_BW
-  Pose body;     // X_W of the handle's body
+  Pose body;     // X_WB of the handle's body
   Vec3 axis, anchor;
-  BasePose base;  // of one that drives
-  double z = 0;   // m, of its frame
+  BasePose base;  // of a driving base
+  double z = 0;   // m, height of its frame
 };
 
 HandleReach::Seen HandleReach::see(mjData* data, const Start& start, const Articulation& one,
@@ -209,7 +211,7 @@ void HandleReach::set(mjData* data, const Start& start, const Articulation& one,
   data->qpos[one.qpos] = q;
 }
 
-// The arm's positions while it has the handle, from `q` at the handle on, and the base's.
+// Computes the positions of arm and base while the handle is held, starting at `q`.
 bool HandleReach::go_along(const Seen& seen, const HandleMotion& motion, RobotValues q,
                            HandleWay& way) const {
   const int points = way.drive ? cfg_.drive_points : cfg_.points, arm = way.hand.arm;
@@ -225,7 +227,8 @@ bool HandleReach::go_along(const Seen& seen, const HandleMotion& motion, RobotVa
     }
     const RobotValues last = q;
     if (!robot_.ik(arm, to_base * motion.at(part) * way.grasp, q, Chain::kTracking)) return false;
-    // Between points joints go straight: after a leap the hand would leave the handle.
+    // Joints are interpolated linearly between points. After a large jump, the gripper would leave
+    // the handle in between.
     for (int i = 0; k > 0 && i < q[arm].size; ++i) {
       if (std::abs(q[arm].values[i] - last[arm].values[i]) > cfg_.jump) return false;
     }
@@ -246,7 +249,8 @@ bool HandleReach::along_is_free(mjData* data, const Start& start, const HandleMo
   return true;
 }
 
-// With the base on its way, too: where the arm reaches the end is tried first.
+// Tries to hold the handle with a driving base. The arm's pose at the end is checked first, because
+// this check is cheap.
 bool HandleReach::try_drives(mjData* data, const Start& start, const Seen& seen,
                              const HandleMotion& motion, const RobotValues& before,
                              HandleWay& way) const {
@@ -268,7 +272,7 @@ bool HandleReach::try_drives(mjData* data, const Start& start, const Seen& seen,
   return false;
 }
 
-// Straight to the pregrasp, or by way of a point farther back.
+// Finds a path to the pregrasp: a straight one, or one through a via point behind the pregrasp.
 bool HandleReach::way_there(mjData* data, const Start& start, const Seen& seen,
                             const RobotValues& before, HandleWay& way) const {
   const int arm = way.hand.arm;
@@ -288,12 +292,13 @@ bool HandleReach::try_grasp(mjData* data, const Start& start, const Seen& seen,
                             const HandleMotion& motion, bool driving, HandleWay& way) const {
   const int arm = way.hand.arm;
   way.pregrasp = seen.to_base * way.grasp * Pose{{0, 0, -cfg_.pregrasp}, {}};
-  // From the posture that arms begin with, so that a little noise on it changes nothing.
+  // Inverse kinematics starts from the initial posture without noise, so that noise does not change
+  // the solution.
   RobotValues before = seen.now;
   before[arm].set(robot_.cfg().groups[arm].init);
   if (before[arm].size != seen.now[arm].size) before[arm] = seen.now[arm];
   if (!robot_.ik(arm, way.pregrasp, before, 2 * Chain::kTracking)) return false;
-  // It can reach all that; is anything in the way?
+  // The pregrasp is reachable. Check the motion with the handle for collisions.
   if (driving ? !try_drives(data, start, seen, motion, before, way)
               : !go_along(seen, motion, before, way) || !along_is_free(data, start, motion, way))
     return false;

@@ -1,7 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
-// How an arm takes a handle and moves it along: joint positions all the way, free of collisions, by
-// MuJoCo on data of its own. The task asks where a base can stand; the planner follows.
+// Collision-free arm motions that grasp a handle and move its articulation, as joint positions
+// along the whole path. Collisions are checked by MuJoCo on separate mjData. The task uses this to
+// find base placements; the planner executes the path.
 
 #include <mujoco/mujoco.h>
 
@@ -21,30 +22,30 @@
 
 namespace mjsense {
 
-// One way to do it, of one arm or of a hand that floats, which goes on screws.
+// A path for one arm, or for a floating gripper, which moves on screws.
 struct HandleWay {
   ArmAndHand hand;
   Pose grasp;                      // X_WT
-  Pose on_body;                    // the same in the frame of the handle's body
-  std::vector<Pose> there;         // X_WT of a hand that floats, from the start to the pregrasp
-  Pose end;                        // X_WT with the handle at the end of its way
+  Pose on_body;                    // the grasp in the frame of the handle's body
+  std::vector<Pose> there;         // X_WT of a floating gripper from the start to the pregrasp
+  Pose end;                        // X_WT with the handle at the end of its motion
   std::vector<RobotValues> go;     // joint positions from the start to the pregrasp, at least two
-  std::vector<RobotValues> along;  // with the handle; the first is where it is now
-  std::optional<Drive> drive;      // of the base meanwhile, whose places are in `along`
+  std::vector<RobotValues> along;  // while holding the handle; the first is at its current pose
+  std::optional<Drive> drive;      // of the base, whose poses are part of `along`
   Pose pregrasp;                   // X_BT
 };
 
 struct HandleReachCfg {
   double pregrasp = 0.04;    // m before the grasp, against the approach
-  int points = 11;           // of the arc, ends included
-  int drive_points = 17;     // likewise, where the base drives
-  double room = 0.02;        // m, that a base keeps from everything while it drives
-  double jump = 0.5;         // rad, of a joint from one point to the next
-  double clearance = 0.010;  // m, of the robot to everything on the way there
-  double contact = -0.001;   // m, what counts as touching while it has the handle
-  double step = 0.10;        // rad, of any joint between two checks of the way
-  double line_step = 0.02;   // m, of a hand that floats; a turn counts as on a radius of 0.2 m
-  // m before the pregrasp: by way of such points it goes where the straight way is barred.
+  int points = 11;           // along the handle's path, ends included
+  int drive_points = 17;     // the same, if the base drives
+  double room = 0.02;        // m, clearance of a driving base
+  double jump = 0.5;         // rad, maximum change of a joint between two points
+  double clearance = 0.010;  // m, clearance of the robot on the path to the pregrasp
+  double contact = -0.001;   // m, contact distance below which a contact counts while holding
+  double step = 0.10;        // rad, maximum change of a joint between two collision checks
+  double line_step = 0.02;   // m, the same for a floating gripper; 1 rad counts as 0.2 m
+  // m behind the pregrasp: via points that are tried if the straight path is blocked.
   std::array<double, 2> detours{0.12, 0.22};
 };
 
@@ -53,9 +54,9 @@ class HandleReach {
   HandleReach(const mjModel* model, const Robot& robot, HandleReachCfg cfg = {});
 
   std::span<const ArmAndHand> hands() const { return hands_; }
-  // A world from which ways are sought: its model, which differs from those of other worlds in where
-  // furniture stands and how large things are, with margins about the robot; positions and mocap poses.
-  // Valid as long as this and what the model was taken from.
+  // The state of a world in which paths are searched: its model with collision margins around the
+  // robot, its positions and mocap poses. Models differ between worlds in furniture poses and
+  // object sizes. The HandleReach and the source of the model must outlive it.
   struct Start {
     mjModel model;
     std::vector<double> qpos, mocap_pos, mocap_quat;
@@ -63,20 +64,21 @@ class HandleReach {
   Start start_of(const World& world) const;
   Start start_of(const mjModel& model, const StateRow& state) const;
   bool drives() const { return base_ >= 0; }
-  int base() const { return base_; }  // group, -1: it stands where it is put
-  // X_WB with the tool of a hand that floats at X_WT.
+  int base() const { return base_; }  // move group; -1: the base cannot move
+  // X_WB of a floating gripper whose tool is at X_WT.
   Pose base_with(const ArmAndHand& hand, const Pose& tool) const;
-  // The articulation goes from `from` to `to`, the robot standing as `start` says; with `driving` its
-  // base drives meanwhile. Nothing: it cannot, or stands in something. At most `most_tries` grasps are
-  // tried an arm.
+  // A path that moves the articulation from `from` to `to` with the robot as in `start`. With
+  // `driving`, the base drives during the motion. Returns nullopt if there is no path or if the
+  // robot is in collision at the start. At most `most_tries` grasps are tried per arm.
   std::optional<HandleWay> find(const Start& start, const Articulation& one, double from, double to,
                                 int most_tries, bool driving) const;
-  // The rest of a way for an arm that has gone to its pregrasp, the handle being where it is now.
+  // The rest of the path `before` for an arm at its pregrasp, recomputed for the handle's current
+  // pose.
   std::optional<HandleWay> again(const Start& start, const Articulation& one, double from,
                                  double to, const HandleWay& before) const;
   // X_WB of the articulation's body, its joint at `q`.
   Pose body_pose(const Start& start, const Articulation& one, double q) const;
-  // Whether the robot at the start is clear of everything, and of itself.
+  // Whether the robot at the start is free of collisions with the scene and with itself.
   bool stands_free(const Start& start) const;
 
  private:
@@ -109,10 +111,11 @@ class HandleReach {
   HandleReachCfg cfg_;
   int base_;
   std::vector<ArmAndHand> hands_;
-  std::vector<char> of_robot_;   // [nbody]
-  std::vector<char> fixed_;      // [nbody] of the robot, and no joint below the base moves it
-  std::vector<int> of_gripper_;  // [nbody] group, -1
-  std::vector<std::pair<int, int>> built_so_;  // geoms of the robot that touch at the start
+  std::vector<char> of_robot_;  // [nbody]
+  std::vector<char> fixed_;     // [nbody] bodies of the robot that are rigidly attached to its base
+  std::vector<int> of_gripper_;  // [nbody] move group of the gripper, or -1
+  std::vector<std::pair<int, int>>
+      built_so_;  // geoms of the robot in contact at the initial pose, exempt
   mutable ScratchData scratch_;
 };
 

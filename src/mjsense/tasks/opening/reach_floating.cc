@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// The part of a hand that floats: its tool goes on screws, and nothing keeps it from any pose.
+// The part of HandleReach for floating grippers. The tool moves on screws and can reach every pose.
 
 #include <algorithm>
 #include <cmath>
@@ -25,14 +25,14 @@ bool HandleReach::screw_is_free(mjData* data, const Start& start, const ArmAndHa
   const Twist screw = log6(inverse(from) * to);
   const double length = std::max(norm(screw.v), 0.2 * norm(screw.w));
   const int steps = std::max(1, static_cast<int>(std::ceil(length / cfg_.line_step)));
-  for (int k = steps; k > 0; --k) {  // the end is the likeliest to be barred
+  for (int k = steps; k > 0; --k) {  // start at the end, which is most likely blocked
     float_to(data, hand, from * exp6((static_cast<double>(k) / steps) * screw));
     if (!free(data, start, cfg_.clearance, nullptr, nullptr)) return false;
   }
   return true;
 }
 
-// Straight to the pregrasp, or by way of a point farther back.
+// Finds a path to the pregrasp: a straight one, or one through a via point behind the pregrasp.
 bool HandleReach::try_floating(mjData* data, const Start& start, const Pose& base,
                                const HandleMotion& motion, HandleWay& way) const {
   for (int k = 0; k < cfg_.points; ++k) {

@@ -17,7 +17,7 @@ namespace {
 using std::numbers::pi;
 
 constexpr std::string_view kScene = "varied_table";
-constexpr double kLift = 0.01;  // m of success
+constexpr double kLift = 0.01;  // m, lift at which the task succeeds
 constexpr double kGoal = 0.05;  // m, goal above the start
 
 }  // namespace
@@ -62,8 +62,9 @@ void PickTask::set_target(int world, int target) {
   set_object(world, object.body, object.text);
 }
 
-// True if the first contact that bears the object from below is not the robot's: its point below
-// the middle of the object, its normal within 80 degrees of up.
+// True if the first contact that supports the object from below is with a body other than the
+// robot. A supporting contact is below the middle of the object, with a normal within 80 degrees of
+// up.
 bool PickTask::borne_by_others(const World& world, int body) const {
   const mjModel* m = world.model;
   const double middle = world_box(world, body).center().z;
@@ -81,7 +82,7 @@ bool PickTask::borne_by_others(const World& world, int body) const {
   return false;
 }
 
-// "" where the robot, and nothing else, holds the object in the air.
+// The unmet condition of success; "" if only the robot holds the object in the air.
 std::string_view PickTask::lacks(const World& world) const {
   const int body = object(world.id).body;
   if (world.data->xpos[3 * body + 2] - start(world.id).p.z < kLift)

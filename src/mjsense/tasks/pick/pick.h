@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
-// Pick up one of the objects of a scene: success is the object 1 cm up and touched by nothing but
-// the robot.
+// The pick task: pick up one of the objects of a scene. Success: the object is at least 1 cm above
+// its start, and the robot is the only body that touches it.
 
 #include <array>
 #include <string>
@@ -17,19 +17,19 @@ class PickTask final : public ObjectTask, public GraspScene {
  public:
   static constexpr std::string_view kRole = "pickup_obj";
 
-  // In cfg.scene; by default on a table in a room.
+  // Plays in cfg.scene; the default scene is a table in a room.
   explicit PickTask(TaskCfg cfg);
   std::string_view name() const override { return "pick"; }
   std::string_view type() const override { return "pick"; }
 
-  // Reward: height above the start (m), where nothing but the robot bears the object.
+  // Reward: height above the start (m) while no other body supports the object.
   Evaluation evaluate(const World& world) const override;
 
   std::string description(int world) const override;
   Referrals referrals(int world) const override;
   std::optional<Pose> goal_pose(int world,
                                 std::string_view role) const override;  // 5 cm above the start
-  // episode_step, position_error (m, to the goal), rotation_error (rad), success.
+  // Writes episode_step, position_error (m, to the goal), rotation_error (rad) and success.
   void write_info(const World& world, JsonWriter& json) const override;
   std::vector<std::shared_ptr<Sensor>> create_task_sensors() const override;
 
@@ -54,8 +54,8 @@ class PickTask final : public ObjectTask, public GraspScene {
 
   Standing standing_;
   std::vector<GraspObject> objects_;
-  std::vector<int> things_;   // of objects_, what may be the target
-  std::vector<int> targets_;  // [B], of objects_
+  std::vector<int> things_;   // indices in objects_ of possible targets
+  std::vector<int> targets_;  // [B], index in objects_
   int robot_root_ = -1;
 };
 

@@ -108,13 +108,13 @@ TEST_F(Pick, LiftedByNothingIsNoSuccess) {
   object_qpos()[2] += 0.05;
   mj_forward(model, data.get());
   e = task.evaluate(w);
-  EXPECT_NEAR(e.reward, 0.05, 1e-9);  // nothing else bears it
+  EXPECT_NEAR(e.reward, 0.05, 1e-9);  // no other body supports it
   EXPECT_FALSE(e.success);            // but the robot does not touch it
 }
 
 TEST_F(Pick, LyingOnAnotherObjectIsNoSuccess) {
   start(0, 1);
-  // On another object: high enough, but not the robot's doing.
+  // On top of another object: high enough, but not held by the robot.
   const int target = task.target(0);
   const auto& other = task.all_objects()[target == 0 ? 1 : 0];
   const Quat turned = quat(data->xquat + 4 * other.body);
@@ -129,11 +129,11 @@ TEST_F(Pick, LyingOnAnotherObjectIsNoSuccess) {
   EXPECT_EQ(e.reward, 0) << "the other object bears it";
 }
 
-// An object that the robot holds, and nothing else touches, is lifted; one that touches anything else is not.
+// An object counts as lifted only if the robot touches it and nothing else does.
 TEST_F(Pick, SuccessNeedsTheRobotsTouchAlone) {
   start(0, 1);
   const int target = task.target(0);
-  // Into the robot: onto a part of the gripper that can be touched.
+  // Move the object onto a colliding part of the gripper.
   const int gripper = resolve(model, mjOBJ_BODY, "robot_0/gripper/base", "test");
   const double* g = data->xpos + 3 * gripper;
   write_vec({g[0], g[1], g[2]}, object_qpos());
@@ -142,7 +142,7 @@ TEST_F(Pick, SuccessNeedsTheRobotsTouchAlone) {
   EXPECT_TRUE(task.evaluate(w).success);
   EXPECT_FALSE(task.evaluate(w).terminal) << "success ends an episode only if asked";
 
-  // Another object against it, as well held: no success any more.
+  // Another object touches it: no success, although the robot still touches it.
   const auto& other = task.all_objects()[target == 0 ? 1 : 0];
   double* q = data->qpos + model->jnt_qposadr[model->body_jntadr[other.body]];
   const Vec3 before = vec3(q);
@@ -163,7 +163,7 @@ TEST_F(Pick, SuccessNeedsTheRobotsTouchAlone) {
   EXPECT_TRUE(task.evaluate(w).success);
 }
 
-// One centimetre: not before.
+// Success begins at a lift of one centimeter.
 TEST_F(Pick, SuccessIsOneCentimetreUp) {
   start(0, 1);
   const int gripper = resolve(model, mjOBJ_BODY, "robot_0/gripper/base", "test");
@@ -180,7 +180,7 @@ TEST_F(Pick, SuccessIsOneCentimetreUp) {
   }
 }
 
-// Around the target there is room for an open gripper: 7 cm; 2 cm between the others.
+// The target has 7 cm of free space around it for an open gripper; other objects are 2 cm apart.
 TEST_F(Pick, TheTargetStandsClear) {
   double least_target = 1, least_other = 1;
   int tight = 0;
@@ -216,12 +216,12 @@ TEST_F(Pick, TheTargetStandsClear) {
   }
   EXPECT_EQ(tight, 0);
   EXPECT_GE(least_target, 0.07 - 1e-9);
-  EXPECT_LT(least_target, 0.08);  // and no more than that is asked
+  EXPECT_LT(least_target, 0.08);  // the required distance is not larger
   EXPECT_GE(least_other, 0.02 - 1e-9);
   EXPECT_LT(least_other, 0.03);
 }
 
-// Blocks lie, or stand on a side or an end, each as often.
+// Blocks rest on each of their three kinds of faces equally often.
 TEST_F(Pick, BlocksRestInEveryWay) {
   int ways[3] = {};
   for (int episode = 0; episode < 150; ++episode) {
@@ -252,8 +252,8 @@ TEST_F(Pick, EndsWithTheHorizonOrADoneAction) {
   EXPECT_EQ(task.last_action(0), nullptr);
 }
 
-// From the same state the same command reaches the arm with other noise in another episode and in the
-// next step, and with the same in another world.
+// Action noise differs between episodes and between steps, but not between worlds: the same state
+// and command in another world gives the same noise.
 TEST_F(Pick, ActionNoiseBelongsToTheEpisodeAndTheStep) {
   start(0, 5);
   const std::vector<double> qpos(data->qpos, data->qpos + model->nq);

@@ -17,20 +17,21 @@ namespace {
 using std::numbers::pi;
 
 constexpr std::string_view kScene = "tableware";
-constexpr double kGoal = 0.03;                                   // m, goal above the start
-constexpr double kMoved = 0.1, kMovedBeside = 0.05;              // m, most of the receptacle
-constexpr double kTurned = 45 * pi / 180;                        // most of its tilt; its turn
-constexpr double kBeside = 0.05 + 0.01;                          // m, most from above
-constexpr double kSamePlace = 0.005, kSameTurn = 10 * pi / 180;  // of a pose carried forward
-constexpr double kSameHeight = 0.01;  // m, of undersides without contact forces
-constexpr double kBesideGap = 0.03;   // m that a planner aims at
-constexpr double kAround = 0.012;     // m, of a point of a receptacle that counts for a place
+constexpr double kGoal = 0.03;                       // m, goal above the start
+constexpr double kMoved = 0.1, kMovedBeside = 0.05;  // m, maximum displacement of the receptacle
+constexpr double kTurned = 45 * pi / 180;            // rad, maximum tilt or rotation of it
+constexpr double kBeside = 0.05 + 0.01;              // m, maximum horizontal gap
+constexpr double kSamePlace = 0.005,
+                 kSameTurn = 10 * pi / 180;  // m, rad, tolerance of a pose carried forward
+constexpr double kSameHeight = 0.01;  // m, tolerance of underside heights without contact forces
+constexpr double kBesideGap = 0.03;   // m, gap that a planner aims at
+constexpr double kAround = 0.012;     // m, radius of surface points considered for a placement
 
 Pose pose_of(const World& world, int body) {
   return {vec3(world.data->xpos + 3 * body), quat(world.data->xquat + 4 * body)};
 }
 
-// What is said of receptacles that are alike but for the colour: "bowl".
+// Name of receptacles that differ only in color, such as "bowl".
 const std::string& noun(const SceneObject& object) {
   return object.others.empty() ? object.text : object.others[0];
 }
@@ -88,7 +89,8 @@ void PickAndPlaceTask::initialize_task() {
   robot_root_ = model()->body_rootid[robot().base_body()];
 }
 
-// The object, where it goes, and what else must be there; empty if the scene lacks it.
+// Indices of the object, its receptacle and other objects that must be present; empty if the scene
+// does not have them.
 std::vector<int> PickAndPlaceTask::choose(int world, Rng& rng) const {
   const auto any = [&](const std::vector<int>& of) {
     return of[rng.below(static_cast<std::uint32_t>(of.size()))];
@@ -172,7 +174,8 @@ const PickAndPlaceTask::Judgement& PickAndPlaceTask::judge_now(const World& worl
   const Pose displaced = inverse(episode.receptacle_start) * of_receptacle;
   now.moved = displaced.p;
   now.turned = angle_between({}, displaced.q);
-  // Between its axis that was up and up: a turn about it is no tilt.
+  // Tilt is the angle between the vertical and the axis that was vertical at the start. A rotation
+  // about this axis is not tilt.
   const Vec3 up = rotate(conjugate(episode.receptacle_start.q), {0, 0, 1});
   now.tilted = std::acos(std::clamp(rotate(of_receptacle.q, up).z, -1.0, 1.0));
   now.lacks = kind_ == PlaceKind::kNextTo ? lacks_beside(world, now) : lacks_within(now);
@@ -233,7 +236,8 @@ void PickAndPlaceTask::places(const World& world, const Quat& turn, std::vector<
     const Vec3 base = vec3(world.data->xpos + 3 * robot().base_body());
     std::ranges::stable_sort(out, {},
                              [&](Vec3 p) { return std::hypot(p.x - base.x, p.y - base.y); });
-    // Beyond an edge - of a table, onto the robot's pedestal - it would not stand on the same thing.
+    // Remove placements beyond the edge of the supporting surface, such as on the robot's pedestal
+    // next to the table: there the two objects would not be on the same surface.
     const int carrier = bearer(world, body);
     const Vec3 half = 0.5 * (object.high - object.low);
     std::erase_if(out, [&](Vec3 p) {
@@ -241,14 +245,14 @@ void PickAndPlaceTask::places(const World& world, const Quat& turn, std::vector<
     });
     return;
   }
-  // Low where it is open, else on the rim.
+  // The height is that of the receptacle's surface: its bottom if it is open, otherwise its rim.
   const Pose pose = pose_of(world, body);
   std::vector<Vec3> points;
   for (Vec3 point : shape(world.id, episode.receptacle).points) points.push_back(pose * point);
   const auto surface = [&](double x, double y) {
     double top = -std::numeric_limits<double>::infinity();
     for (Vec3 p : points) {
-      // Most are far: asked for thousands of times in a plan.
+      // The first comparison skips distant points early. A plan evaluates this thousands of times.
       const double dx = p.x - x, dy = p.y - y;
       if (std::abs(dx) < kAround && dx * dx + dy * dy < kAround * kAround) top = std::max(top, p.z);
     }
@@ -296,7 +300,7 @@ Task::Referrals PickAndPlaceTask::referrals(int world) const {
   const Episode& episode = episodes_[world];
   Referrals all{referral("pickup_name", episode.target),
                 referral("place_name", episode.receptacle)};
-  // Where its colour tells it from another, no name without the colour will do.
+  // The color distinguishes the receptacle from others, so only the text with the color is valid.
   if (kind_ == PlaceKind::kColor) all[1].second = {{place_text(world), 1.0}};
   return all;
 }

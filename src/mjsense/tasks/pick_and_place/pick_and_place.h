@@ -1,7 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
-// Pick up an object and put it in or on a receptacle, or next to another object. Success: it is carried there by what it
-// is to be on, the robot has let go, and that has hardly moved.
+// The pick-and-place tasks: put an object in or on a receptacle, or next to another object.
+// Success: the object is supported there, the robot has released it, and the receptacle has hardly
+// moved.
 
 #include <array>
 #include <string>
@@ -13,23 +14,25 @@
 
 namespace mjsense {
 
-// In or on any receptacle; next to any object; on the one of several alike that has a colour; into a box.
+// kInOrOn: any receptacle. kNextTo: next to any object. kColor: the receptacle of the given color
+// among several of one kind. kPacking: into a box.
 enum class PlaceKind { kInOrOn, kNextTo, kColor, kPacking };
 
 class PickAndPlaceTask final : public SceneTask, public GraspScene, public PlaceScene {
  public:
   static constexpr std::string_view kObject = "pickup_obj", kReceptacle = "place_receptacle";
 
-  // In cfg.scene; by default on a table with tableware.
+  // Plays in cfg.scene; the default scene is a table with tableware.
   PickAndPlaceTask(PlaceKind kind, TaskCfg cfg);
   // pick_and_place, pick_and_place_next_to, pick_and_place_color, packing.
   std::string_view name() const override;
   std::string_view type() const override { return name(); }
 
-  // An object inside something, or one that already stands next to what it is to be put next to.
+  // Rejects starts in which an object penetrates another one, or in which the object is already
+  // next to the other object (kNextTo).
   std::string start_fault(const World& world) const override;
   void begin(const World& world) override;
-  // Reward: exp(-d), d (m) from the object to the middle of the receptacle's box.
+  // Reward: exp(-d), with d the distance (m) from the object to the center of the receptacle's box.
   Evaluation evaluate(const World& world) const override;
   bool info_follows_evaluation() const override { return true; }
 
@@ -37,7 +40,7 @@ class PickAndPlaceTask final : public SceneTask, public GraspScene, public Place
   std::string description(int world) const override;
   Referrals referrals(int world) const override;
   Pose start_pose(int world, std::string_view role) const override;
-  // Of the object: 3 cm above its start. The receptacle is to stay.
+  // Of the object: 3 cm above its start. The receptacle has no goal pose (nullopt).
   std::optional<Pose> goal_pose(int world, std::string_view role) const override;
   // carry_forward_pos_diff (m), carry_forward_rot_diff (rad), episode_step, position_error (m),
   // receptacle_pos_displacement (m, in its frame at the start), receptacle_rot_displacement (rad),
@@ -63,14 +66,14 @@ class PickAndPlaceTask final : public SceneTask, public GraspScene, public Place
   std::vector<std::pair<std::string, std::string>> scene_info(int world) const override;
 
  private:
-  // What an observation shows.
+  // Evaluation of one observation.
   struct Judgement {
     int step = -1;  // of the episode
     bool supported = false, carried_forward = false, robot_contact = false;
-    std::string_view lacks;             // of a success
-    double pos_diff = 0, rot_diff = 0;  // to the nearest earlier supported pose
+    std::string_view lacks;             // unmet condition of success; "" if none
+    double pos_diff = 0, rot_diff = 0;  // m, rad, to the nearest earlier supported pose
     double position_error = 0;
-    Vec3 moved;  // of the receptacle
+    Vec3 moved;  // displacement of the receptacle, m
     double turned = 0, tilted = 0;
   };
   struct Episode {
@@ -90,7 +93,7 @@ class PickAndPlaceTask final : public SceneTask, public GraspScene, public Place
   PlaceKind kind_;
   Standing standing_;
   std::vector<GraspObject> objects_;
-  mutable std::vector<Episode> episodes_;  // [B]; a judgement is made once an observation
+  mutable std::vector<Episode> episodes_;  // [B]; evaluated once per observation
   int robot_root_ = -1;
 };
 

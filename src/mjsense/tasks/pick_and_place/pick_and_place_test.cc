@@ -18,7 +18,7 @@ namespace {
 using testing::HasSubstr;
 using testing::StartsWith;
 
-// A task whose objects are put where a test wants them.
+// A task whose objects a test can move.
 struct Table {
   explicit Table(PlaceKind kind, const char* scene_name = "") : task(kind, cfg(scene_name)) {
     scene = std::make_unique<Scene>(task.whole_scene_cfg());
@@ -38,7 +38,7 @@ struct Table {
     world = {.id = id, .model = scene->model(), .data = data.get()};
     task.begin(world);
   }
-  // The first episode whose receptacle is this.
+  // Starts the first episode whose receptacle is of this kind.
   void start_with(const std::string& kind) {
     for (int episode = 0; episode < 200; ++episode) {
       start(0, episode);
@@ -58,7 +58,7 @@ struct Table {
     std::fill(v, v + 6, 0.0);
     mj_forward(world.model, data.get());
   }
-  // The object over the middle of the receptacle; both come to rest.
+  // Drops the object above the middle of the receptacle and waits until both are at rest.
   void drop() {
     const WorldBox box = world_box(world, body(1)), object = world_box(world, body(0));
     Pose at = pose(0);
@@ -71,7 +71,7 @@ struct Table {
     for (int i = 0; i < steps; ++i) mj_step(world.model, data.get());
     mj_forward(world.model, data.get());
   }
-  // As another observation.
+  // Evaluates the state as a new observation.
   Evaluation look() {
     task.apply(world, Action{}, state_row(data.get()));
     return task.evaluate(world);
@@ -79,7 +79,7 @@ struct Table {
   nlohmann::json info() {
     std::vector<std::uint8_t> text(4000);
     JsonWriter json(text);
-    json.finite_only().begin_object();  // before the first support there is none to compare with
+    json.finite_only().begin_object();  // before the first support, differences are infinite
     task.write_info(world, json);
     json.end_object();
     return nlohmann::json::parse(std::string(text.begin(), std::ranges::find(text, 0)));
@@ -137,7 +137,7 @@ TEST(PickAndPlace, TheReceptacleMayMoveALittleAndTurnButNotTilt) {
   table.drop();
   ASSERT_TRUE(table.look().success);
   const Pose object = table.pose(0), plate = table.pose(1);
-  // Both together: 9 cm are allowed, 11 are not; a turn about the vertical is.
+  // Moves both together: 9 cm are allowed, 11 cm are not. A rotation about the vertical is allowed.
   const auto both = [&](const Pose& by) {
     table.put(1, {plate.p + by.p, by.q * plate.q});
     table.put(0, {plate.p + by.p + rotate(by.q, object.p - plate.p), by.q * object.q});
@@ -151,7 +151,8 @@ TEST(PickAndPlace, TheReceptacleMayMoveALittleAndTurnButNotTilt) {
   EXPECT_NEAR(table.info()["receptacle_tilt_displacement"].get<double>(), 0.85, 0.02);
 }
 
-// In a bowl the boxes say nothing; where it lay before, it is carried still, 4 mm higher, not 6.
+// Bounding boxes cannot detect support in a bowl. An earlier supported pose is carried forward
+// within 5 mm: support is still assumed 4 mm higher, but not 6 mm higher.
 TEST(PickAndPlace, WhatWasCarriedIsCarriedForward) {
   Table table(PlaceKind::kInOrOn);
   table.start_with("red bowl");
@@ -185,7 +186,7 @@ TEST(PickAndPlace, NextToIsBesideOnTheSameTable) {
   table.start(0, 1);
   EXPECT_THAT(table.task.description(0), HasSubstr("next to the"));
   const Pose start = table.pose(0), other = table.pose(1);
-  // Along y, away from the robot and whatever else lies there.
+  // Offset along y, away from the robot and other objects.
   const auto beside = [&](double gap, Vec3 moved = {}) {
     table.put(1, {other.p + moved, other.q});
     const WorldBox a = world_box(table.world, table.body(0)),
@@ -207,7 +208,7 @@ TEST(PickAndPlace, NextToIsBesideOnTheSameTable) {
   EXPECT_FALSE(table.look().success);
 }
 
-// The robot's pedestal begins where the table ends, 2 cm lower.
+// The robot's pedestal begins at the table's edge, 2 cm below the table top.
 TEST(PickAndPlace, NextToHasNoPlaceBeyondTheTable) {
   Table table(PlaceKind::kNextTo);
   table.start(0, 1);

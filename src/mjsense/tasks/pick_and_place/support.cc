@@ -11,20 +11,20 @@ namespace mjsense {
 namespace {
 
 const double kSteep = std::cos(30 * std::numbers::pi / 180);
-constexpr double kShare = 0.5;    // of the weight; of the box from above
+constexpr double kShare = 0.5;    // minimum fraction of the weight; of the box seen from above
 constexpr double kClose = 0.010;  // m
-constexpr int kOutline = 8;       // points of it that are looked at
-constexpr double kRim = 0.9;      // of a half axis
-constexpr double kAbove = 0.05;   // m, from where it is looked down
+constexpr int kOutline = 8;       // number of tested points on the outline
+constexpr double kRim = 0.9;      // fraction of the half extents
+constexpr double kAbove = 0.05;   // m, height from which rays are cast downwards
 
 struct Touch {
   int other;  // body
   const mjContact* contact;
-  double sign;  // of the contact's frame: its normal points to the object
+  double sign;  // makes the contact's normal point towards the object
   int id;
 };
 
-// Calls f for every contact of `object`'s subtree with something else.
+// Calls f for every contact of the subtree of `object` with another body.
 template <class F>
 void each_touch(const World& world, int object, F&& f) {
   const mjModel* m = world.model;
@@ -124,7 +124,8 @@ int bearer(const World& world, int object) {
   int best = -1;
   double most = 0;
   each_touch(world, object, [&](const Touch& one) {
-    // The sum of each root is made where it is met; a few contacts make it no matter how often.
+    // The force of a root body is summed again for each of its contacts. This is cheap, because
+    // there are few contacts.
     const int root = world.model->body_rootid[one.other];
     Vec3 sum;
     each_touch(world, object, [&](const Touch& touch) {

@@ -30,7 +30,7 @@ struct Support : testing::Test {
     data.reset(mj_makeData(model.get()));
     world = {.id = 0, .model = model.get(), .data = data.get()};
   }
-  // The block at rest, or pushed by `push` N along x until nothing changes.
+  // Places the block and simulates until it is at rest; `push`: constant force along x, N.
   void put(double x, double y, double z, double push = 0, int steps = 1000) {
     mj_resetData(model.get(), data.get());
     double* q = data->qpos + 7;
@@ -45,7 +45,8 @@ struct Support : testing::Test {
   World world;
 };
 
-// A block of 2 x 3 x 4 cm half widths turned by a quarter, and by 30 degrees: |R| times the half widths.
+// A block with half extents of 2 x 3 x 4 cm, rotated by 90 and by 30 degrees. The half extents of
+// its axis-aligned box are |R| times these.
 TEST_F(Support, ABoxAroundWhatIsTurned) {
   put(0.5, 0, 0.2, 0, 0);
   for (int i = 0; i < 3; ++i)
@@ -82,7 +83,7 @@ TEST_F(Support, BesideTheTrayTheTableBears) {
   EXPECT_EQ(bearer(world, kBlock), kTable);
 }
 
-// Pressed against a wall by more than its weight the block hangs on friction: the force of the wall is not upright.
+// The block is pressed against a wall and held by friction. The wall's force is not vertical.
 TEST_F(Support, AWallDoesNotBear) {
   put(-0.459, 0, 0.2, -60);
   const Vec3 force = contact_force(world, kWall, kBlock);
@@ -92,7 +93,8 @@ TEST_F(Support, AWallDoesNotBear) {
   EXPECT_FALSE(carries(world, kWall, kBlock));
 }
 
-// A force bears the block up to 30 degrees from up, and from half of its weight on.
+// A force supports the block if it is within 30 degrees of up and at least half of the block's
+// weight.
 TEST_F(Support, ForcesAreJudgedByAngleAndSize) {
   put(0.5, 0, 0.2, 0, 0);
   const auto force = [](double degrees, double size) {
@@ -122,7 +124,7 @@ TEST_F(Support, WithoutForcesTheNormalIsWithinThirtyDegreesOfUp) {
   }
 }
 
-// Where nothing has been solved, or there is a hair's breadth between the two.
+// No contact forces have been computed, or there is a small gap between the two.
 TEST_F(Support, WithoutForcesTheBoxesDecide) {
   put(0, 0, 0.02 + 0.03 + 0.005, 0, 0);
   EXPECT_EQ(norm(contact_force(world, kTray, kBlock)), 0);
@@ -147,7 +149,7 @@ TEST_F(Support, BoxesAndGaps) {
   EXPECT_NEAR(gap_from_above(a, over), -0.02, 1e-12);
 }
 
-// Things of 6 cm that stand on the table, over its edge at x = 1, on the tray, half on it.
+// Objects of 6 cm on the table, over its edge at x = 1, on the tray, and partly on the tray.
 TEST_F(Support, ASurfaceAllUnderIt) {
   put(0.5, 0, 0.03);
   const Vec3 half{0.03, 0.03, 0.03};
