@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Code that runs for a simulation may look at it, and not move it: in a plain Simulation, in an environment and in a recording."""
+"""User code that runs inside a simulation, an environment or a recording may read the worlds but not step or reset them."""
 
 import gymnasium
 import numpy as np

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What is installed: the public headers, alone and complete, and one version of MuJoCo."""
+"""The installed files: the public headers are complete and include only public headers; there is one version of MuJoCo."""
 
 import re
 from pathlib import Path

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""A lack of memory, and models whose size asks for more than there is, are errors: the process goes on."""
+"""Running out of memory, also because of the sizes in a model, raises an error: the process survives."""
 
 import os
 import resource

@@ -177,7 +177,7 @@ def test_a_robot_by_name_joins_the_scene():
 
     class Methodical(Cart):
         def robot(self):  # pyright: ignore[reportIncompatibleVariableOverride]
-            """Somebody's name for a method of theirs."""
+            """A user's method whose name is also an attribute of Task."""
 
     with pytest.raises(TypeError, match=r"Methodical\.robot is <bound method .*: must be the name of a robot"):
         make(Methodical)

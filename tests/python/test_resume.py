@@ -252,7 +252,7 @@ def test_every_change_is_refused_by_name(lab):
     for name, (change, expected) in changes.items():
         attempt(name, change, expected)
     assert not wrong, "\n".join(wrong)
-    # Without a change it goes on: also with a used policy, and with other worlds and threads.
+    # Without a change the recording resumes, also with a used policy, and with other numbers of worlds and threads.
     done = mjs.record(**{**options, "resume": True, "worlds": 2, "threads": 2})
     assert done.kept == 40 and done.enough and len(done.lengths) < 40
 
