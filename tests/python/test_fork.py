@@ -46,7 +46,7 @@ def sim():
 
 @pytest.mark.parametrize("call", ["step", "reset", "forward"])
 def test_a_copy_raises(sim, call):
-    with pytest.raises(RuntimeError, match=rf"simulation: this process .* was forked from the one that made it \({os.getpid()}\)"):
+    with pytest.raises(RuntimeError, match=rf"simulation: this process .* was forked from the one that created it \({os.getpid()}\)"):
         in_fork(getattr(sim, call))
     sim.step()  # the original still works
 

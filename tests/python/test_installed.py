@@ -20,7 +20,7 @@ def test_public_headers_include_public_headers_only():
         private = [i for i in includes(header) if i not in PUBLIC]
         assert not private, f"{header} includes what is not installed: {private} (cmake/PublicHeaders.cmake)"
         libraries = set(re.findall(r"^#\s*include\s+<([a-z0-9_]+)/", (ROOT / "src" / header).read_text(), re.MULTILINE))
-        assert libraries <= {"mujoco"}, f"{header} includes a library that is an affair of ours: {libraries}"
+        assert libraries <= {"mujoco"}, f"{header} includes a library that users need not have: {libraries}"
 
 
 def test_the_umbrella_is_every_public_header():

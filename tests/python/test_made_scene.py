@@ -110,7 +110,7 @@ def test_frozen_cameras_stand_where_they_stood(tmp_path):
 def test_what_frozen_cameras_lack_is_said(tmp_path):
     file = tmp_path / "cameras.json"
     for text, message in (("[]", "must be JSON, cameras by name"), ('{"eye": {"pos": [1, 2]}}', "'eye': 'pos' must be 3 numbers"),
-                          ('{"eye": {"pos": [1, 2, 3], "fovy": 4, "quat": [1, 0, 0, 0], "body": "desk"}}', "body 'desk' is no robot's")):  # fmt: skip
+                          ('{"eye": {"pos": [1, 2, 3], "fovy": 4, "quat": [1, 0, 0, 0], "body": "desk"}}', "body 'desk' is .* robot")):  # fmt: skip
         file.write_text(text)
         with pytest.raises(ValueError, match=message):
             mjs.make_vec("pick", camera_system=str(file))

@@ -191,7 +191,7 @@ class RobotView:
     def get_gripper(self, gripper_group_id: str) -> Gripper:
         group = self._groups[gripper_group_id]
         if not isinstance(group, Gripper):
-            raise ValueError(f"move group '{gripper_group_id}' is no gripper; {', '.join(self.get_gripper_movegroup_ids())} are")
+            raise ValueError(f"move group '{gripper_group_id}' is not a gripper; grippers: {', '.join(self.get_gripper_movegroup_ids())}")
         return group
 
     def _each(self, what: str, ids: list[str] | None) -> dict[str, np.ndarray]:

@@ -83,5 +83,5 @@ class CollisionCfg(_Tuning):
             for name in (*_STRUCTURE, *_TUNING):
                 value = value_of(getattr(self, name), geom.name)
                 if value is None and name in _STRUCTURE:
-                    raise ValueError(f"CollisionCfg: {name} says nothing of geom '{geom.name}': end the mapping with '.*'")
+                    raise ValueError(f"CollisionCfg: {name} has no value for geom '{geom.name}': end the mapping with '.*'")
                 _set(geom, name, value)
