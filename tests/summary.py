@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""summary.py FOLDER: how many tests passed, and why those that were skipped were. Reads the XML of googletest and pytest there."""
+"""summary.py FOLDER: counts passed and failed tests, and lists the reasons of skipped ones, from the XML of googletest and pytest."""
 
 import pathlib
 import sys

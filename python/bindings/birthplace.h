@@ -21,8 +21,8 @@ class Birthplace {
   void check(const char* what) const {
     if (here()) return;
     throw RuntimeError(std::string(what) + ": this process (" + std::to_string(getpid()) +
-                       ") was forked from the one that made it (" + std::to_string(pid_) +
-                       "), and its threads stayed there; make it after the fork, or start "
+                       ") was forked from the one that created it (" + std::to_string(pid_) +
+                       "), which has its threads; create it after the fork, or start "
                        "processes with 'spawn' or 'forkserver'");
   }
 

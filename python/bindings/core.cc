@@ -66,9 +66,10 @@ void bind_core(nb::module_& m) {
         return place + ": no " + kind + " named '" + name + "'" + suggest(name, names);
       },
       nb::arg("place"), nb::arg("kind"), nb::arg("name"), nb::arg("names"),
-      "What is said of a name that does not exist.");
+      "Error text for a name that does not exist, with the nearest names.");
 
-  nb::class_<SensorSpec>(m, "SensorSpec", "What a measurement is, apart from its value.")
+  nb::class_<SensorSpec>(m, "SensorSpec",
+                         "Description of a measurement: name, type, shape, unit, frame and range.")
       .def_prop_ro(
           "name", [](const SensorSpec& s) { return s.name; },
           "Full name of the stream: \"feet/force\".")

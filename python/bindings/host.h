@@ -39,7 +39,7 @@ class PythonHost : public std::enable_shared_from_this<PythonHost> {
         add_note(error, place);
         throw;
       } catch (const std::bad_cast&) {
-        throw ValueError(place + ": what it returned is of another type than expected");
+        throw ValueError(place + ": returned a value of an unexpected type");
       }
     });
   }

@@ -42,8 +42,8 @@ class Turns {
     if (depth_ > 0) {
       throw RuntimeError(
           std::string(what) +
-          "() is called while the simulation is at work: code of a sensor, task or policy may "
-          "read sensors and the state, but not move the worlds");
+          "() was called while the simulation is running: code of a sensor, task or policy may "
+          "read sensors and the state, but not step or reset the worlds");
     }
     const Depth in(depth_);
     body();

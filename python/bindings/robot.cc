@@ -114,7 +114,7 @@ void bind_robot(nb::module_& m) {
       [](const std::string& name) {
         return std::string(embedded_file("robots/" + name + "/robot.toml"));
       },
-      "The robot.toml of one of ours.");
+      "The robot.toml of a built-in robot.");
   m.def(
       "robot_python_sensors",
       [](const std::string& name_or_path) {

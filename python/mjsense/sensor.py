@@ -35,7 +35,7 @@ def encode_json(value: Any) -> bytes:
 def _plain(value: Any) -> Any:
     if isinstance(value, (np.ndarray, np.generic)):
         return value.tolist()
-    raise TypeError(f"{type(value).__name__} is no JSON value")
+    raise TypeError(f"{type(value).__name__} cannot be converted to JSON")
 
 
 class Sensor(Generic[T]):

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """mjlab's own task files, read from its wheel, with ``mjsense.compat.mjlab`` in the place of what they import for scene and sensors.
 
-Rewards, managers and the rest of training are stood in for by records that keep what they are given.
+Rewards, managers and other parts of training are replaced by objects that store their arguments.
 """
 
 import importlib
@@ -26,7 +26,7 @@ class _Names(type):
 
 
 class Record(metaclass=_Names):
-    """Keeps its arguments as attributes; what was not given is another record."""
+    """Stores its arguments as attributes; any other attribute is another Record."""
 
     def __init__(self, *args, **kwargs):
         vars(self).update(kwargs)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Tasks and policies that several tests play."""
+"""Tasks and policies that several tests use."""
 
 import numpy as np
 
@@ -66,7 +66,7 @@ class Cart(mjs.Task):
 
 
 class Driver(mjs.Policy):
-    """Sees the ball of Cart, and the task itself."""
+    """A policy that observes the ball of Cart and accesses the task itself."""
 
     observation = ("qpos",)
 

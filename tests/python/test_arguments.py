@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Wrong arguments of every public method, and misspelt attributes, are said in one sentence."""
+"""Wrong arguments of every public method, and misspelt attributes, raise errors of one sentence."""
 
 import inspect
 import types
@@ -40,7 +40,7 @@ def ids(function):
     return function.__qualname__
 
 
-NATIVE = {mjs.NativeSensor, mjs.BuiltinSensor, mjs.Entity}  # made by scenes only
+NATIVE = {mjs.NativeSensor, mjs.BuiltinSensor, mjs.Entity}  # created by scenes only
 STATIC = {f.__qualname__: f for c in {*CLASSES, mjs.TaskVectorEnv} - NATIVE for f in methods_of(c) if ids(f) != "TaskVectorEnv.__init__" if f.__module__.startswith("mjsense")}
 STATIC |= {f.__qualname__: f for f in FUNCTIONS if f is not mjs.replace and f.__name__ != "checked"}
 
@@ -56,7 +56,7 @@ def test_wrong_types_are_named(function):
 
 @pytest.fixture(scope="module")
 def live(tmp_path_factory):
-    """An object of every class, and arguments that are right."""
+    """An object of every class, and valid arguments."""
     scene = mjs.Scene(
         mjs.SceneCfg(
             entities={"ball": mjs.EntityCfg(model=BALL)},

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Code that runs for a simulation may look at it, and not move it: in a plain Simulation, in an environment and in a recording."""
+"""User code that runs inside a simulation, an environment or a recording may read the worlds but not step or reset them."""
 
 import gymnasium
 import numpy as np
@@ -62,5 +62,5 @@ def in_environment(sensor, tmp_path):
 def test_worlds_are_not_moved_from_inside(name, kind, place, tmp_path):
     if place is not in_simulation and name not in ("step", "reset"):
         pytest.skip("the same code as in a simulation")
-    with pytest.raises(mjs.SensorError, match=rf"sensor 'mover': .*{name}\(\) is called while the simulation is at work"):
+    with pytest.raises(mjs.SensorError, match=rf"sensor 'mover': .*{name}\(\) was called while the simulation is running"):
         place(kind(CALLS[name]), tmp_path)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The default cameras show what a task is about when an episode begins; MJSENSE_EPISODES=200 looks at as many starts of each pair."""
+"""The default cameras show the objects of a task at the start of an episode. MJSENSE_EPISODES=200 tests 200 starts of each pair."""
 
 import importlib.util
 import os

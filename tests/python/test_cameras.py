@@ -145,7 +145,7 @@ SITE, TENDON = int(mujoco.mjtObj.mjOBJ_SITE), int(mujoco.mjtObj.mjOBJ_TENDON)
 @pytest.mark.parametrize("renderer", ["rays", "opengl"])
 def test_sites_and_tendons_move_with_their_world(renderer):
     s, sim = marked(renderer, num_worlds=3)
-    for _ in range(3):  # so that what stands still is kept
+    for _ in range(3):  # three times, so that cached images of resting geoms are used
         s["eye"].data.rgb
         sim.forward()
     for world in range(3):
@@ -155,7 +155,7 @@ def test_sites_and_tendons_move_with_their_world(renderer):
     kinds = many["segmentation"][..., 1]
     assert (kinds == SITE).sum((1, 2)).min() > 20 and (kinds == TENDON).sum((1, 2)).min() > 10
     assert len({many["segmentation"][world].tobytes() for world in range(3)}) == 3
-    for world in range(3):  # a world looks as it does alone
+    for world in range(3):  # the image equals that of a single world
         one, alone = marked(renderer)
         alone.qpos[0, 0] = 0.3 * world
         alone.forward()

@@ -76,7 +76,7 @@ RIGHT = {
     mjs.SceneRegionCfg: dict(name="top", on="bench/top"),
     mjs.SceneVaryCfg: dict(what="light", pattern=".*"),
 }
-# What is wrong for reasons that are not declared field by field, and the texts of some errors that are.
+# Arguments that violate conditions other than the declared ranges, and the texts of some errors of declared ranges.
 WRONG = [
     (mjs.ContactMatch, dict(mode="goem"), "mode is 'goem': must be one of geom, body, subtree; did you mean 'geom'"),
     (mjs.ContactMatch, dict(pattern=()), "no pattern"),
@@ -166,7 +166,7 @@ ALL: set[Any] = {
 
 
 def fields_of(cls):
-    """The fields that C++ declares with a type; others are written in Python's terms alone."""
+    """The fields that C++ declares with a type; other fields are defined in Python only."""
     return [field for field in SCHEMA[cls.__qualname__]["fields"] if "type" in field]
 
 
@@ -202,7 +202,7 @@ def valid(cls):
 
 
 def outside(field):
-    """Values that the declaration of a field rules out."""
+    """Values that the declaration of a field excludes."""
     kind = field["type"]["kind"]
     if kind == "word":
         yield "no such word"
@@ -256,7 +256,7 @@ def test_values_outside_the_declared_range_are_refused(cls):
 
 
 def test_the_scene_says_the_same():
-    """What is made wrong after it was made right is refused by the scene, in the same words."""
+    """A configuration that becomes invalid after construction is rejected by the scene with the same message."""
     cfg = mjs.ContactSensorCfg(name="feet", primary=MATCH)
     cfg.num_slots = 0
     with pytest.raises(ValueError, match="sensor 'feet': num_slots is 0: must be at least 1"):

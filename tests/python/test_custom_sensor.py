@@ -295,7 +295,7 @@ def test_changing_state_inside_compute_is_refused():
             sim.step()
 
     sim = mjs.Simulation(ball_scene(Greedy()))
-    with pytest.raises(mjs.SensorError, match=r"step\(\) is called while the simulation is at work"):
+    with pytest.raises(mjs.SensorError, match=r"step\(\) was called while the simulation is running"):
         sim.scene["greedy"].data
     sim.step()
 
@@ -450,7 +450,7 @@ def test_a_reset_hook_may_not_move_the_worlds():
 
     sim = mjs.Simulation(ball_scene(), num_worlds=2)
     sim.add(Restless())
-    with pytest.raises(mjs.SensorError, match="while the simulation is at work"):
+    with pytest.raises(mjs.SensorError, match="while the simulation is running"):
         sim.reset()
 
 

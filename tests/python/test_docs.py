@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The pages are tests: what they show runs as it stands (CONTRIBUTING, "Pages")."""
+"""Code blocks of the pages run unchanged (CONTRIBUTING, "Documentation")."""
 
 import importlib.util
 import os
@@ -21,7 +21,7 @@ PROGRAM = Path(os.environ.get("MJSENSE_PROGRAM", ROOT / "build/dev/mjsense"))
 PAGES = [ROOT / "README.md", ROOT / "CONTRIBUTING.md", *sorted(ROOT.glob("docs/**/*.md")), *sorted(ROOT.glob("src/mjsense/**/page.md")),
          *sorted(ROOT.glob("models/**/page.md"))]
 FENCE = re.compile(r"^```(\w+)\n(.*?)^```$", re.MULTILINE | re.DOTALL)
-# What pages import of others -> what of it; what is not installed is imitated.
+# Module that pages import -> names used of it. Modules that are not installed are replaced by stubs.
 OTHERS: dict[str, list[str]] = {"matplotlib": ["matplotlib.pyplot"], "rerun": [], "stable_baselines3": ["mjsense.rl.sb3"], "torch": []}
 MISSING = [name for name in OTHERS if importlib.util.find_spec(name) is None]
 SHORT = ["--episodes", "1", "--horizon", "2", "--keep-failures", "--size", "64x48", "-q", "--no-sheet"]  # of recordings
@@ -64,7 +64,7 @@ class Viewer:
 
 @pytest.mark.parametrize("page", pages("python"))
 def test_python(page, tmp_path, monkeypatch):
-    """All blocks of a page, one after the other, in an empty folder. Other people's viewers and trainers are not needed to run them."""
+    """All blocks of a page, one after the other, in an empty folder. Third-party viewers and trainers are not required."""
     monkeypatch.chdir(tmp_path)
     monkeypatch.setitem(sys.modules, "mujoco.viewer", SimpleNamespace(launch_passive=Viewer))
     monkeypatch.setattr(mujoco, "viewer", sys.modules["mujoco.viewer"], raising=False)
@@ -108,10 +108,10 @@ def command_lines(page):
 
 @pytest.mark.parametrize("page", [p for p in pages("python", "toml") if command_lines(p.values[0])])
 def test_command_lines(page, tmp_path):
-    """As they stand, from a folder with the repository's models; recordings are cut short."""
+    """The lines run unchanged in a folder with the repository's models; recordings are shortened."""
     for folder in ("models", "bench"):
         (tmp_path / folder).symlink_to(ROOT / folder)
-    # What lines refer to.
+    # Files that the command lines refer to.
     import numpy as np
 
     np.save(tmp_path / "mid360.npy", np.random.default_rng(0).uniform(-0.5, 0.5, (20000, 2)))

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What gymnasium asks of environments."""
+"""Requirements of Gymnasium on environments."""
 
 import gymnasium
 import numpy as np

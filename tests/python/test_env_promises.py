@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What environments promise beyond stepping: pictures without cameras, rates, names, the expert, sensors of text, sizes."""
+"""Environments beyond stepping: rendering without cameras, rates, names, the expert, text sensors, image sizes."""
 
 import json
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Every example runs, and says what it should."""
+"""Every example runs and prints what is expected."""
 
 import os
 import subprocess

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""A child of fork() has none of a simulation's threads: it is told so, instead of waiting for them for ever."""
+"""A child of fork() has none of a simulation's threads: calls raise an error instead of waiting forever."""
 
 import os
 import pickle
@@ -46,9 +46,9 @@ def sim():
 
 @pytest.mark.parametrize("call", ["step", "reset", "forward"])
 def test_a_copy_raises(sim, call):
-    with pytest.raises(RuntimeError, match=rf"simulation: this process .* was forked from the one that made it \({os.getpid()}\)"):
+    with pytest.raises(RuntimeError, match=rf"simulation: this process .* was forked from the one that created it \({os.getpid()}\)"):
         in_fork(getattr(sim, call))
-    sim.step()  # the original goes on
+    sim.step()  # the original still works
 
 
 def test_reading_what_is_not_current_raises(sim):
@@ -64,7 +64,7 @@ def test_a_copy_may_be_dropped_and_a_new_one_made():
     del sim
 
     def again():
-        held.clear()  # its threads are not waited for
+        held.clear()  # does not wait for the missing threads
         other = mjs.Simulation(ball_scene(), num_worlds=4, threads=2)
         other.step()
         return other.qpos.copy()

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What is read, when, and what is written in between changes no bit of the states: they are those of plain mj_step."""
+"""Reads and writes between steps do not change the states: they equal those of plain mj_step bit for bit."""
 
 import mujoco
 import numpy as np
@@ -81,7 +81,7 @@ def test_writes_and_reads_between_steps(integrator, decimation, threads):
     rng = np.random.default_rng(1)
     for k in range(60):
         write(sim, plain, models, k, rng)
-        if k % 5 == 3:  # somebody looks after the write and before the step
+        if k % 5 == 3:  # a read between the write and the step
             sim.refresh(read[: 1 + k % 3])
         sim.ctrl[:, 0] = np.sin(0.1 * (k // 3) + np.arange(WORLDS))
         sim.step()

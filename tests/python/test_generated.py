@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What is generated from the declarations in C++ is as they say."""
+"""Generated files match the declarations in C++."""
 
 import importlib.util
 import inspect

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""A Go1 from mjlab's package learns to follow a velocity, in a task that is written here, from a trainer of somebody else's."""
+"""A Go1 from mjlab's package learns to follow a velocity, in a task that is defined here, with a third-party trainer."""
 
 import importlib
 import warnings

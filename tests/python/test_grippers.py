@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What a gripper presses with: what the real one does, of which the robot's page or model speaks."""
+"""Gripping forces equal those of the real grippers, as stated by the robot's page or model."""
 
 import mujoco
 import numpy as np
@@ -9,7 +9,7 @@ import mjsense as mjs
 
 
 def pinch(name: str, finger: str, half_width: float) -> float:
-    """N, of one pad of a robot's gripper on a block that floats between its fingers, once it holds still."""
+    """Force (N) of one pad on a block that floats between the fingers, when the block has come to rest."""
     robot = mjs.Robot(name)
     gripper = robot.groups["gripper"]
     spec = mujoco.MjSpec.from_string(robot.xml)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What is installed: the public headers, alone and complete, and one version of MuJoCo."""
+"""The installed files: the public headers are complete and include only public headers; there is one version of MuJoCo."""
 
 import re
 from pathlib import Path
@@ -20,7 +20,7 @@ def test_public_headers_include_public_headers_only():
         private = [i for i in includes(header) if i not in PUBLIC]
         assert not private, f"{header} includes what is not installed: {private} (cmake/PublicHeaders.cmake)"
         libraries = set(re.findall(r"^#\s*include\s+<([a-z0-9_]+)/", (ROOT / "src" / header).read_text(), re.MULTILINE))
-        assert libraries <= {"mujoco"}, f"{header} includes a library that is an affair of ours: {libraries}"
+        assert libraries <= {"mujoco"}, f"{header} includes a library that users need not have: {libraries}"
 
 
 def test_the_umbrella_is_every_public_header():

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""A scene of other people's files: LIBERO's table and things to hold, from the folder of their packages as they are, recorded."""
+"""Recordings of scenes with LIBERO's unchanged files: its table and graspable objects, in the folder of its package."""
 
 import os
 import subprocess

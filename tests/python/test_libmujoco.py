@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Which MuJoCo is taken, and what is said of one that will not do."""
+"""Which MuJoCo library is loaded, and the errors for one that is incompatible."""
 
 import importlib.metadata
 import os

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What is too much, or not possible, is one clear error."""
+"""Requests that exceed a limit or are impossible raise one clear error."""
 
 import os
 import re
@@ -34,7 +34,7 @@ def test_too_many_threads():
 
 
 def in_child(body):
-    """What the child of a fork says, and how it ended."""
+    """Output and exit status of a forked child."""
     end, begin = os.pipe()
     pid = os.fork()
     if pid == 0:
@@ -62,7 +62,7 @@ def test_fork(sim):
     sim.step()
     assert "after the fork" in in_child(sim.step)
     assert in_child(sim.close) == "nothing"
-    sim.step()  # the parent goes on
+    sim.step()  # the parent still works
 
 
 @pytest.mark.filterwarnings("ignore:This process:DeprecationWarning")
@@ -89,7 +89,7 @@ def test_interrupt(sim, request):
     """Ctrl-C reaches a long call of step()."""
     before = signal.signal(signal.SIGINT, signal.default_int_handler)  # a shell's background job begins without it
     request.addfinalizer(lambda: signal.signal(signal.SIGINT, before))
-    at = []  # processor time when it was sent: a busy machine makes nobody slow
+    at = []  # process CPU time at which the signal was sent: independent of the load of the machine
 
     def interrupt():
         at.append(time.process_time())
@@ -102,7 +102,7 @@ def test_interrupt(sim, request):
 
 
 def test_no_log_file_is_dropped(sim, tmp_path, monkeypatch):
-    """MuJoCo warns of a world that diverges, on the terminal, and in no file of the user's folder."""
+    """MuJoCo warns of a world that diverges, on the terminal, and writes no file into the user's folder."""
     monkeypatch.chdir(tmp_path)
     sim.qpos[1].flat[0] = np.nan
     sim.step()
@@ -149,7 +149,7 @@ def test_lists_of_fields_are_mujocos():
 
 
 def test_structure_cannot_be_randomized(sim):
-    """Every array of the model is tried: structure is refused, and whatever is taken, the simulation goes on."""
+    """Every array of the model is tried: structural arrays are rejected, and the simulation still works after every accepted one."""
     refused = 0
     for name, kind in fields_of_mjxmacro().items():
         like = getattr(sim.model, name, None)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Beside other libraries with an HDF5, an Embree or a libstdc++ of their own, in whatever order they are loaded."""
+"""Works together with libraries that bring their own HDF5, Embree or libstdc++, in any load order."""
 
 import importlib.util
 import itertools
@@ -38,7 +38,7 @@ def test_load_order(order):
 
 
 def test_nothing_is_exported():
-    """Another library cannot take a function of ours for its own."""
+    """The extension exports no symbols that another library could bind to by mistake."""
     from mjsense import _core
 
     symbols = subprocess.run(["nm", "-D", "--defined-only", _core.__file__], capture_output=True, text=True, check=True).stdout.split("\n")

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""A lack of memory, and models whose size asks for more than there is, are errors: the process goes on."""
+"""Running out of memory, also because of the sizes in a model, raises an error: the process survives."""
 
 import os
 import resource
@@ -44,7 +44,7 @@ def test_the_program_ends_with_an_error(tmp_path):
     model.write_text(HOSTILE)
     program = Path(mjsense.__file__).parents[2] / "mjsense"
     if not program.is_file():
-        pytest.skip("the program is not beside the package")
+        pytest.skip("the program is not in the package's folder")
     done = subprocess.run(
         [program, "sensors", model],
         preexec_fn=lambda: resource.setrlimit(resource.RLIMIT_AS, (3_000_000_000,) * 2),

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Configurations written for mjlab: its own task files build with the import changed, and read what plain MuJoCo says."""
+"""Configurations written for mjlab: its own task files build with the import changed, and their values equal those of plain MuJoCo."""
 
 import math
 
@@ -53,7 +53,7 @@ def plain_contacts(cfg):
 
 
 def array(value):
-    """Of a tensor or an array, on its memory."""
+    """NumPy array that shares the memory of a tensor or an array."""
     return np.from_dlpack(value) if HAS_TORCH else value
 
 
@@ -156,7 +156,7 @@ def check_rays(sensor, model, plain):
                 distance = distance if 0 <= distance <= sensor.cfg.max_distance else -1
                 ours = array(data.distances)[world, f * len(offsets) + ray]
                 assert ours == pytest.approx(distance, abs=1e-5), (sensor.name, world, frame, ray)
-                inside = array(data.normals_w)[world, f * len(offsets) + ray, 2] < 0  # it leaves a box that the frame is in
+                inside = array(data.normals_w)[world, f * len(offsets) + ray, 2] < 0  # the ray starts inside a box and leaves it
                 heights.append(0 if inside else distance)
             if isinstance(sensor, ml.TerrainHeightSensor) and min(heights) >= 0:
                 assert array(data.heights)[world, f] == pytest.approx(min(heights), abs=2e-5)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Tasks open and close in a kitchen: what they observe, that they succeed, and that a world does not know how many others there are."""
+"""Tasks open and close in a kitchen: observations and success rates, and independence of the number of worlds."""
 
 import numpy as np
 import pytest

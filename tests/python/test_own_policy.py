@@ -162,7 +162,7 @@ def test_chunks_are_asked_for_when_they_end(tmp_path):
         commands = [row["joints"][0] for row in json_rows(rows["actions/commanded_action"])[1:]]
         assert commands == pytest.approx([0.1, 0.11, 0.12, 0.13, 0.2, 0.21])
 
-    # A world that begins anew asks alone; the other goes on with its chunk.
+    # Only the world that was reset requests a chunk; the other continues its own.
     policy = Ramp()
     env = mjs.make_vec(Cart(), policy=policy, num_envs=2, cameras=[], autoreset_mode="disabled")
     env.reset()
@@ -268,7 +268,7 @@ def test_by_name(tmp_path):
 
 
 def test_a_constant_costs_little():
-    """What a policy of Python's adds to a step of 64 worlds: the call, and reading what it returns."""
+    """Cost that a Python policy adds to a step of 64 worlds: the call, and reading its result."""
     command = np.tile(HOLD, (64, 1))
 
     class Constant(mjs.Policy):
@@ -290,7 +290,7 @@ def test_a_constant_costs_little():
 
 
 def test_chunks_of_worlds_that_do_not_begin_together_do_not_mix(tmp_path):
-    """What a chunk gives, and what it leaves out, is that of its own world."""
+    """Commands of a chunk, and groups without a command, are those of the chunk's world."""
 
     class Chunks(mjs.Policy):
         calls = 0

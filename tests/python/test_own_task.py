@@ -144,11 +144,11 @@ def test_the_robot_of_the_scene_and_its_move_groups():
     with pytest.raises(ValueError, match=r"task 'wrong', move group 'wheels'.*drive"):
         make(Wrong)
 
-    class Nobody(Cart):
+    class Armless(Cart):
         robot_entity = "card"
 
-    with pytest.raises(KeyError, match="task 'nobody': no robot entity named 'card'; did you mean 'cart'"):
-        make(Nobody)
+    with pytest.raises(KeyError, match="task 'armless': no robot entity named 'card'; did you mean 'cart'"):
+        make(Armless)
 
 
 def test_a_robot_by_name_joins_the_scene():
@@ -177,7 +177,7 @@ def test_a_robot_by_name_joins_the_scene():
 
     class Methodical(Cart):
         def robot(self):  # pyright: ignore[reportIncompatibleVariableOverride]
-            """Somebody's name for a method of theirs."""
+            """A user's method whose name is also an attribute of Task."""
 
     with pytest.raises(TypeError, match=r"Methodical\.robot is <bound method .*: must be the name of a robot"):
         make(Methodical)
@@ -343,7 +343,7 @@ def test_its_code_may_not_move_the_worlds(tmp_path):
             sim.step()
 
     for play in (lambda: make(Meddler).reset(), lambda: record(tmp_path, Meddler())):
-        with pytest.raises(RuntimeError, match=r"step\(\) is called while the simulation is at work"):
+        with pytest.raises(RuntimeError, match=r"step\(\) was called while the simulation is running"):
             play()
 
 

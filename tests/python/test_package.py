@@ -50,7 +50,7 @@ def test_help_shows_every_field():
 
 
 def test_import_loads_nothing_heavy():
-    """What is slow to import, and often installed, is imported when it is wanted: names, for times depend on the machine."""
+    """Packages that are slow to import are imported on first use. Tests the names, because times depend on the machine."""
     program = "import sys, mjsense; print(*sys.modules)"
     loaded = set(subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, check=True).stdout.split())
     heavy = {"h5py", "torch", "jax", "scipy", "matplotlib", "PIL", "pandas", "imageio_ffmpeg", "gymnasium_robotics", "rerun", "viser", "pyarrow",

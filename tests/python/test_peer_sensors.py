@@ -70,7 +70,7 @@ class Tool(PeerSensor):
 
 
 class Contacts(PeerSensor):
-    """Reads the world's mujoco.MjData: contacts and accelerations, which no sensor of ours copies."""
+    """Reads the world's mujoco.MjData: contacts and accelerations, which no built-in sensor provides."""
 
     def __init__(self):
         super().__init__("contacts", gymnasium.spaces.Dict({}))
@@ -237,7 +237,7 @@ def test_a_suite_of_the_environments_simulation(recorded):
     for step in range(3):
         now = suite.get_observations(env.sim)
         one = suite.get_observations(env.sim, None, 2)
-        assert one["counter"] == [step + 1]  # asked once a state, however often it is read
+        assert one["counter"] == [step + 1]  # computed once per state, even if it is read several times
         assert list(now) == ["counter", "relative", "tool", "contacts", "about_task", "dice", "integral", "batch_integral"]
         np.testing.assert_array_equal(now["counter"], np.full((3, 1), step + 1))
         np.testing.assert_allclose(now["integral"], np.full((3, 2), [0.066 * step, step]))
@@ -312,7 +312,7 @@ def test_with_a_task_written_in_python(tmp_path):
     from tasks import Cart, Driver
 
     class Mark(PeerSensor):
-        """Reads what the task has of its own, and what every task has."""
+        """Reads attributes of the user-defined task, and attributes that every task has."""
 
         def __init__(self):
             super().__init__("mark", BOX(-2, 2, (3,), np.float64))

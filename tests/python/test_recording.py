@@ -84,7 +84,7 @@ def test_interrupt(tmp_path):
 
     with pytest.raises(KeyboardInterrupt):
         mjs.record(out=tmp_path, episodes=2, progress=stop, **SMALL)
-    # What was finished stays, and the recording can go on.
+    # Finished episodes are kept, and the recording can be resumed.
     summary = mjs.record(out=tmp_path, episodes=2, resume=True, **SMALL)
     assert summary.kept == 2 and summary.enough
 

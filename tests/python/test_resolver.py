@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What pip would install beside mjsense has one MuJoCo, of the series that we are built for."""
+"""Together with mjsense, pip installs one MuJoCo, of the series that mjsense is built for."""
 
 import re
 import sys

@@ -176,7 +176,7 @@ OPTIONS = {
     "robot": (dict(robot="franka"), "settings/robot"),
     "scene": (dict(scene="table"), "settings/scene|model"),
     "seed": (dict(seed=4), "settings/seed"),
-    "a policy of ours": (dict(policy="planner"), "settings/(code|policy)|streams"),
+    "a built-in policy": (dict(policy="planner"), "settings/(code|policy)|streams"),
     "camera_system": (dict(camera_system=""), "settings/camera"),
     "cameras": (dict(cameras=[]), "cameras|streams"),
     "width": (dict(width=48), "settings/cameras/0/width"),
@@ -252,7 +252,7 @@ def test_every_change_is_refused_by_name(lab):
     for name, (change, expected) in changes.items():
         attempt(name, change, expected)
     assert not wrong, "\n".join(wrong)
-    # Without a change it goes on: also with a used policy, and with other worlds and threads.
+    # Without a change the recording resumes, also with a used policy, and with other numbers of worlds and threads.
     done = mjs.record(**{**options, "resume": True, "worlds": 2, "threads": 2})
     assert done.kept == 40 and done.enough and len(done.lengths) < 40
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Tasks as trainers and gymnasium's registry want them. Where a trainer is not installed, its tests are skipped."""
+"""Tasks with third-party trainers and Gymnasium's registry. Tests of a trainer are skipped if it is not installed."""
 
 import importlib
 import re
@@ -82,7 +82,7 @@ def test_environments_that_will_not_do():
 
 
 def test_walk():
-    """The task of examples/walk: what it feels is what it says."""
+    """The task of examples/walk: its observations have the documented meaning."""
     from walk import Walk
 
     task = Walk(rough=False)
@@ -96,7 +96,7 @@ def test_walk():
     for _ in range(20):
         observation, reward, terminated, truncated, infos = env.step(np.tile(task.stand, (4, 1)))
         assert not terminated.any()
-    assert truncated.all() and infos["final_info"]["success"].all() and (reward > 0.04).all()  # of 0.045: it stands, as it was told
+    assert truncated.all() and infos["final_info"]["success"].all() and (reward > 0.04).all()  # at most 0.045: it stands, as commanded
     assert np.isfinite(observation["feeling"]).all() and (observation["feeling"] != numbers).any()
     env.close()
 
@@ -161,7 +161,7 @@ def test_stable_baselines3_with_pictures():
 
 
 def test_the_page_s_policy_is_learned():
-    """docs/train.md: the one to copy does what it says."""
+    """docs/train.md: training with the page's code reaches the stated return."""
     pytest.importorskip("stable_baselines3")
     page = (Path(__file__).parents[2] / "docs/train.md").read_text()
     code = next(block for block in re.findall(r"^```python\n(.*?)^```$", page, re.MULTILINE | re.DOTALL) if "SB3VecEnv(" in block)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Robots are data: from Python, in recordings, in environments; and no code knows one by its name."""
+"""Robots are data: in Python, recordings and environments. No code depends on a robot's name."""
 
 import contextlib
 import json

@@ -80,7 +80,7 @@ def test_rows_of_a_door(worlds):
                 )
                 assert env.rows[f"rby1_{side}_grasp_state"][w] == 0
             seen.add(round(angle, 2))
-        if step == 1:  # as if somebody had opened it, in every world by another angle
+        if step == 1:  # open the door by a different angle in every world
             for w in range(worlds):
                 env.sim.data.qpos[w, model.jnt_qposadr[hinge]] = -0.3 - 0.1 * w
                 env.sim.data.qpos[w, model.jnt_qposadr[lever]] = 0.7

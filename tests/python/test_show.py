@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""A sensor shows itself by shape, unit and frame, and an image in a notebook by a thumbnail."""
+"""The repr of a sensor has its shape, unit and frame; in a notebook an image is shown as a thumbnail."""
 
 import base64
 import inspect

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""./dev test ends with what tests/summary.py says."""
+"""tests/summary.py, the summary at the end of ./dev test."""
 
 import subprocess
 import sys

@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """What tasks observe, against plain MuJoCo: at the first, a middle and the last step, in one world and in eight that are at different
-points of their episodes; and an episode in one world is that of the same number beside others, to the bit."""
+points of their episodes; and an episode in one world equals the episode of the same number among other worlds, bit for bit."""
 
 import json
 

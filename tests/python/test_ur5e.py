@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""A robot that mjsense does not know, from somebody else's package, recorded in a task and by a policy that are written here."""
+"""A robot that mjsense does not know, from a third-party package, recorded with a user-defined task and policy."""
 
 import subprocess
 import sys

@@ -193,7 +193,7 @@ def test_a_step_and_the_simulation_take_turns():
     meddler = env.sim.add(Meddler())
     assert meddler.data.shape == (3, 1)  # read: from now on part of every step
     env.step(hold(env))
-    assert len(said) == 2 and all("reset() is called while the simulation is at work" in text for text in said)
+    assert len(said) == 2 and all("reset() was called while the simulation is running" in text for text in said)
     env.close()
 
 

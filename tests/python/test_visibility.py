@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What tasks say of an object's pixels, against the segmentation image of the same camera, counted here: one world and eight, each with
+"""Pixels of an object that tasks report, compared with the segmentation image of the same camera, in one world and in eight, each with
 sizes and cameras of its own."""
 
 import numpy as np

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""A world's own model: what plain MuJoCo computes with it is what the world has."""
+"""The model of one world: plain MuJoCo computes with it what the world contains."""
 
 import copy
 

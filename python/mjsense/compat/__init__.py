@@ -1,2 +1,2 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What was written for another library runs here when its import is changed."""
+"""Replacements for modules of mjlab and MolmoSpaces: code written for them runs after changing its imports."""

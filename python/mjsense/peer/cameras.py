@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Cameras by the name of the sensor that shows them."""
+"""Cameras by the name of the sensor that renders them."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ if TYPE_CHECKING:
 
 
 class Cameras:
-    """Cameras by the name of the sensor that shows them."""
+    """Cameras by the name of the sensor that renders them."""
 
     def __init__(self, env: PeerEnv) -> None:
         self._env = env
@@ -47,7 +47,7 @@ class Cameras:
 
 
 class PeerCamera:
-    """A camera in the world whose sensor is asked, as it is now."""
+    """A camera in the world whose sensor is being computed, in its current pose."""
 
     def __init__(self, env: PeerEnv, name: str, camera: int) -> None:
         self._env, self.name, self._id = env, name, camera

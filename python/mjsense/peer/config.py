@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Of the experiment, as far as sensors read it."""
+"""The part of the experiment's configuration that sensors read."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ if TYPE_CHECKING:
 
 
 class PeerConfig:
-    """Of a task: its type and times, its objects (``task_config``), its cameras (``camera_config``)."""
+    """Configuration of a task: its type and periods, its objects (``task_config``), its cameras (``camera_config``)."""
 
     def __init__(self, task: PeerTask) -> None:
         view = task._view
@@ -28,7 +28,10 @@ class PeerConfig:
 
 
 class PeerTaskConfig:
-    """The objects of the episode: ``pickup_obj_name``, ``pickup_obj_start_pose``, ``pickup_obj_goal_pose`` and so for every role."""
+    """The objects of the episode: ``pickup_obj_name``, ``pickup_obj_start_pose``, ``pickup_obj_goal_pose``.
+
+    Other roles have the same three attributes.
+    """
 
     use_sensors = True
     action_dtype = "float32"
@@ -40,7 +43,7 @@ class PeerTaskConfig:
 
     @property
     def referral_expressions(self) -> dict[str, list[tuple[str, float]]]:
-        """What the objects may be called, with weights."""
+        """Expressions that refer to the objects, with weights."""
         return self._task._view.referrals(self._task._world)
 
     def __getattr__(self, name: str) -> Any:

@@ -36,7 +36,7 @@ class _Models(Sequence):
 
 
 class PeerEnv:
-    """The worlds of a simulation. Whatever is not here is the simulation's: ``env.qpos[batch_index]``, ``env.scene["imu"]``."""
+    """The worlds of a simulation. All other attributes are the simulation's: ``env.qpos[batch_index]``, ``env.scene["imu"]``."""
 
     def __init__(self, sim: Simulation, view: _core.TaskView | None = None) -> None:
         self.sim = sim
@@ -47,7 +47,7 @@ class PeerEnv:
         self._datas: list[mujoco.MjData] = []
         self._copies: Any = None
         self.camera_manager = SimpleNamespace(registry=Cameras(self))
-        """``camera_manager.registry[name]``: cameras by the names of the sensors that show them."""
+        """``camera_manager.registry[name]``: cameras by the names of the sensors that render them."""
         self._robots: tuple[PeerRobot, ...] = ()
 
     def __getattr__(self, name: str) -> Any:
@@ -59,19 +59,19 @@ class PeerEnv:
 
     @property
     def task(self) -> PeerTask | None:
-        """What is played; None where nothing is."""
+        """The task, or None in a plain simulation."""
         if self._task is None and self._view is not None:
             self._task = PeerTask(self, self._view)
         return self._task
 
     @property
     def n_batch(self) -> int:
-        """Worlds."""
+        """Number of worlds."""
         return self.sim.num_worlds
 
     @property
     def current_batch_index(self) -> int:
-        """The world whose sensor is asked."""
+        """Index of the world whose sensor is being computed."""
         return self._world
 
     @current_batch_index.setter
@@ -94,7 +94,10 @@ class PeerEnv:
 
     @property
     def mj_datas(self) -> Sequence[mujoco.MjData]:
-        """A mujoco.MjData of each world as it is now, derived quantities and contacts included: copies, which nobody reads back."""
+        """A mujoco.MjData of each world as it is now, derived quantities and contacts included.
+
+        These are copies: writing to them does not change the worlds.
+        """
         if self._copies is None:
             self._datas = [mujoco.MjData(model) for model in self.mj_models]
             self._copies = self.sim._core.data_copies(self._datas)
@@ -103,7 +106,7 @@ class PeerEnv:
 
     @property
     def current_data(self) -> mujoco.MjData:
-        """The model of the world whose sensor is being computed."""
+        """The data of the world whose sensor is being computed."""
         return self.mj_datas[self._world]
 
     def _make_current(self) -> None:
@@ -113,7 +116,10 @@ class PeerEnv:
 
     @contextmanager
     def _asked(self) -> Iterator[PeerEnv]:
-        """While sensors are asked: MjModel and MjData objects that they keep are current, and one may ask another."""
+        """Context in which sensors are computed: MjModel and MjData objects that they keep are current.
+
+        It may be nested, because a sensor may read another.
+        """
         self._make_current()
         before = self._world
         try:
@@ -132,7 +138,7 @@ class PeerEnv:
 
     @property
     def current_robot(self) -> PeerRobot:
-        """The model of the world whose sensor is being computed."""
+        """The robot of the world whose sensor is being computed."""
         return self.robots[self._world]
 
     def _image(self, camera_name: str, field: str) -> np.ndarray:
@@ -145,7 +151,7 @@ class PeerEnv:
         return fields[field][self._world].copy()
 
     def render_rgb_frame(self, camera_name: str) -> np.ndarray:
-        """uint8 ``[H, W, 3]``, row 0 the top."""
+        """uint8 ``[H, W, 3]``, row 0 is the top."""
         return self._image(camera_name, "rgb")
 
     def render_depth_frame(self, camera_name: str) -> np.ndarray:

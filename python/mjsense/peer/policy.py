@@ -16,7 +16,7 @@ if TYPE_CHECKING:
 
 
 class PeerPolicy:
-    """A planner that drives the robot, in the world whose sensor is asked."""
+    """A planner that drives the robot, in the world whose sensor is being computed."""
 
     def __init__(self, env: PeerEnv, view: _core.TaskView) -> None:
         self._env = env
@@ -27,7 +27,7 @@ class PeerPolicy:
         return self._view.phases
 
     def get_phase(self) -> str:
-        """Name of the present one."""
+        """Name of the current phase."""
         number = self._view.plan(self._env.current_batch_index)[0]
         return next((name for name, n in self._view.phases.items() if n == number), "unknown")
 
@@ -37,12 +37,12 @@ class PeerPolicy:
 
     @property
     def target_poses(self) -> dict[str, np.ndarray]:
-        """4x4 where the gripper is to close, world: "grasp"."""
+        """Planned grasp pose, 4x4 in the world, under the key "grasp"."""
         pose = self._view.plan(self._env.current_batch_index)[2]
         return {"grasp": matrix_of_pose(pose) if np.any(pose[3:]) else np.eye(4)}
 
 
-# Classes of MolmoSpaces that its sensors ask a policy for.
+# Classes of MolmoSpaces that its sensors pass to isinstance() with a policy.
 _PLANNERS = (
     ("molmo_spaces.policy.base_policy", "PlannerPolicy"),
     (
@@ -53,7 +53,7 @@ _PLANNERS = (
 
 
 def register() -> None:
-    """As a subclass of those classes that are imported by now."""
+    """Registers the class as a virtual subclass of those of these classes that have been imported."""
     for module, name in _PLANNERS:
         if module in sys.modules and not issubclass(PeerPolicy, getattr(sys.modules[module], name)):
             getattr(sys.modules[module], name).register(PeerPolicy)

@@ -22,7 +22,7 @@ class MoveGroup:
         self._view = view
         self.name: str = group["name"]
         self.kind: str = group["kind"]
-        """base, arm or gripper."""
+        """Kind: base, arm or gripper."""
         self._joint_ids, self._joint_posadr, self._joint_veladr = group["joints"], group["qpos"], group["dofs"]
         self._actuator_ids = group["actuators"]
         self._leaf_site: int = group["leaf_site"]
@@ -65,7 +65,7 @@ class MoveGroup:
 
     @property
     def joint_pos_limits(self) -> np.ndarray:
-        """``[n, 2]``, infinite where there are none."""
+        """``[n, 2]``, infinite for joints without limits."""
         ranges = np.tile([-np.inf, np.inf], (self.pos_dim, 1))
         for joint in self._joint_ids:
             if self.mj_model.jnt_limited[joint] and self.mj_model.jnt_type[joint] >= mujoco.mjtJoint.mjJNT_SLIDE:
@@ -122,7 +122,7 @@ class Gripper(MoveGroup):
 
     @property
     def inter_finger_dist(self) -> float:
-        """m, between the pads."""
+        """Distance between the pads, m."""
         left, right = (self.mj_data.site_xpos[site] for site in self._pads)
         return float(np.linalg.norm(left - right))
 
@@ -133,20 +133,20 @@ class Gripper(MoveGroup):
 
     @property
     def is_open(self) -> bool:
-        """More than half."""
+        """Whether the gripper is more than half open."""
         return self.inter_finger_dist > 0.5 * self._max_opening
 
 
 class Base(MoveGroup):
-    """What carries the robot."""
+    """The robot's base."""
 
     @property
     def pose(self) -> np.ndarray:
-        """4x4, world; it stands on the floor."""
+        """4x4, world, at floor level."""
         body = self._view.base_body
         return matrix_of(self.mj_data.xpos[body], self.mj_data.xmat[body])
 
-    leaf_frame_to_world = root_frame_to_world = pose  # pyright: ignore[reportIncompatibleMethodOverride]  # a property too
+    leaf_frame_to_world = root_frame_to_world = pose  # pyright: ignore[reportIncompatibleMethodOverride]  # a property as well
 
     @property
     def is_mobile(self) -> bool:
@@ -191,7 +191,7 @@ class RobotView:
     def get_gripper(self, gripper_group_id: str) -> Gripper:
         group = self._groups[gripper_group_id]
         if not isinstance(group, Gripper):
-            raise ValueError(f"move group '{gripper_group_id}' is no gripper; {', '.join(self.get_gripper_movegroup_ids())} are")
+            raise ValueError(f"move group '{gripper_group_id}' is not a gripper; grippers: {', '.join(self.get_gripper_movegroup_ids())}")
         return group
 
     def _each(self, what: str, ids: list[str] | None) -> dict[str, np.ndarray]:
@@ -230,7 +230,7 @@ class PeerRobot:
         return self.robot_view.name
 
     def last_unnoised_cmd_joint_pos(self) -> dict[str, np.ndarray]:
-        """Targets of the controlled groups, without noise; before the first action what the controllers hold."""
+        """Targets of the controlled groups, without noise; before the first action, the controllers' initial targets."""
         return self._task.targets(self._world)
 
     def fk(self, move_group_qpos: dict[str, np.ndarray], base_pose: np.ndarray, rel_to_base: bool = False) -> dict[str, np.ndarray]:

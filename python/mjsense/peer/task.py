@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What is played."""
+"""The task as sensors written for MolmoSpaces see it."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 
 
 class _Infos(Sequence):
-    """What the task says of each world, read when it is asked for."""
+    """The task's information about each world, read on access."""
 
     def __init__(self, view: _core.TaskView, worlds: int) -> None:
         self._view: Any = view
@@ -37,20 +37,20 @@ class _Infos(Sequence):
 
 
 class PeerTask:
-    """What is played. What MolmoSpaces knows of its one world is here that of the world whose sensor is asked.
+    """The task. Where MolmoSpaces has one world, the value is that of the world whose sensor is being computed.
 
-    Of a :class:`mjsense.Task` of yours everything else is there, too; as it judges after the sensors, ``get_info()`` and
-    ``judge_success()`` are then of the observation before.
+    All other attributes are those of the user-defined :class:`mjsense.Task`, if the task is one. Such a task is evaluated after the
+    sensors, so ``get_info()`` and ``judge_success()`` then refer to the previous observation.
     """
 
     def __init__(self, env: PeerEnv, view: _core.TaskView) -> None:
         self.env = self._env = env
         self._view: Any = view
         self.config = PeerConfig(self)
-        """Of the experiment, as far as sensors read it."""
+        """The part of the experiment's configuration that sensors read."""
         self._policy: PeerPolicy | None = None
         self._policies: Sequence[Any] = ()
-        """Of a policy with an instance for each world: these."""
+        """The instances of a policy that has one for each world."""
 
     def __getattr__(self, name: str) -> Any:
         if name.startswith("_") or self._view.own is None:
@@ -63,7 +63,10 @@ class PeerTask:
 
     @property
     def last_action(self) -> dict[str, Any] | None:
-        """As the policy gave it, by move group, and ``success`` if it judged; None before the first."""
+        """The action as the policy returned it, by move group; None before the first.
+
+        It contains ``success`` if the policy judged it.
+        """
         return self._view.last_action(self._world)
 
     @property
@@ -77,17 +80,17 @@ class PeerTask:
         return self._policy
 
     def get_info(self) -> Sequence[dict[str, Any]]:
-        """What the task says about the state, by world: errors, success, step."""
+        """The task's information about the state, by world: errors, success, step."""
         return _Infos(self._view, self._env.n_batch)
 
     def get_task_objects(self, batch_index: int = 0) -> dict[str, str]:
-        """Bodies by role: the grippers, then what the task is about."""
+        """Bodies by role: the grippers, then the objects of the task."""
         view, model = self._env.robots[batch_index].robot_view, self._env.mj_model
         objects = {name: model.body(view.get_move_group(name).root_body_id).name for name in view.get_gripper_movegroup_ids()}
         return objects | dict(self._view.objects(batch_index))
 
     def get_task_description(self) -> str:
-        """Pick up the mug"""
+        """The instruction, for example "Pick up the mug"."""
         return self._view.description(self._world)
 
     @property
@@ -96,25 +99,25 @@ class PeerTask:
         return self._view.step(self._world)
 
     def num_steps_taken(self) -> int:
-        """The same."""
+        """Same as :attr:`episode_step_count`."""
         return self.episode_step_count
 
     def judge_success(self) -> bool:
-        """At this moment."""
+        """Whether the task succeeds in the current state."""
         return self._view.evaluate(self._world)[1]
 
     def get_reward(self) -> np.ndarray:
-        """``[1]``."""
+        """Reward of the current state, ``[1]``."""
         return np.array([self._view.evaluate(self._world)[0]])
 
     def is_terminal(self) -> bool:
-        """The episode is over by the policy's word or by success; a time-out is not."""
+        """Whether the policy or success ended the episode; a time-out does not count."""
         return self._view.evaluate(self._world)[2]
 
     def is_timed_out(self) -> bool:
-        """The horizon is reached."""
+        """Whether the horizon has been reached."""
         return self._view.evaluate(self._world)[3]
 
     def is_done(self) -> bool:
-        """One of the two."""
+        """Whether the episode is terminal or timed out."""
         return self.is_terminal() or self.is_timed_out()

@@ -12,7 +12,10 @@ if TYPE_CHECKING:
 
 
 class Data:
-    """``sim.data.qpos``: ``[B, nq]`` float64 on the worlds' own memory. Write the state (qpos, qvel, ctrl ...), then call ``forward()``."""
+    """Fields of mjData, for example ``sim.data.qpos``: ``[B, nq]`` float64, shares the worlds' memory.
+
+    Write the state (qpos, qvel, ctrl ...), then call ``forward()``.
+    """
 
     def __init__(self, native: mjsense.Simulation) -> None:
         self._native = native

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Names by regular expression, as mjlab matches them: from the first character on, the first expression counts."""
+"""Matches names with regular expressions as mjlab does: anchored at the first character; the first matching expression counts."""
 
 from __future__ import annotations
 
@@ -17,14 +17,17 @@ def matching(expressions: str | Iterable[str], names: Sequence[str]) -> list[str
 
 
 def value_of(field: Any, name: str, default: Any = None) -> Any:
-    """A value for all names, or that of the first expression of a mapping that matches."""
+    """The value of a field for `name`: the field itself, or, of a mapping, the value of the first expression that matches."""
     if not isinstance(field, Mapping):
         return field
     return next((value for expression, value in field.items() if re.match(expression, name)), default)
 
 
 def find(keys: str | Sequence[str], names: Sequence[str], what: str, preserve_order: bool = False) -> tuple[list[int], list[str]]:
-    """Indices and names that whole expressions match, in model order, or in that of the keys; UnknownNameError for a key without any."""
+    """Indices and names that the keys match completely, in model order or in the keys' order.
+
+    Raises UnknownNameError for a key without a match.
+    """
     keys = [keys] if isinstance(keys, str) else list(keys)
     hits = {key: [i for i, name in enumerate(names) if re.fullmatch(key, name)] for key in keys}
     for key, found in hits.items():

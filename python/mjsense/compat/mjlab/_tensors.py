@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Arrays as tensors that share their memory, where torch is installed."""
+"""Converts arrays to torch tensors that share their memory, if torch is installed."""
 
 from __future__ import annotations
 
@@ -10,29 +10,29 @@ from typing import Any
 import numpy as np
 
 _FOUND = importlib.util.find_spec("torch")
-HAS_TORCH = _FOUND is not None and _FOUND.origin is not None  # not a folder that happens to be called so
+HAS_TORCH = _FOUND is not None and _FOUND.origin is not None  # None for a mere folder named torch
 
 
 def tensor(array: np.ndarray | None) -> Any:
-    """A torch tensor on the memory of ``array``; the array itself without torch."""
+    """A torch tensor that shares the memory of ``array``; the array itself if torch is not installed."""
     if array is None or not HAS_TORCH:
         return array
     import torch  # pyright: ignore[reportMissingImports]
 
-    with warnings.catch_warnings():  # it says that ours is read-only: so is mjlab's, by agreement
+    with warnings.catch_warnings():  # torch warns that the array is read-only; mjlab's must not be written either
         warnings.simplefilter("ignore")
         return torch.from_numpy(array)
 
 
 def ids(env_ids: Any) -> Any:
-    """What mjlab takes for some environments (a tensor, a slice, None: all), as the indices or mask that we take."""
+    """Converts mjlab's env_ids (tensor, slice or None) to the indices or mask that mjsense accepts; None means all environments."""
     if env_ids is None or (isinstance(env_ids, slice) and env_ids == slice(None)):
         return None
     return env_ids.detach().cpu().numpy() if hasattr(env_ids, "detach") else env_ids  # pyright: ignore
 
 
 class Cache:
-    """One tensor for each array: sensors return the same arrays again and again."""
+    """Keeps one tensor for each array, because sensors return the same arrays on every read."""
 
     def __init__(self) -> None:
         self._known: dict[str, tuple[np.ndarray, Any]] = {}

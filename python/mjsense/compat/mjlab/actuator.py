@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""``mjlab.actuator``: those that MuJoCo itself computes. Each writes its actuators into the entity's spec."""
+"""``mjlab.actuator``: the actuators that MuJoCo computes. Each configuration adds its actuators to the entity's spec."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ import mujoco
 
 
 class TransmissionType(StrEnum):
-    """What actuators move."""
+    """The kind of element that an actuator drives."""
 
     JOINT = "joint"
     TENDON = "tendon"
@@ -27,7 +27,7 @@ _TRANSMISSIONS = {
 
 @dataclass(kw_only=True)
 class ActuatorCfg:
-    """Base of all. ``target_names_expr`` match whole names of joints, tendons or sites; None keeps what the XML says."""
+    """Base class. ``target_names_expr`` match whole names of joints, tendons or sites; None keeps the value in the XML."""
 
     target_names_expr: tuple[str, ...]
     transmission_type: TransmissionType = TransmissionType.JOINT
@@ -41,7 +41,7 @@ class ActuatorCfg:
     delay_per_env_phase: bool = True
 
     def edit_spec(self, spec: mujoco.MjSpec, names: list[str]) -> None:
-        """Adds an actuator for each of the names; NotImplementedError for what only mjlab computes."""
+        """Adds an actuator for each name. Raises NotImplementedError for features that only mjlab computes."""
         if self.delay_max_lag > 0:
             raise NotImplementedError(f"{type(self).__name__}: delays of commands (delay_max_lag) are not computed here")
         for name in names:
@@ -76,7 +76,7 @@ class ActuatorCfg:
 
 @dataclass(kw_only=True)
 class BuiltinPositionActuatorCfg(ActuatorCfg):
-    """Force = stiffness (ctrl - q) - damping dq/dt, within +-effort_limit; ctrl may lie beyond the joint's range."""
+    """Force = stiffness (ctrl - q) - damping dq/dt, within +-effort_limit; ctrl may exceed the joint's range."""
 
     stiffness: float
     damping: float
@@ -87,7 +87,7 @@ class BuiltinPositionActuatorCfg(ActuatorCfg):
         actuator.biastype = mujoco.mjtBias.mjBIAS_AFFINE
         actuator.gainprm[0], actuator.biasprm[1], actuator.biasprm[2] = self.stiffness, -self.stiffness, -self.damping
         actuator.inheritrange, actuator.ctrllimited = 0.0, False
-        if self.effort_limit is not None:  # beyond these it pushes with all it has: for who asks, not enforced
+        if self.effort_limit is not None:  # the force saturates beyond this range; ctrllimited is off, so it is information only
             joint = self.transmission_type == TransmissionType.JOINT
             low, high = (spec.joint(name) if joint else spec.tendon(name)).range
             reach = self.effort_limit / self.stiffness
@@ -124,7 +124,7 @@ class BuiltinMotorActuatorCfg(ActuatorCfg):
 
 @dataclass(kw_only=True)
 class XmlActuatorCfg(ActuatorCfg):
-    """Takes the actuators that the XML has for the targets; ValueError where it has none."""
+    """Uses the XML's actuators of the targets. Raises ValueError for a target without an actuator."""
 
     command_field: str | None = None
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""``mjlab.entity``: a spec, what is edited in it, and where it begins."""
+"""``mjlab.entity``: a model of the scene: its spec, edits of the spec, actuators and initial state."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ _FREE = mujoco.mjtJoint.mjJNT_FREE
 
 @dataclass
 class EntityArticulationInfoCfg:
-    """What moves it."""
+    """Actuators of the entity."""
 
     actuators: tuple[ActuatorCfg, ...] = ()
     soft_joint_pos_limit_factor: float = 1.0
@@ -29,13 +29,16 @@ class EntityArticulationInfoCfg:
 class EntityCfg:
     """A model that is attached to the scene.
 
-    ``spec_fn`` makes its spec; then lights, cameras, textures, materials, meshes, geoms and collisions, in this order, edit it (anything
-    with ``edit_spec(spec)``), and actuators are added.
+    ``spec_fn`` creates its spec. Then lights, cameras, textures, materials, meshes, geoms and collisions edit it in this order
+    (any objects with ``edit_spec(spec)``), and the actuators are added.
     """
 
     @dataclass
     class InitialStateCfg:
-        """The keyframe ``init_state``: m, wxyz, rad; joints by the first expression that matches; None: the model's own keyframe."""
+        """The keyframe ``init_state``: m, wxyz, rad.
+
+        The first matching expression sets a joint. ``joint_pos=None`` uses the model's keyframe.
+        """
 
         pos: tuple[float, float, float] = (0.0, 0.0, 0.0)
         rot: tuple[float, float, float, float] = (1.0, 0.0, 0.0, 0.0)
@@ -113,7 +116,7 @@ def _add_keyframe(spec: mujoco.MjSpec, cfg: EntityCfg) -> None:
 
 
 class Entity:
-    """An attached entity: the local names of its elements in model order. ``native`` is ours."""
+    """An attached entity: the local names of its elements in model order. ``native`` is the :class:`mjsense.Entity`."""
 
     def __init__(self, native: Any, cfg: Any) -> None:
         self.native = native
@@ -124,7 +127,7 @@ class Entity:
 
     @property
     def is_fixed_base(self) -> bool:
-        """No free joint."""
+        """Whether the entity has no free joint."""
         return self.native.fixed_base
 
     @property
@@ -163,27 +166,27 @@ class Entity:
         return len(self.joint_names)
 
     def find_bodies(self, name_keys: str | Sequence[str], preserve_order: bool = False) -> tuple[list[int], list[str]]:
-        """Local indices and names of the bodies that whole expressions match; UnknownNameError for one without any."""
+        """Local indices and names of the bodies that the expressions match completely; UnknownNameError without a match."""
         return find(name_keys, self.body_names, "body", preserve_order)
 
     def find_joints(self, name_keys: str | Sequence[str], preserve_order: bool = False) -> tuple[list[int], list[str]]:
-        """Likewise, of joints."""
+        """Like find_bodies(), for joints."""
         return find(name_keys, self.joint_names, "joint", preserve_order)
 
     def find_geoms(self, name_keys: str | Sequence[str], preserve_order: bool = False) -> tuple[list[int], list[str]]:
-        """Likewise, of geoms."""
+        """Like find_bodies(), for geoms."""
         return find(name_keys, self.geom_names, "geom", preserve_order)
 
     def find_sites(self, name_keys: str | Sequence[str], preserve_order: bool = False) -> tuple[list[int], list[str]]:
-        """Likewise, of sites."""
+        """Like find_bodies(), for sites."""
         return find(name_keys, self.site_names, "site", preserve_order)
 
     def find_actuators(self, name_keys: str | Sequence[str], preserve_order: bool = False) -> tuple[list[int], list[str]]:
-        """Likewise, of actuators."""
+        """Like find_bodies(), for actuators."""
         return find(name_keys, self.actuator_names, "actuator", preserve_order)
 
     def find_tendons(self, name_keys: str | Sequence[str], preserve_order: bool = False) -> tuple[list[int], list[str]]:
-        """Likewise, of tendons."""
+        """Like find_bodies(), for tendons."""
         return find(name_keys, self.tendon_names, "tendon", preserve_order)
 
 

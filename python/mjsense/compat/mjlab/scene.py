@@ -22,14 +22,14 @@ from mjsense.errors import UnknownNameError
 
 @dataclass(kw_only=True)
 class SceneCfg:
-    """What all worlds share."""
+    """Configuration of a scene, which all worlds share."""
 
     num_envs: int = 1
     env_spacing: float = 2.0
     terrain: TerrainEntityCfg | None = None
     entities: dict[str, EntityCfg] = field(default_factory=dict)
     sensors: tuple[SensorCfg | Sensor[Any] | mjsense.Sensor, ...] = ()
-    """Configurations, or sensors of your own."""
+    """Configurations or user-defined sensors."""
     extent: float | None = None
     spec_fn: Callable[[mujoco.MjSpec], None] | None = None
 
@@ -40,7 +40,7 @@ class SceneCfg:
             self.spec_fn(spec)
 
     def native(self) -> configs.SceneCfg:
-        """What it means here, checked. Sensors of the user's are built."""
+        """The equivalent mjsense configuration, checked. Builds user-defined sensors."""
         return configs.SceneCfg(
             num_envs=self.num_envs,
             env_spacing=self.env_spacing,
@@ -58,7 +58,7 @@ _SCENES: weakref.WeakValueDictionary[int, Scene] = weakref.WeakValueDictionary()
 
 
 def scene_of(given: Any) -> Scene:
-    """The scene whose ``compile()`` or ``spec`` this is; ValueError if it is none's."""
+    """The scene that returned this model or spec from ``compile()`` or ``spec``. Raises ValueError if there is none."""
     scene = _SCENES.get(id(given))
     if scene is None or not (given is scene.native.model or given is scene.native.spec):
         raise ValueError("Simulation: model must be what scene.compile() returned, or spec scene.spec")
@@ -66,7 +66,7 @@ def scene_of(given: Any) -> Scene:
 
 
 def _wrapped(native: Any, cfg: Any) -> Sensor[Any]:
-    """The sensor that the user sees for one of the native scene."""
+    """The public sensor object of a sensor of the native scene."""
     if isinstance(native, OwnSensor):
         return native.original
     if isinstance(native, mjsense.Sensor):
@@ -109,12 +109,12 @@ class Scene:
 
     @property
     def entities(self) -> dict[str, Entity]:
-        """The terrain, if there is one, first."""
+        """Entities by name; the terrain, if any, is first."""
         return self._entities
 
     @property
     def terrain(self) -> Entity | None:
-        """None without one."""
+        """The terrain, or None."""
         return self._entities.get("terrain") if self._cfg.terrain is not None else None
 
     @property
@@ -142,23 +142,23 @@ class Scene:
 
     @property
     def sensor_context(self) -> SensorContext | None:
-        """None without cameras and ray sensors."""
+        """None if there are no cameras and ray sensors."""
         return self._context
 
     def compile(self) -> mujoco.MjModel:
-        """The model, for a simulation. It is compiled already."""
+        """The model for a simulation. It was compiled at construction."""
         return self.native.model
 
     def initialize(self, mj_model: Any = None, model: Any = None, data: Any = None) -> None:
-        """Nothing to do: the simulation has done it."""
+        """Has no effect: the simulation initializes the sensors."""
 
     def update(self, dt: float) -> None:
-        """After a physics step: air times and histories."""
+        """Updates air times and histories. Call after a physics step."""
         if self._simulation is not None:
             self._simulation.update_sensors(dt)
 
     def reset(self, env_ids: Any = None) -> None:
-        """Sensors forget the episode of these worlds; all if not given."""
+        """Resets the sensors of these worlds, by default of all."""
         if self._simulation is not None:
             self._simulation.reset_sensors(ids(env_ids))
 

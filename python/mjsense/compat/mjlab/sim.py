@@ -40,7 +40,7 @@ class MujocoCfg:
 
 @dataclass(kw_only=True)
 class SimulationCfg:
-    """Only ``mujoco`` matters: there is room for every contact."""
+    """Only ``mujoco`` has an effect: limits on the number of contacts are not needed."""
 
     nconmax: int | None = None
     njmax: int | None = None
@@ -53,9 +53,9 @@ class SimulationCfg:
 
 
 class Simulation:
-    """``num_envs`` worlds of the scene whose model this is. ``native`` is ours.
+    """``num_envs`` worlds of the scene of this model. ``native`` is the :class:`mjsense.Simulation`.
 
-    ``step()`` is one plain physics step: derived quantities are those of the state before, until ``forward()``.
+    ``step()`` is one plain physics step: until ``forward()``, derived quantities belong to the state before the step.
     """
 
     def __init__(self, num_envs: int, cfg: SimulationCfg, model: mujoco.MjModel | None = None, device: str = "cpu", *,
@@ -72,7 +72,7 @@ class Simulation:
 
     @property
     def mj_model(self) -> mujoco.MjModel:
-        """A copy of the model, for looking things up."""
+        """A copy of the model, for look-ups."""
         return self.scene.native.model  # the object by which scene_of() knows the scene
 
     @property
@@ -85,14 +85,14 @@ class Simulation:
         self.native.step_raw(1)
 
     def forward(self) -> None:
-        """Derived quantities of the state as it is."""
+        """Computes the derived quantities of the current state."""
         self.native.forward()
 
     def sense(self) -> None:
-        """Nothing to do: cameras and rays are computed when they are read, of the state as it is then."""
+        """Has no effect: cameras and rays are computed from the current state when they are read."""
 
     def reset(self, env_ids: Any = None) -> None:
-        """These worlds to the model's own pose; all if not given."""
+        """Resets these worlds, by default all, to the model's initial pose."""
         self.native.reset(ids(env_ids))
 
     def close(self) -> None:

@@ -9,9 +9,9 @@ they are imported.
     from mjsense.compat.molmospaces.tasks.task import BaseMujocoTask
 
 A task is one of mjsense's tasks (:attr:`BaseMujocoTask.played`) with the sensors that you compose. ``mjsense.make_vec``,
-``mjsense.make`` and ``mjsense.record`` take it, and it has MolmoSpaces' own ``reset``, ``step`` and ``get_observations``.
+``mjsense.make`` and ``mjsense.record`` accept it, and it has MolmoSpaces' ``reset``, ``step`` and ``get_observations``.
 
-Not here: scenes, objects and assets of MolmoSpaces, its planners, and the bundles of sensors that its documentation advises against.
+Not supported: scenes, objects and assets of MolmoSpaces, its planners, and the bundles of sensors that its documentation advises against.
 """
 
 from mjsense.compat.molmospaces.env.abstract_sensors import Sensor, SensorSuite

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""``mjlab.sensor``: configurations, what sensors return, the sensors of a scene, and the base classes of your own."""
+"""``mjlab.sensor``: sensor configurations, data classes, sensors, and base classes of user-defined sensors."""
 
 from mjsense.compat.mjlab.sensor.builtin_sensor import BuiltinSensor, BuiltinSensorCfg, ObjRef
 from mjsense.compat.mjlab.sensor.camera_sensor import CameraSensor, CameraSensorCfg, CameraSensorData

@@ -19,7 +19,7 @@ class ObjRef:
     entity: str | None = None
 
     def prefixed_name(self) -> str:
-        """``entity/name``, or the name alone."""
+        """``entity/name``, or the name if there is no entity."""
         return f"{self.entity}/{self.name}" if self.entity else self.name
 
     def native(self) -> configs.ObjRef:
@@ -37,7 +37,7 @@ class BuiltinSensorCfg(SensorCfg):
 
     @property
     def prefixed_name(self) -> str:
-        """``entity/name`` for an entity's."""
+        """``entity/name`` for a sensor of an entity."""
         return f"{self.obj.entity}/{self.name}" if self.obj is not None and self.obj.entity is not None else self.name
 
     def native(self) -> configs.BuiltinSensorCfg:

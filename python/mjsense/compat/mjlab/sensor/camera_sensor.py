@@ -57,9 +57,9 @@ class CameraSensor(NativeSensor[CameraSensorData]):
     def __init__(self, cfg: Any = None, name: str | None = None) -> None:
         super().__init__(cfg, name)
         self.camera_idx = -1
-        """Of the camera in the model."""
+        """Name of the camera in the model."""
 
     @property
     def camera_name(self) -> str:
-        """Of the camera in the model."""
+        """Name of the camera in the model."""
         return self.cfg.camera_name or self.cfg.name

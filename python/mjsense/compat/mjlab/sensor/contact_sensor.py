@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""``mjlab.sensor.contact_sensor``: who touches what, how hard, since when."""
+"""``mjlab.sensor.contact_sensor``: contact forces, contact points and times of contact and air."""
 
 from __future__ import annotations
 
@@ -50,7 +50,7 @@ class ContactSensorCfg(SensorCfg):
 
 @dataclass
 class ContactData:
-    """As :class:`mjsense.ContactData`; fields that were not asked for are None."""
+    """Like :class:`mjsense.ContactData`; fields that were not requested are None."""
 
     found: Any = None
     force: Any = None
@@ -75,7 +75,7 @@ class ContactSensor(NativeSensor[ContactData]):
 
     @property
     def primary_names(self) -> list[str]:
-        """In the order of the columns."""
+        """Names of the primaries in the order of the columns."""
         return list(self.native.primary_names)
 
     def compute_first_contact(self, dt: float, abs_tol: float = 1e-6) -> Any:

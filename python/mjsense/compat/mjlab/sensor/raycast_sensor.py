@@ -40,7 +40,7 @@ class PinholeCameraPatternCfg:
 
     @classmethod
     def from_intrinsic_matrix(cls, intrinsic_matrix: list[float], width: int, height: int) -> PinholeCameraPatternCfg:
-        """Of a 3x3 matrix as 9 numbers, only fy is used."""
+        """Pattern of a 3x3 intrinsic matrix given as 9 numbers. Only fy is used."""
         return cls(width=width, height=height, fovy=math.degrees(2 * math.atan(height / (2 * intrinsic_matrix[4]))))
 
     def native(self) -> configs.PinholeCameraPatternCfg:

@@ -22,7 +22,7 @@ T = TypeVar("T")
 
 @dataclass
 class SensorCfg:
-    """Base of all sensor configurations. A subclass of your own has a ``build()`` that returns its :class:`Sensor`."""
+    """Base of all sensor configurations. A user-defined subclass implements ``build()``, which returns its :class:`Sensor`."""
 
     name: str
 
@@ -39,8 +39,8 @@ class SensorCfg:
 class Sensor(Generic[T]):
     """Base of the sensors of a :class:`mjsense.compat.mjlab.scene.Scene`; ``T`` is the type of ``data``.
 
-    A subclass of your own writes ``_compute_data()`` and what it needs of ``edit_spec``, ``initialize``, ``update`` and ``reset``. Its
-    value is computed when it is read for the first time after a step, a ``forward()`` or a reset.
+    A user-defined subclass implements ``_compute_data()`` and, if needed, ``edit_spec``, ``initialize``, ``update`` and ``reset``.
+    Its value is computed when it is read for the first time after a step, a ``forward()`` or a reset.
     """
 
     requires_sensor_context: bool = False
@@ -50,7 +50,7 @@ class Sensor(Generic[T]):
     _invalid = False
 
     def __init__(self) -> None:
-        """A subclass may leave out the call of this one."""
+        """A subclass need not call this constructor."""
 
     def __repr__(self) -> str:
         return f"<{type(self).__name__} of mjlab: {self.native!r}>"
@@ -71,7 +71,7 @@ class Sensor(Generic[T]):
         """Called for every ``scene.update(dt)``."""
 
     def reset(self, env_ids: Any = None) -> None:
-        """These environments begin a new episode: a tensor of ids; None: all."""
+        """Called when environments begin a new episode: a tensor of ids, or None for all."""
 
     def debug_vis(self, visualizer: mjsense.DebugShapes) -> None:
         """Draws the environment ``visualizer.env_idx``."""
@@ -106,7 +106,7 @@ class NativeSensor(Sensor[T]):
 
     @property
     def data(self) -> T:
-        """Tensors on the sensor's memory: the next read after a change writes them again."""
+        """Tensors that share the sensor's memory. The first read after a change of state overwrites them."""
         if self.native is None:
             raise RuntimeError(f"sensor '{self.name}' has no data yet: it belongs to no scene")
         return self._compute_data()
@@ -120,7 +120,7 @@ class NativeSensor(Sensor[T]):
 
 
 class GivenSensor(Sensor[Any]):
-    """A :class:`mjsense.Sensor` that was given to the scene; its arrays are tensors here, everything else is its own."""
+    """Wraps a :class:`mjsense.Sensor` of the scene: arrays are returned as tensors, all other attributes are those of the sensor."""
 
     def __init__(self, native: mjsense.Sensor) -> None:
         self.native = native
@@ -131,7 +131,7 @@ class GivenSensor(Sensor[Any]):
 
     @property
     def data(self) -> Any:
-        """The sensor's value with tensors in the place of arrays."""
+        """The sensor's value with arrays replaced by tensors."""
         return self._converted("", self.native.data)
 
     def _converted(self, name: str, value: Any) -> Any:
@@ -179,7 +179,7 @@ class OwnSensor(mjsense.Sensor):
 
 
 def native_sensor(item: Any, entity_cfgs: dict[str, Any]) -> Any:
-    """What the native scene takes for an element of ``SceneCfg.sensors``: a configuration or a sensor of ours."""
+    """Converts an element of ``SceneCfg.sensors`` to a configuration or sensor that the native scene accepts."""
     built: Any = item.build() if isinstance(item, SensorCfg) else item
     if isinstance(built, NativeSensor) and isinstance(item, SensorCfg):
         return item.native()  # pyright: ignore[reportAttributeAccessIssue]
@@ -190,7 +190,7 @@ def native_sensor(item: Any, entity_cfgs: dict[str, Any]) -> Any:
     if not isinstance(built, Sensor):
         if isinstance(item, SensorCfg):
             raise TypeError(f"{type(item).__name__}.build() must return a Sensor, not {built!r}")
-        return built  # a configuration of mjsense's own, or what the scene refuses
+        return built  # a configuration of mjsense, or an object that the scene rejects
     if not name:
         raise ValueError(f"{type(built).__name__}: a sensor in SceneCfg.sensors needs a name; set its attribute 'name'")
     if built.native is not None:

@@ -10,7 +10,7 @@ from mjsense.compat.mjlab.sensor.raycast_sensor import RayCastSensor
 
 
 class SensorContext:
-    """The cameras and ray sensors of a scene. There is nothing to prepare: they are computed when they are read."""
+    """The cameras and ray sensors of a scene. They are computed when they are read, so nothing is prepared."""
 
     def __init__(self, camera_sensors: list[CameraSensor], raycast_sensors: list[RayCastSensor]) -> None:
         self.camera_sensors = sorted(camera_sensors, key=lambda sensor: sensor.camera_idx)
@@ -25,21 +25,21 @@ class SensorContext:
         return bool(self.raycast_sensors)
 
     def prepare(self) -> None:
-        """Nothing to do."""
+        """Has no effect."""
 
     def finalize(self) -> None:
-        """Nothing to do."""
+        """Has no effect."""
 
     def get_rgb(self, cam_idx: int) -> Any:
-        """uint8 ``[B, H, W, 3]`` of a camera of the model; KeyError if no sensor is there."""
+        """uint8 ``[B, H, W, 3]`` of a camera of the model; KeyError if the camera has no sensor."""
         return self._image(cam_idx, "rgb")
 
     def get_depth(self, cam_idx: int) -> Any:
-        """float32 ``[B, H, W, 1]`` m; KeyError if no sensor is there."""
+        """float32 ``[B, H, W, 1]`` m; KeyError if the camera has no sensor."""
         return self._image(cam_idx, "depth")
 
     def get_segmentation(self, cam_idx: int) -> Any:
-        """int32 ``[B, H, W, 2]``; KeyError if no sensor is there."""
+        """int32 ``[B, H, W, 2]``; KeyError if the camera has no sensor."""
         return self._image(cam_idx, "segmentation")
 
     def _image(self, cam_idx: int, kind: str) -> Any:

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""``mjlab.terrains.config``: the tiles of its velocity tasks, by name and measure."""
+"""``mjlab.terrains.config``: names and dimensions of the tiles of its velocity tasks."""
 
 from __future__ import annotations
 

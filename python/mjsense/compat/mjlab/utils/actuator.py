@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""``mjlab.utils.actuator``: what a motor is at its joint."""
+"""``mjlab.utils.actuator``: inertia, speed and effort of a motor as seen at its joint."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ def reflected_inertia_from_two_stage_planetary(
 
 
 def rpm_to_rad(rpm: float) -> float:
-    """Turns a minute in rad/s."""
+    """Converts revolutions per minute to rad/s."""
     return rpm * math.tau / 60
 
 
@@ -48,6 +48,6 @@ class LinearJointProperties(NamedTuple):
 def reflect_rotary_to_linear(
     armature_rotary: float, velocity_limit_rotary: float, effort_limit_rotary: float, transmission_ratio: float
 ) -> LinearJointProperties:
-    """A turning motor that drives a sliding joint, r = dx/dangle in m/rad: m = J / r^2, v = w r, F = T / r."""
+    """A rotary motor that drives a slide joint, r = dx/dangle in m/rad: m = J / r^2, v = w r, F = T / r."""
     r = transmission_ratio
     return LinearJointProperties(armature_rotary / r**2, velocity_limit_rotary * r, effort_limit_rotary / r)

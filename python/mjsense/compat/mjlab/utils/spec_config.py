@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""``mjlab.utils.spec_config``: edits of an entity's spec. Here are those of geoms; others are functions of yours in ``spec_fn``."""
+"""``mjlab.utils.spec_config``: edits of an entity's spec. Edits of geoms are supported; make other edits in ``spec_fn``."""
 
 from __future__ import annotations
 
@@ -41,7 +41,7 @@ _TUNING = tuple(field.name for field in fields(_Tuning))
 
 @dataclass
 class GeomCfg(_Tuning):
-    """Changes what is given of the geoms that an expression matches; values may be mappings from expressions."""
+    """Changes the given properties of the geoms that an expression matches. Values may be mappings from expressions."""
 
     geom_names_expr: tuple[str, ...]
     group: Any = None
@@ -51,7 +51,7 @@ class GeomCfg(_Tuning):
     priority: Any = None
 
     def edit_spec(self, spec: mujoco.MjSpec) -> None:
-        """ValueError for a condim that MuJoCo lacks."""
+        """Raises ValueError for a condim that MuJoCo does not have."""
         chosen = set(matching(self.geom_names_expr, [geom.name for geom in spec.geoms]))
         for geom in spec.geoms:
             for name in ("group", *_STRUCTURE, *_TUNING) if geom.name in chosen else ():
@@ -60,9 +60,9 @@ class GeomCfg(_Tuning):
 
 @dataclass
 class CollisionCfg(_Tuning):
-    """What collides: says all of contype, conaffinity, condim and priority of the geoms that an expression matches.
+    """Sets contype, conaffinity, condim and priority of the geoms that an expression matches.
 
-    The others collide with nothing, unless ``disable_other_geoms`` is False.
+    Collisions of all other geoms are disabled, unless ``disable_other_geoms`` is False.
     """
 
     geom_names_expr: tuple[str, ...]
@@ -73,7 +73,7 @@ class CollisionCfg(_Tuning):
     disable_other_geoms: bool = True
 
     def edit_spec(self, spec: mujoco.MjSpec) -> None:
-        """ValueError where a mapping leaves out a geom, or for a condim that MuJoCo lacks."""
+        """Raises ValueError if a mapping has no value for a geom, or for a condim that MuJoCo does not have."""
         chosen = set(matching(self.geom_names_expr, [geom.name for geom in spec.geoms]))
         for geom in spec.geoms:
             if geom.name not in chosen:
@@ -83,5 +83,5 @@ class CollisionCfg(_Tuning):
             for name in (*_STRUCTURE, *_TUNING):
                 value = value_of(getattr(self, name), geom.name)
                 if value is None and name in _STRUCTURE:
-                    raise ValueError(f"CollisionCfg: {name} says nothing of geom '{geom.name}': end the mapping with '.*'")
+                    raise ValueError(f"CollisionCfg: {name} has no value for geom '{geom.name}': end the mapping with '.*'")
                 _set(geom, name, value)

@@ -18,7 +18,7 @@ class CoreSensor(Sensor):
     def __init__(self, uuid: str, optional: bool = False) -> None:
         super().__init__(uuid, gymnasium.spaces.Box(-np.inf, np.inf, (1,), np.float64))
         self.optional = optional
-        """It is left out where the task has none."""
+        """The sensor is omitted if the task does not have it."""
 
     def get_observation(self, env: Any, task: Any = None, batch_index: int = 0, *args: Any, **kwargs: Any) -> Any:
         raise RuntimeError(f"sensor '{self.uuid}' is computed by the environment of a task: read it there, or with task.get_observations()")

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """The sensors that MolmoSpaces' documentation names.
 
-Those of the core suite stand for the sensors that mjsense computes; the others are computed in Python, for one world at a time.
+Sensors of the core suite are computed by mjsense in C++; the others are computed in Python, one world at a time.
 """
 
 from __future__ import annotations
@@ -21,11 +21,13 @@ _NUMBER = gymnasium.spaces.Box(-(2**31), 2**31 - 1, (), np.int64)
 
 
 class RoleName(str):
-    """What plays a role, in whatever episode: ``config.task_config.pickup_obj_name`` while the suite is composed."""
+    """Placeholder for the object of a role, whose body depends on the episode. Used while the suite is composed, for example as
+    ``config.task_config.pickup_obj_name``.
+    """
 
 
 def body_name(object_name: str, task: Any) -> str:
-    """The body of this name, or the one that plays the role in the world whose sensor is computed."""
+    """The body of this name, or the body that has the role in the world whose sensor is computed."""
     return getattr(task.config.task_config, f"{object_name}_name") if isinstance(object_name, RoleName) else object_name
 
 
@@ -39,7 +41,7 @@ def _body_pose(env: Any, batch_index: int, name: str) -> np.ndarray:
 
 
 class CameraParameterSensor(CoreSensor):
-    """Where a camera is and how it projects."""
+    """Extrinsic and intrinsic parameters of a camera."""
 
     def __init__(self, camera_name: str, uuid: str | None = None, **kwargs: Any) -> None:
         super().__init__(uuid or f"sensor_param_{camera_name}")
@@ -88,14 +90,14 @@ class EnvStateSensor(CoreSensor):
 
 
 class TaskInfoSensor(CoreSensor):
-    """What the task says about the state."""
+    """The task's information about the state."""
 
     def __init__(self, uuid: str = "task_info", **kwargs: Any) -> None:
         super().__init__(uuid)
 
 
 class LastActionSensor(CoreSensor):
-    """The action as the policy gave it."""
+    """The action as the policy returned it."""
 
     def __init__(self, uuid: str = "actions/commanded_action", **kwargs: Any) -> None:
         super().__init__(uuid)
@@ -116,21 +118,21 @@ class LastCommandedRelativeJointPosSensor(CoreSensor):
 
 
 class LastCommandedEETwistSensor(CoreSensor):
-    """Screws from the tool frames observed before to where the targets put them."""
+    """Twists from the tool frames observed before to those at the controllers' targets."""
 
     def __init__(self, uuid: str = "actions/ee_twist", **kwargs: Any) -> None:
         super().__init__(uuid)
 
 
 class LastCommandedEEPoseSensor(CoreSensor):
-    """Where the targets put the tool frames."""
+    """Poses of the tool frames at the controllers' targets."""
 
     def __init__(self, uuid: str = "actions/ee_pose", **kwargs: Any) -> None:
         super().__init__(uuid)
 
 
 class ObjectImagePointsSensor(CoreSensor):
-    """Pixels that show the objects; left out where the task has no camera."""
+    """Pixels that show the objects; omitted if the task has no camera."""
 
     def __init__(self, uuid: str = "object_image_points", **kwargs: Any) -> None:
         super().__init__(uuid, optional=True)
@@ -147,7 +149,7 @@ def get_core_sensors(exp_config: Any) -> list[Any]:
     """The sensors of every task, in their published order: cameras, robot, state, actions, image points.
 
     Args:
-        exp_config: what ``_create_sensor_suite_from_config`` was given.
+        exp_config: the argument of ``_create_sensor_suite_from_config``.
     """
     sensors: list[Any] = []
     for camera in exp_config.camera_config.cameras:
@@ -196,7 +198,7 @@ class ObjectStartPoseSensor(Sensor):
 
 
 class PickupObjGoalPoseSensor(Sensor):
-    """Where the task wants the object, in the world: float32 ``[7]``, m and wxyz."""
+    """Goal pose of the object, in the world: float32 ``[7]``, m and wxyz."""
 
     unit, frame = "m, wxyz", "world"
 
@@ -229,7 +231,10 @@ class ObjectPoseSensor(Sensor):
 
 
 class GraspStateSensor(Sensor):
-    """Whether each gripper touches and holds an object: ``{gripper: {"touching", "held"}}``. Held: it touches nothing but grippers."""
+    """Whether each gripper touches and holds an object: ``{gripper: {"touching", "held"}}``.
+
+    An object is held if it touches nothing but grippers.
+    """
 
     is_dict = True
 
@@ -282,7 +287,7 @@ class TCPPoseSensor(TcpPoseSensor):
 
 
 class PolicyPhaseSensor(Sensor):
-    """Number of the policy's present phase."""
+    """Number of the policy's current phase."""
 
     def __init__(self, uuid: str = "policy_phase", **kwargs: Any) -> None:
         super().__init__(uuid, _NUMBER)
@@ -293,7 +298,7 @@ class PolicyPhaseSensor(Sensor):
 
 
 class PolicyNumRetriesSensor(Sensor):
-    """How often the policy began again."""
+    """Number of the policy's retries."""
 
     def __init__(self, uuid: str = "policy_num_retries", **kwargs: Any) -> None:
         super().__init__(uuid, _NUMBER)
@@ -303,7 +308,7 @@ class PolicyNumRetriesSensor(Sensor):
 
 
 class GraspPoseSensor(Sensor):
-    """Where the policy means to close the gripper, in the world: float32 ``[7]``, m and wxyz."""
+    """The policy's planned grasp pose, in the world: float32 ``[7]``, m and wxyz."""
 
     unit, frame = "m, wxyz", "world"
 

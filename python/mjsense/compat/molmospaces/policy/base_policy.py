@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Policies that act in one world; every world gets a copy."""
+"""Policies that act in one world. Each world has a copy."""
 
 from __future__ import annotations
 
@@ -14,20 +14,20 @@ from mjsense.task import snake_case
 
 
 class BasePolicy:
-    """A policy of one world: write ``get_action(observation)``, and ``reset()`` if it has a state."""
+    """A policy of one world. Implement ``get_action(observation)``, and ``reset()`` if the policy has a state."""
 
     task: Any = None
     """The task that it is registered with."""
 
     def reset(self) -> None:
-        """A new episode begins."""
+        """Called at the start of an episode."""
 
     def get_action(self, observation: dict[str, Any]) -> dict[str, Any] | None:
         """Commands by move group, and ``done: True`` if the episode ends with them; None ends it without."""
         raise NotImplementedError(f"{type(self).__name__}: write get_action(observation)")
 
     def create_policy_sensors(self) -> list[Any]:
-        """Sensors that observations and recordings with this policy have."""
+        """Sensors that are added to observations and recordings with this policy."""
         return []
 
     def _mjs_policy(self) -> Policy:
@@ -35,7 +35,7 @@ class BasePolicy:
 
 
 class PlannerPolicy(BasePolicy):
-    """A policy that follows phases: write ``get_all_phases()``, ``get_phase()`` and ``retry_count``, too."""
+    """A policy with phases. Implement ``get_all_phases()``, ``get_phase()`` and ``retry_count`` as well."""
 
     retry_count: int = 0
 
@@ -44,7 +44,7 @@ class PlannerPolicy(BasePolicy):
         raise NotImplementedError(f"{type(self).__name__}: write get_all_phases()")
 
     def get_phase(self) -> str:
-        """Name of the present one."""
+        """Name of the current phase."""
         raise NotImplementedError(f"{type(self).__name__}: write get_phase()")
 
     def create_policy_sensors(self) -> list[Any]:
@@ -61,7 +61,7 @@ class PolicyOfWorlds(Policy):
         self.instances: list[BasePolicy] = [first]
 
     def sensors(self) -> list[Any]:
-        """Those of phases are of mjsense's own."""
+        """The policy's sensors. Sensors of phases are mjsense's own."""
         sensors = self.first.create_policy_sensors()
         return [s for s in sensors if not (self.phases and isinstance(s, (PolicyPhaseSensor, PolicyNumRetriesSensor)))]
 
@@ -102,7 +102,7 @@ class PolicyOfWorlds(Policy):
             self.phase[world], self.num_retries[world] = self.phases[policy.get_phase()], policy.retry_count
 
     def _hold(self, groups: dict[str, np.ndarray]) -> None:
-        """Worlds that leave out a group, which others command, keep the targets of its controller."""
+        """Worlds without a command for a group that other worlds command keep the targets of its controller."""
         for name, rows in groups.items():
             for world in np.flatnonzero(np.isnan(rows).any(1)):
                 targets = self.sim.env.task._view.targets(int(world)).get(name) if self.sim.env.task is not None else None

@@ -18,7 +18,7 @@ from mjsense.suite import SensorSuite
 
 
 class TaskConfig(PeerTaskConfig):
-    """The objects of a task while its suite is composed: names are those of the roles, whatever plays them in an episode."""
+    """The objects of a task while its suite is composed. Names are placeholders for roles, whose bodies depend on the episode."""
 
     def __getattr__(self, name: str) -> Any:
         if name.endswith("_name") and not name.startswith("_"):
@@ -31,20 +31,20 @@ class TaskConfig(PeerTaskConfig):
 class BaseMujocoTask:
     """One of mjsense's tasks with the sensors that ``_create_sensor_suite_from_config`` composes.
 
-    ``mjsense.make_vec(MyTask)``, ``mjsense.make(MyTask)`` and ``mjsense.record(MyTask, out=...)`` play it; the robot and the policy add
-    their sensors. On its own it plays one world: ``reset()``, ``step(action)``, ``get_observations()``.
+    ``mjsense.make_vec(MyTask)``, ``mjsense.make(MyTask)`` and ``mjsense.record(MyTask, out=...)`` accept it; the robot and the policy add
+    their sensors. Without them it runs one world: ``reset()``, ``step(action)``, ``get_observations()``.
     """
 
     played: str = "pick"
-    """Which of :func:`mjsense.task_names` is played."""
+    """The task that is run, one of :func:`mjsense.task_names`."""
     robot: Any = None
-    """By name, by the path of its file, or a :class:`mjsense.Robot`; None: the task's own."""
+    """The robot: a name, the path of its file, or a :class:`mjsense.Robot`. None: the task's default."""
 
     def __init__(self, exp_config: Any = None, **options: Any) -> None:
         """
         Args:
-            exp_config: an object of your own; ``task_config.use_sensors = False`` in it leaves out all sensors.
-            options: of :func:`mjsense.make_vec`, where the task plays on its own.
+            exp_config: a user-defined object. ``task_config.use_sensors = False`` in it disables all sensors.
+            options: options of :func:`mjsense.make_vec` for the task's own environment.
         """
         self.exp_config = exp_config
         self._options = options
@@ -53,12 +53,13 @@ class BaseMujocoTask:
         self._worlds: mjsense.TaskVectorEnv | None = None
 
     def _create_sensor_suite_from_config(self, config: Any) -> SensorSuite:
-        """The suite: usually ``get_core_sensors(config)`` and what the task adds."""
+        """The suite: usually ``get_core_sensors(config)`` and the task's own sensors."""
         raise NotImplementedError(f"{type(self).__name__}: write _create_sensor_suite_from_config(config)")
 
     def register_policy(self, policy: Any) -> None:
-        """The policy that drives the robot and adds its sensors: a :class:`BasePolicy`, a :class:`mjsense.Policy`, or a name. Once, and
-        before the first ``reset()``."""
+        """The policy that drives the robot and adds its sensors: a :class:`BasePolicy`, a :class:`mjsense.Policy`, or a name.
+
+        Call it once, and before the first ``reset()``."""
         if self._registered is not None:
             raise ValueError("Policy already registered")
         if self._worlds is not None:
@@ -71,24 +72,24 @@ class BaseMujocoTask:
 
     @property
     def worlds(self) -> mjsense.TaskVectorEnv:
-        """The environment that plays it."""
+        """The environment that runs the task."""
         if self._worlds is None:
             self._worlds = mjsense.make_vec(self, autoreset_mode="disabled", **self._options)  # type: ignore[arg-type]
         return self._worlds
 
     @property
     def env(self) -> Any:
-        """What sensors get as ``env``."""
+        """The object that sensors receive as ``env``."""
         return self.worlds.sim.env
 
     @property
     def config(self) -> Any:
-        """What sensors read of the experiment: ``task_config``, ``camera_config``."""
+        """The experiment as sensors read it: ``task_config``, ``camera_config``."""
         return self.env.task.config
 
     @property
     def sensor_suite(self) -> SensorSuite | None:
-        """What ``_create_sensor_suite_from_config`` returned; None without sensors."""
+        """The result of ``_create_sensor_suite_from_config``; None without sensors."""
         if self._worlds is None:
             self.worlds
         return self._sensor_suite
@@ -102,7 +103,7 @@ class BaseMujocoTask:
         """One control step.
 
         Args:
-            action: commands by move group, ``done`` if the episode ends with them; or all commands in a row ``[n]``.
+            action: commands by move group, ``done`` if the episode ends with them; or all commands concatenated, ``[n]``.
         """
         done = None
         if isinstance(action, dict):
@@ -123,7 +124,7 @@ class BaseMujocoTask:
         return np.concatenate([np.atleast_1d(np.asarray(action[name], np.float64)) for name in groups])
 
     def get_observations(self) -> list[dict[str, Any]]:
-        """By world: uuid -> value, in the order of the suite; dict sensors as dicts."""
+        """One dict per world, uuid -> value, in the order of the suite. Values of dict sensors are dicts."""
         streams = [(sensor, spec, array) for sensor, spec, array in self.worlds._rollout.streams()]
         paths = {spec.name: stream_path(sensor, spec.name) for sensor, spec, _ in streams}
         out = []
@@ -166,7 +167,7 @@ class BaseMujocoTask:
         return [sensor for sensor in suite if not isinstance(sensor, CoreSensor)]
 
     def _mjs_select(self, suite: Sequence[tuple[str, str]]) -> list[str]:
-        """Order of the suite: the task's sensors, the robot's, the policy's, then those of the call."""
+        """Order of the suite: the task's sensors, the robot's, the policy's, then those passed to the call."""
         assert self._sensor_suite is not None
         known = {name for name, _ in suite}
         composed = [s.uuid for s in self._sensor_suite if s.uuid in known or not (isinstance(s, CoreSensor) and s.optional)]

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Rows of text, and which sensors are pictures."""
+"""Converts rows of text, and tells which sensors are images."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from mjsense.suite import SensorSuite
 
 
 def is_camera_sensor(sensor_name: str, sensor_suite: SensorSuite | None) -> bool:
-    """Whether the sensor of this name is a camera's picture; False for a name that the suite has not."""
+    """Whether the sensor of this name is a camera image; False for a name that is not in the suite."""
     if sensor_suite is None or sensor_name not in sensor_suite:
         return False
     sensor = sensor_suite.get(sensor_name)
@@ -26,7 +26,7 @@ def is_camera_sensor(sensor_name: str, sensor_suite: SensorSuite | None) -> bool
 
 
 def dict_to_byte_array(value: Any, str_max_len: int = 2000) -> np.ndarray:
-    """JSON text as uint8 ``[str_max_len]``, zeros behind it; ValueError if it is longer."""
+    """JSON text as uint8 ``[str_max_len]``, padded with zeros; ValueError if it is longer."""
     text = encode_json(value)
     if len(text) > str_max_len:
         raise ValueError(f"JSON text of {len(text)} bytes, str_max_len is {str_max_len}")
@@ -34,10 +34,10 @@ def dict_to_byte_array(value: Any, str_max_len: int = 2000) -> np.ndarray:
 
 
 def byte_array_to_string(row: np.ndarray) -> str:
-    """The text of such a row."""
+    """The text of a row of dict_to_byte_array()."""
     return np.asarray(row, np.uint8).tobytes().rstrip(b"\0").decode()
 
 
 def byte_array_to_dict(row: np.ndarray) -> Any:
-    """The value of such a row."""
+    """The value of a row of dict_to_byte_array()."""
     return json.loads(byte_array_to_string(row))
