@@ -471,7 +471,7 @@ def encoders(lab: Lab, names=None) -> Row:
     row.trials += 1
     try:
         done = lab.run(lab.fresh("encoded"), "--timeout", 2, env={**os.environ, "MJSENSE_FFMPEG": str(script)})
-        if done.returncode != 2 or "said nothing for" not in done.stderr:
+        if done.returncode != 2 or "printed nothing for" not in done.stderr:
             row.wrong("crashed", f"-encoders hangs: {done.returncode} {done.stderr}")
     except subprocess.TimeoutExpired:
         row.wrong("hung", "-encoders hangs")

@@ -30,7 +30,7 @@ SCENE = """<mujoco><worldbody><body name="ball"><freejoint/><geom size=".1"/><si
     ("record pick --out x --ffmpeg /no/ffmpeg", "/no/ffmpeg"),
     ("record pick --config missing.toml --out x", "missing.toml: no such file"),
     ("record pick --config typo.toml --out x", "typo.toml:2: no key named 'episods'; did you mean 'episodes'?"),
-    ("record pick --config type.toml --out x", "type.toml:1: the value of 'episodes' is of a wrong type"),
+    ("record pick --config type.toml --out x", "type.toml:1: the value of 'episodes' has the wrong type"),
     ("record pick --config broken.toml --out x", "broken.toml:1"),
     ("recrd", "no command 'recrd'; did you mean 'record'?"),
     ("sensors missing.xml", "missing.xml: no such file"),
@@ -47,21 +47,21 @@ SCENE = """<mujoco><worldbody><body name="ball"><freejoint/><geom size=".1"/><si
     ("schema extra", "extra"),
     ("inspect broken.xml", "cannot open 'broken.xml'"),
     ("inspect broken.xml --sheet x.png", "cannot open 'broken.xml'"),
-    ("inspect folder", "'folder' holds no recording"),
+    ("inspect folder", "'folder' contains no recording"),
     ("inspect pipe", "'pipe' is neither a file nor a folder"),
-    ("inspect link.h5", "'link.h5' is a link, which is not followed"),
+    ("inspect link.h5", "'link.h5' is a symbolic link, which is not followed"),
     ("inspect folder extra", "extra"),
     ("verify", "path is required"),
-    ("verify folder", "'folder' holds no recording"),
+    ("verify folder", "'folder' contains no recording"),
     ("verify /dev/null", "'/dev/null' is neither a file nor a folder"),
     ("verify pipe", "'pipe' is neither a file nor a folder"),
-    ("repair folder", "'folder' holds no recording"),
+    ("repair folder", "'folder' contains no recording"),
     ("repair pipe", "'pipe' is neither a file nor a folder"),
-    ("repair broken.xml", "'broken.xml' is no trajectories_batch_*_of_*.h5"),
+    ("repair broken.xml", "'broken.xml' is not named trajectories_batch_*_of_*.h5"),
     ("sensors", "what is required"),
     ("sensors folder", "folder: is not a file; expected an MJCF file or the name of a task"),
     ("sensors pipe", "pipe: is not a file"),
-    ("sensors scene.xml --robot franka", "--robot is an option of tasks, and scene.xml is a scene"),
+    ("sensors scene.xml --robot franka", "--robot applies to tasks only, and scene.xml is a scene"),
     ("sensors scene.xml --steps -1", "--steps"),
     ("sensors pick --scene tabel", "no scene named 'tabel'; did you mean 'table'?"),
     ("sensors pick --set foo=1", "no field named 'foo'"),
@@ -173,7 +173,7 @@ def test_a_folder_that_cannot_be_written(mjsense):
 def test_folders_are_folders_whatever_they_are_called(mjsense, name):
     """Nothing of a name is an option or an address for ffmpeg."""
     mjsense("record", "pick", "--size", "32x24", "--horizon", 2, "--keep-failures", "-q", f"--out={name}")
-    assert "whole: 1 files, 1 episodes" in mjsense("verify", "--", name).stdout
+    assert "intact: 1 files, 1 episodes" in mjsense("verify", "--", name).stdout
     assert sorted(p.name for p in (mjsense.folder / name).iterdir()) == ["contact_sheet.png", "house_0"]
 
 

@@ -225,7 +225,7 @@ def peer_file(tmp_path):
 def test_the_peers_files_are_understood(record_fake, peer_file):
     path, noise = peer_file
     done = record_fake("verify", path.parent)
-    assert "names no video of camera 'wrist_camera'" in done.stdout and "whole: 1 files, 1 episodes, 40 steps" in done.stdout
+    assert "names no video of camera 'wrist_camera'" in done.stdout and "intact: 1 files, 1 episodes, 40 steps" in done.stdout
     listing = record_fake("inspect", path).stdout
     line = next(row for row in listing.splitlines() if "tcp_pose" in row)
     assert f"{noise.mean():.4g}" in line and f"{noise.std():.4g}" in line
@@ -249,10 +249,10 @@ def damage(path, name, change):
 @pytest.mark.parametrize(
     "name, change, complaint",
     [
-        ("traj_0/actions/joint_pos", lambda v: v[3].__setitem__(5, 0x7B), "joint_pos row 3 is no JSON text"),
+        ("traj_0/actions/joint_pos", lambda v: v[3].__setitem__(5, 0x7B), "joint_pos row 3 is not JSON text"),
         ("traj_1/fail", lambda v: v.__setitem__(2, False), "row 2 is not the opposite of success"),
         ("traj_1/obs/sensor_data/wrist_camera", lambda v: v.__setitem__(3, 0x58), "does not exist"),
-        ("traj_0/rewards", lambda v: v.__setitem__(1, 7.5), "traj_0/rewards is not what was recorded: its checksum is"),
+        ("traj_0/rewards", lambda v: v.__setitem__(1, 7.5), "traj_0/rewards differs from what was recorded: its checksum is"),
     ],
 )
 def test_verify_finds_damage(record_fake, house, tmp_path, name, change, complaint):

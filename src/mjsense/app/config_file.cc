@@ -38,7 +38,7 @@ void read_key(const Key& key, void* object, const toml::node& node, const std::s
     const Kind kind =
         field.type->kind == Kind::kOptional ? field.type->element().kind : field.type->kind;
     if (kind != Kind::kList || !text)
-      throw ValueError(fmt::format("{}: the value of '{}' is of a wrong type: must be {}", place,
+      throw ValueError(fmt::format("{}: the value of '{}' has the wrong type: must be {}", place,
                                    field.option_name(), expected(*field.type)));
     at_place(place, [&] { read_text(field, object, *text); });
   }
@@ -70,7 +70,7 @@ void read_toml_text(std::string_view text, const std::string& path, const Struct
       const auto text = node.value_exact<std::string>();
       if (!text)
         throw ValueError(
-            fmt::format("{}: the value of 'size' is of a wrong type: must be a str", place));
+            fmt::format("{}: the value of 'size' has the wrong type: must be a str", place));
       at_place(place, [&] { read_size(decl, object, *text); });
       continue;
     }

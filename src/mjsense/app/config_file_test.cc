@@ -112,7 +112,7 @@ TEST(ConfigFile, WrongKeysAndTypesAreErrors) {
               HasSubstr(":2: no key named 'samles'; did you mean 'samples'?"));
   for (const char* wrong : {"episodes = 1.5", "depth = 1", "task = true", "cameras = [1]",
                             "cameras = 3", "size = 64", "no_noise = 'yes'"}) {
-    EXPECT_THAT(fault(wrong), HasSubstr("is of a wrong type")) << wrong;
+    EXPECT_THAT(fault(wrong), HasSubstr("has the wrong type")) << wrong;
   }
   EXPECT_THAT(fault("seed = 1\nsize = '64'"), HasSubstr(":2: size '64': expected WIDTHxHEIGHT"));
   EXPECT_THAT(fault("seed = 1\ncameras = 'a,,b'"),

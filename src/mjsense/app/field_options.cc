@@ -170,7 +170,7 @@ void read_size(const StructDecl& decl, void* object, std::string_view text) {
     check_field(width, object, "");
     check_field(height, object, "");
   } catch (const ValueError&) {
-    throw ValueError(fmt::format("size '{}': expected WIDTHxHEIGHT, as 640x368", text));
+    throw ValueError(fmt::format("size '{}': expected WIDTHxHEIGHT, such as 640x368", text));
   }
 }
 

@@ -65,7 +65,7 @@ constexpr struct {
      "a mobile base, an arm with a gripper; a scene with a door."},
     {"nav_to_obj", "Drive to an object.", "a mobile base, a head camera; a scene with objects."},
     {"multi_task", "Several tasks in one scene, such as nav_to_obj+pick.",
-     "whatever its tasks need."},
+     "everything that its tasks need."},
 };
 
 // Packages that entities of a scene come from: "package:<package>/...".
@@ -112,7 +112,8 @@ std::string list_scenes(bool json) {
   std::vector<Line> lines;
   for (const std::string& name : scene_names()) {
     const SceneFileCfg scene = load_scene(name);
-    const char* houses = scene.generator.empty() ? "" : " Every house number is another house.";
+    const char* houses =
+        scene.generator.empty() ? "" : " Each house number gives a different house.";
     lines.push_back({name, scene.description + houses, packages_of(scene)});
   }
   return text_of(lines, json);

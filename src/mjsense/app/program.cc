@@ -236,16 +236,16 @@ int run(int argc, char** argv) {
                               "Write a picture of every camera too."}});
   add_examples(verify_app, {{"mjsense verify data", "Check all checksums."},
                             {"mjsense verify --decode data", "Decode every video frame too."}});
-  add_examples(repair_app,
-               {{"mjsense repair data", "Keep what an interrupted recording has finished."},
-                {"mjsense repair --json data/house_0", "Print the result as JSON."}});
+  add_examples(repair_app, {{"mjsense repair data",
+                             "Publish the finished episodes of an interrupted recording."},
+                            {"mjsense repair --json data/house_0", "Print the result as JSON."}});
 
   bool list_json = false;
   const auto add_list = [&](const char* name, const char* help) -> CLI::App& {
     CLI::App& list = *program.add_subcommand(name, help);
     list.add_flag("--json", list_json, "Print JSON.");
     add_examples(list, {{fmt::format("mjsense {}", name), "Print the list."},
-                        {fmt::format("mjsense {} --json", name), "Print the list for programs."}});
+                        {fmt::format("mjsense {} --json", name), "Print the list as JSON."}});
     return list;
   };
   CLI::App& tasks = add_list("tasks", "List the tasks and what they need.");
@@ -254,17 +254,19 @@ int run(int argc, char** argv) {
 
   CLI::App& schema =
       *program.add_subcommand("schema", "Print all configurations and their fields as JSON.");
-  add_examples(schema, {{"mjsense schema > schema.json", "Keep the schema in a file."},
-                        {"mjsense schema | python -m json.tool | less", "Read it."}});
+  add_examples(schema,
+               {{"mjsense schema > schema.json", "Keep the schema in a file."},
+                {"mjsense schema | python -m json.tool | less", "Page through the schema."}});
 
   std::string shell;
-  CLI::App& completion = *program.add_subcommand(
-      "completion", "Print a shell script that completes this program's words.");
+  CLI::App& completion = *program.add_subcommand("completion", "Print a shell completion script.");
   completion.add_option("shell", shell, "bash, zsh or fish.")->required()->type_name("SHELL");
-  add_examples(completion, {{"source <(mjsense completion bash)",
-                             "Use it in this bash; for all, add the line to ~/.bashrc."},
-                            {"mjsense completion fish > ~/.config/fish/completions/mjsense.fish",
-                             "Use it in fish."}});
+  add_examples(
+      completion,
+      {{"source <(mjsense completion bash)",
+        "Enable completion in this shell; to enable it permanently, add the line to ~/.bashrc."},
+       {"mjsense completion fish > ~/.config/fish/completions/mjsense.fish",
+        "Enable completion in fish."}});
   // Run by the shells' scripts.
   std::vector<std::string> to_complete;
   CLI::App& complete_app = *program.add_subcommand("complete", "")->group("");

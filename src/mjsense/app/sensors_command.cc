@@ -114,7 +114,7 @@ int run_sensors(const SensorsOptions& options) {
     for (const std::string& option : options.given) {
       if (option != "what" && option != "--steps" && option != "--json")
         throw ValueError(
-            fmt::format("{} is an option of tasks, and {} is a scene", option, options.what));
+            fmt::format("{} applies to tasks only, and {} is a scene", option, options.what));
     }
     SceneCfg cfg;
     cfg.base.path = options.what;

@@ -37,7 +37,7 @@ Shape::Shape(std::initializer_list<std::int64_t> dims)
 
 Shape::Shape(std::span<const std::int64_t> dims) {
   if (dims.size() > kMaxRank)
-    throw ValueError(fmt::format("array of rank {}: at most {}", dims.size(), kMaxRank));
+    throw ValueError(fmt::format("array of rank {}: the maximum is {}", dims.size(), kMaxRank));
   for (std::int64_t d : dims) {
     if (d < 0) throw ValueError(fmt::format("negative dimension {}", d));
     dims_[rank_++] = d;
@@ -99,7 +99,7 @@ Array Array::shared(Array& owner, DType dtype, const Shape& shape) {
 void Array::fill_zero() { std::memset(data_.get(), 0, bytes()); }
 
 void Array::throw_other_type(DType asked) const {
-  throw RuntimeError(fmt::format("an array {} of {} is read as {}", shape_.str(),
+  throw RuntimeError(fmt::format("an array {} of {} cannot be read as {}", shape_.str(),
                                  dtype_name(dtype_), dtype_name(asked)));
 }
 

@@ -135,7 +135,8 @@ class Array {
 
  private:
   std::size_t row_begin(int w) const {
-    assert(w >= 0 && shape_.rank() > 0 && w < shape_[0] && "Array: no row of this world");
+    assert(w >= 0 && shape_.rank() > 0 && w < shape_[0] &&
+           "Array: the world index is out of range");
     return w * row_bytes();
   }
   template <class T>

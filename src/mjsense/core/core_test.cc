@@ -31,7 +31,7 @@ TEST(Array, RowOfWrongTypeThrows) {
     std::as_const(a).row<double>(0);
     FAIL();
   } catch (const RuntimeError& e) {
-    EXPECT_STREQ(e.what(), "an array (3, 2) of float32 is read as float64");
+    EXPECT_STREQ(e.what(), "an array (3, 2) of float32 cannot be read as float64");
   }
 }
 
@@ -85,8 +85,8 @@ TEST(Errors, NameTheNearestCandidates) {
 #ifndef NDEBUG
 TEST(ArrayDeathTest, RowOfUnknownWorldAborts) {
   Array rows(DType::kFloat32, {2, 3});
-  EXPECT_DEATH(static_cast<void>(rows.row<float>(2)), "no row of this world");
-  EXPECT_DEATH(static_cast<void>(rows.row_data(-1)), "no row of this world");
+  EXPECT_DEATH(static_cast<void>(rows.row<float>(2)), "the world index is out of range");
+  EXPECT_DEATH(static_cast<void>(rows.row_data(-1)), "the world index is out of range");
 }
 #endif
 

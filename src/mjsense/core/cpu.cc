@@ -35,7 +35,8 @@ Isa choose() {
   for (std::size_t i = 0; i < kNames.size(); ++i) {
     if (kNames[i] != wanted) continue;
     if (static_cast<Isa>(i) > best)
-      throw RuntimeError(fmt::format("MJSENSE_ISA={}: this CPU has {}", wanted, isa_name(best)));
+      throw RuntimeError(
+          fmt::format("MJSENSE_ISA={}: this CPU supports only {}", wanted, isa_name(best)));
     return static_cast<Isa>(i);
   }
   throw ValueError(fmt::format("MJSENSE_ISA={}: expected portable, avx2 or avx512", wanted));

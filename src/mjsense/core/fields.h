@@ -83,7 +83,7 @@ class Word {
     for (std::size_t i = 0; i < kWords<E>.size(); ++i) {
       if (kWords<E>[i] == text) return static_cast<E>(i);
     }
-    throw "there is no such word";
+    throw "the word is not one of the allowed words";
   }
   E value_{};
 };
@@ -473,7 +473,7 @@ constexpr FieldType make() {
             .plain = kPlainAlternative<T>};
   } else {
     static_assert(Described<T>,
-                  "no type of a field: it needs visit_fields() beside it; for a path include "
+                  "not a field type: declare visit_fields() next to it; for a path, include "
                   "core/path_field.h");
     return {.kind = Kind::kObject, .object = &struct_of<T>};
   }

@@ -48,8 +48,10 @@ TEST(Match, SaysWhatIsWrong) {
   EXPECT_EQ(fault({"FR_(foot"}),
             "sensor 'feet': 'FR_(foot' is not a regular expression: missing closing parenthesis at "
             "position 8");
-  EXPECT_THAT(fault({"*"}), HasSubstr("nothing that this could repeat at position 0"));
-  EXPECT_THAT(fault({"a**"}), HasSubstr("nothing that this could repeat at position 2"));
+  EXPECT_THAT(fault({"*"}),
+              HasSubstr("a quantifier without an expression before it at position 0"));
+  EXPECT_THAT(fault({"a**"}),
+              HasSubstr("a quantifier without an expression before it at position 2"));
   EXPECT_THAT(fault({"\\h"}), HasSubstr("not supported: \\h at position 0"));
 }
 
@@ -80,7 +82,8 @@ TEST(Match, RejectsPatternsThatDifferFromPython) {
     EXPECT_THAT(refusal(pattern), HasSubstr("not supported")) << pattern;
   }
   for (const char* pattern : {"^*", "$?", "\\b+", "a|*", "a{2}{3}"}) {
-    EXPECT_THAT(refusal(pattern), HasSubstr("nothing that this could repeat")) << pattern;
+    EXPECT_THAT(refusal(pattern), HasSubstr("a quantifier without an expression before it"))
+        << pattern;
   }
   EXPECT_EQ(refusal("FR_\\Z"),
             "x: 'FR_\\Z' is not a regular expression: not supported: \\Z at position 3");
@@ -223,7 +226,8 @@ std::string ours(const std::vector<std::string>& patterns, const std::vector<std
     return out;
   } catch (const ValueError& error) {
     const std::string_view what = error.what();
-    if (what.find("not supported: nothing that this could repeat") != what.npos) return "syntax";
+    if (what.find("not supported: a quantifier without an expression before it") != what.npos)
+      return "syntax";
     if (what.find("not supported") != what.npos) return "unsupported";
     return what.find("is not a regular expression") != what.npos ? "syntax" : "error";
   }

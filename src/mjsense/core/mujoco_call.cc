@@ -63,7 +63,7 @@ mjsense_call_in_frame:
   .size mjsense_call_in_frame, .-mjsense_call_in_frame
 )");
 #else
-#error "mjsense_call_in_frame() is written for x86-64 and AArch64"
+#error "mjsense_call_in_frame() supports x86-64 and AArch64 only"
 #endif
 
 namespace mjsense {

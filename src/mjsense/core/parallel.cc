@@ -61,7 +61,7 @@ ThreadPool::ThreadPool(int threads) {
     }
     wake_.notify_all();
     for (std::thread& w : workers_) w.join();
-    throw RuntimeError(fmt::format("cannot start thread {} of {}: {}; ask for fewer threads",
+    throw RuntimeError(fmt::format("cannot start thread {} of {}: {}; use fewer threads",
                                    started + 2, count, e.what()));
   }
   add_owner(this);

@@ -25,7 +25,7 @@ class Scanner {
       if (c == '*' || c == '+' || c == '?' || c == '{') {
         const std::size_t at = pos_;
         quantifier();
-        if (!repeatable) refuse("nothing that this could repeat", at);
+        if (!repeatable) refuse("a quantifier without an expression before it", at);
         repeatable = false;
       } else if (c == '\\') {
         repeatable = escape();
@@ -60,10 +60,11 @@ class Scanner {
     if (in_[start] == '{') {
       const std::size_t digits = pos_;
       while (is_digit(peek())) ++pos_;
-      if (pos_ == digits) refuse("'{' without a number (\\{ is the character)", start);
+      if (pos_ == digits) refuse("'{' without a number (write \\{ for the character)", start);
       if (peek() == ',') ++pos_;
       while (is_digit(peek())) ++pos_;
-      if (!take("}")) refuse("'{' that begins no {n}, {n,} or {n,m} (\\{ is the character)", start);
+      if (!take("}"))
+        refuse("'{' that does not begin {n}, {n,} or {n,m} (write \\{ for the character)", start);
     }
     if (peek() == '?' || peek() == '+') ++pos_;
   }
@@ -96,12 +97,12 @@ class Scanner {
     take("^");
     bool class_before = false;  // \d and the like cannot start a range
     for (bool first = true; first || peek() != ']'; first = false) {
-      if (end()) refuse("a set without its ]", start);
+      if (end()) refuse("a set without a closing ]", start);
       const std::size_t at = pos_;
       const char c = peek();
       ++pos_;
-      if (c == '[') refuse("'[' in a set (\\[ is the character)", at);
-      if (c == '-' && class_before && peek() != ']') refuse("a range from a class", at);
+      if (c == '[') refuse("'[' in a set (write \\[ for the character)", at);
+      if (c == '-' && class_before && peek() != ']') refuse("a range that starts with a class", at);
       class_before = false;
       if (c == '\\') {
         const char e = peek();
@@ -111,7 +112,7 @@ class Scanner {
       }
       if (peek() == '-' && peek(1) == '\\' &&
           std::string_view("dDwWsS").find(peek(2)) != std::string_view::npos) {
-        refuse("a range to a class", pos_);
+        refuse("a range that ends with a class", pos_);
       }
     }
     ++pos_;
@@ -140,7 +141,7 @@ class Scanner {
   void name() {
     const std::size_t start = pos_;
     while (is_letter(peek()) || peek() == '_' || (pos_ > start && is_digit(peek()))) ++pos_;
-    if (peek() != '>') refuse("this name of a group", start);
+    if (peek() != '>') refuse("this group name", start);
     ++pos_;
   }
 

@@ -74,11 +74,11 @@ Fd open_plain(int folder, std::string_view name) {
   const auto fail = [&](std::string_view why) {
     throw RuntimeError(fmt::format("'{}' {}", printable(name), why));
   };
-  if (!is_plain_name(name)) fail("is no plain file name, which stays in its folder");
+  if (!is_plain_name(name)) fail("is not a plain file name without a folder");
   // Without O_NONBLOCK, opening a pipe would wait for a writer.
   Fd file(
       openat(folder, std::string(name).c_str(), O_RDONLY | O_NOFOLLOW | O_NONBLOCK | O_CLOEXEC));
-  if (!file && errno == ELOOP) fail("is a link, which is not followed");
+  if (!file && errno == ELOOP) fail("is a symbolic link, which is not followed");
   if (!file && errno == ENOENT) fail("does not exist");
   if (!file) fail(fmt::format("cannot be opened: {}", std::strerror(errno)));
   struct stat about = {};
@@ -86,7 +86,7 @@ Fd open_plain(int folder, std::string_view name) {
     fail(fmt::format("cannot be opened: {}", std::strerror(errno)));
   if (!S_ISREG(about.st_mode)) fail(fmt::format("is {}, expected a file", kind_of(about.st_mode)));
   if (is_mostly_holes(file.get(), about))
-    fail(fmt::format("claims {} bytes and stores {}: it is not read", about.st_size,
+    fail(fmt::format("declares {} bytes but stores {}: it is not read", about.st_size,
                      512 * about.st_blocks));
   return file;
 }

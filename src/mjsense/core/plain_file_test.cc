@@ -39,7 +39,7 @@ TEST(PlainFile, OpensRegularFilesInTheFolderOnly) {
   std::filesystem::create_directory(dir.path / "folder");
   mkfifo((dir.path / "pipe").c_str(), 0600);
   EXPECT_EQ(refused(dir.path, "video.mp4"), "");
-  EXPECT_THAT(refused(dir.path, "link"), HasSubstr("is a link, which is not followed"));
+  EXPECT_THAT(refused(dir.path, "link"), HasSubstr("is a symbolic link, which is not followed"));
   EXPECT_THAT(refused(dir.path, "folder"), HasSubstr("is a folder, expected a file"));
   EXPECT_THAT(refused(dir.path, "pipe"), HasSubstr("is a pipe, expected a file"));
   EXPECT_THAT(refused(dir.path, "none"), HasSubstr("does not exist"));
@@ -47,7 +47,7 @@ TEST(PlainFile, OpensRegularFilesInTheFolderOnly) {
        {std::string("../x"), std::string("/etc/passwd"), std::string("folder/x"), std::string("."),
         std::string(".."), std::string(""), std::string("a\nb"), std::string("a\0b", 3),
         std::string(256, 'x')}) {
-    EXPECT_THAT(refused(dir.path, name), HasSubstr("is no plain file name")) << name;
+    EXPECT_THAT(refused(dir.path, name), HasSubstr("is not a plain file name")) << name;
   }
 }
 
@@ -56,7 +56,8 @@ TEST(PlainFile, RejectsSparseFiles) {
   testing::TempDir dir;
   std::ofstream(dir.path / "video.mp4") << "x";
   std::filesystem::resize_file(dir.path / "video.mp4", std::uintmax_t{1} << 40);
-  EXPECT_THAT(refused(dir.path, "video.mp4"), HasSubstr("claims 1099511627776 bytes and stores "));
+  EXPECT_THAT(refused(dir.path, "video.mp4"),
+              HasSubstr("declares 1099511627776 bytes but stores "));
   std::filesystem::resize_file(dir.path / "video.mp4", std::uintmax_t{1} << 30);
   EXPECT_EQ(refused(dir.path, "video.mp4"), "");
 }
@@ -151,7 +152,7 @@ TEST(ThreadPool, FailureToStartThreadsThrows) {
       const ThreadPool pool(4000);
       _exit(2);
     } catch (const RuntimeError& e) {
-      _exit(std::string(e.what()).find("ask for fewer threads") != std::string::npos ? 0 : 3);
+      _exit(std::string(e.what()).find("use fewer threads") != std::string::npos ? 0 : 3);
     }
   }
   int status = 0;

@@ -33,9 +33,9 @@ std::vector<std::uint8_t> encode_png(std::span<const std::uint8_t> pixels, int w
   const bool known = channels == 1 || channels == 3 || channels == 4;
   if (width <= 0 || height <= 0 || !known ||
       pixels.size() != static_cast<std::size_t>(width) * height * channels) {
-    throw ValueError(
-        fmt::format("PNG: {} bytes are no picture of {} x {} pixels with {} channels (1, 3 or 4)",
-                    pixels.size(), width, height, channels));
+    throw ValueError(fmt::format(
+        "PNG: {} bytes do not match an image of {} x {} pixels with {} channels (1, 3 or 4)",
+        pixels.size(), width, height, channels));
   }
   const std::size_t stride = static_cast<std::size_t>(width) * channels;
 
@@ -56,7 +56,7 @@ std::vector<std::uint8_t> encode_png(std::span<const std::uint8_t> pixels, int w
   uLongf packed_size = compressBound(rows.size());
   std::vector<std::uint8_t> packed(packed_size);
   if (compress2(packed.data(), &packed_size, rows.data(), rows.size(), 6) != Z_OK) {
-    throw RuntimeError("PNG: zlib failed to compress the picture");
+    throw RuntimeError("PNG: zlib failed to compress the image");
   }
   packed.resize(packed_size);
 

@@ -16,7 +16,7 @@ void Sensor::cast(const CastContext& /*context*/) {}
 void Sensor::reset(const World& /*world*/) {}
 void Sensor::draw(const World& /*world*/, DebugShapes& /*shapes*/) {
   throw ValueError(
-      fmt::format("sensor '{}': a sensor of kind '{}' has nothing to draw", name_, kind()));
+      fmt::format("sensor '{}': sensors of kind '{}' have nothing to draw", name_, kind()));
 }
 
 const Field& Sensor::field(std::string_view name) const {

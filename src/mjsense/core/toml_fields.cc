@@ -57,7 +57,7 @@ class Reader {
 
   [[noreturn]] void wrong(const FieldType& type, const toml::node& node,
                           const std::string& name) const {
-    throw ValueError(fmt::format("{}: the value of '{}' is of a wrong type: must be {}",
+    throw ValueError(fmt::format("{}: the value of '{}' has the wrong type: must be {}",
                                  toml_place(path_, node), name, expected(type)));
   }
 

@@ -86,8 +86,9 @@ class Chunks {
                                                  &values, nullptr, 0, nullptr, &config);
       if (filter != H5Z_FILTER_DEFLATE && filter != H5Z_FILTER_SHUFFLE &&
           filter != H5Z_FILTER_FLETCHER32 && filter != kLzfFilter)
-        refuse(name_, fmt::format("is packed by filter {}, which is not read: gzip and lzf are",
-                                  static_cast<int>(filter)));
+        refuse(name_,
+               fmt::format("is compressed with filter {}, which is not supported: gzip and lzf are",
+                           static_cast<int>(filter)));
       filters_.push_back(filter);
     }
     return !filters_.empty();
@@ -100,7 +101,7 @@ class Chunks {
     hsize_t count = 0;
     h5::check(H5Dget_num_chunks(dataset_, space, &count), name_);
     if (count > kMostPlainChunks)
-      refuse(name_, fmt::format("has more than {} chunks that are not packed", kMostPlainChunks));
+      refuse(name_, fmt::format("has more than {} uncompressed chunks", kMostPlainChunks));
     std::vector<hsize_t> at(size_.size());
     for (hsize_t n = 0; n < count; ++n) {
       unsigned without = 0;
@@ -109,8 +110,8 @@ class Chunks {
       h5::check(H5Dget_chunk_info(dataset_, space, n, at.data(), &without, &address, &stored),
                 name_);
       if (stored != bytes_)
-        refuse(name_,
-               fmt::format("is damaged: a chunk of it has {} bytes, not {}", stored, bytes_));
+        refuse(name_, fmt::format("is damaged: one of its chunks has {} bytes, expected {}", stored,
+                                  bytes_));
     }
   }
 
@@ -119,7 +120,7 @@ class Chunks {
     h5::check(H5Dget_chunk_storage_size(dataset_, at.data(), &stored), name_);
     if (stored == 0) return;
     if (stored > kMostRowBytes + (kMostRowBytes >> 4))
-      refuse(name_, fmt::format("has a packed chunk of {} bytes", stored));
+      refuse(name_, fmt::format("has a compressed chunk of {} bytes, which is too large", stored));
     Bytes bytes(stored);
     std::uint32_t without = 0;  // a bit for each filter that was skipped
     h5::check(H5Dread_chunk(dataset_, H5P_DEFAULT, at.data(), &without, bytes.data()), name_);
@@ -132,7 +133,8 @@ class Chunks {
         bytes.resize(bytes.size() - std::min(bytes.size(), kSumBytes));
     }
     if (bytes.size() != bytes_)
-      refuse(name_, fmt::format("is damaged: a chunk of it does not unpack to {} bytes", bytes_));
+      refuse(name_,
+             fmt::format("is damaged: one of its chunks does not decompress to {} bytes", bytes_));
   }
 
   hid_t dataset_;

@@ -83,20 +83,21 @@ TEST_F(Chunks, ChunksThatUnpackToAnotherSizeAreRefused) {
     if (bytes == kChunkBytes) {
       EXPECT_THAT(complaint(made), IsEmpty());
     } else {
-      EXPECT_EQ(complaint(made), "'x' is damaged: a chunk of it does not unpack to 160 bytes")
+      EXPECT_EQ(complaint(made),
+                "'x' is damaged: one of its chunks does not decompress to 160 bytes")
           << bytes;
     }
   }
   const hsize_t at[] = {2 * kChunk, 0};
   check(H5Dwrite_chunk(made, H5P_DEFAULT, 0, at, 9, "no stream"), "chunk");
-  EXPECT_THAT(complaint(made), HasSubstr("does not unpack"));
+  EXPECT_THAT(complaint(made), HasSubstr("does not decompress"));
   // A bit of the chunk says that the filter was skipped; then the stored size must be that of the
   // chunk.
   check(H5Dwrite_chunk(made, H5P_DEFAULT, 1, at, kChunkBytes, std::string(kChunkBytes, 'x').data()),
         "chunk");
   const hsize_t middle[] = {kChunk, 0};
   check(H5Dwrite_chunk(made, H5P_DEFAULT, 1, middle, 20, "short, and not packed"), "chunk");
-  EXPECT_THAT(complaint(made), HasSubstr("does not unpack"));
+  EXPECT_THAT(complaint(made), HasSubstr("does not decompress"));
 }
 
 // The index stores a size for a chunk without filters too, and the library allocates that much.
@@ -108,8 +109,8 @@ TEST_F(Chunks, UnfilteredChunksOfAnotherSizeAreRefused) {
     if (bytes == kChunkBytes) {
       EXPECT_THAT(complaint(made), IsEmpty());
     } else {
-      EXPECT_EQ(complaint(made),
-                "'x' is damaged: a chunk of it has " + std::to_string(bytes) + " bytes, not 160");
+      EXPECT_EQ(complaint(made), "'x' is damaged: one of its chunks has " + std::to_string(bytes) +
+                                     " bytes, expected 160");
     }
     H5Ldelete(file_, "x", H5P_DEFAULT);
   }
@@ -118,7 +119,7 @@ TEST_F(Chunks, UnfilteredChunksOfAnotherSizeAreRefused) {
 TEST_F(Chunks, OtherFiltersAreRefused) {
   H5Pset_nbit(properties_);
   EXPECT_THAT(complaint(dataset(file_, properties_)),
-              HasSubstr("is packed by filter 5, which is not read: gzip and lzf are"));
+              HasSubstr("is compressed with filter 5, which is not supported: gzip and lzf are"));
 }
 
 }  // namespace

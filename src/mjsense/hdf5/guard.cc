@@ -25,12 +25,11 @@ constexpr std::uint64_t kFreeBytes = std::uint64_t{1} << 26;
 // Opens one link, which must be a hard link to an object of this file.
 Id open_link(hid_t parent, const std::string& name) {
   if (name.empty() || name == "." || name.find('/') != std::string::npos)
-    refuse(name, "is no name of an object");
+    refuse(name, "is not the name of an object");
   H5L_info_t info;
   if (H5Lexists(parent, name.c_str(), H5P_DEFAULT) <= 0) refuse(name, "does not exist");
   check(H5Lget_info(parent, name.c_str(), &info, H5P_DEFAULT), name);
-  if (info.type == H5L_TYPE_EXTERNAL)
-    refuse(name, "is a link to another file, which is not followed");
+  if (info.type == H5L_TYPE_EXTERNAL) refuse(name, "is an external link, which is not followed");
   if (info.type != H5L_TYPE_HARD) refuse(name, "is a soft link, which is not followed");
   return {H5Oopen(parent, name.c_str(), H5P_DEFAULT), H5Oclose, name};
 }
@@ -38,7 +37,7 @@ Id open_link(hid_t parent, const std::string& name) {
 Id open_path(hid_t parent, const std::string& path) {
   Id at;
   for (std::size_t begin = 0, depth = 0; begin <= path.size(); ++depth) {
-    if (depth > kMostDepth) refuse(path, "lies too deep");
+    if (depth > kMostDepth) refuse(path, "is nested too deeply");
     const std::size_t end = std::min(path.find('/', begin), path.size());
     at = open_link(at.valid() ? static_cast<hid_t>(at) : parent, path.substr(begin, end - begin));
     begin = end + 1;
@@ -66,10 +65,10 @@ struct Walk {
 
   void group(hid_t at, const std::string& prefix, int depth) {
     if (depth > kMostDepth)
-      refuse(prefix, fmt::format("lies too deep: more than {} groups", kMostDepth));
+      refuse(prefix, fmt::format("is nested too deeply: more than {} groups", kMostDepth));
     ObjectInfo info;
     check(H5Oget_info2(at, &info, H5O_INFO_BASIC), prefix);
-    if (!above.insert(info.addr).second) refuse(prefix, "is a group that stands there twice");
+    if (!above.insert(info.addr).second) refuse(prefix, "is a group that occurs twice");
     for (const std::string& name : children(at)) {
       if (++names > kMostNames) refuse(prefix, fmt::format("has more than {} names", kMostNames));
       const Id object = open_link(at, name);
@@ -89,13 +88,13 @@ struct Walk {
 
 Id open_group(hid_t parent, const std::string& path) {
   Id object = open_path(parent, path);
-  if (H5Iget_type(object) != H5I_GROUP) refuse(path, "is no group");
+  if (H5Iget_type(object) != H5I_GROUP) refuse(path, "is not a group");
   return object;
 }
 
 Id open_dataset(hid_t parent, const std::string& path) {
   Id object = open_path(parent, path);
-  if (H5Iget_type(object) != H5I_DATASET) refuse(path, "is no dataset");
+  if (H5Iget_type(object) != H5I_DATASET) refuse(path, "is not a dataset");
   return object;
 }
 
@@ -103,27 +102,29 @@ std::uint64_t check_storage(hid_t dataset, const std::string& name) {
   const Id properties(H5Dget_create_plist(dataset), H5Pclose, name);
   const H5D_layout_t layout = H5Pget_layout(properties);
   if (H5Pget_external_count(properties) != 0)
-    refuse(name, "lies in other files, which are not read");
+    refuse(name, "is stored in external files, which are not read");
   if (layout != H5D_COMPACT && layout != H5D_CONTIGUOUS && layout != H5D_CHUNKED)
-    refuse(name, "is put together from other datasets, which is not read");
+    refuse(name, "is a virtual dataset, which is not read");
   const Id type(H5Dget_type(dataset), H5Tclose, name);
   const std::uint64_t element = H5Tget_size(type);
   const std::vector<hsize_t> size = dims(dataset);
   std::uint64_t row = element;
   for (std::size_t i = 1; i < size.size(); ++i) row = multiply(row, size[i]);
-  if (row > kMostRowBytes) refuse(name, fmt::format("has rows of {} bytes", row));
+  if (row > kMostRowBytes)
+    refuse(name, fmt::format("has rows of {} bytes, which is too large", row));
   if (layout == H5D_CHUNKED) {
     hsize_t chunk[H5S_MAX_RANK] = {};
     const int rank = H5Pget_chunk(properties, H5S_MAX_RANK, chunk);
     std::uint64_t bytes = element;
     for (int i = 0; i < rank; ++i) bytes = multiply(bytes, chunk[i]);
-    if (bytes > kMostRowBytes) refuse(name, fmt::format("has chunks of {} bytes", bytes));
+    if (bytes > kMostRowBytes)
+      refuse(name, fmt::format("has chunks of {} bytes, which is too large", bytes));
   }
   const std::uint64_t all = size.empty() ? element : multiply(row, size[0]);
   const std::uint64_t stored = H5Dget_storage_size(dataset);
   const std::uint64_t most = multiply(stored, kMostRatio);
   if (all > kFreeBytes && all - kFreeBytes > most)
-    refuse(name, fmt::format("claims {} bytes and stores {}", all, stored));
+    refuse(name, fmt::format("declares {} bytes but stores {}", all, stored));
   return all;
 }
 
@@ -137,7 +138,7 @@ std::string read_bytes(hid_t parent, const std::string& path, std::size_t most) 
   const Id type(H5Dget_type(dataset), H5Tclose, path);
   const std::vector<hsize_t> size = dims(dataset);
   if (H5Tget_class(type) != H5T_INTEGER || H5Tget_size(type) != 1 || size.size() != 1)
-    refuse(path, "is no row of bytes");
+    refuse(path, "is not a one-dimensional array of bytes");
   if (size[0] > most) refuse(path, fmt::format("has {} bytes, expected at most {}", size[0], most));
   check_chunks(dataset, path);
   std::string bytes(size[0], '\0');

@@ -74,13 +74,13 @@ TEST_F(Guard, LinksAreNotFollowed) {
                                H5P_DEFAULT),
             0);
   EXPECT_THAT(complaint([&] { (void)open_group(file_, "outside"); }),
-              HasSubstr("'outside' is a link to another file"));
+              HasSubstr("'outside' is an external link"));
 }
 
 TEST_F(Guard, CyclesAndDeepGroupsAreRefused) {
   create_group(file_, "a/b");
   ASSERT_GE(H5Lcreate_hard(file_, "a", file_, "a/b/again", H5P_DEFAULT, H5P_DEFAULT), 0);
-  EXPECT_THAT(walk(), HasSubstr("is a group that stands there twice"));
+  EXPECT_THAT(walk(), HasSubstr("is a group that occurs twice"));
   ASSERT_GE(H5Ldelete(file_, "a", H5P_DEFAULT), 0);
 
   std::string deep = "g";
@@ -88,7 +88,7 @@ TEST_F(Guard, CyclesAndDeepGroupsAreRefused) {
   create_group(file_, deep);
   EXPECT_EQ(walk(), "");
   create_group(file_, deep + "/g");
-  EXPECT_THAT(walk(), HasSubstr("lies too deep: more than 32 groups"));
+  EXPECT_THAT(walk(), HasSubstr("is nested too deeply: more than 32 groups"));
 }
 
 TEST_F(Guard, DataInOtherFilesIsNotRead) {
@@ -98,18 +98,19 @@ TEST_F(Guard, DataInOtherFilesIsNotRead) {
   std::fclose(outside);
   const Id elsewhere = dataset_properties();
   ASSERT_GE(H5Pset_external(elsewhere, dir_.file("outside").c_str(), 0, 3), 0);
-  EXPECT_THAT(storage(bytes("x", {3}, elsewhere)), HasSubstr("lies in other files"));
+  EXPECT_THAT(storage(bytes("x", {3}, elsewhere)), HasSubstr("is stored in external files"));
   const Id text(H5Tcopy(H5T_C_S1), H5Tclose, "type"), one(H5Screate(H5S_SCALAR), H5Sclose, "space");
   ASSERT_GE(H5Tset_size(text, 3), 0);
   const Id secret(H5Dcreate2(file_, "text", text, one, link_properties(), elsewhere, H5P_DEFAULT),
                   H5Dclose, "text");
-  EXPECT_THAT(complaint([&] { read_text(file_, "text"); }), HasSubstr("lies in other files"));
+  EXPECT_THAT(complaint([&] { read_text(file_, "text"); }),
+              HasSubstr("is stored in external files"));
 
   const Id composed = dataset_properties();
   const hsize_t size = 3;
   const Id space(H5Screate_simple(1, &size, nullptr), H5Sclose, "space");
   ASSERT_GE(H5Pset_virtual(composed, space, dir_.file("other.h5").c_str(), "x", space), 0);
-  EXPECT_THAT(storage(bytes("y", {3}, composed)), HasSubstr("is put together from other datasets"));
+  EXPECT_THAT(storage(bytes("y", {3}, composed)), HasSubstr("is a virtual dataset"));
 }
 
 TEST_F(Guard, SizesAreBoundedByTheStoredData) {
@@ -124,7 +125,7 @@ TEST_F(Guard, SizesAreBoundedByTheStoredData) {
   // No data has been written; a small size is accepted nevertheless.
   EXPECT_EQ(storage(bytes("small", {60 * kMiB}, chunked({kMiB}))), "");
   EXPECT_THAT(storage(bytes("endless", {10'000'000 * kMiB}, chunked({kMiB}))),
-              HasSubstr("claims 10485760000000 bytes and stores 0"));
+              HasSubstr("declares 10485760000000 bytes but stores 0"));
   EXPECT_THAT(storage(bytes("wide", {1, 65 * kMiB}, chunked({1, kMiB}))),
               HasSubstr("has rows of 68157440 bytes"));
   EXPECT_THAT(storage(bytes("large", {130, kMiB}, chunked({65, kMiB}))),
@@ -139,11 +140,12 @@ TEST_F(Guard, ReadsRowsOfBytes) {
               HasSubstr("has 3 bytes, expected at most 2"));
   bytes("table", {2, 2}, dataset_properties());
   EXPECT_THAT(complaint([&] { (void)read_bytes(file_, "table", 100); }),
-              HasSubstr("is no row of bytes"));
+              HasSubstr("is not a one-dimensional array of bytes"));
   EXPECT_THAT(complaint([&] { (void)read_bytes(file_, "missing", 3); }),
               HasSubstr("'missing' does not exist"));
   create_group(file_, "group");
-  EXPECT_THAT(complaint([&] { (void)read_bytes(file_, "group", 3); }), HasSubstr("is no dataset"));
+  EXPECT_THAT(complaint([&] { (void)read_bytes(file_, "group", 3); }),
+              HasSubstr("is not a dataset"));
 }
 
 }  // namespace

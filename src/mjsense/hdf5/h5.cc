@@ -58,9 +58,10 @@ void require_one(hid_t space, hid_t type, H5T_class_t cls, std::size_t most_byte
                  std::string_view name) {
   const bool simple = H5Sget_simple_extent_type(space) != H5S_NULL;
   const hssize_t count = simple ? H5Sget_simple_extent_npoints(space) : 0;
-  if (count != 1) throw RuntimeError(fmt::format("'{}' holds {} values, expected 1", name, count));
+  if (count != 1) throw RuntimeError(fmt::format("'{}' has {} values, expected 1", name, count));
   const char* expected = cls == H5T_STRING ? "text" : "number";
-  if (H5Tget_class(type) != cls) throw RuntimeError(fmt::format("'{}' is no {}", name, expected));
+  if (H5Tget_class(type) != cls)
+    throw RuntimeError(fmt::format("'{}' is not a {}", name, expected));
   if (H5Tget_size(type) > most_bytes)
     throw RuntimeError(fmt::format("'{}' is a {} of {} bytes", name, expected, H5Tget_size(type)));
 }

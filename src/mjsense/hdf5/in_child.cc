@@ -188,19 +188,21 @@ std::string in_child(std::string_view what, std::uint64_t file_bytes,
     const auto worked = static_cast<std::uint64_t>(used.ru_utime.tv_sec + used.ru_stime.tv_sec);
     if (signal == SIGKILL && !heard && worked < seconds)
       throw Ended(
-          fmt::format("{}: reading it was given up after {} s, of which it had the "
-                      "processor for {}: the machine or the disk is busy",
+          fmt::format("{}: reading it was stopped after {} s, of which {} s were CPU time: the "
+                      "machine or the disk is busy",
                       what, patience_s, worked));
     if (signal == SIGXCPU || (signal == SIGKILL && !heard))
       throw RuntimeError(
-          fmt::format("{}: reading it did not end within {} s: it is damaged", what, seconds));
+          fmt::format("{}: reading it did not finish within {} s: it is damaged", what, seconds));
     if (signal == SIGKILL || signal == SIGTERM)
-      throw Ended(fmt::format("{}: the process that read it was ended from outside ({})", what,
+      throw Ended(fmt::format("{}: the process that read it was killed from outside ({})", what,
                               strsignal(signal)));
-    throw RuntimeError(fmt::format("{}: the HDF5 library crashed on it ({}): it is damaged", what,
-                                   strsignal(signal)));
+    throw RuntimeError(
+        fmt::format("{}: the HDF5 library crashed while reading it ({}): it is damaged", what,
+                    strsignal(signal)));
   }
-  throw RuntimeError(fmt::format("{}: reading it did not come to an end: it is damaged", what));
+  throw RuntimeError(
+      fmt::format("{}: the process that read it ended without a result: it is damaged", what));
 }
 
 }  // namespace mjsense::h5

@@ -32,9 +32,10 @@ TEST(InChild, ReturnsAnswersAndErrors) {
 }
 
 TEST(InChild, CrashIsReportedAsDamage) {
-  EXPECT_THAT(complaint([]() -> std::string { std::abort(); }),
-              HasSubstr("x.h5: the HDF5 library crashed on it (Aborted): it is damaged"));
-  EXPECT_THAT(complaint([]() -> std::string { _exit(0); }), HasSubstr("did not come to an end"));
+  EXPECT_THAT(
+      complaint([]() -> std::string { std::abort(); }),
+      HasSubstr("x.h5: the HDF5 library crashed while reading it (Aborted): it is damaged"));
+  EXPECT_THAT(complaint([]() -> std::string { _exit(0); }), HasSubstr("ended without a result"));
 }
 
 TEST(InChild, KilledChildIsNotReportedAsDamage) {
@@ -43,7 +44,7 @@ TEST(InChild, KilledChildIsNotReportedAsDamage) {
                   kill(getpid(), signal);
                   return "";
                 }),
-                HasSubstr("ended: x.h5: the process that read it was ended from outside"));
+                HasSubstr("ended: x.h5: the process that read it was killed from outside"));
   }
 }
 
@@ -56,8 +57,8 @@ TEST(InChild, BusyMachineIsNotReportedAsDamage) {
   } catch (const Ended& e) {
     EXPECT_STREQ(
         e.what(),
-        "x.h5: reading it was given up after 1 s, of which it had the processor for 0: the "
-        "machine or the disk is busy");
+        "x.h5: reading it was stopped after 1 s, of which 0 s were CPU time: the machine or the "
+        "disk is busy");
   }
 }
 

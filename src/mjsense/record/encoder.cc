@@ -183,8 +183,8 @@ struct EncoderPool::Impl {
       stream->seen = now;
       stream->waited_s = waited;
       if (stream->idle_s < most) continue;
-      stream->failure = fmt::format("ffmpeg {} for {:g} s and was ended (ffmpeg_timeout)",
-                                    ending ? "did not come to its end" : "took no picture", most);
+      stream->failure = fmt::format("ffmpeg {} for {:g} s and was killed (ffmpeg_timeout)",
+                                    ending ? "did not finish" : "accepted no frame", most);
       changed.notify_all();
     }
   }

@@ -47,16 +47,14 @@ void check_ffmpeg(const VideoCfg& cfg, std::span<const VideoStream> videos) {
     listing = run_process({program, "-hide_banner", "-loglevel", "error", "-encoders"},
                           {.silence_s = cfg.ffmpeg_timeout});
   } catch (const CannotStart& error) {
-    throw RuntimeError(
-        fmt::format("recording {} video streams needs ffmpeg: {}; install it (apt-get install "
-                    "ffmpeg, or for Python pip install 'mjsense[video]') or name it in "
-                    "$MJSENSE_FFMPEG",
-                    videos.size(), error.what()));
+    throw RuntimeError(fmt::format(
+        "recording {} video streams needs ffmpeg: {}; install it (apt-get install ffmpeg, or for "
+        "Python pip install 'mjsense[video]') or set $MJSENSE_FFMPEG to its path",
+        videos.size(), error.what()));
   } catch (const Error& error) {
-    throw RuntimeError(
-        fmt::format("recording {} video streams needs ffmpeg, and '{}' did not list its encoders: "
-                    "{}",
-                    videos.size(), program, error.what()));
+    throw RuntimeError(fmt::format(
+        "recording {} video streams needs ffmpeg, but '{}' did not list its encoders: {}",
+        videos.size(), program, error.what()));
   }
   constexpr const char* kEncoders[] = {"libx264", "ffv1", "libx264rgb"};
   for (const VideoStream& video : videos) {

@@ -84,7 +84,8 @@ Folder Folder::find(const std::string& name) const {
   if (error == ENOENT) return {};
   struct stat about = {};
   if (fstatat(fd(), name.c_str(), &about, AT_SYMLINK_NOFOLLOW) == 0 && S_ISLNK(about.st_mode))
-    throw ValueError(fmt::format("'{}' is a link, which is not followed: remove it", shown(name)));
+    throw ValueError(
+        fmt::format("'{}' is a symbolic link, which is not followed: remove it", shown(name)));
   throw_file("open the directory", shown(name), error);
 }
 

@@ -91,12 +91,14 @@ JsonRows::JsonRows(const Sensor& sensor, int text_bytes) {
   for (std::size_t i = 1; i < members_.size(); ++i) {
     const Member &a = members_[i - 1], &b = members_[i];
     if (std::ranges::mismatch(a.path, b.path).in1 == a.path.end()) {
-      throw ValueError(fmt::format("sensor '{}': the text of field '{}' would hold that of '{}'",
-                                   sensor.name(), a.field->name, b.field->name));
+      throw ValueError(
+          fmt::format("sensor '{}': the JSON of field '{}' would contain that of field '{}'; "
+                      "rename one of them",
+                      sensor.name(), a.field->name, b.field->name));
     }
   }
   if (longest() > static_cast<std::size_t>(text_bytes)) {
-    throw ValueError(fmt::format("sensor '{}': its text can need {} bytes, a row of it has {}",
+    throw ValueError(fmt::format("sensor '{}': its text can need {} bytes; its rows have {}",
                                  sensor.name(), longest(), text_bytes));
   }
 }
@@ -149,8 +151,8 @@ void JsonRows::write(const std::uint8_t* row, std::span<std::uint8_t> text) cons
   close_to(0);
   json.end_object();
   if (!json.finish()) {
-    throw RuntimeError(
-        fmt::format("a row of JSON takes {} bytes, its stream has {}", json.size(), text.size()));
+    throw RuntimeError(fmt::format("a row of JSON needs {} bytes; the rows of its stream have {}",
+                                   json.size(), text.size()));
   }
 }
 

@@ -87,7 +87,7 @@ TEST(JsonRows, LongestTextMustFit) {
   sensor.add<double>("arm", {2}, {kLong, kLong}).add<bool>("hand/held", {}, {false});
   const std::string text = text_of_row(JsonRows(sensor, 200));
   const std::string error = error_of([&] { JsonRows(sensor, 40); });
-  EXPECT_EQ(error, "sensor 'qpos': its text can need 108 bytes, a row of it has 40");
+  EXPECT_EQ(error, "sensor 'qpos': its text can need 108 bytes; its rows have 40");
   EXPECT_LE(text.size(), 108u);
 }
 
@@ -95,7 +95,8 @@ TEST(JsonRows, ArraysCannotContainFields) {
   Numbers sensor("qpos");
   sensor.add<double>("arm/tip", {1}, {0}).add<double>("arm", {1}, {0});
   EXPECT_EQ(error_of([&] { JsonRows(sensor, 200); }),
-            "sensor 'qpos': the text of field 'arm' would hold that of 'arm/tip'");
+            "sensor 'qpos': the JSON of field 'arm' would contain that of field 'arm/tip'; rename "
+            "one of them");
 }
 
 }  // namespace

@@ -109,7 +109,7 @@ std::string fingerprint(const RecordingCfg& cfg, const RecordingPlan& plan,
   try {
     settings = nlohmann::json::parse(cfg.settings);
   } catch (const nlohmann::json::exception&) {
-    throw ValueError(fmt::format("recording: settings is no JSON text: {:.80}", cfg.settings));
+    throw ValueError(fmt::format("recording: settings is not JSON text: {:.80}", cfg.settings));
   }
   nlohmann::json j{{"format", 1},
                    {"house", cfg.house},

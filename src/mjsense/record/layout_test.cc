@@ -77,7 +77,7 @@ TEST(Layout, NumbersPerMoveGroupAreJsonRows) {
   // 80 numbers of 25 bytes exceed a row of text.
   const Plain many("qpos", spec(DType::kFloat32, {80}), "arm");
   EXPECT_EQ(error_of([&] { plan({&many}); }),
-            "sensor 'qpos': its text can need 2012 bytes, a row of it has 2000");
+            "sensor 'qpos': its text can need 2012 bytes; its rows have 2000");
 }
 
 TEST(Layout, BatchesEqualMolmoSpacesAndAreEven) {

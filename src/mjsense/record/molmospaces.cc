@@ -21,14 +21,15 @@ struct Text {
 constexpr Text kTexts[] = {
     {"qpos", "rad or m", "Joint positions by move group."},
     {"qvel", "rad/s or m/s", "Joint velocities by move group."},
-    {"actions/commanded_action", nullptr, "The policy's action, as it gave it."},
+    {"actions/commanded_action", nullptr, "The policy's action, unchanged."},
     {"actions/joint_pos", nullptr, "Targets of the controllers, without noise."},
     {"actions/joint_pos_rel", nullptr,
-     "Targets of the controllers minus the joint positions observed before."},
+     "Targets of the controllers minus the previously observed joint positions."},
     {"actions/ee_twist", "m, rad",
-     "Twist from each leaf as observed before to where the targets put it, in that leaf's axes, "
-     "per control step."},
-    {"actions/ee_pose", "m, wxyz", "Where the targets put each group's leaf: robot base frame."},
+     "Twist from each leaf frame's previously observed pose to its target pose, in the axes of "
+     "that frame, per control step."},
+    {"actions/ee_pose", "m, wxyz",
+     "Target pose of each group's leaf frame in the robot's base frame."},
     {"grasp_state_", "", "Whether each gripper touches and holds the object."},
 };
 

@@ -10,11 +10,15 @@ namespace mjsense {
 // planners append them in parentheses, "the policy gave up: found no plan (256 grasps: 200 out of
 // reach; ...)". Other texts, such as the errors of user-defined code, are returned unchanged.
 inline std::string_view outcome_without_details(std::string_view outcome) {
-  constexpr std::string_view kReason = "found no plan";
-  const std::size_t begin = outcome.find(kReason);
-  const std::size_t end = begin + kReason.size();
-  return begin != outcome.npos && outcome.substr(end).starts_with(" (") ? outcome.substr(0, end)
-                                                                        : outcome;
+  // Recordings of earlier versions contain "found no way" instead.
+  constexpr std::string_view kReasons[] = {"found no plan", "found no way"};
+  for (const std::string_view reason : kReasons) {
+    const std::size_t begin = outcome.find(reason);
+    const std::size_t end = begin + reason.size();
+    if (begin != outcome.npos && outcome.substr(end).starts_with(" ("))
+      return outcome.substr(0, end);
+  }
+  return outcome;
 }
 
 }  // namespace mjsense

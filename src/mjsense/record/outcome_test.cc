@@ -9,6 +9,8 @@ namespace {
 TEST(Outcome, DetailsOfPlannersAreLeftOut) {
   EXPECT_EQ(outcome_without_details("the policy gave up: found no plan (5 grasps: 5 out of reach)"),
             "the policy gave up: found no plan");
+  EXPECT_EQ(outcome_without_details("the policy gave up: found no way (5 grasps: 5 out of reach)"),
+            "the policy gave up: found no way");
 }
 
 TEST(Outcome, OtherParenthesesAreKept) {

@@ -105,7 +105,7 @@ bool wait_process(Child& child, bool block, Exit& result) {
     result.why =
         fmt::format("killed by signal {} ({})", WTERMSIG(status), strsignal(WTERMSIG(status)));
     if (WTERMSIG(status) == SIGXFSZ) result.why += ": ulimit -f allows no larger file";
-    if (WTERMSIG(status) == SIGXCPU) result.why += ": it used more of the processor than it may";
+    if (WTERMSIG(status) == SIGXCPU) result.why += ": it exceeded its CPU time limit";
   } else if (WEXITSTATUS(status) != 0) {
     result.why = fmt::format("exit code {}", WEXITSTATUS(status));
   } else {
@@ -136,7 +136,7 @@ std::string run_process(const std::vector<std::string>& argv, const Patience& pa
   std::string output;
   const auto give_up = [&](const std::string& why) {
     kill_process(child);
-    throw RuntimeError(fmt::format("the program '{}' was ended: {}", argv[0], why));
+    throw RuntimeError(fmt::format("the program '{}' was killed: {}", argv[0], why));
   };
   char buffer[1 << 14];
   while (true) {
@@ -145,19 +145,19 @@ std::string run_process(const std::vector<std::string>& argv, const Patience& pa
     const int ready =
         poll(&polled, 1, static_cast<int>(std::min(kMostMs, 1000 * patience.silence_s)));
     if (ready < 0 && errno == EINTR) continue;
-    if (ready == 0) give_up(fmt::format("it said nothing for {:g} s", patience.silence_s));
+    if (ready == 0) give_up(fmt::format("it printed nothing for {:g} s", patience.silence_s));
     const ssize_t n = read(child.out.get(), buffer, sizeof buffer);
     if (n < 0 && errno == EINTR) continue;
     if (n <= 0) break;
     output.append(buffer, static_cast<std::size_t>(n));
     if (output.size() > patience.most_bytes)
-      give_up(fmt::format("it said more than {} bytes", patience.most_bytes));
+      give_up(fmt::format("it printed more than {} bytes", patience.most_bytes));
   }
   Exit result;
   // The program may have closed its output but continue to run.
   for (double waited = 0; !wait_process(child, false, result); waited += 5e-4) {
     if (waited > patience.silence_s)
-      give_up(fmt::format("it did not end for {:g} s", patience.silence_s));
+      give_up(fmt::format("it did not finish within {:g} s", patience.silence_s));
     usleep(500);
   }
   if (!result.ok)

@@ -21,7 +21,7 @@ void validate(const RecordingCfg& cfg) {
   };
   if (cfg.out_dir.empty()) throw ValueError("recording: no output directory was given");
   if (printable(cfg.out_dir.string()) != cfg.out_dir.string())
-    throw ValueError(fmt::format("recording: the output directory '{}' has control characters",
+    throw ValueError(fmt::format("recording: the output directory '{}' contains control characters",
                                  printable(cfg.out_dir.string())));
   require(cfg.num_worlds > 0, "num_worlds", cfg.num_worlds, "at least 1");
   require(cfg.house >= 0, "house", cfg.house, "0 or more");
@@ -91,9 +91,9 @@ void Recorder::Impl::check_names() const {
   for (const VideoStream& video : plan.videos) {
     const std::string name = video_file(video, cfg.episodes, batches - 1, batches);
     if (name.size() > kFileNameBytes) {
-      throw ValueError(
-          fmt::format("sensor '{}': its video would be named '{}', {} bytes; at most {} fit",
-                      video.sensor->name(), name, name.size(), kFileNameBytes));
+      throw ValueError(fmt::format(
+          "sensor '{}': its video would be named '{}', {} bytes long; the maximum is {}",
+          video.sensor->name(), name, name.size(), kFileNameBytes));
     }
   }
 }
@@ -106,14 +106,15 @@ void Recorder::Impl::rethrow() const {
 Recorder::Impl::Episode& Recorder::Impl::running(int world, const char* deed) const {
   check_world(world);
   if (!worlds[world])
-    throw ValueError(fmt::format("cannot {}: no episode was begun in world {}", deed, world));
+    throw ValueError(
+        fmt::format("cannot {}: no episode has been started in world {}", deed, world));
   return *worlds[world];
 }
 
 void Recorder::Impl::check_world(int world) const {
   if (world < 0 || world >= cfg.num_worlds) {
-    throw ValueError(
-        fmt::format("recording: no world {}, expected 0 to {}", world, cfg.num_worlds - 1));
+    throw ValueError(fmt::format("recording: world {} does not exist, expected 0 to {}", world,
+                                 cfg.num_worlds - 1));
   }
 }
 
@@ -145,8 +146,9 @@ void Recorder::Impl::begin(int world, const EpisodeMeta& meta) {
 
 void Recorder::Impl::check_begin(int world, std::int64_t number) const {
   if (worlds[world]) {
-    throw ValueError(fmt::format("world {} still records episode {}: finish or discard it first",
-                                 world, worlds[world]->meta.episode));
+    throw ValueError(
+        fmt::format("world {} is still recording episode {}: finish or discard it first", world,
+                    worlds[world]->meta.episode));
   }
   if (house->ended())
     throw ValueError(fmt::format("'{}' is complete: no more episodes", house->dir().string()));
@@ -155,7 +157,8 @@ void Recorder::Impl::check_begin(int world, std::int64_t number) const {
     throw ValueError(fmt::format("recording: episode {} is already recorded or discarded", number));
   for (const EpisodePtr& other : worlds) {
     if (other && other->meta.episode == number) {
-      throw ValueError(fmt::format("recording: episode {} already runs in another world", number));
+      throw ValueError(
+          fmt::format("recording: episode {} is already running in another world", number));
     }
   }
 }
@@ -177,13 +180,13 @@ void Recorder::Impl::finish(int world, std::string_view obs_scene, std::string_v
   rethrow();
   if (episode.refused) {
     throw ValueError(
-        fmt::format("recording: episode {} was refused (a text did not fit): discard it",
+        fmt::format("recording: episode {} was rejected because a text did not fit: discard it",
                     episode.meta.episode));
   }
   if (episode.rows == 0)
     throw ValueError(fmt::format("recording: episode {} has no steps", episode.meta.episode));
   if (!nlohmann::json::accept(obs_scene)) {
-    throw ValueError(fmt::format("recording: obs_scene of episode {} is no JSON text: {:.80}",
+    throw ValueError(fmt::format("recording: obs_scene of episode {} is not JSON text: {:.80}",
                                  episode.meta.episode, obs_scene));
   }
   const EpisodePtr kept = worlds[world];
@@ -310,7 +313,7 @@ void Recorder::complete() {
   for (int w = 0; w < impl_->cfg.num_worlds; ++w) {
     if (impl_->worlds[w]) {
       throw ValueError(
-          fmt::format("cannot complete the recording: world {} still records episode {}", w,
+          fmt::format("cannot complete the recording: world {} is still recording episode {}", w,
                       impl_->worlds[w]->meta.episode));
     }
   }

@@ -299,11 +299,12 @@ TEST(RecorderFaults, FfmpegFailsAtTheEnd) {
 // An exit code of 0 is not sufficient: the frames in the output are counted.
 TEST(RecorderFaults, FfmpegWritesAnIncompleteVideo) {
   const std::pair<const char*, const char*> lies[] = {
-      {"cat > /dev/null; echo garbage > $out", "is no whole video: it is neither MP4 nor Matroska"},
+      {"cat > /dev/null; echo garbage > $out",
+       "is not a complete video: it is neither MP4 nor Matroska"},
       {"cat > /dev/null", "does not exist"},
-      {"cat > /dev/null; : > $out", "is no whole video: it is empty"},
+      {"cat > /dev/null; : > $out", "is not a complete video: it is empty"},
       {"head -c 864 | ffmpeg \"$@\"", "has 3 frames, expected 6"},
-      {"ffmpeg \"$@\"; head -c 700 $out > $out.x; mv $out.x $out", "it was cut"},
+      {"ffmpeg \"$@\"; head -c 700 $out > $out.x; mv $out.x $out", "the file is truncated"},
       {"ffmpeg -loglevel error -f rawvideo -pixel_format yuv420p -video_size 16x12 -i pipe:0 -c:v "
        "mpeg4 -y -f mp4 file:$out",
        "holds mp4v in MP4, expected h264 in MP4"},
@@ -341,8 +342,8 @@ TEST(RecorderFaults, FfmpegHangs) {
       record_all(recorder, suite, {.worlds = 1, .steps = 20});
     });
     EXPECT_THAT(error,
-                HasSubstr(std::string(body).starts_with("cat") ? "did not come to its end for 0.6 s"
-                                                               : "took no picture for 0.6 s"));
+                HasSubstr(std::string(body).starts_with("cat") ? "did not finish for 0.6 s"
+                                                               : "accepted no frame for 0.6 s"));
     expect_nothing_published(dir.path);
   }
 }
@@ -379,14 +380,14 @@ TEST(RecorderFaults, ExistingOutput) {
   TempDir dir;
   record(dir.path, 1, {});
   EXPECT_THAT(error_of([&] { record(dir.path, 1, {}); }),
-              AllOf(HasSubstr("already holds recorded trajectories"), HasSubstr("house_0")));
+              AllOf(HasSubstr("already contains recorded trajectories"), HasSubstr("house_0")));
   EXPECT_THAT(
       error_of([&] { record(dir.path, 2, {}, false, [](RecordingCfg& c) { c.resume = true; }); }),
       HasSubstr("different recording: 'episodes' was 1 and is now 2"));
   TempDir other;
   record(other.path, 8, {.stop_after = 1});
   EXPECT_THAT(error_of([&] { record(other.path, 8, {}); }),
-              HasSubstr("already holds an unfinished recording"));
+              HasSubstr("already contains an unfinished recording"));
 }
 
 TEST(RecorderFaults, TwoProcessesDoNotShareAHouse) {
@@ -395,7 +396,8 @@ TEST(RecorderFaults, TwoProcessesDoNotShareAHouse) {
   RecordingCfg cfg = fake_recording(dir.path, suite, 1, 2);
   Recorder first(cfg);
   cfg.resume = true;
-  EXPECT_THAT(error_of([&] { Recorder second(cfg); }), HasSubstr("another process records into"));
+  EXPECT_THAT(error_of([&] { Recorder second(cfg); }),
+              HasSubstr("another process is recording into"));
 }
 
 TEST(RecorderFaults, UnwritableDirectory) {
@@ -447,7 +449,7 @@ TEST(RecorderFaults, TruncatedTextIsRejected) {
   EXPECT_THAT(
       error_of([&] { recorder.append(0, {}); }),
       AllOf(HasSubstr("sensor 'task_info': step 1 of episode 0"), HasSubstr("str_max_len = 4000")));
-  EXPECT_THAT(error_of([&] { recorder.finish_episode(0, "{}"); }), HasSubstr("was refused"));
+  EXPECT_THAT(error_of([&] { recorder.finish_episode(0, "{}"); }), HasSubstr("was rejected"));
   recorder.discard_episode(0, "text cut");
   EXPECT_EQ(recorder.discarded(), 1);
   recorder.begin_episode(0, {1, 0});  // the next episode is recorded
@@ -463,9 +465,9 @@ TEST(RecorderFaults, InvalidCallsThrow) {
   FakeSuite suite(without_video(2));
   Recorder recorder(fake_recording(dir.path, suite, 2, 2));
   EXPECT_THAT(error_of([&] { recorder.append(0, {}); }),
-              HasSubstr("no episode was begun in world 0"));
+              HasSubstr("no episode has been started in world 0"));
   EXPECT_THAT(error_of([&] { recorder.begin_episode(2, {}); }),
-              HasSubstr("no world 2, expected 0 to 1"));
+              HasSubstr("world 2 does not exist, expected 0 to 1"));
   EXPECT_THAT(error_of([&] {
                 recorder.begin_episode(0, {-1, 0});
               }),
@@ -474,16 +476,17 @@ TEST(RecorderFaults, InvalidCallsThrow) {
   EXPECT_THAT(error_of([&] {
                 recorder.begin_episode(0, {1, 0});
               }),
-              HasSubstr("still records episode 0"));
+              HasSubstr("is still recording episode 0"));
   EXPECT_THAT(error_of([&] {
                 recorder.begin_episode(1, {0, 0});
               }),
-              HasSubstr("already runs in another world"));
+              HasSubstr("is already running in another world"));
   EXPECT_THAT(error_of([&] { recorder.finish_episode(0, "{}"); }), HasSubstr("has no steps"));
   suite.fill(0, 0, 0, 1);
   recorder.append(0, {});
-  EXPECT_THAT(error_of([&] { recorder.finish_episode(0, "{oops"); }), HasSubstr("no JSON text"));
-  EXPECT_THAT(error_of([&] { recorder.complete(); }), HasSubstr("world 0 still records episode 0"));
+  EXPECT_THAT(error_of([&] { recorder.finish_episode(0, "{oops"); }), HasSubstr("not JSON text"));
+  EXPECT_THAT(error_of([&] { recorder.complete(); }),
+              HasSubstr("world 0 is still recording episode 0"));
   recorder.finish_episode(0, "{}");
   EXPECT_THAT(error_of([&] { recorder.begin_episode(0, {0, 0}); }), HasSubstr("already recorded"));
   recorder.complete();
@@ -500,14 +503,14 @@ TEST(RecorderFaults, InvalidConfigurationsThrow) {
               HasSubstr("x/house_0': File name too long"));
   for (const char* name : {"a\nb", "\x1b[31m"})
     EXPECT_THAT(error([&](RecordingCfg& c) { c.out_dir /= name; }),
-                HasSubstr("has control characters"));
+                HasSubstr("contains control characters"));
   EXPECT_THAT(error([](RecordingCfg& c) { c.out_dir /= std::string("a\0b", 3); }),
-              HasSubstr("has control characters"));
+              HasSubstr("contains control characters"));
   EXPECT_THAT(error([](RecordingCfg& c) { c.episodes = 0; }), HasSubstr("episodes is 0"));
   EXPECT_THAT(error([](RecordingCfg& c) { c.num_worlds = -1; }), HasSubstr("num_worlds is -1"));
   EXPECT_THAT(error([](RecordingCfg& c) { c.fps = {0, 1}; }), HasSubstr("fps is 0/1"));
   EXPECT_THAT(error([](RecordingCfg& c) { c.gzip = 10; }), HasSubstr("gzip is 10"));
-  EXPECT_THAT(error([](RecordingCfg& c) { c.settings = "{"; }), HasSubstr("settings is no JSON"));
+  EXPECT_THAT(error([](RecordingCfg& c) { c.settings = "{"; }), HasSubstr("settings is not JSON"));
   EXPECT_THAT(tree(dir.path), IsEmpty());
 }
 

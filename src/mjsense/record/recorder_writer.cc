@@ -89,19 +89,20 @@ std::vector<EpisodeFile::VideoSum> Recorder::Impl::check_videos(const Episode& e
   for (const VideoStream& video : plan.videos) {
     const std::string name = video.stem + video.extension;
     const auto refuse = [&](const std::string& why) {
-      throw RuntimeError(fmt::format(
-          "episode {} cannot be recorded: video '{}': ffmpeg ended as if all were well, but {}",
-          episode.meta.episode, video.key, why));
+      throw RuntimeError(
+          fmt::format("episode {} cannot be recorded: video '{}': ffmpeg reported success, but {}",
+                      episode.meta.episode, video.key, why));
     };
     try {
       const Fd file = open_plain(episode.folder->fd(), name);
       const VideoFacts facts = read_video_facts(file.get());
       const auto fits = [](int got, int asked) { return got == asked || got == asked + asked % 2; };
       if (!facts.error.empty())
-        refuse(fmt::format("'{}' is no whole video: {}", name, facts.error));
+        refuse(fmt::format("'{}' is not a complete video: {}", name, facts.error));
       if (facts.codec != video.codec() || facts.container != video.container())
-        refuse(fmt::format("'{}' holds {} in {}, expected {} in {}", name, printable(facts.codec),
-                           facts.container, video.codec(), video.container()));
+        refuse(fmt::format("'{}' contains {} in {}, expected {} in {}", name,
+                           printable(facts.codec), facts.container, video.codec(),
+                           video.container()));
       if (facts.frames != episode.rows)
         refuse(fmt::format("'{}' has {} frames, expected {}", name, facts.frames, episode.rows));
       if (!fits(facts.width, video.width) || !fits(facts.height, video.height))

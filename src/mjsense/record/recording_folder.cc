@@ -124,7 +124,8 @@ void name_videos(hid_t trajectory, const std::string& episode, int index, int ba
     std::memcpy(bytes.data(), final_name.data(), std::min(final_name.size(), bytes.size()));
     const h5::Id dataset = h5::open_dataset(names, video.key);
     if (h5::dims(dataset) != std::vector<hsize_t>{kFileNameBytes})
-      throw RuntimeError(fmt::format("'{}' is no row of {} bytes", video.key, kFileNameBytes));
+      throw RuntimeError(fmt::format("'{}' is not a one-dimensional array of {} bytes", video.key,
+                                     kFileNameBytes));
     h5::check(H5Dwrite(dataset, H5T_NATIVE_UINT8, H5S_ALL, H5S_ALL, H5P_DEFAULT, bytes.data()),
               video.key);
     moves.push_back({episode, video.name, final_name});
@@ -153,7 +154,7 @@ std::vector<std::int64_t> Decisions::all_kept() const {
 RecordingFolder::RecordingFolder(const fs::path& dir, const std::string& fingerprint, bool resume)
     : fingerprint_(fingerprint) {
   if (!is_description(fingerprint))
-    throw RuntimeError(fmt::format("'{}': its description of a recording cannot be read",
+    throw RuntimeError(fmt::format("'{}': the description of the recording cannot be read",
                                    (dir / kStagingDir / kDescription).string()));
   const nlohmann::json description = parse_description(fingerprint);
   batches_ = batches_of(description.at("episodes"), description.at("batches"));
@@ -168,14 +169,15 @@ RecordingFolder::RecordingFolder(const fs::path& dir, const std::string& fingerp
   load_published(published, fingerprint);
   const std::string unfinished = staging_ ? unfinished_recording(staging_) : "";
   if (!resume && (any_published || !unfinished.empty())) {
-    throw ValueError(
-        fmt::format("'{}' already holds {}; resume it, or choose another directory", dir.string(),
-                    any_published ? "recorded trajectories" : "an unfinished recording"));
+    throw ValueError(fmt::format(
+        "'{}' already contains {}; resume it, or choose another directory", dir.string(),
+        any_published ? "recorded trajectories" : "an unfinished recording"));
   }
   if (const std::string difference =
           unfinished.empty() ? "" : fingerprint_difference(unfinished, fingerprint);
       !difference.empty()) {
-    throw ValueError(fmt::format("'{}' holds a different recording: {}", dir.string(), difference));
+    throw ValueError(
+        fmt::format("'{}' contains a different recording: {}", dir.string(), difference));
   }
   // A lock file without kEndingFile means that the recording continues, even if recording.json was
   // lost.
@@ -193,7 +195,7 @@ RecordingFolder::RecordingFolder(const fs::path& dir, const std::string& fingerp
     lock_ = lock_recording(dir_, true);
     // Another process may have recorded between the reads above and the acquisition of the lock.
     if (unfinished != unfinished_recording(staging_) || published != published_files(dir_))
-      throw ValueError(fmt::format("another process records into '{}'", dir.string()));
+      throw ValueError(fmt::format("another process is recording into '{}'", dir.string()));
   }
   if (!staging_.contains(kLockFile, lock_)) throw_moved(staging_.path());
   if (read_whole(staging_, kDescription) != fingerprint)
@@ -216,10 +218,10 @@ void RecordingFolder::require_in_place() const {
 }
 
 void RecordingFolder::throw_moved(const fs::path& path) const {
-  throw RuntimeError(fmt::format(
-      "'{}' was moved, removed or replaced during the recording; its finished episodes are in the "
-      "folder that had this name: put it back and resume",
-      path.string()));
+  throw RuntimeError(
+      fmt::format("'{}' was moved, removed or replaced during the recording; its finished episodes "
+                  "are in the folder that had this name: move it back and resume",
+                  path.string()));
 }
 
 void RecordingFolder::load_published(const std::vector<std::string>& files,
@@ -287,7 +289,7 @@ void RecordingFolder::load_staged() {
     if (finished && !decisions_.contains(*finished)) {
       try {
         if (name != episode_name(*finished))
-          throw RuntimeError("is not how an episode's folder is named");
+          throw RuntimeError("is not a valid name for an episode's folder");
         StagedEpisode episode = read_staged(staging_.at(name));
         const std::string difference = fingerprint_difference(episode.recording, fingerprint_);
         if (!difference.empty())

@@ -47,8 +47,8 @@ TEST(RecordingFolder, LockIsTestedBeforeReading) {
   {
     const Fd other = lock_recording(Folder::open(house), false);
     EXPECT_TRUE(is_locked(house));
-    EXPECT_THAT(error_of([&] { go_on(dir.path); }), HasSubstr("another process records into"));
-    EXPECT_THAT(repair(dir.path).text(), HasSubstr("another process records into"));
+    EXPECT_THAT(error_of([&] { go_on(dir.path); }), HasSubstr("another process is recording into"));
+    EXPECT_THAT(repair(dir.path).text(), HasSubstr("another process is recording into"));
   }
   EXPECT_FALSE(is_locked(house));
   EXPECT_THAT(error_of([&] { go_on(dir.path); }), HasSubstr("trajectories_batch_2_of_3.h5"));
@@ -61,7 +61,7 @@ TEST(RecordingFolder, RepairIgnoresAStartingRecording) {
   fs::create_directories(house / kStagingDir);
   {
     const Fd other = lock_recording(Folder::open(house), true);
-    EXPECT_THAT(repair(dir.path).text(), HasSubstr("another process records into"));
+    EXPECT_THAT(repair(dir.path).text(), HasSubstr("another process is recording into"));
     EXPECT_TRUE(is_locked(house));
   }
   EXPECT_THAT(repair(dir.path).text(), HasSubstr("removed the remains"));
@@ -112,7 +112,7 @@ TEST(RecordingFolder, FoldersOfOtherNamesAreMovedAside) {
     Recorder recorder(cfg);
     ASSERT_EQ(recorder.damage().size(), 1u);
     EXPECT_THAT(recorder.damage()[0],
-                AllOf(HasSubstr("episode_0 is not how"), HasSubstr("set aside")));
+                AllOf(HasSubstr("episode_0 is not a valid name"), HasSubstr("set aside")));
     EXPECT_TRUE(fs::exists(house / "damaged/episode_0/traj.h5"));
     record_all(recorder, suite, {.worlds = 1});
   }
@@ -162,7 +162,7 @@ TEST(RecordingFolder, FolderReplacedByALinkIsNotFollowed) {
     if (!swapped) continue;  // the recording had ended
     ++swapped_runs;
     EXPECT_THAT(error, ::testing::AnyOf(HasSubstr("was moved, removed or replaced"),
-                                        HasSubstr("is a link, which is not followed")));
+                                        HasSubstr("is a symbolic link, which is not followed")));
     for (int t : {0, 1}) ASSERT_EQ(contents(targets[t]), before[t]) << n << ": " << error;
     EXPECT_TRUE(fs::is_symlink(staging));
   }

@@ -36,7 +36,7 @@ Fd lock_recording(const Folder& house, bool make) {
     // one.
     if (flock(lock.get(), LOCK_EX | LOCK_NB) == 0 && staging.contains(kLockFile, lock)) return lock;
   }
-  throw ValueError(fmt::format("another process records into '{}'", house.path().string()));
+  throw ValueError(fmt::format("another process is recording into '{}'", house.path().string()));
 }
 
 bool is_locked(const fs::path& house) {

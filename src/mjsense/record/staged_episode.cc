@@ -59,7 +59,7 @@ std::vector<StagedVideo> staged_videos(hid_t trajectory) {
     name.resize(name.find_last_not_of('\0') + 1);
     if (!is_plain_name(name))
       throw RuntimeError(fmt::format(
-          "names a video '{}', which is no plain file name of its folder", printable(name)));
+          "names a video '{}', which is not a plain file name in its folder", printable(name)));
     const h5::Id dataset = h5::open_dataset(names, key);
     videos.push_back({key, name, h5::text_attribute(dataset, kChecksumAttribute)});
   }
@@ -79,7 +79,8 @@ StagedEpisode read_staged(const Folder& folder) {
     episode.steps = found.at("steps");
     for (const Json& v : found.at("videos")) episode.videos.push_back({v.at(0), v.at(1), v.at(2)});
   } catch (const Json::exception&) {
-    throw RuntimeError(fmt::format("'{}' is damaged: reading it gave no answer", kEpisodeFile));
+    throw RuntimeError(
+        fmt::format("'{}' is damaged: the process that read it returned nothing", kEpisodeFile));
   }
   return episode;
 }
@@ -88,7 +89,7 @@ void check_staged_video(const Folder& folder, const StagedVideo& video, std::int
   const Fd file = open_plain(folder.fd(), video.name);
   const VideoFacts facts = read_video_facts(file.get());
   if (!facts.error.empty())
-    throw RuntimeError(fmt::format("'{}' is no whole video: {}", video.name, facts.error));
+    throw RuntimeError(fmt::format("'{}' is not a complete video: {}", video.name, facts.error));
   if (facts.frames != steps)
     throw RuntimeError(
         fmt::format("'{}' has {} frames, expected {}", video.name, facts.frames, steps));

@@ -44,7 +44,7 @@ TEST(StagedEpisode, CorruptChunkThrows) {
     static_cast<void>(read_staged(Folder::open(dir.path)));
     FAIL() << "a damaged episode was read";
   } catch (const RuntimeError& e) {
-    EXPECT_THAT(e.what(), HasSubstr("'x' is damaged: a chunk of it does not unpack"));
+    EXPECT_THAT(e.what(), HasSubstr("'x' is damaged: one of its chunks does not decompress"));
   }
 }
 

@@ -60,7 +60,7 @@ std::uint64_t big_endian(std::span<const std::uint8_t> bytes) {
 using Bytes = std::span<const std::uint8_t>;
 
 Bytes part(Bytes bytes, std::size_t at, std::size_t count) {
-  if (at > bytes.size() || count > bytes.size() - at) throw Unreadable{"a table is cut"};
+  if (at > bytes.size() || count > bytes.size() - at) throw Unreadable{"a table is truncated"};
   return bytes.subspan(at, count);
 }
 
@@ -79,7 +79,8 @@ void each_box(Bytes bytes, Visit&& visit) {
     } else if (size == 0) {
       size = bytes.size();
     }
-    if (size < header || size > bytes.size()) throw Unreadable{"a box is longer than the file"};
+    if (size < header || size > bytes.size())
+      throw Unreadable{"a box extends past the end of the file"};
     const std::string_view letters(reinterpret_cast<const char*>(bytes.data()) + 4, 4);
     visit(letters, bytes.subspan(header, size - header));
     bytes = bytes.subspan(size);
@@ -103,7 +104,7 @@ void read_samples(Bytes table, std::uint64_t media_bytes, VideoFacts& facts) {
     const Bytes sizes = part(table, 12, count * 4);
     for (std::size_t i = 0; i < count; ++i) total += number(sizes, 4 * i, 4);
   }
-  if (total > media_bytes) throw Unreadable{"its pictures are longer than the file"};
+  if (total > media_bytes) throw Unreadable{"its frames extend past the end of the file"};
   facts.frames = static_cast<std::int64_t>(count);
 }
 
@@ -115,7 +116,7 @@ VideoFacts read_mp4(const File& file) {
   for (std::uint64_t at = 0; at < file.size();) {
     std::uint8_t head[16] = {};
     const std::size_t got = file.read(at, head);
-    if (got < 8 || ++boxes > kMostElements) throw Unreadable{"its last box is cut"};
+    if (got < 8 || ++boxes > kMostElements) throw Unreadable{"its last box is truncated"};
     std::uint64_t size = big_endian({head, 4}), header = 8;
     if (size == 1 && got == 16) {
       size = big_endian({head + 8, 8});
@@ -124,14 +125,15 @@ VideoFacts read_mp4(const File& file) {
       size = file.size() - at;
     }
     if (size < header || size > file.size() - at)
-      throw Unreadable{"a box is longer than the file: it was cut"};
+      throw Unreadable{"a box extends past the end of the file: the file is truncated"};
     const std::string_view letters(reinterpret_cast<const char*>(head) + 4, 4);
     if (letters == "mdat") media_bytes += size - header;
     if (letters == "moof") throw Unreadable{"it is fragmented"};
     if (letters == "moov") {
       if (size > kMostTableBytes) throw Unreadable{"its tables are longer than 64 MiB"};
       tables.resize(size - header);
-      if (file.read(at + header, tables) != tables.size()) throw Unreadable{"its tables are cut"};
+      if (file.read(at + header, tables) != tables.size())
+        throw Unreadable{"its tables are truncated"};
     }
     at += size;
   }
@@ -152,7 +154,7 @@ VideoFacts read_mp4(const File& file) {
     facts.height = static_cast<int>(number(*forms, 8 + 34, 2));
     read_samples(*samples, media_bytes, facts);
   });
-  if (!found) throw Unreadable{"it holds no video"};
+  if (!found) throw Unreadable{"it contains no video"};
   return facts;
 }
 
@@ -176,7 +178,7 @@ class Matroska {
         if (child.id == kCluster) read_cluster(child);
       });
     });
-    if (track_ == 0) throw Unreadable{"it holds no video"};
+    if (track_ == 0) throw Unreadable{"it contains no video"};
     return facts_;
   }
 
@@ -187,10 +189,10 @@ class Matroska {
 
   // Reads an integer of 1 to 8 bytes, whose first byte encodes its length, and advances `at`.
   std::uint64_t variable(std::span<const std::uint8_t> bytes, std::size_t& at, bool marker) const {
-    if (at >= bytes.size() || bytes[at] == 0) throw Unreadable{"an element is broken"};
+    if (at >= bytes.size() || bytes[at] == 0) throw Unreadable{"an element is malformed"};
     std::size_t size = 1;
     while (!(bytes[at] & (0x80 >> (size - 1)))) ++size;
-    if (size > bytes.size() - at) throw Unreadable{"an element is cut"};
+    if (size > bytes.size() - at) throw Unreadable{"an element is truncated"};
     std::uint64_t value = big_endian(bytes.subspan(at, size));
     if (!marker) value &= ~(0x80ULL << (8 * (size - 1) - (size - 1)));
     at += size;
@@ -211,7 +213,7 @@ class Matroska {
       const std::uint64_t first = begin + at;
       if (size == kUnknown && id != kSegment) throw Unreadable{"it was streamed"};
       if (size != kUnknown && size > end - first)
-        throw Unreadable{"an element is longer than the file: it was cut"};
+        throw Unreadable{"an element extends past the end of the file: the file is truncated"};
       const std::uint64_t last = size == kUnknown ? end : first + size;
       visit(Element{id, first, last});
       begin = last;

@@ -103,7 +103,7 @@ VideoFacts facts_of(const fs::path& folder, const std::string& video, const std:
   }
   if (!facts.error.empty() || facts.frames < 1 || facts.width < 1 || facts.height < 1)
     throw RuntimeError(fmt::format("contact sheet: '{}': {}", (folder / video).string(),
-                                   facts.error.empty() ? "it holds no picture" : facts.error));
+                                   facts.error.empty() ? "it contains no image" : facts.error));
   return facts;
 }
 
@@ -120,7 +120,8 @@ std::vector<Strip> find_strips(const fs::path& path, int shown, const std::strin
         Json::parse(h5::in_child(recorded.name, bytes,
                                  [&] { return describe(recorded.path, shown - episodes); }),
                     nullptr, false);
-    if (found.is_discarded()) throw RuntimeError(recorded.name + ": reading it gave no answer");
+    if (found.is_discarded())
+      throw RuntimeError(recorded.name + ": the process that read it returned nothing");
     episodes += found.at("episodes").get<int>();
     for (const Json& s : found.at("strips")) {
       // each strip starts an ffmpeg process, so only the first ones are shown
@@ -206,7 +207,7 @@ std::string contact_sheet(const fs::path& path, const fs::path& png, int episode
   int all = 0;
   std::vector<Strip> strips = find_strips(path, episodes, ffmpeg, all);
   if (strips.empty())
-    throw ValueError(fmt::format("contact sheet: '{}' holds no videos", path.string()));
+    throw ValueError(fmt::format("contact sheet: '{}' contains no videos", path.string()));
 
   // The images are read first, because the label above a depth strip depends on their values.
   std::vector<std::vector<std::uint8_t>> pictures;
@@ -221,7 +222,7 @@ std::string contact_sheet(const fs::path& path, const fs::path& png, int episode
         std::size_t{strip.depth16 ? 2u : 3u} * strip.tile_width() * kTileHeight * moments.size();
     if (pictures[s].size() < bytes)
       throw RuntimeError(
-          fmt::format("contact sheet: '{}': ffmpeg gave {} bytes of pictures, expected {}",
+          fmt::format("contact sheet: '{}': ffmpeg returned {} bytes of images, expected {}",
                       strip.video.string(), pictures[s].size(), bytes));
     if (strip.depth16) pictures[s] = colour_depth(pictures[s], strip.unit, strip.camera);
     tile_width = std::max(tile_width, strip.tile_width());

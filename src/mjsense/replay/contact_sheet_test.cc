@@ -203,7 +203,7 @@ TEST(ContactSheet, ReportsWhatCannotBeShown) {
   record(dir.path, 1, {.worlds = 1});
   const fs::path png = dir.path / "sheet.png";
   EXPECT_THAT(error_of([&] { contact_sheet(dir.path, png); }),
-              ::testing::HasSubstr("holds no videos"));
+              ::testing::HasSubstr("contains no videos"));
   EXPECT_THAT(error_of([&] { contact_sheet(dir.path, png, 0); }),
               ::testing::HasSubstr("0 episodes"));
   EXPECT_FALSE(fs::exists(png));

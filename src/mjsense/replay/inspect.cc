@@ -106,7 +106,8 @@ class Inspector {
       const RowDataset dataset(trajectory, name);
       unpacked_ += dataset.bytes();
       if (unpacked_ > kFreeBytes + kMostUnpacked * bytes_)
-        throw RuntimeError(fmt::format("'{}': the files claim far more than they hold", name));
+        throw RuntimeError(
+            fmt::format("'{}': the files declare far more data than they contain", name));
       Stream& stream = stream_of(dataset, name);
       if (dataset.is_json()) {
         dataset.each_text([&](std::int64_t, std::string_view text) {
@@ -170,7 +171,7 @@ std::string to_json(const InspectResult& r) {
 
 InspectResult from_json(const std::string& text) {
   const auto in = nlohmann::json::parse(text, nullptr, false);
-  if (in.is_discarded()) throw RuntimeError("reading the recording gave no answer");
+  if (in.is_discarded()) throw RuntimeError("the process that read the recording returned nothing");
   InspectResult r;
   r.videos = in.at("videos");
   r.settings = in.at("settings");
@@ -240,7 +241,7 @@ InspectResult inspect(const fs::path& path) {
   const std::vector<RecordedFile> files = recorded_files(path);
   if (files.empty() && std::ranges::any_of(recorded_houses(path), is_locked))
     throw ValueError(
-        fmt::format("'{}' is being recorded: no file of it is published yet", path.string()));
+        fmt::format("'{}' is being recorded: none of its files is published yet", path.string()));
   for (const RecordedFile& file : files)
     bytes += static_cast<std::uint64_t>(
         size_of(open_plain(file.path.parent_path(), file.path.filename().string())));

@@ -147,7 +147,7 @@ class Parser {
     const std::size_t start = at_;
     if (peek() == '-') ++at_;
     const bool zero = peek() == '0';
-    if (digits("a value") > 1 && zero) throw SyntaxError{start, "no zeros before a number"};
+    if (digits("a value") > 1 && zero) throw SyntaxError{start, "no leading zeros"};
     if (peek() == '.') {
       ++at_;
       digits("a digit");

@@ -38,7 +38,7 @@ TEST(Live, ActiveRecordingIsReportedAsSuch) {
     };
     play(0);
     EXPECT_THAT(error_of([&] { static_cast<void>(inspect(dir.path)); }),
-                HasSubstr("is being recorded: no file of it is published yet"));
+                HasSubstr("is being recorded: none of its files is published yet"));
     play(1);
     play(2);  // unpublished: may be moved at any time
     const VerifyResult found = verify(dir.path);
@@ -74,7 +74,7 @@ TEST(Live, RecordingMayContinueDuringVerify) {
     ++looks;
     for (const Finding& f : found.findings)
       EXPECT_THAT(f.text, ::testing::AnyOf(HasSubstr("is being recorded"),
-                                           HasSubstr("was changed while it was read"),
+                                           HasSubstr("changed while it was being read"),
                                            HasSubstr("finished episodes wait")))
           << f.place;
   }
@@ -101,7 +101,8 @@ TEST(Live, ReplacedFileIsReportedAsChanged) {
   });
   for (int n = 0; n < 40; ++n) {
     for (const Finding& f : verify(dir.path / name).findings)
-      EXPECT_TRUE(!f.error || f.text == "was changed while it was read: verify it again") << f.text;
+      EXPECT_TRUE(!f.error || f.text == "changed while it was being read: verify it again")
+          << f.text;
   }
   ended = true;
   replacing.join();
@@ -115,8 +116,8 @@ TEST(Live, ReplacedVideoIsReportedAsChanged) {
   const std::string ffmpeg = fake_ffmpeg(
       dir.path, fmt::format("cp '{0}' '{0}.new'; mv '{0}.new' '{0}'; exit 1", video.string()));
   const VerifyResult found = verify(dir.path / "house_0", {.decode = true, .ffmpeg = ffmpeg});
-  EXPECT_THAT(found.text(), HasSubstr("wrist_camera_batch_1_of_1.mp4' was changed while it was "
-                                      "read"));
+  EXPECT_THAT(found.text(),
+              HasSubstr("wrist_camera_batch_1_of_1.mp4' changed while it was being read"));
 }
 
 // Data sets without elements can claim any number of rows at no cost.

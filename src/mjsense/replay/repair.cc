@@ -40,10 +40,10 @@ void remove_remains(const fs::path& house, const Folder& folder,
                     std::vector<std::string>& actions) {
   const fs::path staging = house / kStagingDir;
   if (const std::size_t episodes = finished_episodes(house).size(); episodes > 0)
-    throw RuntimeError(fmt::format(
-        "'{}' holds {} finished episodes, and none of them says what recording they belong to; "
-        "nothing was removed",
-        staging.string(), episodes));
+    throw RuntimeError(
+        fmt::format("'{}' contains {} finished episodes, but none of them identifies its "
+                    "recording; nothing was removed",
+                    staging.string(), episodes));
   if (!folder.remove(kStagingDir, folder.at(kStagingDir)))
     throw RuntimeError(fmt::format("cannot remove '{}'", staging.string()));
   actions.push_back(fmt::format("{}: removed the remains of '{}'", house.string(), kStagingDir));
@@ -73,7 +73,7 @@ void copy_file(const Fd& from, const Folder& folder, const std::string& name) {
   folder.remove(name);
   struct stat about = {};
   if (fstat(from.get(), &about) != 0)
-    throw_file("read what is copied to", folder.shown(name), errno);
+    throw_file("read the source of the copy", folder.shown(name), errno);
   const Fd file(openat(folder.fd(), name.c_str(),
                        O_WRONLY | O_CREAT | O_EXCL | O_NOFOLLOW | O_CLOEXEC, 0600));
   if (!file || fchmod(file.get(), about.st_mode & 0777) != 0)
@@ -82,7 +82,7 @@ void copy_file(const Fd& from, const Folder& folder, const std::string& name) {
   for (off_t at = 0;;) {
     const ssize_t n = pread(from.get(), piece.data(), piece.size(), at);
     if (n < 0 && errno == EINTR) continue;
-    if (n < 0) throw_file("read what is copied to", folder.shown(name), errno);
+    if (n < 0) throw_file("read the source of the copy", folder.shown(name), errno);
     if (n == 0) break;
     if (!write_all(file, std::span(piece).first(static_cast<std::size_t>(n))))
       throw_file("write", folder.shown(name), errno);
@@ -146,7 +146,7 @@ int name_videos(const fs::path& path) {
                    [&] { return missing_names(path, number->first, number->second); }));
   if (missing.empty()) return 0;  // most files need no repair and are not opened for writing
   if (flock(bytes.get(), LOCK_EX | LOCK_NB) != 0)
-    throw RuntimeError(fmt::format("another process repairs '{}'", path.string()));
+    throw RuntimeError(fmt::format("another process is repairing '{}'", path.string()));
   // Works on a copy, so that a crash or a full disk leaves the file unchanged.
   const Folder folder = Folder::open(path.parent_path());
   const std::string name = path.filename(), part = name + ".part";
@@ -182,7 +182,8 @@ RepairResult repair(const fs::path& path) {
   RepairResult result;
   if (fs::is_regular_file(path) && !batch_number(path))
     throw ValueError(fmt::format(
-        "'{}' is no trajectories_batch_*_of_*.h5: repair takes these, and folders", path.string()));
+        "'{}' is not named trajectories_batch_*_of_*.h5: repair accepts such files and folders",
+        path.string()));
   const auto attempt = [&](const fs::path& what, auto&& deed) {
     try {
       deed();

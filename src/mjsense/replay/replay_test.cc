@@ -212,7 +212,7 @@ TEST_F(RepairNames, ByOneProcessAtATime) {
   {
     const Fd other(open(path.c_str(), O_RDONLY | O_CLOEXEC));
     ASSERT_EQ(flock(other.get(), LOCK_EX | LOCK_NB), 0);
-    EXPECT_THAT(repair(dir.path).text(), HasSubstr("another process repairs"));
+    EXPECT_THAT(repair(dir.path).text(), HasSubstr("another process is repairing"));
     EXPECT_TRUE(read_file(path) == bytes);
   }
   EXPECT_THAT(repair(dir.path).text(), HasSubstr("added 1 names of videos"));
@@ -226,7 +226,7 @@ TEST_F(RepairNames, OnlyInTrajectoryFiles) {
     fs::copy_file(path, other);
     const std::string bytes = read_file(other);
     EXPECT_THAT(error_of([&] { static_cast<void>(repair(other)); }),
-                HasSubstr("is no trajectories_batch_*_of_*.h5"));
+                HasSubstr("is not named trajectories_batch_*_of_*.h5"));
     EXPECT_TRUE(read_file(other) == bytes) << name;
     fs::remove(other);
   }

@@ -43,7 +43,7 @@ auto walk(const fs::path& path, auto&& steps) {
     return steps();
   } catch (const fs::filesystem_error& e) {
     throw RuntimeError(
-        fmt::format("cannot look through '{}': {}", path.string(), e.code().message()));
+        fmt::format("cannot list the contents of '{}': {}", path.string(), e.code().message()));
   }
 }
 
@@ -98,7 +98,7 @@ std::vector<fs::path> recorded_houses(const fs::path& path) {
     }
   });
   if (houses.empty()) {
-    throw ValueError(fmt::format("'{}' holds no recording: no trajectories_batch_*.h5 was found",
+    throw ValueError(fmt::format("'{}' contains no recording: no trajectories_batch_*.h5 was found",
                                  path.string()));
   }
   std::sort(houses.begin(), houses.end());
@@ -242,7 +242,7 @@ std::string read_file_name(hid_t sensor_data, const std::string& key) {
   std::string name(trim_row(bytes));
   if (!is_plain_name(name) || printable(name) != name)
     throw RuntimeError(fmt::format(
-        "names a video '{:.100}', which is no plain file name of its folder", printable(name)));
+        "names a video '{:.100}', which is not a plain file name in its folder", printable(name)));
   return name;
 }
 

@@ -31,7 +31,7 @@ constexpr std::size_t kMostFindings = 200;       // per file
 // A file whose rows are more than this many times its own size is taken for a decompression bomb.
 constexpr std::uint64_t kMostUnpacked = 200, kFreeBytes = std::uint64_t{1} << 30;
 
-constexpr const char* kChanged = "was changed while it was read: verify it again";
+constexpr const char* kChanged = "changed while it was being read: verify it again";
 
 struct VideoCheck {
   std::string place;
@@ -62,7 +62,8 @@ class FileVerifier {
  private:
   void add(bool is_error, const std::string& place, const std::string& text) {
     if (++findings_ == kMostFindings)
-      return out_["findings"].push_back({is_error, recorded_.name, "has more findings than these"});
+      return out_["findings"].push_back(
+          {is_error, recorded_.name, "has further findings, which are not listed"});
     if (findings_ < kMostFindings)
       out_["findings"].push_back({is_error, printable(place), printable(text)});
   }
@@ -74,12 +75,12 @@ class FileVerifier {
     const h5::Id file = h5::open_file(recorded_.path);
     haddr_t end = 0;
     if (!sealed_ && H5Fget_eoa(file, &end) >= 0 && end < bytes_)
-      error(recorded_.name, fmt::format("has {} bytes behind its end", bytes_ - end));
+      error(recorded_.name, fmt::format("has {} bytes after its end", bytes_ - end));
     ours_ = h5::has_attribute(file, "recording");
     if (ours_ && !parse_description(h5::text_attribute(file, "recording")).is_object())
       error(recorded_.name, "has a description of the recording that cannot be read");
     const std::vector<std::string> names = trajectory_names(file);
-    if (names.empty()) error(recorded_.name, "holds no trajectory");
+    if (names.empty()) error(recorded_.name, "contains no trajectory");
     for (std::size_t i = 0; i < names.size(); ++i) {
       const std::string place = recorded_.name + " " + names[i];
       if (names[i] != fmt::format("traj_{}", i)) {
@@ -96,7 +97,7 @@ class FileVerifier {
       note(recorded_.name,
            fmt::format("has no checksums of {} datasets and videos: {}", without_sum_,
                        with_sum_ > 0 ? "they were changed or added later"
-                                     : "recorded before there were any"));
+                                     : "recorded by a version that stored none"));
     } else if (ours_ && !sealed_) {
       note(recorded_.name,
            "was changed since it was recorded: it has no checksum of the whole file");
@@ -109,9 +110,9 @@ class FileVerifier {
       return error(place, "has no 'success': its length is unknown");
     const RowDataset success(trajectory, "success");
     if (!success.is_number() || success.row_size() != 1)
-      return error(place, "has a 'success' that is no row of booleans");
+      return error(place, "has a 'success' that is not a one-dimensional array of booleans");
     const std::int64_t T = success.rows();
-    if (T > kMostSteps) return error(place, fmt::format("claims {} steps", T));
+    if (T > kMostSteps) return error(place, fmt::format("declares {} steps", T));
     steps_ += T;
     if (T == 0) error(place, "has no steps");
     for (const char* name : {"rewards", "fail", "terminated", "truncated", "obs_scene"}) {
@@ -128,7 +129,7 @@ class FileVerifier {
     check_success(trajectory, place);
     for (const char* name : {"obs/agent/qpos", "obs/agent/qvel"}) {
       if (!h5::exists(trajectory, name))
-        note(place, fmt::format("has no '{}', which MolmoSpaces' tools ask for", name));
+        note(place, fmt::format("has no '{}', which MolmoSpaces' tools require", name));
     }
     check_sensor_data(trajectory, T, place);
   }
@@ -138,7 +139,7 @@ class FileVerifier {
     const std::string stated = h5::text_attribute(object, kChecksumAttribute);
     ++(stated.empty() ? without_sum_ : with_sum_);
     if (!stated.empty() && stated != sum.text())
-      error(place, fmt::format("is not what was recorded: its checksum is {}, expected {}",
+      error(place, fmt::format("differs from what was recorded: its checksum is {}, expected {}",
                                sum.text(), stated));
   }
 
@@ -147,12 +148,12 @@ class FileVerifier {
     const RowDataset dataset(trajectory, name);
     unpacked_ += dataset.bytes();
     if (unpacked_ > kFreeBytes + kMostUnpacked * bytes_)
-      return error(place, "is not read: the file claims far more than it holds");
+      return error(place, "is not read: the file declares far more data than it contains");
     Checksum sum;
     if (name == "obs_scene") {
       const std::string text = h5::read_text(trajectory, name);
       if (const auto wrong = parse_json(text); !wrong.empty())
-        error(place, "is no JSON text: " + wrong);
+        error(place, "is not JSON text: " + wrong);
       sum.add(text.data(), text.size());
       return compare(dataset.id(), place, sum);
     }
@@ -165,9 +166,9 @@ class FileVerifier {
       dataset.each_text([&](std::int64_t t, std::string_view text) {
         const std::string wrong = parse_json(text);
         if (!wrong.empty() && bad++ == 0)
-          error(place, fmt::format("row {} is no JSON text: {}", t, wrong));
+          error(place, fmt::format("row {} is not JSON text: {}", t, wrong));
       });
-      if (bad > 1) error(place, fmt::format("{} rows are no JSON text", bad));
+      if (bad > 1) error(place, fmt::format("{} rows are not JSON text", bad));
     }
     if (!dataset.is_number()) {
       if (ours_) error(place, fmt::format("is {}, which is never recorded", dataset.dtype()));
@@ -266,7 +267,7 @@ class Verifier {
     try {
       const fs::path folder = recorded.path.parent_path();
       if (!recorded.published && !is_plain_folder(folder))
-        return error(recorded.name, "stands in a link, which is not followed");
+        return error(recorded.name, "is in a symbolic link, which is not followed");
       const Fd file = open_plain(folder, recorded.path.filename().string());
       const FileState before = state_of(file);
       const auto bytes = static_cast<std::uint64_t>(size_of(file));
@@ -284,7 +285,7 @@ class Verifier {
       if (!failure.empty()) return error(recorded.name, failure);
       take(recorded, Json::parse(answer));
     } catch (const Json::exception&) {
-      error(recorded.name, "is damaged: reading it gave no answer");
+      error(recorded.name, "is damaged: the process that read it returned nothing");
     } catch (const Error& e) {
       error(recorded.name, e.what());
     }
@@ -390,11 +391,13 @@ class Verifier {
   void check_leftovers(const fs::path& house) {
     const std::string place = house.filename().string();
     if (fs::is_symlink(house / kStagingDir))
-      return error(place, fmt::format("'{}' is a link, which is not followed", kStagingDir));
+      return error(place,
+                   fmt::format("'{}' is a symbolic link, which is not followed", kStagingDir));
     if (const bool locked = is_locked(house); locked || has_moved(house)) {
       forget_waiting(house);
-      return error(place,
-                   locked ? "is being recorded: verify it again when that has ended" : kChanged);
+      return error(place, locked
+                              ? "is being recorded: verify it again after the recording has ended"
+                              : kChanged);
     }
     if (fs::exists(house / kStagingDir)) {
       const std::size_t waiting = finished_episodes(house).size();
@@ -406,10 +409,10 @@ class Verifier {
     for (const fs::directory_entry& entry : fs::directory_iterator(house)) {
       const fs::path& path = entry.path();
       if (path.filename() == kDamagedDir)
-        note(place + "/" + kDamagedDir, "holds episodes that were damaged and set aside");
+        note(place + "/" + kDamagedDir, "contains damaged episodes that were set aside");
       const bool video = path.extension() == ".mp4" || path.extension() == ".mkv";
       if (video && !used_.contains(path))
-        note(place + "/" + path.filename().string(), "belongs to no episode");
+        note(place + "/" + path.filename().string(), "does not belong to an episode");
     }
   }
 
@@ -434,8 +437,8 @@ std::string VerifyResult::text() const {
   std::string out;
   for (const Finding& f : findings)
     out += fmt::format("{}: {} {}\n", f.error ? "error" : "note", f.place, f.text);
-  out += fmt::format("{}: {} files, {} episodes, {} steps, {} videos", ok() ? "whole" : "NOT whole",
-                     files, episodes, steps, videos);
+  out += fmt::format("{}: {} files, {} episodes, {} steps, {} videos",
+                     ok() ? "intact" : "NOT intact", files, episodes, steps, videos);
   if (unpublished > 0) out += fmt::format(", {} episodes not published", unpublished);
   return out + "\n";
 }
