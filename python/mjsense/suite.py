@@ -35,7 +35,7 @@ class SensorSuite(KnownAttributes):
         if not uuid:
             raise ValueError(f"{type(sensor).__name__} has no uuid")
         if uuid in self.sensors:
-            raise AssertionError(f"'{uuid}' is duplicated sensor uuid")
+            raise AssertionError(f"'{uuid}' is a duplicated sensor uuid")
         self.sensors[uuid] = sensor
 
     def extend(self, sensors: Iterable[Any]) -> None:

@@ -76,7 +76,7 @@ def test_registry_order_and_config_of_ones_own():
     scene = ball_scene(feet_cfg(fields=("found",)), Cfg())
     assert list(scene.sensors)[:2] == ["touch", "ball/mine"]
     assert scene["ball/mine"].entities["ball"] == ("ball",)
-    with pytest.raises(ValueError, match="two sensors of one name"):
+    with pytest.raises(ValueError, match="two sensors have this name"):
         ball_scene(Height(), Height())
 
 
@@ -340,7 +340,7 @@ class Reset(Height):
 
 def test_suite():
     suite = mjs.SensorSuite([Reset()])
-    with pytest.raises(AssertionError, match="'height' is duplicated sensor uuid"):
+    with pytest.raises(AssertionError, match="'height' is a duplicated sensor uuid"):
         suite.add(Height())
     scene = ball_scene(feet_cfg(fields=("found",)))
     suite.extend([scene["touch"], scene["ball/acc"]])

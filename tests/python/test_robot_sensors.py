@@ -116,7 +116,7 @@ def test_sensors_of_an_object():
     env = mjs.make("pick", Lab("franka"), cameras=[], use_sensors=True)
     assert "grippers" in env.reset()[0]
     env.close()
-    with pytest.raises(ValueError, match="'qpos' is duplicated sensor uuid: from task 'pick' and from robot 'franka'"):
+    with pytest.raises(ValueError, match="'qpos' is a duplicated sensor uuid: from task 'pick' and from robot 'franka'"):
         mjs.make_vec("pick", mjs.Robot("franka", sensors=[Count("qpos")]), **TASK)
     with pytest.raises(TypeError, match=r"make_vec\(\): robot must be the name of a robot, the path of its .toml, or a mjsense.Robot"):
         mjs.make_vec("pick", 3)

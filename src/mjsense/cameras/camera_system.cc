@@ -42,7 +42,7 @@ void validate(const CameraSystemCfg& cfg, std::string_view place) {
     validate(cfg.cameras[i], place);
     for (std::size_t k = 0; k < i; ++k) {
       if (cfg.cameras[k].name == cfg.cameras[i].name)
-        throw ValueError(fmt::format("{}{}two cameras are called '{}'", place,
+        throw ValueError(fmt::format("{}{}two cameras are named '{}'", place,
                                      place.empty() ? "" : ": ", cfg.cameras[i].name));
     }
   }
@@ -172,8 +172,9 @@ std::string CameraSystem::orbit(int camera, const World& world, Rng& rng, Vec3 c
   }
   if (c.relaxed && best >= 0) return "";
   return fmt::format(
-      "camera '{}': of {} poses around ({:.3f}, {:.3f}, {:.3f}) the best shows the least visible "
-      "object on {:.3g} % of its pixels, min_visible asks for {:.3g} %",
+      "camera '{}': none of the {} poses around ({:.3f}, {:.3f}, {:.3f}) shows every object well "
+      "enough: in the best one, the least visible object covers {:.3g} % of the pixels; "
+      "min_visible requires {:.3g} %",
       c.name, c.max_attempts, centre.x, centre.y, centre.z, 100 * std::max(best, 0.0),
       100 * c.min_visible);
 }

@@ -261,7 +261,7 @@ TEST(CameraSystem, WithoutAVisiblePoseItFailsOrUsesTheBest) {
   c.min_visible = .005;
   c.max_attempts = 5;
   EXPECT_THAT(Bench(cfg).place(0, {0}),
-              HasSubstr("camera 'exo': of 5 poses around (0.000, 0.000, 0.000) the best shows"));
+              HasSubstr("camera 'exo': none of the 5 poses around (0.000, 0.000, 0.000) shows"));
   c.relaxed = true;
   EXPECT_EQ(Bench(cfg).place(0, {0}), "");
 }
@@ -281,18 +281,20 @@ TEST(CameraSystem, ErrorsNameTheCamera) {
   };
   EXPECT_THAT(fault([](auto& c) { c.camera = ""; }, MountKind::kMjcf), HasSubstr("camera 'eye_1'"));
   EXPECT_THAT(fault([](auto& c) { c.camera = "x"; }, MountKind::kBody),
-              HasSubstr("for mount 'mjcf'"));
+              HasSubstr("applies to mount 'mjcf' only"));
   EXPECT_THAT(fault([](auto& c) { c.body = "x"; }, MountKind::kOrbit),
-              HasSubstr("this is 'orbit'"));
+              HasSubstr("the mount is 'orbit'"));
   EXPECT_THAT(fault([](auto& c) { c.quat = {}; }, MountKind::kBody), HasSubstr("quat is zero"));
-  EXPECT_THAT(fault([](auto& c) { c.target = c.pos; }, MountKind::kFixed), HasSubstr("nowhere"));
+  EXPECT_THAT(fault([](auto& c) { c.target = c.pos; }, MountKind::kFixed),
+              HasSubstr("viewing direction"));
   EXPECT_THAT(fault(
                   [](auto& c) {
                     c.distance_range = {2, 1};
                   },
                   MountKind::kOrbit),
               HasSubstr("distance_range is from 2 to 1"));
-  EXPECT_THAT(fault([](auto& c) { c.fovy_noise = 50; }, MountKind::kOrbit), HasSubstr("leaves"));
+  EXPECT_THAT(fault([](auto& c) { c.fovy_noise = 50; }, MountKind::kOrbit),
+              HasSubstr("is not within"));
   CameraSystemCfg twice;
   twice.cameras = {mount("a", MountKind::kOrbit), mount("a", MountKind::kMjcf)};
   EXPECT_THROW(CameraSystem(twice, "robot_0/", "base"), ValueError);

@@ -42,7 +42,7 @@ CameraMountCfg read_camera(const std::string& name, const Json& camera, std::str
   out.quat = numbers<4>(camera, "quat", who);
   const std::string body = camera["body"].is_string() ? camera["body"].get<std::string>() : "";
   if (!body.starts_with(prefix))
-    throw ValueError(fmt::format("{}: body '{}' is no robot's", who, body));
+    throw ValueError(fmt::format("{}: body '{}' does not belong to a robot", who, body));
   out.body = body.substr(prefix.size());
   return out;
 }
@@ -54,7 +54,7 @@ CameraSystemCfg read_frozen(std::string_view json, std::string_view prefix,
   const Json all = Json::parse(json, nullptr, /*allow_exceptions=*/false);
   if (!all.is_object() || all.empty())
     throw ValueError(fmt::format(
-        "{}: must be JSON, cameras by name, as obs_scene has them under 'cameras'", place));
+        "{}: must be a JSON object of cameras by name, like 'cameras' in obs_scene", place));
   CameraSystemCfg system;
   for (const auto& [name, camera] : all.items())
     system.cameras.push_back(

@@ -24,8 +24,8 @@ void Scale::apply(const EffectMoment& /*moment*/, const EffectRow& row) {
 void Misalignment::initialize(const EffectInit& init) {
   check_numeric(init);
   if (init.size % 3 != 0) {
-    throw ValueError(
-        fmt::format("{}: needs rows of 3-vectors, the row has {} values", init.place, init.size));
+    throw ValueError(fmt::format("{}: the row must consist of 3-vectors; it has {} values",
+                                 init.place, init.size));
   }
   stream_ = init.stream;
   matrix_.assign(static_cast<std::size_t>(init.num_worlds) * 9, 0.0);

@@ -34,8 +34,8 @@ EffectChain::EffectChain(std::string name, const SensorSpec& input, const Effect
       tick_s_(tick_s),
       worlds_(num_worlds) {
   if (cfg.history_length < 0) {
-    throw ValueError(
-        fmt::format("sensor '{}': history_length is {}: negative", name, cfg.history_length));
+    throw ValueError(fmt::format("sensor '{}': history_length is {}: must not be negative", name,
+                                 cfg.history_length));
   }
   const std::string place = fmt::format("sensor '{}'", name);
   validate(cfg.effects, place);

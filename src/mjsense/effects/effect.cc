@@ -16,7 +16,7 @@ void check_order(const PerComponent& low, const PerComponent& high, std::string_
   const std::size_t n = std::max(low.size(), high.size());
   if (std::min(low.size(), high.size()) > 1 && low.size() != high.size()) {
     throw ValueError(
-        fmt::format("{}: low has {} values and high {}", place, low.size(), high.size()));
+        fmt::format("{}: low has {} values, but high has {}", place, low.size(), high.size()));
   }
   for (int i = 0; i < static_cast<int>(n); ++i) {
     if (component(low, i) > component(high, i)) {
@@ -28,14 +28,14 @@ void check_order(const PerComponent& low, const PerComponent& high, std::string_
 
 void check_components(const PerComponent& values, const char* name, const EffectInit& init) {
   if (values.size() != 1 && static_cast<int>(values.size()) != init.size) {
-    throw ValueError(fmt::format("{}: {} has {} values: must be 1, or {} as the row has",
-                                 init.place, name, values.size(), init.size));
+    throw ValueError(fmt::format("{}: {} has {} values: must be 1, or {} like the row", init.place,
+                                 name, values.size(), init.size));
   }
 }
 
 void check_numeric(const EffectInit& init) {
   if (init.dtype == DType::kFloat32 || init.dtype == DType::kFloat64) return;
-  throw ValueError(fmt::format("{}: needs float32 or float64 values, the row has {}", init.place,
+  throw ValueError(fmt::format("{}: needs float32 or float64 values; the row has {}", init.place,
                                dtype_name(init.dtype)));
 }
 

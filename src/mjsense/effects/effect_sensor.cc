@@ -25,7 +25,7 @@ ChainTick tick_of(const World& world) {
 
 std::unique_ptr<Sensor> EffectSensorCfg::build() const {
   const std::string place = sensor_place(name);
-  if (sensor.empty()) throw ValueError(fmt::format("{}: no sensor to read is given", place));
+  if (sensor.empty()) throw ValueError(fmt::format("{}: the sensor to read is missing", place));
   check_fields(*this, place);
   return std::make_unique<EffectSensor>(*this);
 }
@@ -42,13 +42,13 @@ std::vector<std::string> EffectSensor::reads() const {
 void EffectSensor::initialize(const SensorInit& init) {
   if (!cfg_.sensor.empty()) {
     if (!init.scene) {
-      throw ValueError(
-          fmt::format("sensor '{}': reads '{}' and needs a scene", name(), cfg_.sensor));
+      throw ValueError(fmt::format("sensor '{}': reads '{}', so it must belong to a scene", name(),
+                                   cfg_.sensor));
     }
     inner_ = &init.scene->sensor(cfg_.sensor);
   }
   if (!inner_ || inner_ == this) {
-    throw ValueError(fmt::format("sensor '{}': has no other sensor to read", name()));
+    throw ValueError(fmt::format("sensor '{}': does not name another sensor to read", name()));
   }
   std::vector<std::string> names;
   for (const Field& f : inner_->fields()) names.push_back(f.name);

@@ -543,9 +543,9 @@ TEST(Chain, ErrorsNameSensorEffectAndValue) {
   EXPECT_THAT(message(one(Dropout(1.5))), HasSubstr("probability is 1.5"));
   EXPECT_THAT(message(one(Misalignment()), 4), HasSubstr("3-vectors"));
   EXPECT_THAT(message(one(Delay(-1))), HasSubstr("delay_s is -1"));
-  EXPECT_THAT(message(one(Delay(1e10))), HasSubstr("effect 0 (delay): a delay of"));
+  EXPECT_THAT(message(one(Delay(1e10))), HasSubstr("effect 0 (delay): the delay is"));
   EXPECT_THAT(message(one(StepDelay(0, std::numeric_limits<int>::max()))),
-              HasSubstr("max_lag is 2147483647: at most 100000"));
+              HasSubstr("max_lag is 2147483647: must be at most 100000"));
 }
 
 TEST(EffectSensor, InvalidEffectsAreRefusedAtBuild) {

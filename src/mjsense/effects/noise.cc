@@ -70,8 +70,8 @@ void EpisodeBias::apply(const EffectMoment& moment, const EffectRow& row) {
 
 void BiasDrift::validate(std::string_view place) const {
   if (std::isinf(time_constant_s) && std::ranges::any_of(std, [](double s) { return s > 0; })) {
-    throw ValueError(
-        fmt::format("{}: std needs a finite time_constant_s; a random walk has density", place));
+    throw ValueError(fmt::format(
+        "{}: std needs a finite time_constant_s; a random walk is set by density", place));
   }
 }
 

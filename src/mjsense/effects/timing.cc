@@ -56,8 +56,8 @@ void Delay::initialize(const EffectInit& init) {
   if (!(init.period > 0)) throw ValueError(fmt::format("{}: needs a period > 0", init.place));
   const double rows = (std::max(delay_s, delay_max_s) + jitter_s) / init.period;
   if (!(rows <= kMostRows)) {
-    throw ValueError(fmt::format("{}: a delay of {:.3g} rows of {:.3g} s: at most {}", init.place,
-                                 rows, init.period, kMostRows));
+    throw ValueError(fmt::format("{}: the delay is {:.3g} rows of {:.3g} s: the maximum is {} rows",
+                                 init.place, rows, init.period, kMostRows));
   }
   ring_.initialize(init.num_worlds, init.size * dtype_size(init.dtype),
                    static_cast<int>(std::ceil(rows)) + 2);
@@ -100,10 +100,11 @@ void Delay::apply(const EffectMoment& moment, const EffectRow& row) {
 
 void StepDelay::validate(std::string_view place) const {
   if (max_lag > kMostRows)
-    throw ValueError(fmt::format("{}: max_lag is {}: at most {}", place, max_lag, kMostRows));
-  if (max_lag < min_lag) {
     throw ValueError(
-        fmt::format("{}: lags [{}, {}]: need 0 <= min_lag <= max_lag", place, min_lag, max_lag));
+        fmt::format("{}: max_lag is {}: must be at most {}", place, max_lag, kMostRows));
+  if (max_lag < min_lag) {
+    throw ValueError(fmt::format("{}: lags [{}, {}]: must satisfy 0 <= min_lag <= max_lag", place,
+                                 min_lag, max_lag));
   }
 }
 

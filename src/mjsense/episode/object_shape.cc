@@ -126,8 +126,8 @@ ObjectShape object_shape(const mjModel* model, int body, double spacing) {
     for (Vec3 p : local) shape.points.push_back(pose * p);
   }
   if (shape.points.empty()) {
-    throw ValueError(fmt::format("object '{}': has no geom that can be touched",
-                                 name_of(model, mjOBJ_BODY, body)));
+    throw ValueError(
+        fmt::format("object '{}': has no collision geom", name_of(model, mjOBJ_BODY, body)));
   }
   shape.low = shape.high = shape.points.front().z;
   for (Vec3 p : shape.points) {

@@ -9,9 +9,9 @@ std::vector<std::shared_ptr<Sensor>> PlannerPolicy::create_policy_sensors() cons
   SensorSpec phase, retries;
   phase.low = 0;
   phase.description =
-      "Number of the planner's phase before it chooses the next action; obs_scene names them.";
+      "Index of the planner's phase before it chooses the next action; obs_scene lists the names.";
   retries.low = 0;
-  retries.description = "How often the planner has begun again in this episode.";
+  retries.description = "Number of times that the planner has restarted in this episode.";
   std::vector<std::shared_ptr<Sensor>> sensors;
   sensors.push_back(std::make_shared<FunctionSensor<std::int64_t>>(
       "policy_phase", phase,

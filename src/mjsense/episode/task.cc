@@ -35,14 +35,14 @@ SceneCfg Task::whole_scene_cfg() const {
   const bool reserved = place != scene.entities.end() && place->second.model.empty();
   if (cfg_.robot.name.empty()) {
     if (reserved) {
-      throw ValueError(fmt::format("task '{}' needs a robot: none is given", this->name()));
+      throw ValueError(fmt::format("task '{}' needs a robot, and none is given", this->name()));
     }
     return scene;
   }
   if (place != scene.entities.end() && !reserved) {
-    throw ValueError(
-        fmt::format("task '{}' has a robot in its scene, entity '{}': robot '{}' cannot join it",
-                    this->name(), name, cfg_.robot.name));
+    throw ValueError(fmt::format(
+        "task '{}' already has a robot in its scene (entity '{}'): robot '{}' cannot be added",
+        this->name(), name, cfg_.robot.name));
   }
   EntityCfg robot;
   robot.model = cfg_.robot.model;
@@ -63,7 +63,7 @@ SceneCfg Task::whole_scene_cfg() const {
 
 void Task::initialize(const mjModel* model, int num_worlds) {
   if (num_worlds <= 0)
-    throw ValueError(fmt::format("task: {} worlds, at least 1 is needed", num_worlds));
+    throw ValueError(fmt::format("task: {} worlds; at least 1 is required", num_worlds));
   model_ = model;
   num_worlds_ = num_worlds;
   const ControlPeriods periods{0.001 * cfg_.policy_dt_ms, 0.001 * cfg_.ctrl_dt_ms};
@@ -99,8 +99,8 @@ void Task::sample(int world, std::int64_t episode, const StateRow& state, int dr
 
 void Task::choose_goal(int /*world*/, Rng& /*rng*/, const StateRow& /*state*/) {
   throw ValueError(
-      fmt::format("task '{}' cannot choose its goal in a scene that another task has sampled: of "
-                  "several tasks it must be the first",
+      fmt::format("task '{}' cannot choose its goal in a scene that another task has sampled: when "
+                  "several tasks are combined, it must be the first",
                   name()));
 }
 
@@ -184,8 +184,9 @@ std::string Task::obs_scene(int world) const {
   if (policy_) {
     for (const auto& [key, value] : policy_->info(world)) {
       if (scene.contains(key))
-        throw ValueError(fmt::format("policy '{}': info() has '{}', which the task says already",
-                                     policy_->name(), key));
+        throw ValueError(
+            fmt::format("policy '{}': info() contains the key '{}', which the task already uses",
+                        policy_->name(), key));
       scene[key] = value;
     }
   }

@@ -17,7 +17,7 @@ CameraParameterSensor::CameraParameterSensor(std::string name, std::string camer
                                              int height)
     : Sensor(std::move(name)), camera_(std::move(camera)), width_(width), height_(height) {
   if (width <= 0 || height <= 0) {
-    throw ValueError(fmt::format("sensor '{}': picture size {} x {} must be positive", this->name(),
+    throw ValueError(fmt::format("sensor '{}': image size {} x {} must be positive", this->name(),
                                  width, height));
   }
 }
@@ -42,7 +42,7 @@ void CameraParameterSensor::initialize(const SensorInit& init) {
   spec.shape = {3, 3};
   spec.unit = "px";
   spec.frame = "pixels";
-  spec.description = "Pinhole matrix of the picture.";
+  spec.description = "Pinhole matrix of the image.";
   add_field("intrinsic_cv", spec, init.num_worlds);
 }
 

@@ -92,7 +92,7 @@ void EnvStatesSensor::initialize(const SensorInit& init) {
     spec.unit = "m, wxyz, m/s, rad/s";
     spec.frame = "world (angular velocity: body)";
     spec.description = "Free joint of the body: position, quaternion, linear and angular velocity.";
-    if (leaves) spec.description += " While it is absent: zeros, NaN in a file.";
+    if (leaves) spec.description += " While the body is absent: zeros, and NaN in a recording.";
     add_field(fmt::format("actors/{}", actor), spec, init.num_worlds);
   }
   articulations_.clear();

@@ -10,7 +10,7 @@ namespace mjsense {
 Frame Frame::find(const mjModel* model, std::string_view place, std::string_view type,
                   std::string_view name) {
   if (type != "body" && type != "site") {
-    throw ValueError(fmt::format("{}: a frame is of type body or site, not '{}'", place, type));
+    throw ValueError(fmt::format("{}: a frame must be a body or a site, not '{}'", place, type));
   }
   const mjtObj object = type == "body" ? mjOBJ_BODY : mjOBJ_SITE;
   return {object, object_id(model, object, place, name)};
@@ -46,8 +46,8 @@ Kind kind_of(const mjModel* model, mjtObj type) {
     case mjOBJ_ACTUATOR:
       return {static_cast<int>(model->nu), "actuator"};
     default:
-      throw ValueError(
-          fmt::format("no names of MuJoCo objects of type {}", static_cast<int>(type)));
+      throw ValueError(fmt::format("names of MuJoCo objects of type {} are not supported",
+                                   static_cast<int>(type)));
   }
 }
 }  // namespace

@@ -48,7 +48,7 @@ ImagePointsSensor::ImagePointsSensor(std::string name, std::vector<Object> objec
                                      std::vector<Camera> cameras)
     : Sensor(std::move(name)), objects_(std::move(objects)), cameras_(std::move(cameras)) {
   if (objects_.size() > kMaxObjects) {
-    throw ValueError(fmt::format("sensor '{}': {} objects, at most {}", this->name(),
+    throw ValueError(fmt::format("sensor '{}': {} objects: the maximum is {}", this->name(),
                                  objects_.size(), kMaxObjects));
   }
   for (const Camera& camera : cameras_) {
@@ -67,8 +67,9 @@ void ImagePointsSensor::initialize(const SensorInit& init) {
     const Field& field = camera.sensor->field(camera.field);
     const Shape& shape = field.spec.shape;
     if (field.spec.dtype != DType::kInt32 || shape.rank() != 3 || shape[2] != 2) {
-      throw ValueError(fmt::format("sensor '{}': '{}' must be int32 (H, W, 2), is {} {}", name(),
-                                   field.spec.name, dtype_name(field.spec.dtype), shape.str()));
+      throw ValueError(fmt::format("sensor '{}': '{}' must be int32 (H, W, 2), but is {} {}",
+                                   name(), field.spec.name, dtype_name(field.spec.dtype),
+                                   shape.str()));
     }
     pictures_.push_back({&field, static_cast<int>(shape[1]), static_cast<int>(shape[0])});
     most = std::max(most, shape[0] * shape[1]);
@@ -79,7 +80,7 @@ void ImagePointsSensor::initialize(const SensorInit& init) {
     for (const Camera& camera : cameras_) {
       SensorSpec spec;
       spec.shape = {kPoints, 2};
-      spec.frame = "picture of " + camera.name;
+      spec.frame = "image of " + camera.name;
       spec.low = 0;
       spec.high = 1;
       spec.description =

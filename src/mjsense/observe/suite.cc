@@ -14,7 +14,7 @@ void SensorSuite::add(std::shared_ptr<Sensor> sensor, std::string_view owner) {
   const std::string from = owner.empty() ? "the suite" : std::string(owner);
   if (sensor->name().empty()) throw ValueError(fmt::format("a sensor from {} has no name", from));
   if (const int other = index(sensor->name()); other >= 0) {
-    throw ValueError(fmt::format("'{}' is duplicated sensor uuid: from {} and from {}",
+    throw ValueError(fmt::format("'{}' is a duplicated sensor uuid: from {} and from {}",
                                  sensor->name(), owners_[other], from));
   }
   sensors_.push_back(std::move(sensor));

@@ -41,7 +41,7 @@ TEST(Suite, KeepsOrderAndNamesBothOwnersOfADuplicate) {
   EXPECT_THAT(suite.names(), testing::ElementsAre("qpos", "exo", "arm"));
   EXPECT_EQ(suite.owner("arm"), "robot 'franka'");
   EXPECT_EQ(error_of([&] { suite.add(std::make_shared<Picture>("qpos"), "robot 'franka'"); }),
-            "'qpos' is duplicated sensor uuid: from task 'pick' and from robot 'franka'");
+            "'qpos' is a duplicated sensor uuid: from task 'pick' and from robot 'franka'");
   EXPECT_EQ(suite.size(), 3u);
   EXPECT_EQ(error_of([&] { suite.get("qpo"); }),
             "suite: no sensor named 'qpo'; did you mean 'qpos'?");

@@ -179,10 +179,10 @@ std::optional<Picking::Grip> Picking::pick_with(const Search& search, int h, boo
       hand.add_line(world, rest, kGrasp, before.tool, at.tool, cfg.slow, cfg.settle);
       hand.add_line(world, rest, kCloseGripper, at.tool, at.tool, cfg.slow, cfg.close_time)
           .grip(gripper, group.closed_command);
-      refusal = {"without room to lift"};
+      refusal = {"without space to lift the object"};
       if (!lift(world, hand, at, rest)) continue;
       ++ways;
-      refusal = {"without a free path to them"};
+      refusal = {"without a collision-free path to them"};
       query.set_margin(kMargin);
       if (!hand.add_way(world, query, plan, kPregrasp, start, before, way)) continue;
       std::ranges::move(rest.segments, std::back_inserter(plan.segments));

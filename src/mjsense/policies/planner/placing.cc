@@ -52,7 +52,7 @@ bool Placing::plan(const World& world, const PlanRequest& request, const Followe
     }
     if (refusals.size() > kMostGoals) break;
   }
-  plan.refusal = text_of("poses of the object at its place", refusals, world.model);
+  plan.refusal = text_of("poses of the object at its goal", refusals, world.model);
   return false;
 }
 
@@ -129,9 +129,9 @@ bool Placing::place_at(const World& world, HandPlanner& hand, CollisionQuery& qu
     refusal = Refusal::collision(query.touching());
     return false;
   }
-  refusal = {"without room for the fingers to open and draw back"};
+  refusal = {"without space for the fingers to open and retreat"};
   if (!gets_away(world, hand, at, object, away)) return false;
-  refusal = {"without a free path to them"};
+  refusal = {"without a collision-free path to them"};
   query.set_margin(kMargin);
   if (!hand.is_free(query, start) || !hand.is_free(query, above)) query.set_margin(0);
   if (!hand.add_way(world, query, plan, kPreplace, start, above, rng)) return false;
