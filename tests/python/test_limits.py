@@ -24,7 +24,7 @@ def sim():
 
 
 def test_too_many_worlds():
-    with pytest.raises(ValueError, match=r"num_worlds is 2000000000: they need .* GB of memory, and .* GB are left"):
+    with pytest.raises(ValueError, match=r"num_worlds is 2000000000: they need .* GB of memory, but only .* GB are available"):
         mjs.Simulation(ball_scene(), num_worlds=2_000_000_000)
 
 

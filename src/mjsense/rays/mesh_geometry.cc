@@ -48,7 +48,7 @@ std::shared_ptr<RTCDeviceTy> ray_device() {
     if (d) rtcReleaseDevice(d);
   });
   if (!device)
-    throw RuntimeError(fmt::format("ray scene: Embree gave no device (error {})",
+    throw RuntimeError(fmt::format("ray scene: Embree could not create a device (error {})",
                                    static_cast<int>(rtcGetDeviceError(nullptr))));
   rtcSetDeviceErrorFunction(
       device.get(), [](void*, RTCError, const char* text) { last_error() = text ? text : ""; },

@@ -362,7 +362,8 @@ void Simulation::cast(std::span<Slot* const> slots, std::span<const int> ids, in
 }
 
 void Simulation::step(int control_steps, WorldIds ids) {
-  if (control_steps < 1) throw ValueError(fmt::format("step({}): at least 1", control_steps));
+  if (control_steps < 1)
+    throw ValueError(fmt::format("step({}): must be at least 1", control_steps));
   for (int k = 0; k < control_steps; ++k) {
     const bool last = k + 1 == control_steps;
     Borrowed due(*this);
@@ -378,7 +379,8 @@ void Simulation::step(int control_steps, WorldIds ids) {
 }
 
 void Simulation::set_control(int every, Control control) {
-  if (every < 1) throw ValueError(fmt::format("control every {} substeps: at least 1", every));
+  if (every < 1)
+    throw ValueError(fmt::format("control every {} substeps: must be at least 1", every));
   control_ = std::move(control);
   control_every_ = control_ ? every : 0;
 }

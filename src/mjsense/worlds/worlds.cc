@@ -156,8 +156,9 @@ void check_memory(const mjModel* m, int num_worlds) {
   mj_deleteData(d);
   const auto require = [&](std::uint64_t needed, std::uint64_t available, const char* what) {
     if (needed > available)
-      throw ValueError(fmt::format("num_worlds is {}: they need {} of {}, and {} are left",
-                                   num_worlds, gigabytes(needed), what, gigabytes(available)));
+      throw ValueError(
+          fmt::format("num_worlds is {}: they need {} of {}, but only {} are available", num_worlds,
+                      gigabytes(needed), what, gigabytes(available)));
   };
   require(each * num_worlds, os::free_memory(), "memory");
   require(space * num_worlds, available_address_space(), "address space");
@@ -206,7 +207,7 @@ Worlds::Worlds(const mjModel* model, int num_worlds, int threads) : Worlds() {
   unmarked.vis.global.bvactive = 0;
   batch_ = call_mujoco(mjb_makeBatch, &unmarked, num_worlds, &config, error, sizeof error);
   if (batch_) add_owner(this);
-  if (!batch_) throw RuntimeError(fmt::format("cannot make {} worlds: {}", num_worlds, error));
+  if (!batch_) throw RuntimeError(fmt::format("cannot create {} worlds: {}", num_worlds, error));
   num_state_ = static_cast<std::size_t>(mjb_nstate(batch_));
   workbenches_ = std::vector<Workbench>(mjb_nthread(batch_));
   for (Workbench& bench : workbenches_) bench.data = call_mujoco(mj_makeData, mjb_model(batch_));
@@ -337,8 +338,8 @@ void Worlds::forward(WorldIds ids, WorldHooks& hooks) {
 
 void Worlds::reset(WorldIds ids, int key, WorldHooks& hooks) {
   if (key < -1 || key >= model()->nkey) {
-    throw ValueError(
-        fmt::format("keyframe {}: the model has {} (-1: its defaults)", key, model()->nkey));
+    throw ValueError(fmt::format(
+        "keyframe {}: the model has {} keyframes (-1: the model's defaults)", key, model()->nkey));
   }
   apply(ids, {this, Op::kReset, 0, key, &hooks}, true);
 }
@@ -623,8 +624,8 @@ void Worlds::report_warnings() {
 void Worlds::apply(WorldIds ids, Call call, bool save) {
   if (is_orphan(this))
     throw RuntimeError(
-        "simulation: this process was forked from the one that made it, and its threads stayed "
-        "there; make it after the fork, or start processes with 'spawn'");
+        "simulation: this process was forked from the one that created it, which has its threads; "
+        "create it after the fork, or start processes with 'spawn' or 'forkserver'");
   checked_ids(ids, ids_);
   if (call.op != Op::kVisit) failures_.clear();
   if (ids_.empty()) return;  // MuJoCo would interpret an empty list as all worlds
@@ -658,7 +659,7 @@ std::vector<int> Worlds::take_failures(Op op) {
     } else if (!diverged_[w]) {
       continue;
     } else if (const int warning = diverged_[w] - 1; warning == kBadState) {
-      why = fmt::format("the state that was written holds NaN or infinity ({})",
+      why = fmt::format("the state that was written contains NaN or infinity ({})",
                         bad_component(batch_, w));
     } else {
       const auto& stat = mjb_warning(batch_)[w * mjNWARNING + warning];
@@ -692,7 +693,7 @@ std::string Worlds::reset_failed(std::vector<int> failed, Call call) {
     drop_warnings(false);
     for (; first != last; ++first) {
       if (mjb_status(batch_)[*first] && helpless.empty()) {
-        helpless = fmt::format("world {} fails even when reset: MuJoCo: {}", *first,
+        helpless = fmt::format("world {} fails even after a reset: MuJoCo: {}", *first,
                                mjb_error(batch_, *first));
       }
     }

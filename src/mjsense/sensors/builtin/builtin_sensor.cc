@@ -104,7 +104,7 @@ void BuiltinSensorCfg::validate() const {
   if (type.group == BuiltinGroup::kRangefinder) range_mask(data, place);
   if (enclosed && type.group != BuiltinGroup::kInside) {
     throw ValueError(
-        fmt::format("{}: enclosed is an option of insidesite, not of {}", place, type.name));
+        fmt::format("{}: enclosed applies to insidesite only, not to {}", place, type.name));
   }
   if (type.group == BuiltinGroup::kUser) {
     if (dim < 1)

@@ -186,7 +186,8 @@ void CameraSensor::check_grid(const PixelGrid& grid) const {
   if (orthographic && (cfg_.intrinsics || cfg_.distortion.model != LensKind::kNone))
     throw ValueError(place + ": an orthographic camera has no intrinsics and no lens distortion");
   if (orthographic && cfg_.depth_noise != DepthNoise::kNone)
-    throw ValueError(place + ": depth_noise is for planar depth of a perspective camera");
+    throw ValueError(place +
+                     ": depth_noise applies only to the planar depth of a perspective camera");
 }
 
 void CameraSensor::declare_fields(int num_worlds) {

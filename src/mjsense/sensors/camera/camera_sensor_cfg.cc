@@ -20,10 +20,9 @@ template <class Fail>
 void check_pose(const CameraSensorCfg& cfg, Fail&& fail) {
   const CameraSensorCfg made;
   if (!cfg.camera_name.empty() && (cfg.pos != made.pos || cfg.quat != made.quat))
-    fail(
-        fmt::format("camera_name '{}' wraps an existing camera, which stays where it is: leave pos "
-                    "and quat alone",
-                    cfg.camera_name));
+    fail(fmt::format(
+        "camera_name '{}' wraps an existing camera, which keeps its pose: do not set pos or quat",
+        cfg.camera_name));
   double length = 0;
   for (double x : cfg.quat) length += x * x;
   if (length < 1e-12) fail(fmt::format("quat is {}: must not be 0", cfg.quat));
@@ -33,8 +32,8 @@ void check_pose(const CameraSensorCfg& cfg, Fail&& fail) {
 
 void check_fovy(double degrees, std::string_view place) {
   if (degrees < 180) return;
-  throw ValueError(fmt::format("{}: fovy is {} degrees: a perspective camera sees less than 180",
-                               place, degrees));
+  throw ValueError(fmt::format(
+      "{}: fovy is {} degrees: must be less than 180 for a perspective camera", place, degrees));
 }
 
 void validate(const LensDistortion& lens, std::string_view place) {
@@ -55,35 +54,33 @@ void validate(const CameraSensorCfg& cfg) {
   check_pose(cfg, fail);
   if (cfg.fovy) {
     if (!cfg.orthographic && cfg.camera_name.empty()) check_fovy(*cfg.fovy, place);
-    if (cfg.intrinsics)
-      fail("both fovy and intrinsics are given: intrinsics say all that fovy does");
+    if (cfg.intrinsics) fail("both fovy and intrinsics are given: set only one of them");
   }
   if (cfg.far > 0 && cfg.far <= cfg.near)
-    fail(fmt::format("near {} and far {}: need 0 <= near < far, or far 0 for no limit", cfg.near,
-                     cfg.far));
+    fail(fmt::format("near {} and far {}: must satisfy 0 <= near < far, or far 0 for no limit",
+                     cfg.near, cfg.far));
   if (cfg.near > 0 && cfg.clip_near == ClipNear::kModel)
-    fail(fmt::format("near is {} m and clip_near is 'model': one of them says where to clip",
-                     cfg.near));
+    fail(fmt::format("near is {} m and clip_near is 'model': set only one of them", cfg.near));
   if (cfg.phase > 0 && cfg.update_period == 0)
-    fail(fmt::format("phase {} s without an update_period: every reading is a new image",
+    fail(fmt::format("phase is {} s, but there is no update_period: every reading is a new image",
                      cfg.phase));
   if (cfg.renderer == CameraRenderer::kOpenGl) {
     for (const std::string& type : cfg.data_types)
       if (type == "normals" || type == "point_cloud")
-        fail(fmt::format("renderer 'opengl' has no {}", type));
+        fail(fmt::format("renderer 'opengl' does not support {}", type));
     if (cfg.near > 0 || cfg.far > 0 || cfg.intrinsics || cfg.distortion.model != LensKind::kNone ||
         cfg.depth_kind != DepthKind::kPlanar)
       fail(
           "renderer 'opengl' takes clip range and intrinsics from the model, has no lens "
           "distortion, and measures planar depth");
     if (cfg.max_lights > kClassicLights)
-      fail(fmt::format("renderer 'opengl' has no more than {} lights; max_lights is {}",
+      fail(fmt::format("renderer 'opengl' supports at most {} lights; max_lights is {}",
                        kClassicLights, cfg.max_lights));
   }
   const auto has_depth = std::count(cfg.data_types.begin(), cfg.data_types.end(), "depth") > 0;
   if (cfg.depth_noise != DepthNoise::kNone &&
       (!has_depth || cfg.depth_kind != DepthKind::kPlanar || cfg.orthographic))
-    fail("depth_noise is for planar depth of a perspective camera");
+    fail("depth_noise applies only to the planar depth of a perspective camera");
   if (cfg.orthographic && (cfg.intrinsics || cfg.distortion.model != LensKind::kNone))
     fail("an orthographic camera has no intrinsics and no lens distortion");
   if (!cfg.camera_name.empty() && !cfg.parent_body.empty())

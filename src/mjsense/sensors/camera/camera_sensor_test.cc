@@ -571,7 +571,7 @@ TEST(Camera, ErrorsNameTheSetting) {
   constexpr double kInf = std::numeric_limits<double>::infinity();
   EXPECT_THAT(with([](Cfg& c) { c.near = kInf; }), HasSubstr("near is inf"));
   EXPECT_THAT(with([](Cfg& c) { c.update_period = kInf; }), HasSubstr("update_period is inf"));
-  EXPECT_THAT(with([](Cfg& c) { c.phase = 1; }), HasSubstr("without an update_period"));
+  EXPECT_THAT(with([](Cfg& c) { c.phase = 1; }), HasSubstr("there is no update_period"));
   EXPECT_THAT(with([](Cfg& c) { c.pos[0] = kNan; }), HasSubstr("must be finite"));
   EXPECT_THAT(with([](Cfg& c) { c.quat = {0, 0, 0, 0}; }), HasSubstr("quat is"));
   EXPECT_THAT(with([](Cfg& c) { c.enabled_geom_groups.clear(); }), HasSubstr("is empty"));
@@ -585,7 +585,7 @@ TEST(Camera, ErrorsNameTheSetting) {
               }),
               HasSubstr("both fovy and intrinsics"));
   EXPECT_THAT(with([&](Cfg& c) { c.distortion = {"fisheye", {kNan, 0, 0, 0}}; }), HasSubstr("nan"));
-  EXPECT_THAT(with([](Cfg& c) { c.pos = {1, 2, 3}; }, "w/top"), HasSubstr("stays where it is"));
+  EXPECT_THAT(with([](Cfg& c) { c.pos = {1, 2, 3}; }, "w/top"), HasSubstr("keeps its pose"));
   EXPECT_THAT(with([](Cfg& c) { c.fovy = 200; }, "w/top"), HasSubstr("less than 180"));
   // An ideal fisheye of this focal length would see directions behind the camera in the corners.
   EXPECT_THAT(with([](Cfg& c) {

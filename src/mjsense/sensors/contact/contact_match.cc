@@ -29,7 +29,7 @@ void drop_excluded(std::string_view place, const ContactMatch& match,
   std::erase_if(objects, [&](const ContactObject& o) { return exclude.drops(o.label); });
   if (objects.empty()) {
     throw ValueError(
-        fmt::format("{}: nothing is left after excludes of: {}", place, fmt::join(before, ", ")));
+        fmt::format("{}: exclude removes every match: {}", place, fmt::join(before, ", ")));
   }
 }
 

@@ -301,7 +301,7 @@ TEST(Contact, ExcludeRemovesSecondaries) {
     c.secondary->exclude = {"L"};
     EXPECT_THAT([&] { Lab("bot", kFeet, {c}); },
                 ::testing::ThrowsMessage<ValueError>(
-                    HasSubstr("sensor 'none': secondary: nothing is left after excludes of: L")))
+                    HasSubstr("sensor 'none': secondary: exclude removes every match: L")))
         << word(policy);
   }
 }
@@ -404,7 +404,7 @@ TEST(Contact, ErrorsNameSensorAndNearest) {
   EXPECT_THAT(message(box_cfg("BOX_GEOM")), HasSubstr("Not all regular expressions are matched"));
   ContactSensorCfg c = box_cfg();
   c.primary.exclude = {"box_.*"};
-  EXPECT_THAT(message(c), HasSubstr("after excludes"));
+  EXPECT_THAT(message(c), HasSubstr("exclude removes every match"));
   c = box_cfg();
   c.primary.entity = "bax";
   EXPECT_THAT(message(c), HasSubstr("entity 'bax' not found; did you mean 'box'?"));

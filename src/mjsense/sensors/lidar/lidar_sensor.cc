@@ -33,7 +33,7 @@ LidarSensor::LidarSensor(const LidarSensorCfg& cfg) : RayCastSensor(cfg), lidar_
   cfg_.hit_ids = true;  // intensity needs them
   exclude_world_ = false;
   if (cfg.pattern != PatternCfg(GridPattern{}))
-    throw ValueError(place() + ": a pattern is set, but a lidar's rays are those of its scan");
+    throw ValueError(place() + ": pattern does not apply to a lidar: use scan");
   check_fields(cfg, place());
   if (const auto* s = std::get_if<SpinningScan>(&cfg.scan)) {
     rate_hz_ = s->rate_hz;
@@ -49,8 +49,9 @@ LidarSensor::LidarSensor(const LidarSensorCfg& cfg) : RayCastSensor(cfg), lidar_
 void validate(const SpinningScan& s, std::string_view place) {
   check_ray_count(static_cast<double>(s.channels) * s.samples, place);
   if (!s.elevations_deg.empty() && static_cast<int>(s.elevations_deg.size()) != s.channels)
-    throw ValueError(fmt::format("{}: elevations_deg has {} values, channels is {}: one a channel",
-                                 place, s.elevations_deg.size(), s.channels));
+    throw ValueError(
+        fmt::format("{}: elevations_deg has {} values, channels is {}: expected one per channel",
+                    place, s.elevations_deg.size(), s.channels));
 }
 
 namespace {

@@ -302,13 +302,13 @@ TEST(Lidar, ErrorsNameTheSetting) {
   EXPECT_THAT(with([](Cfg& c) { c.scan = SpinningScan{.azimuth_start_deg = kNan}; }),
               HasSubstr("azimuth_start_deg is nan"));
   EXPECT_THAT(with([](Cfg& c) { c.scan = SpinningScan{.channels = 100000, .samples = 100000}; }),
-              HasSubstr("10000000000 rays; at most"));
+              HasSubstr("10000000000 rays: the maximum is"));
   EXPECT_THAT(with([](Cfg& c) {
                 c.scan = SpinningScan{.rate_hz = 1e-9};
                 c.motion_distortion = true;
               }),
-              HasSubstr("poses to remember"));
-  EXPECT_THAT(with([](Cfg& c) { c.pattern = RingPattern{}; }), HasSubstr("those of its scan"));
+              HasSubstr("stored poses"));
+  EXPECT_THAT(with([](Cfg& c) { c.pattern = RingPattern{}; }), HasSubstr("use scan"));
   EXPECT_THAT(with([](Cfg& c) { c.range_noise_std = -1; }), HasSubstr("range_noise_std"));
 }
 

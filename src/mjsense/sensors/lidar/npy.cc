@@ -45,7 +45,7 @@ std::vector<std::array<double, 2>> read_npy_pairs(const std::string& path, std::
   const auto status = std::filesystem::status(path, ignored);
   // Opening a pipe would block until there is a writer.
   if (std::filesystem::exists(status) && !std::filesystem::is_regular_file(status))
-    fail(source, "is no file");
+    fail(source, "is not a file");
   std::ifstream in(path, std::ios::binary);
   if (!in) fail(source, "cannot be opened");
   char magic[8];
@@ -53,12 +53,13 @@ std::vector<std::array<double, 2>> read_npy_pairs(const std::string& path, std::
     fail(source, "is not a .npy file");
   std::uint8_t size[4] = {};
   const int size_bytes = magic[6] == 1 ? 2 : 4;
-  if (!in.read(reinterpret_cast<char*>(size), size_bytes)) fail(source, "ends in its header");
+  if (!in.read(reinterpret_cast<char*>(size), size_bytes))
+    fail(source, "is truncated inside its header");
   const std::uint32_t header_size =
       size[0] | size[1] << 8 | size[2] << 16 | static_cast<std::uint32_t>(size[3]) << 24;
   if (header_size > (1u << 20)) fail(source, "has a header of more than 1 MiB");
   std::string header(header_size, '\0');
-  if (!in.read(header.data(), header_size)) fail(source, "ends in its header");
+  if (!in.read(header.data(), header_size)) fail(source, "is truncated inside its header");
 
   const std::string_view type = entry(header, "descr", source),
                          order = entry(header, "fortran_order", source),
@@ -67,8 +68,8 @@ std::vector<std::array<double, 2>> read_npy_pairs(const std::string& path, std::
   long rows = -1, columns = -1;
   if (std::sscanf(std::string(shape).c_str(), "(%ld, %ld)", &rows, &columns) != 2 || columns != 2 ||
       rows < 1 || (!single && type != "'<f8'") || order != "False")
-    fail(source, fmt::format("holds {:.40} of shape {:.40}, fortran_order {:.40}: expected '<f4' "
-                             "or '<f8' of shape (M, 2) in C order",
+    fail(source, fmt::format("contains {:.40} of shape {:.40}, fortran_order {:.40}: expected "
+                             "'<f4' or '<f8' of shape (M, 2) in C order",
                              printable(type), printable(shape), printable(order)));
   // Memory is allocated for the bytes in the file, not for those that the header claims.
   const std::streamoff begin = in.tellg();
@@ -76,11 +77,11 @@ std::vector<std::array<double, 2>> read_npy_pairs(const std::string& path, std::
   const std::size_t row_bytes = single ? 8 : 16;
   if (begin < 0 || end < begin ||
       static_cast<std::size_t>(end - begin) / row_bytes < static_cast<std::size_t>(rows))
-    fail(source, fmt::format("ends before its {} rows", rows));
+    fail(source, fmt::format("is truncated: expected {} rows", rows));
   if (rows > kMostRows) fail(source, fmt::format("has more than {} rows", kMostRows));
   std::vector<char> raw(static_cast<std::size_t>(rows) * row_bytes);
   if (!in.seekg(begin).read(raw.data(), static_cast<std::streamsize>(raw.size())))
-    fail(source, fmt::format("cannot be read to its {} rows", rows));
+    fail(source, fmt::format("cannot be read: expected {} rows", rows));
   std::vector<std::array<double, 2>> pairs(rows);
   for (long i = 0; i < 2 * rows; ++i) {
     float f;

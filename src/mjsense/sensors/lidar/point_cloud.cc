@@ -16,8 +16,8 @@ void write_point_cloud(const std::string& path, std::span<const float> points,
   if (points.size() % 3 != 0 || (!intensity.empty() && intensity.size() != n) ||
       (!distances.empty() && distances.size() != n))
     throw ValueError(fmt::format(
-        "point cloud '{}': {} coordinates, {} intensities, {} distances do not belong together",
-        path, points.size(), intensity.size(), distances.size()));
+        "point cloud '{}': {} coordinates, {} intensities, {} distances are inconsistent", path,
+        points.size(), intensity.size(), distances.size()));
   std::vector<float> rows;
   rows.reserve(4 * n);
   for (std::size_t i = 0; i < n; ++i) {

@@ -19,7 +19,7 @@ using Direction = std::array<double, 3>;
 Direction unit(const Direction& d, std::string_view place) {
   const double length = std::sqrt(d[0] * d[0] + d[1] * d[1] + d[2] * d[2]);
   if (!std::isfinite(length) || length < 1e-12)
-    throw ValueError(fmt::format("{}: ray direction ({}, {}, {}) has no finite length above 0",
+    throw ValueError(fmt::format("{}: ray direction ({}, {}, {}) must have a finite length above 0",
                                  place, d[0], d[1], d[2]));
   return {d[0] / length, d[1] / length, d[2] / length};
 }
@@ -46,7 +46,7 @@ void check_pinhole(double width, double height, double fovy, std::string_view pl
                                  place, width, height));
   if (!(fovy > 0 && fovy < 180))
     throw ValueError(
-        fmt::format("{}: pinhole fovy is {} degrees: must lie between 0 and 180", place, fovy));
+        fmt::format("{}: pinhole fovy is {} degrees: must be between 0 and 180", place, fovy));
   check_ray_count(width * height, place);
 }
 
@@ -61,9 +61,9 @@ RayPattern make(const PinholePattern& p, const mjModel* model, std::string_view 
       throw ValueError(fmt::format("{}: camera '{}' needs a model", place, p.camera));
     const int c = resolve(model, mjOBJ_CAMERA, p.camera, place);
     if (model->cam_projection[c] == mjPROJ_ORTHOGRAPHIC)
-      throw ValueError(fmt::format(
-          "{}: camera '{}' is orthographic: its rays are parallel, as a grid pattern's are", place,
-          p.camera));
+      throw ValueError(
+          fmt::format("{}: camera '{}' is orthographic: its rays are parallel; use a grid pattern",
+                      place, p.camera));
     width = model->cam_resolution[2 * c];
     height = model->cam_resolution[2 * c + 1];
     fovy = model->cam_fovy[c];
@@ -116,7 +116,7 @@ RayPattern make(const UserPattern& u, const mjModel*, std::string_view place) {
 
 void check_ray_count(double rays, std::string_view place) {
   if (rays > kMaxRays)
-    throw ValueError(fmt::format("{}: {:.0f} rays; at most {:.0f}", place, rays, kMaxRays));
+    throw ValueError(fmt::format("{}: {:.0f} rays: the maximum is {:.0f}", place, rays, kMaxRays));
 }
 
 void validate(const GridPattern& g, std::string_view place) {
@@ -141,9 +141,9 @@ void validate(const UserPattern& u, std::string_view place) {
   if (n == 0) throw ValueError(fmt::format("{}: the pattern has no rays", place));
   for (std::size_t count : {u.offsets.size(), u.directions.size()})
     if (count != n && count != 1)
-      throw ValueError(
-          fmt::format("{}: pattern of {} offsets and {} directions: give as many, or one", place,
-                      u.offsets.size(), u.directions.size()));
+      throw ValueError(fmt::format(
+          "{}: pattern of {} offsets and {} directions: give equal numbers, or one of either",
+          place, u.offsets.size(), u.directions.size()));
   for (const Direction& d : u.directions) unit(d, place);
   if (!u.times.empty() && u.times.size() != n)
     throw ValueError(fmt::format("{}: pattern of {} rays and {} times", place, n, u.times.size()));

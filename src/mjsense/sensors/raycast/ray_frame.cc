@@ -17,8 +17,8 @@ void validate_frame(const ObjRef& ref, std::string_view place) {
   const std::array<std::string_view, 5> types = {"body", "xbody", "site", "geom", "camera"};
   if (std::find(types.begin(), types.end(), ref.type) == types.end())
     throw ValueError(
-        fmt::format("{}: frame '{}' is a '{}': must be 'body', 'site', or 'geom' "
-                    "('xbody' and 'camera' will do too)",
+        fmt::format("{}: frame '{}' is a '{}': must be 'body', 'site', or 'geom' ('xbody' and "
+                    "'camera' are accepted too)",
                     place, ref.full_name(), ref.type));
 }
 

@@ -36,7 +36,8 @@ std::uint32_t group_mask(const std::optional<std::vector<int>>& groups, const st
       throw ValueError(fmt::format("{}: include_geom_groups has {}: groups are 0 to 5", place, g));
     mask |= 1u << g;
   }
-  if (mask == 0) throw ValueError(place + ": include_geom_groups is empty: rays would see nothing");
+  if (mask == 0)
+    throw ValueError(place + ": include_geom_groups is empty: the rays would hit nothing");
   return mask;
 }
 
@@ -62,7 +63,7 @@ RayCastSensor::RayCastSensor(const RayCastSensorCfg& cfg) : Sensor(cfg.key()), c
   alignment_ = cfg.ray_alignment;
   filter_.groups = group_mask(cfg.include_geom_groups, place());
   if (!(cfg.min_distance < cfg.max_distance))
-    throw ValueError(fmt::format("{}: min_distance is {} m: must lie in [0, max_distance = {})",
+    throw ValueError(fmt::format("{}: min_distance is {} m: must be in [0, max_distance = {})",
                                  place(), cfg.min_distance, cfg.max_distance));
   for (const ObjRef& ref : cfg.frame) validate_frame(ref, place());
 }
@@ -96,8 +97,8 @@ void RayCastSensor::initialize(const SensorInit& init) {
     const double steps = -oldest / m->opt.timestep + 3;
     if (steps > kMostMoments)
       throw ValueError(
-          fmt::format("{}: its rays' times reach {} s back: {:.0f} poses to remember; at "
-                      "most {}",
+          fmt::format("{}: the times of its rays reach {} s back, which needs {:.0f} stored poses: "
+                      "the maximum is {}",
                       place(), -oldest, steps, kMostMoments));
     history_ = PoseHistory(init.num_worlds * num_frames(), static_cast<int>(steps));
   }

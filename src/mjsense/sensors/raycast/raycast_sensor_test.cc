@@ -387,7 +387,7 @@ TEST(RayCast, ErrorsNameSensorFoundAndExpected) {
   EXPECT_THAT(with([](Cfg& c) { c.pattern = PinholePattern::from_mujoco_camera("r/map"); }),
               HasSubstr("camera 'r/map' is orthographic"));
   EXPECT_THAT(with([](Cfg& c) { c.pattern = UserPattern{.times = {-1e9}}; }),
-              HasSubstr("poses to remember"));
+              HasSubstr("stored poses"));
   EXPECT_THAT(with([](Cfg& c) {
                 c.include_geom_groups = {{0, 6}};
               }),
@@ -399,7 +399,7 @@ TEST(RayCast, ErrorsNameSensorFoundAndExpected) {
   EXPECT_THAT(with([](Cfg& c) {
                 c.pattern = GridPattern{.direction = {0, 0, 0}};
               }),
-              HasSubstr("no finite length"));
+              HasSubstr("must have a finite length"));
   EXPECT_THAT(with([](Cfg& c) { c.pattern = RingPattern{.include_center = false}; }),
               HasSubstr("no rays"));
   EXPECT_THAT(with([](Cfg& c) { c.pattern = PinholePattern{.width = 0}; }),
