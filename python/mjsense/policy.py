@@ -151,7 +151,7 @@ def register_policy(name: str, make: Callable[[], Policy]) -> None:
         make: The policy class, or a function that returns a policy.
     """
     if name in policy_names():
-        raise ValueError(f"there is a policy called '{name}' already")
+        raise ValueError(f"a policy named '{name}' is already registered")
     if not name or not callable(make):
         raise TypeError(f"register_policy: {name!r} must be a name and {make!r} a class or a function")
     _POLICIES[name] = make

@@ -376,7 +376,7 @@ def register_task(name: str, make: Callable[[], Task]) -> None:
         make: The task class, or a function that returns a task.
     """
     if name in task_names():
-        raise ValueError(f"there is a task called '{name}' already")
+        raise ValueError(f"a task named '{name}' is already registered")
     if not name or not callable(make):
         raise TypeError(f"register_task: {name!r} must be a name and {make!r} a class or a function")
     _TASKS[name] = make

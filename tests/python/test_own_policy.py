@@ -261,7 +261,7 @@ def test_by_name(tmp_path):
     mjs.register_policy("still", lambda: FunctionPolicy(lambda obs: np.zeros((len(obs["qpos"]["joints"]), 1)), "still"))
     assert "still" in mjs.policy_names()
     assert record(tmp_path, policy="still", episodes=1).kept == 1
-    with pytest.raises(ValueError, match="there is a policy called 'planner' already"):
+    with pytest.raises(ValueError, match="a policy named 'planner' is already registered"):
         mjs.register_policy("planner", Driver)
     with pytest.raises(TypeError, match=r"policy must be a mjsense\.Policy, a function, or the name of one"):
         mjs.record("pick", policy=3, out=tmp_path)

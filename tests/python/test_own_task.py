@@ -358,7 +358,7 @@ def test_by_name():
     env = mjs.make_vec("carting", cameras=[])
     env.reset()
     env.close()
-    with pytest.raises(ValueError, match="there is a task called 'pick' already"):
+    with pytest.raises(ValueError, match="a task named 'pick' is already registered"):
         mjs.register_task("pick", Cart)
     with pytest.raises(TypeError, match=r"task must be a mjsense\.Task or the name of one"):
         mjs.make_vec(3)

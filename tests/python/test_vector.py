@@ -199,8 +199,8 @@ def test_a_step_and_the_simulation_take_turns():
 
 @pytest.mark.parametrize(
     "task,robot,text",
-    [("open", "franka", "picks, and does nothing else: task 'open' is of type 'open'"),
-     ("pick", "rby1", "wants a gripper on an arm whose joints alone move it; robot 'rby1' has none"),
+    [("open", "franka", "supports picking tasks only; task 'open' is of type 'open'"),
+     ("pick", "rby1", "needs a gripper that only the joints of an arm move; robot 'rby1' has none"),
      ("pick", "floating_rum", "robot 'floating_rum' has none")],
 )  # fmt: skip
 def test_the_planner_from_above_says_what_it_cannot(task, robot, text):

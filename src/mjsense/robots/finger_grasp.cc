@@ -37,8 +37,7 @@ std::vector<std::shared_ptr<Sensor>> finger_grasp_sensors(const Robot& robot,
     spec.shape = {1};
     spec.low = 0;
     spec.high = 1;
-    spec.description =
-        fmt::format("Both fingers of '{}' touch the object that the task is about.", gripper->name);
+    spec.description = fmt::format("Both fingers of '{}' touch the task's object.", gripper->name);
     sensors.push_back(std::make_shared<FunctionSensor<std::uint8_t>>(
         fmt::format("{}_{}_grasp_state", robot.name(),
                     gripper->name.substr(0, gripper->name.find('_'))),

@@ -28,8 +28,8 @@ void GraspStateSensor::initialize(const SensorInit& init) {
     }
     SensorSpec spec;
     spec.dtype = DType::kBool;
-    spec.description = fmt::format("'{}' touches the object, and nothing else does but grippers.",
-                                   grippers_[i].name);
+    spec.description = fmt::format(
+        "'{}' touches the object, and nothing except grippers touches it.", grippers_[i].name);
     add_field(grippers_[i].name + "/held", spec, init.num_worlds);
     spec.description = fmt::format("'{}' touches the object.", grippers_[i].name);
     add_field(grippers_[i].name + "/touching", spec, init.num_worlds);

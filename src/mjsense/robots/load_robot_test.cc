@@ -121,7 +121,7 @@ TEST_F(RobotFile, ErrorsNameFileLineAndKey) {
   EXPECT_THAT(fault(with("kind = \"arm\"", "kind = \"arn\"")),
               HasSubstr(file + ":12: groups[0].kind is 'arn': must be one of base, torso, arm"));
   EXPECT_THAT(fault(with("[0.5]", "0.5")),
-              HasSubstr(file + ":17: the value of 'groups[0].init' is of a wrong type"));
+              HasSubstr(file + ":17: the value of 'groups[0].init' has the wrong type"));
   EXPECT_THAT(fault(with("name = \"arm\"\n", "")), HasSubstr("'groups[0]': 'name' is missing"));
   EXPECT_THAT(fault(with("[0.1]", "[0.1, 0.2]")),
               HasSubstr("'arm': spread has 2 values, init has 1"));

@@ -226,8 +226,8 @@ void Robot::command(const World& world, const Action& action) {
     }
     if (wanted.size != group.command_size)
       throw ValueError(
-          fmt::format("robot '{}': move group '{}' takes {} commands, the action has {}", cfg_.name,
-                      group.name, group.command_size, wanted.size));
+          fmt::format("robot '{}': move group '{}' takes {} commands, but the action has {}",
+                      cfg_.name, group.name, group.command_size, wanted.size));
     for (int i = 0; i < wanted.size; ++i) {
       if (!std::isfinite(wanted.values[i]))
         throw ValueError(fmt::format("robot '{}': command {} of move group '{}' is {}", cfg_.name,

@@ -19,8 +19,8 @@ std::vector<std::shared_ptr<Sensor>> Robot::create_robot_sensors() const {
     sensors.push_back(std::make_shared<PoseSensor>(
         name, PoseSensor::Ref{"site", name_of(model_, mjOBJ_SITE, gripper->leaf_site)},
         PoseSensor::Ref{"body", name_of(model_, mjOBJ_BODY, base_body_)},
-        "Pose of the point between the finger tips in the robot's base frame, which stands on the "
-        "floor."));
+        "Pose of the point between the finger tips in the robot's base frame, whose origin is on "
+        "the floor."));
   }
   return sensors;
 }

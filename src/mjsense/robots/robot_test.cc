@@ -219,7 +219,7 @@ TEST_F(Franka, CommandsAreClippedAndChecked) {
     robot.command(worlds[0], action);
     FAIL();
   } catch (const ValueError& e) {
-    EXPECT_THAT(e.what(), HasSubstr("move group 'arm' takes 7 commands, the action has 6"));
+    EXPECT_THAT(e.what(), HasSubstr("move group 'arm' takes 7 commands, but the action has 6"));
   }
   target.assign(7, NAN);
   action.commands[robot.arm()].set(target);

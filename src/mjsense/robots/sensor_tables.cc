@@ -99,7 +99,7 @@ PythonSensorRef python_sensor(const toml::table& table, const std::string& path,
   }
   if (const toml::node* args = table.get("args")) {
     if (!args->is_table()) {
-      throw ValueError(fmt::format("{}: the value of '{}.args' is of a wrong type: must be a table",
+      throw ValueError(fmt::format("{}: the value of '{}.args' has the wrong type: must be a table",
                                    toml_place(path, *args), inside));
     }
     std::ostringstream text;
@@ -135,7 +135,7 @@ void take_robot_sensors(toml::table& file, const std::string& path, RobotCfg& cf
   const toml::array* list = node->as_array();
   if (!list || !list->is_homogeneous<toml::table>()) {
     throw ValueError(
-        fmt::format("{}: the value of 'sensors' is of a wrong type: must be tables, [[sensors]]",
+        fmt::format("{}: the value of 'sensors' has the wrong type: must be tables, [[sensors]]",
                     toml_place(path, *node)));
   }
   for (std::size_t i = 0; i < list->size(); ++i) {

@@ -62,8 +62,8 @@ class ActionSensor : public Sensor {
   Field& add_given(const std::string& name, const SensorInit& init) {
     SensorSpec spec;
     spec.dtype = DType::kBool;
-    spec.description =
-        fmt::format("'{}' has an action at this observation; else it reads 0.", name);
+    spec.description = fmt::format(
+        "Whether '{}' has an action at this observation; without one, its action reads 0.", name);
     return add_field("given/" + name, spec, init.num_worlds);
   }
 
@@ -109,11 +109,11 @@ class CommandedAction final : public ActionSensor<float> {
  protected:
   SensorSpec group_spec(const MoveGroup& g) const override {
     return spec_of(g.command_size, g.command_unit, "",
-                   fmt::format("The policy's command to '{}', as it gave it.", g.name));
+                   fmt::format("The policy's command to '{}', unchanged.", g.name));
   }
   void declare_more(const SensorInit& init) override {
-    verdict_ =
-        &add("success", spec_of(1, "", "", "The policy's own verdict: 1 success, 0 not."), init);
+    verdict_ = &add("success",
+                    spec_of(1, "", "", "Whether the policy itself reports success: 1 or 0."), init);
     verdict_given_ = &add_given("success", init);
   }
   bool write(const World& world, int g, std::span<float> row) override {
@@ -157,8 +157,9 @@ class JointPosRel final : public ActionSensor<double> {
 
  protected:
   SensorSpec group_spec(const MoveGroup& g) const override {
-    return spec_of(count(g.qpos), g.targets_are_qpos() ? g.target_unit : "", "",
-                   fmt::format("Target of '{}' minus its joints as observed before.", g.name));
+    return spec_of(
+        count(g.qpos), g.targets_are_qpos() ? g.target_unit : "", "",
+        fmt::format("Target of '{}' minus its previously observed joint positions.", g.name));
   }
   bool shown(const World& world) override { return is_first(world) || !terminal(task_, world); }
   bool write(const World& world, int g, std::span<double> row) override {
@@ -181,7 +182,7 @@ class EePose final : public ActionSensor<double> {
   SensorSpec group_spec(const MoveGroup& g) const override {
     const int base = task_.robot().base_body();
     return spec_of(7, "m, wxyz", "body " + name_of(task_.model(), mjOBJ_BODY, base),
-                   fmt::format("Where the targets put the leaf of '{}'.", g.name));
+                   fmt::format("Target pose of the leaf frame of '{}'.", g.name));
   }
   bool shown(const World& world) override { return !terminal(task_, world); }
   bool write(const World& world, int g, std::span<double> row) override {
@@ -197,10 +198,10 @@ class EeTwist final : public ActionSensor<double> {
  protected:
   SensorSpec group_spec(const MoveGroup& g) const override {
     if (g.target_size == 0) return {};
-    return spec_of(6, "m, rad", "the leaf as observed before",
-                   fmt::format("Twist of the leaf of '{}' to where the targets put it, per control "
-                               "step.",
-                               g.name));
+    return spec_of(
+        6, "m, rad", "the leaf frame as previously observed",
+        fmt::format("Twist of the leaf frame of '{}' to its target pose, per control step.",
+                    g.name));
   }
   bool shown(const World& world) override { return is_first(world) || !terminal(task_, world); }
   bool write(const World& world, int g, std::span<double> row) override {

@@ -84,7 +84,7 @@ SensorSuite core_suite(const Task& task, const ActionLog& log,
                          [&task](int world, int body) { return task.present(world, body); }}),
             of_task);
   suite.add(std::make_shared<JsonFunctionSensor>("task_info", kTaskInfoLength,
-                                                 "What the task says about the state.",
+                                                 "The task's information about the state.",
                                                  [&task](const World& world, JsonWriter& json) {
                                                    json.finite_only().begin_object();
                                                    task.write_info(world, json);

@@ -206,7 +206,7 @@ TEST_F(OwnTask, RegisteredTaskHasAName) {
     register_task("cart", nullptr);
     FAIL();
   } catch (const ValueError& e) {
-    EXPECT_STREQ(e.what(), "there is a task called 'cart' already");
+    EXPECT_STREQ(e.what(), "a task named 'cart' is already registered");
   }
   EXPECT_THROW(register_policy("planner", nullptr), ValueError);
   EXPECT_THROW(register_policy("", nullptr), ValueError);
@@ -219,7 +219,7 @@ TEST_F(OwnTask, PickNeedsARobot) {
     Rollout rollout(cfg);
     FAIL();
   } catch (const ValueError& e) {
-    EXPECT_STREQ(e.what(), "task 'pick' needs a robot: none is given");
+    EXPECT_STREQ(e.what(), "task 'pick' needs a robot, and none is given");
   }
 }
 

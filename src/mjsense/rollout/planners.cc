@@ -59,15 +59,15 @@ class TopDownPlanner final : public PlannerPolicy {
   void initialize(Task& task) override {
     if (!picks(task)) {
       throw ValueError(
-          fmt::format("policy '{}' picks, and does nothing else: task '{}' is of type '{}'; "
-                      "'planner' chooses the planner by the task",
+          fmt::format("policy '{}' supports picking tasks only; task '{}' is of type '{}'; policy "
+                      "'planner' selects the planner by the task's type",
                       name(), task.name(), task.type()));
     }
     if (!PickPlanner::can_use(task.robot())) {
-      throw ValueError(fmt::format(
-          "policy '{}' wants a gripper on an arm whose joints alone move it; robot '{}' "
-          "has none: 'planner' picks with any",
-          name(), task.robot().name()));
+      throw ValueError(
+          fmt::format("policy '{}' needs a gripper that only the joints of an arm move; robot '{}' "
+                      "has none: policy 'planner' picks with any gripper",
+                      name(), task.robot().name()));
     }
     above_.initialize(task);
     anywhere_.initialize(task);
@@ -149,12 +149,12 @@ class AnyPlanner final : public PlannerPolicy {
 }  // namespace
 
 void register_planner(std::string task_type, PlannerFactory make) {
-  if (task_type.empty()) throw ValueError("a planner needs the type of its tasks");
+  if (task_type.empty()) throw ValueError("the task type of a planner is empty");
   Planners& all = planners();
   const std::lock_guard lock(all.mutex);
   for (const auto& [type, factory] : all.entries) {
     if (type == task_type)
-      throw ValueError(fmt::format("there is a planner for tasks of type '{}' already", type));
+      throw ValueError(fmt::format("a planner for tasks of type '{}' is already registered", type));
   }
   all.entries.emplace_back(std::move(task_type), std::move(make));
 }
@@ -172,10 +172,10 @@ std::unique_ptr<PlannerPolicy> make_planner(const Task& task) {
   }
   if (make) return make();
   if (task.grasp_scene()) return make_manipulation();
-  throw ValueError(fmt::format(
-      "policy 'planner' cannot do task '{}': it knows tasks of type {}, and picks where "
-      "a task has a GraspScene",
-      task.name(), types));
+  throw ValueError(
+      fmt::format("policy 'planner' cannot do task '{}': it supports tasks of type {}, and picking "
+                  "in tasks with a GraspScene",
+                  task.name(), types));
 }
 
 std::unique_ptr<Policy> make_any_planner() { return std::make_unique<AnyPlanner>(); }

@@ -120,8 +120,8 @@ void require_code(const RecordJobCfg& job) {
     const auto has = [&](const auto& entry) { return entry.first.starts_with(part); };
     if (job.resume && is_own && std::ranges::none_of(cfg.code, has))
       throw ValueError(
-          fmt::format("cannot resume: the caller makes the {}, and RolloutCfg::code says nothing "
-                      "of it: it cannot be compared with the one that recorded before",
+          fmt::format("cannot resume: the {} is made by the calling program and RolloutCfg::code "
+                      "does not describe it, so it cannot be compared with that of the recording",
                       part));
   };
   require(bool{cfg.make_task}, "task");
@@ -144,8 +144,9 @@ std::string recording_settings(const RecordJobCfg& job, Rollout& rollout) {
     if (!field.is_resolved) {
       settings[field.fingerprint] = json_of(field, &job);
     } else if (!settings.contains(field.fingerprint)) {
-      throw std::logic_error(fmt::format("'{}' decides the data as '{}', which nothing writes",
-                                         field.name, field.fingerprint));
+      throw std::logic_error(
+          fmt::format("field '{}' has the fingerprint key '{}', which is not among the settings",
+                      field.name, field.fingerprint));
     }
   }
   if (!cfg.robot.empty()) settings["robot_file"] = checksums_of(task.robot);

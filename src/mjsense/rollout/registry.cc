@@ -45,7 +45,7 @@ class Registry {
     const std::lock_guard lock(mutex_);
     for (const Entry& entry : entries_) {
       if (name == entry.name)
-        throw ValueError(fmt::format("there is a {} called '{}' already", kind_, name));
+        throw ValueError(fmt::format("a {} named '{}' is already registered", kind_, name));
     }
     entries_.push_back({std::move(name), std::move(make)});
   }
@@ -94,7 +94,8 @@ std::unique_ptr<Task> any_of(std::string_view name, TaskCfg cfg) {
   if (cfg.scene.empty()) cfg.scene = default_scene(parts[0]);
   if (cfg.scene.empty() && !cfg.make_scene) {
     throw ValueError(fmt::format(
-        "task '{}': '{}' has no scene of its own that the others know: name one", name, parts[0]));
+        "task '{}': '{}' has no default scene that the other tasks can use: set the scene", name,
+        parts[0]));
   }
   std::vector<std::unique_ptr<Task>> children;
   for (const std::string& part : parts) children.push_back(tasks().at(part)(cfg));

@@ -47,8 +47,8 @@ TaskCfg task_cfg(const RolloutCfg& cfg) {
   if (cfg.meshes == "shapes") out.robot.edit_spec = {};
   if (cfg.meshes == "real" && !out.robot.edit_spec) {
     throw ValueError(
-        fmt::format("robot '{}': there are no real meshes; meshes are shapes or auto, unless an "
-                    "environment variable names their folder (see the robot's page)",
+        fmt::format("robot '{}': its real meshes were not found: set meshes to shapes or auto, or "
+                    "name their folder in the robot's environment variable (see the robot's page)",
                     cfg.robot));
   }
   out.seed = cfg.seed;
@@ -233,7 +233,7 @@ void Rollout::reseed(std::uint64_t seed) {
 void Rollout::start(std::span<const int> worlds, std::span<const std::int64_t> episodes) {
   if (worlds.size() != episodes.size()) {
     throw ValueError(
-        fmt::format("start: {} worlds for {} episodes", worlds.size(), episodes.size()));
+        fmt::format("start: {} worlds, but {} episodes", worlds.size(), episodes.size()));
   }
   if (worlds.empty()) return;
   const auto begun = Clock::now();
@@ -358,8 +358,8 @@ void Rollout::step() {
 void Rollout::step_chunk(std::span<const Action> actions, bool stop_on_success) {
   const auto B = static_cast<std::size_t>(num_worlds());
   if (actions.empty() || actions.size() % B != 0) {
-    throw ValueError(fmt::format("step_chunk: {} actions are not one or more for each of {} worlds",
-                                 actions.size(), B));
+    throw ValueError(fmt::format(
+        "step_chunk: {} actions: must be a positive multiple of the {} worlds", actions.size(), B));
   }
   const std::size_t steps = actions.size() / B;
   std::vector<double> reward(B);

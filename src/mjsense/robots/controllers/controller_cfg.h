@@ -13,14 +13,15 @@ namespace mjsense {
 
 // Without a ramp a servo jumps at every command; if the policy period is long, held objects slip.
 inline constexpr const char* kRampText =
-    "Controls go evenly from command to command, a piece every control step, instead of jumping.";
+    "The controls are interpolated linearly from one command to the next, one part per control "
+    "step, instead of jumping.";
 
 struct JointPositionCfg {
   bool ramp = false;
 };
 template <class V>
 void visit_fields(V& v, JointPositionCfg& c) {
-  v.object("JointPositionCfg", "A command is the positions that the actuators take.",
+  v.object("JointPositionCfg", "A command is the target positions of the actuators.",
            "joint_position");
   v("ramp", c.ramp, kRampText);
 }
