@@ -61,7 +61,7 @@ def test_a_function_alone_will_do(tmp_path):
     [
         (3, "scene must be the name or file of a scene"),
         (lambda: 3, r"models\(\) must return a mjsense.SceneCfg, not 3"),
-        (mjs.SceneFileCfg(name="both", models=bench, base="x.xml"), "scene 'both': code makes its models"),
+        (mjs.SceneFileCfg(name="both", models=bench, base="x.xml"), "scene 'both': a scene whose models are made by code"),
         (mjs.SceneFileCfg(name="lost", models=bench, regions=[mjs.SceneRegionCfg(name="r", on="bench/tip")]), "bench/top"),
     ],
 )
@@ -109,7 +109,7 @@ def test_frozen_cameras_stand_where_they_stood(tmp_path):
 
 def test_what_frozen_cameras_lack_is_said(tmp_path):
     file = tmp_path / "cameras.json"
-    for text, message in (("[]", "must be JSON, cameras by name"), ('{"eye": {"pos": [1, 2]}}', "'eye': 'pos' must be 3 numbers"),
+    for text, message in (("[]", "must be a JSON object of cameras by name"), ('{"eye": {"pos": [1, 2]}}', "'eye': 'pos' must be 3 numbers"),
                           ('{"eye": {"pos": [1, 2, 3], "fovy": 4, "quat": [1, 0, 0, 0], "body": "desk"}}', "body 'desk' is .* robot")):  # fmt: skip
         file.write_text(text)
         with pytest.raises(ValueError, match=message):

@@ -113,7 +113,7 @@ void check_nothing_lost(const std::vector<Census>& child, const std::vector<Cens
       return std::none_of(now.begin(), now.end(), [&](auto& n) { return n.ends_with("/" + name); });
     });
     throw ValueError(fmt::format(
-        "{}: its {} '{}' cannot be attached: what it refers to is not in its model", place,
+        "{}: its {} '{}' cannot be attached: it refers to an element outside its model", place,
         obj_type_name(child[i].type), lost == child[i].names.end() ? "" : *lost));
   }
 }
@@ -165,7 +165,7 @@ Pose set_pose(mjsBody* body, const EntityCfg& cfg, const mjSpec* spec, const std
 
 void validate(const EntityCfg& cfg, std::string_view place) {
   if (!(squared_norm(cfg.quat) > 1e-12)) {
-    throw ValueError(fmt::format("{}: quat ({}) is no rotation; expected w, x, y, z", place,
+    throw ValueError(fmt::format("{}: quat ({}) is not a rotation; expected w, x, y, z", place,
                                  fmt::join(cfg.quat, ", ")));
   }
   for (const auto& [pattern, value] : cfg.joint_pos)

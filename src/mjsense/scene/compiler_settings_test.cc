@@ -328,7 +328,8 @@ TEST(CompilerSettings, SettingsOfTheBaseDoNotAffectEntities) {
     EXPECT_THAT(
         [&] { scene(fmt::format("{}='{}'", setting, setting[0] == 's' ? "7" : "true"), false); },
         ThrowsMessage<ValueError>(HasSubstr(fmt::format(
-            "scene base: its <compiler> sets {}, which would act on what is attached", setting))));
+            "scene base: its <compiler> sets {}, which would also affect the attached entities",
+            setting))));
   }
   // Bounds apply to the base's own bodies only.
   const double plain = compile_text(robot(""), kAssets)->body_subtreemass[0],

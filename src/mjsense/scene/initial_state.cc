@@ -107,8 +107,8 @@ class Merger {
   void put(const std::vector<double>& values, mjtNum* target, Run run, int width,
            const char* field) const {
     if (static_cast<int>(values.size()) > run.size * width) {
-      throw ValueError(fmt::format("{}: its keyframe has {} values of {}, its model {}", place_,
-                                   values.size(), field, run.size * width));
+      throw ValueError(fmt::format("{}: its keyframe has {} values of {}, but its model has {}",
+                                   place_, values.size(), field, run.size * width));
     }
     if (run.size > 0) std::copy(values.begin(), values.end(), target + run.start * width);
   }

@@ -42,8 +42,8 @@ void check_model(const mjModel* m, std::vector<std::string>& warnings) {
         fmt::format("scene: timestep is {}: must be a positive number of seconds", timestep));
   if (timestep > kLongestTimestep)
     warnings.push_back(
-        fmt::format("scene: a timestep of {} s is long: contacts need 0.001 to 0.02 s, and motion "
-                    "in longer steps is not to be trusted",
+        fmt::format("scene: a timestep of {} s is long: contacts need 0.001 to 0.02 s, and the "
+                    "motion is unreliable with longer steps",
                     timestep));
   mjtObj type = mjOBJ_BODY;
 #define X(T, field, nr, nc) check_field(m, type, #field, m->field, m->nr, nc);

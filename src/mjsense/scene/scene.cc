@@ -26,10 +26,10 @@ void check_name(const std::string& name, bool has_terrain, const std::vector<Att
   if (name.find('/') != std::string::npos)
     throw ValueError(fmt::format("entity '{}': '/' is not allowed in a name", name));
   if (has_terrain && name == "terrain")
-    throw ValueError("entity 'terrain': the name is taken by the scene's terrain");
+    throw ValueError("entity 'terrain': the name is reserved for the scene's terrain");
   for (const Attached& other : before) {
     if (other.name == name)
-      throw ValueError(fmt::format("entity '{}': there are two of this name", name));
+      throw ValueError(fmt::format("entity '{}': two entities have this name", name));
   }
 }
 
@@ -120,9 +120,8 @@ void Scene::Impl::check_base_alone() {
   const std::vector<std::string> settings = whole_model_settings(spec.get());
   if (settings.empty() || (!cfg.terrain && cfg.entities.empty())) return;
   throw ValueError(
-      fmt::format("scene base: its <compiler> sets {}, which would act on what is attached to it "
-                  "too; make it an "
-                  "entity, or remove the setting",
+      fmt::format("scene base: its <compiler> sets {}, which would also affect the attached "
+                  "entities; make it an entity, or remove the setting",
                   fmt::join(settings, ", ")));
 }
 
@@ -153,12 +152,12 @@ void Scene::Impl::add(std::unique_ptr<Sensor> sensor) {
   for (const auto& other : sensors) {
     if (other->name() == key) {
       throw ValueError(
-          fmt::format("sensor '{}': already exists in the scene; two sensors of one name", key));
+          fmt::format("sensor '{}': already exists in the scene; two sensors have this name", key));
     }
   }
   for (const Attached& entity : attached) {
     if (entity.name == key) {
-      warnings.push_back(fmt::format("sensor '{}' hides the entity of the same name", key));
+      warnings.push_back(fmt::format("sensor '{}' has the same name as an entity", key));
     }
   }
   sensors.push_back(std::move(sensor));
@@ -224,9 +223,8 @@ void Scene::set_options(const OptionsCfg& options) {
 std::shared_ptr<void> Scene::claim() {
   if (!impl_->claim.expired()) {
     throw RuntimeError(
-        "this scene belongs to a simulation already, whose rows its sensors hold: make another "
-        "Scene "
-        "of the same configuration");
+        "this scene belongs to a simulation already; create another Scene from the same "
+        "configuration");
   }
   std::shared_ptr<void> claim = std::make_shared<char>();
   impl_->claim = claim;

@@ -94,12 +94,12 @@ TEST(Scene, SaysWhatIsWrongWithAnEntity) {
   EXPECT_EQ(fault("", xml(kBall)), "scene: an entity needs a name");
   EXPECT_EQ(fault("a/b", xml(kBall)), "entity 'a/b': '/' is not allowed in a name");
   EXPECT_THAT(fault("a", {.model = {.xml = kBall}, .quat = {0, 0, 0, 0}}),
-              HasSubstr("no rotation"));
+              HasSubstr("not a rotation"));
   EXPECT_THAT(
       fault("a", {.model = {.xml = "<mujoco><worldbody><geom size='.1'/></worldbody></mujoco>"},
                   .quat = {0, 0, 0, 0},
                   .mocap_base = false}),
-      HasSubstr("no rotation"));
+      HasSubstr("not a rotation"));
   EXPECT_THAT(
       fault("x", xml("<mujoco><worldbody><body name='a'><freejoint/><geom size='.1'/></body><body "
                      "name='b'><freejoint/><geom size='.1'/></body></worldbody></mujoco>")),
@@ -109,12 +109,12 @@ TEST(Scene, SaysWhatIsWrongWithAnEntity) {
             "entity 'a': joint_pos: 'sholder' matches no hinge or slide; did you mean 'shoulder'?");
   SceneCfg twice;
   twice.entities = {{"a", xml(kBall)}, {"a", xml(kBall)}};
-  EXPECT_EQ(fault(std::move(twice)), "entity 'a': there are two of this name");
+  EXPECT_EQ(fault(std::move(twice)), "entity 'a': two entities have this name");
   SceneCfg terrain;
   terrain.terrain.emplace();
   terrain.entities = {{"terrain", xml(kBall)}};
   EXPECT_EQ(fault(std::move(terrain)),
-            "entity 'terrain': the name is taken by the scene's terrain");
+            "entity 'terrain': the name is reserved for the scene's terrain");
 }
 
 // MuJoCo compiles these models; at most it warns that there is a NaN.

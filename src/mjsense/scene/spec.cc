@@ -78,7 +78,7 @@ void Vfs::add(const std::string& name, std::string_view bytes, std::string_view 
   const int failed =
       mj_addBufferVFS(&vfs_, name.c_str(), it->second.data(), static_cast<int>(it->second.size()));
   if (failed)
-    throw ValueError(fmt::format("{}: MuJoCo did not take the asset '{}' ({} bytes)", place, name,
+    throw ValueError(fmt::format("{}: MuJoCo did not accept the asset '{}' ({} bytes)", place, name,
                                  bytes.size()));
 }
 
@@ -88,7 +88,7 @@ SpecPtr parse_model(const ModelSource& source, std::string_view place) {
   for (const auto& [name, bytes] : source.assets) vfs.add(name, bytes, place);
   if (source.spec) {
     if (!source.path.empty() || !source.xml.empty())
-      throw ValueError(fmt::format("{}: give a spec, a path or an XML text, only one", place));
+      throw ValueError(fmt::format("{}: give only one of a spec, a path and an XML text", place));
     return checked(call_mujoco(mj_copySpec, source.spec), "MuJoCo cannot copy its spec", place);
   }
   if (!source.xml.empty()) {

@@ -93,9 +93,8 @@ std::string model_path(const std::string& name, std::string_view place) {
     there = there || fs::is_directory(folder / package, ignored);
   }
   throw ValueError(
-      fmt::format("{}: {} '{}': pip install {} (outside of Python the environment variable "
-                  "MJSENSE_PACKAGES lists "
-                  "the site-packages folders to look in)",
+      fmt::format("{}: {} '{}': pip install {} (outside of Python, the environment variable "
+                  "MJSENSE_PACKAGES lists the site-packages folders to look in)",
                   place, there ? "the installed package does not have" : "no installed package has",
                   inside, distribution(package)));
 }

@@ -122,9 +122,8 @@ LevelBox surface_named(const mjModel* m, const std::string& name, const std::str
   const std::optional<LevelBox> box =
       of_body ? highest_box(m, body) : level_box(m, resolve(m, mjOBJ_GEOM, name, who));
   if (box) return *box;
-  throw ValueError(
-      of_body ? fmt::format("{}: body '{}' has no level box that does not move", who, name)
-              : fmt::format("{}: geom '{}' must be a level box that does not move", who, name));
+  throw ValueError(of_body ? fmt::format("{}: body '{}' has no level, fixed box", who, name)
+                           : fmt::format("{}: geom '{}' must be a level, fixed box", who, name));
 }
 
 }  // namespace
@@ -258,9 +257,8 @@ void EpisodeScene::find_objects(std::string_view robot_prefix) {
     };
     if (is_placed(entity) && std::ranges::none_of(objects_, of_entity)) {
       throw ValueError(fmt::format(
-          "{}: entity '{}' is {}, so that nothing places it: give its pos, or leave it out",
-          place(), entity.name,
-          cfg_.objects.empty() ? "nothing that a hand can hold" : "none of the objects"));
+          "{}: entity '{}' is {}, so its position is undefined: set its pos, or remove it", place(),
+          entity.name, cfg_.objects.empty() ? "not graspable" : "not among the objects"));
     }
   }
 }

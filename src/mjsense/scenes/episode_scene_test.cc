@@ -285,8 +285,7 @@ TEST(EpisodeScene, FreeEntityThatIsNotPlacedThrows) {
     Played played(files.cfg);
     ADD_FAILURE() << "nothing said";
   } catch (const ValueError& e) {
-    EXPECT_THAT(e.what(),
-                HasSubstr("scene 'two_tables': entity 'sofa' is nothing that a hand can hold"));
+    EXPECT_THAT(e.what(), HasSubstr("scene 'two_tables': entity 'sofa' is not graspable"));
   }
   files.cfg.entities.back().pos = {-2, -2, .4};
   EXPECT_NO_THROW(Played played(files.cfg));
@@ -384,13 +383,10 @@ TEST(EpisodeScene, FaultsNameWhatIsWrong) {
               HasSubstr("scene 'two_tables', region 'table': no geom named 'room/tap'; did you "
                         "mean 'room/top'?"));
   EXPECT_THAT(fault([](auto& c) { c.regions[0].on = "a/cube"; }),
-              HasSubstr("body 'a/cube' has no level box that does not move"));
+              HasSubstr("body 'a/cube' has no level, fixed box"));
   EXPECT_THAT(fault([](auto& c) { c.objects = {{"room/table"}}; }), HasSubstr("has no free joint"));
   EXPECT_THAT(fault([](auto& c) { c.count = {3, 1}; }), HasSubstr("count is 3, 1"));
-  EXPECT_THAT(fault([](auto& c) {
-                c.regions[0].area = {1, 0, 0, 1};
-              }),
-              HasSubstr("least x, most x"));
+  EXPECT_THAT(fault([](auto& c) { c.regions[0].area = {1, 0, 0, 1}; }), HasSubstr("min x, max x"));
   EXPECT_THAT(fault([](auto& c) {
                 SceneVaryCfg vary;
                 vary.pattern = "rom/.*";

@@ -22,7 +22,7 @@ void read(const DataFile& file, SceneFileCfg& cfg, int depth) {
   read_toml_fields(file.text, file.path, own);
   if (!own.extends.empty()) {
     if (depth == kMostBases)
-      throw ValueError(fmt::format("{}: extends goes round in a circle", file.path));
+      throw ValueError(fmt::format("{}: the scenes extend each other in a cycle", file.path));
     const bool is_path = own.extends.ends_with(".toml");
     read(kScenes.find(is_path ? beside(file.path, own.extends) : own.extends), cfg, depth + 1);
   }
@@ -63,7 +63,7 @@ SceneFileCfg load_scene(std::string_view name) {
   }
   if (house) cfg.house = *house;
   if (cfg.generator.empty() && (house || cfg.house > 0 || !cfg.parameters.empty()))
-    throw ValueError(fmt::format("scene '{}' has no generator: {} mean nothing", name,
+    throw ValueError(fmt::format("scene '{}' has no generator, so {} have no effect", name,
                                  cfg.parameters.empty() ? "houses" : "parameters"));
   check_fields(cfg, fmt::format("scene '{}'", name));
   return cfg;

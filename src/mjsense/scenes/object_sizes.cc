@@ -66,9 +66,9 @@ ObjectSizes::ObjectSizes(Simulation& simulation, std::span<const int> bodies,
     for (int b = bodies[i]; b < m_->nbody; ++b) {
       if (!is_below(m_, b, bodies[i])) continue;
       if (b != bodies[i] && m_->body_jntnum[b] > 0)
-        throw ValueError(
-            fmt::format("{}: object '{}' has a part that moves, '{}': it has one size, [1, 1]",
-                        place, name_of(m_, mjOBJ_BODY, bodies[i]), name_of(m_, mjOBJ_BODY, b)));
+        throw ValueError(fmt::format(
+            "{}: object '{}' has a moving part, '{}', so it cannot be scaled: sizes must be [1, 1]",
+            place, name_of(m_, mjOBJ_BODY, bodies[i]), name_of(m_, mjOBJ_BODY, b)));
       object.bodies.push_back(b);
     }
     for (int s = 0; s < m_->nsite; ++s) {

@@ -297,7 +297,7 @@ TEST(ObjectSizes, FaultsNameWhatIsWrong) {
   EXPECT_THAT(fault([](Files& f) {
                 f.cfg.sizes = {1.2, .8};
               }),
-              HasSubstr("scene 'one_table': sizes is 1.2, 0.8: least, most"));
+              HasSubstr("scene 'one_table': sizes is 1.2, 0.8: must be minimum, maximum"));
   EXPECT_THAT(fault([](Files& f) {
                 f.cfg.objects[1].sizes = {2, 1};
               }),
@@ -309,14 +309,14 @@ TEST(ObjectSizes, FaultsNameWhatIsWrong) {
                         "<body name='lid'><joint/><geom size='.01'/></body></body></worldbody>"
                         "</mujoco>");
               }),
-              HasSubstr("object 'b/ball' has a part that moves, 'b/lid'"));
+              HasSubstr("object 'b/ball' has a moving part, 'b/lid'"));
   EXPECT_THAT(fault([](Files& f) {
                 SceneVaryCfg ball;
                 ball.what = VaryKind::kBody;
                 ball.pattern = "b/ball";
                 f.cfg.vary = {ball};
               }),
-              HasSubstr("vary body: body 'b/ball' moves by itself"));
+              HasSubstr("vary body: body 'b/ball' is not a fixed body"));
   EXPECT_THAT(fault([](Files& f) {
                 SceneVaryCfg table;
                 table.what = VaryKind::kBody;
@@ -324,7 +324,7 @@ TEST(ObjectSizes, FaultsNameWhatIsWrong) {
                 table.hue = 10;
                 f.cfg.vary = {table};
               }),
-              HasSubstr("hue and saturation are not for bodies"));
+              HasSubstr("hue and saturation do not apply to bodies"));
 }
 
 }  // namespace

@@ -185,7 +185,7 @@ Occupancy::Occupancy(const mjModel* m, const mjData* d, const std::function<bool
     }
     if (!outline.empty()) outlines.push_back(hull(std::move(outline)));
   }
-  if (low[0] > high[0]) throw ValueError("occupancy: the model has nothing that touches");
+  if (low[0] > high[0]) throw ValueError("occupancy: the model has no collision geom");
   x0_ = low[0] - cfg.margin;
   y0_ = low[1] - cfg.margin;
   columns_ = std::max(1, static_cast<int>(std::ceil((high[0] + cfg.margin - x0_) / cell_)));

@@ -11,13 +11,14 @@ namespace {
 void check_area(const std::array<double, 4>& area, const std::string& who) {
   if (area == std::array<double, 4>{}) return;
   if (!(area[0] <= area[1] && area[2] <= area[3]))
-    throw ValueError(fmt::format("{} is {}, {}, {}, {}: least x, most x, least y, most y", who,
+    throw ValueError(fmt::format("{} is {}, {}, {}, {}: must be min x, max x, min y, max y", who,
                                  area[0], area[1], area[2], area[3]));
 }
 
 void check_sizes(const std::array<double, 2>& sizes, const std::string& who) {
   if (sizes[0] > sizes[1])
-    throw ValueError(fmt::format("{}: sizes is {}, {}: least, most", who, sizes[0], sizes[1]));
+    throw ValueError(
+        fmt::format("{}: sizes is {}, {}: must be minimum, maximum", who, sizes[0], sizes[1]));
 }
 
 }  // namespace
@@ -26,16 +27,20 @@ void validate(const SceneFileCfg& cfg, std::string_view place) {
   const std::string who = fmt::format("{}{}scene '{}'", place, place.empty() ? "" : ", ", cfg.name);
   if (cfg.name.empty()) throw ValueError(who + ": it has no name");
   if (!cfg.generator.empty() && !cfg.base.empty())
-    throw ValueError(who + ": it has a generator and a base; a generated room is an entity");
+    throw ValueError(
+        who +
+        ": it has both a generator and a base; a generated room is an entity, so remove the base");
   if (cfg.models && !(cfg.base.empty() && cfg.entities.empty() && cfg.generator.empty()))
-    throw ValueError(who + ": code makes its models: no base, entities or generator, too");
+    throw ValueError(
+        who +
+        ": a scene whose models are made by code cannot also have base, entities or a generator");
   for (std::size_t i = 0; i < cfg.entities.size(); ++i) {
     if (!cfg.generator.empty() && cfg.entities[i].name == "room")
-      throw ValueError(who + ": entity 'room' is the one that its generator makes");
+      throw ValueError(who +
+                       ": the name 'room' is reserved for the entity that the generator makes");
     for (std::size_t k = 0; k < i; ++k) {
       if (cfg.entities[i].name == cfg.entities[k].name)
-        throw ValueError(
-            fmt::format("{}: two entities are called '{}'", who, cfg.entities[i].name));
+        throw ValueError(fmt::format("{}: two entities are named '{}'", who, cfg.entities[i].name));
     }
   }
   for (const SceneRegionCfg& region : cfg.regions) {
@@ -45,8 +50,9 @@ void validate(const SceneFileCfg& cfg, std::string_view place) {
                  fmt::format("{}, region '{}': target_area", who, region.name));
   }
   if (cfg.count[0] > cfg.count[1] || cfg.count[0] == 0 || cfg.count[0] < -1)
-    throw ValueError(fmt::format("{}: count is {}, {}: least, most, from 1 on (or -1, -1)", who,
-                                 cfg.count[0], cfg.count[1]));
+    throw ValueError(
+        fmt::format("{}: count is {}, {}: must be minimum, maximum, at least 1 (or -1, -1)", who,
+                    cfg.count[0], cfg.count[1]));
   check_sizes(cfg.sizes, who);
   for (const SceneObjectCfg& object : cfg.objects) {
     if (object.sizes) check_sizes(*object.sizes, fmt::format("{}, object '{}'", who, object.body));
@@ -54,17 +60,17 @@ void validate(const SceneFileCfg& cfg, std::string_view place) {
   for (const SceneVaryCfg& vary : cfg.vary) {
     const std::string what = fmt::format("{}, vary {} '{}'", who, vary.what.text(), vary.pattern);
     if (vary.brightness[0] > vary.brightness[1])
-      throw ValueError(fmt::format("{}: brightness is from {} to {}: least first", what,
-                                   vary.brightness[0], vary.brightness[1]));
+      throw ValueError(fmt::format("{}: brightness is from {} to {}: the minimum must come first",
+                                   what, vary.brightness[0], vary.brightness[1]));
     if (vary.what != VaryKind::kMaterial && !vary.textures.empty())
-      throw ValueError(what + ": textures are for materials");
+      throw ValueError(what + ": textures apply to materials only");
     const bool stands = vary.what == VaryKind::kLight || vary.what == VaryKind::kBody;
     if (!stands && (vary.pos != std::array<double, 3>{} || vary.angle > 0))
-      throw ValueError(what + ": pos and angle are for lights and bodies");
+      throw ValueError(what + ": pos and angle apply to lights and bodies only");
     const bool colours =
         vary.brightness != std::array<double, 2>{1, 1} || vary.hue > 0 || vary.saturation > 0;
     if (vary.what == VaryKind::kBody && colours)
-      throw ValueError(what + ": brightness, hue and saturation are not for bodies");
+      throw ValueError(what + ": brightness, hue and saturation do not apply to bodies");
   }
 }
 

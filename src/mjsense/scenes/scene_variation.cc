@@ -102,7 +102,7 @@ SceneVariation::SceneVariation(std::vector<SceneVaryCfg> cfg, Simulation& simula
       for (int id : part.ids) {
         // The pose of a mocap body is part of the state.
         if (model_->body_treeid[id] >= 0 || model_->body_mocapid[id] >= 0 || id == 0)
-          throw ValueError(fmt::format("{}: body '{}' moves by itself", who, names[id]));
+          throw ValueError(fmt::format("{}: body '{}' is not a fixed body", who, names[id]));
       }
       body_pos_ = expand(batch, "body_pos", body_pos_);
       body_quat_ = expand(batch, "body_quat", body_quat_);

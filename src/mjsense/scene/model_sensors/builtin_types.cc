@@ -128,7 +128,7 @@ const BuiltinType& builtin_type(mjtSensor type) {
   for (const BuiltinType& t : kTypes) {
     if (t.type == type) return t;
   }
-  throw RuntimeError("MuJoCo has a sensor type that mjsense does not know: number " +
+  throw RuntimeError("MuJoCo has a sensor type that mjsense does not support: number " +
                      std::to_string(type));
 }
 

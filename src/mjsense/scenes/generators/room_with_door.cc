@@ -127,12 +127,12 @@ ModelSource make(GeneratorInput& input, SceneFileCfg& cfg) {
 }  // namespace
 
 Generator room_with_door_generator() {
-  return {
-      "room_with_door",
-      "Two furnished rooms and the door between them, with a lever and a latch.",
-      {{"door_width", 0, "Width (m) of the leaf; 0: drawn."},
-       {"hinge_left", 0, "1: the hinge is on the left of who pushes, -1: on the right; 0: drawn."}},
-      make};
+  return {"room_with_door",
+          "Two furnished rooms and the door between them, with a lever and a latch.",
+          {{"door_width", 0, "Width (m) of the leaf; 0: drawn."},
+           {"hinge_left", 0,
+            "1: the hinge is on the left when pushing the door, -1: on the right; 0: drawn."}},
+          make};
 }
 
 }  // namespace mjsense

@@ -33,9 +33,9 @@ void DoorOpeningTask::initialize_task() {
   ObjectTask::initialize_task();
   doors_ = find_doors(model(), robot().prefix());
   if (doors_.empty())
-    throw ValueError(fmt::format(
-        "{} has no door: no body higher than {} m on a hinge about the vertical with a range",
-        place(), Door::kLeastHeight));
+    throw ValueError(
+        fmt::format("{} has no door: no body higher than {} m on a vertical hinge with a range",
+                    place(), Door::kLeastHeight));
   const RestingRobot rest(model(), robot());
   sides_.clear();
   for (const Door& door : doors_)

@@ -64,8 +64,8 @@ std::vector<std::shared_ptr<Sensor>> DoorOpeningTask::create_task_sensors() cons
         side_of(group) + "_tcp_pose",
         PoseSensor::Ref{"site", mjsense::name_of(model(), mjOBJ_SITE, group.leaf_site)},
         PoseSensor::Ref{"body", mjsense::name_of(model(), mjOBJ_BODY, robot().base_body())},
-        "Pose of the point between the finger tips in the robot's base frame, which stands on the "
-        "floor."));
+        "Pose of the point between the finger tips in the robot's base frame, whose origin is on "
+        "the floor."));
   }
   if (auto grasped = grasp_state_sensor(*this, std::string(kRole)))
     sensors.push_back(std::move(grasped));

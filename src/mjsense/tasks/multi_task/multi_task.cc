@@ -13,15 +13,15 @@ MultiTask::MultiTask(std::string name, TaskCfg cfg, std::vector<std::unique_ptr<
     : Task(std::move(cfg)), name_(std::move(name)), children_(std::move(children)) {
   if (size() < 2)
     throw ValueError(
-        fmt::format("task '{}' is made of {} task, at least two are needed", name_, size()));
+        fmt::format("task '{}' consists of {} task, at least two are required", name_, size()));
   for (int i = 0; i < size(); ++i) {
     const TaskCfg& own = children_[i]->cfg();
     if (own.scene != this->cfg().scene || own.robot.name != this->cfg().robot.name)
-      throw ValueError(fmt::format(
-          "task '{}': its task '{}' plays in scene '{}' with robot '{}', it itself in '{}' with "
-          "'{}'",
-          name_, children_[i]->name(), own.scene, own.robot.name, this->cfg().scene,
-          this->cfg().robot.name));
+      throw ValueError(
+          fmt::format("task '{}': its task '{}' has scene '{}' and robot '{}', but the combined "
+                      "task has '{}' and '{}'",
+                      name_, children_[i]->name(), own.scene, own.robot.name, this->cfg().scene,
+                      this->cfg().robot.name));
     const std::string base(children_[i]->name());
     std::string unique = base;
     for (int n = 2; std::ranges::count(names_, unique, &std::pair<std::string, int>::first) > 0;

@@ -207,7 +207,7 @@ TEST(MultiTask, SaysWhatCannotBe) {
   EXPECT_THAT(message(std::move(one)), HasSubstr("1 task, at least two"));
   two.push_back(std::make_unique<PickTask>(cfg("floor")));
   two.push_back(std::make_unique<PickTask>(cfg("table")));
-  EXPECT_THAT(message(std::move(two)), HasSubstr("in scene 'table'"));
+  EXPECT_THAT(message(std::move(two)), HasSubstr("has scene 'table'"));
 }
 
 TEST(MultiTask, ATaskThatMovesThingsMustBeTheFirst) {

@@ -40,16 +40,15 @@ void NavToObjTask::find_camera() {
     sight_ = Sight(model(), id, cfg.image_width, cfg.image_height);
     return;
   }
-  throw ValueError(
-      fmt::format("task 'nav_to_obj': robot '{}' has no camera, neither '{}' nor another",
-                  robot().name(), kCamera));
+  throw ValueError(fmt::format("task 'nav_to_obj': robot '{}' has no camera, such as '{}'",
+                               robot().name(), kCamera));
 }
 
 void NavToObjTask::initialize_task() {
   ObjectTask::initialize_task();
   if (scene().objects().empty())
-    throw ValueError(fmt::format(
-        "{} has nothing to drive to: no body with a free joint that a hand can hold", place()));
+    throw ValueError(
+        fmt::format("{} has no object to drive to: no graspable body with a free joint", place()));
   find_camera();
   points_.clear();
   for (const SceneObject& object : scene().objects())
@@ -138,8 +137,7 @@ std::string NavToObjTask::start_fault(const World& world) const {
   if (!fault.empty()) return fault;
   if (!alone(world.id, targets_[world.id]))
     return fmt::format(
-        "{} has several objects called '{}' and none whose text names it alone: give them "
-        "different "
+        "{} has several objects named '{}', none of which has a unique text: give them different "
         "texts",
         place(), object(world.id).name);
   if (!routes_) return "";
@@ -155,8 +153,8 @@ std::string NavToObjTask::start_fault(const World& world) const {
   if (!routes_->find({base.p.x, base.p.y, std::atan2(ahead.y, ahead.x)}, seen, left).empty())
     return "";
   return fmt::format(
-      "task '{}': robot '{}' sees no {} in scene '{}' from anywhere that it can drive to", name(),
-      robot().name(), object(world.id).name, scene().cfg().name);
+      "task '{}': robot '{}' cannot see the {} in scene '{}' from any base pose that it can reach",
+      name(), robot().name(), object(world.id).name, scene().cfg().name);
 }
 
 double NavToObjTask::distance(const World& world, double x, double y) const {

@@ -64,9 +64,9 @@ TEST_F(Nav, WhatIsSeenFromNowhereIsNoTarget) {
   const int body = task.objects(0)[0].body;
   data->qpos[model->jnt_qposadr[model->body_jntadr[body]] + 2] = 10;  // above the ceiling
   mj_forward(model, data.get());
-  EXPECT_EQ(task.start_fault(world), "task 'nav_to_obj': robot 'rby1' sees no " +
+  EXPECT_EQ(task.start_fault(world), "task 'nav_to_obj': robot 'rby1' cannot see the " +
                                          task.objects(0)[0].name +
-                                         " in scene 'floor' from anywhere that it can drive to");
+                                         " in scene 'floor' from any base pose that it can reach");
 }
 
 TEST_F(Nav, WhatStandsBehindSomethingIsNotSeen) {

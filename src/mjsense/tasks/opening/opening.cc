@@ -33,7 +33,7 @@ void OpeningTask::initialize_task() {
   articulations_ = find_articulations(model(), robot_entity() + "/");
   if (articulations_.empty())
     throw ValueError(fmt::format(
-        "{} has nothing that opens: no hinge or slide with a range and a handle", place()));
+        "{} has nothing to open: no hinge or slide joint with a range and a handle", place()));
   reach_ = std::make_unique<HandleReach>(model(), robot());
   const std::unique_ptr<mjData, decltype(&mj_deleteData)> data(call_mujoco(mj_makeData, model()),
                                                                mj_deleteData);
@@ -139,7 +139,8 @@ std::string OpeningTask::start_fault(const World& world) const {
   const Target& target = targets_[world.id];
   if (target.reached) return "";
   return fmt::format(
-      "task '{}': robot '{}' reaches no handle in scene '{}' from anywhere; last tried '{}'",
+      "task '{}': robot '{}' cannot reach a handle in scene '{}' from any base pose; the last one "
+      "tried was '{}'",
       name(), robot().name(), scene().cfg().name, articulations_[target.index].name);
 }
 

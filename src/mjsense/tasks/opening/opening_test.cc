@@ -416,9 +416,9 @@ TEST(Opening, WhatAnArmComesNearIsThatOfItsWorld) {
 TEST(Opening, ErrorsSayWhatIsMissing) {
   try {
     Stage stage(franka("table"), OpeningKind::kOpen);
-    FAIL() << "a table has nothing that opens";
+    FAIL() << "a table has nothing to open";
   } catch (const ValueError& e) {
-    EXPECT_THAT(e.what(), HasSubstr("task 'open': scene 'table' has nothing that opens"));
+    EXPECT_THAT(e.what(), HasSubstr("task 'open': scene 'table' has nothing to open"));
   }
 }
 

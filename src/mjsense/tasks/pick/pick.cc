@@ -28,8 +28,8 @@ void PickTask::initialize_task() {
   ObjectTask::initialize_task();
   things_ = scene().things();
   if (things_.empty())
-    throw ValueError(fmt::format(
-        "{} has nothing to pick up: no body with a free joint that a hand can hold", place()));
+    throw ValueError(
+        fmt::format("{} has no object to pick up: no graspable body with a free joint", place()));
   objects_.clear();
   for (const SceneObject& object : scene().objects())
     objects_.push_back({object.body, object.kind, object.shape});
@@ -96,7 +96,7 @@ std::string_view PickTask::lacks(const World& world) const {
     const int root1 = m->body_rootid[m->geom_bodyid[contact.geom[1]]];
     if ((root0 == body) == (root1 == body)) continue;
     if ((root0 == body ? root1 : root0) != robot_root_)
-      return "something besides the robot touches the object";
+      return "something other than the robot touches the object";
     held = true;
   }
   return held ? "" : "the robot does not touch the object";

@@ -157,7 +157,7 @@ TEST_F(Pick, SuccessNeedsTheRobotsTouchAlone) {
   }
   ASSERT_TRUE(touching);
   EXPECT_FALSE(task.evaluate(w).success);
-  EXPECT_EQ(task.evaluate(w).lacks, "something besides the robot touches the object");
+  EXPECT_EQ(task.evaluate(w).lacks, "something other than the robot touches the object");
   write_vec(before, q);
   mj_forward(model, data.get());
   EXPECT_TRUE(task.evaluate(w).success);

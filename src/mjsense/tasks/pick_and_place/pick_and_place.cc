@@ -58,14 +58,14 @@ void PickAndPlaceTask::initialize_task() {
   SceneTask::initialize_task();
   const std::string place = this->place();
   if (scene().things().empty())
-    throw ValueError(fmt::format(
-        "{} has nothing to pick up: no body with a free joint that a hand can hold", place));
+    throw ValueError(
+        fmt::format("{} has no object to pick up: no graspable body with a free joint", place));
   if (kind_ == PlaceKind::kNextTo) {
     if (scene().objects().size() < 2)
-      throw ValueError(fmt::format("{} has one object; there is nothing to put it next to", place));
+      throw ValueError(fmt::format("{} has only one object; at least two are needed", place));
   } else if (scene().receptacles().empty()) {
     throw ValueError(
-        fmt::format("{} has no receptacle: none of its objects says receptacle = true", place));
+        fmt::format("{} has no receptacle: none of its objects has receptacle = true", place));
   }
   objects_.clear();
   for (const SceneObject& object : scene().objects())
@@ -73,11 +73,11 @@ void PickAndPlaceTask::initialize_task() {
   if (kind_ == PlaceKind::kColor || kind_ == PlaceKind::kPacking) {
     Rng any(0, 0, 0, 0);
     if (choose(0, any).empty())
-      throw ValueError(
-          fmt::format("{} {}", place,
-                      kind_ == PlaceKind::kColor
-                          ? "has no two receptacles of one kind (other_texts) with different colors"
-                          : "has no receptacle whose kind is a box"));
+      throw ValueError(fmt::format(
+          "{} {}", place,
+          kind_ == PlaceKind::kColor
+              ? "does not have two receptacles of the same kind (other_texts) with different colors"
+              : "has no receptacle that is a box (text or other_texts)"));
   }
   episodes_.assign(num_worlds(), {});
   for (Episode& episode : episodes_) {
@@ -199,7 +199,7 @@ std::string_view PickAndPlaceTask::lacks_beside(const World& world, const Judgem
   const int under = bearer(world, object), under_other = bearer(world, other);
   const bool together = under >= 0 && under_other >= 0 ? under == under_other
                                                        : std::abs(a.low.z - b.low.z) <= kSameHeight;
-  return together ? "" : "the two do not stand on the same thing";
+  return together ? "" : "the two objects are not on the same support";
 }
 
 std::string PickAndPlaceTask::start_fault(const World& world) const {
@@ -209,7 +209,7 @@ std::string PickAndPlaceTask::start_fault(const World& world) const {
   const double gap =
       gap_from_above(world_box(world, objects[0].body), world_box(world, objects[1].body));
   if (gap < 0 || gap > kBeside) return "";
-  return fmt::format("{}: the {} already stands next to the {}", place(), objects[0].name,
+  return fmt::format("{}: the {} is already next to the {}", place(), objects[0].name,
                      objects[1].name);
 }
 

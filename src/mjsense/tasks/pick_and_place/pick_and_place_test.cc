@@ -242,7 +242,7 @@ TEST(PickAndPlace, WhatStandsThereAlreadyIsNoStart) {
     const bool success = table.task.evaluate(table.world).success;
     there += success ? 1 : 0;
     if (!success) continue;
-    EXPECT_THAT(fault, HasSubstr("already stands next to the")) << episode;
+    EXPECT_THAT(fault, HasSubstr("is already next to the")) << episode;
   }
   EXPECT_GT(there, 0) << "none to tell";
 }
